@@ -1,0 +1,19 @@
+#pragma once
+// Every compile-time capacity of the flight path, in one place. Run-time settings may ask for
+// less, never for more; each capacity's policy when full is written where it is applied.
+
+#include <cstddef>
+
+namespace swiftlet {
+
+inline constexpr std::size_t kMaxCameras = 2;
+/// Tracked features per frame (both cameras of one landmark count once).
+inline constexpr std::size_t kMaxFeatures = 400;
+/// IMU samples between two frames handed to the smoother: 2.5 s at 400 Hz, 1 s at 1 kHz.
+inline constexpr std::size_t kMaxImuPerFrame = 1024;
+/// States in the smoother's window, keyframes and recent frames together.
+inline constexpr std::size_t kMaxStates = 24;
+/// Landmarks in the smoother's window.
+inline constexpr std::size_t kMaxLandmarks = 1024;
+
+}  // namespace swiftlet

@@ -1,0 +1,66 @@
+#pragma once
+// What the odometry says after each frame, beside the newest state.
+
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "estimator/core/fixed_vector.hpp"
+#include "estimator/core/limits.hpp"
+#include "estimator/messages/nav_state.hpp"
+
+namespace swiftlet {
+
+enum class EventKind : std::uint8_t {
+  kImuGap,           ///< value: seconds without a sample
+  kImuSaturated,     ///< value: samples
+  kImuInvalid,       ///< value: samples dropped (NaN, repeated or reversed stamp)
+  kFrameDropped,     ///< value: frames refused (repeated or reversed stamp, wrong size)
+  kFrameUnpaired,    ///< value: frames whose partner never came
+  kCameraLost,       ///< value: camera
+  kCameraBack,       ///< value: camera
+  kBlackoutStarted,  ///< no accepted image for longer than the health rule allows
+  kBlackoutEnded,    ///< value: seconds it lasted
+  kRestStarted,
+  kRestEnded,
+  kInitialized,      ///< value: seconds since the first image
+  kHealthChanged,    ///< value: the new Health
+  kReset,            ///< value: the new epoch
+  kCapacityReached,  ///< value: items given up
+};
+
+struct Event {
+  Stamp stamp;
+  EventKind kind = EventKind::kReset;
+  double value = 0;
+};
+
+/// One frame's figures: what a user looks at first when a run goes wrong.
+struct FrameStatistics {
+  bool keyframe = false;
+  bool at_rest = false;
+  int tracks = 0;               ///< features handed in
+  int landmarks = 0;            ///< landmarks in the solved window
+  int inliers_mono = 0;         ///< accepted sightings of this frame, by one camera
+  int inliers_stereo = 0;       ///< accepted, by both cameras
+  double track_length = 0;      ///< mean frames a track of this frame has lived
+  double reprojection_rms = 0;  ///< px, accepted sightings of the window
+  double imu_residual = 0;      ///< whitened IMU residual of the newest interval, RMS (1 = nominal)
+  int iterations = 0;
+};
+
+/// A keyframe as it leaves the window (or at the end of the run).
+struct KeyframeState {
+  NavState state;
+  FrameStatistics statistics;
+};
+
+struct OdometryOutput {
+  bool has_state = false;        ///< false until the first pose of an epoch
+  const char* waiting_for = "";  ///< literal text while initializing
+  NavState state;
+  FrameStatistics statistics;
+  FixedVector<KeyframeState, kMaxStates> left_window;
+  FixedVector<Event, 32> events;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,33 @@
+#pragma once
+// What the front-end hands to the smoother: where each landmark was seen in this frame.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+
+#include "estimator/core/fixed_vector.hpp"
+#include "estimator/core/limits.hpp"
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+using TrackId = std::uint64_t;
+
+/// A landmark's sightings in one frame. An id is never reused within an epoch.
+struct TrackedFeature {
+  TrackId id = 0;
+  std::array<bool, kMaxCameras> seen{};
+  std::array<Eigen::Vector2f, kMaxCameras> pixel{};  ///< distorted pixels, valid where seen
+};
+
+struct TrackedFrame {
+  Stamp stamp;
+  std::uint64_t index = 0;
+  std::array<bool, kMaxCameras> camera_present{};
+  bool keyframe = false;
+  /// Median pixel motion of the tracks since the previous frame; negative when unknown.
+  float median_motion = -1.0F;
+  FixedVector<TrackedFeature, kMaxFeatures> features;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,22 @@
+# swiftlet_library(<name> SOURCES a.cpp ... DEPENDS swiftlet::core ... [PRIVATE pkg ...])
+# One library per folder, target swiftlet_<name>, alias swiftlet::<name>. Without sources it is an
+# interface library. Headers are included by their path from the project's root.
+function(swiftlet_library name)
+  cmake_parse_arguments(arg "" "" "SOURCES;DEPENDS;PRIVATE" ${ARGN})
+  set(target swiftlet_${name})
+  if(arg_SOURCES)
+    add_library(${target} STATIC ${arg_SOURCES})
+    set(scope PUBLIC)
+    target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:swiftlet_flags> ${arg_PRIVATE})
+  else()
+    add_library(${target} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  add_library(swiftlet::${name} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
+  target_compile_features(${target} ${scope} cxx_std_20)
+  target_include_directories(${target} ${scope}
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:include/swiftlet>)
+  target_link_libraries(${target} ${scope} ${arg_DEPENDS})
+  set_property(GLOBAL APPEND PROPERTY SWIFTLET_LIBRARIES ${target})
+endfunction()

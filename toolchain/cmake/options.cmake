@@ -1,0 +1,37 @@
+# Build options and the one set of compile flags that every target of the project shares.
+option(SWIFTLET_BUILD_TESTS "Build the tests (needs Catch2, OpenCV)" ON)
+option(SWIFTLET_BUILD_BENCHMARKS "Build the benchmarks (needs Google Benchmark, OpenCV, Ceres, OpenGV)" OFF)
+option(SWIFTLET_BUILD_FUZZERS "Build the libFuzzer targets (needs clang)" OFF)
+option(SWIFTLET_WARNINGS_AS_ERRORS "Treat warnings as errors" ON)
+set(SWIFTLET_SANITIZE "" CACHE STRING "Sanitizers, as -fsanitize takes them: address,undefined or thread")
+
+# One instruction set for the whole build: units that share Eigen must agree on alignment.
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  set(SWIFTLET_CPU "x86-64-v3" CACHE STRING "-march for every unit")
+else()
+  set(SWIFTLET_CPU "armv8-a" CACHE STRING "-march for every unit")
+endif()
+
+if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
+endif()
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DNDEBUG")
+
+add_library(swiftlet_flags INTERFACE)
+target_compile_options(swiftlet_flags INTERFACE
+  -march=${SWIFTLET_CPU} -fno-math-errno -fno-trapping-math
+  -Wall -Wextra -Wconversion -Wshadow
+  $<$<BOOL:${SWIFTLET_WARNINGS_AS_ERRORS}>:-Werror>
+  # Eigen 3.4 with GCC 12 warns inside its own fixed-size expressions.
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overread>)
+target_compile_definitions(swiftlet_flags INTERFACE
+  $<$<CONFIG:Debug>:EIGEN_RUNTIME_NO_MALLOC EIGEN_INITIALIZE_MATRICES_BY_NAN>)
+if(SWIFTLET_SANITIZE)
+  target_compile_options(swiftlet_flags INTERFACE -fsanitize=${SWIFTLET_SANITIZE} -fno-omit-frame-pointer)
+  target_link_options(swiftlet_flags INTERFACE -fsanitize=${SWIFTLET_SANITIZE})
+endif()
