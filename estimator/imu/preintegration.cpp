@@ -3,110 +3,200 @@
 #include <algorithm>
 
 #include "estimator/geometry/so3.hpp"
+#include "estimator/imu/integration_rule.hpp"
 
 namespace swiftlet {
 namespace {
 
-struct Reading {
-  Eigen::Vector3d gyro;
-  Eigen::Vector3d accel;
-};
-
-Reading interpolate(const ImuSample& a, const ImuSample& b, Stamp at) {
-  const double span = (b.stamp - a.stamp).seconds();
-  const double s = span > 0 ? (at - a.stamp).seconds() / span : 0.0;
-  return {a.gyro + s * (b.gyro - a.gyro), a.accel + s * (b.accel - a.accel)};
+// hat(a) M without forming hat(a).
+Eigen::Matrix3d cross(const Eigen::Vector3d& a, const Eigen::Matrix3d& m) {
+  Eigen::Matrix3d out;
+  out.row(0) = a.y() * m.row(2) - a.z() * m.row(1);
+  out.row(1) = a.z() * m.row(0) - a.x() * m.row(2);
+  out.row(2) = a.x() * m.row(1) - a.y() * m.row(0);
+  return out;
 }
 
 }  // namespace
 
 Preintegration::Preintegration(const ImuNoise& noise, const Eigen::Vector3d& bias_gyro,
                                const Eigen::Vector3d& bias_accel)
-    : gyro_variance_density_(noise.gyro_density * noise.gyro_density),
-      accel_variance_density_(noise.accel_density * noise.accel_density),
-      bias_gyro_(bias_gyro),
-      bias_accel_(bias_accel) {}
+    : noise_(noise), bias_gyro_(bias_gyro), bias_accel_(bias_accel) {}
 
-void Preintegration::integrate(double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
-  const Eigen::Vector3d phi = (gyro - bias_gyro_) * dt;
-  const Eigen::Vector3d a = accel - bias_accel_;
-  const Eigen::Quaterniond half = expSo3(0.5 * phi);
+void Preintegration::integrate(double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel,
+                               double gyro_factor, double accel_factor) {
   const Eigen::Matrix3d R = rotation_.toRotationMatrix();
-  const Eigen::Matrix3d R_half = (rotation_ * half).toRotationMatrix();
-  const Eigen::Matrix3d step = expSo3Matrix(phi);
-  const Eigen::Matrix3d right_jacobian = rightJacobianSo3(phi);
-  const Eigen::Vector3d force = R_half * a;
+  const IntegrationStep step = integrationStep((gyro - bias_gyro_) * dt);
+  const Eigen::Quaterniond middle = rotation_ * step.half;
+  const Eigen::Matrix3d R_half = middle.toRotationMatrix();
+  const Eigen::Vector3d force = R_half * (accel - bias_accel_);
 
-  // d(R_half a)/d(phi of R) = -R hat(Exp(half) a), and through the half step's own rate.
-  const Eigen::Matrix3d force_phi = -R * hat(half * a);
-  const Eigen::Matrix3d force_gyro = R_half * hat(a) * (rightJacobianSo3(0.5 * phi) * (0.5 * dt));
+  propagateCovariance(dt, force, gyro_factor * noise_.gyro_density * noise_.gyro_density * dt,
+                      accel_factor * noise_.accel_density * noise_.accel_density * dt);
 
-  Matrix9d A = Matrix9d::Identity();
-  A.block<3, 3>(0, 0) = step.transpose();
-  A.block<3, 3>(3, 0) = 0.5 * dt * dt * force_phi;
-  A.block<3, 3>(3, 6) = dt * Eigen::Matrix3d::Identity();
-  A.block<3, 3>(6, 0) = dt * force_phi;
-  Eigen::Matrix<double, 9, 3> B_gyro;  // d increment / d gyro bias (bias enters with a minus)
-  B_gyro.topRows<3>() = -right_jacobian * dt;
-  B_gyro.middleRows<3>(3) = 0.5 * dt * dt * force_gyro;
-  B_gyro.bottomRows<3>() = dt * force_gyro;
-  Eigen::Matrix<double, 9, 3> B_accel = Eigen::Matrix<double, 9, 3>::Zero();
-  B_accel.middleRows<3>(3) = -0.5 * dt * dt * R_half;
-  B_accel.bottomRows<3>() = -dt * R_half;
-
-  // White noise of density s over dt has the mean's variance s^2 / dt.
-  covariance_ = A * covariance_ * A.transpose() +
-                (gyro_variance_density_ / dt) * B_gyro * B_gyro.transpose() +
-                (accel_variance_density_ / dt) * B_accel * B_accel.transpose();
-  jacobian_gyro_ = A * jacobian_gyro_ + B_gyro;
-  jacobian_accel_ = A * jacobian_accel_ + B_accel;
+  // The bias turns the middle attitude by d theta_half; p follows v by the trapezoid rule.
+  const Eigen::Matrix3d theta_half = theta_gyro_ - (0.5 * dt) * R * step.half_left_jacobian;
+  const Eigen::Matrix3d v_gyro_before = v_gyro_;
+  v_gyro_ -= cross(dt * force, theta_half);
+  p_gyro_ += (0.5 * dt) * (v_gyro_before + v_gyro_);
+  theta_gyro_ -= dt * R * step.left_jacobian;
+  p_accel_ += dt * v_accel_ - (0.5 * dt * dt) * R_half;
+  v_accel_ -= dt * R_half;
 
   position_ += velocity_ * dt + 0.5 * dt * dt * force;
   velocity_ += dt * force;
-  rotation_ = (rotation_ * expSo3(phi)).normalized();
+  rotation_ = (middle * step.half).normalized();
   duration_ += dt;
+}
+
+void Preintegration::propagateCovariance(double dt, const Eigen::Vector3d& force, double gyro_variance,
+                                         double accel_variance) {
+  // theta' = theta + w,  v' = v - dt f x (theta + w / 2) + n dt,  p' = p + dt (v + v') / 2.
+  // Half of w's variance goes in before, half after: the covariance of theta and v is then exact,
+  // that of v too large by dt^3 f^2 gyro_density^2 / 4, which is nothing.
+  const Eigen::Vector3d a = -dt * force;
+  cov_.theta_theta.diagonal().array() += 0.5 * gyro_variance;
+  const Eigen::Matrix3d f_theta = cross(a, cov_.theta_theta);      // cov(a x theta, theta)
+  const Eigen::Matrix3d f_v = cross(a, cov_.v_theta.transpose());  // cov(a x theta, v)
+  const Eigen::Matrix3d f_p = cross(a, cov_.p_theta.transpose());  // cov(a x theta, p)
+  const Eigen::Matrix3d f_f = cross(a, f_theta.transpose());       // cov(a x theta, a x theta)
+  const Eigen::Matrix3d v_vnew = cov_.v_v + f_v.transpose();       // cov(v, v')
+  const Eigen::Matrix3d p_vnew = cov_.p_v + f_p.transpose();       // cov(p, v')
+  Eigen::Matrix3d vnew_vnew = v_vnew + f_v + f_f;
+  vnew_vnew.diagonal().array() += accel_variance;
+  const Eigen::Matrix3d v_theta = cov_.v_theta + f_theta;
+  const double h = 0.5 * dt;
+  cov_.p_theta += h * (cov_.v_theta + v_theta);
+  const Eigen::Matrix3d p_sum = cov_.p_v + p_vnew;  // cov(p, v + v')
+  cov_.p_p +=
+      h * (p_sum + p_sum.transpose()) + (h * h) * (cov_.v_v + v_vnew + v_vnew.transpose() + vnew_vnew);
+  cov_.p_v = p_vnew + h * (v_vnew + vnew_vnew);
+  cov_.v_v = vnew_vnew;
+  cov_.v_theta = v_theta;
+  cov_.theta_theta.diagonal().array() += 0.5 * gyro_variance;
+}
+
+void Preintegration::bridgeGap(double dt, const Eigen::Vector3d& accel) {
+  const Eigen::Matrix3d R = rotation_.toRotationMatrix();
+  const Eigen::Vector3d force = R * (accel - bias_accel_);
+  // The unknown turn in the gap does not turn the force: a hovering body pushes up whatever its
+  // attitude did. So the rate's variance goes in after the step, not through it.
+  propagateCovariance(dt, force, 0, kGapAccelDensity * kGapAccelDensity * dt);
+  cov_.theta_theta.diagonal().array() += kGapGyroDensity * kGapGyroDensity * dt;
+  const Eigen::Matrix3d v_gyro_before = v_gyro_;
+  v_gyro_ -= cross(dt * force, theta_gyro_);
+  p_gyro_ += (0.5 * dt) * (v_gyro_before + v_gyro_);
+  p_accel_ += dt * v_accel_ - (0.5 * dt * dt) * R;
+  v_accel_ -= dt * R;
+  position_ += velocity_ * dt + 0.5 * dt * dt * force;
+  velocity_ += dt * force;
+  duration_ += dt;
+  gap_duration_ += dt;
 }
 
 Status Preintegration::integrate(std::span<const ImuSample> samples, Stamp from, Stamp to) {
   if (samples.empty()) return {StatusCode::kInvalidInput, "no IMU sample in the interval"};
-  const auto reading_at = [&](std::size_t next, Stamp at) -> Reading {
-    if (next == 0) return {samples.front().gyro, samples.front().accel};
-    if (next == samples.size()) return {samples.back().gyro, samples.back().accel};
-    return interpolate(samples[next - 1], samples[next], at);
-  };
   const auto after = [](Stamp stamp, const ImuSample& s) { return stamp < s.stamp; };
   auto next = static_cast<std::size_t>(std::upper_bound(samples.begin(), samples.end(), from, after) -
                                        samples.begin());
   Stamp at = from;
-  Reading reading = reading_at(next, at);
   while (at < to) {
-    const bool more = next < samples.size() && samples[next].stamp < to;
-    const Stamp end = more ? samples[next].stamp : to;
-    const Reading end_reading =
-        more ? Reading{samples[next].gyro, samples[next].accel} : reading_at(next, to);
-    integrate((end - at).seconds(), 0.5 * (reading.gyro + end_reading.gyro),
-              0.5 * (reading.accel + end_reading.accel));
+    const ImuSample* left = next > 0 ? &samples[next - 1] : nullptr;
+    const ImuSample* right = next < samples.size() ? &samples[next] : nullptr;
+    const Stamp end = right != nullptr && right->stamp < to ? right->stamp : to;
+    const ImuSegment segment = makeSegment(left, right, at, end, noise_);
+    if (segment.gap) {
+      bridgeGap(segment.dt, segment.accel);
+    } else {
+      integrate(segment.dt, segment.gyro, segment.accel, segment.gyro_factor, segment.accel_factor);
+    }
     at = end;
-    reading = end_reading;
-    if (more) ++next;
+    ++next;
   }
   return okStatus();
 }
 
+void Preintegration::append(const Preintegration& next) {
+  const Eigen::Matrix3d R = rotation_.toRotationMatrix();
+  const double T = next.duration_;
+  const Eigen::Vector3d v = R * next.deltaVelocity(bias_gyro_, bias_accel_);
+  const Eigen::Vector3d p = R * next.deltaPosition(bias_gyro_, bias_accel_);
+
+  // theta' = theta + R theta2,  p' = p + T v - p2 x theta + R p2,  v' = v - v2 x theta + R v2.
+  const Eigen::Matrix3d theta = cov_.theta_theta;
+  const Eigen::Matrix3d p_theta = cov_.p_theta + T * cov_.v_theta - cross(p, theta);
+  const Eigen::Matrix3d v_theta = cov_.v_theta - cross(v, theta);
+  // cov(p', .) = cov(p, .) + T cov(v, .) - p2 x cov(theta, .)
+  const Eigen::Matrix3d p_v = cov_.p_v + T * cov_.v_v - cross(p, cov_.v_theta.transpose());
+  const Eigen::Matrix3d p_p = cov_.p_p + T * cov_.p_v.transpose() - cross(p, cov_.p_theta.transpose());
+  const Eigen::Matrix3d v_v = cov_.v_v - cross(v, cov_.v_theta.transpose());
+  const auto turned = [&R](const Eigen::Matrix3d& block) -> Eigen::Matrix3d {
+    return R * block * R.transpose();
+  };
+  Blocks sum;
+  sum.theta_theta = theta + turned(next.cov_.theta_theta);
+  sum.p_theta = p_theta + turned(next.cov_.p_theta);
+  sum.v_theta = v_theta + turned(next.cov_.v_theta);
+  // M hat(a)' = (hat(a) M')'
+  sum.p_p = p_p + T * p_v - cross(p, p_theta.transpose()).transpose() + turned(next.cov_.p_p);
+  sum.p_v = p_v - cross(v, p_theta.transpose()).transpose() + turned(next.cov_.p_v);
+  sum.v_v = v_v - cross(v, v_theta.transpose()).transpose() + turned(next.cov_.v_v);
+  cov_ = sum;
+
+  p_gyro_ += T * v_gyro_ - cross(p, theta_gyro_) + R * next.p_gyro_;
+  v_gyro_ += -cross(v, theta_gyro_) + R * next.v_gyro_;
+  theta_gyro_ += R * next.theta_gyro_;
+  p_accel_ += T * v_accel_ + R * next.p_accel_;
+  v_accel_ += R * next.v_accel_;
+  position_ += T * velocity_ + p;
+  velocity_ += v;
+  rotation_ = (rotation_ * next.deltaRotation(bias_gyro_)).normalized();
+  duration_ += T;
+  gap_duration_ += next.gap_duration_;
+}
+
+Matrix9d Preintegration::covariance() const {
+  const Eigen::Matrix3d Rt = rotation_.toRotationMatrix().transpose();
+  Matrix9d out;
+  out.block<3, 3>(0, 0) = Rt * cov_.theta_theta * Rt.transpose();
+  out.block<3, 3>(3, 0) = cov_.p_theta * Rt.transpose();
+  out.block<3, 3>(6, 0) = cov_.v_theta * Rt.transpose();
+  out.block<3, 3>(0, 3) = out.block<3, 3>(3, 0).transpose();
+  out.block<3, 3>(0, 6) = out.block<3, 3>(6, 0).transpose();
+  out.block<3, 3>(3, 3) = cov_.p_p;
+  out.block<3, 3>(3, 6) = cov_.p_v;
+  out.block<3, 3>(6, 3) = cov_.p_v.transpose();
+  out.block<3, 3>(6, 6) = cov_.v_v;
+  return out;
+}
+
 Eigen::Quaterniond Preintegration::deltaRotation(const Eigen::Vector3d& bias_gyro) const {
-  return (rotation_ * expSo3(jacobian_gyro_.topRows<3>() * (bias_gyro - bias_gyro_))).normalized();
+  return (expSo3(theta_gyro_ * (bias_gyro - bias_gyro_)) * rotation_).normalized();
 }
 
 Eigen::Vector3d Preintegration::deltaVelocity(const Eigen::Vector3d& bias_gyro,
                                               const Eigen::Vector3d& bias_accel) const {
-  return velocity_ + jacobian_gyro_.bottomRows<3>() * (bias_gyro - bias_gyro_) +
-         jacobian_accel_.bottomRows<3>() * (bias_accel - bias_accel_);
+  return velocity_ + v_gyro_ * (bias_gyro - bias_gyro_) + v_accel_ * (bias_accel - bias_accel_);
 }
 
 Eigen::Vector3d Preintegration::deltaPosition(const Eigen::Vector3d& bias_gyro,
                                               const Eigen::Vector3d& bias_accel) const {
-  return position_ + jacobian_gyro_.middleRows<3>(3) * (bias_gyro - bias_gyro_) +
-         jacobian_accel_.middleRows<3>(3) * (bias_accel - bias_accel_);
+  return position_ + p_gyro_ * (bias_gyro - bias_gyro_) + p_accel_ * (bias_accel - bias_accel_);
+}
+
+Eigen::Matrix<double, 9, 3> Preintegration::jacobianGyro() const {
+  Eigen::Matrix<double, 9, 3> out;
+  out.topRows<3>() = rotation_.toRotationMatrix().transpose() * theta_gyro_;
+  out.middleRows<3>(3) = p_gyro_;
+  out.bottomRows<3>() = v_gyro_;
+  return out;
+}
+
+Eigen::Matrix<double, 9, 3> Preintegration::jacobianAccel() const {
+  Eigen::Matrix<double, 9, 3> out = Eigen::Matrix<double, 9, 3>::Zero();
+  out.middleRows<3>(3) = p_accel_;
+  out.bottomRows<3>() = v_accel_;
+  return out;
 }
 
 }  // namespace swiftlet

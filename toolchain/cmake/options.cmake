@@ -1,4 +1,5 @@
 # Build options and the one set of compile flags that every target of the project shares.
+option(SWIFTLET_BUILD_PROGRAM "Build the program and the drivers (needs yaml-cpp, fmt, CLI11, codecs)" ON)
 option(SWIFTLET_BUILD_TESTS "Build the tests (needs Catch2, OpenCV)" ON)
 option(SWIFTLET_BUILD_BENCHMARKS "Build the benchmarks (needs Google Benchmark, OpenCV, Ceres, OpenGV)" OFF)
 option(SWIFTLET_BUILD_FUZZERS "Build the libFuzzer targets (needs clang)" OFF)
@@ -16,6 +17,13 @@ if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
 endif()
 
+# Second builds are faster where ccache is installed; nothing depends on it.
+find_program(SWIFTLET_CCACHE ccache)
+mark_as_advanced(SWIFTLET_CCACHE)
+if(SWIFTLET_CCACHE AND NOT DEFINED CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${SWIFTLET_CCACHE})
+endif()
+
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
@@ -27,8 +35,9 @@ target_compile_options(swiftlet_flags INTERFACE
   -march=${SWIFTLET_CPU} -fno-math-errno -fno-trapping-math
   -Wall -Wextra -Wconversion -Wshadow
   $<$<BOOL:${SWIFTLET_WARNINGS_AS_ERRORS}>:-Werror>
-  # Eigen 3.4 with GCC 12 warns inside its own fixed-size expressions.
-  $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overread>)
+  # GCC 12 warns inside Eigen 3.4's fixed-size expressions and, falsely, inside the standard
+  # library's string operator+ (GCC bug 105651).
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overread -Wno-restrict>)
 target_compile_definitions(swiftlet_flags INTERFACE
   $<$<CONFIG:Debug>:EIGEN_RUNTIME_NO_MALLOC EIGEN_INITIALIZE_MATRICES_BY_NAN>)
 if(SWIFTLET_SANITIZE)

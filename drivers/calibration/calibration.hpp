@@ -1,0 +1,72 @@
+#pragma once
+// Calibration files as users have them: EuRoC/ASL `sensor.yaml` (camera and IMU) and Kalibr camchain
+// and IMU YAML, both turned into one Rig and one ImuNoise.
+//
+// Directions (docs/formats.md): EuRoC `T_BS` maps sensor to body and is used as is; Kalibr
+// `T_cam_imu` maps IMU to camera and is inverted; `T_cn_cnm1` maps camera n-1 to camera n and chains;
+// `T_imu_cam` (OpenVINS) maps camera to IMU. The key decides, never the file's name.
+//
+// Body: the estimator's body has its origin in the IMU. Where the IMU file's `T_BS` is not the
+// identity, the body keeps the axes of the file's body frame: samples are turned by `R_body_imu`, the
+// cameras are moved by `T_body_filebody`, and poses of the file's body follow from
+// T_world_filebody = T_world_body * T_body_filebody.
+//
+// Errors: InputError with file, line, field and remedy for everything that cannot be trusted; what is
+// only suspicious goes to `warnings`. Host side only: allocates and throws.
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "drivers/calibration/input_error.hpp"
+#include "estimator/camera/rig.hpp"
+#include "estimator/imu/imu_noise.hpp"
+
+namespace swiftlet {
+
+struct CalibrationOptions {
+  /// Take a rig whose geometry looks like a transform read the wrong way round.
+  bool accept_unusual_rig = false;
+};
+
+struct Calibration {
+  std::string form;  ///< "EuRoC" or "Kalibr"
+  Rig rig;
+  ImuNoise noise;  ///< densities as in the file, not inflated
+  Eigen::Matrix3d R_body_imu = Eigen::Matrix3d::Identity();
+  SE3 T_body_filebody;                               ///< translation only
+  std::array<double, kMaxCameras> camera_rate_hz{};  ///< 0 where the file does not say
+  /// `rostopic` of the Kalibr files, to find the streams in a bag; empty where not given.
+  std::array<std::string, kMaxCameras> camera_topic;
+  std::string imu_topic;
+  std::vector<std::string> warnings;
+
+  [[nodiscard]] bool turnsImu() const { return !R_body_imu.isIdentity(0); }
+};
+
+/// Reads what `path` leads to: a sequence or its mav0 folder, a folder with one camchain and one IMU
+/// file, or a camchain file (its IMU file beside it, or given as `imu_file`). Decides by content.
+Calibration readCalibration(const std::string& path, const std::string& imu_file = {},
+                            const CalibrationOptions& options = {});
+
+/// True when the folder or file `path` has a calibration that readCalibration would find (good or bad).
+bool hasCalibration(const std::string& path);
+
+/// The same from text in memory (EuRoC: one text per camera), for tests and embedded rigs. `name`s
+/// stand for the files in messages.
+struct NamedText {
+  std::string name;
+  std::string_view text;
+};
+Calibration parseEurocCalibration(const std::vector<NamedText>& cameras, const NamedText& imu,
+                                  const CalibrationOptions& options = {});
+Calibration parseKalibrCalibration(const NamedText& camchain, const NamedText& imu,
+                                   const CalibrationOptions& options = {});
+
+/// The rig in words, a line per fact: where each camera sits and looks, the baseline, the lenses, the
+/// noise per sample. Meant to be compared with the hardware on the table.
+std::string describe(const Calibration& calibration);
+
+}  // namespace swiftlet

@@ -1,0 +1,38 @@
+#pragma once
+// Bad input, said so that a user can repair it: which file, line and field, what is wrong, what to
+// do. Thrown by the readers of files on the host side only; the program catches it once, prints
+// what() and ends with exit code 2. Nothing on the flight path throws or catches it.
+
+#include <exception>
+#include <string>
+
+namespace swiftlet {
+
+struct InputError : std::exception {
+  InputError(std::string file_name, int line_number, std::string field_name, std::string message_text,
+             std::string remedy_text)
+      : file(std::move(file_name)),
+        line(line_number),
+        field(std::move(field_name)),
+        message(std::move(message_text)),
+        remedy(std::move(remedy_text)) {
+    text_ = file;
+    if (line > 0) text_ += ":" + std::to_string(line);
+    if (!field.empty()) text_ += ": " + field;
+    text_ += ": " + message;
+    if (!remedy.empty()) text_ += ". " + remedy;
+  }
+  /// "file:line: field: message. remedy"
+  [[nodiscard]] const char* what() const noexcept override { return text_.c_str(); }
+
+  std::string file;
+  int line = 0;  ///< from 1; 0 when the fault belongs to the whole file
+  std::string field;
+  std::string message;
+  std::string remedy;
+
+ private:
+  std::string text_;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,185 @@
+// Kalibr camchain and IMU YAML, with OpenVINS' variant of the camchain.
+
+#include <fmt/format.h>
+
+#include "drivers/calibration/sensor_fields.hpp"
+#include "estimator/geometry/so3.hpp"
+
+namespace swiftlet {
+namespace {
+
+// Two statements of one transform in one file; Kalibr writes 16 digits.
+constexpr double kContradiction = 1e-6;
+constexpr double kShiftWarn_s = 0.1;
+constexpr double kShiftRefuse_s = 1.0;
+
+double distance(const SE3& a, const SE3& b) {
+  const SE3 d = a.inverse() * b;
+  return std::max(d.translation.norm(), logSo3(d.rotation).norm());
+}
+
+struct ChainCamera {
+  YamlField fields;
+  std::optional<SE3> T_body_cam;
+  std::optional<SE3> T_cam_previous;
+  std::string extrinsics_key;
+};
+
+ChainCamera readExtrinsics(const YamlField& camera, Warnings& warnings) {
+  ChainCamera out{camera, std::nullopt, std::nullopt, ""};
+  if (camera.has("T_cam_imu")) {
+    out.extrinsics_key = "T_cam_imu";
+    out.T_body_cam = readTransform(camera.at("T_cam_imu"), warnings).inverse();
+  }
+  if (camera.has("T_imu_cam")) {
+    const YamlField field = camera.at("T_imu_cam");
+    const SE3 T = readTransform(field, warnings);
+    if (out.T_body_cam && distance(T, *out.T_body_cam) > kContradiction) {
+      throw field.error("contradicts T_cam_imu of the same camera", "Remove the wrong one of the two");
+    }
+    out.extrinsics_key = "T_imu_cam";
+    out.T_body_cam = T;
+  }
+  if (camera.has("T_cn_cnm1")) {
+    out.T_cam_previous = readTransform(camera.at("T_cn_cnm1"), warnings);
+    if (out.extrinsics_key.empty()) out.extrinsics_key = "T_cn_cnm1";
+  }
+  return out;
+}
+
+void refuseContradiction(const ChainCamera& previous, const ChainCamera& camera) {
+  if (!previous.T_body_cam || !camera.T_body_cam || !camera.T_cam_previous) return;
+  const SE3 chained = *previous.T_body_cam * camera.T_cam_previous->inverse();
+  const double gap = distance(chained, *camera.T_body_cam);
+  if (gap <= kContradiction) return;
+  throw camera.fields.at("T_cn_cnm1")
+      .error(fmt::format("contradicts {} and {} by {:.3g} (m, rad)",
+                         previous.fields.name() + "." + previous.extrinsics_key,
+                         camera.fields.name() + "." + camera.extrinsics_key, gap),
+             "T_cn_cnm1 maps camera n-1 to camera n; keep the one that the calibration wrote");
+}
+
+void chain(std::vector<ChainCamera>& cameras) {
+  for (std::size_t i = 1; i < cameras.size(); ++i) {
+    refuseContradiction(cameras[i - 1], cameras[i]);
+    if (!cameras[i].T_body_cam && cameras[i - 1].T_body_cam && cameras[i].T_cam_previous) {
+      cameras[i].T_body_cam = *cameras[i - 1].T_body_cam * cameras[i].T_cam_previous->inverse();
+    }
+  }
+  for (std::size_t i = cameras.size(); i-- > 1;) {
+    if (!cameras[i - 1].T_body_cam && cameras[i].T_body_cam && cameras[i].T_cam_previous) {
+      cameras[i - 1].T_body_cam = *cameras[i].T_body_cam * *cameras[i].T_cam_previous;
+    }
+  }
+  for (const ChainCamera& camera : cameras) {
+    if (camera.T_body_cam) continue;
+    throw camera.fields.error(
+        "neither T_cam_imu nor T_imu_cam, nor a chain of T_cn_cnm1 to a camera that has it",
+        "Run the camera-IMU step of the calibration and give its camchain-imucam file");
+  }
+}
+
+std::optional<double> readShift(const YamlField& camera, Warnings& warnings) {
+  if (!camera.has("timeshift_cam_imu")) return std::nullopt;
+  const YamlField field = camera.at("timeshift_cam_imu");
+  const double shift = field.number();
+  if (std::abs(shift) > kShiftRefuse_s) {
+    throw field.error(fmt::format("a shift of {} s", shift), "The unit is seconds: is this in milliseconds?");
+  }
+  if (std::abs(shift) > kShiftWarn_s) {
+    warnings.push_back(field.where() +
+                       fmt::format(": a shift of {} s is unusually large (unit: seconds)", shift));
+  }
+  return shift;
+}
+
+std::vector<CameraEntry> readChain(const YamlField& root, Warnings& warnings) {
+  std::vector<ChainCamera> cameras;
+  for (int i = 0; root.has(fmt::format("cam{}", i)); ++i) {
+    if (cameras.size() == kMaxCameras) {
+      warnings.push_back(root.file() + ": more than two cameras; cam0 and cam1 are used");
+      break;
+    }
+    const YamlField camera = root.at(fmt::format("cam{}", i));
+    if (!camera.isMap())
+      throw camera.error("a map of the camera's fields is expected", "Give a Kalibr camchain");
+    cameras.push_back(readExtrinsics(camera, warnings));
+  }
+  if (cameras.empty()) throw root.error("no camera `cam0`", "Give a Kalibr camchain file");
+  chain(cameras);
+  std::vector<CameraEntry> entries;
+  for (const ChainCamera& camera : cameras) {
+    CameraEntry entry;
+    entry.model = readLens(camera.fields, "distortion_coeffs", warnings);
+    entry.T_body_cam = *camera.T_body_cam;
+    entry.shift_s = readShift(camera.fields, warnings);
+    if (camera.fields.has("rostopic")) entry.topic = camera.fields.at("rostopic").text();
+    const std::string key = camera.extrinsics_key.empty() ? "T_cn_cnm1" : camera.extrinsics_key;
+    entry.file = camera.fields.file();
+    entry.line = camera.fields.has(key) ? camera.fields.at(key).line() : camera.fields.line();
+    entry.field = camera.fields.name() + "." + key;
+    entries.push_back(entry);
+  }
+  return entries;
+}
+
+void refuseImuModel(const YamlField& imu, Warnings& warnings) {
+  if (imu.has("model")) {
+    const YamlField field = imu.at("model");
+    // OpenVINS writes `kalibr` and `rpng` with explicit matrices, checked below.
+    const std::string model = field.text();
+    if (model.starts_with("scale-misalignment")) {
+      throw field.error(
+          "IMU model `" + model + "` has scale and misalignment terms, which swiftlet does not apply",
+          "Calibrate with `--imu-models calibrated`");
+    }
+  }
+  for (const char* key : {"Tw", "Ta", "R_IMUtoGYRO", "R_IMUtoACC", "Tg"}) {
+    if (!imu.has(key)) continue;
+    const YamlField field = imu.at(key);
+    std::vector<double> values;
+    for (const YamlField& row : field.items()) {
+      for (const double v : row.numbers()) values.push_back(v);
+    }
+    const bool zero = std::string(key) == "Tg";
+    if (values.size() != 9) throw field.error("not a 3x3 matrix", "Write three rows of three numbers");
+    for (std::size_t i = 0; i < 9; ++i) {
+      const double expected = (i % 4 == 0 && !zero) ? 1 : 0;
+      if (std::abs(values[i] - expected) > kContradiction) {
+        throw field.error("a correction that swiftlet does not apply", "Apply it to the samples before");
+      }
+    }
+  }
+  if (imu.has("T_i_b")) {
+    const YamlField field = imu.at("T_i_b");
+    if (distance(readTransform(field, warnings), SE3()) > kContradiction) {
+      throw field.error("this IMU is not the body (imu0)",
+                        "Give the entry of imu0, whose T_i_b is the identity");
+    }
+  }
+  if (imu.has("time_offset")) {
+    const YamlField field = imu.at("time_offset");
+    if (std::abs(field.number()) > kContradiction) {
+      throw field.error("an offset between IMUs, which swiftlet does not apply", "Give the entry of imu0");
+    }
+  }
+}
+
+}  // namespace
+
+Calibration parseKalibrCalibration(const NamedText& camchain, const NamedText& imu,
+                                   const CalibrationOptions& options) {
+  Calibration calibration;
+  calibration.form = "Kalibr";
+  const YamlField chain_root = YamlField::parse(camchain.name, camchain.text);
+  const std::vector<CameraEntry> entries = readChain(chain_root, calibration.warnings);
+  const YamlField imu_root = YamlField::parse(imu.name, imu.text);
+  const YamlField imu_fields = imu_root.has("imu0") ? imu_root.at("imu0") : imu_root;
+  refuseImuModel(imu_fields, calibration.warnings);
+  if (imu_fields.has("rostopic")) calibration.imu_topic = imu_fields.at("rostopic").text();
+  calibration.noise = readNoise(imu_fields, "update_rate", calibration.warnings);
+  assembleRig(entries, options, calibration);
+  return calibration;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,91 @@
+// Checks that need the whole rig: a transform read the wrong way round shows in where the second
+// camera sits seen from the first.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "drivers/calibration/sensor_fields.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr double kMaxShiftDifference_s = 0.5e-3;
+constexpr double kMaxAxisAngle = 30.0 * std::numbers::pi / 180.0;
+constexpr double kMinBaseline = 1e-3;  // m
+
+bool xIsLargest(const Eigen::Vector3d& t) {
+  return std::abs(t.x()) > std::abs(t.y()) && std::abs(t.x()) > std::abs(t.z());
+}
+
+void checkPair(const std::vector<CameraEntry>& cameras, const CalibrationOptions& options,
+               Warnings& warnings) {
+  const SE3 T_c1_c0 = cameras[1].T_body_cam.inverse() * cameras[0].T_body_cam;
+  const SE3 T_c1_c0_reversed = cameras[1].T_body_cam * cameras[0].T_body_cam.inverse();
+  const Eigen::Vector3d& t = T_c1_c0.translation;
+  const Eigen::Vector3d& reversed = T_c1_c0_reversed.translation;
+  const std::string place =
+      fmt::format("cam0 seen from cam1 at ({:.4f}, {:.4f}, {:.4f}) m", t.x(), t.y(), t.z());
+  const CameraEntry& second = cameras[1];
+  if (t.norm() < kMinBaseline) {
+    throw InputError(second.file, second.line, second.field, "both cameras sit in the same place",
+                     "Give each camera its own transform");
+  }
+  if (!xIsLargest(t) && xIsLargest(reversed) && reversed.x() < 0 && !options.accept_unusual_rig) {
+    throw InputError(second.file, second.line, second.field,
+                     "looks like a transform written the wrong way round: as written, " + place +
+                         "; inverted, the cameras sit side by side",
+                     "EuRoC T_BS maps camera to body, Kalibr T_cam_imu maps IMU to camera: invert both "
+                     "matrices, or accept the unusual rig explicitly");
+  }
+  const std::string where = fmt::format("{}:{}: {}", second.file, second.line, second.field);
+  if (!xIsLargest(t)) {
+    warnings.push_back(where + ": the cameras do not sit side by side (" + place + ")");
+  } else if (t.x() > 0) {
+    warnings.push_back(where + ": cam1 sits to the left of cam0 (" + place +
+                       "): swapped cameras, or a transform written the wrong way round?");
+  }
+  const double angle = std::acos(std::clamp(T_c1_c0.R()(2, 2), -1.0, 1.0));
+  if (angle > kMaxAxisAngle) {
+    warnings.push_back(
+        where + fmt::format(": the optical axes are {:.0f} degrees apart", angle * 180.0 / std::numbers::pi));
+  }
+}
+
+void joinShifts(const std::vector<CameraEntry>& cameras, Calibration& calibration) {
+  double sum = 0;
+  int count = 0;
+  for (const CameraEntry& camera : cameras) {
+    if (!camera.shift_s) continue;
+    sum += *camera.shift_s;
+    ++count;
+  }
+  if (count > 0) calibration.rig.camera_to_imu_shift = Duration::fromSeconds(sum / count);
+  if (count == 2 && std::abs(*cameras[0].shift_s - *cameras[1].shift_s) > kMaxShiftDifference_s) {
+    calibration.warnings.push_back(
+        fmt::format("{}: timeshift_cam_imu of the cameras differs by {:.3f} ms; their mean is used. Are they "
+                    "triggered together?",
+                    cameras[1].file, 1e3 * std::abs(*cameras[0].shift_s - *cameras[1].shift_s)));
+  }
+}
+
+}  // namespace
+
+void assembleRig(const std::vector<CameraEntry>& cameras, const CalibrationOptions& options,
+                 Calibration& calibration) {
+  if (cameras.empty()) throw InputError("calibration", 0, "", "no camera", "Give at least cam0");
+  Rig& rig = calibration.rig;
+  rig.camera_count = std::min(cameras.size(), kMaxCameras);
+  for (std::size_t i = 0; i < rig.camera_count; ++i) {
+    rig.camera[i] = cameras[i].model;
+    rig.T_body_cam[i] = calibration.T_body_filebody * cameras[i].T_body_cam;
+    calibration.camera_rate_hz[i] = cameras[i].rate_hz;
+    calibration.camera_topic[i] = cameras[i].topic;
+  }
+  joinShifts(cameras, calibration);
+  if (rig.camera_count == 2) checkPair(cameras, options, calibration.warnings);
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,211 @@
+#include "drivers/calibration/sensor_fields.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/SVD>
+#include <cmath>
+
+namespace swiftlet {
+namespace {
+
+// Single-precision copies of a rotation are off by some 1e-7; rounding to 4 digits by 1e-4.
+constexpr double kOrthonormalWarn = 1e-6;
+constexpr double kOrthonormalRefuse = 1e-3;
+constexpr double kLastRowTolerance = 1e-9;
+constexpr double kMaxLever = 10;  // m; a rig is smaller, so more means millimetres
+constexpr int kMinImageSide = 16;
+constexpr int kMaxImageSide = 16384;
+
+// Bounds outside of which a density is almost certainly in another unit or per sample.
+constexpr double kGyroDensityLow = 1e-5;
+constexpr double kGyroDensityHigh = 1e-1;
+constexpr double kAccelDensityLow = 1e-4;
+constexpr double kAccelDensityHigh = 1;
+constexpr double kGyroWalkHigh = 1e-2;
+constexpr double kAccelWalkHigh = 1e-1;
+
+Eigen::Matrix4d readMatrix(const YamlField& field) {
+  std::vector<double> values;
+  if (field.isMap()) {
+    values = field.at("data", "Write the 16 numbers row by row under `data`").numbers();
+  } else {
+    for (const YamlField& row : field.items()) {
+      if (!row.isList()) {
+        values.push_back(row.number());
+        continue;
+      }
+      const std::vector<double> numbers = row.numbers();
+      if (numbers.size() != 4) throw row.error("a row must have 4 numbers", "Write a 4x4 matrix");
+      values.insert(values.end(), numbers.begin(), numbers.end());
+    }
+  }
+  if (values.size() != 16) {
+    throw field.error(fmt::format("{} numbers where a 4x4 matrix has 16", values.size()),
+                      "Write 4 rows of 4 numbers");
+  }
+  return Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
+}
+
+void checkLastRow(const YamlField& field, const Eigen::Matrix4d& T) {
+  const Eigen::RowVector4d expected(0, 0, 0, 1);
+  if ((T.row(3) - expected).cwiseAbs().maxCoeff() <= kLastRowTolerance) return;
+  if ((T.col(3) - expected.transpose()).cwiseAbs().maxCoeff() <= kLastRowTolerance) {
+    throw field.error("the last column is 0 0 0 1: the matrix is written column by column",
+                      "Transpose it: rows first, translation in the last column");
+  }
+  throw field.error("the last row is not 0 0 0 1", "Write a rigid transform [R t; 0 0 0 1], row by row");
+}
+
+Eigen::Vector4d four(const YamlField& field, std::vector<double> values, const char* meaning) {
+  // Some tools append k3 as a fifth radial coefficient; zero changes nothing.
+  while (values.size() > 4 && values.back() == 0) values.pop_back();
+  if (values.size() != 4) {
+    throw field.error(fmt::format("{} numbers where 4 are expected", values.size()),
+                      fmt::format("Give {}", meaning));
+  }
+  return Eigen::Vector4d(values.data());
+}
+
+void checkIntrinsics(const YamlField& field, const Eigen::Vector4d& k, int width, int height,
+                     Warnings& warnings) {
+  if (k[0] <= 0 || k[1] <= 0) throw field.error("a focal length is not positive", "Order: fu, fv, cu, cv");
+  if (k[2] > width && k[2] <= height) {
+    throw field.error(fmt::format("cu {} lies outside a width of {}", k[2], width),
+                      "`resolution` is swapped: it is [width, height]");
+  }
+  if (k[2] < 0 || k[2] > width || k[3] < 0 || k[3] > height) {
+    throw field.error(
+        fmt::format("the principal point ({}, {}) lies outside the {}x{} image", k[2], k[3], width, height),
+        "Give intrinsics and resolution of the same image size; order: fu, fv, cu, cv");
+  }
+  if (std::abs(k[2] - 0.5 * width) > 0.25 * width || std::abs(k[3] - 0.5 * height) > 0.25 * height) {
+    warnings.push_back(
+        field.where() +
+        fmt::format(": the principal point ({}, {}) is far from the centre of the {}x{} image. "
+                    "Were these intrinsics made at another resolution?",
+                    k[2], k[3], width, height));
+  }
+}
+
+void checkCorners(const YamlField& field, const CameraModel& model, Warnings& warnings) {
+  int lost = 0;
+  for (const double x : {0.0, model.width() - 1.0}) {
+    for (const double y : {0.0, model.height() - 1.0}) {
+      Eigen::Vector3d bearing;
+      if (!model.unproject({x, y}, bearing)) ++lost;
+    }
+  }
+  // A fisheye's corners are dark; a pinhole's are used.
+  if (lost > 0 && model.kind() == CameraKind::kPinholeRadtan) {
+    warnings.push_back(field.where() +
+                       fmt::format(": the lens model has no inverse in {} of the 4 image corners (it folds "
+                                   "back); points there are ignored",
+                                   lost));
+  }
+}
+
+double readPositive(const YamlField& imu, const std::string& key) {
+  const YamlField field = imu.at(key, "Take it from the data sheet or an Allan plot; continuous-time units");
+  const double value = field.number();
+  if (value <= 0) {
+    throw field.error(
+        fmt::format("{} is not positive", value),
+        "A noise figure of zero makes the filter trust the IMU without limit; give the real one");
+  }
+  return value;
+}
+
+void warnOutside(const YamlField& field, double value, double low, double high, const char* unit,
+                 Warnings& warnings) {
+  if (value >= low && value <= high) return;
+  warnings.push_back(field.where() + fmt::format(": {} {} is outside {}..{}: is it in another unit, or per "
+                                                 "sample instead of per sqrt(Hz)?",
+                                                 value, unit, low, high));
+}
+
+}  // namespace
+
+SE3 readTransform(const YamlField& field, Warnings& warnings) {
+  const Eigen::Matrix4d T = readMatrix(field);
+  checkLastRow(field, T);
+  const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
+  const Eigen::Vector3d t = T.topRightCorner<3, 1>();
+  const double defect = (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!(defect <= kOrthonormalRefuse)) {
+    throw field.error(fmt::format("the rotation is not orthonormal (off by {:.2g})", defect),
+                      "Give all digits of the calibration's result");
+  }
+  if (R.determinant() < 0) {
+    throw field.error("the rotation is a mirror (determinant -1)", "One axis has the wrong sign");
+  }
+  if (t.cwiseAbs().maxCoeff() > kMaxLever) {
+    throw field.error(fmt::format("the translation is {:.3g} m long", t.norm()),
+                      "Translations are in metres: is this in millimetres?");
+  }
+  if (defect > kOrthonormalWarn) {
+    warnings.push_back(field.where() +
+                       fmt::format(": the rotation is off orthonormal by {:.2g}; made orthonormal", defect));
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Matrix3d nearest = svd.matrixU() * svd.matrixV().transpose();
+  return {nearest, t};
+}
+
+std::array<int, 2> readResolution(const YamlField& field) {
+  const std::vector<double> values = field.numbers();
+  bool good = values.size() == 2;
+  for (const double v : values) good = good && v >= kMinImageSide && v <= kMaxImageSide && v == std::floor(v);
+  if (!good) throw field.error("not a [width, height] in whole pixels", "Write it as [752, 480]");
+  return {static_cast<int>(values[0]), static_cast<int>(values[1])};
+}
+
+CameraModel readLens(const YamlField& camera, const std::string& coefficients_key, Warnings& warnings) {
+  const YamlField model_field = camera.at("camera_model", "swiftlet reads `pinhole`");
+  if (const std::string model = model_field.text(); model != "pinhole") {
+    throw model_field.error("camera model `" + model + "` is not supported",
+                            "Calibrate as pinhole-radtan or pinhole-equi (wide lenses)");
+  }
+  const auto [width, height] = readResolution(camera.at("resolution", "Write it as [width, height]"));
+  const YamlField intrinsics_field = camera.at("intrinsics", "Write it as [fu, fv, cu, cv]");
+  const Eigen::Vector4d intrinsics = four(intrinsics_field, intrinsics_field.numbers(), "fu, fv, cu, cv");
+  checkIntrinsics(intrinsics_field, intrinsics, width, height, warnings);
+
+  const YamlField kind_field =
+      camera.at("distortion_model", "`radtan`, `radial-tangential` or `equidistant`");
+  const std::string kind = kind_field.text();
+  CameraKind camera_kind = CameraKind::kPinholeRadtan;
+  Eigen::Vector4d distortion = Eigen::Vector4d::Zero();
+  if (kind == "equidistant") {
+    camera_kind = CameraKind::kEquidistant;
+  } else if (kind != "radtan" && kind != "radial-tangential" && kind != "plumb_bob" && kind != "none") {
+    throw kind_field.error("distortion model `" + kind + "` is not supported",
+                           "Calibrate as pinhole-radtan or pinhole-equi");
+  }
+  if (kind != "none") {
+    const YamlField field = camera.at(coefficients_key, "k1, k2, p1, p2 (radtan) or k1..k4 (equidistant)");
+    distortion = four(field, field.numbers(), "k1, k2, p1, p2 (radtan) or k1..k4 (equidistant)");
+  }
+  const CameraModel model(camera_kind, width, height, intrinsics, distortion);
+  checkCorners(intrinsics_field, model, warnings);
+  return model;
+}
+
+ImuNoise readNoise(const YamlField& imu, const std::string& rate_key, Warnings& warnings) {
+  ImuNoise noise;
+  noise.gyro_density = readPositive(imu, "gyroscope_noise_density");
+  noise.gyro_walk = readPositive(imu, "gyroscope_random_walk");
+  noise.accel_density = readPositive(imu, "accelerometer_noise_density");
+  noise.accel_walk = readPositive(imu, "accelerometer_random_walk");
+  noise.rate_hz = readPositive(imu, rate_key);
+  warnOutside(imu.at("gyroscope_noise_density"), noise.gyro_density, kGyroDensityLow, kGyroDensityHigh,
+              "rad/s/sqrt(Hz)", warnings);
+  warnOutside(imu.at("accelerometer_noise_density"), noise.accel_density, kAccelDensityLow, kAccelDensityHigh,
+              "m/s^2/sqrt(Hz)", warnings);
+  warnOutside(imu.at("gyroscope_random_walk"), noise.gyro_walk, 0, kGyroWalkHigh, "rad/s^2/sqrt(Hz)",
+              warnings);
+  warnOutside(imu.at("accelerometer_random_walk"), noise.accel_walk, 0, kAccelWalkHigh, "m/s^3/sqrt(Hz)",
+              warnings);
+  return noise;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,45 @@
+#pragma once
+// What EuRoC and Kalibr files have in common: rigid transforms, lenses, noise figures, and the entry
+// that a reader makes of one camera. Private to this folder.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/calibration/calibration.hpp"
+#include "drivers/calibration/yaml_field.hpp"
+
+namespace swiftlet {
+
+using Warnings = std::vector<std::string>;
+
+struct CameraEntry {
+  CameraModel model;
+  SE3 T_body_cam;
+  double rate_hz = 0;
+  std::optional<double> shift_s;  ///< t_imu = t_cam + shift
+  std::string topic;
+  std::string file;  ///< where the extrinsics stand, for the checks across cameras
+  int line = 0;
+  std::string field;
+};
+
+/// A 4x4 rigid transform, written as four lists of four or as {rows, cols, data}. Refuses wrong last
+/// rows, mirrors, millimetres and matrices further than 1e-3 from orthonormal; above 1e-6 it
+/// re-orthonormalises and warns.
+SE3 readTransform(const YamlField& field, Warnings& warnings);
+
+/// [width, height] in pixels.
+std::array<int, 2> readResolution(const YamlField& field);
+
+/// Lens from its four fields; refuses models swiftlet has no projection for.
+CameraModel readLens(const YamlField& camera, const std::string& coefficients_key, Warnings& warnings);
+
+/// The four densities and the rate under EuRoC's and Kalibr's common names.
+ImuNoise readNoise(const YamlField& imu, const std::string& rate_key, Warnings& warnings);
+
+/// Joins the cameras to a rig, after the checks that need all of them.
+void assembleRig(const std::vector<CameraEntry>& cameras, const CalibrationOptions& options,
+                 Calibration& calibration);
+
+}  // namespace swiftlet

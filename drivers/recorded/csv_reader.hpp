@@ -1,0 +1,87 @@
+#pragma once
+// Rows of a comma- or blank-separated text file, one at a time, in constant memory.
+//
+// Blank lines and lines that begin with '#' are skipped, and a first line whose first field is no
+// number (a header without '#'). CR, surrounding blanks and a byte order mark are removed. A caller
+// that cannot use a row rejects it: the row is counted and named, and reading goes on; a file of which
+// more than a tenth (and more than three rows) is rejected, or that gives no row at all, is refused by
+// finish() with an InputError that names the first bad row.
+
+#include <array>
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "drivers/calibration/input_error.hpp"
+#include "drivers/recorded/log_warnings.hpp"
+
+namespace swiftlet {
+
+class CsvReader {
+ public:
+  static constexpr std::size_t kMaxFields = 64;
+  static constexpr std::size_t kMaxLine = 4096;  ///< bytes; no format here comes near
+
+  enum class Separator { kComma, kBlank };
+
+  /// Opens `path`; InputError when that is impossible.
+  CsvReader(const std::string& path, Separator separator, LogCounters& counters, LogWarnings& warnings);
+  /// Reads text in memory, which must outlive the reader. `name` stands for the file in messages.
+  CsvReader(const std::string& name, std::string_view text, Separator separator, LogCounters& counters,
+            LogWarnings& warnings);
+
+  /// Moves to the next row with at least `min_fields` fields; shorter rows are rejected.
+  bool next(std::size_t min_fields);
+  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] std::string_view field(std::size_t i) const {
+    return i < size_ ? fields_[i] : std::string_view{};
+  }
+  /// The field as a finite number. On NaN the row is counted as such, on text it is rejected (the
+  /// field named `name`), and the answer is false.
+  bool number(std::size_t i, const char* name, double& value);
+  bool numbers(std::size_t first, std::span<const char* const> names, double* values);
+  void reject(const char* field_name, const std::string& message);
+
+  /// Call when next() has given the last row.
+  void finish(const char* what, const char* remedy) const;
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] int line() const { return line_; }
+  /// The header line (first '#' line or text line), empty without one.
+  [[nodiscard]] const std::string& header() const { return header_; }
+  [[nodiscard]] InputError error(const char* field_name, const std::string& message,
+                                 const std::string& remedy) const;
+
+ private:
+  struct FileCloser {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+
+  bool readLine();
+  bool isHeader() const;
+  void split();
+
+  std::string name_;
+  Separator separator_;
+  LogCounters* counters_;
+  LogWarnings* warnings_;
+  std::unique_ptr<std::FILE, FileCloser> file_;
+  std::string_view rest_;  ///< unread text when reading from memory
+  std::array<char, kMaxLine> buffer_{};
+  std::string_view text_;  ///< the line, trimmed
+  bool overlong_ = false;
+  std::string header_;
+  std::array<std::string_view, kMaxFields> fields_{};
+  std::size_t size_ = 0;
+  int line_ = 0;
+  std::uint64_t rows_ = 0;
+  std::uint64_t bad_ = 0;
+  std::uint64_t nan_ = 0;
+  std::optional<InputError> first_bad_;
+};
+
+}  // namespace swiftlet

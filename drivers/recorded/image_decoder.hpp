@@ -1,0 +1,41 @@
+#pragma once
+// JPEG and PNG bytes to 8-bit grey, straight into memory the caller owns.
+//
+// JPEG: the luma plane, through libjpeg-turbo with its exact integer transform. PNG: grey of any depth
+// (16 bits scaled to 8, rounded), colour by luma weights, alpha ignored, interlaced too. The kind is
+// told from the first bytes, not from a file's name. A picture that ends early is damaged, even where
+// the codec could fill in the rest.
+// Memory: the codecs' own (some 100 KiB while decoding). Not thread safe; one decoder per thread.
+
+#include <cstdint>
+#include <span>
+
+namespace swiftlet {
+
+enum class DecodeResult { kOk, kUnknownFormat, kDamaged, kWrongSize };
+
+struct ImageSize {
+  int width = 0;
+  int height = 0;
+  bool operator==(const ImageSize&) const = default;
+};
+
+class ImageDecoder {
+ public:
+  ImageDecoder();
+  ~ImageDecoder();
+  ImageDecoder(const ImageDecoder&) = delete;
+  ImageDecoder& operator=(const ImageDecoder&) = delete;
+
+  /// Decodes into `out` of expected.width * expected.height bytes, rows packed. `found` gets the
+  /// picture's size as soon as its header was read; another size than expected gives kWrongSize.
+  DecodeResult decode(std::span<const std::uint8_t> bytes, ImageSize expected, std::uint8_t* out,
+                      ImageSize& found);
+
+ private:
+  DecodeResult decodeJpeg(std::span<const std::uint8_t> bytes, ImageSize expected, std::uint8_t* out,
+                          ImageSize& found);
+  void* jpeg_ = nullptr;  ///< turbojpeg's handle
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,64 @@
+#pragma once
+// What a replay needs from a log, whatever it is stored in: calibration, one time-ordered stream of
+// IMU samples and single-camera images, and the truth when the log has one.
+//
+// Order: by stamp; at equal stamps the IMU sample first, then camera 0, then camera 1. So every sample
+// with a stamp not later than an image's comes before that image. The stream ends with the last image
+// (a log without images: with the last sample) unless LogOptions::imu_after_last_image says otherwise.
+// Frames: samples in body axes (an IMU turned in the body is turned back), raw (distorted) images.
+// Host side: opening allocates and throws InputError; next() reuses fixed buffers.
+
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "drivers/calibration/calibration.hpp"
+#include "drivers/recorded/log_warnings.hpp"
+#include "drivers/recorded/trajectory_file.hpp"
+#include "estimator/messages/frames.hpp"
+#include "estimator/messages/imu_sample.hpp"
+
+namespace swiftlet {
+
+using SensorMessage = std::variant<ImuSample, CameraFrame>;
+
+struct LogOptions {
+  /// Read this calibration instead of the log's own (file or folder, see readCalibration).
+  std::string calibration;
+  std::string imu_calibration;  ///< the Kalibr IMU file, where it is not beside the camchain
+  CalibrationOptions calibration_options;
+  bool mono = false;                  ///< leave camera 1 out
+  bool imu_after_last_image = false;  ///< deliver the samples after the last image too
+};
+
+class LogSource {
+ public:
+  /// A delivered image's memory stays valid until this many further images of the same camera.
+  static constexpr std::size_t kImageSlots = 4;
+
+  LogSource() = default;
+  LogSource(const LogSource&) = delete;
+  LogSource& operator=(const LogSource&) = delete;
+  virtual ~LogSource() = default;
+
+  [[nodiscard]] virtual const Calibration& calibration() const = 0;
+  /// The next message; false at the end. Images that cannot be used are skipped and counted.
+  virtual bool next(SensorMessage& message) = 0;
+  /// Images the log lists, all cameras together, for progress.
+  [[nodiscard]] virtual std::size_t imageCount() const = 0;
+  /// Distinct image stamps the log lists: the most poses a replay can give.
+  [[nodiscard]] virtual std::size_t frameCount() const = 0;
+  [[nodiscard]] virtual const LogCounters& counters() const = 0;
+  /// Lines for the user; grows while the log is read.
+  [[nodiscard]] virtual const std::vector<std::string>& warnings() const = 0;
+  /// The truth of the estimator's body, in time order; empty when the log has none. Read on demand.
+  [[nodiscard]] virtual Trajectory groundTruth() const { return {}; }
+  /// Where the truth comes from, for the summary; empty without one.
+  [[nodiscard]] virtual std::string groundTruthName() const { return {}; }
+
+  [[nodiscard]] const Rig& rig() const { return calibration().rig; }
+  [[nodiscard]] const ImuNoise& imuNoise() const { return calibration().noise; }
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,33 @@
+#include "drivers/recorded/open_log.hpp"
+
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <string_view>
+
+#include "drivers/recorded/asl_folder.hpp"
+#include "drivers/recorded/ros_bag.hpp"
+
+namespace swiftlet {
+
+bool isRosBag(const std::string& path) {
+  constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
+  std::array<char, kMagic.size()> head{};
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), head.size());
+  return file.gcount() == static_cast<std::streamsize>(head.size()) &&
+         std::string_view(head.data(), head.size()) == kMagic;
+}
+
+std::unique_ptr<LogSource> openLog(const std::string& path, const LogOptions& options) {
+  if (!std::filesystem::exists(path)) {
+    throw InputError(path, 0, "", "does not exist",
+                     "Give a EuRoC folder (the sequence or its mav0) or a ROS 1 bag");
+  }
+  if (isAslFolder(path)) return openAslFolder(path, options);
+  if (!std::filesystem::is_directory(path) && isRosBag(path)) return openRosBag(path, options);
+  throw InputError(path, 0, "", "not a log: neither a folder with imu0 and cam0 nor a ROS 1 bag",
+                   "Give a EuRoC folder (the sequence or its mav0) or a ROS 1 bag");
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,14 @@
+#pragma once
+// Opens a log of any kind this build can read, told by its content.
+
+#include <memory>
+#include <string>
+
+#include "drivers/recorded/log_source.hpp"
+
+namespace swiftlet {
+
+/// A EuRoC/ASL folder, or a ROS 1 bag where the build has rosbag-storage. InputError otherwise.
+std::unique_ptr<LogSource> openLog(const std::string& path, const LogOptions& options = {});
+
+}  // namespace swiftlet

@@ -1,0 +1,39 @@
+#pragma once
+// Puts rows of a log in the order of their stamps; counts what was out of order or repeated.
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "drivers/recorded/log_warnings.hpp"
+
+namespace swiftlet {
+
+/// Row has a member `stamp`. Of rows with one stamp the first stays.
+template <typename Row>
+void orderByStamp(std::vector<Row>& rows, const std::string& name, LogCounters& counters,
+                  LogWarnings& warnings) {
+  std::size_t late = 0;
+  for (std::size_t i = 1, newest = 0; i < rows.size(); ++i) {
+    if (rows[i].stamp < rows[newest].stamp) {
+      ++late;
+    } else {
+      newest = i;
+    }
+  }
+  if (late > 0) {
+    std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.stamp < b.stamp; });
+    counters.out_of_order += late;
+    warnings.add(name + ": " + std::to_string(late) + " rows out of order, sorted by stamp");
+  }
+  const auto end =
+      std::unique(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.stamp == b.stamp; });
+  if (end != rows.end()) {
+    const auto repeated = static_cast<std::size_t>(rows.end() - end);
+    counters.repeated_stamps += repeated;
+    warnings.add(name + ": " + std::to_string(repeated) + " rows repeat a stamp, the first of each is used");
+    rows.erase(end, rows.end());
+  }
+}
+
+}  // namespace swiftlet

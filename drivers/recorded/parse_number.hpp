@@ -1,0 +1,26 @@
+#pragma once
+// Numbers and stamps from text, without locale, allocation or loss: stamps never pass through double.
+
+#include <string_view>
+
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+/// The whole of `text` as a double (a leading '+' allowed, "nan" and "inf" recognised).
+[[nodiscard]] bool parseDouble(std::string_view text, double& value);
+
+/// The whole of `text` as a decimal integer.
+[[nodiscard]] bool parseInteger(std::string_view text, std::int64_t& value);
+
+/// Decimal seconds ("1403636579.763555584") to nanoseconds, split at the point; digits beyond the
+/// ninth are cut. False for exponents, NaN and overflow.
+[[nodiscard]] bool parseSeconds(std::string_view text, Stamp& stamp);
+
+/// Nanoseconds, with an optional fraction that is cut (as ORB-SLAM3 writes them).
+[[nodiscard]] bool parseNanoseconds(std::string_view text, Stamp& stamp);
+
+/// A csv stamp of the EuRoC family: an integer is nanoseconds, a number with a point is seconds.
+[[nodiscard]] bool parseCsvStamp(std::string_view text, Stamp& stamp);
+
+}  // namespace swiftlet

@@ -1,0 +1,112 @@
+#include "drivers/recorded/recorded_log.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "drivers/recorded/imu_file.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr double kRateTolerance = 0.1;
+
+}  // namespace
+
+void RecordedLog::checkRates(const std::string& name) {
+  const double measured = medianRate(samples_);
+  const double stated = calibration_.noise.rate_hz;
+  if (measured > 0 && std::abs(measured - stated) > kRateTolerance * stated) {
+    warnings_.add(
+        fmt::format("{}: the IMU runs at {:.1f} Hz, its calibration says {:g} Hz; the measured rate is used",
+                    name, measured, stated));
+    calibration_.noise.rate_hz = measured;
+  }
+}
+
+void RecordedLog::prepare(const std::string& name) {
+  checkRates(name);
+  for (const std::string& line : calibration_.warnings) warnings_.add(line);
+  if (calibration_.turnsImu()) {
+    for (ImuSample& sample : samples_) {
+      sample.gyro = calibration_.R_body_imu * sample.gyro;
+      sample.accel = calibration_.R_body_imu * sample.accel;
+    }
+  }
+  std::sort(images_.begin(), images_.end(), [](const ImageEntry& a, const ImageEntry& b) {
+    return a.stamp != b.stamp ? a.stamp < b.stamp : a.camera < b.camera;
+  });
+  if (!images_.empty() && !samples_.empty() &&
+      (samples_.back().stamp < images_.front().stamp || samples_.front().stamp > images_.back().stamp)) {
+    throw InputError(name, 0, "timestamp",
+                     fmt::format("the samples ({} to {}) and the images ({} to {}) do not overlap in time",
+                                 samples_.front().stamp.ns, samples_.back().stamp.ns,
+                                 images_.front().stamp.ns, images_.back().stamp.ns),
+                     "Both need stamps of one clock, in nanoseconds");
+  }
+  for (std::size_t i = 0; i < images_.size(); ++i) {
+    if (i == 0 || images_[i].stamp != images_[i - 1].stamp) ++frame_count_;
+  }
+  for (std::size_t camera = 0; camera < calibration_.rig.camera_count; ++camera) {
+    const CameraModel& model = calibration_.rig.camera[camera];
+    pools_[camera].memory.resize(kImageSlots * static_cast<std::size_t>(model.width()) *
+                                 static_cast<std::size_t>(model.height()));
+  }
+}
+
+bool RecordedLog::next(SensorMessage& message) {
+  while (true) {
+    const bool image_left = next_image_ < images_.size();
+    const bool sample_left = next_sample_ < samples_.size();
+    if (!image_left && !images_.empty() && !options_.imu_after_last_image) return false;
+    if (!image_left && !sample_left) return false;
+    if (sample_left && (!image_left || samples_[next_sample_].stamp <= images_[next_image_].stamp)) {
+      message = samples_[next_sample_++];
+      ++counters_.imu_samples;
+      return true;
+    }
+    if (deliverImage(images_[next_image_++], message)) return true;
+  }
+}
+
+bool RecordedLog::deliverImage(const ImageEntry& entry, SensorMessage& message) {
+  const CameraModel& model = calibration_.rig.camera[entry.camera];
+  const ImageSize expected{model.width(), model.height()};
+  const std::size_t bytes =
+      static_cast<std::size_t>(expected.width) * static_cast<std::size_t>(expected.height);
+  Pool& pool = pools_[entry.camera];
+  std::uint8_t* out = pool.memory.data() + pool.slot * bytes;
+  const Fetched fetched = fetch(entry, expected, out);
+  if (fetched.missing) {
+    warnings_.addCounted(++counters_.missing_images, fetched.name + ": missing, image skipped");
+    return false;
+  }
+  if (fetched.result == DecodeResult::kWrongSize && counters_.images[entry.camera] == 0) {
+    throw InputError(
+        fetched.name, 0, "",
+        fmt::format("the image has {}x{} pixels, the calibration of cam{} is for {}x{}", fetched.found.width,
+                    fetched.found.height, entry.camera, expected.width, expected.height),
+        "Give the calibration of this image size");
+  }
+  if (fetched.result != DecodeResult::kOk) {
+    const char* what = fetched.result == DecodeResult::kUnknownFormat ? "neither PNG nor JPEG"
+                       : fetched.result == DecodeResult::kWrongSize   ? "another size than the images before"
+                                                                      : "damaged or truncated";
+    warnings_.addCounted(++counters_.damaged_images, fetched.name + ": " + what + ", image skipped");
+    return false;
+  }
+  pool.slot = (pool.slot + 1) % kImageSlots;
+  ++counters_.images[entry.camera];
+  CameraFrame frame;
+  frame.stamp = entry.stamp;
+  frame.arrival = entry.stamp;
+  frame.clock = Clock::kLog;
+  frame.camera = entry.camera;
+  frame.sequence = entry.index;
+  frame.image = {out, expected.width, expected.height, expected.width};
+  message = frame;
+  return true;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,170 @@
+#include "drivers/simulated/camera_renderer.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include "drivers/simulated/parallel.hpp"
+#include "drivers/simulated/tile_tracer.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr int kMaxSamples = 8;
+constexpr double kPixelsPerSample = 1.0;  // px of motion that one sample may leave unsampled
+constexpr float kFullScale = 215.0F;      // stored texture value of radiance 1
+constexpr float kMinCosine = 0.08F;       // footprints of grazing rays grow no further
+
+struct Sample {
+  float dx = 0;  // px beside the pixel's centre
+  float dy = 0;
+  double instant = 0;  // share of the exposure from its middle, -0.5 to 0.5
+};
+
+// Places that are spread over the pixel and have zero mean, so that the image is not shifted.
+std::vector<Sample> samplePattern(int count) {
+  constexpr std::array<std::array<float, 2>, 4> kRotatedGrid{
+      {{-0.125F, -0.375F}, {0.375F, -0.125F}, {-0.375F, 0.125F}, {0.125F, 0.375F}}};
+  std::vector<Sample> samples(static_cast<std::size_t>(count));
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    samples[i].instant = (static_cast<double>(i) + 0.5) / count - 0.5;
+    if (count == 1) continue;
+    samples[i].dx = kRotatedGrid[i % 4][0];
+    samples[i].dy = kRotatedGrid[i % 4][1];
+  }
+  return samples;
+}
+
+// log2 to 0.06: the level only has to be near.
+float roughLog2(float value) {
+  const auto bits = std::bit_cast<std::uint32_t>(value);
+  const float mantissa = static_cast<float>(bits & 0x7FFFFFU) * 0x1p-23F;
+  return static_cast<float>(static_cast<int>(bits >> 23U) - 127) + mantissa;
+}
+
+struct Shading {
+  const TexturedWorld* world = nullptr;
+  float pixel_angle = 0;
+  float level_shift = 0;  // spread over the samples, so that their mean blends two levels
+};
+
+void shadeTile(const Shading& shading, const View& view, const Tile& tile, std::array<float, kTilePixels>& sum) {
+  for (int i = 0; i < kTilePixels; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (tile.hit[k] < 0) continue;
+    const ViewedPatch& patch = view.patches()[static_cast<std::size_t>(tile.hit[k])];
+    const SurfaceHit hit = surfaceAt(patch, tile, i);
+    const Texture& texture = shading.world->texture(patch.index);
+    const float cosine = std::max(hit.cosine, kMinCosine);
+    // Texels across the pixel, squared and averaged over both directions of the footprint.
+    const float across = shading.pixel_angle * tile.distance[k] * texture.perMetre();
+    const float level = 0.5F * roughLog2(across * across / cosine) + shading.level_shift;
+    sum[k] += texture.sample(hit.u, hit.v, static_cast<int>(std::floor(level)));
+  }
+}
+
+struct Grid {
+  int columns = 0;
+  int rows = 0;
+};
+Grid tileGrid(const RayTable& rays) {
+  return {(rays.width() + kTileSide - 1) / kTileSide, (rays.height() + kTileSide - 1) / kTileSide};
+}
+
+}  // namespace
+
+CameraRenderer::CameraRenderer(const TexturedWorld& world, const CameraModel& camera, const SE3& T_body_cam)
+    : world_(&world), camera_(camera), T_body_cam_(T_body_cam), rays_(camera) {}
+
+void CameraRenderer::renderImage(const SplineTrajectory& trajectory, double seconds, const RenderSettings& settings,
+                                 std::vector<float>& radiance) const {
+  const MotionState motion = trajectory.at(seconds);
+  const double turn = motion.omega_body.norm() * settings.exposure;
+  const double shift = (motion.v_world_body.norm() + motion.omega_body.norm() * T_body_cam_.translation.norm()) *
+                       settings.exposure;
+  // Something at a metre's distance moves by this much on top of the turn.
+  const double moved = (turn + shift) * camera_.focal();
+  const int count = settings.samples <= 1 ? 1 : moved > 4 * kPixelsPerSample ? kMaxSamples : 4;
+  const std::vector<Sample> samples = samplePattern(count);
+
+  // The same patches in every view, so that one list of candidates serves all: slack keeps those
+  // that turn their visible side to the camera during the exposure only.
+  const double slack = shift + 1e-3;
+  std::vector<View> views;
+  views.reserve(samples.size());
+  const SE3 middle = motion.T_world_body * T_body_cam_;
+  const View middle_view(world_->world(), middle, slack);
+  constexpr double kKeepAll = 1e9;
+  for (const Sample& sample : samples) {
+    const SE3 pose = trajectory.pose(seconds + sample.instant * settings.exposure) * T_body_cam_;
+    views.emplace_back(world_->world(), pose, kKeepAll);
+  }
+
+  radiance.assign(static_cast<std::size_t>(rays_.width()) * static_cast<std::size_t>(rays_.height()), 0.0F);
+  const Grid grid = tileGrid(rays_);
+  const float scale = 1.0F / (kFullScale * static_cast<float>(count));
+  parallelFor(grid.rows, settings.threads, [&](int tile_row) {
+    Tile tile;
+    std::vector<std::int32_t> candidates;
+    for (int tile_column = 0; tile_column < grid.columns; ++tile_column) {
+      const int column = tile_column * kTileSide;
+      const int row = tile_row * kTileSide;
+      patchesInTile(middle_view, rays_, column, row, static_cast<float>(turn), static_cast<float>(slack), candidates);
+      // From places in the middle view to places in views that keep every patch.
+      for (std::int32_t& id : candidates) {
+        id = static_cast<std::int32_t>(middle_view.patches()[static_cast<std::size_t>(id)].index);
+      }
+      std::array<float, kTilePixels> sum{};
+      for (std::size_t s = 0; s < samples.size(); ++s) {
+        loadRays(rays_, column, row, samples[s].dx, samples[s].dy, tile);
+        traceTile(views[s], candidates, tile);
+        // A sample covers a part of the pixel only: half a level finer than the pixel's footprint.
+        const float blend = (static_cast<float>(s % 4) + 0.5F) / 4.0F;
+        shadeTile({world_, rays_.pixelAngle(), blend - 0.5F}, views[s], tile, sum);
+      }
+      const int width = std::min(kTileSide, rays_.width() - column);
+      const int height = std::min(kTileSide, rays_.height() - row);
+      for (int j = 0; j < height; ++j) {
+        float* out = radiance.data() + static_cast<std::ptrdiff_t>(row + j) * rays_.width() + column;
+        for (int i = 0; i < width; ++i) out[i] = scale * sum[static_cast<std::size_t>(j * kTileSide + i)];
+      }
+    }
+  });
+}
+
+void CameraRenderer::renderGeometry(const SE3& T_world_body, int threads, GeometryImage& geometry) const {
+  const auto pixels = static_cast<std::size_t>(rays_.width()) * static_cast<std::size_t>(rays_.height());
+  geometry.depth.assign(pixels, 0.0F);
+  geometry.label.assign(pixels, 0);
+  geometry.patch.assign(pixels, -1);
+  const View view(world_->world(), T_world_body * T_body_cam_, 0.0);
+  const Grid grid = tileGrid(rays_);
+  parallelFor(grid.rows, threads, [&](int tile_row) {
+    Tile tile;
+    std::vector<std::int32_t> candidates;
+    for (int tile_column = 0; tile_column < grid.columns; ++tile_column) {
+      const int column = tile_column * kTileSide;
+      const int row = tile_row * kTileSide;
+      patchesInTile(view, rays_, column, row, 0.0F, 0.0F, candidates);
+      loadRays(rays_, column, row, 0.0F, 0.0F, tile);
+      traceTile(view, candidates, tile);
+      const int width = std::min(kTileSide, rays_.width() - column);
+      const int height = std::min(kTileSide, rays_.height() - row);
+      for (int j = 0; j < height; ++j) {
+        for (int i = 0; i < width; ++i) {
+          const auto k = static_cast<std::size_t>(j * kTileSide + i);
+          if (tile.hit[k] < 0) continue;
+          const auto out = static_cast<std::size_t>(row + j) * static_cast<std::size_t>(rays_.width()) +
+                           static_cast<std::size_t>(column + i);
+          const std::uint32_t patch = view.patches()[static_cast<std::size_t>(tile.hit[k])].index;
+          geometry.depth[out] = tile.distance[k] * tile.z[k];
+          geometry.patch[out] = static_cast<std::int32_t>(patch);
+          geometry.label[out] = static_cast<std::uint8_t>(world_->world().patches()[patch].label);
+        }
+      }
+    }
+  });
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,110 @@
+#include "drivers/simulated/given_motion.hpp"
+
+#include <lzma.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <vector>
+
+#include "estimator/geometry/so3.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr double kMaxGap = 0.5;  // s between poses that may still be bridged
+
+struct Row {
+  double t = 0;  // s since the first row
+  SE3 pose;
+};
+
+std::string unpackXz(const std::string& packed, const std::string& path) {
+  lzma_stream stream = LZMA_STREAM_INIT;
+  if (lzma_stream_decoder(&stream, UINT64_MAX, LZMA_CONCATENATED) != LZMA_OK) {
+    throw std::runtime_error(path + ": no memory for the xz decoder");
+  }
+  std::string text;
+  std::array<char, 1 << 16> buffer{};
+  stream.next_in = reinterpret_cast<const std::uint8_t*>(packed.data());
+  stream.avail_in = packed.size();
+  lzma_ret result = LZMA_OK;
+  while (result == LZMA_OK) {
+    stream.next_out = reinterpret_cast<std::uint8_t*>(buffer.data());
+    stream.avail_out = buffer.size();
+    result = lzma_code(&stream, LZMA_FINISH);
+    text.append(buffer.data(), buffer.size() - stream.avail_out);
+  }
+  lzma_end(&stream);
+  if (result != LZMA_STREAM_END) throw std::runtime_error(path + ": not a whole xz file");
+  return text;
+}
+
+std::string readText(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw std::runtime_error(path + ": cannot be opened");
+  std::ostringstream text;
+  text << file.rdbuf();
+  return path.ends_with(".xz") ? unpackXz(text.str(), path) : text.str();
+}
+
+std::vector<Row> parseRows(const std::string& text, const std::string& path) {
+  constexpr int kFields = 7;  // p xyz, q wxyz
+  std::vector<Row> rows;
+  std::int64_t first_ns = 0;
+  std::istringstream lines(text);
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    if (line.empty() || line[0] == '#' || line[0] == '\r') continue;
+    const char* cursor = line.c_str();
+    char* end = nullptr;
+    const std::int64_t ns = std::strtoll(cursor, &end, 10);
+    std::array<double, kFields> value{};
+    bool good = end != cursor;
+    for (std::size_t i = 0; good && i < kFields; ++i) {
+      cursor = *end == ',' ? end + 1 : end;
+      value[i] = std::strtod(cursor, &end);
+      good = end != cursor && std::isfinite(value[i]);
+    }
+    if (!good) throw std::runtime_error(path + ":" + std::to_string(number) + ": not a pose (stamp, p xyz, q wxyz)");
+    if (rows.empty()) first_ns = ns;
+    Row row;
+    row.t = static_cast<double>(ns - first_ns) * 1e-9;
+    row.pose = SE3(Eigen::Quaterniond(value[3], value[4], value[5], value[6]), {value[0], value[1], value[2]});
+    if (!rows.empty() && (row.t <= rows.back().t || row.t > rows.back().t + kMaxGap)) {
+      throw std::runtime_error(path + ":" + std::to_string(number) + ": stamps must rise by at most 0.5 s a row");
+    }
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+}  // namespace
+
+SplineTrajectory readGivenMotion(const std::string& path, double skip, double duration) {
+  const std::vector<Row> rows = parseRows(readText(path), path);
+  const double last = rows.empty() ? 0.0 : rows.back().t;
+  const double end = duration > 0 ? std::min(last, skip + duration) : last;
+  const auto count = static_cast<std::int64_t>(std::floor((end - skip) / kGivenMotionSpacing));
+  if (skip < 0 || count < 1) throw std::runtime_error(path + ": has no motion in the span asked for");
+  std::vector<SE3> samples;
+  std::size_t row = 1;
+  for (std::int64_t k = 0; k <= count; ++k) {
+    const double t = skip + kGivenMotionSpacing * static_cast<double>(k);
+    while (row + 1 < rows.size() && rows[row].t < t) ++row;
+    const Row& a = rows[row - 1];
+    const Row& b = rows[row];
+    const double share = (t - a.t) / (b.t - a.t);
+    const Eigen::Vector3d turn = logSo3(a.pose.rotation.conjugate() * b.pose.rotation);
+    samples.emplace_back(a.pose.rotation * expSo3(share * turn),
+                         a.pose.translation + share * (b.pose.translation - a.pose.translation));
+  }
+  return SplineTrajectory::interpolate(0.0, kGivenMotionSpacing, samples);
+}
+
+}  // namespace swiftlet

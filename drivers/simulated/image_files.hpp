@@ -1,0 +1,14 @@
+#pragma once
+// Writes grey images: 8 and 16 bit PNG (libpng), 8 bit JPEG (libjpeg-turbo). Throws
+// std::runtime_error naming the file.
+
+#include <cstdint>
+#include <string>
+
+namespace swiftlet {
+
+void writePng8(const std::string& path, const std::uint8_t* grey, int width, int height);
+void writePng16(const std::string& path, const std::uint16_t* grey, int width, int height);
+void writeJpeg(const std::string& path, const std::uint8_t* grey, int width, int height, int quality);
+
+}  // namespace swiftlet

@@ -1,0 +1,67 @@
+#pragma once
+// What an IMU on a trajectory reads: exact rate and specific force, then the noise model's errors.
+//
+// reading = truth + bias + white noise + vibration, then clipped at the saturation.
+// White noise of density n has standard deviation n sqrt(rate) a sample; biases are random walks
+// with steps of density sqrt(1 / rate) (Woodman, UCAM-CL-TR-696, 2007; Kalibr's IMU noise model).
+// Specific force: R_body_world (a_world + (0, 0, gravity)). SI units, body axes.
+// Everything follows from the seed; each error source has its own stream, so that switching one
+// off leaves the others as they were.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "drivers/simulated/spline_trajectory.hpp"
+#include "estimator/core/stamp.hpp"
+#include "estimator/imu/imu_noise.hpp"
+#include "estimator/messages/imu_sample.hpp"
+
+namespace swiftlet {
+
+/// Motor vibration as a sum of sines with random phases, constant amplitude, in a band.
+struct Vibration {
+  double accel_amplitude = 0;  ///< m/s^2: a sine of this amplitude on each axis has the same power
+  double gyro_amplitude = 0;   ///< rad/s, likewise
+  double low_hz = 80;
+  double high_hz = 150;
+};
+
+/// Seconds since the trajectory's zero.
+struct TimeSpan {
+  double begin = 0;
+  double end = 0;
+  [[nodiscard]] bool contains(double t) const { return t >= begin && t < end; }
+};
+
+struct ImuSimulationSettings {
+  ImuNoise noise;          ///< densities, rate, gravity, saturation
+  bool noise_free = false; ///< exact readings: no noise, no bias, no vibration
+  /// Initial biases. Drawn with these standard deviations per axis when `draw_bias`.
+  bool draw_bias = true;
+  double gyro_bias_sigma = 0.02;   ///< rad/s
+  double accel_bias_sigma = 0.08;  ///< m/s^2
+  Eigen::Vector3d bias_gyro = Eigen::Vector3d::Zero();
+  Eigen::Vector3d bias_accel = Eigen::Vector3d::Zero();
+  Vibration vibration;
+  std::vector<TimeSpan> gaps;  ///< no samples here
+  /// Spans in which the sensor clips at these lower limits.
+  std::vector<TimeSpan> saturations;
+  double low_gyro_limit = 1.0;    ///< rad/s
+  double low_accel_limit = 12.0;  ///< m/s^2
+  std::uint64_t seed = 1;
+};
+
+struct SimulatedImu {
+  std::vector<ImuSample> samples;
+  /// True biases at every step k / rate, those inside gaps included.
+  std::vector<Eigen::Vector3d> bias_gyro;
+  std::vector<Eigen::Vector3d> bias_accel;
+};
+
+/// Reading k has stamp `zero` + round(k 1e9 / rate) ns, at time k / rate of the trajectory, from
+/// time 0 up to and including `duration`.
+SimulatedImu simulateImu(const SplineTrajectory& trajectory, const ImuSimulationSettings& settings, Stamp zero,
+                         double duration);
+
+}  // namespace swiftlet

@@ -1,0 +1,31 @@
+#pragma once
+// Camera rigs to fly with.
+
+#include <optional>
+#include <string>
+
+#include "drivers/simulated/flight_path.hpp"
+#include "estimator/camera/rig.hpp"
+
+namespace swiftlet {
+
+enum class RigKind {
+  kEuroc,     ///< EuRoC's rig: 752 x 480, radial-tangential, 11 cm baseline, IMU x up and z forward
+  kForward,   ///< 640 x 400, radial-tangential, 8 cm baseline, IMU forward-left-up, looks 15 deg down
+  kWide,      ///< 640 x 480, equidistant, about 130 degrees across, 10 cm baseline, IMU forward-left-up
+  kFisheye,   ///< 640 x 480, equidistant, 180 degrees across, 10 cm baseline, IMU turned oddly
+};
+const char* rigName(RigKind kind);
+std::optional<RigKind> rigNamed(const std::string& name);
+
+/// The rig with its body axes (the IMU's) as mounted in the airframe (forward-left-up).
+struct MountedRig {
+  Rig rig;
+  Eigen::Quaterniond R_flu_body = Eigen::Quaterniond::Identity();
+};
+MountedRig makeRig(RigKind kind);
+
+/// The same rig and airframe with another IMU orientation.
+MountedRig turnImu(const MountedRig& mounted, const Eigen::Quaterniond& R_flu_body);
+
+}  // namespace swiftlet

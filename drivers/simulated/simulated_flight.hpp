@@ -1,0 +1,71 @@
+#pragma once
+// A flight made from its settings: trajectory, world, rig, IMU readings, and images on demand.
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "drivers/simulated/simulation_settings.hpp"
+
+namespace swiftlet {
+
+class SimulatedFlight {
+ public:
+  /// Builds the trajectory, the world and the IMU readings (no textures yet: milliseconds). Throws
+  /// std::invalid_argument or std::runtime_error that name the setting or the file.
+  explicit SimulatedFlight(const SimulationSettings& settings);
+
+  /// As used: seeds handed down, low light and faults applied, the world fitted to a given motion.
+  [[nodiscard]] const SimulationSettings& settings() const { return settings_; }
+  [[nodiscard]] const SplineTrajectory& trajectory() const { return trajectory_; }
+  [[nodiscard]] const World& world() const { return world_; }
+  [[nodiscard]] const Rig& trueRig() const { return true_rig_; }
+  /// What the estimator is told: extrinsics turned, time shift zero, as the settings ask.
+  [[nodiscard]] const Rig& givenRig() const { return given_rig_; }
+  [[nodiscard]] const SimulatedImu& imu() const { return imu_; }
+  [[nodiscard]] double duration() const { return duration_; }  ///< s of IMU data
+
+  [[nodiscard]] int imageCount() const { return image_count_; }
+  /// Mid-exposure time of image k on the trajectory [s].
+  [[nodiscard]] double imageTime(int k) const;
+  /// The stamp that image k is given.
+  [[nodiscard]] Stamp imageStamp(int k) const;
+  [[nodiscard]] Stamp stampAt(double seconds) const { return settings_.start + Duration::fromSeconds(seconds); }
+  [[nodiscard]] bool hasFault(FaultKind kind, std::size_t camera, double seconds) const;
+
+ private:
+  void checkSettings() const;
+  void flyAndBuild();
+
+  SimulationSettings settings_;
+  SplineTrajectory trajectory_;
+  World world_;
+  Rig true_rig_;
+  Rig given_rig_;
+  SimulatedImu imu_;
+  double duration_ = 0;
+  int image_count_ = 0;
+};
+
+/// Renders a flight's images one after the other: exposure control remembers the last one.
+class FlightCameras {
+ public:
+  /// Paints the world (seconds). The flight must outlive this.
+  explicit FlightCameras(const SimulatedFlight& flight);
+
+  [[nodiscard]] const TexturedWorld& world() const { return *world_; }
+  [[nodiscard]] std::size_t cameraCount() const { return renderers_.size(); }
+
+  /// Image k of every camera, k rising; `grey[c]` holds width x height bytes. An entry whose camera
+  /// is missing then is left as it was and `present` says so.
+  void render(int k, const std::array<std::uint8_t*, kMaxCameras>& grey, std::array<bool, kMaxCameras>& present);
+
+ private:
+  const SimulatedFlight* flight_;
+  std::unique_ptr<TexturedWorld> world_;
+  std::vector<CameraRenderer> renderers_;
+  ExposureControl exposure_;
+  std::vector<float> radiance_;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,38 @@
+#pragma once
+// Alignment of a remembered patch with an image by an affine map: translation, rotation, scale and
+// shear of its surroundings, gain and offset of its brightness.
+//
+// Model: I(W(x)) = a T(x) + b, W(x) = A x + t, weighted least squares over the window of
+// patch_template.hpp, inverse compositional: W <- W o dW^-1 (Baker, Matthews, IJCV 2004; affine
+// templates: Shi, Tomasi, CVPR 1994). Gain and offset are solved exactly in each iteration; the
+// Hessian, with both eliminated and a prior on the affine part, is inverted once per template. One
+// iteration costs about 0.4 us.
+
+#include <Eigen/Core>
+
+#include "estimator/core/image_view.hpp"
+#include "estimator/frontend/patch_template.hpp"
+
+namespace swiftlet {
+
+class AffineTemplate {
+ public:
+  /// Prepares the Hessian of the window centred on the whole pixel (x, y) of `patch`. False when
+  /// the window does not fix the six parameters.
+  [[nodiscard]] bool build(const ImageView& patch, int x, int y);
+
+  struct Estimate {
+    Eigen::Vector2f position;  ///< of the template's central pixel in the image
+    Eigen::Matrix2f warp;      ///< offsets in the template to offsets in the image
+    float correlation = 0;     ///< weighted, after the last but one step
+  };
+  /// Refines `estimate`. False when it leaves the image or degenerates. `patch` and (x, y) as given
+  /// to build().
+  [[nodiscard]] bool align(const ImageView& patch, int x, int y, const ImageView& image, int iterations,
+                           Estimate& estimate) const;
+
+ private:
+  Eigen::Matrix<float, 6, 6> inverse_hessian_ = Eigen::Matrix<float, 6, 6>::Zero();
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,107 @@
+#pragma once
+// The front-end's state and steps; private to this folder. Stage and contract: frontend.hpp.
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "estimator/core/fixed_vector.hpp"
+#include "estimator/frontend/anchor_pool.hpp"
+#include "estimator/frontend/corners.hpp"
+#include "estimator/frontend/frontend.hpp"
+#include "estimator/frontend/lucas_kanade.hpp"
+#include "estimator/frontend/stereo_matcher.hpp"
+#include "estimator/geometry/ransac.hpp"
+
+namespace swiftlet {
+
+/// A feature in the cameras' newest images.
+struct Track {
+  TrackId id = 0;
+  int slot = -1;  ///< in the anchor pool
+  int age = 0;    ///< frames since detection
+  /// Has a position in that camera's newest image (which may be an earlier frame's).
+  std::array<bool, kMaxCameras> live{};
+  std::array<bool, kMaxCameras> had_previous{};  ///< `previous` holds the frame before
+  std::array<Eigen::Vector2f, kMaxCameras> pixel{};
+  std::array<Eigen::Vector2f, kMaxCameras> previous{};
+  std::array<Eigen::Vector3d, kMaxCameras> bearing{};
+  std::array<Eigen::Vector3d, kMaxCameras> previous_bearing{};
+  std::array<bool, kMaxCameras> in_keyframe{};
+  std::array<Eigen::Vector3d, kMaxCameras> keyframe_bearing{};
+};
+
+class Frontend::Impl {
+ public:
+  Impl(const Rig& rig, const FrontendSettings& settings);
+
+  Status step(const StereoFrame& frame, const FrontendPrediction& prediction, int max_features,
+              TrackedFrame& out);
+  void reset();
+  [[nodiscard]] const FrontendStatistics& statistics() const { return statistics_; }
+
+ private:
+  struct Camera {
+    std::array<Pyramid, 2> pyramid;
+    std::size_t newest = 0;
+    bool present = false;      ///< has an image in this frame
+    bool has_history = false;  ///< the other pyramid holds its last image
+    Stamp last;                ///< stamp of its newest image
+    bool rotation_known = false;
+    Eigen::Quaterniond R_prev_cur = Eigen::Quaterniond::Identity();  ///< camera axes, since `last`
+
+    [[nodiscard]] const Pyramid& now() const { return pyramid[newest]; }
+    [[nodiscard]] const Pyramid& before() const { return pyramid[1 - newest]; }
+  };
+
+  Status check(const StereoFrame& frame) const;
+  void takeImages(const StereoFrame& frame, const FrontendPrediction& prediction);
+  void trackCamera(std::size_t c, const FrontendPrediction& prediction);
+  [[nodiscard]] bool predict(const Track& track, std::size_t c, const FrontendPrediction& prediction,
+                             Eigen::Vector2f& pixel, int& levels) const;
+  void refine(Track& track, std::size_t c, const Eigen::Vector2f& from, Eigen::Vector2f& pixel);
+  [[nodiscard]] Eigen::Matrix2f turn(std::size_t c, const Eigen::Vector3d& from_bearing) const;
+  void verifyMotion(std::size_t c, std::uint64_t seed);
+  void verifyStereo();
+  void findAgain(const FrontendPrediction& prediction, int max_features, std::uint64_t index);
+  [[nodiscard]] bool locate(AnchorPatch& anchor, std::size_t c, const PredictedLandmark& landmark,
+                            Eigen::Vector2f& pixel) const;
+  void dropLost();
+  [[nodiscard]] bool keyframeDue(Stamp stamp) const;
+  [[nodiscard]] float medianParallax() const;
+  void replenish(int max_features, const StereoFrame& frame);
+  void detect(std::size_t c, int wanted, int max_features);
+  void matchMissing(bool only_new);
+  void markKeyframe(Stamp stamp);
+  void write(const StereoFrame& frame, bool keyframe, TrackedFrame& out);
+  void darkImages(const StereoFrame& frame);
+  [[nodiscard]] float medianMotion();
+  bool place(Track& track, std::size_t c, const Eigen::Vector2f& pixel);
+  [[nodiscard]] bool usesStereo() const { return rig_.camera_count > 1; }
+
+  Rig rig_;
+  FrontendSettings settings_;
+  std::array<Camera, kMaxCameras> camera_;
+  std::vector<CornerDetector> detector_;
+  StereoMatcher matcher_;
+  MonoRansac ransac_;
+  RansacResult ransac_result_;
+  AnchorPool anchors_;
+  FixedVector<Track, kMaxFeatures> tracks_;
+  FixedVector<Corner, kMaxFeatures> corners_;
+  CornerDetector::Pixels occupied_;
+  FixedVector<Eigen::Vector3d, kMaxFeatures> bearings_prev_, bearings_cur_;
+  FixedVector<std::size_t, kMaxFeatures> owners_;
+  FixedVector<float, kMaxFeatures * kMaxCameras> values_;
+  TrackId next_id_ = 1;
+  bool has_keyframe_ = false;
+  Stamp keyframe_stamp_;
+  int keyframe_tracks_ = 0;
+  bool keyframe_rotation_known_ = false;
+  Eigen::Quaterniond R_keyframe_cur_ = Eigen::Quaterniond::Identity();  ///< body axes
+  FrontendStatistics statistics_;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,28 @@
+#pragma once
+// What the rest of the estimator knows about a frame before its images are looked at.
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+
+#include "estimator/core/fixed_vector.hpp"
+#include "estimator/core/limits.hpp"
+#include "estimator/messages/tracked_frame.hpp"
+
+namespace swiftlet {
+
+struct PredictedLandmark {
+  TrackId id = 0;
+  std::array<bool, kMaxCameras> visible{};           ///< projects into that camera's image
+  std::array<Eigen::Vector2f, kMaxCameras> pixel{};  ///< valid where visible
+  float gate = 10.0F;                                ///< px: search radius (about 3 sigma)
+};
+
+struct FrontendPrediction {
+  bool has_rotation = false;
+  /// Body at this frame to body at the previous one: R_prev_cur (gyro, bias removed).
+  Eigen::Quaterniond R_body_prev_body_cur = Eigen::Quaterniond::Identity();
+  FixedVector<PredictedLandmark, kMaxLandmarks> landmarks;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,217 @@
+// Frontend::Impl: following features from frame to frame, verifying them, finding lost ones.
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/frontend/frontend_impl.hpp"
+#include "estimator/frontend/warped_patch.hpp"
+
+namespace swiftlet {
+namespace {
+
+// With a predicted landmark the error is a few pixels: two levels reach 12 px.
+constexpr int kLevelsWithLandmark = 2;
+// With rotation removed what remains is parallax, at most some 20 px between frames.
+constexpr int kLevelsWithRotation = 3;
+constexpr int kBackLevels = 2;
+// After so many frames in a row without agreement the patch is taken anew: the view has changed.
+constexpr int kMaxRefineFailures = 3;
+// Fewer tracks than this do not carry a RANSAC.
+constexpr std::size_t kMinTracksToVerify = 12;
+// Pixel noise behind the gates: they stand at 3 sigma.
+constexpr double kGateSigmas = 3.0;
+// Correlation by which a landmark found by projection must resemble its patch.
+constexpr float kMinRecognition = 0.85F;
+// Landmarks looked for in one frame at most: bounds the time.
+constexpr int kMaxSearches = 60;
+
+}  // namespace
+
+bool Frontend::Impl::predict(const Track& track, std::size_t c, const FrontendPrediction& prediction,
+                             Eigen::Vector2f& pixel, int& levels) const {
+  // Both lists rise in id in practice, but nothing promises it.
+  for (const PredictedLandmark& landmark : prediction.landmarks) {
+    if (landmark.id != track.id) continue;
+    if (!landmark.visible[c]) break;
+    pixel = landmark.pixel[c];
+    levels = kLevelsWithLandmark;
+    return true;
+  }
+  const Camera& camera = camera_[c];
+  if (!camera.rotation_known) return false;
+  Eigen::Vector2d projected;
+  if (!rig_.camera[c].project(camera.R_prev_cur.conjugate() * track.bearing[c], projected)) return false;
+  pixel = projected.cast<float>();
+  levels = kLevelsWithRotation;
+  return true;
+}
+
+void Frontend::Impl::trackCamera(std::size_t c, const FrontendPrediction& prediction) {
+  Camera& camera = camera_[c];
+  for (Track& track : tracks_) {
+    track.had_previous[c] = false;
+    if (!track.live[c]) continue;
+    track.live[c] = false;
+    if (!camera.has_history) continue;
+    LucasKanadeSettings settings;
+    settings.levels = settings_.pyramid_levels;
+    settings.back_check = settings_.back_check;
+    settings.back_levels = kBackLevels;
+    const Eigen::Vector2f from = track.pixel[c];
+    Eigen::Vector2f pixel = from;
+    if (!predict(track, c, prediction, pixel, settings.levels)) pixel = from;
+    const Eigen::Vector3d from_bearing = track.bearing[c];
+    if (!trackPoint(camera.before(), from, camera.now(), settings, pixel)) {
+      ++statistics_.lost;
+      continue;
+    }
+    if (settings_.anchor_refinement) refine(track, c, from, pixel);
+    if (!place(track, c, pixel)) {
+      ++statistics_.lost;
+      continue;
+    }
+    track.previous[c] = from;
+    track.previous_bearing[c] = from_bearing;
+    track.had_previous[c] = true;
+    ++statistics_.tracked;
+  }
+}
+
+Eigen::Matrix2f Frontend::Impl::turn(std::size_t c, const Eigen::Vector3d& from_bearing) const {
+  const Camera& camera = camera_[c];
+  Eigen::Matrix2f turn = Eigen::Matrix2f::Identity();
+  if (!camera.rotation_known) return turn;
+  // d pixel_cur / d pixel_prev = J_cur R J_prev^+ with J = d pixel / d bearing.
+  const Eigen::Matrix3d R = camera.R_prev_cur.conjugate().toRotationMatrix();
+  Eigen::Vector2d pixel;
+  Matrix23d before;
+  Matrix23d after;
+  const CameraModel& model = rig_.camera[c];
+  if (!model.project(from_bearing, pixel, &before) || !model.project(R * from_bearing, pixel, &after)) {
+    return turn;
+  }
+  const Eigen::Matrix2d square = before * before.transpose();
+  turn = (after * R * before.transpose() * square.inverse()).cast<float>();
+  return turn;
+}
+
+void Frontend::Impl::refine(Track& track, std::size_t c, const Eigen::Vector2f& from,
+                            Eigen::Vector2f& pixel) {
+  static_cast<void>(from);
+  AnchorPatch& patch = anchors_[track.slot].patch[c];
+  if (!patch.valid) return;
+  const Eigen::Matrix2f turned = turn(c, track.bearing[c]);
+  if (patch.refine(camera_[c].now().level(0), turned, pixel)) {
+    patch.failures = 0;
+    ++statistics_.refined;
+    return;
+  }
+  patch.warp = turned * patch.warp;
+  if (++patch.failures > kMaxRefineFailures) patch.take(camera_[c].now(), pixel);
+}
+
+void Frontend::Impl::verifyMotion(std::size_t c, std::uint64_t seed) {
+  bearings_prev_.clear();
+  bearings_cur_.clear();
+  owners_.clear();
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    const Track& track = tracks_[i];
+    if (!track.live[c] || !track.had_previous[c]) continue;
+    static_cast<void>(bearings_prev_.tryPushBack(track.previous_bearing[c]));
+    static_cast<void>(bearings_cur_.tryPushBack(track.bearing[c]));
+    static_cast<void>(owners_.tryPushBack(i));
+  }
+  if (owners_.size() < kMinTracksToVerify) return;
+  RansacSettings settings;
+  settings.bearing_sigma = static_cast<double>(settings_.motion_gate) / kGateSigmas / rig_.camera[c].focal();
+  ransac_.setSettings(settings);
+  const Bearings prev(bearings_prev_.data(), bearings_prev_.size());
+  const Bearings cur(bearings_cur_.data(), bearings_cur_.size());
+  const Status status =
+      camera_[c].rotation_known
+          ? ransac_.twoPoint(prev, cur, camera_[c].R_prev_cur.conjugate(), seed, ransac_result_)
+          : ransac_.fivePoint(prev, cur, seed, ransac_result_);
+  // Without a consensus, or with one of a minority, nothing is known about single tracks.
+  const bool usable =
+      (status.ok() || ransac_result_.no_parallax) && 2 * ransac_result_.inlier_count > owners_.size();
+  if (!usable) return;
+  for (std::size_t k = 0; k < owners_.size(); ++k) {
+    if (ransac_result_.inlier[k]) continue;
+    tracks_[owners_[k]].live[c] = false;
+    ++statistics_.false_motion;
+  }
+}
+
+void Frontend::Impl::verifyStereo() {
+  if (!usesStereo() || !camera_[0].present || !camera_[1].present) return;
+  for (Track& track : tracks_) {
+    if (!track.live[0] || !track.live[1]) continue;
+    if (matcher_.epipolarDistance(track.bearing[0], track.bearing[1]) > settings_.stereo_gate) {
+      track.live[1] = false;
+      ++statistics_.false_stereo;
+    }
+  }
+}
+
+bool Frontend::Impl::locate(AnchorPatch& anchor, std::size_t c, const PredictedLandmark& landmark,
+                            Eigen::Vector2f& pixel) const {
+  if (!patchInside(camera_[c].now().level(0), landmark.pixel[c])) return false;
+  if (!(std::abs(anchor.warp.determinant()) > 0.05F)) return false;
+  const Eigen::Matrix2f inverse = anchor.warp.inverse();
+  AlignmentLimits limits;
+  limits.max_displacement = landmark.gate;
+  WarpedPatch patch;
+  PatchTemplate pattern;
+  pixel = landmark.pixel[c];
+  for (int level = AnchorPatch::kLevels - 1; level >= 0; --level) {
+    const auto scale = static_cast<float>(1 << level);
+    const ImageView& image = camera_[c].now().level(level);
+    Eigen::Vector2f position = pixel / scale;
+    const bool found = patch.sample(anchor.view(level), anchor.centre(level), inverse) &&
+                       pattern.build(patch.centre(), patch.stride()) &&
+                       pattern.align(image, limits, position);
+    if (found) pixel = position * scale;
+    if (!found && level == 0) return false;
+  }
+  return (pixel - landmark.pixel[c]).norm() <= landmark.gate &&
+         patchInside(camera_[c].now().level(0), pixel) &&
+         pattern.correlation(camera_[c].now().level(0), pixel) >= kMinRecognition;
+}
+
+void Frontend::Impl::findAgain(const FrontendPrediction& prediction, int max_features, std::uint64_t index) {
+  static_cast<void>(index);
+  int searches = 0;
+  for (const PredictedLandmark& landmark : prediction.landmarks) {
+    if (searches >= kMaxSearches) return;
+    auto* const track =
+        std::find_if(tracks_.begin(), tracks_.end(), [&](const Track& t) { return t.id == landmark.id; });
+    const bool known = track != tracks_.end();
+    if (!known && static_cast<int>(tracks_.size()) >= max_features) continue;
+    const int slot = known ? track->slot : anchors_.find(landmark.id);
+    if (slot < 0) continue;
+    Track lost;
+    lost.id = landmark.id;
+    lost.slot = slot;
+    lost.age = 1;
+    Track& target = known ? *track : lost;
+    bool found = false;
+    for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+      if (!camera_[c].present || !landmark.visible[c] || target.live[c]) continue;
+      AnchorPatch& anchor = anchors_[slot].patch[c];
+      if (!anchor.valid) continue;
+      ++searches;
+      Eigen::Vector2f pixel;
+      if (!locate(anchor, c, landmark, pixel) || !place(target, c, pixel)) continue;
+      target.had_previous[c] = false;
+      target.in_keyframe[c] = false;
+      found = true;
+      ++statistics_.found_again;
+    }
+    if (!found || known) continue;
+    if (!tracks_.tryPushBack(lost)) return;
+    anchors_[slot].tracked = true;
+  }
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,169 @@
+#include "estimator/frontend/stereo_matcher.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "estimator/frontend/lucas_kanade.hpp"
+#include "estimator/frontend/search_patch.hpp"
+#include "estimator/frontend/warped_patch.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr int kSearchLevel = 1;
+constexpr int kMaxSamples = 256;
+// Below this a sampled place is not worth refining: the warp at infinity and whole-pixel sampling
+// cost some correlation, so it is lower than the final threshold.
+constexpr float kMinSearchCorrelation = 0.6F;
+// Samples nearer than this to the best one belong to its own peak [samples].
+constexpr int kPeakWidth = 3;
+// A rival this close in correlation to the best is refined as well, and must then stay behind by
+// the second margin.
+constexpr float kRivalMargin = 0.1F;
+constexpr float kAmbiguity = 0.04F;
+// Matches this far beyond infinity are noise of distant points [px of disparity].
+constexpr double kBeyondInfinity = 0.7;
+// Step of the numeric warp [px]: half a patch.
+constexpr float kWarpStep = 6.0F;
+
+}  // namespace
+
+double StereoMatcher::epipolarDistance(const Eigen::Vector3d& bearing0,
+                                       const Eigen::Vector3d& bearing1) const {
+  const SE3 T_1_0 = rig_.T_cam1_cam0();
+  const Eigen::Vector3d normal = (T_1_0.rotation * bearing0).cross(T_1_0.translation);
+  const double norm = normal.norm();
+  // On the baseline itself every direction is in plane.
+  if (!(norm > 1e-9)) return 0;
+  return std::abs(bearing1.dot(normal)) / norm * rig_.camera[1].focal();
+}
+
+bool StereoMatcher::warpAt(std::size_t from, const Eigen::Vector2f& from_pixel, double inverse_distance,
+                           Eigen::Matrix2f& warp) const {
+  const SE3 T = toOther(from);
+  const CameraModel& source = rig_.camera[from];
+  const CameraModel& target = rig_.camera[1 - from];
+  for (int axis = 0; axis < 2; ++axis) {
+    std::array<Eigen::Vector2d, 2> end;
+    for (std::size_t side = 0; side < 2; ++side) {
+      Eigen::Vector2d pixel = from_pixel.cast<double>();
+      pixel[axis] += side == 0 ? -kWarpStep : kWarpStep;
+      Eigen::Vector3d bearing;
+      if (!source.unproject(pixel, bearing)) return false;
+      if (!target.project(T.rotation * bearing + inverse_distance * T.translation, end[side])) return false;
+    }
+    warp.col(axis) = ((end[1] - end[0]) / (2.0 * kWarpStep)).cast<float>();
+  }
+  return true;
+}
+
+StereoMatcher::Candidates StereoMatcher::search(const Pyramid& from_image, std::size_t from,
+                                                const Eigen::Vector2f& from_pixel,
+                                                const Eigen::Vector3d& bearing,
+                                                const Pyramid& to_image) const {
+  Candidates found;
+  const CameraModel& target = rig_.camera[1 - from];
+  const SE3 T = toOther(from);
+  const Eigen::Vector3d rotated = T.rotation * bearing;
+  const double nearest = 1.0 / settings_.min_depth;
+  const int level = std::min(kSearchLevel, to_image.levels() - 1);
+  const auto scale = static_cast<float>(1 << level);
+
+  Eigen::Matrix2f warp;
+  WarpedPatch patch;
+  SearchPatch pattern;
+  // The warp of a middling distance serves the search: between 0.5 m and infinity it changes little.
+  if (!warpAt(from, from_pixel, 0.1 * nearest, warp) || !(std::abs(warp.determinant()) > 0.05F)) return found;
+  if (!patch.sample(from_image.level(level), from_pixel / scale, warp.inverse(), kPyramidBorder / 2))
+    return found;
+  if (!pattern.build(patch.centre(), patch.stride())) return found;
+
+  // Length of the curve: by its ends where both project, else the most a sample list can hold.
+  Eigen::Vector2d far_end;
+  Eigen::Vector2d near_end;
+  int samples = kMaxSamples;
+  if (target.project(rotated, far_end) && target.project(rotated + nearest * T.translation, near_end)) {
+    samples = std::clamp(static_cast<int>((near_end - far_end).norm() / scale) + 2, 2, kMaxSamples);
+  }
+  std::array<Candidate, kMaxSamples> sample;
+  int best = -1;
+  const ImageView& image = to_image.level(level);
+  for (int i = 0; i < samples; ++i) {
+    Candidate& c = sample[static_cast<std::size_t>(i)];
+    c.inverse_distance = nearest * i / (samples - 1);
+    Eigen::Vector2d pixel;
+    if (!target.project(rotated + c.inverse_distance * T.translation, pixel)) continue;
+    c.pixel = pixel.cast<float>();
+    if (!patchInside(to_image.level(0), c.pixel)) continue;
+    c.correlation = pattern.correlation(image, static_cast<int>(std::lround(c.pixel.x() / scale)),
+                                        static_cast<int>(std::lround(c.pixel.y() / scale)));
+    if (best < 0 || c.correlation > sample[static_cast<std::size_t>(best)].correlation) best = i;
+  }
+  if (best < 0) return found;
+  found.best = sample[static_cast<std::size_t>(best)];
+  for (int i = 0; i < samples; ++i) {
+    const Candidate& c = sample[static_cast<std::size_t>(i)];
+    if (std::abs(i - best) > kPeakWidth && c.correlation > found.rival.correlation) found.rival = c;
+  }
+  return found;
+}
+
+bool StereoMatcher::refine(const Pyramid& from_image, std::size_t from, const Eigen::Vector2f& from_pixel,
+                           const Eigen::Vector3d& bearing, const Pyramid& to_image,
+                           Candidate& candidate) const {
+  Eigen::Matrix2f warp;
+  if (!warpAt(from, from_pixel, candidate.inverse_distance, warp)) return false;
+  const AlignmentLimits limits;
+  const int levels = std::min(kSearchLevel + 1, to_image.levels());
+  if (!alignWarped(from_image, from_pixel, warp, to_image, levels, limits, candidate.pixel,
+                   &candidate.correlation)) {
+    return false;
+  }
+  if (candidate.correlation < settings_.min_correlation) return false;
+  if (!patchInside(to_image.level(0), candidate.pixel)) return false;
+  Eigen::Vector3d other;
+  if (!rig_.camera[1 - from].unproject(candidate.pixel.cast<double>(), other)) return false;
+  const double distance = from == 0 ? epipolarDistance(bearing, other) : epipolarDistance(other, bearing);
+  if (distance > settings_.epipolar_gate) return false;
+  // Disparity towards the epipole direction: the component of the match beyond infinity.
+  const SE3 T = toOther(from);
+  const Eigen::Vector3d at_infinity = T.rotation * bearing;
+  const Eigen::Vector3d along = T.translation - at_infinity * at_infinity.dot(T.translation);
+  const double norm = along.norm();
+  if (norm > 1e-9) {
+    const double disparity = (other - at_infinity).dot(along) / norm * rig_.camera[1 - from].focal();
+    if (disparity < -kBeyondInfinity) return false;
+  }
+  if (settings_.back_check <= 0) return true;
+  Eigen::Vector2f back = from_pixel;
+  if (!alignWarped(to_image, candidate.pixel, warp.inverse(), from_image, levels, limits, back, nullptr)) {
+    return false;
+  }
+  return (back - from_pixel).squaredNorm() < settings_.back_check * settings_.back_check;
+}
+
+bool StereoMatcher::match(const Pyramid& from_image, std::size_t from, const Eigen::Vector2f& from_pixel,
+                          const Pyramid& to_image, Eigen::Vector2f& to_pixel) const {
+  Eigen::Vector3d bearing;
+  if (!rig_.camera[from].unproject(from_pixel.cast<double>(), bearing)) return false;
+  Candidates found = search(from_image, from, from_pixel, bearing, to_image);
+  if (found.best.correlation < kMinSearchCorrelation) return false;
+  const bool has_rival =
+      found.rival.correlation > std::max(kMinSearchCorrelation, found.best.correlation - kRivalMargin);
+  const bool best_good = refine(from_image, from, from_pixel, bearing, to_image, found.best);
+  const bool rival_good = has_rival && refine(from_image, from, from_pixel, bearing, to_image, found.rival);
+  if (!best_good && !rival_good) return false;
+  if (best_good && rival_good) {
+    const bool same = (found.best.pixel - found.rival.pixel).squaredNorm() < 1.0F;
+    const float lead = found.best.correlation - found.rival.correlation;
+    if (!same && std::abs(lead) < kAmbiguity) return false;
+    to_pixel = lead >= 0 ? found.best.pixel : found.rival.pixel;
+    return true;
+  }
+  to_pixel = best_good ? found.best.pixel : found.rival.pixel;
+  return true;
+}
+
+}  // namespace swiftlet

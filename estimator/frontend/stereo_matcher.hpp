@@ -1,0 +1,68 @@
+#pragma once
+// Finds a feature of one camera in the other camera's image of the same instant, without a depth.
+//
+// The feature's ray is cut at inverse distances from 0 to 1 / min_depth and projected into the
+// other image through its own lens model: the samples follow the epipolar curve of any lens, one
+// pixel of pyramid level 1 apart. At each the patch (warped by the rotation between the cameras) is
+// compared by zero-mean normalized correlation; the best place, and its rival where there is one, is
+// refined by Lucas-Kanade with the warp of its depth and must pass: correlation, distance from the
+// epipolar plane, positive depth, the way back, and being clearly better than the rival.
+//
+// Cost per feature on 752 x 480, 11 cm baseline: about 5 us. No memory beyond the object.
+
+#include <Eigen/Core>
+#include <cstddef>
+
+#include "estimator/camera/rig.hpp"
+#include "estimator/frontend/pyramid.hpp"
+
+namespace swiftlet {
+
+struct StereoMatcherSettings {
+  float min_depth = 0.3F;      ///< m
+  float epipolar_gate = 1.5F;  ///< px
+  float back_check = 0.5F;     ///< px
+  float min_correlation = 0.8F;
+};
+
+class StereoMatcher {
+ public:
+  StereoMatcher(const Rig& rig, const StereoMatcherSettings& settings) : rig_(rig), settings_(settings) {}
+
+  /// Pixel in camera `from` to pixel in the other camera. False when there is no safe match.
+  [[nodiscard]] bool match(const Pyramid& from_image, std::size_t from, const Eigen::Vector2f& from_pixel,
+                           const Pyramid& to_image, Eigen::Vector2f& to_pixel) const;
+
+  /// Distance of a left-right pair of unit bearings from their common epipolar plane, in pixels of
+  /// the second camera near its centre.
+  [[nodiscard]] double epipolarDistance(const Eigen::Vector3d& bearing0,
+                                        const Eigen::Vector3d& bearing1) const;
+
+ private:
+  struct Candidate {
+    double inverse_distance = 0;
+    float correlation = -1;
+    Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
+  };
+  struct Candidates {
+    Candidate best, rival;
+  };
+  [[nodiscard]] Candidates search(const Pyramid& from_image, std::size_t from,
+                                  const Eigen::Vector2f& from_pixel, const Eigen::Vector3d& bearing,
+                                  const Pyramid& to_image) const;
+  [[nodiscard]] bool refine(const Pyramid& from_image, std::size_t from, const Eigen::Vector2f& from_pixel,
+                            const Eigen::Vector3d& bearing, const Pyramid& to_image,
+                            Candidate& candidate) const;
+  /// Offsets in camera `from` to offsets in the other, for a patch facing the ray at that distance.
+  [[nodiscard]] bool warpAt(std::size_t from, const Eigen::Vector2f& from_pixel, double inverse_distance,
+                            Eigen::Matrix2f& warp) const;
+  [[nodiscard]] SE3 toOther(std::size_t from) const {
+    const SE3 T_1_0 = rig_.T_cam1_cam0();
+    return from == 0 ? T_1_0 : T_1_0.inverse();
+  }
+
+  Rig rig_;
+  StereoMatcherSettings settings_;
+};
+
+}  // namespace swiftlet

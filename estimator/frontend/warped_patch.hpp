@@ -1,0 +1,39 @@
+#pragma once
+// A square of pixels resampled through an affine map: the look of a feature from another view.
+
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "estimator/core/image_view.hpp"
+#include "estimator/frontend/patch_template.hpp"
+#include "estimator/frontend/pyramid.hpp"
+
+namespace swiftlet {
+
+class WarpedPatch {
+ public:
+  /// Samples `source` at centre + inverse_warp * d for every offset d of a template with its
+  /// gradient border; bilinear, rounded to 8 bits. `inverse_warp` takes offsets in the other view
+  /// to offsets in the source. `border` pixels around the source may be read, too. False when a
+  /// sample would lie outside. About 0.25 us.
+  [[nodiscard]] bool sample(const ImageView& source, const Eigen::Vector2f& centre,
+                            const Eigen::Matrix2f& inverse_warp, int border = 0);
+
+  [[nodiscard]] const std::uint8_t* centre() const { return pixels_ + kReach * kStride + kReach; }
+  [[nodiscard]] int stride() const { return kStride; }
+
+ private:
+  static constexpr int kReach = kPatchRadius + 1;
+  static constexpr int kSide = 2 * kReach + 1;
+  static constexpr int kStride = 32;  ///< 16-lane loads run past the last column
+  alignas(32) std::uint8_t pixels_[(kSide + 1) * kStride]{};
+};
+
+/// Aligns the patch around `from_pixel` of `from`, warped by `warp` (offsets in `from` to offsets in
+/// `to`), at levels - 1 down to 0 of `to`. `to_pixel` holds the guess and receives the answer,
+/// `correlation` (may be null) the final one at level 0. False when lost.
+[[nodiscard]] bool alignWarped(const Pyramid& from, const Eigen::Vector2f& from_pixel,
+                               const Eigen::Matrix2f& warp, const Pyramid& to, int levels,
+                               const AlignmentLimits& limits, Eigen::Vector2f& to_pixel, float* correlation);
+
+}  // namespace swiftlet

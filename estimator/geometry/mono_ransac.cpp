@@ -1,0 +1,402 @@
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "estimator/core/random.hpp"
+#include "estimator/geometry/consensus.hpp"
+#include "estimator/geometry/minimal_solvers.hpp"
+#include "estimator/geometry/ransac.hpp"
+#include "estimator/geometry/so3.hpp"
+
+namespace swiftlet {
+namespace {
+
+// 3 sigma of a normal error in one direction, and the same probability in two directions.
+constexpr double kGateSigmas = 3.0;
+constexpr double kGateSquared = kGateSigmas * kGateSigmas;
+constexpr double kGateSquaredTwoDof = 11.83;
+// A motion must explain more than a rotation alone does: by this share of its own inliers, and by
+// this share of the tracks that the rotation leaves, of which it fits about 0.1 by chance.
+constexpr double kExtraInliers = 0.05;
+constexpr double kExtraOfUnexplained = 0.15;
+constexpr int kRefineSteps = 3;
+constexpr int kFinalRefineSteps = 6;
+constexpr int kMaxRotationSamples = 60;
+constexpr std::size_t kLanes = 8;
+// After how many tracks the cost of a hypothesis is compared with the best.
+constexpr std::size_t kCostBlock = 64;
+// Keeps divisions finite for a bearing at the epipole; far below any noise squared.
+constexpr double kTiny = 1e-24;
+
+struct Gates {
+  double sampson_squared;  // [rad^2]
+  double parallax;         // [rad] noise of a parallax
+  double min_depth;        // over the baseline
+  double turned_squared;   // [rad^2] |cur - R prev|^2
+  double inverse_variance;
+
+  explicit Gates(const RansacSettings& settings)
+      : sampson_squared(kGateSquared * settings.bearing_sigma * settings.bearing_sigma),
+        parallax(kGateSigmas * std::numbers::sqrt2 * settings.bearing_sigma),
+        min_depth(settings.min_depth_over_baseline),
+        turned_squared(2.0 * kGateSquaredTwoDof * settings.bearing_sigma * settings.bearing_sigma),
+        inverse_variance(1.0 / (settings.bearing_sigma * settings.bearing_sigma)) {}
+};
+
+struct Model {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d t = Eigen::Vector3d::Zero();            // unit, or zero: rotation alone
+  double cost = std::numeric_limits<double>::infinity();  // truncated, in gates
+  std::size_t inliers = 0;
+
+  [[nodiscard]] bool turnsOnly() const { return t.isZero(0); }
+};
+
+Status load(Bearings prev, Bearings cur, const RansacSettings& settings, MonoTracks& tracks,
+            RansacResult& result) {
+  result = RansacResult{};
+  tracks.count = 0;
+  if (prev.size() != cur.size() || prev.size() > kMaxFeatures) {
+    return {StatusCode::kInvalidInput, "ransac: track counts differ or exceed kMaxFeatures"};
+  }
+  if (!settings.valid()) return {StatusCode::kInvalidInput, "ransac: a setting is out of range"};
+  result.inlier.resize(prev.size());
+  for (std::size_t i = 0; i < prev.size(); ++i) {
+    result.inlier[i] = false;
+    if (!prev[i].allFinite() || !cur[i].allFinite()) continue;
+    const std::size_t at = tracks.count++;
+    tracks.prev.x[at] = prev[i].x();
+    tracks.prev.y[at] = prev[i].y();
+    tracks.prev.z[at] = prev[i].z();
+    tracks.cur.x[at] = cur[i].x();
+    tracks.cur.y[at] = cur[i].y();
+    tracks.cur.z[at] = cur[i].z();
+    tracks.index[at] = i;
+  }
+  return okStatus();
+}
+
+// Truncated sum of squared Sampson errors over the gate; stops once above `bound`.
+double essentialCost(const Eigen::Matrix3d& E, const MonoTracks& tracks, double gate_squared, double bound) {
+  const double inverse_gate = 1.0 / gate_squared;
+  const double e00 = E(0, 0), e01 = E(0, 1), e02 = E(0, 2);
+  const double e10 = E(1, 0), e11 = E(1, 1), e12 = E(1, 2);
+  const double e20 = E(2, 0), e21 = E(2, 1), e22 = E(2, 2);
+  const auto& p = tracks.prev;
+  const auto& c = tracks.cur;
+  const auto term = [&](std::size_t i) {
+    const double nx = e00 * p.x[i] + e01 * p.y[i] + e02 * p.z[i];
+    const double ny = e10 * p.x[i] + e11 * p.y[i] + e12 * p.z[i];
+    const double nz = e20 * p.x[i] + e21 * p.y[i] + e22 * p.z[i];
+    const double mx = e00 * c.x[i] + e10 * c.y[i] + e20 * c.z[i];
+    const double my = e01 * c.x[i] + e11 * c.y[i] + e21 * c.z[i];
+    const double mz = e02 * c.x[i] + e12 * c.y[i] + e22 * c.z[i];
+    const double e = nx * c.x[i] + ny * c.y[i] + nz * c.z[i];
+    const double gradient = nx * nx + ny * ny + nz * nz + mx * mx + my * my + mz * mz + kTiny;
+    const double error = e * e * inverse_gate / gradient;
+    return error < 1.0 ? error : 1.0;
+  };
+  double cost = 0;
+  std::size_t i = 0;
+  while (i + kLanes <= tracks.count) {
+    const std::size_t end = std::min(tracks.count, i + kCostBlock);
+    std::array<double, kLanes> sums{};
+    for (; i + kLanes <= end; i += kLanes) {
+      for (std::size_t lane = 0; lane < kLanes; ++lane) sums[lane] += term(i + lane);
+    }
+    for (const double sum : sums) cost += sum;
+    if (cost > bound) return cost;
+  }
+  for (; i < tracks.count; ++i) cost += term(i);
+  return cost;
+}
+
+// Squared error over the gate of one track under a motion; 1 or more: outlier.
+double gatedError(const Eigen::Matrix3d& R, const Eigen::Vector3d& t, const Eigen::Vector3d& prev,
+                  const Eigen::Vector3d& cur, const Gates& gates) {
+  const Eigen::Vector3d turned = R * prev;
+  if (t.isZero(0)) return (cur - turned).squaredNorm() / gates.turned_squared;
+  const Eigen::Vector3d normal = t.cross(turned);  // of the epipolar plane
+  const Eigen::Vector3d cur_normal = t.cross(cur);
+  const double e = normal.dot(cur);
+  const double error =
+      e * e / (gates.sampson_squared * (normal.squaredNorm() + cur_normal.squaredNorm() + kTiny));
+  if (error >= 1.0) return error;
+  // With depths d' cur = d turned + t: d' and d are positive multiples of `towards` and `from`,
+  // and d / |t| = from / towards. Both are sines times |normal|, noisy by the parallax gate.
+  const double slack = gates.parallax * normal.norm();
+  const double towards = cur.dot(turned.cross(normal));
+  const double from = normal.dot(cur_normal);
+  const bool in_front = towards > -slack && from > -slack && cur.dot(turned) > 0;
+  return in_front && from + slack > gates.min_depth * towards ? error : 1.0;
+}
+
+// Prior of the rotation; no information: free, infinite: fixed.
+struct RotationPrior {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  double information = 0;  // [1/rad^2]
+
+  [[nodiscard]] bool fixes() const { return std::isinf(information); }
+  [[nodiscard]] bool pulls() const { return information > 0 && !fixes(); }
+};
+
+void score(const MonoTracks& tracks, const Gates& gates, const RotationPrior& prior, Model& model) {
+  model.cost = 0;
+  if (prior.pulls()) {
+    model.cost = prior.information * logSo3(Eigen::Matrix3d(prior.R.transpose() * model.R)).squaredNorm() /
+                 kGateSquared;
+  }
+  model.inliers = 0;
+  for (std::size_t i = 0; i < tracks.count; ++i) {
+    const double error = gatedError(model.R, model.t, tracks.prevAt(i), tracks.curAt(i), gates);
+    model.cost += std::min(error, 1.0);
+    if (error < 1.0) ++model.inliers;
+  }
+}
+
+void addPrior(const RotationPrior& prior, const Eigen::Matrix3d& R, Eigen::Ref<Eigen::Matrix3d> H,
+              Eigen::Ref<Eigen::Vector3d> g) {
+  if (!prior.pulls()) return;
+  const Eigen::Matrix3d difference = prior.R.transpose() * R;
+  g += prior.information * logSo3(difference);
+  H.diagonal().array() += prior.information;
+}
+
+// One Gauss-Newton step of a rotation alone: cur - R Exp(phi) prev.
+Model stepRotation(const MonoTracks& tracks, const Gates& gates, const RotationPrior& prior,
+                   const Model& model) {
+  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d g = Eigen::Vector3d::Zero();
+  const double weight = 0.5 * gates.inverse_variance;  // both bearings are noisy
+  for (std::size_t i = 0; i < tracks.count; ++i) {
+    const Eigen::Vector3d prev = tracks.prevAt(i);
+    const Eigen::Vector3d cur = tracks.curAt(i);
+    if ((cur - model.R * prev).squaredNorm() >= gates.turned_squared) continue;
+    const Eigen::Vector3d back = model.R.transpose() * cur;
+    H += weight * (Eigen::Matrix3d::Identity() - prev * prev.transpose());
+    g += weight * back.cross(prev);
+  }
+  addPrior(prior, model.R, H, g);
+  Model next = model;
+  next.R = model.R * expSo3Matrix(-H.ldlt().solve(g));
+  return next;
+}
+
+// One Gauss-Newton step of rotation and direction of translation on the Sampson errors of the
+// inliers, their gradients' lengths held (their change is second order in the errors).
+Model stepMotion(const MonoTracks& tracks, const Gates& gates, const RotationPrior& prior,
+                 const Model& model) {
+  using Vector5d = Eigen::Matrix<double, 5, 1>;
+  using Matrix5d = Eigen::Matrix<double, 5, 5>;
+  const Eigen::Vector3d axis = model.t.unitOrthogonal();
+  Eigen::Matrix<double, 3, 2> tangent;
+  tangent << axis, model.t.cross(axis);
+  Matrix5d H = Matrix5d::Zero();
+  Vector5d g = Vector5d::Zero();
+  for (std::size_t i = 0; i < tracks.count; ++i) {
+    const Eigen::Vector3d prev = tracks.prevAt(i);
+    const Eigen::Vector3d cur = tracks.curAt(i);
+    if (gatedError(model.R, model.t, prev, cur, gates) >= 1.0) continue;
+    const Eigen::Vector3d turned = model.R * prev;
+    const Eigen::Vector3d cur_normal = cur.cross(model.t);
+    const double gradient = (model.t.cross(turned)).squaredNorm() + cur_normal.squaredNorm() + kTiny;
+    Vector5d J;
+    J.head<3>() = prev.cross(model.R.transpose() * cur_normal);
+    J.tail<2>() = tangent.transpose() * turned.cross(cur);
+    const double weight = gates.inverse_variance / gradient;
+    H += weight * J * J.transpose();
+    g += weight * model.t.dot(turned.cross(cur)) * J;
+  }
+  addPrior(prior, model.R, H.topLeftCorner<3, 3>(), g.head<3>());
+  Vector5d step = Vector5d::Zero();
+  if (prior.fixes()) {
+    step.tail<2>() = -H.bottomRightCorner<2, 2>().ldlt().solve(g.tail<2>());
+  } else {
+    step = -H.ldlt().solve(g);
+  }
+  Model next = model;
+  next.R = model.R * expSo3Matrix(step.head<3>());
+  next.t = (model.t + tangent * step.tail<2>()).normalized();
+  return next;
+}
+
+// Steps while the truncated cost falls.
+void refine(const MonoTracks& tracks, const Gates& gates, const RotationPrior& prior, int steps,
+            Model& model) {
+  if (model.turnsOnly() && prior.fixes()) return;
+  for (int i = 0; i < steps; ++i) {
+    Model next = model.turnsOnly() ? stepRotation(tracks, gates, prior, model)
+                                   : stepMotion(tracks, gates, prior, model);
+    if (!next.R.allFinite() || !next.t.allFinite()) return;
+    score(tracks, gates, prior, next);
+    if (!(next.cost < model.cost)) return;
+    model = next;
+  }
+}
+
+Model rotationConsensus(const MonoTracks& tracks, const Gates& gates, const RansacSettings& settings,
+                        Random& random) {
+  Model best;
+  score(tracks, gates, {}, best);
+  int needed = kMaxRotationSamples;
+  for (int i = 0; i < needed; ++i) {
+    const auto sample = drawSample<2>(random, tracks.count);
+    Model model;
+    model.R = rotationFromTwoPoints(std::array{tracks.prevAt(sample[0]), tracks.prevAt(sample[1])},
+                                    std::array{tracks.curAt(sample[0]), tracks.curAt(sample[1])});
+    score(tracks, gates, {}, model);
+    if (!(model.cost < best.cost)) continue;
+    refine(tracks, gates, {}, kRefineSteps, model);
+    best = model;
+    needed = samplesNeeded(best.inliers, tracks.count, 2, settings.confidence, kMaxRotationSamples);
+  }
+  return best;
+}
+
+// The best of the four motions of an essential matrix, by the full gates.
+Model motionOf(const Eigen::Matrix3d& E, const MonoTracks& tracks, const Gates& gates) {
+  const EssentialMotions motions = motionsOfEssential(E);
+  Model best;
+  for (const Eigen::Matrix3d& R : motions.R) {
+    for (const double sign : {1.0, -1.0}) {
+      Model model;
+      model.R = R;
+      model.t = sign * motions.t;
+      score(tracks, gates, {}, model);
+      if (model.cost < best.cost) best = model;
+    }
+  }
+  return best;
+}
+
+bool explainsMore(const Model& motion, const Model& rotation, std::size_t count) {
+  const double extra = static_cast<double>(motion.inliers) - static_cast<double>(rotation.inliers);
+  const auto unexplained = static_cast<double>(count - rotation.inliers);
+  return extra > kExtraInliers * static_cast<double>(motion.inliers) &&
+         extra > kExtraOfUnexplained * unexplained;
+}
+
+Status finish(const MonoTracks& tracks, const Gates& gates, const RansacSettings& settings,
+              const RotationPrior& prior, Model& motion, Model& rotation, RansacResult& result) {
+  refine(tracks, gates, prior, kFinalRefineSteps, rotation);
+  refine(tracks, gates, prior, kFinalRefineSteps, motion);
+  result.no_parallax = !explainsMore(motion, rotation, tracks.count);
+  const Model& chosen = result.no_parallax ? rotation : motion;
+  if (chosen.inliers < settings.min_inliers) {
+    result.no_parallax = false;
+    return {StatusCode::kDegenerate, "mono ransac: too few tracks agree on a motion"};
+  }
+  result.T_cur_prev = SE3(chosen.R, chosen.t);
+  result.inlier_count = chosen.inliers;
+  for (std::size_t i = 0; i < tracks.count; ++i) {
+    result.inlier[tracks.index[i]] =
+        gatedError(chosen.R, chosen.t, tracks.prevAt(i), tracks.curAt(i), gates) < 1.0;
+  }
+  if (!result.no_parallax) return okStatus();
+  return {StatusCode::kDegenerate, "mono ransac: no parallax, a rotation alone explains the tracks"};
+}
+
+Status tooFew() { return {StatusCode::kDegenerate, "ransac: fewer tracks than a sample needs"}; }
+
+}  // namespace
+
+Status MonoRansac::fivePoint(Bearings prev, Bearings cur, std::uint64_t seed, RansacResult& result) {
+  const Status loaded = load(prev, cur, settings_, tracks_, result);
+  if (!loaded.ok()) return loaded;
+  if (tracks_.count < 5) return tooFew();
+  const Gates gates(settings_);
+  Random random(seed);
+  Model rotation = rotationConsensus(tracks_, gates, settings_, random);
+  Model best;
+  int needed = settings_.max_iterations;
+  for (; result.iterations < needed; ++result.iterations) {
+    const auto sample = drawSample<5>(random, tracks_.count);
+    std::array<Eigen::Vector3d, 5> from;
+    std::array<Eigen::Vector3d, 5> to;
+    for (std::size_t i = 0; i < 5; ++i) {
+      from[i] = tracks_.prevAt(sample[i]);
+      to[i] = tracks_.curAt(sample[i]);
+    }
+    for (const Eigen::Matrix3d& E : essentialFromFivePoints(from, to)) {
+      // The further gates only add to this cost: a worse one cannot win.
+      if (!(essentialCost(E, tracks_, gates.sampson_squared, best.cost) < best.cost)) continue;
+      Model model = motionOf(E, tracks_, gates);
+      if (!(model.cost < best.cost)) continue;
+      refine(tracks_, gates, {}, kRefineSteps, model);
+      best = model;
+      needed = samplesNeeded(best.inliers, tracks_.count, 5, settings_.confidence, settings_.max_iterations);
+    }
+  }
+  return finish(tracks_, gates, settings_, {}, best, rotation, result);
+}
+
+Status MonoRansac::twoPoint(Bearings prev, Bearings cur, const Eigen::Quaterniond& R_cur_prev,
+                            std::uint64_t seed, RansacResult& result) {
+  const Status loaded = load(prev, cur, settings_, tracks_, result);
+  if (!loaded.ok()) return loaded;
+  if (!R_cur_prev.coeffs().allFinite()) {
+    return {StatusCode::kInvalidInput, "ransac: the given rotation is not finite"};
+  }
+  if (tracks_.count < 2) return tooFew();
+  const Gates gates(settings_);
+  Random random(seed);
+  RotationPrior prior;
+  prior.R = R_cur_prev.normalized().toRotationMatrix();
+  prior.information = 1.0 / (settings_.rotation_sigma * settings_.rotation_sigma);  // infinite: fixed
+  Model rotation;
+  rotation.R = prior.R;
+  score(tracks_, gates, prior, rotation);
+
+  // Only tracks that moved beyond their noise carry a direction.
+  std::array<std::size_t, kMaxFeatures> moved{};
+  std::size_t moved_count = 0;
+  for (std::size_t i = 0; i < tracks_.count; ++i) {
+    const double error = gatedError(rotation.R, rotation.t, tracks_.prevAt(i), tracks_.curAt(i), gates);
+    if (error >= 1.0) moved[moved_count++] = i;
+  }
+  Model best;
+  int needed = moved_count < 2 ? 0 : settings_.max_iterations;
+  for (; result.iterations < needed; ++result.iterations) {
+    const auto sample = drawSample<2>(random, moved_count);
+    const std::size_t a = moved[sample[0]];
+    const std::size_t b = moved[sample[1]];
+    Model model;
+    model.R = prior.R;
+    model.t = translationFromTwoPoints(model.R, std::array{tracks_.prevAt(a), tracks_.prevAt(b)},
+                                       std::array{tracks_.curAt(a), tracks_.curAt(b)});
+    if (model.turnsOnly()) continue;
+    score(tracks_, gates, prior, model);
+    if (!(model.cost < best.cost)) continue;
+    refine(tracks_, gates, prior, kRefineSteps, model);
+    best = model;
+    std::size_t agree = 0;
+    for (std::size_t i = 0; i < moved_count; ++i) {
+      const std::size_t at = moved[i];
+      if (gatedError(best.R, best.t, tracks_.prevAt(at), tracks_.curAt(at), gates) < 1.0) ++agree;
+    }
+    needed = samplesNeeded(agree, moved_count, 2, settings_.confidence, settings_.max_iterations);
+  }
+  return finish(tracks_, gates, settings_, prior, best, rotation, result);
+}
+
+std::size_t monoInliers(Bearings prev, Bearings cur, const SE3& T_cur_prev, const RansacSettings& settings,
+                        FixedVector<bool, kMaxFeatures>& inlier) {
+  inlier.clear();
+  if (prev.size() != cur.size() || prev.size() > kMaxFeatures || !settings.valid()) return 0;
+  const Gates gates(settings);
+  const Eigen::Matrix3d R = T_cur_prev.R();
+  const double length = T_cur_prev.translation.norm();
+  const Eigen::Vector3d t =
+      length > 0 ? Eigen::Vector3d(T_cur_prev.translation / length) : Eigen::Vector3d::Zero();
+  inlier.resize(prev.size());
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < prev.size(); ++i) {
+    inlier[i] = gatedError(R, t, prev[i], cur[i], gates) < 1.0;  // false for NaN
+    if (inlier[i]) ++count;
+  }
+  return count;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,108 @@
+#include "estimator/imu/initialization.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/geometry/so3.hpp"
+
+namespace swiftlet {
+namespace {
+
+// Older readings say less: the body has turned by an unknown bias since (4 degrees in 1 s at .08 rad/s).
+constexpr double kLongestMean = 1.0;  // s
+// Sigma of the tilt: what the accelerometer's bias alone leaves, and what hard manoeuvres reach.
+constexpr double kDegree = 0.017453292519943295;
+constexpr double kLeastTiltSigma = 2.0 * kDegree;
+constexpr double kMostTiltSigma = 6.0 * kDegree;
+// Acceleration changes over some tenths of a second: readings closer than this are one.
+constexpr double kAccelerationTime = 0.3;  // s
+// A scatter seen in a short window underestimates the acceleration that stays constant in it.
+constexpr double kLeastAcceleration = 0.45;  // m/s^2, RMS per axis of hand-held and flown starts
+constexpr double kLeastForceShare = 0.5;     // of gravity: below it the body falls
+constexpr double kRestVelocitySigma = 0.01;  // m/s
+
+}  // namespace
+
+Eigen::Quaterniond gravityAlignedRotation(const Eigen::Vector3d& up) {
+  // The half-way quaternion (1 + up.z, up x z), singular only for a body upside down.
+  const double w = 1.0 + up.z();
+  if (w < 1e-9) return {0, 1, 0, 0};
+  return Eigen::Quaterniond(w, up.y(), -up.x(), 0).normalized();
+}
+
+Status estimateTilt(std::span<const ImuSample> samples, Stamp at, const ImuNoise& noise,
+                    const StartPrior& prior, TiltEstimate& tilt) {
+  // Backwards from `at`: R turns a reading's axes into those at `at`.
+  Eigen::Quaterniond R = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double sum_of_squares = 0;
+  double count = 0;
+  Stamp later = at;
+  for (std::size_t i = samples.size(); i-- > 0;) {
+    const ImuSample& sample = samples[i];
+    if (sample.stamp > at) continue;
+    if ((at - sample.stamp).seconds() > kLongestMean) break;
+    const Eigen::Vector3d turn = (later - sample.stamp).seconds() * (sample.gyro - prior.bias_gyro);
+    R = R * expSo3(-turn);
+    later = sample.stamp;
+    const Eigen::Vector3d force = R * (sample.accel - prior.bias_accel);
+    sum += force;
+    sum_of_squares += force.squaredNorm();
+    count += 1;
+  }
+  if (count == 0) return {StatusCode::kInvalidInput, "no IMU sample before the first image"};
+  const Eigen::Vector3d mean = sum / count;
+  if (mean.norm() < kLeastForceShare * noise.gravity) {
+    return {StatusCode::kDegenerate, "mean specific force far below gravity: falling"};
+  }
+  const double variance = std::max(0.0, sum_of_squares / count - mean.squaredNorm()) / 3.0;
+  tilt.up = mean.normalized();
+  tilt.duration = (at - later).seconds();
+  const double independent = 1.0 + tilt.duration / kAccelerationTime;
+  const double manoeuvre =
+      std::sqrt((variance + kLeastAcceleration * kLeastAcceleration) / independent) / noise.gravity;
+  const double excess = std::abs(mean.norm() - noise.gravity) / noise.gravity;  // acceleration that showed
+  const double sigma = std::hypot(manoeuvre, excess, prior.bias_accel_sigma / noise.gravity);
+  tilt.sigma = std::clamp(sigma, kLeastTiltSigma, kMostTiltSigma);
+  return okStatus();
+}
+
+Status initializeAtRest(const RestState& rest, Stamp at, const ImuNoise& noise, const StartPrior& prior,
+                        NavState& state) {
+  if (!rest.at_rest || rest.duration <= 0) return {StatusCode::kNotReady, "the body is not at rest"};
+  const Eigen::Vector3d force = rest.mean_accel - prior.bias_accel;
+  const double magnitude = force.norm();
+  if (magnitude < kLeastForceShare * noise.gravity) {
+    return {StatusCode::kDegenerate, "force at rest far below gravity"};
+  }
+  const Eigen::Vector3d up = force / magnitude;
+  state = NavState{};
+  state.stamp = at;
+  state.health = Health::kGood;
+  state.T_world_body = SE3(gravityAlignedRotation(up), Eigen::Vector3d::Zero());
+  state.bias_gyro = rest.mean_gyro;
+  state.bias_accel = prior.bias_accel + (magnitude - noise.gravity) * up;
+
+  // R_true up_true = z with up_true = (mean - ba) / g: a horizontal bias error b turns the tilt by
+  // phi = up x b / g. Yaw (phi along up) is gauge.
+  const double gyro_variance = noise.gyro_density * noise.gyro_density / rest.duration +
+                               noise.gyro_walk * noise.gyro_walk * rest.duration / 3.0;
+  const double accel_variance = noise.accel_density * noise.accel_density / rest.duration +
+                                noise.accel_walk * noise.accel_walk * rest.duration / 3.0;
+  const double bias_variance = prior.bias_accel_sigma * prior.bias_accel_sigma;
+  const Eigen::Matrix3d along = up * up.transpose();
+  const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - along;
+  const Eigen::Matrix3d turn = hat(up) / noise.gravity;
+  Matrix15d& P = state.covariance;
+  P.block<3, 3>(0, 0) = turn * ((bias_variance + accel_variance) * across) * turn.transpose() +
+                        prior.gauge_sigma * prior.gauge_sigma * along;
+  P.block<3, 3>(0, 12) = turn * (bias_variance * across);
+  P.block<3, 3>(12, 0) = P.block<3, 3>(0, 12).transpose();
+  P.block<3, 3>(12, 12) = bias_variance * across + accel_variance * along;
+  P.block<3, 3>(3, 3) = prior.gauge_sigma * prior.gauge_sigma * Eigen::Matrix3d::Identity();
+  P.block<3, 3>(6, 6) = kRestVelocitySigma * kRestVelocitySigma * Eigen::Matrix3d::Identity();
+  P.block<3, 3>(9, 9) = gyro_variance * Eigen::Matrix3d::Identity();
+  return okStatus();
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,77 @@
+#pragma once
+// Propagation at IMU rate from the smoother's newest state.
+//
+// What: keeps the newest NavState, moves it over every sample that follows its stamp, and gives the
+// state at each sample's stamp with its 15x15 covariance (phi, p, v, bg, ba; bias walks included).
+// A fixed ring keeps the last samples, so that a new smoother state, always some frames old, is
+// brought to the present at once. Rule: that of Preintegration::integrate(samples, from, to) for
+// samples, holes and saturated readings; a gap (more than 10 periods without a sample) is not
+// integrated: attitude and velocity are held, their covariance grows (integration_rule.hpp).
+// Frames: NavState's (world with z up, body). Units: SI.
+// Errors: kNotReady before the first state; kInvalidInput for a sample not later than the last one
+// or not finite (dropped), and for a state that is not finite; kCapacityReached when a state is so
+// old that the ring no longer holds the samples after it (the hole is bridged).
+// Memory: 1024 samples, 60 kB; nothing is allocated. Cost: about 0.5 us a sample.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "estimator/core/status.hpp"
+#include "estimator/imu/imu_noise.hpp"
+#include "estimator/imu/integration_rule.hpp"
+#include "estimator/messages/imu_sample.hpp"
+#include "estimator/messages/nav_state.hpp"
+
+namespace swiftlet {
+
+class Propagator {
+ public:
+  explicit Propagator(const ImuNoise& noise) : noise_(noise) {}
+
+  /// Takes a (smoothed) state and re-applies the samples after its stamp. A state later than the
+  /// last sample is kept as it is; the next sample starts from it.
+  Status setState(const NavState& state);
+
+  /// Takes one sample. `state` (may be null) gets the state at its stamp.
+  Status step(const ImuSample& sample, NavState* state = nullptr);
+
+  /// The state moved on from the last sample to `at` by holding its reading (the prediction for an
+  /// image whose last samples have not come yet). Not kept. kInvalidInput when `at` lies before
+  /// the newest state.
+  Status predict(Stamp at, NavState& state) const;
+
+  [[nodiscard]] bool hasState() const { return has_state_; }
+  /// The newest state, at the later of the last sample's stamp and that of `setState`.
+  [[nodiscard]] NavState state() const { return current_.toNavState(); }
+  /// Seconds bridged without samples since the stamp of the state that was last set.
+  [[nodiscard]] double gapSeconds() const { return current_.gap_seconds; }
+
+  /// Forgets state and samples.
+  void reset();
+
+ private:
+  // The state with its rotation error in world axes (theta = R phi), which makes the transition sparse.
+  struct Current {
+    NavState nav;
+    double gap_seconds = 0;
+
+    void set(const NavState& state);
+    [[nodiscard]] NavState toNavState() const;
+    void advance(const ImuSample* before, const ImuSample* after, Stamp to, const ImuNoise& noise);
+    void advanceMeasured(const ImuSegment& segment, const ImuNoise& noise);
+    void advanceGap(double dt, const ImuNoise& noise);
+  };
+  // 5 s at 200 Hz, 1 s at 1 kHz: beyond any smoother's delay. A longer delay is reported.
+  static constexpr std::size_t kRing = 1024;
+
+  [[nodiscard]] const ImuSample& sampleAt(std::uint64_t index) const { return ring_[index % kRing]; }
+
+  ImuNoise noise_;
+  std::array<ImuSample, kRing> ring_{};
+  std::uint64_t count_ = 0;  // samples ever taken; the ring holds the last kRing of them
+  bool has_state_ = false;
+  Current current_;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,121 @@
+#pragma once
+// Rest: is the body standing still, since when, and what the IMU read meanwhile.
+//
+// What: the readings of the last second in two bands. The slow band (scatter of 0.1 s means) tells
+// standing from flying even with idling rotors, whose vibration averages out, while a hovering body
+// is corrected a few times a second. The whole band (scatter of the samples) is bounded loosely,
+// and any sample that jumps out of it ends a rest at once. The slow limits follow the sensor's own
+// noise (the quietest window so far) between fixed bounds, so that they are neither blind to a
+// coarse sensor nor lax on a fine one.
+//   IMU alone:  1 s within the limits, or 0.5 s well within them; not while the estimate says that
+//               the body moves, nor with a mean rate that no bias explains.
+//   Images:     still images for 0.25 s admit a rest at wider IMU limits; moving images end and
+//               forbid it. Unknown (negative) motion leaves the decision to the IMU.
+// Frames: body axes. Units: SI, pixels.
+// Use: `at_rest` is for a SOFT factor (zero velocity, unchanged pose), never for setting a state.
+// Cost: about 30 ns a sample; fixed memory (3 kB); nothing is allocated.
+// Source: stance detection by windowed deviations: Skog, Handel, Nilsson, Rantakokko, "Zero-Velocity
+// Detection", IEEE T-BME 2010; the two bands and the adaptive limits are this project's own.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "estimator/core/stamp.hpp"
+#include "estimator/imu/imu_noise.hpp"
+#include "estimator/messages/imu_sample.hpp"
+
+namespace swiftlet {
+
+struct RestState {
+  bool at_rest = false;
+  Stamp since;                                           ///< start of the rest (valid at rest)
+  double duration = 0;                                   ///< s of the rest that the means cover
+  Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero();   ///< rad/s over the rest: the gyro bias
+  Eigen::Vector3d mean_accel = Eigen::Vector3d::Zero();  ///< m/s^2 over the rest
+  double gyro_deviation = 0;   ///< rad/s, samples of the newest 0.5 s, RMS of the axes
+  double accel_deviation = 0;  ///< m/s^2, likewise
+};
+
+class RestDetector {
+ public:
+  explicit RestDetector(const ImuNoise& noise);
+
+  /// Takes one accepted sample (stamps increase). After a silence of more than 50 ms the windows
+  /// start anew.
+  void addImu(const ImuSample& sample);
+
+  /// Takes the median pixel motion since the previous frame; negative: unknown (no tracks).
+  void addFrame(Stamp stamp, double median_motion);
+
+  /// Takes what the smoother knows, once it is converged; without it biases up to 0.15 rad/s pass.
+  /// `bias_gyro_sigma`: rad/s. `speed`, `speed_sigma`: m/s.
+  void setEstimate(const Eigen::Vector3d& bias_gyro, double bias_gyro_sigma, double speed,
+                   double speed_sigma);
+
+  [[nodiscard]] const RestState& state() const { return state_; }
+  void reset();
+
+ private:
+  struct Block {  // sums over 50 ms
+    Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
+    Eigen::Vector3d accel = Eigen::Vector3d::Zero();
+    Eigen::Vector3d gyro_squares = Eigen::Vector3d::Zero();
+    Eigen::Vector3d accel_squares = Eigen::Vector3d::Zero();
+    double count = 0;
+    Stamp begin;
+
+    void add(const Block& other);
+  };
+  struct Window {
+    Block sum;
+    double gyro = 0, accel = 0;            // RMS deviation of the samples
+    double slow_gyro = 0, slow_accel = 0;  // RMS deviation of the 0.1 s means
+  };
+  enum class Images : std::uint8_t { kUnknown, kStill, kUncertain, kMoving };
+
+  static constexpr std::size_t kLongBlocks = 20;   // 1 s
+  static constexpr std::size_t kShortBlocks = 10;  // 0.5 s
+  static constexpr std::size_t kImageBlocks = 6;   // 0.3 s
+
+  [[nodiscard]] Window window(std::size_t blocks) const;
+  [[nodiscard]] Images images() const;
+  [[nodiscard]] bool meansAllow(const Window& w) const;
+  [[nodiscard]] bool speedAllows() const;
+  [[nodiscard]] bool within(const Window& w, double slow_factor, double gyro_limit, double accel_limit) const;
+  [[nodiscard]] bool jumps(const ImuSample& sample) const;
+  [[nodiscard]] bool drifts(const Block& block) const;
+  void closeBlock();
+  void startAnew();
+  void begin(const Window& w);
+  void end();
+  void updateLimits(const Window& w);
+
+  ImuNoise noise_;
+  RestState state_;
+  std::array<Block, kLongBlocks> blocks_{};
+  std::size_t block_count_ = 0;  // blocks ever closed since the windows began
+  Block open_;
+  bool has_last_ = false;
+  Stamp last_;
+  Block rest_;                                           // sums over the rest
+  Eigen::Vector3d jump_gyro_ = Eigen::Vector3d::Zero();  // per axis, from the mean of the window
+  Eigen::Vector3d jump_accel_ = Eigen::Vector3d::Zero();
+  double drift_gyro_ = 0;
+  double drift_accel_ = 0;
+  Eigen::Vector3d window_gyro_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d window_accel_ = Eigen::Vector3d::Zero();
+  double slow_gyro_limit_;
+  double slow_accel_limit_;
+  Images image_kind_ = Images::kUnknown;
+  Stamp image_stamp_;
+  Stamp still_since_;
+  bool has_estimate_ = false;
+  Eigen::Vector3d bias_gyro_ = Eigen::Vector3d::Zero();
+  double bias_gyro_sigma_ = 0;
+  double speed_ = 0;
+  double speed_sigma_ = 0;
+};
+
+}  // namespace swiftlet

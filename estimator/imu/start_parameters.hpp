@@ -1,0 +1,60 @@
+#pragma once
+// The unknowns that both starts in motion share, and the poses that follow from them.
+//
+// In body axes at image 0: velocity v, tilt (up on the sphere), biases. The IMU then gives the pose
+// of every later instant (equation 4): p = v t - gravity up t^2 / 2 + alpha(bg, ba), R = dR(bg).
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "estimator/imu/initialization.hpp"
+#include "estimator/imu/preintegration.hpp"
+#include "estimator/imu/stereo_start.hpp"
+
+namespace swiftlet {
+
+/// Pose of the body relative to image 0, with derivatives by the unknowns.
+struct StartPose {
+  Eigen::Vector3d position;
+  Eigen::Quaterniond rotation;
+  Eigen::Matrix<double, 3, 11> d_position;
+  Eigen::Matrix3d d_rotation;  ///< right error phi by the gyro bias
+};
+
+class StartParameters {
+ public:
+  static constexpr int kVelocity = 0;
+  static constexpr int kTilt = 3;  // two, along the tangent basis of `up`
+  static constexpr int kBiasGyro = 5;
+  static constexpr int kBiasAccel = 8;
+  static constexpr int kSize = 11;
+  using Vector = Eigen::Matrix<double, kSize, 1>;
+  using Matrix = Eigen::Matrix<double, kSize, kSize>;
+
+  StartParameters(const Eigen::Vector3d& up, const StartPrior& prior)
+      : up_(up), bias_gyro_(prior.bias_gyro), bias_accel_(prior.bias_accel) {}
+
+  [[nodiscard]] StartPose poseAt(const Preintegration& imu, double gravity) const;
+  /// Adds the priors on tilt and biases to the normal equations H x = -b.
+  void addPrior(const TiltEstimate& tilt, const StartPrior& prior,
+                Eigen::Ref<Matrix, 0, Eigen::OuterStride<>> H, Eigen::Ref<Vector> b) const;
+  /// The priors' share of the cost (sum of whitened squares).
+  [[nodiscard]] double priorCost(const TiltEstimate& tilt, const StartPrior& prior) const;
+  void retract(const Vector& step);
+  void toMotionStart(const Matrix& covariance, MotionStart& start) const;
+
+  [[nodiscard]] const Eigen::Vector3d& up() const { return up_; }
+  [[nodiscard]] const Eigen::Vector3d& velocity() const { return velocity_; }
+  [[nodiscard]] const Eigen::Vector3d& biasGyro() const { return bias_gyro_; }
+
+ private:
+  /// Two unit vectors across `up`: the axes of the tilt unknowns.
+  [[nodiscard]] Eigen::Matrix<double, 3, 2> basis() const;
+
+  Eigen::Vector3d up_;
+  Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d bias_gyro_;
+  Eigen::Vector3d bias_accel_;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,35 @@
+#pragma once
+// The smoother's window after a solve: what the tracker predicts from and the mesher draws.
+
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "estimator/core/fixed_vector.hpp"
+#include "estimator/core/limits.hpp"
+#include "estimator/messages/nav_state.hpp"
+#include "estimator/messages/tracked_frame.hpp"
+
+namespace swiftlet {
+
+struct WindowPose {
+  Stamp stamp;
+  std::uint64_t frame_index = 0;
+  bool keyframe = false;
+  SE3 T_world_body;
+};
+
+struct WindowLandmark {
+  TrackId id = 0;
+  Eigen::Vector3d p_world = Eigen::Vector3d::Zero();  ///< m
+  double inverse_depth_sigma = 0;                     ///< 1/m, along the first sighting's ray
+  int sightings = 0;                                  ///< states of the window that see it
+};
+
+struct SmoothedWindow {
+  std::uint32_t epoch = 0;
+  NavState newest;
+  FixedVector<WindowPose, kMaxStates> poses;  ///< in order of time
+  FixedVector<WindowLandmark, kMaxLandmarks> landmarks;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,49 @@
+#include "estimator/odometry/health_monitor.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr std::uint64_t kSettlingFrames = 10;
+constexpr int kMinSightings = 8;       // a frame with fewer accepted sightings is not accepted
+constexpr int kNominalSightings = 25;  // fewer: degraded
+constexpr double kGoodAge = 0.3;       // s without an accepted image before "good" ends
+// Coasting position error grows with the cube of time: after 3 s it is metres.
+constexpr double kCoastLimit = 3.0;  // s
+
+}  // namespace
+
+void HealthMonitor::reset() {
+  health_ = Health::kInitializing;
+  has_image_ = false;
+}
+
+Health HealthMonitor::update(const TrackedFrame& frame, const FrameStatistics& statistics,
+                             std::size_t cameras, std::uint64_t frames_in_epoch) {
+  const int sightings = statistics.inliers_mono + statistics.inliers_stereo;
+  if (sightings >= kMinSightings || frames_in_epoch <= 1) {
+    last_accepted_ = frame.stamp;
+    has_image_ = true;
+  }
+  bool all_cameras = true;
+  for (std::size_t c = 0; c < cameras; ++c) all_cameras = all_cameras && frame.camera_present[c];
+  if (frames_in_epoch < kSettlingFrames) {
+    health_ = Health::kInitializing;
+  } else {
+    health_ = sightings >= kNominalSightings && all_cameras ? Health::kGood : Health::kDegraded;
+  }
+  health_ = at(frame.stamp);
+  return health_;
+}
+
+double HealthMonitor::secondsWithoutImage(Stamp stamp) const {
+  return has_image_ ? (stamp - last_accepted_).seconds() : 0.0;
+}
+
+Health HealthMonitor::at(Stamp stamp) const {
+  const double age = secondsWithoutImage(stamp);
+  if (age > kCoastLimit) return Health::kFailed;
+  if (age > kGoodAge && health_ == Health::kGood) return Health::kDegraded;
+  return health_;
+}
+
+}  // namespace swiftlet

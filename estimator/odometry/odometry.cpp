@@ -1,0 +1,295 @@
+#include "estimator/odometry/odometry.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/frontend/frontend.hpp"
+#include "estimator/imu/initialization.hpp"
+#include "estimator/imu/preintegration.hpp"
+#include "estimator/imu/propagation.hpp"
+#include "estimator/imu/rest_detector.hpp"
+#include "estimator/imu/sample_monitor.hpp"
+#include "estimator/messages/smoothed_window.hpp"
+#include "estimator/odometry/health_monitor.hpp"
+#include "estimator/smoother/imu_buffer.hpp"
+#include "estimator/smoother/smoother.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr std::size_t kImuHistory = 4096;  // samples before and between frames
+// An interval with this many sample periods missing is not integrated.
+constexpr double kSilentPeriods = 10.0;
+// The first frames decide tilt, velocity and biases: they get more iterations than the steady state.
+constexpr std::uint64_t kStartFrames = 20;
+constexpr int kStartIterations = 8;
+// What a flying body may be doing at its first image, in each axis.
+constexpr double kStartVelocitySigma = 2.0;    // m/s
+constexpr double kStartGyroBiasSigma = 0.1;    // rad/s
+constexpr double kStartAccelBiasSigma = 0.15;  // m/s^2
+constexpr float kMinGate = 6.0F;               // px
+constexpr float kMaxGate = 40.0F;              // px
+// Predicted pixel error of a landmark after one interval: attitude and position error over depth.
+constexpr double kGateSigmas = 3.0;
+
+}  // namespace
+
+class Odometry::Impl {
+ public:
+  Impl(const Rig& rig, const ImuNoise& noise, const OdometrySettings& settings)
+      : rig_(withCameras(rig, settings)),
+        noise_(inflated(noise, settings)),
+        settings_(settings),
+        frontend_(rig_, FrontendSettings{}),
+        smoother_(rig_, noise_, smootherSettings(settings)),
+        monitor_(noise_),
+        rest_(noise_),
+        propagator_(noise_),
+        imu_(kImuHistory) {}
+
+  Status addImu(const ImuSample& sample, NavState* propagated) {
+    const SampleVerdict verdict = monitor_.check(sample);
+    if (!verdict.status.ok()) {
+      raise(sample.stamp, EventKind::kImuInvalid, 1);
+      return verdict.status;
+    }
+    if (verdict.gap) {
+      imu_gap_ = true;
+      raise(sample.stamp, EventKind::kImuGap, verdict.silence);
+    }
+    if (verdict.saturated) raise(sample.stamp, EventKind::kImuSaturated, 1);
+    imu_.push(sample);
+    smoother_.addImu(sample);
+    rest_.addImu(sample);
+    if (!propagator_.hasState()) return {StatusCode::kNotReady, "no state to propagate yet"};
+    NavState state;
+    const Status status = propagator_.step(sample, &state);
+    if (propagated != nullptr) {
+      *propagated = state;
+      propagated->epoch = epoch_;
+      propagated->health = health_.at(sample.stamp);
+    }
+    return status;
+  }
+
+  Status track(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked) {
+    if (has_frame_ && frame.stamp <= last_stamp_) {
+      raise(frame.stamp, EventKind::kFrameDropped, 1);
+      return {StatusCode::kInvalidInput, "the frame's stamp repeats or goes back: frame dropped"};
+    }
+    predict(frame.stamp);
+    const Status status =
+        frontend_.step(frame, prediction_, std::min(effort.features, settings_.max_features), tracked);
+    last_stamp_ = frame.stamp;
+    has_frame_ = true;
+    return status;
+  }
+
+  Status smooth(const TrackedFrame& tracked, const Effort& effort, OdometryOutput& output) {
+    output.has_state = false;
+    output.waiting_for = "";
+    output.left_window.clear();
+    rest_.addFrame(tracked.stamp, static_cast<double>(tracked.median_motion));
+    if (!smoother_.started() && !start(tracked, output)) {
+      flushEvents(output);
+      return okStatus();
+    }
+    const double silence = imu_.empty() ? 1e9 : (tracked.stamp - imu_.newest().stamp).seconds();
+    Smoother::StepInput input;
+    input.frame = &tracked;
+    input.imu_gap = imu_gap_ || silence * noise_.rate_hz > kSilentPeriods;
+    input.at_rest = rest_.state().at_rest;
+    input.iterations =
+        frames_in_epoch_ < kStartFrames ? std::max(kStartIterations, effort.iterations) : effort.iterations;
+    imu_gap_ = false;
+    ++frames_in_epoch_;
+    const Status status = smoother_.step(input, output.left_window);
+    if (!status.ok()) {
+      reset();
+      flushEvents(output);
+      output.waiting_for = status.what;
+      return status;
+    }
+    publish(tracked, output);
+    return okStatus();
+  }
+
+  void finish(OdometryOutput& output) {
+    output.has_state = false;
+    smoother_.flush(output.left_window);
+    for (KeyframeState& keyframe : output.left_window) keyframe.state.epoch = epoch_;
+    flushEvents(output);
+  }
+
+  void reset() {
+    ++epoch_;
+    raise(last_stamp_, EventKind::kReset, epoch_);
+    frontend_.reset();
+    smoother_.reset();
+    propagator_.reset();
+    health_.reset();
+    window_.poses.clear();
+    window_.landmarks.clear();
+    frames_in_epoch_ = 0;
+  }
+
+ private:
+  static Rig withCameras(Rig rig, const OdometrySettings& settings) {
+    if (!settings.use_stereo) rig.camera_count = std::min<std::size_t>(rig.camera_count, 1);
+    return rig;
+  }
+  static ImuNoise inflated(ImuNoise noise, const OdometrySettings& settings) {
+    noise.gyro_density *= settings.imu_inflation;
+    noise.accel_density *= settings.imu_inflation;
+    return noise;
+  }
+  static SmootherSettings smootherSettings(const OdometrySettings& settings) {
+    SmootherSettings s;
+    s.pixel_sigma = settings.pixel_sigma;
+    s.horizon = settings.horizon;
+    s.estimate_time_offset = settings.estimate_time_offset;
+    s.estimate_extrinsics = settings.estimate_extrinsics;
+    return s;
+  }
+
+  void raise(Stamp stamp, EventKind kind, double value) {
+    static_cast<void>(events_.tryPushBack({stamp, kind, value}));
+  }
+  void flushEvents(OdometryOutput& output) {
+    output.events = events_;
+    events_.clear();
+  }
+
+  /// Where things will be seen at `stamp`: the turn since the last frame, and the landmarks' pixels.
+  void predict(Stamp stamp) {
+    prediction_.has_rotation = false;
+    prediction_.landmarks.clear();
+    if (!has_frame_ || imu_.empty()) return;
+    const Stamp from = last_stamp_ + smoother_.timeOffset();
+    const Stamp to = stamp + smoother_.timeOffset();
+    const Eigen::Vector3d bias = smoother_.started() ? smoother_.newest().x.bias_gyro : start_bias_gyro_;
+    Preintegration turn(noise_, bias, Eigen::Vector3d::Zero());
+    if (!turn.integrate(imu_.around(from, to), from, to).ok()) return;
+    prediction_.has_rotation = true;
+    prediction_.R_body_prev_body_cur = turn.deltaRotation();
+    if (!smoother_.started() || !propagator_.hasState()) return;
+    NavState state;
+    if (!propagator_.predict(to, state).ok()) return;
+    const Matrix15d& P = state.covariance;
+    const double angle = std::sqrt(P.diagonal().segment<3>(0).sum());
+    const Eigen::Matrix3d relative_position =
+        P.block<3, 3>(3, 3) - window_.newest.covariance.block<3, 3>(3, 3);
+    const double distance = std::sqrt(std::max(relative_position.trace(), 0.0));
+    std::array<SE3, kMaxCameras> T_cam_world;
+    for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+      T_cam_world[c] = (state.T_world_body * smoother_.extrinsics()[c]).inverse();
+    }
+    for (const WindowLandmark& landmark : window_.landmarks) {
+      PredictedLandmark predicted;
+      predicted.id = landmark.id;
+      double depth = 1e9;
+      for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+        const Eigen::Vector3d p = T_cam_world[c] * landmark.p_world;
+        Eigen::Vector2d pixel;
+        if (!rig_.camera[c].project(p, pixel) || !rig_.camera[c].inImage(pixel)) continue;
+        predicted.visible[c] = true;
+        predicted.pixel[c] = pixel.cast<float>();
+        depth = std::min(depth, p.norm());
+      }
+      if (!predicted.visible[0] && !predicted.visible[1]) continue;
+      const double gate = kGateSigmas * rig_.camera[0].focal() * (angle + distance / depth);
+      predicted.gate = std::clamp(static_cast<float>(gate), kMinGate, kMaxGate);
+      static_cast<void>(prediction_.landmarks.tryPushBack(predicted));
+    }
+  }
+
+  /// The first state of an epoch. False while it must wait; the output says for what.
+  bool start(const TrackedFrame& tracked, OdometryOutput& output) {
+    const Stamp stamp = tracked.stamp + smoother_.timeOffset();
+    StartPrior prior;
+    prior.bias_gyro_sigma = kStartGyroBiasSigma;
+    prior.bias_accel_sigma = kStartAccelBiasSigma;
+    TiltEstimate tilt;
+    const Stamp history = stamp - Duration::fromSeconds(2.0);
+    if (imu_.empty() || !estimateTilt(imu_.around(history, stamp), stamp, noise_, prior, tilt).ok()) {
+      output.waiting_for = "IMU samples before the first image";
+      return false;
+    }
+    StartState start;
+    start.stamp = stamp;
+    start.state.T_world_body.rotation = gravityAlignedRotation(tilt.up);
+    start.tilt_sigma = tilt.sigma;
+    start.velocity_sigma = kStartVelocitySigma;
+    start.gyro_bias_sigma = kStartGyroBiasSigma;
+    start.accel_bias_sigma = kStartAccelBiasSigma;
+    smoother_.start(start);
+    frames_in_epoch_ = 0;
+    return true;
+  }
+
+  void publish(const TrackedFrame& tracked, OdometryOutput& output) {
+    const WindowState& newest = smoother_.newest();
+    NavState& state = output.state;
+    state.stamp = newest.stamp;
+    state.epoch = epoch_;
+    state.T_world_body = newest.x.T_world_body;
+    state.v_world_body = newest.x.v_world_body;
+    state.bias_gyro = newest.x.bias_gyro;
+    state.bias_accel = newest.x.bias_accel;
+    state.covariance = smoother_.covariance();
+    output.statistics = smoother_.statistics();
+    const Health before = health_.health();
+    state.health = health_.update(tracked, output.statistics, rig_.camera_count, frames_in_epoch_);
+    if (before != state.health) {
+      raise(tracked.stamp, EventKind::kHealthChanged, static_cast<double>(state.health));
+    }
+    smoother_.window(window_);
+    window_.newest = state;
+    window_.epoch = epoch_;
+    static_cast<void>(propagator_.setState(state));
+    state.stamp = tracked.stamp;
+    output.has_state = true;
+    for (KeyframeState& keyframe : output.left_window) {
+      keyframe.state.epoch = epoch_;
+    }
+    flushEvents(output);
+  }
+
+  Rig rig_;
+  ImuNoise noise_;
+  OdometrySettings settings_;
+  Frontend frontend_;
+  Smoother smoother_;
+  SampleMonitor monitor_;
+  RestDetector rest_;
+  Propagator propagator_;
+  HealthMonitor health_;
+  ImuBuffer imu_;
+
+  FrontendPrediction prediction_;
+  SmoothedWindow window_;
+  FixedVector<Event, 32> events_;
+  std::uint32_t epoch_ = 0;
+  bool has_frame_ = false;
+  Stamp last_stamp_;
+  bool imu_gap_ = false;
+  std::uint64_t frames_in_epoch_ = 0;
+  Eigen::Vector3d start_bias_gyro_ = Eigen::Vector3d::Zero();
+};
+
+Odometry::Odometry(const Rig& rig, const ImuNoise& noise, const OdometrySettings& settings)
+    : impl_(std::make_unique<Impl>(rig, noise, settings)) {}
+Odometry::~Odometry() = default;
+Status Odometry::addImu(const ImuSample& sample, NavState* propagated) {
+  return impl_->addImu(sample, propagated);
+}
+Status Odometry::track(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked) {
+  return impl_->track(frame, effort, tracked);
+}
+Status Odometry::smooth(const TrackedFrame& tracked, const Effort& effort, OdometryOutput& output) {
+  return impl_->smooth(tracked, effort, output);
+}
+void Odometry::finish(OdometryOutput& output) { impl_->finish(output); }
+void Odometry::reset() { impl_->reset(); }
+
+}  // namespace swiftlet

@@ -1,0 +1,53 @@
+#pragma once
+// The raw IMU samples of the window, kept so that increments can be integrated again: after a bias
+// moved, or over two intervals when the state between them leaves. Fixed memory; contiguous in time
+// (a sliding array, compacted when its end is reached). The oldest samples go first.
+
+#include <algorithm>
+#include <span>
+#include <vector>
+
+#include "estimator/messages/imu_sample.hpp"
+
+namespace swiftlet {
+
+class ImuBuffer {
+ public:
+  explicit ImuBuffer(std::size_t capacity) : samples_(2 * capacity), capacity_(capacity) {}
+
+  void clear() { begin_ = end_ = 0; }
+  [[nodiscard]] bool empty() const { return begin_ == end_; }
+  [[nodiscard]] const ImuSample& newest() const { return samples_[end_ - 1]; }
+
+  /// Appends; the stamp must be later than the newest's. Amortized O(1).
+  void push(const ImuSample& sample) {
+    if (end_ == samples_.size()) {
+      std::copy(samples_.begin() + static_cast<std::ptrdiff_t>(end_ - capacity_), samples_.end(),
+                samples_.begin());
+      begin_ = 0;
+      end_ = capacity_;
+    }
+    samples_[end_++] = sample;
+    begin_ = std::max(begin_, end_ > capacity_ ? end_ - capacity_ : 0);
+  }
+
+  /// The samples needed to integrate over [from, to]: those inside and one neighbour on each side.
+  [[nodiscard]] std::span<const ImuSample> around(Stamp from, Stamp to) const {
+    const auto first = samples_.begin() + static_cast<std::ptrdiff_t>(begin_);
+    const auto last = samples_.begin() + static_cast<std::ptrdiff_t>(end_);
+    const auto before = [](const ImuSample& s, Stamp t) { return s.stamp < t; };
+    auto low = std::lower_bound(first, last, from, before);
+    auto high = std::lower_bound(low, last, to, before);
+    if (low != first && (low == last || low->stamp > from)) --low;
+    if (high != last) ++high;
+    return {&*low, static_cast<std::size_t>(high - low)};
+  }
+
+ private:
+  std::vector<ImuSample> samples_;
+  std::size_t capacity_;
+  std::size_t begin_ = 0;
+  std::size_t end_ = 0;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,117 @@
+#include "estimator/smoother/imu_factor.hpp"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "estimator/geometry/so3.hpp"
+
+namespace swiftlet {
+namespace {
+
+// What a vehicle may do unseen while the IMU is silent: standard deviations per root second of
+// acceleration held for the gap, and of its angular rate.
+constexpr double kGapAcceleration = 3.0;  // m/s^2
+constexpr double kGapRate = 1.0;          // rad/s
+
+void biasWalk(double duration, const ImuNoise& noise, const BodyState& x_i, const BodyState& x_j,
+              MotionFactor& factor) {
+  const double gyro = 1.0 / (noise.gyro_walk * std::sqrt(duration));
+  const double accel = 1.0 / (noise.accel_walk * std::sqrt(duration));
+  factor.residual.segment<3>(9) = gyro * (x_j.bias_gyro - x_i.bias_gyro);
+  factor.residual.segment<3>(12) = accel * (x_j.bias_accel - x_i.bias_accel);
+  factor.jacobian_j.block<3, 3>(9, 9) = gyro * Eigen::Matrix3d::Identity();
+  factor.jacobian_i.block<3, 3>(9, 9) = -gyro * Eigen::Matrix3d::Identity();
+  factor.jacobian_j.block<3, 3>(12, 12) = accel * Eigen::Matrix3d::Identity();
+  factor.jacobian_i.block<3, 3>(12, 12) = -accel * Eigen::Matrix3d::Identity();
+}
+
+Eigen::Vector3d gravityVector(const ImuNoise& noise) { return {0, 0, -noise.gravity}; }
+
+}  // namespace
+
+bool imuFactor(const Preintegration& imu, const ImuNoise& noise, const BodyState& x_i, const BodyState& x_j,
+               const BodyState& lin_i, const BodyState& lin_j, MotionFactor& factor) {
+  const double dt = imu.duration();
+  if (!(dt > 0)) return false;
+  const Eigen::Vector3d g = gravityVector(noise);
+
+  const auto residual = [&](const BodyState& a, const BodyState& b) {
+    const Eigen::Quaterniond R_b_w = a.T_world_body.rotation.conjugate();
+    Vector9d r;
+    r << logSo3(imu.deltaRotation(a.bias_gyro).conjugate() * R_b_w * b.T_world_body.rotation),
+        R_b_w * (b.T_world_body.translation - a.T_world_body.translation - a.v_world_body * dt -
+                 0.5 * dt * dt * g) -
+            imu.deltaPosition(a.bias_gyro, a.bias_accel),
+        R_b_w * (b.v_world_body - a.v_world_body - g * dt) - imu.deltaVelocity(a.bias_gyro, a.bias_accel);
+    return r;
+  };
+  const Vector9d r = residual(x_i, x_j);
+
+  const Eigen::Matrix3d R_i_t = lin_i.T_world_body.R().transpose();
+  const Eigen::Matrix3d R_j = lin_j.T_world_body.R();
+  const Eigen::Vector3d r_phi = logSo3(imu.deltaRotation(lin_i.bias_gyro).conjugate() *
+                                       lin_i.T_world_body.rotation.conjugate() * lin_j.T_world_body.rotation);
+  const Eigen::Matrix3d jr_inverse = rightJacobianInverseSo3(r_phi);
+  const Eigen::Vector3d moved = R_i_t * (lin_j.T_world_body.translation - lin_i.T_world_body.translation -
+                                         lin_i.v_world_body * dt - 0.5 * dt * dt * g);
+  const Eigen::Vector3d gained = R_i_t * (lin_j.v_world_body - lin_i.v_world_body - g * dt);
+
+  Eigen::Matrix<double, 9, 15> J_i = Eigen::Matrix<double, 9, 15>::Zero();
+  Eigen::Matrix<double, 9, 15> J_j = Eigen::Matrix<double, 9, 15>::Zero();
+  J_i.block<3, 3>(0, 0) = -jr_inverse * R_j.transpose() * R_i_t.transpose();
+  const Eigen::Matrix3d gyro_to_phi = imu.jacobianGyro().topRows<3>();
+  J_i.block<3, 3>(0, 9) = -jr_inverse * expSo3Matrix(r_phi).transpose() *
+                          rightJacobianSo3(gyro_to_phi * (lin_i.bias_gyro - imu.biasGyro())) * gyro_to_phi;
+  J_j.block<3, 3>(0, 0) = jr_inverse;
+  J_i.block<3, 3>(3, 0) = hat(moved);
+  J_i.block<3, 3>(3, 3) = -R_i_t;
+  J_i.block<3, 3>(3, 6) = -dt * R_i_t;
+  J_i.block<3, 3>(3, 9) = -imu.jacobianGyro().middleRows<3>(3);
+  J_i.block<3, 3>(3, 12) = -imu.jacobianAccel().middleRows<3>(3);
+  J_j.block<3, 3>(3, 3) = R_i_t;
+  J_i.block<3, 3>(6, 0) = hat(gained);
+  J_i.block<3, 3>(6, 6) = -R_i_t;
+  J_i.block<3, 3>(6, 9) = -imu.jacobianGyro().bottomRows<3>();
+  J_i.block<3, 3>(6, 12) = -imu.jacobianAccel().bottomRows<3>();
+  J_j.block<3, 3>(6, 6) = R_i_t;
+
+  const Eigen::LLT<Matrix9d> llt(imu.covariance());
+  if (llt.info() != Eigen::Success) return false;
+  factor.jacobian_i.setZero();
+  factor.jacobian_j.setZero();
+  factor.residual.head<9>() = llt.matrixL().solve(r);
+  factor.jacobian_i.topRows<9>() = llt.matrixL().solve(J_i);
+  factor.jacobian_j.topRows<9>() = llt.matrixL().solve(J_j);
+  biasWalk(dt, noise, x_i, x_j, factor);
+  return true;
+}
+
+bool constantVelocityFactor(double duration, const ImuNoise& noise, const BodyState& x_i,
+                            const BodyState& x_j, const BodyState& lin_i, const BodyState& lin_j,
+                            MotionFactor& factor) {
+  if (!(duration > 0)) return false;
+  const double phi = 1.0 / (kGapRate * duration);
+  const double v = 1.0 / (kGapAcceleration * duration);
+  const double p = 2.0 / (kGapAcceleration * duration * duration);
+  factor.jacobian_i.setZero();
+  factor.jacobian_j.setZero();
+  factor.residual.segment<3>(0) =
+      phi * logSo3(x_i.T_world_body.rotation.conjugate() * x_j.T_world_body.rotation);
+  factor.residual.segment<3>(3) = p * (x_j.T_world_body.translation - x_i.T_world_body.translation -
+                                       0.5 * duration * (x_i.v_world_body + x_j.v_world_body));
+  factor.residual.segment<3>(6) = v * (x_j.v_world_body - x_i.v_world_body);
+  const Eigen::Vector3d turn = logSo3(lin_i.T_world_body.rotation.conjugate() * lin_j.T_world_body.rotation);
+  const Eigen::Matrix3d jr_inverse = rightJacobianInverseSo3(turn);
+  factor.jacobian_j.block<3, 3>(0, 0) = phi * jr_inverse;
+  factor.jacobian_i.block<3, 3>(0, 0) = -phi * jr_inverse * expSo3Matrix(turn).transpose();
+  factor.jacobian_j.block<3, 3>(3, 3) = p * Eigen::Matrix3d::Identity();
+  factor.jacobian_i.block<3, 3>(3, 3) = -p * Eigen::Matrix3d::Identity();
+  factor.jacobian_i.block<3, 3>(3, 6) = -0.5 * duration * p * Eigen::Matrix3d::Identity();
+  factor.jacobian_j.block<3, 3>(3, 6) = -0.5 * duration * p * Eigen::Matrix3d::Identity();
+  factor.jacobian_j.block<3, 3>(6, 6) = v * Eigen::Matrix3d::Identity();
+  factor.jacobian_i.block<3, 3>(6, 6) = -v * Eigen::Matrix3d::Identity();
+  biasWalk(duration, noise, x_i, x_j, factor);
+  return true;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,58 @@
+#pragma once
+// A landmark of the window: where it was seen, and its point as last triangulated.
+//
+// The point is held as p = reference + bearing / inverse_depth with a constant reference (a camera
+// centre of the past), so that points at infinity are ordinary (inverse_depth = 0) and no state is
+// its anchor. In camera i its homogeneous ray is
+//   h = R_cam_world (bearing + inverse_depth (reference - center_i)),
+// and the residual of a sighting with measured unit bearing m is
+//   r = W h / (m . h),   W = d pixel / d ray at m, divided by the pixel noise   (2 x 3, W m = 0):
+// the reprojection error in units of sigma, to first order in the error, for any lens, also beyond
+// 90 degrees, without evaluating the lens model in the solver.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+
+#include "estimator/core/fixed_vector.hpp"
+#include "estimator/core/limits.hpp"
+#include "estimator/messages/tracked_frame.hpp"
+
+namespace swiftlet {
+
+using Matrix23d = Eigen::Matrix<double, 2, 3>;
+
+struct CameraSighting {
+  bool used = false;
+  Eigen::Vector3d bearing;  ///< m, unit, camera frame
+  Matrix23d weight;         ///< W
+};
+
+/// What one state saw of a landmark.
+struct Sighting {
+  std::uint8_t slot = 0;
+  std::array<CameraSighting, kMaxCameras> camera;
+};
+
+struct Landmark {
+  bool used = false;
+  bool triangulated = false;
+  TrackId id = 0;
+  std::uint64_t last_frame = 0;  ///< index of the newest frame that saw it
+  int frames_seen = 0;
+  int rejections = 0;  ///< solves in which it did not fit
+  Eigen::Vector3d reference = Eigen::Vector3d::Zero();
+  Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();  ///< unit, world axes
+  double inverse_depth = 0;                            ///< 1/m, >= 0
+  double inverse_depth_sigma = 0;                      ///< 1/m
+  FixedVector<Sighting, kMaxStates> sightings;
+
+  [[nodiscard]] Eigen::Vector3d position() const { return reference + bearing / inverse_depth; }
+  [[nodiscard]] int views() const {
+    int count = 0;
+    for (const Sighting& s : sightings) count += int{s.camera[0].used} + int{s.camera[1].used};
+    return count;
+  }
+};
+
+}  // namespace swiftlet

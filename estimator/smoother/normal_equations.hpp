@@ -1,0 +1,81 @@
+#pragma once
+// The reduced normal equations of one Gauss-Newton step: H d = -g over calibration and states, with
+// every landmark already eliminated.
+//
+// Landmarks enter as Schur complements over 6 x 6 pose blocks (padded to 8 rows so that a column is
+// two vector registers), which are scattered into the dense matrix once at the end.
+// Memory: about 1.3 MiB, reserved by the constructor.
+// Source: Triggs et al., "Bundle Adjustment - A Modern Synthesis", 1999, section 6.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "estimator/smoother/cholesky.hpp"
+#include "estimator/smoother/imu_factor.hpp"
+#include "estimator/smoother/prior.hpp"
+#include "estimator/smoother/state.hpp"
+#include "estimator/smoother/vision_factor.hpp"
+
+namespace swiftlet {
+
+/// What the normal equations need to know of the calibration that is being estimated.
+struct CalibrationLayout {
+  bool time_offset = false;
+  bool extrinsics = false;
+  std::size_t cameras = 0;
+
+  [[nodiscard]] int dimension() const {
+    return int{time_offset} + (extrinsics ? kPoseDim * static_cast<int>(cameras) : 0);
+  }
+  [[nodiscard]] int extrinsicOffset(std::size_t camera) const {
+    return int{time_offset} + kPoseDim * static_cast<int>(camera);
+  }
+};
+
+class NormalEquations {
+ public:
+  NormalEquations();
+
+  /// Starts a system: calibration first, then the states of `order` with their `offset`.
+  void begin(const CalibrationLayout& calibration, int dimension);
+
+  [[nodiscard]] int dimension() const { return dimension_; }
+  [[nodiscard]] double cost() const { return cost_; }
+  MatrixMap H();
+  VectorMap g();
+
+  void addMotion(const MotionFactor& factor, const WindowState& i, const WindowState& j);
+
+  /// Diagonal information on columns of one state: residual x (already minus its reference).
+  void addDiagonal(const WindowState& state, int first, const Eigen::Vector3d& residual, double sigma);
+
+  /// Eliminates a landmark. False when it does not constrain anything (fewer than two states, or not
+  /// in front of a camera at the linearization point).
+  bool addLandmark(const Landmark& landmark, const RigPoses& poses,
+                   const std::array<SE3, kMaxCameras>& T_body_cam,
+                   const std::array<WindowState, kMaxStates>& states);
+
+  /// Scatters the pose blocks; call once after all factors. Fills the lower triangle of H.
+  void finish(const std::array<WindowState, kMaxStates>& states);
+
+ private:
+  static constexpr int kRows = 8;  // rows of a padded pose block
+  using PoseBlock = std::array<double, kRows * kPoseDim>;
+
+  [[nodiscard]] PoseBlock& block(std::uint8_t slot_i, std::uint8_t slot_j) {
+    return blocks_[static_cast<std::size_t>(slot_i) * kMaxStates + slot_j];
+  }
+
+  CalibrationLayout calibration_;
+  int dimension_ = 0;
+  double cost_ = 0;
+  std::vector<double> h_;
+  std::vector<double> g_;
+  std::vector<PoseBlock> blocks_;  // [slot_i][slot_j], used where offset_i >= offset_j
+  std::array<std::array<double, kPoseDim>, kMaxStates> pose_gradient_{};
+  std::array<bool, kMaxStates> touched_{};
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,522 @@
+#include "estimator/smoother/smoother.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/geometry/so3.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr std::size_t kImuCapacity = 8192;  // samples: 20 s at 400 Hz, 8 s at 1 kHz
+// The gauge: position and yaw of the first state define the world.
+constexpr double kGaugeSigma = 1e-4;  // m, rad
+// First-order bias correction of an increment is exact to about (bias change x duration)^2 / 2.
+constexpr double kReintegrateGyro = 5e-4;   // rad/s
+constexpr double kReintegrateAccel = 5e-2;  // m/s^2
+constexpr double kRelativeDamping = 1e-7;
+constexpr int kTriangulationStart = 6;  // iterations for a landmark in its first solve
+constexpr int kTriangulationFollow = 2;
+constexpr double kConverged = 1e-4;            // largest step worth another iteration: m, rad, m/s
+constexpr double kCostIncreaseAllowed = 1.02;  // of the robust cost, before a step is taken back
+constexpr double kOutlierSigmas = 5.0;         // of one sighting, during the solve
+constexpr double kFinalOutlierSigmas = 3.5;
+constexpr double kRestVelocitySigma = 0.01;       // m/s
+constexpr double kRestPositionSigma = 1e-3;       // m, between two frames at rest
+constexpr double kRestRotationSigma = 3.5e-4;     // rad (0.02 degrees)
+constexpr double kTimeOffsetSigma = 5e-3;         // s, prior when estimated
+constexpr double kExtrinsicRotationSigma = 0.01;  // rad
+constexpr double kExtrinsicPositionSigma = 0.01;  // m
+constexpr int kMaxRejections = 3;
+
+}  // namespace
+
+Smoother::Smoother(const Rig& rig, const ImuNoise& noise, const SmootherSettings& settings)
+    : rig_(rig),
+      noise_(noise),
+      settings_(settings),
+      imu_(kImuCapacity),
+      landmarks_(kMaxLandmarks),
+      landmark_ids_(kMaxLandmarks, 0),
+      in_system_(kMaxLandmarks, 0),
+      step_(kMaxSystemDim),
+      involved_(kMaxStates, 0) {
+  calibration_.time_offset = settings.estimate_time_offset;
+  calibration_.extrinsics = settings.estimate_extrinsics;
+  calibration_.cameras = rig.camera_count;
+  time_offset_ = rig.camera_to_imu_shift.seconds();
+  T_body_cam_ = rig.T_body_cam;
+  reset();
+}
+
+void Smoother::reset() {
+  order_.clear();
+  for (WindowState& state : states_) state.used = false;
+  for (Landmark& landmark : landmarks_) landmark.used = false;
+  std::fill(landmark_ids_.begin(), landmark_ids_.end(), 0);
+  prior_.clear();
+  has_start_ = false;
+}
+
+Status Smoother::step(const StepInput& input, FixedVector<KeyframeState, kMaxStates>& left_window) {
+  left_window.clear();
+  if (order_.empty() && !has_start_) return {StatusCode::kNotReady, "no start state"};
+  const std::uint8_t slot = addState(input);
+  addSightings(slot, *input.frame);
+  const Status status = solve(input.iterations);
+  if (!status.ok()) return status;
+  updateStatistics(input.iterations);
+  trimWindow(left_window);
+  return okStatus();
+}
+
+std::uint8_t Smoother::addState(const StepInput& input) {
+  std::uint8_t slot = 0;
+  while (states_[slot].used) ++slot;  // trimWindow() leaves a free slot
+  WindowState& state = states_[slot];
+  state = WindowState{};
+  state.used = true;
+  state.stamp = input.frame->stamp + Duration::fromSeconds(time_offset_);
+  state.frame_index = input.frame->index;
+  state.keyframe = input.frame->keyframe;
+  state.at_rest = input.at_rest;
+  state.time_offset = time_offset_;
+  newest_frame_ = input.frame->index;
+  if (order_.empty()) {
+    state.x = start_.state;
+    state.keyframe = true;
+    static_cast<void>(order_.tryPushBack(slot));
+    startPrior();
+  } else {
+    linkState(state, states_[order_.back()], input.imu_gap);
+    static_cast<void>(order_.tryPushBack(slot));
+  }
+  const auto samples = imu_.around(state.stamp, state.stamp);
+  if (!samples.empty()) state.omega_body = samples.front().gyro - state.x.bias_gyro;
+  return slot;
+}
+
+void Smoother::integrateLink(WindowState& state, const WindowState& previous) {
+  state.imu = Preintegration(noise_, previous.x.bias_gyro, previous.x.bias_accel);
+  static_cast<void>(
+      state.imu.integrate(imu_.around(previous.stamp, state.stamp), previous.stamp, state.stamp));
+}
+
+void Smoother::linkState(WindowState& state, const WindowState& previous, bool gap) {
+  state.link_duration = (state.stamp - previous.stamp).seconds();
+  state.x = previous.x;
+  const double dt = state.link_duration;
+  if (gap || imu_.around(previous.stamp, state.stamp).empty()) {
+    state.link = LinkKind::kConstantVelocity;
+    state.x.T_world_body.translation += dt * previous.x.v_world_body;
+    return;
+  }
+  state.link = LinkKind::kImu;
+  integrateLink(state, previous);
+  const Eigen::Vector3d g(0, 0, -noise_.gravity);
+  const SE3& T = previous.x.T_world_body;
+  state.x.T_world_body.rotation = (T.rotation * state.imu.deltaRotation()).normalized();
+  state.x.T_world_body.translation = T.translation + dt * previous.x.v_world_body + 0.5 * dt * dt * g +
+                                     T.rotation * state.imu.deltaPosition();
+  state.x.v_world_body = previous.x.v_world_body + dt * g + T.rotation * state.imu.deltaVelocity();
+}
+
+void Smoother::startPrior() {
+  const std::uint8_t slot = order_.front();
+  prior_.begin();
+  if (calibration_.dimension() > 0) prior_.addBlock(PriorBlock::kCalibration, calibration_.dimension(), {});
+  prior_.addBlock(slot, kStateDim, start_.state);
+  prior_.allocate();
+  MatrixMap H = prior_.H();
+  int at = 0;
+  if (calibration_.time_offset) H(at, at) = 1.0 / (kTimeOffsetSigma * kTimeOffsetSigma);
+  if (calibration_.extrinsics) {
+    for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+      const int first = calibration_.extrinsicOffset(c);
+      for (int k = 0; k < 3; ++k) {
+        H(first + k, first + k) = 1.0 / (kExtrinsicRotationSigma * kExtrinsicRotationSigma);
+        H(first + 3 + k, first + 3 + k) = 1.0 / (kExtrinsicPositionSigma * kExtrinsicPositionSigma);
+      }
+    }
+  }
+  time_offset_reference_ = time_offset_;
+  T_body_cam_reference_ = T_body_cam_;
+  at = calibration_.dimension();
+  const double tilt = 1.0 / (start_.tilt_sigma * start_.tilt_sigma);
+  const double gauge = 1.0 / (kGaugeSigma * kGaugeSigma);
+  // The rotation error lives in body axes; the vertical there is R^T z.
+  const Eigen::Vector3d up = start_.state.T_world_body.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+  H.block<3, 3>(at, at) = tilt * Eigen::Matrix3d::Identity() + (gauge - tilt) * up * up.transpose();
+  for (int k = 0; k < 3; ++k) {
+    H(at + 3 + k, at + 3 + k) = gauge;
+    H(at + 6 + k, at + 6 + k) = 1.0 / (start_.velocity_sigma * start_.velocity_sigma);
+    H(at + 9 + k, at + 9 + k) = 1.0 / (start_.gyro_bias_sigma * start_.gyro_bias_sigma);
+    H(at + 12 + k, at + 12 + k) = 1.0 / (start_.accel_bias_sigma * start_.accel_bias_sigma);
+  }
+}
+
+Landmark* Smoother::findLandmark(TrackId id) {
+  const auto found = std::find(landmark_ids_.begin(), landmark_ids_.end(), id);
+  return found == landmark_ids_.end() ? nullptr
+                                      : &landmarks_[static_cast<std::size_t>(found - landmark_ids_.begin())];
+}
+
+// When full, the landmark that was lost longest ago makes room.
+Landmark* Smoother::newLandmark(TrackId id) {
+  auto free = std::find(landmark_ids_.begin(), landmark_ids_.end(), TrackId{0});
+  if (free == landmark_ids_.end()) {
+    std::size_t oldest = 0;
+    for (std::size_t i = 1; i < landmarks_.size(); ++i) {
+      if (landmarks_[i].last_frame < landmarks_[oldest].last_frame) oldest = i;
+    }
+    removeLandmark(landmarks_[oldest]);
+    free = landmark_ids_.begin() + static_cast<std::ptrdiff_t>(oldest);
+  }
+  Landmark& landmark = landmarks_[static_cast<std::size_t>(free - landmark_ids_.begin())];
+  landmark.used = true;
+  landmark.triangulated = false;
+  landmark.id = id;
+  landmark.frames_seen = 0;
+  landmark.rejections = 0;
+  landmark.sightings.clear();
+  *free = id;
+  return &landmark;
+}
+
+void Smoother::removeLandmark(Landmark& landmark) {
+  landmark.used = false;
+  landmark.sightings.clear();
+  landmark_ids_[static_cast<std::size_t>(&landmark - landmarks_.data())] = 0;
+}
+
+void Smoother::addSightings(std::uint8_t slot, const TrackedFrame& frame) {
+  statistics_ = FrameStatistics{};
+  double age = 0;
+  for (const TrackedFeature& feature : frame.features) {
+    Sighting sighting;
+    sighting.slot = slot;
+    bool any = false;
+    for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+      if (!feature.seen[c]) continue;
+      CameraSighting& view = sighting.camera[c];
+      Eigen::Vector2d pixel;
+      Matrix23d J;
+      if (!rig_.camera[c].unproject(feature.pixel[c].cast<double>(), view.bearing)) continue;
+      if (!rig_.camera[c].project(view.bearing, pixel, &J)) continue;
+      view.weight = J / settings_.pixel_sigma;
+      view.used = true;
+      any = true;
+    }
+    if (!any) continue;
+    Landmark* landmark = findLandmark(feature.id + 1);  // 0 marks a free slot
+    if (landmark == nullptr) landmark = newLandmark(feature.id + 1);
+    landmark->last_frame = frame.index;
+    ++landmark->frames_seen;
+    age += landmark->frames_seen;
+    static_cast<void>(landmark->sightings.tryPushBack(sighting));
+    ++statistics_.tracks;
+  }
+  if (statistics_.tracks > 0) statistics_.track_length = age / statistics_.tracks;
+}
+
+void Smoother::assignOffsets() {
+  dimension_ = calibration_.dimension();
+  for (const std::uint8_t slot : order_) {
+    states_[slot].offset = dimension_;
+    dimension_ += states_[slot].dimension();
+  }
+}
+
+void Smoother::placeCameras() {
+  for (const std::uint8_t slot : order_) {
+    const WindowState& state = states_[slot];
+    RigPose& rig = rig_poses_[slot];
+    SE3 T = state.x.T_world_body;
+    const double shift = time_offset_ - state.time_offset;
+    rig.v_world = state.x.v_world_body;
+    rig.omega_body = state.omega_body;
+    if (shift != 0) {
+      T.rotation = (T.rotation * expSo3(shift * state.omega_body)).normalized();
+      T.translation += shift * state.x.v_world_body;
+    }
+    for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+      rig.current[c] = CameraPose::of(T, T_body_cam_[c]);
+      rig.linearization[c] =
+          state.frozen ? CameraPose::of(state.first_estimate.T_world_body, T_body_cam_[c]) : rig.current[c];
+    }
+  }
+}
+
+void Smoother::triangulateAll(int iterations) {
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    if (landmark_ids_[i] == 0) continue;
+    Landmark& landmark = landmarks_[i];
+    const bool fresh = !landmark.triangulated;
+    if (iterations == 0 && in_system_[i] == 0) continue;
+    in_system_[i] =
+        landmark.sightings.size() >= 2 &&
+                triangulate(rig_poses_, fresh ? kTriangulationStart : std::max(iterations, 1), landmark)
+            ? 1
+            : 0;
+  }
+}
+
+void Smoother::addPrior() {
+  if (prior_.empty()) return;
+  MatrixMap H = system_.H();
+  VectorMap g = system_.g();
+  MatrixMap prior_H = prior_.H();
+  Eigen::Map<Eigen::VectorXd> deviation(step_.data(), prior_.dimension());
+  const auto offset_of = [this](const PriorBlock& block) {
+    return block.slot == PriorBlock::kCalibration ? 0 : states_[block.slot].offset;
+  };
+  for (const PriorBlock& block : prior_.blocks()) {
+    if (block.slot == PriorBlock::kCalibration) {
+      deviation.segment(block.offset, block.dimension) = calibrationDeviation().head(block.dimension);
+    } else {
+      deviation.segment(block.offset, block.dimension) =
+          states_[block.slot].x.minus(block.reference).head(block.dimension);
+    }
+  }
+  for (const PriorBlock& row : prior_.blocks()) {
+    const int at = offset_of(row);
+    for (const PriorBlock& column : prior_.blocks()) {
+      const int to = offset_of(column);
+      if (to > at) continue;
+      H.block(at, to, row.dimension, column.dimension) +=
+          prior_H.block(row.offset, column.offset, row.dimension, column.dimension);
+    }
+    for (int k = 0; k < row.dimension; ++k) {
+      double sum = prior_.b()[row.offset + k];
+      for (int m = 0; m < prior_.dimension(); ++m) sum += prior_H(m, row.offset + k) * deviation[m];
+      g[at + k] += sum;
+    }
+  }
+}
+
+Eigen::Matrix<double, kMaxCalibrationDim, 1> Smoother::calibrationDeviation() const {
+  Eigen::Matrix<double, kMaxCalibrationDim, 1> d = Eigen::Matrix<double, kMaxCalibrationDim, 1>::Zero();
+  if (calibration_.time_offset) d[0] = time_offset_ - time_offset_reference_;
+  if (calibration_.extrinsics) {
+    for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+      const int at = calibration_.extrinsicOffset(c);
+      d.segment<3>(at) = logSo3(T_body_cam_reference_[c].rotation.conjugate() * T_body_cam_[c].rotation);
+      d.segment<3>(at + 3) = T_body_cam_[c].translation - T_body_cam_reference_[c].translation;
+    }
+  }
+  return d;
+}
+
+void Smoother::addMotionFactor(std::size_t position) {
+  if (position == 0) return;
+  const WindowState& i = states_[order_[position - 1]];
+  const WindowState& j = states_[order_[position]];
+  if (!i.has_motion || !j.has_motion || j.link == LinkKind::kNone) return;
+  MotionFactor factor;
+  const bool valid = j.link == LinkKind::kImu
+                         ? imuFactor(j.imu, noise_, i.x, j.x, i.linearization(), j.linearization(), factor)
+                         : constantVelocityFactor(j.link_duration, noise_, i.x, j.x, i.linearization(),
+                                                  j.linearization(), factor);
+  if (!valid) return;
+  system_.addMotion(factor, i, j);
+  if (position + 1 == order_.size()) {
+    statistics_.imu_residual = std::sqrt(factor.residual.head<9>().squaredNorm() / 9.0);
+  }
+}
+
+// Rest is soft: the velocity is near zero, and two frames at rest are at nearly the same pose.
+void Smoother::addRestFactors() {
+  for (std::size_t k = motionBegin(); k < order_.size(); ++k) {
+    const WindowState& j = states_[order_[k]];
+    if (!j.at_rest) continue;
+    system_.addDiagonal(j, 6, j.x.v_world_body, kRestVelocitySigma);
+    if (k == 0) continue;
+    const WindowState& i = states_[order_[k - 1]];
+    if (!i.at_rest || !i.has_motion) continue;
+    MotionFactor factor;
+    factor.residual.setZero();
+    factor.jacobian_i.setZero();
+    factor.jacobian_j.setZero();
+    factor.residual.segment<3>(0) =
+        logSo3(i.x.T_world_body.rotation.conjugate() * j.x.T_world_body.rotation) / kRestRotationSigma;
+    factor.residual.segment<3>(3) =
+        (j.x.T_world_body.translation - i.x.T_world_body.translation) / kRestPositionSigma;
+    factor.jacobian_i.block<3, 3>(0, 0) = -Eigen::Matrix3d::Identity() / kRestRotationSigma;
+    factor.jacobian_j.block<3, 3>(0, 0) = Eigen::Matrix3d::Identity() / kRestRotationSigma;
+    factor.jacobian_i.block<3, 3>(3, 3) = -Eigen::Matrix3d::Identity() / kRestPositionSigma;
+    factor.jacobian_j.block<3, 3>(3, 3) = Eigen::Matrix3d::Identity() / kRestPositionSigma;
+    system_.addMotion(factor, i, j);
+  }
+}
+
+void Smoother::buildSystem() {
+  system_.begin(calibration_, dimension_);
+  addPrior();
+  for (std::size_t k = 1; k < order_.size(); ++k) addMotionFactor(k);
+  addRestFactors();
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    if (in_system_[i] == 0) continue;
+    if (!system_.addLandmark(landmarks_[i], rig_poses_, T_body_cam_, states_)) in_system_[i] = 0;
+  }
+  system_.finish(states_);
+}
+
+void Smoother::backup() {
+  for (const std::uint8_t slot : order_) backup_[slot] = states_[slot].x;
+  time_offset_backup_ = time_offset_;
+  T_body_cam_backup_ = T_body_cam_;
+}
+
+void Smoother::restore() {
+  for (const std::uint8_t slot : order_) states_[slot].x = backup_[slot];
+  time_offset_ = time_offset_backup_;
+  T_body_cam_ = T_body_cam_backup_;
+}
+
+void Smoother::applyStep(const Eigen::Ref<const Eigen::VectorXd>& step) {
+  if (calibration_.time_offset) time_offset_ += step[0];
+  if (calibration_.extrinsics) {
+    for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+      const int at = calibration_.extrinsicOffset(c);
+      T_body_cam_[c].rotation = (T_body_cam_[c].rotation * expSo3(step.segment<3>(at))).normalized();
+      T_body_cam_[c].translation += step.segment<3>(at + 3);
+    }
+  }
+  for (const std::uint8_t slot : order_) {
+    Vector15d delta = Vector15d::Zero();
+    delta.head(states_[slot].dimension()) = step.segment(states_[slot].offset, states_[slot].dimension());
+    states_[slot].x.retract(delta);
+  }
+}
+
+Status Smoother::solve(int iterations) {
+  assignOffsets();
+  for (std::size_t k = 1; k < order_.size(); ++k) {
+    WindowState& state = states_[order_[k]];
+    const WindowState& previous = states_[order_[k - 1]];
+    if (!previous.has_motion || state.link != LinkKind::kImu) continue;
+    const bool moved = (previous.x.bias_gyro - state.imu.biasGyro()).norm() > kReintegrateGyro ||
+                       (previous.x.bias_accel - state.imu.biasAccel()).norm() > kReintegrateAccel;
+    // The newest interval but one ended without the sample behind its last image.
+    if (moved || k + 2 == order_.size()) integrateLink(state, previous);
+  }
+  double cost = 0;
+  bool factored = false;
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    placeCameras();
+    triangulateAll(kTriangulationFollow);
+    if (iteration == 1) rejectOutliers(kOutlierSigmas, true);
+    buildSystem();
+    if (iteration > 1 && system_.cost() > kCostIncreaseAllowed * cost) {
+      restore();
+      break;
+    }
+    cost = system_.cost();
+    MatrixMap H = system_.H();
+    for (int k = 0; k < dimension_; ++k) H(k, k) *= 1.0 + kRelativeDamping;
+    if (!choleskyInPlace(H)) {
+      if (!factored) return {StatusCode::kFailed, "the window's normal equations are singular; reset"};
+      break;
+    }
+    factored = true;
+    VectorMap step(step_.data(), dimension_);
+    step = -system_.g();
+    choleskySolve(H, step);
+    if (!step.allFinite()) return {StatusCode::kFailed, "the window's solution is not finite; reset"};
+    backup();
+    applyStep(step);
+    statistics_.iterations = iteration + 1;
+    if (step.cwiseAbs().maxCoeff() < kConverged) break;
+  }
+  // The newest state is last: its marginal is the inverse of the factor's last diagonal block.
+  const WindowState& newest_state = newest();
+  Matrix15d L = Matrix15d::Zero();
+  MatrixMap H = system_.H();
+  for (int c = 0; c < kStateDim; ++c) {
+    for (int r = c; r < kStateDim; ++r) L(r, c) = H(newest_state.offset + r, newest_state.offset + c);
+  }
+  const Matrix15d L_inverse = L.triangularView<Eigen::Lower>().solve(Matrix15d::Identity());
+  covariance_ = L_inverse.transpose() * L_inverse;
+  placeCameras();
+  rejectOutliers(kFinalOutlierSigmas, true);
+  rejectOutliers(kFinalOutlierSigmas, false);
+  return okStatus();
+}
+
+// newest_only: single sightings of the newest frame. Otherwise: landmarks that fit nowhere.
+void Smoother::rejectOutliers(double threshold, bool newest_only) {
+  const std::uint8_t newest_slot = order_.back();
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    if (landmark_ids_[i] == 0) continue;
+    Landmark& landmark = landmarks_[i];
+    if (newest_only) {
+      if (in_system_[i] == 0 || landmark.sightings.back().slot != newest_slot) continue;
+      Sighting& sighting = landmark.sightings.back();
+      for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+        CameraSighting& view = sighting.camera[c];
+        if (!view.used) continue;
+        Eigen::Vector2d r;
+        if (!reprojectionResidual(view, rig_poses_[newest_slot].current[c], landmark, r) ||
+            r.squaredNorm() > threshold * threshold) {
+          view.used = false;
+        }
+      }
+      if (!sighting.camera[0].used && !sighting.camera[1].used) {
+        landmark.sightings.popBack();
+        if (++landmark.rejections >= kMaxRejections) removeLandmark(landmark);
+      }
+      continue;
+    }
+    const bool tried = landmark.sightings.size() >= 2;
+    const bool bad =
+        tried && (in_system_[i] == 0 || meanSquaredResidual(rig_poses_, landmark) > threshold * threshold);
+    if (bad && ++landmark.rejections >= kMaxRejections) {
+      removeLandmark(landmark);
+      in_system_[i] = 0;
+    } else if (bad) {
+      landmark.triangulated = false;
+    }
+  }
+}
+
+void Smoother::updateStatistics(int) {
+  const std::uint8_t slot = order_.back();
+  double sum = 0;
+  int views = 0;
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    if (landmark_ids_[i] == 0 || in_system_[i] == 0) continue;
+    const Landmark& landmark = landmarks_[i];
+    if (landmark.sightings.empty()) continue;
+    ++statistics_.landmarks;
+    const int count = landmark.views();
+    sum += meanSquaredResidual(rig_poses_, landmark) * count;
+    views += count;
+    const Sighting& last = landmark.sightings.back();
+    if (last.slot != slot) continue;
+    const bool both = last.camera[0].used && last.camera[1].used;
+    ++(both ? statistics_.inliers_stereo : statistics_.inliers_mono);
+  }
+  if (views > 0) statistics_.reprojection_rms = settings_.pixel_sigma * std::sqrt(sum / views);
+  WindowState& state = states_[slot];
+  statistics_.keyframe = state.keyframe;
+  statistics_.at_rest = state.at_rest;
+  state.statistics = statistics_;
+}
+
+void Smoother::window(SmoothedWindow& out) const {
+  out.poses.clear();
+  out.landmarks.clear();
+  for (const std::uint8_t slot : order_) {
+    const WindowState& s = states_[slot];
+    static_cast<void>(out.poses.tryPushBack({s.stamp, s.frame_index, s.keyframe, s.x.T_world_body}));
+  }
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    const Landmark& landmark = landmarks_[i];
+    if (landmark_ids_[i] == 0 || in_system_[i] == 0 || landmark.inverse_depth <= 0) continue;
+    static_cast<void>(
+        out.landmarks.tryPushBack({landmark.id - 1, landmark.position(), landmark.inverse_depth_sigma,
+                                   static_cast<int>(landmark.sightings.size())}));
+  }
+}
+
+}  // namespace swiftlet

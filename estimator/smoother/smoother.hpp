@@ -1,0 +1,169 @@
+#pragma once
+// Fixed-lag smoother: Gauss-Newton over a sliding window of body states.
+//
+// Window, in order of time: pose-only keyframes; keyframes with velocity and biases; the newest
+// frames. A frame that is no keyframe leaves by merging its two IMU intervals (nothing is
+// linearized for good); an old keyframe first loses velocity and biases, then its pose, both into
+// the prior, together with the landmarks that only it kept alive. States that the prior touches
+// keep their first estimate as linearization point.
+// Memory: all reserved by the constructor (see docs/smoother.md); nothing is allocated after it.
+// Cost: linear in sightings, cubic in the window's dimension (about 200).
+// Sources: Leutenegger et al., "Keyframe-based visual-inertial odometry using nonlinear
+// optimization", IJRR 2015 (window); Huang, Mourikis, Roumeliotis, "Observability-based rules for
+// consistent EKF SLAM", IJRR 2010 (first estimates); Usenko et al., "Visual-Inertial Mapping with
+// Non-Linear Factor Recovery", RA-L 2020 (what leaves when).
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "estimator/camera/rig.hpp"
+#include "estimator/core/fixed_vector.hpp"
+#include "estimator/core/status.hpp"
+#include "estimator/imu/imu_noise.hpp"
+#include "estimator/messages/smoothed_window.hpp"
+#include "estimator/messages/tracked_frame.hpp"
+#include "estimator/smoother/imu_buffer.hpp"
+#include "estimator/smoother/normal_equations.hpp"
+#include "estimator/smoother/prior.hpp"
+#include "estimator/smoother/state.hpp"
+#include "estimator/smoother/vision_factor.hpp"
+
+namespace swiftlet {
+
+struct SmootherSettings {
+  double pixel_sigma = 0.6;  ///< px
+  double horizon = 30.0;     ///< s
+  int max_recent = 4;        ///< newest frames, keyframe or not, that stay whole
+  int max_motion_keyframes = 4;
+  int max_keyframes = 10;
+  bool estimate_time_offset = false;
+  bool estimate_extrinsics = false;
+};
+
+/// What the first state of an epoch is known to be.
+struct StartState {
+  Stamp stamp;
+  BodyState state;
+  double tilt_sigma = 0.05;        ///< rad
+  double velocity_sigma = 1.0;     ///< m/s
+  double gyro_bias_sigma = 0.1;    ///< rad/s
+  double accel_bias_sigma = 0.15;  ///< m/s^2
+};
+
+class Smoother {
+ public:
+  Smoother(const Rig& rig, const ImuNoise& noise, const SmootherSettings& settings);
+
+  /// Forgets all states and landmarks.
+  void reset();
+  [[nodiscard]] bool started() const { return !order_.empty(); }
+
+  /// One IMU sample, in order of stamps.
+  void addImu(const ImuSample& sample) { imu_.push(sample); }
+
+  /// The first state; its frame is the first that `step` gets.
+  void start(const StartState& start) {
+    start_ = start;
+    has_start_ = true;
+  }
+
+  struct StepInput {
+    const TrackedFrame* frame = nullptr;
+    bool imu_gap = false;  ///< samples are missing since the previous frame
+    bool at_rest = false;
+    int iterations = 3;
+  };
+
+  /// Adds a frame and solves. kFailed when the system cannot be solved: reset.
+  Status step(const StepInput& input, FixedVector<KeyframeState, kMaxStates>& left_window);
+
+  [[nodiscard]] const WindowState& newest() const { return states_[order_.back()]; }
+  [[nodiscard]] const FrameStatistics& statistics() const { return statistics_; }
+  /// Marginal covariance of the newest state, error-state order.
+  [[nodiscard]] const Matrix15d& covariance() const { return covariance_; }
+  [[nodiscard]] Duration timeOffset() const { return Duration::fromSeconds(time_offset_); }
+  [[nodiscard]] const std::array<SE3, kMaxCameras>& extrinsics() const { return T_body_cam_; }
+
+  void window(SmoothedWindow& out) const;
+  /// The keyframes still in the window, oldest first.
+  void flush(FixedVector<KeyframeState, kMaxStates>& left_window) const;
+
+ private:
+  std::uint8_t addState(const StepInput& input);
+  void linkState(WindowState& state, const WindowState& previous, bool gap);
+  void integrateLink(WindowState& state, const WindowState& previous);
+  void addSightings(std::uint8_t slot, const TrackedFrame& frame);
+  Landmark* findLandmark(TrackId id);
+  Landmark* newLandmark(TrackId id);
+  void removeLandmark(Landmark& landmark);
+
+  Status solve(int iterations);
+  void assignOffsets();
+  void restore();
+  void backup();
+  void placeCameras();
+  void buildSystem();
+  void addPrior();
+  void addMotionFactor(std::size_t position);
+  void addRestFactors();
+  void triangulateAll(int iterations);
+  void startPrior();
+  [[nodiscard]] Vector15d priorDeviation(const PriorBlock& block) const;
+  [[nodiscard]] Eigen::Matrix<double, kMaxCalibrationDim, 1> calibrationDeviation() const;
+  void applyStep(const Eigen::Ref<const Eigen::VectorXd>& step);
+  void rejectOutliers(double threshold, bool newest_only);
+  void updateStatistics(int iterations);
+
+  void trimWindow(FixedVector<KeyframeState, kMaxStates>& left_window);
+  void dropFrame(std::size_t position);
+  void dropMotion(std::size_t position);
+  void dropKeyframe(std::size_t position);
+  [[nodiscard]] std::size_t chooseKeyframeToDrop(std::size_t candidates) const;
+  void removeState(std::size_t position);
+  void removeSightingsOf(std::uint8_t slot);
+  void freeze(std::uint8_t slot);
+  /// Removes columns [first, first + count) of the state at `position` into the prior.
+  void marginalize(std::size_t position, int first, int count, bool with_motion_factor, bool with_landmarks);
+  void buildMarginalSystem(std::size_t position, bool with_motion_factor, bool with_landmarks);
+  [[nodiscard]] bool leavesWith(const Landmark& landmark, std::uint8_t slot) const;
+  [[nodiscard]] KeyframeState record(const WindowState& state) const;
+  [[nodiscard]] std::size_t motionBegin() const;
+
+  Rig rig_;
+  ImuNoise noise_;
+  SmootherSettings settings_;
+  ImuBuffer imu_;
+  StartState start_;
+  bool has_start_ = false;
+  std::uint64_t newest_frame_ = 0;
+
+  std::array<WindowState, kMaxStates> states_;
+  FixedVector<std::uint8_t, kMaxStates> order_;  // slots in order of time
+  std::vector<Landmark> landmarks_;
+  std::vector<TrackId> landmark_ids_;    // of landmarks_, 0 where free: searched far more often than read
+  std::vector<std::uint8_t> in_system_;  // landmark takes part in this solve
+  Prior prior_;
+  Prior next_prior_;
+  NormalEquations system_;
+  RigPoses rig_poses_;
+  std::vector<double> step_;
+  std::vector<std::uint8_t> involved_;  // slots touched by a marginalization
+  int dimension_ = 0;
+  std::uint64_t oldest_recent_frame_ = 0;
+  std::array<BodyState, kMaxStates> backup_;
+
+  CalibrationLayout calibration_;
+  double time_offset_ = 0;  // s, t_imu = t_image + offset
+  double time_offset_backup_ = 0;
+  std::array<SE3, kMaxCameras> T_body_cam_;
+  std::array<SE3, kMaxCameras> T_body_cam_backup_;
+  std::array<SE3, kMaxCameras> T_body_cam_reference_;
+  double time_offset_reference_ = 0;
+
+  Matrix15d covariance_ = Matrix15d::Zero();
+  FrameStatistics statistics_;
+};
+
+}  // namespace swiftlet

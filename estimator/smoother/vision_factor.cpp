@@ -1,0 +1,205 @@
+#include "estimator/smoother/vision_factor.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/geometry/so3.hpp"
+
+namespace swiftlet {
+namespace {
+
+// Points beyond this cosine from the measured ray have no meaningful tangent-plane residual.
+constexpr double kMinCosine = 0.2;
+// Huber threshold in sigmas: 95 % of a normal residual's norm (2 dof) lies below 2.45.
+constexpr double kHuberThreshold = 2.0;
+// Nothing is nearer to a flying camera than this.
+constexpr double kMaxInverseDepth = 20.0;  // 1/m
+// Prior on the inverse depth, for points without parallax: weak enough not to bias points with it.
+constexpr double kInverseDepthPriorSigma = 30.0;  // 1/m
+// Depth taken for a point that one camera saw once.
+constexpr double kGuessedInverseDepth = 0.3;  // 1/m
+constexpr double kStepTolerance = 1e-5;
+
+struct PointSystem {
+  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d g = Eigen::Vector3d::Zero();
+  double cost = 0;
+  int views = 0;
+  bool in_front = true;
+};
+
+PointSystem linearizePoint(const RigPoses& poses, const Landmark& landmark, const PointBasis& basis) {
+  PointSystem system;
+  for (const Sighting& sighting : landmark.sightings) {
+    for (std::size_t c = 0; c < kMaxCameras; ++c) {
+      const CameraSighting& view = sighting.camera[c];
+      if (!view.used) continue;
+      const CameraPose& camera = poses[sighting.slot].current[c];
+      const Eigen::Vector3d arm = landmark.reference - camera.center;
+      const Eigen::Vector3d h = camera.R_cam_world * (landmark.bearing + landmark.inverse_depth * arm);
+      const double along = view.bearing.dot(h);
+      if (!(along > kMinCosine * h.norm())) {
+        system.in_front = false;
+        continue;
+      }
+      const Eigen::Vector2d r = view.weight * h / along;
+      const Matrix23d G = (view.weight - r * view.bearing.transpose()) / along;
+      const Matrix23d M = G * camera.R_cam_world;
+      Matrix23d J;
+      J.col(0) = M * basis.b1;
+      J.col(1) = M * basis.b2;
+      J.col(2) = M * arm;
+      const RobustWeight robust = RobustWeight::huber(r.squaredNorm());
+      system.H.noalias() += robust.weight * J.transpose() * J;
+      system.g.noalias() += robust.weight * J.transpose() * r;
+      system.cost += robust.cost;
+      ++system.views;
+    }
+  }
+  return system;
+}
+
+void movePoint(const Eigen::Vector3d& step, const PointBasis& basis, Landmark& landmark) {
+  const Eigen::Vector3d moved = landmark.bearing + step[0] * basis.b1 + step[1] * basis.b2;
+  const double scale = 1.0 / moved.norm();
+  landmark.bearing = moved * scale;
+  landmark.inverse_depth = std::clamp((landmark.inverse_depth + step[2]) * scale, 0.0, kMaxInverseDepth);
+}
+
+// Along the first sighting's ray the residuals are nearly linear in the inverse depth alone.
+void triangulateLinearly(const RigPoses& poses, Landmark& landmark) {
+  const Sighting& first = landmark.sightings.front();
+  const std::size_t c0 = first.camera[0].used ? 0 : 1;
+  const CameraPose& anchor = poses[first.slot].current[c0];
+  landmark.reference = anchor.center;
+  landmark.bearing = anchor.R_cam_world.transpose() * first.camera[c0].bearing;
+  double numerator = 0;
+  double denominator = 0;
+  for (const Sighting& sighting : landmark.sightings) {
+    for (std::size_t c = 0; c < kMaxCameras; ++c) {
+      const CameraSighting& view = sighting.camera[c];
+      if (!view.used) continue;
+      const CameraPose& camera = poses[sighting.slot].current[c];
+      const Eigen::Vector2d a = view.weight * (camera.R_cam_world * landmark.bearing);
+      const Eigen::Vector2d b = view.weight * (camera.R_cam_world * (landmark.reference - camera.center));
+      numerator -= a.dot(b);
+      denominator += b.dot(b);
+    }
+  }
+  // With less than one sigma of parallax over a metre the data say nothing.
+  const bool known = denominator > 1.0 * 1.0;
+  landmark.inverse_depth =
+      known ? std::clamp(numerator / denominator, 1e-3, kMaxInverseDepth) : kGuessedInverseDepth;
+}
+
+}  // namespace
+
+CameraPose CameraPose::of(const SE3& T_world_body, const SE3& T_body_cam) {
+  const SE3 T_world_cam = T_world_body * T_body_cam;
+  return {T_world_cam.R().transpose(), T_world_cam.translation};
+}
+
+PointBasis PointBasis::of(const Eigen::Vector3d& bearing) {
+  const Eigen::Vector3d axis =
+      std::abs(bearing.z()) < 0.9 ? Eigen::Vector3d::UnitZ() : Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d b1 = bearing.cross(axis).normalized();
+  return {b1, bearing.cross(b1)};
+}
+
+RobustWeight RobustWeight::huber(double squared_norm) {
+  if (squared_norm <= kHuberThreshold * kHuberThreshold) return {1.0, 0.5 * squared_norm};
+  const double norm = std::sqrt(squared_norm);
+  return {kHuberThreshold / norm, kHuberThreshold * (norm - 0.5 * kHuberThreshold)};
+}
+
+bool reprojectionResidual(const CameraSighting& sighting, const CameraPose& camera, const Landmark& landmark,
+                          Eigen::Vector2d& residual) {
+  const Eigen::Vector3d h =
+      camera.R_cam_world * (landmark.bearing + landmark.inverse_depth * (landmark.reference - camera.center));
+  const double along = sighting.bearing.dot(h);
+  if (!(along > kMinCosine * h.norm())) return false;
+  residual = sighting.weight * h / along;
+  return true;
+}
+
+bool reprojectionJacobians(const CameraSighting& sighting, const CameraPose& camera, const SE3& T_body_cam,
+                           const Landmark& landmark, const PointBasis& basis, bool with_extrinsic,
+                           SightingJacobians& jacobians) {
+  const Eigen::Vector3d arm = landmark.reference - camera.center;
+  const Eigen::Vector3d h = camera.R_cam_world * (landmark.bearing + landmark.inverse_depth * arm);
+  const double along = sighting.bearing.dot(h);
+  if (!(along > kMinCosine * h.norm())) return false;
+  const Eigen::Vector2d r = sighting.weight * h / along;
+  const Matrix23d G = (sighting.weight - r * sighting.bearing.transpose()) / along;  // d r / d h
+  const Matrix23d M = G * camera.R_cam_world;
+  const Eigen::Matrix3d R_body_cam = T_body_cam.R();
+  const Matrix23d K = G * R_body_cam.transpose();  // d r / d (ray in body axes)
+  const Eigen::Vector3d ray_body = R_body_cam * h + landmark.inverse_depth * T_body_cam.translation;
+  // k^T hat(x) = (k x x)^T
+  jacobians.pose.block<1, 3>(0, 0) = K.row(0).transpose().cross(ray_body).transpose();
+  jacobians.pose.block<1, 3>(1, 0) = K.row(1).transpose().cross(ray_body).transpose();
+  jacobians.pose.rightCols<3>() = -landmark.inverse_depth * M;
+  jacobians.point.col(0) = M * basis.b1;
+  jacobians.point.col(1) = M * basis.b2;
+  jacobians.point.col(2) = M * arm;
+  if (with_extrinsic) {
+    jacobians.extrinsic.block<1, 3>(0, 0) = G.row(0).transpose().cross(h).transpose();
+    jacobians.extrinsic.block<1, 3>(1, 0) = G.row(1).transpose().cross(h).transpose();
+    jacobians.extrinsic.rightCols<3>() = -landmark.inverse_depth * K;
+  }
+  return true;
+}
+
+bool triangulate(const RigPoses& poses, int max_iterations, Landmark& landmark) {
+  if (landmark.sightings.empty()) return false;
+  if (!landmark.triangulated) triangulateLinearly(poses, landmark);
+  double lambda = 0;
+  PointBasis basis = PointBasis::of(landmark.bearing);
+  PointSystem system = linearizePoint(poses, landmark, basis);
+  for (int i = 0; i < max_iterations && system.in_front; ++i) {
+    Eigen::Matrix3d H = system.H;
+    H(2, 2) += 1.0 / (kInverseDepthPriorSigma * kInverseDepthPriorSigma);
+    H.diagonal() *= 1.0 + lambda;
+    const Eigen::Vector3d step = -H.llt().solve(system.g);
+    if (!step.allFinite()) return false;
+    const Eigen::Vector3d bearing_before = landmark.bearing;
+    const double inverse_depth_before = landmark.inverse_depth;
+    movePoint(step, basis, landmark);
+    const PointBasis moved_basis = PointBasis::of(landmark.bearing);
+    const PointSystem moved = linearizePoint(poses, landmark, moved_basis);
+    if (!moved.in_front || moved.cost > system.cost * (1.0 + 1e-9)) {
+      landmark.bearing = bearing_before;
+      landmark.inverse_depth = inverse_depth_before;
+      lambda = std::max(10.0 * lambda, 1e-2);
+      continue;
+    }
+    basis = moved_basis;
+    system = moved;
+    if (step.squaredNorm() < kStepTolerance * kStepTolerance) break;
+  }
+  if (!system.in_front || system.views < 2) return false;
+  Eigen::Matrix3d H = system.H;
+  H(2, 2) += 1.0 / (kInverseDepthPriorSigma * kInverseDepthPriorSigma);
+  const Eigen::Vector3d column = H.llt().solve(Eigen::Vector3d::UnitZ());
+  landmark.inverse_depth_sigma = std::sqrt(std::max(column.z(), 0.0));
+  landmark.triangulated = true;
+  return true;
+}
+
+double meanSquaredResidual(const RigPoses& poses, const Landmark& landmark) {
+  double sum = 0;
+  int count = 0;
+  for (const Sighting& sighting : landmark.sightings) {
+    for (std::size_t c = 0; c < kMaxCameras; ++c) {
+      if (!sighting.camera[c].used) continue;
+      Eigen::Vector2d r;
+      if (!reprojectionResidual(sighting.camera[c], poses[sighting.slot].current[c], landmark, r)) return 1e6;
+      sum += r.squaredNorm();
+      ++count;
+    }
+  }
+  return count > 0 ? sum / count : -1.0;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,73 @@
+#pragma once
+// Reprojection of a landmark into a camera, its Jacobians, and the structureless elimination of the
+// landmark: re-triangulated at the current poses, linearized, and removed by its Schur complement.
+//
+// First-estimate rule: the Jacobian blocks of a sighting (pose and point) are taken at one and the
+// same point with the pose at its linearization value; the residual at the current values. The four
+// unobservable directions (position, yaw) then stay null whatever the point is.
+
+#include <Eigen/Core>
+#include <array>
+
+#include "estimator/camera/rig.hpp"
+#include "estimator/smoother/landmark.hpp"
+#include "estimator/smoother/state.hpp"
+
+namespace swiftlet {
+
+/// A camera placed in the world by a body state.
+struct CameraPose {
+  Eigen::Matrix3d R_cam_world = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< world
+
+  static CameraPose of(const SE3& T_world_body, const SE3& T_body_cam);
+};
+
+/// The rig placed at one state: current values, linearization values.
+struct RigPose {
+  std::array<CameraPose, kMaxCameras> current;
+  std::array<CameraPose, kMaxCameras> linearization;
+  Eigen::Vector3d v_world = Eigen::Vector3d::Zero();     ///< for the time offset
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  ///< for the time offset
+};
+
+using RigPoses = std::array<RigPose, kMaxStates>;
+
+/// The ray of a point in a camera; also the point's tangent basis, shared by all sightings.
+struct PointBasis {
+  Eigen::Vector3d b1;
+  Eigen::Vector3d b2;
+  static PointBasis of(const Eigen::Vector3d& bearing);
+};
+
+struct SightingJacobians {
+  Eigen::Matrix<double, 2, 6> pose;       ///< phi, p of the body
+  Eigen::Matrix<double, 2, 3> point;      ///< two tangent coordinates of the bearing, inverse depth
+  Eigen::Matrix<double, 2, 6> extrinsic;  ///< phi, p of T_body_cam
+};
+
+/// Whitened residual. False when the point is not in front of the measured ray.
+[[nodiscard]] bool reprojectionResidual(const CameraSighting& sighting, const CameraPose& camera,
+                                        const Landmark& landmark, Eigen::Vector2d& residual);
+
+/// Jacobians at `camera`. False as above.
+[[nodiscard]] bool reprojectionJacobians(const CameraSighting& sighting, const CameraPose& camera,
+                                         const SE3& T_body_cam, const Landmark& landmark,
+                                         const PointBasis& basis, bool with_extrinsic,
+                                         SightingJacobians& jacobians);
+
+/// Robust weight (Huber) of a whitened residual's norm, and the cost it stands for.
+struct RobustWeight {
+  double weight = 1;
+  double cost = 0;
+  static RobustWeight huber(double squared_norm);
+};
+
+/// Moves the point by its own Gauss-Newton steps at the current poses; from nothing when it is not
+/// triangulated yet. False when the sightings do not agree on a point in front of the cameras.
+[[nodiscard]] bool triangulate(const RigPoses& poses, int max_iterations, Landmark& landmark);
+
+/// Mean squared whitened residual over the sightings at the current poses; negative without any.
+[[nodiscard]] double meanSquaredResidual(const RigPoses& poses, const Landmark& landmark);
+
+}  // namespace swiftlet

@@ -1,0 +1,34 @@
+#pragma once
+// The program's subcommands. Each adds itself to the parser and is run by it; its return value is the
+// exit code.
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "firmware_host/settings/settings.hpp"
+
+namespace swiftlet {
+
+inline constexpr int kExitDone = 0;
+inline constexpr int kExitFailed = 1;    ///< the run or the check failed
+inline constexpr int kExitBadInput = 2;  ///< wrong use or bad input
+
+/// The options that every command has.
+struct SettingsOptions {
+  std::string file;
+  std::vector<std::string> overrides;
+
+  void addTo(CLI::App& command);
+  /// Defaults, then the file, then the overrides. InputError.
+  [[nodiscard]] Settings read() const;
+};
+
+void addReplayCommand(CLI::App& app, int& exit_code);
+void addEvaluateCommand(CLI::App& app, int& exit_code);
+void addSettingsCommand(CLI::App& app, int& exit_code);
+
+/// The whole program: parses, runs, prints errors, gives the exit code.
+int runProgram(int argc, char** argv);
+
+}  // namespace swiftlet

@@ -1,0 +1,140 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/evaluate_run.hpp"
+#include "firmware_host/report/accuracy_report.hpp"
+
+namespace swiftlet {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct EvaluateOptions {
+  std::string run;
+  std::string truth;
+  AlignKind align = AlignKind::kSe3;
+  double from = 0;
+  double until = -1;
+  bool json = false;
+  SettingsOptions settings;
+};
+
+/// What is compared with what.
+struct Subject {
+  std::vector<std::string> files;
+  std::string states;  ///< empty: no covariances
+  std::string truth;
+  std::optional<Stamp> first_image;
+};
+
+Json readSummary(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  if (!file) return nullptr;
+  Json json = Json::parse(file, nullptr, false);
+  if (json.is_discarded()) {
+    throw InputError(path, 0, "", "not valid JSON",
+                     "Replay again, or give the .tum file instead of the folder");
+  }
+  return json;
+}
+
+Subject subjectOf(const EvaluateOptions& options) {
+  Subject subject;
+  subject.truth = options.truth;
+  const std::filesystem::path path(options.run);
+  if (!std::filesystem::exists(path)) {
+    throw InputError(options.run, 0, "", "does not exist", "Give a run folder or a trajectory file");
+  }
+  if (!std::filesystem::is_directory(path)) {
+    subject.files.push_back(options.run);
+  } else {
+    for (const char* name : {"odometry.tum", "map.tum"}) {
+      if (std::filesystem::exists(path / name)) subject.files.push_back(path / name);
+    }
+    if (subject.files.empty()) {
+      throw InputError(options.run, 0, "", "no odometry.tum in this folder",
+                       "Give a folder that replay wrote");
+    }
+    if (std::filesystem::exists(path / "states.csv")) subject.states = path / "states.csv";
+    const Json summary = readSummary(path / "summary.json");
+    const Json run = summary.is_object() ? summary.value("run", Json::object()) : Json::object();
+    if (run.contains("first_image_ns") && run["first_image_ns"].is_number_integer()) {
+      subject.first_image = Stamp{run["first_image_ns"].get<std::int64_t>()};
+    }
+    if (subject.truth.empty() && run.contains("log")) subject.truth = run["log"].get<std::string>();
+  }
+  if (subject.truth.empty()) {
+    throw InputError(options.run, 0, "", "nothing to compare with",
+                     "Give a log or a trajectory with --truth");
+  }
+  return subject;
+}
+
+int evaluate(const EvaluateOptions& options) {
+  const Settings settings = options.settings.read();
+  const Subject subject = subjectOf(options);
+  const Truth truth = readTruth(subject.truth);
+  AccuracyOptions accuracy_options = accuracyOptions(settings.evaluation, options.align);
+  Json json;
+  json["truth"] = truth.name;
+  if (!options.json) fmt::print("truth: {}\n", truth.name);
+  bool compared = true;
+  for (const std::string& file : subject.files) {
+    const Trajectory estimate = readEstimate(file);
+    // Without a log the zero of time is the estimate's own first pose.
+    const Stamp zero = subject.first_image ? *subject.first_image
+                       : truth.first_image ? *truth.first_image
+                                           : estimate.front().stamp;
+    if (options.from > 0) accuracy_options.association.from = zero + Duration::fromSeconds(options.from);
+    if (options.until >= 0) accuracy_options.association.until = zero + Duration::fromSeconds(options.until);
+    const Accuracy accuracy = accuracyOf(estimate, truth.poses, accuracy_options);
+    compared = compared && accuracy.pairs > 0;
+    json[std::filesystem::path(file).filename().string()] = toJson(accuracy);
+    const std::string section = options.from > 0 ? fmt::format(", from {:g} s", options.from) : "";
+    if (!options.json) fmt::print("{}", toText(file + section, accuracy));
+  }
+  if (!subject.states.empty()) {
+    const Consistency found =
+        consistencyOf(subject.states, truth.poses, accuracy_options.association.max_gap);
+    json["consistency"] = toJson(found);
+    if (!options.json) fmt::print("{}\n{}", subject.states, toText(found));
+  }
+  if (options.json) fmt::print("{}\n", json.dump(2));
+  if (!compared) fmt::print(stderr, "error: no pose of the estimate has truth at its stamp\n");
+  return compared ? kExitDone : kExitFailed;
+}
+
+}  // namespace
+
+void addEvaluateCommand(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("evaluate", "Compare a run or a trajectory file with the truth");
+  auto options = std::make_shared<EvaluateOptions>();
+  command->add_option("RUN", options->run, "Run folder, or a trajectory (TUM, EuRoC csv)")->required();
+  command->add_option("--truth", options->truth,
+                      "Log or trajectory file with the truth; default: the log the run was made from");
+  const std::map<std::string, AlignKind> kinds = {
+      {"se3", AlignKind::kSe3}, {"sim3", AlignKind::kSim3}, {"yaw", AlignKind::kYaw}};
+  command->add_option("--align", options->align, "se3 (default), sim3 (scale too) or yaw (and translation)")
+      ->transform(CLI::CheckedTransformer(kinds, CLI::ignore_case));
+  command
+      ->add_option("--from", options->from, "Leave out poses before this many seconds after the first image")
+      ->check(CLI::NonNegativeNumber);
+  command
+      ->add_option("--until", options->until, "Leave out poses after this many seconds after the first image")
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag("--json", options->json, "Print JSON, and nothing else, on stdout");
+  options->settings.addTo(*command);
+  command->footer(
+      "Example:\n  swiftlet evaluate run_mh01 --from 3\n"
+      "  swiftlet evaluate trajectory.tum --truth data/euroc_mh01_20s --align yaw");
+  command->callback([options, &exit_code] { exit_code = evaluate(*options); });
+}
+
+}  // namespace swiftlet

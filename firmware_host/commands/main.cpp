@@ -1,0 +1,3 @@
+#include "firmware_host/commands/command.hpp"
+
+int main(int argc, char** argv) { return swiftlet::runProgram(argc, argv); }

@@ -1,0 +1,36 @@
+#include <fmt/format.h>
+
+#include <exception>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/commands/command.hpp"
+#include "firmware_host/report/summary.hpp"
+
+namespace swiftlet {
+
+int runProgram(int argc, char** argv) {
+  CLI::App app("swiftlet: stereo-inertial state estimation for drones");
+  app.set_version_flag("--version", versionText());
+  app.require_subcommand(1);
+  app.footer(
+      "Example:\n  swiftlet replay data/euroc_mh01_20s --out run_mh01\n"
+      "`swiftlet <command> --help` explains each command.");
+  int exit_code = kExitDone;
+  addReplayCommand(app, exit_code);
+  addEvaluateCommand(app, exit_code);
+  addSettingsCommand(app, exit_code);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kExitDone : kExitBadInput;
+  } catch (const InputError& error) {
+    fmt::print(stderr, "error: {}\n", error.what());
+    return kExitBadInput;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "error: {}\n", error.what());
+    return kExitFailed;
+  }
+  return exit_code;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,98 @@
+#include <fmt/format.h>
+
+#include <atomic>
+#include <csignal>
+#include <filesystem>
+#include <memory>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/replay_run.hpp"
+#include "firmware_host/report/summary.hpp"
+
+namespace swiftlet {
+namespace {
+
+std::atomic<bool> stop_asked{false};
+
+extern "C" void askToStop(int /*signal*/) { stop_asked.store(true, std::memory_order_relaxed); }
+
+struct ReplayOptions {
+  ReplayRequest request;
+  SettingsOptions settings;
+  std::vector<std::string> calibration;
+  double until = -1;
+};
+
+std::string accuracyLine(const nlohmann::ordered_json& summary, const char* file, const char* section) {
+  const auto& accuracy = summary["accuracy"];
+  if (!accuracy.contains(file) || !accuracy[file].is_object()) return "";
+  const auto& figures = accuracy[file][section]["se3"];
+  if (!figures.contains("ate_m")) return "";
+  return fmt::format("  {:<9}{:<8} ATE rmse {:.4f} m (se3, {} pairs)  rotation {:.3f} deg\n", file, section,
+                     figures["ate_m"]["rmse"].get<double>(), figures["pairs"].get<std::size_t>(),
+                     figures["rotation_deg"]["rmse"].get<double>());
+}
+
+int replay(const ReplayOptions& options) {
+  ReplayRequest request = options.request;
+  request.stop = &stop_asked;
+  request.show_progress = true;
+  if (options.until >= 0) request.until = options.until;
+  if (!options.calibration.empty()) request.calibration = options.calibration[0];
+  if (options.calibration.size() > 1) request.imu_calibration = options.calibration[1];
+  if (request.until && *request.until < request.from) {
+    throw InputError("--until", 0, "", "the section ends before it begins", "Give an --until after --from");
+  }
+  std::signal(SIGINT, askToStop);
+  std::signal(SIGTERM, askToStop);
+  const ReplayResult result = runReplay(request, options.settings.read());
+  fmt::print("{}", summaryText(result.summary));
+  if (result.summary.contains("accuracy")) {
+    for (const char* file : {"odometry", "states", "map"}) {
+      for (const char* section : {"all", "from_3s"}) {
+        fmt::print("{}", accuracyLine(result.summary, file, section));
+      }
+    }
+  }
+  fmt::print("written to {}\n", request.out);
+  if (!result.finished) {
+    fmt::print(stderr, "stopped before the end; the run folder holds what was done\n");
+    return kExitFailed;
+  }
+  if (!result.has_pose) {
+    fmt::print(stderr, "error: {}: no pose in the whole log; events.log says what the start waited for\n",
+               request.log);
+    return kExitFailed;
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+void addReplayCommand(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("replay", "Run the estimator on a recorded log");
+  auto options = std::make_shared<ReplayOptions>();
+  ReplayRequest& request = options->request;
+  request.out = "run";
+  command->add_option("LOG", request.log, "EuRoC/ASL folder, or a ROS 1 bag where supported")->required();
+  command->add_option("--out", request.out, "Run folder to write")->capture_default_str();
+  command->add_flag("--mono", request.mono, "Camera 0 alone");
+  command
+      ->add_option("--calibration", options->calibration,
+                   "Calibration instead of the log's own: a folder, or Kalibr camchain and IMU files")
+      ->expected(1, 2);
+  command->add_option("--tracks", request.tracks, "File of feature tracks in place of the images");
+  command->add_option("--from", request.from, "Start this many seconds after the first image")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--until", options->until, "End this many seconds after the first image")
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag("--imu-rate", request.imu_rate, "Also write imu_rate.tum, the state at every IMU sample");
+  options->settings.addTo(*command);
+  command->footer(
+      "Example:\n  swiftlet replay data/euroc_mh01_20s --out run_mh01\n"
+      "  swiftlet replay data/vil_v102 --mono --set smoother.horizon=3");
+  command->callback([options, &exit_code] { exit_code = replay(*options); });
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,113 @@
+#include "firmware_host/commands/replay_run.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "drivers/recorded/open_log.hpp"
+#include "firmware_host/commands/evaluate_run.hpp"
+#include "firmware_host/pipeline/lockstep.hpp"
+#include "firmware_host/report/line_file.hpp"
+#include "firmware_host/report/memory_use.hpp"
+#include "firmware_host/report/progress.hpp"
+#include "firmware_host/report/run_recorder.hpp"
+#include "firmware_host/report/summary.hpp"
+#include "firmware_host/settings/read_settings.hpp"
+
+namespace swiftlet {
+namespace {
+
+LogOptions logOptions(const ReplayRequest& request, const Settings& settings) {
+  LogOptions options;
+  options.calibration = request.calibration;
+  options.imu_calibration = request.imu_calibration;
+  options.calibration_options.accept_unusual_rig = settings.calibration.accept_unusual_rig;
+  options.mono = request.mono;
+  return options;
+}
+
+void printWarnings(const LogSource& source, std::size_t from) {
+  const auto& lines = source.warnings();
+  for (std::size_t i = from; i < lines.size(); ++i) fmt::print(stderr, "warning: {}\n", lines[i]);
+}
+
+/// Memory as it grew: what each part made resident.
+class MemoryTable {
+ public:
+  MemoryTable() : last_(residentBytes()) { rows_.push_back({"program_at_start", last_}); }
+  void note(const std::string& what) {
+    const std::int64_t now = residentBytes();
+    rows_.push_back({what, now - last_});
+    last_ = now;
+  }
+  [[nodiscard]] const std::vector<MemoryRow>& rows() const { return rows_; }
+
+ private:
+  std::vector<MemoryRow> rows_;
+  std::int64_t last_;
+};
+
+}  // namespace
+
+ReplayResult runReplay(const ReplayRequest& request, Settings settings) {
+  if (request.mono) settings.odometry.use_stereo = false;
+  MemoryTable memory;
+  const std::unique_ptr<LogSource> source = openLog(request.log, logOptions(request, settings));
+  printWarnings(*source, 0);
+  const std::size_t warned = source->warnings().size();
+  memory.note("log_reader");
+
+  LogCounters track_counters;
+  LogWarnings track_warnings;
+  std::unique_ptr<TrackReader> tracks;
+  if (!request.tracks.empty()) {
+    tracks = std::make_unique<TrackReader>(request.tracks, track_counters, track_warnings);
+  }
+
+  RunRecorder recorder(request.out, request.imu_rate);
+  const std::filesystem::path out(request.out);
+  LineFile(out / "settings.yaml").write(printSettings(settings, false));
+  const auto wiring = std::make_unique<Wiring>(source->rig(), source->imuNoise(), settings, recorder);
+  wiring->wantImuStates(request.imu_rate);
+  memory.note("estimator_at_start");
+
+  Progress progress("replay", request.show_progress ? source->imageCount() : 0);
+  ReplayPlan plan;
+  plan.from = request.from;
+  plan.until = request.until;
+  plan.last_stamp = request.last_stamp;
+  plan.tracks = tracks.get();
+  plan.stop = request.stop;
+  plan.progress = [&](std::uint64_t images) { progress.update(images); };
+
+  RunFacts facts;
+  facts.log = request.log;
+  facts.tracks = request.tracks;
+  facts.mono = !settings.odometry.use_stereo || source->rig().camera_count < 2;
+  const double wall = wallSeconds();
+  const double cpu = processCpuSeconds();
+  facts.finished = runLockstep(*source, *wiring, plan);
+  facts.wall = wallSeconds() - wall;
+  facts.cpu = processCpuSeconds() - cpu;
+  progress.finish();
+  memory.note("grown_in_flight");
+  facts.memory = memory.rows();
+  facts.peak_resident = peakResidentBytes();
+  printWarnings(*source, warned);
+  for (const std::string& line : track_warnings.lines()) fmt::print(stderr, "warning: {}\n", line);
+
+  ReplayResult result;
+  result.finished = facts.finished;
+  result.has_pose = wiring->statistics().first_pose.has_value();
+  result.summary = summaryOf(facts, settings, *source, wiring->statistics());
+  const Trajectory truth = source->groundTruth();
+  if (!truth.empty() && result.has_pose) {
+    result.summary["accuracy"] = runAccuracyJson(request.out, truth, source->groundTruthName(),
+                                                 *wiring->statistics().first_image, settings.evaluation);
+  }
+  writeJson(out / "summary.json", result.summary);
+  return result;
+}
+
+}  // namespace swiftlet

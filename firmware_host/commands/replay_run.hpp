@@ -1,0 +1,40 @@
+#pragma once
+// A replay as a function: log and settings in, run folder and summary out. What `swiftlet replay` and
+// the tests on whole logs call.
+
+#include <atomic>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "drivers/recorded/log_source.hpp"
+#include "firmware_host/settings/settings.hpp"
+
+namespace swiftlet {
+
+struct ReplayRequest {
+  std::string log;
+  std::string out;
+  std::string calibration;      ///< instead of the log's own; empty: the log's
+  std::string imu_calibration;  ///< Kalibr's IMU file where it is not beside the camchain
+  std::string tracks;           ///< file of feature tracks that take the images' place
+  bool mono = false;
+  bool imu_rate = false;
+  double from = 0;              ///< s after the first image
+  std::optional<double> until;  ///< s after the first image
+  std::optional<Stamp> last_stamp;
+  const std::atomic<bool>* stop = nullptr;
+  bool show_progress = false;
+};
+
+struct ReplayResult {
+  nlohmann::ordered_json summary;  ///< as written to summary.json
+  bool finished = true;            ///< false: stopped
+  bool has_pose = false;
+};
+
+/// Creates the run folder and everything in it. InputError for bad input.
+ReplayResult runReplay(const ReplayRequest& request, Settings settings);
+
+}  // namespace swiftlet

@@ -1,0 +1,66 @@
+#pragma once
+// What a run tells its recorder, and what it sums up on the way.
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator/messages/odometry_output.hpp"
+#include "estimator/odometry/pairing.hpp"
+#include "firmware_host/pipeline/stage_timer.hpp"
+
+namespace swiftlet {
+
+/// Called on the executor's thread, in the order of the stream.
+class RunListener {
+ public:
+  RunListener() = default;
+  RunListener(const RunListener&) = delete;
+  RunListener& operator=(const RunListener&) = delete;
+  virtual ~RunListener() = default;
+
+  /// After each frame that was smoothed; `output` also holds events and keyframes that left the window.
+  virtual void onFrame(const TrackedFrame& tracked, const OdometryOutput& output) = 0;
+  /// The state propagated to an IMU sample, when there is one.
+  virtual void onImuState(const NavState& state) = 0;
+  /// At the end: keyframes and events that had not come out yet.
+  virtual void onFinish(const OdometryOutput& output) = 0;
+  /// A remark of the executor, for events.log.
+  virtual void onRemark(Stamp stamp, const std::string& text) = 0;
+};
+
+struct EventTotal {
+  std::uint64_t count = 0;
+  double value = 0;  ///< summed
+};
+
+struct HealthChange {
+  Stamp stamp;
+  Health health = Health::kInitializing;
+  std::uint32_t epoch = 0;
+};
+
+/// Counters of a run. Host side: the lists grow with the number of changes, not of frames.
+struct RunStatistics {
+  std::uint64_t imu_samples = 0;  ///< handed in
+  std::uint64_t imu_refused = 0;
+  std::uint64_t images = 0;  ///< handed to pairing
+  std::uint64_t frames = 0;  ///< frames (pairs or singles) that reached the odometry
+  std::uint64_t frames_refused = 0;
+  std::uint64_t smooth_faults = 0;
+  std::uint64_t keyframes = 0;
+  std::uint64_t poses = 0;  ///< frames with a state
+  std::uint64_t frames_since_first_pose = 0;
+  std::optional<Stamp> first_image;
+  std::optional<Stamp> last_image;
+  std::optional<Stamp> first_pose;
+  PairingCounters pairing;
+  std::map<EventKind, EventTotal> events;
+  std::map<std::string, std::uint64_t> faults;  ///< statuses that were not ok, by their text
+  std::vector<HealthChange> health;
+  StageTable times;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,52 @@
+#pragma once
+// Wall and CPU time of the stages, frames and keyframes apart. Clocks live here, on the host's side:
+// stages read none.
+
+#include <array>
+#include <string_view>
+
+#include "firmware_host/pipeline/latency_histogram.hpp"
+
+namespace swiftlet {
+
+enum class StageId : std::size_t { kSource, kPairing, kImu, kTrack, kSmooth, kFrameTotal, kCount };
+
+/// "source", "pairing", "imu", "track", "smooth", "frame_total".
+std::string_view stageName(StageId stage);
+
+struct StageTimes {
+  LatencyHistogram frames;     ///< wall, frames that are no keyframes (and what belongs to no frame)
+  LatencyHistogram keyframes;  ///< wall
+  double cpu_frames = 0;       ///< s of this thread, summed
+  double cpu_keyframes = 0;    ///< s
+};
+
+using StageTable = std::array<StageTimes, static_cast<std::size_t>(StageId::kCount)>;
+
+double wallSeconds();        ///< monotonic
+double threadCpuSeconds();   ///< this thread
+double processCpuSeconds();  ///< all threads
+
+/// What one call took.
+struct Spent {
+  double wall = 0;
+  double cpu = 0;
+  Spent& operator+=(const Spent& other) {
+    wall += other.wall;
+    cpu += other.cpu;
+    return *this;
+  }
+};
+
+/// Runs `work` and measures it.
+template <typename Work>
+Spent measured(Work&& work) {
+  const double wall = wallSeconds();
+  const double cpu = threadCpuSeconds();
+  work();
+  return {wallSeconds() - wall, threadCpuSeconds() - cpu};
+}
+
+void addTime(StageTable& table, StageId stage, const Spent& spent, bool keyframe = false);
+
+}  // namespace swiftlet

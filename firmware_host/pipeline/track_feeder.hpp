@@ -1,0 +1,45 @@
+#pragma once
+// Feature tracks from a file as the front-end would hand them over: with keyframes chosen, and the
+// median motion since the previous frame.
+//
+// Keyframe rule (the front-end's, on raw pixels): the first frame; then, not before 0.14 s, when less
+// than 0.7 of the last keyframe's tracks are left or their median motion passes 20 px (rotation is not
+// removed here, so the bar is higher); at the latest after 1 s.
+
+#include <map>
+
+#include "drivers/recorded/track_file.hpp"
+#include "estimator/messages/tracked_frame.hpp"
+
+namespace swiftlet {
+
+class TrackFeeder {
+ public:
+  /// Null: there is no file, nothing is ever due.
+  explicit TrackFeeder(TrackReader* reader);
+
+  /// The next frame if its stamp is earlier than `stamp`; valid until take().
+  const TrackedFrame* dueBefore(Stamp stamp);
+  void take() { ready_ = false; }
+
+  /// Sightings beyond kMaxFeatures in a frame, left out.
+  [[nodiscard]] std::uint64_t surplus() const { return surplus_; }
+
+ private:
+  using Pixels = std::map<TrackId, Eigen::Vector2f>;  ///< in camera 0, else camera 1
+
+  bool read();
+  void chooseKeyframe(const Pixels& now);
+
+  TrackReader* reader_;
+  TrackRecord record_;
+  TrackedFrame frame_;
+  bool ready_ = false;
+  std::uint64_t next_index_ = 0;
+  std::uint64_t surplus_ = 0;
+  Pixels previous_;
+  Pixels keyframe_;
+  Stamp keyframe_stamp_;
+};
+
+}  // namespace swiftlet

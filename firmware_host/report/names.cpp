@@ -1,0 +1,55 @@
+#include "firmware_host/report/names.hpp"
+
+namespace swiftlet {
+
+std::string_view healthName(Health health) {
+  switch (health) {
+    case Health::kInitializing:
+      return "initializing";
+    case Health::kGood:
+      return "good";
+    case Health::kDegraded:
+      return "degraded";
+    case Health::kFailed:
+      return "failed";
+  }
+  return "unknown";
+}
+
+std::string_view eventName(EventKind kind) {
+  switch (kind) {
+    case EventKind::kImuGap:
+      return "imu_gap";
+    case EventKind::kImuSaturated:
+      return "imu_saturated";
+    case EventKind::kImuInvalid:
+      return "imu_invalid";
+    case EventKind::kFrameDropped:
+      return "frame_dropped";
+    case EventKind::kFrameUnpaired:
+      return "frame_unpaired";
+    case EventKind::kCameraLost:
+      return "camera_lost";
+    case EventKind::kCameraBack:
+      return "camera_back";
+    case EventKind::kBlackoutStarted:
+      return "blackout_started";
+    case EventKind::kBlackoutEnded:
+      return "blackout_ended";
+    case EventKind::kRestStarted:
+      return "rest_started";
+    case EventKind::kRestEnded:
+      return "rest_ended";
+    case EventKind::kInitialized:
+      return "initialized";
+    case EventKind::kHealthChanged:
+      return "health_changed";
+    case EventKind::kReset:
+      return "reset";
+    case EventKind::kCapacityReached:
+      return "capacity_reached";
+  }
+  return "unknown";
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,33 @@
+#pragma once
+// Writes the files of a run folder that grow while the run goes on: odometry.tum, imu_rate.tum (on
+// request), states.csv, events.log. Lines go out as they come, in constant memory.
+
+#include <optional>
+#include <string>
+
+#include "firmware_host/pipeline/run_listener.hpp"
+#include "firmware_host/report/line_file.hpp"
+
+namespace swiftlet {
+
+class RunRecorder : public RunListener {
+ public:
+  /// Creates the folder (its parents too). Files of an earlier run in it are replaced.
+  RunRecorder(const std::string& folder, bool imu_rate);
+
+  void onFrame(const TrackedFrame& tracked, const OdometryOutput& output) override;
+  void onImuState(const NavState& state) override;
+  void onFinish(const OdometryOutput& output) override;
+  void onRemark(Stamp stamp, const std::string& text) override;
+
+ private:
+  void writeEvents(const OdometryOutput& output);
+  void writeKeyframes(const OdometryOutput& output);
+
+  std::optional<LineFile> odometry_;
+  std::optional<LineFile> imu_rate_;
+  std::optional<LineFile> states_;
+  std::optional<LineFile> events_;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,33 @@
+#pragma once
+// states.csv: one row per keyframe, when it leaves the window or at the end of the run.
+//
+// The first 17 columns are those of EuRoC's ground truth (stamp, p, q wxyz, v, gyro bias, accel bias),
+// so every reader of such files takes it. Then the covariance's diagonal in the order phi, p, v, bg, ba
+// (rad^2, m^2, (m/s)^2, ...), the upper triangle of the 6 x 6 pose block (phi, p) row by row without
+// its diagonal, health, epoch, and the keyframe's figures.
+
+#include <string>
+#include <vector>
+
+#include "estimator/messages/odometry_output.hpp"
+#include "firmware_host/evaluation/consistency.hpp"
+
+namespace swiftlet {
+
+/// The header line, beginning with '#'.
+std::string statesHeader();
+
+/// One row without line end; numbers in full precision.
+std::string statesRow(const KeyframeState& keyframe);
+
+/// What evaluation needs of a row.
+struct StoredState {
+  Stamp stamp;
+  SE3 T_world_body;
+  Matrix6d covariance = Matrix6d::Zero();  ///< of (phi, p)
+};
+
+/// Reads a states.csv in time order; InputError names file and line.
+std::vector<StoredState> readStates(const std::string& path);
+
+}  // namespace swiftlet

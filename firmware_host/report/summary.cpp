@@ -1,0 +1,195 @@
+#include "firmware_host/report/summary.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Core>
+
+#include "drivers/recorded/trajectory_file.hpp"
+#include "firmware_host/report/line_file.hpp"
+#include "firmware_host/report/names.hpp"
+#include "firmware_host/settings/registry.hpp"
+
+namespace swiftlet {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kMilli = 1e3;
+constexpr double kMebibyte = 1024.0 * 1024.0;
+
+Json settingsJson(const Settings& settings) {
+  Settings copy = settings;
+  Json json;
+  for (const Setting& setting : settingsRegistry()) {
+    std::visit([&](const auto& kind) { json[std::string(setting.key)] = kind.value(copy); }, setting.kind);
+  }
+  return json;
+}
+
+Json stampJson(const std::optional<Stamp>& stamp) { return stamp ? Json(stamp->ns) : Json(nullptr); }
+
+double sinceFirstImage(const RunStatistics& statistics, Stamp stamp) {
+  return statistics.first_image ? (stamp - *statistics.first_image).seconds() : 0;
+}
+
+Json healthJson(const RunStatistics& statistics) {
+  Json history = Json::array();
+  for (const HealthChange& change : statistics.health) {
+    history.push_back({{"stamp_ns", change.stamp.ns},
+                       {"t_s", sinceFirstImage(statistics, change.stamp)},
+                       {"health", healthName(change.health)},
+                       {"epoch", change.epoch}});
+  }
+  return history;
+}
+
+Json countersJson(const LogSource& source, const RunStatistics& statistics) {
+  const LogCounters& log = source.counters();
+  Json json;
+  json["log"] = {{"imu_samples", log.imu_samples},
+                 {"images", log.images},
+                 {"bad_rows", log.bad_rows},
+                 {"nan_rows", log.nan_rows},
+                 {"out_of_order", log.out_of_order},
+                 {"repeated_stamps", log.repeated_stamps},
+                 {"missing_images", log.missing_images},
+                 {"damaged_images", log.damaged_images}};
+  json["pairing"] = {{"images", statistics.images},
+                     {"pairs", statistics.pairing.pairs},
+                     {"unpaired", statistics.pairing.unpaired},
+                     {"refused", statistics.pairing.refused}};
+  json["odometry"] = {
+      {"imu_samples", statistics.imu_samples},
+      {"imu_refused", statistics.imu_refused},
+      {"frames", statistics.frames},
+      {"frames_refused", statistics.frames_refused},
+      {"smooth_faults", statistics.smooth_faults},
+      {"keyframes", statistics.keyframes},
+      {"poses", statistics.poses},
+      {"frames_without_pose_after_first", statistics.frames_since_first_pose - statistics.poses}};
+  json["events"] = Json::object();
+  for (const auto& [kind, total] : statistics.events) {
+    json["events"][std::string(eventName(kind))] = {{"count", total.count}, {"value_sum", total.value}};
+  }
+  json["faults"] = Json::object();
+  for (const auto& [text, count] : statistics.faults) json["faults"][text] = count;
+  return json;
+}
+
+Json latencyJson(const LatencyHistogram& histogram, double cpu) {
+  constexpr double kMedian = 0.5;
+  constexpr double kP90 = 0.9;
+  constexpr double kP99 = 0.99;
+  return {{"count", histogram.count()},
+          {"mean_ms", histogram.mean() * kMilli},
+          {"p50_ms", histogram.percentile(kMedian) * kMilli},
+          {"p90_ms", histogram.percentile(kP90) * kMilli},
+          {"p99_ms", histogram.percentile(kP99) * kMilli},
+          {"max_ms", histogram.max() * kMilli},
+          {"wall_s", histogram.total()},
+          {"cpu_s", cpu}};
+}
+
+Json timingJson(const StageTable& table) {
+  Json json;
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const StageTimes& times = table[i];
+    if (times.frames.count() + times.keyframes.count() == 0) continue;
+    Json stage;
+    const auto id = static_cast<StageId>(i);
+    const bool splits = id == StageId::kTrack || id == StageId::kSmooth || id == StageId::kFrameTotal;
+    stage[splits ? "frames" : "all"] = latencyJson(times.frames, times.cpu_frames);
+    if (splits) stage["keyframes"] = latencyJson(times.keyframes, times.cpu_keyframes);
+    json[std::string(stageName(id))] = stage;
+  }
+  return json;
+}
+
+Json runJson(const RunFacts& facts, const RunStatistics& statistics) {
+  Json json;
+  json["log"] = facts.log;
+  if (!facts.tracks.empty()) json["tracks"] = facts.tracks;
+  json["cameras"] = facts.mono ? 1 : 2;
+  json["finished"] = facts.finished;
+  json["first_image_ns"] = stampJson(statistics.first_image);
+  json["last_image_ns"] = stampJson(statistics.last_image);
+  json["first_pose_ns"] = stampJson(statistics.first_pose);
+  json["time_to_first_pose_s"] =
+      statistics.first_pose ? Json(sinceFirstImage(statistics, *statistics.first_pose)) : Json(nullptr);
+  const double frames = static_cast<double>(statistics.frames);
+  json["tracking_coverage"] = statistics.frames == 0 ? 0.0 : static_cast<double>(statistics.poses) / frames;
+  return json;
+}
+
+}  // namespace
+
+Json versionJson() {
+  Json json;
+  json["swiftlet"] = SWIFTLET_VERSION;
+  json["compiler"] = __VERSION__;
+  json["build_type"] = SWIFTLET_BUILD_TYPE;
+  json["cpu"] = SWIFTLET_BUILD_CPU;
+  json["eigen"] = fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION);
+  return json;
+}
+
+std::string versionText() {
+  return fmt::format("swiftlet {} ({}, {}, g++ {})", SWIFTLET_VERSION, SWIFTLET_BUILD_TYPE,
+                     SWIFTLET_BUILD_CPU, __VERSION__);
+}
+
+Json summaryOf(const RunFacts& facts, const Settings& settings, const LogSource& source,
+               const RunStatistics& statistics) {
+  const double flown = statistics.first_image && statistics.last_image
+                           ? (*statistics.last_image - *statistics.first_image).seconds()
+                           : 0;
+  Json json;
+  json["version"] = versionJson();
+  json["run"] = runJson(facts, statistics);
+  json["calibration"] = source.calibration().form;
+  json["settings"] = settingsJson(settings);
+  json["health"] = healthJson(statistics);
+  json["counters"] = countersJson(source, statistics);
+  json["warnings"] = source.warnings();
+  json["timing"] = timingJson(statistics.times);
+  json["cpu"] = {{"flight_s", flown},
+                 {"wall_s", facts.wall},
+                 {"cpu_s", facts.cpu},
+                 {"real_time_factor", facts.wall > 0 ? flown / facts.wall : 0},
+                 {"cpu_per_flight_second", flown > 0 ? facts.cpu / flown : 0}};
+  Json table = Json::object();
+  for (const MemoryRow& row : facts.memory) table[row.what] = row.bytes;
+  json["memory"] = {{"peak_resident_bytes", facts.peak_resident}, {"table_bytes", table}};
+  return json;
+}
+
+std::string summaryText(const Json& summary) {
+  const Json& odometry = summary["counters"]["odometry"];
+  std::string text =
+      fmt::format("{} frames, {} keyframes, {} poses", odometry["frames"].get<std::uint64_t>(),
+                  odometry["keyframes"].get<std::uint64_t>(), odometry["poses"].get<std::uint64_t>());
+  const Json& first = summary["run"]["time_to_first_pose_s"];
+  text += first.is_null() ? std::string(", no pose\n")
+                          : fmt::format(", the first {:.3f} s after the first image\n", first.get<double>());
+  const Json& cpu = summary["cpu"];
+  text += fmt::format(
+      "{:.1f} s of flight in {:.2f} s ({:.2f} s of CPU, {:.3f} per second of flight), peak "
+      "memory {:.1f} MiB\n",
+      cpu["flight_s"].get<double>(), cpu["wall_s"].get<double>(), cpu["cpu_s"].get<double>(),
+      cpu["cpu_per_flight_second"].get<double>(),
+      static_cast<double>(summary["memory"]["peak_resident_bytes"].get<std::int64_t>()) / kMebibyte);
+  for (const auto& [stage, times] : summary["timing"].items()) {
+    for (const auto& [kind, t] : times.items()) {
+      if (t["count"].get<std::uint64_t>() == 0) continue;
+      text +=
+          fmt::format("  {:<12}{:<10} {:>7} times  mean {:8.3f} ms  p50 {:8.3f}  p99 {:8.3f}  max {:8.3f}\n",
+                      stage, kind, t["count"].get<std::uint64_t>(), t["mean_ms"].get<double>(),
+                      t["p50_ms"].get<double>(), t["p99_ms"].get<double>(), t["max_ms"].get<double>());
+    }
+  }
+  return text;
+}
+
+void writeJson(const std::string& path, const Json& json) { LineFile(path).write(json.dump(2)); }
+
+}  // namespace swiftlet

@@ -1,0 +1,48 @@
+#pragma once
+// summary.json of a run: versions, input, settings, health history, counters, latency per stage, CPU
+// time, memory and, when the log has truth, accuracy.
+//
+// Everything but "timing", "cpu" and "memory" is a function of log, settings and program: two runs give
+// the same bytes there.
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "drivers/recorded/log_source.hpp"
+#include "firmware_host/pipeline/run_listener.hpp"
+#include "firmware_host/settings/settings.hpp"
+
+namespace swiftlet {
+
+struct MemoryRow {
+  std::string what;
+  std::int64_t bytes = 0;
+};
+
+struct RunFacts {
+  std::string log;
+  std::string tracks;  ///< file of feature tracks; empty when images were used
+  bool mono = false;
+  bool finished = true;  ///< false: stopped by the user
+  double wall = 0;       ///< s of the run, reading included
+  double cpu = 0;        ///< s, all threads
+  std::int64_t peak_resident = 0;
+  std::vector<MemoryRow> memory;
+};
+
+/// Without accuracy: the caller adds it under "accuracy".
+nlohmann::ordered_json summaryOf(const RunFacts& facts, const Settings& settings, const LogSource& source,
+                                 const RunStatistics& statistics);
+
+/// The summary in a few lines for the terminal.
+std::string summaryText(const nlohmann::ordered_json& summary);
+
+/// Writes pretty-printed JSON; InputError when that fails.
+void writeJson(const std::string& path, const nlohmann::ordered_json& json);
+
+/// Version, compiler and build flags.
+nlohmann::ordered_json versionJson();
+std::string versionText();
+
+}  // namespace swiftlet

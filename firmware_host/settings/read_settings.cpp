@@ -1,0 +1,149 @@
+#include "firmware_host/settings/read_settings.hpp"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/settings/registry.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr const char* kListThem = "`swiftlet settings` prints all keys with their ranges";
+
+/// Where a value came from.
+struct Place {
+  std::string file;
+  int line = 0;
+};
+
+[[noreturn]] void failAt(const Place& place, std::string_view key, const std::string& message,
+                         const std::string& remedy) {
+  throw InputError(place.file, place.line, std::string(key), message, remedy);
+}
+
+const Setting& settingAt(const Place& place, std::string_view key) {
+  if (const Setting* setting = findSetting(key)) return *setting;
+  const std::string_view nearest = nearestSetting(key);
+  failAt(place, key, "unknown setting",
+         nearest.empty() ? std::string(kListThem) : fmt::format("Did you mean `{}`? {}", nearest, kListThem));
+}
+
+template <typename Value>
+Value parsed(const Place& place, const Setting& setting, const YAML::Node& node) {
+  Value value{};
+  if (!node.IsScalar() || !YAML::convert<Value>::decode(node, value)) {
+    const std::string found = node.IsScalar() ? fmt::format("`{}`", node.Scalar()) : "a list, map or nothing";
+    failAt(place, setting.key, fmt::format("{} is not a value this setting takes", found),
+           "Allowed: " + rangeText(setting));
+  }
+  return value;
+}
+
+void assign(const Place& place, const Setting& setting, const YAML::Node& node, Settings& settings) {
+  if (const auto* toggle = std::get_if<SwitchSetting>(&setting.kind)) {
+    toggle->value(settings) = parsed<bool>(place, setting, node);
+    return;
+  }
+  const auto bounded = [&](const auto& kind, auto value) {
+    // NaN fails both comparisons and must not pass.
+    if (!(value >= kind.low && value <= kind.high)) {
+      failAt(place, setting.key, fmt::format("{} is outside the allowed range", value),
+             "Allowed: " + rangeText(setting));
+    }
+    kind.value(settings) = value;
+  };
+  if (const auto* whole = std::get_if<IntegerSetting>(&setting.kind)) {
+    bounded(*whole, parsed<int>(place, setting, node));
+  } else {
+    bounded(std::get<RealSetting>(setting.kind), parsed<double>(place, setting, node));
+  }
+}
+
+void readGroup(const std::string& file, const YAML::Node& node, const std::string& prefix,
+               Settings& settings) {
+  std::set<std::string> seen;
+  for (const auto& entry : node) {
+    const Place place{file, entry.first.Mark().line + 1};
+    const std::string key = prefix + entry.first.Scalar();
+    if (!seen.insert(key).second) failAt(place, key, "given twice", "Remove one of the two lines");
+    if (entry.second.IsMap()) {
+      readGroup(file, entry.second, key + ".", settings);
+    } else if (entry.second.IsNull() && findSetting(key) == nullptr) {
+      continue;  // a group with all of its lines commented out
+    } else {
+      assign(place, settingAt(place, key), entry.second, settings);
+    }
+  }
+}
+
+std::string groupOf(std::string_view key) { return std::string(key.substr(0, key.find('.'))); }
+
+}  // namespace
+
+void readSettingsText(const std::string& name, std::string_view text, Settings& settings) {
+  YAML::Node root;
+  try {
+    root = YAML::Load(std::string(text));
+  } catch (const YAML::Exception& error) {
+    throw InputError(name, error.mark.line + 1, "", "not valid YAML (" + error.msg + ")",
+                     "Compare with what `swiftlet settings` prints");
+  }
+  if (root.IsNull()) return;
+  if (!root.IsMap()) {
+    throw InputError(name, 1, "", "the file is not a tree of `group:` and `name: value` lines",
+                     "Compare with what `swiftlet settings` prints");
+  }
+  Settings changed = settings;
+  readGroup(name, root, "", changed);
+  settings = changed;
+}
+
+void readSettingsFile(const std::string& path, Settings& settings) {
+  std::ifstream file(path);
+  if (!file) {
+    throw InputError(path, 0, "", "the settings file cannot be opened",
+                     "Write one with `swiftlet settings > settings.yaml`");
+  }
+  std::ostringstream text;
+  text << file.rdbuf();
+  readSettingsText(path, text.str(), settings);
+}
+
+void overrideSetting(std::string_view assignment, Settings& settings) {
+  const std::size_t equals = assignment.find('=');
+  const Place place{fmt::format("--set {}", assignment), 0};
+  if (equals == std::string_view::npos) {
+    failAt(place, "", "no `=` in it", "Write --set group.name=value");
+  }
+  const std::string_view key = assignment.substr(0, equals);
+  const YAML::Node value(std::string(assignment.substr(equals + 1)));
+  Settings changed = settings;
+  assign(place, settingAt(place, key), value, changed);
+  settings = changed;
+}
+
+std::string printSettings(const Settings& settings, bool explain) {
+  const Settings defaults;
+  std::string text;
+  std::string group;
+  for (const Setting& setting : settingsRegistry()) {
+    if (groupOf(setting.key) != group) {
+      group = groupOf(setting.key);
+      text += fmt::format("{}{}:\n", text.empty() ? "" : "\n", group);
+    }
+    if (explain) {
+      text += fmt::format("  # {}\n  # Range: {}; default {}.\n", setting.doc, rangeText(setting),
+                          valueText(setting, defaults));
+    }
+    text += fmt::format("  {}: {}\n", setting.key.substr(group.size() + 1), valueText(setting, settings));
+  }
+  return text;
+}
+
+}  // namespace swiftlet

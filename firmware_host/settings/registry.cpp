@@ -1,0 +1,138 @@
+#include "firmware_host/settings/registry.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <vector>
+
+#include "estimator/core/limits.hpp"
+
+namespace swiftlet {
+namespace {
+
+/// settings.*group.*member, as one callable.
+template <typename Group, typename Value>
+auto member(Group Settings::*group, Value Group::*value) {
+  return [group, value](Settings& settings) -> Value& { return settings.*group.*value; };
+}
+
+template <typename Group>
+IntegerSetting integer(Group Settings::*group, int Group::*value, int low, int high) {
+  return {member(group, value), low, high};
+}
+
+template <typename Group>
+RealSetting real(Group Settings::*group, double Group::*value, double low, double high) {
+  return {member(group, value), low, high};
+}
+
+template <typename Group>
+SwitchSetting onOff(Group Settings::*group, bool Group::*value) {
+  return {member(group, value)};
+}
+
+std::vector<Setting> makeRegistry() {
+  using O = OdometrySettings;
+  constexpr auto kOdometry = &Settings::odometry;
+  constexpr int kFeatures = static_cast<int>(kMaxFeatures);
+  return {
+      {"frontend.max_features", "", "Features tracked at once; a landmark seen by both cameras counts once.",
+       integer(kOdometry, &O::max_features, 20, kFeatures)},
+      {"frontend.use_stereo", "", "Use the second camera; false: camera 0 alone, scale from the IMU.",
+       onOff(kOdometry, &O::use_stereo)},
+      {"smoother.horizon", "s", "Fixed lag: no state older than this stays in the window.",
+       real(kOdometry, &O::horizon, 0.5, 60)},
+      {"smoother.pixel_sigma", "px", "Noise of one tracked coordinate, 1 sigma.",
+       real(kOdometry, &O::pixel_sigma, 0.05, 10)},
+      {"smoother.estimate_time_offset", "", "Estimate the offset between camera and IMU clocks in flight.",
+       onOff(kOdometry, &O::estimate_time_offset)},
+      {"smoother.estimate_extrinsics", "", "Estimate how the cameras sit on the IMU in flight.",
+       onOff(kOdometry, &O::estimate_extrinsics)},
+      {"imu.inflation", "",
+       "Factor on the calibration's noise densities, for vibration, scale and misalignment.",
+       real(kOdometry, &O::imu_inflation, 0.1, 100)},
+      {"effort.iterations", "", "Gauss-Newton iterations a frame may spend.",
+       integer(&Settings::effort, &Effort::iterations, 1, 20)},
+      {"effort.features", "",
+       "Features a frame may spend; the smaller of this and frontend.max_features counts.",
+       integer(&Settings::effort, &Effort::features, 20, kFeatures)},
+      {"pairing.tolerance_ms", "ms",
+       "Largest difference of stamps within a stereo pair; never more than a quarter of the frame interval.",
+       real(&Settings::pairing, &PairingGroup::tolerance_ms, 0, 50)},
+      {"pairing.patience_ms", "ms", "Longest wait for the other camera's frame before one goes on alone.",
+       real(&Settings::pairing, &PairingGroup::patience_ms, 1, 1000)},
+      {"calibration.accept_unusual_rig", "",
+       "Take a rig whose geometry looks like a transform read the wrong way round.",
+       onOff(&Settings::calibration, &CalibrationGroup::accept_unusual_rig)},
+      {"evaluation.max_gap_ms", "ms", "Truth is interpolated between poses at most this far apart.",
+       real(&Settings::evaluation, &EvaluationGroup::max_gap_ms, 0.1, 1000)},
+      {"evaluation.rpe_delta_s", "s", "Interval of the relative pose error over time.",
+       real(&Settings::evaluation, &EvaluationGroup::rpe_delta_s, 0.05, 600)},
+  };
+}
+
+/// Levenshtein distance.
+std::size_t editDistance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t above = row[j];
+      row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0U : 1U)});
+      diagonal = above;
+    }
+  }
+  return row[b.size()];
+}
+
+std::string_view lastPart(std::string_view key) { return key.substr(key.rfind('.') + 1); }
+
+}  // namespace
+
+std::span<const Setting> settingsRegistry() {
+  static const std::vector<Setting> kRegistry = makeRegistry();
+  return kRegistry;
+}
+
+const Setting* findSetting(std::string_view key) {
+  const auto registry = settingsRegistry();
+  const auto found = std::ranges::find(registry, key, &Setting::key);
+  return found == registry.end() ? nullptr : &*found;
+}
+
+std::string_view nearestSetting(std::string_view key) {
+  std::string_view best;
+  // Beyond half the name wrong, a suggestion is noise.
+  std::size_t best_distance = key.size() / 2 + 1;
+  for (const Setting& setting : settingsRegistry()) {
+    // The right name in the wrong group is nearer than any misspelling.
+    const std::size_t distance = lastPart(key) == lastPart(setting.key) ? 1 : editDistance(key, setting.key);
+    if (distance < best_distance) {
+      best = setting.key;
+      best_distance = distance;
+    }
+  }
+  return best;
+}
+
+std::string valueText(const Setting& setting, const Settings& settings) {
+  // The accessors give references that may be written through; nothing is written here.
+  Settings copy = settings;
+  return std::visit([&](const auto& kind) { return fmt::format("{}", kind.value(copy)); }, setting.kind);
+}
+
+std::string rangeText(const Setting& setting) {
+  if (std::holds_alternative<SwitchSetting>(setting.kind)) return "true or false";
+  const std::string unit = setting.unit.empty() ? "" : " " + std::string(setting.unit);
+  if (const auto* whole = std::get_if<IntegerSetting>(&setting.kind)) {
+    return fmt::format("whole number, {} to {}{}", whole->low, whole->high, unit);
+  }
+  const auto& number = std::get<RealSetting>(setting.kind);
+  return fmt::format("{} to {}{}", number.low, number.high, unit);
+}
+
+}  // namespace swiftlet

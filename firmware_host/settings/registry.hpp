@@ -1,0 +1,52 @@
+#pragma once
+// Every setting by name: key, unit, explanation, bounds, and where it lives in the tree.
+
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "firmware_host/settings/settings.hpp"
+
+namespace swiftlet {
+
+struct IntegerSetting {
+  std::function<int&(Settings&)> value;
+  int low = 0;
+  int high = 0;
+};
+
+struct RealSetting {
+  std::function<double&(Settings&)> value;
+  double low = 0;
+  double high = 0;
+};
+
+struct SwitchSetting {
+  std::function<bool&(Settings&)> value;
+};
+
+struct Setting {
+  std::string_view key;   ///< "group.name", as in YAML and on the command line
+  std::string_view unit;  ///< empty for pure numbers
+  std::string_view doc;   ///< one or two sentences
+  std::variant<IntegerSetting, RealSetting, SwitchSetting> kind;
+};
+
+/// All settings; those of one group stand together.
+std::span<const Setting> settingsRegistry();
+
+/// The setting called `key`, or null.
+const Setting* findSetting(std::string_view key);
+
+/// The key that `key` was most likely meant to be; empty when nothing is near.
+std::string_view nearestSetting(std::string_view key);
+
+/// The value as YAML text; numbers in the shortest form that reads back to the same value.
+std::string valueText(const Setting& setting, const Settings& settings);
+
+/// What values are allowed, in words: "0.5 to 30 s", "true or false".
+std::string rangeText(const Setting& setting);
+
+}  // namespace swiftlet

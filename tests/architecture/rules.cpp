@@ -1,0 +1,170 @@
+#include "tests/architecture/rules.hpp"
+
+#include <filesystem>
+#include <regex>
+#include <utility>
+
+namespace swiftlet::architecture {
+namespace {
+
+/// Direct neighbours; the table closes over them.
+RoomTable directNeighbours() {
+  const std::set<std::string> world = {"estimator/camera", "estimator/messages"};
+  RoomTable table = {
+      {"estimator/core", {}},
+      {"estimator/geometry", {"estimator/core"}},
+      {"estimator/camera", {"estimator/geometry"}},
+      {"estimator/messages", {"estimator/geometry"}},
+      {"estimator/imu", {"estimator/messages"}},
+      {"estimator/frontend", {"estimator/camera", "estimator/imu", "estimator/messages"}},
+      {"estimator/smoother", {"estimator/camera", "estimator/imu", "estimator/messages"}},
+      {"estimator/odometry", {"estimator/frontend", "estimator/smoother"}},
+      {"mesher", world},
+      {"mapping/depth", world},
+      {"mapping/volume", world},
+      {"mapping/surface", {"mapping/volume"}},
+      {"mapping/distance", {"mapping/volume"}},
+      {"mapping/place", world},
+      {"mapping/pose_graph", world},
+  };
+  for (const char* driver : {"calibration", "recorded", "simulated", "v4l2", "serial", "can", "gpio",
+                             "timesync", "mavlink", "dds"}) {
+    table[std::string("drivers/") + driver] = {"estimator/camera", "estimator/messages", "estimator/imu"};
+  }
+  // Both read and write calibration as users have it.
+  table["drivers/recorded"].insert("drivers/calibration");
+  table["drivers/simulated"].insert("drivers/calibration");
+  return table;
+}
+
+RoomTable closed(RoomTable table) {
+  for (bool grew = true; grew;) {
+    grew = false;
+    for (auto& [room, known] : table) {
+      const std::set<std::string> before = known;
+      for (const std::string& neighbour : before) {
+        known.insert(table.at(neighbour).begin(), table.at(neighbour).end());
+      }
+      grew = grew || known.size() != before.size();
+    }
+  }
+  std::set<std::string> all;
+  for (const auto& [room, known] : table) all.insert(room);
+  table["firmware_host"] = all;
+  all.insert("firmware_host");
+  table["tests"] = all;
+  return table;
+}
+
+struct Pattern {
+  std::regex expression;
+  const char* what;
+};
+
+/// Each line's first match of each pattern.
+std::vector<Violation> matchLines(const std::string& path, const std::vector<std::string>& lines,
+                                  const std::vector<Pattern>& patterns) {
+  std::vector<Violation> found;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    for (const Pattern& pattern : patterns) {
+      if (std::regex_search(lines[i], pattern.expression)) found.push_back({path, i + 1, pattern.what});
+    }
+  }
+  return found;
+}
+
+}  // namespace
+
+const RoomTable& roomTable() {
+  static const RoomTable kTable = closed(directNeighbours());
+  return kTable;
+}
+
+std::vector<Violation> checkIncludeDirections(const SourceFile& file) {
+  static const std::regex kInclude(R"re(^\s*#\s*include\s+"([^"]+)")re");
+  std::vector<Violation> found;
+  const std::string room = file.room();
+  const auto known = roomTable().find(room);
+  if (known == roomTable().end()) return {{file.path, 0, "room '" + room + "' is not in the table"}};
+  for (std::size_t i = 0; i < file.code_lines.size(); ++i) {
+    std::smatch match;
+    if (!std::regex_search(file.code_lines[i], match, kInclude)) continue;
+    const std::string target = match[1];
+    const std::string target_room = SourceFile{target, {}, {}}.room();
+    if (!roomTable().contains(target_room)) {
+      found.push_back({file.path, i + 1, "include \"" + target + "\" by its path from the project's root"});
+    } else if (target_room != room && !known->second.contains(target_room)) {
+      found.push_back({file.path, i + 1, room + " must not know " + target_room + " (" + target + ")"});
+    }
+  }
+  return found;
+}
+
+std::vector<Violation> checkFlightPath(const SourceFile& file) {
+  static const std::vector<Pattern> kPatterns = {
+      {std::regex(
+           R"(#\s*include\s*<(mutex|shared_mutex|condition_variable|semaphore|future|latch|barrier)>)"),
+       "locks and blocking waits are not for the flight path"},
+      {std::regex(R"(#\s*include\s*<thread>)"), "stages own no thread"},
+      {std::regex(R"(#\s*include\s*<(chrono|ctime|time\.h|sys/time\.h)>)"),
+       "stages read no clock: time is data"},
+      {std::regex(R"(#\s*include\s*<(fstream|iostream|filesystem|cstdio|stdio\.h)>)"),
+       "stages open no file and print nothing"},
+      {std::regex(R"(#\s*include\s*<unordered_(map|set)>|\bstd::unordered_)"),
+       "iteration over unordered containers is not deterministic"},
+      {std::regex(R"(#\s*include\s*<opencv)"), "OpenCV is for tests, not for the estimator"},
+      {std::regex(R"(#\s*include\s*<(random)>|\brand\s*\()"), "use swiftlet::Random: same bytes everywhere"},
+      {std::regex(R"(\b(throw|catch|try)\b)"), "faults are values: return a Status"},
+      // Placement new is written `new (where) T` and allocates nothing.
+      {std::regex(R"(\bnew\b(?!\s*\())"), "no naked new: own memory in the constructor"},
+      {std::regex(R"(\bdelete\b(?!\s*[;,]))"), "no naked delete: own memory in the constructor"},
+      {std::regex(R"(\b(malloc|calloc|realloc|free|alloca)\s*\()"), "no heap calls"},
+      {std::regex(R"(\b(abort|exit|terminate)\s*\()"), "never an abort in flight"},
+  };
+  return matchLines(file.path, file.code_lines, kPatterns);
+}
+
+std::vector<Violation> checkHeaderOpening(const SourceFile& file) {
+  if (file.lines.empty() || file.lines[0] != "#pragma once") {
+    return {{file.path, 1, "a header's first line is #pragma once"}};
+  }
+  if (file.lines.size() < 2 || !file.lines[1].starts_with("// ")) {
+    return {{file.path, 2, "a header's second line begins the comment that says what it is"}};
+  }
+  return {};
+}
+
+std::vector<Violation> checkLength(const SourceFile& file, std::size_t limit) {
+  if (file.lines.size() <= limit) return {};
+  return {{file.path, file.lines.size(),
+           std::to_string(file.lines.size()) + " lines, at most " + std::to_string(limit) + " are readable"}};
+}
+
+std::vector<Violation> checkText(const SourceFile& file) {
+  // Split so that this file does not break its own rule.
+  static const std::vector<Pattern> kPatterns = {
+      {std::regex("(^|[^A-Za-z0-9_.}])/(ho"
+                  "me|wo"
+                  "rk|ro"
+                  "ot|t"
+                  "mp|Us"
+                  "ers|m"
+                  "nt)/"),
+       "a path of one machine: take it from an option, the environment or the project's root"},
+      {std::regex("\\b(TO"
+                  "DO|FIX"
+                  "ME|XX"
+                  "X)\\b"),
+       "work left undone belongs in an issue"},
+  };
+  return matchLines(file.path, file.lines, kPatterns);
+}
+
+std::vector<Violation> checkNamedInList(const SourceFile& file, const std::string& list) {
+  const std::string name = std::filesystem::path(file.path).filename().string();
+  const std::string::size_type at = list.find(name);
+  if (at != std::string::npos) return {};
+  return {{file.path, 0, "no CMakeLists.txt above it names this source: it is never built"}};
+}
+
+}  // namespace swiftlet::architecture

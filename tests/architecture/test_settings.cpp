@@ -1,0 +1,91 @@
+// Every setting can be set and is explained: members of the settings structs, the registry and the
+// user's page name the same things.
+#include <catch2/catch.hpp>
+#include <cctype>
+#include <regex>
+#include <set>
+
+#include "firmware_host/settings/registry.hpp"
+#include "tests/architecture/source_tree.hpp"
+
+using namespace swiftlet::architecture;  // NOLINT(google-build-using-namespace)
+
+namespace {
+
+/// Names of the initialised members of struct `name` in a header.
+std::set<std::string> membersOf(const std::string& path, const std::string& name) {
+  const SourceFile file = parseSource(path, readWhole(projectRoot() / path));
+  std::set<std::string> members;
+  bool inside = false;
+  static const std::regex kMember(R"(^\s+(?:int|double|bool)\s+([a-z0-9_]+)\s*=)");
+  for (const std::string& line : file.code_lines) {
+    if (line.starts_with("struct " + name)) inside = true;
+    if (line.starts_with("}")) inside = false;
+    std::smatch match;
+    if (inside && std::regex_search(line, match, kMember)) members.insert(match[1]);
+  }
+  return members;
+}
+
+/// The structs whose members a user may set.
+struct SettingsStruct {
+  const char* path;
+  const char* name;
+};
+
+constexpr SettingsStruct kStructs[] = {
+    {"estimator/odometry/odometry_settings.hpp", "OdometrySettings"},
+    {"estimator/odometry/odometry.hpp", "Effort"},
+    {"firmware_host/settings/settings.hpp", "PairingGroup"},
+    {"firmware_host/settings/settings.hpp", "CalibrationGroup"},
+    {"firmware_host/settings/settings.hpp", "EvaluationGroup"},
+};
+
+/// "group.name" without the group; a member may drop what its group already says.
+std::string lastPart(const std::string& key) { return key.substr(key.rfind('.') + 1); }
+
+bool isRegistered(const std::string& member) {
+  for (const swiftlet::Setting& setting : swiftlet::settingsRegistry()) {
+    if (member.ends_with(lastPart(std::string(setting.key)))) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+TEST_CASE("every member of a settings struct has a key") {
+  for (const SettingsStruct& s : kStructs) {
+    const std::set<std::string> members = membersOf(s.path, s.name);
+    INFO(s.path << ": " << s.name);
+    CHECK(!members.empty());
+    for (const std::string& member : members) {
+      INFO(member << " is not in the registry: nobody can set it");
+      CHECK(isRegistered(member));
+    }
+  }
+}
+
+TEST_CASE("every setting is explained") {
+  REQUIRE(swiftlet::settingsRegistry().size() > 5);
+  std::set<std::string> keys;
+  for (const swiftlet::Setting& setting : swiftlet::settingsRegistry()) {
+    INFO(setting.key);
+    CHECK(keys.insert(std::string(setting.key)).second);
+    CHECK(std::regex_match(std::string(setting.key), std::regex("[a-z_]+\\.[a-z0-9_]+")));
+    CHECK(setting.doc.size() > 20);
+    CHECK(setting.doc.ends_with('.'));
+    CHECK(!swiftlet::rangeText(setting).empty());
+  }
+}
+
+TEST_CASE("the user's page names every setting") {
+  const std::string page = readWhole(projectRoot() / "docs/settings.md");
+  if (page.empty()) {
+    WARN("docs/settings.md does not exist: skipped");
+    return;
+  }
+  for (const swiftlet::Setting& setting : swiftlet::settingsRegistry()) {
+    INFO(setting.key << " is not in docs/settings.md");
+    CHECK(page.find('`' + std::string(setting.key) + '`') != std::string::npos);
+  }
+}

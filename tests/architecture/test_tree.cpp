@@ -1,0 +1,94 @@
+// The rules of the house, applied to the tree as it stands.
+#include <catch2/catch.hpp>
+#include <filesystem>
+
+#include "tests/architecture/rules.hpp"
+
+using namespace swiftlet::architecture;  // NOLINT(google-build-using-namespace)
+
+namespace {
+
+constexpr std::size_t kMaxFileLines = 600;
+constexpr std::size_t kMaxReadmeLines = 100;
+
+const std::vector<std::string>& rooms() {
+  static const std::vector<std::string> kRooms = {"estimator", "mesher", "mapping", "drivers",
+                                                  "firmware_host"};
+  return kRooms;
+}
+
+std::vector<std::string> roomsAndTests() {
+  std::vector<std::string> folders = rooms();
+  folders.emplace_back("tests");
+  return folders;
+}
+
+void append(std::vector<Violation>& all, const std::vector<Violation>& some) {
+  all.insert(all.end(), some.begin(), some.end());
+}
+
+void requireNone(const std::vector<Violation>& violations) {
+  INFO('\n' << describe(violations));
+  CHECK(violations.empty());
+}
+
+/// The CMakeLists.txt of the file's folder and of the folders above it, joined.
+std::string listsAbove(const SourceFile& file) {
+  std::string lists;
+  for (std::filesystem::path folder = std::filesystem::path(file.path).parent_path(); !folder.empty();
+       folder = folder.parent_path()) {
+    lists += readWhole(projectRoot() / folder / "CMakeLists.txt");
+  }
+  return lists;
+}
+
+}  // namespace
+
+TEST_CASE("includes point the way the house is drawn") {
+  std::vector<Violation> found;
+  const auto files = readSources(rooms());
+  REQUIRE(files.size() > 10);
+  for (const SourceFile& file : files) append(found, checkIncludeDirections(file));
+  requireNone(found);
+}
+
+TEST_CASE("the flight path has no locks, exceptions, heap calls or clocks") {
+  std::vector<Violation> found;
+  const auto files = readSources({"estimator", "mesher"});
+  REQUIRE(files.size() > 10);
+  for (const SourceFile& file : files) append(found, checkFlightPath(file));
+  requireNone(found);
+}
+
+TEST_CASE("headers open with #pragma once and say what they are") {
+  std::vector<Violation> found;
+  for (const SourceFile& file : readSources(roomsAndTests())) {
+    if (file.isHeader()) append(found, checkHeaderOpening(file));
+  }
+  requireNone(found);
+}
+
+TEST_CASE("files stay readable in length") {
+  std::vector<Violation> found;
+  for (const SourceFile& file : readSources(roomsAndTests())) append(found, checkLength(file, kMaxFileLines));
+  const SourceFile readme = parseSource("README.md", readWhole(projectRoot() / "README.md"));
+  REQUIRE(!readme.lines.empty());
+  append(found, checkLength(readme, kMaxReadmeLines));
+  requireNone(found);
+}
+
+TEST_CASE("no text names one machine's paths or leaves work undone") {
+  std::vector<Violation> found;
+  const auto files = readTextFiles();
+  REQUIRE(files.size() > 20);
+  for (const SourceFile& file : files) append(found, checkText(file));
+  requireNone(found);
+}
+
+TEST_CASE("every source is named in a CMakeLists.txt") {
+  std::vector<Violation> found;
+  for (const SourceFile& file : readSources(roomsAndTests())) {
+    if (!file.isHeader()) append(found, checkNamedInList(file, listsAbove(file)));
+  }
+  requireNone(found);
+}

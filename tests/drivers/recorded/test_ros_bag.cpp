@@ -1,0 +1,169 @@
+// A small bag written with rosbag-storage and read back.
+
+#include <rosbag/bag.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "drivers/recorded/ros_bag.hpp"
+#include "tests/drivers/recorded/asl_fixture.hpp"
+#include "tests/drivers/recorded/ros_bodies.hpp"
+
+namespace swiftlet::test {
+
+/// A message of any type, given by its serialized body.
+struct RawMessage {
+  std::vector<std::uint8_t> body;
+};
+/// What the traits below answer; a bag asks for them when it first sees a topic.
+inline std::string raw_type;
+
+}  // namespace swiftlet::test
+
+namespace ros {
+namespace message_traits {
+template <>
+struct MD5Sum<swiftlet::test::RawMessage> {
+  static const char* value(const swiftlet::test::RawMessage&) { return "0123456789abcdef0123456789abcdef"; }
+};
+template <>
+struct DataType<swiftlet::test::RawMessage> {
+  static const char* value(const swiftlet::test::RawMessage&) { return swiftlet::test::raw_type.c_str(); }
+};
+template <>
+struct Definition<swiftlet::test::RawMessage> {
+  static const char* value(const swiftlet::test::RawMessage&) { return ""; }
+};
+}  // namespace message_traits
+namespace serialization {
+template <>
+struct Serializer<swiftlet::test::RawMessage> {
+  template <typename Stream>
+  static void write(Stream& stream, const swiftlet::test::RawMessage& message) {
+    std::memcpy(stream.advance(static_cast<std::uint32_t>(message.body.size())), message.body.data(),
+                message.body.size());
+  }
+  static std::uint32_t serializedLength(const swiftlet::test::RawMessage& message) {
+    return static_cast<std::uint32_t>(message.body.size());
+  }
+};
+}  // namespace serialization
+}  // namespace ros
+
+namespace swiftlet {
+namespace {
+
+using test::AslFixture;
+using test::contains;
+using test::Delivered;
+using test::errorOf;
+
+/// The fixture's log as a bag; received late and out of order, as recorders do.
+class BagFixture {
+ public:
+  explicit BagFixture(rosbag::CompressionType compression = rosbag::compression::Uncompressed) : asl(6) {
+    bag_.open(path(), rosbag::bagmode::Write);
+    bag_.setCompression(compression);
+  }
+  [[nodiscard]] std::string path() const { return (asl.folder.path() / "flight.bag").string(); }
+  void put(const std::string& topic, const std::string& type, std::int64_t received,
+           std::vector<std::uint8_t> body) {
+    test::raw_type = type;
+    ros::Time time;
+    time.fromNSec(static_cast<std::uint64_t>(received));
+    bag_.write(topic, time, test::RawMessage{std::move(body)});
+  }
+  void putAll(bool compressed_pictures) {
+    constexpr std::int64_t kImageDelay = 30'000'000;
+    constexpr std::int64_t kImuDelay = 1'000'000;
+    for (std::int64_t t = asl.stamp(-1); t <= asl.stamp(6); t += AslFixture::kImuPeriod) {
+      put("/imu0", "sensor_msgs/Imu", t + kImuDelay,
+          test::imuBody({t}, {0.01, -0.02, 0.03}, {0.1, 0.2, 9.8}));
+    }
+    for (int i = 0; i < asl.frames; ++i) {
+      for (int c = 1; c >= 0; --c) {
+        const std::vector<std::uint8_t> pixels = test::pattern(64, 48, 2 * i + c);
+        const std::string topic = "/cam" + std::to_string(c) + "/image_raw";
+        const Stamp stamp{asl.stamp(i)};
+        if (compressed_pictures) {
+          put(topic + "/compressed", "sensor_msgs/CompressedImage", stamp.ns + kImageDelay,
+              test::compressedBody(stamp, test::encodePng(pixels, 64, 48)));
+        } else {
+          put(topic, "sensor_msgs/Image", stamp.ns + kImageDelay,
+              test::imageBody(stamp, 64, 48, "mono8", 64, pixels));
+        }
+      }
+    }
+    put("/tf", "tf2_msgs/TFMessage", asl.stamp(0), {0, 0, 0, 0});
+  }
+  void close() { bag_.close(); }
+  [[nodiscard]] LogOptions options() const {
+    LogOptions options;
+    options.calibration = asl.mav0().string();
+    return options;
+  }
+  AslFixture asl;
+
+ private:
+  rosbag::Bag bag_;
+};
+
+TEST_CASE("a bag gives what the folder of the same flight gives", "[ros_bag]") {
+  for (const rosbag::CompressionType compression :
+       {rosbag::compression::Uncompressed, rosbag::compression::BZ2, rosbag::compression::LZ4}) {
+    for (const bool compressed_pictures : {false, true}) {
+      BagFixture bag(compression);
+      bag.putAll(compressed_pictures);
+      bag.close();
+      const auto from_bag = openLog(bag.path(), bag.options());
+      const auto from_folder = openLog(bag.asl.folder.path().string());
+      CHECK(from_bag->imageCount() == 12);
+      CHECK(from_bag->frameCount() == 6);
+      const Delivered a = test::readAll(*from_bag);
+      const Delivered b = test::readAll(*from_folder);
+      CHECK(a.order == b.order);
+      CHECK(a.pictures == b.pictures);
+      REQUIRE(a.samples.size() == b.samples.size());
+      for (std::size_t i = 0; i < a.samples.size(); ++i) {
+        CHECK(a.samples[i].stamp == b.samples[i].stamp);
+        CHECK(a.samples[i].accel == b.samples[i].accel);
+      }
+    }
+  }
+}
+
+TEST_CASE("bags with less than a log needs are refused", "[ros_bag]") {
+  BagFixture bag;
+  bag.putAll(false);
+  bag.close();
+  CHECK(contains(errorOf([&] { openLog(bag.path()); }).message, "no calibration"));
+  BagFixture blind;
+  blind.put("/imu0", "sensor_msgs/Imu", blind.asl.stamp(0),
+            test::imuBody({blind.asl.stamp(0)}, {0, 0, 0}, {0, 0, 9.8}));
+  blind.close();
+  CHECK(contains(errorOf([&] { openLog(blind.path(), blind.options()); }).message,
+                 "no topic of type sensor_msgs/Image"));
+  BagFixture still;
+  still.put("/cam0", "sensor_msgs/Image", still.asl.stamp(0),
+            test::imageBody({still.asl.stamp(0)}, 64, 48, "mono8", 64, test::pattern(64, 48, 0)));
+  still.close();
+  CHECK(contains(errorOf([&] { openLog(still.path(), still.options()); }).message, "sensor_msgs/Imu"));
+}
+
+TEST_CASE("damaged messages and cut bags are said", "[ros_bag]") {
+  BagFixture bag;
+  bag.putAll(false);
+  bag.put("/imu0", "sensor_msgs/Imu", bag.asl.stamp(0), {1, 2, 3});
+  bag.put("/imu0", "sensor_msgs/Imu", bag.asl.stamp(0),
+          test::imuBody({bag.asl.stamp(0) + 1}, {0, std::nan(""), 0}, {0, 0, 9.8}));
+  bag.close();
+  const auto log = openLog(bag.path(), bag.options());
+  CHECK(log->counters().bad_rows == 1);
+  CHECK(log->counters().nan_rows == 1);
+  CHECK(test::readAll(*log).frames.size() == 12);
+  fs::resize_file(bag.path(), fs::file_size(bag.path()) / 2);
+  CHECK(errorOf([&] { openLog(bag.path(), bag.options()); }).file == bag.path());
+}
+
+}  // namespace
+}  // namespace swiftlet

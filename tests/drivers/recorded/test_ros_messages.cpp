@@ -1,0 +1,83 @@
+#include <cmath>
+#include <cstring>
+
+#include "drivers/recorded/ros_messages.hpp"
+#include "tests/drivers/recorded/asl_fixture.hpp"
+#include "tests/drivers/recorded/ros_bodies.hpp"
+
+namespace swiftlet {
+namespace {
+
+TEST_CASE("an Imu body gives stamp, gyro and accel; every shorter one nothing", "[ros]") {
+  const std::vector<std::uint8_t> body =
+      test::imuBody({1403636579763555584}, {0.1, -0.2, 0.3}, {9.7, 0.5, -1.2});
+  ImuSample sample;
+  REQUIRE(readRosImu(body, sample));
+  CHECK(sample.stamp.ns == 1403636579763555584);
+  CHECK(sample.gyro == Eigen::Vector3d(0.1, -0.2, 0.3));
+  CHECK(sample.accel == Eigen::Vector3d(9.7, 0.5, -1.2));
+  constexpr std::size_t kLastCovariance = 72;  // behind everything that is read
+  for (std::size_t n = 0; n < body.size() - kLastCovariance; ++n) {
+    CHECK(!readRosImu(std::span(body).first(n), sample));
+  }
+}
+
+TEST_CASE("raw encodings become grey, with padded rows", "[ros]") {
+  const int width = 5;
+  const int height = 3;
+  const ImageSize size{width, height};
+  std::vector<std::uint8_t> out(15);
+  RosImage image;
+  const auto convert = [&](const std::vector<std::uint8_t>& body) {
+    REQUIRE(readRosImage(body, image));
+    return toGrey(image, size, out.data());
+  };
+  SECTION("mono8") {
+    const std::vector<std::uint8_t> grey = test::pattern(width, height, 1);
+    std::vector<std::uint8_t> padded;
+    for (int y = 0; y < height; ++y) {
+      padded.insert(padded.end(), grey.begin() + y * width, grey.begin() + (y + 1) * width);
+      padded.insert(padded.end(), 3, 0xEE);
+    }
+    REQUIRE(convert(test::imageBody({7}, width, height, "mono8", 8, padded)) == DecodeResult::kOk);
+    CHECK(out == grey);
+    CHECK(image.stamp.ns == 7);
+  }
+  SECTION("mono16, both byte orders") {
+    std::vector<std::uint8_t> little;
+    std::vector<std::uint8_t> big;
+    std::vector<std::uint8_t> truth;
+    for (int i = 0; i < 15; ++i) {
+      const int value = i * 4681;
+      little.insert(little.end(),
+                    {static_cast<std::uint8_t>(value & 255), static_cast<std::uint8_t>(value >> 8)});
+      big.insert(big.end(), {static_cast<std::uint8_t>(value >> 8), static_cast<std::uint8_t>(value & 255)});
+      truth.push_back(static_cast<std::uint8_t>(std::lround(value * 255.0 / 65535.0)));
+    }
+    REQUIRE(convert(test::imageBody({7}, width, height, "mono16", 10, little)) == DecodeResult::kOk);
+    CHECK(out == truth);
+    REQUIRE(convert(test::imageBody({7}, width, height, "mono16", 10, big, true)) == DecodeResult::kOk);
+    CHECK(out == truth);
+  }
+  SECTION("colour") {
+    std::vector<std::uint8_t> bgr;
+    for (int i = 0; i < 15; ++i) bgr.insert(bgr.end(), {10, 20, 200});
+    REQUIRE(convert(test::imageBody({7}, width, height, "bgr8", 15, bgr)) == DecodeResult::kOk);
+    CHECK(out[0] == 73);  // 0.299 * 200 + 0.587 * 20 + 0.114 * 10
+    REQUIRE(convert(test::imageBody({7}, width, height, "rgb8", 15, bgr)) == DecodeResult::kOk);
+    CHECK(out[0] == 38);
+  }
+  SECTION("faults") {
+    const std::vector<std::uint8_t> grey = test::pattern(width, height, 1);
+    CHECK(convert(test::imageBody({7}, width, height, "bayer_rggb8", 5, grey)) ==
+          DecodeResult::kUnknownFormat);
+    CHECK(convert(test::imageBody({7}, height, width, "mono8", 5, grey)) == DecodeResult::kWrongSize);
+    CHECK(convert(test::imageBody({7}, width, height, "mono8", 6, grey)) == DecodeResult::kDamaged);
+    CHECK(convert(test::imageBody({7}, width, height, "mono8", 4, grey)) == DecodeResult::kDamaged);
+    std::vector<std::uint8_t> body = test::imageBody({7}, width, height, "mono8", 5, grey);
+    for (std::size_t n = 0; n < body.size(); ++n) CHECK(!readRosImage(std::span(body).first(n), image));
+  }
+}
+
+}  // namespace
+}  // namespace swiftlet

@@ -1,0 +1,132 @@
+// The program's contract: exit codes, messages, and the shape of summary.json.
+
+#include <array>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "drivers/recorded/trajectory_file.hpp"
+#include "firmware_host/commands/command.hpp"
+#include "firmware_host/report/line_file.hpp"
+#include "firmware_host/report/summary.hpp"
+#include "tests/firmware_host/scratch_folder.hpp"
+
+namespace swiftlet {
+namespace {
+
+int run(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "swiftlet");
+  std::vector<char*> pointers;
+  for (std::string& argument : arguments) pointers.push_back(argument.data());
+  return runProgram(static_cast<int>(pointers.size()), pointers.data());
+}
+
+TEST_CASE("exit codes: 0 done, 2 wrong use or bad input") {
+  CHECK(run({"--help"}) == kExitDone);
+  CHECK(run({"--version"}) == kExitDone);
+  for (const char* command : {"replay", "evaluate", "settings"}) CHECK(run({command, "--help"}) == kExitDone);
+  CHECK(run({"settings"}) == kExitDone);
+  CHECK(run({}) == kExitBadInput);
+  CHECK(run({"fly-away"}) == kExitBadInput);
+  CHECK(run({"replay"}) == kExitBadInput);
+  CHECK(run({"replay", "no/such/log"}) == kExitBadInput);
+  CHECK(run({"replay", "no/such/log", "--from", "-1"}) == kExitBadInput);
+  CHECK(run({"settings", "--set", "smoother.horizont=3"}) == kExitBadInput);
+  CHECK(run({"settings", "--settings", "no/such/file.yaml"}) == kExitBadInput);
+  CHECK(run({"evaluate", "no/such/run"}) == kExitBadInput);
+  CHECK(run({"evaluate", "x", "--align", "best"}) == kExitBadInput);
+}
+
+TEST_CASE("evaluate compares two files; without common stamps it fails") {
+  const ScratchFolder folder("evaluate");
+  const std::string truth = folder.file("truth.tum");
+  const std::string estimate = folder.file("estimate.tum");
+  const std::string elsewhere = folder.file("elsewhere.tum");
+  {
+    LineFile a(truth);
+    LineFile b(estimate);
+    LineFile c(elsewhere);
+    for (int i = 0; i < 100; ++i) {
+      const double t = 0.01 * i;
+      const SE3 pose(Eigen::Quaterniond::Identity(), {std::sin(t), std::cos(2 * t), t});
+      a.write(formatTum({1'000'000'000 + i * 10'000'000LL}, pose));
+      b.write(formatTum({1'000'000'000 + i * 10'000'000LL}, pose));
+      c.write(formatTum({9'000'000'000 + i * 10'000'000LL}, pose));
+    }
+  }
+  CHECK(run({"evaluate", estimate, "--truth", truth}) == kExitDone);
+  CHECK(run({"evaluate", estimate, "--truth", truth, "--align", "yaw", "--from", "0.5", "--json"}) ==
+        kExitDone);
+  CHECK(run({"evaluate", elsewhere, "--truth", truth}) == kExitFailed);
+  CHECK(run({"evaluate", estimate}) == kExitBadInput);  // nothing to compare with
+  CHECK(run({"evaluate", folder.path()}) == kExitBadInput);
+}
+
+/// A log that holds nothing.
+class EmptyLog : public LogSource {
+ public:
+  [[nodiscard]] const Calibration& calibration() const override { return calibration_; }
+  bool next(SensorMessage& /*message*/) override { return false; }
+  [[nodiscard]] std::size_t imageCount() const override { return 0; }
+  [[nodiscard]] std::size_t frameCount() const override { return 0; }
+  [[nodiscard]] const LogCounters& counters() const override { return counters_; }
+  [[nodiscard]] const std::vector<std::string>& warnings() const override { return warnings_; }
+
+ private:
+  Calibration calibration_;
+  LogCounters counters_;
+  std::vector<std::string> warnings_;
+};
+
+TEST_CASE("summary.json has what DESIGN's run folder promises") {
+  RunStatistics statistics;
+  statistics.first_image = Stamp{1'000'000'000};
+  statistics.last_image = Stamp{21'000'000'000};
+  statistics.first_pose = Stamp{1'500'000'000};
+  statistics.frames = 400;
+  statistics.poses = 390;
+  statistics.frames_since_first_pose = 390;
+  statistics.health = {{{1'000'000'000}, Health::kInitializing, 0}, {{2'000'000'000}, Health::kGood, 0}};
+  statistics.events[EventKind::kImuGap] = {2, 1.5};
+  for (int i = 0; i < 100; ++i) {
+    addTime(statistics.times, StageId::kTrack, {2e-3, 2e-3}, false);
+    if (i % 4 == 0) addTime(statistics.times, StageId::kTrack, {8e-3, 8e-3}, true);
+  }
+  RunFacts facts;
+  facts.log = "log";
+  facts.wall = 4;
+  facts.cpu = 3;
+  facts.peak_resident = 50 << 20;
+  facts.memory = {{"program_at_start", 10 << 20}};
+  const EmptyLog log;
+  const auto summary = summaryOf(facts, Settings{}, log, statistics);
+
+  for (const char* key :
+       {"version", "run", "settings", "health", "counters", "warnings", "timing", "cpu", "memory"}) {
+    INFO(key);
+    CHECK(summary.contains(key));
+  }
+  CHECK(summary["run"]["time_to_first_pose_s"] == 0.5);
+  CHECK(summary["run"]["tracking_coverage"] == 390.0 / 400.0);
+  CHECK(summary["settings"]["smoother.horizon"] == OdometrySettings{}.horizon);
+  CHECK(summary["health"][1]["health"] == "good");
+  CHECK(summary["health"][1]["t_s"] == 1.0);
+  CHECK(summary["counters"]["events"]["imu_gap"]["count"] == 2);
+  CHECK(summary["cpu"]["flight_s"] == 20.0);
+  CHECK(summary["cpu"]["real_time_factor"] == 5.0);
+  const auto& track = summary["timing"]["track"];
+  CHECK(track["frames"]["count"] == 100);
+  CHECK(track["keyframes"]["count"] == 25);
+  CHECK(track["frames"]["mean_ms"].get<double>() == Approx(2));
+  CHECK(track["keyframes"]["p99_ms"].get<double>() == Approx(8).epsilon(0.025));
+  CHECK(track["keyframes"]["cpu_s"].get<double>() == Approx(0.2));
+  CHECK_FALSE(summary["timing"].contains("smooth"));  // never ran
+  CHECK_NOTHROW(summaryText(summary));
+}
+
+}  // namespace
+}  // namespace swiftlet

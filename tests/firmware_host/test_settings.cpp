@@ -1,0 +1,143 @@
+// Settings: what is printed reads back, what is wrong is refused with place, range and remedy.
+
+#include <catch2/catch.hpp>
+#include <set>
+#include <string>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/settings/read_settings.hpp"
+#include "firmware_host/settings/registry.hpp"
+
+namespace swiftlet {
+namespace {
+
+InputError errorOf(const std::string& text) {
+  Settings settings;
+  try {
+    readSettingsText("file.yaml", text, settings);
+  } catch (const InputError& error) {
+    return error;
+  }
+  FAIL("accepted: " << text);
+  throw std::logic_error("unreachable");
+}
+
+InputError overrideError(const std::string& assignment) {
+  Settings settings;
+  try {
+    overrideSetting(assignment, settings);
+  } catch (const InputError& error) {
+    return error;
+  }
+  FAIL("accepted: " << assignment);
+  throw std::logic_error("unreachable");
+}
+
+TEST_CASE("the registry: keys once, groups together, defaults inside their bounds, everything explained") {
+  std::set<std::string_view> keys;
+  std::set<std::string> closed_groups;
+  std::string group;
+  const Settings defaults;
+  for (const Setting& setting : settingsRegistry()) {
+    INFO(setting.key);
+    CHECK(keys.insert(setting.key).second);
+    CHECK(setting.doc.size() > 10);
+    CHECK(setting.doc.back() == '.');
+    const std::string its_group(setting.key.substr(0, setting.key.find('.')));
+    if (its_group != group) {
+      CHECK(closed_groups.insert(its_group).second);
+      group = its_group;
+    }
+    // A default outside the bounds could not be written back.
+    Settings settings;
+    CHECK_NOTHROW(overrideSetting(std::string(setting.key) + "=" + valueText(setting, defaults), settings));
+  }
+}
+
+TEST_CASE("settings read from YAML") {
+  Settings settings;
+  readSettingsText("f",
+                   "# comment\nsmoother:\n  horizon: 2.5\n  estimate_extrinsics: true\n"
+                   "frontend:\n  max_features: 150\npairing:\n",
+                   settings);
+  CHECK(settings.odometry.horizon == 2.5);
+  CHECK(settings.odometry.estimate_extrinsics);
+  CHECK(settings.odometry.max_features == 150);
+  CHECK(settings.odometry.pixel_sigma == OdometrySettings{}.pixel_sigma);
+  Settings untouched;
+  readSettingsText("f", "", untouched);
+  CHECK(printSettings(untouched, false) == printSettings(Settings{}, false));
+}
+
+TEST_CASE("what is printed reads back to the same values, explained or not") {
+  Settings settings;
+  settings.odometry.pixel_sigma = 0.1 + 0.2;  // needs all its digits
+  settings.odometry.use_stereo = false;
+  settings.effort.iterations = 7;
+  for (const bool explain : {true, false}) {
+    Settings back;
+    readSettingsText("printed", printSettings(settings, explain), back);
+    for (const Setting& setting : settingsRegistry()) {
+      CHECK(valueText(setting, back) == valueText(setting, settings));
+    }
+    CHECK(back.odometry.pixel_sigma == settings.odometry.pixel_sigma);
+  }
+}
+
+TEST_CASE("an unknown key names its line and the nearest known key") {
+  const InputError error = errorOf("smoother:\n  horizont: 3\n");
+  CHECK(error.file == "file.yaml");
+  CHECK(error.line == 2);
+  CHECK(error.field == "smoother.horizont");
+  CHECK_THAT(error.remedy, Catch::Contains("`smoother.horizon`"));
+  // The right name in the wrong group.
+  CHECK_THAT(errorOf("odometry:\n  max_features: 100\n").remedy, Catch::Contains("`frontend.max_features`"));
+  // Nothing near: no wild guess.
+  CHECK_THAT(errorOf("zzz: 1\n").remedy, !Catch::Contains("Did you mean"));
+}
+
+TEST_CASE("values outside their bounds, of a wrong kind, twice or in a wrong place are refused") {
+  const InputError range = errorOf("frontend:\n  max_features: 100000\n");
+  CHECK(range.line == 2);
+  CHECK(range.field == "frontend.max_features");
+  CHECK_THAT(range.remedy, Catch::Contains("20 to 400"));
+
+  CHECK(errorOf("smoother:\n  horizon: .nan\n").field == "smoother.horizon");
+  CHECK(errorOf("smoother:\n  horizon: -.inf\n").field == "smoother.horizon");
+  CHECK(errorOf("smoother:\n  horizon: soon\n").field == "smoother.horizon");
+  CHECK(errorOf("smoother:\n  horizon: [1, 2]\n").field == "smoother.horizon");
+  CHECK(errorOf("smoother:\n  horizon:\n").field == "smoother.horizon");
+  CHECK(errorOf("frontend:\n  max_features: 20.5\n").field == "frontend.max_features");
+  CHECK(errorOf("frontend:\n  use_stereo: 3\n").field == "frontend.use_stereo");
+  CHECK(errorOf("smoother:\n  horizon: 2\n  horizon: 3\n").line == 3);
+  CHECK(errorOf("smoother: 3\n").field == "smoother");
+  CHECK(errorOf("- 1\n- 2\n").line == 1);
+  CHECK(errorOf("smoother:\n  horizon: 3\n bad\n").line == 3);
+  CHECK(errorOf("smoother: {horizon: 3\n").line >= 1);
+}
+
+TEST_CASE("a file with one error changes nothing") {
+  Settings settings;
+  CHECK_THROWS_AS(readSettingsText("f", "smoother:\n  horizon: 2\n  pixel_sigma: -1\n", settings),
+                  InputError);
+  CHECK(settings.odometry.horizon == OdometrySettings{}.horizon);
+}
+
+TEST_CASE("overrides from the command line") {
+  Settings settings;
+  overrideSetting("smoother.horizon=3", settings);
+  overrideSetting("frontend.use_stereo=false", settings);
+  CHECK(settings.odometry.horizon == 3);
+  CHECK_FALSE(settings.odometry.use_stereo);
+  CHECK_THAT(overrideError("smoother.horizon").remedy, Catch::Contains("group.name=value"));
+  CHECK_THAT(overrideError("smoother.horizon=").what(), Catch::Contains("Allowed"));
+  CHECK_THAT(overrideError("smother.horizon=3").remedy, Catch::Contains("`smoother.horizon`"));
+}
+
+TEST_CASE("a settings file that is not there") {
+  Settings settings;
+  CHECK_THROWS_AS(readSettingsFile("does/not/exist.yaml", settings), InputError);
+}
+
+}  // namespace
+}  // namespace swiftlet

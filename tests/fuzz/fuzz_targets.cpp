@@ -1,0 +1,146 @@
+#include "tests/fuzz/fuzz_targets.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "drivers/calibration/calibration.hpp"
+#include "drivers/recorded/image_list.hpp"
+#include "drivers/recorded/imu_file.hpp"
+#include "drivers/recorded/ros_messages.hpp"
+#include "drivers/recorded/track_file.hpp"
+#include "drivers/recorded/trajectory_file.hpp"
+
+namespace swiftlet::fuzz {
+namespace {
+
+/// What a reader promises about its answer; stops the fuzzer where it does not hold.
+void demand(bool holds) {
+  if (!holds) std::abort();
+}
+
+template <typename Rows>
+void demandRisingStamps(const Rows& rows) {
+  for (std::size_t i = 1; i < rows.size(); ++i) demand(rows[i - 1].stamp < rows[i].stamp);
+}
+
+void imuCsv(std::string_view text) {
+  LogCounters counters;
+  LogWarnings warnings;
+  try {
+    const std::vector<ImuSample> samples = readImuText("imu.csv", text, counters, warnings);
+    demand(!samples.empty());
+    demandRisingStamps(samples);
+    for (const ImuSample& s : samples) demand(s.gyro.allFinite() && s.accel.allFinite());
+  } catch (const InputError&) {
+  }
+}
+
+void imageCsv(std::string_view text) {
+  LogCounters counters;
+  LogWarnings warnings;
+  try {
+    demandRisingStamps(readImageListText("data.csv", text, counters, warnings));
+  } catch (const InputError&) {
+  }
+}
+
+void trajectory(std::string_view text) {
+  LogCounters counters;
+  LogWarnings warnings;
+  try {
+    const Trajectory poses = readTrajectoryText("poses", text, counters, warnings);
+    demandRisingStamps(poses);
+    for (const TrajectoryPoint& p : poses) {
+      demand(p.T_world_body.translation.allFinite());
+      demand(std::abs(p.T_world_body.rotation.norm() - 1) < 1e-9);
+      (void)formatTum(p.stamp, p.T_world_body);
+    }
+  } catch (const InputError&) {
+  }
+}
+
+void tracks(std::string_view text) {
+  LogCounters counters;
+  LogWarnings warnings;
+  try {
+    TrackReader reader("tracks.csv", text, counters, warnings);
+    TrackRecord record;
+    Stamp newest;
+    for (bool first = true; reader.next(record); first = false) {
+      demand(first || newest < record.stamp);
+      newest = record.stamp;
+      for (const TrackedFeature& f : record.features) demand(f.seen[0] || f.seen[1]);
+    }
+  } catch (const InputError&) {
+  }
+}
+
+void demandSane(const Calibration& calibration) {
+  for (std::size_t i = 0; i < calibration.rig.camera_count; ++i) {
+    demand(calibration.rig.T_body_cam[i].translation.allFinite());
+    demand(calibration.rig.T_body_cam[i].rotation.coeffs().allFinite());
+    demand(calibration.rig.camera[i].width() > 0 && calibration.rig.camera[i].focal() > 0);
+  }
+  demand(calibration.noise.gyro_density > 0 && calibration.noise.accel_walk > 0);
+  (void)describe(calibration);
+}
+
+constexpr const char* kGoodImu =
+    "update_rate: 200.0\nrate_hz: 200\naccelerometer_noise_density: 2.0e-03\naccelerometer_random_walk: "
+    "3.0e-03\n"
+    "gyroscope_noise_density: 1.6968e-04\ngyroscope_random_walk: 1.9393e-05\n";
+
+/// The text up to the first NUL or "...\n" is the camera, the rest the IMU; without a rest a good one.
+std::array<std::string_view, 2> twoFiles(std::string_view text) {
+  const std::size_t at = text.find("...\n");
+  if (at == std::string_view::npos) return {text, kGoodImu};
+  return {text.substr(0, at), text.substr(at + 4)};
+}
+
+void eurocYaml(std::string_view text) {
+  const auto [camera, imu] = twoFiles(text);
+  try {
+    demandSane(parseEurocCalibration({{"cam0", camera}}, {"imu0", imu}));
+  } catch (const InputError&) {
+  }
+}
+
+void kalibrYaml(std::string_view text) {
+  const auto [chain, imu] = twoFiles(text);
+  try {
+    demandSane(parseKalibrCalibration({"chain", chain}, {"imu", imu}));
+  } catch (const InputError&) {
+  }
+}
+
+void rosMessage(std::string_view text) {
+  const std::span<const std::uint8_t> body(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
+  ImuSample sample;
+  RosImage image;
+  (void)readRosImu(body, sample);
+  (void)readRosCompressedImage(body, image);
+  if (!readRosImage(body, image)) return;
+  constexpr int kMaxPixels = 1 << 16;
+  if (image.size.width <= 0 || image.size.height <= 0 || image.size.width > kMaxPixels / image.size.height)
+    return;
+  std::vector<std::uint8_t> out(static_cast<std::size_t>(image.size.width) *
+                                static_cast<std::size_t>(image.size.height));
+  (void)toGrey(image, image.size, out.data());
+}
+
+constexpr std::array<NamedTarget, 7> kTargets = {{{"imu_csv", &imuCsv},
+                                                  {"image_csv", &imageCsv},
+                                                  {"trajectory", &trajectory},
+                                                  {"tracks", &tracks},
+                                                  {"euroc_yaml", &eurocYaml},
+                                                  {"kalibr_yaml", &kalibrYaml},
+                                                  {"ros_message", &rosMessage}}};
+
+}  // namespace
+
+std::span<const NamedTarget> targets() { return kTargets; }
+
+}  // namespace swiftlet::fuzz

@@ -1,0 +1,127 @@
+// Replays every log it finds, with two cameras and with one, prints the accuracy table and compares it
+// with the committed figures: exit code 1 when a figure got worse by more than the rule allows.
+//
+//   accuracy_table [--update] [--out FOLDER]
+//
+// --update writes the new figures to docs/accuracy_committed.csv (rows of logs that were not found
+// stay); --out keeps the run folders.
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/commands/replay_run.hpp"
+#include "tests/logs/accuracy_rows.hpp"
+#include "tests/logs/log_data.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr const char* kLogs[] = {"euroc_mh01_20s", "euroc_v101_micro", "vil_v102", "vil_mh05"};
+
+std::filesystem::path committedFile() {
+  return std::filesystem::path(SWIFTLET_SOURCE_DIR) / "docs" / "accuracy_committed.csv";
+}
+
+double rmse(const nlohmann::ordered_json& sections, const char* section) {
+  const auto& figures = sections[section]["se3"];
+  return figures.contains("ate_m") ? figures["ate_m"]["rmse"].get<double>()
+                                   : std::numeric_limits<double>::quiet_NaN();
+}
+
+/// The rows of one replay; a log without a pose gives one that is worse than anything.
+std::vector<AccuracyRow> rowsOf(const std::string& log, int cameras, const ReplayResult& result) {
+  constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
+  if (!result.summary.contains("accuracy")) return {{log, cameras, "odometry", kNothing, kNothing}};
+  std::vector<AccuracyRow> rows;
+  const auto& accuracy = result.summary["accuracy"];
+  for (const char* trajectory : {"odometry", "states", "map"}) {
+    if (!accuracy.contains(trajectory) || !accuracy[trajectory].is_object()) continue;
+    const auto& sections = accuracy[trajectory];
+    rows.push_back({log, cameras, trajectory, rmse(sections, "all"), rmse(sections, "from_3s")});
+  }
+  return rows;
+}
+
+std::vector<AccuracyRow> replayAll(const std::filesystem::path& out) {
+  std::vector<AccuracyRow> rows;
+  for (const char* log : kLogs) {
+    const auto path = findLog(log);
+    if (!path) continue;
+    for (const int cameras : {2, 1}) {
+      ReplayRequest request;
+      request.log = *path;
+      request.mono = cameras == 1;
+      request.out = out / fmt::format("{}_{}", log, cameras == 1 ? "mono" : "stereo");
+      fmt::print(stderr, "{} ...\n", request.out);
+      const ReplayResult result = runReplay(request, Settings{});
+      for (const AccuracyRow& row : rowsOf(log, cameras, result)) rows.push_back(row);
+    }
+  }
+  return rows;
+}
+
+std::vector<AccuracyRow> committedRows() {
+  std::ifstream file(committedFile());
+  return file ? readAccuracyRows(file) : std::vector<AccuracyRow>{};
+}
+
+void update(const std::vector<AccuracyRow>& now, std::vector<AccuracyRow> rows) {
+  for (const AccuracyRow& row : now) {
+    const auto found = std::ranges::find_if(rows, [&](const AccuracyRow& r) { return r.sameCase(row); });
+    if (found == rows.end()) {
+      rows.push_back(row);
+    } else {
+      *found = row;
+    }
+  }
+  std::ofstream file(committedFile());
+  writeAccuracyRows(file, rows);
+  if (!file.flush()) throw std::runtime_error("cannot write " + committedFile().string());
+}
+
+int compareAll(bool wants_update, const std::string& out) {
+  const bool keep = !out.empty();
+  const std::filesystem::path folder =
+      keep ? std::filesystem::path(out)
+           : std::filesystem::temp_directory_path() / fmt::format("swiftlet_accuracy_{}", getpid());
+  const std::vector<AccuracyRow> now = replayAll(folder);
+  if (!keep) {
+    std::error_code ignored;
+    std::filesystem::remove_all(folder, ignored);
+  }
+  const std::vector<AccuracyRow> committed = committedRows();
+  fmt::print("ATE RMSE, SE(3) alignment, truth gap at most 20 ms\n\n{}", accuracyMarkdown(now, committed));
+  if (wants_update) {
+    update(now, committed);
+    fmt::print("written to {}\n", committedFile().string());
+    return 0;
+  }
+  const std::vector<std::string> worse = findWorse(now, committed);
+  for (const std::string& line : worse) fmt::print("WORSE: {}\n", line);
+  return worse.empty() ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace swiftlet
+
+int main(int argc, char** argv) {
+  CLI::App app("Accuracy of replays on all logs beside the committed figures");
+  bool wants_update = false;
+  std::string out;
+  app.add_flag("--update", wants_update, "Write the new figures to docs/accuracy_committed.csv");
+  app.add_option("--out", out, "Keep the run folders here");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    return swiftlet::compareAll(wants_update, out);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "error: {}\n", error.what());
+    return 2;
+  }
+}

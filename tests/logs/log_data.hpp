@@ -1,0 +1,13 @@
+#pragma once
+// The recorded logs that whole-run tests use: in the folder that SWIFTLET_DATA names, else in
+// ../shared/data beside the source tree.
+
+#include <optional>
+#include <string>
+
+namespace swiftlet {
+
+/// The log's folder; empty, with a line on stderr, when it is not there.
+std::optional<std::string> findLog(const std::string& name);
+
+}  // namespace swiftlet

@@ -1,0 +1,138 @@
+#!/bin/sh
+# Everything that can be checked, on a fresh Debian 12 too: the demo, all tests, the accuracy table
+# of every log found, unit tests under sanitizers, a short run of each fuzzer.
+# usage: toolchain/test.sh [--quick]   --quick leaves sanitizers and fuzzers out
+# SWIFTLET_DATA names the folder of recorded logs (default ../shared/data); without logs the tests
+# that need them say so and skip. Ends with a table of steps and a count of tests; exit code 0 when
+# all passed, 1 otherwise.
+set -u
+cd "$(dirname "$0")/.." || exit 2
+
+quick=no
+case ${1:-} in
+  '') ;;
+  --quick) quick=yes ;;
+  *)
+    sed -n '2,7s/^# \{0,1\}//p' "$0"
+    exit 2
+    ;;
+esac
+
+fuzz_seconds=15 # each fuzzer
+jobs=$(nproc)
+steps='' # lines "seconds result step"
+failed_steps=0
+passed=0
+failed=0
+mkdir -p build
+
+step() { # name, command...
+  name=$1
+  shift
+  printf '\n==== %s\n' "$name"
+  begin=$(date +%s)
+  if "$@"; then result=ok; else
+    result=FAILED
+    failed_steps=$((failed_steps + 1))
+  fi
+  steps="$steps$(printf '%6d s  %-6s  %s' $(($(date +%s) - begin)) $result "$name")
+"
+  [ $result = ok ]
+}
+
+configure() { # preset, options...
+  preset=$1
+  shift
+  cmake --preset "$preset" "$@" >"build/configure_$preset.log" 2>&1 || {
+    cat "build/configure_$preset.log"
+    return 1
+  }
+  grep -E '^-- (ROS|swiftlet|Optional)' "build/configure_$preset.log" || true
+}
+
+build() { # preset, build options...
+  preset=$1
+  shift
+  cmake --build "build/$preset" "$@"
+}
+
+run_ctest() { # preset, ctest options...; adds to the counts
+  preset=$1
+  shift
+  log=build/ctest_$preset.log
+  ctest --test-dir "build/$preset" --output-on-failure -j "$jobs" "$@" 2>&1 | tee "$log"
+  line=$(grep -E 'tests passed, [0-9]+ tests failed out of [0-9]+' "$log" | tail -1)
+  bad=$(echo "$line" | sed -E 's/.* ([0-9]+) tests failed.*/\1/')
+  all=$(echo "$line" | sed -E 's/.*out of ([0-9]+).*/\1/')
+  if [ -z "$line" ]; then
+    failed=$((failed + 1))
+    return 1
+  fi
+  passed=$((passed + all - bad))
+  failed=$((failed + bad))
+  [ "$bad" -eq 0 ]
+}
+
+counted() { # command...: one more test
+  if "$@"; then passed=$((passed + 1)); else
+    failed=$((failed + 1))
+    return 1
+  fi
+}
+
+cases() { # Catch2's own counts in ctest's log of the release build
+  log=build/release/Testing/Temporary/LastTest.log
+  [ -f $log ] || return 0
+  sed -nE -e 's/.*All tests passed \(([0-9]+) assertions? in ([0-9]+) test cases?\).*/\1 \2/p' \
+    -e 's/^test cases: +([0-9]+) .*/0 \1/p' -e 's/^assertions: +([0-9]+) .*/\1 0/p' $log |
+    awk '{a += $1; c += $2} END {printf "release: %d test cases, %d assertions\n", c, a}'
+}
+
+fuzz() {
+  found=0
+  for fuzzer in $(find build/fuzz -type f -perm -u+x -name 'fuzz_*' ! -name '*.*' | sort); do
+    found=$((found + 1))
+    name=$(basename "$fuzzer")
+    kept=tests/fuzz/corpus/${name#fuzz_}
+    [ -d "$kept" ] || kept=''
+    mkdir -p "build/fuzz/corpus/$name"
+    echo "fuzz: $name for $fuzz_seconds s"
+    # shellcheck disable=SC2086 # $kept may be empty
+    counted "$fuzzer" -max_total_time=$fuzz_seconds -timeout=10 -rss_limit_mb=2048 -verbosity=0 \
+      -print_final_stats=1 -artifact_prefix=build/fuzz/ "build/fuzz/corpus/$name" $kept || return 1
+  done
+  echo "fuzz: $found fuzzers ran"
+}
+
+close() {
+  printf '\n==== steps\n%s' "$steps"
+  cases
+  all=$((passed + failed))
+  percent=0
+  if [ $all -gt 0 ]; then percent=$((100 * passed / all)); fi
+  if [ $failed_steps -gt 0 ]; then echo "$failed_steps steps failed"; fi
+  echo "$percent% tests passed, $failed tests failed out of $all"
+  [ $failed_steps -eq 0 ] && [ $failed -eq 0 ]
+  exit
+}
+
+step "packages" toolchain/install.sh test optional || close
+step "demo: simulate, replay, evaluate" counted toolchain/demo.sh
+step "configure release" configure release -DSWIFTLET_BUILD_TESTS=ON -DSWIFTLET_BUILD_BENCHMARKS=ON || close
+step "build release with tests and benchmarks" build release || close
+step "layout of the sources" counted toolchain/lint.sh format
+step "tests" run_ctest release
+table=build/release/tests/logs/accuracy_table
+if [ -x $table ]; then step "accuracy table" counted $table; fi
+
+if [ $quick = no ]; then
+  step "configure with sanitizers" configure asan -DSWIFTLET_BUILD_TESTS=ON &&
+    step "build with sanitizers" build asan &&
+    step "unit tests with sanitizers" run_ctest asan -LE slow -E '^(headers_alone|install_.*|architecture|logs.*)$'
+fi
+if [ $quick = no ] && [ -f tests/fuzz/CMakeLists.txt ]; then
+  step "configure fuzzers" configure fuzz &&
+    step "build fuzzers" build fuzz --target fuzzers &&
+    step "fuzzers" fuzz
+fi
+close
