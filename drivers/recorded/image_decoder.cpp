@@ -91,14 +91,17 @@ DecodeResult ImageDecoder::decodeJpeg(std::span<const std::uint8_t> bytes, Image
   int subsampling = 0;
   int colour_space = 0;
   DecodeResult result = DecodeResult::kDamaged;
-  if (jpeg_ != nullptr && tjDecompressHeader3(jpeg_, bytes.data(), bytes.size(), &found.width, &found.height,
-                                              &subsampling, &colour_space) == 0) {
-    // A warning (the codec's word for a picture that ends early) counts as damage like an error.
-    result = found != expected ? DecodeResult::kWrongSize
-             : tjDecompress2(jpeg_, bytes.data(), bytes.size(), out, expected.width, expected.width,
-                             expected.height, TJPF_GRAY, 0) == 0
-                 ? DecodeResult::kOk
-                 : DecodeResult::kDamaged;
+  // A file cut before the frame header passes as "tables only", with no size.
+  const bool header = jpeg_ != nullptr &&
+                      tjDecompressHeader3(jpeg_, bytes.data(), bytes.size(), &found.width, &found.height,
+                                          &subsampling, &colour_space) == 0 &&
+                      found.width > 0 && found.height > 0;
+  if (header && found != expected) result = DecodeResult::kWrongSize;
+  // A warning (the codec's word for a picture that ends early) counts as damage like an error.
+  if (header && found == expected &&
+      tjDecompress2(jpeg_, bytes.data(), bytes.size(), out, expected.width, expected.width, expected.height,
+                    TJPF_GRAY, 0) == 0) {
+    result = DecodeResult::kOk;
   }
   if (result == DecodeResult::kDamaged) {
     // After an error inside a header the handle keeps the half-read state and would spoil the next picture.

@@ -79,7 +79,8 @@ void RosBag::chooseTopics() {
     if (type == kImageType || type == kCompressedType) images.push_back(topic);
     if (type != kImuType) continue;
     const std::uint32_t count = rosbag::View(bag_, rosbag::TopicQuery(topic)).size();
-    if (topic == calibration_.imu_topic || (imu_topic_ != calibration_.imu_topic && count > most)) {
+    const bool named_found = !imu_topic_.empty() && imu_topic_ == calibration_.imu_topic;
+    if (topic == calibration_.imu_topic || (!named_found && count > most)) {
       imu_topic_ = topic;
       most = count;
     }

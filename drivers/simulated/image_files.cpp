@@ -3,6 +3,7 @@
 #include <png.h>
 #include <turbojpeg.h>
 
+#include <csetjmp>
 #include <cstdio>
 #include <memory>
 #include <stdexcept>
@@ -30,10 +31,6 @@ void appendBytes(png_structp png, png_bytep data, png_size_t size) {
   bytes->insert(bytes->end(), data, data + size);
 }
 
-[[noreturn]] void throwPngError(png_structp png, png_const_charp) {
-  throw std::runtime_error(*static_cast<const std::string*>(png_get_error_ptr(png)) + ": the PNG encoder failed");
-}
-
 void writeAll(const std::string& path, const std::uint8_t* data, std::size_t size) {
   const File file = openForWriting(path);
   if (std::fwrite(data, 1, size, file.get()) != size || std::fflush(file.get()) != 0) {
@@ -41,28 +38,34 @@ void writeAll(const std::string& path, const std::uint8_t* data, std::size_t siz
   }
 }
 
+// False when libpng reports an error, which it does by a jump back to here: nothing with a
+// destructor may be made between.
+bool encodePng(png_structp png, png_infop info, const std::uint8_t* rows, std::ptrdiff_t stride, int width, int height,
+               int depth) {
+  if (setjmp(png_jmpbuf(png)) != 0) return false;
+  png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), depth,
+               PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_set_compression_level(png, kPngLevel);
+  png_set_filter(png, 0, PNG_FILTER_UP);
+  png_write_info(png, info);
+  if (depth == 16) png_set_swap(png);  // the file is big-endian
+  for (int y = 0; y < height; ++y) png_write_row(png, rows + y * stride);
+  png_write_end(png, info);
+  return true;
+}
+
 void writePng(const std::string& path, const std::uint8_t* rows, std::ptrdiff_t stride, int width, int height,
               int depth) {
-  std::string name = path;
   std::vector<std::uint8_t> bytes;
-  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &name, throwPngError, nullptr);
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
   png_infop info = png == nullptr ? nullptr : png_create_info_struct(png);
-  if (info == nullptr) throw std::runtime_error(path + ": no memory for the PNG encoder");
-  try {
+  bool good = info != nullptr;
+  if (good) {
     png_set_write_fn(png, &bytes, appendBytes, nullptr);
-    png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), depth,
-                 PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-    png_set_compression_level(png, kPngLevel);
-    png_set_filter(png, 0, PNG_FILTER_UP);
-    png_write_info(png, info);
-    if (depth == 16) png_set_swap(png);  // the file is big-endian
-    for (int y = 0; y < height; ++y) png_write_row(png, rows + y * stride);
-    png_write_end(png, info);
-  } catch (...) {
-    png_destroy_write_struct(&png, &info);
-    throw;
+    good = encodePng(png, info, rows, stride, width, height, depth);
   }
   png_destroy_write_struct(&png, &info);
+  if (!good) throw std::runtime_error(path + ": the PNG encoder failed");
   writeAll(path, bytes.data(), bytes.size());
 }
 

@@ -23,8 +23,8 @@ constexpr std::size_t kMinTracksToVerify = 12;
 constexpr double kGateSigmas = 3.0;
 // Correlation by which a landmark found by projection must resemble its patch.
 constexpr float kMinRecognition = 0.85F;
-// Landmarks looked for in one frame at most: bounds the time.
-constexpr int kMaxSearches = 60;
+// Sightings looked for in one frame at most, at about 1.5 us each: bounds the time.
+constexpr int kMaxSearches = 240;
 
 }  // namespace
 

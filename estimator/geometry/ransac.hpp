@@ -28,7 +28,7 @@
 // outliers.
 //
 // Deterministic for a given seed (use the frame's index). No allocation: the scratch is a member
-// (mono 60 KiB, stereo 150 KiB). One call costs O(iterations * tracks); figures: docs/geometry.md.
+// (mono 22 KiB, stereo 92 KiB). One call costs O(iterations * tracks); figures: docs/geometry.md.
 //
 // Sources: Nister, PAMI 2004 (5-point); Arun et al., PAMI 1987 (3-point); Troiani et al., ICRA 2014
 // (2-point); Rosinol et al., ICRA 2020 (1-point with Mahalanobis votes); Fischler, Bolles 1981;

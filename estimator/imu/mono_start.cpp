@@ -19,14 +19,19 @@ constexpr std::size_t kLeastTracks = 15;
 constexpr int kBiasIterations = 5;
 constexpr int kLinearIterations = 6;
 constexpr int kIterations = 12;
-constexpr int kPointIterations = 3;
+constexpr int kPointIterations = 2;
 constexpr double kHuber = 2.0;             // sigma
 constexpr double kOutlier = 3.0;           // sigma: a track's RMS beyond it is left out
 constexpr double kLeastParallax = 8.0;     // bearing sigmas
 constexpr double kInverseDepthPrior = 10;  // 1/m about 0: only to keep points without parallax finite
 constexpr double kFirstSpeed = 1.0;        // m/s, for the first weights of the linear solve
 constexpr double kConverged = 1e-6;        // relative decrease of the cost
-constexpr double kUselessTilt = 0.5;       // rad
+// Noise puts some far points behind the camera; more than this share means a mirrored path.
+constexpr double kMostBehind = 0.25;
+// First guesses, as multiples of the linear solution's velocity, tried until one fits.
+constexpr std::array<double, 4> kVelocityGuesses{1.0, -1.0, 3.0, -3.0};
+constexpr double kGoodFit = 1.5;      // residual RMS, whitened
+constexpr double kUselessTilt = 0.5;  // rad
 
 using Matrix11d = StartParameters::Matrix;
 using Vector11d = StartParameters::Vector;
@@ -288,6 +293,11 @@ struct Normal {
   double cost = 0;
   double squares = 0;
   int rows = 0;
+  int tracks = 0;
+  int behind = 0;  // tracks whose point lies behind its camera
+
+  // n . d = 0 does not know the sign of d: a mirrored path puts the points behind the cameras.
+  [[nodiscard]] double shareBehind() const { return tracks > 0 ? static_cast<double>(behind) / tracks : 0.0; }
 };
 
 void addTrack(const Problem& problem, const Cameras& cameras, const BearingTrack& track, Normal& normal,
@@ -317,6 +327,8 @@ void addTrack(const Problem& problem, const Cameras& cameras, const BearingTrack
   const Eigen::Matrix3d inverse = Hpp.inverse();
   normal.H -= Hxp * inverse * Hxp.transpose();
   normal.g -= Hxp * inverse * gp;
+  ++normal.tracks;
+  normal.behind += point.inverse_depth < 0 ? 1 : 0;
   normal.squares += squares;
   normal.rows += 2 * sightings - 3;
   mean_square = squares / std::max(1, 2 * sightings - 3);
@@ -330,7 +342,7 @@ Normal linearize(Problem& problem, const StartParameters& x, const TiltEstimate&
   Normal normal;
   for (std::size_t t = 0; t < problem.tracks.size(); ++t) {
     if (problem.rejected[t]) continue;
-    Normal with = normal;
+    Normal with = normal;  // kept only when the track stays
     double mean_square = 0;
     addTrack(problem, cameras, problem.tracks[t], with, mean_square);
     if (reject && mean_square > kOutlier * kOutlier) {
@@ -373,6 +385,29 @@ bool refine(Problem& problem, const TiltEstimate& tilt, const StartPrior& prior,
     }
   }
   return true;
+}
+
+// The refinement from several first guesses; the best fit with its points before the cameras.
+bool refineBest(Problem& problem, const TiltEstimate& tilt, const StartPrior& prior, StartParameters& x,
+                Normal& normal) {
+  const StartParameters linear = x;
+  bool found = false;
+  for (const double factor : kVelocityGuesses) {
+    StartParameters guess = linear;
+    Vector11d change = Vector11d::Zero();
+    change.segment<3>(StartParameters::kVelocity) = (factor - 1.0) * linear.velocity();
+    guess.retract(change);
+    if (factor != 1.0) guess.setUp(tilt.up);
+    Normal at;
+    if (!refine(problem, tilt, prior, guess, at) || at.shareBehind() > kMostBehind) continue;
+    if (!found || at.cost < normal.cost) {
+      x = guess;
+      normal = at;
+    }
+    found = true;
+    if (normal.squares < kGoodFit * kGoodFit * normal.rows) break;
+  }
+  return found;
 }
 
 double medianParallax(const Problem& problem, const Cameras& cameras) {
@@ -457,9 +492,14 @@ Status solveMonoStart(std::span<const Preintegration> from_first, std::span<cons
   if (const Status status = linearSolve(problem, tilt, guess, x); !status.ok()) return status;
 
   Normal normal;
-  if (!refine(problem, tilt, prior, x, normal)) return {StatusCode::kNumerical, "mono start diverged"};
+  if (!refineBest(problem, tilt, prior, x, normal)) {
+    return {StatusCode::kDegenerate, "no path fits the bearings with points before the camera"};
+  }
   linearize(problem, x, tilt, prior, true);
-  if (!refine(problem, tilt, prior, x, normal)) return {StatusCode::kNumerical, "mono start diverged"};
+  if (problem.rejected.any() && !refine(problem, tilt, prior, x, normal)) {
+    return {StatusCode::kNumerical, "mono start diverged"};
+  }
+  if (normal.shareBehind() > kMostBehind) return {StatusCode::kDegenerate, "points behind the camera"};
 
   start.tracks = static_cast<int>(problem.tracks.size() - problem.rejected.count());
   if (start.tracks < static_cast<int>(kLeastTracks)) return {StatusCode::kDegenerate, "too few tracks agree"};

@@ -40,6 +40,7 @@ class StartParameters {
                 Eigen::Ref<Matrix, 0, Eigen::OuterStride<>> H, Eigen::Ref<Vector> b) const;
   /// The priors' share of the cost (sum of whitened squares).
   [[nodiscard]] double priorCost(const TiltEstimate& tilt, const StartPrior& prior) const;
+  void setUp(const Eigen::Vector3d& up) { up_ = up; }
   void retract(const Vector& step);
   void toMotionStart(const Matrix& covariance, MotionStart& start) const;
 

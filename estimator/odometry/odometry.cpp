@@ -11,6 +11,7 @@
 #include "estimator/imu/sample_monitor.hpp"
 #include "estimator/messages/smoothed_window.hpp"
 #include "estimator/odometry/health_monitor.hpp"
+#include "estimator/odometry/mono_starter.hpp"
 #include "estimator/smoother/imu_buffer.hpp"
 #include "estimator/smoother/smoother.hpp"
 
@@ -27,6 +28,7 @@ constexpr int kStartIterations = 8;
 constexpr double kStartVelocitySigma = 2.0;    // m/s
 constexpr double kStartGyroBiasSigma = 0.1;    // rad/s
 constexpr double kStartAccelBiasSigma = 0.15;  // m/s^2
+constexpr double kRestVelocitySigma = 0.01;    // m/s
 constexpr float kMinGate = 6.0F;               // px
 constexpr float kMaxGate = 40.0F;              // px
 // Predicted pixel error of a landmark after one interval: attitude and position error over depth.
@@ -45,6 +47,7 @@ class Odometry::Impl {
         monitor_(noise_),
         rest_(noise_),
         propagator_(noise_),
+        mono_starter_(rig_, noise_),
         imu_(kImuHistory) {}
 
   Status addImu(const ImuSample& sample, NavState* propagated) {
@@ -94,6 +97,10 @@ class Odometry::Impl {
       flushEvents(output);
       return okStatus();
     }
+    if (mono_starter_.size() > 0) {
+      const Status caught_up = catchUp(output);
+      if (!caught_up.ok()) return fail(caught_up, output);
+    }
     const double silence = imu_.empty() ? 1e9 : (tracked.stamp - imu_.newest().stamp).seconds();
     Smoother::StepInput input;
     input.frame = &tracked;
@@ -104,12 +111,7 @@ class Odometry::Impl {
     imu_gap_ = false;
     ++frames_in_epoch_;
     const Status status = smoother_.step(input, output.left_window);
-    if (!status.ok()) {
-      reset();
-      flushEvents(output);
-      output.waiting_for = status.what;
-      return status;
-    }
+    if (!status.ok()) return fail(status, output);
     publish(tracked, output);
     return okStatus();
   }
@@ -128,6 +130,7 @@ class Odometry::Impl {
     smoother_.reset();
     propagator_.reset();
     health_.reset();
+    mono_starter_.reset();
     window_.poses.clear();
     window_.landmarks.clear();
     frames_in_epoch_ = 0;
@@ -149,6 +152,9 @@ class Odometry::Impl {
     s.horizon = settings.horizon;
     s.estimate_time_offset = settings.estimate_time_offset;
     s.estimate_extrinsics = settings.estimate_extrinsics;
+    if (getenv("MK")) s.max_keyframes = atoi(getenv("MK"));         // DEV
+    if (getenv("MM")) s.max_motion_keyframes = atoi(getenv("MM"));  // DEV
+    if (getenv("MR")) s.max_recent = atoi(getenv("MR"));            // DEV
     return s;
   }
 
@@ -216,15 +222,43 @@ class Odometry::Impl {
       return false;
     }
     StartState start;
-    start.stamp = stamp;
-    start.state.T_world_body.rotation = gravityAlignedRotation(tilt.up);
-    start.tilt_sigma = tilt.sigma;
     start.velocity_sigma = kStartVelocitySigma;
-    start.gyro_bias_sigma = kStartGyroBiasSigma;
-    start.accel_bias_sigma = kStartAccelBiasSigma;
+    if (rig_.camera_count == 1 && !rest_.state().at_rest) {
+      mono_starter_.push(tracked);
+      if (!mono_starter_.trySolve(imu_, prior, settings_.pixel_sigma, start, output.waiting_for))
+        return false;
+    } else {
+      mono_starter_.reset();
+      start.stamp = stamp;
+      start.state.T_world_body.rotation = gravityAlignedRotation(tilt.up);
+      start.tilt_sigma = tilt.sigma;
+      start.gyro_bias_sigma = kStartGyroBiasSigma;
+      start.accel_bias_sigma = kStartAccelBiasSigma;
+      if (rest_.state().at_rest) start.velocity_sigma = kRestVelocitySigma;
+    }
     smoother_.start(start);
     frames_in_epoch_ = 0;
     return true;
+  }
+
+  /// Gives the smoother the frames that waited for the start, all but the newest.
+  Status catchUp(OdometryOutput& output) {
+    Smoother::StepInput input;
+    input.iterations = kStartIterations;
+    for (std::size_t k = 0; k + 1 < mono_starter_.size(); ++k) {
+      input.frame = &mono_starter_.frame(k);
+      const Status status = smoother_.step(input, output.left_window);
+      if (!status.ok()) return status;
+    }
+    mono_starter_.reset();
+    return okStatus();
+  }
+
+  Status fail(const Status& status, OdometryOutput& output) {
+    reset();
+    flushEvents(output);
+    output.waiting_for = status.what;
+    return status;
   }
 
   void publish(const TrackedFrame& tracked, OdometryOutput& output) {
@@ -264,6 +298,7 @@ class Odometry::Impl {
   RestDetector rest_;
   Propagator propagator_;
   HealthMonitor health_;
+  MonoStarter mono_starter_;
   ImuBuffer imu_;
 
   FrontendPrediction prediction_;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
@@ -165,8 +166,8 @@ struct Warp {
   }
 };
 
-// second(W(x)) = first(x): the second image is sampled through the inverse, found by iteration.
-// The source is the image's own half-size version, so that cubic sampling is far from aliasing.
+// second(W(x)) = first(x): the second image is sampled through the inverse, found by iteration, from
+// a slightly smoothed source, so that cubic sampling is far from aliasing. Both get their own noise.
 Pair synthesize(const GreyImage& source, const Warp& warp, std::uint64_t seed) {
   Random random(seed);
   cv::Mat smooth;
@@ -181,7 +182,7 @@ Pair synthesize(const GreyImage& source, const Warp& warp, std::uint64_t seed) {
       map.at<cv::Vec2f>(y, x) = {static_cast<float>(p.x()), static_cast<float>(p.y())};
     }
   }
-  // remap() rounds its coordinates to 1/32 px; sampling by hand is exact.
+  // OpenCV's remap rounds its coordinates to 1/32 px; sampling by hand is exact.
   Pair pair;
   for (GreyImage* image : {&pair.first, &pair.second}) {
     image->width = source.width;
@@ -205,7 +206,8 @@ Pair synthesize(const GreyImage& source, const Warp& warp, std::uint64_t seed) {
         for (int i = -1; i <= 2; ++i) {
           const int px = std::clamp(bx + i, 0, source.width - 1);
           const int py = std::clamp(by + j, 0, source.height - 1);
-          sum += cubic(m[0] - bx, i) * cubic(m[1] - by, j) * smooth.at<std::uint8_t>(py, px);
+          sum += cubic(static_cast<double>(m[0]) - bx, i) * cubic(static_cast<double>(m[1]) - by, j) *
+                 smooth.at<std::uint8_t>(py, px);
         }
       }
       const auto at = static_cast<std::size_t>(y * source.width + x);

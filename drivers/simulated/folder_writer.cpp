@@ -1,0 +1,249 @@
+#include "drivers/simulated/folder_writer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <iterator>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <tuple>
+
+#include "drivers/simulated/asl_text.hpp"
+#include "drivers/simulated/image_files.hpp"
+#include "drivers/simulated/parallel.hpp"
+#include "drivers/simulated/simulated_flight.hpp"
+
+namespace swiftlet {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kMaxDepth = 10.0;     // m; what lies further counts as not seen
+constexpr double kPinholeFocal = 0.94; // ideal camera's focal length over a narrow lens's own
+constexpr double kWideFocal = 0.45;    // over the image width, for lenses wider than a pinhole's useful field
+constexpr double kObservedCell = 0.03; // m
+constexpr int kObservedStride = 2;     // every n-th pixel of every n-th row
+
+// The ideal camera of the depth images.
+CameraModel depthCamera(const CameraModel& camera) {
+  const double focal = camera.kind() == CameraKind::kPinholeRadtan ? std::round(kPinholeFocal * camera.focal())
+                                                                   : kWideFocal * camera.width();
+  return {CameraKind::kPinholeRadtan,
+          camera.width(),
+          camera.height(),
+          {focal, focal, 0.5 * (camera.width() - 1), 0.5 * (camera.height() - 1)},
+          Eigen::Vector4d::Zero()};
+}
+
+// Depth, labels and the points they show, at every n-th frame.
+class TruthWriter {
+ public:
+  TruthWriter(const SimulatedFlight& flight, const TexturedWorld& world, const fs::path& folder)
+      : flight_(flight),
+        folder_(folder),
+        depth_(world, depthCamera(flight.trueRig().camera[0]), flight.trueRig().T_body_cam[0]),
+        labels_(world, flight.trueRig().camera[0], flight.trueRig().T_body_cam[0]) {
+    fs::create_directories(folder / "mav0/depth0/data");
+    fs::create_directories(folder / "mav0/labels0/data");
+    const double rate = flight.settings().camera_rate / flight.settings().depth_every;
+    const SE3& T = flight.givenRig().T_body_cam[0];
+    writeText(folder / "mav0/depth0/sensor.yaml", cameraYaml(depth_.camera(), T, rate, "depth_unit_m: 0.001\n"));
+    writeText(folder / "mav0/labels0/sensor.yaml", cameraYaml(labels_.camera(), T, rate, ""));
+    writeText(folder / "mav0/labels0/labels.csv", labelsCsv());
+  }
+
+  void write(int k) {
+    const SE3 T_world_body = flight_.trajectory().pose(flight_.imageTime(k));
+    const std::string name = fmt::format("{}.png", flight_.imageStamp(k).ns);
+    const int width = depth_.camera().width();
+    const int height = depth_.camera().height();
+    depth_.renderGeometry(T_world_body, flight_.settings().threads, geometry_);
+    millimetres_.clear();
+    for (const float depth : geometry_.depth) {
+      const bool seen = static_cast<double>(depth) <= kMaxDepth;
+      millimetres_.push_back(seen ? static_cast<std::uint16_t>(std::lround(1000.0F * depth)) : std::uint16_t{0});
+    }
+    collectPoints(T_world_body * flight_.trueRig().T_body_cam[0]);
+    writePng16(folder_ / "mav0/depth0/data" / name, millimetres_.data(), width, height);
+    labels_.renderGeometry(T_world_body, flight_.settings().threads, geometry_);
+    writePng8(folder_ / "mav0/labels0/data" / name, geometry_.label.data(), width, height);
+    fmt::format_to(std::back_inserter(rows_), "{},{}\n", flight_.imageStamp(k).ns, name);
+  }
+
+  void finish() {
+    for (const char* sensor : {"mav0/depth0", "mav0/labels0"}) {
+      writeText(folder_ / sensor / "data.csv", "#timestamp [ns],filename\n" + rows_);
+    }
+    std::vector<LabelledPoint> points;
+    points.reserve(observed_.size());
+    for (const auto& [cell, point] : observed_) points.push_back(point);
+    writeText(folder_ / "truth/observed.ply", pointsPly(points));
+  }
+
+ private:
+  void collectPoints(const SE3& T_world_cam) {
+    const Eigen::Vector4d& k = depth_.camera().intrinsics();
+    const int width = depth_.camera().width();
+    for (int y = 0; y < depth_.camera().height(); y += kObservedStride) {
+      for (int x = 0; x < width; x += kObservedStride) {
+        const auto i = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+        if (millimetres_[i] == 0) continue;
+        const auto z = static_cast<double>(geometry_.depth[i]);
+        const Eigen::Vector3d p = T_world_cam * Eigen::Vector3d((x - k[2]) / k[0] * z, (y - k[3]) / k[1] * z, z);
+        const auto cell = [](double value) { return static_cast<int>(std::floor(value / kObservedCell)); };
+        observed_.try_emplace({cell(p.x()), cell(p.y()), cell(p.z())},
+                              LabelledPoint{p.cast<float>(), geometry_.label[i]});
+      }
+    }
+  }
+
+  const SimulatedFlight& flight_;
+  fs::path folder_;
+  CameraRenderer depth_;
+  CameraRenderer labels_;
+  GeometryImage geometry_;
+  std::vector<std::uint16_t> millimetres_;
+  std::string rows_;
+  std::map<std::tuple<int, int, int>, LabelledPoint> observed_;
+};
+
+void writeImages(const SimulatedFlight& flight, const fs::path& folder, const SimulationProgress& progress) {
+  const SimulationSettings& settings = flight.settings();
+  FlightCameras cameras(flight);
+  const std::size_t count = cameras.cameraCount();
+  std::array<std::vector<std::uint8_t>, kMaxCameras> buffers;
+  std::array<std::uint8_t*, kMaxCameras> grey{};
+  std::array<std::string, kMaxCameras> rows;
+  for (std::size_t c = 0; c < count; ++c) {
+    const CameraModel& camera = flight.trueRig().camera[c];
+    buffers[c].resize(static_cast<std::size_t>(camera.width()) * static_cast<std::size_t>(camera.height()));
+    grey[c] = buffers[c].data();
+    fs::create_directories(folder / fmt::format("mav0/cam{}/data", c));
+  }
+  std::unique_ptr<TruthWriter> truth;
+  if (settings.depth_every > 0) truth = std::make_unique<TruthWriter>(flight, cameras.world(), folder);
+
+  const bool jpeg = settings.format == ImageFormat::kJpeg;
+  for (int k = 0; k < flight.imageCount(); ++k) {
+    std::array<bool, kMaxCameras> present{};
+    cameras.render(k, grey, present);
+    const std::string name = fmt::format("{}.{}", flight.imageStamp(k).ns, jpeg ? "jpg" : "png");
+    std::array<std::string, kMaxCameras> failed;
+    parallelFor(static_cast<int>(count), settings.threads, [&](int i) {
+      const auto c = static_cast<std::size_t>(i);
+      if (!present[c]) return;
+      const CameraModel& camera = flight.trueRig().camera[c];
+      const fs::path path = folder / fmt::format("mav0/cam{}/data", c) / name;
+      try {
+        if (jpeg) {
+          writeJpeg(path, grey[c], camera.width(), camera.height(), settings.jpeg_quality);
+        } else {
+          writePng8(path, grey[c], camera.width(), camera.height());
+        }
+      } catch (const std::runtime_error& error) {  // must not leave a thread
+        failed[c] = error.what();
+      }
+    });
+    for (std::size_t c = 0; c < count; ++c) {
+      if (!failed[c].empty()) throw std::runtime_error(failed[c]);
+      if (present[c]) fmt::format_to(std::back_inserter(rows[c]), "{},{}\n", flight.imageStamp(k).ns, name);
+    }
+    if (truth != nullptr && k % settings.depth_every == 0) truth->write(k);
+    if (progress) progress(k + 1, flight.imageCount());
+  }
+  for (std::size_t c = 0; c < count; ++c) {
+    writeText(folder / fmt::format("mav0/cam{}/data.csv", c), "#timestamp [ns],filename\n" + rows[c]);
+  }
+  if (truth != nullptr) truth->finish();
+}
+
+void writeTracks(const SimulatedFlight& flight, const fs::path& folder, const SimulationProgress& progress) {
+  fs::create_directories(folder / "mav0/tracks0");
+  TrackSimulator simulator(flight.world(), flight.trueRig(), flight.trajectory(), flight.settings().tracks);
+  const auto frame = std::make_unique<TrackedFrame>();
+  std::string text = "#timestamp [ns],id,camera,u [px],v [px],keyframe\n";
+  for (int k = 0; k < flight.imageCount(); ++k) {
+    const double seconds = flight.imageTime(k);
+    simulator.step(seconds, flight.imageStamp(k), *frame);
+    for (const TrackedFeature& feature : frame->features) {
+      for (std::size_t c = 0; c < flight.trueRig().camera_count; ++c) {
+        const bool hidden = flight.hasFault(FaultKind::kBlackout, c, seconds) ||
+                            flight.hasFault(FaultKind::kCameraMissing, c, seconds);
+        if (!feature.seen[c] || hidden) continue;
+        fmt::format_to(std::back_inserter(text), "{},{},{},{:.4f},{:.4f},{}\n", frame->stamp.ns, feature.id, c,
+                       feature.pixel[c].x(), feature.pixel[c].y(), frame->keyframe ? 1 : 0);
+      }
+    }
+    if (progress) progress(k + 1, flight.imageCount());
+  }
+  writeText(folder / "mav0/tracks0/data.csv", text);
+}
+
+std::string simulationYaml(const SimulatedFlight& flight) {
+  const SimulationSettings& s = flight.settings();
+  static constexpr std::array<const char*, 4> kFaults{"blackout", "camera_missing", "imu_gap", "imu_saturation"};
+  std::string text = fmt::format(
+      "seed: {}\nworld: {}\nworld_seed: {}\nrig: {}\nmotion: {}\nduration: {:g}\nspeed: {:g}\naggressiveness: {:g}\n"
+      "rest_at_start: {:g}\nexposure: {:g}\nlight: {:g}\nvibration_accel: {:g}\n",
+      s.seed, worldName(s.world.kind), s.world.seed, rigName(s.rig),
+      s.given_motion.empty() ? "own" : fs::path(s.given_motion).filename().string(), flight.duration(), s.flight.speed,
+      s.flight.aggressiveness, s.flight.rest_at_start, s.render.exposure, s.sensor.light,
+      s.imu.vibration.accel_amplitude);
+  // The true value of t_imu = t_image + shift, in seconds.
+  fmt::format_to(std::back_inserter(text), "timeshift_cam_imu: {:g}\n",
+                 flight.trueRig().camera_to_imu_shift.seconds());
+  text += s.faults.empty() ? "faults: []\n" : "faults:\n";
+  for (const Fault& fault : s.faults) {
+    fmt::format_to(std::back_inserter(text), "  - {{kind: {}, begin: {:g}, end: {:g}, camera: {}}}\n",
+                   kFaults[static_cast<std::size_t>(fault.kind)], fault.span.begin, fault.span.end, fault.camera);
+  }
+  return text;
+}
+
+void writeFlight(const SimulatedFlight& flight, const fs::path& folder) {
+  const SimulationSettings& s = flight.settings();
+  fs::create_directories(folder / "mav0/imu0");
+  fs::create_directories(folder / "mav0/state_groundtruth_estimate0");
+  fs::create_directories(folder / "truth");
+  for (std::size_t c = 0; c < flight.trueRig().camera_count; ++c) {
+    fs::create_directories(folder / fmt::format("mav0/cam{}", c));
+    const CameraModel& camera = flight.trueRig().camera[c];
+    writeText(folder / fmt::format("mav0/cam{}/sensor.yaml", c),
+              cameraYaml(camera, flight.givenRig().T_body_cam[c], s.camera_rate, ""));
+    writeText(folder / fmt::format("truth/cam{}.yaml", c),
+              cameraYaml(camera, flight.trueRig().T_body_cam[c], s.camera_rate, ""));
+  }
+  writeText(folder / "mav0/imu0/sensor.yaml", imuYaml(s.imu.noise));
+  writeText(folder / "mav0/imu0/data.csv", imuCsv(flight.imu().samples));
+  writeText(folder / "mav0/state_groundtruth_estimate0/data.csv",
+            groundTruthCsv(flight.trajectory(), flight.imu(), s.start, s.imu.noise.rate_hz));
+  writeText(folder / "truth/mesh.ply", meshPly(flight.world().mesh()));
+  writeText(folder / "truth/simulation.yaml", simulationYaml(flight));
+}
+
+}  // namespace
+
+Status simulateToFolder(const SimulationSettings& settings, const std::string& folder,
+                        const SimulationProgress& progress, std::string* message) {
+  try {
+    const SimulatedFlight flight(settings);
+    writeFlight(flight, folder);
+    if (settings.output == SimulatedOutput::kTracks) {
+      writeTracks(flight, folder, progress);
+    } else {
+      writeImages(flight, folder, progress);
+    }
+    return okStatus();
+  } catch (const std::invalid_argument& error) {
+    if (message != nullptr) *message = error.what();
+    return {StatusCode::kInvalidInput, "a simulation setting is out of range"};
+  } catch (const std::exception& error) {
+    if (message != nullptr) *message = error.what();
+    return {StatusCode::kFailed, "the simulated flight could not be made or written"};
+  }
+}
+
+}  // namespace swiftlet

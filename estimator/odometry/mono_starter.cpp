@@ -1,0 +1,111 @@
+#include "estimator/odometry/mono_starter.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+
+namespace swiftlet {
+namespace {
+
+constexpr std::size_t kKeptFrames = 64;  // 3.2 s at 20 Hz
+constexpr std::size_t kMinFrames = 8;
+constexpr Duration kShortestWindow = Duration::fromMilliseconds(400);
+constexpr double kScaleSigmaWanted = 0.10;    // relative
+constexpr double kScaleSigmaAccepted = 0.50;  // once the patience is over
+constexpr int kMinSightings = 3;
+
+}  // namespace
+
+MonoStarter::MonoStarter(const Rig& rig, const ImuNoise& noise)
+    : rig_(rig),
+      noise_(noise),
+      frames_(kKeptFrames),
+      tracks_(kMaxMonoTracks),
+      track_ids_(kMaxMonoTracks),
+      from_first_(kMaxMonoFrames) {}
+
+void MonoStarter::reset() { begin_ = count_ = 0; }
+
+void MonoStarter::push(const TrackedFrame& frame) {
+  if (count_ == frames_.size()) {
+    begin_ = (begin_ + 1) % frames_.size();
+    --count_;
+  }
+  frames_[(begin_ + count_++) % frames_.size()] = frame;
+}
+
+// Tracks of the chosen frames with enough sightings, moved to the front of `tracks_`.
+std::size_t MonoStarter::gatherTracks(std::span<const std::size_t> chosen) {
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < chosen.size(); ++k) {
+    for (const TrackedFeature& feature : frame(chosen[k]).features) {
+      Eigen::Vector3d bearing;
+      if (!feature.seen[0] || !rig_.camera[0].unproject(feature.pixel[0].cast<double>(), bearing)) continue;
+      const auto end = track_ids_.begin() + static_cast<std::ptrdiff_t>(count);
+      const auto found = std::find(track_ids_.begin(), end, feature.id);
+      const auto index = static_cast<std::size_t>(found - track_ids_.begin());
+      if (found == end) {
+        if (count == tracks_.size()) continue;
+        track_ids_[count] = feature.id;
+        tracks_[count].seen = 0;
+        ++count;
+      }
+      tracks_[index].seen |= 1U << k;
+      tracks_[index].bearing[k] = bearing;
+    }
+  }
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (std::popcount(tracks_[i].seen) >= kMinSightings) tracks_[kept++] = tracks_[i];
+  }
+  return kept;
+}
+
+bool MonoStarter::trySolve(const ImuBuffer& imu, const StartPrior& prior, double pixel_sigma,
+                           StartState& start, const char*& waiting_for) {
+  waiting_for = "more frames (one camera: the scale is found from motion)";
+  if (count_ < kMinFrames) return false;
+  const Duration waited = frame(count_ - 1).stamp - frame(0).stamp;
+  if (waited < kShortestWindow) return false;
+  const bool impatient = waited >= kMonoPatience;
+  const Duration shift = rig_.camera_to_imu_shift;
+
+  std::array<std::size_t, kMaxMonoFrames> chosen{};
+  const std::size_t n = std::min(count_, kMaxMonoFrames);
+  for (std::size_t k = 0; k < n; ++k) chosen[k] = k * (count_ - 1) / (n - 1);
+  const std::size_t tracks = gatherTracks(std::span(chosen).first(n));
+
+  const Stamp first = frame(0).stamp + shift;
+  TiltEstimate tilt;
+  const Stamp history = first - Duration::fromSeconds(1.0);
+  if (!estimateTilt(imu.around(history, first), first, noise_, prior, tilt).ok()) {
+    waiting_for = "IMU samples before the first image";
+    return false;
+  }
+  for (std::size_t k = 1; k < n; ++k) {
+    const Stamp at = frame(chosen[k]).stamp + shift;
+    from_first_[k - 1] = Preintegration(noise_, prior.bias_gyro, prior.bias_accel);
+    if (!from_first_[k - 1].integrate(imu.around(first, at), first, at).ok()) return false;
+  }
+  MonoStart mono;
+  const Status status =
+      solveMonoStart(std::span(from_first_).first(n - 1), std::span(tracks_).first(tracks),
+                     rig_.T_body_cam[0], pixel_sigma / rig_.camera[0].focal(), tilt, noise_, prior, mono);
+  waiting_for = status.ok() ? "acceleration that shows the scale" : "parallax";
+  const bool solved = status.ok() && mono.scale_sigma < (impatient ? kScaleSigmaAccepted : kScaleSigmaWanted);
+  if (!solved && !impatient) return false;
+  start.stamp = first;
+  start.state = BodyState{};
+  start.state.T_world_body.rotation = gravityAlignedRotation(solved ? mono.motion.up : tilt.up);
+  if (solved) {
+    start.state.v_world_body = start.state.T_world_body.rotation * mono.motion.velocity;
+    start.state.bias_gyro = mono.motion.bias_gyro;
+    start.state.bias_accel = mono.motion.bias_accel;
+  }
+  start.tilt_sigma = tilt.sigma;
+  start.gyro_bias_sigma = prior.bias_gyro_sigma;
+  start.accel_bias_sigma = prior.bias_accel_sigma;
+  return true;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,57 @@
+#pragma once
+// The start with one camera: frames are kept until velocity, tilt and scale can be solved for.
+//
+// One camera shows no scale until the body accelerates; so the first frames wait here, at most
+// `kMonoPatience`. They are then handed to the smoother one after the other from the solved first
+// state, as if they had just arrived. At rest the velocity is known, and nothing has to wait.
+// Memory: 64 frames, about 1.3 MiB, reserved by the constructor. Cost: about 1 ms a frame while waiting.
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "estimator/camera/rig.hpp"
+#include "estimator/imu/initialization.hpp"
+#include "estimator/imu/mono_start.hpp"
+#include "estimator/messages/tracked_frame.hpp"
+#include "estimator/smoother/imu_buffer.hpp"
+#include "estimator/smoother/smoother.hpp"
+
+namespace swiftlet {
+
+/// Longest wait for a sure scale; then the best guess is taken.
+inline constexpr Duration kMonoPatience = Duration::fromMilliseconds(2600);
+
+class MonoStarter {
+ public:
+  MonoStarter(const Rig& rig, const ImuNoise& noise);
+
+  void reset();
+
+  /// Keeps a frame; the oldest goes when full.
+  void push(const TrackedFrame& frame);
+
+  [[nodiscard]] std::size_t size() const { return count_; }
+  /// Frame k of those kept, oldest first.
+  [[nodiscard]] const TrackedFrame& frame(std::size_t k) const {
+    return frames_[(begin_ + k) % frames_.size()];
+  }
+
+  /// Solves from frames first..newest. True when the scale is known well enough, or the patience is
+  /// over; `start` is then the state at frame `first`. `waiting_for` says what is missing otherwise.
+  bool trySolve(const ImuBuffer& imu, const StartPrior& prior, double pixel_sigma, StartState& start,
+                const char*& waiting_for);
+
+ private:
+  [[nodiscard]] std::size_t gatherTracks(std::span<const std::size_t> chosen);
+
+  Rig rig_;
+  ImuNoise noise_;
+  std::vector<TrackedFrame> frames_;
+  std::size_t begin_ = 0;
+  std::size_t count_ = 0;
+  std::vector<BearingTrack> tracks_;
+  std::vector<TrackId> track_ids_;
+  std::vector<Preintegration> from_first_;
+};
+
+}  // namespace swiftlet
