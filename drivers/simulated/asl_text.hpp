@@ -14,11 +14,13 @@
 namespace swiftlet {
 
 /// sensor.yaml of a camera; `extra` lines go at its end.
-std::string cameraYaml(const CameraModel& camera, const SE3& T_body_cam, double rate_hz, const std::string& extra);
+std::string cameraYaml(const CameraModel& camera, const SE3& T_body_cam, double rate_hz,
+                       const std::string& extra);
 std::string imuYaml(const ImuNoise& noise);
 std::string imuCsv(const std::vector<ImuSample>& samples);
 /// 17 columns: stamp, p, q (wxyz), v, gyro and accelerometer bias, at the IMU's steps.
-std::string groundTruthCsv(const SplineTrajectory& trajectory, const SimulatedImu& imu, Stamp zero, double rate_hz);
+std::string groundTruthCsv(const SplineTrajectory& trajectory, const SimulatedImu& imu, Stamp zero,
+                           double rate_hz);
 std::string labelsCsv();
 std::string meshPly(const SurfaceMesh& mesh);
 

@@ -49,7 +49,8 @@ struct Shading {
   float level_shift = 0;  // spread over the samples, so that their mean blends two levels
 };
 
-void shadeTile(const Shading& shading, const View& view, const Tile& tile, std::array<float, kTilePixels>& sum) {
+void shadeTile(const Shading& shading, const View& view, const Tile& tile,
+               std::array<float, kTilePixels>& sum) {
   for (int i = 0; i < kTilePixels; ++i) {
     const auto k = static_cast<std::size_t>(i);
     if (tile.hit[k] < 0) continue;
@@ -77,12 +78,13 @@ Grid tileGrid(const RayTable& rays) {
 CameraRenderer::CameraRenderer(const TexturedWorld& world, const CameraModel& camera, const SE3& T_body_cam)
     : world_(&world), camera_(camera), T_body_cam_(T_body_cam), rays_(camera) {}
 
-void CameraRenderer::renderImage(const SplineTrajectory& trajectory, double seconds, const RenderSettings& settings,
-                                 std::vector<float>& radiance) const {
+void CameraRenderer::renderImage(const SplineTrajectory& trajectory, double seconds,
+                                 const RenderSettings& settings, std::vector<float>& radiance) const {
   const MotionState motion = trajectory.at(seconds);
   const double turn = motion.omega_body.norm() * settings.exposure;
-  const double shift = (motion.v_world_body.norm() + motion.omega_body.norm() * T_body_cam_.translation.norm()) *
-                       settings.exposure;
+  const double shift =
+      (motion.v_world_body.norm() + motion.omega_body.norm() * T_body_cam_.translation.norm()) *
+      settings.exposure;
   // Something at a metre's distance moves by this much on top of the turn.
   const double moved = (turn + shift) * camera_.focal();
   const int count = settings.samples <= 1 ? 1 : moved > 4 * kPixelsPerSample ? kMaxSamples : 4;
@@ -110,7 +112,8 @@ void CameraRenderer::renderImage(const SplineTrajectory& trajectory, double seco
     for (int tile_column = 0; tile_column < grid.columns; ++tile_column) {
       const int column = tile_column * kTileSide;
       const int row = tile_row * kTileSide;
-      patchesInTile(middle_view, rays_, column, row, static_cast<float>(turn), static_cast<float>(slack), candidates);
+      patchesInTile(middle_view, rays_, column, row, static_cast<float>(turn), static_cast<float>(slack),
+                    candidates);
       // From places in the middle view to places in views that keep every patch.
       for (std::int32_t& id : candidates) {
         id = static_cast<std::int32_t>(middle_view.patches()[static_cast<std::size_t>(id)].index);

@@ -18,8 +18,8 @@
 namespace swiftlet {
 
 struct RenderSettings {
-  int samples = 4;             ///< rays a pixel: 1, 4 or, where the image moves fast, up to 8
-  double exposure = 0.004;     ///< s
+  int samples = 4;          ///< rays a pixel: 1, 4 or, where the image moves fast, up to 8
+  double exposure = 0.004;  ///< s
   int threads = 2;
 };
 

@@ -11,14 +11,14 @@ namespace swiftlet {
 namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
-constexpr double kKnotSpacing = 0.1;      // s; the controls follow oscillations up to about 2 Hz
-constexpr double kPathStep = 0.02;        // m between samples of the rounded tour
-constexpr double kRamp = 1.0;             // s from motion to rest
-constexpr double kHeadingAhead = 0.5;     // m: the airframe looks where it will be
-constexpr double kHeadingSmooth = 0.7;    // s at the mean speed, sigma of the heading's low pass
-constexpr double kClimb = 2.5;            // s of take-off
-constexpr double kGroundClearance = 0.12; // m of the body above the floor when landed
-constexpr double kMargin = 1.0;           // s of motion beyond both ends, for the spline's support
+constexpr double kKnotSpacing = 0.1;       // s; the controls follow oscillations up to about 2 Hz
+constexpr double kPathStep = 0.02;         // m between samples of the rounded tour
+constexpr double kRamp = 1.0;              // s from motion to rest
+constexpr double kHeadingAhead = 0.5;      // m: the airframe looks where it will be
+constexpr double kHeadingSmooth = 0.7;     // s at the mean speed, sigma of the heading's low pass
+constexpr double kClimb = 2.5;             // s of take-off
+constexpr double kGroundClearance = 0.12;  // m of the body above the floor when landed
+constexpr double kMargin = 1.0;            // s of motion beyond both ends, for the spline's support
 
 double smoothStep(double x) {  // 0 to 1 with vanishing first and second derivatives at both ends
   x = std::clamp(x, 0.0, 1.0);
@@ -94,10 +94,9 @@ class RoundedTour {
     const auto i = static_cast<std::size_t>(place);
     const double u = place - static_cast<double>(i);
     const double v = 1.0 - u;
-    return (v * v * v * waypoints_[i % n] +
-            (3 * u * u * u - 6 * u * u + 4) * waypoints_[(i + 1) % n] +
-            (3 * v * v * v - 6 * v * v + 4) * waypoints_[(i + 2) % n] +
-            u * u * u * waypoints_[(i + 3) % n]) / 6.0;
+    return (v * v * v * waypoints_[i % n] + (3 * u * u * u - 6 * u * u + 4) * waypoints_[(i + 1) % n] +
+            (3 * v * v * v - 6 * v * v + 4) * waypoints_[(i + 2) % n] + u * u * u * waypoints_[(i + 3) % n]) /
+           6.0;
   }
   // Direction half a metre ahead, unwrapped along one lap, then a Gaussian along the way.
   void smoothHeading(double sigma) {
@@ -172,7 +171,8 @@ std::vector<PathSample> samplePath(const Tour& tour, const FlightSettings& setti
   std::vector<PathSample> samples;
   constexpr int kSubsteps = 10;
   const double step = kKnotSpacing / kSubsteps;
-  const auto count = static_cast<std::size_t>(std::ceil((settings.duration + 2 * kMargin) / kKnotSpacing)) + 6;
+  const auto count =
+      static_cast<std::size_t>(std::ceil((settings.duration + 2 * kMargin) / kKnotSpacing)) + 6;
   double s = begin;
   double activity_time = 0;
   double climb_time = 0;

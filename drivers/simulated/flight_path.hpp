@@ -31,15 +31,15 @@ struct RestPhase {
 };
 
 struct FlightSettings {
-  double duration = 60;           ///< s
-  double speed = 1.0;             ///< m/s along the tour, in the mean
-  double aggressiveness = 1.0;    ///< scales oscillation of position, heading and speed: 0 calm, 2 fast
-  double rest_at_start = 0;       ///< s at rest before the flight; 0: the log begins in motion
-  bool start_on_ground = false;   ///< the rest at the start is on the floor, the flight takes off
-  std::vector<RestPhase> rests;   ///< further phases, in order, not overlapping
-  std::uint64_t seed = 1;         ///< phases of the oscillations and where on the tour it begins
+  double duration = 60;          ///< s
+  double speed = 1.0;            ///< m/s along the tour, in the mean
+  double aggressiveness = 1.0;   ///< scales oscillation of position, heading and speed: 0 calm, 2 fast
+  double rest_at_start = 0;      ///< s at rest before the flight; 0: the log begins in motion
+  bool start_on_ground = false;  ///< the rest at the start is on the floor, the flight takes off
+  std::vector<RestPhase> rests;  ///< further phases, in order, not overlapping
+  std::uint64_t seed = 1;        ///< phases of the oscillations and where on the tour it begins
   Eigen::Quaterniond R_flu_body = Eigen::Quaterniond::Identity();  ///< IMU axes in the airframe
-  double gravity = 9.81;          ///< m/s^2
+  double gravity = 9.81;                                           ///< m/s^2
 };
 
 /// EuRoC's IMU axes: x up, y right, z forward.

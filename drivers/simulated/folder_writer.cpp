@@ -21,16 +21,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMaxDepth = 10.0;     // m; what lies further counts as not seen
-constexpr double kPinholeFocal = 0.94; // ideal camera's focal length over a narrow lens's own
-constexpr double kWideFocal = 0.45;    // over the image width, for lenses wider than a pinhole's useful field
-constexpr double kObservedCell = 0.03; // m
-constexpr int kObservedStride = 2;     // every n-th pixel of every n-th row
+constexpr double kMaxDepth = 10.0;      // m; what lies further counts as not seen
+constexpr double kPinholeFocal = 0.94;  // ideal camera's focal length over a narrow lens's own
+constexpr double kWideFocal = 0.45;  // over the image width, for lenses wider than a pinhole's useful field
+constexpr double kObservedCell = 0.03;  // m
+constexpr int kObservedStride = 2;      // every n-th pixel of every n-th row
 
 // The ideal camera of the depth images.
 CameraModel depthCamera(const CameraModel& camera) {
-  const double focal = camera.kind() == CameraKind::kPinholeRadtan ? std::round(kPinholeFocal * camera.focal())
-                                                                   : kWideFocal * camera.width();
+  const double focal = camera.kind() == CameraKind::kPinholeRadtan
+                           ? std::round(kPinholeFocal * camera.focal())
+                           : kWideFocal * camera.width();
   return {CameraKind::kPinholeRadtan,
           camera.width(),
           camera.height(),
@@ -50,7 +51,8 @@ class TruthWriter {
     fs::create_directories(folder / "mav0/labels0/data");
     const double rate = flight.settings().camera_rate / flight.settings().depth_every;
     const SE3& T = flight.givenRig().T_body_cam[0];
-    writeText(folder / "mav0/depth0/sensor.yaml", cameraYaml(depth_.camera(), T, rate, "depth_unit_m: 0.001\n"));
+    writeText(folder / "mav0/depth0/sensor.yaml",
+              cameraYaml(depth_.camera(), T, rate, "depth_unit_m: 0.001\n"));
     writeText(folder / "mav0/labels0/sensor.yaml", cameraYaml(labels_.camera(), T, rate, ""));
     writeText(folder / "mav0/labels0/labels.csv", labelsCsv());
   }
@@ -64,7 +66,8 @@ class TruthWriter {
     millimetres_.clear();
     for (const float depth : geometry_.depth) {
       const bool seen = static_cast<double>(depth) <= kMaxDepth;
-      millimetres_.push_back(seen ? static_cast<std::uint16_t>(std::lround(1000.0F * depth)) : std::uint16_t{0});
+      millimetres_.push_back(seen ? static_cast<std::uint16_t>(std::lround(1000.0F * depth))
+                                  : std::uint16_t{0});
     }
     collectPoints(T_world_body * flight_.trueRig().T_body_cam[0]);
     writePng16(folder_ / "mav0/depth0/data" / name, millimetres_.data(), width, height);
@@ -89,10 +92,12 @@ class TruthWriter {
     const int width = depth_.camera().width();
     for (int y = 0; y < depth_.camera().height(); y += kObservedStride) {
       for (int x = 0; x < width; x += kObservedStride) {
-        const auto i = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+        const auto i =
+            static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
         if (millimetres_[i] == 0) continue;
         const auto z = static_cast<double>(geometry_.depth[i]);
-        const Eigen::Vector3d p = T_world_cam * Eigen::Vector3d((x - k[2]) / k[0] * z, (y - k[3]) / k[1] * z, z);
+        const Eigen::Vector3d p =
+            T_world_cam * Eigen::Vector3d((x - k[2]) / k[0] * z, (y - k[3]) / k[1] * z, z);
         const auto cell = [](double value) { return static_cast<int>(std::floor(value / kObservedCell)); };
         observed_.try_emplace({cell(p.x()), cell(p.y()), cell(p.z())},
                               LabelledPoint{p.cast<float>(), geometry_.label[i]});
@@ -173,8 +178,8 @@ void writeTracks(const SimulatedFlight& flight, const fs::path& folder, const Si
         const bool hidden = flight.hasFault(FaultKind::kBlackout, c, seconds) ||
                             flight.hasFault(FaultKind::kCameraMissing, c, seconds);
         if (!feature.seen[c] || hidden) continue;
-        fmt::format_to(std::back_inserter(text), "{},{},{},{:.4f},{:.4f},{}\n", frame->stamp.ns, feature.id, c,
-                       feature.pixel[c].x(), feature.pixel[c].y(), frame->keyframe ? 1 : 0);
+        fmt::format_to(std::back_inserter(text), "{},{},{},{:.4f},{:.4f},{}\n", frame->stamp.ns, feature.id,
+                       c, feature.pixel[c].x(), feature.pixel[c].y(), frame->keyframe ? 1 : 0);
       }
     }
     if (progress) progress(k + 1, flight.imageCount());
@@ -184,13 +189,15 @@ void writeTracks(const SimulatedFlight& flight, const fs::path& folder, const Si
 
 std::string simulationYaml(const SimulatedFlight& flight) {
   const SimulationSettings& s = flight.settings();
-  static constexpr std::array<const char*, 4> kFaults{"blackout", "camera_missing", "imu_gap", "imu_saturation"};
+  static constexpr std::array<const char*, 4> kFaults{"blackout", "camera_missing", "imu_gap",
+                                                      "imu_saturation"};
   std::string text = fmt::format(
-      "seed: {}\nworld: {}\nworld_seed: {}\nrig: {}\nmotion: {}\nduration: {:g}\nspeed: {:g}\naggressiveness: {:g}\n"
+      "seed: {}\nworld: {}\nworld_seed: {}\nrig: {}\nmotion: {}\nduration: {:g}\nspeed: "
+      "{:g}\naggressiveness: {:g}\n"
       "rest_at_start: {:g}\nexposure: {:g}\nlight: {:g}\nvibration_accel: {:g}\n",
       s.seed, worldName(s.world.kind), s.world.seed, rigName(s.rig),
-      s.given_motion.empty() ? "own" : fs::path(s.given_motion).filename().string(), flight.duration(), s.flight.speed,
-      s.flight.aggressiveness, s.flight.rest_at_start, s.render.exposure, s.sensor.light,
+      s.given_motion.empty() ? "own" : fs::path(s.given_motion).filename().string(), flight.duration(),
+      s.flight.speed, s.flight.aggressiveness, s.flight.rest_at_start, s.render.exposure, s.sensor.light,
       s.imu.vibration.accel_amplitude);
   // The true value of t_imu = t_image + shift, in seconds.
   fmt::format_to(std::back_inserter(text), "timeshift_cam_imu: {:g}\n",
@@ -198,7 +205,8 @@ std::string simulationYaml(const SimulatedFlight& flight) {
   text += s.faults.empty() ? "faults: []\n" : "faults:\n";
   for (const Fault& fault : s.faults) {
     fmt::format_to(std::back_inserter(text), "  - {{kind: {}, begin: {:g}, end: {:g}, camera: {}}}\n",
-                   kFaults[static_cast<std::size_t>(fault.kind)], fault.span.begin, fault.span.end, fault.camera);
+                   kFaults[static_cast<std::size_t>(fault.kind)], fault.span.begin, fault.span.end,
+                   fault.camera);
   }
   return text;
 }

@@ -43,12 +43,12 @@ void addBox(World& world, const Place& place, const Eigen::Vector3d& size, const
   const double a = 0.5 * size.x();
   const double b = 0.5 * size.y();
   const double h = size.z();
-  addSide(world, f.at(-a, -b, 0), f.x, size.x(), z, h, finish, 0);   // towards -y
-  addSide(world, f.at(a, b, 0), -f.x, size.x(), z, h, front, 1);     // towards +y
-  addSide(world, f.at(a, -b, 0), f.y, size.y(), z, h, finish, 2);    // towards +x
-  addSide(world, f.at(-a, b, 0), -f.y, size.y(), z, h, finish, 3);   // towards -x
-  addSide(world, f.at(-a, -b, h), f.x, size.x(), f.y, size.y(), finish, 4);   // top
-  addSide(world, f.at(-a, b, 0), f.x, size.x(), -f.y, size.y(), finish, 5);   // bottom
+  addSide(world, f.at(-a, -b, 0), f.x, size.x(), z, h, finish, 0);           // towards -y
+  addSide(world, f.at(a, b, 0), -f.x, size.x(), z, h, front, 1);             // towards +y
+  addSide(world, f.at(a, -b, 0), f.y, size.y(), z, h, finish, 2);            // towards +x
+  addSide(world, f.at(-a, b, 0), -f.y, size.y(), z, h, finish, 3);           // towards -x
+  addSide(world, f.at(-a, -b, h), f.x, size.x(), f.y, size.y(), finish, 4);  // top
+  addSide(world, f.at(-a, b, 0), f.x, size.x(), -f.y, size.y(), finish, 5);  // bottom
 }
 
 void addBox(World& world, const Place& place, const Eigen::Vector3d& size, const Finish& finish) {
@@ -111,7 +111,8 @@ void addChair(World& world, const Place& place, std::uint32_t seed) {
 }
 
 void addShelf(World& world, const Place& place, const Eigen::Vector3d& size, std::uint32_t seed) {
-  addBox(world, place, size, {Material::kWood, Label::kShelf, seed}, {Material::kBooks, Label::kShelf, seed + 1});
+  addBox(world, place, size, {Material::kWood, Label::kShelf, seed},
+         {Material::kBooks, Label::kShelf, seed + 1});
 }
 
 void addMachine(World& world, const Place& place, const Eigen::Vector3d& size, std::uint32_t seed) {

@@ -71,13 +71,16 @@ std::vector<Row> parseRows(const std::string& text, const std::string& path) {
       value[i] = std::strtod(cursor, &end);
       good = end != cursor && std::isfinite(value[i]);
     }
-    if (!good) throw std::runtime_error(path + ":" + std::to_string(number) + ": not a pose (stamp, p xyz, q wxyz)");
+    if (!good)
+      throw std::runtime_error(path + ":" + std::to_string(number) + ": not a pose (stamp, p xyz, q wxyz)");
     if (rows.empty()) first_ns = ns;
     Row row;
     row.t = static_cast<double>(ns - first_ns) * 1e-9;
-    row.pose = SE3(Eigen::Quaterniond(value[3], value[4], value[5], value[6]), {value[0], value[1], value[2]});
+    row.pose =
+        SE3(Eigen::Quaterniond(value[3], value[4], value[5], value[6]), {value[0], value[1], value[2]});
     if (!rows.empty() && (row.t <= rows.back().t || row.t > rows.back().t + kMaxGap)) {
-      throw std::runtime_error(path + ":" + std::to_string(number) + ": stamps must rise by at most 0.5 s a row");
+      throw std::runtime_error(path + ":" + std::to_string(number) +
+                               ": stamps must rise by at most 0.5 s a row");
     }
     rows.push_back(row);
   }

@@ -40,11 +40,12 @@ void writeAll(const std::string& path, const std::uint8_t* data, std::size_t siz
 
 // False when libpng reports an error, which it does by a jump back to here: nothing with a
 // destructor may be made between.
-bool encodePng(png_structp png, png_infop info, const std::uint8_t* rows, std::ptrdiff_t stride, int width, int height,
-               int depth) {
+bool encodePng(png_structp png, png_infop info, const std::uint8_t* rows, std::ptrdiff_t stride, int width,
+               int height, int depth) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;
   png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), depth,
-               PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+               PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+               PNG_FILTER_TYPE_DEFAULT);
   png_set_compression_level(png, kPngLevel);
   png_set_filter(png, 0, PNG_FILTER_UP);
   png_write_info(png, info);
@@ -76,8 +77,8 @@ void writePng8(const std::string& path, const std::uint8_t* grey, int width, int
 }
 
 void writePng16(const std::string& path, const std::uint16_t* grey, int width, int height) {
-  writePng(path, reinterpret_cast<const std::uint8_t*>(grey), 2 * static_cast<std::ptrdiff_t>(width), width, height,
-           16);
+  writePng(path, reinterpret_cast<const std::uint8_t*>(grey), 2 * static_cast<std::ptrdiff_t>(width), width,
+           height, 16);
 }
 
 void writeJpeg(const std::string& path, const std::uint8_t* grey, int width, int height, int quality) {
@@ -85,8 +86,8 @@ void writeJpeg(const std::string& path, const std::uint8_t* grey, int width, int
   unsigned char* data = nullptr;
   unsigned long size = 0;
   const int result = encoder == nullptr ? -1
-                                        : tjCompress2(encoder.get(), grey, width, width, height, TJPF_GRAY, &data,
-                                                      &size, TJSAMP_GRAY, quality, TJFLAG_ACCURATEDCT);
+                                        : tjCompress2(encoder.get(), grey, width, width, height, TJPF_GRAY,
+                                                      &data, &size, TJSAMP_GRAY, quality, TJFLAG_ACCURATEDCT);
   const std::unique_ptr<unsigned char, void (*)(unsigned char*)> owner(data, tjFree);
   if (result != 0) throw std::runtime_error(path + ": the JPEG encoder failed");
   writeAll(path, data, size);

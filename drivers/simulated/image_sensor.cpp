@@ -72,7 +72,8 @@ double exposeImage(const std::vector<float>& radiance, int width, int height, co
   const NormalTable& normals = normalTable();
   const double own_gain = gain * (camera == 1 ? settings.right_gain : 1.0);
   const auto scale = static_cast<float>(kWhite * own_gain * settings.light);
-  const auto read_variance = static_cast<float>(settings.read_noise * settings.read_noise * own_gain * own_gain);
+  const auto read_variance =
+      static_cast<float>(settings.read_noise * settings.read_noise * own_gain * own_gain);
   const auto shot = static_cast<float>(settings.shot_noise * own_gain);
   const float half_x = 0.5F * static_cast<float>(width);
   const float half_y = 0.5F * static_cast<float>(height);
@@ -80,8 +81,9 @@ double exposeImage(const std::vector<float>& radiance, int width, int height, co
   const auto loss = static_cast<float>(settings.vignette);
   std::vector<std::int64_t> row_sum(static_cast<std::size_t>(height));
   parallelFor(height, threads, [&](int y) {
-    Random random(settings.seed ^ (frame * 0x9E3779B97F4A7C15ULL),
-                  kNoiseStream + 2 * static_cast<std::uint64_t>(y) + 65536 * static_cast<std::uint64_t>(camera));
+    Random random(
+        settings.seed ^ (frame * 0x9E3779B97F4A7C15ULL),
+        kNoiseStream + 2 * static_cast<std::uint64_t>(y) + 65536 * static_cast<std::uint64_t>(camera));
     const float* in = radiance.data() + static_cast<std::ptrdiff_t>(y) * width;
     std::uint8_t* out = grey + static_cast<std::ptrdiff_t>(y) * width;
     const float dy = static_cast<float>(y) - half_y;

@@ -13,15 +13,15 @@
 namespace swiftlet {
 
 struct SensorSettings {
-  double light = 1.0;            ///< scene light; 0.05: a dim room
-  double read_noise = 0.7;       ///< grey values at nominal gain
-  double shot_noise = 0.018;     ///< grey values squared per grey value at nominal gain
-  double vignette = 0.35;        ///< light lost in the image's corners
-  double target_mean = 100;      ///< grey value that exposure control aims at
-  double settle_time = 0.25;     ///< s, time constant of exposure control
-  double start_error = 0.45;     ///< gain at the first image over the right one
-  double max_gain = 24;          ///< over nominal
-  double right_gain = 0.96;      ///< camera 1 is this much less sensitive
+  double light = 1.0;         ///< scene light; 0.05: a dim room
+  double read_noise = 0.7;    ///< grey values at nominal gain
+  double shot_noise = 0.018;  ///< grey values squared per grey value at nominal gain
+  double vignette = 0.35;     ///< light lost in the image's corners
+  double target_mean = 100;   ///< grey value that exposure control aims at
+  double settle_time = 0.25;  ///< s, time constant of exposure control
+  double start_error = 0.45;  ///< gain at the first image over the right one
+  double max_gain = 24;       ///< over nominal
+  double right_gain = 0.96;   ///< camera 1 is this much less sensitive
   std::uint64_t seed = 1;
 };
 

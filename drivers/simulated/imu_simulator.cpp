@@ -62,8 +62,8 @@ Eigen::Vector3d clip(const Eigen::Vector3d& value, double limit) {
 
 }  // namespace
 
-SimulatedImu simulateImu(const SplineTrajectory& trajectory, const ImuSimulationSettings& settings, Stamp zero,
-                         double duration) {
+SimulatedImu simulateImu(const SplineTrajectory& trajectory, const ImuSimulationSettings& settings,
+                         Stamp zero, double duration) {
   const ImuNoise& noise = settings.noise;
   const double interval = 1.0 / noise.rate_hz;
   const double white_scale = settings.noise_free ? 0.0 : std::sqrt(noise.rate_hz);

@@ -35,8 +35,8 @@ struct TimeSpan {
 };
 
 struct ImuSimulationSettings {
-  ImuNoise noise;          ///< densities, rate, gravity, saturation
-  bool noise_free = false; ///< exact readings: no noise, no bias, no vibration
+  ImuNoise noise;           ///< densities, rate, gravity, saturation
+  bool noise_free = false;  ///< exact readings: no noise, no bias, no vibration
   /// Initial biases. Drawn with these standard deviations per axis when `draw_bias`.
   bool draw_bias = true;
   double gyro_bias_sigma = 0.02;   ///< rad/s
@@ -61,7 +61,7 @@ struct SimulatedImu {
 
 /// Reading k has stamp `zero` + round(k 1e9 / rate) ns, at time k / rate of the trajectory, from
 /// time 0 up to and including `duration`.
-SimulatedImu simulateImu(const SplineTrajectory& trajectory, const ImuSimulationSettings& settings, Stamp zero,
-                         double duration);
+SimulatedImu simulateImu(const SplineTrajectory& trajectory, const ImuSimulationSettings& settings,
+                         Stamp zero, double duration);
 
 }  // namespace swiftlet

@@ -24,8 +24,10 @@ LightGrid::LightGrid(const World& world, std::size_t index, double spacing) {
   for (int j = 0; j < rows_; ++j) {
     for (int i = 0; i < columns_; ++i) {
       // Grid points on the very edge would touch the neighbouring surface: draw them in a little.
-      const double u = std::clamp(i / static_cast<double>(per_u_), kSlack, std::max(kSlack, patch.u_length - kSlack));
-      const double v = std::clamp(j / static_cast<double>(per_v_), kSlack, std::max(kSlack, patch.v_length - kSlack));
+      const double u =
+          std::clamp(i / static_cast<double>(per_u_), kSlack, std::max(kSlack, patch.u_length - kSlack));
+      const double v =
+          std::clamp(j / static_cast<double>(per_v_), kSlack, std::max(kSlack, patch.v_length - kSlack));
       const Eigen::Vector3d normal = patch.normalAt(u, v);
       const Eigen::Vector3d point = patch.pointAt(u, v) + 0.5 * kSlack * normal;
       double light = kAmbient + kFromFloor * std::max(0.0, -normal.z());

@@ -18,7 +18,8 @@ std::uint32_t mix(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
 
 // Uniform in [0, 1) from a cell's integer coordinates.
 float cellValue(int x, int y, std::uint32_t seed) {
-  return static_cast<float>(mix(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), seed)) * 0x1p-32F;
+  return static_cast<float>(mix(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), seed)) *
+         0x1p-32F;
 }
 
 // Fractal noise, tiled, mean 0 and standard deviation about 1: made once, sampled everywhere.
@@ -70,7 +71,8 @@ class NoiseTile {
         const int cy = y / period;
         const float top = lattice(cx, cy) + su * (lattice(cx + 1, cy) - lattice(cx, cy));
         const float low = lattice(cx, cy + 1) + su * (lattice(cx + 1, cy + 1) - lattice(cx, cy + 1));
-        value_[static_cast<std::size_t>(y) * kSize + static_cast<std::size_t>(x)] += amplitude * (top + sv * (low - top));
+        value_[static_cast<std::size_t>(y) * kSize + static_cast<std::size_t>(x)] +=
+            amplitude * (top + sv * (low - top));
       }
     }
   }
@@ -90,7 +92,9 @@ struct Brush {
   [[nodiscard]] float noise(float u, float v, float per_metre) const {
     return noiseTile().at(u * per_metre + shift_x, v * per_metre + shift_y);
   }
-  [[nodiscard]] float cell(int x, int y, std::uint32_t salt) const { return cellValue(x, y, seed * 31U + salt); }
+  [[nodiscard]] float cell(int x, int y, std::uint32_t salt) const {
+    return cellValue(x, y, seed * 31U + salt);
+  }
 };
 
 struct CellPlace {
@@ -109,12 +113,13 @@ CellPlace cellAt(float u, float v, float width, float height, float stagger) {
   return place;
 }
 bool nearEdge(const CellPlace& place, float width, float height, float margin) {
-  return place.in_x < margin || place.in_y < margin || place.in_x > width - margin || place.in_y > height - margin;
+  return place.in_x < margin || place.in_y < margin || place.in_x > width - margin ||
+         place.in_y > height - margin;
 }
 
 // Round spots at random places of a grid: distance to the cell's spot over its radius; 1 and more is outside.
-float spot(const Brush& brush, float u, float v, float pitch, float radius_low, float radius_high, float share,
-           std::uint32_t salt) {
+float spot(const Brush& brush, float u, float v, float pitch, float radius_low, float radius_high,
+           float share, std::uint32_t salt) {
   const CellPlace place = cellAt(u, v, pitch, pitch, 0);
   if (brush.cell(place.x, place.y, salt) > share) return 2;
   const float radius = radius_low + (radius_high - radius_low) * brush.cell(place.x, place.y, salt + 1);
@@ -134,7 +139,8 @@ float plaster(const Brush& b, float u, float v) {
 float brick(const Brush& b, float u, float v) {
   constexpr float kWidth = 0.24F;
   constexpr float kHeight = 0.085F;
-  const CellPlace place = cellAt(u + 0.002F * b.noise(u, v, 150), v + 0.002F * b.noise(v, u, 150), kWidth, kHeight, 0.5F);
+  const CellPlace place =
+      cellAt(u + 0.002F * b.noise(u, v, 150), v + 0.002F * b.noise(v, u, 150), kWidth, kHeight, 0.5F);
   if (nearEdge(place, kWidth, kHeight, 0.006F)) return 0.6F + 0.04F * b.noise(u, v, 400);
   const float shade = b.cell(place.x, place.y, 11);
   return 0.22F + 0.30F * shade * shade + 0.05F * b.noise(u, v, 350);
@@ -190,7 +196,8 @@ float books(const Brush& b, float u, float v) {
   const float cut1 = 0.02F + 0.04F * b.cell(g, row, 59);
   const float cut2 = 0.07F + 0.03F * b.cell(g, row, 61);
   const int index = g * 3 + (in_group > cut1 ? 1 : 0) + (in_group > cut2 ? 1 : 0);
-  const float edge = std::min({in_group, std::fabs(in_group - cut1), std::fabs(in_group - cut2), 0.12F - in_group});
+  const float edge =
+      std::min({in_group, std::fabs(in_group - cut1), std::fabs(in_group - cut2), 0.12F - in_group});
   const float top = 0.2F + 0.08F * b.cell(index, row, 67);
   if (height > top) return 0.05F + 0.02F * b.noise(u, v, 200);
   const float shade = b.cell(index, row, 71);
@@ -282,7 +289,8 @@ class Canvas {
     const int y1 = std::min(height_, static_cast<int>(std::lround(v1 * scale_)));
     for (int y = y0; y < y1; ++y) {
       for (int x = x0; x < x1; ++x) {
-        paint(texels_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)],
+        paint(texels_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+                      static_cast<std::size_t>(x)],
               (x + 0.5) / scale_, (y + 0.5) / scale_);
       }
     }
@@ -312,8 +320,8 @@ void drawPoster(Canvas& canvas, double w, double h, Random& random) {
       canvas.disc(u + 0.5 * s, v + 0.5 * s, 0.5 * s, value);
       if (random.uniform() < 0.5) canvas.disc(u + 0.5 * s, v + 0.5 * s, 0.25 * s, 0.9F - value);
     } else if (kind < 0.85) {
-      canvas.text(u, v, std::min(u + 3 * s, w - edge), std::min(v + s, h - edge), random.uniform(0.012, 0.04), value,
-                  random);
+      canvas.text(u, v, std::min(u + 3 * s, w - edge), std::min(v + s, h - edge), random.uniform(0.012, 0.04),
+                  value, random);
     } else {
       const double cell = s / 6;
       for (int a = 0; a < 6; ++a) {

@@ -5,7 +5,9 @@
 namespace swiftlet {
 
 RayTable::RayTable(const CameraModel& camera)
-    : width_(camera.width()), height_(camera.height()), pixel_angle_(static_cast<float>(1.0 / camera.focal())) {
+    : width_(camera.width()),
+      height_(camera.height()),
+      pixel_angle_(static_cast<float>(1.0 / camera.focal())) {
   const auto count = static_cast<std::size_t>(width_ + 1) * static_cast<std::size_t>(height_ + 1);
   x_.reserve(count);
   y_.reserve(count);

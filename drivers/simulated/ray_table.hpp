@@ -30,7 +30,9 @@ class RayTable {
   [[nodiscard]] float pixelAngle() const { return pixel_angle_; }
 
  private:
-  [[nodiscard]] std::ptrdiff_t offset(int row) const { return static_cast<std::ptrdiff_t>(row) * (width_ + 1); }
+  [[nodiscard]] std::ptrdiff_t offset(int row) const {
+    return static_cast<std::ptrdiff_t>(row) * (width_ + 1);
+  }
   int width_ = 0;
   int height_ = 0;
   float pixel_angle_ = 0;

@@ -75,15 +75,16 @@ MountedRig makeRig(RigKind kind) {
     case RigKind::kWide:
       return pairInAirframe(
           CameraModel(equidistant, 640, 480, {281.3, 281.0, 318.2, 243.5}, {-0.012, 0.004, -0.003, 5e-4}),
-          CameraModel(equidistant, 640, 480, {280.6, 280.4, 322.9, 236.8}, {-0.011, 0.003, -0.002, 4e-4}), 0.10,
-          10 * pi / 180);
+          CameraModel(equidistant, 640, 480, {280.6, 280.4, 322.9, 236.8}, {-0.011, 0.003, -0.002, 4e-4}),
+          0.10, 10 * pi / 180);
     case RigKind::kFisheye:
       break;
   }
   // 640 pixels over 180 degrees; the image circle just touches the sides.
   const MountedRig straight = pairInAirframe(
       CameraModel(equidistant, 640, 480, {203.1, 203.0, 320.3, 241.2}, {0.003, -0.002, 6e-4, -1e-4}),
-      CameraModel(equidistant, 640, 480, {202.8, 202.9, 318.6, 238.7}, {0.002, -0.001, 4e-4, -8e-5}), 0.10, 0.0);
+      CameraModel(equidistant, 640, 480, {202.8, 202.9, 318.6, 238.7}, {0.002, -0.001, 4e-4, -8e-5}), 0.10,
+      0.0);
   return turnImu(straight, expSo3({0.7, -1.1, 0.4}));
 }
 

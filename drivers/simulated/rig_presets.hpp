@@ -10,10 +10,10 @@
 namespace swiftlet {
 
 enum class RigKind {
-  kEuroc,     ///< EuRoC's rig: 752 x 480, radial-tangential, 11 cm baseline, IMU x up and z forward
-  kForward,   ///< 640 x 400, radial-tangential, 8 cm baseline, IMU forward-left-up, looks 15 deg down
-  kWide,      ///< 640 x 480, equidistant, about 130 degrees across, 10 cm baseline, IMU forward-left-up
-  kFisheye,   ///< 640 x 480, equidistant, 180 degrees across, 10 cm baseline, IMU turned oddly
+  kEuroc,    ///< EuRoC's rig: 752 x 480, radial-tangential, 11 cm baseline, IMU x up and z forward
+  kForward,  ///< 640 x 400, radial-tangential, 8 cm baseline, IMU forward-left-up, looks 15 deg down
+  kWide,     ///< 640 x 480, equidistant, about 130 degrees across, 10 cm baseline, IMU forward-left-up
+  kFisheye,  ///< 640 x 480, equidistant, 180 degrees across, 10 cm baseline, IMU turned oddly
 };
 const char* rigName(RigKind kind);
 std::optional<RigKind> rigNamed(const std::string& name);

@@ -11,10 +11,10 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kLowLight = 0.05;          // share of normal light
-constexpr double kLowLightExposure = 0.010; // s
-constexpr double kPathStep = 0.1;           // s between points that furniture keeps clear of
-constexpr double kSharpTime = 1e-9;         // s: image times are multiples of a period to rounding
+constexpr double kLowLight = 0.05;           // share of normal light
+constexpr double kLowLightExposure = 0.010;  // s
+constexpr double kPathStep = 0.1;            // s between points that furniture keeps clear of
+constexpr double kSharpTime = 1e-9;          // s: image times are multiples of a period to rounding
 
 Rig turnedRig(const Rig& rig, const SimulationSettings& settings) {
   constexpr double kRadians = std::numbers::pi / 180;
@@ -22,6 +22,8 @@ Rig turnedRig(const Rig& rig, const SimulationSettings& settings) {
   const Eigen::Quaterniond whole = expSo3(kRadians * settings.rig_turn_deg);
   const Eigen::Vector3d centre = rig.T_body_cam[0].translation;
   for (std::size_t c = 0; c < rig.camera_count; ++c) {
+    // Unturned cameras stay as they are to the last bit.
+    if (settings.rig_turn_deg.isZero(0) && settings.camera_turn_deg[c].isZero(0)) continue;
     const Eigen::Quaterniond own = expSo3(kRadians * settings.camera_turn_deg[c]);
     const SE3& T = rig.T_body_cam[c];
     turned.T_body_cam[c] = SE3(own * whole * T.rotation, centre + whole * (T.translation - centre));
@@ -60,7 +62,8 @@ SimulatedFlight::SimulatedFlight(const SimulationSettings& settings) : settings_
   imu_ = simulateImu(trajectory_, s.imu, s.start, duration_);
   // Half an exposure of motion must exist after the last image.
   const double last = duration_ - 0.5 * s.render.exposure;
-  image_count_ = std::max(0, static_cast<int>(std::floor((last - s.first_image) * s.camera_rate + kSharpTime)) + 1);
+  image_count_ =
+      std::max(0, static_cast<int>(std::floor((last - s.first_image) * s.camera_rate + kSharpTime)) + 1);
   if (image_count_ == 0) throw std::invalid_argument("flight.duration: too short for an image");
 }
 
@@ -69,7 +72,8 @@ void SimulatedFlight::checkSettings() const {
     if (!good) throw std::invalid_argument(what);
   };
   require(settings_.flight.duration >= 0, "flight.duration: must not be negative");
-  require(settings_.flight.duration > 0 || !settings_.given_motion.empty(), "flight.duration: must be positive");
+  require(settings_.flight.duration > 0 || !settings_.given_motion.empty(),
+          "flight.duration: must be positive");
   require(settings_.flight.speed > 0 && settings_.flight.speed < 20, "flight.speed: must lie in (0, 20) m/s");
   require(settings_.camera_rate > 0 && settings_.camera_rate <= 500, "camera_rate: must lie in (0, 500] Hz");
   require(settings_.imu.noise.rate_hz > 0 && settings_.imu.noise.rate_hz <= 10000,
@@ -77,7 +81,8 @@ void SimulatedFlight::checkSettings() const {
   require(settings_.render.exposure > 0 && settings_.render.exposure < 1 / settings_.camera_rate,
           "render.exposure: must be positive and shorter than a frame");
   require(settings_.jpeg_quality >= 1 && settings_.jpeg_quality <= 100, "jpeg_quality: must lie in [1, 100]");
-  require(settings_.first_image >= 0.5 * settings_.render.exposure, "first_image: must leave half an exposure");
+  require(settings_.first_image >= 0.5 * settings_.render.exposure,
+          "first_image: must leave half an exposure");
   require(settings_.paint.texel > 0 && settings_.paint.max_texels > 0, "paint.texel: must be positive");
   require(settings_.threads >= 1, "threads: at least 1");
 }
@@ -94,14 +99,17 @@ void SimulatedFlight::flyAndBuild() {
   std::vector<Eigen::Vector3d> path;
   for (double t = 0; t <= duration_; t += kPathStep) path.push_back(trajectory_.pose(t).translation);
   if (!s.given_motion.empty() && !fitWorld(s.world, path)) {
-    throw std::invalid_argument("world.kind: a given motion needs a world that can be resized (room, hall, cluttered)");
+    throw std::invalid_argument(
+        "world.kind: a given motion needs a world that can be resized (room, hall, cluttered)");
   }
   world_ = buildWorld(s.world, path);
 }
 
 double SimulatedFlight::imageTime(int k) const { return settings_.first_image + k / settings_.camera_rate; }
 
-Stamp SimulatedFlight::imageStamp(int k) const { return stampAt(imageTime(k)) + settings_.image_stamp_offset; }
+Stamp SimulatedFlight::imageStamp(int k) const {
+  return stampAt(imageTime(k)) + settings_.image_stamp_offset;
+}
 
 bool SimulatedFlight::hasFault(FaultKind kind, std::size_t camera, double seconds) const {
   return std::any_of(settings_.faults.begin(), settings_.faults.end(), [&](const Fault& fault) {

@@ -30,7 +30,9 @@ class SimulatedFlight {
   [[nodiscard]] double imageTime(int k) const;
   /// The stamp that image k is given.
   [[nodiscard]] Stamp imageStamp(int k) const;
-  [[nodiscard]] Stamp stampAt(double seconds) const { return settings_.start + Duration::fromSeconds(seconds); }
+  [[nodiscard]] Stamp stampAt(double seconds) const {
+    return settings_.start + Duration::fromSeconds(seconds);
+  }
   [[nodiscard]] bool hasFault(FaultKind kind, std::size_t camera, double seconds) const;
 
  private:
@@ -58,7 +60,8 @@ class FlightCameras {
 
   /// Image k of every camera, k rising; `grey[c]` holds width x height bytes. An entry whose camera
   /// is missing then is left as it was and `present` says so.
-  void render(int k, const std::array<std::uint8_t*, kMaxCameras>& grey, std::array<bool, kMaxCameras>& present);
+  void render(int k, const std::array<std::uint8_t*, kMaxCameras>& grey,
+              std::array<bool, kMaxCameras>& present);
 
  private:
   const SimulatedFlight* flight_;

@@ -51,21 +51,21 @@ struct SimulationSettings {
   double motion_skip = 0;  ///< s of it left out at the beginning
 
   RigKind rig = RigKind::kEuroc;
-  bool mono = false;        ///< camera 0 alone
-  double camera_rate = 20;  ///< Hz
-  double first_image = 0.1; ///< s of IMU before the first image
+  bool mono = false;         ///< camera 0 alone
+  double camera_rate = 20;   ///< Hz
+  double first_image = 0.1;  ///< s of IMU before the first image
 
   ImuSimulationSettings imu;  ///< noise, biases, vibration; its gaps and saturations come from `faults`
   PaintSettings paint;
-  RenderSettings render;  ///< samples, exposure time
-  SensorSettings sensor;  ///< light, noise, vignette, exposure control
-  bool low_light = false; ///< a dim room: 5 % of the light, 10 ms exposure
-  TrackSettings tracks;   ///< of SimulatedOutput::kTracks
+  RenderSettings render;   ///< samples, exposure time
+  SensorSettings sensor;   ///< light, noise, vignette, exposure control
+  bool low_light = false;  ///< a dim room: 5 % of the light, 10 ms exposure
+  TrackSettings tracks;    ///< of SimulatedOutput::kTracks
   SimulatedOutput output = SimulatedOutput::kImages;
 
   ImageFormat format = ImageFormat::kJpeg;
   int jpeg_quality = 92;
-  int depth_every = 5;      ///< depth and labels at every n-th frame; 0: none
+  int depth_every = 5;                     ///< depth and labels at every n-th frame; 0: none
   Stamp start{1'700'000'000'000'000'000};  ///< stamp of the trajectory's time zero
 
   std::vector<Fault> faults;

@@ -63,7 +63,8 @@ SplineTrajectory::SplineTrajectory(double start, double spacing, std::vector<SE3
   assert(controls_.size() >= kOrder && spacing_ > 0);
 }
 
-SplineTrajectory SplineTrajectory::interpolate(double start, double spacing, const std::vector<SE3>& samples) {
+SplineTrajectory SplineTrajectory::interpolate(double start, double spacing,
+                                               const std::vector<SE3>& samples) {
   assert(samples.size() >= 2);
   const std::size_t count = samples.size();
   std::vector<SE3> controls(count + kOrder - 2);

@@ -9,8 +9,8 @@ Texture::Texture(std::vector<std::uint8_t> texels, int width, int height, float 
   texels_.reserve(texels_.size() * 4 / 3 + 64);
   std::ptrdiff_t offset = 0;
   for (levels_ = 0; levels_ < kMaxLevels; ++levels_) {
-    level_[static_cast<std::size_t>(levels_)] = {offset,    width, height, per_metre, static_cast<float>(width - 1),
-                                                 static_cast<float>(height - 1)};
+    level_[static_cast<std::size_t>(levels_)] = {
+        offset, width, height, per_metre, static_cast<float>(width - 1), static_cast<float>(height - 1)};
     if (width == 1 && height == 1) {
       ++levels_;
       break;

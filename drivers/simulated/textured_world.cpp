@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kLightSpacing = 0.12;     // m between grid points of the light
 constexpr double kMaxLightPoints = 30000;  // in the whole world
+constexpr double kLightTexels = 20;        // between grid points at least: coarse paint needs no fine light
 constexpr float kWhite = 215.0F;           // stored value of reflectance 1 in light 1: headroom under lamps
 
 Texture paintLit(const World& world, std::size_t index, double texel, double light_spacing) {
@@ -29,10 +30,12 @@ Texture paintLit(const World& world, std::size_t index, double texel, double lig
   const LightGrid light(world, index, light_spacing);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
-      const auto k = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+      const auto k =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
       const float u = static_cast<float>((x + 0.5) * texel);
       const float v = static_cast<float>((y + 0.5) * texel);
-      texels[k] = static_cast<std::uint8_t>(std::clamp(kWhite * reflectance[k] * light.at(u, v) + 0.5F, 0.0F, 255.0F));
+      texels[k] = static_cast<std::uint8_t>(
+          std::clamp(kWhite * reflectance[k] * light.at(u, v) + 0.5F, 0.0F, 255.0F));
     }
   }
   return {std::move(texels), width, height, static_cast<float>(per_metre)};
@@ -44,7 +47,8 @@ TexturedWorld::TexturedWorld(World world, const PaintSettings& settings) : world
   double area = 0;
   for (const Patch& patch : world_.patches()) area += patch.u_length * patch.v_length;
   texel_ = std::max(settings.texel, std::sqrt(area / settings.max_texels));
-  const double light_spacing = std::max(kLightSpacing, std::sqrt(area / kMaxLightPoints));
+  const double light_spacing =
+      std::max({kLightSpacing, std::sqrt(area / kMaxLightPoints), kLightTexels * texel_});
   textures_.resize(world_.patches().size());
   parallelFor(static_cast<int>(textures_.size()), settings.threads, [&](int i) {
     const auto index = static_cast<std::size_t>(i);

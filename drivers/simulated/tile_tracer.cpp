@@ -75,7 +75,8 @@ void traceRound(const ViewedPatch& patch, std::int32_t id, Tile& tile) {
     const float root = std::sqrt(discriminant > 0 ? discriminant : 0.0F);
     const float t = (b - root) / a;
     const float height = t * along - foot;
-    const bool hit = (discriminant > 0) & (t > kNearest) & (t < tile.distance[i]) & (height >= 0) & (height <= top);
+    const bool hit =
+        (discriminant > 0) & (t > kNearest) & (t < tile.distance[i]) & (height >= 0) & (height <= top);
     tile.distance[i] = hit ? t : tile.distance[i];
     tile.hit[i] = hit ? id : tile.hit[i];
   }
@@ -126,9 +127,12 @@ void loadRays(const RayTable& rays, int column, int row, float dx, float dy, Til
       const int x = std::min(column + i, last_x);
       const int beside_x = std::max(x + step_x, 0);
       const auto k = static_cast<std::size_t>(j * kTileSide + i);
-      tile.x[k] = rays.x(y)[x] + wx * (rays.x(y)[beside_x] - rays.x(y)[x]) + wy * (rays.x(beside_y)[x] - rays.x(y)[x]);
-      tile.y[k] = rays.y(y)[x] + wx * (rays.y(y)[beside_x] - rays.y(y)[x]) + wy * (rays.y(beside_y)[x] - rays.y(y)[x]);
-      tile.z[k] = rays.z(y)[x] + wx * (rays.z(y)[beside_x] - rays.z(y)[x]) + wy * (rays.z(beside_y)[x] - rays.z(y)[x]);
+      tile.x[k] = rays.x(y)[x] + wx * (rays.x(y)[beside_x] - rays.x(y)[x]) +
+                  wy * (rays.x(beside_y)[x] - rays.x(y)[x]);
+      tile.y[k] = rays.y(y)[x] + wx * (rays.y(y)[beside_x] - rays.y(y)[x]) +
+                  wy * (rays.y(beside_y)[x] - rays.y(y)[x]);
+      tile.z[k] = rays.z(y)[x] + wx * (rays.z(y)[beside_x] - rays.z(y)[x]) +
+                  wy * (rays.z(beside_y)[x] - rays.z(y)[x]);
     }
   }
 }
@@ -166,8 +170,9 @@ void patchesInTile(const View& view, const RayTable& rays, int column, int row, 
   reach_y += more * (1 + reach_y * reach_y);
   narrow = narrow && reach_x < kMaxTileTangent && reach_y < kMaxTileTangent;
 
-  const std::array<Eigen::Vector3f, 4> planes{(reach_x * axis - ex).normalized(), (reach_x * axis + ex).normalized(),
-                                              (reach_y * axis - ey).normalized(), (reach_y * axis + ey).normalized()};
+  const std::array<Eigen::Vector3f, 4> planes{
+      (reach_x * axis - ex).normalized(), (reach_x * axis + ex).normalized(),
+      (reach_y * axis - ey).normalized(), (reach_y * axis + ey).normalized()};
   const auto& patches = view.patches();
   for (std::size_t i = 0; i < patches.size(); ++i) {
     const ViewedPatch& patch = patches[i];
@@ -181,7 +186,8 @@ void patchesInTile(const View& view, const RayTable& rays, int column, int row, 
                     std::max(0.0F, patch.v_length * plane.dot(patch.v_axis));
       } else {
         furthest += patch.radius;
-        if (patch.shape == Shape::kCylinder) furthest += std::max(0.0F, patch.v_length * plane.dot(patch.v_axis));
+        if (patch.shape == Shape::kCylinder)
+          furthest += std::max(0.0F, patch.v_length * plane.dot(patch.v_axis));
       }
       out = furthest < -slack;
     }

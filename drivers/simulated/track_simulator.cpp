@@ -30,7 +30,11 @@ double medianOf(std::vector<double>& values) {
 
 TrackSimulator::TrackSimulator(const World& world, const Rig& rig, const SplineTrajectory& trajectory,
                                const TrackSettings& settings)
-    : world_(&world), rig_(&rig), trajectory_(&trajectory), settings_(settings), random_(settings.seed, kTrackStream) {
+    : world_(&world),
+      rig_(&rig),
+      trajectory_(&trajectory),
+      settings_(settings),
+      random_(settings.seed, kTrackStream) {
   settings_.max_tracks = std::min(settings_.max_tracks, static_cast<int>(kMaxFeatures));
   landmarks_.resize(static_cast<std::size_t>(settings_.landmarks));
   for (Landmark& landmark : landmarks_) {
@@ -59,7 +63,8 @@ void TrackSimulator::keepTracks(double seconds, const SE3& T_world_cam) {
   const SE3 T_cam_world = T_world_cam.inverse();
   std::erase_if(tracks_, [&](Track& track) {
     Landmark& landmark = landmarks_[track.landmark];
-    if (seconds < track.end && visible(T_cam_world, 0, landmark, track.now) && inSight(T_world_cam, landmark)) {
+    if (seconds < track.end && visible(T_cam_world, 0, landmark, track.now) &&
+        inSight(T_world_cam, landmark)) {
       return false;
     }
     landmark.tracked = false;
@@ -125,7 +130,8 @@ void TrackSimulator::chooseKeyframe(double seconds, TrackedFrame& frame) {
   if (frame.keyframe) last_keyframe_ = seconds;
 }
 
-Eigen::Vector2d TrackSimulator::disturbed(const Eigen::Vector2d& pixel, const CameraModel& camera, bool& outlier) {
+Eigen::Vector2d TrackSimulator::disturbed(const Eigen::Vector2d& pixel, const CameraModel& camera,
+                                          bool& outlier) {
   const double nx = random_.normal();
   const double ny = random_.normal();
   const Eigen::Vector2d noisy = pixel + settings_.pixel_sigma * Eigen::Vector2d(nx, ny);
@@ -170,8 +176,8 @@ void TrackSimulator::step(double seconds, Stamp stamp, TrackedFrame& frame, std:
     record.pixel[0] = track.now;
     feature.pixel[0] = disturbed(track.now, rig_->camera[0], record.outlier[0]).cast<float>();
     Eigen::Vector2d right;
-    if (cameras > 1 && random_.uniform() < settings_.right_share && visible(T_right_world, 1, landmark, right) &&
-        inSight(T_world_cam[1], landmark)) {
+    if (cameras > 1 && random_.uniform() < settings_.right_share &&
+        visible(T_right_world, 1, landmark, right) && inSight(T_world_cam[1], landmark)) {
       feature.seen[1] = true;
       record.pixel[1] = right;
       feature.pixel[1] = disturbed(right, rig_->camera[1], record.outlier[1]).cast<float>();

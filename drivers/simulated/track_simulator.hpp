@@ -20,23 +20,23 @@
 namespace swiftlet {
 
 struct TrackSettings {
-  int landmarks = 4000;          ///< on the world's surfaces
-  int max_tracks = 150;          ///< features per frame; at most kMaxFeatures
-  double pixel_sigma = 0.5;      ///< px per axis and camera, 1 sigma
-  double mean_lifetime = 4.0;    ///< s; lifetimes are exponential, cut short by leaving the image
-  double dropout = 0.02;         ///< share of sightings missing for one frame, per track
-  double right_share = 0.85;     ///< share of visible right sightings that stereo matching finds
-  double outlier_share = 0.0;    ///< share of sightings displaced at random
-  double outlier_low = 5;        ///< px
-  double outlier_high = 100;     ///< px
-  double min_range = 0.3;        ///< m
-  double max_range = 15;         ///< m
-  double max_slant = 80;         ///< deg between the line of sight and the surface's normal
-  bool occlusion = true;         ///< things hide what is behind them
+  int landmarks = 4000;             ///< on the world's surfaces
+  int max_tracks = 150;             ///< features per frame; at most kMaxFeatures
+  double pixel_sigma = 0.5;         ///< px per axis and camera, 1 sigma
+  double mean_lifetime = 4.0;       ///< s; lifetimes are exponential, cut short by leaving the image
+  double dropout = 0.02;            ///< share of sightings missing for one frame, per track
+  double right_share = 0.85;        ///< share of visible right sightings that stereo matching finds
+  double outlier_share = 0.0;       ///< share of sightings displaced at random
+  double outlier_low = 5;           ///< px
+  double outlier_high = 100;        ///< px
+  double min_range = 0.3;           ///< m
+  double max_range = 15;            ///< m
+  double max_slant = 80;            ///< deg between the line of sight and the surface's normal
+  bool occlusion = true;            ///< things hide what is behind them
   double keyframe_interval = 0.25;  ///< s at most between keyframes
   double keyframe_motion = 40;      ///< px of median motion since the last keyframe that make one
-  double border = 4;             ///< px kept free at the image's edge
-  bool mono = false;             ///< camera 0 alone
+  double border = 4;                ///< px kept free at the image's edge
+  bool mono = false;                ///< camera 0 alone
   std::uint64_t seed = 1;
 };
 
@@ -44,7 +44,7 @@ struct TrackSettings {
 struct TrackTruth {
   Eigen::Vector3d landmark = Eigen::Vector3d::Zero();  ///< world
   std::uint32_t landmark_index = 0;
-  std::array<Eigen::Vector2d, kMaxCameras> pixel{};    ///< without noise, valid where seen
+  std::array<Eigen::Vector2d, kMaxCameras> pixel{};  ///< without noise, valid where seen
   std::array<bool, kMaxCameras> outlier{};
 };
 

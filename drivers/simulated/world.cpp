@@ -92,9 +92,9 @@ void addFan(const Patch& patch, int steps, SurfaceMesh& mesh) {
   mesh.vertices.push_back(patch.pointAt(patch.radius, patch.radius).cast<float>());
   for (int i = 0; i < steps; ++i) {
     const double angle = 2 * kPi * i / steps;
-    mesh.vertices.push_back(patch
-                                .pointAt(patch.radius * (1 + std::cos(angle)), patch.radius * (1 + std::sin(angle)))
-                                .cast<float>());
+    mesh.vertices.push_back(
+        patch.pointAt(patch.radius * (1 + std::cos(angle)), patch.radius * (1 + std::sin(angle)))
+            .cast<float>());
   }
   const auto count = static_cast<std::uint32_t>(steps);
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -106,8 +106,8 @@ void addFan(const Patch& patch, int steps, SurfaceMesh& mesh) {
 
 const char* labelName(Label label) {
   static constexpr std::array<const char*, kLabelCount> kNames{
-      "unknown", "floor", "ceiling", "wall",   "pillar",  "shelf", "table",
-      "chair",   "box",   "poster",  "machine", "ball", "barrel", "lamp"};
+      "unknown", "floor", "ceiling", "wall",    "pillar", "shelf",  "table",
+      "chair",   "box",   "poster",  "machine", "ball",   "barrel", "lamp"};
   return kNames[static_cast<std::size_t>(label)];
 }
 

@@ -66,7 +66,8 @@ struct Patch {
   Material material = Material::kPlaster;
   std::uint8_t zone = 0;         ///< lit by the lamps of the same zone
   std::uint32_t paint_seed = 0;  ///< equal seeds, sizes and materials look equal
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< corner; foot of a cylinder's axis; centre of a sphere
+  Eigen::Vector3d origin =
+      Eigen::Vector3d::Zero();  ///< corner; foot of a cylinder's axis; centre of a sphere
   Eigen::Vector3d u_axis = Eigen::Vector3d::UnitX();
   Eigen::Vector3d v_axis = Eigen::Vector3d::UnitY();
   double u_length = 1;  ///< m, extent of u

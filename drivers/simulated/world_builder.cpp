@@ -13,17 +13,17 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kClearance = 0.5;      // m kept free around the flight path
-constexpr double kWallMargin = 1.5;     // m between a given motion and the walls around it
-constexpr double kFloorMargin = 0.6;    // m below its lowest point
-constexpr double kPosterGap = 0.012;    // m a poster stands off its wall
-constexpr double kTwinSide = 6.0;       // m
+constexpr double kClearance = 0.5;    // m kept free around the flight path
+constexpr double kWallMargin = 1.5;   // m between a given motion and the walls around it
+constexpr double kFloorMargin = 0.6;  // m below its lowest point
+constexpr double kPosterGap = 0.012;  // m a poster stands off its wall
+constexpr double kTwinSide = 6.0;     // m
 constexpr double kTwinHeight = 3.0;
-constexpr double kTwinOffset = 5.0;     // m of a twin room's centre from the middle
-constexpr double kTwinDoor = 1.4;       // m wide
+constexpr double kTwinOffset = 5.0;  // m of a twin room's centre from the middle
+constexpr double kTwinDoor = 1.4;    // m wide
 constexpr double kTwinDoorHeight = 2.3;
-constexpr double kTwinWall = 0.2;       // m thick
-constexpr double kPassage = 2.2;        // m, width of corridors
+constexpr double kTwinWall = 0.2;  // m thick
+constexpr double kPassage = 2.2;   // m, width of corridors
 constexpr double kRingX = 14.0;
 constexpr double kRingY = 10.0;
 constexpr double kRingHeight = 2.8;
@@ -60,8 +60,9 @@ void addWallWithDoor(World& world, const Wall& wall, double left, double right, 
   addWall(world, {wall.corner, wall.along, left, wall.height}, material, seed);
   addWall(world, {wall.corner + right * wall.along, wall.along, wall.length - right, wall.height}, material,
           seed + 1);
-  addWall(world, {wall.corner + left * wall.along + kTwinDoorHeight * Vector3d::UnitZ(), wall.along, right - left,
-                  wall.height - kTwinDoorHeight},
+  addWall(world,
+          {wall.corner + left * wall.along + kTwinDoorHeight * Vector3d::UnitZ(), wall.along, right - left,
+           wall.height - kTwinDoorHeight},
           material, seed + 2);
 }
 
@@ -75,8 +76,8 @@ void hangPosters(World& world, const Wall& wall, double per_metre, Random& rando
     const double low = random.uniform(0.15 * wall.height, wall.height - height - 0.1);
     const auto seed = random.next();
     if (random.uniform() < per_metre) {
-      addFlat(world, wall.corner + at * wall.along + low * Vector3d::UnitZ() + kPosterGap * out, wall.along, width,
-              Vector3d::UnitZ(), height, {Material::kPoster, Label::kPoster, seed});
+      addFlat(world, wall.corner + at * wall.along + low * Vector3d::UnitZ() + kPosterGap * out, wall.along,
+              width, Vector3d::UnitZ(), height, {Material::kPoster, Label::kPoster, seed});
     }
     at += width + random.uniform(0.1, 0.8);
   }
@@ -173,7 +174,8 @@ void putThings(World& world, Ground& ground, const Vector3d& size, const Furnish
   for (int i = 0; i < things.pillars; ++i) {
     const double radius = random.uniform(0.15, 0.3);
     if (ground.find(random, radius, size.z(), false, place)) {
-      addUprightCylinder(world, place, radius, size.z(), {Material::kBrick, Label::kPillar, random.next()}, false);
+      addUprightCylinder(world, place, radius, size.z(), {Material::kBrick, Label::kPillar, random.next()},
+                         false);
     }
   }
   for (int i = 0; i < things.machines; ++i) {
@@ -231,9 +233,11 @@ void layMats(World& world, const Vector3d& centre, const Vector3d& size, int cou
     const double a = random.uniform(0.5, 1.3);
     const double b = random.uniform(0.4, 1.0);
     const double yaw = random.uniform(0.0, 2 * std::numbers::pi);
-    const Vector3d at = centre + Vector3d(random.uniform(-0.4, 0.4) * size.x(), random.uniform(-0.4, 0.4) * size.y(), 0.004);
+    const Vector3d at =
+        centre + Vector3d(random.uniform(-0.4, 0.4) * size.x(), random.uniform(-0.4, 0.4) * size.y(), 0.004);
     const std::uint32_t seed = random.next();
-    if (std::any_of(laid.begin(), laid.end(), [&](const auto& other) { return (other - at.head<2>()).norm() < 1.7; })) {
+    if (std::any_of(laid.begin(), laid.end(),
+                    [&](const auto& other) { return (other - at.head<2>()).norm() < 1.7; })) {
       continue;
     }
     laid.push_back(at.head<2>());
@@ -246,14 +250,14 @@ void layMats(World& world, const Vector3d& centre, const Vector3d& size, int cou
 std::array<Wall, 4> roomWalls(const Vector3d& c, const Vector3d& size) {
   const double a = 0.5 * size.x();
   const double b = 0.5 * size.y();
-  return {Wall{c + Vector3d(-a, b, 0), Vector3d::UnitX(), size.x(), size.z()},     // north, seen from inside
-          Wall{c + Vector3d(a, b, 0), -Vector3d::UnitY(), size.y(), size.z()},     // east
-          Wall{c + Vector3d(a, -b, 0), -Vector3d::UnitX(), size.x(), size.z()},    // south
-          Wall{c + Vector3d(-a, -b, 0), Vector3d::UnitY(), size.y(), size.z()}};   // west
+  return {Wall{c + Vector3d(-a, b, 0), Vector3d::UnitX(), size.x(), size.z()},    // north, seen from inside
+          Wall{c + Vector3d(a, b, 0), -Vector3d::UnitY(), size.y(), size.z()},    // east
+          Wall{c + Vector3d(a, -b, 0), -Vector3d::UnitX(), size.x(), size.z()},   // south
+          Wall{c + Vector3d(-a, -b, 0), Vector3d::UnitY(), size.y(), size.z()}};  // west
 }
 
-void addFloorAndCeiling(World& world, const Vector3d& c, const Vector3d& size, Material floor, Material ceiling,
-                        std::uint32_t seed) {
+void addFloorAndCeiling(World& world, const Vector3d& c, const Vector3d& size, Material floor,
+                        Material ceiling, std::uint32_t seed) {
   const double a = 0.5 * size.x();
   const double b = 0.5 * size.y();
   addFlat(world, c + Vector3d(-a, -b, 0), Vector3d::UnitX(), size.x(), Vector3d::UnitY(), size.y(),
@@ -302,7 +306,8 @@ void buildBoxWorld(World& world, const WorldSettings& settings, const std::vecto
 void buildTwinRooms(World& world, const WorldSettings& settings, const std::vector<Vector3d>& clear) {
   const Vector3d size(kTwinSide, kTwinSide, kTwinHeight);
   const Vector3d middle = settings.floor_centre;
-  const std::array<Vector3d, 2> centres{middle + Vector3d(-kTwinOffset, 0, 0), middle + Vector3d(kTwinOffset, 0, 0)};
+  const std::array<Vector3d, 2> centres{middle + Vector3d(-kTwinOffset, 0, 0),
+                                        middle + Vector3d(kTwinOffset, 0, 0)};
   // What must be free in either room must be free in both.
   std::vector<Vector3d> local;
   for (const Vector3d& centre : centres) {
@@ -311,7 +316,7 @@ void buildTwinRooms(World& world, const WorldSettings& settings, const std::vect
   const double left = 0.5 * (kTwinSide - kTwinDoor);
   const double right = left + kTwinDoor;
   for (const Vector3d& centre : centres) {
-    Random random(settings.seed, 42);  // the same for both
+    Random random(settings.seed, 42);                                        // the same for both
     world.setZone(static_cast<std::uint8_t>(&centre - centres.data() + 1));  // else their light would differ
     addFloorAndCeiling(world, centre, size, Material::kParquet, Material::kPlaster, random.next());
     const auto sides = roomWalls(centre, size);
@@ -341,9 +346,11 @@ void buildTwinRooms(World& world, const WorldSettings& settings, const std::vect
     const Vector3d y = Vector3d::UnitY();
     const Vector3d z = Vector3d::UnitZ();
     addFlat(world, in - kTwinWall * y, x, kTwinDoor, y, kTwinWall, {Material::kWood, Label::kFloor, 71});
-    addFlat(world, in + kTwinDoorHeight * z, x, kTwinDoor, -y, kTwinWall, {Material::kWood, Label::kWall, 72});
+    addFlat(world, in + kTwinDoorHeight * z, x, kTwinDoor, -y, kTwinWall,
+            {Material::kWood, Label::kWall, 72});
     addFlat(world, in - kTwinWall * y, y, kTwinWall, z, kTwinDoorHeight, {Material::kWood, Label::kWall, 73});
-    addFlat(world, in + kTwinDoor * x, -y, kTwinWall, z, kTwinDoorHeight, {Material::kWood, Label::kWall, 74});
+    addFlat(world, in + kTwinDoor * x, -y, kTwinWall, z, kTwinDoorHeight,
+            {Material::kWood, Label::kWall, 74});
   }
 
   // The corridor runs along both south walls.
@@ -361,8 +368,10 @@ void buildTwinRooms(World& world, const WorldSettings& settings, const std::vect
   const double east_door = kTwinOffset - 0.5 * kTwinDoor;  // from the middle
   addWallWithDoor(world, {north.corner + half * north.along, north.along, half, kTwinHeight}, east_door,
                   east_door + kTwinDoor, Material::kConcrete, random.next());
-  hangPosters(world, {north.corner + (west_door + kTwinDoor + 0.2) * north.along, north.along,
-                      2 * (kTwinOffset - 0.5 * kTwinDoor - 0.2), kTwinHeight}, 0.8, random);
+  hangPosters(world,
+              {north.corner + (west_door + kTwinDoor + 0.2) * north.along, north.along,
+               2 * (kTwinOffset - 0.5 * kTwinDoor - 0.2), kTwinHeight},
+              0.8, random);
   for (const std::size_t i : {1U, 2U, 3U}) {
     addWall(world, sides[i], Material::kPlaster, random.next());
     hangPosters(world, sides[i], 0.8, random);
@@ -382,7 +391,8 @@ void buildCorridor(World& world, const WorldSettings& settings) {
   // The block in the middle, seen from outside: the walls of a room turned about.
   const Vector3d core(kRingX - 2 * kPassage, kRingY - 2 * kPassage, kRingHeight);
   for (const Wall& inside : roomWalls(centre, core)) {
-    const Wall wall{inside.corner + inside.length * inside.along, -inside.along, inside.length, inside.height};
+    const Wall wall{inside.corner + inside.length * inside.along, -inside.along, inside.length,
+                    inside.height};
     addWall(world, wall, random.uniform() < 0.5 ? Material::kConcrete : Material::kFabric, random.next());
     hangPosters(world, wall, 0.7, random);
   }
@@ -414,8 +424,8 @@ const char* worldName(WorldKind kind) {
 }
 
 std::optional<WorldKind> worldNamed(const std::string& name) {
-  for (const WorldKind kind : {WorldKind::kRoom, WorldKind::kHall, WorldKind::kCluttered, WorldKind::kTwinRooms,
-                               WorldKind::kCorridor}) {
+  for (const WorldKind kind : {WorldKind::kRoom, WorldKind::kHall, WorldKind::kCluttered,
+                               WorldKind::kTwinRooms, WorldKind::kCorridor}) {
     if (name == worldName(kind)) return kind;
   }
   return std::nullopt;
@@ -465,11 +475,22 @@ Tour worldTour(const WorldSettings& settings) {
   if (settings.kind == WorldKind::kTwinRooms) {
     const double south = -0.5 * kTwinSide - kTwinWall - 0.5 * kPassage;
     const double x = kTwinOffset;
-    tour.waypoints = subdivided({{-x - 0.2, south, 1.3}, {-x - 0.2, -1.6, 1.3}, {-x - 1.4, 0, 1.6}, {-x, 1.5, 1.2},
-                                 {-x + 1.4, 0, 1.5}, {-x + 0.2, -1.6, 1.4}, {-x + 0.2, south, 1.4},
-                                 {x - 0.2, south, 1.3}, {x - 0.2, -1.6, 1.3}, {x - 1.4, 0, 1.6}, {x, 1.5, 1.2},
-                                 {x + 1.4, 0, 1.5}, {x + 0.2, -1.6, 1.4}, {x + 0.2, south + 0.25, 1.4},
-                                 {x - 0.2, south + 0.3, 1.4}, {-x + 0.2, south + 0.3, 1.5}},
+    tour.waypoints = subdivided({{-x - 0.2, south, 1.3},
+                                 {-x - 0.2, -1.6, 1.3},
+                                 {-x - 1.4, 0, 1.6},
+                                 {-x, 1.5, 1.2},
+                                 {-x + 1.4, 0, 1.5},
+                                 {-x + 0.2, -1.6, 1.4},
+                                 {-x + 0.2, south, 1.4},
+                                 {x - 0.2, south, 1.3},
+                                 {x - 0.2, -1.6, 1.3},
+                                 {x - 1.4, 0, 1.6},
+                                 {x, 1.5, 1.2},
+                                 {x + 1.4, 0, 1.5},
+                                 {x + 0.2, -1.6, 1.4},
+                                 {x + 0.2, south + 0.25, 1.4},
+                                 {x - 0.2, south + 0.3, 1.4},
+                                 {-x + 0.2, south + 0.3, 1.5}},
                                 0.9);
   } else if (settings.kind == WorldKind::kCorridor) {
     const double x = 0.5 * (kRingX - kPassage);

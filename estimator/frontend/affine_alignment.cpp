@@ -34,7 +34,8 @@ void readTemplate(const ImageView& patch, int cx, int cy, Gradients& g) {
     const std::uint8_t* row = patch.row(cy - kPatchRadius + r) + (cx - kPatchRadius);
     const std::uint8_t* above = row - patch.stride;
     const std::uint8_t* below = row + patch.stride;
-    for (int c = 0; c < kPatchSize; ++c) {
+    // Whole vectors: the columns beyond the window have weight zero.
+    for (int c = 0; c < kLanes; ++c) {
       const int i = r * kLanes + c;
       g.value[i] = static_cast<float>(row[c]);
       g.x[i] = 0.5F * window[i] * static_cast<float>(row[c + 1] - row[c - 1]);
@@ -91,13 +92,15 @@ bool sampleWindow(const ImageView& image, const AffineTemplate::Estimate& e, flo
   }
   // 16.16 fixed point keeps the inner loop free of rounding calls.
   constexpr float kOne = 65536.0F;
+  constexpr std::int32_t kHalfWeight = 128;
   const auto step_x = static_cast<std::int32_t>(e.warp(0, 0) * kOne);
   const auto step_y = static_cast<std::int32_t>(e.warp(1, 0) * kOne);
   for (int r = 0; r < kRows; ++r) {
     const Eigen::Vector2f start = e.position + e.warp * Eigen::Vector2f(-static_cast<float>(kPatchRadius),
                                                                         static_cast<float>(r - kPatchRadius));
-    auto x = static_cast<std::int32_t>(start.x() * kOne);
-    auto y = static_cast<std::int32_t>(start.y() * kOne);
+    // Half of the 1/256 px to which the weights are cut.
+    auto x = static_cast<std::int32_t>(start.x() * kOne) + kHalfWeight;
+    auto y = static_cast<std::int32_t>(start.y() * kOne) + kHalfWeight;
     for (int c = 0; c < kPatchSize; ++c, x += step_x, y += step_y) {
       const std::uint8_t* p = image.data + static_cast<std::ptrdiff_t>(y >> 16) * image.stride + (x >> 16);
       const int u = (x >> 8) & 255;

@@ -18,7 +18,8 @@ namespace swiftlet {
 class AffineTemplate {
  public:
   /// Prepares the Hessian of the window centred on the whole pixel (x, y) of `patch`. False when
-  /// the window does not fix the six parameters.
+  /// the window does not fix the six parameters. kPatchRadius + 1 pixels around are used; rows are
+  /// read 17 pixels wide.
   [[nodiscard]] bool build(const ImageView& patch, int x, int y);
 
   struct Estimate {

@@ -8,7 +8,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr int kRefineIterations = 4;
+constexpr int kRefineIterations = 3;
 // A correction [px] beyond this says that tracker and patch disagree about what they see.
 constexpr float kMaxCorrection = 1.0F;
 // Correlation that a refined patch must reach.

@@ -113,7 +113,7 @@ void Frontend::Impl::dropLost() {
   tracks_.resize(kept);
 }
 
-void Frontend::Impl::darkImages(const StereoFrame& frame) {
+void Frontend::Impl::darkImages() {
   for (std::size_t c = 0; c < rig_.camera_count; ++c) {
     if (!camera_[c].present) continue;
     int features = 0;
@@ -132,10 +132,9 @@ void Frontend::Impl::darkImages(const StereoFrame& frame) {
     camera_[c].has_history = false;
     for (Track& track : tracks_) track.live[c] = false;
   }
-  static_cast<void>(frame);
 }
 
-void Frontend::Impl::replenish(int max_features, const StereoFrame& frame) {
+void Frontend::Impl::replenish(int max_features) {
   const int wanted = max_features - static_cast<int>(tracks_.size());
   if (wanted <= 0) return;
   if (camera_[0].present) {
@@ -143,7 +142,6 @@ void Frontend::Impl::replenish(int max_features, const StereoFrame& frame) {
   } else if (usesStereo() && camera_[1].present) {
     detect(1, wanted, max_features);
   }
-  static_cast<void>(frame);
 }
 
 void Frontend::Impl::detect(std::size_t c, int wanted, int max_features) {
@@ -211,21 +209,22 @@ Status Frontend::Impl::step(const StereoFrame& frame, const FrontendPrediction& 
   const int limit = std::clamp(max_features, 0, static_cast<int>(kMaxFeatures));
   statistics_ = {};
   takeImages(frame, prediction);
+  joinPredictions(prediction);
   for (std::size_t c = 0; c < rig_.camera_count; ++c) {
     if (!camera_[c].present) continue;
     trackCamera(c, prediction);
     verifyMotion(c, frame.index * kMaxCameras + c);
   }
   verifyStereo();
-  if (settings_.find_again) findAgain(prediction, limit, frame.index);
+  if (settings_.find_again) findAgain(prediction, limit);
   dropLost();
   const bool keyframe = keyframeDue(frame.stamp);
   const bool few = static_cast<float>(tracks_.size()) < kReplenishShare * static_cast<float>(limit);
   if (keyframe || few) {
-    replenish(limit, frame);
+    replenish(limit);
     matchMissing(!keyframe);
   }
-  darkImages(frame);
+  darkImages();
   dropLost();
   if (keyframe) markKeyframe(frame.stamp);
   write(frame, keyframe, out);

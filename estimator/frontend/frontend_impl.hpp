@@ -20,8 +20,9 @@ namespace swiftlet {
 /// A feature in the cameras' newest images.
 struct Track {
   TrackId id = 0;
-  int slot = -1;  ///< in the anchor pool
-  int age = 0;    ///< frames since detection
+  int slot = -1;      ///< in the anchor pool
+  int age = 0;        ///< frames since detection
+  int landmark = -1;  ///< index of its prediction in this frame's list
   /// Has a position in that camera's newest image (which may be an earlier frame's).
   std::array<bool, kMaxCameras> live{};
   std::array<bool, kMaxCameras> had_previous{};  ///< `previous` holds the frame before
@@ -58,25 +59,26 @@ class Frontend::Impl {
 
   Status check(const StereoFrame& frame) const;
   void takeImages(const StereoFrame& frame, const FrontendPrediction& prediction);
+  void joinPredictions(const FrontendPrediction& prediction);
   void trackCamera(std::size_t c, const FrontendPrediction& prediction);
   [[nodiscard]] bool predict(const Track& track, std::size_t c, const FrontendPrediction& prediction,
                              Eigen::Vector2f& pixel, int& levels) const;
-  void refine(Track& track, std::size_t c, const Eigen::Vector2f& from, Eigen::Vector2f& pixel);
+  void refine(const Track& track, std::size_t c, Eigen::Vector2f& pixel);
   [[nodiscard]] Eigen::Matrix2f turn(std::size_t c, const Eigen::Vector3d& from_bearing) const;
   void verifyMotion(std::size_t c, std::uint64_t seed);
   void verifyStereo();
-  void findAgain(const FrontendPrediction& prediction, int max_features, std::uint64_t index);
+  void findAgain(const FrontendPrediction& prediction, int max_features);
   [[nodiscard]] bool locate(AnchorPatch& anchor, std::size_t c, const PredictedLandmark& landmark,
                             Eigen::Vector2f& pixel) const;
   void dropLost();
   [[nodiscard]] bool keyframeDue(Stamp stamp) const;
   [[nodiscard]] float medianParallax() const;
-  void replenish(int max_features, const StereoFrame& frame);
+  void replenish(int max_features);
   void detect(std::size_t c, int wanted, int max_features);
   void matchMissing(bool only_new);
   void markKeyframe(Stamp stamp);
   void write(const StereoFrame& frame, bool keyframe, TrackedFrame& out);
-  void darkImages(const StereoFrame& frame);
+  void darkImages();
   [[nodiscard]] float medianMotion();
   bool place(Track& track, std::size_t c, const Eigen::Vector2f& pixel);
   [[nodiscard]] bool usesStereo() const { return rig_.camera_count > 1; }
@@ -92,6 +94,12 @@ class Frontend::Impl {
   FixedVector<Track, kMaxFeatures> tracks_;
   FixedVector<Corner, kMaxFeatures> corners_;
   CornerDetector::Pixels occupied_;
+  struct LandmarkIndex {
+    TrackId id = 0;
+    int index = 0;
+  };
+  FixedVector<LandmarkIndex, kMaxLandmarks> landmark_order_;  ///< by id
+  std::array<int, kMaxLandmarks> track_of_landmark_{};        ///< -1: not tracked
   FixedVector<Eigen::Vector3d, kMaxFeatures> bearings_prev_, bearings_cur_;
   FixedVector<std::size_t, kMaxFeatures> owners_;
   FixedVector<float, kMaxFeatures * kMaxCameras> values_;

@@ -30,13 +30,13 @@ constexpr int kMaxSearches = 240;
 
 bool Frontend::Impl::predict(const Track& track, std::size_t c, const FrontendPrediction& prediction,
                              Eigen::Vector2f& pixel, int& levels) const {
-  // Both lists rise in id in practice, but nothing promises it.
-  for (const PredictedLandmark& landmark : prediction.landmarks) {
-    if (landmark.id != track.id) continue;
-    if (!landmark.visible[c]) break;
-    pixel = landmark.pixel[c];
-    levels = kLevelsWithLandmark;
-    return true;
+  if (track.landmark >= 0) {
+    const PredictedLandmark& landmark = prediction.landmarks[static_cast<std::size_t>(track.landmark)];
+    if (landmark.visible[c] && landmark.pixel[c].allFinite()) {
+      pixel = landmark.pixel[c];
+      levels = kLevelsWithLandmark;
+      return true;
+    }
   }
   const Camera& camera = camera_[c];
   if (!camera.rotation_known) return false;
@@ -45,6 +45,27 @@ bool Frontend::Impl::predict(const Track& track, std::size_t c, const FrontendPr
   pixel = projected.cast<float>();
   levels = kLevelsWithRotation;
   return true;
+}
+
+void Frontend::Impl::joinPredictions(const FrontendPrediction& prediction) {
+  landmark_order_.clear();
+  for (std::size_t i = 0; i < prediction.landmarks.size(); ++i) {
+    static_cast<void>(landmark_order_.tryPushBack({prediction.landmarks[i].id, static_cast<int>(i)}));
+    track_of_landmark_[i] = -1;
+  }
+  const auto before = [](const LandmarkIndex& a, const LandmarkIndex& b) { return a.id < b.id; };
+  if (!std::is_sorted(landmark_order_.begin(), landmark_order_.end(), before)) {
+    std::sort(landmark_order_.begin(), landmark_order_.end(), before);
+  }
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    Track& track = tracks_[i];
+    track.landmark = -1;
+    const auto* const at =
+        std::lower_bound(landmark_order_.begin(), landmark_order_.end(), LandmarkIndex{track.id, 0}, before);
+    if (at == landmark_order_.end() || at->id != track.id) continue;
+    track.landmark = at->index;
+    track_of_landmark_[static_cast<std::size_t>(at->index)] = static_cast<int>(i);
+  }
 }
 
 void Frontend::Impl::trackCamera(std::size_t c, const FrontendPrediction& prediction) {
@@ -66,7 +87,7 @@ void Frontend::Impl::trackCamera(std::size_t c, const FrontendPrediction& predic
       ++statistics_.lost;
       continue;
     }
-    if (settings_.anchor_refinement) refine(track, c, from, pixel);
+    if (settings_.anchor_refinement) refine(track, c, pixel);
     if (!place(track, c, pixel)) {
       ++statistics_.lost;
       continue;
@@ -96,9 +117,7 @@ Eigen::Matrix2f Frontend::Impl::turn(std::size_t c, const Eigen::Vector3d& from_
   return turn;
 }
 
-void Frontend::Impl::refine(Track& track, std::size_t c, const Eigen::Vector2f& from,
-                            Eigen::Vector2f& pixel) {
-  static_cast<void>(from);
+void Frontend::Impl::refine(const Track& track, std::size_t c, Eigen::Vector2f& pixel) {
   AnchorPatch& patch = anchors_[track.slot].patch[c];
   if (!patch.valid) return;
   const Eigen::Matrix2f turned = turn(c, track.bearing[c]);
@@ -179,22 +198,23 @@ bool Frontend::Impl::locate(AnchorPatch& anchor, std::size_t c, const PredictedL
          pattern.correlation(camera_[c].now().level(0), pixel) >= kMinRecognition;
 }
 
-void Frontend::Impl::findAgain(const FrontendPrediction& prediction, int max_features, std::uint64_t index) {
-  static_cast<void>(index);
+void Frontend::Impl::findAgain(const FrontendPrediction& prediction, int max_features) {
   int searches = 0;
-  for (const PredictedLandmark& landmark : prediction.landmarks) {
+  for (std::size_t i = 0; i < prediction.landmarks.size(); ++i) {
+    const PredictedLandmark& landmark = prediction.landmarks[i];
     if (searches >= kMaxSearches) return;
-    auto* const track =
-        std::find_if(tracks_.begin(), tracks_.end(), [&](const Track& t) { return t.id == landmark.id; });
-    const bool known = track != tracks_.end();
+    const bool known = track_of_landmark_[i] >= 0;
     if (!known && static_cast<int>(tracks_.size()) >= max_features) continue;
-    const int slot = known ? track->slot : anchors_.find(landmark.id);
-    if (slot < 0) continue;
     Track lost;
-    lost.id = landmark.id;
-    lost.slot = slot;
-    lost.age = 1;
-    Track& target = known ? *track : lost;
+    if (!known) {
+      lost.id = landmark.id;
+      lost.slot = anchors_.find(landmark.id);
+      lost.age = 1;
+    }
+    Track& target = known ? tracks_[static_cast<std::size_t>(track_of_landmark_[i])] : lost;
+    const int slot = target.slot;
+    // A tracked slot without a track: the same landmark twice in the prediction.
+    if (slot < 0 || (!known && anchors_[slot].tracked)) continue;
     bool found = false;
     for (std::size_t c = 0; c < rig_.camera_count; ++c) {
       if (!camera_[c].present || !landmark.visible[c] || target.live[c]) continue;

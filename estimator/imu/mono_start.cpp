@@ -20,6 +20,12 @@ constexpr int kBiasIterations = 5;
 constexpr int kLinearIterations = 6;
 constexpr int kIterations = 12;
 constexpr int kPointIterations = 2;
+// Each bearing stands in two pairs (twice the information), and the noise of the planes is not that
+// of a linear model: measured on simulated flights, errors are up to twice what remains.
+constexpr double kBiasInflation = 8.0;  // on the variance
+// What the model leaves out (the IMU's own noise, scale and axes; vibration) costs so much scale on
+// the real logs however long the start; the covariance is raised to show it.
+constexpr double kLeastScaleSigma = 0.04;
 constexpr double kHuber = 2.0;             // sigma
 constexpr double kOutlier = 3.0;           // sigma: a track's RMS beyond it is left out
 constexpr double kLeastParallax = 8.0;     // bearing sigmas
@@ -165,8 +171,7 @@ Status gyroBias(const Problem& problem, const StartPrior& prior, Eigen::Vector3d
     bias += step;
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
     eigen.computeDirect(H, Eigen::EigenvaluesOnly);
-    // Each bearing stands in two pairs: the sum counts it twice.
-    sigma = std::sqrt(2.0 / eigen.eigenvalues()[0]);
+    sigma = std::sqrt(kBiasInflation / eigen.eigenvalues()[0]);
     if (step.norm() < 1e-6) break;
   }
   sigma = std::min(sigma, prior.bias_gyro_sigma);
@@ -510,11 +515,13 @@ Status solveMonoStart(std::span<const Preintegration> from_first, std::span<cons
   // Residuals larger than their sigma: the bearings' noise was given too small.
   const double excess = std::max(1.0, start.motion.residual_rms);
   covariance *= excess * excess;
+  makeCameras(problem, x, cameras);
+  const double scale_sigma = scaleSigma(cameras, covariance);
+  start.scale_sigma = std::hypot(scale_sigma, kLeastScaleSigma);
+  covariance *= std::pow(start.scale_sigma / std::max(scale_sigma, 1e-6), 2);
   const double rms = start.motion.residual_rms;
   x.toMotionStart(covariance, start.motion);
   start.motion.residual_rms = rms;
-  makeCameras(problem, x, cameras);
-  start.scale_sigma = scaleSigma(cameras, covariance);
   if (!(start.motion.tilt_sigma < kUselessTilt))
     return {StatusCode::kDegenerate, "motion does not show gravity"};
   return okStatus();

@@ -10,8 +10,8 @@
 // pure rotation and rest it is large, and the caller must wait (section "mono" of the page on imu).
 // Frames: body axes at image 0.
 // Errors: kNotReady (fewer than 4 frames or 15 tracks), kDegenerate (no parallax), kNumerical.
-// Memory: on the stack, about 20 kB; nothing is allocated. Cost: about 2 ms for 100 tracks over 12
-// frames.
+// Memory: on the stack, about 20 kB; nothing is allocated. Cost: 5 to 15 ms for 100 tracks over
+// 10 frames (a start's, not a frame's).
 // Sources: Kneip, Lynen, "Direct Optimization of Frame-to-Frame Rotation", ICCV 2013 (eigenvalue);
 // He, Xu, Ouyang, Li, "A Rotation-Translation-Decoupled Solution for Robust and Efficient
 // Visual-Inertial Initialization", CVPR 2023 (structureless linear solve); Schur elimination: Triggs

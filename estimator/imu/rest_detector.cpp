@@ -30,7 +30,7 @@ constexpr double kShortSlowFactor = 0.8;
 // At rest the newest 0.5 s may reach this multiple of the limits before the rest ends.
 constexpr double kHoldFactor = 1.3;
 // With still images the limits may be so much wider.
-constexpr double kImageSlowFactor = 2.0;
+constexpr double kImageSlowFactor = 3.0;  // of the upper slow limits
 constexpr double kImageGyroLimit = 0.1;
 constexpr double kImageAccelLimit = 1.5;
 
@@ -45,7 +45,7 @@ constexpr double kDriftGyroFloor = 0.006;  // rad/s
 constexpr double kDriftAccelFloor = 0.06;  // m/s^2
 
 constexpr double kStillPixels = 0.2;   // median motion of a frame: tracking noise is 0.05
-constexpr double kMovingPixels = 0.6;  // certainly motion
+constexpr double kMovingPixels = 0.5;  // certainly motion
 constexpr Duration kStillTime = Duration::fromMilliseconds(250);
 constexpr Duration kImageLife = Duration::fromMilliseconds(300);  // an older verdict says nothing
 
@@ -161,6 +161,11 @@ bool RestDetector::within(const Window& w, double slow_factor, double gyro_limit
          w.gyro < gyro_limit && w.accel < accel_limit && meansAllow(w);
 }
 
+bool RestDetector::withinImageLimits(const Window& w) const {
+  return w.slow_gyro < kImageSlowFactor * kSlowGyroHigh && w.slow_accel < kImageSlowFactor * kSlowAccelHigh &&
+         w.gyro < kImageGyroLimit && w.accel < kImageAccelLimit && meansAllow(w);
+}
+
 bool RestDetector::jumps(const ImuSample& sample) const {
   return ((sample.gyro - window_gyro_).cwiseAbs().array() > jump_gyro_.array()).any() ||
          ((sample.accel - window_accel_).cwiseAbs().array() > jump_accel_.array()).any();
@@ -174,15 +179,14 @@ bool RestDetector::drifts(const Block& block) const {
 void RestDetector::closeBlock() {
   blocks_[block_count_ % kLongBlocks] = open_;
   ++block_count_;
-  if (state_.at_rest && drifts(open_)) end();
+  if (state_.at_rest && images() != Images::kStill && drifts(open_)) end();
   if (state_.at_rest) rest_.add(open_);
   open_ = Block{};
   if (block_count_ < kImageBlocks) return;
 
   const Images images = this->images();
   const Window image_window = window(kImageBlocks);
-  const bool by_images =
-      images == Images::kStill && within(image_window, kImageSlowFactor, kImageGyroLimit, kImageAccelLimit);
+  const bool by_images = images == Images::kStill && withinImageLimits(image_window);
   if (block_count_ < kShortBlocks) {
     if (by_images && !state_.at_rest) begin(image_window);
     return;
@@ -204,12 +208,14 @@ void RestDetector::closeBlock() {
   drift_accel_ = std::max(kDrift * short_window.slow_accel, kDriftAccelFloor);
 
   if (state_.at_rest) {
-    const double factor = images == Images::kStill ? kImageSlowFactor : kHoldFactor;
-    if (!within(short_window, factor, kImageGyroLimit, kImageAccelLimit)) end();
+    const bool holds = images == Images::kStill
+                           ? withinImageLimits(short_window)
+                           : within(short_window, kHoldFactor, kImageGyroLimit, kImageAccelLimit);
+    if (!holds) end();
   }
   if (block_count_ >= kLongBlocks) updateLimits(window(kLongBlocks));
   if (!state_.at_rest && images != Images::kMoving) {
-    const bool imu_may = images == Images::kUnknown && speedAllows();
+    const bool imu_may = speedAllows();
     if (by_images) {
       begin(image_window);
     } else if (imu_may && within(short_window, kShortSlowFactor, kShortGyroLimit, kShortAccelLimit)) {

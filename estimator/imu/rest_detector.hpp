@@ -9,8 +9,9 @@
 // coarse sensor nor lax on a fine one.
 //   IMU alone:  1 s within the limits, or 0.5 s well within them; not while the estimate says that
 //               the body moves, nor with a mean rate that no bias explains.
-//   Images:     still images for 0.25 s admit a rest at wider IMU limits; moving images end and
-//               forbid it. Unknown (negative) motion leaves the decision to the IMU.
+//   Images:     still images (below 0.2 px a frame) for 0.25 s admit and hold a rest at wider IMU
+//               limits; moving ones (from 0.5 px) end and forbid it. In between, and where the
+//               motion is unknown (negative), the IMU decides alone.
 // Frames: body axes. Units: SI, pixels.
 // Use: `at_rest` is for a SOFT factor (zero velocity, unchanged pose), never for setting a state.
 // Cost: about 30 ns a sample; fixed memory (3 kB); nothing is allocated.
@@ -84,6 +85,7 @@ class RestDetector {
   [[nodiscard]] bool meansAllow(const Window& w) const;
   [[nodiscard]] bool speedAllows() const;
   [[nodiscard]] bool within(const Window& w, double slow_factor, double gyro_limit, double accel_limit) const;
+  [[nodiscard]] bool withinImageLimits(const Window& w) const;
   [[nodiscard]] bool jumps(const ImuSample& sample) const;
   [[nodiscard]] bool drifts(const Block& block) const;
   void closeBlock();

@@ -5,9 +5,10 @@
 //   p_k = o + v t_k - gravity up t_k^2 / 2 + alpha_k(bg, ba) + noise,   R_k = dR_k(bg) Exp(noise)
 // with alpha_k, dR_k preintegrated from 0 to k, o the first position's own error. Unknowns: o (3),
 // v (3), tilt (2, gravity's magnitude is known), bg (3), ba (3), with priors on tilt and biases.
-// Gauss-Newton from the linear solution; 14 unknowns, a few iterations, about 20 us.
-// Frames: body axes at the first image. Source: reference equation 4: Mur-Artal, Tardos, RA-L 2017
-// (linear visual-inertial alignment) with gravity on the sphere as in Qin, Shen, IROS 2017.
+// Gauss-Newton from the accelerometer tilt (linear but for the sphere and the biases); 14 unknowns, a few
+// iterations, about 90 us for 10 frames. Frames: body axes at the first image. Source: reference equation 4:
+// Mur-Artal, Tardos, RA-L 2017 (linear visual-inertial alignment) with gravity on the sphere as in Qin, Shen,
+// IROS 2017.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>

@@ -13,6 +13,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <span>
 
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/limits.hpp"
@@ -30,25 +31,32 @@ struct CameraSighting {
 
 /// What one state saw of a landmark.
 struct Sighting {
-  std::uint8_t slot = 0;
+  std::uint32_t slot = 0;
   std::array<CameraSighting, kMaxCameras> camera;
 };
 
-struct Landmark {
-  bool used = false;
+/// Where a landmark is, as last triangulated.
+struct LandmarkPoint {
   bool triangulated = false;
+  Eigen::Vector3d reference = Eigen::Vector3d::Zero();  ///< m, world
+  Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();   ///< unit, world axes
+  double inverse_depth = 0;                             ///< 1/m, >= 0
+  double inverse_depth_sigma = 0;                       ///< 1/m
+
+  [[nodiscard]] Eigen::Vector3d position() const { return reference + bearing / inverse_depth; }
+};
+
+/// A landmark of the fixed-lag window.
+struct Landmark {
   TrackId id = 0;
   std::uint64_t last_frame = 0;  ///< index of the newest frame that saw it
   int frames_seen = 0;
   int rejections = 0;  ///< solves in which it did not fit
-  Eigen::Vector3d reference = Eigen::Vector3d::Zero();
-  Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();  ///< unit, world axes
-  double inverse_depth = 0;                            ///< 1/m, >= 0
-  double inverse_depth_sigma = 0;                      ///< 1/m
+  LandmarkPoint point;
   FixedVector<Sighting, kMaxStates> sightings;
 
-  [[nodiscard]] Eigen::Vector3d position() const { return reference + bearing / inverse_depth; }
-  [[nodiscard]] int views() const {
+  [[nodiscard]] std::span<const Sighting> views() const { return {sightings.data(), sightings.size()}; }
+  [[nodiscard]] int viewCount() const {
     int count = 0;
     for (const Sighting& s : sightings) count += int{s.camera[0].used} + int{s.camera[1].used};
     return count;

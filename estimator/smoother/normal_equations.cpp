@@ -14,7 +14,7 @@ constexpr double kInverseDepthInformation = 1.0 / (30.0 * 30.0);  // as in trian
 using PoseBlockMatrix = Eigen::Matrix<double, kPoseDim, kPoseDim>;
 
 struct SightingTerms {
-  std::uint8_t slot = 0;
+  std::uint32_t slot = 0;
   bool valid = false;
   alignas(32) double y[3][8];  // (J_pose^T J_point) L^-T, padded columns
 };
@@ -63,11 +63,11 @@ void NormalEquations::addDiagonal(const WindowState& state, int first, const Eig
   cost_ += 0.5 * information * residual.squaredNorm();
 }
 
-bool NormalEquations::addLandmark(const Landmark& landmark, const RigPoses& poses,
+bool NormalEquations::addLandmark(const Landmark& landmark, RigPoses poses,
                                   const std::array<SE3, kMaxCameras>& T_body_cam,
                                   const std::array<WindowState, kMaxStates>& states) {
   const int calibration_dim = calibration_.dimension();
-  const PointBasis basis = PointBasis::of(landmark.bearing);
+  const PointBasis basis = PointBasis::of(landmark.point.bearing);
   std::array<SightingTerms, kMaxStates> terms;
   std::array<PoseBlockMatrix, kMaxStates> pose_information;
   std::array<Eigen::Matrix<double, kPoseDim, 3>, kMaxStates> pose_point;
@@ -99,8 +99,8 @@ bool NormalEquations::addLandmark(const Landmark& landmark, const RigPoses& pose
       if (!view.used) continue;
       Eigen::Vector2d r;
       SightingJacobians J;
-      if (!reprojectionResidual(view, rig.current[c], landmark, r)) continue;
-      if (!reprojectionJacobians(view, rig.linearization[c], T_body_cam[c], landmark, basis,
+      if (!reprojectionResidual(view, rig.current[c], landmark.point, r)) continue;
+      if (!reprojectionJacobians(view, rig.linearization[c], T_body_cam[c], landmark.point, basis,
                                  calibration_.extrinsics, J)) {
         continue;
       }

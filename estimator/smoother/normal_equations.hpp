@@ -53,8 +53,7 @@ class NormalEquations {
 
   /// Eliminates a landmark. False when it does not constrain anything (fewer than two states, or not
   /// in front of a camera at the linearization point).
-  bool addLandmark(const Landmark& landmark, const RigPoses& poses,
-                   const std::array<SE3, kMaxCameras>& T_body_cam,
+  bool addLandmark(const Landmark& landmark, RigPoses poses, const std::array<SE3, kMaxCameras>& T_body_cam,
                    const std::array<WindowState, kMaxStates>& states);
 
   /// Scatters the pose blocks; call once after all factors. Fills the lower triangle of H.
@@ -64,8 +63,8 @@ class NormalEquations {
   static constexpr int kRows = 8;  // rows of a padded pose block
   using PoseBlock = std::array<double, kRows * kPoseDim>;
 
-  [[nodiscard]] PoseBlock& block(std::uint8_t slot_i, std::uint8_t slot_j) {
-    return blocks_[static_cast<std::size_t>(slot_i) * kMaxStates + slot_j];
+  [[nodiscard]] PoseBlock& block(std::size_t slot_i, std::size_t slot_j) {
+    return blocks_[slot_i * kMaxStates + slot_j];
   }
 
   CalibrationLayout calibration_;

@@ -52,7 +52,6 @@ Smoother::Smoother(const Rig& rig, const ImuNoise& noise, const SmootherSettings
 void Smoother::reset() {
   order_.clear();
   for (WindowState& state : states_) state.used = false;
-  for (Landmark& landmark : landmarks_) landmark.used = false;
   std::fill(landmark_ids_.begin(), landmark_ids_.end(), 0);
   prior_.clear();
   has_start_ = false;
@@ -173,8 +172,7 @@ Landmark* Smoother::newLandmark(TrackId id) {
     free = landmark_ids_.begin() + static_cast<std::ptrdiff_t>(oldest);
   }
   Landmark& landmark = landmarks_[static_cast<std::size_t>(free - landmark_ids_.begin())];
-  landmark.used = true;
-  landmark.triangulated = false;
+  landmark.point.triangulated = false;
   landmark.id = id;
   landmark.frames_seen = 0;
   landmark.rejections = 0;
@@ -184,7 +182,6 @@ Landmark* Smoother::newLandmark(TrackId id) {
 }
 
 void Smoother::removeLandmark(Landmark& landmark) {
-  landmark.used = false;
   landmark.sightings.clear();
   landmark_ids_[static_cast<std::size_t>(&landmark - landmarks_.data())] = 0;
 }
@@ -251,13 +248,13 @@ void Smoother::triangulateAll(int iterations) {
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     if (landmark_ids_[i] == 0) continue;
     Landmark& landmark = landmarks_[i];
-    const bool fresh = !landmark.triangulated;
+    const bool fresh = !landmark.point.triangulated;
     if (iterations == 0 && in_system_[i] == 0) continue;
-    in_system_[i] =
-        landmark.sightings.size() >= 2 &&
-                triangulate(rig_poses_, fresh ? kTriangulationStart : std::max(iterations, 1), landmark)
-            ? 1
-            : 0;
+    in_system_[i] = landmark.sightings.size() >= 2 &&
+                            triangulate(rig_poses_, landmark.views(),
+                                        fresh ? kTriangulationStart : std::max(iterations, 1), landmark.point)
+                        ? 1
+                        : 0;
   }
 }
 
@@ -456,7 +453,7 @@ void Smoother::rejectOutliers(double threshold, bool newest_only) {
         CameraSighting& view = sighting.camera[c];
         if (!view.used) continue;
         Eigen::Vector2d r;
-        if (!reprojectionResidual(view, rig_poses_[newest_slot].current[c], landmark, r) ||
+        if (!reprojectionResidual(view, rig_poses_[newest_slot].current[c], landmark.point, r) ||
             r.squaredNorm() > threshold * threshold) {
           view.used = false;
         }
@@ -469,12 +466,13 @@ void Smoother::rejectOutliers(double threshold, bool newest_only) {
     }
     const bool tried = landmark.sightings.size() >= 2;
     const bool bad =
-        tried && (in_system_[i] == 0 || meanSquaredResidual(rig_poses_, landmark) > threshold * threshold);
+        tried && (in_system_[i] == 0 ||
+                  meanSquaredResidual(rig_poses_, landmark.views(), landmark.point) > threshold * threshold);
     if (bad && ++landmark.rejections >= kMaxRejections) {
       removeLandmark(landmark);
       in_system_[i] = 0;
     } else if (bad) {
-      landmark.triangulated = false;
+      landmark.point.triangulated = false;
     }
   }
 }
@@ -488,8 +486,8 @@ void Smoother::updateStatistics(int) {
     const Landmark& landmark = landmarks_[i];
     if (landmark.sightings.empty()) continue;
     ++statistics_.landmarks;
-    const int count = landmark.views();
-    sum += meanSquaredResidual(rig_poses_, landmark) * count;
+    const int count = landmark.viewCount();
+    sum += meanSquaredResidual(rig_poses_, landmark.views(), landmark.point) * count;
     views += count;
     const Sighting& last = landmark.sightings.back();
     if (last.slot != slot) continue;
@@ -512,10 +510,10 @@ void Smoother::window(SmoothedWindow& out) const {
   }
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     const Landmark& landmark = landmarks_[i];
-    if (landmark_ids_[i] == 0 || in_system_[i] == 0 || landmark.inverse_depth <= 0) continue;
-    static_cast<void>(
-        out.landmarks.tryPushBack({landmark.id - 1, landmark.position(), landmark.inverse_depth_sigma,
-                                   static_cast<int>(landmark.sightings.size())}));
+    if (landmark_ids_[i] == 0 || in_system_[i] == 0 || landmark.point.inverse_depth <= 0) continue;
+    static_cast<void>(out.landmarks.tryPushBack({landmark.id - 1, landmark.point.position(),
+                                                 landmark.point.inverse_depth_sigma,
+                                                 static_cast<int>(landmark.sightings.size())}));
   }
 }
 

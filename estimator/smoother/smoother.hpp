@@ -147,7 +147,7 @@ class Smoother {
   Prior prior_;
   Prior next_prior_;
   NormalEquations system_;
-  RigPoses rig_poses_;
+  std::array<RigPose, kMaxStates> rig_poses_;
   std::vector<double> step_;
   std::vector<std::uint8_t> involved_;  // slots touched by a marginalization
   int dimension_ = 0;

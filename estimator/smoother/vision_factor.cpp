@@ -29,15 +29,16 @@ struct PointSystem {
   bool in_front = true;
 };
 
-PointSystem linearizePoint(const RigPoses& poses, const Landmark& landmark, const PointBasis& basis) {
+PointSystem linearizePoint(RigPoses poses, std::span<const Sighting> sightings, const LandmarkPoint& point,
+                           const PointBasis& basis) {
   PointSystem system;
-  for (const Sighting& sighting : landmark.sightings) {
+  for (const Sighting& sighting : sightings) {
     for (std::size_t c = 0; c < kMaxCameras; ++c) {
       const CameraSighting& view = sighting.camera[c];
       if (!view.used) continue;
       const CameraPose& camera = poses[sighting.slot].current[c];
-      const Eigen::Vector3d arm = landmark.reference - camera.center;
-      const Eigen::Vector3d h = camera.R_cam_world * (landmark.bearing + landmark.inverse_depth * arm);
+      const Eigen::Vector3d arm = point.reference - camera.center;
+      const Eigen::Vector3d h = camera.R_cam_world * (point.bearing + point.inverse_depth * arm);
       const double along = view.bearing.dot(h);
       if (!(along > kMinCosine * h.norm())) {
         system.in_front = false;
@@ -60,36 +61,36 @@ PointSystem linearizePoint(const RigPoses& poses, const Landmark& landmark, cons
   return system;
 }
 
-void movePoint(const Eigen::Vector3d& step, const PointBasis& basis, Landmark& landmark) {
-  const Eigen::Vector3d moved = landmark.bearing + step[0] * basis.b1 + step[1] * basis.b2;
+void movePoint(const Eigen::Vector3d& step, const PointBasis& basis, LandmarkPoint& point) {
+  const Eigen::Vector3d moved = point.bearing + step[0] * basis.b1 + step[1] * basis.b2;
   const double scale = 1.0 / moved.norm();
-  landmark.bearing = moved * scale;
-  landmark.inverse_depth = std::clamp((landmark.inverse_depth + step[2]) * scale, 0.0, kMaxInverseDepth);
+  point.bearing = moved * scale;
+  point.inverse_depth = std::clamp((point.inverse_depth + step[2]) * scale, 0.0, kMaxInverseDepth);
 }
 
 // Along the first sighting's ray the residuals are nearly linear in the inverse depth alone.
-void triangulateLinearly(const RigPoses& poses, Landmark& landmark) {
-  const Sighting& first = landmark.sightings.front();
+void triangulateLinearly(RigPoses poses, std::span<const Sighting> sightings, LandmarkPoint& point) {
+  const Sighting& first = sightings.front();
   const std::size_t c0 = first.camera[0].used ? 0 : 1;
   const CameraPose& anchor = poses[first.slot].current[c0];
-  landmark.reference = anchor.center;
-  landmark.bearing = anchor.R_cam_world.transpose() * first.camera[c0].bearing;
+  point.reference = anchor.center;
+  point.bearing = anchor.R_cam_world.transpose() * first.camera[c0].bearing;
   double numerator = 0;
   double denominator = 0;
-  for (const Sighting& sighting : landmark.sightings) {
+  for (const Sighting& sighting : sightings) {
     for (std::size_t c = 0; c < kMaxCameras; ++c) {
       const CameraSighting& view = sighting.camera[c];
       if (!view.used) continue;
       const CameraPose& camera = poses[sighting.slot].current[c];
-      const Eigen::Vector2d a = view.weight * (camera.R_cam_world * landmark.bearing);
-      const Eigen::Vector2d b = view.weight * (camera.R_cam_world * (landmark.reference - camera.center));
+      const Eigen::Vector2d a = view.weight * (camera.R_cam_world * point.bearing);
+      const Eigen::Vector2d b = view.weight * (camera.R_cam_world * (point.reference - camera.center));
       numerator -= a.dot(b);
       denominator += b.dot(b);
     }
   }
   // With less than one sigma of parallax over a metre the data say nothing.
   const bool known = denominator > 1.0 * 1.0;
-  landmark.inverse_depth =
+  point.inverse_depth =
       known ? std::clamp(numerator / denominator, 1e-3, kMaxInverseDepth) : kGuessedInverseDepth;
 }
 
@@ -113,10 +114,10 @@ RobustWeight RobustWeight::huber(double squared_norm) {
   return {kHuberThreshold / norm, kHuberThreshold * (norm - 0.5 * kHuberThreshold)};
 }
 
-bool reprojectionResidual(const CameraSighting& sighting, const CameraPose& camera, const Landmark& landmark,
-                          Eigen::Vector2d& residual) {
+bool reprojectionResidual(const CameraSighting& sighting, const CameraPose& camera,
+                          const LandmarkPoint& point, Eigen::Vector2d& residual) {
   const Eigen::Vector3d h =
-      camera.R_cam_world * (landmark.bearing + landmark.inverse_depth * (landmark.reference - camera.center));
+      camera.R_cam_world * (point.bearing + point.inverse_depth * (point.reference - camera.center));
   const double along = sighting.bearing.dot(h);
   if (!(along > kMinCosine * h.norm())) return false;
   residual = sighting.weight * h / along;
@@ -124,10 +125,10 @@ bool reprojectionResidual(const CameraSighting& sighting, const CameraPose& came
 }
 
 bool reprojectionJacobians(const CameraSighting& sighting, const CameraPose& camera, const SE3& T_body_cam,
-                           const Landmark& landmark, const PointBasis& basis, bool with_extrinsic,
+                           const LandmarkPoint& point, const PointBasis& basis, bool with_extrinsic,
                            SightingJacobians& jacobians) {
-  const Eigen::Vector3d arm = landmark.reference - camera.center;
-  const Eigen::Vector3d h = camera.R_cam_world * (landmark.bearing + landmark.inverse_depth * arm);
+  const Eigen::Vector3d arm = point.reference - camera.center;
+  const Eigen::Vector3d h = camera.R_cam_world * (point.bearing + point.inverse_depth * arm);
   const double along = sighting.bearing.dot(h);
   if (!(along > kMinCosine * h.norm())) return false;
   const Eigen::Vector2d r = sighting.weight * h / along;
@@ -135,42 +136,43 @@ bool reprojectionJacobians(const CameraSighting& sighting, const CameraPose& cam
   const Matrix23d M = G * camera.R_cam_world;
   const Eigen::Matrix3d R_body_cam = T_body_cam.R();
   const Matrix23d K = G * R_body_cam.transpose();  // d r / d (ray in body axes)
-  const Eigen::Vector3d ray_body = R_body_cam * h + landmark.inverse_depth * T_body_cam.translation;
+  const Eigen::Vector3d ray_body = R_body_cam * h + point.inverse_depth * T_body_cam.translation;
   // k^T hat(x) = (k x x)^T
   jacobians.pose.block<1, 3>(0, 0) = K.row(0).transpose().cross(ray_body).transpose();
   jacobians.pose.block<1, 3>(1, 0) = K.row(1).transpose().cross(ray_body).transpose();
-  jacobians.pose.rightCols<3>() = -landmark.inverse_depth * M;
+  jacobians.pose.rightCols<3>() = -point.inverse_depth * M;
   jacobians.point.col(0) = M * basis.b1;
   jacobians.point.col(1) = M * basis.b2;
   jacobians.point.col(2) = M * arm;
   if (with_extrinsic) {
     jacobians.extrinsic.block<1, 3>(0, 0) = G.row(0).transpose().cross(h).transpose();
     jacobians.extrinsic.block<1, 3>(1, 0) = G.row(1).transpose().cross(h).transpose();
-    jacobians.extrinsic.rightCols<3>() = -landmark.inverse_depth * K;
+    jacobians.extrinsic.rightCols<3>() = -point.inverse_depth * K;
   }
   return true;
 }
 
-bool triangulate(const RigPoses& poses, int max_iterations, Landmark& landmark) {
-  if (landmark.sightings.empty()) return false;
-  if (!landmark.triangulated) triangulateLinearly(poses, landmark);
+bool triangulate(RigPoses poses, std::span<const Sighting> sightings, int max_iterations,
+                 LandmarkPoint& point) {
+  if (sightings.empty()) return false;
+  if (!point.triangulated) triangulateLinearly(poses, sightings, point);
   double lambda = 0;
-  PointBasis basis = PointBasis::of(landmark.bearing);
-  PointSystem system = linearizePoint(poses, landmark, basis);
+  PointBasis basis = PointBasis::of(point.bearing);
+  PointSystem system = linearizePoint(poses, sightings, point, basis);
   for (int i = 0; i < max_iterations && system.in_front; ++i) {
     Eigen::Matrix3d H = system.H;
     H(2, 2) += 1.0 / (kInverseDepthPriorSigma * kInverseDepthPriorSigma);
     H.diagonal() *= 1.0 + lambda;
     const Eigen::Vector3d step = -H.llt().solve(system.g);
     if (!step.allFinite()) return false;
-    const Eigen::Vector3d bearing_before = landmark.bearing;
-    const double inverse_depth_before = landmark.inverse_depth;
-    movePoint(step, basis, landmark);
-    const PointBasis moved_basis = PointBasis::of(landmark.bearing);
-    const PointSystem moved = linearizePoint(poses, landmark, moved_basis);
+    const Eigen::Vector3d bearing_before = point.bearing;
+    const double inverse_depth_before = point.inverse_depth;
+    movePoint(step, basis, point);
+    const PointBasis moved_basis = PointBasis::of(point.bearing);
+    const PointSystem moved = linearizePoint(poses, sightings, point, moved_basis);
     if (!moved.in_front || moved.cost > system.cost * (1.0 + 1e-9)) {
-      landmark.bearing = bearing_before;
-      landmark.inverse_depth = inverse_depth_before;
+      point.bearing = bearing_before;
+      point.inverse_depth = inverse_depth_before;
       lambda = std::max(10.0 * lambda, 1e-2);
       continue;
     }
@@ -182,19 +184,19 @@ bool triangulate(const RigPoses& poses, int max_iterations, Landmark& landmark) 
   Eigen::Matrix3d H = system.H;
   H(2, 2) += 1.0 / (kInverseDepthPriorSigma * kInverseDepthPriorSigma);
   const Eigen::Vector3d column = H.llt().solve(Eigen::Vector3d::UnitZ());
-  landmark.inverse_depth_sigma = std::sqrt(std::max(column.z(), 0.0));
-  landmark.triangulated = true;
+  point.inverse_depth_sigma = std::sqrt(std::max(column.z(), 0.0));
+  point.triangulated = true;
   return true;
 }
 
-double meanSquaredResidual(const RigPoses& poses, const Landmark& landmark) {
+double meanSquaredResidual(RigPoses poses, std::span<const Sighting> sightings, const LandmarkPoint& point) {
   double sum = 0;
   int count = 0;
-  for (const Sighting& sighting : landmark.sightings) {
+  for (const Sighting& sighting : sightings) {
     for (std::size_t c = 0; c < kMaxCameras; ++c) {
       if (!sighting.camera[c].used) continue;
       Eigen::Vector2d r;
-      if (!reprojectionResidual(sighting.camera[c], poses[sighting.slot].current[c], landmark, r)) return 1e6;
+      if (!reprojectionResidual(sighting.camera[c], poses[sighting.slot].current[c], point, r)) return 1e6;
       sum += r.squaredNorm();
       ++count;
     }

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <span>
 
 #include "estimator/camera/rig.hpp"
 #include "estimator/smoother/landmark.hpp"
@@ -31,7 +32,8 @@ struct RigPose {
   Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  ///< for the time offset
 };
 
-using RigPoses = std::array<RigPose, kMaxStates>;
+/// Indexed by Sighting::slot.
+using RigPoses = std::span<const RigPose>;
 
 /// The ray of a point in a camera; also the point's tangent basis, shared by all sightings.
 struct PointBasis {
@@ -48,11 +50,11 @@ struct SightingJacobians {
 
 /// Whitened residual. False when the point is not in front of the measured ray.
 [[nodiscard]] bool reprojectionResidual(const CameraSighting& sighting, const CameraPose& camera,
-                                        const Landmark& landmark, Eigen::Vector2d& residual);
+                                        const LandmarkPoint& point, Eigen::Vector2d& residual);
 
 /// Jacobians at `camera`. False as above.
 [[nodiscard]] bool reprojectionJacobians(const CameraSighting& sighting, const CameraPose& camera,
-                                         const SE3& T_body_cam, const Landmark& landmark,
+                                         const SE3& T_body_cam, const LandmarkPoint& point,
                                          const PointBasis& basis, bool with_extrinsic,
                                          SightingJacobians& jacobians);
 
@@ -65,9 +67,11 @@ struct RobustWeight {
 
 /// Moves the point by its own Gauss-Newton steps at the current poses; from nothing when it is not
 /// triangulated yet. False when the sightings do not agree on a point in front of the cameras.
-[[nodiscard]] bool triangulate(const RigPoses& poses, int max_iterations, Landmark& landmark);
+[[nodiscard]] bool triangulate(RigPoses poses, std::span<const Sighting> sightings, int max_iterations,
+                               LandmarkPoint& point);
 
 /// Mean squared whitened residual over the sightings at the current poses; negative without any.
-[[nodiscard]] double meanSquaredResidual(const RigPoses& poses, const Landmark& landmark);
+[[nodiscard]] double meanSquaredResidual(RigPoses poses, std::span<const Sighting> sightings,
+                                         const LandmarkPoint& point);
 
 }  // namespace swiftlet

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "estimator/messages/odometry_output.hpp"
+#include "estimator/messages/tracked_frame.hpp"
 #include "estimator/odometry/pairing.hpp"
 #include "firmware_host/pipeline/stage_timer.hpp"
 

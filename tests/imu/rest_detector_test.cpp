@@ -116,8 +116,8 @@ TEST_CASE("Images: moving ones forbid a rest that the IMU would claim, still one
     gliding.addImu(sample);  // constant velocity: the IMU reads as at rest
     if (i % 10 == 0) gliding.addFrame(sample.stamp, 1.5);
     rest_claimed |= gliding.state().at_rest;
-    sample.accel += 1.0 * normalVector(random);  // rotors
-    sample.gyro += 0.05 * normalVector(random);
+    sample.accel += 0.5 * normalVector(random);  // rotors
+    sample.gyro += 0.04 * normalVector(random);
     idling.addImu(sample);
     if (i % 10 == 0) idling.addFrame(sample.stamp, 0.05);
     idling_found += idling.state().at_rest ? 1 : 0;

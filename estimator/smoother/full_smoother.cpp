@@ -1,0 +1,287 @@
+#include "estimator/smoother/full_smoother.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/CholmodSupport>
+#include <Eigen/SparseCore>
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/geometry/so3.hpp"
+#include "estimator/smoother/imu_factor.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr double kGaugeSigma = 1e-4;      // m, rad: the first keyframe holds position and yaw
+constexpr double kGyroBiasSigma = 0.1;    // rad/s, prior on the first keyframe of an epoch
+constexpr double kAccelBiasSigma = 0.15;  // m/s^2
+constexpr double kOutlierSigmas = 3.5;
+constexpr double kRelativeConvergence = 1e-5;  // of the cost
+constexpr int kOutlierRounds = 2;              // iterations after which outliers are looked for
+constexpr int kTriangulationIterations = 5;
+constexpr double kKeptAhead = 0.1;    // s of samples kept across a keyframe, for interpolation
+constexpr double kLongestLink = 5.0;  // s; beyond, an increment's covariance means little
+constexpr double kInverseDepthInformation = 1.0 / (30.0 * 30.0);
+constexpr double kDampingUp = 10.0;
+constexpr double kDampingStart = 1e-6;
+
+using Pose6x3 = Eigen::Matrix<double, kPoseDim, 3>;
+
+}  // namespace
+
+/// The reduced normal equations as triplets of their lower triangle.
+struct FullSmoother::System {
+  std::vector<Eigen::Triplet<double>> H;
+  Eigen::VectorXd g;
+
+  template <typename Derived>
+  void addBlock(Eigen::Index row, Eigen::Index column, const Eigen::MatrixBase<Derived>& block) {
+    for (Eigen::Index c = 0; c < block.cols(); ++c) {
+      for (Eigen::Index r = 0; r < block.rows(); ++r) {
+        if (row + r < column + c) continue;
+        H.emplace_back(static_cast<int>(row + r), static_cast<int>(column + c), block(r, c));
+      }
+    }
+  }
+};
+
+FullSmoother::FullSmoother(const Rig& rig, const ImuNoise& noise, const FullSmootherSettings& settings)
+    : rig_(rig), noise_(noise), settings_(settings) {}
+
+Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& state) {
+  if (keyframes_.size() >= settings_.max_keyframes) {
+    return {StatusCode::kCapacityReached, "full smoothing holds no more keyframes; the rest is left out"};
+  }
+  Keyframe keyframe;
+  keyframe.stamp = frame.stamp;
+  keyframe.epoch = state.epoch;
+  keyframe.x = {state.T_world_body, state.v_world_body, state.bias_gyro, state.bias_accel};
+  const Stamp at = frame.stamp + rig_.camera_to_imu_shift;
+  if (!keyframes_.empty() && keyframes_.back().epoch == state.epoch) {
+    const double dt = (frame.stamp - keyframes_.back().stamp).seconds();
+    keyframe.linked = dt > 0 && dt < kLongestLink && !pending_imu_.empty();
+    keyframe.samples = pending_imu_;
+  }
+  std::erase_if(pending_imu_,
+                [&](const ImuSample& s) { return s.stamp < at - Duration::fromSeconds(kKeptAhead); });
+  const auto slot = static_cast<std::uint32_t>(keyframes_.size());
+  for (const TrackedFeature& feature : frame.features) {
+    Sighting sighting;
+    sighting.slot = slot;
+    bool any = false;
+    for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+      CameraSighting& view = sighting.camera[c];
+      Eigen::Vector2d pixel;
+      view.used = feature.seen[c] &&
+                  rig_.camera[c].unproject(feature.pixel[c].cast<double>(), view.bearing) &&
+                  rig_.camera[c].project(view.bearing, pixel, &view.weight);
+      if (view.used) view.weight /= settings_.pixel_sigma;
+      any = any || view.used;
+    }
+    if (any) tracks_[{state.epoch, feature.id}].sightings.push_back(sighting);
+  }
+  keyframes_.push_back(std::move(keyframe));
+  return okStatus();
+}
+
+NavState FullSmoother::state(std::size_t k) const {
+  const Keyframe& keyframe = keyframes_[k];
+  NavState state;
+  state.stamp = keyframe.stamp;
+  state.epoch = keyframe.epoch;
+  state.health = Health::kGood;
+  state.T_world_body = keyframe.x.T_world_body;
+  state.v_world_body = keyframe.x.v_world_body;
+  state.bias_gyro = keyframe.x.bias_gyro;
+  state.bias_accel = keyframe.x.bias_accel;
+  return state;
+}
+
+void FullSmoother::placeCameras() {
+  poses_.resize(keyframes_.size());
+  for (std::size_t k = 0; k < keyframes_.size(); ++k) {
+    for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+      poses_[k].current[c] = CameraPose::of(keyframes_[k].x.T_world_body, rig_.T_body_cam[c]);
+      poses_[k].linearization[c] = poses_[k].current[c];
+    }
+  }
+}
+
+void FullSmoother::integrateLinks() {
+  for (std::size_t k = 1; k < keyframes_.size(); ++k) {
+    Keyframe& keyframe = keyframes_[k];
+    if (!keyframe.linked) continue;
+    const Keyframe& before = keyframes_[k - 1];
+    keyframe.imu = Preintegration(noise_, before.x.bias_gyro, before.x.bias_accel);
+    keyframe.linked = keyframe.imu
+                          .integrate(keyframe.samples, before.stamp + rig_.camera_to_imu_shift,
+                                     keyframe.stamp + rig_.camera_to_imu_shift)
+                          .ok();
+  }
+}
+
+void FullSmoother::triangulateAll() {
+  for (auto& [id, track] : tracks_) {
+    track.in_system = track.sightings.size() >= 2 &&
+                      triangulate(poses_, track.sightings, kTriangulationIterations, track.point);
+  }
+}
+
+void FullSmoother::removeOutliers() {
+  for (auto& [id, track] : tracks_) {
+    if (!track.in_system) continue;
+    for (Sighting& sighting : track.sightings) {
+      for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+        CameraSighting& view = sighting.camera[c];
+        if (!view.used) continue;
+        Eigen::Vector2d r;
+        view.used = reprojectionResidual(view, poses_[sighting.slot].current[c], track.point, r) &&
+                    r.squaredNorm() < kOutlierSigmas * kOutlierSigmas;
+      }
+    }
+    std::erase_if(track.sightings, [](const Sighting& s) { return !s.camera[0].used && !s.camera[1].used; });
+    track.in_system = track.sightings.size() >= 2;
+  }
+}
+
+double FullSmoother::linearizeTrack(const Track& track, System& system) const {
+  const PointBasis basis = PointBasis::of(track.point.bearing);
+  const std::size_t n = track.sightings.size();
+  std::vector<Pose6x3> pose_point(n, Pose6x3::Zero());
+  std::vector<Eigen::Matrix<double, kPoseDim, kPoseDim>> pose_pose(
+      n, Eigen::Matrix<double, kPoseDim, kPoseDim>::Zero());
+  Eigen::Matrix3d point_point = Eigen::Matrix3d::Zero();
+  point_point(2, 2) = kInverseDepthInformation;
+  Eigen::Vector3d point_gradient = Eigen::Vector3d::Zero();
+  double cost = 0;
+  for (std::size_t s = 0; s < n; ++s) {
+    const Sighting& sighting = track.sightings[s];
+    for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+      const CameraSighting& view = sighting.camera[c];
+      const CameraPose& camera = poses_[sighting.slot].current[c];
+      Eigen::Vector2d r;
+      SightingJacobians J;
+      if (!view.used || !reprojectionResidual(view, camera, track.point, r) ||
+          !reprojectionJacobians(view, camera, rig_.T_body_cam[c], track.point, basis, false, J)) {
+        continue;
+      }
+      const RobustWeight robust = RobustWeight::huber(r.squaredNorm());
+      cost += robust.cost;
+      pose_pose[s] += robust.weight * J.pose.transpose() * J.pose;
+      pose_point[s] += robust.weight * J.pose.transpose() * J.point;
+      system.g.segment<kPoseDim>(kStateDim * sighting.slot) += robust.weight * J.pose.transpose() * r;
+      point_point += robust.weight * J.point.transpose() * J.point;
+      point_gradient += robust.weight * J.point.transpose() * r;
+    }
+  }
+  const Eigen::LLT<Eigen::Matrix3d> llt(point_point);
+  if (llt.info() != Eigen::Success) return cost;
+  const Eigen::Vector3d z = llt.matrixL().solve(point_gradient);
+  for (std::size_t s = 0; s < n; ++s) {
+    pose_point[s] = llt.matrixL().solve(pose_point[s].transpose()).transpose();
+    system.g.segment<kPoseDim>(kStateDim * track.sightings[s].slot) -= pose_point[s] * z;
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const Eigen::Index row = kStateDim * static_cast<Eigen::Index>(track.sightings[i].slot);
+    system.addBlock(row, row, pose_pose[i] - pose_point[i] * pose_point[i].transpose());
+    for (std::size_t j = 0; j < i; ++j) {
+      system.addBlock(row, kStateDim * static_cast<Eigen::Index>(track.sightings[j].slot),
+                      -pose_point[i] * pose_point[j].transpose());
+    }
+  }
+  return cost;
+}
+
+void FullSmoother::linearizeMotion(System& system, double& cost) const {
+  for (std::size_t k = 0; k < keyframes_.size(); ++k) {
+    const Keyframe& keyframe = keyframes_[k];
+    const Eigen::Index at = kStateDim * static_cast<Eigen::Index>(k);
+    if (k == 0 || keyframes_[k - 1].epoch != keyframe.epoch) {
+      Eigen::Matrix<double, kStateDim, kStateDim> prior = Eigen::Matrix<double, kStateDim, kStateDim>::Zero();
+      const double gauge = 1.0 / (kGaugeSigma * kGaugeSigma);
+      const Eigen::Vector3d up = keyframe.x.T_world_body.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+      prior.block<3, 3>(0, 0) = gauge * up * up.transpose();
+      prior.block<3, 3>(3, 3) = gauge * Eigen::Matrix3d::Identity();
+      prior.block<3, 3>(9, 9) = Eigen::Matrix3d::Identity() / (kGyroBiasSigma * kGyroBiasSigma);
+      prior.block<3, 3>(12, 12) = Eigen::Matrix3d::Identity() / (kAccelBiasSigma * kAccelBiasSigma);
+      system.addBlock(at, at, prior);
+      system.g.segment<3>(at + 9) += keyframe.x.bias_gyro / (kGyroBiasSigma * kGyroBiasSigma);
+      system.g.segment<3>(at + 12) += keyframe.x.bias_accel / (kAccelBiasSigma * kAccelBiasSigma);
+      continue;
+    }
+    MotionFactor factor;
+    const BodyState& x_i = keyframes_[k - 1].x;
+    const double dt = (keyframe.stamp - keyframes_[k - 1].stamp).seconds();
+    const bool valid = keyframe.linked
+                           ? imuFactor(keyframe.imu, noise_, x_i, keyframe.x, x_i, keyframe.x, factor)
+                           : constantVelocityFactor(dt, noise_, x_i, keyframe.x, x_i, keyframe.x, factor);
+    if (!valid) continue;
+    cost += 0.5 * factor.residual.squaredNorm();
+    system.addBlock(at - kStateDim, at - kStateDim, factor.jacobian_i.transpose() * factor.jacobian_i);
+    system.addBlock(at, at - kStateDim, factor.jacobian_j.transpose() * factor.jacobian_i);
+    system.addBlock(at, at, factor.jacobian_j.transpose() * factor.jacobian_j);
+    system.g.segment<kStateDim>(at - kStateDim) += factor.jacobian_i.transpose() * factor.residual;
+    system.g.segment<kStateDim>(at) += factor.jacobian_j.transpose() * factor.residual;
+  }
+}
+
+double FullSmoother::linearize(System& system) {
+  system.H.clear();
+  system.g = Eigen::VectorXd::Zero(kStateDim * static_cast<Eigen::Index>(keyframes_.size()));
+  double cost = 0;
+  for (const auto& [id, track] : tracks_) {
+    if (track.in_system) cost += linearizeTrack(track, system);
+  }
+  linearizeMotion(system, cost);
+  return cost;
+}
+
+Status FullSmoother::solve(FullSmootherReport& report) {
+  if (keyframes_.size() < 3) return {StatusCode::kNotReady, "full smoothing needs three keyframes"};
+  const Eigen::Index n = kStateDim * static_cast<Eigen::Index>(keyframes_.size());
+  System system;
+  Eigen::CholmodDecomposition<Eigen::SparseMatrix<double>, Eigen::Lower> cholmod;
+  std::vector<BodyState> before(keyframes_.size());
+  double damping = kDampingStart;
+  double cost = 0;
+  for (int iteration = 0; iteration < settings_.max_iterations; ++iteration) {
+    integrateLinks();
+    placeCameras();
+    triangulateAll();
+    if (iteration == kOutlierRounds || iteration == 2 * kOutlierRounds) removeOutliers();
+    const bool comparable = iteration > 2 * kOutlierRounds;
+    const double new_cost = linearize(system);
+    if (iteration == 0) report.initial_cost = new_cost;
+    if (comparable && new_cost > cost) {
+      for (std::size_t k = 0; k < keyframes_.size(); ++k) keyframes_[k].x = before[k];
+      damping *= kDampingUp;
+      placeCameras();
+      triangulateAll();
+      linearize(system);
+    } else {
+      if (comparable && cost - new_cost < kRelativeConvergence * cost) break;
+      cost = new_cost;
+    }
+    report.iterations = iteration + 1;
+    Eigen::SparseMatrix<double> H(n, n);
+    H.setFromTriplets(system.H.begin(), system.H.end());
+    for (Eigen::Index k = 0; k < n; ++k) H.coeffRef(k, k) *= 1.0 + damping;
+    cholmod.compute(H);
+    if (cholmod.info() != Eigen::Success) {
+      return {StatusCode::kNumerical, "the full system could not be factored"};
+    }
+    const Eigen::VectorXd step = cholmod.solve(-system.g);
+    if (!step.allFinite()) return {StatusCode::kNumerical, "the full system's solution is not finite"};
+    for (std::size_t k = 0; k < keyframes_.size(); ++k) {
+      before[k] = keyframes_[k].x;
+      keyframes_[k].x.retract(step.segment<kStateDim>(kStateDim * static_cast<Eigen::Index>(k)));
+    }
+  }
+  report.final_cost = cost;
+  report.keyframes = keyframes_.size();
+  report.landmarks = static_cast<std::size_t>(std::count_if(
+      tracks_.begin(), tracks_.end(), [](const auto& entry) { return entry.second.in_system; }));
+  return okStatus();
+}
+
+}  // namespace swiftlet

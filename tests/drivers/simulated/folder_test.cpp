@@ -1,0 +1,197 @@
+#include <unistd.h>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+
+#include "drivers/simulated/folder_writer.hpp"
+#include "drivers/simulated/simulated_source.hpp"
+
+namespace swiftlet {
+namespace {
+
+namespace fs = std::filesystem;
+
+class TemporaryFolder {
+ public:
+  explicit TemporaryFolder(const std::string& name)
+      : path_(fs::temp_directory_path() / ("swiftlet_" + name + "_" + std::to_string(::getpid()))) {
+    fs::remove_all(path_);
+  }
+  ~TemporaryFolder() { fs::remove_all(path_); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  [[nodiscard]] const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+std::string read(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+std::vector<std::string> rowsOf(const fs::path& path) {
+  std::istringstream text(read(path));
+  std::vector<std::string> rows;
+  for (std::string line; std::getline(text, line);) {
+    if (!line.empty() && line[0] != '#') rows.push_back(line);
+  }
+  return rows;
+}
+
+SimulationSettings shortFlight() {
+  SimulationSettings settings;
+  settings.flight.duration = 0.61;
+  settings.rig = RigKind::kForward;
+  settings.paint.texel = 0.03;
+  return settings;
+}
+
+TEST_CASE("the folder holds a whole EuRoC log, the same on any number of threads") {
+  SimulationSettings settings = shortFlight();
+  const TemporaryFolder a("simulated_a");
+  const TemporaryFolder b("simulated_b");
+  std::string message;
+  int progress = 0;
+  settings.threads = 1;
+  REQUIRE(simulateToFolder(
+              settings, a.path(), [&](int done, int) { progress = done; }, &message)
+              .ok());
+  settings.threads = 3;
+  REQUIRE(simulateToFolder(settings, b.path(), {}, &message).ok());
+  CHECK(progress == 11);
+
+  std::size_t files = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(a.path())) {
+    if (!entry.is_regular_file()) continue;
+    ++files;
+    const fs::path relative = fs::relative(entry.path(), a.path());
+    INFO(relative.string());
+    CHECK(read(entry.path()) == read(b.path() / relative));
+  }
+  const std::size_t images = 22;
+  const std::size_t cameras = 4;
+  const std::size_t imu_and_truth = 3;
+  const std::size_t depth = 5;
+  const std::size_t labels = 6;
+  const std::size_t about_the_world = 5;
+  CHECK(files == images + cameras + imu_and_truth + depth + labels + about_the_world);
+
+  const fs::path mav = a.path() / "mav0";
+  const auto left = rowsOf(mav / "cam0/data.csv");
+  REQUIRE(left.size() == 11);
+  CHECK(left.front() == "1700000000100000000,1700000000100000000.jpg");
+  CHECK(rowsOf(mav / "cam1/data.csv") == left);
+  for (const std::string& row : left) CHECK(fs::exists(mav / "cam0/data" / row.substr(row.find(',') + 1)));
+  CHECK(rowsOf(mav / "imu0/data.csv").size() == 123);
+  const auto truth = rowsOf(mav / "state_groundtruth_estimate0/data.csv");
+  REQUIRE(truth.size() == 123);
+  CHECK(std::count(truth[0].begin(), truth[0].end(), ',') == 16);
+  CHECK(rowsOf(mav / "depth0/data.csv").size() == 3);
+  CHECK(read(mav / "cam0/sensor.yaml").find("distortion_model: radial-tangential") != std::string::npos);
+  CHECK(rowsOf(mav / "labels0/labels.csv").size() == kLabelCount);
+  CHECK(read(a.path() / "truth/mesh.ply").starts_with("ply\nformat ascii 1.0\n"));
+  CHECK(read(mav / "cam0/sensor.yaml") == read(a.path() / "truth/cam0.yaml"));
+}
+
+TEST_CASE("faults, offsets and turned extrinsics are written as asked") {
+  SimulationSettings settings = shortFlight();
+  settings.depth_every = 0;
+  settings.format = ImageFormat::kPng;
+  settings.faults = {{FaultKind::kCameraMissing, {0.2, 0.34}, 1}, {FaultKind::kImuGap, {0.1, 0.3}, -1}};
+  settings.image_stamp_offset = Duration::fromMilliseconds(5);
+  settings.camera_turn_deg[0] = {0, 0, 0.5};
+  const TemporaryFolder folder("simulated_faults");
+  std::string message;
+  REQUIRE(simulateToFolder(settings, folder.path(), {}, &message).ok());
+  const fs::path mav = folder.path() / "mav0";
+  const auto left = rowsOf(mav / "cam0/data.csv");
+  CHECK(left.size() == 11);
+  CHECK(left.front() == "1700000000105000000,1700000000105000000.png");
+  CHECK(rowsOf(mav / "cam1/data.csv").size() == 8);
+  CHECK(rowsOf(mav / "imu0/data.csv").size() == 123 - 40);
+  CHECK(rowsOf(mav / "state_groundtruth_estimate0/data.csv").size() == 123);
+  CHECK(read(mav / "cam0/sensor.yaml") != read(folder.path() / "truth/cam0.yaml"));
+  CHECK(read(mav / "cam1/sensor.yaml") == read(folder.path() / "truth/cam1.yaml"));
+  CHECK(read(folder.path() / "truth/simulation.yaml").find("timeshift_cam_imu: -0.005") != std::string::npos);
+
+  const SimulatedFlight flight(settings);
+  const Eigen::AngleAxisd turn(flight.givenRig().T_body_cam[0].rotation *
+                               flight.trueRig().T_body_cam[0].rotation.conjugate());
+  CHECK(turn.angle() * 180 / M_PI == Approx(0.5));
+}
+
+TEST_CASE("tracks are written without rendering") {
+  SimulationSettings settings = shortFlight();
+  settings.output = SimulatedOutput::kTracks;
+  const TemporaryFolder folder("simulated_tracks");
+  REQUIRE(simulateToFolder(settings, folder.path()).ok());
+  CHECK(rowsOf(folder.path() / "mav0/tracks0/data.csv").size() > 11 * 100);
+  CHECK_FALSE(fs::exists(folder.path() / "mav0/cam0/data"));
+}
+
+TEST_CASE("bad settings and unwritable folders are said by name") {
+  SimulationSettings settings = shortFlight();
+  settings.camera_rate = 0;
+  std::string message;
+  CHECK(simulateToFolder(settings, "unused", {}, &message).code == StatusCode::kInvalidInput);
+  CHECK(message.find("camera_rate") != std::string::npos);
+  settings = shortFlight();
+  settings.given_motion = "no_such_motion.csv";
+  CHECK(simulateToFolder(settings, "unused", {}, &message).code == StatusCode::kFailed);
+  CHECK(message.find("no_such_motion.csv") != std::string::npos);
+  CHECK(simulateToFolder(shortFlight(), "/proc/no_folder", {}, &message).code == StatusCode::kFailed);
+}
+
+TEST_CASE("the stream gives samples and frames in time order") {
+  SimulationSettings settings = shortFlight();
+  settings.faults = {{FaultKind::kBlackout, {0.2, 0.3}, -1}, {FaultKind::kCameraMissing, {0.3, 0.4}, 0}};
+  SimulatedSource source(settings);
+  ImuSample sample;
+  CameraFrame frame;
+  Stamp last{0};
+  int samples = 0;
+  std::array<int, 2> frames{};
+  for (;;) {
+    const SimulatedSource::Item item = source.next(sample, frame);
+    if (item == SimulatedSource::Item::kEnd) break;
+    const Stamp stamp = item == SimulatedSource::Item::kImu ? sample.stamp : frame.stamp;
+    CHECK(stamp >= last);
+    last = stamp;
+    if (item == SimulatedSource::Item::kImu) {
+      ++samples;
+      continue;
+    }
+    ++frames[frame.camera];
+    double mean = 0;
+    for (int y = 0; y < frame.image.height; ++y) {
+      for (int x = 0; x < frame.image.width; ++x) mean += frame.image.row(y)[x];
+    }
+    mean /= frame.image.width * frame.image.height;
+    const double t = (frame.stamp - source.flight().settings().start).seconds();
+    if (t > 0.2 - 1e-6 && t < 0.3 - 1e-6) {
+      CHECK(mean < 5);
+    } else {
+      CHECK(mean > 20);
+      CHECK(mean < 160);
+    }
+  }
+  CHECK(samples == 123);
+  CHECK(frames[0] == 9);
+  CHECK(frames[1] == 11);
+}
+
+TEST_CASE("low light is darker, noisier, and still exposed") {
+  SimulationSettings settings = shortFlight();
+  settings.low_light = true;
+  const SimulatedFlight flight(settings);
+  CHECK(flight.settings().sensor.light == Approx(0.05));
+  CHECK(flight.settings().render.exposure == Approx(0.01));
+}
+
+}  // namespace
+}  // namespace swiftlet
