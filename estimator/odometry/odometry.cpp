@@ -142,8 +142,8 @@ class Odometry::Impl {
     return rig;
   }
   static ImuNoise inflated(ImuNoise noise, const OdometrySettings& settings) {
-    noise.gyro_density *= settings.imu_inflation;
-    noise.accel_density *= settings.imu_inflation;
+    noise.gyro_density *= settings.gyro_inflation;
+    noise.accel_density *= settings.accel_inflation;
     return noise;
   }
   static SmootherSettings smootherSettings(const OdometrySettings& settings) {
@@ -152,9 +152,6 @@ class Odometry::Impl {
     s.horizon = settings.horizon;
     s.estimate_time_offset = settings.estimate_time_offset;
     s.estimate_extrinsics = settings.estimate_extrinsics;
-    if (getenv("MK")) s.max_keyframes = atoi(getenv("MK"));         // DEV
-    if (getenv("MM")) s.max_motion_keyframes = atoi(getenv("MM"));  // DEV
-    if (getenv("MR")) s.max_recent = atoi(getenv("MR"));            // DEV
     return s;
   }
 

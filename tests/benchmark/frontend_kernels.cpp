@@ -306,6 +306,10 @@ void real(const std::string& name) {
 
 int main() {
   cv::setNumThreads(1);
+  if (EurocLog::open(dataFolder() + "/vil_v102").stamps.empty()) {
+    std::printf("no logs in %s: set SWIFTLET_DATA\n", dataFolder().c_str());
+    return 0;
+  }
   synthetic("euroc_mh01_20s");
   synthetic("vil_v102");
   rendered("vil_v102");

@@ -53,7 +53,7 @@ struct Lens {
 // World axes are those of the first left camera; the wall is the plane z = kWall.
 struct Scene {
   Rig rig;
-  Texture texture{77};
+  Texture texture{77, 40};
   Lens lens;
   explicit Scene(CameraKind kind = CameraKind::kPinholeRadtan) : rig(makeRig(kind)), lens(rig.camera[0]) {}
 
