@@ -22,7 +22,7 @@ constexpr std::size_t kMinTracksToVerify = 12;
 // Pixel noise behind the gates: they stand at 3 sigma.
 constexpr double kGateSigmas = 3.0;
 // Correlation by which a landmark found by projection must resemble its patch.
-constexpr float kMinRecognition = 0.85F;
+constexpr float kMinRecognition = 0.8F;
 // Sightings looked for in one frame at most, at about 1.5 us each: bounds the time.
 constexpr int kMaxSearches = 240;
 
@@ -193,9 +193,14 @@ bool Frontend::Impl::locate(AnchorPatch& anchor, std::size_t c, const PredictedL
     if (found) pixel = position * scale;
     if (!found && level == 0) return false;
   }
-  return (pixel - landmark.pixel[c]).norm() <= landmark.gate &&
-         patchInside(camera_[c].now().level(0), pixel) &&
-         pattern.correlation(camera_[c].now().level(0), pixel) >= kMinRecognition;
+  const ImageView& image = camera_[c].now().level(0);
+  // The warp is as old as the last sighting: bring it up to date, and the position with it.
+  if (pattern.correlation(image, pixel) < kMinRecognition ||
+      !anchor.refine(image, Eigen::Matrix2f::Identity(), pixel)) {
+    return false;
+  }
+  anchor.failures = 0;
+  return (pixel - landmark.pixel[c]).norm() <= landmark.gate && patchInside(image, pixel);
 }
 
 void Frontend::Impl::findAgain(const FrontendPrediction& prediction, int max_features) {

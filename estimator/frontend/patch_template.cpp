@@ -30,7 +30,8 @@ constexpr float kCellSlack = 0.05F;
 
 using Window = std::array<float, kPatchSize * kLanes>;
 
-// Weight falls linearly over the outermost pixel of the disc.
+// The square with its corners taken down to half: in full they would be the first pixels to leave
+// the surface that carries the feature; without them a fifth of the information is lost.
 Window makeWindow() {
   Window window{};
   for (int y = 0; y < kPatchSize; ++y) {
@@ -38,7 +39,7 @@ Window makeWindow() {
       const auto dx = static_cast<float>(x - kPatchRadius);
       const auto dy = static_cast<float>(y - kPatchRadius);
       const float radius = std::sqrt(dx * dx + dy * dy);
-      const float edge = static_cast<float>(kPatchRadius) + 1.0F;
+      const float edge = static_cast<float>(kPatchRadius) + 3.0F;
       window[static_cast<std::size_t>(y * kLanes + x)] = std::clamp(edge - radius, 0.0F, 1.0F);
     }
   }

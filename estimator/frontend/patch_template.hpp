@@ -29,8 +29,7 @@ inline constexpr int kPatchSize = 13;
 inline constexpr int kPatchRadius = kPatchSize / 2;
 static_assert(kPatchSize % 2 == 1 && kPatchSize <= 15);
 
-/// Weights of the window's pixels, kPatchSize rows of 16; zero beyond the window. A disc: pixels far
-/// from the centre are the first to leave the surface that carries the feature.
+/// Weights of the window's pixels, kPatchSize rows of 16; zero beyond the window.
 const float* patchWindow();
 
 struct AlignmentLimits {

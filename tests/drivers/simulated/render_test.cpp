@@ -134,7 +134,7 @@ TEST_CASE("a point is rendered where the camera model projects it, in both camer
     const MountedRig mounted = makeRig(rig);
     const SE3 T_world_body(expSo3({0.3, -0.4, 1.2}), {1, 2, 3});
     const SplineTrajectory still(0, 1, std::vector<SE3>(8, T_world_body));
-    for (int i = 0; i < 6; ++i) {
+    for (int i = 0; i < 4; ++i) {
       const SE3 T_world_cam0 = T_world_body * mounted.rig.T_body_cam[0];
       const Eigen::Vector3d direction(random.uniform(-0.4, 0.4), random.uniform(-0.3, 0.3), 1);
       const double radius = 5 * 3.0 / mounted.rig.camera[0].focal();  // 5 px
@@ -149,7 +149,7 @@ TEST_CASE("a point is rendered where the camera model projects it, in both camer
         REQUIRE(mounted.rig.camera[c].project(T_cam_world * dot.dot, pixel));
         INFO(rigName(rig) << " camera " << c);
         const Eigen::Vector2d error = blobOf(radiance, mounted.rig.camera[c].width()).centre - pixel;
-        CHECK(error.norm() < 0.08);
+        CHECK(error.norm() < 0.1);  // four rays a pixel leave the edge of the dot a little to chance
         sum += error;
         ++count;
       }
