@@ -43,7 +43,12 @@ struct Scalar {
     for (std::int16_t& lane : v.lane) lane = x;
     return v;
   }
-  /// Differences and products wrap around 16 bits: callers keep within them.
+  /// Sums, differences and products wrap around 16 bits: callers keep within them.
+  static Int16x16 add(const Int16x16& a, const Int16x16& b) {
+    Int16x16 v;
+    for (int i = 0; i < 16; ++i) v.lane[i] = static_cast<std::int16_t>(a.lane[i] + b.lane[i]);
+    return v;
+  }
   static Int16x16 subtract(const Int16x16& a, const Int16x16& b) {
     Int16x16 v;
     for (int i = 0; i < 16; ++i) v.lane[i] = static_cast<std::int16_t>(a.lane[i] - b.lane[i]);
@@ -96,6 +101,7 @@ struct Native {
   }
   static void store(std::int16_t* to, Int16x16 v) { _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), v); }
   static Int16x16 broadcast(std::int16_t x) { return _mm256_set1_epi16(x); }
+  static Int16x16 add(Int16x16 a, Int16x16 b) { return _mm256_add_epi16(a, b); }
   static Int16x16 subtract(Int16x16 a, Int16x16 b) { return _mm256_sub_epi16(a, b); }
   static Int16x16 multiply(Int16x16 a, Int16x16 b) { return _mm256_mullo_epi16(a, b); }
   static Int16x16 multiplyFraction(Int16x16 a, Int16x16 b) { return _mm256_mulhrs_epi16(a, b); }
@@ -136,6 +142,9 @@ struct Native {
     vst1q_s16(to + 8, v.high);
   }
   static Int16x16 broadcast(std::int16_t x) { return {vdupq_n_s16(x), vdupq_n_s16(x)}; }
+  static Int16x16 add(const Int16x16& a, const Int16x16& b) {
+    return {vaddq_s16(a.low, b.low), vaddq_s16(a.high, b.high)};
+  }
   static Int16x16 subtract(const Int16x16& a, const Int16x16& b) {
     return {vsubq_s16(a.low, b.low), vsubq_s16(a.high, b.high)};
   }

@@ -30,8 +30,9 @@ constexpr float kCellSlack = 0.05F;
 
 using Window = std::array<float, kPatchSize * kLanes>;
 
-// The square with its corners taken down to half: in full they would be the first pixels to leave
-// the surface that carries the feature; without them a fifth of the information is lost.
+// A disc: pixels in the corners of the square are the first to leave the surface that carries the
+// feature. On rendered flights the full square gives young tracks 5 % less error and old ones (80
+// frames) a third more outliers. Weight falls linearly over the outermost pixel.
 Window makeWindow() {
   Window window{};
   for (int y = 0; y < kPatchSize; ++y) {
@@ -39,7 +40,7 @@ Window makeWindow() {
       const auto dx = static_cast<float>(x - kPatchRadius);
       const auto dy = static_cast<float>(y - kPatchRadius);
       const float radius = std::sqrt(dx * dx + dy * dy);
-      const float edge = static_cast<float>(kPatchRadius) + 3.0F;
+      const float edge = static_cast<float>(kPatchRadius) + 1.0F;
       window[static_cast<std::size_t>(y * kLanes + x)] = std::clamp(edge - radius, 0.0F, 1.0F);
     }
   }
@@ -85,14 +86,28 @@ bool PatchTemplate::build(const std::uint8_t* centre, int stride) {
   auto xx = Isa::zero(), xy = Isa::zero(), yy = Isa::zero(), xt = Isa::zero(), yt = Isa::zero();
   const auto one = Isa::broadcast(1);
   const auto grey = Isa::broadcast(128);
+  // Scharr's smoothing (3 10 3)/16 across each derivative: the finest detail, which bilinear
+  // interpolation falsifies, weighs less.
+  const auto three = Isa::broadcast(3);
+  const auto ten = Isa::broadcast(10);
+  const auto sixteenth = Isa::broadcast(2048);
   const std::uint8_t* const first =
       centre - static_cast<std::ptrdiff_t>(kPatchRadius) * stride - kPatchRadius;
   const std::uint8_t* row = first;
   for (int r = 0; r < kRows; ++r, row += stride) {
     const auto w = Isa::load(kIntegerWindow.weight.data() + r * kLanes);
     const auto v = Isa::subtract(Isa::widen(row), grey);
-    const auto gx = Isa::subtract(Isa::widen(row + 1), Isa::widen(row - 1));
-    const auto gy = Isa::subtract(Isa::widen(row + stride), Isa::widen(row - stride));
+    const std::uint8_t* const up = row - stride;
+    const std::uint8_t* const down = row + stride;
+    const auto smooth = [&](const auto& outer, const auto& middle) {
+      return Isa::multiplyFraction(Isa::add(Isa::multiply(outer, three), Isa::multiply(middle, ten)),
+                                   sixteenth);
+    };
+    const auto falling = Isa::subtract(Isa::widen(down + 1), Isa::widen(up - 1));
+    const auto rising = Isa::subtract(Isa::widen(up + 1), Isa::widen(down - 1));
+    const auto gx =
+        smooth(Isa::add(falling, rising), Isa::subtract(Isa::widen(row + 1), Isa::widen(row - 1)));
+    const auto gy = smooth(Isa::subtract(falling, rising), Isa::subtract(Isa::widen(down), Isa::widen(up)));
     const auto wx = Isa::multiply(w, gx);
     const auto wy = Isa::multiply(w, gy);
     const auto wt = Isa::multiply(w, v);

@@ -347,7 +347,7 @@ Normal linearize(Problem& problem, const StartParameters& x, const TiltEstimate&
   Normal normal;
   for (std::size_t t = 0; t < problem.tracks.size(); ++t) {
     if (problem.rejected[t]) continue;
-    Normal with = normal;  // kept only when the track stays
+    Normal with = normal;
     double mean_square = 0;
     addTrack(problem, cameras, problem.tracks[t], with, mean_square);
     if (reject && mean_square > kOutlier * kOutlier) {

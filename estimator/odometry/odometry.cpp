@@ -271,6 +271,7 @@ class Odometry::Impl {
     output.statistics = smoother_.statistics();
     const Health before = health_.health();
     state.health = health_.update(tracked, output.statistics, rig_.camera_count, frames_in_epoch_);
+    smoother_.setHealth(state.health);
     if (before != state.health) {
       raise(tracked.stamp, EventKind::kHealthChanged, static_cast<double>(state.health));
     }

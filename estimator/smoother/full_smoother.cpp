@@ -1,7 +1,11 @@
 #include "estimator/smoother/full_smoother.hpp"
 
 #include <Eigen/Cholesky>
+#ifdef SWIFTLET_WITH_CHOLMOD
 #include <Eigen/CholmodSupport>
+#else
+#include <Eigen/SparseCholesky>
+#endif
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
@@ -26,6 +30,14 @@ constexpr double kDampingUp = 10.0;
 constexpr double kDampingStart = 1e-6;
 
 using Pose6x3 = Eigen::Matrix<double, kPoseDim, 3>;
+
+// Without CHOLMOD (a GPL library, see docs/licences.md) Eigen's own factorization serves: the same
+// steps to rounding, slower on long runs.
+#ifdef SWIFTLET_WITH_CHOLMOD
+using SparseFactor = Eigen::CholmodDecomposition<Eigen::SparseMatrix<double>, Eigen::Lower>;
+#else
+using SparseFactor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower>;
+#endif
 
 }  // namespace
 
@@ -240,7 +252,7 @@ Status FullSmoother::solve(FullSmootherReport& report) {
   if (keyframes_.size() < 3) return {StatusCode::kNotReady, "full smoothing needs three keyframes"};
   const Eigen::Index n = kStateDim * static_cast<Eigen::Index>(keyframes_.size());
   System system;
-  Eigen::CholmodDecomposition<Eigen::SparseMatrix<double>, Eigen::Lower> cholmod;
+  SparseFactor factor;
   std::vector<BodyState> before(keyframes_.size());
   double damping = kDampingStart;
   double cost = 0;
@@ -266,11 +278,11 @@ Status FullSmoother::solve(FullSmootherReport& report) {
     Eigen::SparseMatrix<double> H(n, n);
     H.setFromTriplets(system.H.begin(), system.H.end());
     for (Eigen::Index k = 0; k < n; ++k) H.coeffRef(k, k) *= 1.0 + damping;
-    cholmod.compute(H);
-    if (cholmod.info() != Eigen::Success) {
+    factor.compute(H);
+    if (factor.info() != Eigen::Success) {
       return {StatusCode::kNumerical, "the full system could not be factored"};
     }
-    const Eigen::VectorXd step = cholmod.solve(-system.g);
+    const Eigen::VectorXd step = factor.solve(-system.g);
     if (!step.allFinite()) return {StatusCode::kNumerical, "the full system's solution is not finite"};
     for (std::size_t k = 0; k < keyframes_.size(); ++k) {
       before[k] = keyframes_[k].x;

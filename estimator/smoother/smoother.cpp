@@ -40,6 +40,9 @@ Smoother::Smoother(const Rig& rig, const ImuNoise& noise, const SmootherSettings
       landmark_ids_(kMaxLandmarks, 0),
       in_system_(kMaxLandmarks, 0),
       step_(kMaxSystemDim),
+      factor_(alignedMapSize(kMaxSystemDim)),
+      columns_i_(static_cast<std::size_t>(kMaxSystemDim) * kStateDim),
+      columns_j_(static_cast<std::size_t>(kMaxSystemDim) * kStateDim),
       involved_(kMaxStates, 0) {
   calibration_.time_offset = settings.estimate_time_offset;
   calibration_.extrinsics = settings.estimate_extrinsics;
@@ -425,15 +428,7 @@ Status Smoother::solve(int iterations) {
     statistics_.iterations = iteration + 1;
     if (step.cwiseAbs().maxCoeff() < kConverged) break;
   }
-  // The newest state is last: its marginal is the inverse of the factor's last diagonal block.
-  const WindowState& newest_state = newest();
-  Matrix15d L = Matrix15d::Zero();
-  MatrixMap H = system_.H();
-  for (int c = 0; c < kStateDim; ++c) {
-    for (int r = c; r < kStateDim; ++r) L(r, c) = H(newest_state.offset + r, newest_state.offset + c);
-  }
-  const Matrix15d L_inverse = L.triangularView<Eigen::Lower>().solve(Matrix15d::Identity());
-  covariance_ = L_inverse.transpose() * L_inverse;
+  keepFactor();
   placeCameras();
   rejectOutliers(kFinalOutlierSigmas, true);
   rejectOutliers(kFinalOutlierSigmas, false);

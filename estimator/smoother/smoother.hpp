@@ -83,12 +83,22 @@ class Smoother {
   [[nodiscard]] const FrameStatistics& statistics() const { return statistics_; }
   /// Marginal covariance of the newest state, error-state order.
   [[nodiscard]] const Matrix15d& covariance() const { return covariance_; }
+  /// The verdict on the newest frame, to be recorded with it.
+  void setHealth(Health health) {
+    if (started()) states_[order_.back()].health = health;
+  }
   [[nodiscard]] Duration timeOffset() const { return Duration::fromSeconds(time_offset_); }
   [[nodiscard]] const std::array<SE3, kMaxCameras>& extrinsics() const { return T_body_cam_; }
 
+  /// Covariance of the motion between two poses of the window, T_i_j = T_world_i^-1 T_world_j, in j's error
+  /// state (phi, p of T_i_j, rotation on the right), from their joint marginal. Positions as in
+  /// `window()`. False for a state that has left since the solve. Cost: 12 triangular solves.
+  [[nodiscard]] bool relativeCovariance(std::size_t i, std::size_t j,
+                                        Eigen::Matrix<double, 6, 6>& covariance);
+
   void window(SmoothedWindow& out) const;
   /// The keyframes still in the window, oldest first.
-  void flush(FixedVector<KeyframeState, kMaxStates>& left_window) const;
+  void flush(FixedVector<KeyframeState, kMaxStates>& left_window);
 
  private:
   std::uint8_t addState(const StepInput& input);
@@ -128,7 +138,10 @@ class Smoother {
   void marginalize(std::size_t position, int first, int count, bool with_motion_factor, bool with_landmarks);
   void buildMarginalSystem(std::size_t position, bool with_motion_factor, bool with_landmarks);
   [[nodiscard]] bool leavesWith(const Landmark& landmark, std::uint8_t slot) const;
-  [[nodiscard]] KeyframeState record(const WindowState& state) const;
+  void keepFactor();
+  /// Columns of L^-1 that give marginals: covariance(a, b) = Y_a^T Y_b.
+  void solveFactorColumns(int offset, int count, std::vector<double>& columns);
+  [[nodiscard]] KeyframeState record(const WindowState& state);
   [[nodiscard]] std::size_t motionBegin() const;
 
   Rig rig_;
@@ -149,6 +162,10 @@ class Smoother {
   NormalEquations system_;
   std::array<RigPose, kMaxStates> rig_poses_;
   std::vector<double> step_;
+  std::vector<double> factor_;  // L of the last solve
+  std::vector<double> columns_i_;
+  std::vector<double> columns_j_;
+  int factor_dimension_ = 0;
   std::vector<std::uint8_t> involved_;  // slots touched by a marginalization
   int dimension_ = 0;
   std::uint64_t oldest_recent_frame_ = 0;

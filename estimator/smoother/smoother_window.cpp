@@ -79,6 +79,7 @@ void Smoother::dropFrame(std::size_t position) {
 
 void Smoother::dropMotion(std::size_t position) {
   WindowState& state = states_[order_[position]];
+  state.covariance = record(state).state.covariance;
   marginalize(position, kPoseDim, kStateDim - kPoseDim, true, false);
   state.has_motion = false;
 }
@@ -256,24 +257,6 @@ void Smoother::marginalize(std::size_t position, int first, int count, bool with
     }
   }
   std::swap(prior_, next_prior_);
-}
-
-KeyframeState Smoother::record(const WindowState& state) const {
-  KeyframeState keyframe;
-  keyframe.state.stamp = state.stamp - Duration::fromSeconds(state.time_offset);
-  keyframe.state.T_world_body = state.x.T_world_body;
-  keyframe.state.v_world_body = state.x.v_world_body;
-  keyframe.state.bias_gyro = state.x.bias_gyro;
-  keyframe.state.bias_accel = state.x.bias_accel;
-  keyframe.statistics = state.statistics;
-  return keyframe;
-}
-
-void Smoother::flush(FixedVector<KeyframeState, kMaxStates>& left_window) const {
-  left_window.clear();
-  for (const std::uint8_t slot : order_) {
-    if (states_[slot].keyframe) static_cast<void>(left_window.tryPushBack(record(states_[slot])));
-  }
 }
 
 }  // namespace swiftlet

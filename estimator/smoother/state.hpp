@@ -56,6 +56,10 @@ struct WindowState {
   double time_offset = 0;    ///< s, camera-to-IMU offset at which `stamp` was placed on the IMU's clock
   Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  ///< rad/s at the stamp
   int offset = -1;                                       ///< first column in the normal equations
+  int factor_offset = -1;                                ///< first column in the factor of the last solve
+  int factor_dimension = 0;                              ///< columns there
+  Health health = Health::kInitializing;
+  Matrix15d covariance = Matrix15d::Zero();  ///< marginal, as last computed
   FrameStatistics statistics;
 
   [[nodiscard]] int dimension() const { return has_motion ? kStateDim : kPoseDim; }

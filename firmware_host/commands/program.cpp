@@ -16,6 +16,7 @@ int runProgram(int argc, char** argv) {
       "Example:\n  swiftlet replay data/euroc_mh01_20s --out run_mh01\n"
       "`swiftlet <command> --help` explains each command.");
   int exit_code = kExitDone;
+  addSimulateCommand(app, exit_code);
   addReplayCommand(app, exit_code);
   addEvaluateCommand(app, exit_code);
   addSettingsCommand(app, exit_code);

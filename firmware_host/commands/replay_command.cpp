@@ -29,9 +29,9 @@ std::string accuracyLine(const nlohmann::ordered_json& summary, const char* file
   if (!accuracy.contains(file) || !accuracy[file].is_object()) return "";
   const auto& figures = accuracy[file][section]["se3"];
   if (!figures.contains("ate_m")) return "";
-  return fmt::format("  {:<9}{:<8} ATE rmse {:.4f} m (se3, {} pairs)  rotation {:.3f} deg\n", file, section,
+  return fmt::format("  {:<9}{:<8} ATE rmse {:.4f} m (se3, {} pairs)  attitude {:.3f} deg\n", file, section,
                      figures["ate_m"]["rmse"].get<double>(), figures["pairs"].get<std::size_t>(),
-                     figures["rotation_deg"]["rmse"].get<double>());
+                     figures["attitude_deg"]["rmse"].get<double>());
 }
 
 int replay(const ReplayOptions& options) {
@@ -88,6 +88,7 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
   command->add_option("--until", options->until, "End this many seconds after the first image")
       ->check(CLI::NonNegativeNumber);
   command->add_flag("--imu-rate", request.imu_rate, "Also write imu_rate.tum, the state at every IMU sample");
+  command->add_flag("!--no-map", request.map, "Leave out the full smoothing after the run (map.tum)");
   options->settings.addTo(*command);
   command->footer(
       "Example:\n  swiftlet replay data/euroc_mh01_20s --out run_mh01\n"

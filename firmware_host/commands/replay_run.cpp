@@ -48,6 +48,12 @@ class MemoryTable {
   std::int64_t last_;
 };
 
+void writeMap(const std::string& path, const std::vector<Wiring::MapPose>& poses) {
+  if (poses.empty()) return;
+  LineFile file(path);
+  for (const Wiring::MapPose& pose : poses) file.write(formatTum(pose.stamp, pose.T_world_body));
+}
+
 }  // namespace
 
 ReplayResult runReplay(const ReplayRequest& request, Settings settings) {
@@ -70,6 +76,7 @@ ReplayResult runReplay(const ReplayRequest& request, Settings settings) {
   LineFile(out / "settings.yaml").write(printSettings(settings, false));
   const auto wiring = std::make_unique<Wiring>(source->rig(), source->imuNoise(), settings, recorder);
   wiring->wantImuStates(request.imu_rate);
+  if (request.map) wiring->keepForMap();
   memory.note("estimator_at_start");
 
   Progress progress("replay", request.show_progress ? source->imageCount() : 0);
@@ -94,6 +101,7 @@ ReplayResult runReplay(const ReplayRequest& request, Settings settings) {
   memory.note("grown_in_flight");
   facts.memory = memory.rows();
   facts.peak_resident = peakResidentBytes();
+  writeMap(out / "map.tum", wiring->solveMap());
   printWarnings(*source, warned);
   for (const std::string& line : track_warnings.lines()) fmt::print(stderr, "warning: {}\n", line);
 

@@ -21,6 +21,7 @@ struct ReplayRequest {
   std::string tracks;           ///< file of feature tracks that take the images' place
   bool mono = false;
   bool imu_rate = false;
+  bool map = true;              ///< full smoothing after the run, into map.tum
   double from = 0;              ///< s after the first image
   std::optional<double> until;  ///< s after the first image
   std::optional<Stamp> last_stamp;

@@ -4,17 +4,12 @@
 #include <cmath>
 
 #include "estimator/geometry/so3.hpp"
+#include "firmware_host/evaluation/yaw_rotation.hpp"
 
 namespace swiftlet {
 namespace {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
-
-/// The rotation about z nearest to R.
-Eigen::Quaterniond yawOf(const Eigen::Matrix3d& R) {
-  const double angle = std::atan2(R(1, 0) - R(0, 1), R(0, 0) + R(1, 1));
-  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()));
-}
 
 template <int kSize>
 double squaredNorm(const Eigen::Matrix<double, kSize, kSize>& covariance,
@@ -31,7 +26,7 @@ Consistency consistency(std::span<const ConsistencySample> samples) {
   if (samples.empty()) return result;
   const SE3& first = samples.front().estimate;
   const SE3& first_truth = samples.front().truth;
-  const Eigen::Quaterniond turn = yawOf(first_truth.R() * first.R().transpose());
+  const Eigen::Quaterniond turn = yawRotation(first_truth.R() * first.R().transpose());
   const SE3 T_truth_estimate(turn, first_truth.translation - turn * first.translation);
 
   std::size_t inside = 0;

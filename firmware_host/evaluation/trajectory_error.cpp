@@ -1,9 +1,11 @@
 #include "firmware_host/evaluation/trajectory_error.hpp"
 
+#include <Eigen/SVD>
 #include <cmath>
 #include <numbers>
 
 #include "estimator/geometry/so3.hpp"
+#include "firmware_host/evaluation/yaw_rotation.hpp"
 
 namespace swiftlet {
 namespace {
@@ -20,6 +22,28 @@ Status align(Points from, Points to, AlignKind kind, Alignment& result) {
       return alignYaw(from, to, result);
   }
   return {StatusCode::kInvalidInput, "unknown kind of alignment"};
+}
+
+/// The rotation R that minimizes sum |R_truth - R R_estimate|^2 (Frobenius; Moakher 2002), or the one
+/// about z alone.
+Eigen::Quaterniond fitRotation(std::span<const PosePair> pairs, AlignKind kind) {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (const PosePair& pair : pairs) sum += pair.truth.R() * pair.estimate.R().transpose();
+  if (kind == AlignKind::kYaw) return yawRotation(sum);
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Matrix3d& U = svd.matrixU();
+  const Eigen::Matrix3d& V = svd.matrixV();
+  const Eigen::Vector3d signs(1, 1, U.determinant() * V.determinant() < 0 ? -1 : 1);
+  return Eigen::Quaterniond(Eigen::Matrix3d(U * signs.asDiagonal() * V.transpose()));
+}
+
+ErrorStatistics rotationErrors(std::span<const PosePair> pairs, const Eigen::Quaterniond& R_truth_estimate) {
+  std::vector<double> degrees;
+  for (const PosePair& pair : pairs) {
+    const Eigen::Quaterniond turned = R_truth_estimate * pair.estimate.rotation;
+    degrees.push_back(logSo3(Eigen::Quaterniond(pair.truth.rotation.conjugate() * turned)).norm() * kDegrees);
+  }
+  return statisticsOf(std::move(degrees));
 }
 
 }  // namespace
@@ -49,19 +73,16 @@ TrajectoryError trajectoryError(std::span<const PosePair> pairs, AlignKind kind)
   if (result.status.code == StatusCode::kInvalidInput) return result;
 
   std::vector<double> translation;
-  std::vector<double> rotation;
   Eigen::Vector3d axis_sum = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const Eigen::Vector3d error = truth[i] - result.alignment * estimate[i];
     translation.push_back(error.norm());
     axis_sum += error.cwiseAbs2();
-    const Eigen::Quaterniond turned = result.alignment.T_to_from.rotation * pairs[i].estimate.rotation;
-    rotation.push_back(logSo3(Eigen::Quaterniond(pairs[i].truth.rotation.conjugate() * turned)).norm() *
-                       kDegrees);
     if (i > 0) result.path_length += (truth[i] - truth[i - 1]).norm();
   }
   result.translation = statisticsOf(std::move(translation));
-  result.rotation = statisticsOf(std::move(rotation));
+  result.rotation = rotationErrors(pairs, result.alignment.T_to_from.rotation);
+  result.attitude = rotationErrors(pairs, fitRotation(pairs, kind));
   result.axis_rmse = (axis_sum / static_cast<double>(pairs.size())).cwiseSqrt();
   return result;
 }

@@ -10,6 +10,7 @@
 #include "estimator/messages/odometry_output.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/odometry/pairing.hpp"
+#include "estimator/smoother/full_smoother.hpp"
 #include "firmware_host/pipeline/stage_timer.hpp"
 
 namespace swiftlet {
@@ -59,6 +60,7 @@ struct RunStatistics {
   std::optional<Stamp> first_pose;
   PairingCounters pairing;
   std::map<EventKind, EventTotal> events;
+  std::optional<FullSmootherReport> map;        ///< figures of the full smoothing, when it ran
   std::map<std::string, std::uint64_t> faults;  ///< statuses that were not ok, by their text
   std::vector<HealthChange> health;
   StageTable times;

@@ -27,6 +27,8 @@ std::string_view stageName(StageId stage) {
       return "smooth";
     case StageId::kFrameTotal:
       return "frame_total";
+    case StageId::kMap:
+      return "map";
     case StageId::kCount:
       break;
   }
@@ -39,8 +41,8 @@ double processCpuSeconds() { return seconds(CLOCK_PROCESS_CPUTIME_ID); }
 
 void addTime(StageTable& table, StageId stage, const Spent& spent, bool keyframe) {
   StageTimes& times = table[static_cast<std::size_t>(stage)];
-  (keyframe ? times.keyframes : times.frames).add(spent.wall);
-  (keyframe ? times.cpu_keyframes : times.cpu_frames) += spent.cpu;
+  (keyframe ? times.wall_keyframes : times.wall_frames).add(spent.wall);
+  (keyframe ? times.cpu_keyframes : times.cpu_frames).add(spent.cpu);
 }
 
 }  // namespace swiftlet

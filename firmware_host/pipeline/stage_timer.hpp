@@ -9,16 +9,18 @@
 
 namespace swiftlet {
 
-enum class StageId : std::size_t { kSource, kPairing, kImu, kTrack, kSmooth, kFrameTotal, kCount };
+enum class StageId : std::size_t { kSource, kPairing, kImu, kTrack, kSmooth, kFrameTotal, kMap, kCount };
 
-/// "source", "pairing", "imu", "track", "smooth", "frame_total".
+/// "source", "pairing", "imu", "track", "smooth", "frame_total", "map".
 std::string_view stageName(StageId stage);
 
+/// Wall time is what a reader waits; CPU time is what the stage itself takes, whatever else the
+/// machine does.
 struct StageTimes {
-  LatencyHistogram frames;     ///< wall, frames that are no keyframes (and what belongs to no frame)
-  LatencyHistogram keyframes;  ///< wall
-  double cpu_frames = 0;       ///< s of this thread, summed
-  double cpu_keyframes = 0;    ///< s
+  LatencyHistogram wall_frames;  ///< frames that are no keyframes, and what belongs to no frame
+  LatencyHistogram wall_keyframes;
+  LatencyHistogram cpu_frames;  ///< of this thread
+  LatencyHistogram cpu_keyframes;
 };
 
 using StageTable = std::array<StageTimes, static_cast<std::size_t>(StageId::kCount)>;

@@ -6,10 +6,12 @@
 //                               +-> TrackedFrame -> smooth ----+-> OdometryOutput -> listener
 //   IMU ------------------------------> addImu ----^
 //                                        +-> NavState at IMU rate -> listener
+//                                        keyframes, IMU -> full smoother -> map.tum (after the run)
 //   track file --------------------> TrackedFrame (in place of cameras, pairing and track)
 
 #include "firmware_host/pipeline/wiring.hpp"
 
+#include <algorithm>
 #include <limits>
 
 namespace swiftlet {
@@ -28,7 +30,10 @@ PairingSettings pairingSettings(const Rig& rig, const Settings& settings) {
 }  // namespace
 
 Wiring::Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, RunListener& listener)
-    : pairing_(pairingSettings(rig, settings)),
+    : rig_(rig),
+      noise_(noise),
+      odometry_settings_(settings.odometry),
+      pairing_(pairingSettings(rig, settings)),
       odometry_(rig, noise, settings.odometry),
       effort_(settings.effort),
       listener_(listener) {}
@@ -90,7 +95,43 @@ void Wiring::passTracks(const TrackedFrame& tracked, Spent spent) {
   if (!status.ok() && status.code != StatusCode::kNotReady) noteFault(status, statistics_.smooth_faults);
   if (tracked.keyframe) ++statistics_.keyframes;
   noteOutput(tracked.stamp, output_);
+  if (full_smoother_ && tracked.keyframe && output_.has_state) {
+    Status kept;
+    addTime(statistics_.times, StageId::kMap,
+            measured([&] { kept = full_smoother_->addKeyframe(tracked, output_.state); }));
+    if (!kept.ok()) ++statistics_.faults[kept.what];
+  }
   listener_.onFrame(tracked, output_);
+}
+
+// keyframes with their causal states, and the IMU between them -> full smoother
+void Wiring::keepForMap() {
+  Rig rig = rig_;
+  if (!odometry_settings_.use_stereo) rig.camera_count = std::min<std::size_t>(rig.camera_count, 1);
+  ImuNoise noise = noise_;
+  noise.gyro_density *= odometry_settings_.gyro_inflation;
+  noise.accel_density *= odometry_settings_.accel_inflation;
+  FullSmootherSettings settings;
+  settings.pixel_sigma = odometry_settings_.pixel_sigma;
+  full_smoother_ = std::make_unique<FullSmoother>(rig, noise, settings);
+}
+
+std::vector<Wiring::MapPose> Wiring::solveMap() {
+  std::vector<MapPose> poses;
+  if (!full_smoother_) return poses;
+  FullSmootherReport report;
+  Status status;
+  addTime(statistics_.times, StageId::kMap, measured([&] { status = full_smoother_->solve(report); }));
+  if (!status.ok()) {
+    ++statistics_.faults[status.what];
+    return poses;
+  }
+  statistics_.map = report;
+  for (std::size_t k = 0; k < full_smoother_->size(); ++k) {
+    const NavState state = full_smoother_->state(k);
+    poses.push_back({state.stamp, state.T_world_body});
+  }
+  return poses;
 }
 
 void Wiring::passImu(const ImuSample& sample) {
@@ -100,6 +141,8 @@ void Wiring::passImu(const ImuSample& sample) {
       measured([&] { status = odometry_.addImu(sample, want_imu_states_ ? &propagated : nullptr); });
   addTime(statistics_.times, StageId::kImu, spent);
   ++statistics_.imu_samples;
+  const bool taken = status.ok() || status.code == StatusCode::kNotReady;
+  if (full_smoother_ && taken) full_smoother_->addImu(sample);
   if (status.ok()) {
     if (want_imu_states_) listener_.onImuState(propagated);
   } else if (status.code != StatusCode::kNotReady) {

@@ -7,10 +7,12 @@
 // waiting for its partner is held back until the frame has gone through, so that a frame never sees
 // samples from beyond its stamp.
 
-#include <array>
+#include <memory>
+#include <vector>
 
 #include "estimator/odometry/odometry.hpp"
 #include "estimator/odometry/pairing.hpp"
+#include "estimator/smoother/full_smoother.hpp"
 #include "firmware_host/pipeline/run_listener.hpp"
 #include "firmware_host/settings/settings.hpp"
 
@@ -27,6 +29,15 @@ class Wiring {
   /// Lets out what still waits. Nothing may be fed afterwards.
   void finish();
 
+  /// Keep keyframes for full smoothing (call before the first message), and do it (after finish()).
+  /// The poses are those of the keyframes after it; empty when nothing could be solved.
+  void keepForMap();
+  struct MapPose {
+    Stamp stamp;
+    SE3 T_world_body;
+  };
+  std::vector<MapPose> solveMap();
+
   /// Ask for onImuState calls.
   void wantImuStates(bool wanted) { want_imu_states_ = wanted; }
 
@@ -40,8 +51,12 @@ class Wiring {
   void noteOutput(Stamp stamp, const OdometryOutput& output);
   void noteFault(const Status& status, std::uint64_t& counter);
 
+  Rig rig_;
+  ImuNoise noise_;
+  OdometrySettings odometry_settings_;
   Pairing pairing_;
   Odometry odometry_;
+  std::unique_ptr<FullSmoother> full_smoother_;
   Effort effort_;
   RunListener& listener_;
   bool want_imu_states_ = false;

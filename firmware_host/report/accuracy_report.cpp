@@ -29,6 +29,7 @@ Json toJson(const Accuracy& accuracy) {
   json["ate_m"] = statisticsJson(absolute.translation);
   json["ate_axis_rmse_m"] = {absolute.axis_rmse.x(), absolute.axis_rmse.y(), absolute.axis_rmse.z()};
   json["rotation_deg"] = statisticsJson(absolute.rotation);
+  json["attitude_deg"] = statisticsJson(absolute.attitude);
   json["scale"] = absolute.alignment.scale;
   json["rpe_time"] = {{"interval_s", accuracy.over_time.interval},
                       {"translation_m", statisticsJson(accuracy.over_time.translation)},
@@ -78,6 +79,10 @@ std::string toText(const std::string& title, const Accuracy& accuracy) {
 }
 
 std::string toText(const Consistency& consistency) {
+  if (consistency.count == 0) {
+    return fmt::format("  NEES: none of {} keyframes has a usable covariance\n",
+                       consistency.without_covariance);
+  }
   return fmt::format(
       "  NEES  pose {:.2f} (6 = consistent)  rotation {:.2f} (3)  position {:.2f} (3)  inside 3 sigma {:.1f} "
       "%"

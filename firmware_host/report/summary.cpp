@@ -71,35 +71,44 @@ Json countersJson(const LogSource& source, const RunStatistics& statistics) {
   for (const auto& [kind, total] : statistics.events) {
     json["events"][std::string(eventName(kind))] = {{"count", total.count}, {"value_sum", total.value}};
   }
+  if (statistics.map) {
+    json["map"] = {{"keyframes", statistics.map->keyframes},
+                   {"landmarks", statistics.map->landmarks},
+                   {"iterations", statistics.map->iterations},
+                   {"initial_cost", statistics.map->initial_cost},
+                   {"final_cost", statistics.map->final_cost}};
+  }
   json["faults"] = Json::object();
   for (const auto& [text, count] : statistics.faults) json["faults"][text] = count;
   return json;
 }
 
-Json latencyJson(const LatencyHistogram& histogram, double cpu) {
+Json distributionJson(const LatencyHistogram& histogram) {
   constexpr double kMedian = 0.5;
   constexpr double kP90 = 0.9;
   constexpr double kP99 = 0.99;
-  return {{"count", histogram.count()},
-          {"mean_ms", histogram.mean() * kMilli},
+  return {{"mean_ms", histogram.mean() * kMilli},
           {"p50_ms", histogram.percentile(kMedian) * kMilli},
           {"p90_ms", histogram.percentile(kP90) * kMilli},
           {"p99_ms", histogram.percentile(kP99) * kMilli},
           {"max_ms", histogram.max() * kMilli},
-          {"wall_s", histogram.total()},
-          {"cpu_s", cpu}};
+          {"total_s", histogram.total()}};
+}
+
+Json latencyJson(const LatencyHistogram& wall, const LatencyHistogram& cpu) {
+  return {{"count", wall.count()}, {"wall", distributionJson(wall)}, {"cpu", distributionJson(cpu)}};
 }
 
 Json timingJson(const StageTable& table) {
   Json json;
   for (std::size_t i = 0; i < table.size(); ++i) {
     const StageTimes& times = table[i];
-    if (times.frames.count() + times.keyframes.count() == 0) continue;
+    if (times.wall_frames.count() + times.wall_keyframes.count() == 0) continue;
     Json stage;
     const auto id = static_cast<StageId>(i);
     const bool splits = id == StageId::kTrack || id == StageId::kSmooth || id == StageId::kFrameTotal;
-    stage[splits ? "frames" : "all"] = latencyJson(times.frames, times.cpu_frames);
-    if (splits) stage["keyframes"] = latencyJson(times.keyframes, times.cpu_keyframes);
+    stage[splits ? "frames" : "all"] = latencyJson(times.wall_frames, times.cpu_frames);
+    if (splits) stage["keyframes"] = latencyJson(times.wall_keyframes, times.cpu_keyframes);
     json[std::string(stageName(id))] = stage;
   }
   return json;
@@ -178,13 +187,15 @@ std::string summaryText(const Json& summary) {
       cpu["flight_s"].get<double>(), cpu["wall_s"].get<double>(), cpu["cpu_s"].get<double>(),
       cpu["cpu_per_flight_second"].get<double>(),
       static_cast<double>(summary["memory"]["peak_resident_bytes"].get<std::int64_t>()) / kMebibyte);
+  text += "  CPU [ms]               count     mean      p50      p99      max\n";
   for (const auto& [stage, times] : summary["timing"].items()) {
     for (const auto& [kind, t] : times.items()) {
       if (t["count"].get<std::uint64_t>() == 0) continue;
-      text +=
-          fmt::format("  {:<12}{:<10} {:>7} times  mean {:8.3f} ms  p50 {:8.3f}  p99 {:8.3f}  max {:8.3f}\n",
-                      stage, kind, t["count"].get<std::uint64_t>(), t["mean_ms"].get<double>(),
-                      t["p50_ms"].get<double>(), t["p99_ms"].get<double>(), t["max_ms"].get<double>());
+      const Json& cpu_ms = t["cpu"];
+      text += fmt::format("  {:<12}{:<9}{:>7}{:9.3f}{:9.3f}{:9.3f}{:9.3f}\n", stage, kind,
+                          t["count"].get<std::uint64_t>(), cpu_ms["mean_ms"].get<double>(),
+                          cpu_ms["p50_ms"].get<double>(), cpu_ms["p99_ms"].get<double>(),
+                          cpu_ms["max_ms"].get<double>());
     }
   }
   return text;

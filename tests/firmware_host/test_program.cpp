@@ -28,7 +28,7 @@ int run(std::vector<std::string> arguments) {
 TEST_CASE("exit codes: 0 done, 2 wrong use or bad input") {
   CHECK(run({"--help"}) == kExitDone);
   CHECK(run({"--version"}) == kExitDone);
-  for (const char* command : {"replay", "evaluate", "settings"}) CHECK(run({command, "--help"}) == kExitDone);
+  for (const char* command : {"simulate", "replay", "evaluate", "settings"}) CHECK(run({command, "--help"}) == kExitDone);
   CHECK(run({"settings"}) == kExitDone);
   CHECK(run({}) == kExitBadInput);
   CHECK(run({"fly-away"}) == kExitBadInput);
@@ -121,9 +121,9 @@ TEST_CASE("summary.json has what DESIGN's run folder promises") {
   const auto& track = summary["timing"]["track"];
   CHECK(track["frames"]["count"] == 100);
   CHECK(track["keyframes"]["count"] == 25);
-  CHECK(track["frames"]["mean_ms"].get<double>() == Approx(2));
-  CHECK(track["keyframes"]["p99_ms"].get<double>() == Approx(8).epsilon(0.025));
-  CHECK(track["keyframes"]["cpu_s"].get<double>() == Approx(0.2));
+  CHECK(track["frames"]["cpu"]["mean_ms"].get<double>() == Approx(2));
+  CHECK(track["keyframes"]["wall"]["p99_ms"].get<double>() == Approx(8).epsilon(0.025));
+  CHECK(track["keyframes"]["cpu"]["total_s"].get<double>() == Approx(0.2));
   CHECK_FALSE(summary["timing"].contains("smooth"));  // never ran
   CHECK_NOTHROW(summaryText(summary));
 }
