@@ -19,8 +19,8 @@ namespace swiftlet {
 namespace {
 
 constexpr std::size_t kImuHistory = 4096;  // samples before and between frames
-// An interval with this many sample periods missing is not integrated.
-constexpr double kSilentPeriods = 10.0;
+// With this many sample periods missing before an image, holding the last reading is no measurement.
+constexpr double kSilentPeriods = 5.0;
 // The first frames decide tilt, velocity and biases: they get more iterations than the steady state.
 constexpr std::uint64_t kStartFrames = 20;
 constexpr int kStartIterations = 8;
@@ -101,10 +101,9 @@ class Odometry::Impl {
       const Status caught_up = catchUp(output);
       if (!caught_up.ok()) return fail(caught_up, output);
     }
-    const double silence = imu_.empty() ? 1e9 : (tracked.stamp - imu_.newest().stamp).seconds();
     Smoother::StepInput input;
     input.frame = &tracked;
-    input.imu_gap = imu_gap_ || silence * noise_.rate_hz > kSilentPeriods;
+    input.imu_gap = imu_gap_ || silent(tracked.stamp + smoother_.timeOffset());
     input.at_rest = rest_.state().at_rest;
     input.iterations =
         frames_in_epoch_ < kStartFrames ? std::max(kStartIterations, effort.iterations) : effort.iterations;
@@ -163,6 +162,11 @@ class Odometry::Impl {
     events_.clear();
   }
 
+  /// No sample for many periods before `stamp`.
+  [[nodiscard]] bool silent(Stamp stamp) const {
+    return imu_.empty() || (stamp - imu_.newest().stamp).seconds() * noise_.rate_hz > kSilentPeriods;
+  }
+
   /// Where things will be seen at `stamp`: the turn since the last frame, and the landmarks' pixels.
   void predict(Stamp stamp) {
     prediction_.has_rotation = false;
@@ -172,6 +176,7 @@ class Odometry::Impl {
     const Stamp to = stamp + smoother_.timeOffset();
     const Eigen::Vector3d bias = smoother_.started() ? smoother_.newest().x.bias_gyro : start_bias_gyro_;
     Preintegration turn(noise_, bias, Eigen::Vector3d::Zero());
+    if (imu_gap_ || silent(to)) return;  // better no prediction than a turn that was not measured
     if (!turn.integrate(imu_.around(from, to), from, to).ok()) return;
     prediction_.has_rotation = true;
     prediction_.R_body_prev_body_cur = turn.deltaRotation();
@@ -279,6 +284,11 @@ class Odometry::Impl {
     window_.newest = state;
     window_.epoch = epoch_;
     static_cast<void>(propagator_.setState(state));
+    if (frames_in_epoch_ > kStartFrames) {
+      const Matrix15d& P = state.covariance;
+      rest_.setEstimate(state.bias_gyro, std::sqrt(P.diagonal().segment<3>(9).maxCoeff()),
+                        state.v_world_body.norm(), std::sqrt(P.diagonal().segment<3>(6).maxCoeff()));
+    }
     state.stamp = tracked.stamp;
     output.has_state = true;
     for (KeyframeState& keyframe : output.left_window) {
