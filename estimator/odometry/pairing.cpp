@@ -91,7 +91,10 @@ Status Pairing::push(const CameraFrame& frame, StereoFrame& paired) {
 }
 
 Status Pairing::expire(Stamp now, StereoFrame& paired) {
-  if (!waiting_ || now - pending_.stamp <= settings_.patience) {
+  if (!waiting_) return {StatusCode::kNotReady, "no frame waits"};
+  // While its partner counts as lost a frame need not wait for it.
+  const bool alone = isLost(otherCamera(pending_.camera));
+  if (now - pending_.stamp <= (alone ? Duration{0} : settings_.patience)) {
     return {StatusCode::kNotReady, "no frame is overdue"};
   }
   return flush(paired);

@@ -9,7 +9,8 @@
 //  - A frame whose partner does not come goes out alone: when a later frame shows that the partner
 //    is missing, or when `patience` has passed on the stamps of other messages (`expire`).
 //  - A camera missing in kLostAfter frames running counts as lost: the other's frames then go out at
-//    once. Its first frame that comes back restores the waiting.
+//    once, or with the next message's stamp where one was waiting already. Its first frame that comes
+//    back restores the waiting.
 //  - A frame not later than what went out already is refused: repeated, reversed, or too late.
 // With `cameras` = 1, camera 0 passes through and the other camera's frames are ignored.
 //

@@ -177,7 +177,7 @@ double FullSmoother::linearizeTrack(const Track& track, System& system) const {
           !reprojectionJacobians(view, camera, rig_.T_body_cam[c], track.point, basis, false, J)) {
         continue;
       }
-      const RobustWeight robust = RobustWeight::huber(r.squaredNorm());
+      const RobustWeight robust = RobustWeight::cauchy(r.squaredNorm());
       cost += robust.cost;
       pose_pose[s] += robust.weight * J.pose.transpose() * J.pose;
       pose_point[s] += robust.weight * J.pose.transpose() * J.point;

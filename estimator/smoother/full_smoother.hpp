@@ -4,7 +4,7 @@
 //
 // Keyframes are kept as they come from the odometry (its causal states are the initial values);
 // `solve` then minimizes the same cost as the fixed-lag smoother: preintegrated IMU factors between
-// neighbours, landmarks eliminated by their Schur complement, Huber weights, outliers removed. The
+// neighbours, landmarks eliminated by their Schur complement, Cauchy weights, outliers removed. The
 // reduced system (15 columns a keyframe) is sparse and factored by CHOLMOD.
 // For the low-priority side: memory grows with the run up to `max_keyframes` (about 30 kB each);
 // beyond it further keyframes are refused (kCapacityReached) and the rest of the run is not in the map.

@@ -104,7 +104,7 @@ bool NormalEquations::addLandmark(const Landmark& landmark, RigPoses poses,
                                  calibration_.extrinsics, J)) {
         continue;
       }
-      const RobustWeight robust = RobustWeight::huber(r.squaredNorm());
+      const RobustWeight robust = RobustWeight::cauchy(r.squaredNorm());
       const double root = std::sqrt(robust.weight);
       J.pose *= root;
       J.point *= root;

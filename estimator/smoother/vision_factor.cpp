@@ -11,8 +11,8 @@ namespace {
 
 // Points beyond this cosine from the measured ray have no meaningful tangent-plane residual.
 constexpr double kMinCosine = 0.2;
-// Huber threshold in sigmas: 95 % of a normal residual's norm (2 dof) lies below 2.45.
-constexpr double kHuberThreshold = 2.0;
+// Cauchy scale in sigmas: tracks have heavier tails than a normal distribution.
+constexpr double kCauchyScale = 2.0;
 // Nothing is nearer to a flying camera than this.
 constexpr double kMaxInverseDepth = 20.0;  // 1/m
 // Prior on the inverse depth, for points without parallax: weak enough not to bias points with it.
@@ -51,7 +51,7 @@ PointSystem linearizePoint(RigPoses poses, std::span<const Sighting> sightings, 
       J.col(0) = M * basis.b1;
       J.col(1) = M * basis.b2;
       J.col(2) = M * arm;
-      const RobustWeight robust = RobustWeight::huber(r.squaredNorm());
+      const RobustWeight robust = RobustWeight::cauchy(r.squaredNorm());
       system.H.noalias() += robust.weight * J.transpose() * J;
       system.g.noalias() += robust.weight * J.transpose() * r;
       system.cost += robust.cost;
@@ -108,10 +108,9 @@ PointBasis PointBasis::of(const Eigen::Vector3d& bearing) {
   return {b1, bearing.cross(b1)};
 }
 
-RobustWeight RobustWeight::huber(double squared_norm) {
-  if (squared_norm <= kHuberThreshold * kHuberThreshold) return {1.0, 0.5 * squared_norm};
-  const double norm = std::sqrt(squared_norm);
-  return {kHuberThreshold / norm, kHuberThreshold * (norm - 0.5 * kHuberThreshold)};
+RobustWeight RobustWeight::cauchy(double squared_norm) {
+  const double c2 = kCauchyScale * kCauchyScale;
+  return {1.0 / (1.0 + squared_norm / c2), 0.5 * c2 * std::log1p(squared_norm / c2)};
 }
 
 bool reprojectionResidual(const CameraSighting& sighting, const CameraPose& camera,

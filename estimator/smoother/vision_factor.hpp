@@ -58,11 +58,11 @@ struct SightingJacobians {
                                          const PointBasis& basis, bool with_extrinsic,
                                          SightingJacobians& jacobians);
 
-/// Robust weight (Huber) of a whitened residual's norm, and the cost it stands for.
+/// Robust weight (Cauchy) of a whitened residual's norm, and the cost it stands for.
 struct RobustWeight {
   double weight = 1;
   double cost = 0;
-  static RobustWeight huber(double squared_norm);
+  static RobustWeight cauchy(double squared_norm);
 };
 
 /// Moves the point by its own Gauss-Newton steps at the current poses; from nothing when it is not

@@ -1,0 +1,103 @@
+// Full smoothing on simulated tracks, against the causal estimate it starts from.
+
+#include "estimator/smoother/full_smoother.hpp"
+
+#include <catch2/catch.hpp>
+#include <cstdio>
+
+#include "tests/smoother/smoother_run.hpp"
+
+using namespace swiftlet;
+using test::TrackFlight;
+
+namespace {
+
+struct FullRun {
+  std::vector<NavState> causal;  // at keyframes
+  std::vector<NavState> full;
+  std::vector<BodyState> truth;
+  FullSmootherReport report;
+  Status status;
+};
+
+FullRun runFull(const TrackFlight& flight) {
+  FullRun run;
+  FullSmootherSettings settings;
+  settings.pixel_sigma = flight.flight().settings().tracks.pixel_sigma;
+  FullSmoother full(flight.rig(), flight.noise(), settings);
+  test::SmootherRun causal(flight);
+  flight.play(
+      [&](const ImuSample& sample) {
+        causal.addImu(sample);
+        full.addImu(sample);
+      },
+      [&](std::size_t k) {
+        REQUIRE(causal.step(k).ok());
+        const TrackedFrame& frame = flight.frames()[k];
+        if (!frame.keyframe) return;
+        NavState state;
+        state.stamp = frame.stamp;
+        const BodyState& x = causal.smoother().newest().x;
+        state.T_world_body = x.T_world_body;
+        state.v_world_body = x.v_world_body;
+        state.bias_gyro = x.bias_gyro;
+        state.bias_accel = x.bias_accel;
+        REQUIRE(full.addKeyframe(frame, state).ok());
+        run.causal.push_back(state);
+        run.truth.push_back(flight.truth(k));
+      });
+  run.status = full.solve(run.report);
+  for (std::size_t k = 0; k < full.size(); ++k) run.full.push_back(full.state(k));
+  return run;
+}
+
+}  // namespace
+
+TEST_CASE("Full smoothing is at least as good as the causal estimate", "[smoother][full_smoother]") {
+  double causal_sum = 0;
+  double full_sum = 0;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const TrackFlight flight(test::roomFlight(20, seed));
+    const FullRun run = runFull(flight);
+    REQUIRE(run.status.ok());
+    const double causal = test::positionError(run.causal, run.truth);
+    const double full = test::positionError(run.full, run.truth);
+    std::printf("full smoothing, seed %d: causal %.4f m, full %.4f m, %d iterations, cost %.0f to %.0f\n",
+                static_cast<int>(seed), causal, full, run.report.iterations, run.report.initial_cost,
+                run.report.final_cost);
+    CHECK(full < causal * 1.05 + 1e-3);
+    CHECK(run.report.final_cost < run.report.initial_cost);
+    CHECK(run.report.keyframes == run.causal.size());
+    causal_sum += causal;
+    full_sum += full;
+  }
+  CHECK(full_sum < causal_sum);
+}
+
+TEST_CASE("Full smoothing gives the same bytes twice", "[smoother][full_smoother]") {
+  const TrackFlight flight(test::roomFlight(6, 4));
+  const FullRun a = runFull(flight);
+  const FullRun b = runFull(flight);
+  REQUIRE(a.status.ok());
+  REQUIRE(a.full.size() == b.full.size());
+  for (std::size_t k = 0; k < a.full.size(); ++k) {
+    CHECK(a.full[k].T_world_body.translation == b.full[k].T_world_body.translation);
+    CHECK(a.full[k].T_world_body.rotation.coeffs() == b.full[k].T_world_body.rotation.coeffs());
+    CHECK(a.full[k].bias_accel == b.full[k].bias_accel);
+  }
+}
+
+TEST_CASE("Full smoothing refuses what it cannot solve or hold", "[smoother][full_smoother]") {
+  const TrackFlight flight(test::roomFlight(1, 5));
+  FullSmootherSettings settings;
+  settings.max_keyframes = 2;
+  FullSmoother full(flight.rig(), flight.noise(), settings);
+  FullSmootherReport report;
+  CHECK(full.solve(report).code == StatusCode::kNotReady);
+  NavState state;
+  CHECK(full.addKeyframe(flight.frames()[0], state).ok());
+  CHECK(full.addKeyframe(flight.frames()[1], state).ok());
+  CHECK(full.addKeyframe(flight.frames()[2], state).code == StatusCode::kCapacityReached);
+  CHECK(full.size() == 2);
+  CHECK(full.solve(report).code == StatusCode::kNotReady);
+}
