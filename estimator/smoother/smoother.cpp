@@ -14,7 +14,7 @@ constexpr double kGaugeSigma = 1e-4;  // m, rad
 // First-order bias correction of an increment is exact to about (bias change x duration)^2 / 2.
 constexpr double kReintegrateGyro = 5e-4;   // rad/s
 constexpr double kReintegrateAccel = 5e-2;  // m/s^2
-constexpr double kRelativeDamping = 1e-7;
+constexpr double kRelativeDamping = 1e-10;
 constexpr int kTriangulationStart = 6;  // iterations for a landmark in its first solve
 constexpr int kTriangulationFollow = 2;
 constexpr double kConverged = 1e-4;            // largest step worth another iteration: m, rad, m/s
@@ -56,6 +56,7 @@ void Smoother::reset() {
   order_.clear();
   for (WindowState& state : states_) state.used = false;
   std::fill(landmark_ids_.begin(), landmark_ids_.end(), 0);
+  std::fill(in_system_.begin(), in_system_.end(), std::uint8_t{0});
   prior_.clear();
   has_start_ = false;
 }
@@ -227,6 +228,27 @@ void Smoother::assignOffsets() {
   }
 }
 
+// First estimates keep what is known apart from what is not; but when the window as a whole has
+// moved since (with one camera the scale, and so the place, is known to some per cent only), points
+// and states that are not frozen have moved along, and Jacobians between old and new places are wrong
+// by the parallax of that move. A common translation changes no factor and leaves the unobservable
+// directions' span: the first estimates are moved with the window.
+void Smoother::moveEstimates() {
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+  int frozen = 0;
+  for (const std::uint8_t slot : order_) {
+    const WindowState& state = states_[slot];
+    if (!state.frozen) continue;
+    shift += state.x.T_world_body.translation - state.moved_estimate.T_world_body.translation;
+    ++frozen;
+  }
+  if (frozen == 0) return;
+  shift /= frozen;
+  for (const std::uint8_t slot : order_) {
+    if (states_[slot].frozen) states_[slot].moved_estimate.T_world_body.translation += shift;
+  }
+}
+
 void Smoother::placeCameras() {
   for (const std::uint8_t slot : order_) {
     const WindowState& state = states_[slot];
@@ -242,7 +264,7 @@ void Smoother::placeCameras() {
     for (std::size_t c = 0; c < rig_.camera_count; ++c) {
       rig.current[c] = CameraPose::of(T, T_body_cam_[c]);
       rig.linearization[c] =
-          state.frozen ? CameraPose::of(state.first_estimate.T_world_body, T_body_cam_[c]) : rig.current[c];
+          state.frozen ? CameraPose::of(state.moved_estimate.T_world_body, T_body_cam_[c]) : rig.current[c];
     }
   }
 }
@@ -403,6 +425,7 @@ Status Smoother::solve(int iterations) {
   double cost = 0;
   bool factored = false;
   for (int iteration = 0; iteration < iterations; ++iteration) {
+    moveEstimates();
     placeCameras();
     triangulateAll(kTriangulationFollow);
     if (iteration == 1) rejectOutliers(kOutlierSigmas, true);

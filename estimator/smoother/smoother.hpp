@@ -113,6 +113,7 @@ class Smoother {
   void assignOffsets();
   void restore();
   void backup();
+  void moveEstimates();
   void placeCameras();
   void buildSystem();
   void addPrior();

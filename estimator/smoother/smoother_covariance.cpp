@@ -76,8 +76,12 @@ KeyframeState Smoother::record(const WindowState& state) {
   keyframe.state.covariance = state.covariance;
   keyframe.statistics = state.statistics;
   if (state.factor_offset < 0) return keyframe;
-  // Velocity and biases of a pose-only keyframe keep the covariance they had when they left.
+  // Velocity and biases of a pose-only keyframe keep the covariance they had when they left; their
+  // correlation with the pose, which has been refined since, is not known any more.
   const int count = state.factor_dimension;
+  const int rest = kStateDim - count;
+  keyframe.state.covariance.topRightCorner(count, rest).setZero();
+  keyframe.state.covariance.bottomLeftCorner(rest, count).setZero();
   solveFactorColumns(state.factor_offset, count, columns_i_);
   const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxSystemDim, kStateDim>>
       Y(columns_i_.data(), factor_dimension_, count);

@@ -44,15 +44,23 @@ void Smoother::trimWindow(FixedVector<KeyframeState, kMaxStates>& left_window) {
     }
   }
   const auto motion_states = static_cast<std::size_t>(settings_.max_recent + settings_.max_motion_keyframes);
-  while (order_.size() - motionBegin() > motion_states) dropMotion(motionBegin());
   const auto keyframes = static_cast<std::size_t>(settings_.max_keyframes - settings_.max_motion_keyframes);
-  const auto too_old = [this] {
-    return (newest().stamp - states_[order_.front()].stamp).seconds() > settings_.horizon;
+  const auto too_old = [this, recent] {
+    return order_.size() > recent &&
+           (newest().stamp - states_[order_.front()].stamp).seconds() > settings_.horizon;
   };
-  while (motionBegin() > keyframes || (motionBegin() > 0 && too_old())) {
-    const std::size_t k = too_old() ? 0 : chooseKeyframeToDrop(motionBegin());
-    static_cast<void>(left_window.tryPushBack(record(states_[order_[k]])));
-    dropKeyframe(k);
+  // Each round takes a part of a state away, so there are at most two for each.
+  for (;;) {
+    const std::size_t poses = motionBegin();
+    if (order_.size() - poses > motion_states || (poses == 0 && too_old())) {
+      dropMotion(poses);
+    } else if (poses > keyframes || too_old()) {
+      const std::size_t k = too_old() ? 0 : chooseKeyframeToDrop(poses);
+      static_cast<void>(left_window.tryPushBack(record(states_[order_[k]])));
+      dropKeyframe(k);
+    } else {
+      break;
+    }
   }
 }
 
@@ -146,6 +154,7 @@ void Smoother::freeze(std::uint8_t slot) {
   if (state.frozen) return;
   state.frozen = true;
   state.first_estimate = state.x;
+  state.moved_estimate = state.x;
 }
 
 // Landmarks leave with a keyframe once no recent frame sees them.
@@ -170,6 +179,7 @@ void Smoother::buildMarginalSystem(std::size_t position, bool with_motion_factor
       for (const Sighting& s : landmarks_[i].sightings) involved_[s.slot] = 1;
     }
   }
+  moveEstimates();
   // The old prior is re-expanded at the current values of states that were not frozen so far.
   for (const std::uint8_t s : order_) {
     if (involved_[s] != 0) freeze(s);

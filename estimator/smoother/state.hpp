@@ -47,9 +47,10 @@ struct WindowState {
   bool keyframe = false;
   bool at_rest = false;
   bool has_motion = true;  ///< velocity and biases are still variables
-  bool frozen = false;     ///< the prior touches it: Jacobians are taken at `first_estimate`
+  bool frozen = false;     ///< the prior touches it: Jacobians are taken at `moved_estimate`
   BodyState x;
-  BodyState first_estimate;
+  BodyState first_estimate;  ///< the prior's reference
+  BodyState moved_estimate;  ///< first_estimate, moved with the window (see Smoother::moveEstimates)
   LinkKind link = LinkKind::kNone;
   Preintegration imu;        ///< from the previous state with motion, when link is kImu
   double link_duration = 0;  ///< s
@@ -64,7 +65,7 @@ struct WindowState {
 
   [[nodiscard]] int dimension() const { return has_motion ? kStateDim : kPoseDim; }
   /// Where Jacobians are taken (first-estimate Jacobians).
-  [[nodiscard]] const BodyState& linearization() const { return frozen ? first_estimate : x; }
+  [[nodiscard]] const BodyState& linearization() const { return frozen ? moved_estimate : x; }
 };
 
 }  // namespace swiftlet

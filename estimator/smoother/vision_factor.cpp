@@ -13,6 +13,9 @@ namespace {
 constexpr double kMinCosine = 0.2;
 // Cauchy scale in sigmas: tracks have heavier tails than a normal distribution.
 constexpr double kCauchyScale = 2.0;
+// Makes the weighted Hessian the information of the estimate where the noise is normal (2 dof):
+// E[psi']^2 / (E[psi^2] E[w]) at the scale above (Huber, "Robust Statistics", 1981, section 6.3).
+constexpr double kInformationScale = 1.267;
 // Nothing is nearer to a flying camera than this.
 constexpr double kMaxInverseDepth = 20.0;  // 1/m
 // Prior on the inverse depth, for points without parallax: weak enough not to bias points with it.
@@ -110,7 +113,8 @@ PointBasis PointBasis::of(const Eigen::Vector3d& bearing) {
 
 RobustWeight RobustWeight::cauchy(double squared_norm) {
   const double c2 = kCauchyScale * kCauchyScale;
-  return {1.0 / (1.0 + squared_norm / c2), 0.5 * c2 * std::log1p(squared_norm / c2)};
+  return {kInformationScale / (1.0 + squared_norm / c2),
+          0.5 * kInformationScale * c2 * std::log1p(squared_norm / c2)};
 }
 
 bool reprojectionResidual(const CameraSighting& sighting, const CameraPose& camera,

@@ -75,7 +75,7 @@ struct Window {
       seen[k].slot = kSlots[seen[k].slot];
       static_cast<void>(landmark.sightings.tryPushBack(seen[k]));
     }
-    landmarks.push_back(landmark);
+    if (landmark.sightings.size() >= 2) landmarks.push_back(landmark);
   }
 
   [[nodiscard]] std::size_t timeOf(std::uint32_t slot) const {
