@@ -15,7 +15,7 @@ struct FrontendSettings {
   float stereo_gate = 1.5F;        ///< px from the epipolar curve
   float motion_gate = 2.0F;        ///< px from the epipolar plane of the frame-to-frame motion
   float keyframe_parallax = 10.F;  ///< px: median, rotation removed, since the last keyframe
-  float keyframe_survival = 0.7F;  ///< keyframe when fewer of the last one's tracks are left
+  float keyframe_survival = 0.8F;  ///< keyframe when fewer of the last one's tracks are left
   Duration min_keyframe_interval = Duration::fromMilliseconds(140);
   Duration max_keyframe_interval = Duration::fromMilliseconds(1000);
 };

@@ -2,10 +2,13 @@
 // What the odometry says after each frame, beside the newest state.
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/limits.hpp"
+#include "estimator/core/stamp.hpp"
+#include "estimator/geometry/se3.hpp"
 #include "estimator/messages/nav_state.hpp"
 
 namespace swiftlet {
@@ -54,11 +57,18 @@ struct KeyframeState {
   FrameStatistics statistics;
 };
 
+/// The calibration in use: the given one, or its estimate where that is switched on.
+struct CalibrationEstimate {
+  Duration camera_to_imu_shift;  ///< t_imu = t_image + shift
+  std::array<SE3, kMaxCameras> T_body_cam;
+};
+
 struct OdometryOutput {
   bool has_state = false;        ///< false until the first pose of an epoch
   const char* waiting_for = "";  ///< literal text while initializing
   NavState state;
   FrameStatistics statistics;
+  CalibrationEstimate calibration;
   FixedVector<KeyframeState, kMaxStates> left_window;
   FixedVector<Event, 32> events;
 };

@@ -1,10 +1,11 @@
 #pragma once
 // What the estimate may be used for: the rules that turn a frame's figures into `Health`.
 //
-//  initializing  until the first frames have settled tilt and velocity
-//  good          enough accepted sightings from every camera of the rig, none of them old
-//  degraded      one camera, few sightings, or coasting on the IMU for less than the limit
-//  failed        coasting longer than the limit
+//  initializing  the first 9 frames of an epoch, in which tilt and velocity settle
+//  good          25 accepted sightings, an image of every camera of the rig, none accepted over 0.3 s ago
+//  degraded      a camera missing, fewer sightings, or coasting on the IMU for less than the limit
+//  failed        no accepted image (8 sightings) for 3 s; the next accepted image ends it
+// Sightings by both cameras count once. Residuals and covariance are not looked at. No memory, O(1).
 
 #include <cstdint>
 

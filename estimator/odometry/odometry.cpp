@@ -274,6 +274,7 @@ class Odometry::Impl {
     state.bias_accel = newest.x.bias_accel;
     state.covariance = smoother_.covariance();
     output.statistics = smoother_.statistics();
+    output.calibration = {smoother_.timeOffset(), smoother_.extrinsics()};
     const Health before = health_.health();
     state.health = health_.update(tracked, output.statistics, rig_.camera_count, frames_in_epoch_);
     smoother_.setHealth(state.health);

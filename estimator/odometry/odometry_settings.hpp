@@ -4,8 +4,8 @@
 namespace swiftlet {
 
 struct OdometrySettings {
-  int max_features = 200;    ///< features tracked at once, at most kMaxFeatures
-  double horizon = 30.0;     ///< s of fixed lag: no state older than this stays in the window
+  int max_features = 200;     ///< features tracked at once, at most kMaxFeatures
+  double horizon = 30.0;      ///< s of fixed lag: no state older than this stays in the window
   double pixel_sigma = 0.45;  ///< px, noise of one tracked coordinate
   /// Factors on the calibration's white-noise densities. A calibration is made at rest; in flight
   /// vibration, scale and misalignment come on top. 1 where the figures already hold in flight.

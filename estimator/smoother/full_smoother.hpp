@@ -3,11 +3,14 @@
 // Gauss-Newton problem, nothing marginalized.
 //
 // Keyframes are kept as they come from the odometry (its causal states are the initial values);
-// `solve` then minimizes the same cost as the fixed-lag smoother: preintegrated IMU factors between
+// `solve` then minimizes over the fixed-lag smoother's factors (but rest): preintegrated IMU between
 // neighbours, landmarks eliminated by their Schur complement, Cauchy weights, outliers removed. The
-// reduced system (15 columns a keyframe) is sparse and factored by CHOLMOD.
-// For the low-priority side: memory grows with the run up to `max_keyframes` (about 30 kB each);
-// beyond it further keyframes are refused (kCapacityReached) and the rest of the run is not in the map.
+// calibration is the given one. The reduced system (15 columns a keyframe) is sparse and factored by
+// CHOLMOD, or by Eigen in a build without it.
+// Frames: as the odometry's; each epoch keeps its own world, held by its first keyframe.
+// Off the flight path: it allocates. Memory grows with the run up to `max_keyframes` (some 40 kB each
+// at 200 features and 200 Hz, and the sparse system while it solves); beyond it further keyframes are
+// refused (kCapacityReached) and the rest of the run is not in the map.
 // Source: Kaess et al., "Square Root SAM", IJRR 2006; the factors are those of docs/smoother.md.
 
 #include <cstdint>
@@ -26,16 +29,16 @@
 namespace swiftlet {
 
 struct FullSmootherSettings {
-  double pixel_sigma = 0.6;  ///< px
-  std::size_t max_keyframes = 4000;
+  double pixel_sigma = 0.6;          ///< px
+  std::size_t max_keyframes = 4000;  ///< 11 minutes at 6 a second
   int max_iterations = 12;
 };
 
-/// Figures of a solve, for the summary.
+/// Figures of a solve, for the summary. Costs are half sums of whitened squares, robust for sightings.
 struct FullSmootherReport {
   int iterations = 0;
-  double initial_cost = 0;
-  double final_cost = 0;
+  double initial_cost = 0;  ///< at the odometry's states
+  double final_cost = 0;    ///< at the last linearization
   std::size_t keyframes = 0;
   std::size_t landmarks = 0;
 };
@@ -47,7 +50,8 @@ class FullSmoother {
   /// Every sample, in order, before the frames that follow it.
   void addImu(const ImuSample& sample) { pending_imu_.push_back(sample); }
 
-  /// A keyframe with the odometry's state for it. A new epoch starts a new, unconnected trajectory.
+  /// A keyframe with the odometry's state for it, in order of time. A new epoch starts a new, unconnected
+  /// trajectory. kCapacityReached beyond max_keyframes.
   Status addKeyframe(const TrackedFrame& frame, const NavState& state);
 
   /// Minimizes over everything added so far. kNotReady below three keyframes; kNumerical when the

@@ -1,7 +1,8 @@
 #pragma once
 // The raw IMU samples of the window, kept so that increments can be integrated again: after a bias
-// moved, or over two intervals when the state between them leaves. Fixed memory; contiguous in time
-// (a sliding array, compacted when its end is reached). The oldest samples go first.
+// moved, or over two intervals when the state between them leaves. Contiguous in time (a sliding
+// array, compacted when its end is reached). Full is normal: the oldest samples go first.
+// Memory: twice `capacity` samples of 56 bytes, reserved by the constructor.
 
 #include <algorithm>
 #include <span>
@@ -17,6 +18,7 @@ class ImuBuffer {
 
   void clear() { begin_ = end_ = 0; }
   [[nodiscard]] bool empty() const { return begin_ == end_; }
+  /// Not on an empty buffer.
   [[nodiscard]] const ImuSample& newest() const { return samples_[end_ - 1]; }
 
   /// Appends; the stamp must be later than the newest's. Amortized O(1).
@@ -31,7 +33,8 @@ class ImuBuffer {
     begin_ = std::max(begin_, end_ > capacity_ ? end_ - capacity_ : 0);
   }
 
-  /// The samples needed to integrate over [from, to]: those inside and one neighbour on each side.
+  /// The samples needed to integrate over [from, to]: those inside and one neighbour on each side,
+  /// where they are still kept; empty without any. Valid until the next push. O(log size).
   [[nodiscard]] std::span<const ImuSample> around(Stamp from, Stamp to) const {
     const auto first = samples_.begin() + static_cast<std::ptrdiff_t>(begin_);
     const auto last = samples_.begin() + static_cast<std::ptrdiff_t>(end_);

@@ -8,8 +8,8 @@
 namespace swiftlet {
 namespace {
 
-// What a vehicle may do unseen while the IMU is silent: standard deviations per root second of
-// acceleration held for the gap, and of its angular rate.
+// What a vehicle may do unseen while the IMU is silent: standard deviations of an acceleration and of
+// an angular rate, each held for the whole gap.
 constexpr double kGapAcceleration = 3.0;  // m/s^2
 constexpr double kGapRate = 1.0;          // rad/s
 

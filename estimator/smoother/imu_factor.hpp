@@ -1,12 +1,13 @@
 #pragma once
 // The factors between two consecutive states with motion.
 //
-// Residual order: phi, p, v, bg, ba, whitened (unit covariance when the model holds).
-//  - imuFactor: preintegrated increments against the states (Forster et al., T-RO 2017, eq. 45)
-//    and the random walk of the biases.
-//  - constantVelocityFactor: for an interval with a gap in the samples.
-// Jacobians are taken at `linearization` states, the residual at the current ones.
-// Cost: about 3 us each.
+// Residual, 15 x 1, order phi, p, v, bg, ba, whitened (unit covariance when the model holds):
+//  - imuFactor: preintegrated increments against the states (Forster et al., T-RO 2017, eq. 45), p and
+//    v in the axes of body i, and the random walk of the biases.
+//  - constantVelocityFactor: for an interval with a gap in the samples; p and v in world axes, loosely.
+// Jacobians, 15 x 15, by the error states of i and j, are taken at the `linearization` states, the
+// residual at the current ones. Gravity in world axes is (0, 0, -noise.gravity).
+// Cost: about 3 us each; nothing is allocated.
 
 #include <Eigen/Core>
 
@@ -27,6 +28,7 @@ struct MotionFactor {
                              const BodyState& x_j, const BodyState& linearization_i,
                              const BodyState& linearization_j, MotionFactor& factor);
 
+/// `duration`: s between the states. False unless positive.
 [[nodiscard]] bool constantVelocityFactor(double duration, const ImuNoise& noise, const BodyState& x_i,
                                           const BodyState& x_j, const BodyState& linearization_i,
                                           const BodyState& linearization_j, MotionFactor& factor);

@@ -4,7 +4,10 @@
 //
 // Landmarks enter as Schur complements over 6 x 6 pose blocks (padded to 8 rows so that a column is
 // two vector registers), which are scattered into the dense matrix once at the end.
-// Memory: about 1.3 MiB, reserved by the constructor.
+// Shapes: H is n x n, g is n x 1, n = dimension() <= kMaxSystemDim; of H the lower triangle counts.
+// Columns are the error states of state.hpp. Jacobians at the linearization, residuals at the values.
+// Memory: about 1.3 MiB, reserved by the constructor. Cost of a landmark: linear in its sightings to
+// linearize, quadratic in the states that see it to eliminate.
 // Source: Triggs et al., "Bundle Adjustment - A Modern Synthesis", 1999, section 6.
 
 #include <Eigen/Core>
@@ -42,13 +45,16 @@ class NormalEquations {
   void begin(const CalibrationLayout& calibration, int dimension);
 
   [[nodiscard]] int dimension() const { return dimension_; }
+  /// Of the factors added so far: half the sum of whitened squares, robust for sightings. Not the prior's.
   [[nodiscard]] double cost() const { return cost_; }
   MatrixMap H();
   VectorMap g();
 
+  /// Both states have all 15 columns.
   void addMotion(const MotionFactor& factor, const WindowState& i, const WindowState& j);
 
-  /// Diagonal information on columns of one state: residual x (already minus its reference).
+  /// Information 1 / sigma^2 on three columns of one state, from `first` on: `residual` is their value
+  /// minus its reference, in their unit, as is `sigma`.
   void addDiagonal(const WindowState& state, int first, const Eigen::Vector3d& residual, double sigma);
 
   /// Eliminates a landmark. False when it does not constrain anything (fewer than two states, or not

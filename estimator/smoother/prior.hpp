@@ -2,8 +2,10 @@
 // What marginalized states left behind: a quadratic cost on the states that remain.
 //
 //   cost(d) = 1/2 d^T H d + b^T d,   d = x [-] reference, stacked over the prior's blocks.
+// d is in the error state of state.hpp (rotation on the right; calibration as in CalibrationLayout).
 // For frozen states the reference is their first estimate. The Hessian form is kept in double
 // precision, which the sqrt-form's advantage (float) does not concern.
+// Memory: 1.1 MiB, reserved by the constructor. H is full (both triangles), n x n, n = dimension().
 
 #include <Eigen/Core>
 #include <array>
@@ -23,10 +25,10 @@ inline constexpr int kMaxSystemDim = static_cast<int>(kMaxStates) * kStateDim + 
 /// Columns of one state (or of the calibration) in the prior.
 struct PriorBlock {
   static constexpr std::uint8_t kCalibration = 255;
-  std::uint8_t slot = 0;
-  int dimension = 0;
-  int offset = 0;
-  BodyState reference;
+  std::uint8_t slot = 0;  ///< of the state, or kCalibration
+  int dimension = 0;      ///< the state's first 6 or 15 columns, or the calibration's
+  int offset = 0;         ///< first column in H and b
+  BodyState reference;    ///< unused for the calibration, whose reference the smoother keeps
 };
 
 class Prior {
@@ -42,9 +44,11 @@ class Prior {
   MatrixMap H();
   VectorMap b();
 
-  /// Starts a new set of blocks; H and b are zeroed and take the new size.
+  /// Starts a new set of blocks.
   void begin();
+  /// Appends a block behind the others. At most kMaxStates and the calibration.
   void addBlock(std::uint8_t slot, int dimension, const BodyState& reference);
+  /// After the last block: H and b take their size and are zeroed (in memory that is there already).
   void allocate();
 
  private:

@@ -18,15 +18,16 @@ constexpr double kRelativeDamping = 1e-10;
 constexpr int kTriangulationStart = 6;  // iterations for a landmark in its first solve
 constexpr int kTriangulationFollow = 2;
 constexpr double kConverged = 1e-4;            // largest step worth another iteration: m, rad, m/s
-constexpr double kCostIncreaseAllowed = 1.02;  // of the robust cost, before a step is taken back
+constexpr double kCostIncreaseAllowed = 0.02;  // of the factors' cost, before a step is taken back
 constexpr double kOutlierSigmas = 20.0;        // of one sighting, during the solve
 constexpr double kFinalOutlierSigmas = 3.5;
 constexpr double kRestVelocitySigma = 0.01;       // m/s
-constexpr double kRestPositionSigma = 1e-3;       // m, between two frames at rest
-constexpr double kRestRotationSigma = 3.5e-4;     // rad (0.02 degrees)
+constexpr double kRestPositionSigma = 5e-4;       // m, between two frames at rest: 4 mm/s at 20 Hz
+constexpr double kRestRotationSigma = 3.5e-4;       // rad, likewise
 constexpr double kTimeOffsetSigma = 5e-3;         // s, prior when estimated
 constexpr double kExtrinsicRotationSigma = 0.01;  // rad
-constexpr double kExtrinsicPositionSigma = 0.01;  // m
+// Calibrations give positions to a few millimetres; a looser prior gives up the baseline, stereo's scale.
+constexpr double kExtrinsicPositionSigma = 2e-3;  // m
 constexpr int kMaxRejections = 3;
 
 }  // namespace
@@ -284,6 +285,7 @@ void Smoother::triangulateAll(int iterations) {
 }
 
 void Smoother::addPrior() {
+  prior_cost_ = 0;
   if (prior_.empty()) return;
   MatrixMap H = system_.H();
   VectorMap g = system_.g();
@@ -309,9 +311,11 @@ void Smoother::addPrior() {
           prior_H.block(row.offset, column.offset, row.dimension, column.dimension);
     }
     for (int k = 0; k < row.dimension; ++k) {
-      double sum = prior_.b()[row.offset + k];
-      for (int m = 0; m < prior_.dimension(); ++m) sum += prior_H(m, row.offset + k) * deviation[m];
-      g[at + k] += sum;
+      double force = 0;
+      for (int m = 0; m < prior_.dimension(); ++m) force += prior_H(m, row.offset + k) * deviation[m];
+      const double b = prior_.b()[row.offset + k];
+      g[at + k] += b + force;
+      prior_cost_ += deviation[row.offset + k] * (b + 0.5 * force);
     }
   }
 }
@@ -344,38 +348,34 @@ void Smoother::addMotionFactor(std::size_t position) {
   if (position + 1 == order_.size()) {
     statistics_.imu_residual = std::sqrt(factor.residual.head<9>().squaredNorm() / 9.0);
   }
+  addRestFactor(i, j);
 }
 
-// Rest is soft: the velocity is near zero, and two frames at rest are at nearly the same pose.
-void Smoother::addRestFactors() {
-  for (std::size_t k = motionBegin(); k < order_.size(); ++k) {
-    const WindowState& j = states_[order_[k]];
-    if (!j.at_rest) continue;
-    system_.addDiagonal(j, 6, j.x.v_world_body, kRestVelocitySigma);
-    if (k == 0) continue;
-    const WindowState& i = states_[order_[k - 1]];
-    if (!i.at_rest || !i.has_motion) continue;
-    MotionFactor factor;
-    factor.residual.setZero();
-    factor.jacobian_i.setZero();
-    factor.jacobian_j.setZero();
-    factor.residual.segment<3>(0) =
-        logSo3(i.x.T_world_body.rotation.conjugate() * j.x.T_world_body.rotation) / kRestRotationSigma;
-    factor.residual.segment<3>(3) =
-        (j.x.T_world_body.translation - i.x.T_world_body.translation) / kRestPositionSigma;
-    factor.jacobian_i.block<3, 3>(0, 0) = -Eigen::Matrix3d::Identity() / kRestRotationSigma;
-    factor.jacobian_j.block<3, 3>(0, 0) = Eigen::Matrix3d::Identity() / kRestRotationSigma;
-    factor.jacobian_i.block<3, 3>(3, 3) = -Eigen::Matrix3d::Identity() / kRestPositionSigma;
-    factor.jacobian_j.block<3, 3>(3, 3) = Eigen::Matrix3d::Identity() / kRestPositionSigma;
-    system_.addMotion(factor, i, j);
-  }
+// Rest is soft: the velocity is near zero, and two frames at rest are at nearly the same pose. It
+// lives and leaves with the motion factor between the two states, so that the prior inherits it.
+void Smoother::addRestFactor(const WindowState& i, const WindowState& j) {
+  if (!j.at_rest) return;
+  system_.addDiagonal(j, 6, j.x.v_world_body, kRestVelocitySigma);
+  if (!i.at_rest) return;
+  MotionFactor factor;
+  factor.residual.setZero();
+  factor.jacobian_i.setZero();
+  factor.jacobian_j.setZero();
+  factor.residual.segment<3>(0) =
+      logSo3(i.x.T_world_body.rotation.conjugate() * j.x.T_world_body.rotation) / kRestRotationSigma;
+  factor.residual.segment<3>(3) =
+      (j.x.T_world_body.translation - i.x.T_world_body.translation) / kRestPositionSigma;
+  factor.jacobian_i.block<3, 3>(0, 0) = -Eigen::Matrix3d::Identity() / kRestRotationSigma;
+  factor.jacobian_j.block<3, 3>(0, 0) = Eigen::Matrix3d::Identity() / kRestRotationSigma;
+  factor.jacobian_i.block<3, 3>(3, 3) = -Eigen::Matrix3d::Identity() / kRestPositionSigma;
+  factor.jacobian_j.block<3, 3>(3, 3) = Eigen::Matrix3d::Identity() / kRestPositionSigma;
+  system_.addMotion(factor, i, j);
 }
 
 void Smoother::buildSystem() {
   system_.begin(calibration_, dimension_);
   addPrior();
   for (std::size_t k = 1; k < order_.size(); ++k) addMotionFactor(k);
-  addRestFactors();
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     if (in_system_[i] == 0) continue;
     if (!system_.addLandmark(landmarks_[i], rig_poses_, T_body_cam_, states_)) in_system_[i] = 0;
@@ -430,11 +430,13 @@ Status Smoother::solve(int iterations) {
     triangulateAll(kTriangulationFollow);
     if (iteration == 1) rejectOutliers(kOutlierSigmas, true);
     buildSystem();
-    if (iteration > 1 && system_.cost() > kCostIncreaseAllowed * cost) {
+    // The prior's cost has an offset of its own: only differences of the sum mean anything.
+    const double total = system_.cost() + prior_cost_;
+    if (iteration > 1 && total > cost + kCostIncreaseAllowed * system_.cost()) {
       restore();
       break;
     }
-    cost = system_.cost();
+    cost = total;
     MatrixMap H = system_.H();
     for (int k = 0; k < dimension_; ++k) H(k, k) *= 1.0 + kRelativeDamping;
     if (!choleskyInPlace(H)) {
@@ -442,6 +444,7 @@ Status Smoother::solve(int iterations) {
       break;
     }
     factored = true;
+    keepFactor();
     VectorMap step(step_.data(), dimension_);
     step = -system_.g();
     choleskySolve(H, step);
@@ -451,7 +454,6 @@ Status Smoother::solve(int iterations) {
     statistics_.iterations = iteration + 1;
     if (step.cwiseAbs().maxCoeff() < kConverged) break;
   }
-  keepFactor();
   placeCameras();
   rejectOutliers(kFinalOutlierSigmas, true);
   rejectOutliers(kFinalOutlierSigmas, false);

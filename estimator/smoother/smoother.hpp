@@ -4,10 +4,12 @@
 // Window, in order of time: pose-only keyframes; keyframes with velocity and biases; the newest
 // frames. A frame that is no keyframe leaves by merging its two IMU intervals (nothing is
 // linearized for good); an old keyframe first loses velocity and biases, then its pose, both into
-// the prior, together with the landmarks that only it kept alive. States that the prior touches
-// keep their first estimate as linearization point.
-// Memory: all reserved by the constructor (see docs/smoother.md); nothing is allocated after it.
-// Cost: linear in sightings, cubic in the window's dimension (about 200).
+// the prior, the latter with the landmarks that it saw and no recent frame sees. States that the prior
+// touches keep their first estimate as linearization point, moved with the window (moveEstimates).
+// Frames: world (z up, origin and yaw of the first state), body (= IMU), cameras. SI units, pixels.
+// Memory: 9.8 MiB, all reserved by the constructor (table in docs/smoother.md); nothing is allocated
+// after it. Full is normal: the landmark not seen for longest, and the oldest IMU samples, go first.
+// Cost: linear in landmarks, cubic in the window's dimension (at most 171 columns by default).
 // Sources: Leutenegger et al., "Keyframe-based visual-inertial odometry using nonlinear
 // optimization", IJRR 2015 (window); Huang, Mourikis, Roumeliotis, "Observability-based rules for
 // consistent EKF SLAM", IJRR 2010 (first estimates); Usenko et al., "Visual-Inertial Mapping with
@@ -33,18 +35,18 @@
 namespace swiftlet {
 
 struct SmootherSettings {
-  double pixel_sigma = 0.6;  ///< px
-  double horizon = 30.0;     ///< s
-  int max_recent = 4;        ///< newest frames, keyframe or not, that stay whole
-  int max_motion_keyframes = 4;
-  int max_keyframes = 10;
-  bool estimate_time_offset = false;
-  bool estimate_extrinsics = false;
+  double pixel_sigma = 0.6;           ///< px
+  double horizon = 30.0;              ///< s
+  int max_recent = 4;                 ///< newest frames, keyframe or not, that stay whole
+  int max_motion_keyframes = 4;       ///< keyframes behind them that keep velocity and biases
+  int max_keyframes = 10;             ///< these and the pose-only ones; with max_recent below kMaxStates
+  bool estimate_time_offset = false;  ///< camera to IMU clock
+  bool estimate_extrinsics = false;   ///< T_body_cam of each camera
 };
 
-/// What the first state of an epoch is known to be.
+/// What the first state of an epoch is known to be. Its position and yaw define the world.
 struct StartState {
-  Stamp stamp;
+  Stamp stamp;  ///< on the IMU's clock
   BodyState state;
   double tilt_sigma = 0.05;        ///< rad
   double velocity_sigma = 1.0;     ///< m/s
@@ -56,11 +58,11 @@ class Smoother {
  public:
   Smoother(const Rig& rig, const ImuNoise& noise, const SmootherSettings& settings);
 
-  /// Forgets all states and landmarks.
+  /// Forgets all states and landmarks; samples and the estimated calibration stay.
   void reset();
   [[nodiscard]] bool started() const { return !order_.empty(); }
 
-  /// One IMU sample, in order of stamps.
+  /// One IMU sample, in order of stamps; those before a frame come before it.
   void addImu(const ImuSample& sample) { imu_.push(sample); }
 
   /// The first state; its frame is the first that `step` gets.
@@ -76,9 +78,11 @@ class Smoother {
     int iterations = 3;
   };
 
-  /// Adds a frame and solves. kFailed when the system cannot be solved: reset.
+  /// Adds a frame, solves, and trims the window. `left_window` is overwritten with the keyframes that
+  /// left. kNotReady without a start state; kFailed when the system cannot be solved: reset.
   Status step(const StepInput& input, FixedVector<KeyframeState, kMaxStates>& left_window);
 
+  /// Not before the first step.
   [[nodiscard]] const WindowState& newest() const { return states_[order_.back()]; }
   [[nodiscard]] const FrameStatistics& statistics() const { return statistics_; }
   /// Marginal covariance of the newest state, error-state order.
@@ -87,7 +91,9 @@ class Smoother {
   void setHealth(Health health) {
     if (started()) states_[order_.back()].health = health;
   }
+  /// t_imu = t_image + offset: the calibration's, or its estimate.
   [[nodiscard]] Duration timeOffset() const { return Duration::fromSeconds(time_offset_); }
+  /// T_body_cam: the calibration's, or its estimate.
   [[nodiscard]] const std::array<SE3, kMaxCameras>& extrinsics() const { return T_body_cam_; }
 
   /// Covariance of the motion between two poses of the window, T_i_j = T_world_i^-1 T_world_j, in j's error
@@ -96,6 +102,7 @@ class Smoother {
   [[nodiscard]] bool relativeCovariance(std::size_t i, std::size_t j,
                                         Eigen::Matrix<double, 6, 6>& covariance);
 
+  /// Poses in order of time, and the landmarks of the last solve that are not at infinity.
   void window(SmoothedWindow& out) const;
   /// The keyframes still in the window, oldest first.
   void flush(FixedVector<KeyframeState, kMaxStates>& left_window);
@@ -118,7 +125,7 @@ class Smoother {
   void buildSystem();
   void addPrior();
   void addMotionFactor(std::size_t position);
-  void addRestFactors();
+  void addRestFactor(const WindowState& i, const WindowState& j);
   void triangulateAll(int iterations);
   void startPrior();
   [[nodiscard]] Vector15d priorDeviation(const PriorBlock& block) const;
@@ -169,6 +176,7 @@ class Smoother {
   int factor_dimension_ = 0;
   std::vector<std::uint8_t> involved_;  // slots touched by a marginalization
   int dimension_ = 0;
+  double prior_cost_ = 0;  // of the last addPrior(), without its constant
   std::uint64_t oldest_recent_frame_ = 0;
   std::array<BodyState, kMaxStates> backup_;
 

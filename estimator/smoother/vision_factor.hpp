@@ -5,6 +5,10 @@
 // First-estimate rule: the Jacobian blocks of a sighting (pose and point) are taken at one and the
 // same point with the pose at its linearization value; the residual at the current values. The four
 // unobservable directions (position, yaw) then stay null whatever the point is.
+// Frames: points and centres in the world, rays in the camera. Residuals are in sigmas of the pixel
+// noise. Nothing is allocated; triangulation is linear in sightings and iterations.
+// Sources: robust weight: Huber, "Robust Statistics", 1981, section 6.3; first-estimate rule: Huang,
+// Mourikis, Roumeliotis, IJRR 2010; equations: docs/smoother.md.
 
 #include <Eigen/Core>
 #include <array>
@@ -28,14 +32,14 @@ struct CameraPose {
 struct RigPose {
   std::array<CameraPose, kMaxCameras> current;
   std::array<CameraPose, kMaxCameras> linearization;
-  Eigen::Vector3d v_world = Eigen::Vector3d::Zero();     ///< for the time offset
-  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  ///< for the time offset
+  Eigen::Vector3d v_world = Eigen::Vector3d::Zero();     ///< m/s, for the time offset
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  ///< rad/s, for the time offset
 };
 
 /// Indexed by Sighting::slot.
 using RigPoses = std::span<const RigPose>;
 
-/// The ray of a point in a camera; also the point's tangent basis, shared by all sightings.
+/// The point's tangent basis at its bearing (world axes, orthonormal), shared by all its sightings.
 struct PointBasis {
   Eigen::Vector3d b1;
   Eigen::Vector3d b2;
@@ -48,17 +52,20 @@ struct SightingJacobians {
   Eigen::Matrix<double, 2, 6> extrinsic;  ///< phi, p of T_body_cam
 };
 
-/// Whitened residual. False when the point is not in front of the measured ray.
+/// Whitened residual, 2 x 1. False when the point is not in front of the measured ray (cosine of the
+/// angle between them at most 0.2).
 [[nodiscard]] bool reprojectionResidual(const CameraSighting& sighting, const CameraPose& camera,
                                         const LandmarkPoint& point, Eigen::Vector2d& residual);
 
-/// Jacobians at `camera`. False as above.
+/// Jacobians of the whitened residual at `camera`; `extrinsic` is left alone unless asked for. False
+/// as above.
 [[nodiscard]] bool reprojectionJacobians(const CameraSighting& sighting, const CameraPose& camera,
                                          const SE3& T_body_cam, const LandmarkPoint& point,
                                          const PointBasis& basis, bool with_extrinsic,
                                          SightingJacobians& jacobians);
 
-/// Robust weight (Cauchy) of a whitened residual's norm, and the cost it stands for.
+/// Robust weight (Cauchy, scale 2 sigma) of a whitened residual's norm, and the cost it stands for,
+/// both scaled so that the weighted Hessian is the information where the noise is normal.
 struct RobustWeight {
   double weight = 1;
   double cost = 0;
@@ -66,7 +73,8 @@ struct RobustWeight {
 };
 
 /// Moves the point by its own Gauss-Newton steps at the current poses; from nothing when it is not
-/// triangulated yet. False when the sightings do not agree on a point in front of the cameras.
+/// triangulated yet. Sets the point's sigma. False when the point is behind a camera that saw it, or
+/// with fewer than two sightings (each camera counts).
 [[nodiscard]] bool triangulate(RigPoses poses, std::span<const Sighting> sightings, int max_iterations,
                                LandmarkPoint& point);
 

@@ -1,0 +1,105 @@
+#pragma once
+// The odometry stage on a simulated flight's tracks, with the truth beside each state it gives.
+
+#include <Eigen/Core>
+#include <memory>
+#include <vector>
+
+#include "estimator/geometry/so3.hpp"
+#include "estimator/odometry/odometry.hpp"
+#include "tests/smoother/track_flight.hpp"
+
+namespace swiftlet::test {
+
+/// One frame's outcome.
+struct RunFrame {
+  std::size_t index = 0;  ///< of the flight's frames
+  double seconds = 0;     ///< since the flight's first frame
+  bool has_state = false;
+  NavState state;
+  BodyState truth;
+  FrameStatistics statistics;
+  CalibrationEstimate calibration;
+};
+
+/// Settings whose noise is the flight's own.
+inline OdometrySettings settingsFor(const TrackFlight& flight, bool stereo = true) {
+  OdometrySettings settings;
+  settings.pixel_sigma = flight.flight().settings().tracks.pixel_sigma;
+  settings.gyro_inflation = 1;
+  settings.accel_inflation = 1;
+  settings.use_stereo = stereo;
+  return settings;
+}
+
+struct OdometryRun {
+  std::vector<RunFrame> frames;
+  std::vector<Event> events;
+};
+
+/// `first`: frames and IMU samples before that frame are left out, but for `imu_before` seconds.
+inline OdometryRun runOdometry(const TrackFlight& flight, const OdometrySettings& settings,
+                               std::size_t first = 0, double imu_before = 0.5) {
+  OdometryRun run;
+  Odometry odometry(flight.rig(), flight.noise(), settings);
+  const Stamp begin = flight.frames()[first].stamp - Duration::fromSeconds(imu_before);
+  auto output = std::make_unique<OdometryOutput>();
+  flight.play(
+      [&](const ImuSample& sample) {
+        if (sample.stamp >= begin) static_cast<void>(odometry.addImu(sample));
+      },
+      [&](std::size_t k) {
+        if (k < first) return;
+        static_cast<void>(odometry.smooth(flight.frames()[k], Effort{}, *output));
+        RunFrame frame;
+        frame.index = k;
+        frame.seconds = flight.seconds(k) - flight.seconds(first);
+        frame.has_state = output->has_state;
+        frame.truth = flight.truth(k);
+        frame.state = output->state;
+        frame.statistics = output->statistics;
+        frame.calibration = output->calibration;
+        run.frames.push_back(frame);
+        run.events.insert(run.events.end(), output->events.begin(), output->events.end());
+      });
+  return run;
+}
+
+/// Takes the truth into the estimate's world: the first pose's position and heading agree.
+inline SE3 worldFromTruth(const RunFrame& first) {
+  const SE3& estimate = first.state.T_world_body;
+  const SE3& truth = first.truth.T_world_body;
+  // Turn about the vertical that leaves no vertical part in the rotation error.
+  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+  for (int iteration = 0; iteration < 5; ++iteration) {
+    const Eigen::Vector3d error = logSo3(estimate.rotation * (turn * truth.rotation).conjugate());
+    turn = expSo3(Eigen::Vector3d(0, 0, error.z())) * turn;
+  }
+  return {turn, estimate.translation - turn * truth.translation};
+}
+
+/// Error of a frame's pose, in the order and frames of its covariance (phi body, p world).
+inline Eigen::Matrix<double, 6, 1> poseError(const RunFrame& frame, const SE3& T_world_truth) {
+  const SE3 truth = T_world_truth * frame.truth.T_world_body;
+  Eigen::Matrix<double, 6, 1> error;
+  error << logSo3(frame.state.T_world_body.rotation.conjugate() * truth.rotation),
+      truth.translation - frame.state.T_world_body.translation;
+  return error;
+}
+
+/// Angle between the estimated and the true vertical [rad].
+inline double tiltError(const RunFrame& frame) {
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d estimate = frame.state.T_world_body.rotation.conjugate() * z;
+  const Eigen::Vector3d truth = frame.truth.T_world_body.rotation.conjugate() * z;
+  return std::atan2(estimate.cross(truth).norm(), estimate.dot(truth));
+}
+
+/// Difference of the velocities seen from the body [m/s].
+inline double velocityError(const RunFrame& frame) {
+  return (frame.state.T_world_body.rotation.conjugate() * frame.state.v_world_body -
+          frame.truth.T_world_body.rotation.conjugate() * frame.truth.v_world_body)
+      .norm();
+}
+
+}  // namespace swiftlet::test
