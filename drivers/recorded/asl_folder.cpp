@@ -49,14 +49,17 @@ class AslFolder final : public RecordedLog {
   AslFolder(const std::string& path, const LogOptions& options);
   [[nodiscard]] Trajectory groundTruth() const override;
   [[nodiscard]] std::string groundTruthName() const override { return truth_file_; }
+  [[nodiscard]] std::string trackFile() const override { return track_file_; }
 
  protected:
   Fetched fetch(const ImageEntry& entry, ImageSize expected, std::uint8_t* out) override;
 
  private:
   void readCalibrationFiles(const fs::path& given);
+  void readCameras();
   void readCamera(std::uint32_t camera);
   std::vector<ImageRow> listImages(const fs::path& folder);
+  [[nodiscard]] bool listsImages() const;
   [[nodiscard]] bool locate(std::uint32_t camera, ImageRow& row) const;
   void chooseTruth();
 
@@ -65,25 +68,20 @@ class AslFolder final : public RecordedLog {
   std::vector<std::uint8_t> bytes_;
   ImageDecoder decoder_;
   std::string truth_file_;
+  std::string track_file_;
 };
 
 AslFolder::AslFolder(const std::string& path, const LogOptions& options)
     : RecordedLog(options), folder_(dataFolder(path)) {
+  const fs::path tracks = folder_ / "tracks0" / "data.csv";
+  if (!options_.without_images && !listsImages() && fs::exists(tracks)) track_file_ = tracks.string();
   readCalibrationFiles(path);
   const fs::path imu = folder_ / "imu0" / "data.csv";
   if (!fs::exists(imu)) {
     throw InputError(imu.string(), 0, "", "does not exist", "A log needs IMU samples: imu0/data.csv");
   }
   samples_ = readImuFile(imu.string(), counters_, warnings_);
-  for (std::uint32_t camera = 0; camera < calibration_.rig.camera_count; ++camera) readCamera(camera);
-  if (calibration_.rig.camera_count > 1 && files_[1].empty()) {
-    warnings_.add(folder_.string() + ": cam1 has no images, going on with one camera");
-    calibration_.rig.camera_count = 1;
-  }
-  if (images_.empty()) {
-    throw InputError(folder_.string(), 0, "", "none of the listed images exists",
-                     "Images are looked for in cam0/data and cam1/data");
-  }
+  if (!options_.without_images && track_file_.empty()) readCameras();
   prepare(imu.string());
   if (files_[0].size() != files_[1].size() && !files_[0].empty() && !files_[1].empty()) {
     warnings_.add(fmt::format("{}: cam0 has {} images, cam1 has {}; frames without a partner stay single",
@@ -112,10 +110,31 @@ void AslFolder::readCalibrationFiles(const fs::path& given) {
           "explicitly");
     }
   }
-  const bool no_second = !fs::is_directory(folder_ / "cam1");
+  // Tracks need no folder for the second camera: they say themselves what it saw.
+  const bool images = !options_.without_images && track_file_.empty();
+  const bool no_second = images && !fs::is_directory(folder_ / "cam1");
   if (calibration_.rig.camera_count > 1 && (options_.mono || no_second)) {
     if (!options_.mono) warnings_.add(folder_.string() + ": no cam1, going on with one camera");
     calibration_.rig.camera_count = 1;
+  }
+}
+
+bool AslFolder::listsImages() const {
+  for (const char* camera : {"cam0", "cam1"}) {
+    if (fs::exists(folder_ / camera / "data.csv") || fs::exists(folder_ / camera / "data")) return true;
+  }
+  return false;
+}
+
+void AslFolder::readCameras() {
+  for (std::uint32_t camera = 0; camera < calibration_.rig.camera_count; ++camera) readCamera(camera);
+  if (calibration_.rig.camera_count > 1 && files_[1].empty()) {
+    warnings_.add(folder_.string() + ": cam1 has no images, going on with one camera");
+    calibration_.rig.camera_count = 1;
+  }
+  if (images_.empty()) {
+    throw InputError(folder_.string(), 0, "", "none of the listed images exists",
+                     "Images are looked for in cam0/data and cam1/data, tracks in tracks0/data.csv");
   }
 }
 
@@ -206,7 +225,9 @@ void AslFolder::chooseTruth() {
     LogWarnings warnings;
     try {
       const Trajectory truth = readTrajectory(file, counters, warnings);
-      const std::int64_t covered = coverage(truth, images_.front().stamp, images_.back().stamp);
+      const std::int64_t covered = images_.empty()
+                                       ? coverage(truth, samples_.front().stamp, samples_.back().stamp)
+                                       : coverage(truth, images_.front().stamp, images_.back().stamp);
       if (covered <= best) continue;
       best = covered;
       truth_file_ = file;

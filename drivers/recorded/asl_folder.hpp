@@ -13,7 +13,8 @@ namespace swiftlet {
 /// True when `path` is such a folder (the sequence or its mav0).
 bool isAslFolder(const std::string& path);
 
-/// Opens it. InputError when there is no IMU, no calibration, no usable image of any camera.
+/// Opens it. Without any image, feature tracks (tracks0/data.csv) take their place. InputError when
+/// there is no IMU, no calibration, or neither images nor tracks (unless LogOptions::without_images).
 std::unique_ptr<LogSource> openAslFolder(const std::string& path, const LogOptions& options = {});
 
 }  // namespace swiftlet

@@ -22,13 +22,13 @@ std::string_view trim(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
-std::string quoted(std::string_view text) {
+}  // namespace
+
+std::string quoteInput(std::string_view text) {
   std::string out = "`";
   for (const char c : text.substr(0, kMaxQuoted)) out += (c >= ' ' && c < 127) ? c : '?';
   return out + (text.size() > kMaxQuoted ? "...`" : "`");
 }
-
-}  // namespace
 
 CsvReader::CsvReader(const std::string& path, Separator separator, LogCounters& counters,
                      LogWarnings& warnings)
@@ -91,12 +91,16 @@ bool CsvReader::next(std::size_t min_fields) {
   while (readLine()) {
     if (text_.empty()) continue;
     if (text_.front() == '#') {
-      if (header_.empty()) header_ = text_.substr(0, kMaxLine);
+      if (header_.empty()) {
+        header_ = text_.substr(0, kMaxLine);
+        header_line_ = line_;
+      }
       continue;
     }
     split();
     if (!overlong_ && isHeader()) {
       header_ = text_;
+      header_line_ = line_;
       continue;
     }
     ++rows_;
@@ -113,13 +117,14 @@ bool CsvReader::next(std::size_t min_fields) {
 
 bool CsvReader::number(std::size_t i, const char* name, double& value) {
   if (!parseDouble(field(i), value)) {
-    reject(name, quoted(field(i)) + " is not a number");
+    reject(name, quoteInput(field(i)) + " is not a number");
     return false;
   }
   if (std::isfinite(value)) return true;
   ++nan_;
-  if (!first_bad_) first_bad_ = error(name, quoted(field(i)) + " is not finite", "");
-  warnings_->addCounted(++counters_->nan_rows, error(name, quoted(field(i)) + ", row skipped", "").what());
+  if (!first_bad_) first_bad_ = error(name, quoteInput(field(i)) + " is not finite", "");
+  warnings_->addCounted(++counters_->nan_rows,
+                        error(name, quoteInput(field(i)) + ", row skipped", "").what());
   return false;
 }
 
@@ -128,6 +133,12 @@ bool CsvReader::numbers(std::size_t first, std::span<const char* const> names, d
     if (!number(first + k, names[k], values[k])) return false;
   }
   return true;
+}
+
+bool CsvReader::integer(std::size_t i, const char* name, std::int64_t& value) {
+  if (parseInteger(field(i), value)) return true;
+  reject(name, quoteInput(field(i)) + " is not a whole number");
+  return false;
 }
 
 void CsvReader::reject(const char* field_name, const std::string& message) {

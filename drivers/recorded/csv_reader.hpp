@@ -21,6 +21,9 @@
 
 namespace swiftlet {
 
+/// Input as a message repeats it: in quotes, cut to 40 characters, unprintable ones replaced.
+std::string quoteInput(std::string_view text);
+
 class CsvReader {
  public:
   static constexpr std::size_t kMaxFields = 64;
@@ -44,7 +47,11 @@ class CsvReader {
   /// field named `name`), and the answer is false.
   bool number(std::size_t i, const char* name, double& value);
   bool numbers(std::size_t first, std::span<const char* const> names, double* values);
+  /// The field as a decimal integer; other text is rejected.
+  bool integer(std::size_t i, const char* name, std::int64_t& value);
   void reject(const char* field_name, const std::string& message);
+  /// The first row rejected or counted as NaN, for a caller that tolerates none.
+  [[nodiscard]] const std::optional<InputError>& firstBad() const { return first_bad_; }
 
   /// Call when next() has given the last row.
   void finish(const char* what, const char* remedy) const;
@@ -53,6 +60,7 @@ class CsvReader {
   [[nodiscard]] int line() const { return line_; }
   /// The header line (first '#' line or text line), empty without one.
   [[nodiscard]] const std::string& header() const { return header_; }
+  [[nodiscard]] int headerLine() const { return header_line_; }  ///< 0 without one
   [[nodiscard]] InputError error(const char* field_name, const std::string& message,
                                  const std::string& remedy) const;
 
@@ -75,6 +83,7 @@ class CsvReader {
   std::string_view text_;  ///< the line, trimmed
   bool overlong_ = false;
   std::string header_;
+  int header_line_ = 0;
   std::array<std::string_view, kMaxFields> fields_{};
   std::size_t size_ = 0;
   int line_ = 0;

@@ -29,6 +29,7 @@ struct LogOptions {
   std::string imu_calibration;  ///< the Kalibr IMU file, where it is not beside the camchain
   CalibrationOptions calibration_options;
   bool mono = false;                  ///< leave camera 1 out
+  bool without_images = false;        ///< neither look for images nor deliver any: tracks take their place
   bool imu_after_last_image = false;  ///< deliver the samples after the last image too
 };
 
@@ -52,6 +53,8 @@ class LogSource {
   [[nodiscard]] virtual const LogCounters& counters() const = 0;
   /// Lines for the user; grows while the log is read.
   [[nodiscard]] virtual const std::vector<std::string>& warnings() const = 0;
+  /// Feature tracks (track_file.hpp) that the log holds in place of images; empty when it has images.
+  [[nodiscard]] virtual std::string trackFile() const { return {}; }
   /// The truth of the estimator's body, in time order; empty when the log has none. Read on demand.
   [[nodiscard]] virtual Trajectory groundTruth() const { return {}; }
   /// Where the truth comes from, for the summary; empty without one.

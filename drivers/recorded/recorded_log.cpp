@@ -48,6 +48,7 @@ void RecordedLog::prepare(const std::string& name) {
   for (std::size_t i = 0; i < images_.size(); ++i) {
     if (i == 0 || images_[i].stamp != images_[i - 1].stamp) ++frame_count_;
   }
+  if (images_.empty()) return;
   for (std::size_t camera = 0; camera < calibration_.rig.camera_count; ++camera) {
     const CameraModel& model = calibration_.rig.camera[camera];
     pools_[camera].memory.resize(kImageSlots * static_cast<std::size_t>(model.width()) *

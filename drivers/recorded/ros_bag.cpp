@@ -87,6 +87,7 @@ void RosBag::chooseTopics() {
   }
   if (imu_topic_.empty())
     throw InputError(path_, 0, "", "no topic of type sensor_msgs/Imu", "Record the IMU too");
+  if (options_.without_images) return;
   // A raw topic and its compressed twin carry the same pictures.
   std::erase_if(images, [&](const std::string& topic) {
     const std::size_t tail = topic.rfind("/compressed");
@@ -161,7 +162,9 @@ void RosBag::addImage(std::size_t camera, const rosbag::MessageInstance& message
 
 void RosBag::scan() {
   std::vector<std::string> topics = {imu_topic_};
-  for (std::size_t c = 0; c < calibration_.rig.camera_count; ++c) topics.push_back(camera_topic_[c]);
+  for (const std::string& topic : camera_topic_) {
+    if (!topic.empty()) topics.push_back(topic);
+  }
   view_ = std::make_unique<rosbag::View>(bag_, rosbag::TopicQuery(topics));
   for (const rosbag::MessageInstance& message : *view_) {
     const std::string& topic = message.getTopic();

@@ -2,136 +2,224 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-
-#include "drivers/recorded/parse_number.hpp"
+#include <iterator>
+#include <limits>
+#include <memory>
 
 namespace swiftlet {
 namespace {
 
-constexpr std::array<std::array<const char*, 2>, kMaxCameras> kPixelNames = {{{"u0", "v0"}, {"u1", "v1"}}};
+struct ColumnText {
+  const char* name;
+  const char* with_unit;
+};
+constexpr std::array<ColumnText, 6> kColumns = {{{"timestamp", "timestamp [ns]"},
+                                                 {"id", "id"},
+                                                 {"camera", "camera"},
+                                                 {"u", "u [px]"},
+                                                 {"v", "v [px]"},
+                                                 {"keyframe", "keyframe"}}};
+constexpr const char* kHeader = "#timestamp [ns],id,camera,u [px],v [px],keyframe";
+constexpr const char* kHeaderRemedy =
+    "The first line has to be `#timestamp [ns],id,camera,u [px],v [px],keyframe` (keyframe may be left out)";
+constexpr const char* kRowRemedy =
+    "A line is: stamp [ns], id, camera (0 or 1), u, v and, where the header says so, keyframe (0 or 1)";
+constexpr const char* kDiskRemedy = "Is the disk full?";
 // Far outside any image: a number like this is damage.
 constexpr double kMaxPixel = 1e5;
 
-bool readPixel(CsvReader& csv, std::size_t camera, TrackedFeature& feature) {
-  const std::size_t column = 2 + 2 * camera;
-  feature.seen[camera] = false;
-  if (csv.field(column).empty() && csv.field(column + 1).empty()) return true;
-  std::array<double, 2> uv{};
-  if (!csv.numbers(column, kPixelNames[camera], uv.data())) return false;
-  if (std::abs(uv[0]) > kMaxPixel || std::abs(uv[1]) > kMaxPixel) {
-    csv.reject(kPixelNames[camera][0], "a pixel far outside any image");
-    return false;
+/// Names of the header line, without '#' and surrounding blanks.
+std::vector<std::string_view> namesOf(std::string_view header) {
+  if (header.starts_with('#')) header.remove_prefix(1);
+  std::vector<std::string_view> names;
+  while (true) {
+    const std::size_t end = header.find(',');
+    std::string_view name = header.substr(0, end);
+    while (name.starts_with(' ') || name.starts_with('\t')) name.remove_prefix(1);
+    while (name.ends_with(' ') || name.ends_with('\t')) name.remove_suffix(1);
+    names.push_back(name);
+    if (end == std::string_view::npos) return names;
+    header.remove_prefix(end + 1);
   }
-  feature.seen[camera] = true;
-  feature.pixel[camera] = {static_cast<float>(uv[0]), static_cast<float>(uv[1])};
-  return true;
-}
-
-bool isFrameOnly(const CsvReader& csv) {
-  for (std::size_t i = 1; i < csv.size(); ++i) {
-    if (!csv.field(i).empty()) return false;
-  }
-  return true;
 }
 
 }  // namespace
 
-TrackReader::TrackReader(const std::string& path, LogCounters& counters, LogWarnings& warnings)
-    : csv_(path, CsvReader::Separator::kComma, counters, warnings) {}
-
-TrackReader::TrackReader(const std::string& name, std::string_view text, LogCounters& counters,
-                         LogWarnings& warnings)
-    : csv_(name, text, CsvReader::Separator::kComma, counters, warnings) {}
-
-TrackReader::Row TrackReader::readRow() {
-  while (csv_.next(1)) {
-    if (!parseCsvStamp(csv_.field(0), pending_stamp_)) {
-      csv_.reject("timestamp", "not a stamp in ns");
-      continue;
-    }
-    if (any_ && pending_stamp_ < newest_) {
-      csv_.reject("timestamp", "earlier than the row before");
-      continue;
-    }
-    if (isFrameOnly(csv_)) {
-      if (!any_ || pending_stamp_ != newest_) ids_.clear();
-      newest_ = pending_stamp_;
-      any_ = true;
-      return Row::kFrame;
-    }
-    TrackedFeature feature;
-    std::int64_t id = 0;
-    if (!parseInteger(csv_.field(1), id) || id < 0) {
-      csv_.reject("track", "not a whole number from 0");
-      continue;
-    }
-    feature.id = static_cast<TrackId>(id);
-    if (!readPixel(csv_, 0, feature) || !readPixel(csv_, 1, feature)) continue;
-    if (!feature.seen[0] && !feature.seen[1]) {
-      csv_.reject("u0", "a track that no camera saw");
-      continue;
-    }
-    if (!any_ || pending_stamp_ != newest_) ids_.clear();
-    if (!ids_.insert(feature.id).second) {
-      csv_.reject("track", "twice in one frame");
-      continue;
-    }
-    pending_feature_ = feature;
-    newest_ = pending_stamp_;
-    any_ = true;
-    return Row::kFeature;
-  }
-  return Row::kEnd;
+TrackReader::TrackReader(const std::string& path)
+    : csv_(path, CsvReader::Separator::kComma, counters_, warnings_) {
+  begin();
 }
 
-bool TrackReader::next(TrackRecord& record) {
-  if (ended_) return false;
-  if (!pending_) pending_kind_ = readRow();
-  pending_ = false;
-  record.features.clear();
-  if (pending_kind_ == Row::kEnd) {
-    ended_ = true;
-    csv_.finish("tracks", "A row is: stamp [ns], track id, u0, v0, u1, v1");
-    return false;
+TrackReader::TrackReader(const std::string& name, std::string_view text)
+    : csv_(name, text, CsvReader::Separator::kComma, counters_, warnings_) {
+  begin();
+}
+
+void TrackReader::begin() {
+  static_assert(kColumns.size() == kColumnCount);
+  more_ = csv_.next(0);
+  checkHeader();
+  refuseRejected();
+  if (!more_) throw InputError(csv_.name(), 0, "", "holds no tracks", kRowRemedy);
+  parseRow();
+}
+
+void TrackReader::checkHeader() {
+  if (csv_.header().empty()) throw InputError(csv_.name(), 1, "header", "is missing", kHeaderRemedy);
+  const std::vector<std::string_view> names = namesOf(csv_.header());
+  const auto complain = [&](const std::string& message) {
+    throw InputError(csv_.name(), csv_.headerLine(), "header", message, kHeaderRemedy);
+  };
+  for (std::size_t i = 0; i < names.size() && i < kColumnCount; ++i) {
+    if (names[i] == kColumns[i].name || names[i] == kColumns[i].with_unit) continue;
+    complain(fmt::format("column {} is {}, not `{}`", i + 1, quoteInput(names[i]), kColumns[i].with_unit));
   }
-  record.stamp = pending_stamp_;
-  while (pending_kind_ != Row::kEnd && pending_stamp_ == record.stamp) {
-    if (pending_kind_ == Row::kFeature) record.features.push_back(pending_feature_);
-    pending_kind_ = readRow();
+  if (names.size() < kKeyframe || names.size() > kColumnCount) {
+    complain(fmt::format("names {} columns, not 5 or 6", names.size()));
   }
-  pending_ = true;
+  columns_ = names.size();
+}
+
+/// A row that CsvReader itself could not use (too long, no number) is the end of it here.
+void TrackReader::refuseRejected() const {
+  const auto& bad = csv_.firstBad();
+  if (bad) throw InputError(bad->file, bad->line, bad->field, bad->message, kRowRemedy);
+}
+
+void TrackReader::refuse(Column column, const std::string& message, const char* remedy) const {
+  throw csv_.error(kColumns[column].name, message, remedy);
+}
+
+bool TrackReader::readRow() {
+  const bool found = csv_.next(0);
+  refuseRejected();
+  if (found) parseRow();
+  return found;
+}
+
+/// A whole number from 0 to `most`.
+std::int64_t TrackReader::integer(Column column, std::int64_t most) {
+  std::int64_t value = 0;
+  if (!csv_.integer(column, kColumns[column].name, value)) refuseRejected();
+  if (value < 0 || value > most) {
+    refuse(column, fmt::format("{} is not within 0 and {}", value, most), kRowRemedy);
+  }
+  return value;
+}
+
+void TrackReader::parseRow() {
+  constexpr std::int64_t kAny = std::numeric_limits<std::int64_t>::max();
+  if (csv_.size() != columns_) {
+    throw csv_.error("row", fmt::format("{} columns where the header names {}", csv_.size(), columns_),
+                     kRowRemedy);
+  }
+  const Stamp before = row_.stamp;
+  row_ = {};
+  row_.stamp.ns = integer(kStamp, kAny);
+  if (any_ && row_.stamp < before) {
+    refuse(kStamp, fmt::format("{} is earlier than {} in the line before", row_.stamp.ns, before.ns),
+           "Sort the lines by stamp");
+  }
+  any_ = true;
+  row_.keyframe = hasKeyframes() && integer(kKeyframe, 1) == 1;
+  for (const Column column : {kId, kCamera, kU, kV}) row_.sighting |= !csv_.field(column).empty();
+  if (!row_.sighting) return;
+  row_.id = static_cast<TrackId>(integer(kId, kAny));
+  row_.camera = static_cast<std::size_t>(integer(kCamera, kMaxCameras - 1));
+  Eigen::Vector2d pixel;
+  const std::array<const char*, 2> names = {kColumns[kU].name, kColumns[kV].name};
+  if (!csv_.numbers(kU, names, pixel.data())) refuseRejected();
+  for (const Column column : {kU, kV}) {
+    if (std::abs(pixel[column - kU]) <= kMaxPixel) continue;
+    refuse(column, fmt::format("{} px is far outside any image", pixel[column - kU]), kRowRemedy);
+  }
+  row_.pixel = pixel.cast<float>();
+}
+
+bool TrackReader::next(TrackedFrame& frame) {
+  if (!more_) return false;
+  frame.stamp = row_.stamp;
+  frame.index = next_index_++;
+  frame.camera_present = {};
+  frame.keyframe = row_.keyframe;
+  frame.median_motion = -1;
+  frame.features.clear();
+  slots_.clear();
+  const std::uint64_t surplus_before = surplus_;
+  while (more_ && row_.stamp == frame.stamp) {
+    if (row_.keyframe != frame.keyframe) {
+      refuse(kKeyframe, "differs from the frame's first line", "All lines of one stamp need the same value");
+    }
+    if (row_.sighting) addSighting(frame);
+    more_ = readRow();
+  }
+  if (surplus_ > surplus_before) {
+    warnings_.addCounted(
+        ++crowded_, fmt::format("{}: the frame at {} has {} tracks, only the first {} are used", csv_.name(),
+                                frame.stamp.ns, slots_.size(), kMaxFeatures));
+  }
   return true;
+}
+
+void TrackReader::addSighting(TrackedFrame& frame) {
+  cameras_ = std::max(cameras_, row_.camera + 1);
+  frame.camera_present[row_.camera] = true;
+  const auto [slot, fresh] = slots_.try_emplace(row_.id, frame.features.size());
+  if (fresh) {
+    TrackedFeature feature;
+    feature.id = row_.id;
+    if (!frame.features.tryPushBack(feature)) {
+      slot->second = kMaxFeatures;
+      ++surplus_;
+    }
+  }
+  if (slot->second == kMaxFeatures) return;
+  TrackedFeature& feature = frame.features[slot->second];
+  if (feature.seen[row_.camera]) {
+    refuse(kId, fmt::format("{} is twice in camera {} at one stamp", row_.id, row_.camera),
+           "A landmark has one sighting per camera and frame");
+  }
+  feature.seen[row_.camera] = true;
+  feature.pixel[row_.camera] = row_.pixel;
+}
+
+TrackFileFacts surveyTrackFile(const std::string& path) {
+  TrackReader reader(path);
+  TrackFileFacts facts;
+  const auto frame = std::make_unique<TrackedFrame>();
+  while (reader.next(*frame)) ++facts.frames;
+  facts.cameras = reader.cameras();
+  return facts;
 }
 
 TrackWriter::TrackWriter(const std::string& path) : path_(path), file_(std::fopen(path.c_str(), "wb")) {
   if (file_ == nullptr) {
     throw InputError(path, 0, "", std::string("cannot be written: ") + std::strerror(errno), "");
   }
-  std::fputs("#timestamp [ns],track,u0 [px],v0 [px],u1 [px],v1 [px]\n", file_);
+  std::fprintf(file_, "%s\n", kHeader);
 }
 
 TrackWriter::~TrackWriter() {
   if (file_ != nullptr) std::fclose(file_);
 }
 
-void TrackWriter::write(const TrackRecord& record) {
+void TrackWriter::write(const TrackedFrame& frame) {
+  const int keyframe = frame.keyframe ? 1 : 0;
   std::string lines;
-  for (const TrackedFeature& feature : record.features) {
-    lines += fmt::format("{},{}", record.stamp.ns, feature.id);
+  for (const TrackedFeature& feature : frame.features) {
     for (std::size_t c = 0; c < kMaxCameras; ++c) {
-      // Shortest text that reads back to the same float.
-      lines += feature.seen[c] ? fmt::format(",{},{}", feature.pixel[c].x(), feature.pixel[c].y()) : ",,";
+      if (!feature.seen[c]) continue;
+      // `{}` gives the shortest text that reads back to the same float.
+      fmt::format_to(std::back_inserter(lines), "{},{},{},{},{},{}\n", frame.stamp.ns, feature.id, c,
+                     feature.pixel[c].x(), feature.pixel[c].y(), keyframe);
     }
-    lines += '\n';
   }
-  if (record.features.empty()) lines = fmt::format("{},,,,,\n", record.stamp.ns);
+  if (lines.empty()) lines = fmt::format("{},,,,,{}\n", frame.stamp.ns, keyframe);
   if (std::fwrite(lines.data(), 1, lines.size(), file_) != lines.size()) {
-    throw InputError(path_, 0, "", std::string("cannot be written: ") + std::strerror(errno),
-                     "Is the disk full?");
+    throw InputError(path_, 0, "", std::string("cannot be written: ") + std::strerror(errno), kDiskRemedy);
   }
 }
 
@@ -139,8 +227,7 @@ void TrackWriter::close() {
   std::FILE* file = file_;
   file_ = nullptr;
   if (file != nullptr && std::fclose(file) != 0) {
-    throw InputError(path_, 0, "", std::string("cannot be written: ") + std::strerror(errno),
-                     "Is the disk full?");
+    throw InputError(path_, 0, "", std::string("cannot be written: ") + std::strerror(errno), kDiskRemedy);
   }
 }
 

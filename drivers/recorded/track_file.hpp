@@ -1,17 +1,24 @@
 #pragma once
-// Feature tracks in a file, to run the back-end alone. One line per sighting:
+// Feature tracks in a file, in place of images: what `simulate --tracks` writes and replay reads, to run
+// the back-end alone. One line per sighting:
 //
-//   #timestamp [ns],track,u0 [px],v0 [px],u1 [px],v1 [px]
-//   1403636579763555584,17,310.25,201.5,288.125,201.75
-//   1403636579763555584,18,52.5,99.0,,
+//   #timestamp [ns],id,camera,u [px],v [px],keyframe
+//   1403636579763555584,17,0,310.25,201.5,1
+//   1403636579763555584,17,1,288.125,201.75,1
+//   1403636579813555584,,,,,0
 //
-// Pixels are those of the raw (distorted) image, (0,0) the centre of the top-left pixel; the fields of a
-// camera that did not see the landmark are empty. Lines of one stamp stand together, stamps rise. A
-// frame without any track is a line with only its stamp. Tracks of one id are one landmark.
+// The first line names the columns, in this order; `keyframe` may be left out. Lines of one stamp are one
+// frame and stand together, in any order; stamps rise. A line whose id, camera and pixel are empty is a
+// frame (part) without tracks. Lines of one id are one landmark: both cameras' sightings at one stamp
+// become one TrackedFeature. Pixels are those of the raw (distorted) image, (0,0) the centre of the
+// top-left pixel. `keyframe` is 0 or 1, the same for the whole frame.
+//
+// The file is made by a program, so nothing in it is repaired or skipped: whatever is malformed is an
+// InputError with file, line, field and remedy.
 
 #include <cstdint>
 #include <cstdio>
-#include <set>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,36 +28,71 @@
 
 namespace swiftlet {
 
-struct TrackRecord {
-  Stamp stamp;
-  std::vector<TrackedFeature> features;  ///< each seen by at least one camera
-};
-
-/// Reads frame by frame in constant memory. Bad rows are skipped and counted; a stamp that goes back,
-/// or an id twice in a frame, is a bad row.
+/// Reads frame by frame, in memory that one frame needs.
 class TrackReader {
  public:
-  TrackReader(const std::string& path, LogCounters& counters, LogWarnings& warnings);
-  TrackReader(const std::string& name, std::string_view text, LogCounters& counters, LogWarnings& warnings);
+  /// InputError when the file cannot be read, has another header or holds no line.
+  explicit TrackReader(const std::string& path);
+  /// Reads text in memory, which must outlive the reader; `name` stands for the file in messages.
+  TrackReader(const std::string& name, std::string_view text);
+  TrackReader(const TrackReader&) = delete;
+  TrackReader& operator=(const TrackReader&) = delete;
 
-  /// The next frame; false at the end (InputError when the file is no track file).
-  bool next(TrackRecord& record);
+  /// The next frame; false at the end. Sets everything but `median_motion`, which is left unknown, and
+  /// `keyframe` where the file does not tell. A camera counts as present when it saw something.
+  bool next(TrackedFrame& frame);
+
+  /// The file says which frames are keyframes.
+  [[nodiscard]] bool hasKeyframes() const { return columns_ > kKeyframe; }
+  /// One more than the highest camera number so far.
+  [[nodiscard]] std::size_t cameras() const { return cameras_; }
+  /// Landmarks beyond kMaxFeatures in a frame so far: left out, the first ones stay.
+  [[nodiscard]] std::uint64_t surplus() const { return surplus_; }
+  /// Lines for the user about the surplus.
+  [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_.lines(); }
 
  private:
-  enum class Row { kEnd, kFrame, kFeature };
-  Row readRow();
+  enum Column : std::size_t { kStamp, kId, kCamera, kU, kV, kKeyframe, kColumnCount };
+  struct Row {
+    Stamp stamp;
+    bool sighting = false;  ///< false: the frame alone
+    TrackId id = 0;
+    std::size_t camera = 0;
+    Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
+    bool keyframe = false;
+  };
 
+  void begin();
+  void checkHeader();
+  bool readRow();
+  void parseRow();
+  std::int64_t integer(Column column, std::int64_t most);
+  void addSighting(TrackedFrame& frame);
+  [[noreturn]] void refuse(Column column, const std::string& message, const char* remedy) const;
+  void refuseRejected() const;
+
+  LogCounters counters_;
+  LogWarnings warnings_;
   CsvReader csv_;
-  bool pending_ = false;  ///< a row read ahead
-  bool ended_ = false;
+  std::size_t columns_ = 0;
+  Row row_;  ///< read ahead
+  bool more_ = false;
   bool any_ = false;
-  Row pending_kind_ = Row::kEnd;
-  Stamp pending_stamp_;
-  Stamp newest_;
-  TrackedFeature pending_feature_;
-  std::set<TrackId> ids_;  ///< of the frame being read
+  std::map<TrackId, std::size_t> slots_;  ///< of the frame being read; kMaxFeatures: left out
+  std::size_t cameras_ = 0;
+  std::uint64_t next_index_ = 0;
+  std::uint64_t surplus_ = 0;
+  std::uint64_t crowded_ = 0;  ///< frames with surplus
 };
 
+/// What a whole file holds. Reading it through before a run refuses a bad file before anything is made.
+struct TrackFileFacts {
+  std::uint64_t frames = 0;
+  std::size_t cameras = 0;
+};
+TrackFileFacts surveyTrackFile(const std::string& path);
+
+/// Writes the same format, keyframe column included. InputError when that fails.
 class TrackWriter {
  public:
   explicit TrackWriter(const std::string& path);
@@ -58,7 +100,8 @@ class TrackWriter {
   TrackWriter(const TrackWriter&) = delete;
   TrackWriter& operator=(const TrackWriter&) = delete;
 
-  void write(const TrackRecord& record);
+  /// Stamps must rise. Pixels read back to the same floats.
+  void write(const TrackedFrame& frame);
   void close();
 
  private:

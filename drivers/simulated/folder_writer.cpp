@@ -165,26 +165,44 @@ void writeImages(const SimulatedFlight& flight, const fs::path& folder, const Si
   if (truth != nullptr) truth->finish();
 }
 
-void writeTracks(const SimulatedFlight& flight, const fs::path& folder, const SimulationProgress& progress) {
-  fs::create_directories(folder / "mav0/tracks0");
+// Takes out what the flight's faults hide; false when no camera took an image at all.
+bool applyFaults(const SimulatedFlight& flight, double seconds, TrackedFrame& frame) {
+  bool any_image = false;
+  for (std::size_t c = 0; c < kMaxCameras; ++c) {
+    const bool missing =
+        c >= flight.trueRig().camera_count || flight.hasFault(FaultKind::kCameraMissing, c, seconds);
+    any_image = any_image || !missing;
+    frame.camera_present[c] = !missing && !flight.hasFault(FaultKind::kBlackout, c, seconds);
+  }
+  std::size_t kept = 0;
+  for (TrackedFeature& feature : frame.features) {
+    for (std::size_t c = 0; c < kMaxCameras; ++c) {
+      feature.seen[c] = feature.seen[c] && frame.camera_present[c];
+    }
+    if (feature.seen[0] || feature.seen[1]) frame.features[kept++] = feature;
+  }
+  frame.features.resize(kept);
+  return any_image;
+}
+
+void makeTracks(const SimulatedFlight& flight, const TrackSink& sink, const SimulationProgress& progress) {
   TrackSimulator simulator(flight.world(), flight.trueRig(), flight.trajectory(), flight.settings().tracks);
   const auto frame = std::make_unique<TrackedFrame>();
-  std::string text = "#timestamp [ns],id,camera,u [px],v [px],keyframe\n";
   for (int k = 0; k < flight.imageCount(); ++k) {
-    const double seconds = flight.imageTime(k);
-    simulator.step(seconds, flight.imageStamp(k), *frame);
-    for (const TrackedFeature& feature : frame->features) {
-      for (std::size_t c = 0; c < flight.trueRig().camera_count; ++c) {
-        const bool hidden = flight.hasFault(FaultKind::kBlackout, c, seconds) ||
-                            flight.hasFault(FaultKind::kCameraMissing, c, seconds);
-        if (!feature.seen[c] || hidden) continue;
-        fmt::format_to(std::back_inserter(text), "{},{},{},{:.4f},{:.4f},{}\n", frame->stamp.ns, feature.id,
-                       c, feature.pixel[c].x(), feature.pixel[c].y(), frame->keyframe ? 1 : 0);
-      }
-    }
+    simulator.step(flight.imageTime(k), flight.imageStamp(k), *frame);
+    if (applyFaults(flight, flight.imageTime(k), *frame)) sink(*frame);
     if (progress) progress(k + 1, flight.imageCount());
   }
-  writeText(folder / "mav0/tracks0/data.csv", text);
+}
+
+// The list of images that the folder already has; empty without one.
+std::string imageListIn(const fs::path& folder) {
+  std::error_code error;
+  for (const char* camera : {"cam0", "cam1"}) {
+    const fs::path list = folder / "mav0" / camera / "data.csv";
+    if (fs::exists(list, error)) return list.string();
+  }
+  return {};
 }
 
 std::string simulationYaml(const SimulatedFlight& flight) {
@@ -232,18 +250,14 @@ void writeFlight(const SimulatedFlight& flight, const fs::path& folder) {
   writeText(folder / "truth/simulation.yaml", simulationYaml(flight));
 }
 
-}  // namespace
-
-Status simulateToFolder(const SimulationSettings& settings, const std::string& folder,
-                        const SimulationProgress& progress, std::string* message) {
+// Makes the flight, the files that both kinds of output share, and the rest by `write`.
+template <typename Write>
+Status simulateWith(const SimulationSettings& settings, const fs::path& folder, std::string* message,
+                    const Write& write) {
   try {
     const SimulatedFlight flight(settings);
     writeFlight(flight, folder);
-    if (settings.output == SimulatedOutput::kTracks) {
-      writeTracks(flight, folder, progress);
-    } else {
-      writeImages(flight, folder, progress);
-    }
+    write(flight);
     return okStatus();
   } catch (const std::invalid_argument& error) {
     if (message != nullptr) *message = error.what();
@@ -252,6 +266,26 @@ Status simulateToFolder(const SimulationSettings& settings, const std::string& f
     if (message != nullptr) *message = error.what();
     return {StatusCode::kFailed, "the simulated flight could not be made or written"};
   }
+}
+
+}  // namespace
+
+Status simulateToFolder(const SimulationSettings& settings, const std::string& folder,
+                        const SimulationProgress& progress, std::string* message) {
+  return simulateWith(settings, folder, message,
+                      [&](const SimulatedFlight& flight) { writeImages(flight, folder, progress); });
+}
+
+Status simulateTracksToFolder(const SimulationSettings& settings, const std::string& folder,
+                              const TrackSink& sink, const SimulationProgress& progress,
+                              std::string* message) {
+  const std::string images = imageListIn(folder);
+  if (!images.empty()) {
+    if (message != nullptr) *message = images + ": the folder holds the images of another flight";
+    return {StatusCode::kFailed, "the folder holds the images of another flight"};
+  }
+  return simulateWith(settings, folder, message,
+                      [&](const SimulatedFlight& flight) { makeTracks(flight, sink, progress); });
 }
 
 }  // namespace swiftlet

@@ -2,7 +2,6 @@
 // Writes a simulated flight as an EuRoC/ASL folder.
 //
 //   mav0/cam0, cam1        data.csv, sensor.yaml, data/<stamp>.png or .jpg
-//   mav0/tracks0           data.csv: stamp, id, camera, u, v, keyframe   (in place of images)
 //   mav0/imu0              data.csv, sensor.yaml
 //   mav0/state_groundtruth_estimate0   data.csv: 17 columns at IMU rate, exact, biases included
 //   mav0/depth0            16 bit PNG [mm] of an ideal pinhole camera at cam0's true pose, 0: none
@@ -20,16 +19,27 @@
 
 #include "drivers/simulated/simulation_settings.hpp"
 #include "estimator/core/status.hpp"
+#include "estimator/messages/tracked_frame.hpp"
 
 namespace swiftlet {
 
 /// Called after each image (or frame of tracks) with how many are done of how many.
 using SimulationProgress = std::function<void(int done, int total)>;
 
+/// Called with each frame of feature tracks. A failure to write it is thrown (std::exception).
+using TrackSink = std::function<void(const TrackedFrame& frame)>;
+
 /// Makes the flight and writes it; existing files of the same names are replaced. kInvalidInput for
 /// a bad setting, kFailed when a file cannot be read or written; `message`, when given, then names
 /// the setting or the file. Cost: 10 pairs of 752 x 480 a second on two idle cores with JPEG.
 Status simulateToFolder(const SimulationSettings& settings, const std::string& folder,
                         const SimulationProgress& progress = {}, std::string* message = nullptr);
+
+/// The same without rendering: feature tracks go to `sink`, whose file format is another room's, and
+/// images, depth and labels are left out. Frames in which no camera took an image are left out too.
+/// kFailed as well when the folder holds images, which would be those of another flight.
+Status simulateTracksToFolder(const SimulationSettings& settings, const std::string& folder,
+                              const TrackSink& sink, const SimulationProgress& progress = {},
+                              std::string* message = nullptr);
 
 }  // namespace swiftlet

@@ -33,11 +33,6 @@ struct Fault {
   int camera = -1;  ///< of blackout and missing camera; -1: all
 };
 
-enum class SimulatedOutput : std::uint8_t {
-  kImages,
-  kTracks,  ///< feature tracks in their place: no rendering
-};
-
 enum class ImageFormat : std::uint8_t { kPng, kJpeg };
 
 struct SimulationSettings {
@@ -60,8 +55,7 @@ struct SimulationSettings {
   RenderSettings render;   ///< samples, exposure time
   SensorSettings sensor;   ///< light, noise, vignette, exposure control
   bool low_light = false;  ///< a dim room: 5 % of the light, 10 ms exposure
-  TrackSettings tracks;    ///< of SimulatedOutput::kTracks
-  SimulatedOutput output = SimulatedOutput::kImages;
+  TrackSettings tracks;    ///< where feature tracks take the images' place
 
   ImageFormat format = ImageFormat::kJpeg;
   int jpeg_quality = 92;

@@ -18,10 +18,9 @@ enum class EventKind : std::uint8_t {
   kImuSaturated,     ///< value: samples
   kImuInvalid,       ///< value: samples dropped (NaN, repeated or reversed stamp)
   kFrameDropped,     ///< value: frames refused (repeated or reversed stamp, wrong size)
-  kFrameUnpaired,    ///< value: frames whose partner never came
   kCameraLost,       ///< value: camera
   kCameraBack,       ///< value: camera
-  kBlackoutStarted,  ///< no accepted image for longer than the health rule allows
+  kBlackoutStarted,  ///< value: seconds without an accepted image, more than "good" allows
   kBlackoutEnded,    ///< value: seconds it lasted
   kRestStarted,
   kRestEnded,

@@ -6,7 +6,6 @@ namespace {
 constexpr std::uint64_t kSettlingFrames = 10;
 constexpr int kMinSightings = 8;       // a frame with fewer accepted sightings is not accepted
 constexpr int kNominalSightings = 25;  // fewer: degraded
-constexpr double kGoodAge = 0.3;       // s without an accepted image before "good" ends
 // Coasting position error grows with the cube of time: after 3 s it is metres.
 constexpr double kCoastLimit = 3.0;  // s
 
@@ -18,7 +17,7 @@ void HealthMonitor::reset() {
 }
 
 Health HealthMonitor::update(const TrackedFrame& frame, const FrameStatistics& statistics,
-                             std::size_t cameras, std::uint64_t frames_in_epoch) {
+                             std::size_t cameras, bool imu_missing, std::uint64_t frames_in_epoch) {
   const int sightings = statistics.inliers_mono + statistics.inliers_stereo;
   if (sightings >= kMinSightings || frames_in_epoch <= 1) {
     last_accepted_ = frame.stamp;
@@ -29,7 +28,7 @@ Health HealthMonitor::update(const TrackedFrame& frame, const FrameStatistics& s
   if (frames_in_epoch < kSettlingFrames) {
     health_ = Health::kInitializing;
   } else {
-    health_ = sightings >= kNominalSightings && all_cameras ? Health::kGood : Health::kDegraded;
+    health_ = sightings >= kNominalSightings && all_cameras && !imu_missing ? Health::kGood : Health::kDegraded;
   }
   health_ = at(frame.stamp);
   return health_;

@@ -3,7 +3,8 @@
 //
 //  initializing  the first 9 frames of an epoch, in which tilt and velocity settle
 //  good          25 accepted sightings, an image of every camera of the rig, none accepted over 0.3 s ago
-//  degraded      a camera missing, fewer sightings, or coasting on the IMU for less than the limit
+//  degraded      a camera or IMU samples missing, fewer sightings, or coasting on the IMU for less than
+//                the limit
 //  failed        no accepted image (8 sightings) for 3 s; the next accepted image ends it
 // Sightings by both cameras count once. Residuals and covariance are not looked at. No memory, O(1).
 
@@ -17,11 +18,14 @@ namespace swiftlet {
 
 class HealthMonitor {
  public:
+  /// s without an accepted image before "good" ends.
+  static constexpr double kGoodAge = 0.3;
+
   void reset();
 
-  /// After a solve.
+  /// After a solve. `imu_missing`: samples were missing since the last frame.
   Health update(const TrackedFrame& frame, const FrameStatistics& statistics, std::size_t cameras,
-                std::uint64_t frames_in_epoch);
+                bool imu_missing, std::uint64_t frames_in_epoch);
 
   /// The health after the last update.
   [[nodiscard]] Health health() const { return health_; }

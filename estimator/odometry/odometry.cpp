@@ -10,6 +10,7 @@
 #include "estimator/imu/rest_detector.hpp"
 #include "estimator/imu/sample_monitor.hpp"
 #include "estimator/messages/smoothed_window.hpp"
+#include "estimator/odometry/event_watch.hpp"
 #include "estimator/odometry/health_monitor.hpp"
 #include "estimator/odometry/mono_starter.hpp"
 #include "estimator/smoother/imu_buffer.hpp"
@@ -53,14 +54,14 @@ class Odometry::Impl {
   Status addImu(const ImuSample& sample, NavState* propagated) {
     const SampleVerdict verdict = monitor_.check(sample);
     if (!verdict.status.ok()) {
-      raise(sample.stamp, EventKind::kImuInvalid, 1);
+      events_.raise(sample.stamp, EventKind::kImuInvalid, 1);
       return verdict.status;
     }
     if (verdict.gap) {
       imu_gap_ = true;
-      raise(sample.stamp, EventKind::kImuGap, verdict.silence);
+      events_.raise(sample.stamp, EventKind::kImuGap, verdict.silence);
     }
-    if (verdict.saturated) raise(sample.stamp, EventKind::kImuSaturated, 1);
+    if (verdict.saturated) events_.raise(sample.stamp, EventKind::kImuSaturated, 1);
     imu_.push(sample);
     smoother_.addImu(sample);
     rest_.addImu(sample);
@@ -77,28 +78,29 @@ class Odometry::Impl {
 
   Status track(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked) {
     if (has_frame_ && frame.stamp <= last_stamp_) {
-      raise(frame.stamp, EventKind::kFrameDropped, 1);
+      events_.raise(frame.stamp, EventKind::kFrameDropped, 1);
       return {StatusCode::kInvalidInput, "the frame's stamp repeats or goes back: frame dropped"};
     }
     predict(frame.stamp);
     const Status status =
         frontend_.step(frame, prediction_, std::min(effort.features, settings_.max_features), tracked);
-    last_stamp_ = frame.stamp;
-    has_frame_ = true;
+    if (status.ok()) {  // a refused frame leaves the tracks where they were
+      last_stamp_ = frame.stamp;
+      has_frame_ = true;
+    }
     return status;
   }
 
   Status smooth(const TrackedFrame& tracked, const Effort& effort, OdometryOutput& output) {
     output.has_state = false;
     output.waiting_for = "";
-    output.left_window.clear();
     rest_.addFrame(tracked.stamp, static_cast<double>(tracked.median_motion));
     if (!smoother_.started() && !start(tracked, output)) {
-      flushEvents(output);
+      deliver(output);
       return okStatus();
     }
     if (mono_starter_.size() > 0) {
-      const Status caught_up = catchUp(output);
+      const Status caught_up = catchUp();
       if (!caught_up.ok()) return fail(caught_up, output);
     }
     Smoother::StepInput input;
@@ -109,26 +111,32 @@ class Odometry::Impl {
         frames_in_epoch_ < kStartFrames ? std::max(kStartIterations, effort.iterations) : effort.iterations;
     imu_gap_ = false;
     ++frames_in_epoch_;
-    const Status status = smoother_.step(input, output.left_window);
+    const Status status = smoother_.step(input, left_step_);
     if (!status.ok()) return fail(status, output);
-    publish(tracked, output);
+    handOver(left_step_);
+    publish(tracked, input.imu_gap, output);
     return okStatus();
   }
 
   void finish(OdometryOutput& output) {
     output.has_state = false;
-    smoother_.flush(output.left_window);
-    for (KeyframeState& keyframe : output.left_window) keyframe.state.epoch = epoch_;
-    flushEvents(output);
+    smoother_.flush(left_step_);
+    handOver(left_step_);
+    deliver(output);
   }
 
   void reset() {
+    if (smoother_.started()) {
+      smoother_.flush(left_step_);
+      handOver(left_step_);
+    }
     ++epoch_;
-    raise(last_stamp_, EventKind::kReset, epoch_);
+    events_.raise(last_stamp_, EventKind::kReset, epoch_);
     frontend_.reset();
     smoother_.reset();
     propagator_.reset();
     health_.reset();
+    watch_.reset();
     mono_starter_.reset();
     window_.poses.clear();
     window_.landmarks.clear();
@@ -154,12 +162,17 @@ class Odometry::Impl {
     return s;
   }
 
-  void raise(Stamp stamp, EventKind kind, double value) {
-    static_cast<void>(events_.tryPushBack({stamp, kind, value}));
+  /// Keyframes that left, for the next output.
+  void handOver(const FixedVector<KeyframeState, kMaxStates>& left) {
+    for (KeyframeState keyframe : left) {
+      keyframe.state.epoch = epoch_;
+      if (!left_.tryPushBack(keyframe)) events_.raise(last_stamp_, EventKind::kCapacityReached, 1);
+    }
   }
-  void flushEvents(OdometryOutput& output) {
-    output.events = events_;
-    events_.clear();
+  void deliver(OdometryOutput& output) {
+    output.left_window = left_;
+    left_.clear();
+    events_.flush(output);
   }
 
   /// No sample for many periods before `stamp`.
@@ -244,13 +257,14 @@ class Odometry::Impl {
   }
 
   /// Gives the smoother the frames that waited for the start, all but the newest.
-  Status catchUp(OdometryOutput& output) {
+  Status catchUp() {
     Smoother::StepInput input;
     input.iterations = kStartIterations;
     for (std::size_t k = 0; k + 1 < mono_starter_.size(); ++k) {
       input.frame = &mono_starter_.frame(k);
-      const Status status = smoother_.step(input, output.left_window);
+      const Status status = smoother_.step(input, left_step_);
       if (!status.ok()) return status;
+      handOver(left_step_);
     }
     mono_starter_.reset();
     return okStatus();
@@ -258,12 +272,12 @@ class Odometry::Impl {
 
   Status fail(const Status& status, OdometryOutput& output) {
     reset();
-    flushEvents(output);
+    deliver(output);
     output.waiting_for = status.what;
     return status;
   }
 
-  void publish(const TrackedFrame& tracked, OdometryOutput& output) {
+  void publish(const TrackedFrame& tracked, bool imu_missing, OdometryOutput& output) {
     const WindowState& newest = smoother_.newest();
     NavState& state = output.state;
     state.stamp = newest.stamp;
@@ -275,12 +289,12 @@ class Odometry::Impl {
     state.covariance = smoother_.covariance();
     output.statistics = smoother_.statistics();
     output.calibration = {smoother_.timeOffset(), smoother_.extrinsics()};
-    const Health before = health_.health();
-    state.health = health_.update(tracked, output.statistics, rig_.camera_count, frames_in_epoch_);
+    state.health =
+        health_.update(tracked, output.statistics, rig_.camera_count, imu_missing, frames_in_epoch_);
     smoother_.setHealth(state.health);
-    if (before != state.health) {
-      raise(tracked.stamp, EventKind::kHealthChanged, static_cast<double>(state.health));
-    }
+    watch_.step({tracked.stamp, tracked.camera_present, rig_.camera_count, rest_.state().at_rest, state.health,
+                 health_.secondsWithoutImage(tracked.stamp)},
+                events_);
     smoother_.window(window_);
     window_.newest = state;
     window_.epoch = epoch_;
@@ -292,10 +306,7 @@ class Odometry::Impl {
     }
     state.stamp = tracked.stamp;
     output.has_state = true;
-    for (KeyframeState& keyframe : output.left_window) {
-      keyframe.state.epoch = epoch_;
-    }
-    flushEvents(output);
+    deliver(output);
   }
 
   Rig rig_;
@@ -312,7 +323,10 @@ class Odometry::Impl {
 
   FrontendPrediction prediction_;
   SmoothedWindow window_;
-  FixedVector<Event, 32> events_;
+  EventBuffer events_;
+  EventWatch watch_;
+  FixedVector<KeyframeState, kMaxStates> left_;       // to be delivered
+  FixedVector<KeyframeState, kMaxStates> left_step_;  // by one step
   std::uint32_t epoch_ = 0;
   bool has_frame_ = false;
   Stamp last_stamp_;

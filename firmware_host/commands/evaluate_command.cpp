@@ -2,11 +2,11 @@
 
 #include <filesystem>
 #include <fstream>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "drivers/calibration/input_error.hpp"
+#include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/evaluate_run.hpp"
 #include "firmware_host/report/accuracy_report.hpp"
@@ -32,6 +32,7 @@ struct Subject {
   std::string states;  ///< empty: no covariances
   std::string truth;
   std::optional<Stamp> first_image;
+  bool from_tracks = false;  ///< the log need not hold images
 };
 
 Json readSummary(const std::filesystem::path& path) {
@@ -68,7 +69,10 @@ Subject subjectOf(const EvaluateOptions& options) {
     if (run.contains("first_image_ns") && run["first_image_ns"].is_number_integer()) {
       subject.first_image = Stamp{run["first_image_ns"].get<std::int64_t>()};
     }
-    if (subject.truth.empty() && run.contains("log")) subject.truth = run["log"].get<std::string>();
+    if (subject.truth.empty() && run.contains("log")) {
+      subject.truth = run["log"].get<std::string>();
+      subject.from_tracks = run.contains("tracks");
+    }
   }
   if (subject.truth.empty()) {
     throw InputError(options.run, 0, "", "nothing to compare with",
@@ -80,7 +84,7 @@ Subject subjectOf(const EvaluateOptions& options) {
 int evaluate(const EvaluateOptions& options) {
   const Settings settings = options.settings.read();
   const Subject subject = subjectOf(options);
-  const Truth truth = readTruth(subject.truth);
+  const Truth truth = readTruth(subject.truth, subject.from_tracks);
   AccuracyOptions accuracy_options = accuracyOptions(settings.evaluation, options.align);
   Json json;
   json["truth"] = truth.name;
@@ -119,16 +123,15 @@ void addEvaluateCommand(CLI::App& app, int& exit_code) {
   command->add_option("RUN", options->run, "Run folder, or a trajectory (TUM, EuRoC csv)")->required();
   command->add_option("--truth", options->truth,
                       "Log or trajectory file with the truth; default: the log the run was made from");
-  const std::map<std::string, AlignKind> kinds = {
-      {"se3", AlignKind::kSe3}, {"sim3", AlignKind::kSim3}, {"yaw", AlignKind::kYaw}};
-  command->add_option("--align", options->align, "se3 (default), sim3 (scale too) or yaw (and translation)")
-      ->transform(CLI::CheckedTransformer(kinds, CLI::ignore_case));
+  addChoice<AlignKind>(*command, "--align", options->align,
+                       "How to align: sim3 with scale, yaw with translation",
+                       {{"se3", AlignKind::kSe3}, {"sim3", AlignKind::kSim3}, {"yaw", AlignKind::kYaw}});
   command
       ->add_option("--from", options->from, "Leave out poses before this many seconds after the first image")
-      ->check(CLI::NonNegativeNumber);
+      ->check(nonNegative());
   command
       ->add_option("--until", options->until, "Leave out poses after this many seconds after the first image")
-      ->check(CLI::NonNegativeNumber);
+      ->check(nonNegative());
   command->add_flag("--json", options->json, "Print JSON, and nothing else, on stdout");
   options->settings.addTo(*command);
   command->footer(

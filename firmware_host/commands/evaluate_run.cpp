@@ -34,14 +34,16 @@ AccuracyOptions accuracyOptions(const EvaluationGroup& settings, AlignKind align
   return options;
 }
 
-Truth readTruth(const std::string& path) {
+Truth readTruth(const std::string& path, bool without_images) {
   Truth truth;
   if (!std::filesystem::is_directory(path) && std::filesystem::path(path).extension() != ".bag") {
     truth.poses = readEstimate(path);
     truth.name = path;
     return truth;
   }
-  const auto source = openLog(path);
+  LogOptions options;
+  options.without_images = without_images;
+  const auto source = openLog(path, options);
   truth.poses = source->groundTruth();
   truth.name = source->groundTruthName();
   if (truth.poses.empty()) {
@@ -49,7 +51,7 @@ Truth readTruth(const std::string& path) {
                      "Give a trajectory file with --truth (TUM, or EuRoC csv)");
   }
   SensorMessage message;
-  while (!truth.first_image && source->next(message)) {
+  while (!without_images && !truth.first_image && source->next(message)) {
     if (const auto* frame = std::get_if<CameraFrame>(&message)) truth.first_image = frame->stamp;
   }
   return truth;

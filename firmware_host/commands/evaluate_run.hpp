@@ -23,7 +23,8 @@ struct Truth {
   std::string name;
   std::optional<Stamp> first_image;  ///< where a log says
 };
-Truth readTruth(const std::string& path);
+/// `without_images`: a log is read as one of tracks, which need not hold images.
+Truth readTruth(const std::string& path, bool without_images = false);
 
 /// What summary.json holds under "accuracy": odometry.tum over all and from kCommonStart, SE(3) and yaw
 /// alignment; states.csv with its consistency; map.tum when it exists.

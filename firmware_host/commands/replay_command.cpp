@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "drivers/calibration/input_error.hpp"
+#include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/replay_run.hpp"
 #include "firmware_host/report/summary.hpp"
@@ -82,11 +83,11 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
       ->add_option("--calibration", options->calibration,
                    "Calibration instead of the log's own: a folder, or Kalibr camchain and IMU files")
       ->expected(1, 2);
-  command->add_option("--tracks", request.tracks, "File of feature tracks in place of the images");
+  command->add_option("--tracks", request.tracks, "File of feature tracks in place of the log's images");
   command->add_option("--from", request.from, "Start this many seconds after the first image")
-      ->check(CLI::NonNegativeNumber);
+      ->check(nonNegative());
   command->add_option("--until", options->until, "End this many seconds after the first image")
-      ->check(CLI::NonNegativeNumber);
+      ->check(nonNegative());
   command->add_flag("--imu-rate", request.imu_rate, "Also write imu_rate.tum, the state at every IMU sample");
   command->add_flag("!--no-map", request.map, "Leave out the full smoothing after the run (map.tum)");
   options->settings.addTo(*command);

@@ -24,7 +24,18 @@ LogOptions logOptions(const ReplayRequest& request, const Settings& settings) {
   options.imu_calibration = request.imu_calibration;
   options.calibration_options.accept_unusual_rig = settings.calibration.accept_unusual_rig;
   options.mono = request.mono;
+  options.without_images = !request.tracks.empty();
   return options;
+}
+
+/// Reads the whole file once, so that a bad one is refused before anything is written.
+TrackFileFacts checkTracks(const std::string& path, const Rig& rig, bool mono) {
+  const TrackFileFacts facts = surveyTrackFile(path);
+  if (!mono && facts.cameras > rig.camera_count) {
+    throw InputError(path, 0, "camera", "has sightings of camera 1, the calibration has camera 0 only",
+                     "Give the calibration of both with --calibration, or leave camera 1 out with --mono");
+  }
+  return facts;
 }
 
 void printWarnings(const LogSource& source, std::size_t from) {
@@ -64,11 +75,14 @@ ReplayResult runReplay(const ReplayRequest& request, Settings settings) {
   const std::size_t warned = source->warnings().size();
   memory.note("log_reader");
 
-  LogCounters track_counters;
-  LogWarnings track_warnings;
+  RunFacts facts;
+  facts.log = request.log;
+  facts.tracks = request.tracks.empty() ? source->trackFile() : request.tracks;
+  std::size_t steps = source->imageCount();
   std::unique_ptr<TrackReader> tracks;
-  if (!request.tracks.empty()) {
-    tracks = std::make_unique<TrackReader>(request.tracks, track_counters, track_warnings);
+  if (!facts.tracks.empty()) {
+    steps = checkTracks(facts.tracks, source->rig(), request.mono).frames;
+    tracks = std::make_unique<TrackReader>(facts.tracks);
   }
 
   RunRecorder recorder(request.out, request.imu_rate);
@@ -79,7 +93,7 @@ ReplayResult runReplay(const ReplayRequest& request, Settings settings) {
   if (request.map) wiring->keepForMap();
   memory.note("estimator_at_start");
 
-  Progress progress("replay", request.show_progress ? source->imageCount() : 0);
+  Progress progress("replay", request.show_progress ? steps : 0);
   ReplayPlan plan;
   plan.from = request.from;
   plan.until = request.until;
@@ -88,9 +102,6 @@ ReplayResult runReplay(const ReplayRequest& request, Settings settings) {
   plan.stop = request.stop;
   plan.progress = [&](std::uint64_t images) { progress.update(images); };
 
-  RunFacts facts;
-  facts.log = request.log;
-  facts.tracks = request.tracks;
   facts.mono = !settings.odometry.use_stereo || source->rig().camera_count < 2;
   const double wall = wallSeconds();
   const double cpu = processCpuSeconds();
@@ -103,7 +114,11 @@ ReplayResult runReplay(const ReplayRequest& request, Settings settings) {
   facts.peak_resident = peakResidentBytes();
   writeMap(out / "map.tum", wiring->solveMap());
   printWarnings(*source, warned);
-  for (const std::string& line : track_warnings.lines()) fmt::print(stderr, "warning: {}\n", line);
+  if (tracks) {
+    facts.track_surplus = tracks->surplus();
+    facts.track_warnings = tracks->warnings();
+    for (const std::string& line : facts.track_warnings) fmt::print(stderr, "warning: {}\n", line);
+  }
 
   ReplayResult result;
   result.finished = facts.finished;

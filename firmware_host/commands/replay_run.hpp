@@ -18,7 +18,7 @@ struct ReplayRequest {
   std::string out;
   std::string calibration;      ///< instead of the log's own; empty: the log's
   std::string imu_calibration;  ///< Kalibr's IMU file where it is not beside the camchain
-  std::string tracks;           ///< file of feature tracks that take the images' place
+  std::string tracks;           ///< file of feature tracks in place of the log's images or own tracks
   bool mono = false;
   bool imu_rate = false;
   bool map = true;              ///< full smoothing after the run, into map.tum

@@ -1,10 +1,12 @@
 #include <fmt/format.h>
 
-#include <map>
+#include <filesystem>
 #include <memory>
 
 #include "drivers/calibration/input_error.hpp"
+#include "drivers/recorded/track_file.hpp"
 #include "drivers/simulated/folder_writer.hpp"
+#include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/report/progress.hpp"
 
@@ -28,12 +30,29 @@ void addFault(std::vector<Fault>& faults, FaultKind kind, const std::vector<doub
   if (span.size() == 2) faults.push_back({kind, {span[0], span[0] + span[1]}, camera});
 }
 
+Status simulateTracks(const SimulationSettings& settings, const std::string& folder,
+                      const SimulationProgress& progress, std::string& message) {
+  const std::filesystem::path place = std::filesystem::path(folder) / "mav0" / "tracks0";
+  std::unique_ptr<TrackWriter> writer;
+  const Status status = simulateTracksToFolder(
+      settings, folder,
+      [&](const TrackedFrame& frame) {
+        if (!writer) {
+          std::filesystem::create_directories(place);
+          writer = std::make_unique<TrackWriter>((place / "data.csv").string());
+        }
+        writer->write(frame);
+      },
+      progress, &message);
+  if (writer) writer->close();
+  return status;
+}
+
 int simulate(const SimulateOptions& options) {
   static_cast<void>(options.settings.read());  // complains about wrong settings as every command does
   SimulationSettings settings = options.simulation;
   settings.imu.vibration.accel_amplitude = options.vibration;
   settings.image_stamp_offset = Duration::fromSeconds(options.stamp_offset_ms * 1e-3);
-  settings.output = options.tracks ? SimulatedOutput::kTracks : SimulatedOutput::kImages;
   settings.format = options.png ? ImageFormat::kPng : ImageFormat::kJpeg;
   addFault(settings.faults, FaultKind::kBlackout, options.blackout, -1);
   addFault(settings.faults, FaultKind::kCameraMissing, options.camera_missing, 1);
@@ -41,13 +60,12 @@ int simulate(const SimulateOptions& options) {
 
   std::unique_ptr<Progress> progress;
   std::string message;
-  const Status status = simulateToFolder(
-      settings, options.out,
-      [&](int done, int total) {
-        if (!progress) progress = std::make_unique<Progress>("simulate", static_cast<std::uint64_t>(total));
-        progress->update(static_cast<std::uint64_t>(done));
-      },
-      &message);
+  const SimulationProgress show = [&](int done, int total) {
+    if (!progress) progress = std::make_unique<Progress>("simulate", static_cast<std::uint64_t>(total));
+    progress->update(static_cast<std::uint64_t>(done));
+  };
+  const Status status = options.tracks ? simulateTracks(settings, options.out, show, message)
+                                       : simulateToFolder(settings, options.out, show, &message);
   if (progress) progress->finish();
   if (!status.ok()) {
     throw InputError("simulate", 0, "", message.empty() ? status.what : message,
@@ -58,35 +76,30 @@ int simulate(const SimulateOptions& options) {
 }
 
 void addFlightOptions(CLI::App& command, SimulationSettings& s) {
-  const std::map<std::string, WorldKind> worlds = {{"room", WorldKind::kRoom},
-                                                   {"hall", WorldKind::kHall},
-                                                   {"cluttered", WorldKind::kCluttered},
-                                                   {"twin_rooms", WorldKind::kTwinRooms},
-                                                   {"corridor", WorldKind::kCorridor}};
-  const std::map<std::string, RigKind> rigs = {{"euroc", RigKind::kEuroc},
-                                               {"forward", RigKind::kForward},
-                                               {"wide", RigKind::kWide},
-                                               {"fisheye", RigKind::kFisheye}};
   command.add_option("--duration", s.flight.duration, "Length of the flight [s]")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->capture_default_str();
   command.add_option("--seed", s.seed, "Of everything random: same seed, same bytes")->capture_default_str();
-  command.add_option("--world", s.world.kind, "Where to fly (default room)")
-      ->transform(CLI::CheckedTransformer(worlds, CLI::ignore_case));
-  command.add_option("--rig", s.rig, "Cameras and IMU (default euroc)")
-      ->transform(CLI::CheckedTransformer(rigs, CLI::ignore_case));
-  command.add_option("--speed", s.flight.speed, "Mean speed [m/s]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+  addChoice<WorldKind>(command, "--world", s.world.kind, "Where to fly",
+                       {{"room", WorldKind::kRoom},
+                        {"hall", WorldKind::kHall},
+                        {"cluttered", WorldKind::kCluttered},
+                        {"twin_rooms", WorldKind::kTwinRooms},
+                        {"corridor", WorldKind::kCorridor}});
+  addChoice<RigKind>(command, "--rig", s.rig, "Cameras and IMU",
+                     {{"euroc", RigKind::kEuroc},
+                      {"forward", RigKind::kForward},
+                      {"wide", RigKind::kWide},
+                      {"fisheye", RigKind::kFisheye}});
+  command.add_option("--speed", s.flight.speed, "Mean speed [m/s]")->check(positive())->capture_default_str();
   command.add_option("--aggressiveness", s.flight.aggressiveness, "0 calm, 1 usual, 2 fast")
-      ->check(CLI::Range(0.0, 4.0))
+      ->check(range(0.0, 4.0))
       ->capture_default_str();
   command.add_option("--rest-at-start", s.flight.rest_at_start, "At rest before the flight [s]")
-      ->check(CLI::NonNegativeNumber)
+      ->check(nonNegative())
       ->capture_default_str();
   command.add_option("--motion", s.given_motion, "EuRoC ground truth to fly (data.csv or data.csv.xz)");
-  command.add_option("--motion-skip", s.motion_skip, "Leave out its first seconds [s]")
-      ->check(CLI::NonNegativeNumber);
+  command.add_option("--motion-skip", s.motion_skip, "Leave out its first seconds [s]")->check(nonNegative());
 }
 
 }  // namespace
@@ -98,25 +111,25 @@ void addSimulateCommand(CLI::App& app, int& exit_code) {
   command->add_option("--out", options->out, "Folder to write")->capture_default_str();
   addFlightOptions(*command, simulation);
   command->add_option("--rate", simulation.camera_rate, "Images a second [Hz]")
-      ->check(CLI::Range(1.0, 200.0))
+      ->check(range(1.0, 200.0))
       ->capture_default_str();
   command->add_flag("--mono", simulation.mono, "Camera 0 alone");
   command->add_flag("--low-light", simulation.low_light, "A dim room: 5 % of the light, longer exposure");
   command->add_flag("--png", options->png, "PNG images in place of JPEG");
-  command->add_flag("--tracks", options->tracks, "Feature tracks in place of images");
+  command->add_flag("--tracks", options->tracks, "Feature tracks in place of images, depth and labels");
   command
       ->add_option("--depth-every", simulation.depth_every, "Depth and labels at every n-th image; 0: none")
-      ->check(CLI::NonNegativeNumber)
+      ->check(nonNegative())
       ->capture_default_str();
   command->add_option("--vibration", options->vibration, "Motor vibration, 80 to 150 Hz [m/s^2]")
-      ->check(CLI::NonNegativeNumber);
+      ->check(nonNegative());
   command->add_option("--stamp-offset", options->stamp_offset_ms, "Added to the image stamps [ms]");
   command->add_option("--blackout", options->blackout, "Dark images: START SECONDS")->expected(2);
   command->add_option("--camera-missing", options->camera_missing, "No images of camera 1: START SECONDS")
       ->expected(2);
   command->add_option("--imu-gap", options->imu_gap, "No IMU samples: START SECONDS")->expected(2);
   command->add_option("--threads", simulation.threads, "Threads that render")
-      ->check(CLI::Range(1, 64))
+      ->check(range(1, 64))
       ->capture_default_str();
   options->settings.addTo(*command);
   command->footer(

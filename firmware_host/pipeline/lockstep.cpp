@@ -42,15 +42,17 @@ class Section {
 bool runLockstep(LogSource& source, Wiring& wiring, const ReplayPlan& plan) {
   Section section(plan);
   TrackFeeder tracks(plan.tracks);
+  std::uint64_t taken = 0;
   const auto pass_tracks_before = [&](Stamp stamp) {
     while (const TrackedFrame* frame = tracks.dueBefore(stamp)) {
       section.noteImage(frame->stamp);
       if (!section.isPast(frame->stamp) && section.wantsImage(frame->stamp)) wiring.feedTracks(*frame);
       tracks.take();
+      ++taken;
+      if (plan.progress) plan.progress(taken);
     }
   };
   SensorMessage message;
-  std::uint64_t images = 0;
   bool stopped = false;
   while (true) {
     stopped = plan.stop != nullptr && plan.stop->load(std::memory_order_relaxed);
@@ -66,13 +68,11 @@ bool runLockstep(LogSource& source, Wiring& wiring, const ReplayPlan& plan) {
     }
     const auto& frame = std::get<CameraFrame>(message);
     addTime(wiring.statistics().times, StageId::kSource, reading);
-    if (plan.tracks == nullptr) {
-      section.noteImage(frame.stamp);
-      if (section.isPast(frame.stamp)) break;
-      if (section.wantsImage(frame.stamp)) wiring.feedImage(frame);
-    }
-    ++images;
-    if (plan.progress) plan.progress(images);
+    section.noteImage(frame.stamp);
+    if (section.isPast(frame.stamp)) break;
+    if (section.wantsImage(frame.stamp)) wiring.feedImage(frame);
+    ++taken;
+    if (plan.progress) plan.progress(taken);
   }
   if (!stopped) pass_tracks_before(kEndOfTime);
   wiring.finish();

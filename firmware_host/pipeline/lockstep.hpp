@@ -16,9 +16,10 @@ struct ReplayPlan {
   double from = 0;                          ///< s after the log's first image
   std::optional<double> until;              ///< s after the log's first image; images up to and including it
   std::optional<Stamp> last_stamp;          ///< the same as a stamp: nothing later is fed
-  TrackReader* tracks = nullptr;            ///< feature tracks that take the images' place
+  TrackReader* tracks = nullptr;            ///< in place of images, which the source must not deliver then
   const std::atomic<bool>* stop = nullptr;  ///< set: end cleanly after the current message
-  std::function<void(std::uint64_t)> progress;  ///< called with the number of images taken so far
+  /// Called with the number of images, or frames of tracks, taken so far.
+  std::function<void(std::uint64_t)> progress;
 };
 
 /// Runs to the end of the log (or the plan) and finishes the wiring. False when it was stopped.

@@ -36,29 +36,17 @@ const TrackedFrame* TrackFeeder::dueBefore(Stamp stamp) {
 }
 
 bool TrackFeeder::read() {
-  if (!reader_->next(record_)) {
+  if (!reader_->next(frame_)) {
     reader_ = nullptr;
     return false;
   }
-  frame_.stamp = record_.stamp;
-  frame_.index = next_index_++;
-  frame_.camera_present = {};
-  frame_.features.clear();
   Pixels now;
-  for (const TrackedFeature& feature : record_.features) {
-    if (!frame_.features.tryPushBack(feature)) {
-      ++surplus_;
-      continue;
-    }
-    for (std::size_t camera = kMaxCameras; camera-- > 0;) {
-      if (!feature.seen[camera]) continue;
-      frame_.camera_present[camera] = true;
-      now[feature.id] = feature.pixel[camera];
-    }
+  for (const TrackedFeature& feature : frame_.features) {
+    now[feature.id] = feature.pixel[feature.seen[0] ? 0 : 1];
   }
   std::size_t common = 0;
   frame_.median_motion = medianMotion(previous_, now, common);
-  chooseKeyframe(now);
+  if (!reader_->hasKeyframes()) chooseKeyframe(now);
   previous_ = std::move(now);
   ready_ = true;
   return true;

@@ -1,6 +1,6 @@
 #pragma once
-// Feature tracks from a file as the front-end would hand them over: with keyframes chosen, and the
-// median motion since the previous frame.
+// Feature tracks from a file as the front-end would hand them over: with keyframes chosen where the file
+// does not say which frames they are, and the median motion since the previous frame.
 //
 // Keyframe rule (the front-end's, on raw pixels): the first frame; then, not before 0.14 s, when less
 // than 0.7 of the last keyframe's tracks are left or their median motion passes 20 px (rotation is not
@@ -22,9 +22,6 @@ class TrackFeeder {
   const TrackedFrame* dueBefore(Stamp stamp);
   void take() { ready_ = false; }
 
-  /// Sightings beyond kMaxFeatures in a frame, left out.
-  [[nodiscard]] std::uint64_t surplus() const { return surplus_; }
-
  private:
   using Pixels = std::map<TrackId, Eigen::Vector2f>;  ///< in camera 0, else camera 1
 
@@ -32,11 +29,8 @@ class TrackFeeder {
   void chooseKeyframe(const Pixels& now);
 
   TrackReader* reader_;
-  TrackRecord record_;
   TrackedFrame frame_;
   bool ready_ = false;
-  std::uint64_t next_index_ = 0;
-  std::uint64_t surplus_ = 0;
   Pixels previous_;
   Pixels keyframe_;
   Stamp keyframe_stamp_;

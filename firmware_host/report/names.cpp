@@ -26,8 +26,6 @@ std::string_view eventName(EventKind kind) {
       return "imu_invalid";
     case EventKind::kFrameDropped:
       return "frame_dropped";
-    case EventKind::kFrameUnpaired:
-      return "frame_unpaired";
     case EventKind::kCameraLost:
       return "camera_lost";
     case EventKind::kCameraBack:

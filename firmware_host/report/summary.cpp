@@ -43,7 +43,7 @@ Json healthJson(const RunStatistics& statistics) {
   return history;
 }
 
-Json countersJson(const LogSource& source, const RunStatistics& statistics) {
+Json countersJson(const RunFacts& facts, const LogSource& source, const RunStatistics& statistics) {
   const LogCounters& log = source.counters();
   Json json;
   json["log"] = {{"imu_samples", log.imu_samples},
@@ -54,6 +54,7 @@ Json countersJson(const LogSource& source, const RunStatistics& statistics) {
                  {"repeated_stamps", log.repeated_stamps},
                  {"missing_images", log.missing_images},
                  {"damaged_images", log.damaged_images}};
+  if (!facts.tracks.empty()) json["tracks"] = {{"surplus", facts.track_surplus}};
   json["pairing"] = {{"images", statistics.images},
                      {"pairs", statistics.pairing.pairs},
                      {"unpaired", statistics.pairing.unpaired},
@@ -158,8 +159,9 @@ Json summaryOf(const RunFacts& facts, const Settings& settings, const LogSource&
   json["calibration"] = source.calibration().form;
   json["settings"] = settingsJson(settings);
   json["health"] = healthJson(statistics);
-  json["counters"] = countersJson(source, statistics);
+  json["counters"] = countersJson(facts, source, statistics);
   json["warnings"] = source.warnings();
+  for (const std::string& line : facts.track_warnings) json["warnings"].push_back(line);
   json["timing"] = timingJson(statistics.times);
   json["cpu"] = {{"flight_s", flown},
                  {"wall_s", facts.wall},

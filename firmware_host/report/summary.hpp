@@ -22,7 +22,9 @@ struct MemoryRow {
 
 struct RunFacts {
   std::string log;
-  std::string tracks;  ///< file of feature tracks; empty when images were used
+  std::string tracks;               ///< file of feature tracks; empty when images were used
+  std::uint64_t track_surplus = 0;  ///< landmarks beyond kMaxFeatures in a frame, left out
+  std::vector<std::string> track_warnings;
   bool mono = false;
   bool finished = true;  ///< false: stopped by the user
   double wall = 0;       ///< s of the run, reading included

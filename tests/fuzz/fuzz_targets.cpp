@@ -63,16 +63,17 @@ void trajectory(std::string_view text) {
 }
 
 void tracks(std::string_view text) {
-  LogCounters counters;
-  LogWarnings warnings;
   try {
-    TrackReader reader("tracks.csv", text, counters, warnings);
-    TrackRecord record;
+    TrackReader reader("tracks.csv", text);
+    TrackedFrame frame;
     Stamp newest;
-    for (bool first = true; reader.next(record); first = false) {
-      demand(first || newest < record.stamp);
-      newest = record.stamp;
-      for (const TrackedFeature& f : record.features) demand(f.seen[0] || f.seen[1]);
+    for (bool first = true; reader.next(frame); first = false) {
+      demand(first || newest < frame.stamp);
+      newest = frame.stamp;
+      for (const TrackedFeature& f : frame.features) {
+        demand(f.seen[0] || f.seen[1]);
+        demand(f.pixel[0].allFinite() && f.pixel[1].allFinite());
+      }
     }
   } catch (const InputError&) {
   }

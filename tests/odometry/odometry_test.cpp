@@ -1,1 +1,196 @@
+// The odometry stage on simulated tracks: states, epochs, health and events, with every fault a flight
+// may bring. Statistics over many flights: flight_statistics.
+
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
+#include <set>
+
+#include "estimator/geometry/alignment.hpp"
+#include "tests/odometry/odometry_run.hpp"
+
+using namespace swiftlet;
+using test::OdometryRun;
+using test::RunFrame;
+using test::TrackFlight;
+
+namespace {
+
+double ate(const OdometryRun& run) {
+  std::vector<Eigen::Vector3d> estimate;
+  std::vector<Eigen::Vector3d> truth;
+  for (const RunFrame& f : run.frames) {
+    if (!f.has_state) continue;
+    estimate.push_back(f.state.T_world_body.translation);
+    truth.push_back(f.truth.T_world_body.translation);
+  }
+  Alignment alignment;
+  REQUIRE(alignRigid(estimate, truth, alignment).ok());
+  return alignment.rms;
+}
+
+int count(const OdometryRun& run, EventKind kind) {
+  return static_cast<int>(
+      std::count_if(run.events.begin(), run.events.end(), [&](const Event& e) { return e.kind == kind; }));
+}
+
+std::set<Health> healthBetween(const TrackFlight& flight, const OdometryRun& run, double begin, double end) {
+  std::set<Health> seen;
+  for (const RunFrame& f : run.frames) {
+    const double t = flight.seconds(f.index);
+    if (t >= begin && t < end) seen.insert(f.state.health);
+  }
+  return seen;
+}
+
+SimulationSettings withFault(const SimulationSettings& settings, const Fault& fault) {
+  SimulationSettings result = settings;
+  result.faults.push_back(fault);
+  return result;
+}
+
+}  // namespace
+
+TEST_CASE("Odometry: every frame has a state, the first at once", "[odometry]") {
+  const TrackFlight flight(test::roomFlight(12, 21));
+  const OdometryRun run = test::runOdometry(flight, OdometrySettings{});
+  for (const RunFrame& f : run.frames) REQUIRE(f.has_state);
+  CHECK(ate(run) < 0.05);
+  CHECK(run.frames.back().state.health == Health::kGood);
+  CHECK(run.frames.back().state.epoch == 0);
+  CHECK(count(run, EventKind::kInitialized) == 1);
+  CHECK(count(run, EventKind::kReset) == 0);
+  CHECK(count(run, EventKind::kCapacityReached) == 0);
+}
+
+TEST_CASE("Odometry: one camera starts within 3 s and says what it waits for", "[odometry]") {
+  const TrackFlight flight(test::roomFlight(15, 22));
+  Odometry odometry(flight.rig(), flight.noise(), test::settingsFor(flight, false));
+  auto output = std::make_unique<OdometryOutput>();
+  double first = -1;
+  bool silent = false;
+  flight.play([&](const ImuSample& sample) { static_cast<void>(odometry.addImu(sample)); },
+              [&](std::size_t k) {
+                static_cast<void>(odometry.smooth(flight.frames()[k], Effort{}, *output));
+                if (output->has_state && first < 0) first = flight.seconds(k) - flight.seconds(0);
+                if (!output->has_state && output->waiting_for[0] == '\0') silent = true;
+              });
+  CHECK_FALSE(silent);
+  CHECK(first >= 0);
+  CHECK(first <= 3.0);
+}
+
+TEST_CASE("Odometry: a reset in flight starts a new epoch and loses no keyframe", "[odometry]") {
+  const TrackFlight flight(test::roomFlight(12, 23));
+  Odometry odometry(flight.rig(), flight.noise(), OdometrySettings{});
+  auto output = std::make_unique<OdometryOutput>();
+  constexpr std::size_t kResetAt = 120;
+  std::vector<std::uint32_t> epochs;
+  std::vector<std::int64_t> delivered;
+  std::size_t keyframes = 0;
+  const auto take = [&] {
+    for (const KeyframeState& keyframe : output->left_window) {
+      delivered.push_back(keyframe.state.stamp.ns);
+      CHECK(keyframe.state.epoch ==
+            (keyframe.state.stamp < flight.frames()[kResetAt].stamp ? 0U : 1U));
+    }
+  };
+  flight.play([&](const ImuSample& sample) { static_cast<void>(odometry.addImu(sample)); },
+              [&](std::size_t k) {
+                if (k == kResetAt) odometry.reset();
+                REQUIRE(odometry.smooth(flight.frames()[k], Effort{}, *output).ok());
+                REQUIRE(output->has_state);
+                epochs.push_back(output->state.epoch);
+                keyframes += flight.frames()[k].keyframe || k == 0 || k == kResetAt ? 1 : 0;
+                take();
+              });
+  odometry.finish(*output);
+  take();
+  CHECK(epochs.front() == 0);
+  CHECK(epochs[kResetAt - 1] == 0);
+  CHECK(epochs[kResetAt] == 1);
+  CHECK(epochs.back() == 1);
+  CHECK(std::set<std::int64_t>(delivered.begin(), delivered.end()).size() == delivered.size());
+  CHECK(delivered.size() == keyframes);
+}
+
+TEST_CASE("Odometry: one camera lost is degraded, not reset, and taken back", "[odometry][fault]") {
+  for (const int camera : {0, 1}) {
+    INFO("camera " << camera);
+    const TrackFlight flight(
+        withFault(test::roomFlight(14, 24), {FaultKind::kCameraMissing, {5, 10}, camera}));
+    const OdometryRun run = test::runOdometry(flight, OdometrySettings{});
+    CHECK(healthBetween(flight, run, 5, 10) == std::set{Health::kDegraded});
+    CHECK(healthBetween(flight, run, 10.5, 14) == std::set{Health::kGood});
+    CHECK(count(run, EventKind::kCameraLost) == 1);
+    CHECK(count(run, EventKind::kCameraBack) == 1);
+    CHECK(run.frames.back().state.epoch == 0);
+    CHECK(ate(run) < 0.05);
+  }
+}
+
+TEST_CASE("Odometry: dark for 2 s it coasts, for 4 s it says failed; both end well", "[odometry][fault]") {
+  for (const double dark : {2.0, 4.0}) {
+    INFO("dark for " << dark << " s");
+    const TrackFlight flight(
+        withFault(test::roomFlight(16, 25), {FaultKind::kBlackout, {8, 8 + dark}, -1}));
+    const OdometryRun run = test::runOdometry(flight, OdometrySettings{});
+    CHECK(healthBetween(flight, run, 8.5, 8 + std::min(dark, 2.9)) == std::set{Health::kDegraded});
+    if (dark > 3) CHECK(healthBetween(flight, run, 11.2, 8 + dark) == std::set{Health::kFailed});
+    CHECK(healthBetween(flight, run, 8 + dark + 1, 16).count(Health::kFailed) == 0);
+    CHECK(run.frames.back().state.health == Health::kGood);
+    CHECK(count(run, EventKind::kBlackoutStarted) == 1);
+    CHECK(count(run, EventKind::kBlackoutEnded) == 1);
+    CHECK(ate(run) < 0.25);
+  }
+}
+
+TEST_CASE("Odometry: an IMU gap of 1 s is told, degrades, and is recovered from", "[odometry][fault]") {
+  const TrackFlight flight(withFault(test::roomFlight(14, 26), {FaultKind::kImuGap, {6, 7}, -1}));
+  const OdometryRun run = test::runOdometry(flight, OdometrySettings{});
+  CHECK(count(run, EventKind::kImuGap) == 1);
+  CHECK(healthBetween(flight, run, 6.2, 7.0) == std::set{Health::kDegraded});
+  CHECK(healthBetween(flight, run, 7.2, 14) == std::set{Health::kGood});
+  CHECK(ate(run) < 0.1);
+}
+
+TEST_CASE("Odometry: samples that are not finite or go back are dropped and told", "[odometry][fault]") {
+  const TrackFlight flight(test::roomFlight(6, 27));
+  Odometry odometry(flight.rig(), flight.noise(), OdometrySettings{});
+  auto output = std::make_unique<OdometryOutput>();
+  int told = 0;
+  int given = 0;
+  ImuSample previous;
+  flight.play(
+      [&](const ImuSample& sample) {
+        static_cast<void>(odometry.addImu(sample));
+        if (++given % 200 == 100) {
+          ImuSample bad = sample;
+          bad.stamp = sample.stamp + Duration::fromMilliseconds(1);
+          bad.gyro.x() = std::nan("");
+          CHECK_FALSE(odometry.addImu(bad).ok());
+          CHECK_FALSE(odometry.addImu(previous).ok());
+        }
+        previous = sample;
+      },
+      [&](std::size_t k) {
+        REQUIRE(odometry.smooth(flight.frames()[k], Effort{}, *output).ok());
+        REQUIRE(output->state.T_world_body.translation.allFinite());
+        for (const Event& e : output->events) told += e.kind == EventKind::kImuInvalid ? 1 : 0;
+      });
+  CHECK(told >= 2 * (given / 200) - 2);
+  CHECK(output->state.health == Health::kGood);
+}
+
+TEST_CASE("Odometry: finds a time offset of 5 ms either way", "[odometry][calibration]") {
+  for (const double sign : {1.0, -1.0}) {
+    SimulationSettings settings = test::roomFlight(25, 28);
+    settings.flight.aggressiveness = 1.5;
+    settings.image_stamp_offset = Duration::fromSeconds(sign * 5e-3);
+    const TrackFlight flight(settings);
+    OdometrySettings with = test::settingsFor(flight);
+    with.estimate_time_offset = true;
+    const OdometryRun run = test::runOdometry(flight, with);
+    CHECK(run.frames.back().calibration.camera_to_imu_shift.seconds() == Approx(-sign * 5e-3).margin(3e-4));
+  }
+}

@@ -52,7 +52,6 @@ SimulationSettings roomFlight(double duration, std::uint64_t seed) {
   SimulationSettings settings;
   settings.seed = seed;
   settings.flight.duration = duration;
-  settings.output = SimulatedOutput::kTracks;
   return settings;
 }
 

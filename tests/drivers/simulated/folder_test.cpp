@@ -127,11 +127,39 @@ TEST_CASE("faults, offsets and turned extrinsics are written as asked") {
 
 TEST_CASE("tracks are written without rendering") {
   SimulationSettings settings = shortFlight();
-  settings.output = SimulatedOutput::kTracks;
+  settings.faults = {{FaultKind::kBlackout, {0.18, 0.22}, -1}, {FaultKind::kCameraMissing, {0.38, 0.42}, -1}};
   const TemporaryFolder folder("simulated_tracks");
-  REQUIRE(simulateToFolder(settings, folder.path()).ok());
-  CHECK(rowsOf(folder.path() / "mav0/tracks0/data.csv").size() > 11 * 100);
+  std::vector<TrackedFrame> frames;
+  int progress = 0;
+  REQUIRE(simulateTracksToFolder(
+              settings, folder.path(), [&](const TrackedFrame& frame) { frames.push_back(frame); },
+              [&](int done, int) { progress = done; })
+              .ok());
+  CHECK(progress == 11);
+  // Without any image there is no frame; dark images make a frame that saw nothing.
+  REQUIRE(frames.size() == 10);
+  std::size_t dark = 0;
+  for (const TrackedFrame& frame : frames) {
+    dark += frame.features.empty() ? 1 : 0;
+    CHECK(frame.camera_present[0] == !frame.features.empty());
+    if (!frame.features.empty()) CHECK(frame.features.size() > 100);
+  }
+  CHECK(dark == 1);
+  CHECK(frames.front().stamp.ns == 1700000000100000000);
+  CHECK(fs::exists(folder.path() / "mav0/cam0/sensor.yaml"));
   CHECK_FALSE(fs::exists(folder.path() / "mav0/cam0/data"));
+}
+
+TEST_CASE("tracks do not go into a folder with another flight's images") {
+  const TemporaryFolder folder("simulated_mixed");
+  fs::create_directories(folder.path() / "mav0/cam0");
+  std::ofstream(folder.path() / "mav0/cam0/data.csv") << "#timestamp [ns],filename\n";
+  std::string message;
+  const auto sink = [](const TrackedFrame&) {};
+  const Status status = simulateTracksToFolder(shortFlight(), folder.path(), sink, {}, &message);
+  CHECK(status.code == StatusCode::kFailed);
+  CHECK(message.find("cam0/data.csv") != std::string::npos);
+  CHECK_FALSE(fs::exists(folder.path() / "mav0/imu0"));
 }
 
 TEST_CASE("bad settings and unwritable folders are said by name") {

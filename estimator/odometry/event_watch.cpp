@@ -1,0 +1,72 @@
+#include "estimator/odometry/event_watch.hpp"
+
+#include "estimator/odometry/health_monitor.hpp"
+
+namespace swiftlet {
+
+void EventBuffer::raise(Stamp stamp, EventKind kind, double value) {
+  if (events_.size() + 1 < events_.capacity()) {
+    static_cast<void>(events_.tryPushBack({stamp, kind, value}));
+    return;
+  }
+  ++lost_;
+  if (events_.full()) events_.popBack();
+  static_cast<void>(events_.tryPushBack({stamp, EventKind::kCapacityReached, static_cast<double>(lost_)}));
+}
+
+void EventBuffer::flush(OdometryOutput& output) {
+  output.events = events_;
+  events_.clear();
+  lost_ = 0;
+}
+
+void EventWatch::reset() {
+  any_ = false;
+  initialized_ = false;
+  dark_ = false;
+  health_ = Health::kInitializing;
+}
+
+void EventWatch::step(const Frame& frame, EventBuffer& events) {
+  if (!any_) first_ = frame.stamp;
+  any_ = true;
+  if (frame.health != health_) {
+    events.raise(frame.stamp, EventKind::kHealthChanged, static_cast<double>(frame.health));
+  }
+  health_ = frame.health;
+  if (!initialized_ && frame.health != Health::kInitializing) {
+    initialized_ = true;
+    events.raise(frame.stamp, EventKind::kInitialized, (frame.stamp - first_).seconds());
+  }
+  if (frame.at_rest != at_rest_) {
+    events.raise(frame.stamp, frame.at_rest ? EventKind::kRestStarted : EventKind::kRestEnded, 0);
+  }
+  at_rest_ = frame.at_rest;
+  watchCameras(frame, events);
+  watchBlackout(frame, events);
+}
+
+void EventWatch::watchCameras(const Frame& frame, EventBuffer& events) {
+  for (std::size_t c = 0; c < frame.cameras; ++c) {
+    if (!frame.camera_present[c]) {
+      if (++missing_[c] == kLostAfter) events.raise(frame.stamp, EventKind::kCameraLost, static_cast<double>(c));
+      continue;
+    }
+    if (missing_[c] >= kLostAfter) events.raise(frame.stamp, EventKind::kCameraBack, static_cast<double>(c));
+    missing_[c] = 0;
+  }
+}
+
+void EventWatch::watchBlackout(const Frame& frame, EventBuffer& events) {
+  const bool dark = frame.seconds_without_image > HealthMonitor::kGoodAge;
+  if (dark && !dark_) {
+    dark_since_ = frame.stamp - Duration::fromSeconds(frame.seconds_without_image);
+    events.raise(frame.stamp, EventKind::kBlackoutStarted, frame.seconds_without_image);
+  }
+  if (!dark && dark_) {
+    events.raise(frame.stamp, EventKind::kBlackoutEnded, (frame.stamp - dark_since_).seconds());
+  }
+  dark_ = dark;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,57 @@
+#pragma once
+// Turns what changes from frame to frame into events, and holds events until an output takes them.
+//
+// An output has room for 32 events. Further ones are counted, and the last place then holds
+// kCapacityReached with their number. No other memory; O(1) a frame.
+
+#include <array>
+
+#include "estimator/messages/nav_state.hpp"
+#include "estimator/messages/odometry_output.hpp"
+#include "estimator/messages/tracked_frame.hpp"
+
+namespace swiftlet {
+
+class EventBuffer {
+ public:
+  void raise(Stamp stamp, EventKind kind, double value);
+  /// Moves the events to `output`.
+  void flush(OdometryOutput& output);
+
+ private:
+  FixedVector<Event, 32> events_;
+  int lost_ = 0;
+};
+
+class EventWatch {
+ public:
+  /// A new epoch: nothing seen so far. Cameras and rest go on as they were.
+  void reset();
+
+  struct Frame {
+    Stamp stamp;
+    std::array<bool, kMaxCameras> camera_present{};
+    std::size_t cameras = 1;  ///< of the rig
+    bool at_rest = false;
+    Health health = Health::kInitializing;
+    double seconds_without_image = 0;
+  };
+  void step(const Frame& frame, EventBuffer& events);
+
+ private:
+  void watchCameras(const Frame& frame, EventBuffer& events);
+  void watchBlackout(const Frame& frame, EventBuffer& events);
+
+  /// One missed image happens on a busy bus; three running are a fault (as in Pairing).
+  static constexpr int kLostAfter = 3;
+  bool any_ = false;
+  Stamp first_;  ///< frame of the epoch
+  bool initialized_ = false;
+  bool at_rest_ = false;
+  bool dark_ = false;
+  Stamp dark_since_;
+  Health health_ = Health::kInitializing;
+  std::array<int, kMaxCameras> missing_{};
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,65 @@
+#pragma once
+// Checks of option values that read well in `--help`: CLI11's own print the mapped enumerators and
+// 300-digit bounds.
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace swiftlet {
+
+/// `holds` decides on the number; `what` says which numbers are taken, in help and messages.
+inline CLI::Validator numberCheck(const std::string& what, std::function<bool(double)> holds) {
+  const auto check = [what, holds = std::move(holds)](std::string& text) {
+    double value = 0;
+    const bool good = CLI::detail::lexical_cast(text, value) && std::isfinite(value) && holds(value);
+    return good ? std::string() : "`" + text + "` is not a number " + what;
+  };
+  return CLI::Validator(check, what);
+}
+
+inline CLI::Validator nonNegative() {
+  return numberCheck("from 0", [](double value) { return value >= 0; });
+}
+
+inline CLI::Validator positive() {
+  return numberCheck("above 0", [](double value) { return value > 0; });
+}
+
+inline CLI::Validator range(double least, double most) {
+  const auto text = [](double value) { return CLI::detail::to_string(value); };
+  return numberCheck("from " + text(least) + " to " + text(most),
+                     [least, most](double value) { return value >= least && value <= most; });
+}
+
+/// An option whose value is one of the given names, upper or lower case; help lists the names and the
+/// default, which is what `value` holds.
+template <typename Enum>
+void addChoice(CLI::App& command, const std::string& option, Enum& value, const std::string& help,
+               const std::vector<std::pair<std::string, Enum>>& choices) {
+  std::string names;
+  std::string chosen;
+  for (const auto& [name, kind] : choices) {
+    names += (names.empty() ? "" : "|") + name;
+    if (kind == value) chosen = name;
+  }
+  const auto set = [choices, names, option, &value](const std::string& text) {
+    std::string lower = text;
+    std::transform(lower.begin(), lower.end(), lower.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    for (const auto& [name, kind] : choices) {
+      if (name != lower) continue;
+      value = kind;
+      return;
+    }
+    throw CLI::ValidationError(option, "`" + text + "` is none of " + names);
+  };
+  command.add_option_function<std::string>(option, set, help)->type_name(names)->default_str(chosen);
+}
+
+}  // namespace swiftlet

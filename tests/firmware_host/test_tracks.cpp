@@ -1,0 +1,158 @@
+// Feature tracks through the whole program, and what the feeder adds to them.
+
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "drivers/recorded/track_file.hpp"
+#include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/replay_run.hpp"
+#include "firmware_host/pipeline/track_feeder.hpp"
+#include "tests/firmware_host/scratch_folder.hpp"
+
+namespace swiftlet {
+namespace {
+
+namespace fs = std::filesystem;
+
+int run(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "swiftlet");
+  std::vector<char*> pointers;
+  for (std::string& argument : arguments) pointers.push_back(argument.data());
+  return runProgram(static_cast<int>(pointers.size()), pointers.data());
+}
+
+std::string textOf(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+nlohmann::json summaryIn(const std::string& folder) {
+  return nlohmann::json::parse(textOf(fs::path(folder) / "summary.json"));
+}
+
+TEST_CASE("simulated tracks replay and evaluate from end to end") {
+  const ScratchFolder folder("tracks");
+  const std::string flight = folder.file("flight");
+  const std::string first = folder.file("run");
+  REQUIRE(run({"simulate", "--tracks", "--duration", "5", "--seed", "7", "--out", flight}) == kExitDone);
+  REQUIRE(run({"replay", flight, "--out", first}) == kExitDone);
+  CHECK(run({"evaluate", first}) == kExitDone);
+  const auto summary = summaryIn(first);
+  CHECK(summary["run"]["tracks"] == (fs::path(flight) / "mav0/tracks0/data.csv").string());
+  CHECK(summary["run"]["cameras"] == 2);
+  CHECK(summary["counters"]["odometry"]["frames"] == 98);  // 20 Hz from 0.1 s on
+  CHECK(summary["counters"]["tracks"]["surplus"] == 0);
+  CHECK(summary["run"]["tracking_coverage"].get<double>() > 0.9);
+  // Half a pixel of noise over a few metres of path: millimetres to centimetres.
+  const double ate = summary["accuracy"]["odometry"]["all"]["se3"]["ate_m"]["rmse"].get<double>();
+  CHECK(ate > 0);
+  CHECK(ate < 0.05);
+
+  SECTION("a file given overrides the folder's own, with the same bytes as a result") {
+    const std::string moved = folder.file("moved.csv");
+    fs::rename(fs::path(flight) / "mav0/tracks0/data.csv", moved);
+    CHECK(run({"replay", flight, "--out", folder.file("none")}) == kExitBadInput);
+    CHECK_FALSE(fs::exists(folder.file("none")));
+    const std::string again = folder.file("again");
+    REQUIRE(run({"replay", flight, "--tracks", moved, "--out", again}) == kExitDone);
+    CHECK(textOf(fs::path(again) / "odometry.tum") == textOf(fs::path(first) / "odometry.tum"));
+    CHECK(run({"evaluate", again}) == kExitDone);
+  }
+  SECTION("one camera") {
+    const std::string mono = folder.file("mono");
+    REQUIRE(run({"replay", flight, "--mono", "--out", mono}) == kExitDone);
+    CHECK(summaryIn(mono)["run"]["cameras"] == 1);
+  }
+  SECTION("a bad file is refused before a run folder is made") {
+    std::ofstream(fs::path(flight) / "mav0/tracks0/data.csv", std::ios::app) << "oops\n";
+    CHECK(run({"replay", flight, "--out", folder.file("none")}) == kExitBadInput);
+    CHECK_FALSE(fs::exists(folder.file("none")));
+  }
+}
+
+TEST_CASE("the run says how many tracks were too many") {
+  const ScratchFolder folder("crowded");
+  const std::string flight = folder.file("flight");
+  REQUIRE(run({"simulate", "--tracks", "--duration", "3", "--out", flight}) == kExitDone);
+  const fs::path file = fs::path(flight) / "mav0/tracks0/data.csv";
+  TrackReader reader(file.string());
+  TrackedFrame frame;
+  std::uint64_t frames = 0;
+  std::string crowd;
+  for (; reader.next(frame); ++frames) {
+    if (frames != 10) continue;
+    for (int i = 0; i < 410; ++i) {
+      crowd += std::to_string(frame.stamp.ns) + "," + std::to_string(1'000'000 + i) + ",0,5,5," +
+               (frame.keyframe ? "1\n" : "0\n");
+    }
+  }
+  // In front of the frame's own lines, which then are the surplus.
+  std::string text = textOf(file);
+  const std::string stamp = "\n" + crowd.substr(0, crowd.find(',') + 1);
+  text.insert(text.find(stamp) + 1, crowd);
+  std::ofstream(file, std::ios::binary) << text;
+  ReplayRequest request;
+  request.log = flight;
+  request.out = folder.file("run");
+  const ReplayResult result = runReplay(request, Settings{});
+  CHECK(result.summary["counters"]["tracks"]["surplus"].get<std::uint64_t>() > 100);
+  bool told = false;
+  for (const auto& line : result.summary["warnings"]) {
+    told = told || line.get<std::string>().find("only the first 400 are used") != std::string::npos;
+  }
+  CHECK(told);
+}
+
+/// Two landmarks that move by `step` px between frames 50 ms apart.
+std::string movingTracks(double step, int frames, bool keyframes) {
+  std::string text = keyframes ? "#timestamp,id,camera,u,v,keyframe\n" : "#timestamp,id,camera,u,v\n";
+  for (int f = 0; f < frames; ++f) {
+    for (const int id : {1, 2}) {
+      text += std::to_string(50'000'000LL * f) + "," + std::to_string(id) + ",0," +
+              std::to_string(10 * id + step * f) + ",5" + (keyframes ? (f == 3 ? ",1\n" : ",0\n") : "\n");
+    }
+  }
+  return text;
+}
+
+std::vector<int> keyframesOf(const std::string& text) {
+  TrackReader reader("tracks.csv", text);
+  TrackFeeder feeder(&reader);
+  std::vector<int> keyframes;
+  int index = 0;
+  while (const TrackedFrame* frame = feeder.dueBefore(Stamp{1'000'000'000'000})) {
+    if (frame->keyframe) keyframes.push_back(index);
+    ++index;
+    feeder.take();
+  }
+  return keyframes;
+}
+
+TEST_CASE("keyframes come from the file, else from the reader's own rule") {
+  CHECK(keyframesOf(movingTracks(1, 30, true)) == std::vector<int>{3});
+  CHECK(keyframesOf(movingTracks(0, 42, false)) == std::vector<int>{0, 20, 40});  // 1 s at the latest
+  CHECK(keyframesOf(movingTracks(6, 9, false)) == std::vector<int>{0, 4, 8});     // past 20 px
+  CHECK(keyframesOf(movingTracks(90, 7, false)) == std::vector<int>{0, 3, 6});    // not before 0.14 s
+}
+
+TEST_CASE("the median motion since the frame before is added") {
+  const std::string text = movingTracks(6, 2, false);
+  TrackReader reader("tracks.csv", text);
+  TrackFeeder feeder(&reader);
+  const TrackedFrame* frame = feeder.dueBefore(Stamp{1});
+  REQUIRE(frame != nullptr);
+  CHECK(frame->median_motion < 0);
+  feeder.take();
+  CHECK(feeder.dueBefore(Stamp{50'000'000}) == nullptr);
+  frame = feeder.dueBefore(Stamp{50'000'001});
+  REQUIRE(frame != nullptr);
+  CHECK(frame->median_motion == Approx(6));
+}
+
+}  // namespace
+}  // namespace swiftlet
