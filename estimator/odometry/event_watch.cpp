@@ -49,7 +49,8 @@ void EventWatch::step(const Frame& frame, EventBuffer& events) {
 void EventWatch::watchCameras(const Frame& frame, EventBuffer& events) {
   for (std::size_t c = 0; c < frame.cameras; ++c) {
     if (!frame.camera_present[c]) {
-      if (++missing_[c] == kLostAfter) events.raise(frame.stamp, EventKind::kCameraLost, static_cast<double>(c));
+      if (++missing_[c] == kLostAfter)
+        events.raise(frame.stamp, EventKind::kCameraLost, static_cast<double>(c));
       continue;
     }
     if (missing_[c] >= kLostAfter) events.raise(frame.stamp, EventKind::kCameraBack, static_cast<double>(c));

@@ -28,7 +28,8 @@ Health HealthMonitor::update(const TrackedFrame& frame, const FrameStatistics& s
   if (frames_in_epoch < kSettlingFrames) {
     health_ = Health::kInitializing;
   } else {
-    health_ = sightings >= kNominalSightings && all_cameras && !imu_missing ? Health::kGood : Health::kDegraded;
+    health_ =
+        sightings >= kNominalSightings && all_cameras && !imu_missing ? Health::kGood : Health::kDegraded;
   }
   health_ = at(frame.stamp);
   return health_;

@@ -292,8 +292,8 @@ class Odometry::Impl {
     state.health =
         health_.update(tracked, output.statistics, rig_.camera_count, imu_missing, frames_in_epoch_);
     smoother_.setHealth(state.health);
-    watch_.step({tracked.stamp, tracked.camera_present, rig_.camera_count, rest_.state().at_rest, state.health,
-                 health_.secondsWithoutImage(tracked.stamp)},
+    watch_.step({tracked.stamp, tracked.camera_present, rig_.camera_count, rest_.state().at_rest,
+                 state.health, health_.secondsWithoutImage(tracked.stamp)},
                 events_);
     smoother_.window(window_);
     window_.newest = state;

@@ -23,7 +23,7 @@ constexpr double kOutlierSigmas = 20.0;        // of one sighting, during the so
 constexpr double kFinalOutlierSigmas = 3.5;
 constexpr double kRestVelocitySigma = 0.01;       // m/s
 constexpr double kRestPositionSigma = 5e-4;       // m, between two frames at rest: 4 mm/s at 20 Hz
-constexpr double kRestRotationSigma = 3.5e-4;       // rad, likewise
+constexpr double kRestRotationSigma = 3.5e-4;     // rad, likewise
 constexpr double kTimeOffsetSigma = 5e-3;         // s, prior when estimated
 constexpr double kExtrinsicRotationSigma = 0.01;  // rad
 // Calibrations give positions to a few millimetres; a looser prior gives up the baseline, stereo's scale.

@@ -299,8 +299,8 @@ bool rest() {
     double farthest = 0;
     for (const RunFrame& f : run.frames) {
       if (!f.has_state) continue;
-      farthest = std::max(
-          farthest, (f.state.T_world_body.translation - first->state.T_world_body.translation).norm());
+      farthest = std::max(farthest,
+                          (f.state.T_world_body.translation - first->state.T_world_body.translation).norm());
       square += f.state.v_world_body.squaredNorm();
       ++count;
     }

@@ -91,8 +91,7 @@ TEST_CASE("Odometry: a reset in flight starts a new epoch and loses no keyframe"
   const auto take = [&] {
     for (const KeyframeState& keyframe : output->left_window) {
       delivered.push_back(keyframe.state.stamp.ns);
-      CHECK(keyframe.state.epoch ==
-            (keyframe.state.stamp < flight.frames()[kResetAt].stamp ? 0U : 1U));
+      CHECK(keyframe.state.epoch == (keyframe.state.stamp < flight.frames()[kResetAt].stamp ? 0U : 1U));
     }
   };
   flight.play([&](const ImuSample& sample) { static_cast<void>(odometry.addImu(sample)); },
@@ -132,8 +131,7 @@ TEST_CASE("Odometry: one camera lost is degraded, not reset, and taken back", "[
 TEST_CASE("Odometry: dark for 2 s it coasts, for 4 s it says failed; both end well", "[odometry][fault]") {
   for (const double dark : {2.0, 4.0}) {
     INFO("dark for " << dark << " s");
-    const TrackFlight flight(
-        withFault(test::roomFlight(16, 25), {FaultKind::kBlackout, {8, 8 + dark}, -1}));
+    const TrackFlight flight(withFault(test::roomFlight(16, 25), {FaultKind::kBlackout, {8, 8 + dark}, -1}));
     const OdometryRun run = test::runOdometry(flight, OdometrySettings{});
     CHECK(healthBetween(flight, run, 8.5, 8 + std::min(dark, 2.9)) == std::set{Health::kDegraded});
     if (dark > 3) CHECK(healthBetween(flight, run, 11.2, 8 + dark) == std::set{Health::kFailed});
