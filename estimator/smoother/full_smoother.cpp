@@ -25,7 +25,6 @@ constexpr int kOutlierRounds = 2;              // iterations after which outlier
 constexpr int kTriangulationIterations = 5;
 constexpr double kKeptAhead = 0.1;    // s of samples kept across a keyframe, for interpolation
 constexpr double kLongestLink = 5.0;  // s; beyond, an increment's covariance means little
-constexpr double kInverseDepthInformation = 1.0 / (30.0 * 30.0);
 constexpr double kDampingUp = 10.0;
 constexpr double kDampingStart = 1e-6;
 

@@ -1,23 +1,103 @@
 #include "estimator/smoother/normal_equations.hpp"
 
-#include <Eigen/Cholesky>
 #include <cmath>
+
+#include "estimator/core/fixed_vector.hpp"
+#include "estimator/smoother/landmark_lanes.hpp"
 
 namespace swiftlet {
 namespace {
 
-// Relative floor on the point's information, so that a point without parallax is eliminated as a
-// direction: its depth column is weak, not singular.
-constexpr double kPointDamping = 1e-9;
-constexpr double kInverseDepthInformation = 1.0 / (30.0 * 30.0);  // as in triangulate()
-
+using PoseVector = Eigen::Matrix<double, kPoseDim, 1>;
 using PoseBlockMatrix = Eigen::Matrix<double, kPoseDim, kPoseDim>;
+using PosePoint = Eigen::Matrix<double, kPoseDim, 3>;
+using CalibrationVector = Eigen::Matrix<double, kMaxCalibrationDim, 1>;
+using CalibrationMatrix = Eigen::Matrix<double, kMaxCalibrationDim, kMaxCalibrationDim>;
+using CalibrationPoint = Eigen::Matrix<double, kMaxCalibrationDim, 3>;
+using CalibrationRows = Eigen::Matrix<double, 2, kMaxCalibrationDim>;
 
-struct SightingTerms {
-  std::uint32_t slot = 0;
-  bool valid = false;
-  alignas(32) double y[3][8];  // (J_pose^T J_point) L^-T, padded columns
+// One landmark, linearized; names as in landmark_lanes.hpp, k for the calibration's columns.
+struct CalibratedLandmark {
+  struct Pose {
+    std::uint32_t slot = 0;
+    bool valid = false;
+    PoseBlockMatrix A = PoseBlockMatrix::Zero();
+    PosePoint B = PosePoint::Zero();
+    PoseVector a = PoseVector::Zero();
+    Eigen::Matrix<double, kPoseDim, kMaxCalibrationDim> A_k =
+        Eigen::Matrix<double, kPoseDim, kMaxCalibrationDim>::Zero();
+  };
+  FixedVector<Pose, kMaxStates> poses;
+  Eigen::Matrix3d C = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d c = Eigen::Vector3d::Zero();
+  CalibrationMatrix K = CalibrationMatrix::Zero();
+  CalibrationPoint B_k = CalibrationPoint::Zero();
+  CalibrationVector a_k = CalibrationVector::Zero();
+  double cost = 0;
+
+  // One view; its Jacobians, residual and calibration columns already weighted.
+  void add(const SightingJacobians& J, const CalibrationRows& Jk, const Eigen::Vector2d& r, Pose& pose) {
+    pose.valid = true;
+    pose.A.noalias() += J.pose.transpose() * J.pose;
+    pose.B.noalias() += J.pose.transpose() * J.point;
+    pose.a.noalias() += J.pose.transpose() * r;
+    pose.A_k.noalias() += J.pose.transpose() * Jk;
+    C.noalias() += J.point.transpose() * J.point;
+    c.noalias() += J.point.transpose() * r;
+    K.noalias() += Jk.transpose() * Jk;
+    B_k.noalias() += Jk.transpose() * J.point;
+    a_k.noalias() += Jk.transpose() * r;
+  }
 };
+
+CalibratedLandmark linearize(const Landmark& landmark, const CalibrationLayout& calibration, RigPoses poses,
+                             const std::array<SE3, kMaxCameras>& T_body_cam) {
+  const PointBasis basis = PointBasis::of(landmark.point.bearing);
+  CalibratedLandmark result;
+  for (const Sighting& sighting : landmark.sightings) {
+    const RigPose& rig = poses[sighting.slot];
+    CalibratedLandmark::Pose pose;
+    pose.slot = sighting.slot;
+    for (std::size_t c = 0; c < kMaxCameras; ++c) {
+      const CameraSighting& view = sighting.camera[c];
+      Eigen::Vector2d r;
+      SightingJacobians J;
+      if (!view.used || !reprojectionResidual(view, rig.current[c], landmark.point, r) ||
+          !reprojectionJacobians(view, rig.linearization[c], T_body_cam[c], landmark.point, basis,
+                                 calibration.extrinsics, J)) {
+        continue;
+      }
+      const RobustWeight robust = RobustWeight::cauchy(r.squaredNorm());
+      const double root = std::sqrt(robust.weight);
+      J.pose *= root;
+      J.point *= root;
+      r *= root;
+      CalibrationRows Jk = CalibrationRows::Zero();
+      if (calibration.time_offset) {
+        Jk.col(0) = J.pose.leftCols<3>() * rig.omega_body + J.pose.rightCols<3>() * rig.v_world;
+      }
+      if (calibration.extrinsics) {
+        Jk.block<2, kPoseDim>(0, calibration.extrinsicOffset(c)) = root * J.extrinsic;
+      }
+      result.cost += robust.cost;
+      result.add(J, Jk, r, pose);
+    }
+    if (pose.valid) static_cast<void>(result.poses.tryPushBack(pose));
+  }
+  return result;
+}
+
+// B L^-T: each row is solved for by itself.
+template <typename Rows>
+Rows timesInverseTransposed(const Rows& B, const PointFactor& L) {
+  Rows Y;
+  for (Eigen::Index row = 0; row < B.rows(); ++row) {
+    double y[3] = {B(row, 0), B(row, 1), B(row, 2)};
+    L.solve(y);
+    Y.row(row) << y[0], y[1], y[2];
+  }
+  return Y;
+}
 
 }  // namespace
 
@@ -66,133 +146,115 @@ void NormalEquations::addDiagonal(const WindowState& state, int first, const Eig
 bool NormalEquations::addLandmark(const Landmark& landmark, RigPoses poses,
                                   const std::array<SE3, kMaxCameras>& T_body_cam,
                                   const std::array<WindowState, kMaxStates>& states) {
-  const int calibration_dim = calibration_.dimension();
-  const PointBasis basis = PointBasis::of(landmark.point.bearing);
-  std::array<SightingTerms, kMaxStates> terms;
-  std::array<PoseBlockMatrix, kMaxStates> pose_information;
-  std::array<Eigen::Matrix<double, kPoseDim, 3>, kMaxStates> pose_point;
-  std::array<Eigen::Matrix<double, kPoseDim, 1>, kMaxStates> pose_gradient;
-  Eigen::Matrix3d point_information = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d point_gradient = Eigen::Vector3d::Zero();
-  Eigen::Matrix<double, kMaxCalibrationDim, 3> calibration_point =
-      Eigen::Matrix<double, kMaxCalibrationDim, 3>::Zero();
-  Eigen::Matrix<double, kMaxCalibrationDim, 1> calibration_gradient =
-      Eigen::Matrix<double, kMaxCalibrationDim, 1>::Zero();
-  Eigen::Matrix<double, kMaxCalibrationDim, kMaxCalibrationDim> calibration_information =
-      Eigen::Matrix<double, kMaxCalibrationDim, kMaxCalibrationDim>::Zero();
-  std::array<Eigen::Matrix<double, kPoseDim, kMaxCalibrationDim>, kMaxStates> pose_calibration;
-  double cost = 0;
-  int valid_states = 0;
-  const std::size_t n = landmark.sightings.size();
+  return calibration_.dimension() == 0 ? addLandmarkInLanes(landmark, poses, T_body_cam, states)
+                                       : addLandmarkWithCalibration(landmark, poses, T_body_cam, states);
+}
 
-  for (std::size_t s = 0; s < n; ++s) {
-    const Sighting& sighting = landmark.sightings[s];
-    const RigPose& rig = poses[sighting.slot];
-    terms[s].slot = sighting.slot;
-    terms[s].valid = false;
-    pose_information[s].setZero();
-    pose_point[s].setZero();
-    pose_gradient[s].setZero();
-    if (calibration_dim > 0) pose_calibration[s].setZero();
-    for (std::size_t c = 0; c < kMaxCameras; ++c) {
-      const CameraSighting& view = sighting.camera[c];
-      if (!view.used) continue;
-      Eigen::Vector2d r;
-      SightingJacobians J;
-      if (!reprojectionResidual(view, rig.current[c], landmark.point, r)) continue;
-      if (!reprojectionJacobians(view, rig.linearization[c], T_body_cam[c], landmark.point, basis,
-                                 calibration_.extrinsics, J)) {
-        continue;
-      }
-      const RobustWeight robust = RobustWeight::cauchy(r.squaredNorm());
-      const double root = std::sqrt(robust.weight);
-      J.pose *= root;
-      J.point *= root;
-      r *= root;
-      cost += robust.cost;
-      pose_information[s].noalias() += J.pose.transpose() * J.pose;
-      pose_point[s].noalias() += J.pose.transpose() * J.point;
-      pose_gradient[s].noalias() += J.pose.transpose() * r;
-      point_information.noalias() += J.point.transpose() * J.point;
-      point_gradient.noalias() += J.point.transpose() * r;
-      terms[s].valid = true;
-      if (calibration_dim > 0) {
-        Eigen::Matrix<double, 2, kMaxCalibrationDim> Jc =
-            Eigen::Matrix<double, 2, kMaxCalibrationDim>::Zero();
-        if (calibration_.time_offset) {
-          Jc.col(0) = J.pose.leftCols<3>() * rig.omega_body + J.pose.rightCols<3>() * rig.v_world;
-        }
-        if (calibration_.extrinsics) {
-          Jc.block<2, kPoseDim>(0, calibration_.extrinsicOffset(c)) = root * J.extrinsic;
-        }
-        calibration_information.noalias() += Jc.transpose() * Jc;
-        pose_calibration[s].noalias() += J.pose.transpose() * Jc;
-        calibration_point.noalias() += Jc.transpose() * J.point;
-        calibration_gradient.noalias() += Jc.transpose() * r;
-      }
+bool NormalEquations::addLandmarkInLanes(const Landmark& landmark, RigPoses poses,
+                                         const std::array<SE3, kMaxCameras>& T_body_cam,
+                                         const std::array<WindowState, kMaxStates>& states) {
+  LandmarkLanes linearized(landmark, poses, T_body_cam);
+  if (!linearized.eliminate()) return false;
+  cost_ += linearized.cost();
+  std::array<EliminatedPose, kMaxStates> eliminated;
+  std::size_t count = 0;
+  for (std::size_t s = 0; s < landmark.sightings.size(); ++s) {
+    const LandmarkLanes::PoseGroup& group = linearized.groups()[s / lanes::kLanes];
+    const std::size_t lane = s % lanes::kLanes;
+    if (group.valid[lane] == 0) continue;
+    EliminatedPose& pose = eliminated[count++];
+    pose.slot = landmark.sightings[s].slot;
+    touched_[pose.slot] = true;
+    PoseBlock& diagonal = block(pose.slot, pose.slot);
+    auto& gradient = pose_gradient_[pose.slot];
+    std::size_t entry = 0;
+    SWIFTLET_UNROLL
+    for (std::size_t i = 0; i < kPoseDim; ++i) {
+      SWIFTLET_UNROLL
+      for (std::size_t j = i; j < kPoseDim; ++j) diagonal[i * kRows + j] += group.information[entry++][lane];
+      gradient[i] += group.gradient[i][lane];
     }
-    if (terms[s].valid) ++valid_states;
-  }
-  if (valid_states < 2) return false;
-
-  point_information(2, 2) += kInverseDepthInformation;
-  point_information.diagonal() *= 1.0 + kPointDamping;
-  const Eigen::LLT<Eigen::Matrix3d> llt(point_information);
-  if (llt.info() != Eigen::Success) return false;
-  const Eigen::Matrix3d L_inverse = llt.matrixL().solve(Eigen::Matrix3d::Identity());
-  const Eigen::Vector3d z = L_inverse * point_gradient;
-  cost_ += cost;
-
-  for (std::size_t s = 0; s < n; ++s) {
-    if (!terms[s].valid) continue;
-    touched_[terms[s].slot] = true;
-    const Eigen::Matrix<double, kPoseDim, 3> Y = pose_point[s] * L_inverse.transpose();
-    for (int k = 0; k < 3; ++k) {
-      for (int row = 0; row < kPoseDim; ++row) terms[s].y[k][row] = Y(row, k);
-      terms[s].y[k][6] = 0;
-      terms[s].y[k][7] = 0;
-    }
-    PoseBlock& diagonal = block(terms[s].slot, terms[s].slot);
-    for (int column = 0; column < kPoseDim; ++column) {
-      for (int row = 0; row < kPoseDim; ++row) {
-        diagonal[static_cast<std::size_t>(column * kRows + row)] += pose_information[s](row, column);
-      }
-    }
-    auto& gradient = pose_gradient_[terms[s].slot];
-    for (int row = 0; row < kPoseDim; ++row) {
-      gradient[static_cast<std::size_t>(row)] += pose_gradient[s][row] - Y.row(row).dot(z);
+    SWIFTLET_UNROLL
+    for (std::size_t k = 0; k < 3; ++k) {
+      SWIFTLET_UNROLL
+      for (std::size_t i = 0; i < kPoseDim; ++i) pose.y[k][i] = group.point[i][k][lane];
+      pose.y[k][kPoseDim] = pose.y[k][kPoseDim + 1] = 0;
     }
   }
-  for (std::size_t i = 0; i < n; ++i) {
-    if (!terms[i].valid) continue;
-    for (std::size_t j = 0; j < n; ++j) {
-      if (!terms[j].valid || states[terms[i].slot].offset < states[terms[j].slot].offset) continue;
-      double* const target = block(terms[i].slot, terms[j].slot).data();
-      for (int column = 0; column < kPoseDim; ++column) {
-        const double a = terms[j].y[0][column];
-        const double b = terms[j].y[1][column];
-        const double c = terms[j].y[2][column];
-        for (int row = 0; row < kRows; ++row) {
-          target[column * kRows + row] -=
-              a * terms[i].y[0][row] + b * terms[i].y[1][row] + c * terms[i].y[2][row];
-        }
-      }
-    }
-  }
-  if (calibration_dim > 0) {
-    MatrixMap h = H();
-    const Eigen::Matrix<double, kMaxCalibrationDim, 3> Yc = calibration_point * L_inverse.transpose();
-    h.topLeftCorner(calibration_dim, calibration_dim) +=
-        (calibration_information - Yc * Yc.transpose()).topLeftCorner(calibration_dim, calibration_dim);
-    g().head(calibration_dim) += (calibration_gradient - Yc * z).head(calibration_dim);
-    for (std::size_t s = 0; s < n; ++s) {
-      if (!terms[s].valid) continue;
-      const Eigen::Matrix<double, kPoseDim, 3> Y = pose_point[s] * L_inverse.transpose();
-      h.block(states[terms[s].slot].offset, 0, kPoseDim, calibration_dim) +=
-          (pose_calibration[s] - Y * Yc.transpose()).leftCols(calibration_dim);
-    }
-  }
+  subtractPairs({eliminated.data(), count}, states);
   return true;
+}
+
+bool NormalEquations::addLandmarkWithCalibration(const Landmark& landmark, RigPoses poses,
+                                                 const std::array<SE3, kMaxCameras>& T_body_cam,
+                                                 const std::array<WindowState, kMaxStates>& states) {
+  const CalibratedLandmark linearized = linearize(landmark, calibration_, poses, T_body_cam);
+  PointFactor L;
+  if (linearized.poses.size() < 2 || !L.compute(linearized.C)) return false;
+  cost_ += linearized.cost;
+  const int dimension = calibration_.dimension();
+  const Eigen::Vector3d z =
+      timesInverseTransposed<Eigen::RowVector3d>(linearized.c.transpose(), L).transpose();
+  const CalibrationPoint Y_k = timesInverseTransposed(linearized.B_k, L);
+  MatrixMap h = H();
+  h.topLeftCorner(dimension, dimension) +=
+      (linearized.K - Y_k * Y_k.transpose()).topLeftCorner(dimension, dimension);
+  g().head(dimension) += (linearized.a_k - Y_k * z).head(dimension);
+  std::array<EliminatedPose, kMaxStates> eliminated;
+  std::size_t count = 0;
+  for (const CalibratedLandmark::Pose& pose : linearized.poses) {
+    EliminatedPose& target = eliminated[count++];
+    target.slot = pose.slot;
+    touched_[pose.slot] = true;
+    const PosePoint Y = timesInverseTransposed(pose.B, L);
+    for (int k = 0; k < 3; ++k) {
+      Eigen::Map<Eigen::Matrix<double, kRows, 1>>(target.y[k]) << Y.col(k), 0, 0;
+    }
+    Eigen::Map<Eigen::Matrix<double, kRows, kPoseDim>>(block(pose.slot, pose.slot).data())
+        .topRows<kPoseDim>() += pose.A - Y * Y.transpose();
+    Eigen::Map<PoseVector>(pose_gradient_[pose.slot].data()) += pose.a - Y * z;
+    h.block(states[pose.slot].offset, 0, kPoseDim, dimension) +=
+        (pose.A_k - Y * Y_k.transpose()).leftCols(dimension);
+  }
+  subtractPairs({eliminated.data(), count}, states);
+  return true;
+}
+
+// The only part of a landmark's elimination that is quadratic in its states: a padded column of 8 is two
+// vectors, held in registers for state i. Both orders of a pair are met, the one below the diagonal counts.
+void NormalEquations::subtractPairs(std::span<const EliminatedPose> poses,
+                                    const std::array<WindowState, kMaxStates>& states) {
+  using lanes::kLanes;
+  using lanes::load;
+  using lanes::store;
+  using lanes::V;
+  static_assert(kRows == 2 * kLanes);
+  for (const EliminatedPose& pose_i : poses) {
+    V upper0, lower0, upper1, lower1, upper2, lower2;
+    load(pose_i.y[0], upper0);
+    load(pose_i.y[0] + kLanes, lower0);
+    load(pose_i.y[1], upper1);
+    load(pose_i.y[1] + kLanes, lower1);
+    load(pose_i.y[2], upper2);
+    load(pose_i.y[2] + kLanes, lower2);
+    for (const EliminatedPose& pose_j : poses) {
+      if (&pose_i == &pose_j || states[pose_i.slot].offset < states[pose_j.slot].offset) continue;
+      double* const target = block(pose_i.slot, pose_j.slot).data();
+      SWIFTLET_UNROLL
+      for (std::size_t k = 0; k < kPoseDim; ++k) {
+        const double y0 = pose_j.y[0][k];
+        const double y1 = pose_j.y[1][k];
+        const double y2 = pose_j.y[2][k];
+        V upper, lower;
+        load(target + k * kRows, upper);
+        load(target + k * kRows + kLanes, lower);
+        upper -= y0 * upper0 + y1 * upper1 + y2 * upper2;
+        lower -= y0 * lower0 + y1 * lower1 + y2 * lower2;
+        store(upper, target + k * kRows);
+        store(lower, target + k * kRows + kLanes);
+      }
+    }
+  }
 }
 
 void NormalEquations::finish(const std::array<WindowState, kMaxStates>& states) {
@@ -209,7 +271,8 @@ void NormalEquations::finish(const std::array<WindowState, kMaxStates>& states) 
       const PoseBlock& source = block(i, j);
       for (int column = 0; column < kPoseDim; ++column) {
         for (int row = 0; row < kPoseDim; ++row) {
-          h(at_i + row, states[j].offset + column) += source[static_cast<std::size_t>(column * kRows + row)];
+          h(at_i + row, states[j].offset + column) +=
+              source[static_cast<std::size_t>(column) * kRows + static_cast<std::size_t>(row)];
         }
       }
     }

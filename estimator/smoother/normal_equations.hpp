@@ -7,12 +7,14 @@
 // Shapes: H is n x n, g is n x 1, n = dimension() <= kMaxSystemDim; of H the lower triangle counts.
 // Columns are the error states of state.hpp. Jacobians at the linearization, residuals at the values.
 // Memory: about 1.3 MiB, reserved by the constructor. Cost of a landmark: linear in its sightings to
-// linearize, quadratic in the states that see it to eliminate.
+// linearize, quadratic in the states that see it to eliminate; both in vector lanes. While the calibration
+// is estimated, linearization goes view by view.
 // Source: Triggs et al., "Bundle Adjustment - A Modern Synthesis", 1999, section 6.
 
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "estimator/smoother/cholesky.hpp"
@@ -66,8 +68,24 @@ class NormalEquations {
   void finish(const std::array<WindowState, kMaxStates>& states);
 
  private:
-  static constexpr int kRows = 8;  // rows of a padded pose block
+  static constexpr std::size_t kRows = 8;  // rows of a padded pose block
   using PoseBlock = std::array<double, kRows * kPoseDim>;
+
+  /// A state that saw an eliminated landmark, and its Y (landmark_lanes.hpp) in padded columns.
+  struct EliminatedPose {
+    std::uint32_t slot = 0;
+    alignas(32) double y[3][kRows];
+  };
+
+  bool addLandmarkInLanes(const Landmark& landmark, RigPoses poses,
+                          const std::array<SE3, kMaxCameras>& T_body_cam,
+                          const std::array<WindowState, kMaxStates>& states);
+  bool addLandmarkWithCalibration(const Landmark& landmark, RigPoses poses,
+                                  const std::array<SE3, kMaxCameras>& T_body_cam,
+                                  const std::array<WindowState, kMaxStates>& states);
+  /// -Y_i Y_j^T for each pair of different states.
+  void subtractPairs(std::span<const EliminatedPose> poses,
+                     const std::array<WindowState, kMaxStates>& states);
 
   [[nodiscard]] PoseBlock& block(std::size_t slot_i, std::size_t slot_j) {
     return blocks_[slot_i * kMaxStates + slot_j];

@@ -30,6 +30,16 @@ constexpr double kExtrinsicRotationSigma = 0.01;  // rad
 constexpr double kExtrinsicPositionSigma = 2e-3;  // m
 constexpr int kMaxRejections = 3;
 
+// Of the 3-vectors that a step is made of, the longest, and the time offset's where it comes first. Lengths,
+// not components: when the iteration ends must not depend on which way the world's axes point.
+double largestStep(const VectorMap& step, bool with_time_offset) {
+  double largest = with_time_offset ? std::abs(step[0]) : 0;
+  for (Eigen::Index k = with_time_offset ? 1 : 0; k + 3 <= step.size(); k += 3) {
+    largest = std::max(largest, step.segment<3>(k).norm());
+  }
+  return largest;
+}
+
 }  // namespace
 
 Smoother::Smoother(const Rig& rig, const ImuNoise& noise, const SmootherSettings& settings)
@@ -452,7 +462,7 @@ Status Smoother::solve(int iterations) {
     backup();
     applyStep(step);
     statistics_.iterations = iteration + 1;
-    if (step.cwiseAbs().maxCoeff() < kConverged) break;
+    if (largestStep(step, calibration_.time_offset) < kConverged) break;
   }
   placeCameras();
   rejectOutliers(kFinalOutlierSigmas, true);

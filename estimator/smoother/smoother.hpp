@@ -9,7 +9,7 @@
 // Frames: world (z up, origin and yaw of the first state), body (= IMU), cameras. SI units, pixels.
 // Memory: 9.8 MiB, all reserved by the constructor (table in docs/smoother.md); nothing is allocated
 // after it. Full is normal: the landmark not seen for longest, and the oldest IMU samples, go first.
-// Cost: linear in landmarks, cubic in the window's dimension (at most 171 columns by default).
+// Cost: linear in landmarks, cubic in the window's dimension (at most 192 columns by default).
 // Sources: Leutenegger et al., "Keyframe-based visual-inertial odometry using nonlinear
 // optimization", IJRR 2015 (window); Huang, Mourikis, Roumeliotis, "Observability-based rules for
 // consistent EKF SLAM", IJRR 2010 (first estimates); Usenko et al., "Visual-Inertial Mapping with
@@ -38,8 +38,8 @@ struct SmootherSettings {
   double pixel_sigma = 0.6;           ///< px
   double horizon = 30.0;              ///< s
   int max_recent = 4;                 ///< newest frames, keyframe or not, that stay whole
-  int max_motion_keyframes = 4;       ///< keyframes behind them that keep velocity and biases
-  int max_keyframes = 10;             ///< these and the pose-only ones; with max_recent below kMaxStates
+  int max_motion_keyframes = 5;       ///< keyframes behind them that keep velocity and biases
+  int max_keyframes = 12;             ///< these and the pose-only ones; with max_recent below kMaxStates
   bool estimate_time_offset = false;  ///< camera to IMU clock
   bool estimate_extrinsics = false;   ///< T_body_cam of each camera
 };

@@ -5,64 +5,17 @@
 #include <cmath>
 
 #include "estimator/geometry/so3.hpp"
+#include "estimator/smoother/point_system.hpp"
 
 namespace swiftlet {
 namespace {
 
-// Points beyond this cosine from the measured ray have no meaningful tangent-plane residual.
-constexpr double kMinCosine = 0.2;
-// Cauchy scale in sigmas: tracks have heavier tails than a normal distribution.
-constexpr double kCauchyScale = 2.0;
-// Makes the weighted Hessian the information of the estimate where the noise is normal (2 dof):
-// E[psi']^2 / (E[psi^2] E[w]) at the scale above (Huber, "Robust Statistics", 1981, section 6.3).
-constexpr double kInformationScale = 1.267;
 // Nothing is nearer to a flying camera than this.
 constexpr double kMaxInverseDepth = 20.0;  // 1/m
-// Prior on the inverse depth, for points without parallax: weak enough not to bias points with it.
-constexpr double kInverseDepthPriorSigma = 30.0;  // 1/m
 // Depth taken for a point that one camera saw once.
 constexpr double kGuessedInverseDepth = 0.3;  // 1/m
 constexpr double kStepTolerance = 1e-5;
-
-struct PointSystem {
-  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d g = Eigen::Vector3d::Zero();
-  double cost = 0;
-  int views = 0;
-  bool in_front = true;
-};
-
-PointSystem linearizePoint(RigPoses poses, std::span<const Sighting> sightings, const LandmarkPoint& point,
-                           const PointBasis& basis) {
-  PointSystem system;
-  for (const Sighting& sighting : sightings) {
-    for (std::size_t c = 0; c < kMaxCameras; ++c) {
-      const CameraSighting& view = sighting.camera[c];
-      if (!view.used) continue;
-      const CameraPose& camera = poses[sighting.slot].current[c];
-      const Eigen::Vector3d arm = point.reference - camera.center;
-      const Eigen::Vector3d h = camera.R_cam_world * (point.bearing + point.inverse_depth * arm);
-      const double along = view.bearing.dot(h);
-      if (!(along > kMinCosine * h.norm())) {
-        system.in_front = false;
-        continue;
-      }
-      const Eigen::Vector2d r = view.weight * h / along;
-      const Matrix23d G = (view.weight - r * view.bearing.transpose()) / along;
-      const Matrix23d M = G * camera.R_cam_world;
-      Matrix23d J;
-      J.col(0) = M * basis.b1;
-      J.col(1) = M * basis.b2;
-      J.col(2) = M * arm;
-      const RobustWeight robust = RobustWeight::cauchy(r.squaredNorm());
-      system.H.noalias() += robust.weight * J.transpose() * J;
-      system.g.noalias() += robust.weight * J.transpose() * r;
-      system.cost += robust.cost;
-      ++system.views;
-    }
-  }
-  return system;
-}
+constexpr double kCostRounding = 1e-9;  // relative, and in squared sigmas: far below what a step can matter
 
 void movePoint(const Eigen::Vector3d& step, const PointBasis& basis, LandmarkPoint& point) {
   const Eigen::Vector3d moved = point.bearing + step[0] * basis.b1 + step[1] * basis.b2;
@@ -161,10 +114,11 @@ bool triangulate(RigPoses poses, std::span<const Sighting> sightings, int max_it
   if (!point.triangulated) triangulateLinearly(poses, sightings, point);
   double lambda = 0;
   PointBasis basis = PointBasis::of(point.bearing);
-  PointSystem system = linearizePoint(poses, sightings, point, basis);
+  const PointViews views(poses, sightings);
+  PointSystem system = views.linearize(point, basis);
   for (int i = 0; i < max_iterations && system.in_front; ++i) {
     Eigen::Matrix3d H = system.H;
-    H(2, 2) += 1.0 / (kInverseDepthPriorSigma * kInverseDepthPriorSigma);
+    H(2, 2) += kInverseDepthInformation;
     H.diagonal() *= 1.0 + lambda;
     const Eigen::Vector3d step = -H.llt().solve(system.g);
     if (!step.allFinite()) return false;
@@ -172,8 +126,8 @@ bool triangulate(RigPoses poses, std::span<const Sighting> sightings, int max_it
     const double inverse_depth_before = point.inverse_depth;
     movePoint(step, basis, point);
     const PointBasis moved_basis = PointBasis::of(point.bearing);
-    const PointSystem moved = linearizePoint(poses, sightings, point, moved_basis);
-    if (!moved.in_front || moved.cost > system.cost * (1.0 + 1e-9)) {
+    const PointSystem moved = views.linearize(point, moved_basis);
+    if (!moved.in_front || moved.cost > system.cost * (1.0 + kCostRounding) + kCostRounding) {
       point.bearing = bearing_before;
       point.inverse_depth = inverse_depth_before;
       lambda = std::max(10.0 * lambda, 1e-2);
@@ -185,7 +139,7 @@ bool triangulate(RigPoses poses, std::span<const Sighting> sightings, int max_it
   }
   if (!system.in_front || system.views < 2) return false;
   Eigen::Matrix3d H = system.H;
-  H(2, 2) += 1.0 / (kInverseDepthPriorSigma * kInverseDepthPriorSigma);
+  H(2, 2) += kInverseDepthInformation;
   const Eigen::Vector3d column = H.llt().solve(Eigen::Vector3d::UnitZ());
   point.inverse_depth_sigma = std::sqrt(std::max(column.z(), 0.0));
   point.triangulated = true;

@@ -64,6 +64,16 @@ struct SightingJacobians {
                                          const PointBasis& basis, bool with_extrinsic,
                                          SightingJacobians& jacobians);
 
+// Points beyond this cosine from the measured ray have no meaningful tangent-plane residual.
+inline constexpr double kMinCosine = 0.2;
+// Cauchy scale in sigmas: tracks have heavier tails than a normal distribution.
+inline constexpr double kCauchyScale = 2.0;
+// Makes the weighted Hessian the information of the estimate where the noise is normal (2 dof):
+// E[psi']^2 / (E[psi^2] E[w]) at the scale above (Huber, "Robust Statistics", 1981, section 6.3).
+inline constexpr double kInformationScale = 1.267;
+// Prior on the inverse depth, sigma 30 / m, for points without parallax: too weak to bias points with it.
+inline constexpr double kInverseDepthInformation = 1.0 / (30.0 * 30.0);  // m^2
+
 /// Robust weight (Cauchy, scale 2 sigma) of a whitened residual's norm, and the cost it stands for,
 /// both scaled so that the weighted Hessian is the information where the noise is normal.
 struct RobustWeight {

@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdio>
@@ -127,6 +128,8 @@ TEST_CASE("Smoother: a turned and shifted world gives the same flight, turned an
   const SE3 T(Eigen::Quaterniond(Eigen::AngleAxisd(2.1, Eigen::Vector3d::UnitZ())), {30, -20, 5});
   std::vector<BodyState> plain;
   std::vector<BodyState> moved;
+  std::vector<int> plain_iterations;
+  std::vector<int> moved_iterations;
   for (const bool turned : {false, true}) {
     Smoother smoother(flight.rig(), flight.noise(), test::settingsFor(flight));
     FixedVector<KeyframeState, kMaxStates> left;
@@ -144,8 +147,13 @@ TEST_CASE("Smoother: a turned and shifted world gives the same flight, turned an
                   input.frame = &flight.frames()[k];
                   REQUIRE(smoother.step(input, left).ok());
                   (turned ? moved : plain).push_back(smoother.newest().x);
+                  (turned ? moved_iterations : plain_iterations).push_back(smoother.statistics().iterations);
                 });
   }
+  // One step more or less moves a state by up to the size of step at which the iteration ends, 1e-4.
+  CHECK(plain_iterations == moved_iterations);
+  CHECK(std::count(plain_iterations.begin(), plain_iterations.end(), 3) <
+        static_cast<std::ptrdiff_t>(plain_iterations.size()));  // the early end does take part
   for (std::size_t k = 0; k < plain.size(); ++k) {
     const SE3 expected = T * plain[k].T_world_body;
     REQUIRE((moved[k].T_world_body.translation - expected.translation).norm() < 1e-5);
