@@ -21,7 +21,7 @@ esac
 fuzz_seconds=15 # each fuzzer
 # Unit tests that run under sanitizers too; the statistical ones (imu, ransac, whole flights, rendering, the program)
 # repeat the same code thousands of times and would take most of an hour there.
-sanitized='core geometry camera frontend smoother odometry drivers_calibration drivers_recorded drivers_image_decoder'
+sanitized='core geometry camera frontend smoother drivers_calibration drivers_recorded drivers_image_decoder'
 jobs=$(nproc)
 steps='' # lines "seconds result step"
 failed_steps=0
