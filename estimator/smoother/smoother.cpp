@@ -79,7 +79,7 @@ Status Smoother::step(const StepInput& input, FixedVector<KeyframeState, kMaxSta
   addSightings(slot, *input.frame);
   const Status status = solve(input.iterations);
   if (!status.ok()) return status;
-  updateStatistics(input.iterations);
+  updateStatistics();
   trimWindow(left_window);
   return okStatus();
 }
@@ -507,7 +507,7 @@ void Smoother::rejectOutliers(double threshold, bool newest_only) {
   }
 }
 
-void Smoother::updateStatistics(int) {
+void Smoother::updateStatistics() {
   const std::uint8_t slot = order_.back();
   double sum = 0;
   int views = 0;

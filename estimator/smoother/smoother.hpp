@@ -128,11 +128,10 @@ class Smoother {
   void addRestFactor(const WindowState& i, const WindowState& j);
   void triangulateAll(int iterations);
   void startPrior();
-  [[nodiscard]] Vector15d priorDeviation(const PriorBlock& block) const;
   [[nodiscard]] Eigen::Matrix<double, kMaxCalibrationDim, 1> calibrationDeviation() const;
   void applyStep(const Eigen::Ref<const Eigen::VectorXd>& step);
   void rejectOutliers(double threshold, bool newest_only);
-  void updateStatistics(int iterations);
+  void updateStatistics();
 
   void trimWindow(FixedVector<KeyframeState, kMaxStates>& left_window);
   void dropFrame(std::size_t position);
