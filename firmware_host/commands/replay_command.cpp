@@ -89,7 +89,6 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
   command->add_option("--until", options->until, "End this many seconds after the first image")
       ->check(nonNegative());
   command->add_flag("--imu-rate", request.imu_rate, "Also write imu_rate.tum, the state at every IMU sample");
-  command->add_flag("!--no-map", request.map, "Leave out the full smoothing after the run (map.tum)");
   options->settings.addTo(*command);
   command->footer(
       "Example:\n  swiftlet replay data/euroc_mh01_20s --out run_mh01\n"

@@ -90,7 +90,7 @@ ReplayResult runReplay(const ReplayRequest& request, Settings settings) {
   LineFile(out / "settings.yaml").write(printSettings(settings, false));
   const auto wiring = std::make_unique<Wiring>(source->rig(), source->imuNoise(), settings, recorder);
   wiring->wantImuStates(request.imu_rate);
-  if (request.map) wiring->keepForMap();
+  if (settings.full_smoothing) wiring->keepForMap();
   memory.note("estimator_at_start");
 
   Progress progress("replay", request.show_progress ? steps : 0);

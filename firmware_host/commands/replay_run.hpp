@@ -21,7 +21,6 @@ struct ReplayRequest {
   std::string tracks;           ///< file of feature tracks in place of the log's images or own tracks
   bool mono = false;
   bool imu_rate = false;
-  bool map = true;              ///< full smoothing after the run, into map.tum
   double from = 0;              ///< s after the first image
   std::optional<double> until;  ///< s after the first image
   std::optional<Stamp> last_stamp;

@@ -21,7 +21,10 @@ Json settingsJson(const Settings& settings) {
   Settings copy = settings;
   Json json;
   for (const Setting& setting : settingsRegistry()) {
-    std::visit([&](const auto& kind) { json[std::string(setting.key)] = kind.value(copy); }, setting.kind);
+    const std::string key(setting.key);
+    std::visit([&](const auto& kind) { json[key] = kind.value(copy); }, setting.kind);
+    const auto* real_or_word = std::get_if<RealOrWordSetting>(&setting.kind);
+    if (real_or_word != nullptr && real_or_word->chosen(copy)) json[key] = real_or_word->word;
   }
   return json;
 }

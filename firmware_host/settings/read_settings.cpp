@@ -60,8 +60,18 @@ void assign(const Place& place, const Setting& setting, const YAML::Node& node, 
   };
   if (const auto* whole = std::get_if<IntegerSetting>(&setting.kind)) {
     bounded(*whole, parsed<int>(place, setting, node));
+  } else if (const auto* number = std::get_if<RealSetting>(&setting.kind)) {
+    bounded(*number, parsed<double>(place, setting, node));
   } else {
-    bounded(std::get<RealSetting>(setting.kind), parsed<double>(place, setting, node));
+    const auto& either = std::get<RealOrWordSetting>(setting.kind);
+    const bool word = node.IsScalar() && node.Scalar() == either.word;
+    if (word) {
+      Settings defaults;
+      either.value(settings) = either.value(defaults);
+    } else {
+      bounded(either, parsed<double>(place, setting, node));
+    }
+    either.chosen(settings) = word;
   }
 }
 

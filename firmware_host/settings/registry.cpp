@@ -42,8 +42,12 @@ std::vector<Setting> makeRegistry() {
        integer(kOdometry, &O::max_features, 20, kFeatures)},
       {"frontend.use_stereo", "", "Use the second camera; false: camera 0 alone, scale from the IMU.",
        onOff(kOdometry, &O::use_stereo)},
-      {"smoother.horizon", "s", "Fixed lag: no state older than this stays in the window.",
-       real(kOdometry, &O::horizon, 0.5, 60)},
+      {"smoother.horizon", "s",
+       "Fixed lag: no state older than this stays in the window. full: the default lag in flight, and all "
+       "keyframes of the run smoothed together at its end (map.tum).",
+       RealOrWordSetting{{member(kOdometry, &O::horizon), 0.5, 60},
+                         "full",
+                         [](Settings& settings) -> bool& { return settings.full_smoothing; }}},
       {"smoother.pixel_sigma", "px", "Noise of one tracked coordinate, 1 sigma.",
        real(kOdometry, &O::pixel_sigma, 0.05, 10)},
       {"smoother.estimate_time_offset", "", "Estimate the offset between camera and IMU clocks in flight.",
@@ -124,6 +128,9 @@ std::string_view nearestSetting(std::string_view key) {
 std::string valueText(const Setting& setting, const Settings& settings) {
   // The accessors give references that may be written through; nothing is written here.
   Settings copy = settings;
+  if (const auto* real_or_word = std::get_if<RealOrWordSetting>(&setting.kind)) {
+    if (real_or_word->chosen(copy)) return std::string(real_or_word->word);
+  }
   return std::visit([&](const auto& kind) { return fmt::format("{}", kind.value(copy)); }, setting.kind);
 }
 
@@ -133,8 +140,11 @@ std::string rangeText(const Setting& setting) {
   if (const auto* whole = std::get_if<IntegerSetting>(&setting.kind)) {
     return fmt::format("whole number, {} to {}{}", whole->low, whole->high, unit);
   }
-  const auto& number = std::get<RealSetting>(setting.kind);
-  return fmt::format("{} to {}{}", number.low, number.high, unit);
+  if (const auto* number = std::get_if<RealSetting>(&setting.kind)) {
+    return fmt::format("{} to {}{}", number->low, number->high, unit);
+  }
+  const auto& number = std::get<RealOrWordSetting>(setting.kind);
+  return fmt::format("{} to {}{}, or {}", number.low, number.high, unit, number.word);
 }
 
 }  // namespace swiftlet

@@ -23,6 +23,12 @@ struct RealSetting {
   double high = 0;
 };
 
+/// A number, or one word in its place that leaves the number at its default.
+struct RealOrWordSetting : RealSetting {
+  std::string_view word;
+  std::function<bool&(Settings&)> chosen;  ///< the word instead of a number
+};
+
 struct SwitchSetting {
   std::function<bool&(Settings&)> value;
 };
@@ -31,7 +37,7 @@ struct Setting {
   std::string_view key;   ///< "group.name", as in YAML and on the command line
   std::string_view unit;  ///< empty for pure numbers
   std::string_view doc;   ///< one or two sentences
-  std::variant<IntegerSetting, RealSetting, SwitchSetting> kind;
+  std::variant<IntegerSetting, RealSetting, RealOrWordSetting, SwitchSetting> kind;
 };
 
 /// All settings; those of one group stand together.
@@ -43,7 +49,7 @@ const Setting* findSetting(std::string_view key);
 /// The key that `key` was most likely meant to be; empty when nothing is near.
 std::string_view nearestSetting(std::string_view key);
 
-/// The value as YAML text; numbers in the shortest form that reads back to the same value.
+/// The value as YAML text (the word where that is chosen); numbers in the shortest form that reads back to the same value.
 std::string valueText(const Setting& setting, const Settings& settings);
 
 /// What values are allowed, in words: "0.5 to 30 s", "true or false".

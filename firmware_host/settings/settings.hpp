@@ -29,6 +29,7 @@ struct Settings {
   PairingGroup pairing;
   CalibrationGroup calibration;
   EvaluationGroup evaluation;
+  bool full_smoothing = true;  ///< smoother.horizon is `full`
 };
 
 }  // namespace swiftlet

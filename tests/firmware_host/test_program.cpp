@@ -113,7 +113,7 @@ TEST_CASE("summary.json has what DESIGN's run folder promises") {
   }
   CHECK(summary["run"]["time_to_first_pose_s"] == 0.5);
   CHECK(summary["run"]["tracking_coverage"] == 390.0 / 400.0);
-  CHECK(summary["settings"]["smoother.horizon"] == OdometrySettings{}.horizon);
+  CHECK(summary["settings"]["smoother.horizon"] == "full");
   CHECK(summary["health"][1]["health"] == "good");
   CHECK(summary["health"][1]["t_s"] == 1.0);
   CHECK(summary["counters"]["events"]["imu_gap"]["count"] == 2);

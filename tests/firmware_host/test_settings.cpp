@@ -116,6 +116,23 @@ TEST_CASE("values outside their bounds, of a wrong kind, twice or in a wrong pla
   CHECK(errorOf("smoother: {horizon: 3\n").line >= 1);
 }
 
+TEST_CASE("the horizon is a number of seconds, or full") {
+  Settings settings;
+  CHECK(settings.full_smoothing);
+  CHECK_THAT(printSettings(settings, true), Catch::Contains("horizon: full") && Catch::Contains("or full"));
+  overrideSetting("smoother.horizon=3", settings);
+  CHECK_FALSE(settings.full_smoothing);
+  CHECK(settings.odometry.horizon == 3);
+  Settings back;
+  readSettingsText("printed", printSettings(settings, false), back);
+  CHECK_FALSE(back.full_smoothing);
+  overrideSetting("smoother.horizon=full", settings);
+  CHECK(settings.full_smoothing);
+  CHECK(settings.odometry.horizon == OdometrySettings{}.horizon);
+  CHECK(errorOf("smoother:\n  horizon: fully\n").line == 2);
+  CHECK(errorOf("smoother:\n  pixel_sigma: full\n").line == 2);
+}
+
 TEST_CASE("a file with one error changes nothing") {
   Settings settings;
   CHECK_THROWS_AS(readSettingsText("f", "smoother:\n  horizon: 2\n  pixel_sigma: -1\n", settings),
