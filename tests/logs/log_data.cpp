@@ -17,4 +17,8 @@ std::optional<std::string> findLog(const std::string& name) {
   return std::nullopt;
 }
 
+std::string shortLog() {
+  return (std::filesystem::path(SWIFTLET_SOURCE_DIR) / "tests" / "data" / "euroc_mh01_4s").string();
+}
+
 }  // namespace swiftlet

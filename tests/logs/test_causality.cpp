@@ -1,8 +1,8 @@
 // Causality and determinism on real logs: a run cut after image k gives the first lines of the whole
 // run's odometry.tum byte for byte, and a second run gives the same bytes in every file.
 //
-// SWIFTLET_CAUSALITY_LOG names another log than the short default; SWIFTLET_CAUSALITY_CUTS the number
-// of cuts.
+// SWIFTLET_CAUSALITY_LOG names a log of SWIFTLET_DATA to use instead of the repository's own seconds;
+// SWIFTLET_CAUSALITY_CUTS the number of cuts.
 
 #include <catch2/catch.hpp>
 #include <cstdlib>
@@ -22,9 +22,9 @@ namespace {
 
 constexpr int kDefaultCuts = 6;
 
-std::string chosenLog() {
+std::optional<std::string> chosenLog() {
   const char* name = std::getenv("SWIFTLET_CAUSALITY_LOG");
-  return name != nullptr ? name : "euroc_v101_micro";
+  return name != nullptr ? findLog(name) : shortLog();
 }
 
 int chosenCuts() {
@@ -59,7 +59,7 @@ std::string withoutTimes(nlohmann::ordered_json summary) {
 }
 
 void checkCuts(bool mono) {
-  const auto log = findLog(chosenLog());
+  const auto log = chosenLog();
   if (!log) return;
   const ScratchFolder folder(mono ? "causality_mono" : "causality_stereo");
   ReplayRequest request;

@@ -1,0 +1,60 @@
+// The real seconds in the repository: a whole run with two cameras and with one, on any machine.
+
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <string>
+
+#include "firmware_host/commands/replay_run.hpp"
+#include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/logs/log_data.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr int kImages = 80;
+// What a run measures is 3 and 4 mm; on four seconds in a room anything beyond a centimetre is broken.
+constexpr double kLargestError = 0.01;  // m, ATE
+constexpr double kTiltError = 1.0;      // deg, RMS of the attitude
+
+struct Expected {
+  bool mono;
+  double first_pose;  // s after the first image, at most
+};
+
+void checkRun(const Expected& expected) {
+  const ScratchFolder folder(expected.mono ? "short_log_mono" : "short_log_stereo");
+  ReplayRequest request;
+  request.log = shortLog();
+  request.out = folder.file("run");
+  request.mono = expected.mono;
+  const ReplayResult result = runReplay(request, Settings{});
+  REQUIRE(result.finished);
+  REQUIRE(result.has_pose);
+  const double first_pose = result.summary["run"]["time_to_first_pose_s"].get<double>();
+  CHECK(first_pose <= expected.first_pose);
+
+  // From the first on, a pose for every image.
+  int poses = 0;
+  std::ifstream file(folder.file("run/odometry.tum"));
+  for (std::string line; std::getline(file, line);) ++poses;
+  CHECK(poses >= kImages - static_cast<int>(first_pose * 20 + 0.5));
+
+  for (const char* trajectory : {"odometry", "states", "map"}) {
+    INFO(trajectory);
+    const auto& figures = result.summary["accuracy"][trajectory]["all"]["se3"];
+    CHECK(figures["ate_m"]["rmse"].get<double>() < kLargestError);
+    CHECK(figures["attitude_deg"]["rmse"].get<double>() < kTiltError);
+  }
+  CHECK(result.summary["health"].back()["health"] == "good");
+}
+
+TEST_CASE("four real seconds with two cameras: a pose from the first image on, within a centimetre") {
+  checkRun({false, 0.0});
+}
+
+TEST_CASE("four real seconds with one camera: a pose within a second, within a centimetre") {
+  checkRun({true, 1.0});
+}
+
+}  // namespace
+}  // namespace swiftlet
