@@ -7,6 +7,31 @@ namespace {
 
 constexpr Eigen::Index kPanel = 4;  // columns per update: enough to hide the load of the target
 
+// Takes what four finished columns of L stand for, l0 the first, out of columns [first, n) of A
+// (right-looking). Two columns at once, so that each load of L serves twice.
+void updateBehind(const double* __restrict l0, Eigen::Index stride, Eigen::Index first, Eigen::Index n,
+                  double* a) {
+  const double* __restrict const l1 = l0 + stride;
+  const double* __restrict const l2 = l1 + stride;
+  const double* __restrict const l3 = l2 + stride;
+  const auto product = [&](Eigen::Index i, Eigen::Index k) {
+    return l0[i] * l0[k] + l1[i] * l1[k] + l2[i] * l2[k] + l3[i] * l3[k];
+  };
+  for (Eigen::Index j = first; j < n; j += 2) {
+    double* __restrict const left = a + j * stride;
+    left[j] -= product(j, j);
+    if (j + 1 == n) break;
+    double* __restrict const right = left + stride;
+    const double f0 = l0[j], f1 = l1[j], f2 = l2[j], f3 = l3[j];
+    const double h0 = l0[j + 1], h1 = l1[j + 1], h2 = l2[j + 1], h3 = l3[j + 1];
+    if (f0 == 0 && f1 == 0 && f2 == 0 && f3 == 0 && h0 == 0 && h1 == 0 && h2 == 0 && h3 == 0) continue;
+    for (Eigen::Index i = j + 1; i < n; ++i) {
+      left[i] -= f0 * l0[i] + f1 * l1[i] + f2 * l2[i] + f3 * l3[i];
+      right[i] -= h0 * l0[i] + h1 * l1[i] + h2 * l2[i] + h3 * l3[i];
+    }
+  }
+}
+
 }  // namespace
 
 bool choleskyInPlace(MatrixMap A) {
@@ -29,22 +54,7 @@ bool choleskyInPlace(MatrixMap A) {
       for (Eigen::Index i = j; i < n; ++i) column[i] *= scale;
     }
     if (end - panel < kPanel) break;
-    // Right-looking update of everything behind the panel, four columns of L at once.
-    const double* const l0 = a + panel * stride;
-    const double* const l1 = l0 + stride;
-    const double* const l2 = l1 + stride;
-    const double* const l3 = l2 + stride;
-    for (Eigen::Index j = end; j < n; ++j) {
-      double* const column = a + j * stride;
-      const double f0 = l0[j];
-      const double f1 = l1[j];
-      const double f2 = l2[j];
-      const double f3 = l3[j];
-      if (f0 == 0 && f1 == 0 && f2 == 0 && f3 == 0) continue;
-      for (Eigen::Index i = j; i < n; ++i) {
-        column[i] -= f0 * l0[i] + f1 * l1[i] + f2 * l2[i] + f3 * l3[i];
-      }
-    }
+    updateBehind(a + panel * stride, stride, end, n, a);
   }
   return true;
 }

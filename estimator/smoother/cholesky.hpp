@@ -1,7 +1,7 @@
 #pragma once
 // Dense Cholesky factorization in place, for the reduced system of the smoother.
 //
-// Column-major, lower triangle; columns are updated four at a time so that the inner loop is a
+// Column-major, lower triangle; columns are updated by four at a time so that the inner loop is a
 // contiguous fused multiply-add that the compiler vectorizes. Unlike Eigen's blocked LLT it never
 // asks the heap for packing space. Cost n^3 / 6 multiply-adds (about 0.4 ms at n = 200); no memory.
 

@@ -1,17 +1,12 @@
 #include "estimator/smoother/landmark_lanes.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace swiftlet {
 namespace {
 
 using lanes::kLanes;
 using lanes::V;
-
-// Relative floor on the point's information, so that a point without parallax is eliminated as a
-// direction: its depth column is weak, not singular.
-constexpr double kPointDamping = 1e-9;
 
 bool samePlace(const CameraPose& a, const CameraPose& b) {
   return a.center == b.center && a.R_cam_world == b.R_cam_world;
@@ -27,23 +22,6 @@ void transform(const Eigen::Matrix3d& M, const V (&x)[3], const Eigen::Vector3d&
 }
 
 }  // namespace
-
-bool PointFactor::compute(Eigen::Matrix3d C) {
-  C(2, 2) += kInverseDepthInformation;
-  C.diagonal() *= 1.0 + kPointDamping;
-  if (!(C(0, 0) > 0)) return false;
-  i00 = 1.0 / std::sqrt(C(0, 0));
-  l10 = C(1, 0) * i00;
-  l20 = C(2, 0) * i00;
-  const double d11 = C(1, 1) - l10 * l10;
-  if (!(d11 > 0)) return false;
-  i11 = 1.0 / std::sqrt(d11);
-  l21 = (C(2, 1) - l20 * l10) * i11;
-  const double d22 = C(2, 2) - l20 * l20 - l21 * l21;
-  if (!(d22 > 0)) return false;
-  i22 = 1.0 / std::sqrt(d22);
-  return true;
-}
 
 LandmarkLanes::LandmarkLanes(const Landmark& landmark, RigPoses poses,
                              const std::array<SE3, kMaxCameras>& T_body_cam)
@@ -119,11 +97,14 @@ void LandmarkLanes::addRows(const Camera& camera, const lanes::ViewGroup& views,
 
 bool LandmarkLanes::eliminate() {
   if (valid_states_ < 2) return false;
+  // A copy: stores to the groups cannot change it, as far as the compiler sees.
   PointFactor L;
   if (!L.compute(sums_.H())) return false;
   const Eigen::Vector3d c = sums_.g();
   double z[3] = {c[0], c[1], c[2]};
   L.solve(z);
+  L_ = L;
+  z_ << z[0], z[1], z[2];
   for (std::size_t k = 0; k < count_; ++k) {
     PoseGroup& group = groups_[k];
     // Y_i = B_i L^-T: each row is solved for by itself.

@@ -15,25 +15,10 @@
 #include <cstddef>
 #include <span>
 
+#include "estimator/smoother/eliminated_point.hpp"
 #include "estimator/smoother/view_lanes.hpp"
 
 namespace swiftlet {
-
-/// L of C = L L^T, 3 x 3, C with the prior on the inverse depth; the diagonal inverted.
-struct PointFactor {
-  double i00, i11, i22;
-  double l10, l20, l21;
-
-  /// False when C is not positive definite (or not a number).
-  [[nodiscard]] bool compute(Eigen::Matrix3d C);
-  /// x := L^-1 x, for one vector or one per lane.
-  template <typename T>
-  void solve(T (&x)[3]) const {
-    x[0] = x[0] * i00;
-    x[1] = (x[1] - l10 * x[0]) * i11;
-    x[2] = (x[2] - l20 * x[0] - l21 * x[1]) * i22;
-  }
-};
 
 class LandmarkLanes {
  public:
@@ -55,6 +40,9 @@ class LandmarkLanes {
   /// State k is lane k % kLanes of group k / kLanes.
   [[nodiscard]] std::span<const PoseGroup> groups() const { return {groups_, count_}; }
   [[nodiscard]] double cost() const { return sums_.cost(); }
+  /// After eliminate().
+  [[nodiscard]] const PointFactor& factor() const { return L_; }
+  [[nodiscard]] const Eigen::Vector3d& z() const { return z_; }
 
  private:
   struct Camera {
@@ -74,6 +62,8 @@ class LandmarkLanes {
   lanes::PointSums sums_;
   std::size_t count_ = 0;
   int valid_states_ = 0;
+  PointFactor L_;
+  Eigen::Vector3d z_;
   PoseGroup groups_[kMaxGroups];
 };
 

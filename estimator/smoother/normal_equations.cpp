@@ -108,9 +108,16 @@ void NormalEquations::begin(const CalibrationLayout& calibration, int dimension)
   calibration_ = calibration;
   dimension_ = dimension;
   cost_ = 0;
-  H().setZero();
+  MatrixMap h = H();
+  for (int c = 0; c < dimension; ++c) h.col(c).tail(dimension - c).setZero();
   g().setZero();
-  for (PoseBlock& b : blocks_) b.fill(0.0);
+  // Only what the last system used is not zero.
+  for (std::size_t i = 0; i < kMaxStates; ++i) {
+    if (!touched_[i]) continue;
+    for (std::size_t j = 0; j < kMaxStates; ++j) {
+      if (touched_[j]) block(i, j).fill(0.0);
+    }
+  }
   for (auto& gradient : pose_gradient_) gradient.fill(0.0);
   touched_.fill(false);
 }
@@ -145,16 +152,20 @@ void NormalEquations::addDiagonal(const WindowState& state, int first, const Eig
 
 bool NormalEquations::addLandmark(const Landmark& landmark, RigPoses poses,
                                   const std::array<SE3, kMaxCameras>& T_body_cam,
-                                  const std::array<WindowState, kMaxStates>& states) {
-  return calibration_.dimension() == 0 ? addLandmarkInLanes(landmark, poses, T_body_cam, states)
-                                       : addLandmarkWithCalibration(landmark, poses, T_body_cam, states);
+                                  const std::array<WindowState, kMaxStates>& states,
+                                  EliminatedPoint* eliminated) {
+  return calibration_.dimension() == 0
+             ? addLandmarkInLanes(landmark, poses, T_body_cam, states, eliminated)
+             : addLandmarkWithCalibration(landmark, poses, T_body_cam, states, eliminated);
 }
 
 bool NormalEquations::addLandmarkInLanes(const Landmark& landmark, RigPoses poses,
                                          const std::array<SE3, kMaxCameras>& T_body_cam,
-                                         const std::array<WindowState, kMaxStates>& states) {
+                                         const std::array<WindowState, kMaxStates>& states,
+                                         EliminatedPoint* kept) {
   LandmarkLanes linearized(landmark, poses, T_body_cam);
   if (!linearized.eliminate()) return false;
+  if (kept != nullptr) kept->begin(linearized.factor(), linearized.z());
   cost_ += linearized.cost();
   std::array<EliminatedPose, kMaxStates> eliminated;
   std::size_t count = 0;
@@ -180,6 +191,7 @@ bool NormalEquations::addLandmarkInLanes(const Landmark& landmark, RigPoses pose
       for (std::size_t i = 0; i < kPoseDim; ++i) pose.y[k][i] = group.point[i][k][lane];
       pose.y[k][kPoseDim] = pose.y[k][kPoseDim + 1] = 0;
     }
+    if (kept != nullptr) kept->addState(pose.slot, pose.y[0], pose.y[1], pose.y[2]);
   }
   subtractPairs({eliminated.data(), count}, states);
   return true;
@@ -187,7 +199,8 @@ bool NormalEquations::addLandmarkInLanes(const Landmark& landmark, RigPoses pose
 
 bool NormalEquations::addLandmarkWithCalibration(const Landmark& landmark, RigPoses poses,
                                                  const std::array<SE3, kMaxCameras>& T_body_cam,
-                                                 const std::array<WindowState, kMaxStates>& states) {
+                                                 const std::array<WindowState, kMaxStates>& states,
+                                                 EliminatedPoint* kept) {
   const CalibratedLandmark linearized = linearize(landmark, calibration_, poses, T_body_cam);
   PointFactor L;
   if (linearized.poses.size() < 2 || !L.compute(linearized.C)) return false;
@@ -196,6 +209,10 @@ bool NormalEquations::addLandmarkWithCalibration(const Landmark& landmark, RigPo
   const Eigen::Vector3d z =
       timesInverseTransposed<Eigen::RowVector3d>(linearized.c.transpose(), L).transpose();
   const CalibrationPoint Y_k = timesInverseTransposed(linearized.B_k, L);
+  if (kept != nullptr) {
+    kept->begin(L, z);
+    kept->setCalibration(Y_k, dimension);
+  }
   MatrixMap h = H();
   h.topLeftCorner(dimension, dimension) +=
       (linearized.K - Y_k * Y_k.transpose()).topLeftCorner(dimension, dimension);
@@ -210,6 +227,7 @@ bool NormalEquations::addLandmarkWithCalibration(const Landmark& landmark, RigPo
     for (int k = 0; k < 3; ++k) {
       Eigen::Map<Eigen::Matrix<double, kRows, 1>>(target.y[k]) << Y.col(k), 0, 0;
     }
+    if (kept != nullptr) kept->addState(target.slot, target.y[0], target.y[1], target.y[2]);
     Eigen::Map<Eigen::Matrix<double, kRows, kPoseDim>>(block(pose.slot, pose.slot).data())
         .topRows<kPoseDim>() += pose.A - Y * Y.transpose();
     Eigen::Map<PoseVector>(pose_gradient_[pose.slot].data()) += pose.a - Y * z;

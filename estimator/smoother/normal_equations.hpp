@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "estimator/smoother/cholesky.hpp"
+#include "estimator/smoother/eliminated_point.hpp"
 #include "estimator/smoother/imu_factor.hpp"
 #include "estimator/smoother/prior.hpp"
 #include "estimator/smoother/state.hpp"
@@ -51,6 +52,9 @@ class NormalEquations {
   [[nodiscard]] double cost() const { return cost_; }
   MatrixMap H();
   VectorMap g();
+  /// Gives the matrix's memory away, for other memory of alignedMapSize(kMaxSystemDim): until begin()
+  /// there is no H. A factor is kept in this way without being copied.
+  void swapMatrix(std::vector<double>& memory) { h_.swap(memory); }
 
   /// Both states have all 15 columns.
   void addMotion(const MotionFactor& factor, const WindowState& i, const WindowState& j);
@@ -59,10 +63,11 @@ class NormalEquations {
   /// minus its reference, in their unit, as is `sigma`.
   void addDiagonal(const WindowState& state, int first, const Eigen::Vector3d& residual, double sigma);
 
-  /// Eliminates a landmark. False when it does not constrain anything (fewer than two states, or not
-  /// in front of a camera at the linearization point).
+  /// Eliminates a landmark; `eliminated`, unless null, gets what its back-substitution needs. False when
+  /// it does not constrain anything (fewer than two states, or not in front of a camera at the
+  /// linearization point).
   bool addLandmark(const Landmark& landmark, RigPoses poses, const std::array<SE3, kMaxCameras>& T_body_cam,
-                   const std::array<WindowState, kMaxStates>& states);
+                   const std::array<WindowState, kMaxStates>& states, EliminatedPoint* eliminated = nullptr);
 
   /// Scatters the pose blocks; call once after all factors. Fills the lower triangle of H.
   void finish(const std::array<WindowState, kMaxStates>& states);
@@ -79,10 +84,10 @@ class NormalEquations {
 
   bool addLandmarkInLanes(const Landmark& landmark, RigPoses poses,
                           const std::array<SE3, kMaxCameras>& T_body_cam,
-                          const std::array<WindowState, kMaxStates>& states);
+                          const std::array<WindowState, kMaxStates>& states, EliminatedPoint* kept);
   bool addLandmarkWithCalibration(const Landmark& landmark, RigPoses poses,
                                   const std::array<SE3, kMaxCameras>& T_body_cam,
-                                  const std::array<WindowState, kMaxStates>& states);
+                                  const std::array<WindowState, kMaxStates>& states, EliminatedPoint* kept);
   /// -Y_i Y_j^T for each pair of different states.
   void subtractPairs(std::span<const EliminatedPose> poses,
                      const std::array<WindowState, kMaxStates>& states);

@@ -15,8 +15,8 @@ constexpr double kGaugeSigma = 1e-4;  // m, rad
 constexpr double kReintegrateGyro = 5e-4;   // rad/s
 constexpr double kReintegrateAccel = 5e-2;  // m/s^2
 constexpr double kRelativeDamping = 1e-10;
-constexpr int kTriangulationStart = 6;  // iterations for a landmark in its first solve
-constexpr int kTriangulationFollow = 2;
+constexpr int kTriangulationStart = 6;    // iterations for a landmark in its first solve
+constexpr int kTriangulationRestart = 2;  // and for all when states have gone back
 constexpr double kConverged = 1e-4;            // largest step worth another iteration: m, rad, m/s
 constexpr double kCostIncreaseAllowed = 0.02;  // of the factors' cost, before a step is taken back
 constexpr double kOutlierSigmas = 20.0;        // of one sighting, during the solve
@@ -50,6 +50,7 @@ Smoother::Smoother(const Rig& rig, const ImuNoise& noise, const SmootherSettings
       landmarks_(kMaxLandmarks),
       landmark_ids_(kMaxLandmarks, 0),
       in_system_(kMaxLandmarks, 0),
+      eliminated_(kMaxLandmarks),
       step_(kMaxSystemDim),
       factor_(alignedMapSize(kMaxSystemDim)),
       columns_i_(static_cast<std::size_t>(kMaxSystemDim) * kStateDim),
@@ -197,8 +198,10 @@ Landmark* Smoother::newLandmark(TrackId id) {
 }
 
 void Smoother::removeLandmark(Landmark& landmark) {
+  const auto index = static_cast<std::size_t>(&landmark - landmarks_.data());
   landmark.sightings.clear();
-  landmark_ids_[static_cast<std::size_t>(&landmark - landmarks_.data())] = 0;
+  landmark_ids_[index] = 0;
+  in_system_[index] = 0;
 }
 
 void Smoother::addSightings(std::uint8_t slot, const TrackedFrame& frame) {
@@ -280,17 +283,31 @@ void Smoother::placeCameras() {
   }
 }
 
+// Landmarks that have no point yet get one; the others move by `iterations` steps of their own, with none
+// they are only looked at.
 void Smoother::triangulateAll(int iterations) {
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     if (landmark_ids_[i] == 0) continue;
     Landmark& landmark = landmarks_[i];
-    const bool fresh = !landmark.point.triangulated;
-    if (iterations == 0 && in_system_[i] == 0) continue;
+    const int steps = landmark.point.triangulated ? iterations : kTriangulationStart;
     in_system_[i] = landmark.sightings.size() >= 2 &&
-                            triangulate(rig_poses_, landmark.views(),
-                                        fresh ? kTriangulationStart : std::max(iterations, 1), landmark.point)
+                            triangulate(rig_poses_, landmark.views(), steps, landmark.point)
                         ? 1
                         : 0;
+  }
+}
+
+// The points' part of the step that was solved for.
+void Smoother::substitutePoints(const VectorMap& step) {
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    if (in_system_[i] == 0) continue;
+    LandmarkPoint& point = landmarks_[i].point;
+    const Eigen::Vector3d point_step = eliminated_[i].step(step, states_);
+    if (point_step.allFinite()) {
+      movePoint(point_step, PointBasis::of(point.bearing), point);
+    } else {
+      in_system_[i] = 0;
+    }
   }
 }
 
@@ -388,7 +405,9 @@ void Smoother::buildSystem() {
   for (std::size_t k = 1; k < order_.size(); ++k) addMotionFactor(k);
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     if (in_system_[i] == 0) continue;
-    if (!system_.addLandmark(landmarks_[i], rig_poses_, T_body_cam_, states_)) in_system_[i] = 0;
+    if (!system_.addLandmark(landmarks_[i], rig_poses_, T_body_cam_, states_, &eliminated_[i])) {
+      in_system_[i] = 0;
+    }
   }
   system_.finish(states_);
 }
@@ -437,13 +456,15 @@ Status Smoother::solve(int iterations) {
   for (int iteration = 0; iteration < iterations; ++iteration) {
     moveEstimates();
     placeCameras();
-    triangulateAll(kTriangulationFollow);
+    if (iteration == 0) triangulateAll(0);
     if (iteration == 1) rejectOutliers(kOutlierSigmas, true);
     buildSystem();
     // The prior's cost has an offset of its own: only differences of the sum mean anything.
     const double total = system_.cost() + prior_cost_;
     if (iteration > 1 && total > cost + kCostIncreaseAllowed * system_.cost()) {
       restore();
+      placeCameras();
+      triangulateAll(kTriangulationRestart);
       break;
     }
     cost = total;
@@ -457,9 +478,10 @@ Status Smoother::solve(int iterations) {
     keepFactor();
     VectorMap step(step_.data(), dimension_);
     step = -system_.g();
-    choleskySolve(H, step);
+    choleskySolve(alignedMap(factor_, dimension_), step);
     if (!step.allFinite()) return {StatusCode::kFailed, "the window's solution is not finite; reset"};
     backup();
+    substitutePoints(step);
     applyStep(step);
     statistics_.iterations = iteration + 1;
     if (largestStep(step, calibration_.time_offset) < kConverged) break;
@@ -500,7 +522,6 @@ void Smoother::rejectOutliers(double threshold, bool newest_only) {
                   meanSquaredResidual(rig_poses_, landmark.views(), landmark.point) > threshold * threshold);
     if (bad && ++landmark.rejections >= kMaxRejections) {
       removeLandmark(landmark);
-      in_system_[i] = 0;
     } else if (bad) {
       landmark.point.triangulated = false;
     }
@@ -512,9 +533,8 @@ void Smoother::updateStatistics() {
   double sum = 0;
   int views = 0;
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
-    if (landmark_ids_[i] == 0 || in_system_[i] == 0) continue;
+    if (in_system_[i] == 0) continue;
     const Landmark& landmark = landmarks_[i];
-    if (landmark.sightings.empty()) continue;
     ++statistics_.landmarks;
     const int count = landmark.viewCount();
     sum += meanSquaredResidual(rig_poses_, landmark.views(), landmark.point) * count;
@@ -540,7 +560,7 @@ void Smoother::window(SmoothedWindow& out) const {
   }
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     const Landmark& landmark = landmarks_[i];
-    if (landmark_ids_[i] == 0 || in_system_[i] == 0 || landmark.point.inverse_depth <= 0) continue;
+    if (in_system_[i] == 0 || landmark.point.inverse_depth <= 0) continue;
     static_cast<void>(out.landmarks.tryPushBack({landmark.id - 1, landmark.point.position(),
                                                  landmark.point.inverse_depth_sigma,
                                                  static_cast<int>(landmark.sightings.size())}));

@@ -127,6 +127,7 @@ class Smoother {
   void addMotionFactor(std::size_t position);
   void addRestFactor(const WindowState& i, const WindowState& j);
   void triangulateAll(int iterations);
+  void substitutePoints(const VectorMap& step);
   void startPrior();
   [[nodiscard]] Eigen::Matrix<double, kMaxCalibrationDim, 1> calibrationDeviation() const;
   void applyStep(const Eigen::Ref<const Eigen::VectorXd>& step);
@@ -164,6 +165,7 @@ class Smoother {
   std::vector<Landmark> landmarks_;
   std::vector<TrackId> landmark_ids_;    // of landmarks_, 0 where free: searched far more often than read
   std::vector<std::uint8_t> in_system_;  // landmark takes part in this solve
+  std::vector<EliminatedPoint> eliminated_;
   Prior prior_;
   Prior next_prior_;
   NormalEquations system_;

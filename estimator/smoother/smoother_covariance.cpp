@@ -9,9 +9,9 @@ namespace swiftlet {
 
 // The factor outlives the system, which marginalization reuses.
 void Smoother::keepFactor() {
-  MatrixMap L = system_.H();
+  system_.swapMatrix(factor_);
+  const MatrixMap L = alignedMap(factor_, dimension_);
   factor_dimension_ = dimension_;
-  alignedMap(factor_, dimension_) = L;
   for (const std::uint8_t slot : order_) {
     states_[slot].factor_offset = states_[slot].offset;
     states_[slot].factor_dimension = states_[slot].dimension();

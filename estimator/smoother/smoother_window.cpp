@@ -175,7 +175,7 @@ void Smoother::buildMarginalSystem(std::size_t position, bool with_motion_factor
   if (with_motion_factor) involved_[order_[position + 1]] = 1;
   if (with_landmarks) {
     for (std::size_t i = 0; i < landmarks_.size(); ++i) {
-      if (landmark_ids_[i] == 0 || in_system_[i] == 0 || !leavesWith(landmarks_[i], slot)) continue;
+      if (in_system_[i] == 0 || !leavesWith(landmarks_[i], slot)) continue;
       for (const Sighting& s : landmarks_[i].sightings) involved_[s.slot] = 1;
     }
   }
@@ -195,7 +195,6 @@ void Smoother::buildMarginalSystem(std::size_t position, bool with_motion_factor
         static_cast<void>(system_.addLandmark(landmarks_[i], rig_poses_, T_body_cam_, states_));
       }
       removeLandmark(landmarks_[i]);
-      in_system_[i] = 0;
     }
   }
   system_.finish(states_);

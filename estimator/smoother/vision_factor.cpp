@@ -17,13 +17,6 @@ constexpr double kGuessedInverseDepth = 0.3;  // 1/m
 constexpr double kStepTolerance = 1e-5;
 constexpr double kCostRounding = 1e-9;  // relative, and in squared sigmas: far below what a step can matter
 
-void movePoint(const Eigen::Vector3d& step, const PointBasis& basis, LandmarkPoint& point) {
-  const Eigen::Vector3d moved = point.bearing + step[0] * basis.b1 + step[1] * basis.b2;
-  const double scale = 1.0 / moved.norm();
-  point.bearing = moved * scale;
-  point.inverse_depth = std::clamp((point.inverse_depth + step[2]) * scale, 0.0, kMaxInverseDepth);
-}
-
 // Along the first sighting's ray the residuals are nearly linear in the inverse depth alone.
 void triangulateLinearly(RigPoses poses, std::span<const Sighting> sightings, LandmarkPoint& point) {
   const Sighting& first = sightings.front();
@@ -62,6 +55,13 @@ PointBasis PointBasis::of(const Eigen::Vector3d& bearing) {
       std::abs(bearing.z()) < 0.9 ? Eigen::Vector3d::UnitZ() : Eigen::Vector3d::UnitX();
   const Eigen::Vector3d b1 = bearing.cross(axis).normalized();
   return {b1, bearing.cross(b1)};
+}
+
+void movePoint(const Eigen::Vector3d& step, const PointBasis& basis, LandmarkPoint& point) {
+  const Eigen::Vector3d moved = point.bearing + step[0] * basis.b1 + step[1] * basis.b2;
+  const double scale = 1.0 / moved.norm();
+  point.bearing = moved * scale;
+  point.inverse_depth = std::clamp((point.inverse_depth + step[2]) * scale, 0.0, kMaxInverseDepth);
 }
 
 RobustWeight RobustWeight::cauchy(double squared_norm) {

@@ -19,7 +19,6 @@ constexpr std::size_t kRecent = 4;
 constexpr double kPixelSigma = 0.6;  // px
 // As in Smoother::solve.
 constexpr int kTriangulationStart = 6;
-constexpr int kTriangulationFollow = 2;
 constexpr double kRelativeDamping = 1e-10;
 // How far values are off when an update begins: all states by one common amount (what the new frame
 // tells about bias and place), the new state, predicted by the IMU alone, by its own in addition.
@@ -48,6 +47,7 @@ BenchmarkWindow::BenchmarkWindow(const TrackFlight& flight, std::size_t newest)
   chooseStates(flight, newest);
   linkStates(flight);
   addLandmarks(flight);
+  eliminated_.resize(landmarks.size());
   makePrior();
   for (const std::uint8_t slot : order) {
     states[slot].offset = dimension_;
@@ -198,8 +198,10 @@ void BenchmarkWindow::addPrior() {
 bool BenchmarkWindow::update(int iterations) {
   for (int iteration = 0; iteration < iterations; ++iteration) {
     placeCameras();
-    for (Landmark& landmark : landmarks) {
-      if (!triangulate(poses_, landmark.views(), kTriangulationFollow, landmark.point)) return false;
+    if (iteration == 0) {
+      for (Landmark& landmark : landmarks) {
+        if (!triangulate(poses_, landmark.views(), 0, landmark.point)) return false;
+      }
     }
     system_.begin({}, dimension_);
     addPrior();
@@ -208,15 +210,20 @@ bool BenchmarkWindow::update(int iterations) {
       if (!motionFactor(k, factor)) return false;
       system_.addMotion(factor, states[order[k - 1]], states[order[k]]);
     }
-    for (const Landmark& landmark : landmarks) {
-      if (!system_.addLandmark(landmark, poses_, rig.T_body_cam, states)) return false;
+    for (std::size_t i = 0; i < landmarks.size(); ++i) {
+      if (!system_.addLandmark(landmarks[i], poses_, rig.T_body_cam, states, &eliminated_[i])) return false;
     }
     system_.finish(states);
     MatrixMap H = system_.H();
     for (int k = 0; k < dimension_; ++k) H(k, k) *= 1.0 + kRelativeDamping;
     if (!choleskyInPlace(H)) return false;
     step_ = -system_.g();
-    choleskySolve(H, VectorMap(step_.data(), dimension_));
+    const VectorMap step(step_.data(), dimension_);
+    choleskySolve(H, step);
+    for (std::size_t i = 0; i < landmarks.size(); ++i) {
+      LandmarkPoint& point = landmarks[i].point;
+      movePoint(eliminated_[i].step(step, states), PointBasis::of(point.bearing), point);
+    }
     for (const std::uint8_t slot : order) {
       WindowState& state = states[slot];
       Vector15d delta = Vector15d::Zero();
@@ -225,9 +232,6 @@ bool BenchmarkWindow::update(int iterations) {
     }
   }
   placeCameras();
-  for (Landmark& landmark : landmarks) {
-    if (!triangulate(poses_, landmark.views(), kTriangulationFollow, landmark.point)) return false;
-  }
   return true;
 }
 

@@ -64,6 +64,7 @@ class BenchmarkWindow {
   void addPrior();
 
   NormalEquations system_;
+  std::vector<EliminatedPoint> eliminated_;
   std::array<RigPose, kMaxStates> poses_;
   Eigen::VectorXd step_;
   int dimension_ = 0;
