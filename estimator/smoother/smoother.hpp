@@ -7,7 +7,7 @@
 // the prior, the latter with the landmarks that it saw and no recent frame sees. States that the prior
 // touches keep their first estimate as linearization point, moved with the window (moveEstimates).
 // Frames: world (z up, origin and yaw of the first state), body (= IMU), cameras. SI units, pixels.
-// Memory: 9.8 MiB, all reserved by the constructor (table in docs/smoother.md); nothing is allocated
+// Memory: 11.8 MiB, all reserved by the constructor (table in docs/smoother.md); nothing is allocated
 // after it. Full is normal: the landmark not seen for longest, and the oldest IMU samples, go first.
 // Cost: linear in landmarks, cubic in the window's dimension (at most 192 columns by default).
 // Sources: Leutenegger et al., "Keyframe-based visual-inertial odometry using nonlinear
