@@ -36,7 +36,7 @@ using Window = std::array<float, kPatchSize * kLanes>;
 // Between a square and a disc, |x|^3 + |y|^3: pixels in the corners are the first to leave the
 // surface that carries the feature, yet on an even surface they count like all others. On image
 // pairs a disc errs by 2 to 3 % more under shifts, a square by 2 % more under warps; with an
-// exponent of 4 the map of a rendered flight with near walls errs by a fifth more.
+// exponent of 4 the map of a rendered flight with near walls errs by a quarter more.
 Window makeWindow() {
   Window window{};
   for (int y = 0; y < kPatchSize; ++y) {
