@@ -20,6 +20,27 @@ constexpr float kMaxDeterminant = 10.0F;
 // Steps below this [px] end the iterations.
 constexpr float kStop = 0.01F;
 
+using Window = std::array<float, kRows * kLanes>;
+
+// A disc: pixels in the corners of the square are the first to leave the surface that carries the
+// feature. On rendered flights the full square gives young tracks 5 % less error and old ones (80
+// frames) a third more outliers. Weight falls linearly over the outermost pixel.
+Window makeWindow() {
+  Window window{};
+  for (int y = 0; y < kPatchSize; ++y) {
+    for (int x = 0; x < kPatchSize; ++x) {
+      const auto dx = static_cast<float>(x - kPatchRadius);
+      const auto dy = static_cast<float>(y - kPatchRadius);
+      const float radius = std::sqrt(dx * dx + dy * dy);
+      const float edge = static_cast<float>(kPatchRadius) + 1.0F;
+      window[static_cast<std::size_t>(y * kLanes + x)] = std::clamp(edge - radius, 0.0F, 1.0F);
+    }
+  }
+  return window;
+}
+
+const Window kWindow = makeWindow();
+
 using Vector6f = Eigen::Matrix<float, 6, 1>;
 
 struct Gradients {
@@ -29,7 +50,7 @@ struct Gradients {
 };
 
 void readTemplate(const ImageView& patch, int cx, int cy, Gradients& g) {
-  const float* window = patchWindow();
+  const float* window = kWindow.data();
   for (int r = 0; r < kRows; ++r) {
     const std::uint8_t* row = patch.row(cy - kPatchRadius + r) + (cx - kPatchRadius);
     const std::uint8_t* above = row - patch.stride;
@@ -47,7 +68,7 @@ void readTemplate(const ImageView& patch, int cx, int cy, Gradients& g) {
 }  // namespace
 
 bool AffineTemplate::build(const ImageView& patch, int cx, int cy) {
-  const float* window = patchWindow();
+  const float* window = kWindow.data();
   Gradients g;
   readTemplate(patch, cx, cy, g);
   // Parameters: t_x, t_y, then dA row by row; the last two are gain and offset.
@@ -121,7 +142,7 @@ struct Light {
 
 // Weighted regression of the image on the template.
 Light fitLight(const float* value, const float* image) {
-  const float* window = patchWindow();
+  const float* window = kWindow.data();
   std::array<float, kLanes> w{}, t{}, i{}, tt{}, ii{}, ti{};
   for (int k = 0; k < kRows; ++k) {
     for (std::size_t c = 0; c < kLanes; ++c) {

@@ -185,11 +185,12 @@ bool Frontend::Impl::locate(AnchorPatch& anchor, std::size_t c, const PredictedL
   pixel = landmark.pixel[c];
   for (int level = AnchorPatch::kLevels - 1; level >= 0; --level) {
     const auto scale = static_cast<float>(1 << level);
+    const auto finish = level == 0 ? PatchTemplate::Finish::kFine : PatchTemplate::Finish::kCoarse;
     const ImageView& image = camera_[c].now().level(level);
     Eigen::Vector2f position = pixel / scale;
     const bool found = patch.sample(anchor.view(level), anchor.centre(level), inverse) &&
                        pattern.build(patch.centre(), patch.stride()) &&
-                       pattern.align(image, limits, position);
+                       pattern.align(image, limits, finish, position);
     if (found) pixel = position * scale;
     if (!found && level == 0) return false;
   }

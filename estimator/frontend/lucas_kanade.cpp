@@ -14,6 +14,7 @@ bool trackForward(const Pyramid& from, const Eigen::Vector2f& from_pixel, const 
   for (int level = std::min(levels, from.levels()) - 1; level >= 0; --level) {
     const ImageView& image = from.level(level);
     const auto scale = static_cast<float>(1 << level);
+    const auto finish = level == 0 ? PatchTemplate::Finish::kFine : PatchTemplate::Finish::kCoarse;
     const Eigen::Vector2f centre = from_pixel / scale;
     const auto x = static_cast<int>(std::lround(centre.x()));
     const auto y = static_cast<int>(std::lround(centre.y()));
@@ -23,7 +24,7 @@ bool trackForward(const Pyramid& from, const Eigen::Vector2f& from_pixel, const 
       continue;
     }
     Eigen::Vector2f position = to_pixel / scale - offset;
-    if (!patch.align(to.level(level), limits, position)) {
+    if (!patch.align(to.level(level), limits, finish, position)) {
       if (level == 0) return false;
       continue;
     }

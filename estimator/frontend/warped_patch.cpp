@@ -51,10 +51,11 @@ bool alignWarped(const Pyramid& from, const Eigen::Vector2f& from_pixel, const E
   constexpr int kBorder = kPyramidBorder / 2;
   for (int level = levels - 1; level >= 0; --level) {
     const auto scale = static_cast<float>(1 << level);
+    const auto finish = level == 0 ? PatchTemplate::Finish::kFine : PatchTemplate::Finish::kCoarse;
     const bool built = patch.sample(from.level(level), from_pixel / scale, inverse, kBorder) &&
                        pattern.build(patch.centre(), patch.stride());
     Eigen::Vector2f position = to_pixel / scale;
-    const bool found = built && pattern.align(to.level(level), limits, position);
+    const bool found = built && pattern.align(to.level(level), limits, finish, position);
     if (found) to_pixel = position * scale;
     if (!found && level == 0) return false;
   }

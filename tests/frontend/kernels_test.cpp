@@ -124,8 +124,8 @@ TEST_CASE("alignment: vector and scalar code agree to the bit") {
               scalar.build<simd::Scalar>(image.row(y) + x, image.stride));
       Eigen::Vector2f p(static_cast<float>(x), static_cast<float>(y));
       Eigen::Vector2f q = p;
-      const bool found = native.align(second.level(0), {}, p);
-      REQUIRE(found == scalar.align<simd::Scalar>(second.level(0), {}, q));
+      const bool found = native.align(second.level(0), {}, PatchTemplate::Finish::kFine, p);
+      REQUIRE(found == scalar.align<simd::Scalar>(second.level(0), {}, PatchTemplate::Finish::kFine, q));
       CHECK(p.x() == q.x());
       CHECK(p.y() == q.y());
       compared += found ? 1 : 0;
