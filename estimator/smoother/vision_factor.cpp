@@ -64,10 +64,10 @@ PointBasis PointBasis::of(const Eigen::Vector3d& bearing) {
   return {b1, bearing.cross(b1)};
 }
 
-RobustWeight RobustWeight::cauchy(double squared_norm) {
+RobustWeight RobustWeight::cauchy(double squared_norm, double information_scale) {
   const double c2 = kCauchyScale * kCauchyScale;
-  return {kInformationScale / (1.0 + squared_norm / c2),
-          0.5 * kInformationScale * c2 * std::log1p(squared_norm / c2)};
+  return {information_scale / (1.0 + squared_norm / c2),
+          0.5 * information_scale * c2 * std::log1p(squared_norm / c2)};
 }
 
 bool reprojectionResidual(const CameraSighting& sighting, const CameraPose& camera,
