@@ -31,10 +31,12 @@ constexpr double kExtrinsicPositionSigma = 2e-3;  // m
 constexpr int kMaxRejections = 3;
 
 // Of the 3-vectors that a step is made of, the longest, and the time offset's where it comes first. Lengths,
-// not components: when the iteration ends must not depend on which way the world's axes point.
-double largestStep(const VectorMap& step, bool with_time_offset) {
+// not components: when the iteration ends must not depend on which way the world's axes point. Without the
+// extra states' columns, `extra` behind the first `calibration`: points far away are not worth an iteration.
+double largestStep(const VectorMap& step, bool with_time_offset, int calibration, int extra) {
   double largest = with_time_offset ? std::abs(step[0]) : 0;
   for (Eigen::Index k = with_time_offset ? 1 : 0; k + 3 <= step.size(); k += 3) {
+    if (k >= calibration && k < calibration + extra) continue;
     largest = std::max(largest, step.segment<3>(k).norm());
   }
   return largest;
@@ -54,7 +56,7 @@ Smoother::Smoother(const Rig& rig, const ImuNoise& noise, const SmootherSettings
       factor_(alignedMapSize(kMaxSystemDim)),
       columns_i_(static_cast<std::size_t>(kMaxSystemDim) * kStateDim),
       columns_j_(static_cast<std::size_t>(kMaxSystemDim) * kStateDim),
-      involved_(kMaxStates, 0) {
+      involved_(kMaxStates + kMaxExtraStates, 0) {
   calibration_.time_offset = settings.estimate_time_offset;
   calibration_.extrinsics = settings.estimate_extrinsics;
   calibration_.cameras = rig.camera_count;
@@ -68,6 +70,8 @@ void Smoother::reset() {
   for (WindowState& state : states_) state.used = false;
   std::fill(landmark_ids_.begin(), landmark_ids_.end(), 0);
   std::fill(in_system_.begin(), in_system_.end(), std::uint8_t{0});
+  for (ExtraState& extra : extras_) extra = ExtraState{};
+  extra_factors_.clear();
   prior_.clear();
   has_start_ = false;
 }
@@ -175,12 +179,15 @@ Landmark* Smoother::findLandmark(TrackId id) {
                                       : &landmarks_[static_cast<std::size_t>(found - landmark_ids_.begin())];
 }
 
-// When full, the landmark that was lost longest ago makes room.
+// When full, the landmark that was lost longest ago makes room; explicit ones leave in their own way.
 Landmark* Smoother::newLandmark(TrackId id) {
   auto free = std::find(landmark_ids_.begin(), landmark_ids_.end(), TrackId{0});
   if (free == landmark_ids_.end()) {
+    static_assert(kMaxExplicitLandmarks < kMaxLandmarks);
     std::size_t oldest = 0;
-    for (std::size_t i = 1; i < landmarks_.size(); ++i) {
+    while (landmarks_[oldest].extra != kNoExtra) ++oldest;
+    for (std::size_t i = oldest + 1; i < landmarks_.size(); ++i) {
+      if (landmarks_[i].extra != kNoExtra) continue;
       if (landmarks_[i].last_frame < landmarks_[oldest].last_frame) oldest = i;
     }
     removeLandmark(landmarks_[oldest]);
@@ -191,6 +198,7 @@ Landmark* Smoother::newLandmark(TrackId id) {
   landmark.id = id;
   landmark.frames_seen = 0;
   landmark.rejections = 0;
+  landmark.extra = kNoExtra;
   landmark.sightings.clear();
   *free = id;
   return &landmark;
@@ -233,6 +241,13 @@ void Smoother::addSightings(std::uint8_t slot, const TrackedFrame& frame) {
 
 void Smoother::assignOffsets() {
   dimension_ = calibration_.dimension();
+  extra_columns_ = 0;
+  for (ExtraState& extra : extras_) {
+    if (extra.kind == ExtraKind::kNone) continue;
+    extra.offset = dimension_ + extra_columns_;
+    extra_columns_ += kExtraDim;
+  }
+  dimension_ += extra_columns_;
   for (const std::uint8_t slot : order_) {
     states_[slot].offset = dimension_;
     dimension_ += states_[slot].dimension();
@@ -257,6 +272,9 @@ void Smoother::moveEstimates() {
   shift /= frozen;
   for (const std::uint8_t slot : order_) {
     if (states_[slot].frozen) states_[slot].moved_estimate.T_world_body.translation += shift;
+  }
+  for (ExtraState& extra : extras_) {
+    if (extra.frozen) extra.translateEstimate(shift);
   }
 }
 
@@ -284,6 +302,10 @@ void Smoother::triangulateAll(int iterations) {
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     if (landmark_ids_[i] == 0) continue;
     Landmark& landmark = landmarks_[i];
+    if (landmark.extra != kNoExtra) {
+      in_system_[i] = landmark.sightings.empty() ? 0 : 1;
+      continue;
+    }
     const bool fresh = !landmark.point.triangulated;
     if (iterations == 0 && in_system_[i] == 0) continue;
     in_system_[i] = landmark.sightings.size() >= 2 &&
@@ -301,21 +323,20 @@ void Smoother::addPrior() {
   VectorMap g = system_.g();
   MatrixMap prior_H = prior_.H();
   Eigen::Map<Eigen::VectorXd> deviation(step_.data(), prior_.dimension());
-  const auto offset_of = [this](const PriorBlock& block) {
-    return block.slot == PriorBlock::kCalibration ? 0 : states_[block.slot].offset;
-  };
   for (const PriorBlock& block : prior_.blocks()) {
     if (block.slot == PriorBlock::kCalibration) {
       deviation.segment(block.offset, block.dimension) = calibrationDeviation().head(block.dimension);
+    } else if (block.isExtra()) {
+      deviation.segment<kExtraDim>(block.offset) = extras_[block.slot - kMaxStates].deviation();
     } else {
       deviation.segment(block.offset, block.dimension) =
           states_[block.slot].x.minus(block.reference).head(block.dimension);
     }
   }
   for (const PriorBlock& row : prior_.blocks()) {
-    const int at = offset_of(row);
+    const int at = offsetOf(row.slot);
     for (const PriorBlock& column : prior_.blocks()) {
-      const int to = offset_of(column);
+      const int to = offsetOf(column.slot);
       if (to > at) continue;
       H.block(at, to, row.dimension, column.dimension) +=
           prior_H.block(row.offset, column.offset, row.dimension, column.dimension);
@@ -387,14 +408,17 @@ void Smoother::buildSystem() {
   addPrior();
   for (std::size_t k = 1; k < order_.size(); ++k) addMotionFactor(k);
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
-    if (in_system_[i] == 0) continue;
+    if (in_system_[i] == 0 || landmarks_[i].extra != kNoExtra) continue;
     if (!system_.addLandmark(landmarks_[i], rig_poses_, T_body_cam_, states_)) in_system_[i] = 0;
   }
+  addExtras();
   system_.finish(states_);
+  finishExtras();
 }
 
 void Smoother::backup() {
   for (const std::uint8_t slot : order_) backup_[slot] = states_[slot].x;
+  for (ExtraState& extra : extras_) extra.backup = extra.x;
   time_offset_backup_ = time_offset_;
   T_body_cam_backup_ = T_body_cam_;
 }
@@ -403,6 +427,7 @@ void Smoother::restore() {
   for (const std::uint8_t slot : order_) states_[slot].x = backup_[slot];
   time_offset_ = time_offset_backup_;
   T_body_cam_ = T_body_cam_backup_;
+  restoreExtras();
 }
 
 void Smoother::applyStep(const Eigen::Ref<const Eigen::VectorXd>& step) {
@@ -419,10 +444,12 @@ void Smoother::applyStep(const Eigen::Ref<const Eigen::VectorXd>& step) {
     delta.head(states_[slot].dimension()) = step.segment(states_[slot].offset, states_[slot].dimension());
     states_[slot].x.retract(delta);
   }
+  retractExtras(step);
 }
 
 Status Smoother::solve(int iterations) {
   assignOffsets();
+  settlePlanes();
   for (std::size_t k = 1; k < order_.size(); ++k) {
     WindowState& state = states_[order_[k]];
     const WindowState& previous = states_[order_[k - 1]];
@@ -462,7 +489,8 @@ Status Smoother::solve(int iterations) {
     backup();
     applyStep(step);
     statistics_.iterations = iteration + 1;
-    if (largestStep(step, calibration_.time_offset) < kConverged) break;
+    if (largestStep(step, calibration_.time_offset, calibration_.dimension(), extra_columns_) < kConverged)
+      break;
   }
   placeCameras();
   rejectOutliers(kFinalOutlierSigmas, true);
@@ -477,7 +505,8 @@ void Smoother::rejectOutliers(double threshold, bool newest_only) {
     if (landmark_ids_[i] == 0) continue;
     Landmark& landmark = landmarks_[i];
     if (newest_only) {
-      if (in_system_[i] == 0 || landmark.sightings.back().slot != newest_slot) continue;
+      if (in_system_[i] == 0 || landmark.sightings.empty()) continue;
+      if (landmark.sightings.back().slot != newest_slot) continue;
       Sighting& sighting = landmark.sightings.back();
       for (std::size_t c = 0; c < rig_.camera_count; ++c) {
         CameraSighting& view = sighting.camera[c];
@@ -490,7 +519,7 @@ void Smoother::rejectOutliers(double threshold, bool newest_only) {
       }
       if (!sighting.camera[0].used && !sighting.camera[1].used) {
         landmark.sightings.popBack();
-        if (++landmark.rejections >= kMaxRejections) removeLandmark(landmark);
+        if (++landmark.rejections >= kMaxRejections) discardLandmark(landmark);
       }
       continue;
     }
@@ -499,9 +528,9 @@ void Smoother::rejectOutliers(double threshold, bool newest_only) {
         tried && (in_system_[i] == 0 ||
                   meanSquaredResidual(rig_poses_, landmark.views(), landmark.point) > threshold * threshold);
     if (bad && ++landmark.rejections >= kMaxRejections) {
-      removeLandmark(landmark);
+      discardLandmark(landmark);
       in_system_[i] = 0;
-    } else if (bad) {
+    } else if (bad && landmark.extra == kNoExtra) {
       landmark.point.triangulated = false;
     }
   }
