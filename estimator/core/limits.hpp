@@ -15,5 +15,9 @@ inline constexpr std::size_t kMaxImuPerFrame = 1024;
 inline constexpr std::size_t kMaxStates = 24;
 /// Landmarks in the smoother's window.
 inline constexpr std::size_t kMaxLandmarks = 1024;
+/// Of these, landmarks that can have columns of their own in the system at a time.
+inline constexpr std::size_t kMaxExplicitLandmarks = 64;
+/// Planes in the smoother's window.
+inline constexpr std::size_t kMaxPlanes = 8;
 
 }  // namespace swiftlet

@@ -4,7 +4,7 @@
 // Two steps a frame, so that an executor may run them on two threads: `track` (images to tracks)
 // and `smooth` (tracks and IMU to states). IMU samples are handed in as they arrive, each before
 // the first frame whose stamp is not earlier. No clock, no files, no threads; everything is
-// reserved by the constructor, nothing is allocated after it: about 18 MiB at 752 x 480 stereo.
+// reserved by the constructor, nothing is allocated after it: about 24 MiB at 752 x 480 stereo.
 // Frames: T_world_body, world gravity-aligned with z up, origin and yaw of the epoch's first state.
 // Stamps: those of images on the image clock, of propagated states on the IMU's. Rules of start, health,
 // events and reset: docs/odometry.md.

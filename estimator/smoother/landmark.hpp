@@ -19,6 +19,7 @@
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/limits.hpp"
 #include "estimator/messages/tracked_frame.hpp"
+#include "estimator/smoother/extra_states.hpp"
 
 namespace swiftlet {
 
@@ -53,7 +54,8 @@ struct Landmark {
   TrackId id = 0;
   std::uint64_t last_frame = 0;  ///< index of the newest frame that saw it
   int frames_seen = 0;
-  int rejections = 0;  ///< solves in which it did not fit
+  int rejections = 0;             ///< solves in which it did not fit
+  std::uint8_t extra = kNoExtra;  ///< index of its own state; none: structureless
   LandmarkPoint point;
   FixedVector<Sighting, kMaxStates> sightings;
 

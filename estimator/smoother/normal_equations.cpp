@@ -1,5 +1,6 @@
 #include "estimator/smoother/normal_equations.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "estimator/core/fixed_vector.hpp"
@@ -148,6 +149,21 @@ void NormalEquations::addDiagonal(const WindowState& state, int first, const Eig
   for (int k = 0; k < 3; ++k) H()(at + k, at + k) += information;
   g().segment<3>(at) += information * residual;
   cost_ += 0.5 * information * residual.squaredNorm();
+}
+
+void NormalEquations::addFactor(const LinearFactor& factor) {
+  MatrixMap h = H();
+  VectorMap gradient = g();
+  for (int a = 0; a < factor.columns; ++a) {
+    const int column_a = factor.column[static_cast<std::size_t>(a)];
+    const Eigen::Vector3d J_a = factor.jacobian.col(a);
+    gradient[column_a] += J_a.dot(factor.residual);
+    for (int b = 0; b <= a; ++b) {
+      const int column_b = factor.column[static_cast<std::size_t>(b)];
+      h(std::max(column_a, column_b), std::min(column_a, column_b)) += J_a.dot(factor.jacobian.col(b));
+    }
+  }
+  cost_ += factor.cost;
 }
 
 bool NormalEquations::addLandmark(const Landmark& landmark, RigPoses poses,

@@ -1,15 +1,15 @@
 #pragma once
-// The reduced normal equations of one Gauss-Newton step: H d = -g over calibration and states, with
-// every landmark already eliminated.
+// The reduced normal equations of one Gauss-Newton step: H d = -g over calibration, extra states and body
+// states, with every structureless landmark already eliminated.
 //
 // Landmarks enter as Schur complements over 6 x 6 pose blocks (padded to 8 rows so that a column is
 // two vector registers), which are scattered into the dense matrix once at the end.
 // Shapes: H is n x n, g is n x 1, n = dimension() <= kMaxSystemDim; of H the lower triangle counts.
-// Columns are the error states of state.hpp. Jacobians at the linearization, residuals at the values.
-// Memory: about 1.3 MiB, reserved by the constructor. Cost of a landmark: linear in its sightings to
-// linearize, quadratic in the states that see it to eliminate; both in vector lanes. While the calibration
-// is estimated, linearization goes view by view.
-// Source: Triggs et al., "Bundle Adjustment - A Modern Synthesis", 1999, section 6.
+// Columns are the error states of state.hpp and extra_states.hpp. Jacobians at the linearization, residuals
+// at the values. Memory: about 2.9 MiB, reserved by the constructor. Cost of a landmark: linear in its
+// sightings to linearize, quadratic in the states that see it to eliminate; both in vector lanes. While the
+// calibration is estimated, linearization goes view by view. Source: Triggs et al., "Bundle Adjustment - A
+// Modern Synthesis", 1999, section 6.
 
 #include <Eigen/Core>
 #include <array>
@@ -20,6 +20,7 @@
 #include "estimator/smoother/cholesky.hpp"
 #include "estimator/smoother/eliminated_point.hpp"
 #include "estimator/smoother/imu_factor.hpp"
+#include "estimator/smoother/linear_factor.hpp"
 #include "estimator/smoother/prior.hpp"
 #include "estimator/smoother/state.hpp"
 #include "estimator/smoother/vision_factor.hpp"
@@ -44,7 +45,7 @@ class NormalEquations {
  public:
   NormalEquations();
 
-  /// Starts a system: calibration first, then the states of `order` with their `offset`.
+  /// Starts a system: calibration first, then whatever has an `offset`.
   void begin(const CalibrationLayout& calibration, int dimension);
 
   [[nodiscard]] int dimension() const { return dimension_; }
@@ -62,6 +63,9 @@ class NormalEquations {
   /// Information 1 / sigma^2 on three columns of one state, from `first` on: `residual` is their value
   /// minus its reference, in their unit, as is `sigma`.
   void addDiagonal(const WindowState& state, int first, const Eigen::Vector3d& residual, double sigma);
+
+  /// Any small factor, over any variables, each column at most once.
+  void addFactor(const LinearFactor& factor);
 
   /// Eliminates a landmark; `eliminated`, unless null, gets what its back-substitution needs. False when
   /// it does not constrain anything (fewer than two states, or not in front of a camera at the

@@ -28,13 +28,14 @@ constexpr double kTimeOffsetSigma = 5e-3;         // s, prior when estimated
 constexpr double kExtrinsicRotationSigma = 0.01;  // rad
 // Calibrations give positions to a few millimetres; a looser prior gives up the baseline, stereo's scale.
 constexpr double kExtrinsicPositionSigma = 2e-3;  // m
-constexpr int kMaxRejections = 3;
 
 // Of the 3-vectors that a step is made of, the longest, and the time offset's where it comes first. Lengths,
-// not components: when the iteration ends must not depend on which way the world's axes point.
-double largestStep(const VectorMap& step, bool with_time_offset) {
+// not components: when the iteration ends must not depend on which way the world's axes point. Without the
+// extra states' columns, `extra` behind the first `calibration`: points far away are not worth an iteration.
+double largestStep(const VectorMap& step, bool with_time_offset, int calibration, int extra) {
   double largest = with_time_offset ? std::abs(step[0]) : 0;
   for (Eigen::Index k = with_time_offset ? 1 : 0; k + 3 <= step.size(); k += 3) {
+    if (k >= calibration && k < calibration + extra) continue;
     largest = std::max(largest, step.segment<3>(k).norm());
   }
   return largest;
@@ -55,7 +56,7 @@ Smoother::Smoother(const Rig& rig, const ImuNoise& noise, const SmootherSettings
       factor_(alignedMapSize(kMaxSystemDim)),
       columns_i_(static_cast<std::size_t>(kMaxSystemDim) * kStateDim),
       columns_j_(static_cast<std::size_t>(kMaxSystemDim) * kStateDim),
-      involved_(kMaxStates, 0) {
+      involved_(kMaxStates + kMaxExtraStates, 0) {
   calibration_.time_offset = settings.estimate_time_offset;
   calibration_.extrinsics = settings.estimate_extrinsics;
   calibration_.cameras = rig.camera_count;
@@ -69,6 +70,8 @@ void Smoother::reset() {
   for (WindowState& state : states_) state.used = false;
   std::fill(landmark_ids_.begin(), landmark_ids_.end(), 0);
   std::fill(in_system_.begin(), in_system_.end(), std::uint8_t{0});
+  for (ExtraState& extra : extras_) extra = ExtraState{};
+  extra_factors_.clear();
   prior_.clear();
   has_start_ = false;
 }
@@ -176,12 +179,15 @@ Landmark* Smoother::findLandmark(TrackId id) {
                                       : &landmarks_[static_cast<std::size_t>(found - landmark_ids_.begin())];
 }
 
-// When full, the landmark that was lost longest ago makes room.
+// When full, the landmark that was lost longest ago makes room; explicit ones leave in their own way.
 Landmark* Smoother::newLandmark(TrackId id) {
   auto free = std::find(landmark_ids_.begin(), landmark_ids_.end(), TrackId{0});
   if (free == landmark_ids_.end()) {
+    static_assert(kMaxExplicitLandmarks < kMaxLandmarks);
     std::size_t oldest = 0;
-    for (std::size_t i = 1; i < landmarks_.size(); ++i) {
+    while (landmarks_[oldest].extra != kNoExtra) ++oldest;
+    for (std::size_t i = oldest + 1; i < landmarks_.size(); ++i) {
+      if (landmarks_[i].extra != kNoExtra) continue;
       if (landmarks_[i].last_frame < landmarks_[oldest].last_frame) oldest = i;
     }
     removeLandmark(landmarks_[oldest]);
@@ -192,6 +198,7 @@ Landmark* Smoother::newLandmark(TrackId id) {
   landmark.id = id;
   landmark.frames_seen = 0;
   landmark.rejections = 0;
+  landmark.extra = kNoExtra;
   landmark.sightings.clear();
   *free = id;
   return &landmark;
@@ -236,6 +243,13 @@ void Smoother::addSightings(std::uint8_t slot, const TrackedFrame& frame) {
 
 void Smoother::assignOffsets() {
   dimension_ = calibration_.dimension();
+  extra_columns_ = 0;
+  for (ExtraState& extra : extras_) {
+    if (extra.kind == ExtraKind::kNone) continue;
+    extra.offset = dimension_ + extra_columns_;
+    extra_columns_ += kExtraDim;
+  }
+  dimension_ += extra_columns_;
   for (const std::uint8_t slot : order_) {
     states_[slot].offset = dimension_;
     dimension_ += states_[slot].dimension();
@@ -260,6 +274,9 @@ void Smoother::moveEstimates() {
   shift /= frozen;
   for (const std::uint8_t slot : order_) {
     if (states_[slot].frozen) states_[slot].moved_estimate.T_world_body.translation += shift;
+  }
+  for (ExtraState& extra : extras_) {
+    if (extra.frozen) extra.translateEstimate(shift);
   }
 }
 
@@ -289,6 +306,10 @@ void Smoother::triangulateAll(int iterations) {
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     if (landmark_ids_[i] == 0) continue;
     Landmark& landmark = landmarks_[i];
+    if (landmark.extra != kNoExtra) {
+      in_system_[i] = landmark.sightings.empty() ? 0 : 1;
+      continue;
+    }
     const int steps = landmark.point.triangulated ? iterations : kTriangulationStart;
     in_system_[i] = landmark.sightings.size() >= 2 &&
                             triangulate(rig_poses_, landmark.views(), steps, landmark.point)
@@ -300,7 +321,7 @@ void Smoother::triangulateAll(int iterations) {
 // The points' part of the step that was solved for.
 void Smoother::substitutePoints(const VectorMap& step) {
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
-    if (in_system_[i] == 0) continue;
+    if (in_system_[i] == 0 || landmarks_[i].extra != kNoExtra) continue;
     LandmarkPoint& point = landmarks_[i].point;
     const Eigen::Vector3d point_step = eliminated_[i].step(step, states_);
     if (point_step.allFinite()) {
@@ -318,21 +339,20 @@ void Smoother::addPrior() {
   VectorMap g = system_.g();
   MatrixMap prior_H = prior_.H();
   Eigen::Map<Eigen::VectorXd> deviation(step_.data(), prior_.dimension());
-  const auto offset_of = [this](const PriorBlock& block) {
-    return block.slot == PriorBlock::kCalibration ? 0 : states_[block.slot].offset;
-  };
   for (const PriorBlock& block : prior_.blocks()) {
     if (block.slot == PriorBlock::kCalibration) {
       deviation.segment(block.offset, block.dimension) = calibrationDeviation().head(block.dimension);
+    } else if (block.isExtra()) {
+      deviation.segment<kExtraDim>(block.offset) = extras_[block.slot - kMaxStates].deviation();
     } else {
       deviation.segment(block.offset, block.dimension) =
           states_[block.slot].x.minus(block.reference).head(block.dimension);
     }
   }
   for (const PriorBlock& row : prior_.blocks()) {
-    const int at = offset_of(row);
+    const int at = offsetOf(row.slot);
     for (const PriorBlock& column : prior_.blocks()) {
-      const int to = offset_of(column);
+      const int to = offsetOf(column.slot);
       if (to > at) continue;
       H.block(at, to, row.dimension, column.dimension) +=
           prior_H.block(row.offset, column.offset, row.dimension, column.dimension);
@@ -404,16 +424,19 @@ void Smoother::buildSystem() {
   addPrior();
   for (std::size_t k = 1; k < order_.size(); ++k) addMotionFactor(k);
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
-    if (in_system_[i] == 0) continue;
+    if (in_system_[i] == 0 || landmarks_[i].extra != kNoExtra) continue;
     if (!system_.addLandmark(landmarks_[i], rig_poses_, T_body_cam_, states_, &eliminated_[i])) {
       in_system_[i] = 0;
     }
   }
+  addExtras();
   system_.finish(states_);
+  finishExtras();
 }
 
 void Smoother::backup() {
   for (const std::uint8_t slot : order_) backup_[slot] = states_[slot].x;
+  for (ExtraState& extra : extras_) extra.backup = extra.x;
   time_offset_backup_ = time_offset_;
   T_body_cam_backup_ = T_body_cam_;
 }
@@ -422,6 +445,7 @@ void Smoother::restore() {
   for (const std::uint8_t slot : order_) states_[slot].x = backup_[slot];
   time_offset_ = time_offset_backup_;
   T_body_cam_ = T_body_cam_backup_;
+  restoreExtras();
 }
 
 void Smoother::applyStep(const Eigen::Ref<const Eigen::VectorXd>& step) {
@@ -438,10 +462,12 @@ void Smoother::applyStep(const Eigen::Ref<const Eigen::VectorXd>& step) {
     delta.head(states_[slot].dimension()) = step.segment(states_[slot].offset, states_[slot].dimension());
     states_[slot].x.retract(delta);
   }
+  retractExtras(step);
 }
 
 Status Smoother::solve(int iterations) {
   assignOffsets();
+  settlePlanes();
   for (std::size_t k = 1; k < order_.size(); ++k) {
     WindowState& state = states_[order_[k]];
     const WindowState& previous = states_[order_[k - 1]];
@@ -484,87 +510,13 @@ Status Smoother::solve(int iterations) {
     substitutePoints(step);
     applyStep(step);
     statistics_.iterations = iteration + 1;
-    if (largestStep(step, calibration_.time_offset) < kConverged) break;
+    if (largestStep(step, calibration_.time_offset, calibration_.dimension(), extra_columns_) < kConverged)
+      break;
   }
   placeCameras();
   rejectOutliers(kFinalOutlierSigmas, true);
   rejectOutliers(kFinalOutlierSigmas, false);
   return okStatus();
-}
-
-// newest_only: single sightings of the newest frame. Otherwise: landmarks that fit nowhere.
-void Smoother::rejectOutliers(double threshold, bool newest_only) {
-  const std::uint8_t newest_slot = order_.back();
-  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
-    if (landmark_ids_[i] == 0) continue;
-    Landmark& landmark = landmarks_[i];
-    if (newest_only) {
-      if (in_system_[i] == 0 || landmark.sightings.back().slot != newest_slot) continue;
-      Sighting& sighting = landmark.sightings.back();
-      for (std::size_t c = 0; c < rig_.camera_count; ++c) {
-        CameraSighting& view = sighting.camera[c];
-        if (!view.used) continue;
-        Eigen::Vector2d r;
-        if (!reprojectionResidual(view, rig_poses_[newest_slot].current[c], landmark.point, r) ||
-            r.squaredNorm() > threshold * threshold) {
-          view.used = false;
-        }
-      }
-      if (!sighting.camera[0].used && !sighting.camera[1].used) {
-        landmark.sightings.popBack();
-        if (++landmark.rejections >= kMaxRejections) removeLandmark(landmark);
-      }
-      continue;
-    }
-    const bool tried = landmark.sightings.size() >= 2;
-    const bool bad =
-        tried && (in_system_[i] == 0 ||
-                  meanSquaredResidual(rig_poses_, landmark.views(), landmark.point) > threshold * threshold);
-    if (bad && ++landmark.rejections >= kMaxRejections) {
-      removeLandmark(landmark);
-    } else if (bad) {
-      landmark.point.triangulated = false;
-    }
-  }
-}
-
-void Smoother::updateStatistics() {
-  const std::uint8_t slot = order_.back();
-  double sum = 0;
-  int views = 0;
-  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
-    if (in_system_[i] == 0) continue;
-    const Landmark& landmark = landmarks_[i];
-    ++statistics_.landmarks;
-    const int count = landmark.viewCount();
-    sum += meanSquaredResidual(rig_poses_, landmark.views(), landmark.point) * count;
-    views += count;
-    const Sighting& last = landmark.sightings.back();
-    if (last.slot != slot) continue;
-    const bool both = last.camera[0].used && last.camera[1].used;
-    ++(both ? statistics_.inliers_stereo : statistics_.inliers_mono);
-  }
-  if (views > 0) statistics_.reprojection_rms = settings_.pixel_sigma * std::sqrt(sum / views);
-  WindowState& state = states_[slot];
-  statistics_.keyframe = state.keyframe;
-  statistics_.at_rest = state.at_rest;
-  state.statistics = statistics_;
-}
-
-void Smoother::window(SmoothedWindow& out) const {
-  out.poses.clear();
-  out.landmarks.clear();
-  for (const std::uint8_t slot : order_) {
-    const WindowState& s = states_[slot];
-    static_cast<void>(out.poses.tryPushBack({s.stamp, s.frame_index, s.keyframe, s.x.T_world_body}));
-  }
-  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
-    const Landmark& landmark = landmarks_[i];
-    if (in_system_[i] == 0 || landmark.point.inverse_depth <= 0) continue;
-    static_cast<void>(out.landmarks.tryPushBack({landmark.id - 1, landmark.point.position(),
-                                                 landmark.point.inverse_depth_sigma,
-                                                 static_cast<int>(landmark.sightings.size())}));
-  }
 }
 
 }  // namespace swiftlet

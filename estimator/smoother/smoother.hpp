@@ -4,20 +4,24 @@
 // Window, in order of time: pose-only keyframes; keyframes with velocity and biases; the newest
 // frames. A frame that is no keyframe leaves by merging its two IMU intervals (nothing is
 // linearized for good); an old keyframe first loses velocity and biases, then its pose, both into
-// the prior, the latter with the landmarks that it saw and no recent frame sees. States that the prior
-// touches keep their first estimate as linearization point, moved with the window (moveEstimates).
+// the prior, the latter with the landmarks that it saw and no recent frame sees. Landmarks are structureless
+// until they are promoted to columns of their own; planes are further columns (extra_states.hpp). States that
+// the prior touches keep their first estimate as linearization point, moved with the window (moveEstimates).
 // Frames: world (z up, origin and yaw of the first state), body (= IMU), cameras. SI units, pixels.
-// Memory: 11.8 MiB, all reserved by the constructor (table in docs/smoother.md); nothing is allocated
+// Memory: 15.6 MiB, all reserved by the constructor (table in docs/smoother.md); nothing is allocated
 // after it. Full is normal: the landmark not seen for longest, and the oldest IMU samples, go first.
-// Cost: linear in landmarks, cubic in the window's dimension (at most 192 columns by default).
+// Cost: linear in landmarks, cubic in the window's dimension (at most 192 columns by default, and 3
+// for each explicit landmark and plane).
 // Sources: Leutenegger et al., "Keyframe-based visual-inertial odometry using nonlinear
 // optimization", IJRR 2015 (window); Huang, Mourikis, Roumeliotis, "Observability-based rules for
 // consistent EKF SLAM", IJRR 2010 (first estimates); Usenko et al., "Visual-Inertial Mapping with
-// Non-Linear Factor Recovery", RA-L 2020 (what leaves when).
+// Non-Linear Factor Recovery", RA-L 2020 (what leaves when); Rosinol, Sattler, Pollefeys, Carlone,
+// "Incremental Visual-Inertial 3D Mesh Generation with Structural Regularities", ICRA 2019 (planes).
 
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "estimator/camera/rig.hpp"
@@ -26,6 +30,7 @@
 #include "estimator/imu/imu_noise.hpp"
 #include "estimator/messages/smoothed_window.hpp"
 #include "estimator/messages/tracked_frame.hpp"
+#include "estimator/smoother/extra_factors.hpp"
 #include "estimator/smoother/imu_buffer.hpp"
 #include "estimator/smoother/normal_equations.hpp"
 #include "estimator/smoother/prior.hpp"
@@ -42,6 +47,22 @@ struct SmootherSettings {
   int max_keyframes = 12;             ///< these and the pose-only ones; with max_recent below kMaxStates
   bool estimate_time_offset = false;  ///< camera to IMU clock
   bool estimate_extrinsics = false;   ///< T_body_cam of each camera
+};
+
+/// Everything that is tied to planes: each explicit landmark to two, each plane with a direction.
+inline constexpr std::size_t kMaxExtraFactors = 2 * kMaxExplicitLandmarks + kMaxPlanes;
+
+enum class PlaneDirection : std::uint8_t {
+  kHorizontal,  ///< a floor, a ceiling, a table: its normal is along z
+  kVertical,    ///< a wall: its normal is orthogonal to z
+};
+
+/// A plane of the window.
+struct PlaneEstimate {
+  Plane plane;
+  /// Of the last solve, in the plane's three columns; zero for a plane that has not been solved for.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  int points = 0;  ///< tied to it
 };
 
 /// What the first state of an epoch is known to be. Its position and yaw define the world.
@@ -104,10 +125,40 @@ class Smoother {
 
   /// Poses in order of time, and the landmarks of the last solve that are not at infinity.
   void window(SmoothedWindow& out) const;
+
+  // Extra states: between two steps. All of it is forgotten by reset().
+
+  /// Gives a landmark columns of its own, from its triangulated position on, until no frame sees it any more.
+  /// Refused: kInvalidInput without such a landmark, kNotReady when it took no part in the last solve,
+  /// kDegenerate at infinity or when its depth is known to less than 10 % (1 sigma), kCapacityReached with
+  /// kMaxExplicitLandmarks. One that is promoted already stays so: ok.
+  Status promote(TrackId id);
+  [[nodiscard]] bool promoted(TrackId id) const;
+
+  /// A new plane, without any information: `plane` is where to start from. Its factors count from the step on
+  /// at which they determine its normal (settlePlanes). It leaves with the next step unless a point is tied
+  /// to it by then, and later when the last point tied to it has left. None when kMaxPlanes are held.
+  std::optional<PlaneId> addPlane(const Plane& plane);
+  /// Ties a promoted landmark to a plane, `sigma` m. Refused: kInvalidInput without such a landmark or plane,
+  /// or when they are tied already; kCapacityReached with kMaxExtraFactors.
+  Status addPointOnPlane(TrackId id, PlaneId plane, double sigma);
+  /// `sigma` rad. Replaces the direction that it has. Refused as above.
+  Status addPlaneDirection(PlaneId plane, PlaneDirection direction, double sigma);
+  /// Unties; what left into the prior with frames of the past stays there. No effect without such a tie.
+  void removePointOnPlane(TrackId id, PlaneId plane);
+  /// Forgets a plane with its factors; what the prior knows through it stays.
+  void removePlane(PlaneId plane);
+  /// Cost: three triangular solves.
+  [[nodiscard]] std::optional<PlaneEstimate> plane(PlaneId plane);
+  [[nodiscard]] std::size_t explicitLandmarks() const;
+  [[nodiscard]] std::size_t planes() const;
+
   /// The keyframes still in the window, oldest first.
   void flush(FixedVector<KeyframeState, kMaxStates>& left_window);
 
  private:
+  static constexpr std::uint8_t kNoSlot = 255;
+
   std::uint8_t addState(const StepInput& input);
   void linkState(WindowState& state, const WindowState& previous, bool gap);
   void integrateLink(WindowState& state, const WindowState& previous);
@@ -115,6 +166,7 @@ class Smoother {
   Landmark* findLandmark(TrackId id);
   Landmark* newLandmark(TrackId id);
   void removeLandmark(Landmark& landmark);
+  void discardLandmark(Landmark& landmark);
 
   Status solve(int iterations);
   void assignOffsets();
@@ -142,10 +194,44 @@ class Smoother {
   void removeState(std::size_t position);
   void removeSightingsOf(std::uint8_t slot);
   void freeze(std::uint8_t slot);
-  /// Removes columns [first, first + count) of the state at `position` into the prior.
-  void marginalize(std::size_t position, int first, int count, bool with_motion_factor, bool with_landmarks);
-  void buildMarginalSystem(std::size_t position, bool with_motion_factor, bool with_landmarks);
+  /// What goes into the prior at a time: columns [first, first + count) of the state at `position`, and the
+  /// extra states marked as leaving.
+  struct Departure {
+    std::size_t position = 0;
+    int first = 0;
+    int count = 0;                    ///< zero: extra states alone
+    bool with_motion_factor = false;  ///< to the next state
+    bool with_landmarks = false;      ///< that no recent frame sees, and its sightings of explicit ones
+  };
+  void marginalize(const Departure& departure);
+  void buildMarginalSystem(const Departure& departure);
+  void expandAtReferences();
+  void eliminateDeparture(const Departure& departure);
+  [[nodiscard]] int offsetOf(std::uint8_t slot) const;
   [[nodiscard]] bool leavesWith(const Landmark& landmark, std::uint8_t slot) const;
+
+  ExtraState* findExtra(ExtraKind kind, std::size_t first, std::size_t last);
+  ExtraState* findPlane(PlaneId id);
+  [[nodiscard]] std::uint8_t indexOf(const ExtraState& extra) const;
+  void syncLandmark(const ExtraState& extra);
+  void linearizeFactor(const ExtraFactor& factor, LinearFactor& linear) const;
+  void addSightingsOf(const ExtraState& extra, std::uint8_t slot);
+  void settlePlanes();
+  double linearizePlane(const ExtraState& plane, Eigen::Matrix3d& H, Eigen::Vector3d& g) const;
+  [[nodiscard]] bool counts(const ExtraFactor& factor) const { return extras_[factor.plane].settled; }
+  void addExtras();
+  void finishExtras();
+  void retractExtras(const Eigen::Ref<const Eigen::VectorXd>& step);
+  void restoreExtras();
+  void markDepartures(std::uint8_t slot);
+  void markBarePlanes();
+  [[nodiscard]] bool departs(const ExtraFactor& factor) const;
+  void involveExtras(std::uint8_t slot);
+  void addDepartingFactors(std::uint8_t slot);
+  void dropFactorsOf(std::uint8_t extra);
+  void freeExtra(ExtraState& extra);
+  void releaseExtras();
+
   void keepFactor();
   /// Columns of L^-1 that give marginals: covariance(a, b) = Y_a^T Y_b.
   void solveFactorColumns(int offset, int count, std::vector<double>& columns);
@@ -167,7 +253,6 @@ class Smoother {
   std::vector<std::uint8_t> in_system_;  // landmark takes part in this solve
   std::vector<EliminatedPoint> eliminated_;
   Prior prior_;
-  Prior next_prior_;
   NormalEquations system_;
   std::array<RigPose, kMaxStates> rig_poses_;
   std::vector<double> step_;
@@ -175,11 +260,16 @@ class Smoother {
   std::vector<double> columns_i_;
   std::vector<double> columns_j_;
   int factor_dimension_ = 0;
-  std::vector<std::uint8_t> involved_;  // slots touched by a marginalization
+  std::vector<std::uint8_t> involved_;  // slots touched by a marginalization, extra ones behind the others
   int dimension_ = 0;
   double prior_cost_ = 0;  // of the last addPrior(), without its constant
   std::uint64_t oldest_recent_frame_ = 0;
   std::array<BodyState, kMaxStates> backup_;
+
+  std::array<ExtraState, kMaxExtraStates> extras_;  // landmarks, then planes
+  FixedVector<ExtraFactor, kMaxExtraFactors> extra_factors_;
+  int extra_columns_ = 0;  // of the system, behind the calibration's
+  PlaneId next_plane_ = 1;
 
   CalibrationLayout calibration_;
   double time_offset_ = 0;  // s, t_imu = t_image + offset

@@ -16,6 +16,7 @@ void Smoother::keepFactor() {
     states_[slot].factor_offset = states_[slot].offset;
     states_[slot].factor_dimension = states_[slot].dimension();
   }
+  for (ExtraState& extra : extras_) extra.factor_offset = extra.kind == ExtraKind::kNone ? -1 : extra.offset;
   // The newest state is last: its marginal is the inverse of the factor's last diagonal block.
   const int at = states_[order_.back()].offset;
   Matrix15d corner = Matrix15d::Zero();

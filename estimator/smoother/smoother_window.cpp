@@ -1,10 +1,10 @@
 // What leaves the window, when, and how.
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "estimator/geometry/so3.hpp"
+#include "estimator/smoother/elimination.hpp"
 #include "estimator/smoother/smoother.hpp"
 
 namespace swiftlet {
@@ -15,8 +15,6 @@ constexpr double kMinSharedLandmarks = 0.05;
 // One radian of turn separates two keyframes as much as this distance.
 constexpr double kMetresPerRadian = 1.0;
 constexpr double kMinDistance = 1e-2;  // m, keeps the score finite
-// Eigenvalues below this share of the largest are not information.
-constexpr double kRelativeRank = 1e-12;
 // Bias walk within one increment is not modelled: longer intervals are not made by merging.
 constexpr double kLongestMergedInterval = 3.0;  // s
 
@@ -62,6 +60,7 @@ void Smoother::trimWindow(FixedVector<KeyframeState, kMaxStates>& left_window) {
       break;
     }
   }
+  releaseExtras();
 }
 
 // A frame between two keyframes: its vision is given up, its two IMU intervals become one.
@@ -72,7 +71,7 @@ void Smoother::dropFrame(std::size_t position) {
   const bool linked =
       position > 0 && states_[order_[position - 1]].has_motion && position + 1 < order_.size();
   if (!linked || state.frozen) {
-    marginalize(position, 0, kStateDim, true, false);
+    marginalize({position, 0, kStateDim, true, false});
     removeState(position);
     return;
   }
@@ -88,12 +87,13 @@ void Smoother::dropFrame(std::size_t position) {
 void Smoother::dropMotion(std::size_t position) {
   WindowState& state = states_[order_[position]];
   state.covariance = record(state).state.covariance;
-  marginalize(position, kPoseDim, kStateDim - kPoseDim, true, false);
+  marginalize({position, kPoseDim, kStateDim - kPoseDim, true, false});
   state.has_motion = false;
 }
 
 void Smoother::dropKeyframe(std::size_t position) {
-  marginalize(position, 0, kPoseDim, false, true);
+  markDepartures(order_[position]);
+  marginalize({position, 0, kPoseDim, false, true});
   removeSightingsOf(order_[position]);
   removeState(position);
 }
@@ -113,7 +113,7 @@ void Smoother::removeSightingsOf(std::uint8_t slot) {
         break;
       }
     }
-    if (landmark.sightings.empty()) removeLandmark(landmark);
+    if (landmark.sightings.empty() && landmark.extra == kNoExtra) removeLandmark(landmark);
   }
 }
 
@@ -157,38 +157,49 @@ void Smoother::freeze(std::uint8_t slot) {
   state.moved_estimate = state.x;
 }
 
-// Landmarks leave with a keyframe once no recent frame sees them.
+// Structureless landmarks leave with a keyframe once no recent frame sees them.
 bool Smoother::leavesWith(const Landmark& landmark, std::uint8_t slot) const {
+  if (landmark.extra != kNoExtra) return false;
   if (landmark.last_frame >= oldest_recent_frame_ || landmark.sightings.size() < 2) return false;
   return std::any_of(landmark.sightings.begin(), landmark.sightings.end(),
                      [slot](const Sighting& s) { return s.slot == slot; });
 }
 
-void Smoother::buildMarginalSystem(std::size_t position, bool with_motion_factor, bool with_landmarks) {
-  const std::uint8_t slot = order_[position];
+int Smoother::offsetOf(std::uint8_t slot) const {
+  if (slot == PriorBlock::kCalibration) return 0;
+  return slot < kMaxStates ? states_[slot].offset : extras_[slot - kMaxStates].offset;
+}
+
+void Smoother::buildMarginalSystem(const Departure& departure) {
+  const std::uint8_t slot = departure.count > 0 ? order_[departure.position] : kNoSlot;
+  const std::uint8_t landmarks_of = departure.with_landmarks ? slot : kNoSlot;
   assignOffsets();
-  std::fill(involved_.begin(), involved_.end(), 0);
-  involved_[slot] = 1;
+  std::fill(involved_.begin(), involved_.end(), std::uint8_t{0});
+  if (slot != kNoSlot) involved_[slot] = 1;
   for (const PriorBlock& block : prior_.blocks()) {
     if (block.slot != PriorBlock::kCalibration) involved_[block.slot] = 1;
   }
-  if (with_motion_factor) involved_[order_[position + 1]] = 1;
-  if (with_landmarks) {
+  if (departure.with_motion_factor) involved_[order_[departure.position + 1]] = 1;
+  if (landmarks_of != kNoSlot) {
     for (std::size_t i = 0; i < landmarks_.size(); ++i) {
       if (in_system_[i] == 0 || !leavesWith(landmarks_[i], slot)) continue;
       for (const Sighting& s : landmarks_[i].sightings) involved_[s.slot] = 1;
     }
   }
+  involveExtras(landmarks_of);
   moveEstimates();
   // The old prior is re-expanded at the current values of states that were not frozen so far.
   for (const std::uint8_t s : order_) {
     if (involved_[s] != 0) freeze(s);
   }
+  for (std::size_t e = 0; e < extras_.size(); ++e) {
+    if (involved_[kMaxStates + e] != 0) extras_[e].freeze();
+  }
   placeCameras();
   system_.begin(calibration_, dimension_);
   addPrior();
-  if (with_motion_factor) addMotionFactor(position + 1);
-  if (with_landmarks) {
+  if (departure.with_motion_factor) addMotionFactor(departure.position + 1);
+  if (landmarks_of != kNoSlot) {
     for (std::size_t i = 0; i < landmarks_.size(); ++i) {
       if (landmark_ids_[i] == 0 || !leavesWith(landmarks_[i], slot)) continue;
       if (in_system_[i] != 0) {
@@ -197,24 +208,24 @@ void Smoother::buildMarginalSystem(std::size_t position, bool with_motion_factor
       removeLandmark(landmarks_[i]);
     }
   }
+  addDepartingFactors(landmarks_of);
   system_.finish(states_);
 }
 
-void Smoother::marginalize(std::size_t position, int first, int count, bool with_motion_factor,
-                           bool with_landmarks) {
-  const std::uint8_t slot = order_[position];
-  buildMarginalSystem(position, with_motion_factor && position + 1 < order_.size(), with_landmarks);
+// Both triangles, and b at the references: g = b + H d.
+void Smoother::expandAtReferences() {
   MatrixMap H = system_.H();
   VectorMap g = system_.g();
   for (int c = 0; c < dimension_; ++c) {
     for (int r = c + 1; r < dimension_; ++r) H(c, r) = H(r, c);
   }
-
-  // b at the references: g = b + H d.
   VectorMap d(step_.data(), dimension_);
   d.setZero();
   const int calibration_dim = calibration_.dimension();
   d.head(calibration_dim) = calibrationDeviation().head(calibration_dim);
+  for (std::size_t e = 0; e < extras_.size(); ++e) {
+    if (involved_[kMaxStates + e] != 0) d.segment<kExtraDim>(extras_[e].offset) = extras_[e].deviation();
+  }
   for (const std::uint8_t s : order_) {
     if (involved_[s] == 0) continue;
     d.segment(states_[s].offset, states_[s].dimension()) =
@@ -225,47 +236,71 @@ void Smoother::marginalize(std::size_t position, int first, int count, bool with
     for (int c = 0; c < dimension_; ++c) sum += H(c, r) * d[c];
     g[r] -= sum;
   }
+}
 
-  using MarginalMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kStateDim, kStateDim>;
-  const int at = states_[slot].offset + first;
-  const MarginalMatrix H_mm = H.block(at, at, count, count);
-  const Eigen::SelfAdjointEigenSolver<MarginalMatrix> eigen(H_mm);
-  const double floor = kRelativeRank * std::max(eigen.eigenvalues().maxCoeff(), 1.0);
-  // Columns of U / sqrt(lambda): H_mm^+ = W W^T.
-  MarginalMatrix W = eigen.eigenvectors();
-  for (int k = 0; k < count; ++k) {
-    const double lambda = eigen.eigenvalues()[k];
-    W.col(k) *= lambda > floor ? 1.0 / std::sqrt(lambda) : 0.0;
+// Extra states one by one, then the body state's columns. What stays: all extra columns, in ranges that need
+// not be variables, and the states involved.
+void Smoother::eliminateDeparture(const Departure& departure) {
+  const std::uint8_t slot = departure.count > 0 ? order_[departure.position] : kNoSlot;
+  const ColumnRange body{slot != kNoSlot ? states_[slot].offset + departure.first : 0, departure.count};
+  constexpr std::size_t kMaxRanges =
+      kMaxStates + 2 + (kMaxExtraStates * kExtraDim + kStateDim - 1) / kStateDim;
+  FixedVector<ColumnRange, kMaxRanges> others;
+  const int calibration_dim = calibration_.dimension();
+  if (calibration_dim > 0) static_cast<void>(others.tryPushBack({0, calibration_dim}));
+  for (int c = 0; c < extra_columns_; c += kStateDim) {
+    static_cast<void>(others.tryPushBack({calibration_dim + c, std::min(kStateDim, extra_columns_ - c)}));
   }
-
-  next_prior_.begin();
-  if (calibration_dim > 0) next_prior_.addBlock(PriorBlock::kCalibration, calibration_dim, {});
   for (const std::uint8_t s : order_) {
     if (involved_[s] == 0) continue;
-    const int dimension = s == slot ? states_[s].dimension() - count : states_[s].dimension();
-    if (dimension > 0) next_prior_.addBlock(s, dimension, states_[s].first_estimate);
+    const int dimension = states_[s].dimension() - (s == slot ? departure.count : 0);
+    if (dimension > 0) static_cast<void>(others.tryPushBack({states_[s].offset, dimension}));
   }
-  next_prior_.allocate();
-  const auto offset_of = [this](const PriorBlock& b) {
-    return b.slot == PriorBlock::kCalibration ? 0 : states_[b.slot].offset;
+  const auto eliminate = [this, &others](const ColumnRange& leaving, std::size_t count) {
+    eliminateColumns(system_.H(), system_.g(), leaving, {others.data(), count}, columns_i_);
   };
-  MatrixMap next_H = next_prior_.H();
-  VectorMap next_b = next_prior_.b();
-  Eigen::Matrix<double, kStateDim, 1> w_b = Eigen::Matrix<double, kStateDim, 1>::Zero();
-  w_b.head(count) = W.transpose() * g.segment(at, count);
-  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kStateDim, kStateDim>;
-  for (const PriorBlock& row : next_prior_.blocks()) {
-    const int row_at = offset_of(row);
-    const Rows row_w = H.block(row_at, at, row.dimension, count) * W;
-    next_b.segment(row.offset, row.dimension) = g.segment(row_at, row.dimension) - row_w * w_b.head(count);
-    for (const PriorBlock& column : next_prior_.blocks()) {
-      const int column_at = offset_of(column);
-      const Rows column_w = H.block(column_at, at, column.dimension, count) * W;
-      next_H.block(row.offset, column.offset, row.dimension, column.dimension) =
-          H.block(row_at, column_at, row.dimension, column.dimension) - row_w * column_w.transpose();
+  if (departure.count > 0) static_cast<void>(others.tryPushBack(body));
+  for (const ExtraState& extra : extras_) {
+    if (extra.leaving) eliminate({extra.offset, kExtraDim}, others.size());
+  }
+  if (departure.count > 0) eliminate(body, others.size() - 1);
+}
+
+void Smoother::marginalize(const Departure& departure) {
+  Departure checked = departure;
+  checked.with_motion_factor = departure.with_motion_factor && departure.position + 1 < order_.size();
+  buildMarginalSystem(checked);
+  expandAtReferences();
+  eliminateDeparture(departure);
+  // The old prior is in the system: its memory takes the new one.
+  const std::uint8_t slot = departure.count > 0 ? order_[departure.position] : kNoSlot;
+  prior_.begin();
+  if (calibration_.dimension() > 0) prior_.addBlock(PriorBlock::kCalibration, calibration_.dimension(), {});
+  for (std::size_t e = 0; e < extras_.size(); ++e) {
+    const std::size_t extra_slot = kMaxStates + e;
+    if (involved_[extra_slot] == 0 || extras_[e].leaving) continue;
+    prior_.addBlock(static_cast<std::uint8_t>(extra_slot), kExtraDim, {});
+  }
+  for (const std::uint8_t s : order_) {
+    if (involved_[s] == 0) continue;
+    const int dimension = states_[s].dimension() - (s == slot ? departure.count : 0);
+    if (dimension > 0) prior_.addBlock(s, dimension, states_[s].first_estimate);
+  }
+  prior_.allocate();
+  const MatrixMap H = system_.H();
+  const VectorMap g = system_.g();
+  MatrixMap prior_H = prior_.H();
+  for (const PriorBlock& row : prior_.blocks()) {
+    const int row_at = offsetOf(row.slot);
+    prior_.b().segment(row.offset, row.dimension) = g.segment(row_at, row.dimension);
+    for (const PriorBlock& column : prior_.blocks()) {
+      prior_H.block(row.offset, column.offset, row.dimension, column.dimension) =
+          H.block(row_at, offsetOf(column.slot), row.dimension, column.dimension);
     }
   }
-  std::swap(prior_, next_prior_);
+  for (ExtraState& extra : extras_) {
+    if (extra.leaving) freeExtra(extra);
+  }
 }
 
 }  // namespace swiftlet

@@ -64,10 +64,10 @@ void movePoint(const Eigen::Vector3d& step, const PointBasis& basis, LandmarkPoi
   point.inverse_depth = std::clamp((point.inverse_depth + step[2]) * scale, 0.0, kMaxInverseDepth);
 }
 
-RobustWeight RobustWeight::cauchy(double squared_norm) {
+RobustWeight RobustWeight::cauchy(double squared_norm, double information_scale) {
   const double c2 = kCauchyScale * kCauchyScale;
-  return {kInformationScale / (1.0 + squared_norm / c2),
-          0.5 * kInformationScale * c2 * std::log1p(squared_norm / c2)};
+  return {information_scale / (1.0 + squared_norm / c2),
+          0.5 * information_scale * c2 * std::log1p(squared_norm / c2)};
 }
 
 bool reprojectionResidual(const CameraSighting& sighting, const CameraPose& camera,

@@ -79,7 +79,8 @@ inline constexpr double kInverseDepthInformation = 1.0 / (30.0 * 30.0);  // m^2
 struct RobustWeight {
   double weight = 1;
   double cost = 0;
-  static RobustWeight cauchy(double squared_norm);
+  /// `information_scale` is for two dimensions unless given.
+  static RobustWeight cauchy(double squared_norm, double information_scale = kInformationScale);
 };
 
 /// Moves the point by a step of its three coordinates; the inverse depth stays between 0 and 20 / m.

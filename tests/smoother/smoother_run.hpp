@@ -87,4 +87,16 @@ inline double positionError(std::span<const NavState> estimate, std::span<const 
   return alignment.rms;
 }
 
+/// Directions of a state that nothing but the start prior knows: shifts and a turn about gravity of the
+/// whole window.
+inline Eigen::Matrix<double, kStateDim, 4> unobservable(const BodyState& x) {
+  Eigen::Matrix<double, kStateDim, 4> N = Eigen::Matrix<double, kStateDim, 4>::Zero();
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  N.block<3, 3>(3, 0).setIdentity();
+  N.block<3, 1>(0, 3) = x.T_world_body.rotation.conjugate() * z;
+  N.block<3, 1>(3, 3) = z.cross(x.T_world_body.translation);
+  N.block<3, 1>(6, 3) = z.cross(x.v_world_body);
+  return N;
+}
+
 }  // namespace swiftlet::test

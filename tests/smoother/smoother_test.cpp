@@ -48,18 +48,6 @@ double positionRms(const TrackFlight& flight, const std::vector<Step>& steps) {
   return std::sqrt(sum / static_cast<double>(steps.size()));
 }
 
-// Directions of the newest state that nothing but the start prior knows: shifts and a turn about
-// gravity of the whole window.
-Eigen::Matrix<double, kStateDim, 4> unobservable(const BodyState& x) {
-  Eigen::Matrix<double, kStateDim, 4> N = Eigen::Matrix<double, kStateDim, 4>::Zero();
-  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
-  N.block<3, 3>(3, 0).setIdentity();
-  N.block<3, 1>(0, 3) = x.T_world_body.rotation.conjugate() * z;
-  N.block<3, 1>(3, 3) = z.cross(x.T_world_body.translation);
-  N.block<3, 1>(6, 3) = z.cross(x.v_world_body);
-  return N;
-}
-
 double smallestEigenvalue(const Matrix6d& m) {
   return Eigen::SelfAdjointEigenSolver<Matrix6d>(m, Eigen::EigenvaluesOnly).eigenvalues()[0];
 }
@@ -103,7 +91,7 @@ TEST_CASE("Smoother: nothing is learned of position and yaw after the start", "[
   Eigen::Vector4d last;
   double worst_rise = 0;
   for (std::size_t k = 1; k < steps.size(); ++k) {
-    const Eigen::Matrix<double, kStateDim, 4> N = unobservable(steps[k].x);
+    const Eigen::Matrix<double, kStateDim, 4> N = test::unobservable(steps[k].x);
     const Eigen::Vector4d information = (N.transpose() * steps[k].covariance.llt().solve(N)).diagonal();
     for (int axis = 0; axis < 4; ++axis) {
       worst_rise = std::max(worst_rise, information[axis] / lowest[axis] - 1);

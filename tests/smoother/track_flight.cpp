@@ -31,9 +31,11 @@ bool applyFaults(const SimulatedFlight& flight, double seconds, TrackedFrame& fr
 TrackFlight::TrackFlight(const SimulationSettings& settings) : flight_(settings) {
   TrackSimulator tracks(flight_.world(), flight_.trueRig(), flight_.trajectory(), flight_.settings().tracks);
   TrackedFrame frame;
+  std::vector<TrackTruth> truth;
   for (int k = 0; k < flight_.imageCount(); ++k) {
     const double seconds = flight_.imageTime(k);
-    tracks.step(seconds, flight_.imageStamp(k), frame);
+    tracks.step(seconds, flight_.imageStamp(k), frame, &truth);
+    for (std::size_t f = 0; f < truth.size(); ++f) landmarks_[frame.features[f].id] = truth[f].landmark;
     if (!applyFaults(flight_, seconds, frame)) continue;
     frames_.push_back(frame);
     seconds_.push_back(seconds);

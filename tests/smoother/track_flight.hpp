@@ -2,6 +2,7 @@
 // A simulated flight as the back-end sees it: feature tracks, IMU samples and the truth, no images.
 
 #include <cstddef>
+#include <map>
 #include <vector>
 
 #include "drivers/simulated/simulated_flight.hpp"
@@ -26,6 +27,9 @@ class TrackFlight {
   /// The true state at frame k, biases included.
   [[nodiscard]] BodyState truth(std::size_t k) const;
 
+  /// Where the landmark of a track is [m].
+  [[nodiscard]] const Eigen::Vector3d& landmark(TrackId id) const { return landmarks_.at(id); }
+
   /// Calls `imu(sample)` and `frame(k)` in the order in which they would arrive: samples up to and
   /// including a frame's stamp first.
   template <typename OnImu, typename OnFrame>
@@ -42,6 +46,7 @@ class TrackFlight {
   SimulatedFlight flight_;
   std::vector<TrackedFrame> frames_;
   std::vector<double> seconds_;
+  std::map<TrackId, Eigen::Vector3d> landmarks_;
 };
 
 /// A flight in the furnished room with EuRoC's rig and IMU.
