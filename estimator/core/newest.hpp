@@ -1,0 +1,90 @@
+#pragma once
+// The newest value from one thread to one other, where only the latest matters: a triple buffer. Wait-free
+// on both sides (one exchange each); neither ever waits for the other or starts again because of it.
+//
+// Threads: one writer calls draft, publish, write; one reader calls refresh, value, sequence, read.
+//   Several readers: one Newest each, written in turn (small trivially copyable values: NewestShared).
+// Values: anything default-constructible and assignable, Eigen members included; written and read in
+//   place. What the reader never took is overwritten; it sees from the numbers how many there were.
+// Sequence: values count from 1 in the order of publishing; 0 means that nothing was published yet. The
+//   reader keeps the number of what it read, so that a run can be repeated from its record.
+// Memory: three values inside the object, each in lines of its own.
+// Cost: O(1); a refresh without news is one load.
+//
+// Why it is right: of three buffers the writer owns one, the reader one, and the third changes hands through
+// `middle_` by exchange, with release (what I did to the buffer that I give) and acquire (what you did to
+// the buffer that I get). So no buffer is ever owned twice, and the one in the middle is the newest
+// published or the one that the reader gave back. (The exchange is one instruction on x86-64 and ARMv8.1;
+// before that a load-linked pair, which the hardware may have to repeat.)
+
+#include <array>
+#include <cstdint>
+
+#include "estimator/core/atomic_policy.hpp"
+
+namespace swiftlet {
+
+template <typename T, typename Policy = HardwareAtomics>
+class Newest {
+ public:
+  using value_type = T;
+
+  Newest() = default;
+  Newest(const Newest&) = delete;
+  Newest& operator=(const Newest&) = delete;
+
+  /// Writer. The value to fill before publish; it holds some older value.
+  [[nodiscard]] T& draft() { return buffers_[writer_.buffer].value; }
+  /// Writer. Hands the draft over; returns its sequence number.
+  std::uint64_t publish() {
+    buffers_[writer_.buffer].sequence = ++writer_.sequence;
+    const std::uint32_t before = middle_.exchange(writer_.buffer | kFresh, std::memory_order_acq_rel);
+    writer_.buffer = before & kBufferMask;
+    return writer_.sequence;
+  }
+  std::uint64_t write(const T& value) {
+    draft() = value;
+    return publish();
+  }
+
+  /// Reader. Takes the newest value if there is one that it has not got; returns the sequence number of
+  /// value().
+  std::uint64_t refresh() {
+    if ((middle_.load(std::memory_order_relaxed) & kFresh) != 0) {
+      reader_.buffer = middle_.exchange(reader_.buffer, std::memory_order_acq_rel) & kBufferMask;
+    }
+    return sequence();
+  }
+  /// Reader. What the last refresh took; it stays the same, and the reader's own, until the next.
+  [[nodiscard]] const T& value() const { return buffers_[reader_.buffer].value; }
+  [[nodiscard]] std::uint64_t sequence() const { return buffers_[reader_.buffer].sequence; }
+  /// Reader. A copy of the newest value and its number; 0, and `out` untouched, while there is none.
+  [[nodiscard]] std::uint64_t read(T& out) {
+    const std::uint64_t taken = refresh();
+    if (taken != 0) out = value();
+    return taken;
+  }
+
+ private:
+  static constexpr std::uint32_t kBufferMask = 3;
+  static constexpr std::uint32_t kFresh = 4;  ///< the buffer in the middle was not taken yet
+
+  struct alignas(kCacheLine) Buffer {
+    T value{};
+    std::uint64_t sequence = 0;
+  };
+  struct alignas(kCacheLine) Writer {
+    std::uint32_t buffer = 0;
+    std::uint64_t sequence = 0;
+  };
+  struct alignas(kCacheLine) Reader {
+    std::uint32_t buffer = 2;
+  };
+
+  Writer writer_;
+  Reader reader_;
+  alignas(kCacheLine) typename Policy::template Atomic<std::uint32_t> middle_{1};
+  std::array<Buffer, 3> buffers_{};
+};
+
+}  // namespace swiftlet
