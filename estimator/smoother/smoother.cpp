@@ -15,8 +15,8 @@ constexpr double kGaugeSigma = 1e-4;  // m, rad
 constexpr double kReintegrateGyro = 5e-4;   // rad/s
 constexpr double kReintegrateAccel = 5e-2;  // m/s^2
 constexpr double kRelativeDamping = 1e-10;
-constexpr int kTriangulationStart = 6;    // iterations for a landmark in its first solve
-constexpr int kTriangulationRestart = 2;  // and for all when states have gone back
+constexpr int kTriangulationStart = 6;         // iterations for a landmark in its first solve
+constexpr int kTriangulationRestart = 2;       // and for all when states have gone back
 constexpr double kConverged = 1e-4;            // largest step worth another iteration: m, rad, m/s
 constexpr double kCostIncreaseAllowed = 0.02;  // of the factors' cost, before a step is taken back
 constexpr double kOutlierSigmas = 20.0;        // of one sighting, during the solve
@@ -311,10 +311,10 @@ void Smoother::triangulateAll(int iterations) {
       continue;
     }
     const int steps = landmark.point.triangulated ? iterations : kTriangulationStart;
-    in_system_[i] = landmark.sightings.size() >= 2 &&
-                            triangulate(rig_poses_, landmark.views(), steps, landmark.point)
-                        ? 1
-                        : 0;
+    in_system_[i] =
+        landmark.sightings.size() >= 2 && triangulate(rig_poses_, landmark.views(), steps, landmark.point)
+            ? 1
+            : 0;
   }
 }
 

@@ -87,8 +87,8 @@ struct RobustWeight {
 void movePoint(const Eigen::Vector3d& step, const PointBasis& basis, LandmarkPoint& point);
 
 /// Moves the point by its own Gauss-Newton steps at the current poses; from nothing when it is not
-/// triangulated yet; with no iterations it stays. Sets the point's sigma. False when the point is behind a camera that saw it, or
-/// with fewer than two sightings (each camera counts).
+/// triangulated yet; with no iterations it stays. Sets the point's sigma. False when the point is behind a
+/// camera that saw it, or with fewer than two sightings (each camera counts).
 [[nodiscard]] bool triangulate(RigPoses poses, std::span<const Sighting> sightings, int max_iterations,
                                LandmarkPoint& point);
 

@@ -49,7 +49,8 @@ const Setting* findSetting(std::string_view key);
 /// The key that `key` was most likely meant to be; empty when nothing is near.
 std::string_view nearestSetting(std::string_view key);
 
-/// The value as YAML text (the word where that is chosen); numbers in the shortest form that reads back to the same value.
+/// The value as YAML text (the word where that is chosen); numbers in the shortest form that reads back to
+/// the same value.
 std::string valueText(const Setting& setting, const Settings& settings);
 
 /// What values are allowed, in words: "0.5 to 30 s", "true or false".

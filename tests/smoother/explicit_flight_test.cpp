@@ -321,10 +321,10 @@ TEST_CASE("Promoted landmarks whose sightings go astray are given up", "[smoothe
                   }
                 } else if (k == kAstray + 6) {
                   for (const TrackedFeature& f : frame.features) {
-            if (!contains(astray, f.id)) continue;
-            CHECK_FALSE(smoother.promoted(f.id));
-            ++given_up;
-          }
+                    if (!contains(astray, f.id)) continue;
+                    CHECK_FALSE(smoother.promoted(f.id));
+                    ++given_up;
+                  }
                 }
               });
   CHECK(in_prior > 1);
