@@ -25,8 +25,8 @@ namespace swiftlet {
 
 /// What the stages may spend on one frame; an executor lowers it and records what it gave.
 struct Effort {
-  int iterations = 3;
-  int features = 200;
+  int iterations = 2;
+  int features = 300;
 };
 
 class Odometry {

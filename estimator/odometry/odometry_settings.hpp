@@ -4,7 +4,7 @@
 namespace swiftlet {
 
 struct OdometrySettings {
-  int max_features = 200;     ///< features tracked at once, at most kMaxFeatures
+  int max_features = 300;     ///< features tracked at once, at most kMaxFeatures
   double horizon = 30.0;      ///< s of fixed lag: no state older than this stays in the window
   double pixel_sigma = 0.45;  ///< px, noise of one tracked coordinate
   /// Factors on the calibration's white-noise densities. A calibration is made at rest; in flight

@@ -96,7 +96,7 @@ class Smoother {
     const TrackedFrame* frame = nullptr;
     bool imu_gap = false;  ///< samples are missing since the previous frame
     bool at_rest = false;
-    int iterations = 3;
+    int iterations = 2;
   };
 
   /// Adds a frame, solves, and trims the window. `left_window` is overwritten with the keyframes that

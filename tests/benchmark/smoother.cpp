@@ -22,7 +22,7 @@ using namespace swiftlet::test;
 namespace {
 
 constexpr int kRepetitions = 41;
-constexpr int kIterations = 3;        // Smoother::StepInput's default
+constexpr int kIterations = 3;        // an update that has converged
 constexpr int kToConvergence = 25;    // steps: reweighting converges linearly
 constexpr double kSameState = 1e-6;   // m, rad, m/s: largest difference of the two solutions
 constexpr double kSameCost = 1e-9;    // relative
