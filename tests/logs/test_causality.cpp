@@ -86,10 +86,12 @@ void checkCuts(bool mono) {
   Random random(mono ? 2 : 1);
   request.imu_rate = false;
   request.out = folder.file("cut");
+  Settings fixed_lag;
+  fixed_lag.full_smoothing = false;  // what comes after the run is not compared
   for (int i = 0; i < chosenCuts(); ++i) {
     const std::size_t k = random.below(static_cast<std::uint32_t>(lines.size()));
     request.last_stamp = stampOf(lines[k]);
-    runReplay(request, Settings{});
+    runReplay(request, fixed_lag);
     const auto cut = linesOf(folder.file("cut/odometry.tum"));
     INFO("cut after line " << k);
     REQUIRE(cut.size() == k + 1);
