@@ -8,7 +8,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr int kLanes = 16;
+constexpr int kLanes = kPatchLanes;
 // Weights in 1/16: the integer gradients are then 16 w (doubled difference), at most 4080, and all
 // sums over the window stay below 2^31.
 constexpr float kWeightScale = 16.0F;
@@ -31,27 +31,12 @@ constexpr float kParameters = 4.0F;
 // Variance of the difference of two images rounded to whole greys [grey^2].
 constexpr float kRounding = 1.0F / 6.0F;
 
-using Window = std::array<float, kPatchSize * kLanes>;
-
 // Between a square and a disc, |x|^3 + |y|^3: pixels in the corners are the first to leave the
 // surface that carries the feature, yet on an even surface they count like all others. On image
 // pairs a disc errs by 2 to 3 % more under shifts, a square by 2 % more under warps; with an
 // exponent of 4 the map of a rendered flight with near walls errs by a quarter more.
-Window makeWindow() {
-  Window window{};
-  for (int y = 0; y < kPatchSize; ++y) {
-    for (int x = 0; x < kPatchSize; ++x) {
-      const auto dx = std::abs(static_cast<float>(x - kPatchRadius));
-      const auto dy = std::abs(static_cast<float>(y - kPatchRadius));
-      const float radius = std::cbrt(dx * dx * dx + dy * dy * dy);
-      const float edge = static_cast<float>(kPatchRadius) + 1.0F;
-      window[static_cast<std::size_t>(y * kLanes + x)] = std::clamp(edge - radius, 0.0F, 1.0F);
-    }
-  }
-  return window;
-}
-
-const Window kWindow = makeWindow();
+const PatchWindow kWindow =
+    makePatchWindow([](float x, float y) { return std::cbrt(x * x * x + y * y * y); });
 
 // The same weights as integers.
 struct alignas(32) IntegerWindow {
@@ -60,10 +45,9 @@ struct alignas(32) IntegerWindow {
 };
 
 IntegerWindow makeIntegerWindow() {
-  const Window window = makeWindow();
   IntegerWindow integers;
-  for (std::size_t i = 0; i < window.size(); ++i) {
-    integers.weight[i] = static_cast<std::int16_t>(std::lround(window[i] * kWeightScale));
+  for (std::size_t i = 0; i < kWindow.size(); ++i) {
+    integers.weight[i] = static_cast<std::int16_t>(std::lround(kWindow[i] * kWeightScale));
     integers.total += static_cast<float>(integers.weight[i]);
   }
   return integers;

@@ -32,13 +32,9 @@
 
 #include "estimator/core/image_view.hpp"
 #include "estimator/core/simd.hpp"
+#include "estimator/frontend/patch_window.hpp"
 
 namespace swiftlet {
-
-/// Window side in pixels, odd, at most 15: a row and one spare column fill a 16-lane vector.
-inline constexpr int kPatchSize = 13;
-inline constexpr int kPatchRadius = kPatchSize / 2;
-static_assert(kPatchSize % 2 == 1 && kPatchSize <= 15);
 
 struct AlignmentLimits {
   int cells = 8;                  ///< pixel cells visited at most; the last position then stands
@@ -71,7 +67,7 @@ class PatchTemplate {
   [[nodiscard]] float minEigenvalue() const { return min_eigenvalue_; }
 
  private:
-  static constexpr int kLanes = 16;
+  static constexpr int kLanes = kPatchLanes;
   static constexpr int kRows = kPatchSize;
 
   /// Gain and offset estimated, or none.

@@ -15,6 +15,7 @@
 #include "tests/benchmark/smoother_ceres.hpp"
 #include "tests/benchmark/smoother_window.hpp"
 #include "tests/smoother/smoother_run.hpp"
+#include "tests/support/statistics.hpp"
 
 using namespace swiftlet;
 using namespace swiftlet::test;
@@ -44,10 +45,6 @@ double timed(const F& f) {
   return cpuMilliseconds() - start;
 }
 
-double quantile(std::vector<double> values, double share) {
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-}
 double median(const std::vector<double>& values) { return quantile(values, 0.5); }
 
 void printTime(const char* name, const std::vector<double>& t) {

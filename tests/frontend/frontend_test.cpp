@@ -8,9 +8,11 @@
 
 #include "estimator/geometry/so3.hpp"
 #include "tests/frontend/synthetic_image.hpp"
+#include "tests/support/statistics.hpp"
 
 using namespace swiftlet;
 using namespace swiftlet::testing;
+using test::quantile;
 
 namespace {
 
@@ -115,11 +117,6 @@ struct Run {
     return frontend.step(frame, *prediction, 100, *out);
   }
 };
-
-double quantile(std::vector<double> values, double q) {
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
-}
 
 }  // namespace
 

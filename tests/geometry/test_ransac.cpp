@@ -6,6 +6,7 @@
 #include <string>
 
 #include "tests/geometry/track_scene.hpp"
+#include "tests/support/statistics.hpp"
 
 namespace swiftlet::test {
 namespace {
@@ -91,11 +92,6 @@ struct Tally {
   [[nodiscard]] double removed() const { return static_cast<double>(bad_removed) / static_cast<double>(bad); }
   [[nodiscard]] double lost() const { return static_cast<double>(good_lost) / static_cast<double>(good); }
 };
-
-double quantile(std::vector<double> values, double share) {
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-}
 
 void print(const char* lens, Method method, const Tally& tally) {
   std::printf("%-14s %-24s %6.2f %6.2f %6.2f   %7.4f %7.4f   %7.4f %7.4f %s  %5.1f\n", lens, nameOf(method),

@@ -22,9 +22,13 @@
 #include "firmware_host/evaluation/consistency.hpp"
 #include "firmware_host/pipeline/lockstep.hpp"
 #include "firmware_host/pipeline/run_listener.hpp"
+#include "tests/support/statistics.hpp"
 
 namespace swiftlet {
 namespace {
+
+using test::mean;
+using test::quantile;
 
 constexpr double kDegrees = 180.0 / 3.14159265358979323846;
 constexpr double kNotAsked = std::numeric_limits<double>::infinity();
@@ -96,18 +100,6 @@ StartError startError(const NavState& state, const Trajectory& truth) {
       std::atan2(up.cross(true_up).norm(), up.dot(true_up)) * kDegrees,
       (state.T_world_body.rotation.conjugate() * state.v_world_body - now->rotation.conjugate() * velocity)
           .norm()};
-}
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return std::nan("");
-  std::ranges::sort(values);
-  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-}
-
-double mean(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double v : values) sum += v;
-  return sum / static_cast<double>(values.size());
 }
 
 struct Totals {

@@ -15,9 +15,12 @@
 
 #include "estimator/geometry/alignment.hpp"
 #include "tests/odometry/odometry_run.hpp"
+#include "tests/support/statistics.hpp"
 
 using namespace swiftlet;
+using test::mean;
 using test::OdometryRun;
+using test::quantile;
 using test::RunFrame;
 using test::TrackFlight;
 
@@ -30,18 +33,6 @@ bool report(const char* what, double value, const char* unit, double low, double
   const bool ok = value >= low && value <= high;
   std::printf("  %-58s %9.4f %-5s asked [%g, %g]%s\n", what, value, unit, low, high, ok ? "" : "  MISSED");
   return ok;
-}
-
-double quantile(std::vector<double> values, double q) {
-  if (values.empty()) return std::nan("");
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
-}
-
-double mean(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double v : values) sum += v;
-  return sum / static_cast<double>(values.size());
 }
 
 void forEach(int count, const std::function<void(int)>& work) {

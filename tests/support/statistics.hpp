@@ -1,0 +1,25 @@
+#pragma once
+// Figures of a list of numbers, for tests and benchmarks that print or bound them.
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace swiftlet::test {
+
+/// The value below which `share` of the list lies, without interpolation: 0.5 the (lower) median, 1 the
+/// largest. NaN for an empty list, so that no bound holds.
+inline double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return std::nan("");
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+/// NaN for an empty list.
+inline double mean(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double v : values) sum += v;
+  return sum / static_cast<double>(values.size());
+}
+
+}  // namespace swiftlet::test
