@@ -14,6 +14,7 @@
 #include "estimator/camera/rig.hpp"
 #include "estimator/core/status.hpp"
 #include "estimator/imu/imu_noise.hpp"
+#include "estimator/messages/effort.hpp"
 #include "estimator/messages/frames.hpp"
 #include "estimator/messages/imu_sample.hpp"
 #include "estimator/messages/nav_state.hpp"
@@ -22,12 +23,6 @@
 #include "estimator/odometry/odometry_settings.hpp"
 
 namespace swiftlet {
-
-/// What the stages may spend on one frame; an executor lowers it and records what it gave.
-struct Effort {
-  int iterations = 2;
-  int features = 300;
-};
 
 class Odometry {
  public:

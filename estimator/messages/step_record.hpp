@@ -1,0 +1,44 @@
+#pragma once
+// What each stage took for a step, beside the messages themselves: enough to repeat a threaded run, in
+// which threads decide by their speed what a stage sees.
+//
+// Numbers count from 1 in the order of arrival at the estimator, 0 is none: IMU samples over the run,
+// images over the run of each camera, windows and fixes in the order in which `smooth` published them.
+
+#include <array>
+#include <cstdint>
+
+#include "estimator/core/limits.hpp"
+#include "estimator/core/stamp.hpp"
+#include "estimator/messages/effort.hpp"
+
+namespace swiftlet {
+
+/// Propagation started again from a fix; between samples `samples` and `samples + 1`.
+struct PropagateStep {
+  std::uint64_t samples = 0;
+  std::uint64_t fix = 0;  ///< number of the fix
+
+  bool operator==(const PropagateStep&) const = default;
+};
+
+struct TrackStep {
+  std::uint64_t frame = 0;  ///< StereoFrame::index
+  Stamp stamp;
+  std::array<std::uint64_t, kMaxCameras> image{};  ///< number of each camera's image; 0: missing
+  std::uint64_t samples = 0;                       ///< IMU samples taken before the frame
+  std::uint64_t window = 0;                        ///< number of the window that it predicted from
+  Effort effort;
+
+  bool operator==(const TrackStep&) const = default;
+};
+
+struct SmoothStep {
+  std::uint64_t frame = 0;    ///< index of the tracked frame
+  std::uint64_t samples = 0;  ///< IMU samples taken before it
+  Effort effort;
+
+  bool operator==(const SmoothStep&) const = default;
+};
+
+}  // namespace swiftlet
