@@ -2,13 +2,12 @@
 // What the odometry says after each frame, beside the newest state.
 
 #include <Eigen/Core>
-#include <array>
 #include <cstdint>
 
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/limits.hpp"
 #include "estimator/core/stamp.hpp"
-#include "estimator/geometry/se3.hpp"
+#include "estimator/messages/calibration_estimate.hpp"
 #include "estimator/messages/nav_state.hpp"
 
 namespace swiftlet {
@@ -54,12 +53,6 @@ struct FrameStatistics {
 struct KeyframeState {
   NavState state;
   FrameStatistics statistics;
-};
-
-/// The calibration in use: the given one, or its estimate where that is switched on.
-struct CalibrationEstimate {
-  Duration camera_to_imu_shift;  ///< t_imu = t_image + shift
-  std::array<SE3, kMaxCameras> T_body_cam;
 };
 
 struct OdometryOutput {

@@ -6,6 +6,7 @@
 
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/limits.hpp"
+#include "estimator/messages/calibration_estimate.hpp"
 #include "estimator/messages/nav_state.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 
@@ -27,7 +28,9 @@ struct WindowLandmark {
 
 struct SmoothedWindow {
   std::uint32_t epoch = 0;
-  NavState newest;
+  bool started = false;  ///< false: no state yet in this epoch, nothing below but the calibration counts
+  NavState newest;       ///< stamp on the IMU's clock
+  CalibrationEstimate calibration;
   FixedVector<WindowPose, kMaxStates> poses;  ///< in order of time
   FixedVector<WindowLandmark, kMaxLandmarks> landmarks;
 };

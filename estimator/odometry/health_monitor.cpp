@@ -40,10 +40,14 @@ double HealthMonitor::secondsWithoutImage(Stamp stamp) const {
 }
 
 Health HealthMonitor::at(Stamp stamp) const {
-  const double age = secondsWithoutImage(stamp);
+  return has_image_ ? aged(health_, last_accepted_, stamp) : health_;
+}
+
+Health HealthMonitor::aged(Health health, Stamp last_accepted, Stamp stamp) {
+  const double age = (stamp - last_accepted).seconds();
   if (age > kCoastLimit) return Health::kFailed;
-  if (age > kGoodAge && health_ == Health::kGood) return Health::kDegraded;
-  return health_;
+  if (age > kGoodAge && health == Health::kGood) return Health::kDegraded;
+  return health;
 }
 
 }  // namespace swiftlet

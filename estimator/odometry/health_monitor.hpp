@@ -31,6 +31,10 @@ class HealthMonitor {
   [[nodiscard]] Health health() const { return health_; }
   /// The health at a later stamp without a new frame: images that stay away degrade it.
   [[nodiscard]] Health at(Stamp stamp) const;
+  /// The same for who has only the last verdict and the stamp of the last accepted image.
+  [[nodiscard]] static Health aged(Health health, Stamp last_accepted, Stamp stamp);
+  /// Of the epoch; meaningful after its first update.
+  [[nodiscard]] Stamp lastAccepted() const { return last_accepted_; }
   [[nodiscard]] double secondsWithoutImage(Stamp stamp) const;
 
  private:

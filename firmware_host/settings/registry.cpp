@@ -64,6 +64,8 @@ std::vector<Setting> makeRegistry() {
       {"effort.features", "",
        "Features a frame may spend; the smaller of this and frontend.max_features counts.",
        integer(&Settings::effort, &Effort::features, 20, kFeatures)},
+      {"effort.keyframes", "", "Keyframes that the smoother's window keeps.",
+       integer(&Settings::effort, &Effort::keyframes, 4, 12)},
       {"pairing.tolerance_ms", "ms",
        "Largest difference of stamps within a stereo pair; never more than a quarter of the frame interval.",
        real(&Settings::pairing, &PairingGroup::tolerance_ms, 0, 50)},

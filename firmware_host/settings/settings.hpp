@@ -4,7 +4,7 @@
 // Each setting is declared once more, in registry.cpp, with key, unit, bounds and explanation; the
 // reader, the printer and the checks work from that table alone.
 
-#include "estimator/odometry/odometry.hpp"
+#include "estimator/messages/effort.hpp"
 #include "estimator/odometry/odometry_settings.hpp"
 
 namespace swiftlet {

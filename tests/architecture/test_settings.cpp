@@ -35,7 +35,7 @@ struct SettingsStruct {
 
 constexpr SettingsStruct kStructs[] = {
     {"estimator/odometry/odometry_settings.hpp", "OdometrySettings"},
-    {"estimator/odometry/odometry.hpp", "Effort"},
+    {"estimator/messages/effort.hpp", "Effort"},
     {"firmware_host/settings/settings.hpp", "PairingGroup"},
     {"firmware_host/settings/settings.hpp", "CalibrationGroup"},
     {"firmware_host/settings/settings.hpp", "EvaluationGroup"},

@@ -1,0 +1,228 @@
+#include "estimator/odometry/smooth_stage.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace swiftlet {
+namespace {
+
+// The first frames decide tilt, velocity and biases: they get more iterations than the steady state.
+constexpr std::uint64_t kStartFrames = 20;
+constexpr int kStartIterations = 8;
+// What a flying body may be doing at its first image, in each axis.
+constexpr double kStartVelocitySigma = 2.0;    // m/s
+constexpr double kStartGyroBiasSigma = 0.1;    // rad/s
+constexpr double kStartAccelBiasSigma = 0.15;  // m/s^2
+constexpr double kRestVelocitySigma = 0.01;    // m/s
+
+SmootherSettings smootherSettings(const OdometrySettings& settings) {
+  SmootherSettings s;
+  s.pixel_sigma = settings.pixel_sigma;
+  s.horizon = settings.horizon;
+  s.estimate_time_offset = settings.estimate_time_offset;
+  s.estimate_extrinsics = settings.estimate_extrinsics;
+  return s;
+}
+
+}  // namespace
+
+SmoothStage::SmoothStage(const Rig& rig, const ImuNoise& noise, const OdometrySettings& settings)
+    : rig_(rigInUse(rig, settings)),
+      noise_(inflatedNoise(noise, settings)),
+      settings_(settings),
+      smoother_(rig_, noise_, smootherSettings(settings)),
+      monitor_(noise_),
+      rest_(noise_),
+      mono_starter_(rig_, noise_),
+      imu_(kImuHistory) {}
+
+void SmoothStage::addImu(const ImuSample& sample) {
+  const SampleVerdict verdict = monitor_.check(sample);
+  if (!verdict.status.ok()) {
+    events_.raise(sample.stamp, EventKind::kImuInvalid, 1);
+    return;
+  }
+  if (verdict.gap) {
+    imu_gap_ = true;
+    events_.raise(sample.stamp, EventKind::kImuGap, verdict.silence);
+  }
+  if (verdict.saturated) events_.raise(sample.stamp, EventKind::kImuSaturated, 1);
+  imu_.push(sample);
+  smoother_.addImu(sample);
+  rest_.addImu(sample);
+}
+
+Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, OdometryOutput& output) {
+  trim();  // where the caller left it out
+  output.has_state = false;
+  output.waiting_for = "";
+  last_stamp_ = tracked.stamp;
+  if (tracked.refused_before > 0) {
+    events_.raise(tracked.refused_stamp, EventKind::kFrameDropped, tracked.refused_before);
+  }
+  rest_.addFrame(tracked.stamp, static_cast<double>(tracked.median_motion));
+  if (!smoother_.started() && !start(tracked, output)) {
+    deliver(output);
+    return okStatus();
+  }
+  if (mono_starter_.size() > 0) {
+    const Status caught_up = catchUp();
+    if (!caught_up.ok()) return fail(caught_up, output);
+  }
+  Smoother::StepInput input;
+  input.frame = &tracked;
+  input.imu_gap = imu_gap_ || isSilent(imu_, noise_, tracked.stamp + smoother_.timeOffset());
+  input.at_rest = rest_.state().at_rest;
+  input.iterations =
+      frames_in_epoch_ < kStartFrames ? std::max(kStartIterations, effort.iterations) : effort.iterations;
+  imu_gap_ = false;
+  ++frames_in_epoch_;
+  const Status status = smoother_.step(input, left_step_);
+  if (!status.ok()) return fail(status, output);
+  trim_due_ = true;
+  publish(tracked, input.imu_gap, output);
+  return okStatus();
+}
+
+void SmoothStage::trim() {
+  if (!trim_due_) return;
+  trim_due_ = false;
+  handOver();
+}
+
+void SmoothStage::finish(OdometryOutput& output) {
+  trim();
+  output.has_state = false;
+  smoother_.flush(left_step_);
+  handOver();
+  deliver(output);
+}
+
+void SmoothStage::reset() {
+  trim();
+  if (smoother_.started()) {
+    smoother_.flush(left_step_);
+    handOver();
+  }
+  ++epoch_;
+  events_.raise(last_stamp_, EventKind::kReset, epoch_);
+  smoother_.reset();
+  health_.reset();
+  watch_.reset();
+  mono_starter_.reset();
+  frames_in_epoch_ = 0;
+  fix_ = StateFix{};
+  fix_.state.epoch = epoch_;
+}
+
+void SmoothStage::window(SmoothedWindow& out) const {
+  out.epoch = epoch_;
+  out.started = fix_.has_state;
+  out.newest = fix_.state;
+  out.calibration = {smoother_.timeOffset(), smoother_.extrinsics()};
+  if (fix_.has_state) {
+    smoother_.window(out);
+  } else {
+    out.poses.clear();
+    out.landmarks.clear();
+  }
+}
+
+/// Keyframes that left, for the next output.
+void SmoothStage::handOver() {
+  for (KeyframeState keyframe : left_step_) {
+    keyframe.state.epoch = epoch_;
+    if (!left_.tryPushBack(keyframe)) events_.raise(last_stamp_, EventKind::kCapacityReached, 1);
+  }
+  left_step_.clear();
+}
+
+void SmoothStage::deliver(OdometryOutput& output) {
+  output.left_window = left_;
+  left_.clear();
+  events_.flush(output);
+}
+
+/// The first state of an epoch. False while it must wait; the output says for what.
+bool SmoothStage::start(const TrackedFrame& tracked, OdometryOutput& output) {
+  const Stamp stamp = tracked.stamp + smoother_.timeOffset();
+  StartPrior prior;
+  prior.bias_gyro_sigma = kStartGyroBiasSigma;
+  prior.bias_accel_sigma = kStartAccelBiasSigma;
+  TiltEstimate tilt;
+  const Stamp history = stamp - Duration::fromSeconds(2.0);
+  if (imu_.empty() || !estimateTilt(imu_.around(history, stamp), stamp, noise_, prior, tilt).ok()) {
+    output.waiting_for = "IMU samples before the first image";
+    return false;
+  }
+  StartState start;
+  start.velocity_sigma = kStartVelocitySigma;
+  if (rig_.camera_count == 1 && !rest_.state().at_rest) {
+    mono_starter_.push(tracked);
+    if (!mono_starter_.trySolve(imu_, prior, settings_.pixel_sigma, start, output.waiting_for)) return false;
+  } else {
+    mono_starter_.reset();
+    start.stamp = stamp;
+    start.state.T_world_body.rotation = gravityAlignedRotation(tilt.up);
+    start.tilt_sigma = tilt.sigma;
+    start.gyro_bias_sigma = kStartGyroBiasSigma;
+    start.accel_bias_sigma = kStartAccelBiasSigma;
+    if (rest_.state().at_rest) start.velocity_sigma = kRestVelocitySigma;
+  }
+  smoother_.start(start);
+  frames_in_epoch_ = 0;
+  return true;
+}
+
+/// Gives the smoother the frames that waited for the start, all but the newest.
+Status SmoothStage::catchUp() {
+  Smoother::StepInput input;
+  input.iterations = kStartIterations;
+  for (std::size_t k = 0; k + 1 < mono_starter_.size(); ++k) {
+    input.frame = &mono_starter_.frame(k);
+    const Status status = smoother_.step(input, left_step_);
+    if (!status.ok()) return status;
+    handOver();
+  }
+  mono_starter_.reset();
+  return okStatus();
+}
+
+Status SmoothStage::fail(const Status& status, OdometryOutput& output) {
+  reset();
+  deliver(output);
+  output.waiting_for = status.what;
+  return status;
+}
+
+void SmoothStage::publish(const TrackedFrame& tracked, bool imu_missing, OdometryOutput& output) {
+  const WindowState& newest = smoother_.newest();
+  NavState& state = output.state;
+  state.stamp = newest.stamp;
+  state.epoch = epoch_;
+  state.T_world_body = newest.x.T_world_body;
+  state.v_world_body = newest.x.v_world_body;
+  state.bias_gyro = newest.x.bias_gyro;
+  state.bias_accel = newest.x.bias_accel;
+  state.covariance = smoother_.covariance();
+  output.statistics = smoother_.statistics();
+  output.calibration = {smoother_.timeOffset(), smoother_.extrinsics()};
+  state.health = health_.update(tracked, output.statistics, rig_.camera_count, imu_missing, frames_in_epoch_);
+  smoother_.setHealth(state.health);
+  watch_.step({tracked.stamp, tracked.camera_present, rig_.camera_count, rest_.state().at_rest, state.health,
+               health_.secondsWithoutImage(tracked.stamp)},
+              events_);
+  fix_.has_state = true;
+  fix_.state = state;
+  fix_.last_accepted = health_.lastAccepted();
+  if (frames_in_epoch_ > kStartFrames) {
+    const Matrix15d& P = state.covariance;
+    rest_.setEstimate(state.bias_gyro, std::sqrt(P.diagonal().segment<3>(9).maxCoeff()),
+                      state.v_world_body.norm(), std::sqrt(P.diagonal().segment<3>(6).maxCoeff()));
+  }
+  state.stamp = tracked.stamp;
+  output.has_state = true;
+  deliver(output);
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,85 @@
+#pragma once
+// The stage of the thread `smooth`: tracks and IMU to states, with start, health and events.
+//
+// A step has two parts: `step` gives the state as soon as it stands; `trim` then makes room in the window
+// (marginalization). What others go on from is taken in between and after: the fix for propagation
+// after `step`, the window for tracking after `trim`.
+// Samples come before the first frame whose stamp is not earlier. Memory: the smoother's 15.6 MiB, 0.9 MiB of
+// waiting frames (one camera), half a MiB of samples; no allocation after the constructor.
+// Rules of start, health, events and reset: docs/odometry.md.
+
+#include "estimator/camera/rig.hpp"
+#include "estimator/core/status.hpp"
+#include "estimator/imu/imu_noise.hpp"
+#include "estimator/imu/initialization.hpp"
+#include "estimator/imu/rest_detector.hpp"
+#include "estimator/imu/sample_monitor.hpp"
+#include "estimator/messages/effort.hpp"
+#include "estimator/messages/imu_sample.hpp"
+#include "estimator/messages/odometry_output.hpp"
+#include "estimator/messages/smoothed_window.hpp"
+#include "estimator/messages/state_fix.hpp"
+#include "estimator/messages/tracked_frame.hpp"
+#include "estimator/odometry/event_watch.hpp"
+#include "estimator/odometry/health_monitor.hpp"
+#include "estimator/odometry/mono_starter.hpp"
+#include "estimator/odometry/odometry_inputs.hpp"
+#include "estimator/odometry/odometry_settings.hpp"
+#include "estimator/smoother/imu_buffer.hpp"
+#include "estimator/smoother/smoother.hpp"
+
+namespace swiftlet {
+
+class SmoothStage {
+ public:
+  SmoothStage(const Rig& rig, const ImuNoise& noise, const OdometrySettings& settings);
+
+  void addImu(const ImuSample& sample);
+
+  /// kOk without a state while the start waits (`output.waiting_for`). kFailed when the window could not be
+  /// solved: it has been reset by then, with a new epoch.
+  Status step(const TrackedFrame& tracked, const Effort& effort, OdometryOutput& output);
+  /// After every step. Keyframes that leave come with the next output.
+  void trim();
+
+  /// The newest state, or that there is none, and the epoch; right after `step`.
+  void fix(StateFix& out) const { out = fix_; }
+  /// The newest window; after `trim`.
+  void window(SmoothedWindow& out) const;
+
+  /// At the end of a run: the keyframes still in the window, and events that had not come out yet.
+  void finish(OdometryOutput& output);
+
+  /// Forgets the state and starts again; raises the epoch.
+  void reset();
+
+ private:
+  bool start(const TrackedFrame& tracked, OdometryOutput& output);
+  Status catchUp();
+  Status fail(const Status& status, OdometryOutput& output);
+  void publish(const TrackedFrame& tracked, bool imu_missing, OdometryOutput& output);
+  void deliver(OdometryOutput& output);
+  void handOver();
+
+  Rig rig_;
+  ImuNoise noise_;
+  OdometrySettings settings_;
+  Smoother smoother_;
+  SampleMonitor monitor_;
+  RestDetector rest_;
+  HealthMonitor health_;
+  MonoStarter mono_starter_;
+  ImuBuffer imu_;
+  EventBuffer events_;
+  EventWatch watch_;
+  StateFix fix_;
+  FixedVector<KeyframeState, kMaxStates> left_;       // to be delivered
+  FixedVector<KeyframeState, kMaxStates> left_step_;  // by one step
+  bool trim_due_ = false;
+  std::uint32_t epoch_ = 0;
+  Stamp last_stamp_;  // of the newest tracked frame
+  bool imu_gap_ = false;
+  std::uint64_t frames_in_epoch_ = 0;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,118 @@
+#include "estimator/odometry/track_stage.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/imu/preintegration.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr float kMinGate = 6.0F;   // px
+constexpr float kMaxGate = 40.0F;  // px
+// Predicted pixel error of a landmark after one interval: attitude and position error over depth.
+constexpr double kGateSigmas = 3.0;
+
+}  // namespace
+
+TrackStage::TrackStage(const Rig& rig, const ImuNoise& noise, const OdometrySettings& settings)
+    : rig_(rigInUse(rig, settings)),
+      noise_(inflatedNoise(noise, settings)),
+      max_features_(settings.max_features),
+      frontend_(rig_, FrontendSettings{}),
+      monitor_(noise_),
+      propagator_(noise_),
+      imu_(kImuHistory) {
+  window_.calibration.camera_to_imu_shift = rig_.camera_to_imu_shift;
+  window_.calibration.T_body_cam = rig_.T_body_cam;
+}
+
+void TrackStage::addImu(const ImuSample& sample) {
+  const SampleVerdict verdict = monitor_.check(sample);
+  if (!verdict.status.ok()) return;
+  imu_gap_ = imu_gap_ || verdict.gap;
+  imu_.push(sample);
+  if (propagator_.hasState()) static_cast<void>(propagator_.step(sample));
+}
+
+void TrackStage::take(const SmoothedWindow& window) {
+  if (window.epoch != window_.epoch) {
+    frontend_.reset();
+    propagator_.reset();
+  }
+  window_ = window;
+  if (window_.started) static_cast<void>(propagator_.setState(window_.newest));
+}
+
+Status TrackStage::step(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked) {
+  const Status status = process(frame, effort, tracked);
+  if (!status.ok()) {  // the tracks stay where they were
+    ++refused_;
+    refused_stamp_ = frame.stamp;
+    return status;
+  }
+  last_stamp_ = frame.stamp;
+  has_frame_ = true;
+  imu_gap_ = false;
+  tracked.refused_before = refused_;
+  tracked.refused_stamp = refused_stamp_;
+  refused_ = 0;
+  return status;
+}
+
+Status TrackStage::process(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked) {
+  if (has_frame_ && frame.stamp <= last_stamp_) {
+    return {StatusCode::kInvalidInput, "the frame's stamp repeats or goes back: frame dropped"};
+  }
+  predict(frame.stamp);
+  return frontend_.step(frame, prediction_, std::min(effort.features, max_features_), tracked);
+}
+
+void TrackStage::predict(Stamp stamp) {
+  prediction_.has_rotation = false;
+  prediction_.landmarks.clear();
+  if (!has_frame_ || imu_.empty()) return;
+  const Duration shift = window_.calibration.camera_to_imu_shift;
+  const Stamp from = last_stamp_ + shift;
+  const Stamp to = stamp + shift;
+  if (imu_gap_ || isSilent(imu_, noise_, to))
+    return;  // better no prediction than a turn that was not measured
+  const Eigen::Vector3d bias = window_.started ? window_.newest.bias_gyro : Eigen::Vector3d::Zero();
+  Preintegration turn(noise_, bias, Eigen::Vector3d::Zero());
+  if (!turn.integrate(imu_.around(from, to), from, to).ok()) return;
+  prediction_.has_rotation = true;
+  prediction_.R_body_prev_body_cur = turn.deltaRotation();
+  if (window_.started && propagator_.hasState()) predictLandmarks(to);
+}
+
+void TrackStage::predictLandmarks(Stamp stamp) {
+  NavState state;
+  if (!propagator_.predict(stamp, state).ok()) return;
+  const Matrix15d& P = state.covariance;
+  const double angle = std::sqrt(P.diagonal().segment<3>(0).sum());
+  const Eigen::Matrix3d relative_position = P.block<3, 3>(3, 3) - window_.newest.covariance.block<3, 3>(3, 3);
+  const double distance = std::sqrt(std::max(relative_position.trace(), 0.0));
+  std::array<SE3, kMaxCameras> T_cam_world;
+  for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+    T_cam_world[c] = (state.T_world_body * window_.calibration.T_body_cam[c]).inverse();
+  }
+  for (const WindowLandmark& landmark : window_.landmarks) {
+    PredictedLandmark predicted;
+    predicted.id = landmark.id;
+    double depth = 1e9;
+    for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+      const Eigen::Vector3d p = T_cam_world[c] * landmark.p_world;
+      Eigen::Vector2d pixel;
+      if (!rig_.camera[c].project(p, pixel) || !rig_.camera[c].inImage(pixel)) continue;
+      predicted.visible[c] = true;
+      predicted.pixel[c] = pixel.cast<float>();
+      depth = std::min(depth, p.norm());
+    }
+    if (!predicted.visible[0] && !predicted.visible[1]) continue;
+    const double gate = kGateSigmas * rig_.camera[0].focal() * (angle + distance / depth);
+    predicted.gate = std::clamp(static_cast<float>(gate), kMinGate, kMaxGate);
+    static_cast<void>(prediction_.landmarks.tryPushBack(predicted));
+  }
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,61 @@
+#pragma once
+// The stage of the thread `track`: images to tracks, with where things will be seen worked out from the gyro
+// and from the newest window.
+//
+// Samples come before the first frame whose stamp is not earlier; windows when they are there (an older one
+// costs sharpness of prediction, nothing else). A window of a new epoch drops the tracks.
+// Memory: the front-end's 6.3 MiB at 752 x 480 stereo and half a MiB of samples, no allocation after the
+// constructor. Cost, rules and sources: docs/odometry.md, docs/frontend.md.
+
+#include "estimator/camera/rig.hpp"
+#include "estimator/core/status.hpp"
+#include "estimator/frontend/frontend.hpp"
+#include "estimator/imu/imu_noise.hpp"
+#include "estimator/imu/propagation.hpp"
+#include "estimator/imu/sample_monitor.hpp"
+#include "estimator/messages/effort.hpp"
+#include "estimator/messages/frames.hpp"
+#include "estimator/messages/imu_sample.hpp"
+#include "estimator/messages/smoothed_window.hpp"
+#include "estimator/messages/tracked_frame.hpp"
+#include "estimator/odometry/odometry_inputs.hpp"
+#include "estimator/odometry/odometry_settings.hpp"
+#include "estimator/smoother/imu_buffer.hpp"
+
+namespace swiftlet {
+
+class TrackStage {
+ public:
+  TrackStage(const Rig& rig, const ImuNoise& noise, const OdometrySettings& settings);
+
+  void addImu(const ImuSample& sample);
+
+  /// Copied; the next frame is predicted from it.
+  void take(const SmoothedWindow& window);
+
+  /// kInvalidInput for a repeated or reversed stamp, a frame without images, an image of the wrong size:
+  /// then `tracked` stays as it was, and the next tracked frame counts it.
+  Status step(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked);
+
+ private:
+  Status process(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked);
+  void predict(Stamp stamp);
+  void predictLandmarks(Stamp stamp);
+
+  Rig rig_;
+  ImuNoise noise_;
+  int max_features_;
+  Frontend frontend_;
+  SampleMonitor monitor_;
+  Propagator propagator_;
+  ImuBuffer imu_;
+  SmoothedWindow window_;
+  FrontendPrediction prediction_;
+  bool imu_gap_ = false;  // since the last tracked frame
+  bool has_frame_ = false;
+  Stamp last_stamp_;
+  int refused_ = 0;
+  Stamp refused_stamp_;
+};
+
+}  // namespace swiftlet
