@@ -1,0 +1,226 @@
+#include "firmware_host/realtime/flight_thread.hpp"
+
+#include <fmt/format.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <exception>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+namespace swiftlet {
+namespace {
+
+constexpr std::size_t kKernelNameLength = 15;
+/// What an untouched byte of the stack holds; zero would be common in use.
+constexpr unsigned char kPaint = 0xA5;
+constexpr const char* kPriorityRemedy =
+    "give the program the right: `setcap cap_sys_nice+ep` on it, `LimitRTPRIO=99` in its systemd unit, or "
+    "`ulimit -r 99` (rtprio in /etc/security/limits.conf); in a control group of version 1 also "
+    "cpu.rt_runtime_us above 0";
+
+ThreadPolicy policyOf(int kernel_policy) {
+  return kernel_policy == SCHED_FIFO ? ThreadPolicy::kFifo : ThreadPolicy::kOther;
+}
+
+/// The CPUs that the calling thread may run on.
+std::vector<int> allowedCpus() {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  std::vector<int> cpus;
+  if (pthread_getaffinity_np(pthread_self(), sizeof set, &set) != 0) return cpus;
+  for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
+    if (CPU_ISSET(static_cast<std::size_t>(cpu), &set)) cpus.push_back(cpu);
+  }
+  return cpus;
+}
+
+std::string joined(const std::vector<int>& numbers) {
+  return numbers.empty() ? std::string("unknown") : fmt::format("{}", fmt::join(numbers, ","));
+}
+
+std::string errorText(int error) { return std::generic_category().message(error); }
+
+}  // namespace
+
+const char* policyName(ThreadPolicy policy) {
+  return policy == ThreadPolicy::kFifo ? "SCHED_FIFO" : "SCHED_OTHER";
+}
+
+nlohmann::ordered_json toJson(const ThreadReport& report) {
+  return {{"name", report.name},
+          {"started", report.started},
+          {"wanted_policy", policyName(report.wanted_policy)},
+          {"policy", policyName(report.actual_policy)},
+          {"wanted_priority", report.wanted_priority},
+          {"priority", report.actual_priority},
+          {"wanted_cpu",
+           report.wanted_cpu < 0 ? nlohmann::ordered_json("any") : nlohmann::ordered_json(report.wanted_cpu)},
+          {"cpus", report.actual_cpus},
+          {"stack_bytes", report.stack_bytes},
+          {"message", report.message}};
+}
+
+std::string describe(const ThreadReport& report) {
+  std::string line = report.started
+                         ? fmt::format("{}: {} {} on CPU {}", report.name, policyName(report.actual_policy),
+                                       report.actual_priority, joined(report.actual_cpus))
+                         : fmt::format("{}: not started", report.name);
+  if (!report.message.empty()) line += "; " + report.message;
+  return line;
+}
+
+bool FlightThread::Stack::reserve(std::size_t bytes) {
+  release();
+  const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+  const std::size_t least = std::max(bytes, static_cast<std::size_t>(sysconf(_SC_THREAD_STACK_MIN)));
+  bytes_ = (least + page - 1) / page * page;
+  guard_ = page;
+  void* mapping =
+      mmap(nullptr, bytes_ + guard_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_STACK, -1, 0);
+  if (mapping == MAP_FAILED) return false;
+  mapping_ = mapping;
+  low_ = static_cast<char*>(mapping) + guard_;
+  if (mprotect(mapping_, guard_, PROT_NONE) != 0) return false;
+  std::memset(low_, kPaint, bytes_);
+  return true;
+}
+
+void FlightThread::Stack::release() {
+  if (mapping_ != nullptr) munmap(mapping_, bytes_ + guard_);
+  mapping_ = nullptr;
+  low_ = nullptr;
+}
+
+// A sanitizer may hold parts of a dead thread's stack for unreadable.
+__attribute__((no_sanitize("address"))) std::size_t FlightThread::Stack::used() const {
+  const auto* bytes = static_cast<const volatile unsigned char*>(low_);
+  std::size_t untouched = 0;
+  while (untouched < bytes_ && bytes[untouched] == kPaint) ++untouched;
+  return bytes_ - untouched;
+}
+
+FlightThread::~FlightThread() { join(); }
+
+int FlightThread::create(const ThreadSettings& settings, bool fifo, bool pinned) {
+  pthread_attr_t attributes;
+  if (const int error = pthread_attr_init(&attributes); error != 0) return error;
+  const sched_param priority{.sched_priority = fifo ? settings.priority : 0};
+  int error = pthread_attr_setstack(&attributes, stack_.low(), stack_.bytes());
+  // Explicit: a thread made by a real-time one would inherit its priority.
+  if (error == 0) error = pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
+  if (error == 0) error = pthread_attr_setschedpolicy(&attributes, fifo ? SCHED_FIFO : SCHED_OTHER);
+  if (error == 0) error = pthread_attr_setschedparam(&attributes, &priority);
+  if (error == 0 && pinned) {
+    cpu_set_t set;
+    CPU_ZERO(&set);
+    CPU_SET(static_cast<std::size_t>(settings.cpu), &set);
+    error = pthread_attr_setaffinity_np(&attributes, sizeof set, &set);
+  }
+  if (error == 0) error = pthread_create(&thread_, &attributes, &FlightThread::run, this);
+  pthread_attr_destroy(&attributes);
+  return error;
+}
+
+ThreadReport FlightThread::start(const ThreadSettings& settings, std::function<void()> entry) {
+  ThreadReport report;
+  report.name = settings.name.substr(0, kKernelNameLength);
+  bool fifo = settings.priority > 0;
+  report.wanted_policy = fifo ? ThreadPolicy::kFifo : ThreadPolicy::kOther;
+  report.wanted_priority = settings.priority;
+  report.wanted_cpu = settings.cpu;
+  const auto say = [&report](const std::string& sentence) {
+    report.message += (report.message.empty() ? "" : "; ") + sentence;
+  };
+  if (joinable_) {
+    say("this thread is already running: join it first");
+    return report;
+  }
+  if (settings.priority < 0 || settings.priority > sched_get_priority_max(SCHED_FIFO)) {
+    say(fmt::format("priority {} does not exist: 1 to {}, or 0 for SCHED_OTHER", settings.priority,
+                    sched_get_priority_max(SCHED_FIFO)));
+    return report;
+  }
+  bool pinned = settings.cpu >= 0 && settings.cpu < CPU_SETSIZE;
+  if (settings.cpu >= CPU_SETSIZE) say(fmt::format("there is no CPU {}: it runs on any", settings.cpu));
+  if (!stack_.reserve(settings.stack_bytes)) {
+    say(fmt::format("no memory for a stack of {} bytes ({}): lower it or raise RLIMIT_MEMLOCK (`ulimit -l`)",
+                    settings.stack_bytes, errorText(errno)));
+    return report;
+  }
+  entry_ = std::move(entry);
+  fault_.clear();
+  stack_used_ = 0;
+  name_ = report.name;
+  begun_.store(false, std::memory_order_relaxed);
+
+  int error = create(settings, fifo, pinned);
+  // One wish after the other is given up, whichever the kernel refuses first.
+  while ((error == EINVAL && pinned) || (error == EPERM && fifo)) {
+    if (error == EINVAL) {
+      say(fmt::format("CPU {} does not exist or is not allowed to this process: it runs on any",
+                      settings.cpu));
+      pinned = false;
+    } else {
+      say(fmt::format("no right to SCHED_FIFO {}, it runs under SCHED_OTHER: {}", settings.priority,
+                      kPriorityRemedy));
+      fifo = false;
+    }
+    error = create(settings, fifo, pinned);
+  }
+  if (error != 0) {
+    say(fmt::format("the thread cannot be made ({})", errorText(error)));
+    entry_ = nullptr;
+    return report;
+  }
+  joinable_ = true;
+  begun_.wait(false, std::memory_order_acquire);
+  report.started = true;
+  report.actual_policy = seen_.actual_policy;
+  report.actual_priority = seen_.actual_priority;
+  report.actual_cpus = seen_.actual_cpus;
+  report.stack_bytes = stack_.bytes();
+  return report;
+}
+
+void* FlightThread::run(void* self) {
+  static_cast<FlightThread*>(self)->begin();
+  return nullptr;
+}
+
+void FlightThread::begin() {
+  pthread_setname_np(pthread_self(), name_.c_str());
+  constexpr unsigned long kExactSleeps = 1;  // ns
+  prctl(PR_SET_TIMERSLACK, kExactSleeps, 0, 0, 0);
+  int policy = 0;
+  sched_param priority{};
+  pthread_getschedparam(pthread_self(), &policy, &priority);
+  seen_.actual_policy = policyOf(policy);
+  seen_.actual_priority = priority.sched_priority;
+  seen_.actual_cpus = allowedCpus();
+  begun_.store(true, std::memory_order_release);
+  begun_.notify_one();
+  try {
+    entry_();
+  } catch (const std::exception& error) {
+    fault_ = *error.what() == '\0' ? "an exception without text" : error.what();
+  } catch (...) {
+    fault_ = "something that is no std::exception was thrown";
+  }
+}
+
+void FlightThread::join() {
+  if (!joinable_) return;
+  pthread_join(thread_, nullptr);
+  joinable_ = false;
+  entry_ = nullptr;
+  stack_used_ = stack_.used();
+  stack_.release();
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,121 @@
+#pragma once
+// A thread as the flight path needs it: a name, a real-time priority, a CPU and a stack that is fixed,
+// touched in advance and measured. What it got is a value; a missing right is no error.
+//
+// Where the right to SCHED_FIFO is missing the thread runs under SCHED_OTHER, where the CPU does not exist
+// or may not be used it runs on any, and the report says what is missing and how to get it. Whether that is
+// good enough is not decided here (ready_to_arm.hpp).
+//
+// Memory: the stack is a mapping of its own with a guard page below, filled with a pattern before the
+//   thread begins: every page is resident then, and after the thread's end the deepest use can be read.
+// Exceptions: what escapes from `entry` ends the thread and is kept as text (fault()); nothing crosses.
+// Sleeps are exact: the thread's timer slack is 1 ns (SCHED_OTHER would have 50 us).
+
+#include <pthread.h>
+
+#include <atomic>
+#include <cstddef>
+#include <functional>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+namespace swiftlet {
+
+/// Stack of a flight thread. Measured over the recorded logs the deepest thread takes a small part of it;
+/// FlightThread::stackUsed says how much.
+inline constexpr std::size_t kFlightStackBytes = std::size_t{4} * 1024 * 1024;
+
+enum class ThreadPolicy {
+  kOther,  ///< SCHED_OTHER: shares time with everything else
+  kFifo,   ///< SCHED_FIFO: runs until it sleeps or a higher priority wants the CPU
+};
+
+/// "SCHED_OTHER", "SCHED_FIFO".
+const char* policyName(ThreadPolicy policy);
+
+struct ThreadSettings {
+  std::string name;  ///< as `top -H` and `perf` show it; the kernel keeps 15 characters
+  int priority = 0;  ///< 1 to 99: SCHED_FIFO with this priority; 0: SCHED_OTHER
+  int cpu = -1;      ///< the one CPU to run on; -1: any
+  std::size_t stack_bytes = kFlightStackBytes;
+};
+
+/// What was wanted and what the kernel gave.
+struct ThreadReport {
+  std::string name;
+  ThreadPolicy wanted_policy = ThreadPolicy::kOther;
+  ThreadPolicy actual_policy = ThreadPolicy::kOther;
+  int wanted_priority = 0;
+  int actual_priority = 0;
+  int wanted_cpu = -1;
+  std::vector<int> actual_cpus;  ///< that the thread may run on
+  std::size_t stack_bytes = 0;
+  bool started = false;
+  std::string message;  ///< what is missing and the remedy, one sentence each; empty: all as wanted
+
+  /// It runs, with the policy and priority that it was to have.
+  [[nodiscard]] bool hasPriority() const {
+    return started && actual_policy == wanted_policy && actual_priority == wanted_priority;
+  }
+  [[nodiscard]] bool asWanted() const { return hasPriority() && message.empty(); }
+};
+
+nlohmann::ordered_json toJson(const ThreadReport& report);
+/// One line: name, policy, priority, CPUs, and what is missing.
+std::string describe(const ThreadReport& report);
+
+class FlightThread {
+ public:
+  FlightThread() = default;
+  /// Joins: whoever owns the thread has told it to end before.
+  ~FlightThread();
+  FlightThread(const FlightThread&) = delete;
+  FlightThread& operator=(const FlightThread&) = delete;
+
+  /// Starts `entry` on the thread; not while one is running. Returns when the thread has begun, or with
+  /// `started` false and the reason when there is no thread.
+  ThreadReport start(const ThreadSettings& settings, std::function<void()> entry);
+  /// Waits for the end; nothing when there is no thread.
+  void join();
+
+  [[nodiscard]] bool joinable() const { return joinable_; }
+  /// After join: what() of the exception that ended the thread; empty: it returned.
+  [[nodiscard]] const std::string& fault() const { return fault_; }
+  /// After join: deepest use of the stack in bytes, thread-local storage included.
+  [[nodiscard]] std::size_t stackUsed() const { return stack_used_; }
+
+ private:
+  /// A mapping with a guard page at its low end.
+  class Stack {
+   public:
+    ~Stack() { release(); }
+    [[nodiscard]] bool reserve(std::size_t bytes);
+    void release();
+    [[nodiscard]] std::size_t used() const;
+    [[nodiscard]] void* low() const { return low_; }
+    [[nodiscard]] std::size_t bytes() const { return bytes_; }
+
+   private:
+    void* mapping_ = nullptr;
+    void* low_ = nullptr;  ///< above the guard page
+    std::size_t bytes_ = 0;
+    std::size_t guard_ = 0;
+  };
+
+  static void* run(void* self);
+  void begin();
+  int create(const ThreadSettings& settings, bool fifo, bool pinned);
+
+  Stack stack_;
+  std::function<void()> entry_;
+  std::string fault_;
+  std::string name_;
+  ThreadReport seen_;  ///< what the thread found of itself as it began
+  pthread_t thread_{};
+  std::atomic<bool> begun_{false};
+  bool joinable_ = false;
+  std::size_t stack_used_ = 0;
+};
+
+}  // namespace swiftlet
