@@ -1,0 +1,18 @@
+#pragma once
+// CRC-32C (Castagnoli, polynomial 0x1EDC6F41, reflected), the checksum of flight recordings: finds every
+// burst of up to 32 bits, and both SSE 4.2 and Armv8 have an instruction for it.
+// Cost: about 8 GB/s with the instruction; the table twin, used where there is none, about 1.5 GB/s.
+
+#include <cstdint>
+#include <span>
+
+namespace swiftlet {
+
+/// CRC of `bytes`, continuing from the CRC of the bytes before them (0 at the beginning):
+/// crc32c(crc32c(0, a), b) is the CRC of a followed by b.
+std::uint32_t crc32c(std::uint32_t before, std::span<const std::uint8_t> bytes);
+
+/// The same by tables, on any machine: the twin that the fast one is tested against.
+std::uint32_t crc32cByTable(std::uint32_t before, std::span<const std::uint8_t> bytes);
+
+}  // namespace swiftlet

@@ -1,0 +1,178 @@
+#pragma once
+// The layout of a flight recording on disk; docs/formats.md has the tables. Shared by writer and reader.
+//
+// A recording is a folder of segments recording_000000.swr, recording_000001.swr, ... A segment is a
+// header of kSegmentHeaderBytes and then records, back to back. All numbers are little-endian, doubles
+// their IEEE 754 bits; every record begins at a multiple of kRecordAlignment in its file.
+//
+// Record: kRecordHeaderBytes, then the payload, padded with zeros to the alignment.
+//   0 u32 CRC of bytes 4 to 23   4 u32 CRC of payload and padding   8 u64 sequence number, from 0
+//  16 u32 payload bytes without padding   20 u16 kind   22 u16 kRecordMark
+// Both CRCs continue from the CRC of the run's id, so that a record of another run, such as a stale disk
+// block of an earlier recording, never passes for one of this run.
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <string>
+
+#include "estimator/core/limits.hpp"
+
+namespace swiftlet {
+
+enum class RecordKind : std::uint16_t {
+  kRun = 0,  ///< what the run was made with; always the first record
+  kImu = 1,
+  kImage0 = 2,
+  kImage1 = 3,
+  kPropagateStep = 4,
+  kTrackStep = 5,
+  kSmoothStep = 6,
+  kLoss = 7,  ///< records of another kind were lost here
+  kEnd = 8,   ///< the recording was ended in order
+};
+inline constexpr std::size_t kRecordKinds = 9;
+
+constexpr RecordKind imageKind(std::size_t camera) {
+  return camera == 0 ? RecordKind::kImage0 : RecordKind::kImage1;
+}
+
+/// "IMU samples", "images of camera 0", ... for messages.
+const char* pluralName(RecordKind kind);
+
+inline constexpr std::uint32_t kRecordingVersion = 1;
+/// As PNG's: a byte that is no text, both line ends and an end of text file find every kind of damage that
+/// a transfer as text does.
+inline constexpr std::array<std::uint8_t, 8> kSegmentMagic{0x89, 'S', 'W', 'R', '\r', '\n', 0x1A, '\n'};
+inline constexpr std::size_t kSegmentHeaderBytes = 64;
+inline constexpr std::size_t kRecordHeaderBytes = 24;
+inline constexpr std::size_t kRecordAlignment = 8;
+inline constexpr std::uint16_t kRecordMark = 0x7253;
+/// Largest payload: beyond any camera, and it keeps a reader's memory bounded on hostile input.
+inline constexpr std::size_t kMaxPayloadBytes = 256U << 20U;
+inline constexpr std::uint32_t kMaxSegments = 1'000'000;
+
+inline constexpr std::size_t kImuPayloadBytes = 64;
+inline constexpr std::size_t kImageHeadBytes = 40;  ///< then width * height pixels
+inline constexpr std::size_t kPropagateStepBytes = 16;
+inline constexpr std::size_t kTrackStepBytes = 64;
+inline constexpr std::size_t kSmoothStepBytes = 32;
+inline constexpr std::size_t kLossBytes = 16;
+inline constexpr std::size_t kEndBytes = 8;
+
+constexpr std::size_t paddedSize(std::size_t bytes) {
+  return (bytes + kRecordAlignment - 1) / kRecordAlignment * kRecordAlignment;
+}
+
+using RunId = std::array<std::uint8_t, 16>;
+
+struct SegmentHeader {
+  std::uint32_t version = kRecordingVersion;
+  std::uint32_t segment = 0;
+  RunId run{};
+  std::uint64_t first_sequence = 0;  ///< of the segment's first record
+};
+
+struct RecordHeader {
+  RecordKind kind = RecordKind::kRun;
+  std::uint64_t sequence = 0;
+  std::uint32_t length = 0;       ///< payload without padding
+  std::uint32_t payload_crc = 0;  ///< payload with padding, from the run's CRC on
+};
+
+/// recording_000042.swr, written into `name` with its final zero.
+using SegmentName = std::array<char, 24>;
+SegmentName segmentName(std::uint32_t segment);
+/// The number in a file name of that form; false for any other name.
+bool parseSegmentName(const std::string& name, std::uint32_t& segment);
+
+/// The CRC that all CRCs of a run's records continue from.
+std::uint32_t runChecksum(const RunId& run);
+
+void encode(const SegmentHeader& header, std::span<std::uint8_t, kSegmentHeaderBytes> out);
+void encode(const RecordHeader& header, std::uint32_t run_checksum,
+            std::span<std::uint8_t, kRecordHeaderBytes> out);
+
+enum class SegmentHeaderState : std::uint8_t {
+  kGood,
+  kForeign,       ///< does not begin with the magic bytes
+  kDamaged,       ///< the checksum is wrong
+  kOtherVersion,  ///< `version` is not kRecordingVersion (its checksum is right)
+};
+SegmentHeaderState decode(std::span<const std::uint8_t, kSegmentHeaderBytes> in, SegmentHeader& header);
+/// False when it is not a sound record header of the run.
+bool decode(std::span<const std::uint8_t, kRecordHeaderBytes> in, std::uint32_t run_checksum,
+            RecordHeader& header);
+
+/// Writes numbers one after the other into memory that is large enough.
+class LittleEndianWriter {
+ public:
+  explicit LittleEndianWriter(std::uint8_t* out) : begin_(out), at_(out) {}
+  void u8(std::uint8_t value) { *at_++ = value; }
+  void u16(std::uint16_t value) { put(value); }
+  void u32(std::uint32_t value) { put(value); }
+  void u64(std::uint64_t value) { put(value); }
+  void i32(std::int32_t value) { put(static_cast<std::uint32_t>(value)); }
+  void i64(std::int64_t value) { put(static_cast<std::uint64_t>(value)); }
+  void f64(double value) { put(std::bit_cast<std::uint64_t>(value)); }
+  void bytes(std::span<const std::uint8_t> values) {
+    if (!values.empty()) std::memcpy(at_, values.data(), values.size());
+    at_ += values.size();
+  }
+  void zeros(std::size_t count) {
+    std::memset(at_, 0, count);
+    at_ += count;
+  }
+  [[nodiscard]] std::size_t written() const { return static_cast<std::size_t>(at_ - begin_); }
+
+ private:
+  template <typename Word>
+  void put(Word value) {
+    for (std::size_t i = 0; i < sizeof(Word); ++i) *at_++ = static_cast<std::uint8_t>(value >> (8U * i));
+  }
+  std::uint8_t* begin_;
+  std::uint8_t* at_;
+};
+
+/// Reads them back. Beyond the end everything is zero and good() false.
+class LittleEndianReader {
+ public:
+  explicit LittleEndianReader(std::span<const std::uint8_t> in) : left_(in) {}
+  std::uint8_t u8() { return get<std::uint8_t>(); }
+  std::uint16_t u16() { return get<std::uint16_t>(); }
+  std::uint32_t u32() { return get<std::uint32_t>(); }
+  std::uint64_t u64() { return get<std::uint64_t>(); }
+  std::int32_t i32() { return static_cast<std::int32_t>(u32()); }
+  std::int64_t i64() { return static_cast<std::int64_t>(u64()); }
+  double f64() { return std::bit_cast<double>(u64()); }
+  std::span<const std::uint8_t> bytes(std::size_t count) {
+    if (count > left_.size()) {
+      good_ = false;
+      left_ = {};
+      return {};
+    }
+    const std::span<const std::uint8_t> taken = left_.first(count);
+    left_ = left_.subspan(count);
+    return taken;
+  }
+  [[nodiscard]] bool good() const { return good_; }
+  [[nodiscard]] std::size_t left() const { return left_.size(); }
+
+ private:
+  template <typename Word>
+  Word get() {
+    const std::span<const std::uint8_t> in = bytes(sizeof(Word));
+    Word value = 0;
+    for (std::size_t i = 0; i < in.size(); ++i) {
+      value = static_cast<Word>(value | static_cast<Word>(static_cast<Word>(in[i]) << (8U * i)));
+    }
+    return value;
+  }
+  std::span<const std::uint8_t> left_;
+  bool good_ = true;
+};
+
+}  // namespace swiftlet

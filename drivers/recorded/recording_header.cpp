@@ -1,0 +1,109 @@
+#include "drivers/recorded/recording_header.hpp"
+
+#include "drivers/recorded/recording_format.hpp"
+
+namespace swiftlet {
+namespace {
+
+// Larger than any imager; keeps width * height within 32 bits.
+constexpr int kMaxImageSide = 1 << 15;
+// Everything but the texts, with room to spare.
+constexpr std::size_t kFixedPartBytes = 1024;
+
+void put(LittleEndianWriter& to, const std::string& text) {
+  to.u32(static_cast<std::uint32_t>(text.size()));
+  to.bytes({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+}
+
+void put(LittleEndianWriter& to, const CameraModel& camera, const SE3& T_body_cam) {
+  to.u32(camera.kind() == CameraKind::kPinholeRadtan ? 0U : 1U);
+  to.i32(camera.width());
+  to.i32(camera.height());
+  for (int i = 0; i < 4; ++i) to.f64(camera.intrinsics()[i]);
+  for (int i = 0; i < 4; ++i) to.f64(camera.distortion()[i]);
+  for (int i = 0; i < 4; ++i) to.f64(T_body_cam.rotation.coeffs()[i]);
+  for (int i = 0; i < 3; ++i) to.f64(T_body_cam.translation[i]);
+}
+
+void put(LittleEndianWriter& to, const ImuNoise& noise) {
+  for (const double value : {noise.gyro_density, noise.accel_density, noise.gyro_walk, noise.accel_walk,
+                             noise.rate_hz, noise.gravity, noise.gyro_saturation, noise.accel_saturation}) {
+    to.f64(value);
+  }
+}
+
+bool get(LittleEndianReader& from, std::string& text) {
+  const std::span<const std::uint8_t> bytes = from.bytes(from.u32());
+  text.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  return from.good();
+}
+
+bool get(LittleEndianReader& from, CameraModel& camera, SE3& T_body_cam) {
+  const std::uint32_t kind = from.u32();
+  const std::int32_t width = from.i32();
+  const std::int32_t height = from.i32();
+  Eigen::Vector4d intrinsics;
+  Eigen::Vector4d distortion;
+  for (int i = 0; i < 4; ++i) intrinsics[i] = from.f64();
+  for (int i = 0; i < 4; ++i) distortion[i] = from.f64();
+  // Past SE3's constructor, which would normalize and so change bits.
+  for (int i = 0; i < 4; ++i) T_body_cam.rotation.coeffs()[i] = from.f64();
+  for (int i = 0; i < 3; ++i) T_body_cam.translation[i] = from.f64();
+  const bool sane = from.good() && kind <= 1 && width > 0 && height > 0 && width <= kMaxImageSide &&
+                    height <= kMaxImageSide && intrinsics.allFinite() && intrinsics[0] > 0 &&
+                    intrinsics[1] > 0 && distortion.allFinite() && T_body_cam.rotation.coeffs().allFinite() &&
+                    T_body_cam.translation.allFinite();
+  if (!sane) return false;
+  camera = CameraModel(kind == 0 ? CameraKind::kPinholeRadtan : CameraKind::kEquidistant, width, height,
+                       intrinsics, distortion);
+  return true;
+}
+
+bool get(LittleEndianReader& from, ImuNoise& noise) {
+  for (double* value : {&noise.gyro_density, &noise.accel_density, &noise.gyro_walk, &noise.accel_walk,
+                        &noise.rate_hz, &noise.gravity, &noise.gyro_saturation, &noise.accel_saturation}) {
+    *value = from.f64();
+  }
+  return from.good();
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> encodeRecordingHeader(const RecordingHeader& header) {
+  std::vector<std::uint8_t> payload(kFixedPartBytes + header.calibration_form.size() +
+                                    header.settings.size() + header.program_version.size());
+  LittleEndianWriter to(payload.data());
+  to.u32(static_cast<std::uint32_t>(header.order));
+  to.u32(static_cast<std::uint32_t>(header.rig.camera_count));
+  for (std::size_t i = 0; i < header.rig.camera_count; ++i) {
+    put(to, header.rig.camera[i], header.rig.T_body_cam[i]);
+  }
+  to.i64(header.rig.camera_to_imu_shift.ns);
+  put(to, header.noise);
+  put(to, header.calibration_form);
+  put(to, header.settings);
+  put(to, header.program_version);
+  payload.resize(to.written());
+  return payload;
+}
+
+const char* decodeRecordingHeader(std::span<const std::uint8_t> payload, RecordingHeader& header) {
+  LittleEndianReader from(payload);
+  const std::uint32_t order = from.u32();
+  if (order > 1) return "order";
+  header.order = static_cast<RecordOrder>(order);
+  header.rig = {};
+  header.rig.camera_count = from.u32();
+  if (header.rig.camera_count > kMaxCameras) return "number of cameras";
+  for (std::size_t i = 0; i < header.rig.camera_count; ++i) {
+    if (!get(from, header.rig.camera[i], header.rig.T_body_cam[i])) return "camera";
+  }
+  header.rig.camera_to_imu_shift.ns = from.i64();
+  if (!get(from, header.noise)) return "IMU noise";
+  if (!get(from, header.calibration_form)) return "calibration form";
+  if (!get(from, header.settings)) return "settings";
+  if (!get(from, header.program_version)) return "program version";
+  return from.left() == 0 ? nullptr : "length";
+}
+
+}  // namespace swiftlet

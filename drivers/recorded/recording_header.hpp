@@ -1,0 +1,38 @@
+#pragma once
+// What a recorded run was made with: the first record of every recording. Every double comes back with
+// the bits that it had.
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "estimator/camera/rig.hpp"
+#include "estimator/imu/imu_noise.hpp"
+
+namespace swiftlet {
+
+enum class RecordOrder : std::uint8_t {
+  /// Several threads fed the estimator: a reader merges the streams by arrival (ties: IMU, camera 0,
+  /// camera 1), each stream kept in its own order.
+  kByArrival = 0,
+  /// One thread fed it and wrote the records as they entered: their order in the file is the order.
+  kAsWritten = 1,
+};
+
+struct RecordingHeader {
+  Rig rig;
+  ImuNoise noise;
+  std::string calibration_form;  ///< Calibration::form of the log or device
+  std::string settings;          ///< the settings in force, as YAML text
+  std::string program_version;
+  RecordOrder order = RecordOrder::kByArrival;
+};
+
+/// The payload of the first record.
+std::vector<std::uint8_t> encodeRecordingHeader(const RecordingHeader& header);
+
+/// Null when it was read, else what is wrong: the name of the field, literal text.
+const char* decodeRecordingHeader(std::span<const std::uint8_t> payload, RecordingHeader& header);
+
+}  // namespace swiftlet

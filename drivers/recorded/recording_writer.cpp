@@ -1,0 +1,453 @@
+#include "drivers/recorded/recording_writer.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/random.h>
+#include <sys/uio.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+
+#include "drivers/calibration/input_error.hpp"
+#include "drivers/recorded/recording_checksum.hpp"
+
+namespace swiftlet {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMinBufferBytes = 128U << 10U;
+// From here on a second copy of the pixels costs more than a call of the kernel.
+constexpr std::size_t kDirectBytes = 32U << 10U;
+// Rows of an image with gaps between its rows that go to the kernel with one call.
+constexpr std::size_t kPiecesPerCall = 64;
+constexpr mode_t kFileMode = 0644;
+constexpr std::array<std::uint8_t, kRecordAlignment> kPadding{};
+
+constexpr Status kEnded{StatusCode::kInvalidInput, "the recording was ended"};
+
+Status statusOf(int error) {
+  switch (error) {
+    case ENOSPC:
+    case EDQUOT:
+      return {StatusCode::kFailed, "the disk is full: recording stopped; make room before the next run"};
+    case EFBIG:
+      return {StatusCode::kFailed, "a file became larger than allowed: recording stopped; see ulimit -f"};
+    default:
+      return {StatusCode::kFailed, "the disk does not take data any more: recording stopped; see dmesg"};
+  }
+}
+
+std::size_t pixelBytes(const ImageView& image) {
+  if (image.empty()) return 0;
+  return static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
+}
+
+std::span<const std::uint8_t> rowOf(const ImageView& image, int y) {
+  return {image.row(y), static_cast<std::size_t>(image.width)};
+}
+
+/// `piece` is only read, but iovec is made for reading and writing.
+iovec readOnly(std::span<const std::uint8_t> piece) {
+  return {const_cast<std::uint8_t*>(piece.data()), piece.size()};
+}
+
+}  // namespace
+
+RecordingWriter::RecordingWriter(const std::string& folder, const RecordingHeader& header,
+                                 const RecordingOptions& options)
+    : buffer_(std::max(options.buffer_bytes, kMinBufferBytes)), segment_bytes_(options.segment_bytes) {
+  try {
+    const std::vector<std::uint8_t> run = encodeRecordingHeader(header);
+    RecordingHeader read_back;
+    if (const char* field = decodeRecordingHeader(run, read_back)) {
+      throw InputError(folder, 0, field, "not fit for a recording", "Check the calibration");
+    }
+    if (kRecordHeaderBytes + paddedSize(run.size()) > buffer_.size()) buffer_.resize(2 * run.size());
+    openFolder(folder);
+    removeEarlierRun(folder);
+    if (::getrandom(run_.data(), run_.size(), 0) != static_cast<ssize_t>(run_.size())) {
+      throw InputError(folder, 0, "", "the system gives no random numbers for the run's id",
+                       "See getrandom(2)");
+    }
+    run_checksum_ = runChecksum(run_);
+    int error = beginSegment();
+    if (error == 0) {
+      put(RecordKind::kRun, run.data(), run.size());
+      sync();
+      if (!status_.ok()) error = EIO;
+    }
+    if (error != 0) {
+      const char* what = status_.ok() ? std::strerror(error) : status_.what;
+      throw InputError(folder, 0, "", std::string("no recording can be written here: ") + what,
+                       "Give a folder on a disk with room and the right to write");
+    }
+    // The new folder's own entry; a file system that cannot sync folders is none of the user's concern.
+    const int parent = ::openat(folder_, "..", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (parent >= 0) {
+      (void)::fsync(parent);
+      ::close(parent);
+    }
+  } catch (...) {
+    closeFiles();
+    throw;
+  }
+}
+
+RecordingWriter::~RecordingWriter() {
+  flush();
+  closeFiles();
+}
+
+void RecordingWriter::openFolder(const std::string& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  folder_ = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder_ < 0) {
+    throw InputError(folder, 0, "",
+                     std::string("no recording can be written here: ") +
+                         (error ? error.message() : std::string(std::strerror(errno))),
+                     "Give a folder, or the name of a new one, with the right to write");
+  }
+  if (::flock(folder_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+    throw InputError(folder, 0, "", "this recording is being written or read by another program",
+                     "Give another folder, or wait until that program has ended");
+  }
+}
+
+void RecordingWriter::removeEarlierRun(const std::string& folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    std::uint32_t segment = 0;
+    const std::string name = entry.path().filename().string();
+    if (parseSegmentName(name, segment)) names.push_back(name);
+  }
+  // The last first: whatever stops this leaves a beginning of the old run, not a run with holes.
+  std::sort(names.rbegin(), names.rend());
+  for (const std::string& name : names) {
+    if (::unlinkat(folder_, name.c_str(), 0) == 0) continue;
+    throw InputError(
+        (fs::path(folder) / name).string(), 0, "",
+        std::string("a segment of an earlier recording cannot be removed: ") + std::strerror(errno),
+        "Give another folder");
+  }
+}
+
+int RecordingWriter::beginSegment() {
+  if (segment_ >= kMaxSegments) return EFBIG;
+  const SegmentName name = segmentName(segment_);
+  file_ = ::openat(folder_, name.data(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kFileMode);
+  if (file_ < 0) return errno;
+  SegmentHeader header;
+  header.segment = segment_;
+  header.run = run_;
+  header.first_sequence = sequence_;
+  std::array<std::uint8_t, kSegmentHeaderBytes> bytes{};
+  encode(header, bytes);
+  iovec piece = readOnly(bytes);
+  const WriteResult result = writeAll(&piece, 1);
+  if (result.error != 0) {
+    // An empty segment would only puzzle a reader.
+    ::unlinkat(folder_, name.data(), 0);
+    ::close(file_);
+    file_ = -1;
+    return result.error;
+  }
+  // Without its entry in the folder a synced file would still be lost with the power.
+  (void)::fsync(folder_);
+  offset_ = bytes.size();
+  ++statistics_.segments;
+  statistics_.bytes += bytes.size();
+  return 0;
+}
+
+void RecordingWriter::closeFiles() {
+  if (file_ >= 0) ::close(file_);
+  if (folder_ >= 0) ::close(folder_);
+  file_ = -1;
+  folder_ = -1;
+}
+
+Status RecordingWriter::imu(const ImuSample& sample, Stamp arrival) {
+  std::array<std::uint8_t, kImuPayloadBytes> payload{};
+  LittleEndianWriter to(payload.data());
+  to.i64(sample.stamp.ns);
+  to.i64(arrival.ns);
+  for (int i = 0; i < 3; ++i) to.f64(sample.gyro[i]);
+  for (int i = 0; i < 3; ++i) to.f64(sample.accel[i]);
+  return put(RecordKind::kImu, payload.data(), payload.size());
+}
+
+Status RecordingWriter::image(const CameraFrame& frame) {
+  const std::size_t pixels = pixelBytes(frame.image);
+  const RecordKind kind = imageKind(frame.camera);
+  if (frame.camera >= kMaxCameras || kImageHeadBytes + pixels > kMaxPayloadBytes) {
+    ++statistics_.lost[static_cast<std::size_t>(kind)];
+    return {StatusCode::kInvalidInput, "an image of no camera of the rig, or too large to record"};
+  }
+  if (!status_.ok() || ended_) return refuse(kind);
+  std::array<std::uint8_t, kImageHeadBytes> head{};
+  LittleEndianWriter to(head.data());
+  to.i64(frame.stamp.ns);
+  to.i64(frame.arrival.ns);
+  to.u64(frame.sequence);
+  to.i32(frame.image.width);
+  to.i32(frame.image.height);
+  to.u32(static_cast<std::uint32_t>(frame.clock));
+  to.u32(0);
+  const std::size_t payload = head.size() + pixels;
+  const std::size_t padding = paddedSize(payload) - payload;
+  const bool direct = pixels >= kDirectBytes;
+  if (!makeRoom(kRecordHeaderBytes + paddedSize(payload))) return refuse(kind);
+  const std::size_t in_buffer = kRecordHeaderBytes + (direct ? head.size() : paddedSize(payload));
+  if (!fitsBuffer(in_buffer) && !flushBuffer()) return refuse(kind);
+
+  RecordHeader header{kind, sequence_, static_cast<std::uint32_t>(payload), crc32c(run_checksum_, head)};
+  const bool gaps = pixels > 0 && frame.image.stride != frame.image.width;
+  if (gaps) {
+    for (int y = 0; y < frame.image.height; ++y) {
+      header.payload_crc = crc32c(header.payload_crc, rowOf(frame.image, y));
+    }
+  } else {
+    header.payload_crc = crc32c(header.payload_crc, {frame.image.data, pixels});
+  }
+  header.payload_crc = crc32c(header.payload_crc, {kPadding.data(), padding});
+  if (direct) return putImageDirect(frame, header, head.data());
+
+  appendHeader(header);
+  LittleEndianWriter body(buffer_.data() + filled_);
+  body.bytes(head);
+  for (int y = 0; pixels > 0 && y < frame.image.height; ++y) body.bytes(rowOf(frame.image, y));
+  body.zeros(padding);
+  filled_ += body.written();
+  return okStatus();
+}
+
+/// The pixels go to the kernel from where they are, behind the buffer and with it.
+Status RecordingWriter::putImageDirect(const CameraFrame& frame, const RecordHeader& header,
+                                       const std::uint8_t* head) {
+  appendHeader(header);
+  std::memcpy(buffer_.data() + filled_, head, kImageHeadBytes);
+  filled_ += kImageHeadBytes;
+
+  const ImageView& image = frame.image;
+  const std::size_t whole = header.length - kImageHeadBytes;
+  const std::size_t padding = paddedSize(header.length) - header.length;
+  const bool gaps = image.stride != image.width;
+  const int rows = gaps ? image.height : 1;
+  std::array<iovec, kPiecesPerCall> pieces{};
+  std::size_t count = 0;
+  std::size_t written = 0;
+  pieces[count++] = readOnly({buffer_.data(), filled_});
+  for (int y = 0; y <= rows; ++y) {
+    const bool last = y == rows;
+    if (last) {
+      pieces[count++] = readOnly({kPadding.data(), padding});
+    } else {
+      pieces[count++] = readOnly(gaps ? rowOf(image, y) : std::span(image.data, whole));
+    }
+    if (!last && count < pieces.size()) continue;
+    const WriteResult result = writeAll(pieces.data(), count);
+    written += result.written;
+    count = 0;
+    if (result.error != 0) {
+      loseBuffer(written);
+      fail(result.error);
+      return status_;
+    }
+  }
+  offset_ += written;
+  filled_ = 0;
+  return okStatus();
+}
+
+Status RecordingWriter::propagateStep(const PropagateStep& step) {
+  std::array<std::uint8_t, kPropagateStepBytes> payload{};
+  LittleEndianWriter to(payload.data());
+  to.u64(step.samples);
+  to.u64(step.fix);
+  return put(RecordKind::kPropagateStep, payload.data(), payload.size());
+}
+
+Status RecordingWriter::trackStep(const TrackStep& step) {
+  std::array<std::uint8_t, kTrackStepBytes> payload{};
+  LittleEndianWriter to(payload.data());
+  to.u64(step.frame);
+  to.i64(step.stamp.ns);
+  for (const std::uint64_t image : step.image) to.u64(image);
+  to.u64(step.samples);
+  to.u64(step.window);
+  to.i32(step.effort.iterations);
+  to.i32(step.effort.features);
+  to.i32(step.effort.keyframes);
+  to.i32(0);
+  return put(RecordKind::kTrackStep, payload.data(), payload.size());
+}
+
+Status RecordingWriter::smoothStep(const SmoothStep& step) {
+  std::array<std::uint8_t, kSmoothStepBytes> payload{};
+  LittleEndianWriter to(payload.data());
+  to.u64(step.frame);
+  to.u64(step.samples);
+  to.i32(step.effort.iterations);
+  to.i32(step.effort.features);
+  to.i32(step.effort.keyframes);
+  to.i32(0);
+  return put(RecordKind::kSmoothStep, payload.data(), payload.size());
+}
+
+Status RecordingWriter::loss(RecordKind kind, std::uint64_t count) {
+  if (count == 0) return status_;
+  std::array<std::uint8_t, kLossBytes> payload{};
+  LittleEndianWriter to(payload.data());
+  to.u32(static_cast<std::uint32_t>(kind));
+  to.u32(0);
+  to.u64(count);
+  return put(RecordKind::kLoss, payload.data(), payload.size());
+}
+
+Status RecordingWriter::flush() {
+  if (status_.ok() && !ended_) flushBuffer();
+  return status_;
+}
+
+Status RecordingWriter::sync() {
+  if (!status_.ok() || ended_ || !flushBuffer()) return status_;
+  if (::fdatasync(file_) != 0) {
+    fail(errno);
+  } else {
+    ++statistics_.syncs;
+  }
+  return status_;
+}
+
+Status RecordingWriter::end() {
+  if (ended_) return status_;
+  std::array<std::uint8_t, kEndBytes> payload{};
+  LittleEndianWriter(payload.data()).u64(sequence_);
+  put(RecordKind::kEnd, payload.data(), payload.size());
+  sync();
+  ended_ = true;
+  closeFiles();
+  return status_;
+}
+
+Status RecordingWriter::put(RecordKind kind, const std::uint8_t* payload, std::size_t size) {
+  if (!status_.ok() || ended_) return refuse(kind);
+  const std::size_t padded = paddedSize(size);
+  if (!makeRoom(kRecordHeaderBytes + padded)) return refuse(kind);
+  if (!fitsBuffer(kRecordHeaderBytes + padded) && !flushBuffer()) return refuse(kind);
+  std::uint32_t crc = crc32c(run_checksum_, {payload, size});
+  crc = crc32c(crc, {kPadding.data(), padded - size});
+  appendHeader({kind, sequence_, static_cast<std::uint32_t>(size), crc});
+  LittleEndianWriter to(buffer_.data() + filled_);
+  to.bytes({payload, size});
+  to.zeros(padded - size);
+  filled_ += padded;
+  return okStatus();
+}
+
+/// Also counts the record: its payload must follow.
+void RecordingWriter::appendHeader(const RecordHeader& header) {
+  encode(header, run_checksum_,
+         std::span<std::uint8_t, kRecordHeaderBytes>(buffer_.data() + filled_, kRecordHeaderBytes));
+  filled_ += kRecordHeaderBytes;
+  ++sequence_;
+  ++statistics_.records;
+  statistics_.bytes += kRecordHeaderBytes + paddedSize(header.length);
+}
+
+/// Begins the next segment where a record of `bytes` would pass the end of this one.
+bool RecordingWriter::makeRoom(std::size_t bytes) {
+  const std::uint64_t used = offset_ + filled_;
+  if (used + bytes <= segment_bytes_ || used == kSegmentHeaderBytes) return true;
+  if (!sync().ok()) return false;
+  ::close(file_);
+  file_ = -1;
+  ++segment_;
+  const int error = beginSegment();
+  if (error != 0) fail(error);
+  return error == 0;
+}
+
+RecordingWriter::WriteResult RecordingWriter::writeAll(iovec* pieces, std::size_t count) const {
+  WriteResult result;
+  while (count > 0) {
+    if (pieces->iov_len == 0) {
+      ++pieces;
+      --count;
+      continue;
+    }
+    const ssize_t got = ::writev(file_, pieces, static_cast<int>(count));
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) {
+      result.error = got < 0 ? errno : EIO;
+      return result;
+    }
+    auto left = static_cast<std::size_t>(got);
+    result.written += left;
+    while (left > 0) {
+      const std::size_t step = std::min(left, pieces->iov_len);
+      pieces->iov_base = static_cast<std::uint8_t*>(pieces->iov_base) + step;
+      pieces->iov_len -= step;
+      left -= step;
+      if (pieces->iov_len > 0) continue;
+      ++pieces;
+      --count;
+    }
+  }
+  return result;
+}
+
+bool RecordingWriter::flushBuffer() {
+  iovec piece{buffer_.data(), filled_};
+  const WriteResult result = writeAll(&piece, 1);
+  if (result.error != 0) {
+    loseBuffer(result.written);
+    fail(result.error);
+    return false;
+  }
+  offset_ += filled_;
+  filled_ = 0;
+  return true;
+}
+
+/// Of the buffer (and what should have followed it) the first `written` bytes got to the file: counts the
+/// records that did not, and cuts the file behind the last that did.
+void RecordingWriter::loseBuffer(std::size_t written) {
+  std::size_t kept = 0;
+  std::size_t at = 0;
+  while (at < filled_) {
+    LittleEndianReader from(std::span<const std::uint8_t>(buffer_).subspan(at + 16, 6));
+    const std::size_t size = kRecordHeaderBytes + paddedSize(from.u32());
+    const std::uint16_t kind = from.u16();
+    at += size;
+    if (at <= std::min(written, filled_)) {
+      kept = at;
+      continue;
+    }
+    ++statistics_.lost[kind];
+    --statistics_.records;
+    statistics_.bytes -= size;
+  }
+  offset_ += kept;
+  filled_ = 0;
+  // Should this fail too, a reader cuts there all the same.
+  if (::ftruncate(file_, static_cast<off_t>(offset_)) != 0) errno = 0;
+}
+
+void RecordingWriter::fail(int error) {
+  if (status_.ok()) status_ = statusOf(error);
+}
+
+Status RecordingWriter::refuse(RecordKind kind) {
+  ++statistics_.lost[static_cast<std::size_t>(kind)];
+  return status_.ok() ? kEnded : status_;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,123 @@
+#pragma once
+// Writes a flight recording: everything that entered the estimator, in a form that survives a kill and a
+// power cut. recording_source.hpp reads it; recording_format.hpp has the layout.
+//
+// Threads: one, the recorder's own. Nothing here is on the flight path; calls may block in the kernel.
+// Memory: one buffer of RecordingOptions::buffer_bytes, all of it touched at construction; nothing is
+//   allocated afterwards. Pixels of a large image go from the caller's memory to the kernel without a copy.
+// Cost: one pass over the payload for the checksum and the kernel's copy.
+// Errors: InputError at construction (folder not writable, recording in use). Afterwards a Status: the
+//   first error of the disk (full, I/O) ends the writing for good, later calls return it at once, and
+//   statistics().lost says how many records of each kind did not get to the file. What was written before
+//   stays whole: the segment is cut behind its last complete record.
+//
+// What is safe when:
+//   flush()  everything so far is with the kernel: survives a crash or kill -9 of the program.
+//   sync()   everything so far is on the disk: survives a power cut. An owner that flushes after each drain
+//   of
+//            its rings and syncs every 0.5 s loses at most the last 0.5 s and the duration of one sync.
+//   A full segment is synced when the next one begins.
+//
+// Segments: a new file every RecordingOptions::segment_bytes. Segments of an earlier run in the folder are
+//   deleted first, other files stay. While it is written the folder is locked against another writer and
+//   against readers (flock; the kernel lets go of it however the program ends).
+
+#include <sys/uio.h>
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "drivers/recorded/recording_format.hpp"
+#include "drivers/recorded/recording_header.hpp"
+#include "estimator/core/status.hpp"
+#include "estimator/messages/frames.hpp"
+#include "estimator/messages/imu_sample.hpp"
+#include "estimator/messages/step_record.hpp"
+
+namespace swiftlet {
+
+struct RecordingOptions {
+  std::size_t segment_bytes = 64U << 20U;  ///< a segment ends before the record that would pass this
+  std::size_t buffer_bytes = 1U << 20U;    ///< at least 128 KiB is taken
+};
+
+struct RecordingStatistics {
+  std::uint64_t records = 0;   ///< complete in the file or the buffer
+  std::uint64_t bytes = 0;     ///< of these, with the segments' headers
+  std::uint64_t segments = 0;  ///< files begun
+  std::uint64_t syncs = 0;
+  /// Given to the writer but not written because of an error, by RecordKind.
+  std::array<std::uint64_t, kRecordKinds> lost{};
+};
+
+class RecordingWriter {
+ public:
+  /// Begins a recording in `folder` (created if needed; `RUN/recording` by custom). The first segment with
+  /// its header is on the disk when this returns.
+  RecordingWriter(const std::string& folder, const RecordingHeader& header,
+                  const RecordingOptions& options = {});
+  RecordingWriter(const RecordingWriter&) = delete;
+  RecordingWriter& operator=(const RecordingWriter&) = delete;
+  /// Flushes. Without end() before, a reader takes the recording for one that was cut off.
+  ~RecordingWriter();
+
+  /// `arrival`: when it reached the estimator, not falling along the stream; its stamp for a log.
+  Status imu(const ImuSample& sample, Stamp arrival);
+  /// kInvalidInput for a camera beyond the rig's kMaxCameras or an image above 256 MiB (counted as lost).
+  Status image(const CameraFrame& frame);
+  Status propagateStep(const PropagateStep& step);
+  Status trackStep(const TrackStep& step);
+  Status smoothStep(const SmoothStep& step);
+  /// `count` records of `kind` never came here because a buffer before the writer was full; they would have
+  /// followed the last record of that kind.
+  Status loss(RecordKind kind, std::uint64_t count);
+
+  Status flush();
+  Status sync();
+  /// Marks the end, syncs and closes. Whatever comes later is refused and counted as lost.
+  Status end();
+
+  [[nodiscard]] Status status() const { return status_; }
+  [[nodiscard]] const RecordingStatistics& statistics() const { return statistics_; }
+
+ private:
+  struct WriteResult {
+    std::size_t written = 0;
+    int error = 0;
+  };
+
+  void openFolder(const std::string& folder);
+  void removeEarlierRun(const std::string& folder);
+  int beginSegment();
+  void closeFiles();
+
+  Status put(RecordKind kind, const std::uint8_t* payload, std::size_t size);
+  Status putImageDirect(const CameraFrame& frame, const RecordHeader& header, const std::uint8_t* head);
+  void appendHeader(const RecordHeader& header);
+  bool makeRoom(std::size_t bytes);
+  [[nodiscard]] bool fitsBuffer(std::size_t bytes) const { return filled_ + bytes <= buffer_.size(); }
+  WriteResult writeAll(iovec* pieces, std::size_t count) const;
+  bool flushBuffer();
+  void takeWritten(std::size_t bytes);
+  void loseBuffer(std::size_t written);
+  void fail(int error);
+  Status refuse(RecordKind kind);
+
+  std::vector<std::uint8_t> buffer_;  ///< whole records, except while an image is written directly
+  std::size_t filled_ = 0;
+  std::size_t segment_bytes_ = 0;
+  int folder_ = -1;
+  int file_ = -1;
+  RunId run_{};
+  std::uint32_t run_checksum_ = 0;
+  std::uint32_t segment_ = 0;
+  std::uint64_t offset_ = 0;    ///< bytes of the segment that the kernel has
+  std::uint64_t sequence_ = 0;  ///< of the next record
+  bool ended_ = false;
+  Status status_;
+  RecordingStatistics statistics_;
+};
+
+}  // namespace swiftlet
