@@ -77,7 +77,7 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
       frames_in_epoch_ < kStartFrames ? std::max(kStartIterations, effort.iterations) : effort.iterations;
   imu_gap_ = false;
   ++frames_in_epoch_;
-  const Status status = smoother_.step(input, left_step_);
+  const Status status = smoother_.step(input);
   if (!status.ok()) return fail(status, output);
   trim_due_ = true;
   publish(tracked, input.imu_gap, output);
@@ -87,6 +87,7 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
 void SmoothStage::trim() {
   if (!trim_due_) return;
   trim_due_ = false;
+  smoother_.trim(left_step_);
   handOver();
 }
 
@@ -180,8 +181,9 @@ Status SmoothStage::catchUp() {
   input.iterations = kStartIterations;
   for (std::size_t k = 0; k + 1 < mono_starter_.size(); ++k) {
     input.frame = &mono_starter_.frame(k);
-    const Status status = smoother_.step(input, left_step_);
+    const Status status = smoother_.step(input);
     if (!status.ok()) return status;
+    smoother_.trim(left_step_);
     handOver();
   }
   mono_starter_.reset();

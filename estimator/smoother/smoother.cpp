@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "estimator/geometry/so3.hpp"
 
@@ -74,23 +75,25 @@ void Smoother::reset() {
   extra_factors_.clear();
   prior_.clear();
   has_start_ = false;
+  trim_due_ = false;
 }
 
-Status Smoother::step(const StepInput& input, FixedVector<KeyframeState, kMaxStates>& left_window) {
-  left_window.clear();
+Status Smoother::step(const StepInput& input) {
   if (order_.empty() && !has_start_) return {StatusCode::kNotReady, "no start state"};
+  if (trim_due_) return {StatusCode::kInvalidInput, "the window has not been trimmed since the last step"};
   const std::uint8_t slot = addState(input);
-  addSightings(slot, *input.frame);
+  addSightings(slot, *input.frame, input.max_features);
   const Status status = solve(input.iterations);
   if (!status.ok()) return status;
   updateStatistics();
-  trimWindow(left_window);
+  max_keyframes_ = std::clamp(input.max_keyframes, 1, settings_.max_keyframes);
+  trim_due_ = true;
   return okStatus();
 }
 
 std::uint8_t Smoother::addState(const StepInput& input) {
   std::uint8_t slot = 0;
-  while (states_[slot].used) ++slot;  // trimWindow() leaves a free slot
+  while (states_[slot].used) ++slot;  // trim() leaves a free slot
   WindowState& state = states_[slot];
   state = WindowState{};
   state.used = true;
@@ -211,10 +214,23 @@ void Smoother::removeLandmark(Landmark& landmark) {
   in_system_[index] = 0;
 }
 
-void Smoother::addSightings(std::uint8_t slot, const TrackedFrame& frame) {
+// Ids rise with every detection, so those up to this one have been followed for longest.
+TrackId Smoother::newestIdTaken(const TrackedFrame& frame, int max_features) {
+  const auto count = static_cast<std::size_t>(std::max(max_features, 1));
+  if (frame.features.size() <= count) return std::numeric_limits<TrackId>::max();
+  taken_.clear();
+  for (const TrackedFeature& feature : frame.features) static_cast<void>(taken_.tryPushBack(feature.id));
+  TrackId* const last = taken_.begin() + (count - 1);
+  std::nth_element(taken_.begin(), last, taken_.end());
+  return *last;
+}
+
+void Smoother::addSightings(std::uint8_t slot, const TrackedFrame& frame, int max_features) {
   statistics_ = FrameStatistics{};
   double age = 0;
+  const TrackId newest_taken = newestIdTaken(frame, max_features);
   for (const TrackedFeature& feature : frame.features) {
+    if (feature.id > newest_taken) continue;
     Sighting sighting;
     sighting.slot = slot;
     bool any = false;

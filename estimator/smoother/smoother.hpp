@@ -97,11 +97,22 @@ class Smoother {
     bool imu_gap = false;  ///< samples are missing since the previous frame
     bool at_rest = false;
     int iterations = 2;
+    /// Of the frame's features, taken at most: those with the smallest ids, known for longest; at least 1.
+    int max_features = static_cast<int>(kMaxFeatures);
+    /// That the window keeps, between 1 and the settings'; further down it comes by two a step.
+    int max_keyframes = static_cast<int>(kMaxStates);
   };
 
-  /// Adds a frame, solves, and trims the window. `left_window` is overwritten with the keyframes that
-  /// left. kNotReady without a start state; kFailed when the system cannot be solved: reset.
-  Status step(const StepInput& input, FixedVector<KeyframeState, kMaxStates>& left_window);
+  /// Adds a frame and solves: afterwards the newest state, its covariance, the statistics and `window()`
+  /// stand. The window is one frame longer then, and `trim` must follow before the next step.
+  /// kNotReady without a start state; kInvalidInput, with nothing changed, when the window has not been
+  /// trimmed; kFailed when the system cannot be solved: reset. Only after kOk is there something to trim.
+  Status step(const StepInput& input);
+
+  /// What leaves the window after a step: frames between keyframes, and old keyframes into the prior.
+  /// `left_window` is overwritten with the keyframes that left. Changes no value of the states that stay.
+  /// From here on `window()` is without what left.
+  void trim(FixedVector<KeyframeState, kMaxStates>& left_window);
 
   /// Not before the first step.
   [[nodiscard]] const WindowState& newest() const { return states_[order_.back()]; }
@@ -126,7 +137,7 @@ class Smoother {
   /// Poses in order of time, and the landmarks of the last solve that are not at infinity.
   void window(SmoothedWindow& out) const;
 
-  // Extra states: between two steps. All of it is forgotten by reset().
+  // Extra states: after a step's trim, before the next step. All of it is forgotten by reset().
 
   /// Gives a landmark columns of its own, from its triangulated position on, until no frame sees it any more.
   /// Refused: kInvalidInput without such a landmark, kNotReady when it took no part in the last solve,
@@ -160,9 +171,10 @@ class Smoother {
   static constexpr std::uint8_t kNoSlot = 255;
 
   std::uint8_t addState(const StepInput& input);
+  [[nodiscard]] TrackId newestIdTaken(const TrackedFrame& frame, int max_features);
   void linkState(WindowState& state, const WindowState& previous, bool gap);
   void integrateLink(WindowState& state, const WindowState& previous);
-  void addSightings(std::uint8_t slot, const TrackedFrame& frame);
+  void addSightings(std::uint8_t slot, const TrackedFrame& frame, int max_features);
   Landmark* findLandmark(TrackId id);
   Landmark* newLandmark(TrackId id);
   void removeLandmark(Landmark& landmark);
@@ -186,7 +198,6 @@ class Smoother {
   void rejectOutliers(double threshold, bool newest_only);
   void updateStatistics();
 
-  void trimWindow(FixedVector<KeyframeState, kMaxStates>& left_window);
   void dropFrame(std::size_t position);
   void dropMotion(std::size_t position);
   void dropKeyframe(std::size_t position);
@@ -245,6 +256,9 @@ class Smoother {
   StartState start_;
   bool has_start_ = false;
   std::uint64_t newest_frame_ = 0;
+  bool trim_due_ = false;
+  int max_keyframes_ = 0;                     // of the last step
+  FixedVector<TrackId, kMaxFeatures> taken_;  // scratch of newestIdTaken()
 
   std::array<WindowState, kMaxStates> states_;
   FixedVector<std::uint8_t, kMaxStates> order_;  // slots in order of time

@@ -17,6 +17,9 @@ constexpr double kMetresPerRadian = 1.0;
 constexpr double kMinDistance = 1e-2;  // m, keeps the score finite
 // Bias walk within one increment is not modelled: longer intervals are not made by merging.
 constexpr double kLongestMergedInterval = 3.0;  // s
+// Parts of states that leave in one step because the window is to become shorter: bounds the time. Each new
+// keyframe makes at most one of either kind leave, so that two bring the window down.
+constexpr int kMaxDropsOfAKind = 2;
 
 double separation(const BodyState& a, const BodyState& b) {
   return (a.T_world_body.translation - b.T_world_body.translation).norm() +
@@ -31,7 +34,10 @@ std::size_t Smoother::motionBegin() const {
   return k;
 }
 
-void Smoother::trimWindow(FixedVector<KeyframeState, kMaxStates>& left_window) {
+void Smoother::trim(FixedVector<KeyframeState, kMaxStates>& left_window) {
+  left_window.clear();
+  if (!trim_due_) return;
+  trim_due_ = false;
   const auto recent = static_cast<std::size_t>(settings_.max_recent);
   if (order_.size() > recent) oldest_recent_frame_ = states_[order_[order_.size() - recent]].frame_index;
   for (std::size_t k = 0; k + recent < order_.size();) {
@@ -41,21 +47,27 @@ void Smoother::trimWindow(FixedVector<KeyframeState, kMaxStates>& left_window) {
       ++k;
     }
   }
-  const auto motion_states = static_cast<std::size_t>(settings_.max_recent + settings_.max_motion_keyframes);
-  const auto keyframes = static_cast<std::size_t>(settings_.max_keyframes - settings_.max_motion_keyframes);
+  const int motion_keyframes = std::min(settings_.max_motion_keyframes, max_keyframes_);
+  const auto motion_states = static_cast<std::size_t>(settings_.max_recent + motion_keyframes);
+  const auto keyframes = static_cast<std::size_t>(max_keyframes_ - motion_keyframes);
   const auto too_old = [this, recent] {
     return order_.size() > recent &&
            (newest().stamp - states_[order_.front()].stamp).seconds() > settings_.horizon;
   };
   // Each round takes a part of a state away, so there are at most two for each.
+  int motions_dropped = 0;
+  int keyframes_dropped = 0;
   for (;;) {
     const std::size_t poses = motionBegin();
-    if (order_.size() - poses > motion_states || (poses == 0 && too_old())) {
+    if ((order_.size() - poses > motion_states && motions_dropped < kMaxDropsOfAKind) ||
+        (poses == 0 && too_old())) {
       dropMotion(poses);
-    } else if (poses > keyframes || too_old()) {
+      ++motions_dropped;
+    } else if ((poses > keyframes && keyframes_dropped < kMaxDropsOfAKind) || too_old()) {
       const std::size_t k = too_old() ? 0 : chooseKeyframeToDrop(poses);
       static_cast<void>(left_window.tryPushBack(record(states_[order_[k]])));
       dropKeyframe(k);
+      ++keyframes_dropped;
     } else {
       break;
     }

@@ -29,12 +29,20 @@ class SmootherRun {
 
   void addImu(const ImuSample& sample) { smoother_->addImu(sample); }
 
+  // Effort of the steps to come.
+  int max_features = static_cast<int>(kMaxFeatures);
+  int max_keyframes = static_cast<int>(kMaxStates);
+
   Status step(std::size_t k, int iterations = 3) {
     if (!smoother_->started()) start(k);
     Smoother::StepInput input;
     input.frame = &flight_.frames()[k];
     input.iterations = k < 20 ? std::max(iterations, 8) : iterations;  // the start needs more
-    return smoother_->step(input, left_);
+    input.max_features = max_features;
+    input.max_keyframes = max_keyframes;
+    const Status status = smoother_->step(input);
+    smoother_->trim(left_);
+    return status;
   }
 
   [[nodiscard]] Smoother& smoother() { return *smoother_; }
