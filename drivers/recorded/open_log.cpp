@@ -6,9 +6,16 @@
 #include <string_view>
 
 #include "drivers/recorded/asl_folder.hpp"
+#include "drivers/recorded/recording_source.hpp"
 #include "drivers/recorded/ros_bag.hpp"
 
 namespace swiftlet {
+namespace {
+
+constexpr const char* kWhatToGive =
+    "Give a EuRoC folder (the sequence or its mav0), a ROS 1 bag, or a run's folder with its recording";
+
+}  // namespace
 
 bool isRosBag(const std::string& path) {
   constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
@@ -21,13 +28,14 @@ bool isRosBag(const std::string& path) {
 
 std::unique_ptr<LogSource> openLog(const std::string& path, const LogOptions& options) {
   if (!std::filesystem::exists(path)) {
-    throw InputError(path, 0, "", "does not exist",
-                     "Give a EuRoC folder (the sequence or its mav0) or a ROS 1 bag");
+    throw InputError(path, 0, "", "does not exist", kWhatToGive);
   }
   if (isAslFolder(path)) return openAslFolder(path, options);
   if (!std::filesystem::is_directory(path) && isRosBag(path)) return openRosBag(path, options);
-  throw InputError(path, 0, "", "not a log: neither a folder with imu0 and cam0 nor a ROS 1 bag",
-                   "Give a EuRoC folder (the sequence or its mav0) or a ROS 1 bag");
+  if (isRecording(path)) return openRecording(path, options);
+  throw InputError(path, 0, "",
+                   "not a log: neither a folder with imu0 and cam0, nor a ROS 1 bag, nor a recording",
+                   kWhatToGive);
 }
 
 }  // namespace swiftlet

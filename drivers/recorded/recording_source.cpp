@@ -1,0 +1,214 @@
+#include "drivers/recorded/recording_source.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "drivers/recorded/recording_checksum.hpp"
+
+namespace swiftlet {
+namespace {
+
+// Slots begin at cache lines of their own.
+constexpr std::size_t kSlotAlignment = 64;
+
+/// Pixels and padding of an image's record.
+std::size_t bodyBytes(const RecordedImage& entry) { return paddedSize(entry.length) - kImageHeadBytes; }
+
+}  // namespace
+
+RecordingSource::RecordingSource(RecordingFiles files, const LogOptions& options, const std::string& folder)
+    : files_(std::move(files)), without_images_(options.without_images) {
+  if (!folder.empty()) lock_.emplace(folder);
+  index_ = indexRecording(files_);
+  chooseCalibration(options);
+  countImages();
+  reservePools();
+  warn();
+}
+
+void RecordingSource::chooseCalibration(const LogOptions& options) {
+  const Rig& recorded = index_.header.rig;
+  if (options.calibration.empty()) {
+    calibration_.form = index_.header.calibration_form;
+    calibration_.rig = recorded;
+    calibration_.noise = index_.header.noise;
+  } else {
+    calibration_ = readCalibration(options.calibration, options.imu_calibration, options.calibration_options);
+    for (const std::string& line : calibration_.warnings) warnings_.add(line);
+    calibration_.R_body_imu.setIdentity();
+    calibration_.rig.camera_count = std::min(calibration_.rig.camera_count, recorded.camera_count);
+    cameras_ = calibration_.rig.camera_count;
+    for (std::size_t i = 0; i < calibration_.rig.camera_count; ++i) {
+      const CameraModel& given = calibration_.rig.camera[i];
+      const CameraModel& used = recorded.camera[i];
+      if (given.width() == used.width() && given.height() == used.height()) continue;
+      throw InputError(options.calibration, 0, "",
+                       fmt::format("cam{} has {}x{} pixels, the recording was made with {}x{}", i,
+                                   given.width(), given.height(), used.width(), used.height()),
+                       "Give the calibration of this image size");
+    }
+  }
+  if (options.mono) {
+    calibration_.rig.camera_count = std::min<std::size_t>(calibration_.rig.camera_count, 1);
+    cameras_ = 1;
+  }
+}
+
+bool RecordingSource::delivers(RecordKind kind) const {
+  if (kind == RecordKind::kImu) return true;
+  const std::size_t camera = kind == RecordKind::kImage0 ? 0 : 1;
+  return !without_images_ && camera < cameras_;
+}
+
+void RecordingSource::countImages() {
+  std::vector<std::int64_t> stamps;
+  for (std::size_t camera = 0; camera < kMaxCameras; ++camera) {
+    if (!delivers(imageKind(camera))) continue;
+    for (const RecordedImage& entry : index_.images[camera]) stamps.push_back(entry.stamp.ns);
+  }
+  image_count_ = stamps.size();
+  std::sort(stamps.begin(), stamps.end());
+  frame_count_ = static_cast<std::size_t>(std::unique(stamps.begin(), stamps.end()) - stamps.begin());
+}
+
+void RecordingSource::reservePools() {
+  for (std::size_t camera = 0; camera < kMaxCameras; ++camera) {
+    std::size_t largest = 0;
+    for (const RecordedImage& entry : index_.images[camera]) largest = std::max(largest, bodyBytes(entry));
+    Pool& pool = pools_[camera];
+    pool.slot_bytes = (largest + kSlotAlignment - 1) / kSlotAlignment * kSlotAlignment;
+    pool.memory.resize(kImageSlots * pool.slot_bytes);
+  }
+}
+
+void RecordingSource::warn() {
+  const RecordingCut& cut = index_.cut;
+  const std::string& last_file = files_.segments.back()->name();
+  if (cut.reason != nullptr) {
+    std::string line = fmt::format("{}: byte {}: {}; the recording ends here, {} bytes are left out",
+                                   files_.segments[cut.segment]->name(), cut.offset, cut.reason, cut.bytes);
+    if (cut.sound_records > 0) {
+      line +=
+          fmt::format(", among them {} sound records that cannot be used after the gap", cut.sound_records);
+    }
+    warnings_.add(line);
+  } else if (!index_.ended) {
+    warnings_.add(
+        fmt::format("{}: byte {}: no end mark: the recording was broken off; it is whole up to here",
+                    last_file, files_.segments.back()->size()));
+  }
+  std::array<std::uint64_t, kRecordKinds> events{};
+  std::array<std::uint64_t, kRecordKinds> lost{};
+  for (const RecordingLoss& loss : index_.losses) {
+    const auto kind = static_cast<std::size_t>(loss.kind);
+    lost[kind] += loss.count;
+    warnings_.addCounted(++events[kind],
+                         fmt::format("{}: {} {} were lost while recording, after number {}", files_.folder,
+                                     loss.count, pluralName(loss.kind), loss.after));
+  }
+  for (std::size_t kind = 0; kind < kRecordKinds; ++kind) {
+    if (events[kind] <= LogWarnings::kPerKind) continue;
+    warnings_.add(fmt::format("{}: in all {} {} were lost while recording", files_.folder, lost[kind],
+                              pluralName(static_cast<RecordKind>(kind))));
+  }
+}
+
+bool RecordingSource::complete() const {
+  return index_.ended && index_.cut.reason == nullptr && index_.losses.empty();
+}
+
+bool RecordingSource::next(SensorMessage& message) {
+  while (turn_ < index_.turns.size()) {
+    const auto kind = static_cast<RecordKind>(index_.turns[turn_++]);
+    if (kind == RecordKind::kImu) {
+      message = index_.imu[next_imu_++].sample;
+      ++counters_.imu_samples;
+      return true;
+    }
+    const std::size_t camera = kind == RecordKind::kImage0 ? 0 : 1;
+    const RecordedImage& entry = index_.images[camera][next_image_[camera]++];
+    if (!delivers(kind)) continue;
+    CameraFrame frame;
+    read(camera, entry, frame);
+    ++counters_.images[camera];
+    message = frame;
+    return true;
+  }
+  return false;
+}
+
+std::uint64_t RecordingSource::imuNumber(std::size_t i) const {
+  std::uint64_t number = i + 1;
+  for (const RecordingLoss& loss : index_.losses) {
+    if (loss.kind == RecordKind::kImu && loss.after < number) number += loss.count;
+  }
+  return number;
+}
+
+std::uint64_t RecordingSource::lastImage(std::size_t camera) const {
+  if (camera >= kMaxCameras || index_.images[camera].empty()) return 0;
+  return index_.images[camera].back().number;
+}
+
+bool RecordingSource::image(std::size_t camera, std::uint64_t number, CameraFrame& frame) {
+  if (camera >= kMaxCameras) return false;
+  const std::vector<RecordedImage>& images = index_.images[camera];
+  const auto found = std::lower_bound(
+      images.begin(), images.end(), number,
+      [](const RecordedImage& entry, std::uint64_t wanted) { return entry.number < wanted; });
+  if (found == images.end() || found->number != number) return false;
+  read(camera, *found, frame);
+  return true;
+}
+
+void RecordingSource::read(std::size_t camera, const RecordedImage& entry, CameraFrame& frame) {
+  const RecordingFile& file = *files_.segments[entry.segment];
+  std::array<std::uint8_t, kRecordHeaderBytes + kImageHeadBytes> head{};
+  RecordHeader header;
+  const bool head_there = file.read(entry.offset, head) == head.size();
+  if (!head_there || !decode(std::span(head).first<kRecordHeaderBytes>(), index_.run_checksum, header) ||
+      header.length != entry.length) {
+    refuseChanged(entry);
+  }
+  Pool& pool = pools_[camera];
+  const std::span<std::uint8_t> body(pool.memory.data() + pool.slot * pool.slot_bytes, bodyBytes(entry));
+  const std::size_t got = file.read(entry.offset + head.size(), body);
+  const std::span<const std::uint8_t> payload = std::span(head).subspan<kRecordHeaderBytes>();
+  const std::uint32_t crc = crc32c(index_.run_checksum, payload);
+  if (got != body.size() || crc32c(crc, body) != header.payload_crc) refuseChanged(entry);
+
+  LittleEndianReader from(payload);
+  frame.stamp.ns = from.i64();
+  frame.arrival.ns = from.i64();
+  if (frame.stamp != entry.stamp || frame.arrival != entry.arrival) refuseChanged(entry);
+  frame.sequence = from.u64();
+  frame.image.width = from.i32();
+  frame.image.height = from.i32();
+  frame.clock = static_cast<Clock>(from.u32());
+  frame.camera = static_cast<std::uint32_t>(camera);
+  frame.image.stride = frame.image.width;
+  frame.image.data = nullptr;
+  if (entry.length == kImageHeadBytes) return;
+  frame.image.data = body.data();
+  pool.slot = (pool.slot + 1) % kImageSlots;
+}
+
+void RecordingSource::refuseChanged(const RecordedImage& entry) const {
+  throw InputError(files_.segments[entry.segment]->name(), 0, fmt::format("byte {}", entry.offset),
+                   "this image was sound when the recording was opened and is not any more",
+                   "The file was changed meanwhile or the disk fails; open it again to see what is left");
+}
+
+bool isRecording(const std::string& path) { return !findRecordingFolder(path).empty(); }
+
+std::unique_ptr<RecordingSource> openRecording(const std::string& path, const LogOptions& options) {
+  const std::string folder = findRecordingFolder(path);
+  if (folder.empty()) {
+    throw InputError(path, 0, "", "no recording: neither here nor in `recording` are recording_*.swr files",
+                     "Give a run's folder or its recording");
+  }
+  return std::make_unique<RecordingSource>(listRecordingFiles(folder), options, folder);
+}
+
+}  // namespace swiftlet
