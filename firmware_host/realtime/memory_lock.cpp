@@ -45,7 +45,7 @@ std::int64_t lockLimit() {
 /// The capability that lifts the limit, in the thread's effective set.
 bool mayLockBeyondLimit() {
   constexpr unsigned kCapIpcLock = 14;  // linux/capability.h
-  std::ifstream file("/proc/self/status");
+  std::ifstream file("/proc/thread-self/status");
   for (std::string line; std::getline(file, line);) {
     if (!line.starts_with("CapEff:")) continue;
     constexpr std::size_t kLabel = 7;
