@@ -11,6 +11,14 @@ inline constexpr std::size_t kMaxCameras = 2;
 inline constexpr std::size_t kMaxFeatures = 400;
 /// IMU samples between two frames handed to the smoother: 2.5 s at 400 Hz, 1 s at 1 kHz.
 inline constexpr std::size_t kMaxImuPerFrame = 1024;
+/// IMU samples on their way from a sensor to one reader: 10 s at 200 Hz, 2 s at 1 kHz.
+inline constexpr std::size_t kImuRing = 2048;
+/// Images of one camera on their way to tracking, and frames that wait there: some 0.2 s at 20 Hz, the
+/// longest pause that an operating system without real-time rights makes now and then.
+inline constexpr std::size_t kImageRing = 4;
+inline constexpr std::size_t kWaitingFrames = 3;
+/// Tracked frames on their way to the smoother.
+inline constexpr std::size_t kTrackedRing = 4;
 /// States in the smoother's window, keyframes and recent frames together.
 inline constexpr std::size_t kMaxStates = 24;
 /// Landmarks in the smoother's window.

@@ -17,7 +17,8 @@ struct CameraFrame {
   Stamp arrival;  ///< when the last byte was there; equals `stamp` where a log does not say
   Clock clock = Clock::kLog;
   std::uint32_t camera = 0;  ///< 0 left, 1 right
-  std::uint64_t sequence = 0;
+  std::uint64_t sequence = 0;  ///< the device's own count
+  std::uint64_t number = 0;    ///< of this camera's images that entered the estimator, from 1; 0: not counted
   ImageView image;
 };
 
@@ -25,7 +26,8 @@ struct CameraFrame {
 struct StereoFrame {
   Stamp stamp;
   std::uint64_t index = 0;
-  std::array<ImageView, kMaxCameras> image;  ///< empty() where that camera is missing
+  std::array<ImageView, kMaxCameras> image;         ///< empty() where that camera is missing
+  std::array<std::uint64_t, kMaxCameras> number{};  ///< CameraFrame::number of each; 0 where missing
 
   [[nodiscard]] bool has(std::size_t camera) const { return !image[camera].empty(); }
 };

@@ -27,6 +27,7 @@ Status Pairing::giveSingle(const CameraFrame& frame, StereoFrame& paired) {
   paired.stamp = frame.stamp;
   paired.index = next_index_++;
   paired.image[frame.camera] = frame.image;
+  paired.number[frame.camera] = frame.number;
   any_given_ = true;
   last_given_ = frame.stamp;
   if (settings_.cameras > 1) {
@@ -43,6 +44,8 @@ Status Pairing::givePair(const CameraFrame& a, const CameraFrame& b, StereoFrame
   paired.index = next_index_++;
   paired.image[a.camera] = a.image;
   paired.image[b.camera] = b.image;
+  paired.number[a.camera] = a.number;
+  paired.number[b.camera] = b.number;
   any_given_ = true;
   last_given_ = std::max(a.stamp, b.stamp);
   missing_running_ = {};

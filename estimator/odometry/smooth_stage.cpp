@@ -75,6 +75,8 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
   input.at_rest = rest_.state().at_rest;
   input.iterations =
       frames_in_epoch_ < kStartFrames ? std::max(kStartIterations, effort.iterations) : effort.iterations;
+  input.max_features = effort.features;
+  input.max_keyframes = effort.keyframes;
   imu_gap_ = false;
   ++frames_in_epoch_;
   const Status status = smoother_.step(input);

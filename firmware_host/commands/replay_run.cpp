@@ -59,10 +59,10 @@ class MemoryTable {
   std::int64_t last_;
 };
 
-void writeMap(const std::string& path, const std::vector<Wiring::MapPose>& poses) {
+void writeMap(const std::string& path, const std::vector<MapPose>& poses) {
   if (poses.empty()) return;
   LineFile file(path);
-  for (const Wiring::MapPose& pose : poses) file.write(formatTum(pose.stamp, pose.T_world_body));
+  for (const MapPose& pose : poses) file.write(formatTum(pose.stamp, pose.T_world_body));
 }
 
 }  // namespace
@@ -88,31 +88,36 @@ ReplayResult runReplay(const ReplayRequest& request, Settings settings) {
   RunRecorder recorder(request.out, request.imu_rate);
   const std::filesystem::path out(request.out);
   LineFile(out / "settings.yaml").write(printSettings(settings, false));
-  const auto wiring = std::make_unique<Wiring>(source->rig(), source->imuNoise(), settings, recorder);
-  wiring->wantImuStates(request.imu_rate);
-  if (settings.full_smoothing) wiring->keepForMap();
+  RunLog log(recorder);
+  if (settings.full_smoothing) {
+    log.keepForMap(
+        std::make_unique<MapKeeper>(request.out, source->rig(), source->imuNoise(), settings.odometry));
+  }
+  Wiring::Options wanted;
+  wanted.imu_states = request.imu_rate;
+  const auto wiring = std::make_unique<Wiring>(source->rig(), source->imuNoise(), settings, log, wanted);
   memory.note("estimator_at_start");
 
   Progress progress("replay", request.show_progress ? steps : 0);
-  ReplayPlan plan;
-  plan.from = request.from;
-  plan.until = request.until;
-  plan.last_stamp = request.last_stamp;
-  plan.tracks = tracks.get();
-  plan.stop = request.stop;
-  plan.progress = [&](std::uint64_t images) { progress.update(images); };
+  RunControl control;
+  control.stop = request.stop;
+  control.progress = [&](std::uint64_t images) { progress.update(images); };
+  LogFeed feed(*source, {request.from, request.until, request.last_stamp}, tracks.get());
 
   facts.mono = !settings.odometry.use_stereo || source->rig().camera_count < 2;
   const double wall = wallSeconds();
   const double cpu = processCpuSeconds();
-  facts.finished = runLockstep(*source, *wiring, plan);
+  facts.finished = runLockstep(feed, *wiring, control);
   facts.wall = wallSeconds() - wall;
   facts.cpu = processCpuSeconds() - cpu;
   progress.finish();
   memory.note("grown_in_flight");
   facts.memory = memory.rows();
   facts.peak_resident = peakResidentBytes();
-  writeMap(out / "map.tum", wiring->solveMap());
+  log.collect(*wiring);
+  RunStatistics& statistics = log.statistics();
+  statistics.times[static_cast<std::size_t>(StageId::kSource)] = feed.times();
+  writeMap(out / "map.tum", log.solveMap());
   printWarnings(*source, warned);
   if (tracks) {
     facts.track_surplus = tracks->surplus();
@@ -122,12 +127,12 @@ ReplayResult runReplay(const ReplayRequest& request, Settings settings) {
 
   ReplayResult result;
   result.finished = facts.finished;
-  result.has_pose = wiring->statistics().first_pose.has_value();
-  result.summary = summaryOf(facts, settings, *source, wiring->statistics());
+  result.has_pose = statistics.first_pose.has_value();
+  result.summary = summaryOf(facts, settings, *source, statistics);
   const Trajectory truth = source->groundTruth();
   if (!truth.empty() && result.has_pose) {
     result.summary["accuracy"] = runAccuracyJson(request.out, truth, source->groundTruthName(),
-                                                 *wiring->statistics().first_image, settings.evaluation);
+                                                 *statistics.first_image, settings.evaluation);
   }
   writeJson(out / "summary.json", result.summary);
   return result;

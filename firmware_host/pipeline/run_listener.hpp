@@ -15,7 +15,7 @@
 
 namespace swiftlet {
 
-/// Called on the executor's thread, in the order of the stream.
+/// Called on the thread `log`, in the order of the stream.
 class RunListener {
  public:
   RunListener() = default;
@@ -51,6 +51,8 @@ struct RunStatistics {
   std::uint64_t images = 0;  ///< handed to pairing
   std::uint64_t frames = 0;  ///< frames (pairs or singles) that reached the odometry
   std::uint64_t frames_refused = 0;
+  std::uint64_t frames_dropped = 0;  ///< went by while tracking was behind
+  std::uint64_t effort_changes = 0;  ///< of a stage, from one frame to the next
   std::uint64_t smooth_faults = 0;
   std::uint64_t keyframes = 0;
   std::uint64_t poses = 0;  ///< frames with a state
@@ -62,6 +64,7 @@ struct RunStatistics {
   std::map<EventKind, EventTotal> events;
   std::optional<FullSmootherReport> map;        ///< figures of the full smoothing, when it ran
   std::map<std::string, std::uint64_t> faults;  ///< statuses that were not ok, by their text
+  std::map<std::string, std::uint64_t> losses;  ///< what did not fit an arrow between threads, by its name
   std::vector<HealthChange> health;
   StageTable times;
 };

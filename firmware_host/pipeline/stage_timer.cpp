@@ -25,8 +25,14 @@ std::string_view stageName(StageId stage) {
       return "track";
     case StageId::kSmooth:
       return "smooth";
-    case StageId::kFrameTotal:
-      return "frame_total";
+    case StageId::kFix:
+      return "fix";
+    case StageId::kTrim:
+      return "trim";
+    case StageId::kImageToPose:
+      return "image_to_pose";
+    case StageId::kExposureToPose:
+      return "exposure_to_pose";
     case StageId::kMap:
       return "map";
     case StageId::kCount:

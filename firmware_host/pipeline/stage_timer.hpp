@@ -9,9 +9,21 @@
 
 namespace swiftlet {
 
-enum class StageId : std::size_t { kSource, kPairing, kImu, kTrack, kSmooth, kFrameTotal, kMap, kCount };
+enum class StageId : std::size_t {
+  kSource,          ///< reading and decoding an image
+  kPairing,         ///< a look at the images that have come
+  kImu,             ///< sample to state: wall from its arrival until the state is published
+  kFix,             ///< propagation starts again from a new fix
+  kTrack,           ///< front-end
+  kSmooth,          ///< back-end until the state stands
+  kTrim,            ///< making room in the window, after the state was published
+  kImageToPose,     ///< wall from the image's arrival until the pose is published; CPU of track and smooth
+  kExposureToPose,  ///< wall from the middle of the exposure
+  kMap,             ///< full smoothing
+  kCount
+};
 
-/// "source", "pairing", "imu", "track", "smooth", "frame_total", "map".
+/// In snake case: "source", "image_to_pose", ...
 std::string_view stageName(StageId stage);
 
 /// Wall time is what a reader waits; CPU time is what the stage itself takes, whatever else the

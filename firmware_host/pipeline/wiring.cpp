@@ -1,23 +1,29 @@
-// The system in one screen. Stages: pairing, track, smooth (the odometry's two halves). Arrows:
+// The system in one screen. Threads in brackets, stages in capitals; ring: every message arrives, in order;
+// newest: only the latest matters; slots: images, lent by handle with a quota for each reader.
 //
-//   camera 0 --+                       newest state, for prediction
-//              +-> pairing -> track <--------------------------+
-//   camera 1 --+                |                              |
-//                               +-> TrackedFrame -> smooth ----+-> OdometryOutput -> listener
-//   IMU ------------------------------> addImu ----^
-//                                        +-> NavState at IMU rate -> listener
-//                                        keyframes, IMU -> full smoother -> map.tum (after the run)
-//   track file --------------------> TrackedFrame (in place of cameras, pairing and track)
+//   [sensor]  IMU -------+--ring--> [propagate] PROPAGATION --ring--> NavState at IMU rate -> [log]
+//                        |               ^
+//                        |               '--newest-- StateFix <------------------.
+//                        +--ring--> [track]                                      |
+//   [sensor]  cameras --slots-----> PAIRING, TRACK --ring--> TrackedFrame -> [smooth] SMOOTH --ring-->
+//                        |               ^                                       |    FrameResult -> [log]
+//                        |               '--newest-- SmoothedWindow <------------'
+//                        +--ring--> [smooth]
+//                        +--ring--> [log] keyframes and IMU, kept for full smoothing after the run -> map.tum
+//   everything above, and what each stage took for a step --ring, slots--> [record] flight recorder
+//
+//   when full: IMU rings refuse and count; camera rings and waiting frames let the oldest go, counted;
+//   `track` waits for room in front of `smooth`; log and recorder lose, counted; no reader can hold another's
+//   slots.
 
 #include "firmware_host/pipeline/wiring.hpp"
 
 #include <algorithm>
-#include <limits>
+
+#include "firmware_host/pipeline/flight_recorder.hpp"
 
 namespace swiftlet {
 namespace {
-
-constexpr Stamp kEndOfTime{std::numeric_limits<std::int64_t>::max()};
 
 PairingSettings pairingSettings(const Rig& rig, const Settings& settings) {
   PairingSettings result;
@@ -29,172 +35,209 @@ PairingSettings pairingSettings(const Rig& rig, const Settings& settings) {
 
 }  // namespace
 
-Wiring::Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, RunListener& listener)
-    : rig_(rig),
-      noise_(noise),
-      odometry_settings_(settings.odometry),
+Wiring::Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, RunLog& log,
+               const Options& options)
+    : rig_(rigInUse(rig, settings.odometry)),
+      imu_period_(1.0 / noise.rate_hz),
+      log_(log),
+      recorder_(options.recorder),
+      full_effort_(settings.effort),
+      track_effort_(options.track_effort != nullptr ? options.track_effort : &full_effort_),
+      smooth_effort_(options.smooth_effort != nullptr ? options.smooth_effort : &full_effort_),
+      drag_(options.drag),
+      propagation_(noise, settings.odometry),
       pairing_(pairingSettings(rig, settings)),
-      odometry_(rig, noise, settings.odometry),
-      effort_(settings.effort),
-      listener_(listener) {}
-
-// camera -> pairing -> track -> smooth
-void Wiring::feedImage(const CameraFrame& frame) {
-  ++statistics_.images;
-  if (!statistics_.first_image) statistics_.first_image = frame.stamp;
-  statistics_.last_image = frame.stamp;
-  Status status;
-  addTime(statistics_.times, StageId::kPairing, measured([&] { status = pairing_.push(frame, paired_); }));
-  if (status.ok()) passFrame(paired_);
-  if (status.code == StatusCode::kInvalidInput) {
-    listener_.onRemark(frame.stamp, std::string("image refused: ") + status.what);
+      track_(rig, noise, settings.odometry),
+      smooth_(rig, noise, settings.odometry) {
+  if (options.imu_states) states_ = std::make_unique<StateRing>();
+  if (recorder_ != nullptr) to_recorder_ = std::make_unique<RecorderArrows>();
+  for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+    const CameraModel& model = rig_.camera[c];
+    for (std::size_t i = 0; i < kImageSlots; ++i) {
+      camera_[c].pool.slot(i).pixels.resize(static_cast<std::size_t>(model.width() * model.height()));
+    }
   }
 }
 
-// IMU -> addImu, or held back while a frame waits for its partner
-void Wiring::feedImu(const ImuSample& sample) {
-  if (pairing_.expire(sample.stamp, paired_).ok() || (held_imu_.full() && pairing_.flush(paired_).ok())) {
-    passFrame(paired_);
-  }
-  if (pairing_.holdsImage() && sample.stamp > pairing_.waitingStamp()) {
-    // A patience of 1 s at 1 kHz fits; beyond it the frame was let go just above.
-    if (held_imu_.tryPushBack(sample)) return;
-  }
-  passImu(sample);
+// IMU -> propagate, track, smooth, log, record
+void Wiring::takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host) {
+  const ImuArrival message{sample, ++counters_.sensor.imu_samples, arrival, host};
+  // Refusals are counted by the rings.
+  static_cast<void>(imu_to_propagate_.tryPush(message));
+  static_cast<void>(imu_to_track_.tryPush(message));
+  static_cast<void>(imu_to_smooth_.tryPush(message));
+  if (log_.wantsImu()) static_cast<void>(imu_to_log_.tryPush(message));
+  if (to_recorder_) static_cast<void>(to_recorder_->imu.tryPush(message));
+  newest_imu_.store(sample.stamp.ns, std::memory_order_release);
 }
 
-// track file -> smooth
-void Wiring::feedTracks(const TrackedFrame& tracked) {
-  if (!statistics_.first_image) statistics_.first_image = tracked.stamp;
-  statistics_.last_image = tracked.stamp;
-  ++statistics_.frames;
-  passTracks(tracked, {});
+// IMU, newest fix -> propagation -> state at IMU rate
+bool Wiring::propagate() {
+  const bool ended = input_ended_.load(std::memory_order_acquire);
+  const double cpu = threadCpuSeconds();
+  const std::uint64_t fix = fix_.refresh();
+  if (fix != propagating_.fix) {
+    propagating_.fix = fix;
+    if (to_recorder_) static_cast<void>(to_recorder_->propagate.tryPush({propagating_.samples, fix}));
+    addTime(times_, StageId::kFix, measured([&] { propagation_.take(fix_.value()); }));
+  }
+  const ImuArrival* arrival = imu_to_propagate_.front();
+  if (arrival == nullptr) {
+    if (ended) propagate_done_.store(true, std::memory_order_release);
+    return false;
+  }
+  const Status status = propagation_.step(arrival->sample, states_ ? &propagating_.state : nullptr);
+  if (states_ && status.ok()) static_cast<void>(states_->tryPush(propagating_.state));
+  addTime(times_, StageId::kImu, {wallSeconds() - arrival->host.arrival, threadCpuSeconds() - cpu});
+  imu_to_propagate_.pop();
+  ++propagating_.samples;
+  ++counters_.propagate.samples;
+  if (!status.ok() && status.code != StatusCode::kNotReady) {
+    ++counters_.propagate.refused;
+    counters_.propagate.faults.add(status);
+  }
+  return true;
 }
 
-void Wiring::passFrame(const StereoFrame& frame) {
-  passHeldImu(frame.stamp);
-  ++statistics_.frames;
-  Status status;
-  const Spent spent = measured([&] { status = odometry_.track(frame, effort_, tracked_); });
-  addTime(statistics_.times, StageId::kTrack, spent, status.ok() && tracked_.keyframe);
-  if (status.ok()) {
-    passTracks(tracked_, spent);
-  } else {
-    noteFault(status, statistics_.frames_refused);
-    listener_.onRemark(frame.stamp, std::string("frame refused: ") + status.what);
+// IMU, tracked frames -> smooth -> output, fix, window
+bool Wiring::smooth() {
+  const TrackMessage* message = tracked_ring_.front();
+  if (message == nullptr) {
+    // Without frames the samples must not fill the ring: half of it is more than any frame will ask for.
+    while (imu_to_smooth_.size() > kImuRing / 2) {
+      smooth_.addImu(imu_to_smooth_.front()->sample);
+      imu_to_smooth_.pop();
+      ++smoothing_.samples;
+    }
+    return false;
   }
-  passHeldImu(pairing_.holdsImage() ? pairing_.waitingStamp() : kEndOfTime);
+  const bool ended = message->kind == TrackMessage::Kind::kEnd;
+  if (ended && results_.size() >= ResultRing::capacity()) return false;  // the end is not to be lost
+  FrameResult* result = results_.beginPush();
+  FrameResult& out = result != nullptr ? *result : smoothing_.unread;
+  out.kind = message->kind;
+  out.track_status = message->status;
+  out.status = okStatus();
+  out.track_step = message->step;
+  out.host = message->host;
+  out.spent = message->spent;
+  out.dropped = message->dropped;
+  out.track_level = message->effort_level;
+  if (message->kind == TrackMessage::Kind::kFrame) {
+    smoothFrame(*message, out);
+  } else if (ended) {
+    out.output = OdometryOutput{};
+    smooth_.finish(out.output);
+  }
+  out.published = wallSeconds();
+  if (result != nullptr) results_.commitPush();
+  published_.fetch_add(1, std::memory_order_relaxed);
+  if (message->kind == TrackMessage::Kind::kFrame) {
+    addTime(times_, StageId::kTrim, measured([&] { smooth_.trim(); }), message->tracked.keyframe);
+    smooth_.window(window_.draft());
+    window_.publish();
+  }
+  tracked_ring_.pop();
+  if (ended) smooth_done_.store(true, std::memory_order_release);
+  return true;
 }
 
-void Wiring::passTracks(const TrackedFrame& tracked, Spent spent) {
-  Status status;
-  const Spent smoothing = measured([&] { status = odometry_.smooth(tracked, effort_, output_); });
-  addTime(statistics_.times, StageId::kSmooth, smoothing, tracked.keyframe);
-  spent += smoothing;
-  addTime(statistics_.times, StageId::kFrameTotal, spent, tracked.keyframe);
-  if (!status.ok() && status.code != StatusCode::kNotReady) noteFault(status, statistics_.smooth_faults);
-  if (tracked.keyframe) ++statistics_.keyframes;
-  noteOutput(tracked.stamp, output_);
-  if (full_smoother_ && tracked.keyframe && output_.has_state) {
-    Status kept;
-    addTime(statistics_.times, StageId::kMap,
-            measured([&] { kept = full_smoother_->addKeyframe(tracked, output_.state); }));
-    if (!kept.ok()) ++statistics_.faults[kept.what];
-  }
-  listener_.onFrame(tracked, output_);
+void Wiring::smoothFrame(const TrackMessage& message, FrameResult& out) {
+  const double begin = wallSeconds();
+  out.step.frame = message.tracked.index;
+  out.step.effort =
+      smooth_effort_->give({begin - message.host.arrival, static_cast<int>(trackedWaiting()) - 1});
+  out.smooth_level = smooth_effort_->level();
+  out.smooth_spent = measured([&] {
+    for (const ImuArrival* arrival = imu_to_smooth_.front();
+         arrival != nullptr && arrival->sample.stamp <= message.tracked.stamp;
+         arrival = imu_to_smooth_.front()) {
+      smooth_.addImu(arrival->sample);
+      imu_to_smooth_.pop();
+      ++smoothing_.samples;
+    }
+    out.step.samples = smoothing_.samples;
+    const double cpu = threadCpuSeconds();
+    out.status = smooth_.step(message.tracked, out.step.effort, out.output);
+    smooth_.fix(fix_.draft());
+    fix_.publish();
+    if (drag_) drag_(StageId::kSmooth, threadCpuSeconds() - cpu);
+  });
+  smooth_effort_->took(out.smooth_spent.wall);
+  out.tracked = message.tracked;
+  out.spent += out.smooth_spent;
+  addTime(times_, StageId::kSmooth, out.smooth_spent, message.tracked.keyframe);
+  if (to_recorder_) static_cast<void>(to_recorder_->smooth.tryPush(out.step));
 }
 
-// keyframes with their causal states, and the IMU between them -> full smoother
-void Wiring::keepForMap() {
-  Rig rig = rig_;
-  if (!odometry_settings_.use_stereo) rig.camera_count = std::min<std::size_t>(rig.camera_count, 1);
-  ImuNoise noise = noise_;
-  noise.gyro_density *= odometry_settings_.gyro_inflation;
-  noise.accel_density *= odometry_settings_.accel_inflation;
-  FullSmootherSettings settings;
-  settings.pixel_sigma = odometry_settings_.pixel_sigma;
-  full_smoother_ = std::make_unique<FullSmoother>(rig, noise, settings);
+// results, states, IMU -> log
+bool Wiring::log() {
+  bool any = false;
+  const bool ended = smoothDone() && propagateDone();
+  if (states_) {
+    while (const NavState* state = states_->front()) {
+      log_.onImuState(*state);
+      states_->pop();
+      any = true;
+    }
+  }
+  if (FrameResult* result = results_.front(); result != nullptr) {
+    while (const ImuArrival* arrival = imu_to_log_.front()) {
+      if (result->kind != TrackMessage::Kind::kEnd && arrival->sample.stamp > result->track_step.stamp) break;
+      log_.onImu(arrival->sample);
+      imu_to_log_.pop();
+    }
+    log_.onResult(*result);
+    results_.pop();
+    return true;
+  }
+  while (imu_to_log_.size() > kImuRing / 2) {
+    log_.onImu(imu_to_log_.front()->sample);
+    imu_to_log_.pop();
+  }
+  if (ended && !any) log_done_ = true;
+  return any;
 }
 
-std::vector<Wiring::MapPose> Wiring::solveMap() {
-  std::vector<MapPose> poses;
-  if (!full_smoother_) return poses;
-  FullSmootherReport report;
-  Status status;
-  addTime(statistics_.times, StageId::kMap, measured([&] { status = full_smoother_->solve(report); }));
-  if (!status.ok()) {
-    ++statistics_.faults[status.what];
-    return poses;
+// everything -> recorder
+bool Wiring::record() {
+  if (recorder_ == nullptr) {
+    record_done_ = true;
+    return false;
   }
-  statistics_.map = report;
-  for (std::size_t k = 0; k < full_smoother_->size(); ++k) {
-    const NavState state = full_smoother_->state(k);
-    poses.push_back({state.stamp, state.T_world_body});
+  const bool ended = smoothDone() && propagateDone();
+  const bool any = recorder_->drain(*to_recorder_, {&camera_[0].pool, &camera_[1].pool});
+  if (ended && !any && !record_done_) {
+    recorder_->end(counters_.sensor.imu_samples, counters_.sensor.images);
+    record_done_ = true;
   }
-  return poses;
+  return any;
 }
 
-void Wiring::passImu(const ImuSample& sample) {
-  NavState propagated;
-  Status status;
-  const Spent spent =
-      measured([&] { status = odometry_.addImu(sample, want_imu_states_ ? &propagated : nullptr); });
-  addTime(statistics_.times, StageId::kImu, spent);
-  ++statistics_.imu_samples;
-  const bool taken = status.ok() || status.code == StatusCode::kNotReady;
-  if (full_smoother_ && taken) full_smoother_->addImu(sample);
-  if (status.ok()) {
-    if (want_imu_states_) listener_.onImuState(propagated);
-  } else if (status.code != StatusCode::kNotReady) {
-    noteFault(status, statistics_.imu_refused);
+void Wiring::addLosses(std::map<std::string, std::uint64_t>& losses) const {
+  const auto note = [&](const char* what, std::uint64_t count) {
+    if (count > 0) losses[what] += count;
+  };
+  note("imu_to_propagate", imu_to_propagate_.refused());
+  note("imu_to_track", imu_to_track_.refused());
+  note("imu_to_smooth", imu_to_smooth_.refused());
+  note("imu_to_log", imu_to_log_.refused());
+  for (std::size_t c = 0; c < kMaxCameras; ++c) {
+    const std::string camera = "camera_" + std::to_string(c);
+    note((camera + "_dropped").c_str(), counters_.sensor.images_dropped[c]);
+    note((camera + "_wrong_size").c_str(), counters_.sensor.images_wrong_size[c]);
+    note((camera + "_lost").c_str(), counters_.sensor.images_lost[c]);
+    note((camera + "_unrecorded").c_str(), counters_.sensor.images_unrecorded[c]);
   }
-}
-
-void Wiring::passHeldImu(Stamp until) {
-  std::size_t passed = 0;
-  while (passed < held_imu_.size() && held_imu_[passed].stamp <= until) passImu(held_imu_[passed++]);
-  for (std::size_t i = passed; i < held_imu_.size(); ++i) held_imu_[i - passed] = held_imu_[i];
-  held_imu_.resize(held_imu_.size() - passed);
-}
-
-void Wiring::finish() {
-  if (pairing_.flush(paired_).ok()) passFrame(paired_);
-  passHeldImu(kEndOfTime);
-  output_ = OdometryOutput{};
-  odometry_.finish(output_);
-  for (const Event& event : output_.events) {
-    EventTotal& total = statistics_.events[event.kind];
-    ++total.count;
-    total.value += event.value;
+  note("frames_dropped", counters_.track.dropped);
+  note("results_to_log", results_.refused());
+  if (states_) note("states_to_log", states_->refused());
+  if (to_recorder_) {
+    note("imu_to_record", to_recorder_->imu.refused());
+    note("propagate_steps_to_record", to_recorder_->propagate.refused());
+    note("track_steps_to_record", to_recorder_->track.refused());
+    note("smooth_steps_to_record", to_recorder_->smooth.refused());
   }
-  statistics_.pairing = pairing_.counters();
-  listener_.onFinish(output_);
-}
-
-void Wiring::noteOutput(Stamp stamp, const OdometryOutput& output) {
-  for (const Event& event : output.events) {
-    EventTotal& total = statistics_.events[event.kind];
-    ++total.count;
-    total.value += event.value;
-  }
-  if (output.has_state) {
-    if (!statistics_.first_pose) statistics_.first_pose = stamp;
-    ++statistics_.poses;
-  } else if (*output.waiting_for != '\0' && std::string_view(waiting_for_) != output.waiting_for) {
-    waiting_for_ = output.waiting_for;
-    listener_.onRemark(stamp, std::string("no pose yet, waiting for ") + waiting_for_);
-  }
-  if (statistics_.first_pose) ++statistics_.frames_since_first_pose;
-  const HealthChange now{stamp, output.state.health, output.state.epoch};
-  if (statistics_.health.empty() || statistics_.health.back().health != now.health ||
-      statistics_.health.back().epoch != now.epoch) {
-    statistics_.health.push_back(now);
-  }
-}
-
-void Wiring::noteFault(const Status& status, std::uint64_t& counter) {
-  ++counter;
-  ++statistics_.faults[status.what];
 }
 
 }  // namespace swiftlet

@@ -1,71 +1,185 @@
 #pragma once
-// Every stage and every arrow of the system, for an executor to drive. See wiring.cpp: it reads as the
-// block diagram.
+// Every stage and every arrow of the system, with what each thread does with them. See wiring.cpp: it reads
+// as the block diagram.
 //
-// One thread calls these functions, in the order of the stream (see LogSource). An image's memory must
-// stay valid for two further images of the same camera. An IMU sample that is newer than a frame still
-// waiting for its partner is held back until the frame has gone through, so that a frame never sees
-// samples from beyond its stamp.
+// One function a thread: takeImu, takeImage, endInput (sensor); propagate, track, smooth (flight path);
+// log, record (low priority). Each takes what waits on its arrows, at most one frame, and says whether it did
+// anything. An executor calls them: from one thread in turn (lockstep.hpp), or each from its own
+// (threaded.hpp). The arrows are in fixed memory and nobody waits on them; who sleeps until something comes
+// is the executor's matter. Nothing on the flight path allocates or locks once the first message has been
+// taken.
+//
+// IMU samples go to their readers at once. `track` and `smooth` take those not later than the frame that they
+// work on, so that a frame never sees samples from beyond its stamp.
 
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <map>
 #include <memory>
-#include <vector>
+#include <string>
 
-#include "estimator/odometry/odometry.hpp"
 #include "estimator/odometry/pairing.hpp"
-#include "estimator/smoother/full_smoother.hpp"
-#include "firmware_host/pipeline/run_listener.hpp"
+#include "estimator/odometry/propagation_stage.hpp"
+#include "estimator/odometry/smooth_stage.hpp"
+#include "estimator/odometry/track_stage.hpp"
+#include "firmware_host/pipeline/arrows.hpp"
+#include "firmware_host/pipeline/effort_source.hpp"
+#include "firmware_host/pipeline/fault_counts.hpp"
+#include "firmware_host/pipeline/run_log.hpp"
 #include "firmware_host/settings/settings.hpp"
 
 namespace swiftlet {
 
+class FlightRecorder;
+
+/// Counted by the thread that writes it; for others once that thread has ended.
+struct WiringCounters {
+  struct Sensor {
+    std::uint64_t imu_samples = 0;
+    std::array<std::uint64_t, kMaxCameras> images{};
+    std::array<std::uint64_t, kMaxCameras> images_dropped{};  ///< at a full ring: tracking did not look
+    std::array<std::uint64_t, kMaxCameras> images_lost{};     ///< no slot was free
+    std::array<std::uint64_t, kMaxCameras> images_wrong_size{};
+    std::array<std::uint64_t, kMaxCameras> images_unrecorded{};
+  } sensor;
+  struct Propagate {
+    std::uint64_t samples = 0;
+    std::uint64_t refused = 0;
+    FaultCounts faults;
+  } propagate;
+  struct Track {
+    std::uint64_t frames = 0;
+    std::uint64_t dropped = 0;        ///< went by while others were in work
+    std::uint64_t early_samples = 0;  ///< taken without a frame because the ring was filling
+    PairingCounters pairing;
+  } track;
+};
+
 class Wiring {
  public:
-  Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, RunListener& listener);
-
-  void feedImu(const ImuSample& sample);
-  void feedImage(const CameraFrame& frame);
-  /// In place of images: the back-end alone.
-  void feedTracks(const TrackedFrame& tracked);
-  /// Lets out what still waits. Nothing may be fed afterwards.
-  void finish();
-
-  /// Keep keyframes for full smoothing (call before the first message), and do it (after finish()).
-  /// The poses are those of the keyframes after it; empty when nothing could be solved.
-  void keepForMap();
-  struct MapPose {
-    Stamp stamp;
-    SE3 T_world_body;
+  struct Options {
+    bool imu_states = false;               ///< ask for RunListener::onImuState
+    FlightRecorder* recorder = nullptr;    ///< null: nothing is recorded
+    EffortSource* track_effort = nullptr;  ///< null: the settings' effort, always
+    EffortSource* smooth_effort = nullptr;
+    /// Called after a stage's work with its CPU seconds, within its wall time: tests slow stages down.
+    std::function<void(StageId, double)> drag;
   };
-  std::vector<MapPose> solveMap();
 
-  /// Ask for onImuState calls.
-  void wantImuStates(bool wanted) { want_imu_states_ = wanted; }
+  Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, RunLog& log,
+         const Options& options);
 
-  [[nodiscard]] RunStatistics& statistics() { return statistics_; }
+  // Sensor. The image is copied; one of another size than the calibration's is counted and goes no further.
+  void takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host);
+  void takeImage(const CameraFrame& image, const HostTimes& host);
+  /// In place of images: the back-end alone. Lockstep only; false while the smoother has no room.
+  bool takeTracks(const TrackedFrame& tracked);
+  void endInput() { input_ended_.store(true, std::memory_order_release); }
+
+  // Threads.
+  bool propagate();
+  /// `wait_for_imu`: leave a frame where it is as long as the samples before it have not come; used where
+  /// sensors are threads of their own.
+  bool track(bool wait_for_imu = false);
+  bool smooth();
+  bool log();
+  bool record();
+
+  // What an executor waits for.
+  [[nodiscard]] bool trackDone() const { return track_done_.load(std::memory_order_acquire); }
+  [[nodiscard]] bool propagateDone() const { return propagate_done_.load(std::memory_order_acquire); }
+  [[nodiscard]] bool smoothDone() const { return smooth_done_.load(std::memory_order_acquire); }
+  [[nodiscard]] bool logDone() const { return log_done_; }
+  [[nodiscard]] bool recordDone() const { return record_done_; }
+  /// Tracked frames that wait for `smooth`.
+  [[nodiscard]] std::size_t trackedWaiting() const { return tracked_ring_.size(); }
+
+  [[nodiscard]] const WiringCounters& counters() const { return counters_; }
+  /// Losses at full arrows, by name; at the end.
+  void addLosses(std::map<std::string, std::uint64_t>& losses) const;
+  [[nodiscard]] const StageTable& times() const { return times_; }
+  /// Frames that the thread `smooth` has published.
+  [[nodiscard]] std::uint64_t published() const { return published_.load(std::memory_order_relaxed); }
 
  private:
-  void passImu(const ImuSample& sample);
-  void passHeldImu(Stamp until);
-  void passFrame(const StereoFrame& frame);
-  void passTracks(const TrackedFrame& tracked, Spent spent);
-  void noteOutput(Stamp stamp, const OdometryOutput& output);
-  void noteFault(const Status& status, std::uint64_t& counter);
+  struct Camera {
+    ImagePool pool{ImagePool::Quotas{kTrackQuota, kRecordQuota}};
+    ImageRing ring;
+    // Of `track`: what it holds, in order.
+    std::array<ImagePool::Loan, kTrackQuota> held;
+    std::size_t held_count = 0;
+    bool has_head = false;  ///< the last of `held` was not yet given to pairing
+  };
+
+  // track
+  void takeArrivals();
+  bool popHead(std::size_t camera);
+  void pair(const CameraFrame& frame);
+  void queueFrame(const StereoFrame& frame);
+  void release(const StereoFrame& frame);
+  [[nodiscard]] const CameraFrame& headOf(std::size_t camera) const;
+  [[nodiscard]] HostTimes hostTimesOf(const StereoFrame& frame) const;
+  [[nodiscard]] bool samplesAreIn(const StereoFrame& frame);
+  void takeSamples(Stamp until);
+  void takeSurplus();
+  bool trackFrame();
+  bool endTracking();
+  void smoothFrame(const TrackMessage& message, FrameResult& out);
 
   Rig rig_;
-  ImuNoise noise_;
-  OdometrySettings odometry_settings_;
+  double imu_period_;  // s
+  RunLog& log_;
+  FlightRecorder* recorder_;
+  ConstantEffort full_effort_;
+  EffortSource* track_effort_;
+  EffortSource* smooth_effort_;
+  std::function<void(StageId, double)> drag_;
+
+  // Stages.
+  PropagationStage propagation_;
   Pairing pairing_;
-  Odometry odometry_;
-  std::unique_ptr<FullSmoother> full_smoother_;
-  Effort effort_;
-  RunListener& listener_;
-  bool want_imu_states_ = false;
-  FixedVector<ImuSample, kMaxImuPerFrame> held_imu_;
-  StereoFrame paired_;
-  TrackedFrame tracked_;
-  OdometryOutput output_;
-  const char* waiting_for_ = "";
-  RunStatistics statistics_;
+  TrackStage track_;
+  SmoothStage smooth_;
+
+  // Arrows.
+  ImuRing imu_to_propagate_, imu_to_track_, imu_to_smooth_, imu_to_log_;
+  std::array<Camera, kMaxCameras> camera_;
+  TrackRing tracked_ring_;
+  Newest<StateFix> fix_;
+  Newest<SmoothedWindow> window_;
+  std::unique_ptr<StateRing> states_;  ///< null where nobody wants them
+  ResultRing results_;
+  std::unique_ptr<RecorderArrows> to_recorder_;
+
+  // Of one thread each.
+  struct {
+    std::uint64_t samples = 0;
+    std::uint64_t fix = 0;
+    NavState state;
+  } propagating_;
+  struct {
+    FixedVector<StereoFrame, kWaitingFrames> waiting;
+    StereoFrame paired;
+    std::uint64_t samples = 0;
+    std::uint64_t window = 0;
+    int dropped = 0;
+    Stamp newest_sample;
+    double wait_since = 0;
+  } tracking_;
+  struct {
+    std::uint64_t samples = 0;
+    FrameResult unread;  ///< written where the log has no room
+  } smoothing_;
+
+  std::atomic<std::int64_t> newest_imu_{std::numeric_limits<std::int64_t>::min()};
+  std::atomic<bool> input_ended_{false}, propagate_done_{false}, track_done_{false}, smooth_done_{false};
+  std::atomic<std::uint64_t> published_{0};
+  bool log_done_ = false, record_done_ = false;
+  WiringCounters counters_;
+  StageTable times_;
 };
 
 }  // namespace swiftlet

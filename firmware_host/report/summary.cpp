@@ -67,6 +67,8 @@ Json countersJson(const RunFacts& facts, const LogSource& source, const RunStati
       {"imu_refused", statistics.imu_refused},
       {"frames", statistics.frames},
       {"frames_refused", statistics.frames_refused},
+      {"frames_dropped", statistics.frames_dropped},
+      {"effort_changes", statistics.effort_changes},
       {"smooth_faults", statistics.smooth_faults},
       {"keyframes", statistics.keyframes},
       {"poses", statistics.poses},
@@ -82,6 +84,8 @@ Json countersJson(const RunFacts& facts, const LogSource& source, const RunStati
                    {"initial_cost", statistics.map->initial_cost},
                    {"final_cost", statistics.map->final_cost}};
   }
+  json["losses"] = Json::object();
+  for (const auto& [arrow, count] : statistics.losses) json["losses"][arrow] = count;
   json["faults"] = Json::object();
   for (const auto& [text, count] : statistics.faults) json["faults"][text] = count;
   return json;
@@ -110,7 +114,8 @@ Json timingJson(const StageTable& table) {
     if (times.wall_frames.count() + times.wall_keyframes.count() == 0) continue;
     Json stage;
     const auto id = static_cast<StageId>(i);
-    const bool splits = id == StageId::kTrack || id == StageId::kSmooth || id == StageId::kFrameTotal;
+    const bool splits = id == StageId::kTrack || id == StageId::kSmooth || id == StageId::kTrim ||
+                        id == StageId::kImageToPose || id == StageId::kExposureToPose;
     stage[splits ? "frames" : "all"] = latencyJson(times.wall_frames, times.cpu_frames);
     if (splits) stage["keyframes"] = latencyJson(times.wall_keyframes, times.cpu_keyframes);
     json[std::string(stageName(id))] = stage;
@@ -192,12 +197,12 @@ std::string summaryText(const Json& summary) {
       cpu["flight_s"].get<double>(), cpu["wall_s"].get<double>(), cpu["cpu_s"].get<double>(),
       cpu["cpu_per_flight_second"].get<double>(),
       static_cast<double>(summary["memory"]["peak_resident_bytes"].get<std::int64_t>()) / kMebibyte);
-  text += "  CPU [ms]               count     mean      p50      p99      max\n";
+  text += "  CPU [ms]                    count     mean      p50      p99      max\n";
   for (const auto& [stage, times] : summary["timing"].items()) {
     for (const auto& [kind, t] : times.items()) {
       if (t["count"].get<std::uint64_t>() == 0) continue;
       const Json& cpu_ms = t["cpu"];
-      text += fmt::format("  {:<12}{:<9}{:>7}{:9.3f}{:9.3f}{:9.3f}{:9.3f}\n", stage, kind,
+      text += fmt::format("  {:<17}{:<9}{:>7}{:9.3f}{:9.3f}{:9.3f}{:9.3f}\n", stage, kind,
                           t["count"].get<std::uint64_t>(), cpu_ms["mean_ms"].get<double>(),
                           cpu_ms["p50_ms"].get<double>(), cpu_ms["p99_ms"].get<double>(),
                           cpu_ms["max_ms"].get<double>());

@@ -62,7 +62,7 @@ std::vector<Setting> makeRegistry() {
       {"effort.iterations", "", "Gauss-Newton iterations a frame may spend.",
        integer(&Settings::effort, &Effort::iterations, 1, 20)},
       {"effort.features", "",
-       "Features a frame may spend; the smaller of this and frontend.max_features counts.",
+       "Features a frame may spend, in tracking and in the smoother; frontend.max_features counts too.",
        integer(&Settings::effort, &Effort::features, 20, kFeatures)},
       {"effort.keyframes", "", "Keyframes that the smoother's window keeps.",
        integer(&Settings::effort, &Effort::keyframes, 4, 12)},

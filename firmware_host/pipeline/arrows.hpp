@@ -1,0 +1,110 @@
+#pragma once
+// What goes from thread to thread, and in what: the messages of wiring.cpp's arrows with the times that the
+// host notes on them. Capacities: estimator/core/limits.hpp.
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "estimator/core/drop_oldest_ring.hpp"
+#include "estimator/core/limits.hpp"
+#include "estimator/core/newest.hpp"
+#include "estimator/core/slot_pool.hpp"
+#include "estimator/core/spsc_ring.hpp"
+#include "estimator/core/status.hpp"
+#include "estimator/messages/frames.hpp"
+#include "estimator/messages/imu_sample.hpp"
+#include "estimator/messages/odometry_output.hpp"
+#include "estimator/messages/smoothed_window.hpp"
+#include "estimator/messages/state_fix.hpp"
+#include "estimator/messages/step_record.hpp"
+#include "estimator/messages/tracked_frame.hpp"
+#include "firmware_host/pipeline/stage_timer.hpp"
+
+namespace swiftlet {
+
+/// Times of the host's monotonic clock [s].
+struct HostTimes {
+  double exposure = 0;  ///< middle of the exposure (IMU: the sample's stamp)
+  double arrival = 0;   ///< handed to the estimator
+};
+
+struct ImuArrival {
+  ImuSample sample;
+  std::uint64_t number = 0;  ///< from 1
+  Stamp arrival;             ///< on the log's clock
+  HostTimes host;
+};
+
+/// An image in its slot; `frame.image` shows `pixels`.
+struct ImageSlot {
+  CameraFrame frame;
+  HostTimes host;
+  std::vector<std::uint8_t> pixels;  ///< reserved for the camera's size before the flight
+};
+
+/// Readers of images, each with its quota.
+enum ImageReader : std::size_t { kTrackReads, kRecordReads, kImageReaders };
+
+/// Waiting in the ring, one at its head, one waiting for its partner, those of waiting frames, those in
+/// work, and one more that lets the newest in before the oldest goes.
+inline constexpr std::uint32_t kTrackQuota = kImageRing + kWaitingFrames + 4;
+/// 0.4 s at 20 Hz: the longest that a disk may keep the recorder waiting without a loss.
+inline constexpr std::uint32_t kRecordQuota = 8;
+inline constexpr std::size_t kImageSlots = 1 + kTrackQuota + kRecordQuota;
+using ImagePool = SlotPool<ImageSlot, kImageSlots, kImageReaders>;
+
+/// Between `track` and `smooth`. In order: the end comes last.
+struct TrackMessage {
+  enum class Kind : std::uint8_t {
+    kFrame,         ///< tracked
+    kFrameRefused,  ///< `status` says why; `tracked` is not filled
+    kImageRefused,  ///< by pairing
+    kEnd,
+  };
+  Kind kind = Kind::kFrame;
+  Status status;
+  TrackStep step;
+  TrackedFrame tracked;
+  HostTimes host;        ///< of the later image
+  Spent spent;           ///< by `track`
+  int dropped = 0;       ///< frames that went by untracked since the message before
+  int effort_level = 0;  ///< steps below full effort
+};
+
+/// What `smooth` publishes: for the log, and whoever else follows the estimate.
+struct FrameResult {
+  TrackMessage::Kind kind = TrackMessage::Kind::kFrame;
+  Status track_status;
+  Status status;  ///< of the smoother
+  TrackStep track_step;
+  SmoothStep step;
+  TrackedFrame tracked;
+  OdometryOutput output;
+  HostTimes host;
+  double published = 0;  ///< host time
+  Spent spent;           ///< by `track` and `smooth` until it was published
+  Spent smooth_spent;
+  int dropped = 0;
+  int track_level = 0;
+  int smooth_level = 0;
+};
+
+using ImuRing = SpscRing<ImuArrival, kImuRing>;
+using ImageRing = DropOldestRing<SlotHandle, kImageRing>;
+using TrackRing = SpscRing<TrackMessage, kTrackedRing>;
+/// 1.6 s at 20 Hz, for a log that is written at the lowest priority.
+using ResultRing = SpscRing<FrameResult, 32>;
+/// States at IMU rate for the log: 1 s at 1 kHz.
+using StateRing = SpscRing<NavState, 1024>;
+
+/// What the recorder takes beside images: it looks at them every few milliseconds.
+struct RecorderArrows {
+  ImuRing imu;
+  std::array<SpscRing<SlotHandle, kRecordQuota>, kMaxCameras> image;
+  SpscRing<PropagateStep, 256> propagate;
+  SpscRing<TrackStep, 256> track;
+  SpscRing<SmoothStep, 256> smooth;
+};
+
+}  // namespace swiftlet

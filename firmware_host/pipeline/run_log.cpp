@@ -1,0 +1,123 @@
+#include "firmware_host/pipeline/run_log.hpp"
+
+#include <fmt/format.h>
+
+#include "firmware_host/pipeline/wiring.hpp"
+
+namespace swiftlet {
+
+void RunLog::onResult(const FrameResult& result) {
+  const Stamp stamp = result.track_step.stamp;
+  if (result.dropped > 0) {
+    listener_.onRemark(
+        stamp, fmt::format("{} frame(s) before this one dropped: tracking was behind", result.dropped));
+  }
+  switch (result.kind) {
+    case TrackMessage::Kind::kFrame:
+      noteFrame(result);
+      break;
+    case TrackMessage::Kind::kFrameRefused:
+      ++statistics_.frames;
+      ++statistics_.frames_refused;
+      ++statistics_.faults[result.track_status.what];
+      listener_.onRemark(stamp, std::string("frame refused: ") + result.track_status.what);
+      break;
+    case TrackMessage::Kind::kImageRefused:
+      listener_.onRemark(stamp, std::string("image refused: ") + result.track_status.what);
+      break;
+    case TrackMessage::Kind::kEnd:
+      noteEvents(result.output);
+      listener_.onFinish(result.output);
+      break;
+  }
+}
+
+void RunLog::noteFrame(const FrameResult& result) {
+  const TrackedFrame& tracked = result.tracked;
+  const OdometryOutput& output = result.output;
+  ++statistics_.frames;
+  if (!statistics_.first_image) statistics_.first_image = tracked.stamp;
+  statistics_.last_image = tracked.stamp;
+  if (!result.status.ok() && result.status.code != StatusCode::kNotReady) {
+    ++statistics_.smooth_faults;
+    ++statistics_.faults[result.status.what];
+  }
+  if (tracked.keyframe) ++statistics_.keyframes;
+  addTime(statistics_.times, StageId::kImageToPose,
+          {result.published - result.host.arrival, result.spent.cpu}, tracked.keyframe);
+  addTime(statistics_.times, StageId::kExposureToPose,
+          {result.published - result.host.exposure, result.spent.cpu}, tracked.keyframe);
+  noteEvents(output);
+  noteHealth(tracked.stamp, output);
+  noteEffort("track", result, result.track_step.effort, track_effort_);
+  noteEffort("smooth", result, result.step.effort, smooth_effort_);
+  any_frame_ = true;
+  if (keeper_ && tracked.keyframe && output.has_state) keeper_->addKeyframe(tracked, output.state);
+  listener_.onFrame(tracked, output);
+}
+
+void RunLog::noteEvents(const OdometryOutput& output) {
+  for (const Event& event : output.events) {
+    EventTotal& total = statistics_.events[event.kind];
+    ++total.count;
+    total.value += event.value;
+  }
+}
+
+void RunLog::noteEffort(const char* stage, const FrameResult& result, const Effort& now, Effort& last) {
+  if (any_frame_ && !(now == last)) {
+    ++statistics_.effort_changes;
+    listener_.onRemark(result.track_step.stamp,
+                       fmt::format("effort of {} is now {} iterations, {} features, {} keyframes", stage,
+                                   now.iterations, now.features, now.keyframes));
+  }
+  last = now;
+}
+
+void RunLog::noteHealth(Stamp stamp, const OdometryOutput& output) {
+  if (output.has_state) {
+    if (!statistics_.first_pose) statistics_.first_pose = stamp;
+    ++statistics_.poses;
+  } else if (*output.waiting_for != '\0' && waiting_for_ != output.waiting_for) {
+    waiting_for_ = output.waiting_for;
+    listener_.onRemark(stamp, "no pose yet, waiting for " + waiting_for_);
+  }
+  if (statistics_.first_pose) ++statistics_.frames_since_first_pose;
+  const HealthChange now{stamp, output.state.health, output.state.epoch};
+  if (statistics_.health.empty() || statistics_.health.back().health != now.health ||
+      statistics_.health.back().epoch != now.epoch) {
+    statistics_.health.push_back(now);
+  }
+}
+
+void RunLog::collect(const Wiring& wiring) {
+  const WiringCounters& counters = wiring.counters();
+  statistics_.imu_samples = counters.propagate.samples;
+  statistics_.imu_refused = counters.propagate.refused;
+  for (const auto& row : counters.propagate.faults.rows()) statistics_.faults[row.text] += row.count;
+  for (const std::uint64_t images : counters.sensor.images) statistics_.images += images;
+  statistics_.pairing = counters.track.pairing;
+  statistics_.frames_dropped = counters.track.dropped;
+  wiring.addLosses(statistics_.losses);
+  for (std::size_t i = 0; i < statistics_.times.size(); ++i) {
+    const StageTimes& times = wiring.times()[i];
+    if (times.wall_frames.count() + times.wall_keyframes.count() > 0) statistics_.times[i] = times;
+  }
+}
+
+std::vector<MapPose> RunLog::solveMap() {
+  std::vector<MapPose> poses;
+  if (!keeper_) return poses;
+  FullSmootherReport report;
+  Status status;
+  addTime(statistics_.times, StageId::kMap, measured([&] { status = keeper_->solve(report, poses); }));
+  for (const auto& row : keeper_->faults().rows()) statistics_.faults[row.text] += row.count;
+  if (!status.ok()) {
+    ++statistics_.faults[status.what];
+    return poses;
+  }
+  statistics_.map = report;
+  return poses;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,51 @@
+#pragma once
+// The thread `log`: what the run tells its listener, what it sums up, and what it keeps for full smoothing.
+// Host side, of one thread. Memory: constant but for the lists that RunStatistics names.
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "firmware_host/pipeline/arrows.hpp"
+#include "firmware_host/pipeline/map_keeper.hpp"
+#include "firmware_host/pipeline/run_listener.hpp"
+
+namespace swiftlet {
+
+class Wiring;
+
+class RunLog {
+ public:
+  explicit RunLog(RunListener& listener) : listener_(listener) {}
+
+  /// Before the first message: keep keyframes and IMU for full smoothing.
+  void keepForMap(std::unique_ptr<MapKeeper> keeper) { keeper_ = std::move(keeper); }
+  [[nodiscard]] bool wantsImu() const { return keeper_ != nullptr; }
+
+  void onImu(const ImuSample& sample) { keeper_->addImu(sample); }
+  void onImuState(const NavState& state) { listener_.onImuState(state); }
+  void onResult(const FrameResult& result);
+
+  /// After the run: what the other threads counted.
+  void collect(const Wiring& wiring);
+  /// After the run: full smoothing over what was kept. Poses of the keyframes; empty when there is nothing.
+  std::vector<MapPose> solveMap();
+
+  [[nodiscard]] RunStatistics& statistics() { return statistics_; }
+
+ private:
+  void noteFrame(const FrameResult& result);
+  void noteEvents(const OdometryOutput& output);
+  void noteEffort(const char* stage, const FrameResult& result, const Effort& now, Effort& last);
+  void noteHealth(Stamp stamp, const OdometryOutput& output);
+
+  RunListener& listener_;
+  std::unique_ptr<MapKeeper> keeper_;
+  std::string waiting_for_;
+  bool any_frame_ = false;
+  Effort track_effort_;
+  Effort smooth_effort_;
+  RunStatistics statistics_;
+};
+
+}  // namespace swiftlet
