@@ -33,7 +33,93 @@ SwitchSetting onOff(Group Settings::*group, bool Group::*value) {
   return {member(group, value)};
 }
 
-std::vector<Setting> makeRegistry() {
+/// SCHED_FIFO ends at 99, which the kernel's own threads have.
+constexpr int kHighestPriority = 98;
+/// glibc's fixed CPU sets end there.
+constexpr int kHighestCpu = 1023;
+/// A budget in milliseconds: longer than this is no flight estimator.
+constexpr double kLongestBudget = 10'000;
+constexpr double kShortestBudget = 0.001;
+
+IntegerSetting priority(int RealtimeGroup::*value) {
+  return integer(&Settings::realtime, value, 0, kHighestPriority);
+}
+
+IntegerSetting cpu(int RealtimeGroup::*value) { return integer(&Settings::realtime, value, -1, kHighestCpu); }
+
+std::vector<Setting> realtimeSettings() {
+  using R = RealtimeGroup;
+  return {
+      {"realtime.enabled", "",
+       "Ask for the priorities and CPUs below; where the right is missing the run goes on without, and says "
+       "so.",
+       onOff(&Settings::realtime, &R::enabled)},
+      {"realtime.lock_memory", "", "Lock all memory (mlockall) before arming.",
+       onOff(&Settings::realtime, &R::lock_memory)},
+      {"realtime.sensor_priority", "",
+       "SCHED_FIFO priority of the threads that read devices; 0: SCHED_OTHER. Kernels with PREEMPT_RT run "
+       "interrupt handlers at 50: stay below. Descending from here to low_priority.",
+       priority(&R::sensor_priority)},
+      {"realtime.propagate_priority", "", "Likewise, the thread that propagates every IMU sample.",
+       priority(&R::propagate_priority)},
+      {"realtime.track_priority", "", "Likewise, pairing and the front-end.", priority(&R::track_priority)},
+      {"realtime.smooth_priority", "", "Likewise, the smoother.", priority(&R::smooth_priority)},
+      {"realtime.low_priority", "", "Likewise, map, loop closure, recorder and reports.",
+       priority(&R::low_priority)},
+      {"realtime.sensor_cpu", "", "The one CPU that these threads run on; -1: any.", cpu(&R::sensor_cpu)},
+      {"realtime.propagate_cpu", "", "Likewise for the propagation.", cpu(&R::propagate_cpu)},
+      {"realtime.track_cpu", "", "Likewise for the front-end.", cpu(&R::track_cpu)},
+      {"realtime.smooth_cpu", "", "Likewise for the smoother.", cpu(&R::smooth_cpu)},
+      {"realtime.low_cpu", "", "Likewise for map, loop closure, recorder and reports.", cpu(&R::low_cpu)},
+  };
+}
+
+RealSetting budget(double BudgetsGroup::*value) {
+  return real(&Settings::budgets, value, kShortestBudget, kLongestBudget);
+}
+
+std::vector<Setting> budgetSettings() {
+  using B = BudgetsGroup;
+  constexpr double kWidestSpread = 100;
+  return {
+      {"budgets.propagate_p50_ms", "ms", "CPU time of a step of the propagation: median.",
+       budget(&B::propagate_p50_ms)},
+      {"budgets.propagate_p99_ms", "ms", "Likewise, 99 of 100 steps.", budget(&B::propagate_p99_ms)},
+      {"budgets.propagate_max_ms", "ms", "Likewise, every step.", budget(&B::propagate_max_ms)},
+      {"budgets.track_p50_ms", "ms", "CPU time of a step of the front-end, keyframes included: median.",
+       budget(&B::track_p50_ms)},
+      {"budgets.track_p99_ms", "ms", "Likewise, 99 of 100 steps.", budget(&B::track_p99_ms)},
+      {"budgets.track_max_ms", "ms", "Likewise, every step.", budget(&B::track_max_ms)},
+      {"budgets.smooth_p50_ms", "ms", "CPU time of a step of the smoother: median.",
+       budget(&B::smooth_p50_ms)},
+      {"budgets.smooth_p99_ms", "ms", "Likewise, 99 of 100 steps.", budget(&B::smooth_p99_ms)},
+      {"budgets.smooth_max_ms", "ms", "Likewise, every step.", budget(&B::smooth_max_ms)},
+      {"budgets.image_to_pose_p50_ms", "ms",
+       "CPU time from a frame's images to its pose, all stages: median.", budget(&B::image_to_pose_p50_ms)},
+      {"budgets.image_to_pose_p99_ms", "ms", "Likewise, 99 of 100 frames.", budget(&B::image_to_pose_p99_ms)},
+      {"budgets.image_to_pose_max_ms", "ms", "Likewise, every frame.", budget(&B::image_to_pose_max_ms)},
+      {"budgets.image_to_pose_spread", "",
+       "Largest p99/p50 of that CPU time, of keyframes and of the other frames each by itself.",
+       real(&Settings::budgets, &B::image_to_pose_spread, 1, kWidestSpread)},
+      {"budgets.image_to_pose_wall_p99_ms", "ms",
+       "Wall time from the arrival of a frame's last image to its published pose, 99 of 100 frames. The "
+       "machine's own lateness is in it: the bare timer loop beside it says how much.",
+       budget(&B::image_to_pose_wall_p99_ms)},
+      {"budgets.image_to_pose_wall_max_ms", "ms", "Likewise, every frame.",
+       budget(&B::image_to_pose_wall_max_ms)},
+      {"budgets.sample_to_state_p50_ms", "ms", "CPU time from an IMU sample to its published state: median.",
+       budget(&B::sample_to_state_p50_ms)},
+      {"budgets.sample_to_state_p99_ms", "ms", "Likewise, 99 of 100 samples.",
+       budget(&B::sample_to_state_p99_ms)},
+      {"budgets.sample_to_state_wall_p99_ms", "ms",
+       "Wall time from a sample's arrival to its published state, 99 of 100 samples.",
+       budget(&B::sample_to_state_wall_p99_ms)},
+      {"budgets.sample_to_state_wall_max_ms", "ms", "Likewise, every sample.",
+       budget(&B::sample_to_state_wall_max_ms)},
+  };
+}
+
+std::vector<Setting> estimationSettings() {
   using O = OdometrySettings;
   constexpr auto kOdometry = &Settings::odometry;
   constexpr int kFeatures = static_cast<int>(kMaxFeatures);
@@ -79,6 +165,14 @@ std::vector<Setting> makeRegistry() {
       {"evaluation.rpe_delta_s", "s", "Interval of the relative pose error over time.",
        real(&Settings::evaluation, &EvaluationGroup::rpe_delta_s, 0.05, 600)},
   };
+}
+
+std::vector<Setting> makeRegistry() {
+  std::vector<Setting> all = estimationSettings();
+  for (const auto& group : {realtimeSettings(), budgetSettings()}) {
+    all.insert(all.end(), group.begin(), group.end());
+  }
+  return all;
 }
 
 /// Levenshtein distance.

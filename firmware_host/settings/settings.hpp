@@ -23,12 +23,54 @@ struct EvaluationGroup {
   double rpe_delta_s = 1.0;
 };
 
+/// Priorities are of SCHED_FIFO, 1 to 98; 0 is SCHED_OTHER. All of them below 50, where kernels with
+/// PREEMPT_RT run their interrupt handlers, without which no sample arrives.
+struct RealtimeGroup {
+  bool enabled = true;
+  bool lock_memory = true;
+  int sensor_priority = 45;
+  int propagate_priority = 40;
+  int track_priority = 30;
+  int smooth_priority = 20;
+  int low_priority = 0;
+  int sensor_cpu = -1;
+  int propagate_cpu = -1;
+  int track_cpu = -1;
+  int smooth_cpu = -1;
+  int low_cpu = -1;
+};
+
+/// Milliseconds of the thread's CPU time, except where the name says wall.
+struct BudgetsGroup {
+  double propagate_p50_ms = 0.02;
+  double propagate_p99_ms = 0.05;
+  double propagate_max_ms = 1;
+  double track_p50_ms = 3.5;
+  double track_p99_ms = 9;
+  double track_max_ms = 20;
+  double smooth_p50_ms = 2.5;
+  double smooth_p99_ms = 6;
+  double smooth_max_ms = 15;
+  double image_to_pose_p50_ms = 6;
+  double image_to_pose_p99_ms = 15;
+  double image_to_pose_max_ms = 35;
+  double image_to_pose_spread = 2.5;
+  double image_to_pose_wall_p99_ms = 50;
+  double image_to_pose_wall_max_ms = 100;
+  double sample_to_state_p50_ms = 0.02;
+  double sample_to_state_p99_ms = 0.05;
+  double sample_to_state_wall_p99_ms = 5;
+  double sample_to_state_wall_max_ms = 20;
+};
+
 struct Settings {
   OdometrySettings odometry;
   Effort effort;
   PairingGroup pairing;
   CalibrationGroup calibration;
   EvaluationGroup evaluation;
+  RealtimeGroup realtime;
+  BudgetsGroup budgets;
   bool full_smoothing = true;  ///< smoother.horizon is `full`
 };
 

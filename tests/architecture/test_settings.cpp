@@ -39,6 +39,8 @@ constexpr SettingsStruct kStructs[] = {
     {"firmware_host/settings/settings.hpp", "PairingGroup"},
     {"firmware_host/settings/settings.hpp", "CalibrationGroup"},
     {"firmware_host/settings/settings.hpp", "EvaluationGroup"},
+    {"firmware_host/settings/settings.hpp", "RealtimeGroup"},
+    {"firmware_host/settings/settings.hpp", "BudgetsGroup"},
 };
 
 /// "group.name" without the group; a member may drop what its group already says.
