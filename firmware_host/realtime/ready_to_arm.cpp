@@ -1,0 +1,177 @@
+#include "firmware_host/realtime/ready_to_arm.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+namespace swiftlet {
+namespace {
+
+constexpr double kMilli = 1e3;
+constexpr double kPercent = 100;
+
+__attribute__((format(printf, 4, 5))) void lack(ArmingVerdict& verdict, ArmingCondition condition,
+                                                const char* remedy, const char* format, ...) {
+  MissingCondition missing{condition, {}, remedy};
+  va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(missing.text.data(), missing.text.size(), format, arguments);
+  va_end(arguments);
+  // kMost counts every call of this function in one evaluation.
+  static_cast<void>(verdict.missing.tryPushBack(missing));
+}
+
+void checkThreads(const ArmingFacts& facts, ArmingVerdict& verdict) {
+  if (facts.flight_threads <= 0) {
+    lack(verdict, ArmingCondition::kRights, "start the executor", "no flight thread runs");
+  } else if (facts.threads_without_priority > 0) {
+    lack(verdict, ArmingCondition::kRights,
+         "set realtime.enabled and give the right to SCHED_FIFO (the thread table at the start says how)",
+         "%d of %d flight threads are without their priority, the first: %s", facts.threads_without_priority,
+         facts.flight_threads, facts.first_without_priority);
+  }
+  if (!facts.memory_locked) {
+    lack(verdict, ArmingCondition::kMemoryLocked,
+         "set realtime.lock_memory and give the right to lock memory (`ulimit -l unlimited`, CAP_IPC_LOCK)",
+         "memory is not locked");
+  }
+}
+
+void checkClocks(const ArmingFacts& facts, const ArmingSettings& settings, ArmingVerdict& verdict) {
+  if (facts.reversed_stamps > 0) {
+    lack(verdict, ArmingCondition::kClocks,
+         "look for two drivers on one device, or a clock that is being set", "%llu stamps did not advance",
+         static_cast<unsigned long long>(facts.reversed_stamps));
+  }
+  if (!facts.has_sample || !facts.has_image) {
+    lack(verdict, ArmingCondition::kClocks, "wait for the sensors, or look at their cables",
+         "no %s yet: clocks cannot be compared", facts.has_sample ? "image" : "IMU sample");
+    return;
+  }
+  const Duration offset = facts.newest_sample - facts.newest_image;
+  if (offset > settings.sensor_offset || offset < -settings.sensor_offset) {
+    lack(verdict, ArmingCondition::kClocks, "look at the time synchronization of camera and IMU",
+         "the newest IMU sample is %.1f ms after the newest image, at most %.1f ms either way are allowed",
+         offset.seconds() * kMilli, settings.sensor_offset.seconds() * kMilli);
+  }
+}
+
+void checkSensors(const ArmingFacts& facts, const ArmingSettings& settings, ArmingVerdict& verdict) {
+  // Written so that a NaN is refused.
+  const double allowed = settings.imu_rate_tolerance * facts.imu_rate_expected;
+  const bool at_rate =
+      facts.imu_rate_expected > 0 && std::abs(facts.imu_rate - facts.imu_rate_expected) <= allowed;
+  if (!at_rate) {
+    lack(verdict, ArmingCondition::kSensors,
+         "look at the IMU's rate in its calibration (update_rate), its settings and its bus",
+         "the IMU delivers at %.1f Hz, expected are %.1f Hz within %.0f %%", facts.imu_rate,
+         facts.imu_rate_expected, settings.imu_rate_tolerance * kPercent);
+  }
+  const int cameras = std::min(facts.cameras, static_cast<int>(kMaxCameras));
+  if (cameras <= 0) {
+    lack(verdict, ArmingCondition::kSensors, "give a calibration with a camera", "the rig has no camera");
+  }
+  for (int i = 0; i < cameras; ++i) {
+    const auto camera = static_cast<std::size_t>(i);
+    if (!facts.has_image_of[camera]) {
+      lack(verdict, ArmingCondition::kSensors, "look at its cable and driver",
+           "camera %d has delivered nothing", i);
+    } else if (facts.image_age[camera] > settings.image_age) {
+      lack(verdict, ArmingCondition::kSensors, "look at its cable and driver",
+           "camera %d has delivered nothing for %.1f ms", i, facts.image_age[camera].seconds() * kMilli);
+    }
+  }
+}
+
+void checkInitialized(const ArmingFacts& facts, const ArmingSettings& settings, ArmingVerdict& verdict) {
+  if (!facts.health_good) {
+    lack(verdict, ArmingCondition::kInitialized, "hold still, then move gently where there is texture",
+         "the estimator's health is not good");
+  } else if (facts.health_good_for < settings.steady) {
+    lack(verdict, ArmingCondition::kInitialized, "wait", "health has been good for %.1f s, %.1f s are wanted",
+         facts.health_good_for.seconds(), settings.steady.seconds());
+  }
+  if (facts.epoch_steady_for < settings.steady) {
+    lack(verdict, ArmingCondition::kInitialized, "wait",
+         "the last initialization is %.1f s old, %.1f s are wanted", facts.epoch_steady_for.seconds(),
+         settings.steady.seconds());
+  }
+}
+
+void checkRecorder(const ArmingFacts& facts, ArmingVerdict& verdict) {
+  if (!facts.recorder_wanted) return;
+  if (!facts.recorder_running) {
+    lack(verdict, ArmingCondition::kRecorder, "look at the recording's folder and the space left there",
+         "the flight recorder does not run");
+  } else if (facts.recorder_lost > 0) {
+    lack(verdict, ArmingCondition::kRecorder, "record to a faster disk, or begin a new recording",
+         "the flight recorder has lost %llu records", static_cast<unsigned long long>(facts.recorder_lost));
+  }
+}
+
+void checkEffort(const ArmingFacts& facts, ArmingVerdict& verdict) {
+  if (facts.track_level == 0 && facts.smooth_level == 0) return;
+  lack(verdict, ArmingCondition::kEffort,
+       "take load off the machine, or lower frontend.max_features and effort.iterations",
+       "stages work below full effort: tracking by %d levels, smoothing by %d", facts.track_level,
+       facts.smooth_level);
+}
+
+}  // namespace
+
+const char* conditionName(ArmingCondition condition) {
+  switch (condition) {
+    case ArmingCondition::kRights:
+      return "rights";
+    case ArmingCondition::kMemoryLocked:
+      return "memory_locked";
+    case ArmingCondition::kClocks:
+      return "clocks";
+    case ArmingCondition::kSensors:
+      return "sensors";
+    case ArmingCondition::kInitialized:
+      return "initialized";
+    case ArmingCondition::kRecorder:
+      return "recorder";
+    case ArmingCondition::kEffort:
+      return "effort";
+  }
+  return "unknown";
+}
+
+bool ArmingVerdict::lacks(ArmingCondition condition) const {
+  return std::any_of(missing.begin(), missing.end(),
+                     [condition](const MissingCondition& item) { return item.condition == condition; });
+}
+
+ArmingVerdict ReadyToArm::evaluate(const ArmingFacts& facts) const {
+  ArmingVerdict verdict;
+  checkThreads(facts, verdict);
+  checkClocks(facts, settings_, verdict);
+  checkSensors(facts, settings_, verdict);
+  checkInitialized(facts, settings_, verdict);
+  checkRecorder(facts, verdict);
+  checkEffort(facts, verdict);
+  return verdict;
+}
+
+std::string describe(const ArmingVerdict& verdict) {
+  if (verdict.ready()) return "ready to arm\n";
+  std::string text;
+  for (const MissingCondition& item : verdict.missing) {
+    text += std::string(item.name()) + ": " + item.text.data() + "; " + item.remedy + "\n";
+  }
+  return text;
+}
+
+nlohmann::ordered_json toJson(const ArmingVerdict& verdict) {
+  nlohmann::ordered_json missing = nlohmann::ordered_json::array();
+  for (const MissingCondition& item : verdict.missing) {
+    missing.push_back({{"condition", item.name()}, {"what", item.text.data()}, {"remedy", item.remedy}});
+  }
+  return {{"ready", verdict.ready()}, {"missing", missing}};
+}
+
+}  // namespace swiftlet

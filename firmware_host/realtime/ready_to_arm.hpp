@@ -1,0 +1,109 @@
+#pragma once
+// Whether the vehicle may be armed, in the autopilot's sense: every named condition holds, or the verdict
+// lists what is missing, with the remedy. Missing conditions block readiness, never running.
+//
+// Pure: facts in, verdict out; no clock, no files, no heap. The executor collects the facts; times are
+// differences that it measured.
+//
+// | condition       | holds when
+// | `rights`        | every flight thread has the priority that it was to have
+// | `memory_locked` | all memory that the flight path uses is locked
+// | `clocks`        | no stamp ran backwards of late, newest image and newest sample are near each other
+// | `sensors`       | the IMU delivers at its rate, and each camera of the rig delivers
+// | `initialized`   | health has been good, and the epoch the same, for some seconds
+// | `recorder`      | a recorder that is wanted runs and has lost nothing
+// | `effort`        | the stages work at full effort
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "estimator/core/fixed_vector.hpp"
+#include "estimator/core/limits.hpp"
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+enum class ArmingCondition { kRights, kMemoryLocked, kClocks, kSensors, kInitialized, kRecorder, kEffort };
+inline constexpr std::size_t kArmingConditions = 7;
+
+/// "rights", "memory_locked", "clocks", "sensors", "initialized", "recorder", "effort".
+const char* conditionName(ArmingCondition condition);
+
+struct ArmingFacts {
+  int flight_threads = 0;  ///< that run; 0: the executor is not up
+  int threads_without_priority = 0;
+  const char* first_without_priority = "";  ///< its name
+
+  bool memory_locked = false;
+
+  std::uint64_t reversed_stamps = 0;  ///< over the look-back, of all sensors: at or before the one before
+  bool has_sample = false;            ///< there is a newest IMU sample
+  bool has_image = false;
+  Stamp newest_sample;
+  Stamp newest_image;
+
+  double imu_rate = 0;  ///< Hz, measured over the look-back
+  double imu_rate_expected = 0;
+  int cameras = 0;                                ///< of the rig
+  std::array<bool, kMaxCameras> has_image_of{};   ///< camera i delivered since the start
+  std::array<Duration, kMaxCameras> image_age{};  ///< since the arrival of camera i's newest image
+
+  bool health_good = false;
+  Duration health_good_for;  ///< without a break until now
+  Duration epoch_steady_for;
+
+  bool recorder_wanted = false;
+  bool recorder_running = false;
+  std::uint64_t recorder_lost = 0;  ///< records, since the recording began
+
+  int track_level = 0;  ///< levels below full effort
+  int smooth_level = 0;
+};
+
+struct ArmingSettings {
+  double imu_rate_tolerance = 0.2;                           ///< share of the expected rate
+  Duration sensor_offset = Duration::fromMilliseconds(200);  ///< newest image against newest sample
+  Duration image_age = Duration::fromMilliseconds(500);      ///< of each camera's newest image
+  Duration steady = Duration::fromMilliseconds(3000);        ///< of health and epoch
+};
+
+struct MissingCondition {
+  static constexpr std::size_t kTextBytes = 160;
+
+  ArmingCondition condition = ArmingCondition::kRights;
+  std::array<char, kTextBytes> text{};  ///< what is missing, with its figures; ends with a zero
+  const char* remedy = "";              ///< literal
+
+  [[nodiscard]] const char* name() const { return conditionName(condition); }
+};
+
+struct ArmingVerdict {
+  /// Clocks and initialized may be missed in two ways at once, sensors by the IMU and by each camera.
+  static constexpr std::size_t kMost = kArmingConditions + 2 + kMaxCameras;
+
+  FixedVector<MissingCondition, kMost> missing;
+
+  [[nodiscard]] bool ready() const { return missing.empty(); }
+  [[nodiscard]] bool lacks(ArmingCondition condition) const;
+};
+
+class ReadyToArm {
+ public:
+  explicit ReadyToArm(const ArmingSettings& settings = {}) : settings_(settings) {}
+
+  /// O(1), no heap.
+  [[nodiscard]] ArmingVerdict evaluate(const ArmingFacts& facts) const;
+
+ private:
+  ArmingSettings settings_;
+};
+
+/// One line for each missing condition: `name: what is missing; remedy`. "ready to arm" when none is.
+std::string describe(const ArmingVerdict& verdict);
+/// {"ready": bool, "missing": [{"condition", "what", "remedy"}]}
+nlohmann::ordered_json toJson(const ArmingVerdict& verdict);
+
+}  // namespace swiftlet
