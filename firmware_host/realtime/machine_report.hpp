@@ -1,0 +1,45 @@
+#pragma once
+// What this machine says about its latency before anything is measured: each fact that delays real-time
+// threads, with a verdict and a remedy. Facts only: nothing is changed, nothing fails. What does not exist
+// or cannot be read is "unknown".
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+namespace swiftlet {
+
+enum class MachineVerdict {
+  kGood,
+  kNote,     ///< no harm by itself; worth knowing when figures surprise
+  kPoor,     ///< costs latency: see the remedy
+  kUnknown,  ///< the machine does not say
+};
+/// "good", "note", "poor", "unknown".
+const char* verdictName(MachineVerdict verdict);
+
+struct MachineLine {
+  std::string what;   ///< "real-time throttling", "CPU governor", ...
+  std::string found;  ///< as the machine says it, with units
+  MachineVerdict verdict = MachineVerdict::kUnknown;
+  std::string remedy;  ///< empty when there is nothing to do
+};
+
+struct MachineReport {
+  std::vector<MachineLine> lines;
+
+  /// The line called `what`, or null.
+  [[nodiscard]] const MachineLine* find(const std::string& what) const;
+  /// A table, remedies indented below their lines.
+  [[nodiscard]] std::string text() const;
+  /// [{"what", "found", "verdict", "remedy"}]
+  [[nodiscard]] nlohmann::ordered_json json() const;
+};
+
+/// Lines: "real-time throttling", "real-time priority", "locked memory", "preemption", "CPUs", "CPU
+/// governor", "CPU quota", "real-time quota" (control groups of version 1), "clock". `root` stands in front
+/// of every path that is read ("" is this machine, a folder with the same files a test's). `priority` is the
+/// highest that the flight threads want.
+MachineReport inspectMachine(const std::string& root = "", int priority = 45);
+
+}  // namespace swiftlet
