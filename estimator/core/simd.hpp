@@ -1,26 +1,38 @@
 #pragma once
-// The few integer vector operations that the image kernels need, behind one wrapper: AVX2, NEON
-// and a scalar twin that defines the result. All three give the same bits, because the operations
-// are exact integer arithmetic; kernels are templates over the instruction set, and tests run them
-// with both `simd::Native` and `simd::Scalar`.
+// The few vector operations that the image kernels need, behind one wrapper: AVX2, NEON (64-bit ARM)
+// and a scalar twin that defines the result. All three give the same bits: the integer operations are
+// exact, the float ones rounded once each (products are fused with their sums) and summed over lanes in
+// one order. Kernels are templates over the instruction set, and tests run them with both
+// `simd::Native` and `simd::Scalar`.
 
+#include <cmath>
 #include <cstdint>
 
-#if defined(__AVX2__)
+// Where Native is not the scalar twin itself: kernels are then instantiated for both.
+#if defined(__AVX2__) && defined(__FMA__)
+#define SWIFTLET_SIMD_NATIVE
 #include <immintrin.h>
-#elif defined(__ARM_NEON)
+#elif defined(__aarch64__)
+#define SWIFTLET_SIMD_NATIVE
 #include <arm_neon.h>
 #endif
 
 namespace swiftlet::simd {
 
-/// Sixteen 16-bit lanes, eight 32-bit sums.
+/// Sixteen 16-bit lanes, eight 32-bit sums, sixteen float lanes.
 struct Scalar {
   struct Int16x16 {
     std::int16_t lane[16];
   };
   struct Int32x8 {
     std::int32_t lane[8];
+  };
+  struct Float32x16 {
+    float lane[16];
+  };
+  /// Places in a row of 32 bytes.
+  struct Places {
+    std::int16_t lane[16];
   };
 
   static Int32x8 zero() { return {}; }
@@ -84,13 +96,103 @@ struct Scalar {
     for (const std::int32_t x : v.lane) sum += x;
     return sum;
   }
+
+  template <int kBits>
+  static Int16x16 shiftLeft(const Int16x16& a) {
+    Int16x16 v;
+    for (int i = 0; i < 16; ++i) v.lane[i] = static_cast<std::int16_t>(a.lane[i] << kBits);
+    return v;
+  }
+  /// Rounds towards minus infinity.
+  template <int kBits>
+  static Int16x16 shiftRight(const Int16x16& a) {
+    Int16x16 v;
+    for (int i = 0; i < 16; ++i) v.lane[i] = static_cast<std::int16_t>(a.lane[i] >> kBits);
+    return v;
+  }
+  /// Lanes of `a` where `key` equals `value`, of `b` elsewhere.
+  static Int16x16 selectEqual(const Int16x16& key, std::int16_t value, const Int16x16& a, const Int16x16& b) {
+    Int16x16 v;
+    for (int i = 0; i < 16; ++i) v.lane[i] = key.lane[i] == value ? a.lane[i] : b.lane[i];
+    return v;
+  }
+  /// Lanes as unsigned bytes, cut at 0 and 255.
+  static void storeBytes(std::uint8_t* to, const Int16x16& v) {
+    for (int i = 0; i < 16; ++i) {
+      to[i] = static_cast<std::uint8_t>(v.lane[i] < 0 ? 0 : (v.lane[i] > 255 ? 255 : v.lane[i]));
+    }
+  }
+  static Places places(const Int16x16& v) {
+    Places p;
+    for (int i = 0; i < 16; ++i) p.lane[i] = v.lane[i];
+    return p;
+  }
+  /// from[place], zero for places outside 0 to 31. Reads 32 bytes.
+  static Int16x16 pick(const std::uint8_t* from, const Places& place) {
+    Int16x16 v;
+    for (int i = 0; i < 16; ++i) {
+      v.lane[i] = place.lane[i] >= 0 && place.lane[i] < 32 ? from[place.lane[i]] : std::int16_t{0};
+    }
+    return v;
+  }
+
+  static Float32x16 zeroFloats() { return {}; }
+  static Float32x16 loadFloats(const float* from) {
+    Float32x16 v;
+    for (int i = 0; i < 16; ++i) v.lane[i] = from[i];
+    return v;
+  }
+  static void storeFloats(float* to, const Float32x16& v) {
+    for (int i = 0; i < 16; ++i) to[i] = v.lane[i];
+  }
+  static Float32x16 broadcastFloat(float x) {
+    Float32x16 v;
+    for (float& lane : v.lane) lane = x;
+    return v;
+  }
+  static Float32x16 toFloats(const Int16x16& a) {
+    Float32x16 v;
+    for (int i = 0; i < 16; ++i) v.lane[i] = a.lane[i];
+    return v;
+  }
+  static Float32x16 multiply(const Float32x16& a, const Float32x16& b) {
+    Float32x16 v;
+    for (int i = 0; i < 16; ++i) v.lane[i] = a.lane[i] * b.lane[i];
+    return v;
+  }
+  static Float32x16 add(const Float32x16& a, const Float32x16& b) {
+    Float32x16 v;
+    for (int i = 0; i < 16; ++i) v.lane[i] = a.lane[i] + b.lane[i];
+    return v;
+  }
+  /// sum + a b, rounded once.
+  static Float32x16 multiplyAdd(const Float32x16& sum, const Float32x16& a, const Float32x16& b) {
+    Float32x16 v;
+    for (int i = 0; i < 16; ++i) v.lane[i] = std::fma(a.lane[i], b.lane[i], sum.lane[i]);
+    return v;
+  }
+  /// Halves are added until one is left.
+  static float total(Float32x16 v) {
+    for (int half = 8; half > 0; half /= 2) {
+      for (int i = 0; i < half; ++i) v.lane[i] += v.lane[i + half];
+    }
+    return v.lane[0];
+  }
 };
 
-#if defined(__AVX2__)
+#if defined(__AVX2__) && defined(__FMA__)
 
 struct Native {
   using Int16x16 = __m256i;
   using Int32x8 = __m256i;
+  struct Float32x16 {
+    __m256 low;
+    __m256 high;
+  };
+  struct Places {
+    __m128i low;   ///< in the first half of the row; top bit set where not there
+    __m128i high;  ///< likewise in the second
+  };
 
   static Int32x8 zero() { return _mm256_setzero_si256(); }
   static Int16x16 load(const std::int16_t* from) {
@@ -115,9 +217,68 @@ struct Native {
     s = _mm_add_epi32(s, _mm_shuffle_epi32(s, 0xB1));
     return _mm_cvtsi128_si32(s);
   }
+
+  template <int kBits>
+  static Int16x16 shiftLeft(Int16x16 a) {
+    return _mm256_slli_epi16(a, kBits);
+  }
+  template <int kBits>
+  static Int16x16 shiftRight(Int16x16 a) {
+    return _mm256_srai_epi16(a, kBits);
+  }
+  static Int16x16 selectEqual(Int16x16 key, std::int16_t value, Int16x16 a, Int16x16 b) {
+    return _mm256_blendv_epi8(b, a, _mm256_cmpeq_epi16(key, _mm256_set1_epi16(value)));
+  }
+  static void storeBytes(std::uint8_t* to, Int16x16 v) {
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(to), bytes(v));
+  }
+  static Places places(Int16x16 v) {
+    const __m128i place = bytes(v);
+    // A shuffle gives zero where the top bit is set: from 16 on, and below 16.
+    return {_mm_adds_epu8(place, _mm_set1_epi8(0x70)), _mm_sub_epi8(place, _mm_set1_epi8(16))};
+  }
+  static Int16x16 pick(const std::uint8_t* from, const Places& place) {
+    const __m128i* const row = reinterpret_cast<const __m128i*>(from);
+    return _mm256_cvtepu8_epi16(_mm_or_si128(_mm_shuffle_epi8(_mm_loadu_si128(row), place.low),
+                                             _mm_shuffle_epi8(_mm_loadu_si128(row + 1), place.high)));
+  }
+
+  static Float32x16 zeroFloats() { return {_mm256_setzero_ps(), _mm256_setzero_ps()}; }
+  static Float32x16 loadFloats(const float* from) {
+    return {_mm256_loadu_ps(from), _mm256_loadu_ps(from + 8)};
+  }
+  static void storeFloats(float* to, const Float32x16& v) {
+    _mm256_storeu_ps(to, v.low);
+    _mm256_storeu_ps(to + 8, v.high);
+  }
+  static Float32x16 broadcastFloat(float x) { return {_mm256_set1_ps(x), _mm256_set1_ps(x)}; }
+  static Float32x16 toFloats(Int16x16 a) {
+    return {_mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm256_castsi256_si128(a))),
+            _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm256_extracti128_si256(a, 1)))};
+  }
+  static Float32x16 multiply(const Float32x16& a, const Float32x16& b) {
+    return {_mm256_mul_ps(a.low, b.low), _mm256_mul_ps(a.high, b.high)};
+  }
+  static Float32x16 add(const Float32x16& a, const Float32x16& b) {
+    return {_mm256_add_ps(a.low, b.low), _mm256_add_ps(a.high, b.high)};
+  }
+  static Float32x16 multiplyAdd(const Float32x16& sum, const Float32x16& a, const Float32x16& b) {
+    return {_mm256_fmadd_ps(a.low, b.low, sum.low), _mm256_fmadd_ps(a.high, b.high, sum.high)};
+  }
+  static float total(const Float32x16& v) {
+    const __m256 eight = _mm256_add_ps(v.low, v.high);
+    __m128 four = _mm_add_ps(_mm256_castps256_ps128(eight), _mm256_extractf128_ps(eight, 1));
+    four = _mm_add_ps(four, _mm_movehl_ps(four, four));
+    return _mm_cvtss_f32(_mm_add_ss(four, _mm_movehdup_ps(four)));
+  }
+
+ private:
+  static __m128i bytes(Int16x16 v) {
+    return _mm_packus_epi16(_mm256_castsi256_si128(v), _mm256_extracti128_si256(v, 1));
+  }
 };
 
-#elif defined(__ARM_NEON)
+#elif defined(__aarch64__)
 
 struct Native {
   struct Int16x16 {
@@ -129,6 +290,10 @@ struct Native {
     int32x4_t low;
     int32x4_t high;
   };
+  struct Float32x16 {
+    float32x4_t quarter[4];
+  };
+  using Places = uint8x16_t;
 
   static Int32x8 zero() { return {vdupq_n_s32(0), vdupq_n_s32(0)}; }
   static Int16x16 load(const std::int16_t* from) { return {vld1q_s16(from), vld1q_s16(from + 8)}; }
@@ -168,6 +333,66 @@ struct Native {
     const int32x4_t sum = vaddq_s32(v.low, v.high);
     const int32x2_t half = vadd_s32(vget_low_s32(sum), vget_high_s32(sum));
     return vget_lane_s32(vpadd_s32(half, half), 0);
+  }
+
+  template <int kBits>
+  static Int16x16 shiftLeft(const Int16x16& a) {
+    return {vshlq_n_s16(a.low, kBits), vshlq_n_s16(a.high, kBits)};
+  }
+  template <int kBits>
+  static Int16x16 shiftRight(const Int16x16& a) {
+    return {vshrq_n_s16(a.low, kBits), vshrq_n_s16(a.high, kBits)};
+  }
+  static Int16x16 selectEqual(const Int16x16& key, std::int16_t value, const Int16x16& a, const Int16x16& b) {
+    const int16x8_t wanted = vdupq_n_s16(value);
+    return {vbslq_s16(vceqq_s16(key.low, wanted), a.low, b.low),
+            vbslq_s16(vceqq_s16(key.high, wanted), a.high, b.high)};
+  }
+  static void storeBytes(std::uint8_t* to, const Int16x16& v) { vst1q_u8(to, places(v)); }
+  static Places places(const Int16x16& v) { return vcombine_u8(vqmovun_s16(v.low), vqmovun_s16(v.high)); }
+  static Int16x16 pick(const std::uint8_t* from, const Places& place) {
+    const uint8x16x2_t row = {{vld1q_u8(from), vld1q_u8(from + 16)}};
+    const uint8x16_t bytes = vqtbl2q_u8(row, place);
+    return {vreinterpretq_s16_u16(vmovl_u8(vget_low_u8(bytes))),
+            vreinterpretq_s16_u16(vmovl_u8(vget_high_u8(bytes)))};
+  }
+
+  static Float32x16 zeroFloats() { return broadcastFloat(0); }
+  static Float32x16 loadFloats(const float* from) {
+    return {{vld1q_f32(from), vld1q_f32(from + 4), vld1q_f32(from + 8), vld1q_f32(from + 12)}};
+  }
+  static void storeFloats(float* to, const Float32x16& v) {
+    for (int i = 0; i < 4; ++i) vst1q_f32(to + 4 * i, v.quarter[i]);
+  }
+  static Float32x16 broadcastFloat(float x) {
+    const float32x4_t v = vdupq_n_f32(x);
+    return {{v, v, v, v}};
+  }
+  static Float32x16 toFloats(const Int16x16& a) {
+    return {{vcvtq_f32_s32(vmovl_s16(vget_low_s16(a.low))), vcvtq_f32_s32(vmovl_s16(vget_high_s16(a.low))),
+             vcvtq_f32_s32(vmovl_s16(vget_low_s16(a.high))),
+             vcvtq_f32_s32(vmovl_s16(vget_high_s16(a.high)))}};
+  }
+  static Float32x16 multiply(const Float32x16& a, const Float32x16& b) {
+    Float32x16 v;
+    for (int i = 0; i < 4; ++i) v.quarter[i] = vmulq_f32(a.quarter[i], b.quarter[i]);
+    return v;
+  }
+  static Float32x16 add(const Float32x16& a, const Float32x16& b) {
+    Float32x16 v;
+    for (int i = 0; i < 4; ++i) v.quarter[i] = vaddq_f32(a.quarter[i], b.quarter[i]);
+    return v;
+  }
+  static Float32x16 multiplyAdd(const Float32x16& sum, const Float32x16& a, const Float32x16& b) {
+    Float32x16 v;
+    for (int i = 0; i < 4; ++i) v.quarter[i] = vfmaq_f32(sum.quarter[i], a.quarter[i], b.quarter[i]);
+    return v;
+  }
+  static float total(const Float32x16& v) {
+    const float32x4_t four =
+        vaddq_f32(vaddq_f32(v.quarter[0], v.quarter[2]), vaddq_f32(v.quarter[1], v.quarter[3]));
+    const float32x2_t two = vadd_f32(vget_low_f32(four), vget_high_f32(four));
+    return vget_lane_f32(two, 0) + vget_lane_f32(two, 1);
   }
 };
 

@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "estimator/frontend/affine_sampler.hpp"
+
 namespace swiftlet {
 namespace {
 
@@ -19,6 +21,8 @@ constexpr float kMinDeterminant = 0.1F;
 constexpr float kMaxDeterminant = 10.0F;
 // Steps below this [px] end the iterations.
 constexpr float kStop = 0.01F;
+// Greys are taken from the middle of their range, where floats are finest.
+constexpr float kMiddle = 128.0F;
 
 // A disc: pixels in the corners of the square are the first to leave the surface that carries the
 // feature. On rendered flights the full square gives young tracks 5 % less error and old ones (80
@@ -28,24 +32,25 @@ const PatchWindow kWindow = makePatchWindow([](float x, float y) { return std::s
 using Vector6f = Eigen::Matrix<float, 6, 1>;
 
 struct Gradients {
-  alignas(32) float value[kRows * kLanes];
-  alignas(32) float x[kRows * kLanes];  ///< weighted
-  alignas(32) float y[kRows * kLanes];  ///< weighted
+  alignas(32) float value[kRows * kLanes];  ///< less kMiddle
+  alignas(32) float x[kRows * kLanes];      ///< weighted
+  alignas(32) float y[kRows * kLanes];      ///< weighted
 };
 
+template <typename Isa>
 void readTemplate(const ImageView& patch, int cx, int cy, Gradients& g) {
-  const float* window = kWindow.data();
+  const auto middle = Isa::broadcast(static_cast<std::int16_t>(kMiddle));
+  const auto half = Isa::broadcastFloat(0.5F);
   for (int r = 0; r < kRows; ++r) {
     const std::uint8_t* row = patch.row(cy - kPatchRadius + r) + (cx - kPatchRadius);
-    const std::uint8_t* above = row - patch.stride;
-    const std::uint8_t* below = row + patch.stride;
     // Whole vectors: the columns beyond the window have weight zero.
-    for (int c = 0; c < kLanes; ++c) {
-      const int i = r * kLanes + c;
-      g.value[i] = static_cast<float>(row[c]);
-      g.x[i] = 0.5F * window[i] * static_cast<float>(row[c + 1] - row[c - 1]);
-      g.y[i] = 0.5F * window[i] * static_cast<float>(below[c] - above[c]);
-    }
+    const int at = r * kLanes;
+    const auto w = Isa::multiply(half, Isa::loadFloats(kWindow.data() + at));
+    const auto x = Isa::subtract(Isa::widen(row + 1), Isa::widen(row - 1));
+    const auto y = Isa::subtract(Isa::widen(row + patch.stride), Isa::widen(row - patch.stride));
+    Isa::storeFloats(g.value + at, Isa::toFloats(Isa::subtract(Isa::widen(row), middle)));
+    Isa::storeFloats(g.x + at, Isa::multiply(w, Isa::toFloats(x)));
+    Isa::storeFloats(g.y + at, Isa::multiply(w, Isa::toFloats(y)));
   }
 }
 
@@ -54,7 +59,7 @@ void readTemplate(const ImageView& patch, int cx, int cy, Gradients& g) {
 bool AffineTemplate::build(const ImageView& patch, int cx, int cy) {
   const float* window = kWindow.data();
   Gradients g;
-  readTemplate(patch, cx, cy, g);
+  readTemplate<simd::Native>(patch, cx, cy, g);
   // Parameters: t_x, t_y, then dA row by row; the last two are gain and offset.
   Eigen::Matrix<float, 8, 8> H = Eigen::Matrix<float, 8, 8>::Zero();
   for (int r = 0; r < kRows; ++r) {
@@ -67,7 +72,7 @@ bool AffineTemplate::build(const ImageView& patch, int cx, int cy) {
       Eigen::Matrix<float, 8, 1> j;
       const float gx = g.x[i] / w;
       const float gy = g.y[i] / w;
-      j << gx, gy, gx * x, gx * y, gy * x, gy * y, g.value[i] - 128.0F, 1.0F;
+      j << gx, gy, gx * x, gx * y, gy * x, gy * y, g.value[i], 1.0F;
       H.noalias() += w * j * j.transpose();
     }
   }
@@ -86,117 +91,109 @@ bool AffineTemplate::build(const ImageView& patch, int cx, int cy) {
 
 namespace {
 
-// Image values under the warped window; false when any lies outside.
-bool sampleWindow(const ImageView& image, const AffineTemplate::Estimate& e, float* value) {
-  const Eigen::Vector2f half =
-      e.warp.cwiseAbs() * Eigen::Vector2f::Constant(static_cast<float>(kPatchRadius));
-  if (!(e.position.x() - half.x() >= 0 && e.position.y() - half.y() >= 0 &&
-        e.position.x() + half.x() < static_cast<float>(image.width - 1) &&
-        e.position.y() + half.y() < static_cast<float>(image.height - 1))) {
-    return false;
-  }
-  // 16.16 fixed point keeps the inner loop free of rounding calls.
-  constexpr float kOne = 65536.0F;
-  constexpr std::int32_t kHalfWeight = 128;
-  const auto step_x = static_cast<std::int32_t>(e.warp(0, 0) * kOne);
-  const auto step_y = static_cast<std::int32_t>(e.warp(1, 0) * kOne);
+// Sums over the window of an image times what the alignment needs to know of it.
+struct ImageSums {
+  float one = 0;                       ///< weight times the image
+  float square = 0;                    ///< weight times its square
+  float value = 0;                     ///< weight times it and the template
+  Vector6f moment = Vector6f::Zero();  ///< times the weighted gradients and their places in the window
+};
+
+const std::array<float, kLanes> kColumn = [] {
+  std::array<float, kLanes> column{};
+  for (std::size_t c = 0; c < kPatchSize; ++c)
+    column[c] = static_cast<float>(static_cast<int>(c) - kPatchRadius);
+  return column;
+}();
+
+// `row`: function of the row's index to the image's sixteen values there.
+template <typename Isa, typename Rows>
+ImageSums sumWindow(const Gradients& g, const Rows& row) {
+  auto one = Isa::zeroFloats(), square = Isa::zeroFloats(), value = Isa::zeroFloats();
+  auto x0 = Isa::zeroFloats(), y0 = Isa::zeroFloats(), x1 = Isa::zeroFloats(), y1 = Isa::zeroFloats();
   for (int r = 0; r < kRows; ++r) {
-    const Eigen::Vector2f start = e.position + e.warp * Eigen::Vector2f(-static_cast<float>(kPatchRadius),
-                                                                        static_cast<float>(r - kPatchRadius));
-    // Half of the 1/256 px to which the weights are cut.
-    auto x = static_cast<std::int32_t>(start.x() * kOne) + kHalfWeight;
-    auto y = static_cast<std::int32_t>(start.y() * kOne) + kHalfWeight;
-    for (int c = 0; c < kPatchSize; ++c, x += step_x, y += step_y) {
-      const std::uint8_t* p = image.data + static_cast<std::ptrdiff_t>(y >> 16) * image.stride + (x >> 16);
-      const int u = (x >> 8) & 255;
-      const int v = (y >> 8) & 255;
-      const int top = p[0] * (256 - u) + p[1] * u;
-      const int bottom = p[image.stride] * (256 - u) + p[image.stride + 1] * u;
-      value[r * kLanes + c] = static_cast<float>(top * (256 - v) + bottom * v) * (1.0F / kOne);
-    }
+    const int at = r * kLanes;
+    const auto s = row(r);
+    const auto w = Isa::loadFloats(kWindow.data() + at);
+    const auto ws = Isa::multiply(w, s);
+    one = Isa::multiplyAdd(one, w, s);
+    square = Isa::multiplyAdd(square, ws, s);
+    value = Isa::multiplyAdd(value, ws, Isa::loadFloats(g.value + at));
+    const auto gx = Isa::loadFloats(g.x + at);
+    const auto gy = Isa::loadFloats(g.y + at);
+    const auto rs = Isa::multiply(Isa::broadcastFloat(static_cast<float>(r - kPatchRadius)), s);
+    x0 = Isa::multiplyAdd(x0, gx, s);
+    y0 = Isa::multiplyAdd(y0, gy, s);
+    x1 = Isa::multiplyAdd(x1, gx, rs);
+    y1 = Isa::multiplyAdd(y1, gy, rs);
   }
-  return true;
+  // Fused with zero: a plain product might or might not be fused with the sum over lanes.
+  const auto column = Isa::loadFloats(kColumn.data());
+  const auto column_x = Isa::multiplyAdd(Isa::zeroFloats(), column, x0);
+  const auto column_y = Isa::multiplyAdd(Isa::zeroFloats(), column, y0);
+  ImageSums sums;
+  sums.one = Isa::total(one);
+  sums.square = Isa::total(square);
+  sums.value = Isa::total(value);
+  sums.moment << Isa::total(x0), Isa::total(y0), Isa::total(column_x), Isa::total(x1), Isa::total(column_y),
+      Isa::total(y1);
+  return sums;
 }
 
 struct Light {
   float gain = 1;
-  float offset = 0;
+  float offset = 0;  ///< image less gain times template, both less kMiddle
   float correlation = 0;
 };
 
-// Weighted regression of the image on the template.
-Light fitLight(const float* value, const float* image) {
-  const float* window = kWindow.data();
-  std::array<float, kLanes> w{}, t{}, i{}, tt{}, ii{}, ti{};
-  for (int k = 0; k < kRows; ++k) {
-    for (std::size_t c = 0; c < kLanes; ++c) {
-      const std::size_t at = static_cast<std::size_t>(k * kLanes) + c;
-      const float a = value[at] - 128.0F;
-      const float b = image[at] - 128.0F;
-      w[c] += window[at];
-      t[c] += window[at] * a;
-      i[c] += window[at] * b;
-      tt[c] += window[at] * a * a;
-      ii[c] += window[at] * b * b;
-      ti[c] += window[at] * a * b;
-    }
-  }
-  const auto sum = [](const std::array<float, kLanes>& v) {
-    float s = 0;
-    for (const float x : v) s += x;
-    return s;
-  };
-  const float n = 1.0F / sum(w);
-  const float mean_t = sum(t) * n;
-  const float mean_i = sum(i) * n;
-  const float var_t = sum(tt) * n - mean_t * mean_t;
-  const float var_i = sum(ii) * n - mean_i * mean_i;
-  const float covariance = sum(ti) * n - mean_t * mean_i;
+// Weighted regression of the image on the template. `constant`: sums of an image that is 1 everywhere.
+Light fitLight(const ImageSums& image, const ImageSums& pattern, const ImageSums& constant) {
+  const float n = 1.0F / constant.one;
+  const float mean_t = pattern.one * n;
+  const float mean_i = image.one * n;
+  const float var_t = pattern.square * n - mean_t * mean_t;
+  const float var_i = image.square * n - mean_i * mean_i;
+  const float covariance = image.value * n - mean_t * mean_i;
   Light light;
   if (!(var_t > 0) || !(var_i > 0)) return light;
   light.gain = covariance / var_t;
-  light.offset = mean_i + 128.0F - light.gain * (mean_t + 128.0F);
+  light.offset = mean_i - light.gain * mean_t;
   light.correlation = covariance / std::sqrt(var_t * var_i);
   return light;
 }
 
+// The window and the pixels that interpolate it lie in the image.
+bool windowInside(const ImageView& image, const AffineTemplate::Estimate& e) {
+  const Eigen::Vector2f half =
+      e.warp.cwiseAbs() * Eigen::Vector2f::Constant(static_cast<float>(kPatchRadius));
+  return e.position.x() - half.x() >= 0 && e.position.y() - half.y() >= 0 &&
+         e.position.x() + half.x() < static_cast<float>(image.width - 1) &&
+         e.position.y() + half.y() < static_cast<float>(image.height - 1);
+}
+
 }  // namespace
 
+template <typename Isa>
 bool AffineTemplate::align(const ImageView& patch, int cx, int cy, const ImageView& image, int iterations,
                            Estimate& estimate) const {
-  Gradients g{};
-  readTemplate(patch, cx, cy, g);
-  alignas(32) float sampled[kRows * kLanes]{};
+  Gradients g;
+  readTemplate<Isa>(patch, cx, cy, g);
+  const ImageSums pattern = sumWindow<Isa>(g, [&g](int r) { return Isa::loadFloats(g.value + r * kLanes); });
+  const ImageSums constant = sumWindow<Isa>(g, [](int) { return Isa::broadcastFloat(1); });
+  const auto to_grey = Isa::broadcastFloat(1.0F / AffineSampler<Isa>::kUnitsPerGrey);
+  const auto middle = Isa::broadcast(static_cast<std::int16_t>(kMiddle * AffineSampler<Isa>::kUnitsPerGrey));
+  AffineSampler<Isa> sampler;
   for (int iteration = 0; iteration < iterations; ++iteration) {
-    if (!sampleWindow(image, estimate, sampled)) return false;
-    const Light light = fitLight(g.value, sampled);
+    if (!windowInside(image, estimate) || !sampler.prepare(estimate.warp, kPatchRadius)) return false;
+    const ImageSums sums = sumWindow<Isa>(g, [&](int r) {
+      const auto sampled = sampler.sample(image, estimate.position, r - kPatchRadius);
+      return Isa::multiply(Isa::toFloats(Isa::subtract(sampled, middle)), to_grey);
+    });
+    const Light light = fitLight(sums, pattern, constant);
     estimate.correlation = light.correlation;
     if (!(light.gain > 0.1F)) return false;
-    // Moments of the residual times the weighted gradients, lane by lane.
-    std::array<float, kLanes> x0{}, y0{}, x1{}, y1{};
-    for (int r = 0; r < kRows; ++r) {
-      const auto row = static_cast<float>(r - kPatchRadius);
-      for (std::size_t c = 0; c < kLanes; ++c) {
-        const std::size_t at = static_cast<std::size_t>(r * kLanes) + c;
-        const float residual = sampled[at] - light.gain * g.value[at] - light.offset;
-        const float px = g.x[at] * residual;
-        const float py = g.y[at] * residual;
-        x0[c] += px;
-        y0[c] += py;
-        x1[c] += row * px;
-        y1[c] += row * py;
-      }
-    }
-    Vector6f moment = Vector6f::Zero();
-    for (std::size_t c = 0; c < kPatchSize; ++c) {
-      const float column = static_cast<float>(c) - static_cast<float>(kPatchRadius);
-      moment[0] += x0[c];
-      moment[1] += y0[c];
-      moment[2] += column * x0[c];
-      moment[3] += x1[c];
-      moment[4] += column * y0[c];
-      moment[5] += y1[c];
-    }
+    // Of the residual: image less gain times template less offset.
+    const Vector6f moment = sums.moment - light.gain * pattern.moment - light.offset * constant.moment;
     const Vector6f step = inverse_hessian_ * moment / light.gain;
     Eigen::Matrix2f change;
     change << 1 + step[2], step[3], step[4], 1 + step[5];
@@ -212,5 +209,12 @@ bool AffineTemplate::align(const ImageView& patch, int cx, int cy, const ImageVi
   }
   return true;
 }
+
+template bool AffineTemplate::align<simd::Native>(const ImageView&, int, int, const ImageView&, int,
+                                                  Estimate&) const;
+#ifdef SWIFTLET_SIMD_NATIVE
+template bool AffineTemplate::align<simd::Scalar>(const ImageView&, int, int, const ImageView&, int,
+                                                  Estimate&) const;
+#endif
 
 }  // namespace swiftlet

@@ -25,7 +25,7 @@ void AnchorPatch::take(const Pyramid& image, const Eigen::Vector2f& pixel) {
     const int x = static_cast<int>(std::lround(at.x())) - side / 2;
     const int y = static_cast<int>(std::lround(at.y())) - side / 2;
     centre_[index] = at - Eigen::Vector2f(static_cast<float>(x), static_cast<float>(y));
-    std::uint8_t* to = level == 0 ? fine_.data() : coarse_.data();
+    std::uint8_t* to = pixels_.data() + (level == 0 ? 0 : kSide0 * kSide0);
     // The pyramid's border covers what lies outside the image: a feature is inside it.
     for (int r = 0; r < side; ++r) {
       std::memcpy(to + r * side, source.row(y + r) + x, static_cast<std::size_t>(side));
@@ -53,7 +53,7 @@ bool AnchorPatch::refine(const ImageView& image, const Eigen::Matrix2f& turn, Ei
 
 ImageView AnchorPatch::view(int level) const {
   const int side = kSide[static_cast<std::size_t>(level)];
-  return {level == 0 ? fine_.data() : coarse_.data(), side, side, side};
+  return {pixels_.data() + (level == 0 ? 0 : kSide0 * kSide0), side, side, side};
 }
 
 Eigen::Vector2f AnchorPatch::centre(int level) const { return centre_[static_cast<std::size_t>(level)]; }

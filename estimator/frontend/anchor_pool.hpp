@@ -46,8 +46,8 @@ class AnchorPatch {
   AffineTemplate template_;
   bool has_template_ = false;
   std::array<Eigen::Vector2f, kLevels> centre_{};
-  std::array<std::uint8_t, kSide0 * kSide0> fine_{};
-  std::array<std::uint8_t, kSide1 * kSide1> coarse_{};
+  /// Level 0, level 1, and what reading whole vectors takes behind the last row.
+  std::array<std::uint8_t, kSide0 * kSide0 + kSide1 * kSide1 + 32> pixels_{};
 };
 
 struct Anchor {

@@ -134,7 +134,7 @@ bool PatchTemplate::build(const std::uint8_t* centre, int stride) {
 }
 
 template bool PatchTemplate::build<simd::Native>(const std::uint8_t*, int);
-#if defined(__AVX2__) || defined(__ARM_NEON)
+#ifdef SWIFTLET_SIMD_NATIVE
 template bool PatchTemplate::build<simd::Scalar>(const std::uint8_t*, int);
 #endif
 
@@ -261,7 +261,7 @@ bool PatchTemplate::align(const ImageView& image, const AlignmentLimits& limits,
 
 template bool PatchTemplate::align<simd::Native>(const ImageView&, const AlignmentLimits&, Finish,
                                                  Eigen::Vector2f&) const;
-#if defined(__AVX2__) || defined(__ARM_NEON)
+#ifdef SWIFTLET_SIMD_NATIVE
 template bool PatchTemplate::align<simd::Scalar>(const ImageView&, const AlignmentLimits&, Finish,
                                                  Eigen::Vector2f&) const;
 #endif

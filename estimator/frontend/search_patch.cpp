@@ -69,7 +69,7 @@ float SearchPatch::correlation(const ImageView& image, int x, int y) const {
 }
 
 template float SearchPatch::correlation<simd::Native>(const ImageView&, int, int) const;
-#if defined(__AVX2__) || defined(__ARM_NEON)
+#ifdef SWIFTLET_SIMD_NATIVE
 template float SearchPatch::correlation<simd::Scalar>(const ImageView&, int, int) const;
 #endif
 

@@ -1,11 +1,13 @@
 #include "estimator/frontend/warped_patch.hpp"
 
 #include <Eigen/LU>
-#include <algorithm>
 #include <cmath>
+
+#include "estimator/frontend/affine_sampler.hpp"
 
 namespace swiftlet {
 
+template <typename Isa>
 bool WarpedPatch::sample(const ImageView& source, const Eigen::Vector2f& centre,
                          const Eigen::Matrix2f& inverse_warp, int border) {
   const auto reach = static_cast<float>(kReach);
@@ -16,28 +18,24 @@ bool WarpedPatch::sample(const ImageView& source, const Eigen::Vector2f& centre,
         centre.y() + half.y() < static_cast<float>(source.height - 1 + border))) {
     return false;
   }
+  AffineSampler<Isa> sampler;
+  if (!sampler.prepare(inverse_warp, kReach)) return false;
+  constexpr int kUnits = AffineSampler<Isa>::kUnitsPerGrey;
+  static_assert(kUnits == 1 << 7);
+  const auto half_unit = Isa::broadcast(kUnits / 2);
   for (int y = 0; y < kSide; ++y) {
-    const Eigen::Vector2f start =
-        centre + inverse_warp * Eigen::Vector2f(-reach, static_cast<float>(y) - reach);
-    const float step_x = inverse_warp(0, 0);
-    const float step_y = inverse_warp(1, 0);
-    std::uint8_t* out = pixels_ + y * kStride;
-    for (int x = 0; x < kSide; ++x) {
-      const float px = start.x() + static_cast<float>(x) * step_x;
-      const float py = start.y() + static_cast<float>(x) * step_y;
-      const float base_x = std::floor(px);
-      const float base_y = std::floor(py);
-      const float u = px - base_x;
-      const float v = py - base_y;
-      const std::uint8_t* p = source.row(static_cast<int>(base_y)) + static_cast<int>(base_x);
-      const std::uint8_t* q = p + source.stride;
-      const float top = static_cast<float>(p[0]) + u * static_cast<float>(p[1] - p[0]);
-      const float bottom = static_cast<float>(q[0]) + u * static_cast<float>(q[1] - q[0]);
-      out[x] = static_cast<std::uint8_t>(top + v * (bottom - top) + 0.5F);
-    }
+    const auto sampled = sampler.sample(source, centre, y - kReach);
+    Isa::storeBytes(pixels_ + y * kStride, Isa::template shiftRight<7>(Isa::add(sampled, half_unit)));
   }
   return true;
 }
+
+template bool WarpedPatch::sample<simd::Native>(const ImageView&, const Eigen::Vector2f&,
+                                                const Eigen::Matrix2f&, int);
+#ifdef SWIFTLET_SIMD_NATIVE
+template bool WarpedPatch::sample<simd::Scalar>(const ImageView&, const Eigen::Vector2f&,
+                                                const Eigen::Matrix2f&, int);
+#endif
 
 bool alignWarped(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Eigen::Matrix2f& warp,
                  const Pyramid& to, int levels, const AlignmentLimits& limits, Eigen::Vector2f& to_pixel,

@@ -60,7 +60,9 @@ inline Canvas draw(const Texture& texture, int width, int height, const Eigen::M
                    const Eigen::Vector2d& t, double noise = 0, std::uint64_t seed = 1, double gain = 1,
                    double offset = 0) {
   Canvas canvas{width, height, {}};
-  canvas.pixels.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  // Kernels read whole vectors, past the last pixel they use.
+  constexpr std::size_t kReadPast = 32;
+  canvas.pixels.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) + kReadPast);
   Random random(seed);
   const Eigen::Matrix2d inverse = A.inverse();
   for (int y = 0; y < height; ++y) {
