@@ -89,10 +89,23 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
   command->add_option("--until", options->until, "End this many seconds after the first image")
       ->check(nonNegative());
   command->add_flag("--imu-rate", request.imu_rate, "Also write imu_rate.tum, the state at every IMU sample");
+  CLI::Option* real_time = command->add_flag("--real-time", request.real_time,
+                                             "On threads, with the log's messages let out at their times");
+  command->add_option("--speed", request.speed, "Times faster than recorded (with --real-time)")
+      ->check(CLI::Range(0.01, 100.0))
+      ->needs(real_time);
+  command->add_flag("--record", request.record,
+                    "Write what enters the estimator to recording/ in the run folder");
+  command
+      ->add_flag("--reproduce", request.reproduce,
+                 "LOG is a recording: repeat its threaded run byte for byte, with its settings")
+      ->excludes(real_time);
   options->settings.addTo(*command);
   command->footer(
       "Example:\n  swiftlet replay data/euroc_mh01_20s --out run_mh01\n"
-      "  swiftlet replay data/vil_v102 --mono --set smoother.horizon=3");
+      "  swiftlet replay data/vil_v102 --mono --set smoother.horizon=3\n"
+      "  swiftlet replay data/vil_v102 --real-time --record --out run\n"
+      "  swiftlet replay run --reproduce --out again");
   command->callback([options, &exit_code] { exit_code = replay(*options); });
 }
 

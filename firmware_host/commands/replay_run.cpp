@@ -4,10 +4,15 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "drivers/recorded/open_log.hpp"
+#include "drivers/recorded/recording_source.hpp"
 #include "firmware_host/commands/evaluate_run.hpp"
+#include "firmware_host/commands/fly_threaded.hpp"
+#include "firmware_host/pipeline/flight_recorder.hpp"
 #include "firmware_host/pipeline/lockstep.hpp"
+#include "firmware_host/pipeline/reproduce.hpp"
 #include "firmware_host/report/line_file.hpp"
 #include "firmware_host/report/memory_use.hpp"
 #include "firmware_host/report/progress.hpp"
@@ -44,9 +49,9 @@ void printWarnings(const LogSource& source, std::size_t from) {
 }
 
 /// Memory as it grew: what each part made resident.
-class MemoryTable {
+class MemoryTrack {
  public:
-  MemoryTable() : last_(residentBytes()) { rows_.push_back({"program_at_start", last_}); }
+  MemoryTrack() : last_(residentBytes()) { rows_.push_back({"program_at_start", last_}); }
   void note(const std::string& what) {
     const std::int64_t now = residentBytes();
     rows_.push_back({what, now - last_});
@@ -59,83 +64,186 @@ class MemoryTable {
   std::int64_t last_;
 };
 
+nlohmann::ordered_json recordingJson(const FlightRecorder& recorder) {
+  const RecordingStatistics& statistics = recorder.statistics();
+  nlohmann::ordered_json lost = nlohmann::ordered_json::object();
+  for (std::size_t kind = 0; kind < kRecordKinds; ++kind) {
+    if (statistics.lost[kind] > 0) lost[pluralName(static_cast<RecordKind>(kind))] = statistics.lost[kind];
+  }
+  return {{"records", statistics.records},
+          {"bytes", statistics.bytes},
+          {"segments", statistics.segments},
+          {"syncs", statistics.syncs},
+          {"lost", lost},
+          {"error", recorder.status().ok() ? "" : recorder.status().what}};
+}
+
 void writeMap(const std::string& path, const std::vector<MapPose>& poses) {
   if (poses.empty()) return;
   LineFile file(path);
   for (const MapPose& pose : poses) file.write(formatTum(pose.stamp, pose.T_world_body));
 }
 
+/// What one run is made of, from opening to the summary.
+class ReplayRun {
+ public:
+  ReplayRun(const ReplayRequest& request, Settings settings, const ReplayHooks& hooks)
+      : request_(request), settings_(std::move(settings)), hooks_(hooks) {
+    if (request_.mono) settings_.odometry.use_stereo = false;
+  }
+
+  ReplayResult operator()() {
+    open();
+    begin();
+    const double wall = wallSeconds();
+    const double cpu = processCpuSeconds();
+    if (request_.reproduce) {
+      repeat();
+    } else {
+      fly();
+    }
+    facts_.wall = wallSeconds() - wall;
+    facts_.cpu = processCpuSeconds() - cpu;
+    return end();
+  }
+
+ private:
+  void open() {
+    const LogOptions options = logOptions(request_, settings_);
+    if (request_.reproduce) {
+      std::unique_ptr<RecordingSource> recording = openRecording(request_.log, options);
+      recording_ = recording.get();
+      source_ = std::move(recording);
+      settings_ = Settings{};
+      readSettingsText(request_.log, recording_->header().settings, settings_);
+    } else {
+      source_ = openLog(request_.log, options);
+    }
+    printWarnings(*source_, 0);
+    warned_ = source_->warnings().size();
+    memory_.note("log_reader");
+    facts_.log = request_.log;
+    facts_.tracks = request_.tracks.empty() ? source_->trackFile() : request_.tracks;
+    steps_ = source_->imageCount();
+    if (facts_.tracks.empty()) return;
+    if (request_.real_time || request_.record) {
+      throw InputError(request_.log, 0, "", "a log of feature tracks has no images to let out or record",
+                       "Leave --real-time and --record out");
+    }
+    steps_ = checkTracks(facts_.tracks, source_->rig(), request_.mono).frames;
+    tracks_ = std::make_unique<TrackReader>(facts_.tracks);
+  }
+
+  void begin() {
+    facts_.mono = !settings_.odometry.use_stereo || source_->rig().camera_count < 2;
+    recorder_.emplace(request_.out, request_.imu_rate);
+    LineFile(out() / "settings.yaml").write(printSettings(settings_, false));
+    log_.emplace(*recorder_);
+    if (settings_.full_smoothing) {
+      log_->keepForMap(
+          std::make_unique<MapKeeper>(request_.out, source_->rig(), source_->imuNoise(), settings_.odometry));
+    }
+    progress_.emplace("replay", request_.show_progress ? steps_ : 0);
+    control_.stop = request_.stop;
+    control_.progress = [this](std::uint64_t images) { progress_->update(images); };
+  }
+
+  void repeat() {
+    const ReproduceReport report = reproduce(*recording_, settings_, *log_, request_.imu_rate, control_);
+    facts_.finished = report.finished && report.stopped_early.empty();
+    facts_.executor["kind"] = "reproduced";
+    if (report.stopped_early.empty()) return;
+    facts_.executor["stopped_early"] = report.stopped_early;
+    fmt::print(stderr, "warning: {}: the run was repeated for {} frames: {}\n", request_.log, report.frames,
+               report.stopped_early);
+  }
+
+  void fly() {
+    std::unique_ptr<FlightRecorder> flight_recorder;
+    if (request_.record) flight_recorder = startRecorder();
+    Wiring::Options wanted;
+    wanted.imu_states = request_.imu_rate;
+    wanted.recorder = flight_recorder.get();
+    wanted.drag = hooks_.drag;
+    LogFeed feed(*source_, {request_.from, request_.until, request_.last_stamp}, tracks_.get());
+    std::unique_ptr<Wiring> wiring;
+    if (request_.real_time) {
+      FlightRequest flight;
+      flight.speed = request_.speed;
+      flight.watch = hooks_.watch;
+      flight.announce = request_.show_progress;
+      facts_.finished =
+          flyThreaded(*source_, feed, settings_, *log_, wanted, flight, control_, facts_.executor);
+    } else {
+      wiring = std::make_unique<Wiring>(source_->rig(), source_->imuNoise(), settings_, *log_, wanted);
+      memory_.note("estimator_at_start");
+      facts_.finished = runLockstep(feed, *wiring, control_);
+      log_->collect(*wiring);
+      facts_.executor["kind"] = "lockstep";
+    }
+    log_->statistics().times[static_cast<std::size_t>(StageId::kSource)] = feed.times();
+    if (flight_recorder) facts_.executor["recording"] = recordingJson(*flight_recorder);
+  }
+
+  std::unique_ptr<FlightRecorder> startRecorder() {
+    RecordingHeader header;
+    header.rig = source_->rig();
+    header.noise = source_->imuNoise();
+    header.calibration_form = source_->calibration().form;
+    header.settings = printSettings(settings_, false);
+    header.program_version = versionText();
+    header.order = RecordOrder::kAsWritten;  // one thread feeds the estimator
+    return std::make_unique<FlightRecorder>((out() / "recording").string(), header);
+  }
+
+  ReplayResult end() {
+    progress_->finish();
+    memory_.note("grown_in_flight");
+    facts_.memory = memory_.rows();
+    facts_.peak_resident = peakResidentBytes();
+    writeMap(out() / "map.tum", log_->solveMap());
+    printWarnings(*source_, warned_);
+    if (tracks_) {
+      facts_.track_surplus = tracks_->surplus();
+      facts_.track_warnings = tracks_->warnings();
+      for (const std::string& line : facts_.track_warnings) fmt::print(stderr, "warning: {}\n", line);
+    }
+    ReplayResult result;
+    result.statistics = log_->statistics();
+    result.finished = facts_.finished;
+    result.has_pose = result.statistics.first_pose.has_value();
+    result.summary = summaryOf(facts_, settings_, *source_, result.statistics);
+    const Trajectory truth = source_->groundTruth();
+    if (!truth.empty() && result.has_pose) {
+      result.summary["accuracy"] = runAccuracyJson(request_.out, truth, source_->groundTruthName(),
+                                                   *result.statistics.first_image, settings_.evaluation);
+    }
+    writeJson(out() / "summary.json", result.summary);
+    return result;
+  }
+
+  [[nodiscard]] std::filesystem::path out() const { return request_.out; }
+
+  const ReplayRequest& request_;
+  Settings settings_;
+  const ReplayHooks& hooks_;
+  MemoryTrack memory_;
+  std::unique_ptr<LogSource> source_;
+  RecordingSource* recording_ = nullptr;  ///< source_, when it is to be repeated
+  std::unique_ptr<TrackReader> tracks_;
+  std::size_t warned_ = 0;
+  std::size_t steps_ = 0;
+  std::optional<RunRecorder> recorder_;
+  std::optional<RunLog> log_;
+  std::optional<Progress> progress_;
+  RunControl control_;
+  RunFacts facts_;
+};
+
 }  // namespace
 
-ReplayResult runReplay(const ReplayRequest& request, Settings settings) {
-  if (request.mono) settings.odometry.use_stereo = false;
-  MemoryTable memory;
-  const std::unique_ptr<LogSource> source = openLog(request.log, logOptions(request, settings));
-  printWarnings(*source, 0);
-  const std::size_t warned = source->warnings().size();
-  memory.note("log_reader");
-
-  RunFacts facts;
-  facts.log = request.log;
-  facts.tracks = request.tracks.empty() ? source->trackFile() : request.tracks;
-  std::size_t steps = source->imageCount();
-  std::unique_ptr<TrackReader> tracks;
-  if (!facts.tracks.empty()) {
-    steps = checkTracks(facts.tracks, source->rig(), request.mono).frames;
-    tracks = std::make_unique<TrackReader>(facts.tracks);
-  }
-
-  RunRecorder recorder(request.out, request.imu_rate);
-  const std::filesystem::path out(request.out);
-  LineFile(out / "settings.yaml").write(printSettings(settings, false));
-  RunLog log(recorder);
-  if (settings.full_smoothing) {
-    log.keepForMap(
-        std::make_unique<MapKeeper>(request.out, source->rig(), source->imuNoise(), settings.odometry));
-  }
-  Wiring::Options wanted;
-  wanted.imu_states = request.imu_rate;
-  const auto wiring = std::make_unique<Wiring>(source->rig(), source->imuNoise(), settings, log, wanted);
-  memory.note("estimator_at_start");
-
-  Progress progress("replay", request.show_progress ? steps : 0);
-  RunControl control;
-  control.stop = request.stop;
-  control.progress = [&](std::uint64_t images) { progress.update(images); };
-  LogFeed feed(*source, {request.from, request.until, request.last_stamp}, tracks.get());
-
-  facts.mono = !settings.odometry.use_stereo || source->rig().camera_count < 2;
-  const double wall = wallSeconds();
-  const double cpu = processCpuSeconds();
-  facts.finished = runLockstep(feed, *wiring, control);
-  facts.wall = wallSeconds() - wall;
-  facts.cpu = processCpuSeconds() - cpu;
-  progress.finish();
-  memory.note("grown_in_flight");
-  facts.memory = memory.rows();
-  facts.peak_resident = peakResidentBytes();
-  log.collect(*wiring);
-  RunStatistics& statistics = log.statistics();
-  statistics.times[static_cast<std::size_t>(StageId::kSource)] = feed.times();
-  writeMap(out / "map.tum", log.solveMap());
-  printWarnings(*source, warned);
-  if (tracks) {
-    facts.track_surplus = tracks->surplus();
-    facts.track_warnings = tracks->warnings();
-    for (const std::string& line : facts.track_warnings) fmt::print(stderr, "warning: {}\n", line);
-  }
-
-  ReplayResult result;
-  result.finished = facts.finished;
-  result.has_pose = statistics.first_pose.has_value();
-  result.summary = summaryOf(facts, settings, *source, statistics);
-  const Trajectory truth = source->groundTruth();
-  if (!truth.empty() && result.has_pose) {
-    result.summary["accuracy"] = runAccuracyJson(request.out, truth, source->groundTruthName(),
-                                                 *statistics.first_image, settings.evaluation);
-  }
-  writeJson(out / "summary.json", result.summary);
-  return result;
+ReplayResult runReplay(const ReplayRequest& request, Settings settings, const ReplayHooks& hooks) {
+  return ReplayRun(request, std::move(settings), hooks)();
 }
 
 }  // namespace swiftlet

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "drivers/recorded/log_source.hpp"
+#include "firmware_host/pipeline/run_listener.hpp"
 #include "firmware_host/settings/settings.hpp"
 
 namespace swiftlet {
@@ -21,20 +22,31 @@ struct ReplayRequest {
   std::string tracks;           ///< file of feature tracks in place of the log's images or own tracks
   bool mono = false;
   bool imu_rate = false;
-  double from = 0;              ///< s after the first image
+  bool real_time = false;  ///< on threads, messages let out at their times
+  double speed = 1;        ///< real_time: times faster than recorded
+  bool record = false;     ///< write `recording/` into the run folder
+  bool reproduce = false;  ///< `log` is a recording: repeat its threaded run step by step, with its settings
+  double from = 0;         ///< s after the first image
   std::optional<double> until;  ///< s after the first image
   std::optional<Stamp> last_stamp;
   const std::atomic<bool>* stop = nullptr;
   bool show_progress = false;
 };
 
+/// Tests slow stages down and set traps on threads with these.
+struct ReplayHooks {
+  std::function<void(StageId, double)> drag;
+  std::function<void(const char* thread, bool begins)> watch;
+};
+
 struct ReplayResult {
   nlohmann::ordered_json summary;  ///< as written to summary.json
   bool finished = true;            ///< false: stopped
   bool has_pose = false;
+  RunStatistics statistics;
 };
 
 /// Creates the run folder and everything in it. InputError for bad input.
-ReplayResult runReplay(const ReplayRequest& request, Settings settings);
+ReplayResult runReplay(const ReplayRequest& request, Settings settings, const ReplayHooks& hooks = {});
 
 }  // namespace swiftlet

@@ -2,14 +2,9 @@
 // Where a thread asks what its stage may spend on the next frame, and says what it took.
 
 #include "estimator/messages/effort.hpp"
+#include "firmware_host/realtime/effort_governor.hpp"
 
 namespace swiftlet {
-
-/// How late a frame is as its step begins.
-struct StepLoad {
-  double age = 0;   ///< s since it arrived
-  int waiting = 0;  ///< frames behind it
-};
 
 class EffortSource {
  public:
@@ -18,9 +13,9 @@ class EffortSource {
   EffortSource& operator=(const EffortSource&) = delete;
   virtual ~EffortSource() = default;
 
-  virtual Effort give(const StepLoad& load) = 0;
-  /// Wall time of the step that followed.
-  virtual void took(double seconds) = 0;
+  [[nodiscard]] virtual Effort give() const = 0;
+  /// What the step that was given it was like.
+  virtual void took(const StepTiming& timing) = 0;
   /// Steps below full effort.
   [[nodiscard]] virtual int level() const = 0;
 };
@@ -29,12 +24,25 @@ class EffortSource {
 class ConstantEffort : public EffortSource {
  public:
   explicit ConstantEffort(const Effort& effort) : effort_(effort) {}
-  Effort give(const StepLoad& /*load*/) override { return effort_; }
-  void took(double /*seconds*/) override {}
+  [[nodiscard]] Effort give() const override { return effort_; }
+  void took(const StepTiming& /*timing*/) override {}
   [[nodiscard]] int level() const override { return 0; }
 
  private:
   Effort effort_;
+};
+
+/// Less before a deadline is missed, more when there is room (effort_governor.hpp).
+class GovernedEffort : public EffortSource {
+ public:
+  GovernedEffort(const EffortLadder& ladder, const GovernorSettings& settings)
+      : governor_(ladder, settings) {}
+  [[nodiscard]] Effort give() const override { return governor_.effort(); }
+  void took(const StepTiming& timing) override { static_cast<void>(governor_.update(timing)); }
+  [[nodiscard]] int level() const override { return governor_.level(); }
+
+ private:
+  EffortGovernor governor_;
 };
 
 }  // namespace swiftlet

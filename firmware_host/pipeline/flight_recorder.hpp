@@ -6,6 +6,7 @@
 // numbers of samples and images.
 
 #include <array>
+#include <atomic>
 #include <string>
 
 #include "drivers/recorded/recording_writer.hpp"
@@ -25,6 +26,8 @@ class FlightRecorder {
   /// After the last drain: notes losses at the tail, from how many there were, and marks the end.
   void end(std::uint64_t imu_samples, const std::array<std::uint64_t, kMaxCameras>& images);
 
+  /// Any thread. No error of the disk so far.
+  [[nodiscard]] bool running() const { return running_.load(std::memory_order_relaxed); }
   [[nodiscard]] const RecordingStatistics& statistics() const { return writer_.statistics(); }
   /// The first error of the disk, or ok.
   [[nodiscard]] Status status() const { return writer_.status(); }
@@ -37,6 +40,7 @@ class FlightRecorder {
   bool drainSteps(Ring& ring, RecordKind kind, std::uint64_t& lost, Write&& write);
 
   RecordingWriter writer_;
+  std::atomic<bool> running_{true};
   std::uint64_t next_sample_ = 1;
   std::array<std::uint64_t, kMaxCameras> next_image_{1, 1};
   std::array<std::uint64_t, 3> steps_lost_{};

@@ -25,6 +25,8 @@ class RunLog {
   void onImu(const ImuSample& sample) { keeper_->addImu(sample); }
   void onImuState(const NavState& state) { listener_.onImuState(state); }
   void onResult(const FrameResult& result);
+  /// An executor's own remark, for events.log.
+  void remark(Stamp stamp, const std::string& text) { listener_.onRemark(stamp, text); }
 
   /// After the run: what the other threads counted.
   void collect(const Wiring& wiring);

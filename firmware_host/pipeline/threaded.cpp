@@ -34,7 +34,7 @@ class Run {
       : feed_(feed), wiring_(wiring), options_(options), control_(control) {}
 
   ThreadedReport operator()() {
-    const RealTimeGroup& rt = options_.real_time;
+    const RealtimeGroup& rt = options_.realtime;
     // From the end of the stream to its beginning: whoever starts finds its readers running.
     start("log", rt.low_priority, rt.low_cpu, [this] { low([this] { return wiring_.log(); }, log_done_); });
     start("record", rt.low_priority, rt.low_cpu,
@@ -42,8 +42,9 @@ class Run {
     start("smooth", rt.smooth_priority, rt.smooth_cpu, [this] { smooth(); });
     start("track", rt.track_priority, rt.track_cpu, [this] { track(); });
     start("propagate", rt.propagate_priority, rt.propagate_cpu, [this] { propagate(); });
-    start("source", 0, -1, [this] { read(); });
     start("sensor", rt.sensor_priority, rt.sensor_cpu, [this] { sense(); });
+    if (options_.started) options_.started(report_.threads);
+    start("source", 0, -1, [this] { read(); });
     waitForEnd();
     for (std::size_t i = 0; i < threads_.size(); ++i) {
       threads_[i].join();
@@ -69,8 +70,8 @@ class Run {
   void start(const char* name, int priority, int cpu, std::function<void()> entry) {
     ThreadSettings settings;
     settings.name = name;
-    settings.priority = options_.real_time.enabled ? priority : 0;
-    settings.cpu = options_.real_time.enabled ? cpu : -1;
+    settings.priority = options_.realtime.enabled ? priority : 0;
+    settings.cpu = options_.realtime.enabled ? cpu : -1;
     report_.threads.push_back(threads_[started_++].start(settings, [this, name, entry] {
       if (options_.watch) options_.watch(name, true);
       entry();

@@ -21,16 +21,18 @@ namespace swiftlet {
 
 struct ThreadedOptions {
   double speed = 1;  ///< times faster than recorded
-  RealTimeGroup real_time;
+  RealtimeGroup realtime;
+  /// Called once with what the threads got, before the first message.
+  std::function<void(const std::vector<ThreadReport>&)> started;
   /// Called on each thread as it begins and ends: tests arm their traps here.
   std::function<void(const char* thread, bool begins)> watch;
 };
 
 struct ThreadedReport {
-  bool finished = true;              ///< false: stopped
+  bool finished = true;  ///< false: stopped
   std::vector<ThreadReport> threads;
-  std::vector<std::string> faults;   ///< what ended a thread before its time: "name: what"
-  StageTimes lateness;               ///< of the sensor thread behind the log's times
+  std::vector<std::string> faults;  ///< what ended a thread before its time: "name: what"
+  StageTimes lateness;              ///< of the sensor thread behind the log's times
 };
 
 /// Starts the threads, waits for the end of the feed and of all that follows from it, joins.

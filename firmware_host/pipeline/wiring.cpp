@@ -18,9 +18,13 @@
 
 #include "firmware_host/pipeline/wiring.hpp"
 
+#include <malloc.h>
+
 #include <algorithm>
 
+#include "firmware_host/pipeline/arming_monitor.hpp"
 #include "firmware_host/pipeline/flight_recorder.hpp"
+#include "firmware_host/realtime/memory_lock.hpp"
 
 namespace swiftlet {
 namespace {
@@ -35,12 +39,18 @@ PairingSettings pairingSettings(const Rig& rig, const Settings& settings) {
 
 }  // namespace
 
+HeapMark::HeapMark() {
+  const struct mallinfo2 info = mallinfo2();
+  bytes = static_cast<std::int64_t>(info.uordblks + info.hblkhd);
+}
+
 Wiring::Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, RunLog& log,
                const Options& options)
     : rig_(rigInUse(rig, settings.odometry)),
       imu_period_(1.0 / noise.rate_hz),
       log_(log),
       recorder_(options.recorder),
+      arming_(options.arming),
       full_effort_(settings.effort),
       track_effort_(options.track_effort != nullptr ? options.track_effort : &full_effort_),
       smooth_effort_(options.smooth_effort != nullptr ? options.smooth_effort : &full_effort_),
@@ -69,6 +79,11 @@ void Wiring::takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& ho
   if (log_.wantsImu()) static_cast<void>(imu_to_log_.tryPush(message));
   if (to_recorder_) static_cast<void>(to_recorder_->imu.tryPush(message));
   newest_imu_.store(sample.stamp.ns, std::memory_order_release);
+  SensorFacts& facts = sensing_.facts;
+  if (sample.stamp <= facts.newest_sample) ++facts.reversed_stamps;
+  facts.newest_sample = sample.stamp;
+  facts.samples = message.number;
+  sensor_facts_.write(facts);
 }
 
 // IMU, newest fix -> propagation -> state at IMU rate
@@ -145,8 +160,7 @@ bool Wiring::smooth() {
 void Wiring::smoothFrame(const TrackMessage& message, FrameResult& out) {
   const double begin = wallSeconds();
   out.step.frame = message.tracked.index;
-  out.step.effort =
-      smooth_effort_->give({begin - message.host.arrival, static_cast<int>(trackedWaiting()) - 1});
+  out.step.effort = smooth_effort_->give();
   out.smooth_level = smooth_effort_->level();
   out.smooth_spent = measured([&] {
     for (const ImuArrival* arrival = imu_to_smooth_.front();
@@ -163,7 +177,8 @@ void Wiring::smoothFrame(const TrackMessage& message, FrameResult& out) {
     fix_.publish();
     if (drag_) drag_(StageId::kSmooth, threadCpuSeconds() - cpu);
   });
-  smooth_effort_->took(out.smooth_spent.wall);
+  smooth_effort_->took(
+      {out.smooth_spent.wall, static_cast<int>(trackedWaiting()) - 1, begin - message.host.arrival});
   out.tracked = message.tracked;
   out.spent += out.smooth_spent;
   addTime(times_, StageId::kSmooth, out.smooth_spent, message.tracked.keyframe);
@@ -188,6 +203,7 @@ bool Wiring::log() {
       imu_to_log_.pop();
     }
     log_.onResult(*result);
+    if (arming_ != nullptr && result->kind == TrackMessage::Kind::kFrame) watchArming(*result);
     results_.pop();
     return true;
   }
@@ -197,6 +213,20 @@ bool Wiring::log() {
   }
   if (ended && !any) log_done_ = true;
   return any;
+}
+
+void Wiring::watchArming(const FrameResult& result) {
+  std::uint64_t lost = 0;
+  if (recorder_ != nullptr) {
+    lost = to_recorder_->imu.refused() + to_recorder_->track.refused() + to_recorder_->smooth.refused();
+    for (const Camera& camera : camera_) lost += camera.pool.refused(kRecordReads);
+  }
+  const bool running = recorder_ != nullptr && recorder_->running();
+  if (!arming_->update(result, sensorFacts(), running, lost, wallSeconds())) return;
+  const ArmingVerdict& verdict = arming_->verdict();
+  std::string text = verdict.ready() ? "ready to arm" : "not ready to arm:";
+  for (const MissingCondition& missing : verdict.missing) text += std::string(" ") + missing.name();
+  log_.remark(result.track_step.stamp, text);
 }
 
 // everything -> recorder
@@ -212,6 +242,28 @@ bool Wiring::record() {
     record_done_ = true;
   }
   return any;
+}
+
+void Wiring::addReservations(MemoryTable& table) const {
+  const auto add = [&](const char* what, std::size_t bytes) {
+    table.add(what, static_cast<std::int64_t>(bytes));
+  };
+  const auto between = [](const HeapMark& from, const HeapMark& to) {
+    return static_cast<std::size_t>(std::max<std::int64_t>(to.bytes - from.bytes, 0));
+  };
+  std::size_t images = 0;
+  for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+    images += kImageSlots * static_cast<std::size_t>(rig_.camera[c].width() * rig_.camera[c].height());
+  }
+  add("image slots", images);
+  add("propagation", sizeof(propagation_));
+  add("tracking", sizeof(track_) + between(before_track_, before_smooth_));
+  add("smoother", sizeof(smooth_) + between(before_smooth_, after_smooth_));
+  add("IMU rings", sizeof(ImuRing) * 4);
+  add("tracked frames", sizeof(tracked_ring_));
+  add("fixes and windows", sizeof(fix_) + sizeof(window_));
+  add("results for the log", sizeof(results_) + sizeof(smoothing_) + (states_ ? sizeof(StateRing) : 0));
+  if (to_recorder_) add("recorder's rings", sizeof(RecorderArrows));
 }
 
 void Wiring::addLosses(std::map<std::string, std::uint64_t>& losses) const {

@@ -21,6 +21,7 @@
 #include <memory>
 #include <string>
 
+#include "estimator/core/newest_shared.hpp"
 #include "estimator/odometry/pairing.hpp"
 #include "estimator/odometry/propagation_stage.hpp"
 #include "estimator/odometry/smooth_stage.hpp"
@@ -33,7 +34,16 @@
 
 namespace swiftlet {
 
+class ArmingMonitor;
 class FlightRecorder;
+class MemoryTable;
+
+/// Bytes that malloc has given out, at the point of construction; members between two of them took the
+/// difference.
+struct HeapMark {
+  HeapMark();
+  std::int64_t bytes;
+};
 
 /// Counted by the thread that writes it; for others once that thread has ended.
 struct WiringCounters {
@@ -58,6 +68,16 @@ struct WiringCounters {
   } track;
 };
 
+/// What the sensors did of late, for whoever asks.
+struct SensorFacts {
+  std::uint64_t samples = 0;
+  std::uint64_t reversed_stamps = 0;  ///< at or before the one before
+  Stamp newest_sample{std::numeric_limits<std::int64_t>::min()};
+  std::array<Stamp, kMaxCameras> newest_image{Stamp{std::numeric_limits<std::int64_t>::min()},
+                                              Stamp{std::numeric_limits<std::int64_t>::min()}};
+  std::array<double, kMaxCameras> image_arrival{};  ///< host time; 0: none yet
+};
+
 class Wiring {
  public:
   struct Options {
@@ -65,6 +85,7 @@ class Wiring {
     FlightRecorder* recorder = nullptr;    ///< null: nothing is recorded
     EffortSource* track_effort = nullptr;  ///< null: the settings' effort, always
     EffortSource* smooth_effort = nullptr;
+    ArmingMonitor* arming = nullptr;  ///< null: nobody asks whether the vehicle may be armed
     /// Called after a stage's work with its CPU seconds, within its wall time: tests slow stages down.
     std::function<void(StageId, double)> drag;
   };
@@ -100,6 +121,14 @@ class Wiring {
   [[nodiscard]] const WiringCounters& counters() const { return counters_; }
   /// Losses at full arrows, by name; at the end.
   void addLosses(std::map<std::string, std::uint64_t>& losses) const;
+  /// What was reserved for what, by the constructor.
+  void addReservations(MemoryTable& table) const;
+  /// Any thread.
+  [[nodiscard]] SensorFacts sensorFacts() const {
+    SensorFacts facts;
+    static_cast<void>(sensor_facts_.read(facts));
+    return facts;
+  }
   [[nodiscard]] const StageTable& times() const { return times_; }
   /// Frames that the thread `smooth` has published.
   [[nodiscard]] std::uint64_t published() const { return published_.load(std::memory_order_relaxed); }
@@ -122,17 +151,20 @@ class Wiring {
   void release(const StereoFrame& frame);
   [[nodiscard]] const CameraFrame& headOf(std::size_t camera) const;
   [[nodiscard]] HostTimes hostTimesOf(const StereoFrame& frame) const;
+  [[nodiscard]] int waitingFrames() const;
   [[nodiscard]] bool samplesAreIn(const StereoFrame& frame);
   void takeSamples(Stamp until);
   void takeSurplus();
   bool trackFrame();
   bool endTracking();
   void smoothFrame(const TrackMessage& message, FrameResult& out);
+  void watchArming(const FrameResult& result);
 
   Rig rig_;
   double imu_period_;  // s
   RunLog& log_;
   FlightRecorder* recorder_;
+  ArmingMonitor* arming_;
   ConstantEffort full_effort_;
   EffortSource* track_effort_;
   EffortSource* smooth_effort_;
@@ -141,13 +173,17 @@ class Wiring {
   // Stages.
   PropagationStage propagation_;
   Pairing pairing_;
+  HeapMark before_track_;
   TrackStage track_;
+  HeapMark before_smooth_;
   SmoothStage smooth_;
+  HeapMark after_smooth_;
 
   // Arrows.
   ImuRing imu_to_propagate_, imu_to_track_, imu_to_smooth_, imu_to_log_;
   std::array<Camera, kMaxCameras> camera_;
   TrackRing tracked_ring_;
+  NewestShared<SensorFacts> sensor_facts_;
   Newest<StateFix> fix_;
   Newest<SmoothedWindow> window_;
   std::unique_ptr<StateRing> states_;  ///< null where nobody wants them
@@ -155,6 +191,9 @@ class Wiring {
   std::unique_ptr<RecorderArrows> to_recorder_;
 
   // Of one thread each.
+  struct {
+    SensorFacts facts;
+  } sensing_;
   struct {
     std::uint64_t samples = 0;
     std::uint64_t fix = 0;

@@ -59,6 +59,11 @@ void Wiring::takeImage(const CameraFrame& image, const HostTimes& host) {
     ++counters.images_dropped[image.camera];
   }
   camera.pool.finish(handle);
+  SensorFacts& facts = sensing_.facts;
+  if (image.stamp <= facts.newest_image[image.camera]) ++facts.reversed_stamps;
+  facts.newest_image[image.camera] = image.stamp;
+  facts.image_arrival[image.camera] = host.arrival;
+  sensor_facts_.write(facts);
 }
 
 // track file -> smooth
@@ -180,6 +185,11 @@ HostTimes Wiring::hostTimesOf(const StereoFrame& frame) const {
   return times;
 }
 
+/// The one in work included.
+int Wiring::waitingFrames() const {
+  return static_cast<int>(tracking_.waiting.size() + camera_[0].ring.size());
+}
+
 bool Wiring::samplesAreIn(const StereoFrame& frame) {
   const double now = wallSeconds();
   if ((frame.stamp - tracking_.newest_sample).seconds() <= kPeriodsEarly * imu_period_) {
@@ -221,8 +231,8 @@ bool Wiring::trackFrame() {
   step.frame = frame.index;
   step.stamp = frame.stamp;
   step.image = frame.number;
-  step.effort = track_effort_->give(
-      {wallSeconds() - message.host.arrival, static_cast<int>(tracking_.waiting.size()) - 1});
+  const double age = wallSeconds() - message.host.arrival;
+  step.effort = track_effort_->give();
   message.effort_level = track_effort_->level();
   message.spent = measured([&] {
     const double cpu = threadCpuSeconds();
@@ -236,7 +246,7 @@ bool Wiring::trackFrame() {
     message.status = track_.step(frame, step.effort, message.tracked);
     if (drag_) drag_(StageId::kTrack, threadCpuSeconds() - cpu);
   });
-  track_effort_->took(message.spent.wall);
+  track_effort_->took({message.spent.wall, waitingFrames() - 1, age});
   const bool tracked = message.status.ok();
   if (!tracked) message.kind = TrackMessage::Kind::kFrameRefused;
   message.dropped = tracking_.dropped;

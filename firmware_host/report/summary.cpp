@@ -170,6 +170,7 @@ Json summaryOf(const RunFacts& facts, const Settings& settings, const LogSource&
   json["counters"] = countersJson(facts, source, statistics);
   json["warnings"] = source.warnings();
   for (const std::string& line : facts.track_warnings) json["warnings"].push_back(line);
+  json["executor"] = facts.executor;
   json["timing"] = timingJson(statistics.times);
   json["cpu"] = {{"flight_s", flown},
                  {"wall_s", facts.wall},

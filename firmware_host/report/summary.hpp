@@ -31,6 +31,8 @@ struct RunFacts {
   double cpu = 0;        ///< s, all threads
   std::int64_t peak_resident = 0;
   std::vector<MemoryRow> memory;
+  /// How the run was executed: its kind, and of a threaded one threads, rights, memory, arming, recording.
+  nlohmann::ordered_json executor = nlohmann::ordered_json::object();
 };
 
 /// Without accuracy: the caller adds it under "accuracy".

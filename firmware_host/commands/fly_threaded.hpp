@@ -1,0 +1,23 @@
+#pragma once
+// A run on threads with all that belongs around it: memory reserved, shown and locked, libraries confined,
+// what the machine says, effort governed by the budgets, and whether the vehicle might be armed.
+
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "firmware_host/pipeline/threaded.hpp"
+
+namespace swiftlet {
+
+struct FlightRequest {
+  double speed = 1;
+  bool announce = false;  ///< print the table of what was reserved, and what is missing
+  std::function<void(const char* thread, bool begins)> watch;
+};
+
+/// `report` gets what the summary says of the executor. False when it was stopped.
+bool flyThreaded(LogSource& source, LogFeed& feed, const Settings& settings, RunLog& log,
+                 Wiring::Options wanted, const FlightRequest& request, const RunControl& control,
+                 nlohmann::ordered_json& report);
+
+}  // namespace swiftlet
