@@ -8,7 +8,7 @@
 // samples, holes and saturated readings; a gap (more than 10 periods without a sample) is not
 // integrated: attitude and velocity are held, their covariance grows (integration_rule.hpp).
 // Frames: NavState's (world with z up, body). Units: SI.
-// Errors: kNotReady before the first state; kInvalidInput for a sample not later than the last one
+// Errors: kNotReady before the first state (the sample is kept: the first state comes late); kInvalidInput for a sample not later than the last one
 // or not finite (dropped), and for a state that is not finite; kCapacityReached when a state is so
 // old that the ring no longer holds the samples after it (the hole is bridged).
 // Memory: 1024 samples, 60 kB; nothing is allocated. Cost: about 2 us a sample,
@@ -47,6 +47,9 @@ class Propagator {
   [[nodiscard]] NavState state() const { return current_.toNavState(); }
   /// Seconds bridged without samples since the stamp of the state that was last set.
   [[nodiscard]] double gapSeconds() const { return current_.gap_seconds; }
+
+  /// Forgets the state; samples stay, for the next one's to start from.
+  void forgetState() { has_state_ = false; }
 
   /// Forgets state and samples.
   void reset();

@@ -7,9 +7,8 @@ namespace swiftlet {
 Status PropagationStage::step(const ImuSample& sample, NavState* state) {
   const SampleVerdict verdict = monitor_.check(sample);
   if (!verdict.status.ok()) return verdict.status;
-  if (!propagator_.hasState()) return {StatusCode::kNotReady, "no state to propagate yet"};
   const Status status = propagator_.step(sample, state);
-  if (state != nullptr) {
+  if (status.ok() && state != nullptr) {
     state->epoch = fix_.state.epoch;
     state->health = HealthMonitor::aged(fix_.state.health, fix_.last_accepted, sample.stamp);
   }
@@ -17,7 +16,7 @@ Status PropagationStage::step(const ImuSample& sample, NavState* state) {
 }
 
 void PropagationStage::take(const StateFix& fix) {
-  if (fix.state.epoch != fix_.state.epoch) propagator_.reset();
+  if (fix.state.epoch != fix_.state.epoch) propagator_.forgetState();
   fix_ = fix;
   // A state that is not finite never leaves the smoother; a bridged hole is in the covariance.
   if (fix.has_state) static_cast<void>(propagator_.setState(fix.state));

@@ -32,13 +32,13 @@ void TrackStage::addImu(const ImuSample& sample) {
   if (!verdict.status.ok()) return;
   imu_gap_ = imu_gap_ || verdict.gap;
   imu_.push(sample);
-  if (propagator_.hasState()) static_cast<void>(propagator_.step(sample));
+  static_cast<void>(propagator_.step(sample));  // kept, where there is no state yet
 }
 
 void TrackStage::take(const SmoothedWindow& window) {
   if (window.epoch != window_.epoch) {
     frontend_.reset();
-    propagator_.reset();
+    propagator_.forgetState();
   }
   window_ = window;
   if (window_.started) static_cast<void>(propagator_.setState(window_.newest));

@@ -49,8 +49,8 @@ enum ImageReader : std::size_t { kTrackReads, kRecordReads, kImageReaders };
 /// Waiting in the ring, one at its head, one waiting for its partner, those of waiting frames, those in
 /// work, and one more that lets the newest in before the oldest goes.
 inline constexpr std::uint32_t kTrackQuota = kImageRing + kWaitingFrames + 4;
-/// 0.4 s at 20 Hz: the longest that a disk may keep the recorder waiting without a loss.
-inline constexpr std::uint32_t kRecordQuota = 8;
+/// 0.8 s at 20 Hz: the longest that a disk may keep the recorder waiting without a loss.
+inline constexpr std::uint32_t kRecordQuota = 16;
 inline constexpr std::size_t kImageSlots = 1 + kTrackQuota + kRecordQuota;
 using ImagePool = SlotPool<ImageSlot, kImageSlots, kImageReaders>;
 

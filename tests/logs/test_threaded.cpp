@@ -1,0 +1,262 @@
+// Runs on threads: they lose nothing at the log's own speed and agree with lockstep; overloaded they
+// degrade by policy, account for every message, and are repeated byte for byte from their recordings; a
+// killed recording keeps all but its last second.
+
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <new>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "drivers/recorded/recording_source.hpp"
+#include "estimator/core/random.hpp"
+#include "firmware_host/commands/replay_run.hpp"
+#include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/logs/log_data.hpp"
+
+namespace swiftlet {
+namespace {
+
+/// SWIFTLET_THREADED_RUNS: of random overloads, and of kills.
+int chosenRuns(int usual) {
+  const char* text = std::getenv("SWIFTLET_THREADED_RUNS");
+  return text != nullptr ? std::atoi(text) : usual;
+}
+
+/// Of the short log.
+constexpr std::uint64_t kImages = 160;  // of both cameras
+constexpr Stamp kLastImage{1'403'636'588'713'555'456};
+
+std::string textOf(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+ReplayRequest requestFor(const std::string& log, const std::string& out) {
+  ReplayRequest request;
+  request.log = log;
+  request.out = out;
+  request.imu_rate = true;
+  return request;
+}
+
+double ateOf(const ReplayResult& result) {
+  return result.summary["accuracy"]["odometry"]["all"]["se3"]["ate_m"]["rmse"].get<double>();
+}
+
+/// Everything that went in came out, or was counted where it went.
+void checkAccounts(const RunStatistics& s, std::uint64_t images_in_log) {
+  std::uint64_t lost = 0;
+  std::uint64_t dropped = 0;
+  for (const auto& [arrow, count] : s.losses) {
+    if (arrow.starts_with("camera_") && arrow.ends_with("_lost")) lost += count;
+    if (arrow.starts_with("camera_") && arrow.ends_with("_dropped")) dropped += count;
+  }
+  CHECK(s.images + lost == images_in_log);
+  const PairingCounters& p = s.pairing;
+  CHECK(2 * p.pairs + p.unpaired[0] + p.unpaired[1] + p.refused[0] + p.refused[1] == s.images - dropped);
+  CHECK(s.frames + s.frames_dropped == p.pairs + p.unpaired[0] + p.unpaired[1]);
+}
+
+TEST_CASE("at the log's own speed threads lose nothing and agree with lockstep") {
+  const ScratchFolder folder("threaded");
+  const ReplayResult lockstep = runReplay(requestFor(shortLog(), folder.file("lockstep")), Settings{});
+  ReplayRequest request = requestFor(shortLog(), folder.file("threaded"));
+  request.real_time = true;
+  const ReplayResult threaded = runReplay(request, Settings{});
+  REQUIRE(threaded.finished);
+  CHECK(threaded.statistics.losses.empty());
+  CHECK(threaded.statistics.frames_dropped == 0);
+  CHECK(threaded.statistics.frames == lockstep.statistics.frames);
+  CHECK(threaded.statistics.imu_samples == lockstep.statistics.imu_samples);
+  CHECK(threaded.statistics.poses == lockstep.statistics.poses);
+  checkAccounts(threaded.statistics, kImages);
+  // Ten per cent or two millimetres, whichever is more.
+  CHECK(std::abs(ateOf(threaded) - ateOf(lockstep)) < std::max(0.1 * ateOf(lockstep), 0.002));
+}
+
+TEST_CASE("a recording replayed in lockstep gives the bytes of the run that it was made of") {
+  const ScratchFolder folder("recorded");
+  ReplayRequest request = requestFor(shortLog(), folder.file("run"));
+  request.record = true;
+  REQUIRE(runReplay(request, Settings{}).finished);
+  REQUIRE(runReplay(requestFor(folder.file("run"), folder.file("again")), Settings{}).finished);
+  for (const char* file : {"odometry.tum", "states.csv", "imu_rate.tum", "map.tum", "events.log"}) {
+    CHECK(textOf(folder.file("run/") + file) == textOf(folder.file("again/") + file));
+  }
+}
+
+/// Makes stages up to four times as slow for random stretches of frames; the last third of a run is free.
+class RandomDrag {
+ public:
+  explicit RandomDrag(std::uint64_t seed) : random_(seed + 1) {
+    constexpr int kStretches = 4;
+    for (int i = 0; i < kStretches; ++i) {
+      const int begin = static_cast<int>(random_.below(40));
+      stretches_.push_back({random_.below(2) == 0 ? StageId::kTrack : StageId::kSmooth, begin,
+                            begin + 4 + static_cast<int>(random_.below(20)), random_.uniform(2.0, 4.0)});
+    }
+    // One of them is sure to be too much.
+    stretches_.push_back({StageId::kTrack, 8, 40, 4.0});
+  }
+
+  void operator()(StageId stage, double cpu) {
+    const int frame = (stage == StageId::kTrack ? tracked_ : smoothed_)++;
+    double factor = 1;
+    for (const Stretch& s : stretches_) {
+      if (s.stage == stage && frame >= s.begin && frame < s.end) factor = std::max(factor, s.factor);
+    }
+    const double until = threadCpuSeconds() + (factor - 1) * cpu;
+    while (threadCpuSeconds() < until) {
+    }
+  }
+
+ private:
+  struct Stretch {
+    StageId stage;
+    int begin, end;  // frames of that stage
+    double factor;
+  };
+  Random random_;
+  std::vector<Stretch> stretches_;
+  int tracked_ = 0;   // of the thread `track`
+  int smoothed_ = 0;  // of the thread `smooth`
+};
+
+TEST_CASE("overloaded, threads degrade by policy, recover, and are repeated byte for byte") {
+  const int runs = chosenRuns(20);
+  // A frame every 17 ms for stages that take 7 to 12, and up to 48 where they are dragged.
+  constexpr double kSpeed = 3;
+  std::uint64_t dropped = 0;
+  std::uint64_t effort_changes = 0;
+  int complete = 0;
+  for (int run = 0; run < runs; ++run) {
+    CAPTURE(run);
+    const ScratchFolder folder("overload");
+    ReplayRequest request = requestFor(shortLog(), folder.file("run"));
+    request.real_time = true;
+    request.speed = kSpeed;
+    request.record = true;
+    RandomDrag drag(static_cast<std::uint32_t>(run));
+    ReplayHooks hooks;
+    hooks.drag = [&](StageId stage, double cpu) { drag(stage, cpu); };
+    const ReplayResult result = runReplay(request, Settings{}, hooks);
+    REQUIRE(result.finished);
+    checkAccounts(result.statistics, kImages);
+    CHECK(result.statistics.first_pose.has_value());
+    // It is back at the end: the log's last image has its pose, and the estimate never started anew.
+    CHECK(result.statistics.last_image == kLastImage);
+    CHECK(result.statistics.health.back().epoch == 0);
+    CHECK(ateOf(result) < 0.05);
+    dropped += result.statistics.frames_dropped;
+    effort_changes += result.statistics.effort_changes;
+
+    ReplayRequest again = requestFor(folder.file("run"), folder.file("again"));
+    again.reproduce = true;
+    const ReplayResult repeated = runReplay(again, Settings{});
+    // A disk that stands still for most of a second costs records; that is counted, not hidden.
+    const bool whole = openRecording(folder.file("run"))->complete();
+    CHECK(repeated.finished == whole);
+    if (!whole) continue;
+    ++complete;
+    for (const char* file : {"odometry.tum", "states.csv", "map.tum"}) {
+      CHECK(textOf(folder.file("run/") + file) == textOf(folder.file("again/") + file));
+    }
+    if (!result.statistics.losses.contains("states_to_log")) {
+      CHECK(textOf(folder.file("run/imu_rate.tum")) == textOf(folder.file("again/imu_rate.tum")));
+    }
+  }
+  WARN(runs << " overloaded runs: " << dropped << " frames dropped, " << effort_changes
+            << " changes of effort, " << complete << " complete recordings");
+  CHECK(dropped + effort_changes > 0);
+  CHECK(4 * complete >= 3 * runs);
+}
+
+TEST_CASE("a stage that stands still loses the oldest images, counted, and goes on") {
+  const ScratchFolder folder("stall");
+  ReplayRequest request = requestFor(shortLog(), folder.file("run"));
+  request.real_time = true;
+  request.record = true;
+  ReplayHooks hooks;
+  int frame = 0;
+  hooks.drag = [&](StageId stage, double /*cpu*/) {
+    // 16 frames long: more than the camera rings and the waiting frames hold.
+    if (stage == StageId::kTrack && ++frame == 20) usleep(800'000);
+  };
+  const ReplayResult result = runReplay(request, Settings{}, hooks);
+  REQUIRE(result.finished);
+  checkAccounts(result.statistics, kImages);
+  CHECK(result.statistics.losses.contains("camera_0_dropped"));
+  CHECK(result.statistics.losses.contains("camera_1_dropped"));
+  CHECK(result.statistics.last_image == kLastImage);
+  CHECK(result.statistics.health.back().epoch == 0);
+  ReplayRequest again = requestFor(folder.file("run"), folder.file("again"));
+  again.reproduce = true;
+  REQUIRE(runReplay(again, Settings{}).finished);
+  for (const char* file : {"odometry.tum", "states.csv", "map.tum"}) {
+    CHECK(textOf(folder.file("run/") + file) == textOf(folder.file("again/") + file));
+  }
+}
+
+TEST_CASE("a killed recording loses at most its last second") {
+  const int runs = chosenRuns(20);
+  constexpr std::uint64_t kFramesPerSecond = 20;
+  Random random(11);
+  void* shared = mmap(nullptr, sizeof(std::atomic<std::uint64_t>), PROT_READ | PROT_WRITE,
+                      MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  REQUIRE(shared != MAP_FAILED);
+  auto& tracked = *new (shared) std::atomic<std::uint64_t>(0);
+  for (int run = 0; run < runs; ++run) {
+    CAPTURE(run);
+    const ScratchFolder folder("killed");
+    tracked.store(0);
+    const pid_t child = fork();
+    REQUIRE(child >= 0);
+    if (child == 0) {
+      ReplayRequest request = requestFor(shortLog(), folder.file("run"));
+      request.real_time = true;
+      request.record = true;
+      ReplayHooks hooks;
+      hooks.drag = [&](StageId stage, double /*cpu*/) {
+        if (stage == StageId::kTrack) tracked.fetch_add(1);
+      };
+      try {
+        runReplay(request, Settings{}, hooks);
+      } catch (...) {
+      }
+      _exit(0);
+    }
+    const std::uint64_t until = 5 + random.below(65);
+    for (int waited = 0; tracked.load() < until && waited < 20'000; ++waited) usleep(1000);
+    usleep(static_cast<useconds_t>(random.below(50'000)));
+    kill(child, SIGKILL);
+    int status = 0;
+    waitpid(child, &status, 0);
+    const std::uint64_t done = tracked.load();
+    const auto recording = openRecording(folder.file("run"));
+    CHECK(recording->steps().track.size() + kFramesPerSecond >= done);
+    CHECK(recording->lastImage(0) + kFramesPerSecond >= done);
+    if (recording->lastImage(0) == 0) continue;
+    const std::uint64_t frames = recording->lastImage(0);
+    ReplayRequest again = requestFor(folder.file("run"), folder.file("again"));
+    const ReplayResult result = runReplay(again, Settings{});
+    CHECK(result.finished);
+    CHECK(result.statistics.frames >= frames - 1);
+  }
+  munmap(shared, sizeof(std::atomic<std::uint64_t>));
+}
+
+}  // namespace
+}  // namespace swiftlet
