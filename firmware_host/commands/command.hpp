@@ -24,6 +24,7 @@ struct SettingsOptions {
   [[nodiscard]] Settings read() const;
 };
 
+void addBudgetCommand(CLI::App& app, int& exit_code);
 void addReplayCommand(CLI::App& app, int& exit_code);
 void addEvaluateCommand(CLI::App& app, int& exit_code);
 void addSimulateCommand(CLI::App& app, int& exit_code);

@@ -14,6 +14,13 @@ void LatencyHistogram::add(double seconds) {
   max_ = std::max(max_, seconds);
 }
 
+void LatencyHistogram::add(const LatencyHistogram& other) {
+  for (std::size_t i = 0; i < buckets_.size(); ++i) buckets_[i] += other.buckets_[i];
+  count_ += other.count_;
+  total_ += other.total_;
+  max_ = std::max(max_, other.max_);
+}
+
 double LatencyHistogram::percentile(double share) const {
   if (count_ == 0) return 0;
   const double wanted = share * static_cast<double>(count_);

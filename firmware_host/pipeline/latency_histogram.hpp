@@ -15,6 +15,7 @@ class LatencyHistogram {
   static constexpr double kSmallest = 1e-7;  ///< s; what is shorter counts in the first bucket
 
   void add(double seconds);
+  void add(const LatencyHistogram& other);
 
   [[nodiscard]] std::uint64_t count() const { return count_; }
   [[nodiscard]] double total() const { return total_; }  ///< s
