@@ -50,7 +50,8 @@ class Indexer {
   void takeSmoothStep(LittleEndianReader& from);
   void takeLoss(LittleEndianReader& from, const RecordingFile& file, std::uint64_t offset);
   void cutAt(std::uint64_t offset, const char* reason);
-  [[nodiscard]] std::uint64_t soundRecords(RecordingWindow& window, std::uint64_t offset) const;
+  [[nodiscard]] std::uint64_t soundRecords(RecordingWindow& window, std::size_t segment,
+                                           std::uint64_t offset) const;
   void mergeTurns();
 
   const RecordingFiles& files_;
@@ -340,20 +341,23 @@ void Indexer::cutAt(std::uint64_t offset, const char* reason) {
     RecordingWindow window(*files_.segments[i]);
     const std::uint64_t begin = i == segment_ ? offset : 0;
     cut.bytes += window.file().size() - begin;
-    cut.sound_records += soundRecords(window, begin);
+    cut.sound_records += soundRecords(window, i, begin);
   }
 }
 
-/// Counts by headers alone, so that the search stays one pass whatever the bytes are.
-std::uint64_t Indexer::soundRecords(RecordingWindow& window, std::uint64_t offset) const {
+/// Those of segment `segment` from `offset` on, without the damaged one itself. Counts by headers alone, so
+/// that the search stays one pass whatever the bytes are.
+std::uint64_t Indexer::soundRecords(RecordingWindow& window, std::size_t segment,
+                                    std::uint64_t offset) const {
   std::uint64_t found = 0;
   while (true) {
     const std::span<const std::uint8_t> bytes = window.exactly(offset, kRecordHeaderBytes);
     if (bytes.size() < kRecordHeaderBytes) return found;
     RecordHeader header;
     std::uint64_t step = kRecordAlignment;
+    const bool damaged_one = segment == index_.cut.segment && offset == index_.cut.offset;
     if (decode(bytes.first<kRecordHeaderBytes>(), index_.run_checksum, header) &&
-        header.sequence > sequence_) {
+        (damaged_one ? header.sequence > sequence_ : header.sequence >= sequence_)) {
       step = kRecordHeaderBytes + paddedSize(header.length);
       if (offset + step <= window.file().size()) ++found;
     }
