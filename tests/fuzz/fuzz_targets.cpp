@@ -12,6 +12,7 @@
 #include "drivers/recorded/ros_messages.hpp"
 #include "drivers/recorded/track_file.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
+#include "tests/fuzz/fuzz_recording.hpp"
 
 namespace swiftlet::fuzz {
 namespace {
@@ -132,13 +133,14 @@ void rosMessage(std::string_view text) {
   (void)toGrey(image, image.size, out.data());
 }
 
-constexpr std::array<NamedTarget, 7> kTargets = {{{"imu_csv", &imuCsv},
+constexpr std::array<NamedTarget, 8> kTargets = {{{"imu_csv", &imuCsv},
                                                   {"image_csv", &imageCsv},
                                                   {"trajectory", &trajectory},
                                                   {"tracks", &tracks},
                                                   {"euroc_yaml", &eurocYaml},
                                                   {"kalibr_yaml", &kalibrYaml},
-                                                  {"ros_message", &rosMessage}}};
+                                                  {"ros_message", &rosMessage},
+                                                  {"recording", &recording}}};
 
 }  // namespace
 
