@@ -40,6 +40,7 @@ class Indexer {
   bool takeSegmentHeader(RecordingWindow& window);
   bool belongs(const RecordingFile& file, const SegmentHeader& header);
   void takeRecords(RecordingWindow& window);
+  const char* faultAt(RecordingWindow& window, std::uint64_t offset, RecordHeader& header) const;
   bool takeRecord(RecordingWindow& window, std::uint64_t& offset);
   void take(const RecordHeader& header, RecordingWindow& window, std::uint64_t offset);
   void takeRun(const RecordHeader& header, RecordingWindow& window, std::uint64_t offset);
@@ -137,34 +138,33 @@ void Indexer::takeRecords(RecordingWindow& window) {
   if (sequence_ == 0) refuse(window.file(), offset, "the run's header is not there", "Record again");
 }
 
+/// Null when a sound record begins at `offset`, else why it is none.
+const char* Indexer::faultAt(RecordingWindow& window, std::uint64_t offset, RecordHeader& header) const {
+  if (index_.ended) return "it goes on behind the end mark";
+  const std::span<const std::uint8_t> bytes = window.exactly(offset, kRecordHeaderBytes);
+  if (allZero(bytes)) return "only zeros were written here";
+  const bool header_there = bytes.size() == kRecordHeaderBytes;
+  if (header_there) {
+    if (!decode(bytes.first<kRecordHeaderBytes>(), index_.run_checksum, header)) {
+      return "a record's header is damaged (checksum)";
+    }
+    if (header.sequence != sequence_) return "records are missing before this one (sequence number)";
+  }
+  const std::uint64_t payload = offset + kRecordHeaderBytes;
+  if (!header_there || payload + paddedSize(header.length) > window.file().size()) {
+    return "a record is incomplete";
+  }
+  std::uint32_t crc = index_.run_checksum;
+  const bool there = payloadChecksum(window, payload, paddedSize(header.length), crc);
+  return there && crc == header.payload_crc ? nullptr : "a record is damaged (checksum)";
+}
+
 /// Takes one record and moves on; false when the recording was cut instead.
 bool Indexer::takeRecord(RecordingWindow& window, std::uint64_t& offset) {
-  const RecordingFile& file = window.file();
-  const std::span<const std::uint8_t> bytes = window.exactly(offset, kRecordHeaderBytes);
-  const char* fault = nullptr;
   RecordHeader header;
-  if (index_.ended) {
-    fault = "it goes on behind the end mark";
-  } else if (allZero(bytes)) {
-    fault = "only zeros were written here";
-  } else if (bytes.size() < kRecordHeaderBytes) {
-    fault = "a record is incomplete";
-  } else if (!decode(bytes.first<kRecordHeaderBytes>(), index_.run_checksum, header)) {
-    fault = "a record's header is damaged (checksum)";
-  } else if (header.sequence != sequence_) {
-    fault = "records are missing before this one (sequence number)";
-  } else if (offset + kRecordHeaderBytes + paddedSize(header.length) > file.size()) {
-    fault = "a record is incomplete";
-  } else {
-    std::uint32_t crc = index_.run_checksum;
-    if (!payloadChecksum(window, offset + kRecordHeaderBytes, paddedSize(header.length), crc) ||
-        crc != header.payload_crc) {
-      fault = "a record is damaged (checksum)";
-    }
-  }
-  if (fault != nullptr) {
+  if (const char* fault = faultAt(window, offset, header)) {
     if (sequence_ == 0) {
-      refuse(file, offset, std::string("the run's header is not whole: ") + fault,
+      refuse(window.file(), offset, std::string("the run's header is not whole: ") + fault,
              "Without it nothing can be replayed; bring back a copy");
     }
     cutAt(offset, fault);
