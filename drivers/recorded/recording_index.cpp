@@ -322,9 +322,9 @@ void Indexer::takeLoss(LittleEndianReader& from, const RecordingFile& file, std:
   const std::uint32_t kind = from.u32();
   (void)from.u32();
   const std::uint64_t count = from.u64();
-  std::uint64_t room = 0;
-  if (kind < kRecordKinds) room = std::numeric_limits<std::uint64_t>::max() - last_number_[kind];
-  if (count > room) {
+  const bool known = kind >= static_cast<std::uint32_t>(RecordKind::kImu) &&
+                     kind <= static_cast<std::uint32_t>(RecordKind::kSmoothStep);
+  if (!known || count > std::numeric_limits<std::uint64_t>::max() - last_number_[kind]) {
     refuse(file, offset, fmt::format("{} lost records of kind {}", count, kind),
            "Replay it with the program that recorded it");
   }

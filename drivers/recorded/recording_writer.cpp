@@ -303,6 +303,9 @@ Status RecordingWriter::smoothStep(const SmoothStep& step) {
 
 Status RecordingWriter::loss(RecordKind kind, std::uint64_t count) {
   if (count == 0) return status_;
+  if (kind < RecordKind::kImu || kind > RecordKind::kSmoothStep) {
+    return {StatusCode::kInvalidInput, "only messages and steps can be lost"};
+  }
   std::array<std::uint8_t, kLossBytes> payload{};
   LittleEndianWriter to(payload.data());
   to.u32(static_cast<std::uint32_t>(kind));
