@@ -365,8 +365,8 @@ std::uint64_t Indexer::soundRecords(RecordingWindow& window, std::size_t segment
   }
 }
 
-/// By arrival: each stream in its own order, the one whose next message arrived first has its turn. A
-/// stream whose arrivals fall is taken at the latest arrival that it had, so that it keeps its order.
+/// By arrival: each stream in its own order, the one whose next message arrived first has its turn. So a
+/// message whose arrival falls behind the one before it follows that one at once.
 void Indexer::mergeTurns() {
   if (index_.header.order == RecordOrder::kAsWritten) return;
   constexpr std::size_t kStreams = 1 + kMaxCameras;
@@ -378,14 +378,11 @@ void Indexer::mergeTurns() {
   constexpr std::array<RecordKind, kStreams> kKinds{RecordKind::kImu, RecordKind::kImage0,
                                                     RecordKind::kImage1};
   std::array<std::size_t, kStreams> next{};
-  std::array<Stamp, kStreams> latest{};
-  latest.fill({std::numeric_limits<std::int64_t>::min()});
   for (std::uint8_t& turn : index_.turns) {
     std::size_t best = kStreams;
     for (std::size_t s = 0; s < kStreams; ++s) {
       if (next[s] == sizes[s]) continue;
-      latest[s] = std::max(latest[s], arrival(s, next[s]));
-      if (best == kStreams || latest[s] < latest[best]) best = s;
+      if (best == kStreams || arrival(s, next[s]) < arrival(best, next[best])) best = s;
     }
     ++next[best];
     turn = static_cast<std::uint8_t>(kKinds[best]);
