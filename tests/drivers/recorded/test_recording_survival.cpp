@@ -107,6 +107,7 @@ TEST_CASE("killed at 20 random moments, a recording has everything that was flus
 TEST_CASE("a full disk ends the recording, loses nothing before it and counts all after it") {
   Random random(32);
   constexpr std::uint64_t kEntries = 1200;
+  constexpr std::uint64_t kFlushEvery = 7;
   for (std::uint64_t round = 0; round < 16; ++round) {
     const TempFolder folder;
     const std::string path = folder.path().string();
@@ -114,7 +115,13 @@ TEST_CASE("a full disk ends the recording, loses nothing before it and counts al
     const std::vector<Entry>& script = whole.script;
     // Far less than the script takes; every other one full to the byte when a record ends.
     rlim_t limit = 2000 + random.below(300'000);
-    if (round % 2 == 0) limit = whole.ends[whole.wholeBefore(limit)];
+    if (round % 2 == 0) {
+      // Record i ends there and i + 1 is in the buffer with it.
+      std::size_t i = whole.wholeBefore(limit);
+      while (i % kFlushEvery == 0 || script[i].pixels.size() > 1000 || script[i + 1].pixels.size() > 1000)
+        ++i;
+      limit = whole.ends[i + 1];
+    }
     SharedMemory shared;
     const pid_t child = ::fork();
     REQUIRE(child >= 0);
@@ -125,7 +132,7 @@ TEST_CASE("a full disk ends the recording, loses nothing before it and counts al
       RecordingWriter writer(path, wildHeader(RecordOrder::kAsWritten));
       for (const Entry& entry : script) {
         (void)record(writer, entry);
-        if (shared->calls++ % 7 == 0) (void)writer.flush();
+        if (shared->calls++ % kFlushEvery == 0) (void)writer.flush();
       }
       (void)writer.end();
       shared->statistics = writer.statistics();
