@@ -183,8 +183,9 @@ TEST_CASE("wild damage never gives anything but a beginning of what was recorded
 }
 
 TEST_CASE("files that do not belong together are refused with name, place and remedy") {
-  const RecordedScript recorded = recordScript(25, 60, 1500);
-  const RecordedScript other = recordScript(26, 60, 1500);
+  // Once for all sections.
+  static const RecordedScript recorded = recordScript(25, 60, 1500);
+  static const RecordedScript other = recordScript(26, 60, 1500);
   std::vector<Bytes> segments = recorded.segments;
   const auto refuses = [&](const char* file, const char* what) {
     const InputError error = refusal(segments);
