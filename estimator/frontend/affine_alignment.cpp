@@ -29,8 +29,6 @@ constexpr float kMiddle = 128.0F;
 // frames) a third more outliers.
 const PatchWindow kWindow = makePatchWindow([](float x, float y) { return std::sqrt(x * x + y * y); });
 
-using Vector6f = Eigen::Matrix<float, 6, 1>;
-
 struct Gradients {
   alignas(32) float value[kRows * kLanes];  ///< less kMiddle
   alignas(32) float x[kRows * kLanes];      ///< weighted
@@ -52,6 +50,47 @@ void readTemplate(const ImageView& patch, int cx, int cy, Gradients& g) {
     Isa::storeFloats(g.x + at, Isa::multiply(w, Isa::toFloats(x)));
     Isa::storeFloats(g.y + at, Isa::multiply(w, Isa::toFloats(y)));
   }
+}
+
+const std::array<float, kLanes> kColumn = [] {
+  std::array<float, kLanes> column{};
+  for (std::size_t c = 0; c < kPatchSize; ++c)
+    column[c] = static_cast<float>(static_cast<int>(c) - kPatchRadius);
+  return column;
+}();
+
+// `row`: function of the row's index to the image's sixteen values there.
+template <typename Isa, typename Rows>
+AffineTemplate::Sums sumWindow(const Gradients& g, const Rows& row) {
+  auto one = Isa::zeroFloats(), square = Isa::zeroFloats(), value = Isa::zeroFloats();
+  auto x0 = Isa::zeroFloats(), y0 = Isa::zeroFloats(), x1 = Isa::zeroFloats(), y1 = Isa::zeroFloats();
+  for (int r = 0; r < kRows; ++r) {
+    const int at = r * kLanes;
+    const auto s = row(r);
+    const auto w = Isa::loadFloats(kWindow.data() + at);
+    const auto ws = Isa::multiply(w, s);
+    one = Isa::multiplyAdd(one, w, s);
+    square = Isa::multiplyAdd(square, ws, s);
+    value = Isa::multiplyAdd(value, ws, Isa::loadFloats(g.value + at));
+    const auto gx = Isa::loadFloats(g.x + at);
+    const auto gy = Isa::loadFloats(g.y + at);
+    const auto rs = Isa::multiply(Isa::broadcastFloat(static_cast<float>(r - kPatchRadius)), s);
+    x0 = Isa::multiplyAdd(x0, gx, s);
+    y0 = Isa::multiplyAdd(y0, gy, s);
+    x1 = Isa::multiplyAdd(x1, gx, rs);
+    y1 = Isa::multiplyAdd(y1, gy, rs);
+  }
+  // Fused with zero: a plain product might or might not be fused with the sum over lanes.
+  const auto column = Isa::loadFloats(kColumn.data());
+  const auto column_x = Isa::multiplyAdd(Isa::zeroFloats(), column, x0);
+  const auto column_y = Isa::multiplyAdd(Isa::zeroFloats(), column, y0);
+  AffineTemplate::Sums sums;
+  sums.one = Isa::total(one);
+  sums.square = Isa::total(square);
+  sums.value = Isa::total(value);
+  sums.moment << Isa::total(x0), Isa::total(y0), Isa::total(column_x), Isa::total(x1), Isa::total(column_y),
+      Isa::total(y1);
+  return sums;
 }
 
 }  // namespace
@@ -85,60 +124,13 @@ bool AffineTemplate::build(const ImageView& patch, int cx, int cy) {
   for (int k = 2; k < 6; ++k) reduced(k, k) += kAffinePrior;
   const Eigen::LLT<Eigen::Matrix<float, 6, 6>> factor(reduced);
   if (factor.info() != Eigen::Success) return false;
+  own_ = sumWindow<simd::Native>(g, [&g](int r) { return simd::Native::loadFloats(g.value + r * kLanes); });
+  constant_ = sumWindow<simd::Native>(g, [](int) { return simd::Native::broadcastFloat(1); });
   inverse_hessian_ = factor.solve(Eigen::Matrix<float, 6, 6>::Identity());
   return inverse_hessian_.allFinite();
 }
 
 namespace {
-
-// Sums over the window of an image times what the alignment needs to know of it.
-struct ImageSums {
-  float one = 0;                       ///< weight times the image
-  float square = 0;                    ///< weight times its square
-  float value = 0;                     ///< weight times it and the template
-  Vector6f moment = Vector6f::Zero();  ///< times the weighted gradients and their places in the window
-};
-
-const std::array<float, kLanes> kColumn = [] {
-  std::array<float, kLanes> column{};
-  for (std::size_t c = 0; c < kPatchSize; ++c)
-    column[c] = static_cast<float>(static_cast<int>(c) - kPatchRadius);
-  return column;
-}();
-
-// `row`: function of the row's index to the image's sixteen values there.
-template <typename Isa, typename Rows>
-ImageSums sumWindow(const Gradients& g, const Rows& row) {
-  auto one = Isa::zeroFloats(), square = Isa::zeroFloats(), value = Isa::zeroFloats();
-  auto x0 = Isa::zeroFloats(), y0 = Isa::zeroFloats(), x1 = Isa::zeroFloats(), y1 = Isa::zeroFloats();
-  for (int r = 0; r < kRows; ++r) {
-    const int at = r * kLanes;
-    const auto s = row(r);
-    const auto w = Isa::loadFloats(kWindow.data() + at);
-    const auto ws = Isa::multiply(w, s);
-    one = Isa::multiplyAdd(one, w, s);
-    square = Isa::multiplyAdd(square, ws, s);
-    value = Isa::multiplyAdd(value, ws, Isa::loadFloats(g.value + at));
-    const auto gx = Isa::loadFloats(g.x + at);
-    const auto gy = Isa::loadFloats(g.y + at);
-    const auto rs = Isa::multiply(Isa::broadcastFloat(static_cast<float>(r - kPatchRadius)), s);
-    x0 = Isa::multiplyAdd(x0, gx, s);
-    y0 = Isa::multiplyAdd(y0, gy, s);
-    x1 = Isa::multiplyAdd(x1, gx, rs);
-    y1 = Isa::multiplyAdd(y1, gy, rs);
-  }
-  // Fused with zero: a plain product might or might not be fused with the sum over lanes.
-  const auto column = Isa::loadFloats(kColumn.data());
-  const auto column_x = Isa::multiplyAdd(Isa::zeroFloats(), column, x0);
-  const auto column_y = Isa::multiplyAdd(Isa::zeroFloats(), column, y0);
-  ImageSums sums;
-  sums.one = Isa::total(one);
-  sums.square = Isa::total(square);
-  sums.value = Isa::total(value);
-  sums.moment << Isa::total(x0), Isa::total(y0), Isa::total(column_x), Isa::total(x1), Isa::total(column_y),
-      Isa::total(y1);
-  return sums;
-}
 
 struct Light {
   float gain = 1;
@@ -147,7 +139,8 @@ struct Light {
 };
 
 // Weighted regression of the image on the template. `constant`: sums of an image that is 1 everywhere.
-Light fitLight(const ImageSums& image, const ImageSums& pattern, const ImageSums& constant) {
+Light fitLight(const AffineTemplate::Sums& image, const AffineTemplate::Sums& pattern,
+               const AffineTemplate::Sums& constant) {
   const float n = 1.0F / constant.one;
   const float mean_t = pattern.one * n;
   const float mean_i = image.one * n;
@@ -178,23 +171,22 @@ bool AffineTemplate::align(const ImageView& patch, int cx, int cy, const ImageVi
                            Estimate& estimate) const {
   Gradients g;
   readTemplate<Isa>(patch, cx, cy, g);
-  const ImageSums pattern = sumWindow<Isa>(g, [&g](int r) { return Isa::loadFloats(g.value + r * kLanes); });
-  const ImageSums constant = sumWindow<Isa>(g, [](int) { return Isa::broadcastFloat(1); });
   const auto to_grey = Isa::broadcastFloat(1.0F / AffineSampler<Isa>::kUnitsPerGrey);
   const auto middle = Isa::broadcast(static_cast<std::int16_t>(kMiddle * AffineSampler<Isa>::kUnitsPerGrey));
   AffineSampler<Isa> sampler;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     if (!windowInside(image, estimate) || !sampler.prepare(estimate.warp, kPatchRadius)) return false;
-    const ImageSums sums = sumWindow<Isa>(g, [&](int r) {
+    const Sums sums = sumWindow<Isa>(g, [&](int r) {
       const auto sampled = sampler.sample(image, estimate.position, r - kPatchRadius);
       return Isa::multiply(Isa::toFloats(Isa::subtract(sampled, middle)), to_grey);
     });
-    const Light light = fitLight(sums, pattern, constant);
+    const Light light = fitLight(sums, own_, constant_);
     estimate.correlation = light.correlation;
     if (!(light.gain > 0.1F)) return false;
     // Of the residual: image less gain times template less offset.
-    const Vector6f moment = sums.moment - light.gain * pattern.moment - light.offset * constant.moment;
-    const Vector6f step = inverse_hessian_ * moment / light.gain;
+    const Eigen::Matrix<float, 6, 1> moment =
+        sums.moment - light.gain * own_.moment - light.offset * constant_.moment;
+    const Eigen::Matrix<float, 6, 1> step = inverse_hessian_ * moment / light.gain;
     Eigen::Matrix2f change;
     change << 1 + step[2], step[3], step[4], 1 + step[5];
     const float determinant = change.determinant();

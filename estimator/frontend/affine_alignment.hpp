@@ -33,7 +33,18 @@ class AffineTemplate {
   [[nodiscard]] bool align(const ImageView& patch, int x, int y, const ImageView& image, int iterations,
                            Estimate& estimate) const;
 
+  /// Over the window, of an image (greys less 128).
+  struct Sums {
+    float one = 0;     ///< weight times the image
+    float square = 0;  ///< weight times its square
+    float value = 0;   ///< weight times it and the template
+    /// It times the weighted gradients and their places in the window, as the affine map's parameters.
+    Eigen::Matrix<float, 6, 1> moment = Eigen::Matrix<float, 6, 1>::Zero();
+  };
+
  private:
+  Sums own_;       ///< of the template
+  Sums constant_;  ///< of an image that is 1 everywhere
   Eigen::Matrix<float, 6, 6> inverse_hessian_ = Eigen::Matrix<float, 6, 6>::Zero();
 };
 
