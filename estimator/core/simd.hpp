@@ -110,6 +110,32 @@ struct Scalar {
     for (int i = 0; i < 16; ++i) v.lane[i] = static_cast<std::int16_t>(a.lane[i] >> kBits);
     return v;
   }
+  /// Lanes taken as unsigned.
+  template <int kBits>
+  static Int16x16 shiftRightUnsigned(const Int16x16& a) {
+    Int16x16 v;
+    for (int i = 0; i < 16; ++i) {
+      v.lane[i] = static_cast<std::int16_t>(static_cast<std::uint16_t>(a.lane[i]) >> kBits);
+    }
+    return v;
+  }
+  /// Of the 32 values of `a` and `b`, those at even and at odd places.
+  static Int16x16 even(const Int16x16& a, const Int16x16& b) {
+    Int16x16 v;
+    for (int i = 0; i < 8; ++i) {
+      v.lane[i] = a.lane[2 * i];
+      v.lane[i + 8] = b.lane[2 * i];
+    }
+    return v;
+  }
+  static Int16x16 odd(const Int16x16& a, const Int16x16& b) {
+    Int16x16 v;
+    for (int i = 0; i < 8; ++i) {
+      v.lane[i] = a.lane[2 * i + 1];
+      v.lane[i + 8] = b.lane[2 * i + 1];
+    }
+    return v;
+  }
   /// Lanes of `a` where `key` equals `value`, of `b` elsewhere.
   static Int16x16 selectEqual(const Int16x16& key, std::int16_t value, const Int16x16& a, const Int16x16& b) {
     Int16x16 v;
@@ -164,6 +190,21 @@ struct Scalar {
     Float32x16 v;
     for (int i = 0; i < 16; ++i) v.lane[i] = a.lane[i] + b.lane[i];
     return v;
+  }
+  static Float32x16 subtract(const Float32x16& a, const Float32x16& b) {
+    Float32x16 v;
+    for (int i = 0; i < 16; ++i) v.lane[i] = a.lane[i] - b.lane[i];
+    return v;
+  }
+  static Float32x16 squareRoot(const Float32x16& a) {
+    Float32x16 v;
+    for (int i = 0; i < 16; ++i) v.lane[i] = std::sqrt(a.lane[i]);
+    return v;
+  }
+  static bool anyAbove(const Float32x16& a, float limit) {
+    bool any = false;
+    for (const float lane : a.lane) any = any || lane > limit;
+    return any;
   }
   /// sum + a b, rounded once.
   static Float32x16 multiplyAdd(const Float32x16& sum, const Float32x16& a, const Float32x16& b) {
@@ -226,6 +267,17 @@ struct Native {
   static Int16x16 shiftRight(Int16x16 a) {
     return _mm256_srai_epi16(a, kBits);
   }
+  template <int kBits>
+  static Int16x16 shiftRightUnsigned(Int16x16 a) {
+    return _mm256_srli_epi16(a, kBits);
+  }
+  static Int16x16 even(Int16x16 a, Int16x16 b) {
+    const __m256i low = _mm256_set1_epi32(0xFFFF);
+    return inOrder(_mm256_packus_epi32(_mm256_and_si256(a, low), _mm256_and_si256(b, low)));
+  }
+  static Int16x16 odd(Int16x16 a, Int16x16 b) {
+    return inOrder(_mm256_packus_epi32(_mm256_srli_epi32(a, 16), _mm256_srli_epi32(b, 16)));
+  }
   static Int16x16 selectEqual(Int16x16 key, std::int16_t value, Int16x16 a, Int16x16 b) {
     return _mm256_blendv_epi8(b, a, _mm256_cmpeq_epi16(key, _mm256_set1_epi16(value)));
   }
@@ -262,6 +314,17 @@ struct Native {
   static Float32x16 add(const Float32x16& a, const Float32x16& b) {
     return {_mm256_add_ps(a.low, b.low), _mm256_add_ps(a.high, b.high)};
   }
+  static Float32x16 subtract(const Float32x16& a, const Float32x16& b) {
+    return {_mm256_sub_ps(a.low, b.low), _mm256_sub_ps(a.high, b.high)};
+  }
+  static Float32x16 squareRoot(const Float32x16& a) {
+    return {_mm256_sqrt_ps(a.low), _mm256_sqrt_ps(a.high)};
+  }
+  static bool anyAbove(const Float32x16& a, float limit) {
+    const __m256 l = _mm256_set1_ps(limit);
+    return _mm256_movemask_ps(
+               _mm256_or_ps(_mm256_cmp_ps(a.low, l, _CMP_GT_OQ), _mm256_cmp_ps(a.high, l, _CMP_GT_OQ))) != 0;
+  }
   static Float32x16 multiplyAdd(const Float32x16& sum, const Float32x16& a, const Float32x16& b) {
     return {_mm256_fmadd_ps(a.low, b.low, sum.low), _mm256_fmadd_ps(a.high, b.high, sum.high)};
   }
@@ -273,6 +336,8 @@ struct Native {
   }
 
  private:
+  /// Quarters of two packed vectors come out interleaved.
+  static __m256i inOrder(__m256i v) { return _mm256_permute4x64_epi64(v, 0xD8); }
   static __m128i bytes(Int16x16 v) {
     return _mm_packus_epi16(_mm256_castsi256_si128(v), _mm256_extracti128_si256(v, 1));
   }
@@ -343,6 +408,17 @@ struct Native {
   static Int16x16 shiftRight(const Int16x16& a) {
     return {vshrq_n_s16(a.low, kBits), vshrq_n_s16(a.high, kBits)};
   }
+  template <int kBits>
+  static Int16x16 shiftRightUnsigned(const Int16x16& a) {
+    return {vreinterpretq_s16_u16(vshrq_n_u16(vreinterpretq_u16_s16(a.low), kBits)),
+            vreinterpretq_s16_u16(vshrq_n_u16(vreinterpretq_u16_s16(a.high), kBits))};
+  }
+  static Int16x16 even(const Int16x16& a, const Int16x16& b) {
+    return {vuzp1q_s16(a.low, a.high), vuzp1q_s16(b.low, b.high)};
+  }
+  static Int16x16 odd(const Int16x16& a, const Int16x16& b) {
+    return {vuzp2q_s16(a.low, a.high), vuzp2q_s16(b.low, b.high)};
+  }
   static Int16x16 selectEqual(const Int16x16& key, std::int16_t value, const Int16x16& a, const Int16x16& b) {
     const int16x8_t wanted = vdupq_n_s16(value);
     return {vbslq_s16(vceqq_s16(key.low, wanted), a.low, b.low),
@@ -382,6 +458,22 @@ struct Native {
     Float32x16 v;
     for (int i = 0; i < 4; ++i) v.quarter[i] = vaddq_f32(a.quarter[i], b.quarter[i]);
     return v;
+  }
+  static Float32x16 subtract(const Float32x16& a, const Float32x16& b) {
+    Float32x16 v;
+    for (int i = 0; i < 4; ++i) v.quarter[i] = vsubq_f32(a.quarter[i], b.quarter[i]);
+    return v;
+  }
+  static Float32x16 squareRoot(const Float32x16& a) {
+    Float32x16 v;
+    for (int i = 0; i < 4; ++i) v.quarter[i] = vsqrtq_f32(a.quarter[i]);
+    return v;
+  }
+  static bool anyAbove(const Float32x16& a, float limit) {
+    const float32x4_t l = vdupq_n_f32(limit);
+    uint32x4_t above = vdupq_n_u32(0);
+    for (int i = 0; i < 4; ++i) above = vorrq_u32(above, vcgtq_f32(a.quarter[i], l));
+    return vmaxvq_u32(above) != 0;
   }
   static Float32x16 multiplyAdd(const Float32x16& sum, const Float32x16& a, const Float32x16& b) {
     Float32x16 v;

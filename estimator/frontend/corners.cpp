@@ -17,49 +17,68 @@ constexpr float kScoreScale = 1.0F / (64.0F * kBox * kBox);
 // More cells than features: some are without texture.
 constexpr float kCellsPerFeature = 1.25F;
 
-// Rolling sums over the last kBox rows of gradient products, one cell wide.
-constexpr int kMaxRow = 96 + 2 + 2 * kBoxRadius + 16;
+constexpr int kLanes = 16;
+
+// Rolling sums over the last kBox rows of gradient products, one cell wide. Rows are written in whole vectors
+// and read kBox beyond them.
+constexpr int kMaxRow = (CornerDetector::kMaxCell + 2 + 2 * kBoxRadius + kLanes - 1) / kLanes * kLanes;
+using ProductRow = std::array<float, kMaxRow>;
 struct Rolling {
-  std::array<std::array<float, kMaxRow>, kBox> xx, xy, yy;
-  std::array<float, kMaxRow> sum_xx{}, sum_xy{}, sum_yy{};
-  std::array<std::array<float, kMaxRow>, 3> score;
+  alignas(32) std::array<ProductRow, kBox> xx, xy, yy;
+  alignas(32) std::array<float, kMaxRow + kLanes> sum_xx, sum_xy, sum_yy;
+  alignas(32) std::array<std::array<float, kMaxRow + kLanes>, 3> score;
 };
 
-void addRow(const std::uint8_t* row, int stride, int width, bool remove_old, std::size_t slot, Rolling& r) {
-  const std::uint8_t* up = row - stride;
-  const std::uint8_t* down = row + stride;
-  float* xx = r.xx[slot].data();
-  float* xy = r.xy[slot].data();
-  float* yy = r.yy[slot].data();
-  const float keep = remove_old ? 1.0F : 0.0F;
-  for (int x = 0; x < width; ++x) {
-    const int gx = up[x + 1] - up[x - 1] + 2 * (row[x + 1] - row[x - 1]) + down[x + 1] - down[x - 1];
-    const int gy = down[x - 1] - up[x - 1] + 2 * (down[x] - up[x]) + down[x + 1] - up[x + 1];
-    const auto fx = static_cast<float>(gx);
-    const auto fy = static_cast<float>(gy);
-    // Products and their sums are integers below 2^24 x 3: exact enough for the rolling difference.
-    r.sum_xx[static_cast<std::size_t>(x)] += fx * fx - keep * xx[x];
-    r.sum_xy[static_cast<std::size_t>(x)] += fx * fy - keep * xy[x];
-    r.sum_yy[static_cast<std::size_t>(x)] += fy * fy - keep * yy[x];
-    xx[x] = fx * fx;
-    xy[x] = fx * fy;
-    yy[x] = fy * fy;
+// Takes a row of the image into the sums, and the one that it replaces out of them. Products of gradients are
+// integers below 2^20 and their sums below 2^23: exact in floats, so that nothing builds up.
+template <typename Isa>
+void addRow(const std::uint8_t* row, int stride, int width, std::size_t slot, Rolling& r) {
+  const auto take = [](float* sum, float* product, const auto& a, const auto& b) {
+    const auto now = Isa::multiply(a, b);
+    const auto change = Isa::subtract(now, Isa::loadFloats(product));
+    Isa::storeFloats(sum, Isa::add(Isa::loadFloats(sum), change));
+    Isa::storeFloats(product, now);
+  };
+  for (int x = 0; x < width; x += kLanes) {
+    const std::uint8_t* here = row + x;
+    const std::uint8_t* up = here - stride;
+    const std::uint8_t* down = here + stride;
+    const auto falling = Isa::subtract(Isa::widen(down + 1), Isa::widen(up - 1));
+    const auto rising = Isa::subtract(Isa::widen(up + 1), Isa::widen(down - 1));
+    const auto across = Isa::subtract(Isa::widen(here + 1), Isa::widen(here - 1));
+    const auto along = Isa::subtract(Isa::widen(down), Isa::widen(up));
+    const auto gx = Isa::add(Isa::add(falling, rising), Isa::add(across, across));
+    const auto gy = Isa::add(Isa::subtract(falling, rising), Isa::add(along, along));
+    const auto fx = Isa::toFloats(gx);
+    const auto fy = Isa::toFloats(gy);
+    take(r.sum_xx.data() + x, r.xx[slot].data() + x, fx, fx);
+    take(r.sum_xy.data() + x, r.xy[slot].data() + x, fx, fy);
+    take(r.sum_yy.data() + x, r.yy[slot].data() + x, fy, fy);
   }
 }
 
-void scoreRow(const Rolling& r, int width, float* score) {
-  for (int x = 0; x < width; ++x) {
-    float a = 0;
-    float b = 0;
-    float c = 0;
-    for (int k = 0; k < kBox; ++k) {
-      a += r.sum_xx[static_cast<std::size_t>(x + k)];
-      b += r.sum_xy[static_cast<std::size_t>(x + k)];
-      c += r.sum_yy[static_cast<std::size_t>(x + k)];
-    }
-    const float half = 0.5F * (a - c);
-    score[x] = (0.5F * (a + c) - std::sqrt(half * half + b * b)) * kScoreScale;
+// Whether any score is above `limit`: of the vectors that hold the row.
+template <typename Isa>
+bool scoreRow(const Rolling& r, int width, float limit, float* score) {
+  bool above = false;
+  for (int x = 0; x < width; x += kLanes) {
+    const auto box = [x](const auto& sums) {
+      auto total = Isa::loadFloats(sums.data() + x);
+      for (int k = 1; k < kBox; ++k) total = Isa::add(total, Isa::loadFloats(sums.data() + x + k));
+      return total;
+    };
+    const auto a = box(r.sum_xx);
+    const auto b = box(r.sum_xy);
+    const auto c = box(r.sum_yy);
+    const auto half = Isa::broadcastFloat(0.5F);
+    const auto mean = Isa::multiply(half, Isa::add(a, c));
+    const auto difference = Isa::multiply(half, Isa::subtract(a, c));
+    const auto root = Isa::squareRoot(Isa::multiplyAdd(Isa::multiply(difference, difference), b, b));
+    const auto s = Isa::multiply(Isa::subtract(mean, root), Isa::broadcastFloat(kScoreScale));
+    Isa::storeFloats(score + x, s);
+    above = Isa::anyAbove(s, limit) || above;
   }
+  return above;
 }
 
 }  // namespace
@@ -87,23 +106,36 @@ bool CornerDetector::blocked(int x, int y) const {
   return mask_[static_cast<std::size_t>((y / kMaskStep) * mask_stride_ + x / kMaskStep)] != 0;
 }
 
-Corner CornerDetector::bestOfCell(const ImageView& image, int x0, int y0, int x1, int y1, float min_score) {
-  Rolling r{};
+template <typename Isa>
+Corner CornerDetector::bestOfCell(const ImageView& image, int x0, int y0, int x1, int y1,
+                                  float min_score) const {
   // One more score on each side than the cell, for the 3x3 maximum.
   const int score_width = x1 - x0 + 2;
   const int product_width = score_width + 2 * kBoxRadius;
+  Rolling r;
+  const auto used = static_cast<std::size_t>((product_width + kLanes - 1) / kLanes * kLanes + kLanes);
+  for (std::size_t k = 0; k < kBox; ++k) {
+    for (auto* row : {&r.xx[k], &r.xy[k], &r.yy[k]}) {
+      std::fill_n(row->begin(), std::min<std::size_t>(used, kMaxRow), 0.0F);
+    }
+  }
+  for (auto* row : {&r.sum_xx, &r.sum_xy, &r.sum_yy}) std::fill_n(row->begin(), used, 0.0F);
   Corner best;
   best.score = min_score;
   const int first = y0 - 1 - kBoxRadius;
   const int last = y1 + kBoxRadius;
+  bool here_above = false;  // the limit, in the row of scores before the newest
   for (int y = first; y <= last; ++y) {
     const int count = y - first;
-    addRow(image.row(y) + (x0 - 1 - kBoxRadius), image.stride, product_width, count >= kBox,
-           static_cast<std::size_t>(count % kBox), r);
+    addRow<Isa>(image.row(y) + (x0 - 1 - kBoxRadius), image.stride, product_width,
+                static_cast<std::size_t>(count % kBox), r);
     if (count < kBox - 1) continue;
     const int done = count - (kBox - 1);  // score rows so far: row y0 - 1 + done
-    scoreRow(r, score_width, r.score[static_cast<std::size_t>(done % 3)].data());
-    if (done < 2) continue;
+    const bool newest_above =
+        scoreRow<Isa>(r, score_width, best.score, r.score[static_cast<std::size_t>(done % 3)].data());
+    const bool worth_a_look = here_above;
+    here_above = newest_above;
+    if (done < 2 || !worth_a_look) continue;
     const float* above = r.score[static_cast<std::size_t>((done - 2) % 3)].data();
     const float* here = r.score[static_cast<std::size_t>((done - 1) % 3)].data();
     const float* below = r.score[static_cast<std::size_t>(done % 3)].data();
@@ -122,6 +154,7 @@ Corner CornerDetector::bestOfCell(const ImageView& image, int x0, int y0, int x1
   return best;
 }
 
+template <typename Isa>
 void CornerDetector::detect(const ImageView& image, const Pixels& occupied, int features_at_most, int wanted,
                             const CornerSettings& settings, FixedVector<Corner, kMaxFeatures>& corners) {
   corners.clear();
@@ -149,7 +182,7 @@ void CornerDetector::detect(const ImageView& image, const Pixels& occupied, int 
     const int y1 = std::min(cell / columns * side + side, height_ - kImageBorder);
     if (x1 - x0 < 2 || y1 - y0 < 2) continue;
     const Corner best =
-        bestOfCell(image, x0, y0, x1, y1, std::max(settings.min_score, settings.relative * top));
+        bestOfCell<Isa>(image, x0, y0, x1, y1, std::max(settings.min_score, settings.relative * top));
     if (best.score <= 0) continue;
     top = std::max(top, best.score);
     if (!candidates_.tryPushBack(best)) break;
@@ -166,5 +199,12 @@ void CornerDetector::detect(const ImageView& image, const Pixels& occupied, int 
     block(corner.pixel, settings.min_distance);
   }
 }
+
+template void CornerDetector::detect<simd::Native>(const ImageView&, const Pixels&, int, int,
+                                                   const CornerSettings&, FixedVector<Corner, kMaxFeatures>&);
+#ifdef SWIFTLET_SIMD_NATIVE
+template void CornerDetector::detect<simd::Scalar>(const ImageView&, const Pixels&, int, int,
+                                                   const CornerSettings&, FixedVector<Corner, kMaxFeatures>&);
+#endif
 
 }  // namespace swiftlet

@@ -18,6 +18,7 @@
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/image_view.hpp"
 #include "estimator/core/limits.hpp"
+#include "estimator/core/simd.hpp"
 
 namespace swiftlet {
 
@@ -36,20 +37,24 @@ class CornerDetector {
  public:
   CornerDetector(int width, int height);
 
-  /// Corners in empty cells, best first, at most `wanted`. `image` must have a readable border of
-  /// 5 pixels (a Pyramid level 0). `occupied` are the features that exist; `features_at_most` is
-  /// the number the whole image should carry: it sets the cell size.
+  static constexpr int kMaxCell = 96;  ///< px
+
+  /// Corners in empty cells, best first, at most `wanted`. `image` must have the border of a Pyramid level.
+  /// `occupied` are the features that exist; `features_at_most` is the number the whole image should carry:
+  /// it sets the cell size.
   using Pixels = FixedVector<Eigen::Vector2f, kMaxFeatures>;
+  template <typename Isa = simd::Native>
   void detect(const ImageView& image, const Pixels& occupied, int features_at_most, int wanted,
               const CornerSettings& settings, FixedVector<Corner, kMaxFeatures>& corners);
 
  private:
-  static constexpr int kMaxCell = 96;  ///< px
   static constexpr int kMaxCells = 1024;
 
   void block(const Eigen::Vector2f& pixel, float distance);
   [[nodiscard]] bool blocked(int x, int y) const;
-  [[nodiscard]] Corner bestOfCell(const ImageView& image, int x0, int y0, int x1, int y1, float min_score);
+  template <typename Isa>
+  [[nodiscard]] Corner bestOfCell(const ImageView& image, int x0, int y0, int x1, int y1,
+                                  float min_score) const;
 
   int width_ = 0;
   int height_ = 0;

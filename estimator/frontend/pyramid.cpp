@@ -9,6 +9,7 @@ namespace {
 constexpr int kMinSide = 16;
 constexpr int kRowAlignment = 64;  // bytes: a row starts on a cache line
 constexpr int kFilterReach = 2;    // pixels on either side of the 5 taps
+constexpr int kLanes = 16;
 
 int alignedStride(int width) {
   return (width + 2 * kPyramidBorder + kRowAlignment - 1) / kRowAlignment * kRowAlignment;
@@ -32,6 +33,7 @@ Pyramid::Pyramid(int width, int height, int levels) {
     h = (h + 1) / 2;
   }
   storage_.assign(total, 0);
+  // Two halves of whole vectors, and what reading shifted vectors takes behind them.
   row_.assign(static_cast<std::size_t>(width + 2 * kRowAlignment), 0);
   for (std::size_t k = 0; k < static_cast<std::size_t>(levels_); ++k) {
     view_[k].data = storage_.data() + origin_[k];
@@ -58,39 +60,58 @@ void Pyramid::replicateBorder(int level) {
   }
 }
 
+template <typename Isa>
 void Pyramid::halve(int from) {
   const ImageView& fine = view_[static_cast<std::size_t>(from)];
   const ImageView& coarse = view_[static_cast<std::size_t>(from) + 1];
-  const int columns = 2 * coarse.width + 2 * kFilterReach;
-  std::uint16_t* filtered = row_.data();
+  // One row filtered along y, its even and odd pixels apart: at most 16 * 255.
+  std::int16_t* const even = row_.data();
+  std::int16_t* const odd = even + row_.size() / 2;
+  const auto six = Isa::broadcast(6);
+  const auto half = Isa::broadcast(128);
   for (int y = 0; y < coarse.height; ++y) {
-    const std::uint8_t* r0 = fine.row(2 * y - 2) - kFilterReach;
-    const std::uint8_t* r1 = r0 + fine.stride;
-    const std::uint8_t* r2 = r1 + fine.stride;
-    const std::uint8_t* r3 = r2 + fine.stride;
-    const std::uint8_t* r4 = r3 + fine.stride;
-    for (int x = 0; x < columns; ++x) {
-      filtered[x] = static_cast<std::uint16_t>(r0[x] + r4[x] + 4 * (r1[x] + r3[x]) + 6 * r2[x]);
+    const std::uint8_t* const first = fine.row(2 * y - kFilterReach) - kFilterReach;
+    const auto filtered = [&](int x) {
+      const std::uint8_t* p = first + x;
+      const auto v0 = Isa::widen(p), v1 = Isa::widen(p += fine.stride), v2 = Isa::widen(p += fine.stride),
+                 v3 = Isa::widen(p += fine.stride), v4 = Isa::widen(p += fine.stride);
+      const auto sides = Isa::add(Isa::add(v0, v4), Isa::template shiftLeft<2>(Isa::add(v1, v3)));
+      return Isa::add(sides, Isa::multiply(v2, six));
+    };
+    for (int x = 0; x < coarse.width + kFilterReach; x += kLanes) {
+      const auto a = filtered(2 * x);
+      const auto b = filtered(2 * x + kLanes);
+      Isa::store(even + x, Isa::even(a, b));
+      Isa::store(odd + x, Isa::odd(a, b));
     }
     std::uint8_t* out = writableRow(from + 1, y);
-    for (int x = 0; x < coarse.width; ++x) {
-      const std::uint16_t* f = filtered + 2 * x;
-      // At most 255 * 256 + 128: fits 16 bits.
-      const auto sum = static_cast<std::uint16_t>(f[0] + f[4] + 4 * (f[1] + f[3]) + 6 * f[2] + 128);
-      out[x] = static_cast<std::uint8_t>(sum >> 8);
+    // Whole vectors: what runs into the border is overwritten with it.
+    for (int x = 0; x < coarse.width; x += kLanes) {
+      const auto ends = Isa::add(Isa::load(even + x), Isa::load(even + x + 2));
+      const auto sides = Isa::template shiftLeft<2>(Isa::add(Isa::load(odd + x), Isa::load(odd + x + 1)));
+      const auto middle = Isa::multiply(Isa::load(even + x + 1), six);
+      // At most 255 * 256 + 128: fits 16 bits, unsigned.
+      const auto sum = Isa::add(Isa::add(ends, sides), Isa::add(middle, half));
+      Isa::storeBytes(out + x, Isa::template shiftRightUnsigned<8>(sum));
     }
   }
 }
 
+template <typename Isa>
 void Pyramid::build(const ImageView& image) {
   for (int y = 0; y < image.height; ++y) {
     std::memcpy(writableRow(0, y), image.row(y), static_cast<std::size_t>(image.width));
   }
   replicateBorder(0);
   for (int k = 1; k < levels_; ++k) {
-    halve(k - 1);
+    halve<Isa>(k - 1);
     replicateBorder(k);
   }
 }
+
+template void Pyramid::build<simd::Native>(const ImageView&);
+#ifdef SWIFTLET_SIMD_NATIVE
+template void Pyramid::build<simd::Scalar>(const ImageView&);
+#endif
 
 }  // namespace swiftlet

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "estimator/core/image_view.hpp"
+#include "estimator/core/simd.hpp"
 
 namespace swiftlet {
 
@@ -28,6 +29,7 @@ class Pyramid {
   Pyramid& operator=(Pyramid&&) = default;
 
   /// Copies the image and builds all levels. The image must have the size of the constructor.
+  template <typename Isa = simd::Native>
   void build(const ImageView& image);
 
   [[nodiscard]] int levels() const { return levels_; }
@@ -37,13 +39,14 @@ class Pyramid {
  private:
   std::uint8_t* writableRow(int level, int y);
   void replicateBorder(int level);
+  template <typename Isa>
   void halve(int from);
 
   int levels_ = 0;
   std::array<ImageView, kMaxPyramidLevels> view_{};
   std::array<std::size_t, kMaxPyramidLevels> origin_{};  ///< index of pixel (0, 0) in storage_
   std::vector<std::uint8_t> storage_;
-  std::vector<std::uint16_t> row_;  ///< one vertically filtered row, borders included
+  std::vector<std::int16_t> row_;  ///< one row filtered along y: even pixels, then odd ones
 };
 
 }  // namespace swiftlet

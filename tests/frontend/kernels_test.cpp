@@ -54,6 +54,16 @@ TEST_CASE("pyramid equals OpenCV's pyrDown and has replicated borders") {
       }
       CHECK(differing == 0);
     }
+    Pyramid scalar(width, height, 3);
+    scalar.build<simd::Scalar>(image.view());
+    for (int level = 0; level < 3; ++level) {
+      const ImageView& view = pyramid.level(level);
+      for (int y = -kPyramidBorder; y < view.height + kPyramidBorder; ++y) {
+        const auto bytes = static_cast<std::size_t>(view.width + 2 * kPyramidBorder);
+        REQUIRE(std::memcmp(view.row(y) - kPyramidBorder, scalar.level(level).row(y) - kPyramidBorder,
+                            bytes) == 0);
+      }
+    }
     const ImageView& base = pyramid.level(0);
     CHECK(base.row(-kPyramidBorder)[-kPyramidBorder] == image.pixels.front());
     CHECK(base.row(height - 1 + kPyramidBorder)[width - 1 + kPyramidBorder] == image.pixels.back());
@@ -75,6 +85,13 @@ TEST_CASE("corner scores are OpenCV's smaller eigenvalues, and corners keep thei
   detector.detect(pyramid.level(0), *occupied, 60, 50, settings, *corners);
   REQUIRE(corners->size() > 30);
   CHECK(corners->size() <= 50);
+  auto scalar = std::make_unique<FixedVector<Corner, kMaxFeatures>>();
+  detector.detect<simd::Scalar>(pyramid.level(0), *occupied, 60, 50, settings, *scalar);
+  REQUIRE(scalar->size() == corners->size());
+  for (std::size_t i = 0; i < corners->size(); ++i) {
+    CHECK((*scalar)[i].pixel == (*corners)[i].pixel);
+    CHECK((*scalar)[i].score == (*corners)[i].score);
+  }
 
   cv::Mat expected;
   const cv::Mat source(image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.pixels.data()));
