@@ -22,9 +22,9 @@
 
 namespace swiftlet {
 
-/// Stack of a flight thread. Measured over the recorded logs the deepest thread takes a small part of it;
-/// FlightThread::stackUsed says how much.
-inline constexpr std::size_t kFlightStackBytes = std::size_t{4} * 1024 * 1024;
+/// Stack of a flight thread: a whole replay of a recorded log on one thread uses 0.25 MiB at its deepest.
+/// The rest is room for other logs, other compilers and the sanitizers' own 0.8 MiB.
+inline constexpr std::size_t kFlightStackBytes = std::size_t{2} * 1024 * 1024;
 
 enum class ThreadPolicy {
   kOther,  ///< SCHED_OTHER: shares time with everything else
