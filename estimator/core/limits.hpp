@@ -19,6 +19,15 @@ inline constexpr std::size_t kImageRing = 4;
 inline constexpr std::size_t kWaitingFrames = 3;
 /// Tracked frames on their way to the smoother.
 inline constexpr std::size_t kTrackedRing = 4;
+/// Images of one camera that the recorder may hold: 0.8 s at 20 Hz, the longest that a disk may keep it
+/// waiting without a loss.
+inline constexpr std::size_t kRecordedImages = 16;
+/// Results on their way to the log, which is written at the lowest priority: 1.6 s at 20 Hz; and states at
+/// IMU rate: 1 s at 1 kHz.
+inline constexpr std::size_t kResultRing = 32;
+inline constexpr std::size_t kStateRing = 1024;
+/// Steps of one stage on their way to the recorder.
+inline constexpr std::size_t kStepRing = 256;
 /// States in the smoother's window, keyframes and recent frames together.
 inline constexpr std::size_t kMaxStates = 24;
 /// Landmarks in the smoother's window.

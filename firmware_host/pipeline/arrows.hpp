@@ -49,8 +49,7 @@ enum ImageReader : std::size_t { kTrackReads, kRecordReads, kImageReaders };
 /// Waiting in the ring, one at its head, one waiting for its partner, those of waiting frames, those in
 /// work, and one more that lets the newest in before the oldest goes.
 inline constexpr std::uint32_t kTrackQuota = kImageRing + kWaitingFrames + 4;
-/// 0.8 s at 20 Hz: the longest that a disk may keep the recorder waiting without a loss.
-inline constexpr std::uint32_t kRecordQuota = 16;
+inline constexpr std::uint32_t kRecordQuota = kRecordedImages;
 inline constexpr std::size_t kImageSlots = 1 + kTrackQuota + kRecordQuota;
 using ImagePool = SlotPool<ImageSlot, kImageSlots, kImageReaders>;
 
@@ -93,18 +92,16 @@ struct FrameResult {
 using ImuRing = SpscRing<ImuArrival, kImuRing>;
 using ImageRing = DropOldestRing<SlotHandle, kImageRing>;
 using TrackRing = SpscRing<TrackMessage, kTrackedRing>;
-/// 1.6 s at 20 Hz, for a log that is written at the lowest priority.
-using ResultRing = SpscRing<FrameResult, 32>;
-/// States at IMU rate for the log: 1 s at 1 kHz.
-using StateRing = SpscRing<NavState, 1024>;
+using ResultRing = SpscRing<FrameResult, kResultRing>;
+using StateRing = SpscRing<NavState, kStateRing>;
 
 /// What the recorder takes beside images: it looks at them every few milliseconds.
 struct RecorderArrows {
   ImuRing imu;
   std::array<SpscRing<SlotHandle, kRecordQuota>, kMaxCameras> image;
-  SpscRing<PropagateStep, 256> propagate;
-  SpscRing<TrackStep, 256> track;
-  SpscRing<SmoothStep, 256> smooth;
+  SpscRing<PropagateStep, kStepRing> propagate;
+  SpscRing<TrackStep, kStepRing> track;
+  SpscRing<SmoothStep, kStepRing> smooth;
 };
 
 }  // namespace swiftlet

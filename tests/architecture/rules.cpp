@@ -124,6 +124,18 @@ std::vector<Violation> checkFlightPath(const SourceFile& file) {
   return matchLines(file.path, file.code_lines, kPatterns);
 }
 
+std::vector<Violation> checkNoLocks(const SourceFile& file) {
+  static const std::vector<Pattern> kPatterns = {
+      {std::regex(
+           R"(#\s*include\s*<(mutex|shared_mutex|condition_variable|semaphore|semaphore\.h|future|latch|barrier)>)"),
+       "locks and blocking waits are not for the flight path"},
+      {std::regex(
+           R"(\b(mutex|condition_variable|lock_guard|unique_lock|scoped_lock|pthread_mutex_|pthread_cond_|pthread_rwlock_|sem_wait)\w*)"),
+       "locks and blocking waits are not for the flight path"},
+  };
+  return matchLines(file.path, file.code_lines, kPatterns);
+}
+
 std::vector<Violation> checkHeaderOpening(const SourceFile& file) {
   if (file.lines.empty() || file.lines[0] != "#pragma once") {
     return {{file.path, 1, "a header's first line is #pragma once"}};

@@ -24,6 +24,10 @@ using RoomTable = std::map<std::string, std::set<std::string>>;
 /// No lock, exception, heap call, clock, file, stream or unordered container on the flight path.
 [[nodiscard]] std::vector<Violation> checkFlightPath(const SourceFile& file);
 
+/// No lock and no wait that another thread could prolong, by include or by name: the executor's flight path,
+/// which may read clocks and own threads.
+[[nodiscard]] std::vector<Violation> checkNoLocks(const SourceFile& file);
+
 /// #pragma once in the first line, a comment in the second.
 [[nodiscard]] std::vector<Violation> checkHeaderOpening(const SourceFile& file);
 

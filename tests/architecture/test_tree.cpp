@@ -62,6 +62,14 @@ TEST_CASE("the flight path has no locks, exceptions, heap calls or clocks") {
   requireNone(found);
 }
 
+TEST_CASE("the executor's flight path has no locks") {
+  std::vector<Violation> found;
+  const auto files = readSources({"firmware_host/pipeline", "firmware_host/realtime"});
+  REQUIRE(files.size() > 10);
+  for (const SourceFile& file : files) append(found, checkNoLocks(file));
+  requireNone(found);
+}
+
 TEST_CASE("headers open with #pragma once and say what they are") {
   std::vector<Violation> found;
   for (const SourceFile& file : readSources(roomsAndTests())) {
