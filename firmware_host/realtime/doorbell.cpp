@@ -42,27 +42,17 @@ void futexWait(std::atomic<std::uint32_t>& word, std::uint32_t value, const time
 
 }  // namespace
 
-void Doorbell::wake() {
-  // One sleeper: one to wake. Not INT_MAX, so that a second one shows as a fault in the tests.
-  syscall(SYS_futex, &word_, FUTEX_WAKE_PRIVATE, 1, nullptr, nullptr, 0);
+void KernelSleep::wake(std::atomic<std::uint32_t>& word) {
+  // One sleeper: one to wake.
+  syscall(SYS_futex, &word, FUTEX_WAKE_PRIVATE, 1, nullptr, nullptr, 0);
 }
 
-bool Doorbell::wait(std::uint32_t ticket, Duration at_most) {
-  const std::uint32_t awake = ticket << 1U;
-  if (word_.load(std::memory_order_acquire) != awake) return true;
-  if (at_most.ns <= 0) return false;
+void KernelSleep::sleepWhile(std::atomic<std::uint32_t>& word, std::uint32_t value, Duration at_most) {
   const timespec deadline = deadlineAfter(at_most);
-  std::uint32_t expected = awake;
-  if (!word_.compare_exchange_strong(expected, awake | kAsleep, std::memory_order_acq_rel,
-                                     std::memory_order_acquire)) {
-    return true;
+  // A signal, or the wake of a ring that an earlier round has seen already, may end a sleep early.
+  while (word.load(std::memory_order_relaxed) == value && !isPast(deadline)) {
+    futexWait(word, value, deadline);
   }
-  // A signal or a late wake of an earlier round may end a sleep early.
-  while (word_.load(std::memory_order_acquire) == (awake | kAsleep) && !isPast(deadline)) {
-    futexWait(word_, awake | kAsleep, deadline);
-  }
-  // Only this thread takes the announcement back, so what is left is the number of rings.
-  return word_.fetch_and(~kAsleep, std::memory_order_acq_rel) != (awake | kAsleep);
 }
 
 }  // namespace swiftlet

@@ -26,6 +26,8 @@
 // A ringer that saw the announcement always calls the kernel itself. To let the first one clear it and
 // spare the others the call would make them depend on a ringer that may have been preempted between
 // clearing and waking: a low-priority thread would prolong a high-priority one's sleep.
+// tests/firmware_host runs this header in every interleaving of small cases and with every stale read that
+// the orders allow, and takes each order and each indivisible step away in turn to see a case fail.
 // Rings wrap at 2^31: a ticket held while exactly that many came (24 days at 1 kHz) would sleep its bound.
 
 #include <atomic>
@@ -36,31 +38,55 @@
 
 namespace swiftlet {
 
-class alignas(kCacheLine) Doorbell {
+/// The kernel's part: sleeping and waking, by futex.
+struct KernelSleep {
+  template <typename T>
+  using Atomic = std::atomic<T>;
+
+  /// Sleeps while the word is `value`, at most `at_most`. The check and the falling asleep are one step.
+  static void sleepWhile(std::atomic<std::uint32_t>& word, std::uint32_t value, Duration at_most);
+  /// Wakes who sleeps on the word.
+  static void wake(std::atomic<std::uint32_t>& word);
+};
+
+template <typename Policy>
+class alignas(kCacheLine) BasicDoorbell {
  public:
-  Doorbell() = default;
-  Doorbell(const Doorbell&) = delete;
-  Doorbell& operator=(const Doorbell&) = delete;
+  BasicDoorbell() = default;
+  BasicDoorbell(const BasicDoorbell&) = delete;
+  BasicDoorbell& operator=(const BasicDoorbell&) = delete;
 
   /// Sleeper. The number of rings so far.
   [[nodiscard]] std::uint32_t ticket() const { return word_.load(std::memory_order_acquire) >> 1U; }
 
   /// Any thread, a signal handler too.
   void ring() {
-    if ((word_.fetch_add(kOneRing, std::memory_order_acq_rel) & kAsleep) != 0) wake();
+    if ((word_.fetch_add(kOneRing, std::memory_order_release) & kAsleep) != 0) Policy::wake(word_);
   }
 
   /// Sleeper. Sleeps until a ring later than `ticket`, at most `at_most` of CLOCK_MONOTONIC (nothing or
   /// less: looks only). True when there was such a ring, however it was noticed; false when time ran out.
-  bool wait(std::uint32_t ticket, Duration at_most);
+  bool wait(std::uint32_t ticket, Duration at_most) {
+    const std::uint32_t awake = ticket << 1U;
+    if (word_.load(std::memory_order_acquire) != awake) return true;
+    if (at_most.ns <= 0) return false;
+    std::uint32_t expected = awake;
+    if (!word_.compare_exchange_strong(expected, awake | kAsleep, std::memory_order_relaxed,
+                                       std::memory_order_acquire)) {
+      return true;
+    }
+    Policy::sleepWhile(word_, awake | kAsleep, at_most);
+    // Only this thread takes the announcement back, so what differs is the number of rings.
+    return word_.fetch_and(~kAsleep, std::memory_order_acquire) != (awake | kAsleep);
+  }
 
  private:
   static constexpr std::uint32_t kAsleep = 1;   ///< lowest bit: the sleeper is, or is about to be, asleep
   static constexpr std::uint32_t kOneRing = 2;  ///< the other 31 bits count rings
 
-  void wake();
-
-  std::atomic<std::uint32_t> word_{0};
+  typename Policy::template Atomic<std::uint32_t> word_{0};
 };
+
+using Doorbell = BasicDoorbell<KernelSleep>;
 
 }  // namespace swiftlet

@@ -136,6 +136,10 @@ class Atomic {
     return change(
         value, order, [](Bits old, Bits operand) { return old & operand; }, where);
   }
+  T fetch_add(T value, std::memory_order order, const Place& where = Place::current()) {
+    return change(
+        value, order, [](Bits old, Bits operand) { return old + operand; }, where);
+  }
   bool compare_exchange_strong(T& expected, T desired, std::memory_order success, std::memory_order failure,
                                const Place& where = Place::current()) {
     detail::Operation operation = make(detail::Kind::kModify, success, detail::toBits(desired),
