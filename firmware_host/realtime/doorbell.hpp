@@ -71,7 +71,7 @@ class alignas(kCacheLine) BasicDoorbell {
     if (word_.load(std::memory_order_acquire) != awake) return true;
     if (at_most.ns <= 0) return false;
     std::uint32_t expected = awake;
-    if (!word_.compare_exchange_strong(expected, awake | kAsleep, std::memory_order_relaxed,
+    if (!word_.compare_exchange_strong(expected, awake | kAsleep, std::memory_order_acquire,
                                        std::memory_order_acquire)) {
       return true;
     }
