@@ -13,6 +13,9 @@ namespace {
 constexpr Duration kMaxHold = Duration::fromMilliseconds(250);
 // Below this share of the wanted features new ones are detected without waiting for a keyframe.
 constexpr float kReplenishShare = 0.6F;
+// A feature that the other camera does not show is looked for again at the next keyframe, then after one more
+// in between each time, up to this many: most are out of its sight and stay so.
+constexpr int kMaxMatchWait = 3;
 // An image is dark when its mean is below this level and it carries almost no feature.
 constexpr float kDarkMean = 12.0F;
 constexpr int kDarkFeatures = 10;
@@ -170,12 +173,18 @@ void Frontend::Impl::matchMissing(bool only_new) {
     if (track.live[0] == track.live[1] || (only_new && track.age > 0)) continue;
     const std::size_t from = track.live[0] ? 0 : 1;
     const std::size_t to = 1 - from;
+    if (track.match_wait > 0) {
+      --track.match_wait;
+      continue;
+    }
     Eigen::Vector2f pixel;
     if (!matcher_.match(camera_[from].now(), from, track.pixel[from], camera_[to].now(), pixel) ||
         !place(track, to, pixel)) {
       ++statistics_.match_failed;
+      track.match_wait = std::min(track.unmatched++, kMaxMatchWait);
       continue;
     }
+    track.unmatched = 0;
     track.had_previous[to] = false;
     track.in_keyframe[to] = false;
     anchors_[track.slot].patch[to].take(camera_[to].now(), pixel);

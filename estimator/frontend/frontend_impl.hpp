@@ -20,9 +20,11 @@ namespace swiftlet {
 /// A feature in the cameras' newest images.
 struct Track {
   TrackId id = 0;
-  int slot = -1;      ///< in the anchor pool
-  int age = 0;        ///< frames since detection
-  int landmark = -1;  ///< index of its prediction in this frame's list
+  int slot = -1;       ///< in the anchor pool
+  int age = 0;         ///< frames since detection
+  int unmatched = 0;   ///< attempts in a row to find it in the other camera that failed
+  int match_wait = 0;  ///< keyframes until the next one
+  int landmark = -1;   ///< index of its prediction in this frame's list
   /// Has a position in that camera's newest image (which may be an earlier frame's).
   std::array<bool, kMaxCameras> live{};
   std::array<bool, kMaxCameras> had_previous{};  ///< `previous` holds the frame before
