@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "estimator/geometry/so3.hpp"
 
@@ -38,6 +39,17 @@ double largestStep(const VectorMap& step, bool with_time_offset, int calibration
   for (Eigen::Index k = with_time_offset ? 1 : 0; k + 3 <= step.size(); k += 3) {
     if (k >= calibration && k < calibration + extra) continue;
     largest = std::max(largest, step.segment<3>(k).norm());
+  }
+  return largest;
+}
+
+// Of the poses' parts alone, the longest.
+double largestPoseStep(const VectorMap& step, std::span<const std::uint8_t> order,
+                       const std::array<WindowState, kMaxStates>& states) {
+  double largest = 0;
+  for (const std::uint8_t slot : order) {
+    const Eigen::Index at = states[slot].offset;
+    largest = std::max({largest, step.segment<3>(at).norm(), step.segment<3>(at + 3).norm()});
   }
   return largest;
 }
@@ -83,7 +95,7 @@ Status Smoother::step(const StepInput& input) {
   if (trim_due_) return {StatusCode::kInvalidInput, "the window has not been trimmed since the last step"};
   const std::uint8_t slot = addState(input);
   addSightings(slot, *input.frame, input.max_features);
-  const Status status = solve(input.iterations);
+  const Status status = solve(input.iterations, input.pose_tolerance);
   if (!status.ok()) return status;
   updateStatistics();
   max_keyframes_ = std::clamp(input.max_keyframes, 1, settings_.max_keyframes);
@@ -481,7 +493,7 @@ void Smoother::applyStep(const Eigen::Ref<const Eigen::VectorXd>& step) {
   retractExtras(step);
 }
 
-Status Smoother::solve(int iterations) {
+Status Smoother::solve(int iterations, double pose_tolerance) {
   assignOffsets();
   settlePlanes();
   for (std::size_t k = 1; k < order_.size(); ++k) {
@@ -526,8 +538,10 @@ Status Smoother::solve(int iterations) {
     substitutePoints(step);
     applyStep(step);
     statistics_.iterations = iteration + 1;
-    if (largestStep(step, calibration_.time_offset, calibration_.dimension(), extra_columns_) < kConverged)
+    if (largestStep(step, calibration_.time_offset, calibration_.dimension(), extra_columns_) < kConverged ||
+        largestPoseStep(step, {order_.data(), order_.size()}, states_) < pose_tolerance) {
       break;
+    }
   }
   placeCameras();
   rejectOutliers(kFinalOutlierSigmas, true);

@@ -96,7 +96,10 @@ class Smoother {
     const TrackedFrame* frame = nullptr;
     bool imu_gap = false;  ///< samples are missing since the previous frame
     bool at_rest = false;
-    int iterations = 2;
+    int iterations = 2;  ///< at most
+    /// m, rad: a step in which no pose moves further is the last. It has changed Jacobians and robust weights
+    /// by less than the noise shows, and the rest of a state enters linearly.
+    double pose_tolerance = 1e-3;
     /// Of the frame's features, taken at most: those with the smallest ids, known for longest; at least 1.
     int max_features = static_cast<int>(kMaxFeatures);
     /// That the window keeps, between 1 and the settings'; further down it comes by two a step.
@@ -180,7 +183,7 @@ class Smoother {
   void removeLandmark(Landmark& landmark);
   void discardLandmark(Landmark& landmark);
 
-  Status solve(int iterations);
+  Status solve(int iterations, double pose_tolerance);
   void assignOffsets();
   void restore();
   void backup();

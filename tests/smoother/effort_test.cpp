@@ -136,6 +136,33 @@ TEST_CASE("Smoother: a window made shorter comes down two keyframes a step and g
   }
 }
 
+TEST_CASE("Smoother: steps end when the poses stand still, and lose little by it", "[smoother][effort]") {
+  const TrackFlight flight(test::roomFlight(6, 17));
+  SmootherRun usual(flight);
+  SmootherRun patient(flight);
+  patient.pose_tolerance = 0;
+  int usual_steps = 0;
+  int patient_steps = 0;
+  double worst = 0;
+  flight.play(
+      [&](const ImuSample& s) {
+        usual.addImu(s);
+        patient.addImu(s);
+      },
+      [&](std::size_t k) {
+        REQUIRE(usual.step(k).ok());
+        REQUIRE(patient.step(k).ok());
+        usual_steps += usual.smoother().statistics().iterations;
+        patient_steps += patient.smoother().statistics().iterations;
+        worst = std::max(worst, (usual.smoother().newest().x.T_world_body.translation -
+                                 patient.smoother().newest().x.T_world_body.translation)
+                                    .norm());
+      });
+  std::printf("steps %d for %d, poses apart by at most %.2g m\n", usual_steps, patient_steps, worst);
+  CHECK(usual_steps < 0.8 * patient_steps);
+  CHECK(worst < 2e-3);
+}
+
 TEST_CASE("Smoother: a step waits for the trim of the one before", "[smoother][effort]") {
   const TrackFlight flight(test::roomFlight(2, 16));
   SmootherRun run(flight);

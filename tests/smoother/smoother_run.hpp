@@ -29,7 +29,8 @@ class SmootherRun {
 
   void addImu(const ImuSample& sample) { smoother_->addImu(sample); }
 
-  // Effort of the steps to come.
+  // Of the steps to come.
+  double pose_tolerance = Smoother::StepInput{}.pose_tolerance;
   int max_features = static_cast<int>(kMaxFeatures);
   int max_keyframes = static_cast<int>(kMaxStates);
 
@@ -38,6 +39,7 @@ class SmootherRun {
     Smoother::StepInput input;
     input.frame = &flight_.frames()[k];
     input.iterations = k < 20 ? std::max(iterations, 8) : iterations;  // the start needs more
+    input.pose_tolerance = pose_tolerance;
     input.max_features = max_features;
     input.max_keyframes = max_keyframes;
     const Status status = smoother_->step(input);
