@@ -8,14 +8,13 @@ namespace {
 // The patch, its gradient pixel and the interpolation's neighbour.
 constexpr float kBorder = static_cast<float>(kPatchRadius) + 2.0F;
 
-// `finest`: how level 0 ends.
-bool trackLevels(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Pyramid& to, int levels,
-                 const AlignmentLimits& limits, PatchTemplate::Finish finest, Eigen::Vector2f& to_pixel) {
+bool trackForward(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Pyramid& to, int levels,
+                  const AlignmentLimits& limits, Eigen::Vector2f& to_pixel) {
   PatchTemplate patch;
   for (int level = std::min(levels, from.levels()) - 1; level >= 0; --level) {
     const ImageView& image = from.level(level);
     const auto scale = static_cast<float>(1 << level);
-    const auto finish = level == 0 ? finest : PatchTemplate::Finish::kCoarse;
+    const auto finish = level == 0 ? PatchTemplate::Finish::kFine : PatchTemplate::Finish::kCoarse;
     const Eigen::Vector2f centre = from_pixel / scale;
     const auto x = static_cast<int>(std::lround(centre.x()));
     const auto y = static_cast<int>(std::lround(centre.y()));
@@ -45,14 +44,11 @@ bool patchInside(const ImageView& image, const Eigen::Vector2f& pixel) {
 bool trackPoint(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Pyramid& to,
                 const LucasKanadeSettings& settings, Eigen::Vector2f& to_pixel) {
   if (!patchInside(from.level(0), from_pixel)) return false;
-  constexpr auto kFine = PatchTemplate::Finish::kFine;
-  if (!trackLevels(from, from_pixel, to, settings.levels, settings.limits, kFine, to_pixel)) return false;
+  if (!trackForward(from, from_pixel, to, settings.levels, settings.limits, to_pixel)) return false;
   if (!patchInside(to.level(0), to_pixel)) return false;
   if (settings.back_check <= 0) return true;
-  // The way back is judged to half a pixel: what makes the last hundredths exact would be wasted on it.
-  constexpr auto kCoarse = PatchTemplate::Finish::kCoarse;
   Eigen::Vector2f back = from_pixel;
-  if (!trackLevels(to, to_pixel, from, settings.back_levels, settings.limits, kCoarse, back)) return false;
+  if (!trackForward(to, to_pixel, from, settings.back_levels, settings.limits, back)) return false;
   return (back - from_pixel).squaredNorm() <= settings.back_check * settings.back_check;
 }
 
