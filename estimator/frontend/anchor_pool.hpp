@@ -1,7 +1,7 @@
 #pragma once
 // The patches by which landmarks are recognized: how each looked to each camera when it was first
 // seen. Tracked features hold a slot; lost ones keep theirs until the pool needs it, the one not
-// seen for longest going first. 1.8 KiB per patch, 3.6 MiB in all, reserved by the constructor.
+// seen for longest going first. 1.9 KiB per patch, 3.8 MiB in all, reserved by the constructor.
 
 #include <Eigen/Core>
 #include <array>
