@@ -4,7 +4,7 @@
 //
 // Samples come before the first frame whose stamp is not earlier; windows when they are there (an older one
 // costs sharpness of prediction, nothing else). A window of a new epoch drops the tracks.
-// Memory: the front-end's 6.3 MiB at 752 x 480 stereo and half a MiB of samples, no allocation after the
+// Memory: the front-end's 6.5 MiB at 752 x 480 stereo and half a MiB of samples, no allocation after the
 // constructor. Cost, rules and sources: docs/odometry.md, docs/frontend.md.
 
 #include "estimator/camera/rig.hpp"

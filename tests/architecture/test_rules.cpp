@@ -40,6 +40,16 @@ TEST_CASE("rooms are folders of the table") {
   CHECK(parseSource("mapping/volume/block.hpp", "").room() == "mapping/volume");
 }
 
+TEST_CASE("locks are found by include and by name") {
+  const auto locks = [](const std::string& text) {
+    return checkNoLocks(parseSource("firmware_host/pipeline/a.cpp", text)).size();
+  };
+  CHECK(locks("#include <mutex>\n") == 1);
+  CHECK(locks("std::scoped_lock guard(m);\n") == 1);
+  CHECK(locks("pthread_cond_wait(&c, &m);\n") == 1);
+  CHECK(locks("// a mutex\nstd::atomic<int> a;\n") == 0);
+}
+
 TEST_CASE("include directions: forbidden, allowed and unknown") {
   const auto upward = includes("estimator/core/a.hpp", "estimator/geometry/so3.hpp");
   REQUIRE(upward.size() == 1);

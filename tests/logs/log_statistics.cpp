@@ -54,12 +54,15 @@ struct Run {
 Run runLog(const std::string& log, double from, double until) {
   const std::unique_ptr<LogSource> source = openLog(log, LogOptions{});
   StateKeeper keeper;
-  const auto wiring = std::make_unique<Wiring>(source->rig(), source->imuNoise(), Settings{}, keeper);
-  ReplayPlan plan;
-  plan.from = from;
-  if (until < kNotAsked) plan.until = until;
-  runLockstep(*source, *wiring, plan);
-  const auto first = wiring->statistics().first_image;
+  RunLog run_log(keeper);
+  const auto wiring =
+      std::make_unique<Wiring>(source->rig(), source->imuNoise(), Settings{}, run_log, Wiring::Options{});
+  LogSection section;
+  section.from = from;
+  if (until < kNotAsked) section.until = until;
+  LogFeed feed(*source, section, nullptr);
+  runLockstep(feed, *wiring, RunControl{});
+  const auto first = run_log.statistics().first_image;
   return {std::move(keeper.states), first ? *first : Stamp{}};
 }
 
