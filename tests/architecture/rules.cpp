@@ -130,7 +130,7 @@ std::vector<Violation> checkNoLocks(const SourceFile& file) {
            R"(#\s*include\s*<(mutex|shared_mutex|condition_variable|semaphore|semaphore\.h|future|latch|barrier)>)"),
        "locks and blocking waits are not for the flight path"},
       {std::regex(
-           R"(\b(mutex|condition_variable|lock_guard|unique_lock|scoped_lock|pthread_mutex_|pthread_cond_|pthread_rwlock_|sem_wait)\w*)"),
+           R"(\bstd::(\w*mutex|condition_variable|lock_guard|unique_lock|scoped_lock|shared_lock|future)|\b(pthread_(mutex|cond|rwlock)_|sem_wait))"),
        "locks and blocking waits are not for the flight path"},
   };
   return matchLines(file.path, file.code_lines, kPatterns);

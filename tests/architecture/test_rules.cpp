@@ -46,6 +46,7 @@ TEST_CASE("locks are found by include and by name") {
   };
   CHECK(locks("#include <mutex>\n") == 1);
   CHECK(locks("std::scoped_lock guard(m);\n") == 1);
+  CHECK(locks("std::mutex m;\n") == 1);
   CHECK(locks("pthread_cond_wait(&c, &m);\n") == 1);
   CHECK(locks("// a mutex\nstd::atomic<int> a;\n") == 0);
 }

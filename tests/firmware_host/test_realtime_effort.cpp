@@ -17,6 +17,8 @@ namespace {
 constexpr GovernorSettings kSettings{.step_budget = 0.012, .age_budget = 0.05, .good_steps = 10};
 constexpr double kPeriod = 0.05;  // s between frames
 
+constexpr Effort kFull{.iterations = 2, .features = 300, .keyframes = 12};
+
 /// s; as measured on the recorded logs: about 4 ms a frame and 7 ms a keyframe, a quarter of it fixed.
 double trackTime(const Effort& effort, int frame) {
   const double share = effort.features / 300.0;
@@ -68,7 +70,7 @@ int reversals(const Run& run) {
 }
 
 TEST_CASE("ladders: full effort first, each level less in one thing, never below the least") {
-  const Effort full{.iterations = 2, .features = 300, .keyframes = 12};
+  const Effort& full = kFull;
   const EffortLadder tracker = trackerLadder(full);
   REQUIRE(tracker.size() > 4);
   CHECK(tracker[0] == full);
@@ -103,11 +105,11 @@ TEST_CASE("ladders: full effort first, each level less in one thing, never below
 }
 
 TEST_CASE("within the budget nothing is taken away") {
-  EffortGovernor tracker(trackerLadder({}), kSettings);
+  EffortGovernor tracker(trackerLadder(kFull), kSettings);
   CHECK(runStage(
             tracker, trackTime, [](int) { return 1.0; }, 2000)
             .changes.empty());
-  EffortGovernor smoother(smootherLadder({}), kSettings);
+  EffortGovernor smoother(smootherLadder(kFull), kSettings);
   CHECK(runStage(
             smoother, smoothTime, [](int) { return 1.0; }, 2000)
             .changes.empty());
@@ -145,14 +147,14 @@ TEST_CASE("a stage made four times slower is within its budget after ten frames,
     CHECK(run.changes.front().why != EffortReason::kRecovered);
     CHECK(run.changes.back().why == EffortReason::kRecovered);
   };
-  check(trackerLadder({}), 0.012, trackTime);
-  check(trackerLadder({}), 0.016, trackTime);
-  check(smootherLadder({}), 0.004, smoothTime);
-  check(smootherLadder({}), 0.008, smoothTime);
+  check(trackerLadder(kFull), 0.012, trackTime);
+  check(trackerLadder(kFull), 0.016, trackTime);
+  check(smootherLadder(kFull), 0.004, smoothTime);
+  check(smootherLadder(kFull), 0.008, smoothTime);
 }
 
 TEST_CASE("a load that grows is met before a step takes its whole budget") {
-  EffortGovernor governor(trackerLadder({}), kSettings);
+  EffortGovernor governor(trackerLadder(kFull), kSettings);
   // Keyframes of 7 ms reach the budget of 12 ms at a slowness of 1.7.
   const Run run = runStage(
       governor, trackTime, [](int frame) { return 1 + frame / 1000.0; }, 1200);
@@ -168,7 +170,7 @@ TEST_CASE("a load that grows is met before a step takes its whole budget") {
 }
 
 TEST_CASE("one step that the system made slow costs nothing, or half a second when frames piled up") {
-  EffortGovernor governor(trackerLadder({}), kSettings);
+  EffortGovernor governor(trackerLadder(kFull), kSettings);
   const auto hiccup = [](double wall) {
     return [wall](int frame) { return frame == 100 ? wall / trackTime({}, 100) : 1.0; };
   };
@@ -184,7 +186,7 @@ TEST_CASE("one step that the system made slow costs nothing, or half a second wh
 
 TEST_CASE("frames that come late act after three on end, and not through one") {
   const auto levelsAfter = [](int late_steps) {
-    EffortGovernor governor(trackerLadder({}), kSettings);
+    EffortGovernor governor(trackerLadder(kFull), kSettings);
     for (int i = 0; i < 20; ++i) governor.update({0.004, 0, 0.001});
     for (int i = 0; i < late_steps; ++i) governor.update({0.004, 0, 0.048});
     return governor.level();
@@ -196,7 +198,7 @@ TEST_CASE("frames that come late act after three on end, and not through one") {
 
 TEST_CASE("between a level that is too slow and one that is not, changes are rare") {
   // Level 0 takes 1.2 budgets, level 1 takes half of one.
-  EffortGovernor governor(trackerLadder({}), kSettings);
+  EffortGovernor governor(trackerLadder(kFull), kSettings);
   Run run;
   constexpr int kSteps = 4000;
   for (int i = 0; i < kSteps; ++i) {
@@ -215,7 +217,7 @@ TEST_CASE("whatever comes, levels stay on the ladder and changes are told as the
       1e-9, 1e30, -std::numeric_limits<double>::infinity()};
   int up = 0;
   for (int pattern = 0; pattern < 20; ++pattern) {
-    const EffortLadder ladder = pattern % 2 == 0 ? trackerLadder({}) : smootherLadder({});
+    const EffortLadder ladder = pattern % 2 == 0 ? trackerLadder(kFull) : smootherLadder(kFull);
     EffortGovernor governor(ladder, kSettings);
     EffortGovernor twin(ladder, kSettings);
     double slowness = 1;

@@ -10,7 +10,7 @@
 #include "firmware_host/commands/replay_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
-#include "tests/support/flight_trap.hpp"
+#include "tests/logs/flight_trap.hpp"
 
 namespace swiftlet {
 namespace {

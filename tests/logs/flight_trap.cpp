@@ -1,4 +1,4 @@
-#include "tests/support/flight_trap.hpp"
+#include "tests/logs/flight_trap.hpp"
 
 #include <dlfcn.h>
 #include <pthread.h>
