@@ -172,7 +172,7 @@ TEST_CASE("a load that grows is met before a step takes its whole budget") {
 TEST_CASE("one step that the system made slow costs nothing, or half a second when frames piled up") {
   EffortGovernor governor(trackerLadder(kFull), kSettings);
   const auto hiccup = [](double wall) {
-    return [wall](int frame) { return frame == 100 ? wall / trackTime({}, 100) : 1.0; };
+    return [wall](int frame) { return frame == 100 ? wall / trackTime(kFull, 100) : 1.0; };
   };
   CHECK(runStage(governor, trackTime, hiccup(0.045), 300).changes.empty());
   // 120 ms at 20 Hz leave two frames waiting: that acts at once, by one level, and is given back soon.
