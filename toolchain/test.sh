@@ -21,9 +21,7 @@ esac
 fuzz_seconds=15 # each fuzzer
 # Unit tests that run under sanitizers too; the statistical ones (imu, ransac, whole flights, rendering, the program)
 # repeat the same code thousands of times and would take most of an hour there.
-sanitized='core geometry camera frontend smoother drivers_calibration drivers_recorded drivers_recording drivers_image_decoder threaded'
-# What runs on several threads, under ThreadSanitizer.
-threads='core realtime threaded'
+sanitized='core geometry camera frontend smoother drivers_calibration drivers_recorded drivers_recording drivers_image_decoder'
 jobs=$(nproc)
 steps='' # lines "seconds result step"
 failed_steps=0
@@ -135,10 +133,6 @@ if [ $quick = no ]; then
   step "configure with sanitizers" configure asan -DSWIFTLET_BUILD_TESTS=ON &&
     step "build with sanitizers" build asan --target $(echo $sanitized | sed 's/\([^ ]*\)/test_\1/g') &&
     step "unit tests with sanitizers" run_ctest asan -R "^($(echo $sanitized | tr ' ' '|'))\$"
-  # shellcheck disable=SC2086
-  step "configure for races" configure tsan -DSWIFTLET_BUILD_TESTS=ON &&
-    step "build for races" build tsan --target $(echo $threads | sed 's/\([^ ]*\)/test_\1/g') &&
-    step "threads without races" run_ctest tsan -R "^($(echo $threads | tr ' ' '|'))\$"
 fi
 if [ $quick = no ] && [ -f tests/fuzz/CMakeLists.txt ]; then
   step "configure fuzzers" configure fuzz &&
