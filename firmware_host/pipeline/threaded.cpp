@@ -185,8 +185,15 @@ class Run {
   template <typename Work>
   void low(Work&& work, std::atomic<bool>& done) {
     const bool recorder = &done == &record_done_;
-    while (!(recorder ? wiring_.recordDone() : wiring_.logDone())) {
-      if (!work()) sleepFor(kLowPeriod);
+    try {
+      while (!(recorder ? wiring_.recordDone() : wiring_.logDone())) {
+        if (!work()) sleepFor(kLowPeriod);
+      }
+    } catch (...) {
+      // A full disk, say: the flight goes on without its files, to its end, and the report names the fault.
+      if (!recorder) wiring_.abandonLog();
+      done.store(true, std::memory_order_release);
+      throw;
     }
     done.store(true, std::memory_order_release);
   }

@@ -127,7 +127,10 @@ bool Wiring::smooth() {
     return false;
   }
   const bool ended = message->kind == TrackMessage::Kind::kEnd;
-  if (ended && results_.size() >= ResultRing::capacity()) return false;  // the end is not to be lost
+  // The end is not to be lost, unless nobody is left to take it.
+  if (ended && results_.size() >= ResultRing::capacity() && !log_abandoned_.load(std::memory_order_acquire)) {
+    return false;
+  }
   FrameResult* result = results_.beginPush();
   FrameResult& out = result != nullptr ? *result : smoothing_.unread;
   out.kind = message->kind;
@@ -146,7 +149,6 @@ bool Wiring::smooth() {
   }
   out.published = wallSeconds();
   if (result != nullptr) results_.commitPush();
-  published_.fetch_add(1, std::memory_order_relaxed);
   if (message->kind == TrackMessage::Kind::kFrame) {
     addTime(times_, StageId::kTrim, measured([&] { smooth_.trim(); }), message->tracked.keyframe);
     smooth_.window(window_.draft());

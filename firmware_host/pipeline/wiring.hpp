@@ -114,6 +114,8 @@ class Wiring {
   [[nodiscard]] bool propagateDone() const { return propagate_done_.load(std::memory_order_acquire); }
   [[nodiscard]] bool smoothDone() const { return smooth_done_.load(std::memory_order_acquire); }
   [[nodiscard]] bool logDone() const { return log_done_; }
+  /// Any thread: nobody calls log() any more, so nothing waits for room in front of it.
+  void abandonLog() { log_abandoned_.store(true, std::memory_order_release); }
   [[nodiscard]] bool recordDone() const { return record_done_; }
   /// Tracked frames that wait for `smooth`.
   [[nodiscard]] std::size_t trackedWaiting() const { return tracked_ring_.size(); }
@@ -130,8 +132,6 @@ class Wiring {
     return facts;
   }
   [[nodiscard]] const StageTable& times() const { return times_; }
-  /// Frames that the thread `smooth` has published.
-  [[nodiscard]] std::uint64_t published() const { return published_.load(std::memory_order_relaxed); }
 
  private:
   struct Camera {
@@ -215,7 +215,7 @@ class Wiring {
 
   std::atomic<std::int64_t> newest_imu_{std::numeric_limits<std::int64_t>::min()};
   std::atomic<bool> input_ended_{false}, propagate_done_{false}, track_done_{false}, smooth_done_{false};
-  std::atomic<std::uint64_t> published_{0};
+  std::atomic<bool> log_abandoned_{false};
   bool log_done_ = false, record_done_ = false;
   WiringCounters counters_;
   StageTable times_;

@@ -15,12 +15,15 @@
 #include <fstream>
 #include <new>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "drivers/recorded/open_log.hpp"
 #include "drivers/recorded/recording_source.hpp"
 #include "estimator/core/random.hpp"
 #include "firmware_host/commands/replay_run.hpp"
+#include "firmware_host/pipeline/threaded.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
 
@@ -220,6 +223,36 @@ TEST_CASE("a stage that stands still loses the oldest images, counted, and goes 
   for (const char* file : {"odometry.tum", "states.csv", "map.tum"}) {
     CHECK(textOf(folder.file("run/") + file) == textOf(folder.file("again/") + file));
   }
+}
+
+/// Fails as a full disk would.
+class FailingListener : public RunListener {
+ public:
+  void onFrame(const TrackedFrame& /*tracked*/, const OdometryOutput& /*output*/) override {
+    if (++frames_ == 10) throw std::runtime_error("the disk is full");
+  }
+  void onImuState(const NavState& /*state*/) override {}
+  void onFinish(const OdometryOutput& /*output*/) override {}
+  void onRemark(Stamp /*stamp*/, const std::string& /*text*/) override {}
+
+ private:
+  int frames_ = 0;
+};
+
+TEST_CASE("a log that fails ends neither the flight nor the waiting for its end") {
+  const auto source = openLog(shortLog());
+  FailingListener listener;
+  RunLog log(listener);
+  LogFeed feed(*source, {}, nullptr);
+  const auto wiring =
+      std::make_unique<Wiring>(source->rig(), source->imuNoise(), Settings{}, log, Wiring::Options{});
+  ThreadedOptions options;
+  options.speed = kSlow;
+  const ThreadedReport report = runThreaded(feed, *wiring, options, RunControl{});
+  REQUIRE(report.faults.size() == 1);
+  CHECK(report.faults[0] == "log: the disk is full");
+  CHECK(wiring->smoothDone());
+  CHECK(wiring->counters().sensor.images[0] == 80);
 }
 
 TEST_CASE("a killed recording loses at most its last second") {
