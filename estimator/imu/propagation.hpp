@@ -8,11 +8,11 @@
 // samples, holes and saturated readings; a gap (more than 10 periods without a sample) is not
 // integrated: attitude and velocity are held, their covariance grows (integration_rule.hpp).
 // Frames: NavState's (world with z up, body). Units: SI.
-// Errors: kNotReady before the first state (the sample is kept: the first state comes late); kInvalidInput for a sample not later than the last one
-// or not finite (dropped), and for a state that is not finite; kCapacityReached when a state is so
-// old that the ring no longer holds the samples after it (the hole is bridged).
-// Memory: 1024 samples, 60 kB; nothing is allocated. Cost: about 2 us a sample,
-// covariance and output included.
+// Errors: kNotReady before the first state (the sample is kept: the first state comes late); kInvalidInput
+// for a sample not later than the last one or not finite (dropped), and for a state that is not finite;
+// kCapacityReached when a state is so old that the ring no longer holds the samples after it (the hole is
+// bridged). Memory: 1024 samples, 60 kB; nothing is allocated. Cost: about 2 us a sample, covariance and
+// output included.
 
 #include <array>
 #include <cstddef>

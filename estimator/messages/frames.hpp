@@ -16,7 +16,7 @@ struct CameraFrame {
   Stamp stamp;    ///< mid-exposure
   Stamp arrival;  ///< when the last byte was there; equals `stamp` where a log does not say
   Clock clock = Clock::kLog;
-  std::uint32_t camera = 0;  ///< 0 left, 1 right
+  std::uint32_t camera = 0;    ///< 0 left, 1 right
   std::uint64_t sequence = 0;  ///< the device's own count
   std::uint64_t number = 0;    ///< of this camera's images that entered the estimator, from 1; 0: not counted
   ImageView image;

@@ -9,8 +9,8 @@
 
 #include "firmware_host/commands/replay_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
-#include "tests/logs/log_data.hpp"
 #include "tests/logs/flight_trap.hpp"
+#include "tests/logs/log_data.hpp"
 
 namespace swiftlet {
 namespace {
