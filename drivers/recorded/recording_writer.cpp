@@ -56,6 +56,13 @@ iovec readOnly(std::span<const std::uint8_t> piece) {
   return {const_cast<std::uint8_t*>(piece.data()), piece.size()};
 }
 
+void appendEffort(LittleEndianWriter& to, const Effort& effort) {
+  to.i32(effort.iterations);
+  to.i32(effort.features);
+  to.i32(effort.keyframes);
+  to.i32(0);  // room for one more
+}
+
 }  // namespace
 
 RecordingWriter::RecordingWriter(const std::string& folder, const RecordingHeader& header,
@@ -282,10 +289,7 @@ Status RecordingWriter::trackStep(const TrackStep& step) {
   for (const std::uint64_t image : step.image) to.u64(image);
   to.u64(step.samples);
   to.u64(step.window);
-  to.i32(step.effort.iterations);
-  to.i32(step.effort.features);
-  to.i32(step.effort.keyframes);
-  to.i32(0);
+  appendEffort(to, step.effort);
   return put(RecordKind::kTrackStep, payload.data(), payload.size());
 }
 
@@ -294,10 +298,7 @@ Status RecordingWriter::smoothStep(const SmoothStep& step) {
   LittleEndianWriter to(payload.data());
   to.u64(step.frame);
   to.u64(step.samples);
-  to.i32(step.effort.iterations);
-  to.i32(step.effort.features);
-  to.i32(step.effort.keyframes);
-  to.i32(0);
+  appendEffort(to, step.effort);
   return put(RecordKind::kSmoothStep, payload.data(), payload.size());
 }
 

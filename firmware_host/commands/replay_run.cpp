@@ -166,7 +166,6 @@ class ReplayRun {
     wanted.recorder = flight_recorder.get();
     wanted.drag = hooks_.drag;
     LogFeed feed(*source_, {request_.from, request_.until, request_.last_stamp}, tracks_.get());
-    std::unique_ptr<Wiring> wiring;
     if (request_.real_time) {
       FlightRequest flight;
       flight.speed = request_.speed;
@@ -175,7 +174,8 @@ class ReplayRun {
       facts_.finished =
           flyThreaded(*source_, feed, settings_, *log_, wanted, flight, control_, facts_.executor);
     } else {
-      wiring = std::make_unique<Wiring>(source_->rig(), source_->imuNoise(), settings_, *log_, wanted);
+      const auto wiring =
+          std::make_unique<Wiring>(source_->rig(), source_->imuNoise(), settings_, *log_, wanted);
       memory_.note("estimator_at_start");
       facts_.finished = runLockstep(feed, *wiring, control_);
       log_->collect(*wiring);

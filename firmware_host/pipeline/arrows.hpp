@@ -83,13 +83,37 @@ struct FrameResult {
   HostTimes host;
   double published = 0;  ///< host time
   Spent spent;           ///< by `track` and `smooth` until it was published
-  Spent smooth_spent;
   int dropped = 0;
   int track_level = 0;
   int smooth_level = 0;
 };
 
 using ImuRing = SpscRing<ImuArrival, kImuRing>;
+/// Hands samples not later than `until` to `taker`, in order; how many.
+template <typename Taker>
+std::uint64_t takeSamples(ImuRing& ring, Stamp until, Taker&& taker) {
+  std::uint64_t taken = 0;
+  for (const ImuArrival* arrival = ring.front(); arrival != nullptr && arrival->sample.stamp <= until;
+       arrival = ring.front()) {
+    taker(arrival->sample);
+    ring.pop();
+    ++taken;
+  }
+  return taken;
+}
+
+/// The same where no frame has come for long and samples must not fill the ring: half of it is more than any
+/// frame will ask for.
+template <typename Taker>
+std::uint64_t takeSurplus(ImuRing& ring, Taker&& taker) {
+  std::uint64_t taken = 0;
+  for (; ring.size() > kImuRing / 2; ++taken) {
+    taker(ring.front()->sample);
+    ring.pop();
+  }
+  return taken;
+}
+
 using ImageRing = DropOldestRing<SlotHandle, kImageRing>;
 using TrackRing = SpscRing<TrackMessage, kTrackedRing>;
 using ResultRing = SpscRing<FrameResult, kResultRing>;

@@ -47,7 +47,6 @@ HeapMark::HeapMark() {
 Wiring::Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, RunLog& log,
                const Options& options)
     : rig_(rigInUse(rig, settings.odometry)),
-      imu_period_(1.0 / noise.rate_hz),
       log_(log),
       recorder_(options.recorder),
       arming_(options.arming),
@@ -93,7 +92,7 @@ bool Wiring::propagate() {
   const std::uint64_t fix = fix_.refresh();
   if (fix != propagating_.fix) {
     propagating_.fix = fix;
-    if (to_recorder_) static_cast<void>(to_recorder_->propagate.tryPush({propagating_.samples, fix}));
+    if (to_recorder_) static_cast<void>(to_recorder_->propagate.tryPush({counters_.propagate.samples, fix}));
     addTime(times_, StageId::kFix, measured([&] { propagation_.take(fix_.value()); }));
   }
   const ImuArrival* arrival = imu_to_propagate_.front();
@@ -105,7 +104,6 @@ bool Wiring::propagate() {
   if (states_ && status.ok()) static_cast<void>(states_->tryPush(propagating_.state));
   addTime(times_, StageId::kImu, {wallSeconds() - arrival->host.arrival, threadCpuSeconds() - cpu});
   imu_to_propagate_.pop();
-  ++propagating_.samples;
   ++counters_.propagate.samples;
   if (!status.ok() && status.code != StatusCode::kNotReady) {
     ++counters_.propagate.refused;
@@ -118,12 +116,8 @@ bool Wiring::propagate() {
 bool Wiring::smooth() {
   const TrackMessage* message = tracked_ring_.front();
   if (message == nullptr) {
-    // Without frames the samples must not fill the ring: half of it is more than any frame will ask for.
-    while (imu_to_smooth_.size() > kImuRing / 2) {
-      smooth_.addImu(imu_to_smooth_.front()->sample);
-      imu_to_smooth_.pop();
-      ++smoothing_.samples;
-    }
+    smoothing_.samples +=
+        takeSurplus(imu_to_smooth_, [this](const ImuSample& sample) { smooth_.addImu(sample); });
     return false;
   }
   const bool ended = message->kind == TrackMessage::Kind::kEnd;
@@ -164,14 +158,9 @@ void Wiring::smoothFrame(const TrackMessage& message, FrameResult& out) {
   out.step.frame = message.tracked.index;
   out.step.effort = smooth_effort_->give();
   out.smooth_level = smooth_effort_->level();
-  out.smooth_spent = measured([&] {
-    for (const ImuArrival* arrival = imu_to_smooth_.front();
-         arrival != nullptr && arrival->sample.stamp <= message.tracked.stamp;
-         arrival = imu_to_smooth_.front()) {
-      smooth_.addImu(arrival->sample);
-      imu_to_smooth_.pop();
-      ++smoothing_.samples;
-    }
+  const Spent spent = measured([&] {
+    smoothing_.samples += takeSamples(imu_to_smooth_, message.tracked.stamp,
+                                      [this](const ImuSample& sample) { smooth_.addImu(sample); });
     out.step.samples = smoothing_.samples;
     const double cpu = threadCpuSeconds();
     out.status = smooth_.step(message.tracked, out.step.effort, out.output);
@@ -179,11 +168,10 @@ void Wiring::smoothFrame(const TrackMessage& message, FrameResult& out) {
     fix_.publish();
     if (drag_) drag_(StageId::kSmooth, threadCpuSeconds() - cpu);
   });
-  smooth_effort_->took(
-      {out.smooth_spent.wall, static_cast<int>(trackedWaiting()) - 1, begin - message.host.arrival});
+  smooth_effort_->took({spent.wall, static_cast<int>(trackedWaiting()) - 1, begin - message.host.arrival});
   out.tracked = message.tracked;
-  out.spent += out.smooth_spent;
-  addTime(times_, StageId::kSmooth, out.smooth_spent, message.tracked.keyframe);
+  out.spent += spent;
+  addTime(times_, StageId::kSmooth, spent, message.tracked.keyframe);
   if (to_recorder_) static_cast<void>(to_recorder_->smooth.tryPush(out.step));
 }
 
@@ -198,21 +186,15 @@ bool Wiring::log() {
       any = true;
     }
   }
+  const auto keep = [this](const ImuSample& sample) { log_.onImu(sample); };
   if (FrameResult* result = results_.front(); result != nullptr) {
-    while (const ImuArrival* arrival = imu_to_log_.front()) {
-      if (result->kind != TrackMessage::Kind::kEnd && arrival->sample.stamp > result->track_step.stamp) break;
-      log_.onImu(arrival->sample);
-      imu_to_log_.pop();
-    }
+    takeSamples(imu_to_log_, result->track_step.stamp, keep);
     log_.onResult(*result);
     if (arming_ != nullptr && result->kind == TrackMessage::Kind::kFrame) watchArming(*result);
     results_.pop();
     return true;
   }
-  while (imu_to_log_.size() > kImuRing / 2) {
-    log_.onImu(imu_to_log_.front()->sample);
-    imu_to_log_.pop();
-  }
+  takeSurplus(imu_to_log_, keep);
   if (ended && !any) log_done_ = true;
   return any;
 }

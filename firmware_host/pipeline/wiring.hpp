@@ -61,9 +61,7 @@ struct WiringCounters {
     FaultCounts faults;
   } propagate;
   struct Track {
-    std::uint64_t frames = 0;
-    std::uint64_t dropped = 0;        ///< went by while others were in work
-    std::uint64_t early_samples = 0;  ///< taken without a frame because the ring was filling
+    std::uint64_t dropped = 0;  ///< frames that went by while others were in work
     PairingCounters pairing;
   } track;
 };
@@ -102,9 +100,7 @@ class Wiring {
 
   // Threads.
   bool propagate();
-  /// `wait_for_imu`: leave a frame where it is as long as the samples before it have not come; used where
-  /// sensors are threads of their own.
-  bool track(bool wait_for_imu = false);
+  bool track();
   bool smooth();
   bool log();
   bool record();
@@ -152,16 +148,12 @@ class Wiring {
   [[nodiscard]] const CameraFrame& headOf(std::size_t camera) const;
   [[nodiscard]] HostTimes hostTimesOf(const StereoFrame& frame) const;
   [[nodiscard]] int waitingFrames() const;
-  [[nodiscard]] bool samplesAreIn(const StereoFrame& frame);
-  void takeSamples(Stamp until);
-  void takeSurplus();
   bool trackFrame();
   bool endTracking();
   void smoothFrame(const TrackMessage& message, FrameResult& out);
   void watchArming(const FrameResult& result);
 
   Rig rig_;
-  double imu_period_;  // s
   RunLog& log_;
   FlightRecorder* recorder_;
   ArmingMonitor* arming_;
@@ -195,7 +187,6 @@ class Wiring {
     SensorFacts facts;
   } sensing_;
   struct {
-    std::uint64_t samples = 0;
     std::uint64_t fix = 0;
     NavState state;
   } propagating_;
@@ -206,7 +197,6 @@ class Wiring {
     std::uint64_t window = 0;
     int dropped = 0;
     Stamp newest_sample;
-    double wait_since = 0;
   } tracking_;
   struct {
     std::uint64_t samples = 0;

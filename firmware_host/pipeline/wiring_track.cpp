@@ -8,10 +8,6 @@ namespace swiftlet {
 namespace {
 
 constexpr Stamp kEndOfTime{std::numeric_limits<std::int64_t>::max()};
-/// A sample's way to us may differ from the frame's by so much before it counts as late.
-constexpr double kSampleWait = 0.02;  // s
-/// With the newest sample this near before the frame, no other is due before it.
-constexpr double kPeriodsEarly = 1.5;
 
 }  // namespace
 
@@ -70,7 +66,6 @@ void Wiring::takeImage(const CameraFrame& image, const HostTimes& host) {
 bool Wiring::takeTracks(const TrackedFrame& tracked) {
   TrackMessage* message = tracked_ring_.beginPush();
   if (message == nullptr) return false;
-  ++counters_.track.frames;
   message->kind = TrackMessage::Kind::kFrame;
   message->status = okStatus();
   message->step = TrackStep{};
@@ -86,17 +81,17 @@ bool Wiring::takeTracks(const TrackedFrame& tracked) {
 }
 
 // IMU, images, newest window -> pairing -> track -> tracked frames
-bool Wiring::track(bool wait_for_imu) {
+bool Wiring::track() {
   const bool ended = input_ended_.load(std::memory_order_acquire);
   // Before the images: a sample that is seen now came before every image taken below.
   tracking_.newest_sample = Stamp{newest_imu_.load(std::memory_order_acquire)};
   takeArrivals();
   if (tracking_.waiting.empty()) {
-    takeSurplus();
+    tracking_.samples +=
+        takeSurplus(imu_to_track_, [this](const ImuSample& sample) { track_.addImu(sample); });
     return ended && endTracking();
   }
   if (tracked_ring_.size() >= kTrackedRing) return false;
-  if (wait_for_imu && !ended && !samplesAreIn(tracking_.waiting.front())) return false;
   return trackFrame();
 }
 
@@ -190,38 +185,6 @@ int Wiring::waitingFrames() const {
   return static_cast<int>(tracking_.waiting.size() + camera_[0].ring.size());
 }
 
-bool Wiring::samplesAreIn(const StereoFrame& frame) {
-  const double now = wallSeconds();
-  if ((frame.stamp - tracking_.newest_sample).seconds() <= kPeriodsEarly * imu_period_) {
-    tracking_.wait_since = 0;
-    return true;
-  }
-  if (tracking_.wait_since == 0) tracking_.wait_since = now;
-  if (now - tracking_.wait_since < kSampleWait) return false;
-  tracking_.wait_since = 0;
-  return true;
-}
-
-/// Samples not later than `until`.
-void Wiring::takeSamples(Stamp until) {
-  for (const ImuArrival* arrival = imu_to_track_.front();
-       arrival != nullptr && arrival->sample.stamp <= until; arrival = imu_to_track_.front()) {
-    track_.addImu(arrival->sample);
-    imu_to_track_.pop();
-    ++tracking_.samples;
-  }
-}
-
-/// Without frames the samples must not fill the ring: half of it is more than any frame will ask for.
-void Wiring::takeSurplus() {
-  while (imu_to_track_.size() > kImuRing / 2) {
-    track_.addImu(imu_to_track_.front()->sample);
-    imu_to_track_.pop();
-    ++tracking_.samples;
-    ++counters_.track.early_samples;
-  }
-}
-
 bool Wiring::trackFrame() {
   const StereoFrame frame = tracking_.waiting.front();
   TrackMessage& message = *tracked_ring_.beginPush();  // track() has made sure of room
@@ -241,7 +204,8 @@ bool Wiring::trackFrame() {
       tracking_.window = step.window;
       track_.take(window_.value());
     }
-    takeSamples(frame.stamp);
+    tracking_.samples +=
+        takeSamples(imu_to_track_, frame.stamp, [this](const ImuSample& sample) { track_.addImu(sample); });
     step.samples = tracking_.samples;
     message.status = track_.step(frame, step.effort, message.tracked);
     if (drag_) drag_(StageId::kTrack, threadCpuSeconds() - cpu);
@@ -252,7 +216,6 @@ bool Wiring::trackFrame() {
   message.dropped = tracking_.dropped;
   tracking_.dropped = 0;
   addTime(times_, StageId::kTrack, message.spent, tracked && message.tracked.keyframe);
-  ++counters_.track.frames;
   if (to_recorder_) static_cast<void>(to_recorder_->track.tryPush(step));
   tracked_ring_.commitPush();
   release(frame);

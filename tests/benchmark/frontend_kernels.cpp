@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -21,6 +20,7 @@
 #include "estimator/frontend/lucas_kanade.hpp"
 #include "tests/frontend/log_reader.hpp"
 #include "tests/frontend/true_depth.hpp"
+#include "tests/support/cpu_time.hpp"
 
 using namespace swiftlet;
 using namespace swiftlet::testing;
@@ -31,17 +31,9 @@ constexpr int kRepetitions = 7;
 constexpr int kLevels = 4;
 constexpr int kFeatures = 200;
 
-double cpuMilliseconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
 template <typename F>
 void timed(double& least, F&& f) {
-  const double start = cpuMilliseconds();
-  f();
-  least = std::min(least, cpuMilliseconds() - start);
+  least = std::min(least, test::timed(f));
 }
 
 cv::Mat asMat(const ImageView& v) { return {v.height, v.width, CV_8U, const_cast<std::uint8_t*>(v.data)}; }

@@ -9,7 +9,6 @@
 // right, each from the two images. Prints figures beside what is wanted; asserts none.
 
 #include <cstdio>
-#include <ctime>
 #include <exception>
 #include <memory>
 #include <opencv2/core.hpp>
@@ -24,11 +23,13 @@
 #include "estimator/odometry/smooth_stage.hpp"
 #include "estimator/odometry/track_stage.hpp"
 #include "tests/logs/log_data.hpp"
+#include "tests/support/cpu_time.hpp"
 #include "tests/support/statistics.hpp"
 
 using namespace swiftlet;
 using swiftlet::test::mean;
 using swiftlet::test::quantile;
+using swiftlet::test::timed;
 
 namespace {
 
@@ -40,19 +41,6 @@ constexpr double kCvQuality = 0.01;
 constexpr double kCvDistance = 20;  // px
 constexpr int kCvWindow = 21;       // px
 constexpr int kCvMaxLevel = 3;
-
-double cpuMilliseconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
-template <typename F>
-double timed(const F& f) {
-  const double start = cpuMilliseconds();
-  f();
-  return cpuMilliseconds() - start;
-}
 
 cv::Mat asMat(const ImageView& v) { return {v.height, v.width, CV_8U, const_cast<std::uint8_t*>(v.data)}; }
 

@@ -8,13 +8,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <string>
 #include <vector>
 
 #include "tests/benchmark/smoother_ceres.hpp"
 #include "tests/benchmark/smoother_window.hpp"
 #include "tests/smoother/smoother_run.hpp"
+#include "tests/support/cpu_time.hpp"
 #include "tests/support/statistics.hpp"
 
 using namespace swiftlet;
@@ -32,17 +32,9 @@ constexpr double kSeconds = 12;
 constexpr std::uint64_t kSeed = 3;
 
 // Of the process: helper threads of a linear algebra library would count.
-double cpuMilliseconds() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
 template <typename F>
-double timed(const F& f) {
-  const double start = cpuMilliseconds();
-  f();
-  return cpuMilliseconds() - start;
+double processTimed(const F& f) {
+  return timed(f, CLOCK_PROCESS_CPUTIME_ID);
 }
 
 double median(const std::vector<double>& values) { return quantile(values, 0.5); }
@@ -95,7 +87,7 @@ void timeSteps(const TrackFlight& flight, std::vector<double>& milliseconds, dou
   landmarks = 0;
   flight.play([&](const ImuSample& sample) { run.addImu(sample); },
               [&](std::size_t k) {
-                const double t = timed([&] { static_cast<void>(run.step(k, kIterations)); });
+                const double t = processTimed([&] { static_cast<void>(run.step(k, kIterations)); });
                 if (k + 60 < kNewest) return;
                 milliseconds.push_back(t);
                 landmarks += run.smoother().statistics().landmarks;
@@ -136,13 +128,13 @@ bool compare(int tracks) {
   std::vector<std::vector<double>> theirs(solvers.size());
   for (int repetition = 0; repetition < kRepetitions; ++repetition) {
     window.setValues(start);
-    ours.push_back(timed([&] { static_cast<void>(window.update(kIterations)); }));
+    ours.push_back(processTimed([&] { static_cast<void>(window.update(kIterations)); }));
     window.setValues(start);
     for (std::size_t s = 0; s < solvers.size(); ++s) {
       ceres.reset();
-      theirs[s].push_back(timed([&] { ceres.solve(solvers[s], kIterations); }));
+      theirs[s].push_back(processTimed([&] { ceres.solve(solvers[s], kIterations); }));
     }
-    build.push_back(timed([&] { const CeresWindow rebuilt(window); }));
+    build.push_back(processTimed([&] { const CeresWindow rebuilt(window); }));
   }
   std::vector<double> step;
   double landmarks = 0;

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <ctime>
 #include <map>
 #include <memory>
 #include <string>
@@ -15,18 +14,12 @@
 #include "estimator/frontend/frontend.hpp"
 #include "tests/frontend/log_reader.hpp"
 #include "tests/frontend/true_depth.hpp"
+#include "tests/support/cpu_time.hpp"
 
 using namespace swiftlet;
 using namespace swiftlet::testing;
 
 namespace {
-
-// CPU time of this thread: a shared machine's other work does not count.
-double cpuMilliseconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
 
 struct Options {
   std::string log;
@@ -218,9 +211,9 @@ int main(int argc, char** argv) {
     if (prediction->has_rotation)
       prediction->R_body_prev_body_cur = log.rotation(log.stamps[k - 1], stamp, bias);
     if (options.predict && has_truth) fillPrediction(log, T_world_body, landmarks, last_seen, k, *prediction);
-    const double start = cpuMilliseconds();
+    const double start = test::cpuMilliseconds();
     const Status status = frontend.step(frame, *prediction, options.features, *tracked);
-    const double ms = cpuMilliseconds() - start;
+    const double ms = test::cpuMilliseconds() - start;
     if (!status.ok()) std::printf("frame %zu: %s\n", k, status.what);
     ++report.frames;
     report.milliseconds += ms;
