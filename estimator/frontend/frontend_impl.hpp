@@ -63,9 +63,14 @@ class Frontend::Impl {
   void takeImages(const StereoFrame& frame, const FrontendPrediction& prediction);
   void joinPredictions(const FrontendPrediction& prediction);
   void trackCamera(std::size_t c, const FrontendPrediction& prediction);
-  [[nodiscard]] bool predict(const Track& track, std::size_t c, const FrontendPrediction& prediction,
-                             Eigen::Vector2f& pixel, int& levels) const;
-  void refine(const Track& track, std::size_t c, Eigen::Vector2f& pixel);
+  /// Where a feature is looked for, and from how many levels on.
+  struct Guess {
+    Eigen::Vector2f pixel;
+    int levels = 0;
+    bool of_landmark = false;
+  };
+  [[nodiscard]] Guess predict(const Track& track, std::size_t c, const FrontendPrediction& prediction) const;
+  [[nodiscard]] bool follow(const Track& track, std::size_t c, const Guess& guess, Eigen::Vector2f& pixel);
   [[nodiscard]] Eigen::Matrix2f turn(std::size_t c, const Eigen::Vector3d& from_bearing) const;
   void verifyMotion(std::size_t c, std::uint64_t seed);
   void verifyStereo();

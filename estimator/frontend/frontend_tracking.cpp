@@ -28,23 +28,21 @@ constexpr int kMaxSearches = 240;
 
 }  // namespace
 
-bool Frontend::Impl::predict(const Track& track, std::size_t c, const FrontendPrediction& prediction,
-                             Eigen::Vector2f& pixel, int& levels) const {
+Frontend::Impl::Guess Frontend::Impl::predict(const Track& track, std::size_t c,
+                                              const FrontendPrediction& prediction) const {
   if (track.landmark >= 0) {
     const PredictedLandmark& landmark = prediction.landmarks[static_cast<std::size_t>(track.landmark)];
     if (landmark.visible[c] && landmark.pixel[c].allFinite()) {
-      pixel = landmark.pixel[c];
-      levels = kLevelsWithLandmark;
-      return true;
+      return {landmark.pixel[c], kLevelsWithLandmark, true};
     }
   }
   const Camera& camera = camera_[c];
-  if (!camera.rotation_known) return false;
   Eigen::Vector2d projected;
-  if (!rig_.camera[c].project(camera.R_prev_cur.conjugate() * track.bearing[c], projected)) return false;
-  pixel = projected.cast<float>();
-  levels = kLevelsWithRotation;
-  return true;
+  if (!camera.rotation_known ||
+      !rig_.camera[c].project(camera.R_prev_cur.conjugate() * track.bearing[c], projected)) {
+    return {track.pixel[c], settings_.pyramid_levels, false};
+  }
+  return {projected.cast<float>(), kLevelsWithRotation, false};
 }
 
 void Frontend::Impl::joinPredictions(const FrontendPrediction& prediction) {
@@ -68,6 +66,42 @@ void Frontend::Impl::joinPredictions(const FrontendPrediction& prediction) {
   }
 }
 
+bool Frontend::Impl::follow(const Track& track, std::size_t c, const Guess& guess, Eigen::Vector2f& pixel) {
+  const Camera& camera = camera_[c];
+  const ImageView& image = camera.now().level(0);
+  AnchorPatch& patch = anchors_[track.slot].patch[c];
+  const bool refines = settings_.anchor_refinement && patch.valid;
+  const Eigen::Matrix2f turned = refines ? turn(c, track.bearing[c]) : Eigen::Matrix2f::Identity();
+  const auto refine = [&] {
+    if (!refines || !patch.refine(image, turned, pixel)) return false;
+    patch.failures = 0;
+    ++statistics_.refined;
+    return true;
+  };
+  // Mostly a landmark is within a pixel of where it was predicted: the first sighting then decides alone.
+  pixel = guess.pixel;
+  if (guess.of_landmark && patch.failures == 0 && patchInside(image, pixel) && refine() &&
+      patchInside(image, pixel)) {
+    return true;
+  }
+  LucasKanadeSettings settings;
+  settings.levels = guess.levels;
+  settings.back_check = 0;
+  pixel = guess.pixel;
+  if (!trackPoint(camera.before(), track.pixel[c], camera.now(), settings, pixel)) return false;
+  const Eigen::Vector2f tracked = pixel;
+  // What agrees with its first sighting needs no way back.
+  if (refine()) return true;
+  settings.back_check = settings_.back_check;
+  settings.back_levels = kBackLevels;
+  if (!tracksBack(camera.before(), track.pixel[c], camera.now(), settings, tracked)) return false;
+  if (refines) {
+    patch.warp = turned * patch.warp;
+    if (++patch.failures > kMaxRefineFailures) patch.take(camera.now(), tracked);
+  }
+  return true;
+}
+
 void Frontend::Impl::trackCamera(std::size_t c, const FrontendPrediction& prediction) {
   Camera& camera = camera_[c];
   for (Track& track : tracks_) {
@@ -75,19 +109,13 @@ void Frontend::Impl::trackCamera(std::size_t c, const FrontendPrediction& predic
     if (!track.live[c]) continue;
     track.live[c] = false;
     if (!camera.has_history) continue;
-    LucasKanadeSettings settings;
-    settings.levels = settings_.pyramid_levels;
-    settings.back_check = settings_.back_check;
-    settings.back_levels = kBackLevels;
     const Eigen::Vector2f from = track.pixel[c];
-    Eigen::Vector2f pixel = from;
-    if (!predict(track, c, prediction, pixel, settings.levels)) pixel = from;
     const Eigen::Vector3d from_bearing = track.bearing[c];
-    if (!trackPoint(camera.before(), from, camera.now(), settings, pixel)) {
+    Eigen::Vector2f pixel;
+    if (!follow(track, c, predict(track, c, prediction), pixel)) {
       ++statistics_.lost;
       continue;
     }
-    if (settings_.anchor_refinement) refine(track, c, pixel);
     if (!place(track, c, pixel)) {
       ++statistics_.lost;
       continue;
@@ -115,19 +143,6 @@ Eigen::Matrix2f Frontend::Impl::turn(std::size_t c, const Eigen::Vector3d& from_
   const Eigen::Matrix2d square = before * before.transpose();
   turn = (after * R * before.transpose() * square.inverse()).cast<float>();
   return turn;
-}
-
-void Frontend::Impl::refine(const Track& track, std::size_t c, Eigen::Vector2f& pixel) {
-  AnchorPatch& patch = anchors_[track.slot].patch[c];
-  if (!patch.valid) return;
-  const Eigen::Matrix2f turned = turn(c, track.bearing[c]);
-  if (patch.refine(camera_[c].now().level(0), turned, pixel)) {
-    patch.failures = 0;
-    ++statistics_.refined;
-    return;
-  }
-  patch.warp = turned * patch.warp;
-  if (++patch.failures > kMaxRefineFailures) patch.take(camera_[c].now(), pixel);
 }
 
 void Frontend::Impl::verifyMotion(std::size_t c, std::uint64_t seed) {

@@ -46,7 +46,11 @@ bool trackPoint(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Py
   if (!patchInside(from.level(0), from_pixel)) return false;
   if (!trackForward(from, from_pixel, to, settings.levels, settings.limits, to_pixel)) return false;
   if (!patchInside(to.level(0), to_pixel)) return false;
-  if (settings.back_check <= 0) return true;
+  return settings.back_check <= 0 || tracksBack(from, from_pixel, to, settings, to_pixel);
+}
+
+bool tracksBack(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Pyramid& to,
+                const LucasKanadeSettings& settings, const Eigen::Vector2f& to_pixel) {
   Eigen::Vector2f back = from_pixel;
   if (!trackForward(to, to_pixel, from, settings.back_levels, settings.limits, back)) return false;
   return (back - from_pixel).squaredNorm() <= settings.back_check * settings.back_check;

@@ -25,6 +25,10 @@ struct LucasKanadeSettings {
 [[nodiscard]] bool trackPoint(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Pyramid& to,
                               const LucasKanadeSettings& settings, Eigen::Vector2f& to_pixel);
 
+/// The way back alone: from `to_pixel` to within `back_check` of `from_pixel`.
+[[nodiscard]] bool tracksBack(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Pyramid& to,
+                              const LucasKanadeSettings& settings, const Eigen::Vector2f& to_pixel);
+
 /// Whole pixels of the patch around `pixel` lie in the image.
 [[nodiscard]] bool patchInside(const ImageView& image, const Eigen::Vector2f& pixel);
 
