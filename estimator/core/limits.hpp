@@ -36,5 +36,9 @@ inline constexpr std::size_t kMaxLandmarks = 1024;
 inline constexpr std::size_t kMaxExplicitLandmarks = 64;
 /// Planes in the smoother's window.
 inline constexpr std::size_t kMaxPlanes = 8;
+/// The local mesh: a vertex for each landmark of the window and a frame's worth of new ones; twice as many
+/// faces, as a closed mesh has.
+inline constexpr std::size_t kMaxMeshVertices = kMaxLandmarks + kMaxFeatures;
+inline constexpr std::size_t kMaxMeshFaces = 2 * kMaxMeshVertices;
 
 }  // namespace swiftlet

@@ -28,6 +28,7 @@
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/status.hpp"
 #include "estimator/imu/imu_noise.hpp"
+#include "estimator/messages/plane_report.hpp"
 #include "estimator/messages/smoothed_window.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/smoother/extra_factors.hpp"
@@ -51,11 +52,6 @@ struct SmootherSettings {
 
 /// Everything that is tied to planes: each explicit landmark to two, each plane with a direction.
 inline constexpr std::size_t kMaxExtraFactors = 2 * kMaxExplicitLandmarks + kMaxPlanes;
-
-enum class PlaneDirection : std::uint8_t {
-  kHorizontal,  ///< a floor, a ceiling, a table: its normal is along z
-  kVertical,    ///< a wall: its normal is orthogonal to z
-};
 
 /// A plane of the window.
 struct PlaneEstimate {
