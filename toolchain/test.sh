@@ -1,6 +1,6 @@
 #!/bin/sh
 # Everything that can be checked, on a fresh Debian 12 too: the demo, all tests, the accuracy table
-# of every log found, unit tests under sanitizers, a short run of each fuzzer.
+# of every log found, tests under sanitizers, the threads under ThreadSanitizer, a short run of each fuzzer.
 # usage: toolchain/test.sh [--quick]   --quick leaves sanitizers and fuzzers out
 # SWIFTLET_DATA names the folder of recorded logs (default ../shared/data); without logs the tests
 # that need them say so and skip. Ends with a table of steps and a count of tests; exit code 0 when
@@ -21,7 +21,10 @@ esac
 fuzz_seconds=15 # each fuzzer
 # Unit tests that run under sanitizers too; the statistical ones (imu, ransac, whole flights, rendering, the program)
 # repeat the same code thousands of times and would take most of an hour there.
-sanitized='core geometry camera frontend smoother drivers_calibration drivers_recorded drivers_recording drivers_image_decoder'
+sanitized='core geometry camera frontend smoother drivers_calibration drivers_recorded drivers_recording drivers_image_decoder
+threaded'
+# What shares memory between threads, and the whole executor on a second of a log.
+threads='core realtime threaded'
 jobs=$(nproc)
 steps='' # lines "seconds result step"
 failed_steps=0
@@ -132,7 +135,11 @@ if [ $quick = no ]; then
   # shellcheck disable=SC2086 # a list of targets
   step "configure with sanitizers" configure asan -DSWIFTLET_BUILD_TESTS=ON &&
     step "build with sanitizers" build asan --target $(echo $sanitized | sed 's/\([^ ]*\)/test_\1/g') &&
-    step "unit tests with sanitizers" run_ctest asan -R "^($(echo $sanitized | tr ' ' '|'))\$"
+    step "tests with sanitizers" run_ctest asan -R "^($(echo $sanitized | tr ' ' '|'))\$"
+  # shellcheck disable=SC2086 # a list of targets
+  step "configure for data races" configure tsan -DSWIFTLET_BUILD_TESTS=ON &&
+    step "build for data races" build tsan --target $(echo $threads | sed 's/\([^ ]*\)/test_\1/g') &&
+    step "threads without data races" run_ctest tsan -R "^($(echo $threads | tr ' ' '|'))\$"
 fi
 if [ $quick = no ] && [ -f tests/fuzz/CMakeLists.txt ]; then
   step "configure fuzzers" configure fuzz &&
