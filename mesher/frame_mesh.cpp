@@ -8,8 +8,8 @@ namespace swiftlet {
 namespace {
 
 // Sine of the least angle between a face and the line of sight to its middle. Walls and floors of a room are
-// seen at more than 10 degrees nearly everywhere; a face from a thing to the wall behind it at less.
-constexpr float kMinSineToSight = 0.14F;
+// seen at more than 15 degrees nearly everywhere; a face from a thing to the wall behind it at less.
+constexpr float kMinSineToSight = 0.25F;
 // Of the distance from the camera.
 constexpr float kMaxEdgeOverDepth = 0.5F;
 constexpr float kMinHeight = 2.0F;  // px

@@ -4,9 +4,9 @@
 //
 // Features without a known depth take no part but in the hull. Faces that do not follow a surface are
 // removed, by these rules (docs/mesher.md has the reasons and what each buys):
-//  - steep: the face's normal is within 8 degrees of being orthogonal to the line of sight: it bridges two
+//  - steep: the face's normal is within 14 degrees of being orthogonal to the line of sight: it bridges two
 //    surfaces, one behind the other;
-//  - long: an edge longer than 1.2 m, or than half of the distance from the camera;
+//  - long: an edge longer than 1 m, or than half of the distance from the camera;
 //  - thin: the shortest height in the image is below 2 px;
 //  - unknown: a vertex whose depth is known to less than a tenth (1 sigma).
 // Frames: camera 0, metres; raw pixels. Source: Rosinol, Sattler, Pollefeys, Carlone, "Incremental
@@ -27,7 +27,7 @@
 namespace swiftlet {
 
 /// What no landmark lies on for that far is unknown, not flat [m].
-inline constexpr float kMaxFaceEdge = 1.2F;
+inline constexpr float kMaxFaceEdge = 1.0F;
 
 /// A feature with its landmark.
 struct FramePoint {

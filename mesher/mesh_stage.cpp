@@ -111,9 +111,7 @@ Status MeshStage::step(const MeshInput& input) {
   lift(input);
   convexHull(features_, hull_);
   frame_.build(points_, input.labels);
-  if (input.tracks->keyframe || !input.labels.empty()) {
-    horizon_.update(frame_, landmarks_, rig_.camera[0], T_world_cam_);
-  }
+  horizon_.update(frame_, landmarks_, rig_.camera[0], T_world_cam_);
   if (frame_.faces().empty()) {
     ++counters_.too_few_points;
     return {StatusCode::kDegenerate, "no three features with a depth: no mesh of this frame"};

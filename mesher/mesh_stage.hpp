@@ -2,8 +2,8 @@
 // The stage of the thread `mesh`: from a solved window and its newest frame to the frame's mesh and the mesh
 // over the horizon.
 //
-// The frame mesh is made at every step, the horizon's at keyframes and where labels come. Features of camera
-// 0 whose landmark is in the window are lifted; all tracked ones span the hull. A new epoch of the window
+// Both are brought up to date at every step; an executor in a hurry leaves frames out. Features of camera 0
+// whose landmark is in the window are lifted; all tracked ones span the hull. A new epoch of the window
 // starts a new mesh. Bad input is skipped and counted: landmarks that are not finite or come twice, features
 // that come twice or lie outside the image, frames with fewer than three points, and a pose that jumped.
 // Frames: world, body, camera 0; metres; raw pixels.
