@@ -1,6 +1,7 @@
 #include "mesher/delaunay.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace swiftlet {
@@ -39,15 +40,12 @@ constexpr auto kHilbert = [] {
   return table;
 }();
 
-constexpr std::uint32_t next(std::uint32_t i) { return i == 2 ? 0 : i + 1; }
-constexpr std::uint32_t previous(std::uint32_t i) { return i == 0 ? 2 : i - 1; }
-
-constexpr std::uint16_t edgeOf(std::uint32_t cell, std::uint32_t edge) {
-  return static_cast<std::uint16_t>(4 * cell + edge);
-}
-constexpr std::uint16_t cellOf(std::uint16_t edge) { return edge / 4; }
-
 }  // namespace
+
+Delaunay::Delaunay() {
+  constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
+  point_[kInfinite] = {kNotANumber, kNotANumber};
+}
 
 void Delaunay::clear() {
   point_count_ = 0;
@@ -102,18 +100,15 @@ void Delaunay::sortAlongCurve(std::size_t count) {
     low = {std::min(low.x, p.x), std::min(low.y, p.y)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y)};
   }
-  // Cells per grid step as a fixed-point number: offset * scale < kCurveSide * 2^32 < 2^63.
-  const auto scaleOf = [](std::int32_t from, std::int32_t to) {
-    return (std::int64_t{kCurveSide} << 32U) / (std::int64_t{to} - from + 1);
-  };
-  const std::int64_t scale_x = scaleOf(low.x, high.x);
-  const std::int64_t scale_y = scaleOf(low.y, high.y);
+  // Below kCurveSide however it is rounded, as a step lies beyond the last point.
+  const double scale_x = kCurveSide / (high.x - low.x + 1);
+  const double scale_y = kCurveSide / (high.y - low.y + 1);
   // rank_ and line_ are not in use yet.
   std::array<std::uint16_t, kHilbert.size() + 1> start{};
   for (std::size_t i = 0; i < count; ++i) {
     const GridPoint& p = point_[order_[i]];
-    const auto x = static_cast<std::size_t>(((std::int64_t{p.x} - low.x) * scale_x) >> 32U);
-    const auto y = static_cast<std::size_t>(((std::int64_t{p.y} - low.y) * scale_y) >> 32U);
+    const auto x = static_cast<std::uint32_t>((p.x - low.x) * scale_x);
+    const auto y = static_cast<std::uint32_t>((p.y - low.y) * scale_y);
     rank_[i] = kHilbert[y * kCurveSide + x];
     ++start[rank_[i] + 1U];
   }
@@ -138,7 +133,7 @@ Status Delaunay::place(std::uint16_t index) {
 // Until three vertices span a triangle they are kept in their order on the line; then each is inserted.
 Status Delaunay::placeOnLine(std::uint16_t index) {
   const GridPoint& p = point_[index];
-  const auto before = [this](std::uint16_t i, const GridPoint& q) { return point_[i] < q; };
+  const auto before = [this](std::uint16_t i, const GridPoint& q) { return isBefore(point_[i], q); };
   const auto at =
       static_cast<std::size_t>(std::lower_bound(line_.begin(), line_.end(), p, before) - line_.begin());
   if (at < line_.size() && point_[line_[at]] == p) {
@@ -159,30 +154,26 @@ Status Delaunay::placeOnLine(std::uint16_t index) {
 
 void Delaunay::startWith(std::uint16_t a, std::uint16_t b, std::uint16_t c) {
   if (orientation(point_[a], point_[b], point_[c]) < 0) std::swap(a, b);
-  cell_[0].vertex = {a, b, c};
-  cell_[1].vertex = {b, a, kInfinite};
-  cell_[2].vertex = {c, b, kInfinite};
-  cell_[3].vertex = {a, c, kInfinite};
+  setVertices(0, a, b, c);
+  setVertices(4, b, a, kInfinite);
+  setVertices(8, c, b, kInfinite);
+  setVertices(12, a, c, kInfinite);
   cell_count_ = 4;
-  for (std::uint32_t i = 0; i < 3; ++i) {
-    join(edgeOf(0, i), edgeOf(1 + i, 0));
-    // From a hull vertex to infinity and back: the next infinite cell counter-clockwise comes before this
-    // one.
-    join(edgeOf(1 + i, 2), edgeOf(1 + next(i), 1));
+  for (Edge side = 0; side < 3; ++side) {
+    const auto beyond = static_cast<Edge>(4 + 4 * side);
+    join(side, beyond);
+    // Counter-clockwise along the hull, the edge from infinity is the one to infinity of the next infinite
+    // cell.
+    join(static_cast<Edge>(beyond + 2), static_cast<Edge>(4 + 4 * nextOf(side) + 1));
   }
   last_ = 0;
 }
 
-void Delaunay::join(std::uint16_t edge, std::uint16_t twin) {
-  cell_[cellOf(edge)].twin[edge % 4U] = twin;
-  cell_[cellOf(twin)].twin[twin % 4U] = edge;
-}
-
 Status Delaunay::placeInPlane(std::uint16_t index) {
   const GridPoint& p = point_[index];
-  std::uint16_t cell = 0;
+  Edge cell = 0;
   if (!locate(p, cell)) return {StatusCode::kNumerical, "the walk to the point did not end: it is skipped"};
-  if (isVertexOf(cell_[cell], p)) {
+  if (point_[origin_[cell]] == p || point_[origin_[cell + 1U]] == p || point_[origin_[cell + 2U]] == p) {
     return {StatusCode::kInvalidInput, "the point falls together with another: it is skipped"};
   }
   split(cell, index);
@@ -193,105 +184,109 @@ Status Delaunay::placeInPlane(std::uint16_t index) {
 
 // The triangle that p is in or on the border of, or an infinite one whose edge p is strictly outside of. No
 // triangle is entered twice, for along the walk the power of p to the circumcircles falls; hence the limit.
-bool Delaunay::locate(const GridPoint& p, std::uint16_t& cell) const {
-  constexpr std::uint32_t kNoEdge = 3;
-  std::uint16_t at = last_;
-  if (isInfinite(cell_[at])) {
-    const auto& vertex = cell_[at].vertex;
-    const std::uint32_t infinite = vertex[0] == kInfinite ? 0 : vertex[1] == kInfinite ? 1 : 2;
-    at = cellOf(cell_[at].twin[next(infinite)]);
-  }
-  std::uint32_t entered = kNoEdge;
+bool Delaunay::locate(const GridPoint& p, Edge& cell) const {
+  const auto isBeyond = [&](Edge edge) {
+    return orientation(point_[origin_[edge]], point_[origin_[nextOf(edge)]], p) < 0;
+  };
+  cell = last_;
+  const Edge from_infinite = edgeFromInfinite(cell);
+  if (from_infinite < cell + 3) cell = firstOf(twin_[nextOf(from_infinite)]);
+  Edge entered = cell;
+  if (isBeyond(cell)) entered = twin_[cell];
   for (std::size_t steps = 0; steps <= cell_count_; ++steps) {
-    const Cell& c = cell_[at];
-    std::uint32_t leave = kNoEdge;
-    for (std::uint32_t i = 0; i < 3 && leave == kNoEdge; ++i) {
-      if (i != entered && orientation(point_[c.vertex[i]], point_[c.vertex[next(i)]], p) < 0) leave = i;
-    }
-    if (leave == kNoEdge) {
-      cell = at;
-      return true;
-    }
-    const std::uint16_t edge = c.twin[leave];
-    at = cellOf(edge);
-    entered = edge % 4U;
-    if (isInfinite(cell_[at])) {
-      cell = at;
+    const Edge right = nextOf(entered);
+    const Edge left = previousOf(entered);
+    if (isBeyond(right)) {
+      entered = twin_[right];
+    } else if (isBeyond(left)) {
+      entered = twin_[left];
+    } else {
+      cell = firstOf(entered);
       return true;
     }
   }
   return false;
 }
 
-bool Delaunay::isVertexOf(const Cell& cell, const GridPoint& p) const {
-  return std::any_of(cell.vertex.begin(), cell.vertex.end(),
-                     [&](std::uint16_t i) { return i != kInfinite && point_[i] == p; });
-}
-
 // Three triangles for one; p is the last vertex of each, as flips keep it. If p is on the edge opposite to
 // it, that triangle is flat until flipAround() flips the edge, which it does as p is inside the circle
 // beyond.
-void Delaunay::split(std::uint16_t cell, std::uint16_t p) {
-  const Cell old = cell_[cell];
-  const std::array<std::uint16_t, 3> at = {cell, static_cast<std::uint16_t>(cell_count_),
-                                           static_cast<std::uint16_t>(cell_count_ + 1)};
+void Delaunay::split(Edge cell, std::uint16_t p) {
+  const auto second = static_cast<Edge>(4 * cell_count_);
+  const auto third = static_cast<Edge>(second + 4);
   cell_count_ += 2;
-  for (std::uint32_t i = 0; i < 3; ++i) {
-    cell_[at[i]].vertex = {old.vertex[i], old.vertex[next(i)], p};
-    cell_[at[i]].twin[1] = edgeOf(at[next(i)], 2);
-    cell_[at[i]].twin[2] = edgeOf(at[previous(i)], 1);
-    join(edgeOf(at[i], 0), old.twin[i]);
-  }
+  const std::uint16_t a = origin_[cell];
+  const std::uint16_t b = origin_[cell + 1U];
+  const std::uint16_t c = origin_[cell + 2U];
+  join(second, twin_[cell + 1U]);
+  join(third, twin_[cell + 2U]);
+  setVertices(cell, a, b, p);
+  setVertices(second, b, c, p);
+  setVertices(third, c, a, p);
+  const auto joinFan = [this](Edge right, Edge left) {
+    join(static_cast<Edge>(right + 1), static_cast<Edge>(left + 2));
+  };
+  joinFan(cell, second);
+  joinFan(second, third);
+  joinFan(third, cell);
 }
 
 // Counter-clockwise around p, beginning at `cell`. Every flip gives p one more neighbour, every other step
 // passes one of them, and p has no more neighbours than there are vertices (the infinite one included): hence
 // the limit.
-void Delaunay::flipAround(std::uint16_t cell, std::uint16_t p) {
-  const std::uint16_t first = cell_[cell].vertex[0];
+void Delaunay::flipAround(Edge cell, std::uint16_t p) {
+  const GridPoint centre = point_[p];
+  const std::uint16_t first = origin_[cell];
+  // The edge a b is opposite to p, and d is the vertex beyond: b, a, d are counter-clockwise.
+  GridArm a = armOf(centre, point_[first]);
+  GridArm b = armOf(centre, point_[origin_[cell + 1U]]);
   for (std::size_t steps = 0; steps <= 2 * (vertex_count_ + 2); ++steps) {
-    const Cell& c = cell_[cell];
-    const std::uint16_t twin = c.twin[0];
-    const std::uint16_t beyond = cell_[cellOf(twin)].vertex[previous(twin % 4U)];
-    if (mustFlip(c.vertex[0], c.vertex[1], p, beyond)) {
+    const std::uint16_t beyond = origin_[previousOf(twin_[cell])];
+    const GridArm d = armOf(centre, point_[beyond]);
+    const int side = inCircleByFilter(b, a, d);
+    if (side > 0 || (side == 0 && mustFlipUndecided(cell, p, beyond))) {
       flip(cell, p);
+      b = d;
       continue;
     }
-    if (c.vertex[1] == first) return;
-    cell = cellOf(c.twin[1]);
+    if (origin_[cell + 1U] == first) return;
+    cell = firstOf(twin_[cell + 1U]);
+    a = b;
+    b = armOf(centre, point_[origin_[cell + 1U]]);
   }
 }
 
-// Of the triangles a, b, p and b, a, d: is the edge a b to be replaced by p d?
-bool Delaunay::mustFlip(std::uint16_t a, std::uint16_t b, std::uint16_t p, std::uint16_t d) const {
+// Is the edge, from a to b opposite to p, to be replaced by p d, with d beyond? For what the filter cannot
+// decide.
+bool Delaunay::mustFlipUndecided(Edge edge, std::uint16_t p, std::uint16_t d) const {
+  const std::uint16_t a = origin_[edge];
+  const std::uint16_t b = origin_[nextOf(edge)];
   // Is the hull's edge b d (d a) seen from p? In line with p it is not: its ends stay on the hull.
   if (a == kInfinite) return orientation(point_[d], point_[b], point_[p]) > 0;
   if (b == kInfinite) return orientation(point_[a], point_[d], point_[p]) > 0;
   // p is inside the hull or, if the triangle is flat, on its edge.
   if (d == kInfinite) return orientation(point_[a], point_[b], point_[p]) == 0;
-  const int side = inCircle(point_[a], point_[b], point_[p], point_[d]);
+  const int side = inCircle(point_[b], point_[a], point_[d], point_[p]);
   if (side != 0) return side > 0;
-  return std::max(point_[a], point_[b]) > std::max(point_[p], point_[d]);
+  // On one circle: the diagonal avoids the last of the four in their order.
+  return isBefore(std::max(point_[p], point_[d], isBefore), std::max(point_[a], point_[b], isBefore));
 }
 
 // The edge opposite to p, from a to b, becomes the edge from p to the vertex d beyond.
-void Delaunay::flip(std::uint16_t cell, std::uint16_t p) {
-  Cell& c = cell_[cell];
-  const std::uint16_t twin = c.twin[0];
-  const std::uint16_t other = cellOf(twin);
-  Cell& o = cell_[other];
-  const std::uint32_t edge = twin % 4U;
-  const std::uint16_t b = c.vertex[1];
-  const std::uint16_t d = o.vertex[previous(edge)];
-  const std::uint16_t a_d = o.twin[next(edge)];
-  const std::uint16_t d_b = o.twin[previous(edge)];
-  const std::uint16_t b_p = c.twin[1];
-  c.vertex[1] = d;
-  o.vertex = {d, b, p};
-  join(edgeOf(cell, 0), a_d);
-  join(edgeOf(other, 0), d_b);
-  join(edgeOf(other, 1), b_p);
-  join(edgeOf(cell, 1), edgeOf(other, 2));
+void Delaunay::flip(Edge edge, std::uint16_t p) {
+  const Edge twin = twin_[edge];
+  const Edge other = firstOf(twin);
+  const Edge a_d = twin_[nextOf(twin)];
+  const Edge d_b = twin_[previousOf(twin)];
+  const Edge b_p = twin_[edge + 1U];
+  const std::uint16_t b = origin_[edge + 1U];
+  const std::uint16_t d = origin_[previousOf(twin)];
+  origin_[edge + 1U] = d;
+  setVertices(other, d, b, p);
+  join(edge, a_d);
+  join(other, d_b);
+  join(static_cast<Edge>(other + 1), b_p);
+  join(static_cast<Edge>(edge + 1), static_cast<Edge>(other + 2));
 }
 
 std::span<const DelaunayTriangle> Delaunay::triangles() {
@@ -310,31 +305,34 @@ void Delaunay::collect() {
   triangles_.clear();
   hull_.clear();
   std::uint16_t count = 0;
-  std::uint16_t infinite = 0;
+  Edge from_infinite = 0;
   for (std::size_t i = 0; i < cell_count_; ++i) {
-    const bool outside = isInfinite(cell_[i]);
+    const auto cell = static_cast<Edge>(4 * i);
+    const Edge edge = edgeFromInfinite(cell);
+    const bool outside = edge < cell + 3;
     rank_[i] = outside ? DelaunayTriangle::kNoNeighbour : count++;
-    if (outside) infinite = static_cast<std::uint16_t>(i);
+    if (outside) from_infinite = edge;
   }
   triangles_.resize(count);
   for (std::size_t i = 0; i < cell_count_; ++i) {
     if (rank_[i] == DelaunayTriangle::kNoNeighbour) continue;
     DelaunayTriangle& triangle = triangles_[rank_[i]];
-    triangle.vertex = cell_[i].vertex;
-    for (std::size_t k = 0; k < 3; ++k) triangle.neighbour[k] = rank_[cellOf(cell_[i].twin[k])];
+    for (std::size_t k = 0; k < 3; ++k) {
+      triangle.vertex[k] = origin_[4 * i + k];
+      triangle.neighbour[k] = rank_[twin_[4 * i + k] / 4U];
+    }
   }
-  if (cell_count_ > 0) collectHull(infinite);
+  if (cell_count_ > 0) collectHull(from_infinite);
 }
 
-// Around the infinite vertex; the infinite cell of the hull's edge s e has it from e to s.
-void Delaunay::collectHull(std::uint16_t infinite_cell) {
-  std::uint16_t at = infinite_cell;
+// Around the infinite vertex. The infinite cell beyond the hull's edge from s to e is e, s, infinite; the
+// next one is beyond its edge from infinity to e.
+void Delaunay::collectHull(Edge from_infinite) {
+  Edge at = from_infinite;
   for (std::size_t i = 0; i < vertex_count_; ++i) {
-    const Cell& c = cell_[at];
-    const std::uint32_t infinite = c.vertex[0] == kInfinite ? 0 : c.vertex[1] == kInfinite ? 1 : 2;
-    static_cast<void>(hull_.tryPushBack(c.vertex[previous(infinite)]));
-    at = cellOf(c.twin[infinite]);
-    if (at == infinite_cell) return;
+    static_cast<void>(hull_.tryPushBack(origin_[previousOf(at)]));
+    at = nextOf(twin_[at]);
+    if (at == from_infinite) return;
   }
 }
 

@@ -1,73 +1,110 @@
 #pragma once
 // Exact geometric predicates in the plane: on which side of a line, inside or outside of a circle.
 //
-// Points are snapped once to a grid of 2^-14 px; on the grid both signs are computed in integers without any
-// rounding, so there is no filter and no second, slower path. (Adaptive floating point after Shewchuk 1997,
-// "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", keeps every bit of the
-// input; here its last bits carry nothing: 2^-14 px is the spacing of floats between 512 and 1024.)
+// Points are snapped once to a grid of 2^-12 px, far below what a feature's position is good for. On the grid
+// the side of a line is exact in doubles, and the circle is decided by a filter or, where that cannot, by
+// integers of 128 bits: filters and exact stages as in Shewchuk 1997, "Adaptive Precision Floating-Point
+// Arithmetic and Fast Robust Geometric Predicates", of which the grid leaves the first and the last.
 //
-// Bounds, with coordinates within +-2^29 grid steps: differences D <= 2^30; cross products and squared
-// lengths
-// <= 2 D^2 = 2^61 < 2^63 (64 bit); the in-circle determinant is three products of such two, < 2^124 (128
-// bit).
+// Bounds, with whole coordinates within +-2^25 steps: differences are at most D = 2^26, so that products,
+// squared lengths and cross products are whole numbers of at most 2 D^2 = 2^53, which a double holds exactly
+// (fused or not). The in-circle determinant is the sum of three products of two such numbers, < 2^108.
 
 #include <Eigen/Core>
 #include <cmath>
+#include <compare>
 #include <cstdint>
 
 namespace swiftlet {
 
-/// Grid steps in a pixel. Snapping moves a coordinate by at most half a step, 3e-5 px; none of 512 px or
+/// Grid steps in a pixel. Snapping moves a coordinate by at most half a step, 1.2e-4 px; none of 2048 px or
 /// more.
-inline constexpr float kGridStepsPerPixel = 16384.0F;
-/// Coordinates beyond this are refused [px]: 2^15 px are 2^29 grid steps, the bound above.
-inline constexpr float kGridRange = 32768.0F;
+inline constexpr double kGridStepsPerPixel = 4096;
+/// Coordinates beyond this are refused [px]: 2^13 px are 2^25 grid steps, the bound above.
+inline constexpr float kGridRange = 8192;
 
-/// A point in grid steps, each coordinate within +-2^29.
+/// A point in grid steps: whole numbers within +-2^25.
 struct GridPoint {
-  std::int32_t x = 0;
-  std::int32_t y = 0;
+  double x = 0;
+  double y = 0;
 
   friend constexpr bool operator==(const GridPoint&, const GridPoint&) = default;
-  /// By x, then by y.
-  friend constexpr auto operator<=>(const GridPoint&, const GridPoint&) = default;
 };
+
+/// Order by x, then by y.
+constexpr bool isBefore(const GridPoint& a, const GridPoint& b) {
+  return a.x < b.x || (a.x == b.x && a.y < b.y);
+}
 
 /// The grid point nearest to `pixel`, ties to even; false (and no change) if it is not finite or out of
 /// range.
 inline bool snapToGrid(const Eigen::Vector2f& pixel, GridPoint& point) {
   // Written so that a NaN fails it.
   if (!(std::abs(pixel.x()) <= kGridRange && std::abs(pixel.y()) <= kGridRange)) return false;
-  // The product by a power of two is exact; only lrint rounds.
-  point.x = static_cast<std::int32_t>(std::lrint(pixel.x() * kGridStepsPerPixel));
-  point.y = static_cast<std::int32_t>(std::lrint(pixel.y() * kGridStepsPerPixel));
+  // The product by a power of two is exact; only the conversion rounds.
+  point.x = static_cast<double>(std::lrint(kGridStepsPerPixel * pixel.x()));
+  point.y = static_cast<double>(std::lrint(kGridStepsPerPixel * pixel.y()));
   return true;
 }
 
 /// Twice the signed area of the triangle a, b, c [grid steps squared], exact: positive if c is to the left of
 /// the line from a to b (x axis to y axis is a left turn), 0 if the three are collinear.
-constexpr std::int64_t orientation(const GridPoint& a, const GridPoint& b, const GridPoint& c) {
-  const std::int64_t ax = std::int64_t{a.x} - c.x;
-  const std::int64_t ay = std::int64_t{a.y} - c.y;
-  const std::int64_t bx = std::int64_t{b.x} - c.x;
-  const std::int64_t by = std::int64_t{b.y} - c.y;
-  return ax * by - ay * bx;
+constexpr double orientation(const GridPoint& a, const GridPoint& b, const GridPoint& c) {
+  return (a.x - c.x) * (b.y - c.y) - (a.y - c.y) * (b.x - c.x);
 }
 
-/// Sign, exact: +1 if d is inside the circle through a, b, c (counter-clockwise), -1 outside, 0 on it. For
-/// clockwise a, b, c the sign is the opposite; for collinear ones it tells the side of their line instead.
+/// From one point to another, with its squared length; all exact.
+struct GridArm {
+  double x = 0;
+  double y = 0;
+  double squared = 0;
+};
+
+constexpr GridArm armOf(const GridPoint& from, const GridPoint& to) {
+  const double x = to.x - from.x;
+  const double y = to.y - from.y;
+  return {x, y, x * x + y * y};
+}
+
+/// inCircle() if floating point can tell: +1 or -1; else 0, also if an arm is not a number.
+///
+/// With unit roundoff u = 2^-53, l the squared lengths and s their sum, each product l_i cross_jk is at most
+/// l_i (l_j + l_k) / 2 and the three together at most s^2 / 3. They are rounded once, and their sum twice:
+/// the error is below 3 (1 + 2 u) u s^2 / 3, half of the bound.
+constexpr int inCircleByFilter(const GridArm& a, const GridArm& b, const GridArm& c) {
+  constexpr double kErrorShare = 0x1p-52;
+  const double sum = a.squared * (b.x * c.y - b.y * c.x) + b.squared * (c.x * a.y - c.y * a.x) +
+                     c.squared * (a.x * b.y - a.y * b.x);
+  const double lengths = a.squared + b.squared + c.squared;
+  const double bound = kErrorShare * lengths * lengths;
+  if (sum > bound) return 1;
+  return sum < -bound ? -1 : 0;
+}
+
+/// inCircle() in any case, of whole numbers.
+constexpr int inCircleInIntegers(const GridArm& a, const GridArm& b, const GridArm& c) {
+  const auto cross = [](const GridArm& u, const GridArm& v) {
+    return static_cast<std::int64_t>(u.x * v.y - u.y * v.x);
+  };
+  const auto product = [](double squared, std::int64_t area) {
+    return static_cast<__int128>(static_cast<std::int64_t>(squared)) * area;
+  };
+  const __int128 sum =
+      product(a.squared, cross(b, c)) + product(b.squared, cross(c, a)) + product(c.squared, cross(a, b));
+  return (sum > 0 ? 1 : 0) - (sum < 0 ? 1 : 0);
+}
+
+/// Sign, exact: +1 if the point from which the arms go is inside the circle through their ends a, b, c
+/// (counter-clockwise), -1 outside, 0 on it. For clockwise ends the sign is the opposite; for collinear ones
+/// it tells the side of their line.
+constexpr int inCircle(const GridArm& a, const GridArm& b, const GridArm& c) {
+  const int side = inCircleByFilter(a, b, c);
+  return side != 0 ? side : inCircleInIntegers(a, b, c);
+}
+
+/// The same for the point d.
 constexpr int inCircle(const GridPoint& a, const GridPoint& b, const GridPoint& c, const GridPoint& d) {
-  const std::int64_t ax = std::int64_t{a.x} - d.x;
-  const std::int64_t ay = std::int64_t{a.y} - d.y;
-  const std::int64_t bx = std::int64_t{b.x} - d.x;
-  const std::int64_t by = std::int64_t{b.y} - d.y;
-  const std::int64_t cx = std::int64_t{c.x} - d.x;
-  const std::int64_t cy = std::int64_t{c.y} - d.y;
-  using Wide = __int128;
-  const Wide determinant = static_cast<Wide>(ax * ax + ay * ay) * (bx * cy - by * cx) +
-                           static_cast<Wide>(bx * bx + by * by) * (cx * ay - cy * ax) +
-                           static_cast<Wide>(cx * cx + cy * cy) * (ax * by - ay * bx);
-  return (determinant > 0 ? 1 : 0) - (determinant < 0 ? 1 : 0);
+  return inCircle(armOf(d, a), armOf(d, b), armOf(d, c));
 }
 
 }  // namespace swiftlet
