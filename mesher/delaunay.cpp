@@ -185,21 +185,25 @@ Status Delaunay::placeInPlane(std::uint16_t index) {
 // The triangle that p is in or on the border of, or an infinite one whose edge p is strictly outside of. No
 // triangle is entered twice, for along the walk the power of p to the circumcircles falls; hence the limit.
 bool Delaunay::locate(const GridPoint& p, Edge& cell) const {
-  const auto isBeyond = [&](Edge edge) {
-    return orientation(point_[origin_[edge]], point_[origin_[nextOf(edge)]], p) < 0;
-  };
-  cell = last_;
-  const Edge from_infinite = edgeFromInfinite(cell);
-  if (from_infinite < cell + 3) cell = firstOf(twin_[nextOf(from_infinite)]);
-  Edge entered = cell;
-  if (isBeyond(cell)) entered = twin_[cell];
+  const auto armTo = [&](Edge edge) { return armOf(p, point_[origin_[edge]]); };
+  const auto isBeyond = [](const GridArm& from, const GridArm& to) { return from.x * to.y - from.y * to.x < 0; };
+  const Edge from_infinite = edgeFromInfinite(last_);
+  Edge entered = from_infinite < last_ + 3 ? twin_[nextOf(from_infinite)] : last_;
+  GridArm start = armTo(entered);
+  GridArm end = armTo(nextOf(entered));
+  if (isBeyond(start, end)) {
+    entered = twin_[entered];
+    std::swap(start, end);
+  }
   for (std::size_t steps = 0; steps <= cell_count_; ++steps) {
-    const Edge right = nextOf(entered);
     const Edge left = previousOf(entered);
-    if (isBeyond(right)) {
-      entered = twin_[right];
-    } else if (isBeyond(left)) {
+    const GridArm apex = armTo(left);
+    if (isBeyond(end, apex)) {
+      entered = twin_[nextOf(entered)];
+      start = apex;
+    } else if (isBeyond(apex, start)) {
       entered = twin_[left];
+      end = apex;
     } else {
       cell = firstOf(entered);
       return true;
@@ -305,13 +309,11 @@ void Delaunay::collect() {
   triangles_.clear();
   hull_.clear();
   std::uint16_t count = 0;
-  Edge from_infinite = 0;
+  Edge infinite_cell = 0;
   for (std::size_t i = 0; i < cell_count_; ++i) {
-    const auto cell = static_cast<Edge>(4 * i);
-    const Edge edge = edgeFromInfinite(cell);
-    const bool outside = edge < cell + 3;
+    const bool outside = std::max({origin_[4 * i], origin_[4 * i + 1], origin_[4 * i + 2]}) == kInfinite;
     rank_[i] = outside ? DelaunayTriangle::kNoNeighbour : count++;
-    if (outside) from_infinite = edge;
+    if (outside) infinite_cell = static_cast<Edge>(4 * i);
   }
   triangles_.resize(count);
   for (std::size_t i = 0; i < cell_count_; ++i) {
@@ -322,7 +324,7 @@ void Delaunay::collect() {
       triangle.neighbour[k] = rank_[twin_[4 * i + k] / 4U];
     }
   }
-  if (cell_count_ > 0) collectHull(from_infinite);
+  if (cell_count_ > 0) collectHull(edgeFromInfinite(infinite_cell));
 }
 
 // Around the infinite vertex. The infinite cell beyond the hull's edge from s to e is e, s, infinite; the
