@@ -8,8 +8,10 @@
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/evaluate_meshes.hpp"
 #include "firmware_host/commands/evaluate_run.hpp"
 #include "firmware_host/report/accuracy_report.hpp"
+#include "firmware_host/report/mesh_report.hpp"
 
 namespace swiftlet {
 namespace {
@@ -23,6 +25,8 @@ struct EvaluateOptions {
   double from = 0;
   double until = -1;
   bool json = false;
+  bool mesh = false;
+  std::string truth_mesh;
   SettingsOptions settings;
 };
 
@@ -31,6 +35,7 @@ struct Subject {
   std::vector<std::string> files;
   std::string states;  ///< empty: no covariances
   std::string truth;
+  std::string log;  ///< that the run was made from, or that holds the truth; empty: none known
   std::optional<Stamp> first_image;
   bool from_tracks = false;  ///< the log need not hold images
 };
@@ -56,7 +61,7 @@ Subject subjectOf(const EvaluateOptions& options) {
   if (!std::filesystem::is_directory(path)) {
     subject.files.push_back(options.run);
   } else {
-    for (const char* name : {"odometry.tum", "map.tum"}) {
+    for (const char* name : {"odometry.tum", "trajectory.tum", "map.tum"}) {
       if (std::filesystem::exists(path / name)) subject.files.push_back(path / name);
     }
     if (subject.files.empty()) {
@@ -69,16 +74,28 @@ Subject subjectOf(const EvaluateOptions& options) {
     if (run.contains("first_image_ns") && run["first_image_ns"].is_number_integer()) {
       subject.first_image = Stamp{run["first_image_ns"].get<std::int64_t>()};
     }
+    if (run.contains("log")) subject.log = run["log"].get<std::string>();
     if (subject.truth.empty() && run.contains("log")) {
-      subject.truth = run["log"].get<std::string>();
+      subject.truth = subject.log;
       subject.from_tracks = run.contains("tracks");
     }
   }
+  if (std::filesystem::is_directory(subject.truth)) subject.log = subject.truth;
   if (subject.truth.empty()) {
     throw InputError(options.run, 0, "", "nothing to compare with",
                      "Give a log or a trajectory with --truth");
   }
   return subject;
+}
+
+MeshAccuracy meshAccuracy(const EvaluateOptions& options, const Subject& subject, const Truth& truth,
+                          const AccuracyOptions& accuracy_options) {
+  if (subject.log.empty()) {
+    throw InputError(options.run, 0, "", "nothing says which log the meshes belong to",
+                     "Give the log with --truth");
+  }
+  return evaluateMeshes({options.run, subject.log, options.truth_mesh}, readEstimate(subject.files.front()),
+                        truth.poses, accuracy_options);
 }
 
 int evaluate(const EvaluateOptions& options) {
@@ -110,6 +127,11 @@ int evaluate(const EvaluateOptions& options) {
     json["consistency"] = toJson(found);
     if (!options.json) fmt::print("{}\n{}", subject.states, toText(found));
   }
+  if (options.mesh && compared) {
+    const MeshAccuracy found = meshAccuracy(options, subject, truth, accuracy_options);
+    json["mesh"] = toJson(found);
+    if (!options.json) fmt::print("{}", toText(found));
+  }
   if (options.json) fmt::print("{}\n", json.dump(2));
   if (!compared) fmt::print(stderr, "error: no pose of the estimate has truth at its stamp\n");
   return compared ? kExitDone : kExitFailed;
@@ -133,9 +155,15 @@ void addEvaluateCommand(CLI::App& app, int& exit_code) {
       ->add_option("--until", options->until, "Leave out poses after this many seconds after the first image")
       ->check(nonNegative());
   command->add_flag("--json", options->json, "Print JSON, and nothing else, on stdout");
+  CLI::Option* mesh =
+      command->add_flag("--mesh", options->mesh, "Also judge the run's meshes by the true surface");
+  command
+      ->add_option("--truth-mesh", options->truth_mesh,
+                   "True surface, a PLY file; default: truth/mesh.ply of the log")
+      ->needs(mesh);
   options->settings.addTo(*command);
   command->footer(
-      "Example:\n  swiftlet evaluate run_mh01 --from 3\n"
+      "Example:\n  swiftlet evaluate run_mh01 --from 3\n  swiftlet evaluate run_room --mesh\n"
       "  swiftlet evaluate trajectory.tum --truth data/euroc_mh01_20s --align yaw");
   command->callback([options, &exit_code] { exit_code = evaluate(*options); });
 }
