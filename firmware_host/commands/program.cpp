@@ -19,6 +19,7 @@ int runProgram(int argc, char** argv) {
   addSimulateCommand(app, exit_code);
   addReplayCommand(app, exit_code);
   addEvaluateCommand(app, exit_code);
+  addMeshCommand(app, exit_code);
   addBudgetCommand(app, exit_code);
   addSettingsCommand(app, exit_code);
   try {

@@ -28,7 +28,7 @@ int run(std::vector<std::string> arguments) {
 TEST_CASE("exit codes: 0 done, 2 wrong use or bad input") {
   CHECK(run({"--help"}) == kExitDone);
   CHECK(run({"--version"}) == kExitDone);
-  for (const char* command : {"simulate", "replay", "evaluate", "settings"})
+  for (const char* command : {"simulate", "replay", "evaluate", "mesh", "settings"})
     CHECK(run({command, "--help"}) == kExitDone);
   CHECK(run({"settings"}) == kExitDone);
   CHECK(run({}) == kExitBadInput);

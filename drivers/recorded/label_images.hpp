@@ -1,0 +1,42 @@
+#pragma once
+// The label images of a log: `mav0/labels0`, a folder like a camera's with data.csv and 8-bit grey PNG whose
+// values are labels, in camera 0's raw (distorted) geometry. Not every image has one.
+//
+// Host side: opening allocates and throws InputError; at() decodes into one buffer, valid until the next
+// call.
+
+#include <string>
+#include <vector>
+
+#include "drivers/recorded/image_decoder.hpp"
+#include "drivers/recorded/image_list.hpp"
+#include "drivers/recorded/log_warnings.hpp"
+#include "estimator/core/image_view.hpp"
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+class LabelImages {
+ public:
+  /// `log`: the sequence or its mav0. A log without label images gives none at any stamp.
+  LabelImages(const std::string& log, ImageSize size, LogWarnings& warnings);
+
+  /// The image of exactly this stamp; empty where there is none. Missing, damaged or wrongly sized files are
+  /// warned of, counted and left out.
+  ImageView at(Stamp stamp);
+
+  [[nodiscard]] std::size_t listed() const { return rows_.size(); }
+  [[nodiscard]] const LogCounters& counters() const { return counters_; }
+
+ private:
+  std::string folder_;
+  ImageSize size_;
+  LogWarnings& warnings_;
+  LogCounters counters_;
+  std::vector<ImageRow> rows_;  ///< by stamp
+  ImageDecoder decoder_;
+  std::vector<std::uint8_t> bytes_;
+  std::vector<std::uint8_t> pixels_;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,38 @@
+#pragma once
+// The poses of a trajectory at any stamp within it, and where it jumps.
+//
+// Between two poses at most `max_gap` apart the pose is interpolated (position linear, rotation by SLERP).
+// Two neighbours that nothing flies or turns between so fast end one piece of the trajectory and begin the
+// next; nothing is interpolated across. Host side.
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "drivers/recorded/trajectory_file.hpp"
+
+namespace swiftlet {
+
+class GivenPoses {
+ public:
+  struct Pose {
+    SE3 T_world_body;
+    std::size_t piece = 0;  ///< counts the jumps before it
+  };
+
+  GivenPoses(Trajectory trajectory, Duration max_gap);
+
+  [[nodiscard]] std::optional<Pose> at(Stamp stamp) const;
+  [[nodiscard]] std::size_t jumps() const { return jumps_.size(); }
+  /// Of the first pose after the first jump; meaningful with jumps.
+  [[nodiscard]] Stamp firstJump() const { return trajectory_[jumps_.front()].stamp; }
+  [[nodiscard]] Stamp begin() const { return trajectory_.front().stamp; }
+  [[nodiscard]] Stamp end() const { return trajectory_.back().stamp; }
+
+ private:
+  Trajectory trajectory_;  ///< in time order, not empty
+  Duration max_gap_;
+  std::vector<std::size_t> jumps_;  ///< indices of the poses that begin a piece, without the first
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,104 @@
+#include <fmt/format.h>
+
+#include <atomic>
+#include <csignal>
+#include <memory>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/commands/checks.hpp"
+#include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/mesh_run.hpp"
+
+namespace swiftlet {
+namespace {
+
+std::atomic<bool> stop_asked{false};
+
+extern "C" void askMeshToStop(int /*signal*/) { stop_asked.store(true, std::memory_order_relaxed); }
+
+struct MeshOptions {
+  MeshRequest request;
+  SettingsOptions settings;
+  std::vector<std::string> calibration;
+  double until = -1;
+};
+
+void printSummary(const nlohmann::ordered_json& summary) {
+  const auto& frames = summary["frames"];
+  fmt::print("{} frames with a pose, {} keyframes, {} without a pose, {} jumps\n",
+             frames["meshed"].get<std::uint64_t>(), frames["keyframes"].get<std::uint64_t>(),
+             frames["without_pose"].get<std::uint64_t>(), frames["jumps"].get<std::uint64_t>());
+  for (const auto& [name, timing] : summary["timing"].items()) {
+    const auto& cpu = timing["cpu"];
+    fmt::print("  {:<24} {:>6} times  p50 {:.3f}  p99 {:.3f}  max {:.3f} ms CPU\n", name,
+               timing["count"].get<std::uint64_t>(), cpu["p50_ms"].get<double>(), cpu["p99_ms"].get<double>(),
+               cpu["max_ms"].get<double>());
+  }
+}
+
+int mesh(const MeshOptions& options) {
+  MeshRequest request = options.request;
+  request.stop = &stop_asked;
+  request.show_progress = true;
+  if (options.until >= 0) request.until = options.until;
+  if (!options.calibration.empty()) request.calibration = options.calibration[0];
+  if (options.calibration.size() > 1) request.imu_calibration = options.calibration[1];
+  if (request.until && *request.until < request.from) {
+    throw InputError("--until", 0, "", "the section ends before it begins", "Give an --until after --from");
+  }
+  stop_asked.store(false, std::memory_order_relaxed);
+  std::signal(SIGINT, askMeshToStop);
+  std::signal(SIGTERM, askMeshToStop);
+  const MeshResult result = runMesh(request, options.settings.read());
+  printSummary(result.summary);
+  fmt::print("written to {}\n", request.out);
+  if (!result.finished) {
+    fmt::print(stderr, "stopped before the end; the folder holds what was done\n");
+    return kExitFailed;
+  }
+  if (!result.has_mesh) {
+    fmt::print(stderr,
+               "error: {}: no frame has a mesh; summary.json says what became of frames and landmarks\n",
+               request.log);
+    return kExitFailed;
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+void addMeshCommand(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("mesh", "Mesh a log's surroundings with given poses");
+  auto options = std::make_shared<MeshOptions>();
+  MeshRequest& request = options->request;
+  request.out = "mesh";
+  command->add_option("LOG", request.log, "EuRoC/ASL folder, a recorded run, or a ROS 1 bag where supported")
+      ->required();
+  command->add_option("--trajectory", request.trajectory,
+                      "Poses of the body (TUM, EuRoC csv); default: the log's own truth");
+  command->add_option("--out", request.out, "Folder to write")->capture_default_str();
+  command->add_flag("--complete", request.complete,
+                    "Also complete_mesh.ply: the mesh with a horizon over the whole flight");
+  command
+      ->add_option("--max-gap", request.max_gap,
+                   "Poses are interpolated between neighbours at most this far apart [s]")
+      ->check(positive())
+      ->capture_default_str();
+  command->add_flag("--mono", request.mono, "Camera 0 alone");
+  command
+      ->add_option("--calibration", options->calibration,
+                   "Calibration instead of the log's own: a folder, or Kalibr camchain and IMU files")
+      ->expected(1, 2);
+  command->add_option("--from", request.from, "Start this many seconds after the first image")
+      ->check(nonNegative());
+  command->add_option("--until", options->until, "End this many seconds after the first image")
+      ->check(nonNegative());
+  options->settings.addTo(*command);
+  command->footer(
+      "Example:\n  swiftlet mesh data/vil_v102 --out mesh_v102\n"
+      "  swiftlet mesh data/euroc_mh01_20s --trajectory run_mh01/odometry.tum --out mesh_mh01\n"
+      "  swiftlet mesh flight --complete --out mesh_flight");
+  command->callback([options, &exit_code] { exit_code = mesh(*options); });
+}
+
+}  // namespace swiftlet
