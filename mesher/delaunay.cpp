@@ -185,23 +185,25 @@ Status Delaunay::placeInPlane(std::uint16_t index) {
 // The triangle that p is in or on the border of, or an infinite one whose edge p is strictly outside of. No
 // triangle is entered twice, for along the walk the power of p to the circumcircles falls; hence the limit.
 bool Delaunay::locate(const GridPoint& p, Edge& cell) const {
-  const auto armTo = [&](Edge edge) { return armOf(p, point_[origin_[edge]]); };
-  const auto isBeyond = [](const GridArm& from, const GridArm& to) { return from.x * to.y - from.y * to.x < 0; };
+  const auto arm_to = [&](Edge edge) { return armOf(p, point_[origin_[edge]]); };
+  const auto is_beyond = [](const GridArm& from, const GridArm& to) {
+    return from.x * to.y - from.y * to.x < 0;
+  };
   const Edge from_infinite = edgeFromInfinite(last_);
   Edge entered = from_infinite < last_ + 3 ? twin_[nextOf(from_infinite)] : last_;
-  GridArm start = armTo(entered);
-  GridArm end = armTo(nextOf(entered));
-  if (isBeyond(start, end)) {
+  GridArm start = arm_to(entered);
+  GridArm end = arm_to(nextOf(entered));
+  if (is_beyond(start, end)) {
     entered = twin_[entered];
     std::swap(start, end);
   }
   for (std::size_t steps = 0; steps <= cell_count_; ++steps) {
     const Edge left = previousOf(entered);
-    const GridArm apex = armTo(left);
-    if (isBeyond(end, apex)) {
+    const GridArm apex = arm_to(left);
+    if (is_beyond(end, apex)) {
       entered = twin_[nextOf(entered)];
       start = apex;
-    } else if (isBeyond(apex, start)) {
+    } else if (is_beyond(apex, start)) {
       entered = twin_[left];
       end = apex;
     } else {
@@ -227,12 +229,12 @@ void Delaunay::split(Edge cell, std::uint16_t p) {
   setVertices(cell, a, b, p);
   setVertices(second, b, c, p);
   setVertices(third, c, a, p);
-  const auto joinFan = [this](Edge right, Edge left) {
+  const auto join_fan = [this](Edge right, Edge left) {
     join(static_cast<Edge>(right + 1), static_cast<Edge>(left + 2));
   };
-  joinFan(cell, second);
-  joinFan(second, third);
-  joinFan(third, cell);
+  join_fan(cell, second);
+  join_fan(second, third);
+  join_fan(third, cell);
 }
 
 // Counter-clockwise around p, beginning at `cell`. Every flip gives p one more neighbour, every other step

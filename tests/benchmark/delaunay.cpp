@@ -43,7 +43,8 @@ Points spreadPixels(Random& random, int count) {
   Points points;
   for (int i = 0; i < count; ++i) {
     const double u = (i % columns + random.uniform(0.1, 0.9)) * kWidth / columns;
-    const double v = (i / columns + random.uniform(0.1, 0.9)) * kHeight / rows;
+    const int row = i / columns;
+    const double v = (row + random.uniform(0.1, 0.9)) * kHeight / rows;
     points.emplace_back(std::floor(static_cast<float>(u)), std::floor(static_cast<float>(v)));
   }
   for (std::size_t i = points.size(); i > 1; --i) {

@@ -124,13 +124,13 @@ std::string faultOf(const Points& points, Delaunay& delaunay) {
   std::rotate(expected.begin(), first, expected.end());
   if (!std::equal(hull.begin(), hull.end(), expected.begin())) return "the hull";
 
-  const auto areaOf = [&](std::size_t a, std::size_t b, std::size_t c) {
+  const auto area_of = [&](std::size_t a, std::size_t b, std::size_t c) {
     return static_cast<std::int64_t>(orientation(grid[a], grid[b], grid[c]));
   };
   std::int64_t hull_area = 0;
-  for (std::size_t i = 1; i + 1 < hull.size(); ++i) hull_area += areaOf(hull[0], hull[i], hull[i + 1]);
+  for (std::size_t i = 1; i + 1 < hull.size(); ++i) hull_area += area_of(hull[0], hull[i], hull[i + 1]);
   std::int64_t area = 0;
-  for (const DelaunayTriangle& t : triangles) area += areaOf(t.vertex[0], t.vertex[1], t.vertex[2]);
+  for (const DelaunayTriangle& t : triangles) area += area_of(t.vertex[0], t.vertex[1], t.vertex[2]);
   if (area != hull_area) return "the area is not the hull's";
   return faultOfTriangles(grid, vertices, triangles, hull.size());
 }
