@@ -15,7 +15,7 @@ constexpr float kMaxEdgeOverDepth = 0.5F;
 constexpr float kMinHeight = 2.0F;  // px
 constexpr float kMaxRelativeSigma = 0.1F;
 
-// Places in a face at which the label image is read: evenly spread, away from the edges.
+// Places in a face at which the label image is read: spread, away from the edges.
 struct Barycentric {
   float a, b, c;
 };
@@ -53,30 +53,20 @@ FaceVerdict FrameMesh::judge(const FrameFace& face) const {
   return FaceVerdict::kKept;
 }
 
+// A face across a border between labels is of neither.
 std::uint8_t FrameMesh::labelOf(const FrameFace& face, const ImageView& labels) const {
-  std::array<std::uint8_t, kLabelPlaces.size()> read{};
-  for (std::size_t i = 0; i < read.size(); ++i) {
-    const Eigen::Vector2f at = kLabelPlaces[i].a * points_[face.point[0]].pixel +
-                               kLabelPlaces[i].b * points_[face.point[1]].pixel +
-                               kLabelPlaces[i].c * points_[face.point[2]].pixel;
+  std::uint8_t label = kNoLabel;
+  for (const Barycentric& place : kLabelPlaces) {
+    const Eigen::Vector2f at = place.a * points_[face.point[0]].pixel +
+                               place.b * points_[face.point[1]].pixel +
+                               place.c * points_[face.point[2]].pixel;
     const int x = std::clamp(static_cast<int>(std::lround(at.x())), 0, labels.width - 1);
     const int y = std::clamp(static_cast<int>(std::lround(at.y())), 0, labels.height - 1);
-    read[i] = labels.row(y)[x];
+    const std::uint8_t read = labels.row(y)[x];
+    if (&place != &kLabelPlaces.front() && read != label) return kNoLabel;
+    label = read;
   }
-  // The most frequent; of equals the smallest.
-  std::sort(read.begin(), read.end());
-  std::uint8_t best = read[0];
-  std::size_t best_count = 0;
-  for (std::size_t i = 0; i < read.size();) {
-    std::size_t end = i;
-    while (end < read.size() && read[end] == read[i]) ++end;
-    if (end - i > best_count) {
-      best_count = end - i;
-      best = read[i];
-    }
-    i = end;
-  }
-  return best;
+  return label;
 }
 
 void FrameMesh::build(const Points& points, const ImageView& labels) {

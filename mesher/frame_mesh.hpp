@@ -9,6 +9,7 @@
 //  - long: an edge longer than 1 m, or than half of the distance from the camera;
 //  - thin: the shortest height in the image is below 2 px;
 //  - unknown: a vertex whose depth is known to less than a tenth (1 sigma).
+// A face has the label that all of seven places in it show; across a border between labels it has none.
 // Frames: camera 0, metres; raw pixels. Source: Rosinol, Sattler, Pollefeys, Carlone, "Incremental
 // Visual-Inertial 3D Mesh Generation with Structural Regularities", ICRA 2019.
 // Memory: 60 kB and Delaunay's, inside the object. Cost: 0.15 ms for 300 features.

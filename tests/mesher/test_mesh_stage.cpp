@@ -207,7 +207,7 @@ TEST_CASE("a newer frame joins the same vertices otherwise") {
   CHECK(stage.horizon().counters().replaced == 1);
 }
 
-TEST_CASE("a face's label is what most of its area shows, and changes by majority") {
+TEST_CASE("a face's label changes by majority") {
   const Rig rig = pinholeRig();
   MeshStage stage(rig, {});
   std::vector<std::uint8_t> pixels(static_cast<std::size_t>(kWidth * kHeight), 3);
@@ -225,6 +225,27 @@ TEST_CASE("a face's label is what most of its area shows, and changes by majorit
   CHECK(step(3, 5) == 3);
   CHECK(step(4, 5) == 3);
   CHECK(step(5, 5) == 5);
+}
+
+TEST_CASE("faces across a border between labels have none") {
+  const Rig rig = pinholeRig();
+  MeshStage stage(rig, {});
+  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(kWidth * kHeight), 3);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    if (i % kWidth >= kWidth / 2 + 20) pixels[i] = 4;  // midway between two columns of vertices
+  }
+  MeshScene scene(rig, at(0, 0, 0), 1);
+  addWall(scene, 1);
+  MeshInput input = scene.input();
+  input.labels = {pixels.data(), kWidth, kHeight, kWidth};
+  REQUIRE(stage.step(input).ok());
+  const auto mesh = frameOf(stage);
+  for (const MeshFace& face : mesh->faces) {
+    float x = 0;
+    for (const std::uint32_t v : face.vertex) x += mesh->vertices[v].p_world.x() / 3;
+    const bool across = x > 0 && x < 0.4F;
+    CHECK(face.label == (across ? kNoLabel : x < 0 ? 3 : 4));
+  }
 }
 
 TEST_CASE("bad input is skipped and counted") {
