@@ -12,6 +12,7 @@
 #include "drivers/recorded/ros_messages.hpp"
 #include "drivers/recorded/track_file.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
+#include "firmware_host/report/ply_file.hpp"
 #include "tests/fuzz/fuzz_recording.hpp"
 
 namespace swiftlet::fuzz {
@@ -133,14 +134,28 @@ void rosMessage(std::string_view text) {
   (void)toGrey(image, image.size, out.data());
 }
 
-constexpr std::array<NamedTarget, 8> kTargets = {{{"imu_csv", &imuCsv},
+void ply(std::string_view text) {
+  try {
+    const TriangleMesh mesh = readPlyText("mesh.ply", text);
+    demand(mesh.grey.empty() || mesh.grey.size() == mesh.vertices.size());
+    demand(mesh.labels.size() == mesh.faces.size());
+    for (const Eigen::Vector3f& p : mesh.vertices) demand(p.allFinite());
+    for (const auto& face : mesh.faces) {
+      for (const std::uint32_t v : face) demand(v < mesh.vertices.size());
+    }
+  } catch (const InputError&) {
+  }
+}
+
+constexpr std::array<NamedTarget, 9> kTargets = {{{"imu_csv", &imuCsv},
                                                   {"image_csv", &imageCsv},
                                                   {"trajectory", &trajectory},
                                                   {"tracks", &tracks},
                                                   {"euroc_yaml", &eurocYaml},
                                                   {"kalibr_yaml", &kalibrYaml},
                                                   {"ros_message", &rosMessage},
-                                                  {"recording", &recording}}};
+                                                  {"recording", &recording},
+                                                  {"ply", &ply}}};
 
 }  // namespace
 
