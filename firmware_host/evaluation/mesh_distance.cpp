@@ -113,15 +113,15 @@ std::uint32_t MeshDistance::split(std::vector<Item>& items, const Span& span, co
   };
   if (span.depth >= kHalvingDepth || !(width > 0)) return halve();
 
-  const auto binOf = [&](const Item& item) {
+  const auto bin_of = [&](const Item& item) {
     const double share = (item.centre[axis] - low) / width;
     return std::min(static_cast<std::size_t>(share * static_cast<double>(kBins)), kBins - 1);
   };
   std::array<Box, kBins> box;
   std::array<std::uint32_t, kBins> count{};
   for (auto item = begin; item != end; ++item) {
-    box[binOf(*item)].add(item->box);
-    ++count[binOf(*item)];
+    box[bin_of(*item)].add(item->box);
+    ++count[bin_of(*item)];
   }
   // cost_above[k]: of the bins from k on; then the sweep from below finds the cheapest border.
   std::array<double, kBins> cost_above{};
@@ -146,7 +146,7 @@ std::uint32_t MeshDistance::split(std::vector<Item>& items, const Span& span, co
     border = k;
   }
   if (border == 0) return halve();
-  const auto middle = std::partition(begin, end, [&](const Item& item) { return binOf(item) < border; });
+  const auto middle = std::partition(begin, end, [&](const Item& item) { return bin_of(item) < border; });
   return static_cast<std::uint32_t>(middle - items.begin());
 }
 

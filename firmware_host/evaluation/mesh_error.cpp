@@ -87,7 +87,7 @@ DistanceStatistics statisticsOf(std::vector<float> distances) {
   result.mean = sum / n;
   result.rmse = std::sqrt(squares / n);
   const auto quantile = [&](double q) {
-    const auto at = distances.begin() + static_cast<std::ptrdiff_t>(q * (n - 1) + 0.5);
+    const auto at = distances.begin() + std::lround(q * (n - 1));
     std::nth_element(distances.begin(), at, distances.end());
     return static_cast<double>(*at);
   };

@@ -108,19 +108,18 @@ class MeshReader {
     Eigen::Vector3f p = Eigen::Vector3f::Zero();
     double grey = 0;
     for (const PlyProperty& property : element.properties) {
-      if (property.is_list) {
-        passOver(property);
-      } else if (property.name == "x") {
+      const std::string_view name = property.is_list ? std::string_view() : std::string_view(property.name);
+      if (name == "x") {
         p.x() = coordinate(property);
-      } else if (property.name == "y") {
+      } else if (name == "y") {
         p.y() = coordinate(property);
-      } else if (property.name == "z") {
+      } else if (name == "z") {
         p.z() = coordinate(property);
-      } else if (has_colour_ && property.name == "red") {
+      } else if (has_colour_ && name == "red") {
         grey += kRedWeight * byteValue(property);
-      } else if (has_colour_ && property.name == "green") {
+      } else if (has_colour_ && name == "green") {
         grey += kGreenWeight * byteValue(property);
-      } else if (has_colour_ && property.name == "blue") {
+      } else if (has_colour_ && name == "blue") {
         grey += kBlueWeight * byteValue(property);
       } else {
         passOver(property);
