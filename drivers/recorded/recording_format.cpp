@@ -29,6 +29,8 @@ const char* pluralName(RecordKind kind) {
       return "tracking steps";
     case RecordKind::kSmoothStep:
       return "smoothing steps";
+    case RecordKind::kMeshStep:
+      return "mesh steps";
     default:
       return "marks";
   }

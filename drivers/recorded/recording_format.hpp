@@ -33,8 +33,14 @@ enum class RecordKind : std::uint16_t {
   kSmoothStep = 6,
   kLoss = 7,  ///< records of another kind were lost here
   kEnd = 8,   ///< the recording was ended in order
+  kMeshStep = 9,
 };
-inline constexpr std::size_t kRecordKinds = 9;
+inline constexpr std::size_t kRecordKinds = 10;
+
+/// Messages and steps: what may be lost in front of the recorder.
+constexpr bool canBeLost(RecordKind kind) {
+  return (kind >= RecordKind::kImu && kind <= RecordKind::kSmoothStep) || kind == RecordKind::kMeshStep;
+}
 
 constexpr RecordKind imageKind(std::size_t camera) {
   return camera == 0 ? RecordKind::kImage0 : RecordKind::kImage1;
@@ -59,7 +65,9 @@ inline constexpr std::size_t kImuPayloadBytes = 64;
 inline constexpr std::size_t kImageHeadBytes = 40;  ///< then width * height pixels
 inline constexpr std::size_t kPropagateStepBytes = 16;
 inline constexpr std::size_t kTrackStepBytes = 64;
-inline constexpr std::size_t kSmoothStepBytes = 32;
+inline constexpr std::size_t kSmoothStepBytes = 40;
+inline constexpr std::size_t kSmoothStepBytesBeforePlanes = 32;  ///< as written by programs without a mesh
+inline constexpr std::size_t kMeshStepBytes = 24;
 inline constexpr std::size_t kLossBytes = 16;
 inline constexpr std::size_t kEndBytes = 8;
 

@@ -49,6 +49,7 @@ class Indexer {
                  std::uint64_t offset);
   void takeTrackStep(LittleEndianReader& from);
   void takeSmoothStep(LittleEndianReader& from);
+  void takeMeshStep(LittleEndianReader& from);
   void takeLoss(LittleEndianReader& from, const RecordingFile& file, std::uint64_t offset);
   void cutAt(std::uint64_t offset, const char* reason);
   [[nodiscard]] std::uint64_t soundRecords(RecordingWindow& window, std::size_t segment,
@@ -191,6 +192,8 @@ std::size_t payloadBytes(RecordKind kind) {
       return kTrackStepBytes;
     case RecordKind::kSmoothStep:
       return kSmoothStepBytes;
+    case RecordKind::kMeshStep:
+      return kMeshStepBytes;
     case RecordKind::kLoss:
       return kLossBytes;
     case RecordKind::kEnd:
@@ -211,13 +214,15 @@ void Indexer::take(const RecordHeader& header, RecordingWindow& window, std::uin
   }
   if (kind == RecordKind::kRun) return takeRun(header, window, offset);
   const bool image = kind == RecordKind::kImage0 || kind == RecordKind::kImage1;
-  if (image ? header.length < kImageHeadBytes : header.length != payloadBytes(kind)) {
+  const bool older = kind == RecordKind::kSmoothStep && header.length == kSmoothStepBytesBeforePlanes;
+  const std::size_t length = older ? kSmoothStepBytesBeforePlanes : payloadBytes(kind);
+  if (image ? header.length < kImageHeadBytes : header.length != length) {
     refuse(file, offset, fmt::format("a record of {} has {} bytes", pluralName(kind), header.length),
            "Replay it with the program that recorded it");
   }
   // Copied, because the window moves.
   std::array<std::uint8_t, kLargestSmallPayload> payload{};
-  const std::span<const std::uint8_t> bytes = window.exactly(offset + kRecordHeaderBytes, payloadBytes(kind));
+  const std::span<const std::uint8_t> bytes = window.exactly(offset + kRecordHeaderBytes, length);
   std::copy(bytes.begin(), bytes.end(), payload.begin());
   LittleEndianReader from(payload);
   std::uint64_t& number = last_number_[static_cast<std::size_t>(kind)];
@@ -241,6 +246,8 @@ void Indexer::take(const RecordHeader& header, RecordingWindow& window, std::uin
       return takeTrackStep(from);
     case RecordKind::kSmoothStep:
       return takeSmoothStep(from);
+    case RecordKind::kMeshStep:
+      return takeMeshStep(from);
     case RecordKind::kLoss:
       return takeLoss(from, file, offset);
     default:
@@ -316,14 +323,22 @@ void Indexer::takeSmoothStep(LittleEndianReader& from) {
   step.effort.iterations = from.i32();
   step.effort.features = from.i32();
   step.effort.keyframes = from.i32();
+  (void)from.u32();
+  step.planes = from.u64();  // zero in an older, shorter one
+}
+
+void Indexer::takeMeshStep(LittleEndianReader& from) {
+  MeshStep& step = index_.steps.mesh.emplace_back();
+  step.frame = from.u64();
+  step.window = from.u64();
+  step.image = from.u64();
 }
 
 void Indexer::takeLoss(LittleEndianReader& from, const RecordingFile& file, std::uint64_t offset) {
   const std::uint32_t kind = from.u32();
   (void)from.u32();
   const std::uint64_t count = from.u64();
-  const bool known = kind >= static_cast<std::uint32_t>(RecordKind::kImu) &&
-                     kind <= static_cast<std::uint32_t>(RecordKind::kSmoothStep);
+  const bool known = kind < kRecordKinds && canBeLost(static_cast<RecordKind>(kind));
   if (!known || count > std::numeric_limits<std::uint64_t>::max() - last_number_[kind]) {
     refuse(file, offset, fmt::format("{} lost records of kind {}", count, kind),
            "Replay it with the program that recorded it");

@@ -42,6 +42,7 @@ struct RecordedSteps {
   std::vector<PropagateStep> propagate;
   std::vector<TrackStep> track;
   std::vector<SmoothStep> smooth;
+  std::vector<MeshStep> mesh;
 };
 
 /// Records that never reached the writer: `count` of `kind`, after number `after` of that kind.

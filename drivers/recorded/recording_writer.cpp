@@ -299,12 +299,22 @@ Status RecordingWriter::smoothStep(const SmoothStep& step) {
   to.u64(step.frame);
   to.u64(step.samples);
   appendEffort(to, step.effort);
+  to.u64(step.planes);
   return put(RecordKind::kSmoothStep, payload.data(), payload.size());
+}
+
+Status RecordingWriter::meshStep(const MeshStep& step) {
+  std::array<std::uint8_t, kMeshStepBytes> payload{};
+  LittleEndianWriter to(payload.data());
+  to.u64(step.frame);
+  to.u64(step.window);
+  to.u64(step.image);
+  return put(RecordKind::kMeshStep, payload.data(), payload.size());
 }
 
 Status RecordingWriter::loss(RecordKind kind, std::uint64_t count) {
   if (count == 0) return status_;
-  if (kind < RecordKind::kImu || kind > RecordKind::kSmoothStep) {
+  if (!canBeLost(kind)) {
     return {StatusCode::kInvalidInput, "only messages and steps can be lost"};
   }
   std::array<std::uint8_t, kLossBytes> payload{};

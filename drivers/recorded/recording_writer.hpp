@@ -70,6 +70,7 @@ class RecordingWriter {
   Status propagateStep(const PropagateStep& step);
   Status trackStep(const TrackStep& step);
   Status smoothStep(const SmoothStep& step);
+  Status meshStep(const MeshStep& step);
   /// `count` records of `kind` never came here because a buffer before the writer was full; they would have
   /// followed the last record of that kind.
   Status loss(RecordKind kind, std::uint64_t count);

@@ -3,7 +3,8 @@
 // which threads decide by their speed what a stage sees.
 //
 // Numbers count from 1 in the order of arrival at the estimator, 0 is none: IMU samples over the run,
-// images over the run of each camera, windows and fixes in the order in which `smooth` published them.
+// images over the run of each camera, windows and fixes in the order in which `smooth` published them, plane
+// reports in the order in which `mesh` did.
 
 #include <array>
 #include <cstdint>
@@ -37,8 +38,17 @@ struct SmoothStep {
   std::uint64_t frame = 0;    ///< index of the tracked frame
   std::uint64_t samples = 0;  ///< IMU samples taken before it
   Effort effort;
+  std::uint64_t planes = 0;  ///< number of the plane report that was the newest
 
   bool operator==(const SmoothStep&) const = default;
+};
+
+struct MeshStep {
+  std::uint64_t frame = 0;   ///< index of the tracked frame
+  std::uint64_t window = 0;  ///< number of the window that was the newest
+  std::uint64_t image = 0;   ///< number of camera 0's image; 0: none was at hand
+
+  bool operator==(const MeshStep&) const = default;
 };
 
 }  // namespace swiftlet

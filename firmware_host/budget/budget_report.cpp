@@ -242,6 +242,10 @@ BudgetReport evaluateBudgets(const BudgetMeasurements& measured, const BudgetsGr
              limits(b.track_p50_ms, b.track_p99_ms, b.track_max_ms));
   report.add("smooth", TimeKind::kCpu, measured.smooth_cpu,
              limits(b.smooth_p50_ms, b.smooth_p99_ms, b.smooth_max_ms));
+  if (measured.meshes) {
+    report.add("mesh", TimeKind::kCpu, measured.mesh_cpu,
+               limits(b.mesh_p50_ms, b.mesh_p99_ms, b.mesh_max_ms));
+  }
   report.add("image to pose", TimeKind::kCpu, measured.image_to_pose_cpu,
              limits(b.image_to_pose_p50_ms, b.image_to_pose_p99_ms, b.image_to_pose_max_ms));
   report.add("... at keyframes", TimeKind::kCpu, measured.image_to_pose_cpu_keyframes, spread);

@@ -88,6 +88,8 @@ struct BudgetMeasurements {
   LatencyHistogram track_wall;
   LatencyHistogram smooth_cpu;
   LatencyHistogram smooth_wall;
+  bool meshes = false;  ///< the runs mesh
+  LatencyHistogram mesh_cpu;
   LatencyHistogram image_to_pose_cpu;            ///< all frames
   LatencyHistogram image_to_pose_cpu_keyframes;  ///< of them, those that became keyframes
   LatencyHistogram image_to_pose_cpu_frames;     ///< and those that did not

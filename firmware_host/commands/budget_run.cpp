@@ -40,6 +40,7 @@ class Load {
 void addMeasurements(const StageTable& times, BudgetMeasurements& sum) {
   const StageTimes& track = timesOf(times, StageId::kTrack);
   const StageTimes& smooth = timesOf(times, StageId::kSmooth);
+  const StageTimes& mesh = timesOf(times, StageId::kMesh);
   const StageTimes& imu = timesOf(times, StageId::kImu);
   const StageTimes& pose = timesOf(times, StageId::kImageToPose);
   const StageTimes& exposure = timesOf(times, StageId::kExposureToPose);
@@ -48,6 +49,7 @@ void addMeasurements(const StageTable& times, BudgetMeasurements& sum) {
   addBoth(sum.track_wall, track.wall_frames, track.wall_keyframes);
   addBoth(sum.smooth_cpu, smooth.cpu_frames, smooth.cpu_keyframes);
   addBoth(sum.smooth_wall, smooth.wall_frames, smooth.wall_keyframes);
+  addBoth(sum.mesh_cpu, mesh.cpu_frames, mesh.cpu_keyframes);
   addBoth(sum.image_to_pose_cpu, pose.cpu_frames, pose.cpu_keyframes);
   sum.image_to_pose_cpu_keyframes.add(pose.cpu_keyframes);
   sum.image_to_pose_cpu_frames.add(pose.cpu_frames);
@@ -65,6 +67,7 @@ BudgetResult runBudget(const BudgetRequest& request, const Settings& settings) {
   same_as_track.priority = settings.realtime.enabled ? settings.realtime.track_priority : 0;
   timer.start(same_as_track);
   BudgetMeasurements measured;
+  measured.meshes = settings.mesh.enabled;
   BudgetResult result;
   nlohmann::ordered_json runs = nlohmann::ordered_json::array();
   Settings flight = settings;

@@ -72,19 +72,6 @@ Json timingJson(const LatencyHistogram& cpu) {
             {"max_ms", cpu.max() * kMilli}}}};
 }
 
-Json countersJson(const MeshCounters& counters, const HorizonCounters& horizon) {
-  return {{"frames", counters.frames},
-          {"invalid_frames", counters.invalid_frames},
-          {"pose_jumps", counters.pose_jumps},
-          {"too_few_points", counters.too_few_points},
-          {"bad_landmarks", counters.bad_landmarks},
-          {"bad_features", counters.bad_features},
-          {"epochs", counters.epochs},
-          {"refused_for_room", horizon.refused},
-          {"faces_refuted", horizon.refuted},
-          {"faces_replaced", horizon.replaced}};
-}
-
 Json landmarksJson(const GivenPoseCounters& counters) {
   return {{"triangulated", counters.triangulated},
           {"sightings_left_out", counters.sightings_left_out},
@@ -340,7 +327,7 @@ MeshResult MeshRun::end() {
                     {"meshed", meshed_},       {"keyframes", keyframes_},       {"jumps", jumps_},
                     {"with_labels", labelled_}};
   json["landmarks"] = landmarksJson(local_->window.counters());
-  json["counters"] = countersJson(local_->stage->counters(), local_->stage->horizon().counters());
+  json["counters"] = toJson(local_->stage->counters(), local_->stage->horizon().counters());
   json["local_mesh"] = {{"vertices", horizon_mesh_.vertices.size()}, {"faces", horizon_mesh_.faces.size()}};
   if (complete_) {
     const HorizonMesh& mesh = complete_->stage->horizon();
@@ -348,7 +335,7 @@ MeshResult MeshRun::end() {
     json["complete_mesh"] = {{"vertices", mesh.vertices().size()},
                              {"faces", mesh.faces().size()},
                              {"landmarks", landmarksJson(complete_->window.counters())},
-                             {"counters", countersJson(complete_->stage->counters(), mesh.counters())}};
+                             {"counters", toJson(complete_->stage->counters(), mesh.counters())}};
   }
   json["timing"] = timingsJson();
   json["warnings"] = source_->warnings();

@@ -90,6 +90,8 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
   command->add_option("--until", options->until, "End this many seconds after the first image")
       ->check(nonNegative());
   command->add_flag("--imu-rate", request.imu_rate, "Also write imu_rate.tum, the state at every IMU sample");
+  command->add_flag("--mesh-sequence", request.mesh_sequence,
+                    "Also write meshes/, the mesh of every frame and that over the horizon at keyframes");
   CLI::Option* real_time = command->add_flag("--real-time", request.real_time,
                                              "On threads, with the log's messages let out at their times");
   command->add_option("--speed", request.speed, "Times faster than recorded (with --real-time)")

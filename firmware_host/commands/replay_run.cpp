@@ -136,7 +136,7 @@ class ReplayRun {
 
   void begin() {
     facts_.mono = !settings_.odometry.use_stereo || source_->rig().camera_count < 2;
-    recorder_.emplace(request_.out, request_.imu_rate);
+    recorder_.emplace(request_.out, request_.imu_rate, request_.mesh_sequence);
     LineFile(out() / "settings.yaml").write(printSettings(settings_, false));
     log_.emplace(*recorder_);
     if (settings_.full_smoothing) {
@@ -163,6 +163,7 @@ class ReplayRun {
     if (request_.record) flight_recorder = startRecorder();
     Wiring::Options wanted;
     wanted.imu_states = request_.imu_rate;
+    wanted.meshes = request_.mesh_sequence;
     wanted.recorder = flight_recorder.get();
     wanted.drag = hooks_.drag;
     LogFeed feed(*source_, {request_.from, request_.until, request_.last_stamp}, tracks_.get());

@@ -22,9 +22,10 @@ struct ReplayRequest {
   std::string tracks;           ///< file of feature tracks in place of the log's images or own tracks
   bool mono = false;
   bool imu_rate = false;
-  bool real_time = false;  ///< on threads, messages let out at their times
-  double speed = 1;        ///< real_time: times faster than recorded
-  bool record = false;     ///< write `recording/` into the run folder
+  bool mesh_sequence = false;  ///< write the meshes of all frames to `meshes/`
+  bool real_time = false;      ///< on threads, messages let out at their times
+  double speed = 1;            ///< real_time: times faster than recorded
+  bool record = false;         ///< write `recording/` into the run folder
   bool reproduce = false;  ///< `log` is a recording: repeat its threaded run step by step, with its settings
   double from = 0;         ///< s after the first image
   std::optional<double> until;  ///< s after the first image

@@ -14,6 +14,7 @@
 #include "estimator/core/status.hpp"
 #include "estimator/messages/frames.hpp"
 #include "estimator/messages/imu_sample.hpp"
+#include "estimator/messages/local_mesh.hpp"
 #include "estimator/messages/odometry_output.hpp"
 #include "estimator/messages/smoothed_window.hpp"
 #include "estimator/messages/state_fix.hpp"
@@ -44,13 +45,15 @@ struct ImageSlot {
 };
 
 /// Readers of images, each with its quota.
-enum ImageReader : std::size_t { kTrackReads, kRecordReads, kImageReaders };
+enum ImageReader : std::size_t { kTrackReads, kMeshReads, kRecordReads, kImageReaders };
 
 /// Waiting in the ring, one at its head, one waiting for its partner, those of waiting frames, those in
 /// work, and one more that lets the newest in before the oldest goes.
 inline constexpr std::uint32_t kTrackQuota = kImageRing + kWaitingFrames + 4;
+/// Waiting in the ring, the one at its head, and one more that lets the newest in before the oldest goes.
+inline constexpr std::uint32_t kMeshQuota = kMeshImages + 2;
 inline constexpr std::uint32_t kRecordQuota = kRecordedImages;
-inline constexpr std::size_t kImageSlots = 1 + kTrackQuota + kRecordQuota;
+inline constexpr std::size_t kImageSlots = 1 + kTrackQuota + kMeshQuota + kRecordQuota;
 using ImagePool = SlotPool<ImageSlot, kImageSlots, kImageReaders>;
 
 /// Between `track` and `smooth`. In order: the end comes last.
@@ -88,6 +91,24 @@ struct FrameResult {
   int smooth_level = 0;
 };
 
+/// From `smooth` to `mesh`: the window, and the frame that is its newest.
+struct MeshMessage {
+  SmoothedWindow window;
+  TrackedFrame tracked;
+  std::uint64_t image = 0;  ///< number of camera 0's image of that frame; 0: missing
+
+  /// False while the start waits.
+  [[nodiscard]] bool hasPose() const { return window.started && !window.poses.empty(); }
+};
+
+/// From `mesh` to `log`, where the meshes of all frames are wanted.
+struct MeshResult {
+  bool keyframe = false;  ///< `horizon` is of this frame
+  LocalMesh frame;
+  LocalMesh horizon;
+  FixedVector<Eigen::Vector2f, kMaxFeatures> hull;  ///< of the frame's features, raw pixels of camera 0
+};
+
 using ImuRing = SpscRing<ImuArrival, kImuRing>;
 /// Hands samples not later than `until` to `taker`, in order; how many.
 template <typename Taker>
@@ -115,6 +136,8 @@ std::uint64_t takeSurplus(ImuRing& ring, Taker&& taker) {
 }
 
 using ImageRing = DropOldestRing<SlotHandle, kImageRing>;
+using MeshImageRing = DropOldestRing<SlotHandle, kMeshImages>;
+using MeshRing = SpscRing<MeshResult, kResultRing>;
 using TrackRing = SpscRing<TrackMessage, kTrackedRing>;
 using ResultRing = SpscRing<FrameResult, kResultRing>;
 using StateRing = SpscRing<NavState, kStateRing>;
@@ -126,6 +149,7 @@ struct RecorderArrows {
   SpscRing<PropagateStep, kStepRing> propagate;
   SpscRing<TrackStep, kStepRing> track;
   SpscRing<SmoothStep, kStepRing> smooth;
+  SpscRing<MeshStep, kStepRing> mesh;
 };
 
 }  // namespace swiftlet

@@ -70,6 +70,9 @@ bool FlightRecorder::drain(RecorderArrows& arrows, const std::array<ImagePool*, 
   any = drainSteps(arrows.smooth, RecordKind::kSmoothStep, steps_lost_[2],
                    [&](const SmoothStep& step) { return writer_.smoothStep(step); }) ||
         any;
+  any = drainSteps(arrows.mesh, RecordKind::kMeshStep, steps_lost_[3],
+                   [&](const MeshStep& step) { return writer_.meshStep(step); }) ||
+        any;
   if (!writer_.status().ok()) running_.store(false, std::memory_order_relaxed);
   const double now = wallSeconds();
   if (now - synced_ > kSyncSeconds) {

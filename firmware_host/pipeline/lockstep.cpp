@@ -14,6 +14,7 @@ void runAll(Wiring& wiring) {
     any = wiring.propagate();
     any = wiring.track() || any;
     any = wiring.smooth() || any;
+    any = wiring.mesh() || any;
     any = wiring.log() || any;
     any = wiring.record() || any;
   }

@@ -4,11 +4,13 @@
 
 #include <deque>
 #include <limits>
+#include <memory>
 
 #include "estimator/odometry/propagation_stage.hpp"
 #include "estimator/odometry/smooth_stage.hpp"
 #include "estimator/odometry/track_stage.hpp"
 #include "firmware_host/pipeline/arrows.hpp"
+#include "mesher/mesh_stage.hpp"
 
 namespace swiftlet {
 namespace {
@@ -23,7 +25,11 @@ class Repeat {
         imu_states_(imu_states),
         propagation_(recording.imuNoise(), settings.odometry),
         track_(recording.rig(), recording.imuNoise(), settings.odometry),
-        smooth_(recording.rig(), recording.imuNoise(), settings.odometry) {}
+        smooth_(recording.rig(), recording.imuNoise(), settings.odometry) {
+    if (settings.mesh.enabled) {
+      mesh_ = std::make_unique<MeshStage>(rigInUse(recording.rig(), settings.odometry), HorizonLimits{});
+    }
+  }
 
   ReproduceReport operator()(const RunControl& control) {
     const RecordedSteps& steps = recording_.steps();
@@ -118,10 +124,45 @@ class Repeat {
       log_.onResult(result);
       smooth_.trim();
       smooth_.window(window_);
+      mesh_message_.window = window_;
+      mesh_message_.tracked = result.tracked;
+      if (!meshNext()) return false;
     } else {
       log_.onResult(result);
     }
     tracked_.pop_front();
+    return true;
+  }
+
+  /// The mesher took this window, or skipped it.
+  bool meshNext() {
+    const auto& steps = recording_.steps().mesh;
+    if (!mesh_ || mesh_steps_ >= steps.size()) return true;
+    if (steps[mesh_steps_].window != windows_) {
+      mesh_skipped_ += mesh_message_.hasPose() ? 1U : 0U;
+      return true;
+    }
+    const MeshStep& step = steps[mesh_steps_++];
+    MeshInput input;
+    input.window = &mesh_message_.window;
+    input.tracks = &mesh_message_.tracked;
+    CameraFrame image;
+    if (step.image > 0) {
+      if (!recording_.image(0, step.image, image)) {
+        return stop(fmt::format("image {} of camera 0 is not in the recording", step.image));
+      }
+      input.image = image.image;
+    }
+    without_image_ += step.image == 0 ? 1 : 0;
+    if (mesh_->step(input).code == StatusCode::kInvalidInput) return true;
+    MeshResult& result = mesh_result_;
+    result.keyframe = mesh_message_.tracked.keyframe;
+    mesh_->frameMesh(result.frame);
+    if (result.keyframe) mesh_->horizonMesh(result.horizon);
+    has_mesh_ = has_mesh_ || result.keyframe;
+    result.hull.clear();
+    for (const Eigen::Vector2f& corner : mesh_->hull()) static_cast<void>(result.hull.tryPushBack(corner));
+    log_.onMesh(result);
     return true;
   }
 
@@ -158,7 +199,11 @@ class Repeat {
     result.track_step.stamp = kEndOfTime;
     smooth_.finish(result.output);
     log_.onResult(result);
+    if (has_mesh_) log_.onLocalMesh(mesh_result_.horizon);
     RunStatistics& statistics = log_.statistics();
+    if (mesh_) {
+      statistics.mesh = {mesh_->counters(), mesh_->horizon().counters(), mesh_skipped_, without_image_};
+    }
     statistics.imu_samples = recording_.imuCount();
     for (const TrackStep& step : recording_.steps().track) {
       for (const std::uint64_t image : step.image) statistics.images += image > 0 ? 1U : 0U;
@@ -171,6 +216,13 @@ class Repeat {
   PropagationStage propagation_;
   TrackStage track_;
   SmoothStage smooth_;
+  std::unique_ptr<MeshStage> mesh_;  ///< null: switched off
+  MeshMessage mesh_message_;
+  MeshResult mesh_result_;
+  std::size_t mesh_steps_ = 0;
+  std::uint64_t without_image_ = 0;
+  std::uint64_t mesh_skipped_ = 0;
+  bool has_mesh_ = false;  ///< mesh_result_ holds one over the horizon
   SmoothedWindow window_;
   std::uint64_t windows_ = 0;  ///< published so far; window_ is the last of them
   std::uint64_t window_taken_ = 0;

@@ -4,14 +4,17 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "estimator/messages/local_mesh.hpp"
 #include "estimator/messages/odometry_output.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/odometry/pairing.hpp"
 #include "estimator/smoother/full_smoother.hpp"
 #include "firmware_host/pipeline/stage_timer.hpp"
+#include "mesher/mesh_stage.hpp"
 
 namespace swiftlet {
 
@@ -27,6 +30,12 @@ class RunListener {
   virtual void onFrame(const TrackedFrame& tracked, const OdometryOutput& output) = 0;
   /// The state propagated to an IMU sample, when there is one.
   virtual void onImuState(const NavState& state) = 0;
+  /// The meshes of a frame, where Wiring::Options asks for them; `horizon` is null between keyframes, `hull`
+  /// that of the frame's features in raw pixels of camera 0.
+  virtual void onMesh(bool /*keyframe*/, const LocalMesh& /*frame*/, const LocalMesh* /*horizon*/,
+                      std::span<const Eigen::Vector2f> /*hull*/) {}
+  /// At the end: the newest mesh over the horizon, when there is one.
+  virtual void onLocalMesh(const LocalMesh& /*mesh*/) {}
   /// At the end: keyframes and events that had not come out yet.
   virtual void onFinish(const OdometryOutput& output) = 0;
   /// A remark of the executor, for events.log.
@@ -42,6 +51,14 @@ struct HealthChange {
   Stamp stamp;
   Health health = Health::kInitializing;
   std::uint32_t epoch = 0;
+};
+
+/// What the mesh stage and the mesh over the horizon counted.
+struct MeshStatistics {
+  MeshCounters stage;
+  HorizonCounters horizon;
+  std::uint64_t skipped = 0;        ///< windows that a newer one overtook
+  std::uint64_t without_image = 0;  ///< steps without grey values
 };
 
 /// Counters of a run. Host side: the lists grow with the number of changes, not of frames.
@@ -63,6 +80,7 @@ struct RunStatistics {
   PairingCounters pairing;
   std::map<EventKind, EventTotal> events;
   std::optional<FullSmootherReport> map;        ///< figures of the full smoothing, when it ran
+  std::optional<MeshStatistics> mesh;           ///< when the run meshed
   std::map<std::string, std::uint64_t> faults;  ///< statuses that were not ok, by their text
   std::map<std::string, std::uint64_t> losses;  ///< what did not fit an arrow between threads, by its name
   std::vector<HealthChange> health;

@@ -98,6 +98,10 @@ void RunLog::collect(const Wiring& wiring) {
   for (const std::uint64_t images : counters.sensor.images) statistics_.images += images;
   statistics_.pairing = counters.track.pairing;
   statistics_.frames_dropped = counters.track.dropped;
+  if (const MeshStage* mesh = wiring.meshStage()) {
+    statistics_.mesh = {mesh->counters(), mesh->horizon().counters(), counters.mesh.skipped,
+                        counters.mesh.without_image};
+  }
   wiring.addLosses(statistics_.losses);
   for (std::size_t i = 0; i < statistics_.times.size(); ++i) {
     const StageTimes& times = wiring.times()[i];

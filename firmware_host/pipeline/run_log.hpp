@@ -25,6 +25,11 @@ class RunLog {
   void onImu(const ImuSample& sample) { keeper_->addImu(sample); }
   void onImuState(const NavState& state) { listener_.onImuState(state); }
   void onResult(const FrameResult& result);
+  void onMesh(const MeshResult& result) {
+    listener_.onMesh(result.keyframe, result.frame, result.keyframe ? &result.horizon : nullptr,
+                     {result.hull.data(), result.hull.size()});
+  }
+  void onLocalMesh(const LocalMesh& mesh) { listener_.onLocalMesh(mesh); }
   /// An executor's own remark, for events.log.
   void remark(Stamp stamp, const std::string& text) { listener_.onRemark(stamp, text); }
 

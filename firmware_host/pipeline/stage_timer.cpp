@@ -29,6 +29,8 @@ std::string_view stageName(StageId stage) {
       return "fix";
     case StageId::kTrim:
       return "trim";
+    case StageId::kMesh:
+      return "mesh";
     case StageId::kImageToPose:
       return "image_to_pose";
     case StageId::kExposureToPose:

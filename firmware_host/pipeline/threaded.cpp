@@ -39,6 +39,7 @@ class Run {
     start("log", rt.low_priority, rt.low_cpu, [this] { low([this] { return wiring_.log(); }, log_done_); });
     start("record", rt.low_priority, rt.low_cpu,
           [this] { low([this] { return wiring_.record(); }, record_done_); });
+    start("mesh", rt.mesh_priority, rt.mesh_cpu, [this] { mesh(); });
     start("smooth", rt.smooth_priority, rt.smooth_cpu, [this] { smooth(); });
     start("track", rt.track_priority, rt.track_cpu, [this] { track(); });
     start("propagate", rt.propagate_priority, rt.propagate_cpu, [this] { propagate(); });
@@ -65,7 +66,7 @@ class Run {
     CameraFrame image;
     std::uint64_t taken = 0;
   };
-  static constexpr std::size_t kThreads = 7;
+  static constexpr std::size_t kThreads = 8;
 
   void start(const char* name, int priority, int cpu, std::function<void()> entry) {
     ThreadSettings settings;
@@ -177,8 +178,19 @@ class Run {
       while (wiring_.smooth()) {
         propagate_bell_.ring();  // a new fix
         track_bell_.ring();      // room, and a new window
+        mesh_bell_.ring();
       }
       if (!wiring_.smoothDone()) smooth_bell_.wait(ticket, kLongestSleep);
+    }
+    mesh_bell_.ring();
+  }
+
+  void mesh() {
+    while (!wiring_.meshDone()) {
+      const std::uint32_t ticket = mesh_bell_.ticket();
+      while (wiring_.mesh()) {
+      }
+      if (!wiring_.meshDone()) mesh_bell_.wait(ticket, kLongestSleep);
     }
   }
 
@@ -223,7 +235,7 @@ class Run {
   bool begun_ = false;
   Stamp first_;
   double zero_ = 0;
-  Doorbell propagate_bell_, track_bell_, smooth_bell_;
+  Doorbell propagate_bell_, track_bell_, smooth_bell_, mesh_bell_;
 };
 
 }  // namespace

@@ -3,10 +3,10 @@
 // times of their arrival, as sensors would.
 //
 // Threads: `source` reads and decodes ahead (it is not of the vehicle); `sensor`, `propagate`, `track`,
-// `smooth` are the flight path; `log` and `record` follow at the lowest priority. The flight path sleeps on
-// doorbells with a bounded wait; the others look at their arrows every few milliseconds, so that nobody on
-// the flight path calls the kernel for them.
-// A thread that does not get its priority or CPU runs without; the reports say so.
+// `smooth`, `mesh` are the flight path; `log` and `record` follow at the lowest priority. The flight path
+// sleeps on doorbells with a bounded wait; the others look at their arrows every few milliseconds, so that
+// nobody on the flight path calls the kernel for them. A thread that does not get its priority or CPU runs
+// without; the reports say so.
 
 #include <string>
 #include <vector>

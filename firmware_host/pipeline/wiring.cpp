@@ -7,14 +7,18 @@
 //                        +--ring--> [track]                                      |
 //   [sensor]  cameras --slots-----> PAIRING, TRACK --ring--> TrackedFrame -> [smooth] SMOOTH --ring-->
 //                        |               ^                                       |    FrameResult -> [log]
-//                        |               '--newest-- SmoothedWindow <------------'
-//                        +--ring--> [smooth]
+//                        |               '--newest-- SmoothedWindow <------------+
+//                        +--ring--> [smooth]                                     | newest, with its frame
+//                        |                                                       v
+//   [sensor]  camera 0 --slots-----------------------------------------------> [mesh] MESH
+//                        |                                                       |
+//                        |                     newest LocalMesh, ring of all on request --> [log]
 //                        +--ring--> [log] keyframes and IMU, kept for full smoothing after the run -> map.tum
 //   everything above, and what each stage took for a step --ring, slots--> [record] flight recorder
 //
 //   when full: IMU rings refuse and count; camera rings and waiting frames let the oldest go, counted;
-//   `track` waits for room in front of `smooth`; log and recorder lose, counted; no reader can hold another's
-//   slots.
+//   `track` waits for room in front of `smooth`; `mesh` skips to the newest window, counted; log and recorder
+//   lose, counted; no reader can hold another's slots.
 
 #include "firmware_host/pipeline/wiring.hpp"
 
@@ -57,8 +61,10 @@ Wiring::Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, 
       propagation_(noise, settings.odometry),
       pairing_(pairingSettings(rig, settings)),
       track_(rig, noise, settings.odometry),
-      smooth_(rig, noise, settings.odometry) {
+      smooth_(rig, noise, settings.odometry),
+      mesh_(settings.mesh.enabled ? std::make_unique<MeshStage>(rig_, HorizonLimits{}) : nullptr) {
   if (options.imu_states) states_ = std::make_unique<StateRing>();
+  if (options.meshes && mesh_) meshes_ = std::make_unique<MeshRing>();
   if (recorder_ != nullptr) to_recorder_ = std::make_unique<RecorderArrows>();
   for (std::size_t c = 0; c < rig_.camera_count; ++c) {
     const CameraModel& model = rig_.camera[c];
@@ -112,7 +118,7 @@ bool Wiring::propagate() {
   return true;
 }
 
-// IMU, tracked frames -> smooth -> output, fix, window
+// IMU, tracked frames -> smooth -> output, fix, window, window with its frame
 bool Wiring::smooth() {
   const TrackMessage* message = tracked_ring_.front();
   if (message == nullptr) {
@@ -145,8 +151,7 @@ bool Wiring::smooth() {
   if (result != nullptr) results_.commitPush();
   if (message->kind == TrackMessage::Kind::kFrame) {
     addTime(times_, StageId::kTrim, measured([&] { smooth_.trim(); }), message->tracked.keyframe);
-    smooth_.window(window_.draft());
-    window_.publish();
+    publishWindow(*message);
   }
   tracked_ring_.pop();
   if (ended) smooth_done_.store(true, std::memory_order_release);
@@ -175,10 +180,17 @@ void Wiring::smoothFrame(const TrackMessage& message, FrameResult& out) {
   if (to_recorder_) static_cast<void>(to_recorder_->smooth.tryPush(out.step));
 }
 
-// results, states, IMU -> log
+// results, states, meshes, IMU -> log
 bool Wiring::log() {
   bool any = false;
-  const bool ended = smoothDone() && propagateDone();
+  const bool ended = smoothDone() && meshDone() && propagateDone();
+  if (meshes_) {
+    while (const MeshResult* result = meshes_->front()) {
+      log_.onMesh(*result);
+      meshes_->pop();
+      any = true;
+    }
+  }
   if (states_) {
     while (const NavState* state = states_->front()) {
       log_.onImuState(*state);
@@ -195,14 +207,18 @@ bool Wiring::log() {
     return true;
   }
   takeSurplus(imu_to_log_, keep);
-  if (ended && !any) log_done_ = true;
+  if (ended && !any && !log_done_) {
+    if (local_mesh_.refresh() > 0) log_.onLocalMesh(local_mesh_.value());
+    log_done_ = true;
+  }
   return any;
 }
 
 void Wiring::watchArming(const FrameResult& result) {
   std::uint64_t lost = 0;
   if (recorder_ != nullptr) {
-    lost = to_recorder_->imu.refused() + to_recorder_->track.refused() + to_recorder_->smooth.refused();
+    lost = to_recorder_->imu.refused() + to_recorder_->track.refused() + to_recorder_->smooth.refused() +
+           to_recorder_->mesh.refused();
     for (const Camera& camera : camera_) lost += camera.pool.refused(kRecordReads);
   }
   const bool running = recorder_ != nullptr && recorder_->running();
@@ -219,7 +235,7 @@ bool Wiring::record() {
     record_done_ = true;
     return false;
   }
-  const bool ended = smoothDone() && propagateDone();
+  const bool ended = smoothDone() && meshDone() && propagateDone();
   const bool any = recorder_->drain(*to_recorder_, {&camera_[0].pool, &camera_[1].pool});
   if (ended && !any && !record_done_) {
     recorder_->end(counters_.sensor.imu_samples, counters_.sensor.images);
@@ -242,10 +258,12 @@ void Wiring::addReservations(MemoryTable& table) const {
   add("image slots", images);
   add("propagation", sizeof(propagation_));
   add("tracking", sizeof(track_) + between(before_track_, before_smooth_));
-  add("smoother", sizeof(smooth_) + between(before_smooth_, after_smooth_));
+  add("smoother", sizeof(smooth_) + between(before_smooth_, before_mesh_));
+  if (mesh_) add("mesh", between(before_mesh_, after_mesh_));
   add("IMU rings", sizeof(ImuRing) * 4);
   add("tracked frames", sizeof(tracked_ring_));
-  add("fixes and windows", sizeof(fix_) + sizeof(window_));
+  add("fixes and windows", sizeof(fix_) + sizeof(window_) + sizeof(window_to_mesh_));
+  add("meshes for the log", sizeof(local_mesh_) + (meshes_ ? sizeof(MeshRing) : 0));
   add("results for the log", sizeof(results_) + sizeof(smoothing_) + (states_ ? sizeof(StateRing) : 0));
   if (to_recorder_) add("recorder's rings", sizeof(RecorderArrows));
 }
@@ -267,12 +285,15 @@ void Wiring::addLosses(std::map<std::string, std::uint64_t>& losses) const {
   }
   note("frames_dropped", counters_.track.dropped);
   note("results_to_log", results_.refused());
+  note("camera_0_unmeshed", counters_.sensor.images_unmeshed);
+  if (meshes_) note("meshes_to_log", meshes_->refused());
   if (states_) note("states_to_log", states_->refused());
   if (to_recorder_) {
     note("imu_to_record", to_recorder_->imu.refused());
     note("propagate_steps_to_record", to_recorder_->propagate.refused());
     note("track_steps_to_record", to_recorder_->track.refused());
     note("smooth_steps_to_record", to_recorder_->smooth.refused());
+    note("mesh_steps_to_record", to_recorder_->mesh.refused());
   }
 }
 

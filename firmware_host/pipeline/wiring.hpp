@@ -2,7 +2,7 @@
 // Every stage and every arrow of the system, with what each thread does with them. See wiring.cpp: it reads
 // as the block diagram.
 //
-// One function a thread: takeImu, takeImage, endInput (sensor); propagate, track, smooth (flight path);
+// One function a thread: takeImu, takeImage, endInput (sensor); propagate, track, smooth, mesh (flight path);
 // log, record (low priority). Each takes what waits on its arrows, at most one frame, and says whether it did
 // anything. An executor calls them: from one thread in turn (lockstep.hpp), or each from its own
 // (threaded.hpp). The arrows are in fixed memory and nobody waits on them; who sleeps until something comes
@@ -31,6 +31,7 @@
 #include "firmware_host/pipeline/fault_counts.hpp"
 #include "firmware_host/pipeline/run_log.hpp"
 #include "firmware_host/settings/settings.hpp"
+#include "mesher/mesh_stage.hpp"
 
 namespace swiftlet {
 
@@ -54,6 +55,7 @@ struct WiringCounters {
     std::array<std::uint64_t, kMaxCameras> images_lost{};     ///< no slot was free
     std::array<std::uint64_t, kMaxCameras> images_wrong_size{};
     std::array<std::uint64_t, kMaxCameras> images_unrecorded{};
+    std::uint64_t images_unmeshed = 0;  ///< of camera 0, at a full ring or quota: the mesh did not look
   } sensor;
   struct Propagate {
     std::uint64_t samples = 0;
@@ -64,6 +66,10 @@ struct WiringCounters {
     std::uint64_t dropped = 0;  ///< frames that went by while others were in work
     PairingCounters pairing;
   } track;
+  struct Mesh {
+    std::uint64_t skipped = 0;        ///< windows that a newer one overtook
+    std::uint64_t without_image = 0;  ///< steps whose image was gone, or never came
+  } mesh;
 };
 
 /// What the sensors did of late, for whoever asks.
@@ -80,6 +86,7 @@ class Wiring {
  public:
   struct Options {
     bool imu_states = false;               ///< ask for RunListener::onImuState
+    bool meshes = false;                   ///< ask for RunListener::onMesh
     FlightRecorder* recorder = nullptr;    ///< null: nothing is recorded
     EffortSource* track_effort = nullptr;  ///< null: the settings' effort, always
     EffortSource* smooth_effort = nullptr;
@@ -102,6 +109,7 @@ class Wiring {
   bool propagate();
   bool track();
   bool smooth();
+  bool mesh();
   bool log();
   bool record();
 
@@ -109,6 +117,7 @@ class Wiring {
   [[nodiscard]] bool trackDone() const { return track_done_.load(std::memory_order_acquire); }
   [[nodiscard]] bool propagateDone() const { return propagate_done_.load(std::memory_order_acquire); }
   [[nodiscard]] bool smoothDone() const { return smooth_done_.load(std::memory_order_acquire); }
+  [[nodiscard]] bool meshDone() const { return mesh_done_.load(std::memory_order_acquire); }
   [[nodiscard]] bool logDone() const { return log_done_; }
   /// Any thread: nobody calls log() any more, so nothing waits for room in front of it.
   void abandonLog() { log_abandoned_.store(true, std::memory_order_release); }
@@ -117,6 +126,8 @@ class Wiring {
   [[nodiscard]] std::size_t trackedWaiting() const { return tracked_ring_.size(); }
 
   [[nodiscard]] const WiringCounters& counters() const { return counters_; }
+  /// Null where meshing is switched off; once the thread `mesh` has ended.
+  [[nodiscard]] const MeshStage* meshStage() const { return mesh_.get(); }
   /// Losses at full arrows, by name; at the end.
   void addLosses(std::map<std::string, std::uint64_t>& losses) const;
   /// What was reserved for what, by the constructor.
@@ -131,7 +142,7 @@ class Wiring {
 
  private:
   struct Camera {
-    ImagePool pool{ImagePool::Quotas{kTrackQuota, kRecordQuota}};
+    ImagePool pool{ImagePool::Quotas{kTrackQuota, kMeshQuota, kRecordQuota}};
     ImageRing ring;
     // Of `track`: what it holds, in order.
     std::array<ImagePool::Loan, kTrackQuota> held;
@@ -151,6 +162,14 @@ class Wiring {
   bool trackFrame();
   bool endTracking();
   void smoothFrame(const TrackMessage& message, FrameResult& out);
+  void publishWindow(const TrackMessage& message);
+
+  // mesh
+  void handToMesh(SlotHandle handle);
+  void meshFrame(const MeshMessage& message);
+  [[nodiscard]] bool findMeshImage(std::uint64_t number);
+  void publishMesh(bool keyframe);
+
   void watchArming(const FrameResult& result);
 
   Rig rig_;
@@ -169,7 +188,9 @@ class Wiring {
   TrackStage track_;
   HeapMark before_smooth_;
   SmoothStage smooth_;
-  HeapMark after_smooth_;
+  HeapMark before_mesh_;
+  std::unique_ptr<MeshStage> mesh_;  ///< null: switched off
+  HeapMark after_mesh_;
 
   // Arrows.
   ImuRing imu_to_propagate_, imu_to_track_, imu_to_smooth_, imu_to_log_;
@@ -178,6 +199,10 @@ class Wiring {
   NewestShared<SensorFacts> sensor_facts_;
   Newest<StateFix> fix_;
   Newest<SmoothedWindow> window_;
+  MeshImageRing image_to_mesh_;  ///< of camera 0
+  Newest<MeshMessage> window_to_mesh_;
+  Newest<LocalMesh> local_mesh_;
+  std::unique_ptr<MeshRing> meshes_;   ///< null where nobody wants them
   std::unique_ptr<StateRing> states_;  ///< null where nobody wants them
   ResultRing results_;
   std::unique_ptr<RecorderArrows> to_recorder_;
@@ -202,9 +227,14 @@ class Wiring {
     std::uint64_t samples = 0;
     FrameResult unread;  ///< written where the log has no room
   } smoothing_;
+  struct {
+    std::uint64_t window = 0;
+    ImagePool::Loan image;  ///< at the head of the ring
+  } meshing_;
 
   std::atomic<std::int64_t> newest_imu_{std::numeric_limits<std::int64_t>::min()};
-  std::atomic<bool> input_ended_{false}, propagate_done_{false}, track_done_{false}, smooth_done_{false};
+  std::atomic<bool> input_ended_{false}, propagate_done_{false}, track_done_{false}, smooth_done_{false},
+      mesh_done_{false};
   std::atomic<bool> log_abandoned_{false};
   bool log_done_ = false, record_done_ = false;
   WiringCounters counters_;

@@ -11,7 +11,7 @@ constexpr Stamp kEndOfTime{std::numeric_limits<std::int64_t>::max()};
 
 }  // namespace
 
-// camera -> slot -> track, record
+// camera -> slot -> track, mesh, record
 void Wiring::takeImage(const CameraFrame& image, const HostTimes& host) {
   if (image.camera >= rig_.camera_count || image.image.empty()) return;
   Camera& camera = camera_[image.camera];
@@ -54,6 +54,7 @@ void Wiring::takeImage(const CameraFrame& image, const HostTimes& host) {
   } else {
     ++counters.images_dropped[image.camera];
   }
+  if (mesh_ && image.camera == 0) handToMesh(handle);
   camera.pool.finish(handle);
   SensorFacts& facts = sensing_.facts;
   if (image.stamp <= facts.newest_image[image.camera]) ++facts.reversed_stamps;

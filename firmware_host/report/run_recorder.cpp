@@ -7,6 +7,7 @@
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
 #include "firmware_host/report/names.hpp"
+#include "firmware_host/report/ply_file.hpp"
 #include "firmware_host/report/states_csv.hpp"
 
 namespace swiftlet {
@@ -22,7 +23,7 @@ std::string valueText(const Event& event) {
 
 }  // namespace
 
-RunRecorder::RunRecorder(const std::string& folder, bool imu_rate) {
+RunRecorder::RunRecorder(const std::string& folder, bool imu_rate, bool meshes) : folder_(folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) {
@@ -31,9 +32,10 @@ RunRecorder::RunRecorder(const std::string& folder, bool imu_rate) {
   }
   const std::filesystem::path path(folder);
   // What an earlier run left and this one does not write would be taken for this one's.
-  for (const char* name : {"imu_rate.tum", "map.tum", "summary.json"}) {
-    std::filesystem::remove(path / name, error);
+  for (const char* name : {"imu_rate.tum", "map.tum", "local_mesh.ply", "meshes", "summary.json"}) {
+    std::filesystem::remove_all(path / name, error);
   }
+  if (meshes) meshes_.emplace(folder);
   odometry_.emplace(path / "odometry.tum");
   if (imu_rate) imu_rate_.emplace(path / "imu_rate.tum");
   states_.emplace(path / "states.csv");
@@ -50,6 +52,15 @@ void RunRecorder::onFrame(const TrackedFrame& tracked, const OdometryOutput& out
 
 void RunRecorder::onImuState(const NavState& state) {
   if (imu_rate_) imu_rate_->write(formatTum(state.stamp, state.T_world_body));
+}
+
+void RunRecorder::onMesh(bool keyframe, const LocalMesh& frame, const LocalMesh* horizon,
+                         std::span<const Eigen::Vector2f> hull) {
+  if (meshes_) meshes_->write(keyframe, frame, horizon, hull);
+}
+
+void RunRecorder::onLocalMesh(const LocalMesh& mesh) {
+  writePly((std::filesystem::path(folder_) / "local_mesh.ply").string(), toTriangleMesh(mesh));
 }
 
 void RunRecorder::onFinish(const OdometryOutput& output) {

@@ -1,22 +1,27 @@
 #pragma once
-// Writes the files of a run folder that grow while the run goes on: odometry.tum, imu_rate.tum (on
-// request), states.csv, events.log. Lines go out as they come, in constant memory.
+// Writes the files of a run folder that grow while the run goes on: odometry.tum, imu_rate.tum and meshes/
+// (on request), states.csv, events.log; and local_mesh.ply at its end. Lines go out as they come, in constant
+// memory.
 
 #include <optional>
 #include <string>
 
 #include "firmware_host/pipeline/run_listener.hpp"
 #include "firmware_host/report/line_file.hpp"
+#include "firmware_host/report/mesh_files.hpp"
 
 namespace swiftlet {
 
 class RunRecorder : public RunListener {
  public:
   /// Creates the folder (its parents too). Files of an earlier run in it are replaced.
-  RunRecorder(const std::string& folder, bool imu_rate);
+  RunRecorder(const std::string& folder, bool imu_rate, bool meshes = false);
 
   void onFrame(const TrackedFrame& tracked, const OdometryOutput& output) override;
   void onImuState(const NavState& state) override;
+  void onMesh(bool keyframe, const LocalMesh& frame, const LocalMesh* horizon,
+              std::span<const Eigen::Vector2f> hull) override;
+  void onLocalMesh(const LocalMesh& mesh) override;
   void onFinish(const OdometryOutput& output) override;
   void onRemark(Stamp stamp, const std::string& text) override;
 
@@ -24,10 +29,12 @@ class RunRecorder : public RunListener {
   void writeEvents(const OdometryOutput& output);
   void writeKeyframes(const OdometryOutput& output);
 
+  std::string folder_;
   std::optional<LineFile> odometry_;
   std::optional<LineFile> imu_rate_;
   std::optional<LineFile> states_;
   std::optional<LineFile> events_;
+  std::optional<MeshSequence> meshes_;
 };
 
 }  // namespace swiftlet

@@ -84,6 +84,11 @@ Json countersJson(const RunFacts& facts, const LogSource& source, const RunStati
                    {"initial_cost", statistics.map->initial_cost},
                    {"final_cost", statistics.map->final_cost}};
   }
+  if (statistics.mesh) {
+    json["mesh"] = toJson(statistics.mesh->stage, statistics.mesh->horizon);
+    json["mesh"]["skipped"] = statistics.mesh->skipped;
+    json["mesh"]["without_image"] = statistics.mesh->without_image;
+  }
   json["losses"] = Json::object();
   for (const auto& [arrow, count] : statistics.losses) json["losses"][arrow] = count;
   json["faults"] = Json::object();
@@ -115,7 +120,7 @@ Json timingJson(const StageTable& table) {
     Json stage;
     const auto id = static_cast<StageId>(i);
     const bool splits = id == StageId::kTrack || id == StageId::kSmooth || id == StageId::kTrim ||
-                        id == StageId::kImageToPose || id == StageId::kExposureToPose;
+                        id == StageId::kMesh || id == StageId::kImageToPose || id == StageId::kExposureToPose;
     stage[splits ? "frames" : "all"] = latencyJson(times.wall_frames, times.cpu_frames);
     if (splits) stage["keyframes"] = latencyJson(times.wall_keyframes, times.cpu_keyframes);
     json[std::string(stageName(id))] = stage;
@@ -154,6 +159,19 @@ Json versionJson() {
 std::string versionText() {
   return fmt::format("swiftlet {} ({}, {}, g++ {})", SWIFTLET_VERSION, SWIFTLET_BUILD_TYPE,
                      SWIFTLET_BUILD_CPU, __VERSION__);
+}
+
+Json toJson(const MeshCounters& stage, const HorizonCounters& horizon) {
+  return {{"frames", stage.frames},
+          {"invalid_frames", stage.invalid_frames},
+          {"pose_jumps", stage.pose_jumps},
+          {"too_few_points", stage.too_few_points},
+          {"bad_landmarks", stage.bad_landmarks},
+          {"bad_features", stage.bad_features},
+          {"epochs", stage.epochs},
+          {"refused_for_room", horizon.refused},
+          {"faces_refuted", horizon.refuted},
+          {"faces_replaced", horizon.replaced}};
 }
 
 Json summaryOf(const RunFacts& facts, const Settings& settings, const LogSource& source,

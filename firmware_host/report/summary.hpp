@@ -39,6 +39,9 @@ struct RunFacts {
 nlohmann::ordered_json summaryOf(const RunFacts& facts, const Settings& settings, const LogSource& source,
                                  const RunStatistics& statistics);
 
+/// Counters of the mesher, without those of the pipeline around it.
+nlohmann::ordered_json toJson(const MeshCounters& stage, const HorizonCounters& horizon);
+
 /// The summary in a few lines for the terminal.
 std::string summaryText(const nlohmann::ordered_json& summary);
 

@@ -23,6 +23,10 @@ struct EvaluationGroup {
   double rpe_delta_s = 1.0;
 };
 
+struct MeshGroup {
+  bool enabled = true;
+};
+
 /// Priorities are of SCHED_FIFO, 1 to 98; 0 is SCHED_OTHER. All of them below 50, where kernels with
 /// PREEMPT_RT run their interrupt handlers, without which no sample arrives.
 struct RealtimeGroup {
@@ -32,11 +36,13 @@ struct RealtimeGroup {
   int propagate_priority = 40;
   int track_priority = 30;
   int smooth_priority = 20;
+  int mesh_priority = 15;
   int low_priority = 0;
   int sensor_cpu = -1;
   int propagate_cpu = -1;
   int track_cpu = -1;
   int smooth_cpu = -1;
+  int mesh_cpu = -1;
   int low_cpu = -1;
 };
 
@@ -51,6 +57,9 @@ struct BudgetsGroup {
   double smooth_p50_ms = 2.5;
   double smooth_p99_ms = 6;
   double smooth_max_ms = 15;
+  double mesh_p50_ms = 1;
+  double mesh_p99_ms = 3;
+  double mesh_max_ms = 8;
   double image_to_pose_p50_ms = 6;
   double image_to_pose_p99_ms = 15;
   double image_to_pose_max_ms = 35;
@@ -69,6 +78,7 @@ struct Settings {
   PairingGroup pairing;
   CalibrationGroup calibration;
   EvaluationGroup evaluation;
+  MeshGroup mesh;
   RealtimeGroup realtime;
   BudgetsGroup budgets;
   bool full_smoothing = true;  ///< smoother.horizon is `full`

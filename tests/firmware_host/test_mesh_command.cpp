@@ -147,6 +147,41 @@ TEST_CASE("mesh writes what the run folder promises, from real images") {
   }
 }
 
+TEST_CASE("replay leaves its newest mesh in the run folder, and all of them on request") {
+  const ScratchFolder folder("replay_meshes");
+  const std::string out = folder.file("run");
+  REQUIRE(run({"replay", recordedLog(), "--until", "1.5", "--mesh-sequence", "--out", out}) == kExitDone);
+  const auto counters = summaryIn(out)["counters"]["mesh"];
+  const auto poses = summaryIn(out)["counters"]["odometry"]["poses"].get<std::size_t>();
+  CHECK(counters["frames"].get<std::size_t>() + counters["too_few_points"].get<std::size_t>() == poses);
+  CHECK(counters["skipped"] == 0);
+  CHECK(counters["without_image"] == 0);
+  const std::vector<Row> rows = readFrames(out);
+  CHECK(rows.size() == poses);
+  const TriangleMesh local = readPly(fs::path(out) / "local_mesh.ply");
+  std::string last;
+  for (const Row& row : rows) last = row.horizon_mesh.empty() ? last : row.horizon_mesh;
+  const std::string local_bytes = textOf(fs::path(out) / "local_mesh.ply");
+  REQUIRE_FALSE(last.empty());
+  CHECK(local_bytes == textOf(fs::path(out) / "meshes" / last));
+  CHECK(local.faces.size() > 50);
+
+  SECTION("less on request, with the same mesh") {
+    REQUIRE(run({"replay", recordedLog(), "--until", "1.5", "--out", out}) == kExitDone);
+    CHECK_FALSE(fs::exists(fs::path(out) / "meshes"));
+    CHECK(textOf(fs::path(out) / "local_mesh.ply") == local_bytes);
+  }
+  SECTION("none when it is switched off, with the same poses") {
+    const std::string poses_before = textOf(fs::path(out) / "odometry.tum");
+    REQUIRE(run({"replay", recordedLog(), "--until", "1.5", "--set", "mesh.enabled=false", "--mesh-sequence",
+                 "--out", out}) == kExitDone);
+    CHECK(readFrames(out).empty());
+    CHECK_FALSE(fs::exists(fs::path(out) / "local_mesh.ply"));
+    CHECK_FALSE(summaryIn(out)["counters"].contains("mesh"));
+    CHECK(textOf(fs::path(out) / "odometry.tum") == poses_before);
+  }
+}
+
 TEST_CASE("labels of a simulated flight come into the mesh") {
   const ScratchFolder folder("mesh_labels");
   const std::string flight = folder.file("flight");

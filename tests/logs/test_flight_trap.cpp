@@ -25,7 +25,7 @@ std::string chosenLog() {
 }
 
 bool isFlightThread(std::string_view name) {
-  return name == "sensor" || name == "propagate" || name == "track" || name == "smooth";
+  return name == "sensor" || name == "propagate" || name == "track" || name == "smooth" || name == "mesh";
 }
 
 void checkRun(bool mono, bool record) {
@@ -36,6 +36,7 @@ void checkRun(bool mono, bool record) {
   request.mono = mono;
   request.real_time = true;
   request.imu_rate = true;
+  request.mesh_sequence = true;
   request.record = record;
   ReplayHooks hooks;
   int armed = 0;
@@ -56,7 +57,9 @@ void checkRun(bool mono, bool record) {
   const std::uint64_t all_before = heapCallsOfAll();
   const ReplayResult result = runReplay(request, Settings{}, hooks);
   REQUIRE(result.finished);
-  CHECK(armed == 4);
+  CHECK(armed == 5);
+  REQUIRE(result.statistics.mesh);
+  CHECK(result.statistics.mesh->stage.frames > 0);
   CHECK(result.statistics.poses > 0);
   CHECK(heapCallsOfAll() > all_before + 1000);  // the other threads do, and are seen
   CHECK(trapCounts().heap == before.heap);

@@ -108,7 +108,8 @@ TEST_CASE("a recording replayed in lockstep gives the bytes of the run that it w
   request.record = true;
   REQUIRE(runReplay(request, Settings{}).finished);
   REQUIRE(runReplay(requestFor(folder.file("run"), folder.file("again")), Settings{}).finished);
-  for (const char* file : {"odometry.tum", "states.csv", "imu_rate.tum", "map.tum", "events.log"}) {
+  for (const char* file :
+       {"odometry.tum", "states.csv", "imu_rate.tum", "map.tum", "events.log", "local_mesh.ply"}) {
     CHECK(textOf(folder.file("run/") + file) == textOf(folder.file("again/") + file));
   }
 }
@@ -186,7 +187,7 @@ TEST_CASE("overloaded, threads degrade by policy, recover, and are repeated byte
     CHECK(repeated.finished == whole);
     if (!whole) continue;
     ++complete;
-    for (const char* file : {"odometry.tum", "states.csv", "map.tum"}) {
+    for (const char* file : {"odometry.tum", "states.csv", "map.tum", "local_mesh.ply"}) {
       CHECK(textOf(folder.file("run/") + file) == textOf(folder.file("again/") + file));
     }
     if (!result.statistics.losses.contains("states_to_log")) {
@@ -222,6 +223,37 @@ TEST_CASE("a stage that stands still loses the oldest images, counted, and goes 
   again.reproduce = true;
   REQUIRE(runReplay(again, Settings{}).finished);
   for (const char* file : {"odometry.tum", "states.csv", "map.tum"}) {
+    CHECK(textOf(folder.file("run/") + file) == textOf(folder.file("again/") + file));
+  }
+}
+
+TEST_CASE("a mesh that falls behind skips to the newest window, and nobody waits for it") {
+  const ScratchFolder folder("mesh_behind");
+  ReplayRequest request = requestFor(shortLog(), folder.file("run"));
+  request.real_time = true;
+  request.record = true;
+  ReplayHooks hooks;
+  hooks.drag = [&](StageId stage, double /*cpu*/) {
+    if (stage == StageId::kMesh) usleep(static_cast<useconds_t>(180'000 / kSlow));  // of some four frames
+  };
+  const ReplayResult result = runReplay(request, Settings{}, hooks);
+  REQUIRE(result.finished);
+  checkAccounts(result.statistics, kImages);
+  CHECK(result.statistics.last_image == kLastImage);
+  REQUIRE(result.statistics.mesh);
+  const MeshStatistics& mesh = *result.statistics.mesh;
+  CHECK(mesh.skipped > mesh.stage.frames);
+  CHECK(mesh.skipped + mesh.stage.frames + mesh.stage.invalid_frames <= result.statistics.frames);
+  if (!kSanitized) CHECK(result.statistics.frames_dropped == 0);
+  ReplayRequest again = requestFor(folder.file("run"), folder.file("again"));
+  again.reproduce = true;
+  const ReplayResult repeated = runReplay(again, Settings{});
+  REQUIRE(repeated.finished);
+  REQUIRE(repeated.statistics.mesh);
+  CHECK(repeated.statistics.mesh->stage.frames == mesh.stage.frames);
+  CHECK(repeated.statistics.mesh->without_image == mesh.without_image);
+  CHECK_FALSE(textOf(folder.file("run/local_mesh.ply")).empty());
+  for (const char* file : {"odometry.tum", "local_mesh.ply"}) {
     CHECK(textOf(folder.file("run/") + file) == textOf(folder.file("again/") + file));
   }
 }

@@ -99,6 +99,8 @@ Status record(RecordingWriter& writer, const Entry& entry) {
       return writer.trackStep(entry.track);
     case RecordKind::kSmoothStep:
       return writer.smoothStep(entry.smooth);
+    case RecordKind::kMeshStep:
+      return writer.meshStep(entry.mesh);
     default:
       return writer.loss(entry.loss.kind, entry.loss.count);
   }
@@ -106,10 +108,10 @@ Status record(RecordingWriter& writer, const Entry& entry) {
 
 Entry wildEntry(std::uint64_t seed, std::uint64_t i) {
   Random random(seed, i);
-  constexpr std::array<RecordKind, 10> kMix{
-      RecordKind::kImu,        RecordKind::kImu,    RecordKind::kImu,           RecordKind::kImu,
-      RecordKind::kImage0,     RecordKind::kImage1, RecordKind::kPropagateStep, RecordKind::kTrackStep,
-      RecordKind::kSmoothStep, RecordKind::kLoss};
+  constexpr std::array<RecordKind, 12> kMix{
+      RecordKind::kImu,           RecordKind::kImu,       RecordKind::kImu,        RecordKind::kImu,
+      RecordKind::kImage0,        RecordKind::kImage1,    RecordKind::kImage1,     RecordKind::kMeshStep,
+      RecordKind::kPropagateStep, RecordKind::kTrackStep, RecordKind::kSmoothStep, RecordKind::kLoss};
   Entry entry;
   entry.kind = kMix[random.below(static_cast<std::uint32_t>(kMix.size()))];
   entry.sample.stamp = wildStamp(random);
@@ -119,7 +121,8 @@ Entry wildEntry(std::uint64_t seed, std::uint64_t i) {
   entry.propagate = {wildCount(random), wildCount(random)};
   entry.track = {wildCount(random), wildStamp(random), {wildCount(random), wildCount(random)},
                  wildCount(random), wildCount(random), wildEffort(random)};
-  entry.smooth = {wildCount(random), wildCount(random), wildEffort(random)};
+  entry.smooth = {wildCount(random), wildCount(random), wildEffort(random), wildCount(random)};
+  entry.mesh = {wildCount(random), wildCount(random), wildCount(random)};
   entry.loss.kind = static_cast<RecordKind>(1 + random.below(6));
   entry.loss.count = 1 + random.below(1000);
   if (entry.kind == RecordKind::kImage0 || entry.kind == RecordKind::kImage1) wildImage(random, entry);
@@ -225,6 +228,9 @@ std::string difference(RecordingSource& source, const std::vector<Entry>& script
       case RecordKind::kSmoothStep:
         steps.smooth.push_back(entry.smooth);
         break;
+      case RecordKind::kMeshStep:
+        steps.mesh.push_back(entry.mesh);
+        break;
       default: {
         std::uint64_t& of_kind = number[static_cast<std::size_t>(entry.loss.kind)];
         losses.push_back({entry.loss.kind, of_kind, entry.loss.count});
@@ -232,7 +238,7 @@ std::string difference(RecordingSource& source, const std::vector<Entry>& script
       }
     }
     if (entry.kind == RecordKind::kPropagateStep || entry.kind == RecordKind::kTrackStep ||
-        entry.kind == RecordKind::kSmoothStep) {
+        entry.kind == RecordKind::kSmoothStep || entry.kind == RecordKind::kMeshStep) {
       ++last;
     }
   }
@@ -241,6 +247,7 @@ std::string difference(RecordingSource& source, const std::vector<Entry>& script
   if (source.steps().propagate != steps.propagate) return "other propagation steps";
   if (source.steps().track != steps.track) return "other tracking steps";
   if (source.steps().smooth != steps.smooth) return "other smoothing steps";
+  if (source.steps().mesh != steps.mesh) return "other mesh steps";
   const auto same_loss = [](const RecordingLoss& a, const RecordingLoss& b) {
     return a.kind == b.kind && a.after == b.after && a.count == b.count;
   };

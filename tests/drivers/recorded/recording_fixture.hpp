@@ -24,6 +24,7 @@ struct Entry {
   PropagateStep propagate;
   TrackStep track;
   SmoothStep smooth;
+  MeshStep mesh;
   RecordingLoss loss;
 
   Entry() = default;
