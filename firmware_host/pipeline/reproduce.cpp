@@ -159,7 +159,8 @@ class Repeat {
     result.keyframe = mesh_message_.tracked.keyframe;
     mesh_->frameMesh(result.frame);
     if (result.keyframe) mesh_->horizonMesh(result.horizon);
-    has_mesh_ = has_mesh_ || result.keyframe;
+    mesh_->horizonMesh(local_mesh_);
+    has_mesh_ = true;
     result.hull.clear();
     for (const Eigen::Vector2f& corner : mesh_->hull()) static_cast<void>(result.hull.tryPushBack(corner));
     log_.onMesh(result);
@@ -199,7 +200,7 @@ class Repeat {
     result.track_step.stamp = kEndOfTime;
     smooth_.finish(result.output);
     log_.onResult(result);
-    if (has_mesh_) log_.onLocalMesh(mesh_result_.horizon);
+    if (has_mesh_) log_.onLocalMesh(local_mesh_);
     RunStatistics& statistics = log_.statistics();
     if (mesh_) {
       statistics.mesh = {mesh_->counters(), mesh_->horizon().counters(), mesh_skipped_, without_image_};
@@ -222,7 +223,8 @@ class Repeat {
   std::size_t mesh_steps_ = 0;
   std::uint64_t without_image_ = 0;
   std::uint64_t mesh_skipped_ = 0;
-  bool has_mesh_ = false;  ///< mesh_result_ holds one over the horizon
+  LocalMesh local_mesh_;   ///< newest, over the horizon
+  bool has_mesh_ = false;  ///< it is one
   SmoothedWindow window_;
   std::uint64_t windows_ = 0;  ///< published so far; window_ is the last of them
   std::uint64_t window_taken_ = 0;

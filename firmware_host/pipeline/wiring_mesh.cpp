@@ -82,10 +82,8 @@ bool Wiring::findMeshImage(std::uint64_t number) {
 }
 
 void Wiring::publishMesh(bool keyframe) {
-  if (keyframe) {
-    mesh_->horizonMesh(local_mesh_.draft());
-    local_mesh_.publish();
-  }
+  mesh_->horizonMesh(local_mesh_.draft());
+  local_mesh_.publish();
   if (!meshes_) return;
   MeshResult* out = meshes_->beginPush();
   if (out == nullptr) return;  // counted by the ring
