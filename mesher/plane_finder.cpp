@@ -1,0 +1,321 @@
+#include "mesher/plane_finder.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace swiftlet {
+namespace {
+
+// What a plane must show in every keyframe until it is reported.
+constexpr int kNewPoints = 8;
+constexpr float kNewArea = 0.5F;     // m^2: a table; less is the side of a box
+constexpr float kNewNarrow = 0.12F;  // m, 1 sigma: some 40 cm across at its narrowest
+constexpr float kNewShare = 0.6F;    // of the points around it; a cloud gives a quarter, two surfaces half
+constexpr float kMaxChiSquared = 2;  // 1 is expected; sigmas are those of a linear solve
+constexpr float kMaxRms = 0.03F;     // m; even scatter in the gate has 0.029
+constexpr int kProofKeyframes = 4;   // a second or more of flight: other landmarks, another view
+// And what keeps a plane that is known.
+constexpr int kKeptPoints = 4;
+constexpr float kKeptArea = 0.15F;  // m^2
+constexpr float kKeptShare = 0.4F;
+constexpr int kKeptSilent = 20;     // keyframes: five seconds of looking elsewhere
+constexpr int kUnprovenSilent = 2;  // keyframes, before it is reported
+// The estimate moves under a plane by millimetres a keyframe; more is another surface.
+constexpr double kSameDistance = 0.08;       // m, at the other's points
+constexpr double kSameCosine = 0.985;        // 10 degrees: a narrow wall's azimuth, badly known
+constexpr double kDuplicateDistance = 0.04;  // m: below the gate, one's points are the other's
+// Votes below this are no surface [m^2]: a fifth of a new plane's area lies in its strongest bin at the
+// least.
+constexpr float kLeastVotes = 0.2F * kNewArea;
+constexpr int kMaxTries = 24;  // of guesses a keyframe: bounded work
+
+// A landmark's way onto a plane and off again.
+constexpr float kOnSigmas = 2.5F;
+constexpr float kOnGate = 0.035F;  // m
+constexpr float kOffSigmas = 3.5F;
+constexpr int kAgreeKeyframes = 2;
+constexpr int kWithoutFaces = 3;    // keyframes: the triangulation changes, the landmark does not
+constexpr int kFewestShare = 3;     // at least one in so many of the faces around it: an edge has half
+constexpr int kReportedBonus = 10;  // points by which a newcomer must lead to take a reported plane's place
+
+bool proves(const PlaneSupport& s) {
+  return s.points >= kNewPoints && s.area >= kNewArea && s.narrow >= kNewNarrow && s.share >= kNewShare &&
+         s.chi_squared <= kMaxChiSquared && s.rms <= kMaxRms;
+}
+
+bool keeps(const PlaneSupport& s) {
+  return s.points >= kKeptPoints && s.area >= kKeptArea && s.share >= kKeptShare &&
+         s.chi_squared <= kMaxChiSquared && s.rms <= kMaxRms;
+}
+
+}  // namespace
+
+void PlaneFinder::reset() {
+  followed_.clear();
+  associations_.clear();
+}
+
+Status PlaneFinder::step(const LocalMesh& mesh, const SmoothedWindow& window, PlaneReport& report) {
+  ++counters_.keyframes;
+  report.epoch = mesh.epoch;
+  report.stamp = mesh.stamp;
+  report.frame_index = mesh.frame_index;
+  report.planes.clear();
+  report.points.clear();
+  if (window.epoch != mesh.epoch || window.poses.empty() ||
+      !window.poses.back().T_world_body.translation.allFinite()) {
+    return {StatusCode::kInvalidInput, "the window has no pose to look from, or is not the mesh's"};
+  }
+  if (mesh.epoch != epoch_) reset();
+  epoch_ = mesh.epoch;
+  facts_.read(mesh, window);
+  counters_.refused += static_cast<std::uint64_t>(facts_.refused);
+  std::fill(owners_.begin(), owners_.end(), Owner{});
+  for (Followed& plane : followed_) ++plane.silent;
+  followKnown(mesh);
+  findNew(mesh);
+  mergeDuplicates();
+  expire();
+  associate(mesh);
+  write(report);
+  return okStatus();
+}
+
+void PlaneFinder::followKnown(const LocalMesh& mesh) {
+  for (std::size_t i = 0; i < followed_.size(); ++i) {
+    const Followed& plane = followed_[i];
+    PlaneGuess guess{plane.direction, plane.normal.cast<float>(),
+                     static_cast<float>(plane.distance - plane.normal.dot(facts_.viewer))};
+    if (!fit_.refine(mesh, facts_, guess, true)) continue;
+    const PlaneSupport& support = fit_.support();
+    if (!(plane.supported < kProofKeyframes ? proves(support) : keeps(support))) continue;
+    if (slotFor(guess) != i) continue;
+    accept(mesh, guess, i, false);
+  }
+}
+
+void PlaneFinder::findNew(const LocalMesh& mesh) {
+  votes_.clear();
+  for (std::size_t f = 0; f < facts_.faces.size(); ++f) {
+    if (!facts_.faces[f].taken) votes_.vote(mesh.faces[f], facts_.faces[f], facts_, 1);
+  }
+  for (int k = 0; k < kMaxTries; ++k) {
+    const std::optional<PlaneGuess> strongest = votes_.strongest(kLeastVotes);
+    if (!strongest) return;
+    PlaneGuess guess = *strongest;
+    if (!fit_.refine(mesh, facts_, guess, false) || !proves(fit_.support())) {
+      votes_.suppress(*strongest);
+      continue;
+    }
+    const std::size_t slot = slotFor(guess);
+    if (slot == followed_.size()) {
+      Followed fresh;
+      fresh.id = next_id_;
+      fresh.direction = guess.direction;
+      if (!followed_.tryPushBack(fresh)) {
+        votes_.suppress(*strongest);  // full: those known go first
+        continue;
+      }
+      ++next_id_;
+    }
+    accept(mesh, guess, slot, true);
+    votes_.suppress(*strongest);
+  }
+}
+
+// The followed plane that a fitted one is, which may be the one it came from; their number when it is new.
+std::size_t PlaneFinder::slotFor(const PlaneGuess& guess) {
+  const Eigen::Vector3d normal = guess.normal.cast<double>();
+  const Eigen::Vector3d centre = facts_.viewer + fit_.support().centre.cast<double>();
+  const double distance = static_cast<double>(guess.distance) + normal.dot(facts_.viewer);
+  std::size_t best = followed_.size();
+  double nearest = kSameDistance;
+  for (std::size_t i = 0; i < followed_.size(); ++i) {
+    const Followed& plane = followed_[i];
+    if (plane.direction != guess.direction || plane.normal.dot(normal) < kSameCosine) continue;
+    // At both places where something was seen of them; a small turn about one moves the other's far end.
+    const double here = std::abs(plane.normal.dot(centre) - plane.distance);
+    const double there = std::abs(normal.dot(plane.centre) - distance);
+    if (std::max(here, 0.5 * there) >= nearest) continue;
+    nearest = std::max(here, 0.5 * there);
+    best = i;
+  }
+  return best;
+}
+
+void PlaneFinder::accept(const LocalMesh& mesh, const PlaneGuess& guess, std::size_t index, bool voted) {
+  Followed& plane = followed_[index];
+  if (plane.silent > 0 || plane.supported == 0) {
+    plane.normal = guess.normal.cast<double>();
+    plane.distance = static_cast<double>(guess.distance) + plane.normal.dot(facts_.viewer);
+    plane.centre = facts_.viewer + fit_.support().centre.cast<double>();
+    plane.silent = 0;
+    ++plane.supported;
+  }
+  const auto owner = static_cast<std::uint8_t>(index);
+  for (std::size_t f = 0; f < facts_.faces.size(); ++f) {
+    if (!fit_.holds(f)) continue;
+    facts_.faces[f].taken = true;
+    if (voted) votes_.vote(mesh.faces[f], facts_.faces[f], facts_, -1);
+    for (const std::uint32_t v : mesh.faces[f].vertex) {
+      Owner& o = owners_[v];
+      if (o.plane_faces < 255) ++o.plane_faces;
+      if (o.plane == owner) continue;
+      // Where two planes meet: the nearer.
+      if (o.plane == kNone || std::abs(heightOf(plane, facts_.vertices[v])) <
+                                  std::abs(heightOf(followed_[o.plane], facts_.vertices[v]))) {
+        o.plane = owner;
+      }
+    }
+  }
+}
+
+float PlaneFinder::heightOf(const Followed& plane, const VertexFacts& vertex) const {
+  return static_cast<float>(plane.normal.dot(facts_.viewer + vertex.p.cast<double>()) - plane.distance);
+}
+
+PlaneFinder::Followed* PlaneFinder::find(std::uint64_t id) {
+  for (Followed& plane : followed_) {
+    if (plane.id == id) return &plane;
+  }
+  return nullptr;
+}
+
+// The one followed for longer stays.
+void PlaneFinder::mergeDuplicates() {
+  for (std::size_t i = 0; i < followed_.size(); ++i) {
+    for (std::size_t k = followed_.size(); k-- > i + 1;) {
+      const Followed& a = followed_[i];
+      const Followed& b = followed_[k];
+      if (a.direction != b.direction || a.normal.dot(b.normal) < kSameCosine) continue;
+      if (std::abs(a.normal.dot(b.centre) - a.distance) > kDuplicateDistance ||
+          std::abs(b.normal.dot(a.centre) - b.distance) > kDuplicateDistance) {
+        continue;
+      }
+      for (Association& association : associations_) {
+        if (association.plane == b.id) association.plane = a.id;
+      }
+      for (Owner& owner : owners_) {
+        if (owner.plane == k) owner.plane = static_cast<std::uint8_t>(i);
+      }
+      followed_[i].supported = std::max(a.supported, b.supported);
+      followed_[i].silent = std::min(a.silent, b.silent);
+      followed_[i].reported = a.reported || b.reported;
+      remove(k);
+      ++counters_.merged;
+    }
+  }
+}
+
+void PlaneFinder::remove(std::size_t index) {
+  for (Owner& owner : owners_) {
+    if (owner.plane == kNone || owner.plane < index) continue;
+    owner.plane = owner.plane == index ? kNone : static_cast<std::uint8_t>(owner.plane - 1);
+  }
+  followed_.erase(index);
+}
+
+void PlaneFinder::expire() {
+  for (std::size_t i = followed_.size(); i-- > 0;) {
+    const Followed& plane = followed_[i];
+    const bool proven = plane.supported >= kProofKeyframes;
+    if (plane.silent <= (proven ? kKeptSilent : kUnprovenSilent)) continue;
+    remove(i);
+    ++counters_.expired;
+  }
+}
+
+void PlaneFinder::associate(const LocalMesh& mesh) {
+  for (const MeshFace& face : mesh.faces) {
+    for (const std::uint32_t v : face.vertex) {
+      if (v < facts_.vertices.size() && owners_[v].faces < 255) ++owners_[v].faces;
+    }
+  }
+  associations_before_ = associations_;
+  associations_.clear();
+  for (Followed& plane : followed_) plane.points = 0;
+  const auto by_id = [](const Association& a, const Association& b) { return a.id < b.id; };
+  for (std::size_t v = 0; v < facts_.vertices.size(); ++v) {
+    Association association;
+    association.id = mesh.vertices[v].id;
+    const Association* before =
+        std::lower_bound(associations_before_.begin(), associations_before_.end(), association, by_id);
+    if (before != associations_before_.end() && before->id == association.id) association = *before;
+    if (!associateVertex(v, association)) continue;
+    static_cast<void>(associations_.tryPushBack(association));
+  }
+  std::sort(associations_.begin(), associations_.end(), by_id);
+  // A mesh may name a landmark twice.
+  const auto end = std::unique(associations_.begin(), associations_.end(),
+                               [](const Association& a, const Association& b) { return a.id == b.id; });
+  associations_.resize(static_cast<std::size_t>(end - associations_.begin()));
+}
+
+bool PlaneFinder::associateVertex(std::size_t vertex, Association& association) {
+  const VertexFacts& facts = facts_.vertices[vertex];
+  if (!facts.finite || !facts.measured) return false;
+  association.sigma = facts.depth_sigma;
+  const Owner& owner = owners_[vertex];
+  const bool on_faces = owner.plane != kNone && kFewestShare * owner.plane_faces >= owner.faces;
+  Followed* plane = association.plane != 0 ? find(association.plane) : nullptr;
+  if (plane != nullptr) {
+    const float sigma = normalSigma(facts, plane->normal.cast<float>());
+    const bool near = std::abs(heightOf(*plane, facts)) <= std::min(kPlaneGate, kOffSigmas * sigma);
+    const bool held = on_faces && &followed_[owner.plane] == plane;
+    association.without = held || plane->silent > 0 ? 0 : association.without + 1;
+    association.agreed += held ? 1 : 0;
+    if (near && association.without <= kWithoutFaces) {
+      ++plane->points;
+      return true;
+    }
+    counters_.points_dropped += association.agreed >= kAgreeKeyframes ? 1 : 0;
+    return false;
+  }
+  if (!on_faces) return false;
+  plane = &followed_[owner.plane];
+  const float sigma = normalSigma(facts, plane->normal.cast<float>());
+  if (std::abs(heightOf(*plane, facts)) > std::min(kOnGate, kOnSigmas * sigma)) return false;
+  association = {association.id, plane->id, 1, 0, facts.depth_sigma};
+  ++plane->points;
+  return true;
+}
+
+void PlaneFinder::write(PlaneReport& report) {
+  std::array<bool, kMaxFollowed> out{};
+  for (std::size_t n = 0; n < kMaxPlanes; ++n) {
+    std::size_t best = kMaxFollowed;
+    int most = 0;
+    for (std::size_t i = 0; i < followed_.size(); ++i) {
+      const Followed& plane = followed_[i];
+      if (out[i] || plane.supported < kProofKeyframes || plane.points == 0) continue;
+      const int weight = plane.points + (plane.reported ? kReportedBonus : 0);
+      if (weight <= most) continue;
+      most = weight;
+      best = i;
+    }
+    if (best == kMaxFollowed) break;
+    out[best] = true;
+    Followed& plane = followed_[best];
+    counters_.confirmed += plane.reported ? 0 : 1;
+    plane.reported = true;
+    static_cast<void>(report.planes.tryPushBack({plane.id, plane.direction, plane.normal, plane.distance}));
+  }
+  // Those of reported planes, in the scratch of the step before.
+  associations_before_.clear();
+  for (const Association& association : associations_) {
+    const bool reported =
+        std::any_of(report.planes.begin(), report.planes.end(),
+                    [&association](const ReportedPlane& p) { return p.id == association.plane; });
+    if (!reported || association.agreed < kAgreeKeyframes) continue;
+    static_cast<void>(associations_before_.tryPushBack(association));
+  }
+  std::sort(associations_before_.begin(), associations_before_.end(),
+            [](const Association& a, const Association& b) {
+              return a.sigma != b.sigma ? a.sigma < b.sigma : a.id < b.id;
+            });
+  for (const Association& association : associations_before_) {
+    if (!report.points.tryPushBack({association.id, association.plane})) break;
+  }
+}
+
+}  // namespace swiftlet

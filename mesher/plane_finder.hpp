@@ -1,0 +1,109 @@
+#pragma once
+// Floors, tables, ceilings and walls in the local mesh, followed over the keyframes: for the smoother to tie
+// landmarks to, and for a mesh to be drawn flat where the world is.
+//
+// At each keyframe known planes are fitted again to the faces that they hold; what faces are left vote for
+// new ones (plane_votes.hpp), which are fitted (plane_fit.hpp), compared with the known and otherwise
+// followed until several keyframes agree. A plane is reported only after that: enough area, points and extent
+// in two directions, residuals that its points' noise explains, and a high share of the points around it on
+// it; a cluttered corner has one or the other, not all, and not again and again. A landmark is on a plane
+// when it is within the gate (in sigmas and absolute) and a corner of faces that lie in it, at two keyframes;
+// it is dropped as soon as it is beyond a wider gate. Frames: the mesh's world, z up; metres. A new epoch
+// starts anew. Memory: 0.4 MiB, reserved by the constructor; nothing is allocated after it. Cost: linear in
+// faces times planes; below a millisecond with 2000 faces (tests/benchmark has the figure). Source: Rosinol,
+// Sattler, Pollefeys, Carlone, "Incremental Visual-Inertial 3D Mesh Generation with Structural Regularities",
+// ICRA 2019, section III-B; the guards against planes that are none are this project's own.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "estimator/core/fixed_vector.hpp"
+#include "estimator/core/status.hpp"
+#include "estimator/messages/local_mesh.hpp"
+#include "estimator/messages/plane_report.hpp"
+#include "estimator/messages/smoothed_window.hpp"
+#include "mesher/plane_facts.hpp"
+#include "mesher/plane_fit.hpp"
+#include "mesher/plane_votes.hpp"
+
+namespace swiftlet {
+
+struct PlaneCounters {
+  std::uint64_t keyframes = 0;
+  std::uint64_t refused = 0;    ///< vertices and faces: not finite, or pointing nowhere
+  std::uint64_t confirmed = 0;  ///< planes that were ever reported
+  std::uint64_t merged = 0;
+  std::uint64_t expired = 0;
+  std::uint64_t points_dropped = 0;  ///< landmarks that were on a plane and disagreed later
+};
+
+class PlaneFinder {
+ public:
+  PlaneFinder() = default;
+
+  /// A keyframe's mesh and the window that it was drawn from (its landmarks' sigmas; its newest pose is where
+  /// one looks from). `report` is overwritten. kInvalidInput, with nothing changed but the refused counted
+  /// and an empty report, when the window's newest pose is not finite or of another epoch.
+  Status step(const LocalMesh& mesh, const SmoothedWindow& window, PlaneReport& report);
+
+  [[nodiscard]] const PlaneCounters& counters() const { return counters_; }
+  /// Forgets all planes; ids go on.
+  void reset();
+
+ private:
+  /// More than are reported: those that have to prove themselves.
+  static constexpr std::size_t kMaxFollowed = 2 * kMaxPlanes;
+  static constexpr std::uint8_t kNone = 255;
+
+  struct Followed {
+    std::uint64_t id = 0;
+    PlaneDirection direction = PlaneDirection::kHorizontal;
+    Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+    double distance = 0;                               // world
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // of its points when last seen, world
+    int supported = 0;                                 // keyframes
+    int silent = 0;                                    // keyframes since the last support
+    bool reported = false;
+    int points = 0;  // now
+  };
+  struct Association {
+    TrackId id = 0;
+    std::uint64_t plane = 0;
+    int agreed = 0;   // keyframes
+    int without = 0;  // keyframes in a row without a face of the plane
+    float sigma = 0;  // m, of its depth, now
+  };
+  struct Owner {
+    std::uint8_t plane = kNone;    // index in followed_
+    std::uint8_t faces = 0;        // around the vertex
+    std::uint8_t plane_faces = 0;  // of them, in some plane
+  };
+  void followKnown(const LocalMesh& mesh);
+  void findNew(const LocalMesh& mesh);
+  void accept(const LocalMesh& mesh, const PlaneGuess& guess, std::size_t index, bool voted);
+  [[nodiscard]] std::size_t slotFor(const PlaneGuess& guess);
+  void mergeDuplicates();
+  void expire();
+  void remove(std::size_t index);
+  void associate(const LocalMesh& mesh);
+  [[nodiscard]] bool associateVertex(std::size_t vertex, Association& association);
+  void write(PlaneReport& report);
+  [[nodiscard]] Followed* find(std::uint64_t id);
+  [[nodiscard]] float heightOf(const Followed& plane, const VertexFacts& vertex) const;
+
+  MeshFacts facts_;
+  PlaneVotes votes_;
+  PlaneFit fit_;
+  FixedVector<Followed, kMaxFollowed> followed_;  // those followed for longest first
+  std::array<Owner, kMaxMeshVertices> owners_{};
+  FixedVector<Association, kMaxMeshVertices> associations_;  // by id, each once
+  FixedVector<Association, kMaxMeshVertices> associations_before_;
+  std::uint64_t next_id_ = 1;
+  std::uint32_t epoch_ = 0;
+  PlaneCounters counters_;
+};
+
+}  // namespace swiftlet

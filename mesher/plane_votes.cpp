@@ -1,0 +1,116 @@
+#include "mesher/plane_votes.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace swiftlet {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+// A landmark some metres off is known to centimetres: two bins hold a plane's vertices.
+constexpr float kBinSize = 0.05F;           // m
+constexpr std::size_t kDistanceBins = 512;  // +-12.8 m: beyond, stereo of a drone's size knows no plane
+constexpr std::size_t kAzimuthBins = 120;   // 3 degrees: 8 cm over 3 m of wall on either side of its middle
+constexpr std::size_t kHeightRows = 2;      // what looks up, what looks down
+// A triangle with edges of 30 cm and corners off by 3 cm is off by 8 degrees (1 sigma).
+constexpr float kMaxTiltSine = 0.342F;    // sin(20 deg): a face may stand for a direction
+constexpr float kMaxTiltCosine = 0.940F;  // its cosine
+constexpr int kAzimuthSpread = 3;         // bins to either side that a face votes for: 9 degrees
+constexpr float kLargestVote = 0.25F;     // m^2
+constexpr std::array<float, 3> kThird{1.0F / 3, 1.0F / 3, 1.0F / 3};
+
+std::size_t azimuthBin(const Eigen::Vector3f& normal) {
+  const double turns = std::atan2(normal.y(), normal.x()) / (2 * kPi);  // -0.5 to 0.5
+  const auto bin = static_cast<int>(std::lround((turns + 1.0) * static_cast<double>(kAzimuthBins)));
+  return static_cast<std::size_t>(bin) % kAzimuthBins;
+}
+
+}  // namespace
+
+PlaneVotes::PlaneVotes() : bins_((kHeightRows + kAzimuthBins) * kDistanceBins, 0.0F) {
+  azimuths_.reserve(kAzimuthBins);
+  for (std::size_t a = 0; a < kAzimuthBins; ++a) {
+    const double angle = 2 * kPi * static_cast<double>(a) / static_cast<double>(kAzimuthBins);
+    azimuths_.emplace_back(static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)), 0.0F);
+  }
+}
+
+void PlaneVotes::clear() { std::fill(bins_.begin(), bins_.end(), 0.0F); }
+
+// Shared by the two bins whose middles are nearest.
+void PlaneVotes::spread(std::size_t row, float distance, float weight) {
+  const float at = distance / kBinSize + 0.5F * static_cast<float>(kDistanceBins) - 0.5F;
+  if (!(at >= 0) || at >= static_cast<float>(kDistanceBins - 1)) return;
+  const auto bin = static_cast<std::size_t>(at);
+  const float share = at - static_cast<float>(bin);
+  float* bins = &bins_[row * kDistanceBins];
+  bins[bin] += (1 - share) * weight;
+  bins[bin + 1] += share * weight;
+}
+
+void PlaneVotes::vote(const MeshFace& face, const FaceFacts& facts, const MeshFacts& mesh, float sign) {
+  if (facts.area <= 0) return;
+  const float weight = sign * std::min(facts.area, kLargestVote);
+  const float up = facts.normal.z();
+  if (std::abs(up) >= kMaxTiltCosine) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      spread(up > 0 ? 0 : 1, (up > 0 ? 1.0F : -1.0F) * mesh.vertices[face.vertex[k]].p.z(),
+             kThird[k] * weight);
+    }
+  } else if (std::abs(up) <= kMaxTiltSine) {
+    const std::size_t middle = azimuthBin(facts.normal);
+    for (int step = -kAzimuthSpread; step <= kAzimuthSpread; ++step) {
+      const std::size_t azimuth =
+          (middle + kAzimuthBins + static_cast<std::size_t>(step + kAzimuthSpread) - kAzimuthSpread) %
+          kAzimuthBins;
+      for (std::size_t k = 0; k < 3; ++k) {
+        spread(kHeightRows + azimuth, azimuths_[azimuth].dot(mesh.vertices[face.vertex[k]].p),
+               kThird[k] * weight);
+      }
+    }
+  }
+}
+
+std::optional<PlaneGuess> PlaneVotes::strongest(float least) const {
+  const auto found = std::max_element(bins_.begin(), bins_.end());
+  if (*found < least) return std::nullopt;
+  const auto index = static_cast<std::size_t>(found - bins_.begin());
+  const std::size_t row = index / kDistanceBins;
+  PlaneGuess guess;
+  guess.distance =
+      (static_cast<float>(index % kDistanceBins) + 0.5F - 0.5F * static_cast<float>(kDistanceBins)) *
+      kBinSize;
+  if (row < kHeightRows) {
+    guess.normal = row == 0 ? Eigen::Vector3f(0, 0, 1) : Eigen::Vector3f(0, 0, -1);
+  } else {
+    guess.direction = PlaneDirection::kVertical;
+    guess.normal = azimuths_[row - kHeightRows];
+  }
+  return guess;
+}
+
+std::size_t PlaneVotes::rowOf(const PlaneGuess& guess) const {
+  if (guess.direction == PlaneDirection::kHorizontal) return guess.normal.z() > 0 ? 0 : 1;
+  return kHeightRows + azimuthBin(guess.normal);
+}
+
+void PlaneVotes::suppress(const PlaneGuess& guess) {
+  const bool level = guess.direction == PlaneDirection::kHorizontal;
+  const std::size_t row = rowOf(guess);
+  const auto bin = static_cast<int>(guess.distance / kBinSize + 0.5F * static_cast<float>(kDistanceBins));
+  const int rows = level ? 0 : 1;
+  for (int dr = -rows; dr <= rows; ++dr) {
+    const std::size_t at =
+        level ? row
+              : kHeightRows +
+                    (row - kHeightRows + kAzimuthBins + static_cast<std::size_t>(dr + 1) - 1) % kAzimuthBins;
+    for (int d = bin - 1; d <= bin + 1; ++d) {
+      if (d < 0 || d >= static_cast<int>(kDistanceBins)) continue;
+      bins_[at * kDistanceBins + static_cast<std::size_t>(d)] = 0;
+    }
+  }
+}
+
+}  // namespace swiftlet
