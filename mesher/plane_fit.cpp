@@ -87,7 +87,7 @@ bool PlaneFit::solve(const MeshFacts& facts, PlaneGuess& plane) const {
 bool PlaneFit::refine(const LocalMesh& mesh, const MeshFacts& facts, PlaneGuess& plane, bool known) {
   const Eigen::Vector3f guessed = plane.normal;
   for (const float gate : kGates) {
-    if (known && gate == kGates.front()) continue;
+    if (known && gate > kPlaneGate) continue;  // else it would reach for its neighbours
     collect(mesh, facts, plane, gate, gate == kPlaneGate);
     if (support_.points < kLeastPoints || !solve(facts, plane)) return false;
     if (plane.normal.dot(guessed) < kFaceCosine) return false;  // turned into something else
