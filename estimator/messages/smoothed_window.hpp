@@ -26,6 +26,17 @@ struct WindowLandmark {
   int sightings = 0;                                  ///< states of the window that see it
 };
 
+/// A plane that landmarks of the window are tied to: n . p = distance, world.
+struct WindowPlane {
+  std::uint64_t id = 0;  ///< the mesher's (plane_report.hpp)
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+  double distance = 0;  ///< m
+  /// Of (normal, distance): rank 3. The variance of the plane's height at a point p is q^T C q with
+  /// q = (p, -1).
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+  int points = 0;  ///< tied to it
+};
+
 struct SmoothedWindow {
   std::uint32_t epoch = 0;
   bool started = false;  ///< false: no state yet in this epoch, nothing below but the calibration counts
@@ -33,6 +44,7 @@ struct SmoothedWindow {
   CalibrationEstimate calibration;
   FixedVector<WindowPose, kMaxStates> poses;  ///< in order of time
   FixedVector<WindowLandmark, kMaxLandmarks> landmarks;
+  FixedVector<WindowPlane, kMaxPlanes> planes;  ///< those that the last solve has determined
 };
 
 }  // namespace swiftlet

@@ -14,6 +14,10 @@ struct OdometrySettings {
   bool estimate_time_offset = false;
   bool estimate_extrinsics = false;
   bool use_stereo = true;  ///< false: camera 0 alone
+  /// Ties landmarks to the planes that the mesher finds.
+  bool regularity_enabled = false;
+  double plane_point_sigma =
+      0.01;  ///< m, by which a point of a wall is off its plane: posters, plaster, mats
 };
 
 }  // namespace swiftlet

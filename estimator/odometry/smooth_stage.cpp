@@ -31,6 +31,7 @@ SmoothStage::SmoothStage(const Rig& rig, const ImuNoise& noise, const OdometrySe
       noise_(inflatedNoise(noise, settings)),
       settings_(settings),
       smoother_(rig_, noise_, smootherSettings(settings)),
+      ties_(settings.plane_point_sigma),
       monitor_(noise_),
       rest_(noise_),
       mono_starter_(rig_, noise_),
@@ -69,6 +70,7 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
     const Status caught_up = catchUp();
     if (!caught_up.ok()) return fail(caught_up, output);
   }
+  ties_.apply(smoother_, tracked, epoch_);
   Smoother::StepInput input;
   input.frame = &tracked;
   input.imu_gap = imu_gap_ || isSilent(imu_, noise_, tracked.stamp + smoother_.timeOffset());
@@ -90,7 +92,12 @@ void SmoothStage::trim() {
   if (!trim_due_) return;
   trim_due_ = false;
   smoother_.trim(left_step_);
+  ties_.review(smoother_);
   handOver();
+}
+
+void SmoothStage::take(const PlaneReport& report) {
+  if (settings_.regularity_enabled) ties_.take(report);
 }
 
 void SmoothStage::finish(OdometryOutput& output) {
@@ -110,6 +117,7 @@ void SmoothStage::reset() {
   ++epoch_;
   events_.raise(last_stamp_, EventKind::kReset, epoch_);
   smoother_.reset();
+  ties_.reset();
   health_.reset();
   watch_.reset();
   mono_starter_.reset();
@@ -123,6 +131,7 @@ void SmoothStage::window(SmoothedWindow& out) const {
   out.started = fix_.has_state;
   out.newest = fix_.state;
   out.calibration = {smoother_.timeOffset(), smoother_.extrinsics()};
+  out.planes = ties_.planes();
   if (fix_.has_state) {
     smoother_.window(out);
   } else {

@@ -17,6 +17,7 @@
 #include "estimator/messages/effort.hpp"
 #include "estimator/messages/imu_sample.hpp"
 #include "estimator/messages/odometry_output.hpp"
+#include "estimator/messages/plane_report.hpp"
 #include "estimator/messages/smoothed_window.hpp"
 #include "estimator/messages/state_fix.hpp"
 #include "estimator/messages/tracked_frame.hpp"
@@ -25,6 +26,7 @@
 #include "estimator/odometry/mono_starter.hpp"
 #include "estimator/odometry/odometry_inputs.hpp"
 #include "estimator/odometry/odometry_settings.hpp"
+#include "estimator/odometry/plane_ties.hpp"
 #include "estimator/smoother/imu_buffer.hpp"
 #include "estimator/smoother/smoother.hpp"
 
@@ -36,6 +38,10 @@ class SmoothStage {
 
   void addImu(const ImuSample& sample);
 
+  /// The mesher's planes: worked in at the beginning of the next step. Without effect unless
+  /// `regularity_enabled`. Reports of another epoch are ignored.
+  void take(const PlaneReport& report);
+
   /// kOk without a state while the start waits (`output.waiting_for`). kFailed when the window could not be
   /// solved: it has been reset by then, with a new epoch.
   Status step(const TrackedFrame& tracked, const Effort& effort, OdometryOutput& output);
@@ -46,6 +52,7 @@ class SmoothStage {
   void fix(StateFix& out) const { out = fix_; }
   /// The newest window; after `trim`.
   void window(SmoothedWindow& out) const;
+  [[nodiscard]] const PlaneTies& planeTies() const { return ties_; }
 
   /// At the end of a run: the keyframes still in the window, and events that had not come out yet.
   void finish(OdometryOutput& output);
@@ -65,6 +72,7 @@ class SmoothStage {
   ImuNoise noise_;
   OdometrySettings settings_;
   Smoother smoother_;
+  PlaneTies ties_;
   SampleMonitor monitor_;
   RestDetector rest_;
   HealthMonitor health_;

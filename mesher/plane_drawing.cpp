@@ -1,0 +1,76 @@
+#include "mesher/plane_drawing.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/core/fixed_vector.hpp"
+#include "mesher/plane_fit.hpp"
+
+namespace swiftlet {
+namespace {
+
+struct Plane {
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+  double distance = 0;
+};
+
+// False when nobody knows it.
+bool planeOf(std::uint64_t id, const PlaneReport& report, const SmoothedWindow& window, Plane& plane) {
+  for (const WindowPlane& p : window.planes) {
+    if (p.id != id) continue;
+    plane = {p.normal, p.distance};
+    return true;
+  }
+  for (const ReportedPlane& p : report.planes) {
+    if (p.id != id) continue;
+    plane = {p.normal, p.distance};
+    return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+int drawOntoPlanes(const PlaneReport& report, const SmoothedWindow& window, double surface_sigma,
+                   LocalMesh& mesh) {
+  if (report.epoch != mesh.epoch || window.epoch != mesh.epoch || window.poses.empty()) return 0;
+  FixedVector<ReportedPoint, kMaxLandmarks> points = report.points;
+  std::sort(points.begin(), points.end(),
+            [](const ReportedPoint& a, const ReportedPoint& b) { return a.id < b.id; });
+  struct Known {
+    TrackId id = 0;
+    double inverse_depth_sigma = 0;
+  };
+  FixedVector<Known, kMaxLandmarks> known;
+  for (const WindowLandmark& landmark : window.landmarks) {
+    static_cast<void>(known.tryPushBack({landmark.id, landmark.inverse_depth_sigma}));
+  }
+  std::sort(known.begin(), known.end(), [](const Known& a, const Known& b) { return a.id < b.id; });
+  const Eigen::Vector3d viewer = window.poses.back().T_world_body.translation;
+  const auto before = [](const auto& entry, TrackId id) { return entry.id < id; };
+  int moved = 0;
+  for (MeshVertex& vertex : mesh.vertices) {
+    const auto* point = std::lower_bound(points.begin(), points.end(), vertex.id, before);
+    if (point == points.end() || point->id != vertex.id) continue;
+    Plane plane;
+    if (!planeOf(point->plane, report, window, plane)) continue;
+    const Eigen::Vector3d p = vertex.p_world.cast<double>();
+    const double height = plane.normal.dot(p) - plane.distance;
+    if (!(std::abs(height) <= static_cast<double>(kPlaneGate))) continue;
+    double weight = 1;
+    if (surface_sigma > 0) {
+      const auto* landmark = std::lower_bound(known.begin(), known.end(), vertex.id, before);
+      if (landmark == known.end() || landmark->id != vertex.id) continue;
+      const Eigen::Vector3d ray = p - viewer;
+      const double sigma = landmark->inverse_depth_sigma * ray.norm() * plane.normal.dot(ray);
+      const double variance = sigma * sigma;
+      weight = variance / (variance + surface_sigma * surface_sigma);
+      if (!std::isfinite(weight)) continue;
+    }
+    vertex.p_world = (p - weight * height * plane.normal).cast<float>();
+    ++moved;
+  }
+  return moved;
+}
+
+}  // namespace swiftlet
