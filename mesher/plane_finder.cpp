@@ -8,18 +8,20 @@ namespace {
 
 // What a plane must show in every keyframe until it is reported.
 constexpr int kNewPoints = 8;
-constexpr float kNewArea = 0.5F;     // m^2: a table; less is the side of a box
-constexpr float kNewNarrow = 0.12F;  // m, 1 sigma: some 40 cm across at its narrowest
-constexpr float kNewShare = 0.6F;    // of the points around it; a cloud gives a quarter, two surfaces half
-constexpr float kMaxChiSquared = 2;  // 1 is expected; sigmas are those of a linear solve
-constexpr float kMaxRms = 0.03F;     // m; even scatter in the gate has 0.029
-constexpr int kProofKeyframes = 4;   // a second or more of flight: other landmarks, another view
+constexpr float kNewArea = 0.5F;        // m^2: a table; less is the side of a box
+constexpr float kNewNarrow = 0.12F;     // m, 1 sigma: some 40 cm across at its narrowest
+constexpr float kNewShare = 0.6F;       // of the points around it; a cloud gives a quarter, two surfaces half
+constexpr float kMaxChiSquared = 2;     // 1 is expected; sigmas are those of a linear solve
+constexpr float kMaxRms = 0.03F;        // m; even scatter in the gate has 0.029
+constexpr float kNewTurnSigma = 0.02F;  // rad: a narrow wall turns as its noise likes
+constexpr int kProofKeyframes = 4;      // a second or more of flight: other landmarks, another view
 // And what keeps a plane that is known.
 constexpr int kKeptPoints = 4;
 constexpr float kKeptArea = 0.15F;  // m^2
 constexpr float kKeptShare = 0.4F;
-constexpr int kKeptSilent = 20;     // keyframes: five seconds of looking elsewhere
-constexpr int kUnprovenSilent = 2;  // keyframes, before it is reported
+constexpr float kKeptTurnSigma = 0.05F;  // rad
+constexpr int kKeptSilent = 20;          // keyframes: five seconds of looking elsewhere
+constexpr int kUnprovenSilent = 2;       // keyframes, before it is reported
 // The estimate moves under a plane by millimetres a keyframe; more is another surface.
 constexpr double kSameDistance = 0.08;       // m, at the other's points
 constexpr double kSameCosine = 0.985;        // 10 degrees: a narrow wall's azimuth, badly known
@@ -40,12 +42,12 @@ constexpr int kReportedBonus = 10;  // points by which a newcomer must lead to t
 
 bool proves(const PlaneSupport& s) {
   return s.points >= kNewPoints && s.area >= kNewArea && s.narrow >= kNewNarrow && s.share >= kNewShare &&
-         s.chi_squared <= kMaxChiSquared && s.rms <= kMaxRms;
+         s.turn_sigma <= kNewTurnSigma && s.chi_squared <= kMaxChiSquared && s.rms <= kMaxRms;
 }
 
 bool keeps(const PlaneSupport& s) {
   return s.points >= kKeptPoints && s.area >= kKeptArea && s.share >= kKeptShare &&
-         s.chi_squared <= kMaxChiSquared && s.rms <= kMaxRms;
+         s.turn_sigma <= kKeptTurnSigma && s.chi_squared <= kMaxChiSquared && s.rms <= kMaxRms;
 }
 
 }  // namespace
@@ -89,6 +91,10 @@ void PlaneFinder::followKnown(const LocalMesh& mesh) {
     if (!fit_.refine(mesh, facts_, guess, true)) continue;
     const PlaneSupport& support = fit_.support();
     if (!(plane.supported < kProofKeyframes ? proves(support) : keeps(support))) continue;
+    if (support.turn_sigma > kNewTurnSigma) {  // what is left of it says nothing new of its azimuth
+      guess.normal = plane.normal.cast<float>();
+      guess.distance = guess.normal.dot(support.centre);
+    }
     if (slotFor(guess) != i) continue;
     accept(mesh, guess, i, false);
   }
@@ -265,7 +271,7 @@ bool PlaneFinder::associateVertex(std::size_t vertex, Association& association) 
     association.without = held || plane->silent > 0 ? 0 : association.without + 1;
     association.agreed += held ? 1 : 0;
     if (near && association.without <= kWithoutFaces) {
-      ++plane->points;
+      plane->points += association.agreed >= kAgreeKeyframes ? 1 : 0;
       return true;
     }
     counters_.points_dropped += association.agreed >= kAgreeKeyframes ? 1 : 0;
@@ -276,7 +282,6 @@ bool PlaneFinder::associateVertex(std::size_t vertex, Association& association) 
   const float sigma = normalSigma(facts, plane->normal.cast<float>());
   if (std::abs(heightOf(*plane, facts)) > std::min(kOnGate, kOnSigmas * sigma)) return false;
   association = {association.id, plane->id, 1, 0, facts.depth_sigma};
-  ++plane->points;
   return true;
 }
 
@@ -287,7 +292,7 @@ void PlaneFinder::write(PlaneReport& report) {
     int most = 0;
     for (std::size_t i = 0; i < followed_.size(); ++i) {
       const Followed& plane = followed_[i];
-      if (out[i] || plane.supported < kProofKeyframes || plane.points == 0) continue;
+      if (out[i] || plane.supported < kProofKeyframes || plane.points < kKeptPoints) continue;
       const int weight = plane.points + (plane.reported ? kReportedBonus : 0);
       if (weight <= most) continue;
       most = weight;

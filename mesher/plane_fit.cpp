@@ -19,6 +19,8 @@ constexpr float kSlab = 0.20F;  // m
 // Standard deviations of the points in the plane within which vertices are asked: an even spread ends at 1.7.
 constexpr float kExtentSigmas = 2;
 
+constexpr double kLeastSpread = 1e-6;  // m^2, of points on one vertical line
+
 float height(const PlaneGuess& plane, const Eigen::Vector3f& p) {
   return plane.normal.dot(p) - plane.distance;
 }
@@ -55,7 +57,7 @@ void PlaneFit::collect(const LocalMesh& mesh, const MeshFacts& facts, const Plan
   }
 }
 
-bool PlaneFit::solve(const MeshFacts& facts, PlaneGuess& plane) const {
+bool PlaneFit::solve(const MeshFacts& facts, PlaneGuess& plane) {
   double sum = 0;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   Eigen::Matrix2d square = Eigen::Matrix2d::Zero();
@@ -71,6 +73,7 @@ bool PlaneFit::solve(const MeshFacts& facts, PlaneGuess& plane) const {
   }
   if (!(sum > 0)) return false;
   mean /= sum;
+  turn_sigma_ = 0;
   if (plane.direction == PlaneDirection::kVertical) {
     const Eigen::Matrix2d covariance = square / sum - mean.head<2>() * mean.head<2>().transpose();
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes;
@@ -79,6 +82,7 @@ bool PlaneFit::solve(const MeshFacts& facts, PlaneGuess& plane) const {
     if (normal.dot(plane.normal.head<2>()) < 0) normal = -normal;
     if (!normal.allFinite()) return false;
     plane.normal << normal, 0.0F;
+    turn_sigma_ = static_cast<float>(1 / std::sqrt(sum * std::max(axes.eigenvalues()[1], kLeastSpread)));
   }
   plane.distance = static_cast<float>(plane.normal.cast<double>().dot(mean));
   return std::isfinite(plane.distance);
@@ -125,6 +129,7 @@ void PlaneFit::judge(const MeshFacts& facts, const PlaneGuess& plane) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes;
   axes.computeDirect(Eigen::Matrix2d(square / count - mean * mean.transpose()));
   const Eigen::Vector2d spread = axes.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  support_.turn_sigma = turn_sigma_;
   support_.narrow = static_cast<float>(spread[0]);
   support_.rms = static_cast<float>(std::sqrt(distances / count));
   support_.chi_squared = static_cast<float>(chi_squared / count);

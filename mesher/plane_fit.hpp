@@ -27,6 +27,7 @@ struct PlaneSupport {
   float area = 0;         ///< m^2 of its faces
   float narrow = 0;       ///< m, standard deviation of its points along the narrower direction in the plane
   float rms = 0;          ///< m, of its points' distances
+  float turn_sigma = 0;   ///< rad, 1 sigma of a vertical plane's azimuth; 0 of a horizontal one
   float chi_squared = 0;  ///< mean of the squared distances in sigmas
   /// Of the well-known vertices in a slab around it and within its extent, those that are on it.
   float share = 0;
@@ -49,12 +50,13 @@ class PlaneFit {
  private:
   void collect(const LocalMesh& mesh, const MeshFacts& facts, const PlaneGuess& plane, float gate,
                bool by_noise);
-  [[nodiscard]] bool solve(const MeshFacts& facts, PlaneGuess& plane) const;
+  [[nodiscard]] bool solve(const MeshFacts& facts, PlaneGuess& plane);
   void judge(const MeshFacts& facts, const PlaneGuess& plane);
 
   std::array<std::uint8_t, kMaxMeshVertices> vertex_in_{};
   std::array<std::uint8_t, kMaxMeshFaces> face_in_{};
   PlaneSupport support_;
+  float turn_sigma_ = 0;  // of the last solve
 };
 
 }  // namespace swiftlet

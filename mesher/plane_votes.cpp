@@ -29,7 +29,10 @@ std::size_t azimuthBin(const Eigen::Vector3f& normal) {
 
 }  // namespace
 
-PlaneVotes::PlaneVotes() : bins_((kHeightRows + kAzimuthBins) * kDistanceBins, 0.0F) {
+PlaneVotes::PlaneVotes()
+    : bins_((kHeightRows + kAzimuthBins) * kDistanceBins, 0.0F),
+      highest_(kHeightRows + kAzimuthBins, 0.0F),
+      stale_(kHeightRows + kAzimuthBins, 0) {
   azimuths_.reserve(kAzimuthBins);
   for (std::size_t a = 0; a < kAzimuthBins; ++a) {
     const double angle = 2 * kPi * static_cast<double>(a) / static_cast<double>(kAzimuthBins);
@@ -37,7 +40,10 @@ PlaneVotes::PlaneVotes() : bins_((kHeightRows + kAzimuthBins) * kDistanceBins, 0
   }
 }
 
-void PlaneVotes::clear() { std::fill(bins_.begin(), bins_.end(), 0.0F); }
+void PlaneVotes::clear() {
+  std::fill(bins_.begin(), bins_.end(), 0.0F);
+  std::fill(stale_.begin(), stale_.end(), std::uint8_t{1});
+}
 
 // Shared by the two bins whose middles are nearest.
 void PlaneVotes::spread(std::size_t row, float distance, float weight) {
@@ -48,6 +54,7 @@ void PlaneVotes::spread(std::size_t row, float distance, float weight) {
   float* bins = &bins_[row * kDistanceBins];
   bins[bin] += (1 - share) * weight;
   bins[bin + 1] += share * weight;
+  stale_[row] = 1;
 }
 
 void PlaneVotes::vote(const MeshFace& face, const FaceFacts& facts, const MeshFacts& mesh, float sign) {
@@ -73,15 +80,22 @@ void PlaneVotes::vote(const MeshFace& face, const FaceFacts& facts, const MeshFa
   }
 }
 
-std::optional<PlaneGuess> PlaneVotes::strongest(float least) const {
-  const auto found = std::max_element(bins_.begin(), bins_.end());
-  if (*found < least) return std::nullopt;
-  const auto index = static_cast<std::size_t>(found - bins_.begin());
-  const std::size_t row = index / kDistanceBins;
+std::optional<PlaneGuess> PlaneVotes::strongest(float least) {
+  for (std::size_t row = 0; row < highest_.size(); ++row) {
+    if (stale_[row] == 0) continue;
+    const float* bins = &bins_[row * kDistanceBins];
+    float highest = 0;
+    for (std::size_t k = 0; k < kDistanceBins; ++k) highest = bins[k] > highest ? bins[k] : highest;
+    highest_[row] = highest;
+    stale_[row] = 0;
+  }
+  const auto best = std::max_element(highest_.begin(), highest_.end());
+  if (*best < least) return std::nullopt;
+  const auto row = static_cast<std::size_t>(best - highest_.begin());
+  const float* bins = &bins_[row * kDistanceBins];
+  const auto bin = static_cast<std::size_t>(std::find(bins, bins + kDistanceBins, *best) - bins);
   PlaneGuess guess;
-  guess.distance =
-      (static_cast<float>(index % kDistanceBins) + 0.5F - 0.5F * static_cast<float>(kDistanceBins)) *
-      kBinSize;
+  guess.distance = (static_cast<float>(bin) + 0.5F - 0.5F * static_cast<float>(kDistanceBins)) * kBinSize;
   if (row < kHeightRows) {
     guess.normal = row == 0 ? Eigen::Vector3f(0, 0, 1) : Eigen::Vector3f(0, 0, -1);
   } else {
@@ -109,6 +123,7 @@ void PlaneVotes::suppress(const PlaneGuess& guess) {
     for (int d = bin - 1; d <= bin + 1; ++d) {
       if (d < 0 || d >= static_cast<int>(kDistanceBins)) continue;
       bins_[at * kDistanceBins + static_cast<std::size_t>(d)] = 0;
+      stale_[at] = 1;
     }
   }
 }

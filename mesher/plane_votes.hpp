@@ -7,10 +7,11 @@
 //    in one distance (Hough).
 // A vote weighs as much as the face's area, up to a limit: a few large triangles are no surface.
 // Distances from the viewer. Memory: 130 kB. Cost: 21 additions a vertical face, 6 a horizontal one; a search
-// reads all bins.
+// reads the rows that have changed.
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -35,7 +36,7 @@ class PlaneVotes {
   /// Adds a face's vote, or with `sign` -1 takes it back.
   void vote(const MeshFace& face, const FaceFacts& facts, const MeshFacts& mesh, float sign);
   /// The bin with the largest weight, if that is at least `least` [m^2].
-  [[nodiscard]] std::optional<PlaneGuess> strongest(float least) const;
+  [[nodiscard]] std::optional<PlaneGuess> strongest(float least);
   /// Empties a guess's bin and its neighbours: it led nowhere.
   void suppress(const PlaneGuess& guess);
 
@@ -45,6 +46,8 @@ class PlaneVotes {
 
   // Rows of kDistanceBins: heights of what looks up, of what looks down, then one for each azimuth.
   std::vector<float> bins_;
+  std::vector<float> highest_;             // of each row
+  std::vector<std::uint8_t> stale_;        // the row has changed since
   std::vector<Eigen::Vector3f> azimuths_;  // unit, of each row's middle
 };
 
