@@ -4,10 +4,15 @@
 #include <cmath>
 
 #include "estimator/core/fixed_vector.hpp"
-#include "mesher/plane_fit.hpp"
 
 namespace swiftlet {
 namespace {
+
+// Across the line of sight: a pixel or so.
+constexpr double kLateralSigma = 0.002;  // of the depth
+// A plane moves a little between the keyframe of the report and the solve that it is drawn with.
+constexpr double kMaxSigmas = 4;
+constexpr double kLeastGate = 0.05;  // m
 
 struct Plane {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
@@ -56,18 +61,19 @@ int drawOntoPlanes(const PlaneReport& report, const SmoothedWindow& window, doub
     if (!planeOf(point->plane, report, window, plane)) continue;
     const Eigen::Vector3d p = vertex.p_world.cast<double>();
     const double height = plane.normal.dot(p) - plane.distance;
-    if (!(std::abs(height) <= static_cast<double>(kPlaneGate))) continue;
-    double weight = 1;
-    if (surface_sigma > 0) {
-      const auto* landmark = std::lower_bound(known.begin(), known.end(), vertex.id, before);
-      if (landmark == known.end() || landmark->id != vertex.id) continue;
-      const Eigen::Vector3d ray = p - viewer;
-      const double sigma = landmark->inverse_depth_sigma * ray.norm() * plane.normal.dot(ray);
-      const double variance = sigma * sigma;
-      weight = variance / (variance + surface_sigma * surface_sigma);
-      if (!std::isfinite(weight)) continue;
-    }
-    vertex.p_world = (p - weight * height * plane.normal).cast<float>();
+    const auto* landmark = std::lower_bound(known.begin(), known.end(), vertex.id, before);
+    if (landmark == known.end() || landmark->id != vertex.id) continue;
+    const Eigen::Vector3d ray = p - viewer;
+    const double depth = ray.norm();
+    const double depth_sigma = landmark->inverse_depth_sigma * depth;  // over the depth: ray is not unit
+    const double lateral = kLateralSigma * depth;
+    const Eigen::Vector3d spread =
+        depth_sigma * depth_sigma * plane.normal.dot(ray) * ray + lateral * lateral * plane.normal;
+    const double variance = plane.normal.dot(spread);
+    if (!(std::abs(height) <= std::max(kLeastGate, kMaxSigmas * std::sqrt(variance)))) continue;
+    const Eigen::Vector3d step = height / (variance + surface_sigma * surface_sigma) * spread;
+    if (!step.allFinite()) continue;
+    vertex.p_world = (p - step).cast<float>();
     ++moved;
   }
   return moved;

@@ -1,10 +1,11 @@
 #pragma once
-// A mesh drawn flat where planes are known: its vertices on planes are moved towards them,
-//   p' = p - w n (n . p - d),   w = s^2 / (s^2 + surface_sigma^2),
-// s the vertex's own noise along n: what is known well stays where it is, what is known badly takes the
-// plane's word. A landmark that the smoother has tied already has little noise left and hardly moves.
+// A mesh drawn flat where planes are known: its vertices on planes are moved towards them by their own noise,
+//   p' = p - S n (n . p - d) / (n^T S n + surface_sigma^2),   S = depth_sigma^2 u u^T + lateral_sigma^2 I,
+// u the line of sight: the likeliest place of a point that is seen in that direction and lies on that plane.
+// What is known well stays where it is, what is known badly takes the plane's word, and moves along its line
+// of sight, so that it stays where it was seen. A landmark that the smoother has tied already hardly moves.
 // The plane is the smoother's where it has one (SmoothedWindow::planes), the mesher's otherwise.
-// Nothing is allocated (20 kB on the stack). Cost: two sorts and a search a vertex, 0.1 ms.
+// Nothing is allocated (40 kB on the stack). Cost: two sorts and a search a vertex, 0.1 ms.
 
 #include "estimator/messages/local_mesh.hpp"
 #include "estimator/messages/plane_report.hpp"

@@ -36,9 +36,13 @@ constexpr float kOnSigmas = 2.5F;
 constexpr float kOnGate = 0.035F;  // m
 constexpr float kOffSigmas = 3.5F;
 constexpr int kAgreeKeyframes = 2;
-constexpr int kWithoutFaces = 3;    // keyframes: the triangulation changes, the landmark does not
-constexpr int kFewestShare = 3;     // at least one in so many of the faces around it: an edge has half
-constexpr int kReportedBonus = 10;  // points by which a newcomer must lead to take a reported plane's place
+constexpr int kWithoutFaces = 3;  // keyframes: the triangulation changes, the landmark does not
+constexpr int kFewestShare = 3;   // at least one in so many of the faces around it: an edge has half
+// From faces with two corners on a plane to the third.
+constexpr float kSpreadSigmas = 2;
+constexpr float kSpreadGate = 0.3F;  // m: what stands so far in front of a wall is a thing of its own
+constexpr int kSpreadRounds = 3;     // faces away from points that are on it for certain
+constexpr int kReportedBonus = 10;   // points by which a newcomer must lead to take a reported plane's place
 
 bool proves(const PlaneSupport& s) {
   return s.points >= kNewPoints && s.area >= kNewArea && s.narrow >= kNewNarrow && s.share >= kNewShare &&
@@ -79,7 +83,7 @@ Status PlaneFinder::step(const LocalMesh& mesh, const SmoothedWindow& window, Pl
   mergeDuplicates();
   expire();
   associate(mesh);
-  write(report);
+  write(mesh, report);
   return okStatus();
 }
 
@@ -281,11 +285,11 @@ bool PlaneFinder::associateVertex(std::size_t vertex, Association& association) 
   plane = &followed_[owner.plane];
   const float sigma = normalSigma(facts, plane->normal.cast<float>());
   if (std::abs(heightOf(*plane, facts)) > std::min(kOnGate, kOnSigmas * sigma)) return false;
-  association = {association.id, plane->id, 1, 0, facts.depth_sigma};
+  association = {association.id, plane->id, 1, 0, facts.depth_sigma, true};
   return true;
 }
 
-void PlaneFinder::write(PlaneReport& report) {
+void PlaneFinder::write(const LocalMesh& mesh, PlaneReport& report) {
   std::array<bool, kMaxFollowed> out{};
   for (std::size_t n = 0; n < kMaxPlanes; ++n) {
     std::size_t best = kMaxFollowed;
@@ -307,6 +311,7 @@ void PlaneFinder::write(PlaneReport& report) {
   }
   // Those of reported planes, in the scratch of the step before.
   associations_before_.clear();
+  for (std::size_t v = 0; v < facts_.vertices.size(); ++v) owners_[v].plane = kNone;
   for (const Association& association : associations_) {
     const bool reported =
         std::any_of(report.planes.begin(), report.planes.end(),
@@ -314,12 +319,48 @@ void PlaneFinder::write(PlaneReport& report) {
     if (!reported || association.agreed < kAgreeKeyframes) continue;
     static_cast<void>(associations_before_.tryPushBack(association));
   }
+  spreadOver(mesh);
   std::sort(associations_before_.begin(), associations_before_.end(),
             [](const Association& a, const Association& b) {
+              if (a.firm != b.firm) return a.firm;
               return a.sigma != b.sigma ? a.sigma < b.sigma : a.id < b.id;
             });
   for (const Association& association : associations_before_) {
-    if (!report.points.tryPushBack({association.id, association.plane})) break;
+    if (!report.points.tryPushBack({association.id, association.plane, association.firm})) break;
+  }
+}
+
+// Over vertices that are known badly, from faces with two corners on a plane.
+void PlaneFinder::spreadOver(const LocalMesh& mesh) {
+  const auto by_id = [](const Association& a, TrackId id) { return a.id < id; };
+  const Association* begin = associations_before_.begin();
+  const Association* end = associations_before_.end();
+  for (std::size_t v = 0; v < facts_.vertices.size(); ++v) {
+    const TrackId id = mesh.vertices[v].id;
+    const Association* found = std::lower_bound(begin, end, id, by_id);
+    if (found == end || found->id != id) continue;
+    owners_[v].plane = static_cast<std::uint8_t>(find(found->plane) - followed_.begin());
+  }
+  for (int round = 0; round < kSpreadRounds; ++round) {
+    for (std::size_t f = 0; f < facts_.faces.size(); ++f) {
+      if (facts_.faces[f].area <= 0) continue;
+      const auto& corner = mesh.faces[f].vertex;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t v = corner[k];
+        const std::uint8_t plane = owners_[corner[(k + 1) % 3]].plane;
+        if (owners_[v].plane != kNone || plane == kNone || plane != owners_[corner[(k + 2) % 3]].plane) {
+          continue;
+        }
+        const VertexFacts& vertex = facts_.vertices[v];
+        if (!vertex.measured) continue;
+        const Followed& on = followed_[plane];
+        const float sigma = normalSigma(vertex, on.normal.cast<float>());
+        if (std::abs(heightOf(on, vertex)) > std::min(kSpreadGate, kSpreadSigmas * sigma)) continue;
+        owners_[v].plane = plane;
+        static_cast<void>(
+            associations_before_.tryPushBack({mesh.vertices[v].id, on.id, 0, 0, vertex.depth_sigma, false}));
+      }
+    }
   }
 }
 

@@ -75,6 +75,7 @@ class PlaneFinder {
     int agreed = 0;   // keyframes
     int without = 0;  // keyframes in a row without a face of the plane
     float sigma = 0;  // m, of its depth, now
+    bool firm = true;
   };
   struct Owner {
     std::uint8_t plane = kNone;    // index in followed_
@@ -90,7 +91,8 @@ class PlaneFinder {
   void remove(std::size_t index);
   void associate(const LocalMesh& mesh);
   [[nodiscard]] bool associateVertex(std::size_t vertex, Association& association);
-  void write(PlaneReport& report);
+  void write(const LocalMesh& mesh, PlaneReport& report);
+  void spreadOver(const LocalMesh& mesh);
   [[nodiscard]] Followed* find(std::uint64_t id);
   [[nodiscard]] float heightOf(const Followed& plane, const VertexFacts& vertex) const;
 

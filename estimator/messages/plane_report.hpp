@@ -29,6 +29,9 @@ struct ReportedPlane {
 struct ReportedPoint {
   TrackId id = 0;
   std::uint64_t plane = 0;  ///< id of the plane that it lies on
+  /// False: amid points of the plane, but known too badly to tell it from something in front: to be drawn on
+  /// it, not to be tied.
+  bool firm = true;
 };
 
 struct PlaneReport {
@@ -36,7 +39,8 @@ struct PlaneReport {
   Stamp stamp;                    ///< of the keyframe that it was found at
   std::uint64_t frame_index = 0;  ///< that keyframe's
   FixedVector<ReportedPlane, kMaxPlanes> planes;
-  FixedVector<ReportedPoint, kMaxLandmarks> points;  ///< best known first; each landmark once
+  FixedVector<ReportedPoint, kMaxLandmarks>
+      points;  ///< firm ones, best known first; then the others. Each once
 };
 
 }  // namespace swiftlet

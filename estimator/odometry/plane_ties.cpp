@@ -118,7 +118,7 @@ void PlaneTies::releaseUnnamed(Smoother& smoother) {
   for (Tie& tie : ties_) ++tie.unnamed;
   for (const ReportedPoint& point : report_.points) {
     for (Tie& tie : ties_) {
-      if (tie.id != point.id) continue;
+      if (tie.id != point.id || !point.firm) continue;
       tie.unnamed = tie.plane == point.plane ? 0 : kUnnamedReports + 1;
     }
   }
@@ -130,6 +130,7 @@ void PlaneTies::releaseUnnamed(Smoother& smoother) {
 void PlaneTies::collectCandidates(const TrackedFrame& coming) {
   candidates_.clear();
   for (const ReportedPoint& point : report_.points) {
+    if (!point.firm) break;  // they come last
     const auto same = [&point](const auto& other) { return other.id == point.id; };
     if (std::any_of(ties_.begin(), ties_.end(), same) || refused(point.id, point.plane)) continue;
     const auto plane = std::find_if(report_.planes.begin(), report_.planes.end(),
