@@ -20,7 +20,7 @@ constexpr int kKeptPoints = 4;
 constexpr float kKeptArea = 0.15F;  // m^2
 constexpr float kKeptShare = 0.4F;
 constexpr float kKeptTurnSigma = 0.05F;  // rad
-constexpr int kKeptSilent = 20;          // keyframes: five seconds of looking elsewhere
+constexpr int kKeptSilent = 120;         // keyframes: half a minute of looking elsewhere
 constexpr int kUnprovenSilent = 2;       // keyframes, before it is reported
 // The estimate moves under a plane by millimetres a keyframe; more is another surface.
 constexpr double kSameDistance = 0.08;       // m, at the other's points
@@ -39,9 +39,9 @@ constexpr int kAgreeKeyframes = 2;
 constexpr int kWithoutFaces = 3;  // keyframes: the triangulation changes, the landmark does not
 constexpr int kFewestShare = 3;   // at least one in so many of the faces around it: an edge has half
 // From faces with two corners on a plane to the third.
-constexpr float kSpreadSigmas = 2;
-constexpr float kSpreadGate = 0.3F;  // m: what stands so far in front of a wall is a thing of its own
-constexpr int kSpreadRounds = 3;     // faces away from points that are on it for certain
+constexpr float kSpreadSigmas = 3.5F;
+constexpr float kSpreadGate = 0.5F;  // m: what stands so far in front of a wall is a thing of its own
+constexpr int kSpreadRounds = 5;     // faces away from points that are on it for certain
 constexpr int kReportedBonus = 10;   // points by which a newcomer must lead to take a reported plane's place
 
 bool proves(const PlaneSupport& s) {
@@ -117,15 +117,17 @@ void PlaneFinder::findNew(const LocalMesh& mesh) {
       votes_.suppress(*strongest);
       continue;
     }
-    const std::size_t slot = slotFor(guess);
+    std::size_t slot = slotFor(guess);
     if (slot == followed_.size()) {
       Followed fresh;
       fresh.id = next_id_;
       fresh.direction = guess.direction;
-      if (!followed_.tryPushBack(fresh)) {
-        votes_.suppress(*strongest);  // full: those known go first
+      if (followed_.full() && !forgetOne()) {
+        votes_.suppress(*strongest);
         continue;
       }
+      slot = followed_.size();
+      static_cast<void>(followed_.tryPushBack(fresh));
       ++next_id_;
     }
     accept(mesh, guess, slot, true);
@@ -223,6 +225,17 @@ void PlaneFinder::remove(std::size_t index) {
     owner.plane = owner.plane == index ? kNone : static_cast<std::uint8_t>(owner.plane - 1);
   }
   followed_.erase(index);
+}
+
+// Room for a new one: the plane not seen for longest goes. False when all are in sight.
+bool PlaneFinder::forgetOne() {
+  const auto* oldest =
+      std::max_element(followed_.begin(), followed_.end(),
+                       [](const Followed& a, const Followed& b) { return a.silent < b.silent; });
+  if (oldest->silent == 0) return false;
+  remove(static_cast<std::size_t>(oldest - followed_.begin()));
+  ++counters_.expired;
+  return true;
 }
 
 void PlaneFinder::expire() {

@@ -88,6 +88,7 @@ class PlaneFinder {
   [[nodiscard]] std::size_t slotFor(const PlaneGuess& guess);
   void mergeDuplicates();
   void expire();
+  [[nodiscard]] bool forgetOne();
   void remove(std::size_t index);
   void associate(const LocalMesh& mesh);
   [[nodiscard]] bool associateVertex(std::size_t vertex, Association& association);
