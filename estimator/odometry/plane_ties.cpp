@@ -80,6 +80,13 @@ const WindowLandmark* PlaneTies::landmark(TrackId id) const {
   return &window_.landmarks[*found];
 }
 
+std::uint64_t PlaneTies::planeOf(TrackId id) const {
+  for (const Tie& tie : ties_) {
+    if (tie.id == id) return tie.plane;
+  }
+  return 0;
+}
+
 PlaneTies::HeldPlane* PlaneTies::held(std::uint64_t report_id) {
   for (HeldPlane& plane : held_) {
     if (plane.report_id == report_id) return &plane;

@@ -52,6 +52,8 @@ class PlaneTies {
   /// As of the last review.
   [[nodiscard]] const FixedVector<WindowPlane, kMaxPlanes>& planes() const { return estimates_; }
   [[nodiscard]] std::size_t size() const { return ties_.size(); }
+  /// The reported plane that a landmark is tied to; 0: none.
+  [[nodiscard]] std::uint64_t planeOf(TrackId id) const;
   [[nodiscard]] const PlaneTieCounters& counters() const { return counters_; }
 
  private:
