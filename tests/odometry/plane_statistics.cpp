@@ -2,8 +2,8 @@
 //   plane_statistics [flights [seconds [room|hall|cluttered|twin_rooms|corridor [tracks]]]]
 // The same flight without and with landmarks tied to the planes found: error of the trajectory (aligned), and
 // distance of the horizon mesh to the true surface, seen from the newest pose. "snapped": the mesh of the run
-// without ties, its vertices on the planes found in it. "drawn": of the run with ties, as drawOntoPlanes gives
-// it. Planes that are nowhere in the true world are counted. Same seeds, same figures.
+// without ties, its vertices on the planes found in it. "drawn": of the run with ties, as drawOntoPlanes
+// gives it. Planes that are nowhere in the true world are counted. Same seeds, same figures.
 
 #include <algorithm>
 #include <array>
@@ -102,23 +102,24 @@ struct MeshError {
           a = 1 - a;
           b = 1 - b;
         }
-        surface.add(distanceToWorld(
-            world, corner[0] + a * (corner[1] - corner[0]) + b * (corner[2] - corner[0])));
+        surface.add(
+            distanceToWorld(world, corner[0] + a * (corner[1] - corner[0]) + b * (corner[2] - corner[0])));
       }
     }
     for (std::size_t v = 0; v < used.size(); ++v) {
       if (!used[v]) continue;
-      vertices.add(distanceToWorld(
-          world, T_truth_world * Eigen::Vector3d(mesh.vertices[v].p_world.cast<double>())));
+      vertices.add(
+          distanceToWorld(world, T_truth_world * Eigen::Vector3d(mesh.vertices[v].p_world.cast<double>())));
     }
   }
 };
 
 struct Outcome {
   double ate = 0;
-  MeshError plain;    ///< as the landmarks are
-  MeshError snapped;  ///< all the way onto the planes
-  MeshError drawn;    ///< by their noise
+  MeshError plain;       ///< as the landmarks are
+  MeshError snapped;     ///< all the way onto the planes
+  MeshError drawn;       ///< by their noise
+  MeshError exact;       ///< every vertex where its landmark truly is: what triangulation alone leaves
   SquareMean on_planes;  ///< landmarks that the report names, height over their true surface
   double reported_points = 0;
   double mesh_vertices = 0;
@@ -170,20 +171,19 @@ class Flight {
   Flight(const TrackFlight& flight, bool ties) : flight_(flight) {
     OdometrySettings settings = test::settingsFor(flight);
     settings.regularity_enabled = ties;
-    if (const char* sigma = std::getenv("PLANE_POINT_SIGMA")) settings.plane_point_sigma = std::atof(sigma);
     settings_ = settings;
     stage_ = std::make_unique<SmoothStage>(flight.rig(), flight.noise(), settings);
     mesh_stage_ = std::make_unique<MeshStage>(flight.rig(), HorizonLimits{});
   }
 
   Outcome fly() {
-    flight_.play([&](const ImuSample& sample) { stage_->addImu(sample); },
-                 [&](std::size_t k) { frame(k); });
+    flight_.play([&](const ImuSample& sample) { stage_->addImu(sample); }, [&](std::size_t k) { frame(k); });
     Alignment alignment;
     out_.ate = alignRigid(estimate_, truth_, alignment).ok() ? alignment.rms : std::nan("");
     out_.counters = stage_->planeTies().counters();
     out_.solve_ms /= static_cast<double>(flight_.frames().size());
-    for (double* sum : {&out_.reported_points, &out_.mesh_vertices, &out_.ties, &out_.planes, &out_.find_ms}) {
+    for (double* sum :
+         {&out_.reported_points, &out_.mesh_vertices, &out_.ties, &out_.planes, &out_.find_ms}) {
       *sum /= std::max(1, keyframes_);
     }
     return out_;
@@ -215,8 +215,7 @@ class Flight {
   }
 
   void measure(std::size_t k) {
-    const SE3 T_truth_world =
-        flight_.truth(k).T_world_body * window_->poses.back().T_world_body.inverse();
+    const SE3 T_truth_world = flight_.truth(k).T_world_body * window_->poses.back().T_world_body.inverse();
     out_.reported_points += static_cast<double>(report_->points.size());
     out_.mesh_vertices += static_cast<double>(mesh_->vertices.size());
     out_.ties += static_cast<double>(stage_->planeTies().size());
@@ -240,6 +239,9 @@ class Flight {
       }
     }
     out_.plain.add(*mesh_, T_truth_world, world);
+    *drawn_ = *mesh_;
+    for (MeshVertex& vertex : drawn_->vertices) vertex.p_world = flight_.landmark(vertex.id).cast<float>();
+    out_.exact.add(*drawn_, SE3(), world);
     *drawn_ = *mesh_;
     drawOntoPlanes(*report_, *window_, 0, *drawn_);
     out_.snapped.add(*drawn_, T_truth_world, world);
@@ -277,15 +279,17 @@ void forEach(int count, const std::function<void(int)>& work) {
 void printSeed(int seed, const Outcome& a, const Outcome& b) {
   const double allowed = std::max(0.05 * a.ate, 0.001);
   std::printf(
-      "  %3d  ATE %.4f -> %.4f m%s | mesh %.4f snapped %.4f -> %.4f snapped %.4f drawn %.4f m | vertices "
+      "  %3d  ATE %.4f -> %.4f m%s | mesh %.4f snapped %.4f -> %.4f snapped %.4f drawn %.4f exact %.4f m | "
+      "vertices "
       "%.4f snapped %.4f -> %.4f drawn %.4f | on planes %.4f -> %.4f\n"
-      "       %.0f of %.0f vertices on %.1f planes (%zu in all, %zu unreal), wrong %.3f | %.1f ties; tied %llu "
+      "       %.0f of %.0f vertices on %.1f planes (%zu in all, %zu unreal), wrong %.3f | %.1f ties; tied "
+      "%llu "
       "refused %llu untied %llu planes %llu | step %.2f -> %.2f ms (%.1f -> %.1f), find %.2f ms (%.1f)\n",
       seed, a.ate, b.ate, b.ate > a.ate + allowed ? " WORSE" : "", a.plain.surface.rms(),
       a.snapped.surface.rms(), b.plain.surface.rms(), b.snapped.surface.rms(), b.drawn.surface.rms(),
-      a.plain.vertices.rms(), a.snapped.vertices.rms(), b.plain.vertices.rms(), b.drawn.vertices.rms(),
-      a.on_planes.rms(), b.on_planes.rms(), b.reported_points, b.mesh_vertices, b.planes,
-      a.seen.size() + b.seen.size(), a.unreal.size() + b.unreal.size(),
+      b.exact.surface.rms(), a.plain.vertices.rms(), a.snapped.vertices.rms(), b.plain.vertices.rms(),
+      b.drawn.vertices.rms(), a.on_planes.rms(), b.on_planes.rms(), b.reported_points, b.mesh_vertices,
+      b.planes, a.seen.size() + b.seen.size(), a.unreal.size() + b.unreal.size(),
       static_cast<double>(b.wrong_points) / std::max(1, b.named_points), b.ties,
       static_cast<unsigned long long>(b.counters.points_tied),
       static_cast<unsigned long long>(b.counters.points_refused),
