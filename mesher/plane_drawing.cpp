@@ -14,27 +14,18 @@ constexpr double kLateralSigma = 0.002;  // of the depth
 constexpr double kMaxSigmas = 4;
 constexpr double kLeastGate = 0.05;  // m
 
-struct Plane {
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
-  double distance = 0;
-};
-
-// False when nobody knows it.
-bool planeOf(std::uint64_t id, const PlaneReport& report, const SmoothedWindow& window, Plane& plane) {
-  for (const WindowPlane& p : window.planes) {
-    if (p.id != id) continue;
-    plane = {p.normal, p.distance};
-    return true;
-  }
-  for (const ReportedPlane& p : report.planes) {
-    if (p.id != id) continue;
-    plane = {p.normal, p.distance};
-    return true;
-  }
-  return false;
-}
-
 }  // namespace
+
+std::optional<KnownPlane> knownPlane(std::uint64_t id, const PlaneReport& report,
+                                     const SmoothedWindow& window) {
+  for (const WindowPlane& plane : window.planes) {
+    if (plane.id == id) return KnownPlane{plane.normal, plane.distance};
+  }
+  for (const ReportedPlane& plane : report.planes) {
+    if (plane.id == id) return KnownPlane{plane.normal, plane.distance};
+  }
+  return std::nullopt;
+}
 
 int drawOntoPlanes(const PlaneReport& report, const SmoothedWindow& window, double surface_sigma,
                    LocalMesh& mesh) {
@@ -57,10 +48,10 @@ int drawOntoPlanes(const PlaneReport& report, const SmoothedWindow& window, doub
   for (MeshVertex& vertex : mesh.vertices) {
     const auto* point = std::lower_bound(points.begin(), points.end(), vertex.id, before);
     if (point == points.end() || point->id != vertex.id) continue;
-    Plane plane;
-    if (!planeOf(point->plane, report, window, plane)) continue;
+    const std::optional<KnownPlane> plane = knownPlane(point->plane, report, window);
+    if (!plane) continue;
     const Eigen::Vector3d p = vertex.p_world.cast<double>();
-    const double height = plane.normal.dot(p) - plane.distance;
+    const double height = plane->normal.dot(p) - plane->distance;
     const auto* landmark = std::lower_bound(known.begin(), known.end(), vertex.id, before);
     if (landmark == known.end() || landmark->id != vertex.id) continue;
     const Eigen::Vector3d ray = p - viewer;
@@ -68,8 +59,8 @@ int drawOntoPlanes(const PlaneReport& report, const SmoothedWindow& window, doub
     const double depth_sigma = landmark->inverse_depth_sigma * depth;  // over the depth: ray is not unit
     const double lateral = kLateralSigma * depth;
     const Eigen::Vector3d spread =
-        depth_sigma * depth_sigma * plane.normal.dot(ray) * ray + lateral * lateral * plane.normal;
-    const double variance = plane.normal.dot(spread);
+        depth_sigma * depth_sigma * plane->normal.dot(ray) * ray + lateral * lateral * plane->normal;
+    const double variance = plane->normal.dot(spread);
     if (!(std::abs(height) <= std::max(kLeastGate, kMaxSigmas * std::sqrt(variance)))) continue;
     const Eigen::Vector3d step = height / (variance + surface_sigma * surface_sigma) * spread;
     if (!step.allFinite()) continue;

@@ -24,6 +24,7 @@
 #include "mesher/mesh_stage.hpp"
 #include "mesher/plane_drawing.hpp"
 #include "mesher/plane_finder.hpp"
+#include "mesher/plane_folds.hpp"
 #include "tests/odometry/odometry_run.hpp"
 #include "tests/support/statistics.hpp"
 
@@ -119,6 +120,7 @@ struct Outcome {
   MeshError plain;       ///< as the landmarks are
   MeshError snapped;     ///< all the way onto the planes
   MeshError drawn;       ///< by their noise
+  MeshError folded;      ///< and folded where planes meet
   MeshError exact;       ///< every vertex where its landmark truly is: what triangulation alone leaves
   SquareMean on_planes;  ///< landmarks that the report names, height over their true surface
   double reported_points = 0;
@@ -132,6 +134,7 @@ struct Outcome {
   double worst_solve_ms = 0;
   double find_ms = 0;
   double worst_find_ms = 0;
+  int folds = 0;
   int wrong_points = 0;  ///< named on a plane that they are not on by more than 5 cm
   int named_points = 0;
 };
@@ -248,6 +251,8 @@ class Flight {
     *drawn_ = *mesh_;
     drawOntoPlanes(*report_, *window_, settings_.plane_point_sigma, *drawn_);
     out_.drawn.add(*drawn_, T_truth_world, world);
+    out_.folds += foldAtPlanes(*report_, *window_, *drawn_);
+    out_.folded.add(*drawn_, T_truth_world, world);
   }
 
   const TrackFlight& flight_;
@@ -279,7 +284,8 @@ void forEach(int count, const std::function<void(int)>& work) {
 void printSeed(int seed, const Outcome& a, const Outcome& b) {
   const double allowed = std::max(0.05 * a.ate, 0.001);
   std::printf(
-      "  %3d  ATE %.4f -> %.4f m%s | mesh %.4f snapped %.4f -> %.4f snapped %.4f drawn %.4f exact %.4f m | "
+      "  %3d  ATE %.4f -> %.4f m%s | mesh %.4f snapped %.4f -> %.4f snapped %.4f drawn %.4f folded %.4f "
+      "exact %.4f m | "
       "vertices "
       "%.4f snapped %.4f -> %.4f drawn %.4f | on planes %.4f -> %.4f\n"
       "       %.0f of %.0f vertices on %.1f planes (%zu in all, %zu unreal), wrong %.3f | %.1f ties; tied "
@@ -287,9 +293,9 @@ void printSeed(int seed, const Outcome& a, const Outcome& b) {
       "refused %llu untied %llu planes %llu | step %.2f -> %.2f ms (%.1f -> %.1f), find %.2f ms (%.1f)\n",
       seed, a.ate, b.ate, b.ate > a.ate + allowed ? " WORSE" : "", a.plain.surface.rms(),
       a.snapped.surface.rms(), b.plain.surface.rms(), b.snapped.surface.rms(), b.drawn.surface.rms(),
-      b.exact.surface.rms(), a.plain.vertices.rms(), a.snapped.vertices.rms(), b.plain.vertices.rms(),
-      b.drawn.vertices.rms(), a.on_planes.rms(), b.on_planes.rms(), b.reported_points, b.mesh_vertices,
-      b.planes, a.seen.size() + b.seen.size(), a.unreal.size() + b.unreal.size(),
+      b.folded.surface.rms(), b.exact.surface.rms(), a.plain.vertices.rms(), a.snapped.vertices.rms(),
+      b.plain.vertices.rms(), b.drawn.vertices.rms(), a.on_planes.rms(), b.on_planes.rms(), b.reported_points,
+      b.mesh_vertices, b.planes, a.seen.size() + b.seen.size(), a.unreal.size() + b.unreal.size(),
       static_cast<double>(b.wrong_points) / std::max(1, b.named_points), b.ties,
       static_cast<unsigned long long>(b.counters.points_tied),
       static_cast<unsigned long long>(b.counters.points_refused),
@@ -322,7 +328,7 @@ int main(int argc, char** argv) {
   int worse = 0;
   std::size_t unreal = 0;
   std::array<double, 2> ate{};
-  std::array<double, 5> mesh{};
+  std::array<double, 6> mesh{};
   for (std::size_t i = 0; i < without.size(); ++i) {
     const Outcome& a = without[i];
     const Outcome& b = with[i];
@@ -331,14 +337,15 @@ int main(int argc, char** argv) {
     unreal += a.unreal.size() + b.unreal.size();
     ate[0] += a.ate / flights;
     ate[1] += b.ate / flights;
-    const std::array<double, 5> m{a.plain.surface.rms(), a.snapped.surface.rms(), b.plain.surface.rms(),
-                                  b.snapped.surface.rms(), b.drawn.surface.rms()};
+    const std::array<double, 6> m{a.plain.surface.rms(),   a.snapped.surface.rms(), b.plain.surface.rms(),
+                                  b.snapped.surface.rms(), b.drawn.surface.rms(),   b.folded.surface.rms()};
     for (std::size_t k = 0; k < m.size(); ++k) mesh[k] += m[k] / flights;
   }
   std::printf(
-      "mean: ATE %.4f -> %.4f m (worse on %d); mesh %.4f, snapped %.4f -> %.4f, snapped %.4f, drawn %.4f m "
+      "mean: ATE %.4f -> %.4f m (worse on %d); mesh %.4f, snapped %.4f -> %.4f, snapped %.4f, drawn %.4f, "
+      "folded %.4f m "
       "(%.1f %% lower; snapping alone %.1f %%); unreal planes %zu\n",
-      ate[0], ate[1], worse, mesh[0], mesh[1], mesh[2], mesh[3], mesh[4], 100 * (1 - mesh[4] / mesh[0]),
-      100 * (1 - mesh[1] / mesh[0]), unreal);
+      ate[0], ate[1], worse, mesh[0], mesh[1], mesh[2], mesh[3], mesh[4], mesh[5],
+      100 * (1 - mesh[5] / mesh[0]), 100 * (1 - mesh[1] / mesh[0]), unreal);
   return 0;
 }
