@@ -22,6 +22,10 @@ constexpr float kKeptShare = 0.4F;
 constexpr float kKeptTurnSigma = 0.05F;  // rad
 constexpr int kKeptSilent = 120;         // keyframes: half a minute of looking elsewhere
 constexpr int kUnprovenSilent = 2;       // keyframes, before it is reported
+// A wall's azimuth over keyframes. Neighbouring ones share most of their points, some five each.
+constexpr double kSharedKeyframes = 5;
+constexpr double kTurnDrift = 0.001;  // rad a keyframe: the estimate's yaw
+constexpr double kTurnGate = 3;       // sigmas
 // The estimate moves under a plane by millimetres a keyframe; more is another surface.
 constexpr double kSameDistance = 0.08;       // m, at the other's points
 constexpr double kSameCosine = 0.985;        // 10 degrees: a narrow wall's azimuth, badly known
@@ -95,13 +99,35 @@ void PlaneFinder::followKnown(const LocalMesh& mesh) {
     if (!fit_.refine(mesh, facts_, guess, true)) continue;
     const PlaneSupport& support = fit_.support();
     if (!(plane.supported < kProofKeyframes ? proves(support) : keeps(support))) continue;
-    if (support.turn_sigma > kNewTurnSigma) {  // what is left of it says nothing new of its azimuth
-      guess.normal = plane.normal.cast<float>();
-      guess.distance = guess.normal.dot(support.centre);
-    }
+    double turn_variance = 0;
+    if (!blend(plane, guess, turn_variance)) continue;
     if (slotFor(guess) != i) continue;
+    followed_[i].turn_variance = turn_variance;
     accept(mesh, guess, i, false);
   }
+}
+
+// A wall at the edge of the view turns as its last points like: the azimuth is filtered. False when it has
+// turned into something else.
+bool PlaneFinder::blend(const Followed& plane, PlaneGuess& guess, double& turn_variance) const {
+  if (guess.direction == PlaneDirection::kHorizontal) return true;
+  const Eigen::Vector3d before = plane.normal;
+  const Eigen::Vector3d now = guess.normal.cast<double>();
+  const double turn = std::atan2(before.x() * now.y() - before.y() * now.x(), before.dot(now));
+  const double sigma = static_cast<double>(fit_.support().turn_sigma);
+  const double known = plane.turn_variance + kTurnDrift * kTurnDrift;
+  const double measured = kSharedKeyframes * sigma * sigma;
+  if (turn * turn > kTurnGate * kTurnGate * (known + measured)) return false;
+  const double gain = known / (known + measured);
+  turn_variance = (1 - gain) * known;
+  const double c = std::cos(gain * turn);
+  const double s = std::sin(gain * turn);
+  const Eigen::Vector3f normal =
+      Eigen::Vector3d(c * before.x() - s * before.y(), s * before.x() + c * before.y(), 0).cast<float>();
+  // Turned about its points.
+  guess.distance += (normal - guess.normal).dot(fit_.support().centre);
+  guess.normal = normal;
+  return true;
 }
 
 void PlaneFinder::findNew(const LocalMesh& mesh) {
@@ -122,6 +148,8 @@ void PlaneFinder::findNew(const LocalMesh& mesh) {
       Followed fresh;
       fresh.id = next_id_;
       fresh.direction = guess.direction;
+      const double sigma = static_cast<double>(fit_.support().turn_sigma);
+      fresh.turn_variance = kSharedKeyframes * sigma * sigma;
       if (followed_.full() && !forgetOne()) {
         votes_.suppress(*strongest);
         continue;

@@ -8,10 +8,10 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <functional>
 #include <memory>
 #include <set>
@@ -135,12 +135,17 @@ struct Outcome {
   double find_ms = 0;
   double worst_find_ms = 0;
   int folds = 0;
-  int wrong_points = 0;  ///< named on a plane that they are not on by more than 5 cm
+  int reports = 0;         ///< planes times keyframes
+  int unreal_reports = 0;  ///< of them, of planes that are nowhere
+  int wrong_points = 0;    ///< named on a plane that they are not on by more than 5 cm
   int named_points = 0;
 };
 
-double millisecondsSince(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+/// CPU time of this thread: other programs on the machine do not count.
+double milliseconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
 }
 
 /// Is there a flat patch with this normal where most of its points truly are?
@@ -195,9 +200,9 @@ class Flight {
  private:
   void frame(std::size_t k) {
     const TrackedFrame& tracked = flight_.frames()[k];
-    auto begin = std::chrono::steady_clock::now();
+    double begin = milliseconds();
     static_cast<void>(stage_->step(tracked, Effort{}, *output_));
-    const double step_ms = millisecondsSince(begin);
+    const double step_ms = milliseconds() - begin;
     out_.solve_ms += step_ms;
     out_.worst_solve_ms = std::max(out_.worst_solve_ms, step_ms);
     stage_->trim();
@@ -207,9 +212,9 @@ class Flight {
     stage_->window(*window_);
     if (!mesh_stage_->step({window_.get(), &tracked, {}, {}}).ok() || !tracked.keyframe) return;
     mesh_stage_->horizonMesh(*mesh_);
-    begin = std::chrono::steady_clock::now();
+    begin = milliseconds();
     static_cast<void>(finder_->step(*mesh_, *window_, *report_));
-    const double find_ms = millisecondsSince(begin);
+    const double find_ms = milliseconds() - begin;
     out_.find_ms += find_ms;
     out_.worst_find_ms = std::max(out_.worst_find_ms, find_ms);
     stage_->take(*report_);
@@ -225,7 +230,10 @@ class Flight {
     out_.planes += static_cast<double>(report_->planes.size());
     for (const ReportedPlane& plane : report_->planes) {
       out_.seen.insert(plane.id);
-      if (!isReal(plane, *report_, T_truth_world, flight_)) out_.unreal.insert(plane.id);
+      ++out_.reports;
+      if (isReal(plane, *report_, T_truth_world, flight_)) continue;
+      out_.unreal.insert(plane.id);
+      ++out_.unreal_reports;
     }
     if (keyframes_ % kMeshEvery != 0) return;
     const World& world = flight_.flight().world();
@@ -288,7 +296,8 @@ void printSeed(int seed, const Outcome& a, const Outcome& b) {
       "exact %.4f m | "
       "vertices "
       "%.4f snapped %.4f -> %.4f drawn %.4f | on planes %.4f -> %.4f\n"
-      "       %.0f of %.0f vertices on %.1f planes (%zu in all, %zu unreal), wrong %.3f | %.1f ties; tied "
+      "       %.0f of %.0f vertices on %.1f planes (%zu in all, %zu unreal, %d of %d times), wrong %.3f | "
+      "%.1f ties; tied "
       "%llu "
       "refused %llu untied %llu planes %llu | step %.2f -> %.2f ms (%.1f -> %.1f), find %.2f ms (%.1f)\n",
       seed, a.ate, b.ate, b.ate > a.ate + allowed ? " WORSE" : "", a.plain.surface.rms(),
@@ -296,6 +305,7 @@ void printSeed(int seed, const Outcome& a, const Outcome& b) {
       b.folded.surface.rms(), b.exact.surface.rms(), a.plain.vertices.rms(), a.snapped.vertices.rms(),
       b.plain.vertices.rms(), b.drawn.vertices.rms(), a.on_planes.rms(), b.on_planes.rms(), b.reported_points,
       b.mesh_vertices, b.planes, a.seen.size() + b.seen.size(), a.unreal.size() + b.unreal.size(),
+      a.unreal_reports + b.unreal_reports, a.reports + b.reports,
       static_cast<double>(b.wrong_points) / std::max(1, b.named_points), b.ties,
       static_cast<unsigned long long>(b.counters.points_tied),
       static_cast<unsigned long long>(b.counters.points_refused),
