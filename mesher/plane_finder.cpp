@@ -24,8 +24,9 @@ constexpr int kKeptSilent = 120;         // keyframes: half a minute of looking 
 constexpr int kUnprovenSilent = 2;       // keyframes, before it is reported
 // A wall's azimuth over keyframes. Neighbouring ones share most of their points, some five each.
 constexpr double kSharedKeyframes = 5;
-constexpr double kTurnDrift = 0.001;  // rad a keyframe: the estimate's yaw
-constexpr double kTurnGate = 3;       // sigmas
+constexpr double kTurnDrift = 0.001;     // rad a keyframe: the estimate's yaw
+constexpr double kTurnGate = 3;          // sigmas
+constexpr double kMostTurnSigma = 0.02;  // rad, of what is reported
 // The estimate moves under a plane by millimetres a keyframe; more is another surface.
 constexpr double kSameDistance = 0.08;       // m, at the other's points
 constexpr double kSameCosine = 0.985;        // 10 degrees: a narrow wall's azimuth, badly known
@@ -91,6 +92,10 @@ Status PlaneFinder::step(const LocalMesh& mesh, const SmoothedWindow& window, Pl
   return okStatus();
 }
 
+bool PlaneFinder::isProven(const Followed& plane) {
+  return plane.supported >= kProofKeyframes && plane.turn_variance <= kMostTurnSigma * kMostTurnSigma;
+}
+
 void PlaneFinder::followKnown(const LocalMesh& mesh) {
   for (std::size_t i = 0; i < followed_.size(); ++i) {
     const Followed& plane = followed_[i];
@@ -98,7 +103,7 @@ void PlaneFinder::followKnown(const LocalMesh& mesh) {
                      static_cast<float>(plane.distance - plane.normal.dot(facts_.viewer))};
     if (!fit_.refine(mesh, facts_, guess, true)) continue;
     const PlaneSupport& support = fit_.support();
-    if (!(plane.supported < kProofKeyframes ? proves(support) : keeps(support))) continue;
+    if (!(isProven(plane) ? keeps(support) : proves(support))) continue;
     double turn_variance = 0;
     if (!blend(plane, guess, turn_variance)) continue;
     if (slotFor(guess) != i) continue;
@@ -269,8 +274,7 @@ bool PlaneFinder::forgetOne() {
 void PlaneFinder::expire() {
   for (std::size_t i = followed_.size(); i-- > 0;) {
     const Followed& plane = followed_[i];
-    const bool proven = plane.supported >= kProofKeyframes;
-    if (plane.silent <= (proven ? kKeptSilent : kUnprovenSilent)) continue;
+    if (plane.silent <= (isProven(plane) ? kKeptSilent : kUnprovenSilent)) continue;
     remove(i);
     ++counters_.expired;
   }
@@ -337,7 +341,7 @@ void PlaneFinder::write(const LocalMesh& mesh, PlaneReport& report) {
     int most = 0;
     for (std::size_t i = 0; i < followed_.size(); ++i) {
       const Followed& plane = followed_[i];
-      if (out[i] || plane.supported < kProofKeyframes || plane.points < kKeptPoints) continue;
+      if (out[i] || !isProven(plane) || plane.points < kKeptPoints) continue;
       const int weight = plane.points + (plane.reported ? kReportedBonus : 0);
       if (weight <= most) continue;
       most = weight;

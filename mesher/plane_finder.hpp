@@ -83,6 +83,7 @@ class PlaneFinder {
     std::uint8_t faces = 0;        // around the vertex
     std::uint8_t plane_faces = 0;  // of them, in some plane
   };
+  [[nodiscard]] static bool isProven(const Followed& plane);
   void followKnown(const LocalMesh& mesh);
   void findNew(const LocalMesh& mesh);
   [[nodiscard]] bool blend(const Followed& plane, PlaneGuess& guess, double& turn_variance) const;
