@@ -7,8 +7,9 @@ namespace swiftlet {
 namespace {
 
 // What a plane must show in every keyframe until it is reported.
-constexpr int kNewPoints = 8;
-constexpr float kNewArea = 0.5F;        // m^2: a table; less is the side of a box
+constexpr int kNewPoints = 10;
+constexpr int kNewKnown = 8;      // of them, known well enough to tell the wall from a shelf in front of it
+constexpr float kNewArea = 0.5F;  // m^2: a table; less is the side of a box
 constexpr float kNewNarrow = 0.12F;     // m, 1 sigma: some 40 cm across at its narrowest
 constexpr float kNewShare = 0.6F;       // of the points around it; a cloud gives a quarter, two surfaces half
 constexpr float kMaxChiSquared = 2;     // 1 is expected; sigmas are those of a linear solve
@@ -50,8 +51,9 @@ constexpr int kSpreadRounds = 5;     // faces away from points that are on it fo
 constexpr int kReportedBonus = 10;   // points by which a newcomer must lead to take a reported plane's place
 
 bool proves(const PlaneSupport& s) {
-  return s.points >= kNewPoints && s.area >= kNewArea && s.narrow >= kNewNarrow && s.share >= kNewShare &&
-         s.turn_sigma <= kNewTurnSigma && s.chi_squared <= kMaxChiSquared && s.rms <= kMaxRms;
+  return s.points >= kNewPoints && s.known >= kNewKnown && s.area >= kNewArea && s.narrow >= kNewNarrow &&
+         s.share >= kNewShare && s.turn_sigma <= kNewTurnSigma && s.chi_squared <= kMaxChiSquared &&
+         s.rms <= kMaxRms;
 }
 
 bool keeps(const PlaneSupport& s) {

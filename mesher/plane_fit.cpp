@@ -118,6 +118,7 @@ void PlaneFit::judge(const MeshFacts& facts, const PlaneGuess& plane) {
     const Eigen::Vector2d q(across.dot(vertex.p), along.dot(vertex.p));
     const double r = height(plane, vertex.p);
     const double sigma = normalSigma(vertex, plane.normal);
+    support_.known += sigma <= 0.5 * static_cast<double>(kPlaneGate) ? 1 : 0;
     mean += q;
     square += q * q.transpose();
     centre += vertex.p.cast<double>();

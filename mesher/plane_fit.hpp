@@ -24,9 +24,10 @@ inline constexpr float kSurfaceSigma = 0.008F;  // m
 /// A plane's claim in one keyframe.
 struct PlaneSupport {
   int points = 0;
-  float area = 0;         ///< m^2 of its faces
-  float narrow = 0;       ///< m, standard deviation of its points along the narrower direction in the plane
-  float rms = 0;          ///< m, of its points' distances
+  int known = 0;     ///< of them, known to half of the gate: the others would be in it on a bent surface too
+  float area = 0;    ///< m^2 of its faces
+  float narrow = 0;  ///< m, standard deviation of its points along the narrower direction in the plane
+  float rms = 0;     ///< m, of its points' distances
   float turn_sigma = 0;   ///< rad, 1 sigma of a vertical plane's azimuth; 0 of a horizontal one
   float chi_squared = 0;  ///< mean of the squared distances in sigmas
   /// Of the well-known vertices in a slab around it and within its extent, those that are on it.
