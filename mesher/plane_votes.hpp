@@ -6,7 +6,7 @@
 //    with the distance that its vertices have along it: only on the true azimuth do the faces of a wall meet
 //    in one distance (Hough).
 // A vote weighs as much as the face's area, up to a limit: a few large triangles are no surface.
-// Distances from the viewer. Memory: 130 kB. Cost: 21 additions a vertical face, 6 a horizontal one; a search
+// Distances from the viewer. Memory: 250 kB. Cost: 21 additions a vertical face, 6 a horizontal one; a search
 // reads the rows that have changed.
 
 #include <Eigen/Core>
