@@ -8,7 +8,8 @@
 // pulled onto its plane, so what tells is how far it is held off it against how far its own sightings let it
 // go (disagrees() in plane_ties.cpp). A point that was refused is not tried again on the same plane for some
 // time. Work is bounded by kMaxPlanes and kMaxLandmarks; nothing is allocated; reports of another epoch are
-// ignored. Memory: 0.2 MiB inside the object (a report, a window). Cost: docs/performance.md. Source:
+// ignored. Memory: 0.15 MiB inside the object. Cost: that of the columns; with 40 ties a step takes 2.0 ms in
+// place of 1.3 ms (tests/odometry/plane_statistics.cpp). Source:
 // Rosinol, Sattler, Pollefeys, Carlone, "Incremental Visual-Inertial 3D Mesh Generation with Structural
 // Regularities", ICRA 2019; the tests are this project's own.
 
