@@ -11,6 +11,7 @@
 #include "estimator/odometry/track_stage.hpp"
 #include "firmware_host/pipeline/arrows.hpp"
 #include "mesher/mesh_stage.hpp"
+#include "mesher/plane_finder.hpp"
 
 namespace swiftlet {
 namespace {
@@ -28,6 +29,7 @@ class Repeat {
         smooth_(recording.rig(), recording.imuNoise(), settings.odometry) {
     if (settings.mesh.enabled) {
       mesh_ = std::make_unique<MeshStage>(rigInUse(recording.rig(), settings.odometry), HorizonLimits{});
+      if (settings.odometry.regularity_enabled) plane_finder_ = std::make_unique<PlaneFinder>();
     }
   }
 
@@ -116,6 +118,7 @@ class Repeat {
                        [&](const ImuSample& s) { smooth_.addImu(s); })) {
         return false;
       }
+      if (!takePlanes(result.step.planes)) return false;
       result.status = smooth_.step(result.tracked, result.step.effort, result.output);
       StateFix fix;
       smooth_.fix(fix);
@@ -131,6 +134,18 @@ class Repeat {
       log_.onResult(result);
     }
     tracked_.pop_front();
+    return true;
+  }
+
+  bool takePlanes(std::uint64_t number) {
+    if (number == planes_taken_) return true;
+    // `reports_` ends with the one published last.
+    while (!reports_.empty() && reports_published_ - reports_.size() + 1 < number) reports_.pop_front();
+    if (reports_.empty() || reports_published_ - reports_.size() + 1 != number) {
+      return stop(fmt::format("plane report {} is missing, which the smoother took", number));
+    }
+    planes_taken_ = number;
+    smooth_.take(reports_.front());
     return true;
   }
 
@@ -161,6 +176,14 @@ class Repeat {
     if (result.keyframe) mesh_->horizonMesh(result.horizon);
     mesh_->horizonMesh(local_mesh_);
     has_mesh_ = true;
+    if (result.keyframe && plane_finder_) {
+      PlaneReport& report = reports_.emplace_back();
+      if (plane_finder_->step(local_mesh_, mesh_message_.window, report).ok()) {
+        ++reports_published_;
+      } else {
+        reports_.pop_back();
+      }
+    }
     result.hull.clear();
     for (const Eigen::Vector2f& corner : mesh_->hull()) static_cast<void>(result.hull.tryPushBack(corner));
     log_.onMesh(result);
@@ -217,7 +240,11 @@ class Repeat {
   PropagationStage propagation_;
   TrackStage track_;
   SmoothStage smooth_;
-  std::unique_ptr<MeshStage> mesh_;  ///< null: switched off
+  std::unique_ptr<MeshStage> mesh_;            ///< null: switched off
+  std::unique_ptr<PlaneFinder> plane_finder_;  ///< null: nobody ties landmarks to planes
+  std::deque<PlaneReport> reports_;            ///< not older than the one that the smoother took last
+  std::uint64_t reports_published_ = 0;
+  std::uint64_t planes_taken_ = 0;
   MeshMessage mesh_message_;
   MeshResult mesh_result_;
   std::size_t mesh_steps_ = 0;

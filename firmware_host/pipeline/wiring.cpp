@@ -9,7 +9,7 @@
 //                        |               ^                                       |    FrameResult -> [log]
 //                        |               '--newest-- SmoothedWindow <------------+
 //                        +--ring--> [smooth]                                     | newest, with its frame
-//                        |                                                       v
+//                        |                         ^-- newest PlaneReport --.    v
 //   [sensor]  camera 0 --slots-----------------------------------------------> [mesh] MESH
 //                        |                                                       |
 //                        |                     newest LocalMesh, ring of all on request --> [log]
@@ -62,7 +62,9 @@ Wiring::Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, 
       pairing_(pairingSettings(rig, settings)),
       track_(rig, noise, settings.odometry),
       smooth_(rig, noise, settings.odometry),
-      mesh_(settings.mesh.enabled ? std::make_unique<MeshStage>(rig_, HorizonLimits{}) : nullptr) {
+      mesh_(settings.mesh.enabled ? std::make_unique<MeshStage>(rig_, HorizonLimits{}) : nullptr),
+      plane_finder_(mesh_ && settings.odometry.regularity_enabled ? std::make_unique<PlaneFinder>()
+                                                                  : nullptr) {
   if (options.imu_states) states_ = std::make_unique<StateRing>();
   if (options.meshes && mesh_) meshes_ = std::make_unique<MeshRing>();
   if (recorder_ != nullptr) to_recorder_ = std::make_unique<RecorderArrows>();
@@ -118,7 +120,7 @@ bool Wiring::propagate() {
   return true;
 }
 
-// IMU, tracked frames -> smooth -> output, fix, window, window with its frame
+// IMU, tracked frames, newest planes -> smooth -> output, fix, window, window with its frame
 bool Wiring::smooth() {
   const TrackMessage* message = tracked_ring_.front();
   if (message == nullptr) {
@@ -167,6 +169,11 @@ void Wiring::smoothFrame(const TrackMessage& message, FrameResult& out) {
     smoothing_.samples += takeSamples(imu_to_smooth_, message.tracked.stamp,
                                       [this](const ImuSample& sample) { smooth_.addImu(sample); });
     out.step.samples = smoothing_.samples;
+    out.step.planes = planes_.refresh();
+    if (out.step.planes != smoothing_.planes) {
+      smoothing_.planes = out.step.planes;
+      smooth_.take(planes_.value());
+    }
     const double cpu = threadCpuSeconds();
     out.status = smooth_.step(message.tracked, out.step.effort, out.output);
     smooth_.fix(fix_.draft());
@@ -262,7 +269,7 @@ void Wiring::addReservations(MemoryTable& table) const {
   if (mesh_) add("mesh", between(before_mesh_, after_mesh_));
   add("IMU rings", sizeof(ImuRing) * 4);
   add("tracked frames", sizeof(tracked_ring_));
-  add("fixes and windows", sizeof(fix_) + sizeof(window_) + sizeof(window_to_mesh_));
+  add("fixes and windows", sizeof(fix_) + sizeof(window_) + sizeof(window_to_mesh_) + sizeof(planes_));
   add("meshes for the log", sizeof(local_mesh_) + (meshes_ ? sizeof(MeshRing) : 0));
   add("results for the log", sizeof(results_) + sizeof(smoothing_) + (states_ ? sizeof(StateRing) : 0));
   if (to_recorder_) add("recorder's rings", sizeof(RecorderArrows));

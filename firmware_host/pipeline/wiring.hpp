@@ -32,6 +32,7 @@
 #include "firmware_host/pipeline/run_log.hpp"
 #include "firmware_host/settings/settings.hpp"
 #include "mesher/mesh_stage.hpp"
+#include "mesher/plane_finder.hpp"
 
 namespace swiftlet {
 
@@ -168,7 +169,7 @@ class Wiring {
   void handToMesh(SlotHandle handle);
   void meshFrame(const MeshMessage& message);
   [[nodiscard]] bool findMeshImage(std::uint64_t number);
-  void publishMesh(bool keyframe);
+  void publishMesh(const MeshMessage& message);
 
   void watchArming(const FrameResult& result);
 
@@ -189,7 +190,8 @@ class Wiring {
   HeapMark before_smooth_;
   SmoothStage smooth_;
   HeapMark before_mesh_;
-  std::unique_ptr<MeshStage> mesh_;  ///< null: switched off
+  std::unique_ptr<MeshStage> mesh_;            ///< null: switched off
+  std::unique_ptr<PlaneFinder> plane_finder_;  ///< null: nobody ties landmarks to planes
   HeapMark after_mesh_;
 
   // Arrows.
@@ -202,6 +204,7 @@ class Wiring {
   MeshImageRing image_to_mesh_;  ///< of camera 0
   Newest<MeshMessage> window_to_mesh_;
   Newest<LocalMesh> local_mesh_;
+  Newest<PlaneReport> planes_;
   std::unique_ptr<MeshRing> meshes_;   ///< null where nobody wants them
   std::unique_ptr<StateRing> states_;  ///< null where nobody wants them
   ResultRing results_;
@@ -225,6 +228,7 @@ class Wiring {
   } tracking_;
   struct {
     std::uint64_t samples = 0;
+    std::uint64_t planes = 0;
     FrameResult unread;  ///< written where the log has no room
   } smoothing_;
   struct {

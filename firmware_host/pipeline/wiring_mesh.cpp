@@ -31,7 +31,7 @@ void Wiring::publishWindow(const TrackMessage& message) {
   window_.publish();
 }
 
-// newest window, image -> mesh -> newest mesh; every mesh where it is wanted
+// newest window, image -> mesh -> newest mesh, planes; every mesh where it is wanted
 bool Wiring::mesh() {
   const bool ended = smoothDone();
   const std::uint64_t number = mesh_ ? window_to_mesh_.refresh() : 0;
@@ -62,7 +62,7 @@ void Wiring::meshFrame(const MeshMessage& message) {
     const double cpu = threadCpuSeconds();
     status = mesh_->step(input);
     // What was refused is in the stage's counters.
-    if (status.code != StatusCode::kInvalidInput) publishMesh(message.tracked.keyframe);
+    if (status.code != StatusCode::kInvalidInput) publishMesh(message);
     if (drag_) drag_(StageId::kMesh, threadCpuSeconds() - cpu);
   });
   addTime(times_, StageId::kMesh, spent, message.tracked.keyframe);
@@ -81,8 +81,14 @@ bool Wiring::findMeshImage(std::uint64_t number) {
   return number > 0 && head && head->frame.number == number;
 }
 
-void Wiring::publishMesh(bool keyframe) {
-  mesh_->horizonMesh(local_mesh_.draft());
+void Wiring::publishMesh(const MeshMessage& message) {
+  const bool keyframe = message.tracked.keyframe;
+  LocalMesh& mesh = local_mesh_.draft();
+  mesh_->horizonMesh(mesh);
+  // What the finder refuses leaves its report empty, and is in its counters.
+  if (keyframe && plane_finder_ && plane_finder_->step(mesh, message.window, planes_.draft()).ok()) {
+    planes_.publish();
+  }
   local_mesh_.publish();
   if (!meshes_) return;
   MeshResult* out = meshes_->beginPush();
