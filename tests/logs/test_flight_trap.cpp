@@ -28,7 +28,7 @@ bool isFlightThread(std::string_view name) {
   return name == "sensor" || name == "propagate" || name == "track" || name == "smooth" || name == "mesh";
 }
 
-void checkRun(bool mono, bool record) {
+void checkRun(bool mono, bool record, bool planes = false) {
   const ScratchFolder folder("flight_trap");
   ReplayRequest request;
   request.log = chosenLog();
@@ -55,7 +55,9 @@ void checkRun(bool mono, bool record) {
   };
   const TrapCounts before = trapCounts();
   const std::uint64_t all_before = heapCallsOfAll();
-  const ReplayResult result = runReplay(request, Settings{}, hooks);
+  Settings settings;
+  settings.odometry.regularity_enabled = planes;
+  const ReplayResult result = runReplay(request, settings, hooks);
   REQUIRE(result.finished);
   CHECK(armed == 5);
   REQUIRE(result.statistics.mesh);
@@ -83,6 +85,7 @@ TEST_CASE("the trap sees heap calls and locks of an armed thread") {
 TEST_CASE("the flight path neither allocates nor locks") { checkRun(false, false); }
 TEST_CASE("the flight path neither allocates nor locks while it is recorded") { checkRun(false, true); }
 TEST_CASE("the flight path neither allocates nor locks with one camera") { checkRun(true, false); }
+TEST_CASE("the flight path neither allocates nor locks with planes") { checkRun(false, false, true); }
 
 }  // namespace
 }  // namespace swiftlet
