@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mesher/plane_drawing.hpp"
+#include "mesher/plane_folds.hpp"
+
 namespace swiftlet {
 namespace {
 
@@ -23,11 +26,25 @@ void copyMesh(const Vertices& vertices, const Faces& faces, LocalMesh& out) {
 
 }  // namespace
 
-MeshStage::MeshStage(const Rig& rig, const HorizonLimits& limits) : rig_(rig), horizon_(limits) {}
+MeshStage::MeshStage(const Rig& rig, const HorizonLimits& limits, const MeshPlanes& planes)
+    : rig_(rig),
+      horizon_(limits),
+      surface_sigma_(planes.surface_sigma),
+      planes_(planes.enabled ? std::make_unique<Planes>() : nullptr) {}
 
 void MeshStage::reset() {
   begun_ = false;
+  looked_ = false;
   horizon_.clear();
+  if (planes_) {
+    planes_->finder.reset();
+    planes_->report.planes.clear();
+    planes_->report.points.clear();
+    for (LocalMesh* mesh : {&planes_->frame, &planes_->horizon}) {
+      mesh->vertices.clear();
+      mesh->faces.clear();
+    }
+  }
   points_.clear();
   hull_.clear();
   frame_.build(points_, {});
@@ -106,12 +123,14 @@ void MeshStage::lift(const MeshInput& input) {
 }
 
 Status MeshStage::step(const MeshInput& input) {
+  looked_ = false;
   if (const Status status = check(input); !status.ok()) return status;
   counters_.bad_landmarks += static_cast<std::uint64_t>(landmarks_.fill(*input.window));
   lift(input);
   convexHull(features_, hull_);
   frame_.build(points_, input.labels);
   horizon_.update(frame_, landmarks_, rig_.camera[0], T_world_cam_);
+  if (planes_) findPlanes(input);
   if (frame_.faces().empty()) {
     ++counters_.too_few_points;
     return {StatusCode::kDegenerate, "no three features with a depth: no mesh of this frame"};
@@ -120,7 +139,38 @@ Status MeshStage::step(const MeshInput& input) {
   return okStatus();
 }
 
+void MeshStage::findPlanes(const MeshInput& input) {
+  const SmoothedWindow& window = *input.window;
+  PlaneReport& report = planes_->report;
+  copyHorizon(planes_->horizon);
+  copyFrame(planes_->frame);
+  if (input.tracks->keyframe) {
+    // What the finder refuses leaves its report empty, and is in its counters.
+    looked_ = planes_->finder.step(planes_->horizon, window, report).ok();
+  }
+  for (LocalMesh* mesh : {&planes_->horizon, &planes_->frame}) {
+    drawOntoPlanes(report, window, surface_sigma_, *mesh);
+    foldAtPlanes(report, window, *mesh);
+  }
+}
+
 void MeshStage::frameMesh(LocalMesh& out) const {
+  if (planes_) {
+    out = planes_->frame;
+  } else {
+    copyFrame(out);
+  }
+}
+
+void MeshStage::horizonMesh(LocalMesh& out) const {
+  if (planes_) {
+    out = planes_->horizon;
+  } else {
+    copyHorizon(out);
+  }
+}
+
+void MeshStage::copyFrame(LocalMesh& out) const {
   out.epoch = epoch_;
   out.stamp = stamp_;
   out.frame_index = frame_index_;
@@ -136,7 +186,7 @@ void MeshStage::frameMesh(LocalMesh& out) const {
   }
 }
 
-void MeshStage::horizonMesh(LocalMesh& out) const {
+void MeshStage::copyHorizon(LocalMesh& out) const {
   out.epoch = epoch_;
   out.stamp = stamp_;
   out.frame_index = frame_index_;

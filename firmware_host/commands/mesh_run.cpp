@@ -41,13 +41,14 @@ GivenPoseSettings windowSettings(const Settings& settings, bool complete) {
 
 /// Landmarks by the given poses, and the meshes of them.
 struct Mesher {
-  Mesher(const Rig& rig, const GivenPoseSettings& settings, const HorizonLimits& limits)
-      : window(rig, settings), stage(std::make_unique<MeshStage>(rig, limits)) {}
+  Mesher(const Rig& rig, const GivenPoseSettings& settings, const HorizonLimits& limits,
+         const MeshPlanes& planes)
+      : window(rig, settings), stage(std::make_unique<MeshStage>(rig, limits, planes)) {}
 
   GivenPoseWindow window;
   std::unique_ptr<MeshStage> stage;
-  LatencyHistogram frame_times;     ///< CPU s of steps that gave a frame mesh alone
-  LatencyHistogram keyframe_times;  ///< likewise, with the mesh over the horizon
+  LatencyHistogram frame_times;     ///< CPU s of a step
+  LatencyHistogram keyframe_times;  ///< likewise, at keyframes
 };
 
 TriangleMesh toTriangleMesh(const HorizonMesh& mesh) {
@@ -191,9 +192,12 @@ void MeshRun::begin() {
   labels_.emplace(request_.log, ImageSize{rig_.camera[0].width(), rig_.camera[0].height()}, warnings_);
   printWarnings(source_->warnings());
   printWarnings(warnings_.lines());
-  local_ = std::make_unique<Mesher>(rig_, windowSettings(settings_, false), HorizonLimits{});
+  local_ = std::make_unique<Mesher>(
+      rig_, windowSettings(settings_, false), HorizonLimits{},
+      MeshPlanes{settings_.odometry.regularity_enabled, settings_.odometry.plane_point_sigma});
   if (request_.complete) {
-    complete_ = std::make_unique<Mesher>(rig_, windowSettings(settings_, true), completeLimits());
+    complete_ =
+        std::make_unique<Mesher>(rig_, windowSettings(settings_, true), completeLimits(), MeshPlanes{});
   }
   progress_.emplace("mesh", request_.show_progress ? steps : 0);
 }
@@ -284,7 +288,7 @@ void MeshRun::step(Mesher& mesher, const TrackedFrame& tracked, const SE3& T_wor
   input.tracks = &tracked;
   // Refusals are in the stage's counters; the meshes are then as they were.
   const Spent spent = measured([&] { static_cast<void>(mesher.stage->step(input)); });
-  (tracked.keyframe || !views.labels.empty() ? mesher.keyframe_times : mesher.frame_times).add(spent.cpu);
+  (tracked.keyframe ? mesher.keyframe_times : mesher.frame_times).add(spent.cpu);
 }
 
 void MeshRun::failWithoutPose() const {
@@ -302,11 +306,11 @@ void MeshRun::failWithoutPose() const {
 
 Json MeshRun::timingsJson() const {
   Json json;
-  json["frame_mesh"] = timingJson(local_->frame_times);
-  json["frame_and_horizon_mesh"] = timingJson(local_->keyframe_times);
+  json["frames"] = timingJson(local_->frame_times);
+  json["keyframes"] = timingJson(local_->keyframe_times);
   if (complete_) {
-    json["complete_frame_mesh"] = timingJson(complete_->frame_times);
-    json["complete_mesh"] = timingJson(complete_->keyframe_times);
+    json["complete_frames"] = timingJson(complete_->frame_times);
+    json["complete_keyframes"] = timingJson(complete_->keyframe_times);
   }
   return json;
 }
@@ -332,10 +336,10 @@ MeshResult MeshRun::end() {
   if (complete_) {
     const HorizonMesh& mesh = complete_->stage->horizon();
     writePly(file("complete_mesh.ply"), toTriangleMesh(mesh));
-    json["complete_mesh"] = {{"vertices", mesh.vertices().size()},
-                             {"faces", mesh.faces().size()},
-                             {"landmarks", landmarksJson(complete_->window.counters())},
-                             {"counters", toJson(complete_->stage->counters(), mesh.counters())}};
+    json["complete_keyframes"] = {{"vertices", mesh.vertices().size()},
+                                  {"faces", mesh.faces().size()},
+                                  {"landmarks", landmarksJson(complete_->window.counters())},
+                                  {"counters", toJson(complete_->stage->counters(), mesh.counters())}};
   }
   json["timing"] = timingsJson();
   json["warnings"] = source_->warnings();

@@ -11,7 +11,6 @@
 #include "estimator/odometry/track_stage.hpp"
 #include "firmware_host/pipeline/arrows.hpp"
 #include "mesher/mesh_stage.hpp"
-#include "mesher/plane_finder.hpp"
 
 namespace swiftlet {
 namespace {
@@ -28,8 +27,9 @@ class Repeat {
         track_(recording.rig(), recording.imuNoise(), settings.odometry),
         smooth_(recording.rig(), recording.imuNoise(), settings.odometry) {
     if (settings.mesh.enabled) {
-      mesh_ = std::make_unique<MeshStage>(rigInUse(recording.rig(), settings.odometry), HorizonLimits{});
-      if (settings.odometry.regularity_enabled) plane_finder_ = std::make_unique<PlaneFinder>();
+      mesh_ = std::make_unique<MeshStage>(
+          rigInUse(recording.rig(), settings.odometry), HorizonLimits{},
+          MeshPlanes{settings.odometry.regularity_enabled, settings.odometry.plane_point_sigma});
     }
   }
 
@@ -176,13 +176,9 @@ class Repeat {
     if (result.keyframe) mesh_->horizonMesh(result.horizon);
     mesh_->horizonMesh(local_mesh_);
     has_mesh_ = true;
-    if (result.keyframe && plane_finder_) {
-      PlaneReport& report = reports_.emplace_back();
-      if (plane_finder_->step(local_mesh_, mesh_message_.window, report).ok()) {
-        ++reports_published_;
-      } else {
-        reports_.pop_back();
-      }
+    if (const PlaneReport* planes = mesh_->newPlanes()) {
+      reports_.push_back(*planes);
+      ++reports_published_;
     }
     result.hull.clear();
     for (const Eigen::Vector2f& corner : mesh_->hull()) static_cast<void>(result.hull.tryPushBack(corner));
@@ -240,9 +236,8 @@ class Repeat {
   PropagationStage propagation_;
   TrackStage track_;
   SmoothStage smooth_;
-  std::unique_ptr<MeshStage> mesh_;            ///< null: switched off
-  std::unique_ptr<PlaneFinder> plane_finder_;  ///< null: nobody ties landmarks to planes
-  std::deque<PlaneReport> reports_;            ///< not older than the one that the smoother took last
+  std::unique_ptr<MeshStage> mesh_;  ///< null: switched off
+  std::deque<PlaneReport> reports_;  ///< not older than the one that the smoother took last
   std::uint64_t reports_published_ = 0;
   std::uint64_t planes_taken_ = 0;
   MeshMessage mesh_message_;

@@ -62,9 +62,11 @@ Wiring::Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, 
       pairing_(pairingSettings(rig, settings)),
       track_(rig, noise, settings.odometry),
       smooth_(rig, noise, settings.odometry),
-      mesh_(settings.mesh.enabled ? std::make_unique<MeshStage>(rig_, HorizonLimits{}) : nullptr),
-      plane_finder_(mesh_ && settings.odometry.regularity_enabled ? std::make_unique<PlaneFinder>()
-                                                                  : nullptr) {
+      mesh_(settings.mesh.enabled
+                ? std::make_unique<MeshStage>(
+                      rig_, HorizonLimits{},
+                      MeshPlanes{settings.odometry.regularity_enabled, settings.odometry.plane_point_sigma})
+                : nullptr) {
   if (options.imu_states) states_ = std::make_unique<StateRing>();
   if (options.meshes && mesh_) meshes_ = std::make_unique<MeshRing>();
   if (recorder_ != nullptr) to_recorder_ = std::make_unique<RecorderArrows>();

@@ -32,7 +32,6 @@
 #include "firmware_host/pipeline/run_log.hpp"
 #include "firmware_host/settings/settings.hpp"
 #include "mesher/mesh_stage.hpp"
-#include "mesher/plane_finder.hpp"
 
 namespace swiftlet {
 
@@ -169,7 +168,7 @@ class Wiring {
   void handToMesh(SlotHandle handle);
   void meshFrame(const MeshMessage& message);
   [[nodiscard]] bool findMeshImage(std::uint64_t number);
-  void publishMesh(const MeshMessage& message);
+  void publishMesh(bool keyframe);
 
   void watchArming(const FrameResult& result);
 
@@ -190,8 +189,7 @@ class Wiring {
   HeapMark before_smooth_;
   SmoothStage smooth_;
   HeapMark before_mesh_;
-  std::unique_ptr<MeshStage> mesh_;            ///< null: switched off
-  std::unique_ptr<PlaneFinder> plane_finder_;  ///< null: nobody ties landmarks to planes
+  std::unique_ptr<MeshStage> mesh_;  ///< null: switched off
   HeapMark after_mesh_;
 
   // Arrows.

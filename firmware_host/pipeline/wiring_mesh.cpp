@@ -62,7 +62,7 @@ void Wiring::meshFrame(const MeshMessage& message) {
     const double cpu = threadCpuSeconds();
     status = mesh_->step(input);
     // What was refused is in the stage's counters.
-    if (status.code != StatusCode::kInvalidInput) publishMesh(message);
+    if (status.code != StatusCode::kInvalidInput) publishMesh(message.tracked.keyframe);
     if (drag_) drag_(StageId::kMesh, threadCpuSeconds() - cpu);
   });
   addTime(times_, StageId::kMesh, spent, message.tracked.keyframe);
@@ -81,15 +81,13 @@ bool Wiring::findMeshImage(std::uint64_t number) {
   return number > 0 && head && head->frame.number == number;
 }
 
-void Wiring::publishMesh(const MeshMessage& message) {
-  const bool keyframe = message.tracked.keyframe;
-  LocalMesh& mesh = local_mesh_.draft();
-  mesh_->horizonMesh(mesh);
-  // What the finder refuses leaves its report empty, and is in its counters.
-  if (keyframe && plane_finder_ && plane_finder_->step(mesh, message.window, planes_.draft()).ok()) {
+void Wiring::publishMesh(bool keyframe) {
+  mesh_->horizonMesh(local_mesh_.draft());
+  local_mesh_.publish();
+  if (const PlaneReport* planes = mesh_->newPlanes()) {
+    planes_.draft() = *planes;
     planes_.publish();
   }
-  local_mesh_.publish();
   if (!meshes_) return;
   MeshResult* out = meshes_->beginPush();
   if (out == nullptr) return;  // counted by the ring

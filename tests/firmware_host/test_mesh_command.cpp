@@ -101,7 +101,7 @@ TEST_CASE("mesh writes what the run folder promises, from real images") {
   const auto meshed = summary["frames"]["meshed"].get<std::size_t>();
   CHECK(meshed >= 25);
   CHECK(summary["frames"]["jumps"] == 0);
-  CHECK(summary["timing"]["frame_and_horizon_mesh"]["count"] == summary["frames"]["keyframes"]);
+  CHECK(summary["timing"]["keyframes"]["count"] == summary["frames"]["keyframes"]);
   const std::vector<Row> rows = readFrames(out);
   REQUIRE(rows.size() == meshed);
   std::size_t keyframes = 0;
@@ -163,8 +163,10 @@ TEST_CASE("replay leaves its newest mesh in the run folder, and all of them on r
   for (const Row& row : rows) last = row.horizon_mesh.empty() ? last : row.horizon_mesh;
   const std::string local_bytes = textOf(fs::path(out) / "local_mesh.ply");
   REQUIRE_FALSE(last.empty());
-  CHECK(local_bytes == textOf(fs::path(out) / "meshes" / last));
+  // The newest is of the last frame, the other of the last keyframe: most of the landmarks are the same.
+  const TriangleMesh keyframe = readPly(fs::path(out) / "meshes" / last);
   CHECK(local.faces.size() > 50);
+  CHECK(2 * local.vertices.size() > keyframe.vertices.size());
 
   SECTION("less on request, with the same mesh") {
     REQUIRE(run({"replay", recordedLog(), "--until", "1.5", "--out", out}) == kExitDone);

@@ -307,6 +307,46 @@ TEST_CASE("bad input is skipped and counted") {
   }
 }
 
+TEST_CASE("with planes the meshes are drawn flat, as far as the landmarks' noise allows") {
+  constexpr double kNoise = 0.015;  // m
+  const Rig rig = pinholeRig();
+  Random random(3);
+  std::vector<Eigen::Vector3d> points;
+  for (double y = -1.6; y <= 1.6; y += 0.32) {
+    for (double x = -1.6; x <= 1.6; x += 0.32) points.emplace_back(x, y, kWall + kNoise * random.normal());
+  }
+  const auto fly = [&](MeshStage& stage) {
+    int reports = 0;
+    for (std::uint64_t k = 1; k <= 8; ++k) {
+      MeshScene scene(rig, at(0.05 * static_cast<double>(k), 0, 0), k);
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        scene.add(1 + i, points[i], true, kNoise / (kWall * kWall));
+      }
+      REQUIRE(stage.step(scene.input()).ok());
+      reports += stage.newPlanes() != nullptr ? 1 : 0;
+    }
+    return reports;
+  };
+  const auto rms = [](const LocalMesh& mesh) {
+    double sum = 0;
+    for (const MeshVertex& v : mesh.vertices) sum += std::pow(static_cast<double>(v.p_world.z()) - kWall, 2);
+    return std::sqrt(sum / static_cast<double>(mesh.vertices.size()));
+  };
+  MeshStage plain(rig, {});
+  CHECK(fly(plain) == 0);
+  CHECK(plain.planeCounters() == nullptr);
+  MeshStage drawn(rig, {}, {.enabled = true, .surface_sigma = 0.003});
+  CHECK(fly(drawn) == 8);
+  REQUIRE(drawn.newPlanes()->planes.size() == 1);
+  CHECK(drawn.newPlanes()->planes[0].direction == PlaneDirection::kHorizontal);
+  CHECK(drawn.newPlanes()->planes[0].distance == Approx(-kWall).margin(0.01));
+  CHECK(rms(*horizonOf(drawn)) < 0.4 * rms(*horizonOf(plain)));
+  CHECK(rms(*frameOf(drawn)) < 0.4 * rms(*frameOf(plain)));
+  drawn.reset();
+  CHECK(drawn.newPlanes() == nullptr);
+  CHECK(horizonOf(drawn)->faces.empty());
+}
+
 TEST_CASE("full meshes refuse what is new, counted, and stay whole") {
   const Rig rig = pinholeRig();
   MeshStage stage(rig, {.vertices = 40, .faces = 30, .keep_all = false});
