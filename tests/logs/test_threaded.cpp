@@ -129,6 +129,7 @@ class RandomDrag {
   }
 
   void operator()(StageId stage, double cpu) {
+    if (stage != StageId::kTrack && stage != StageId::kSmooth) return;  // each counts on a thread of its own
     const int frame = (stage == StageId::kTrack ? tracked_ : smoothed_)++;
     double factor = 1;
     for (const Stretch& s : stretches_) {

@@ -125,7 +125,8 @@ TEST_CASE("the horizon follows its landmarks and forgets those that left") {
     MeshScene scene(rig, at(0, 0, 0), 2);
     addWall(scene, 1, 0.4, 1.6, kWall + 0.05);
     REQUIRE(stage.step(scene.input()).ok());
-    for (const MeshVertex& vertex : horizonOf(stage)->vertices) {
+    const auto mesh = horizonOf(stage);
+    for (const MeshVertex& vertex : mesh->vertices) {
       CHECK(vertex.p_world.z() == Approx(kWall + 0.05));
     }
   }
