@@ -32,7 +32,7 @@ Fit fitOf(const Trajectory& estimate, const Trajectory& truth, const AccuracyOpt
   return fit;
 }
 
-std::string truthMesh(const MeshRequest& request) {
+std::string truthMesh(const MeshEvaluationRequest& request) {
   if (!request.truth_mesh.empty()) return request.truth_mesh;
   const fs::path path = fs::path(request.log) / "truth" / "mesh.ply";
   if (!fs::exists(path)) {
@@ -45,7 +45,7 @@ std::string truthMesh(const MeshRequest& request) {
 /// Judges the frames of meshes/frames.csv.
 class SequenceJudge {
  public:
-  SequenceJudge(const MeshRequest& request, const Trajectory& truth, const AccuracyOptions& options,
+  SequenceJudge(const MeshEvaluationRequest& request, const Trajectory& truth, const AccuracyOptions& options,
                 const Alignment& alignment, const TrueSurface& surface)
       : truth_(&truth),
         options_(&options),
@@ -125,8 +125,8 @@ class SequenceJudge {
 
 }  // namespace
 
-MeshAccuracy evaluateMeshes(const MeshRequest& request, const Trajectory& estimate, const Trajectory& truth,
-                            const AccuracyOptions& options) {
+MeshAccuracy evaluateMeshes(const MeshEvaluationRequest& request, const Trajectory& estimate,
+                            const Trajectory& truth, const AccuracyOptions& options) {
   MeshAccuracy accuracy;
   accuracy.truth = truthMesh(request);
   const TriangleMesh true_mesh = readPly(accuracy.truth);

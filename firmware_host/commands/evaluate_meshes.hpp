@@ -8,7 +8,7 @@
 
 namespace swiftlet {
 
-struct MeshRequest {
+struct MeshEvaluationRequest {
   std::string run;         ///< folder with meshes/frames.csv, complete_mesh.ply or local_mesh.ply
   std::string log;         ///< says the cameras; its truth/ holds mesh.ply and observed.ply
   std::string truth_mesh;  ///< in place of the log's truth/mesh.ply; observed.ply is looked for beside it
@@ -18,7 +18,7 @@ struct MeshRequest {
 /// other says. Where the path is too short or straight for a fit of positions, by the pose in the middle.
 /// Frames outside the section of `options` or without a true pose are left out. InputError when there is
 /// nothing to judge or to judge by.
-MeshAccuracy evaluateMeshes(const MeshRequest& request, const Trajectory& estimate, const Trajectory& truth,
-                            const AccuracyOptions& options);
+MeshAccuracy evaluateMeshes(const MeshEvaluationRequest& request, const Trajectory& estimate,
+                            const Trajectory& truth, const AccuracyOptions& options);
 
 }  // namespace swiftlet

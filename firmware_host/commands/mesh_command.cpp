@@ -49,7 +49,7 @@ int mesh(const MeshOptions& options) {
   stop_asked.store(false, std::memory_order_relaxed);
   std::signal(SIGINT, askMeshToStop);
   std::signal(SIGTERM, askMeshToStop);
-  const MeshResult result = runMesh(request, options.settings.read());
+  const MeshRunResult result = runMesh(request, options.settings.read());
   printSummary(result.summary);
   fmt::print("written to {}\n", request.out);
   if (!result.finished) {

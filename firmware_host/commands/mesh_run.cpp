@@ -102,7 +102,7 @@ class MeshRun {
         source_(openLog(request.log, logOptions(request, settings))),
         rig_(rigInUse(source_->rig(), settings.odometry)) {}
 
-  MeshResult operator()() {
+  MeshRunResult operator()() {
     begin();
     run();
     progress_->finish();
@@ -121,7 +121,7 @@ class MeshRun {
         std::filesystem::remove(folder / name, ignored);
       }
     }
-    MeshSequence meshes;
+    MeshSequenceWriter meshes;
     TumWriter poses;
   };
 
@@ -134,7 +134,7 @@ class MeshRun {
   void noteJump(std::size_t piece);
   [[noreturn]] void failWithoutPose() const;
   [[nodiscard]] Json timingsJson() const;
-  MeshResult end();
+  MeshRunResult end();
   [[nodiscard]] std::string file(const char* name) const {
     return std::filesystem::path(request_.out) / name;
   }
@@ -315,7 +315,7 @@ Json MeshRun::timingsJson() const {
   return json;
 }
 
-MeshResult MeshRun::end() {
+MeshRunResult MeshRun::end() {
   output_->poses.close();
   writePly(file("local_mesh.ply"), swiftlet::toTriangleMesh(horizon_mesh_));
   Json json;
@@ -350,7 +350,7 @@ MeshResult MeshRun::end() {
 
 }  // namespace
 
-MeshResult runMesh(const MeshRequest& request, const Settings& settings) {
+MeshRunResult runMesh(const MeshRequest& request, const Settings& settings) {
   return MeshRun(request, settings)();
 }
 

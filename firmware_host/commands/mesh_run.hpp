@@ -29,7 +29,7 @@ struct MeshRequest {
   bool show_progress = false;
 };
 
-struct MeshResult {
+struct MeshRunResult {
   nlohmann::ordered_json summary;  ///< as written to summary.json
   bool finished = true;            ///< false: stopped
   bool has_mesh = false;           ///< some frame had a face
@@ -37,6 +37,6 @@ struct MeshResult {
 
 /// Writes meshes/, local_mesh.ply, trajectory.tum (the poses used), summary.json and, where asked for,
 /// complete_mesh.ply. InputError for bad input; nothing is written before the first frame that has a pose.
-MeshResult runMesh(const MeshRequest& request, const Settings& settings);
+MeshRunResult runMesh(const MeshRequest& request, const Settings& settings);
 
 }  // namespace swiftlet

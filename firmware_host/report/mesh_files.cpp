@@ -42,20 +42,21 @@ TriangleMesh toTriangleMesh(const LocalMesh& mesh) {
   return out;
 }
 
-MeshSequence::MeshSequence(const std::string& run_folder)
+MeshSequenceWriter::MeshSequenceWriter(const std::string& run_folder)
     : folder_(madeAnew(run_folder)), list_(folder_ + "/frames.csv") {
   list_.write("frame,stamp [ns],keyframe,frame_mesh,horizon_mesh,hull [px: u v ...]");
 }
 
-std::string MeshSequence::writeFile(const char* kind, std::uint64_t frame, const LocalMesh& mesh) const {
+std::string MeshSequenceWriter::writeFile(const char* kind, std::uint64_t frame,
+                                          const LocalMesh& mesh) const {
   if (mesh.faces.empty()) return {};
   std::string name = fmt::format("{}_{:06}.ply", kind, frame);
   writePly(folder_ + "/" + name, toTriangleMesh(mesh));
   return name;
 }
 
-void MeshSequence::write(bool keyframe, const LocalMesh& frame, const LocalMesh* horizon,
-                         std::span<const Eigen::Vector2f> hull) {
+void MeshSequenceWriter::write(bool keyframe, const LocalMesh& frame, const LocalMesh* horizon,
+                               std::span<const Eigen::Vector2f> hull) {
   std::string corners;
   for (const Eigen::Vector2f& corner : hull) {
     corners += fmt::format("{}{:.3f} {:.3f}", corners.empty() ? "" : " ", corner.x(), corner.y());

@@ -18,10 +18,10 @@ namespace swiftlet {
 
 TriangleMesh toTriangleMesh(const LocalMesh& mesh);
 
-class MeshSequence {
+class MeshSequenceWriter {
  public:
   /// Makes `meshes/` in the run folder; meshes of an earlier run there are removed.
-  explicit MeshSequence(const std::string& run_folder);
+  explicit MeshSequenceWriter(const std::string& run_folder);
 
   /// `horizon`: null between keyframes.
   void write(bool keyframe, const LocalMesh& frame, const LocalMesh* horizon,

@@ -34,7 +34,7 @@ class RunRecorder : public RunListener {
   std::optional<LineFile> imu_rate_;
   std::optional<LineFile> states_;
   std::optional<LineFile> events_;
-  std::optional<MeshSequence> meshes_;
+  std::optional<MeshSequenceWriter> meshes_;
 };
 
 }  // namespace swiftlet

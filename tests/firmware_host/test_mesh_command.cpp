@@ -213,7 +213,7 @@ TEST_CASE("given poses that are missing, elsewhere, broken or jump") {
 
   SECTION("tracks in place of images give meshes too") {
     write(file, given);
-    const MeshResult result = runMesh(request, Settings{});
+    const MeshRunResult result = runMesh(request, Settings{});
     CHECK(result.has_mesh);
     CHECK(result.summary["frames"]["without_pose"] == 0);
     CHECK(result.summary["counters"]["epochs"] == 1);
@@ -249,7 +249,7 @@ TEST_CASE("given poses that are missing, elsewhere, broken or jump") {
       if (t < 1.0 || t > 1.52) gappy.push_back(point);
     }
     write(file, gappy);
-    const MeshResult result = runMesh(request, Settings{});
+    const MeshRunResult result = runMesh(request, Settings{});
     const auto left_out = result.summary["frames"]["without_pose"].get<int>();
     CHECK(left_out >= 9);
     CHECK(left_out <= 12);
@@ -260,7 +260,7 @@ TEST_CASE("given poses that are missing, elsewhere, broken or jump") {
       if ((point.stamp - given.front().stamp).seconds() > 1.5) point.T_world_body.translation.x() += 100;
     }
     write(file, given);
-    const MeshResult result = runMesh(request, Settings{});
+    const MeshRunResult result = runMesh(request, Settings{});
     CHECK(result.summary["frames"]["jumps"] == 1);
     CHECK(result.summary["counters"]["epochs"] == 2);
     CHECK(result.summary["warnings"].dump().find("jump") != std::string::npos);

@@ -359,7 +359,7 @@ TEST_CASE("evaluate --mesh moves the run's meshes onto the truth") {
     addQuad(box, corner, a, b, 3);
     addQuad(box, corner + 10 * Eigen::Vector3d::Unit(k), a, b, 4);
   }
-  const MeshRequest request = {folder.path(), log, folder.file("mesh.ply")};
+  const MeshEvaluationRequest request = {folder.path(), log, folder.file("mesh.ply")};
   writePly(request.truth_mesh, box);
   const std::vector<std::string> arguments = {"swiftlet", "evaluate",     folder.path(),      "--truth", log,
                                               "--mesh",   "--truth-mesh", request.truth_mesh, "--json"};
