@@ -105,13 +105,18 @@ void PlaneFinder::followKnown(const LocalMesh& mesh) {
                      static_cast<float>(plane.distance - plane.normal.dot(facts_.viewer))};
     if (!fit_.refine(mesh, facts_, guess, true)) continue;
     const PlaneSupport& support = fit_.support();
-    if (!(isProven(plane) ? keeps(support) : proves(support))) continue;
+    if (!(isProven(plane) ? keeps(support) : provesItself())) continue;
     double turn_variance = 0;
     if (!blend(plane, guess, turn_variance)) continue;
     if (slotFor(guess) != i) continue;
     followed_[i].turn_variance = turn_variance;
     accept(mesh, guess, i, false);
   }
+}
+
+// Of the plane that was fitted last.
+bool PlaneFinder::provesItself() {
+  return proves(fit_.support()) && fit_.narrowOfLargerPart(facts_) >= kNewNarrow;
 }
 
 // A wall at the edge of the view turns as its last points like: the azimuth is filtered. False when it has
@@ -146,7 +151,7 @@ void PlaneFinder::findNew(const LocalMesh& mesh) {
     const std::optional<PlaneGuess> strongest = votes_.strongest(kLeastVotes);
     if (!strongest) return;
     PlaneGuess guess = *strongest;
-    if (!fit_.refine(mesh, facts_, guess, false) || !proves(fit_.support())) {
+    if (!fit_.refine(mesh, facts_, guess, false) || !provesItself()) {
       votes_.suppress(*strongest);
       continue;
     }

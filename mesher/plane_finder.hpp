@@ -84,6 +84,7 @@ class PlaneFinder {
     std::uint8_t plane_faces = 0;  // of them, in some plane
   };
   [[nodiscard]] static bool isProven(const Followed& plane);
+  [[nodiscard]] bool provesItself();
   void followKnown(const LocalMesh& mesh);
   void findNew(const LocalMesh& mesh);
   [[nodiscard]] bool blend(const Followed& plane, PlaneGuess& guess, double& turn_variance) const;

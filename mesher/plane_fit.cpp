@@ -19,6 +19,10 @@ constexpr float kSlab = 0.20F;  // m
 // Standard deviations of the points in the plane within which vertices are asked: an even spread ends at 1.7.
 constexpr float kExtentSigmas = 2;
 
+// Points fall apart where the widest gap between neighbours exceeds so many standard deviations: twenty that
+// are spread evenly do so in one of thirty cases.
+constexpr float kGapSigmas = 1;
+
 constexpr double kLeastSpread = 1e-6;  // m^2, of points on one vertical line
 
 float height(const PlaneGuess& plane, const Eigen::Vector3f& p) {
@@ -132,6 +136,8 @@ void PlaneFit::judge(const MeshFacts& facts, const PlaneGuess& plane) {
   const Eigen::Vector2d spread = axes.eigenvalues().cwiseMax(0.0).cwiseSqrt();
   support_.turn_sigma = turn_sigma_;
   support_.narrow = static_cast<float>(spread[0]);
+  const Eigen::Vector2f axis = axes.eigenvectors().col(0).cast<float>();
+  narrow_axis_ = axis.x() * across + axis.y() * along;
   support_.rms = static_cast<float>(std::sqrt(distances / count));
   support_.chi_squared = static_cast<float>(chi_squared / count);
   support_.centre = (centre / count).cast<float>();
@@ -148,6 +154,31 @@ void PlaneFit::judge(const MeshFacts& facts, const PlaneGuess& plane) {
     on += r <= kPlaneGate ? 1 : 0;
   }
   support_.share = near == 0 ? 0.0F : static_cast<float>(on) / static_cast<float>(near);
+}
+
+float PlaneFit::narrowOfLargerPart(const MeshFacts& facts) {
+  std::size_t count = 0;
+  for (std::size_t v = 0; v < facts.vertices.size(); ++v) {
+    if (vertex_in_[v] == 2) places_[count++] = narrow_axis_.dot(facts.vertices[v].p);
+  }
+  std::sort(places_.begin(), places_.begin() + static_cast<std::ptrdiff_t>(count));
+  std::size_t cut = 0;
+  for (std::size_t i = 1; i < count; ++i) {
+    if (cut == 0 || places_[i] - places_[i - 1] > places_[cut] - places_[cut - 1]) cut = i;
+  }
+  if (cut == 0 || places_[cut] - places_[cut - 1] <= kGapSigmas * support_.narrow) return support_.narrow;
+  const std::size_t begin = 2 * cut > count ? 0 : cut;
+  const std::size_t end = 2 * cut > count ? cut : count;
+  double mean = 0;
+  double square = 0;
+  for (std::size_t i = begin; i < end; ++i) {
+    const double q = places_[i];
+    mean += q;
+    square += q * q;
+  }
+  const auto points = static_cast<double>(end - begin);
+  mean /= points;
+  return static_cast<float>(std::sqrt(std::max(square / points - mean * mean, 0.0)));
 }
 
 }  // namespace swiftlet

@@ -45,6 +45,10 @@ class PlaneFit {
   [[nodiscard]] bool refine(const LocalMesh& mesh, const MeshFacts& facts, PlaneGuess& plane, bool known);
   /// After refine(): of the plane that it gave.
   [[nodiscard]] const PlaneSupport& support() const { return support_; }
+  /// m, as `narrow`, of one side alone where the points fall apart into two: what happens to lie in one
+  /// plane, the front of a column and the edge of a shelf beyond, is far apart and says nothing of what is
+  /// between.
+  [[nodiscard]] float narrowOfLargerPart(const MeshFacts& facts);
   /// Face f lies in it, and is no other plane's.
   [[nodiscard]] bool holds(std::size_t face) const { return face_in_[face] != 0; }
 
@@ -58,6 +62,8 @@ class PlaneFit {
   std::array<std::uint8_t, kMaxMeshFaces> face_in_{};
   PlaneSupport support_;
   float turn_sigma_ = 0;  // of the last solve
+  Eigen::Vector3f narrow_axis_ = Eigen::Vector3f::Zero();
+  std::array<float, kMaxMeshVertices> places_{};  // along it
 };
 
 }  // namespace swiftlet

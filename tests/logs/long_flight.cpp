@@ -41,6 +41,7 @@ class RepeatedLog : public LogSource {
       // One frame's pause at the seam. The estimator keeps no reference to the log that goes.
       constexpr Duration kPause = Duration::fromMilliseconds(50);
       offset_ = offset_ + (last_ - first_) + kPause;
+      log_.reset();  // two logs at a time would be counted as the flight's growth
       log_ = openLog(path_);
       any_ = false;
     }
@@ -65,7 +66,7 @@ class RepeatedLog : public LogSource {
 
 int run(const std::string& path, double minutes, double speed) {
   const ScratchFolder folder("long_flight");
-  const auto probe = openLog(path);
+  const auto images_a_minute = static_cast<std::uint64_t>(openLog(path)->imageCount());
   RepeatedLog log(path, static_cast<int>(std::lround(minutes)));
   RunRecorder recorder(folder.path(), true);
   RunLog run_log(recorder);
@@ -78,7 +79,6 @@ int run(const std::string& path, double minutes, double speed) {
   FlightRequest flight;
   flight.speed = speed;
   std::int64_t after_a_minute = 0;
-  const auto images_a_minute = static_cast<std::uint64_t>(probe->imageCount());
   RunControl control;
   control.progress = [&](std::uint64_t images) {
     if (after_a_minute == 0 && images >= images_a_minute) {

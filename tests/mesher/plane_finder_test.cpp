@@ -148,6 +148,20 @@ TEST_CASE("No plane in a cloud or on a ball", "[mesher][planes]") {
       CHECK(planes.step(scene).planes.empty());
     }
   }
+  SECTION("the front of a column, the edge of a shelf far beside it, and faces across") {
+    for (int k = 0; k < 12; ++k) {
+      scene.begin(Vector3d::Zero());
+      scene.addSheet({{-0.1, 2, -1}, {0.15, 0, 0}, {0, 0, 2}, 1, 8});
+      scene.addSheet({{0.55, 2, -1}, {0.02, 0, 0}, {0, 0, 2}, 1, 8});
+      for (std::uint32_t j = 0; j < 8; ++j) {
+        const std::uint32_t left = 2 * j + 1;  // the column's right edge and the shelf's left one
+        const std::uint32_t right = 18 + 2 * j;
+        scene.addFace({left, right, right + 2});
+        scene.addFace({left, right + 2, left + 2});
+      }
+      CHECK(planes.step(scene).planes.empty());
+    }
+  }
   SECTION("a slope, neither floor nor wall") {
     for (int k = 0; k < 12; ++k) {
       scene.begin(Vector3d::Zero());
