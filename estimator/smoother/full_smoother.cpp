@@ -9,8 +9,10 @@
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "estimator/geometry/so3.hpp"
+#include "estimator/smoother/full_smoother_system.hpp"
 #include "estimator/smoother/imu_factor.hpp"
 
 namespace swiftlet {
@@ -27,6 +29,9 @@ constexpr double kKeptAhead = 0.1;    // s of samples kept across a keyframe, fo
 constexpr double kLongestLink = 5.0;  // s; beyond, an increment's covariance means little
 constexpr double kDampingUp = 10.0;
 constexpr double kDampingStart = 1e-6;
+constexpr double kFirstMatchGate = 30;  // sigmas: what the loops' relative poses leave, and no more
+constexpr int kPullIterations = 10;
+constexpr double kPulledEnough = 2e-3;  // m, rad: largest step of a pose
 
 using Pose6x3 = Eigen::Matrix<double, kPoseDim, 3>;
 
@@ -40,24 +45,32 @@ using SparseFactor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::L
 
 }  // namespace
 
-/// The reduced normal equations as triplets of their lower triangle.
-struct FullSmoother::System {
-  std::vector<Eigen::Triplet<double>> H;
-  Eigen::VectorXd g;
-
-  template <typename Derived>
-  void addBlock(Eigen::Index row, Eigen::Index column, const Eigen::MatrixBase<Derived>& block) {
-    for (Eigen::Index c = 0; c < block.cols(); ++c) {
-      for (Eigen::Index r = 0; r < block.rows(); ++r) {
-        if (row + r < column + c) continue;
-        H.emplace_back(static_cast<int>(row + r), static_cast<int>(column + c), block(r, c));
-      }
+/// Factors the system and solves it. Kept between iterations.
+class FullSmoother::Solver {
+ public:
+  Status solve(const System& system, double damping, Eigen::VectorXd& step) {
+    const Eigen::Index n = system.g.size();
+    Eigen::SparseMatrix<double> H(n, n);
+    H.setFromTriplets(system.H.begin(), system.H.end());
+    for (Eigen::Index k = 0; k < n; ++k) H.coeffRef(k, k) *= 1.0 + damping;
+    factor_.compute(H);
+    if (factor_.info() != Eigen::Success) {
+      return {StatusCode::kNumerical, "the full system could not be factored"};
     }
+    step = factor_.solve(-system.g);
+    if (!step.allFinite()) return {StatusCode::kNumerical, "the full system's solution is not finite"};
+    return okStatus();
   }
+
+ private:
+  SparseFactor factor_;
 };
 
 FullSmoother::FullSmoother(const Rig& rig, const ImuNoise& noise, const FullSmootherSettings& settings)
-    : rig_(rig), noise_(noise), settings_(settings) {}
+    : rig_(rig),
+      noise_(noise),
+      settings_(settings),
+      next_revisit_track_(std::numeric_limits<TrackId>::max()) {}
 
 Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& state) {
   if (keyframes_.size() >= settings_.max_keyframes) {
@@ -75,24 +88,31 @@ Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& stat
   }
   std::erase_if(pending_imu_,
                 [&](const ImuSample& s) { return s.stamp < at - Duration::fromSeconds(kKeptAhead); });
-  const auto slot = static_cast<std::uint32_t>(keyframes_.size());
+  const std::size_t slot = keyframes_.size();
   for (const TrackedFeature& feature : frame.features) {
     Sighting sighting;
-    sighting.slot = slot;
-    bool any = false;
-    for (std::size_t c = 0; c < rig_.camera_count; ++c) {
-      CameraSighting& view = sighting.camera[c];
-      Eigen::Vector2d pixel;
-      view.used = feature.seen[c] &&
-                  rig_.camera[c].unproject(feature.pixel[c].cast<double>(), view.bearing) &&
-                  rig_.camera[c].project(view.bearing, pixel, &view.weight);
-      if (view.used) view.weight /= settings_.pixel_sigma;
-      any = any || view.used;
-    }
-    if (any) tracks_[{state.epoch, feature.id}].sightings.push_back(sighting);
+    if (!makeSighting(slot, feature.seen, feature.pixel, settings_.pixel_sigma, sighting)) continue;
+    tracks_[{state.epoch, feature.id}].sightings.push_back(sighting);
   }
+  worlds_.try_emplace(state.epoch, state.epoch);
   keyframes_.push_back(std::move(keyframe));
   return okStatus();
+}
+
+bool FullSmoother::makeSighting(std::size_t keyframe, const std::array<bool, kMaxCameras>& seen,
+                                const std::array<Eigen::Vector2f, kMaxCameras>& pixel, double sigma,
+                                Sighting& sighting) const {
+  sighting.slot = static_cast<std::uint32_t>(keyframe);
+  bool any = false;
+  for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+    CameraSighting& view = sighting.camera[c];
+    Eigen::Vector2d back;
+    view.used = seen[c] && rig_.camera[c].unproject(pixel[c].cast<double>(), view.bearing) &&
+                rig_.camera[c].project(view.bearing, back, &view.weight);
+    if (view.used) view.weight /= sigma;
+    any = any || view.used;
+  }
+  return any;
 }
 
 NavState FullSmoother::state(std::size_t k) const {
@@ -209,7 +229,9 @@ void FullSmoother::linearizeMotion(System& system, double& cost) const {
     const Eigen::Index at = kStateDim * static_cast<Eigen::Index>(k);
     if (k == 0 || keyframes_[k - 1].epoch != keyframe.epoch) {
       Eigen::Matrix<double, kStateDim, kStateDim> prior = Eigen::Matrix<double, kStateDim, kStateDim>::Zero();
-      const double gauge = 1.0 / (kGaugeSigma * kGaugeSigma);
+      // An epoch that loops tie to an earlier one has its position and yaw from there.
+      const bool own_world = world(k) == keyframe.epoch;
+      const double gauge = own_world ? 1.0 / (kGaugeSigma * kGaugeSigma) : 0.0;
       const Eigen::Vector3d up = keyframe.x.T_world_body.rotation.conjugate() * Eigen::Vector3d::UnitZ();
       prior.block<3, 3>(0, 0) = gauge * up * up.transpose();
       prior.block<3, 3>(3, 3) = gauge * Eigen::Matrix3d::Identity();
@@ -249,17 +271,28 @@ double FullSmoother::linearize(System& system) {
 
 Status FullSmoother::solve(FullSmootherReport& report) {
   if (keyframes_.size() < 3) return {StatusCode::kNotReady, "full smoothing needs three keyframes"};
-  const Eigen::Index n = kStateDim * static_cast<Eigen::Index>(keyframes_.size());
   System system;
-  SparseFactor factor;
+  Solver solver;
+  if (!revisits_.empty()) {
+    joinWorlds();
+    const Status pulled = pullTogether(solver, system);
+    if (!pulled.ok()) return pulled;
+  }
   std::vector<BodyState> before(keyframes_.size());
+  Eigen::VectorXd step;
   double damping = kDampingStart;
   double cost = 0;
   for (int iteration = 0; iteration < settings_.max_iterations; ++iteration) {
     integrateLinks();
     placeCameras();
     triangulateAll();
-    if (iteration == kOutlierRounds || iteration == 2 * kOutlierRounds) removeOutliers();
+    const bool look_for_outliers = iteration == kOutlierRounds || iteration == 2 * kOutlierRounds;
+    if (!revisits_.empty()) {
+      if (iteration == 0) chooseMatches(kFirstMatchGate);
+      if (look_for_outliers) chooseMatches(kOutlierSigmas);
+      tieWorlds(true);
+    }
+    if (look_for_outliers) removeOutliers();
     const bool comparable = iteration > 2 * kOutlierRounds;
     const double new_cost = linearize(system);
     if (iteration == 0) report.initial_cost = new_cost;
@@ -274,25 +307,60 @@ Status FullSmoother::solve(FullSmootherReport& report) {
       cost = new_cost;
     }
     report.iterations = iteration + 1;
-    Eigen::SparseMatrix<double> H(n, n);
-    H.setFromTriplets(system.H.begin(), system.H.end());
-    for (Eigen::Index k = 0; k < n; ++k) H.coeffRef(k, k) *= 1.0 + damping;
-    factor.compute(H);
-    if (factor.info() != Eigen::Success) {
-      return {StatusCode::kNumerical, "the full system could not be factored"};
-    }
-    const Eigen::VectorXd step = factor.solve(-system.g);
-    if (!step.allFinite()) return {StatusCode::kNumerical, "the full system's solution is not finite"};
-    for (std::size_t k = 0; k < keyframes_.size(); ++k) {
-      before[k] = keyframes_[k].x;
-      keyframes_[k].x.retract(step.segment<kStateDim>(kStateDim * static_cast<Eigen::Index>(k)));
-    }
+    const Status solved = solver.solve(system, damping, step);
+    if (!solved.ok()) return solved;
+    for (std::size_t k = 0; k < keyframes_.size(); ++k) before[k] = keyframes_[k].x;
+    retractAll(step);
   }
   report.final_cost = cost;
+  fillReport(report);
+  return okStatus();
+}
+
+void FullSmoother::retractAll(const Eigen::VectorXd& step) {
+  for (std::size_t k = 0; k < keyframes_.size(); ++k) {
+    keyframes_[k].x.retract(step.segment<kStateDim>(kStateDim * static_cast<Eigen::Index>(k)));
+  }
+}
+
+// The loops' relative poses and everything else, until the keyframes stand still: the matches are then near
+// enough to their landmarks to be sightings.
+Status FullSmoother::pullTogether(Solver& solver, System& system) {
+  tieWorlds(false);
+  Eigen::VectorXd step;
+  for (int iteration = 0; iteration < kPullIterations; ++iteration) {
+    integrateLinks();
+    placeCameras();
+    triangulateAll();
+    linearize(system);
+    linearizeRevisits(system);
+    const Status solved = solver.solve(system, kDampingStart, step);
+    if (!solved.ok()) return solved;
+    retractAll(step);
+    double largest = 0;
+    for (std::size_t k = 0; k < keyframes_.size(); ++k) {
+      const auto pose = step.segment<kPoseDim>(kStateDim * static_cast<Eigen::Index>(k));
+      largest = std::max(largest, pose.cwiseAbs().maxCoeff());
+    }
+    if (largest < kPulledEnough) break;
+  }
+  forgetPoints();
+  return okStatus();
+}
+
+void FullSmoother::fillReport(FullSmootherReport& report) const {
   report.keyframes = keyframes_.size();
   report.landmarks = static_cast<std::size_t>(std::count_if(
       tracks_.begin(), tracks_.end(), [](const auto& entry) { return entry.second.in_system; }));
-  return okStatus();
+  report.revisits = revisits_.size();
+  report.matches = matches_.size();
+  report.revisits_used = 0;
+  report.matches_used = 0;
+  for (const Revisit& revisit : revisits_) {
+    const std::size_t used = matchesInSystem(revisit);
+    report.matches_used += used;
+    if (used > 0) ++report.revisits_used;
+  }
 }
 
 }  // namespace swiftlet

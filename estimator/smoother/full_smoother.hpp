@@ -1,20 +1,28 @@
 #pragma once
 // Full smoothing: every keyframe of a run, all IMU between them and all landmarks in one sparse
-// Gauss-Newton problem, nothing marginalized.
+// Gauss-Newton problem, nothing marginalized. Loop closures, where there are any, tie visits of a place.
 //
 // Keyframes are kept as they come from the odometry (its causal states are the initial values);
 // `solve` then minimizes over the fixed-lag smoother's factors (but rest): preintegrated IMU between
 // neighbours, landmarks eliminated by their Schur complement, Cauchy weights, outliers removed. The
 // calibration is the given one. The reduced system (15 columns a keyframe) is sparse and factored by
 // CHOLMOD, or by Eigen in a build without it.
-// Frames: as the odometry's; each epoch keeps its own world, held by its first keyframe.
+// Revisits: each match of a loop is a further sighting of the old landmark, from the new keyframe, with the
+// noise of a match. The loops' relative poses pull the keyframes together first and are then dropped (they
+// were made of the same matches). Matches that do not fit are not used, and tried again twice; a loop with
+// fewer than six that fit is left out as a whole. A pair of tracks counts once, however many loops name it.
+// Frames: as the odometry's; each epoch keeps its own world, held by its first keyframe; epochs that loops
+// tie share the world of the earliest.
 // Off the flight path: it allocates. Memory grows with the run up to `max_keyframes` (some 40 kB each
 // at 200 features and 200 Hz, and the sparse system while it solves); beyond it further keyframes are
-// refused (kCapacityReached) and the rest of the run is not in the map.
+// refused (kCapacityReached) and the rest of the run is not in the map. A match takes 0.3 kB.
 // Source: Kaess et al., "Square Root SAM", IJRR 2006; the factors are those of docs/smoother.md.
 
 #include <cstdint>
 #include <map>
+#include <set>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "estimator/camera/rig.hpp"
@@ -23,6 +31,7 @@
 #include "estimator/messages/nav_state.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/smoother/landmark.hpp"
+#include "estimator/smoother/loop_revisit.hpp"
 #include "estimator/smoother/state.hpp"
 #include "estimator/smoother/vision_factor.hpp"
 
@@ -30,7 +39,9 @@ namespace swiftlet {
 
 struct FullSmootherSettings {
   double pixel_sigma = 0.6;          ///< px
+  double match_sigma = 1.2;          ///< px, of a loop's match, pixel noise included
   std::size_t max_keyframes = 4000;  ///< 11 minutes at 6 a second
+  std::size_t max_revisits = 4000;
   int max_iterations = 12;
 };
 
@@ -41,6 +52,10 @@ struct FullSmootherReport {
   double final_cost = 0;    ///< at the last linearization
   std::size_t keyframes = 0;
   std::size_t landmarks = 0;
+  std::size_t revisits = 0;       ///< loops given
+  std::size_t revisits_used = 0;  ///< of them, those whose matches were used
+  std::size_t matches = 0;        ///< of the loops given, without repetitions and those that name nothing
+  std::size_t matches_used = 0;
 };
 
 class FullSmoother {
@@ -54,6 +69,16 @@ class FullSmoother {
   /// trajectory. kCapacityReached beyond max_keyframes.
   Status addKeyframe(const TrackedFrame& frame, const NavState& state);
 
+  /// A verified loop between two keyframes added before. kInvalidInput when there is no keyframe at a stamp,
+  /// the old one is not the older, or the pose or its information is not usable; kCapacityReached beyond
+  /// max_revisits. Matches that name no track and no pixel are left out.
+  Status addRevisit(const LoopRevisit& revisit);
+
+  /// Initial poses in place of the odometry's, one for each keyframe, where the drift is large: those of a
+  /// pose graph. Epochs that loops tie are taken to share a world already. Velocities turn with their poses.
+  /// kInvalidInput when the number is not size() or a pose is not finite.
+  Status setPoses(std::span<const SE3> T_world_body);
+
   /// Minimizes over everything added so far. kNotReady below three keyframes; kNumerical when the
   /// system cannot be factored (the states stay as they were).
   Status solve(FullSmootherReport& report);
@@ -61,8 +86,11 @@ class FullSmoother {
   [[nodiscard]] std::size_t size() const { return keyframes_.size(); }
   /// State of keyframe k, with the image's stamp.
   [[nodiscard]] NavState state(std::size_t k) const;
+  /// The epoch in whose world keyframe k's state is: its own, or the earliest that loops tie it to.
+  [[nodiscard]] std::uint32_t world(std::size_t k) const { return worlds_.at(keyframes_[k].epoch); }
 
  private:
+  using TrackKey = std::pair<std::uint32_t, TrackId>;  // epoch, id
   struct Keyframe {
     Stamp stamp;
     std::uint32_t epoch = 0;
@@ -76,7 +104,22 @@ class FullSmoother {
     LandmarkPoint point;
     bool in_system = false;
   };
+  /// A further sighting of a track, from a loop.
+  struct Match {
+    TrackKey track;
+    Sighting sighting;
+    bool used = false;
+  };
+  struct Revisit {
+    std::size_t old_keyframe = 0;
+    std::size_t new_keyframe = 0;
+    SE3 T_old_new;
+    Matrix6d root_information;
+    std::size_t first_match = 0;  // in matches_
+    std::size_t match_count = 0;
+  };
   struct System;
+  class Solver;
 
   void placeCameras();
   void integrateLinks();
@@ -86,13 +129,39 @@ class FullSmoother {
   double linearizeTrack(const Track& track, System& system) const;
   void linearizeMotion(System& system, double& cost) const;
 
+  [[nodiscard]] bool makeSighting(std::size_t keyframe, const std::array<bool, kMaxCameras>& seen,
+                                  const std::array<Eigen::Vector2f, kMaxCameras>& pixel, double sigma,
+                                  Sighting& sighting) const;
+  [[nodiscard]] bool findKeyframe(Stamp stamp, std::size_t& k) const;
+  [[nodiscard]] bool findOldTrack(std::size_t keyframe, const RevisitFeature& feature, TrackKey& key);
+  [[nodiscard]] bool addMatch(const RevisitMatch& match, std::size_t old_keyframe, std::size_t new_keyframe);
+  void joinWorlds();
+  void moveWorld(std::uint32_t world, const SE3& T_to_from);
+  void tieWorlds(bool by_matches);
+  Status pullTogether(Solver& solver, System& system);
+  void retractAll(const Eigen::VectorXd& step);
+  void fillReport(FullSmootherReport& report) const;
+  void linearizeRevisits(System& system) const;
+  void chooseMatches(double gate_sigmas);
+  void tryMatch(Match& match, double gate_sigmas);
+  void withdraw(Match& match);
+  void forgetPoints();
+  [[nodiscard]] std::size_t matchesInSystem(const Revisit& revisit) const;
+
   Rig rig_;
   ImuNoise noise_;
   FullSmootherSettings settings_;
   std::vector<Keyframe> keyframes_;
-  std::map<std::pair<std::uint32_t, TrackId>, Track> tracks_;
+  std::map<TrackKey, Track> tracks_;
   std::vector<ImuSample> pending_imu_;
   std::vector<RigPose> poses_;
+  std::vector<Revisit> revisits_;
+  std::vector<Match> matches_;
+  std::set<std::pair<TrackKey, TrackKey>> matched_tracks_;    // old, new
+  std::set<std::pair<TrackKey, std::size_t>> matched_slots_;  // track and keyframe
+  std::map<std::uint32_t, std::uint32_t> worlds_;             // epoch to the epoch whose world it shares
+  TrackId next_revisit_track_;
+  bool poses_given_ = false;
 };
 
 }  // namespace swiftlet

@@ -1,0 +1,38 @@
+#pragma once
+// A verified loop closure as full smoothing takes it: two keyframes, their measured relative pose, and which
+// features of theirs are the same point.
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "estimator/core/stamp.hpp"
+#include "estimator/geometry/se3.hpp"
+#include "estimator/messages/tracked_frame.hpp"
+#include "estimator/smoother/relative_pose_factor.hpp"
+
+namespace swiftlet {
+
+/// A feature of a keyframe: a track of the odometry in that keyframe's epoch, or where the cameras saw it,
+/// or both.
+struct RevisitFeature {
+  bool has_track = false;
+  TrackId track = 0;
+  std::array<bool, kMaxCameras> seen{};
+  std::array<Eigen::Vector2f, kMaxCameras> pixel{};  ///< distorted, where seen
+};
+
+struct RevisitMatch {
+  RevisitFeature old_feature;
+  RevisitFeature new_feature;
+};
+
+struct LoopRevisit {
+  Stamp old_stamp;  ///< of the keyframes' images
+  Stamp new_stamp;
+  SE3 T_old_new;                                ///< m, between the bodies
+  Matrix6d information = Matrix6d::Identity();  ///< of it, right perturbation (phi, p), 1/rad^2, 1/m^2
+  std::vector<RevisitMatch> matches;
+};
+
+}  // namespace swiftlet
