@@ -1,0 +1,36 @@
+#pragma once
+// Which poses of a graph are unknowns, and which block of the normal equations each edge adds to.
+//
+// Poses that are held are no unknowns. A piece of the graph (poses joined by edges) in which no pose is held
+// is held by its first pose: its place among the other pieces is not determined.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "mapping/pose_graph/block_structure.hpp"
+
+namespace swiftlet {
+
+struct GraphLayout {
+  static constexpr std::uint32_t kHeld = 0xffffffffU;
+  static constexpr std::uint32_t kNoPair = 0xffffffffU;
+
+  std::vector<std::uint32_t> unknown;    ///< of each pose: number of its block, or kHeld
+  std::vector<std::uint32_t> edge_pair;  ///< of each edge: its pair, kNoPair where an end is held
+  std::vector<bool> edge_reversed;       ///< the pair is (to, from)
+  std::vector<BlockPair> pairs;
+  std::uint32_t unknowns = 0;
+  std::uint32_t pieces = 0;
+  std::vector<std::uint32_t> held;  ///< all held poses, given or chosen, rising
+  BlockStructure structure;
+
+  /// `ends`: (from, to) of each edge. `given_held`: one flag per pose.
+  void arrange(std::size_t poses, std::span<const BlockPair> ends, const std::vector<bool>& given_held);
+};
+
+/// The piece of each pose, numbered in the order of their first poses.
+std::vector<std::uint32_t> graphPieces(std::size_t poses, std::span<const BlockPair> ends,
+                                       std::uint32_t& count);
+
+}  // namespace swiftlet
