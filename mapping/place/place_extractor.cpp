@@ -1,0 +1,223 @@
+#include "mapping/place/place_extractor.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "mapping/place/fast_score.hpp"
+
+namespace swiftlet {
+namespace {
+
+// Around a feature: its patch and the smoothing, one more for rounding.
+constexpr int kBorder = SteeredBrief::kBorder + 1;  // px
+constexpr int kMinCell = 12;                        // px: a cell's least side
+// Features that a cell gives on average: fewer, and weak corners are taken to cover every cell; more, and
+// the image is covered unevenly.
+constexpr int kWantedPerCell = 3;
+// Tracked features are looked for in the octaves up to this one (scale 1.7): their patches are of this size.
+constexpr int kTrackedOctaves = 4;
+// A corner this near to a described feature of the same octave is the same corner.
+constexpr float kSameCorner = 3.0F;  // px of the octave
+
+}  // namespace
+
+PlaceExtractor::PlaceExtractor(int width, int height, const PlaceExtractorSettings& settings)
+    : settings_(settings), pyramid_(width, height, settings.octaves) {
+  settings_.features = std::clamp(settings_.features, 0, static_cast<int>(kMaxPlaceFeatures));
+  settings_.tracked = std::clamp(settings_.tracked, 0, settings_.features);
+  settings_.min_score = std::clamp(settings_.min_score, 1, 254);
+  std::size_t most_cells = 1;
+  for (int l = 0; l < pyramid_.octaves(); ++l) {
+    const ImageView level = pyramid_.level(l);
+    scores_[static_cast<std::size_t>(l)].assign(
+        static_cast<std::size_t>(level.stride) * static_cast<std::size_t>(level.height), 0);
+    const auto cells = static_cast<std::size_t>((level.width / kMinCell + 1) * (level.height / kMinCell + 1));
+    most_cells = std::max(most_cells, cells);
+  }
+  cells_.resize(most_cells);
+  spots_.reserve(most_cells * kPerCell);
+}
+
+bool PlaceExtractor::inside(int octave, int x, int y) const {
+  const ImageView level = pyramid_.level(octave);
+  return x >= kBorder && y >= kBorder && x < level.width - kBorder && y < level.height - kBorder;
+}
+
+// Features of an octave: in proportion to its side, as the distance between distinct corners of one size
+// asks.
+int PlaceExtractor::share(int octave, int features) const {
+  const double shrink = 1 / kOctaveRatio;
+  const double first = features * (1 - shrink) / (1 - std::pow(shrink, pyramid_.octaves()));
+  return static_cast<int>(std::lround(first * std::pow(shrink, octave)));
+}
+
+template <typename Lanes>
+void PlaceExtractor::score(int octave) {
+  const ImageView level = pyramid_.level(octave);
+  std::vector<std::uint8_t>& out = scores_[static_cast<std::size_t>(octave)];
+  const int begin = kBorder - 1;
+  const int end = level.width - kBorder + 1;
+  for (int y = kBorder - 1; y < level.height - kBorder + 1; ++y) {
+    if (begin >= end) break;
+    fastScoreRow<Lanes>(level.row(y), level.stride, begin, end,
+                        static_cast<std::uint8_t>(settings_.min_score - 1),
+                        out.data() + static_cast<std::ptrdiff_t>(y) * level.stride);
+  }
+}
+
+// Best first; of equals the one found first stays in front.
+void PlaceExtractor::keepInCell(Cell& cell, const Spot& spot) const {
+  std::size_t at = cell.count;
+  while (at > 0 && cell.best[at - 1].score < spot.score) --at;
+  if (at == kPerCell) return;
+  cell.count = std::min(cell.count + 1, kPerCell);
+  for (std::size_t i = cell.count - 1; i > at; --i) cell.best[i] = cell.best[i - 1];
+  cell.best[at] = spot;
+}
+
+void PlaceExtractor::findSpots(int octave, int wanted) {
+  spots_.clear();
+  const ImageView level = pyramid_.level(octave);
+  const int width = level.width - 2 * kBorder;
+  const int height = level.height - 2 * kBorder;
+  if (width <= 0 || height <= 0 || wanted <= 0) return;
+  const double area = static_cast<double>(width) * height * kWantedPerCell / wanted;
+  const int side = std::max(kMinCell, static_cast<int>(std::lround(std::sqrt(area))));
+  const int columns = (width + side - 1) / side;
+  const int rows = (height + side - 1) / side;
+  for (int c = 0; c < columns * rows; ++c) cells_[static_cast<std::size_t>(c)].count = 0;
+  const std::uint8_t* scores = scores_[static_cast<std::size_t>(octave)].data();
+  const std::ptrdiff_t stride = level.stride;
+  const int least = settings_.min_score;
+  for (int y = kBorder; y < level.height - kBorder; ++y) {
+    const std::uint8_t* here = scores + y * stride;
+    Cell* row = cells_.data() + static_cast<std::ptrdiff_t>((y - kBorder) / side) * columns;
+    for (int x = kBorder; x < level.width - kBorder; ++x) {
+      const int s = here[x];
+      if (s < least) continue;
+      const std::uint8_t* up = here + x - stride;
+      const std::uint8_t* down = here + x + stride;
+      const bool maximum = s > up[-1] && s > up[0] && s > up[1] && s > here[x - 1] && s >= here[x + 1] &&
+                           s >= down[-1] && s >= down[0] && s >= down[1];
+      if (!maximum) continue;
+      keepInCell(row[(x - kBorder) / side], {static_cast<std::int16_t>(x), static_cast<std::int16_t>(y),
+                                             static_cast<std::uint8_t>(s), 0});
+    }
+  }
+  for (int c = 0; c < columns * rows; ++c) {
+    Cell& cell = cells_[static_cast<std::size_t>(c)];
+    for (std::size_t i = 0; i < cell.count; ++i) {
+      cell.best[i].rank = static_cast<std::uint8_t>(i);
+      spots_.push_back(cell.best[i]);
+    }
+  }
+  // Total order: the result does not depend on the sort's implementation.
+  std::sort(spots_.begin(), spots_.end(), [](const Spot& a, const Spot& b) {
+    if (a.rank != b.rank) return a.rank < b.rank;
+    if (a.score != b.score) return a.score > b.score;
+    return a.y != b.y ? a.y < b.y : a.x < b.x;
+  });
+}
+
+bool PlaceExtractor::add(int octave, int x, int y, const Eigen::Vector2f& pixel, const CameraModel& camera,
+                         PlaceKeyframe& keyframe) const {
+  Eigen::Vector3d bearing;
+  if (!camera.unproject(pixel.cast<double>(), bearing)) return false;
+  PlaceFeature feature;
+  feature.pixel = pixel;
+  feature.bearing = bearing.cast<float>();
+  feature.octave = static_cast<std::int8_t>(octave);
+  const ImageView level = pyramid_.level(octave);
+  SteeredBrief::Patch patch;
+  SteeredBrief::smooth(level.row(y) + x, level.stride, patch);
+  feature.descriptor = brief_.describe(patch, SteeredBrief::direction(patch));
+  return keyframe.features.tryPushBack(feature);
+}
+
+std::uint8_t PlaceExtractor::scoreNear(int octave, int x, int y) const {
+  const int stride = pyramid_.level(octave).stride;
+  const std::uint8_t* at =
+      scores_[static_cast<std::size_t>(octave)].data() + static_cast<std::ptrdiff_t>(y) * stride + x;
+  std::uint8_t best = 0;
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) best = std::max(best, at[dy * stride + dx]);
+  }
+  return best;
+}
+
+void PlaceExtractor::addTracked(const CameraModel& camera, const TrackedFrame& tracked,
+                                PlaceKeyframe& keyframe) {
+  const auto most = static_cast<std::size_t>(settings_.tracked);
+  for (const TrackedFeature& track : tracked.features) {
+    if (keyframe.features.size() >= most) return;
+    const Eigen::Vector2f& pixel = track.pixel[0];
+    if (!track.seen[0] || !pixel.allFinite()) continue;
+    int octave = -1, x = 0, y = 0, best = -1;
+    for (int l = 0; l < std::min(kTrackedOctaves, pyramid_.octaves()); ++l) {
+      const Eigen::Vector2f at = pyramid_.toLevel(l, pixel);
+      const auto px = static_cast<int>(std::lround(at.x()));
+      const auto py = static_cast<int>(std::lround(at.y()));
+      if (!inside(l, px, py)) continue;
+      const int s = scoreNear(l, px, py);
+      if (s <= best) continue;
+      octave = l;
+      x = px;
+      y = py;
+      best = s;
+    }
+    if (octave < 0 || !add(octave, x, y, pixel, camera, keyframe)) continue;
+    keyframe.features.back().has_landmark = true;
+    keyframe.features.back().landmark = track.id;
+  }
+}
+
+void PlaceExtractor::addCorners(int octave, int wanted, const CameraModel& camera, PlaceKeyframe& keyframe) {
+  const std::size_t given = keyframe.features.size();
+  int taken = 0;
+  for (const Spot& spot : spots_) {
+    if (taken >= wanted || keyframe.features.full()) return;
+    const Eigen::Vector2f pixel =
+        pyramid_.toImage(octave, Eigen::Vector2f(static_cast<float>(spot.x), static_cast<float>(spot.y)));
+    bool known = false;
+    for (std::size_t i = 0; i < given && !known; ++i) {
+      const PlaceFeature& f = keyframe.features[i];
+      if (f.octave != octave || !f.has_landmark) continue;
+      const Eigen::Vector2f at = pyramid_.toLevel(octave, f.pixel);
+      known = std::abs(at.x() - static_cast<float>(spot.x)) < kSameCorner &&
+              std::abs(at.y() - static_cast<float>(spot.y)) < kSameCorner;
+    }
+    if (!known && add(octave, spot.x, spot.y, pixel, camera, keyframe)) ++taken;
+  }
+}
+
+template <typename Lanes>
+Status PlaceExtractor::extract(const ImageView& image, const CameraModel& camera, const TrackedFrame& tracked,
+                               PlaceKeyframe& keyframe) {
+  keyframe.features.clear();
+  keyframe.index = tracked.index;
+  keyframe.stamp = tracked.stamp;
+  if (!pyramid_.build(image))
+    return {StatusCode::kInvalidInput, "place recognition got an image of another size"};
+  for (int l = 0; l < pyramid_.octaves(); ++l) score<Lanes>(l);
+  addTracked(camera, tracked, keyframe);
+  const int corners = settings_.features - static_cast<int>(keyframe.features.size());
+  // From the smallest octave on: what one lacks, the next may take.
+  int due = 0;
+  for (int l = pyramid_.octaves() - 1; l >= 0; --l) {
+    due += share(l, corners);
+    if (l == 0) due = settings_.features - static_cast<int>(keyframe.features.size());
+    const std::size_t before = keyframe.features.size();
+    findSpots(l, due);
+    addCorners(l, due, camera, keyframe);
+    due -= static_cast<int>(keyframe.features.size() - before);
+  }
+  if (keyframe.features.empty()) return {StatusCode::kDegenerate, "no corner in the keyframe's image"};
+  return okStatus();
+}
+
+template Status PlaceExtractor::extract<byte_lanes::Native>(const ImageView&, const CameraModel&,
+                                                            const TrackedFrame&, PlaceKeyframe&);
+template Status PlaceExtractor::extract<byte_lanes::Scalar>(const ImageView&, const CameraModel&,
+                                                            const TrackedFrame&, PlaceKeyframe&);
+
+}  // namespace swiftlet
