@@ -1,0 +1,130 @@
+#pragma once
+// Do two keyframes show the same place, and from where? Geometry's answer to a candidate of place
+// recognition.
+//
+// matches of descriptors -> a motion most agree on (loop_consensus.hpp) -> refinement on all that agree
+// (relative_pose.hpp) -> matches again, where that pose says they must lie -> refinement -> gates.
+// Every candidate ends in one LoopFate; what was reached on the way is reported with it.
+//
+// Frames: T_old_new takes coordinates of the body at the new keyframe to the body at the old one. Covariance
+// in the tangent T_old_new <- T_old_new (Exp(phi), delta), rotation first [rad], translation [m] in the axes
+// of the new body: that of an edge in mapping/pose_graph.
+//
+// Needs inverse depths in one keyframe at least (feature_depth.hpp); matches without any still count in the
+// refinement. Errors: candidates never give an error, but kInvalidInput (settings out of range, NaN).
+// Deterministic: the seed is made of the keyframes' indices. Bounded: `effort` scales the samples.
+// No allocation; the object holds 330 KiB. Cost and figures: docs/place.md.
+
+#include <cstdint>
+#include <optional>
+
+#include "estimator/camera/rig.hpp"
+#include "estimator/core/status.hpp"
+#include "mapping/place/descriptor_matching.hpp"
+#include "mapping/place/loop_consensus.hpp"
+#include "mapping/place/place_keyframe.hpp"
+#include "mapping/place/relative_pose.hpp"
+
+namespace swiftlet {
+
+enum class LoopFate : std::uint8_t {
+  kAccepted,
+  kInvalidInput,    ///< a keyframe holds values that are not finite
+  kTooFewMatches,   ///< descriptors alike: fewer than min_matches
+  kTooFewDepths,    ///< of these with a depth: fewer than min_depths
+  kNoConsensus,     ///< no motion explains min_consensus of them
+  kTooFewInliers,   ///< after refinement and matching again
+  kLowShare,        ///< too few of what the pose predicts to be seen was found
+  kPoorSpread,      ///< the inliers stand on a small part of an image, or on a line
+  kPoorFit,         ///< residuals far above their noise
+  kIllConditioned,  ///< rotation or translation not determined well enough
+  kTooFar,          ///< keyframes farther apart than max_distance
+};
+inline constexpr std::size_t kLoopFates = 11;
+
+/// A few words for logs and tables.
+const char* describe(LoopFate fate);
+
+struct LoopVerificationSettings {
+  DescriptorMatchSettings matching;
+  ConsensusSettings consensus;
+  RelativePoseSettings refinement;
+  double pixel_sigma = 0.8;   ///< px at octave 0, of a corner found again from elsewhere
+  double octave_scale = 1.2;  ///< of the pyramid that the features come from: noise grows with it
+  int guided_distance = 80;   ///< bits
+  float guided_ratio = 0.9F;  ///< best / next, among the places that the pose allows
+  double guided_reach = 60;   ///< px, at most
+  std::size_t min_matches = 12;
+  std::size_t min_depths = 8;
+  std::size_t min_consensus = 10;
+  std::size_t min_inliers = 15;
+  double min_spread = 0.05;  ///< rad, of the inliers' bearings across their narrowest direction
+  double max_chi_squared_per_dof = 4;
+  double max_rotation_sigma = 0.03;     ///< rad, largest axis
+  double max_translation_sigma = 0.15;  ///< m, largest axis, or
+  double max_relative_sigma = 0.1;      ///< of the median distance of the inliers, whichever is more
+  double max_distance = 10;             ///< m between the two bodies
+  bool five_point = true;               ///< tried where three points found nothing
+
+  [[nodiscard]] bool valid() const;
+};
+
+/// What is known before, from the odometry. Used as a first guess, never as a measurement.
+struct LoopPrior {
+  std::optional<Eigen::Quaterniond> R_old_new;  ///< bodies
+};
+
+struct LoopVerification {
+  LoopFate fate = LoopFate::kInvalidInput;
+  std::uint64_t old_index = 0, new_index = 0;
+  SE3 T_old_new;                           ///< bodies; of the last stage reached, zero before consensus
+  Matrix6d covariance = Matrix6d::Zero();  ///< as above; zero before refinement
+  std::size_t matches = 0;
+  std::size_t matches_with_depth = 0;
+  std::size_t consensus = 0;  ///< matches that agreed before refinement
+  int samples = 0;
+  double chi_squared_per_dof = 0;
+  double spread = 0;          ///< rad, the smaller of both keyframes
+  DescriptorMatches inliers;  ///< features that agree with the refined pose
+
+  [[nodiscard]] bool accepted() const { return fate == LoopFate::kAccepted; }
+};
+
+class LoopVerifier {
+ public:
+  /// `rig`: camera 0 and its place on the body.
+  explicit LoopVerifier(const Rig& rig, const LoopVerificationSettings& settings = {});
+
+  /// `effort` in (0, 1]: part of the settings' samples that may be spent.
+  Status verify(const PlaceKeyframe& old_keyframe, const PlaceKeyframe& new_keyframe, const LoopPrior& prior,
+                double effort, LoopVerification& result);
+
+ private:
+  [[nodiscard]] PointView viewOf(const PlaceFeature& feature) const;
+  void loadPoints(const PlaceKeyframe& old_keyframe, const PlaceKeyframe& new_keyframe);
+  LoopFate consent(const LoopPrior& prior, LoopVerification& result);
+  Status refine(int rounds, LoopVerification& result);
+  void matchGuided(const PlaceKeyframe& old_keyframe, const PlaceKeyframe& new_keyframe);
+  void offerGuided(std::size_t i, std::size_t j, int distance, const PlaceKeyframe& new_keyframe);
+  LoopFate judge(LoopVerification& result);
+  LoopFate run(const PlaceKeyframe& old_keyframe, const PlaceKeyframe& new_keyframe, const LoopPrior& prior,
+               LoopVerification& result);
+
+  LoopVerificationSettings settings_;
+  CameraModel camera_;
+  SE3 T_body_cam_;
+  DescriptorMatcher matcher_;
+  LoopConsensus consensus_;
+  DescriptorMatches matches_;
+  MatchedPoints points_;  ///< beside matches_
+  SE3 T_cam_;             ///< T_old_new of the cameras
+  RelativePoseFit fit_;
+
+  struct Guided {
+    std::uint16_t distance = 0, next = 0, partner = 0;
+  };
+  std::array<PointView, kMaxPlaceFeatures> old_views_{}, new_views_{};
+  std::array<Guided, kMaxPlaceFeatures> guided_old_{}, guided_new_{};
+};
+
+}  // namespace swiftlet
