@@ -19,6 +19,27 @@ constexpr int kTrackedOctaves = 4;
 // A corner this near to a described feature of the same octave is the same corner.
 constexpr float kSameCorner = 3.0F;  // px of the octave
 
+// Harris' measure of a corner over 7 x 7 pixels, from Sobel gradients: sums below 2^28, then floats.
+float harris(const std::uint8_t* centre, std::ptrdiff_t stride) {
+  constexpr int kRadius = 3;
+  constexpr float kTrace = 0.04F;  // Harris, Stephens, 1988
+  std::int32_t xx = 0, xy = 0, yy = 0;
+  for (int dy = -kRadius; dy <= kRadius; ++dy) {
+    const std::uint8_t* at = centre + dy * stride - kRadius;
+    const std::uint8_t* up = at - stride;
+    const std::uint8_t* down = at + stride;
+    for (int i = 0; i < 2 * kRadius + 1; ++i) {
+      const int gx = (at[i + 1] - at[i - 1]) * 2 + (up[i + 1] - up[i - 1]) + (down[i + 1] - down[i - 1]);
+      const int gy = (down[i] - up[i]) * 2 + (down[i - 1] - up[i - 1]) + (down[i + 1] - up[i + 1]);
+      xx += gx * gx;
+      xy += gx * gy;
+      yy += gy * gy;
+    }
+  }
+  const auto a = static_cast<float>(xx), b = static_cast<float>(xy), c = static_cast<float>(yy);
+  return a * c - b * b - kTrace * (a + c) * (a + c);
+}
+
 }  // namespace
 
 PlaceExtractor::PlaceExtractor(int width, int height, const PlaceExtractorSettings& settings)
@@ -36,6 +57,12 @@ PlaceExtractor::PlaceExtractor(int width, int height, const PlaceExtractorSettin
   }
   cells_.resize(most_cells);
   spots_.reserve(most_cells * kPerCell);
+}
+
+// Total order: the result does not depend on the sort's implementation.
+bool PlaceExtractor::stronger(const Spot& a, const Spot& b) {
+  if (a.strength != b.strength) return a.strength > b.strength;
+  return a.y != b.y ? a.y < b.y : a.x < b.x;
 }
 
 bool PlaceExtractor::inside(int octave, int x, int y) const {
@@ -101,21 +128,24 @@ void PlaceExtractor::findSpots(int octave, int wanted) {
                            s >= down[-1] && s >= down[0] && s >= down[1];
       if (!maximum) continue;
       keepInCell(row[(x - kBorder) / side], {static_cast<std::int16_t>(x), static_cast<std::int16_t>(y),
-                                             static_cast<std::uint8_t>(s), 0});
+                                             static_cast<std::uint8_t>(s), 0, 0});
     }
   }
   for (int c = 0; c < columns * rows; ++c) {
     Cell& cell = cells_[static_cast<std::size_t>(c)];
     for (std::size_t i = 0; i < cell.count; ++i) {
+      Spot& spot = cell.best[i];
+      spot.strength = harris(level.row(spot.y) + spot.x, level.stride);
+    }
+    std::sort(cell.best.begin(), cell.best.begin() + static_cast<std::ptrdiff_t>(cell.count), stronger);
+    for (std::size_t i = 0; i < cell.count; ++i) {
       cell.best[i].rank = static_cast<std::uint8_t>(i);
       spots_.push_back(cell.best[i]);
     }
   }
-  // Total order: the result does not depend on the sort's implementation.
   std::sort(spots_.begin(), spots_.end(), [](const Spot& a, const Spot& b) {
     if (a.rank != b.rank) return a.rank < b.rank;
-    if (a.score != b.score) return a.score > b.score;
-    return a.y != b.y ? a.y < b.y : a.x < b.x;
+    return stronger(a, b);
   });
 }
 

@@ -51,13 +51,15 @@ class PlaceExtractor {
     std::int16_t y = 0;
     std::uint8_t score = 0;
     std::uint8_t rank = 0;  ///< in its cell, best first
+    float strength = 0;     ///< Harris' measure, among the best scores of a cell
   };
-  static constexpr std::size_t kPerCell = 8;
+  static constexpr std::size_t kPerCell = 9;
   struct Cell {
     std::array<Spot, kPerCell> best;
     std::size_t count = 0;
   };
 
+  static bool stronger(const Spot& a, const Spot& b);
   template <typename Lanes>
   void score(int octave);
   void findSpots(int octave, int wanted);
