@@ -28,10 +28,10 @@
 #include "estimator/camera/rig.hpp"
 #include "estimator/core/status.hpp"
 #include "estimator/imu/imu_noise.hpp"
+#include "estimator/messages/loop_revisit.hpp"
 #include "estimator/messages/nav_state.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/smoother/landmark.hpp"
-#include "estimator/smoother/loop_revisit.hpp"
 #include "estimator/smoother/state.hpp"
 #include "estimator/smoother/vision_factor.hpp"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "estimator/core/random.hpp"
-#include "estimator/smoother/loop_revisit.hpp"
+#include "estimator/messages/loop_revisit.hpp"
 #include "tests/smoother/track_flight.hpp"
 
 namespace swiftlet::test {

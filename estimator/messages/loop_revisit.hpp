@@ -9,7 +9,6 @@
 #include "estimator/core/stamp.hpp"
 #include "estimator/geometry/se3.hpp"
 #include "estimator/messages/tracked_frame.hpp"
-#include "estimator/smoother/relative_pose_factor.hpp"
 
 namespace swiftlet {
 
@@ -30,8 +29,9 @@ struct RevisitMatch {
 struct LoopRevisit {
   Stamp old_stamp;  ///< of the keyframes' images
   Stamp new_stamp;
-  SE3 T_old_new;                                ///< m, between the bodies
-  Matrix6d information = Matrix6d::Identity();  ///< of it, right perturbation (phi, p), 1/rad^2, 1/m^2
+  SE3 T_old_new;  ///< m, between the bodies
+  Eigen::Matrix<double, 6, 6> information =
+      Eigen::Matrix<double, 6, 6>::Identity();  ///< of it, right perturbation (phi, p), 1/rad^2, 1/m^2
   std::vector<RevisitMatch> matches;
 };
 
