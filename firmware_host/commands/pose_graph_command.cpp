@@ -1,0 +1,78 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/commands/checks.hpp"
+#include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/pose_graph_run.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr std::size_t kWarningsShown = 10;
+
+void print(const PoseGraphRequest& request, const PoseGraphResult& result) {
+  for (std::size_t k = 0; k < std::min(kWarningsShown, result.warnings.size()); ++k) {
+    fmt::print(stderr, "warning: {}\n", result.warnings[k]);
+  }
+  fmt::print("{:<14} {} ({})\n", "poses", result.poses, result.planar ? "plane" : "space");
+  fmt::print("{:<14} {}", "edges", result.edges);
+  if (result.outliers > 0) fmt::print(", {} of them injected (seed {})", result.outliers, request.seed);
+  fmt::print("\n");
+  if (result.pieces > 1) fmt::print("{:<14} {}\n", "pieces", result.pieces);
+  fmt::print("{:<14} {:.8g}\n", "cost given", result.start.given_cost);
+  if (request.start == StartRule::kAuto)
+    fmt::print("{:<14} {:.8g}\n", "cost chordal", result.start.chordal_cost);
+  fmt::print("{:<14} {:.8g}\n", "cost initial", result.solve.initial_cost);
+  fmt::print("{:<14} {:.8g} (g2o's: 1/2 sum e^T Omega e; chi2 = {:.8g})\n", "cost final",
+             result.solve.final_cost, 2 * result.solve.final_cost);
+  fmt::print("{:<14} {}{}\n", "iterations", result.solve.iterations,
+             result.solve.converged ? "" : ", not converged: --iterations allows more");
+  fmt::print("{:<14} {:.3f}\n", "seconds", result.seconds);
+}
+
+int poseGraph(const PoseGraphRequest& request) {
+  const PoseGraphResult result = runPoseGraph(request);
+  print(request, result);
+  if (!request.out.empty()) fmt::print("written to {}\n", request.out);
+  if (result.factored) return kExitDone;
+  fmt::print(stderr, "error: {}: {}; the poses are the best that were found\n", request.file, result.failure);
+  return kExitFailed;
+}
+
+}  // namespace
+
+void addPoseGraphCommand(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("pose-graph", "Optimize a pose graph of a g2o file");
+  auto request = std::make_shared<PoseGraphRequest>();
+  command->add_option("FILE", request->file, "Pose graph: .g2o, or packed as .g2o.xz")->required();
+  command->add_option("--out", request->out, "The graph with the poses found, as g2o text");
+  command->add_option("--json", request->json, "The figures as JSON");
+  addChoice<StartRule>(
+      *command, "--start", request->start,
+      "First poses: auto takes the file's (or the odometry's where it has none) or the chordal "
+      "ones, whichever cost less",
+      {{"auto", StartRule::kAuto}, {"given", StartRule::kGiven}});
+  command->add_option("--iterations", request->iterations, "At most so many")
+      ->check(CLI::Range(0, 100000))
+      ->capture_default_str();
+  command
+      ->add_option("--inject-outliers", request->outliers,
+                   "Add so many false loops before solving; --out has them too, after the file's edges")
+      ->check(CLI::Range(0U, 10000000U))
+      ->capture_default_str();
+  command->add_option("--seed", request->seed, "Of the false loops")->capture_default_str();
+  command->footer(
+      "Costs are g2o's: 1/2 sum e^T Omega e with e = (translation, vec(q)) of T_i_j^-1 T_i^-1 T_j, in the "
+      "plane\n"
+      "(translation, angle); the chi2 that g2o prints is twice that. Other programs count the rotation of "
+      "space\n"
+      "with a factor of 4.\n"
+      "Example:\n  swiftlet pose-graph sphere2500.g2o --out solved.g2o\n"
+      "  swiftlet pose-graph torus3D.g2o.xz --out solved.g2o --json solved.json\n"
+      "  swiftlet pose-graph intel.g2o --inject-outliers 100 --seed 7 --iterations 0 --out spoiled.g2o");
+  command->callback([request, &exit_code] { exit_code = poseGraph(*request); });
+}
+
+}  // namespace swiftlet
