@@ -30,6 +30,7 @@ void addMeshCommand(CLI::App& app, int& exit_code);
 void addPoseGraphCommand(CLI::App& app, int& exit_code);
 void addEvaluateCommand(CLI::App& app, int& exit_code);
 void addSimulateCommand(CLI::App& app, int& exit_code);
+void addVocabularyCommand(CLI::App& app, int& exit_code);
 void addSettingsCommand(CLI::App& app, int& exit_code);
 
 /// The whole program: parses, runs, prints errors, gives the exit code.

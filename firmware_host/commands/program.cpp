@@ -22,6 +22,7 @@ int runProgram(int argc, char** argv) {
   addMeshCommand(app, exit_code);
   addPoseGraphCommand(app, exit_code);
   addBudgetCommand(app, exit_code);
+  addVocabularyCommand(app, exit_code);
   addSettingsCommand(app, exit_code);
   try {
     app.parse(argc, argv);

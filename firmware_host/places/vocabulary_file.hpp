@@ -1,0 +1,33 @@
+#pragma once
+// Vocabularies in files: the project's compact form (mapping/place/vocabulary.hpp), ORB-SLAM's text
+// (ORBvoc.txt) and DBoW2's YAML, plain or compressed by gzip; told apart by their content.
+//
+// Weights are taken as the file has them. The bits of descriptors mean what the comparisons say that made
+// them: a vocabulary of ORB's descriptors divides ours into words too, but without having learnt them.
+//
+// Host side: allocates, throws InputError that names file, line and field.
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mapping/place/vocabulary.hpp"
+
+namespace swiftlet {
+
+Vocabulary readVocabulary(const std::string& path);
+/// `name` stands for the file in messages; `bytes` as they are in the file.
+Vocabulary readVocabularyBytes(const std::string& name, std::string_view bytes);
+
+/// The compact form.
+void writeVocabulary(const std::string& path, const Vocabulary& vocabulary);
+
+/// "k L scoring weighting", then a line "parent isLeaf d0 .. d31 weight" for each node in the order of ids 1,
+/// 2, ...
+std::vector<VocabularyNode> readVocabularyText(const std::string& name, std::string_view text);
+/// "{ nodeId, parentId, weight, descriptor }" for each node, in any order, "{ wordId, nodeId }" for each
+/// leaf.
+std::vector<VocabularyNode> readVocabularyYaml(const std::string& name, std::string_view text);
+
+}  // namespace swiftlet
