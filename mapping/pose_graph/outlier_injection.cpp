@@ -47,7 +47,7 @@ Pose randomNoise(const PoseMatrix<Pose>& information, Random& random) {
       xi += normal / std::sqrt(eigenvalue) * eigen.eigenvectors().col(k);
     }
   }
-  return poseFromTangent(xi);
+  return poseExp(xi);
 }
 
 /// T_first_second along the odometry edges, by the graph's poses where one is missing.

@@ -38,19 +38,35 @@ inline PoseMatrix<SE3> poseAdjoint(const SE3& T) {
   return adjoint;
 }
 
-/// How far T is from the identity, as the cost of a pose graph counts it (pose_graph.hpp): to first order xi
-/// of T = Exp(xi).
-inline PoseVector<SE2> poseError(const SE2& T) { return {T.angle, T.translation.x(), T.translation.y()}; }
-inline PoseVector<SE3> poseError(const SE3& T) {
-  PoseVector<SE3> error;
-  error << (T.rotation.w() < 0 ? -2 : 2) * T.rotation.vec(), T.translation;
-  return error;
+/// xi with T = Exp(xi). On long chains the errors of these coordinates stay close to normal where those of
+/// (rotation, translation) bend with the heading (Long, Wolfe, Mashner, Chirikjian, "The banana distribution
+/// is Gaussian", RSS 2012); to first order they are the error that the cost of a graph counts
+/// (pose_graph.hpp).
+inline PoseVector<SE2> poseLog(const SE2& T) {
+  const double half = 0.5 * T.angle;
+  // Below, the series' next term is under the rounding.
+  const double along = std::abs(half) < 1e-4 ? 1 - half * half / 3 : half / std::tan(half);
+  const Eigen::Vector2d& p = T.translation;
+  return {T.angle, along * p.x() + half * p.y(), along * p.y() - half * p.x()};
+}
+inline PoseVector<SE3> poseLog(const SE3& T) {
+  const Eigen::Vector3d phi = logSo3(T.rotation);
+  PoseVector<SE3> xi;
+  // The inverse left Jacobian is the inverse right one of the opposite rotation.
+  xi << phi, rightJacobianInverseSo3(-phi) * T.translation;
+  return xi;
 }
 
-/// A pose near the identity with poseError(T) = xi to first order; the inverse of poseError in the plane.
-inline SE2 poseFromTangent(const PoseVector<SE2>& xi) { return {xi[0], xi.tail<2>()}; }
-inline SE3 poseFromTangent(const PoseVector<SE3>& xi) {
-  return {expSo3(Eigen::Vector3d(xi.head<3>())), Eigen::Vector3d(xi.tail<3>())};
+/// T = Exp(xi).
+inline SE2 poseExp(const PoseVector<SE2>& xi) {
+  const double half = 0.5 * xi[0];
+  const double sinc = std::abs(half) < 1e-4 ? 1 - half * half / 6 : std::sin(half) / half;
+  return {xi[0], sinc * (Eigen::Rotation2Dd(half) * Eigen::Vector2d(xi.tail<2>()))};
+}
+inline SE3 poseExp(const PoseVector<SE3>& xi) {
+  const Eigen::Vector3d phi = xi.head<3>();
+  const Eigen::Matrix3d left = rightJacobianInverseSo3(-phi).inverse();
+  return {expSo3(phi), left * xi.tail<3>()};
 }
 
 inline bool allFinite(const SE2& T) { return std::isfinite(T.angle) && T.translation.allFinite(); }

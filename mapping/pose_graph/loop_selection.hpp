@@ -1,0 +1,166 @@
+#pragma once
+// Which loop closures to believe: those that agree with the odometry, with each other, and not by chance.
+//
+// 1. Gate. A loop within one component must agree with the chain of the odometry (loop_consistency.hpp): its
+//    chi-squared at most that of the settings. One that does not stays held and is asked again by
+//    reconsider().
+// 2. Pairs. A loop that passed is tested against those held (only it: one row and column of the graph of
+//    consistency). Loops agree or conflict; those of different pairs of components do neither.
+// 3. Set. For each pair of components the largest set of loops that all agree (maximum_clique.hpp). A larger
+// set
+//    after a loop arrives must contain it, so only its neighbours are searched; of sets of equal size the one
+//    found first stays. The set is a function of the loops in the order of their arrival and of the nodes
+//    given for each: kept up loop by loop it is the same as when everything is done again from nothing
+//    (replay()).
+// 4. Support. Where odometry is vague nearly any loop agrees with nearly all others, and agreement proves
+//    nothing. A loop of the set is selected when a random one would hardly have passed its gate (chance at
+//    most `max_chance`, loop_consistency.hpp), or when at least `min_support` loops agree with it, themselves
+//    selected, in pair tests that a random one would hardly have passed. Between two components, where there
+//    is no gate, also at least `min_between` loops must be left, else none is selected.
+//
+// Full: a new loop takes the place of the held one that is not selected and agrees with fewest (of equals the
+// oldest); when all held are in the sets it is refused (kCapacityReached): all of them say the same already.
+// Both are counted.
+// Memory: max_loops^2 / 8 x 3 bytes for pairs, support and search, 0.6 KiB a loop, 0.4 KiB a pose, reserved
+// by the constructor; 2.9 MiB for 2000 loops and 2000 poses in space. Cost of a loop: a pair test (0.3 us in
+// space) for each held one of the same components, and the search (maximum_clique.hpp) within `max_nodes`.
+// Deterministic. Not for several threads. Sources: Mangelson et al., ICRA 2018 (pairs and their largest set);
+// Rosinol, Abate, Chang, Carlone, "Kimera", ICRA 2020, section II-C (odometry check, row by row); support is
+// this project's own. docs/pose_graph.md.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "estimator/core/status.hpp"
+#include "mapping/pose_graph/consistency_graph.hpp"
+#include "mapping/pose_graph/loop_consistency.hpp"
+#include "mapping/pose_graph/maximum_clique.hpp"
+#include "mapping/pose_graph/odometry_chain.hpp"
+
+namespace swiftlet {
+
+struct LoopSelectionLimits {
+  std::uint32_t max_poses = 0;
+  std::uint32_t max_loops = 0;
+};
+
+struct LoopSelectionSettings {
+  double gate_chi_squared =
+      0;  ///< chiSquaredOfTail(dof, probability), or the square of a Mahalanobis distance
+  double pair_chi_squared = 0;
+  double max_chance = 1e-2;       ///< that a random loop passes a test which then counts as support
+  std::uint32_t min_support = 1;  ///< agreeing loops, where the gate alone is no proof
+  std::uint32_t min_between = 3;  ///< loops that tie two components at least
+  bool pairwise = true;           ///< false: all that pass the gate are selected (for comparison)
+};
+
+/// The settings used everywhere: a true loop passes each test but for `tail` (a probability in (0, 1)).
+template <typename Pose>
+LoopSelectionSettings loopSelectionSettings(double tail = 1e-6);
+
+/// chi-squared with 3 or 6 degrees of freedom that is exceeded with probability `tail` in (0, 1).
+double chiSquaredOfTail(int degrees_of_freedom, double tail);
+
+enum class LoopVerdict : std::uint8_t {
+  kSelected,
+  kAgainstOdometry,  ///< gate
+  kInconsistent,     ///< passed the gate, is not in the largest set
+  kUnsupported,      ///< in the set, but chance would agree as well, or too few loops between components
+};
+
+struct LoopSelectionCounters {
+  std::uint64_t added = 0;
+  std::uint64_t refused = 0;   ///< not finite, no such pose, or full of agreeing loops
+  std::uint64_t replaced = 0;  ///< held loops that gave way
+  std::uint64_t pair_tests = 0;
+  std::uint64_t nodes = 0;  ///< visited by searches
+};
+
+template <typename Pose>
+class LoopSelection {
+ public:
+  LoopSelection(const LoopSelectionLimits& limits, const LoopSelectionSettings& settings);
+
+  /// The odometry so far; poses are added to it before loops name them.
+  OdometryChain<Pose>& odometry() { return chain_; }
+  [[nodiscard]] const OdometryChain<Pose>& odometry() const { return chain_; }
+
+  /// Tests the loop and brings sets and selection up to date. `id` is the loop's place, valid until it is
+  /// replaced. kInvalidInput (no such pose, not finite, no information) and kCapacityReached change nothing.
+  Status addLoop(const RelativePose<Pose>& loop, std::uint32_t max_nodes, std::uint32_t& id);
+  /// Tests the loop, but leaves sets and selection to search().
+  Status holdLoop(const RelativePose<Pose>& loop, std::uint32_t& id);
+  /// One search over all held loops of each pair of components, for many loops at once. The result is a set
+  /// of the same size as loop by loop where both are exact, not always the same one.
+  void search(std::uint32_t max_nodes);
+  /// A better test of a loop than the odometry's, such as that of an optimized graph: replaces its gate. A
+  /// loop that now passes is treated as if it just arrived; one that no longer does leaves the set, which is
+  /// then searched again.
+  Status reconsider(std::uint32_t id, const CycleTest& gate, std::uint32_t max_nodes);
+  /// Everything again from nothing, in the order of arrival, with the chain as it is now (it may have been
+  /// refined) and the gates of the odometry.
+  void replay(std::uint32_t max_nodes);
+
+  /// Ids of the selected loops, ascending.
+  [[nodiscard]] std::span<const std::uint32_t> selected() const { return selected_; }
+  [[nodiscard]] LoopVerdict verdict(std::uint32_t id) const;
+  [[nodiscard]] const RelativePose<Pose>& loop(std::uint32_t id) const { return held_[id].loop; }
+  [[nodiscard]] const CycleTest& gate(std::uint32_t id) const { return held_[id].gate; }
+  [[nodiscard]] std::uint32_t held() const { return static_cast<std::uint32_t>(held_.size()); }
+  /// All sets are proven to be the largest.
+  [[nodiscard]] bool exact() const;
+  [[nodiscard]] const LoopSelectionCounters& counters() const { return counters_; }
+  [[nodiscard]] const ConsistencyGraph& consistency() const { return consistency_; }
+
+ private:
+  struct Held {
+    RelativePose<Pose> loop;
+    ChainedLoop<Pose> chained;
+    CycleTest gate;
+    std::uint64_t arrival = 0;
+    std::uint32_t group = 0;
+    bool passed = false;  ///< the gate
+    bool proven = false;  ///< by the gate alone
+  };
+  /// Loops between the same two components.
+  struct Group {
+    std::uint32_t from = 0;
+    std::uint32_t to = 0;
+    std::uint32_t size = 0;  ///< of its set
+    bool exact = true;
+  };
+
+  Status place(const RelativePose<Pose>& loop, std::uint32_t& id);
+  [[nodiscard]] bool findLeast(std::uint32_t& id) const;
+  std::uint32_t groupOf(const ChainedLoop<Pose>& chained);
+  void applyGate(Held& held, const CycleTest& gate);
+  void testPairs(std::uint32_t id);
+  void extend(std::uint32_t id, std::uint32_t max_nodes);
+  void searchGroup(std::uint32_t group, std::uint32_t max_nodes);
+  void replaceSet(std::uint32_t group);
+  void leave(std::uint32_t id);
+  void select();
+  void dropUnsupported();
+
+  LoopSelectionLimits limits_;
+  LoopSelectionSettings settings_;
+  OdometryChain<Pose> chain_;
+  std::vector<Held> held_;
+  std::vector<Group> groups_;
+  ConsistencyGraph consistency_;
+  ConsistencyGraph support_;  ///< of the agreeing pairs those that chance would not make agree
+  MaximumClique clique_;
+  std::vector<std::uint64_t> sets_;    ///< loops in the set of their group
+  std::vector<std::uint64_t> chosen_;  ///< bits of selected_
+  std::vector<std::uint64_t> scratch_;
+  std::vector<std::uint32_t> selected_;
+  std::vector<std::uint32_t> order_;  ///< scratch of replay()
+  std::uint64_t arrivals_ = 0;
+  LoopSelectionCounters counters_;
+};
+
+extern template class LoopSelection<SE2>;
+extern template class LoopSelection<SE3>;
+
+}  // namespace swiftlet

@@ -1,0 +1,52 @@
+#include "mapping/pose_graph/odometry_chain.hpp"
+
+namespace swiftlet {
+
+template <typename Pose>
+OdometryChain<Pose>::OdometryChain(std::uint32_t max_poses) : capacity_(max_poses) {
+  nodes_.reserve(max_poses);
+}
+
+template <typename Pose>
+Status OdometryChain<Pose>::beginComponent() {
+  if (size() == capacity_) {
+    return {StatusCode::kCapacityReached, "odometry chain is full"};
+  }
+  const std::uint32_t component = components();
+  nodes_.push_back({Pose(), Matrix::Zero(), component, Point::Zero(), Point::Zero()});
+  return okStatus();
+}
+
+template <typename Pose>
+Status OdometryChain<Pose>::append(const Pose& T_previous_this, const Matrix& covariance) {
+  if (nodes_.empty() || !allFinite(T_previous_this) || !covariance.allFinite()) {
+    return {StatusCode::kInvalidInput, "odometry step without a pose before it or not finite"};
+  }
+  if (size() == capacity_) {
+    return {StatusCode::kCapacityReached, "odometry chain is full"};
+  }
+  const Node& last = nodes_.back();
+  const Pose T = last.T_component_this * T_previous_this;
+  const Matrix adjoint = poseAdjoint(T);
+  const Matrix sum = last.cumulated + adjoint * covariance * adjoint.transpose();
+  nodes_.push_back(
+      {T, sum, last.component, last.low.cwiseMin(T.translation), last.high.cwiseMax(T.translation)});
+  return okStatus();
+}
+
+template <typename Pose>
+typename OdometryChain<Pose>::Matrix OdometryChain<Pose>::covariance(std::uint32_t i, std::uint32_t j) const {
+  const Matrix adjoint = poseAdjoint(pose(j).inverse());
+  return adjoint * between(i, j) * adjoint.transpose();
+}
+
+template <typename Pose>
+double OdometryChain<Pose>::logBox(std::uint32_t k) const {
+  const Point sides = nodes_[k].high - nodes_[k].low;
+  return sides.cwiseMax(kThinnest * sides.maxCoeff()).array().log().sum();
+}
+
+template class OdometryChain<SE2>;
+template class OdometryChain<SE3>;
+
+}  // namespace swiftlet

@@ -1,0 +1,80 @@
+#pragma once
+// The odometry as a chain of relative poses with covariances, for the covariance of any relative pose along
+// it in constant time.
+//
+// Pose k in the frame of the first pose of its component is P_k = T_0_1 T_1_2 ... T_k-1_k, each step
+// T <- T Exp(xi) with covariance Q of xi (rotation, translation; rad, m). Carried to the component's frame a
+// step's error is m_k = Ad(P_k) xi_k, and that of the chain from i to j there is the sum of m_k, i < k <= j:
+//   S_j - S_i,   S_k = sum of Ad(P_l) Q_l Ad(P_l)^T, l <= k;
+// in pose j's own frame Ad(P_j^-1) (S_j - S_i) Ad(P_j^-1)^T. The first order in the errors of each step; the
+// steps' errors are taken as independent. The difference of two sums loses digits as the sum grows: tests
+// show 1e-7 relative after 20 000 steps and 1 km.
+//
+// An epoch of the odometry is a component: between two of them there is no chain.
+// Memory: pose, sum, box and component, 408 (space) or 136 (plane) bytes a pose, reserved by the constructor.
+
+#include <Eigen/StdVector>
+#include <cstdint>
+#include <vector>
+
+#include "estimator/core/status.hpp"
+#include "mapping/pose_graph/pose_tangent.hpp"
+
+namespace swiftlet {
+
+template <typename Pose>
+class OdometryChain {
+ public:
+  using Matrix = PoseMatrix<Pose>;
+  using Point = decltype(Pose().translation);
+
+  explicit OdometryChain(std::uint32_t max_poses);
+
+  /// A pose that nothing joins to those before: the first of a component.
+  Status beginComponent();
+  /// The next pose. kInvalidInput when the step is not finite or there is no pose before;
+  /// kCapacityReached when `max_poses` are held. Nothing changes then.
+  Status append(const Pose& T_previous_this, const Matrix& covariance);
+
+  [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(nodes_.size()); }
+  [[nodiscard]] std::uint32_t components() const { return nodes_.empty() ? 0 : nodes_.back().component + 1; }
+  [[nodiscard]] std::uint32_t component(std::uint32_t k) const { return nodes_[k].component; }
+  /// In the frame of its component's first pose.
+  [[nodiscard]] const Pose& pose(std::uint32_t k) const { return nodes_[k].T_component_this; }
+  /// S_k.
+  [[nodiscard]] const Matrix& cumulated(std::uint32_t k) const { return nodes_[k].cumulated; }
+  /// S_j - S_i, i <= j of one component.
+  [[nodiscard]] Matrix between(std::uint32_t i, std::uint32_t j) const {
+    return nodes_[j].cumulated - nodes_[i].cumulated;
+  }
+  /// T_i_j of one component.
+  [[nodiscard]] Pose relative(std::uint32_t i, std::uint32_t j) const { return pose(i).inverse() * pose(j); }
+  /// Covariance of xi in T_i_j <- T_i_j Exp(xi), i <= j of one component.
+  [[nodiscard]] Matrix covariance(std::uint32_t i, std::uint32_t j) const;
+
+  /// Logarithm of the volume [m^3, in the plane m^2] of the box around the component's poses up to k; sides
+  /// are at least kThinnest of the longest.
+  [[nodiscard]] double logBox(std::uint32_t k) const;
+
+  void clear() { nodes_.clear(); }
+
+  /// A flight at one height, a way along a line: a false loop may still lie beside it.
+  static constexpr double kThinnest = 0.1;
+
+ private:
+  struct Node {
+    Pose T_component_this;
+    Matrix cumulated = Matrix::Zero();
+    std::uint32_t component = 0;
+    Point low = Point::Zero();  ///< box of the component's poses so far
+    Point high = Point::Zero();
+  };
+
+  std::vector<Node> nodes_;
+  std::uint32_t capacity_;
+};
+
+extern template class OdometryChain<SE2>;
+extern template class OdometryChain<SE3>;
+
+}  // namespace swiftlet
