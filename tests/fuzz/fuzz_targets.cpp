@@ -12,6 +12,7 @@
 #include "drivers/recorded/ros_messages.hpp"
 #include "drivers/recorded/track_file.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
+#include "firmware_host/places/vocabulary_file.hpp"
 #include "firmware_host/report/ply_file.hpp"
 #include "tests/fuzz/fuzz_recording.hpp"
 
@@ -147,15 +148,45 @@ void ply(std::string_view text) {
   }
 }
 
-constexpr std::array<NamedTarget, 9> kTargets = {{{"imu_csv", &imuCsv},
-                                                  {"image_csv", &imageCsv},
-                                                  {"trajectory", &trajectory},
-                                                  {"tracks", &tracks},
-                                                  {"euroc_yaml", &eurocYaml},
-                                                  {"kalibr_yaml", &kalibrYaml},
-                                                  {"ros_message", &rosMessage},
-                                                  {"recording", &recording},
-                                                  {"ply", &ply}}};
+/// With the checksum that its content asks for: what lies behind that check is to be reached.
+std::string withChecksum(std::string_view text) {
+  std::string bytes(text);
+  constexpr std::size_t kChecksum = 8;
+  if (!text.starts_with("SWPLACES") || bytes.size() < 2 * kChecksum) return bytes;
+  std::uint64_t hash = 14695981039346656037ULL;
+  for (std::size_t i = 0; i + kChecksum < bytes.size(); ++i) {
+    hash = (hash ^ static_cast<std::uint8_t>(bytes[i])) * 1099511628211ULL;
+  }
+  for (std::size_t i = 0; i < kChecksum; ++i) {
+    bytes[bytes.size() - kChecksum + i] = static_cast<char>(hash >> (8 * i));
+  }
+  return bytes;
+}
+
+void vocabulary(std::string_view text) {
+  try {
+    const Vocabulary words = readVocabularyBytes("vocabulary", withChecksum(text));
+    demand(words.words() > 0 && words.nodes() >= words.words());
+    Descriptor descriptor;
+    demand(words.word(descriptor) < words.words());
+    descriptor.words.fill(0x0123456789ABCDEFULL);
+    demand(words.weight(words.word(descriptor)) >= 0);
+    Vocabulary again;
+    demand(again.load(words.compact()).ok() && again.words() == words.words());
+  } catch (const InputError&) {
+  }
+}
+
+constexpr std::array<NamedTarget, 10> kTargets = {{{"imu_csv", &imuCsv},
+                                                   {"image_csv", &imageCsv},
+                                                   {"trajectory", &trajectory},
+                                                   {"tracks", &tracks},
+                                                   {"euroc_yaml", &eurocYaml},
+                                                   {"kalibr_yaml", &kalibrYaml},
+                                                   {"ros_message", &rosMessage},
+                                                   {"recording", &recording},
+                                                   {"ply", &ply},
+                                                   {"vocabulary", &vocabulary}}};
 
 }  // namespace
 
