@@ -32,7 +32,7 @@ namespace swiftlet {
 
 struct StereoDepthSettings {
   double min_distance = 0.4;      ///< m
-  double pixel_sigma = 0.35;      ///< px, of a match along the epipolar curve
+  double pixel_sigma = 0.2;      ///< px, of a match along the epipolar curve
   double epipolar_gate = 1.5;     ///< px
   float min_correlation = 0.75F;  ///< at full resolution
   float rival_lead = 0.05F;  ///< a rival with a correlation less than this below the best makes it unsafe

@@ -22,6 +22,8 @@ constexpr double kScaleDof = 20.0;
 // The noise is never believed to be less than this part (variance) of the set one: matches have errors in
 // common.
 constexpr double kMinScale = 0.5;
+// Noise of twice the set one at most.
+constexpr double kMaxNoiseScale = 4.0;
 constexpr std::uint16_t kFar = 512;
 
 bool finite(const PlaceKeyframe& keyframe) {
@@ -52,6 +54,21 @@ double narrowestSpread(const MatchedPoints& points, bool old_side) {
   const Eigen::Matrix3d covariance = scatter / count - mean * mean.transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance, Eigen::EigenvaluesOnly);
   return std::sqrt(std::max(0.0, solver.eigenvalues()[1]));
+}
+
+// Variance of the used residuals over the set one, by their median: 1 to kMaxNoiseScale. Gates follow it, or
+// they would cut noise that is larger than set and hide it.
+double noiseScale(const MatchedPoints& points) {
+  constexpr std::array<double, 3> kMedians = {0.455, 1.386,
+                                              2.366};  // of chi-square, 1 to 3 degrees of freedom
+  FixedVector<double, kMaxPlaceFeatures> ratios;
+  for (const MatchedPoint& m : points) {
+    if (m.used) (void)ratios.tryPushBack(m.chi_squared / kMedians[static_cast<std::size_t>(m.dof() - 1)]);
+  }
+  if (ratios.empty()) return 1.0;
+  double* middle = ratios.begin() + ratios.size() / 2;
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  return std::clamp(*middle, 1.0, kMaxNoiseScale);
 }
 
 double medianDistance(const MatchedPoints& points) {
@@ -87,7 +104,7 @@ const char* describe(LoopFate fate) {
     case LoopFate::kTooFewInliers:
       return "too few inliers";
     case LoopFate::kLowShare:
-      return "low share of inliers";
+      return "low share of matches";
     case LoopFate::kPoorSpread:
       return "poor spread";
     case LoopFate::kPoorFit:
@@ -126,7 +143,7 @@ PointView LoopVerifier::viewOf(const PlaceFeature& feature) const {
   return view;
 }
 
-void LoopVerifier::loadPoints(const PlaceKeyframe& old_keyframe, const PlaceKeyframe& new_keyframe) {
+void LoopVerifier::loadPoints() {
   points_.clear();
   for (const DescriptorMatch& match : matches_) {
     MatchedPoint m;
@@ -134,8 +151,6 @@ void LoopVerifier::loadPoints(const PlaceKeyframe& old_keyframe, const PlaceKeyf
     m.new_view = new_views_[match.new_feature];
     (void)points_.tryPushBack(m);
   }
-  (void)old_keyframe;
-  (void)new_keyframe;
 }
 
 LoopFate LoopVerifier::consent(const LoopPrior& prior, LoopVerification& result) {
@@ -160,16 +175,18 @@ LoopFate LoopVerifier::consent(const LoopPrior& prior, LoopVerification& result)
   return LoopFate::kAccepted;
 }
 
-Status LoopVerifier::refine(int rounds, LoopVerification& result) {
+Status LoopVerifier::refine(LoopVerification& result) {
   const std::span<MatchedPoint> points(points_.data(), points_.size());
-  for (int round = 0; round < rounds; ++round) {
+  noise_scale_ = 1.0;
+  for (int round = 0; round < kRefineRounds; ++round) {
     placePoints(T_cam_, points);
-    const double widening = round == 0 ? kFirstRoundWidening : 1.0;
+    const double widening = round == 0 ? kFirstRoundWidening : noise_scale_;
     for (MatchedPoint& m : points_) m.used = m.chi_squared < widening * matchGate(m.dof());
     const Status status = refineRelativePose(settings_.refinement, points, T_cam_, fit_);
     if (!status.ok()) return status;
+    if (round == 0) noise_scale_ = noiseScale(points_);
   }
-  for (MatchedPoint& m : points_) m.used = m.chi_squared < matchGate(m.dof());
+  for (MatchedPoint& m : points_) m.used = m.chi_squared < noise_scale_ * matchGate(m.dof());
   const SE3 T_old_new = T_body_cam_ * T_cam_ * T_body_cam_.inverse();
   result.T_old_new = T_old_new;
   // The residuals' own scale, drawn towards the set one.
@@ -209,7 +226,7 @@ void LoopVerifier::matchGuided(const PlaceKeyframe& old_keyframe, const PlaceKey
   const SE3 inverse = T_cam_.inverse();
   const Eigen::Matrix3d R_no = inverse.R();
   const double reach = std::cos(settings_.guided_reach / camera_.focal());
-  const double gate = kGuidedWidening * matchGate(2);
+  const double gate = kGuidedWidening * noise_scale_ * matchGate(2);
   for (std::size_t i = 0; i < old_count; ++i) {
     const PointView& o = old_views_[i];
     const Eigen::Vector3d seen = (R_no * o.bearing + o.inverse_depth * inverse.translation).normalized();
@@ -239,14 +256,33 @@ void LoopVerifier::matchGuided(const PlaceKeyframe& old_keyframe, const PlaceKey
   }
 }
 
+std::size_t LoopVerifier::countKept() const {
+  std::size_t kept = 0;
+  for (std::size_t m = 0; m < matches_.size(); ++m) {
+    if (!points_[m].used) continue;
+    for (const DescriptorMatch& first : first_matches_) {
+      if (first.old_feature == matches_[m].old_feature && first.new_feature == matches_[m].new_feature)
+        ++kept;
+    }
+  }
+  return kept;
+}
+
 LoopFate LoopVerifier::judge(LoopVerification& result) {
   result.inliers.clear();
   for (std::size_t m = 0; m < points_.size(); ++m) {
     if (points_[m].used) (void)result.inliers.tryPushBack(matches_[m]);
   }
   result.spread = std::min(narrowestSpread(points_, true), narrowestSpread(points_, false));
-  if (result.inliers.size() < settings_.min_inliers) return LoopFate::kTooFewInliers;
-  if (!(result.spread >= settings_.min_spread)) return LoopFate::kPoorSpread;
+  const auto share = static_cast<double>(result.kept) / static_cast<double>(result.matches);
+  if (result.inliers.size() < settings_.min_inliers || result.kept < settings_.min_kept) {
+    return LoopFate::kTooFewInliers;
+  }
+  if (!(share >= settings_.min_kept_share)) return LoopFate::kLowShare;
+  const bool many = result.kept >= settings_.many_kept;
+  if (!(result.spread >= (many ? settings_.min_spread_of_many : settings_.min_spread))) {
+    return LoopFate::kPoorSpread;
+  }
   if (!(result.chi_squared_per_dof <= settings_.max_chi_squared_per_dof)) return LoopFate::kPoorFit;
   const double far =
       std::max(settings_.max_translation_sigma, settings_.max_relative_sigma * medianDistance(points_));
@@ -272,17 +308,19 @@ LoopFate LoopVerifier::run(const PlaceKeyframe& old_keyframe, const PlaceKeyfram
     old_views_[i] = viewOf(old_keyframe.features[i]);
   for (std::size_t i = 0; i < new_keyframe.features.size(); ++i)
     new_views_[i] = viewOf(new_keyframe.features[i]);
-  loadPoints(old_keyframe, new_keyframe);
+  first_matches_ = matches_;
+  loadPoints();
   for (const MatchedPoint& m : points_) {
     if (m.old_view.hasDepth() || m.new_view.hasDepth()) ++result.matches_with_depth;
   }
   if (result.matches_with_depth < settings_.min_depths) return LoopFate::kTooFewDepths;
   const LoopFate consented = consent(prior, result);
   if (consented != LoopFate::kAccepted) return consented;
-  if (!refine(kRefineRounds, result).ok()) return LoopFate::kIllConditioned;
+  if (!refine(result).ok()) return LoopFate::kIllConditioned;
   matchGuided(old_keyframe, new_keyframe);
-  loadPoints(old_keyframe, new_keyframe);
-  if (!refine(kRefineRounds, result).ok()) return LoopFate::kTooFewInliers;
+  loadPoints();
+  if (!refine(result).ok()) return LoopFate::kTooFewInliers;
+  result.kept = countKept();
   return judge(result);
 }
 

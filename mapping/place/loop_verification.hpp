@@ -15,6 +15,7 @@
 // Deterministic: the seed is made of the keyframes' indices. Bounded: `effort` scales the samples.
 // No allocation; the object holds 330 KiB. Cost and figures: docs/place.md.
 
+#include <array>
 #include <cstdint>
 #include <optional>
 
@@ -34,7 +35,7 @@ enum class LoopFate : std::uint8_t {
   kTooFewDepths,    ///< of these with a depth: fewer than min_depths
   kNoConsensus,     ///< no motion explains min_consensus of them
   kTooFewInliers,   ///< after refinement and matching again
-  kLowShare,        ///< too few of what the pose predicts to be seen was found
+  kLowShare,        ///< most matches by descriptor alone contradict the pose: a repeated structure, chance
   kPoorSpread,      ///< the inliers stand on a small part of an image, or on a line
   kPoorFit,         ///< residuals far above their noise
   kIllConditioned,  ///< rotation or translation not determined well enough
@@ -51,14 +52,18 @@ struct LoopVerificationSettings {
   RelativePoseSettings refinement;
   double pixel_sigma = 0.8;   ///< px at octave 0, of a corner found again from elsewhere
   double octave_scale = 1.2;  ///< of the pyramid that the features come from: noise grows with it
-  int guided_distance = 80;   ///< bits
+  int guided_distance = 64;   ///< bits
   float guided_ratio = 0.9F;  ///< best / next, among the places that the pose allows
   double guided_reach = 60;   ///< px, at most
   std::size_t min_matches = 12;
   std::size_t min_depths = 8;
   std::size_t min_consensus = 10;
   std::size_t min_inliers = 15;
-  double min_spread = 0.05;  ///< rad, of the inliers' bearings across their narrowest direction
+  std::size_t min_kept = 15;         ///< of the matches by descriptor alone, in agreement with the final pose
+  double min_kept_share = 0.3;       ///< the same, as a part of them
+  double min_spread = 0.1;           ///< rad, of the inliers' bearings across their narrowest direction
+  double min_spread_of_many = 0.06;  ///< rad, the same where the matches kept are at least
+  std::size_t many_kept = 30;
   double max_chi_squared_per_dof = 4;
   double max_rotation_sigma = 0.03;     ///< rad, largest axis
   double max_translation_sigma = 0.15;  ///< m, largest axis, or
@@ -83,6 +88,7 @@ struct LoopVerification {
   std::size_t matches_with_depth = 0;
   std::size_t consensus = 0;  ///< matches that agreed before refinement
   int samples = 0;
+  std::size_t kept = 0;  ///< of the first matches, those that agree with the final pose
   double chi_squared_per_dof = 0;
   double spread = 0;          ///< rad, the smaller of both keyframes
   DescriptorMatches inliers;  ///< features that agree with the refined pose
@@ -101,12 +107,13 @@ class LoopVerifier {
 
  private:
   [[nodiscard]] PointView viewOf(const PlaceFeature& feature) const;
-  void loadPoints(const PlaceKeyframe& old_keyframe, const PlaceKeyframe& new_keyframe);
+  void loadPoints();
   LoopFate consent(const LoopPrior& prior, LoopVerification& result);
-  Status refine(int rounds, LoopVerification& result);
+  Status refine(LoopVerification& result);
   void matchGuided(const PlaceKeyframe& old_keyframe, const PlaceKeyframe& new_keyframe);
   void offerGuided(std::size_t i, std::size_t j, int distance, const PlaceKeyframe& new_keyframe);
   LoopFate judge(LoopVerification& result);
+  [[nodiscard]] std::size_t countKept() const;
   LoopFate run(const PlaceKeyframe& old_keyframe, const PlaceKeyframe& new_keyframe, const LoopPrior& prior,
                LoopVerification& result);
 
@@ -115,10 +122,12 @@ class LoopVerifier {
   SE3 T_body_cam_;
   DescriptorMatcher matcher_;
   LoopConsensus consensus_;
+  DescriptorMatches first_matches_;  ///< by descriptor alone
   DescriptorMatches matches_;
   MatchedPoints points_;  ///< beside matches_
   SE3 T_cam_;             ///< T_old_new of the cameras
   RelativePoseFit fit_;
+  double noise_scale_ = 1;  ///< variance of the matches over the set one
 
   struct Guided {
     std::uint16_t distance = 0, next = 0, partner = 0;

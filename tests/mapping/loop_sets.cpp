@@ -186,25 +186,25 @@ std::optional<ImageSet> readDbowDemo(const std::string& data) {
   return set;
 }
 
-std::optional<ImageSet> readFlight(const std::string& folder, double min_seconds) {
+std::optional<ImageSet> readFlight(const std::string& folder, double min_seconds, int every) {
   if (!std::filesystem::exists(folder + "/mav0/cam0/data.csv")) return std::nullopt;
   ImageSet set;
   set.name = std::filesystem::path(folder).filename().string();
   set.rig = readCalibration(folder).rig;
-  const cv::FileStorage depth_yaml(folder + "/mav0/depth0/sensor.yaml", cv::FileStorage::READ);
+  const std::string depth_yaml = readText(folder + "/mav0/depth0/sensor.yaml");
   LogCounters counters;
   LogWarnings warnings;
   const Trajectory truth =
       readTrajectory(folder + "/mav0/state_groundtruth_estimate0/data.csv", counters, warnings);
   std::ifstream list(folder + "/mav0/cam0/data.csv");
+  int row = 0;
   for (std::string line; std::getline(list, line);) {
-    if (line.empty() || line[0] == '#') continue;
+    if (line.empty() || line[0] == '#' || row++ % every != 0) continue;
     const std::int64_t stamp = std::stoll(line);
     std::string file = line.substr(line.find(',') + 1);
     file.erase(file.find_last_not_of(" \r") + 1);
-    const auto at =
-        std::lower_bound(truth.begin(), truth.end(), stamp,
-                         [](const TrajectoryPoint& p, std::int64_t t) { return p.stamp.ns < t; });
+    const auto at = std::lower_bound(truth.begin(), truth.end(), stamp,
+                                     [](const TrajectoryPoint& p, std::int64_t t) { return p.stamp.ns < t; });
     if (at == truth.end() || at->stamp.ns != stamp) continue;
     Shot shot;
     shot.T_world_body = at->T_world_body;
@@ -218,9 +218,11 @@ std::optional<ImageSet> readFlight(const std::string& folder, double min_seconds
     set.shots.push_back(shot);
   }
   set.T_body_depth = set.rig.T_body_cam[0];
-  std::vector<double> k;
-  depth_yaml["intrinsics"] >> k;
-  if (k.size() == 4) set.depth_camera << k[0], k[1], k[2], k[3];
+  std::istringstream intrinsics(depth_yaml.substr(depth_yaml.find("intrinsics: [") + 13));
+  for (int i = 0; i < 4; ++i) {
+    char comma = 0;
+    intrinsics >> set.depth_camera[i] >> comma;
+  }
   setKinds(set, PairKind::kUnclear);
   for (std::size_t i = 0; i < set.shots.size(); ++i) {
     for (std::size_t j = i + 1; j < set.shots.size(); ++j) {

@@ -42,8 +42,9 @@ std::optional<ImageSet> readKimera(const std::string& data);
 std::optional<ImageSet> readKitchen(const std::string& data);
 std::optional<ImageSet> readDbowDemo(const std::string& data);
 /// A folder of `swiftlet simulate` with depth at every image. Revisits: both see at least 40 % of the other's
-/// surface and are at least `min_seconds` apart; pairs less apart in time are unclear.
-std::optional<ImageSet> readFlight(const std::string& folder, double min_seconds);
+/// surface and are at least `min_seconds` apart; pairs less apart in time are unclear. Every n-th image is
+/// taken.
+std::optional<ImageSet> readFlight(const std::string& folder, double min_seconds, int every);
 
 /// Features of OpenCV's ORB, for comparison.
 void extractOrb(const ImageSet& set, std::size_t shot, int features, PlaceKeyframe& keyframe);

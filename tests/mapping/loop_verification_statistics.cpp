@@ -36,6 +36,8 @@ ImageView viewOf(const cv::Mat& image) {
   return {image.data, image.cols, image.rows, static_cast<int>(image.step)};
 }
 
+std::FILE* dump = nullptr;
+
 enum class Features { kOrb, kOwn };
 
 struct Prepared {
@@ -104,6 +106,15 @@ void verifyPairs(const ImageSet& set, const Prepared& prepared, const LoopVerifi
         ++out.revisits;
       else
         ++out.others;
+      if (dump && result.consensus > 0 && set.has_truth) {
+        const SE3 truth = set.shots[i].T_world_body.inverse() * set.shots[j].T_world_body;
+        const SE3 d = result.T_old_new.inverse() * truth;
+        std::fprintf(dump, "%s %zu %zu %d %d %.3f %.2f %zu %zu %zu %zu %zu %.3f %.3f %.2f\n",
+                     set.name.c_str(), i, j, static_cast<int>(kind), static_cast<int>(result.fate),
+                     d.translation.norm(), logSo3(d.rotation).norm() * 57.3, result.matches,
+                     result.matches_with_depth, result.consensus, result.kept, result.inliers.size(),
+                     0.0, result.spread, result.chi_squared_per_dof);
+      }
       if (!result.accepted()) {
         ++(kind == PairKind::kRevisit ? out.lost : out.refused)[result.fate];
         continue;
@@ -144,9 +155,12 @@ void printFates(const char* what, const std::map<LoopFate, std::size_t>& fates) 
   std::printf("\n");
 }
 
+bool own_only = false;
+
 void report(const ImageSet& set, bool verbose, const LoopVerificationSettings& settings) {
   std::printf("%s: %zu images\n", set.name.c_str(), set.shots.size());
   for (const Features features : {Features::kOrb, Features::kOwn}) {
+    if (own_only && features == Features::kOrb) continue;
     const Prepared p = prepare(set, features);
     Outcome o;
     verifyPairs(set, p, settings, verbose, o);
@@ -157,9 +171,7 @@ void report(const ImageSet& set, bool verbose, const LoopVerificationSettings& s
     std::printf(
         "    error median %.4f m %.3f deg, p90 %.4f m %.3f deg; NEES median %.1f mean %.1f; chi2/dof %.2f\n",
         quantile(o.metres, 0.5), quantile(o.degrees, 0.5), quantile(o.metres, 0.9), quantile(o.degrees, 0.9),
-        quantile(o.nees, 0.5),
-        test::mean(o.nees),
-        quantile(o.chi, 0.5));
+        quantile(o.nees, 0.5), test::mean(o.nees), quantile(o.chi, 0.5));
     std::printf(
         "    CPU ms: verify p50 %.2f p99 %.2f max %.2f (accepted p50 %.2f p99 %.2f); extract p50 %.2f; "
         "stereo depth p50 %.2f p99 %.2f\n",
@@ -185,6 +197,7 @@ void report(const ImageSet& set, bool verbose, const LoopVerificationSettings& s
 int main(int argc, char** argv) {
   double min_seconds = 10;
   bool verbose = false;
+  int every = 1;
   bool flights_only = false;
   std::vector<std::string> flights;
   for (int i = 1; i < argc; ++i) {
@@ -192,6 +205,12 @@ int main(int argc, char** argv) {
       min_seconds = std::atof(argv[++i]);
     } else if (std::strcmp(argv[i], "--verbose") == 0) {
       verbose = true;
+    } else if (std::strcmp(argv[i], "--dump") == 0) {
+      dump = std::fopen(argv[++i], "w");
+    } else if (std::strcmp(argv[i], "--own-only") == 0) {
+      own_only = true;
+    } else if (std::strcmp(argv[i], "--every") == 0 && i + 1 < argc) {
+      every = std::atoi(argv[++i]);
     } else if (std::strcmp(argv[i], "--flights-only") == 0) {
       flights_only = true;
     } else {
@@ -206,7 +225,7 @@ int main(int argc, char** argv) {
     }
   }
   for (const std::string& flight : flights) {
-    const auto set = readFlight(flight, min_seconds);
+    const auto set = readFlight(flight, min_seconds, every);
     if (set) report(*set, verbose, settings);
   }
   return 0;
