@@ -98,6 +98,22 @@ MeshAccuracy meshAccuracy(const EvaluateOptions& options, const Subject& subject
                         truth.poses, accuracy_options);
 }
 
+// map.tum beside odometry.tum at the stamps of both, and how much there was to revisit.
+void compareMap(const EvaluateOptions& options, const Subject& subject, const Truth& truth,
+                const AccuracyOptions& accuracy_options, Json& json) {
+  const std::filesystem::path run(options.run);
+  if (!std::filesystem::exists(run / "map.tum") || !std::filesystem::exists(run / "odometry.tum")) return;
+  const Trajectory odometry = readEstimate(run / "odometry.tum");
+  const CommonStamps beside =
+      compareAtCommonStamps(odometry, readEstimate(run / "map.tum"), truth.poses, accuracy_options);
+  const Revisits revisits = revisitsOf(odometry, truth.poses);
+  json["map_beside_odometry"] = toJson(beside);
+  json["revisits"] = toJson(revisits);
+  if (options.json) return;
+  fmt::print("{}, at the same stamps\n{}", subject.files.back(), toText(beside));
+  fmt::print("revisits\n{}", toText(revisits));
+}
+
 int evaluate(const EvaluateOptions& options) {
   const Settings settings = options.settings.read();
   const Subject subject = subjectOf(options);
@@ -121,6 +137,7 @@ int evaluate(const EvaluateOptions& options) {
     const std::string section = options.from > 0 ? fmt::format(", from {:g} s", options.from) : "";
     if (!options.json) fmt::print("{}", toText(file + section, accuracy));
   }
+  if (compared) compareMap(options, subject, truth, accuracy_options, json);
   if (!subject.states.empty()) {
     const Consistency found =
         consistencyOf(subject.states, truth.poses, accuracy_options.association.max_gap);

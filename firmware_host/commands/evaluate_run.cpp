@@ -72,12 +72,21 @@ Consistency consistencyOf(const std::string& states_file, const Trajectory& trut
   return consistency(samples);
 }
 
+Revisits revisitsOf(const Trajectory& estimate, const Trajectory& truth) {
+  Trajectory flown;
+  for (const TrajectoryPoint& point : truth) {
+    if (point.stamp >= estimate.front().stamp && point.stamp <= estimate.back().stamp) flown.push_back(point);
+  }
+  return countRevisits(flown);
+}
+
 Json runAccuracyJson(const std::string& folder, const Trajectory& truth, const std::string& truth_name,
                      Stamp first_image, const EvaluationGroup& settings) {
   const std::filesystem::path path(folder);
   Json json;
   json["truth"] = truth_name;
-  json["odometry"] = sectionsJson(readEstimate(path / "odometry.tum"), truth, first_image, settings);
+  const Trajectory odometry = readEstimate(path / "odometry.tum");
+  json["odometry"] = sectionsJson(odometry, truth, first_image, settings);
   // A run of a few frames has no keyframe that left the window with a state.
   Trajectory states;
   try {
@@ -91,8 +100,14 @@ Json runAccuracyJson(const std::string& folder, const Trajectory& truth, const s
         path / "states.csv", truth, accuracyOptions(settings, AlignKind::kSe3).association.max_gap));
   }
   if (std::filesystem::exists(path / "map.tum")) {
-    json["map"] = sectionsJson(readEstimate(path / "map.tum"), truth, first_image, settings);
+    const Trajectory map = readEstimate(path / "map.tum");
+    json["map"] = sectionsJson(map, truth, first_image, settings);
+    AccuracyOptions options = accuracyOptions(settings, AlignKind::kSe3);
+    json["map_beside_odometry"]["all"] = toJson(compareAtCommonStamps(odometry, map, truth, options));
+    options.association.from = first_image + Duration::fromSeconds(kCommonStart);
+    json["map_beside_odometry"]["from_3s"] = toJson(compareAtCommonStamps(odometry, map, truth, options));
   }
+  json["revisits"] = toJson(revisitsOf(odometry, truth));
   return json;
 }
 

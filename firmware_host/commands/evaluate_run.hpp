@@ -7,7 +7,9 @@
 
 #include "drivers/recorded/trajectory_file.hpp"
 #include "firmware_host/evaluation/accuracy.hpp"
+#include "firmware_host/evaluation/common_stamps.hpp"
 #include "firmware_host/evaluation/consistency.hpp"
+#include "firmware_host/evaluation/revisits.hpp"
 #include "firmware_host/settings/settings.hpp"
 
 namespace swiftlet {
@@ -27,10 +29,14 @@ struct Truth {
 Truth readTruth(const std::string& path, bool without_images = false);
 
 /// What summary.json holds under "accuracy": odometry.tum over all and from kCommonStart, SE(3) and yaw
-/// alignment; states.csv with its consistency; map.tum when it exists.
+/// alignment; states.csv with its consistency; map.tum when it exists, by itself and beside odometry.tum at the
+/// same stamps; how much of the flight revisits.
 nlohmann::ordered_json runAccuracyJson(const std::string& folder, const Trajectory& truth,
                                        const std::string& truth_name, Stamp first_image,
                                        const EvaluationGroup& settings);
+
+/// Over the part of the truth that `estimate` (not empty) covers.
+Revisits revisitsOf(const Trajectory& estimate, const Trajectory& truth);
 
 /// A trajectory file of any kind readTrajectory() takes; InputError when it has no pose.
 Trajectory readEstimate(const std::string& path);

@@ -35,6 +35,14 @@ std::string accuracyLine(const nlohmann::ordered_json& summary, const char* file
                      figures["attitude_deg"]["rmse"].get<double>());
 }
 
+std::string sameStampsLine(const nlohmann::ordered_json& accuracy) {
+  if (!accuracy.contains("map_beside_odometry")) return "";
+  const auto& figures = accuracy["map_beside_odometry"]["all"];
+  return fmt::format("  map at the same stamps: {:.4f} m beside odometry's {:.4f} m, {:.2f} times\n",
+                     figures["map_ate_rmse_m"].get<double>(), figures["odometry_ate_rmse_m"].get<double>(),
+                     figures["ratio"].get<double>());
+}
+
 int replay(const ReplayOptions& options) {
   ReplayRequest request = options.request;
   request.stop = &stop_asked;
@@ -55,6 +63,7 @@ int replay(const ReplayOptions& options) {
         fmt::print("{}", accuracyLine(result.summary, file, section));
       }
     }
+    fmt::print("{}", sameStampsLine(result.summary["accuracy"]));
   }
   fmt::print("written to {}\n", request.out);
   if (!result.finished) {

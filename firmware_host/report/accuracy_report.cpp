@@ -52,6 +52,29 @@ Json toJson(const Consistency& consistency) {
           {"inside_3_sigma", consistency.inside_3_sigma}};
 }
 
+Json toJson(const CommonStamps& map_beside_odometry) {
+  return {{"pairs", map_beside_odometry.pairs},
+          {"odometry_ate_rmse_m", map_beside_odometry.reference_rmse},
+          {"map_ate_rmse_m", map_beside_odometry.other_rmse},
+          {"ratio", map_beside_odometry.ratio()}};
+}
+
+Json toJson(const Revisits& revisits) {
+  return {{"samples", revisits.samples}, {"revisiting", revisits.revisiting}, {"pairs", revisits.pairs}};
+}
+
+std::string toText(const CommonStamps& map_beside_odometry) {
+  return fmt::format("  ATE rmse of odometry.tum {:.4f} m, of map.tum {:.4f} m: {:.2f} times  ({} poses)\n",
+                     map_beside_odometry.reference_rmse, map_beside_odometry.other_rmse,
+                     map_beside_odometry.ratio(), map_beside_odometry.pairs);
+}
+
+std::string toText(const Revisits& revisits) {
+  return fmt::format(
+      "  {} of {} places (one every 0.5 s) are within 1 m and 30 degrees of one more than 20 s before\n",
+      revisits.revisiting, revisits.samples);
+}
+
 std::string toText(const std::string& title, const Accuracy& accuracy) {
   const TrajectoryError& absolute = accuracy.absolute;
   std::string text = fmt::format("{}: {} of {} poses have truth (gap at most {:g} ms)", title, accuracy.pairs,

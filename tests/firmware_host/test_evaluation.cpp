@@ -9,7 +9,9 @@
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/evaluation/accuracy.hpp"
+#include "firmware_host/evaluation/common_stamps.hpp"
 #include "firmware_host/evaluation/consistency.hpp"
+#include "firmware_host/evaluation/revisits.hpp"
 
 namespace swiftlet {
 namespace {
@@ -266,6 +268,49 @@ TEST_CASE("NEES of errors drawn from the covariance averages its degrees of free
   for (ConsistencySample& sample : samples) sample.covariance.setZero();
   CHECK(consistency(samples).without_covariance == 3999);
   CHECK(consistency({}).count == 0);
+}
+
+TEST_CASE("two estimates are compared at the stamps of both") {
+  const Trajectory truth = flight(10);
+  // The one is off by 3 cm to and fro at every second pose, and by a metre where the other has no pose.
+  Trajectory odometry;
+  Trajectory map;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    TrajectoryPoint p = truth[i];
+    if (i % 4 == 0) map.push_back(p);
+    p.T_world_body.translation.x() += i % 4 == 0 ? (i % 8 == 0 ? 0.03 : -0.03) : 1.0;
+    odometry.push_back(p);
+  }
+  map.push_back(point(11, SE3()));  // odometry has none there
+  const CommonStamps found = compareAtCommonStamps(odometry, map, truth, {});
+  CHECK(found.pairs == 51);
+  CHECK(found.reference_rmse == Approx(0.03).epsilon(0.02));
+  CHECK(found.other_rmse < 1e-9);
+  CHECK(found.ratio() < 1e-6);
+  CHECK(compareAtCommonStamps(truth, odometry, truth, {}).ratio() == 0);
+  CHECK(atStampsOf(map, odometry).size() == 51);
+}
+
+TEST_CASE("a flight there and back revisits, one way does not") {
+  Trajectory there;
+  Trajectory back;
+  for (int i = 0; i <= 800; ++i) {  // 40 s at 20 Hz, 0.5 m/s
+    const double t = 0.05 * i;
+    there.push_back(point(t, SE3(yaw(0), {0.5 * t, 0, 0})));
+    const double x = 0.5 * std::min(t, 40 - t);
+    back.push_back(point(t, SE3(yaw(0), {x, 0, 0})));
+  }
+  CHECK(countRevisits(there).revisiting == 0);
+  const Revisits found = countRevisits(back);
+  CHECK(found.samples == 81);
+  // At t it is where it was at 40 - t and 1 m (2 s) to either side of it: earlier by more than 20 s if t
+  // > 29.
+  CHECK(found.revisiting == 22);
+  Trajectory turned = back;
+  for (TrajectoryPoint& p : turned) {
+    if (p.stamp > at(20)) p.T_world_body.rotation = yaw(std::numbers::pi);
+  }
+  CHECK(countRevisits(turned).revisiting == 0);
 }
 
 TEST_CASE("no truth at all gives no figures and a status") {
