@@ -31,6 +31,8 @@ const char* pluralName(RecordKind kind) {
       return "smoothing steps";
     case RecordKind::kMeshStep:
       return "mesh steps";
+    case RecordKind::kLoopStep:
+      return "loop closure's steps";
     default:
       return "marks";
   }

@@ -34,12 +34,14 @@ enum class RecordKind : std::uint16_t {
   kLoss = 7,  ///< records of another kind were lost here
   kEnd = 8,   ///< the recording was ended in order
   kMeshStep = 9,
+  kLoopStep = 10,
 };
-inline constexpr std::size_t kRecordKinds = 10;
+inline constexpr std::size_t kRecordKinds = 11;
 
 /// Messages and steps: what may be lost in front of the recorder.
 constexpr bool canBeLost(RecordKind kind) {
-  return (kind >= RecordKind::kImu && kind <= RecordKind::kSmoothStep) || kind == RecordKind::kMeshStep;
+  return (kind >= RecordKind::kImu && kind <= RecordKind::kSmoothStep) || kind == RecordKind::kMeshStep ||
+         kind == RecordKind::kLoopStep;
 }
 
 constexpr RecordKind imageKind(std::size_t camera) {
@@ -68,6 +70,7 @@ inline constexpr std::size_t kTrackStepBytes = 64;
 inline constexpr std::size_t kSmoothStepBytes = 40;
 inline constexpr std::size_t kSmoothStepBytesBeforePlanes = 32;  ///< as written by programs without a mesh
 inline constexpr std::size_t kMeshStepBytes = 24;
+inline constexpr std::size_t kLoopStepBytes = 32;
 inline constexpr std::size_t kLossBytes = 16;
 inline constexpr std::size_t kEndBytes = 8;
 

@@ -50,6 +50,7 @@ class Indexer {
   void takeTrackStep(LittleEndianReader& from);
   void takeSmoothStep(LittleEndianReader& from);
   void takeMeshStep(LittleEndianReader& from);
+  void takeLoopStep(LittleEndianReader& from);
   void takeLoss(LittleEndianReader& from, const RecordingFile& file, std::uint64_t offset);
   void cutAt(std::uint64_t offset, const char* reason);
   [[nodiscard]] std::uint64_t soundRecords(RecordingWindow& window, std::size_t segment,
@@ -194,6 +195,8 @@ std::size_t payloadBytes(RecordKind kind) {
       return kSmoothStepBytes;
     case RecordKind::kMeshStep:
       return kMeshStepBytes;
+    case RecordKind::kLoopStep:
+      return kLoopStepBytes;
     case RecordKind::kLoss:
       return kLossBytes;
     case RecordKind::kEnd:
@@ -248,6 +251,8 @@ void Indexer::take(const RecordHeader& header, RecordingWindow& window, std::uin
       return takeSmoothStep(from);
     case RecordKind::kMeshStep:
       return takeMeshStep(from);
+    case RecordKind::kLoopStep:
+      return takeLoopStep(from);
     case RecordKind::kLoss:
       return takeLoss(from, file, offset);
     default:
@@ -332,6 +337,13 @@ void Indexer::takeMeshStep(LittleEndianReader& from) {
   step.frame = from.u64();
   step.window = from.u64();
   step.image = from.u64();
+}
+
+void Indexer::takeLoopStep(LittleEndianReader& from) {
+  LoopStep& step = index_.steps.loop.emplace_back();
+  step.frame = from.u64();
+  step.window = from.u64();
+  for (std::uint64_t& image : step.image) image = from.u64();
 }
 
 void Indexer::takeLoss(LittleEndianReader& from, const RecordingFile& file, std::uint64_t offset) {

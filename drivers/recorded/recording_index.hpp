@@ -43,6 +43,7 @@ struct RecordedSteps {
   std::vector<TrackStep> track;
   std::vector<SmoothStep> smooth;
   std::vector<MeshStep> mesh;
+  std::vector<LoopStep> loop;
 };
 
 /// Records that never reached the writer: `count` of `kind`, after number `after` of that kind.

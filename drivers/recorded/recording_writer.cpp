@@ -312,6 +312,15 @@ Status RecordingWriter::meshStep(const MeshStep& step) {
   return put(RecordKind::kMeshStep, payload.data(), payload.size());
 }
 
+Status RecordingWriter::loopStep(const LoopStep& step) {
+  std::array<std::uint8_t, kLoopStepBytes> payload{};
+  LittleEndianWriter to(payload.data());
+  to.u64(step.frame);
+  to.u64(step.window);
+  for (const std::uint64_t image : step.image) to.u64(image);
+  return put(RecordKind::kLoopStep, payload.data(), payload.size());
+}
+
 Status RecordingWriter::loss(RecordKind kind, std::uint64_t count) {
   if (count == 0) return status_;
   if (!canBeLost(kind)) {

@@ -71,6 +71,7 @@ class RecordingWriter {
   Status trackStep(const TrackStep& step);
   Status smoothStep(const SmoothStep& step);
   Status meshStep(const MeshStep& step);
+  Status loopStep(const LoopStep& step);
   /// `count` records of `kind` never came here because a buffer before the writer was full; they would have
   /// followed the last record of that kind.
   Status loss(RecordKind kind, std::uint64_t count);

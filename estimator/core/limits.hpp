@@ -21,6 +21,8 @@ inline constexpr std::size_t kWaitingFrames = 3;
 inline constexpr std::size_t kTrackedRing = 4;
 /// Images of camera 0 that wait for the mesh: 0.4 s at 20 Hz, longer than tracking and smoothing take.
 inline constexpr std::size_t kMeshImages = 8;
+/// Keyframes that wait for loop closure: 0.7 s at 6 a second, longer than it works on one.
+inline constexpr std::size_t kLoopKeyframes = 4;
 /// Images of one camera that the recorder may hold: 0.8 s at 20 Hz, the longest that a disk may keep it
 /// waiting without a loss.
 inline constexpr std::size_t kRecordedImages = 16;

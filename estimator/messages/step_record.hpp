@@ -51,4 +51,13 @@ struct MeshStep {
   bool operator==(const MeshStep&) const = default;
 };
 
+/// A keyframe that loop closure took; those in between were skipped.
+struct LoopStep {
+  std::uint64_t frame = 0;                         ///< index of the tracked frame
+  std::uint64_t window = 0;                        ///< number of the window that came with it
+  std::array<std::uint64_t, kMaxCameras> image{};  ///< number of each camera's image; 0: none was at hand
+
+  bool operator==(const LoopStep&) const = default;
+};
+
 }  // namespace swiftlet

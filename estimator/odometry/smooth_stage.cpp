@@ -140,6 +140,23 @@ void SmoothStage::window(SmoothedWindow& out) const {
   }
 }
 
+void SmoothStage::link(const SmoothedWindow& window, KeyframeLink& out) {
+  out.linked = false;
+  if (!window.started || window.poses.empty()) return;
+  const std::size_t newest = window.poses.size() - 1;
+  std::size_t before = newest;
+  while (before > 0 && !window.poses[before - 1].keyframe) --before;
+  if (before == 0) return;
+  --before;
+  out.previous = window.poses[before].frame_index;
+  out.T_previous_this = window.poses[before].T_world_body.inverse() * window.poses[newest].T_world_body;
+  out.linked = smoother_.relativeCovariance(before, newest, out.covariance);
+  // The smoother's is of the position in the axes of the keyframe before.
+  Eigen::Matrix<double, 6, 6> turn = Eigen::Matrix<double, 6, 6>::Identity();
+  turn.bottomRightCorner<3, 3>() = out.T_previous_this.R().transpose();
+  out.covariance = turn * out.covariance * turn.transpose();
+}
+
 /// Keyframes that left, for the next output.
 void SmoothStage::handOver() {
   for (KeyframeState keyframe : left_step_) {

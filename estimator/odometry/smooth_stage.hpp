@@ -16,6 +16,7 @@
 #include "estimator/imu/sample_monitor.hpp"
 #include "estimator/messages/effort.hpp"
 #include "estimator/messages/imu_sample.hpp"
+#include "estimator/messages/keyframe_link.hpp"
 #include "estimator/messages/odometry_output.hpp"
 #include "estimator/messages/plane_report.hpp"
 #include "estimator/messages/smoothed_window.hpp"
@@ -52,6 +53,8 @@ class SmoothStage {
   void fix(StateFix& out) const { out = fix_; }
   /// The newest window; after `trim`.
   void window(SmoothedWindow& out) const;
+  /// The newest keyframe's tie to the one before it in `window`, which `window()` has given since `trim`.
+  void link(const SmoothedWindow& window, KeyframeLink& out);
   [[nodiscard]] const PlaneTies& planeTies() const { return ties_; }
 
   /// At the end of a run: the keyframes still in the window, and events that had not come out yet.

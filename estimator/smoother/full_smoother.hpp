@@ -32,6 +32,7 @@
 #include "estimator/messages/nav_state.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/smoother/landmark.hpp"
+#include "estimator/smoother/relative_pose_factor.hpp"
 #include "estimator/smoother/state.hpp"
 #include "estimator/smoother/vision_factor.hpp"
 

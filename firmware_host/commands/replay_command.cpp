@@ -106,6 +106,8 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
   command->add_option("--speed", request.speed, "Times faster than recorded (with --real-time)")
       ->check(CLI::Range(0.01, 100.0))
       ->needs(real_time);
+  command->add_flag("--loop-closure", request.loop_closure,
+                    "Recognize places seen before; they hold map.tum together");
   command->add_flag("--record", request.record,
                     "Write what enters the estimator to recording/ in the run folder");
   command

@@ -90,6 +90,7 @@ class ReplayRun {
   ReplayRun(const ReplayRequest& request, Settings settings, const ReplayHooks& hooks)
       : request_(request), settings_(std::move(settings)), hooks_(hooks) {
     if (request_.mono) settings_.odometry.use_stereo = false;
+    if (request_.loop_closure) settings_.loop.enabled = true;
   }
 
   ReplayResult operator()() {

@@ -14,6 +14,7 @@
 #include "estimator/core/status.hpp"
 #include "estimator/messages/frames.hpp"
 #include "estimator/messages/imu_sample.hpp"
+#include "estimator/messages/keyframe_link.hpp"
 #include "estimator/messages/local_mesh.hpp"
 #include "estimator/messages/odometry_output.hpp"
 #include "estimator/messages/smoothed_window.hpp"
@@ -21,6 +22,7 @@
 #include "estimator/messages/step_record.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "firmware_host/pipeline/stage_timer.hpp"
+#include "mapping/loop/loop_report.hpp"
 
 namespace swiftlet {
 
@@ -55,6 +57,21 @@ inline constexpr std::uint32_t kMeshQuota = kMeshImages + 2;
 inline constexpr std::uint32_t kRecordQuota = kRecordedImages;
 inline constexpr std::size_t kImageSlots = 1 + kTrackQuota + kMeshQuota + kRecordQuota;
 using ImagePool = SlotPool<ImageSlot, kImageSlots, kImageReaders>;
+
+/// Images of a keyframe, copied by `track`: the threads that look at keyframes are slow, and would otherwise
+/// hold the cameras' slots. `image` shows `pixels`; empty where missing.
+struct KeyframeImages {
+  std::uint64_t frame = 0;  ///< StereoFrame::index
+  std::array<std::uint64_t, kMaxCameras> number{};
+  std::array<ImageView, kMaxCameras> image;
+  std::array<std::vector<std::uint8_t>, kMaxCameras> pixels;
+};
+
+enum KeyframeReader : std::size_t { kLoopReads, kKeyframeReaders };
+
+/// As kMeshQuota.
+inline constexpr std::uint32_t kLoopQuota = kLoopKeyframes + 2;
+using KeyframePool = SlotPool<KeyframeImages, 1 + kLoopQuota, kKeyframeReaders>;
 
 /// Between `track` and `smooth`. In order: the end comes last.
 struct TrackMessage {
@@ -101,6 +118,15 @@ struct MeshMessage {
   [[nodiscard]] bool hasPose() const { return window.started && !window.poses.empty(); }
 };
 
+/// From `smooth` to `loop`: a keyframe as it stands once it has been smoothed.
+struct KeyframeMessage {
+  std::uint64_t window_number = 0;
+  SmoothedWindow window;
+  TrackedFrame tracked;
+  KeyframeLink link;
+  std::array<std::uint64_t, kMaxCameras> image{};  ///< numbers; 0: missing
+};
+
 /// From `mesh` to `log`, where the meshes of all frames are wanted.
 struct MeshResult {
   bool keyframe = false;  ///< `horizon` is of this frame
@@ -142,6 +168,16 @@ using TrackRing = SpscRing<TrackMessage, kTrackedRing>;
 using ResultRing = SpscRing<FrameResult, kResultRing>;
 using StateRing = SpscRing<NavState, kStateRing>;
 
+/// What leads to `loop` and from there.
+struct LoopArrows {
+  KeyframePool pool{KeyframePool::Quotas{kLoopQuota}};
+  DropOldestRing<SlotHandle, kLoopKeyframes> images;
+  SpscRing<KeyframeMessage, kLoopKeyframes> keyframes;
+  Newest<MapCorrection> correction;
+  SpscRing<LoopReport, kResultRing> reports;  ///< to `log`
+  std::uint64_t images_dropped = 0;           ///< of `track`: keyframes whose images found no room
+};
+
 /// What the recorder takes beside images: it looks at them every few milliseconds.
 struct RecorderArrows {
   ImuRing imu;
@@ -150,6 +186,7 @@ struct RecorderArrows {
   SpscRing<TrackStep, kStepRing> track;
   SpscRing<SmoothStep, kStepRing> smooth;
   SpscRing<MeshStep, kStepRing> mesh;
+  SpscRing<LoopStep, kStepRing> loop;
 };
 
 }  // namespace swiftlet

@@ -73,6 +73,9 @@ bool FlightRecorder::drain(RecorderArrows& arrows, const std::array<ImagePool*, 
   any = drainSteps(arrows.mesh, RecordKind::kMeshStep, steps_lost_[3],
                    [&](const MeshStep& step) { return writer_.meshStep(step); }) ||
         any;
+  any = drainSteps(arrows.loop, RecordKind::kLoopStep, steps_lost_[4],
+                   [&](const LoopStep& step) { return writer_.loopStep(step); }) ||
+        any;
   if (!writer_.status().ok()) running_.store(false, std::memory_order_relaxed);
   const double now = wallSeconds();
   if (now - synced_ > kSyncSeconds) {

@@ -43,7 +43,7 @@ class FlightRecorder {
   std::atomic<bool> running_{true};
   std::uint64_t next_sample_ = 1;
   std::array<std::uint64_t, kMaxCameras> next_image_{1, 1};
-  std::array<std::uint64_t, 4> steps_lost_{};
+  std::array<std::uint64_t, 5> steps_lost_{};
   double flushed_ = 0;  // host time
   double synced_ = 0;
 };

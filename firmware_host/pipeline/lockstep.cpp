@@ -15,6 +15,7 @@ void runAll(Wiring& wiring) {
     any = wiring.track() || any;
     any = wiring.smooth() || any;
     any = wiring.mesh() || any;
+    any = wiring.loop() || any;
     any = wiring.log() || any;
     any = wiring.record() || any;
   }

@@ -101,6 +101,10 @@ Status MapKeeper::solve(FullSmootherReport& report, std::vector<MapPose>& poses)
       if (!kept.ok()) faults_.add(kept);
     }
   }
+  for (const LoopRevisit& revisit : revisits_) {
+    const Status kept = smoother.addRevisit(revisit);
+    if (!kept.ok()) faults_.add(kept);
+  }
   const Status status = smoother.solve(report);
   if (!status.ok()) return status;
   for (std::size_t k = 0; k < smoother.size(); ++k) {

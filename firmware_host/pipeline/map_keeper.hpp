@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "estimator/imu/sample_monitor.hpp"
+#include "estimator/messages/loop_revisit.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/odometry/odometry_settings.hpp"
 #include "estimator/smoother/full_smoother.hpp"
@@ -34,7 +35,8 @@ class MapKeeper {
   void addImu(const ImuSample& sample);
   void addKeyframe(const TrackedFrame& frame, const NavState& state);
 
-  /// After the run.
+  /// After the run, before solve(): a loop between two of the keyframes.
+  void addRevisit(const LoopRevisit& revisit) { revisits_.push_back(revisit); }
   Status solve(FullSmootherReport& report, std::vector<MapPose>& poses);
   [[nodiscard]] const FaultCounts& faults() const { return faults_; }
 
@@ -57,6 +59,7 @@ class MapKeeper {
   std::vector<char> buffer_;
   std::unique_ptr<std::FILE, Close> file_;
   bool failed_ = false;
+  std::vector<LoopRevisit> revisits_;
   FaultCounts faults_;
 };
 

@@ -10,6 +10,7 @@
 #include "estimator/odometry/smooth_stage.hpp"
 #include "estimator/odometry/track_stage.hpp"
 #include "firmware_host/pipeline/arrows.hpp"
+#include "mapping/loop/loop_stage.hpp"
 #include "mesher/mesh_stage.hpp"
 
 namespace swiftlet {
@@ -30,6 +31,9 @@ class Repeat {
       mesh_ = std::make_unique<MeshStage>(
           rigInUse(recording.rig(), settings.odometry), HorizonLimits{},
           MeshPlanes{settings.odometry.regularity_enabled, settings.odometry.plane_point_sigma});
+    }
+    if (settings.loop.enabled) {
+      loop_ = std::make_unique<LoopStage>(rigInUse(recording.rig(), settings.odometry), LoopLimits{});
     }
   }
 
@@ -129,7 +133,7 @@ class Repeat {
       smooth_.window(window_);
       mesh_message_.window = window_;
       mesh_message_.tracked = result.tracked;
-      if (!meshNext()) return false;
+      if (!meshNext() || !loopNext()) return false;
     } else {
       log_.onResult(result);
     }
@@ -186,6 +190,31 @@ class Repeat {
     return true;
   }
 
+  /// Loop closure took this keyframe, or missed it.
+  bool loopNext() {
+    const auto& steps = recording_.steps().loop;
+    if (!loop_ || loop_steps_ >= steps.size() || steps[loop_steps_].window != windows_) return true;
+    const LoopStep& step = steps[loop_steps_++];
+    KeyframeLink link;
+    smooth_.link(window_, link);
+    LoopInput input;
+    input.tracks = &mesh_message_.tracked;
+    input.window = &window_;
+    input.link = &link;
+    for (std::size_t c = 0; c < kMaxCameras; ++c) {
+      CameraFrame image;
+      if (step.image[c] == 0) continue;
+      if (!recording_.image(c, step.image[c], image)) {
+        return stop(fmt::format("image {} of camera {} is not in the recording", step.image[c], c));
+      }
+      input.image[c] = image.image;
+    }
+    LoopReport report;
+    static_cast<void>(loop_->step(input, LoopEffort{}, report));
+    log_.onLoop(report);
+    return true;
+  }
+
   /// Fixes that propagation took: the samples before fix `number`'s taking, then the fix.
   void propagateUpTo(std::uint64_t number, const StateFix& fix) {
     const auto& steps = recording_.steps().propagate;
@@ -220,6 +249,7 @@ class Repeat {
     smooth_.finish(result.output);
     log_.onResult(result);
     if (has_mesh_) log_.onLocalMesh(local_mesh_);
+    if (loop_) log_.keepLoops(*loop_);
     RunStatistics& statistics = log_.statistics();
     if (mesh_) {
       statistics.mesh = {mesh_->counters(), mesh_->horizon().counters(), mesh_skipped_, without_image_};
@@ -242,6 +272,8 @@ class Repeat {
   std::uint64_t planes_taken_ = 0;
   MeshMessage mesh_message_;
   MeshResult mesh_result_;
+  std::unique_ptr<LoopStage> loop_;  ///< null: switched off
+  std::size_t loop_steps_ = 0;
   std::size_t mesh_steps_ = 0;
   std::uint64_t without_image_ = 0;
   std::uint64_t mesh_skipped_ = 0;

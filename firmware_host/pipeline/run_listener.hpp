@@ -14,6 +14,7 @@
 #include "estimator/odometry/pairing.hpp"
 #include "estimator/smoother/full_smoother.hpp"
 #include "firmware_host/pipeline/stage_timer.hpp"
+#include "mapping/loop/loop_report.hpp"
 #include "mesher/mesh_stage.hpp"
 
 namespace swiftlet {
@@ -81,6 +82,7 @@ struct RunStatistics {
   std::map<EventKind, EventTotal> events;
   std::optional<FullSmootherReport> map;        ///< figures of the full smoothing, when it ran
   std::optional<MeshStatistics> mesh;           ///< when the run meshed
+  std::optional<LoopCounters> loop;             ///< when the run closed loops
   std::map<std::string, std::uint64_t> faults;  ///< statuses that were not ok, by their text
   std::map<std::string, std::uint64_t> losses;  ///< what did not fit an arrow between threads, by its name
   std::vector<HealthChange> health;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "firmware_host/pipeline/wiring.hpp"
+#include "mapping/loop/loop_stage.hpp"
 
 namespace swiftlet {
 
@@ -29,6 +30,29 @@ void RunLog::onResult(const FrameResult& result) {
       noteEvents(result.output);
       listener_.onFinish(result.output);
       break;
+  }
+}
+
+void RunLog::onLoop(const LoopReport& report) {
+  for (const LoopCandidate& candidate : report.candidates) {
+    const double ago = (report.stamp - candidate.old_stamp).seconds();
+    listener_.onRemark(report.stamp,
+                       fmt::format("place of {:.1f} s before: {}, {} matches, {} agree", ago,
+                                   describe(candidate.fate), candidate.matches, candidate.inliers));
+  }
+  if (!report.moved) return;
+  const Eigen::Vector3d& p = report.correction.T_map_world.translation;
+  listener_.onRemark(report.stamp,
+                     fmt::format("map moved: {} of {} loops selected, T_map_world {:.3f} {:.3f} {:.3f} m",
+                                 report.selected, report.loops, p.x(), p.y(), p.z()));
+}
+
+void RunLog::keepLoops(const LoopStage& loops) {
+  statistics_.loop = loops.counters();
+  if (!keeper_) return;
+  for (std::size_t i = 0; i < loops.loopCount(); ++i) {
+    LoopRevisit revisit;
+    if (loops.revisit(i, revisit)) keeper_->addRevisit(revisit);
   }
 }
 
@@ -102,6 +126,7 @@ void RunLog::collect(const Wiring& wiring) {
     statistics_.mesh = {mesh->counters(), mesh->horizon().counters(), counters.mesh.skipped,
                         counters.mesh.without_image};
   }
+  if (const LoopStage* loops = wiring.loopStage()) keepLoops(*loops);
   wiring.addLosses(statistics_.losses);
   for (std::size_t i = 0; i < statistics_.times.size(); ++i) {
     const StageTimes& times = wiring.times()[i];

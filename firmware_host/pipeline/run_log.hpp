@@ -12,6 +12,7 @@
 
 namespace swiftlet {
 
+class LoopStage;
 class Wiring;
 
 class RunLog {
@@ -29,12 +30,15 @@ class RunLog {
     listener_.onMesh(result.keyframe, result.frame, result.keyframe ? &result.horizon : nullptr,
                      {result.hull.data(), result.hull.size()});
   }
+  void onLoop(const LoopReport& report);
   void onLocalMesh(const LocalMesh& mesh) { listener_.onLocalMesh(mesh); }
   /// An executor's own remark, for events.log.
   void remark(Stamp stamp, const std::string& text) { listener_.onRemark(stamp, text); }
 
   /// After the run: what the other threads counted.
   void collect(const Wiring& wiring);
+  /// After the run: the loops that were found, for full smoothing.
+  void keepLoops(const LoopStage& loops);
   /// After the run: full smoothing over what was kept. Poses of the keyframes; empty when there is nothing.
   std::vector<MapPose> solveMap();
 

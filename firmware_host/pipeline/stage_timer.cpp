@@ -31,6 +31,8 @@ std::string_view stageName(StageId stage) {
       return "trim";
     case StageId::kMesh:
       return "mesh";
+    case StageId::kLoop:
+      return "loop";
     case StageId::kImageToPose:
       return "image_to_pose";
     case StageId::kExposureToPose:

@@ -18,6 +18,7 @@ enum class StageId : std::size_t {
   kSmooth,          ///< back-end until the state stands
   kTrim,            ///< making room in the window, after the state was published
   kMesh,            ///< frame mesh, at keyframes the mesh over the horizon too
+  kLoop,            ///< loop closure, of a keyframe
   kImageToPose,     ///< wall from the image's arrival until the pose is published; CPU of track and smooth
   kExposureToPose,  ///< wall from the middle of the exposure
   kMap,             ///< full smoothing

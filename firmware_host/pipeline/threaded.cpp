@@ -39,6 +39,7 @@ class Run {
     start("log", rt.low_priority, rt.low_cpu, [this] { low([this] { return wiring_.log(); }, log_done_); });
     start("record", rt.low_priority, rt.low_cpu,
           [this] { low([this] { return wiring_.record(); }, record_done_); });
+    start("loop", rt.low_priority, rt.low_cpu, [this] { loop(); });
     start("mesh", rt.mesh_priority, rt.mesh_cpu, [this] { mesh(); });
     start("smooth", rt.smooth_priority, rt.smooth_cpu, [this] { smooth(); });
     start("track", rt.track_priority, rt.track_cpu, [this] { track(); });
@@ -66,7 +67,7 @@ class Run {
     CameraFrame image;
     std::uint64_t taken = 0;
   };
-  static constexpr std::size_t kThreads = 8;
+  static constexpr std::size_t kThreads = 9;
 
   void start(const char* name, int priority, int cpu, std::function<void()> entry) {
     ThreadSettings settings;
@@ -179,10 +180,21 @@ class Run {
         propagate_bell_.ring();  // a new fix
         track_bell_.ring();      // room, and a new window
         mesh_bell_.ring();
+        loop_bell_.ring();
       }
       if (!wiring_.smoothDone()) smooth_bell_.wait(ticket, kLongestSleep);
     }
     mesh_bell_.ring();
+    loop_bell_.ring();
+  }
+
+  void loop() {
+    while (!wiring_.loopDone()) {
+      const std::uint32_t ticket = loop_bell_.ticket();
+      while (wiring_.loop()) {
+      }
+      if (!wiring_.loopDone()) loop_bell_.wait(ticket, kLongestSleep);
+    }
   }
 
   void mesh() {
@@ -235,7 +247,7 @@ class Run {
   bool begun_ = false;
   Stamp first_;
   double zero_ = 0;
-  Doorbell propagate_bell_, track_bell_, smooth_bell_, mesh_bell_;
+  Doorbell propagate_bell_, track_bell_, smooth_bell_, mesh_bell_, loop_bell_;
 };
 
 }  // namespace

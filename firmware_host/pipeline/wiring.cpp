@@ -13,12 +13,16 @@
 //   [sensor]  camera 0 --slots-----------------------------------------------> [mesh] MESH
 //                        |                                                       |
 //                        |                     newest LocalMesh, ring of all on request --> [log]
+//   [track]   keyframes' images, copied --slots--> [loop] LOOP <--ring-- keyframes, with window and link, of
+//   [smooth]
+//                        |                           |
+//                        |                           '--newest MapCorrection; ring of reports --> [log]
 //                        +--ring--> [log] keyframes and IMU, kept for full smoothing after the run -> map.tum
 //   everything above, and what each stage took for a step --ring, slots--> [record] flight recorder
 //
 //   when full: IMU rings refuse and count; camera rings and waiting frames let the oldest go, counted;
-//   `track` waits for room in front of `smooth`; `mesh` skips to the newest window, counted; log and recorder
-//   lose, counted; no reader can hold another's slots.
+//   `track` waits for room in front of `smooth`; `mesh` skips to the newest window, counted; `loop` misses
+//   keyframes, counted; log and recorder lose, counted; no reader can hold another's slots.
 
 #include "firmware_host/pipeline/wiring.hpp"
 
@@ -66,14 +70,19 @@ Wiring::Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, 
                 ? std::make_unique<MeshStage>(
                       rig_, HorizonLimits{},
                       MeshPlanes{settings.odometry.regularity_enabled, settings.odometry.plane_point_sigma})
-                : nullptr) {
+                : nullptr),
+      loop_(settings.loop.enabled ? std::make_unique<LoopStage>(rig_, LoopLimits{}) : nullptr) {
   if (options.imu_states) states_ = std::make_unique<StateRing>();
+  if (loop_) to_loop_ = std::make_unique<LoopArrows>();
   if (options.meshes && mesh_) meshes_ = std::make_unique<MeshRing>();
   if (recorder_ != nullptr) to_recorder_ = std::make_unique<RecorderArrows>();
   for (std::size_t c = 0; c < rig_.camera_count; ++c) {
     const CameraModel& model = rig_.camera[c];
     for (std::size_t i = 0; i < kImageSlots; ++i) {
       camera_[c].pool.slot(i).pixels.resize(static_cast<std::size_t>(model.width() * model.height()));
+    }
+    for (std::size_t i = 0; to_loop_ && i < KeyframePool::capacity(); ++i) {
+      to_loop_->pool.slot(i).pixels[c].resize(static_cast<std::size_t>(model.width() * model.height()));
     }
   }
 }
@@ -192,7 +201,14 @@ void Wiring::smoothFrame(const TrackMessage& message, FrameResult& out) {
 // results, states, meshes, IMU -> log
 bool Wiring::log() {
   bool any = false;
-  const bool ended = smoothDone() && meshDone() && propagateDone();
+  const bool ended = smoothDone() && meshDone() && loopDone() && propagateDone();
+  if (to_loop_) {
+    while (const LoopReport* report = to_loop_->reports.front()) {
+      log_.onLoop(*report);
+      to_loop_->reports.pop();
+      any = true;
+    }
+  }
   if (meshes_) {
     while (const MeshResult* result = meshes_->front()) {
       log_.onMesh(*result);
@@ -227,7 +243,7 @@ void Wiring::watchArming(const FrameResult& result) {
   std::uint64_t lost = 0;
   if (recorder_ != nullptr) {
     lost = to_recorder_->imu.refused() + to_recorder_->track.refused() + to_recorder_->smooth.refused() +
-           to_recorder_->mesh.refused();
+           to_recorder_->mesh.refused() + to_recorder_->loop.refused();
     for (const Camera& camera : camera_) lost += camera.pool.refused(kRecordReads);
   }
   const bool running = recorder_ != nullptr && recorder_->running();
@@ -244,7 +260,7 @@ bool Wiring::record() {
     record_done_ = true;
     return false;
   }
-  const bool ended = smoothDone() && meshDone() && propagateDone();
+  const bool ended = smoothDone() && meshDone() && loopDone() && propagateDone();
   const bool any = recorder_->drain(*to_recorder_, {&camera_[0].pool, &camera_[1].pool});
   if (ended && !any && !record_done_) {
     recorder_->end(counters_.sensor.imu_samples, counters_.sensor.images);
@@ -268,7 +284,16 @@ void Wiring::addReservations(MemoryTable& table) const {
   add("propagation", sizeof(propagation_));
   add("tracking", sizeof(track_) + between(before_track_, before_smooth_));
   add("smoother", sizeof(smooth_) + between(before_smooth_, before_mesh_));
-  if (mesh_) add("mesh", between(before_mesh_, after_mesh_));
+  if (mesh_) add("mesh", between(before_mesh_, before_loop_));
+  if (loop_) {
+    std::size_t keyframe_images = 0;
+    for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+      keyframe_images += KeyframePool::capacity() *
+                         static_cast<std::size_t>(rig_.camera[c].width() * rig_.camera[c].height());
+    }
+    add("loop closure", between(before_loop_, after_loop_));
+    add("keyframes for loop closure", sizeof(LoopArrows) + keyframe_images);
+  }
   add("IMU rings", sizeof(ImuRing) * 4);
   add("tracked frames", sizeof(tracked_ring_));
   add("fixes and windows", sizeof(fix_) + sizeof(window_) + sizeof(window_to_mesh_) + sizeof(planes_));
@@ -296,6 +321,11 @@ void Wiring::addLosses(std::map<std::string, std::uint64_t>& losses) const {
   note("results_to_log", results_.refused());
   note("camera_0_unmeshed", counters_.sensor.images_unmeshed);
   if (meshes_) note("meshes_to_log", meshes_->refused());
+  if (to_loop_) {
+    note("keyframes_to_loop", to_loop_->keyframes.refused());
+    note("keyframe_images_to_loop", to_loop_->images_dropped);
+    note("loops_to_log", to_loop_->reports.refused());
+  }
   if (states_) note("states_to_log", states_->refused());
   if (to_recorder_) {
     note("imu_to_record", to_recorder_->imu.refused());
@@ -303,6 +333,7 @@ void Wiring::addLosses(std::map<std::string, std::uint64_t>& losses) const {
     note("track_steps_to_record", to_recorder_->track.refused());
     note("smooth_steps_to_record", to_recorder_->smooth.refused());
     note("mesh_steps_to_record", to_recorder_->mesh.refused());
+    note("loop_steps_to_record", to_recorder_->loop.refused());
   }
 }
 

@@ -3,8 +3,8 @@
 // as the block diagram.
 //
 // One function a thread: takeImu, takeImage, endInput (sensor); propagate, track, smooth, mesh (flight path);
-// log, record (low priority). Each takes what waits on its arrows, at most one frame, and says whether it did
-// anything. An executor calls them: from one thread in turn (lockstep.hpp), or each from its own
+// loop, log, record (low priority). Each takes what waits on its arrows, at most one frame, and says whether
+// it did anything. An executor calls them: from one thread in turn (lockstep.hpp), or each from its own
 // (threaded.hpp). The arrows are in fixed memory and nobody waits on them; who sleeps until something comes
 // is the executor's matter. Nothing on the flight path allocates or locks once the first message has been
 // taken.
@@ -31,6 +31,7 @@
 #include "firmware_host/pipeline/fault_counts.hpp"
 #include "firmware_host/pipeline/run_log.hpp"
 #include "firmware_host/settings/settings.hpp"
+#include "mapping/loop/loop_stage.hpp"
 #include "mesher/mesh_stage.hpp"
 
 namespace swiftlet {
@@ -70,6 +71,9 @@ struct WiringCounters {
     std::uint64_t skipped = 0;        ///< windows that a newer one overtook
     std::uint64_t without_image = 0;  ///< steps whose image was gone, or never came
   } mesh;
+  struct Loop {
+    std::uint64_t without_image = 0;  ///< as above
+  } loop;
 };
 
 /// What the sensors did of late, for whoever asks.
@@ -110,6 +114,7 @@ class Wiring {
   bool track();
   bool smooth();
   bool mesh();
+  bool loop();
   bool log();
   bool record();
 
@@ -118,6 +123,7 @@ class Wiring {
   [[nodiscard]] bool propagateDone() const { return propagate_done_.load(std::memory_order_acquire); }
   [[nodiscard]] bool smoothDone() const { return smooth_done_.load(std::memory_order_acquire); }
   [[nodiscard]] bool meshDone() const { return mesh_done_.load(std::memory_order_acquire); }
+  [[nodiscard]] bool loopDone() const { return loop_done_.load(std::memory_order_acquire); }
   [[nodiscard]] bool logDone() const { return log_done_; }
   /// Any thread: nobody calls log() any more, so nothing waits for room in front of it.
   void abandonLog() { log_abandoned_.store(true, std::memory_order_release); }
@@ -128,6 +134,8 @@ class Wiring {
   [[nodiscard]] const WiringCounters& counters() const { return counters_; }
   /// Null where meshing is switched off; once the thread `mesh` has ended.
   [[nodiscard]] const MeshStage* meshStage() const { return mesh_.get(); }
+  /// Null where loop closure is switched off; once the thread `loop` has ended.
+  [[nodiscard]] const LoopStage* loopStage() const { return loop_.get(); }
   /// Losses at full arrows, by name; at the end.
   void addLosses(std::map<std::string, std::uint64_t>& losses) const;
   /// What was reserved for what, by the constructor.
@@ -170,6 +178,11 @@ class Wiring {
   [[nodiscard]] bool findMeshImage(std::uint64_t number);
   void publishMesh(bool keyframe);
 
+  // loop
+  void handToLoop(const StereoFrame& frame);
+  void handKeyframe(const TrackMessage& message);
+  [[nodiscard]] bool findKeyframeImages(std::uint64_t frame);
+
   void watchArming(const FrameResult& result);
 
   Rig rig_;
@@ -190,7 +203,9 @@ class Wiring {
   SmoothStage smooth_;
   HeapMark before_mesh_;
   std::unique_ptr<MeshStage> mesh_;  ///< null: switched off
-  HeapMark after_mesh_;
+  HeapMark before_loop_;
+  std::unique_ptr<LoopStage> loop_;  ///< null: switched off
+  HeapMark after_loop_;
 
   // Arrows.
   ImuRing imu_to_propagate_, imu_to_track_, imu_to_smooth_, imu_to_log_;
@@ -203,8 +218,9 @@ class Wiring {
   Newest<MeshMessage> window_to_mesh_;
   Newest<LocalMesh> local_mesh_;
   Newest<PlaneReport> planes_;
-  std::unique_ptr<MeshRing> meshes_;   ///< null where nobody wants them
-  std::unique_ptr<StateRing> states_;  ///< null where nobody wants them
+  std::unique_ptr<LoopArrows> to_loop_;  ///< null: switched off
+  std::unique_ptr<MeshRing> meshes_;     ///< null where nobody wants them
+  std::unique_ptr<StateRing> states_;    ///< null where nobody wants them
   ResultRing results_;
   std::unique_ptr<RecorderArrows> to_recorder_;
 
@@ -227,16 +243,21 @@ class Wiring {
   struct {
     std::uint64_t samples = 0;
     std::uint64_t planes = 0;
-    FrameResult unread;  ///< written where the log has no room
+    std::uint64_t windows = 0;  ///< published
+    FrameResult unread;         ///< written where the log has no room
   } smoothing_;
   struct {
     std::uint64_t window = 0;
     ImagePool::Loan image;  ///< at the head of the ring
   } meshing_;
+  struct {
+    KeyframePool::Loan images;  ///< at the head of the ring
+    LoopReport unread;          ///< written where the log has no room
+  } closing_;
 
   std::atomic<std::int64_t> newest_imu_{std::numeric_limits<std::int64_t>::min()};
   std::atomic<bool> input_ended_{false}, propagate_done_{false}, track_done_{false}, smooth_done_{false},
-      mesh_done_{false};
+      mesh_done_{false}, loop_done_{false};
   std::atomic<bool> log_abandoned_{false};
   bool log_done_ = false, record_done_ = false;
   WiringCounters counters_;

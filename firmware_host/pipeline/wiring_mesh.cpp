@@ -17,7 +17,7 @@ void Wiring::handToMesh(SlotHandle handle) {
   ++counters_.sensor.images_unmeshed;
 }
 
-// smooth -> newest window, for track and, with its frame, for mesh
+// smooth -> newest window, for track and, with its frame, for mesh; keyframes for loop
 void Wiring::publishWindow(const TrackMessage& message) {
   SmoothedWindow& window = window_.draft();
   smooth_.window(window);
@@ -28,7 +28,8 @@ void Wiring::publishWindow(const TrackMessage& message) {
     to_mesh.image = message.step.image[0];
     window_to_mesh_.publish();
   }
-  window_.publish();
+  if (to_loop_ && message.tracked.keyframe && window.started) handKeyframe(message);
+  smoothing_.windows = window_.publish();
 }
 
 // newest window, image -> mesh -> newest mesh, planes; every mesh where it is wanted

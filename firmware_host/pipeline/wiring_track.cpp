@@ -218,6 +218,7 @@ bool Wiring::trackFrame() {
   tracking_.dropped = 0;
   addTime(times_, StageId::kTrack, message.spent, tracked && message.tracked.keyframe);
   if (to_recorder_) static_cast<void>(to_recorder_->track.tryPush(step));
+  if (to_loop_ && tracked && message.tracked.keyframe) handToLoop(frame);
   tracked_ring_.commitPush();
   release(frame);
   tracking_.waiting.erase(0);

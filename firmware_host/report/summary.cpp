@@ -78,17 +78,19 @@ Json countersJson(const RunFacts& facts, const LogSource& source, const RunStati
     json["events"][std::string(eventName(kind))] = {{"count", total.count}, {"value_sum", total.value}};
   }
   if (statistics.map) {
-    json["map"] = {{"keyframes", statistics.map->keyframes},
-                   {"landmarks", statistics.map->landmarks},
-                   {"iterations", statistics.map->iterations},
-                   {"initial_cost", statistics.map->initial_cost},
-                   {"final_cost", statistics.map->final_cost}};
+    json["map"] = {
+        {"keyframes", statistics.map->keyframes},         {"landmarks", statistics.map->landmarks},
+        {"iterations", statistics.map->iterations},       {"revisits", statistics.map->revisits},
+        {"revisits_used", statistics.map->revisits_used}, {"matches", statistics.map->matches},
+        {"matches_used", statistics.map->matches_used},   {"initial_cost", statistics.map->initial_cost},
+        {"final_cost", statistics.map->final_cost}};
   }
   if (statistics.mesh) {
     json["mesh"] = toJson(statistics.mesh->stage, statistics.mesh->horizon);
     json["mesh"]["skipped"] = statistics.mesh->skipped;
     json["mesh"]["without_image"] = statistics.mesh->without_image;
   }
+  if (statistics.loop) json["loop"] = toJson(*statistics.loop);
   json["losses"] = Json::object();
   for (const auto& [arrow, count] : statistics.losses) json["losses"][arrow] = count;
   json["faults"] = Json::object();
@@ -172,6 +174,23 @@ Json toJson(const MeshCounters& stage, const HorizonCounters& horizon) {
           {"refused_for_room", horizon.refused},
           {"faces_refuted", horizon.refuted},
           {"faces_replaced", horizon.replaced}};
+}
+
+Json toJson(const LoopCounters& loops) {
+  Json fates = Json::object();
+  for (std::size_t i = 0; i < loops.fates.size(); ++i) {
+    if (loops.fates[i] > 0) fates[describe(static_cast<LoopFate>(i))] = loops.fates[i];
+  }
+  return {{"keyframes", loops.keyframes},
+          {"nodes", loops.nodes},
+          {"without_image", loops.without_image},
+          {"bridged", loops.gaps},
+          {"components", loops.components},
+          {"candidates", fates},
+          {"verified", loops.loops},
+          {"selected", loops.selected},
+          {"optimizations", loops.optimizations},
+          {"refused_for_room", loops.refused}};
 }
 
 Json summaryOf(const RunFacts& facts, const Settings& settings, const LogSource& source,

@@ -41,6 +41,7 @@ nlohmann::ordered_json summaryOf(const RunFacts& facts, const Settings& settings
 
 /// Counters of the mesher, without those of the pipeline around it.
 nlohmann::ordered_json toJson(const MeshCounters& stage, const HorizonCounters& horizon);
+nlohmann::ordered_json toJson(const LoopCounters& loops);
 
 /// The summary in a few lines for the terminal.
 std::string summaryText(const nlohmann::ordered_json& summary);

@@ -27,6 +27,10 @@ struct MeshGroup {
   bool enabled = true;
 };
 
+struct LoopGroup {
+  bool enabled = false;
+};
+
 /// Priorities are of SCHED_FIFO, 1 to 98; 0 is SCHED_OTHER. All of them below 50, where kernels with
 /// PREEMPT_RT run their interrupt handlers, without which no sample arrives.
 struct RealtimeGroup {
@@ -79,6 +83,7 @@ struct Settings {
   CalibrationGroup calibration;
   EvaluationGroup evaluation;
   MeshGroup mesh;
+  LoopGroup loop;
   RealtimeGroup realtime;
   BudgetsGroup budgets;
   bool full_smoothing = true;  ///< smoother.horizon is `full`

@@ -26,6 +26,7 @@ RoomTable directNeighbours() {
       {"mapping/distance", {"mapping/volume"}},
       {"mapping/place", world},
       {"mapping/pose_graph", world},
+      {"mapping/loop", {"mapping/place", "mapping/pose_graph"}},
   };
   for (const char* driver : {"calibration", "recorded", "simulated", "v4l2", "serial", "can", "gpio",
                              "timesync", "mavlink", "dds"}) {

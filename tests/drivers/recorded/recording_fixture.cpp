@@ -101,6 +101,8 @@ Status record(RecordingWriter& writer, const Entry& entry) {
       return writer.smoothStep(entry.smooth);
     case RecordKind::kMeshStep:
       return writer.meshStep(entry.mesh);
+    case RecordKind::kLoopStep:
+      return writer.loopStep(entry.loop);
     default:
       return writer.loss(entry.loss.kind, entry.loss.count);
   }
@@ -108,10 +110,11 @@ Status record(RecordingWriter& writer, const Entry& entry) {
 
 Entry wildEntry(std::uint64_t seed, std::uint64_t i) {
   Random random(seed, i);
-  constexpr std::array<RecordKind, 12> kMix{
+  constexpr std::array<RecordKind, 13> kMix{
       RecordKind::kImu,           RecordKind::kImu,       RecordKind::kImu,        RecordKind::kImu,
       RecordKind::kImage0,        RecordKind::kImage1,    RecordKind::kImage1,     RecordKind::kMeshStep,
-      RecordKind::kPropagateStep, RecordKind::kTrackStep, RecordKind::kSmoothStep, RecordKind::kLoss};
+      RecordKind::kPropagateStep, RecordKind::kTrackStep, RecordKind::kSmoothStep, RecordKind::kLoss,
+      RecordKind::kLoopStep};
   Entry entry;
   entry.kind = kMix[random.below(static_cast<std::uint32_t>(kMix.size()))];
   entry.sample.stamp = wildStamp(random);
@@ -123,6 +126,7 @@ Entry wildEntry(std::uint64_t seed, std::uint64_t i) {
                  wildCount(random), wildCount(random), wildEffort(random)};
   entry.smooth = {wildCount(random), wildCount(random), wildEffort(random), wildCount(random)};
   entry.mesh = {wildCount(random), wildCount(random), wildCount(random)};
+  entry.loop = {wildCount(random), wildCount(random), {wildCount(random), wildCount(random)}};
   entry.loss.kind = static_cast<RecordKind>(1 + random.below(6));
   entry.loss.count = 1 + random.below(1000);
   if (entry.kind == RecordKind::kImage0 || entry.kind == RecordKind::kImage1) wildImage(random, entry);
@@ -231,6 +235,9 @@ std::string difference(RecordingSource& source, const std::vector<Entry>& script
       case RecordKind::kMeshStep:
         steps.mesh.push_back(entry.mesh);
         break;
+      case RecordKind::kLoopStep:
+        steps.loop.push_back(entry.loop);
+        break;
       default: {
         std::uint64_t& of_kind = number[static_cast<std::size_t>(entry.loss.kind)];
         losses.push_back({entry.loss.kind, of_kind, entry.loss.count});
@@ -238,7 +245,8 @@ std::string difference(RecordingSource& source, const std::vector<Entry>& script
       }
     }
     if (entry.kind == RecordKind::kPropagateStep || entry.kind == RecordKind::kTrackStep ||
-        entry.kind == RecordKind::kSmoothStep || entry.kind == RecordKind::kMeshStep) {
+        entry.kind == RecordKind::kSmoothStep || entry.kind == RecordKind::kMeshStep ||
+        entry.kind == RecordKind::kLoopStep) {
       ++last;
     }
   }
@@ -248,6 +256,7 @@ std::string difference(RecordingSource& source, const std::vector<Entry>& script
   if (source.steps().track != steps.track) return "other tracking steps";
   if (source.steps().smooth != steps.smooth) return "other smoothing steps";
   if (source.steps().mesh != steps.mesh) return "other mesh steps";
+  if (source.steps().loop != steps.loop) return "other steps of loop closure";
   const auto same_loss = [](const RecordingLoss& a, const RecordingLoss& b) {
     return a.kind == b.kind && a.after == b.after && a.count == b.count;
   };

@@ -25,6 +25,7 @@ struct Entry {
   TrackStep track;
   SmoothStep smooth;
   MeshStep mesh;
+  LoopStep loop;
   RecordingLoss loss;
 
   Entry() = default;

@@ -1,0 +1,102 @@
+// The thread `loop`: keyframes with their images, one after the other, and the map that they make.
+
+#include <algorithm>
+
+#include "firmware_host/pipeline/wiring.hpp"
+
+namespace swiftlet {
+
+// track: a keyframe's images -> copies -> loop
+void Wiring::handToLoop(const StereoFrame& frame) {
+  LoopArrows& arrows = *to_loop_;
+  const SlotHandle handle = arrows.pool.tryAcquire();
+  if (!handle.valid()) {
+    ++arrows.images_dropped;
+    return;
+  }
+  KeyframeImages& images = arrows.pool.fill(handle);
+  images.frame = frame.index;
+  images.number = frame.number;
+  for (std::size_t c = 0; c < kMaxCameras; ++c) {
+    const ImageView& from = frame.image[c];
+    images.image[c] = ImageView{};
+    if (from.empty()) continue;
+    const auto width = static_cast<std::size_t>(from.width);
+    for (int y = 0; y < from.height; ++y) {
+      std::copy_n(from.row(y), width, images.pixels[c].data() + static_cast<std::size_t>(y) * width);
+    }
+    images.image[c] = ImageView{images.pixels[c].data(), from.width, from.height, from.width};
+  }
+  SlotHandle dropped;
+  if (!arrows.pool.tryHand(handle, kLoopReads)) {
+    ++arrows.images_dropped;
+  } else if (arrows.images.push(handle, dropped)) {
+    arrows.pool.takeBack(dropped, kLoopReads);
+    ++arrows.images_dropped;
+  }
+  arrows.pool.finish(handle);
+}
+
+// smooth -> keyframe with its window and its link to the one before -> loop
+void Wiring::handKeyframe(const TrackMessage& message) {
+  KeyframeMessage* out = to_loop_->keyframes.beginPush();
+  if (out == nullptr) return;  // counted by the ring
+  out->window = window_.draft();
+  out->window_number = smoothing_.windows + 1;  // about to be published
+  out->tracked = message.tracked;
+  out->image = message.step.image;
+  smooth_.link(out->window, out->link);
+  to_loop_->keyframes.commitPush();
+}
+
+// keyframe, images -> place recognition, verification, selection, pose graph -> correction, report
+bool Wiring::loop() {
+  const bool ended = smoothDone();
+  const KeyframeMessage* message = to_loop_ ? to_loop_->keyframes.front() : nullptr;
+  if (message == nullptr) {
+    if (ended) {
+      closing_.images.reset();
+      loop_done_.store(true, std::memory_order_release);
+    }
+    return false;
+  }
+  LoopInput input;
+  input.tracks = &message->tracked;
+  input.window = &message->window;
+  input.link = &message->link;
+  LoopStep step{message->tracked.index, message->window_number, {}};
+  if (findKeyframeImages(message->tracked.index)) {
+    input.image = closing_.images->image;
+    step.image = closing_.images->number;
+  } else {
+    ++counters_.loop.without_image;
+  }
+  const Spent spent = measured([&] {
+    const double cpu = threadCpuSeconds();
+    LoopReport* report = to_loop_->reports.beginPush();
+    LoopReport& out = report != nullptr ? *report : closing_.unread;
+    static_cast<void>(loop_->step(input, LoopEffort{}, out));
+    to_loop_->correction.draft() = loop_->correction();
+    to_loop_->correction.publish();
+    if (report != nullptr) to_loop_->reports.commitPush();
+    if (drag_) drag_(StageId::kLoop, threadCpuSeconds() - cpu);
+  });
+  addTime(times_, StageId::kLoop, spent);
+  if (to_recorder_) static_cast<void>(to_recorder_->loop.tryPush(step));
+  to_loop_->keyframes.pop();
+  return true;
+}
+
+/// Brings the images of `frame` to the head; those of earlier keyframes go back, later ones stay.
+bool Wiring::findKeyframeImages(std::uint64_t frame) {
+  KeyframePool::Loan& head = closing_.images;
+  while (!head || head->frame < frame) {
+    head.reset();
+    SlotHandle handle;
+    if (!to_loop_->images.tryPop(handle)) return false;
+    head = to_loop_->pool.borrow(handle, kLoopReads);
+  }
+  return head->frame == frame;
+}
+
+}  // namespace swiftlet

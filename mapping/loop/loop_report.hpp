@@ -1,0 +1,57 @@
+#pragma once
+// What loop closure tells: each candidate's fate, and how the odometry's world lies in the map.
+
+#include <array>
+#include <cstdint>
+
+#include "estimator/core/fixed_vector.hpp"
+#include "estimator/core/stamp.hpp"
+#include "estimator/geometry/se3.hpp"
+#include "mapping/place/loop_verification.hpp"
+
+namespace swiftlet {
+
+/// A keyframe that looks like the newest one, and what geometry says of the two.
+struct LoopCandidate {
+  std::uint64_t old_frame = 0;  ///< index of the keyframe seen again
+  Stamp old_stamp;
+  LoopFate fate = LoopFate::kInvalidInput;
+  std::size_t matches = 0;
+  std::size_t inliers = 0;
+  double similarity = 0;  ///< of the words, relative to that of neighbouring keyframes
+};
+
+/// Candidates looked at in one step, at most.
+inline constexpr std::size_t kMaxLoopCandidates = 4;
+
+/// How the newest epoch's world lies in the map.
+struct MapCorrection {
+  std::uint32_t epoch = 0;
+  std::uint64_t version = 0;  ///< raised whenever the map moves
+  SE3 T_map_world;
+};
+
+struct LoopReport {
+  Stamp stamp;
+  std::uint64_t frame = 0;
+  FixedVector<LoopCandidate, kMaxLoopCandidates> candidates;
+  std::uint32_t loops = 0;     ///< verified so far and kept
+  std::uint32_t selected = 0;  ///< of them, those that hold the map together
+  bool moved = false;          ///< the map has moved in this step
+  MapCorrection correction;
+};
+
+struct LoopCounters {
+  std::uint64_t keyframes = 0;
+  std::uint64_t nodes = 0;          ///< keyframes that were kept as places and poses of the graph
+  std::uint64_t without_image = 0;  ///< nodes without a place
+  std::uint64_t gaps = 0;           ///< links bridged over keyframes that were missed
+  std::uint64_t components = 0;     ///< pieces that odometry alone holds together
+  std::array<std::uint64_t, kLoopFates> fates{};  ///< of candidates
+  std::uint64_t loops = 0;                        ///< verified
+  std::uint64_t selected = 0;                     ///< at the end
+  std::uint64_t optimizations = 0;
+  std::uint64_t refused = 0;  ///< keyframes that did not fit any more
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,137 @@
+#pragma once
+// The stage of the thread `loop`: keyframes to a map that places seen again hold together.
+//
+// A keyframe that has moved or turned enough since the last one kept becomes a node: a pose of the graph,
+// tied to the node before by the odometry's relative pose, and, where its images are at hand, a place. Per
+// step: describe the place, ask the database for places alike, verify up to `effort.candidates` of them by
+// geometry, give those that pass to the selection, and optimize the graph (at most `effort.iterations`) while
+// the selected set, or the poses, still change. Every piece that neither odometry nor loops join keeps its
+// own world; an epoch of the odometry begins a piece. Frames: world is the odometry's of an epoch, map that
+// of the first piece. Errors: kInvalidInput (no window, tracks of another frame, a pose that is not finite):
+// nothing changes; kCapacityReached: no more nodes, the map stays as it is and its correction goes on.
+// Memory: reserved by the constructor for LoopLimits (38 kB a node). No clock, no randomness but seeds from
+// frame indices: same input, same bytes. docs/pose_graph.md, docs/place.md.
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "estimator/camera/rig.hpp"
+#include "estimator/core/image_view.hpp"
+#include "estimator/core/status.hpp"
+#include "estimator/messages/keyframe_link.hpp"
+#include "estimator/messages/loop_revisit.hpp"
+#include "estimator/messages/smoothed_window.hpp"
+#include "estimator/messages/tracked_frame.hpp"
+#include "mapping/loop/loop_report.hpp"
+#include "mapping/place/feature_depth.hpp"
+#include "mapping/place/place_database.hpp"
+#include "mapping/place/place_extractor.hpp"
+#include "mapping/pose_graph/loop_selection.hpp"
+#include "mapping/pose_graph/pose_graph_optimizer.hpp"
+
+namespace swiftlet {
+
+struct LoopLimits {
+  std::size_t nodes = 1000;  ///< five minutes of flight at three a second
+  std::size_t loops = 1000;
+};
+
+struct LoopEffort {
+  std::size_t candidates = 2;  ///< verified in a step, up to kMaxLoopCandidates
+  double verification = 1;     ///< part of the samples that verification may draw
+  int iterations = 3;          ///< of the optimizer
+};
+
+struct LoopInput {
+  const TrackedFrame* tracks = nullptr;    ///< of the keyframe
+  const SmoothedWindow* window = nullptr;  ///< whose newest pose is the keyframe's
+  const KeyframeLink* link = nullptr;
+  std::array<ImageView, kMaxCameras> image;  ///< raw; empty where missing
+};
+
+/// A keyframe in the map.
+struct MapNode {
+  Stamp stamp;
+  std::uint32_t epoch = 0;
+  SE3 T_map_body;
+};
+
+class LoopStage {
+ public:
+  LoopStage(const Rig& rig, const LoopLimits& limits);
+
+  Status step(const LoopInput& input, const LoopEffort& effort, LoopReport& report);
+
+  [[nodiscard]] const MapCorrection& correction() const { return correction_; }
+  [[nodiscard]] const LoopCounters& counters() const { return counters_; }
+  [[nodiscard]] std::size_t nodeCount() const { return nodes_.size(); }
+  [[nodiscard]] MapNode node(std::size_t i) const;
+  [[nodiscard]] std::size_t loopCount() const { return loops_.size(); }
+  /// For full smoothing. False where loop i is not selected. Allocates: after the flight.
+  [[nodiscard]] bool revisit(std::size_t i, LoopRevisit& out) const;
+
+ private:
+  struct Node {
+    Stamp stamp;
+    std::uint64_t frame = 0;
+    std::uint32_t epoch = 0;
+    SE3 T_world_body;                             ///< as the odometry had it then
+    std::uint32_t slot = PlaceDatabase::kNoSlot;  ///< of its place
+  };
+  /// By the selection's ids.
+  struct Loop {
+    RelativePose<SE3> edge;  ///< of nodes
+    std::size_t number = 0;  ///< of the optimizer's edges
+    bool selected = false;
+    std::uint64_t old_frame = 0;
+    DescriptorMatches inliers;
+  };
+  /// From the last node to the newest keyframe.
+  struct Pending {
+    bool linked = false;
+    std::uint64_t frame = 0;  ///< index of the newest keyframe
+    SE3 T_node_this;
+    Matrix6d covariance = Matrix6d::Zero();
+  };
+
+  void extendPending(const LoopInput& input);
+  void bridge(const LoopInput& input);
+  void appendLink(const SE3& T_previous_this, const Matrix6d& covariance);
+  [[nodiscard]] bool movedEnough(Stamp now) const;
+  Status addNode(const WindowPose& pose);
+  [[nodiscard]] bool describePlace(const LoopInput& input);
+  void closeLoops(const LoopEffort& effort, LoopReport& report);
+  [[nodiscard]] bool verify(const PlaceCandidate& candidate, const LoopEffort& effort, LoopReport& report);
+  [[nodiscard]] bool addLoop(std::uint32_t from);
+  void keepPlace();
+  void weigh();
+  void optimize(const LoopEffort& effort, LoopReport& report);
+  void correct(const SmoothedWindow& window);
+  [[nodiscard]] bool findNode(std::uint64_t frame, std::uint32_t epoch, std::uint32_t& node) const;
+
+  Rig rig_;
+  LoopLimits limits_;
+  PlaceExtractor extractor_;
+  std::unique_ptr<StereoDepth> stereo_;  ///< null with one camera
+  LandmarkDepth landmarks_;
+  PlaceDatabase database_;
+  LoopVerifier verifier_;
+  LoopSelection<SE3> selection_;
+  PoseGraphOptimizer<SE3> optimizer_;
+
+  std::vector<Node> nodes_;
+  std::vector<PlaceKeyframe> places_;  ///< by the database's slots
+  std::vector<Loop> loops_;
+  std::uint32_t epoch_ = 0;
+  Pending pending_;
+  PlaceKeyframe newest_;
+  BagOfWords words_;
+  PlaceQuery query_;
+  LoopVerification verification_;
+  bool unsettled_ = false;  ///< the optimizer has not converged since the selection changed
+  MapCorrection correction_;
+  LoopCounters counters_;
+};
+
+}  // namespace swiftlet
