@@ -48,7 +48,8 @@ bool eliminateWide(double* panel, Index height, Index columns, double* update) {
   Front top(panel, columns, columns, Eigen::OuterStride<>(height));
   Eigen::Ref<Eigen::MatrixXd, 0, Eigen::OuterStride<>> top_ref(top);
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd, 0, Eigen::OuterStride<>>> llt(top_ref);
-  if (llt.info() != Eigen::Success) return false;
+  // Eigen's takes NaN for a pivot.
+  if (llt.info() != Eigen::Success || !(top.diagonal().array() > 0).all()) return false;
   if (rows == 0) return true;
   Front bottom(panel + columns, rows, columns, Eigen::OuterStride<>(height));
   top.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(bottom);

@@ -15,6 +15,8 @@ constexpr int kDampingTries = 6;
 constexpr double kAccepted = 1e-4;  // of the predicted decrease
 constexpr double kPoor = 0.25;
 constexpr double kGood = 0.75;
+constexpr double kShrink = 0.5;                 // of the region after a step that was not taken
+constexpr double kGrow = 3;                     // and after a good one
 constexpr double kInformationAsymmetry = 1e-9;  // of the largest entry
 
 bool finite(const SE2& pose) { return std::isfinite(pose.angle) && pose.translation.allFinite(); }
@@ -209,12 +211,15 @@ void PoseGraphOptimizer<Pose>::linearize() {
 
 template <typename Pose>
 Status PoseGraphOptimizer<Pose>::factorNormalEquations() {
-  damping_.resize(0);
-  if (factor_.factor(H_, damping_)) return okStatus();
-  double damping = kFirstDamping;
-  for (int k = 0; k < kDampingTries; ++k, damping *= kDampingUp) {
-    damping_ = damping * scale_.cwiseAbs2();
+  double damping = 0;
+  for (int k = 0; k < kDampingTries; ++k) {
+    if (damping > 0) {
+      damping_ = damping * scale_.cwiseAbs2();
+    } else {
+      damping_.resize(0);
+    }
     if (factor_.factor(H_, damping_)) return okStatus();
+    damping = std::max(kDampingUp * damping, kFirstDamping);
   }
   return {StatusCode::kNumerical, "the normal equations cannot be factored"};
 }
@@ -294,8 +299,8 @@ Status PoseGraphOptimizer<Pose>::iterate(const OptimizeEffort& effort, OptimizeR
     const double gain = cost_ - cost;
     const double length = scale_.cwiseProduct(step).norm();
     if (gain > kAccepted * predicted && gain > 0) {
-      if (gain > kGood * predicted) radius_ = std::max(radius_, 3 * length);
-      if (gain < kPoor * predicted) radius_ = 0.5 * length;
+      if (gain > kGood * predicted) radius_ = std::max(radius_, kGrow * length);
+      if (gain < kPoor * predicted) radius_ = kShrink * length;
       graph_.poses.swap(trial_);
       report.final_cost = cost;
       done = gain <= effort.tolerance * cost_ || cost <= effort.cost_floor;
@@ -304,7 +309,7 @@ Status PoseGraphOptimizer<Pose>::iterate(const OptimizeEffort& effort, OptimizeR
     ++report.rejected;
     // Neither the model nor the cost can tell the two apart any more.
     if (predicted <= effort.tolerance * cost_ || !(predicted > 0)) break;
-    radius_ = 0.25 * std::min(length, radius_);
+    radius_ = kShrink * std::min(length, radius_);
   }
   report.final_cost = cost_;
   done = true;
