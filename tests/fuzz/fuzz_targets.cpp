@@ -13,7 +13,9 @@
 #include "drivers/recorded/track_file.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
 #include "firmware_host/places/vocabulary_file.hpp"
+#include "firmware_host/report/g2o_file.hpp"
 #include "firmware_host/report/ply_file.hpp"
+#include "mapping/pose_graph/pose_graph_optimizer.hpp"
 #include "tests/fuzz/fuzz_recording.hpp"
 
 namespace swiftlet::fuzz {
@@ -177,7 +179,44 @@ void vocabulary(std::string_view text) {
   }
 }
 
-constexpr std::array<NamedTarget, 10> kTargets = {{{"imu_csv", &imuCsv},
+/// What was read is sane, solves without leaving the finite, and reads back equal.
+template <typename Pose>
+void demandSane(const G2oGraph& file, const PoseGraph<Pose>& graph) {
+  demand(graph.poses.size() == file.ids.size());
+  for (const auto& edge : graph.edges) {
+    demand(edge.from < graph.poses.size() && edge.to < graph.poses.size() && edge.from != edge.to);
+    demand(edge.information.allFinite() && edge.information.trace() > 0);
+  }
+  constexpr std::size_t kMostPoses = 200;  // larger ones say nothing new and take time
+  if (graph.poses.size() > kMostPoses) return;
+  PoseGraphOptimizer<Pose> optimizer({graph.poses.size(), graph.edges.size(), 0});
+  StartReport start;
+  OptimizeReport report;
+  OptimizeEffort effort;
+  effort.iterations = 3;
+  if (!optimizer.assign(graph).ok() || !optimizer.start(start).ok()) return;
+  if (optimizer.optimize(effort, report).ok() && std::isfinite(report.initial_cost)) {
+    demand(report.final_cost <= report.initial_cost);
+  }
+  for (const Pose& pose : optimizer.graph().poses) demand(pose.translation.allFinite());
+}
+
+void g2o(std::string_view text) {
+  try {
+    const G2oFile file = readG2oBytes("graph.g2o", text);
+    if (file.graph.planar) {
+      demandSane(file.graph, file.graph.plane);
+    } else {
+      demandSane(file.graph, file.graph.space);
+    }
+    const std::string written = writeG2o(file.graph);
+    G2oFile again = readG2oBytes("again.g2o", written);
+    demand(again.report.clamped_information == 0 && writeG2o(again.graph) == written);
+  } catch (const InputError&) {
+  }
+}
+
+constexpr std::array<NamedTarget, 11> kTargets = {{{"imu_csv", &imuCsv},
                                                    {"image_csv", &imageCsv},
                                                    {"trajectory", &trajectory},
                                                    {"tracks", &tracks},
@@ -185,6 +224,7 @@ constexpr std::array<NamedTarget, 10> kTargets = {{{"imu_csv", &imuCsv},
                                                    {"kalibr_yaml", &kalibrYaml},
                                                    {"ros_message", &rosMessage},
                                                    {"recording", &recording},
+                                                   {"g2o", &g2o},
                                                    {"ply", &ply},
                                                    {"vocabulary", &vocabulary}}};
 

@@ -1,0 +1,187 @@
+// `swiftlet pose-graph`, from the command line to its files.
+
+#include <lzma.h>
+
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/pose_graph_run.hpp"
+#include "firmware_host/report/g2o_file.hpp"
+#include "mapping/pose_graph/pose_error.hpp"
+#include "tests/firmware_host/scratch_folder.hpp"
+
+namespace swiftlet {
+namespace {
+
+int run(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "swiftlet");
+  std::vector<char*> pointers;
+  for (std::string& argument : arguments) pointers.push_back(argument.data());
+  return runProgram(static_cast<int>(pointers.size()), pointers.data());
+}
+
+std::string textOf(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+void write(const std::string& path, const std::string& text) {
+  std::ofstream(path, std::ios::binary) << text;
+}
+
+/// A closed walk around a square of 4 x `side` poses with ids 3, 6, 9, ...; no VERTEX lines, a little noise.
+std::string squareWalk(int side) {
+  std::string text;
+  const int poses = 4 * side;
+  const std::string information = " 100 0 0 100 0 1000\n";
+  for (int k = 0; k < poses; ++k) {
+    const double turn = k % side == side - 1 ? M_PI / 2 : 0;
+    const double off = 0.01 * ((k * 7) % 5 - 2);
+    text += "EDGE_SE2 " + std::to_string(3 * (k + 1)) + " " + std::to_string(3 * ((k + 1) % poses + 1)) +
+            " " + std::to_string(1 + off) + " " + std::to_string(off) + " " +
+            std::to_string(turn + 0.5 * off) + information;
+  }
+  return text;
+}
+
+std::string packed(const std::string& text) {
+  std::string out(lzma_stream_buffer_bound(text.size()), '\0');
+  std::size_t size = 0;
+  REQUIRE(lzma_easy_buffer_encode(6, LZMA_CHECK_CRC64, nullptr,
+                                  reinterpret_cast<const std::uint8_t*>(text.data()), text.size(),
+                                  reinterpret_cast<std::uint8_t*>(out.data()), &size, out.size()) == LZMA_OK);
+  out.resize(size);
+  return out;
+}
+
+std::string complaint(const PoseGraphRequest& request) {
+  try {
+    static_cast<void>(runPoseGraph(request));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST_CASE("pose-graph solves a file, keeps ids and edges, and writes the same bytes again") {
+  const ScratchFolder folder("pose_graph");
+  const std::string in = folder.file("in.g2o");
+  const std::string out = folder.file("out.g2o");
+  const std::string json = folder.file("out.json");
+  write(in, squareWalk(10));
+  REQUIRE(run({"pose-graph", in, "--out", out, "--json", json}) == kExitDone);
+  const G2oFile before = readG2oFile(in);
+  const G2oFile after = readG2oFile(out);
+  CHECK(after.graph.ids == before.graph.ids);
+  CHECK(after.graph.has_poses);
+  REQUIRE(after.graph.edgeCount() == before.graph.edgeCount());
+  for (std::size_t e = 0; e < after.graph.plane.edges.size(); ++e) {
+    CHECK(after.graph.plane.edges[e].information == before.graph.plane.edges[e].information);
+  }
+  const auto figures = nlohmann::json::parse(textOf(json));
+  CHECK(figures["poses"] == 40);
+  CHECK(figures["edges"] == 40);
+  CHECK(figures["converged"] == true);
+  CHECK(figures["final_cost"].get<double>() < figures["start"]["given_cost"].get<double>());
+  // The cost that it says is that of the file that it wrote.
+  CHECK(graphCost(after.graph.plane) == Approx(figures["final_cost"].get<double>()).epsilon(1e-9));
+  const std::string first = textOf(out);
+  REQUIRE(run({"pose-graph", in, "--out", out}) == kExitDone);
+  CHECK(textOf(out) == first);
+
+  SECTION("a packed file is the same file, whatever its name") {
+    write(folder.file("graph.bin"), packed(squareWalk(10)));
+    REQUIRE(run({"pose-graph", folder.file("graph.bin"), "--out", out}) == kExitDone);
+    CHECK(textOf(out) == first);
+  }
+  SECTION("solved already: nothing to gain") {
+    PoseGraphRequest request;
+    request.file = out;
+    const PoseGraphResult result = runPoseGraph(request);
+    CHECK(result.solve.final_cost == Approx(figures["final_cost"].get<double>()).epsilon(1e-6));
+    CHECK(result.start.choice == StartChoice::kGiven);
+  }
+  SECTION("FIX is obeyed") {
+    write(in, squareWalk(10) + "FIX 30\n");
+    REQUIRE(run({"pose-graph", in, "--out", out}) == kExitDone);
+    const G2oFile held = readG2oFile(out);
+    REQUIRE(held.graph.fixed.size() == 1);
+    const std::uint32_t pose = held.graph.fixed[0];
+    CHECK(held.graph.ids[pose] == 30);
+    const G2oFile given = readG2oFile(in);
+    CHECK(held.graph.plane.poses[pose].translation == given.graph.plane.poses[pose].translation);
+  }
+}
+
+TEST_CASE("false loops are added on request, the same for one seed") {
+  const ScratchFolder folder("pose_graph_outliers");
+  const std::string in = folder.file("in.g2o");
+  write(in, squareWalk(10));
+  const auto spoil = [&](const std::string& seed, const std::string& name) {
+    REQUIRE(run({"pose-graph", in, "--inject-outliers", "12", "--seed", seed, "--iterations", "0", "--out",
+                 folder.file(name)}) == kExitDone);
+    return textOf(folder.file(name));
+  };
+  const std::string first = spoil("5", "a.g2o");
+  CHECK(spoil("5", "b.g2o") == first);
+  CHECK(spoil("6", "c.g2o") != first);
+  CHECK(readG2oFile(folder.file("a.g2o")).graph.edgeCount() == 52);
+  PoseGraphRequest request;
+  request.file = folder.file("a.g2o");
+  const double spoiled = runPoseGraph(request).solve.final_cost;
+  request.file = in;
+  CHECK(spoiled > 10 * runPoseGraph(request).solve.final_cost);
+}
+
+TEST_CASE("bad graphs are named by file, line, field and remedy, and leave nothing behind") {
+  const ScratchFolder folder("pose_graph_bad");
+  PoseGraphRequest request;
+  request.file = folder.file("bad.g2o");
+  request.out = folder.file("out.g2o");
+  write(request.file, squareWalk(2) + "EDGE_SE2 3 6 1 nan 0 1 0 0 1 0 1\n");
+  CHECK(complaint(request).find("bad.g2o:9: dy: `nan` is no finite number. Give") != std::string::npos);
+  CHECK(run({"pose-graph", request.file, "--out", request.out}) == kExitBadInput);
+  CHECK_FALSE(std::filesystem::exists(request.out));
+
+  const std::string whole = packed(squareWalk(10));
+  write(request.file, whole.substr(0, whole.size() / 2));
+  CHECK(complaint(request).find("not a whole xz file") != std::string::npos);
+
+  request.file = folder.file("nowhere.g2o");
+  CHECK(complaint(request).find("cannot be read") != std::string::npos);
+  request.file = folder.path();
+  CHECK(complaint(request).find("is a folder") != std::string::npos);
+
+  request.file = folder.file("good.g2o");
+  write(request.file, squareWalk(2));
+  request.out = folder.file("no/such/folder/out.g2o");
+  CHECK(complaint(request).find("cannot be written") != std::string::npos);
+  request.out.clear();
+  write(request.file, "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 0 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n");
+  request.outliers = 3;
+  CHECK(complaint(request).find("--inject-outliers") != std::string::npos);
+  CHECK(run({"pose-graph"}) == kExitBadInput);
+  CHECK(run({"pose-graph", request.file, "--start", "elsewhere"}) == kExitBadInput);
+}
+
+TEST_CASE("a graph in pieces is solved piece by piece, with a warning") {
+  const ScratchFolder folder("pose_graph_pieces");
+  PoseGraphRequest request;
+  request.file = folder.file("in.g2o");
+  write(request.file, squareWalk(3) + "EDGE_SE2 1000 1001 1 2 0.3 1 0 0 1 0 1\n");
+  const PoseGraphResult result = runPoseGraph(request);
+  CHECK(result.pieces == 2);
+  REQUIRE(result.warnings.size() == 1);
+  CHECK(result.warnings[0].find("2 pieces") != std::string::npos);
+  CHECK(result.factored);
+}
+
+}  // namespace
+}  // namespace swiftlet
