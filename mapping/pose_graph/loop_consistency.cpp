@@ -71,11 +71,12 @@ ChainedLoop<Pose> chainLoop(const OdometryChain<Pose>& chain, const RelativePose
 }
 
 template <typename Pose>
-double logChance(const CycleTest& test, double max_chi_squared, double log_box) {
+double logChance(const CycleTest& test, double log_box) {
   constexpr int kDof = PoseSpace<Pose>::kDof;
   constexpr double kBall = kDof == 3 ? kBall3 : kBall6;
   constexpr double kTurns = kDof == 3 ? kTurns2 : kTurns3;
-  return std::log(kBall / kTurns) + 0.5 * kDof * std::log(max_chi_squared) + test.log_deviation - log_box;
+  return std::log(kBall / kTurns) + 0.5 * kDof * std::log(std::max(test.chi_squared, 1.0 * kDof)) +
+         test.log_deviation - log_box;
 }
 
 template <typename Pose>
@@ -130,8 +131,8 @@ template PoseMatrix<SE2> covarianceFromInformation(const PoseMatrix<SE2>&);
 template PoseMatrix<SE3> covarianceFromInformation(const PoseMatrix<SE3>&);
 template ChainedLoop<SE2> chainLoop(const OdometryChain<SE2>&, const RelativePose<SE2>&);
 template ChainedLoop<SE3> chainLoop(const OdometryChain<SE3>&, const RelativePose<SE3>&);
-template double logChance<SE2>(const CycleTest&, double, double);
-template double logChance<SE3>(const CycleTest&, double, double);
+template double logChance<SE2>(const CycleTest&, double);
+template double logChance<SE3>(const CycleTest&, double);
 template CycleTest odometryTest(const OdometryChain<SE2>&, const ChainedLoop<SE2>&);
 template CycleTest odometryTest(const OdometryChain<SE3>&, const ChainedLoop<SE3>&);
 template class PairTest<SE2>;

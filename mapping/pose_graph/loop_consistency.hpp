@@ -34,11 +34,11 @@ struct CycleTest {
   double log_deviation = 0;
 };
 
-/// Logarithm of the chance that a loop with a random relative pose passes a test that leaves this room:
-/// volume of the ellipsoid of chi-squared up to `max_chi_squared` over that of all rotations and the box of
-/// the scene. Above 0 the test says nothing.
+/// Logarithm of the chance that a loop with a random relative pose agrees as well as this: volume of the
+/// ellipsoid of chi-squared up to that found (at least its mean for true loops) over that of all rotations
+/// and the box of the scene, `log_box` (OdometryChain::logBox). Above 0 the test says nothing.
 template <typename Pose>
-double logChance(const CycleTest& test, double max_chi_squared, double log_box);
+double logChance(const CycleTest& test, double log_box);
 
 /// A loop made ready for the tests. `from` is before `to`: the constructor turns it otherwise.
 template <typename Pose>

@@ -149,15 +149,14 @@ void LoopSelection<Pose>::applyGate(Held& held, const CycleTest& gate) {
   held.gate = gate;
   held.passed = gate.chi_squared <= settings_.gate_chi_squared;
   held.proven = held.chained.withinComponent() &&
-                logChance<Pose>(gate, settings_.gate_chi_squared, chain_.logBox(held.chained.to)) <=
-                    std::log(settings_.max_chance);
+                logChance<Pose>(gate, chain_.logBox(held.chained.to)) <= std::log(settings_.max_gate_chance);
 }
 
 template <typename Pose>
 void LoopSelection<Pose>::testPairs(std::uint32_t id) {
   const Held& a = held_[id];
   const PairTest<Pose> test(chain_, a.chained);
-  const double log_chance = std::log(settings_.max_chance);
+  const double log_chance = std::log(settings_.max_pair_chance);
   for (std::uint32_t k = 0; k < held(); ++k) {
     const Held& b = held_[k];
     if (k == id || !b.passed || b.group != a.group) {
@@ -170,7 +169,7 @@ void LoopSelection<Pose>::testPairs(std::uint32_t id) {
     }
     consistency_.connect(id, k);
     const double log_box = chain_.logBox(std::max(a.chained.to, b.chained.to));
-    if (logChance<Pose>(pair, settings_.pair_chi_squared, log_box) <= log_chance) {
+    if (logChance<Pose>(pair, log_box) <= log_chance) {
       support_.connect(id, k);
     }
   }

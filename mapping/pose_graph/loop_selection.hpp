@@ -49,7 +49,12 @@ struct LoopSelectionSettings {
   double gate_chi_squared =
       0;  ///< chiSquaredOfTail(dof, probability), or the square of a Mahalanobis distance
   double pair_chi_squared = 0;
-  double max_chance = 1e-2;       ///< that a random loop passes a test which then counts as support
+  /// That a random loop agrees as well with the odometry, for the gate alone to prove the loop: of thousands
+  /// of false loops a few.
+  double max_gate_chance = 1e-3;
+  /// That a random loop agrees as well with another, for the pair to count as support. Larger: a loop of the
+  /// set has also agreed with all others.
+  double max_pair_chance = 1e-2;
   std::uint32_t min_support = 1;  ///< agreeing loops, where the gate alone is no proof
   std::uint32_t min_between = 3;  ///< loops that tie two components at least
   bool pairwise = true;           ///< false: all that pass the gate are selected (for comparison)
