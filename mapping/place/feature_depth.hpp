@@ -3,7 +3,7 @@
 // odometry's landmarks.
 //
 // Stereo: a feature's ray is cut at inverse distances from 0 to 1 / min_distance and projected into camera 1
-// through its own lens model, half a pixel apart at half resolution; at each the patch of camera 0, warped by
+// through its own lens model, one pixel apart at half resolution; at each the patch of camera 0, warped by
 // the rotation between the cameras and both lenses, is compared by zero-mean normalized correlation. The best
 // place must be clearly better than its rivals; it is refined in camera 1 to a part of a pixel (Lucas, Kanade
 // 1981, two unknown shifts, mean removed) and must stay near the epipolar curve. The inverse distance is the
@@ -32,7 +32,7 @@ namespace swiftlet {
 
 struct StereoDepthSettings {
   double min_distance = 0.4;      ///< m
-  double pixel_sigma = 0.2;      ///< px, of a match along the epipolar curve
+  double pixel_sigma = 0.2;       ///< px, of a match along the epipolar curve
   double epipolar_gate = 1.5;     ///< px
   float min_correlation = 0.75F;  ///< at full resolution
   float rival_lead = 0.05F;  ///< a rival with a correlation less than this below the best makes it unsafe

@@ -14,6 +14,8 @@ constexpr int kRefineRadius = 4;
 constexpr int kRefineSide = 2 * kRefineRadius + 1;
 constexpr int kRefineArea = kRefineSide * kRefineSide;
 constexpr int kMaxSamples = 200;
+// Distance of the samples [px of the whole image].
+constexpr double kSampleStep = 2.0;
 // Whole-pixel sampling costs correlation: the search asks for less than the refinement.
 constexpr float kMinSearchCorrelation = 0.6F;
 // Samples nearer than this to the best belong to its own peak.
@@ -162,7 +164,7 @@ bool StereoDepth::search(const PlaceFeature& feature, const Eigen::Vector3d& bea
   int samples = kMaxSamples;
   if (rig_.camera[1].project(rotated, far_end) &&
       rig_.camera[1].project(rotated + nearest * T_1_0_.translation, near_end)) {
-    samples = std::clamp(static_cast<int>((near_end - far_end).norm()) + 2, 2, kMaxSamples);
+    samples = std::clamp(static_cast<int>((near_end - far_end).norm() / kSampleStep) + 2, 2, kMaxSamples);
   }
   std::array<float, kMaxSamples> correlation{};
   int best = -1;
@@ -186,8 +188,7 @@ bool StereoDepth::search(const PlaceFeature& feature, const Eigen::Vector3d& bea
   if (best < 0 || correlation[static_cast<std::size_t>(best)] < kMinSearchCorrelation) return false;
   const float limit = correlation[static_cast<std::size_t>(best)] - settings_.rival_lead;
   for (int i = 0; i < samples; ++i) {
-    // Samples are one pixel of the whole image apart: the peak is twice as wide as at half resolution.
-    if (std::abs(i - best) > 2 * kPeakWidth && correlation[static_cast<std::size_t>(i)] > limit) return false;
+    if (std::abs(i - best) > kPeakWidth && correlation[static_cast<std::size_t>(i)] > limit) return false;
   }
   return true;
 }

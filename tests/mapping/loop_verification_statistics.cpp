@@ -112,8 +112,8 @@ void verifyPairs(const ImageSet& set, const Prepared& prepared, const LoopVerifi
         std::fprintf(dump, "%s %zu %zu %d %d %.3f %.2f %zu %zu %zu %zu %zu %.3f %.3f %.2f\n",
                      set.name.c_str(), i, j, static_cast<int>(kind), static_cast<int>(result.fate),
                      d.translation.norm(), logSo3(d.rotation).norm() * 57.3, result.matches,
-                     result.matches_with_depth, result.consensus, result.kept, result.inliers.size(),
-                     0.0, result.spread, result.chi_squared_per_dof);
+                     result.matches_with_depth, result.consensus, result.kept, result.inliers.size(), 0.0,
+                     result.spread, result.chi_squared_per_dof);
       }
       if (!result.accepted()) {
         ++(kind == PairKind::kRevisit ? out.lost : out.refused)[result.fate];

@@ -157,3 +157,123 @@ TEST_CASE("the covariance is honest over many scenes") {
   CHECK(sparse.nees == Approx(6).margin(1.2));
   CHECK(noisy.nees < 10);
 }
+
+namespace {
+
+LoopFate fateOf(const SceneSettings& scene, const LoopVerificationSettings& settings = {},
+                std::uint64_t seed = 3) {
+  const auto verifier = std::make_unique<LoopVerifier>(makeRig(), settings);
+  return verifyScene(*verifier, makeScene(scene, seed)).fate;
+}
+
+}  // namespace
+
+TEST_CASE("each candidate's fate says where it ended") {
+  CHECK(fateOf({}) == LoopFate::kAccepted);
+  SceneSettings unlike;
+  unlike.common = 5;
+  CHECK(fateOf(unlike) == LoopFate::kTooFewMatches);
+  SceneSettings blind;
+  blind.depth_share = 0;
+  CHECK(fateOf(blind) == LoopFate::kTooFewDepths);
+  SceneSettings chance;
+  chance.common = 0;
+  chance.twins = 0.6;
+  CHECK(fateOf(chance) == LoopFate::kNoConsensus);
+  SceneSettings drowned;
+  drowned.common = 30;
+  drowned.alone = 250;
+  drowned.twins = 0.9;
+  CHECK(fateOf(drowned) == LoopFate::kLowShare);
+  LoopVerificationSettings strict;
+  strict.min_inliers = 400;
+  CHECK(fateOf({}, strict) == LoopFate::kTooFewInliers);
+  strict = {};
+  strict.min_spread = strict.min_spread_of_many = 0.8;
+  CHECK(fateOf({}, strict) == LoopFate::kPoorSpread);
+  strict = {};
+  strict.max_chi_squared_per_dof = 0.1;
+  CHECK(fateOf({}, strict) == LoopFate::kPoorFit);
+  strict = {};
+  strict.max_rotation_sigma = 1e-5;
+  CHECK(fateOf({}, strict) == LoopFate::kIllConditioned);
+  strict = {};
+  strict.max_distance = 0.1;
+  CHECK(fateOf({}, strict) == LoopFate::kTooFar);
+  for (std::size_t i = 0; i < kLoopFates; ++i) CHECK(std::strlen(describe(static_cast<LoopFate>(i))) > 3);
+}
+
+TEST_CASE("chance matches are never a loop") {
+  const auto verifier = std::make_unique<LoopVerifier>(makeRig());
+  SceneSettings settings;
+  settings.common = 0;
+  settings.alone = 200;
+  settings.twins = 0.8;
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    CHECK_FALSE(verifyScene(*verifier, makeScene(settings, seed)).accepted());
+  }
+}
+
+TEST_CASE("input that is not finite and settings out of range are refused") {
+  const auto verifier = std::make_unique<LoopVerifier>(makeRig());
+  const Scene good = makeScene({}, 1);
+  LoopVerification result;
+  CHECK(verifier->verify(good.old_keyframe, good.new_keyframe, {}, 0.0, result).code ==
+        StatusCode::kInvalidInput);
+  for (int field = 0; field < 4; ++field) {
+    Scene scene = good;
+    PlaceFeature& f = scene.new_keyframe.features[7];
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    if (field == 0) f.pixel.x() = nan;
+    if (field == 1) f.bearing.y() = nan;
+    if (field == 2) f.inverse_depth = std::numeric_limits<float>::infinity();
+    if (field == 3) f.inverse_depth_sigma = nan;
+    CHECK(verifyScene(*verifier, scene).fate == LoopFate::kInvalidInput);
+  }
+  LoopVerificationSettings settings;
+  settings.pixel_sigma = 0;
+  const auto wrong = std::make_unique<LoopVerifier>(makeRig(), settings);
+  CHECK(wrong->verify(good.old_keyframe, good.new_keyframe, {}, 1.0, result).code ==
+        StatusCode::kInvalidInput);
+}
+
+TEST_CASE("the same candidate gives the same bytes, whatever came before") {
+  SceneSettings settings;
+  settings.twins = 0.5;
+  const Scene scene = makeScene(settings, 9);
+  const auto fresh = std::make_unique<LoopVerifier>(makeRig());
+  const auto used = std::make_unique<LoopVerifier>(makeRig());
+  (void)verifyScene(*used, makeScene(settings, 10));
+  const LoopVerification a = verifyScene(*fresh, scene);
+  const LoopVerification b = verifyScene(*used, scene);
+  CHECK(a.fate == b.fate);
+  CHECK(a.samples == b.samples);
+  CHECK(a.T_old_new.translation == b.T_old_new.translation);
+  CHECK(a.T_old_new.rotation.coeffs() == b.T_old_new.rotation.coeffs());
+  CHECK(a.covariance == b.covariance);
+  CHECK(std::equal(a.inliers.begin(), a.inliers.end(), b.inliers.begin(), b.inliers.end()));
+}
+
+TEST_CASE("one point with the rotation, and five points with a scale, find the motion too") {
+  Random random(12);
+  const auto consensus = std::make_unique<LoopConsensus>();
+  int one = 0;
+  int five = 0;
+  for (int n = 0; n < 20; ++n) {
+    const SE3 truth(expSo3(0.4 * randomVector(random)), 0.5 * randomVector(random));
+    MatchedPoints points = exactPoints(truth, random, 60);
+    // A third is false.
+    for (std::size_t i = 0; i < 20; ++i)
+      points[3 * i].new_view.bearing = (randomVector(random) + 3 * Eigen::Vector3d::UnitZ()).normalized();
+    const std::span<MatchedPoint> all(points.data(), points.size());
+    ConsensusResult result;
+    if (consensus->onePoint(all, truth.rotation * expSo3(0.01 * randomVector(random)), 7, result).ok() &&
+        poseError(result.T_old_new, truth).norm() < 0.05) {
+      ++one;
+    }
+    if (consensus->fivePoint(all, 7, result).ok() && poseError(result.T_old_new, truth).norm() < 0.05) ++five;
+  }
+  INFO(one << ' ' << five);
+  CHECK(one >= 18);
+  CHECK(five >= 17);
+}
