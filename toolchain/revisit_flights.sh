@@ -6,13 +6,14 @@
 #   NAME...   only these; default all
 #   --list    print name, seconds and what is flown; write nothing
 #   --tracks  feature tracks in place of images (seconds in all; for replay --tracks)
-# SWIFTLET_DATA  folder of recorded logs, for euroc_imu_gt_all (default ../shared/data)
-# SWIFTLET       the program (default build/release/bin/swiftlet)
+# SWIFTLET_DATA  folder of recorded logs, for euroc_imu_gt_all (default ../shared/data, seen from the project's root)
+# SWIFTLET       the program (default build/release/bin/swiftlet, seen from there too)
 # THREADS        that render (default: all cores)
 # Fixed seeds: the same bytes every time. What is complete is kept: a flight is written as OUT/NAME.part and renamed
 # at its end, so a run that was stopped goes on where it was. All of them take an hour (5 pairs a second on two cores)
 # and 4 GB. Exit code 0 when all are there, 1 when one failed, 2 wrong use.
 set -eu
+start=$PWD
 cd "$(dirname "$0")/.."
 
 # name, seed, seconds, sequence and seconds left out at its start (chosen so that the flight revisits: a tenth to a
@@ -52,7 +53,10 @@ case ${1:-} in
     exit 2
     ;;
 esac
-out=$1
+case $1 in
+  /*) out=$1 ;;
+  *) out=$start/$1 ;;
+esac
 shift
 
 swiftlet=${SWIFTLET:-build/release/bin/swiftlet}

@@ -13,7 +13,7 @@
 namespace swiftlet::test {
 
 struct RevisitSettings {
-  double min_apart = 20;      ///< s
+  double min_apart = 12;      ///< s
   double max_distance = 1.0;  ///< m
   double max_turn = 0.52;     ///< rad
   std::size_t min_matches = 15;
