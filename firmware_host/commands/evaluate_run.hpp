@@ -29,8 +29,8 @@ struct Truth {
 Truth readTruth(const std::string& path, bool without_images = false);
 
 /// What summary.json holds under "accuracy": odometry.tum over all and from kCommonStart, SE(3) and yaw
-/// alignment; states.csv with its consistency; map.tum when it exists, by itself and beside odometry.tum at the
-/// same stamps; how much of the flight revisits.
+/// alignment; states.csv with its consistency; map.tum when it exists, by itself and beside odometry.tum at
+/// the same stamps; how much of the flight revisits.
 nlohmann::ordered_json runAccuracyJson(const std::string& folder, const Trajectory& truth,
                                        const std::string& truth_name, Stamp first_image,
                                        const EvaluationGroup& settings);
