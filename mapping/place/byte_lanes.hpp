@@ -7,11 +7,14 @@
 #include <cstdint>
 #include <cstring>
 
+#include "estimator/core/simd.hpp"
+
 namespace swiftlet::byte_lanes {
 
 struct Scalar {
   static constexpr int kWidth = 16;
   using Bytes = std::array<std::uint8_t, kWidth>;
+  using Isa = simd::Scalar;  ///< for 16-bit lanes
 
   static Bytes load(const std::uint8_t* from) {
     Bytes v;
@@ -22,6 +25,11 @@ struct Scalar {
     for (std::size_t i = 0; i < kWidth; ++i) to[i] = v[i];
   }
   static Bytes zero() { return {}; }
+  static Bytes broadcast(std::uint8_t x) {
+    Bytes v;
+    v.fill(x);
+    return v;
+  }
   static Bytes min(const Bytes& a, const Bytes& b) {
     Bytes v;
     for (std::size_t i = 0; i < kWidth; ++i) v[i] = a[i] < b[i] ? a[i] : b[i];
@@ -55,6 +63,7 @@ inline constexpr int kNativeWidth = 16;
 struct Native {
   static constexpr int kWidth = kNativeWidth;
   using Bytes [[gnu::vector_size(kNativeWidth)]] = std::uint8_t;
+  using Isa = simd::Native;
 
   static Bytes load(const std::uint8_t* from) {
     Bytes v;
@@ -63,6 +72,7 @@ struct Native {
   }
   static void store(std::uint8_t* to, const Bytes& v) { std::memcpy(to, &v, sizeof v); }
   static Bytes zero() { return Bytes{}; }
+  static Bytes broadcast(std::uint8_t x) { return Bytes{} + x; }
   static Bytes min(const Bytes& a, const Bytes& b) { return a < b ? a : b; }
   static Bytes max(const Bytes& a, const Bytes& b) { return a > b ? a : b; }
   static Bytes above(const Bytes& a, const Bytes& b) { return max(a, b) - b; }

@@ -75,6 +75,30 @@ void fastScoreRow(const std::uint8_t* row, std::ptrdiff_t stride, int begin, int
   }
 }
 
+template <typename Lanes>
+void peaksOfRow(const std::uint8_t* scores, std::ptrdiff_t stride, int begin, int end, std::uint8_t least,
+                std::uint8_t* peaks) {
+  using Bytes = typename Lanes::Bytes;
+  const Bytes one = Lanes::broadcast(1);
+  const Bytes below_least = Lanes::broadcast(static_cast<std::uint8_t>(least - 1));
+  for (int x = begin; x < end; x += Lanes::kWidth) {
+    const std::uint8_t* here = scores + x;
+    const std::uint8_t* up = here - stride;
+    const std::uint8_t* down = here + stride;
+    const Bytes before = Lanes::max(Lanes::max(Lanes::load(up - 1), Lanes::load(up)),
+                                    Lanes::max(Lanes::load(up + 1), Lanes::load(here - 1)));
+    const Bytes after = Lanes::max(Lanes::max(Lanes::load(down - 1), Lanes::load(down)),
+                                   Lanes::max(Lanes::load(down + 1), Lanes::load(here + 1)));
+    // Above those before it, at least those after it: above one less.
+    const Bytes limit = Lanes::max(Lanes::max(before, below_least), Lanes::above(after, one));
+    Lanes::store(peaks + x, Lanes::above(Lanes::load(here), limit));
+  }
+}
+
+template void peaksOfRow<byte_lanes::Native>(const std::uint8_t*, std::ptrdiff_t, int, int, std::uint8_t,
+                                             std::uint8_t*);
+template void peaksOfRow<byte_lanes::Scalar>(const std::uint8_t*, std::ptrdiff_t, int, int, std::uint8_t,
+                                             std::uint8_t*);
 template void fastScoreRow<byte_lanes::Native>(const std::uint8_t*, std::ptrdiff_t, int, int, std::uint8_t,
                                                std::uint8_t*);
 template void fastScoreRow<byte_lanes::Scalar>(const std::uint8_t*, std::ptrdiff_t, int, int, std::uint8_t,

@@ -23,4 +23,11 @@ template <typename Lanes = byte_lanes::Native>
 void fastScoreRow(const std::uint8_t* row, std::ptrdiff_t stride, int begin, int end, std::uint8_t least,
                   std::uint8_t* score);
 
+/// Not 0 where a pixel of [begin, end) has a score of at least `least` (> 0) that is the maximum of its 3 x 3
+/// pixels (of equals the first in reading order); whole vectors are written. Rows above and below exist, and
+/// a pixel before `begin`.
+template <typename Lanes = byte_lanes::Native>
+void peaksOfRow(const std::uint8_t* scores, std::ptrdiff_t stride, int begin, int end, std::uint8_t least,
+                std::uint8_t* peaks);
+
 }  // namespace swiftlet

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "mapping/place/fast_score.hpp"
 
@@ -51,11 +52,12 @@ PlaceExtractor::PlaceExtractor(int width, int height, const PlaceExtractorSettin
   for (int l = 0; l < pyramid_.octaves(); ++l) {
     const ImageView level = pyramid_.level(l);
     scores_[static_cast<std::size_t>(l)].assign(
-        static_cast<std::size_t>(level.stride) * static_cast<std::size_t>(level.height), 0);
+        static_cast<std::size_t>(level.stride) * static_cast<std::size_t>(level.height + 1), 0);
     const auto cells = static_cast<std::size_t>((level.width / kMinCell + 1) * (level.height / kMinCell + 1));
     most_cells = std::max(most_cells, cells);
   }
   cells_.resize(most_cells);
+  peaks_.resize(static_cast<std::size_t>(pyramid_.level(0).stride), 0);
   spots_.reserve(most_cells * kPerCell);
 }
 
@@ -102,6 +104,7 @@ void PlaceExtractor::keepInCell(Cell& cell, const Spot& spot) const {
   cell.best[at] = spot;
 }
 
+template <typename Lanes>
 void PlaceExtractor::findSpots(int octave, int wanted) {
   spots_.clear();
   const ImageView level = pyramid_.level(octave);
@@ -114,24 +117,30 @@ void PlaceExtractor::findSpots(int octave, int wanted) {
   const int rows = (height + side - 1) / side;
   for (int c = 0; c < columns * rows; ++c) cells_[static_cast<std::size_t>(c)].count = 0;
   const std::uint8_t* scores = scores_[static_cast<std::size_t>(octave)].data();
-  const std::ptrdiff_t stride = level.stride;
-  const int least = settings_.min_score;
+  const int end = level.width - kBorder;
   for (int y = kBorder; y < level.height - kBorder; ++y) {
-    const std::uint8_t* here = scores + y * stride;
+    const std::uint8_t* here = scores + static_cast<std::ptrdiff_t>(y) * level.stride;
+    peaksOfRow<Lanes>(here, level.stride, kBorder, end, static_cast<std::uint8_t>(settings_.min_score),
+                      peaks_.data());
     Cell* row = cells_.data() + static_cast<std::ptrdiff_t>((y - kBorder) / side) * columns;
-    for (int x = kBorder; x < level.width - kBorder; ++x) {
-      const int s = here[x];
-      if (s < least) continue;
-      const std::uint8_t* up = here + x - stride;
-      const std::uint8_t* down = here + x + stride;
-      const bool maximum = s > up[-1] && s > up[0] && s > up[1] && s > here[x - 1] && s >= here[x + 1] &&
-                           s >= down[-1] && s >= down[0] && s >= down[1];
-      if (!maximum) continue;
-      keepInCell(row[(x - kBorder) / side], {static_cast<std::int16_t>(x), static_cast<std::int16_t>(y),
-                                             static_cast<std::uint8_t>(s), 0, 0});
+    constexpr int kWord = 8;  // peaks are few: eight pixels are looked at together
+    for (int x = kBorder; x < end; x += kWord) {
+      std::uint64_t eight = 0;
+      std::memcpy(&eight, peaks_.data() + x, sizeof eight);
+      if (eight == 0) continue;
+      for (int at = x; at < std::min(x + kWord, end); ++at) {
+        if (peaks_[static_cast<std::size_t>(at)] == 0) continue;
+        keepInCell(row[(at - kBorder) / side],
+                   {static_cast<std::int16_t>(at), static_cast<std::int16_t>(y), here[at], 0, 0});
+      }
     }
   }
-  for (int c = 0; c < columns * rows; ++c) {
+  orderSpots(octave, columns * rows);
+}
+
+void PlaceExtractor::orderSpots(int octave, int cells) {
+  const ImageView level = pyramid_.level(octave);
+  for (int c = 0; c < cells; ++c) {
     Cell& cell = cells_[static_cast<std::size_t>(c)];
     for (std::size_t i = 0; i < cell.count; ++i) {
       Spot& spot = cell.best[i];
@@ -226,7 +235,7 @@ Status PlaceExtractor::extract(const ImageView& image, const CameraModel& camera
   keyframe.features.clear();
   keyframe.index = tracked.index;
   keyframe.stamp = tracked.stamp;
-  if (!pyramid_.build(image))
+  if (!pyramid_.build<typename Lanes::Isa>(image))
     return {StatusCode::kInvalidInput, "place recognition got an image of another size"};
   for (int l = 0; l < pyramid_.octaves(); ++l) score<Lanes>(l);
   addTracked(camera, tracked, keyframe);
@@ -237,7 +246,7 @@ Status PlaceExtractor::extract(const ImageView& image, const CameraModel& camera
     due += share(l, corners);
     if (l == 0) due = settings_.features - static_cast<int>(keyframe.features.size());
     const std::size_t before = keyframe.features.size();
-    findSpots(l, due);
+    findSpots<Lanes>(l, due);
     addCorners(l, due, camera, keyframe);
     due -= static_cast<int>(keyframe.features.size() - before);
   }

@@ -62,7 +62,9 @@ class PlaceExtractor {
   static bool stronger(const Spot& a, const Spot& b);
   template <typename Lanes>
   void score(int octave);
+  template <typename Lanes>
   void findSpots(int octave, int wanted);
+  void orderSpots(int octave, int cells);
   void keepInCell(Cell& cell, const Spot& spot) const;
   [[nodiscard]] bool inside(int octave, int x, int y) const;
   [[nodiscard]] int share(int octave, int features) const;
@@ -76,6 +78,7 @@ class PlaceExtractor {
   PlacePyramid pyramid_;
   SteeredBrief brief_;
   std::array<std::vector<std::uint8_t>, kMaxOctaves> scores_;  ///< as the pyramid's levels
+  std::vector<std::uint8_t> peaks_;                            ///< of a row
   std::vector<Cell> cells_;
   std::vector<Spot> spots_;  ///< of the octave in hand, in the order in which they are wanted
 };

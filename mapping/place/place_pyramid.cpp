@@ -9,8 +9,9 @@
 namespace swiftlet {
 namespace {
 
-// Weights of neighbours, in 1/128: a byte times two of them fits 16 bits with its rounding.
+// Weights of neighbours, in 1/128: a byte times them fits 15 bits with its rounding.
 constexpr int kWeightBits = 7;
+constexpr int kLanes = 16;
 constexpr int kOne = 1 << kWeightBits;
 
 struct Neighbour {
@@ -44,15 +45,18 @@ PlacePyramid::PlacePyramid(int width, int height, int octaves)
                         0);
     if (l == 0) continue;
     const int from_width = levels_[static_cast<std::size_t>(l - 1)].width;
-    for (int x = 0; x < level.width; ++x) {
-      const Neighbour n = source(x, level.width, from_width);
-      level.column.push_back(n.first);
-      level.weight.push_back(static_cast<std::uint16_t>(n.weight));
+    // Whole blocks: what lies beyond the last column repeats it.
+    for (int x = 0; x < (level.width + kLanes - 1) / kLanes * kLanes; ++x) {
+      const Neighbour n = source(std::min(x, level.width - 1), level.width, from_width);
+      if (x % kLanes == 0) level.first.push_back(n.first);
+      level.left.push_back(static_cast<std::int16_t>(n.first - level.first.back()));
+      level.weight.push_back(static_cast<std::int16_t>(n.weight));
     }
   }
-  for (auto& row : rows_) row.assign(static_cast<std::size_t>(width), 0);
+  row_.assign(static_cast<std::size_t>(width + kFastScoreOverrun), 0);
 }
 
+template <typename Isa>
 bool PlacePyramid::build(const ImageView& image) {
   Level& base = levels_[0];
   if (image.empty() || image.width != base.width || image.height != base.height) return false;
@@ -60,40 +64,45 @@ bool PlacePyramid::build(const ImageView& image) {
     std::memcpy(base.pixels.data() + static_cast<std::ptrdiff_t>(y) * base.stride, image.row(y),
                 static_cast<std::size_t>(base.width));
   }
-  for (std::size_t l = 1; l < static_cast<std::size_t>(octaves_); ++l) shrink(levels_[l - 1], levels_[l]);
+  for (std::size_t l = 1; l < static_cast<std::size_t>(octaves_); ++l)
+    shrink<Isa>(levels_[l - 1], levels_[l]);
   return true;
 }
 
-void PlacePyramid::resampleRow(const Level& from, int y, const Level& to,
-                               std::vector<std::uint16_t>& out) const {
-  const std::uint8_t* row = from.pixels.data() + static_cast<std::ptrdiff_t>(y) * from.stride;
-  for (std::size_t x = 0; x < static_cast<std::size_t>(to.width); ++x) {
-    const std::uint8_t* two = row + to.column[x];
-    out[x] = static_cast<std::uint16_t>(two[0] * (kOne - to.weight[x]) + two[1] * to.weight[x]);
+template <typename Isa>
+void PlacePyramid::shrink(const Level& from, Level& to) {
+  const auto one = Isa::broadcast(1);
+  const auto whole = Isa::broadcast(kOne);
+  const auto half = Isa::broadcast(kOne / 2);
+  for (int y = 0; y < to.height; ++y) {
+    const Neighbour n = source(y, to.height, from.height);
+    const std::uint8_t* upper = from.pixels.data() + static_cast<std::ptrdiff_t>(n.first) * from.stride;
+    const auto below = Isa::broadcast(static_cast<std::int16_t>(n.weight));
+    const auto above = Isa::subtract(whole, below);
+    // Sums stay below 2^15: 255 * kOne + kOne / 2.
+    for (int x = 0; x < from.width; x += kLanes) {
+      const auto sum = Isa::add(Isa::multiply(Isa::widen(upper + x), above),
+                                Isa::multiply(Isa::widen(upper + from.stride + x), below));
+      Isa::storeBytes(row_.data() + x, Isa::template shiftRight<kWeightBits>(Isa::add(sum, half)));
+    }
+    std::uint8_t* out = to.pixels.data() + static_cast<std::ptrdiff_t>(y) * to.stride;
+    for (std::size_t block = 0; block < to.first.size(); ++block) {
+      const std::size_t x = block * kLanes;
+      const std::uint8_t* source_row = row_.data() + to.first[block];
+      const auto left = Isa::load(to.left.data() + x);
+      const auto weight = Isa::load(to.weight.data() + x);
+      const auto a = Isa::pick(source_row, Isa::places(left));
+      const auto b = Isa::pick(source_row, Isa::places(Isa::add(left, one)));
+      const auto sum = Isa::add(Isa::multiply(a, Isa::subtract(whole, weight)), Isa::multiply(b, weight));
+      Isa::storeBytes(out + x, Isa::template shiftRight<kWeightBits>(Isa::add(sum, half)));
+    }
   }
 }
 
-void PlacePyramid::shrink(const Level& from, Level& to) {
-  int upper = -1;  // the row of `from` that rows_[0] holds; rows_[1] holds the next
-  for (int y = 0; y < to.height; ++y) {
-    const Neighbour n = source(y, to.height, from.height);
-    if (n.first == upper + 1 && upper >= 0) {
-      std::swap(rows_[0], rows_[1]);
-      resampleRow(from, n.first + 1, to, rows_[1]);
-    } else if (n.first != upper) {
-      resampleRow(from, n.first, to, rows_[0]);
-      resampleRow(from, n.first + 1, to, rows_[1]);
-    }
-    upper = n.first;
-    const auto a = static_cast<std::uint32_t>(kOne - n.weight);
-    const auto b = static_cast<std::uint32_t>(n.weight);
-    std::uint8_t* out = to.pixels.data() + static_cast<std::ptrdiff_t>(y) * to.stride;
-    constexpr std::uint32_t kHalf = 1U << (2 * kWeightBits - 1);
-    for (std::size_t x = 0; x < static_cast<std::size_t>(to.width); ++x) {
-      out[x] = static_cast<std::uint8_t>((rows_[0][x] * a + rows_[1][x] * b + kHalf) >> (2 * kWeightBits));
-    }
-  }
-}
+template bool PlacePyramid::build<simd::Native>(const ImageView&);
+#ifdef SWIFTLET_SIMD_NATIVE
+template bool PlacePyramid::build<simd::Scalar>(const ImageView&);
+#endif
 
 ImageView PlacePyramid::level(int octave) const {
   const Level& l = levels_[static_cast<std::size_t>(octave)];

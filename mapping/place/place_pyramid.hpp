@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "estimator/core/image_view.hpp"
+#include "estimator/core/simd.hpp"
 
 namespace swiftlet {
 
@@ -24,6 +25,7 @@ class PlacePyramid {
 
   [[nodiscard]] int octaves() const { return octaves_; }
   /// False, and nothing done, for an image of another size.
+  template <typename Isa = simd::Native>
   [[nodiscard]] bool build(const ImageView& image);
   [[nodiscard]] ImageView level(int octave) const;
   /// Between a pixel of a level and the same place in the image, both with (0,0) at a pixel's centre.
@@ -37,17 +39,18 @@ class PlacePyramid {
     int stride = 0;
     Eigen::Array2f ratio = Eigen::Array2f::Ones();  ///< pixels of the image per pixel, along x and y
     std::vector<std::uint8_t> pixels;
-    /// Where each column comes from in the level before: left neighbour and weight of the right one.
-    std::vector<std::int32_t> column;
-    std::vector<std::uint16_t> weight;
+    /// Where sixteen columns in a row come from in the level before: the first, and from there their left
+    /// neighbours and the weights of their right ones.
+    std::vector<std::int32_t> first;
+    std::vector<std::int16_t> left, weight;
   };
 
+  template <typename Isa>
   void shrink(const Level& from, Level& to);
-  void resampleRow(const Level& from, int y, const Level& to, std::vector<std::uint16_t>& out) const;
 
   int octaves_;
   std::array<Level, kMaxOctaves> levels_;
-  std::array<std::vector<std::uint16_t>, 2> rows_;  ///< two rows of a level, resampled along x
+  std::vector<std::uint8_t> row_;  ///< a row of a level, blended of two
 };
 
 }  // namespace swiftlet

@@ -107,7 +107,7 @@ TEST_CASE("Features cover the image and carry bearings") {
     CHECK(f.inverse_depth == 0);
     CHECK_FALSE(f.has_landmark);
   }
-  CHECK(*std::min_element(cell.begin(), cell.end()) >= 8);
+  CHECK(*std::min_element(cell.begin(), cell.end()) >= 4);
 }
 
 TEST_CASE("Descriptors survive turning, moving, scaling and noise as OpenCV's ORB does") {
