@@ -202,6 +202,15 @@ TEST_CASE("DBoW2's YAML is read, in any order") {
                     refused("does not unpack"));
 }
 
+TEST_CASE("Compressed YAML and the compact form are read from files") {
+  const std::string folder = SWIFTLET_SOURCE_ROOT "/tests/fuzz/corpus/vocabulary/";
+  const Vocabulary packed = readVocabulary(folder + "dbow2.yml.gz");
+  CHECK(packed.words() == 3);
+  CHECK(packed.compact() == readVocabulary(folder + "dbow2.yml").compact());
+  CHECK(readVocabulary(folder + "compact.swv").compact() == readVocabulary(folder + "orbvoc.txt").compact());
+  CHECK_THROWS_AS(readVocabulary(folder + "absent"), InputError);
+}
+
 TEST_CASE("Lists of nodes that are no tree are refused") {
   Vocabulary vocabulary;
   std::vector<VocabularyNode> nodes(3);
