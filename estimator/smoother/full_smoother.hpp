@@ -118,6 +118,7 @@ class FullSmoother {
     Matrix6d root_information;
     std::size_t first_match = 0;  // in matches_
     std::size_t match_count = 0;
+    std::size_t repeated = 0;  // matches that an earlier loop named
   };
   struct System;
   class Solver;
@@ -135,7 +136,7 @@ class FullSmoother {
                                   Sighting& sighting) const;
   [[nodiscard]] bool findKeyframe(Stamp stamp, std::size_t& k) const;
   [[nodiscard]] bool findOldTrack(std::size_t keyframe, const RevisitFeature& feature, TrackKey& key);
-  [[nodiscard]] bool addMatch(const RevisitMatch& match, std::size_t old_keyframe, std::size_t new_keyframe);
+  void addMatch(const RevisitMatch& match, Revisit& revisit);
   void joinWorlds();
   void moveWorld(std::uint32_t world, const SE3& T_to_from);
   void tieWorlds(bool by_matches);

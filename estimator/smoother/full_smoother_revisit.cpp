@@ -53,7 +53,7 @@ Status FullSmoother::addRevisit(const LoopRevisit& loop) {
   revisit.root_information = llt.matrixU();
   revisit.first_match = matches_.size();
   for (const RevisitMatch& match : loop.matches) {
-    if (addMatch(match, revisit.old_keyframe, revisit.new_keyframe)) ++revisit.match_count;
+    addMatch(match, revisit);
   }
   revisits_.push_back(revisit);
   return okStatus();
@@ -93,30 +93,32 @@ bool FullSmoother::findOldTrack(std::size_t keyframe, const RevisitFeature& feat
   return true;
 }
 
-bool FullSmoother::addMatch(const RevisitMatch& match, std::size_t old_keyframe, std::size_t new_keyframe) {
+void FullSmoother::addMatch(const RevisitMatch& match, Revisit& revisit) {
+  const std::size_t new_keyframe = revisit.new_keyframe;
   Match made;
   const RevisitFeature& seen = match.new_feature;
   const TrackKey new_key{keyframes_[new_keyframe].epoch, seen.track};
   if (!makeSighting(new_keyframe, seen.seen, seen.pixel, settings_.match_sigma, made.sighting)) {
     const auto track = seen.has_track ? tracks_.find(new_key) : tracks_.end();
-    if (track == tracks_.end()) return false;
+    if (track == tracks_.end()) return;
     const auto at = std::ranges::find(track->second.sightings, new_keyframe, &Sighting::slot);
-    if (at == track->second.sightings.end()) return false;
+    if (at == track->second.sightings.end()) return;
     made.sighting = *at;
     for (CameraSighting& view : made.sighting.camera) {
       if (view.used) view.weight *= settings_.pixel_sigma / settings_.match_sigma;
     }
   }
-  if (!findOldTrack(old_keyframe, match.old_feature, made.track)) return false;
+  if (!findOldTrack(revisit.old_keyframe, match.old_feature, made.track)) return;
   const std::vector<Sighting>& own = tracks_[made.track].sightings;
   if (std::ranges::find(own, new_keyframe, &Sighting::slot) != own.end() ||
-      matched_slots_.contains({made.track, new_keyframe})) {
-    return false;
+      matched_slots_.contains({made.track, new_keyframe}) ||
+      (seen.has_track && !matched_tracks_.emplace(made.track, new_key).second)) {
+    ++revisit.repeated;
+    return;
   }
-  if (seen.has_track && !matched_tracks_.emplace(made.track, new_key).second) return false;
   matched_slots_.emplace(made.track, new_keyframe);
   matches_.push_back(made);
-  return true;
+  ++revisit.match_count;
 }
 
 void FullSmoother::moveWorld(std::uint32_t world, const SE3& T_to_from) {
@@ -239,7 +241,7 @@ void FullSmoother::chooseMatches(double gate_sigmas) {
     for (std::size_t m = 0; m < revisit.match_count; ++m) {
       tryMatch(matches_[revisit.first_match + m], gate_sigmas);
     }
-    if (matchesInSystem(revisit) >= kLeastMatches) continue;
+    if (matchesInSystem(revisit) + revisit.repeated >= kLeastMatches) continue;
     for (std::size_t m = 0; m < revisit.match_count; ++m) {
       Match& match = matches_[revisit.first_match + m];
       if (!match.used) continue;

@@ -37,7 +37,10 @@ FullSmootherSettings fullSettings(const TrackFlight& flight) {
 /// From `cut` seconds on the odometry is in its second epoch, whose world is T_second_first from the first.
 Prepared prepared(double duration, std::uint64_t seed, double cut = 1e9, const SE3& T_second_first = {}) {
   Prepared run;
-  run.flight = std::make_unique<TrackFlight>(test::roomFlight(duration, seed));
+  SimulationSettings settings = test::roomFlight(duration, seed);
+  settings.tracks.max_tracks = 80;  // few, of as few landmarks: quick, and visits share as many
+  settings.tracks.landmarks = 2000;
+  run.flight = std::make_unique<TrackFlight>(settings);
   const TrackFlight& flight = *run.flight;
   run.full.emplace_back(flight.rig(), flight.noise(), fullSettings(flight));
   test::SmootherRun causal(flight);
