@@ -6,6 +6,10 @@
 namespace swiftlet {
 namespace {
 
+/// docs/pose_graph.md has the figures behind these.
+constexpr double kPlaneChance = 1e-4;
+constexpr double kSpaceChance = 1e-2;
+
 /// Probability that chi-squared of 3 degrees of freedom exceeds x; of 6 its closed form is a polynomial.
 double tailOf(int degrees_of_freedom, double x) {
   const double half = 0.5 * x;
@@ -34,6 +38,7 @@ LoopSelectionSettings loopSelectionSettings(double tail) {
   LoopSelectionSettings settings;
   settings.gate_chi_squared = chiSquaredOfTail(PoseSpace<Pose>::kDof, tail);
   settings.pair_chi_squared = settings.gate_chi_squared;
+  settings.max_pair_chance = PoseSpace<Pose>::kDof == 3 ? kPlaneChance : kSpaceChance;
   return settings;
 }
 

@@ -52,15 +52,17 @@ struct LoopSelectionSettings {
   /// That a random loop agrees as well with the odometry, for the gate alone to prove the loop: of thousands
   /// of false loops a few.
   double max_gate_chance = 1e-3;
-  /// That a random loop agrees as well with another, for the pair to count as support. Larger: a loop of the
-  /// set has also agreed with all others.
-  double max_pair_chance = 1e-2;
+  /// That a random loop agrees as well with another, for the pair to count as support.
+  /// loopSelectionSettings() takes 1e-4 in the plane and 1e-2 in space, where few pairs can prove more
+  /// (docs/pose_graph.md).
+  double max_pair_chance = 1e-4;
   std::uint32_t min_support = 1;  ///< agreeing loops, where the gate alone is no proof
   std::uint32_t min_between = 3;  ///< loops that tie two components at least
   bool pairwise = true;           ///< false: all that pass the gate are selected (for comparison)
 };
 
-/// The settings used everywhere: a true loop passes each test but for `tail` (a probability in (0, 1)).
+/// The settings used everywhere: a true loop fails each test with probability `tail`, in (0, 1). Small, for a
+/// loop must pass against all others.
 template <typename Pose>
 LoopSelectionSettings loopSelectionSettings(double tail = 1e-6);
 

@@ -2,6 +2,7 @@
 // Odometry chains with known errors for tests of loop selection: a way that turns, and measurements of it.
 
 #include <Eigen/Cholesky>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
