@@ -14,7 +14,7 @@
 // large C is passed by most false loops too: agreement says something only where chance would not agree.
 //
 // Loops between two components have no cycle of their own; two of them have one when they join the same two
-// components. Cost of a pair: 0.3 us (space), 0.1 us (plane) when one of the two stays the same; no
+// components. Cost of a pair: 0.7 us (space), 0.2 us (plane) when one of the two stays the same; no
 // allocation. Source: Mangelson, Dominic, Eustice, Vasudevan, "Pairwise Consistent Measurement Set
 // Maximization for Robust Multi-robot Map Merging", ICRA 2018, equations 3 and 4; the sums and their overlap
 // are this project's.

@@ -22,10 +22,10 @@
 // oldest); when all held are in the sets it is refused (kCapacityReached): all of them say the same already.
 // Both are counted.
 // Memory: max_loops^2 / 8 x 3 bytes for pairs, support and search, 0.6 KiB a loop, 0.4 KiB a pose, reserved
-// by the constructor; 2.9 MiB for 2000 loops and 2000 poses in space. Cost of a loop: a pair test (0.3 us in
+// by the constructor; 4.8 MiB for 2000 loops and 2000 poses in space. Cost of a loop: a pair test (0.3 us in
 // space) for each held one of the same components, and the search (maximum_clique.hpp) within `max_nodes`.
 // Deterministic. Not for several threads. Sources: Mangelson et al., ICRA 2018 (pairs and their largest set);
-// Rosinol, Abate, Chang, Carlone, "Kimera", ICRA 2020, section II-C (odometry check, row by row); support is
+// Rosinol, Abate, Chang, Carlone, "Kimera", ICRA 2020 (odometry check, row by row); support is
 // this project's own. docs/pose_graph.md.
 
 #include <cstdint>
