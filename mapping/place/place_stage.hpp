@@ -1,0 +1,51 @@
+#pragma once
+// From a keyframe's image to the earlier keyframes that may show the same place: features, words, query, and
+// then the keyframe joins the database.
+//
+// A stage of the low-priority side: memory fixed by the constructor, no clock, no randomness; the same
+// keyframes give the same bytes. Keyframes come in the order of time. The keyframe itself is not kept: who
+// verifies candidates keeps it at `slot`, which is its own until the database gives it to another. Cost: some
+// 4 ms for 752 x 480 and 2 000 keyframes (docs/place.md).
+
+#include "estimator/camera/camera_model.hpp"
+#include "estimator/core/image_view.hpp"
+#include "estimator/core/status.hpp"
+#include "estimator/messages/tracked_frame.hpp"
+#include "mapping/place/place_database.hpp"
+#include "mapping/place/place_extractor.hpp"
+#include "mapping/place/vocabulary.hpp"
+
+namespace swiftlet {
+
+struct PlaceStep {
+  PlaceQuery query;
+  BagOfWords bag;
+  std::uint32_t slot = PlaceDatabase::kNoSlot;
+  bool forgot = false;  ///< another keyframe left for this one
+};
+
+class PlaceStage {
+ public:
+  /// `vocabulary` outlives the stage.
+  PlaceStage(const CameraModel& camera, const Vocabulary& vocabulary,
+             const PlaceExtractorSettings& extractor = {}, const PlaceDatabaseSettings& database = {})
+      : camera_(camera),
+        vocabulary_(vocabulary),
+        extractor_(camera.width(), camera.height(), extractor),
+        database_(vocabulary.words(), database) {}
+
+  /// `image`: camera 0's; `tracked`: the keyframe's stamp, index and tracks. Not ok where the image gives no
+  /// features or the vocabulary is empty: then nothing was stored. Without candidates it is ok.
+  [[nodiscard]] Status step(const ImageView& image, const TrackedFrame& tracked, std::uint32_t epoch,
+                            PlaceKeyframe& keyframe, PlaceStep& out);
+
+  [[nodiscard]] const PlaceDatabase& database() const { return database_; }
+
+ private:
+  CameraModel camera_;
+  const Vocabulary& vocabulary_;
+  PlaceExtractor extractor_;
+  PlaceDatabase database_;
+};
+
+}  // namespace swiftlet
