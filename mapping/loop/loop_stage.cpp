@@ -56,13 +56,12 @@ const WindowPose* poseOfFrame(const SmoothedWindow& window, std::uint64_t frame)
 LoopStage::LoopStage(const Rig& rig, const LoopLimits& limits)
     : rig_(rig),
       limits_(limits),
-      extractor_(rig.camera[0].width(), rig.camera[0].height()),
+      place_(rig.camera[0], Vocabulary::shipped(), {}, databaseSettings(limits)),
       stereo_(rig.camera_count > 1 ? std::make_unique<StereoDepth>(rig) : nullptr),
-      database_(Vocabulary::shipped().words(), databaseSettings(limits)),
       verifier_(rig),
       selection_(selectionLimits(limits), loopSelectionSettings<SE3>()),
       optimizer_(graphLimits(limits)),
-      places_(database_.capacity()),
+      places_(place_.database().capacity()),
       loops_(limits.loops) {
   nodes_.reserve(limits.nodes);
 }
@@ -84,13 +83,12 @@ Status LoopStage::step(const LoopInput& input, const LoopEffort& effort, LoopRep
   report.stamp = input.tracks->stamp;
   report.frame = input.tracks->index;
   extendPending(input);
+  Status status;
   if (movedEnough(pose.stamp)) {
-    const Status added = addNode(pose);
-    if (!added.ok()) {
+    status = addNode(pose);
+    if (!status.ok()) {
       ++counters_.refused;
-      return added;
-    }
-    if (describePlace(input)) {
+    } else if (describePlace(input)) {
       closeLoops(effort, report);
       keepPlace();
     } else {
@@ -102,7 +100,7 @@ Status LoopStage::step(const LoopInput& input, const LoopEffort& effort, LoopRep
   report.loops = selection_.held();
   report.selected = static_cast<std::uint32_t>(selection_.selected().size());
   report.correction = correction_;
-  return okStatus();
+  return status;
 }
 
 // The motion since the last node grows by the newest keyframe's.
@@ -179,22 +177,21 @@ Status LoopStage::addNode(const WindowPose& pose) {
 
 bool LoopStage::describePlace(const LoopInput& input) {
   if (input.image[0].empty()) return false;
-  if (!extractor_.extract(input.image[0], rig_.camera[0], *input.tracks, newest_).ok()) return false;
-  newest_.epoch = epoch_;
+  if (!place_.step(input.image[0], *input.tracks, epoch_, newest_, place_step_).ok()) return false;
   std::size_t found = 0;
   if (stereo_ && !input.image[1].empty()) {
     static_cast<void>(stereo_->fill(input.image[0], input.image[1], newest_, found));
   }
   static_cast<void>(landmarks_.fill(*input.window, rig_.T_body_cam[0], newest_, found));
-  return Vocabulary::shipped().describe(newest_, words_).ok();
+  return true;
 }
 
 void LoopStage::closeLoops(const LoopEffort& effort, LoopReport& report) {
-  if (!database_.query(newest_.stamp, newest_.epoch, words_, query_).ok()) return;
-  const std::size_t most = std::min({effort.candidates, kMaxLoopCandidates, query_.candidates.size()});
+  const auto& candidates = place_step_.query.candidates;
+  const std::size_t most = std::min({effort.candidates, kMaxLoopCandidates, candidates.size()});
   for (std::size_t i = 0; i < most; ++i) {
     // A second loop to the same place says little more.
-    if (verify(query_.candidates[i], effort, report)) return;
+    if (verify(candidates[i], effort, report)) return;
   }
 }
 
@@ -249,12 +246,11 @@ void LoopStage::weigh() {
   counters_.selected = selected.size();
 }
 
+// After the candidates have been looked at: the slot may have been one of theirs.
 void LoopStage::keepPlace() {
-  std::uint32_t slot = PlaceDatabase::kNoSlot;
-  const Status status = database_.add(newest_.index, newest_.stamp, newest_.epoch, words_, slot);
-  if (slot == PlaceDatabase::kNoSlot || (!status.ok() && status.code != StatusCode::kCapacityReached)) return;
-  places_[slot] = newest_;
-  nodes_.back().slot = slot;
+  if (place_step_.slot == PlaceDatabase::kNoSlot) return;
+  places_[place_step_.slot] = newest_;
+  nodes_.back().slot = place_step_.slot;
 }
 
 void LoopStage::optimize(const LoopEffort& effort, LoopReport& report) {
@@ -290,8 +286,8 @@ bool LoopStage::revisit(std::size_t i, LoopRevisit& out) const {
   const Node& from = nodes_[loop.edge.from];
   const Node& to = nodes_[loop.edge.to];
   const bool kept = from.slot != PlaceDatabase::kNoSlot && to.slot != PlaceDatabase::kNoSlot &&
-                    database_.holds(from.slot, from.frame, from.epoch) &&
-                    database_.holds(to.slot, to.frame, to.epoch);
+                    place_.database().holds(from.slot, from.frame, from.epoch) &&
+                    place_.database().holds(to.slot, to.frame, to.epoch);
   if (!loop.selected || !kept) return false;
   out.old_stamp = from.stamp;
   out.new_stamp = to.stamp;

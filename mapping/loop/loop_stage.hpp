@@ -25,8 +25,7 @@
 #include "estimator/messages/tracked_frame.hpp"
 #include "mapping/loop/loop_report.hpp"
 #include "mapping/place/feature_depth.hpp"
-#include "mapping/place/place_database.hpp"
-#include "mapping/place/place_extractor.hpp"
+#include "mapping/place/place_stage.hpp"
 #include "mapping/pose_graph/loop_selection.hpp"
 #include "mapping/pose_graph/pose_graph_optimizer.hpp"
 
@@ -112,10 +111,9 @@ class LoopStage {
 
   Rig rig_;
   LoopLimits limits_;
-  PlaceExtractor extractor_;
+  PlaceStage place_;
   std::unique_ptr<StereoDepth> stereo_;  ///< null with one camera
   LandmarkDepth landmarks_;
-  PlaceDatabase database_;
   LoopVerifier verifier_;
   LoopSelection<SE3> selection_;
   PoseGraphOptimizer<SE3> optimizer_;
@@ -126,8 +124,7 @@ class LoopStage {
   std::uint32_t epoch_ = 0;
   Pending pending_;
   PlaceKeyframe newest_;
-  BagOfWords words_;
-  PlaceQuery query_;
+  PlaceStep place_step_;
   LoopVerification verification_;
   bool unsettled_ = false;  ///< the optimizer has not converged since the selection changed
   MapCorrection correction_;

@@ -1,0 +1,233 @@
+// The stage of loop closure on real images: the seconds of log in the repository are flown twice, with an
+// odometry that is made of the truth and has gone wrong in between.
+
+#include "mapping/loop/loop_stage.hpp"
+
+#include <catch2/catch.hpp>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "drivers/recorded/open_log.hpp"
+#include "estimator/geometry/so3.hpp"
+#include "firmware_host/evaluation/association.hpp"
+#include "mapping/pose_graph/pose_tangent.hpp"
+
+using namespace swiftlet;
+
+namespace {
+
+constexpr double kSpacing = 2.1;  // s of the stage's time between keyframes: each is a node
+constexpr double kVisitGap = 60;  // s between the visits
+
+struct Picture {
+  std::array<std::vector<std::uint8_t>, kMaxCameras> pixels;
+  std::array<ImageView, kMaxCameras> image;
+  SE3 T_truth_body;
+};
+
+struct Pictures {
+  Rig rig;
+  std::vector<Picture> all;
+};
+
+const Pictures& pictures() {
+  static const Pictures kept = [] {
+    Pictures out;
+    const auto log = openLog(std::string(SWIFTLET_SOURCE_ROOT) + "/tests/data/euroc_mh01_4s");
+    out.rig = log->rig();
+    const Trajectory truth = log->groundTruth();
+    constexpr std::uint64_t kEvery = 8;
+    SensorMessage message;
+    std::array<std::uint64_t, kMaxCameras> seen{};
+    while (log->next(message)) {
+      const auto* frame = std::get_if<CameraFrame>(&message);
+      if (frame == nullptr || seen[frame->camera]++ % kEvery != 0) continue;
+      if (frame->camera == 0) {
+        out.all.emplace_back();
+        const auto pose = interpolate(truth, frame->stamp, Duration::fromMilliseconds(20));
+        REQUIRE(pose.has_value());
+        out.all.back().T_truth_body = *pose;
+      }
+      Picture& picture = out.all.back();
+      std::vector<std::uint8_t>& pixels = picture.pixels[frame->camera];
+      for (int y = 0; y < frame->image.height; ++y) {
+        pixels.insert(pixels.end(), frame->image.row(y), frame->image.row(y) + frame->image.width);
+      }
+      picture.image[frame->camera] = {pixels.data(), frame->image.width, frame->image.height,
+                                      frame->image.width};
+    }
+    return out;
+  }();
+  return kept;
+}
+
+/// Keyframe after keyframe, as the odometry would hand them over.
+class Flight {
+ public:
+  explicit Flight(const LoopLimits& limits = {60, 100})
+      : stage(std::make_unique<LoopStage>(pictures().rig, limits)),
+        window_(std::make_unique<SmoothedWindow>()),
+        tracks_(std::make_unique<TrackedFrame>()) {
+    window_->started = true;
+  }
+
+  /// `T_world_truth` is how wrong the odometry is by now.
+  LoopReport see(const Picture& picture, double seconds, const SE3& T_world_truth, bool with_images = true) {
+    const SE3 T_world_body = T_world_truth * picture.T_truth_body;
+    WindowPose pose;
+    pose.stamp = Stamp{} + Duration::fromSeconds(seconds);
+    pose.frame_index = ++frame_;
+    pose.keyframe = true;
+    pose.T_world_body = T_world_body;
+    window_->poses.clear();
+    static_cast<void>(window_->poses.tryPushBack(pose));
+    tracks_->stamp = pose.stamp;
+    tracks_->index = frame_;
+    KeyframeLink link;
+    link.linked = linked_;
+    link.previous = frame_ - 1;
+    link.T_previous_this = T_world_before_.inverse() * T_world_body;
+    const double elapsed = seconds - seconds_before_;
+    link.covariance.diagonal() << Eigen::Vector3d::Constant(elapsed * 1e-4),
+        Eigen::Vector3d::Constant(elapsed * 4e-4);
+    LoopInput input{tracks_.get(), window_.get(), &link, {}};
+    if (with_images) input.image = picture.image;
+    LoopReport report;
+    status = stage->step(input, LoopEffort{}, report);
+    T_world_before_ = T_world_body;
+    seconds_before_ = seconds;
+    linked_ = true;
+    return report;
+  }
+
+  void newEpoch() {
+    ++window_->epoch;
+    linked_ = false;
+  }
+
+  /// m, of the map's node against the truth in the frame of the first node.
+  [[nodiscard]] double errorOfNode(std::size_t node, const Picture& picture) const {
+    const SE3 T_truth_map = pictures().all.front().T_truth_body * stage->node(0).T_map_body.inverse();
+    return ((T_truth_map * stage->node(node).T_map_body).translation - picture.T_truth_body.translation)
+        .norm();
+  }
+
+  std::unique_ptr<LoopStage> stage;
+  Status status;
+
+ private:
+  std::unique_ptr<SmoothedWindow> window_;
+  std::unique_ptr<TrackedFrame> tracks_;
+  std::uint64_t frame_ = 0;
+  bool linked_ = false;
+  SE3 T_world_before_;
+  double seconds_before_ = 0;
+};
+
+/// 3 degrees of yaw and 0.4 m.
+SE3 drift() { return {expSo3(Eigen::Vector3d(0, 0, 0.05)), Eigen::Vector3d(0.3, -0.25, 0.1)}; }
+
+/// Both visits; the last report.
+LoopReport flyTwice(Flight& flight) {
+  LoopReport report;
+  double seconds = 0;
+  for (const Picture& picture : pictures().all) report = flight.see(picture, seconds += kSpacing, SE3());
+  seconds += kVisitGap;
+  for (const Picture& picture : pictures().all) report = flight.see(picture, seconds += kSpacing, drift());
+  return report;
+}
+
+}  // namespace
+
+TEST_CASE("a place seen again brings the map back where it was, and says how the world lies in it") {
+  Flight flight;
+  const LoopReport last = flyTwice(flight);
+  const std::size_t n = pictures().all.size();
+  REQUIRE(n >= 8);
+  REQUIRE(flight.stage->nodeCount() == 2 * n);
+  const LoopCounters& counters = flight.stage->counters();
+  CHECK(counters.components == 1);
+  CHECK(counters.selected >= n - 2);
+  CHECK(last.selected == counters.selected);
+  for (std::size_t i = 0; i < n; ++i) {
+    INFO("node " << i);
+    CHECK(flight.errorOfNode(n + i, pictures().all[i]) < 0.03);
+  }
+  // The odometry still has its drift; the correction takes it away.
+  const SE3 left = last.correction.T_map_world * drift();
+  CHECK(left.translation.norm() < 0.15);  // about a point metres away: turned by half a degree
+  CHECK(logSo3(left.rotation).norm() < 0.01);
+  CHECK(last.correction.version == 2 * n);
+
+  std::size_t revisits = 0;
+  LoopRevisit revisit;
+  for (std::size_t i = 0; i < flight.stage->loopCount(); ++i) {
+    if (!flight.stage->revisit(i, revisit)) continue;
+    ++revisits;
+    CHECK(revisit.old_stamp < revisit.new_stamp);
+    CHECK(revisit.matches.size() >= 15);
+    CHECK(revisit.information.llt().info() == Eigen::Success);
+  }
+  CHECK(revisits == counters.selected);
+}
+
+TEST_CASE("the same keyframes give the same map, bit for bit") {
+  Flight a;
+  Flight b;
+  flyTwice(a);
+  flyTwice(b);
+  REQUIRE(a.stage->nodeCount() == b.stage->nodeCount());
+  for (std::size_t i = 0; i < a.stage->nodeCount(); ++i) {
+    const SE3 x = a.stage->node(i).T_map_body;
+    const SE3 y = b.stage->node(i).T_map_body;
+    CHECK(x.translation == y.translation);
+    CHECK(x.rotation.coeffs() == y.rotation.coeffs());
+  }
+}
+
+TEST_CASE("an epoch of the odometry that begins anew is tied to the map by what it sees") {
+  Flight flight;
+  double seconds = 0;
+  for (const Picture& picture : pictures().all) flight.see(picture, seconds += kSpacing, SE3());
+  flight.newEpoch();
+  const SE3 elsewhere(expSo3(Eigen::Vector3d(0, 0, 2)), Eigen::Vector3d(20, -7, 1));
+  LoopReport report;
+  seconds += kVisitGap;
+  for (const Picture& picture : pictures().all) report = flight.see(picture, seconds += kSpacing, elsewhere);
+  CHECK(flight.stage->counters().components == 2);
+  CHECK(report.correction.epoch == 1);
+  const std::size_t n = pictures().all.size();
+  CHECK(flight.errorOfNode(2 * n - 1, pictures().all.back()) < 0.03);
+}
+
+TEST_CASE("without images, without room and without a pose the map goes on as it can") {
+  SECTION("a keyframe whose images are gone is a pose without a place") {
+    Flight flight;
+    for (std::size_t i = 0; i < 4; ++i) {
+      flight.see(pictures().all[i], kSpacing * static_cast<double>(i), SE3(), i != 2);
+    }
+    CHECK(flight.status.ok());
+    CHECK(flight.stage->nodeCount() == 4);
+    CHECK(flight.stage->counters().without_image == 1);
+  }
+  SECTION("a full map refuses keyframes, and its correction goes on") {
+    Flight flight({3, 10});
+    for (std::size_t i = 0; i < 5; ++i) {
+      flight.see(pictures().all[i], kSpacing * static_cast<double>(i), SE3());
+    }
+    CHECK(flight.status.code == StatusCode::kCapacityReached);
+    CHECK(flight.stage->nodeCount() == 3);
+    CHECK(flight.stage->counters().refused == 2);
+  }
+  SECTION("input that is none") {
+    Flight flight;
+    LoopReport report;
+    CHECK(flight.stage->step({}, LoopEffort{}, report).code == StatusCode::kInvalidInput);
+    Picture bad = pictures().all[0];
+    bad.T_truth_body.translation.x() = std::nan("");
+    flight.see(bad, 1, SE3());
+    CHECK(flight.status.code == StatusCode::kInvalidInput);
+    CHECK(flight.stage->nodeCount() == 0);
+  }
+}
