@@ -6,7 +6,7 @@
 // within `same_spot` pixels of the best does not count: a corner found in several octaves is one corner. With
 // vocabulary nodes given, only features below the same node are compared.
 //
-// Deterministic: equal distances go to the smaller index. No allocation; memory: the object, 24 KiB. Plain
+// Deterministic: equal distances go to the smaller index. No allocation; memory: the object, 22 KiB. Plain
 // loops over words in rows; 512 x 512 features take about 0.4 ms. Figures: docs/place.md.
 
 #include <array>

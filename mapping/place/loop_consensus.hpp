@@ -4,7 +4,7 @@
 //   method       motion known before  sample                                  used when
 //   threePoint   nothing              3 matches with depth in one keyframe    always first
 //   onePoint     rotation             1 match with depth in both              a rotation is given
-//   fivePoint    nothing              5 matches, then 1 for the scale         the first finds nothing
+//   fivePoint    nothing              5 matches, then 1 for the scale         nothing found, depths rare
 //
 // threePoint takes the points from whichever keyframe knows them and the bearings from the other (P3P), so a
 // match needs one depth only, and errors of depth do not turn the pose; where both are known the sides of the
@@ -14,7 +14,7 @@
 // chi-square of the bearing with the inverse depth marginalized (estimator/geometry/ransac.hpp), truncated.
 // The best so far is refined on its inliers (Chum et al., DAGM 2003).
 //
-// Deterministic for a given seed. No allocation; the object holds 70 KiB. Bounded by `iterations`.
+// Deterministic for a given seed. No allocation; the object holds 88 KiB. Bounded by `iterations`.
 
 #include <Eigen/Geometry>
 #include <array>

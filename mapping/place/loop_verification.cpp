@@ -165,7 +165,8 @@ LoopFate LoopVerifier::consent(const LoopPrior& prior, LoopVerification& result)
     status = consensus_.onePoint(points, R_cam, seed, found);
     result.samples += found.iterations;
   }
-  if (!status.ok() && settings_.five_point) {
+  const bool few_depths = 2 * result.matches_with_depth < result.matches;
+  if (!status.ok() && settings_.five_point && few_depths) {
     status = consensus_.fivePoint(points, seed, found);
     result.samples += found.iterations;
   }

@@ -13,7 +13,7 @@
 // Needs inverse depths in one keyframe at least (feature_depth.hpp); matches without any still count in the
 // refinement. Errors: candidates never give an error, but kInvalidInput (settings out of range, NaN).
 // Deterministic: the seed is made of the keyframes' indices. Bounded: `effort` scales the samples.
-// No allocation; the object holds 330 KiB. Cost and figures: docs/place.md.
+// No allocation; the object holds 243 KiB. Cost and figures: docs/place.md.
 
 #include <array>
 #include <cstdint>
@@ -24,6 +24,7 @@
 #include "mapping/place/descriptor_matching.hpp"
 #include "mapping/place/loop_consensus.hpp"
 #include "mapping/place/place_keyframe.hpp"
+#include "mapping/place/place_pyramid.hpp"
 #include "mapping/place/relative_pose.hpp"
 
 namespace swiftlet {
@@ -50,26 +51,26 @@ struct LoopVerificationSettings {
   DescriptorMatchSettings matching;
   ConsensusSettings consensus;
   RelativePoseSettings refinement;
-  double pixel_sigma = 0.8;   ///< px at octave 0, of a corner found again from elsewhere
-  double octave_scale = 1.2;  ///< of the pyramid that the features come from: noise grows with it
-  int guided_distance = 64;   ///< bits
-  float guided_ratio = 0.9F;  ///< best / next, among the places that the pose allows
-  double guided_reach = 60;   ///< px, at most
+  double pixel_sigma = 0.8;            ///< px at octave 0, of a corner found again from elsewhere
+  double octave_scale = kOctaveRatio;  ///< of the pyramid that the features come from: noise grows with it
+  int guided_distance = 64;            ///< bits
+  float guided_ratio = 0.9F;           ///< best / next, among the places that the pose allows
+  double guided_reach = 60;            ///< px, at most
   std::size_t min_matches = 12;
   std::size_t min_depths = 8;
   std::size_t min_consensus = 10;
   std::size_t min_inliers = 15;
-  std::size_t min_kept = 15;         ///< of the matches by descriptor alone, in agreement with the final pose
-  double min_kept_share = 0.3;       ///< the same, as a part of them
-  double min_spread = 0.1;           ///< rad, of the inliers' bearings across their narrowest direction
-  double min_spread_of_many = 0.06;  ///< rad, the same where the matches kept are at least
+  std::size_t min_kept = 15;    ///< of the matches by descriptor alone, in agreement with the final pose
+  double min_kept_share = 0.3;  ///< the same, as a part of them
+  double min_spread = 0.1;      ///< rad, of the inliers' bearings across their narrowest direction
+  double min_spread_of_many = 0.085;  ///< rad, the same where the matches kept are at least
   std::size_t many_kept = 30;
   double max_chi_squared_per_dof = 4;
   double max_rotation_sigma = 0.03;     ///< rad, largest axis
   double max_translation_sigma = 0.15;  ///< m, largest axis, or
   double max_relative_sigma = 0.1;      ///< of the median distance of the inliers, whichever is more
   double max_distance = 10;             ///< m between the two bodies
-  bool five_point = true;               ///< tried where three points found nothing
+  bool five_point = true;  ///< tried where three points found nothing and most matches have no depth
 
   [[nodiscard]] bool valid() const;
 };

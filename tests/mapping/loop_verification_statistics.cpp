@@ -28,6 +28,8 @@ namespace {
 // An accepted pose farther from the truth than this is false.
 constexpr double kFalseMetres = 0.3;
 constexpr double kFalseDegrees = 6.0;
+// Pairs nearer in time are no loops.
+constexpr double kNeighbourSeconds = 5.0;
 
 using test::cpuMilliseconds;
 using test::quantile;
@@ -35,8 +37,6 @@ using test::quantile;
 ImageView viewOf(const cv::Mat& image) {
   return {image.data, image.cols, image.rows, static_cast<int>(image.step)};
 }
-
-std::FILE* dump = nullptr;
 
 enum class Features { kOrb, kOwn };
 
@@ -87,8 +87,39 @@ Prepared prepare(const ImageSet& set, Features features) {
 struct Outcome {
   std::size_t revisits = 0, found = 0, others = 0, others_accepted = 0, false_accepted = 0;
   std::map<LoopFate, std::size_t> lost, refused;
-  std::vector<double> metres, degrees, nees, ms, accepted_ms, chi;
+  std::vector<double> metres, degrees, nees, ms, accepted_ms, chi_squared;
 };
+
+// What became of one candidate.
+void count(const ImageSet& set, std::size_t i, std::size_t j, const LoopVerification& result, bool verbose,
+           Outcome& out) {
+  const bool revisit = set.kind[i][j] == PairKind::kRevisit;
+  ++(revisit ? out.revisits : out.others);
+  if (!result.accepted()) {
+    ++(revisit ? out.lost : out.refused)[result.fate];
+    return;
+  }
+  out.accepted_ms.push_back(out.ms.back());
+  out.chi_squared.push_back(result.chi_squared_per_dof);
+  const SE3 truth = set.shots[i].T_world_body.inverse() * set.shots[j].T_world_body;
+  const SE3 difference = result.T_old_new.inverse() * truth;
+  Vector6d error;
+  error << logSo3(difference.rotation), difference.translation;
+  const double metres = error.tail<3>().norm();
+  const double degrees = error.head<3>().norm() * 180 / std::numbers::pi;
+  if (metres > kFalseMetres || degrees > kFalseDegrees) {
+    ++out.false_accepted;
+    if (verbose) {
+      std::printf("    false: %zu %zu, inliers %zu, kept %zu of %zu, %.2f m %.1f deg off, spread %.3f rad\n",
+                  i, j, result.inliers.size(), result.kept, result.matches, metres, degrees, result.spread);
+    }
+    return;
+  }
+  ++(revisit ? out.found : out.others_accepted);
+  out.metres.push_back(metres);
+  out.degrees.push_back(degrees);
+  out.nees.push_back(error.dot(result.covariance.ldlt().solve(error)));
+}
 
 void verifyPairs(const ImageSet& set, const Prepared& prepared, const LoopVerificationSettings& settings,
                  bool verbose, Outcome& out) {
@@ -96,55 +127,38 @@ void verifyPairs(const ImageSet& set, const Prepared& prepared, const LoopVerifi
   LoopVerification result;
   for (std::size_t i = 0; i < set.shots.size(); ++i) {
     for (std::size_t j = i + 1; j < set.shots.size(); ++j) {
-      const PairKind kind = set.kind[i][j];
-      if (kind == PairKind::kUnclear && set.has_truth && set.shots[j].seconds - set.shots[i].seconds < 5)
-        continue;
+      const double apart = set.shots[j].seconds - set.shots[i].seconds;
+      if (set.kind[i][j] == PairKind::kUnclear && apart < kNeighbourSeconds) continue;
       const double start = cpuMilliseconds();
       (void)verifier->verify(prepared.keyframes[i], prepared.keyframes[j], {}, 1.0, result);
       out.ms.push_back(cpuMilliseconds() - start);
-      if (kind == PairKind::kRevisit)
-        ++out.revisits;
-      else
-        ++out.others;
-      if (dump && result.consensus > 0 && set.has_truth) {
-        const SE3 truth = set.shots[i].T_world_body.inverse() * set.shots[j].T_world_body;
-        const SE3 d = result.T_old_new.inverse() * truth;
-        std::fprintf(dump, "%s %zu %zu %d %d %.3f %.2f %zu %zu %zu %zu %zu %.3f %.3f %.2f\n",
-                     set.name.c_str(), i, j, static_cast<int>(kind), static_cast<int>(result.fate),
-                     d.translation.norm(), logSo3(d.rotation).norm() * 57.3, result.matches,
-                     result.matches_with_depth, result.consensus, result.kept, result.inliers.size(), 0.0,
-                     result.spread, result.chi_squared_per_dof);
+      count(set, i, j, result, verbose, out);
+    }
+  }
+}
+
+// Without calibration and depth: how many matches one epipolar geometry explains, pair by pair.
+void reportMono(const ImageSet& set, const Prepared& prepared) {
+  const auto matcher = std::make_unique<DescriptorMatcher>();
+  const auto ransac =
+      std::make_unique<MonoRansac>(RansacSettings{.bearing_sigma = 1.0 / set.rig.camera[0].focal()});
+  for (std::size_t i = 0; i < set.shots.size(); ++i) {
+    for (std::size_t j = i + 1; j < set.shots.size(); ++j) {
+      const PlaceFeatures& a = prepared.keyframes[i].features;
+      const PlaceFeatures& b = prepared.keyframes[j].features;
+      DescriptorMatches matches;
+      (void)matcher->match(a, b, {}, matches);
+      std::vector<Eigen::Vector3d> from;
+      std::vector<Eigen::Vector3d> to;
+      for (const DescriptorMatch& m : matches) {
+        from.push_back(a[m.old_feature].bearing.cast<double>());
+        to.push_back(b[m.new_feature].bearing.cast<double>());
       }
-      if (!result.accepted()) {
-        ++(kind == PairKind::kRevisit ? out.lost : out.refused)[result.fate];
-        continue;
-      }
-      out.accepted_ms.push_back(out.ms.back());
-      out.chi.push_back(result.chi_squared_per_dof);
-      if (!set.has_truth) {
-        ++(kind == PairKind::kRevisit ? out.found : out.others_accepted);
-        continue;
-      }
-      const SE3 truth = set.shots[i].T_world_body.inverse() * set.shots[j].T_world_body;
-      const SE3 d = result.T_old_new.inverse() * truth;
-      Vector6d e;
-      e << logSo3(d.rotation), d.translation;
-      const double metres = e.tail<3>().norm();
-      const double degrees = e.head<3>().norm() * 180 / std::numbers::pi;
-      if (metres > kFalseMetres || degrees > kFalseDegrees) {
-        ++out.false_accepted;
-        if (verbose)
-          std::printf(
-              "    false: %zu %zu kind %d inliers %zu of %zu, %.2f m %.1f deg off, spread %.3f chi2 %.2f, "
-              "consensus %zu\n",
-              i, j, static_cast<int>(kind), result.inliers.size(), result.matches, metres, degrees,
-              result.spread, result.chi_squared_per_dof, result.consensus);
-        continue;
-      }
-      ++(kind == PairKind::kRevisit ? out.found : out.others_accepted);
-      out.metres.push_back(metres);
-      out.degrees.push_back(degrees);
-      out.nees.push_back(e.dot(result.covariance.ldlt().solve(e)));
+      RansacResult result;
+      (void)ransac->fivePoint(from, to, i * 100 + j, result);
+      std::printf("    %zu %zu%s: matches %zu, five-point inliers %zu\n", i, j,
+                  set.kind[i][j] == PairKind::kRevisit ? " (revisit)" : "", matches.size(),
+                  result.inlier_count);
     }
   }
 }
@@ -162,6 +176,11 @@ void report(const ImageSet& set, bool verbose, const LoopVerificationSettings& s
   for (const Features features : {Features::kOrb, Features::kOwn}) {
     if (own_only && features == Features::kOrb) continue;
     const Prepared p = prepare(set, features);
+    if (!set.has_truth) {
+      std::printf("  %s\n", features == Features::kOrb ? "ORB" : "own");
+      reportMono(set, p);
+      continue;
+    }
     Outcome o;
     verifyPairs(set, p, settings, verbose, o);
     std::printf("  %s: revisits found %zu of %zu (%.3f), other pairs accepted rightly %zu, falsely %zu\n",
@@ -171,7 +190,7 @@ void report(const ImageSet& set, bool verbose, const LoopVerificationSettings& s
     std::printf(
         "    error median %.4f m %.3f deg, p90 %.4f m %.3f deg; NEES median %.1f mean %.1f; chi2/dof %.2f\n",
         quantile(o.metres, 0.5), quantile(o.degrees, 0.5), quantile(o.metres, 0.9), quantile(o.degrees, 0.9),
-        quantile(o.nees, 0.5), test::mean(o.nees), quantile(o.chi, 0.5));
+        quantile(o.nees, 0.5), test::mean(o.nees), quantile(o.chi_squared, 0.5));
     std::printf(
         "    CPU ms: verify p50 %.2f p99 %.2f max %.2f (accepted p50 %.2f p99 %.2f); extract p50 %.2f; "
         "stereo depth p50 %.2f p99 %.2f\n",
@@ -195,6 +214,7 @@ void report(const ImageSet& set, bool verbose, const LoopVerificationSettings& s
 }  // namespace
 
 int main(int argc, char** argv) {
+  LoopVerificationSettings settings;
   double min_seconds = 10;
   bool verbose = false;
   int every = 1;
@@ -205,19 +225,18 @@ int main(int argc, char** argv) {
       min_seconds = std::atof(argv[++i]);
     } else if (std::strcmp(argv[i], "--verbose") == 0) {
       verbose = true;
-    } else if (std::strcmp(argv[i], "--dump") == 0) {
-      dump = std::fopen(argv[++i], "w");
     } else if (std::strcmp(argv[i], "--own-only") == 0) {
       own_only = true;
     } else if (std::strcmp(argv[i], "--every") == 0 && i + 1 < argc) {
       every = std::atoi(argv[++i]);
+    } else if (std::strcmp(argv[i], "--no-five-point") == 0) {
+      settings.five_point = false;
     } else if (std::strcmp(argv[i], "--flights-only") == 0) {
       flights_only = true;
     } else {
       flights.emplace_back(argv[i]);
     }
   }
-  const LoopVerificationSettings settings;
   if (!flights_only) {
     for (const auto& read : {readKimera, readKitchen, readDbowDemo}) {
       const auto set = read(dataFolder());
