@@ -28,7 +28,7 @@ bool isFlightThread(std::string_view name) {
   return name == "sensor" || name == "propagate" || name == "track" || name == "smooth" || name == "mesh";
 }
 
-void checkRun(bool mono, bool record, bool planes = false) {
+void checkRun(bool mono, bool record, bool planes = false, bool loops = false) {
   const ScratchFolder folder("flight_trap");
   ReplayRequest request;
   request.log = chosenLog();
@@ -38,6 +38,7 @@ void checkRun(bool mono, bool record, bool planes = false) {
   request.imu_rate = true;
   request.mesh_sequence = true;
   request.record = record;
+  request.loop_closure = loops;
   ReplayHooks hooks;
   int armed = 0;
   std::mutex guard;
@@ -85,7 +86,9 @@ TEST_CASE("the trap sees heap calls and locks of an armed thread") {
 TEST_CASE("the flight path neither allocates nor locks") { checkRun(false, false); }
 TEST_CASE("the flight path neither allocates nor locks while it is recorded") { checkRun(false, true); }
 TEST_CASE("the flight path neither allocates nor locks with one camera") { checkRun(true, false); }
-TEST_CASE("the flight path neither allocates nor locks with planes") { checkRun(false, false, true); }
+TEST_CASE("the flight path neither allocates nor locks with planes and loop closure") {
+  checkRun(false, false, true, true);
+}
 
 }  // namespace
 }  // namespace swiftlet

@@ -166,6 +166,7 @@ TEST_CASE("overloaded, threads degrade by policy, recover, and are repeated byte
     request.real_time = true;
     request.speed = kSpeed * kSlow;
     request.record = true;
+    request.loop_closure = run % 2 == 0;
     RandomDrag drag(static_cast<std::uint32_t>(run));
     ReplayHooks hooks;
     hooks.drag = [&](StageId stage, double cpu) { drag(stage, cpu); };
@@ -188,6 +189,12 @@ TEST_CASE("overloaded, threads degrade by policy, recover, and are repeated byte
     CHECK(repeated.finished == whole);
     if (!whole) continue;
     ++complete;
+    CHECK(result.statistics.loop.has_value() == request.loop_closure);
+    if (request.loop_closure && repeated.statistics.loop) {
+      CHECK(repeated.statistics.loop->keyframes == result.statistics.loop->keyframes);
+      CHECK(repeated.statistics.loop->nodes == result.statistics.loop->nodes);
+      CHECK(repeated.statistics.loop->without_image == result.statistics.loop->without_image);
+    }
     for (const char* file : {"odometry.tum", "states.csv", "map.tum", "local_mesh.ply"}) {
       CHECK(textOf(folder.file("run/") + file) == textOf(folder.file("again/") + file));
     }
