@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 
 #include "drivers/calibration/input_error.hpp"
@@ -22,7 +24,7 @@ void print(const PoseGraphRequest& request, const PoseGraphResult& result) {
   fmt::print("\n");
   if (result.pieces > 1) fmt::print("{:<14} {}\n", "pieces", result.pieces);
   fmt::print("{:<14} {:.8g}\n", "cost given", result.start.given_cost);
-  if (request.start == StartRule::kAuto)
+  if (request.start == StartRule::kAuto && std::isfinite(result.start.chordal_cost))
     fmt::print("{:<14} {:.8g}\n", "cost chordal", result.start.chordal_cost);
   fmt::print("{:<14} {:.8g}\n", "cost initial", result.solve.initial_cost);
   fmt::print("{:<14} {:.8g} (g2o's: 1/2 sum e^T Omega e; chi2 = {:.8g})\n", "cost final",

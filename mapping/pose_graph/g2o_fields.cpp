@@ -1,5 +1,6 @@
 #include "mapping/pose_graph/g2o_fields.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 

@@ -30,6 +30,15 @@ std::vector<std::uint32_t> graphPieces(std::size_t poses, std::span<const BlockP
   return piece;
 }
 
+bool GraphLayout::append(const BlockPair& ends) {
+  const BlockPair pair = std::minmax(unknown[ends.first], unknown[ends.second]);
+  const auto at = std::lower_bound(pairs.begin(), pairs.end(), pair);
+  if (at == pairs.end() || *at != pair) return false;
+  edge_pair.push_back(static_cast<std::uint32_t>(at - pairs.begin()));
+  edge_reversed.push_back(unknown[ends.first] > unknown[ends.second]);
+  return true;
+}
+
 void GraphLayout::arrange(std::size_t poses, std::span<const BlockPair> ends,
                           const std::vector<bool>& given_held) {
   const std::vector<std::uint32_t> piece = graphPieces(poses, ends, pieces);

@@ -19,11 +19,15 @@ struct GraphLayout {
   std::vector<std::uint32_t> unknown;    ///< of each pose: number of its block, or kHeld
   std::vector<std::uint32_t> edge_pair;  ///< of each edge: its pair, kNoPair where an end is held
   std::vector<bool> edge_reversed;       ///< the pair is (to, from)
-  std::vector<BlockPair> pairs;
+  std::vector<BlockPair> pairs;          ///< of unknowns, first < second, rising
   std::uint32_t unknowns = 0;
   std::uint32_t pieces = 0;
   std::vector<std::uint32_t> held;  ///< all held poses, given or chosen, rising
   BlockStructure structure;
+
+  /// Takes one more edge without arranging anew: true where both ends are unknowns that an edge joins
+  /// already.
+  bool append(const BlockPair& ends);
 
   /// `ends`: (from, to) of each edge. `given_held`: one flag per pose.
   void arrange(std::size_t poses, std::span<const BlockPair> ends, const std::vector<bool>& given_held);

@@ -9,7 +9,8 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kFirstDamping = 1e-9;  // of the diagonal, where the undamped equations have no factor
+constexpr double kNothingToGain = 1e-9;  // a cost: the given poses fit, no start could be better
+constexpr double kFirstDamping = 1e-9;   // of the diagonal, where the undamped equations have no factor
 constexpr double kDampingUp = 100;
 constexpr int kDampingTries = 6;
 constexpr double kAccepted = 1e-4;  // of the predicted decrease
@@ -63,7 +64,8 @@ Status PoseGraphOptimizer<Pose>::addEdge(const RelativePose<Pose>& edge) {
   }
   graph_.edges.push_back(edge);
   weights_.push_back(1.0);
-  arranged_ = linear_at_poses_ = false;
+  linear_at_poses_ = false;
+  arranged_ = arranged_ && layout_.append({edge.from, edge.to});
   return okStatus();
 }
 
@@ -319,9 +321,12 @@ Status PoseGraphOptimizer<Pose>::iterate(const OptimizeEffort& effort, OptimizeR
 template <typename Pose>
 Status PoseGraphOptimizer<Pose>::optimize(const OptimizeEffort& effort, OptimizeReport& report) {
   report = {};
-  if (const Status status = arrange(); !status.ok()) return status;
+  if (graph_.poses.empty()) return {StatusCode::kNotReady, "the graph has no poses"};
   report.initial_cost = report.final_cost = cost();
-  if (report.initial_cost <= effort.cost_floor || layout_.unknowns == 0) report.converged = true;
+  report.converged = report.initial_cost <= effort.cost_floor;
+  if (report.converged) return okStatus();
+  if (const Status status = arrange(); !status.ok()) return status;
+  report.converged = layout_.unknowns == 0;
   while (!report.converged && report.iterations < effort.iterations) {
     ++report.iterations;
     if (const Status status = iterate(effort, report, report.converged); !status.ok()) return status;
@@ -332,9 +337,10 @@ Status PoseGraphOptimizer<Pose>::optimize(const OptimizeEffort& effort, Optimize
 template <typename Pose>
 Status PoseGraphOptimizer<Pose>::start(StartReport& report) {
   report = {};
-  if (const Status status = arrange(); !status.ok()) return status;
   report.given_cost = cost();
   report.chordal_cost = std::numeric_limits<double>::infinity();
+  if (report.given_cost <= kNothingToGain) return okStatus();
+  if (const Status status = arrange(); !status.ok()) return status;
   std::vector<Pose> poses = graph_.poses;
   ChordalStart<Pose> chordal;
   if (!chordal.run(graph_.edges, weights_, layout_, poses).ok()) return okStatus();

@@ -55,7 +55,7 @@ enum class StartChoice : std::uint8_t { kGiven, kChordal };
 struct StartReport {
   StartChoice choice = StartChoice::kGiven;
   double given_cost = 0;    ///< at the poses as they were
-  double chordal_cost = 0;  ///< infinite where the linear systems could not be solved
+  double chordal_cost = 0;  ///< infinite where not needed, or the linear systems have no solution
 };
 
 template <typename Pose>

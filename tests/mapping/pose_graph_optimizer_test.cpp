@@ -227,6 +227,45 @@ TEST_CASE("a graph grown bit by bit ends where the whole one does") {
   CHECK_FALSE(grown.truncate(10, edges).ok());
 }
 
+TEST_CASE("an edge beside another counts, without a new arrangement") {
+  const TrueGraph<SE3> made = randomGraph<SE3>(13, 30, 15, 0.1);
+  PoseGraph<SE3> twice = made.graph;
+  twice.edges.insert(twice.edges.end(), made.graph.edges.begin(), made.graph.edges.end());
+  auto whole = optimizerOf(twice);
+  PoseGraphOptimizer<SE3> grown({30, twice.edges.size(), 0});
+  REQUIRE(grown.assign(made.graph).ok());
+  OptimizeReport report;
+  OptimizeReport whole_report;
+  REQUIRE(grown.optimize({}, report).ok());
+  const double once = report.final_cost;
+  for (const RelativePose<SE3>& edge : made.graph.edges) {
+    REQUIRE(grown.addEdge(edge).ok());
+  }
+  REQUIRE(grown.optimize({}, report).ok());
+  REQUIRE(whole.optimize({}, whole_report).ok());
+  CHECK(report.initial_cost == Approx(2 * once).epsilon(1e-9));
+  CHECK(report.final_cost == Approx(whole_report.final_cost).epsilon(1e-6));
+  // One reversed edge that lies: it pulls.
+  RelativePose<SE3> wrong;
+  wrong.from = 11;
+  wrong.to = 10;
+  wrong.T_from_to = SE3(Eigen::Quaterniond::Identity(), {5, 0, 0});
+  REQUIRE(grown.addEdge(wrong).code == StatusCode::kCapacityReached);
+  REQUIRE(grown.truncate(30, twice.edges.size() - 1).ok());
+  REQUIRE(grown.optimize({}, report).ok());
+  REQUIRE(grown.addEdge(wrong).ok());
+  OptimizeEffort effort;
+  effort.tolerance = 1e-12;
+  REQUIRE(grown.optimize(effort, report).ok());
+  CHECK(report.converged);
+  PoseGraph<SE3> same = grown.graph();
+  auto fresh = optimizerOf(same);
+  OptimizeReport fresh_report;
+  REQUIRE(fresh.optimize(effort, fresh_report).ok());
+  CHECK(fresh_report.initial_cost - fresh_report.final_cost < 1e-6 * fresh_report.initial_cost);
+  CHECK(report.final_cost < report.initial_cost);
+}
+
 TEST_CASE("the same graph gives the same bytes") {
   const TrueGraph<SE3> made = randomGraph<SE3>(11, 80, 60, 0.1);
   std::vector<SE3> first;
