@@ -100,7 +100,7 @@ MeshAccuracy meshAccuracy(const EvaluateOptions& options, const Subject& subject
 
 // map.tum beside odometry.tum at the stamps of both, and how much there was to revisit.
 void compareMap(const EvaluateOptions& options, const Subject& subject, const Truth& truth,
-                const AccuracyOptions& accuracy_options, Json& json) {
+                const AccuracyOptions& accuracy_options, const EvaluationGroup& settings, Json& json) {
   const std::filesystem::path run(options.run);
   if (!std::filesystem::exists(run / "map.tum") || !std::filesystem::exists(run / "odometry.tum")) return;
   const Trajectory odometry = readEstimate(run / "odometry.tum");
@@ -109,9 +109,15 @@ void compareMap(const EvaluateOptions& options, const Subject& subject, const Tr
   const Revisits revisits = revisitsOf(odometry, truth.poses);
   json["map_beside_odometry"] = toJson(beside);
   json["revisits"] = toJson(revisits);
+  std::string loops;
+  if (std::filesystem::exists(run / "loops.csv")) {
+    const LoopAccuracy accuracy = loopsOf(run / "loops.csv", truth.poses, settings);
+    json["loops"] = toJson(accuracy);
+    loops = "loops\n" + toText(accuracy);
+  }
   if (options.json) return;
   fmt::print("{}, at the same stamps\n{}", subject.files.back(), toText(beside));
-  fmt::print("revisits\n{}", toText(revisits));
+  fmt::print("revisits\n{}{}", toText(revisits), loops);
 }
 
 int evaluate(const EvaluateOptions& options) {
@@ -137,7 +143,7 @@ int evaluate(const EvaluateOptions& options) {
     const std::string section = options.from > 0 ? fmt::format(", from {:g} s", options.from) : "";
     if (!options.json) fmt::print("{}", toText(file + section, accuracy));
   }
-  if (compared) compareMap(options, subject, truth, accuracy_options, json);
+  if (compared) compareMap(options, subject, truth, accuracy_options, settings.evaluation, json);
   if (!subject.states.empty()) {
     const Consistency found =
         consistencyOf(subject.states, truth.poses, accuracy_options.association.max_gap);

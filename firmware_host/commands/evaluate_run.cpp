@@ -4,6 +4,7 @@
 
 #include "drivers/recorded/open_log.hpp"
 #include "firmware_host/report/accuracy_report.hpp"
+#include "firmware_host/report/loops_csv.hpp"
 #include "firmware_host/report/states_csv.hpp"
 
 namespace swiftlet {
@@ -72,6 +73,12 @@ Consistency consistencyOf(const std::string& states_file, const Trajectory& trut
   return consistency(samples);
 }
 
+LoopAccuracy loopsOf(const std::string& loops_file, const Trajectory& truth,
+                     const EvaluationGroup& settings) {
+  return loopAccuracy(readLoops(loops_file), truth,
+                      accuracyOptions(settings, AlignKind::kSe3).association.max_gap);
+}
+
 Revisits revisitsOf(const Trajectory& estimate, const Trajectory& truth) {
   Trajectory flown;
   for (const TrajectoryPoint& point : truth) {
@@ -106,6 +113,9 @@ Json runAccuracyJson(const std::string& folder, const Trajectory& truth, const s
     json["map_beside_odometry"]["all"] = toJson(compareAtCommonStamps(odometry, map, truth, options));
     options.association.from = first_image + Duration::fromSeconds(kCommonStart);
     json["map_beside_odometry"]["from_3s"] = toJson(compareAtCommonStamps(odometry, map, truth, options));
+  }
+  if (std::filesystem::exists(path / "loops.csv")) {
+    json["loops"] = toJson(loopsOf(path / "loops.csv", truth, settings));
   }
   json["revisits"] = toJson(revisitsOf(odometry, truth));
   return json;

@@ -9,6 +9,7 @@
 #include "firmware_host/evaluation/accuracy.hpp"
 #include "firmware_host/evaluation/common_stamps.hpp"
 #include "firmware_host/evaluation/consistency.hpp"
+#include "firmware_host/evaluation/loop_accuracy.hpp"
 #include "firmware_host/evaluation/revisits.hpp"
 #include "firmware_host/settings/settings.hpp"
 
@@ -34,6 +35,9 @@ Truth readTruth(const std::string& path, bool without_images = false);
 nlohmann::ordered_json runAccuracyJson(const std::string& folder, const Trajectory& truth,
                                        const std::string& truth_name, Stamp first_image,
                                        const EvaluationGroup& settings);
+
+/// Of a loops.csv.
+LoopAccuracy loopsOf(const std::string& loops_file, const Trajectory& truth, const EvaluationGroup& settings);
 
 /// Over the part of the truth that `estimate` (not empty) covers.
 Revisits revisitsOf(const Trajectory& estimate, const Trajectory& truth);

@@ -14,6 +14,7 @@
 #include "firmware_host/pipeline/lockstep.hpp"
 #include "firmware_host/pipeline/reproduce.hpp"
 #include "firmware_host/report/line_file.hpp"
+#include "firmware_host/report/loops_csv.hpp"
 #include "firmware_host/report/memory_use.hpp"
 #include "firmware_host/report/progress.hpp"
 #include "firmware_host/report/run_recorder.hpp"
@@ -204,6 +205,7 @@ class ReplayRun {
     facts_.memory = memory_.rows();
     facts_.peak_resident = peakResidentBytes();
     writeMap(out() / "map.tum", log_->solveMap());
+    if (settings_.loop.enabled) writeLoops(out() / "loops.csv", log_->loops());
     printWarnings(*source_, warned_);
     if (tracks_) {
       facts_.track_surplus = tracks_->surplus();

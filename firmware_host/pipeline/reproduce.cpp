@@ -33,7 +33,7 @@ class Repeat {
           MeshPlanes{settings.odometry.regularity_enabled, settings.odometry.plane_point_sigma});
     }
     if (settings.loop.enabled) {
-      loop_ = std::make_unique<LoopStage>(rigInUse(recording.rig(), settings.odometry), LoopLimits{});
+      loop_ = std::make_unique<LoopStage>(rigInUse(recording.rig(), settings.odometry), settings.loop_stage);
     }
   }
 

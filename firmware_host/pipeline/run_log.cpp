@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include "firmware_host/pipeline/wiring.hpp"
-#include "mapping/loop/loop_stage.hpp"
 
 namespace swiftlet {
 
@@ -49,10 +48,10 @@ void RunLog::onLoop(const LoopReport& report) {
 
 void RunLog::keepLoops(const LoopStage& loops) {
   statistics_.loop = loops.counters();
-  if (!keeper_) return;
-  for (std::size_t i = 0; i < loops.loopCount(); ++i) {
+  for (std::uint32_t i = 0; i < loops.loopCount(); ++i) {
+    loops_.push_back(loops.loop(i));
     LoopRevisit revisit;
-    if (loops.revisit(i, revisit)) keeper_->addRevisit(revisit);
+    if (keeper_ && loops.revisit(i, revisit)) keeper_->addRevisit(revisit);
   }
 }
 

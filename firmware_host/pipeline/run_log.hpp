@@ -9,10 +9,10 @@
 #include "firmware_host/pipeline/arrows.hpp"
 #include "firmware_host/pipeline/map_keeper.hpp"
 #include "firmware_host/pipeline/run_listener.hpp"
+#include "mapping/loop/loop_stage.hpp"
 
 namespace swiftlet {
 
-class LoopStage;
 class Wiring;
 
 class RunLog {
@@ -39,6 +39,7 @@ class RunLog {
   void collect(const Wiring& wiring);
   /// After the run: the loops that were found, for full smoothing.
   void keepLoops(const LoopStage& loops);
+  [[nodiscard]] const std::vector<MapLoop>& loops() const { return loops_; }
   /// After the run: full smoothing over what was kept. Poses of the keyframes; empty when there is nothing.
   std::vector<MapPose> solveMap();
 
@@ -57,6 +58,7 @@ class RunLog {
   Effort track_effort_;
   Effort smooth_effort_;
   RunStatistics statistics_;
+  std::vector<MapLoop> loops_;
 };
 
 }  // namespace swiftlet

@@ -69,6 +69,24 @@ std::string toText(const CommonStamps& map_beside_odometry) {
                      map_beside_odometry.ratio(), map_beside_odometry.pairs);
 }
 
+Json toJson(const LoopAccuracy& loops) {
+  return {{"verified", loops.verified},
+          {"verified_right", loops.verified_right},
+          {"selected", loops.selected},
+          {"selected_right", loops.selected_right},
+          {"without_truth", loops.without_truth},
+          {"median_error_m", loops.median_distance},
+          {"median_error_deg", loops.median_degrees}};
+}
+
+std::string toText(const LoopAccuracy& loops) {
+  return fmt::format(
+      "  {} of {} verified are right (within {:g} m and {:g} deg), {} of {} selected; median error {:.4f} m, "
+      "{:.3f} deg\n",
+      loops.verified_right, loops.verified, kFalseLoopDistance, kFalseLoopDegrees, loops.selected_right,
+      loops.selected, loops.median_distance, loops.median_degrees);
+}
+
 std::string toText(const Revisits& revisits) {
   return fmt::format(
       "  {} of {} places (one every 0.5 s) are within 1 m and 30 degrees of one more than 20 s before\n",

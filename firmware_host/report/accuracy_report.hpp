@@ -8,6 +8,7 @@
 #include "firmware_host/evaluation/accuracy.hpp"
 #include "firmware_host/evaluation/common_stamps.hpp"
 #include "firmware_host/evaluation/consistency.hpp"
+#include "firmware_host/evaluation/loop_accuracy.hpp"
 #include "firmware_host/evaluation/revisits.hpp"
 
 namespace swiftlet {
@@ -17,11 +18,13 @@ nlohmann::ordered_json toJson(const Consistency& consistency);
 /// Of map.tum (the other) beside odometry.tum (the reference).
 nlohmann::ordered_json toJson(const CommonStamps& map_beside_odometry);
 nlohmann::ordered_json toJson(const Revisits& revisits);
+nlohmann::ordered_json toJson(const LoopAccuracy& loops);
 
 /// `title`: which section and file, "odometry.tum, from 3 s".
 std::string toText(const std::string& title, const Accuracy& accuracy);
 std::string toText(const Consistency& consistency);
 std::string toText(const CommonStamps& map_beside_odometry);
 std::string toText(const Revisits& revisits);
+std::string toText(const LoopAccuracy& loops);
 
 }  // namespace swiftlet

@@ -32,7 +32,8 @@ RunRecorder::RunRecorder(const std::string& folder, bool imu_rate, bool meshes) 
   }
   const std::filesystem::path path(folder);
   // What an earlier run left and this one does not write would be taken for this one's.
-  for (const char* name : {"imu_rate.tum", "map.tum", "local_mesh.ply", "meshes", "summary.json"}) {
+  for (const char* name :
+       {"imu_rate.tum", "map.tum", "loops.csv", "local_mesh.ply", "meshes", "summary.json"}) {
     std::filesystem::remove_all(path / name, error);
   }
   if (meshes) meshes_.emplace(folder);

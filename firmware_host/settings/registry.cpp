@@ -173,6 +173,14 @@ std::vector<Setting> estimationSettings() {
       {"loop.enabled", "",
        "Recognize places seen before and keep a map that they hold together: T_map_world, map.tum.",
        onOff(&Settings::loop, &LoopGroup::enabled)},
+      {"loop.min_similarity", "",
+       "Least similarity of a place looked at as a revisit, relative to that of a keyframe with the one "
+       "before it.",
+       real(&Settings::loop_stage, &LoopSettings::min_similarity, 0, 10)},
+      {"loop.consistency", "",
+       "Believe a loop only where it agrees with the odometry and other loops; false, to compare: every one "
+       "that geometry verifies.",
+       onOff(&Settings::loop_stage, &LoopSettings::consistency)},
       {"calibration.accept_unusual_rig", "",
        "Take a rig whose geometry looks like a transform read the wrong way round.",
        onOff(&Settings::calibration, &CalibrationGroup::accept_unusual_rig)},

@@ -6,6 +6,7 @@
 
 #include "estimator/messages/effort.hpp"
 #include "estimator/odometry/odometry_settings.hpp"
+#include "mapping/loop/loop_settings.hpp"
 
 namespace swiftlet {
 
@@ -84,6 +85,7 @@ struct Settings {
   EvaluationGroup evaluation;
   MeshGroup mesh;
   LoopGroup loop;
+  LoopSettings loop_stage;
   RealtimeGroup realtime;
   BudgetsGroup budgets;
   bool full_smoothing = true;  ///< smoother.horizon is `full`

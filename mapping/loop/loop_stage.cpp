@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "mapping/place/vocabulary.hpp"
 #include "mapping/pose_graph/pose_tangent.hpp"
@@ -32,10 +33,20 @@ LoopSelectionLimits selectionLimits(const LoopLimits& limits) {
   return {static_cast<std::uint32_t>(limits.nodes), static_cast<std::uint32_t>(limits.loops)};
 }
 
-PlaceDatabaseSettings databaseSettings(const LoopLimits& limits) {
-  PlaceDatabaseSettings settings;
-  settings.keyframes = limits.nodes;
-  return settings;
+PlaceDatabaseSettings databaseSettings(const LoopSettings& settings, const LoopLimits& limits) {
+  PlaceDatabaseSettings out;
+  out.keyframes = limits.nodes;
+  out.min_relative = static_cast<float>(settings.min_similarity);
+  return out;
+}
+
+LoopSelectionSettings selectionSettings(const LoopSettings& settings) {
+  LoopSelectionSettings out = loopSelectionSettings<SE3>();
+  if (!settings.consistency) {
+    out.gate_chi_squared = std::numeric_limits<double>::max();
+    out.pairwise = false;
+  }
+  return out;
 }
 
 Matrix6d informationOf(const Matrix6d& covariance) {
@@ -53,13 +64,13 @@ const WindowPose* poseOfFrame(const SmoothedWindow& window, std::uint64_t frame)
 
 }  // namespace
 
-LoopStage::LoopStage(const Rig& rig, const LoopLimits& limits)
+LoopStage::LoopStage(const Rig& rig, const LoopSettings& settings, const LoopLimits& limits)
     : rig_(rig),
       limits_(limits),
-      place_(rig.camera[0], Vocabulary::shipped(), {}, databaseSettings(limits)),
+      place_(rig.camera[0], Vocabulary::shipped(), {}, databaseSettings(settings, limits)),
       stereo_(rig.camera_count > 1 ? std::make_unique<StereoDepth>(rig) : nullptr),
       verifier_(rig),
-      selection_(selectionLimits(limits), loopSelectionSettings<SE3>()),
+      selection_(selectionLimits(limits), selectionSettings(settings)),
       optimizer_(graphLimits(limits)),
       places_(place_.database().capacity()),
       loops_(limits.loops) {
@@ -281,7 +292,21 @@ bool LoopStage::findNode(std::uint64_t frame, std::uint32_t epoch, std::uint32_t
   return found != nodes_.end();
 }
 
-bool LoopStage::revisit(std::size_t i, LoopRevisit& out) const {
+MapLoop LoopStage::loop(std::uint32_t i) const {
+  const Loop& loop = loops_[i];
+  const Matrix6d covariance = loop.edge.information.ldlt().solve(Matrix6d::Identity());
+  MapLoop out;
+  out.old_stamp = nodes_[loop.edge.from].stamp;
+  out.new_stamp = nodes_[loop.edge.to].stamp;
+  out.T_old_new = loop.edge.T_from_to;
+  out.rotation_sigma = std::sqrt(covariance.diagonal().head<3>().maxCoeff());
+  out.translation_sigma = std::sqrt(covariance.diagonal().tail<3>().maxCoeff());
+  out.inliers = loop.inliers.size();
+  out.verdict = selection_.verdict(i);
+  return out;
+}
+
+bool LoopStage::revisit(std::uint32_t i, LoopRevisit& out) const {
   const Loop& loop = loops_[i];
   const Node& from = nodes_[loop.edge.from];
   const Node& to = nodes_[loop.edge.to];

@@ -24,6 +24,7 @@
 #include "estimator/messages/smoothed_window.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "mapping/loop/loop_report.hpp"
+#include "mapping/loop/loop_settings.hpp"
 #include "mapping/place/feature_depth.hpp"
 #include "mapping/place/place_stage.hpp"
 #include "mapping/pose_graph/loop_selection.hpp"
@@ -49,6 +50,17 @@ struct LoopInput {
   std::array<ImageView, kMaxCameras> image;  ///< raw; empty where missing
 };
 
+/// A verified loop, and what the selection says of it.
+struct MapLoop {
+  Stamp old_stamp;
+  Stamp new_stamp;
+  SE3 T_old_new;
+  double rotation_sigma = 0;     ///< rad, of the worst direction
+  double translation_sigma = 0;  ///< m
+  std::size_t inliers = 0;
+  LoopVerdict verdict = LoopVerdict::kSelected;
+};
+
 /// A keyframe in the map.
 struct MapNode {
   Stamp stamp;
@@ -58,7 +70,7 @@ struct MapNode {
 
 class LoopStage {
  public:
-  LoopStage(const Rig& rig, const LoopLimits& limits);
+  LoopStage(const Rig& rig, const LoopSettings& settings, const LoopLimits& limits = {});
 
   Status step(const LoopInput& input, const LoopEffort& effort, LoopReport& report);
 
@@ -66,9 +78,10 @@ class LoopStage {
   [[nodiscard]] const LoopCounters& counters() const { return counters_; }
   [[nodiscard]] std::size_t nodeCount() const { return nodes_.size(); }
   [[nodiscard]] MapNode node(std::size_t i) const;
-  [[nodiscard]] std::size_t loopCount() const { return loops_.size(); }
+  [[nodiscard]] std::uint32_t loopCount() const { return selection_.held(); }
+  [[nodiscard]] MapLoop loop(std::uint32_t i) const;
   /// For full smoothing. False where loop i is not selected. Allocates: after the flight.
-  [[nodiscard]] bool revisit(std::size_t i, LoopRevisit& out) const;
+  [[nodiscard]] bool revisit(std::uint32_t i, LoopRevisit& out) const;
 
  private:
   struct Node {

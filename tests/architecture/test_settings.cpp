@@ -41,6 +41,9 @@ constexpr SettingsStruct kStructs[] = {
     {"firmware_host/settings/settings.hpp", "EvaluationGroup"},
     {"firmware_host/settings/settings.hpp", "RealtimeGroup"},
     {"firmware_host/settings/settings.hpp", "BudgetsGroup"},
+    {"firmware_host/settings/settings.hpp", "MeshGroup"},
+    {"firmware_host/settings/settings.hpp", "LoopGroup"},
+    {"mapping/loop/loop_settings.hpp", "LoopSettings"},
 };
 
 /// "group.name" without the group; a member may drop what its group already says.

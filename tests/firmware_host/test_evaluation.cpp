@@ -11,7 +11,10 @@
 #include "firmware_host/evaluation/accuracy.hpp"
 #include "firmware_host/evaluation/common_stamps.hpp"
 #include "firmware_host/evaluation/consistency.hpp"
+#include "firmware_host/evaluation/loop_accuracy.hpp"
 #include "firmware_host/evaluation/revisits.hpp"
+#include "firmware_host/report/loops_csv.hpp"
+#include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {
 namespace {
@@ -320,6 +323,53 @@ TEST_CASE("no truth at all gives no figures and a status") {
   CHECK(none.pairs == 0);
   CHECK(none.coverage() == 0);
   CHECK(none.absolute.status.code == StatusCode::kInvalidInput);
+}
+
+TEST_CASE("loops are judged by the truth at both ends, and survive their file") {
+  Trajectory truth;
+  for (int k = 0; k <= 100; ++k) {
+    truth.push_back({Stamp{} + Duration::fromMilliseconds(100 * k),
+                     SE3(expSo3(Eigen::Vector3d(0, 0, 0.02 * k)), Eigen::Vector3d(0.1 * k, 0, 1))});
+  }
+  const auto loopBetween = [&](std::size_t i, std::size_t j, const SE3& error, LoopVerdict verdict) {
+    MapLoop loop;
+    loop.old_stamp = truth[i].stamp;
+    loop.new_stamp = truth[j].stamp;
+    loop.T_old_new = truth[i].T_world_body.inverse() * truth[j].T_world_body * error;
+    loop.inliers = 40;
+    loop.rotation_sigma = 0.01;
+    loop.translation_sigma = 0.02;
+    loop.verdict = verdict;
+    return loop;
+  };
+  const SE3 near(expSo3(Eigen::Vector3d(0.01, 0, 0)), Eigen::Vector3d(0, 0.03, 0.04));
+  std::vector<MapLoop> loops = {
+      loopBetween(3, 80, near, LoopVerdict::kSelected), loopBetween(4, 81, near, LoopVerdict::kInconsistent),
+      loopBetween(5, 82, SE3(Eigen::Matrix3d(Eigen::Matrix3d::Identity()), {0.5, 0, 0}),
+                  LoopVerdict::kAgainstOdometry),
+      loopBetween(6, 83, SE3(expSo3(Eigen::Vector3d(0, 0.2, 0)), {0, 0, 0}), LoopVerdict::kUnsupported),
+      loopBetween(7, 84, near, LoopVerdict::kSelected)};
+  loops.back().new_stamp = Stamp{} + Duration::fromSeconds(20);  // the truth has ended by then
+  const ScratchFolder folder("loops");
+  writeLoops(folder.file("loops.csv"), loops);
+  const std::vector<MapLoop> read = readLoops(folder.file("loops.csv"));
+  REQUIRE(read.size() == loops.size());
+  for (std::size_t i = 0; i < loops.size(); ++i) {
+    CHECK(read[i].old_stamp == loops[i].old_stamp);
+    CHECK(read[i].new_stamp == loops[i].new_stamp);
+    CHECK(read[i].verdict == loops[i].verdict);
+    CHECK(read[i].inliers == loops[i].inliers);
+    CHECK((read[i].T_old_new.translation - loops[i].T_old_new.translation).norm() < 1e-7);
+    CHECK(read[i].T_old_new.rotation.angularDistance(loops[i].T_old_new.rotation) < 1e-7);
+  }
+  const LoopAccuracy accuracy = loopAccuracy(read, truth, Duration::fromMilliseconds(200));
+  CHECK(accuracy.verified == 4);
+  CHECK(accuracy.verified_right == 2);
+  CHECK(accuracy.selected == 1);
+  CHECK(accuracy.selected_right == 1);
+  CHECK(accuracy.without_truth == 1);
+  CHECK(accuracy.median_distance == Approx(0.05).margin(1e-6));
+  CHECK(accuracy.median_degrees == Approx(0.573).margin(1e-3));
 }
 
 }  // namespace

@@ -66,7 +66,7 @@ const Pictures& pictures() {
 class Flight {
  public:
   explicit Flight(const LoopLimits& limits = {60, 100})
-      : stage(std::make_unique<LoopStage>(pictures().rig, limits)),
+      : stage(std::make_unique<LoopStage>(pictures().rig, LoopSettings{}, limits)),
         window_(std::make_unique<SmoothedWindow>()),
         tracks_(std::make_unique<TrackedFrame>()) {
     window_->started = true;
@@ -162,7 +162,7 @@ TEST_CASE("a place seen again brings the map back where it was, and says how the
 
   std::size_t revisits = 0;
   LoopRevisit revisit;
-  for (std::size_t i = 0; i < flight.stage->loopCount(); ++i) {
+  for (std::uint32_t i = 0; i < flight.stage->loopCount(); ++i) {
     if (!flight.stage->revisit(i, revisit)) continue;
     ++revisits;
     CHECK(revisit.old_stamp < revisit.new_stamp);

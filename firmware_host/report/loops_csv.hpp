@@ -1,0 +1,23 @@
+#pragma once
+// loops.csv of a run folder: one row for each loop that geometry verified, in the order in which they were
+// found, with what the selection said of it at the end. Stamps [ns] of the keyframes' images; T_old_new
+// between the bodies, quaternion xyzw; 1 sigma of the worst direction of rotation [rad] and translation [m].
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "mapping/loop/loop_stage.hpp"
+
+namespace swiftlet {
+
+/// "selected", "against_odometry", ...
+std::string_view verdictName(LoopVerdict verdict);
+
+/// Replaces the file.
+void writeLoops(const std::string& path, std::span<const MapLoop> loops);
+
+/// InputError names file and line.
+std::vector<MapLoop> readLoops(const std::string& path);
+
+}  // namespace swiftlet
