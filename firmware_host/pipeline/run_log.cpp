@@ -48,6 +48,10 @@ void RunLog::onLoop(const LoopReport& report) {
 
 void RunLog::keepLoops(const LoopStage& loops) {
   statistics_.loop = loops.counters();
+  for (std::size_t i = 0; i < loops.nodeCount(); ++i) {
+    const MapNode node = loops.node(i);
+    nodes_.push_back({node.stamp, node.T_map_body});
+  }
   for (std::uint32_t i = 0; i < loops.loopCount(); ++i) {
     loops_.push_back(loops.loop(i));
     LoopRevisit revisit;
@@ -135,7 +139,7 @@ void RunLog::collect(const Wiring& wiring) {
 
 std::vector<MapPose> RunLog::solveMap() {
   std::vector<MapPose> poses;
-  if (!keeper_) return poses;
+  if (!keeper_) return nodes_;
   FullSmootherReport report;
   Status status;
   addTime(statistics_.times, StageId::kMap, measured([&] { status = keeper_->solve(report, poses); }));

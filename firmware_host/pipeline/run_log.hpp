@@ -40,7 +40,8 @@ class RunLog {
   /// After the run: the loops that were found, for full smoothing.
   void keepLoops(const LoopStage& loops);
   [[nodiscard]] const std::vector<MapLoop>& loops() const { return loops_; }
-  /// After the run: full smoothing over what was kept. Poses of the keyframes; empty when there is nothing.
+  /// After the run: full smoothing over what was kept, or the pose graph of the loops where nothing was.
+  /// Poses of the keyframes; empty when there is neither.
   std::vector<MapPose> solveMap();
 
   [[nodiscard]] RunStatistics& statistics() { return statistics_; }
@@ -59,6 +60,7 @@ class RunLog {
   Effort smooth_effort_;
   RunStatistics statistics_;
   std::vector<MapLoop> loops_;
+  std::vector<MapPose> nodes_;  ///< of the pose graph, at the end
 };
 
 }  // namespace swiftlet
