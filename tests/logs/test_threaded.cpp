@@ -166,7 +166,7 @@ TEST_CASE("overloaded, threads degrade by policy, recover, and are repeated byte
     request.real_time = true;
     request.speed = kSpeed * kSlow;
     request.record = true;
-    request.loop_closure = run % 2 == 0;
+    request.loop_closure = !kSanitized && run % 2 == 0;  // its images take minutes under a sanitizer
     RandomDrag drag(static_cast<std::uint32_t>(run));
     ReplayHooks hooks;
     hooks.drag = [&](StageId stage, double cpu) { drag(stage, cpu); };
