@@ -71,9 +71,6 @@ struct WiringCounters {
     std::uint64_t skipped = 0;        ///< windows that a newer one overtook
     std::uint64_t without_image = 0;  ///< steps whose image was gone, or never came
   } mesh;
-  struct Loop {
-    std::uint64_t without_image = 0;  ///< as above
-  } loop;
 };
 
 /// What the sensors did of late, for whoever asks.

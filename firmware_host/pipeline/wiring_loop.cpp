@@ -68,8 +68,6 @@ bool Wiring::loop() {
   if (findKeyframeImages(message->tracked.index)) {
     input.image = closing_.images->image;
     step.image = closing_.images->number;
-  } else {
-    ++counters_.loop.without_image;
   }
   const Spent spent = measured([&] {
     const double cpu = threadCpuSeconds();

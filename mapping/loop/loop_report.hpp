@@ -27,7 +27,7 @@ inline constexpr std::size_t kMaxLoopCandidates = 4;
 /// How the newest epoch's world lies in the map.
 struct MapCorrection {
   std::uint32_t epoch = 0;
-  std::uint64_t version = 0;  ///< raised whenever the map moves
+  std::uint64_t version = 0;  ///< raised by every keyframe
   SE3 T_map_world;
 };
 

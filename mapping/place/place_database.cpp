@@ -148,7 +148,7 @@ void PlaceDatabase::findIslands(float least, Stamp stamp, std::uint32_t epoch, P
 }
 
 void PlaceDatabase::give(float reference, PlaceQuery& result) {
-  const auto better = [this](const PlaceCandidate& a, const PlaceCandidate& b) {
+  const auto better = [](const PlaceCandidate& a, const PlaceCandidate& b) {
     return a.score != b.score ? a.score > b.score : a.slot < b.slot;
   };
   for (const Island& island : islands_) {

@@ -28,8 +28,7 @@ void remove(BitSet set, ConstBitSet what) {
 }  // namespace
 
 MaximumClique::MaximumClique(std::uint32_t capacity, std::uint32_t max_depth)
-    : capacity_(capacity),
-      max_words_(wordsFor(capacity)),
+    : max_words_(wordsFor(capacity)),
       max_depth_(std::max(max_depth, 1U)),
       core_(max_words_),
       free_(max_words_),

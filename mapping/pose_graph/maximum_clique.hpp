@@ -74,7 +74,6 @@ class MaximumClique {
     return {levels_bits_.data() + (std::size_t{depth} * 2 + 1) * max_words_, words_};
   }
 
-  std::uint32_t capacity_;
   std::uint32_t max_words_;
   std::uint32_t max_depth_;
   std::uint32_t words_ = 0;                 ///< of the sets of numbered candidates
