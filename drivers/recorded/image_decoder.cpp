@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <csetjmp>
 #include <cstring>
 
@@ -14,6 +15,9 @@ namespace {
 constexpr std::array<std::uint8_t, 3> kJpegMagic = {0xFF, 0xD8, 0xFF};
 constexpr std::array<std::uint8_t, 8> kPngMagic = {0x89, 'P', 'N', 'G', 0x0D, 0x0A, 0x1A, 0x0A};
 constexpr png_uint_32 kMaxSide = 16384;
+
+/// Bytes a pixel.
+enum class Grey : std::uint8_t { k8 = 1, k16 = 2 };
 
 struct PngInput {
   const std::uint8_t* next;
@@ -41,10 +45,18 @@ void askForGrey8(png_structp png, png_infop info) {
   if ((type & PNG_COLOR_MASK_ALPHA) != 0) png_set_strip_alpha(png);
 }
 
+/// Two bytes a pixel, in this machine's order. False where the file has anything else.
+bool askForGrey16(png_structp png, png_infop info) {
+  if (png_get_color_type(png, info) != PNG_COLOR_TYPE_GRAY || png_get_bit_depth(png, info) != 16)
+    return false;
+  if constexpr (std::endian::native == std::endian::little) png_set_swap(png);
+  return true;
+}
+
 // libpng reports errors by longjmp: no object with a destructor may live in this function, and what it
 // changes after setjmp lives behind pointers.
-DecodeResult readPng(png_structp png, png_infop info, PngInput* input, ImageSize expected, std::uint8_t* out,
-                     ImageSize* found) {
+DecodeResult readPng(png_structp png, png_infop info, PngInput* input, ImageSize expected, Grey grey,
+                     std::uint8_t* out, ImageSize* found) {
   if (setjmp(png_jmpbuf(png)) != 0) return DecodeResult::kDamaged;
   png_set_user_limits(png, kMaxSide, kMaxSide);
   png_set_read_fn(png, input, &readPngBytes);
@@ -52,20 +64,25 @@ DecodeResult readPng(png_structp png, png_infop info, PngInput* input, ImageSize
   found->width = static_cast<int>(png_get_image_width(png, info));
   found->height = static_cast<int>(png_get_image_height(png, info));
   if (*found != expected) return DecodeResult::kWrongSize;
-  askForGrey8(png, info);
+  if (grey == Grey::k8) {
+    askForGrey8(png, info);
+  } else if (!askForGrey16(png, info)) {
+    return DecodeResult::kDamaged;
+  }
   const int passes = png_set_interlace_handling(png);
   png_read_update_info(png, info);
-  if (png_get_rowbytes(png, info) != static_cast<png_size_t>(expected.width)) return DecodeResult::kDamaged;
+  const int row_bytes = expected.width * static_cast<int>(grey);
+  if (png_get_rowbytes(png, info) != static_cast<png_size_t>(row_bytes)) return DecodeResult::kDamaged;
   for (int pass = 0; pass < passes; ++pass) {
     for (int y = 0; y < expected.height; ++y) {
-      png_read_row(png, out + static_cast<std::ptrdiff_t>(y) * expected.width, nullptr);
+      png_read_row(png, out + static_cast<std::ptrdiff_t>(y) * row_bytes, nullptr);
     }
   }
   png_read_end(png, nullptr);
   return DecodeResult::kOk;
 }
 
-DecodeResult decodePng(std::span<const std::uint8_t> bytes, ImageSize expected, std::uint8_t* out,
+DecodeResult decodePng(std::span<const std::uint8_t> bytes, ImageSize expected, Grey grey, std::uint8_t* out,
                        ImageSize& found) {
   png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, &onPngError, &onPngWarning);
   png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
@@ -74,9 +91,14 @@ DecodeResult decodePng(std::span<const std::uint8_t> bytes, ImageSize expected, 
     return DecodeResult::kDamaged;
   }
   PngInput input{bytes.data(), bytes.size()};
-  const DecodeResult result = readPng(png, info, &input, expected, out, &found);
+  const DecodeResult result = readPng(png, info, &input, expected, grey, out, &found);
   png_destroy_read_struct(&png, &info, nullptr);
   return result;
+}
+
+template <typename Magic>
+bool beginsWith(std::span<const std::uint8_t> bytes, const Magic& magic) {
+  return bytes.size() >= magic.size() && std::equal(magic.begin(), magic.end(), bytes.begin());
 }
 
 }  // namespace
@@ -113,13 +135,18 @@ DecodeResult ImageDecoder::decodeJpeg(std::span<const std::uint8_t> bytes, Image
 
 DecodeResult ImageDecoder::decode(std::span<const std::uint8_t> bytes, ImageSize expected, std::uint8_t* out,
                                   ImageSize& found) {
-  const auto beginsWith = [&](const auto& magic) {
-    return bytes.size() >= magic.size() && std::equal(magic.begin(), magic.end(), bytes.begin());
-  };
   found = {};
-  if (beginsWith(kJpegMagic)) return decodeJpeg(bytes, expected, out, found);
-  if (beginsWith(kPngMagic)) return decodePng(bytes, expected, out, found);
+  if (beginsWith(bytes, kJpegMagic)) return decodeJpeg(bytes, expected, out, found);
+  if (beginsWith(bytes, kPngMagic)) return decodePng(bytes, expected, Grey::k8, out, found);
   return bytes.empty() ? DecodeResult::kDamaged : DecodeResult::kUnknownFormat;
+}
+
+DecodeResult ImageDecoder::decode16(std::span<const std::uint8_t> bytes, ImageSize expected,
+                                    std::uint16_t* out, ImageSize& found) {
+  found = {};
+  if (!beginsWith(bytes, kPngMagic))
+    return bytes.empty() ? DecodeResult::kDamaged : DecodeResult::kUnknownFormat;
+  return decodePng(bytes, expected, Grey::k16, reinterpret_cast<std::uint8_t*>(out), found);
 }
 
 }  // namespace swiftlet

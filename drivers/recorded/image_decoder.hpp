@@ -31,6 +31,9 @@ class ImageDecoder {
   /// picture's size as soon as its header was read; another size than expected gives kWrongSize.
   DecodeResult decode(std::span<const std::uint8_t> bytes, ImageSize expected, std::uint8_t* out,
                       ImageSize& found);
+  /// PNG of 16 bits grey, kept as written (depth images); everything else is damaged.
+  static DecodeResult decode16(std::span<const std::uint8_t> bytes, ImageSize expected, std::uint16_t* out,
+                               ImageSize& found);
 
  private:
   DecodeResult decodeJpeg(std::span<const std::uint8_t> bytes, ImageSize expected, std::uint8_t* out,

@@ -49,6 +49,23 @@ TEST_CASE("8-bit PNG is exact", "[image_decoder]") {
   CHECK(decoded(bytes) == pixelsOf(image));
 }
 
+TEST_CASE("16-bit PNG is kept exactly for depth, and nothing else is taken for it", "[image_decoder]") {
+  const cv::Mat image = textured(CV_16UC1);
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".png", image, bytes);
+  std::vector<std::uint16_t> out(kWidth * kHeight);
+  ImageSize found;
+  REQUIRE(ImageDecoder::decode16(bytes, {kWidth, kHeight}, out.data(), found) == DecodeResult::kOk);
+  for (int i = 0; i < kWidth * kHeight; ++i) {
+    REQUIRE(out[static_cast<std::size_t>(i)] == image.at<std::uint16_t>(i / kWidth, i % kWidth));
+  }
+  CHECK(ImageDecoder::decode16(bytes, {kWidth + 1, kHeight}, out.data(), found) == DecodeResult::kWrongSize);
+  bytes.resize(bytes.size() / 2);
+  CHECK(ImageDecoder::decode16(bytes, {kWidth, kHeight}, out.data(), found) == DecodeResult::kDamaged);
+  cv::imencode(".png", textured(CV_8UC1), bytes);
+  CHECK(ImageDecoder::decode16(bytes, {kWidth, kHeight}, out.data(), found) == DecodeResult::kDamaged);
+}
+
 TEST_CASE("16-bit PNG is scaled and rounded", "[image_decoder]") {
   const cv::Mat image = textured(CV_16UC1);
   std::vector<std::uint8_t> bytes;

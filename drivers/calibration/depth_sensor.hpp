@@ -1,0 +1,21 @@
+#pragma once
+// The sensor.yaml of a depth camera: an ideal pinhole camera, where it sits, and what one unit of its images
+// is. Host side only: allocates and throws InputError with file, line and field.
+
+#include <string>
+#include <vector>
+
+#include "estimator/messages/depth_image.hpp"
+
+namespace swiftlet {
+
+struct DepthSensor {
+  PinholeIntrinsics camera;
+  SE3 T_body_camera;              ///< body: as the file has it
+  double metres_per_unit = 1e-3;  ///< `depth_unit_m`; millimetres where the file does not say
+};
+
+/// Refuses a lens with distortion: depth along the axis of a bent image has no common reading.
+DepthSensor readDepthSensor(const std::string& path, std::vector<std::string>& warnings);
+
+}  // namespace swiftlet
