@@ -12,6 +12,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kMapFile = "map.ply";
+
 struct Fit {
   Alignment alignment;
   std::string text;
@@ -139,17 +141,23 @@ MeshAccuracy evaluateMeshes(const MeshEvaluationRequest& request, const Trajecto
   const fs::path run(request.run);
   const bool has_sequence = fs::exists(run / "meshes" / "frames.csv");
   if (has_sequence) SequenceJudge(request, truth, options, fit.alignment, surface)(accuracy);
+  const fs::path observed = fs::path(accuracy.truth).parent_path() / "observed.ply";
+  const TriangleMesh points = fs::exists(observed) ? readPly(observed) : TriangleMesh();
+  const auto judge = [&](const char* name) {
+    const TriangleMesh mesh = moved(readPly(run / name), fit.alignment);
+    CompleteMeshAccuracy judged = completeMeshAccuracy(mesh, surface, points.vertices);
+    judged.file = name;
+    if (std::string_view(name) == kMapFile) judgeRegistered(mesh, true_mesh, surface, judged);
+    return judged;
+  };
   for (const char* name : {"complete_mesh.ply", "local_mesh.ply"}) {
-    if (accuracy.complete || !fs::exists(run / name)) continue;
-    const fs::path observed = fs::path(accuracy.truth).parent_path() / "observed.ply";
-    const TriangleMesh points = fs::exists(observed) ? readPly(observed) : TriangleMesh();
-    accuracy.complete =
-        completeMeshAccuracy(moved(readPly(run / name), fit.alignment), surface, points.vertices);
-    accuracy.complete->file = name;
+    if (!accuracy.complete && fs::exists(run / name)) accuracy.complete = judge(name);
   }
-  if (!has_sequence && !accuracy.complete) {
-    throw InputError(request.run, 0, "", "no meshes in this folder",
-                     "Replay with --mesh-sequence, or give what `swiftlet mesh` wrote");
+  if (fs::exists(run / kMapFile)) accuracy.map = judge(kMapFile);
+  if (!has_sequence && !accuracy.complete && !accuracy.map) {
+    throw InputError(
+        request.run, 0, "", "no meshes in this folder",
+        "Replay with --mesh-sequence or --map, or give what `swiftlet mesh` or `swiftlet fuse` wrote");
   }
   return accuracy;
 }

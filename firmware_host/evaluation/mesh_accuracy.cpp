@@ -43,7 +43,7 @@ CompleteMeshAccuracy completeMeshAccuracy(const TriangleMesh& mesh, const TrueSu
   result.vertices = mesh.vertices.size();
   result.faces = mesh.faces.size();
   result.density = sequenceDensity(areaOf(mesh));
-  const SurfaceError error = surfaceError(mesh, truth, result.density);
+  const SurfaceError error = surfaceError(mesh, truth, result.density, &result.labels);
   result.area = error.area;
   result.distance = statisticsOf(error.distances);
   result.label_share = error.labelShare();
@@ -54,6 +54,13 @@ CompleteMeshAccuracy completeMeshAccuracy(const TriangleMesh& mesh, const TrueSu
     return distance.nearest(p.cast<double>(), kCovered).has_value();
   }));
   return result;
+}
+
+void judgeRegistered(const TriangleMesh& mesh, const TriangleMesh& true_mesh, const TrueSurface& truth,
+                     CompleteMeshAccuracy& accuracy) {
+  accuracy.registration = registerMesh(mesh, true_mesh, truth);
+  const TriangleMesh laid = moved(mesh, accuracy.registration->motion);
+  accuracy.registered = statisticsOf(surfaceError(laid, truth, accuracy.density).distances);
 }
 
 }  // namespace swiftlet

@@ -10,6 +10,7 @@
 
 #include "firmware_host/evaluation/mesh_completeness.hpp"
 #include "firmware_host/evaluation/mesh_error.hpp"
+#include "firmware_host/evaluation/mesh_registration.hpp"
 
 namespace swiftlet {
 
@@ -64,7 +65,17 @@ struct CompleteMeshAccuracy {
   double unlabelled_share = 0;
   std::size_t observed = 0;  ///< points of the true surface that were seen; 0: nobody says which
   std::size_t covered = 0;   ///< of them, with mesh within kCovered
+  LabelConfusion labels;     ///< of the samples
+  /// Of a map: the same once it lies on the true surface as well as it can.
+  std::optional<MeshRegistration> registration;
+  DistanceStatistics registered;
 };
+/// Classes with a smaller share of the samples are left out of the mean over classes.
+inline constexpr double kLeastClassShare = 0.01;
+
+/// Adds to `accuracy` how far the mesh is from the truth after registration.
+void judgeRegistered(const TriangleMesh& mesh, const TriangleMesh& true_mesh, const TrueSurface& truth,
+                     CompleteMeshAccuracy& accuracy);
 
 /// `observed` may be empty.
 CompleteMeshAccuracy completeMeshAccuracy(const TriangleMesh& mesh, const TrueSurface& truth,
@@ -79,6 +90,7 @@ struct MeshAccuracy {
   std::optional<MeshSequenceAccuracy> frame;
   std::optional<MeshSequenceAccuracy> horizon;
   std::optional<CompleteMeshAccuracy> complete;
+  std::optional<CompleteMeshAccuracy> map;  ///< map.ply
 };
 
 }  // namespace swiftlet

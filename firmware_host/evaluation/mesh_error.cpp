@@ -107,7 +107,8 @@ double SurfaceError::labelShare() const { return share(label_right, labelled); }
 
 double SurfaceError::unlabelledShare() const { return share(distances.size() - labelled, distances.size()); }
 
-SurfaceError surfaceError(const TriangleMesh& mesh, const TrueSurface& truth, double density) {
+SurfaceError surfaceError(const TriangleMesh& mesh, const TrueSurface& truth, double density,
+                          LabelConfusion* labels) {
   SurfaceError result;
   result.area = areaOf(mesh);
   const std::vector<SurfaceSample> samples = sampleSurface(mesh, density);
@@ -117,6 +118,7 @@ SurfaceError surfaceError(const TriangleMesh& mesh, const TrueSurface& truth, do
     if (!nearest) continue;
     result.distances.push_back(static_cast<float>(nearest->distance));
     const std::uint8_t label = mesh.labels.empty() ? std::uint8_t{0} : mesh.labels[sample.face];
+    if (labels != nullptr) labels->add(truth.label(nearest->face), label);
     if (label == 0) continue;
     ++result.labelled;
     if (truth.label(nearest->face) == label) ++result.label_right;

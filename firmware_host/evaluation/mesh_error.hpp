@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "estimator/geometry/alignment.hpp"
+#include "firmware_host/evaluation/label_confusion.hpp"
 #include "firmware_host/evaluation/mesh_distance.hpp"
 
 namespace swiftlet {
@@ -66,7 +67,8 @@ struct SurfaceError {
   [[nodiscard]] double unlabelledShare() const;  ///< of all samples
 };
 
-/// `mesh` in the true surface's axes.
-SurfaceError surfaceError(const TriangleMesh& mesh, const TrueSurface& truth, double density);
+/// `mesh` in the true surface's axes. `labels`, when given, gets the samples' labels beside the true ones.
+SurfaceError surfaceError(const TriangleMesh& mesh, const TrueSurface& truth, double density,
+                          LabelConfusion* labels = nullptr);
 
 }  // namespace swiftlet

@@ -35,6 +35,18 @@ Json sequenceJson(const MeshSequenceAccuracy& sequence) {
           {"unlabelled_share", sequence.unlabelled_share}};
 }
 
+Json labelsJson(const LabelConfusion& labels) {
+  Json json = {{"accuracy", labels.accuracy()},
+               {"mean_iou", labels.meanIntersectionOverUnion(kLeastClassShare)},
+               {"least_class_share", kLeastClassShare}};
+  for (const std::uint8_t label : labels.classes()) {
+    json["classes"][std::to_string(label)] = {
+        {"share", static_cast<double>(labels.places(label)) / static_cast<double>(labels.places())},
+        {"iou", labels.intersectionOverUnion(label)}};
+  }
+  return json;
+}
+
 Json completeJson(const CompleteMeshAccuracy& complete) {
   Json json = {{"file", complete.file},
                {"vertices", complete.vertices},
@@ -46,6 +58,12 @@ Json completeJson(const CompleteMeshAccuracy& complete) {
                {"unlabelled_share", complete.unlabelled_share},
                {"observed_points", complete.observed}};
   if (complete.observed > 0) json["completeness"] = observedShare(complete);
+  if (complete.unlabelled_share < 1) json["labels"] = labelsJson(complete.labels);
+  if (complete.registration) {
+    json["after_registration"] = {{"distance_m", distanceJson(complete.registered)},
+                                  {"settled", complete.registration->settled},
+                                  {"moved_m", complete.registration->motion.T_to_from.translation.norm()}};
+  }
   return json;
 }
 
@@ -82,7 +100,17 @@ std::string completeText(const CompleteMeshAccuracy& complete) {
                         complete.observed, kCovered);
   }
   if (complete.distance.count > 0 && complete.unlabelled_share < 1) {
-    text += fmt::format("; labels right {:.1f} %", 100 * complete.label_share);
+    text += fmt::format("; labels right {:.1f} % of the labelled", 100 * complete.label_share);
+  }
+  if (complete.registration) {
+    text += fmt::format("\n    laid on the truth: rmse {:.4f}  median {:.4f}", complete.registered.rmse,
+                        complete.registered.median);
+  }
+  if (complete.labels.places() > 0 && complete.unlabelled_share < 1) {
+    text += fmt::format(
+        "\n    labels: accuracy {:.1f} %, mean IoU {:.1f} % over classes with {:g} % and more",
+        100 * complete.labels.accuracy(), 100 * complete.labels.meanIntersectionOverUnion(kLeastClassShare),
+        100 * kLeastClassShare);
   }
   return text + "\n";
 }
@@ -99,6 +127,7 @@ Json toJson(const MeshAccuracy& accuracy) {
                {"grid_step_px", kGridStep}};
   if (accuracy.frame) json["frame"] = sequenceJson(*accuracy.frame);
   if (accuracy.horizon) json["horizon"] = sequenceJson(*accuracy.horizon);
+  if (accuracy.map) json["map"] = completeJson(*accuracy.map);
   if (accuracy.complete) json["complete"] = completeJson(*accuracy.complete);
   return json;
 }
@@ -119,6 +148,7 @@ std::string toText(const MeshAccuracy& accuracy) {
   }
   if (accuracy.frame) text += sequenceText("frame", *accuracy.frame);
   if (accuracy.horizon) text += sequenceText("horizon", *accuracy.horizon);
+  if (accuracy.map) text += completeText(*accuracy.map);
   if (accuracy.complete) text += completeText(*accuracy.complete);
   return text;
 }
