@@ -1,0 +1,57 @@
+#pragma once
+// Voxels and the cubes of voxels ("blocks") that the volume keeps.
+//
+// World axes. Voxel (i, j, k) has its centre at (i + 1/2, j + 1/2, k + 1/2) voxel sizes; block (x, y, z)
+// holds the voxels from 8 (x, y, z) on. Within a block x runs fastest.
+
+#include <Eigen/Core>
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+
+namespace swiftlet {
+
+inline constexpr int kBlockBits = 3;
+/// Voxels along an edge of a block. With 16 the band around a surface takes twice the memory and the update
+/// half as long again (docs/volume.md).
+inline constexpr int kBlockSide = 1 << kBlockBits;
+inline constexpr int kBlockMask = kBlockSide - 1;
+inline constexpr std::size_t kBlockVoxels = std::size_t{1} << (3 * kBlockBits);
+
+/// Blocks lie within this many of the origin along each axis, so that 21 bits hold a coordinate.
+inline constexpr std::int32_t kBlockLimit = (1 << 20) - 2;
+
+struct BlockIndex {
+  std::int32_t x = 0;
+  std::int32_t y = 0;
+  std::int32_t z = 0;
+
+  auto operator<=>(const BlockIndex&) const = default;
+  BlockIndex operator+(const BlockIndex& o) const { return {x + o.x, y + o.y, z + o.z}; }
+  [[nodiscard]] bool inRange() const {
+    const auto within = [](std::int32_t i) { return i >= -kBlockLimit && i <= kBlockLimit; };
+    return within(x) && within(y) && within(z);
+  }
+};
+
+using VoxelIndex = BlockIndex;
+
+/// One number for a block in range; never zero.
+inline std::uint64_t keyOf(const BlockIndex& block) {
+  const auto part = [](std::int32_t i) {
+    return static_cast<std::uint64_t>(static_cast<std::uint32_t>(i + (1 << 20)));
+  };
+  return part(block.x) | (part(block.y) << 21U) | (part(block.z) << 42U) | (std::uint64_t{1} << 63U);
+}
+
+inline BlockIndex blockOf(const VoxelIndex& voxel) {
+  return {voxel.x >> kBlockBits, voxel.y >> kBlockBits, voxel.z >> kBlockBits};
+}
+
+/// Where a voxel lies within its block.
+inline std::size_t offsetOf(const VoxelIndex& voxel) {
+  return static_cast<std::size_t>((voxel.x & kBlockMask) + ((voxel.y & kBlockMask) << kBlockBits) +
+                                  ((voxel.z & kBlockMask) << (2 * kBlockBits)));
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,58 @@
+#pragma once
+// One block against one depth image: every voxel is projected into the image, and the depth it meets there
+// moves its distance (Curless, Levoy, "A Volumetric Method for Building Complex Models from Range Images",
+// SIGGRAPH 1996).
+//
+// With depth d of the pixel that a voxel's centre falls on, z the centre's own depth and |p| its distance
+// from the camera, the distance along the ray is s = (d - z) |p| / z. Observed are -behind <= s; s is cut at
+// the truncation distance, so that free voxels are carved; the weight falls from one voxel behind the surface
+// to zero at `behind` (Bylow et al., RSS 2013; Oleynikova et al., IROS 2017). Averages run up to most_weight.
+// Plain loops over rows, written so that the compiler turns them into vector code. Cost: docs/volume.md.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+
+#include "estimator/geometry/se3.hpp"
+#include "mapping/volume/prepared_image.hpp"
+#include "mapping/volume/voxel_block.hpp"
+#include "mapping/volume/voxel_volume.hpp"
+
+namespace swiftlet {
+
+/// What all blocks of an image share.
+class BlockUpdate {
+ public:
+  explicit BlockUpdate(const VolumeSettings& settings);
+
+  /// Before the blocks of an image, which outlives them.
+  void begin(const PreparedImage& image, const SE3& T_camera_world);
+
+  struct Result {
+    std::uint32_t observed = 0;  ///< voxels
+    float largest_change = 0;    ///< of a distance [steps]
+    std::uint8_t sides = 0;      ///< as in BlockHeader, after the update
+    bool news = false;           ///< a first observation, a changed side or most frequent label
+  };
+
+  /// By projection. `labels` may be null.
+  Result project(const BlockIndex& index, VoxelBlock& block, LabelBlock* labels) const;
+  /// The whole block was seen free.
+  Result carve(VoxelBlock& block) const;
+
+ private:
+  static constexpr std::size_t kRows = 64;  ///< voxels that are done together
+
+  struct Rows;
+  void meet(const Eigen::Vector3f& first, std::size_t at, Rows& rows) const;
+  void average(VoxelBlock& block, std::size_t at, Rows& rows, Result& result) const;
+  void colour(VoxelBlock& block, LabelBlock* labels, std::size_t at, const Rows& rows, Result& result) const;
+
+  VolumeSettings settings_;
+  const PreparedImage* image_ = nullptr;
+  SE3 T_camera_world_;
+  /// From a block's first voxel to each of its voxels, in camera axes.
+  alignas(64) std::array<float, kBlockVoxels> x_{}, y_{}, z_{};
+};
+
+}  // namespace swiftlet

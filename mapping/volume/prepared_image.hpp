@@ -1,0 +1,93 @@
+#pragma once
+// A depth image made ready for the update: checked pixels, packed attributes, and a pyramid of how far the
+// view is free.
+//
+// A pixel is one number: above 0 a measured depth; below 0 free up to its absolute value and nothing known
+// beyond (masked labels, depths beyond the range); 0 unmeasured. One pixel more than the image has stands for
+// everything outside of it, unmeasured. Buffers are reserved at construction.
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "estimator/core/status.hpp"
+#include "estimator/messages/depth_image.hpp"
+#include "mapping/volume/volume_settings.hpp"
+
+namespace swiftlet {
+
+struct PixelCounters {
+  std::uint64_t unmeasured = 0;  ///< zero, negative, NaN, infinite, or nearer than the range
+  std::uint64_t beyond_range = 0;
+  std::uint64_t masked = 0;
+  std::uint64_t bad_label = 0;  ///< out of range: taken as unknown
+};
+
+class PreparedImage {
+ public:
+  /// Pixels along a tile's edge at the pyramid's finest level.
+  static constexpr int kTile = 8;
+  static constexpr int kMostLevels = 12;
+  /// A tile in which fewer of the pixels are measured says nothing.
+  static constexpr int kLeastMeasured = kTile * kTile / 2;
+
+  explicit PreparedImage(std::size_t most_pixels);
+
+  /// kInvalidInput where the image is empty, has more than `most_pixels`, impossible intrinsics or no depth.
+  [[nodiscard]] Status prepare(const DepthImageView& image, const VolumeSettings& settings,
+                               PixelCounters& counters);
+
+  [[nodiscard]] const PinholeIntrinsics& camera() const { return camera_; }
+  /// width * height + 1 values.
+  [[nodiscard]] const float* depth() const { return depth_.data(); }
+  /// What a metre of depth in front of each pixel's surface is in metres from that surface: the cosine
+  /// between ray and normal by the length of the ray for a metre of depth. From differences of inverse depth,
+  /// which is linear in the pixel on a plane; of the two neighbours along an axis the one that is nearer in
+  /// depth, so that the edge of a thing does not turn its normal. 1 where nothing was measured.
+  [[nodiscard]] const float* slope() const { return slope_.data(); }
+  /// Weight of each pixel, in kWeightSteps.
+  [[nodiscard]] const float* weight() const { return weight_.data(); }
+  /// Null where the image has none.
+  [[nodiscard]] const std::uint8_t* grey() const { return grey_; }
+  [[nodiscard]] const std::uint8_t* labels() const { return has_labels_ ? label_.data() : nullptr; }
+
+  /// A depth [m] up to which all measured pixels of the rectangle (inclusive, within the image) are free; 0
+  /// where too little is measured. Never more than the truth, less by what a coarse level blurs.
+  [[nodiscard]] float freeDepth(int left, int top, int right, int bottom) const;
+  /// The deepest measured pixel of the tile (column, row at level 0), or 0.
+  [[nodiscard]] float deepest(int column, int row) const {
+    return deepest_[static_cast<std::size_t>(row) * static_cast<std::size_t>(level_[0].width) +
+                    static_cast<std::size_t>(column)];
+  }
+  [[nodiscard]] int tileColumns() const { return level_[0].width; }
+  [[nodiscard]] int tileRows() const { return level_[0].height; }
+  [[nodiscard]] std::size_t bytes() const;
+
+ private:
+  struct Level {
+    int width = 0;
+    int height = 0;
+    std::size_t first = 0;  ///< in free_
+  };
+
+  void checkPixels(const DepthImageView& image, const VolumeSettings& settings, PixelCounters& counters);
+  void checkLabels(const DepthImageView& image, const VolumeSettings& settings, PixelCounters& counters);
+  void findSlopes();
+  void buildPyramid();
+
+  std::size_t most_pixels_;
+  PinholeIntrinsics camera_;
+  std::vector<float> depth_;
+  std::vector<float> weight_;
+  std::vector<float> slope_;
+  std::vector<float> inverse_;  ///< depth; 0 where nothing was measured
+  std::vector<std::uint8_t> label_;
+  const std::uint8_t* grey_ = nullptr;
+  bool has_labels_ = false;
+  std::vector<float> free_;
+  std::vector<float> deepest_;
+  Level level_[kMostLevels];
+  int levels_ = 0;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,274 @@
+#include "mapping/volume/volume_integrator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace swiftlet {
+namespace {
+
+/// Every so many pixels a surface point lists its blocks: 9 cm at 10 m with a focal length of 430 px.
+constexpr int kBandStride = 4;
+/// Tiles of PreparedImage along the edge of a bundle.
+constexpr int kBundleTiles = 2;
+/// How much farther than its depth a ray may be long: a corner of a view of 110 degrees.
+constexpr double kRayStretch = 1.75;
+/// A block nearer than this [m] is not judged as a whole.
+constexpr float kNearestBlock = 0.05F;
+/// Two images of one pose may differ by this much at once: the noise of an estimate.
+constexpr double kPoseSlack = 0.05;  // m
+constexpr double kTurnSlack = 0.05;  // rad
+
+bool finite(const SE3& T) { return T.rotation.coeffs().allFinite() && T.translation.allFinite(); }
+
+int reachOf(const VolumeSettings& s) {
+  return static_cast<int>(std::ceil(kRayStretch * s.most_range / (s.voxel_size * kBlockSide))) + 2;
+}
+
+/// Blocks that one image can list: as many as the points that it looks at may touch, and not more than the
+/// volume has use for.
+std::size_t bandCapacity(const VoxelVolume& volume, std::size_t most_pixels) {
+  return std::min(8 * (most_pixels / (kBandStride * kBandStride) + 1), 4 * volume.blockCapacity() + 64);
+}
+
+}  // namespace
+
+VolumeIntegrator::VolumeIntegrator(VoxelVolume& volume, std::size_t most_pixels)
+    : volume_(volume),
+      image_(most_pixels),
+      update_(volume.settings()),
+      window_(reachOf(volume.settings())),
+      most_band_(bandCapacity(volume, most_pixels)) {
+  band_.reserve(most_band_);
+}
+
+std::size_t VolumeIntegrator::bytes() const {
+  return sizeof(*this) + image_.bytes() + window_.bytes() + band_.capacity() * sizeof(BlockIndex);
+}
+
+Status VolumeIntegrator::checkPose(const DepthImageView& image, const SE3& T_world_body) {
+  if (!finite(T_world_body) || !finite(image.T_body_camera)) {
+    ++counters_.bad_poses;
+    return {StatusCode::kInvalidInput, "depth image: the pose is not finite"};
+  }
+  const std::optional<Pose> before = last_;
+  if (before && image.stamp <= before->stamp) {
+    ++counters_.bad_stamps;
+    return {StatusCode::kInvalidInput, "depth image: the stamp is not after the last"};
+  }
+  last_ = Pose{image.stamp, T_world_body};
+  if (!before) return okStatus();
+  const VolumeSettings& s = volume_.settings();
+  const double seconds = (image.stamp - before->stamp).seconds();
+  const double moved = (T_world_body.translation - before->T_world_body.translation).norm();
+  const double turned = T_world_body.rotation.angularDistance(before->T_world_body.rotation);
+  if (moved > kPoseSlack + s.most_speed * seconds || turned > kTurnSlack + s.most_turn_rate * seconds) {
+    ++counters_.pose_jumps;
+    return {StatusCode::kInvalidInput, "depth image: the pose jumped"};
+  }
+  return okStatus();
+}
+
+Status VolumeIntegrator::step(const DepthImageView& image, const SE3& T_world_body,
+                              const VolumeEffort& effort, VolumeStep& out) {
+  out = {};
+  Status status = checkPose(image, T_world_body);
+  if (status.ok()) status = image_.prepare(image, volume_.settings(), counters_.pixels);
+  if (!status.ok()) {
+    ++counters_.refused;
+    return status;
+  }
+  begin(T_world_body * image.T_body_camera);
+  listBand(effort.blocks, out);
+  for (const BlockIndex& block : band_) {
+    const std::uint32_t slot = volume_.obtain(block);
+    if (slot != VoxelVolume::kNone) {
+      update(slot, false, out);
+    } else {
+      ++out.no_room;
+    }
+  }
+  walkBundles(effort.blocks, out);
+  ++counters_.images;
+  counters_.blocks_left_out += out.left_out;
+  if (out.left_out + out.no_room > 0)
+    return {StatusCode::kCapacityReached, "volume: not all blocks were updated"};
+  return okStatus();
+}
+
+void VolumeIntegrator::begin(const SE3& T_world_camera) {
+  const double block = volume_.settings().voxel_size * kBlockSide;
+  T_world_camera_ = T_world_camera;
+  T_camera_world_ = T_world_camera.inverse();
+  vehicle_ = T_world_camera.translation.cast<float>();
+  const Eigen::Vector3d at = T_world_camera.translation / block;
+  const Eigen::Vector3d whole = at.array().floor();
+  centre_ = {static_cast<std::int32_t>(whole.x()), static_cast<std::int32_t>(whole.y()),
+             static_cast<std::int32_t>(whole.z())};
+  origin_ = (at - whole).cast<float>();
+  const Eigen::Matrix3d R = T_world_camera.R();
+  R_blocks_camera_ = (R / block).cast<float>();
+  half_extent_ = (0.5 * block * R.transpose().cwiseAbs().rowwise().sum()).cast<float>();
+  update_.begin(image_, T_camera_world_);
+  window_.clear();
+  volume_.beginChange();
+}
+
+void VolumeIntegrator::addBandPoint(const Eigen::Vector3f& p) {
+  // The corners of a cube that a surface passes through lie within a voxel of it along each axis.
+  constexpr float kMargin = 1.0F / kBlockSide;
+  std::array<std::int32_t, 6> range;
+  for (int axis = 0; axis < 3; ++axis) {
+    range[static_cast<std::size_t>(axis)] = static_cast<std::int32_t>(std::floor(p[axis] - kMargin));
+    range[static_cast<std::size_t>(axis + 3)] = static_cast<std::int32_t>(std::floor(p[axis] + kMargin));
+  }
+  if (range == last_band_) return;
+  last_band_ = range;
+  for (std::int32_t z = range[2]; z <= range[5]; ++z) {
+    for (std::int32_t y = range[1]; y <= range[4]; ++y) {
+      for (std::int32_t x = range[0]; x <= range[3]; ++x) {
+        if (band_.size() < most_band_ && window_.meet({x, y, z}))
+          band_.push_back(centre_ + BlockIndex{x, y, z});
+      }
+    }
+  }
+}
+
+void VolumeIntegrator::listBand(std::uint32_t blocks, VolumeStep& out) {
+  band_.clear();
+  last_band_.fill(std::numeric_limits<std::int32_t>::max());
+  const PinholeIntrinsics& c = image_.camera();
+  const auto fx = static_cast<float>(1 / c.fx), fy = static_cast<float>(1 / c.fy);
+  const auto cx = static_cast<float>(c.cx), cy = static_cast<float>(c.cy);
+  for (int v = 0; v < c.height; v += kBandStride) {
+    const float* const depth =
+        image_.depth() + static_cast<std::size_t>(v) * static_cast<std::size_t>(c.width);
+    const Eigen::Vector3f row = R_blocks_camera_ * Eigen::Vector3f(0, (static_cast<float>(v) - cy) * fy, 1);
+    for (int u = 0; u < c.width; u += kBandStride) {
+      if (depth[u] <= 0) continue;
+      const Eigen::Vector3f ray = row + (static_cast<float>(u) - cx) * fx * R_blocks_camera_.col(0);
+      addBandPoint(origin_ + depth[u] * ray);
+    }
+  }
+  if (band_.size() > blocks) {
+    const auto nearer = [this](const BlockIndex& a, const BlockIndex& b) {
+      const float da = (volume_.centreOf(a) - vehicle_).squaredNorm();
+      const float db = (volume_.centreOf(b) - vehicle_).squaredNorm();
+      return da != db ? da < db : keyOf(a) < keyOf(b);
+    };
+    std::nth_element(band_.begin(), band_.begin() + blocks, band_.end(), nearer);
+    out.left_out += static_cast<std::uint32_t>(band_.size() - blocks);
+    band_.resize(blocks);
+  }
+  out.band = static_cast<std::uint32_t>(band_.size());
+  const std::size_t listed = band_.size();
+  const std::size_t before = volume_.blockCount();
+  volume_.makeRoom(vehicle_, band_);
+  out.no_room += static_cast<std::uint32_t>(listed - band_.size());
+  out.created = static_cast<std::uint32_t>(before);
+}
+
+void VolumeIntegrator::update(std::uint32_t slot, bool carve, VolumeStep& out) {
+  BlockHeader& header = volume_.changeHeader(slot);
+  VoxelBlock& voxels = volume_.changeVoxels(slot);
+  const BlockUpdate::Result result =
+      carve ? update_.carve(voxels) : update_.project(header.index, voxels, volume_.changeLabels(slot));
+  (carve ? out.carved : out.updated) += 1;
+  if (result.observed == 0) return;
+  header.sides = result.sides;
+  header.drift += result.largest_change;
+  const auto tolerance = static_cast<float>(volume_.settings().change_tolerance);
+  if (result.news || tolerance <= 0 || header.drift * volume_.distanceStep() > tolerance) {
+    volume_.markChanged(slot);
+    ++out.changed;
+  }
+}
+
+void VolumeIntegrator::walkBundles(std::uint32_t blocks, VolumeStep& out) {
+  const PinholeIntrinsics& c = image_.camera();
+  for (int row = 0; row < image_.tileRows(); row += kBundleTiles) {
+    for (int column = 0; column < image_.tileColumns(); column += kBundleTiles) {
+      float deepest = 0;
+      for (int r = row; r < std::min(row + kBundleTiles, image_.tileRows()); ++r) {
+        for (int k = column; k < std::min(column + kBundleTiles, image_.tileColumns()); ++k) {
+          deepest = std::max(deepest, image_.deepest(k, r));
+        }
+      }
+      if (deepest <= 0) continue;
+      constexpr double kCentre = 0.5 * kBundleTiles * PreparedImage::kTile - 0.5;
+      const Eigen::Vector3f ray(
+          static_cast<float>((std::min(column * PreparedImage::kTile + kCentre, c.width - 1.0) - c.cx) /
+                             c.fx),
+          static_cast<float>((std::min(row * PreparedImage::kTile + kCentre, c.height - 1.0) - c.cy) / c.fy),
+          1);
+      if (!walk(R_blocks_camera_ * ray, deepest, blocks, out)) return;
+    }
+  }
+}
+
+bool VolumeIntegrator::walk(const Eigen::Vector3f& direction, float length, std::uint32_t blocks,
+                            VolumeStep& out) {
+  constexpr float kNever = std::numeric_limits<float>::infinity();
+  std::array<std::int32_t, 3> at{}, way{};
+  std::array<float, 3> next{}, each{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    const float d = direction[axis];
+    way[i] = d > 0 ? 1 : -1;
+    each[i] = d != 0 ? std::abs(1 / d) : kNever;
+    next[i] = d != 0 ? ((d > 0 ? 1.0F : 0.0F) - origin_[axis]) / d : kNever;
+  }
+  for (float t = 0; t <= length;) {
+    const BlockIndex block{at[0], at[1], at[2]};
+    if (window_.meet(block)) {
+      if (out.updated + out.carved >= blocks) {
+        ++out.left_out;
+        return false;
+      }
+      meetOnRay(centre_ + block, out);
+    }
+    const std::size_t axis =
+        next[0] < next[1] ? (next[0] < next[2] ? 0U : 2U) : (next[1] < next[2] ? 1U : 2U);
+    t = next[axis];
+    next[axis] += each[axis];
+    at[axis] += way[axis];
+  }
+  return true;
+}
+
+void VolumeIntegrator::meetOnRay(const BlockIndex& block, VolumeStep& out) {
+  const std::uint32_t slot = volume_.find(block);
+  const bool has_voxels = slot != VoxelVolume::kNone && volume_.header(slot).state == BlockState::kVoxels;
+  const bool free = isFree(block);
+  if (has_voxels) {
+    update(slot, free, out);
+  } else if (free) {
+    volume_.addFree(block, vehicle_);
+    ++out.freed;
+  }
+}
+
+bool VolumeIntegrator::isFree(const BlockIndex& block) const {
+  const Eigen::Vector3f centre = (T_camera_world_ * volume_.centreOf(block).cast<double>()).cast<float>();
+  const float nearest = centre.z() - half_extent_.z(), farthest = centre.z() + half_extent_.z();
+  if (nearest < kNearestBlock) return false;
+  const PinholeIntrinsics& c = image_.camera();
+  // Of the block's box in camera axes, the corners that project farthest out.
+  const auto low = [&](float x) { return x / (x < 0 ? nearest : farthest); };
+  const auto high = [&](float x) { return x / (x > 0 ? nearest : farthest); };
+  const auto left = static_cast<float>(c.fx) * low(centre.x() - half_extent_.x()) + static_cast<float>(c.cx);
+  const auto right =
+      static_cast<float>(c.fx) * high(centre.x() + half_extent_.x()) + static_cast<float>(c.cx);
+  const auto top = static_cast<float>(c.fy) * low(centre.y() - half_extent_.y()) + static_cast<float>(c.cy);
+  const auto bottom =
+      static_cast<float>(c.fy) * high(centre.y() + half_extent_.y()) + static_cast<float>(c.cy);
+  if (!(left >= 0 && top >= 0 && right <= static_cast<float>(c.width - 1) &&
+        bottom <= static_cast<float>(c.height - 1))) {
+    return false;
+  }
+  const float free = image_.freeDepth(static_cast<int>(left), static_cast<int>(top), static_cast<int>(right),
+                                      static_cast<int>(bottom));
+  return free >= farthest + static_cast<float>(volume_.settings().truncation);
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,111 @@
+#pragma once
+// The stage that fuses depth images into a volume.
+//
+// 1. Band: the blocks within a voxel of a measured surface point are listed, and room is made for the new
+// ones.
+// 2. Bundles: all rays of a tile of 16 x 16 pixels walk as one through the blocks up to the deepest of their
+//    pixels (Amanatides, Woo, 1987); a block that the image has met already is passed over. This is the
+//    "fast" bundled ray casting of Voxblox (Oleynikova et al., IROS 2017) on blocks in place of voxels. A
+//    block that lies in front of everything measured is free as a whole; of others, those with voxels are
+//    updated.
+// 3. Update: block_update.hpp, voxel by voxel.
+//
+// `effort` bounds the blocks that are updated: the band's go first, nearest first. Memory fixed at
+// construction, no clock, no randomness: the same images give the same bytes.
+// kInvalidInput, with a counter, for images that were refused: wrong size or intrinsics, a pose or an
+// extrinsic that is not finite, a stamp not after the last, a pose jump (VolumeSettings::most_speed,
+// most_turn_rate; the next image is judged against the refused one, so one jump costs one image).
+// kCapacityReached when blocks were refused or left out: the rest was fused.
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "estimator/core/status.hpp"
+#include "estimator/messages/depth_image.hpp"
+#include "mapping/volume/block_update.hpp"
+#include "mapping/volume/block_window.hpp"
+#include "mapping/volume/prepared_image.hpp"
+#include "mapping/volume/voxel_volume.hpp"
+
+namespace swiftlet {
+
+struct VolumeEffort {
+  std::uint32_t blocks = 1U << 20U;  ///< updated or carved, for one image
+
+  bool operator==(const VolumeEffort&) const = default;
+};
+
+/// What one image did.
+struct VolumeStep {
+  std::uint32_t band = 0;      ///< blocks near measured surface
+  std::uint32_t created = 0;   ///< of them, new
+  std::uint32_t updated = 0;   ///< blocks projected, band and others
+  std::uint32_t carved = 0;    ///< blocks with voxels, free as a whole
+  std::uint32_t freed = 0;     ///< blocks without voxels, free as a whole
+  std::uint32_t changed = 0;   ///< blocks that readers have to look at
+  std::uint32_t left_out = 0;  ///< for lack of effort; blocks met behind that are not counted
+  std::uint32_t no_room = 0;   ///< new blocks refused
+};
+
+struct IntegratorCounters {
+  std::uint64_t images = 0;   ///< fused
+  std::uint64_t refused = 0;  ///< of these three kinds and all others
+  std::uint64_t pose_jumps = 0;
+  std::uint64_t bad_poses = 0;
+  std::uint64_t bad_stamps = 0;
+  std::uint64_t blocks_left_out = 0;
+  PixelCounters pixels;
+};
+
+class VolumeIntegrator {
+ public:
+  /// `volume` outlives it. `most_pixels`: of any image to come.
+  VolumeIntegrator(VoxelVolume& volume, std::size_t most_pixels);
+
+  [[nodiscard]] Status step(const DepthImageView& image, const SE3& T_world_body, const VolumeEffort& effort,
+                            VolumeStep& out);
+  /// Forgets the last pose and stamp: for a new epoch, or a map that was moved.
+  void restart() { last_.reset(); }
+
+  [[nodiscard]] const IntegratorCounters& counters() const { return counters_; }
+  /// Beside the volume's own.
+  [[nodiscard]] std::size_t bytes() const;
+
+ private:
+  struct Pose {
+    Stamp stamp;
+    SE3 T_world_body;
+  };
+
+  Status checkPose(const DepthImageView& image, const SE3& T_world_body);
+  void begin(const SE3& T_world_camera);
+  void listBand(std::uint32_t blocks, VolumeStep& out);
+  void addBandPoint(const Eigen::Vector3f& p);
+  void walkBundles(std::uint32_t blocks, VolumeStep& out);
+  bool walk(const Eigen::Vector3f& direction, float length, std::uint32_t blocks, VolumeStep& out);
+  void meetOnRay(const BlockIndex& block, VolumeStep& out);
+  [[nodiscard]] bool isFree(const BlockIndex& block) const;
+  void update(std::uint32_t slot, bool carve, VolumeStep& out);
+
+  VoxelVolume& volume_;
+  PreparedImage image_;
+  BlockUpdate update_;
+  BlockWindow window_;
+  std::size_t most_band_;
+  std::vector<BlockIndex> band_;
+  std::optional<Pose> last_;
+  IntegratorCounters counters_;
+
+  // Of the image in hand. Rays and points are in blocks, from the camera's block.
+  SE3 T_world_camera_;
+  SE3 T_camera_world_;
+  Eigen::Vector3f vehicle_ = Eigen::Vector3f::Zero();
+  BlockIndex centre_;
+  Eigen::Vector3f origin_ = Eigen::Vector3f::Zero();
+  Eigen::Matrix3f R_blocks_camera_ = Eigen::Matrix3f::Identity();
+  Eigen::Vector3f half_extent_ = Eigen::Vector3f::Zero();  ///< of a block in camera axes [m]
+  std::array<std::int32_t, 6> last_band_{};
+};
+
+}  // namespace swiftlet

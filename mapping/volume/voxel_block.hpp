@@ -1,0 +1,81 @@
+#pragma once
+// What a block knows of its voxels, each quantity by itself so that the update runs over rows.
+//
+// 5 bytes a voxel (2 560 a block), and 8 more (4 096) where labels are kept.
+
+#include <array>
+#include <cstdint>
+#include <utility>
+
+#include "mapping/volume/block_index.hpp"
+
+namespace swiftlet {
+
+/// Distances are kept in this many steps from 0 to the truncation distance: 5 um at 15 cm.
+inline constexpr float kDistanceSteps = 32767.0F;
+/// Weights are kept in 1/256: an observation as good as the reference has weight 1.
+inline constexpr float kWeightSteps = 256.0F;
+
+struct alignas(64) VoxelBlock {
+  std::array<std::int16_t, kBlockVoxels> distance;  ///< to the surface, positive in front of it
+  std::array<std::uint16_t, kBlockVoxels> weight;   ///< 0: never observed
+  std::array<std::uint8_t, kBlockVoxels> grey;
+};
+
+/// How often which label was seen at a voxel: four of them, each 5 bits of label and 11 of count. Sufficient
+/// for Bayes' rule with any confusion model as long as a voxel saw at most four labels. Where a fifth comes
+/// the rarest gives way (Misra, Gries, "Finding repeated elements", 1982).
+class LabelCounts {
+ public:
+  static constexpr int kSlots = 4;
+  static constexpr std::uint16_t kMostCount = (1U << 11U) - 1;
+
+  /// `label` from 1 to 31. True when the most frequent label is another than before.
+  bool add(std::uint8_t label);
+  /// By falling count.
+  [[nodiscard]] std::uint8_t label(int slot) const {
+    return static_cast<std::uint8_t>(slots_[static_cast<std::size_t>(slot)] >> 11U);
+  }
+  [[nodiscard]] std::uint16_t count(int slot) const {
+    return slots_[static_cast<std::size_t>(slot)] & kMostCount;
+  }
+  [[nodiscard]] bool empty() const { return slots_[0] == 0; }
+
+ private:
+  std::array<std::uint16_t, kSlots> slots_{};  ///< filled from the front, by falling count
+};
+
+inline bool LabelCounts::add(std::uint8_t label) {
+  std::size_t i = 0;
+  while (i < kSlots && slots_[i] != 0 && slots_[i] >> 11U != label) ++i;
+  if (i == kSlots) {
+    // All others have been seen: the rarest pays, and gives way when it has nothing left.
+    i = kSlots - 1;
+    if ((slots_[i] & kMostCount) > 1) {
+      --slots_[i];
+    } else {
+      slots_[i] = static_cast<std::uint16_t>((label << 11U) | 1U);
+    }
+    return false;
+  }
+  if (slots_[i] == 0) {
+    slots_[i] = static_cast<std::uint16_t>((label << 11U) | 1U);
+    return i == 0;
+  }
+  if ((slots_[i] & kMostCount) == kMostCount) {
+    // Shares stay as they are, and the newest go on to count.
+    for (std::uint16_t& s : slots_) {
+      if (s != 0) s = static_cast<std::uint16_t>((s & ~kMostCount) | (((s & kMostCount) + 1U) / 2U));
+    }
+  }
+  ++slots_[i];
+  if (i == 0 || (slots_[i] & kMostCount) <= (slots_[i - 1] & kMostCount)) return false;
+  std::swap(slots_[i], slots_[i - 1]);
+  return i == 1;
+}
+
+struct alignas(64) LabelBlock {
+  std::array<LabelCounts, kBlockVoxels> counts;
+};
+
+}  // namespace swiftlet

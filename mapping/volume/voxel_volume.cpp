@@ -1,0 +1,226 @@
+#include "mapping/volume/voxel_volume.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace swiftlet {
+namespace {
+
+/// Of the pool, dropped at once when it is full, so that not every image has to choose.
+constexpr std::size_t kEvictionShare = 32;
+
+}  // namespace
+
+std::size_t VoxelVolume::blocksFor(std::size_t memory_bytes, bool labels) {
+  constexpr std::size_t kHeaders = 1 + kFreePerBlock;
+  const std::size_t each =
+      sizeof(VoxelBlock) + (labels ? sizeof(LabelBlock) : 0) +
+      kHeaders * (sizeof(BlockHeader) + sizeof(std::uint32_t) + sizeof(Farness) + sizeof(std::uint32_t)) +
+      sizeof(std::uint32_t);
+  std::size_t blocks = memory_bytes / each;
+  const auto fits = [&](std::size_t n) {
+    return n * each + BlockHash::bytesFor(n * kHeaders) <= memory_bytes;
+  };
+  while (blocks > 1 && !fits(blocks)) blocks -= std::max<std::size_t>(blocks / 64, 1);
+  return std::max<std::size_t>(blocks, 1);
+}
+
+VoxelVolume::VoxelVolume(const VolumeSettings& settings)
+    : settings_(settings),
+      hash_(blocksFor(settings.memory_bytes, settings.labels) * (1 + kFreePerBlock)),
+      headers_(blocksFor(settings.memory_bytes, settings.labels) * (1 + kFreePerBlock)),
+      blocks_(blocksFor(settings.memory_bytes, settings.labels)),
+      labels_(settings.labels ? blocks_.size() : 0) {
+  unused_headers_.reserve(headers_.size());
+  unused_data_.reserve(blocks_.size());
+  far_.resize(headers_.size());
+  leaving_.resize(headers_.size());
+  clear();
+}
+
+void VoxelVolume::clear() {
+  hash_.clear();
+  std::fill(headers_.begin(), headers_.end(), BlockHeader{});
+  unused_headers_.clear();
+  unused_data_.clear();
+  // The lowest slots are given first.
+  for (std::size_t i = headers_.size(); i-- > 0;) unused_headers_.push_back(static_cast<std::uint32_t>(i));
+  for (std::size_t i = blocks_.size(); i-- > 0;) unused_data_.push_back(static_cast<std::uint32_t>(i));
+  free_count_ = 0;
+  ++revision_;
+}
+
+std::size_t VoxelVolume::bytes() const {
+  return hash_.bytes() + headers_.size() * sizeof(BlockHeader) + blocks_.size() * sizeof(VoxelBlock) +
+         labels_.size() * sizeof(LabelBlock) + far_.size() * sizeof(Farness) +
+         (unused_headers_.capacity() + unused_data_.capacity() + leaving_.size()) * sizeof(std::uint32_t);
+}
+
+VoxelIndex VoxelVolume::voxelAt(const Eigen::Vector3d& p_world) const {
+  const Eigen::Vector3d scaled = p_world / settings_.voxel_size;
+  return {static_cast<std::int32_t>(std::floor(scaled.x())),
+          static_cast<std::int32_t>(std::floor(scaled.y())),
+          static_cast<std::int32_t>(std::floor(scaled.z()))};
+}
+
+Eigen::Vector3f VoxelVolume::centreOf(const BlockIndex& block) const {
+  return blockSize() * (Eigen::Vector3f(static_cast<float>(block.x), static_cast<float>(block.y),
+                                        static_cast<float>(block.z)) +
+                        Eigen::Vector3f::Constant(0.5F));
+}
+
+bool VoxelVolume::distanceAt(const VoxelIndex& voxel, float& distance) const {
+  const std::uint32_t slot = find(blockOf(voxel));
+  if (slot == kNone) return false;
+  if (headers_[slot].state == BlockState::kFree) {
+    distance = static_cast<float>(settings_.truncation);
+    return true;
+  }
+  const VoxelBlock& block = blocks_[headers_[slot].data];
+  const std::size_t at = offsetOf(voxel);
+  distance = distanceStep() * static_cast<float>(block.distance[at]);
+  return block.weight[at] > 0;
+}
+
+bool VoxelVolume::addListener(BlockListener* listener) {
+  if (listener_count_ == kMostListeners) return false;
+  listeners_[listener_count_++] = listener;
+  return true;
+}
+
+VoxelVolume::Farness VoxelVolume::farness(const BlockIndex& block, std::uint32_t slot,
+                                          const Eigen::Vector3f& vehicle) const {
+  return {(centreOf(block) - vehicle).squaredNorm(), keyOf(block), slot};
+}
+
+void VoxelVolume::makeRoom(const Eigen::Vector3f& vehicle, std::vector<BlockIndex>& wanted) {
+  const auto isNew = [&](const BlockIndex& block) {
+    const std::uint32_t slot = find(block);
+    return slot == kNone || headers_[slot].state != BlockState::kVoxels;
+  };
+  const auto fresh = static_cast<std::size_t>(std::ranges::count_if(wanted, isNew));
+  if (fresh <= unused_data_.size()) return;
+  std::size_t count = 0;
+  for (std::uint32_t slot = 0; slot < headers_.size(); ++slot) {
+    if (headers_[slot].state == BlockState::kVoxels)
+      far_[count++] = farness(headers_[slot].index, slot, vehicle);
+  }
+  // New ones that the scratch does not hold are judged by the same limit, and refused by obtain() at worst.
+  for (const BlockIndex& block : wanted) {
+    if (isNew(block) && count < far_.size()) far_[count++] = farness(block, kNone, vehicle);
+  }
+  const std::size_t keep = blocks_.size() - std::min(blocks_.size() - 1, blocks_.size() / kEvictionShare);
+  if (count <= keep) return;
+  std::nth_element(far_.begin(), far_.begin() + static_cast<std::ptrdiff_t>(keep),
+                   far_.begin() + static_cast<std::ptrdiff_t>(count));
+  const Farness limit = far_[keep];
+  std::size_t leaving = 0;
+  for (std::size_t i = keep; i < count; ++i) {
+    if (far_[i].slot != kNone) leaving_[leaving++] = far_[i].slot;
+  }
+  std::sort(leaving_.begin(), leaving_.begin() + static_cast<std::ptrdiff_t>(leaving));
+  const auto tooFar = [&](const BlockIndex& block) { return !(farness(block, kNone, vehicle) < limit); };
+  counters_.refused += static_cast<std::size_t>(
+      std::ranges::count_if(wanted, [&](const BlockIndex& block) { return isNew(block) && tooFar(block); }));
+  counters_.evicted += leaving;
+  remove({leaving_.data(), leaving});
+  // Among these are blocks that were there and have just left.
+  std::erase_if(wanted, [&](const BlockIndex& block) { return isNew(block) && tooFar(block); });
+}
+
+std::uint32_t VoxelVolume::newHeader(const BlockIndex& block) {
+  if (!block.inRange()) {
+    ++counters_.out_of_range;
+    return kNone;
+  }
+  const std::uint32_t slot = unused_headers_.back();
+  if (!hash_.insert(keyOf(block), slot)) {
+    ++counters_.index_full;
+    return kNone;
+  }
+  unused_headers_.pop_back();
+  headers_[slot] = BlockHeader{};
+  headers_[slot].index = block;
+  return slot;
+}
+
+std::uint32_t VoxelVolume::obtain(const BlockIndex& block) {
+  std::uint32_t slot = find(block);
+  if (slot != kNone && headers_[slot].state == BlockState::kVoxels) return slot;
+  if (unused_data_.empty()) {
+    ++counters_.refused;
+    return kNone;
+  }
+  float weight = 0;
+  if (slot == kNone) {
+    slot = newHeader(block);
+    if (slot == kNone) return kNone;
+  } else {
+    --free_count_;
+    weight =
+        std::min(static_cast<float>(headers_[slot].free_count), static_cast<float>(settings_.most_weight));
+  }
+  BlockHeader& header = headers_[slot];
+  header.state = BlockState::kVoxels;
+  header.data = unused_data_.back();
+  header.sides = weight > 0 ? BlockHeader::kInFront : std::uint8_t{0};
+  header.drift = 0;
+  header.revision = revision_;
+  unused_data_.pop_back();
+  VoxelBlock& voxels = blocks_[header.data];
+  voxels.distance.fill(static_cast<std::int16_t>(kDistanceSteps));
+  voxels.weight.fill(static_cast<std::uint16_t>(std::min(kWeightSteps * weight, 65535.0F)));
+  voxels.grey.fill(0);
+  if (!labels_.empty()) labels_[header.data].counts.fill(LabelCounts{});
+  return slot;
+}
+
+void VoxelVolume::addFree(const BlockIndex& block, const Eigen::Vector3f& vehicle) {
+  std::uint32_t slot = find(block);
+  if (slot == kNone) {
+    if (free_count_ == freeCapacity()) dropFarFree(vehicle);
+    slot = newHeader(block);
+    if (slot == kNone) return;
+    headers_[slot].state = BlockState::kFree;
+    headers_[slot].revision = revision_;
+    ++free_count_;
+  }
+  BlockHeader& header = headers_[slot];
+  if (header.free_count < std::numeric_limits<std::uint16_t>::max()) ++header.free_count;
+}
+
+void VoxelVolume::dropFarFree(const Eigen::Vector3f& vehicle) {
+  std::size_t count = 0;
+  for (std::uint32_t slot = 0; slot < headers_.size(); ++slot) {
+    if (headers_[slot].state == BlockState::kFree)
+      far_[count++] = farness(headers_[slot].index, slot, vehicle);
+  }
+  const std::size_t keep = count - std::max<std::size_t>(count / kEvictionShare, 1);
+  std::nth_element(far_.begin(), far_.begin() + static_cast<std::ptrdiff_t>(keep),
+                   far_.begin() + static_cast<std::ptrdiff_t>(count));
+  std::size_t leaving = 0;
+  for (std::size_t i = keep; i < count; ++i) leaving_[leaving++] = far_[i].slot;
+  std::sort(leaving_.begin(), leaving_.begin() + static_cast<std::ptrdiff_t>(leaving));
+  counters_.evicted_free += leaving;
+  remove({leaving_.data(), leaving});
+}
+
+void VoxelVolume::drop(std::uint32_t slot) {
+  BlockHeader& header = headers_[slot];
+  if (header.state == BlockState::kUnused) return;
+  if (header.state == BlockState::kFree) --free_count_;
+  if (header.state == BlockState::kVoxels) unused_data_.push_back(header.data);
+  hash_.erase(keyOf(header.index));
+  header = BlockHeader{};
+  header.revision = revision_;
+  unused_headers_.push_back(slot);
+}
+
+void VoxelVolume::remove(std::span<const std::uint32_t> slots) {
+  if (slots.empty()) return;
+  for (std::size_t i = 0; i < listener_count_; ++i) listeners_[i]->beforeRemoval(*this, slots);
+  for (const std::uint32_t slot : slots) drop(slot);
+}
+
+}  // namespace swiftlet
