@@ -1,0 +1,413 @@
+#include "mapping/distance/distance_field.hpp"
+
+#include "mapping/distance/distance_word.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr std::uint32_t kNone = 0xFFFFFFFF;
+// Buckets of the queue to a cell of distance: waves run outwards evenly enough that few cells are taken
+// twice.
+constexpr float kBucketsPerCell = 4;
+// Against cells handing each other equal distances for ever [cells^2].
+constexpr float kGain = 1e-3F;
+// The window moves once the vehicle is an eighth of it away from its middle.
+constexpr int kSlack = 8;
+
+int floorDiv(int a, int b) { return a / b - (a % b < 0 ? 1 : 0); }
+int wrapped(int a, int b) {
+  const int rest = a % b;
+  return rest < 0 ? rest + b : rest;
+}
+
+// Origins are kept for readers in steps, 21 bits an axis.
+constexpr std::uint64_t kOriginMask = (1ULL << 21U) - 1;
+constexpr std::int64_t kOriginBias = 1 << 20;
+
+std::uint64_t packOrigin(const Eigen::Vector3i& origin) {
+  std::uint64_t word = 0;
+  for (int i = 0; i < 3; ++i) {
+    const std::int64_t steps = origin[i] / kDistanceStep + kOriginBias;
+    word |= (static_cast<std::uint64_t>(steps) & kOriginMask) << (21U * static_cast<unsigned>(i));
+  }
+  return word;
+}
+
+Eigen::Vector3i unpackOrigin(std::uint64_t word) {
+  Eigen::Vector3i origin;
+  for (int i = 0; i < 3; ++i) {
+    const std::uint64_t steps = word >> (21U * static_cast<unsigned>(i)) & kOriginMask;
+    origin[i] = static_cast<int>(static_cast<std::int64_t>(steps) - kOriginBias) * kDistanceStep;
+  }
+  return origin;
+}
+
+DistanceLimits checked(DistanceLimits limits) {
+  for (int i = 0; i < 3; ++i) {
+    limits.cells[i] = std::max(limits.cells[i] / kDistanceStep, 2) * kDistanceStep;
+  }
+  limits.reach = std::clamp(limits.reach, 1, kMostReach);
+  return limits;
+}
+
+bool within(const Eigen::Vector3i& cell, const Eigen::Vector3i& origin, const Eigen::Vector3i& cells) {
+  const Eigen::Vector3i from = cell - origin;
+  return (from.array() >= 0).all() && (from.array() < cells.array()).all();
+}
+
+template <typename Visit>
+void forNeighbours(const Eigen::Vector3i& cell, const Visit& visit) {
+  for (int z = -1; z <= 1; ++z) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int x = -1; x <= 1; ++x) {
+        if (x != 0 || y != 0 || z != 0) visit(Eigen::Vector3i(cell + Eigen::Vector3i(x, y, z)));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+DistanceField::DistanceField(const DistanceLimits& limits)
+    : limits_(checked(limits)),
+      squared_reach_(static_cast<float>(limits_.reach * limits_.reach)),
+      nearest_(static_cast<std::size_t>(limits_.cells.prod())),
+      surface_(nearest_.size()),
+      next_(nearest_.size(), kNone),
+      head_(static_cast<std::size_t>(static_cast<float>(limits_.reach + 2) * kBucketsPerCell), kNone),
+      lowest_(head_.size()) {
+  for (int i = 0; i < 3; ++i) origin_[i] = -floorDiv(limits_.cells[i] / 2, kDistanceStep) * kDistanceStep;
+  for (std::uint32_t slot = 0; slot < nearest_.size(); ++slot) {
+    nearest_[slot].store(tagOf(cellAt(slot)) << NearestWord::kTagShift, std::memory_order_relaxed);
+    surface_[slot].store(0, std::memory_order_relaxed);
+  }
+  publishOrigin();
+}
+
+void DistanceField::publishOrigin() { shown_origin_.store(packOrigin(origin_), std::memory_order_release); }
+
+std::size_t DistanceField::bytes() const {
+  return nearest_.size() * (2 * sizeof(Word) + sizeof(std::uint32_t)) + head_.size() * sizeof(std::uint32_t);
+}
+
+Eigen::Vector3i DistanceField::cellOf(const Eigen::Vector3d& p_map) const {
+  return (p_map / limits_.cell_size).array().floor().cast<int>();
+}
+
+Eigen::Vector3d DistanceField::centreOf(const Eigen::Vector3i& cell) const {
+  return (cell.cast<double>().array() + 0.5) * limits_.cell_size;
+}
+
+bool DistanceField::inside(const Eigen::Vector3i& cell) const { return within(cell, origin_, limits_.cells); }
+
+std::uint32_t DistanceField::slotOf(const Eigen::Vector3i& cell) const {
+  const int x = wrapped(cell.x(), limits_.cells.x());
+  const int y = wrapped(cell.y(), limits_.cells.y());
+  const int z = wrapped(cell.z(), limits_.cells.z());
+  return static_cast<std::uint32_t>((z * limits_.cells.y() + y) * limits_.cells.x() + x);
+}
+
+std::uint32_t DistanceField::tagOf(const Eigen::Vector3i& cell) const {
+  std::uint32_t tag = 0;
+  for (int i = 0; i < 3; ++i) {
+    const auto turns = static_cast<std::uint32_t>(floorDiv(cell[i], limits_.cells[i]));
+    tag |= (turns & 1U) << static_cast<unsigned>(i);
+  }
+  return tag;
+}
+
+Eigen::Vector3i DistanceField::cellAt(std::uint32_t slot) const {
+  const int x = static_cast<int>(slot) % limits_.cells.x();
+  const int rows = static_cast<int>(slot) / limits_.cells.x();
+  const Eigen::Vector3i at(x, rows % limits_.cells.y(), rows / limits_.cells.y());
+  Eigen::Vector3i cell;
+  for (int i = 0; i < 3; ++i) cell[i] = origin_[i] + wrapped(at[i] - origin_[i], limits_.cells[i]);
+  return cell;
+}
+
+bool DistanceField::holdsSurface(const Eigen::Vector3i& cell) const {
+  if (!inside(cell)) return false;
+  return (surface_[slotOf(cell)].load(std::memory_order_relaxed) & SurfaceWord::kPresent) != 0;
+}
+
+/// What the cell with this word takes for its nearest surface is there, and has not moved since.
+bool DistanceField::holdsTrue(const Eigen::Vector3i& cell, std::uint32_t nearest) const {
+  const Eigen::Vector3i surface = cell + NearestWord::offset(nearest);
+  if (!inside(surface)) return false;
+  const std::uint32_t word = surface_[slotOf(surface)].load(std::memory_order_relaxed);
+  if ((word & SurfaceWord::kPresent) == 0) return false;
+  return ((word & SurfaceWord::kParity) != 0) == ((nearest & NearestWord::kParity) != 0);
+}
+
+/// The bits by which a cell says that its nearest surface is that one.
+std::uint32_t DistanceField::linkTo(const Eigen::Vector3i& cell, const Eigen::Vector3i& surface) const {
+  const std::uint32_t word = surface_[slotOf(surface)].load(std::memory_order_relaxed);
+  return NearestWord::pack(surface - cell) | NearestWord::kHasSurface |
+         ((word & SurfaceWord::kParity) != 0 ? NearestWord::kParity : 0U);
+}
+
+float DistanceField::squaredTo(const Eigen::Vector3i& surface, const Eigen::Vector3i& cell) const {
+  const std::uint32_t word = surface_[slotOf(surface)].load(std::memory_order_relaxed);
+  Eigen::Vector3f to = (surface - cell).cast<float>();
+  if ((word & SurfaceWord::kPresent) != 0 && word >> SurfaceWord::kTagShift == tagOf(surface)) {
+    to += SurfaceWord::offset(word);
+  }
+  return to.squaredNorm();
+}
+
+float DistanceField::squaredDistance(const Eigen::Vector3i& cell) const {
+  const std::uint32_t word = nearest_[slotOf(cell)].load(std::memory_order_relaxed);
+  if ((word & NearestWord::kHasSurface) == 0) return -1;
+  return squaredTo(cell + NearestWord::offset(word), cell);
+}
+
+void DistanceField::push(std::uint32_t slot, float squared) {
+  const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
+  // Who waits already is taken later than its new distance asks for: more cells are taken twice, the end is
+  // the same.
+  if ((word & NearestWord::kQueued) != 0) return;
+  nearest_[slot].store(word | NearestWord::kQueued, std::memory_order_relaxed);
+  const auto wanted = static_cast<std::size_t>(std::sqrt(std::max(squared, 0.0F)) * kBucketsPerCell);
+  const std::size_t bucket = std::min(wanted, head_.size() - 1);
+  next_[slot] = head_[bucket];
+  head_[bucket] = slot;
+  lowest_ = std::min(lowest_, bucket);
+  ++queued_;
+}
+
+bool DistanceField::pop(std::uint32_t& slot) {
+  while (lowest_ < head_.size() && head_[lowest_] == kNone) ++lowest_;
+  if (lowest_ == head_.size()) return false;
+  slot = head_[lowest_];
+  head_[lowest_] = next_[slot];
+  --queued_;
+  const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
+  nearest_[slot].store(word & ~NearestWord::kQueued, std::memory_order_relaxed);
+  return true;
+}
+
+void DistanceField::setState(std::uint32_t slot, const Eigen::Vector3i& cell, Space space) {
+  const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
+  const std::uint32_t kept = word & (NearestWord::kLink | NearestWord::kRaise | NearestWord::kQueued);
+  nearest_[slot].store(kept | static_cast<std::uint32_t>(space) << NearestWord::kSpaceShift |
+                           tagOf(cell) << NearestWord::kTagShift,
+                       std::memory_order_relaxed);
+}
+
+/// The cell's nearest surface is no more: what it was nearest to is to be raised.
+void DistanceField::remove(std::uint32_t slot) {
+  const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
+  nearest_[slot].store((word & ~NearestWord::kLink) | NearestWord::kRaise, std::memory_order_relaxed);
+}
+
+void DistanceField::setSpace(const Eigen::Vector3i& cell, Space space) {
+  if (!inside(cell)) return;
+  const std::uint32_t slot = slotOf(cell);
+  setState(slot, cell, space);
+  const std::uint32_t before = surface_[slot].load(std::memory_order_relaxed);
+  if ((before & SurfaceWord::kPresent) == 0) return;
+  surface_[slot].store(before & SurfaceWord::kParity, std::memory_order_relaxed);
+  askAnew(slot, cell);
+}
+
+void DistanceField::setSurface(const Eigen::Vector3i& cell, Space space, const Eigen::Vector3f& offset) {
+  if (!inside(cell)) return;
+  const std::uint32_t slot = slotOf(cell);
+  setState(slot, cell, space);
+  const std::uint32_t before = surface_[slot].load(std::memory_order_relaxed);
+  const std::uint32_t packed = SurfaceWord::pack(offset) | tagOf(cell) << SurfaceWord::kTagShift;
+  const bool present = (before & SurfaceWord::kPresent) != 0;
+  // Readers take the point from here: who moves by less than this need not tell its dependants, who may at
+  // worst hold to it where another is nearer by as much [cells].
+  constexpr float kMoved = 0.1F;
+  const bool moved = (SurfaceWord::offset(before) - SurfaceWord::offset(packed)).norm() >= kMoved;
+  const std::uint32_t parity =
+      (before & SurfaceWord::kParity) ^ (present && moved ? SurfaceWord::kParity : 0U);
+  surface_[slot].store(packed | parity, std::memory_order_relaxed);
+  if (present && !moved) return;
+  if (present) askAnew(slot, cell);
+  takeOwn(slot, cell);
+  push(slot, SurfaceWord::offset(packed).squaredNorm());
+}
+
+/// A cell with surface in it, for which no other is nearer to its middle.
+void DistanceField::takeOwn(std::uint32_t slot, const Eigen::Vector3i& cell) {
+  const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
+  if ((word & NearestWord::kHasSurface) != 0 && squaredTo(cell, cell) >= squaredDistance(cell)) return;
+  nearest_[slot].store((word & ~NearestWord::kLink) | linkTo(cell, cell), std::memory_order_relaxed);
+}
+
+/// The surface in the cell left or moved: the cell, and after it those that took it for their nearest, look
+/// again.
+void DistanceField::askAnew(std::uint32_t slot, const Eigen::Vector3i& cell) {
+  const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
+  const float squared = squaredDistance(cell);
+  if ((word & NearestWord::kHasSurface) != 0 && !holdsTrue(cell, word)) remove(slot);
+  nearest_[slot].fetch_or(NearestWord::kRaise, std::memory_order_relaxed);
+  push(slot, squared);
+}
+
+std::size_t DistanceField::propagate(std::size_t work) {
+  std::size_t taken = 0;
+  for (std::uint32_t slot = 0; taken < work && pop(slot); ++taken) {
+    const Eigen::Vector3i cell = cellAt(slot);
+    const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
+    if ((word & NearestWord::kRaise) != 0) raise(cell);
+    if (holdsSurface(cell)) takeOwn(slot, cell);
+    // A cell hands on its own surface too, where another is nearer to its own middle: the neighbours may
+    // differ.
+    if (holdsSurface(cell)) lower(cell, cell);
+    if ((word & NearestWord::kHasSurface) != 0 && (word & NearestWord::kRaise) == 0) {
+      const Eigen::Vector3i surface = cell + NearestWord::offset(word);
+      if (surface != cell && holdsTrue(cell, word)) lower(cell, surface);
+    }
+  }
+  return taken;
+}
+
+void DistanceField::raise(const Eigen::Vector3i& cell) {
+  forNeighbours(cell, [&](const Eigen::Vector3i& neighbour) {
+    if (!inside(neighbour)) return;
+    const std::uint32_t slot = slotOf(neighbour);
+    const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
+    if ((word & NearestWord::kHasSurface) == 0 || (word & NearestWord::kRaise) != 0) return;
+    const float squared = squaredDistance(neighbour);
+    if (!holdsTrue(neighbour, word)) remove(slot);
+    push(slot, squared);
+  });
+  const std::uint32_t slot = slotOf(cell);
+  const std::uint32_t word =
+      nearest_[slot].fetch_and(~NearestWord::kRaise, std::memory_order_relaxed) & ~NearestWord::kRaise;
+  // One that kept a surface hands it on into what was raised.
+  if ((word & NearestWord::kHasSurface) != 0) push(slot, squaredDistance(cell));
+}
+
+void DistanceField::lower(const Eigen::Vector3i& cell, const Eigen::Vector3i& surface) {
+  forNeighbours(cell, [&](const Eigen::Vector3i& neighbour) {
+    if (!inside(neighbour)) return;
+    const Eigen::Vector3i offset = surface - neighbour;
+    const float squared = squaredTo(surface, neighbour);
+    if (squared > squared_reach_ || (offset.array().abs() > kMostReach + 2).any()) return;
+    const std::uint32_t slot = slotOf(neighbour);
+    const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
+    if ((word & NearestWord::kRaise) != 0) return;
+    if ((word & NearestWord::kHasSurface) != 0 && squared > squaredDistance(neighbour) - kGain) return;
+    nearest_[slot].store((word & ~NearestWord::kLink) | linkTo(neighbour, surface),
+                         std::memory_order_relaxed);
+    push(slot, squared);
+  });
+}
+
+bool DistanceField::follow(const Eigen::Vector3d& p_map) {
+  const Eigen::Vector3i before = origin_;
+  const Eigen::Vector3i cell = cellOf(p_map);
+  for (int axis = 0; axis < 3; ++axis) {
+    const int cells = limits_.cells[axis];
+    const int wanted = cell[axis] - cells / 2;
+    if (std::abs(wanted - origin_[axis]) <= std::max(cells / kSlack, kDistanceStep)) continue;
+    const int from = origin_[axis];
+    const int to = floorDiv(wanted, kDistanceStep) * kDistanceStep;
+    const int steps = std::min(std::abs(to - from), cells);
+    // Who asks meanwhile finds words of another place, and takes them for unknown.
+    origin_[axis] = to;
+    publishOrigin();
+    if (to > from) {
+      clearSlab(axis, to + cells - steps, to + cells);
+      wakeLayer(axis, to);
+      wakeLayer(axis, to + cells - steps - 1);
+    } else {
+      clearSlab(axis, to, to + steps);
+      wakeLayer(axis, to + cells - 1);
+      wakeLayer(axis, to + steps);
+    }
+  }
+  return origin_ != before;
+}
+
+/// The cells that entered, from `first` to before `last`, are unknown. Those in the queue stay in it.
+void DistanceField::clearSlab(int axis, int first, int last) {
+  Eigen::Vector3i low = origin_;
+  Eigen::Vector3i high = origin_ + limits_.cells;
+  low[axis] = first;
+  high[axis] = last;
+  for (int z = low.z(); z < high.z(); ++z) {
+    for (int y = low.y(); y < high.y(); ++y) {
+      for (int x = low.x(); x < high.x(); ++x) {
+        const Eigen::Vector3i cell(x, y, z);
+        const std::uint32_t slot = slotOf(cell);
+        const std::uint32_t queued = nearest_[slot].load(std::memory_order_relaxed) & NearestWord::kQueued;
+        nearest_[slot].store(queued | tagOf(cell) << NearestWord::kTagShift, std::memory_order_relaxed);
+        surface_[slot].store(0, std::memory_order_relaxed);
+      }
+    }
+  }
+}
+
+/// A layer next to where the window changed: raised where its surface left, else handed on into what entered.
+void DistanceField::wakeLayer(int axis, int at) {
+  Eigen::Vector3i low = origin_;
+  Eigen::Vector3i high = origin_ + limits_.cells;
+  if (at < low[axis] || at >= high[axis]) return;
+  low[axis] = at;
+  high[axis] = at + 1;
+  for (int z = low.z(); z < high.z(); ++z) {
+    for (int y = low.y(); y < high.y(); ++y) {
+      for (int x = low.x(); x < high.x(); ++x) {
+        const Eigen::Vector3i cell(x, y, z);
+        const std::uint32_t slot = slotOf(cell);
+        const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
+        if ((word & NearestWord::kHasSurface) == 0) continue;
+        const float squared = squaredDistance(cell);
+        if (!holdsTrue(cell, word)) remove(slot);
+        push(slot, squared);
+      }
+    }
+  }
+}
+
+DistanceField::Corner DistanceField::corner(const Eigen::Vector3i& cell) const {
+  const std::uint32_t word = nearest_[slotOf(cell)].load(std::memory_order_relaxed);
+  Corner out;
+  if (word >> NearestWord::kTagShift != tagOf(cell)) return out;
+  out.known = true;
+  out.space = static_cast<Space>((word & NearestWord::kSpaceMask) >> NearestWord::kSpaceShift);
+  out.bounded = (word & NearestWord::kHasSurface) != 0;
+  const float squared = out.bounded ? squaredTo(cell + NearestWord::offset(word), cell) : squared_reach_;
+  const float distance = std::min(std::sqrt(squared), static_cast<float>(limits_.reach));
+  out.distance = out.space == Space::kBehindSurface ? -distance : distance;
+  return out;
+}
+
+bool DistanceField::query(const Eigen::Vector3d& p_map, DistanceSample& out) const {
+  out = DistanceSample{};
+  const Eigen::Vector3d at = p_map.array() / limits_.cell_size - 0.5;
+  const Eigen::Vector3i origin = unpackOrigin(shown_origin_.load(std::memory_order_acquire));
+  const Eigen::Array3d from = at.array() - origin.cast<double>().array();
+  if (!((from >= 0).all() && (from < limits_.cells.cast<double>().array() - 1).all())) return false;
+  const Eigen::Vector3i first = at.array().floor().cast<int>();
+  const Eigen::Vector3d part = at - first.cast<double>();
+  const Eigen::Vector3i own = (at.array() + 0.5).floor().cast<int>();
+  double distance = 0;
+  Eigen::Vector3d slope = Eigen::Vector3d::Zero();
+  bool bounded = true;
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3i bit(i & 1, i >> 1 & 1, i >> 2 & 1);
+    const Corner value = corner(first + bit);
+    if (!value.known) return false;
+    bounded = bounded && value.bounded;
+    if (first + bit == own) out.space = value.space;
+    Eigen::Vector3d weight;
+    for (int axis = 0; axis < 3; ++axis) weight[axis] = bit[axis] != 0 ? part[axis] : 1 - part[axis];
+    distance += weight.prod() * static_cast<double>(value.distance);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double others = weight[(axis + 1) % 3] * weight[(axis + 2) % 3];
+      slope[axis] += (bit[axis] != 0 ? others : -others) * static_cast<double>(value.distance);
+    }
+  }
+  out.distance = distance * limits_.cell_size;
+  out.bounded = bounded;
+  if (bounded && slope.norm() > 0) out.gradient = slope.normalized();
+  return true;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,55 @@
+#pragma once
+// Keeps a distance field true to a volume: surfaces, free space and the unknown, as blocks change.
+//
+// Per step: the window follows the vehicle; at most `effort.blocks` blocks that changed since they were last
+// read are read, in the order of the volume's slots from where the last step ended; then at most
+// `effort.cells` cells of the field's waves. A voxel holds surface where the signed distance changes sign to
+// a neighbour that lies no nearer; the surface point is where the distance's slope leads to zero (one Newton
+// step), so it is found to a part of a voxel. What the volume dropped becomes unknown. Cells are the volume's
+// voxels. Map axes, metres. Memory: 16 bytes for each of the volume's slots, beside the field's. Not thread
+// safe; the field's readers are free.
+
+#include <vector>
+
+#include "mapping/distance/distance_field.hpp"
+#include "mapping/volume/voxel_volume.hpp"
+
+namespace swiftlet {
+
+struct DistanceEffort {
+  std::size_t blocks = 500;
+  std::size_t cells = 200'000;
+};
+
+struct DistanceStep {
+  std::size_t blocks = 0;  ///< read
+  std::size_t cells = 0;   ///< taken from the queue
+  bool caught_up = false;  ///< nothing waits
+};
+
+class VolumeDistance {
+ public:
+  /// `limits.cell_size` is the volume's. Both outlive this.
+  VolumeDistance(const VoxelVolume& volume, DistanceField& field);
+
+  void step(const Eigen::Vector3d& p_map_vehicle, const DistanceEffort& effort, DistanceStep& out);
+
+ private:
+  struct Seen {
+    std::uint64_t key = 0;  ///< of the block; 0: none
+    std::uint32_t revision = 0;
+  };
+
+  void forgetEntered(const Eigen::Vector3i& origin_before);
+  [[nodiscard]] bool inWindow(const BlockIndex& block) const;
+  void read(std::uint32_t slot);
+  void readVoxel(const VoxelIndex& voxel);
+  void erase(std::uint64_t key);
+
+  const VoxelVolume& volume_;
+  DistanceField& field_;
+  std::vector<Seen> seen_;  ///< by slot
+  std::uint32_t cursor_ = 0;
+};
+
+}  // namespace swiftlet
