@@ -3,21 +3,42 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mapping/volume/lanes.hpp"
+
 namespace swiftlet {
 namespace {
 
 /// Depth [m] below which nothing is projected.
 constexpr float kNearestDepth = 0.05F;
+constexpr float kMostWeightSteps = 65535.0F;
+
+std::uint8_t sidesOf(const VoxelBlock& block) {
+  lanes::Shorts in_front{}, behind{};
+  for (std::size_t at = 0; at < kBlockVoxels; at += lanes::kLanes) {
+    lanes::Shorts distance;
+    lanes::UnsignedShorts weight;
+    lanes::load(distance, &block.distance[at]);
+    lanes::load(weight, &block.weight[at]);
+    behind |= (distance < 0) & (weight != 0);
+    in_front |= (distance >= 0) & (weight != 0);
+  }
+  std::array<std::uint64_t, 2> f, b;
+  std::memcpy(f.data(), &in_front, sizeof(f));
+  std::memcpy(b.data(), &behind, sizeof(b));
+  return static_cast<std::uint8_t>(((f[0] | f[1]) != 0 ? BlockHeader::kInFront : 0) |
+                                   ((b[0] | b[1]) != 0 ? BlockHeader::kBehind : 0));
+}
 
 }  // namespace
 
-struct BlockUpdate::Rows {
-  alignas(64) std::array<std::int32_t, kRows> pixel;
-  alignas(64) std::array<float, kRows> depth;  ///< of the voxel, along the optical axis
-  alignas(64) std::array<float, kRows> slope;  ///< distance from the surface for a metre of depth
-  alignas(64) std::array<float, kRows> measured;
-  alignas(64) std::array<float, kRows> weight;
-  alignas(64) std::array<std::int32_t, kRows> near;  ///< on the surface, for colour and label
+using lanes::Floats;
+using lanes::Ints;
+
+struct BlockUpdate::Sums {
+  Floats largest{};
+  Ints observed{};
+  Ints news{};
+  bool label_news = false;
 };
 
 BlockUpdate::BlockUpdate(const VolumeSettings& settings) : settings_(settings) {}
@@ -36,104 +57,100 @@ void BlockUpdate::begin(const PreparedImage& image, const SE3& T_camera_world) {
   }
 }
 
-void BlockUpdate::meet(const Eigen::Vector3f& first, std::size_t at, Rows& rows) const {
+void BlockUpdate::projectEight(const Eigen::Vector3f& first, std::size_t at, VoxelBlock& block,
+                               LabelBlock* labels, Sums& sums) const {
   const PinholeIntrinsics& c = image_->camera();
-  const auto fx = static_cast<float>(c.fx), fy = static_cast<float>(c.fy);
+  Floats x, y, z;
+  lanes::load(x, &x_[at]);
+  lanes::load(y, &y_[at]);
+  lanes::load(z, &z_[at]);
+  z += first.z();
+  const Floats inverse = 1.0F / z;
   // Half a pixel more, so that cutting to an integer rounds to the nearest.
-  const auto cx = static_cast<float>(c.cx + 0.5), cy = static_cast<float>(c.cy + 0.5);
-  const auto width = static_cast<float>(c.width), height = static_cast<float>(c.height);
-  const auto outside = static_cast<std::int32_t>(c.pixels());
-  const std::int32_t row_pixels = c.width;
-  const float first_x = first.x(), first_y = first.y(), first_z = first.z();
-  for (std::size_t i = 0; i < kRows; ++i) {
-    const float z = first_z + z_[at + i];
-    const float inverse = 1.0F / z;
-    const float x = (first_x + x_[at + i]) * inverse;
-    const float y = (first_y + y_[at + i]) * inverse;
-    const float u = fx * x + cx;
-    const float v = fy * y + cy;
-    const bool seen = (z > kNearestDepth) & (u >= 0.0F) & (u < width) & (v >= 0.0F) & (v < height);
-    // Where not seen the conversion would overflow.
-    const auto column = static_cast<std::int32_t>(seen ? u : 0.0F);
-    const auto row = static_cast<std::int32_t>(seen ? v : 0.0F);
-    rows.pixel[i] = seen ? row * row_pixels + column : outside;
-    rows.depth[i] = z;
-  }
-  const float* const depth = image_->depth();
-  const float* const weight = image_->weight();
-  const float* const slope = image_->slope();
-  for (std::size_t i = 0; i < kRows; ++i) rows.measured[i] = depth[rows.pixel[i]];
-  for (std::size_t i = 0; i < kRows; ++i) rows.weight[i] = weight[rows.pixel[i]];
-  for (std::size_t i = 0; i < kRows; ++i) rows.slope[i] = slope[rows.pixel[i]];
-}
+  const Floats u = static_cast<float>(c.fx) * (x + first.x()) * inverse + static_cast<float>(c.cx + 0.5);
+  const Floats v = static_cast<float>(c.fy) * (y + first.y()) * inverse + static_cast<float>(c.cy + 0.5);
+  const Ints inside = (z > kNearestDepth) & (u >= 0.0F) & (u < static_cast<float>(c.width)) & (v >= 0.0F) &
+                      (v < static_cast<float>(c.height));
+  if (!lanes::any(inside)) return;
+  // Where outside the conversion would overflow.
+  const Ints column = __builtin_convertvector(inside ? u : Floats{}, Ints);
+  const Ints row = __builtin_convertvector(inside ? v : Floats{}, Ints);
+  const Ints pixel = inside ? row * c.width + column : Ints{} + static_cast<std::int32_t>(c.pixels());
 
-void BlockUpdate::average(VoxelBlock& block, std::size_t at, Rows& rows, Result& result) const {
+  Floats measured, slope;
+  lanes::gather(measured, image_->depth(), pixel);
   const auto truncation = static_cast<float>(settings_.truncation);
   const auto behind = static_cast<float>(settings_.behind);
-  const auto behind_ray = static_cast<float>(settings_.behind_ray);
-  const auto voxel = static_cast<float>(settings_.voxel_size);
-  const float fall = 1.0F / std::max(behind - voxel, 1e-6F);
-  const float steps = kDistanceSteps / truncation;
-  const float most = std::min(static_cast<float>(settings_.most_weight) * kWeightSteps, 65535.0F);
-  std::int16_t* const distance = block.distance.data() + at;
-  std::uint16_t* const weight = block.weight.data() + at;
-  float largest = 0;
-  std::int32_t observed = 0, in_front = 0, is_behind = 0, news = 0;
-  for (std::size_t i = 0; i < kRows; ++i) {
-    const float measured = rows.measured[i];
-    const float ahead = std::abs(measured) - rows.depth[i];
-    const float s = ahead * rows.slope[i];
-    // A measured surface, or a view that is free at least up to here.
-    const bool hit = (measured > 0.0F) & (s > -behind) & (ahead > -behind_ray);
-    const bool seen = hit | ((measured < 0.0F) & (s >= truncation));
-    const float dropped = std::min((behind + s) * fall, 1.0F);
-    const float gain = seen ? std::max(rows.weight[i] * dropped, 1.0F) : 0.0F;
-    const float cut = std::min(s, truncation) * steps;
-    const auto old_weight = static_cast<float>(weight[i]);
-    const auto old_distance = static_cast<float>(distance[i]);
-    const float sum = old_weight + gain;
-    const float mean = seen ? (old_distance * old_weight + cut * gain) / sum : old_distance;
-    // Rounded away from zero: zero is on the surface, and stays on the side it was seen on.
-    const float rounded = mean + (mean < 0.0F ? -0.5F : 0.5F);
-    const auto new_distance = static_cast<std::int32_t>(rounded);
-    const auto new_weight = static_cast<std::int32_t>(std::min(sum, most) + 0.5F);
-    distance[i] = static_cast<std::int16_t>(new_distance);
-    weight[i] = static_cast<std::uint16_t>(new_weight);
-    const float change = std::abs(mean - old_distance);
-    largest = change > largest ? change : largest;
-    observed += seen ? 1 : 0;
-    const bool now_behind = new_distance < 0;
-    in_front |= (new_weight > 0) & !now_behind ? 1 : 0;
-    is_behind |= (new_weight > 0) & now_behind ? 1 : 0;
-    news |= seen & ((old_weight == 0.0F) | (now_behind != (old_distance < 0.0F))) ? 1 : 0;
-    rows.near[i] = hit & (s < truncation) ? 1 : 0;
+  const Ints is_surface = measured > 0.0F;
+  const Floats ahead = (is_surface ? measured : -measured) - z;
+  const Ints reached = is_surface & (ahead > -static_cast<float>(settings_.behind_ray));
+  if (!lanes::any(reached | ((measured < 0.0F) & (ahead >= truncation)))) return;
+  lanes::gather(slope, image_->slope(), pixel);
+  const Floats s = ahead * slope;
+  // A measured surface, or a view that is free at least up to here.
+  const Ints hit = reached & (s > -behind);
+  const Ints seen = hit | ((measured < 0.0F) & (s >= truncation));
+  if (!lanes::any(seen)) return;
+
+  Floats pixel_weight;
+  if (image_->weight() != nullptr) {
+    lanes::gather(pixel_weight, image_->weight(), pixel);
+  } else {
+    pixel_weight = Floats{} + image_->evenWeight();
   }
-  result.largest_change = std::max(result.largest_change, largest);
-  result.observed += static_cast<std::uint32_t>(observed);
-  result.sides = static_cast<std::uint8_t>(result.sides | (in_front != 0 ? BlockHeader::kInFront : 0) |
-                                           (is_behind != 0 ? BlockHeader::kBehind : 0));
-  result.news = result.news || news != 0;
+  const float fall = 1.0F / std::max(behind - static_cast<float>(settings_.voxel_size), 1e-6F);
+  const Floats drop = (behind + s) * fall;
+  const Floats dropped = pixel_weight * (drop < 1.0F ? drop : Floats{} + 1.0F);
+  const Floats gain = seen ? (dropped > 1.0F ? dropped : Floats{} + 1.0F) : Floats{};
+  const Floats cut = (s < truncation ? s : Floats{} + truncation) * (kDistanceSteps / truncation);
+
+  lanes::Shorts distances;
+  lanes::UnsignedShorts weights;
+  lanes::load(distances, &block.distance[at]);
+  lanes::load(weights, &block.weight[at]);
+  const Floats old_distance = __builtin_convertvector(distances, Floats);
+  const Floats old_weight = __builtin_convertvector(weights, Floats);
+  const Floats sum = old_weight + gain;
+  const Floats mean = seen ? (old_distance * old_weight + cut * gain) / sum : old_distance;
+  // Rounded to the nearest; what is behind by less than half a step stays behind.
+  const Ints now_behind = mean < 0.0F;
+  const Floats rounded = mean + (now_behind ? Floats{} - 0.5F : Floats{} + 0.5F);
+  const Ints cut_distance = __builtin_convertvector(rounded, Ints);
+  const Ints new_distance = now_behind & (cut_distance == 0) ? Ints{} - 1 : cut_distance;
+  const float most = std::min(static_cast<float>(settings_.most_weight) * kWeightSteps, kMostWeightSteps);
+  const Ints new_weight = __builtin_convertvector((sum < most ? sum : Floats{} + most) + 0.5F, Ints);
+  distances = __builtin_convertvector(new_distance, lanes::Shorts);
+  weights = __builtin_convertvector(new_weight, lanes::UnsignedShorts);
+  lanes::store(&block.distance[at], distances);
+  lanes::store(&block.weight[at], weights);
+
+  const Floats moved = mean - old_distance;
+  const Floats change = moved < 0.0F ? -moved : moved;
+  sums.largest = change > sums.largest ? change : sums.largest;
+  sums.observed -= seen;
+  sums.news |= seen & ((old_weight == 0.0F) | (now_behind ^ (old_distance < 0.0F)));
+  const Ints near = hit & (s < truncation);
+  if (lanes::any(near)) colour(pixel, near, gain, sum, at, block, labels, sums);
 }
 
-void BlockUpdate::colour(VoxelBlock& block, LabelBlock* labels, std::size_t at, const Rows& rows,
-                         Result& result) const {
-  const std::uint8_t* const grey = image_->grey();
+void BlockUpdate::colour(const Ints& pixel, const Ints& near, const Floats& gain, const Floats& sum,
+                         std::size_t at, VoxelBlock& block, LabelBlock* labels, Sums& sums) const {
+  if (const std::uint8_t* const grey = image_->grey(); grey != nullptr) {
+    Floats old, seen;
+    for (std::size_t i = 0; i < lanes::kLanes; ++i) {
+      old[i] = block.grey[at + i];
+      seen[i] = near[i] != 0 ? grey[pixel[i]] : 0;
+    }
+    // What was free so far has no grey yet.
+    const Floats share = old > 0.0F ? gain / sum : Floats{} + 1.0F;
+    const Ints mean = __builtin_convertvector(near ? old + share * (seen - old) + 0.5F : old, Ints);
+    for (std::size_t i = 0; i < lanes::kLanes; ++i) block.grey[at + i] = static_cast<std::uint8_t>(mean[i]);
+  }
   const std::uint8_t* const label = labels != nullptr ? image_->labels() : nullptr;
-  for (std::size_t i = 0; i < kRows; ++i) {
-    if (rows.near[i] == 0) continue;
-    const std::int32_t pixel = rows.pixel[i];
-    if (grey != nullptr) {
-      const auto weight = static_cast<std::int32_t>(block.weight[at + i]);
-      const auto gain = std::min(static_cast<std::int32_t>(rows.weight[i]) + 1, weight);
-      const std::int32_t old = block.grey[at + i];
-      // The weight before this image is at least weight - gain; the first observation takes the grey as it
-      // is.
-      const std::int32_t next = (old * (weight - gain) + grey[pixel] * gain + weight / 2) / weight;
-      block.grey[at + i] = static_cast<std::uint8_t>(std::clamp(next, 0, 255));
-    }
-    if (label != nullptr && label[pixel] != 0) {
-      result.news = labels->counts[at + i].add(label[pixel]) || result.news;
-    }
+  if (label == nullptr) return;
+  for (std::size_t i = 0; i < lanes::kLanes; ++i) {
+    if (near[i] == 0 || label[pixel[i]] == 0) continue;
+    sums.label_news = labels->counts[at + i].add(label[pixel[i]]) || sums.label_news;
   }
 }
 
@@ -143,20 +160,21 @@ BlockUpdate::Result BlockUpdate::project(const BlockIndex& index, VoxelBlock& bl
   const Eigen::Vector3d first = T_camera_world_ * Eigen::Vector3d((index.x * kBlockSide + 0.5) * voxel,
                                                                   (index.y * kBlockSide + 0.5) * voxel,
                                                                   (index.z * kBlockSide + 0.5) * voxel);
-  const bool coloured = image_->grey() != nullptr || (labels != nullptr && image_->labels() != nullptr);
-  Result result;
-  Rows rows;
-  for (std::size_t at = 0; at < kBlockVoxels; at += kRows) {
-    meet(first.cast<float>(), at, rows);
-    average(block, at, rows, result);
-    if (coloured) colour(block, labels, at, rows, result);
+  Sums sums;
+  for (std::size_t at = 0; at < kBlockVoxels; at += lanes::kLanes) {
+    projectEight(first.cast<float>(), at, block, labels, sums);
   }
+  Result result;
+  result.observed = static_cast<std::uint32_t>(lanes::sum(sums.observed));
+  result.largest_change = lanes::largest(sums.largest);
+  result.news = lanes::any(sums.news) || sums.label_news;
+  result.sides = sidesOf(block);
   return result;
 }
 
 BlockUpdate::Result BlockUpdate::carve(VoxelBlock& block) const {
   Result result;
-  const float most = std::min(static_cast<float>(settings_.most_weight) * kWeightSteps, 65535.0F);
+  const float most = std::min(static_cast<float>(settings_.most_weight) * kWeightSteps, kMostWeightSteps);
   float largest = 0;
   std::int32_t is_behind = 0, news = 0;
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {

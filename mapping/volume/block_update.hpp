@@ -14,6 +14,7 @@
 #include <cstdint>
 
 #include "estimator/geometry/se3.hpp"
+#include "mapping/volume/lanes.hpp"
 #include "mapping/volume/prepared_image.hpp"
 #include "mapping/volume/voxel_block.hpp"
 #include "mapping/volume/voxel_volume.hpp"
@@ -41,12 +42,13 @@ class BlockUpdate {
   Result carve(VoxelBlock& block) const;
 
  private:
-  static constexpr std::size_t kRows = 64;  ///< voxels that are done together
-
-  struct Rows;
-  void meet(const Eigen::Vector3f& first, std::size_t at, Rows& rows) const;
-  void average(VoxelBlock& block, std::size_t at, Rows& rows, Result& result) const;
-  void colour(VoxelBlock& block, LabelBlock* labels, std::size_t at, const Rows& rows, Result& result) const;
+  /// Shared by the groups of eight voxels of a block.
+  struct Sums;
+  void projectEight(const Eigen::Vector3f& first, std::size_t at, VoxelBlock& block, LabelBlock* labels,
+                    Sums& sums) const;
+  void colour(const lanes::Ints& pixel, const lanes::Ints& near, const lanes::Floats& gain,
+              const lanes::Floats& sum, std::size_t at, VoxelBlock& block, LabelBlock* labels,
+              Sums& sums) const;
 
   VolumeSettings settings_;
   const PreparedImage* image_ = nullptr;

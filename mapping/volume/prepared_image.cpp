@@ -84,7 +84,10 @@ void PreparedImage::checkPixels(const DepthImageView& image, const VolumeSetting
     const float ratio = reference / sigma;
     return std::min(std::max(kWeightSteps * ratio * ratio, 1.0F), kMostPixelWeight);
   };
-  if (image.sigma != nullptr) {
+  is_even_ = image.sigma == nullptr && settings.sigma_quadratic == 0;
+  if (is_even_) {
+    even_weight_ = weightOf(static_cast<float>(settings.sigma_constant));
+  } else if (image.sigma != nullptr) {
     for (std::size_t i = 0; i < pixels; ++i) {
       const float sigma = image.sigma[i];
       const bool known = sigma > 0 && sigma < kFarAway;

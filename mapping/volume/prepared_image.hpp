@@ -45,8 +45,9 @@ class PreparedImage {
   /// which is linear in the pixel on a plane; of the two neighbours along an axis the one that is nearer in
   /// depth, so that the edge of a thing does not turn its normal. 1 where nothing was measured.
   [[nodiscard]] const float* slope() const { return slope_.data(); }
-  /// Weight of each pixel, in kWeightSteps.
-  [[nodiscard]] const float* weight() const { return weight_.data(); }
+  /// Weight of each pixel, in kWeightSteps; null where all have evenWeight().
+  [[nodiscard]] const float* weight() const { return is_even_ ? nullptr : weight_.data(); }
+  [[nodiscard]] float evenWeight() const { return even_weight_; }
   /// Null where the image has none.
   [[nodiscard]] const std::uint8_t* grey() const { return grey_; }
   [[nodiscard]] const std::uint8_t* labels() const { return has_labels_ ? label_.data() : nullptr; }
@@ -84,6 +85,8 @@ class PreparedImage {
   std::vector<std::uint8_t> label_;
   const std::uint8_t* grey_ = nullptr;
   bool has_labels_ = false;
+  bool is_even_ = true;
+  float even_weight_ = 0;
   std::vector<float> free_;
   std::vector<float> deepest_;
   Level level_[kMostLevels];
