@@ -12,9 +12,18 @@ namespace {
 /// Large enough that no test looks at the direction, small enough for a Cholesky factor in doubles.
 constexpr double kUnknownVarianceRatio = 1e9;
 
-template <typename Matrix, typename Vector>
-CycleTest cycleTest(const Matrix& covariance, const Vector& error) {
-  const Eigen::LLT<Matrix> llt(covariance);
+/// Volumes of the unit ball of 3 and 6 dimensions, and of all rotations as vectors of angles near the
+/// identity.
+constexpr double kBall3 = 4 * M_PI / 3;
+constexpr double kBall6 = M_PI * M_PI * M_PI / 6;
+constexpr double kTurns2 = 2 * M_PI;
+constexpr double kTurns3 = 8 * M_PI * M_PI;
+
+}  // namespace
+
+template <typename Pose>
+CycleTest cycleTest(const PoseMatrix<Pose>& covariance, const PoseVector<Pose>& error) {
+  const Eigen::LLT<PoseMatrix<Pose>> llt(covariance);
   CycleTest test;
   if (llt.info() != Eigen::Success) {
     return test;
@@ -26,15 +35,6 @@ CycleTest cycleTest(const Matrix& covariance, const Vector& error) {
   }
   return test;
 }
-
-/// Volumes of the unit ball of 3 and 6 dimensions, and of all rotations as vectors of angles near the
-/// identity.
-constexpr double kBall3 = 4 * M_PI / 3;
-constexpr double kBall6 = M_PI * M_PI * M_PI / 6;
-constexpr double kTurns2 = 2 * M_PI;
-constexpr double kTurns3 = 8 * M_PI * M_PI;
-
-}  // namespace
 
 template <typename Matrix>
 Matrix covarianceFromInformation(const Matrix& information) {
@@ -82,7 +82,7 @@ double logChance(const CycleTest& test, double log_box) {
 template <typename Pose>
 CycleTest odometryTest(const OdometryChain<Pose>& chain, const ChainedLoop<Pose>& loop) {
   const PoseMatrix<Pose> covariance = loop.covariance + chain.covariance(loop.from, loop.to);
-  return cycleTest(covariance, poseLog(loop.T_chain_loop.inverse() * chain.pose(loop.to)));
+  return cycleTest<Pose>(covariance, poseLog(loop.T_chain_loop.inverse() * chain.pose(loop.to)));
 }
 
 template <typename Pose>
@@ -124,9 +124,11 @@ CycleTest PairTest<Pose>::against(const ChainedLoop<Pose>& other) const {
     same_direction ? covariance += both : covariance -= both;
   }
   const Pose X = (other.T_from_to_chain * T_to_).inverse() * loop_.T_chain_loop;
-  return cycleTest(covariance, poseLog(X));
+  return cycleTest<Pose>(covariance, poseLog(X));
 }
 
+template CycleTest cycleTest<SE2>(const PoseMatrix<SE2>&, const PoseVector<SE2>&);
+template CycleTest cycleTest<SE3>(const PoseMatrix<SE3>&, const PoseVector<SE3>&);
 template PoseMatrix<SE2> covarianceFromInformation(const PoseMatrix<SE2>&);
 template PoseMatrix<SE3> covarianceFromInformation(const PoseMatrix<SE3>&);
 template ChainedLoop<SE2> chainLoop(const OdometryChain<SE2>&, const RelativePose<SE2>&);

@@ -34,6 +34,10 @@ struct CycleTest {
   double log_deviation = 0;
 };
 
+/// e^T C^-1 e and the room that it leaves.
+template <typename Pose>
+CycleTest cycleTest(const PoseMatrix<Pose>& covariance, const PoseVector<Pose>& error);
+
 /// Logarithm of the chance that a loop with a random relative pose agrees as well as this: volume of the
 /// ellipsoid of chi-squared up to that found (at least its mean for true loops) over that of all rotations
 /// and the box of the scene, `log_box` (OdometryChain::logBox). Above 0 the test says nothing.

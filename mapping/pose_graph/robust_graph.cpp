@@ -1,7 +1,9 @@
 #include "mapping/pose_graph/robust_graph.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <memory>
 
 namespace swiftlet {
 namespace {
@@ -14,9 +16,18 @@ constexpr std::uint32_t kNodes = 200;
 /// 340 MB of pairs, and about a minute of pair tests.
 constexpr std::uint32_t kCandidates = 30000;
 
+/// Covariances of relative poses on the solved graph: 10 ms each on the largest public ones.
+constexpr std::uint32_t kReconsidered = 300;
+
+/// One false loop in ten graphs, were all loops false.
+constexpr double kFalseExpected = 0.1;
+
 /// While weights change a rough solution will do.
 constexpr int kGraduatedIterations = 5;
 constexpr double kGraduatedTolerance = 1e-4;
+
+/// Loops come back in at most so many rounds.
+constexpr int kRounds = 5;
 
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
@@ -50,16 +61,24 @@ class GraphLoops : public WeightedLoops {
   OptimizeEffort effort_;
 };
 
-/// Loops that may be kept, by their edges in the whole graph.
-struct Candidates {
-  std::vector<std::uint32_t> edges;
-  std::vector<double> weights;  ///< 1: taken for the first solution
+/// Loops of the optimizer's graph.
+struct TakenLoops {
+  std::vector<std::uint32_t> edges;    ///< in the whole graph
+  std::vector<std::uint32_t> numbers;  ///< in the optimizer's
+  std::vector<double> weights;
 };
 
-/// Step 2: fates of all loops, and the members of the largest set.
+/// A loop that was not selected, and how many of the largest set it contradicts.
+struct OpenLoop {
+  std::uint32_t edge = 0;
+  std::uint32_t conflicts = 0;
+};
+
+/// Step 2: fates of all loops.
 template <typename Pose>
 Status selectLoops(const RobustGraphSettings& settings, const OdometryChain<Pose>& chain,
-                   const PoseGraph<Pose>& graph, Candidates& candidates, RobustGraphReport& report) {
+                   const PoseGraph<Pose>& graph, TakenLoops& taken, std::vector<OpenLoop>& open,
+                   RobustGraphReport& report) {
   std::vector<std::uint32_t> passed;
   for (std::uint32_t e = 0; e < graph.edges.size(); ++e) {
     if (report.fates[e] == EdgeFate::kOdometry) continue;
@@ -82,72 +101,177 @@ Status selectLoops(const RobustGraphSettings& settings, const OdometryChain<Pose
   selection.search(settings.max_nodes);
   report.exact = selection.exact();
   report.selected = static_cast<std::uint32_t>(selection.selected().size());
+  std::vector<std::uint64_t> set(selection.consistency().words());
   for (std::uint32_t id = 0; id < selection.held(); ++id) {
+    if (selection.verdict(id) != LoopVerdict::kInconsistent) setBit(set, id);
+  }
+  const std::uint32_t size = countBits(set);
+  for (std::uint32_t id = 0; id < selection.held(); ++id) {
+    const std::uint32_t e = passed[id];
     const LoopVerdict verdict = selection.verdict(id);
-    const bool in_set = verdict == LoopVerdict::kSelected || verdict == LoopVerdict::kUnsupported;
-    report.fates[passed[id]] = EdgeFate::kInconsistent;
-    if (!in_set) continue;
-    const bool selected = verdict == LoopVerdict::kSelected;
-    report.fates[passed[id]] = selected ? EdgeFate::kKept : EdgeFate::kUnsupported;
-    const RelativePose<Pose>& loop = selection.loop(id);
-    // Between components that nothing ties there is no solution that it could fit.
-    if (!selected && chain.component(loop.from) != chain.component(loop.to)) continue;
-    candidates.edges.push_back(passed[id]);
-    candidates.weights.push_back(selected ? 1 : 0);
+    if (verdict == LoopVerdict::kSelected) {
+      report.fates[e] = EdgeFate::kKept;
+      taken.edges.push_back(e);
+      taken.weights.push_back(1);
+      continue;
+    }
+    report.fates[e] = verdict == LoopVerdict::kUnsupported ? EdgeFate::kUnsupported : EdgeFate::kInconsistent;
+    if (chain.component(graph.edges[e].from) != chain.component(graph.edges[e].to)) continue;
+    open.push_back({e, size - countBoth(selection.consistency().row(id), set)});
   }
   return okStatus();
 }
 
-/// Odometry and candidates; `numbers` are the candidates' edges in it.
+/// Loops chosen, to the poses of the graph.
 template <typename Pose>
-PoseGraph<Pose> reduced(const PoseGraph<Pose>& graph, const RobustGraphReport& report,
-                        const Candidates& candidates, std::vector<std::uint32_t>& numbers) {
-  PoseGraph<Pose> out;
-  out.poses = graph.poses;
-  for (std::uint32_t e = 0; e < graph.edges.size(); ++e) {
-    if (report.fates[e] == EdgeFate::kOdometry) out.edges.push_back(graph.edges[e]);
+class RobustSolution {
+ public:
+  RobustSolution(const RobustGraphSettings& settings, const OdometryChain<Pose>& chain,
+                 const PoseGraph<Pose>& graph, TakenLoops& taken, std::size_t spare_edges,
+                 const RobustGraphReport& report)
+      : settings_(settings), chain_(chain), whole_(graph), taken_(taken) {
+    part_.poses = graph.poses;
+    for (std::uint32_t e = 0; e < graph.edges.size(); ++e) {
+      if (report.fates[e] == EdgeFate::kOdometry) part_.edges.push_back(graph.edges[e]);
+    }
+    for (const std::uint32_t e : taken.edges) {
+      taken_.numbers.push_back(static_cast<std::uint32_t>(part_.edges.size()));
+      part_.edges.push_back(graph.edges[e]);
+    }
+    optimizer_ = std::make_unique<PoseGraphOptimizer<Pose>>(
+        PoseGraphLimits{part_.poses.size(), part_.edges.size() + spare_edges, settings.max_factor_values});
   }
-  for (const std::uint32_t e : candidates.edges) {
-    numbers.push_back(static_cast<std::uint32_t>(out.edges.size()));
-    out.edges.push_back(graph.edges[e]);
+
+  Status solve(std::span<const std::uint32_t> fixed, RobustGraphReport& report) {
+    Status status = optimizer_->assign(part_);
+    for (const std::uint32_t pose : fixed) {
+      if (status.ok()) status = optimizer_->hold(pose, true);
+    }
+    if (status.ok()) status = optimizer_->start(report.start);
+    if (status.ok()) status = optimizer_->optimize(settings_.effort, report.solve);
+    return status;
   }
-  return out;
+
+  Status graduate(RobustGraphReport& report) {
+    GraphLoops<Pose> problem(*optimizer_, taken_.numbers);
+    std::vector<double> chi_squared(taken_.numbers.size());
+    GraduatedReport graduated;
+    const Status status =
+        selectGraduated(settings_.graduated, problem, taken_.weights, chi_squared, graduated);
+    report.graduated.solutions += graduated.solutions;
+    report.graduated.kept = graduated.kept;
+    report.graduated.settled = graduated.settled;
+    return status.ok() ? optimizer_->optimize(settings_.effort, report.solve) : status;
+  }
+
+  /// Step 5 once: how many loops came back.
+  Status takeBack(std::vector<OpenLoop>& open, std::uint32_t& count) {
+    count = 0;
+    const auto fits = [&](const OpenLoop& loop, bool& fit) {
+      return this->fits(whole_.edges[loop.edge], fit);
+    };
+    for (std::size_t k = 0; k < open.size();) {
+      bool fit = false;
+      if (const Status status = fits(open[k], fit); !status.ok()) return status;
+      if (fit) {
+        back_.push_back(open[k].edge);
+        open.erase(open.begin() + static_cast<std::ptrdiff_t>(k));
+      } else {
+        ++k;
+      }
+    }
+    // Added only now: a new edge would cost a new factor for the next covariance.
+    for (const std::uint32_t e : back_) {
+      if (const Status status = take(e); !status.ok()) return status;
+    }
+    count = static_cast<std::uint32_t>(back_.size());
+    back_.clear();
+    return okStatus();
+  }
+
+  [[nodiscard]] const std::vector<Pose>& poses() const { return optimizer_->graph().poses; }
+
+ private:
+  /// Whether the loop agrees with the solution as a true loop would and a random one would not.
+  Status fits(const RelativePose<Pose>& loop, bool& fit) {
+    fit = false;
+    const ChainedLoop<Pose> chained = chainLoop(chain_, loop);
+    const PoseGraph<Pose>& solved = optimizer_->graph();
+    const Pose Z = chain_.pose(chained.from).inverse() * chained.T_chain_loop;
+    const Pose X = solved.poses[chained.from].inverse() * solved.poses[chained.to];
+    const PoseVector<Pose> error = poseLog(Z.inverse() * X);
+    // The solution knows the relative pose better than the odometry alone: what fails this fails that.
+    const PoseMatrix<Pose> loose = chained.covariance + chain_.covariance(chained.from, chained.to);
+    if (!(cycleTest<Pose>(loose, error).chi_squared <= settings_.selection.gate_chi_squared))
+      return okStatus();
+    PoseMatrix<Pose> known;
+    if (const Status status = optimizer_->relativeCovariance(chained.from, chained.to, known); !status.ok()) {
+      return status;
+    }
+    const CycleTest test = cycleTest<Pose>(chained.covariance + known, error);
+    fit = test.chi_squared <= settings_.selection.gate_chi_squared &&
+          logChance<Pose>(test, chain_.logBox(chained.to)) <= std::log(settings_.selection.max_gate_chance);
+    return okStatus();
+  }
+
+  Status take(std::uint32_t e) {
+    const auto found = std::find(taken_.edges.begin(), taken_.edges.end(), e);
+    if (found != taken_.edges.end()) {
+      taken_.weights[static_cast<std::size_t>(found - taken_.edges.begin())] = 1;
+      return okStatus();
+    }
+    taken_.edges.push_back(e);
+    taken_.numbers.push_back(static_cast<std::uint32_t>(optimizer_->graph().edges.size()));
+    taken_.weights.push_back(1);
+    return optimizer_->addEdge(whole_.edges[e]);
+  }
+
+  const RobustGraphSettings& settings_;
+  const OdometryChain<Pose>& chain_;
+  const PoseGraph<Pose>& whole_;
+  TakenLoops& taken_;
+  PoseGraph<Pose> part_;
+  std::unique_ptr<PoseGraphOptimizer<Pose>> optimizer_;
+  std::vector<std::uint32_t> back_;
+};
+
+/// Of the open loops those that contradict fewest, at most as many as may be asked.
+void fewestConflicts(std::uint32_t most, std::vector<OpenLoop>& open) {
+  std::stable_sort(open.begin(), open.end(),
+                   [](const OpenLoop& a, const OpenLoop& b) { return a.conflicts < b.conflicts; });
+  if (open.size() > most) open.resize(most);
 }
 
-/// Steps 3 to 5.
+/// Steps 3 to 6.
 template <typename Pose>
-Status solveReduced(const RobustGraphSettings& settings, std::span<const std::uint32_t> fixed,
-                    Candidates& candidates, PoseGraph<Pose>& graph, RobustGraphReport& report) {
-  std::vector<std::uint32_t> numbers;
-  const PoseGraph<Pose> part = reduced(graph, report, candidates, numbers);
-  PoseGraphOptimizer<Pose> optimizer({part.poses.size(), part.edges.size(), settings.max_factor_values});
-  Status status = optimizer.assign(part);
-  for (const std::uint32_t pose : fixed) {
-    if (status.ok()) status = optimizer.hold(pose, true);
-  }
-  for (std::size_t k = 0; k < numbers.size() && status.ok(); ++k) {
-    status = optimizer.setWeight(numbers[k], candidates.weights[k]);
-  }
-  if (status.ok()) status = optimizer.start(report.start);
-  if (status.ok()) status = optimizer.optimize(settings.effort, report.solve);
-  if (status.ok() && settings.method != RobustMethod::kSelection) {
-    GraphLoops<Pose> problem(optimizer, numbers);
-    std::vector<double> chi_squared(numbers.size());
-    status = selectGraduated(settings.graduated, problem, candidates.weights, chi_squared, report.graduated);
-    if (status.ok()) status = optimizer.optimize(settings.effort, report.solve);
+Status solveTaken(const RobustGraphSettings& settings, std::span<const std::uint32_t> fixed,
+                  const OdometryChain<Pose>& chain, TakenLoops& taken, std::vector<OpenLoop>& open,
+                  PoseGraph<Pose>& graph, RobustGraphReport& report) {
+  fewestConflicts(settings.max_reconsidered, open);
+  RobustSolution<Pose> solution(settings, chain, graph, taken, open.size(), report);
+  Status status = solution.solve(fixed, report);
+  if (status.ok() && settings.method != RobustMethod::kSelection) status = solution.graduate(report);
+  if (settings.method == RobustMethod::kSelectionAndGraduated) {
+    for (std::size_t k = 0; k < taken.edges.size(); ++k) {
+      if (taken.weights[k] == 0) open.push_back({taken.edges[k], 0});
+    }
+    std::uint32_t count = 1;
+    for (int round = 0; round < kRounds && count > 0 && status.ok(); ++round) {
+      status = solution.takeBack(open, count);
+      if (status.ok() && count > 0) status = solution.graduate(report);
+    }
   }
   if (!status.ok()) return status;
-  for (std::size_t k = 0; k < candidates.edges.size(); ++k) {
-    EdgeFate& fate = report.fates[candidates.edges[k]];
-    const bool kept = candidates.weights[k] == 1;
-    if (kept) {
+  for (std::size_t k = 0; k < taken.edges.size(); ++k) {
+    EdgeFate& fate = report.fates[taken.edges[k]];
+    if (taken.weights[k] == 1) {
       ++report.kept;
       fate = EdgeFate::kKept;
     } else if (fate == EdgeFate::kKept) {
       fate = EdgeFate::kAgainstSolution;
     }
   }
-  graph.poses = optimizer.graph().poses;
+  graph.poses = solution.poses();
   return okStatus();
 }
 
@@ -160,6 +284,8 @@ RobustGraphSettings robustGraphSettings() {
   settings.graduated.max_chi_squared = chiSquaredOfTail(PoseSpace<Pose>::kDof, kFitTail);
   settings.max_nodes = kNodes;
   settings.max_candidates = kCandidates;
+  settings.max_reconsidered = kReconsidered;
+  settings.max_false_expected = kFalseExpected;
   settings.effort.iterations = 100;
   return settings;
 }
@@ -216,20 +342,24 @@ Status solveRobustly(const RobustGraphSettings& settings, std::span<const std::u
     report.fates.push_back(odometry ? EdgeFate::kOdometry : EdgeFate::kAgainstOdometry);
     report.loops += odometry ? 0U : 1U;
   }
-  Candidates candidates;
+  TakenLoops taken;
+  std::vector<OpenLoop> open;
+  RobustGraphSettings adapted = settings;
+  adapted.selection.max_gate_chance =
+      std::min(settings.selection.max_gate_chance, settings.max_false_expected / std::max(report.loops, 1U));
   if (settings.method == RobustMethod::kGraduated) {
     for (std::uint32_t e = 0; e < graph.edges.size(); ++e) {
       if (is_odometry[e]) continue;
       report.fates[e] = EdgeFate::kKept;
-      candidates.edges.push_back(e);
-      candidates.weights.push_back(1);
+      taken.edges.push_back(e);
+      taken.weights.push_back(1);
     }
     report.selected = report.loops;
   } else {
-    const Status status = selectLoops(settings, chain, graph, candidates, report);
+    const Status status = selectLoops(adapted, chain, graph, taken, open, report);
     if (!status.ok()) return status;
   }
-  return solveReduced(settings, fixed, candidates, graph, report);
+  return solveTaken(adapted, fixed, chain, taken, open, graph, report);
 }
 
 template RobustGraphSettings robustGraphSettings<SE2>();

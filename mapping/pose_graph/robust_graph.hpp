@@ -6,9 +6,15 @@
 //    are loops, a second edge between neighbours too. Where there is none a component begins.
 // 2. LoopSelection over all loops at once: gate, pairs, largest set, support.
 // 3. The graph of odometry and selected loops is solved.
-// 4. Graduated non-convexity on the loops of the largest set, from that solution: drops loops that agree in
-//    pairs but not all together, and takes back those that had no support but fit.
-// 5. The graph of odometry and kept loops is solved again.
+// 4. Graduated non-convexity on these loops, from that solution: drops those that agree in pairs but not all
+//    together.
+// 5. Loops that were not selected (those that contradict fewest of the largest set, at most
+//    `max_reconsidered`) and those dropped come back when they agree with the solution and chance would not:
+//    chi-squared and chance with the covariance of the loop and of the relative pose on the solved graph. A
+//    true loop may be far off a solution without it where that is vague; its own covariance alone would
+//    reject it. Then 4 again, until no loop comes back.
+// In 2 and 5 a loop that nothing but the odometry or the solution vouches for is believed at a chance of at
+// most `max_false_expected` / loops: the more loops are offered, the more random ones agree by chance.
 // RobustMethod leaves steps out, for comparison.
 //
 // Frames and cost: pose_graph.hpp. Errors: kInvalidInput (poses or edges that the optimizer refuses),
@@ -31,17 +37,19 @@ namespace swiftlet {
 enum class RobustMethod : std::uint8_t {
   kSelectionAndGraduated,  ///< 1 to 5
   kSelection,              ///< 1 to 3
-  kGraduated,              ///< 1, then 4 on all loops from the odometry, 5
+  kGraduated,              ///< 1, then 4 on all loops from the odometry
 };
 
 struct RobustGraphSettings {
   RobustMethod method = RobustMethod::kSelectionAndGraduated;
   LoopSelectionSettings selection;
   GraduatedSettings graduated;
-  std::uint32_t max_nodes = 0;        ///< of the search for the largest set
-  std::uint32_t max_candidates = 0;   ///< loops that pass the gate
-  std::size_t max_factor_values = 0;  ///< of the optimizer, PoseGraphLimits
-  OptimizeEffort effort;              ///< of the first and the last solution
+  std::uint32_t max_nodes = 0;         ///< of the search for the largest set
+  std::uint32_t max_candidates = 0;    ///< loops that pass the gate
+  std::uint32_t max_reconsidered = 0;  ///< loops asked again on the solved graph
+  double max_false_expected = 0;       ///< loops believed by chance, were all of them false
+  std::size_t max_factor_values = 0;   ///< of the optimizer, PoseGraphLimits
+  OptimizeEffort effort;               ///< of the first and the last solution
 };
 
 /// The settings used everywhere. A loop stays on the solved graph while its chi-squared is one that a true
@@ -55,7 +63,7 @@ enum class EdgeFate : std::uint8_t {
   kAgainstOdometry,  ///< gate
   kInconsistent,     ///< not in the largest set
   kAgainstSolution,  ///< selected, but does not fit the solved graph
-  kUnsupported,      ///< of the largest set; chance would agree as well, and it does not fit the solved graph
+  kUnsupported,      ///< of the largest set, but chance would agree as well
 };
 
 struct RobustGraphReport {
