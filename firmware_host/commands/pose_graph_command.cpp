@@ -14,6 +14,14 @@ namespace {
 
 constexpr std::size_t kWarningsShown = 10;
 
+void printLoops(const char* name, const LoopCount& count) {
+  fmt::print(
+      "{:<14} {} kept, {} rejected: {} against the odometry, {} inconsistent, {} unsupported, {} against the "
+      "solution\n",
+      name, count.kept, count.rejected(), count.against_odometry, count.inconsistent, count.unsupported,
+      count.against_solution);
+}
+
 void print(const PoseGraphRequest& request, const PoseGraphResult& result) {
   for (std::size_t k = 0; k < std::min(kWarningsShown, result.warnings.size()); ++k) {
     fmt::print(stderr, "warning: {}\n", result.warnings[k]);
@@ -23,6 +31,15 @@ void print(const PoseGraphRequest& request, const PoseGraphResult& result) {
   if (result.outliers > 0) fmt::print(", {} of them injected (seed {})", result.outliers, request.seed);
   fmt::print("\n");
   if (result.pieces > 1) fmt::print("{:<14} {}\n", "pieces", result.pieces);
+  if (request.robust && result.factored) {
+    if (result.robust.components > 1) {
+      fmt::print("{:<14} {} pieces (edges between poses that follow each other)\n", "odometry",
+                 result.robust.components);
+    }
+    printLoops(result.outliers > 0 ? "own loops" : "loops", result.loops);
+    if (result.outliers > 0) printLoops("injected", result.false_loops);
+    if (!result.robust.exact) fmt::print("{:<14} the best found, not proven the largest\n", "set");
+  }
   fmt::print("{:<14} {:.8g}\n", "cost given", result.start.given_cost);
   if (request.start == StartRule::kAuto && std::isfinite(result.start.chordal_cost))
     fmt::print("{:<14} {:.8g}\n", "cost chordal", result.start.chordal_cost);
@@ -37,6 +54,7 @@ void print(const PoseGraphRequest& request, const PoseGraphResult& result) {
 int poseGraph(const PoseGraphRequest& request) {
   const PoseGraphResult result = runPoseGraph(request);
   print(request, result);
+  if (!request.loops.empty() && result.factored) fmt::print("loops written to {}\n", request.loops);
   if (!request.out.empty()) fmt::print("written to {}\n", request.out);
   if (result.factored) return kExitDone;
   fmt::print(stderr, "error: {}: {}; the poses are the best that were found\n", request.file, result.failure);
@@ -61,10 +79,15 @@ void addPoseGraphCommand(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command
       ->add_option("--inject-outliers", request->outliers,
-                   "Add so many false loops before solving; --out has them too, after the file's edges")
+                   "Add so many false loops before solving; --out has them too, after the file's edges (with "
+                   "--robust those that stay)")
       ->check(CLI::Range(0U, 10000000U))
       ->capture_default_str();
   command->add_option("--seed", request->seed, "Of the false loops")->capture_default_str();
+  command->add_flag("--robust", request->robust,
+                    "Choose the loops that agree with the odometry, with each other and with the solution; "
+                    "the others are left out, in --out too");
+  command->add_option("--loops", request->loops, "With --robust: every loop and what became of it, as CSV");
   command->footer(
       "Costs are g2o's: 1/2 sum e^T Omega e with e = (translation, vec(q)) of T_i_j^-1 T_i^-1 T_j, in the "
       "plane\n"
@@ -73,7 +96,8 @@ void addPoseGraphCommand(CLI::App& app, int& exit_code) {
       "with a factor of 4.\n"
       "Example:\n  swiftlet pose-graph sphere2500.g2o --out solved.g2o\n"
       "  swiftlet pose-graph torus3D.g2o.xz --out solved.g2o --json solved.json\n"
-      "  swiftlet pose-graph intel.g2o --inject-outliers 100 --seed 7 --iterations 0 --out spoiled.g2o");
+      "  swiftlet pose-graph intel.g2o --inject-outliers 100 --seed 7 --iterations 0 --out spoiled.g2o\n"
+      "  swiftlet pose-graph spoiled.g2o --robust --loops loops.csv --out solved.g2o");
   command->callback([request, &exit_code] { exit_code = poseGraph(*request); });
 }
 

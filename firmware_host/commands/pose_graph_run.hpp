@@ -1,12 +1,13 @@
 #pragma once
-// `swiftlet pose-graph`: a g2o file optimized, and written again with the poses found.
+// `swiftlet pose-graph`: a g2o file optimized, and written again with the poses found; on request without its
+// false loops (mapping/pose_graph/robust_graph.hpp).
 
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
-#include "mapping/pose_graph/pose_graph_optimizer.hpp"
+#include "mapping/pose_graph/robust_graph.hpp"
 
 namespace swiftlet {
 
@@ -20,14 +21,33 @@ struct PoseGraphRequest {
   int iterations = 100;
   std::uint32_t outliers = 0;  ///< false loops to add before solving
   std::uint64_t seed = 1;
+  bool robust = false;
+  std::string loops;  ///< with `robust`: CSV of all loops and what became of them; empty: not written
+};
+
+/// What became of the loops of a graph.
+struct LoopCount {
+  std::uint32_t kept = 0;
+  std::uint32_t against_odometry = 0;
+  std::uint32_t inconsistent = 0;
+  std::uint32_t unsupported = 0;
+  std::uint32_t against_solution = 0;
+
+  void add(EdgeFate fate);
+  [[nodiscard]] std::uint32_t rejected() const {
+    return against_odometry + inconsistent + unsupported + against_solution;
+  }
 };
 
 struct PoseGraphResult {
   bool planar = true;
   std::size_t poses = 0;
-  std::size_t edges = 0;  ///< with the false loops
+  std::size_t edges = 0;  ///< with the false loops, before any is rejected
   std::uint32_t pieces = 0;
   std::uint32_t outliers = 0;
+  RobustGraphReport robust;  ///< with `robust`
+  LoopCount loops;           ///< of the file
+  LoopCount false_loops;     ///< injected
   StartReport start;
   OptimizeReport solve;      ///< initial_cost: at the start that was chosen
   double seconds = 0;        ///< wall time of start and optimization, without files
@@ -36,8 +56,9 @@ struct PoseGraphResult {
   std::vector<std::string> warnings;
 };
 
-/// InputError for bad input. Deterministic but for `seconds`: the same file and request, the same output
-/// file.
+/// InputError for bad input. Robust: `out` gets the graph without the rejected loops; where there is no
+/// solution (`factored` false) it gets the graph as it was. Deterministic but for `seconds`: the same file
+/// and request, the same output file.
 PoseGraphResult runPoseGraph(const PoseGraphRequest& request);
 
 nlohmann::ordered_json toJson(const PoseGraphRequest& request, const PoseGraphResult& result);
