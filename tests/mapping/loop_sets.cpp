@@ -11,14 +11,12 @@
 #include <sstream>
 
 #include "drivers/calibration/calibration.hpp"
-#include "drivers/recorded/trajectory_file.hpp"
+#include "tests/mapping/loop_sets_depth.hpp"
 
 namespace swiftlet::loop_sets {
 namespace {
 
 constexpr double kRevisitOverlap = 0.4;
-constexpr double kApartOverlap = 0.05;
-constexpr int kGridStep = 24;  // px, of the depth image for overlaps
 
 std::string readText(const std::string& path) {
   std::ifstream file(path);
@@ -36,38 +34,6 @@ SE3 poseFrom(std::istream& in) {
 
 void setKinds(ImageSet& set, PairKind kind) {
   set.kind.assign(set.shots.size(), std::vector<PairKind>(set.shots.size(), kind));
-}
-
-cv::Mat depthInMetres(const std::string& path) {
-  const cv::Mat raw = cv::imread(path, cv::IMREAD_UNCHANGED);
-  cv::Mat depth;
-  raw.convertTo(depth, CV_32F, 1e-3);
-  depth.setTo(0, raw == 65535);
-  return depth;
-}
-
-// Share of i's depth pixels that j sees at the same place.
-double overlap(const ImageSet& set, std::size_t i, std::size_t j) {
-  const Shot& a = set.shots[i];
-  const Shot& b = set.shots[j];
-  const SE3 T_b_a = (b.T_world_body * set.T_body_depth).inverse() * a.T_world_body * set.T_body_depth;
-  const Eigen::Vector4d& k = set.depth_camera;
-  int seen = 0;
-  int all = 0;
-  for (int y = kGridStep / 2; y < a.depth.rows; y += kGridStep) {
-    for (int x = kGridStep / 2; x < a.depth.cols; x += kGridStep) {
-      const double z = a.depth.at<float>(y, x);
-      if (!(z > 0)) continue;
-      ++all;
-      const Eigen::Vector3d p = T_b_a * Eigen::Vector3d((x - k[2]) / k[0] * z, (y - k[3]) / k[1] * z, z);
-      if (!(p.z() > 0.05)) continue;
-      const auto u = static_cast<int>(std::lround(k[0] * p.x() / p.z() + k[2]));
-      const auto v = static_cast<int>(std::lround(k[1] * p.y() / p.z() + k[3]));
-      if (u < 0 || v < 0 || u >= b.depth.cols || v >= b.depth.rows) continue;
-      if (std::abs(b.depth.at<float>(v, u) - p.z()) < 0.05 + 0.02 * p.z()) ++seen;
-    }
-  }
-  return all > 0 ? static_cast<double>(seen) / all : 0;
 }
 
 }  // namespace
@@ -182,56 +148,6 @@ std::optional<ImageSet> readDbowDemo(const std::string& data) {
   if (set.shots.size() == 4) {
     set.kind[1][3] = PairKind::kRevisit;
     set.kind[1][2] = set.kind[2][3] = PairKind::kUnclear;
-  }
-  return set;
-}
-
-std::optional<ImageSet> readFlight(const std::string& folder, double min_seconds, int every) {
-  if (!std::filesystem::exists(folder + "/mav0/cam0/data.csv")) return std::nullopt;
-  ImageSet set;
-  set.name = std::filesystem::path(folder).filename().string();
-  set.rig = readCalibration(folder).rig;
-  const std::string depth_yaml = readText(folder + "/mav0/depth0/sensor.yaml");
-  LogCounters counters;
-  LogWarnings warnings;
-  const Trajectory truth =
-      readTrajectory(folder + "/mav0/state_groundtruth_estimate0/data.csv", counters, warnings);
-  std::ifstream list(folder + "/mav0/cam0/data.csv");
-  int row = 0;
-  for (std::string line; std::getline(list, line);) {
-    if (line.empty() || line[0] == '#' || row++ % every != 0) continue;
-    const std::int64_t stamp = std::stoll(line);
-    std::string file = line.substr(line.find(',') + 1);
-    file.erase(file.find_last_not_of(" \r") + 1);
-    const auto at = std::lower_bound(truth.begin(), truth.end(), stamp,
-                                     [](const TrajectoryPoint& p, std::int64_t t) { return p.stamp.ns < t; });
-    if (at == truth.end() || at->stamp.ns != stamp) continue;
-    Shot shot;
-    shot.T_world_body = at->T_world_body;
-    shot.seconds = static_cast<double>(stamp) * 1e-9;
-    for (std::size_t c = 0; c < 2; ++c) {
-      const std::string camera = folder + "/mav0/cam" + std::to_string(c) + "/data/";
-      shot.grey[c] = cv::imread(camera + file, cv::IMREAD_GRAYSCALE);
-    }
-    const std::string depth = folder + "/mav0/depth0/data/" + std::to_string(stamp) + ".png";
-    if (std::filesystem::exists(depth)) shot.depth = depthInMetres(depth);
-    set.shots.push_back(shot);
-  }
-  set.T_body_depth = set.rig.T_body_cam[0];
-  std::istringstream intrinsics(depth_yaml.substr(depth_yaml.find("intrinsics: [") + 13));
-  for (int i = 0; i < 4; ++i) {
-    char comma = 0;
-    intrinsics >> set.depth_camera[i] >> comma;
-  }
-  setKinds(set, PairKind::kUnclear);
-  for (std::size_t i = 0; i < set.shots.size(); ++i) {
-    for (std::size_t j = i + 1; j < set.shots.size(); ++j) {
-      if (set.shots[j].seconds - set.shots[i].seconds < min_seconds) continue;
-      const double forth = overlap(set, i, j);
-      const double back = overlap(set, j, i);
-      if (std::min(forth, back) > kRevisitOverlap) set.kind[i][j] = PairKind::kRevisit;
-      if (std::max(forth, back) < kApartOverlap) set.kind[i][j] = PairKind::kApart;
-    }
   }
   return set;
 }

@@ -41,9 +41,10 @@ std::string dataFolder();
 std::optional<ImageSet> readKimera(const std::string& data);
 std::optional<ImageSet> readKitchen(const std::string& data);
 std::optional<ImageSet> readDbowDemo(const std::string& data);
-/// A folder of `swiftlet simulate` with depth at every image. Revisits: both see at least 40 % of the other's
-/// surface and are at least `min_seconds` apart; pairs less apart in time are unclear. Every n-th image is
-/// taken.
+/// An EuRoC folder with truth, every n-th image of it. Revisits: both see at least 40 % of the other's
+/// surface and are at least `min_seconds` apart; pairs less apart in time are unclear. The surface is that of
+/// depth0 where every image taken has one, else of truth/mesh.ply; without either (real flights) that of
+/// stereo depths at corners, where nothing tells what hides behind another thing.
 std::optional<ImageSet> readFlight(const std::string& folder, double min_seconds, int every);
 
 /// Features of OpenCV's ORB, for comparison.

@@ -1,8 +1,7 @@
 // Recall, precision, accuracy, honesty and cost of loop verification over all pairs of image sets; run by
 // hand.
 //
-//   loop_verification_statistics [--min-seconds S] [FLIGHT...]   (folders of `swiftlet simulate --depth-every
-//   1`)
+//   loop_verification_statistics [--min-seconds S] [--every N] [FLIGHT...]   (EuRoC folders with truth)
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -11,11 +10,14 @@
 #include <map>
 #include <memory>
 #include <numbers>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "estimator/geometry/so3.hpp"
 #include "mapping/place/feature_depth.hpp"
 #include "mapping/place/loop_verification.hpp"
 #include "mapping/place/place_extractor.hpp"
+#include "tests/mapping/loop_retrieval.hpp"
 #include "tests/mapping/loop_sets.hpp"
 #include "tests/support/cpu_time.hpp"
 #include "tests/support/statistics.hpp"
@@ -37,6 +39,9 @@ using test::quantile;
 ImageView viewOf(const cv::Mat& image) {
   return {image.data, image.cols, image.rows, static_cast<int>(image.step)};
 }
+
+double least_seconds = 10;
+const char* draw_into = nullptr;
 
 enum class Features { kOrb, kOwn };
 
@@ -88,11 +93,72 @@ struct Outcome {
   std::size_t revisits = 0, found = 0, others = 0, others_accepted = 0, false_accepted = 0;
   std::map<LoopFate, std::size_t> lost, refused;
   std::vector<double> metres, degrees, nees, ms, accepted_ms, chi_squared;
+  Verdicts verdicts;
 };
 
+// A pair and the matches that were believed, one above the other.
+void draw(const ImageSet& set, const Prepared& prepared, std::size_t i, std::size_t j,
+          const LoopVerification& result) {
+  cv::Mat both;
+  cv::vconcat(set.shots[i].grey[0], set.shots[j].grey[0], both);
+  cv::cvtColor(both, both, cv::COLOR_GRAY2BGR);
+  const int below = set.shots[i].grey[0].rows;
+  int color = 0;
+  for (const DescriptorMatch& m : result.inliers) {
+    const Eigen::Vector2f& a = prepared.keyframes[i].features[m.old_feature].pixel;
+    const Eigen::Vector2f& b = prepared.keyframes[j].features[m.new_feature].pixel;
+    const cv::Scalar paint = color++ % 2 == 0 ? cv::Scalar(0, 255, 0) : cv::Scalar(0, 160, 255);
+    cv::line(both, cv::Point2f(a.x(), a.y()), cv::Point2f(b.x(), b.y() + static_cast<float>(below)), paint);
+  }
+  cv::imwrite(cv::format("%s/%s_%03zu_%03zu.png", draw_into, set.name.c_str(), i, j), both);
+}
+
+// Believed matches that the truth bears out, of those where it can tell.
+std::pair<std::size_t, std::size_t> countTrue(const ImageSet& set, const Prepared& prepared, std::size_t i,
+                                              std::size_t j, const LoopVerification& result) {
+  constexpr double kPixels = 5;
+  const CameraModel& camera = set.rig.camera[0];
+  const SE3 T_body_cam = set.rig.T_body_cam[0];
+  const SE3 T_j_i =
+      (set.shots[j].T_world_body * T_body_cam).inverse() * set.shots[i].T_world_body * T_body_cam;
+  std::pair<std::size_t, std::size_t> count{0, 0};
+  for (const DescriptorMatch& m : result.inliers) {
+    const PlaceFeature& a = prepared.keyframes[i].features[m.old_feature];
+    const double inverse = trueInverseDistance(set, i, a.pixel.cast<double>());
+    if (!(inverse > 0)) continue;
+    ++count.second;
+    Eigen::Vector2d pixel;
+    if (!camera.project(T_j_i * (a.bearing.cast<double>() / inverse), pixel)) continue;
+    const Eigen::Vector2f& b = prepared.keyframes[j].features[m.new_feature].pixel;
+    if ((pixel - b.cast<double>()).norm() < kPixels) ++count.first;
+  }
+  return count;
+}
+
+struct Wrong {
+  double metres = 0, degrees = 0, nees = 0;
+};
+
+void tellFalse(const ImageSet& set, const Prepared& prepared, std::size_t i, std::size_t j,
+               const LoopVerification& result, const Wrong& wrong) {
+  const SE3 truth = set.shots[i].T_world_body.inverse() * set.shots[j].T_world_body;
+  const Matrix6d& c = result.covariance;
+  const auto [borne_out, told] = countTrue(set, prepared, i, j, result);
+  std::printf(
+      "    false: %zu %zu, inliers %zu (%zu of %zu true), kept %zu of %zu, %.2f m %.1f deg off (NEES %.0f, "
+      "sigmas %.3f rad "
+      "%.3f "
+      "m), truly %.2f m %.1f deg apart, spread %.3f rad, chi2/dof %.2f\n",
+      i, j, result.inliers.size(), borne_out, told, result.kept, result.matches, wrong.metres, wrong.degrees,
+      wrong.nees, std::sqrt(c.diagonal().head<3>().maxCoeff()), std::sqrt(c.diagonal().tail<3>().maxCoeff()),
+      truth.translation.norm(), logSo3(truth.rotation).norm() * 180 / std::numbers::pi, result.spread,
+      result.chi_squared_per_dof);
+  if (draw_into != nullptr) draw(set, prepared, i, j, result);
+}
+
 // What became of one candidate.
-void count(const ImageSet& set, std::size_t i, std::size_t j, const LoopVerification& result, bool verbose,
-           Outcome& out) {
+void count(const ImageSet& set, const Prepared& prepared, std::size_t i, std::size_t j,
+           const LoopVerification& result, bool verbose, Outcome& out) {
   const bool revisit = set.kind[i][j] == PairKind::kRevisit;
   ++(revisit ? out.revisits : out.others);
   if (!result.accepted()) {
@@ -107,24 +173,25 @@ void count(const ImageSet& set, std::size_t i, std::size_t j, const LoopVerifica
   error << logSo3(difference.rotation), difference.translation;
   const double metres = error.tail<3>().norm();
   const double degrees = error.head<3>().norm() * 180 / std::numbers::pi;
-  if (metres > kFalseMetres || degrees > kFalseDegrees) {
+  const double nees = error.dot(result.covariance.ldlt().solve(error));
+  const bool wrong = metres > kFalseMetres || degrees > kFalseDegrees;
+  out.verdicts[i][j] = wrong ? Verdict::kFalse : Verdict::kRight;
+  if (wrong) {
     ++out.false_accepted;
-    if (verbose) {
-      std::printf("    false: %zu %zu, inliers %zu, kept %zu of %zu, %.2f m %.1f deg off, spread %.3f rad\n",
-                  i, j, result.inliers.size(), result.kept, result.matches, metres, degrees, result.spread);
-    }
+    if (verbose) tellFalse(set, prepared, i, j, result, {metres, degrees, nees});
     return;
   }
   ++(revisit ? out.found : out.others_accepted);
   out.metres.push_back(metres);
   out.degrees.push_back(degrees);
-  out.nees.push_back(error.dot(result.covariance.ldlt().solve(error)));
+  out.nees.push_back(nees);
 }
 
 void verifyPairs(const ImageSet& set, const Prepared& prepared, const LoopVerificationSettings& settings,
                  bool verbose, Outcome& out) {
   const auto verifier = std::make_unique<LoopVerifier>(set.rig, settings);
   LoopVerification result;
+  out.verdicts.assign(set.shots.size(), std::vector<Verdict>(set.shots.size(), Verdict::kRefused));
   for (std::size_t i = 0; i < set.shots.size(); ++i) {
     for (std::size_t j = i + 1; j < set.shots.size(); ++j) {
       const double apart = set.shots[j].seconds - set.shots[i].seconds;
@@ -132,7 +199,7 @@ void verifyPairs(const ImageSet& set, const Prepared& prepared, const LoopVerifi
       const double start = cpuMilliseconds();
       (void)verifier->verify(prepared.keyframes[i], prepared.keyframes[j], {}, 1.0, result);
       out.ms.push_back(cpuMilliseconds() - start);
-      count(set, i, j, result, verbose, out);
+      count(set, prepared, i, j, result, verbose, out);
     }
   }
 }
@@ -169,10 +236,25 @@ void printFates(const char* what, const std::map<LoopFate, std::size_t>& fates) 
   std::printf("\n");
 }
 
+// What the database proposes, and what comes of it; `reference`: of all pairs.
+void propose(const ImageSet& set, const std::vector<PlaceKeyframe>& keyframes, const Verdicts& reference,
+             const Verdicts& verdicts) {
+  PlaceDatabaseSettings settings;
+  settings.exclude = least_seconds;
+  const auto run = [&](const char* name) {
+    reportRetrieval(set, retrieve(set, keyframes, Vocabulary::shipped(), settings), settings, reference,
+                    verdicts, name);
+  };
+  run("as set");
+  settings.candidates = settings.per_island = kMaxPlaceCandidates;
+  run("all the best");
+}
+
 bool own_only = false;
 
 void report(const ImageSet& set, bool verbose, const LoopVerificationSettings& settings) {
   std::printf("%s: %zu images\n", set.name.c_str(), set.shots.size());
+  Verdicts by_orb;
   for (const Features features : {Features::kOrb, Features::kOwn}) {
     if (own_only && features == Features::kOrb) continue;
     const Prepared p = prepare(set, features);
@@ -208,6 +290,9 @@ void report(const ImageSet& set, bool verbose, const LoopVerificationSettings& s
     }
     printFates("revisits lost", o.lost);
     printFates("others refused", o.refused);
+    if (features == Features::kOrb) by_orb = o.verdicts;
+    if (features == Features::kOwn)
+      propose(set, p.keyframes, by_orb.empty() ? o.verdicts : by_orb, o.verdicts);
   }
 }
 
@@ -215,16 +300,17 @@ void report(const ImageSet& set, bool verbose, const LoopVerificationSettings& s
 
 int main(int argc, char** argv) {
   LoopVerificationSettings settings;
-  double min_seconds = 10;
   bool verbose = false;
   int every = 1;
   bool flights_only = false;
   std::vector<std::string> flights;
   for (int i = 1; i < argc; ++i) {
     if (std::strcmp(argv[i], "--min-seconds") == 0 && i + 1 < argc) {
-      min_seconds = std::atof(argv[++i]);
+      least_seconds = std::atof(argv[++i]);
     } else if (std::strcmp(argv[i], "--verbose") == 0) {
       verbose = true;
+    } else if (std::strcmp(argv[i], "--draw") == 0 && i + 1 < argc) {
+      draw_into = argv[++i];
     } else if (std::strcmp(argv[i], "--own-only") == 0) {
       own_only = true;
     } else if (std::strcmp(argv[i], "--every") == 0 && i + 1 < argc) {
@@ -244,7 +330,7 @@ int main(int argc, char** argv) {
     }
   }
   for (const std::string& flight : flights) {
-    const auto set = readFlight(flight, min_seconds, every);
+    const auto set = readFlight(flight, least_seconds, every);
     if (set) report(*set, verbose, settings);
   }
   return 0;
