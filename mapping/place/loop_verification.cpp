@@ -113,6 +113,8 @@ const char* describe(LoopFate fate) {
       return "ill-conditioned";
     case LoopFate::kTooFar:
       return "too far apart";
+    case LoopFate::kFragile:
+      return "fragile";
   }
   return "";
 }
@@ -292,6 +294,12 @@ LoopFate LoopVerifier::judge(LoopVerification& result) {
     return LoopFate::kIllConditioned;
   }
   if (!(result.T_old_new.translation.norm() <= settings_.max_distance)) return LoopFate::kTooFar;
+  result.support = relativePoseSupport(settings_.refinement, {points_.data(), points_.size()}, T_cam_,
+                                       settings_.support_reach);
+  if (!(result.support.rotation_shift <= settings_.max_rotation_shift) ||
+      !(result.support.translation_shift <= far)) {
+    return LoopFate::kFragile;
+  }
   return LoopFate::kAccepted;
 }
 

@@ -41,8 +41,9 @@ enum class LoopFate : std::uint8_t {
   kPoorFit,         ///< residuals far above their noise
   kIllConditioned,  ///< rotation or translation not determined well enough
   kTooFar,          ///< keyframes farther apart than max_distance
+  kFragile,         ///< without a few matches beside each other the pose would be another
 };
-inline constexpr std::size_t kLoopFates = 11;
+inline constexpr std::size_t kLoopFates = 12;
 
 /// A few words for logs and tables.
 const char* describe(LoopFate fate);
@@ -69,6 +70,8 @@ struct LoopVerificationSettings {
   double max_rotation_sigma = 0.03;     ///< rad, largest axis
   double max_translation_sigma = 0.15;  ///< m, largest axis, or
   double max_relative_sigma = 0.1;      ///< of the median distance of the inliers, whichever is more
+  double support_reach = 0.1;           ///< rad: matches so near each other may be wrong together
+  double max_rotation_shift = 0.03;     ///< rad, without any of such groups
   double max_distance = 10;             ///< m between the two bodies
   bool five_point = true;  ///< tried where three points found nothing and most matches have no depth
 
@@ -91,7 +94,8 @@ struct LoopVerification {
   int samples = 0;
   std::size_t kept = 0;  ///< of the first matches, those that agree with the final pose
   double chi_squared_per_dof = 0;
-  double spread = 0;          ///< rad, the smaller of both keyframes
+  double spread = 0;  ///< rad, the smaller of both keyframes
+  RelativePoseSupport support;
   DescriptorMatches inliers;  ///< features that agree with the refined pose
 
   [[nodiscard]] bool accepted() const { return fate == LoopFate::kAccepted; }

@@ -188,6 +188,27 @@ System assemble(const SE3& T_old_new, double huber, std::span<const MatchedPoint
   return system;
 }
 
+struct Seed {
+  double leverage = 0;  ///< part of the pose's degrees of freedom that the match holds alone
+  std::size_t index = 0;
+};
+
+std::array<Seed, kSupportSeeds> greatestLeverage(const Eigen::Matrix3d& R_new_old, const Eigen::Vector3d& t,
+                                                 double huber, std::span<const MatchedPoint> points,
+                                                 const Matrix6d& covariance) {
+  std::array<Seed, kSupportSeeds> seeds{};
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!points[i].used) continue;
+    System match;
+    addMatch(R_new_old, t, huber, points[i], match);
+    Seed seed{(covariance * match.H).trace(), i};
+    for (Seed& kept : seeds) {
+      if (seed.leverage > kept.leverage) std::swap(seed, kept);
+    }
+  }
+  return seeds;
+}
+
 }  // namespace
 
 double matchGate(int dof) {
@@ -233,6 +254,39 @@ Status refineRelativePose(const RelativePoseSettings& settings, std::span<Matche
   fit.dof = system.dof - 6;
   fit.used = system.used;
   return okStatus();
+}
+
+RelativePoseSupport relativePoseSupport(const RelativePoseSettings& settings,
+                                        std::span<const MatchedPoint> points, const SE3& T_old_new,
+                                        double reach) {
+  constexpr double kUndetermined = std::numeric_limits<double>::infinity();
+  const Eigen::Matrix3d R_new_old = T_old_new.R().transpose();
+  const System all = assemble(T_old_new, settings.huber, points);
+  const Eigen::LDLT<Matrix6d> solver(all.H);
+  if (solver.info() != Eigen::Success || !solver.isPositive()) return {kUndetermined, kUndetermined};
+  const Matrix6d covariance = solver.solve(Matrix6d::Identity());
+  const std::array<Seed, kSupportSeeds> seeds =
+      greatestLeverage(R_new_old, T_old_new.translation, settings.huber, points, covariance);
+  RelativePoseSupport support;
+  const double near = std::cos(reach);
+  for (const Seed& seed : seeds) {
+    if (!(seed.leverage > 0)) break;
+    const MatchedPoint& middle = points[seed.index];
+    System group;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const bool beside = points[k].old_view.bearing.dot(middle.old_view.bearing) >= near &&
+                          points[k].new_view.bearing.dot(middle.new_view.bearing) >= near;
+      if (!points[k].used || (!beside && k != seed.index)) continue;
+      addMatch(R_new_old, T_old_new.translation, settings.huber, points[k], group);
+    }
+    const Eigen::LDLT<Matrix6d> rest(all.H - group.H);
+    if (rest.info() != Eigen::Success || !rest.isPositive()) return {kUndetermined, kUndetermined};
+    const Vector6d shift = rest.solve(all.g - group.g);
+    if (!shift.allFinite()) return {kUndetermined, kUndetermined};
+    support.rotation_shift = std::max(support.rotation_shift, shift.head<3>().norm());
+    support.translation_shift = std::max(support.translation_shift, shift.tail<3>().norm());
+  }
+  return support;
 }
 
 Matrix6d covarianceOfBody(const SE3& T_body_cam, const Matrix6d& covariance_of_cameras) {

@@ -75,6 +75,22 @@ void placePoints(const SE3& T_old_new, std::span<MatchedPoint> points);
 Status refineRelativePose(const RelativePoseSettings& settings, std::span<MatchedPoint> points,
                           SE3& T_old_new, RelativePoseFit& fit);
 
+/// How far a pose moves when a few matches beside each other are left out: what one thing of the scene, taken
+/// for another, may have done to it unseen.
+struct RelativePoseSupport {
+  double rotation_shift = 0;     ///< rad, the largest found
+  double translation_shift = 0;  ///< m
+};
+
+/// Looks at the kSupportSeeds used matches of the greatest leverage (Hoaglin, Welsch, "The Hat Matrix in
+/// Regression and ANOVA", 1978), each with the used ones whose bearings lie within `reach` [rad] of its own
+/// in both views. To first order about `T_old_new`, where `points` were refined; infinite where the others do
+/// not determine the pose. Costs about two steps of the refinement.
+inline constexpr std::size_t kSupportSeeds = 16;
+RelativePoseSupport relativePoseSupport(const RelativePoseSettings& settings,
+                                        std::span<const MatchedPoint> points, const SE3& T_old_new,
+                                        double reach);
+
 /// Information or covariance of `T_a_b` in the tangent above, carried to T_x_a T_a_b T_x_b^-1 with both X
 /// equal: camera to body. `T_body_cam` is X; covariance in, covariance out.
 Matrix6d covarianceOfBody(const SE3& T_body_cam, const Matrix6d& covariance_of_cameras);
