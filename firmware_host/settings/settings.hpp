@@ -7,6 +7,7 @@
 #include "estimator/messages/effort.hpp"
 #include "estimator/odometry/odometry_settings.hpp"
 #include "mapping/loop/loop_settings.hpp"
+#include "mapping/map/map_settings.hpp"
 
 namespace swiftlet {
 
@@ -86,6 +87,7 @@ struct Settings {
   MeshGroup mesh;
   LoopGroup loop;
   LoopSettings loop_stage;
+  MapSettings map_stage;
   RealtimeGroup realtime;
   BudgetsGroup budgets;
   bool full_smoothing = true;  ///< smoother.horizon is `full`

@@ -44,6 +44,7 @@ constexpr SettingsStruct kStructs[] = {
     {"firmware_host/settings/settings.hpp", "MeshGroup"},
     {"firmware_host/settings/settings.hpp", "LoopGroup"},
     {"mapping/loop/loop_settings.hpp", "LoopSettings"},
+    {"mapping/map/map_settings.hpp", "MapSettings"},
 };
 
 /// "group.name" without the group; a member may drop what its group already says.

@@ -1,0 +1,111 @@
+#include <fmt/format.h>
+
+#include <atomic>
+#include <csignal>
+#include <memory>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/commands/checks.hpp"
+#include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/fuse_run.hpp"
+
+namespace swiftlet {
+namespace {
+
+std::atomic<bool> stop_asked{false};
+
+extern "C" void askFuseToStop(int /*signal*/) { stop_asked.store(true, std::memory_order_relaxed); }
+
+struct FuseOptions {
+  FuseRequest request;
+  SettingsOptions settings;
+  std::vector<std::string> calibration;
+  double until = -1;
+};
+
+void printSummary(const nlohmann::ordered_json& summary) {
+  const auto& moments = summary["moments"];
+  const auto& map = summary["map"];
+  fmt::print("{} depth images fused ({} with labels), {} without a pose, {} refused; {} triangles\n",
+             moments["fused"].get<std::uint64_t>(), moments["with_labels"].get<std::uint64_t>(),
+             moments["without_pose"].get<std::uint64_t>(), moments["refused"].get<std::uint64_t>(),
+             map["mesh"]["faces"].get<std::uint64_t>());
+  for (const auto& [name, timing] : summary["timing"].items()) {
+    const auto& cpu = timing["cpu"];
+    fmt::print("  {:<10} {:>6} times  p50 {:.2f}  p99 {:.2f}  max {:.2f} ms CPU\n", name,
+               timing["count"].get<std::uint64_t>(), cpu["p50_ms"].get<double>(), cpu["p99_ms"].get<double>(),
+               cpu["max_ms"].get<double>());
+  }
+}
+
+int fuse(const FuseOptions& options) {
+  FuseRequest request = options.request;
+  request.stop = &stop_asked;
+  request.show_progress = true;
+  if (options.until >= 0) request.until = options.until;
+  if (!options.calibration.empty()) request.calibration = options.calibration[0];
+  if (options.calibration.size() > 1) request.imu_calibration = options.calibration[1];
+  if (request.until && *request.until < request.from) {
+    throw InputError("--until", 0, "", "the section ends before it begins", "Give an --until after --from");
+  }
+  stop_asked.store(false, std::memory_order_relaxed);
+  std::signal(SIGINT, askFuseToStop);
+  std::signal(SIGTERM, askFuseToStop);
+  const FuseRunResult result = runFuse(request, options.settings.read());
+  printSummary(result.summary);
+  fmt::print("written to {}\n", request.out);
+  if (!result.finished) {
+    fmt::print(stderr, "stopped before the end; the folder holds what was done\n");
+    return kExitFailed;
+  }
+  if (!result.has_surface) {
+    fmt::print(stderr, "error: {}: no surface; summary.json says what became of the depth images\n",
+               request.log);
+    return kExitFailed;
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+void addFuseCommand(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("fuse", "Make the labelled map of a log with given poses");
+  auto options = std::make_shared<FuseOptions>();
+  FuseRequest& request = options->request;
+  request.out = "fuse";
+  command
+      ->add_option("LOG", request.log,
+                   "EuRoC/ASL folder with depth0 or two cameras, and labels0 where there are labels")
+      ->required();
+  command->add_option("--trajectory", request.trajectory,
+                      "Poses of the body (TUM, EuRoC csv); default: the log's own truth");
+  command->add_option("--out", request.out, "Folder to write")->capture_default_str();
+  addChoice<DepthSource>(
+      *command, "--depth", request.depth, "Where depth comes from: sensor is the log's depth0",
+      {{"any", DepthSource::kAny}, {"sensor", DepthSource::kSensor}, {"stereo", DepthSource::kStereo}});
+  command
+      ->add_option("--interval", request.interval,
+                   "Seconds between pairs that are matched for stereo depth; pairs with labels always are")
+      ->check(positive())
+      ->capture_default_str();
+  command
+      ->add_option("--max-gap", request.max_gap,
+                   "Poses are interpolated between neighbours at most this far apart [s]")
+      ->check(positive())
+      ->capture_default_str();
+  command
+      ->add_option("--calibration", options->calibration,
+                   "Calibration instead of the log's own: a folder, or Kalibr camchain and IMU files")
+      ->expected(1, 2);
+  command->add_option("--from", request.from, "Start this many seconds after the first image")
+      ->check(nonNegative());
+  command->add_option("--until", options->until, "End this many seconds after the first image")
+      ->check(nonNegative());
+  options->settings.addTo(*command);
+  command->footer(
+      "Example:\n  swiftlet fuse data/vil_v102 --out map_v102\n"
+      "  swiftlet fuse data/vil_v102 --trajectory run_v102/map.tum --depth stereo --out map_v102");
+  command->callback([options, &exit_code] { exit_code = fuse(*options); });
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,296 @@
+#include "firmware_host/commands/fuse_run.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <filesystem>
+#include <memory>
+
+#include "drivers/recorded/depth_images.hpp"
+#include "drivers/recorded/label_images.hpp"
+#include "drivers/recorded/open_log.hpp"
+#include "estimator/odometry/odometry_inputs.hpp"
+#include "estimator/odometry/pairing.hpp"
+#include "firmware_host/commands/given_poses.hpp"
+#include "firmware_host/pipeline/log_feed.hpp"
+#include "firmware_host/report/line_file.hpp"
+#include "firmware_host/report/map_files.hpp"
+#include "firmware_host/report/map_mesh_builder.hpp"
+#include "firmware_host/report/map_report.hpp"
+#include "firmware_host/report/progress.hpp"
+#include "firmware_host/report/summary.hpp"
+#include "mapping/map/map_stage.hpp"
+
+namespace swiftlet {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// CPU of a step's parts.
+struct MapTimes {
+  LatencyHistogram depth;  ///< stereo, and the volume's update
+  LatencyHistogram surface;
+  LatencyHistogram distance;
+};
+
+Json timingJson(const MapTimes& times) {
+  Json json;
+  const std::array<std::pair<const char*, const LatencyHistogram*>, 3> parts{
+      {{"volume", &times.depth}, {"surface", &times.surface}, {"distance", &times.distance}}};
+  for (const auto& [name, cpu] : parts) {
+    constexpr double kMilli = 1e3;
+    json[name] = {{"count", cpu->count()},
+                  {"cpu",
+                   {{"mean_ms", cpu->mean() * kMilli},
+                    {"p50_ms", cpu->percentile(0.5) * kMilli},
+                    {"p99_ms", cpu->percentile(0.99) * kMilli},
+                    {"max_ms", cpu->max() * kMilli}}}};
+  }
+  return json;
+}
+
+LogOptions logOptions(const FuseRequest& request, const Settings& settings) {
+  LogOptions options;
+  options.calibration = request.calibration;
+  options.imu_calibration = request.imu_calibration;
+  options.calibration_options.accept_unusual_rig = settings.calibration.accept_unusual_rig;
+  return options;
+}
+
+/// What one run is made of, from opening to the summary.
+class FuseRun {
+ public:
+  FuseRun(const FuseRequest& request, const Settings& settings)
+      : request_(request),
+        settings_(settings),
+        source_(openLog(request.log, logOptions(request, settings))),
+        rig_(source_->rig()),
+        depth_(request.log, warnings_, source_->calibration().T_body_filebody),
+        labels_(request.log, {rig_.camera[0].width(), rig_.camera[0].height()}, warnings_) {}
+
+  FuseRunResult operator()() {
+    begin();
+    run();
+    progress_->finish();
+    if (!poses_out_) failWithoutPose();
+    return end();
+  }
+
+ private:
+  void begin();
+  void openPoses();
+  void run();
+  void take(const StereoFrame& frame);
+  void takeSensorUntil(Stamp stamp, const StereoFrame* frame);
+  void fuse(Stamp stamp, const StereoFrame* frame, const DepthImageView& depth);
+  [[noreturn]] void failWithoutPose() const;
+  FuseRunResult end();
+  [[nodiscard]] std::string file(const char* name) const {
+    return std::filesystem::path(request_.out) / name;
+  }
+
+  const FuseRequest& request_;
+  const Settings& settings_;
+  std::unique_ptr<LogSource> source_;
+  Rig rig_;
+  LogWarnings warnings_;
+  DepthImages depth_;
+  LabelImages labels_;
+  std::string poses_name_;
+  std::optional<GivenPoses> poses_;
+  std::optional<Progress> progress_;
+  std::unique_ptr<MapStage> map_;
+  std::optional<TumWriter> poses_out_;
+  MapReport report_;
+  MapTimes times_;
+  bool sensor_ = false;
+  std::size_t next_depth_ = 0;  ///< row
+  std::optional<Stamp> first_image_, last_image_, last_pair_;
+  bool finished_ = true;
+  std::uint64_t moments_ = 0, without_pose_ = 0, refused_ = 0, fused_ = 0, labelled_ = 0;
+};
+
+void FuseRun::openPoses() {
+  Trajectory trajectory;
+  if (request_.trajectory.empty()) {
+    trajectory = source_->groundTruth();
+    poses_name_ = source_->groundTruthName();
+    if (trajectory.empty()) {
+      throw InputError(request_.log, 0, "", "the log has no truth to take poses from",
+                       "Give a trajectory file with --trajectory (TUM, or EuRoC csv)");
+    }
+  } else {
+    LogCounters counters;
+    trajectory = readTrajectory(request_.trajectory, counters, warnings_);
+    poses_name_ = request_.trajectory;
+  }
+  poses_.emplace(std::move(trajectory), Duration::fromSeconds(request_.max_gap));
+  if (poses_->jumps() > 0) {
+    warnings_.add(fmt::format("{}: the poses jump {} times, first at {}: the map begins anew after each",
+                              poses_name_, poses_->jumps(), formatSeconds(poses_->firstJump())));
+  }
+}
+
+void FuseRun::begin() {
+  openPoses();
+  sensor_ =
+      request_.depth == DepthSource::kSensor || (request_.depth == DepthSource::kAny && !depth_.empty());
+  if (sensor_ && depth_.empty()) {
+    throw InputError(request_.log, 0, "", "has no depth images (mav0/depth0)", "Use --depth stereo");
+  }
+  if (!sensor_ && rig_.camera_count < 2) {
+    throw InputError(request_.log, 0, "", "one camera and no depth images: nothing gives depth",
+                     "Give a log with two cameras or with mav0/depth0");
+  }
+  if (sensor_) {
+    DepthImageView camera;
+    camera.camera = depth_.sensor().camera;
+    camera.T_body_camera = depth_.sensor().T_body_camera;
+    map_ = std::make_unique<MapStage>(rig_, settings_.map_stage, &camera);
+  } else {
+    map_ = std::make_unique<MapStage>(rig_, settings_.map_stage);
+  }
+  for (const std::string& line : source_->warnings()) fmt::print(stderr, "warning: {}\n", line);
+  for (const std::string& line : warnings_.lines()) fmt::print(stderr, "warning: {}\n", line);
+  progress_.emplace("fuse", request_.show_progress ? source_->imageCount() : 0);
+}
+
+void FuseRun::run() {
+  LogFeed feed(*source_, {request_.from, request_.until, std::nullopt}, nullptr);
+  PairingSettings pairing_settings;
+  pairing_settings.cameras = rig_.camera_count;
+  pairing_settings.tolerance = Duration::fromSeconds(settings_.pairing.tolerance_ms * 1e-3);
+  pairing_settings.patience = Duration::fromSeconds(settings_.pairing.patience_ms * 1e-3);
+  Pairing pairing(pairing_settings);
+  StereoFrame frame;
+  for (;;) {
+    if (request_.stop != nullptr && request_.stop->load(std::memory_order_relaxed)) {
+      finished_ = false;
+      return;
+    }
+    const LogFeed::Next next = feed.next();
+    if (next == LogFeed::Next::kEnd) break;
+    if (next == LogFeed::Next::kImage) {
+      if (pairing.push(feed.image(), frame).ok()) take(frame);
+    } else if (next == LogFeed::Next::kSample) {
+      if (pairing.expire(feed.sample().stamp, frame).ok()) take(frame);
+    }
+    progress_->update(feed.taken());
+  }
+  if (pairing.flush(frame).ok()) take(frame);
+}
+
+void FuseRun::take(const StereoFrame& frame) {
+  if (!first_image_) {
+    first_image_ = frame.stamp;
+    // What was measured before the part of the log that is wanted is not.
+    while (next_depth_ < depth_.rows().size() && depth_.rows()[next_depth_].stamp < frame.stamp)
+      ++next_depth_;
+  }
+  last_image_ = frame.stamp;
+  if (sensor_) {
+    takeSensorUntil(frame.stamp, &frame);
+    return;
+  }
+  if (frame.image[0].empty() || frame.image[1].empty()) return;
+  const bool due = !last_pair_ || (frame.stamp - *last_pair_).seconds() >= request_.interval;
+  if (!due && labels_.at(frame.stamp).empty()) return;
+  last_pair_ = frame.stamp;
+  fuse(frame.stamp, &frame, {});
+}
+
+/// Depth images up to a frame's stamp; the one at the stamp gets the frame's grey values and labels.
+void FuseRun::takeSensorUntil(Stamp stamp, const StereoFrame* frame) {
+  for (; next_depth_ < depth_.rows().size() && depth_.rows()[next_depth_].stamp <= stamp; ++next_depth_) {
+    const Stamp at = depth_.rows()[next_depth_].stamp;
+    const DepthImageView view = depth_.at(at);
+    if (view.depth != nullptr) fuse(at, at == stamp ? frame : nullptr, view);
+  }
+}
+
+void FuseRun::fuse(Stamp stamp, const StereoFrame* frame, const DepthImageView& depth) {
+  ++moments_;
+  const auto pose = poses_->at(stamp);
+  if (!pose) {
+    ++without_pose_;
+    return;
+  }
+  if (!poses_out_) {
+    std::filesystem::create_directories(request_.out);
+    poses_out_.emplace(file("trajectory.tum"));
+  }
+  poses_out_->write(stamp, pose->T_world_body);
+  MapInput input;
+  input.stamp = stamp;
+  input.epoch = static_cast<std::uint32_t>(pose->piece);
+  input.T_map_body = pose->T_world_body;
+  input.depth = depth;
+  if (frame != nullptr) input.image = frame->image;
+  if (settings_.map_stage.labels) input.labels = labels_.at(stamp);
+  bool taken = false;
+  const Spent depth_time =
+      measured([&] { taken = map_->takeDepth(input, {}, report_).code != StatusCode::kInvalidInput; });
+  if (!taken) {
+    ++refused_;
+    return;
+  }
+  ++fused_;
+  labelled_ += report_.with_labels ? 1 : 0;
+  times_.depth.add(depth_time.cpu);
+  const Eigen::Vector3d& vehicle = pose->T_world_body.translation;
+  // What is left over is counted in the report and drawn later.
+  times_.surface.add(measured([&] { static_cast<void>(map_->draw(vehicle, {}, report_)); }).cpu);
+  times_.distance.add(measured([&] { map_->updateDistance(vehicle, {}, report_); }).cpu);
+}
+
+void FuseRun::failWithoutPose() const {
+  if (!first_image_ || moments_ == 0) {
+    throw InputError(request_.log, 0, "", "no depth in the part of the log that was asked for",
+                     "Give another --from or --until");
+  }
+  throw InputError(
+      poses_name_, 0, "timestamp",
+      fmt::format("no depth image has a pose: the poses go from {} to {}, the images from {} to {}",
+                  formatSeconds(poses_->begin()), formatSeconds(poses_->end()), formatSeconds(*first_image_),
+                  formatSeconds(*last_image_)),
+      fmt::format("Both need stamps of one clock, and poses at most --max-gap={:g} s apart",
+                  request_.max_gap));
+}
+
+FuseRunResult FuseRun::end() {
+  poses_out_->close();
+  MapMeshBuilder builder;
+  map_->visitSurface(builder);
+  const MapMesh mesh = builder.mesh();
+  writeMapPly(file("map.ply"), mesh);
+  writeMapGlb(file("map.glb"), mesh);
+  Json json;
+  json["version"] = versionJson();
+  json["run"] = {{"command", "fuse"},
+                 {"log", request_.log},
+                 {"trajectory", poses_name_},
+                 {"depth", sensor_ ? "sensor" : "stereo"},
+                 {"finished", finished_},
+                 {"first_image_ns", first_image_->ns},
+                 {"last_image_ns", last_image_->ns}};
+  json["moments"] = {{"with_depth", moments_},
+                     {"without_pose", without_pose_},
+                     {"refused", refused_},
+                     {"fused", fused_},
+                     {"with_labels", labelled_}};
+  json["map"] = toJson(*map_);
+  json["map"]["mesh"] = {{"vertices", mesh.vertices.size()}, {"faces", mesh.faces.size()}};
+  json["timing"] = timingJson(times_);
+  json["warnings"] = source_->warnings();
+  for (const std::string& line : warnings_.lines()) json["warnings"].push_back(line);
+  writeJson(file("summary.json"), json);
+  return {json, finished_, !mesh.faces.empty()};
+}
+
+}  // namespace
+
+FuseRunResult runFuse(const FuseRequest& request, const Settings& settings) {
+  return FuseRun(request, settings)();
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,43 @@
+#include "firmware_host/report/map_report.hpp"
+
+namespace swiftlet {
+
+nlohmann::ordered_json toJson(const MapStage& map) {
+  const MapCounters& stage = map.counters();
+  const IntegratorCounters& images = map.integrator().counters();
+  const VolumeCounters& blocks = map.volume().counters();
+  const SurfaceStoreCounters& store = map.surface().counters();
+  const DistanceField& distance = map.distance();
+  return {{"taken", stage.taken},
+          {"without_depth", stage.without_depth},
+          {"wrong_size", stage.wrong_size},
+          {"epochs", stage.epochs},
+          {"refused",
+           {{"all", images.refused},
+            {"pose_jumps", images.pose_jumps},
+            {"bad_poses", images.bad_poses},
+            {"bad_stamps", images.bad_stamps}}},
+          {"blocks",
+           {{"held", map.volume().blockCount()},
+            {"capacity", map.volume().blockCapacity()},
+            {"free", map.volume().freeCount()},
+            {"evicted", blocks.evicted},
+            {"evicted_free", blocks.evicted_free},
+            {"refused", blocks.refused},
+            {"out_of_range", blocks.out_of_range},
+            {"index_full", blocks.index_full},
+            {"left_out", images.blocks_left_out}}},
+          {"surface",
+           {{"patches", map.surface().patches()},
+            {"pages", map.surface().pagesUsed()},
+            {"capacity", map.surface().pages()},
+            {"drawn", map.surfaceStage().counters().drawn},
+            {"spilled", store.spilled},
+            {"lost", store.lost}}},
+          {"bytes",
+           {{"volume", map.volume().bytes()},
+            {"surface", map.surface().bytes()},
+            {"distance", distance.bytes()}}}};
+}
+
+}  // namespace swiftlet

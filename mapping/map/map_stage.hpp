@@ -1,0 +1,112 @@
+#pragma once
+// The stage of the thread `map`: images with poses to a volume, its labelled surface and a distance field.
+//
+// A step takes one moment: the images of the cameras, or the depth image of a sensor, and labels where there
+// are any. Depth comes from the sensor when it gives one, else from the two cameras. Grey values and labels
+// are brought from camera 0 to the depth's pixels. Then the volume takes the depth, the surface follows the
+// blocks that changed, the distance field follows the volume. `MapEffort` bounds each. A new epoch has a
+// world of its own: the surface so far stays in the store, the volume begins anew. Errors: kInvalidInput,
+// counted, where nothing could be taken: no depth and no pair of images, a wrong size, a pose that is not
+// finite or jumped (VolumeIntegrator). kCapacityReached: taken, in part. Frames: map (or world, of whoever
+// gives the poses), body, metres. Memory: all reserved by the constructor (bytes() says how much); nothing is
+// allocated later. No clock, no randomness: same input, same bytes.
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "estimator/camera/rig.hpp"
+#include "mapping/distance/volume_distance.hpp"
+#include "mapping/map/map_settings.hpp"
+#include "mapping/map/view_warp.hpp"
+#include "mapping/surface/surface_stage.hpp"
+#include "mapping/volume/volume_integrator.hpp"
+
+namespace swiftlet {
+
+struct MapInput {
+  Stamp stamp;
+  std::uint32_t epoch = 0;
+  SE3 T_map_body;
+  std::array<ImageView, kMaxCameras> image;  ///< raw; empty where missing
+  DepthImageView depth;                      ///< of a sensor; `depth` null: from the images
+  ImageView labels;                          ///< in camera 0's raw geometry; empty where missing
+};
+
+struct MapEffort {
+  VolumeEffort volume;
+  SurfaceEffort surface;
+  DistanceEffort distance;
+};
+
+/// What one step did.
+struct MapReport {
+  Stamp stamp;
+  Status status;
+  bool from_sensor = false;
+  bool with_labels = false;
+  VolumeStep volume;
+  SurfaceStep surface;
+  DistanceStep distance;
+};
+
+struct MapCounters {
+  std::uint64_t taken = 0;
+  std::uint64_t without_depth = 0;  ///< neither a depth image nor a pair
+  std::uint64_t wrong_size = 0;     ///< labels or grey values that do not fit: left out, the depth is taken
+  std::uint64_t epochs = 0;
+};
+
+class MapStage {
+ public:
+  /// `depth_sensor`: its camera, where one gives depth images. `spill` takes the surface that leaves the
+  /// store; may be null, outlives the stage.
+  MapStage(const Rig& rig, const MapSettings& settings, const DepthImageView* depth_sensor = nullptr,
+           SurfaceSink* spill = nullptr);
+
+  /// All of the below, in their order.
+  Status step(const MapInput& input, const MapEffort& effort, MapReport& report);
+
+  /// Depth into the volume. The report begins here.
+  Status takeDepth(const MapInput& input, const VolumeEffort& effort, MapReport& report);
+  /// The surface of what changed.
+  Status draw(const Eigen::Vector3d& p_map_vehicle, const SurfaceEffort& effort, MapReport& report);
+  void updateDistance(const Eigen::Vector3d& p_map_vehicle, const DistanceEffort& effort, MapReport& report);
+
+  [[nodiscard]] const DistanceField& distance() const { return distance_; }
+  [[nodiscard]] const VoxelVolume& volume() const { return volume_; }
+  [[nodiscard]] const VolumeIntegrator& integrator() const { return integrator_; }
+  [[nodiscard]] const SurfaceStore& surface() const { return store_; }
+  /// All patches, ordered by block.
+  void visitSurface(SurfaceSink& sink) { store_.visit(sink, patch_); }
+  [[nodiscard]] const SurfaceStage& surfaceStage() const { return surface_; }
+  [[nodiscard]] const MapCounters& counters() const { return counters_; }
+
+ private:
+  /// What a camera that gives depth needs beside it.
+  struct DepthSide {
+    DepthSide(const PinholeIntrinsics& camera, const SE3& T_body_camera, const Rig& rig);
+    ViewWarp warp;
+    std::vector<std::uint8_t> grey;
+    std::vector<std::uint8_t> labels;
+  };
+
+  void beginEpoch(std::uint32_t epoch);
+  void addViews(const MapInput& input, DepthSide& side, DepthImageView& depth, MapReport& report);
+
+  Rig rig_;
+  ConfusionModel confusion_;
+  VoxelVolume volume_;
+  std::unique_ptr<DepthSide> sensor_;
+  VolumeIntegrator integrator_;
+  SurfaceStore store_;
+  SurfaceStage surface_;
+  DistanceField distance_;
+  VolumeDistance volume_distance_;
+  SurfacePatch patch_;
+  std::uint32_t epoch_ = 0;
+  Eigen::Vector3d vehicle_ = Eigen::Vector3d::Zero();  ///< last
+  MapCounters counters_;
+};
+
+}  // namespace swiftlet
