@@ -1,7 +1,5 @@
 #include "drivers/simulated/given_motion.hpp"
 
-#include <lzma.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,9 +7,10 @@
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
-#include <stdexcept>
 #include <vector>
 
+#include "drivers/calibration/input_error.hpp"
+#include "drivers/calibration/unpack_xz.hpp"
 #include "estimator/geometry/so3.hpp"
 
 namespace swiftlet {
@@ -24,33 +23,12 @@ struct Row {
   SE3 pose;
 };
 
-std::string unpackXz(const std::string& packed, const std::string& path) {
-  lzma_stream stream = LZMA_STREAM_INIT;
-  if (lzma_stream_decoder(&stream, UINT64_MAX, LZMA_CONCATENATED) != LZMA_OK) {
-    throw std::runtime_error(path + ": no memory for the xz decoder");
-  }
-  std::string text;
-  std::array<char, 1 << 16> buffer{};
-  stream.next_in = reinterpret_cast<const std::uint8_t*>(packed.data());
-  stream.avail_in = packed.size();
-  lzma_ret result = LZMA_OK;
-  while (result == LZMA_OK) {
-    stream.next_out = reinterpret_cast<std::uint8_t*>(buffer.data());
-    stream.avail_out = buffer.size();
-    result = lzma_code(&stream, LZMA_FINISH);
-    text.append(buffer.data(), buffer.size() - stream.avail_out);
-  }
-  lzma_end(&stream);
-  if (result != LZMA_STREAM_END) throw std::runtime_error(path + ": not a whole xz file");
-  return text;
-}
-
 std::string readText(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
-  if (!file) throw std::runtime_error(path + ": cannot be opened");
+  if (!file) throw InputError(path, 0, "", "cannot be opened", "");
   std::ostringstream text;
   text << file.rdbuf();
-  return path.ends_with(".xz") ? unpackXz(text.str(), path) : text.str();
+  return isXz(text.view()) ? unpackXz(path, text.view()) : text.str();
 }
 
 std::vector<Row> parseRows(const std::string& text, const std::string& path) {
@@ -71,16 +49,14 @@ std::vector<Row> parseRows(const std::string& text, const std::string& path) {
       value[i] = std::strtod(cursor, &end);
       good = end != cursor && std::isfinite(value[i]);
     }
-    if (!good)
-      throw std::runtime_error(path + ":" + std::to_string(number) + ": not a pose (stamp, p xyz, q wxyz)");
+    if (!good) throw InputError(path, number, "", "not a pose (stamp, p xyz, q wxyz)", "");
     if (rows.empty()) first_ns = ns;
     Row row;
     row.t = static_cast<double>(ns - first_ns) * 1e-9;
     row.pose =
         SE3(Eigen::Quaterniond(value[3], value[4], value[5], value[6]), {value[0], value[1], value[2]});
     if (!rows.empty() && (row.t <= rows.back().t || row.t > rows.back().t + kMaxGap)) {
-      throw std::runtime_error(path + ":" + std::to_string(number) +
-                               ": stamps must rise by at most 0.5 s a row");
+      throw InputError(path, number, "stamp", "must rise by at most 0.5 s a row", "");
     }
     rows.push_back(row);
   }
@@ -94,7 +70,7 @@ SplineTrajectory readGivenMotion(const std::string& path, double skip, double du
   const double last = rows.empty() ? 0.0 : rows.back().t;
   const double end = duration > 0 ? std::min(last, skip + duration) : last;
   const auto count = static_cast<std::int64_t>(std::floor((end - skip) / kGivenMotionSpacing));
-  if (skip < 0 || count < 1) throw std::runtime_error(path + ": has no motion in the span asked for");
+  if (skip < 0 || count < 1) throw InputError(path, 0, "", "has no motion in the span asked for", "");
   std::vector<SE3> samples;
   std::size_t row = 1;
   for (std::int64_t k = 0; k <= count; ++k) {

@@ -17,7 +17,7 @@ namespace swiftlet {
 inline constexpr double kGivenMotionSpacing = 0.05;
 
 /// Trajectory from the first to the last pose; its time zero is the first pose. With `duration` > 0
-/// only [skip, skip + duration] of it. Throws std::runtime_error naming file and line.
+/// only [skip, skip + duration] of it. InputError names file and line.
 SplineTrajectory readGivenMotion(const std::string& path, double skip = 0, double duration = 0);
 
 }  // namespace swiftlet

@@ -12,7 +12,7 @@ namespace swiftlet {
 class SimulatedFlight {
  public:
   /// Builds the trajectory, the world and the IMU readings (no textures yet: milliseconds). Throws
-  /// std::invalid_argument or std::runtime_error that name the setting or the file.
+  /// std::invalid_argument names the setting, InputError the file.
   explicit SimulatedFlight(const SimulationSettings& settings);
 
   /// As used: seeds handed down, low light and faults applied, the world fitted to a given motion.
