@@ -11,8 +11,9 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::array<LoopVerdict, 4> kVerdicts = {LoopVerdict::kSelected, LoopVerdict::kAgainstOdometry,
-                                                  LoopVerdict::kInconsistent, LoopVerdict::kUnsupported};
+constexpr std::array<LoopVerdict, 5> kVerdicts = {LoopVerdict::kSelected, LoopVerdict::kAgainstOdometry,
+                                                  LoopVerdict::kInconsistent, LoopVerdict::kUnsupported,
+                                                  LoopVerdict::kReleased};
 constexpr std::size_t kVerdictField = 2;
 constexpr std::size_t kFirstNumber = 3;
 constexpr std::size_t kNumbers = 10;
@@ -29,6 +30,8 @@ std::string_view verdictName(LoopVerdict verdict) {
       return "inconsistent";
     case LoopVerdict::kUnsupported:
       return "unsupported";
+    case LoopVerdict::kReleased:
+      return "released";
   }
   return "unknown";
 }

@@ -211,6 +211,13 @@ std::uint32_t PlaceDatabase::mostRedundant(Stamp stamp, std::uint32_t epoch) con
   return best != kNoSlot ? best : oldest_;
 }
 
+bool PlaceDatabase::forget(std::uint32_t slot) {
+  if (slot >= entries_.size() || !entries_[slot].used) return false;
+  remove(slot);
+  --counts_.removed;  // not by the policy
+  return true;
+}
+
 void PlaceDatabase::remove(std::uint32_t slot) {
   Entry& entry = entries_[slot];
   for (const WordValue& w : entry.bag) removePosting(w.word, slot);

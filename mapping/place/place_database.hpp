@@ -87,6 +87,9 @@ class PlaceDatabase {
   [[nodiscard]] Status add(std::uint64_t index, Stamp stamp, std::uint32_t epoch, const BagOfWords& bag,
                            std::uint32_t& slot);
 
+  /// The keyframe of a slot leaves, and the slot is free. False where it holds none.
+  bool forget(std::uint32_t slot);
+
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] std::size_t capacity() const { return entries_.size(); }
   [[nodiscard]] const PlaceDatabaseCounts& counts() const { return counts_; }

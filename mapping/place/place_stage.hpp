@@ -39,6 +39,8 @@ class PlaceStage {
   [[nodiscard]] Status step(const ImageView& image, const TrackedFrame& tracked, std::uint32_t epoch,
                             PlaceKeyframe& keyframe, PlaceStep& out);
 
+  /// The keyframe of a slot is needed no more.
+  void forget(std::uint32_t slot) { static_cast<void>(database_.forget(slot)); }
   [[nodiscard]] const PlaceDatabase& database() const { return database_; }
 
  private:

@@ -117,6 +117,10 @@ bool LoopSelection<Pose>::findLeast(std::uint32_t& id) const {
   std::uint32_t least = 0;
   bool found = false;
   for (std::uint32_t k = 0; k < held(); ++k) {
+    if (held_[k].released) {
+      id = k;
+      return true;
+    }
     if (testBit(sets_, k)) {
       continue;
     }
@@ -257,8 +261,87 @@ void LoopSelection<Pose>::leave(std::uint32_t id) {
 }
 
 template <typename Pose>
+void LoopSelection<Pose>::giveUp(std::uint32_t id) {
+  leave(id);
+  held_[id].passed = held_[id].proven = false;
+  held_[id].released = true;
+  ++counters_.released;
+}
+
+template <typename Pose>
+Status LoopSelection<Pose>::release(std::uint32_t id) {
+  if (id >= held() || held_[id].released) {
+    return {StatusCode::kInvalidInput, "no such loop"};
+  }
+  giveUp(id);
+  select();
+  return okStatus();
+}
+
+/// Names `onto` in the place of `pose`. With T_pose_onto <- T_pose_onto Exp(eta), cov(eta) = Q, and the
+/// loop's Z <- Z Exp(zeta):  Z T_pose_onto has the error Ad(T_onto_pose) zeta + eta, T_onto_pose Z has zeta -
+/// Ad((T_onto_pose Z)^-1) eta.
+template <typename Pose>
+void LoopSelection<Pose>::carry(RelativePose<Pose>& loop, std::uint32_t pose, std::uint32_t onto) const {
+  using Matrix = PoseMatrix<Pose>;
+  const Pose T_onto_pose = chain_.relative(onto, pose);
+  const Matrix turned = poseAdjoint(T_onto_pose);
+  const Matrix Q = pose < onto ? chain_.covariance(pose, onto)
+                               : Matrix(turned * chain_.covariance(onto, pose) * turned.transpose());
+  Matrix R = covarianceFromInformation(loop.information);
+  if (loop.to == pose) {
+    loop.T_from_to = loop.T_from_to * T_onto_pose.inverse();
+    R = turned * R * turned.transpose() + Q;
+    loop.to = onto;
+  } else {
+    loop.T_from_to = T_onto_pose * loop.T_from_to;
+    const Matrix back = poseAdjoint(loop.T_from_to.inverse());
+    R += back * Q * back.transpose();
+    loop.from = onto;
+  }
+  const Matrix information = R.ldlt().solve(Matrix::Identity());
+  loop.information = 0.5 * (information + information.transpose());
+}
+
+template <typename Pose>
+Status LoopSelection<Pose>::removePose(std::uint32_t pose, std::uint32_t onto) {
+  const bool known = pose + 1 < chain_.size() && onto < chain_.size();
+  if (!known || chain_.component(pose) != chain_.component(onto)) {
+    return {StatusCode::kInvalidInput, "no such pose to remove, or none beside it to carry its loops to"};
+  }
+  std::vector<std::uint32_t>& carried = order_;
+  carried.clear();
+  for (std::uint32_t k = 0; k < held(); ++k) {
+    RelativePose<Pose>& loop = held_[k].loop;
+    if (held_[k].released || (loop.from != pose && loop.to != pose)) {
+      continue;
+    }
+    if (pose == onto || loop.from == onto || loop.to == onto) {
+      giveUp(k);
+      continue;
+    }
+    carry(loop, pose, onto);
+    carried.push_back(k);
+  }
+  chain_.erase(pose);
+  const auto moveDown = [pose](std::uint32_t& k) { k -= k > pose ? 1U : 0U; };
+  for (Held& held : held_) {
+    moveDown(held.loop.from);
+    moveDown(held.loop.to);
+    moveDown(held.chained.from);
+    moveDown(held.chained.to);
+  }
+  for (const std::uint32_t k : carried) {
+    held_[k].chained = chainLoop(chain_, held_[k].loop);
+  }
+  counters_.carried += carried.size();
+  select();
+  return okStatus();
+}
+
+template <typename Pose>
 Status LoopSelection<Pose>::reconsider(std::uint32_t id, const CycleTest& gate, std::uint32_t max_nodes) {
-  if (id >= held()) {
+  if (id >= held() || held_[id].released) {
     return {StatusCode::kInvalidInput, "no such loop"};
   }
   const bool before = held_[id].passed;
@@ -285,8 +368,10 @@ void LoopSelection<Pose>::replay(std::uint32_t max_nodes) {
   groups_.clear();
   order_.clear();
   for (std::uint32_t k = 0; k < held(); ++k) {
-    order_.push_back(k);
     held_[k].passed = false;
+    if (!held_[k].released) {
+      order_.push_back(k);
+    }
   }
   std::sort(order_.begin(), order_.end(),
             [&](std::uint32_t a, std::uint32_t b) { return held_[a].arrival < held_[b].arrival; });
@@ -352,6 +437,9 @@ template <typename Pose>
 LoopVerdict LoopSelection<Pose>::verdict(std::uint32_t id) const {
   if (testBit(chosen_, id)) {
     return LoopVerdict::kSelected;
+  }
+  if (held_[id].released) {
+    return LoopVerdict::kReleased;
   }
   if (!held_[id].passed) {
     return LoopVerdict::kAgainstOdometry;

@@ -74,12 +74,15 @@ enum class LoopVerdict : std::uint8_t {
   kAgainstOdometry,  ///< gate
   kInconsistent,     ///< passed the gate, is not in the largest set
   kUnsupported,      ///< in the set, but chance would agree as well, or too few loops between components
+  kReleased,         ///< given up for room
 };
 
 struct LoopSelectionCounters {
   std::uint64_t added = 0;
   std::uint64_t refused = 0;   ///< not finite, no such pose, or full of agreeing loops
   std::uint64_t replaced = 0;  ///< held loops that gave way
+  std::uint64_t carried = 0;   ///< loops moved to the pose beside theirs, which was removed
+  std::uint64_t released = 0;  ///< given up by release() or removePose()
   std::uint64_t pair_tests = 0;
   std::uint64_t nodes = 0;  ///< visited by searches
 };
@@ -105,6 +108,15 @@ class LoopSelection {
   /// loop that now passes is treated as if it just arrived; one that no longer does leaves the set, which is
   /// then searched again.
   Status reconsider(std::uint32_t id, const CycleTest& gate, std::uint32_t max_nodes);
+  /// Gives a held loop up: it leaves pairs and sets (one that others agreed with for its support may take
+  /// them out of the selection), and its id is the next to be given to another loop.
+  Status release(std::uint32_t id);
+  /// Takes a pose out of the odometry, so that there is room for another; poses after it move down by one.
+  /// Its loops are carried to `onto`, a pose of the same component: their relative pose goes on along the
+  /// odometry between the two, whose covariance is added to theirs; what was found of their pairs stays.
+  /// Loops between the two, and all where pose == onto, are released. Not the last pose. Linear in poses and
+  /// loops.
+  Status removePose(std::uint32_t pose, std::uint32_t onto);
   /// Everything again from nothing, in the order of arrival, with the chain as it is now (it may have been
   /// refined) and the gates of the odometry.
   void replay(std::uint32_t max_nodes);
@@ -129,6 +141,7 @@ class LoopSelection {
     std::uint32_t group = 0;
     bool passed = false;  ///< the gate
     bool proven = false;  ///< by the gate alone
+    bool released = false;
   };
   /// Loops between the same two components.
   struct Group {
@@ -147,6 +160,8 @@ class LoopSelection {
   void searchGroup(std::uint32_t group, std::uint32_t max_nodes);
   void replaceSet(std::uint32_t group);
   void leave(std::uint32_t id);
+  void giveUp(std::uint32_t id);
+  void carry(RelativePose<Pose>& loop, std::uint32_t pose, std::uint32_t onto) const;
   void select();
   void dropUnsupported();
 

@@ -56,6 +56,9 @@ class OdometryChain {
   /// are at least kThinnest of the longest.
   [[nodiscard]] double logBox(std::uint32_t k) const;
 
+  /// Takes pose k away; those after it move down by one. What lies between the others, and how well it is
+  /// known, stays exactly as it was. Not the last pose. Linear in the poses after k.
+  void erase(std::uint32_t k) { nodes_.erase(nodes_.begin() + k); }
   void clear() { nodes_.clear(); }
 
   /// A flight at one height, a way along a line: a false loop may still lie beside it.
