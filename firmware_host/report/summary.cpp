@@ -189,8 +189,14 @@ Json toJson(const LoopCounters& loops) {
           {"candidates", fates},
           {"verified", loops.loops},
           {"selected", loops.selected},
-          {"optimizations", loops.optimizations},
-          {"refused_for_room", loops.refused}};
+          {"optimizations", loops.map.optimizations},
+          {"graduated_solutions", loops.map.graduated_solutions},
+          {"reconsidered", loops.map.reconsidered},
+          {"taken_back", loops.map.taken_back},
+          {"nodes_removed", loops.map.nodes_removed},
+          {"loops_carried", loops.map.loops_carried},
+          {"loops_released", loops.map.loops_released},
+          {"refused", loops.refused}};
 }
 
 Json summaryOf(const RunFacts& facts, const Settings& settings, const LogSource& source,

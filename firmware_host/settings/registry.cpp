@@ -181,6 +181,10 @@ std::vector<Setting> estimationSettings() {
        "Believe a loop only where it agrees with the odometry and other loops; false, to compare: every one "
        "that geometry verifies.",
        onOff(&Settings::loop_stage, &LoopSettings::consistency)},
+      {"loop.graduated", "",
+       "Tell loops from false ones by graduated non-convexity on the whole graph in place of the largest set "
+       "that agrees pair by pair.",
+       onOff(&Settings::loop_stage, &LoopSettings::graduated)},
       {"map.voxel_size", "m", "Edge of the map's voxels.",
        real(&Settings::map_stage, &MapSettings::voxel_size, 0.01, 0.5)},
       {"map.volume_mib", "MiB", "Memory for voxels; when it is full the farthest from the vehicle go.",

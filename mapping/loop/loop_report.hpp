@@ -7,6 +7,7 @@
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/stamp.hpp"
 #include "estimator/geometry/se3.hpp"
+#include "mapping/loop/loop_map.hpp"
 #include "mapping/place/loop_verification.hpp"
 
 namespace swiftlet {
@@ -50,8 +51,8 @@ struct LoopCounters {
   std::array<std::uint64_t, kLoopFates> fates{};  ///< of candidates
   std::uint64_t loops = 0;                        ///< verified
   std::uint64_t selected = 0;                     ///< at the end
-  std::uint64_t optimizations = 0;
-  std::uint64_t refused = 0;  ///< keyframes that did not fit any more
+  std::uint64_t refused = 0;                      ///< keyframes that the map did not take
+  LoopMapCounters map;                            ///< what was done for room, and rejected loops asked again
 };
 
 }  // namespace swiftlet

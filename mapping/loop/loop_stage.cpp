@@ -3,7 +3,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "mapping/place/vocabulary.hpp"
 #include "mapping/pose_graph/pose_tangent.hpp"
@@ -11,48 +10,14 @@
 namespace swiftlet {
 namespace {
 
-// A keyframe closer than this to the last node in all three shows nothing new.
-constexpr double kNodeDistance = 0.25;  // m
-constexpr double kNodeTurn = 0.2;       // rad
-constexpr double kNodeSeconds = 2;
 // A bridge over missed keyframes: the odometry's variance grows faster than in proportion to time.
 constexpr double kBridgeInflation = 2;
-// Added to a covariance when it is inverted: no relative pose is known better.
-constexpr double kLeastSigma = 1e-5;          // rad, m
-constexpr std::uint32_t kCliqueNodes = 2000;  // visited in a search: a few milliseconds
-
-PoseGraphLimits graphLimits(const LoopLimits& limits) {
-  PoseGraphLimits out;
-  out.max_poses = limits.nodes;
-  // Of loops that gave way to others the edges stay, without weight.
-  out.max_edges = limits.nodes + 2 * limits.loops;
-  return out;
-}
-
-LoopSelectionLimits selectionLimits(const LoopLimits& limits) {
-  return {static_cast<std::uint32_t>(limits.nodes), static_cast<std::uint32_t>(limits.loops)};
-}
 
 PlaceDatabaseSettings databaseSettings(const LoopSettings& settings, const LoopLimits& limits) {
   PlaceDatabaseSettings out;
   out.keyframes = limits.nodes;
   out.min_relative = static_cast<float>(settings.min_similarity);
   return out;
-}
-
-LoopSelectionSettings selectionSettings(const LoopSettings& settings) {
-  LoopSelectionSettings out = loopSelectionSettings<SE3>();
-  if (!settings.consistency) {
-    out.gate_chi_squared = std::numeric_limits<double>::max();
-    out.pairwise = false;
-  }
-  return out;
-}
-
-Matrix6d informationOf(const Matrix6d& covariance) {
-  const Matrix6d floored = covariance + kLeastSigma * kLeastSigma * Matrix6d::Identity();
-  const Matrix6d inverse = floored.ldlt().solve(Matrix6d::Identity());
-  return 0.5 * (inverse + inverse.transpose());
 }
 
 const WindowPose* poseOfFrame(const SmoothedWindow& window, std::uint64_t frame) {
@@ -66,19 +31,15 @@ const WindowPose* poseOfFrame(const SmoothedWindow& window, std::uint64_t frame)
 
 LoopStage::LoopStage(const Rig& rig, const LoopSettings& settings, const LoopLimits& limits)
     : rig_(rig),
-      limits_(limits),
       place_(rig.camera[0], Vocabulary::shipped(), {}, databaseSettings(settings, limits)),
       stereo_(rig.camera_count > 1 ? std::make_unique<StereoDepth>(rig) : nullptr),
       verifier_(rig),
-      selection_(selectionLimits(limits), selectionSettings(settings)),
-      optimizer_(graphLimits(limits)),
+      map_(settings, limits),
       places_(place_.database().capacity()),
-      loops_(limits.loops) {
-  nodes_.reserve(limits.nodes);
-}
+      inliers_(limits.loops) {}
 
 MapNode LoopStage::node(std::size_t i) const {
-  return {nodes_[i].stamp, nodes_[i].epoch, optimizer_.graph().poses[i]};
+  return {map_.node(i).stamp, map_.node(i).epoch, map_.pose(i)};
 }
 
 Status LoopStage::step(const LoopInput& input, const LoopEffort& effort, LoopReport& report) {
@@ -106,10 +67,10 @@ Status LoopStage::step(const LoopInput& input, const LoopEffort& effort, LoopRep
       ++counters_.without_image;
     }
   }
-  optimize(effort, report);
+  static_cast<void>(map_.settle(effort.iterations, report.moved));
   correct(*input.window);
-  report.loops = selection_.held();
-  report.selected = static_cast<std::uint32_t>(selection_.selected().size());
+  report.loops = map_.loops();
+  report.selected = map_.selected();
   report.correction = correction_;
   return status;
 }
@@ -117,7 +78,7 @@ Status LoopStage::step(const LoopInput& input, const LoopEffort& effort, LoopRep
 // The motion since the last node grows by the newest keyframe's.
 void LoopStage::extendPending(const LoopInput& input) {
   const KeyframeLink& link = *input.link;
-  if (nodes_.empty() || input.window->epoch != epoch_) pending_ = Pending{};
+  if (map_.size() == 0 || input.window->epoch != epoch_) pending_ = Pending{};
   epoch_ = input.window->epoch;
   if (pending_.linked) {
     if (link.linked && link.previous == pending_.frame) {
@@ -155,35 +116,30 @@ bool LoopStage::movedEnough(Stamp now) const {
   if (!pending_.linked) return true;
   const double turn = 2 * std::acos(std::min(1.0, std::abs(pending_.T_node_this.rotation.w())));
   return pending_.T_node_this.translation.norm() > kNodeDistance || turn > kNodeTurn ||
-         (now - nodes_.back().stamp).seconds() > kNodeSeconds;
+         (now - map_.node(map_.size() - 1).stamp).seconds() > kNodeSeconds;
 }
 
 Status LoopStage::addNode(const WindowPose& pose) {
-  if (nodes_.size() >= limits_.nodes) {
-    return {StatusCode::kCapacityReached, "the map has no room for more keyframes"};
+  LoopMap::Node left;
+  if (map_.full() && map_.makeRoom(left) && place_.database().holds(left.place, left.frame, left.epoch)) {
+    place_.forget(left.place);
   }
-  Status status;
-  if (pending_.linked) {
-    RelativePose<SE3> edge;
-    edge.from = static_cast<std::uint32_t>(nodes_.size() - 1);
-    edge.to = edge.from + 1;
-    edge.T_from_to = pending_.T_node_this;
-    edge.information = informationOf(pending_.covariance);
-    status = selection_.odometry().append(edge.T_from_to, pending_.covariance);
-    if (status.ok()) status = optimizer_.addPose(optimizer_.graph().poses.back() * edge.T_from_to);
-    if (status.ok()) status = optimizer_.addEdge(edge);
-  } else {
-    status = selection_.odometry().beginComponent();
-    if (status.ok()) status = optimizer_.addPose(pose.T_world_body);
-    ++counters_.components;
-  }
-  if (!status.ok()) return status;
-  nodes_.push_back({pose.stamp, pose.frame_index, epoch_, pose.T_world_body, PlaceDatabase::kNoSlot});
+  LoopMap::Node node;
+  node.stamp = pose.stamp;
+  node.frame = pose.frame_index;
+  node.epoch = epoch_;
+  node.place = PlaceDatabase::kNoSlot;
+  node.T_world_body = pose.T_world_body;
+  node.linked = pending_.linked;
+  node.T_previous_this = pending_.T_node_this;
+  node.covariance = pending_.covariance;
+  if (const Status status = map_.add(node); !status.ok()) return status;
+  counters_.components += node.linked ? 0 : 1;
   ++counters_.nodes;
   pending_ = Pending{};
   pending_.linked = true;
   pending_.frame = pose.frame_index;
-  return status;
+  return okStatus();
 }
 
 bool LoopStage::describePlace(const LoopInput& input) {
@@ -208,7 +164,7 @@ void LoopStage::closeLoops(const LoopEffort& effort, LoopReport& report) {
 
 bool LoopStage::verify(const PlaceCandidate& candidate, const LoopEffort& effort, LoopReport& report) {
   std::uint32_t from = 0;
-  if (!findNode(candidate.index, candidate.epoch, from)) return false;
+  if (!map_.find(candidate.index, candidate.epoch, from)) return false;
   static_cast<void>(
       verifier_.verify(places_[candidate.slot], newest_, {}, effort.verification, verification_));
   ++counters_.fates[static_cast<std::size_t>(verification_.fate)];
@@ -224,100 +180,65 @@ bool LoopStage::verify(const PlaceCandidate& candidate, const LoopEffort& effort
 }
 
 bool LoopStage::addLoop(std::uint32_t from) {
-  RelativePose<SE3> edge;
-  edge.from = from;
-  edge.to = static_cast<std::uint32_t>(nodes_.size() - 1);
-  edge.T_from_to = verification_.T_old_new;
-  edge.information = informationOf(verification_.covariance);
-  if (optimizer_.graph().edges.size() >= limits_.nodes + 2 * limits_.loops) return false;
   std::uint32_t id = 0;
-  if (!selection_.addLoop(edge, kCliqueNodes, id).ok()) return false;
-  Loop& loop = loops_[id];
-  if (loop.selected) static_cast<void>(optimizer_.setWeight(loop.number, 0));  // it has given way
-  loop = Loop{edge, optimizer_.graph().edges.size(), false, nodes_[from].frame, verification_.inliers};
-  static_cast<void>(optimizer_.addEdge(edge));
-  static_cast<void>(optimizer_.setWeight(loop.number, 0));
+  if (!map_.addLoop(from, verification_.T_old_new, verification_.covariance, id).ok()) return false;
+  inliers_[id] = verification_.inliers;
   ++counters_.loops;
-  weigh();
   return true;
-}
-
-// The selection's loops have their weight, the others none.
-void LoopStage::weigh() {
-  const auto selected = selection_.selected();
-  auto next = selected.begin();
-  for (std::uint32_t id = 0; id < selection_.held(); ++id) {
-    const bool chosen = next != selected.end() && *next == id;
-    if (chosen) ++next;
-    if (loops_[id].selected == chosen) continue;
-    loops_[id].selected = chosen;
-    static_cast<void>(optimizer_.setWeight(loops_[id].number, chosen ? 1 : 0));
-    unsettled_ = true;
-  }
-  counters_.selected = selected.size();
 }
 
 // After the candidates have been looked at: the slot may have been one of theirs.
 void LoopStage::keepPlace() {
   if (place_step_.slot == PlaceDatabase::kNoSlot) return;
   places_[place_step_.slot] = newest_;
-  nodes_.back().slot = place_step_.slot;
-}
-
-void LoopStage::optimize(const LoopEffort& effort, LoopReport& report) {
-  if (!unsettled_) return;
-  OptimizeEffort work;
-  work.iterations = effort.iterations;
-  OptimizeReport result;
-  const Status status = optimizer_.optimize(work, result);
-  ++counters_.optimizations;
-  unsettled_ = status.ok() && !result.converged;
-  report.moved = status.ok();
+  map_.setPlace(place_step_.slot);
 }
 
 void LoopStage::correct(const SmoothedWindow& window) {
-  if (nodes_.empty()) return;
-  const Node& node = nodes_.back();
+  if (map_.size() == 0) return;
+  const LoopMap::Node& node = map_.node(map_.size() - 1);
   const WindowPose* now = poseOfFrame(window, node.frame);
   const SE3 T_world_node = now != nullptr ? now->T_world_body : node.T_world_body;
   correction_.epoch = node.epoch;
-  correction_.T_map_world = optimizer_.graph().poses.back() * T_world_node.inverse();
+  correction_.T_map_world = map_.pose(map_.size() - 1) * T_world_node.inverse();
   ++correction_.version;
 }
 
-bool LoopStage::findNode(std::uint64_t frame, std::uint32_t epoch, std::uint32_t& node) const {
-  const auto found = std::find_if(nodes_.begin(), nodes_.end(),
-                                  [&](const Node& n) { return n.frame == frame && n.epoch == epoch; });
-  node = static_cast<std::uint32_t>(found - nodes_.begin());
-  return found != nodes_.end();
+LoopCounters LoopStage::counters() const {
+  LoopCounters out = counters_;
+  out.selected = map_.selected();
+  out.map = map_.counters();
+  return out;
 }
 
 MapLoop LoopStage::loop(std::uint32_t i) const {
-  const Loop& loop = loops_[i];
-  const Matrix6d covariance = loop.edge.information.ldlt().solve(Matrix6d::Identity());
+  const RelativePose<SE3>& edge = map_.loopEdge(i);
+  const Matrix6d covariance = edge.information.ldlt().solve(Matrix6d::Identity());
   MapLoop out;
-  out.old_stamp = nodes_[loop.edge.from].stamp;
-  out.new_stamp = nodes_[loop.edge.to].stamp;
-  out.T_old_new = loop.edge.T_from_to;
+  out.old_stamp = map_.node(edge.from).stamp;
+  out.new_stamp = map_.node(edge.to).stamp;
+  out.T_old_new = edge.T_from_to;
   out.rotation_sigma = std::sqrt(covariance.diagonal().head<3>().maxCoeff());
   out.translation_sigma = std::sqrt(covariance.diagonal().tail<3>().maxCoeff());
-  out.inliers = loop.inliers.size();
-  out.verdict = selection_.verdict(i);
+  out.inliers = inliers_[i].size();
+  out.verdict = map_.verdict(i);
   return out;
 }
 
 bool LoopStage::revisit(std::uint32_t i, LoopRevisit& out) const {
-  const Loop& loop = loops_[i];
-  const Node& from = nodes_[loop.edge.from];
-  const Node& to = nodes_[loop.edge.to];
-  const bool kept = from.slot != PlaceDatabase::kNoSlot && to.slot != PlaceDatabase::kNoSlot &&
-                    place_.database().holds(from.slot, from.frame, from.epoch) &&
-                    place_.database().holds(to.slot, to.frame, to.epoch);
-  if (!loop.selected || !kept) return false;
+  const LoopMap::Loop& loop = map_.loop(i);
+  if (!loop.selected || loop.carried) return false;
+  const RelativePose<SE3>& edge = map_.loopEdge(i);
+  const LoopMap::Node& from = map_.node(edge.from);
+  const LoopMap::Node& to = map_.node(edge.to);
+  if (!place_.database().holds(from.place, from.frame, from.epoch) ||
+      !place_.database().holds(to.place, to.frame, to.epoch)) {
+    return false;
+  }
   out.old_stamp = from.stamp;
   out.new_stamp = to.stamp;
-  out.T_old_new = loop.edge.T_from_to;
-  out.information = loop.edge.information;
+  out.T_old_new = edge.T_from_to;
+  out.information = edge.information;
   out.matches.clear();
   const auto featureOf = [](const PlaceFeature& feature) {
     RevisitFeature result;
@@ -327,9 +248,9 @@ bool LoopStage::revisit(std::uint32_t i, LoopRevisit& out) const {
     result.pixel[0] = feature.pixel;
     return result;
   };
-  for (const DescriptorMatch& match : loop.inliers) {
-    out.matches.push_back({featureOf(places_[from.slot].features[match.old_feature]),
-                           featureOf(places_[to.slot].features[match.new_feature])});
+  for (const DescriptorMatch& match : inliers_[i]) {
+    out.matches.push_back({featureOf(places_[from.place].features[match.old_feature]),
+                           featureOf(places_[to.place].features[match.new_feature])});
   }
   return true;
 }

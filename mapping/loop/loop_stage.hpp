@@ -8,7 +8,7 @@
 // the selected set, or the poses, still change. Every piece that neither odometry nor loops join keeps its
 // own world; an epoch of the odometry begins a piece. Frames: world is the odometry's of an epoch, map that
 // of the first piece. Errors: kInvalidInput (no window, tracks of another frame, a pose that is not finite):
-// nothing changes; kCapacityReached: no more nodes, the map stays as it is and its correction goes on.
+// nothing changes. Full: a node leaves for each new one (loop_map.hpp), counted.
 // Memory: reserved by the constructor for LoopLimits (38 kB a node). No clock, no randomness but seeds from
 // frame indices: same input, same bytes. docs/pose_graph.md, docs/place.md.
 
@@ -23,19 +23,13 @@
 #include "estimator/messages/loop_revisit.hpp"
 #include "estimator/messages/smoothed_window.hpp"
 #include "estimator/messages/tracked_frame.hpp"
+#include "mapping/loop/loop_map.hpp"
 #include "mapping/loop/loop_report.hpp"
 #include "mapping/loop/loop_settings.hpp"
 #include "mapping/place/feature_depth.hpp"
 #include "mapping/place/place_stage.hpp"
-#include "mapping/pose_graph/loop_selection.hpp"
-#include "mapping/pose_graph/pose_graph_optimizer.hpp"
 
 namespace swiftlet {
-
-struct LoopLimits {
-  std::size_t nodes = 1000;  ///< five minutes of flight at three a second
-  std::size_t loops = 1000;
-};
 
 struct LoopEffort {
   std::size_t candidates = 2;  ///< verified in a step, up to kMaxLoopCandidates
@@ -52,7 +46,7 @@ struct LoopInput {
 
 /// A verified loop, and what the selection says of it.
 struct MapLoop {
-  Stamp old_stamp;
+  Stamp old_stamp;  ///< of the nodes that it joins now: neighbours of those that saw it, when these had to go
   Stamp new_stamp;
   SE3 T_old_new;
   double rotation_sigma = 0;     ///< rad, of the worst direction
@@ -75,30 +69,16 @@ class LoopStage {
   Status step(const LoopInput& input, const LoopEffort& effort, LoopReport& report);
 
   [[nodiscard]] const MapCorrection& correction() const { return correction_; }
-  [[nodiscard]] const LoopCounters& counters() const { return counters_; }
-  [[nodiscard]] std::size_t nodeCount() const { return nodes_.size(); }
+  [[nodiscard]] LoopCounters counters() const;
+  [[nodiscard]] std::size_t nodeCount() const { return map_.size(); }
   [[nodiscard]] MapNode node(std::size_t i) const;
-  [[nodiscard]] std::uint32_t loopCount() const { return selection_.held(); }
+  [[nodiscard]] std::uint32_t loopCount() const { return map_.loops(); }
   [[nodiscard]] MapLoop loop(std::uint32_t i) const;
-  /// For full smoothing. False where loop i is not selected. Allocates: after the flight.
+  /// For full smoothing. False where loop i is not selected, or the keyframes that saw it are not in the map
+  /// any more. Allocates: after the flight.
   [[nodiscard]] bool revisit(std::uint32_t i, LoopRevisit& out) const;
 
  private:
-  struct Node {
-    Stamp stamp;
-    std::uint64_t frame = 0;
-    std::uint32_t epoch = 0;
-    SE3 T_world_body;                             ///< as the odometry had it then
-    std::uint32_t slot = PlaceDatabase::kNoSlot;  ///< of its place
-  };
-  /// By the selection's ids.
-  struct Loop {
-    RelativePose<SE3> edge;  ///< of nodes
-    std::size_t number = 0;  ///< of the optimizer's edges
-    bool selected = false;
-    std::uint64_t old_frame = 0;
-    DescriptorMatches inliers;
-  };
   /// From the last node to the newest keyframe.
   struct Pending {
     bool linked = false;
@@ -117,29 +97,22 @@ class LoopStage {
   [[nodiscard]] bool verify(const PlaceCandidate& candidate, const LoopEffort& effort, LoopReport& report);
   [[nodiscard]] bool addLoop(std::uint32_t from);
   void keepPlace();
-  void weigh();
-  void optimize(const LoopEffort& effort, LoopReport& report);
   void correct(const SmoothedWindow& window);
-  [[nodiscard]] bool findNode(std::uint64_t frame, std::uint32_t epoch, std::uint32_t& node) const;
 
   Rig rig_;
-  LoopLimits limits_;
   PlaceStage place_;
   std::unique_ptr<StereoDepth> stereo_;  ///< null with one camera
   LandmarkDepth landmarks_;
   LoopVerifier verifier_;
-  LoopSelection<SE3> selection_;
-  PoseGraphOptimizer<SE3> optimizer_;
+  LoopMap map_;
 
-  std::vector<Node> nodes_;
-  std::vector<PlaceKeyframe> places_;  ///< by the database's slots
-  std::vector<Loop> loops_;
+  std::vector<PlaceKeyframe> places_;       ///< by the database's slots
+  std::vector<DescriptorMatches> inliers_;  ///< by the map's loops
   std::uint32_t epoch_ = 0;
   Pending pending_;
   PlaceKeyframe newest_;
   PlaceStep place_step_;
   LoopVerification verification_;
-  bool unsettled_ = false;  ///< the optimizer has not converged since the selection changed
   MapCorrection correction_;
   LoopCounters counters_;
 };

@@ -146,7 +146,7 @@ TEST_CASE("a place seen again brings the map back where it was, and says how the
   const std::size_t n = pictures().all.size();
   REQUIRE(n >= 8);
   REQUIRE(flight.stage->nodeCount() == 2 * n);
-  const LoopCounters& counters = flight.stage->counters();
+  const LoopCounters counters = flight.stage->counters();
   CHECK(counters.components == 1);
   CHECK(counters.selected >= n - 2);
   CHECK(last.selected == counters.selected);
@@ -211,14 +211,24 @@ TEST_CASE("without images, without room and without a pose the map goes on as it
     CHECK(flight.stage->nodeCount() == 4);
     CHECK(flight.stage->counters().without_image == 1);
   }
-  SECTION("a full map refuses keyframes, and its correction goes on") {
-    Flight flight({3, 10});
-    for (std::size_t i = 0; i < 5; ++i) {
-      flight.see(pictures().all[i], kSpacing * static_cast<double>(i), SE3());
+  SECTION("a full map gives up a node for each new one, and its place with it") {
+    Flight flight({6, 10});
+    double seconds = 0;
+    for (int visit = 0; visit < 3; ++visit, seconds += kVisitGap) {
+      for (std::size_t i = 0; i < 6; ++i) flight.see(pictures().all[i], seconds += kSpacing, SE3());
     }
-    CHECK(flight.status.code == StatusCode::kCapacityReached);
-    CHECK(flight.stage->nodeCount() == 3);
-    CHECK(flight.stage->counters().refused == 2);
+    CHECK(flight.status.ok());
+    CHECK(flight.stage->nodeCount() == 6);
+    const LoopCounters counters = flight.stage->counters();
+    CHECK(counters.refused == 0);
+    CHECK(counters.nodes == 18);
+    CHECK(counters.map.nodes_removed == 12);
+    CHECK(counters.loops > 0);
+    LoopRevisit revisit;
+    for (std::uint32_t i = 0; i < flight.stage->loopCount(); ++i) {
+      if (!flight.stage->revisit(i, revisit)) continue;
+      CHECK(revisit.old_stamp < revisit.new_stamp);  // both are there
+    }
   }
   SECTION("input that is none") {
     Flight flight;

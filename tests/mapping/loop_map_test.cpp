@@ -1,0 +1,281 @@
+// The map of nodes and loops alone: long flights in little room, loops that are asked again, graduated
+// non-convexity.
+
+#include "mapping/loop/loop_map.hpp"
+
+#include <malloc.h>
+
+#include <Eigen/Geometry>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "estimator/core/random.hpp"
+#include "estimator/geometry/so3.hpp"
+#include "mapping/place/relative_pose.hpp"
+
+using namespace swiftlet;
+
+namespace {
+
+constexpr double kSecondsANode = 0.5;
+constexpr double kOdometryTurn = 2e-3;  // rad, 1 sigma of a step
+constexpr double kOdometryMove = 5e-3;  // m
+constexpr double kLoopTurn = 2e-3;      // rad
+constexpr double kLoopMove = 1e-2;      // m
+
+Vector6d draw(Random& random, double turn, double move) {
+  Vector6d xi;
+  for (int i = 0; i < 3; ++i) xi[i] = turn * random.normal();
+  for (int i = 3; i < 6; ++i) xi[i] = move * random.normal();
+  return xi;
+}
+
+Matrix6d covarianceOf(double turn, double move) {
+  Vector6d sigma;
+  sigma << Eigen::Vector3d::Constant(turn), Eigen::Vector3d::Constant(move);
+  return sigma.cwiseAbs2().asDiagonal();
+}
+
+/// A drone that wanders through a room of 10 m and recognizes places of its map within 1 m.
+class Wanderer {
+ public:
+  Wanderer(const LoopLimits& limits, std::uint64_t seed, const LoopSettings& settings = {})
+      : map(std::make_unique<LoopMap>(settings, limits)), random_(seed) {}
+
+  void fly(int nodes, bool with_loops = true) {
+    for (int i = 0; i < nodes; ++i) step(with_loops);
+  }
+
+  /// The next node, by the odometry.
+  void step(bool with_loops = true) {
+    const SE3 before = T_truth_;
+    wander();
+    LoopMap::Node node;
+    node.stamp = Stamp{} + Duration::fromSeconds(kSecondsANode * static_cast<double>(truth_.size()));
+    node.frame = truth_.size() + 1;
+    const SE3 moved = before.inverse() * T_truth_;
+    node.T_previous_this = moved * poseExp(draw(random_, kOdometryTurn, kOdometryMove));
+    node.covariance = covarianceOf(kOdometryTurn, kOdometryMove);
+    node.linked = !truth_.empty();
+    T_world_ = node.linked ? T_world_ * node.T_previous_this : T_truth_;
+    node.T_world_body = T_world_;
+    odometry_.push_back(T_world_);
+    truth_.push_back(T_truth_);
+    if (map->full()) {
+      LoopMap::Node left;
+      REQUIRE(map->makeRoom(left));
+      REQUIRE(left.frame < node.frame - 1);  // never the newest
+    }
+    REQUIRE(map->add(node).ok());
+    if (with_loops && truth_.size() % 3 == 0) recognize();
+    bool moved_map = false;
+    static_cast<void>(map->settle(3, moved_map));
+    settled_moves_ += moved_map ? 1 : 0;
+  }
+
+  /// A loop from the node nearest to here that is old enough.
+  void recognize() {
+    std::uint32_t from = 0;
+    double nearest = 1;  // m
+    for (std::uint32_t k = 0; k + 30 < map->size(); ++k) {
+      const double distance = (truthOf(k).translation - T_truth_.translation).norm();
+      if (distance < nearest) {
+        nearest = distance;
+        from = k;
+      }
+    }
+    if (nearest < 1) addLoop(from, truthOf(from).inverse() * T_truth_);
+  }
+
+  void addLoop(std::uint32_t from, const SE3& T_from_newest) {
+    std::uint32_t id = 0;
+    const SE3 measured = T_from_newest * poseExp(draw(random_, kLoopTurn, kLoopMove));
+    REQUIRE(map->addLoop(from, measured, covarianceOf(kLoopTurn, kLoopMove), id).ok());
+  }
+
+  [[nodiscard]] const SE3& truthOf(std::size_t node) const { return truth_[map->node(node).frame - 1]; }
+
+  /// m, RMSE of the map's nodes, or of the odometry at the same nodes, rigidly aligned to the truth.
+  [[nodiscard]] double error(bool of_odometry = false) const {
+    const auto n = static_cast<Eigen::Index>(map->size());
+    Eigen::Matrix3Xd found(3, n);
+    Eigen::Matrix3Xd truth(3, n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      found.col(i) = of_odometry ? odometry_[map->node(k).frame - 1].translation : map->pose(k).translation;
+      truth.col(i) = truthOf(k).translation;
+    }
+    const Eigen::Matrix4d T = Eigen::umeyama(found, truth, false);
+    const Eigen::Matrix3Xd aligned = (T.topLeftCorner<3, 3>() * found).colwise() + T.topRightCorner<3, 1>();
+    return std::sqrt((aligned - truth).colwise().squaredNorm().mean());
+  }
+
+  std::unique_ptr<LoopMap> map;
+
+ private:
+  // Towards one random corner of the room after the other, 0.3 m a node.
+  void wander() {
+    const Eigen::Vector3d to = goal_ - T_truth_.translation;
+    if (to.norm() < 0.5) {
+      goal_ = Eigen::Vector3d(random_.uniform(-5, 5), random_.uniform(-5, 5), random_.uniform(0, 3));
+    }
+    const Eigen::Vector3d way = (goal_ - T_truth_.translation).normalized();
+    T_truth_.translation += 0.3 * way;
+    T_truth_.rotation = expSo3(Eigen::Vector3d(0, 0, std::atan2(way.y(), way.x())));
+  }
+
+  Random random_;
+  Eigen::Vector3d goal_ = Eigen::Vector3d(4, 3, 1);
+  SE3 T_truth_;
+  SE3 T_world_;
+  std::vector<SE3> truth_;
+  std::vector<SE3> odometry_;
+  int settled_moves_ = 0;
+};
+
+}  // namespace
+
+TEST_CASE("a long flight in little room stays as right as one with room for all") {
+  constexpr int kNodes = 3000;  // 25 minutes
+  Wanderer small({60, 60}, 5);
+  small.fly(1500);
+  const std::size_t early = mallinfo2().uordblks;
+  const double halfway = small.error();
+  small.fly(kNodes - 1500);
+  // What is left of the second half: the wanderer's own record of the truth, no more.
+  const std::size_t late = mallinfo2().uordblks;
+  CHECK(late < early + std::size_t{kNodes} * 4 * sizeof(SE3));
+  CHECK(small.map->size() == 60);
+  CHECK(small.map->loops() <= 60);
+  const LoopMapCounters counters = small.map->counters();
+  CHECK(counters.nodes_removed == kNodes - 60);
+  CHECK(counters.loops_carried > 100);
+  CHECK(counters.loops_released > 100);
+  CHECK(small.map->selected() > 30);
+
+  Wanderer large({kNodes, kNodes}, 5);
+  large.fly(kNodes / 3);
+  INFO("small " << halfway << " and " << small.error() << ", odometry " << small.error(true) << ", large "
+                << large.error());
+  CHECK(large.map->counters().nodes_removed == 0);
+  CHECK(large.error() < 0.02);
+  CHECK(small.error() < 0.05);
+  CHECK(small.error(true) > 0.25);  // or the test shows nothing
+}
+
+TEST_CASE("taking away nodes that only the odometry holds leaves the others where they are") {
+  constexpr int kRemoved = 60;
+  Wanderer thinned({200, 50}, 7);
+  Wanderer whole({200, 50}, 7);
+  thinned.fly(199);
+  whole.fly(199);
+  REQUIRE(thinned.map->selected() > 5);
+  std::vector<std::uint64_t> gone;
+  for (int i = 0; i < kRemoved; ++i) {
+    LoopMap::Node left;
+    REQUIRE(thinned.map->makeRoom(left));
+    gone.push_back(left.frame);
+  }
+  REQUIRE(thinned.map->counters().loops_carried == 0);
+  CHECK(thinned.map->selected() == whole.map->selected());
+  // The same loop moves both alike.
+  std::uint32_t from = 0;
+  REQUIRE(whole.map->find(thinned.map->node(3).frame, 0, from));
+  const SE3 T_from_newest = whole.truthOf(from).inverse() * whole.truthOf(whole.map->size() - 1);
+  const SE3 before = thinned.map->pose(thinned.map->size() - 1);
+  thinned.addLoop(3, T_from_newest);
+  whole.addLoop(from, T_from_newest);
+  bool moved = false;
+  for (int i = 0; i < 20; ++i) {
+    static_cast<void>(thinned.map->settle(10, moved));
+    static_cast<void>(whole.map->settle(10, moved));
+  }
+  CHECK((thinned.map->pose(thinned.map->size() - 1).translation - before.translation).norm() > 2e-3);
+  std::size_t compared = 0;
+  for (std::uint32_t k = 0; k < thinned.map->size(); ++k) {
+    std::uint32_t same = 0;
+    REQUIRE(whole.map->find(thinned.map->node(k).frame, 0, same));
+    CHECK((thinned.map->pose(k).translation - whole.map->pose(same).translation).norm() < 1e-3);
+    ++compared;
+  }
+  CHECK(compared == 199 - kRemoved);
+}
+
+TEST_CASE("a loop that the odometry spoke against comes back when the map has become better") {
+  // Straight ahead; the odometry drifts by 12 mm a step and believes 10 mm, 1 sigma, at random.
+  constexpr int kSteps = 40;
+  constexpr int kLoose = 20;
+  LoopMap map({}, {100, 40});
+  std::uint64_t frame = 0;
+  const auto add = [&](double ahead, double drift, double sigma) {
+    LoopMap::Node node;
+    node.frame = ++frame;
+    node.stamp = Stamp{} + Duration::fromSeconds(static_cast<double>(frame));
+    node.linked = frame > 1;
+    node.T_previous_this.translation.x() = ahead + drift;
+    node.covariance = covarianceOf(1e-4, sigma);
+    REQUIRE(map.add(node).ok());
+  };
+  const auto loopTo = [&](std::uint32_t from, double x, double sigma) {
+    std::uint32_t id = 0;
+    SE3 T;
+    T.translation.x() = x - 0.5 * from;
+    REQUIRE(map.addLoop(from, T, covarianceOf(1e-3, sigma), id).ok());
+    return id;
+  };
+  for (int i = 0; i <= kSteps; ++i) add(0.5, 0.012, 0.01);
+  const double end = 0.5 * kSteps;
+  const std::uint32_t right = loopTo(0, end, 2e-3);
+  const std::uint32_t wrong = loopTo(1, end + 3, 2e-3);
+  CHECK(map.verdict(right) == LoopVerdict::kAgainstOdometry);
+  CHECK(map.verdict(wrong) == LoopVerdict::kAgainstOdometry);
+  bool moved = false;
+  static_cast<void>(map.settle(10, moved));
+  CHECK(map.counters().reconsidered == 0);  // nothing has changed
+  // Loops that know less pass, and together make the map better.
+  for (std::uint32_t i = 0; i < kLoose; ++i) {
+    add(0, 0, 1e-4);
+    loopTo(i / 2, end, 0.12);
+    static_cast<void>(map.settle(10, moved));
+  }
+  for (int i = 0; i < 10; ++i) static_cast<void>(map.settle(10, moved));
+  CHECK(map.verdict(right) == LoopVerdict::kSelected);
+  CHECK(map.verdict(wrong) == LoopVerdict::kAgainstOdometry);
+  CHECK(map.counters().taken_back >= 1);
+  CHECK(map.selected() == kLoose + 1);
+  const std::uint64_t asked = map.counters().reconsidered;
+  for (int i = 0; i < 10; ++i) static_cast<void>(map.settle(10, moved));
+  CHECK(map.counters().reconsidered == asked);  // at rest nobody is asked twice
+}
+
+TEST_CASE("graduated non-convexity keeps true loops and none of the false ones") {
+  LoopSettings settings;
+  settings.graduated = true;
+  Wanderer wanderer({250, 60}, 11, settings);
+  wanderer.fly(240);
+  REQUIRE(wanderer.map->selected() > 5);
+  const std::uint32_t true_loops = wanderer.map->loops();
+  const std::uint32_t kept = wanderer.map->selected();
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    // Near enough to what the odometry says to pass its test, and each off another way.
+    const double way = 2.4 * i;
+    const SE3 off(expSo3(Eigen::Vector3d(0, 0, 0.02)),
+                  0.25 * Eigen::Vector3d(std::cos(way), std::sin(way), 0));
+    const std::uint32_t from = 5 * i;
+    wanderer.addLoop(from, wanderer.truthOf(from).inverse() * wanderer.truthOf(239) * off);
+    INFO("false loop " << i);
+    CHECK(wanderer.map->verdict(true_loops + i) != LoopVerdict::kAgainstOdometry);
+  }
+  bool moved = false;
+  for (int i = 0; i < 5; ++i) static_cast<void>(wanderer.map->settle(5, moved));
+  CHECK(wanderer.map->counters().graduated_solutions > 0);
+  std::uint32_t still = 0;
+  for (std::uint32_t id = 0; id < true_loops; ++id) still += wanderer.map->loop(id).selected ? 1U : 0U;
+  CHECK(still + 1 >= kept);
+  for (std::uint32_t id = true_loops; id < wanderer.map->loops(); ++id) {
+    CHECK_FALSE(wanderer.map->loop(id).selected);
+  }
+  CHECK(wanderer.error() < 0.03);
+}
