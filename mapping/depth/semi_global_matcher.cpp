@@ -1,0 +1,219 @@
+#include "mapping/depth/semi_global_matcher.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdlib>
+#include <cstring>
+
+namespace swiftlet {
+namespace {
+
+using disparity_lanes::kLanes;
+
+/// Bytes beside a kept row: the census window and whole vectors behind the row's end.
+constexpr int kMarginBefore = 64;
+constexpr int kMarginBehind = kCensusColumnReach + kLanes;
+constexpr int kLinesOfChoice = 6;
+
+int roundUp(int x, int to) { return (x + to - 1) / to * to; }
+
+int signBytes(int width) { return roundUp(width + kLanes * kMaxDisparityVectors + kLanes, 64); }
+
+MatcherSettings checkedSettings(MatcherSettings s) {
+  s.disparities = std::clamp(roundUp(s.disparities, kLanes), kLanes, kLanes * kMaxDisparityVectors);
+  // Costs along a path stay below 255: signs and the large penalty.
+  constexpr int kMostPenalty = 255 - kCensusSigns;
+  s.large_penalty = std::clamp(s.large_penalty, 1, kMostPenalty);
+  s.small_penalty = std::clamp(s.small_penalty, 1, s.large_penalty);
+  s.least_large_penalty = std::clamp(s.least_large_penalty, s.small_penalty, s.large_penalty);
+  s.large_penalty_falloff = std::max(s.large_penalty_falloff, 1);
+  s.outside_cost = std::clamp(s.outside_cost, 0, kCensusSigns);
+  s.uniqueness = std::clamp(s.uniqueness, 0, 100);
+  return s;
+}
+
+PathPenalties makePenalties(const MatcherSettings& s) {
+  PathPenalties p;
+  p.small = static_cast<std::uint8_t>(s.small_penalty);
+  p.outside = static_cast<std::uint8_t>(s.outside_cost);
+  for (int difference = 0; difference < 256; ++difference) {
+    const int large = s.large_penalty * s.large_penalty_falloff / (s.large_penalty_falloff + difference);
+    p.large[static_cast<std::size_t>(difference)] =
+        static_cast<std::uint8_t>(std::max(large, s.least_large_penalty));
+  }
+  return p;
+}
+
+}  // namespace
+
+SemiGlobalMatcher::SemiGlobalMatcher(int width, int height, const MatcherSettings& settings)
+    : width_(std::max(width, 0)),
+      height_(std::max(height, 0)),
+      settings_(checkedSettings(settings)),
+      penalties_(makePenalties(settings_)),
+      row_bytes_(roundUp(kMarginBefore + width_ + kMarginBehind, 64)),
+      left_rows_(static_cast<std::size_t>(row_bytes_) * kKeptRows),
+      right_rows_(left_rows_.size()),
+      left_signs_(static_cast<std::size_t>(signBytes(width_)) * kCensusPlanes),
+      right_signs_(left_signs_.size()),
+      path_blocks_(1 + (static_cast<std::size_t>(width_ + 1) * static_cast<std::size_t>(settings_.disparities) +
+                        sizeof(Block) - 1) /
+                           sizeof(Block)),
+      paths_(1 + kPathBuffers * path_blocks_),
+      choice_rows_(static_cast<std::size_t>(roundUp(width_ + 1, 64)) * kLinesOfChoice),
+      speckles_(width_, height_),
+      median_(width_, height_) {
+  std::uint8_t* row = choice_rows_.data();
+  for (std::uint8_t** line : {&choice_.disparity, &choice_.least, &choice_.below, &choice_.above,
+                              &choice_.second, &choice_.right_disparity}) {
+    *line = row;
+    row += roundUp(width_ + 1, 64);
+  }
+}
+
+std::uint8_t* SemiGlobalMatcher::leftRow(int y) {
+  return left_rows_.data() + static_cast<std::ptrdiff_t>(y % kKeptRows) * row_bytes_ + kMarginBefore;
+}
+
+std::uint8_t* SemiGlobalMatcher::rightRow(int y) {
+  return right_rows_.data() + static_cast<std::ptrdiff_t>(y % kKeptRows) * row_bytes_ + kMarginBefore;
+}
+
+// With margins that repeat the border's pixels.
+void SemiGlobalMatcher::keepRow(const ImageView& left, const ImageView& right, int y) {
+  std::uint8_t* const l = leftRow(y);
+  std::uint8_t* const r = rightRow(y);
+  const std::uint8_t* const from = right.row(y);
+  std::memcpy(l, left.row(y), static_cast<std::size_t>(width_));
+  std::reverse_copy(from, from + width_, r);
+  for (std::uint8_t* const row : {l, r}) {
+    std::memset(row - kCensusColumnReach, row[0], kCensusColumnReach);
+    std::memset(row + width_, row[width_ - 1], kMarginBehind);
+  }
+}
+
+template <typename Lanes>
+void SemiGlobalMatcher::census(int y) {
+  CensusRows left{}, right{};
+  for (int i = 0; i < kCensusRows; ++i) {
+    const int row = std::clamp(y + i - kCensusRowReach, 0, height_ - 1);
+    left[static_cast<std::size_t>(i)] = leftRow(row);
+    right[static_cast<std::size_t>(i)] = rightRow(row);
+  }
+  CensusPlanes left_planes{}, right_planes{};
+  for (int p = 0; p < kCensusPlanes; ++p) {
+    const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(p) * signBytes(width_);
+    left_planes[static_cast<std::size_t>(p)] = left_signs_.data() + at;
+    right_planes[static_cast<std::size_t>(p)] = right_signs_.data() + at;
+  }
+  censusRow<Lanes>(left, width_, false, left_planes);
+  censusRow<Lanes>(right, width_, true, right_planes);
+}
+
+MatchingRow SemiGlobalMatcher::matchingRow(int y) {
+  MatchingRow row;
+  row.width = width_;
+  row.grey = leftRow(y);
+  row.grey_above = leftRow(std::max(y - 1, 0));
+  for (std::size_t p = 0; p < kCensusPlanes; ++p) {
+    const std::size_t at = p * static_cast<std::size_t>(signBytes(width_));
+    row.left_signs[p] = left_signs_.data() + at;
+    row.right_signs[p] = right_signs_.data() + at;
+  }
+  return row;
+}
+
+PathBuffers SemiGlobalMatcher::pathBuffers(int y) {
+  const auto at = [&](std::size_t i) { return paths_[1 + i * path_blocks_].bytes; };
+  const bool even = y % 2 == 0;
+  return {at(0), at(1), at(2), at(even ? 3 : 4), at(even ? 4 : 3), at(5)};
+}
+
+// Sub-pixel by two lines of opposite slope through the three sums about the least (equiangular fit: the sums
+// of census costs rise linearly about their least; Shimizu, Okutomi, ICCV 2001). Sums fall off towards the
+// better neighbour.
+void SemiGlobalMatcher::refineRow(int disparities, std::uint16_t* disparity, std::uint8_t* sigma) {
+  const DisparityChoice& c = choice_;
+  for (int x = 0; x < width_; ++x) {
+    const int steeper = std::max<int>(c.below[x], c.above[x]) - c.least[x];
+    const bool inside = c.disparity[x] > 0 && c.disparity[x] + 1 < disparities && steeper > 0;
+    const float offset = static_cast<float>(c.below[x] - c.above[x]) * (0.5F * kDisparitySteps) /
+                         static_cast<float>(std::max(steeper, 1));
+    const int steps = static_cast<int>(offset + (kDisparitySteps + 0.5F)) - kDisparitySteps;
+    disparity[x] = static_cast<std::uint16_t>(c.disparity[x] * kDisparitySteps + (inside ? steps : 0));
+    sigma[x] = kDisparitySteps / 4;
+  }
+}
+
+void SemiGlobalMatcher::checkRow(std::uint16_t* disparity) const {
+  const DisparityChoice& c = choice_;
+  for (int x = 0; x < width_; ++x) {
+    const int d = c.disparity[x];
+    bool good = 100 * (c.second[x] - c.least[x]) >= settings_.uniqueness * c.least[x];
+    if (settings_.left_right_tolerance >= 0) {
+      good = good && d <= x && std::abs(c.right_disparity[x - d] - d) <= settings_.left_right_tolerance;
+    }
+    if (!good) disparity[x] = kNoDisparity;
+  }
+}
+
+template <typename Lanes, int kVectors>
+void SemiGlobalMatcher::matchRows(const ImageView& left, const ImageView& right, DisparityImage& disparity) {
+  std::memset(static_cast<void*>(paths_.data()), 0, paths_.size() * sizeof(Block));
+  for (int y = 0; y < std::min(kCensusRowReach, height_); ++y) keepRow(left, right, y);
+  for (int y = 0; y < height_; ++y) {
+    if (y + kCensusRowReach < height_) keepRow(left, right, y + kCensusRowReach);
+    census<Lanes>(y);
+    const MatchingRow row = matchingRow(y);
+    const PathBuffers buffers = pathBuffers(y);
+    matchLeftwards<Lanes, kVectors>(row, penalties_, buffers);
+    matchDownwards<Lanes, kVectors>(row, penalties_, buffers);
+    chooseDisparities<Lanes, kVectors>(buffers.sums, width_, choice_);
+    const std::size_t at = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_);
+    refineRow(kLanes * kVectors, disparity.disparity() + at, disparity.sigma() + at);
+    checkRow(disparity.disparity() + at);
+  }
+}
+
+template <typename Lanes>
+Status SemiGlobalMatcher::match(const ImageView& left, const ImageView& right, int disparities,
+                                DisparityImage& disparity) {
+  for (const ImageView& image : {left, right}) {
+    if (image.empty()) return {StatusCode::kInvalidInput, "depth: an image of the pair is missing"};
+    if (image.width != width_ || image.height != height_ || image.stride < width_)
+      return {StatusCode::kInvalidInput, "depth: an image's size is not the matcher's"};
+  }
+  if (disparity.width() != width_ || disparity.height() != height_)
+    return {StatusCode::kInvalidInput, "depth: the disparity image's size is not the matcher's"};
+  const int wanted = disparities > 0 ? std::min(disparities, settings_.disparities) : settings_.disparities;
+  switch (roundUp(wanted, kLanes) / kLanes) {
+    case 1:
+      matchRows<Lanes, 1>(left, right, disparity);
+      break;
+    case 2:
+      matchRows<Lanes, 2>(left, right, disparity);
+      break;
+    case 3:
+      matchRows<Lanes, 3>(left, right, disparity);
+      break;
+    default:
+      matchRows<Lanes, 4>(left, right, disparity);
+      break;
+  }
+  if (settings_.speckle_pixels > 0) {
+    speckles_.remove(disparity, settings_.speckle_pixels,
+                     static_cast<int>(settings_.speckle_step * kDisparitySteps));
+  }
+  if (settings_.median) median_.filter(disparity);
+  return okStatus();
+}
+
+template Status SemiGlobalMatcher::match<disparity_lanes::Scalar>(const ImageView&, const ImageView&, int,
+                                                                  DisparityImage&);
+#ifdef SWIFTLET_DISPARITY_LANES_NATIVE
+template Status SemiGlobalMatcher::match<disparity_lanes::Native>(const ImageView&, const ImageView&, int,
+                                                                  DisparityImage&);
+#endif
+
+}  // namespace swiftlet

@@ -1,0 +1,92 @@
+#pragma once
+// Dense disparities of a rectified pair by semi-global matching (Hirschmuller, PAMI 2008): centre-symmetric
+// census, five paths in one pass from top to bottom, equiangular sub-pixel, left-right check from the same
+// sums, speckle filter, median. docs/depth.md has the equations and figures.
+//
+// Input: rectified images of the constructor's size, x_right = x_left - disparity along a row, row for row.
+// Output: DisparityImage, in the left image's pixels. Errors: kInvalidInput (an image missing or of another
+// size); the output is untouched then. Memory: fixed by the constructor, some 16 bytes a pixel and 5 rows of
+// width x disparities; no volume. Time is proportional to pixels x disparities. One thread, no clock, no
+// randomness; the native instruction set and the scalar twin give the same bytes.
+
+#include <cstdint>
+#include <vector>
+
+#include "estimator/core/image_view.hpp"
+#include "estimator/core/status.hpp"
+#include "mapping/depth/disparity_filters.hpp"
+#include "mapping/depth/disparity_image.hpp"
+#include "mapping/depth/disparity_lanes.hpp"
+#include "mapping/depth/path_aggregation.hpp"
+
+namespace swiftlet {
+
+/// Costs are counts of census signs that differ, 0 .. 31. The defaults were chosen together on the pairs with
+/// true disparity and on rendered flights.
+struct MatcherSettings {
+  int disparities = 64;            ///< 0 .. disparities - 1 px: 32, 64, 96 or 128
+  int small_penalty = 10;          ///< disparity changes by one pixel from a pixel to the next
+  int large_penalty = 80;          ///< changes by more, where both have the same grey
+  int large_penalty_falloff = 10;  ///< grey levels of difference that halve the large penalty
+  int least_large_penalty = 12;
+  int outside_cost = 8;          ///< matching cost where the other pixel is outside the right image
+  int left_right_tolerance = 1;  ///< px, between the two images' disparities; negative: no check
+  int uniqueness = 0;            ///< %, the next best disparity's sum must be that much greater
+  int speckle_pixels = 60;       ///< patches smaller than this are removed; 0: none
+  double speckle_step = 1;       ///< px, between neighbours of a patch
+  bool median = true;            ///< of 3 x 3, closing small holes
+};
+
+class SemiGlobalMatcher {
+ public:
+  /// Settings outside their ranges are brought into them.
+  SemiGlobalMatcher(int width, int height, const MatcherSettings& settings = {});
+
+  /// `disparities`: searched in this call, at most the settings' (0: those); less costs less and leaves out
+  /// what is near. `disparity` is of the constructor's size.
+  template <typename Lanes = disparity_lanes::Native>
+  Status match(const ImageView& left, const ImageView& right, int disparities, DisparityImage& disparity);
+
+  [[nodiscard]] int width() const { return width_; }
+  [[nodiscard]] int height() const { return height_; }
+  [[nodiscard]] const MatcherSettings& settings() const { return settings_; }
+
+ private:
+  /// Kept rows of one image, with margins: enough for the census window.
+  static constexpr int kKeptRows = 8;
+  static constexpr std::size_t kPathBuffers = 6;
+
+  struct Block {
+    alignas(64) std::uint8_t bytes[64];
+  };
+
+  template <typename Lanes, int kVectors>
+  void matchRows(const ImageView& left, const ImageView& right, DisparityImage& disparity);
+  void keepRow(const ImageView& left, const ImageView& right, int y);
+  [[nodiscard]] std::uint8_t* leftRow(int y);
+  [[nodiscard]] std::uint8_t* rightRow(int y);
+  template <typename Lanes>
+  void census(int y);
+  [[nodiscard]] MatchingRow matchingRow(int y);
+  [[nodiscard]] PathBuffers pathBuffers(int y);
+  void refineRow(int disparities, std::uint16_t* disparity, std::uint8_t* sigma);
+  void checkRow(std::uint16_t* disparity) const;
+
+  int width_;
+  int height_;
+  MatcherSettings settings_;
+  PathPenalties penalties_;
+  int row_bytes_;  ///< of a kept row with its margins
+  std::vector<std::uint8_t> left_rows_;
+  std::vector<std::uint8_t> right_rows_;  ///< mirrored
+  std::vector<std::uint8_t> left_signs_;
+  std::vector<std::uint8_t> right_signs_;
+  std::size_t path_blocks_;
+  std::vector<Block> paths_;  ///< kPathBuffers, a block between them
+  std::vector<std::uint8_t> choice_rows_;
+  DisparityChoice choice_;
+  SpeckleFilter speckles_;
+  MedianFilter median_;
+};
+
+}  // namespace swiftlet
