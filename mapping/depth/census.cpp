@@ -48,9 +48,10 @@ void planesOfRow(const CensusRows& rows, int width, const CensusPlanes& planes,
                  std::index_sequence<kPlane...>) {
   constexpr auto kSigns = static_cast<std::size_t>(kCensusSigns);
   for (int x = 0; x < width; x += disparity_lanes::kLanes) {
-    (Lanes::store(planes[kPlane] + x,
-                  plane<Lanes, kDirection, kPlane>(
-                      rows, x, std::make_index_sequence<(kSigns - 8 * kPlane < 8 ? kSigns - 8 * kPlane : 8)>())),
+    (Lanes::store(
+         planes[kPlane] + x,
+         plane<Lanes, kDirection, kPlane>(
+             rows, x, std::make_index_sequence<(kSigns - 8 * kPlane < 8 ? kSigns - 8 * kPlane : 8)>())),
      ...);
   }
 }

@@ -9,8 +9,7 @@
 namespace swiftlet {
 
 SpeckleFilter::SpeckleFilter(int width, int height)
-    : runs_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)),
-      ends_(runs_.size()) {}
+    : runs_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)), ends_(runs_.size()) {}
 
 std::uint32_t SpeckleFilter::root(std::uint32_t run) {
   while (runs_[run].parent != run) {
@@ -127,9 +126,9 @@ void MedianFilter::filterRow(const std::uint16_t* above, const std::uint16_t* he
   }
   for (int x = 1; x + 1 < width; ++x) {
     const auto one = [](std::uint16_t v) { return static_cast<std::uint16_t>(v != kNoDisparity ? 1 : 0); };
-    known[x] = static_cast<std::uint16_t>(one(above[x - 1]) + one(above[x]) + one(above[x + 1]) +
-                                          one(here[x - 1]) + one(here[x + 1]) + one(below[x - 1]) +
-                                          one(below[x]) + one(below[x + 1]));
+    known[x] =
+        static_cast<std::uint16_t>(one(above[x - 1]) + one(above[x]) + one(above[x + 1]) + one(here[x - 1]) +
+                                   one(here[x + 1]) + one(below[x - 1]) + one(below[x]) + one(below[x + 1]));
   }
   for (int x = 1; x + 1 < width; ++x) {
     if (here[x] != kNoDisparity) continue;

@@ -10,8 +10,8 @@
 namespace swiftlet {
 
 /// Removes patches of fewer than `least_pixels` connected pixels: 4-neighbours that differ by at most `step`
-/// belong together. Union-find over runs of pixels within rows (He, Chao, Suzuki, IEEE TIP 2008, without their
-/// second scan of pixels). Memory: 12 bytes a pixel (every pixel a run of its own).
+/// belong together. Union-find over runs of pixels within rows (He, Chao, Suzuki, IEEE TIP 2008, without
+/// their second scan of pixels). Memory: 12 bytes a pixel (every pixel a run of its own).
 class SpeckleFilter {
  public:
   SpeckleFilter(int width, int height);
@@ -52,7 +52,7 @@ class MedianFilter {
   void filterRow(const std::uint16_t* above, const std::uint16_t* here, const std::uint16_t* below,
                  std::uint16_t* out, std::uint8_t* sigma, int width);
 
-  std::vector<std::uint16_t> rows_;      ///< two rows as they were
+  std::vector<std::uint16_t> rows_;   ///< two rows as they were
   std::vector<std::uint16_t> known_;  ///< neighbours that have a disparity
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-// Disparities of a rectified pair, in the left image's pixels: x_right = x_left - disparity. Fixed point, with
-// each one's standard deviation.
+// Disparities of a rectified pair, in the left image's pixels: x_right = x_left - disparity. Fixed point,
+// with each one's standard deviation.
 
 #include <cstddef>
 #include <cstdint>

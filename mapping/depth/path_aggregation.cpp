@@ -173,32 +173,42 @@ class RightView {
 }  // namespace
 
 template <typename Lanes, int kVectors>
-void matchLeftwards(const MatchingRow& row, const PathPenalties& penalties, const PathBuffers& buffers) {
+void matchUpwards(const MatchingRow& row, const PathPenalties& penalties, std::uint8_t* neighbours,
+                  std::uint8_t* costs, std::uint8_t* sums) {
   constexpr int kDisparities = kLanes * kVectors;
   using Pixel = Costs<Lanes, kVectors>;
+  using Before = Neighbours<Lanes, kVectors>;
+  const EndMasks<Lanes> end;
   const Pixel count = Pixel::count();
   const auto outside = Lanes::broadcast(penalties.outside);
   const auto small = Lanes::broadcast(penalties.small);
-  Pixel before = Pixel::broadcast(0);
+  Pixel right = Pixel::broadcast(0);
   for (int x = row.width - 1; x >= 0; --x) {
-    Pixel costs = matchingCosts<Lanes, kVectors>(row, x);
+    const std::ptrdiff_t at = std::ptrdiff_t{x} * kDisparities;
+    const std::uint8_t grey = row.grey[x];
+    Pixel pixel = matchingCosts<Lanes, kVectors>(row, x);
     if (x + 1 < kDisparities) {
       const auto last_inside = Lanes::broadcast(static_cast<std::uint8_t>(x));
       for (int i = 0; i < kVectors; ++i) {
-        costs.part[i] = Lanes::select(Lanes::atLeast(last_inside, count.part[i]), costs.part[i], outside);
+        pixel.part[i] = Lanes::select(Lanes::atLeast(last_inside, count.part[i]), pixel.part[i], outside);
       }
     }
-    const std::ptrdiff_t at = std::ptrdiff_t{x} * kDisparities;
-    costs.store(buffers.costs + at);
-    const std::uint8_t large = largePenalty(penalties, row.grey[x], row.grey[x + 1]);
-    const Pixel path = along(Neighbours<Lanes, kVectors>::of(before), costs, small, large);
-    path.store(buffers.sums + at);
-    before = relative(path);
+    Pixel path = along(Before::load(neighbours + at, end), pixel, small,
+                       largePenalty(penalties, grey, row.grey_before[x]));
+    relative(path).store(neighbours + at);
+    if (costs == nullptr) continue;
+    pixel.store(costs + at);
+    const Pixel leftwards =
+        along(Before::of(right), pixel, small, largePenalty(penalties, grey, row.grey[x + 1]));
+    right = relative(leftwards);
+    path.add(leftwards);
+    path.store(sums + at);
   }
 }
 
 template <typename Lanes, int kVectors>
-void matchDownwards(const MatchingRow& row, const PathPenalties& penalties, const PathBuffers& buffers) {
+void addDownwards(const MatchingRow& row, const PathPenalties& penalties, const std::uint8_t* costs,
+                  std::uint8_t* neighbours, std::uint8_t* sums) {
   constexpr int kDisparities = kLanes * kVectors;
   using Pixel = Costs<Lanes, kVectors>;
   using Before = Neighbours<Lanes, kVectors>;
@@ -207,23 +217,18 @@ void matchDownwards(const MatchingRow& row, const PathPenalties& penalties, cons
   Pixel left = Pixel::broadcast(0);
   for (int x = 0; x < row.width; ++x) {
     const std::ptrdiff_t at = std::ptrdiff_t{x} * kDisparities;
+    const Pixel pixel = Pixel::load(costs + at);
     const std::uint8_t grey = row.grey[x];
-    const Pixel costs = Pixel::load(buffers.costs + at);
-    Pixel sums = Pixel::load(buffers.sums + at);
-    // A step of one path: from the pixel before it to the sums; gives what the next pixel takes.
-    const auto follow = [&](const Before& before, std::uint8_t grey_before) {
-      const Pixel path = along(before, costs, small, largePenalty(penalties, grey, grey_before));
-      sums.add(path);
-      return relative(path);
-    };
-    left = follow(Before::of(left), row.grey[x - 1]);
-    follow(Before::load(buffers.from_above + at, end), row.grey_above[x]).store(buffers.from_above + at);
-    // One slot on: the next row's pixel x finds what comes from x - 1 at its own place.
-    follow(Before::load(buffers.from_above_left + at, end), row.grey_above[x - 1])
-        .store(buffers.to_below_right + at + kDisparities);
-    follow(Before::load(buffers.from_above_right + at + kDisparities, end), row.grey_above[x + 1])
-        .store(buffers.from_above_right + at);
-    sums.store(buffers.sums + at);
+    const Pixel rightwards =
+        along(Before::of(left), pixel, small, largePenalty(penalties, grey, row.grey[x - 1]));
+    left = relative(rightwards);
+    const Pixel downwards = along(Before::load(neighbours + at, end), pixel, small,
+                                  largePenalty(penalties, grey, row.grey_before[x]));
+    relative(downwards).store(neighbours + at);
+    Pixel sum = Pixel::load(sums + at);
+    sum.add(rightwards);
+    sum.add(downwards);
+    sum.store(sums + at);
   }
 }
 
@@ -260,16 +265,16 @@ void chooseDisparities(const std::uint8_t* sums, int width, const DisparityChoic
   right.finish();
 }
 
-#define SWIFTLET_INSTANTIATE(LANES, VECTORS)                                                               \
-  template void matchLeftwards<disparity_lanes::LANES, VECTORS>(const MatchingRow&, const PathPenalties&,  \
-                                                                const PathBuffers&);                       \
-  template void matchDownwards<disparity_lanes::LANES, VECTORS>(const MatchingRow&, const PathPenalties&,  \
-                                                                const PathBuffers&);                       \
-  template void chooseDisparities<disparity_lanes::LANES, VECTORS>(const std::uint8_t*, int,               \
+#define SWIFTLET_INSTANTIATE(LANES, VECTORS)                                                                \
+  template void matchUpwards<disparity_lanes::LANES, VECTORS>(const MatchingRow&, const PathPenalties&,     \
+                                                              std::uint8_t*, std::uint8_t*, std::uint8_t*); \
+  template void addDownwards<disparity_lanes::LANES, VECTORS>(                                              \
+      const MatchingRow&, const PathPenalties&, const std::uint8_t*, std::uint8_t*, std::uint8_t*);         \
+  template void chooseDisparities<disparity_lanes::LANES, VECTORS>(const std::uint8_t*, int,                \
                                                                    const DisparityChoice&);
-#define SWIFTLET_INSTANTIATE_ALL(LANES)                           \
-  SWIFTLET_INSTANTIATE(LANES, 1) SWIFTLET_INSTANTIATE(LANES, 2) \
-  SWIFTLET_INSTANTIATE(LANES, 3) SWIFTLET_INSTANTIATE(LANES, 4)
+#define SWIFTLET_INSTANTIATE_ALL(LANES) \
+  SWIFTLET_INSTANTIATE(LANES, 1)        \
+  SWIFTLET_INSTANTIATE(LANES, 2) SWIFTLET_INSTANTIATE(LANES, 3) SWIFTLET_INSTANTIATE(LANES, 4)
 SWIFTLET_INSTANTIATE_ALL(Scalar)
 #ifdef SWIFTLET_DISPARITY_LANES_NATIVE
 SWIFTLET_INSTANTIATE_ALL(Native)

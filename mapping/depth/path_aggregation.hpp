@@ -2,12 +2,13 @@
 // Semi-global matching, one image row at a time: matching costs, costs aggregated along five paths, and the
 // choice of disparities.
 //
-// The cost of disparity d at pixel p along a path that comes from its neighbour q is (Hirschmuller, PAMI 2008,
-// eq. 12-13, written with costs whose least at every pixel has been taken off)
+// The cost of disparity d at pixel p along a path that comes from its neighbour q is (Hirschmuller, PAMI
+// 2008, eq. 12-13, written with costs whose least at every pixel has been taken off)
 //   L(p,d) = C(p,d) + min(L(q,d), L(q,d-1) + P1, L(q,d+1) + P1, P2),
-// with P2 smaller where the two pixels' grey differs. Five paths: leftwards and rightwards along the row, and
-// from the three neighbours in the row above. Their costs sum up in a row's buffer: no volume over the image
-// is kept. All costs are bytes that stop at 255; sums too, which only matters to disparities far from best.
+// with P2 smaller where the two pixels' grey differs. Four paths: along the row both ways, down and up the
+// column. As many come from above as from below: paths from above alone drag what is seen there down slanted
+// ground, which then comes out too far. All costs are bytes that stop at 255; sums of paths too, which only
+// matters to disparities far from the best.
 //
 // Layout: byte buffers [pixel][disparity]; the right image's signs run from right to left, so that the
 // candidates of a left pixel, x - d for rising d, are neighbours in memory. `Lanes` is an instruction set of
@@ -31,24 +32,10 @@ struct PathPenalties {
 
 struct MatchingRow {
   int width = 0;
-  const std::uint8_t* grey = nullptr;        ///< left image; one more pixel at both ends
-  const std::uint8_t* grey_above = nullptr;  ///< the row above, likewise
+  const std::uint8_t* grey = nullptr;         ///< left image; one more pixel at both ends
+  const std::uint8_t* grey_before = nullptr;  ///< the row that a path across rows comes from
   std::array<const std::uint8_t*, kCensusPlanes> left_signs{};
   std::array<const std::uint8_t*, kCensusPlanes> right_signs{};  ///< mirrored; 32 kVectors bytes behind
-};
-
-/// Buffers of (width + 1) x disparities, with a byte before and kDisparityLanes behind. Costs and sums hold
-/// one row; the others the costs along a path of the row above, less each pixel's least. `from_above` and
-/// `from_above_right` are afterwards those of this row. `from_above_left` holds pixel x's in slot x + 1, and
-/// this row's go to `to_below_right`: the two change places from row to row. All zeros before the first row;
-/// slot 0 of `from_above_left`, slot `width` of `from_above_right` always.
-struct PathBuffers {
-  std::uint8_t* costs = nullptr;
-  std::uint8_t* sums = nullptr;
-  std::uint8_t* from_above = nullptr;
-  std::uint8_t* from_above_left = nullptr;
-  std::uint8_t* to_below_right = nullptr;
-  std::uint8_t* from_above_right = nullptr;
 };
 
 /// Per pixel of the row. Where sums are equal the least disparity wins.
@@ -61,13 +48,20 @@ struct DisparityChoice {
   std::uint8_t* right_disparity = nullptr;  ///< of the right image's pixels, from the same sums
 };
 
-/// Fills costs, and sums with the leftward path's.
+/// `costs` and `sums`: a row's, width x disparities. `neighbours`: costs along a path in the row that the
+/// path comes from, less each pixel's least; afterwards this row's; zeros where a path begins. A byte before
+/// and behind it is read.
+///
+/// Matching costs and the upward path (`grey_before`: the row below). Where `costs` and `sums` are not null:
+/// the costs, and the sums of the upward and the leftward path.
 template <typename Lanes, int kVectors>
-void matchLeftwards(const MatchingRow& row, const PathPenalties& penalties, const PathBuffers& buffers);
+void matchUpwards(const MatchingRow& row, const PathPenalties& penalties, std::uint8_t* neighbours,
+                  std::uint8_t* costs, std::uint8_t* sums);
 
-/// Adds the four other paths.
+/// Adds the rightward and the downward path. `grey_before`: the row above.
 template <typename Lanes, int kVectors>
-void matchDownwards(const MatchingRow& row, const PathPenalties& penalties, const PathBuffers& buffers);
+void addDownwards(const MatchingRow& row, const PathPenalties& penalties, const std::uint8_t* costs,
+                  std::uint8_t* neighbours, std::uint8_t* sums);
 
 template <typename Lanes, int kVectors>
 void chooseDisparities(const std::uint8_t* sums, int width, const DisparityChoice& choice);

@@ -57,10 +57,13 @@ SemiGlobalMatcher::SemiGlobalMatcher(int width, int height, const MatcherSetting
       right_rows_(left_rows_.size()),
       left_signs_(static_cast<std::size_t>(signBytes(width_)) * kCensusPlanes),
       right_signs_(left_signs_.size()),
-      path_blocks_(1 + (static_cast<std::size_t>(width_ + 1) * static_cast<std::size_t>(settings_.disparities) +
-                        sizeof(Block) - 1) /
-                           sizeof(Block)),
-      paths_(1 + kPathBuffers * path_blocks_),
+      row_blocks_((static_cast<std::size_t>(width_) * static_cast<std::size_t>(settings_.disparities) +
+                   sizeof(Block) - 1) /
+                  sizeof(Block)),
+      costs_(kStripRows * row_blocks_),
+      sums_(costs_.size()),
+      from_above_(row_blocks_ + 2),
+      from_below_(row_blocks_ + 2),
       choice_rows_(static_cast<std::size_t>(roundUp(width_ + 1, 64)) * kLinesOfChoice),
       speckles_(width_, height_),
       median_(width_, height_) {
@@ -111,11 +114,11 @@ void SemiGlobalMatcher::census(int y) {
   censusRow<Lanes>(right, width_, true, right_planes);
 }
 
-MatchingRow SemiGlobalMatcher::matchingRow(int y) {
+MatchingRow SemiGlobalMatcher::matchingRow(int y, int y_before) {
   MatchingRow row;
   row.width = width_;
   row.grey = leftRow(y);
-  row.grey_above = leftRow(std::max(y - 1, 0));
+  row.grey_before = leftRow(std::clamp(y_before, 0, height_ - 1));
   for (std::size_t p = 0; p < kCensusPlanes; ++p) {
     const std::size_t at = p * static_cast<std::size_t>(signBytes(width_));
     row.left_signs[p] = left_signs_.data() + at;
@@ -124,24 +127,22 @@ MatchingRow SemiGlobalMatcher::matchingRow(int y) {
   return row;
 }
 
-PathBuffers SemiGlobalMatcher::pathBuffers(int y) {
-  const auto at = [&](std::size_t i) { return paths_[1 + i * path_blocks_].bytes; };
-  const bool even = y % 2 == 0;
-  return {at(0), at(1), at(2), at(even ? 3 : 4), at(even ? 4 : 3), at(5)};
-}
-
 // Sub-pixel by two lines of opposite slope through the three sums about the least (equiangular fit: the sums
 // of census costs rise linearly about their least; Shimizu, Okutomi, ICCV 2001). Sums fall off towards the
 // better neighbour.
-void SemiGlobalMatcher::refineRow(int disparities, std::uint16_t* disparity, std::uint8_t* sigma) {
-  const DisparityChoice& c = choice_;
+void SemiGlobalMatcher::refineRow(int disparities, std::uint16_t* __restrict disparity,
+                                  std::uint8_t* __restrict sigma) const {
+  const std::uint8_t* __restrict const whole = choice_.disparity;
+  const std::uint8_t* __restrict const least = choice_.least;
+  const std::uint8_t* __restrict const below = choice_.below;
+  const std::uint8_t* __restrict const above = choice_.above;
   for (int x = 0; x < width_; ++x) {
-    const int steeper = std::max<int>(c.below[x], c.above[x]) - c.least[x];
-    const bool inside = c.disparity[x] > 0 && c.disparity[x] + 1 < disparities && steeper > 0;
-    const float offset = static_cast<float>(c.below[x] - c.above[x]) * (0.5F * kDisparitySteps) /
+    const int steeper = std::max<int>(below[x], above[x]) - least[x];
+    const bool inside = whole[x] > 0 && whole[x] + 1 < disparities && steeper > 0;
+    const float offset = static_cast<float>(below[x] - above[x]) * (0.5F * kDisparitySteps) /
                          static_cast<float>(std::max(steeper, 1));
     const int steps = static_cast<int>(offset + (kDisparitySteps + 0.5F)) - kDisparitySteps;
-    disparity[x] = static_cast<std::uint16_t>(c.disparity[x] * kDisparitySteps + (inside ? steps : 0));
+    disparity[x] = static_cast<std::uint16_t>(whole[x] * kDisparitySteps + (inside ? steps : 0));
     sigma[x] = kDisparitySteps / 4;
   }
 }
@@ -159,20 +160,31 @@ void SemiGlobalMatcher::checkRow(std::uint16_t* disparity) const {
 }
 
 template <typename Lanes, int kVectors>
-void SemiGlobalMatcher::matchRows(const ImageView& left, const ImageView& right, DisparityImage& disparity) {
-  std::memset(static_cast<void*>(paths_.data()), 0, paths_.size() * sizeof(Block));
-  for (int y = 0; y < std::min(kCensusRowReach, height_); ++y) keepRow(left, right, y);
-  for (int y = 0; y < height_; ++y) {
-    if (y + kCensusRowReach < height_) keepRow(left, right, y + kCensusRowReach);
+void SemiGlobalMatcher::matchStrip(int begin, int end, int ahead, DisparityImage& disparity) {
+  std::memset(static_cast<void*>(from_below_.data()), 0, from_below_.size() * sizeof(Block));
+  for (int y = ahead - 1; y >= begin; --y) {
     census<Lanes>(y);
-    const MatchingRow row = matchingRow(y);
-    const PathBuffers buffers = pathBuffers(y);
-    matchLeftwards<Lanes, kVectors>(row, penalties_, buffers);
-    matchDownwards<Lanes, kVectors>(row, penalties_, buffers);
-    chooseDisparities<Lanes, kVectors>(buffers.sums, width_, choice_);
+    matchUpwards<Lanes, kVectors>(matchingRow(y, y + 1), penalties_, from_below_[1].bytes,
+                                  y < end ? costs(y) : nullptr, y < end ? sums(y) : nullptr);
+  }
+  for (int y = begin; y < end; ++y) {
+    addDownwards<Lanes, kVectors>(matchingRow(y, y - 1), penalties_, costs(y), from_above_[1].bytes, sums(y));
+    chooseDisparities<Lanes, kVectors>(sums(y), width_, choice_);
     const std::size_t at = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_);
     refineRow(kLanes * kVectors, disparity.disparity() + at, disparity.sigma() + at);
     checkRow(disparity.disparity() + at);
+  }
+}
+
+template <typename Lanes, int kVectors>
+void SemiGlobalMatcher::matchRows(const ImageView& left, const ImageView& right, DisparityImage& disparity) {
+  std::memset(static_cast<void*>(from_above_.data()), 0, from_above_.size() * sizeof(Block));
+  int kept = 0;
+  for (int begin = 0; begin < height_; begin += kStripRows) {
+    const int end = std::min(begin + kStripRows, height_);
+    const int ahead = std::min(end + kRowsAhead, height_);
+    for (; kept < std::min(ahead + kCensusRowReach, height_); ++kept) keepRow(left, right, kept);
+    matchStrip<Lanes, kVectors>(begin, end, ahead, disparity);
   }
 }
 
