@@ -23,7 +23,9 @@ std::uint16_t weightSteps(double weight) {
   return static_cast<std::uint16_t>(std::clamp(weight * kWeightSteps, 1.0, 65535.0));
 }
 
-std::int8_t quantised(float x) { return static_cast<std::int8_t>(std::lround(127 * x)); }
+std::int8_t quantised(float x) {
+  return static_cast<std::int8_t>(static_cast<int>(127 * x + (x < 0 ? -0.5F : 0.5F)));
+}
 
 }  // namespace
 
@@ -222,7 +224,7 @@ void BlockSurface::attributes(int x, int y, int z, SurfaceVertex& vertex) const 
   if (labels == nullptr) return;
   const LabelEstimate estimate = confusion_.estimate(labels->counts[at]);
   vertex.label = estimate.label;
-  vertex.probability = static_cast<std::uint8_t>(std::lround(255 * estimate.probability));
+  vertex.probability = static_cast<std::uint8_t>(static_cast<int>(255 * estimate.probability + 0.5F));
 }
 
 }  // namespace swiftlet

@@ -128,8 +128,9 @@ void BlockUpdate::projectEight(const Eigen::Vector3f& first, std::size_t at, Vox
   const Floats change = moved < 0.0F ? -moved : moved;
   sums.largest = change > sums.largest ? change : sums.largest;
   sums.observed -= seen;
-  sums.news |= seen & ((old_weight == 0.0F) | (now_behind ^ (old_distance < 0.0F)));
   const Ints near = hit & (s < truncation);
+  // A first observation far in front makes no surface.
+  sums.news |= seen & ((near & (old_weight == 0.0F)) | (now_behind ^ (old_distance < 0.0F)));
   if (lanes::any(near)) colour(pixel, near, gain, sum, at, block, labels, sums);
 }
 

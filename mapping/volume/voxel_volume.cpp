@@ -220,6 +220,8 @@ void VoxelVolume::drop(std::uint32_t slot) {
 void VoxelVolume::remove(std::span<const std::uint32_t> slots) {
   if (slots.empty()) return;
   for (std::size_t i = 0; i < listener_count_; ++i) listeners_[i]->beforeRemoval(*this, slots);
+  // A slot that a listener has just looked at may change hands within this set of changes.
+  ++revision_;
   for (const std::uint32_t slot : slots) drop(slot);
 }
 

@@ -1,0 +1,104 @@
+#pragma once
+// The surface of the map, block by block, in fixed memory: what the volume still holds and what it has
+// dropped.
+//
+// A patch lies in pages of 240 bytes from a pool, found by its block. A new patch of a block takes the place
+// of the one before. When pages or entries run out the patches farthest from the vehicle go: handed to the
+// sink where there is one (a file in the run folder), lost otherwise; both are counted. A patch that is
+// itself the farthest goes at once. A sink that hears of one block again should keep the later patch. Cost: a
+// copy; when full, a pass over all entries for every 1/32 of them that goes.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "mapping/surface/surface_patch.hpp"
+#include "mapping/volume/block_hash.hpp"
+
+namespace swiftlet {
+
+/// Takes patches that leave the store, or all of them for an export.
+class SurfaceSink {
+ public:
+  virtual ~SurfaceSink() = default;
+  virtual void take(const SurfacePatch& patch) = 0;
+};
+
+struct SurfaceStoreCounters {
+  std::uint64_t spilled = 0;  ///< patches that went to the sink
+  std::uint64_t lost = 0;     ///< patches that went, without a sink
+};
+
+class SurfaceStore {
+ public:
+  static constexpr std::uint32_t kNone = BlockHash::kNone;
+
+  /// `bytes`: everything together. `block_size` [m] gives distances from the vehicle. `sink` may be null and
+  /// outlives the store's use.
+  SurfaceStore(std::size_t bytes, double block_size, SurfaceSink* sink = nullptr);
+
+  /// An empty patch takes the block's out.
+  void put(const SurfacePatch& patch, const Eigen::Vector3f& vehicle);
+  void clear();
+
+  /// For readers: entries 0 to entries() - 1, some unused; an order that only the history decides.
+  [[nodiscard]] std::uint32_t entries() const { return static_cast<std::uint32_t>(entries_.size()); }
+  [[nodiscard]] std::uint32_t find(const BlockIndex& block) const { return hash_.find(keyOf(block)); }
+  /// False for an unused entry.
+  bool read(std::uint32_t entry, SurfacePatch& patch) const;
+  /// All patches, ordered by block, through `patch` as scratch.
+  void visit(SurfaceSink& sink, SurfacePatch& patch);
+
+  [[nodiscard]] std::size_t patches() const { return entries_.size() - unused_entries_.size(); }
+  [[nodiscard]] std::size_t pagesUsed() const { return next_.size() - free_pages_; }
+  [[nodiscard]] std::size_t pages() const { return next_.size(); }
+  [[nodiscard]] std::size_t bytes() const;
+  [[nodiscard]] const SurfaceStoreCounters& counters() const { return counters_; }
+
+ private:
+  static constexpr std::size_t kPageVertices = 12;
+  static constexpr std::size_t kPageTriangles = 40;
+  struct Page {
+    alignas(4) std::array<std::byte, kPageVertices * sizeof(SurfaceVertex)> bytes;
+  };
+  struct Entry {
+    BlockIndex block;
+    std::uint32_t first = kNone;  ///< pages: vertices, then triangles
+    std::uint16_t vertices = 0;
+    std::uint16_t triangles = 0;  ///< 0: unused
+  };
+  struct Farness {
+    float squared = 0;
+    std::uint64_t key = 0;
+    std::uint32_t entry = 0;
+    bool operator<(const Farness& o) const {
+      return squared != o.squared ? squared < o.squared : key < o.key;
+    }
+  };
+
+  [[nodiscard]] static std::size_t pagesFor(std::size_t vertices, std::size_t triangles);
+  [[nodiscard]] Farness farness(const BlockIndex& block, std::uint32_t entry,
+                                const Eigen::Vector3f& vehicle) const;
+  void remove(std::uint32_t entry);
+  void leave(const SurfacePatch& patch);
+  bool makeRoom(std::size_t pages, const BlockIndex& block, const Eigen::Vector3f& vehicle);
+  void write(const SurfacePatch& patch, Entry& entry);
+
+  float block_size_;
+  SurfaceSink* sink_;
+  BlockHash hash_;
+  std::vector<Entry> entries_;
+  std::vector<std::uint32_t> unused_entries_;
+  std::vector<Page> page_;
+  std::vector<std::uint32_t> next_;  ///< of each page, in its patch or in the list of free ones
+  std::uint32_t first_free_ = kNone;
+  std::size_t free_pages_ = 0;
+  std::vector<Farness> far_;  ///< scratch
+  SurfacePatch leaving_;      ///< scratch
+  SurfaceStoreCounters counters_;
+};
+
+}  // namespace swiftlet
