@@ -28,6 +28,7 @@ void addBudgetCommand(CLI::App& app, int& exit_code);
 void addReplayCommand(CLI::App& app, int& exit_code);
 void addMeshCommand(CLI::App& app, int& exit_code);
 void addFuseCommand(CLI::App& app, int& exit_code);
+void addPlaceCommand(CLI::App& app, int& exit_code);
 void addPoseGraphCommand(CLI::App& app, int& exit_code);
 void addEvaluateCommand(CLI::App& app, int& exit_code);
 void addSimulateCommand(CLI::App& app, int& exit_code);

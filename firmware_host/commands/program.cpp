@@ -21,6 +21,7 @@ int runProgram(int argc, char** argv) {
   addEvaluateCommand(app, exit_code);
   addMeshCommand(app, exit_code);
   addFuseCommand(app, exit_code);
+  addPlaceCommand(app, exit_code);
   addPoseGraphCommand(app, exit_code);
   addBudgetCommand(app, exit_code);
   addVocabularyCommand(app, exit_code);

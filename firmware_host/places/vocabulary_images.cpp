@@ -2,74 +2,19 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <memory>
 
-#include "drivers/calibration/input_error.hpp"
-#include "drivers/recorded/image_decoder.hpp"
+#include "firmware_host/places/image_folder.hpp"
 #include "firmware_host/report/progress.hpp"
 #include "mapping/place/place_extractor.hpp"
 
 namespace swiftlet {
-namespace {
-
-namespace fs = std::filesystem;
-
-// Larger pictures are refused before memory is asked for them.
-constexpr int kMaxSide = 16384;  // px
-
-std::vector<std::string> imagesIn(const std::string& folder, int every) {
-  std::vector<std::string> all;
-  std::error_code error;
-  for (fs::recursive_directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
-    const std::string ending = at->path().extension().string();
-    if (ending == ".png" || ending == ".jpg" || ending == ".jpeg") all.push_back(at->path().string());
-  }
-  if (error) {
-    throw InputError(folder, 0, "", "cannot be read (" + error.message() + ")", "Give a folder of images");
-  }
-  if (all.empty()) throw InputError(folder, 0, "", "no .png or .jpg in it", "Give a folder of images");
-  std::sort(all.begin(), all.end());
-  std::vector<std::string> chosen;
-  for (std::size_t i = 0; i < all.size(); i += static_cast<std::size_t>(every)) chosen.push_back(all[i]);
-  return chosen;
-}
-
-/// Decodes whatever size a picture has.
-class AnySize {
- public:
-  bool read(const std::string& path) {
-    std::ifstream in(path, std::ios::binary);
-    bytes_.assign(std::istreambuf_iterator<char>(in), {});
-    ImageSize found;
-    DecodeResult result = decoder_.decode(bytes_, size_, pixels_.data(), found);
-    if (result == DecodeResult::kWrongSize && found.width > 0 && found.height > 0 &&
-        found.width <= kMaxSide && found.height <= kMaxSide) {
-      size_ = found;
-      pixels_.resize(static_cast<std::size_t>(size_.width) * static_cast<std::size_t>(size_.height));
-      result = decoder_.decode(bytes_, size_, pixels_.data(), found);
-    }
-    return result == DecodeResult::kOk;
-  }
-  [[nodiscard]] ImageView view() const { return {pixels_.data(), size_.width, size_.height, size_.width}; }
-
- private:
-  ImageDecoder decoder_;
-  std::vector<std::uint8_t> bytes_;
-  std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(1);
-  ImageSize size_{1, 1};
-};
-
-}  // namespace
 
 TrainingImages describeImages(const std::vector<std::string>& folders, int every, int features) {
   std::vector<std::string> files;
   for (const std::string& folder : folders) {
-    const std::vector<std::string> some = imagesIn(folder, every);
-    files.insert(files.end(), some.begin(), some.end());
+    const std::vector<std::string> all = imagesUnder(folder);
+    for (std::size_t i = 0; i < all.size(); i += static_cast<std::size_t>(every)) files.push_back(all[i]);
   }
   TrainingImages out;
   PlaceExtractorSettings settings;
@@ -78,7 +23,7 @@ TrainingImages describeImages(const std::vector<std::string>& folders, int every
   CameraModel camera;
   const TrackedFrame no_tracks;
   const auto keyframe = std::make_unique<PlaceKeyframe>();
-  AnySize image;
+  ImageFile image;
   Progress progress("describing images", files.size());
   for (std::size_t i = 0; i < files.size(); ++i) {
     progress.update(i);

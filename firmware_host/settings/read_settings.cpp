@@ -50,6 +50,10 @@ void assign(const Place& place, const Setting& setting, const YAML::Node& node, 
     toggle->value(settings) = parsed<bool>(place, setting, node);
     return;
   }
+  if (const auto* text = std::get_if<TextSetting>(&setting.kind)) {
+    text->value(settings) = parsed<std::string>(place, setting, node);
+    return;
+  }
   const auto bounded = [&](const auto& kind, auto value) {
     // NaN fails both comparisons and must not pass.
     if (!(value >= kind.low && value <= kind.high)) {

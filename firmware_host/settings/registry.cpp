@@ -173,6 +173,10 @@ std::vector<Setting> estimationSettings() {
       {"loop.enabled", "",
        "Recognize places seen before and keep a map that they hold together: T_map_world, map.tum.",
        onOff(&Settings::loop, &LoopGroup::enabled)},
+      {"loop.vocabulary", "",
+       "File of the words that places are known by: compact, ORBvoc.txt or DBoW2's; empty: the one that is "
+       "part of the program.",
+       TextSetting{member(&Settings::loop, &LoopGroup::vocabulary), "a file's name, or empty"}},
       {"loop.min_similarity", "",
        "Least similarity of a place looked at as a revisit, relative to that of a keyframe with the one "
        "before it.",
@@ -231,6 +235,13 @@ std::size_t editDistance(std::string_view a, std::string_view b) {
   return row[b.size()];
 }
 
+/// In YAML's single quotes, within which a quote is doubled and nothing else is special.
+std::string inQuotes(const std::string& text) {
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? "''" : std::string(1, c);
+  return out + "'";
+}
+
 std::string_view lastPart(std::string_view key) { return key.substr(key.rfind('.') + 1); }
 
 }  // namespace
@@ -267,6 +278,7 @@ std::string valueText(const Setting& setting, const Settings& settings) {
   if (const auto* real_or_word = std::get_if<RealOrWordSetting>(&setting.kind)) {
     if (real_or_word->chosen(copy)) return std::string(real_or_word->word);
   }
+  if (const auto* text = std::get_if<TextSetting>(&setting.kind)) return inQuotes(text->value(copy));
   return std::visit([&](const auto& kind) { return fmt::format("{}", kind.value(copy)); }, setting.kind);
 }
 
@@ -279,6 +291,7 @@ std::string rangeText(const Setting& setting) {
   if (const auto* number = std::get_if<RealSetting>(&setting.kind)) {
     return fmt::format("{} to {}{}", number->low, number->high, unit);
   }
+  if (const auto* text = std::get_if<TextSetting>(&setting.kind)) return std::string(text->what);
   const auto& number = std::get<RealOrWordSetting>(setting.kind);
   return fmt::format("{} to {}{}, or {}", number.low, number.high, unit, number.word);
 }

@@ -33,11 +33,17 @@ struct SwitchSetting {
   std::function<bool&(Settings&)> value;
 };
 
+/// Text, a file's name for instance; may be empty.
+struct TextSetting {
+  std::function<std::string&(Settings&)> value;
+  std::string_view what;  ///< in words
+};
+
 struct Setting {
   std::string_view key;   ///< "group.name", as in YAML and on the command line
   std::string_view unit;  ///< empty for pure numbers
   std::string_view doc;   ///< one or two sentences
-  std::variant<IntegerSetting, RealSetting, RealOrWordSetting, SwitchSetting> kind;
+  std::variant<IntegerSetting, RealSetting, RealOrWordSetting, SwitchSetting, TextSetting> kind;
 };
 
 /// All settings; those of one group stand together.
@@ -50,7 +56,7 @@ const Setting* findSetting(std::string_view key);
 std::string_view nearestSetting(std::string_view key);
 
 /// The value as YAML text (the word where that is chosen); numbers in the shortest form that reads back to
-/// the same value.
+/// the same value, text in quotes.
 std::string valueText(const Setting& setting, const Settings& settings);
 
 /// What values are allowed, in words: "0.5 to 30 s", "true or false".

@@ -4,6 +4,8 @@
 // Each setting is declared once more, in registry.cpp, with key, unit, bounds and explanation; the
 // reader, the printer and the checks work from that table alone.
 
+#include <string>
+
 #include "estimator/messages/effort.hpp"
 #include "estimator/odometry/odometry_settings.hpp"
 #include "mapping/loop/loop_settings.hpp"
@@ -31,6 +33,7 @@ struct MeshGroup {
 
 struct LoopGroup {
   bool enabled = false;
+  std::string vocabulary = "";  ///< file; empty: the shipped one
 };
 
 /// Priorities are of SCHED_FIFO, 1 to 98; 0 is SCHED_OTHER. All of them below 50, where kernels with

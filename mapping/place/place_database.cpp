@@ -18,6 +18,7 @@ bool near(Stamp a, Stamp b, double seconds) {
 PlaceDatabase::PlaceDatabase(std::size_t words, const PlaceDatabaseSettings& settings) : settings_(settings) {
   settings_.keyframes = std::clamp<std::size_t>(settings_.keyframes, 1, kMaxKeyframes);
   if (settings_.postings == 0) settings_.postings = kPostingsPerKeyframe * settings_.keyframes;
+  settings_.max_reference = std::max(settings_.max_reference, settings_.min_reference);
   settings_.candidates = std::min(settings_.candidates, kMaxPlaceCandidates);
   entries_.resize(settings_.keyframes);
   free_slots_.reserve(settings_.keyframes);
@@ -186,7 +187,7 @@ Status PlaceDatabase::query(Stamp stamp, std::uint32_t epoch, const BagOfWords& 
   islands_.clear();
   if (newest_ == kNoSlot) return {StatusCode::kNotReady, "no keyframe to compare with"};
   result.reference = similarity(bag, entries_[newest_].bag);
-  const float reference = std::max(result.reference, settings_.min_reference);
+  const float reference = std::clamp(result.reference, settings_.min_reference, settings_.max_reference);
   score(bag);
   findIslands(settings_.min_relative * reference, stamp, epoch, result);
   if (result.compared == 0) return {StatusCode::kNotReady, "no keyframe old enough to compare with"};

@@ -37,7 +37,8 @@ struct PlaceDatabaseSettings {
   std::size_t postings = 0;
   double exclude = 10.0;        ///< s: keyframes nearer in time (of the same epoch) are no revisit
   float min_relative = 0.3F;    ///< least score relative to that with the predecessor
-  float min_reference = 0.02F;  ///< the predecessor's score counts as at least this
+  float min_reference = 0.02F;  ///< the predecessor's score counts as at least this,
+  float max_reference = 0.3F;   ///< and at most this: who hovers looks more like before than any revisit does
   double island_gap = 3.0;      ///< s: keyframes nearer in time than this belong to one island
   std::size_t per_island = 3;   ///< candidates of one island at most
   std::size_t candidates = 10;  ///< at most kMaxPlaceCandidates
@@ -53,7 +54,7 @@ struct PlaceCandidate {
   Stamp stamp;
   std::uint32_t epoch = 0;
   float score = 0;     ///< similarity, 0 to 1
-  float relative = 0;  ///< to the similarity of the query with its predecessor
+  float relative = 0;  ///< to the similarity of the query with its predecessor, as bounded by the settings
   float island_score = 0;
   /// Islands of the queries just before, in a row, that lie beside this one's.
   int consistent = 0;

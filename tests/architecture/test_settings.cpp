@@ -17,7 +17,7 @@ std::set<std::string> membersOf(const std::string& path, const std::string& name
   const SourceFile file = parseSource(path, readWhole(projectRoot() / path));
   std::set<std::string> members;
   bool inside = false;
-  static const std::regex kMember(R"(^\s+(?:int|double|bool)\s+([a-z0-9_]+)\s*=[^=])");
+  static const std::regex kMember(R"(^\s+(?:int|double|bool|std::string)\s+([a-z0-9_]+)\s*=[^=])");
   for (const std::string& line : file.code_lines) {
     if (line.starts_with("struct " + name)) inside = true;
     if (line.starts_with("}")) inside = false;

@@ -157,7 +157,9 @@ TEST_CASE("A hover thins out first, the places seen once stay") {
 }
 
 TEST_CASE("Recent keyframes are no revisit; another epoch's are") {
-  PlaceDatabase database(kWords);
+  PlaceDatabaseSettings settings;
+  settings.max_reference = 1;
+  PlaceDatabase database(kWords, settings);
   Random random(24);
   auto query = std::make_unique<PlaceQuery>();
   const BagOfWords bag = bagAt(10, random);
@@ -177,6 +179,28 @@ TEST_CASE("Recent keyframes are no revisit; another epoch's are") {
   REQUIRE(database.query(at(31), 0, bagAt(150, random), *query).ok());
   REQUIRE(query->candidates.size() == 1);
   CHECK(query->candidates[0].index == 2);
+}
+
+TEST_CASE("Who hovers finds a revisit all the same") {
+  const auto bagOf = [](std::initializer_list<WordId> words) {
+    BagOfWords bag;
+    for (const WordId word : words) REQUIRE(bag.tryPushBack({word, 1.0F / static_cast<float>(words.size())}));
+    return bag;
+  };
+  const BagOfWords old = bagOf({0, 1, 2, 3, 4, 5, 6, 7, 8, 9});
+  const BagOfWords now = bagOf({0, 1, 100, 101, 102, 103, 104, 105, 106, 107});
+  for (const float most : {PlaceDatabaseSettings{}.max_reference, 1.0F}) {
+    PlaceDatabaseSettings settings;
+    settings.max_reference = most;
+    PlaceDatabase database(kWords, settings);
+    std::uint32_t slot = 0;
+    REQUIRE(database.add(1, at(0), 0, old, slot).ok());
+    REQUIRE(database.add(2, at(20), 0, now, slot).ok());
+    auto query = std::make_unique<PlaceQuery>();
+    REQUIRE(database.query(at(20.1), 0, now, *query).ok());
+    CHECK(query->reference == Approx(1));
+    CHECK(query->candidates.size() == (most < 1 ? 1 : 0));
+  }
 }
 
 TEST_CASE("Islands: the best few of each, and how long they are followed") {

@@ -1,0 +1,118 @@
+#include <fmt/format.h>
+
+#include <atomic>
+#include <csignal>
+#include <memory>
+
+#include "firmware_host/commands/checks.hpp"
+#include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/place_run.hpp"
+#include "mapping/place/place_database.hpp"
+
+namespace swiftlet {
+namespace {
+
+std::atomic<bool> stop_asked{false};
+
+extern "C" void askPlaceToStop(int /*signal*/) { stop_asked.store(true, std::memory_order_relaxed); }
+
+struct PlaceOptions {
+  PlaceRequest request;
+  SettingsOptions settings;
+  std::vector<std::string> calibration;
+};
+
+std::string shareText(const nlohmann::ordered_json& share) {
+  return share.is_null() ? "nothing to judge" : fmt::format("{:.1f} %", 100 * share.get<double>());
+}
+
+void printSummary(const nlohmann::ordered_json& summary) {
+  const auto& retrieval = summary["retrieval"];
+  fmt::print("{} keyframes of {} images, {} candidates\n",
+             summary["images"]["keyframes"].get<std::uint64_t>(),
+             summary["images"]["seen"].get<std::uint64_t>(), retrieval["candidates"].get<std::uint64_t>());
+  fmt::print(
+      "retrieval: of the same place by the poses {}; {} images revisit, with their place among the "
+      "candidates {}\n",
+      shareText(retrieval["precision"]), retrieval["images_revisiting"].get<std::uint64_t>(),
+      shareText(retrieval["recall"]));
+  if (!summary.contains("verification")) {
+    fmt::print("not verified: {}\n", summary["run"]["verified"].get<bool>()
+                                         ? "no candidate"
+                                         : "that needs a log with two cameras and their calibration");
+    return;
+  }
+  const auto& verification = summary["verification"];
+  fmt::print(
+      "verified: {} loops, right by the poses {}, median error {:.4f} m, {:.3f} deg; images closed {}\n",
+      verification["accepted"].get<std::uint64_t>(), shareText(verification["precision"]),
+      verification["median_error_m"].get<double>(), verification["median_error_deg"].get<double>(),
+      shareText(verification["recall"]));
+}
+
+int place(const PlaceOptions& options) {
+  PlaceRequest request = options.request;
+  request.stop = &stop_asked;
+  request.show_progress = true;
+  if (!options.calibration.empty()) request.calibration = options.calibration[0];
+  if (options.calibration.size() > 1) request.imu_calibration = options.calibration[1];
+  stop_asked.store(false, std::memory_order_relaxed);
+  std::signal(SIGINT, askPlaceToStop);
+  std::signal(SIGTERM, askPlaceToStop);
+  const PlaceRunResult result = runPlace(request, options.settings.read());
+  printSummary(result.summary);
+  fmt::print("written to {}\n", request.out);
+  if (!result.finished) {
+    fmt::print(stderr, "stopped before the end; the folder holds what was done\n");
+    return kExitFailed;
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+void addPlaceCommand(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("place", "Recognize places in images with given poses");
+  auto options = std::make_shared<PlaceOptions>();
+  PlaceRequest& request = options->request;
+  request.out = "place";
+  command
+      ->add_option(
+          "LOG", request.input,
+          "EuRoC/ASL folder, a recorded run, a ROS 1 bag where supported; or a plain folder of images")
+      ->required();
+  command->add_option("--trajectory", request.trajectory,
+                      "Poses of the body (TUM, EuRoC csv); default: the log's own truth");
+  command->add_option("--out", request.out, "Folder to write")->capture_default_str();
+  command->add_option("--vocabulary", request.vocabulary,
+                      "Words: compact, ORBvoc.txt or DBoW2 YAML (.gz); default: loop.vocabulary");
+  command
+      ->add_option("--calibration", options->calibration,
+                   "Calibration instead of the log's own: a folder, or Kalibr camchain and IMU files")
+      ->expected(1, 2);
+  command->add_option("--candidates", request.candidates, "Earlier images given for each, at most")
+      ->check(CLI::Range(1, static_cast<int>(kMaxPlaceCandidates)))
+      ->capture_default_str();
+  command->add_option("--exclude", request.exclude, "Images nearer in time are no revisit [s]")
+      ->check(nonNegative())
+      ->capture_default_str();
+  command->add_option("--keyframes", request.keyframes, "Images remembered, at most")
+      ->check(CLI::Range(2, 65534))
+      ->capture_default_str();
+  command
+      ->add_option("--max-gap", request.max_gap,
+                   "Poses are interpolated between neighbours at most this far apart [s]")
+      ->check(positive())
+      ->capture_default_str();
+  options->settings.addTo(*command);
+  command->footer(
+      "A plain folder of images needs --trajectory: names are stamps [ns], or there is one pose for each "
+      "image\n"
+      "in the order of names; its candidates are not verified.\n"
+      "Example:\n  swiftlet place data/vil_v102 --out place_v102\n"
+      "  swiftlet place flight --trajectory run/odometry.tum --vocabulary ORBvoc.txt --out place_flight\n"
+      "  swiftlet place photos --trajectory photos.tum --out place_photos");
+  command->callback([options, &exit_code] { exit_code = place(*options); });
+}
+
+}  // namespace swiftlet

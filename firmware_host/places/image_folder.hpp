@@ -1,0 +1,34 @@
+#pragma once
+// Folders of pictures of any size, without anything beside them.
+//
+// Host side: allocates, throws InputError.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "drivers/recorded/image_decoder.hpp"
+#include "estimator/core/image_view.hpp"
+
+namespace swiftlet {
+
+/// All .png, .jpg and .jpeg under the folder, in the order of their names. InputError for a folder that
+/// cannot be read or holds none.
+std::vector<std::string> imagesUnder(const std::string& folder);
+
+/// One picture, decoded to 8-bit grey whatever size it has. Keeps its memory for the next.
+class ImageFile {
+ public:
+  /// False for what cannot be decoded.
+  bool read(const std::string& path);
+  /// Until the next read().
+  [[nodiscard]] ImageView view() const { return {pixels_.data(), size_.width, size_.height, size_.width}; }
+
+ private:
+  ImageDecoder decoder_;
+  std::vector<std::uint8_t> bytes_;
+  std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(1);
+  ImageSize size_{1, 1};
+};
+
+}  // namespace swiftlet
