@@ -11,6 +11,7 @@
 // disparities. One thread, no clock, no randomness; the native instruction set and the scalar twin give the
 // same bytes.
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -27,16 +28,16 @@ namespace swiftlet {
 /// true disparity and on rendered flights.
 struct MatcherSettings {
   int disparities = 64;            ///< 0 .. disparities - 1 px: 32, 64, 96 or 128
-  int small_penalty = 10;          ///< disparity changes by one pixel from a pixel to the next
-  int large_penalty = 80;          ///< changes by more, where both have the same grey
-  int large_penalty_falloff = 10;  ///< grey levels of difference that halve the large penalty
+  int small_penalty = 12;          ///< disparity changes by one pixel from a pixel to the next
+  int large_penalty = 100;         ///< changes by more, where both have the same grey
+  int large_penalty_falloff = 15;  ///< grey levels of difference that halve the large penalty
   int least_large_penalty = 12;
-  int outside_cost = 8;          ///< matching cost where the other pixel is outside the right image
+  int outside_cost = 10;         ///< matching cost where the other pixel is outside the right image
   int left_right_tolerance = 1;  ///< px, between the two images' disparities; negative: no check
-  int uniqueness = 0;            ///< %, the next best disparity's sum must be that much greater
-  int speckle_pixels = 60;       ///< patches smaller than this are removed; 0: none
-  double speckle_step = 1;       ///< px, between neighbours of a patch
-  bool median = true;            ///< of 3 x 3, closing small holes
+  int least_lead = 0;  ///< of the best sum over the next best that is no neighbour of it; less: no disparity
+  int speckle_pixels = 60;  ///< patches smaller than this are removed; 0: none
+  double speckle_step = 1;  ///< px, between neighbours of a patch
+  bool median = true;       ///< of 3 x 3, closing small holes
 };
 
 class SemiGlobalMatcher {
@@ -56,10 +57,10 @@ class SemiGlobalMatcher {
  private:
   /// Rows of a strip, and how far below it the upward path begins: at least so many rows, and at most both,
   /// tell on a pixel from below.
-  static constexpr int kStripRows = 32;
+  static constexpr int kStripRows = 48;
   static constexpr int kRowsAhead = 16;
   /// Kept rows of one image, with margins: the strip, the rows ahead and the census window about them.
-  static constexpr int kKeptRows = 64;
+  static constexpr int kKeptRows = 72;
   static_assert(kStripRows + kRowsAhead + 2 * kCensusRowReach <= kKeptRows);
 
   struct Block {
@@ -82,14 +83,16 @@ class SemiGlobalMatcher {
   [[nodiscard]] std::uint8_t* sums(int y) {
     return sums_[static_cast<std::size_t>(y % kStripRows) * row_blocks_].bytes;
   }
-  void refineRow(int disparities, std::uint16_t* disparity, std::uint8_t* sigma) const;
-  void checkRow(std::uint16_t* disparity) const;
+  [[nodiscard]] static std::array<std::uint8_t, 64 * 64> makeSigmas();
+  void refineRow(int disparities, std::uint16_t* disparity) const;
+  void checkRow(std::uint16_t* disparity, std::uint8_t* sigma) const;
 
   int width_;
   int height_;
   MatcherSettings settings_;
   PathPenalties penalties_;
-  int row_bytes_;  ///< of a kept row with its margins
+  std::array<std::uint8_t, 64 * 64> sigmas_;  ///< 1/kDisparitySteps px, by lead and rise of sums, in fours
+  int row_bytes_;                             ///< of a kept row with its margins
   std::vector<std::uint8_t> left_rows_;
   std::vector<std::uint8_t> right_rows_;  ///< mirrored
   std::vector<std::uint8_t> left_signs_;
