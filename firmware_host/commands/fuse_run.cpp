@@ -28,15 +28,18 @@ using Json = nlohmann::ordered_json;
 
 /// CPU of a step's parts.
 struct MapTimes {
-  LatencyHistogram depth;  ///< stereo, and the volume's update
+  LatencyHistogram depth;
+  LatencyHistogram volume;
   LatencyHistogram surface;
   LatencyHistogram distance;
 };
 
 Json timingJson(const MapTimes& times) {
   Json json;
-  const std::array<std::pair<const char*, const LatencyHistogram*>, 3> parts{
-      {{"volume", &times.depth}, {"surface", &times.surface}, {"distance", &times.distance}}};
+  const std::array<std::pair<const char*, const LatencyHistogram*>, 4> parts{{{"depth", &times.depth},
+                                                                              {"volume", &times.volume},
+                                                                              {"surface", &times.surface},
+                                                                              {"distance", &times.distance}}};
   for (const auto& [name, cpu] : parts) {
     constexpr double kMilli = 1e3;
     json[name] = {{"count", cpu->count()},
@@ -228,8 +231,9 @@ void FuseRun::fuse(Stamp stamp, const StereoFrame* frame, const DepthImageView& 
   if (frame != nullptr) input.image = frame->image;
   if (settings_.map_stage.labels) input.labels = labels_.at(stamp);
   bool taken = false;
-  const Spent depth_time =
-      measured([&] { taken = map_->takeDepth(input, {}, report_).code != StatusCode::kInvalidInput; });
+  const Spent depth_time = measured([&] { taken = map_->measure(input, {}, report_).ok(); });
+  const Spent volume_time = measured(
+      [&] { taken = taken && map_->integrate(input, {}, report_).code != StatusCode::kInvalidInput; });
   if (!taken) {
     ++refused_;
     return;
@@ -237,6 +241,7 @@ void FuseRun::fuse(Stamp stamp, const StereoFrame* frame, const DepthImageView& 
   ++fused_;
   labelled_ += report_.with_labels ? 1 : 0;
   times_.depth.add(depth_time.cpu);
+  times_.volume.add(volume_time.cpu);
   const Eigen::Vector3d& vehicle = pose->T_world_body.translation;
   // What is left over is counted in the report and drawn later.
   times_.surface.add(measured([&] { static_cast<void>(map_->draw(vehicle, {}, report_)); }).cpu);

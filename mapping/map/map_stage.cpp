@@ -21,6 +21,18 @@ VolumeSettings volumeSettings(const MapSettings& settings) {
   return volume;
 }
 
+DepthSettings depthSettings(const MapSettings& settings) {
+  DepthSettings depth;
+  depth.max_depth = settings.most_range;
+  return depth;
+}
+
+SensorDepthSettings sensorSettings(const MapSettings& settings) {
+  SensorDepthSettings sensor;
+  sensor.max_depth = settings.most_range;
+  return sensor;
+}
+
 DistanceLimits distanceLimits(const MapSettings& settings) {
   DistanceLimits limits;
   limits.cell_size = settings.voxel_size;
@@ -35,63 +47,82 @@ std::size_t mostPixels(const Rig& rig, const DepthImageView* sensor) {
 
 }  // namespace
 
-MapStage::DepthSide::DepthSide(const PinholeIntrinsics& camera, const SE3& T_body_camera, const Rig& rig)
-    : warp(camera, rig.camera[0], rig.T_body_cam[0].inverse() * T_body_camera),
-      grey(camera.pixels()),
-      labels(camera.pixels()) {}
+MapStage::Sensor::Sensor(const DepthImageView& camera, const Rig& rig, const MapSettings& settings)
+    : depth(camera.camera, camera.T_body_camera, sensorSettings(settings)),
+      warp(camera.camera, rig.camera[0], rig.T_body_cam[0].inverse() * camera.T_body_camera),
+      buffer(depth.makeBuffer()) {}
+
+MapStage::Pair::Pair(const Rig& rig, const MapSettings& settings)
+    : depth(rig, depthSettings(settings)), buffer(depth.makeBuffer()) {}
 
 MapStage::MapStage(const Rig& rig, const MapSettings& settings, const DepthImageView* depth_sensor,
                    SurfaceSink* spill)
     : rig_(rig),
       confusion_(kLabelValues, static_cast<float>(settings.label_certainty)),
       volume_(volumeSettings(settings)),
-      sensor_(depth_sensor == nullptr
-                  ? nullptr
-                  : std::make_unique<DepthSide>(depth_sensor->camera, depth_sensor->T_body_camera, rig)),
+      sensor_(depth_sensor == nullptr ? nullptr : std::make_unique<Sensor>(*depth_sensor, rig, settings)),
+      pair_(rig.camera_count < 2 ? nullptr : std::make_unique<Pair>(rig, settings)),
       integrator_(volume_, mostPixels(rig, depth_sensor)),
       store_(static_cast<std::size_t>(settings.surface_mib) << 20U, volume_.blockSize(), spill),
       surface_(volume_, confusion_, store_),
       distance_(distanceLimits(settings)),
       volume_distance_(volume_, distance_) {}
 
-void MapStage::addViews(const MapInput& input, DepthSide& side, DepthImageView& depth, MapReport& report) {
-  if (!input.image[0].empty() && depth.intensity == nullptr) {
-    if (side.warp.apply(input.image[0], depth.depth, side.grey.data()).ok()) {
-      depth.intensity = side.grey.data();
-    } else {
-      ++counters_.wrong_size;
-    }
-  }
-  if (!input.labels.empty() && depth.labels == nullptr) {
-    if (side.warp.apply(input.labels, depth.depth, side.labels.data()).ok()) {
-      depth.labels = side.labels.data();
-    } else {
-      ++counters_.wrong_size;
-    }
-  }
-  report.with_labels = depth.labels != nullptr;
-}
-
 Status MapStage::step(const MapInput& input, const MapEffort& effort, MapReport& report) {
-  const Status taken = takeDepth(input, effort.volume, report);
+  if (!measure(input, effort.depth, report).ok()) return report.status;
+  const Status taken = integrate(input, effort.volume, report);
   if (taken.code == StatusCode::kInvalidInput) return taken;
   const Status drawn = draw(input.T_map_body.translation, effort.surface, report);
   updateDistance(input.T_map_body.translation, effort.distance, report);
   return taken.ok() ? drawn : taken;
 }
 
-Status MapStage::takeDepth(const MapInput& input, const VolumeEffort& effort, MapReport& report) {
+Status MapStage::measure(const MapInput& input, const DepthEffort& effort, MapReport& report) {
   report = {};
   report.stamp = input.stamp;
-  DepthImageView depth = input.depth;
-  if (depth.depth == nullptr || sensor_ == nullptr) {
+  measured_ = nullptr;
+  report.from_sensor = input.depth.depth != nullptr && sensor_ != nullptr;
+  report.status = report.from_sensor ? measureBySensor(input) : measureByPair(input, effort);
+  if (!report.status.ok()) {
     ++counters_.without_depth;
-    return report.status = {StatusCode::kInvalidInput, "neither a depth image nor two images"};
+    return report.status;
   }
-  report.from_sensor = true;
-  addViews(input, *sensor_, depth, report);
+  measured_ = report.from_sensor ? &sensor_->buffer : &pair_->buffer;
+  report.with_labels = measured_->has_labels;
+  return report.status;
+}
+
+Status MapStage::measureBySensor(const MapInput& input) {
+  Sensor& sensor = *sensor_;
+  DepthBuffer& out = sensor.buffer;
+  const int width = input.depth.camera.width;
+  const Status status =
+      sensor.depth.step(input.depth.depth, width, input.depth.camera.height, width, input.stamp, out);
+  if (!status.ok()) return status;
+  const auto bring = [&](const ImageView& image, std::vector<std::uint8_t>& to) {
+    if (image.empty()) return false;
+    const bool fits = sensor.warp.apply(image, out.depth.data(), to.data()).ok();
+    if (!fits) ++counters_.wrong_size;
+    return fits;
+  };
+  out.has_intensity = bring(input.image[0], out.intensity);
+  out.has_labels = bring(input.labels, out.labels);
+  return status;
+}
+
+Status MapStage::measureByPair(const MapInput& input, const DepthEffort& effort) {
+  if (pair_ == nullptr) return {StatusCode::kInvalidInput, "neither a depth image nor two cameras"};
+  const Status status = pair_->depth.step(input.image[0], input.image[1], input.stamp, effort, pair_->buffer);
+  if (status.ok() && !input.labels.empty() && !pair_->depth.addLabels(input.labels, pair_->buffer).ok()) {
+    ++counters_.wrong_size;
+  }
+  return status;
+}
+
+Status MapStage::integrate(const MapInput& input, const VolumeEffort& effort, MapReport& report) {
+  if (measured_ == nullptr) return report.status = {StatusCode::kInvalidInput, "nothing was measured"};
   if (input.epoch != epoch_) beginEpoch(input.epoch);
-  report.status = integrator_.step(depth, input.T_map_body, effort, report.volume);
+  report.status = integrator_.step(measured_->view(), input.T_map_body, effort, report.volume);
   if (report.status.code != StatusCode::kInvalidInput) ++counters_.taken;
   return report.status;
 }

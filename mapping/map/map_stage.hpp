@@ -16,6 +16,8 @@
 #include <vector>
 
 #include "estimator/camera/rig.hpp"
+#include "mapping/depth/depth_stage.hpp"
+#include "mapping/depth/sensor_depth.hpp"
 #include "mapping/distance/volume_distance.hpp"
 #include "mapping/map/map_settings.hpp"
 #include "mapping/map/view_warp.hpp"
@@ -34,6 +36,7 @@ struct MapInput {
 };
 
 struct MapEffort {
+  DepthEffort depth;
   VolumeEffort volume;
   SurfaceEffort surface;
   DistanceEffort distance;
@@ -52,7 +55,7 @@ struct MapReport {
 
 struct MapCounters {
   std::uint64_t taken = 0;
-  std::uint64_t without_depth = 0;  ///< neither a depth image nor a pair
+  std::uint64_t without_depth = 0;  ///< neither a depth image nor a pair, or none that fits the camera
   std::uint64_t wrong_size = 0;     ///< labels or grey values that do not fit: left out, the depth is taken
   std::uint64_t epochs = 0;
 };
@@ -67,12 +70,16 @@ class MapStage {
   /// All of the below, in their order.
   Status step(const MapInput& input, const MapEffort& effort, MapReport& report);
 
-  /// Depth into the volume. The report begins here.
-  Status takeDepth(const MapInput& input, const VolumeEffort& effort, MapReport& report);
+  /// Depth of this moment, from the sensor or the pair, with grey values and labels. The report begins here.
+  Status measure(const MapInput& input, const DepthEffort& effort, MapReport& report);
+  /// What was measured last, into the volume.
+  Status integrate(const MapInput& input, const VolumeEffort& effort, MapReport& report);
   /// The surface of what changed.
   Status draw(const Eigen::Vector3d& p_map_vehicle, const SurfaceEffort& effort, MapReport& report);
   void updateDistance(const Eigen::Vector3d& p_map_vehicle, const DistanceEffort& effort, MapReport& report);
 
+  /// Null where the rig has one camera.
+  [[nodiscard]] const DepthStage* stereo() const { return pair_ ? &pair_->depth : nullptr; }
   [[nodiscard]] const DistanceField& distance() const { return distance_; }
   [[nodiscard]] const VoxelVolume& volume() const { return volume_; }
   [[nodiscard]] const VolumeIntegrator& integrator() const { return integrator_; }
@@ -83,21 +90,30 @@ class MapStage {
   [[nodiscard]] const MapCounters& counters() const { return counters_; }
 
  private:
-  /// What a camera that gives depth needs beside it.
-  struct DepthSide {
-    DepthSide(const PinholeIntrinsics& camera, const SE3& T_body_camera, const Rig& rig);
+  /// A depth sensor, and what camera 0 sees at its pixels.
+  struct Sensor {
+    Sensor(const DepthImageView& camera, const Rig& rig, const MapSettings& settings);
+    SensorDepth depth;
     ViewWarp warp;
-    std::vector<std::uint8_t> grey;
-    std::vector<std::uint8_t> labels;
+    DepthBuffer buffer;
+  };
+  /// Two cameras.
+  struct Pair {
+    Pair(const Rig& rig, const MapSettings& settings);
+    DepthStage depth;
+    DepthBuffer buffer;
   };
 
+  Status measureBySensor(const MapInput& input);
+  Status measureByPair(const MapInput& input, const DepthEffort& effort);
   void beginEpoch(std::uint32_t epoch);
-  void addViews(const MapInput& input, DepthSide& side, DepthImageView& depth, MapReport& report);
 
   Rig rig_;
   ConfusionModel confusion_;
   VoxelVolume volume_;
-  std::unique_ptr<DepthSide> sensor_;
+  std::unique_ptr<Sensor> sensor_;
+  std::unique_ptr<Pair> pair_;
+  const DepthBuffer* measured_ = nullptr;  ///< of the sensor or the pair
   VolumeIntegrator integrator_;
   SurfaceStore store_;
   SurfaceStage surface_;
