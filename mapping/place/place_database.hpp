@@ -31,6 +31,8 @@
 
 namespace swiftlet {
 
+inline constexpr std::size_t kMaxPlaceCandidates = 32;
+
 struct PlaceDatabaseSettings {
   std::size_t keyframes = 2000;  ///< up to 65 534
   /// Words of keyframes that can be stored together; 0: 400 for each keyframe.
@@ -40,12 +42,10 @@ struct PlaceDatabaseSettings {
   float min_reference = 0.02F;  ///< the predecessor's score counts as at least this,
   float max_reference = 0.3F;   ///< and at most this: who hovers looks more like before than any revisit does
   double island_gap = 3.0;      ///< s: keyframes nearer in time than this belong to one island
-  std::size_t per_island = 3;   ///< candidates of one island at most
-  std::size_t candidates = 10;  ///< at most kMaxPlaceCandidates
-  int consistent = 0;           ///< least number of preceding queries with an island beside a candidate's
+  std::size_t per_island = kMaxPlaceCandidates;  ///< candidates of one island at most
+  std::size_t candidates = 10;                   ///< at most kMaxPlaceCandidates
+  int consistent = 0;  ///< least number of preceding queries with an island beside a candidate's
 };
-
-inline constexpr std::size_t kMaxPlaceCandidates = 32;
 
 /// A keyframe that may show the same place.
 struct PlaceCandidate {

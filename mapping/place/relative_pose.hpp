@@ -82,11 +82,11 @@ struct RelativePoseSupport {
   double translation_shift = 0;  ///< m
 };
 
+inline constexpr std::size_t kSupportSeeds = 16;
 /// Looks at the kSupportSeeds used matches of the greatest leverage (Hoaglin, Welsch, "The Hat Matrix in
 /// Regression and ANOVA", 1978), each with the used ones whose bearings lie within `reach` [rad] of its own
 /// in both views. To first order about `T_old_new`, where `points` were refined; infinite where the others do
 /// not determine the pose. Costs about two steps of the refinement.
-inline constexpr std::size_t kSupportSeeds = 16;
 RelativePoseSupport relativePoseSupport(const RelativePoseSettings& settings,
                                         std::span<const MatchedPoint> points, const SE3& T_old_new,
                                         double reach);

@@ -33,9 +33,43 @@ std::vector<PlaceQuery> retrieve(const ImageSet& set, const std::vector<PlaceKey
   return found;
 }
 
+const char* describe(Order order) {
+  switch (order) {
+    case Order::kScore:
+      return "by score";
+    case Order::kConsistentFirst:
+      return "consistent ones first";
+    case Order::kConsistentOnly:
+      return "consistent ones only";
+    case Order::kEachIslandFirst:
+      return "the best of each island first";
+  }
+  return "";
+}
+
+namespace {
+
+std::vector<std::size_t> inOrder(const PlaceQuery& query, Order order) {
+  std::vector<std::size_t> first, later;
+  std::vector<float> islands;  // known by their scores
+  for (const PlaceCandidate& c : query.candidates) {
+    const auto index = static_cast<std::size_t>(c.index);
+    bool early = order == Order::kScore || c.consistent > 0;
+    if (order == Order::kEachIslandFirst) {
+      early = std::find(islands.begin(), islands.end(), c.island_score) == islands.end();
+      islands.push_back(c.island_score);
+    }
+    (early ? first : later).push_back(index);
+  }
+  if (order != Order::kConsistentOnly) first.insert(first.end(), later.begin(), later.end());
+  return first;
+}
+
+}  // namespace
+
 void reportRetrieval(const ImageSet& set, const std::vector<PlaceQuery>& found,
                      const PlaceDatabaseSettings& settings, const Verdicts& reference,
-                     const Verdicts& verified, const char* name) {
+                     const Verdicts& verified, Order order, const char* name) {
   const auto old_enough = [&](std::size_t i, std::size_t j) {
     return set.shots[j].seconds - set.shots[i].seconds >= settings.exclude;
   };
@@ -49,16 +83,17 @@ void reportRetrieval(const ImageSet& set, const std::vector<PlaceQuery>& found,
     }
     if (revisits[j]) ++revisiting;
   }
-  std::printf("    retrieval, %s (%zu pairs and %zu images to find):\n", name, pairs, revisiting);
+  std::printf("    retrieval, %s, %s (%zu pairs and %zu images to find):\n", name, describe(order), pairs,
+              revisiting);
   for (const std::size_t most : {1U, 2U, 4U, 10U, 20U, 32U}) {
     if (most > settings.candidates) break;
     Yield y;
     std::size_t both = 0;
     for (std::size_t j = 0; j < found.size(); ++j) {
       bool closed = false;
-      const auto& candidates = found[j].candidates;
+      const std::vector<std::size_t> candidates = inOrder(found[j], order);
       for (std::size_t k = 0; k < std::min(most, candidates.size()); ++k) {
-        const auto i = static_cast<std::size_t>(candidates[k].index);
+        const std::size_t i = candidates[k];
         const Verdict verdict = verified[i][j];
         const bool revisit = set.kind[i][j] == PairKind::kRevisit;
         if (revisit && verdict == Verdict::kRight) ++y.pairs;

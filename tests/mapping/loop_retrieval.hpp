@@ -19,10 +19,13 @@ using Verdicts = std::vector<std::vector<Verdict>>;
 std::vector<PlaceQuery> retrieve(const ImageSet& set, const std::vector<PlaceKeyframe>& keyframes,
                                  const Vocabulary& vocabulary, const PlaceDatabaseSettings& settings);
 
+/// In which candidates are verified.
+enum class Order { kScore, kConsistentFirst, kConsistentOnly, kEachIslandFirst };
+
 /// Prints what share of the pairs and of the images that revisit (by `reference`, a verification of all
 /// pairs) comes out when only candidates are verified, as `verified` says.
 void reportRetrieval(const ImageSet& set, const std::vector<PlaceQuery>& found,
                      const PlaceDatabaseSettings& settings, const Verdicts& reference,
-                     const Verdicts& verified, const char* name);
+                     const Verdicts& verified, Order order, const char* name);
 
 }  // namespace swiftlet::loop_sets

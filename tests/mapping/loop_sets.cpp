@@ -85,6 +85,7 @@ std::optional<ImageSet> readKitchen(const std::string& data) {
   if (!std::filesystem::exists(folder + "poses_c2w.txt")) return std::nullopt;
   ImageSet set;
   set.name = "redkitchen_50";
+  set.exclude_seconds = 9.5 * 20 / 30.0;  // 200 frames at 30 Hz are a revisit
   // Colour beside depth as the data's page estimates it; the body is the depth camera.
   set.rig.camera_count = 1;
   set.rig.camera[0] = CameraModel(CameraKind::kPinholeRadtan, 640, 480, Eigen::Vector4d(525, 525, 323, 238),

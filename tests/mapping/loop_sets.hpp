@@ -29,6 +29,7 @@ struct ImageSet {
   Eigen::Vector4d depth_camera = Eigen::Vector4d::Zero();
   SE3 T_body_depth;
   bool has_truth = true;
+  double exclude_seconds = 10;  ///< nearer in time is no revisit
   std::vector<Shot> shots;
   /// Of the pair (i, j), i < j.
   std::vector<std::vector<PairKind>> kind;

@@ -140,6 +140,7 @@ std::optional<ImageSet> readFlight(const std::string& folder, double min_seconds
   ImageSet set;
   set.name = std::filesystem::path(folder).filename().string();
   set.rig = readCalibration(folder).rig;
+  set.exclude_seconds = min_seconds;
   set.T_body_depth = set.rig.T_body_cam[0];
   LogCounters counters;
   LogWarnings warnings;

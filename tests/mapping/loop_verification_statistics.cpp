@@ -240,14 +240,18 @@ void printFates(const char* what, const std::map<LoopFate, std::size_t>& fates) 
 void propose(const ImageSet& set, const std::vector<PlaceKeyframe>& keyframes, const Verdicts& reference,
              const Verdicts& verdicts) {
   PlaceDatabaseSettings settings;
-  settings.exclude = least_seconds;
-  const auto run = [&](const char* name) {
-    reportRetrieval(set, retrieve(set, keyframes, Vocabulary::shipped(), settings), settings, reference,
-                    verdicts, name);
+  settings.exclude = set.exclude_seconds;
+  const auto run = [&](const char* name, std::initializer_list<Order> orders) {
+    const auto found = retrieve(set, keyframes, Vocabulary::shipped(), settings);
+    for (const Order order : orders) reportRetrieval(set, found, settings, reference, verdicts, order, name);
   };
-  run("as set");
+  run("as set", {Order::kScore, Order::kConsistentFirst, Order::kConsistentOnly, Order::kEachIslandFirst});
+  settings.per_island = 3;
+  run("three of an island", {Order::kScore});
   settings.candidates = settings.per_island = kMaxPlaceCandidates;
-  run("all the best");
+  run("32", {Order::kScore});
+  settings.min_relative = 0;
+  run("32, however unlike", {Order::kScore});
 }
 
 bool own_only = false;

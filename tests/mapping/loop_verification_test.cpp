@@ -200,6 +200,9 @@ TEST_CASE("each candidate's fate says where it ended") {
   strict = {};
   strict.max_distance = 0.1;
   CHECK(fateOf({}, strict) == LoopFate::kTooFar);
+  strict = {};
+  strict.max_rotation_shift = 1e-6;
+  CHECK(fateOf({}, strict) == LoopFate::kFragile);
   for (std::size_t i = 0; i < kLoopFates; ++i) CHECK(std::strlen(describe(static_cast<LoopFate>(i))) > 3);
 }
 
