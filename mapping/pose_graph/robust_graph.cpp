@@ -19,15 +19,17 @@ constexpr std::uint32_t kCandidates = 30000;
 /// Covariances of relative poses on the solved graph: 10 ms each on the largest public ones.
 constexpr std::uint32_t kReconsidered = 300;
 
-/// One false loop in ten graphs, were all loops false.
-constexpr double kFalseExpected = 0.1;
+/// Random loops believed a graph, were all loops false and each at the limit: of those that agree with every
+/// loop of the largest set, and of those that come back, which only the solution vouches for.
+constexpr double kFalseProven = 1;
+constexpr double kFalseTakenBack = 0.1;
 
 /// While weights change a rough solution will do.
 constexpr int kGraduatedIterations = 5;
 constexpr double kGraduatedTolerance = 1e-4;
 
-/// Loops come back in at most so many rounds.
-constexpr int kRounds = 5;
+/// Loops come back in at most so many rounds; most graphs need two or three.
+constexpr int kRounds = 10;
 
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
@@ -122,6 +124,11 @@ Status selectLoops(const RobustGraphSettings& settings, const OdometryChain<Pose
   return okStatus();
 }
 
+/// The more loops are offered, the more random ones agree.
+double chanceFor(const RobustGraphSettings& settings, double max_false, std::uint32_t loops) {
+  return std::min(settings.selection.max_gate_chance, max_false / std::max(loops, 1U));
+}
+
 /// Loops chosen, to the poses of the graph.
 template <typename Pose>
 class RobustSolution {
@@ -129,7 +136,11 @@ class RobustSolution {
   RobustSolution(const RobustGraphSettings& settings, const OdometryChain<Pose>& chain,
                  const PoseGraph<Pose>& graph, TakenLoops& taken, std::size_t spare_edges,
                  const RobustGraphReport& report)
-      : settings_(settings), chain_(chain), whole_(graph), taken_(taken) {
+      : settings_(settings),
+        chain_(chain),
+        whole_(graph),
+        taken_(taken),
+        max_chance_(chanceFor(settings, settings.max_false_taken_back, report.loops)) {
     part_.poses = graph.poses;
     for (std::uint32_t e = 0; e < graph.edges.size(); ++e) {
       if (report.fates[e] == EdgeFate::kOdometry) part_.edges.push_back(graph.edges[e]);
@@ -166,19 +177,29 @@ class RobustSolution {
 
   /// Step 5 once: how many loops came back.
   Status takeBack(std::vector<OpenLoop>& open, std::uint32_t& count) {
-    count = 0;
-    const auto fits = [&](const OpenLoop& loop, bool& fit) {
-      return this->fits(whole_.edges[loop.edge], fit);
-    };
-    for (std::size_t k = 0; k < open.size();) {
-      bool fit = false;
-      if (const Status status = fits(open[k], fit); !status.ok()) return status;
-      if (fit) {
-        back_.push_back(open[k].edge);
-        open.erase(open.begin() + static_cast<std::ptrdiff_t>(k));
-      } else {
-        ++k;
+    // Those that fit with their own covariance first: they bend the solution least, and it knows more then.
+    for (const bool own_covariance : {true, false}) {
+      std::uint32_t asked = 0;
+      std::size_t left = 0;
+      for (const OpenLoop& loop : open) {
+        bool fit = false;
+        const Cycle cycle(chain_, optimizer_->graph(), whole_.edges[loop.edge]);
+        Status status = okStatus();
+        if (own_covariance) {
+          fit = believed(cycle, cycle.chained.covariance, settings_.graduated.max_chi_squared);
+        } else if (asked < settings_.max_reconsidered && mayAgree(cycle)) {
+          ++asked;
+          status = agrees(cycle, fit);
+        }
+        if (!status.ok()) return status;
+        if (fit) {
+          back_.push_back(loop.edge);
+        } else {
+          open[left++] = loop;
+        }
       }
+      open.resize(left);
+      if (!back_.empty()) break;
     }
     // Added only now: a new edge would cost a new factor for the next covariance.
     for (const std::uint32_t e : back_) {
@@ -192,26 +213,38 @@ class RobustSolution {
   [[nodiscard]] const std::vector<Pose>& poses() const { return optimizer_->graph().poses; }
 
  private:
-  /// Whether the loop agrees with the solution as a true loop would and a random one would not.
-  Status fits(const RelativePose<Pose>& loop, bool& fit) {
-    fit = false;
-    const ChainedLoop<Pose> chained = chainLoop(chain_, loop);
-    const PoseGraph<Pose>& solved = optimizer_->graph();
-    const Pose Z = chain_.pose(chained.from).inverse() * chained.T_chain_loop;
-    const Pose X = solved.poses[chained.from].inverse() * solved.poses[chained.to];
-    const PoseVector<Pose> error = poseLog(Z.inverse() * X);
-    // The solution knows the relative pose better than the odometry alone: what fails this fails that.
-    const PoseMatrix<Pose> loose = chained.covariance + chain_.covariance(chained.from, chained.to);
-    if (!(cycleTest<Pose>(loose, error).chi_squared <= settings_.selection.gate_chi_squared))
-      return okStatus();
-    PoseMatrix<Pose> known;
-    if (const Status status = optimizer_->relativeCovariance(chained.from, chained.to, known); !status.ok()) {
-      return status;
+  /// A loop and the solution, round.
+  struct Cycle {
+    ChainedLoop<Pose> chained;
+    PoseVector<Pose> error;
+
+    Cycle(const OdometryChain<Pose>& chain, const PoseGraph<Pose>& solved, const RelativePose<Pose>& loop)
+        : chained(chainLoop(chain, loop)) {
+      const Pose Z = chain.pose(chained.from).inverse() * chained.T_chain_loop;
+      error = poseLog(Z.inverse() * (solved.poses[chained.from].inverse() * solved.poses[chained.to]));
     }
-    const CycleTest test = cycleTest<Pose>(chained.covariance + known, error);
-    fit = test.chi_squared <= settings_.selection.gate_chi_squared &&
-          logChance<Pose>(test, chain_.logBox(chained.to)) <= std::log(settings_.selection.max_gate_chance);
-    return okStatus();
+  };
+
+  /// A true loop passes, a random one hardly does.
+  [[nodiscard]] bool believed(const Cycle& cycle, const PoseMatrix<Pose>& covariance, double limit) const {
+    const CycleTest test = cycleTest<Pose>(covariance, cycle.error);
+    return test.chi_squared <= limit &&
+           logChance<Pose>(test, chain_.logBox(cycle.chained.to)) <= std::log(max_chance_);
+  }
+
+  /// The solution knows the relative pose better than the odometry alone: what fails this fails agrees().
+  [[nodiscard]] bool mayAgree(const Cycle& cycle) const {
+    const PoseMatrix<Pose> loose =
+        cycle.chained.covariance + chain_.covariance(cycle.chained.from, cycle.chained.to);
+    return cycleTest<Pose>(loose, cycle.error).chi_squared <= settings_.selection.gate_chi_squared;
+  }
+
+  Status agrees(const Cycle& cycle, bool& fit) {
+    PoseMatrix<Pose> known;
+    const Status status = optimizer_->relativeCovariance(cycle.chained.from, cycle.chained.to, known);
+    fit = status.ok() &&
+          believed(cycle, cycle.chained.covariance + known, settings_.selection.gate_chi_squared);
+    return status;
   }
 
   Status take(std::uint32_t e) {
@@ -230,31 +263,23 @@ class RobustSolution {
   const OdometryChain<Pose>& chain_;
   const PoseGraph<Pose>& whole_;
   TakenLoops& taken_;
+  double max_chance_;
   PoseGraph<Pose> part_;
   std::unique_ptr<PoseGraphOptimizer<Pose>> optimizer_;
   std::vector<std::uint32_t> back_;
 };
 
-/// Of the open loops those that contradict fewest, at most as many as may be asked.
-void fewestConflicts(std::uint32_t most, std::vector<OpenLoop>& open) {
-  std::stable_sort(open.begin(), open.end(),
-                   [](const OpenLoop& a, const OpenLoop& b) { return a.conflicts < b.conflicts; });
-  if (open.size() > most) open.resize(most);
-}
-
-/// Steps 3 to 6.
+/// Steps 3 to 5.
 template <typename Pose>
 Status solveTaken(const RobustGraphSettings& settings, std::span<const std::uint32_t> fixed,
                   const OdometryChain<Pose>& chain, TakenLoops& taken, std::vector<OpenLoop>& open,
                   PoseGraph<Pose>& graph, RobustGraphReport& report) {
-  fewestConflicts(settings.max_reconsidered, open);
+  std::stable_sort(open.begin(), open.end(),
+                   [](const OpenLoop& a, const OpenLoop& b) { return a.conflicts < b.conflicts; });
   RobustSolution<Pose> solution(settings, chain, graph, taken, open.size(), report);
   Status status = solution.solve(fixed, report);
   if (status.ok() && settings.method != RobustMethod::kSelection) status = solution.graduate(report);
   if (settings.method == RobustMethod::kSelectionAndGraduated) {
-    for (std::size_t k = 0; k < taken.edges.size(); ++k) {
-      if (taken.weights[k] == 0) open.push_back({taken.edges[k], 0});
-    }
     std::uint32_t count = 1;
     for (int round = 0; round < kRounds && count > 0 && status.ok(); ++round) {
       status = solution.takeBack(open, count);
@@ -285,7 +310,8 @@ RobustGraphSettings robustGraphSettings() {
   settings.max_nodes = kNodes;
   settings.max_candidates = kCandidates;
   settings.max_reconsidered = kReconsidered;
-  settings.max_false_expected = kFalseExpected;
+  settings.max_false_proven = kFalseProven;
+  settings.max_false_taken_back = kFalseTakenBack;
   settings.effort.iterations = 100;
   return settings;
 }
@@ -345,8 +371,7 @@ Status solveRobustly(const RobustGraphSettings& settings, std::span<const std::u
   TakenLoops taken;
   std::vector<OpenLoop> open;
   RobustGraphSettings adapted = settings;
-  adapted.selection.max_gate_chance =
-      std::min(settings.selection.max_gate_chance, settings.max_false_expected / std::max(report.loops, 1U));
+  adapted.selection.max_gate_chance = chanceFor(settings, settings.max_false_proven, report.loops);
   if (settings.method == RobustMethod::kGraduated) {
     for (std::uint32_t e = 0; e < graph.edges.size(); ++e) {
       if (is_odometry[e]) continue;

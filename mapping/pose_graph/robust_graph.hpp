@@ -8,13 +8,13 @@
 // 3. The graph of odometry and selected loops is solved.
 // 4. Graduated non-convexity on these loops, from that solution: drops those that agree in pairs but not all
 //    together.
-// 5. Loops that were not selected (those that contradict fewest of the largest set, at most
-//    `max_reconsidered`) and those dropped come back when they agree with the solution and chance would not:
-//    chi-squared and chance with the covariance of the loop and of the relative pose on the solved graph. A
-//    true loop may be far off a solution without it where that is vague; its own covariance alone would
-//    reject it. Then 4 again, until no loop comes back.
+// 5. Loops that were not selected and those that were dropped come back when they agree with the solution and
+//    chance would not, by one of two tests: with the loop's own covariance alone; or, for the
+//    `max_reconsidered` that contradict fewest of the largest set, with that of the relative pose on the
+//    solved graph added (a true loop may be far off a solution without it where that is vague). Then 4
+//    again, until no loop comes back.
 // In 2 and 5 a loop that nothing but the odometry or the solution vouches for is believed at a chance of at
-// most `max_false_expected` / loops: the more loops are offered, the more random ones agree by chance.
+// most max_false_... / loops: the more loops are offered, the more random ones agree.
 // RobustMethod leaves steps out, for comparison.
 //
 // Frames and cost: pose_graph.hpp. Errors: kInvalidInput (poses or edges that the optimizer refuses),
@@ -46,10 +46,12 @@ struct RobustGraphSettings {
   GraduatedSettings graduated;
   std::uint32_t max_nodes = 0;         ///< of the search for the largest set
   std::uint32_t max_candidates = 0;    ///< loops that pass the gate
-  std::uint32_t max_reconsidered = 0;  ///< loops asked again on the solved graph
-  double max_false_expected = 0;       ///< loops believed by chance, were all of them false
-  std::size_t max_factor_values = 0;   ///< of the optimizer, PoseGraphLimits
-  OptimizeEffort effort;               ///< of the first and the last solution
+  std::uint32_t max_reconsidered = 0;  ///< covariances asked for in 5, a round
+  /// Loops believed by chance, were all of them false: on the odometry alone (2), on the solution alone (5).
+  double max_false_proven = 0;
+  double max_false_taken_back = 0;
+  std::size_t max_factor_values = 0;  ///< of the optimizer, PoseGraphLimits
+  OptimizeEffort effort;              ///< of the first and the last solution
 };
 
 /// The settings used everywhere. A loop stays on the solved graph while its chi-squared is one that a true

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -138,6 +139,77 @@ TEST_CASE("false loops are added on request, the same for one seed") {
   const double spoiled = runPoseGraph(request).solve.final_cost;
   request.file = in;
   CHECK(spoiled > 10 * runPoseGraph(request).solve.final_cost);
+}
+
+TEST_CASE("--robust leaves false loops out, says which, and writes the graph without them") {
+  const ScratchFolder folder("pose_graph_robust");
+  const std::string in = folder.file("in.g2o");
+  const std::string out = folder.file("out.g2o");
+  const std::string json = folder.file("out.json");
+  const std::string csv = folder.file("loops.csv");
+  // Twice around: pose 40 + k is where pose k was.
+  std::string text;
+  for (int k = 0; k < 80; ++k) {
+    const double turn = k % 10 == 9 ? M_PI / 2 : 0;
+    const double off = 0.002 * ((k * 7) % 5 - 2);
+    if (k < 79) {
+      text += "EDGE_SE2 " + std::to_string(3 * (k + 1)) + " " + std::to_string(3 * (k + 2)) + " " +
+              std::to_string(1 + off) + " " + std::to_string(off) + " " + std::to_string(turn + 0.5 * off) +
+              " 1e4 0 0 1e4 0 1e5\n";
+    }
+    if (k < 40) {
+      text += "EDGE_SE2 " + std::to_string(3 * (k + 1)) + " " + std::to_string(3 * (k + 41)) + " " +
+              std::to_string(off) + " " + std::to_string(-off) + " 0 1e4 0 0 1e4 0 1e5\n";
+    }
+  }
+  write(in, text);
+  REQUIRE(run({"pose-graph", in, "--robust", "--inject-outliers", "60", "--seed", "4", "--out", out, "--json",
+               json, "--loops", csv}) == kExitDone);
+  const auto figures = nlohmann::json::parse(textOf(json));
+  CHECK(figures["edges"] == 179);
+  CHECK(figures["robust"]["loops"] == 100);
+  CHECK(figures["robust"]["own"]["kept"] == 40);
+  CHECK(figures["robust"]["own"]["rejected"] == 0);
+  CHECK(figures["robust"]["injected"]["rejected"] == 60);
+  // Every loop with its ids; those of the file that are not kept are those that are not written.
+  std::istringstream lines(textOf(csv));
+  std::string line;
+  std::getline(lines, line);
+  CHECK(line == "edge,from_id,to_id,fate,injected");
+  int injected = 0;
+  int kept = 0;
+  for (int count = 0; std::getline(lines, line); ++count) {
+    if (count == 0) CHECK(line.find(",3,123,kept,0") != std::string::npos);
+    injected += line.ends_with(",1") ? 1 : 0;
+    kept += line.find(",kept,") != std::string::npos ? 1 : 0;
+  }
+  CHECK(injected == 60);
+  CHECK(kept == 40);
+  CHECK(readG2oFile(out).graph.edgeCount() == 119);
+  // The poses are those of the graph that was never spoiled.
+  const std::string whole = folder.file("whole.g2o");
+  REQUIRE(run({"pose-graph", in, "--out", whole}) == kExitDone);
+  const G2oFile robust = readG2oFile(out);
+  const G2oFile plain = readG2oFile(whole);
+  for (std::size_t k = 0; k < 80; ++k) {
+    CHECK((robust.graph.plane.poses[k].translation - plain.graph.plane.poses[k].translation).norm() < 1e-6);
+  }
+  const std::string spoiled = folder.file("spoiled.g2o");
+  REQUIRE(run({"pose-graph", in, "--inject-outliers", "60", "--seed", "4", "--iterations", "0", "--out",
+               spoiled}) == kExitDone);
+  REQUIRE(run({"pose-graph", spoiled, "--robust", "--out", out}) == kExitDone);
+  CHECK(readG2oFile(out).graph.edgeCount() == 119);
+
+  PoseGraphRequest request;
+  request.file = in;
+  request.loops = csv;
+  CHECK(complaint(request).find("--loops: no loop is rejected. Give --robust") != std::string::npos);
+  request.robust = true;
+  request.start = StartRule::kGiven;
+  CHECK(complaint(request).find("--start") != std::string::npos);
+  request.start = StartRule::kAuto;
+  request.loops = folder.file("no/such/folder/loops.csv");
+  CHECK(complaint(request).find("cannot be written") != std::string::npos);
 }
 
 TEST_CASE("bad graphs are named by file, line, field and remedy, and leave nothing behind") {

@@ -252,6 +252,33 @@ TEST_CASE("A rejected loop is believed once a better test of it passes, and drop
   CHECK(selection.reconsider(3, passed, kNodes).code == StatusCode::kInvalidInput);
 }
 
+TEST_CASE("A loop rejected early is taken once support arrives, without being asked again", "[pose_graph]") {
+  Random random(72);
+  const PoseMatrix<SE2> vague = testCovariance<SE2>(0.05, 0.1);
+  const SimulatedChain<SE2> chain(200, vague, random);
+  LoopSelection<SE2> selection({200, 10}, loopSelectionSettings<SE2>());
+  (void)selection.odometry().beginComponent();
+  for (std::uint32_t k = 1; k < 200; ++k) {
+    (void)selection.odometry().append(chain.odometry.relative(k - 1, k), vague);
+  }
+  const PoseMatrix<SE2> noise = testCovariance<SE2>(1e-2, 1e-2);
+  std::uint32_t id = 0;
+  // A false loop that came first holds the set: the true one that contradicts it is not in it.
+  RelativePose<SE2> wrong = chain.loop(60, 189, noise, random);
+  wrong.T_from_to.translation.y() += 4;
+  REQUIRE(selection.addLoop(wrong, kNodes, id).ok());
+  REQUIRE(selection.addLoop(chain.loop(60, 190, noise, random), kNodes, id).ok());
+  CHECK(selection.verdict(0) == LoopVerdict::kUnsupported);
+  CHECK(selection.verdict(1) == LoopVerdict::kInconsistent);
+  CHECK(selection.selected().empty());
+  // One more that agrees with the second makes the larger set, and both are taken.
+  REQUIRE(selection.addLoop(chain.loop(60, 191, noise, random), kNodes, id).ok());
+  CHECK(copyOf(selection.selected()) == std::vector<std::uint32_t>{1, 2});
+  CHECK(selection.verdict(0) == LoopVerdict::kInconsistent);
+  const std::uint64_t tests = selection.counters().pair_tests;
+  CHECK(tests == 3);  // each pair once: what was found of the early ones is kept
+}
+
 TEST_CASE("Where the odometry is vague, a loop that nothing supports is not selected", "[pose_graph]") {
   // The heading is lost: every loop agrees with the chain.
   Random random(71);
