@@ -260,6 +260,8 @@ RelativePoseSupport relativePoseSupport(const RelativePoseSettings& settings,
                                         std::span<const MatchedPoint> points, const SE3& T_old_new,
                                         double reach) {
   constexpr double kUndetermined = std::numeric_limits<double>::infinity();
+  // Of the information, in 1/rad^2 and 1/m^2: below is rounding.
+  constexpr double kLeastCondition = 1e-10;
   const Eigen::Matrix3d R_new_old = T_old_new.R().transpose();
   const System all = assemble(T_old_new, settings.huber, points);
   const Eigen::LDLT<Matrix6d> solver(all.H);
@@ -280,7 +282,9 @@ RelativePoseSupport relativePoseSupport(const RelativePoseSettings& settings,
       addMatch(R_new_old, T_old_new.translation, settings.huber, points[k], group);
     }
     const Eigen::LDLT<Matrix6d> rest(all.H - group.H);
-    if (rest.info() != Eigen::Success || !rest.isPositive()) return {kUndetermined, kUndetermined};
+    if (rest.info() != Eigen::Success || !rest.isPositive() || !(rest.rcond() > kLeastCondition)) {
+      return {kUndetermined, kUndetermined};
+    }
     const Vector6d shift = rest.solve(all.g - group.g);
     if (!shift.allFinite()) return {kUndetermined, kUndetermined};
     support.rotation_shift = std::max(support.rotation_shift, shift.head<3>().norm());
