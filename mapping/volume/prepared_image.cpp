@@ -10,8 +10,6 @@ namespace {
 
 /// Stands for "free however far" in tiles where nothing limits the view.
 constexpr float kFarAway = 1e9F;
-/// A surface seen at a more glancing angle than 84 degrees counts as seen at that.
-constexpr float kLeastSlope = 0.1F;
 /// Against a division by zero where nothing was measured [1/m^2].
 constexpr float kTinySquare = 1e-12F;
 /// A pixel weighs at least one step and at most this many, 16 of the reference.

@@ -28,6 +28,8 @@ class PreparedImage {
   /// Pixels along a tile's edge at the pyramid's finest level.
   static constexpr int kTile = 8;
   static constexpr int kMostLevels = 12;
+  /// A surface seen at a more glancing angle than 84 degrees counts as seen at that.
+  static constexpr float kLeastSlope = 0.1F;
   /// A tile in which fewer of the pixels are measured says nothing.
   static constexpr int kLeastMeasured = kTile * kTile / 2;
 

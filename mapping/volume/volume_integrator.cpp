@@ -239,19 +239,22 @@ bool VolumeIntegrator::walk(const Eigen::Vector3f& direction, float length, std:
 void VolumeIntegrator::meetOnRay(const BlockIndex& block, VolumeStep& out) {
   const std::uint32_t slot = volume_.find(block);
   const bool has_voxels = slot != VoxelVolume::kNone && volume_.header(slot).state == BlockState::kVoxels;
-  const bool free = isFree(block);
+  const auto truncation = static_cast<float>(volume_.settings().truncation);
+  const float behind = freeBehind(block);
   if (has_voxels) {
-    update(slot, free, out);
-  } else if (free) {
+    // In front of a surface seen at a glancing angle, much depth is little distance.
+    update(slot, behind >= truncation / PreparedImage::kLeastSlope, out);
+  } else if (behind >= truncation) {
     volume_.addFree(block, vehicle_);
     ++out.freed;
   }
 }
 
-bool VolumeIntegrator::isFree(const BlockIndex& block) const {
+float VolumeIntegrator::freeBehind(const BlockIndex& block) const {
+  constexpr float kUnknown = -1;
   const Eigen::Vector3f centre = (T_camera_world_ * volume_.centreOf(block).cast<double>()).cast<float>();
   const float nearest = centre.z() - half_extent_.z(), farthest = centre.z() + half_extent_.z();
-  if (nearest < kNearestBlock) return false;
+  if (nearest < kNearestBlock) return kUnknown;
   const PinholeIntrinsics& c = image_.camera();
   // Of the block's box in camera axes, the corners that project farthest out.
   const auto low = [&](float x) { return x / (x < 0 ? nearest : farthest); };
@@ -264,11 +267,11 @@ bool VolumeIntegrator::isFree(const BlockIndex& block) const {
       static_cast<float>(c.fy) * high(centre.y() + half_extent_.y()) + static_cast<float>(c.cy);
   if (!(left >= 0 && top >= 0 && right <= static_cast<float>(c.width - 1) &&
         bottom <= static_cast<float>(c.height - 1))) {
-    return false;
+    return kUnknown;
   }
   const float free = image_.freeDepth(static_cast<int>(left), static_cast<int>(top), static_cast<int>(right),
                                       static_cast<int>(bottom));
-  return free >= farthest + static_cast<float>(volume_.settings().truncation);
+  return free > 0 ? free - farthest : kUnknown;
 }
 
 }  // namespace swiftlet

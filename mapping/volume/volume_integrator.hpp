@@ -85,7 +85,8 @@ class VolumeIntegrator {
   void walkBundles(std::uint32_t blocks, VolumeStep& out);
   bool walk(const Eigen::Vector3f& direction, float length, std::uint32_t blocks, VolumeStep& out);
   void meetOnRay(const BlockIndex& block, VolumeStep& out);
-  [[nodiscard]] bool isFree(const BlockIndex& block) const;
+  /// Depth [m] between the block and what is measured behind it; negative where that is not known.
+  [[nodiscard]] float freeBehind(const BlockIndex& block) const;
   void update(std::uint32_t slot, bool carve, VolumeStep& out);
 
   VoxelVolume& volume_;

@@ -158,8 +158,8 @@ std::uint32_t VoxelVolume::obtain(const BlockIndex& block) {
     if (slot == kNone) return kNone;
   } else {
     --free_count_;
-    weight =
-        std::min(static_cast<float>(headers_[slot].free_count), static_cast<float>(settings_.most_weight));
+    // Free by the depth in front of what was measured, which is more than the distance: one observation.
+    weight = 1;
   }
   BlockHeader& header = headers_[slot];
   header.state = BlockState::kVoxels;

@@ -126,8 +126,8 @@ class VoxelVolume {
   /// Makes sure that `blocks` new ones with voxels fit beside what stays, farthest from `vehicle` first:
   /// drops blocks, and takes out of `wanted` those that are refused. Slots may change hands.
   void makeRoom(const Eigen::Vector3f& vehicle, std::vector<BlockIndex>& wanted);
-  /// The slot of a block with voxels: the one there is, else a new one, its voxels unobserved (or free, as
-  /// often as the block was seen free). kNone when full: makeRoom() first.
+  /// The slot of a block with voxels: the one there is, else a new one, its voxels unobserved (or free,
+  /// by one observation, where the block was seen free). kNone when full: makeRoom() first.
   std::uint32_t obtain(const BlockIndex& block);
   /// One more image saw the whole block free, which has no voxels. A full table drops the farthest.
   void addFree(const BlockIndex& block, const Eigen::Vector3f& vehicle);

@@ -47,8 +47,7 @@ VolumeRun fuse(const DepthLog& log, const RunOptions& options) {
     SurfaceStep drawn;
     run.integration_ms.push_back(
         test::timed([&] { (void)integrator.step(image, T, options.effort, fused); }));
-    run.surface_ms.push_back(
-        test::timed([&] { (void)stage->step(T.translation.cast<float>(), {}, drawn); }));
+    run.surface_ms.push_back(test::timed([&] { (void)stage->step(T.translation.cast<float>(), {}, drawn); }));
     run.drawn += drawn.drawn;
     run.most_blocks = std::max(run.most_blocks, volume.blockCount());
   }
@@ -68,7 +67,9 @@ VolumeRun fuse(const DepthLog& log, const RunOptions& options) {
 }
 
 double meanOf(const std::vector<double>& values) {
-  return values.empty() ? 0 : std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+  return values.empty()
+             ? 0
+             : std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
 double percentileOf(std::vector<double> values, double share) {
@@ -104,7 +105,8 @@ LabelQuality labelQuality(const TriangleMesh& mesh, const TrueSurface& truth, co
   for (std::size_t label = 1; label < kLabelValues; ++label) {
     quality.pixel_share[label] /= std::max(pixels, 1.0);
     right += static_cast<double>(quality.samples[label][label]);
-    for (std::size_t said = 0; said < kLabelValues; ++said) all += static_cast<double>(quality.samples[said][label]);
+    for (std::size_t said = 0; said < kLabelValues; ++said)
+      all += static_cast<double>(quality.samples[said][label]);
     if (quality.pixel_share[label] < 0.01) continue;
     quality.mean_iou += quality.iou(label);
     ++judged;

@@ -18,19 +18,23 @@ constexpr double kMega = 1 << 20;
 
 void print(const char* what, const VolumeRun& run, const DepthLog& log, const TrueSurface& truth) {
   const CompleteMeshAccuracy mesh = completeMeshAccuracy(run.mesh, truth, log.observed);
-  std::printf("%s, %s: RMSE %.4f m, median %.4f, 95 %% %.4f, complete %.2f %%, %zu faces\n", log.name.c_str(), what,
-              mesh.distance.rmse, mesh.distance.median, mesh.distance.percentile95,
+  std::printf("%s, %s: RMSE %.4f m, median %.4f, 95 %% %.4f, complete %.2f %%, %zu faces\n", log.name.c_str(),
+              what, mesh.distance.rmse, mesh.distance.median, mesh.distance.percentile95,
               100.0 * static_cast<double>(mesh.covered) / static_cast<double>(mesh.observed), mesh.faces);
-  std::printf("  integration %.2f ms an image (p99 %.2f), surface %.2f (p99 %.2f), %.0f blocks drawn an image\n",
-              meanOf(run.integration_ms), percentileOf(run.integration_ms, 0.99), meanOf(run.surface_ms),
-              percentileOf(run.surface_ms, 0.99),
-              static_cast<double>(run.drawn) / static_cast<double>(log.frames.size()));
-  std::printf("  %zu of %zu blocks (most %zu), %zu free; volume %.1f MB, integrator %.1f MB, surface %.1f MB; evicted %llu, "
-              "refused %llu, spilled %llu\n",
-              run.blocks, run.capacity, run.most_blocks, run.free_blocks, static_cast<double>(run.volume_bytes) / kMega,
-              static_cast<double>(run.integrator_bytes) / kMega, static_cast<double>(run.surface_bytes) / kMega,
-              static_cast<unsigned long long>(run.volume.evicted), static_cast<unsigned long long>(run.volume.refused),
-              static_cast<unsigned long long>(run.store.spilled));
+  std::printf(
+      "  integration %.2f ms an image (p99 %.2f), surface %.2f (p99 %.2f), %.0f blocks drawn an image\n",
+      meanOf(run.integration_ms), percentileOf(run.integration_ms, 0.99), meanOf(run.surface_ms),
+      percentileOf(run.surface_ms, 0.99),
+      static_cast<double>(run.drawn) / static_cast<double>(log.frames.size()));
+  std::printf(
+      "  %zu of %zu blocks (most %zu), %zu free; volume %.1f MB, integrator %.1f MB, surface %.1f MB; "
+      "evicted %llu, "
+      "refused %llu, spilled %llu\n",
+      run.blocks, run.capacity, run.most_blocks, run.free_blocks,
+      static_cast<double>(run.volume_bytes) / kMega, static_cast<double>(run.integrator_bytes) / kMega,
+      static_cast<double>(run.surface_bytes) / kMega, static_cast<unsigned long long>(run.volume.evicted),
+      static_cast<unsigned long long>(run.volume.refused),
+      static_cast<unsigned long long>(run.store.spilled));
 }
 
 void printLabels(const VolumeRun& run, const DepthLog& log, const TrueSurface& truth) {
