@@ -12,6 +12,8 @@ namespace {
 constexpr float kFarAway = 1e9F;
 /// Against a division by zero where nothing was measured [1/m^2].
 constexpr float kTinySquare = 1e-12F;
+/// Above any difference of inverse depths [1/m].
+constexpr float kNoSlope = 1e9F;
 /// A pixel weighs at least one step and at most this many, 16 of the reference.
 constexpr float kMostPixelWeight = 16 * kWeightSteps;
 
@@ -136,15 +138,26 @@ void PreparedImage::findSlopes() {
     const float y = (static_cast<float>(v) - cy) / fy;
     for (std::size_t u = 1; u + 1 < width; ++u) {
       const float here = row[u];
-      const float left = here - row[u - 1], right = row[u + 1] - here;
-      const float up = here - *(row + u - width), down = *(row + u + width) - here;
-      const float a = fx * (std::abs(left) < std::abs(right) ? left : right);
-      const float b = fy * (std::abs(up) < std::abs(down) ? up : down);
+      // Where a neighbour was not measured the other one decides, or none.
+      const auto nearer = [here](float before, float after) {
+        const float down = before > 0 ? here - before : kNoSlope, up = after > 0 ? after - here : kNoSlope;
+        const float least = std::abs(down) < std::abs(up) ? down : up;
+        return least < kNoSlope ? least : 0.0F;
+      };
+      const float a = fx * nearer(row[u - 1], row[u + 1]);
+      const float b = fy * nearer(*(row + u - width), *(row + u + width));
       const float c = here - a * (static_cast<float>(static_cast<std::int32_t>(u)) - cx) / fx - b * y;
       const float cosine = here / std::sqrt(a * a + b * b + c * c + kTinySquare);
       slope_[v * width + u] = here > 0 ? std::max(cosine, kLeastSlope) : 1.0F;
     }
   }
+  // Pixels on the border have the slope of their neighbour.
+  for (std::size_t v = 1; v + 1 < height; ++v) {
+    slope_[v * width] = slope_[v * width + 1];
+    slope_[v * width + width - 1] = slope_[v * width + width - 2];
+  }
+  std::copy_n(&slope_[width], width, &slope_[0]);
+  std::copy_n(&slope_[(height - 2) * width], width, &slope_[(height - 1) * width]);
 }
 
 void PreparedImage::buildPyramid() {
