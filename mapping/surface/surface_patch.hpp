@@ -24,8 +24,7 @@ struct SurfaceVertex {
 
 using SurfaceTriangle = std::array<std::uint16_t, 3>;
 
-/// Two for every three edges of a block's cubes would be the most that a loop rule can give; real surfaces
-/// stay below a tenth.
+/// Every edge crossed, and the most triangles in every cube: bounds, not expectations.
 inline constexpr std::size_t kMostPatchVertices = 3 * kBlockSide * (kBlockSide + 1) * (kBlockSide + 1);
 inline constexpr std::size_t kMostPatchTriangles = 6 * kBlockVoxels;
 

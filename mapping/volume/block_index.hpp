@@ -12,8 +12,7 @@
 namespace swiftlet {
 
 inline constexpr int kBlockBits = 3;
-/// Voxels along an edge of a block. With 16 the band around a surface takes twice the memory and the update
-/// half as long again (docs/volume.md).
+/// Voxels along an edge of a block: eight, so that a row is one group of lanes.
 inline constexpr int kBlockSide = 1 << kBlockBits;
 inline constexpr int kBlockMask = kBlockSide - 1;
 inline constexpr std::size_t kBlockVoxels = std::size_t{1} << (3 * kBlockBits);
