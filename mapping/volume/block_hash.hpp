@@ -3,7 +3,7 @@
 //
 // At most half full, so that a look-up probes few entries; probing ends after kMostProbes, and an entry that
 // would lie farther from its home is refused. Removing moves the followers up: no tombstones, so the table
-// does not age. Cost: some 5 ns where the entry is in the cache. Not for iteration.
+// does not age. Not for iteration.
 
 #include <cstddef>
 #include <cstdint>
