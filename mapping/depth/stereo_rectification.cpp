@@ -8,6 +8,8 @@ namespace {
 
 /// Cameras this close to each other have no baseline to speak of [m].
 constexpr double kLeastBaseline = 1e-3;
+/// Of a camera's axis to the rectified one: 60 degrees.
+constexpr double kLeastCosine = 0.5;
 
 struct Field {
   double left = -StereoRectification::kMaxFieldTangent;
@@ -56,7 +58,8 @@ Status StereoRectification::build(const Rig& rig) {
   baseline_ = rig.baseline();
   if (!(baseline_ > kLeastBaseline)) return refuse("rectification: the cameras are at one place");
   chooseRotations(rig);
-  if (!R_cam_rectified_[0].allFinite() || !chooseIntrinsics(rig))
+  const auto looks_ahead = [](const Eigen::Matrix3d& R) { return R.allFinite() && R(2, 2) > kLeastCosine; };
+  if (!looks_ahead(R_cam_rectified_[0]) || !looks_ahead(R_cam_rectified_[1]) || !chooseIntrinsics(rig))
     return refuse("rectification: the cameras share no field of view");
   T_body_camera_ = rig.T_body_cam[0] * SE3(R_cam_rectified_[0], Eigen::Vector3d::Zero());
   for (std::size_t c = 0; c < 2; ++c) warps_[c] = ImageWarp(rig.camera[c], R_cam_rectified_[c], intrinsics_);

@@ -38,10 +38,24 @@ struct Image {
   [[nodiscard]] ImageView view() const { return {pixels.data(), kWidth, kHeight, kWidth}; }
 };
 
-/// Smooth, without period in what a camera sees of it.
+/// Random values 0 .. 1 at whole places, bilinear between them.
+inline double valueNoise(double a, double b) {
+  const auto at = [](std::int64_t i, std::int64_t j) {
+    std::uint64_t h = static_cast<std::uint64_t>(i) * 0x9E3779B97F4A7C15U ^
+                      static_cast<std::uint64_t>(j) * 0xC2B2AE3D27D4EB4FU;
+    h = (h ^ (h >> 29U)) * 0xBF58476D1CE4E5B9U;
+    return static_cast<double>((h ^ (h >> 32U)) >> 11U) / 9007199254740992.0;
+  };
+  const double i = std::floor(a), j = std::floor(b);
+  const double u = a - i, v = b - j;
+  const auto x = static_cast<std::int64_t>(i), y = static_cast<std::int64_t>(j);
+  return (1 - v) * ((1 - u) * at(x, y) + u * at(x + 1, y)) +
+         v * ((1 - u) * at(x, y + 1) + u * at(x + 1, y + 1));
+}
+
+/// Grey of a surface at (a, b) [m]: patches of 3 cm on patches of 12 cm.
 inline double textureAt(double a, double b) {
-  return 128 + 45 * std::sin(31 * a + 3 * std::sin(7 * b)) * std::cos(27 * b + 2 * std::sin(11 * a)) +
-         45 * std::sin(63 * a * (1 + 0.2 * b) - 71 * b);
+  return 20 + 140 * valueNoise(a / 0.03, b / 0.03) + 75 * valueNoise(a / 0.12, b / 0.12);
 }
 
 /// Plane n . p = offset in body coordinates (n a unit vector), seen by the raw camera.

@@ -25,7 +25,9 @@ TEST_CASE("depth: a plane's depth comes out of the raw pair, with an honest sigm
     CHECK(view.stamp == Stamp{42});
     REQUIRE(view.intensity != nullptr);
     CHECK(view.labels == nullptr);
-    std::vector<double> relative;
+    // In pixels of disparity: independent of where the plane is.
+    std::vector<double> pixels_off;
+    const double depth_disparity = view.camera.fx * stage.rectification().baseline();
     std::size_t within = 0, far_within = 0, i = 0;
     for (int y = 0; y < view.camera.height; ++y) {
       for (int x = 0; x < view.camera.width; ++x, ++i) {
@@ -35,23 +37,23 @@ TEST_CASE("depth: a plane's depth comes out of the raw pair, with an honest sigm
             Eigen::Vector3d((x - view.camera.cx) / view.camera.fx, (y - view.camera.cy) / view.camera.fy, 1);
         const double z = (offset - normal.dot(view.T_body_camera.translation)) / normal.dot(ray);
         const double error = std::abs(view.depth[i] - z);
-        relative.push_back(error / z);
+        pixels_off.push_back(depth_disparity * std::abs(1 / view.depth[i] - 1 / z));
         REQUIRE(view.sigma[i] > 0);
         within += error <= view.sigma[i] ? 1U : 0U;
         far_within += error <= 3 * view.sigma[i] ? 1U : 0U;
       }
     }
-    const double count = static_cast<double>(relative.size());
+    const double count = static_cast<double>(pixels_off.size());
     CHECK(count > 0.85 * static_cast<double>(view.camera.pixels()));
-    std::sort(relative.begin(), relative.end());
-    INFO("median relative error " << relative[relative.size() / 2] << ", 95 % "
-                                  << relative[relative.size() * 95 / 100]);
-    CHECK(relative[relative.size() / 2] < 0.01);
-    CHECK(relative[relative.size() * 95 / 100] < 0.05);
+    std::sort(pixels_off.begin(), pixels_off.end());
+    INFO("median error [px] " << pixels_off[pixels_off.size() / 2] << ", 95 % "
+                              << pixels_off[pixels_off.size() * 95 / 100]);
+    CHECK(pixels_off[pixels_off.size() / 2] < 0.2);
+    CHECK(pixels_off[pixels_off.size() * 95 / 100] < 0.8);
     CHECK(static_cast<double>(within) > 0.6 * count);
     CHECK(static_cast<double>(far_within) > 0.97 * count);
     CHECK(stage.counters().images == 1);
-    CHECK(stage.counters().measured == relative.size());
+    CHECK(stage.counters().measured == pixels_off.size());
   }
 }
 
