@@ -1,5 +1,7 @@
 #include "mapping/distance/distance_field.hpp"
 
+#include <array>
+
 #include "mapping/distance/distance_word.hpp"
 
 namespace swiftlet {
@@ -55,17 +57,6 @@ bool within(const Eigen::Vector3i& cell, const Eigen::Vector3i& origin, const Ei
   return (from.array() >= 0).all() && (from.array() < cells.array()).all();
 }
 
-template <typename Visit>
-void forNeighbours(const Eigen::Vector3i& cell, const Visit& visit) {
-  for (int z = -1; z <= 1; ++z) {
-    for (int y = -1; y <= 1; ++y) {
-      for (int x = -1; x <= 1; ++x) {
-        if (x != 0 || y != 0 || z != 0) visit(Eigen::Vector3i(cell + Eigen::Vector3i(x, y, z)));
-      }
-    }
-  }
-}
-
 }  // namespace
 
 DistanceField::DistanceField(const DistanceLimits& limits)
@@ -73,6 +64,7 @@ DistanceField::DistanceField(const DistanceLimits& limits)
       squared_reach_(static_cast<float>(limits_.reach * limits_.reach)),
       nearest_(static_cast<std::size_t>(limits_.cells.prod())),
       surface_(nearest_.size()),
+      squared_(nearest_.size()),
       next_(nearest_.size(), kNone),
       head_(static_cast<std::size_t>(static_cast<float>(limits_.reach + 2) * kBucketsPerCell), kNone),
       lowest_(head_.size()) {
@@ -87,7 +79,8 @@ DistanceField::DistanceField(const DistanceLimits& limits)
 void DistanceField::publishOrigin() { shown_origin_.store(packOrigin(origin_), std::memory_order_release); }
 
 std::size_t DistanceField::bytes() const {
-  return nearest_.size() * (2 * sizeof(Word) + sizeof(std::uint32_t)) + head_.size() * sizeof(std::uint32_t);
+  return nearest_.size() * (2 * sizeof(Word) + sizeof(float) + sizeof(std::uint32_t)) +
+         head_.size() * sizeof(std::uint32_t);
 }
 
 Eigen::Vector3i DistanceField::cellOf(const Eigen::Vector3d& p_map) const {
@@ -123,11 +116,6 @@ Eigen::Vector3i DistanceField::cellAt(std::uint32_t slot) const {
   Eigen::Vector3i cell;
   for (int i = 0; i < 3; ++i) cell[i] = origin_[i] + wrapped(at[i] - origin_[i], limits_.cells[i]);
   return cell;
-}
-
-bool DistanceField::holdsSurface(const Eigen::Vector3i& cell) const {
-  if (!inside(cell)) return false;
-  return (surface_[slotOf(cell)].load(std::memory_order_relaxed) & SurfaceWord::kPresent) != 0;
 }
 
 /// What the cell with this word takes for its nearest surface is there, and has not moved since.
@@ -217,14 +205,12 @@ void DistanceField::setSurface(const Eigen::Vector3i& cell, Space space, const E
   const std::uint32_t before = surface_[slot].load(std::memory_order_relaxed);
   const std::uint32_t packed = SurfaceWord::pack(offset) | tagOf(cell) << SurfaceWord::kTagShift;
   const bool present = (before & SurfaceWord::kPresent) != 0;
-  // Readers take the point from here: who moves by less than this need not tell its dependants, who may at
-  // worst hold to it where another is nearer by as much [cells].
+  // Noise of less than this is not worth waves: the point stays where it was told to be [cells].
   constexpr float kMoved = 0.1F;
-  const bool moved = (SurfaceWord::offset(before) - SurfaceWord::offset(packed)).norm() >= kMoved;
-  const std::uint32_t parity =
-      (before & SurfaceWord::kParity) ^ (present && moved ? SurfaceWord::kParity : 0U);
+  if (present && (SurfaceWord::offset(before) - SurfaceWord::offset(packed)).norm() < kMoved) return;
+  // Who took the point as it was is told by the parity.
+  const std::uint32_t parity = (before & SurfaceWord::kParity) ^ (present ? SurfaceWord::kParity : 0U);
   surface_[slot].store(packed | parity, std::memory_order_relaxed);
-  if (present && !moved) return;
   if (present) askAnew(slot, cell);
   takeOwn(slot, cell);
   push(slot, SurfaceWord::offset(packed).squaredNorm());
@@ -233,68 +219,125 @@ void DistanceField::setSurface(const Eigen::Vector3i& cell, Space space, const E
 /// A cell with surface in it, for which no other is nearer to its middle.
 void DistanceField::takeOwn(std::uint32_t slot, const Eigen::Vector3i& cell) {
   const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
-  if ((word & NearestWord::kHasSurface) != 0 && squaredTo(cell, cell) >= squaredDistance(cell)) return;
+  const float own = SurfaceWord::offset(surface_[slot].load(std::memory_order_relaxed)).squaredNorm();
+  if ((word & NearestWord::kHasSurface) != 0 && own >= squared_[slot]) return;
   nearest_[slot].store((word & ~NearestWord::kLink) | linkTo(cell, cell), std::memory_order_relaxed);
+  squared_[slot] = own;
 }
 
 /// The surface in the cell left or moved: the cell, and after it those that took it for their nearest, look
 /// again.
 void DistanceField::askAnew(std::uint32_t slot, const Eigen::Vector3i& cell) {
   const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
-  const float squared = squaredDistance(cell);
   if ((word & NearestWord::kHasSurface) != 0 && !holdsTrue(cell, word)) remove(slot);
-  nearest_[slot].fetch_or(NearestWord::kRaise, std::memory_order_relaxed);
-  push(slot, squared);
+  const std::uint32_t now = nearest_[slot].load(std::memory_order_relaxed);
+  nearest_[slot].store(now | NearestWord::kRaise, std::memory_order_relaxed);
+  push(slot, squared_[slot]);
+}
+
+/// The slots around a cell: along each axis what the three coordinates add to the slot, kNone outside the
+/// window.
+struct DistanceField::Around {
+  std::array<std::array<std::uint32_t, 3>, 3> part;  ///< [axis][step + 1]
+};
+
+DistanceField::Around DistanceField::around(const Eigen::Vector3i& cell) const {
+  Around result;
+  int stride = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int cells = limits_.cells[axis];
+    const int inside_at = cell[axis] - origin_[axis];
+    const int slot_at = wrapped(cell[axis], cells);
+    for (int step = -1; step <= 1; ++step) {
+      const int next = slot_at + step == cells ? 0 : slot_at + step < 0 ? cells - 1 : slot_at + step;
+      const bool within_window = inside_at + step >= 0 && inside_at + step < cells;
+      result.part[static_cast<std::size_t>(axis)][static_cast<std::size_t>(step + 1)] =
+          within_window ? static_cast<std::uint32_t>(next * stride) : kNone;
+    }
+    stride *= cells;
+  }
+  return result;
+}
+
+/// Calls `visit(slot, x, y, z)` with steps of -1, 0, 1 for the neighbours in the window.
+template <typename Visit>
+void DistanceField::forNeighbours(const Around& around, const Visit& visit) {
+  for (int z = -1; z <= 1; ++z) {
+    const std::uint32_t at_z = around.part[2][static_cast<std::size_t>(z + 1)];
+    if (at_z == kNone) continue;
+    for (int y = -1; y <= 1; ++y) {
+      const std::uint32_t at_y = around.part[1][static_cast<std::size_t>(y + 1)];
+      if (at_y == kNone) continue;
+      for (int x = -1; x <= 1; ++x) {
+        const std::uint32_t at_x = around.part[0][static_cast<std::size_t>(x + 1)];
+        if (at_x == kNone || (x == 0 && y == 0 && z == 0)) continue;
+        visit(at_z + at_y + at_x, x, y, z);
+      }
+    }
+  }
 }
 
 std::size_t DistanceField::propagate(std::size_t work) {
   std::size_t taken = 0;
   for (std::uint32_t slot = 0; taken < work && pop(slot); ++taken) {
     const Eigen::Vector3i cell = cellAt(slot);
+    const Around neighbours = around(cell);
+    if ((nearest_[slot].load(std::memory_order_relaxed) & NearestWord::kRaise) != 0)
+      raise(slot, cell, neighbours);
+    const bool holds = (surface_[slot].load(std::memory_order_relaxed) & SurfaceWord::kPresent) != 0;
+    if (holds) takeOwn(slot, cell);
     const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
-    if ((word & NearestWord::kRaise) != 0) raise(cell);
-    if (holdsSurface(cell)) takeOwn(slot, cell);
     // A cell hands on its own surface too, where another is nearer to its own middle: the neighbours may
     // differ.
-    if (holdsSurface(cell)) lower(cell, cell);
-    if ((word & NearestWord::kHasSurface) != 0 && (word & NearestWord::kRaise) == 0) {
-      const Eigen::Vector3i surface = cell + NearestWord::offset(word);
-      if (surface != cell && holdsTrue(cell, word)) lower(cell, surface);
-    }
+    if (holds) lower(neighbours, Eigen::Vector3i::Zero(), linkTo(cell, cell), surface_[slot]);
+    if ((word & NearestWord::kHasSurface) == 0 || (word & NearestWord::kRaise) != 0) continue;
+    const Eigen::Vector3i offset = NearestWord::offset(word);
+    if (offset.isZero() || !holdsTrue(cell, word)) continue;
+    lower(neighbours, offset, word & NearestWord::kLink, surface_[slotOf(cell + offset)]);
   }
   return taken;
 }
 
-void DistanceField::raise(const Eigen::Vector3i& cell) {
-  forNeighbours(cell, [&](const Eigen::Vector3i& neighbour) {
-    if (!inside(neighbour)) return;
-    const std::uint32_t slot = slotOf(neighbour);
-    const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
+void DistanceField::raise(std::uint32_t slot, const Eigen::Vector3i& cell, const Around& neighbours) {
+  forNeighbours(neighbours, [&](std::uint32_t beside, int x, int y, int z) {
+    const std::uint32_t word = nearest_[beside].load(std::memory_order_relaxed);
     if ((word & NearestWord::kHasSurface) == 0 || (word & NearestWord::kRaise) != 0) return;
-    const float squared = squaredDistance(neighbour);
-    if (!holdsTrue(neighbour, word)) remove(slot);
-    push(slot, squared);
+    if (!holdsTrue(cell + Eigen::Vector3i(x, y, z), word)) remove(beside);
+    push(beside, squared_[beside]);
   });
-  const std::uint32_t slot = slotOf(cell);
-  const std::uint32_t word =
-      nearest_[slot].fetch_and(~NearestWord::kRaise, std::memory_order_relaxed) & ~NearestWord::kRaise;
+  const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed) & ~NearestWord::kRaise;
+  nearest_[slot].store(word, std::memory_order_relaxed);
   // One that kept a surface hands it on into what was raised.
-  if ((word & NearestWord::kHasSurface) != 0) push(slot, squaredDistance(cell));
+  if ((word & NearestWord::kHasSurface) != 0) push(slot, squared_[slot]);
 }
 
-void DistanceField::lower(const Eigen::Vector3i& cell, const Eigen::Vector3i& surface) {
-  forNeighbours(cell, [&](const Eigen::Vector3i& neighbour) {
-    if (!inside(neighbour)) return;
-    const Eigen::Vector3i offset = surface - neighbour;
-    const float squared = squaredTo(surface, neighbour);
-    if (squared > squared_reach_ || (offset.array().abs() > kMostReach + 2).any()) return;
-    const std::uint32_t slot = slotOf(neighbour);
-    const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
+/// Hands the surface point in the cell at `offset` on to the neighbours. `link`: how the cell itself names
+/// it.
+void DistanceField::lower(const Around& neighbours, const Eigen::Vector3i& offset, std::uint32_t link,
+                          const Word& surface) {
+  const Eigen::Vector3f to =
+      offset.cast<float>() + SurfaceWord::offset(surface.load(std::memory_order_relaxed));
+  std::array<std::array<float, 3>, 3> square{};  // [axis][step + 1]
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int step = -1; step <= 1; ++step) {
+      const float along = to[axis] - static_cast<float>(step);
+      square[static_cast<std::size_t>(axis)][static_cast<std::size_t>(step + 1)] = along * along;
+    }
+  }
+  forNeighbours(neighbours, [&](std::uint32_t beside, int x, int y, int z) {
+    const float squared = square[0][static_cast<std::size_t>(x + 1)] +
+                          square[1][static_cast<std::size_t>(y + 1)] +
+                          square[2][static_cast<std::size_t>(z + 1)];
+    if (squared > squared_reach_) return;
+    const std::uint32_t word = nearest_[beside].load(std::memory_order_relaxed);
     if ((word & NearestWord::kRaise) != 0) return;
-    if ((word & NearestWord::kHasSurface) != 0 && squared > squaredDistance(neighbour) - kGain) return;
-    nearest_[slot].store((word & ~NearestWord::kLink) | linkTo(neighbour, surface),
-                         std::memory_order_relaxed);
-    push(slot, squared);
+    if ((word & NearestWord::kHasSurface) != 0 && squared > squared_[beside] - kGain) return;
+    // Within reach no component of the offset leaves its seven bits, so that steps are subtracted from all at
+    // once.
+    const std::uint32_t shifted = link - static_cast<std::uint32_t>(x + (y << 7) + (z << 14));
+    nearest_[beside].store((word & ~NearestWord::kLink) | shifted, std::memory_order_relaxed);
+    squared_[beside] = squared;
+    push(beside, squared);
   });
 }
 
@@ -357,9 +400,8 @@ void DistanceField::wakeLayer(int axis, int at) {
         const std::uint32_t slot = slotOf(cell);
         const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
         if ((word & NearestWord::kHasSurface) == 0) continue;
-        const float squared = squaredDistance(cell);
         if (!holdsTrue(cell, word)) remove(slot);
-        push(slot, squared);
+        push(slot, squared_[slot]);
       }
     }
   }

@@ -76,6 +76,7 @@ class DistanceField {
 
  private:
   using Word = std::atomic<std::uint32_t>;
+  struct Around;
   struct Corner {
     float distance = 0;  ///< cells, signed
     bool known = false;  ///< the slot is of this cell
@@ -87,7 +88,6 @@ class DistanceField {
   [[nodiscard]] std::uint32_t slotOf(const Eigen::Vector3i& cell) const;
   [[nodiscard]] std::uint32_t tagOf(const Eigen::Vector3i& cell) const;
   [[nodiscard]] Eigen::Vector3i cellAt(std::uint32_t slot) const;
-  [[nodiscard]] bool holdsSurface(const Eigen::Vector3i& cell) const;
   [[nodiscard]] bool holdsTrue(const Eigen::Vector3i& cell, std::uint32_t nearest) const;
   [[nodiscard]] std::uint32_t linkTo(const Eigen::Vector3i& cell, const Eigen::Vector3i& surface) const;
   [[nodiscard]] float squaredTo(const Eigen::Vector3i& surface, const Eigen::Vector3i& cell) const;
@@ -95,8 +95,12 @@ class DistanceField {
   void setState(std::uint32_t slot, const Eigen::Vector3i& cell, Space space);
   void push(std::uint32_t slot, float squared);
   bool pop(std::uint32_t& slot);
-  void raise(const Eigen::Vector3i& cell);
-  void lower(const Eigen::Vector3i& cell, const Eigen::Vector3i& surface);
+  [[nodiscard]] Around around(const Eigen::Vector3i& cell) const;
+  template <typename Visit>
+  static void forNeighbours(const Around& around, const Visit& visit);
+  void raise(std::uint32_t slot, const Eigen::Vector3i& cell, const Around& neighbours);
+  void lower(const Around& neighbours, const Eigen::Vector3i& offset, std::uint32_t link,
+             const Word& surface);
   void remove(std::uint32_t slot);
   void takeOwn(std::uint32_t slot, const Eigen::Vector3i& cell);
   void askAnew(std::uint32_t slot, const Eigen::Vector3i& cell);
@@ -110,6 +114,7 @@ class DistanceField {
   std::atomic<std::uint64_t> shown_origin_{0};
   std::vector<Word> nearest_;        ///< of each slot: where its nearest surface is
   std::vector<Word> surface_;        ///< of each slot: the surface in it
+  std::vector<float> squared_;       ///< of each slot: to its nearest surface, as it was taken [cells^2]
   std::vector<std::uint32_t> next_;  ///< in the queue
   std::vector<std::uint32_t> head_;  ///< of the queue, by distance
   std::size_t lowest_ = 0;           ///< no lower bucket holds a cell

@@ -98,12 +98,39 @@ void VolumeDistance::read(std::uint32_t slot) {
               [this](const VoxelIndex& voxel) { field_.setSpace(cellOf(voxel), Space::kFree); });
     return;
   }
+  gatherAround(header.index);
   forVoxels(header.index, 1, [this](const VoxelIndex& voxel) { readVoxel(voxel); });
+}
+
+void VolumeDistance::gatherAround(const BlockIndex& block) {
+  block_ = block;
+  std::size_t i = 0;
+  for (int z = -1; z <= 1; ++z) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int x = -1; x <= 1; ++x) around_[i++] = volume_.find(block + BlockIndex{x, y, z});
+    }
+  }
+}
+
+/// VoxelVolume::distanceAt without a search: `voxel` lies in the block in hand or beside it.
+bool VolumeDistance::valueAt(const VoxelIndex& voxel, float& distance) const {
+  const BlockIndex at = blockOf(voxel);
+  const int which = at.x - block_.x + 1 + 3 * (at.y - block_.y + 1) + 9 * (at.z - block_.z + 1);
+  const std::uint32_t slot = around_[static_cast<std::size_t>(which)];
+  if (slot == VoxelVolume::kNone) return false;
+  const VoxelBlock* voxels = volume_.voxels(slot);
+  if (voxels == nullptr) {
+    distance = static_cast<float>(volume_.settings().truncation);
+    return true;
+  }
+  const std::size_t within = offsetOf(voxel);
+  distance = volume_.distanceStep() * static_cast<float>(voxels->distance[within]);
+  return voxels->weight[within] > 0;
 }
 
 void VolumeDistance::readVoxel(const VoxelIndex& voxel) {
   float own = 0;
-  if (!volume_.distanceAt(voxel, own)) {
+  if (!valueAt(voxel, own)) {
     field_.setSpace(cellOf(voxel), Space::kUnknown);
     return;
   }
@@ -111,7 +138,7 @@ void VolumeDistance::readVoxel(const VoxelIndex& voxel) {
   std::array<bool, 6> known{};
   bool crossed = false;
   for (std::size_t i = 0; i < kFaces.size(); ++i) {
-    known[i] = volume_.distanceAt(voxel + kFaces[i], beside[i]);
+    known[i] = valueAt(voxel + kFaces[i], beside[i]);
     crossed = crossed || (known[i] && changesSign(own, beside[i]) && std::abs(own) <= std::abs(beside[i]));
   }
   const Space space = own < 0 ? Space::kBehindSurface : Space::kFree;

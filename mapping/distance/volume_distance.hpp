@@ -9,6 +9,7 @@
 // voxels. Map axes, metres. Memory: 16 bytes for each of the volume's slots, beside the field's. Not thread
 // safe; the field's readers are free.
 
+#include <array>
 #include <vector>
 
 #include "mapping/distance/distance_field.hpp"
@@ -44,12 +45,17 @@ class VolumeDistance {
   [[nodiscard]] bool inWindow(const BlockIndex& block) const;
   void read(std::uint32_t slot);
   void readVoxel(const VoxelIndex& voxel);
+  void gatherAround(const BlockIndex& block);
+  bool valueAt(const VoxelIndex& voxel, float& distance) const;
   void erase(std::uint64_t key);
 
   const VoxelVolume& volume_;
   DistanceField& field_;
   std::vector<Seen> seen_;  ///< by slot
   std::uint32_t cursor_ = 0;
+  // Of the block in hand: its slot and those around it, x fastest.
+  BlockIndex block_;
+  std::array<std::uint32_t, 27> around_{};
 };
 
 }  // namespace swiftlet
