@@ -11,7 +11,7 @@ namespace swiftlet {
 
 /// Removes patches of fewer than `least_pixels` connected pixels: 4-neighbours that differ by at most `step`
 /// belong together. Union-find over runs of pixels within rows (He, Chao, Suzuki, IEEE TIP 2008, without
-/// their second scan of pixels). Memory: 12 bytes a pixel (every pixel a run of its own).
+/// their second scan of pixels). Memory: 16 bytes a pixel (every pixel a run of its own).
 class SpeckleFilter {
  public:
   SpeckleFilter(int width, int height);
