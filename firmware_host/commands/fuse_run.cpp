@@ -135,6 +135,11 @@ void FuseRun::openPoses() {
 }
 
 void FuseRun::begin() {
+  if (!labelMask(settings_.map_stage.moving_labels)) {
+    throw InputError("map.moving_labels", 0, "",
+                     "\"" + settings_.map_stage.moving_labels + "\" is no list of labels",
+                     "Write numbers from 1 to 31 with commas, as 10,12");
+  }
   openPoses();
   sensor_ =
       request_.depth == DepthSource::kSensor || (request_.depth == DepthSource::kAny && !depth_.empty());

@@ -13,6 +13,7 @@
 #include "firmware_host/pipeline/flight_recorder.hpp"
 #include "firmware_host/pipeline/lockstep.hpp"
 #include "firmware_host/pipeline/reproduce.hpp"
+#include "firmware_host/places/vocabulary_file.hpp"
 #include "firmware_host/report/line_file.hpp"
 #include "firmware_host/report/loops_csv.hpp"
 #include "firmware_host/report/memory_use.hpp"
@@ -150,8 +151,17 @@ class ReplayRun {
     control_.progress = [this](std::uint64_t images) { progress_->update(images); };
   }
 
+  /// Null: the shipped one.
+  const Vocabulary* vocabulary() {
+    const std::string& file = settings_.loop.vocabulary;
+    if (!settings_.loop.enabled || file.empty()) return nullptr;
+    if (!vocabulary_) vocabulary_ = std::make_unique<const Vocabulary>(readVocabulary(file));
+    return vocabulary_.get();
+  }
+
   void repeat() {
-    const ReproduceReport report = reproduce(*recording_, settings_, *log_, request_.imu_rate, control_);
+    const ReproduceReport report =
+        reproduce(*recording_, settings_, *log_, request_.imu_rate, control_, vocabulary());
     facts_.finished = report.finished && report.stopped_early.empty();
     facts_.executor["kind"] = "reproduced";
     if (report.stopped_early.empty()) return;
@@ -168,6 +178,7 @@ class ReplayRun {
     wanted.meshes = request_.mesh_sequence;
     wanted.recorder = flight_recorder.get();
     wanted.drag = hooks_.drag;
+    wanted.vocabulary = vocabulary();
     LogFeed feed(*source_, {request_.from, request_.until, request_.last_stamp}, tracks_.get());
     if (request_.real_time) {
       FlightRequest flight;
@@ -232,6 +243,7 @@ class ReplayRun {
   Settings settings_;
   const ReplayHooks& hooks_;
   MemoryTrack memory_;
+  std::unique_ptr<const Vocabulary> vocabulary_;
   std::unique_ptr<LogSource> source_;
   RecordingSource* recording_ = nullptr;  ///< source_, when it is to be repeated
   std::unique_ptr<TrackReader> tracks_;

@@ -20,7 +20,8 @@ constexpr Stamp kEndOfTime{std::numeric_limits<std::int64_t>::max()};
 
 class Repeat {
  public:
-  Repeat(RecordingSource& recording, const Settings& settings, RunLog& log, bool imu_states)
+  Repeat(RecordingSource& recording, const Settings& settings, RunLog& log, bool imu_states,
+         const Vocabulary* vocabulary)
       : recording_(recording),
         log_(log),
         imu_states_(imu_states),
@@ -33,7 +34,9 @@ class Repeat {
           MeshPlanes{settings.odometry.regularity_enabled, settings.odometry.plane_point_sigma});
     }
     if (settings.loop.enabled) {
-      loop_ = std::make_unique<LoopStage>(rigInUse(recording.rig(), settings.odometry), settings.loop_stage);
+      loop_ = std::make_unique<LoopStage>(rigInUse(recording.rig(), settings.odometry), settings.loop_stage,
+                                          LoopLimits{},
+                                          vocabulary != nullptr ? *vocabulary : Vocabulary::shipped());
     }
   }
 
@@ -294,8 +297,8 @@ class Repeat {
 }  // namespace
 
 ReproduceReport reproduce(RecordingSource& recording, const Settings& settings, RunLog& log, bool imu_states,
-                          const RunControl& control) {
-  return std::make_unique<Repeat>(recording, settings, log, imu_states)->operator()(control);
+                          const RunControl& control, const Vocabulary* vocabulary) {
+  return std::make_unique<Repeat>(recording, settings, log, imu_states, vocabulary)->operator()(control);
 }
 
 }  // namespace swiftlet

@@ -12,6 +12,7 @@
 #include "firmware_host/pipeline/lockstep.hpp"
 #include "firmware_host/pipeline/run_log.hpp"
 #include "firmware_host/settings/settings.hpp"
+#include "mapping/place/vocabulary.hpp"
 
 namespace swiftlet {
 
@@ -22,7 +23,8 @@ struct ReproduceReport {
 };
 
 /// `settings`: those that were recorded. Wants what `wanted` says of the run.
+/// `vocabulary`: of loop closure; null: the shipped one.
 ReproduceReport reproduce(RecordingSource& recording, const Settings& settings, RunLog& log, bool imu_states,
-                          const RunControl& control);
+                          const RunControl& control, const Vocabulary* vocabulary = nullptr);
 
 }  // namespace swiftlet

@@ -71,7 +71,11 @@ Wiring::Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, 
                       rig_, HorizonLimits{},
                       MeshPlanes{settings.odometry.regularity_enabled, settings.odometry.plane_point_sigma})
                 : nullptr),
-      loop_(settings.loop.enabled ? std::make_unique<LoopStage>(rig_, settings.loop_stage) : nullptr) {
+      loop_(settings.loop.enabled
+                ? std::make_unique<LoopStage>(
+                      rig_, settings.loop_stage, LoopLimits{},
+                      options.vocabulary != nullptr ? *options.vocabulary : Vocabulary::shipped())
+                : nullptr) {
   if (options.imu_states) states_ = std::make_unique<StateRing>();
   if (loop_) to_loop_ = std::make_unique<LoopArrows>();
   if (options.meshes && mesh_) meshes_ = std::make_unique<MeshRing>();

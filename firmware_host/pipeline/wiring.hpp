@@ -91,7 +91,8 @@ class Wiring {
     FlightRecorder* recorder = nullptr;    ///< null: nothing is recorded
     EffortSource* track_effort = nullptr;  ///< null: the settings' effort, always
     EffortSource* smooth_effort = nullptr;
-    ArmingMonitor* arming = nullptr;  ///< null: nobody asks whether the vehicle may be armed
+    const Vocabulary* vocabulary = nullptr;  ///< of loop closure; null: the shipped one; outlives the wiring
+    ArmingMonitor* arming = nullptr;         ///< null: nobody asks whether the vehicle may be armed
     /// Called after a stage's work with its CPU seconds, within its wall time: tests slow stages down.
     std::function<void(StageId, double)> drag;
   };

@@ -29,9 +29,10 @@ const WindowPose* poseOfFrame(const SmoothedWindow& window, std::uint64_t frame)
 
 }  // namespace
 
-LoopStage::LoopStage(const Rig& rig, const LoopSettings& settings, const LoopLimits& limits)
+LoopStage::LoopStage(const Rig& rig, const LoopSettings& settings, const LoopLimits& limits,
+                     const Vocabulary& vocabulary)
     : rig_(rig),
-      place_(rig.camera[0], Vocabulary::shipped(), {}, databaseSettings(settings, limits)),
+      place_(rig.camera[0], vocabulary, {}, databaseSettings(settings, limits)),
       stereo_(rig.camera_count > 1 ? std::make_unique<StereoDepth>(rig) : nullptr),
       verifier_(rig),
       map_(settings, limits),

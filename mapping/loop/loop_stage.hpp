@@ -64,7 +64,9 @@ struct MapNode {
 
 class LoopStage {
  public:
-  LoopStage(const Rig& rig, const LoopSettings& settings, const LoopLimits& limits = {});
+  /// `vocabulary` outlives the stage.
+  LoopStage(const Rig& rig, const LoopSettings& settings, const LoopLimits& limits = {},
+            const Vocabulary& vocabulary = Vocabulary::shipped());
 
   Status step(const LoopInput& input, const LoopEffort& effort, LoopReport& report);
 

@@ -1,6 +1,7 @@
 #include "mapping/map/map_stage.hpp"
 
 #include <algorithm>
+#include <charconv>
 
 namespace swiftlet {
 namespace {
@@ -17,7 +18,7 @@ VolumeSettings volumeSettings(const MapSettings& settings) {
   volume.memory_bytes = static_cast<std::size_t>(settings.volume_mib) << 20U;
   volume.labels = settings.labels;
   volume.most_range = settings.most_range;
-  volume.masked_labels = settings.masked_labels;
+  volume.masked_labels = labelMask(settings.moving_labels).value_or(0);
   return volume;
 }
 
@@ -46,6 +47,20 @@ std::size_t mostPixels(const Rig& rig, const DepthImageView* sensor) {
 }
 
 }  // namespace
+
+std::optional<std::uint32_t> labelMask(std::string_view labels) {
+  std::uint32_t mask = 0;
+  while (!labels.empty()) {
+    const std::size_t comma = std::min(labels.find(','), labels.size());
+    int label = 0;
+    const auto [end, error] = std::from_chars(labels.data(), labels.data() + comma, label);
+    if (error != std::errc() || end != labels.data() + comma || label < 1 || label >= kLabelValues)
+      return std::nullopt;
+    mask |= 1U << static_cast<unsigned>(label);
+    labels.remove_prefix(comma == labels.size() ? comma : comma + 1);
+  }
+  return mask;
+}
 
 MapStage::Sensor::Sensor(const DepthImageView& camera, const Rig& rig, const MapSettings& settings)
     : depth(camera.camera, camera.T_body_camera, sensorSettings(settings)),

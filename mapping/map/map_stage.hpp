@@ -13,6 +13,8 @@
 
 #include <array>
 #include <memory>
+#include <optional>
+#include <string_view>
 #include <vector>
 
 #include "estimator/camera/rig.hpp"
@@ -60,10 +62,14 @@ struct MapCounters {
   std::uint64_t epochs = 0;
 };
 
+/// The set of labels that "10,12" names, bit by bit; empty where the text is no such list of labels from 1
+/// to 31.
+std::optional<std::uint32_t> labelMask(std::string_view labels);
+
 class MapStage {
  public:
-  /// `depth_sensor`: its camera, where one gives depth images. `spill` takes the surface that leaves the
-  /// store; may be null, outlives the stage.
+  /// Moving labels that are no list count as none: check them first. `depth_sensor`: its camera, where one
+  /// gives depth images. `spill` takes the surface that leaves the store; may be null, outlives the stage.
   MapStage(const Rig& rig, const MapSettings& settings, const DepthImageView* depth_sensor = nullptr,
            SurfaceSink* spill = nullptr);
 

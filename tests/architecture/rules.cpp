@@ -24,6 +24,7 @@ RoomTable directNeighbours() {
       {"mapping/volume", world},
       {"mapping/surface", {"mapping/volume"}},
       {"mapping/distance", {"mapping/volume"}},
+      {"mapping/map", {"mapping/depth", "mapping/distance", "mapping/surface", "mapping/volume"}},
       {"mapping/place", world},
       {"mapping/pose_graph", world},
       {"mapping/loop", {"mapping/place", "mapping/pose_graph"}},

@@ -1,0 +1,54 @@
+// `swiftlet fuse`: the map alone with given poses, from the command line to its files.
+
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "firmware_host/commands/command.hpp"
+#include "firmware_host/report/ply_file.hpp"
+#include "tests/firmware_host/scratch_folder.hpp"
+
+namespace swiftlet {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kLog = std::string(SWIFTLET_TEST_DATA) + "/euroc_mh01_4s";
+
+int run(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "swiftlet");
+  std::vector<char*> pointers;
+  for (std::string& argument : arguments) pointers.push_back(argument.data());
+  return runProgram(static_cast<int>(pointers.size()), pointers.data());
+}
+
+TEST_CASE("a second of a real flight gives a map from stereo, in files that others read", "[fuse_command]") {
+  const ScratchFolder folder("fuse");
+  const std::string out = folder.file("map");
+  REQUIRE(run({"fuse", kLog, "--out", out, "--until", "1", "--interval", "0.25"}) == kExitDone);
+  const TriangleMesh mesh = readPly(out + "/map.ply");
+  CHECK(mesh.faces.size() > 5000);
+  CHECK(fs::file_size(out + "/map.glb") > 100'000);
+  std::ifstream file(out + "/summary.json");
+  const nlohmann::json summary = nlohmann::json::parse(file);
+  CHECK(summary["run"]["depth"] == "stereo");
+  CHECK(summary["moments"]["fused"].get<int>() >= 4);
+  CHECK(summary["moments"]["refused"] == 0);
+  CHECK(summary["map"]["mesh"]["faces"] == mesh.faces.size());
+}
+
+TEST_CASE("what cannot be fused is refused with a remedy", "[fuse_command]") {
+  const ScratchFolder folder("fuse_bad");
+  const std::string out = folder.file("map");
+  CHECK(run({"fuse", kLog, "--out", out, "--depth", "sensor"}) == kExitBadInput);
+  CHECK(run({"fuse", kLog, "--out", out, "--depth", "sonar"}) == kExitBadInput);
+  CHECK(run({"fuse", kLog, "--out", out, "--set", "map.moving_labels=chair"}) == kExitBadInput);
+  CHECK(run({"fuse", folder.file("nowhere"), "--out", out}) == kExitBadInput);
+  CHECK_FALSE(fs::exists(out));
+}
+
+}  // namespace
+}  // namespace swiftlet

@@ -1,0 +1,181 @@
+// The map's stage as a whole: depth, labels and grey values of a wall through to its surface and the distance
+// field.
+
+#include "mapping/map/map_stage.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <vector>
+
+using namespace swiftlet;
+
+namespace {
+
+constexpr float kWall = 1.5F;  // m in front of the camera
+constexpr std::uint8_t kLeft = 3;
+constexpr std::uint8_t kRight = 7;
+
+/// One camera that looks along the body's x, and a depth sensor at its place.
+struct Wall {
+  Wall() {
+    Eigen::Matrix3d R;
+    R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+    rig.camera_count = 1;
+    rig.camera[0] = CameraModel(CameraKind::kPinholeRadtan, 160, 120, {110, 110, 79.5, 59.5}, {0, 0, 0, 0});
+    rig.T_body_cam[0] = SE3(R, Eigen::Vector3d::Zero());
+    sensor.camera = {110, 110, 79.5, 59.5, 160, 120};
+    sensor.T_body_camera = rig.T_body_cam[0];
+    depth.assign(sensor.camera.pixels(), kWall);
+    grey.assign(sensor.camera.pixels(), 90);
+    labels.assign(sensor.camera.pixels(), kLeft);
+    for (std::size_t i = 0; i < labels.size(); ++i) {
+      if (i % 160 >= 80) labels[i] = kRight;
+    }
+  }
+
+  MapInput at(int i) {
+    MapInput input;
+    input.stamp = Stamp{100'000'000LL * (i + 1)};
+    input.depth = sensor;
+    input.depth.depth = depth.data();
+    input.image[0] = {grey.data(), 160, 120, 160};
+    input.labels = {labels.data(), 160, 120, 160};
+    return input;
+  }
+
+  Rig rig;
+  DepthImageView sensor;
+  std::vector<float> depth;
+  std::vector<std::uint8_t> grey;
+  std::vector<std::uint8_t> labels;
+};
+
+MapSettings smallSettings() {
+  MapSettings settings;
+  settings.volume_mib = 8;
+  settings.surface_mib = 4;
+  return settings;
+}
+
+struct Count : SurfaceSink {
+  void take(const SurfacePatch& patch) override {
+    triangles += patch.triangles.size();
+    for (const SurfaceVertex& vertex : patch.vertices) {
+      worst = std::max(worst, std::abs(vertex.p_world.x() - kWall));
+      if (vertex.label == kLeft) left += 1;
+      if (vertex.label == kRight) right += 1;
+      wrong_side += (vertex.label == kLeft && vertex.p_world.y() < -0.1F) ||
+                            (vertex.label == kRight && vertex.p_world.y() > 0.1F)
+                        ? 1
+                        : 0;
+      grey_off += std::abs(vertex.grey - 90) > 2 ? 1 : 0;
+    }
+  }
+  std::size_t triangles = 0, left = 0, right = 0, wrong_side = 0, grey_off = 0;
+  float worst = 0;
+};
+
+Count countOf(MapStage& map) {
+  Count count;
+  map.visitSurface(count);
+  return count;
+}
+
+}  // namespace
+
+TEST_CASE("a wall becomes a surface where it stands, with its labels and grey values, and a distance to it") {
+  Wall wall;
+  MapStage map(wall.rig, smallSettings(), &wall.sensor);
+  MapReport report;
+  for (int i = 0; i < 5; ++i) REQUIRE(map.step(wall.at(i), {}, report).ok());
+  CHECK(report.from_sensor);
+  CHECK(report.with_labels);
+  const Count count = countOf(map);
+  CHECK(count.triangles > 1000);
+  CHECK(count.worst < 0.005F);
+  CHECK(count.left > 200);
+  CHECK(count.right > 200);
+  CHECK(count.wrong_side == 0);
+  CHECK(count.grey_off == 0);
+  DistanceSample sample;
+  REQUIRE(map.distance().query({1.0, 0, 0}, sample));
+  CHECK(sample.space == Space::kFree);
+  CHECK(sample.distance == Approx(kWall - 1.0).margin(0.01));
+}
+
+TEST_CASE("labels of moving things leave no surface") {
+  Wall wall;
+  MapSettings settings = smallSettings();
+  settings.moving_labels = "7";
+  MapStage map(wall.rig, settings, &wall.sensor);
+  MapReport report;
+  for (int i = 0; i < 5; ++i) REQUIRE(map.step(wall.at(i), {}, report).ok());
+  const Count count = countOf(map);
+  CHECK(count.left > 200);
+  CHECK(count.right == 0);
+}
+
+TEST_CASE("what does not fit is refused or left out, and counted") {
+  Wall wall;
+  MapStage map(wall.rig, smallSettings(), &wall.sensor);
+  MapReport report;
+  MapInput nothing;
+  nothing.stamp = Stamp{1};
+  CHECK(map.step(nothing, {}, report).code == StatusCode::kInvalidInput);
+  CHECK(map.counters().without_depth == 1);
+
+  MapInput small = wall.at(0);
+  small.depth.camera.width = 80;
+  CHECK(map.step(small, {}, report).code == StatusCode::kInvalidInput);
+  CHECK(map.counters().without_depth == 2);
+
+  MapInput labels = wall.at(1);
+  labels.labels.height = 60;
+  CHECK(map.step(labels, {}, report).ok());
+  CHECK_FALSE(report.with_labels);
+  CHECK(map.counters().wrong_size == 1);
+
+  MapInput jump = wall.at(2);
+  jump.T_map_body.translation.x() = 50;
+  CHECK(map.step(jump, {}, report).code == StatusCode::kInvalidInput);
+  CHECK(map.integrator().counters().pose_jumps == 1);
+  CHECK(map.counters().taken == 1);
+}
+
+TEST_CASE("a new epoch begins a new volume and keeps the surface of the old") {
+  Wall wall;
+  MapStage map(wall.rig, smallSettings(), &wall.sensor);
+  MapReport report;
+  REQUIRE(map.step(wall.at(0), {}, report).ok());
+  const std::size_t before = countOf(map).triangles;
+  MapInput next = wall.at(1);
+  next.epoch = 1;
+  next.T_map_body.translation.x() = -20;
+  REQUIRE(map.step(next, {}, report).ok());
+  CHECK(map.counters().epochs == 1);
+  CHECK(countOf(map).triangles > before + before / 2);
+  DistanceSample sample;
+  CHECK_FALSE(map.distance().query({1.0, 0, 0}, sample));
+}
+
+TEST_CASE("the same input gives the same bytes") {
+  std::vector<float> distances[2];
+  std::size_t triangles[2];
+  for (int run = 0; run < 2; ++run) {
+    Wall wall;
+    MapStage map(wall.rig, smallSettings(), &wall.sensor);
+    MapReport report;
+    for (int i = 0; i < 3; ++i) REQUIRE(map.step(wall.at(i), {}, report).ok());
+    triangles[run] = countOf(map).triangles;
+    for (int x = 0; x < 30; ++x) distances[run].push_back(map.distance().squaredDistance({x, 2, 3}));
+  }
+  CHECK(distances[0] == distances[1]);
+  CHECK(triangles[0] == triangles[1]);
+}
+
+TEST_CASE("moving labels are a list of numbers from 1 to 31") {
+  CHECK(labelMask("") == 0U);
+  CHECK(labelMask("1") == 2U);
+  CHECK(labelMask("10,12") == ((1U << 10U) | (1U << 12U)));
+  for (const char* bad : {"0", "32", "a", "1,,2", "1, 2", "-3", "1.5"}) CHECK_FALSE(labelMask(bad));
+}
