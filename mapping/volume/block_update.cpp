@@ -129,8 +129,8 @@ void BlockUpdate::projectEight(const Eigen::Vector3f& first, std::size_t at, Vox
   sums.largest = change > sums.largest ? change : sums.largest;
   sums.observed -= seen;
   const Ints near = hit & (s < truncation);
-  // A first observation far in front makes no surface.
-  sums.news |= seen & ((near & (old_weight == 0.0F)) | (now_behind ^ (old_distance < 0.0F)));
+  // A first observation far in front makes no surface, but free space of the unknown.
+  sums.news |= seen & ((old_weight == 0.0F) | (now_behind ^ (old_distance < 0.0F)));
   if (lanes::any(near)) colour(pixel, near, gain, sum, at, block, labels, sums);
 }
 
