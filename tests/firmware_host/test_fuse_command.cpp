@@ -30,7 +30,7 @@ TEST_CASE("a second of a real flight gives a map from stereo, in files that othe
   const std::string out = folder.file("map");
   REQUIRE(run({"fuse", kLog, "--out", out, "--until", "1", "--interval", "0.25"}) == kExitDone);
   const TriangleMesh mesh = readPly(out + "/map.ply");
-  CHECK(mesh.faces.size() > 5000);
+  CHECK(mesh.faces.size() > 2000);
   CHECK(fs::file_size(out + "/map.glb") > 100'000);
   std::ifstream file(out + "/summary.json");
   const nlohmann::json summary = nlohmann::json::parse(file);
