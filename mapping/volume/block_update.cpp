@@ -116,7 +116,7 @@ void BlockUpdate::projectEight(const Eigen::Vector3f& first, std::size_t at, Vox
   const Ints now_behind = mean < 0.0F;
   const Floats rounded = mean + (now_behind ? Floats{} - 0.5F : Floats{} + 0.5F);
   const Ints cut_distance = __builtin_convertvector(rounded, Ints);
-  const Ints new_distance = now_behind & (cut_distance == 0) ? Ints{} - 1 : cut_distance;
+  const Ints new_distance = (now_behind & (cut_distance == 0)) ? Ints{} - 1 : cut_distance;
   const float most = std::min(static_cast<float>(settings_.most_weight) * kWeightSteps, kMostWeightSteps);
   const Ints new_weight = __builtin_convertvector((sum < most ? sum : Floats{} + most) + 0.5F, Ints);
   distances = __builtin_convertvector(new_distance, lanes::Shorts);
@@ -189,7 +189,7 @@ BlockUpdate::Result BlockUpdate::carve(VoxelBlock& block) const {
     const float change = std::abs(mean - old_distance);
     largest = change > largest ? change : largest;
     is_behind |= new_distance < 0 ? 1 : 0;
-    news |= (old_weight == 0.0F) | ((new_distance < 0) != (old_distance < 0.0F)) ? 1 : 0;
+    news |= old_weight == 0.0F || (new_distance < 0) != (old_distance < 0.0F) ? 1 : 0;
   }
   result.observed = kBlockVoxels;
   result.largest_change = largest;

@@ -54,12 +54,12 @@ inline bool LabelCounts::add(std::uint8_t label) {
     if ((slots_[i] & kMostCount) > 1) {
       --slots_[i];
     } else {
-      slots_[i] = static_cast<std::uint16_t>((label << 11U) | 1U);
+      slots_[i] = static_cast<std::uint16_t>((static_cast<unsigned>(label) << 11U) | 1U);
     }
     return false;
   }
   if (slots_[i] == 0) {
-    slots_[i] = static_cast<std::uint16_t>((label << 11U) | 1U);
+    slots_[i] = static_cast<std::uint16_t>((static_cast<unsigned>(label) << 11U) | 1U);
     return i == 0;
   }
   if ((slots_[i] & kMostCount) == kMostCount) {
