@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "drivers/calibration/input_error.hpp"
 #include "firmware_host/evaluation/association.hpp"
 
 namespace swiftlet {
@@ -23,6 +24,20 @@ bool isJump(const TrajectoryPoint& a, const TrajectoryPoint& b) {
 }
 
 }  // namespace
+
+NamedTrajectory openTrajectory(const std::string& file, const std::string& log, const LogSource& source,
+                               LogWarnings& warnings) {
+  if (!file.empty()) {
+    LogCounters counters;
+    return {file, readTrajectory(file, counters, warnings)};
+  }
+  NamedTrajectory truth{source.groundTruthName(), source.groundTruth()};
+  if (truth.poses.empty()) {
+    throw InputError(log, 0, "", "the log has no truth to take poses from",
+                     "Give a trajectory file with --trajectory (TUM, or EuRoC csv)");
+  }
+  return truth;
+}
 
 GivenPoses::GivenPoses(Trajectory trajectory, Duration max_gap)
     : trajectory_(std::move(trajectory)), max_gap_(max_gap) {

@@ -7,11 +7,24 @@
 
 #include <cstddef>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "drivers/recorded/log_source.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
 
 namespace swiftlet {
+
+/// Poses, and where they are from: for messages.
+struct NamedTrajectory {
+  std::string name;
+  Trajectory poses;
+};
+
+/// Those of `file` (TUM, EuRoC csv), or where it is empty the log's own truth. InputError where there are
+/// none.
+NamedTrajectory openTrajectory(const std::string& file, const std::string& log, const LogSource& source,
+                               LogWarnings& warnings);
 
 class GivenPoses {
  public:

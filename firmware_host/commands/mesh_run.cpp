@@ -164,20 +164,9 @@ class MeshRun {
 };
 
 void MeshRun::begin() {
-  Trajectory trajectory;
-  if (request_.trajectory.empty()) {
-    trajectory = source_->groundTruth();
-    poses_name_ = source_->groundTruthName();
-    if (trajectory.empty()) {
-      throw InputError(request_.log, 0, "", "the log has no truth to take poses from",
-                       "Give a trajectory file with --trajectory (TUM, or EuRoC csv)");
-    }
-  } else {
-    LogCounters counters;
-    trajectory = readTrajectory(request_.trajectory, counters, warnings_);
-    poses_name_ = request_.trajectory;
-  }
-  poses_.emplace(std::move(trajectory), Duration::fromSeconds(request_.max_gap));
+  NamedTrajectory trajectory = openTrajectory(request_.trajectory, request_.log, *source_, warnings_);
+  poses_name_ = trajectory.name;
+  poses_.emplace(std::move(trajectory.poses), Duration::fromSeconds(request_.max_gap));
   if (poses_->jumps() > 0) {
     warnings_.add(fmt::format("{}: the poses jump {} times, first at {}: a new mesh begins after each",
                               poses_name_, poses_->jumps(), formatSeconds(poses_->firstJump())));

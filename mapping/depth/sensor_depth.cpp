@@ -11,13 +11,6 @@ SensorDepth::SensorDepth(const PinholeIntrinsics& sensor, const SE3& T_body_sens
                          const SensorDepthSettings& settings)
     : sensor_(sensor), T_body_sensor_(T_body_sensor), settings_(settings) {}
 
-bool SensorDepth::useCamera(const CameraModel& camera, const SE3& T_body_cam) {
-  const SE3 T_cam_sensor = T_body_cam.inverse() * T_body_sensor_;
-  if (!(T_cam_sensor.translation.norm() <= kMaxOffset)) return false;
-  warp_ = ImageWarp(camera, T_cam_sensor.R(), sensor_);
-  return true;
-}
-
 DepthBuffer SensorDepth::makeBuffer() const { return DepthBuffer(sensor_); }
 
 // 0 where there is none.
@@ -76,24 +69,6 @@ Status SensorDepth::step(const std::uint16_t* counts, int width, int height, int
 Status SensorDepth::step(const float* metres, int width, int height, int stride, Stamp stamp,
                          DepthBuffer& out) {
   return take(metres, width, height, stride, stamp, out);
-}
-
-Status SensorDepth::addIntensity(const ImageView& raw, DepthBuffer& out) {
-  const Status status = out.intensity.size() == sensor_.pixels()
-                            ? warp_.warp(raw, out.intensity.data())
-                            : Status{StatusCode::kInvalidInput, "depth: the output is of another size"};
-  ++(status.ok() ? counters_.images_added : counters_.images_refused);
-  if (status.ok()) out.has_intensity = true;
-  return status;
-}
-
-Status SensorDepth::addLabels(const ImageView& raw, DepthBuffer& out) {
-  const Status status = out.labels.size() == sensor_.pixels()
-                            ? warp_.warpLabels(raw, out.labels.data())
-                            : Status{StatusCode::kInvalidInput, "depth: the output is of another size"};
-  ++(status.ok() ? counters_.images_added : counters_.images_refused);
-  if (status.ok()) out.has_labels = true;
-  return status;
 }
 
 }  // namespace swiftlet

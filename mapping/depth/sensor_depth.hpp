@@ -4,18 +4,15 @@
 //
 // Depth is along the axis of an ideal pinhole camera. No depth: count 0, NaN or infinite, not positive, out
 // of range; each kind is counted. sigma = floor + square (z - knee)^2 for z > knee, floor below; the defaults
-// are Kinect's (Nguyen, Izadi, Lovell, 3DIMPVT 2012, eq. 2). Grey and label images of a raw camera at the
-// sensor's place can be added. Errors: kInvalidInput (missing, or of another size): the output is untouched,
-// counted. Memory: fixed by the constructor, 6 bytes a pixel where a camera is given. Deterministic.
+// are Kinect's (Nguyen, Izadi, Lovell, 3DIMPVT 2012, eq. 2). Grey values and labels of a camera are brought
+// by mapping/map/view_warp.hpp. Errors: kInvalidInput (missing, or of another size): the output is untouched,
+// counted. Deterministic.
 
 #include <cstdint>
 
-#include "estimator/camera/camera_model.hpp"
-#include "estimator/core/image_view.hpp"
 #include "estimator/core/stamp.hpp"
 #include "estimator/core/status.hpp"
 #include "mapping/depth/depth_buffer.hpp"
-#include "mapping/depth/image_warp.hpp"
 
 namespace swiftlet {
 
@@ -35,8 +32,6 @@ struct SensorDepthCounters {
   std::uint64_t missing = 0;       ///< count or value 0
   std::uint64_t not_finite = 0;    ///< NaN or infinite
   std::uint64_t out_of_range = 0;  ///< negative, nearer or farther than asked for
-  std::uint64_t images_added = 0;  ///< grey and labels
-  std::uint64_t images_refused = 0;
 };
 
 class SensorDepth {
@@ -44,20 +39,11 @@ class SensorDepth {
   SensorDepth(const PinholeIntrinsics& sensor, const SE3& T_body_sensor,
               const SensorDepthSettings& settings = {});
 
-  /// For addIntensity and addLabels: the raw camera, which stands at most kMaxOffset from the sensor. False:
-  /// it stands farther off, and its images will be refused (what it sees differs by parallax).
-  bool useCamera(const CameraModel& camera, const SE3& T_body_cam);
-  static constexpr double kMaxOffset = 0.005;  ///< m: less than 2 px from 1 m on with f = 430 px
-
   [[nodiscard]] DepthBuffer makeBuffer() const;
 
   /// `stride`: values from row to row. The output's grey and labels are taken away.
   Status step(const std::uint16_t* counts, int width, int height, int stride, Stamp stamp, DepthBuffer& out);
   Status step(const float* metres, int width, int height, int stride, Stamp stamp, DepthBuffer& out);
-
-  /// Raw images of the camera.
-  Status addIntensity(const ImageView& raw, DepthBuffer& out);
-  Status addLabels(const ImageView& raw, DepthBuffer& out);
 
   [[nodiscard]] const SensorDepthCounters& counters() const { return counters_; }
 
@@ -69,7 +55,6 @@ class SensorDepth {
   PinholeIntrinsics sensor_;
   SE3 T_body_sensor_;
   SensorDepthSettings settings_;
-  ImageWarp warp_;
   SensorDepthCounters counters_;
 };
 

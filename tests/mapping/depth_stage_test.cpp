@@ -156,24 +156,3 @@ TEST_CASE("depth: a sensor's image with gaps, NaN and values out of range") {
   CHECK(sensor.counters().refused == 3);
   CHECK(out.depth[3] == before);
 }
-
-TEST_CASE("depth: a camera's images join a sensor's depth only where both stand at one place") {
-  const Rig rig = makeRig(CameraKind::kPinholeRadtan);
-  const PinholeIntrinsics k{180, 180, 159.5, 119.5, kWidth, kHeight};
-  SensorDepth sensor(k, rig.T_body_cam[0]);
-  DepthBuffer out = sensor.makeBuffer();
-  Image image;
-  CHECK(sensor.addLabels(image.view(), out).code == StatusCode::kInvalidInput);
-  CHECK_FALSE(sensor.useCamera(rig.camera[1], rig.T_body_cam[1]));
-  CHECK(sensor.addIntensity(image.view(), out).code == StatusCode::kInvalidInput);
-  CHECK(sensor.counters().images_refused == 2);
-  REQUIRE(sensor.useCamera(rig.camera[0], rig.T_body_cam[0]));
-  // The raw pixel at a known place.
-  const Eigen::Vector3d ray((40 - k.cx) / k.fx, (60 - k.cy) / k.fy, 1);
-  Eigen::Vector2d pixel;
-  REQUIRE(rig.camera[0].project(ray, pixel));
-  image.pixels[static_cast<std::size_t>(std::lround(pixel.y()) * kWidth + std::lround(pixel.x()))] = 9;
-  REQUIRE(sensor.addLabels(image.view(), out).ok());
-  CHECK(out.view().labels[60 * kWidth + 40] == 9);
-  CHECK(sensor.counters().images_added == 1);
-}
