@@ -183,15 +183,9 @@ void PlaceRun::runLog() {
   }
   const Rig rig = rigInUse(source->rig(), settings_.odometry);
   verifies_ = rig.camera_count > 1;
-  LogCounters counters;
-  poses_name_ = request_.trajectory.empty() ? source->groundTruthName() : request_.trajectory;
-  Trajectory trajectory =
-      request_.trajectory.empty() ? source->groundTruth() : readTrajectory(poses_name_, counters, warnings_);
-  if (trajectory.empty()) {
-    throw InputError(request_.input, 0, "", "the log has no truth to take poses from",
-                     "Give a trajectory file with --trajectory (TUM, or EuRoC csv)");
-  }
-  takePoses(std::move(trajectory));
+  NamedTrajectory trajectory = openTrajectory(request_.trajectory, request_.input, *source, warnings_);
+  poses_name_ = trajectory.name;
+  takePoses(std::move(trajectory.poses));
   LogFeed feed(*source, {}, nullptr);
   PairingSettings pairing_settings;
   pairing_settings.cameras = rig.camera_count;
