@@ -12,6 +12,7 @@
 #include "estimator/odometry/odometry_inputs.hpp"
 #include "estimator/odometry/pairing.hpp"
 #include "firmware_host/commands/given_poses.hpp"
+#include "firmware_host/commands/moving_labels.hpp"
 #include "firmware_host/pipeline/log_feed.hpp"
 #include "firmware_host/report/line_file.hpp"
 #include "firmware_host/report/map_files.hpp"
@@ -60,12 +61,18 @@ LogOptions logOptions(const FuseRequest& request, const Settings& settings) {
   return options;
 }
 
+/// Given poses stay as they are.
+Settings withoutCorrection(Settings settings) {
+  settings.map_stage.keyframes_mib = 0;
+  return settings;
+}
+
 /// What one run is made of, from opening to the summary.
 class FuseRun {
  public:
   FuseRun(const FuseRequest& request, const Settings& settings)
       : request_(request),
-        settings_(settings),
+        settings_(withoutCorrection(settings)),
         source_(openLog(request.log, logOptions(request, settings))),
         rig_(source_->rig()),
         depth_(request.log, warnings_, source_->calibration().T_body_filebody),
@@ -93,7 +100,7 @@ class FuseRun {
   }
 
   const FuseRequest& request_;
-  const Settings& settings_;
+  const Settings settings_;
   std::unique_ptr<LogSource> source_;
   Rig rig_;
   LogWarnings warnings_;
@@ -124,11 +131,7 @@ void FuseRun::openPoses() {
 }
 
 void FuseRun::begin() {
-  if (!labelMask(settings_.map_stage.moving_labels)) {
-    throw InputError("map.moving_labels", 0, "",
-                     "\"" + settings_.map_stage.moving_labels + "\" is no list of labels",
-                     "Write numbers from 1 to 31 with commas, as 10,12");
-  }
+  checkMovingLabels(settings_.map_stage);
   openPoses();
   sensor_ =
       request_.depth == DepthSource::kSensor || (request_.depth == DepthSource::kAny && !depth_.empty());

@@ -108,6 +108,7 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
       ->needs(real_time);
   command->add_flag("--loop-closure", request.loop_closure,
                     "Recognize places seen before; they hold map.tum together");
+  command->add_flag("--map", request.map, "Fuse depth into a labelled map: map.ply, map.glb");
   command->add_flag("--record", request.record,
                     "Write what enters the estimator to recording/ in the run folder");
   command

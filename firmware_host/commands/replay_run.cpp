@@ -10,6 +10,7 @@
 #include "drivers/recorded/recording_source.hpp"
 #include "firmware_host/commands/evaluate_run.hpp"
 #include "firmware_host/commands/fly_threaded.hpp"
+#include "firmware_host/commands/moving_labels.hpp"
 #include "firmware_host/pipeline/flight_recorder.hpp"
 #include "firmware_host/pipeline/lockstep.hpp"
 #include "firmware_host/pipeline/reproduce.hpp"
@@ -93,6 +94,7 @@ class ReplayRun {
       : request_(request), settings_(std::move(settings)), hooks_(hooks) {
     if (request_.mono) settings_.odometry.use_stereo = false;
     if (request_.loop_closure) settings_.loop.enabled = true;
+    if (request_.map) settings_.map.enabled = true;
   }
 
   ReplayResult operator()() {
@@ -128,6 +130,7 @@ class ReplayRun {
     facts_.log = request_.log;
     facts_.tracks = request_.tracks.empty() ? source_->trackFile() : request_.tracks;
     steps_ = source_->imageCount();
+    openScenes();
     if (facts_.tracks.empty()) return;
     if (request_.real_time || request_.record) {
       throw InputError(request_.log, 0, "", "a log of feature tracks has no images to let out or record",
@@ -135,6 +138,25 @@ class ReplayRun {
     }
     steps_ = checkTracks(facts_.tracks, source_->rig(), request_.mono).frames;
     tracks_ = std::make_unique<TrackReader>(facts_.tracks);
+  }
+
+  /// Refuses what cannot be mapped before anything is written.
+  void openScenes() {
+    if (!settings_.map.enabled || request_.reproduce) return;
+    checkMovingLabels(settings_.map_stage);
+    if (!facts_.tracks.empty()) {
+      throw InputError(request_.log, 0, "", "a log of feature tracks has no images to map",
+                       "Leave --map out");
+    }
+    scenes_.emplace(request_.log, source_->calibration(),
+                    SceneReader::Wanted{settings_.map.depth_sensor, settings_.map_stage.labels});
+    for (const std::string& line : scenes_->warnings()) fmt::print(stderr, "warning: {}\n", line);
+    scene_warnings_ = scenes_->warnings().size();
+    if (scenes_->depthSensor() == nullptr &&
+        (source_->rig().camera_count < 2 || !settings_.odometry.use_stereo)) {
+      throw InputError(request_.log, 0, "", "one camera and no depth images: nothing gives depth for --map",
+                       "Give a log with two cameras or with mav0/depth0, or leave --map out");
+    }
   }
 
   void begin() {
@@ -179,7 +201,9 @@ class ReplayRun {
     wanted.recorder = flight_recorder.get();
     wanted.drag = hooks_.drag;
     wanted.vocabulary = vocabulary();
-    LogFeed feed(*source_, {request_.from, request_.until, request_.last_stamp}, tracks_.get());
+    if (scenes_) wanted.depth_sensor = scenes_->depthSensor();
+    LogFeed feed(*source_, {request_.from, request_.until, request_.last_stamp}, tracks_.get(),
+                 scenes_ ? &*scenes_ : nullptr);
     if (request_.real_time) {
       FlightRequest flight;
       flight.speed = request_.speed;
@@ -218,6 +242,9 @@ class ReplayRun {
     writeMap(out() / "map.tum", log_->solveMap());
     if (settings_.loop.enabled) writeLoops(out() / "loops.csv", log_->loops());
     printWarnings(*source_, warned_);
+    for (std::size_t i = scene_warnings_; scenes_ && i < scenes_->warnings().size(); ++i) {
+      fmt::print(stderr, "warning: {}\n", scenes_->warnings()[i]);
+    }
     if (tracks_) {
       facts_.track_surplus = tracks_->surplus();
       facts_.track_warnings = tracks_->warnings();
@@ -228,6 +255,14 @@ class ReplayRun {
     result.finished = facts_.finished;
     result.has_pose = result.statistics.first_pose.has_value();
     result.summary = summaryOf(facts_, settings_, *source_, result.statistics);
+    if (!recorder_->map().is_null()) {
+      result.summary["map"] = recorder_->map();
+      const MapThreadStatistics& mapping = *result.statistics.mapping;
+      result.summary["map"]["frames"] = {{"to_map", mapping.frames},
+                                         {"without_image", mapping.without_image},
+                                         {"without_scene", mapping.without_scene},
+                                         {"refused", mapping.refused}};
+    }
     const Trajectory truth = source_->groundTruth();
     if (!truth.empty() && result.has_pose) {
       result.summary["accuracy"] = runAccuracyJson(request_.out, truth, source_->groundTruthName(),
@@ -247,6 +282,8 @@ class ReplayRun {
   std::unique_ptr<LogSource> source_;
   RecordingSource* recording_ = nullptr;  ///< source_, when it is to be repeated
   std::unique_ptr<TrackReader> tracks_;
+  std::optional<SceneReader> scenes_;
+  std::size_t scene_warnings_ = 0;
   std::size_t warned_ = 0;
   std::size_t steps_ = 0;
   std::optional<RunRecorder> recorder_;

@@ -24,6 +24,7 @@ struct ReplayRequest {
   bool imu_rate = false;
   bool mesh_sequence = false;  ///< write the meshes of all frames to `meshes/`
   bool loop_closure = false;   ///< recognize places; sets loop.enabled
+  bool map = false;            ///< fuse depth into a map; sets map.enabled
   bool real_time = false;      ///< on threads, messages let out at their times
   double speed = 1;            ///< real_time: times faster than recorded
   bool record = false;         ///< write `recording/` into the run folder

@@ -17,12 +17,14 @@
 #include "estimator/messages/keyframe_link.hpp"
 #include "estimator/messages/local_mesh.hpp"
 #include "estimator/messages/odometry_output.hpp"
+#include "estimator/messages/scene_images.hpp"
 #include "estimator/messages/smoothed_window.hpp"
 #include "estimator/messages/state_fix.hpp"
 #include "estimator/messages/step_record.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "firmware_host/pipeline/stage_timer.hpp"
 #include "mapping/loop/loop_report.hpp"
+#include "mapping/map/volume_correction.hpp"
 
 namespace swiftlet {
 
@@ -67,11 +69,29 @@ struct KeyframeImages {
   std::array<std::vector<std::uint8_t>, kMaxCameras> pixels;
 };
 
-enum KeyframeReader : std::size_t { kLoopReads, kKeyframeReaders };
+enum KeyframeReader : std::size_t { kLoopReads, kMapReads, kKeyframeReaders };
 
+/// Frames that wait for the map: as kLoopKeyframes.
+inline constexpr std::size_t kMapFrames = 4;
 /// As kMeshQuota.
 inline constexpr std::uint32_t kLoopQuota = kLoopKeyframes + 2;
-using KeyframePool = SlotPool<KeyframeImages, 1 + kLoopQuota, kKeyframeReaders>;
+inline constexpr std::uint32_t kMapQuota = kMapFrames + 2;
+using KeyframePool = SlotPool<KeyframeImages, 1 + kLoopQuota + kMapQuota, kKeyframeReaders>;
+
+/// Depth and labels in their slot; `images` shows `depth` and `labels`.
+struct SceneSlot {
+  SceneImages images;
+  std::vector<float> depth;
+  std::vector<std::uint8_t> labels;
+};
+using ScenePool = SlotPool<SceneSlot, 1 + kMapQuota, 1>;
+
+/// What came with a stamp, for `track`, which copies the images of that frame for the map.
+struct SceneNote {
+  Stamp stamp;
+  bool depth = false;
+  bool labels = false;
+};
 
 /// Between `track` and `smooth`. In order: the end comes last.
 struct TrackMessage {
@@ -89,6 +109,7 @@ struct TrackMessage {
   Spent spent;           ///< by `track`
   int dropped = 0;       ///< frames that went by untracked since the message before
   int effort_level = 0;  ///< steps below full effort
+  bool mapped = false;   ///< its images have gone to the map
 };
 
 /// What `smooth` publishes: for the log, and whoever else follows the estimate.
@@ -125,6 +146,14 @@ struct KeyframeMessage {
   TrackedFrame tracked;
   KeyframeLink link;
   std::array<std::uint64_t, kMaxCameras> image{};  ///< numbers; 0: missing
+};
+
+/// From `smooth` to `map`: a frame that is to be mapped, and how the window stands with it.
+struct MapMessage {
+  std::uint64_t frame = 0;
+  Stamp stamp;  ///< of the images
+  std::uint32_t epoch = 0;
+  FixedVector<WindowPose, kMaxStates> poses;  ///< its own last
 };
 
 /// From `mesh` to `log`, where the meshes of all frames are wanted.
@@ -170,12 +199,27 @@ using StateRing = SpscRing<NavState, kStateRing>;
 
 /// What leads to `loop` and from there.
 struct LoopArrows {
-  KeyframePool pool{KeyframePool::Quotas{kLoopQuota}};
   DropOldestRing<SlotHandle, kLoopKeyframes> images;
   SpscRing<KeyframeMessage, kLoopKeyframes> keyframes;
-  Newest<MapCorrection> correction;
   SpscRing<LoopReport, kResultRing> reports;  ///< to `log`
   std::uint64_t images_dropped = 0;           ///< of `track`: keyframes whose images found no room
+};
+
+/// How the odometry's world lies in the map, now and at each keyframe of the newest epoch that is a node.
+struct MapInWorlds {
+  MapCorrection newest;
+  FixedVector<WorldInMap, LoopLimits{}.nodes> keyframes;  ///< by frame
+};
+
+/// What leads to `map`.
+struct MapArrows {
+  ScenePool scenes{ScenePool::Quotas{kMapQuota}};
+  DropOldestRing<SlotHandle, kMapFrames> scene;   ///< of `sensor`
+  SpscRing<SceneNote, 4 * kMapFrames> notes;      ///< of `sensor` to `track`
+  DropOldestRing<SlotHandle, kMapFrames> images;  ///< of `track`
+  SpscRing<MapMessage, 4 * kMapFrames> frames;    ///< of `smooth`
+  Newest<MapInWorlds> correction;                 ///< of `loop`
+  std::uint64_t images_dropped = 0;               ///< of `track`: frames whose images found no room
 };
 
 /// What the recorder takes beside images: it looks at them every few milliseconds.

@@ -16,6 +16,7 @@ void runAll(Wiring& wiring) {
     any = wiring.smooth() || any;
     any = wiring.mesh() || any;
     any = wiring.loop() || any;
+    any = wiring.map() || any;
     any = wiring.log() || any;
     any = wiring.record() || any;
   }
@@ -30,6 +31,7 @@ bool runLockstep(LogFeed& feed, Wiring& wiring, const RunControl& control) {
     if (next == LogFeed::Next::kSample) {
       wiring.takeImu(feed.sample(), feed.sample().stamp, now());
     } else if (next == LogFeed::Next::kImage) {
+      wiring.takeScene(feed.scene());
       wiring.takeImage(feed.image(), now());
     } else {
       // Nobody is ahead of us: there is room.

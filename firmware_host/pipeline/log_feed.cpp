@@ -11,8 +11,8 @@ constexpr Duration kImuLead = Duration::fromMilliseconds(100);
 
 }  // namespace
 
-LogFeed::LogFeed(LogSource& source, const LogSection& section, TrackReader* tracks)
-    : source_(source), section_(section), tracks_(tracks), last_(section.last_stamp) {}
+LogFeed::LogFeed(LogSource& source, const LogSection& section, TrackReader* tracks, SceneReader* scenes)
+    : source_(source), section_(section), tracks_(tracks), scenes_(scenes), last_(section.last_stamp) {}
 
 void LogFeed::noteImage(Stamp stamp) {
   if (first_image_) return;
@@ -61,7 +61,9 @@ LogFeed::Next LogFeed::next() {
     if (isPast(stamp)) break;
     has_message_ = false;
     ++taken_;
-    if (wantsImage(stamp)) return Next::kImage;
+    if (!wantsImage(stamp)) continue;
+    scene_ = scenes_ != nullptr && image().camera == 0 ? scenes_->at(stamp) : SceneImages{};
+    return Next::kImage;
   }
   ended_ = true;
   return nextTracks(kEndOfTime) ? Next::kTracks : Next::kEnd;

@@ -7,6 +7,7 @@
 
 #include "drivers/recorded/log_source.hpp"
 #include "drivers/recorded/track_file.hpp"
+#include "firmware_host/pipeline/scene_reader.hpp"
 #include "firmware_host/pipeline/stage_timer.hpp"
 #include "firmware_host/pipeline/track_feeder.hpp"
 
@@ -20,14 +21,17 @@ struct LogSection {
 
 class LogFeed {
  public:
-  /// `tracks` (may be null) takes the place of images, which the source must not deliver then.
-  LogFeed(LogSource& source, const LogSection& section, TrackReader* tracks);
+  /// `tracks` (may be null) takes the place of images, which the source must not deliver then. `scenes` (may
+  /// be null): depth and labels beside the images of camera 0.
+  LogFeed(LogSource& source, const LogSection& section, TrackReader* tracks, SceneReader* scenes = nullptr);
 
   enum class Next : std::uint8_t { kSample, kImage, kTracks, kEnd };
   /// The next message that the section wants. Images are valid as LogSource says, tracks until the next call.
   Next next();
   [[nodiscard]] const ImuSample& sample() const { return std::get<ImuSample>(message_); }
   [[nodiscard]] const CameraFrame& image() const { return std::get<CameraFrame>(message_); }
+  /// What goes with image(); may be empty.
+  [[nodiscard]] const SceneImages& scene() const { return scene_; }
   [[nodiscard]] const TrackedFrame& tracks() const { return *tracked_; }
 
   /// Images, or frames of tracks, gone by so far, unwanted ones included.
@@ -46,6 +50,8 @@ class LogFeed {
   LogSource& source_;
   LogSection section_;
   TrackFeeder tracks_;
+  SceneReader* scenes_;
+  SceneImages scene_;
   const TrackedFrame* tracked_ = nullptr;
   SensorMessage message_;
   bool has_message_ = false;  ///< read, waiting behind tracks

@@ -15,6 +15,7 @@
 #include "estimator/smoother/full_smoother.hpp"
 #include "firmware_host/pipeline/stage_timer.hpp"
 #include "mapping/loop/loop_report.hpp"
+#include "mapping/map/map_stage.hpp"
 #include "mesher/mesh_stage.hpp"
 
 namespace swiftlet {
@@ -37,6 +38,8 @@ class RunListener {
                       std::span<const Eigen::Vector2f> /*hull*/) {}
   /// At the end: the newest mesh over the horizon, when there is one.
   virtual void onLocalMesh(const LocalMesh& /*mesh*/) {}
+  /// At the end: the map, when there is one.
+  virtual void onMap(MapStage& /*map*/) {}
   /// At the end: keyframes and events that had not come out yet.
   virtual void onFinish(const OdometryOutput& output) = 0;
   /// A remark of the executor, for events.log.
@@ -62,6 +65,14 @@ struct MeshStatistics {
   std::uint64_t without_image = 0;  ///< steps without grey values
 };
 
+/// What the thread `map` counted beside its stage.
+struct MapThreadStatistics {
+  std::uint64_t frames = 0;         ///< that were to be mapped
+  std::uint64_t without_image = 0;  ///< of them, skipped: others came before they were looked at
+  std::uint64_t without_scene = 0;  ///< of them, whose depth or labels were gone
+  std::uint64_t refused = 0;        ///< by the stage
+};
+
 /// Counters of a run. Host side: the lists grow with the number of changes, not of frames.
 struct RunStatistics {
   std::uint64_t imu_samples = 0;  ///< handed in
@@ -83,6 +94,7 @@ struct RunStatistics {
   std::optional<FullSmootherReport> map;        ///< figures of the full smoothing, when it ran
   std::optional<MeshStatistics> mesh;           ///< when the run meshed
   std::optional<LoopCounters> loop;             ///< when the run closed loops
+  std::optional<MapThreadStatistics> mapping;   ///< when the run mapped
   std::map<std::string, std::uint64_t> faults;  ///< statuses that were not ok, by their text
   std::map<std::string, std::uint64_t> losses;  ///< what did not fit an arrow between threads, by its name
   std::vector<HealthChange> health;

@@ -130,6 +130,12 @@ void RunLog::collect(const Wiring& wiring) {
                         counters.mesh.without_image};
   }
   if (const LoopStage* loops = wiring.loopStage()) keepLoops(*loops);
+  if (MapStage* map = wiring.mapStage()) {
+    statistics_.mapping = {counters.map.frames, counters.map.without_image, counters.map.without_scene,
+                           counters.map.refused};
+    for (const auto& row : counters.map.faults.rows()) statistics_.faults[row.text] += row.count;
+    listener_.onMap(*map);
+  }
   wiring.addLosses(statistics_.losses);
   for (std::size_t i = 0; i < statistics_.times.size(); ++i) {
     const StageTimes& times = wiring.times()[i];

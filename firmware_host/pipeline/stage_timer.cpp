@@ -33,12 +33,22 @@ std::string_view stageName(StageId stage) {
       return "mesh";
     case StageId::kLoop:
       return "loop";
+    case StageId::kDepth:
+      return "map_depth";
+    case StageId::kVolume:
+      return "map_volume";
+    case StageId::kSurface:
+      return "map_surface";
+    case StageId::kDistance:
+      return "map_distance";
+    case StageId::kCorrection:
+      return "map_correction";
     case StageId::kImageToPose:
       return "image_to_pose";
     case StageId::kExposureToPose:
       return "exposure_to_pose";
     case StageId::kMap:
-      return "map";
+      return "full_smoothing";
     case StageId::kCount:
       break;
   }

@@ -19,6 +19,11 @@ enum class StageId : std::size_t {
   kTrim,            ///< making room in the window, after the state was published
   kMesh,            ///< frame mesh, at keyframes the mesh over the horizon too
   kLoop,            ///< loop closure, of a keyframe
+  kDepth,           ///< the map's parts, of a mapped frame: depth,
+  kVolume,          ///< fusion of it,
+  kSurface,         ///< surface of the blocks that changed,
+  kDistance,        ///< distance field
+  kCorrection,      ///< what moved, fused again
   kImageToPose,     ///< wall from the image's arrival until the pose is published; CPU of track and smooth
   kExposureToPose,  ///< wall from the middle of the exposure
   kMap,             ///< full smoothing

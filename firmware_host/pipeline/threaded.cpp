@@ -39,6 +39,7 @@ class Run {
     start("log", rt.low_priority, rt.low_cpu, [this] { low([this] { return wiring_.log(); }, log_done_); });
     start("record", rt.low_priority, rt.low_cpu,
           [this] { low([this] { return wiring_.record(); }, record_done_); });
+    start("map", rt.low_priority, rt.low_cpu, [this] { map(); });
     start("loop", rt.low_priority, rt.low_cpu, [this] { loop(); });
     start("mesh", rt.mesh_priority, rt.mesh_cpu, [this] { mesh(); });
     start("smooth", rt.smooth_priority, rt.smooth_cpu, [this] { smooth(); });
@@ -65,9 +66,10 @@ class Run {
     Kind kind = Kind::kSample;
     ImuSample sample;
     CameraFrame image;
+    SceneImages scene;
     std::uint64_t taken = 0;
   };
-  static constexpr std::size_t kThreads = 9;
+  static constexpr std::size_t kThreads = 10;
 
   void start(const char* name, int priority, int cpu, std::function<void()> entry) {
     ThreadSettings settings;
@@ -101,6 +103,7 @@ class Run {
           message->sample = feed_.sample();
         } else {
           message->image = feed_.image();
+          message->scene = feed_.scene();
           ++images;
         }
         ahead_.commitPush();
@@ -132,6 +135,7 @@ class Run {
         wiring_.takeImu(message->sample, arrival, host);
         propagate_bell_.ring();
       } else {
+        wiring_.takeScene(message->scene);
         wiring_.takeImage(message->image, host);
         track_bell_.ring();
         images_out_.fetch_add(1, std::memory_order_release);
@@ -181,11 +185,22 @@ class Run {
         track_bell_.ring();      // room, and a new window
         mesh_bell_.ring();
         loop_bell_.ring();
+        map_bell_.ring();
       }
       if (!wiring_.smoothDone()) smooth_bell_.wait(ticket, kLongestSleep);
     }
     mesh_bell_.ring();
     loop_bell_.ring();
+    map_bell_.ring();
+  }
+
+  void map() {
+    while (!wiring_.mapDone()) {
+      const std::uint32_t ticket = map_bell_.ticket();
+      while (wiring_.map()) {
+      }
+      if (!wiring_.mapDone()) map_bell_.wait(ticket, kLongestSleep);
+    }
   }
 
   void loop() {
@@ -247,7 +262,7 @@ class Run {
   bool begun_ = false;
   Stamp first_;
   double zero_ = 0;
-  Doorbell propagate_bell_, track_bell_, smooth_bell_, mesh_bell_, loop_bell_;
+  Doorbell propagate_bell_, track_bell_, smooth_bell_, mesh_bell_, loop_bell_, map_bell_;
 };
 
 }  // namespace

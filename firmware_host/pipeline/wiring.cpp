@@ -14,15 +14,17 @@
 //                        |                                                       |
 //                        |                     newest LocalMesh, ring of all on request --> [log]
 //   [track]   keyframes' images, copied --slots--> [loop] LOOP <--ring-- keyframes, with window and link, of
-//   [smooth]
-//                        |                           |
+//                        |                           |                   [smooth]
 //                        |                           '--newest MapCorrection; ring of reports --> [log]
+//                        |                           v
+//   [track]   mapped frames' images --slots-----> [map] DEPTH, VOLUME, SURFACE, DISTANCE --> distance field
+//   [sensor]  depth, labels --slots----------------^ ^--ring-- frames with their poses, of [smooth]
 //                        +--ring--> [log] keyframes and IMU, kept for full smoothing after the run -> map.tum
 //   everything above, and what each stage took for a step --ring, slots--> [record] flight recorder
 //
 //   when full: IMU rings refuse and count; camera rings and waiting frames let the oldest go, counted;
-//   `track` waits for room in front of `smooth`; `mesh` skips to the newest window, counted; `loop` misses
-//   keyframes, counted; log and recorder lose, counted; no reader can hold another's slots.
+//   `track` waits for room in front of `smooth`; `mesh` skips to the newest window, counted; `loop` and
+//   `map` miss keyframes, counted; log and recorder lose, counted; no reader can hold another's slots.
 
 #include "firmware_host/pipeline/wiring.hpp"
 
@@ -75,7 +77,22 @@ Wiring::Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, 
                 ? std::make_unique<LoopStage>(
                       rig_, settings.loop_stage, LoopLimits{},
                       options.vocabulary != nullptr ? *options.vocabulary : Vocabulary::shipped())
-                : nullptr) {
+                : nullptr),
+      map_(settings.map.enabled
+               ? std::make_unique<MapStage>(rig_, settings.map_stage, options.depth_sensor, options.spill)
+               : nullptr) {
+  if (map_) {
+    to_map_ = std::make_unique<MapArrows>();
+    mapping_.from_sensor = options.depth_sensor != nullptr;
+    const auto pixels = static_cast<std::size_t>(rig_.camera[0].width() * rig_.camera[0].height());
+    for (std::size_t i = 0; i < ScenePool::capacity(); ++i) {
+      SceneSlot& slot = to_map_->scenes.slot(i);
+      if (mapping_.from_sensor) slot.depth.resize(options.depth_sensor->camera.pixels());
+      if (settings.map_stage.labels) slot.labels.resize(pixels);
+    }
+  }
+  if (loop_ || map_)
+    keyframe_images_ = std::make_unique<KeyframePool>(KeyframePool::Quotas{kLoopQuota, kMapQuota});
   if (options.imu_states) states_ = std::make_unique<StateRing>();
   if (loop_) to_loop_ = std::make_unique<LoopArrows>();
   if (options.meshes && mesh_) meshes_ = std::make_unique<MeshRing>();
@@ -85,8 +102,8 @@ Wiring::Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, 
     for (std::size_t i = 0; i < kImageSlots; ++i) {
       camera_[c].pool.slot(i).pixels.resize(static_cast<std::size_t>(model.width() * model.height()));
     }
-    for (std::size_t i = 0; to_loop_ && i < KeyframePool::capacity(); ++i) {
-      to_loop_->pool.slot(i).pixels[c].resize(static_cast<std::size_t>(model.width() * model.height()));
+    for (std::size_t i = 0; keyframe_images_ && i < KeyframePool::capacity(); ++i) {
+      keyframe_images_->slot(i).pixels[c].resize(static_cast<std::size_t>(model.width() * model.height()));
     }
   }
 }
@@ -205,7 +222,7 @@ void Wiring::smoothFrame(const TrackMessage& message, FrameResult& out) {
 // results, states, meshes, IMU -> log
 bool Wiring::log() {
   bool any = false;
-  const bool ended = smoothDone() && meshDone() && loopDone() && propagateDone();
+  const bool ended = smoothDone() && meshDone() && loopDone() && mapDone() && propagateDone();
   if (to_loop_) {
     while (const LoopReport* report = to_loop_->reports.front()) {
       log_.onLoop(*report);
@@ -264,7 +281,7 @@ bool Wiring::record() {
     record_done_ = true;
     return false;
   }
-  const bool ended = smoothDone() && meshDone() && loopDone() && propagateDone();
+  const bool ended = smoothDone() && meshDone() && loopDone() && mapDone() && propagateDone();
   const bool any = recorder_->drain(*to_recorder_, {&camera_[0].pool, &camera_[1].pool});
   if (ended && !any && !record_done_) {
     recorder_->end(counters_.sensor.imu_samples, counters_.sensor.images);
@@ -289,15 +306,21 @@ void Wiring::addReservations(MemoryTable& table) const {
   add("tracking", sizeof(track_) + between(before_track_, before_smooth_));
   add("smoother", sizeof(smooth_) + between(before_smooth_, before_mesh_));
   if (mesh_) add("mesh", between(before_mesh_, before_loop_));
-  if (loop_) {
-    std::size_t keyframe_images = 0;
-    for (std::size_t c = 0; c < rig_.camera_count; ++c) {
-      keyframe_images += KeyframePool::capacity() *
-                         static_cast<std::size_t>(rig_.camera[c].width() * rig_.camera[c].height());
-    }
-    add("loop closure", between(before_loop_, after_loop_));
-    add("keyframes for loop closure", sizeof(LoopArrows) + keyframe_images);
+  std::size_t keyframe_images = 0;
+  for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+    keyframe_images +=
+        KeyframePool::capacity() * static_cast<std::size_t>(rig_.camera[c].width() * rig_.camera[c].height());
   }
+  std::size_t scenes = 0;
+  for (std::size_t i = 0; map_ && i < ScenePool::capacity(); ++i) {
+    const SceneSlot& slot = to_map_->scenes.slot(i);
+    scenes += slot.depth.size() * sizeof(float) + slot.labels.size();
+  }
+  if (loop_) {
+    add("loop closure", sizeof(LoopArrows) + between(before_loop_, before_map_));
+  }
+  if (map_) add("map", sizeof(MapArrows) + scenes + between(before_map_, after_map_));
+  if (keyframe_images_) add("keyframes for loop closure and map", sizeof(KeyframePool) + keyframe_images);
   add("IMU rings", sizeof(ImuRing) * 4);
   add("tracked frames", sizeof(tracked_ring_));
   add("fixes and windows", sizeof(fix_) + sizeof(window_) + sizeof(window_to_mesh_) + sizeof(planes_));
@@ -329,6 +352,15 @@ void Wiring::addLosses(std::map<std::string, std::uint64_t>& losses) const {
     note("keyframes_to_loop", to_loop_->keyframes.refused());
     note("keyframe_images_to_loop", to_loop_->images_dropped);
     note("loops_to_log", to_loop_->reports.refused());
+  }
+  if (to_map_) {
+    note("frames_to_map", to_map_->frames.refused());
+    note("frame_images_to_map", to_map_->images_dropped);
+    note("frames_unmapped", counters_.map.without_image);
+    note("scenes_to_map", counters_.sensor.scenes_dropped);
+    note("scenes_to_track", to_map_->notes.refused());
+    note("labels_wrong_size", counters_.sensor.labels_wrong_size);
+    note("depths_wrong_size", counters_.sensor.depths_wrong_size);
   }
   if (states_) note("states_to_log", states_->refused());
   if (to_recorder_) {

@@ -2,12 +2,12 @@
 // Every stage and every arrow of the system, with what each thread does with them. See wiring.cpp: it reads
 // as the block diagram.
 //
-// One function a thread: takeImu, takeImage, endInput (sensor); propagate, track, smooth, mesh (flight path);
-// loop, log, record (low priority). Each takes what waits on its arrows, at most one frame, and says whether
-// it did anything. An executor calls them: from one thread in turn (lockstep.hpp), or each from its own
-// (threaded.hpp). The arrows are in fixed memory and nobody waits on them; who sleeps until something comes
-// is the executor's matter. Nothing on the flight path allocates or locks once the first message has been
-// taken.
+// One function a thread: takeImu, takeImage, takeScene, endInput (sensor); propagate, track, smooth, mesh
+// (flight path); loop, map, log, record (low priority). Each takes what waits on its arrows, at most one
+// frame, and says whether it did anything. An executor calls them: from one thread in turn (lockstep.hpp), or
+// each from its own (threaded.hpp). The arrows are in fixed memory and nobody waits on them; who sleeps until
+// something comes is the executor's matter. Nothing on the flight path allocates or locks once the first
+// message has been taken.
 //
 // IMU samples go to their readers at once. `track` and `smooth` take those not later than the frame that they
 // work on, so that a frame never sees samples from beyond its stamp.
@@ -32,6 +32,7 @@
 #include "firmware_host/pipeline/run_log.hpp"
 #include "firmware_host/settings/settings.hpp"
 #include "mapping/loop/loop_stage.hpp"
+#include "mapping/map/map_stage.hpp"
 #include "mesher/mesh_stage.hpp"
 
 namespace swiftlet {
@@ -57,6 +58,10 @@ struct WiringCounters {
     std::array<std::uint64_t, kMaxCameras> images_wrong_size{};
     std::array<std::uint64_t, kMaxCameras> images_unrecorded{};
     std::uint64_t images_unmeshed = 0;  ///< of camera 0, at a full ring or quota: the mesh did not look
+    std::uint64_t scenes = 0;           ///< depth or labels
+    std::uint64_t scenes_dropped = 0;   ///< at a full ring or quota: the map did not look
+    std::uint64_t labels_wrong_size = 0;
+    std::uint64_t depths_wrong_size = 0;
   } sensor;
   struct Propagate {
     std::uint64_t samples = 0;
@@ -71,6 +76,13 @@ struct WiringCounters {
     std::uint64_t skipped = 0;        ///< windows that a newer one overtook
     std::uint64_t without_image = 0;  ///< steps whose image was gone, or never came
   } mesh;
+  struct Map {
+    std::uint64_t frames = 0;         ///< that were to be mapped
+    std::uint64_t without_image = 0;  ///< of them, skipped: others came before they were looked at
+    std::uint64_t without_scene = 0;  ///< of them, whose depth or labels were gone
+    std::uint64_t refused = 0;        ///< by the stage
+    FaultCounts faults;
+  } map;
 };
 
 /// What the sensors did of late, for whoever asks.
@@ -91,6 +103,8 @@ class Wiring {
     FlightRecorder* recorder = nullptr;    ///< null: nothing is recorded
     EffortSource* track_effort = nullptr;  ///< null: the settings' effort, always
     EffortSource* smooth_effort = nullptr;
+    const DepthImageView* depth_sensor = nullptr;  ///< of the map; null: none, depth from the cameras
+    SurfaceSink* spill = nullptr;  ///< takes surface for which the map has no room; null: it is lost
     const Vocabulary* vocabulary = nullptr;  ///< of loop closure; null: the shipped one; outlives the wiring
     ArmingMonitor* arming = nullptr;         ///< null: nobody asks whether the vehicle may be armed
     /// Called after a stage's work with its CPU seconds, within its wall time: tests slow stages down.
@@ -103,6 +117,8 @@ class Wiring {
   // Sensor. The image is copied; one of another size than the calibration's is counted and goes no further.
   void takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host);
   void takeImage(const CameraFrame& image, const HostTimes& host);
+  /// Depth and labels of the image of camera 0 that comes next; copied. Without a map: nothing happens.
+  void takeScene(const SceneImages& scene);
   /// In place of images: the back-end alone. Lockstep only; false while the smoother has no room.
   bool takeTracks(const TrackedFrame& tracked);
   void endInput() { input_ended_.store(true, std::memory_order_release); }
@@ -113,6 +129,7 @@ class Wiring {
   bool smooth();
   bool mesh();
   bool loop();
+  bool map();
   bool log();
   bool record();
 
@@ -122,6 +139,7 @@ class Wiring {
   [[nodiscard]] bool smoothDone() const { return smooth_done_.load(std::memory_order_acquire); }
   [[nodiscard]] bool meshDone() const { return mesh_done_.load(std::memory_order_acquire); }
   [[nodiscard]] bool loopDone() const { return loop_done_.load(std::memory_order_acquire); }
+  [[nodiscard]] bool mapDone() const { return map_done_.load(std::memory_order_acquire); }
   [[nodiscard]] bool logDone() const { return log_done_; }
   /// Any thread: nobody calls log() any more, so nothing waits for room in front of it.
   void abandonLog() { log_abandoned_.store(true, std::memory_order_release); }
@@ -134,6 +152,9 @@ class Wiring {
   [[nodiscard]] const MeshStage* meshStage() const { return mesh_.get(); }
   /// Null where loop closure is switched off; once the thread `loop` has ended.
   [[nodiscard]] const LoopStage* loopStage() const { return loop_.get(); }
+  /// Null where mapping is switched off; once the thread `map` has ended, but for the distance field, which
+  /// any one thread may read at any time.
+  [[nodiscard]] MapStage* mapStage() const { return map_.get(); }
   /// Losses at full arrows, by name; at the end.
   void addLosses(std::map<std::string, std::uint64_t>& losses) const;
   /// What was reserved for what, by the constructor.
@@ -176,10 +197,25 @@ class Wiring {
   [[nodiscard]] bool findMeshImage(std::uint64_t number);
   void publishMesh(bool keyframe);
 
+  // loop, map
+  [[nodiscard]] bool wantsMap(const StereoFrame& frame, bool keyframe);
+  [[nodiscard]] bool copyImages(const StereoFrame& frame, bool to_loop, bool to_map);
+
   // loop
-  void handToLoop(const StereoFrame& frame);
   void handKeyframe(const TrackMessage& message);
   [[nodiscard]] bool findKeyframeImages(std::uint64_t frame);
+
+  // map
+  void publishMap();
+  void correctMap(const MapMessage& message);
+  void stepCorrection();
+  void drawMap();
+  template <typename Work>
+  void timed(StageId stage, Work&& work);
+  void handFrame(const TrackMessage& message, const SmoothedWindow& window);
+  void mapFrame(const MapMessage& message);
+  [[nodiscard]] bool findMapImages(std::uint64_t frame);
+  [[nodiscard]] bool findScene(Stamp stamp);
 
   void watchArming(const FrameResult& result);
 
@@ -203,7 +239,9 @@ class Wiring {
   std::unique_ptr<MeshStage> mesh_;  ///< null: switched off
   HeapMark before_loop_;
   std::unique_ptr<LoopStage> loop_;  ///< null: switched off
-  HeapMark after_loop_;
+  HeapMark before_map_;
+  std::unique_ptr<MapStage> map_;  ///< null: switched off
+  HeapMark after_map_;
 
   // Arrows.
   ImuRing imu_to_propagate_, imu_to_track_, imu_to_smooth_, imu_to_log_;
@@ -216,9 +254,11 @@ class Wiring {
   Newest<MeshMessage> window_to_mesh_;
   Newest<LocalMesh> local_mesh_;
   Newest<PlaneReport> planes_;
-  std::unique_ptr<LoopArrows> to_loop_;  ///< null: switched off
-  std::unique_ptr<MeshRing> meshes_;     ///< null where nobody wants them
-  std::unique_ptr<StateRing> states_;    ///< null where nobody wants them
+  std::unique_ptr<KeyframePool> keyframe_images_;  ///< null where neither loop closure nor map is on
+  std::unique_ptr<LoopArrows> to_loop_;            ///< null: switched off
+  std::unique_ptr<MapArrows> to_map_;              ///< null: switched off
+  std::unique_ptr<MeshRing> meshes_;               ///< null where nobody wants them
+  std::unique_ptr<StateRing> states_;              ///< null where nobody wants them
   ResultRing results_;
   std::unique_ptr<RecorderArrows> to_recorder_;
 
@@ -252,10 +292,20 @@ class Wiring {
     KeyframePool::Loan images;  ///< at the head of the ring
     LoopReport unread;          ///< written where the log has no room
   } closing_;
+  struct {
+    KeyframePool::Loan images;  ///< at the head of the ring
+    ScenePool::Loan scene;      ///< likewise
+    bool from_sensor = false;   ///< depth comes from a sensor alone
+    std::uint64_t correction = 0;
+    FixedVector<RefinedPose, kMaxStates> refined;
+    CorrectionStep corrected;
+    Eigen::Vector3d vehicle = Eigen::Vector3d::Zero();  ///< in the map
+    MapReport report;
+  } mapping_;
 
   std::atomic<std::int64_t> newest_imu_{std::numeric_limits<std::int64_t>::min()};
   std::atomic<bool> input_ended_{false}, propagate_done_{false}, track_done_{false}, smooth_done_{false},
-      mesh_done_{false}, loop_done_{false};
+      mesh_done_{false}, loop_done_{false}, map_done_{false};
   std::atomic<bool> log_abandoned_{false};
   bool log_done_ = false, record_done_ = false;
   WiringCounters counters_;

@@ -1,41 +1,8 @@
 // The thread `loop`: keyframes with their images, one after the other, and the map that they make.
 
-#include <algorithm>
-
 #include "firmware_host/pipeline/wiring.hpp"
 
 namespace swiftlet {
-
-// track: a keyframe's images -> copies -> loop
-void Wiring::handToLoop(const StereoFrame& frame) {
-  LoopArrows& arrows = *to_loop_;
-  const SlotHandle handle = arrows.pool.tryAcquire();
-  if (!handle.valid()) {
-    ++arrows.images_dropped;
-    return;
-  }
-  KeyframeImages& images = arrows.pool.fill(handle);
-  images.frame = frame.index;
-  images.number = frame.number;
-  for (std::size_t c = 0; c < kMaxCameras; ++c) {
-    const ImageView& from = frame.image[c];
-    images.image[c] = ImageView{};
-    if (from.empty()) continue;
-    const auto width = static_cast<std::size_t>(from.width);
-    for (int y = 0; y < from.height; ++y) {
-      std::copy_n(from.row(y), width, images.pixels[c].data() + static_cast<std::size_t>(y) * width);
-    }
-    images.image[c] = ImageView{images.pixels[c].data(), from.width, from.height, from.width};
-  }
-  SlotHandle dropped;
-  if (!arrows.pool.tryHand(handle, kLoopReads)) {
-    ++arrows.images_dropped;
-  } else if (arrows.images.push(handle, dropped)) {
-    arrows.pool.takeBack(dropped, kLoopReads);
-    ++arrows.images_dropped;
-  }
-  arrows.pool.finish(handle);
-}
 
 // smooth -> keyframe with its window and its link to the one before -> loop
 void Wiring::handKeyframe(const TrackMessage& message) {
@@ -74,8 +41,7 @@ bool Wiring::loop() {
     LoopReport* report = to_loop_->reports.beginPush();
     LoopReport& out = report != nullptr ? *report : closing_.unread;
     static_cast<void>(loop_->step(input, LoopEffort{}, out));
-    to_loop_->correction.draft() = loop_->correction();
-    to_loop_->correction.publish();
+    if (to_map_) publishMap();
     if (report != nullptr) to_loop_->reports.commitPush();
     if (drag_) drag_(StageId::kLoop, threadCpuSeconds() - cpu);
   });
@@ -85,6 +51,19 @@ bool Wiring::loop() {
   return true;
 }
 
+// loop -> newest correction -> map
+void Wiring::publishMap() {
+  MapInWorlds& out = to_map_->correction.draft();
+  out.newest = loop_->correction();
+  out.keyframes.clear();
+  for (std::size_t i = 0; i < loop_->nodeCount(); ++i) {
+    const MapNode node = loop_->node(i);
+    if (node.epoch != out.newest.epoch) continue;
+    static_cast<void>(out.keyframes.tryPushBack({node.frame, node.T_map_body * node.T_world_body.inverse()}));
+  }
+  to_map_->correction.publish();
+}
+
 /// Brings the images of `frame` to the head; those of earlier keyframes go back, later ones stay.
 bool Wiring::findKeyframeImages(std::uint64_t frame) {
   KeyframePool::Loan& head = closing_.images;
@@ -92,7 +71,7 @@ bool Wiring::findKeyframeImages(std::uint64_t frame) {
     head.reset();
     SlotHandle handle;
     if (!to_loop_->images.tryPop(handle)) return false;
-    head = to_loop_->pool.borrow(handle, kLoopReads);
+    head = keyframe_images_->borrow(handle, kLoopReads);
   }
   return head->frame == frame;
 }

@@ -29,6 +29,7 @@ void Wiring::publishWindow(const TrackMessage& message) {
     window_to_mesh_.publish();
   }
   if (to_loop_ && message.tracked.keyframe && window.started) handKeyframe(message);
+  if (to_map_ && message.mapped && window.started) handFrame(message, window);
   smoothing_.windows = window_.publish();
 }
 

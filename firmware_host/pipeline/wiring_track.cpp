@@ -77,6 +77,7 @@ bool Wiring::takeTracks(const TrackedFrame& tracked) {
   message->host.arrival = message->host.exposure = wallSeconds();
   message->dropped = 0;
   message->effort_level = 0;
+  message->mapped = false;
   tracked_ring_.commitPush();
   return true;
 }
@@ -218,7 +219,9 @@ bool Wiring::trackFrame() {
   tracking_.dropped = 0;
   addTime(times_, StageId::kTrack, message.spent, tracked && message.tracked.keyframe);
   if (to_recorder_) static_cast<void>(to_recorder_->track.tryPush(step));
-  if (to_loop_ && tracked && message.tracked.keyframe) handToLoop(frame);
+  const bool to_loop = to_loop_ && tracked && message.tracked.keyframe;
+  const bool to_map = to_map_ && wantsMap(frame, tracked && message.tracked.keyframe) && tracked;
+  message.mapped = (to_loop || to_map) && copyImages(frame, to_loop, to_map);
   tracked_ring_.commitPush();
   release(frame);
   tracking_.waiting.erase(0);

@@ -8,6 +8,8 @@ nlohmann::ordered_json toJson(const MapStage& map) {
   const VolumeCounters& blocks = map.volume().counters();
   const SurfaceStoreCounters& store = map.surface().counters();
   const DistanceField& distance = map.distance();
+  const CorrectionCounters& corrections = map.correction().counters();
+  const KeptDepths& kept = map.correction().kept();
   return {{"taken", stage.taken},
           {"without_depth", stage.without_depth},
           {"wrong_size", stage.wrong_size},
@@ -27,6 +29,14 @@ nlohmann::ordered_json toJson(const MapStage& map) {
             {"out_of_range", blocks.out_of_range},
             {"index_full", blocks.index_full},
             {"left_out", images.blocks_left_out}}},
+          {"corrections",
+           {{"begun", corrections.corrections},
+            {"images_moved", corrections.images_moved},
+            {"images_fused_again", images.again},
+            {"blocks_dropped", corrections.blocks_dropped},
+            {"images_kept", kept.size()},
+            {"capacity", kept.capacity()},
+            {"given_up", kept.given_up()}}},
           {"surface",
            {{"patches", map.surface().patches()},
             {"pages", map.surface().pagesUsed()},
@@ -37,7 +47,8 @@ nlohmann::ordered_json toJson(const MapStage& map) {
           {"bytes",
            {{"volume", map.volume().bytes()},
             {"surface", map.surface().bytes()},
-            {"distance", distance.bytes()}}}};
+            {"distance", distance.bytes()},
+            {"corrections", map.correction().bytes()}}}};
 }
 
 }  // namespace swiftlet

@@ -6,6 +6,9 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
+#include "firmware_host/report/map_files.hpp"
+#include "firmware_host/report/map_mesh_builder.hpp"
+#include "firmware_host/report/map_report.hpp"
 #include "firmware_host/report/names.hpp"
 #include "firmware_host/report/ply_file.hpp"
 #include "firmware_host/report/states_csv.hpp"
@@ -32,8 +35,8 @@ RunRecorder::RunRecorder(const std::string& folder, bool imu_rate, bool meshes) 
   }
   const std::filesystem::path path(folder);
   // What an earlier run left and this one does not write would be taken for this one's.
-  for (const char* name :
-       {"imu_rate.tum", "map.tum", "loops.csv", "local_mesh.ply", "meshes", "summary.json"}) {
+  for (const char* name : {"imu_rate.tum", "map.tum", "loops.csv", "local_mesh.ply", "map.ply", "map.glb",
+                           "meshes", "summary.json"}) {
     std::filesystem::remove_all(path / name, error);
   }
   if (meshes) meshes_.emplace(folder);
@@ -62,6 +65,17 @@ void RunRecorder::onMesh(bool keyframe, const LocalMesh& frame, const LocalMesh*
 
 void RunRecorder::onLocalMesh(const LocalMesh& mesh) {
   writePly((std::filesystem::path(folder_) / "local_mesh.ply").string(), toTriangleMesh(mesh));
+}
+
+void RunRecorder::onMap(MapStage& map) {
+  MapMeshBuilder builder;
+  map.visitSurface(builder);
+  const MapMesh mesh = builder.mesh();
+  const std::filesystem::path path(folder_);
+  writeMapPly((path / "map.ply").string(), mesh);
+  writeMapGlb((path / "map.glb").string(), mesh);
+  map_ = toJson(map);
+  map_["mesh"] = {{"vertices", mesh.vertices.size()}, {"faces", mesh.faces.size()}};
 }
 
 void RunRecorder::onFinish(const OdometryOutput& output) {

@@ -1,8 +1,9 @@
 #pragma once
 // Writes the files of a run folder that grow while the run goes on: odometry.tum, imu_rate.tum and meshes/
-// (on request), states.csv, events.log; and local_mesh.ply at its end. Lines go out as they come, in constant
-// memory.
+// (on request), states.csv, events.log; and local_mesh.ply, map.ply and map.glb at its end. Lines go out as
+// they come, in constant memory.
 
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
@@ -22,8 +23,11 @@ class RunRecorder : public RunListener {
   void onMesh(bool keyframe, const LocalMesh& frame, const LocalMesh* horizon,
               std::span<const Eigen::Vector2f> hull) override;
   void onLocalMesh(const LocalMesh& mesh) override;
+  void onMap(MapStage& map) override;
   void onFinish(const OdometryOutput& output) override;
   void onRemark(Stamp stamp, const std::string& text) override;
+  /// Of the map and its surface; null without one.
+  [[nodiscard]] const nlohmann::ordered_json& map() const { return map_; }
 
  private:
   void writeEvents(const OdometryOutput& output);
@@ -35,6 +39,7 @@ class RunRecorder : public RunListener {
   std::optional<LineFile> states_;
   std::optional<LineFile> events_;
   std::optional<MeshSequenceWriter> meshes_;
+  nlohmann::ordered_json map_;
 };
 
 }  // namespace swiftlet

@@ -78,7 +78,7 @@ Json countersJson(const RunFacts& facts, const LogSource& source, const RunStati
     json["events"][std::string(eventName(kind))] = {{"count", total.count}, {"value_sum", total.value}};
   }
   if (statistics.map) {
-    json["map"] = {
+    json["full_smoothing"] = {
         {"keyframes", statistics.map->keyframes},         {"landmarks", statistics.map->landmarks},
         {"iterations", statistics.map->iterations},       {"revisits", statistics.map->revisits},
         {"revisits_used", statistics.map->revisits_used}, {"matches", statistics.map->matches},

@@ -189,12 +189,23 @@ std::vector<Setting> estimationSettings() {
        "Tell loops from false ones by graduated non-convexity on the whole graph in place of the largest set "
        "that agrees pair by pair.",
        onOff(&Settings::loop_stage, &LoopSettings::graduated)},
+      {"map.enabled", "",
+       "Fuse depth into a map in flight: labelled surface (map.ply, map.glb) and distance field.",
+       onOff(&Settings::map, &MapGroup::enabled)},
+      {"map.depth_sensor", "",
+       "Take depth from a sensor where the log has one (depth0); false: always from the two cameras.",
+       onOff(&Settings::map, &MapGroup::depth_sensor)},
       {"map.voxel_size", "m", "Edge of the map's voxels.",
        real(&Settings::map_stage, &MapSettings::voxel_size, 0.01, 0.5)},
       {"map.volume_mib", "MiB", "Memory for voxels; when it is full the farthest from the vehicle go.",
        integer(&Settings::map_stage, &MapSettings::volume_mib, 4, 16384)},
       {"map.surface_mib", "MiB", "Memory for the map's triangles, those of dropped voxels too.",
        integer(&Settings::map_stage, &MapSettings::surface_mib, 1, 16384)},
+      {"map.keyframes_mib", "MiB",
+       "Memory for depth images that are fused again where loop closure or the smoother moves their poses; "
+       "0: "
+       "the map stays as it was drawn.",
+       integer(&Settings::map_stage, &MapSettings::keyframes_mib, 0, 16384)},
       {"map.most_range", "m", "What is measured farther away gives no surface.",
        real(&Settings::map_stage, &MapSettings::most_range, 0.5, 100)},
       {"map.labels", "", "Keep labels where the log, or a network, gives label images.",

@@ -36,6 +36,11 @@ struct LoopGroup {
   std::string vocabulary = "";  ///< file; empty: the shipped one
 };
 
+struct MapGroup {
+  bool enabled = false;
+  bool depth_sensor = true;
+};
+
 /// Priorities are of SCHED_FIFO, 1 to 98; 0 is SCHED_OTHER. All of them below 50, where kernels with
 /// PREEMPT_RT run their interrupt handlers, without which no sample arrives.
 struct RealtimeGroup {
@@ -90,6 +95,7 @@ struct Settings {
   MeshGroup mesh;
   LoopGroup loop;
   LoopSettings loop_stage;
+  MapGroup map;
   MapSettings map_stage;
   RealtimeGroup realtime;
   BudgetsGroup budgets;

@@ -40,7 +40,8 @@ LoopStage::LoopStage(const Rig& rig, const LoopSettings& settings, const LoopLim
       inliers_(limits.loops) {}
 
 MapNode LoopStage::node(std::size_t i) const {
-  return {map_.node(i).stamp, map_.node(i).epoch, map_.pose(i)};
+  const LoopMap::Node& node = map_.node(i);
+  return {node.stamp, node.frame, node.epoch, map_.pose(i), node.T_world_body};
 }
 
 Status LoopStage::step(const LoopInput& input, const LoopEffort& effort, LoopReport& report) {

@@ -58,8 +58,10 @@ struct MapLoop {
 /// A keyframe in the map.
 struct MapNode {
   Stamp stamp;
+  std::uint64_t frame = 0;
   std::uint32_t epoch = 0;
   SE3 T_map_body;
+  SE3 T_world_body;  ///< as the odometry had it when it became a node
 };
 
 class LoopStage {

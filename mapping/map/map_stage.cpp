@@ -80,6 +80,8 @@ MapStage::MapStage(const Rig& rig, const MapSettings& settings, const DepthImage
       integrator_(volume_, mostPixels(rig, depth_sensor)),
       store_(static_cast<std::size_t>(settings.surface_mib) << 20U, volume_.blockSize(), spill),
       surface_(volume_, confusion_, store_),
+      correction_(volume_, integrator_, store_, static_cast<std::size_t>(settings.keyframes_mib) << 20U,
+                  mostPixels(rig, depth_sensor)),
       distance_(distanceLimits(settings)),
       volume_distance_(volume_, distance_) {}
 
@@ -138,7 +140,10 @@ Status MapStage::integrate(const MapInput& input, const VolumeEffort& effort, Ma
   if (measured_ == nullptr) return report.status = {StatusCode::kInvalidInput, "nothing was measured"};
   if (input.epoch != epoch_) beginEpoch(input.epoch);
   report.status = integrator_.step(measured_->view(), input.T_map_body, effort, report.volume);
-  if (report.status.code != StatusCode::kInvalidInput) ++counters_.taken;
+  if (report.status.code == StatusCode::kInvalidInput) return report.status;
+  ++counters_.taken;
+  correction_.keep(measured_->view(), input.frame, input.T_map_world,
+                   input.T_map_world.inverse() * input.T_map_body);
   return report.status;
 }
 
@@ -149,6 +154,7 @@ void MapStage::beginEpoch(std::uint32_t epoch) {
   volume_.clear();
   surface_.drawAll();
   integrator_.restart();
+  correction_.restart();
   epoch_ = epoch;
   ++counters_.epochs;
 }

@@ -4,16 +4,18 @@
 // A step takes one moment: the images of the cameras, or the depth image of a sensor, and labels where there
 // are any. Depth comes from the sensor when it gives one, else from the two cameras. Grey values and labels
 // are brought from camera 0 to the depth's pixels. Then the volume takes the depth, the surface follows the
-// blocks that changed, the distance field follows the volume. `MapEffort` bounds each. A new epoch has a
-// world of its own: the surface so far stays in the store, the volume begins anew. Errors: kInvalidInput,
-// counted, where nothing could be taken: no depth and no pair of images, a wrong size, a pose that is not
-// finite or jumped (VolumeIntegrator). kCapacityReached: taken, in part. Frames: map (or world, of whoever
-// gives the poses), body, metres. Memory: all reserved by the constructor (bytes() says how much); nothing is
-// allocated later. No clock, no randomness: same input, same bytes.
+// blocks that changed, the distance field follows the volume. `MapEffort` bounds each. Where poses turn out
+// otherwise later, refine() and correct() say so, and stepCorrection() puts the volume right bit by bit. A
+// new epoch has a world of its own: the surface so far stays in the store, the volume begins anew. Errors:
+// kInvalidInput, counted, where nothing could be taken: no depth and no pair of images, a wrong size, a pose
+// that is not finite or jumped (VolumeIntegrator). kCapacityReached: taken, in part. Frames: map (or world,
+// of whoever gives the poses), body, metres. Memory: all reserved by the constructor (bytes() says how much);
+// nothing is allocated later. No clock, no randomness: same input, same bytes.
 
 #include <array>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -23,6 +25,7 @@
 #include "mapping/distance/volume_distance.hpp"
 #include "mapping/map/map_settings.hpp"
 #include "mapping/map/view_warp.hpp"
+#include "mapping/map/volume_correction.hpp"
 #include "mapping/surface/surface_stage.hpp"
 #include "mapping/volume/volume_integrator.hpp"
 
@@ -30,8 +33,10 @@ namespace swiftlet {
 
 struct MapInput {
   Stamp stamp;
+  std::uint64_t frame = 0;  ///< names the moment where poses are corrected later
   std::uint32_t epoch = 0;
   SE3 T_map_body;
+  SE3 T_map_world;  ///< of the odometry's world, whoever corrects its poses; otherwise left alone
   std::array<ImageView, kMaxCameras> image;  ///< raw; empty where missing
   DepthImageView depth;                      ///< of a sensor; `depth` null: from the images
   ImageView labels;                          ///< in camera 0's raw geometry; empty where missing
@@ -84,6 +89,15 @@ class MapStage {
   Status draw(const Eigen::Vector3d& p_map_vehicle, const SurfaceEffort& effort, MapReport& report);
   void updateDistance(const Eigen::Vector3d& p_map_vehicle, const DistanceEffort& effort, MapReport& report);
 
+  // Corrections of what was integrated before, of this epoch: VolumeCorrection's.
+  void refine(std::span<const RefinedPose> poses) { correction_.refine(poses); }
+  void correct(std::span<const WorldInMap> worlds) { correction_.correct(worlds); }
+  [[nodiscard]] bool isCorrecting() const { return correction_.busy(); }
+  void stepCorrection(const CorrectionEffort& effort, CorrectionStep& out) {
+    correction_.step(vehicle_.cast<float>(), effort, out);
+  }
+  [[nodiscard]] const VolumeCorrection& correction() const { return correction_; }
+
   /// Null where the rig has one camera.
   [[nodiscard]] const DepthStage* stereo() const { return pair_ ? &pair_->depth : nullptr; }
   [[nodiscard]] const DistanceField& distance() const { return distance_; }
@@ -123,6 +137,7 @@ class MapStage {
   VolumeIntegrator integrator_;
   SurfaceStore store_;
   SurfaceStage surface_;
+  VolumeCorrection correction_;
   DistanceField distance_;
   VolumeDistance volume_distance_;
   SurfacePatch patch_;

@@ -72,15 +72,34 @@ Status VolumeIntegrator::checkPose(const DepthImageView& image, const SE3& T_wor
 Status VolumeIntegrator::step(const DepthImageView& image, const SE3& T_world_body,
                               const VolumeEffort& effort, VolumeStep& out) {
   out = {};
+  since_ = 0;
   Status status = checkPose(image, T_world_body);
-  if (status.ok()) status = image_.prepare(image, volume_.settings(), counters_.pixels);
-  if (!status.ok()) {
-    ++counters_.refused;
+  if (status.ok()) status = fuse(image, T_world_body, effort, out);
+  ++(status.code == StatusCode::kInvalidInput ? counters_.refused : counters_.images);
+  return status;
+}
+
+Status VolumeIntegrator::again(const DepthImageView& image, const SE3& T_world_body, std::uint32_t since,
+                               const VolumeEffort& effort, VolumeStep& out) {
+  out = {};
+  since_ = since;
+  if (!finite(T_world_body) || !finite(image.T_body_camera)) {
+    return {StatusCode::kInvalidInput, "depth image: the pose is not finite"};
+  }
+  const Status status = fuse(image, T_world_body, effort, out);
+  if (status.code != StatusCode::kInvalidInput) ++counters_.again;
+  return status;
+}
+
+Status VolumeIntegrator::fuse(const DepthImageView& image, const SE3& T_world_body,
+                              const VolumeEffort& effort, VolumeStep& out) {
+  if (const Status status = image_.prepare(image, volume_.settings(), counters_.pixels); !status.ok()) {
     return status;
   }
   begin(T_world_body * image.T_body_camera);
   listBand(effort.blocks, out);
   for (const BlockIndex& block : band_) {
+    if (holdsImage(volume_.find(block))) continue;
     const std::uint32_t slot = volume_.obtain(block);
     if (slot != VoxelVolume::kNone) {
       update(slot, false, out);
@@ -89,7 +108,6 @@ Status VolumeIntegrator::step(const DepthImageView& image, const SE3& T_world_bo
     }
   }
   walkBundles(effort.blocks, out);
-  ++counters_.images;
   counters_.blocks_left_out += out.left_out;
   if (out.left_out + out.no_room > 0)
     return {StatusCode::kCapacityReached, "volume: not all blocks were updated"};
@@ -238,6 +256,7 @@ bool VolumeIntegrator::walk(const Eigen::Vector3f& direction, float length, std:
 
 void VolumeIntegrator::meetOnRay(const BlockIndex& block, VolumeStep& out) {
   const std::uint32_t slot = volume_.find(block);
+  if (holdsImage(slot)) return;
   const bool has_voxels = slot != VoxelVolume::kNone && volume_.header(slot).state == BlockState::kVoxels;
   const auto truncation = static_cast<float>(volume_.settings().truncation);
   const float behind = freeBehind(block);

@@ -50,6 +50,7 @@ struct VolumeStep {
 
 struct IntegratorCounters {
   std::uint64_t images = 0;   ///< fused
+  std::uint64_t again = 0;    ///< fused once more
   std::uint64_t refused = 0;  ///< of these three kinds and all others
   std::uint64_t pose_jumps = 0;
   std::uint64_t bad_poses = 0;
@@ -65,6 +66,10 @@ class VolumeIntegrator {
 
   [[nodiscard]] Status step(const DepthImageView& image, const SE3& T_world_body, const VolumeEffort& effort,
                             VolumeStep& out);
+  /// Fuses an image once more, into the blocks that became known after revision `since` of the volume: those
+  /// before hold it already. 0: into all. Its stamp and pose are not compared with the last.
+  [[nodiscard]] Status again(const DepthImageView& image, const SE3& T_world_body, std::uint32_t since,
+                             const VolumeEffort& effort, VolumeStep& out);
   /// Forgets the last pose and stamp: for a new epoch, or a map that was moved.
   void restart() { last_.reset(); }
 
@@ -78,6 +83,11 @@ class VolumeIntegrator {
     SE3 T_world_body;
   };
 
+  Status fuse(const DepthImageView& image, const SE3& T_world_body, const VolumeEffort& effort,
+              VolumeStep& out);
+  [[nodiscard]] bool holdsImage(std::uint32_t slot) const {
+    return slot != VoxelVolume::kNone && volume_.header(slot).born <= since_;
+  }
   Status checkPose(const DepthImageView& image, const SE3& T_world_body);
   void begin(const SE3& T_world_camera);
   void listBand(std::uint32_t blocks, VolumeStep& out);
@@ -99,6 +109,7 @@ class VolumeIntegrator {
   IntegratorCounters counters_;
 
   // Of the image in hand. Rays and points are in blocks, from the camera's block.
+  std::uint32_t since_ = 0;  ///< blocks that are no younger hold it
   SE3 T_world_camera_;
   SE3 T_camera_world_;
   Eigen::Vector3f vehicle_ = Eigen::Vector3f::Zero();

@@ -142,6 +142,7 @@ std::uint32_t VoxelVolume::newHeader(const BlockIndex& block) {
   unused_headers_.pop_back();
   headers_[slot] = BlockHeader{};
   headers_[slot].index = block;
+  headers_[slot].born = revision_;
   return slot;
 }
 
@@ -220,7 +221,11 @@ void VoxelVolume::drop(std::uint32_t slot) {
 void VoxelVolume::remove(std::span<const std::uint32_t> slots) {
   if (slots.empty()) return;
   for (std::size_t i = 0; i < listener_count_; ++i) listeners_[i]->beforeRemoval(*this, slots);
-  // A slot that a listener has just looked at may change hands within this set of changes.
+  discard(slots);
+}
+
+void VoxelVolume::discard(std::span<const std::uint32_t> slots) {
+  // A slot that a reader has just looked at may change hands within this set of changes.
   ++revision_;
   for (const std::uint32_t slot : slots) drop(slot);
 }

@@ -32,6 +32,7 @@ struct BlockHeader {
   BlockIndex index;
   std::uint32_t data = BlockHash::kNone;  ///< in the pool, for kVoxels
   std::uint32_t revision = 0;             ///< the volume's at the last change
+  std::uint32_t born = 0;                 ///< the volume's when the block became known
   std::uint16_t free_count = 0;           ///< for kFree: images that saw it free, saturating
   BlockState state = BlockState::kUnused;
   /// For kVoxels: kInFront and kBehind, where any observed voxel is on that side of a surface. A surface
@@ -134,6 +135,8 @@ class VoxelVolume {
 
   /// Drops blocks after the listeners have seen them.
   void remove(std::span<const std::uint32_t> slots);
+  /// The same for blocks that turned out wrong: listeners are not asked.
+  void discard(std::span<const std::uint32_t> slots);
   /// Everything unknown again; listeners are not asked.
   void clear();
 

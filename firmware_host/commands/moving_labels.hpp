@@ -1,0 +1,16 @@
+#pragma once
+// The check of map.moving_labels that every command with a map makes before it begins.
+
+#include "drivers/calibration/input_error.hpp"
+#include "mapping/map/map_stage.hpp"
+
+namespace swiftlet {
+
+/// InputError where the text is no list of labels.
+inline void checkMovingLabels(const MapSettings& settings) {
+  if (labelMask(settings.moving_labels)) return;
+  throw InputError("map.moving_labels", 0, "", "\"" + settings.moving_labels + "\" is no list of labels",
+                   "Write numbers from 1 to 31 with commas, as 10,12");
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,248 @@
+// The thread `map`: frames with their images, depth and labels, to volume, surface and distance field.
+//
+// Mapped are: with a depth sensor, frames that have a depth image; else keyframes seen by both cameras, and
+// frames that have labels.
+
+#include <algorithm>
+
+#include "firmware_host/pipeline/wiring.hpp"
+
+namespace swiftlet {
+
+// depth, labels -> slot -> map; their stamp -> track
+void Wiring::takeScene(const SceneImages& scene) {
+  if (!to_map_ || scene.empty()) return;
+  auto& counters = counters_.sensor;
+  ++counters.scenes;
+  MapArrows& arrows = *to_map_;
+  const SlotHandle handle = arrows.scenes.tryAcquire();
+  if (!handle.valid()) {
+    ++counters.scenes_dropped;
+    return;
+  }
+  SceneSlot& slot = arrows.scenes.fill(handle);
+  slot.images = SceneImages{};
+  slot.images.stamp = scene.stamp;
+  if (const DepthImageView& from = scene.depth; from.depth != nullptr && mapping_.from_sensor) {
+    if (from.camera.pixels() == slot.depth.size()) {
+      std::copy_n(from.depth, slot.depth.size(), slot.depth.begin());
+      slot.images.depth = from;
+      slot.images.depth.depth = slot.depth.data();
+    } else {
+      ++counters.depths_wrong_size;
+    }
+  }
+  if (const ImageView& from = scene.labels; !from.empty() && !slot.labels.empty()) {
+    const auto width = static_cast<std::size_t>(from.width);
+    if (from.width == rig_.camera[0].width() && from.height == rig_.camera[0].height()) {
+      for (int y = 0; y < from.height; ++y) {
+        std::copy_n(from.row(y), width, slot.labels.data() + static_cast<std::size_t>(y) * width);
+      }
+      slot.images.labels = ImageView{slot.labels.data(), from.width, from.height, from.width};
+    } else {
+      ++counters.labels_wrong_size;
+    }
+  }
+  if (!slot.images.empty()) {
+    const SceneNote note{scene.stamp, slot.images.depth.depth != nullptr, !slot.images.labels.empty()};
+    if (!arrows.scenes.tryHand(handle, 0)) {
+      ++counters.scenes_dropped;
+    } else if (SlotHandle dropped; arrows.scene.push(handle, dropped)) {
+      arrows.scenes.takeBack(dropped, 0);
+      ++counters.scenes_dropped;
+    }
+    static_cast<void>(arrows.notes.tryPush(note));  // refusals are counted by the ring
+  }
+  arrows.scenes.finish(handle);
+}
+
+template <typename Work>
+void Wiring::timed(StageId stage, Work&& work) {
+  addTime(times_, stage, measured([&] {
+            const double cpu = threadCpuSeconds();
+            work();
+            if (drag_) drag_(stage, threadCpuSeconds() - cpu);
+          }));
+}
+
+bool Wiring::wantsMap(const StereoFrame& frame, bool keyframe) {
+  bool depth = false, labels = false;
+  while (const SceneNote* note = to_map_->notes.front()) {
+    if (note->stamp > frame.stamp) break;
+    if (note->stamp == frame.stamp) {
+      depth = note->depth;
+      labels = note->labels;
+    }
+    to_map_->notes.pop();
+  }
+  if (mapping_.from_sensor) return depth;
+  return (keyframe || labels) && frame.has(0) && frame.has(1);
+}
+
+// track: a frame's images -> copies -> loop, map; whether the map gets them
+bool Wiring::copyImages(const StereoFrame& frame, bool to_loop, bool to_map) {
+  KeyframePool& pool = *keyframe_images_;
+  const SlotHandle handle = pool.tryAcquire();
+  if (!handle.valid()) {
+    if (to_loop) ++to_loop_->images_dropped;
+    if (to_map) ++to_map_->images_dropped;
+    return false;
+  }
+  KeyframeImages& images = pool.fill(handle);
+  images.frame = frame.index;
+  images.number = frame.number;
+  for (std::size_t c = 0; c < kMaxCameras; ++c) {
+    const ImageView& from = frame.image[c];
+    images.image[c] = ImageView{};
+    if (from.empty()) continue;
+    const auto width = static_cast<std::size_t>(from.width);
+    for (int y = 0; y < from.height; ++y) {
+      std::copy_n(from.row(y), width, images.pixels[c].data() + static_cast<std::size_t>(y) * width);
+    }
+    images.image[c] = ImageView{images.pixels[c].data(), from.width, from.height, from.width};
+  }
+  const auto hand = [&](KeyframeReader reader, auto& ring, std::uint64_t& dropped_count) {
+    SlotHandle dropped;
+    if (!pool.tryHand(handle, reader)) {
+      ++dropped_count;
+      return false;
+    }
+    if (ring.push(handle, dropped)) {
+      pool.takeBack(dropped, reader);
+      ++dropped_count;
+    }
+    return true;
+  };
+  if (to_loop) static_cast<void>(hand(kLoopReads, to_loop_->images, to_loop_->images_dropped));
+  const bool mapped = to_map && hand(kMapReads, to_map_->images, to_map_->images_dropped);
+  pool.finish(handle);
+  return mapped;
+}
+
+// smooth -> frame with its window's poses -> map
+void Wiring::handFrame(const TrackMessage& message, const SmoothedWindow& window) {
+  const Health health = window.newest.health;
+  // Where the pose is not to be flown on, or still being found, there is nothing to map.
+  if (window.poses.empty() || (health != Health::kGood && health != Health::kDegraded)) return;
+  MapMessage* out = to_map_->frames.beginPush();
+  if (out == nullptr) return;  // counted by the ring
+  out->frame = message.tracked.index;
+  out->stamp = message.tracked.stamp;
+  out->epoch = window.epoch;
+  out->poses = window.poses;
+  to_map_->frames.commitPush();
+}
+
+// frames with poses, images, depth, labels, newest correction -> depth -> volume -> surface, distance field
+bool Wiring::map() {
+  const bool ended = smoothDone() && loopDone();
+  const MapMessage* message = to_map_ ? to_map_->frames.front() : nullptr;
+  if (message == nullptr) {
+    if (map_ && map_->isCorrecting()) {
+      stepCorrection();
+      return true;
+    }
+    if (ended) {
+      mapping_.images.reset();
+      mapping_.scene.reset();
+      map_done_.store(true, std::memory_order_release);
+    }
+    return false;
+  }
+  ++counters_.map.frames;
+  correctMap(*message);
+  if (findMapImages(message->frame)) {
+    mapFrame(*message);
+  } else {
+    ++counters_.map.without_image;
+  }
+  to_map_->frames.pop();
+  if (map_->isCorrecting()) stepCorrection();
+  return true;
+}
+
+// newest window, newest correction -> poses of what was fused before
+void Wiring::correctMap(const MapMessage& message) {
+  mapping_.refined.clear();
+  for (const WindowPose& pose : message.poses) {
+    static_cast<void>(mapping_.refined.tryPushBack({pose.frame_index, pose.T_world_body}));
+  }
+  map_->refine({mapping_.refined.data(), mapping_.refined.size()});
+  const std::uint64_t number = to_map_->correction.refresh();
+  if (number == mapping_.correction) return;
+  mapping_.correction = number;
+  const MapInWorlds& worlds = to_map_->correction.value();
+  if (worlds.newest.epoch == message.epoch) map_->correct({worlds.keyframes.data(), worlds.keyframes.size()});
+}
+
+// what turned out to be out of place -> volume -> surface, distance field
+void Wiring::stepCorrection() {
+  timed(StageId::kCorrection, [&] { map_->stepCorrection({}, mapping_.corrected); });
+  if (mapping_.corrected.waiting == 0) drawMap();
+}
+
+void Wiring::mapFrame(const MapMessage& message) {
+  MapInput input;
+  input.stamp = message.stamp;
+  input.frame = message.frame;
+  input.epoch = message.epoch;
+  input.T_map_body = message.poses.back().T_world_body;
+  if (const MapCorrection& now = to_map_->correction.value().newest;
+      mapping_.correction > 0 && now.epoch == message.epoch) {
+    input.T_map_world = now.T_map_world;
+    input.T_map_body = now.T_map_world * input.T_map_body;
+  }
+  input.image = mapping_.images->image;
+  if (findScene(message.stamp)) {
+    input.depth = mapping_.scene->images.depth;
+    input.labels = mapping_.scene->images.labels;
+  } else if (mapping_.from_sensor) {
+    ++counters_.map.without_scene;
+    return;
+  }
+  MapStage& map = *map_;
+  MapReport& report = mapping_.report;
+  timed(StageId::kDepth, [&] { static_cast<void>(map.measure(input, {}, report)); });
+  if (report.status.ok()) {
+    timed(StageId::kVolume, [&] { static_cast<void>(map.integrate(input, {}, report)); });
+  }
+  if (report.status.code == StatusCode::kInvalidInput) {
+    ++counters_.map.refused;
+    counters_.map.faults.add(report.status);
+    return;
+  }
+  mapping_.vehicle = input.T_map_body.translation;
+  drawMap();
+}
+
+void Wiring::drawMap() {
+  // What is left over is counted in the report and drawn later.
+  timed(StageId::kSurface, [&] { static_cast<void>(map_->draw(mapping_.vehicle, {}, mapping_.report)); });
+  timed(StageId::kDistance, [&] { map_->updateDistance(mapping_.vehicle, {}, mapping_.report); });
+}
+
+/// Brings the images of `frame` to the head; those of earlier frames go back, later ones stay.
+bool Wiring::findMapImages(std::uint64_t frame) {
+  KeyframePool::Loan& head = mapping_.images;
+  while (!head || head->frame < frame) {
+    head.reset();
+    SlotHandle handle;
+    if (!to_map_->images.tryPop(handle)) return false;
+    head = keyframe_images_->borrow(handle, kMapReads);
+  }
+  return head->frame == frame;
+}
+
+/// Likewise depth and labels of `stamp`.
+bool Wiring::findScene(Stamp stamp) {
+  ScenePool::Loan& head = mapping_.scene;
+  while (!head || head->images.stamp < stamp) {
+    head.reset();
+    SlotHandle handle;
+    if (!to_map_->scene.tryPop(handle)) return false;
+    head = to_map_->scenes.borrow(handle, 0);
+  }
+  return head->images.stamp == stamp;
+}
+
+}  // namespace swiftlet
