@@ -28,7 +28,7 @@ bool isFlightThread(std::string_view name) {
   return name == "sensor" || name == "propagate" || name == "track" || name == "smooth" || name == "mesh";
 }
 
-void checkRun(bool mono, bool record, bool planes = false, bool loops = false) {
+void checkRun(bool mono, bool record, bool planes = false, bool loops = false, bool map = false) {
   const ScratchFolder folder("flight_trap");
   ReplayRequest request;
   request.log = chosenLog();
@@ -39,6 +39,7 @@ void checkRun(bool mono, bool record, bool planes = false, bool loops = false) {
   request.mesh_sequence = true;
   request.record = record;
   request.loop_closure = loops;
+  request.map = map;
   ReplayHooks hooks;
   int armed = 0;
   std::mutex guard;
@@ -88,6 +89,9 @@ TEST_CASE("the flight path neither allocates nor locks while it is recorded") { 
 TEST_CASE("the flight path neither allocates nor locks with one camera") { checkRun(true, false); }
 TEST_CASE("the flight path neither allocates nor locks with planes and loop closure") {
   checkRun(false, false, true, true);
+}
+TEST_CASE("the flight path neither allocates nor locks with loop closure and a map") {
+  checkRun(false, true, false, true, true);
 }
 
 }  // namespace

@@ -280,6 +280,50 @@ class FailingListener : public RunListener {
   int frames_ = 0;
 };
 
+TEST_CASE("two runs with loop closure and a map write the same map") {
+  const ScratchFolder folder("mapped");
+  for (const char* run : {"one", "two"}) {
+    ReplayRequest request = requestFor(shortLog(), folder.file(run));
+    request.loop_closure = true;
+    request.map = true;
+    const ReplayResult result = runReplay(request, Settings{});
+    REQUIRE(result.finished);
+    CHECK(result.statistics.losses.empty());
+    REQUIRE(result.statistics.mapping);
+    // Of all keyframes those with a pose that was not still being found.
+    CHECK(result.statistics.mapping->frames > result.statistics.keyframes / 2);
+    CHECK(result.statistics.mapping->refused == 0);
+    CHECK(result.summary["map"]["mesh"]["faces"].get<int>() > 1000);
+  }
+  for (const char* file : {"map.ply", "map.glb", "odometry.tum"}) {
+    CHECK(textOf(folder.file("one/") + file) == textOf(folder.file("two/") + file));
+  }
+}
+
+TEST_CASE("a map that falls behind misses frames, counted, and nobody waits for it") {
+  const ScratchFolder folder("slow_map");
+  ReplayRequest request = requestFor(shortLog(), folder.file("run"));
+  request.real_time = true;
+  request.map = true;
+  ReplayHooks hooks;
+  hooks.drag = [](StageId stage, double /*cpu*/) {
+    if (stage == StageId::kDepth) usleep(static_cast<unsigned>(600e3 / kSlow));
+  };
+  const ReplayResult result = runReplay(request, Settings{}, hooks);
+  REQUIRE(result.finished);
+  checkAccounts(result.statistics, kImages);
+  REQUIRE(result.statistics.mapping);
+  const MapThreadStatistics& map = *result.statistics.mapping;
+  CHECK(map.frames > 0);
+  const auto& losses = result.statistics.losses;
+  const auto lost = [&](const char* name) { return losses.contains(name) ? losses.at(name) : 0U; };
+  CHECK(lost("frames_unmapped") == map.without_image);
+  CHECK(result.summary["map"]["taken"].get<std::uint64_t>() + map.without_image + map.refused == map.frames);
+  if (kSanitized) return;
+  CHECK(map.without_image + lost("frame_images_to_map") > 0);
+  CHECK(result.statistics.frames_dropped == 0);
+}
+
 TEST_CASE("a log that fails ends neither the flight nor the waiting for its end") {
   const auto source = openLog(shortLog());
   FailingListener listener;
