@@ -80,6 +80,11 @@ void addFuseCommand(CLI::App& app, int& exit_code) {
   command->add_option("--trajectory", request.trajectory,
                       "Poses of the body (TUM, EuRoC csv); default: the log's own truth");
   command->add_option("--out", request.out, "Folder to write")->capture_default_str();
+  command->add_option("--keep", request.keep, "File to keep the map in, to be continued later");
+  command
+      ->add_option("--continue", request.continued,
+                   "Begin with this kept map; the poses have to be in its frame")
+      ->check(CLI::ExistingFile);
   addChoice<DepthSource>(
       *command, "--depth", request.depth, "Where depth comes from: sensor is the log's depth0",
       {{"any", DepthSource::kAny}, {"sensor", DepthSource::kSensor}, {"stereo", DepthSource::kStereo}});
@@ -104,7 +109,9 @@ void addFuseCommand(CLI::App& app, int& exit_code) {
   options->settings.addTo(*command);
   command->footer(
       "Example:\n  swiftlet fuse data/vil_v102 --out map_v102\n"
-      "  swiftlet fuse data/vil_v102 --trajectory run_v102/map.tum --depth stereo --out map_v102");
+      "  swiftlet fuse data/vil_v102 --trajectory run_v102/map.tum --depth stereo --out map_v102\n"
+      "  swiftlet fuse data/vil_v102 --until 15 --keep v102.swm --out first\n"
+      "  swiftlet fuse data/vil_v102 --from 15 --continue v102.swm --out whole");
   command->callback([options, &exit_code] { exit_code = fuse(*options); });
 }
 

@@ -14,6 +14,7 @@
 #include "firmware_host/commands/given_poses.hpp"
 #include "firmware_host/commands/moving_labels.hpp"
 #include "firmware_host/pipeline/log_feed.hpp"
+#include "firmware_host/report/kept_map.hpp"
 #include "firmware_host/report/line_file.hpp"
 #include "firmware_host/report/map_files.hpp"
 #include "firmware_host/report/map_mesh_builder.hpp"
@@ -89,6 +90,7 @@ class FuseRun {
  private:
   void begin();
   void openPoses();
+  void openKept();
   void run();
   void take(const StereoFrame& frame);
   void takeSensorUntil(Stamp stamp, const StereoFrame* frame);
@@ -111,6 +113,7 @@ class FuseRun {
   std::optional<Progress> progress_;
   std::unique_ptr<MapStage> map_;
   std::optional<TumWriter> poses_out_;
+  std::optional<KeptMapReport> continued_;
   MapReport report_;
   MapTimes times_;
   bool sensor_ = false;
@@ -150,9 +153,32 @@ void FuseRun::begin() {
   } else {
     map_ = std::make_unique<MapStage>(rig_, settings_.map_stage);
   }
+  openKept();
   for (const std::string& line : source_->warnings()) fmt::print(stderr, "warning: {}\n", line);
   for (const std::string& line : warnings_.lines()) fmt::print(stderr, "warning: {}\n", line);
   progress_.emplace("fuse", request_.show_progress ? source_->imageCount() : 0);
+}
+
+void FuseRun::openKept() {
+  if (!request_.keep.empty()) {
+    // Now and not after an hour's work.
+    const std::filesystem::path folder = std::filesystem::absolute(request_.keep).parent_path();
+    if (!std::filesystem::is_directory(folder) || std::filesystem::is_directory(request_.keep)) {
+      throw InputError(request_.keep, 0, "--keep", "is not a file in a folder that exists",
+                       "Make the folder first, or give another file");
+    }
+  }
+  if (request_.continued.empty()) return;
+  continued_ = readKeptMapFile(request_.continued, *map_);
+  const KeptMapCounts& without = continued_->without_room;
+  if (without.blocks + without.free_blocks + without.patches > 0) {
+    warnings_.add(fmt::format(
+        "{}: {} of {} blocks, {} of {} free blocks and {} of {} patches have no room and are left "
+        "out, the farthest from where the vehicle was last; map.volume_mib and map.surface_mib "
+        "give more",
+        request_.continued, without.blocks, continued_->held.blocks, without.free_blocks,
+        continued_->held.free_blocks, without.patches, continued_->held.patches));
+  }
 }
 
 void FuseRun::run() {
@@ -222,7 +248,7 @@ void FuseRun::fuse(Stamp stamp, const StereoFrame* frame, const DepthImageView& 
   poses_out_->write(stamp, pose->T_world_body);
   MapInput input;
   input.stamp = stamp;
-  input.epoch = static_cast<std::uint32_t>(pose->piece);
+  input.epoch = (continued_ ? continued_->epoch : 0) + static_cast<std::uint32_t>(pose->piece);
   input.T_map_body = pose->T_world_body;
   input.depth = depth;
   if (frame != nullptr) input.image = frame->image;
@@ -259,8 +285,13 @@ void FuseRun::failWithoutPose() const {
                   request_.max_gap));
 }
 
+Json countsJson(const KeptMapCounts& counts) {
+  return {{"blocks", counts.blocks}, {"free_blocks", counts.free_blocks}, {"patches", counts.patches}};
+}
+
 FuseRunResult FuseRun::end() {
   poses_out_->close();
+  map_->drawRest();
   MapMeshBuilder builder;
   map_->visitSurface(builder);
   const MapMesh mesh = builder.mesh();
@@ -282,6 +313,15 @@ FuseRunResult FuseRun::end() {
                      {"with_labels", labelled_}};
   json["map"] = toJson(*map_);
   json["map"]["mesh"] = {{"vertices", mesh.vertices.size()}, {"faces", mesh.faces.size()}};
+  if (continued_) {
+    json["continued"] = {{"file", request_.continued},
+                         {"held", countsJson(continued_->held)},
+                         {"without_room", countsJson(continued_->without_room)}};
+  }
+  if (!request_.keep.empty()) {
+    json["kept"] = countsJson(writeKeptMapFile(request_.keep, *map_));
+    json["kept"]["file"] = request_.keep;
+  }
   json["timing"] = timingJson(times_);
   json["warnings"] = source_->warnings();
   for (const std::string& line : warnings_.lines()) json["warnings"].push_back(line);

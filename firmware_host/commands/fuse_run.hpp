@@ -24,6 +24,8 @@ struct FuseRequest {
   std::string log;
   std::string trajectory;       ///< TUM, EuRoC csv; empty: the log's own truth
   std::string out;              ///< folder to write
+  std::string keep;             ///< file that the map is kept in; empty: none
+  std::string continued;        ///< kept map to begin with, in whose frame the poses are; empty: a new map
   std::string calibration;      ///< instead of the log's own; empty: the log's
   std::string imu_calibration;  ///< Kalibr's IMU file where it is not beside the camchain
   DepthSource depth = DepthSource::kAny;
@@ -41,8 +43,8 @@ struct FuseRunResult {
   bool has_surface = false;
 };
 
-/// Writes map.ply, map.glb, trajectory.tum (the poses used) and summary.json. InputError for bad input;
-/// nothing is written before the first depth image that has a pose.
+/// Writes map.ply, map.glb, the kept map, trajectory.tum (the poses used) and summary.json. InputError for
+/// bad input; nothing is written before the first depth image that has a pose.
 FuseRunResult runFuse(const FuseRequest& request, const Settings& settings);
 
 }  // namespace swiftlet

@@ -149,14 +149,26 @@ Status MapStage::integrate(const MapInput& input, const VolumeEffort& effort, Ma
 
 void MapStage::beginEpoch(std::uint32_t epoch) {
   // The store keeps what is drawn: the rest of the old world first.
-  SurfaceStep last;
-  static_cast<void>(surface_.step(vehicle_.cast<float>(), {}, last));
+  drawRest();
   volume_.clear();
   surface_.drawAll();
   integrator_.restart();
   correction_.restart();
   epoch_ = epoch;
   ++counters_.epochs;
+}
+
+void MapStage::drawRest() {
+  SurfaceStep last;
+  static_cast<void>(surface_.step(vehicle_.cast<float>(), {}, last));
+}
+
+void MapStage::resume(std::uint32_t epoch, const Eigen::Vector3d& p_map_vehicle) {
+  surface_.takeAsDrawn();
+  integrator_.restart();
+  correction_.restart();
+  epoch_ = epoch;
+  vehicle_ = p_map_vehicle;
 }
 
 Status MapStage::draw(const Eigen::Vector3d& p_map_vehicle, const SurfaceEffort& effort, MapReport& report) {

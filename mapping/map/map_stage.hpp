@@ -98,6 +98,22 @@ class MapStage {
   }
   [[nodiscard]] const VolumeCorrection& correction() const { return correction_; }
 
+  /// Draws all that waits: work without a bound, for the end of a run.
+  void drawRest();
+  /// A kept map in place of what there is: `fill(volume, store)` puts its blocks and patches into both,
+  /// empty. The surface counts as that of the volume; the next pose is not judged against the last.
+  template <typename Fill>
+  void restore(std::uint32_t epoch, const Eigen::Vector3d& p_map_vehicle, const Fill& fill) {
+    volume_.clear();
+    volume_.beginChange();
+    store_.clear();
+    fill(volume_, store_);
+    resume(epoch, p_map_vehicle);
+  }
+  [[nodiscard]] std::uint32_t epoch() const { return epoch_; }
+  /// Where it was last [m].
+  [[nodiscard]] const Eigen::Vector3d& vehicle() const { return vehicle_; }
+
   /// Null where the rig has one camera.
   [[nodiscard]] const DepthStage* stereo() const { return pair_ ? &pair_->depth : nullptr; }
   [[nodiscard]] const DistanceField& distance() const { return distance_; }
@@ -127,6 +143,7 @@ class MapStage {
   Status measureBySensor(const MapInput& input);
   Status measureByPair(const MapInput& input, const DepthEffort& effort);
   void beginEpoch(std::uint32_t epoch);
+  void resume(std::uint32_t epoch, const Eigen::Vector3d& p_map_vehicle);
 
   Rig rig_;
   ConfusionModel confusion_;

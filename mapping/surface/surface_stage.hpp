@@ -45,8 +45,10 @@ class SurfaceStage : public BlockListener {
   /// `vehicle` in world: what the store keeps when it is full. kCapacityReached while blocks wait.
   Status step(const Eigen::Vector3f& vehicle, const SurfaceEffort& effort, SurfaceStep& out);
   void beforeRemoval(const VoxelVolume& volume, std::span<const std::uint32_t> slots) override;
-  /// Every block is out of date: after the volume was cleared, loaded or moved.
+  /// Every block is out of date: after the volume was cleared or moved.
   void drawAll();
+  /// No block is: after the volume was loaded and the store with it.
+  void takeAsDrawn();
 
   [[nodiscard]] const SurfaceCounters& counters() const { return counters_; }
   [[nodiscard]] std::size_t bytes() const;

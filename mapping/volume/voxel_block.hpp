@@ -41,9 +41,28 @@ class LabelCounts {
   }
   [[nodiscard]] bool empty() const { return slots_[0] == 0; }
 
+  /// As they are kept in files, label << 11 | count each.
+  using Words = std::array<std::uint16_t, kSlots>;
+  [[nodiscard]] const Words& words() const { return slots_; }
+  /// False, and nothing is changed, where the words are none that add() makes.
+  [[nodiscard]] bool setWords(const Words& words);
+
  private:
-  std::array<std::uint16_t, kSlots> slots_{};  ///< filled from the front, by falling count
+  Words slots_{};  ///< filled from the front, by falling count
 };
+
+inline bool LabelCounts::setWords(const Words& words) {
+  for (std::size_t i = 0; i < kSlots; ++i) {
+    const bool one = words[i] >> 11U != 0 && (words[i] & kMostCount) != 0;
+    if (!one && words[i] != 0) return false;
+    if (i > 0 && (words[i] & kMostCount) > (words[i - 1] & kMostCount)) return false;
+    for (std::size_t k = 0; one && k < i; ++k) {
+      if (words[k] >> 11U == words[i] >> 11U) return false;
+    }
+  }
+  slots_ = words;
+  return true;
+}
 
 inline bool LabelCounts::add(std::uint8_t label) {
   std::size_t i = 0;
@@ -70,8 +89,10 @@ inline bool LabelCounts::add(std::uint8_t label) {
   }
   ++slots_[i];
   if (i == 0 || (slots_[i] & kMostCount) <= (slots_[i - 1] & kMostCount)) return false;
-  std::swap(slots_[i], slots_[i - 1]);
-  return i == 1;
+  // Past all that were as frequent.
+  for (; i > 0 && (slots_[i] & kMostCount) > (slots_[i - 1] & kMostCount); --i)
+    std::swap(slots_[i], slots_[i - 1]);
+  return i == 0;
 }
 
 struct alignas(64) LabelBlock {

@@ -40,6 +40,28 @@ TEST_CASE("a second of a real flight gives a map from stereo, in files that othe
   CHECK(summary["map"]["mesh"]["faces"] == mesh.faces.size());
 }
 
+TEST_CASE("a kept map is continued, a damaged one refused before anything is written", "[fuse_command]") {
+  const ScratchFolder folder("fuse_kept");
+  const std::string kept = folder.file("kept.swm"), both = folder.file("both"), out = folder.file("out");
+  REQUIRE(run({"fuse", kLog, "--out", folder.file("first"), "--until", "0.6", "--keep", kept}) == kExitDone);
+  REQUIRE(run({"fuse", kLog, "--out", both, "--from", "0.6", "--until", "1", "--continue", kept}) ==
+          kExitDone);
+  std::ifstream file(both + "/summary.json");
+  const nlohmann::json summary = nlohmann::json::parse(file);
+  CHECK(summary["continued"]["held"]["blocks"].get<int>() > 100);
+  CHECK(summary["continued"]["without_room"]["blocks"] == 0);
+  const std::size_t first = readPly(folder.file("first") + "/map.ply").faces.size();
+  CHECK(readPly(both + "/map.ply").faces.size() > first);
+  CHECK_FALSE(fs::exists(kept + ".part"));
+
+  CHECK(run({"fuse", kLog, "--out", out, "--continue", kept, "--set", "map.voxel_size=0.1"}) ==
+        kExitBadInput);
+  fs::resize_file(kept, fs::file_size(kept) - 1);
+  CHECK(run({"fuse", kLog, "--out", out, "--continue", kept}) == kExitBadInput);
+  CHECK(run({"fuse", kLog, "--out", out, "--keep", folder.file("nowhere/kept.swm")}) == kExitBadInput);
+  CHECK_FALSE(fs::exists(out));
+}
+
 TEST_CASE("what cannot be fused is refused with a remedy", "[fuse_command]") {
   const ScratchFolder folder("fuse_bad");
   const std::string out = folder.file("map");

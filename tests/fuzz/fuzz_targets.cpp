@@ -3,17 +3,21 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "drivers/calibration/calibration.hpp"
 #include "drivers/recorded/image_list.hpp"
 #include "drivers/recorded/imu_file.hpp"
+#include "drivers/recorded/recording_checksum.hpp"
+#include "drivers/recorded/recording_format.hpp"
 #include "drivers/recorded/ros_messages.hpp"
 #include "drivers/recorded/track_file.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
 #include "firmware_host/places/vocabulary_file.hpp"
 #include "firmware_host/report/g2o_file.hpp"
+#include "firmware_host/report/kept_map.hpp"
 #include "firmware_host/report/ply_file.hpp"
 #include "mapping/pose_graph/pose_graph_optimizer.hpp"
 #include "tests/fuzz/fuzz_recording.hpp"
@@ -216,7 +220,60 @@ void g2o(std::string_view text) {
   }
 }
 
-constexpr std::array<NamedTarget, 11> kTargets = {{{"imu_csv", &imuCsv},
+/// A kept map's checksums, as far as lengths lead from record to record.
+std::string withMapChecksums(std::string_view text) {
+  constexpr std::size_t kHead = 96, kRecord = 12, kCrc = 4, kLengthAt = 8;  // docs/formats.md
+  std::string bytes(text);
+  auto* const data = reinterpret_cast<std::uint8_t*>(bytes.data());
+  if (bytes.size() < kHead) return bytes;
+  const std::uint32_t head = crc32c(0, {data, kHead - kCrc});
+  LittleEndianWriter(data + kHead - kCrc).u32(head);
+  for (std::size_t at = kHead; bytes.size() - at >= kRecord;) {
+    const std::size_t length = LittleEndianReader({data + at + kLengthAt, sizeof(std::uint32_t)}).u32();
+    if (length > bytes.size() - at - kRecord) break;
+    LittleEndianWriter(data + at).u32(crc32c(head, {data + at + kCrc, kRecord - kCrc + length}));
+    at += kRecord + length;
+  }
+  return bytes;
+}
+
+/// A map with room for few blocks, emptied before each use.
+struct MapPlace {
+  static VolumeSettings settings() {
+    VolumeSettings settings;
+    constexpr std::size_t kBytes = std::size_t{64} << 10U;
+    settings.memory_bytes = kBytes;
+    return settings;
+  }
+  KeptMapReport load(const std::string& bytes) {
+    std::istringstream in(bytes);
+    KeptMapReport report = checkKeptMap("map", in, volume.settings());
+    volume.clear();
+    surface.clear();
+    loadKeptMap("map", in, volume, surface, report);
+    return report;
+  }
+  std::string kept(const KeptMapReport& report) {
+    std::ostringstream out;
+    (void)writeKeptMap("map", out, {volume, surface, report.epoch, report.p_map_vehicle});
+    return out.str();
+  }
+  VoxelVolume volume{settings()};
+  SurfaceStore surface{std::size_t{64} << 10U, volume.settings().voxel_size* kBlockSide};
+};
+
+void keptMap(std::string_view text) {
+  static MapPlace first, second;
+  try {
+    const KeptMapReport report = first.load(withMapChecksums(text));
+    demand(report.without_room.blocks <= report.held.blocks);
+    const std::string once = first.kept(report);
+    demand(second.kept(second.load(once)) == once);
+  } catch (const InputError&) {
+  }
+}
+
+constexpr std::array<NamedTarget, 12> kTargets = {{{"imu_csv", &imuCsv},
                                                    {"image_csv", &imageCsv},
                                                    {"trajectory", &trajectory},
                                                    {"tracks", &tracks},
@@ -226,7 +283,8 @@ constexpr std::array<NamedTarget, 11> kTargets = {{{"imu_csv", &imuCsv},
                                                    {"recording", &recording},
                                                    {"g2o", &g2o},
                                                    {"ply", &ply},
-                                                   {"vocabulary", &vocabulary}}};
+                                                   {"vocabulary", &vocabulary},
+                                                   {"kept_map", &keptMap}}};
 
 }  // namespace
 

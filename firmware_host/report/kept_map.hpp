@@ -1,0 +1,56 @@
+#pragma once
+// A map on disk: written, read, continued. docs/formats.md has the layout.
+//
+// Kept are the volume's blocks bit by bit (distances, weights, grey values, label counts, what is free), the
+// surface's patches, the epoch and where the vehicle was last. The same map gives the same bytes. Blocks and
+// patches lie in order of their distance from the vehicle, so that a smaller pool takes the nearest: what has
+// no room is counted. Every record has a CRC; a file is read twice, first only to check it, so that nothing
+// is loaded from a damaged one. Memory: one record (kMostRecordBytes) and 12 bytes a block or patch for
+// writing. InputError names the file, the byte, the field and the remedy.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <iosfwd>
+#include <string>
+
+#include "mapping/map/map_stage.hpp"
+
+namespace swiftlet {
+
+struct KeptMapCounts {
+  std::uint32_t blocks = 0;  ///< with voxels
+  std::uint32_t free_blocks = 0;
+  std::uint32_t patches = 0;
+};
+
+struct KeptMapReport {
+  KeptMapCounts held;          ///< by the file
+  KeptMapCounts without_room;  ///< of them, left out: the map that took the others is smaller
+  std::uint32_t epoch = 0;
+  Eigen::Vector3d p_map_vehicle = Eigen::Vector3d::Zero();
+};
+
+/// Where a map's parts lie, for who has no MapStage.
+struct MapParts {
+  const VoxelVolume& volume;
+  const SurfaceStore& surface;
+  std::uint32_t epoch = 0;
+  Eigen::Vector3d p_map_vehicle = Eigen::Vector3d::Zero();
+};
+
+KeptMapCounts writeKeptMap(const std::string& name, std::ostream& out, const MapParts& map);
+/// Draws what waits, then writes beside `path` and renames: an older file is whole until the new one is.
+KeptMapCounts writeKeptMapFile(const std::string& path, MapStage& map);
+
+/// Checks the whole of `in` for a map with `settings`; throws where anything is amiss.
+KeptMapReport checkKeptMap(const std::string& name, std::istream& in, const VolumeSettings& settings);
+/// Puts it into an empty volume and store, after checkKeptMap(). Where it throws (the file changed since)
+/// both hold a part.
+void loadKeptMap(const std::string& name, std::istream& in, VoxelVolume& volume, SurfaceStore& surface,
+                 KeptMapReport& report);
+/// In place of what `map` holds. Where it throws the map is as it was; empty where the file changed
+/// meanwhile.
+KeptMapReport readKeptMap(const std::string& name, std::istream& in, MapStage& map);
+KeptMapReport readKeptMapFile(const std::string& path, MapStage& map);
+
+}  // namespace swiftlet
