@@ -142,7 +142,8 @@ bool Wiring::map() {
       stepCorrection();
       return true;
     }
-    if (ended) {
+    if (ended && !mapDone()) {
+      if (map_) map_->drawRest();
       mapping_.images.reset();
       mapping_.scene.reset();
       map_done_.store(true, std::memory_order_release);
