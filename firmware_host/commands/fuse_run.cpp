@@ -16,9 +16,7 @@
 #include "firmware_host/pipeline/log_feed.hpp"
 #include "firmware_host/report/kept_map.hpp"
 #include "firmware_host/report/line_file.hpp"
-#include "firmware_host/report/map_files.hpp"
-#include "firmware_host/report/map_mesh_builder.hpp"
-#include "firmware_host/report/map_report.hpp"
+#include "firmware_host/report/map_output.hpp"
 #include "firmware_host/report/progress.hpp"
 #include "firmware_host/report/summary.hpp"
 #include "mapping/map/map_stage.hpp"
@@ -111,6 +109,7 @@ class FuseRun {
   std::string poses_name_;
   std::optional<GivenPoses> poses_;
   std::optional<Progress> progress_;
+  SpilledSurface spilled_{request_.out};
   std::unique_ptr<MapStage> map_;
   std::optional<TumWriter> poses_out_;
   std::optional<KeptMapReport> continued_;
@@ -149,9 +148,9 @@ void FuseRun::begin() {
     DepthImageView camera;
     camera.camera = depth_.sensor().camera;
     camera.T_body_camera = depth_.sensor().T_body_camera;
-    map_ = std::make_unique<MapStage>(rig_, settings_.map_stage, &camera);
+    map_ = std::make_unique<MapStage>(rig_, settings_.map_stage, &camera, &spilled_);
   } else {
-    map_ = std::make_unique<MapStage>(rig_, settings_.map_stage);
+    map_ = std::make_unique<MapStage>(rig_, settings_.map_stage, nullptr, &spilled_);
   }
   openKept();
   for (const std::string& line : source_->warnings()) fmt::print(stderr, "warning: {}\n", line);
@@ -292,11 +291,6 @@ Json countsJson(const KeptMapCounts& counts) {
 FuseRunResult FuseRun::end() {
   poses_out_->close();
   map_->drawRest();
-  MapMeshBuilder builder;
-  map_->visitSurface(builder);
-  const MapMesh mesh = builder.mesh();
-  writeMapPly(file("map.ply"), mesh);
-  writeMapGlb(file("map.glb"), mesh);
   Json json;
   json["version"] = versionJson();
   json["run"] = {{"command", "fuse"},
@@ -311,8 +305,7 @@ FuseRunResult FuseRun::end() {
                      {"refused", refused_},
                      {"fused", fused_},
                      {"with_labels", labelled_}};
-  json["map"] = toJson(*map_);
-  json["map"]["mesh"] = {{"vertices", mesh.vertices.size()}, {"faces", mesh.faces.size()}};
+  json["map"] = writeMap(request_.out, *map_, spilled_, {});
   if (continued_) {
     json["continued"] = {{"file", request_.continued},
                          {"held", countsJson(continued_->held)},
@@ -326,7 +319,7 @@ FuseRunResult FuseRun::end() {
   json["warnings"] = source_->warnings();
   for (const std::string& line : warnings_.lines()) json["warnings"].push_back(line);
   writeJson(file("summary.json"), json);
-  return {json, finished_, !mesh.faces.empty()};
+  return {json, finished_, json["map"]["mesh"]["faces"].get<std::size_t>() > 0};
 }
 
 }  // namespace

@@ -202,6 +202,7 @@ class ReplayRun {
     wanted.drag = hooks_.drag;
     wanted.vocabulary = vocabulary();
     if (scenes_) wanted.depth_sensor = scenes_->depthSensor();
+    wanted.spill = &recorder_->spilled();
     LogFeed feed(*source_, {request_.from, request_.until, request_.last_stamp}, tracks_.get(),
                  scenes_ ? &*scenes_ : nullptr);
     if (request_.real_time) {

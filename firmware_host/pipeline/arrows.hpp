@@ -209,6 +209,7 @@ struct LoopArrows {
 struct MapInWorlds {
   MapCorrection newest;
   FixedVector<WorldInMap, LoopLimits{}.nodes> keyframes;  ///< by frame
+  FixedVector<std::uint32_t, kTiedEpochs> tied;           ///< earlier epochs of the same piece
 };
 
 /// What leads to `map`.

@@ -38,8 +38,8 @@ class RunListener {
                       std::span<const Eigen::Vector2f> /*hull*/) {}
   /// At the end: the newest mesh over the horizon, when there is one.
   virtual void onLocalMesh(const LocalMesh& /*mesh*/) {}
-  /// At the end: the map, when there is one.
-  virtual void onMap(MapStage& /*map*/) {}
+  /// At the end: the map, when there is one; `tied`: earlier epochs that lie in it, by loop closure.
+  virtual void onMap(MapStage& /*map*/, std::span<const std::uint32_t> /*tied*/) {}
   /// At the end: keyframes and events that had not come out yet.
   virtual void onFinish(const OdometryOutput& output) = 0;
   /// A remark of the executor, for events.log.

@@ -134,7 +134,7 @@ void RunLog::collect(const Wiring& wiring) {
     statistics_.mapping = {counters.map.frames, counters.map.without_image, counters.map.without_scene,
                            counters.map.refused};
     for (const auto& row : counters.map.faults.rows()) statistics_.faults[row.text] += row.count;
-    listener_.onMap(*map);
+    listener_.onMap(*map, wiring.tiedEpochs());
   }
   wiring.addLosses(statistics_.losses);
   for (std::size_t i = 0; i < statistics_.times.size(); ++i) {

@@ -19,6 +19,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "estimator/core/newest_shared.hpp"
@@ -155,6 +156,12 @@ class Wiring {
   /// Null where mapping is switched off; once the thread `map` has ended, but for the distance field, which
   /// any one thread may read at any time.
   [[nodiscard]] MapStage* mapStage() const { return map_.get(); }
+  /// Earlier epochs whose worlds loop closure has tied to the newest; as mapStage().
+  [[nodiscard]] std::span<const std::uint32_t> tiedEpochs() const {
+    if (!to_map_) return {};
+    const auto& tied = to_map_->correction.value().tied;
+    return {tied.data(), tied.size()};
+  }
   /// Losses at full arrows, by name; at the end.
   void addLosses(std::map<std::string, std::uint64_t>& losses) const;
   /// What was reserved for what, by the constructor.

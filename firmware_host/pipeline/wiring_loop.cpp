@@ -56,6 +56,7 @@ void Wiring::publishMap() {
   MapInWorlds& out = to_map_->correction.draft();
   out.newest = loop_->correction();
   out.keyframes.clear();
+  loop_->tiedEpochs(out.newest.epoch, out.tied);
   for (std::size_t i = 0; i < loop_->nodeCount(); ++i) {
     const MapNode node = loop_->node(i);
     if (node.epoch != out.newest.epoch) continue;

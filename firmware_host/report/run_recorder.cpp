@@ -6,9 +6,7 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
-#include "firmware_host/report/map_files.hpp"
-#include "firmware_host/report/map_mesh_builder.hpp"
-#include "firmware_host/report/map_report.hpp"
+#include "firmware_host/report/map_output.hpp"
 #include "firmware_host/report/names.hpp"
 #include "firmware_host/report/ply_file.hpp"
 #include "firmware_host/report/states_csv.hpp"
@@ -26,7 +24,8 @@ std::string valueText(const Event& event) {
 
 }  // namespace
 
-RunRecorder::RunRecorder(const std::string& folder, bool imu_rate, bool meshes) : folder_(folder) {
+RunRecorder::RunRecorder(const std::string& folder, bool imu_rate, bool meshes)
+    : folder_(folder), spilled_(folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) {
@@ -67,15 +66,8 @@ void RunRecorder::onLocalMesh(const LocalMesh& mesh) {
   writePly((std::filesystem::path(folder_) / "local_mesh.ply").string(), toTriangleMesh(mesh));
 }
 
-void RunRecorder::onMap(MapStage& map) {
-  MapMeshBuilder builder;
-  map.visitSurface(builder);
-  const MapMesh mesh = builder.mesh();
-  const std::filesystem::path path(folder_);
-  writeMapPly((path / "map.ply").string(), mesh);
-  writeMapGlb((path / "map.glb").string(), mesh);
-  map_ = toJson(map);
-  map_["mesh"] = {{"vertices", mesh.vertices.size()}, {"faces", mesh.faces.size()}};
+void RunRecorder::onMap(MapStage& map, std::span<const std::uint32_t> tied) {
+  map_ = writeMap(folder_, map, spilled_, tied);
 }
 
 void RunRecorder::onFinish(const OdometryOutput& output) {

@@ -10,6 +10,7 @@
 #include "firmware_host/pipeline/run_listener.hpp"
 #include "firmware_host/report/line_file.hpp"
 #include "firmware_host/report/mesh_files.hpp"
+#include "firmware_host/report/spilled_surface.hpp"
 
 namespace swiftlet {
 
@@ -23,9 +24,11 @@ class RunRecorder : public RunListener {
   void onMesh(bool keyframe, const LocalMesh& frame, const LocalMesh* horizon,
               std::span<const Eigen::Vector2f> hull) override;
   void onLocalMesh(const LocalMesh& mesh) override;
-  void onMap(MapStage& map) override;
+  void onMap(MapStage& map, std::span<const std::uint32_t> tied) override;
   void onFinish(const OdometryOutput& output) override;
   void onRemark(Stamp stamp, const std::string& text) override;
+  /// For the wiring: where surface goes that the map has no room for.
+  [[nodiscard]] SpilledSurface& spilled() { return spilled_; }
   /// Of the map and its surface; null without one.
   [[nodiscard]] const nlohmann::ordered_json& map() const { return map_; }
 
@@ -39,6 +42,7 @@ class RunRecorder : public RunListener {
   std::optional<LineFile> states_;
   std::optional<LineFile> events_;
   std::optional<MeshSequenceWriter> meshes_;
+  SpilledSurface spilled_;
   nlohmann::ordered_json map_;
 };
 

@@ -25,6 +25,9 @@ struct LoopCandidate {
 /// Candidates looked at in one step, at most.
 inline constexpr std::size_t kMaxLoopCandidates = 4;
 
+/// Earlier epochs that one is told to be tied to, at most.
+inline constexpr std::size_t kTiedEpochs = 16;
+
 /// How the newest epoch's world lies in the map.
 struct MapCorrection {
   std::uint32_t epoch = 0;

@@ -213,6 +213,24 @@ LoopCounters LoopStage::counters() const {
   return out;
 }
 
+void LoopStage::tiedEpochs(std::uint32_t epoch, FixedVector<std::uint32_t, kTiedEpochs>& out) const {
+  out.clear();
+  const auto isTied = [&](std::uint32_t e) {
+    return e == epoch || std::find(out.begin(), out.end(), e) != out.end();
+  };
+  // A pass may reach one epoch from another that it has just added.
+  for (std::size_t before = 0, pass = 0; pass == 0 || out.size() > before; ++pass) {
+    before = out.size();
+    for (std::uint32_t i = 0; i < map_.loops(); ++i) {
+      if (map_.verdict(i) != LoopVerdict::kSelected) continue;
+      const RelativePose<SE3>& edge = map_.loopEdge(i);
+      const std::uint32_t a = map_.node(edge.from).epoch, b = map_.node(edge.to).epoch;
+      if (isTied(a) != isTied(b)) static_cast<void>(out.tryPushBack(isTied(a) ? b : a));
+    }
+  }
+  std::sort(out.begin(), out.end());
+}
+
 MapLoop LoopStage::loop(std::uint32_t i) const {
   const RelativePose<SE3>& edge = map_.loopEdge(i);
   const Matrix6d covariance = edge.information.ldlt().solve(Matrix6d::Identity());

@@ -76,6 +76,8 @@ class LoopStage {
   [[nodiscard]] LoopCounters counters() const;
   [[nodiscard]] std::size_t nodeCount() const { return map_.size(); }
   [[nodiscard]] MapNode node(std::size_t i) const;
+  /// The epochs before `epoch` whose worlds loops hold in the same map, ascending.
+  void tiedEpochs(std::uint32_t epoch, FixedVector<std::uint32_t, kTiedEpochs>& out) const;
   [[nodiscard]] std::uint32_t loopCount() const { return map_.loops(); }
   [[nodiscard]] MapLoop loop(std::uint32_t i) const;
   /// For full smoothing. False where loop i is not selected, or the keyframes that saw it are not in the map

@@ -7,7 +7,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr int kStride = 2;
+constexpr int kStride = 3;
 constexpr std::size_t kBytesPerPixel = 5;
 constexpr float kDepthSteps = 65535;
 /// What lies beyond the range still says what is free: it is kept as a depth of this many ranges.
@@ -36,11 +36,13 @@ double viewDistance(const KeptFrame& a, const KeptFrame& b) {
 }  // namespace
 
 KeptDepths::KeptDepths(std::size_t bytes, std::size_t pixels, double most_range)
-    // Odd widths and heights keep a little more than a quarter.
+    // Widths and heights that are no multiples keep a little more than their share.
     : most_range_(most_range), pixels_(pixels / (kStride * kStride) + pixels / 64 + 1) {
   const std::size_t frames = bytes / (kBytesPerPixel * pixels_ + sizeof(KeptFrame));
   if (frames < 2) return;
   frames_.reserve(frames);
+  neighbour_.reserve(frames);
+  to_newest_.resize(frames);
   depth_.resize(frames * pixels_);
   sigma_.resize(frames * pixels_);
   grey_.resize(frames * pixels_);
@@ -51,40 +53,53 @@ KeptDepths::KeptDepths(std::size_t bytes, std::size_t pixels, double most_range)
 }
 
 std::size_t KeptDepths::bytes() const {
-  return sizeof(*this) + frames_.capacity() * sizeof(KeptFrame) + depth_.size() * kBytesPerPixel +
-         contents_.size() + pixels_ * 2 * sizeof(float);
+  return sizeof(*this) + frames_.capacity() * (sizeof(KeptFrame) + sizeof(Neighbour) + sizeof(double)) +
+         depth_.size() * kBytesPerPixel + contents_.size() + pixels_ * 2 * sizeof(float);
 }
 
-std::size_t KeptDepths::mostAlike(const KeptFrame& newest) const {
-  std::size_t chosen = 0;
+/// The place for a new frame, and what it changes in who is most like whom.
+std::size_t KeptDepths::place(const KeptFrame& newest) {
+  std::size_t at = frames_.size();
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < frames_.size(); ++i) {
-    double nearest = viewDistance(frames_[i], newest);
-    for (std::size_t k = 0; k < frames_.size(); ++k) {
-      if (k != i) nearest = std::min(nearest, viewDistance(frames_[i], frames_[k]));
-    }
-    const bool older = nearest == least && frames_[i].frame < frames_[chosen].frame;
-    if (nearest < least || older) {
-      least = nearest;
-      chosen = i;
+    to_newest_[i] = viewDistance(frames_[i], newest);
+    if (frames_.size() < frames_.capacity()) continue;
+    const double alike = std::min(neighbour_[i].distance, to_newest_[i]);
+    if (alike < least || (alike == least && frames_[i].frame < frames_[at].frame)) {
+      least = alike;
+      at = i;
     }
   }
-  return chosen;
+  if (at == frames_.size()) {
+    frames_.emplace_back();
+    neighbour_.emplace_back();
+  } else {
+    ++given_up_;
+  }
+  frames_[at] = newest;
+  neighbour_[at] = {};
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    if (i == at) continue;
+    if (to_newest_[i] < neighbour_[at].distance) neighbour_[at] = {to_newest_[i], i};
+    if (neighbour_[i].at == at) {
+      neighbour_[i] = {};
+      for (std::size_t k = 0; k < frames_.size(); ++k) {
+        const double distance = k == i ? neighbour_[i].distance : viewDistance(frames_[i], frames_[k]);
+        if (distance < neighbour_[i].distance) neighbour_[i] = {distance, k};
+      }
+    } else if (to_newest_[i] < neighbour_[i].distance) {
+      neighbour_[i] = {to_newest_[i], at};
+    }
+  }
+  return at;
 }
 
 std::size_t KeptDepths::keep(const DepthImageView& image, const KeptFrame& about) {
   const int width = keptOf(image.camera.width), height = keptOf(image.camera.height);
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   if (frames_.capacity() == 0 || pixels > pixels_) return kNone;
-  std::size_t at = frames_.size();
-  if (at == frames_.capacity()) {
-    at = mostAlike(about);
-    ++given_up_;
-  } else {
-    frames_.emplace_back();
-  }
+  const std::size_t at = place(about);
   KeptFrame& frame = frames_[at];
-  frame = about;
   frame.T_body_camera = image.T_body_camera;
   frame.camera = image.camera;
   // Of a kept pixel's centre, which is the centre of the pixel that it was.
@@ -100,7 +115,6 @@ std::size_t KeptDepths::keep(const DepthImageView& image, const KeptFrame& about
   const auto steps = static_cast<float>(kDepthSteps / (kBeyond * most_range_));
   double sum = 0;
   std::size_t measured = 0, to = at * pixels_;
-  frame.deepest = 0;
   for (int v = 0; v < image.camera.height; v += kStride) {
     const std::size_t row = static_cast<std::size_t>(v) * static_cast<std::size_t>(image.camera.width);
     for (int u = 0; u < image.camera.width; u += kStride, ++to) {
@@ -113,13 +127,28 @@ std::size_t KeptDepths::keep(const DepthImageView& image, const KeptFrame& about
       grey_[to] = image.intensity != nullptr ? image.intensity[from] : 0;
       labels_[to] = image.labels != nullptr ? image.labels[from] : 0;
       if (!valid) continue;
-      frame.deepest = std::max(frame.deepest, std::min(depth, static_cast<float>(most_range_)));
       sum += static_cast<double>(depth);
       ++measured;
     }
   }
   frame.mean_depth = measured > 0 ? static_cast<float>(sum / static_cast<double>(measured)) : 0;
   return at;
+}
+
+void KeptDepths::deepestOf(std::size_t i, DepthTiles& out) const {
+  const KeptFrame& frame = frames_[i];
+  const auto metres = static_cast<float>(kBeyond * most_range_ / kDepthSteps);
+  out.columns = (frame.camera.width + DepthTiles::kSide - 1) / DepthTiles::kSide;
+  out.rows = (frame.camera.height + DepthTiles::kSide - 1) / DepthTiles::kSide;
+  out.deepest.assign(static_cast<std::size_t>(out.columns * out.rows), 0.0F);
+  std::size_t from = i * pixels_;
+  for (int v = 0; v < frame.camera.height; ++v) {
+    float* const row = out.deepest.data() + (v / DepthTiles::kSide) * out.columns;
+    for (int u = 0; u < frame.camera.width; ++u, ++from) {
+      float& deepest = row[u / DepthTiles::kSide];
+      deepest = std::max(deepest, metres * static_cast<float>(depth_[from]));
+    }
+  }
 }
 
 DepthImageView KeptDepths::read(std::size_t i) {

@@ -78,6 +78,7 @@ MapStage::MapStage(const Rig& rig, const MapSettings& settings, const DepthImage
       sensor_(depth_sensor == nullptr ? nullptr : std::make_unique<Sensor>(*depth_sensor, rig, settings)),
       pair_(rig.camera_count < 2 ? nullptr : std::make_unique<Pair>(rig, settings)),
       integrator_(volume_, mostPixels(rig, depth_sensor)),
+      spill_(spill),
       store_(static_cast<std::size_t>(settings.surface_mib) << 20U, volume_.blockSize(), spill),
       surface_(volume_, confusion_, store_),
       correction_(volume_, integrator_, store_, static_cast<std::size_t>(settings.keyframes_mib) << 20U,
@@ -148,8 +149,9 @@ Status MapStage::integrate(const MapInput& input, const VolumeEffort& effort, Ma
 }
 
 void MapStage::beginEpoch(std::uint32_t epoch) {
-  // The store keeps what is drawn: the rest of the old world first.
   drawRest();
+  store_.leaveAll();
+  if (spill_ != nullptr) spill_->beginSubmap(epoch);
   volume_.clear();
   surface_.drawAll();
   integrator_.restart();
@@ -168,6 +170,7 @@ void MapStage::resume(std::uint32_t epoch, const Eigen::Vector3d& p_map_vehicle)
   integrator_.restart();
   correction_.restart();
   epoch_ = epoch;
+  if (spill_ != nullptr) spill_->beginSubmap(epoch);
   vehicle_ = p_map_vehicle;
 }
 

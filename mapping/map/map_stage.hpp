@@ -6,11 +6,11 @@
 // are brought from camera 0 to the depth's pixels. Then the volume takes the depth, the surface follows the
 // blocks that changed, the distance field follows the volume. `MapEffort` bounds each. Where poses turn out
 // otherwise later, refine() and correct() say so, and stepCorrection() puts the volume right bit by bit. A
-// new epoch has a world of its own: the surface so far stays in the store, the volume begins anew. Errors:
-// kInvalidInput, counted, where nothing could be taken: no depth and no pair of images, a wrong size, a pose
-// that is not finite or jumped (VolumeIntegrator). kCapacityReached: taken, in part. Frames: map (or world,
-// of whoever gives the poses), body, metres. Memory: all reserved by the constructor (bytes() says how much);
-// nothing is allocated later. No clock, no randomness: same input, same bytes.
+// new epoch has a world of its own, a submap: the surface so far goes to `spill`, all else begins anew.
+// Errors: kInvalidInput, counted, where nothing could be taken: no depth and no pair of images, a wrong size,
+// a pose that is not finite or jumped (VolumeIntegrator). kCapacityReached: taken, in part. Frames: map (or
+// world, of whoever gives the poses), body, metres. Memory: all reserved by the constructor (bytes() says how
+// much); nothing is allocated later. No clock, no randomness: same input, same bytes.
 
 #include <array>
 #include <memory>
@@ -152,6 +152,7 @@ class MapStage {
   std::unique_ptr<Pair> pair_;
   const DepthBuffer* measured_ = nullptr;  ///< of the sensor or the pair
   VolumeIntegrator integrator_;
+  SurfaceSink* spill_;
   SurfaceStore store_;
   SurfaceStage surface_;
   VolumeCorrection correction_;

@@ -9,8 +9,8 @@ namespace {
 
 /// What moves less than this part of a voxel is not worth fusing again.
 constexpr double kTolerance = 0.5;
-/// How much wider than the image a view is taken to be: blocks are judged by their centres.
-constexpr double kViewMargin = 1.1;
+/// A block nearer than this [m] to the camera's plane is not projected.
+constexpr double kNearestBlock = 0.1;
 
 }  // namespace
 
@@ -21,13 +21,15 @@ VolumeCorrection::VolumeCorrection(VoxelVolume& volume, VolumeIntegrator& integr
       store_(store),
       kept_(bytes, most_pixels, volume.settings().most_range) {
   if (kept_.capacity() == 0) return;
+  // At most as many as there are pixels.
+  tiles_.deepest.reserve(kept_.mostPixels());
   leaving_.reserve(volume.slots());
   dropped_.reserve(volume.slots());
 }
 
 std::size_t VolumeCorrection::bytes() const {
   return kept_.bytes() + leaving_.capacity() * sizeof(std::uint32_t) +
-         dropped_.capacity() * sizeof(BlockIndex);
+         dropped_.capacity() * sizeof(BlockIndex) + tiles_.deepest.capacity() * sizeof(float);
 }
 
 void VolumeCorrection::keep(const DepthImageView& image, std::uint64_t frame, const SE3& T_map_world,
@@ -95,18 +97,33 @@ bool VolumeCorrection::isOutOfPlace(const KeptFrame& frame) const {
   return shift > kTolerance * volume_.settings().voxel_size;
 }
 
-bool VolumeCorrection::sees(const KeptFrame& frame, const SE3& T_camera_map, const BlockIndex& block) const {
+bool VolumeCorrection::sees(const PinholeIntrinsics& camera, const SE3& T_camera_map,
+                            const BlockIndex& block) const {
   const Eigen::Vector3d p = T_camera_map * volume_.centreOf(block).cast<double>();
   const double radius = 0.5 * std::sqrt(3.0) * static_cast<double>(volume_.blockSize());
-  const double most = static_cast<double>(frame.deepest) + volume_.settings().truncation + radius;
-  if (p.z() < -radius || p.z() > most) return false;
-  const PinholeIntrinsics& c = frame.camera;
-  const double wide = kViewMargin * std::max(c.cx, c.width - c.cx) / c.fx;
-  const double high = kViewMargin * std::max(c.cy, c.height - c.cy) / c.fy;
-  const double z = std::max(p.z(), 0.0);
-  // A plane of the pyramid of view stands askew: as far from it as the radius is farther along an axis.
-  return std::abs(p.x()) < wide * z + radius * std::sqrt(1 + wide * wide) &&
-         std::abs(p.y()) < high * z + radius * std::sqrt(1 + high * high);
+  if (p.z() < -radius || p.z() > volume_.settings().most_range + volume_.settings().truncation + radius) {
+    return false;
+  }
+  // Around the projected ball; beside the camera that is a half space.
+  const double z = p.z() - radius;
+  double left = 0, top = 0, right = camera.width - 1, bottom = camera.height - 1;
+  if (z > kNearestBlock) {
+    left = std::max(left, camera.cx + camera.fx * std::min((p.x() - radius) / z, (p.x() - radius) / p.z()));
+    right = std::min(right, camera.cx + camera.fx * std::max((p.x() + radius) / z, (p.x() + radius) / p.z()));
+    top = std::max(top, camera.cy + camera.fy * std::min((p.y() - radius) / z, (p.y() - radius) / p.z()));
+    bottom =
+        std::min(bottom, camera.cy + camera.fy * std::max((p.y() + radius) / z, (p.y() + radius) / p.z()));
+  }
+  if (left > right || top > bottom) return false;
+  const auto tile = [](double pixel) { return static_cast<int>(pixel) / DepthTiles::kSide; };
+  const auto nearest = static_cast<float>(z - volume_.settings().truncation);
+  for (int row = tile(top); row <= tile(bottom); ++row) {
+    for (int column = tile(left); column <= tile(right); ++column) {
+      const float deepest = tiles_.deepest[static_cast<std::size_t>(row * tiles_.columns + column)];
+      if (deepest > 0 && deepest >= nearest) return true;
+    }
+  }
+  return false;
 }
 
 void VolumeCorrection::begin() {
@@ -114,10 +131,11 @@ void VolumeCorrection::begin() {
   dropSeen();
   for (std::size_t i = 0; i < kept_.size(); ++i) {
     KeptFrame& frame = kept_.frame(i);
+    if (frame.pending || dropped_.empty()) continue;
+    kept_.deepestOf(i, tiles_);
     const SE3 T_camera_map = (frame.T_map_body() * frame.T_body_camera).inverse();
-    for (std::size_t k = 0; k < dropped_.size() && !frame.pending; ++k) {
-      frame.pending = sees(frame, T_camera_map, dropped_[k]);
-    }
+    frame.pending = std::ranges::any_of(
+        dropped_, [&](const BlockIndex& block) { return sees(frame.camera, T_camera_map, block); });
   }
   countWaiting();
 }
@@ -133,9 +151,10 @@ void VolumeCorrection::dropSeen() {
     KeptFrame& frame = kept_.frame(i);
     if (!isOutOfPlace(frame)) continue;
     ++counters_.images_moved;
+    kept_.deepestOf(i, tiles_);
     const SE3 T_camera_map = (frame.T_map_fused * frame.T_body_camera).inverse();
     seen = std::partition(leaving_.begin(), seen, [&](std::uint32_t slot) {
-      return !sees(frame, T_camera_map, volume_.header(slot).index);
+      return !sees(frame.camera, T_camera_map, volume_.header(slot).index);
     });
     frame.fused = false;
     frame.since = 0;
@@ -177,7 +196,7 @@ void VolumeCorrection::step(const Eigen::Vector3f& vehicle, const CorrectionEffo
     KeptFrame& frame = kept_.frame(i);
     VolumeStep fused;
     // The poses were finite when the image was fused first; corrections are.
-    static_cast<void>(integrator_.again(kept_.read(i), frame.T_map_body(), frame.since, {}, fused));
+    static_cast<void>(integrator_.again(kept_.read(i), frame.T_map_body(), frame.since, vehicle, {}, fused));
     frame.pending = false;
     frame.fused = true;
     frame.T_map_fused = frame.T_map_body();

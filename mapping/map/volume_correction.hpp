@@ -9,8 +9,8 @@
 // back as far as kept images saw it.
 //
 // Frames: world (the odometry's), map, body; metres. Memory: KeptDepths and 12 bytes a block, reserved at
-// construction. Cost: beginning, blocks times kept images (10 ms for 10 000 and 70); a step, that of its
-// images (VolumeIntegrator). No clock; deterministic. Source of the idea: re-integration of Dai et al.
+// construction. Cost: beginning, blocks times kept images (some 0.1 s for 10 000 and 300); a step, that of
+// its images (VolumeIntegrator). No clock; deterministic. Source of the idea: re-integration of Dai et al.
 // (BundleFusion, 2017), here block by block without subtracting, which needs no exact inverse of carving and
 // capped weights.
 
@@ -80,7 +80,9 @@ class VolumeCorrection {
 
  private:
   [[nodiscard]] bool isOutOfPlace(const KeptFrame& frame) const;
-  [[nodiscard]] bool sees(const KeptFrame& frame, const SE3& T_camera_map, const BlockIndex& block) const;
+  /// Whether a camera whose depths are in `tiles_` measured anything in the block, or through it.
+  [[nodiscard]] bool sees(const PinholeIntrinsics& camera, const SE3& T_camera_map,
+                          const BlockIndex& block) const;
   void begin();
   void dropSeen();
   void countWaiting();
@@ -93,6 +95,7 @@ class VolumeCorrection {
   std::uint32_t waiting_ = 0;
   std::vector<std::uint32_t> leaving_;  ///< scratch: slots
   std::vector<BlockIndex> dropped_;     ///< scratch
+  DepthTiles tiles_;                    ///< scratch, of one image
   SurfacePatch empty_;
   CorrectionCounters counters_;
 };

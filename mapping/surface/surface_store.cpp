@@ -76,6 +76,19 @@ void SurfaceStore::remove(std::uint32_t at) {
   unused_entries_.push_back(at);
 }
 
+void SurfaceStore::leaveAll() {
+  std::size_t count = 0;
+  for (std::uint32_t i = 0; i < entries_.size(); ++i) {
+    if (entries_[i].triangles > 0) far_[count++] = {0, keyOf(entries_[i].block), i};
+  }
+  std::sort(far_.begin(), far_.begin() + static_cast<std::ptrdiff_t>(count));
+  for (std::size_t i = 0; i < count; ++i) {
+    (void)read(far_[i].entry, leaving_);
+    leave(leaving_);
+  }
+  clear();
+}
+
 void SurfaceStore::leave(const SurfacePatch& patch) {
   if (sink_ != nullptr) {
     sink_->take(patch);

@@ -25,6 +25,8 @@ class SurfaceSink {
  public:
   virtual ~SurfaceSink() = default;
   virtual void take(const SurfacePatch& patch) = 0;
+  /// What comes from now on is of another world.
+  virtual void beginSubmap(std::uint32_t /*epoch*/) {}
 };
 
 struct SurfaceStoreCounters {
@@ -43,6 +45,8 @@ class SurfaceStore {
   /// An empty patch takes the block's out.
   void put(const SurfacePatch& patch, const Eigen::Vector3f& vehicle);
   void clear();
+  /// All patches go to the sink (or are lost, counted), ordered by block.
+  void leaveAll();
 
   /// For readers: entries 0 to entries() - 1, some unused; an order that only the history decides.
   [[nodiscard]] std::uint32_t entries() const { return static_cast<std::uint32_t>(entries_.size()); }

@@ -74,29 +74,34 @@ Status VolumeIntegrator::step(const DepthImageView& image, const SE3& T_world_bo
   out = {};
   since_ = 0;
   Status status = checkPose(image, T_world_body);
-  if (status.ok()) status = fuse(image, T_world_body, effort, out);
+  if (status.ok()) {
+    const SE3 T_world_camera = T_world_body * image.T_body_camera;
+    vehicle_ = T_world_camera.translation.cast<float>();
+    status = fuse(image, T_world_camera, effort, out);
+  }
   ++(status.code == StatusCode::kInvalidInput ? counters_.refused : counters_.images);
   return status;
 }
 
 Status VolumeIntegrator::again(const DepthImageView& image, const SE3& T_world_body, std::uint32_t since,
-                               const VolumeEffort& effort, VolumeStep& out) {
+                               const Eigen::Vector3f& vehicle, const VolumeEffort& effort, VolumeStep& out) {
   out = {};
   since_ = since;
   if (!finite(T_world_body) || !finite(image.T_body_camera)) {
     return {StatusCode::kInvalidInput, "depth image: the pose is not finite"};
   }
-  const Status status = fuse(image, T_world_body, effort, out);
+  vehicle_ = vehicle;
+  const Status status = fuse(image, T_world_body * image.T_body_camera, effort, out);
   if (status.code != StatusCode::kInvalidInput) ++counters_.again;
   return status;
 }
 
-Status VolumeIntegrator::fuse(const DepthImageView& image, const SE3& T_world_body,
+Status VolumeIntegrator::fuse(const DepthImageView& image, const SE3& T_world_camera,
                               const VolumeEffort& effort, VolumeStep& out) {
   if (const Status status = image_.prepare(image, volume_.settings(), counters_.pixels); !status.ok()) {
     return status;
   }
-  begin(T_world_body * image.T_body_camera);
+  begin(T_world_camera);
   listBand(effort.blocks, out);
   for (const BlockIndex& block : band_) {
     if (holdsImage(volume_.find(block))) continue;
@@ -118,7 +123,6 @@ void VolumeIntegrator::begin(const SE3& T_world_camera) {
   const double block = volume_.settings().voxel_size * kBlockSide;
   T_world_camera_ = T_world_camera;
   T_camera_world_ = T_world_camera.inverse();
-  vehicle_ = T_world_camera.translation.cast<float>();
   const Eigen::Vector3d at = T_world_camera.translation / block;
   const Eigen::Vector3d whole = at.array().floor();
   centre_ = {static_cast<std::int32_t>(whole.x()), static_cast<std::int32_t>(whole.y()),

@@ -67,9 +67,10 @@ class VolumeIntegrator {
   [[nodiscard]] Status step(const DepthImageView& image, const SE3& T_world_body, const VolumeEffort& effort,
                             VolumeStep& out);
   /// Fuses an image once more, into the blocks that became known after revision `since` of the volume: those
-  /// before hold it already. 0: into all. Its stamp and pose are not compared with the last.
+  /// before hold it already. 0: into all. Its stamp and pose are not compared with the last. `vehicle`: what
+  /// is far from there goes first when the volume is full; otherwise that is the camera.
   [[nodiscard]] Status again(const DepthImageView& image, const SE3& T_world_body, std::uint32_t since,
-                             const VolumeEffort& effort, VolumeStep& out);
+                             const Eigen::Vector3f& vehicle, const VolumeEffort& effort, VolumeStep& out);
   /// Forgets the last pose and stamp: for a new epoch, or a map that was moved.
   void restart() { last_.reset(); }
 
@@ -83,7 +84,7 @@ class VolumeIntegrator {
     SE3 T_world_body;
   };
 
-  Status fuse(const DepthImageView& image, const SE3& T_world_body, const VolumeEffort& effort,
+  Status fuse(const DepthImageView& image, const SE3& T_world_camera, const VolumeEffort& effort,
               VolumeStep& out);
   [[nodiscard]] bool holdsImage(std::uint32_t slot) const {
     return slot != VoxelVolume::kNone && volume_.header(slot).born <= since_;

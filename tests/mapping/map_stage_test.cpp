@@ -142,9 +142,17 @@ TEST_CASE("what does not fit is refused or left out, and counted") {
   CHECK(map.counters().taken == 1);
 }
 
-TEST_CASE("a new epoch begins a new volume and keeps the surface of the old") {
+TEST_CASE("a new epoch is a submap of its own; the surface of the old goes to who keeps it") {
+  struct Kept : Count {
+    void take(const SurfacePatch& patch) override {
+      CHECK(submap == 0);
+      Count::take(patch);
+    }
+    void beginSubmap(std::uint32_t epoch) override { submap = epoch; }
+    std::uint32_t submap = 0;
+  } kept;
   Wall wall;
-  MapStage map(wall.rig, smallSettings(), &wall.sensor);
+  MapStage map(wall.rig, smallSettings(), &wall.sensor, &kept);
   MapReport report;
   REQUIRE(map.step(wall.at(0), {}, report).ok());
   const std::size_t before = countOf(map).triangles;
@@ -153,7 +161,10 @@ TEST_CASE("a new epoch begins a new volume and keeps the surface of the old") {
   next.T_map_body.translation.x() = -20;
   REQUIRE(map.step(next, {}, report).ok());
   CHECK(map.counters().epochs == 1);
-  CHECK(countOf(map).triangles > before + before / 2);
+  CHECK(kept.triangles == before);
+  CHECK(kept.submap == 1);
+  CHECK(map.surface().counters().lost == 0);
+  CHECK(countOf(map).triangles > before / 2);
   DistanceSample sample;
   CHECK_FALSE(map.distance().query({1.0, 0, 0}, sample));
 }
