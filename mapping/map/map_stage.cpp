@@ -162,7 +162,7 @@ void MapStage::beginEpoch(std::uint32_t epoch) {
 
 void MapStage::drawRest() {
   SurfaceStep last;
-  static_cast<void>(surface_.step(vehicle_.cast<float>(), {}, last));
+  static_cast<void>(surface_.step(vehicle_.cast<float>(), kAllSurface, last));
 }
 
 void MapStage::resume(std::uint32_t epoch, const Eigen::Vector3d& p_map_vehicle) {

@@ -3,21 +3,44 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 #include "mapping/surface/cube_cases.hpp"
+#include "mapping/volume/lanes.hpp"
 
 namespace swiftlet {
 namespace {
 
-/// Of a voxel that was not observed; no distance is as large.
-constexpr float kUnknown = 1e9F;
+/// In place of a block without voxels: seen free as a whole, or not at all.
+constexpr VoxelBlock evenBlock(std::uint16_t weight) {
+  VoxelBlock block{};
+  block.distance.fill(static_cast<std::int16_t>(kDistanceSteps));
+  block.weight.fill(weight);
+  return block;
+}
+constexpr VoxelBlock kFreeBlock = evenBlock(std::numeric_limits<std::uint16_t>::max());
+constexpr VoxelBlock kNowhereSeen = evenBlock(0);
+/// Of a difference [steps]: there is none as large.
+constexpr int kNoLimit = 1 << 17;
 /// A vertex keeps this share of an edge from its ends, so that no triangle has a corner twice.
 constexpr float kEdgeMargin = 1e-3F;
 
 constexpr std::size_t neighbourAt(int x, int y, int z) {
   return static_cast<std::size_t>((x + 1) + 3 * ((y + 1) + 3 * (z + 1)));
 }
-constexpr std::size_t kSelf = neighbourAt(0, 0, 0);
+
+/// Voxels of corners along an edge, and edges of one axis.
+constexpr std::size_t kSide = kBlockSide + 1, kEdges = kSide * kSide * kSide;
+/// From a cube's place to that of each of its edges.
+constexpr std::array<std::uint16_t, 12> kEdgePlace = [] {
+  std::array<std::uint16_t, 12> place{};
+  for (std::size_t e = 0; e < place.size(); ++e) {
+    const std::size_t from = kCubeEdges[e].from;
+    place[e] = static_cast<std::uint16_t>(kCubeEdges[e].axis * kEdges + (from & 1U) +
+                                          kSide * ((from >> 1U & 1U) + kSide * (from >> 2U)));
+  }
+  return place;
+}();
 
 std::uint16_t weightSteps(double weight) {
   return static_cast<std::uint16_t>(std::clamp(weight * kWeightSteps, 1.0, 65535.0));
@@ -36,8 +59,10 @@ BlockSurface::BlockSurface(const VoxelVolume& volume, const ConfusionModel& conf
       settings_(settings),
       least_weight_(weightSteps(settings.least_weight)),
       most_step_(settings.most_step > 0
-                     ? static_cast<float>(settings.most_step) * volume.voxelSize() / volume.distanceStep()
-                     : kUnknown) {}
+                     ? static_cast<int>(std::min(static_cast<float>(settings.most_step) * volume.voxelSize() /
+                                                     volume.distanceStep(),
+                                                 static_cast<float>(kNoLimit)))
+                     : kNoLimit) {}
 
 /// False where all that the block's cubes touch lies on one side.
 bool BlockSurface::gatherNeighbours(const BlockIndex& block) {
@@ -68,38 +93,52 @@ bool BlockSurface::gatherNeighbours(const BlockIndex& block) {
   return true;
 }
 
-void BlockSurface::fillPadded() {
-  // Of the padded range -1 to side + 1 along an axis: the part that each neighbour gives.
-  struct Part {
-    int first, last;
+/// The row of voxels at (y, z) from -1 to side + 1, out of the three blocks it passes.
+void BlockSurface::fillRow(int y, int z, const std::array<const VoxelBlock*, 3>& along) {
+  const std::size_t from = offsetOf({0, y, z});
+  const auto one = [&](const VoxelBlock* block, std::size_t at) {
+    return block->weight[at] >= least_weight_ ? block->distance[at] : kUnknown;
   };
-  constexpr std::array<Part, 3> kParts = {{{-1, -1}, {0, kBlockSide - 1}, {kBlockSide, kBlockSide + 1}}};
-  for (int nz = -1; nz <= 1; ++nz) {
-    for (int ny = -1; ny <= 1; ++ny) {
-      for (int nx = -1; nx <= 1; ++nx) {
-        const std::uint32_t slot = neighbour_[neighbourAt(nx, ny, nz)];
-        const VoxelBlock* const block = slot == VoxelVolume::kNone ? nullptr : volume_.voxels(slot);
-        const float otherwise = slot == VoxelVolume::kNone ? kUnknown : kDistanceSteps;
-        const Part px = kParts[static_cast<std::size_t>(nx + 1)],
-                   py = kParts[static_cast<std::size_t>(ny + 1)],
-                   pz = kParts[static_cast<std::size_t>(nz + 1)];
-        for (int z = pz.first; z <= pz.last; ++z) {
-          for (int y = py.first; y <= py.last; ++y) {
-            float* const to = &value_[padded(px.first, y, z)];
-            if (block == nullptr) {
-              std::fill_n(to, px.last - px.first + 1, otherwise);
-              continue;
-            }
-            const std::size_t from = offsetOf({px.first, y, z});
-            for (int x = 0; x <= px.last - px.first; ++x) {
-              const std::size_t at = from + static_cast<std::size_t>(x);
-              to[x] = block->weight[at] >= least_weight_ ? static_cast<float>(block->distance[at]) : kUnknown;
-            }
-          }
-        }
-      }
+  std::int16_t* const row = &value_[padded(0, y, z)];
+  row[-1] = one(along[0], from + kBlockMask);
+  lanes::Shorts distance;
+  lanes::UnsignedShorts weight;
+  lanes::load(distance, &along[1]->distance[from]);
+  lanes::load(weight, &along[1]->weight[from]);
+  const lanes::Shorts known = weight >= least_weight_;
+  const lanes::Shorts value = known ? distance : lanes::Shorts{} + kUnknown;
+  lanes::store(row, value);
+  row[kBlockSide] = one(along[2], from);
+  row[kBlockSide + 1] = one(along[2], from + 1);
+  if (y < 0 || z < 0 || y >= kCorners || z >= kCorners) return;
+  const std::int16_t last = row[kBlockSide];
+  behind_[static_cast<std::size_t>(z)][static_cast<std::size_t>(y)] =
+      lanes::bits(value < 0) | (last < 0 ? 1U << kBlockSide : 0U);
+  known_[static_cast<std::size_t>(z)][static_cast<std::size_t>(y)] =
+      lanes::bits(known) | (last != kUnknown ? 1U << kBlockSide : 0U);
+}
+
+void BlockSurface::fillPadded() {
+  std::array<const VoxelBlock*, 27> block;
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    const std::uint32_t slot = neighbour_[i];
+    const VoxelBlock* const voxels = slot == VoxelVolume::kNone ? nullptr : volume_.voxels(slot);
+    block[i] = voxels != nullptr ? voxels : slot == VoxelVolume::kNone ? &kNowhereSeen : &kFreeBlock;
+  }
+  for (int z = -1; z <= kBlockSide + 1; ++z) {
+    for (int y = -1; y <= kBlockSide + 1; ++y) {
+      const std::size_t first = neighbourAt(-1, y >> kBlockBits, z >> kBlockBits);
+      fillRow(y, z, {block[first], block[first + 1], block[first + 2]});
     }
   }
+}
+
+/// The cubes of a row that surface passes through, bit by bit.
+inline std::uint32_t BlockSurface::cubesIn(std::size_t y, std::size_t z) const {
+  const std::uint32_t any = behind_[z][y] | behind_[z][y + 1] | behind_[z + 1][y] | behind_[z + 1][y + 1];
+  const std::uint32_t all = behind_[z][y] & behind_[z][y + 1] & behind_[z + 1][y] & behind_[z + 1][y + 1];
+  const std::uint32_t seen = known_[z][y] & known_[z][y + 1] & known_[z + 1][y] & known_[z + 1][y + 1];
+  return (any | (any >> 1U)) & ~(all & (all >> 1U)) & seen & (seen >> 1U) & ((1U << kBlockSide) - 1U);
 }
 
 void BlockSurface::extract(std::uint32_t slot, SurfacePatch& patch) {
@@ -108,73 +147,54 @@ void BlockSurface::extract(std::uint32_t slot, SurfacePatch& patch) {
   patch.triangles.clear();
   if (volume_.header(slot).state != BlockState::kVoxels || !gatherNeighbours(patch.block)) return;
   fillPadded();
-  for (auto& edges : vertex_) edges.fill(kNoVertex);
-  // Of each row of corners: which lie behind, which are known.
-  std::array<std::array<std::uint32_t, kCorners>, kCorners> behind{}, known{};
-  for (int z = 0; z < kCorners; ++z) {
-    for (int y = 0; y < kCorners; ++y) {
-      const float* const row = &value_[padded(0, y, z)];
-      std::uint32_t b = 0, k = 0;
-      for (unsigned x = 0; x < kCorners; ++x) {
-        b |= (row[x] < 0 ? 1U : 0U) << x;
-        k |= (row[x] < kUnknown ? 1U : 0U) << x;
-      }
-      behind[static_cast<std::size_t>(z)][static_cast<std::size_t>(y)] = b;
-      known[static_cast<std::size_t>(z)][static_cast<std::size_t>(y)] = k;
-    }
-  }
+  vertex_.fill(kNoVertex);
   for (std::size_t z = 0; z < kBlockSide; ++z) {
     for (std::size_t y = 0; y < kBlockSide; ++y) {
-      const std::uint32_t any = behind[z][y] | behind[z][y + 1] | behind[z + 1][y] | behind[z + 1][y + 1];
-      const std::uint32_t all = behind[z][y] & behind[z][y + 1] & behind[z + 1][y] & behind[z + 1][y + 1];
-      const std::uint32_t seen = known[z][y] & known[z][y + 1] & known[z + 1][y] & known[z + 1][y + 1];
-      std::uint32_t cubes =
-          (any | (any >> 1U)) & ~(all & (all >> 1U)) & seen & (seen >> 1U) & ((1U << kBlockSide) - 1U);
-      while (cubes != 0) {
-        const int x = std::countr_zero(cubes);
-        cubes &= cubes - 1;
-        addCube(x, static_cast<int>(y), static_cast<int>(z), patch);
-      }
+      for (std::uint32_t left = cubesIn(y, z); left != 0; left &= left - 1)
+        addCube(std::countr_zero(left), static_cast<int>(y), static_cast<int>(z), patch);
     }
   }
 }
 
 void BlockSurface::addCube(int x, int y, int z, SurfacePatch& patch) {
-  unsigned which = 0;
-  std::array<float, 8> corner;
-  for (unsigned i = 0; i < 8; ++i) {
-    corner[i] = value_[padded(x + static_cast<int>(i & 1U), y + static_cast<int>(i >> 1U & 1U),
-                              z + static_cast<int>(i >> 2U))];
-    which |= (corner[i] < 0 ? 1U : 0U) << i;
-  }
+  const auto row = static_cast<std::size_t>(y), layer = static_cast<std::size_t>(z);
+  const auto two = [&](std::size_t dz, std::size_t dy) { return behind_[layer + dz][row + dy] >> x & 3U; };
+  const unsigned which = two(0, 0) | two(0, 1) << 2U | two(1, 0) << 4U | two(1, 1) << 6U;
+  if (most_step_ < kNoLimit && steps(x, y, z) > most_step_) return;
   const CubeCase& cube = kCubeCases[which];
-  std::array<std::uint16_t, 12> vertex;
-  vertex.fill(kNoVertex);
-  if (most_step_ < kUnknown) {
-    for (const CubeEdge& edge : kCubeEdges) {
-      if (std::abs(corner[edge.from] - corner[edge.to]) > most_step_) return;
-    }
-  }
-  for (std::size_t i = 0; i < std::size_t{3} * cube.triangles; ++i) {
-    const std::uint8_t e = cube.edge[i];
-    if (vertex[e] != kNoVertex) continue;
-    const unsigned from = kCubeEdges[e].from;
-    vertex[e] = vertexOn(kCubeEdges[e].axis, x + static_cast<int>(from & 1U),
-                         y + static_cast<int>(from >> 1U & 1U), z + static_cast<int>(from >> 2U), patch);
-  }
+  const std::size_t first = edgeAt(0, x, y, z);
   for (std::size_t i = 0; i < cube.triangles; ++i) {
-    const std::array<std::uint16_t, 3> corners = {vertex[cube.edge[3 * i]], vertex[cube.edge[3 * i + 1]],
-                                                  vertex[cube.edge[3 * i + 2]]};
+    SurfaceTriangle corners;
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      const std::uint8_t e = cube.edge[3 * i + k];
+      std::uint16_t& vertex = vertex_[first + kEdgePlace[e]];
+      if (vertex == kNoVertex) {
+        const unsigned from = kCubeEdges[e].from;
+        vertex = newVertex(kCubeEdges[e].axis, x + static_cast<int>(from & 1U),
+                           y + static_cast<int>(from >> 1U & 1U), z + static_cast<int>(from >> 2U), patch);
+      }
+      corners[k] = vertex;
+    }
     if (!patch.triangles.tryPushBack(corners)) return;
   }
 }
 
-std::uint16_t BlockSurface::vertexOn(int axis, int x, int y, int z, SurfacePatch& patch) {
-  std::uint16_t& known =
-      vertex_[static_cast<std::size_t>(axis)][static_cast<std::size_t>(x + kCorners * (y + kCorners * z))];
-  if (known != kNoVertex) return known;
+/// The largest difference along a cube's edges.
+int BlockSurface::steps(int x, int y, int z) const {
+  const auto corner = [&](unsigned i) {
+    return int{value_[padded(x + static_cast<int>(i & 1U), y + static_cast<int>(i >> 1U & 1U),
+                             z + static_cast<int>(i >> 2U))]};
+  };
+  int most = 0;
+  for (const CubeEdge& edge : kCubeEdges)
+    most = std::max(most, std::abs(corner(edge.from) - corner(edge.to)));
+  return most;
+}
+
+std::uint16_t BlockSurface::newVertex(int axis, int x, int y, int z, SurfacePatch& patch) const {
   const std::array<int, 3> to = {x + (axis == 0 ? 1 : 0), y + (axis == 1 ? 1 : 0), z + (axis == 2 ? 1 : 0)};
-  const float a = value_[padded(x, y, z)], b = value_[padded(to[0], to[1], to[2])];
+  const auto a = static_cast<float>(value_[padded(x, y, z)]),
+             b = static_cast<float>(value_[padded(to[0], to[1], to[2])]);
   const float share = std::clamp(a / (a - b), kEdgeMargin, 1 - kEdgeMargin);
   SurfaceVertex vertex;
   const std::array<int, 3> from = {x, y, z};
@@ -194,21 +214,20 @@ std::uint16_t BlockSurface::vertexOn(int axis, int x, int y, int z, SurfacePatch
   } else {
     attributes(to[0], to[1], to[2], vertex);
   }
-  known = static_cast<std::uint16_t>(patch.vertices.size());
   (void)patch.vertices.tryPushBack(vertex);
-  return known;
+  return static_cast<std::uint16_t>(patch.vertices.size() - 1);
 }
 
 Eigen::Vector3f BlockSurface::gradient(int x, int y, int z) const {
   const std::size_t at = padded(x, y, z);
-  constexpr std::array<std::size_t, 3> kStride = {1, kPad, static_cast<std::size_t>(kPad) * kPad};
+  constexpr std::array<std::size_t, 3> kStride = {1, kRow, static_cast<std::size_t>(kRow) * kPad};
   Eigen::Vector3f result;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const float here = value_[at];
-    const float before = value_[at - kStride[axis]], after = value_[at + kStride[axis]];
+    const int here = value_[at];
+    const int before = value_[at - kStride[axis]], after = value_[at + kStride[axis]];
     // One-sided where a side was not observed.
-    const bool has_before = before < kUnknown, has_after = after < kUnknown;
-    const float difference = (has_after ? after : here) - (has_before ? before : here);
+    const bool has_before = before != kUnknown, has_after = after != kUnknown;
+    const auto difference = static_cast<float>((has_after ? after : here) - (has_before ? before : here));
     result[static_cast<int>(axis)] = has_before && has_after ? 0.5F * difference : difference;
   }
   return result;

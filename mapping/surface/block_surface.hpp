@@ -35,16 +35,28 @@ class BlockSurface {
  private:
   static constexpr int kBefore = 1;                ///< voxels below the block
   static constexpr int kPad = kBlockSide + 3;      ///< one below, two above
+  static constexpr int kRow = 3 * kBlockSide;      ///< of them in memory, so that the block's own are aligned
   static constexpr int kCorners = kBlockSide + 1;  ///< along an edge
   static constexpr std::uint16_t kNoVertex = 0xFFFF;
+  /// Of a voxel that was not observed; no distance is as low.
+  static constexpr std::int16_t kUnknown = -32768;
+
+  /// Of each row of corners along x, bit by bit.
+  using Bits = std::array<std::array<std::uint32_t, kCorners>, kCorners>;
 
   [[nodiscard]] static std::size_t padded(int x, int y, int z) {
-    return static_cast<std::size_t>((x + kBefore) + kPad * ((y + kBefore) + kPad * (z + kBefore)));
+    return static_cast<std::size_t>((x + kBlockSide) + kRow * ((y + kBefore) + kPad * (z + kBefore)));
+  }
+  [[nodiscard]] static std::size_t edgeAt(int axis, int x, int y, int z) {
+    return static_cast<std::size_t>(x + kCorners * (y + kCorners * (z + kCorners * axis)));
   }
   bool gatherNeighbours(const BlockIndex& block);
   void fillPadded();
+  [[nodiscard]] std::uint32_t cubesIn(std::size_t y, std::size_t z) const;
+  void fillRow(int y, int z, const std::array<const VoxelBlock*, 3>& along);
   void addCube(int x, int y, int z, SurfacePatch& patch);
-  std::uint16_t vertexOn(int axis, int x, int y, int z, SurfacePatch& patch);
+  [[nodiscard]] int steps(int x, int y, int z) const;
+  std::uint16_t newVertex(int axis, int x, int y, int z, SurfacePatch& patch) const;
   [[nodiscard]] Eigen::Vector3f gradient(int x, int y, int z) const;
   void attributes(int x, int y, int z, SurfaceVertex& vertex) const;
 
@@ -52,12 +64,13 @@ class BlockSurface {
   const ConfusionModel& confusion_;
   SurfaceSettings settings_;
   std::uint16_t least_weight_;
-  float most_step_;  ///< in steps of a distance; above any difference when there is no limit
+  int most_step_;  ///< in steps of a distance; above any difference when there is no limit
   BlockIndex block_;
   std::array<std::uint32_t, 27> neighbour_{};
-  std::array<float, static_cast<std::size_t>(kPad) * kPad * kPad> value_{};  ///< [steps]; kUnknown
-  std::array<std::array<std::uint16_t, static_cast<std::size_t>(kCorners) * kCorners * kCorners>, 3>
-      vertex_{};
+  Bits behind_{};
+  Bits known_{};
+  alignas(16) std::array<std::int16_t, static_cast<std::size_t>(kRow) * kPad * kPad> value_{};  ///< [steps]
+  std::array<std::uint16_t, std::size_t{3} * kCorners * kCorners * kCorners> vertex_{};  ///< of each edge
 };
 
 }  // namespace swiftlet

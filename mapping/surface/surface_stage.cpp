@@ -11,17 +11,21 @@ SurfaceStage::SurfaceStage(VoxelVolume& volume, const ConfusionModel& confusion,
       surface_(volume, confusion, settings),
       seen_(volume.slots(), 0),
       is_old_(volume.slots(), 0) {
+  pass_.reserve(volume.slots());
   (void)volume.addListener(this);
 }
 
 std::size_t SurfaceStage::bytes() const {
-  return sizeof(*this) + seen_.size() * sizeof(std::uint32_t) + is_old_.size();
+  return sizeof(*this) + seen_.size() * sizeof(std::uint32_t) + is_old_.size() +
+         pass_.capacity() * sizeof(Waiting);
 }
 
 void SurfaceStage::drawAll() {
   std::fill(seen_.begin(), seen_.end(), 0);
   std::fill(is_old_.begin(), is_old_.end(), std::uint8_t{0});
   old_count_ = 0;
+  pass_.clear();
+  next_ = 0;
 }
 
 void SurfaceStage::takeAsDrawn() {
@@ -52,6 +56,17 @@ void SurfaceStage::findChanges() {
   }
 }
 
+void SurfaceStage::beginPass() {
+  pass_.clear();
+  next_ = 0;
+  for (std::uint32_t slot = 0; slot < volume_.slots(); ++slot) {
+    if (is_old_[slot] == 0) continue;
+    const float squared = (volume_.centreOf(volume_.header(slot).index) - vehicle_).squaredNorm();
+    pass_.push_back({squared, slot});
+  }
+  std::sort(pass_.begin(), pass_.end());
+}
+
 void SurfaceStage::draw(std::uint32_t slot) {
   old_count_ -= is_old_[slot];
   is_old_[slot] = 0;
@@ -64,10 +79,9 @@ Status SurfaceStage::step(const Eigen::Vector3f& vehicle, const SurfaceEffort& e
   out = {};
   vehicle_ = vehicle;
   findChanges();
-  const std::uint32_t slots = volume_.slots();
-  for (std::uint32_t i = 0; i < slots && old_count_ > 0 && out.drawn < effort.blocks; ++i) {
-    const std::uint32_t slot = next_;
-    next_ = next_ + 1 < slots ? next_ + 1 : 0;
+  while (old_count_ > 0 && out.drawn < effort.blocks) {
+    if (next_ == pass_.size()) beginPass();
+    const std::uint32_t slot = pass_[next_++].slot;
     if (is_old_[slot] == 0) continue;
     draw(slot);
     ++out.drawn;

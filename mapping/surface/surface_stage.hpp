@@ -2,11 +2,13 @@
 // The stage that keeps the surface up to date: marching cubes over changed blocks, into the store.
 //
 // A changed block touches the surface of its 26 neighbours too (cubes at the border, normals). `effort`
-// bounds the blocks of one step; the others wait their turn, in the order of slots from where the last step
-// ended. As the volume's listener it draws what is out of date before blocks are dropped, so that the store
-// has the newest surface of everything the volume ever held. Once a block is gone, a neighbour that changes
-// later is drawn without it: between the two a seam one voxel wide may open. A block that comes back replaces
-// its patch. Memory: fixed at construction, 5 bytes a slot and one patch. Cost: docs/volume.md.
+// bounds the blocks of one step; the others wait. They are drawn in passes: all that are out of date when a
+// pass begins, nearest to the vehicle first, over as many steps as it takes; what changes meanwhile is drawn
+// with the pass where its turn comes still, else in the next. So none waits longer than two passes. As the
+// volume's listener it draws what is out of date before blocks are dropped, so that the store has the newest
+// surface of everything the volume ever held. Once a block is gone, a neighbour that changes later is drawn
+// without it: between the two a seam one voxel wide may open. A block that comes back replaces its patch.
+// Memory: fixed at construction, 13 bytes a slot and one patch. Cost: docs/volume.md.
 
 #include <cstdint>
 #include <span>
@@ -19,7 +21,7 @@
 namespace swiftlet {
 
 struct SurfaceEffort {
-  std::uint32_t blocks = 1U << 20U;  ///< drawn in one step
+  std::uint32_t blocks = 300;  ///< drawn in one step; 6 to 10 us each
 
   bool operator==(const SurfaceEffort&) const = default;
 };
@@ -33,6 +35,9 @@ struct SurfaceCounters {
   std::uint64_t drawn = 0;
   std::uint64_t drawn_before_removal = 0;
 };
+
+/// For who wants the whole surface now.
+inline constexpr SurfaceEffort kAllSurface{1U << 20U};
 
 class SurfaceStage : public BlockListener {
  public:
@@ -54,7 +59,14 @@ class SurfaceStage : public BlockListener {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
+  struct Waiting {
+    float squared = 0;  ///< from the vehicle when the pass began
+    std::uint32_t slot = 0;
+    auto operator<=>(const Waiting&) const = default;
+  };
+
   void findChanges();
+  void beginPass();
   void draw(std::uint32_t slot);
 
   const VoxelVolume& volume_;
@@ -62,7 +74,8 @@ class SurfaceStage : public BlockListener {
   BlockSurface surface_;
   std::vector<std::uint32_t> seen_;  ///< of each slot, the revision that was looked at
   std::vector<std::uint8_t> is_old_;
-  std::uint32_t next_ = 0;
+  std::vector<Waiting> pass_;
+  std::size_t next_ = 0;  ///< of the pass
   std::uint32_t old_count_ = 0;
   Eigen::Vector3f vehicle_ = Eigen::Vector3f::Zero();
   SurfacePatch patch_;

@@ -44,6 +44,17 @@ inline bool any(const Ints& mask) {
   return (words[0] | words[1] | words[2] | words[3]) != 0;
 }
 
+/// Bit i of a comparison's lane i.
+inline std::uint32_t bits(const Shorts& mask) {
+  const Shorts own = mask & Shorts{1, 2, 4, 8, 16, 32, 64, 128};
+  std::array<std::uint64_t, 2> words;
+  std::memcpy(words.data(), &own, sizeof(own));
+  std::uint64_t all = words[0] | words[1];
+  all |= all >> 32U;
+  all |= all >> 16U;
+  return static_cast<std::uint32_t>(all & 0xFFU);
+}
+
 inline float largest(const Floats& v) {
   float most = v[0];
   for (std::size_t i = 1; i < kLanes; ++i) most = v[i] > most ? v[i] : most;

@@ -104,7 +104,7 @@ struct Mapped {
         stage(volume, confusion, store) {}
   void add(const SceneImage& image, const SE3& pose) {
     (void)integrator.step(image.view(), pose, {}, fused);
-    REQUIRE(stage.step(pose.translation.cast<float>(), {}, drawn).ok());
+    REQUIRE(stage.step(pose.translation.cast<float>(), kAllSurface, drawn).ok());
   }
   Joined all() {
     Joined joined;
@@ -285,6 +285,39 @@ TEST_CASE("few blocks a step end at the same surface") {
   }
   CHECK(steps > 3);
   CHECK(few.all().triangles.size() == all.all().triangles.size());
+}
+
+TEST_CASE("under a bound of work the nearest come first and none waits for ever") {
+  Mapped map;
+  constexpr int kSide = 4;
+  fill(map.volume, kSide,
+       [](const VoxelIndex& v) { return static_cast<std::int16_t>((v.x & 3) < 2 ? -900 : 900); });
+  const std::size_t blocks = map.volume.blockCount();
+  const Eigen::Vector3f vehicle(0.9F, 0.1F, -0.3F);
+  constexpr SurfaceEffort kFew{7};
+  std::map<BlockIndex, int> drawn_at;
+  const auto step = [&](int i) {
+    CHECK(map.stage.step(vehicle, kFew, map.drawn).code == StatusCode::kCapacityReached);
+    CHECK(map.drawn.drawn == kFew.blocks);
+    for (const auto& [block, patches] : map.all().patches) drawn_at.try_emplace(block, i);
+  };
+  const std::size_t pass = (blocks + kFew.blocks - 1) / kFew.blocks;
+  for (std::size_t i = 0; i < pass; ++i) {
+    step(static_cast<int>(i));
+    // Everything changes all the time.
+    map.volume.beginChange();
+    for (std::uint32_t slot = 0; slot < map.volume.slots(); ++slot) {
+      if (map.volume.voxels(slot) != nullptr) map.volume.markChanged(slot);
+    }
+  }
+  REQUIRE(drawn_at.size() == blocks);
+  for (const auto& [a, first] : drawn_at) {
+    for (const auto& [b, second] : drawn_at) {
+      if (first < second)
+        CHECK((map.volume.centreOf(a) - vehicle).norm() <= (map.volume.centreOf(b) - vehicle).norm() + 1e-5F);
+    }
+  }
+  CHECK(map.stage.step(vehicle, kAllSurface, map.drawn).ok());
 }
 
 TEST_CASE("evicted surface stays in the store") {

@@ -51,6 +51,8 @@ VolumeRun fuse(const DepthLog& log, const RunOptions& options) {
     run.drawn += drawn.drawn;
     run.most_blocks = std::max(run.most_blocks, volume.blockCount());
   }
+  SurfaceStep rest;
+  (void)stage->step(log.frames.back().T_world_body.translation.cast<float>(), kAllSurface, rest);
   const auto patch = std::make_unique<SurfacePatch>();
   store.visit(sink, *patch);
   run.mesh = sink.mesh();
