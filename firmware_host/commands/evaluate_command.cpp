@@ -11,6 +11,8 @@
 #include "firmware_host/commands/evaluate_meshes.hpp"
 #include "firmware_host/commands/evaluate_run.hpp"
 #include "firmware_host/report/accuracy_report.hpp"
+#include "firmware_host/report/confusion_picture.hpp"
+#include "firmware_host/report/line_file.hpp"
 #include "firmware_host/report/mesh_report.hpp"
 
 namespace swiftlet {
@@ -154,6 +156,11 @@ int evaluate(const EvaluateOptions& options) {
     const MeshAccuracy found = meshAccuracy(options, subject, truth, accuracy_options);
     json["mesh"] = toJson(found);
     if (!options.json) fmt::print("{}", toText(found));
+    if (found.map && found.map->labels.places() > 0) {
+      const std::string picture = std::filesystem::path(options.run) / "label_confusion.svg";
+      LineFile(picture).write(confusionSvg(found.map->labels, readLabelNames(subject.log)));
+      if (!options.json) fmt::print("  confusion of labels: {}\n", picture);
+    }
   }
   if (options.json) fmt::print("{}\n", json.dump(2));
   if (!compared) fmt::print(stderr, "error: no pose of the estimate has truth at its stamp\n");
@@ -179,7 +186,8 @@ void addEvaluateCommand(CLI::App& app, int& exit_code) {
       ->check(nonNegative());
   command->add_flag("--json", options->json, "Print JSON, and nothing else, on stdout");
   CLI::Option* mesh =
-      command->add_flag("--mesh", options->mesh, "Also judge the run's meshes by the true surface");
+      command->add_flag("--mesh", options->mesh,
+                        "Also judge the run's meshes by the true surface; draws label_confusion.svg there");
   command
       ->add_option("--truth-mesh", options->truth_mesh,
                    "True surface, a PLY file; default: truth/mesh.ply of the log")

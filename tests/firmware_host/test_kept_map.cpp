@@ -89,7 +89,7 @@ Place mapped(int views) {
     image.labels.assign(image.depth.size(), static_cast<std::uint8_t>(1 + i % 5));
     image.grey.assign(image.depth.size(), static_cast<std::uint8_t>(50 + i));
     (void)integrator.step(image.view(), pose, {}, fused);
-    REQUIRE(stage.step(pose.translation.cast<float>(), {}, drawn).ok());
+    REQUIRE(stage.step(pose.translation.cast<float>(), kAllSurface, drawn).ok());
     place.vehicle = pose.translation;
   }
   place.volume.beginChange();
@@ -168,7 +168,9 @@ struct Flight {
       input.depth.depth = image.depth.data();
       input.labels = {labels.data(), kSceneCamera.width, kSceneCamera.height, kSceneCamera.width};
       MapReport report;
-      REQUIRE(map->step(input, {}, report).ok());
+      MapEffort effort;
+      effort.surface = kAllSurface;
+      REQUIRE(map->step(input, effort, report).ok());
     }
   }
   [[nodiscard]] std::string kept() const {
