@@ -9,12 +9,18 @@ namespace {
 // Two voxels of surface on each side are known without the noise of one image deciding where it ends.
 constexpr double kTruncationVoxels = 3;
 constexpr double kBehindVoxels = 2;
+/// VolumeSettings::most_sigma in truncation distances.
+constexpr double kMostSigma = 2;
+/// A depth sensor's errors are those that it says: one measurement is a surface. Stereo repeats its
+/// mismatches from image to image; that takes more (SurfaceSettings::least_weight).
+constexpr double kLeastSensorWeight = 1.0 / kWeightSteps;
 
 VolumeSettings volumeSettings(const MapSettings& settings) {
   VolumeSettings volume;
   volume.voxel_size = settings.voxel_size;
   volume.truncation = kTruncationVoxels * settings.voxel_size;
   volume.behind = kBehindVoxels * settings.voxel_size;
+  volume.most_sigma = kMostSigma * volume.truncation;
   volume.memory_bytes = static_cast<std::size_t>(settings.volume_mib) << 20U;
   volume.labels = settings.labels;
   volume.most_range = settings.most_range;
@@ -32,6 +38,12 @@ SensorDepthSettings sensorSettings(const MapSettings& settings) {
   SensorDepthSettings sensor;
   sensor.max_depth = settings.most_range;
   return sensor;
+}
+
+SurfaceSettings surfaceSettings(bool has_sensor) {
+  SurfaceSettings surface;
+  if (has_sensor) surface.least_weight = kLeastSensorWeight;
+  return surface;
 }
 
 DistanceLimits distanceLimits(const MapSettings& settings) {
@@ -80,7 +92,7 @@ MapStage::MapStage(const Rig& rig, const MapSettings& settings, const DepthImage
       integrator_(volume_, mostPixels(rig, depth_sensor)),
       spill_(spill),
       store_(static_cast<std::size_t>(settings.surface_mib) << 20U, volume_.blockSize(), spill),
-      surface_(volume_, confusion_, store_),
+      surface_(volume_, confusion_, store_, surfaceSettings(depth_sensor != nullptr)),
       correction_(volume_, integrator_, store_, static_cast<std::size_t>(settings.keyframes_mib) << 20U,
                   mostPixels(rig, depth_sensor)),
       distance_(distanceLimits(settings)),

@@ -87,20 +87,22 @@ void PreparedImage::checkPixels(const DepthImageView& image, const VolumeSetting
   is_even_ = image.sigma == nullptr && settings.sigma_quadratic == 0;
   if (is_even_) {
     even_weight_ = weightOf(static_cast<float>(settings.sigma_constant));
-  } else if (image.sigma != nullptr) {
-    for (std::size_t i = 0; i < pixels; ++i) {
-      const float sigma = image.sigma[i];
-      const bool known = sigma > 0 && sigma < kFarAway;
-      weight_[i] = weightOf(known ? sigma : 1.0F);
-      // A deviation that is no number leaves the pixel without a measurement.
-      if (!known) depth_[i] = 0;
-    }
-  } else {
-    const auto constant = static_cast<float>(settings.sigma_constant);
-    const auto quadratic = static_cast<float>(settings.sigma_quadratic);
-    for (std::size_t i = 0; i < pixels; ++i) {
-      weight_[i] = weightOf(constant + quadratic * depth_[i] * depth_[i]);
-    }
+    return;
+  }
+  const auto constant = static_cast<float>(settings.sigma_constant);
+  const auto quadratic = static_cast<float>(settings.sigma_quadratic);
+  const auto most_sigma = static_cast<float>(settings.most_sigma);
+  for (std::size_t i = 0; i < pixels; ++i) {
+    const float sigma =
+        image.sigma != nullptr ? image.sigma[i] : constant + quadratic * depth_[i] * depth_[i];
+    const bool known = sigma > 0 && sigma < kFarAway;
+    weight_[i] = weightOf(known ? sigma : 1.0F);
+    // A deviation that is no number leaves the pixel without a measurement.
+    if (!known) depth_[i] = 0;
+    if (!known || sigma <= most_sigma || depth_[i] <= 0) continue;
+    const float free = depth_[i] - kSureSigmas * sigma;
+    depth_[i] = free > least ? -free : 0.0F;
+    ++counters.uncertain;
   }
   weight_[pixels] = 0;
 }

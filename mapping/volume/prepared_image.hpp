@@ -19,6 +19,7 @@ namespace swiftlet {
 struct PixelCounters {
   std::uint64_t unmeasured = 0;  ///< zero, negative, NaN, infinite, or nearer than the range
   std::uint64_t beyond_range = 0;
+  std::uint64_t uncertain = 0;  ///< deviation beyond most_sigma: free up to kSureSigmas before it
   std::uint64_t masked = 0;
   std::uint64_t bad_label = 0;  ///< out of range: taken as unknown
 };
@@ -28,6 +29,8 @@ class PreparedImage {
   /// Pixels along a tile's edge at the pyramid's finest level.
   static constexpr int kTile = 8;
   static constexpr int kMostLevels = 12;
+  /// Nothing nearer than this many deviations before an uncertain measurement.
+  static constexpr float kSureSigmas = 3;
   /// A surface seen at a more glancing angle than 84 degrees counts as seen at that.
   static constexpr float kLeastSlope = 0.1F;
   /// A tile in which fewer of the pixels are measured says nothing.

@@ -402,3 +402,23 @@ TEST_CASE("surer pixels count for more") {
   // Weights 1 and 1/4.
   CHECK(static_cast<double>(distance) == Approx(0.025 + 0.2 * 0.04).margin(0.004));
 }
+
+TEST_CASE("a measurement too uncertain for a surface still says what is free before it") {
+  const SE3 pose = lookAt({0, 0, 0}, {1, 0, 0});
+  for (const double sigma_of_all : {0.29, 0.31}) {
+    Fused fused;
+    const bool sure = sigma_of_all < fused.volume.settings().most_sigma;
+    const SceneImage image = render(pose, 1, kWall);
+    const std::vector<float> sigma(image.depth.size(), static_cast<float>(sigma_of_all));
+    DepthImageView view = image.view();
+    view.sigma = sigma.data();
+    REQUIRE(fused.integrator.step(view, pose, {}, fused.step).ok());
+    CHECK(fused.integrator.counters().pixels.uncertain == (sure ? 0 : image.depth.size()));
+    CHECK((fused.volume.blockCount() > 0) == sure);
+    float distance = 0;
+    REQUIRE(fused.volume.distanceAt(fused.volume.voxelAt({1.2, 0, 0}), distance));
+    CHECK(static_cast<double>(distance) == Approx(fused.volume.settings().truncation));
+    // Within three deviations of the wall at 3 m nothing is known.
+    CHECK(fused.volume.distanceAt(fused.volume.voxelAt({2.6, 0, 0}), distance) == sure);
+  }
+}
