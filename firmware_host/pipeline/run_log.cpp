@@ -34,10 +34,11 @@ void RunLog::onResult(const FrameResult& result) {
 
 void RunLog::onLoop(const LoopReport& report) {
   for (const LoopCandidate& candidate : report.candidates) {
-    const double ago = (report.stamp - candidate.old_stamp).seconds();
-    listener_.onRemark(report.stamp,
-                       fmt::format("place of {:.1f} s before: {}, {} matches, {} agree", ago,
-                                   describe(candidate.fate), candidate.matches, candidate.inliers));
+    const double ago = (candidate.new_stamp - candidate.old_stamp).seconds();
+    listener_.onRemark(
+        report.stamp,
+        fmt::format("{} of {:.1f} s before: {}, {} matches, {} agree", candidate.near ? "near node" : "place",
+                    ago, describe(candidate.fate), candidate.matches, candidate.inliers));
   }
   if (!report.moved) return;
   const Eigen::Vector3d& p = report.correction.T_map_world.translation;

@@ -137,13 +137,15 @@ Status LoopMap::add(const Node& node) {
   return status;
 }
 
-Status LoopMap::addLoop(std::uint32_t from, const SE3& T_from_newest, const PoseMatrix<SE3>& covariance,
-                        std::uint32_t& id) {
-  if (from + 1 >= nodes_.size()) return {StatusCode::kInvalidInput, "a loop must lead to an older node"};
+Status LoopMap::addLoop(std::uint32_t from, std::uint32_t to, const SE3& T_from_to,
+                        const PoseMatrix<SE3>& covariance, std::uint32_t& id) {
+  if (from >= to || to >= nodes_.size()) {
+    return {StatusCode::kInvalidInput, "a loop must lead to an older node"};
+  }
   RelativePose<SE3> edge;
   edge.from = from;
-  edge.to = static_cast<std::uint32_t>(nodes_.size() - 1);
-  edge.T_from_to = T_from_newest;
+  edge.to = to;
+  edge.T_from_to = T_from_to;
   edge.information = informationOf(covariance);
   Status status = selection_.addLoop(edge, kCliqueNodes, id);
   if (status.code == StatusCode::kCapacityReached) {
@@ -153,7 +155,7 @@ Status LoopMap::addLoop(std::uint32_t from, const SE3& T_from_newest, const Pose
   if (!status.ok()) return status;
   const bool another = loops_[id].new_frame != 0;  // one that gave way: its edge must go
   const Node& old_node = nodes_[from];
-  const Node& new_node = nodes_.back();
+  const Node& new_node = nodes_[to];
   loops_[id] = Loop{old_node.stamp, new_node.stamp, old_node.frame, new_node.frame, false, false};
   asked_[id] = version_;
   if (another || optimizer_.graph().edges.size() >= graphLimits(limits_).max_edges) {

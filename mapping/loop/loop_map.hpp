@@ -100,10 +100,13 @@ class LoopMap {
   /// Adds a node; where `node.linked`, tied to the last by T_previous_this and covariance, else the first of
   /// a component, at its T_world_body. kCapacityReached: full, see makeRoom(); kInvalidInput: not finite.
   Status add(const Node& node);
-  /// Adds a loop from `from` to the newest node. `id` holds until another takes its place. kInvalidInput as
+  /// The piece that the odometry alone holds together.
+  [[nodiscard]] std::uint32_t component(std::uint32_t k) const { return selection_.odometry().component(k); }
+
+  /// Adds a loop from a node to a newer one. `id` holds until another takes its place. kInvalidInput as
   /// LoopSelection's.
-  Status addLoop(std::uint32_t from, const SE3& T_from_newest, const PoseMatrix<SE3>& covariance,
-                 std::uint32_t& id);
+  Status addLoop(std::uint32_t from, std::uint32_t to, const SE3& T_from_to,
+                 const PoseMatrix<SE3>& covariance, std::uint32_t& id);
   /// Up to `iterations` of the optimizer where there is something to settle, else a rejected loop is asked
   /// again. `moved`: poses may have changed.
   Status settle(int iterations, bool& moved);

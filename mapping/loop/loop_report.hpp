@@ -12,14 +12,17 @@
 
 namespace swiftlet {
 
-/// A keyframe that looks like the newest one, and what geometry says of the two.
+/// Two keyframes that may show the same place, and what geometry says of them.
 struct LoopCandidate {
   std::uint64_t old_frame = 0;  ///< index of the keyframe seen again
   Stamp old_stamp;
+  std::uint64_t new_frame = 0;  ///< the newest, or where `near` one before it
+  Stamp new_stamp;
+  bool near = false;  ///< known by where the map has them, not by their words
   LoopFate fate = LoopFate::kInvalidInput;
   std::size_t matches = 0;
   std::size_t inliers = 0;
-  double similarity = 0;  ///< of the words, relative to that of neighbouring keyframes
+  double similarity = 0;  ///< of the words, relative to that of neighbouring keyframes; 0 where `near`
 };
 
 /// Candidates looked at in one step, at most.
@@ -52,7 +55,9 @@ struct LoopCounters {
   std::uint64_t gaps = 0;           ///< links bridged over keyframes that were missed
   std::uint64_t components = 0;     ///< pieces that odometry alone holds together
   std::array<std::uint64_t, kLoopFates> fates{};  ///< of candidates
+  std::uint64_t near = 0;                         ///< of candidates, those known by the map
   std::uint64_t loops = 0;                        ///< verified
+  std::uint64_t near_loops = 0;                   ///< of them, those from near candidates
   std::uint64_t selected = 0;                     ///< at the end
   std::uint64_t refused = 0;                      ///< keyframes that the map did not take
   LoopMapCounters map;                            ///< what was done for room, and rejected loops asked again

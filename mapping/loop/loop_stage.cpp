@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
 
 #include "mapping/place/vocabulary.hpp"
 #include "mapping/pose_graph/pose_tangent.hpp"
@@ -13,10 +15,19 @@ namespace {
 // A bridge over missed keyframes: the odometry's variance grows faster than in proportion to time.
 constexpr double kBridgeInflation = 2;
 
+// Nearer in time two nodes are no revisit.
+constexpr double kRevisitSeconds = 10;
+
+// Views of one place: what is farther off, or turned more, shows little of the same.
+constexpr double kNearDistance = 1;                 // m
+constexpr double kNearTurn = std::numbers::pi / 6;  // rad
+constexpr std::size_t kNearSearches = 8;            // in a step, each linear in nodes
+
 PlaceDatabaseSettings databaseSettings(const LoopSettings& settings, const LoopLimits& limits) {
   PlaceDatabaseSettings out;
   out.keyframes = limits.nodes;
   out.min_relative = static_cast<float>(settings.min_similarity);
+  out.exclude = kRevisitSeconds;
   return out;
 }
 
@@ -37,6 +48,7 @@ LoopStage::LoopStage(const Rig& rig, const LoopSettings& settings, const LoopLim
       verifier_(rig),
       map_(settings, limits),
       places_(place_.database().capacity()),
+      comparisons_(place_.database().capacity()),
       inliers_(limits.loops) {}
 
 MapNode LoopStage::node(std::size_t i) const {
@@ -69,6 +81,7 @@ Status LoopStage::step(const LoopInput& input, const LoopEffort& effort, LoopRep
       ++counters_.without_image;
     }
   }
+  closeNearLoops(effort, report);
   static_cast<void>(map_.settle(effort.iterations, report.moved));
   correct(*input.window);
   report.loops = map_.loops();
@@ -156,44 +169,103 @@ bool LoopStage::describePlace(const LoopInput& input) {
 }
 
 void LoopStage::closeLoops(const LoopEffort& effort, LoopReport& report) {
-  const auto& candidates = place_step_.query.candidates;
-  const std::size_t most = std::min({effort.candidates, kMaxLoopCandidates, candidates.size()});
-  for (std::size_t i = 0; i < most; ++i) {
+  const auto newest = static_cast<std::uint32_t>(map_.size() - 1);
+  newest_comparisons_ = Comparisons{};
+  for (const PlaceCandidate& candidate : place_step_.query.candidates) {
+    if (report.candidates.size() >= std::min(effort.candidates, kMaxLoopCandidates)) return;
+    std::uint32_t from = 0;
+    if (!map_.find(candidate.index, candidate.epoch, from)) continue;
+    static_cast<void>(newest_comparisons_.frames.tryPushBack(candidate.index));
+    LoopCandidate told;
+    told.similarity = static_cast<double>(candidate.relative);
     // A second loop to the same place says little more.
-    if (verify(candidates[i], effort, report)) return;
+    if (verify(from, newest, newest_, told, effort, report)) {
+      newest_comparisons_.near_left = 0;
+      return;
+    }
   }
-}
-
-bool LoopStage::verify(const PlaceCandidate& candidate, const LoopEffort& effort, LoopReport& report) {
-  std::uint32_t from = 0;
-  if (!map_.find(candidate.index, candidate.epoch, from)) return false;
-  static_cast<void>(
-      verifier_.verify(places_[candidate.slot], newest_, {}, effort.verification, verification_));
-  ++counters_.fates[static_cast<std::size_t>(verification_.fate)];
-  LoopCandidate told;
-  told.old_frame = candidate.index;
-  told.old_stamp = candidate.stamp;
-  told.fate = verification_.fate;
-  told.matches = verification_.matches;
-  told.inliers = verification_.inliers.size();
-  told.similarity = static_cast<double>(candidate.relative);
-  static_cast<void>(report.candidates.tryPushBack(told));
-  return verification_.accepted() && addLoop(from);
-}
-
-bool LoopStage::addLoop(std::uint32_t from) {
-  std::uint32_t id = 0;
-  if (!map_.addLoop(from, verification_.T_old_new, verification_.covariance, id).ok()) return false;
-  inliers_[id] = verification_.inliers;
-  ++counters_.loops;
-  return true;
 }
 
 // After the candidates have been looked at: the slot may have been one of theirs.
 void LoopStage::keepPlace() {
   if (place_step_.slot == PlaceDatabase::kNoSlot) return;
   places_[place_step_.slot] = newest_;
+  comparisons_[place_step_.slot] = newest_comparisons_;
   map_.setPlace(place_step_.slot);
+}
+
+void LoopStage::closeNearLoops(const LoopEffort& effort, LoopReport& report) {
+  const std::size_t most = std::min(effort.candidates, kMaxLoopCandidates);
+  std::size_t searches = 0;
+  for (auto to = static_cast<std::uint32_t>(map_.size()); to-- > 0 && map_.selected() > 0;) {
+    if (!hasPlace(to)) continue;
+    Comparisons& made = comparisons_[map_.node(to).place];
+    while (made.near_left > 0) {
+      std::uint32_t from = 0;
+      if (report.candidates.size() >= most || searches++ >= kNearSearches) return;
+      if (!nearestNode(to, from)) {
+        made.near_left = 0;
+        break;
+      }
+      --made.near_left;
+      static_cast<void>(made.frames.tryPushBack(map_.node(from).frame));
+      LoopCandidate told;
+      told.near = true;
+      if (verify(from, to, places_[map_.node(to).place], told, effort, report)) made.near_left = 0;
+    }
+  }
+}
+
+/// Whether the node's features are still held.
+bool LoopStage::hasPlace(std::uint32_t k) const {
+  const LoopMap::Node& node = map_.node(k);
+  return place_.database().holds(node.place, node.frame, node.epoch);
+}
+
+/// Of the nodes near `to` that it was not compared with the nearest.
+bool LoopStage::nearestNode(std::uint32_t to, std::uint32_t& from) const {
+  const auto& compared = comparisons_[map_.node(to).place].frames;
+  const SE3& here = map_.pose(to);
+  const Stamp now = map_.node(to).stamp;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::uint32_t k = 0; k < to && (now - map_.node(k).stamp).seconds() >= kRevisitSeconds; ++k) {
+    const SE3& there = map_.pose(k);
+    const double distance = (there.translation - here.translation).norm() / kNearDistance;
+    if (distance > 1 || map_.component(k) != map_.component(to)) continue;
+    const double turn = there.rotation.angularDistance(here.rotation) / kNearTurn;
+    if (turn > 1 || distance + turn >= least || !hasPlace(k)) continue;
+    if (std::find(compared.begin(), compared.end(), map_.node(k).frame) != compared.end()) continue;
+    least = distance + turn;
+    from = k;
+  }
+  return least < std::numeric_limits<double>::infinity();
+}
+
+/// Geometry's answer to a candidate; true where it became a loop of the map.
+bool LoopStage::verify(std::uint32_t from, std::uint32_t to, const PlaceKeyframe& new_keyframe,
+                       LoopCandidate& told, const LoopEffort& effort, LoopReport& report) {
+  const LoopMap::Node& old_node = map_.node(from);
+  static_cast<void>(
+      verifier_.verify(places_[old_node.place], new_keyframe, {}, effort.verification, verification_));
+  ++counters_.fates[static_cast<std::size_t>(verification_.fate)];
+  counters_.near += told.near ? 1 : 0;
+  told.old_frame = old_node.frame;
+  told.old_stamp = old_node.stamp;
+  told.new_frame = map_.node(to).frame;
+  told.new_stamp = map_.node(to).stamp;
+  told.fate = verification_.fate;
+  told.matches = verification_.matches;
+  told.inliers = verification_.inliers.size();
+  static_cast<void>(report.candidates.tryPushBack(told));
+  std::uint32_t id = 0;
+  if (!verification_.accepted() ||
+      !map_.addLoop(from, to, verification_.T_old_new, verification_.covariance, id).ok()) {
+    return false;
+  }
+  inliers_[id] = verification_.inliers;
+  ++counters_.loops;
+  counters_.near_loops += told.near ? 1 : 0;
+  return true;
 }
 
 void LoopStage::correct(const SmoothedWindow& window) {

@@ -5,7 +5,15 @@
 // tied to the node before by the odometry's relative pose, and, where its images are at hand, a place. Per
 // step: describe the place, ask the database for places alike, verify up to `effort.candidates` of them by
 // geometry, give those that pass to the selection, and optimize the graph (at most `effort.iterations`) while
-// the selected set, or the poses, still change. Every piece that neither odometry nor loops join keeps its
+// the selected set, or the poses, still change.
+//
+// Near nodes. Words find a place that nothing else leads to; once a loop is selected, the map leads too. What
+// a step has left of its candidates goes to nodes that have no loop yet, the newest first: each is compared,
+// once in its life, with the two nearest of the older nodes of its piece that the map has within 1 m and 30
+// degrees of it. So how strict the words are asked decides which loop is the first, hardly which come after
+// it. A near candidate is verified and selected as any other.
+//
+// Every piece that neither odometry nor loops join keeps its
 // own world; an epoch of the odometry begins a piece. Frames: world is the odometry's of an epoch, map that
 // of the first piece. Errors: kInvalidInput (no window, tracks of another frame, a pose that is not finite):
 // nothing changes. Full: a node leaves for each new one (loop_map.hpp), counted.
@@ -17,6 +25,7 @@
 #include <vector>
 
 #include "estimator/camera/rig.hpp"
+#include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/image_view.hpp"
 #include "estimator/core/status.hpp"
 #include "estimator/messages/keyframe_link.hpp"
@@ -36,6 +45,9 @@ struct LoopEffort {
   double verification = 1;     ///< part of the samples that verification may draw
   int iterations = 3;          ///< of the optimizer
 };
+
+/// Older nodes that a node is compared with because the map has them near it.
+inline constexpr std::size_t kMaxNearNodes = 2;
 
 struct LoopInput {
   const TrackedFrame* tracks = nullptr;    ///< of the keyframe
@@ -93,6 +105,12 @@ class LoopStage {
     Matrix6d covariance = Matrix6d::Zero();
   };
 
+  /// What a node was compared with.
+  struct Comparisons {
+    FixedVector<std::uint64_t, kMaxLoopCandidates + kMaxNearNodes> frames;
+    std::size_t near_left = kMaxNearNodes;  ///< comparisons with near nodes still to make
+  };
+
   void extendPending(const LoopInput& input);
   void bridge(const LoopInput& input);
   void appendLink(const SE3& T_previous_this, const Matrix6d& covariance);
@@ -100,9 +118,12 @@ class LoopStage {
   Status addNode(const WindowPose& pose);
   [[nodiscard]] bool describePlace(const LoopInput& input);
   void closeLoops(const LoopEffort& effort, LoopReport& report);
-  [[nodiscard]] bool verify(const PlaceCandidate& candidate, const LoopEffort& effort, LoopReport& report);
-  [[nodiscard]] bool addLoop(std::uint32_t from);
   void keepPlace();
+  void closeNearLoops(const LoopEffort& effort, LoopReport& report);
+  [[nodiscard]] bool hasPlace(std::uint32_t k) const;
+  [[nodiscard]] bool nearestNode(std::uint32_t to, std::uint32_t& from) const;
+  [[nodiscard]] bool verify(std::uint32_t from, std::uint32_t to, const PlaceKeyframe& new_keyframe,
+                            LoopCandidate& told, const LoopEffort& effort, LoopReport& report);
   void correct(const SmoothedWindow& window);
 
   Rig rig_;
@@ -113,11 +134,14 @@ class LoopStage {
   LoopMap map_;
 
   std::vector<PlaceKeyframe> places_;       ///< by the database's slots
+  std::vector<Comparisons> comparisons_;    ///< likewise
   std::vector<DescriptorMatches> inliers_;  ///< by the map's loops
   std::uint32_t epoch_ = 0;
   Pending pending_;
   PlaceKeyframe newest_;
   PlaceStep place_step_;
+  FixedVector<std::uint32_t, kMaxNearNodes> near_;  ///< nearest first
+  Comparisons newest_comparisons_;
   LoopVerification verification_;
   MapCorrection correction_;
   LoopCounters counters_;

@@ -92,7 +92,9 @@ class Wanderer {
   void addLoop(std::uint32_t from, const SE3& T_from_newest) {
     std::uint32_t id = 0;
     const SE3 measured = T_from_newest * poseExp(draw(random_, kLoopTurn, kLoopMove));
-    REQUIRE(map->addLoop(from, measured, covarianceOf(kLoopTurn, kLoopMove), id).ok());
+    REQUIRE(map->addLoop(from, static_cast<std::uint32_t>(map->size() - 1), measured,
+                         covarianceOf(kLoopTurn, kLoopMove), id)
+                .ok());
   }
 
   [[nodiscard]] const SE3& truthOf(std::size_t node) const { return truth_[map->node(node).frame - 1]; }
@@ -222,7 +224,8 @@ TEST_CASE("a loop that the odometry spoke against comes back when the map has be
     std::uint32_t id = 0;
     SE3 T;
     T.translation.x() = x - 0.5 * from;
-    REQUIRE(map.addLoop(from, T, covarianceOf(1e-3, sigma), id).ok());
+    REQUIRE(
+        map.addLoop(from, static_cast<std::uint32_t>(map.size() - 1), T, covarianceOf(1e-3, sigma), id).ok());
     return id;
   };
   for (int i = 0; i <= kSteps; ++i) add(0.5, 0.012, 0.01);
