@@ -19,8 +19,8 @@ constexpr double kBridgeInflation = 2;
 constexpr double kRevisitSeconds = 10;
 
 // Views of one place: what is farther off, or turned more, shows little of the same.
-constexpr double kNearDistance = 1;                 // m
-constexpr double kNearTurn = std::numbers::pi / 6;  // rad
+constexpr double kNearDistance = 2;                 // m
+constexpr double kNearTurn = std::numbers::pi / 4;  // rad
 constexpr std::size_t kNearSearches = 8;            // in a step, each linear in nodes
 
 PlaceDatabaseSettings databaseSettings(const LoopSettings& settings, const LoopLimits& limits) {
@@ -75,8 +75,8 @@ Status LoopStage::step(const LoopInput& input, const LoopEffort& effort, LoopRep
     if (!status.ok()) {
       ++counters_.refused;
     } else if (describePlace(input)) {
-      closeLoops(effort, report);
       keepPlace();
+      closeLoops(effort, report);
     } else {
       ++counters_.without_image;
     }
@@ -168,52 +168,67 @@ bool LoopStage::describePlace(const LoopInput& input) {
   return true;
 }
 
+void LoopStage::keepPlace() {
+  if (place_step_.slot == PlaceDatabase::kNoSlot) return;
+  places_[place_step_.slot] = newest_;
+  comparisons_[place_step_.slot] = Comparisons{};
+  map_.setPlace(place_step_.slot);
+}
+
+// The newest node: the nearest by the map, then those that look like it.
 void LoopStage::closeLoops(const LoopEffort& effort, LoopReport& report) {
   const auto newest = static_cast<std::uint32_t>(map_.size() - 1);
-  newest_comparisons_ = Comparisons{};
+  if (!hasPlace(newest) || effort.candidates == 0) return;
+  Comparisons& made = comparisons_[map_.node(newest).place];
+  const bool tied = compareNearest(newest, effort, report);
   for (const PlaceCandidate& candidate : place_step_.query.candidates) {
     if (report.candidates.size() >= std::min(effort.candidates, kMaxLoopCandidates)) return;
     std::uint32_t from = 0;
-    if (!map_.find(candidate.index, candidate.epoch, from)) continue;
-    static_cast<void>(newest_comparisons_.frames.tryPushBack(candidate.index));
+    if (!map_.find(candidate.index, candidate.epoch, from) || !hasPlace(from)) continue;
+    if (std::find(made.frames.begin(), made.frames.end(), candidate.index) != made.frames.end()) continue;
+    // A second loop to the same place says little more. One to another place gainsays the first: a map gone
+    // wrong must not be asked about itself alone.
+    if (tied && view(from, newest) <= 1) continue;
+    static_cast<void>(made.frames.tryPushBack(candidate.index));
     LoopCandidate told;
     told.similarity = static_cast<double>(candidate.relative);
-    // A second loop to the same place says little more.
-    if (verify(from, newest, newest_, told, effort, report)) {
-      newest_comparisons_.near_left = 0;
+    if (verify(from, newest, told, effort, report)) {
+      made.near_left = 0;
       return;
     }
   }
 }
 
-// After the candidates have been looked at: the slot may have been one of theirs.
-void LoopStage::keepPlace() {
-  if (place_step_.slot == PlaceDatabase::kNoSlot) return;
-  places_[place_step_.slot] = newest_;
-  comparisons_[place_step_.slot] = newest_comparisons_;
-  map_.setPlace(place_step_.slot);
-}
-
+// Nodes that have no loop, the newest first.
 void LoopStage::closeNearLoops(const LoopEffort& effort, LoopReport& report) {
-  const std::size_t most = std::min(effort.candidates, kMaxLoopCandidates);
   std::size_t searches = 0;
   for (auto to = static_cast<std::uint32_t>(map_.size()); to-- > 0 && map_.selected() > 0;) {
     if (!hasPlace(to)) continue;
-    Comparisons& made = comparisons_[map_.node(to).place];
+    const Comparisons& made = comparisons_[map_.node(to).place];
     while (made.near_left > 0) {
-      std::uint32_t from = 0;
-      if (report.candidates.size() >= most || searches++ >= kNearSearches) return;
-      if (!nearestNode(to, from)) {
-        made.near_left = 0;
-        break;
-      }
-      --made.near_left;
-      static_cast<void>(made.frames.tryPushBack(map_.node(from).frame));
-      LoopCandidate told;
-      told.near = true;
-      if (verify(from, to, places_[map_.node(to).place], told, effort, report)) made.near_left = 0;
+      if (report.candidates.size() >= std::min(effort.candidates, kMaxLoopCandidates)) return;
+      if (searches++ >= kNearSearches) return;
+      static_cast<void>(compareNearest(to, effort, report));
     }
   }
+}
+
+/// With the nearest node that `to` was not compared with; true where that gave a loop.
+bool LoopStage::compareNearest(std::uint32_t to, const LoopEffort& effort, LoopReport& report) {
+  Comparisons& made = comparisons_[map_.node(to).place];
+  if (map_.selected() == 0 || made.near_left == 0) return false;
+  std::uint32_t from = 0;
+  if (!nearestNode(to, from)) {
+    made.near_left = 0;
+    return false;
+  }
+  --made.near_left;
+  static_cast<void>(made.frames.tryPushBack(map_.node(from).frame));
+  LoopCandidate told;
+  told.near = true;
+  const bool tied = verify(from, to, told, effort, report);
+  if (tied) made.near_left = 0;
+  return tied;
 }
 
 /// Whether the node's features are still held.
@@ -222,37 +237,44 @@ bool LoopStage::hasPlace(std::uint32_t k) const {
   return place_.database().holds(node.place, node.frame, node.epoch);
 }
 
+/// How far apart the map has two views, in units of what near is.
+double LoopStage::view(std::uint32_t a, std::uint32_t b) const {
+  if (map_.component(a) != map_.component(b)) return std::numeric_limits<double>::infinity();
+  const double distance = (map_.pose(a).translation - map_.pose(b).translation).norm() / kNearDistance;
+  if (distance > 1) return distance;
+  return std::max(distance, map_.pose(a).rotation.angularDistance(map_.pose(b).rotation) / kNearTurn);
+}
+
 /// Of the nodes near `to` that it was not compared with the nearest.
 bool LoopStage::nearestNode(std::uint32_t to, std::uint32_t& from) const {
   const auto& compared = comparisons_[map_.node(to).place].frames;
-  const SE3& here = map_.pose(to);
   const Stamp now = map_.node(to).stamp;
-  double least = std::numeric_limits<double>::infinity();
+  double least = 1;
+  bool found = false;
   for (std::uint32_t k = 0; k < to && (now - map_.node(k).stamp).seconds() >= kRevisitSeconds; ++k) {
-    const SE3& there = map_.pose(k);
-    const double distance = (there.translation - here.translation).norm() / kNearDistance;
-    if (distance > 1 || map_.component(k) != map_.component(to)) continue;
-    const double turn = there.rotation.angularDistance(here.rotation) / kNearTurn;
-    if (turn > 1 || distance + turn >= least || !hasPlace(k)) continue;
+    const double apart = view(k, to);
+    if (apart >= least || !hasPlace(k)) continue;
     if (std::find(compared.begin(), compared.end(), map_.node(k).frame) != compared.end()) continue;
-    least = distance + turn;
+    least = apart;
     from = k;
+    found = true;
   }
-  return least < std::numeric_limits<double>::infinity();
+  return found;
 }
 
 /// Geometry's answer to a candidate; true where it became a loop of the map.
-bool LoopStage::verify(std::uint32_t from, std::uint32_t to, const PlaceKeyframe& new_keyframe,
-                       LoopCandidate& told, const LoopEffort& effort, LoopReport& report) {
+bool LoopStage::verify(std::uint32_t from, std::uint32_t to, LoopCandidate& told, const LoopEffort& effort,
+                       LoopReport& report) {
   const LoopMap::Node& old_node = map_.node(from);
-  static_cast<void>(
-      verifier_.verify(places_[old_node.place], new_keyframe, {}, effort.verification, verification_));
+  const LoopMap::Node& new_node = map_.node(to);
+  static_cast<void>(verifier_.verify(places_[old_node.place], places_[new_node.place], {},
+                                     effort.verification, verification_));
   ++counters_.fates[static_cast<std::size_t>(verification_.fate)];
   counters_.near += told.near ? 1 : 0;
   told.old_frame = old_node.frame;
   told.old_stamp = old_node.stamp;
-  told.new_frame = map_.node(to).frame;
-  told.new_stamp = map_.node(to).stamp;
+  told.new_frame = new_node.frame;
+  told.new_stamp = new_node.stamp;
   told.fate = verification_.fate;
   told.matches = verification_.matches;
   told.inliers = verification_.inliers.size();

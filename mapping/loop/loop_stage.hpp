@@ -122,8 +122,10 @@ class LoopStage {
   void closeNearLoops(const LoopEffort& effort, LoopReport& report);
   [[nodiscard]] bool hasPlace(std::uint32_t k) const;
   [[nodiscard]] bool nearestNode(std::uint32_t to, std::uint32_t& from) const;
-  [[nodiscard]] bool verify(std::uint32_t from, std::uint32_t to, const PlaceKeyframe& new_keyframe,
-                            LoopCandidate& told, const LoopEffort& effort, LoopReport& report);
+  [[nodiscard]] bool compareNearest(std::uint32_t to, const LoopEffort& effort, LoopReport& report);
+  [[nodiscard]] double view(std::uint32_t a, std::uint32_t b) const;
+  [[nodiscard]] bool verify(std::uint32_t from, std::uint32_t to, LoopCandidate& told,
+                            const LoopEffort& effort, LoopReport& report);
   void correct(const SmoothedWindow& window);
 
   Rig rig_;
@@ -140,8 +142,6 @@ class LoopStage {
   Pending pending_;
   PlaceKeyframe newest_;
   PlaceStep place_step_;
-  FixedVector<std::uint32_t, kMaxNearNodes> near_;  ///< nearest first
-  Comparisons newest_comparisons_;
   LoopVerification verification_;
   MapCorrection correction_;
   LoopCounters counters_;
