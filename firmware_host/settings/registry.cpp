@@ -179,7 +179,7 @@ std::vector<Setting> estimationSettings() {
        TextSetting{member(&Settings::loop, &LoopGroup::vocabulary), "a file's name, or empty"}},
       {"loop.min_similarity", "",
        "Least similarity of a place looked at as a revisit, relative to that of a keyframe with the one "
-       "before it.",
+       "before it; once a loop is believed, keyframes near each other in the map need none.",
        real(&Settings::loop_stage, &LoopSettings::min_similarity, 0, 10)},
       {"loop.consistency", "",
        "Believe a loop only where it agrees with the odometry and other loops; false, to compare: every one "

@@ -7,11 +7,13 @@
 // geometry, give those that pass to the selection, and optimize the graph (at most `effort.iterations`) while
 // the selected set, or the poses, still change.
 //
-// Near nodes. Words find a place that nothing else leads to; once a loop is selected, the map leads too. What
-// a step has left of its candidates goes to nodes that have no loop yet, the newest first: each is compared,
-// once in its life, with the two nearest of the older nodes of its piece that the map has within 1 m and 30
-// degrees of it. So how strict the words are asked decides which loop is the first, hardly which come after
-// it. A near candidate is verified and selected as any other.
+// Near nodes. Words find a place that nothing else leads to; once a loop is selected, the map leads too. Each
+// node is then compared, once in its life, with the two nearest of the older nodes of its piece that the map
+// has within 2 m and 45 degrees of it, until one gives a loop. The newest node begins with the nearest and
+// goes on with places alike; where the nearest gave a loop, with those only that lead elsewhere, lest a map
+// gone wrong be asked about itself alone. What a step has left of its candidates goes to older nodes that
+// have no loop yet, the newest first. So how strict the words are asked decides which loop is the first,
+// hardly which come after it. A near candidate is verified and selected as any other.
 //
 // Every piece that neither odometry nor loops join keeps its
 // own world; an epoch of the odometry begins a piece. Frames: world is the odometry's of an epoch, map that

@@ -234,6 +234,30 @@ TEST_CASE(
     CHECK(before > 0);
     CHECK(after > 0);
   }
+  SECTION("words that lead elsewhere are still asked") {
+    Flight flight;
+    SE3 elsewhere;
+    elsewhere.translation.x() = 10;  // where it looks the same
+    double seconds = seeEverySecond(flight, 0, n, 0, SE3());
+    seconds = seeEverySecond(flight, 0, n, seconds + kVisitGap, elsewhere) + kVisitGap;
+    std::size_t gainsaid = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const LoopReport report = flight.see(pictures().all[i], seconds += kSpacing, SE3());
+      if (report.candidates.size() < 2 || !report.candidates[0].near) continue;
+      // Its own place first, of the newest node; then by words the other one.
+      if (report.candidates[0].new_frame != report.frame || report.candidates[0].fate != LoopFate::kAccepted)
+        continue;
+      gainsaid += !report.candidates[1].near && report.candidates[1].new_frame == report.frame ? 1 : 0;
+    }
+    CHECK(gainsaid > 0);
+    for (std::uint32_t i = 0; i < flight.stage->loopCount(); ++i) {
+      const MapLoop loop = flight.stage->loop(i);
+      // The third visit is to the first room.
+      const bool right = loop.new_stamp > flight.stage->node(n - 1).stamp &&
+                         loop.old_stamp < flight.stage->node(n / 2).stamp;
+      CHECK((loop.verdict == LoopVerdict::kSelected) == right);
+    }
+  }
   SECTION("a look-alike beside a place is not taken for it") {
     Flight flight({60, 100}, strict());
     double seconds = seeEverySecond(flight, 0, n, 0, SE3()) + kVisitGap;
