@@ -15,10 +15,10 @@
 // have no loop yet, the newest first. So how strict the words are asked decides which loop is the first,
 // hardly which come after it. A near candidate is verified and selected as any other.
 //
-// Every piece that neither odometry nor loops join keeps its
-// own world; an epoch of the odometry begins a piece. Frames: world is the odometry's of an epoch, map that
-// of the first piece. Errors: kInvalidInput (no window, tracks of another frame, a pose that is not finite):
-// nothing changes. Full: a node leaves for each new one (loop_map.hpp), counted.
+// Every piece that neither odometry nor loops join keeps its own world; an epoch of the odometry begins a
+// piece. Frames: world is the odometry's of an epoch, map that of the first piece. Errors: kInvalidInput (no
+// window, tracks of another frame, a pose that is not finite): nothing changes. Full: a node leaves for each
+// new one (loop_map.hpp), counted.
 // Memory: reserved by the constructor for LoopLimits (38 kB a node). No clock, no randomness but seeds from
 // frame indices: same input, same bytes. docs/pose_graph.md, docs/place.md.
 
