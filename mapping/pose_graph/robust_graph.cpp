@@ -5,6 +5,8 @@
 #include <limits>
 #include <memory>
 
+#include "mapping/pose_graph/chance_limit.hpp"
+
 namespace swiftlet {
 namespace {
 
@@ -19,10 +21,8 @@ constexpr std::uint32_t kCandidates = 30000;
 /// Covariances of relative poses on the solved graph: 10 ms each on the largest public ones.
 constexpr std::uint32_t kReconsidered = 300;
 
-/// Random loops believed a graph, were all loops false and each at the limit: of those that agree with every
-/// loop of the largest set, and of those that come back, which only the solution vouches for.
-constexpr double kFalseProven = 1;
-constexpr double kFalseTakenBack = 0.1;
+/// The usual 5 %: were all loops random, one of twenty graphs would believe one.
+constexpr double kMaxFalse = 0.05;
 
 /// While weights change a rough solution will do.
 constexpr int kGraduatedIterations = 5;
@@ -32,6 +32,9 @@ constexpr double kGraduatedTolerance = 1e-4;
 constexpr int kRounds = 10;
 
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+
+/// Logarithm of a chance that no limit reaches.
+constexpr double kNever = std::numeric_limits<double>::infinity();
 
 /// The optimizer, as graduated selection sees it.
 template <typename Pose>
@@ -74,6 +77,8 @@ struct TakenLoops {
 struct OpenLoop {
   std::uint32_t edge = 0;
   std::uint32_t conflicts = 0;
+  double log_chance = kNever;  ///< beside the present solution, while step 5 looks
+  bool fits = false;
 };
 
 /// Step 2: fates of all loops.
@@ -82,19 +87,26 @@ Status selectLoops(const RobustGraphSettings& settings, const OdometryChain<Pose
                    const PoseGraph<Pose>& graph, TakenLoops& taken, std::vector<OpenLoop>& open,
                    RobustGraphReport& report) {
   std::vector<std::uint32_t> passed;
+  std::vector<double> least_chances;
   for (std::uint32_t e = 0; e < graph.edges.size(); ++e) {
     if (report.fates[e] == EdgeFate::kOdometry) continue;
     const auto chained = chainLoop(chain, graph.edges[e]);
-    if (!chained.withinComponent() ||
-        odometryTest(chain, chained).chi_squared <= settings.selection.gate_chi_squared) {
+    if (!chained.withinComponent()) {
       passed.push_back(e);
+      continue;
     }
+    const CycleTest gate = odometryTest(chain, chained);
+    if (gate.chi_squared <= settings.selection.gate_chi_squared) passed.push_back(e);
+    least_chances.push_back(logChance<Pose>({0, gate.log_deviation}, chain.logBox(chained.to)));
   }
   report.passed = static_cast<std::uint32_t>(passed.size());
   if (passed.size() > settings.max_candidates) {
     return {StatusCode::kCapacityReached, "more loops agree with the odometry than can be compared in pairs"};
   }
-  LoopSelection<Pose> selection({chain.size(), report.passed}, settings.selection);
+  LoopSelectionSettings adapted = settings.selection;
+  adapted.max_gate_chance =
+      std::min(adapted.max_gate_chance, std::exp(logChanceLimit(settings.max_false, least_chances)));
+  LoopSelection<Pose> selection({chain.size(), report.passed}, adapted);
   selection.odometry() = chain;
   for (const std::uint32_t e : passed) {
     std::uint32_t id = 0;
@@ -119,14 +131,9 @@ Status selectLoops(const RobustGraphSettings& settings, const OdometryChain<Pose
     }
     report.fates[e] = verdict == LoopVerdict::kUnsupported ? EdgeFate::kUnsupported : EdgeFate::kInconsistent;
     if (chain.component(graph.edges[e].from) != chain.component(graph.edges[e].to)) continue;
-    open.push_back({e, size - countBoth(selection.consistency().row(id), set)});
+    open.push_back({e, size - countBoth(selection.consistency().row(id), set), kNever, false});
   }
   return okStatus();
-}
-
-/// The more loops are offered, the more random ones agree.
-double chanceFor(const RobustGraphSettings& settings, double max_false, std::uint32_t loops) {
-  return std::min(settings.selection.max_gate_chance, max_false / std::max(loops, 1U));
 }
 
 /// Loops chosen, to the poses of the graph.
@@ -136,11 +143,7 @@ class RobustSolution {
   RobustSolution(const RobustGraphSettings& settings, const OdometryChain<Pose>& chain,
                  const PoseGraph<Pose>& graph, TakenLoops& taken, std::size_t spare_edges,
                  const RobustGraphReport& report)
-      : settings_(settings),
-        chain_(chain),
-        whole_(graph),
-        taken_(taken),
-        max_chance_(chanceFor(settings, settings.max_false_taken_back, report.loops)) {
+      : settings_(settings), chain_(chain), whole_(graph), taken_(taken), loops_(report.loops) {
     part_.poses = graph.poses;
     for (std::uint32_t e = 0; e < graph.edges.size(); ++e) {
       if (report.fates[e] == EdgeFate::kOdometry) part_.edges.push_back(graph.edges[e]);
@@ -178,34 +181,17 @@ class RobustSolution {
   /// Step 5 once: how many loops came back.
   Status takeBack(std::vector<OpenLoop>& open, std::uint32_t& count) {
     // Those that fit with their own covariance first: they bend the solution least, and it knows more then.
+    count = 0;
     for (const bool own_covariance : {true, false}) {
-      std::uint32_t asked = 0;
-      std::size_t left = 0;
-      for (const OpenLoop& loop : open) {
-        bool fit = false;
-        const Cycle cycle(chain_, optimizer_->graph(), whole_.edges[loop.edge]);
-        Status status = okStatus();
-        if (own_covariance) {
-          fit = believed(cycle, cycle.chained.covariance, settings_.graduated.max_chi_squared);
-        } else if (asked < settings_.max_reconsidered && mayAgree(cycle)) {
-          ++asked;
-          status = agrees(cycle, fit);
-        }
-        if (!status.ok()) return status;
-        if (fit) {
-          back_.push_back(loop.edge);
-        } else {
-          open[left++] = loop;
-        }
-      }
-      open.resize(left);
-      if (!back_.empty()) break;
+      if (const Status status = findFits(open, own_covariance); !status.ok()) return status;
+      std::erase_if(open, [](const OpenLoop& loop) { return loop.fits; });
+      count = static_cast<std::uint32_t>(back_.size());
+      if (count > 0) break;
     }
     // Added only now: a new edge would cost a new factor for the next covariance.
     for (const std::uint32_t e : back_) {
       if (const Status status = take(e); !status.ok()) return status;
     }
-    count = static_cast<std::uint32_t>(back_.size());
     back_.clear();
     return okStatus();
   }
@@ -225,26 +211,49 @@ class RobustSolution {
     }
   };
 
-  /// A true loop passes, a random one hardly does.
-  [[nodiscard]] bool believed(const Cycle& cycle, const PoseMatrix<Pose>& covariance, double limit) const {
-    const CycleTest test = cycleTest<Pose>(covariance, cycle.error);
-    return test.chi_squared <= limit &&
-           logChance<Pose>(test, chain_.logBox(cycle.chained.to)) <= std::log(max_chance_);
+  /// Which open loops fit, and not by chance: to back_.
+  Status findFits(std::vector<OpenLoop>& open, bool own_covariance) {
+    std::vector<double> log_chances;
+    std::uint32_t asked = 0;
+    for (OpenLoop& loop : open) {
+      const Cycle cycle(chain_, optimizer_->graph(), whole_.edges[loop.edge]);
+      CycleTest test;
+      double limit = settings_.graduated.max_chi_squared;
+      if (own_covariance) {
+        test = cycleTest<Pose>(cycle.chained.covariance, cycle.error);
+      } else if (asked < settings_.max_reconsidered && mayAgree(cycle)) {
+        ++asked;
+        limit = settings_.selection.gate_chi_squared;
+        PoseMatrix<Pose> known;
+        const Status status = optimizer_->relativeCovariance(cycle.chained.from, cycle.chained.to, known);
+        if (!status.ok()) return status;
+        test = cycleTest<Pose>(cycle.chained.covariance + known, cycle.error);
+      }
+      loop.log_chance =
+          test.chi_squared <= limit ? logChance<Pose>(test, chain_.logBox(cycle.chained.to)) : kNever;
+      if (loop.log_chance < kNever) log_chances.push_back(loop.log_chance);
+    }
+    const double limit = std::min(std::log(settings_.selection.max_gate_chance),
+                                  logDiscoveryLimit(settings_.max_false, loopsLeft(), log_chances));
+    for (OpenLoop& loop : open) {
+      loop.fits = loop.log_chance <= limit;
+      if (loop.fits) back_.push_back(loop.edge);
+    }
+    return okStatus();
   }
 
-  /// The solution knows the relative pose better than the odometry alone: what fails this fails agrees().
+  /// Not in the solution, those that the odometry spoke against too: how well one agrees with it was seen
+  /// before.
+  [[nodiscard]] std::size_t loopsLeft() const {
+    return loops_ - static_cast<std::size_t>(std::count(taken_.weights.begin(), taken_.weights.end(), 1.0));
+  }
+
+  /// The solution knows the relative pose better than the odometry alone: what fails this would fail the
+  /// test.
   [[nodiscard]] bool mayAgree(const Cycle& cycle) const {
     const PoseMatrix<Pose> loose =
         cycle.chained.covariance + chain_.covariance(cycle.chained.from, cycle.chained.to);
     return cycleTest<Pose>(loose, cycle.error).chi_squared <= settings_.selection.gate_chi_squared;
-  }
-
-  Status agrees(const Cycle& cycle, bool& fit) {
-    PoseMatrix<Pose> known;
-    const Status status = optimizer_->relativeCovariance(cycle.chained.from, cycle.chained.to, known);
-    fit = status.ok() &&
-          believed(cycle, cycle.chained.covariance + known, settings_.selection.gate_chi_squared);
-    return status;
   }
 
   Status take(std::uint32_t e) {
@@ -263,7 +272,7 @@ class RobustSolution {
   const OdometryChain<Pose>& chain_;
   const PoseGraph<Pose>& whole_;
   TakenLoops& taken_;
-  double max_chance_;
+  std::size_t loops_;
   PoseGraph<Pose> part_;
   std::unique_ptr<PoseGraphOptimizer<Pose>> optimizer_;
   std::vector<std::uint32_t> back_;
@@ -310,8 +319,7 @@ RobustGraphSettings robustGraphSettings() {
   settings.max_nodes = kNodes;
   settings.max_candidates = kCandidates;
   settings.max_reconsidered = kReconsidered;
-  settings.max_false_proven = kFalseProven;
-  settings.max_false_taken_back = kFalseTakenBack;
+  settings.max_false = kMaxFalse;
   settings.effort.iterations = 100;
   return settings;
 }
@@ -370,8 +378,6 @@ Status solveRobustly(const RobustGraphSettings& settings, std::span<const std::u
   }
   TakenLoops taken;
   std::vector<OpenLoop> open;
-  RobustGraphSettings adapted = settings;
-  adapted.selection.max_gate_chance = chanceFor(settings, settings.max_false_proven, report.loops);
   if (settings.method == RobustMethod::kGraduated) {
     for (std::uint32_t e = 0; e < graph.edges.size(); ++e) {
       if (is_odometry[e]) continue;
@@ -381,10 +387,10 @@ Status solveRobustly(const RobustGraphSettings& settings, std::span<const std::u
     }
     report.selected = report.loops;
   } else {
-    const Status status = selectLoops(adapted, chain, graph, taken, open, report);
+    const Status status = selectLoops(settings, chain, graph, taken, open, report);
     if (!status.ok()) return status;
   }
-  return solveTaken(adapted, fixed, chain, taken, open, graph, report);
+  return solveTaken(settings, fixed, chain, taken, open, graph, report);
 }
 
 template RobustGraphSettings robustGraphSettings<SE2>();

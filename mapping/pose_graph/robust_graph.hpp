@@ -13,8 +13,10 @@
 //    `max_reconsidered` that contradict fewest of the largest set, with that of the relative pose on the
 //    solved graph added (a true loop may be far off a solution without it where that is vague). Then 4
 //    again, until no loop comes back.
-// In 2 and 5 a loop that nothing but the odometry or the solution vouches for is believed at a chance of at
-// most max_false_... / loops: the more loops are offered, the more random ones agree.
+// How small a chance must be follows from how many loops are tested and how many agree (chance_limit.hpp): in
+// 2 such that `max_false` random loops a graph are believed on the odometry alone, were all random; in 5 such
+// that of those coming back no larger share is random, and a random one comes back to `max_false` of the
+// graphs from which no true loop is missing.
 // RobustMethod leaves steps out, for comparison.
 //
 // Frames and cost: pose_graph.hpp. Errors: kInvalidInput (poses or edges that the optimizer refuses),
@@ -47,11 +49,9 @@ struct RobustGraphSettings {
   std::uint32_t max_nodes = 0;         ///< of the search for the largest set
   std::uint32_t max_candidates = 0;    ///< loops that pass the gate
   std::uint32_t max_reconsidered = 0;  ///< covariances asked for in 5, a round
-  /// Loops believed by chance, were all of them false: on the odometry alone (2), on the solution alone (5).
-  double max_false_proven = 0;
-  double max_false_taken_back = 0;
-  std::size_t max_factor_values = 0;  ///< of the optimizer, PoseGraphLimits
-  OptimizeEffort effort;              ///< of the first and the last solution
+  double max_false = 0;                ///< loops believed by chance, in 2 and in 5
+  std::size_t max_factor_values = 0;   ///< of the optimizer, PoseGraphLimits
+  OptimizeEffort effort;               ///< of the first and the last solution
 };
 
 /// The settings used everywhere. A loop stays on the solved graph while its chi-squared is one that a true

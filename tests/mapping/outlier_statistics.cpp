@@ -1,16 +1,20 @@
 // False loops injected into the public pose graphs: how many are rejected, how many true loops go with them,
 // and what the trajectory loses; run by hand, prints figures.
 //   outlier_statistics [--graphs a,b] [--shares 10,30,50,70,90] [--seeds 1,2,3] [--group N] [--alone VALUES]
+//                      [--csv FILE] [--loops FILE] [--max-false X]
 // Graphs: all of SWIFTLET_DATA/pose_graphs that have at least 20 loops, a chi-squared per degree of freedom
 // of 0.05 to 2 at the optimum, and at least 90 % of their own loops inside the 99 % check against their
 // odometry; the others are named with the reason. Shares: percent of all loops after injection. Settings:
-// robustGraphSettings(), the same for all. --alone: graduated non-convexity on all loops from the odometry
-// as well, where the normal equations' factor takes no more than so many numbers.
+// robustGraphSettings(), the same for all, with another limit of chance where --max-false says so. --alone:
+// graduated non-convexity on all loops from the odometry as well, where the normal equations' factor takes no
+// more than so many numbers. --csv: a row a run, appended as it ends. --loops: every loop of every run, what
+// became of it, and what the tests say of it.
 //
 // Error: RMS of positions after a rigid fit, against the truth where there is one. Where there is none,
 // against the optimum of the graph without false loops; the ratio then takes the expected error e of that
 // optimum into account, sqrt(e^2 + difference^2) / e, where e is that of optima of graphs whose measurements
-// were drawn anew about the optimum with their own information (`kDraws` of them).
+// were drawn anew about the optimum with their own information (`kDraws` of them). A second ratio is to the
+// error that solveRobustly() itself leaves when nothing is injected.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -48,6 +52,9 @@ struct Options {
   std::uint32_t group = 1;
   std::size_t alone = 0;
   bool all = false;
+  double max_false = 0;
+  std::string csv;
+  std::string loops;
 };
 
 std::vector<Eigen::Vector3d> positions(const std::vector<SE3>& poses) {
@@ -144,7 +151,8 @@ struct Row {
   double rejected = 0;  ///< percent of false
   std::uint32_t false_kept = 0;
   double error = 0;
-  double ratio = 0;
+  double ratio = 0;      ///< to the optimum without false loops
+  double own_ratio = 1;  ///< to the same method's result without false loops
   bool solved = false;
   double seconds = 0;
 };
@@ -158,12 +166,15 @@ struct Case {
   std::vector<Eigen::Vector3d> reference;  ///< truth, or the optimum
   bool has_truth = false;
   double optimum_error = 0;  ///< against the truth, or the expected one
+  double clean_ratio = 1;    ///< of solveRobustly() without false loops
 
   [[nodiscard]] double ratio(double error) const {
     return has_truth ? error / optimum_error : std::hypot(1, error / optimum_error);
   }
 
-  [[nodiscard]] Row run(const RobustGraphSettings& settings, const OutlierInjection& injection) const {
+  /// `loops`: where each loop and its fate is written; none where it is closed.
+  [[nodiscard]] Row run(const RobustGraphSettings& settings, const OutlierInjection& injection,
+                        const std::string& label, std::ofstream& loops_out) const {
     Row row;
     PoseGraph<Pose> spoiled = graph;
     if (injection.count > 0 && !injectOutliers(injection, spoiled).ok()) return row;
@@ -183,7 +194,33 @@ struct Case {
     row.rejected = injection.count == 0 ? 100 : 100.0 - 100.0 * row.false_kept / injection.count;
     row.error = errorOf(spoiled.poses, reference);
     row.ratio = ratio(row.error);
+    row.own_ratio = row.ratio / clean_ratio;
+    if (loops_out.is_open()) writeLoops(spoiled, report, label, loops_out);
     return row;
+  }
+
+  void writeLoops(const PoseGraph<Pose>& spoiled, const RobustGraphReport& report, const std::string& label,
+                  std::ofstream& out) const {
+    OdometryChain<Pose> chain(static_cast<std::uint32_t>(graph.poses.size()));
+    std::vector<bool> ignored;
+    if (!chainOdometry(graph, chain, ignored).ok()) return;
+    for (std::size_t e = 0; e < spoiled.edges.size(); ++e) {
+      if (report.fates[e] == EdgeFate::kOdometry) continue;
+      const auto& edge = spoiled.edges[e];
+      const auto loop = chainLoop(chain, edge);
+      if (!loop.withinComponent()) continue;
+      const CycleTest gate = odometryTest(chain, loop);
+      const auto log10_chance = [&](const CycleTest& test) {
+        return logChance<Pose>(test, chain.logBox(loop.to)) / std::log(10.0);
+      };
+      const Pose solved = spoiled.poses[edge.from].inverse() * spoiled.poses[edge.to];
+      const CycleTest own = cycleTest<Pose>(covarianceFromInformation(edge.information),
+                                            poseLog(edge.T_from_to.inverse() * solved));
+      out << label << ',' << e << ',' << edge.from << ',' << edge.to << ',' << (e >= graph.edges.size())
+          << ',' << static_cast<int>(report.fates[e]) << ','
+          << 2 * edgeCost(edge, best[edge.from], best[edge.to]) << ',' << gate.chi_squared << ','
+          << log10_chance(gate) << ',' << own.chi_squared << ',' << log10_chance(own) << '\n';
+    }
   }
 };
 
@@ -191,8 +228,8 @@ std::string describe(const Row& row) {
   if (!row.solved) return "not solved: too large";
   char text[160];
   std::snprintf(text, sizeof text,
-                "rejected %7.3f %% (%u stay), lost %6.2f %%, error %.4f m, ratio %.3f, %.1f s", row.rejected,
-                row.false_kept, row.lost, row.error, row.ratio, row.seconds);
+                "rejected %7.3f %% (%u stay), lost %6.2f %%, error %.4f m, ratio %.3f (%.3f), %.1f s",
+                row.rejected, row.false_kept, row.lost, row.error, row.ratio, row.own_ratio, row.seconds);
   return text;
 }
 
@@ -202,6 +239,7 @@ Row worse(Row a, const Row& b) {
   a.rejected = std::min(a.rejected, b.rejected);
   a.error = std::max(a.error, b.error);
   a.ratio = std::max(a.ratio, b.ratio);
+  a.own_ratio = std::max(a.own_ratio, b.own_ratio);
   a.solved = a.solved && b.solved;
   a.seconds = std::max(a.seconds, b.seconds);
   return a;
@@ -270,33 +308,54 @@ void runGraph(const G2oGraph& file, const GraphReference& named, const PoseGraph
   refer(file, named, given, graph);
   std::printf("%-20s %s; optimum's error %.4f m (%s)\n", named.name.c_str(), reason.c_str(),
               graph.optimum_error, graph.has_truth ? "truth" : "expected");
-  const RobustGraphSettings settings = robustGraphSettings<Pose>();
+  std::ofstream csv;
+  std::ofstream loops;
+  if (!options.csv.empty()) csv.open(options.csv, std::ios::app);
+  if (!options.loops.empty()) loops.open(options.loops, std::ios::app);
+  const auto record = [&](const char* method, double share, std::uint64_t seed, const Row& row) {
+    if (!csv.is_open()) return;
+    csv << named.name << ',' << method << ',' << options.group << ',' << share << ',' << seed << ','
+        << row.true_loops << ',' << row.false_loops << ',' << row.solved << ',' << row.rejected << ','
+        << row.false_kept << ',' << row.lost << ',' << row.error << ',' << (graph.has_truth ? 't' : 'o')
+        << ',' << row.ratio << ',' << row.own_ratio << ',' << row.seconds << std::endl;
+  };
+  RobustGraphSettings settings = robustGraphSettings<Pose>();
+  if (options.max_false > 0) settings.max_false = options.max_false;
   RobustGraphSettings alone = settings;
   alone.method = RobustMethod::kGraduated;
   alone.max_factor_values = options.alone;
-  std::printf("  %3.0f %%         %s\n", 0.0, describe(graph.run(settings, {})).c_str());
+  const Row clean = graph.run(settings, {}, named.name + ",0,0", loops);
+  graph.clean_ratio = clean.ratio;
+  std::printf("  %3.0f %%         %s\n", 0.0, describe(clean).c_str());
   std::fflush(stdout);
+  record("robust", 0, 0, clean);
   for (const double share : options.shares) {
     Row worst;
     Row worst_alone;
     for (std::size_t s = 0; s < options.seeds.size(); ++s) {
       const OutlierInjection injection{outlierCount(graph.loops, share / 100), options.seeds[s],
                                        options.group};
-      const Row row = graph.run(settings, injection);
+      std::ostringstream label;
+      label << named.name << ',' << share << ',' << injection.seed;
+      const Row row = graph.run(settings, injection, label.str(), loops);
+      record("robust", share, injection.seed, row);
       std::printf("  %3.0f %% seed %-3llu %s\n", share, static_cast<unsigned long long>(options.seeds[s]),
                   describe(row).c_str());
       std::fflush(stdout);
       worst = s == 0 ? row : worse(worst, row);
       if (options.alone == 0) continue;
-      const Row other = graph.run(alone, injection);
+      std::ofstream none;
+      const Row other = graph.run(alone, injection, {}, none);
+      record("graduated", share, injection.seed, other);
       std::printf("        graduated alone %s\n", describe(other).c_str());
       std::fflush(stdout);
       worst_alone = s == 0 ? other : worse(worst_alone, other);
     }
     char line[320];
-    int used = std::snprintf(line, sizeof line, "| %s | %u | %u | %.0f | %.2f | %.2f | %.4f %s | %.3f |",
-                             named.name.c_str(), worst.true_loops, worst.false_loops, share, worst.rejected,
-                             worst.lost, worst.error, graph.has_truth ? "t" : "o", worst.ratio);
+    int used =
+        std::snprintf(line, sizeof line, "| %s | %u | %u | %.0f | %.2f | %.2f | %.4f %s | %.3f (%.3f) |",
+                      named.name.c_str(), worst.true_loops, worst.false_loops, share, worst.rejected,
+                      worst.lost, worst.error, graph.has_truth ? "t" : "o", worst.ratio, worst.own_ratio);
     if (options.alone > 0 && worst_alone.solved) {
       std::snprintf(line + used, sizeof line - static_cast<std::size_t>(used), " %.2f, %.2f, %.3f |",
                     worst_alone.rejected, worst_alone.lost, worst_alone.ratio);
@@ -342,6 +401,9 @@ int main(int argc, char** argv) {
   app.add_option("--seeds", options.seeds, "Of the injection")->delimiter(',')->capture_default_str();
   app.add_option("--group", options.group, "False loops that agree with each other")->capture_default_str();
   app.add_option("--alone", options.alone, "Largest factor of graduated selection alone; 0: not run");
+  app.add_option("--max-false", options.max_false, "RobustGraphSettings::max_false; 0: as it is");
+  app.add_option("--csv", options.csv, "A row a run is appended to this file");
+  app.add_option("--loops", options.loops, "Every loop and its fate is appended to this file");
   app.add_flag("--all", options.all, "Graphs that do not qualify, too");
   CLI11_PARSE(app, argc, argv);
   return swiftlet::test::run(options);
