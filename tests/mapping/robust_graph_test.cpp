@@ -1,7 +1,9 @@
 #include "mapping/pose_graph/robust_graph.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <cstddef>
 
 #include "mapping/pose_graph/outlier_injection.hpp"
 #include "tests/mapping/simulated_chain.hpp"
@@ -110,6 +112,44 @@ TEST_CASE("A loop that only the solved graph can vouch for comes back", "[pose_g
   settings.method = RobustMethod::kSelectionAndGraduated;
   REQUIRE(solveRobustly(settings, {}, graph, report).ok());
   CHECK(report.fates[alone] == EdgeFate::kKept);
+}
+
+TEST_CASE("Loops of which none is proven prove each other, a single one is not believed", "[pose_graph]") {
+  // Loops so vague that a random one agrees with the solution at a chance of 8e-4: every third graph with 400
+  // random ones has one that does.
+  Random random(11);
+  const PoseMatrix<SE2> step = testCovariance<SE2>(1e-3, 5e-3);
+  const SimulatedChain<SE2> chain(kPoses, step, random);
+  const PoseMatrix<SE2> unit = testCovariance<SE2>(0.1, 1);
+  const double log_unit =
+      logChance<SE2>(cycleTest<SE2>(unit, PoseVector<SE2>::Zero()), chain.odometry.logBox(kPoses - 45));
+  const PoseMatrix<SE2> noise = testCovariance<SE2>(0.1, std::exp(0.5 * (std::log(8e-4) - log_unit)));
+  RobustGraphSettings settings = robustGraphSettings<SE2>();
+  settings.selection.max_gate_chance = 1e-2;
+  for (const std::uint32_t loops : {1U, 40U}) {
+    PoseGraph<SE2> graph;
+    for (std::uint32_t k = 0; k < kPoses; ++k) {
+      graph.poses.push_back(chain.odometry.pose(k));
+      if (k > 0) graph.edges.push_back({k - 1, k, chain.odometry.relative(k - 1, k), step.inverse()});
+    }
+    const std::size_t first = graph.edges.size();
+    for (std::uint32_t k = 0; k < loops; ++k) {
+      graph.edges.push_back(chain.loop(kPoses - 60 + k, kPoses - 45 + k, noise, random));
+    }
+    REQUIRE(injectOutliers({400, 5, 1}, graph).ok());
+    RobustGraphReport report;
+    REQUIRE(solveRobustly(settings, {}, graph, report).ok());
+    const auto kept = [&](std::size_t from, std::size_t to) {
+      return std::count(report.fates.begin() + static_cast<std::ptrdiff_t>(from),
+                        report.fates.begin() + static_cast<std::ptrdiff_t>(to), EdgeFate::kKept);
+    };
+    CHECK(kept(first + loops, graph.edges.size()) == 0);
+    if (loops == 1) {
+      CHECK(kept(first, first + loops) == 0);
+    } else {
+      CHECK(kept(first, first + loops) >= 30);
+    }
+  }
 }
 
 TEST_CASE("Odometry is found turned round, broken and doubled", "[pose_graph]") {
