@@ -11,6 +11,7 @@
 #include "drivers/recorded/open_log.hpp"
 #include "estimator/odometry/odometry_inputs.hpp"
 #include "estimator/odometry/pairing.hpp"
+#include "firmware_host/commands/confusion_file.hpp"
 #include "firmware_host/commands/given_poses.hpp"
 #include "firmware_host/commands/moving_labels.hpp"
 #include "firmware_host/pipeline/log_feed.hpp"
@@ -134,6 +135,11 @@ void FuseRun::openPoses() {
 
 void FuseRun::begin() {
   checkMovingLabels(settings_.map_stage);
+  std::optional<ConfusionModel> confusion;
+  if (!settings_.map.confusion.empty()) {
+    confusion =
+        readConfusion(settings_.map.confusion, static_cast<float>(settings_.map_stage.label_certainty));
+  }
   openPoses();
   sensor_ =
       request_.depth == DepthSource::kSensor || (request_.depth == DepthSource::kAny && !depth_.empty());
@@ -152,6 +158,7 @@ void FuseRun::begin() {
   } else {
     map_ = std::make_unique<MapStage>(rig_, settings_.map_stage, nullptr, &spilled_);
   }
+  if (confusion) map_->setConfusion(*confusion);
   openKept();
   for (const std::string& line : source_->warnings()) fmt::print(stderr, "warning: {}\n", line);
   for (const std::string& line : warnings_.lines()) fmt::print(stderr, "warning: {}\n", line);

@@ -8,6 +8,7 @@
 
 #include "drivers/recorded/open_log.hpp"
 #include "drivers/recorded/recording_source.hpp"
+#include "firmware_host/commands/confusion_file.hpp"
 #include "firmware_host/commands/evaluate_run.hpp"
 #include "firmware_host/commands/fly_threaded.hpp"
 #include "firmware_host/commands/moving_labels.hpp"
@@ -144,6 +145,10 @@ class ReplayRun {
   void openScenes() {
     if (!settings_.map.enabled || request_.reproduce) return;
     checkMovingLabels(settings_.map_stage);
+    if (!settings_.map.confusion.empty()) {
+      confusion_ =
+          readConfusion(settings_.map.confusion, static_cast<float>(settings_.map_stage.label_certainty));
+    }
     if (!facts_.tracks.empty()) {
       throw InputError(request_.log, 0, "", "a log of feature tracks has no images to map",
                        "Leave --map out");
@@ -203,6 +208,7 @@ class ReplayRun {
     wanted.vocabulary = vocabulary();
     if (scenes_) wanted.depth_sensor = scenes_->depthSensor();
     wanted.spill = &recorder_->spilled();
+    wanted.confusion = confusion_;
     LogFeed feed(*source_, {request_.from, request_.until, request_.last_stamp}, tracks_.get(),
                  scenes_ ? &*scenes_ : nullptr);
     if (request_.real_time) {
@@ -285,6 +291,7 @@ class ReplayRun {
   std::unique_ptr<TrackReader> tracks_;
   std::optional<SceneReader> scenes_;
   std::size_t scene_warnings_ = 0;
+  std::optional<ConfusionModel> confusion_;
   std::size_t warned_ = 0;
   std::size_t steps_ = 0;
   std::optional<RunRecorder> recorder_;

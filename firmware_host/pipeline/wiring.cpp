@@ -82,6 +82,7 @@ Wiring::Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, 
                ? std::make_unique<MapStage>(rig_, settings.map_stage, options.depth_sensor, options.spill)
                : nullptr) {
   if (map_) {
+    if (options.confusion) map_->setConfusion(*options.confusion);
     to_map_ = std::make_unique<MapArrows>();
     mapping_.from_sensor = options.depth_sensor != nullptr;
     const auto pixels = static_cast<std::size_t>(rig_.camera[0].width() * rig_.camera[0].height());

@@ -19,6 +19,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -105,6 +106,7 @@ class Wiring {
     EffortSource* track_effort = nullptr;  ///< null: the settings' effort, always
     EffortSource* smooth_effort = nullptr;
     const DepthImageView* depth_sensor = nullptr;  ///< of the map; null: none, depth from the cameras
+    std::optional<ConfusionModel> confusion;       ///< of the map's labels; empty: the settings' certainty
     SurfaceSink* spill = nullptr;  ///< takes surface for which the map has no room; null: it is lost
     const Vocabulary* vocabulary = nullptr;  ///< of loop closure; null: the shipped one; outlives the wiring
     ArmingMonitor* arming = nullptr;         ///< null: nobody asks whether the vehicle may be armed

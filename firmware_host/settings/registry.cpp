@@ -216,6 +216,10 @@ std::vector<Setting> estimationSettings() {
                    "labels with commas, or empty"}},
       {"map.label_certainty", "", "Probability that a pixel's label is right.",
        real(&Settings::map_stage, &MapSettings::label_certainty, 0.5, 0.999)},
+      {"map.confusion", "",
+       "File of how often the network that labels images takes one label for another, lines of "
+       "true,said,probability; empty: map.label_certainty for all.",
+       TextSetting{member(&Settings::map, &MapGroup::confusion), "a file's name, or empty"}},
       {"calibration.accept_unusual_rig", "",
        "Take a rig whose geometry looks like a transform read the wrong way round.",
        onOff(&Settings::calibration, &CalibrationGroup::accept_unusual_rig)},

@@ -39,6 +39,7 @@ struct LoopGroup {
 struct MapGroup {
   bool enabled = false;
   bool depth_sensor = true;
+  std::string confusion = "";  ///< file; empty: map.label_certainty
 };
 
 /// Priorities are of SCHED_FIFO, 1 to 98; 0 is SCHED_OTHER. All of them below 50, where kernels with

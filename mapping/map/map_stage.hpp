@@ -78,6 +78,9 @@ class MapStage {
   MapStage(const Rig& rig, const MapSettings& settings, const DepthImageView* depth_sensor = nullptr,
            SurfaceSink* spill = nullptr);
 
+  /// Before the first step: in place of MapSettings::label_certainty.
+  void setConfusion(const ConfusionModel& confusion) { confusion_ = confusion; }
+
   /// All of the below, in their order.
   Status step(const MapInput& input, const MapEffort& effort, MapReport& report);
 
