@@ -11,8 +11,16 @@ constexpr std::uint32_t kNone = 0xFFFFFFFF;
 // Buckets of the queue to a cell of distance: waves run outwards evenly enough that few cells are taken
 // twice.
 constexpr float kBucketsPerCell = 4;
-// Against cells handing each other equal distances for ever [cells^2].
-constexpr float kGain = 1e-3F;
+// A cell takes another surface that is nearer by more than this [cells]: what is as good makes no waves. On
+// the way from a cell to its nearest surface the gain does not fall, so none is kept from farther cells.
+constexpr float kGain = 0.05F;
+
+bool isNearer(float squared, float than) {
+  // sqrt(than) - sqrt(squared) > kGain, but for kGain^2.
+  const float gain = than - squared;
+  return gain > 0 && gain * gain > 4 * kGain * kGain * than;
+}
+
 // The window moves once the vehicle is an eighth of it away from its middle.
 constexpr int kSlack = 8;
 
@@ -62,15 +70,14 @@ bool within(const Eigen::Vector3i& cell, const Eigen::Vector3i& origin, const Ei
 DistanceField::DistanceField(const DistanceLimits& limits)
     : limits_(checked(limits)),
       squared_reach_(static_cast<float>(limits_.reach * limits_.reach)),
-      nearest_(static_cast<std::size_t>(limits_.cells.prod())),
-      surface_(nearest_.size()),
-      squared_(nearest_.size()),
-      next_(nearest_.size(), kNone),
+      cell_(static_cast<std::size_t>(limits_.cells.prod())),
+      surface_(cell_.size()),
+      next_(cell_.size(), kNone),
       head_(static_cast<std::size_t>(static_cast<float>(limits_.reach + 2) * kBucketsPerCell), kNone),
       lowest_(head_.size()) {
   for (int i = 0; i < 3; ++i) origin_[i] = -floorDiv(limits_.cells[i] / 2, kDistanceStep) * kDistanceStep;
-  for (std::uint32_t slot = 0; slot < nearest_.size(); ++slot) {
-    nearest_[slot].store(tagOf(cellAt(slot)) << NearestWord::kTagShift, std::memory_order_relaxed);
+  for (std::uint32_t slot = 0; slot < cell_.size(); ++slot) {
+    cell_[slot].nearest.store(tagOf(cellAt(slot)) << NearestWord::kTagShift, std::memory_order_relaxed);
     surface_[slot].store(0, std::memory_order_relaxed);
   }
   publishOrigin();
@@ -79,7 +86,7 @@ DistanceField::DistanceField(const DistanceLimits& limits)
 void DistanceField::publishOrigin() { shown_origin_.store(packOrigin(origin_), std::memory_order_release); }
 
 std::size_t DistanceField::bytes() const {
-  return nearest_.size() * (2 * sizeof(Word) + sizeof(float) + sizeof(std::uint32_t)) +
+  return cell_.size() * (sizeof(Cell) + sizeof(Word) + sizeof(std::uint32_t)) +
          head_.size() * sizeof(std::uint32_t);
 }
 
@@ -118,9 +125,9 @@ Eigen::Vector3i DistanceField::cellAt(std::uint32_t slot) const {
   return cell;
 }
 
-/// What the cell with this word takes for its nearest surface is there, and has not moved since.
-bool DistanceField::holdsTrue(const Eigen::Vector3i& cell, std::uint32_t nearest) const {
-  const Eigen::Vector3i surface = cell + NearestWord::offset(nearest);
+/// What a cell with this word takes for its nearest surface, the one in `surface`, is there and has not
+/// moved.
+bool DistanceField::holdsTrue(const Eigen::Vector3i& surface, std::uint32_t nearest) const {
   if (!inside(surface)) return false;
   const std::uint32_t word = surface_[slotOf(surface)].load(std::memory_order_relaxed);
   if ((word & SurfaceWord::kPresent) == 0) return false;
@@ -144,17 +151,22 @@ float DistanceField::squaredTo(const Eigen::Vector3i& surface, const Eigen::Vect
 }
 
 float DistanceField::squaredDistance(const Eigen::Vector3i& cell) const {
-  const std::uint32_t word = nearest_[slotOf(cell)].load(std::memory_order_relaxed);
+  const std::uint32_t word = cell_[slotOf(cell)].nearest.load(std::memory_order_relaxed);
   if ((word & NearestWord::kHasSurface) == 0) return -1;
   return squaredTo(cell + NearestWord::offset(word), cell);
 }
 
+bool DistanceField::holdsSurface(const Eigen::Vector3i& cell) const {
+  return inside(cell) &&
+         (surface_[slotOf(cell)].load(std::memory_order_relaxed) & SurfaceWord::kPresent) != 0;
+}
+
 void DistanceField::push(std::uint32_t slot, float squared) {
-  const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
+  const std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed);
   // Who waits already is taken later than its new distance asks for: more cells are taken twice, the end is
   // the same.
   if ((word & NearestWord::kQueued) != 0) return;
-  nearest_[slot].store(word | NearestWord::kQueued, std::memory_order_relaxed);
+  cell_[slot].nearest.store(word | NearestWord::kQueued, std::memory_order_relaxed);
   const auto wanted = static_cast<std::size_t>(std::sqrt(std::max(squared, 0.0F)) * kBucketsPerCell);
   const std::size_t bucket = std::min(wanted, head_.size() - 1);
   next_[slot] = head_[bucket];
@@ -169,33 +181,54 @@ bool DistanceField::pop(std::uint32_t& slot) {
   slot = head_[lowest_];
   head_[lowest_] = next_[slot];
   --queued_;
-  const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
-  nearest_[slot].store(word & ~NearestWord::kQueued, std::memory_order_relaxed);
+  const std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed);
+  cell_[slot].nearest.store(word & ~NearestWord::kQueued, std::memory_order_relaxed);
   return true;
 }
 
 void DistanceField::setState(std::uint32_t slot, const Eigen::Vector3i& cell, Space space) {
-  const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
+  const std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed);
   const std::uint32_t kept = word & (NearestWord::kLink | NearestWord::kRaise | NearestWord::kQueued);
-  nearest_[slot].store(kept | static_cast<std::uint32_t>(space) << NearestWord::kSpaceShift |
-                           tagOf(cell) << NearestWord::kTagShift,
-                       std::memory_order_relaxed);
+  cell_[slot].nearest.store(kept | static_cast<std::uint32_t>(space) << NearestWord::kSpaceShift |
+                                tagOf(cell) << NearestWord::kTagShift,
+                            std::memory_order_relaxed);
 }
 
 /// The cell's nearest surface is no more: what it was nearest to is to be raised.
 void DistanceField::remove(std::uint32_t slot) {
-  const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
-  nearest_[slot].store((word & ~NearestWord::kLink) | NearestWord::kRaise, std::memory_order_relaxed);
+  const std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed);
+  cell_[slot].nearest.store((word & ~NearestWord::kLink) | NearestWord::kRaise, std::memory_order_relaxed);
 }
 
 void DistanceField::setSpace(const Eigen::Vector3i& cell, Space space) {
   if (!inside(cell)) return;
   const std::uint32_t slot = slotOf(cell);
   setState(slot, cell, space);
+  dropSurface(slot, cell);
+}
+
+void DistanceField::dropSurface(std::uint32_t slot, const Eigen::Vector3i& cell) {
   const std::uint32_t before = surface_[slot].load(std::memory_order_relaxed);
   if ((before & SurfaceWord::kPresent) == 0) return;
   surface_[slot].store(before & SurfaceWord::kParity, std::memory_order_relaxed);
   askAnew(slot, cell);
+}
+
+void DistanceField::setSpaces(const Eigen::Vector3i& first, std::uint32_t cells,
+                              const std::array<Space, kDistanceStep>& space) {
+  // The window begins and ends at multiples of kDistanceStep: a row lies in it whole, and in slots side by
+  // side.
+  if (!inside(first)) return;
+  const std::uint32_t slot = slotOf(first);
+  const std::uint32_t tag = tagOf(first) << NearestWord::kTagShift;
+  for (std::uint32_t i = 0; i < kDistanceStep; ++i) {
+    if ((cells >> i & 1U) == 0) continue;
+    const std::uint32_t word = cell_[slot + i].nearest.load(std::memory_order_relaxed);
+    const std::uint32_t now = (word & (NearestWord::kLink | NearestWord::kRaise | NearestWord::kQueued)) |
+                              static_cast<std::uint32_t>(space[i]) << NearestWord::kSpaceShift | tag;
+    if (now != word) cell_[slot + i].nearest.store(now, std::memory_order_relaxed);
+    dropSurface(slot + i, first + Eigen::Vector3i(static_cast<int>(i), 0, 0));
+  }
 }
 
 void DistanceField::setSurface(const Eigen::Vector3i& cell, Space space, const Eigen::Vector3f& offset) {
@@ -218,21 +251,22 @@ void DistanceField::setSurface(const Eigen::Vector3i& cell, Space space, const E
 
 /// A cell with surface in it, for which no other is nearer to its middle.
 void DistanceField::takeOwn(std::uint32_t slot, const Eigen::Vector3i& cell) {
-  const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
+  const std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed);
   const float own = SurfaceWord::offset(surface_[slot].load(std::memory_order_relaxed)).squaredNorm();
-  if ((word & NearestWord::kHasSurface) != 0 && own >= squared_[slot]) return;
-  nearest_[slot].store((word & ~NearestWord::kLink) | linkTo(cell, cell), std::memory_order_relaxed);
-  squared_[slot] = own;
+  if ((word & NearestWord::kHasSurface) != 0 && own >= cell_[slot].squared) return;
+  cell_[slot].nearest.store((word & ~NearestWord::kLink) | linkTo(cell, cell), std::memory_order_relaxed);
+  cell_[slot].squared = own;
 }
 
 /// The surface in the cell left or moved: the cell, and after it those that took it for their nearest, look
 /// again.
 void DistanceField::askAnew(std::uint32_t slot, const Eigen::Vector3i& cell) {
-  const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
-  if ((word & NearestWord::kHasSurface) != 0 && !holdsTrue(cell, word)) remove(slot);
-  const std::uint32_t now = nearest_[slot].load(std::memory_order_relaxed);
-  nearest_[slot].store(now | NearestWord::kRaise, std::memory_order_relaxed);
-  push(slot, squared_[slot]);
+  const std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed);
+  if ((word & NearestWord::kHasSurface) != 0 && !holdsTrue(cell + NearestWord::offset(word), word))
+    remove(slot);
+  const std::uint32_t now = cell_[slot].nearest.load(std::memory_order_relaxed);
+  cell_[slot].nearest.store(now | NearestWord::kRaise, std::memory_order_relaxed);
+  push(slot, cell_[slot].squared);
 }
 
 /// The slots around a cell: along each axis what the three coordinates add to the slot, kNone outside the
@@ -282,33 +316,52 @@ std::size_t DistanceField::propagate(std::size_t work) {
   for (std::uint32_t slot = 0; taken < work && pop(slot); ++taken) {
     const Eigen::Vector3i cell = cellAt(slot);
     const Around neighbours = around(cell);
-    if ((nearest_[slot].load(std::memory_order_relaxed) & NearestWord::kRaise) != 0)
+    if ((cell_[slot].nearest.load(std::memory_order_relaxed) & NearestWord::kRaise) != 0)
       raise(slot, cell, neighbours);
     const bool holds = (surface_[slot].load(std::memory_order_relaxed) & SurfaceWord::kPresent) != 0;
     if (holds) takeOwn(slot, cell);
-    const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
+    const std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed);
     // A cell hands on its own surface too, where another is nearer to its own middle: the neighbours may
     // differ.
     if (holds) lower(neighbours, Eigen::Vector3i::Zero(), linkTo(cell, cell), surface_[slot]);
     if ((word & NearestWord::kHasSurface) == 0 || (word & NearestWord::kRaise) != 0) continue;
     const Eigen::Vector3i offset = NearestWord::offset(word);
-    if (offset.isZero() || !holdsTrue(cell, word)) continue;
+    if (offset.isZero() || !holdsTrue(cell + NearestWord::offset(word), word)) continue;
     lower(neighbours, offset, word & NearestWord::kLink, surface_[slotOf(cell + offset)]);
   }
   return taken;
 }
 
+/// Neighbours whose surface is no more are to be raised too. Of those of the others the cell takes the
+/// nearest for its own: so they need not be asked to hand theirs on.
 void DistanceField::raise(std::uint32_t slot, const Eigen::Vector3i& cell, const Around& neighbours) {
+  float best = squared_reach_;
+  Eigen::Vector3i found = Eigen::Vector3i::Zero();
+  bool any = false;
   forNeighbours(neighbours, [&](std::uint32_t beside, int x, int y, int z) {
-    const std::uint32_t word = nearest_[beside].load(std::memory_order_relaxed);
+    const std::uint32_t word = cell_[beside].nearest.load(std::memory_order_relaxed);
     if ((word & NearestWord::kHasSurface) == 0 || (word & NearestWord::kRaise) != 0) return;
-    if (!holdsTrue(cell + Eigen::Vector3i(x, y, z), word)) remove(beside);
-    push(beside, squared_[beside]);
+    const Eigen::Vector3i surface = cell + Eigen::Vector3i(x, y, z) + NearestWord::offset(word);
+    if (!holdsTrue(surface, word)) {
+      remove(beside);
+      push(beside, cell_[beside].squared);
+      return;
+    }
+    const float squared = squaredTo(surface, cell);
+    if (squared > best) return;
+    best = squared;
+    found = surface;
+    any = true;
   });
-  const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed) & ~NearestWord::kRaise;
-  nearest_[slot].store(word, std::memory_order_relaxed);
-  // One that kept a surface hands it on into what was raised.
-  if ((word & NearestWord::kHasSurface) != 0) push(slot, squared_[slot]);
+  std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed) & ~NearestWord::kRaise;
+  const bool holds = (word & NearestWord::kHasSurface) != 0;
+  if (any && (!holds || isNearer(best, cell_[slot].squared))) {
+    word = (word & ~NearestWord::kLink) | linkTo(cell, found);
+    cell_[slot].squared = best;
+  }
+  cell_[slot].nearest.store(word, std::memory_order_relaxed);
+  // Handed on into what was raised before.
+  if (any || holds) push(slot, cell_[slot].squared);
 }
 
 /// Hands the surface point in the cell at `offset` on to the neighbours. `link`: how the cell itself names
@@ -329,14 +382,14 @@ void DistanceField::lower(const Around& neighbours, const Eigen::Vector3i& offse
                           square[1][static_cast<std::size_t>(y + 1)] +
                           square[2][static_cast<std::size_t>(z + 1)];
     if (squared > squared_reach_) return;
-    const std::uint32_t word = nearest_[beside].load(std::memory_order_relaxed);
+    const std::uint32_t word = cell_[beside].nearest.load(std::memory_order_relaxed);
     if ((word & NearestWord::kRaise) != 0) return;
-    if ((word & NearestWord::kHasSurface) != 0 && squared > squared_[beside] - kGain) return;
+    if ((word & NearestWord::kHasSurface) != 0 && !isNearer(squared, cell_[beside].squared)) return;
     // Within reach no component of the offset leaves its seven bits, so that steps are subtracted from all at
     // once.
     const std::uint32_t shifted = link - static_cast<std::uint32_t>(x + (y << 7) + (z << 14));
-    nearest_[beside].store((word & ~NearestWord::kLink) | shifted, std::memory_order_relaxed);
-    squared_[beside] = squared;
+    cell_[beside].nearest.store((word & ~NearestWord::kLink) | shifted, std::memory_order_relaxed);
+    cell_[beside].squared = squared;
     push(beside, squared);
   });
 }
@@ -378,8 +431,9 @@ void DistanceField::clearSlab(int axis, int first, int last) {
       for (int x = low.x(); x < high.x(); ++x) {
         const Eigen::Vector3i cell(x, y, z);
         const std::uint32_t slot = slotOf(cell);
-        const std::uint32_t queued = nearest_[slot].load(std::memory_order_relaxed) & NearestWord::kQueued;
-        nearest_[slot].store(queued | tagOf(cell) << NearestWord::kTagShift, std::memory_order_relaxed);
+        const std::uint32_t queued =
+            cell_[slot].nearest.load(std::memory_order_relaxed) & NearestWord::kQueued;
+        cell_[slot].nearest.store(queued | tagOf(cell) << NearestWord::kTagShift, std::memory_order_relaxed);
         surface_[slot].store(0, std::memory_order_relaxed);
       }
     }
@@ -398,17 +452,17 @@ void DistanceField::wakeLayer(int axis, int at) {
       for (int x = low.x(); x < high.x(); ++x) {
         const Eigen::Vector3i cell(x, y, z);
         const std::uint32_t slot = slotOf(cell);
-        const std::uint32_t word = nearest_[slot].load(std::memory_order_relaxed);
+        const std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed);
         if ((word & NearestWord::kHasSurface) == 0) continue;
-        if (!holdsTrue(cell, word)) remove(slot);
-        push(slot, squared_[slot]);
+        if (!holdsTrue(cell + NearestWord::offset(word), word)) remove(slot);
+        push(slot, cell_[slot].squared);
       }
     }
   }
 }
 
 DistanceField::Corner DistanceField::corner(const Eigen::Vector3i& cell) const {
-  const std::uint32_t word = nearest_[slotOf(cell)].load(std::memory_order_relaxed);
+  const std::uint32_t word = cell_[slotOf(cell)].nearest.load(std::memory_order_relaxed);
   Corner out;
   if (word >> NearestWord::kTagShift != tagOf(cell)) return out;
   out.known = true;

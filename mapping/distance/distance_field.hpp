@@ -14,6 +14,7 @@
 // docs/distance.md.
 
 #include <Eigen/Core>
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -53,6 +54,10 @@ class DistanceField {
   bool follow(const Eigen::Vector3d& p_map);
   /// A cell without surface in it.
   void setSpace(const Eigen::Vector3i& cell, Space space);
+  /// The same for cells in a row along x from `first` on, x a multiple of kDistanceStep: those whose bit is
+  /// set in `cells`.
+  void setSpaces(const Eigen::Vector3i& first, std::uint32_t cells,
+                 const std::array<Space, kDistanceStep>& space);
   /// A cell that the surface passes through, at `offset` [cells] from its middle, each component within +-1.
   void setSurface(const Eigen::Vector3i& cell, Space space, const Eigen::Vector3f& offset);
   /// Takes at most `work` cells from the queue; returns how many it took.
@@ -72,10 +77,17 @@ class DistanceField {
   /// Squared distance [cells^2] of a cell's middle to its nearest surface point; negative where none is in
   /// reach.
   [[nodiscard]] float squaredDistance(const Eigen::Vector3i& cell) const;
+  /// A surface passes through the cell, as the writer was told. Writer's thread.
+  [[nodiscard]] bool holdsSurface(const Eigen::Vector3i& cell) const;
   [[nodiscard]] std::size_t bytes() const;
 
  private:
   using Word = std::atomic<std::uint32_t>;
+  /// Side by side, as waves ask for both.
+  struct Cell {
+    Word nearest{0};    ///< where its nearest surface is
+    float squared = 0;  ///< to it, as it was taken [cells^2]
+  };
   struct Around;
   struct Corner {
     float distance = 0;  ///< cells, signed
@@ -88,11 +100,12 @@ class DistanceField {
   [[nodiscard]] std::uint32_t slotOf(const Eigen::Vector3i& cell) const;
   [[nodiscard]] std::uint32_t tagOf(const Eigen::Vector3i& cell) const;
   [[nodiscard]] Eigen::Vector3i cellAt(std::uint32_t slot) const;
-  [[nodiscard]] bool holdsTrue(const Eigen::Vector3i& cell, std::uint32_t nearest) const;
+  [[nodiscard]] bool holdsTrue(const Eigen::Vector3i& surface, std::uint32_t nearest) const;
   [[nodiscard]] std::uint32_t linkTo(const Eigen::Vector3i& cell, const Eigen::Vector3i& surface) const;
   [[nodiscard]] float squaredTo(const Eigen::Vector3i& surface, const Eigen::Vector3i& cell) const;
   [[nodiscard]] Corner corner(const Eigen::Vector3i& cell) const;
   void setState(std::uint32_t slot, const Eigen::Vector3i& cell, Space space);
+  void dropSurface(std::uint32_t slot, const Eigen::Vector3i& cell);
   void push(std::uint32_t slot, float squared);
   bool pop(std::uint32_t& slot);
   [[nodiscard]] Around around(const Eigen::Vector3i& cell) const;
@@ -112,9 +125,8 @@ class DistanceField {
   float squared_reach_;
   Eigen::Vector3i origin_;
   std::atomic<std::uint64_t> shown_origin_{0};
-  std::vector<Word> nearest_;        ///< of each slot: where its nearest surface is
+  std::vector<Cell> cell_;           ///< of each slot
   std::vector<Word> surface_;        ///< of each slot: the surface in it
-  std::vector<float> squared_;       ///< of each slot: to its nearest surface, as it was taken [cells^2]
   std::vector<std::uint32_t> next_;  ///< in the queue
   std::vector<std::uint32_t> head_;  ///< of the queue, by distance
   std::size_t lowest_ = 0;           ///< no lower bucket holds a cell

@@ -1,6 +1,7 @@
 #include "mapping/distance/volume_distance.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace swiftlet {
@@ -8,6 +9,9 @@ namespace {
 
 // Flatter than this the distance does not say where its zero is [per voxel of 1].
 constexpr float kLeastSlope = 0.3F;
+
+constexpr std::uint32_t kWholeRow = (1U << kBlockSide) - 1;
+static_assert(kBlockSide == kDistanceStep, "a block lies in the window whole or not at all");
 
 constexpr std::array<VoxelIndex, 6> kFaces{
     {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
@@ -21,19 +25,7 @@ BlockIndex blockFrom(std::uint64_t key) {
   return {part(0), part(21), part(42)};
 }
 
-/// From the block's first voxel on, one beyond each face too: what they hold depends on this block.
-template <typename Visit>
-void forVoxels(const BlockIndex& block, int border, const Visit& visit) {
-  const VoxelIndex first{block.x * kBlockSide, block.y * kBlockSide, block.z * kBlockSide};
-  const auto outside = [](int i) { return i < 0 || i >= kBlockSide ? 1 : 0; };
-  for (int z = -border; z < kBlockSide + border; ++z) {
-    for (int y = -border; y < kBlockSide + border; ++y) {
-      for (int x = -border; x < kBlockSide + border; ++x) {
-        if (outside(x) + outside(y) + outside(z) <= 1) visit(first + VoxelIndex{x, y, z});
-      }
-    }
-  }
-}
+Eigen::Vector3i firstCell(const BlockIndex& block) { return cellOf(block) * kBlockSide; }
 
 bool changesSign(float a, float b) { return (a < 0) != (b < 0); }
 
@@ -87,19 +79,100 @@ void VolumeDistance::step(const Eigen::Vector3d& p_map_vehicle, const DistanceEf
 void VolumeDistance::erase(std::uint64_t key) {
   // It may stand elsewhere in the volume by now, or have come back.
   const BlockIndex block = blockFrom(key);
-  if (volume_.find(block) != VoxelVolume::kNone) return;
-  forVoxels(block, 0, [this](const VoxelIndex& voxel) { field_.setSpace(cellOf(voxel), Space::kUnknown); });
+  if (volume_.find(block) == VoxelVolume::kNone) fill(block, Space::kUnknown);
+}
+
+void VolumeDistance::fill(const BlockIndex& block, Space space) {
+  std::array<Space, kBlockSide> row;
+  row.fill(space);
+  for (int z = 0; z < kBlockSide; ++z) {
+    for (int y = 0; y < kBlockSide; ++y)
+      field_.setSpaces(firstCell(block) + Eigen::Vector3i(0, y, z), kWholeRow, row);
+  }
 }
 
 void VolumeDistance::read(std::uint32_t slot) {
   const BlockHeader& header = volume_.header(slot);
   if (header.state == BlockState::kFree) {
-    forVoxels(header.index, 0,
-              [this](const VoxelIndex& voxel) { field_.setSpace(cellOf(voxel), Space::kFree); });
+    fill(header.index, Space::kFree);
     return;
   }
   gatherAround(header.index);
-  forVoxels(header.index, 1, [this](const VoxelIndex& voxel) { readVoxel(voxel); });
+  gatherValues();
+  const VoxelIndex first{header.index.x * kBlockSide, header.index.y * kBlockSide,
+                         header.index.z * kBlockSide};
+  for (int z = 0; z < kBlockSide; ++z) {
+    for (int y = 0; y < kBlockSide; ++y) readRow(first + VoxelIndex{0, y, z}, y, z);
+  }
+  readBorder(first);
+}
+
+/// Distances of the block and one voxel beyond each face, by sign: 1 in front, -1 behind, 0 not observed.
+void VolumeDistance::gatherValues() {
+  sign_.fill(0);
+  const auto signsOf = [this](const BlockIndex& beside, int from, int to, const auto& place) {
+    const std::uint32_t slot = around_[static_cast<std::size_t>(13 + beside.x + 3 * beside.y + 9 * beside.z)];
+    if (slot == VoxelVolume::kNone) return;
+    const VoxelBlock* const voxels = volume_.voxels(slot);
+    for (int i = from; i < to; ++i) {
+      const VoxelIndex voxel = place(i);
+      const std::size_t within = offsetOf(voxel);
+      const bool seen = voxels == nullptr || voxels->weight[within] > 0;
+      const bool behind = voxels != nullptr && voxels->distance[within] < 0;
+      sign_[signAt(voxel.x, voxel.y, voxel.z)] = static_cast<std::int8_t>(!seen ? 0 : behind ? -1 : 1);
+    }
+  };
+  constexpr int kFace = kBlockSide * kBlockSide;
+  const auto low = [](int i) { return i & kBlockMask; };
+  const auto high = [](int i) { return i >> kBlockBits; };
+  signsOf({}, 0, static_cast<int>(kBlockVoxels), [&](int i) {
+    return VoxelIndex{low(i), low(high(i)), high(high(i))};
+  });
+  for (const int side : {-1, 1}) {
+    const int at = side < 0 ? -1 : kBlockSide;
+    signsOf({side, 0, 0}, 0, kFace, [&](int i) { return VoxelIndex{at, low(i), high(i)}; });
+    signsOf({0, side, 0}, 0, kFace, [&](int i) { return VoxelIndex{low(i), at, high(i)}; });
+    signsOf({0, 0, side}, 0, kFace, [&](int i) { return VoxelIndex{low(i), high(i), at}; });
+  }
+}
+
+/// Eight voxels: those beside one of the other sign by themselves, the others as a row.
+void VolumeDistance::readRow(const VoxelIndex& first, int y, int z) {
+  const std::int8_t* const own = &sign_[signAt(0, y, z)];
+  constexpr std::array<int, 6> kBeside = {
+      1, -1, kSignRow, -kSignRow, kSignRow * kSignSide, -kSignRow * kSignSide};
+  std::array<Space, kBlockSide> space;
+  std::uint32_t crossed = 0;
+  for (int x = 0; x < kBlockSide; ++x) {
+    int other = 0;
+    for (const int beside : kBeside) other |= own[x] * own[x + beside];
+    crossed |= (other < 0 ? 1U : 0U) << static_cast<unsigned>(x);
+    space[static_cast<std::size_t>(x)] = own[x] == 0  ? Space::kUnknown
+                                         : own[x] < 0 ? Space::kBehindSurface
+                                                      : Space::kFree;
+  }
+  field_.setSpaces(cellOf(first), kWholeRow & ~crossed, space);
+  for (; crossed != 0; crossed &= crossed - 1) readVoxel(first + VoxelIndex{std::countr_zero(crossed), 0, 0});
+}
+
+/// One voxel beyond each face: what it holds depends on this block where surface passes between the two, or
+/// did.
+void VolumeDistance::readBorder(const VoxelIndex& first) {
+  const auto look = [&](int x, int y, int z, int inner_x, int inner_y, int inner_z) {
+    const VoxelIndex voxel = first + VoxelIndex{x, y, z};
+    const bool crossed = sign_[signAt(x, y, z)] * sign_[signAt(inner_x, inner_y, inner_z)] < 0;
+    if (crossed || field_.holdsSurface(cellOf(voxel))) readVoxel(voxel);
+  };
+  for (const int side : {-1, 1}) {
+    const int outer = side < 0 ? -1 : kBlockSide, inner = side < 0 ? 0 : kBlockSide - 1;
+    for (int j = 0; j < kBlockSide; ++j) {
+      for (int i = 0; i < kBlockSide; ++i) {
+        look(outer, i, j, inner, i, j);
+        look(i, outer, j, i, inner, j);
+        look(i, j, outer, i, j, inner);
+      }
+    }
+  }
 }
 
 void VolumeDistance::gatherAround(const BlockIndex& block) {

@@ -19,7 +19,7 @@ namespace swiftlet {
 
 struct DistanceEffort {
   std::size_t blocks = 500;
-  std::size_t cells = 200'000;
+  std::size_t cells = 100'000;  ///< nearest to surfaces first
 };
 
 struct DistanceStep {
@@ -43,7 +43,16 @@ class VolumeDistance {
 
   void forgetEntered(const Eigen::Vector3i& origin_before);
   [[nodiscard]] bool inWindow(const BlockIndex& block) const;
+  static constexpr int kSignRow = kBlockSide + 2, kSignSide = kBlockSide + 2;
+  [[nodiscard]] static std::size_t signAt(int x, int y, int z) {
+    return static_cast<std::size_t>((x + 1) + kSignRow * ((y + 1) + kSignSide * (z + 1)));
+  }
+
   void read(std::uint32_t slot);
+  void fill(const BlockIndex& block, Space space);
+  void gatherValues();
+  void readRow(const VoxelIndex& first, int y, int z);
+  void readBorder(const VoxelIndex& first);
   void readVoxel(const VoxelIndex& voxel);
   void gatherAround(const BlockIndex& block);
   bool valueAt(const VoxelIndex& voxel, float& distance) const;
@@ -56,6 +65,7 @@ class VolumeDistance {
   // Of the block in hand: its slot and those around it, x fastest.
   BlockIndex block_;
   std::array<std::uint32_t, 27> around_{};
+  std::array<std::int8_t, static_cast<std::size_t>(kSignRow) * kSignSide * kSignSide> sign_{};
 };
 
 }  // namespace swiftlet
