@@ -21,6 +21,11 @@ bool isNearer(float squared, float than) {
   return gain > 0 && gain * gain > 4 * kGain * kGain * than;
 }
 
+// Cells lie in memory in bricks of 8 x 8 x 8, a page of 4 KiB each: a cell's neighbours are in few pages, and
+// what waves wait for is memory.
+constexpr std::uint32_t kBrickBits = 3;
+constexpr std::uint32_t kBrickSide = 1U << kBrickBits;
+static_assert(kBrickSide == kDistanceStep);
 // The window moves once the vehicle is an eighth of it away from its middle.
 constexpr int kSlack = 8;
 
@@ -75,6 +80,11 @@ DistanceField::DistanceField(const DistanceLimits& limits)
       next_(cell_.size(), kNone),
       head_(static_cast<std::size_t>(static_cast<float>(limits_.reach + 2) * kBucketsPerCell), kNone),
       lowest_(head_.size()) {
+  std::uint32_t stride = 1U << (3 * kBrickBits);
+  for (int i = 0; i < 3; ++i) {
+    brick_stride_[static_cast<std::size_t>(i)] = stride;
+    stride *= static_cast<std::uint32_t>(limits_.cells[i]) >> kBrickBits;
+  }
   for (int i = 0; i < 3; ++i) origin_[i] = -floorDiv(limits_.cells[i] / 2, kDistanceStep) * kDistanceStep;
   for (std::uint32_t slot = 0; slot < cell_.size(); ++slot) {
     cell_[slot].nearest.store(tagOf(cellAt(slot)) << NearestWord::kTagShift, std::memory_order_relaxed);
@@ -100,11 +110,17 @@ Eigen::Vector3d DistanceField::centreOf(const Eigen::Vector3i& cell) const {
 
 bool DistanceField::inside(const Eigen::Vector3i& cell) const { return within(cell, origin_, limits_.cells); }
 
+std::uint32_t DistanceField::partOfSlot(int axis, int at) const {
+  const auto shift = static_cast<std::uint32_t>(axis) * kBrickBits;
+  const auto place = static_cast<std::uint32_t>(at);
+  return (place >> kBrickBits) * brick_stride_[static_cast<std::size_t>(axis)] +
+         ((place & (kBrickSide - 1)) << shift);
+}
+
 std::uint32_t DistanceField::slotOf(const Eigen::Vector3i& cell) const {
-  const int x = wrapped(cell.x(), limits_.cells.x());
-  const int y = wrapped(cell.y(), limits_.cells.y());
-  const int z = wrapped(cell.z(), limits_.cells.z());
-  return static_cast<std::uint32_t>((z * limits_.cells.y() + y) * limits_.cells.x() + x);
+  std::uint32_t slot = 0;
+  for (int i = 0; i < 3; ++i) slot += partOfSlot(i, wrapped(cell[i], limits_.cells[i]));
+  return slot;
 }
 
 std::uint32_t DistanceField::tagOf(const Eigen::Vector3i& cell) const {
@@ -117,11 +133,15 @@ std::uint32_t DistanceField::tagOf(const Eigen::Vector3i& cell) const {
 }
 
 Eigen::Vector3i DistanceField::cellAt(std::uint32_t slot) const {
-  const int x = static_cast<int>(slot) % limits_.cells.x();
-  const int rows = static_cast<int>(slot) / limits_.cells.x();
-  const Eigen::Vector3i at(x, rows % limits_.cells.y(), rows / limits_.cells.y());
   Eigen::Vector3i cell;
-  for (int i = 0; i < 3; ++i) cell[i] = origin_[i] + wrapped(at[i] - origin_[i], limits_.cells[i]);
+  std::uint32_t brick = slot >> (3 * kBrickBits);
+  for (int i = 0; i < 3; ++i) {
+    const auto bricks = static_cast<std::uint32_t>(limits_.cells[i]) >> kBrickBits;
+    const std::uint32_t within = slot >> (static_cast<std::uint32_t>(i) * kBrickBits) & (kBrickSide - 1);
+    const int at = static_cast<int>((brick % bricks << kBrickBits) + within);
+    brick /= bricks;
+    cell[i] = origin_[i] + wrapped(at - origin_[i], limits_.cells[i]);
+  }
   return cell;
 }
 
@@ -277,7 +297,6 @@ struct DistanceField::Around {
 
 DistanceField::Around DistanceField::around(const Eigen::Vector3i& cell) const {
   Around result;
-  int stride = 1;
   for (int axis = 0; axis < 3; ++axis) {
     const int cells = limits_.cells[axis];
     const int inside_at = cell[axis] - origin_[axis];
@@ -286,9 +305,8 @@ DistanceField::Around DistanceField::around(const Eigen::Vector3i& cell) const {
       const int next = slot_at + step == cells ? 0 : slot_at + step < 0 ? cells - 1 : slot_at + step;
       const bool within_window = inside_at + step >= 0 && inside_at + step < cells;
       result.part[static_cast<std::size_t>(axis)][static_cast<std::size_t>(step + 1)] =
-          within_window ? static_cast<std::uint32_t>(next * stride) : kNone;
+          within_window ? partOfSlot(axis, next) : kNone;
     }
-    stride *= cells;
   }
   return result;
 }
