@@ -313,7 +313,7 @@ Status PoseGraphOptimizer<Pose>::iterate(const OptimizeEffort& effort, OptimizeR
     if (predicted <= effort.tolerance * cost_ || !(predicted > 0)) break;
     radius_ = kShrink * std::min(length, radius_);
   }
-  report.final_cost = cost_;
+  // The poses stay, and with them final_cost, which a sum in another order would change by its rounding.
   done = true;
   return okStatus();
 }
