@@ -22,7 +22,7 @@ fuzz_seconds=15 # each fuzzer
 # Unit tests that run under sanitizers too; the statistical ones (imu, ransac, whole flights, rendering, the program)
 # repeat the same code thousands of times and would take most of an hour there.
 sanitized='core geometry camera frontend smoother drivers_calibration drivers_recorded drivers_recording drivers_image_decoder
-mesher threaded'
+map mesher threaded'
 # What shares memory between threads, and the whole executor on a second of a log.
 threads='core realtime threaded'
 jobs=$(nproc)

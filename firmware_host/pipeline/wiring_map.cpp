@@ -142,6 +142,11 @@ bool Wiring::map() {
       stepCorrection();
       return true;
     }
+    if (map_ && map_->counters().taken > 0 && !ended && !mapping_.report.distance.caught_up) {
+      // Time that no frame asks for: waves that the last step left.
+      timed(StageId::kDistance, [&] { map_->updateDistance(mapping_.vehicle, {}, mapping_.report); });
+      return true;
+    }
     if (ended && !mapDone()) {
       if (map_) map_->drawRest();
       mapping_.images.reset();
