@@ -117,25 +117,29 @@ TEST_CASE("a recording replayed in lockstep gives the bytes of the run that it w
 /// Makes stages up to four times as slow for random stretches of frames; the last third of a run is free.
 class RandomDrag {
  public:
+  /// A frame and a half: at three times the log's speed one comes every 17 ms.
+  static constexpr double kTooLong = 0.025 / kSlow;  // s
+
   explicit RandomDrag(std::uint64_t seed) : random_(seed + 1) {
     constexpr int kStretches = 4;
     for (int i = 0; i < kStretches; ++i) {
       const int begin = static_cast<int>(random_.below(40));
       stretches_.push_back({random_.below(2) == 0 ? StageId::kTrack : StageId::kSmooth, begin,
-                            begin + 4 + static_cast<int>(random_.below(20)), random_.uniform(2.0, 4.0)});
+                            begin + 4 + static_cast<int>(random_.below(20)), random_.uniform(2.0, 4.0), 0});
     }
-    // One of them is sure to be too much.
-    stretches_.push_back({StageId::kTrack, 8, 40, 4.0});
+    // One of them is sure to be too much, however fast the machine.
+    stretches_.push_back({StageId::kTrack, 8, 40, 4.0, kTooLong});
   }
 
   void operator()(StageId stage, double cpu) {
     if (stage != StageId::kTrack && stage != StageId::kSmooth) return;  // each counts on a thread of its own
     const int frame = (stage == StageId::kTrack ? tracked_ : smoothed_)++;
-    double factor = 1;
+    double more = 0;
     for (const Stretch& s : stretches_) {
-      if (s.stage == stage && frame >= s.begin && frame < s.end) factor = std::max(factor, s.factor);
+      if (s.stage != stage || frame < s.begin || frame >= s.end) continue;
+      more = std::max({more, (s.factor - 1) * cpu, s.least});
     }
-    const double until = threadCpuSeconds() + (factor - 1) * cpu;
+    const double until = threadCpuSeconds() + more;
     while (threadCpuSeconds() < until) {
     }
   }
@@ -145,6 +149,7 @@ class RandomDrag {
     StageId stage;
     int begin, end;  // frames of that stage
     double factor;
+    double least;  // s, on top of the stage's own
   };
   Random random_;
   std::vector<Stretch> stretches_;
