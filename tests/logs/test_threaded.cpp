@@ -296,9 +296,10 @@ TEST_CASE("two runs with loop closure and a map write the same map") {
     CHECK(result.statistics.losses.empty());
     REQUIRE(result.statistics.mapping);
     // Of all keyframes those with a pose that was not still being found.
-    CHECK(result.statistics.mapping->frames > result.statistics.keyframes / 2);
+    CHECK(2 * result.statistics.mapping->frames >= result.statistics.keyframes);
     CHECK(result.statistics.mapping->refused == 0);
-    CHECK(result.summary["map"]["mesh"]["faces"].get<int>() > 1000);
+    // Of four seconds, or of one.
+    CHECK(result.summary["map"]["mesh"]["faces"].get<int>() > (kSanitized ? 300 : 1000));
   }
   for (const char* file : {"map.ply", "map.glb", "odometry.tum"}) {
     CHECK(textOf(folder.file("one/") + file) == textOf(folder.file("two/") + file));
