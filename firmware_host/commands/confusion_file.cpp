@@ -91,4 +91,9 @@ ConfusionModel readConfusion(const std::string& path, float right) {
   return model;
 }
 
+std::optional<ConfusionModel> confusionOf(const Settings& settings) {
+  if (settings.map.confusion.empty()) return std::nullopt;
+  return readConfusion(settings.map.confusion, static_cast<float>(settings.map_stage.label_certainty));
+}
+
 }  // namespace swiftlet

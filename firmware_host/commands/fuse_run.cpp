@@ -135,11 +135,7 @@ void FuseRun::openPoses() {
 
 void FuseRun::begin() {
   checkMovingLabels(settings_.map_stage);
-  std::optional<ConfusionModel> confusion;
-  if (!settings_.map.confusion.empty()) {
-    confusion =
-        readConfusion(settings_.map.confusion, static_cast<float>(settings_.map_stage.label_certainty));
-  }
+  const std::optional<ConfusionModel> confusion = confusionOf(settings_);
   openPoses();
   sensor_ =
       request_.depth == DepthSource::kSensor || (request_.depth == DepthSource::kAny && !depth_.empty());

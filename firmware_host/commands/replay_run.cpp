@@ -145,10 +145,7 @@ class ReplayRun {
   void openScenes() {
     if (!settings_.map.enabled || request_.reproduce) return;
     checkMovingLabels(settings_.map_stage);
-    if (!settings_.map.confusion.empty()) {
-      confusion_ =
-          readConfusion(settings_.map.confusion, static_cast<float>(settings_.map_stage.label_certainty));
-    }
+    confusion_ = confusionOf(settings_);
     if (!facts_.tracks.empty()) {
       throw InputError(request_.log, 0, "", "a log of feature tracks has no images to map",
                        "Leave --map out");

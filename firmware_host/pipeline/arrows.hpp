@@ -164,6 +164,20 @@ struct MeshResult {
   FixedVector<Eigen::Vector2f, kMaxFeatures> hull;  ///< of the frame's features, raw pixels of camera 0
 };
 
+/// Brings the slot that a reader waits for to the head of what it has on loan: older ones go back, a newer
+/// one stays for later. False where it is not there.
+template <typename Pool, typename Ring, typename Key, typename KeyOf>
+bool bringToHead(Pool& pool, std::size_t reader, Ring& ring, typename Pool::Loan& head, const Key& wanted,
+                 KeyOf&& keyOf) {
+  while (!head || keyOf(*head) < wanted) {
+    head.reset();
+    SlotHandle handle;
+    if (!ring.tryPop(handle)) return false;
+    head = pool.borrow(handle, reader);
+  }
+  return keyOf(*head) == wanted;
+}
+
 using ImuRing = SpscRing<ImuArrival, kImuRing>;
 /// Hands samples not later than `until` to `taker`, in order; how many.
 template <typename Taker>
@@ -206,7 +220,7 @@ struct LoopArrows {
 };
 
 /// How the odometry's world lies in the map, now and at each keyframe of the newest epoch that is a node.
-struct MapInWorlds {
+struct WorldsInMap {
   MapCorrection newest;
   FixedVector<WorldInMap, LoopLimits{}.nodes> keyframes;  ///< by frame
   FixedVector<std::uint32_t, kTiedEpochs> tied;           ///< earlier epochs of the same piece
@@ -219,7 +233,7 @@ struct MapArrows {
   SpscRing<SceneNote, 4 * kMapFrames> notes;      ///< of `sensor` to `track`
   DropOldestRing<SlotHandle, kMapFrames> images;  ///< of `track`
   SpscRing<MapMessage, 4 * kMapFrames> frames;    ///< of `smooth`
-  Newest<MapInWorlds> correction;                 ///< of `loop`
+  Newest<WorldsInMap> correction;                 ///< of `loop`
   std::uint64_t images_dropped = 0;               ///< of `track`: frames whose images found no room
 };
 

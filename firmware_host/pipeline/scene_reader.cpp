@@ -1,6 +1,6 @@
 #include "firmware_host/pipeline/scene_reader.hpp"
 
-#include <algorithm>
+#include "firmware_host/pipeline/packed_copy.hpp"
 
 namespace swiftlet {
 
@@ -28,12 +28,8 @@ SceneImages SceneReader::at(Stamp stamp) {
   if (labels_) {
     const ImageView image = labels_->at(stamp);
     if (!image.empty()) {
-      const auto width = static_cast<std::size_t>(image.width);
-      slot.labels.resize(width * static_cast<std::size_t>(image.height));
-      for (int y = 0; y < image.height; ++y) {
-        std::copy_n(image.row(y), width, slot.labels.data() + static_cast<std::size_t>(y) * width);
-      }
-      scene.labels = ImageView{slot.labels.data(), image.width, image.height, image.width};
+      slot.labels.resize(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height));
+      scene.labels = packedCopy(image, slot.labels.data());
     }
   }
   if (!scene.empty()) next_ = (next_ + 1) % kSlots;

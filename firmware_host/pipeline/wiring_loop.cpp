@@ -53,7 +53,7 @@ bool Wiring::loop() {
 
 // loop -> newest correction -> map
 void Wiring::publishMap() {
-  MapInWorlds& out = to_map_->correction.draft();
+  WorldsInMap& out = to_map_->correction.draft();
   out.newest = loop_->correction();
   out.keyframes.clear();
   loop_->tiedEpochs(out.newest.epoch, out.tied);
@@ -65,16 +65,9 @@ void Wiring::publishMap() {
   to_map_->correction.publish();
 }
 
-/// Brings the images of `frame` to the head; those of earlier keyframes go back, later ones stay.
 bool Wiring::findKeyframeImages(std::uint64_t frame) {
-  KeyframePool::Loan& head = closing_.images;
-  while (!head || head->frame < frame) {
-    head.reset();
-    SlotHandle handle;
-    if (!to_loop_->images.tryPop(handle)) return false;
-    head = keyframe_images_->borrow(handle, kLoopReads);
-  }
-  return head->frame == frame;
+  return bringToHead(*keyframe_images_, kLoopReads, to_loop_->images, closing_.images, frame,
+                     [](const KeyframeImages& images) { return images.frame; });
 }
 
 }  // namespace swiftlet

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "firmware_host/pipeline/packed_copy.hpp"
 #include "firmware_host/pipeline/wiring.hpp"
 
 namespace swiftlet {
@@ -33,12 +34,8 @@ void Wiring::takeScene(const SceneImages& scene) {
     }
   }
   if (const ImageView& from = scene.labels; !from.empty() && !slot.labels.empty()) {
-    const auto width = static_cast<std::size_t>(from.width);
     if (from.width == rig_.camera[0].width() && from.height == rig_.camera[0].height()) {
-      for (int y = 0; y < from.height; ++y) {
-        std::copy_n(from.row(y), width, slot.labels.data() + static_cast<std::size_t>(y) * width);
-      }
-      slot.images.labels = ImageView{slot.labels.data(), from.width, from.height, from.width};
+      slot.images.labels = packedCopy(from, slot.labels.data());
     } else {
       ++counters.labels_wrong_size;
     }
@@ -92,14 +89,7 @@ bool Wiring::copyImages(const StereoFrame& frame, bool to_loop, bool to_map) {
   images.frame = frame.index;
   images.number = frame.number;
   for (std::size_t c = 0; c < kMaxCameras; ++c) {
-    const ImageView& from = frame.image[c];
-    images.image[c] = ImageView{};
-    if (from.empty()) continue;
-    const auto width = static_cast<std::size_t>(from.width);
-    for (int y = 0; y < from.height; ++y) {
-      std::copy_n(from.row(y), width, images.pixels[c].data() + static_cast<std::size_t>(y) * width);
-    }
-    images.image[c] = ImageView{images.pixels[c].data(), from.width, from.height, from.width};
+    images.image[c] = packedCopy(frame.image[c], images.pixels[c].data());
   }
   const auto hand = [&](KeyframeReader reader, auto& ring, std::uint64_t& dropped_count) {
     SlotHandle dropped;
@@ -177,7 +167,7 @@ void Wiring::correctMap(const MapMessage& message) {
   const std::uint64_t number = to_map_->correction.refresh();
   if (number == mapping_.correction) return;
   mapping_.correction = number;
-  const MapInWorlds& worlds = to_map_->correction.value();
+  const WorldsInMap& worlds = to_map_->correction.value();
   if (worlds.newest.epoch == message.epoch) map_->correct({worlds.keyframes.data(), worlds.keyframes.size()});
 }
 
@@ -227,28 +217,14 @@ void Wiring::drawMap() {
   timed(StageId::kDistance, [&] { map_->updateDistance(mapping_.vehicle, {}, mapping_.report); });
 }
 
-/// Brings the images of `frame` to the head; those of earlier frames go back, later ones stay.
 bool Wiring::findMapImages(std::uint64_t frame) {
-  KeyframePool::Loan& head = mapping_.images;
-  while (!head || head->frame < frame) {
-    head.reset();
-    SlotHandle handle;
-    if (!to_map_->images.tryPop(handle)) return false;
-    head = keyframe_images_->borrow(handle, kMapReads);
-  }
-  return head->frame == frame;
+  return bringToHead(*keyframe_images_, kMapReads, to_map_->images, mapping_.images, frame,
+                     [](const KeyframeImages& images) { return images.frame; });
 }
 
-/// Likewise depth and labels of `stamp`.
 bool Wiring::findScene(Stamp stamp) {
-  ScenePool::Loan& head = mapping_.scene;
-  while (!head || head->images.stamp < stamp) {
-    head.reset();
-    SlotHandle handle;
-    if (!to_map_->scene.tryPop(handle)) return false;
-    head = to_map_->scenes.borrow(handle, 0);
-  }
-  return head->images.stamp == stamp;
+  return bringToHead(to_map_->scenes, 0, to_map_->scene, mapping_.scene, stamp,
+                     [](const SceneSlot& slot) { return slot.images.stamp; });
 }
 
 }  // namespace swiftlet

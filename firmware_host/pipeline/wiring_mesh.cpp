@@ -71,16 +71,9 @@ void Wiring::meshFrame(const MeshMessage& message) {
   if (to_recorder_) static_cast<void>(to_recorder_->mesh.tryPush(step));
 }
 
-/// Brings camera 0's image `number` to the head; what is older goes back, what is newer stays for later.
 bool Wiring::findMeshImage(std::uint64_t number) {
-  ImagePool::Loan& head = meshing_.image;
-  while (number > 0 && (!head || head->frame.number < number)) {
-    head.reset();
-    SlotHandle handle;
-    if (!image_to_mesh_.tryPop(handle)) break;
-    head = camera_[0].pool.borrow(handle, kMeshReads);
-  }
-  return number > 0 && head && head->frame.number == number;
+  return number > 0 && bringToHead(camera_[0].pool, kMeshReads, image_to_mesh_, meshing_.image, number,
+                                   [](const ImageSlot& slot) { return slot.frame.number; });
 }
 
 void Wiring::publishMesh(bool keyframe) {

@@ -1,7 +1,8 @@
 // The thread `track`: images from slots through pairing to the front-end.
 
-#include <algorithm>
+#include <limits>
 
+#include "firmware_host/pipeline/packed_copy.hpp"
 #include "firmware_host/pipeline/wiring.hpp"
 
 namespace swiftlet {
@@ -30,12 +31,7 @@ void Wiring::takeImage(const CameraFrame& image, const HostTimes& host) {
   slot.frame = image;
   slot.frame.number = ++counters.images[image.camera];
   slot.host = host;
-  const ImageView& from = image.image;
-  const auto width = static_cast<std::size_t>(from.width);
-  for (int y = 0; y < from.height; ++y) {
-    std::copy_n(from.row(y), width, slot.pixels.data() + static_cast<std::size_t>(y) * width);
-  }
-  slot.frame.image = ImageView{slot.pixels.data(), from.width, from.height, from.width};
+  slot.frame.image = packedCopy(image.image, slot.pixels.data());
   if (to_recorder_) {
     const bool handed = camera.pool.tryHand(handle, kRecordReads);
     if (!handed) {

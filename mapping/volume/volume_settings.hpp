@@ -32,7 +32,7 @@ struct VolumeSettings {
   double sigma_quadratic = 0.0;
   /// A pixel whose deviation is larger [m] says what is free in front of it, and not where the surface is:
   /// twice the truncation distance, beyond which two of three such measurements miss the band. On vil_mh05 it
-  /// is what keeps far walls by stereo from standing twice (docs/volume.md).
+  /// is what keeps far walls by stereo from standing twice (docs/map.md).
   double most_sigma = 0.30;
   /// Weight at which a voxel stops to gain, so that what changed since is forgotten.
   double most_weight = 100.0;

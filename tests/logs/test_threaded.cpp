@@ -240,18 +240,24 @@ TEST_CASE("a stage that stands still loses the oldest images, counted, and goes 
   }
 }
 
+/// On threads, every step of a stage held up by so many seconds of the log.
+ReplayResult runHeldUp(ReplayRequest request, StageId held_up, double seconds) {
+  request.real_time = true;
+  ReplayHooks hooks;
+  hooks.drag = [&](StageId stage, double /*cpu*/) {
+    if (stage == held_up) usleep(static_cast<useconds_t>(1e6 * seconds / kSlow));
+  };
+  ReplayResult result = runReplay(request, Settings{}, hooks);
+  REQUIRE(result.finished);
+  checkAccounts(result.statistics, kImages);
+  return result;
+}
+
 TEST_CASE("a mesh that falls behind skips to the newest window, and nobody waits for it") {
   const ScratchFolder folder("mesh_behind");
   ReplayRequest request = requestFor(shortLog(), folder.file("run"));
-  request.real_time = true;
   request.record = true;
-  ReplayHooks hooks;
-  hooks.drag = [&](StageId stage, double /*cpu*/) {
-    if (stage == StageId::kMesh) usleep(static_cast<useconds_t>(180'000 / kSlow));  // of some four frames
-  };
-  const ReplayResult result = runReplay(request, Settings{}, hooks);
-  REQUIRE(result.finished);
-  checkAccounts(result.statistics, kImages);
+  const ReplayResult result = runHeldUp(request, StageId::kMesh, 0.18);  // some four frames
   CHECK(result.statistics.last_image == kLastImage);
   REQUIRE(result.statistics.mesh);
   const MeshStatistics& mesh = *result.statistics.mesh;
@@ -309,15 +315,8 @@ TEST_CASE("two runs with loop closure and a map write the same map") {
 TEST_CASE("a map that falls behind misses frames, counted, and nobody waits for it") {
   const ScratchFolder folder("slow_map");
   ReplayRequest request = requestFor(shortLog(), folder.file("run"));
-  request.real_time = true;
   request.map = true;
-  ReplayHooks hooks;
-  hooks.drag = [](StageId stage, double /*cpu*/) {
-    if (stage == StageId::kDepth) usleep(static_cast<unsigned>(600e3 / kSlow));
-  };
-  const ReplayResult result = runReplay(request, Settings{}, hooks);
-  REQUIRE(result.finished);
-  checkAccounts(result.statistics, kImages);
+  const ReplayResult result = runHeldUp(request, StageId::kDepth, 0.6);
   REQUIRE(result.statistics.mapping);
   const MapThreadStatistics& map = *result.statistics.mapping;
   CHECK(map.frames > 0);
