@@ -1,10 +1,11 @@
 #pragma once
 // What the estimate may be used for: the rules that turn a frame's figures into `Health`.
 //
-//  initializing  the first 9 frames of an epoch, in which tilt and velocity settle
+//  initializing  until the 10th accepted image of an epoch: tilt and velocity settle
 //  good          25 accepted sightings, an image of every camera of the rig, none accepted over 0.3 s ago
-//  degraded      a camera or IMU samples missing, fewer sightings, or coasting on the IMU for less than
-//                the limit
+//  degraded      a camera missing, fewer sightings, or coasting on the IMU for less than the limit; samples
+//                missing, or coasting for more than 0.3 s, and the 9 accepted images after it, in which the
+//                state that drifted settles again; the 39 after more than 2 s, or without samples too
 //  failed        no accepted image (8 sightings) for 3 s; the next accepted image ends it
 // Sightings by both cameras count once. Residuals and covariance are not looked at. No memory, O(1).
 
@@ -25,7 +26,7 @@ class HealthMonitor {
 
   /// After a solve. `imu_missing`: samples were missing since the last frame.
   Health update(const TrackedFrame& frame, const FrameStatistics& statistics, std::size_t cameras,
-                bool imu_missing, std::uint64_t frames_in_epoch);
+                bool imu_missing, bool first_of_epoch);
 
   /// The health after the last update.
   [[nodiscard]] Health health() const { return health_; }
@@ -41,6 +42,7 @@ class HealthMonitor {
   Health health_ = Health::kInitializing;
   bool has_image_ = false;
   Stamp last_accepted_;
+  int settling_ = 0;  ///< accepted images until the state has settled
 };
 
 }  // namespace swiftlet

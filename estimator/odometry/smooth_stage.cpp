@@ -237,7 +237,8 @@ void SmoothStage::publish(const TrackedFrame& tracked, bool imu_missing, Odometr
   state.covariance = smoother_.covariance();
   output.statistics = smoother_.statistics();
   output.calibration = {smoother_.timeOffset(), smoother_.extrinsics()};
-  state.health = health_.update(tracked, output.statistics, rig_.camera_count, imu_missing, frames_in_epoch_);
+  state.health =
+      health_.update(tracked, output.statistics, rig_.camera_count, imu_missing, frames_in_epoch_ <= 1);
   smoother_.setHealth(state.health);
   watch_.step({tracked.stamp, tracked.camera_present, rig_.camera_count, rest_.state().at_rest, state.health,
                health_.secondsWithoutImage(tracked.stamp)},
