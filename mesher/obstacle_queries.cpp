@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "estimator/core/fixed_vector.hpp"
 
@@ -14,14 +15,14 @@ namespace {
 // A triangle cut by six half-spaces has nine corners at most.
 using Polygon = FixedVector<Eigen::Vector3f, 9>;
 
-/// Keeps what has side * p[axis] <= limit.
-void cut(const Polygon& polygon, int axis, float side, float limit, Polygon& out) {
+/// Keeps what has normal . p <= limit.
+void cut(const Polygon& polygon, const Eigen::Vector3f& normal, float limit, Polygon& out) {
   out.clear();
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     const Eigen::Vector3f& p = polygon[i];
     const Eigen::Vector3f& q = polygon[(i + 1) % polygon.size()];
-    const float beyond_p = side * p[axis] - limit;
-    const float beyond_q = side * q[axis] - limit;
+    const float beyond_p = normal.dot(p) - limit;
+    const float beyond_q = normal.dot(q) - limit;
     if (beyond_p <= 0) static_cast<void>(out.tryPushBack(p));
     if ((beyond_p < 0 && beyond_q > 0) || (beyond_p > 0 && beyond_q < 0)) {
       static_cast<void>(out.tryPushBack(p + (q - p) * (beyond_p / (beyond_p - beyond_q))));
@@ -51,6 +52,71 @@ Eigen::Vector3f nearestToOrigin(const Polygon& polygon, const Eigen::Vector3f& n
     if (candidate.squaredNorm() < best.squaredNorm()) best = candidate;
   }
   return best;
+}
+
+constexpr float kSectorWidth = 2 * std::numbers::pi_v<float> / static_cast<float>(kObstacleSectors);
+
+/// Horizontal distance from the origin to the convex polygon, which does not lie around it.
+float horizontalDistance(const Polygon& polygon) {
+  float best = kNothingKnown;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Eigen::Vector2f p = polygon[i].head<2>();
+    const Eigen::Vector2f edge = polygon[(i + 1) % polygon.size()].head<2>() - p;
+    const float length = edge.squaredNorm();
+    const float at = length > 0 ? std::clamp(-edge.dot(p) / length, 0.0F, 1.0F) : 0.0F;
+    best = std::min(best, (p + at * edge).norm());
+  }
+  return best;
+}
+
+/// The azimuths that a polygon covers, from x to y, in sectors; `around` where it surrounds the origin.
+struct Azimuths {
+  int first = 0;
+  int last = -1;
+  bool around = false;
+};
+
+Azimuths azimuthsOf(const Polygon& polygon) {
+  const float begin = std::atan2(polygon[0].y(), polygon[0].x());
+  float angle = 0;
+  float low = 0;
+  float high = 0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Eigen::Vector3f& p = polygon[i];
+    const Eigen::Vector3f& q = polygon[(i + 1) % polygon.size()];
+    angle += std::atan2(p.x() * q.y() - p.y() * q.x(), p.x() * q.x() + p.y() * q.y());
+    low = std::min(low, angle);
+    high = std::max(high, angle);
+  }
+  Azimuths azimuths;
+  // All the way round in one direction, not there and back.
+  azimuths.around = std::abs(angle) > std::numbers::pi_v<float>;
+  azimuths.first = static_cast<int>(std::floor((begin + low) / kSectorWidth + 0.5F));
+  azimuths.last = static_cast<int>(std::floor((begin + high) / kSectorWidth + 0.5F));
+  return azimuths;
+}
+
+/// What the polygon has in the sectors that it crosses.
+void addToSectors(const Polygon& polygon, SectorDistances& nearest) {
+  const Azimuths azimuths = azimuthsOf(polygon);
+  if (azimuths.around) {
+    nearest.fill(0);
+    return;
+  }
+  constexpr int kSectors = static_cast<int>(kObstacleSectors);
+  for (int sector = azimuths.first; sector <= std::min(azimuths.last, azimuths.first + kSectors - 1);
+       ++sector) {
+    const float left = (static_cast<float>(sector) - 0.5F) * kSectorWidth;
+    const float right = left + kSectorWidth;
+    Polygon half;
+    Polygon part;
+    cut(polygon, {std::sin(left), -std::cos(left), 0}, 0, half);
+    if (half.empty()) continue;
+    cut(half, {-std::sin(right), std::cos(right), 0}, 0, part);
+    if (part.empty()) continue;
+    float& known = nearest[static_cast<std::size_t>((sector % kSectors + kSectors) % kSectors)];
+    known = std::min(known, horizontalDistance(part));
+  }
 }
 
 }  // namespace
@@ -101,7 +167,8 @@ std::optional<Obstacle> nearestInBox(const LocalMesh& mesh, const SE3& T_world_b
     std::size_t current = 0;
     for (int side = 0; side < 6 && !polygon[current].empty(); ++side) {
       const float sign = side % 2 == 0 ? 1.0F : -1.0F;
-      cut(polygon[current], side / 2, sign, half_size[side / 2], polygon[1 - current]);
+      cut(polygon[current], sign * Eigen::Vector3f::Unit(side / 2), half_size[side / 2],
+          polygon[1 - current]);
       current = 1 - current;
     }
     if (polygon[current].empty()) continue;
@@ -111,6 +178,34 @@ std::optional<Obstacle> nearestInBox(const LocalMesh& mesh, const SE3& T_world_b
     best = Obstacle{R.transpose() * (point - t), nearest, i, face.label};
   }
   return best;
+}
+
+SectorDistances nearestBySector(const LocalMesh& mesh, const SectorQuery& query) {
+  SectorDistances nearest;
+  nearest.fill(kNothingKnown);
+  // Forward, right, up: azimuths run clockwise.
+  const float c = std::cos(query.heading);
+  const float s = std::sin(query.heading);
+  const auto inVehicle = [&](const Eigen::Vector3f& p_world) {
+    const Eigen::Vector3f d = p_world - query.origin;
+    return Eigen::Vector3f(c * d.x() + s * d.y(), s * d.x() - c * d.y(), d.z());
+  };
+  for (const MeshFace& face : mesh.faces) {
+    Polygon corners;
+    for (const std::uint32_t v : face.vertex) {
+      static_cast<void>(corners.tryPushBack(inVehicle(mesh.vertices[v].p_world)));
+    }
+    Polygon lower;
+    Polygon band;
+    cut(corners, Eigen::Vector3f::UnitZ(), query.above, lower);
+    if (lower.empty()) continue;
+    cut(lower, -Eigen::Vector3f::UnitZ(), query.below, band);
+    if (!band.empty()) addToSectors(band, nearest);
+  }
+  for (float& distance : nearest) {
+    if (distance > query.reach) distance = kNothingKnown;
+  }
+  return nearest;
 }
 
 }  // namespace swiftlet
