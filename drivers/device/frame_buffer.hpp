@@ -1,0 +1,110 @@
+#pragma once
+// Cuts a byte stream into frames. A protocol says, from the bytes at one place, whether a frame begins there;
+// this holds the bytes, finds the next place after a refusal, and knows when each byte arrived.
+//
+// - Results depend on the bytes alone, not on how they were cut into reads.
+// - After any refusal the search goes on one byte later, never after the refused length: a stray sync byte
+//   costs no frame.
+// - The arrival of a byte is the time of the read minus the bytes behind it times the time of one byte on the
+//   wire; 0 for links whose baud rate means nothing (USB CDC).
+// Memory: nine bytes for each byte it can hold, inside the object. Cost: O(1) a byte, plus what the check
+// costs at places that look like a frame.
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "drivers/device/stream_counters.hpp"
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+enum class FrameVerdict : std::uint8_t {
+  kNotHere,      ///< no frame begins at the first byte
+  kIncomplete,   ///< one may: more bytes are needed. Not to be said with longest frame's length at hand
+  kBadChecksum,  ///< one seemed to
+  kWhole,        ///< one does, of `length` bytes
+};
+
+struct FrameCheck {
+  FrameVerdict verdict = FrameVerdict::kNotHere;
+  std::size_t length = 0;  ///< of a whole frame
+};
+
+/// Valid until the next feed().
+struct StampedFrame {
+  std::span<const std::uint8_t> bytes;
+  Stamp arrival;  ///< of the first byte, CLOCK_MONOTONIC
+};
+
+template <std::size_t kLongestFrame>
+class FrameBuffer {
+ public:
+  /// What feed() takes for sure once next() has said false: more than a serial port's buffer in the kernel.
+  static constexpr std::size_t kMostFed = 4096;
+
+  /// Takes from the front of `bytes` what there is room for and says how many; all of kMostFed bytes once
+  /// next() has said false.
+  [[nodiscard]] std::size_t feed(std::span<const std::uint8_t> bytes, Stamp read_at, Duration byte_time,
+                                 StreamCounters& counters) {
+    if (bytes.size() > bytes_.size() - end_) moveToFront();
+    const std::size_t count = std::min(bytes.size(), bytes_.size() - end_);
+    std::copy_n(bytes.begin(), count, bytes_.begin() + static_cast<std::ptrdiff_t>(end_));
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto behind = static_cast<std::int64_t>(bytes.size() - 1 - i);
+      arrivals_[end_ + i] = read_at - Duration{behind * byte_time.ns};
+    }
+    end_ += count;
+    counters.bytes += count;
+    return count;
+  }
+
+  /// The next whole frame, if it is there. `check(std::span<const std::uint8_t>) -> FrameCheck` looks at the
+  /// bytes from one place on; what it says of a place must not change when more bytes come, but for
+  /// kIncomplete.
+  template <typename Check>
+  bool next(Check&& check, StampedFrame& frame, StreamCounters& counters) {
+    while (begin_ < end_) {
+      const FrameCheck found = check(std::span<const std::uint8_t>(bytes_).subspan(begin_, end_ - begin_));
+      if (found.verdict == FrameVerdict::kIncomplete) return false;
+      if (found.verdict == FrameVerdict::kWhole) {
+        frame = {std::span<const std::uint8_t>(bytes_).subspan(begin_, found.length), arrivals_[begin_]};
+        begin_ += found.length;
+        ++counters.frames;
+        counters.framed_bytes += found.length;
+        return true;
+      }
+      if (found.verdict == FrameVerdict::kBadChecksum) ++counters.checksum_failures;
+      ++counters.skipped_bytes;
+      ++begin_;
+    }
+    return false;
+  }
+
+  /// Bytes that wait for the rest of their frame.
+  [[nodiscard]] std::size_t waiting() const { return end_ - begin_; }
+  /// Forgets them, after the device was gone; they count as skipped.
+  void clear(StreamCounters& counters) {
+    counters.skipped_bytes += waiting();
+    begin_ = end_ = 0;
+  }
+
+ private:
+  void moveToFront() {
+    std::copy(bytes_.begin() + static_cast<std::ptrdiff_t>(begin_),
+              bytes_.begin() + static_cast<std::ptrdiff_t>(end_), bytes_.begin());
+    std::copy(arrivals_.begin() + static_cast<std::ptrdiff_t>(begin_),
+              arrivals_.begin() + static_cast<std::ptrdiff_t>(end_), arrivals_.begin());
+    end_ -= begin_;
+    begin_ = 0;
+  }
+
+  std::array<std::uint8_t, kMostFed + kLongestFrame> bytes_ = {};
+  std::array<Stamp, kMostFed + kLongestFrame> arrivals_ = {};
+  std::size_t begin_ = 0;
+  std::size_t end_ = 0;
+};
+
+}  // namespace swiftlet

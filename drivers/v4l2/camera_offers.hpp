@@ -1,0 +1,39 @@
+#pragma once
+// What a video node offers: in words for a refusal, and as lists for those who search for a camera.
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "drivers/device/device_fault.hpp"
+#include "drivers/v4l2/video_node.hpp"
+
+namespace swiftlet {
+
+/// "GREY YUYV 640x480 752x480, UYVY 640x480, MJPG": formats that are taken first, with their sizes. Cut to
+/// `size` bytes with the 0. Does not allocate.
+void writeOffers(const VideoNode& node, char* out, std::size_t size);
+/// "10 20 30": the frame rates of one format and size.
+void writeRates(const VideoNode& node, std::uint32_t fourcc, int width, int height, char* out,
+                std::size_t size);
+
+struct FormatOffer {
+  std::string fourcc;
+  bool taken = false;              ///< one of kPixelFormats
+  std::vector<std::string> sizes;  ///< "752x480", or "16x16 to 1920x1080"
+};
+
+struct CameraListing {
+  std::string path;
+  std::string driver;
+  std::string card;
+  std::string bus;
+  std::vector<FormatOffer> formats;
+  DeviceFault fault;  ///< why it could not be asked (no rights), or that it is no camera
+};
+
+/// Every /dev/video* in order of its number, with those that are no cameras. Allocates; not for flight.
+std::vector<CameraListing> listCameras();
+
+}  // namespace swiftlet
