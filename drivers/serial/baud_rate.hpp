@@ -1,0 +1,12 @@
+#pragma once
+// Any baud rate, by the kernel's termios2: in a source of its own, because its header and <termios.h> define
+// the same names differently.
+
+namespace swiftlet {
+
+/// Asks the port for `baud` in both directions; 0 or errno.
+int setBaudRate(int descriptor, unsigned baud);
+/// What it runs at; 0 or errno.
+int readBaudRate(int descriptor, unsigned& baud);
+
+}  // namespace swiftlet

@@ -1,0 +1,44 @@
+#pragma once
+// swiftlet's own framing for microcontrollers that put a bare inertial chip on a serial port, and for the
+// camera trigger that they make or see: both in one clock, the microcontroller's.
+//
+//   A9 1C | version and kind | length | payload | CRC     all little-endian
+//   byte 2: version (1) in the high four bits, kind in the low four; byte 3: bytes of payload
+//   CRC-16/CCITT-FALSE over byte 2 to the payload's end
+//   kind 1, sample: time u64 ns | counter u32 | gyro 3 x f32 rad/s | accel 3 x f32 m/s^2 [| temperature f32]
+//   kind 2, edge:   time u64 ns | counter u32 | line u8 | rising u8
+// A payload may grow at its end; what is not known there is passed over. docs/serial.md has the sender.
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "drivers/device/frame_buffer.hpp"
+#include "drivers/device/imu_reading.hpp"
+#include "drivers/serial/device_count.hpp"
+#include "drivers/serial/inertial_frame.hpp"
+
+namespace swiftlet {
+
+class Bridge {
+ public:
+  static constexpr std::size_t kLongestFrame = 4 + 255 + 2;
+
+  [[nodiscard]] static FrameCheck check(std::span<const std::uint8_t> bytes);
+  void read(std::span<const std::uint8_t> frame, InertialFrame& content);
+  void forget() { *this = {}; }
+
+ private:
+  WrappingCounter<std::uint32_t> samples_;
+  WrappingCounter<std::uint32_t> edges_;
+};
+
+/// 42 bytes, 46 with the temperature [degC]. The device clock, or the arrival where there is none; the
+/// counter's low 32 bits. Returns the length; 0 when `out` is too short.
+std::size_t encodeBridge(const ImuReading& reading, std::optional<float> temperature,
+                         std::span<std::uint8_t> out);
+/// 20 bytes.
+std::size_t encodeBridge(const TriggerEdge& edge, std::span<std::uint8_t> out);
+
+}  // namespace swiftlet

@@ -1,0 +1,81 @@
+#pragma once
+// Counters and clocks of sensors, which wrap at 16 or 32 bits, made 64 bits wide; and what their steps say of
+// lost samples.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+/// A clock: a step of more than half the range forward is one back, so that the device's start anew shows.
+/// Cost: O(1). `T` is unsigned.
+template <typename T>
+class WrappingClock {
+ public:
+  std::int64_t unwrap(T value) {
+    total_ = last_ ? total_ + difference(value, *last_) : static_cast<std::int64_t>(value);
+    last_ = value;
+    return total_;
+  }
+  /// A value close to the last one, without moving on: of an event told about next to a sample.
+  [[nodiscard]] std::int64_t near(T value) const {
+    return last_ ? total_ + difference(value, *last_) : static_cast<std::int64_t>(value);
+  }
+  void forget() { last_.reset(); }
+
+ private:
+  static std::int64_t difference(T value, T from) {
+    const auto forward = static_cast<T>(value - from);
+    const auto backward = static_cast<T>(from - value);
+    return forward <= backward ? static_cast<std::int64_t>(forward) : -static_cast<std::int64_t>(backward);
+  }
+
+  std::optional<T> last_;
+  std::int64_t total_ = 0;
+};
+
+/// A counter: never goes back, since a number that was used should not come again.
+template <typename T>
+class WrappingCounter {
+ public:
+  std::uint64_t unwrap(T value) {
+    total_ = last_ ? total_ + static_cast<T>(value - *last_) : value;
+    last_ = value;
+    return total_;
+  }
+  void forget() { last_.reset(); }
+
+ private:
+  std::optional<T> last_;
+  std::uint64_t total_ = 0;
+};
+
+/// How many samples are missing in front of each: from the counter where there is one, else from the
+/// device's clock and the median of its last steps. Memory: nine steps. Cost: O(1).
+class SampleGaps {
+ public:
+  struct Step {
+    std::uint64_t missing = 0;
+    bool went_back = false;  ///< the clock, or a counter by more than half of 16 bits
+  };
+  Step step(std::optional<Stamp> device, std::optional<std::uint64_t> counter);
+  void forget();
+
+ private:
+  std::uint64_t missingByClock(Duration step);
+
+  static constexpr std::size_t kSteps = 9;
+  std::array<std::int64_t, kSteps> steps_ = {};  ///< [ns], the last ones in a ring
+  std::size_t step_count_ = 0;
+  std::optional<Stamp> device_;
+  std::optional<std::uint64_t> counter_;
+};
+
+/// `value` units of `ns_per_unit` as a stamp; empty beyond what 63 bits of nanoseconds hold (292 years).
+std::optional<Stamp> stampOf(std::uint64_t value, std::uint64_t ns_per_unit);
+
+}  // namespace swiftlet

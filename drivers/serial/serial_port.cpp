@@ -1,0 +1,177 @@
+#include "drivers/serial/serial_port.hpp"
+
+#include <fcntl.h>
+#include <linux/serial.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <climits>
+#include <cstdlib>
+#include <ctime>
+#include <string_view>
+#include <utility>
+
+#include "drivers/serial/baud_rate.hpp"
+
+namespace swiftlet {
+namespace {
+
+Stamp now() {
+  timespec time = {};
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  return Stamp{static_cast<std::int64_t>(time.tv_sec) * 1'000'000'000 + time.tv_nsec};
+}
+
+/// Rounded up, so that a wait of less than a millisecond is one.
+int pollMilliseconds(Duration duration) {
+  constexpr std::int64_t kNsPerMs = 1'000'000;
+  constexpr std::int64_t kLongest = 60'000;
+  return static_cast<int>(std::clamp((duration.ns + kNsPerMs - 1) / kNsPerMs, std::int64_t{0}, kLongest));
+}
+
+/// Whose baud rate is what the wire does: not USB CDC's, nor a pseudo-terminal's.
+bool baudMeansSomething(const char* path) {
+  std::array<char, PATH_MAX> real = {};
+  const std::string_view node = realpath(path, real.data()) != nullptr ? real.data() : path;
+  return !node.starts_with("/dev/ttyACM") && !node.starts_with("/dev/pts/");
+}
+
+}  // namespace
+
+DeviceFault SerialPort::open() {
+  close();
+  if (settings_.baud == 0 || settings_.baud > kHighestBaud) {
+    return deviceFault(DeviceFaultKind::kUnsupported, 0, "%u baud asked, 1 to %u possible", settings_.baud,
+                       kHighestBaud);
+  }
+  descriptor_ = ::open(settings_.path.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
+  if (descriptor_ < 0) return openFault(errno, "open");
+  const DeviceFault fault = configure();
+  if (!fault.ok()) close();
+  return fault;
+}
+
+DeviceFault SerialPort::configure() {
+  termios settings = {};
+  if (tcgetattr(descriptor_, &settings) != 0) {
+    if (errno == ENOTTY) return deviceFault(DeviceFaultKind::kWrongDevice, 0, "no serial port");
+    return deviceFault(DeviceFaultKind::kFailed, errno, "tcgetattr");
+  }
+  if (ioctl(descriptor_, TIOCEXCL) != 0) return deviceFault(DeviceFaultKind::kFailed, errno, "TIOCEXCL");
+  cfmakeraw(&settings);
+  settings.c_cflag |= static_cast<tcflag_t>(CLOCAL | CREAD);
+  settings.c_cflag &= ~static_cast<tcflag_t>(CSTOPB | CRTSCTS);
+  settings.c_cc[VMIN] = 0;
+  settings.c_cc[VTIME] = 0;
+  if (tcsetattr(descriptor_, TCSANOW, &settings) != 0)
+    return deviceFault(DeviceFaultKind::kFailed, errno, "tcsetattr");
+  if (const int error = setBaudRate(descriptor_, settings_.baud); error != 0)
+    return deviceFault(DeviceFaultKind::kUnsupported, error, "%u baud", settings_.baud);
+  if (const int error = readBaudRate(descriptor_, baud_); error != 0)
+    return deviceFault(DeviceFaultKind::kFailed, error, "TCGETS2");
+  // A sampling error of a quarter bit at the stop bit is 2.5 %, shared by both ends.
+  constexpr unsigned kAllowedPercent = 2;
+  const unsigned off = baud_ > settings_.baud ? baud_ - settings_.baud : settings_.baud - baud_;
+  if (off > settings_.baud / 100 * kAllowedPercent + settings_.baud % 100 * kAllowedPercent / 100)
+    return deviceFault(DeviceFaultKind::kChanged, 0, "%u baud asked, %u set", settings_.baud, baud_);
+
+  askLowLatency();
+  constexpr std::int64_t kBitsPerByte = 10;
+  constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+  byte_time_ = {};
+  if (baudMeansSomething(settings_.path.c_str())) byte_time_ = Duration{kBitsPerByte * kNsPerSecond / baud_};
+  tcflush(descriptor_, TCIFLUSH);
+  return {};
+}
+
+void SerialPort::askLowLatency() {
+  low_latency_ = LowLatency::kNotAsked;
+  if (!settings_.low_latency) return;
+  low_latency_ = LowLatency::kNotOffered;
+  serial_struct serial = {};
+  if (ioctl(descriptor_, TIOCGSERIAL, &serial) != 0) return;
+  constexpr int kFlag = static_cast<int>(ASYNC_LOW_LATENCY);
+  serial.flags |= kFlag;
+  if (ioctl(descriptor_, TIOCSSERIAL, &serial) != 0) return;
+  serial = {};
+  if (ioctl(descriptor_, TIOCGSERIAL, &serial) == 0 && (serial.flags & kFlag) != 0)
+    low_latency_ = LowLatency::kOn;
+}
+
+void SerialPort::close() {
+  if (descriptor_ < 0) return;
+  // The lock outlives the file where another one is open, as at the other end of a pseudo-terminal.
+  (void)ioctl(descriptor_, TIOCNXCL);
+  ::close(std::exchange(descriptor_, -1));
+}
+
+DeviceFault SerialPort::unplugged(int error) {
+  close();
+  return deviceFault(DeviceFaultKind::kUnplugged, error, "%s", settings_.path.c_str());
+}
+
+DeviceFault SerialPort::read(std::span<std::uint8_t> into, std::size_t& count, Stamp& read_at) {
+  count = 0;
+  if (descriptor_ < 0) return unplugged(0);
+  const ssize_t got = ::read(descriptor_, into.data(), into.size());
+  const int error = errno;
+  read_at = now();
+  if (got > 0) {
+    count = static_cast<std::size_t>(got);
+    return {};
+  }
+  if (got < 0 && error == EINTR) return {};
+  if (got < 0 && error != EAGAIN) {
+    if (error == EIO || error == ENXIO || error == ENODEV) return unplugged(error);
+    return deviceFault(DeviceFaultKind::kFailed, error, "read");
+  }
+  // With VMIN and VTIME 0 nothing to read is 0 or EAGAIN, and so is the end of some drivers: ask.
+  pollfd asked = {descriptor_, POLLIN, 0};
+  if (::poll(&asked, 1, 0) > 0 && (asked.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) return unplugged(0);
+  return {};
+}
+
+DeviceFault SerialPort::wait(Duration most) {
+  if (descriptor_ < 0) return unplugged(0);
+  pollfd asked = {descriptor_, POLLIN, 0};
+  const int ready = ::poll(&asked, 1, pollMilliseconds(most));
+  if (ready < 0 && errno != EINTR) return deviceFault(DeviceFaultKind::kFailed, errno, "poll");
+  return {};
+}
+
+DeviceFault SerialPort::write(std::span<const std::uint8_t> bytes, Duration most) {
+  const Stamp until = now() + most;
+  // Each turn sends a byte at least, or waits, or ends: bounded by the bytes and the time.
+  while (!bytes.empty()) {
+    if (descriptor_ < 0) return unplugged(0);
+    const ssize_t sent = ::write(descriptor_, bytes.data(), bytes.size());
+    if (sent > 0) {
+      bytes = bytes.subspan(static_cast<std::size_t>(sent));
+      continue;
+    }
+    if (sent < 0 && errno != EAGAIN && errno != EINTR) {
+      if (errno == EIO || errno == ENXIO || errno == ENODEV) return unplugged(errno);
+      return deviceFault(DeviceFaultKind::kFailed, errno, "write");
+    }
+    const Duration left = until - now();
+    if (left <= Duration{})
+      return deviceFault(DeviceFaultKind::kFailed, 0, "%zu bytes not taken in time", bytes.size());
+    pollfd asked = {descriptor_, POLLOUT, 0};
+    if (::poll(&asked, 1, pollMilliseconds(left)) > 0 && (asked.revents & POLLHUP) != 0) return unplugged(0);
+  }
+  return {};
+}
+
+std::optional<SerialErrors> SerialPort::errors() const {
+  serial_icounter_struct counts = {};
+  if (descriptor_ < 0 || ioctl(descriptor_, TIOCGICOUNT, &counts) != 0) return {};
+  return SerialErrors{static_cast<std::uint32_t>(counts.overrun), static_cast<std::uint32_t>(counts.frame),
+                      static_cast<std::uint32_t>(counts.parity),
+                      static_cast<std::uint32_t>(counts.buf_overrun)};
+}
+
+}  // namespace swiftlet

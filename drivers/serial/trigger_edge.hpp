@@ -1,0 +1,21 @@
+#pragma once
+// An edge of a trigger or synchronisation line as an inertial sensor saw it: in the clock of its samples,
+// which is what ties frames to samples without the host's clock in between.
+
+#include <cstdint>
+
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+struct TriggerEdge {
+  Stamp arrival;              ///< CLOCK_MONOTONIC, of the first byte of the message that told of it
+  Stamp device;               ///< of the edge, in the sensor's clock: comparable with ImuReading::device
+  std::uint64_t counter = 0;  ///< of edges, unwrapped: a jump shows edges that were not told of
+  std::uint8_t line = 0;      ///< which input, where there are several
+  bool rising = true;
+
+  bool operator==(const TriggerEdge&) const = default;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,192 @@
+// What goes to an autopilot and when, in simulated time, read by our own parser.
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <vector>
+
+#include "drivers/mavlink/autopilot_link.hpp"
+#include "estimator/core/random.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr Duration kStep = Duration::fromMilliseconds(1);
+constexpr Stamp kBegin{50'000'000'000};
+
+/// The autopilot's side: everything that it heard.
+struct Autopilot {
+  std::vector<mavlink::Odometry> poses;
+  std::vector<Stamp> pose_times;
+  std::vector<mavlink::Heartbeat> beats;
+  std::vector<mavlink::Timesync> answers;
+  std::size_t texts = 0;
+  MavlinkParser parser;
+
+  void hear(std::span<const std::uint8_t> bytes, Stamp now) {
+    REQUIRE(parser.feed(bytes, now, Duration{}) == bytes.size());
+    MavlinkFrame frame;
+    while (parser.next(frame)) {
+      mavlink::Odometry pose;
+      mavlink::Heartbeat beat;
+      mavlink::Timesync answer;
+      if (mavlink::read(frame, pose)) {
+        poses.push_back(pose);
+        pose_times.push_back(now);
+      }
+      if (mavlink::read(frame, beat)) beats.push_back(beat);
+      if (mavlink::read(frame, answer)) answers.push_back(answer);
+      if (frame.message == mavlink::StatusText::kId) ++texts;
+    }
+  }
+};
+
+/// Time, millisecond by millisecond, with states at 200 Hz that come 3 ms after their stamps.
+class Flight {
+ public:
+  AutopilotLink link{AutopilotLinkSettings{}};
+  Autopilot autopilot;
+  Stamp now = kBegin;
+  Health health = Health::kGood;
+  std::uint32_t epoch = 0;
+  bool states_come = true;
+
+  void fly(Duration time) {
+    for (const Stamp end = now + time; now < end; now = now + kStep) {
+      constexpr std::int64_t kStatePeriod = 5'000'000;
+      if (states_come && (now - kBegin).ns % kStatePeriod == 0) {
+        state_.stamp = now - Duration::fromMilliseconds(3);
+        state_.T_world_body.translation.x() = (now - kBegin).seconds();
+        any_ = true;
+      }
+      state_.health = health;
+      state_.epoch = epoch;
+      std::array<std::uint8_t, AutopilotLink::kMostBytes> bytes;
+      const std::size_t count = link.step(now, any_ ? &state_ : nullptr, Eigen::Vector3d::Zero(), bytes);
+      autopilot.hear(std::span(bytes).first(count), now);
+    }
+  }
+
+ private:
+  NavState state_;
+  bool any_ = false;
+};
+
+TEST_CASE("Poses go out at the set rate, each once, with the stamp of its state", "[mavlink]") {
+  Flight flight;
+  flight.fly(Duration::fromMilliseconds(10'000));
+  const auto& poses = flight.autopilot.poses;
+  CHECK(std::abs(static_cast<double>(poses.size()) - 400) <= 8);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const Stamp stamp{static_cast<std::int64_t>(poses[i].time_usec) * 1000};
+    if (i > 0) REQUIRE(poses[i].time_usec > poses[i - 1].time_usec);
+    REQUIRE(flight.autopilot.pose_times[i] - stamp <= Duration::fromMilliseconds(8));
+    // The position is that of the stamp.
+    REQUIRE(std::abs(poses[i].position.x() - (stamp - kBegin).seconds() - 0.003) < 1e-5);
+    REQUIRE(poses[i].quality == 100);
+    REQUIRE(poses[i].reset_counter == 0);
+  }
+  CHECK(flight.autopilot.beats.size() == 10);
+  CHECK(flight.autopilot.beats.back().system_status == 4);
+}
+
+TEST_CASE("Before there is a state there are heartbeats and no poses", "[mavlink]") {
+  Flight flight;
+  flight.health = Health::kInitializing;
+  flight.fly(Duration::fromMilliseconds(3'000));
+  CHECK(flight.autopilot.poses.empty());
+  CHECK(flight.autopilot.beats.size() == 3);
+  CHECK(flight.autopilot.beats.back().system_status == 1);
+}
+
+TEST_CASE("A loss is told for a second, then nothing; what comes back has another reset counter",
+          "[mavlink]") {
+  const bool failed = GENERATE(true, false);
+  Flight flight;
+  flight.fly(Duration::fromMilliseconds(2'000));
+  const std::size_t before = flight.autopilot.poses.size();
+  if (failed) {
+    flight.health = Health::kFailed;
+  } else {
+    flight.states_come = false;
+  }
+  flight.fly(Duration::fromMilliseconds(5'000));
+  const auto& poses = flight.autopilot.poses;
+  const std::size_t told = poses.size() - before;
+  CHECK(told > 35);
+  CHECK(told < 46);
+  for (std::size_t i = before + 1; i < poses.size(); ++i) {
+    CHECK(poses[i].quality == -1);
+    CHECK(std::isnan(poses[i].position.x()));
+  }
+  CHECK(flight.autopilot.pose_times.back() < kBegin + Duration::fromMilliseconds(3'500));
+  CHECK(flight.autopilot.beats.back().system_status == 5);
+  CHECK(flight.link.counters().losses == 1);
+  flight.health = Health::kGood;
+  flight.states_come = true;
+  flight.fly(Duration::fromMilliseconds(1'000));
+  CHECK(poses.back().quality == 100);
+  CHECK(poses.back().reset_counter == 1);
+  flight.epoch = 1;
+  flight.fly(Duration::fromMilliseconds(1'000));
+  CHECK(poses.back().reset_counter == 2);
+  CHECK(flight.autopilot.beats.back().system_status == 4);
+}
+
+TEST_CASE("A state that comes late is not sent as new", "[mavlink]") {
+  AutopilotLink link({});
+  NavState state;
+  state.health = Health::kGood;
+  state.stamp = kBegin - AutopilotLink::kOldest - kStep;
+  std::array<std::uint8_t, AutopilotLink::kMostBytes> bytes;
+  static_cast<void>(link.step(kBegin, &state, Eigen::Vector3d::Zero(), bytes));
+  CHECK(link.counters().poses == 0);
+  CHECK(link.counters().too_old == 1);
+}
+
+TEST_CASE("TIMESYNC is answered with our clock and the asker's stamp, at once", "[mavlink]") {
+  Flight flight;
+  flight.fly(Duration::fromMilliseconds(100));
+  MavlinkSender asker;
+  asker.system = 7;
+  asker.component = 1;
+  std::array<std::uint8_t, kLongestMavlinkFrame> bytes;
+  const mavlink::Timesync request{0, 123'456'789, 0, 0};
+  const std::size_t length = mavlink::write(asker, request, bytes);
+  flight.link.receive(std::span(bytes).first(length), flight.now, Duration{});
+  const Stamp asked = flight.now;
+  flight.fly(kStep);
+  REQUIRE(flight.autopilot.answers.size() == 1);
+  const mavlink::Timesync& answer = flight.autopilot.answers[0];
+  CHECK(answer.ts1 == request.ts1);
+  CHECK(answer.tc1 == asked.ns);
+  CHECK(answer.target_system == 7);
+  CHECK(answer.target_component == 1);
+  // An answer is no request.
+  const mavlink::Timesync other{55, 66, 0, 0};
+  flight.link.receive(std::span(bytes).first(mavlink::write(asker, other, bytes)), flight.now, Duration{});
+  flight.fly(kStep);
+  CHECK(flight.autopilot.answers.size() == 1);
+}
+
+TEST_CASE("Texts are told one by one, the oldest of too many are dropped and counted", "[mavlink]") {
+  Flight flight;
+  for (int i = 0; i < 11; ++i) flight.link.say(mavlink::StatusText::Severity::kWarning, std::string(80, 'x'));
+  flight.fly(Duration::fromMilliseconds(50));
+  CHECK(flight.autopilot.texts == 8);
+  CHECK(flight.link.counters().texts_dropped == 3);
+}
+
+TEST_CASE("Random bytes from the autopilot change nothing of what is sent", "[mavlink]") {
+  Flight flight;
+  Random random(3);
+  for (int i = 0; i < 200; ++i) {
+    std::array<std::uint8_t, 300> noise;
+    for (std::uint8_t& byte : noise) byte = static_cast<std::uint8_t>(random.next());
+    flight.link.receive(noise, flight.now, Duration{});
+    flight.fly(Duration::fromMilliseconds(10));
+  }
+  CHECK(std::abs(static_cast<double>(flight.autopilot.poses.size()) - 80) <= 3);
+}
+
+}  // namespace
+}  // namespace swiftlet
