@@ -1,0 +1,106 @@
+#pragma once
+// One CAN interface through a raw SocketCAN socket: frames with the kernel's receive stamps, and the bus's
+// troubles.
+//
+// Threads: one. Nothing waits: poll fd() for POLLIN, then call next() until it gives no frame.
+// Errors: values that name the command that helps. Down, and bus-off, pass by themselves: go on calling
+// next().
+//   After kUnplugged or kMissing the socket is closed; reopen() takes the interface up when it is there
+//   again.
+// Stamps: the kernel's software stamp is CLOCK_REALTIME; the offset to CLOCK_MONOTONIC is measured at each
+// receipt,
+//   so that a step of the wall clock moves one frame at most. Hardware stamps are passed on where there are
+//   any.
+// Memory: the socket's buffer in the kernel; no allocation. Cost of a frame: one call and three clock
+// readings. Source: the kernel's Documentation/networking/can.rst and timestamping.rst; linux/can/error.h.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "drivers/can/can_frame.hpp"
+#include "drivers/device/device_fault.hpp"
+
+namespace swiftlet {
+
+/// Takes extended frames with (id & mask) == (this id & mask).
+struct CanFilter {
+  std::uint32_t id = 0;
+  std::uint32_t mask = 0;
+};
+
+struct CanBusSettings {
+  std::array<char, 16> interface = {};  ///< "can0"
+  bool fd = false;  ///< true: refused where the interface is set up for classic frames only
+  std::array<CanFilter, 4> filters = {};
+  std::size_t filter_count = 0;  ///< 0: every frame
+  /// Each frame is charged several hundred bytes; 4 MiB hold a second and more of a full bus.
+  int receive_buffer = 4 << 20;
+
+  void setInterface(const char* name);
+  void addFilter(CanFilter filter);
+};
+
+struct CanBusCounters {
+  std::uint64_t frames = 0;
+  std::uint64_t fd_frames = 0;  ///< of those
+  std::uint64_t sent = 0;
+  std::uint64_t lost_in_socket = 0;  ///< by the kernel, for want of room in the socket
+  std::uint64_t error_frames = 0;
+  std::uint64_t bus_off = 0;
+  std::uint64_t restarts = 0;  ///< of the controller after bus-off
+  std::uint64_t controller_overflows = 0;
+  std::uint64_t error_passive = 0;
+  std::uint64_t went_down = 0;
+  std::uint64_t hardware_stamps = 0;
+  std::uint64_t without_stamp = 0;  ///< arrival is the time of the reading
+  std::uint64_t reopened = 0;
+};
+
+class CanBus {
+ public:
+  CanBus() = default;
+  CanBus(const CanBus&) = delete;
+  CanBus& operator=(const CanBus&) = delete;
+  ~CanBus() { close(); }
+
+  DeviceFault open(const CanBusSettings& settings);
+  DeviceFault reopen();
+  void close();
+  [[nodiscard]] bool isOpen() const { return fd_ >= 0; }
+  [[nodiscard]] int fd() const { return fd_; }
+
+  /// The oldest frame that waits; empty: none. kDown with no frame as long as the interface is down or the
+  /// bus off. Error frames are taken in on the way, 16 at most in one call.
+  DeviceFault next(std::optional<CanFrame>& frame);
+  /// kBusy: the queue of the interface is full, try again.
+  DeviceFault send(const CanFrame& frame);
+
+  [[nodiscard]] const CanBusCounters& counters() const { return counters_; }
+  /// Whether FD frames can be sent and received.
+  [[nodiscard]] bool takesFd() const { return takes_fd_; }
+  /// Bytes that the kernel set aside; less than asked where net.core.rmem_max is lower.
+  [[nodiscard]] int receiveBuffer() const { return receive_buffer_; }
+  /// kChanged where that is less than a quarter; says how to raise it.
+  [[nodiscard]] const DeviceFault& warning() const { return warning_; }
+
+ private:
+  DeviceFault setUp();
+  DeviceFault interfaceFault(int error) const;
+  [[nodiscard]] bool interfaceIsUp() const;
+  void takeError(std::uint32_t id, std::span<const std::uint8_t> data);
+  [[nodiscard]] DeviceFault standing();
+
+  int fd_ = -1;
+  CanBusSettings settings_;
+  CanBusCounters counters_;
+  DeviceFault warning_;
+  bool takes_fd_ = false;
+  bool down_ = false;
+  bool bus_off_ = false;
+  int receive_buffer_ = 0;
+  std::uint32_t lost_seen_ = 0;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,73 @@
+#pragma once
+// The edges of a periodic trigger, numbered as the pulses that made them: also where edges were missed, and
+// although others came that were no pulse.
+//
+// The number comes from the time: an edge lies on the grid of the tracked period or it is a glitch. Cameras
+// of one trigger share one train, so equal numbers are equal exposures.
+//
+// - On the grid: within 0.1 periods. Of two edges on one place the one closer to the grid counts.
+// - Gaps of up to 16 periods are bridged. After a longer one, or when four edges in a row agree on another
+//   grid, numbering starts anew and `epoch` rises.
+// Cost: O(1). Memory: 256 edges, 4 KiB. Any stamps; nothing overflows.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+class EdgeTrain {
+ public:
+  /// `period`: nominal, right to 2 %; positive.
+  explicit EdgeTrain(Duration period);
+
+  /// One edge as it was read, in order. `sequence`: of the kernel's events on this line; says whether pulses
+  /// that lack were missed or not there.
+  void add(Stamp edge, std::optional<std::uint32_t> sequence = std::nullopt);
+
+  struct Edge {
+    Stamp stamp;
+    bool measured = false;  ///< false: not read (or not yet); from its neighbours and the period
+  };
+  /// The edge of pulse `index` of this epoch; empty where no edge is near.
+  [[nodiscard]] std::optional<Edge> at(std::int64_t index) const;
+  /// The number of the pulse nearest to `stamp`; empty without edges.
+  [[nodiscard]] std::optional<std::int64_t> nearest(Stamp stamp) const;
+
+  [[nodiscard]] std::uint32_t epoch() const { return epoch_; }
+  [[nodiscard]] Duration period() const { return {static_cast<std::int64_t>(period_)}; }
+  [[nodiscard]] std::uint64_t edges() const { return edges_; }
+  [[nodiscard]] std::uint64_t missed() const { return missed_; }  ///< pulses without an edge
+  [[nodiscard]] std::uint64_t absent() const { return absent_; }  ///< places where there was no pulse
+  [[nodiscard]] std::uint64_t glitches() const { return glitches_; }
+
+ private:
+  static constexpr std::size_t kKept = 256;
+  struct Slot {
+    std::int64_t index = -1;
+    Stamp stamp;
+  };
+  void restart(Stamp edge);
+  void offGrid(Stamp edge);
+  [[nodiscard]] const Slot* slot(std::int64_t index) const;
+
+  double nominal_;  ///< [ns]
+  double period_;
+  std::array<Slot, kKept> slots_{};
+  std::int64_t newest_ = -1;  ///< index
+  Stamp grid_;                ///< where the grid has pulse newest_
+  bool any_ = false;
+  std::optional<std::uint32_t> sequence_;
+  int others_ = 0;  ///< edges in a row that agree on another grid
+  Stamp other_;
+  std::uint32_t epoch_ = 0;
+  std::uint64_t edges_ = 0;
+  std::uint64_t missed_ = 0;
+  std::uint64_t absent_ = 0;
+  std::uint64_t glitches_ = 0;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,156 @@
+#include "drivers/timesync/lower_envelope.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace swiftlet {
+namespace {
+
+constexpr std::int64_t kWindow = static_cast<std::int64_t>(LowerEnvelope::kBins) *
+                                 LowerEnvelope::kBinWidth.ns;  // 32 s: shorter than crystals take to warm up
+// After an outage the old points hold the line until the new ones are enough to stand alone: 2 s of them.
+constexpr std::size_t kAloneFrom = 8;
+// What a slope is taken from. One that is known from a longer span is not replaced by one from a shorter.
+constexpr std::int64_t kFirstSpan = 2'000'000'000;
+constexpr std::int64_t kLaterSpan = 8'000'000'000;
+// The lowest of n points of even density lie a few times mean / n above the true line; the factor is the
+// 99 % point of the simulated clocks in tests/drivers/timesync.
+constexpr double kFitFactor = 4;
+constexpr double kWander = 2e-6;  // a crystal's rate in flight, between windows
+// Farther than this [ns] from the newest point a line says nothing; keeps the sum within int64.
+constexpr double kFarthest = 1e18;
+
+}  // namespace
+
+Duration LowerEnvelope::span() const { return {count_ == 0 ? 0 : point(count_ - 1).time - point(0).time}; }
+
+// In double: two heights of hostile stamps are farther apart than int64 goes.
+double LowerEnvelope::rise(const Point& from, const Point& to) {
+  return static_cast<double>(to.value) - static_cast<double>(from.value);
+}
+
+double LowerEnvelope::line(std::int64_t time) const {
+  return level_ + slope_ * static_cast<double>(time - reference_);
+}
+
+std::int64_t LowerEnvelope::at(Stamp time) const {
+  const double from_reference = static_cast<double>(time.ns - origin_.ns) - static_cast<double>(reference_);
+  const double value = level_ + slope_ * from_reference;
+  return base_ + std::llround(std::clamp(value, -kFarthest, kFarthest));
+}
+
+double LowerEnvelope::heightOf(Stamp time, std::int64_t value_ns) const {
+  return height({time.ns - origin_.ns, value_ns - base_});
+}
+
+double LowerEnvelope::uncertainty(Stamp time) const {
+  if (count_ == 0) return std::numeric_limits<double>::infinity();
+  const double fit = kFitFactor * mean_excess_ / static_cast<double>(count_);
+  const double ahead =
+      std::abs(static_cast<double>(time.ns - origin_.ns) - static_cast<double>(point(count_ - 1).time));
+  const double half_span = static_cast<double>(span().ns) / 2;
+  const double of_slope = slope_known_ ? kWander : max_slope_;
+  return fit + of_slope * ahead + (slope_known_ ? 0 : max_slope_ * half_span);
+}
+
+bool LowerEnvelope::raised(std::size_t fewest, double tolerance, double surprise, Stamp& since) const {
+  if (count_ < fewest + 2) return false;
+  tolerance += kFitFactor * mean_excess_ / static_cast<double>(count_);
+  double lowest = std::numeric_limits<double>::infinity();
+  double most = 0;
+  // The newest bin is still filling, and one at least must have been right.
+  for (std::size_t n = 1; n + 2 <= count_; ++n) {
+    const Point& p = point(count_ - 1 - n);
+    lowest = std::min(lowest, height(p));
+    const double excess = lowest - tolerance;
+    if (excess <= 0) break;
+    const double found = static_cast<double>(n) * excess;
+    if (n < fewest || found < surprise * roughness_ || found <= most) continue;
+    most = found;
+    since = {origin_.ns + p.time};
+  }
+  return most > 0;
+}
+
+void LowerEnvelope::dropOldest() {
+  first_ = (first_ + 1) % kBins;
+  --count_;
+}
+
+void LowerEnvelope::dropBefore(Stamp time) {
+  while (count_ > 1 && origin_.ns + point(0).time < time.ns) dropOldest();
+  if (count_ > 0) fit();
+}
+
+void LowerEnvelope::add(Stamp time, std::int64_t value_ns) {
+  if (count_ == 0) {
+    origin_ = time;
+    base_ = value_ns;
+    first_ = 0;
+    bin_ = 0;
+  }
+  const Point p = {time.ns - origin_.ns, value_ns - base_};
+  const std::int64_t bin = p.time / kBinWidth.ns;
+  if (count_ > 0 && bin == bin_) {
+    Point& lowest = point(count_ - 1);
+    if (height(p) >= height(lowest)) return;
+    lowest = p;
+    if (height(p) < 0) fit();
+    return;
+  }
+  if (count_ == kBins) dropOldest();
+  point(count_++) = p;
+  bin_ = bin;
+  ++closed_;
+  while (count_ > kAloneFrom && point(count_ - kAloneFrom).time > point(0).time + kWindow) dropOldest();
+  fit();
+}
+
+void LowerEnvelope::fit() {
+  std::array<std::size_t, kBins> hull;
+  std::size_t n = 0;
+  double mean_time = 0;
+  const std::int64_t oldest = point(0).time;
+  for (std::size_t i = 0; i < count_; ++i) {
+    const Point& p = point(i);
+    mean_time += static_cast<double>(p.time - oldest);
+    while (n >= 2) {
+      const Point& a = point(hull[n - 2]);
+      const Point& b = point(hull[n - 1]);
+      const double turn = static_cast<double>(b.time - a.time) * rise(a, p) -
+                          static_cast<double>(p.time - a.time) * rise(a, b);
+      if (turn > 0) break;
+      --n;
+    }
+    hull[n++] = i;
+  }
+  mean_time /= static_cast<double>(count_);
+
+  if (span().ns >= std::clamp(slope_span_, kFirstSpan, kLaterSpan)) {
+    std::size_t edge = 0;
+    while (edge + 2 < n && static_cast<double>(point(hull[edge + 1]).time - oldest) < mean_time) ++edge;
+    const Point& a = point(hull[edge]);
+    const Point& b = point(hull[edge + 1]);
+    slope_ = std::clamp(rise(a, b) / static_cast<double>(b.time - a.time), -max_slope_, max_slope_);
+    slope_known_ = true;
+    slope_span_ = span().ns;
+  }
+  reference_ = point(count_ - 1).time;
+  level_ = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < n; ++i) {
+    const Point& p = point(hull[i]);
+    level_ =
+        std::min(level_, static_cast<double>(p.value) - slope_ * static_cast<double>(p.time - reference_));
+  }
+  double sum = 0;
+  double changes = 0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    sum += height(point(i));
+    if (i > 0) changes += std::abs(height(point(i)) - height(point(i - 1)));
+  }
+  mean_excess_ = sum / static_cast<double>(count_);
+  roughness_ = count_ < 2 ? 0 : changes / static_cast<double>(count_ - 1);
+}
+
+}  // namespace swiftlet

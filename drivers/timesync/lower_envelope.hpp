@@ -1,0 +1,95 @@
+#pragma once
+// The straight line under a cloud of points (time, offset + delay) whose delays are never negative: the line
+// of the offset plus the smallest delay.
+//
+// Of each quarter of a second the lowest point is kept, for 32 s. The line is the edge of the points' lower
+// convex hull that lies over the mean of their times: of all lines with no point below, it has the smallest
+// sum of distances. Its slope is bounded; while the points span too little time for a slope, the slope
+// known from before (or none) carries the lowest line.
+//
+// Cost: add() O(1), and O(kBins), about 2 us, when a quarter second ends or a point comes to lie below the
+// line. Memory: 2.1 KiB. Any values within +-kStampLimit; nothing overflows.
+// Source: S. B. Moon, P. Skelly, D. Towsley, "Estimation and removal of clock skew from network delay
+// measurements", INFOCOM 1999; the edge over the mean time: L. Zhang, Z. Liu, C. H. Xia, "Clock
+// synchronization algorithms for network measurements", INFOCOM 2002. Hull: A. M. Andrew, 1979.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "drivers/timesync/stamp_limit.hpp"
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+class LowerEnvelope {
+ public:
+  static constexpr std::size_t kBins = 128;
+  static constexpr Duration kBinWidth = {250'000'000};
+
+  /// Largest |slope| of the line, 1e-6 = 1 ppm.
+  explicit LowerEnvelope(double max_slope) : max_slope_(max_slope) {}
+
+  /// One point; its time at or after the newest one's.
+  void add(Stamp time, std::int64_t value_ns);
+  /// Forgets the points and keeps the slope: a clock that stepped runs as fast as before.
+  void restart() { count_ = 0; }
+  /// Forgets the points before `time`, keeps the slope.
+  void dropBefore(Stamp time);
+
+  [[nodiscard]] bool empty() const { return count_ == 0; }
+  [[nodiscard]] std::size_t bins() const { return count_; }
+  [[nodiscard]] Duration span() const;
+  [[nodiscard]] double slope() const { return slope_; }
+  /// False until points ever spanned enough time.
+  [[nodiscard]] bool slopeKnown() const { return slope_known_; }
+  /// The line [ns]; not when empty. Saturates far from the points.
+  [[nodiscard]] std::int64_t at(Stamp time) const;
+  /// Height [ns] of a point over the line; not when empty.
+  [[nodiscard]] double heightOf(Stamp time, std::int64_t value_ns) const;
+  /// Mean height [ns] of the bins' lowest points over the line.
+  [[nodiscard]] double meanExcess() const { return mean_excess_; }
+  /// Mean change [ns] of that height from bin to bin: as large as the mean for jitter of even density, and
+  /// blind to a step of all the later bins.
+  [[nodiscard]] double roughness() const { return roughness_; }
+  /// Estimated error [ns] of the line at `time`: of the fit, and what a clock may wander until then.
+  [[nodiscard]] double uncertainty(Stamp time) const;
+  /// Whether the line has risen for good: true when in the newest n >= `fewest` closed bins no point came
+  /// within h of the line, with n (h - tolerance - the fit's own error) >= surprise x roughness. By chance
+  /// that has odds of about e^-surprise for jitter of even density. `since`: the first of those bins.
+  /// O(kBins).
+  [[nodiscard]] bool raised(std::size_t fewest, double tolerance, double surprise, Stamp& since) const;
+  /// How often a bin was closed, since the beginning.
+  [[nodiscard]] std::uint64_t closed() const { return closed_; }
+
+ private:
+  struct Point {
+    std::int64_t time = 0;   ///< device, ns since origin_
+    std::int64_t value = 0;  ///< ns above base_
+  };
+  [[nodiscard]] Point& point(std::size_t i) { return points_[(first_ + i) % kBins]; }
+  [[nodiscard]] const Point& point(std::size_t i) const { return points_[(first_ + i) % kBins]; }
+  static double rise(const Point& from, const Point& to);
+  [[nodiscard]] double line(std::int64_t time) const;
+  [[nodiscard]] double height(const Point& p) const { return static_cast<double>(p.value) - line(p.time); }
+  void dropOldest();
+  void fit();
+
+  double max_slope_;
+  Stamp origin_;           ///< time of the first point since the restart
+  std::int64_t base_ = 0;  ///< its value
+  std::array<Point, kBins> points_{};
+  std::size_t first_ = 0;
+  std::size_t count_ = 0;
+  std::uint64_t closed_ = 0;
+  std::int64_t bin_ = 0;        ///< number of the newest bin
+  std::int64_t reference_ = 0;  ///< the line's own origin, near the newest point
+  double level_ = 0;            ///< its value there
+  double slope_ = 0;
+  bool slope_known_ = false;
+  std::int64_t slope_span_ = 0;  ///< [ns] that it was taken from
+  double mean_excess_ = 0;
+  double roughness_ = 0;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,198 @@
+#include "drivers/timesync/trigger_matcher.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "drivers/timesync/stamp_limit.hpp"
+
+namespace swiftlet {
+namespace {
+
+// Frames to lock on: for stamps that scatter evenly by +-0.4 periods their mean is right to 0.04 periods
+// (one sigma), to 0.08 when the lag is known from before.
+constexpr int kFirstLock = 32;
+constexpr int kNextLock = 8;
+constexpr double kWidest = 0.95;    // periods from the least to the largest D: a slip makes it wider
+constexpr double kAmbiguous = 0.3;  // periods from the expected lag
+// A slip by one puts a scatter of 0.4 periods beyond 0.5. One after a pause of the trigger of nearly one
+// period (EdgeTrain takes 0.9) does so, too, and where stamps scatter less the bound is as much narrower, but
+// for a changing exposure.
+constexpr double kMoved = 0.25;  // periods by which the mean of the few may differ from the lag known before
+constexpr double kVerified = 0.5;    // periods
+constexpr double kNarrowest = 0.35;  // periods
+constexpr double kSpreadMargin = 1.2;
+constexpr int kDisputes = 3;
+constexpr int kEdgeless = 16;  // frames: EdgeTrain bridges no longer gap either
+constexpr double kLagGain = 1.0 / 64;
+constexpr std::int64_t kMostDropped = 1000;  // frames; more is another stream
+// With the count given, lags of this many periods are believed: exposure, readout and delivery.
+constexpr double kLongestLag = 3;
+
+double apart(Stamp from, Stamp to) { return static_cast<double>(to.ns - from.ns); }
+double ns(Duration duration) { return static_cast<double>(duration.ns); }
+
+/// From one sequence number to the next, over the wrap; negative: the stream began again.
+std::int64_t advance(std::uint32_t from, std::uint32_t to) { return static_cast<std::int32_t>(to - from); }
+
+}  // namespace
+
+void TriggerMatcher::pairFirst(std::uint32_t sequence) { first_ = {sequence, train_->epoch()}; }
+
+void TriggerMatcher::giveUp() {
+  if (lock_ == LockState::kLocked) ++resets_;
+  lock_ = LockState::kUnlocked;
+  count_ = 0;
+  disputes_ = 0;
+  edgeless_ = 0;
+}
+
+void TriggerMatcher::begin(const FrameMark& frame) {
+  count_ = 0;
+  const double guess = lag_known_ ? lag_ : expected_ ? ns(*expected_) : 0;
+  const auto pulse = train_->nearest({frame.stamp.ns - std::llround(guess)});
+  if (!pulse) return;
+  pulse_ = *pulse;
+  lock_ = LockState::kLocking;
+  sum_ = 0;
+  least_ = 1e18;
+  most_ = -1e18;
+}
+
+double TriggerMatcher::verified(double period) const {
+  return std::clamp(kSpreadMargin * spread_, kNarrowest * period, kVerified * period);
+}
+
+Status TriggerMatcher::match(const FrameMark& frame, TriggerMatch& out) {
+  if (!withinLimit(frame.stamp) || !withinLimit(frame.arrival)) {
+    ++refused_;
+    return {StatusCode::kInvalidInput, "stamp out of range"};
+  }
+  if (epoch_ != train_->epoch()) giveUp();
+  epoch_ = train_->epoch();
+  if (lock_ != LockState::kLocked) return collect(frame, out);
+
+  const std::int64_t steps = advance(sequence_, frame.sequence);
+  if (steps == 0) {
+    ++unmatched_;
+    return {StatusCode::kInvalidInput, "frame's number repeated"};
+  }
+  if (steps < 0 || steps > kMostDropped) {
+    giveUp();
+    return collect(frame, out);
+  }
+  sequence_ = frame.sequence;
+  pulse_ += steps;
+  const auto edge = train_->at(pulse_);
+  const double period = ns(train_->period());
+  if (!edge) {
+    ++unmatched_;
+    if (++edgeless_ >= kEdgeless) giveUp();
+    return {StatusCode::kNotReady, "no edge near this frame"};
+  }
+  edgeless_ = 0;
+  const double off = apart(edge->stamp, frame.stamp) - lag_;
+  const bool caused = apart(edge->stamp, frame.arrival) > -kAmbiguous * period;
+  if (!caused || std::abs(off) > verified(period)) {
+    ++unmatched_;
+    if (++disputes_ >= kDisputes) giveUp();
+    return {StatusCode::kInvalidInput, "frame's number and stamp do not agree on an edge"};
+  }
+  disputes_ = 0;
+  lag_ += kLagGain * off;
+  spread_ = std::max(spread_, std::abs(off));
+  residuals_.add(frame.arrival, {std::llround(std::abs(off))});
+  out = {pulse_, epoch_, edge->stamp, edge->measured};
+  ++matched_;
+  return okStatus();
+}
+
+Status TriggerMatcher::collect(const FrameMark& frame, TriggerMatch& out) {
+  constexpr Status kNotYet = {StatusCode::kNotReady, "trigger not locked: use the driver's stamp"};
+  const std::int64_t steps = count_ == 0 ? 0 : advance(sequence_, frame.sequence);
+  if (count_ == 0 || steps <= 0 || steps > kMostDropped) {
+    begin(frame);
+  } else {
+    pulse_ += steps;
+  }
+  sequence_ = frame.sequence;
+  ++refused_;
+  if (lock_ != LockState::kLocking) return kNotYet;
+  const auto edge = train_->at(pulse_);
+  if (!edge) {
+    giveUp();
+    return kNotYet;
+  }
+  const double d = apart(edge->stamp, frame.stamp);
+  ++count_;
+  sum_ += d;
+  least_ = std::min(least_, d);
+  most_ = std::max(most_, d);
+  if (most_ - least_ > kWidest * ns(train_->period())) {
+    giveUp();
+    return kNotYet;
+  }
+  if (count_ < (lag_known_ ? kNextLock : kFirstLock)) return kNotYet;
+  if (!decide()) {
+    giveUp();
+    lag_known_ = false;
+    return {StatusCode::kDegenerate, "frames lie between two edges: correct the expected lag"};
+  }
+  // This frame is handed out like the next ones: verified.
+  lock_ = LockState::kLocked;
+  lag_known_ = true;
+  count_ = 0;
+  --refused_;
+  sequence_ = frame.sequence - 1;
+  --pulse_;
+  return match(frame, out);
+}
+
+bool TriggerMatcher::decide() {
+  const double period = ns(train_->period());
+  const double mean = sum_ / count_;
+  const bool counted = first_ && first_->epoch == epoch_;
+  double lag = 0;
+  std::int64_t shift = 0;  // pulses to add
+  if (lag_known_ || expected_) {
+    const double expected = lag_known_ ? lag_ : ns(*expected_);
+    const double periods = std::round((mean - expected) / period);
+    lag = mean - periods * period;
+    const double limit = lag_known_ ? kMoved : kAmbiguous;
+    if (!(std::abs(lag - expected) <= limit * period) || std::abs(periods) > kLongestLag) return false;
+    // The mean of a few frames is worse than what is known.
+    if (lag_known_) lag = lag_;
+    shift = static_cast<std::int64_t>(periods);
+    if (counted && pulse_ + shift != advance(first_->sequence, sequence_)) return false;
+  } else {
+    if (!counted) return false;
+    shift = advance(first_->sequence, sequence_) - pulse_;
+    lag = mean - static_cast<double>(shift) * period;
+    if (lag < -kAmbiguous * period || lag > kLongestLag * period) return false;
+  }
+  const double centre = lag + static_cast<double>(shift) * period;
+  const double spread = std::max(most_ - centre, centre - least_);
+  if (spread > kVerified * period) return false;
+  pulse_ += shift;
+  lag_ = lag;
+  spread_ = std::max(spread_, spread);
+  // The count holds for the stream that it was given for, and the lag carries on.
+  first_.reset();
+  return true;
+}
+
+TimesyncStatus TriggerMatcher::status() const {
+  TimesyncStatus s;
+  s.lock = lock_;
+  s.offset = {std::llround(lag_)};
+  s.residual_p50 = residuals_.quantile(0.5);
+  s.residual_p99 = residuals_.quantile(0.99);
+  s.samples = matched_;
+  s.resets = resets_;
+  s.refused = refused_;
+  s.missed_edges = train_->missed();
+  s.glitch_edges = train_->glitches();
+  s.unmatched_frames = unmatched_;
+  return s;
+}
+
+}  // namespace swiftlet
