@@ -23,36 +23,35 @@ std::string transformYaml(const SE3& T) {
 }  // namespace
 
 std::string cameraYaml(const CameraModel& camera, const SE3& T_body_cam, double rate_hz,
-                       const std::string& extra) {
+                       std::string_view origin, const std::string& extra) {
   const Eigen::Vector4d& k = camera.intrinsics();
   const Eigen::Vector4d& d = camera.distortion();
   const bool radtan = camera.kind() == CameraKind::kPinholeRadtan;
   return fmt::format(
-      "sensor_type: camera\ncomment: simulated\n{}rate_hz: {:g}\nresolution: [{}, {}]\ncamera_model: "
+      "sensor_type: camera\ncomment: {}\n{}rate_hz: {:g}\nresolution: [{}, {}]\ncamera_model: "
       "pinhole\n"
       "intrinsics: [{:.12g}, {:.12g}, {:.12g}, {:.12g}]\ndistortion_model: {}\n"
       "distortion_coefficients: [{:.12g}, {:.12g}, {:.12g}, {:.12g}]\n{}",
-      transformYaml(T_body_cam), rate_hz, camera.width(), camera.height(), k[0], k[1], k[2], k[3],
+      origin, transformYaml(T_body_cam), rate_hz, camera.width(), camera.height(), k[0], k[1], k[2], k[3],
       radtan ? "radial-tangential" : "equidistant", d[0], d[1], d[2], d[3], extra);
 }
 
-std::string imuYaml(const ImuNoise& noise) {
+std::string imuYaml(const ImuNoise& noise, std::string_view origin) {
   return fmt::format(
-      "sensor_type: imu\ncomment: simulated\n{}rate_hz: {:g}\ngyroscope_noise_density: {:g}\n"
+      "sensor_type: imu\ncomment: {}\n{}rate_hz: {:g}\ngyroscope_noise_density: {:g}\n"
       "gyroscope_random_walk: {:g}\naccelerometer_noise_density: {:g}\naccelerometer_random_walk: {:g}\n",
-      transformYaml(SE3()), noise.rate_hz, noise.gyro_density, noise.gyro_walk, noise.accel_density,
+      origin, transformYaml(SE3()), noise.rate_hz, noise.gyro_density, noise.gyro_walk, noise.accel_density,
       noise.accel_walk);
 }
 
-std::string imuCsv(const std::vector<ImuSample>& samples) {
-  std::string text =
-      "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],"
-      "a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
-  for (const ImuSample& s : samples) {
-    fmt::format_to(std::back_inserter(text), "{},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g}\n",
-                   s.stamp.ns, s.gyro.x(), s.gyro.y(), s.gyro.z(), s.accel.x(), s.accel.y(), s.accel.z());
-  }
-  return text;
+std::string imuCsvHeader() {
+  return "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],"
+         "a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
+}
+
+std::string imuCsvRow(const ImuSample& s) {
+  return fmt::format("{},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g}\n", s.stamp.ns, s.gyro.x(),
+                     s.gyro.y(), s.gyro.z(), s.accel.x(), s.accel.y(), s.accel.z());
 }
 
 std::string groundTruthCsv(const SplineTrajectory& trajectory, const SimulatedImu& imu, Stamp zero,

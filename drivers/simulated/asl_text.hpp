@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "drivers/simulated/imu_simulator.hpp"
@@ -13,11 +14,13 @@
 
 namespace swiftlet {
 
-/// sensor.yaml of a camera; `extra` lines go at its end.
+/// sensor.yaml of a camera; `origin` says where the data come from, `extra` lines go at its end.
 std::string cameraYaml(const CameraModel& camera, const SE3& T_body_cam, double rate_hz,
-                       const std::string& extra);
-std::string imuYaml(const ImuNoise& noise);
-std::string imuCsv(const std::vector<ImuSample>& samples);
+                       std::string_view origin, const std::string& extra);
+std::string imuYaml(const ImuNoise& noise, std::string_view origin);
+/// data.csv of an IMU: its first line, and a line for each sample, both with their ends.
+std::string imuCsvHeader();
+std::string imuCsvRow(const ImuSample& sample);
 /// 17 columns: stamp, p, q (wxyz), v, gyro and accelerometer bias, at the IMU's steps.
 std::string groundTruthCsv(const SplineTrajectory& trajectory, const SimulatedImu& imu, Stamp zero,
                            double rate_hz);

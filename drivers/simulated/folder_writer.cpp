@@ -21,6 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::string_view kOrigin = "simulated";
 constexpr double kMaxDepth = 10.0;      // m; what lies further counts as not seen
 constexpr double kPinholeFocal = 0.94;  // ideal camera's focal length over a narrow lens's own
 constexpr double kWideFocal = 0.45;  // over the image width, for lenses wider than a pinhole's useful field
@@ -52,8 +53,8 @@ class TruthWriter {
     const double rate = flight.settings().camera_rate / flight.settings().depth_every;
     const SE3& T = flight.givenRig().T_body_cam[0];
     writeText(folder / "mav0/depth0/sensor.yaml",
-              cameraYaml(depth_.camera(), T, rate, "depth_unit_m: 0.001\n"));
-    writeText(folder / "mav0/labels0/sensor.yaml", cameraYaml(labels_.camera(), T, rate, ""));
+              cameraYaml(depth_.camera(), T, rate, kOrigin, "depth_unit_m: 0.001\n"));
+    writeText(folder / "mav0/labels0/sensor.yaml", cameraYaml(labels_.camera(), T, rate, kOrigin, ""));
     writeText(folder / "mav0/labels0/labels.csv", labelsCsv());
   }
 
@@ -238,12 +239,14 @@ void writeFlight(const SimulatedFlight& flight, const fs::path& folder) {
     fs::create_directories(folder / fmt::format("mav0/cam{}", c));
     const CameraModel& camera = flight.trueRig().camera[c];
     writeText(folder / fmt::format("mav0/cam{}/sensor.yaml", c),
-              cameraYaml(camera, flight.givenRig().T_body_cam[c], s.camera_rate, ""));
+              cameraYaml(camera, flight.givenRig().T_body_cam[c], s.camera_rate, kOrigin, ""));
     writeText(folder / fmt::format("truth/cam{}.yaml", c),
-              cameraYaml(camera, flight.trueRig().T_body_cam[c], s.camera_rate, ""));
+              cameraYaml(camera, flight.trueRig().T_body_cam[c], s.camera_rate, kOrigin, ""));
   }
-  writeText(folder / "mav0/imu0/sensor.yaml", imuYaml(s.imu.noise));
-  writeText(folder / "mav0/imu0/data.csv", imuCsv(flight.imu().samples));
+  writeText(folder / "mav0/imu0/sensor.yaml", imuYaml(s.imu.noise, kOrigin));
+  std::string samples = imuCsvHeader();
+  for (const ImuSample& sample : flight.imu().samples) samples += imuCsvRow(sample);
+  writeText(folder / "mav0/imu0/data.csv", samples);
   writeText(folder / "mav0/state_groundtruth_estimate0/data.csv",
             groundTruthCsv(flight.trajectory(), flight.imu(), s.start, s.imu.noise.rate_hz));
   writeText(folder / "truth/mesh.ply", meshPly(flight.world().mesh()));

@@ -26,6 +26,10 @@ struct SettingsOptions {
 
 void addBudgetCommand(CLI::App& app, int& exit_code);
 void addReplayCommand(CLI::App& app, int& exit_code);
+void addFlyCommand(CLI::App& app, int& exit_code);
+void addRecordCommand(CLI::App& app, int& exit_code);
+void addDoctorCommand(CLI::App& app, int& exit_code);
+void addHilCommand(CLI::App& app, int& exit_code);
 void addMeshCommand(CLI::App& app, int& exit_code);
 void addFuseCommand(CLI::App& app, int& exit_code);
 void addPlaceCommand(CLI::App& app, int& exit_code);

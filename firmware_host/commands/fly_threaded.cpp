@@ -47,7 +47,7 @@ struct Governors {
 
 }  // namespace
 
-bool flyThreaded(LogSource& source, LogFeed& feed, const Settings& settings, RunLog& log,
+bool flyThreaded(const Calibration& calibration, SensorInput& input, const Settings& settings, RunLog& log,
                  Wiring::Options wanted, const FlightRequest& request, const RunControl& control,
                  nlohmann::ordered_json& report) {
   const std::string confined = confineMalloc();
@@ -58,7 +58,7 @@ bool flyThreaded(LogSource& source, LogFeed& feed, const Settings& settings, Run
   wanted.track_effort = &governors.track;
   wanted.smooth_effort = &governors.smooth;
   wanted.arming = &arming;
-  const auto wiring = std::make_unique<Wiring>(source.rig(), source.imuNoise(), settings, log, wanted);
+  const auto wiring = std::make_unique<Wiring>(calibration.rig, calibration.noise, settings, log, wanted);
   reserveHeap(kHeapReserve);
   MemoryTable reserved;
   wiring->addReservations(reserved);
@@ -75,7 +75,6 @@ bool flyThreaded(LogSource& source, LogFeed& feed, const Settings& settings, Run
   }
 
   ThreadedOptions options;
-  options.speed = request.speed;
   options.realtime = settings.realtime;
   options.watch = request.watch;
   options.started = [&](const std::vector<ThreadReport>& threads) {
@@ -91,13 +90,13 @@ bool flyThreaded(LogSource& source, LogFeed& feed, const Settings& settings, Run
       }
     }
     ground.memory_locked = lock.current;
-    ground.imu_rate = source.imuNoise().rate_hz;
+    ground.imu_rate = calibration.noise.rate_hz;
     ground.speed = request.speed;
-    ground.cameras = static_cast<int>(settings.odometry.use_stereo ? source.rig().camera_count : 1);
+    ground.cameras = static_cast<int>(settings.odometry.use_stereo ? calibration.rig.camera_count : 1);
     ground.recorder_wanted = wanted.recorder != nullptr;
     arming.begin(ground);
   };
-  const ThreadedReport threads = runThreaded(feed, *wiring, options, control);
+  const ThreadedReport threads = runThreaded(input, *wiring, options, control);
   if (lock.current) unlockMemory();
   log.collect(*wiring);
 
@@ -106,9 +105,6 @@ bool flyThreaded(LogSource& source, LogFeed& feed, const Settings& settings, Run
   report["threads"] = nlohmann::ordered_json::array();
   for (const ThreadReport& thread : threads.threads) report["threads"].push_back(toJson(thread));
   report["thread_faults"] = threads.faults;
-  report["late_ms"] = {{"p50", threads.lateness.wall_frames.percentile(0.5) / kMilli},
-                       {"p99", threads.lateness.wall_frames.percentile(0.99) / kMilli},
-                       {"max", threads.lateness.wall_frames.max() / kMilli}};
   report["memory_lock"] = toJson(lock);
   report["reserved"] = reserved.json();
   report["malloc"] = confined;

@@ -5,18 +5,20 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
+#include "drivers/calibration/calibration.hpp"
 #include "firmware_host/pipeline/threaded.hpp"
+#include "firmware_host/pipeline/wiring.hpp"
 
 namespace swiftlet {
 
 struct FlightRequest {
-  double speed = 1;
+  double speed = 1;       ///< of the log's clock against the host's
   bool announce = false;  ///< print the table of what was reserved, and what is missing
   std::function<void(const char* thread, bool begins)> watch;
 };
 
 /// `report` gets what the summary says of the executor. False when it was stopped.
-bool flyThreaded(LogSource& source, LogFeed& feed, const Settings& settings, RunLog& log,
+bool flyThreaded(const Calibration& calibration, SensorInput& input, const Settings& settings, RunLog& log,
                  Wiring::Options wanted, const FlightRequest& request, const RunControl& control,
                  nlohmann::ordered_json& report);
 

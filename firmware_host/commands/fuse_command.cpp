@@ -1,20 +1,15 @@
 #include <fmt/format.h>
 
-#include <atomic>
-#include <csignal>
 #include <memory>
 
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/fuse_run.hpp"
+#include "firmware_host/commands/stop_signal.hpp"
 
 namespace swiftlet {
 namespace {
-
-std::atomic<bool> stop_asked{false};
-
-extern "C" void askFuseToStop(int /*signal*/) { stop_asked.store(true, std::memory_order_relaxed); }
 
 struct FuseOptions {
   FuseRequest request;
@@ -40,7 +35,7 @@ void printSummary(const nlohmann::ordered_json& summary) {
 
 int fuse(const FuseOptions& options) {
   FuseRequest request = options.request;
-  request.stop = &stop_asked;
+  request.stop = &stopOnSignal();
   request.show_progress = true;
   if (options.until >= 0) request.until = options.until;
   if (!options.calibration.empty()) request.calibration = options.calibration[0];
@@ -48,9 +43,6 @@ int fuse(const FuseOptions& options) {
   if (request.until && *request.until < request.from) {
     throw InputError("--until", 0, "", "the section ends before it begins", "Give an --until after --from");
   }
-  stop_asked.store(false, std::memory_order_relaxed);
-  std::signal(SIGINT, askFuseToStop);
-  std::signal(SIGTERM, askFuseToStop);
   const FuseRunResult result = runFuse(request, options.settings.read());
   printSummary(result.summary);
   fmt::print("written to {}\n", request.out);

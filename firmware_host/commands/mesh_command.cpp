@@ -1,20 +1,15 @@
 #include <fmt/format.h>
 
-#include <atomic>
-#include <csignal>
 #include <memory>
 
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/mesh_run.hpp"
+#include "firmware_host/commands/stop_signal.hpp"
 
 namespace swiftlet {
 namespace {
-
-std::atomic<bool> stop_asked{false};
-
-extern "C" void askMeshToStop(int /*signal*/) { stop_asked.store(true, std::memory_order_relaxed); }
 
 struct MeshOptions {
   MeshRequest request;
@@ -38,7 +33,7 @@ void printSummary(const nlohmann::ordered_json& summary) {
 
 int mesh(const MeshOptions& options) {
   MeshRequest request = options.request;
-  request.stop = &stop_asked;
+  request.stop = &stopOnSignal();
   request.show_progress = true;
   if (options.until >= 0) request.until = options.until;
   if (!options.calibration.empty()) request.calibration = options.calibration[0];
@@ -46,9 +41,6 @@ int mesh(const MeshOptions& options) {
   if (request.until && *request.until < request.from) {
     throw InputError("--until", 0, "", "the section ends before it begins", "Give an --until after --from");
   }
-  stop_asked.store(false, std::memory_order_relaxed);
-  std::signal(SIGINT, askMeshToStop);
-  std::signal(SIGTERM, askMeshToStop);
   const MeshRunResult result = runMesh(request, options.settings.read());
   printSummary(result.summary);
   fmt::print("written to {}\n", request.out);

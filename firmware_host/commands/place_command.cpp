@@ -1,20 +1,15 @@
 #include <fmt/format.h>
 
-#include <atomic>
-#include <csignal>
 #include <memory>
 
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/place_run.hpp"
+#include "firmware_host/commands/stop_signal.hpp"
 #include "mapping/place/place_database.hpp"
 
 namespace swiftlet {
 namespace {
-
-std::atomic<bool> stop_asked{false};
-
-extern "C" void askPlaceToStop(int /*signal*/) { stop_asked.store(true, std::memory_order_relaxed); }
 
 struct PlaceOptions {
   PlaceRequest request;
@@ -52,13 +47,10 @@ void printSummary(const nlohmann::ordered_json& summary) {
 
 int place(const PlaceOptions& options) {
   PlaceRequest request = options.request;
-  request.stop = &stop_asked;
+  request.stop = &stopOnSignal();
   request.show_progress = true;
   if (!options.calibration.empty()) request.calibration = options.calibration[0];
   if (options.calibration.size() > 1) request.imu_calibration = options.calibration[1];
-  stop_asked.store(false, std::memory_order_relaxed);
-  std::signal(SIGINT, askPlaceToStop);
-  std::signal(SIGTERM, askPlaceToStop);
   const PlaceRunResult result = runPlace(request, options.settings.read());
   printSummary(result.summary);
   fmt::print("written to {}\n", request.out);

@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <atomic>
-#include <csignal>
 #include <filesystem>
 #include <memory>
 
@@ -9,14 +7,11 @@
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/replay_run.hpp"
+#include "firmware_host/commands/stop_signal.hpp"
 #include "firmware_host/report/summary.hpp"
 
 namespace swiftlet {
 namespace {
-
-std::atomic<bool> stop_asked{false};
-
-extern "C" void askToStop(int /*signal*/) { stop_asked.store(true, std::memory_order_relaxed); }
 
 struct ReplayOptions {
   ReplayRequest request;
@@ -45,7 +40,7 @@ std::string sameStampsLine(const nlohmann::ordered_json& accuracy) {
 
 int replay(const ReplayOptions& options) {
   ReplayRequest request = options.request;
-  request.stop = &stop_asked;
+  request.stop = &stopOnSignal();
   request.show_progress = true;
   if (options.until >= 0) request.until = options.until;
   if (!options.calibration.empty()) request.calibration = options.calibration[0];
@@ -53,8 +48,6 @@ int replay(const ReplayOptions& options) {
   if (request.until && *request.until < request.from) {
     throw InputError("--until", 0, "", "the section ends before it begins", "Give an --until after --from");
   }
-  std::signal(SIGINT, askToStop);
-  std::signal(SIGTERM, askToStop);
   const ReplayResult result = runReplay(request, options.settings.read());
   fmt::print("{}", summaryText(result.summary));
   if (result.summary.contains("accuracy")) {

@@ -18,6 +18,7 @@ bool sameConditions(const ArmingVerdict& a, const ArmingVerdict& b) {
 }  // namespace
 
 void ArmingMonitor::measureRate(const SensorFacts& sensors, ArmingFacts& facts) {
+  if (sensors.samples == 0) return;  // no stamp to begin from
   const Mark now{sensors.newest_sample, sensors.samples, sensors.reversed_stamps};
   if (!newer_ || now.stamp - newer_->stamp > kLookBack) {
     older_ = newer_ ? newer_ : now;

@@ -41,6 +41,13 @@ struct ImuArrival {
   HostTimes host;
 };
 
+/// Writes an image's pixels, grey, 8 bit, rows without padding, to where it is told: once, from the device's
+/// memory into a slot.
+struct PixelWriter {
+  void (*write)(const void* device, std::uint8_t* pixels) = nullptr;
+  const void* device = nullptr;
+};
+
 /// An image in its slot; `frame.image` shows `pixels`.
 struct ImageSlot {
   CameraFrame frame;

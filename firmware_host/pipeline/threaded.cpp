@@ -1,10 +1,8 @@
 #include "firmware_host/pipeline/threaded.hpp"
 
-#include <ctime>
+#include <memory>
 
-#include <algorithm>
-#include <exception>
-
+#include "firmware_host/pipeline/host_sleep.hpp"
 #include "firmware_host/realtime/doorbell.hpp"
 
 namespace swiftlet {
@@ -14,24 +12,11 @@ namespace {
 constexpr Duration kLongestSleep = Duration::fromMilliseconds(5);
 /// How often the low threads look: the recorder's and the log's arrows hold many times as much.
 constexpr Duration kLowPeriod = Duration::fromMilliseconds(5);
-/// Messages read ahead of their time, and of these images of both cameras: their memory is the source's.
-constexpr std::size_t kReadAhead = 256;
-constexpr std::uint64_t kImagesAhead = LogSource::kImageSlots - 1;
 
-void sleepUntil(double host_seconds) {
-  constexpr double kNanoseconds = 1e9;
-  timespec at{};
-  at.tv_sec = static_cast<std::time_t>(host_seconds);
-  at.tv_nsec = static_cast<long>((host_seconds - static_cast<double>(at.tv_sec)) * kNanoseconds);
-  clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
-}
-
-void sleepFor(Duration duration) { sleepUntil(wallSeconds() + duration.seconds()); }
-
-class Run {
+class Run : public SensorSink {
  public:
-  Run(LogFeed& feed, Wiring& wiring, const ThreadedOptions& options, const RunControl& control)
-      : feed_(feed), wiring_(wiring), options_(options), control_(control) {}
+  Run(SensorInput& input, Wiring& wiring, const ThreadedOptions& options, const RunControl& control)
+      : input_(input), wiring_(wiring), options_(options), control_(control) {}
 
   ThreadedReport operator()() {
     const RealtimeGroup& rt = options_.realtime;
@@ -45,118 +30,77 @@ class Run {
     start("smooth", rt.smooth_priority, rt.smooth_cpu, [this] { smooth(); });
     start("track", rt.track_priority, rt.track_cpu, [this] { track(); });
     start("propagate", rt.propagate_priority, rt.propagate_cpu, [this] { propagate(); });
-    start("sensor", rt.sensor_priority, rt.sensor_cpu, [this] { sense(); });
+    const std::vector<SensorInput::Thread> sensors = input_.threads(*this, control_);
+    for (const SensorInput::Thread& sensor : sensors) sensing_ += sensor.of_vehicle ? 1 : 0;
+    for (const SensorInput::Thread& sensor : sensors) {
+      if (sensor.of_vehicle) start(sensor.name, rt.sensor_priority, rt.sensor_cpu, [&] { sense(sensor); });
+    }
     if (options_.started) options_.started(report_.threads);
-    start("source", 0, -1, [this] { read(); });
+    for (const SensorInput::Thread& sensor : sensors) {
+      if (!sensor.of_vehicle) start(sensor.name, 0, -1, sensor.run);
+    }
     waitForEnd();
-    for (std::size_t i = 0; i < threads_.size(); ++i) {
+    for (std::size_t i = 0; i < started_; ++i) {
       threads_[i].join();
       if (!threads_[i].fault().empty()) {
         report_.faults.push_back(report_.threads[i].name + ": " + threads_[i].fault());
       }
     }
-    if (read_error_) std::rethrow_exception(read_error_);
+    input_.finish();
     report_.finished = !control_.stopped();
     return std::move(report_);
   }
 
  private:
-  enum class Kind : std::uint8_t { kSample, kImage };
-  struct Ahead {
-    Kind kind = Kind::kSample;
-    ImuSample sample;
-    CameraFrame image;
-    SceneImages scene;
-    std::uint64_t taken = 0;
-  };
-  static constexpr std::size_t kThreads = 10;
+  /// The eight of wiring.cpp, and an input's: IMU, two cameras, trigger, and two to spare.
+  static constexpr std::size_t kThreads = 14;
 
   void start(const char* name, int priority, int cpu, std::function<void()> entry) {
     ThreadSettings settings;
     settings.name = name;
     settings.priority = options_.realtime.enabled ? priority : 0;
     settings.cpu = options_.realtime.enabled ? cpu : -1;
-    report_.threads.push_back(threads_[started_++].start(settings, [this, name, entry] {
+    report_.threads.push_back(threads_.at(started_++).start(settings, [this, name, entry] {
       if (options_.watch) options_.watch(name, true);
       entry();
       if (options_.watch) options_.watch(name, false);
     }));
   }
 
-  // Threads.
+  // Sink.
 
-  void read() {
-    try {
-      std::uint64_t images = 0;
-      for (;;) {
-        while (ahead_.size() >= kReadAhead ||
-               images - images_out_.load(std::memory_order_acquire) >= kImagesAhead) {
-          if (control_.stopped()) break;
-          sleepFor(Duration::fromMilliseconds(1));
-        }
-        const LogFeed::Next next = control_.stopped() ? LogFeed::Next::kEnd : feed_.next();
-        if (next == LogFeed::Next::kEnd) break;
-        Ahead* message = ahead_.beginPush();
-        message->kind = next == LogFeed::Next::kSample ? Kind::kSample : Kind::kImage;
-        message->taken = feed_.taken();
-        if (message->kind == Kind::kSample) {
-          message->sample = feed_.sample();
-        } else {
-          message->image = feed_.image();
-          message->scene = feed_.scene();
-          ++images;
-        }
-        ahead_.commitPush();
-      }
-    } catch (...) {
-      read_error_ = std::current_exception();
-    }
-    read_done_.store(true, std::memory_order_release);
+  void takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host) override {
+    wiring_.takeImu(sample, arrival, host);
+    propagate_bell_.ring();
+    if (wiring_.awaitedSampleCame()) track_bell_.ring();
   }
 
-  void sense() {
-    for (;;) {
-      const bool done = read_done_.load(std::memory_order_acquire);
-      Ahead* message = ahead_.front();
-      if (message == nullptr) {
-        if (done) break;
-        sleepFor(Duration::fromMilliseconds(1));
-        continue;
-      }
-      if (control_.stopped()) break;
-      const Stamp arrival = message->kind == Kind::kSample ? message->sample.stamp : message->image.arrival;
-      const Stamp stamp = message->kind == Kind::kSample ? message->sample.stamp : message->image.stamp;
-      if (!begun_) begin(arrival);
-      const double due = hostTime(arrival);
-      if (due > wallSeconds()) sleepUntil(due);
-      const HostTimes host{hostTime(stamp), wallSeconds()};
-      report_.lateness.wall_frames.add(std::max(host.arrival - due, 0.0));
-      if (message->kind == Kind::kSample) {
-        wiring_.takeImu(message->sample, arrival, host);
-        propagate_bell_.ring();
-      } else {
-        wiring_.takeScene(message->scene);
-        wiring_.takeImage(message->image, host);
-        track_bell_.ring();
-        images_out_.fetch_add(1, std::memory_order_release);
-        taken_.store(message->taken, std::memory_order_relaxed);
-      }
-      ahead_.pop();
-    }
-    wiring_.endInput();
-    propagate_bell_.ring();
+  void takeScene(const SceneImages& scene) override { wiring_.takeScene(scene); }
+
+  void takeImage(const CameraFrame& image, const HostTimes& host) override {
+    wiring_.takeImage(image, host);
     track_bell_.ring();
   }
 
-  void begin(Stamp first) {
-    begun_ = true;
-    first_ = first;
-    // The other threads have a moment to fall asleep.
-    constexpr double kLead = 0.05;  // s
-    zero_ = wallSeconds() + kLead;
+  void takeImage(const CameraFrame& image, const HostTimes& host, const PixelWriter& pixels) override {
+    wiring_.takeImage(image, host, pixels);
+    track_bell_.ring();
   }
-  [[nodiscard]] double hostTime(Stamp stamp) const {
-    return zero_ + (stamp - first_).seconds() / options_.speed;
+
+  // Threads.
+
+  void sense(const SensorInput::Thread& sensor) {
+    // The input ends with its last thread, whatever ends it.
+    struct AtEnd {
+      Run& run;
+      ~AtEnd() {
+        if (run.sensing_.fetch_sub(1) > 1) return;
+        run.wiring_.endInput();
+        run.propagate_bell_.ring();
+        run.track_bell_.ring();
+      }
+    } at_end{*this};
+    sensor.run();
   }
 
   void propagate() {
@@ -240,12 +184,12 @@ class Run {
   void waitForEnd() {
     constexpr Duration kProgressPeriod = Duration::fromMilliseconds(100);
     while (!log_done_.load(std::memory_order_acquire) || !record_done_.load(std::memory_order_acquire)) {
-      if (control_.progress) control_.progress(taken_.load(std::memory_order_relaxed));
+      if (control_.progress) control_.progress(input_.taken());
       sleepFor(kProgressPeriod);
     }
   }
 
-  LogFeed& feed_;
+  SensorInput& input_;
   Wiring& wiring_;
   const ThreadedOptions& options_;
   const RunControl& control_;
@@ -253,23 +197,16 @@ class Run {
   std::array<FlightThread, kThreads> threads_;
   std::size_t started_ = 0;
 
-  SpscRing<Ahead, kReadAhead> ahead_;
-  std::atomic<std::uint64_t> images_out_{0};  ///< images whose memory the source may use again
-  std::atomic<std::uint64_t> taken_{0};
-  std::atomic<bool> read_done_{false}, log_done_{false}, record_done_{false};
-  std::exception_ptr read_error_;
-
-  bool begun_ = false;
-  Stamp first_;
-  double zero_ = 0;
+  std::atomic<int> sensing_{0};
+  std::atomic<bool> log_done_{false}, record_done_{false};
   Doorbell propagate_bell_, track_bell_, smooth_bell_, mesh_bell_, loop_bell_, map_bell_;
 };
 
 }  // namespace
 
-ThreadedReport runThreaded(LogFeed& feed, Wiring& wiring, const ThreadedOptions& options,
+ThreadedReport runThreaded(SensorInput& input, Wiring& wiring, const ThreadedOptions& options,
                            const RunControl& control) {
-  return std::make_unique<Run>(feed, wiring, options, control)->operator()();
+  return std::make_unique<Run>(input, wiring, options, control)->operator()();
 }
 
 }  // namespace swiftlet

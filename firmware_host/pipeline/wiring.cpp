@@ -63,6 +63,9 @@ Wiring::Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, 
       full_effort_(settings.effort),
       track_effort_(options.track_effort != nullptr ? options.track_effort : &full_effort_),
       smooth_effort_(options.smooth_effort != nullptr ? options.smooth_effort : &full_effort_),
+      sample_patience_(options.sample_patience),
+      sample_period_(Duration::fromSeconds(noise.rate_hz > 0 ? 1 / noise.rate_hz : 0)),
+      remarks_(options.remarks),
       drag_(options.drag),
       propagation_(noise, settings.odometry),
       pairing_(pairingSettings(rig, settings)),
@@ -118,12 +121,34 @@ void Wiring::takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& ho
   static_cast<void>(imu_to_smooth_.tryPush(message));
   if (log_.wantsImu()) static_cast<void>(imu_to_log_.tryPush(message));
   if (to_recorder_) static_cast<void>(to_recorder_->imu.tryPush(message));
-  newest_imu_.store(sample.stamp.ns, std::memory_order_release);
-  SensorFacts& facts = sensing_.facts;
-  if (sample.stamp <= facts.newest_sample) ++facts.reversed_stamps;
-  facts.newest_sample = sample.stamp;
-  facts.samples = message.number;
-  sensor_facts_.write(facts);
+  newest_imu_.store(sample.stamp.ns);
+  imu_sensed_.note(sample.stamp, host.arrival);
+  imu_facts_.write(imu_sensed_);
+}
+
+void SensorActivity::note(Stamp stamp, double host_arrival) {
+  ++messages;
+  if (stamp <= newest) ++reversed_stamps;
+  newest = stamp;
+  arrival = host_arrival;
+}
+
+SensorFacts Wiring::sensorFacts() const {
+  SensorFacts facts;
+  SensorActivity imu;
+  if (imu_facts_.read(imu) != 0) {
+    facts.samples = imu.messages;
+    facts.reversed_stamps = imu.reversed_stamps;
+    facts.newest_sample = imu.newest;
+  }
+  for (std::size_t c = 0; c < kMaxCameras; ++c) {
+    SensorActivity camera;
+    if (camera_[c].facts.read(camera) == 0) continue;
+    facts.reversed_stamps += camera.reversed_stamps;
+    facts.newest_image[c] = camera.newest;
+    facts.image_arrival[c] = camera.arrival;
+  }
+  return facts;
 }
 
 // IMU, newest fix -> propagation -> state at IMU rate
@@ -224,6 +249,7 @@ void Wiring::smoothFrame(const TrackMessage& message, FrameResult& out) {
 bool Wiring::log() {
   bool any = false;
   const bool ended = smoothDone() && meshDone() && loopDone() && mapDone() && propagateDone();
+  if (remarks_) any = remarks_(log_);
   if (to_loop_) {
     while (const LoopReport* report = to_loop_->reports.front()) {
       log_.onLoop(*report);
@@ -272,7 +298,9 @@ void Wiring::watchArming(const FrameResult& result) {
   if (!arming_->update(result, sensorFacts(), running, lost, wallSeconds())) return;
   const ArmingVerdict& verdict = arming_->verdict();
   std::string text = verdict.ready() ? "ready to arm" : "not ready to arm:";
-  for (const MissingCondition& missing : verdict.missing) text += std::string(" ") + missing.name();
+  for (const MissingCondition& missing : verdict.missing) {
+    text += std::string(" ") + missing.name() + " (" + missing.text.data() + ")";
+  }
   log_.remark(result.track_step.stamp, text);
 }
 
@@ -346,6 +374,7 @@ void Wiring::addLosses(std::map<std::string, std::uint64_t>& losses) const {
     note((camera + "_unrecorded").c_str(), counters_.sensor.images_unrecorded[c]);
   }
   note("frames_dropped", counters_.track.dropped);
+  note("frames_without_samples", counters_.track.without_samples);
   note("results_to_log", results_.refused());
   note("camera_0_unmeshed", counters_.sensor.images_unmeshed);
   if (meshes_) note("meshes_to_log", meshes_->refused());

@@ -2,15 +2,16 @@
 // Every stage and every arrow of the system, with what each thread does with them. See wiring.cpp: it reads
 // as the block diagram.
 //
-// One function a thread: takeImu, takeImage, takeScene, endInput (sensor); propagate, track, smooth, mesh
-// (flight path); loop, map, log, record (low priority). Each takes what waits on its arrows, at most one
-// frame, and says whether it did anything. An executor calls them: from one thread in turn (lockstep.hpp), or
-// each from its own (threaded.hpp). The arrows are in fixed memory and nobody waits on them; who sleeps until
-// something comes is the executor's matter. Nothing on the flight path allocates or locks once the first
-// message has been taken.
+// One function a thread: takeImu (the IMU's), takeImage (each camera's), takeScene (camera 0's), endInput
+// (the last of them); propagate, track, smooth, mesh (flight path); loop, map, log, record (low priority).
+// Each takes what waits on its arrows, at most one frame, and says whether it did anything. An executor calls
+// them: from one thread in turn (lockstep.hpp), or each from its own (threaded.hpp). The arrows are in fixed
+// memory and nobody waits on them; who sleeps until something comes is the executor's matter. Nothing on the
+// flight path allocates or locks once the first message has been taken.
 //
 // IMU samples go to their readers at once. `track` and `smooth` take those not later than the frame that they
-// work on, so that a frame never sees samples from beyond its stamp.
+// work on, so that a frame never sees samples from beyond its stamp. From a log they come before the frame;
+// from devices they may come after it, and `track` waits for them, not longer than Options::sample_patience.
 
 #include <array>
 #include <atomic>
@@ -71,7 +72,8 @@ struct WiringCounters {
     FaultCounts faults;
   } propagate;
   struct Track {
-    std::uint64_t dropped = 0;  ///< frames that went by while others were in work
+    std::uint64_t dropped = 0;          ///< frames that went by while others were in work
+    std::uint64_t without_samples = 0;  ///< frames that went on although their samples had not come
     PairingCounters pairing;
   } track;
   struct Mesh {
@@ -85,6 +87,16 @@ struct WiringCounters {
     std::uint64_t refused = 0;        ///< by the stage
     FaultCounts faults;
   } map;
+};
+
+/// What one of the sensors did of late.
+struct SensorActivity {
+  std::uint64_t messages = 0;
+  std::uint64_t reversed_stamps = 0;
+  Stamp newest{std::numeric_limits<std::int64_t>::min()};
+  double arrival = 0;  ///< host time of the newest
+
+  void note(Stamp stamp, double host_arrival);
 };
 
 /// What the sensors did of late, for whoever asks.
@@ -110,6 +122,11 @@ class Wiring {
     SurfaceSink* spill = nullptr;  ///< takes surface for which the map has no room; null: it is lost
     const Vocabulary* vocabulary = nullptr;  ///< of loop closure; null: the shipped one; outlives the wiring
     ArmingMonitor* arming = nullptr;         ///< null: nobody asks whether the vehicle may be armed
+    /// For which `track` waits, after a frame's arrival, for the samples up to its stamp, on the host's
+    /// clock; 0: never, for then whoever feeds the wiring hands them over first.
+    Duration sample_patience{0};
+    /// Called by `log` each time: what the input has to say of itself, to the log. True: there was something.
+    std::function<bool(RunLog&)> remarks;
     /// Called after a stage's work with its CPU seconds, within its wall time: tests slow stages down.
     std::function<void(StageId, double)> drag;
   };
@@ -117,9 +134,11 @@ class Wiring {
   Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, RunLog& log,
          const Options& options);
 
-  // Sensor. The image is copied; one of another size than the calibration's is counted and goes no further.
+  // Sensors. The image is copied; one of another size than the calibration's is counted and goes no further.
   void takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host);
   void takeImage(const CameraFrame& image, const HostTimes& host);
+  /// The same where the pixels are not grey bytes in rows: `image.image` says the size, `pixels` writes them.
+  void takeImage(const CameraFrame& image, const HostTimes& host, const PixelWriter& pixels);
   /// Depth and labels of the image of camera 0 that comes next; copied. Without a map: nothing happens.
   void takeScene(const SceneImages& scene);
   /// In place of images: the back-end alone. Lockstep only; false while the smoother has no room.
@@ -169,17 +188,17 @@ class Wiring {
   /// What was reserved for what, by the constructor.
   void addReservations(MemoryTable& table) const;
   /// Any thread.
-  [[nodiscard]] SensorFacts sensorFacts() const {
-    SensorFacts facts;
-    static_cast<void>(sensor_facts_.read(facts));
-    return facts;
-  }
+  [[nodiscard]] SensorFacts sensorFacts() const;
+  /// Of the IMU's thread, after takeImu: the sample for which `track` waits has come.
+  [[nodiscard]] bool awaitedSampleCame() const { return newest_imu_.load() >= awaited_imu_.load(); }
   [[nodiscard]] const StageTable& times() const { return times_; }
 
  private:
   struct Camera {
     ImagePool pool{ImagePool::Quotas{kTrackQuota, kMeshQuota, kRecordQuota}};
     ImageRing ring;
+    SensorActivity sensed;  ///< of the camera's thread
+    NewestShared<SensorActivity> facts;
     // Of `track`: what it holds, in order.
     std::array<ImagePool::Loan, kTrackQuota> held;
     std::size_t held_count = 0;
@@ -188,6 +207,7 @@ class Wiring {
 
   // track
   void takeArrivals();
+  [[nodiscard]] bool awaitsSamples();
   bool popHead(std::size_t camera);
   void pair(const CameraFrame& frame);
   void queueFrame(const StereoFrame& frame);
@@ -235,6 +255,9 @@ class Wiring {
   ConstantEffort full_effort_;
   EffortSource* track_effort_;
   EffortSource* smooth_effort_;
+  Duration sample_patience_;
+  Duration sample_period_;
+  std::function<bool(RunLog&)> remarks_;
   std::function<void(StageId, double)> drag_;
 
   // Stages.
@@ -254,9 +277,9 @@ class Wiring {
 
   // Arrows.
   ImuRing imu_to_propagate_, imu_to_track_, imu_to_smooth_, imu_to_log_;
+  NewestShared<SensorActivity> imu_facts_;
   std::array<Camera, kMaxCameras> camera_;
   TrackRing tracked_ring_;
-  NewestShared<SensorFacts> sensor_facts_;
   Newest<StateFix> fix_;
   Newest<SmoothedWindow> window_;
   MeshImageRing image_to_mesh_;  ///< of camera 0
@@ -272,9 +295,7 @@ class Wiring {
   std::unique_ptr<RecorderArrows> to_recorder_;
 
   // Of one thread each.
-  struct {
-    SensorFacts facts;
-  } sensing_;
+  SensorActivity imu_sensed_;
   struct {
     std::uint64_t fix = 0;
     NavState state;
@@ -313,6 +334,8 @@ class Wiring {
   } mapping_;
 
   std::atomic<std::int64_t> newest_imu_{std::numeric_limits<std::int64_t>::min()};
+  /// Once newest_imu_ is there `track` may go on; the latest stamp of all while it does not wait.
+  std::atomic<std::int64_t> awaited_imu_{std::numeric_limits<std::int64_t>::max()};
   std::atomic<bool> input_ended_{false}, propagate_done_{false}, track_done_{false}, smooth_done_{false},
       mesh_done_{false}, loop_done_{false}, map_done_{false};
   std::atomic<bool> log_abandoned_{false};

@@ -12,9 +12,17 @@ constexpr Stamp kEndOfTime{std::numeric_limits<std::int64_t>::max()};
 
 }  // namespace
 
-// camera -> slot -> track, mesh, record
 void Wiring::takeImage(const CameraFrame& image, const HostTimes& host) {
-  if (image.camera >= rig_.camera_count || image.image.empty()) return;
+  if (image.image.empty()) return;
+  const auto copy = [](const void* from, std::uint8_t* to) {
+    packedCopy(*static_cast<const ImageView*>(from), to);
+  };
+  takeImage(image, host, {copy, &image.image});
+}
+
+// camera -> slot -> track, mesh, record
+void Wiring::takeImage(const CameraFrame& image, const HostTimes& host, const PixelWriter& pixels) {
+  if (image.camera >= rig_.camera_count) return;
   Camera& camera = camera_[image.camera];
   auto& counters = counters_.sensor;
   if (image.image.width != rig_.camera[image.camera].width() ||
@@ -31,7 +39,8 @@ void Wiring::takeImage(const CameraFrame& image, const HostTimes& host) {
   slot.frame = image;
   slot.frame.number = ++counters.images[image.camera];
   slot.host = host;
-  slot.frame.image = packedCopy(image.image, slot.pixels.data());
+  pixels.write(pixels.device, slot.pixels.data());
+  slot.frame.image = {slot.pixels.data(), image.image.width, image.image.height, image.image.width};
   if (to_recorder_) {
     const bool handed = camera.pool.tryHand(handle, kRecordReads);
     if (!handed) {
@@ -52,11 +61,8 @@ void Wiring::takeImage(const CameraFrame& image, const HostTimes& host) {
   }
   if (mesh_ && image.camera == 0) handToMesh(handle);
   camera.pool.finish(handle);
-  SensorFacts& facts = sensing_.facts;
-  if (image.stamp <= facts.newest_image[image.camera]) ++facts.reversed_stamps;
-  facts.newest_image[image.camera] = image.stamp;
-  facts.image_arrival[image.camera] = host.arrival;
-  sensor_facts_.write(facts);
+  camera.sensed.note(image.stamp, host.arrival);
+  camera.facts.write(camera.sensed);
 }
 
 // track file -> smooth
@@ -90,7 +96,25 @@ bool Wiring::track() {
     return ended && endTracking();
   }
   if (tracked_ring_.size() >= kTrackedRing) return false;
+  if (!ended && awaitsSamples()) return false;
   return trackFrame();
+}
+
+/// Whether samples up to the stamp of the first frame are still to come. A sample less than one period before
+/// the frame is its last.
+bool Wiring::awaitsSamples() {
+  if (sample_patience_.ns == 0) return false;
+  const StereoFrame& frame = tracking_.waiting.front();
+  // Written before the newest sample is read, as the IMU's thread reads it after its write: one of the two
+  // sees the other.
+  awaited_imu_.store((frame.stamp - sample_period_).ns + 1);
+  bool waits = newest_imu_.load() < awaited_imu_.load();
+  if (waits && wallSeconds() - hostTimesOf(frame).arrival > sample_patience_.seconds()) {
+    ++counters_.track.without_samples;
+    waits = false;
+  }
+  if (!waits) awaited_imu_.store(kEndOfTime.ns);
+  return waits;
 }
 
 void Wiring::takeArrivals() {
@@ -105,7 +129,11 @@ void Wiring::takeArrivals() {
               camera_[first].has_head = false;
               pair(headOf(first));
             }
-            if (pairing_.expire(tracking_.newest_sample, tracking_.paired).ok()) queueFrame(tracking_.paired);
+            // Before the first sample nothing says how late it is.
+            const bool any_sample = tracking_.newest_sample.ns != std::numeric_limits<std::int64_t>::min();
+            if (any_sample && pairing_.expire(tracking_.newest_sample, tracking_.paired).ok()) {
+              queueFrame(tracking_.paired);
+            }
           }));
 }
 

@@ -3,64 +3,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
 #include <string_view>
 
+#include "firmware_host/realtime/machine_files.hpp"
+
 namespace swiftlet {
 namespace {
 
 constexpr double kPercent = 100;
-
-/// The files of one machine, real or made up.
-class Machine {
- public:
-  explicit Machine(std::string root) : root_(std::move(root)) {}
-
-  /// The whole file without the white space at its end.
-  [[nodiscard]] std::optional<std::string> text(const std::string& path) const {
-    std::ifstream file(root_ + path);
-    if (!file) return std::nullopt;
-    std::ostringstream content;
-    content << file.rdbuf();
-    std::string all = content.str();
-    while (!all.empty() && std::isspace(static_cast<unsigned char>(all.back())) != 0) all.pop_back();
-    return all;
-  }
-  [[nodiscard]] std::optional<std::int64_t> number(const std::string& path) const {
-    const auto content = text(path);
-    return content ? toNumber(*content) : std::nullopt;
-  }
-  /// The rest of the first line that begins so.
-  [[nodiscard]] std::optional<std::string> lineAfter(const std::string& path, std::string_view start) const {
-    const auto content = text(path);
-    if (!content) return std::nullopt;
-    std::istringstream lines(*content);
-    for (std::string line; std::getline(lines, line);) {
-      if (line.starts_with(start)) return line.substr(start.size());
-    }
-    return std::nullopt;
-  }
-
-  static std::optional<std::int64_t> toNumber(const std::string& text) {
-    char* end = nullptr;
-    const std::int64_t value = std::strtoll(text.c_str(), &end, 10);
-    const bool whole =
-        end != text.c_str() && (*end == '\0' || std::isspace(static_cast<unsigned char>(*end)));
-    return whole ? std::optional(value) : std::nullopt;
-  }
-
- private:
-  std::string root_;
-};
-
-MachineLine unknown(const char* what) { return {what, "unknown", MachineVerdict::kUnknown, ""}; }
 
 std::optional<bool> hasCapability(const Machine& machine, unsigned capability) {
   const auto effective = machine.lineAfter("/proc/self/status", "CapEff:");
@@ -352,10 +308,10 @@ const MachineLine* MachineReport::find(const std::string& what) const {
   return line == lines.end() ? nullptr : &*line;
 }
 
-std::string MachineReport::text() const {
+std::string MachineReport::text(const std::string& title) const {
   std::size_t width = 0;
   for (const MachineLine& line : lines) width = std::max(width, line.what.size());
-  std::string text = "this machine\n";
+  std::string text = title + "\n";
   for (const MachineLine& line : lines) {
     text += fmt::format("  {:<{}}  {:<7}  {}\n", line.what, width, verdictName(line.verdict), line.found);
     if (!line.remedy.empty()) text += fmt::format("  {:<{}}  {:<7}  -> {}\n", "", width, "", line.remedy);
@@ -377,7 +333,8 @@ nlohmann::ordered_json MachineReport::json() const {
 MachineReport inspectMachine(const std::string& root, int priority) {
   const Machine machine(root);
   return {{throttling(machine), priorityRight(machine, priority), lockRight(machine), preemption(machine),
-           cpus(machine), governor(machine), quotaLine(machine), realtimeQuota(machine), clockLine(machine)}};
+           cpus(machine), governor(machine), idleStates(machine), interrupts(machine), quotaLine(machine),
+           realtimeQuota(machine), clockLine(machine)}};
 }
 
 }  // namespace swiftlet

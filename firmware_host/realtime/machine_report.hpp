@@ -31,15 +31,15 @@ struct MachineReport {
   /// The line called `what`, or null.
   [[nodiscard]] const MachineLine* find(const std::string& what) const;
   /// A table, remedies indented below their lines.
-  [[nodiscard]] std::string text() const;
+  [[nodiscard]] std::string text(const std::string& title = "this machine") const;
   /// [{"what", "found", "verdict", "remedy"}]
   [[nodiscard]] nlohmann::ordered_json json() const;
 };
 
 /// Lines: "real-time throttling", "real-time priority", "locked memory", "preemption", "CPUs", "CPU
-/// governor", "CPU quota", "real-time quota" (control groups of version 1), "clock". `root` stands in front
-/// of every path that is read ("" is this machine, a folder with the same files a test's). `priority` is the
-/// highest that the flight threads want.
+/// governor", "idle states", "interrupts", "CPU quota", "real-time quota" (control groups of version 1),
+/// "clock". `root` stands in front of every path that is read ("" is this machine, a folder with the same
+/// files a test's). `priority` is the highest that the flight threads want.
 MachineReport inspectMachine(const std::string& root = "", int priority = 45);
 
 }  // namespace swiftlet

@@ -34,13 +34,17 @@ RunRecorder::RunRecorder(const std::string& folder, bool imu_rate, bool meshes)
   }
   const std::filesystem::path path(folder);
   // What an earlier run left and this one does not write would be taken for this one's.
-  for (const char* name : {"imu_rate.tum", "map.tum", "loops.csv", "local_mesh.ply", "map.ply", "map.glb",
-                           "meshes", "summary.json"}) {
+  for (const char* name : {"imu_rate.tum", "imu_rate_health.csv", "map.tum", "loops.csv", "local_mesh.ply",
+                           "map.ply", "map.glb", "meshes", "summary.json"}) {
     std::filesystem::remove_all(path / name, error);
   }
   if (meshes) meshes_.emplace(folder);
   odometry_.emplace(path / "odometry.tum");
-  if (imu_rate) imu_rate_.emplace(path / "imu_rate.tum");
+  if (imu_rate) {
+    imu_rate_.emplace(path / "imu_rate.tum");
+    imu_rate_health_.emplace(path / "imu_rate_health.csv");
+    imu_rate_health_->write("#timestamp [ns],health,epoch");
+  }
   states_.emplace(path / "states.csv");
   states_->write(statesHeader());
   events_.emplace(path / "events.log");
@@ -54,7 +58,12 @@ void RunRecorder::onFrame(const TrackedFrame& tracked, const OdometryOutput& out
 }
 
 void RunRecorder::onImuState(const NavState& state) {
-  if (imu_rate_) imu_rate_->write(formatTum(state.stamp, state.T_world_body));
+  if (!imu_rate_) return;
+  imu_rate_->write(formatTum(state.stamp, state.T_world_body));
+  if (health_ == state.health && epoch_ == state.epoch) return;
+  health_ = state.health;
+  epoch_ = state.epoch;
+  imu_rate_health_->write(fmt::format("{},{},{}", state.stamp.ns, healthName(state.health), state.epoch));
 }
 
 void RunRecorder::onMesh(bool keyframe, const LocalMesh& frame, const LocalMesh* horizon,

@@ -1,7 +1,8 @@
 #pragma once
-// Writes the files of a run folder that grow while the run goes on: odometry.tum, imu_rate.tum and meshes/
-// (on request), states.csv, events.log; and local_mesh.ply, map.ply and map.glb at its end. Lines go out as
-// they come, in constant memory.
+// Writes the files of a run folder that grow while the run goes on: odometry.tum; on request imu_rate.tum
+// with imu_rate_health.csv (a line where health or epoch of those states changes) and meshes/; states.csv,
+// events.log; and local_mesh.ply, map.ply and map.glb at its end. Lines go out as they come, in constant
+// memory.
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -39,6 +40,9 @@ class RunRecorder : public RunListener {
   std::string folder_;
   std::optional<LineFile> odometry_;
   std::optional<LineFile> imu_rate_;
+  std::optional<LineFile> imu_rate_health_;
+  std::optional<Health> health_;  ///< the newest of imu_rate_health_
+  std::uint32_t epoch_ = 0;       ///< likewise
   std::optional<LineFile> states_;
   std::optional<LineFile> events_;
   std::optional<MeshSequenceWriter> meshes_;

@@ -46,17 +46,8 @@ Json healthJson(const RunStatistics& statistics) {
   return history;
 }
 
-Json countersJson(const RunFacts& facts, const LogSource& source, const RunStatistics& statistics) {
-  const LogCounters& log = source.counters();
-  Json json;
-  json["log"] = {{"imu_samples", log.imu_samples},
-                 {"images", log.images},
-                 {"bad_rows", log.bad_rows},
-                 {"nan_rows", log.nan_rows},
-                 {"out_of_order", log.out_of_order},
-                 {"repeated_stamps", log.repeated_stamps},
-                 {"missing_images", log.missing_images},
-                 {"damaged_images", log.damaged_images}};
+Json countersJson(const RunFacts& facts, const RunStatistics& statistics) {
+  Json json = facts.input;
   if (!facts.tracks.empty()) json["tracks"] = {{"surplus", facts.track_surplus}};
   json["pairing"] = {{"images", statistics.images},
                      {"pairs", statistics.pairing.pairs},
@@ -163,6 +154,17 @@ std::string versionText() {
                      SWIFTLET_BUILD_CPU, __VERSION__);
 }
 
+Json toJson(const LogCounters& log) {
+  return {{"imu_samples", log.imu_samples},
+          {"images", log.images},
+          {"bad_rows", log.bad_rows},
+          {"nan_rows", log.nan_rows},
+          {"out_of_order", log.out_of_order},
+          {"repeated_stamps", log.repeated_stamps},
+          {"missing_images", log.missing_images},
+          {"damaged_images", log.damaged_images}};
+}
+
 Json toJson(const MeshCounters& stage, const HorizonCounters& horizon) {
   return {{"frames", stage.frames},
           {"invalid_frames", stage.invalid_frames},
@@ -201,20 +203,18 @@ Json toJson(const LoopCounters& loops) {
           {"refused", loops.refused}};
 }
 
-Json summaryOf(const RunFacts& facts, const Settings& settings, const LogSource& source,
-               const RunStatistics& statistics) {
+Json summaryOf(const RunFacts& facts, const Settings& settings, const RunStatistics& statistics) {
   const double flown = statistics.first_image && statistics.last_image
                            ? (*statistics.last_image - *statistics.first_image).seconds()
                            : 0;
   Json json;
   json["version"] = versionJson();
   json["run"] = runJson(facts, statistics);
-  json["calibration"] = source.calibration().form;
+  json["calibration"] = facts.calibration_form;
   json["settings"] = settingsJson(settings);
   json["health"] = healthJson(statistics);
-  json["counters"] = countersJson(facts, source, statistics);
-  json["warnings"] = source.warnings();
-  for (const std::string& line : facts.track_warnings) json["warnings"].push_back(line);
+  json["counters"] = countersJson(facts, statistics);
+  json["warnings"] = facts.warnings;
   json["executor"] = facts.executor;
   json["timing"] = timingJson(statistics.times);
   json["cpu"] = {{"flight_s", flown},

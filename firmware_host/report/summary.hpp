@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/recorded/log_source.hpp"
+#include "drivers/recorded/log_warnings.hpp"
 #include "firmware_host/pipeline/run_listener.hpp"
 #include "firmware_host/settings/settings.hpp"
 
@@ -22,9 +22,12 @@ struct MemoryRow {
 
 struct RunFacts {
   std::string log;
-  std::string tracks;               ///< file of feature tracks; empty when images were used
-  std::uint64_t track_surplus = 0;  ///< landmarks beyond kMaxFeatures in a frame, left out
-  std::vector<std::string> track_warnings;
+  std::string tracks;                 ///< file of feature tracks; empty when images were used
+  std::uint64_t track_surplus = 0;    ///< landmarks beyond kMaxFeatures in a frame, left out
+  std::vector<std::string> warnings;  ///< lines for the user, of the input
+  std::string calibration_form;
+  /// What the input counted, by its name in the summary's counters: {"log": {...}}.
+  nlohmann::ordered_json input = nlohmann::ordered_json::object();
   bool mono = false;
   bool finished = true;  ///< false: stopped by the user
   double wall = 0;       ///< s of the run, reading included
@@ -36,8 +39,10 @@ struct RunFacts {
 };
 
 /// Without accuracy: the caller adds it under "accuracy".
-nlohmann::ordered_json summaryOf(const RunFacts& facts, const Settings& settings, const LogSource& source,
+nlohmann::ordered_json summaryOf(const RunFacts& facts, const Settings& settings,
                                  const RunStatistics& statistics);
+
+nlohmann::ordered_json toJson(const LogCounters& log);
 
 /// Counters of the mesher, without those of the pipeline around it.
 nlohmann::ordered_json toJson(const MeshCounters& stage, const HorizonCounters& horizon);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <set>
@@ -52,6 +53,15 @@ void assign(const Place& place, const Setting& setting, const YAML::Node& node, 
   }
   if (const auto* text = std::get_if<TextSetting>(&setting.kind)) {
     text->value(settings) = parsed<std::string>(place, setting, node);
+    return;
+  }
+  if (const auto* choice = std::get_if<ChoiceSetting>(&setting.kind)) {
+    const auto word = parsed<std::string>(place, setting, node);
+    if (std::ranges::find(choice->words, word) == choice->words.end()) {
+      failAt(place, setting.key, fmt::format("`{}` is not a value this setting takes", word),
+             "Allowed: " + rangeText(setting));
+    }
+    choice->value(settings) = word;
     return;
   }
   const auto bounded = [&](const auto& kind, auto value) {

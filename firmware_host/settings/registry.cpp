@@ -8,30 +8,10 @@
 #include <vector>
 
 #include "estimator/core/limits.hpp"
+#include "firmware_host/settings/setting_makers.hpp"
 
 namespace swiftlet {
 namespace {
-
-/// settings.*group.*member, as one callable.
-template <typename Group, typename Value>
-auto member(Group Settings::*group, Value Group::*value) {
-  return [group, value](Settings& settings) -> Value& { return settings.*group.*value; };
-}
-
-template <typename Group>
-IntegerSetting integer(Group Settings::*group, int Group::*value, int low, int high) {
-  return {member(group, value), low, high};
-}
-
-template <typename Group>
-RealSetting real(Group Settings::*group, double Group::*value, double low, double high) {
-  return {member(group, value), low, high};
-}
-
-template <typename Group>
-SwitchSetting onOff(Group Settings::*group, bool Group::*value) {
-  return {member(group, value)};
-}
 
 /// SCHED_FIFO ends at 99, which the kernel's own threads have.
 constexpr int kHighestPriority = 98;
@@ -232,7 +212,7 @@ std::vector<Setting> estimationSettings() {
 
 std::vector<Setting> makeRegistry() {
   std::vector<Setting> all = estimationSettings();
-  for (const auto& group : {realtimeSettings(), budgetSettings()}) {
+  for (const auto& group : {deviceSettings(), realtimeSettings(), budgetSettings()}) {
     all.insert(all.end(), group.begin(), group.end());
   }
   return all;
@@ -311,6 +291,9 @@ std::string rangeText(const Setting& setting) {
     return fmt::format("{} to {}{}", number->low, number->high, unit);
   }
   if (const auto* text = std::get_if<TextSetting>(&setting.kind)) return std::string(text->what);
+  if (const auto* choice = std::get_if<ChoiceSetting>(&setting.kind)) {
+    return fmt::format("one of {}", fmt::join(choice->words, ", "));
+  }
   const auto& number = std::get<RealOrWordSetting>(setting.kind);
   return fmt::format("{} to {}{}, or {}", number.low, number.high, unit, number.word);
 }

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "firmware_host/settings/settings.hpp"
 
@@ -39,11 +40,18 @@ struct TextSetting {
   std::string_view what;  ///< in words
 };
 
+/// One of a few words.
+struct ChoiceSetting {
+  std::function<std::string&(Settings&)> value;
+  std::vector<std::string_view> words;
+};
+
 struct Setting {
   std::string_view key;   ///< "group.name", as in YAML and on the command line
   std::string_view unit;  ///< empty for pure numbers
   std::string_view doc;   ///< one or two sentences
-  std::variant<IntegerSetting, RealSetting, RealOrWordSetting, SwitchSetting, TextSetting> kind;
+  std::variant<IntegerSetting, RealSetting, RealOrWordSetting, SwitchSetting, TextSetting, ChoiceSetting>
+      kind;
 };
 
 /// All settings; those of one group stand together.

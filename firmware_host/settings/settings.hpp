@@ -8,6 +8,7 @@
 
 #include "estimator/messages/effort.hpp"
 #include "estimator/odometry/odometry_settings.hpp"
+#include "firmware_host/settings/device_settings.hpp"
 #include "mapping/loop/loop_settings.hpp"
 #include "mapping/map/map_settings.hpp"
 
@@ -88,6 +89,11 @@ struct BudgetsGroup {
 };
 
 struct Settings {
+  VehicleGroup vehicle;
+  ImuLinkGroup imu_link;
+  CamerasGroup cameras;
+  TriggerGroup trigger;
+  HilGroup hil;
   OdometrySettings odometry;
   Effort effort;
   PairingGroup pairing;

@@ -19,6 +19,11 @@ const std::string kGovernor = "/sys/devices/system/cpu/cpu0/cpufreq/scaling_gove
 const std::string kGovernor1 = "/sys/devices/system/cpu/cpu1/cpufreq/scaling_governor";
 const std::string kRuntime = "/proc/sys/kernel/sched_rt_runtime_us";
 
+const std::string kIdle = "/sys/devices/system/cpu/cpu0/cpuidle/state";
+const std::string kInterrupts =
+    "           CPU0       CPU1\n  9:        900        100   IO-APIC  acpi\n"
+    " 24:       2100        900   PCI-MSI  xhci\nLOC:    9999999    9999999   Local timer interrupts\n";
+
 /// A machine set up for flight.
 Files goodMachine() {
   return {{kRuntime, "950000\n"},
@@ -37,6 +42,12 @@ Files goodMachine() {
           {"/sys/devices/system/cpu/isolated", "2-3\n"},
           {kGovernor, "performance\n"},
           {kGovernor1, "performance\n"},
+          {kIdle + "0/latency", "0\n"},
+          {kIdle + "0/name", "POLL\n"},
+          {kIdle + "1/latency", "2\n"},
+          {kIdle + "1/name", "C1\n"},
+          {"/proc/interrupts", kInterrupts},
+          {"/proc/uptime", "100.5 200.0\n"},
           {"/sys/devices/system/clocksource/clocksource0/current_clocksource", "tsc\n"}};
 }
 
@@ -65,7 +76,7 @@ bool contains(const std::string& text, const std::string& part) {
 
 TEST_CASE("a machine set up for flight is good in every line") {
   const MachineReport report = reportOf(goodMachine());
-  CHECK(report.lines.size() == 9);
+  CHECK(report.lines.size() == 11);
   for (const MachineLine& line : report.lines) {
     INFO(line.what << ": " << line.found);
     CHECK(line.verdict == MachineVerdict::kGood);
@@ -150,6 +161,19 @@ TEST_CASE("preemption, CPUs, governor and clock") {
             .verdict == MachineVerdict::kNote);
 }
 
+TEST_CASE("idle states that wake slowly and CPUs full of interrupts are named") {
+  const Files deep = {{kIdle + "2/latency", "133\n"}, {kIdle + "2/name", "C6\n"}};
+  CHECK(lineWith("idle states", deep).verdict == MachineVerdict::kPoor);
+  CHECK(contains(lineWith("idle states", deep).found, "C6, which takes 133 us"));
+  Files off = deep;
+  off[kIdle + "2/disable"] = "1\n";
+  CHECK(lineWith("idle states", off).verdict == MachineVerdict::kGood);
+  CHECK(
+      contains(lineWith("interrupts", {}).found, "CPU 0 takes 75 % of the devices', 40 a second since boot"));
+  CHECK(lineWith("interrupts", {{"/proc/uptime", "0.1 0.1\n"}}).verdict == MachineVerdict::kNote);
+  CHECK(lineWith("interrupts", {{"/proc/interrupts", "nothing\n"}}).verdict == MachineVerdict::kUnknown);
+}
+
 TEST_CASE("a CPU quota counts wherever it is set above the group") {
   const std::string group = "/proc/self/cgroup";
   CHECK(lineWith("CPU quota", {}).found == "none");
@@ -178,10 +202,10 @@ TEST_CASE("a CPU quota counts wherever it is set above the group") {
 
 TEST_CASE("this machine's own report has every line, as a table and as JSON") {
   const MachineReport report = inspectMachine();
-  CHECK(report.lines.size() == 9);
+  CHECK(report.lines.size() == 11);
   const std::string text = report.text();
   const auto json = report.json();
-  REQUIRE(json.size() == 9);
+  REQUIRE(json.size() == 11);
   for (std::size_t i = 0; i < json.size(); ++i) {
     CHECK(contains(text, report.lines[i].what));
     CHECK(contains(text, report.lines[i].found));

@@ -156,5 +156,13 @@ TEST_CASE("a settings file that is not there") {
   CHECK_THROWS_AS(readSettingsFile("does/not/exist.yaml", settings), InputError);
 }
 
+TEST_CASE("a word outside the choice is refused with the words that it might be") {
+  CHECK_THAT(overrideError("cameras.format=MJPG").what(),
+             Catch::Contains("cameras.format") && Catch::Contains("GREY, Y10, Y16, YUYV, UYVY"));
+  Settings settings;
+  overrideSetting("cameras.format=Y16", settings);
+  CHECK(settings.cameras.format == "Y16");
+}
+
 }  // namespace
 }  // namespace swiftlet

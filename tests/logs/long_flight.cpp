@@ -16,6 +16,7 @@
 
 #include "drivers/recorded/open_log.hpp"
 #include "firmware_host/commands/fly_threaded.hpp"
+#include "firmware_host/pipeline/log_player.hpp"
 #include "firmware_host/pipeline/map_keeper.hpp"
 #include "firmware_host/report/memory_use.hpp"
 #include "firmware_host/report/run_recorder.hpp"
@@ -87,7 +88,9 @@ int run(const std::string& path, double minutes, double speed) {
     }
   };
   nlohmann::ordered_json report;
-  const bool finished = flyThreaded(log, feed, settings, run_log, wanted, flight, control, report);
+  LogPlayer player(feed, speed);
+  const bool finished =
+      flyThreaded(log.calibration(), player, settings, run_log, wanted, flight, control, report);
   const std::int64_t at_end = peakResidentBytes();
   const RunStatistics& s = run_log.statistics();
   fmt::print("at the end:     {} bytes ({:+.2f} %)\n{} frames, {} poses, dropped {}, epochs {}\n", at_end,

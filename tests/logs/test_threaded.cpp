@@ -23,6 +23,7 @@
 #include "drivers/recorded/recording_source.hpp"
 #include "estimator/core/random.hpp"
 #include "firmware_host/commands/replay_run.hpp"
+#include "firmware_host/pipeline/log_player.hpp"
 #include "firmware_host/pipeline/threaded.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
@@ -336,9 +337,8 @@ TEST_CASE("a log that fails ends neither the flight nor the waiting for its end"
   LogFeed feed(*source, {}, nullptr);
   const auto wiring =
       std::make_unique<Wiring>(source->rig(), source->imuNoise(), Settings{}, log, Wiring::Options{});
-  ThreadedOptions options;
-  options.speed = kSlow;
-  const ThreadedReport report = runThreaded(feed, *wiring, options, RunControl{});
+  LogPlayer player(feed, kSlow);
+  const ThreadedReport report = runThreaded(player, *wiring, ThreadedOptions{}, RunControl{});
   REQUIRE(report.faults.size() == 1);
   CHECK(report.faults[0] == "log: the disk is full");
   CHECK(wiring->smoothDone());

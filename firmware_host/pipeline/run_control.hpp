@@ -1,0 +1,18 @@
+#pragma once
+// What whoever waits for a run may want of it.
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+
+namespace swiftlet {
+
+struct RunControl {
+  const std::atomic<bool>* stop = nullptr;  ///< set: end cleanly after the current message
+  /// Called with the number of images, or frames of tracks, taken so far.
+  std::function<void(std::uint64_t)> progress;
+
+  [[nodiscard]] bool stopped() const { return stop != nullptr && stop->load(std::memory_order_relaxed); }
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,47 @@
+#pragma once
+// The vehicle's devices, as `fly`, `record`, `doctor` and `hil` want to know them.
+
+#include <string>
+
+namespace swiftlet {
+
+struct VehicleGroup {
+  std::string calibration = "";
+  std::string imu_calibration = "";
+};
+
+struct ImuLinkGroup {
+  std::string device = "";  ///< serial port or CAN interface; empty: none
+  std::string protocol = "bridge";
+  int baud = 921600;
+  double delay_ms = 0;
+  int can_node = 0;  ///< 0: any
+};
+
+struct CamerasGroup {
+  std::string device0 = "";
+  std::string device1 = "";
+  bool side_by_side = false;
+  std::string format = "GREY";
+  double rate_hz = 20;
+  double exposure_ms = 0;  ///< 0: as the camera has it
+  int gain = -1;           ///< below 0: as the camera has it
+  std::string shutter = "global";
+  double readout_ms = 0;
+};
+
+struct TriggerGroup {
+  std::string chip = "";  ///< empty: no trigger line
+  std::string line = "0";
+  std::string edge = "rising";
+  double delay_us = 0;
+};
+
+/// The far ends of the devices above, for `hil`.
+struct HilGroup {
+  std::string output0 = "";
+  std::string output1 = "";
+  std::string trigger_pull = "";
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,74 @@
+#include "firmware_host/settings/setting_makers.hpp"
+
+namespace swiftlet {
+
+std::vector<Setting> deviceSettings() {
+  using L = ImuLinkGroup;
+  using C = CamerasGroup;
+  using T = TriggerGroup;
+  constexpr auto kVehicle = &Settings::vehicle;
+  constexpr auto kLink = &Settings::imu_link;
+  constexpr auto kCameras = &Settings::cameras;
+  constexpr auto kTrigger = &Settings::trigger;
+  constexpr auto kHil = &Settings::hil;
+  return {
+      {"vehicle.calibration", "",
+       "Calibration of the rig for `fly`, `record` and `doctor`: a folder with EuRoC's sensor.yaml files, or "
+       "Kalibr's camchain.",
+       TextSetting{member(kVehicle, &VehicleGroup::calibration), "a file's or folder's name, or empty"}},
+      {"vehicle.imu_calibration", "", "Kalibr's IMU file where it is not beside the camchain.",
+       TextSetting{member(kVehicle, &VehicleGroup::imu_calibration), "a file's name, or empty"}},
+      {"imu_link.device", "",
+       "Serial port (best by its name under /dev/serial/by-id) or CAN interface that the IMU is on.",
+       TextSetting{member(kLink, &L::device), "a port as /dev/ttyUSB0, an interface as can0, or empty"}},
+      {"imu_link.protocol", "",
+       "What the IMU speaks; dronecan is on a CAN interface, the others on a serial port. bridge: the "
+       "project's own framing for microcontrollers, docs/serial.md.",
+       ChoiceSetting{member(kLink, &L::protocol),
+                     {"bridge", "vectornav", "xsens", "mip", "mavlink", "dronecan"}}},
+      {"imu_link.baud", "Bd", "Rate of the serial port; means nothing on USB that is no adapter.",
+       integer(kLink, &L::baud, 1200, 4'000'000)},
+      {"imu_link.delay_ms", "ms",
+       "Constant part of the way from sensing to arrival, which no clock comparison can see; taken off every "
+       "sample's stamp.",
+       real(kLink, &L::delay_ms, 0, 100)},
+      {"imu_link.can_node", "", "Node whose RawIMU is taken; 0: the first that is heard.",
+       integer(kLink, &L::can_node, 0, 127)},
+      {"cameras.device0", "", "Video node of camera 0 (best by its name under /dev/v4l/by-path).",
+       TextSetting{member(kCameras, &C::device0), "a node as /dev/video0, or empty"}},
+      {"cameras.device1", "", "Video node of camera 1; empty: one camera, or both in one image.",
+       TextSetting{member(kCameras, &C::device1), "a node as /dev/video2, or empty"}},
+      {"cameras.side_by_side", "", "device0 gives both cameras in one image, camera 0 in its left half.",
+       onOff(kCameras, &C::side_by_side)},
+      {"cameras.format", "", "Pixels that the cameras are asked for.",
+       ChoiceSetting{member(kCameras, &C::format), {"GREY", "Y10", "Y16", "YUYV", "UYVY"}}},
+      {"cameras.rate_hz", "Hz", "Images per second that each camera is asked for.",
+       real(kCameras, &C::rate_hz, 1, 500)},
+      {"cameras.exposure_ms", "ms",
+       "Exposure that the cameras are set to; 0: as they have it, and stamps are not moved to its middle.",
+       real(kCameras, &C::exposure_ms, 0, 1000)},
+      {"cameras.gain", "", "Gain in the cameras' own units; -1: as they have it.",
+       integer(kCameras, &C::gain, -1, 65535)},
+      {"cameras.shutter", "", "A rolling shutter's stamp is that of its middle row.",
+       ChoiceSetting{member(kCameras, &C::shutter), {"global", "rolling"}}},
+      {"cameras.readout_ms", "ms", "From the first row to the last.", real(kCameras, &C::readout_ms, 0, 100)},
+      {"trigger.chip", "", "GPIO chip that sees the cameras' trigger; empty: the cameras' own stamps.",
+       TextSetting{member(kTrigger, &T::chip), "a chip as gpiochip0, or empty"}},
+      {"trigger.line", "", "Line of that chip that the cameras' trigger is on.",
+       TextSetting{member(kTrigger, &T::line), "its number or its name"}},
+      {"trigger.edge", "", "Edge at which exposure begins.",
+       ChoiceSetting{member(kTrigger, &T::edge), {"rising", "falling"}}},
+      {"trigger.delay_us", "us", "From the edge to the begin of exposure.",
+       real(kTrigger, &T::delay_us, 0, 100'000)},
+      {"hil.output0", "",
+       "For `hil`: video output node whose images camera 0 shows (vivid's); empty: none are shown.",
+       TextSetting{member(kHil, &HilGroup::output0), "a node as /dev/video10, or empty"}},
+      {"hil.output1", "", "Likewise for camera 1.",
+       TextSetting{member(kHil, &HilGroup::output1), "a node as /dev/video11, or empty"}},
+      {"hil.trigger_pull", "",
+       "For `hil`: the file that pulls the trigger's line up and down (gpio-sim's); empty: none is pulled.",
+       TextSetting{member(kHil, &HilGroup::trigger_pull), "a file as .../sim_gpio3/pull, or empty"}},
+  };
+}
+
+}  // namespace swiftlet
