@@ -10,6 +10,7 @@
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/evaluate_meshes.hpp"
 #include "firmware_host/commands/evaluate_run.hpp"
+#include "firmware_host/hil/hil_checks.hpp"
 #include "firmware_host/report/accuracy_report.hpp"
 #include "firmware_host/report/confusion_picture.hpp"
 #include "firmware_host/report/line_file.hpp"
@@ -29,6 +30,8 @@ struct EvaluateOptions {
   bool json = false;
   bool mesh = false;
   std::string truth_mesh;
+  std::string hil;
+  std::string junit;
   SettingsOptions settings;
 };
 
@@ -122,7 +125,23 @@ void compareMap(const EvaluateOptions& options, const Subject& subject, const Tr
   fmt::print("revisits\n{}{}", toText(revisits), loops);
 }
 
+int evaluateHil(const EvaluateOptions& options) {
+  const HilVerdict verdict = checkHil(readHilEvidence(options.run, options.hil));
+  if (!options.junit.empty()) LineFile(options.junit).write(verdict.junit(options.run));
+  if (options.json) {
+    Json json = Json::array();
+    for (const HilCheck& check : verdict.checks()) {
+      json.push_back({{"name", check.name}, {"passed", check.passed}, {"says", check.says}});
+    }
+    fmt::print("{}\n", json.dump(2));
+  } else {
+    fmt::print("{}", verdict.text());
+  }
+  return verdict.passed() ? kExitDone : kExitFailed;
+}
+
 int evaluate(const EvaluateOptions& options) {
+  if (!options.hil.empty()) return evaluateHil(options);
   const Settings settings = options.settings.read();
   const Subject subject = subjectOf(options);
   const Truth truth = readTruth(subject.truth, subject.from_tracks);
@@ -192,9 +211,14 @@ void addEvaluateCommand(CLI::App& app, int& exit_code) {
       ->add_option("--truth-mesh", options->truth_mesh,
                    "True surface, a PLY file; default: truth/mesh.ply of the log")
       ->needs(mesh);
+  CLI::Option* hil = command->add_option(
+      "--hil", options->hil,
+      "Check a flight on a hardware-in-the-loop replay instead: the folder that `swiftlet hil` wrote");
+  command->add_option("--junit", options->junit, "Also write the checks as JUnit XML")->needs(hil);
   options->settings.addTo(*command);
   command->footer(
       "Example:\n  swiftlet evaluate run_mh01 --from 3\n  swiftlet evaluate run_room --mesh\n"
+      "  swiftlet evaluate flight --hil hil --junit flight.xml\n"
       "  swiftlet evaluate trajectory.tum --truth data/euroc_mh01_20s --align yaw");
   command->callback([options, &exit_code] { exit_code = evaluate(*options); });
 }

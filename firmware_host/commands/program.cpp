@@ -18,6 +18,10 @@ int runProgram(int argc, char** argv) {
   int exit_code = kExitDone;
   addSimulateCommand(app, exit_code);
   addReplayCommand(app, exit_code);
+  addFlyCommand(app, exit_code);
+  addRecordCommand(app, exit_code);
+  addDoctorCommand(app, exit_code);
+  addHilCommand(app, exit_code);
   addEvaluateCommand(app, exit_code);
   addMeshCommand(app, exit_code);
   addFuseCommand(app, exit_code);

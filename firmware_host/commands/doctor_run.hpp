@@ -1,0 +1,32 @@
+#pragma once
+// What `swiftlet doctor` finds: this computer, the devices that are connected, and the vehicle's own devices
+// at work for some seconds. Every line that is not good says what to do.
+
+#include <atomic>
+#include <string>
+#include <vector>
+
+#include "firmware_host/realtime/machine_report.hpp"
+#include "firmware_host/settings/settings.hpp"
+
+namespace swiftlet {
+
+struct DoctorRequest {
+  double seconds = 5;  ///< that the vehicle's devices are watched
+  const std::atomic<bool>* stop = nullptr;
+};
+
+struct DoctorReport {
+  MachineReport computer;
+  MachineReport connected;
+  MachineReport vehicle;          ///< empty where the settings name no device
+  std::vector<std::string> next;  ///< what to do, in order; empty: fly
+
+  /// Neither a device of the vehicle nor one that is missing for it is poor. The computer's own poor lines
+  /// cost latency and do not count.
+  [[nodiscard]] bool ready() const;
+};
+
+DoctorReport examine(const DoctorRequest& request, const Settings& settings);
+
+}  // namespace swiftlet

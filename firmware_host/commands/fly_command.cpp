@@ -1,0 +1,63 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "firmware_host/commands/checks.hpp"
+#include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/fly_run.hpp"
+#include "firmware_host/commands/stop_signal.hpp"
+#include "firmware_host/report/summary.hpp"
+
+namespace swiftlet {
+namespace {
+
+struct FlyOptions {
+  FlyRequest request;
+  SettingsOptions settings;
+};
+
+int fly(const FlyOptions& options) {
+  FlyRequest request = options.request;
+  request.stop = &stopOnSignal();
+  request.show_progress = true;
+  const FlyResult result = runFlight(request, options.settings.read());
+  if (!result.missing.empty()) {
+    for (const std::string& line : result.missing) fmt::print(stderr, "error: {}\n", line);
+    fmt::print(stderr, "nothing was flown; `swiftlet doctor` looks at all devices and at this computer\n");
+    return kExitFailed;
+  }
+  fmt::print("{}", summaryText(result.summary));
+  fmt::print("written to {}\n", request.out);
+  if (!result.has_pose) {
+    fmt::print(stderr, "error: no pose in the whole flight; {}/events.log says what the start waited for\n",
+               request.out);
+    return kExitFailed;
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+void addFlyCommand(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("fly", "Run the estimator live on the vehicle's cameras and IMU");
+  auto options = std::make_shared<FlyOptions>();
+  FlyRequest& request = options->request;
+  request.out = "flight";
+  command->add_option("--out", request.out, "Run folder to write")->capture_default_str();
+  command->add_option("--seconds", request.seconds, "End after this long; without: with SIGINT or SIGTERM")
+      ->check(nonNegative());
+  command->add_flag("--imu-rate", request.imu_rate, "Also write imu_rate.tum, the state at every IMU sample");
+  command->add_flag("--loop-closure", request.loop_closure,
+                    "Recognize places seen before; they hold map.tum together");
+  command->add_flag("--map", request.map, "Fuse depth into a labelled map: map.ply, map.glb");
+  command->add_flag("--record", request.record,
+                    "Write what enters the estimator to recording/ in the run folder");
+  options->settings.addTo(*command);
+  command->footer(
+      "Example, with the vehicle's devices in a settings file (docs/connecting.md):\n"
+      "  swiftlet doctor --settings vehicle.yaml\n"
+      "  swiftlet fly --settings vehicle.yaml --record --out flight_1");
+  command->callback([options, &exit_code] { exit_code = fly(*options); });
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,94 @@
+#include "firmware_host/commands/fly_run.hpp"
+
+#include <fmt/format.h>
+
+#include <atomic>
+#include <memory>
+
+#include "firmware_host/commands/confusion_file.hpp"
+#include "firmware_host/commands/fly_threaded.hpp"
+#include "firmware_host/commands/moving_labels.hpp"
+#include "firmware_host/commands/run_output.hpp"
+#include "firmware_host/live/live_input.hpp"
+
+namespace swiftlet {
+namespace {
+
+/// Longer than an IMU's samples take over any of the links: their buffers hold 16 ms at the most.
+constexpr Duration kSamplePatience = Duration::fromMilliseconds(25);
+
+}  // namespace
+
+Calibration vehicleCalibration(const Settings& settings) {
+  if (settings.vehicle.calibration.empty()) {
+    throw InputError("settings", 0, "vehicle.calibration",
+                     "the settings do not say how the rig is calibrated",
+                     "Name a folder with EuRoC's sensor.yaml files, or Kalibr's camchain");
+  }
+  CalibrationOptions options;
+  options.accept_unusual_rig = settings.calibration.accept_unusual_rig;
+  return readCalibration(settings.vehicle.calibration, settings.vehicle.imu_calibration, options);
+}
+
+FlyResult runFlight(const FlyRequest& request, Settings settings) {
+  if (request.loop_closure) settings.loop.enabled = true;
+  if (request.map) settings.map.enabled = true;
+  checkMovingLabels(settings.map_stage);
+  const Calibration calibration = vehicleCalibration(settings);
+  for (const std::string& line : calibration.warnings) fmt::print(stderr, "warning: {}\n", line);
+  MemoryTrack memory;
+  LiveInput input(settings, calibration);
+  LiveInput::Opened opened = input.open();
+  for (const std::string& line : opened.warnings) fmt::print(stderr, "warning: {}\n", line);
+  FlyResult result;
+  if (!opened.faults.empty()) {
+    result.missing = std::move(opened.faults);
+    return result;
+  }
+  memory.note("devices");
+
+  RunOutput output(request.out, settings, calibration, RunOutput::Wanted{request.imu_rate, false});
+  std::unique_ptr<FlightRecorder> recorder;
+  if (request.record) recorder = output.startRecorder(RecordOrder::kByArrival);
+  Wiring::Options wanted = output.wiringOptions();
+  wanted.recorder = recorder.get();
+  wanted.confusion = confusionOf(settings);
+  wanted.sample_patience = kSamplePatience;
+  wanted.remarks = [&input](RunLog& log) {
+    return input.drainEvents([&log](Stamp stamp, const std::string& line) {
+      log.remark(stamp, line);
+      fmt::print(stderr, "{}\n", line);
+    });
+  };
+  // The executor asks ten times a second.
+  std::atomic<bool> stop{false};
+  RunControl control;
+  control.stop = &stop;
+  const double begin = wallSeconds();
+  control.progress = [&](std::uint64_t /*images*/) {
+    const bool told = request.stop != nullptr && request.stop->load(std::memory_order_relaxed);
+    if (told || (request.seconds > 0 && wallSeconds() - begin > request.seconds)) stop.store(true);
+  };
+  FlightRequest flight;
+  flight.announce = request.show_progress;
+  RunFacts facts;
+  const double cpu = processCpuSeconds();
+  flyThreaded(calibration, input, settings, output.log(), wanted, flight, control, facts.executor);
+  // A flight has no end of its own: to be told is its end.
+  facts.finished = true;
+  facts.wall = wallSeconds() - begin;
+  facts.cpu = processCpuSeconds() - cpu;
+  memory.note("grown_in_flight");
+  facts.log = "devices";
+  facts.mono = !settings.odometry.use_stereo || calibration.rig.camera_count < 2;
+  facts.memory = memory.rows();
+  facts.calibration_form = calibration.form;
+  facts.input["devices"] = input.counters();
+  if (recorder) facts.executor["recording"] = recordingJson(*recorder);
+  result.summary = output.finish(facts);
+  output.writeSummary(result.summary);
+  result.has_pose = output.log().statistics().first_pose.has_value();
+  return result;
+}
+
+}  // namespace swiftlet

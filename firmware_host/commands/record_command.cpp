@@ -1,0 +1,69 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "firmware_host/commands/checks.hpp"
+#include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/record_run.hpp"
+#include "firmware_host/commands/stop_signal.hpp"
+
+namespace swiftlet {
+namespace {
+
+struct RecordOptions {
+  RecordRequest request;
+  SettingsOptions settings;
+};
+
+int record(const RecordOptions& options) {
+  RecordRequest request = options.request;
+  request.stop = &stopOnSignal();
+  const RecordResult result = runRecord(request, options.settings.read());
+  if (!result.missing.empty()) {
+    for (const std::string& line : result.missing) fmt::print(stderr, "error: {}\n", line);
+    fmt::print(stderr, "nothing was recorded; `swiftlet doctor` looks at all devices and at this computer\n");
+    return kExitFailed;
+  }
+  const FolderSink::Counters& written = result.written;
+  fmt::print("{} samples", written.samples);
+  std::uint64_t lost = written.samples_lost;
+  for (std::size_t c = 0; c < result.cameras; ++c) {
+    fmt::print(", {} images of camera {}", written.images[c], c);
+    lost += written.images_lost[c];
+  }
+  const auto images_end = written.images.begin() + static_cast<std::ptrdiff_t>(result.cameras);
+  fmt::print("\nwritten to {}\n", request.out);
+  if (written.samples == 0 || std::count(written.images.begin(), images_end, 0U) > 0) {
+    fmt::print(stderr,
+               "error: a device gave nothing; `swiftlet doctor` with the same settings says which and why\n");
+    return kExitFailed;
+  }
+  if (lost > 0) {
+    fmt::print(stderr,
+               "error: {} samples and {} images found no room: the disk is too slow for these cameras\n",
+               written.samples_lost, lost - written.samples_lost);
+    return kExitFailed;
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+void addRecordCommand(CLI::App& app, int& exit_code) {
+  CLI::App* command =
+      app.add_subcommand("record", "Record the vehicle's cameras and IMU as an EuRoC/ASL folder");
+  auto options = std::make_shared<RecordOptions>();
+  RecordRequest& request = options->request;
+  request.out = "recording";
+  command->add_option("--out", request.out, "Folder to write")->capture_default_str();
+  command->add_option("--seconds", request.seconds, "End after this long; without: with SIGINT or SIGTERM")
+      ->check(nonNegative());
+  options->settings.addTo(*command);
+  command->footer(
+      "Example, for Kalibr or for swiftlet replay:\n"
+      "  swiftlet record --settings vehicle.yaml --seconds 60 --out calibration_1");
+  command->callback([options, &exit_code] { exit_code = record(*options); });
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,43 @@
+#include "firmware_host/commands/record_run.hpp"
+
+#include <fmt/format.h>
+
+#include "firmware_host/commands/fly_run.hpp"
+#include "firmware_host/live/live_input.hpp"
+#include "firmware_host/live/sensor_threads.hpp"
+#include "firmware_host/pipeline/host_sleep.hpp"
+
+namespace swiftlet {
+
+RecordResult runRecord(const RecordRequest& request, const Settings& settings) {
+  const Calibration calibration = vehicleCalibration(settings);
+  LiveInput input(settings, calibration);
+  LiveInput::Opened opened = input.open();
+  for (const std::string& line : opened.warnings) fmt::print(stderr, "warning: {}\n", line);
+  RecordResult result;
+  result.cameras = calibration.rig.camera_count;
+  if (!opened.faults.empty()) {
+    result.missing = std::move(opened.faults);
+    return result;
+  }
+  FolderSink sink(request.out, calibration, settings.cameras.rate_hz);
+  SensorThreads threads(input, sink, settings.realtime);
+  for (const std::string& line : threads.warnings()) fmt::print(stderr, "warning: {}\n", line);
+  const auto print = [&input] {
+    input.drainEvents([](Stamp /*stamp*/, const std::string& line) { fmt::print(stderr, "{}\n", line); });
+  };
+  const double begin = wallSeconds();
+  constexpr Duration kPeriod = Duration::fromMilliseconds(50);
+  while (!sink.failed() && !(request.stop != nullptr && request.stop->load(std::memory_order_relaxed)) &&
+         !(request.seconds > 0 && wallSeconds() - begin > request.seconds)) {
+    print();
+    sleepFor(kPeriod);
+  }
+  threads.join();
+  print();
+  sink.finish();
+  result.written = sink.counters();
+  return result;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,78 @@
+#pragma once
+// What goes wrong when in a hardware-in-the-loop replay: read from a file, in lines of
+//   seconds after the first image, device, fault, for how many seconds, value
+// as `5.0,imu,stall,2.0` ('#' begins a comment; the value may be left out).
+//
+// Faults by device, and what their value is where they have one:
+//   imu      unplug       the port goes, the interface goes down, and returns
+//            stall        nothing is sent
+//            garbage      random bytes in place of messages; on a CAN bus nothing
+//            drop         samples are lost; value: share of them, 0.5
+//            clock_step   the sensor's clock jumps, once; value: seconds, 0.25
+//   camera0, unplug       the node goes, and returns
+//   camera1  stall        no frame comes
+//            drop         frames are lost; value: share of them, 0.5
+//            dark         images are black; value: grey value, 0
+//            freeze       the same image again
+//   trigger  drop         edges are lost; value: share of them, 0.5
+//            glitch       two edges for one
+//
+// The same file gives the same faults: what is drawn by chance is drawn from a seed that the line gives.
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "estimator/core/random.hpp"
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+enum class FaultDevice : std::uint8_t { kImu, kCamera0, kCamera1, kTrigger };
+enum class FaultKind : std::uint8_t {
+  kUnplug,
+  kStall,
+  kGarbage,
+  kDrop,
+  kClockStep,
+  kDark,
+  kFreeze,
+  kGlitch,
+};
+
+std::string_view name(FaultDevice device);
+std::string_view name(FaultKind kind);
+
+struct PlannedFault {
+  Duration begin;  ///< after the first image
+  Duration length;
+  FaultDevice device = FaultDevice::kImu;
+  FaultKind kind = FaultKind::kStall;
+  double value = 0;
+
+  [[nodiscard]] bool covers(Duration time) const { return time >= begin && time < begin + length; }
+};
+
+class FaultTimeline {
+ public:
+  FaultTimeline() = default;
+  /// InputError with line and field. `name` stands for the file in messages.
+  static FaultTimeline parse(const std::string& name, std::string_view text);
+  static FaultTimeline read(const std::string& path);
+
+  [[nodiscard]] const std::vector<PlannedFault>& faults() const { return faults_; }
+  /// The fault of this kind that covers `time`, the first of them; null: none.
+  [[nodiscard]] const PlannedFault* active(FaultDevice device, FaultKind kind, Duration time) const;
+  /// Whether chance has it at the n-th occasion, with probability `share`: of the line and n alone.
+  [[nodiscard]] bool strikes(const PlannedFault& fault, std::uint64_t n) const;
+  /// Sum of the clock's steps that have come by `time`.
+  [[nodiscard]] Duration clockStep(Duration time) const;
+  /// The list, a line each in order of begin: the same for the same file.
+  [[nodiscard]] std::string text() const;
+
+ private:
+  std::vector<PlannedFault> faults_;  ///< by begin
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,41 @@
+#pragma once
+// The way to an IMU, whatever it is made of: a serial port with a protocol, or a CAN bus.
+// Threads: one. Errors: values; a fault that lasts closes the link, and open() takes it up again.
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+
+#include "drivers/device/device_fault.hpp"
+#include "drivers/device/imu_reading.hpp"
+#include "drivers/serial/trigger_edge.hpp"
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+class ImuLink {
+ public:
+  ImuLink() = default;
+  ImuLink(const ImuLink&) = delete;
+  ImuLink& operator=(const ImuLink&) = delete;
+  virtual ~ImuLink() = default;
+
+  virtual DeviceFault open() = 0;
+  [[nodiscard]] virtual bool isOpen() const = 0;
+  /// To poll for reading.
+  [[nodiscard]] virtual int fd() const = 0;
+  /// Throws away what waits, where its arrival can be told no more. Bounded.
+  virtual void discard() {}
+  /// Reads what waits, and sends what the protocol wants sent.
+  virtual DeviceFault receive(Stamp now) = 0;
+  virtual bool next(ImuReading& reading) = 0;
+  /// Edges of a trigger that the IMU sees.
+  virtual bool nextEdge(TriggerEdge& /*edge*/) { return false; }
+  /// Bytes or frames so far, whatever they were: growing without readings, it is the wrong protocol.
+  [[nodiscard]] virtual std::uint64_t received() const = 0;
+  /// Host stamp by the protocol's own exchange of clocks; empty: none, or not yet sure.
+  [[nodiscard]] virtual std::optional<Stamp> toHost(Stamp /*device*/) const { return std::nullopt; }
+  /// What was counted; after the flight.
+  [[nodiscard]] virtual nlohmann::ordered_json counters() const = 0;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,54 @@
+#pragma once
+// Whether a device that works sends as often as it should: messages of a second beside those expected.
+// Silence is not its matter: whoever sees a device return restarts it. O(1).
+
+#include <cstddef>
+
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+class RateWatch {
+ public:
+  /// Of the messages expected: fewer is a loss, more is noise. A second of the slowest camera holds 10, of
+  /// which the window's ends may cost one.
+  static constexpr double kFewest = 0.85;
+  static constexpr double kMost = 1.15;
+
+  /// Per second; 0: unknown, and nothing is ever wrong.
+  explicit RateWatch(double expected) : expected_(expected) {}
+
+  /// Counting begins after the message that came at `now`.
+  void restart(Stamp now) {
+    begin_ = now;
+    count_ = 0;
+    begun_ = true;
+  }
+  /// `count` messages have come by `now`. True once a second: seen() is new.
+  bool add(Stamp now, std::size_t count) {
+    if (!begun_) {
+      restart(now);
+      return false;
+    }
+    count_ += count;
+    if (now - begin_ < kWindow) return false;
+    seen_ = static_cast<double>(count_) / (now - begin_).seconds();
+    restart(now);
+    return true;
+  }
+  [[nodiscard]] double seen() const { return seen_; }
+  [[nodiscard]] double expected() const { return expected_; }
+  [[nodiscard]] bool tooFew() const { return seen_ < kFewest * expected_; }
+  [[nodiscard]] bool tooMany() const { return expected_ > 0 && seen_ > kMost * expected_; }
+
+ private:
+  static constexpr Duration kWindow = Duration::fromMilliseconds(1000);
+
+  double expected_;
+  Stamp begin_;
+  std::size_t count_ = 0;
+  bool begun_ = false;
+  double seen_ = 0;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,142 @@
+// What LiveInput refuses names its setting; devices that are missing are all told.
+
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <map>
+#include <thread>
+
+#include "drivers/calibration/input_error.hpp"
+#include "drivers/simulated/rig_presets.hpp"
+#include "firmware_host/live/live_input.hpp"
+#include "firmware_host/live/sensor_threads.hpp"
+
+namespace swiftlet {
+namespace {
+
+Calibration stereo() {
+  Calibration calibration;
+  calibration.rig = makeRig(RigKind::kEuroc).rig;
+  return calibration;
+}
+
+Calibration mono() {
+  Calibration calibration = stereo();
+  calibration.rig.camera_count = 1;
+  return calibration;
+}
+
+Settings vehicle() {
+  Settings settings;
+  settings.imu_link.device = "/dev/no_such_imu";
+  settings.cameras.device0 = "/dev/no_such_camera0";
+  settings.cameras.device1 = "/dev/no_such_camera1";
+  return settings;
+}
+
+/// "key: remedy", or empty: taken.
+std::string refusal(const Settings& settings, const Calibration& calibration) {
+  try {
+    const LiveInput input(settings, calibration);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST_CASE("each refusal names its setting and what to do") {
+  CHECK(refusal(vehicle(), stereo()).empty());
+
+  Settings settings = vehicle();
+  settings.imu_link.device.clear();
+  CHECK_THAT(refusal(settings, stereo()),
+             Catch::Contains("imu_link.device") && Catch::Contains("swiftlet doctor"));
+
+  settings = vehicle();
+  settings.cameras.device0.clear();
+  CHECK_THAT(refusal(settings, stereo()),
+             Catch::Contains("cameras.device0") && Catch::Contains("swiftlet doctor"));
+
+  settings = vehicle();
+  settings.cameras.device1.clear();
+  CHECK_THAT(refusal(settings, stereo()),
+             Catch::Contains("cameras.device1") && Catch::Contains("side_by_side"));
+  CHECK(refusal(settings, mono()).empty());
+  settings.cameras.side_by_side = true;
+  CHECK(refusal(settings, stereo()).empty());
+  CHECK_THAT(refusal(settings, mono()), Catch::Contains("vehicle.calibration"));
+
+  CHECK_THAT(refusal(vehicle(), mono()),
+             Catch::Contains("vehicle.calibration") && Catch::Contains("device1"));
+
+  settings = vehicle();
+  settings.cameras.side_by_side = true;
+  CHECK_THAT(refusal(settings, stereo()), Catch::Contains("cameras.device1") && Catch::Contains("beside"));
+
+  settings = vehicle();
+  settings.cameras.device1 = settings.cameras.device0;
+  CHECK_THAT(refusal(settings, stereo()), Catch::Contains("cameras.device1") && Catch::Contains("same"));
+
+  settings = vehicle();
+  settings.cameras.device1.clear();
+  settings.cameras.side_by_side = true;
+  Calibration odd = stereo();
+  odd.rig.camera[1] = makeRig(RigKind::kForward).rig.camera[1];
+  CHECK_THAT(refusal(settings, odd), Catch::Contains("cameras.side_by_side") && Catch::Contains("size"));
+
+  settings = vehicle();
+  settings.imu_link.protocol = "dronecan";
+  CHECK(refusal(settings, stereo()).empty());
+  settings.trigger.chip = "imu";
+  CHECK_THAT(refusal(settings, stereo()), Catch::Contains("trigger.chip") && Catch::Contains("dronecan"));
+}
+
+TEST_CASE("all devices that are missing are told at once, each by name and with what to do") {
+  Settings settings = vehicle();
+  settings.trigger.chip = "/dev/no_such_chip";
+  LiveInput input(settings, stereo());
+  const LiveInput::Opened opened = input.open();
+  REQUIRE(opened.faults.size() == 4);
+  for (const auto& [line, device] : {std::pair{0, "IMU (/dev/no_such_imu, bridge)"},
+                                     {1, "camera 0 (/dev/no_such_camera0)"},
+                                     {2, "camera 1 (/dev/no_such_camera1)"},
+                                     {3, "trigger (/dev/no_such_chip, line 0)"}}) {
+    const std::string& text = opened.faults[static_cast<std::size_t>(line)];
+    CHECK_THAT(text, Catch::StartsWith(device));
+    CHECK_THAT(text, Catch::Contains("connect it, or correct its name in the vehicle settings"));
+  }
+}
+
+TEST_CASE("threads look for devices that are gone, end when told, and say once that they are not there") {
+  Settings settings = vehicle();
+  settings.trigger.chip = "/dev/no_such_chip";
+  settings.realtime.enabled = false;
+  LiveInput input(settings, stereo());
+  struct NoSink : SensorSink {
+    void takeImu(const ImuSample&, Stamp, const HostTimes&) override { ++taken; }
+    void takeScene(const SceneImages&) override { ++taken; }
+    void takeImage(const CameraFrame&, const HostTimes&) override { ++taken; }
+    void takeImage(const CameraFrame&, const HostTimes&, const PixelWriter&) override { ++taken; }
+    std::atomic<int> taken{0};
+  } sink;
+  {
+    SensorThreads threads(input, sink, settings.realtime);
+    CHECK(threads.warnings().empty());
+    std::this_thread::sleep_for(std::chrono::milliseconds(450));  // three looks
+  }
+  std::map<std::string, int> lines;
+  input.drainEvents([&](Stamp /*stamp*/, const std::string& line) { ++lines[line]; });
+  CHECK(lines.size() == 4);
+  for (const auto& [line, count] : lines) {
+    INFO(line);
+    CHECK(count == 1);
+    CHECK_THAT(line, Catch::Contains("not there"));
+  }
+  CHECK(sink.taken == 0);
+  CHECK(input.taken() == 0);
+  const nlohmann::ordered_json counters = input.counters();
+  CHECK(counters["faults"].size() == 4);
+  CHECK(counters["imu"]["samples"] == 0);
+}
+
+}  // namespace
+}  // namespace swiftlet

@@ -1,0 +1,86 @@
+#!/bin/sh
+# Flights on a hardware-in-the-loop replay in the kernel sandbox, by simulated time.
+# usage: check_flight.sh PROGRAM accuracy|faults SECONDS [LINK...]
+#   accuracy  the odometry's ATE is within the larger of 20 % and 3 mm of a plain replay's
+#   faults    a timeline of several faults, flown twice: every check passes, and both flights list the same events
+#   LINK      of guest_flight.sh: serial, can, trigger, protocol=NAME
+# Needs euroc_mh01_20s in the folder SWIFTLET_DATA, or in ../shared/data beside the project. Exit code 77: skipped.
+set -u
+program=$1
+what=$2
+seconds=$3
+shift 3
+here=$(dirname "$(realpath "$0")")
+root=$here/../..
+log=${SWIFTLET_DATA:-$root/../shared/data}/euroc_mh01_20s
+if [ ! -d "$log" ]; then
+  echo "check_flight: skipped: no $log. Name the folder of euroc_mh01_20s in SWIFTLET_DATA."
+  exit 77
+fi
+log=$(realpath "$log")
+out=$(mktemp -d)
+trap 'rm -rf "$out"' EXIT
+
+# NAME OPTION...
+fly() {
+  name=$1
+  shift
+  SWIFTLET_SANDBOX_SHARE=$out SWIFTLET_SANDBOX_TIME=simulated SWIFTLET_SANDBOX_CAMERAS=loop \
+    SWIFTLET_SANDBOX_MEMORY=1500M SWIFTLET_SANDBOX_TIMEOUT=160 "$root/toolchain/kernel_sandbox/run.sh" \
+    sh "$here/guest_flight.sh" "$program" "$log" "$out/$name" nomesh seconds="$seconds" "$@"
+  code=$?
+  [ $code -eq 77 ] && exit 77
+  [ $code -eq 0 ] && return
+  cat "$out/$name/hil.txt" "$out/$name/fly.txt"
+  exit 1
+}
+
+# RUN TRUTH OPTION...: the odometry's ATE in m.
+ate() {
+  "$program" evaluate "$1" --truth "$2" --json | sed -n '/"odometry.tum"/,$p' |
+    sed -n 's/.*"rmse": \([0-9.e-]*\),.*/\1/p' | head -n 1
+}
+
+# NAME: what events.log says of devices, a device after the other, without figures.
+events() {
+  grep -E ' remark (IMU|camera|trigger) ?[01]? ?\(' "$out/$1/flight/events.log" |
+    sed -e 's/^[0-9.]* remark //' -e 's/): \([a-z ]*\).*/): \1/' | sort -s -t '(' -k 1,1
+}
+
+case $what in
+  accuracy)
+    fly flight "$@"
+    "$program" evaluate "$out/flight/flight" --hil "$out/flight/hil" || exit 1
+    "$program" replay "$log" --out "$out/plain" --set mesh.enabled=false >"$out/plain.txt" 2>&1 || {
+      cat "$out/plain.txt"
+      exit 1
+    }
+    # The plain poses of what was played.
+    awk -v seconds="$seconds" 'NR == 1 { first = $1 } $1 - first <= seconds' "$out/plain/odometry.tum" \
+      >"$out/plain.tum"
+    "$program" evaluate "$out/plain.tum" --truth "$log" --json >"$out/plain.json" || exit 1
+    plain=$(sed -n 's/.*"rmse": \([0-9.e-]*\),.*/\1/p' "$out/plain.json" | head -n 1)
+    flown=$(ate "$out/flight/flight" "$out/flight/hil/truth.tum")
+    echo "check_flight: ATE $flown m in flight, $plain m in a plain replay"
+    awk -v flown="$flown" -v plain="$plain" 'BEGIN {
+      most = plain * 0.2 > 0.003 ? plain * 0.2 : 0.003
+      exit !(flown > 0 && plain > 0 && flown - plain <= most && plain - flown <= most)
+    }'
+    ;;
+  faults)
+    printf '%s\n' '2.0,imu,unplug,0.8' '2.5,camera1,stall,1.5' '3.0,imu,clock_step,0,-0.25' \
+      '3.2,camera0,dark,0.7' '4.0,imu,drop,0.4,0.3' >"$out/faults.csv"
+    for name in first second; do fly $name "$@" faults="$out/faults.csv"; done
+    "$program" evaluate "$out/first/flight" --hil "$out/first/hil" --junit "$out/first.xml" || exit 1
+    grep -q '<testcase classname="hil" name="told: ' "$out/first.xml" || exit 1
+    cmp "$out/first/hil/faults.csv" "$out/second/hil/faults.csv" || exit 1
+    events first >"$out/first.txt"
+    events second >"$out/second.txt"
+    cat "$out/first.txt"
+    [ -s "$out/first.txt" ] && diff "$out/first.txt" "$out/second.txt"
+    ;;
+  *)
+    echo "check_flight: what is $what?" >&2
+    exit 2
+    ;;
+esac

@@ -1,0 +1,83 @@
+#!/bin/sh
+# Inside the kernel sandbox, cameras looping: plays a log out through the kernel's devices and flies on them with the
+# unmodified program.
+# usage: guest_flight.sh PROGRAM LOG OUT [serial|can] [trigger] [faults=FILE] [seconds=N] [protocol=NAME] [nomesh]
+#   PROGRAM  swiftlet
+#   LOG      EuRoC folder with calibration
+#   OUT      folder: vehicle.yaml, hil/, flight/, what each program said
+# Exit code: 0 when both programs ended well.
+set -u
+program=$1
+log=$2
+out=$3
+shift 3
+link=serial
+trigger=no
+faults=''
+seconds=0
+protocol=bridge
+mesh=true
+for option in "$@"; do
+  case $option in
+    serial | can) link=$option ;;
+    trigger) trigger=yes ;;
+    faults=*) faults=${option#faults=} ;;
+    seconds=*) seconds=${option#seconds=} ;;
+    nomesh) mesh=false ;;
+    protocol=*) protocol=${option#protocol=} ;;
+    *)
+      echo "guest_flight: what is $option?" >&2
+      exit 2
+      ;;
+  esac
+done
+mkdir -p "$out"
+imu=/run/imu
+if [ "$link" = can ]; then
+  imu=$SANDBOX_CAN
+  protocol=dronecan
+fi
+cat >"$out/vehicle.yaml" <<END
+vehicle:
+  calibration: '$log'
+imu_link:
+  device: '$imu'
+  protocol: $protocol
+cameras:
+  device0: '$SANDBOX_CAMERA0'
+  device1: '$SANDBOX_CAMERA1'
+  rate_hz: 20
+hil:
+  output0: '$SANDBOX_OUTPUT0'
+  output1: '$SANDBOX_OUTPUT1'
+realtime:
+  enabled: false
+mesh:
+  enabled: $mesh
+END
+if [ $trigger = yes ]; then
+  cat >>"$out/vehicle.yaml" <<END
+trigger:
+  chip: '$SANDBOX_GPIO'
+  line: 3
+END
+  sed -i "s|^  output1:.*|&\n  trigger_pull: '$SANDBOX_GPIO_SYSFS/sim_gpio3/pull'|" "$out/vehicle.yaml"
+fi
+
+"$program" hil "$log" --settings "$out/vehicle.yaml" --out "$out/hil" --seconds "$seconds" --lead 3 \
+  ${faults:+--faults "$faults"} >"$out/hil.txt" 2>&1 &
+hil=$!
+# A serial port is there when its name is.
+for _ in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20; do
+  if [ "$link" = can ] || [ -e "$imu" ]; then break; fi
+  sleep 0.1
+done
+"$program" fly --settings "$out/vehicle.yaml" --imu-rate --out "$out/flight" >"$out/fly.txt" 2>&1 &
+fly=$!
+wait $hil
+played=$?
+kill -INT $fly
+wait $fly
+flown=$?
+echo "guest_flight: hil $played, fly $flown"
+[ $played -eq 0 ] && [ $flown -eq 0 ]

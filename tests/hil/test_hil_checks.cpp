@@ -1,0 +1,184 @@
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include "firmware_host/hil/hil_checks.hpp"
+#include "tests/firmware_host/xml_reader.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr std::int64_t kStart = 5'000'000'000;
+constexpr double kFlight = 10;  // s
+
+Stamp at(double seconds) { return Stamp{kStart} + Duration::fromSeconds(seconds); }
+
+SE3 poseAt(double t) { return SE3(Eigen::Quaterniond::Identity(), {std::sin(t), std::cos(t), 0.1 * t}); }
+
+/// A flight that followed the truth, good but from `low_begin` to `low_end`.
+HilEvidence flight(const std::string& faults, double low_begin = 0, double low_end = 0) {
+  HilEvidence evidence;
+  evidence.faults = FaultTimeline::parse("faults", faults);
+  evidence.first_image = at(0);
+  evidence.last_image = at(kFlight);
+  evidence.complete = true;
+  evidence.finished = true;
+  for (int i = 0; i <= 2000; ++i) evidence.truth.push_back({at(i * 0.005), poseAt(i * 0.005)});
+  for (int i = 0; i <= 200; ++i) {
+    const double t = i * 0.05;
+    const bool low = t >= low_begin && t < low_end;
+    evidence.frames.push_back({at(t), poseAt(t), low ? Health::kDegraded : Health::kGood, 0});
+  }
+  return evidence;
+}
+
+const HilCheck* find(const HilVerdict& verdict, const std::string& name) {
+  const auto& checks = verdict.checks();
+  const auto found =
+      std::ranges::find_if(checks, [&](const HilCheck& check) { return check.name.starts_with(name); });
+  return found == checks.end() ? nullptr : &*found;
+}
+
+bool fails(const HilEvidence& evidence, const std::string& name) {
+  const HilVerdict verdict = checkHil(evidence);
+  INFO(verdict.text());
+  const HilCheck* check = find(verdict, name);
+  REQUIRE(check != nullptr);
+  return !check->passed && !verdict.passed();
+}
+
+const HilEvidence::Line kSilent{at(5), "IMU (/run/imu, bridge): sends nothing (1.0 s); check its power"};
+const HilEvidence::Line kBack{at(6.01), "IMU (/run/imu, bridge): works again"};
+
+HilEvidence stalled() {
+  HilEvidence evidence = flight("4,imu,stall,2\n", 4, 6.6);
+  evidence.remarks = {kSilent, kBack};
+  return evidence;
+}
+
+TEST_CASE("A flight that did what it must passes every check", "[hil]") {
+  const HilVerdict verdict = checkHil(stalled());
+  INFO(verdict.text());
+  CHECK(verdict.passed());
+  for (const char* name : {"played", "ended", "told: imu stall", "lowered: imu stall", "returned: imu",
+                           "recovered", "no wrong pose is good: frames"}) {
+    INFO(name);
+    CHECK(find(verdict, name) != nullptr);
+  }
+}
+
+TEST_CASE("Each check fails on what it is for", "[hil]") {
+  SECTION("not played") {
+    HilEvidence evidence = stalled();
+    evidence.complete = false;
+    CHECK(fails(evidence, "played"));
+  }
+  SECTION("not ended") {
+    HilEvidence evidence = stalled();
+    evidence.finished = false;
+    CHECK(fails(evidence, "ended"));
+  }
+  SECTION("a fault that nobody tells of") {
+    HilEvidence evidence = stalled();
+    evidence.remarks = {kBack};
+    CHECK(fails(evidence, "told: imu stall"));
+  }
+  SECTION("a line without a remedy") {
+    HilEvidence evidence = stalled();
+    evidence.remarks[0].text = "IMU (/run/imu, bridge): sends nothing";
+    CHECK(fails(evidence, "told: imu stall"));
+  }
+  SECTION("another device's line") {
+    HilEvidence evidence = stalled();
+    evidence.remarks[0].text = "camera 0 (/dev/video0): sends nothing; check its power";
+    CHECK(fails(evidence, "told: imu stall"));
+  }
+  SECTION("a device that stays away") {
+    HilEvidence evidence = stalled();
+    evidence.remarks = {kSilent};
+    CHECK(fails(evidence, "returned: imu"));
+  }
+  SECTION("a defect that stays") {
+    HilEvidence evidence = stalled();
+    evidence.remarks.push_back({at(7), "IMU (/run/imu, bridge): part of it is lost (100 of 200); check"});
+    CHECK(fails(evidence, "returned: imu"));
+    evidence.remarks.push_back({at(8), "IMU (/run/imu, bridge): sound again"});
+    CHECK(checkHil(evidence).passed());
+  }
+  SECTION("good without an IMU") {
+    HilEvidence evidence = stalled();
+    evidence.frames[100].health = Health::kGood;
+    CHECK(fails(evidence, "lowered: imu stall"));
+  }
+  SECTION("good at IMU rate without an IMU") {
+    HilEvidence evidence = stalled();
+    evidence.states = {{at(5), poseAt(5), Health::kGood, 0}};
+    CHECK(fails(evidence, "lowered: imu stall"));
+  }
+  SECTION("never good again") {
+    HilEvidence evidence = flight("4,imu,stall,2\n", 4, 11);
+    evidence.remarks = {kSilent, kBack};
+    CHECK(fails(evidence, "recovered"));
+  }
+  SECTION("a jump that is called good") {
+    HilEvidence evidence = stalled();
+    for (std::size_t i = 160; i < evidence.frames.size(); ++i) {
+      evidence.frames[i].T_world_body.translation.x() += 0.04;
+    }
+    CHECK(fails(evidence, "no wrong pose is good"));
+    // Another epoch has another origin.
+    for (std::size_t i = 160; i < evidence.frames.size(); ++i) evidence.frames[i].epoch = 1;
+    CHECK(checkHil(evidence).passed());
+  }
+  SECTION("a slow drift that is called good") {
+    HilEvidence evidence = stalled();
+    for (std::size_t i = 0; i < evidence.frames.size(); ++i) {
+      evidence.frames[i].T_world_body.translation.z() += 0.07 * 0.05 * static_cast<double>(i);
+    }
+    CHECK(fails(evidence, "no wrong pose is good"));
+  }
+  SECTION("nothing good at all") { CHECK(fails(flight("", 0, 11), "no wrong pose is good")); }
+  SECTION("blind and not failed") {
+    HilEvidence evidence = flight("2,camera0,dark,5\n2.1,camera1,stall,5\n", 2, 7.6);
+    CHECK(fails(evidence, "failed while blind"));
+    for (HilEvidence::Judged& pose : evidence.frames) {
+      if (pose.stamp > at(5.1) && pose.stamp < at(7.1)) pose.health = Health::kFailed;
+    }
+    CHECK(find(checkHil(evidence), "failed while blind") == nullptr);
+  }
+}
+
+TEST_CASE("What a device cannot show need not be told", "[hil]") {
+  const auto told = [](const std::string& faults) {
+    return find(checkHil(flight(faults, 0, 11)), "told: ") != nullptr;
+  };
+  CHECK(told("4,camera0,stall,1.5\n"));
+  CHECK_FALSE(told("4,camera0,stall,1.2\n"));
+  CHECK_FALSE(told("4,camera0,dark,2,40\n"));
+  CHECK_FALSE(told("4,imu,drop,2.5,0.1\n"));
+  CHECK(told("4,imu,clock_step,0,-0.25\n"));
+  // Too near the end of the flight.
+  CHECK_FALSE(told("9,imu,clock_step,0,-0.25\n"));
+  const FaultTimeline both = FaultTimeline::parse("faults", "4,camera0,dark,3\n5,camera0,stall,1.5\n");
+  const FaultStretch dark = longestVisible(both.faults()[0], both);
+  CHECK(dark.begin == Duration::fromSeconds(4));
+  CHECK(dark.end == Duration::fromSeconds(5));
+  const FaultStretch stall = longestVisible(both.faults()[1], both);
+  CHECK(stall.length() == Duration::fromSeconds(1.5));
+}
+
+TEST_CASE("The checks as JUnit are XML that says what failed", "[hil]") {
+  HilEvidence evidence = stalled();
+  evidence.remarks = {kBack};
+  const XmlElement root = XmlReader::read(checkHil(evidence).junit("a \"flight\" & more"));
+  const XmlElement& suite = *root.all("testsuite").at(0);
+  CHECK(suite.attributes.at("name") == "a \"flight\" & more");
+  CHECK(suite.attributes.at("failures") == "1");
+  CHECK(std::to_string(suite.all("testcase").size()) == suite.attributes.at("tests"));
+  REQUIRE(suite.all("failure").size() == 1);
+  CHECK(suite.all("failure")[0]->attributes.at("message").find("events.log") != std::string::npos);
+}
+
+}  // namespace
+}  // namespace swiftlet
