@@ -20,6 +20,10 @@
 #include "firmware_host/report/kept_map.hpp"
 #include "firmware_host/report/ply_file.hpp"
 #include "mapping/pose_graph/pose_graph_optimizer.hpp"
+#include "tests/fuzz/fuzz_can.hpp"
+#include "tests/fuzz/fuzz_clocks.hpp"
+#include "tests/fuzz/fuzz_decoders.hpp"
+#include "tests/fuzz/fuzz_faults.hpp"
 #include "tests/fuzz/fuzz_recording.hpp"
 
 namespace swiftlet::fuzz {
@@ -273,7 +277,7 @@ void keptMap(std::string_view text) {
   }
 }
 
-constexpr std::array<NamedTarget, 12> kTargets = {{{"imu_csv", &imuCsv},
+constexpr std::array<NamedTarget, 20> kTargets = {{{"imu_csv", &imuCsv},
                                                    {"image_csv", &imageCsv},
                                                    {"trajectory", &trajectory},
                                                    {"tracks", &tracks},
@@ -284,7 +288,15 @@ constexpr std::array<NamedTarget, 12> kTargets = {{{"imu_csv", &imuCsv},
                                                    {"g2o", &g2o},
                                                    {"ply", &ply},
                                                    {"vocabulary", &vocabulary},
-                                                   {"kept_map", &keptMap}}};
+                                                   {"kept_map", &keptMap},
+                                                   {"dronecan", &dronecan},
+                                                   {"vectornav_stream", &vectornavStream},
+                                                   {"xsens_stream", &xsensStream},
+                                                   {"mip_stream", &mipStream},
+                                                   {"mavlink_stream", &mavlinkStream},
+                                                   {"bridge_stream", &bridgeStream},
+                                                   {"clocks", &clocks},
+                                                   {"faults", &faults}}};
 
 }  // namespace
 
