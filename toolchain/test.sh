@@ -22,9 +22,9 @@ fuzz_seconds=15 # each fuzzer
 # Unit tests that run under sanitizers too; the statistical ones (imu, ransac, whole flights, rendering, the program)
 # repeat the same code thousands of times and would take most of an hour there.
 sanitized='core geometry camera frontend smoother drivers_calibration drivers_recorded drivers_recording drivers_image_decoder
-map mesher threaded'
-# What shares memory between threads, and the whole executor on a second of a log.
-threads='core realtime threaded'
+drivers_can drivers_device drivers_gpio drivers_mavlink drivers_serial drivers_v4l2 map mesher threaded'
+# What shares memory between threads, the devices' threads, and the whole executor on a second of a log.
+threads='core realtime live threaded'
 jobs=$(nproc)
 steps='' # lines "seconds result step"
 failed_steps=0
@@ -113,6 +113,8 @@ fuzz() {
 close() {
   printf '\n==== steps\n%s' "$steps"
   cases
+  skipped=$(sed -nE 's/^[[:space:]]*[0-9]+ - (.*) \(Skipped\).*$/\1/p' build/ctest_release.log 2>/dev/null | tr '\n' ' ')
+  if [ -n "$skipped" ]; then echo "skipped, for want of a kernel (docs/kernel_sandbox.md): $skipped"; fi
   all=$((passed + failed))
   percent=0
   if [ $all -gt 0 ]; then percent=$((100 * passed / all)); fi

@@ -29,10 +29,15 @@ RoomTable directNeighbours() {
       {"mapping/pose_graph", world},
       {"mapping/loop", {"mapping/place", "mapping/pose_graph"}},
   };
-  for (const char* driver : {"calibration", "recorded", "simulated", "v4l2", "serial", "can", "gpio",
-                             "timesync", "mavlink", "dds"}) {
-    table[std::string("drivers/") + driver] = {"estimator/camera", "estimator/messages", "estimator/imu"};
+  const std::set<std::string> world_and_imu = {"estimator/camera", "estimator/messages", "estimator/imu"};
+  for (const char* driver : {"calibration", "recorded", "simulated", "device", "dds"}) {
+    table[std::string("drivers/") + driver] = world_and_imu;
   }
+  for (const char* driver : {"v4l2", "serial", "can", "gpio", "timesync", "mavlink"}) {
+    table[std::string("drivers/") + driver] = {"drivers/device"};
+  }
+  // An autopilot's inertial messages come over a serial port like any sensor's.
+  table["drivers/serial"].insert("drivers/mavlink");
   // Both read and write calibration as users have it.
   table["drivers/recorded"].insert("drivers/calibration");
   table["drivers/simulated"].insert("drivers/calibration");

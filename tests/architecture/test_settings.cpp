@@ -43,6 +43,11 @@ constexpr SettingsStruct kStructs[] = {
     {"firmware_host/settings/settings.hpp", "BudgetsGroup"},
     {"firmware_host/settings/settings.hpp", "MeshGroup"},
     {"firmware_host/settings/settings.hpp", "LoopGroup"},
+    {"firmware_host/settings/device_settings.hpp", "VehicleGroup"},
+    {"firmware_host/settings/device_settings.hpp", "ImuLinkGroup"},
+    {"firmware_host/settings/device_settings.hpp", "CamerasGroup"},
+    {"firmware_host/settings/device_settings.hpp", "TriggerGroup"},
+    {"firmware_host/settings/device_settings.hpp", "HilGroup"},
     {"mapping/loop/loop_settings.hpp", "LoopSettings"},
     {"mapping/map/map_settings.hpp", "MapSettings"},
 };
