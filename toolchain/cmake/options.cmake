@@ -4,6 +4,7 @@ option(SWIFTLET_WITH_CHOLMOD "Full smoothing with SuiteSparse's CHOLMOD (GPL, se
 option(SWIFTLET_BUILD_TESTS "Build the tests (needs Catch2, OpenCV)" ON)
 option(SWIFTLET_BUILD_BENCHMARKS "Build the benchmarks (needs Google Benchmark, OpenCV, Ceres, OpenGV)" OFF)
 option(SWIFTLET_BUILD_FUZZERS "Build the libFuzzer targets (needs clang)" OFF)
+option(SWIFTLET_PRECOMPILED_HEADERS "Parse Eigen and the standard library once, not in each unit" ON)
 option(SWIFTLET_WARNINGS_AS_ERRORS "Treat warnings as errors" ON)
 set(SWIFTLET_SANITIZE "" CACHE STRING "Sanitizers, as -fsanitize takes them: address,undefined or thread")
 
@@ -22,7 +23,9 @@ endif()
 find_program(SWIFTLET_CCACHE ccache)
 mark_as_advanced(SWIFTLET_CCACHE)
 if(SWIFTLET_CCACHE AND NOT DEFINED CMAKE_CXX_COMPILER_LAUNCHER)
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${SWIFTLET_CCACHE})
+  # What ccache asks for where headers are precompiled.
+  set(CMAKE_CXX_COMPILER_LAUNCHER
+      ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${SWIFTLET_CCACHE})
 endif()
 
 # A package that one room finds is known to the tests and programs that link the room.
@@ -41,7 +44,7 @@ target_compile_options(swiftlet_flags INTERFACE
   $<$<BOOL:${SWIFTLET_WARNINGS_AS_ERRORS}>:-Werror>
   # GCC 12 warns inside Eigen 3.4's fixed-size expressions and, falsely, inside the standard
   # library's string operator+ (GCC bug 105651).
-  $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overread -Wno-restrict>)
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overread -Wno-stringop-overflow -Wno-restrict>)
 target_compile_definitions(swiftlet_flags INTERFACE
   $<$<CONFIG:Debug>:EIGEN_RUNTIME_NO_MALLOC EIGEN_INITIALIZE_MATRICES_BY_NAN>)
 if(SWIFTLET_SANITIZE)
