@@ -23,7 +23,6 @@ void EventBuffer::flush(OdometryOutput& output) {
 void EventWatch::reset() {
   any_ = false;
   initialized_ = false;
-  dark_ = false;
   health_ = Health::kInitializing;
 }
 
@@ -43,7 +42,7 @@ void EventWatch::step(const Frame& frame, EventBuffer& events) {
   }
   at_rest_ = frame.at_rest;
   watchCameras(frame, events);
-  watchBlackout(frame, events);
+  watchBlackout(frame.stamp, frame.seconds_without_image, events);
 }
 
 void EventWatch::watchCameras(const Frame& frame, EventBuffer& events) {
@@ -58,14 +57,14 @@ void EventWatch::watchCameras(const Frame& frame, EventBuffer& events) {
   }
 }
 
-void EventWatch::watchBlackout(const Frame& frame, EventBuffer& events) {
-  const bool dark = frame.seconds_without_image > HealthMonitor::kGoodAge;
+void EventWatch::watchBlackout(Stamp stamp, double seconds_without_image, EventBuffer& events) {
+  const bool dark = seconds_without_image > HealthMonitor::kGoodAge;
   if (dark && !dark_) {
-    dark_since_ = frame.stamp - Duration::fromSeconds(frame.seconds_without_image);
-    events.raise(frame.stamp, EventKind::kBlackoutStarted, frame.seconds_without_image);
+    dark_since_ = stamp - Duration::fromSeconds(seconds_without_image);
+    events.raise(stamp, EventKind::kBlackoutStarted, seconds_without_image);
   }
   if (!dark && dark_) {
-    events.raise(frame.stamp, EventKind::kBlackoutEnded, (frame.stamp - dark_since_).seconds());
+    events.raise(stamp, EventKind::kBlackoutEnded, (stamp - dark_since_).seconds());
   }
   dark_ = dark;
 }

@@ -25,7 +25,7 @@ class EventBuffer {
 
 class EventWatch {
  public:
-  /// A new epoch: nothing seen so far. Cameras and rest go on as they were.
+  /// A new epoch: nothing seen so far. Cameras, rest and darkness go on as they were.
   void reset();
 
   struct Frame {
@@ -37,10 +37,11 @@ class EventWatch {
     double seconds_without_image = 0;
   };
   void step(const Frame& frame, EventBuffer& events);
+  /// The part of `step` that tells of blackouts, for a frame that begins an epoch because of one.
+  void watchBlackout(Stamp stamp, double seconds_without_image, EventBuffer& events);
 
  private:
   void watchCameras(const Frame& frame, EventBuffer& events);
-  void watchBlackout(const Frame& frame, EventBuffer& events);
 
   /// One missed image happens on a busy bus; three running are a fault (as in Pairing).
   static constexpr int kLostAfter = 3;

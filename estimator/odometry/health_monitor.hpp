@@ -5,7 +5,7 @@
 //  good          25 accepted sightings, an image of every camera of the rig, none accepted over 0.3 s ago
 //  degraded      a camera missing, fewer sightings, or coasting on the IMU for less than the limit; samples
 //                missing, or coasting for more than 0.3 s, and the 9 accepted images after it, in which the
-//                state that drifted settles again; the 39 after more than 2 s, or without samples too
+//                state that drifted settles again
 //  failed        no accepted image (8 sightings) for 3 s; the next accepted image ends it
 // Sightings by both cameras count once. Residuals and covariance are not looked at. No memory, O(1).
 
@@ -21,6 +21,10 @@ class HealthMonitor {
  public:
   /// s without an accepted image before "good" ends.
   static constexpr double kGoodAge = 0.3;
+  /// s without an accepted image after which a new epoch begins.
+  static constexpr double kLongCoast = 1.0;
+  /// A frame with fewer accepted sightings is not accepted.
+  static constexpr int kMinSightings = 8;
 
   void reset();
 

@@ -13,6 +13,7 @@ constexpr int kStartIterations = 8;
 constexpr double kStartVelocitySigma = 2.0;    // m/s
 constexpr double kStartGyroBiasSigma = 0.1;    // rad/s
 constexpr double kStartAccelBiasSigma = 0.15;  // m/s^2
+constexpr double kCarriedBias = 2.0;           // times the sigma with which it was left: marginals are hopeful
 constexpr double kRestVelocitySigma = 0.01;    // m/s
 
 SmootherSettings smootherSettings(const OdometrySettings& settings) {
@@ -45,6 +46,7 @@ void SmoothStage::addImu(const ImuSample& sample) {
   }
   if (verdict.gap) {
     imu_gap_ = true;
+    gap_end_ = sample.stamp;
     events_.raise(sample.stamp, EventKind::kImuGap, verdict.silence);
   }
   if (verdict.saturated) events_.raise(sample.stamp, EventKind::kImuSaturated, 1);
@@ -62,6 +64,17 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
     events_.raise(tracked.refused_stamp, EventKind::kFrameDropped, tracked.refused_before);
   }
   rest_.addFrame(tracked.stamp, static_cast<double>(tracked.median_motion));
+  const bool imu_gap = imu_gap_ || isSilent(imu_, noise_, tracked.stamp + smoother_.timeOffset());
+  double blind = health_.secondsWithoutImage(tracked.stamp);
+  const bool sees = static_cast<int>(tracked.features.size()) >= HealthMonitor::kMinSightings;
+  lost_ = smoother_.started() && (lost_ || (imu_gap && blind > HealthMonitor::kGoodAge));
+  if (lost_ && sees) {
+    watch_.watchBlackout(tracked.stamp, blind, events_);
+    const StartState left_at = newestAsStart();
+    reset();
+    left_at_ = left_at;
+    blind = 0;
+  }
   if (!smoother_.started() && !start(tracked, output)) {
     deliver(output);
     return okStatus();
@@ -73,7 +86,7 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
   ties_.apply(smoother_, tracked, epoch_);
   Smoother::StepInput input;
   input.frame = &tracked;
-  input.imu_gap = imu_gap_ || isSilent(imu_, noise_, tracked.stamp + smoother_.timeOffset());
+  input.imu_gap = imu_gap;
   input.at_rest = rest_.state().at_rest;
   input.iterations =
       frames_in_epoch_ < kStartFrames ? std::max(kStartIterations, effort.iterations) : effort.iterations;
@@ -81,9 +94,15 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
   input.max_keyframes = effort.keyframes;
   imu_gap_ = false;
   ++frames_in_epoch_;
-  const Status status = smoother_.step(input);
+  Status status = smoother_.step(input);
+  if (status.ok()) {
+    trim_due_ = true;
+    if (blind > HealthMonitor::kLongCoast && sees) {
+      watch_.watchBlackout(tracked.stamp, blind, events_);
+      status = restartFromCoast(input);
+    }
+  }
   if (!status.ok()) return fail(status, output);
-  trim_due_ = true;
   publish(tracked, input.imu_gap, output);
   return okStatus();
 }
@@ -115,6 +134,8 @@ void SmoothStage::reset() {
     handOver();
   }
   ++epoch_;
+  lost_ = false;
+  left_at_.reset();
   events_.raise(last_stamp_, EventKind::kReset, epoch_);
   smoother_.reset();
   ties_.reset();
@@ -179,7 +200,7 @@ bool SmoothStage::start(const TrackedFrame& tracked, OdometryOutput& output) {
   prior.bias_gyro_sigma = kStartGyroBiasSigma;
   prior.bias_accel_sigma = kStartAccelBiasSigma;
   TiltEstimate tilt;
-  const Stamp history = stamp - Duration::fromSeconds(2.0);
+  const Stamp history = std::max(stamp - Duration::fromSeconds(2.0), gap_end_);
   if (imu_.empty() || !estimateTilt(imu_.around(history, stamp), stamp, noise_, prior, tilt).ok()) {
     output.waiting_for = "IMU samples before the first image";
     return false;
@@ -196,11 +217,51 @@ bool SmoothStage::start(const TrackedFrame& tracked, OdometryOutput& output) {
     start.tilt_sigma = tilt.sigma;
     start.gyro_bias_sigma = kStartGyroBiasSigma;
     start.accel_bias_sigma = kStartAccelBiasSigma;
+    if (left_at_) {
+      // Place, heading and biases go on from where they were; the motion since is unknown.
+      const Eigen::Quaterniond& before = left_at_->state.T_world_body.rotation;
+      start.state = left_at_->state;
+      start.state.v_world_body.setZero();
+      start.state.T_world_body.rotation =
+          Eigen::Quaterniond::FromTwoVectors(before * tilt.up, Eigen::Vector3d::UnitZ()) * before;
+      start.gyro_bias_sigma = std::min(start.gyro_bias_sigma, kCarriedBias * left_at_->gyro_bias_sigma);
+      start.accel_bias_sigma = std::min(start.accel_bias_sigma, kCarriedBias * left_at_->accel_bias_sigma);
+    }
     if (rest_.state().at_rest) start.velocity_sigma = kRestVelocitySigma;
   }
   smoother_.start(start);
   frames_in_epoch_ = 0;
   return true;
+}
+
+/// The newest state with its marginal sigmas, the largest over the axes.
+StartState SmoothStage::newestAsStart() const {
+  const WindowState& newest = smoother_.newest();
+  const Matrix15d& P = smoother_.covariance();
+  const auto sigma = [&P](int first) { return std::sqrt(P.diagonal().segment<3>(first).maxCoeff()); };
+  const Eigen::Vector3d up = newest.x.T_world_body.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+  const Eigen::Matrix3d level = Eigen::Matrix3d::Identity() - up * up.transpose();
+  StartState start;
+  start.stamp = newest.stamp;
+  start.state = newest.x;
+  start.tilt_sigma = std::sqrt((level * P.topLeftCorner<3, 3>() * level).trace());
+  start.velocity_sigma = sigma(6);
+  start.gyro_bias_sigma = sigma(9);
+  start.accel_bias_sigma = sigma(12);
+  return start;
+}
+
+/// After a step that ended a long coast: the state is what the IMU alone gave, off by decimetres, and in one
+/// window with what was before it every later correction of tilt and bias would move it again. It becomes
+/// the first of a new epoch instead, known as well as the step says.
+Status SmoothStage::restartFromCoast(const Smoother::StepInput& input) {
+  const StartState start = newestAsStart();
+  reset();
+  smoother_.start(start);
+  ++frames_in_epoch_;
+  const Status status = smoother_.step(input);
+  trim_due_ = status.ok();
+  return status;
 }
 
 /// Gives the smoother the frames that waited for the start, all but the newest.

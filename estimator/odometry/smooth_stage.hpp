@@ -8,6 +8,8 @@
 // waiting frames (one camera), half a MiB of samples; no allocation after the constructor.
 // Rules of start, health, events and reset: docs/odometry.md.
 
+#include <optional>
+
 #include "estimator/camera/rig.hpp"
 #include "estimator/core/status.hpp"
 #include "estimator/imu/imu_noise.hpp"
@@ -65,6 +67,8 @@ class SmoothStage {
 
  private:
   bool start(const TrackedFrame& tracked, OdometryOutput& output);
+  Status restartFromCoast(const Smoother::StepInput& input);
+  [[nodiscard]] StartState newestAsStart() const;
   Status catchUp();
   Status fail(const Status& status, OdometryOutput& output);
   void publish(const TrackedFrame& tracked, bool imu_missing, OdometryOutput& output);
@@ -90,6 +94,9 @@ class SmoothStage {
   std::uint32_t epoch_ = 0;
   Stamp last_stamp_;  // of the newest tracked frame
   bool imu_gap_ = false;
+  Stamp gap_end_;       // of the last gap in the samples
+  bool lost_ = false;   // samples were missing while no image was accepted: where the body is, nobody knows
+  std::optional<StartState> left_at_;  // from which a new epoch goes on that begins because of it
   std::uint64_t frames_in_epoch_ = 0;
 };
 

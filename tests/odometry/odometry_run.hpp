@@ -2,6 +2,7 @@
 // The odometry stage on a simulated flight's tracks, with the truth beside each state it gives.
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <memory>
 #include <vector>
 
@@ -100,6 +101,17 @@ inline double velocityError(const RunFrame& frame) {
   return (frame.state.T_world_body.rotation.conjugate() * frame.state.v_world_body -
           frame.truth.T_world_body.rotation.conjugate() * frame.truth.v_world_body)
       .norm();
+}
+
+inline int count(const OdometryRun& run, EventKind kind) {
+  return static_cast<int>(
+      std::count_if(run.events.begin(), run.events.end(), [&](const Event& e) { return e.kind == kind; }));
+}
+
+inline SimulationSettings withFault(const SimulationSettings& settings, const Fault& fault) {
+  SimulationSettings result = settings;
+  result.faults.push_back(fault);
+  return result;
 }
 
 }  // namespace swiftlet::test

@@ -10,9 +10,11 @@
 #include "tests/odometry/odometry_run.hpp"
 
 using namespace swiftlet;
+using test::count;
 using test::OdometryRun;
 using test::RunFrame;
 using test::TrackFlight;
+using test::withFault;
 
 namespace {
 
@@ -29,11 +31,6 @@ double ate(const OdometryRun& run) {
   return alignment.rms;
 }
 
-int count(const OdometryRun& run, EventKind kind) {
-  return static_cast<int>(
-      std::count_if(run.events.begin(), run.events.end(), [&](const Event& e) { return e.kind == kind; }));
-}
-
 std::set<Health> healthBetween(const TrackFlight& flight, const OdometryRun& run, double begin, double end) {
   std::set<Health> seen;
   for (const RunFrame& f : run.frames) {
@@ -41,12 +38,6 @@ std::set<Health> healthBetween(const TrackFlight& flight, const OdometryRun& run
     if (t >= begin && t < end) seen.insert(f.state.health);
   }
   return seen;
-}
-
-SimulationSettings withFault(const SimulationSettings& settings, const Fault& fault) {
-  SimulationSettings result = settings;
-  result.faults.push_back(fault);
-  return result;
 }
 
 }  // namespace
@@ -139,6 +130,8 @@ TEST_CASE("Odometry: dark for 2 s it coasts, for 4 s it says failed; both end we
     CHECK(run.frames.back().state.health == Health::kGood);
     CHECK(count(run, EventKind::kBlackoutStarted) == 1);
     CHECK(count(run, EventKind::kBlackoutEnded) == 1);
+    CHECK(count(run, EventKind::kReset) == 1);
+    CHECK(run.frames.back().state.epoch == 1);
     CHECK(ate(run) < 0.25);
   }
 }
