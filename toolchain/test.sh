@@ -94,22 +94,6 @@ cases() { # Catch2's own counts in ctest's log of the release build
     awk '{a += $1; c += $2} END {printf "release: %d test cases, %d assertions\n", c, a}'
 }
 
-fuzz() {
-  found=0
-  for fuzzer in $(find build/fuzz -type f -perm -u+x -name 'fuzz_*' ! -name '*.*' ! -name fuzz_corpus | sort); do
-    found=$((found + 1))
-    name=$(basename "$fuzzer")
-    kept=tests/fuzz/corpus/${name#fuzz_}
-    [ -d "$kept" ] || kept=''
-    mkdir -p "build/fuzz/corpus/$name"
-    echo "fuzz: $name for $fuzz_seconds s"
-    # shellcheck disable=SC2086 # $kept may be empty
-    counted "$fuzzer" -max_total_time=$fuzz_seconds -timeout=10 -rss_limit_mb=2048 -verbosity=0 \
-      -print_final_stats=1 -artifact_prefix=build/fuzz/ "build/fuzz/corpus/$name" $kept || return 1
-  done
-  echo "fuzz: $found fuzzers ran"
-}
-
 close() {
   printf '\n==== steps\n%s' "$steps"
   cases
@@ -136,16 +120,13 @@ step "accuracy of all logs found" counted build/release/tests/logs/accuracy_tabl
 if [ $quick = no ]; then
   # shellcheck disable=SC2086 # a list of targets
   step "configure with sanitizers" configure asan -DSWIFTLET_BUILD_TESTS=ON &&
-    step "build with sanitizers" build asan --target $(echo $sanitized | sed 's/\([^ ]*\)/test_\1/g') &&
+    step "build with sanitizers" build asan --target fuzzers $(echo $sanitized | sed 's/\([^ ]*\)/test_\1/g') && {
     step "tests with sanitizers" run_ctest asan -R "^($(echo $sanitized | tr ' ' '|'))\$"
+    step "fuzzers" counted toolchain/fuzz.sh $fuzz_seconds
+  }
   # shellcheck disable=SC2086 # a list of targets
   step "configure for data races" configure tsan -DSWIFTLET_BUILD_TESTS=ON &&
     step "build for data races" build tsan --target $(echo $threads | sed 's/\([^ ]*\)/test_\1/g') &&
     step "threads without data races" run_ctest tsan -R "^($(echo $threads | tr ' ' '|'))\$"
-fi
-if [ $quick = no ] && [ -f tests/fuzz/CMakeLists.txt ]; then
-  step "configure fuzzers" configure fuzz &&
-    step "build fuzzers" build fuzz --target fuzzers &&
-    step "fuzzers" fuzz
 fi
 close
