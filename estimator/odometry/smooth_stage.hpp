@@ -94,7 +94,7 @@ class SmoothStage {
   std::uint32_t epoch_ = 0;
   Stamp last_stamp_;  // of the newest tracked frame
   bool imu_gap_ = false;
-  Stamp gap_end_;       // of the last gap in the samples
+  Stamp gap_end_;      // of the last gap in the samples
   bool lost_ = false;  // samples were missing while no image was accepted: where the body is, nobody knows
   std::optional<StartState> left_at_;  // from which a new epoch goes on that begins because of it
   std::uint64_t frames_in_epoch_ = 0;
