@@ -1,6 +1,7 @@
 #include "firmware_host/live/folder_sink.hpp"
 
 #include <filesystem>
+#include <stdexcept>
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/simulated/asl_text.hpp"

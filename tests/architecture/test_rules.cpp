@@ -1,6 +1,7 @@
 // Each rule must find what it forbids and let the allowed neighbour pass.
 #include <catch2/catch.hpp>
 
+#include "tests/architecture/named_includes.hpp"
 #include "tests/architecture/rules.hpp"
 
 using namespace swiftlet::architecture;  // NOLINT(google-build-using-namespace)
@@ -49,6 +50,19 @@ TEST_CASE("locks are found by include and by name") {
   CHECK(locks("std::mutex m;\n") == 1);
   CHECK(locks("pthread_cond_wait(&c, &m);\n") == 1);
   CHECK(locks("// a mutex\nstd::atomic<int> a;\n") == 0);
+}
+
+TEST_CASE("what a file names it includes, itself or through the project's headers") {
+  const SourceFile header = parseSource("mesher/a.hpp", "#include <vector>\n");
+  const auto check = [&](const std::string& text) {
+    const SourceFile file = parseSource("mesher/a.cpp", text);
+    return checkNamedIncludes(file, IncludeGraph({header, file})).size();
+  };
+  CHECK(check("std::vector<int> a;\nstd::vector<int> b;\n") == 1);
+  CHECK(check("#include <vector>\nstd::vector<int> a;\n") == 0);
+  CHECK(check("#include \"mesher/a.hpp\"\nstd::vector<int> a;\n") == 0);
+  CHECK(check("#include \"mesher/a.hpp\"\nstd::span<int> a;\nEigen::Vector3d v;\n") == 2);
+  CHECK(check("// std::vector\nother::std::vector a;\nmystd::vector b;\n") == 0);
 }
 
 TEST_CASE("include directions: forbidden, allowed and unknown") {

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <iostream>
 
+#include "tests/architecture/named_includes.hpp"
 #include "tests/architecture/rules.hpp"
 
 using namespace swiftlet::architecture;  // NOLINT(google-build-using-namespace)
@@ -75,6 +76,14 @@ TEST_CASE("headers open with #pragma once and say what they are") {
   for (const SourceFile& file : readSources(roomsAndTests())) {
     if (file.isHeader()) append(found, checkHeaderOpening(file));
   }
+  requireNone(found);
+}
+
+TEST_CASE("files include what they name") {
+  std::vector<Violation> found;
+  const auto files = readSources(roomsAndTests());
+  const IncludeGraph graph(files);
+  for (const SourceFile& file : files) append(found, checkNamedIncludes(file, graph));
   requireNone(found);
 }
 

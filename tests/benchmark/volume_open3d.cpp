@@ -6,6 +6,7 @@
 #include <open3d/geometry/RGBDImage.h>
 #include <open3d/geometry/TriangleMesh.h>
 #include <open3d/pipelines/integration/ScalableTSDFVolume.h>
+#include <Eigen/Core>
 
 #include <cstring>
 

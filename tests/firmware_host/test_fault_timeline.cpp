@@ -1,5 +1,6 @@
 // The timeline of faults: the same file gives the same faults, a wrong one says where it is wrong.
 
+#include <array>
 #include <catch2/catch.hpp>
 
 #include "drivers/calibration/input_error.hpp"

@@ -15,6 +15,7 @@ check() { # what, condition...
   else
     echo "FAIL  $what"
     failed=$((failed + 1))
+    return 1
   fi
 }
 left_behind() { # folders of jobs, and kernels whose files lie in our temporary folder
@@ -37,7 +38,7 @@ export TMPDIR=$folder A_WORD='two words; $HOME "quoted"'
 "$run" bash -c 'echo "out $A_WORD|$1"; echo err >&2; cat; exit 7' name 'an argument' >out 2>err <<<'not read'
 check "exit code" test $? = 7
 check "standard output, environment, arguments" test "$(cat out)" = "out $A_WORD|an argument"
-check "standard error" test "$(cat err)" = err
+check "standard error" test "$(cat err)" = err || sed 's/^/      was: /' err
 "$run" bash -c 'kill -KILL $$' 2>/dev/null
 check "killed: 128 + signal" test $? = 137
 "$run" bash -c 'head -c 3000000 /dev/zero | tr "\0" x; sleep 1000 & exit 3' >out

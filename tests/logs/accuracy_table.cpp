@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 #include <unistd.h>
+#include <stdexcept>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>

@@ -3,6 +3,7 @@
 
 #include "mapping/distance/distance_field.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <map>

@@ -1,5 +1,6 @@
 #include "tests/mapping/place_scene.hpp"
 
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>

@@ -2,6 +2,7 @@
 // Calibration texts for tests, and edits of them.
 
 #include <catch2/catch.hpp>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>

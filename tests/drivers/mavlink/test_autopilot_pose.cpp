@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "drivers/mavlink/autopilot_pose.hpp"
 #include "drivers/mavlink/mavlink_link.hpp"

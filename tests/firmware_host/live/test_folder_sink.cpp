@@ -1,6 +1,7 @@
 // A live recording comes back as it went in.
 
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <thread>
