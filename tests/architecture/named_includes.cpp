@@ -113,7 +113,8 @@ std::set<std::string> IncludeGraph::reached(const std::string& path) const {
 
 std::vector<Violation> checkNamedIncludes(const SourceFile& file, const IncludeGraph& graph) {
   const std::set<std::string> reached = graph.reached(file.path);
-  const bool eigen = std::ranges::any_of(reached, [](const auto& name) { return name.starts_with("Eigen/"); });
+  const bool eigen =
+      std::ranges::any_of(reached, [](const auto& name) { return name.starts_with("Eigen/"); });
   std::vector<Violation> found;
   std::set<std::string_view> told;
   for (std::size_t i = 0; i < file.code_lines.size(); ++i) {
@@ -125,8 +126,9 @@ std::vector<Violation> checkNamedIncludes(const SourceFile& file, const IncludeG
       if (provider == providers().end()) continue;
       const auto is_reached = [&](const std::string& header) { return reached.contains(header); };
       if (std::ranges::any_of(provider->second, is_reached) || !told.insert(provider->first).second) continue;
-      found.push_back({file.path, i + 1, "names std::" + provider->first + " and does not include <" +
-                                             provider->second.front() + ">"});
+      found.push_back(
+          {file.path, i + 1,
+           "names std::" + provider->first + " and does not include <" + provider->second.front() + ">"});
     }
   }
   return found;
