@@ -38,6 +38,8 @@ void addEvaluateCommand(CLI::App& app, int& exit_code);
 void addSimulateCommand(CLI::App& app, int& exit_code);
 void addVocabularyCommand(CLI::App& app, int& exit_code);
 void addSettingsCommand(CLI::App& app, int& exit_code);
+/// Needs all others in `app` when it runs; not in the help.
+void addManCommand(CLI::App& app, int& exit_code);
 
 /// The whole program: parses, runs, prints errors, gives the exit code.
 int runProgram(int argc, char** argv);

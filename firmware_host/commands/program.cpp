@@ -30,6 +30,7 @@ int runProgram(int argc, char** argv) {
   addBudgetCommand(app, exit_code);
   addVocabularyCommand(app, exit_code);
   addSettingsCommand(app, exit_code);
+  addManCommand(app, exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

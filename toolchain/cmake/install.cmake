@@ -14,13 +14,14 @@ foreach(library ${libraries})
     list(REMOVE_ITEM libraries ${library})
   endif()
 endforeach()
-install(TARGETS ${libraries} EXPORT swiftletTargets)
+install(TARGETS ${libraries} EXPORT swiftletTargets COMPONENT development)
 foreach(room estimator mesher mapping drivers)
   if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${room})
-    install(DIRECTORY ${room} DESTINATION include/swiftlet FILES_MATCHING PATTERN "*.hpp")
+    install(DIRECTORY ${room} DESTINATION include/swiftlet COMPONENT development FILES_MATCHING PATTERN "*.hpp")
   endif()
 endforeach()
-install(EXPORT swiftletTargets NAMESPACE swiftlet:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/swiftlet)
+install(EXPORT swiftletTargets NAMESPACE swiftlet:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/swiftlet
+        COMPONENT development)
 
 # What the exported libraries link (a static library's private packages too) has to be found again
 # by the user: one line of the package file for each imported target.
@@ -38,11 +39,15 @@ function(swiftlet_dependency_line target result)
 endfunction()
 
 set(dependencies "")
+set(linked_files "")
 foreach(library ${libraries})
   foreach(property LINK_LIBRARIES INTERFACE_LINK_LIBRARIES)
     get_target_property(links ${library} ${property})
     foreach(link IN LISTS links)
       string(REGEX REPLACE "^\\$<LINK_ONLY:(.*)>$" "\\1" link "${link}")
+      if(IS_ABSOLUTE "${link}")
+        list(APPEND linked_files ${link})
+      endif()
       # Own libraries and build-only flags need no package, nor do library files and plain names.
       # (`if(TARGET)` does not help: a room's packages are known in the room's folder only.)
       if(link MATCHES "^(swiftlet::|swiftlet_|\\$<BUILD_INTERFACE:)" OR NOT link MATCHES "::|^yaml-cpp$")
@@ -63,4 +68,4 @@ write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/swiftletConfigVersi
   COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/swiftletConfig.cmake
   ${CMAKE_CURRENT_BINARY_DIR}/swiftletConfigVersion.cmake
-  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/swiftlet)
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/swiftlet COMPONENT development)

@@ -1,0 +1,37 @@
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <ctime>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/man_page.hpp"
+#include "firmware_host/report/summary.hpp"
+
+namespace swiftlet {
+namespace {
+
+/// Today, or the day that packagers set for builds that can be repeated (SOURCE_DATE_EPOCH, seconds).
+std::string dateOfPage() {
+  const char* epoch = std::getenv("SOURCE_DATE_EPOCH");
+  constexpr int kDecimal = 10;
+  const std::time_t time = epoch == nullptr ? std::time(nullptr) : std::strtoll(epoch, nullptr, kDecimal);
+  return fmt::format("{:%Y-%m-%d}", fmt::gmtime(time));
+}
+
+}  // namespace
+
+void addManCommand(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("man", "Print the manual page, as man(1) reads it");
+  command->group("");  // for the build: users have `man swiftlet`
+  command->footer("Example:\n  swiftlet man > swiftlet.1 && man ./swiftlet.1");
+  command->callback([&app, &exit_code] {
+    const auto version = versionJson().at("swiftlet").get<std::string>();
+    fmt::print("{}", manPage(app, "swiftlet " + version, dateOfPage()));
+    exit_code = kExitDone;
+  });
+}
+
+}  // namespace swiftlet
