@@ -44,6 +44,26 @@ check() { # what, command...
 inside() { chroot "$root" env LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"; }
 apt() { inside apt-get -y -qq --no-install-recommends "$@"; }
 
+# The system calls of a group (@...), one a line; groups hold groups.
+calls_of() {
+  systemd-analyze syscall-filter "$1" | sed -e 1d -e 's/^ *//' -e '/^#/d' -e '/^$/d' | while read -r call; do
+    case $call in @*) calls_of "$call" ;; *) echo "$call" ;; esac
+  done
+}
+# All system calls of a threaded run against those that the service's unit allows.
+calls_allowed() {
+  filters=$(sed -n 's/^SystemCallFilter=//p' toolchain/packaging/swiftlet.service)
+  for group in $(echo "$filters" | grep -v '^~'); do calls_of "$group"; done | sort -u >build/calls_allowed
+  for group in $(echo "$filters" | sed -n 's/^~//p'); do calls_of "$group"; done | sort -u >build/calls_denied
+  strace -f -qq -o build/calls_trace "$build/bin/swiftlet" replay "$log" --until 1 --real-time --record \
+    --loop-closure --out build/check_packages_run || return 1
+  sed -n 's/^[0-9]* *\([a-z_0-9]*\)(.*/\1/p' build/calls_trace | sort -u >build/calls_used
+  wc -l build/calls_*
+  grep -qx futex build/calls_used || return 1
+  # Used and not allowed, used and denied: none.
+  [ -z "$(comm -23 build/calls_used build/calls_allowed)" ] && [ -z "$(comm -12 build/calls_used build/calls_denied)" ]
+}
+
 mounted=no
 leave() {
   if [ $mounted = yes ]; then umount "$root/proc" || true; fi
@@ -118,6 +138,9 @@ check "systemd-analyze verify" inside sh -c \
    echo "$said"; [ $code -eq 0 ] && [ -z "$said" ]'
 check "systemd-analyze security" inside systemd-analyze security --offline=yes --threshold=30 \
   /usr/lib/systemd/system/swiftlet.service
+if command -v strace >/dev/null && command -v systemd-analyze >/dev/null; then
+  check "the unit allows every system call of a threaded run" calls_allowed
+fi
 check "man swiftlet" inside sh -c 'man -w swiftlet && man swiftlet | grep -q "^SETTINGS"'
 if [ $mounted = yes ] && mount --rbind /sys "$root/sys" 2>/dev/null; then
   # It reads all rules and complains of those that it does not understand.
