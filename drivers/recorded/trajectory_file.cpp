@@ -118,6 +118,28 @@ Trajectory readTrajectory(const std::string& path, LogCounters& counters, LogWar
   return readRows(csv, is_csv, counters, warnings);
 }
 
+Trajectory readWholeTrajectory(const std::string& path, const std::string& remedy) {
+  LogCounters counters;
+  LogWarnings warnings;
+  CsvReader csv(path, CsvReader::Separator::kBlank, counters, warnings);
+  Trajectory trajectory;
+  StampUnit unit = StampUnit::kUnknown;
+  while (csv.next(8)) {
+    TrajectoryPoint point;
+    if (!readTumRow(csv, unit, point)) break;
+    if (!trajectory.empty() && point.stamp <= trajectory.back().stamp) {
+      throw csv.error("timestamp", "not after the one before", remedy);
+    }
+    trajectory.push_back(point);
+  }
+  if (csv.firstBad()) {
+    const InputError& bad = *csv.firstBad();
+    throw InputError(bad.file, bad.line, bad.field, bad.message, remedy);
+  }
+  if (trajectory.empty()) throw InputError(path, 0, "", "holds no poses", remedy);
+  return trajectory;
+}
+
 Trajectory readTrajectoryText(const std::string& name, std::string_view text, LogCounters& counters,
                               LogWarnings& warnings) {
   const bool is_csv = looksLikeCsv(text.substr(0, kProbedBytes));

@@ -35,6 +35,10 @@ Trajectory readTrajectory(const std::string& path, LogCounters& counters, LogWar
 Trajectory readTrajectoryText(const std::string& name, std::string_view text, LogCounters& counters,
                               LogWarnings& warnings);
 
+/// For files that a program of ours wrote: the first row that is bad, repeated or out of order is an
+/// InputError with its line, and nothing is skipped. `remedy` ends the message.
+Trajectory readWholeTrajectory(const std::string& path, const std::string& remedy);
+
 /// "sec.nnnnnnnnn", exact.
 std::string formatSeconds(Stamp stamp);
 

@@ -34,6 +34,7 @@ void addMeshCommand(CLI::App& app, int& exit_code);
 void addFuseCommand(CLI::App& app, int& exit_code);
 void addPlaceCommand(CLI::App& app, int& exit_code);
 void addPoseGraphCommand(CLI::App& app, int& exit_code);
+void addExportCommand(CLI::App& app, int& exit_code);
 void addEvaluateCommand(CLI::App& app, int& exit_code);
 void addSimulateCommand(CLI::App& app, int& exit_code);
 void addVocabularyCommand(CLI::App& app, int& exit_code);

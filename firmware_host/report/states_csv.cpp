@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "drivers/recorded/csv_reader.hpp"
 #include "drivers/recorded/parse_number.hpp"
@@ -16,6 +17,7 @@ constexpr int kPoseDim = 6;
 constexpr std::size_t kFirstVariance = 17;
 constexpr std::size_t kFirstCovariance = kFirstVariance + kStateDim;
 constexpr std::size_t kCovariances = kPoseDim * (kPoseDim - 1) / 2;
+constexpr std::size_t kFigures = 11;  ///< health and what follows it
 
 void append(std::string& row, double value) { row += fmt::format(",{:.17g}", value); }
 
@@ -96,6 +98,89 @@ std::vector<StoredState> readStates(const std::string& path) {
   csv.finish("states", "Give a states.csv that `swiftlet replay` wrote");
   std::ranges::stable_sort(states, {}, &StoredState::stamp);
   return states;
+}
+
+namespace {
+
+bool readHealth(std::string_view name, Health& health) {
+  for (const Health candidate : {Health::kInitializing, Health::kGood, Health::kDegraded, Health::kFailed}) {
+    if (healthName(candidate) != name) continue;
+    health = candidate;
+    return true;
+  }
+  return false;
+}
+
+/// What stands behind the covariances, in the order of statesRow().
+bool readFigures(CsvReader& csv, std::size_t first, KeyframeState& keyframe) {
+  if (!readHealth(csv.field(first), keyframe.state.health)) {
+    csv.reject("health", quoteInput(csv.field(first)) + " is no health");
+    return false;
+  }
+  constexpr std::array<const char*, kFigures - 1> kNames = {
+      "epoch",          "at_rest",      "tracks",           "landmarks",    "inliers_mono",
+      "inliers_stereo", "track_length", "reprojection_rms", "imu_residual", "iterations"};
+  std::array<double, kNames.size()> v{};
+  if (!csv.numbers(first + 1, kNames, v.data())) return false;
+  keyframe.state.epoch = static_cast<std::uint32_t>(v[0]);
+  FrameStatistics& figures = keyframe.statistics;
+  figures.keyframe = true;
+  figures.at_rest = v[1] != 0;
+  figures.tracks = static_cast<int>(v[2]);
+  figures.landmarks = static_cast<int>(v[3]);
+  figures.inliers_mono = static_cast<int>(v[4]);
+  figures.inliers_stereo = static_cast<int>(v[5]);
+  figures.track_length = v[6];
+  figures.reprojection_rms = v[7];
+  figures.imu_residual = v[8];
+  figures.iterations = static_cast<int>(v[9]);
+  return true;
+}
+
+}  // namespace
+
+std::vector<KeyframeState> readKeyframes(const std::string& path) {
+  constexpr std::size_t kNumbers = kFirstCovariance + kCovariances;
+  LogCounters counters;
+  LogWarnings warnings;
+  CsvReader csv(path, CsvReader::Separator::kComma, counters, warnings);
+  std::array<const char*, kNumbers - 1> names{};
+  names.fill("state or covariance");
+  std::array<double, kNumbers - 1> v{};
+  std::vector<KeyframeState> keyframes;
+  while (csv.next(kNumbers + kFigures)) {
+    KeyframeState keyframe;
+    NavState& state = keyframe.state;
+    if (!parseNanoseconds(csv.field(0), state.stamp)) {
+      csv.reject("timestamp", "not a stamp in ns");
+      break;
+    }
+    if (!csv.numbers(1, names, v.data()) || !readFigures(csv, kNumbers, keyframe)) break;
+    const Eigen::Quaterniond q(v[3], v[4], v[5], v[6]);
+    if (!(std::abs(q.norm() - 1) < 1e-6)) {
+      csv.reject("quaternion", fmt::format("its norm is {:.4g}, not 1", q.norm()));
+      break;
+    }
+    state.T_world_body = SE3(q, {v[0], v[1], v[2]});
+    state.v_world_body = {v[7], v[8], v[9]};
+    state.bias_gyro = {v[10], v[11], v[12]};
+    state.bias_accel = {v[13], v[14], v[15]};
+    std::size_t next = kFirstVariance - 1;
+    for (int i = 0; i < kStateDim; ++i) state.covariance(i, i) = v[next++];
+    for (int i = 0; i < kPoseDim; ++i) {
+      for (int j = i + 1; j < kPoseDim; ++j) {
+        state.covariance(i, j) = v[next++];
+        state.covariance(j, i) = state.covariance(i, j);
+      }
+    }
+    keyframes.push_back(keyframe);
+  }
+  if (csv.firstBad()) {
+    const InputError& bad = *csv.firstBad();
+    throw InputError(bad.file, bad.line, bad.field, bad.message,
+                     "Replay again, or delete the row if a run that ended badly cut it short");
+  }
+  return keyframes;
 }
 
 }  // namespace swiftlet

@@ -30,4 +30,8 @@ struct StoredState {
 /// Reads a states.csv in time order; InputError names file and line.
 std::vector<StoredState> readStates(const std::string& path);
 
+/// All that the file holds, row by row: of the covariance the pose block and the diagonal, the rest is zero.
+/// InputError with the line on the first bad row. Empty for a file with a header alone.
+std::vector<KeyframeState> readKeyframes(const std::string& path);
+
 }  // namespace swiftlet

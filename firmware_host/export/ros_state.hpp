@@ -1,0 +1,39 @@
+#pragma once
+// The estimate in the conventions of ROS messages (REP 103, REP 105), whatever carries them.
+//
+// Frames: `map` and `odom` as in REP 105 are our map and world; `base_link` stands for the body, which is the
+// IMU. A vehicle whose base_link is elsewhere renames it (RosFrames) and adds the transform of its own.
+// geometry_msgs/PoseWithCovariance: order x y z and rotations about the fixed axes of the header's frame;
+// ours is phi, p with phi about the body's axes (R <- R Exp(phi)). geometry_msgs/TwistWithCovariance of
+// nav_msgs/Odometry: in the child frame, so the velocity is turned into the body's axes. Angular velocity is
+// no part of the state: zero with kUnknownVariance.
+
+#include <Eigen/Core>
+#include <string>
+
+#include "estimator/messages/nav_state.hpp"
+
+namespace swiftlet {
+
+struct RosFrames {
+  std::string map = "map";
+  std::string odom = "odom";
+  std::string body = "base_link";
+  std::string truth = "truth";  ///< the axes of the truth as it was recorded
+};
+
+inline constexpr double kUnknownVariance = 1e6;
+
+using RosCovariance = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+
+/// Of x y z [m^2] and the rotation about the world's axes [rad^2].
+RosCovariance rosPoseCovariance(const NavState& state);
+
+/// Of the linear velocity [m^2/s^2] and the angular one, both in body axes. To first order, with the
+/// attitude's part; covariances that `state` does not hold count as zero.
+RosCovariance rosTwistCovariance(const NavState& state);
+
+/// m/s, body axes.
+Eigen::Vector3d bodyVelocity(const NavState& state);
+
+}  // namespace swiftlet
