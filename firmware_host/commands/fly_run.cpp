@@ -71,6 +71,7 @@ FlyResult runFlight(const FlyRequest& request, Settings settings) {
   };
   FlightRequest flight;
   flight.announce = request.show_progress;
+  flight.host_stamps = true;
   RunFacts facts;
   const double cpu = processCpuSeconds();
   flyThreaded(calibration, input, settings, output.log(), wanted, flight, control, facts.executor);

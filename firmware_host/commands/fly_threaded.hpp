@@ -12,8 +12,9 @@
 namespace swiftlet {
 
 struct FlightRequest {
-  double speed = 1;       ///< of the log's clock against the host's
-  bool announce = false;  ///< print the table of what was reserved, and what is missing
+  double speed = 1;          ///< of the log's clock against the host's
+  bool host_stamps = false;  ///< of CLOCK_MONOTONIC, not of a log
+  bool announce = false;     ///< print the table of what was reserved, and what is missing
   std::function<void(const char* thread, bool begins)> watch;
 };
 

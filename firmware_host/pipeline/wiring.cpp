@@ -60,6 +60,7 @@ Wiring::Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, 
       log_(log),
       recorder_(options.recorder),
       arming_(options.arming),
+      outlet_(options.outlet),
       full_effort_(settings.effort),
       track_effort_(options.track_effort != nullptr ? options.track_effort : &full_effort_),
       smooth_effort_(options.smooth_effort != nullptr ? options.smooth_effort : &full_effort_),
@@ -166,8 +167,10 @@ bool Wiring::propagate() {
     if (ended) propagate_done_.store(true, std::memory_order_release);
     return false;
   }
-  const Status status = propagation_.step(arrival->sample, states_ ? &propagating_.state : nullptr);
+  const Status status =
+      propagation_.step(arrival->sample, states_ || outlet_ != nullptr ? &propagating_.state : nullptr);
   if (states_ && status.ok()) static_cast<void>(states_->tryPush(propagating_.state));
+  if (outlet_ != nullptr && status.ok()) outlet_->state.write(propagating_.state);
   addTime(times_, StageId::kImu, {wallSeconds() - arrival->host.arrival, threadCpuSeconds() - cpu});
   imu_to_propagate_.pop();
   ++counters_.propagate.samples;
@@ -236,6 +239,11 @@ void Wiring::smoothFrame(const TrackMessage& message, FrameResult& out) {
     out.status = smooth_.step(message.tracked, out.step.effort, out.output);
     smooth_.fix(fix_.draft());
     fix_.publish();
+    if (outlet_ != nullptr) {
+      const OdometryOutput& output = out.output;
+      outlet_->frame.write({message.tracked.stamp, output.has_state, output.waiting_for, output.state.health,
+                            output.state.epoch, output.statistics});
+    }
     if (drag_) drag_(StageId::kSmooth, threadCpuSeconds() - cpu);
   });
   smooth_effort_->took({spent.wall, static_cast<int>(trackedWaiting()) - 1, begin - message.host.arrival});

@@ -32,6 +32,7 @@
 #include "firmware_host/pipeline/arrows.hpp"
 #include "firmware_host/pipeline/effort_source.hpp"
 #include "firmware_host/pipeline/fault_counts.hpp"
+#include "firmware_host/pipeline/live_outlet.hpp"
 #include "firmware_host/pipeline/run_log.hpp"
 #include "firmware_host/settings/settings.hpp"
 #include "mapping/loop/loop_stage.hpp"
@@ -125,6 +126,7 @@ class Wiring {
     /// For which `track` waits, after a frame's arrival, for the samples up to its stamp, on the host's
     /// clock; 0: never, for then whoever feeds the wiring hands them over first.
     Duration sample_patience{0};
+    LiveOutlet* outlet = nullptr;  ///< gets the newest of everything; null: nobody asks. Outlives the wiring
     /// Called by `log` each time: what the input has to say of itself, to the log. True: there was something.
     std::function<bool(RunLog&)> remarks;
     /// Called after a stage's work with its CPU seconds, within its wall time: tests slow stages down.
@@ -239,6 +241,7 @@ class Wiring {
   void correctMap(const MapMessage& message);
   void stepCorrection();
   void drawMap();
+  void publishSurface(Stamp stamp);
   template <typename Work>
   void timed(StageId stage, Work&& work);
   void handFrame(const TrackMessage& message, const SmoothedWindow& window);
@@ -252,6 +255,7 @@ class Wiring {
   RunLog& log_;
   FlightRecorder* recorder_;
   ArmingMonitor* arming_;
+  LiveOutlet* outlet_;
   ConstantEffort full_effort_;
   EffortSource* track_effort_;
   EffortSource* smooth_effort_;

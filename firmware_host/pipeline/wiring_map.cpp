@@ -209,12 +209,34 @@ void Wiring::mapFrame(const MapMessage& message) {
   }
   mapping_.vehicle = input.T_map_body.translation;
   drawMap();
+  publishSurface(message.stamp);
 }
 
 void Wiring::drawMap() {
   // What is left over is counted in the report and drawn later.
   timed(StageId::kSurface, [&] { static_cast<void>(map_->draw(mapping_.vehicle, {}, mapping_.report)); });
   timed(StageId::kDistance, [&] { map_->updateDistance(mapping_.vehicle, {}, mapping_.report); });
+}
+
+// map -> newest surface, when it is asked for
+void Wiring::publishSurface(Stamp stamp) {
+  if (outlet_ == nullptr || !outlet_->surface_wanted.exchange(false, std::memory_order_acq_rel)) return;
+  struct Gather : SurfaceSink {
+    explicit Gather(std::vector<SurfaceVertex>& to) : vertices(to) {}
+    void take(const SurfacePatch& patch) override {
+      const std::size_t room = SurfaceNews::kMost - vertices.size();
+      vertices.insert(
+          vertices.end(), patch.vertices.begin(),
+          patch.vertices.begin() + static_cast<std::ptrdiff_t>(std::min(room, patch.vertices.size())));
+    }
+    std::vector<SurfaceVertex>& vertices;
+  };
+  SurfaceNews& out = outlet_->surface.draft();
+  out.stamp = stamp;
+  out.vertices.clear();
+  Gather gather(out.vertices);
+  map_->visitSurface(gather);
+  outlet_->surface.publish();
 }
 
 bool Wiring::findMapImages(std::uint64_t frame) {

@@ -79,6 +79,10 @@ bool Wiring::findMeshImage(std::uint64_t number) {
 void Wiring::publishMesh(bool keyframe) {
   mesh_->horizonMesh(local_mesh_.draft());
   local_mesh_.publish();
+  if (outlet_ != nullptr) {
+    mesh_->horizonMesh(outlet_->mesh.draft());
+    outlet_->mesh.publish();
+  }
   if (const PlaneReport* planes = mesh_->newPlanes()) {
     planes_.draft() = *planes;
     planes_.publish();

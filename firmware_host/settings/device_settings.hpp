@@ -1,5 +1,5 @@
 #pragma once
-// The vehicle's devices, as `fly`, `record`, `doctor` and `hil` want to know them.
+// The vehicle's devices, and whom it talks to, as `fly`, `record`, `doctor` and `hil` want to know them.
 
 #include <string>
 
@@ -35,6 +35,15 @@ struct TriggerGroup {
   std::string line = "0";
   std::string edge = "rising";
   double delay_us = 0;
+};
+
+/// Other processes, over DDS.
+struct Ros2Group {
+  bool enabled = false;
+  int domain = 0;
+  std::string interface = "lo";  ///< network interface; lo: this computer alone
+  double odometry_hz = 50;
+  double mesh_hz = 5;
 };
 
 /// The far ends of the devices above, for `hil`.

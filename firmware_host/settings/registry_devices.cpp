@@ -11,6 +11,7 @@ std::vector<Setting> deviceSettings() {
   constexpr auto kCameras = &Settings::cameras;
   constexpr auto kTrigger = &Settings::trigger;
   constexpr auto kHil = &Settings::hil;
+  constexpr auto kRos2 = &Settings::ros2;
   return {
       {"vehicle.calibration", "",
        "Calibration of the rig for `fly`, `record` and `doctor`: a folder with EuRoC's sensor.yaml files, or "
@@ -60,6 +61,18 @@ std::vector<Setting> deviceSettings() {
        ChoiceSetting{member(kTrigger, &T::edge), {"rising", "falling"}}},
       {"trigger.delay_us", "us", "From the edge to the begin of exposure.",
        real(kTrigger, &T::delay_us, 0, 100'000)},
+      {"ros2.enabled", "",
+       "Publish pose, frames, mesh, surface and diagnostics of runs on threads as ROS 2's topics, "
+       "docs/ros2.md; "
+       "for builds with SWIFTLET_WITH_DDS.",
+       onOff(kRos2, &Ros2Group::enabled)},
+      {"ros2.domain", "", "ROS_DOMAIN_ID.", integer(kRos2, &Ros2Group::domain, 0, 232)},
+      {"ros2.interface", "", "Network interface to publish on; lo: this computer alone.",
+       TextSetting{member(kRos2, &Ros2Group::interface), "an interface as lo or eth0"}},
+      {"ros2.odometry_hz", "Hz", "Most states per second that are published.",
+       real(kRos2, &Ros2Group::odometry_hz, 1, 1000)},
+      {"ros2.mesh_hz", "Hz", "Most local meshes per second that are published.",
+       real(kRos2, &Ros2Group::mesh_hz, 0.1, 50)},
       {"hil.output0", "",
        "For `hil`: video output node whose images camera 0 shows (vivid's); empty: none are shown.",
        TextSetting{member(kHil, &HilGroup::output0), "a node as /dev/video10, or empty"}},

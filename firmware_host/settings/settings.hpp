@@ -94,6 +94,7 @@ struct Settings {
   CamerasGroup cameras;
   TriggerGroup trigger;
   HilGroup hil;
+  Ros2Group ros2;
   OdometrySettings odometry;
   Effort effort;
   PairingGroup pairing;

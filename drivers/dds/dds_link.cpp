@@ -1,0 +1,344 @@
+#include "drivers/dds/dds_link.hpp"
+
+#include <dds/dds.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "drivers/dds/ros_messages.h"  // made by idlc from ros_messages.idl
+
+namespace swiftlet {
+namespace {
+
+using Odometry = nav_msgs_msg_dds__Odometry_;
+using Header = std_msgs_msg_dds__Header_;
+
+constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+constexpr int kKept = 16;       ///< messages of a topic that a late or slow subscriber can still get
+constexpr int kTriangles = 11;  ///< visualization_msgs/Marker::TRIANGLE_LIST
+constexpr int kAdd = 0;
+constexpr int kDelete = 2;
+constexpr std::uint8_t kFloat32 = 7;  ///< sensor_msgs/PointField
+constexpr std::uint8_t kUint32 = 6;
+constexpr std::uint32_t kMaxSide = 16384;
+
+/// Beyond this many unacknowledged bytes the library would hold a writer back: more than it can ever keep.
+constexpr const char* kWatermark = "1 GB";
+
+std::string configuration(const DdsSettings& settings) {
+  const bool loopback = settings.interface == "lo";
+  std::string text = "<General><Interfaces><NetworkInterface name=\"" + settings.interface +
+                     "\"/></Interfaces><AllowMulticast>" + (loopback ? "false" : "spdp") +
+                     "</AllowMulticast></General><Internal><Watermarks><WhcHigh>" + kWatermark +
+                     "</WhcHigh></Watermarks></Internal>";
+  if (loopback) {
+    text +=
+        "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32"
+        "</MaxAutoParticipantIndex><Peers><Peer address=\"127.0.0.1\"/></Peers></Discovery>";
+  }
+  return text;
+}
+
+/// The message is read while it is written out and not kept: what C wants without const stays ours.
+char* text(std::string_view view, std::string& keep) {
+  keep.assign(view);
+  return keep.data();
+}
+char* empty() {
+  static char nothing = '\0';
+  return &nothing;
+}
+
+builtin_interfaces_msg_dds__Time_ timeOf(Stamp stamp) {
+  std::int64_t seconds = stamp.ns / kNsPerSecond;
+  std::int64_t rest = stamp.ns % kNsPerSecond;
+  if (rest < 0) {
+    rest += kNsPerSecond;
+    --seconds;
+  }
+  return {static_cast<std::int32_t>(seconds), static_cast<std::uint32_t>(rest)};
+}
+
+geometry_msgs_msg_dds__Quaternion_ turned(const Eigen::Quaterniond& q) {
+  return {q.x(), q.y(), q.z(), q.w()};
+}
+
+template <typename Sequence, typename Item>
+void lend(Sequence& sequence, std::vector<Item>& items) {
+  sequence._maximum = static_cast<std::uint32_t>(items.size());
+  sequence._length = sequence._maximum;
+  sequence._buffer = items.data();
+  sequence._release = false;
+}
+
+/// What ROS 2 asks for: reliable, volatile, the last `kept`; and no waiting.
+dds_qos_t* quality(bool reliable, int kept) {
+  dds_qos_t* qos = dds_create_qos();
+  dds_qset_reliability(qos, reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, 0);
+  dds_qset_durability(qos, DDS_DURABILITY_VOLATILE);
+  dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, kept);
+  dds_data_representation_id_t plain = DDS_DATA_REPRESENTATION_XCDR1;
+  dds_qset_data_representation(qos, 1, &plain);
+  return qos;
+}
+
+}  // namespace
+
+struct DdsLink::Entities {
+  dds_entity_t domain = 0;
+  dds_entity_t participant = 0;
+  dds_entity_t odometry = 0;
+  dds_entity_t transforms = 0;
+  dds_entity_t mesh = 0;
+  dds_entity_t cloud = 0;
+  dds_entity_t diagnostics = 0;
+  dds_entity_t labels = 0;
+
+  // Room of the messages on their way out.
+  std::array<std::string, 8> texts;
+  std::vector<geometry_msgs_msg_dds__TransformStamped_> transform_list;
+  std::vector<std::string> names;
+  std::vector<geometry_msgs_msg_dds__Point_> points;
+  std::vector<std_msgs_msg_dds__ColorRGBA_> colours;
+  std::vector<std::uint8_t> bytes;
+  std::vector<diagnostic_msgs_msg_dds__DiagnosticStatus_> statuses;
+  std::vector<diagnostic_msgs_msg_dds__KeyValue_> values;
+
+  Entities() = default;
+  Entities(const Entities&) = delete;
+  Entities& operator=(const Entities&) = delete;
+  ~Entities() {
+    if (participant > 0) dds_delete(participant);
+    if (domain > 0) dds_delete(domain);
+  }
+
+  /// ROS's name of a topic begins with a slash, DDS's with rt.
+  [[nodiscard]] dds_entity_t topic(const dds_topic_descriptor_t& type, const std::string& name) const {
+    return dds_create_topic(participant, &type, ("rt" + name).c_str(), nullptr, nullptr);
+  }
+  [[nodiscard]] dds_entity_t writer(const dds_topic_descriptor_t& type, const std::string& name,
+                                    int kept) const {
+    dds_qos_t* qos = quality(true, kept);
+    const dds_entity_t made = dds_create_writer(participant, topic(type, name), qos, nullptr);
+    dds_delete_qos(qos);
+    return made;
+  }
+  [[nodiscard]] dds_entity_t reader(const dds_topic_descriptor_t& type, const std::string& name) const {
+    // Best effort meets both kinds of writers, and asks no writer to wait for us.
+    dds_qos_t* qos = quality(false, 1);
+    const dds_entity_t made = dds_create_reader(participant, topic(type, name), qos, nullptr);
+    dds_delete_qos(qos);
+    return made;
+  }
+};
+
+DdsLink::DdsLink() = default;
+DdsLink::~DdsLink() = default;
+
+bool DdsLink::open(const DdsSettings& settings) {
+  entities_ = std::make_unique<Entities>();
+  Entities& e = *entities_;
+  const auto failed = [this](const std::string& what, std::int32_t result) {
+    error_ = what + ": " + dds_strretcode(result);
+    entities_.reset();
+    return false;
+  };
+  if (settings.prefix.empty() || settings.prefix.front() != '/' ||
+      (!settings.label_topic.empty() && settings.label_topic.front() != '/')) {
+    return failed("a topic of ROS begins with /", DDS_RETCODE_BAD_PARAMETER);
+  }
+  e.domain = dds_create_domain(settings.domain, configuration(settings).c_str());
+  if (e.domain < 0) {
+    return failed("DDS domain " + std::to_string(settings.domain) +
+                      " cannot be opened on the network interface " + settings.interface +
+                      ": name one that `ip link` shows, and open a domain once in a program",
+                  e.domain);
+  }
+  e.participant = dds_create_participant(settings.domain, nullptr, nullptr);
+  if (e.participant < 0) {
+    return failed("DDS cannot take part in domain " + std::to_string(settings.domain) +
+                      " on the network interface " + settings.interface +
+                      ": 32 programs at most do on one computer",
+                  e.participant);
+  }
+  e.odometry = e.writer(nav_msgs_msg_dds__Odometry__desc, settings.prefix + "/odometry", kKept);
+  e.transforms = e.writer(tf2_msgs_msg_dds__TFMessage__desc, "/tf", kKept);
+  e.mesh = e.writer(visualization_msgs_msg_dds__Marker__desc, settings.prefix + "/local_mesh", 1);
+  e.cloud = e.writer(sensor_msgs_msg_dds__PointCloud2__desc, settings.prefix + "/surface", 1);
+  e.diagnostics = e.writer(diagnostic_msgs_msg_dds__DiagnosticArray__desc, "/diagnostics", kKept);
+  if (!settings.label_topic.empty()) {
+    e.labels = e.reader(sensor_msgs_msg_dds__Image__desc, settings.label_topic);
+  }
+  for (const dds_entity_t made : {e.odometry, e.transforms, e.mesh, e.cloud, e.diagnostics, e.labels}) {
+    if (made < 0) return failed("a DDS topic cannot be made", made);
+  }
+  return true;
+}
+
+bool DdsLink::wrote(std::int32_t result) {
+  if (result < 0) {
+    ++counters_.refused;
+  } else {
+    ++counters_.written;
+  }
+  return result >= 0;
+}
+
+bool DdsLink::publish(const DdsOdometry& odometry) {
+  if (!entities_) return false;
+  Odometry message{};
+  message.header = Header{timeOf(odometry.stamp), text(odometry.frame, entities_->texts[0])};
+  message.child_frame_id = text(odometry.child_frame, entities_->texts[1]);
+  const Eigen::Vector3d& p = odometry.T_frame_child.translation;
+  message.pose.pose = {{p.x(), p.y(), p.z()}, turned(odometry.T_frame_child.rotation)};
+  message.twist.twist.linear = {odometry.velocity.x(), odometry.velocity.y(), odometry.velocity.z()};
+  std::ranges::copy(odometry.pose_covariance, message.pose.covariance);
+  std::ranges::copy(odometry.twist_covariance, message.twist.covariance);
+  return wrote(dds_write(entities_->odometry, &message));
+}
+
+bool DdsLink::publish(std::span<const DdsTransform> transforms) {
+  if (!entities_) return false;
+  Entities& e = *entities_;
+  e.names.resize(2 * transforms.size());
+  e.transform_list.resize(transforms.size());
+  for (std::size_t i = 0; i < transforms.size(); ++i) {
+    const DdsTransform& from = transforms[i];
+    auto& to = e.transform_list[i];
+    to.header = Header{timeOf(from.stamp), text(from.frame, e.names[2 * i])};
+    to.child_frame_id = text(from.child_frame, e.names[2 * i + 1]);
+    const Eigen::Vector3d& p = from.T_frame_child.translation;
+    to.transform = {{p.x(), p.y(), p.z()}, turned(from.T_frame_child.rotation)};
+  }
+  tf2_msgs_msg_dds__TFMessage_ message{};
+  lend(message.transforms, e.transform_list);
+  return wrote(dds_write(e.transforms, &message));
+}
+
+bool DdsLink::publish(const DdsMesh& mesh) {
+  if (!entities_) return false;
+  Entities& e = *entities_;
+  e.points.clear();
+  for (const Eigen::Vector3f& p : mesh.points) {
+    e.points.push_back({static_cast<double>(p.x()), static_cast<double>(p.y()), static_cast<double>(p.z())});
+  }
+  e.colours.clear();
+  for (const Eigen::Vector3f& c : mesh.colours) e.colours.push_back({c.x(), c.y(), c.z(), 1.0F});
+  visualization_msgs_msg_dds__Marker_ message{};
+  message.header = Header{timeOf(mesh.stamp), text(mesh.frame, e.texts[0])};
+  message.ns = text("local_mesh", e.texts[1]);
+  message.type = kTriangles;
+  message.action = mesh.points.empty() ? kDelete : kAdd;
+  message.pose.orientation.w = 1;
+  message.scale = {1, 1, 1};
+  message.color = {0.5F, 0.5F, 0.5F, 1.0F};
+  lend(message.points, e.points);
+  lend(message.colors, e.colours);
+  message.texture_resource = empty();
+  message.texture.header.frame_id = empty();
+  message.texture.format = empty();
+  message.text = empty();
+  message.mesh_resource = empty();
+  message.mesh_file.filename = empty();
+  return wrote(dds_write(e.mesh, &message));
+}
+
+bool DdsLink::publish(const DdsCloud& cloud) {
+  if (!entities_) return false;
+  Entities& e = *entities_;
+  static_assert(sizeof(DdsCloudPoint) == 20);
+  e.bytes.resize(cloud.points.size() * sizeof(DdsCloudPoint));
+  if (!e.bytes.empty()) std::memcpy(e.bytes.data(), cloud.points.data(), e.bytes.size());
+  constexpr std::array<const char*, 5> kNames = {"x", "y", "z", "rgb", "label"};
+  std::array<sensor_msgs_msg_dds__PointField_, 5> fields{};
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    // `rgb` is a float's bits by custom: viewers look for it so.
+    fields[i] = {text(kNames[i], e.texts[1 + i]), static_cast<std::uint32_t>(4 * i),
+                 i < 4 ? kFloat32 : kUint32, 1};
+  }
+  sensor_msgs_msg_dds__PointCloud2_ message{};
+  message.header = Header{timeOf(cloud.stamp), text(cloud.frame, e.texts[0])};
+  message.height = 1;
+  message.width = static_cast<std::uint32_t>(cloud.points.size());
+  message.fields._maximum = message.fields._length = static_cast<std::uint32_t>(fields.size());
+  message.fields._buffer = fields.data();
+  message.point_step = sizeof(DdsCloudPoint);
+  message.row_step = static_cast<std::uint32_t>(e.bytes.size());
+  lend(message.data, e.bytes);
+  message.is_dense = true;
+  return wrote(dds_write(e.cloud, &message));
+}
+
+bool DdsLink::publish(Stamp stamp, std::span<const DdsStatus> statuses) {
+  if (!entities_) return false;
+  Entities& e = *entities_;
+  std::size_t values = 0;
+  for (const DdsStatus& status : statuses) values += status.values.size();
+  e.names.resize(3 * statuses.size() + 2 * values);
+  e.values.resize(values);
+  e.statuses.resize(statuses.size());
+  std::size_t name = 0;
+  std::size_t value = 0;
+  for (std::size_t i = 0; i < statuses.size(); ++i) {
+    const DdsStatus& from = statuses[i];
+    auto& to = e.statuses[i];
+    to = {};
+    to.level = from.level;
+    to.name = text(from.name, e.names[name++]);
+    to.message = text(from.message, e.names[name++]);
+    to.hardware_id = text("swiftlet", e.names[name++]);
+    to.values._buffer = e.values.data() + value;
+    to.values._maximum = to.values._length = static_cast<std::uint32_t>(from.values.size());
+    for (const auto& [key, what] : from.values) {
+      e.values[value].key = text(key, e.names[name++]);
+      e.values[value++].value = text(what, e.names[name++]);
+    }
+  }
+  diagnostic_msgs_msg_dds__DiagnosticArray_ message{};
+  message.header = Header{timeOf(stamp), empty()};
+  lend(message.status, e.statuses);
+  return wrote(dds_write(e.diagnostics, &message));
+}
+
+bool DdsLink::takeLabels(DdsImage& image) {
+  if (!entities_ || entities_->labels <= 0) return false;
+  bool taken = false;
+  void* sample = nullptr;
+  dds_sample_info_t info;
+  while (dds_take(entities_->labels, &sample, &info, 1, 1) > 0) {
+    if (info.valid_data) {
+      const auto& from = *static_cast<const sensor_msgs_msg_dds__Image_*>(sample);
+      const std::string_view encoding = from.encoding;
+      const bool bytes = encoding == "mono8" || encoding == "8UC1";
+      const std::uint64_t needed = static_cast<std::uint64_t>(from.step) * from.height;
+      if (!bytes || from.width == 0 || from.height == 0 || from.width > kMaxSide || from.height > kMaxSide ||
+          from.step < from.width || from.data._length < needed) {
+        ++counters_.images_refused;
+      } else {
+        if (taken) ++counters_.images_skipped;
+        taken = true;
+        ++counters_.images;
+        image.stamp.ns = from.header.stamp.sec * kNsPerSecond + from.header.stamp.nanosec;
+        image.frame = from.header.frame_id;
+        image.width = static_cast<int>(from.width);
+        image.height = static_cast<int>(from.height);
+        image.pixels.resize(static_cast<std::size_t>(from.width) * from.height);
+        for (std::size_t y = 0; y < from.height; ++y) {
+          std::memcpy(image.pixels.data() + y * from.width, from.data._buffer + y * from.step, from.width);
+        }
+      }
+    }
+    dds_return_loan(entities_->labels, &sample, 1);
+    sample = nullptr;
+  }
+  return taken;
+}
+
+int DdsLink::subscribers() const {
+  if (!entities_) return 0;
+  dds_publication_matched_status_t status{};
+  if (dds_get_publication_matched_status(entities_->odometry, &status) < 0) return 0;
+  return static_cast<int>(status.current_count);
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,129 @@
+#pragma once
+// Messages of ROS 2 to and from other processes, without ROS here: topics `rt/...`, types `...::dds_::..._`,
+// plain CDR, over Eclipse Cyclone DDS. docs/ros2.md lists topics, types, frames and qualities of service.
+//
+// Nothing blocks: every writer keeps its last messages only and has no time to wait (max_blocking_time 0),
+// and the library's throttle is out of reach, so that a subscriber that is slow, stopped or killed costs its
+// own messages and nobody else's. What a writer refuses all the same is counted. One thread calls publish and
+// take; the library has threads of its own, which inherit the scheduling of who called open(). Network:
+// loopback and unicast unless DdsSettings::interface names another. Memory: the last messages of each writer,
+// at most 16 of each topic, 1 of those with meshes and surfaces; grows to the largest message seen. No
+// exceptions.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "estimator/core/stamp.hpp"
+#include "estimator/geometry/se3.hpp"
+
+namespace swiftlet {
+
+struct DdsSettings {
+  std::uint32_t domain = 0;          ///< ROS_DOMAIN_ID, 0 to 232
+  std::string interface = "lo";      ///< network interface; "lo": this computer alone
+  std::string prefix = "/swiftlet";  ///< of our topics; /tf and /diagnostics have none
+  std::string label_topic;           ///< sensor_msgs/Image to read; empty: none
+};
+
+struct DdsOdometry {
+  Stamp stamp;
+  std::string_view frame;
+  std::string_view child_frame;
+  SE3 T_frame_child;
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s, child axes
+  std::array<double, 36> pose_covariance{};            ///< x y z, rotations about the frame's axes; rows
+  std::array<double, 36> twist_covariance{};           ///< child axes; rows
+};
+
+struct DdsTransform {
+  Stamp stamp;
+  std::string_view frame;
+  std::string_view child_frame;
+  SE3 T_frame_child;
+};
+
+/// Three points and three colours (r g b, 0 to 1) a triangle; without points the marker is taken away.
+struct DdsMesh {
+  Stamp stamp;
+  std::string_view frame;
+  std::span<const Eigen::Vector3f> points;
+  std::span<const Eigen::Vector3f> colours;
+};
+
+struct DdsCloudPoint {
+  float x = 0, y = 0, z = 0;  ///< m
+  std::uint32_t rgb = 0;      ///< 0x00RRGGBB
+  std::uint32_t label = 0;
+};
+
+struct DdsCloud {
+  Stamp stamp;
+  std::string_view frame;
+  std::span<const DdsCloudPoint> points;
+};
+
+struct DdsStatus {
+  std::uint8_t level = 0;  ///< 0 ok, 1 warning, 2 error, 3 stale
+  std::string name;
+  std::string message;
+  std::vector<std::pair<std::string, std::string>> values;
+};
+
+/// An 8-bit image, rows without gaps.
+struct DdsImage {
+  Stamp stamp;
+  std::string frame;
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint8_t> pixels;
+};
+
+struct DdsCounters {
+  std::uint64_t written = 0;
+  std::uint64_t refused = 0;         ///< by the library: it would have had to wait
+  std::uint64_t images = 0;          ///< taken
+  std::uint64_t images_skipped = 0;  ///< a newer one had come before they were looked at
+  std::uint64_t images_refused = 0;  ///< not 8 bits, or smaller than they say
+};
+
+class DdsLink {
+ public:
+  DdsLink();
+  ~DdsLink();
+  DdsLink(const DdsLink&) = delete;
+  DdsLink& operator=(const DdsLink&) = delete;
+
+  /// Once. False, with error() for the user, where the domain cannot be opened.
+  [[nodiscard]] bool open(const DdsSettings& settings);
+  [[nodiscard]] const std::string& error() const { return error_; }
+
+  /// False: refused, counted.
+  bool publish(const DdsOdometry& odometry);
+  bool publish(std::span<const DdsTransform> transforms);
+  bool publish(const DdsMesh& mesh);
+  bool publish(const DdsCloud& cloud);
+  bool publish(Stamp stamp, std::span<const DdsStatus> statuses);
+  /// The newest label image that was not taken yet; false where there is none.
+  bool takeLabels(DdsImage& image);
+
+  /// Subscribers of the odometry that are there now.
+  [[nodiscard]] int subscribers() const;
+  [[nodiscard]] const DdsCounters& counters() const { return counters_; }
+
+ private:
+  struct Entities;
+  bool wrote(std::int32_t result);
+
+  std::unique_ptr<Entities> entities_;
+  std::string error_;
+  DdsCounters counters_;
+};
+
+}  // namespace swiftlet

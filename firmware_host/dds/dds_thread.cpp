@@ -1,0 +1,205 @@
+#include "firmware_host/dds/dds_thread.hpp"
+
+#include <fmt/format.h>
+
+#include <atomic>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "drivers/calibration/input_error.hpp"
+#include "drivers/dds/dds_link.hpp"
+#include "firmware_host/export/ros_state.hpp"
+#include "firmware_host/pipeline/host_sleep.hpp"
+#include "firmware_host/pipeline/stage_timer.hpp"
+#include "firmware_host/realtime/flight_thread.hpp"
+#include "firmware_host/report/map_files.hpp"
+#include "firmware_host/report/names.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr double kSurfacePeriod = 2;      // s: as large as a map is, nobody looks more often
+constexpr double kDiagnosticsPeriod = 1;  // s; a change of health goes out at once
+constexpr float kFullColour = 255;
+
+Eigen::Vector3f colourOf(std::uint8_t label, std::uint8_t grey) {
+  const auto [r, g, b] = label == 0 ? std::array{grey, grey, grey} : labelColour(label);
+  return Eigen::Vector3f(r, g, b) / kFullColour;
+}
+
+std::uint8_t levelOf(Health health) {
+  if (health == Health::kGood) return 0;
+  return health == Health::kFailed ? 2 : 1;
+}
+
+/// Lets through once a period.
+struct Pace {
+  double period;
+  double next = 0;
+  bool due(double now) {
+    if (now < next) return false;
+    next = now + period;
+    return true;
+  }
+};
+
+}  // namespace
+
+class DdsThread::Work {
+ public:
+  Work(LiveOutlet& outlet, const DdsThreadOptions& options)
+      : outlet_(outlet), options_(options), mesh_pace_{1 / options.settings.mesh_hz} {
+    DdsSettings settings;
+    settings.domain = static_cast<std::uint32_t>(options.settings.domain);
+    settings.interface = options.settings.interface;
+    if (!link_.open(settings)) {
+      throw InputError("settings", 0, "ros2.interface, ros2.domain", link_.error(),
+                       "Switch it off with ros2.enabled: false");
+    }
+    ThreadSettings thread;
+    thread.name = "dds";
+    const ThreadReport report = thread_.start(thread, [this] { run(); });
+    if (!report.started) throw InputError("settings", 0, "ros2.enabled", report.message, "");
+  }
+  ~Work() { end(); }
+  Work(const Work&) = delete;
+  Work& operator=(const Work&) = delete;
+
+  void end() {
+    stop_.store(true, std::memory_order_relaxed);
+    thread_.join();
+  }
+  [[nodiscard]] nlohmann::ordered_json json() const {
+    return {{"odometry", odometries_},
+            {"meshes", meshes_},
+            {"surfaces", surfaces_},
+            {"written", link_.counters().written},
+            {"refused", link_.counters().refused}};
+  }
+
+ private:
+  void run() {
+    const double period = 1 / options_.settings.odometry_hz;
+    double next = wallSeconds();
+    while (!stop_.load(std::memory_order_relaxed)) {
+      const double now = wallSeconds();
+      publishState();
+      publishDiagnostics(now);
+      if (mesh_pace_.due(now)) publishMesh();
+      publishSurface(now);
+      // A thread that came late does not hurry after.
+      next = std::max(next + period, now);
+      sleepUntil(next);
+    }
+  }
+
+  [[nodiscard]] Stamp ros(Stamp stamp) const { return stamp + options_.to_ros_clock; }
+
+  void publishState() {
+    outlet_.correction.refresh();
+    const std::uint64_t number = outlet_.state.refresh();
+    if (number == state_) return;
+    state_ = number;
+    const NavState& state = outlet_.state.value();
+    if (state.health == Health::kFailed) return;  // no pose to be had by it
+    DdsOdometry odometry;
+    odometry.stamp = ros(state.stamp);
+    odometry.frame = frames_.odom;
+    odometry.child_frame = frames_.body;
+    odometry.T_frame_child = state.T_world_body;
+    odometry.velocity = bodyVelocity(state);
+    Eigen::Map<RosCovariance>(odometry.pose_covariance.data()) = rosPoseCovariance(state);
+    Eigen::Map<RosCovariance>(odometry.twist_covariance.data()) = rosTwistCovariance(state);
+    if (link_.publish(odometry)) ++odometries_;
+    const MapCorrection& now = outlet_.correction.value();
+    const bool corrected = outlet_.correction.sequence() > 0 && now.epoch == state.epoch;
+    const std::array<DdsTransform, 2> transforms = {
+        DdsTransform{odometry.stamp, frames_.map, frames_.odom, corrected ? now.T_map_world : SE3()},
+        DdsTransform{odometry.stamp, frames_.odom, frames_.body, state.T_world_body}};
+    link_.publish(transforms);
+  }
+
+  void publishDiagnostics(double now) {
+    if (outlet_.frame.refresh() == 0) return;
+    const FrameNews& news = outlet_.frame.value();
+    const bool changed = news.health != health_;
+    if (!changed && !diagnostics_pace_.due(now)) return;
+    health_ = news.health;
+    DdsStatus status;
+    status.level = levelOf(news.health);
+    status.name = "swiftlet/health";
+    status.message = std::string(healthName(news.health));
+    if (!news.has_state) status.message += std::string(", waits for ") + news.waiting_for;
+    const FrameStatistics& figures = news.statistics;
+    status.values = {{"epoch", std::to_string(news.epoch)},
+                     {"at_rest", figures.at_rest ? "1" : "0"},
+                     {"tracks", std::to_string(figures.tracks)},
+                     {"landmarks", std::to_string(figures.landmarks)},
+                     {"inliers_mono", std::to_string(figures.inliers_mono)},
+                     {"inliers_stereo", std::to_string(figures.inliers_stereo)},
+                     {"reprojection_rms", fmt::format("{:.4f}", figures.reprojection_rms)},
+                     {"imu_residual", fmt::format("{:.4f}", figures.imu_residual)},
+                     {"dds_refused", std::to_string(link_.counters().refused)}};
+    link_.publish(ros(news.stamp), {&status, 1});
+  }
+
+  void publishMesh() {
+    const std::uint64_t number = outlet_.mesh.refresh();
+    if (number == mesh_) return;
+    mesh_ = number;
+    const LocalMesh& mesh = outlet_.mesh.value();
+    points_.clear();
+    colours_.clear();
+    for (const MeshFace& face : mesh.faces) {
+      for (const std::uint32_t corner : face.vertex) {
+        points_.push_back(mesh.vertices[corner].p_world);
+        colours_.push_back(colourOf(face.label, mesh.vertices[corner].grey));
+      }
+    }
+    if (link_.publish(DdsMesh{ros(mesh.stamp), frames_.odom, points_, colours_})) ++meshes_;
+  }
+
+  void publishSurface(double now) {
+    if (surface_pace_.due(now)) outlet_.surface_wanted.store(true, std::memory_order_release);
+    const std::uint64_t number = outlet_.surface.refresh();
+    if (number == surface_) return;
+    surface_ = number;
+    const SurfaceNews& surface = outlet_.surface.value();
+    cloud_.clear();
+    for (const SurfaceVertex& vertex : surface.vertices) {
+      const Eigen::Vector3f& p = vertex.p_world;
+      const auto [r, g, b] =
+          vertex.label == 0 ? std::array{vertex.grey, vertex.grey, vertex.grey} : labelColour(vertex.label);
+      const std::uint32_t rgb =
+          (static_cast<std::uint32_t>(r) << 16U) | (static_cast<std::uint32_t>(g) << 8U) | b;
+      cloud_.push_back({p.x(), p.y(), p.z(), rgb, vertex.label});
+    }
+    if (link_.publish(DdsCloud{ros(surface.stamp), frames_.map, cloud_})) ++surfaces_;
+  }
+
+  LiveOutlet& outlet_;
+  const DdsThreadOptions options_;
+  const RosFrames frames_;
+  DdsLink link_;
+  Pace mesh_pace_;
+  Pace surface_pace_{kSurfacePeriod};
+  Pace diagnostics_pace_{kDiagnosticsPeriod};
+  Health health_ = Health::kFailed;
+  std::uint64_t state_ = 0, mesh_ = 0, surface_ = 0;          ///< numbers taken
+  std::uint64_t odometries_ = 0, meshes_ = 0, surfaces_ = 0;  ///< published
+  std::vector<Eigen::Vector3f> points_, colours_;
+  std::vector<DdsCloudPoint> cloud_;
+  std::atomic<bool> stop_{false};
+  FlightThread thread_;
+};
+
+DdsThread::DdsThread(LiveOutlet& outlet, const DdsThreadOptions& options)
+    : work_(std::make_unique<Work>(outlet, options)) {}
+DdsThread::~DdsThread() = default;
+
+nlohmann::ordered_json DdsThread::finish() {
+  work_->end();
+  return work_->json();
+}
+
+}  // namespace swiftlet

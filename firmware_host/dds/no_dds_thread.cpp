@@ -1,0 +1,20 @@
+// Stands in for dds_thread.cpp in builds without Cyclone DDS.
+
+#include <nlohmann/json.hpp>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/dds/dds_thread.hpp"
+
+namespace swiftlet {
+
+class DdsThread::Work {};
+
+DdsThread::DdsThread(LiveOutlet&, const DdsThreadOptions&) {
+  throw InputError("settings", 0, "ros2.enabled", "this build has no DDS",
+                   "Install cyclonedds-dev and configure with -DSWIFTLET_WITH_DDS=ON, or switch it off");
+}
+DdsThread::~DdsThread() = default;
+
+nlohmann::ordered_json DdsThread::finish() { return {}; }
+
+}  // namespace swiftlet

@@ -1,0 +1,273 @@
+// The link against a subscriber of another make in processes of its own, some of which are stopped and
+// killed. SWIFTLET_DDS_SECONDS: how long (8).
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "drivers/dds/dds_link.hpp"
+#include "tests/drivers/dds/test_messages.hpp"
+
+namespace swiftlet {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using test::pointsOf;
+
+/// Two of these tests at once do not hear each other.
+std::uint32_t ownDomain() {
+  static const pid_t kMaker = getpid();
+  return 40 + static_cast<std::uint32_t>(kMaker % 30) * 2;
+}
+
+struct Received {
+  std::uint64_t received = 0, lost = 0, torn = 0, repeated = 0;
+};
+
+/// dds_subscriber as a process; ends when its input is closed.
+class Subscriber {
+ public:
+  explicit Subscriber(double seconds) {
+    int in[2];
+    int out[2];
+    // Not inherited: or a process started later would hold this one's input open.
+    REQUIRE(pipe2(in, O_CLOEXEC) == 0);
+    REQUIRE(pipe2(out, O_CLOEXEC) == 0);
+    const std::string duration = std::to_string(seconds);
+    const std::string domain = std::to_string(ownDomain());
+    pid_ = fork();
+    REQUIRE(pid_ >= 0);
+    if (pid_ == 0) {
+      dup2(in[0], STDIN_FILENO);
+      dup2(out[1], STDOUT_FILENO);
+      execl(SWIFTLET_DDS_SUBSCRIBER, SWIFTLET_DDS_SUBSCRIBER, duration.c_str(), domain.c_str(), nullptr);
+      _exit(127);
+    }
+    close(in[0]);
+    close(out[1]);
+    in_ = in[1];
+    out_ = out[0];
+  }
+  ~Subscriber() {
+    if (pid_ > 0) kill(SIGKILL);
+    if (in_ >= 0) close(in_);
+    close(out_);
+  }
+  Subscriber(const Subscriber&) = delete;
+  Subscriber& operator=(const Subscriber&) = delete;
+
+  void signal(int number) const { ::kill(pid_, number); }
+  void kill(int number) {
+    ::kill(pid_, number);
+    waitpid(pid_, nullptr, 0);
+    pid_ = -1;
+  }
+  /// By topic.
+  std::map<std::string, Received> finish() {
+    close(in_);
+    in_ = -1;
+    std::string text;
+    std::array<char, 4096> buffer{};
+    for (ssize_t n = 0; (n = read(out_, buffer.data(), buffer.size())) > 0;) {
+      text.append(buffer.data(), static_cast<std::size_t>(n));
+    }
+    waitpid(pid_, nullptr, 0);
+    pid_ = -1;
+    std::map<std::string, Received> topics;
+    std::istringstream lines(text);
+    std::string topic;
+    Received counts;
+    while (lines >> topic >> counts.received >> counts.lost >> counts.torn >> counts.repeated)
+      topics[topic] = counts;
+    return topics;
+  }
+
+ private:
+  pid_t pid_ = -1;
+  int in_ = -1;
+  int out_ = -1;
+};
+
+/// Message n of each kind, and how long its publishing took.
+class Publisher {
+ public:
+  explicit Publisher(DdsLink& link) : link_(link) {}
+
+  void odometry() {
+    const std::uint64_t n = ++odometries_;
+    const auto v = static_cast<double>(n);
+    DdsOdometry message;
+    message.stamp = stampOf(n);
+    message.frame = "odom";
+    message.child_frame = "base_link";
+    message.T_frame_child.translation = {v, 0.5 * v, -v};
+    message.velocity = {-v, 0, 0};
+    for (std::size_t i = 0; i < 36; ++i) {
+      message.pose_covariance[i] = v + static_cast<double>(i);
+      message.twist_covariance[i] = v - static_cast<double>(i);
+    }
+    timed([&] { link_.publish(message); });
+    SE3 map;
+    map.translation = {-v, 0, 0};
+    const std::array<DdsTransform, 2> transforms = {
+        DdsTransform{stampOf(n), "map", "odom", map},
+        DdsTransform{stampOf(n), "odom", "base_link", message.T_frame_child}};
+    timed([&] { link_.publish(transforms); });
+  }
+  void mesh() {
+    const std::uint64_t n = ++meshes_;
+    points_.assign(static_cast<std::size_t>(pointsOf(n)), Eigen::Vector3f::Zero());
+    for (std::size_t i = 0; i < points_.size(); ++i)
+      points_[i] = {static_cast<float>(n), 0, static_cast<float>(i)};
+    colours_.assign(points_.size(), {0.5F, 0.25F, 0.125F});
+    timed([&] { link_.publish(DdsMesh{stampOf(n), "odom", points_, colours_}); });
+    cloud_.assign(static_cast<std::size_t>(pointsOf(n)), {});
+    for (std::size_t i = 0; i < cloud_.size(); ++i) {
+      cloud_[i].z = static_cast<float>(i);
+      cloud_[i].label = static_cast<std::uint32_t>(n % 32);
+    }
+    timed([&] { link_.publish(DdsCloud{stampOf(n), "map", cloud_}); });
+  }
+  void diagnostics() {
+    const std::uint64_t n = ++diagnostics_;
+    const std::string text = std::to_string(n);
+    const std::array<DdsStatus, 2> statuses = {DdsStatus{0, "a", text, {{"n", text}}},
+                                               DdsStatus{1, "b", text, {{"m", ""}, {"n", text}}}};
+    timed([&] { link_.publish(stampOf(n), statuses); });
+  }
+  /// s, of every call since the last asking.
+  [[nodiscard]] std::vector<double> times() { return std::exchange(times_, {}); }
+  [[nodiscard]] std::uint64_t odometries() const { return odometries_; }
+
+ private:
+  static Stamp stampOf(std::uint64_t n) { return {static_cast<std::int64_t>(n) * 1'000'000}; }
+  template <typename Work>
+  void timed(Work&& work) {
+    const auto begin = Clock::now();
+    work();
+    times_.push_back(std::chrono::duration<double>(Clock::now() - begin).count());
+  }
+
+  DdsLink& link_;
+  std::uint64_t odometries_ = 0, meshes_ = 0, diagnostics_ = 0;
+  std::vector<Eigen::Vector3f> points_, colours_;
+  std::vector<DdsCloudPoint> cloud_;
+  std::vector<double> times_;
+};
+
+std::string spread(const char* what, std::vector<double> times) {
+  std::ranges::sort(times);
+  std::ostringstream text;
+  const auto at = [&](double share) {
+    return 1e6 * times[static_cast<std::size_t>(share * static_cast<double>(times.size() - 1))];
+  };
+  text << what << ": " << times.size() << " calls, p50 " << at(0.5) << " us, p99 " << at(0.99) << " us, max "
+       << at(1) << " us";
+  return text.str();
+}
+
+void checkWhole(const std::map<std::string, Received>& topics) {
+  REQUIRE(topics.size() == 5);
+  for (const auto& [topic, counts] : topics) {
+    INFO(topic << " received " << counts.received << " lost " << counts.lost);
+    CHECK(counts.received > 0);
+    CHECK(counts.torn == 0);
+    CHECK(counts.repeated == 0);
+  }
+}
+
+TEST_CASE("another implementation receives and decodes everything; its death disturbs nobody", "[dds]") {
+  const char* wanted = std::getenv("SWIFTLET_DDS_SECONDS");
+  const double seconds = wanted != nullptr ? std::atof(wanted) : 8;
+  DdsSettings settings;
+  settings.domain = ownDomain();
+  settings.label_topic = test::kDdsLabelTopic;
+  DdsLink link;
+  INFO(link.error());
+  REQUIRE(link.open(settings));
+  Subscriber stays(10 * seconds + 60);
+  Subscriber dies(10 * seconds + 60);
+  Subscriber hangs(10 * seconds + 60);
+  for (int i = 0; i < 300 && link.subscribers() < 3; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  REQUIRE(link.subscribers() == 3);
+  std::this_thread::sleep_for(std::chrono::seconds(1));  // the other topics' readers
+
+  Publisher publisher(link);
+  std::vector<std::string> report;
+  DdsImage labels;
+  std::uint64_t images = 0;
+  std::set<std::int64_t> taken;
+  const int steps = static_cast<int>(200 * seconds);
+  const auto begin = Clock::now();
+  for (int step = 0; step < steps; ++step) {
+    std::this_thread::sleep_until(begin + std::chrono::milliseconds(5) * step);
+    if (step == steps / 3) report.push_back(spread("all alive", publisher.times()));
+    if (step == steps / 3) dies.kill(SIGKILL);
+    if (step == steps / 3) hangs.signal(SIGSTOP);
+    if (step == 2 * steps / 3) report.push_back(spread("one killed, one stopped", publisher.times()));
+    publisher.odometry();
+    if (step % 10 == 0) publisher.mesh();
+    if (step % 200 == 0) publisher.diagnostics();
+    if (!link.takeLabels(labels)) continue;
+    ++images;
+    CHECK(taken.insert(labels.stamp.ns).second);
+    REQUIRE(labels.pixels.size() == std::size_t{test::kLabelWidth} * test::kLabelHeight);
+    const auto n = static_cast<std::uint64_t>(labels.stamp.ns / 1'000'000);
+    bool whole = labels.frame == "cam0" && labels.width == test::kLabelWidth;
+    for (std::size_t i = 0; i < labels.pixels.size(); ++i) {
+      const std::size_t row = i / test::kLabelWidth;
+      whole = whole &&
+              labels.pixels[i] == test::pixelOf(n, row * (test::kLabelWidth + 8) + i % test::kLabelWidth);
+    }
+    CHECK(whole);
+  }
+  const double took = std::chrono::duration<double>(Clock::now() - begin).count();
+  report.push_back(spread("after that", publisher.times()));
+  const auto topics = stays.finish();
+  hangs.signal(SIGCONT);
+  for (const std::string& line : report) std::printf("%s\n", line.c_str());
+  for (const auto& [topic, counts] : topics) {
+    std::printf("%s: received %llu, lost %llu, torn %llu, repeated %llu\n", topic.c_str(),
+                static_cast<unsigned long long>(counts.received),
+                static_cast<unsigned long long>(counts.lost), static_cast<unsigned long long>(counts.torn),
+                static_cast<unsigned long long>(counts.repeated));
+  }
+  checkWhole(topics);
+  // A subscriber that gets no CPU for longer than the writer keeps loses what is oldest; nothing else goes.
+  const Received& odometry = topics.at("odometry");
+  CHECK(odometry.received + odometry.lost <= publisher.odometries());
+  CHECK(odometry.received * 10 >= publisher.odometries() * 9);
+  CHECK(link.counters().refused == 0);
+  CHECK(images > 0);
+  CHECK(link.counters().images_refused == 0);
+  CHECK(took < seconds + 1);  // no call waited
+}
+
+TEST_CASE("what cannot be opened is said", "[dds]") {
+  DdsLink link;
+  DdsSettings settings;
+  settings.domain = ownDomain() + 1;
+  settings.interface = "no_such_interface";
+  CHECK_FALSE(link.open(settings));
+  CHECK(link.error().find("no_such_interface") != std::string::npos);
+  CHECK_FALSE(link.publish(DdsOdometry{}));
+  DdsImage image;
+  CHECK_FALSE(link.takeLabels(image));
+  settings.prefix = "swiftlet";
+  CHECK_FALSE(DdsLink().open(settings));
+}
+
+}  // namespace
+}  // namespace swiftlet
