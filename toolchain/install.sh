@@ -3,7 +3,8 @@
 # usage: toolchain/install.sh [test] [optional]
 #   (nothing)  what building and running needs        packages.txt
 #   test       also tests, benchmarks, fuzzers, lints  packages_test.txt
-#   optional   also what adds features when present   packages_optional.txt (may fail)
+#   optional   also what adds features when present   packages_optional.txt (may fail),
+#              and where there is no npm               packages_report.txt (may fail)
 # Packages that are present are left alone; when all are, nothing is run.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
@@ -55,7 +56,7 @@ for argument in "$@"; do
     test) with_test=yes ;;
     optional) with_optional=yes ;;
     *)
-      sed -n '2,7s/^# \{0,1\}//p' "$0"
+      sed -n '2,8s/^# \{0,1\}//p' "$0"
       exit 2
       ;;
   esac
@@ -69,4 +70,7 @@ install_list packages.txt "to build"
 if [ $with_test = yes ]; then install_list packages_test.txt "to test"; fi
 if [ $with_optional = yes ]; then
   install_list packages_optional.txt "optional" || echo "install: going on without optional packages"
+  if ! command -v npm >/dev/null 2>&1; then
+    install_list packages_report.txt "for the report's page" || echo "install: going on without npm"
+  fi
 fi

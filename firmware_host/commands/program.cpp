@@ -24,6 +24,7 @@ int runProgram(int argc, char** argv) {
   addHilCommand(app, exit_code);
   addEvaluateCommand(app, exit_code);
   addExportCommand(app, exit_code);
+  addReportCommand(app, exit_code);
   addMeshCommand(app, exit_code);
   addFuseCommand(app, exit_code);
   addPlaceCommand(app, exit_code);

@@ -21,24 +21,36 @@ double squaredNorm(const Eigen::Matrix<double, kSize, kSize>& covariance,
 
 }  // namespace
 
-Consistency consistency(std::span<const ConsistencySample> samples) {
-  Consistency result;
-  if (samples.empty()) return result;
+std::vector<ConsistencyError> consistencyErrors(std::span<const ConsistencySample> samples) {
+  std::vector<ConsistencyError> errors;
+  if (samples.empty()) return errors;
   const SE3& first = samples.front().estimate;
   const SE3& first_truth = samples.front().truth;
   const Eigen::Quaterniond turn = yawRotation(first_truth.R() * first.R().transpose());
   const SE3 T_truth_estimate(turn, first_truth.translation - turn * first.translation);
-
-  std::size_t inside = 0;
-  for (const ConsistencySample& sample : samples.subspan(1)) {
+  // The position block turns with the world axes.
+  Matrix6d turned = Matrix6d::Identity();
+  turned.bottomRightCorner<3, 3>() = turn.toRotationMatrix();
+  errors.reserve(samples.size());
+  for (const ConsistencySample& sample : samples) {
     const SE3 estimate = T_truth_estimate * sample.estimate;
-    Vector6d error;
-    error << logSo3(Eigen::Quaterniond(estimate.rotation.conjugate() * sample.truth.rotation)),
+    ConsistencyError found;
+    found.error << logSo3(Eigen::Quaterniond(estimate.rotation.conjugate() * sample.truth.rotation)),
         sample.truth.translation - estimate.translation;
-    // The position block turns with the world axes.
-    Matrix6d turned = Matrix6d::Identity();
-    turned.bottomRightCorner<3, 3>() = turn.toRotationMatrix();
-    const Matrix6d covariance = turned * sample.covariance * turned.transpose();
+    found.covariance = turned * sample.covariance * turned.transpose();
+    errors.push_back(found);
+  }
+  return errors;
+}
+
+Consistency consistency(std::span<const ConsistencySample> samples) {
+  Consistency result;
+  if (samples.empty()) return result;
+  std::size_t inside = 0;
+  const std::vector<ConsistencyError> errors = consistencyErrors(samples);
+  for (std::size_t i = 1; i < errors.size(); ++i) {
+    const Vector6d& error = errors[i].error;
+    const Matrix6d& covariance = errors[i].covariance;
     const double pose = squaredNorm<6>(covariance, error);
     if (!std::isfinite(pose)) {
       ++result.without_covariance;

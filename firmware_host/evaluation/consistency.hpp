@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 #include <span>
+#include <vector>
 
 #include "estimator/geometry/se3.hpp"
 
@@ -21,6 +22,15 @@ struct ConsistencySample {
   SE3 truth;
   Matrix6d covariance = Matrix6d::Zero();  ///< of (phi, p)
 };
+
+/// One sample's error in the common gauge, with the covariance turned into it.
+struct ConsistencyError {
+  Eigen::Matrix<double, 6, 1> error = Eigen::Matrix<double, 6, 1>::Zero();  ///< (phi, p): rad, m
+  Matrix6d covariance = Matrix6d::Zero();
+};
+
+/// One for each sample; that of the first is zero in yaw and position, which fix the gauge.
+std::vector<ConsistencyError> consistencyErrors(std::span<const ConsistencySample> samples);
 
 struct Consistency {
   std::size_t count = 0;

@@ -8,6 +8,7 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/parse_number.hpp"
+#include "firmware_host/report/events_log.hpp"
 #include "firmware_host/report/names.hpp"
 
 namespace swiftlet {
@@ -81,18 +82,9 @@ std::vector<HealthChange> readChanges(const fs::path& path) {
 }
 
 std::vector<HilEvidence::Line> readRemarks(const fs::path& path) {
-  std::ifstream file(path);
-  if (!file)
-    throw InputError(path.string(), 0, "", "cannot be read", "Give the folder that `swiftlet fly` wrote");
-  constexpr std::string_view kRemark = "remark ";
   std::vector<HilEvidence::Line> remarks;
-  std::string line;
-  while (std::getline(file, line)) {
-    const std::size_t space = line.find(' ');
-    double seconds = 0;
-    if (space == std::string::npos || !parseDouble(line.substr(0, space), seconds)) continue;
-    if (line.compare(space + 1, kRemark.size(), kRemark) != 0) continue;
-    remarks.push_back({Stamp{} + Duration::fromSeconds(seconds), line.substr(space + 1 + kRemark.size())});
+  for (const EventLine& line : readEvents(path.string())) {
+    if (line.name == kRemarkName) remarks.push_back({line.stamp, line.text});
   }
   return remarks;
 }

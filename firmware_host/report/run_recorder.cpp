@@ -6,6 +6,7 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
+#include "firmware_host/report/events_log.hpp"
 #include "firmware_host/report/map_output.hpp"
 #include "firmware_host/report/names.hpp"
 #include "firmware_host/report/ply_file.hpp"
@@ -85,7 +86,7 @@ void RunRecorder::onFinish(const OdometryOutput& output) {
 }
 
 void RunRecorder::onRemark(Stamp stamp, const std::string& text) {
-  events_->write(formatSeconds(stamp) + " remark " + text);
+  events_->write(fmt::format("{} {} {}", formatSeconds(stamp), kRemarkName, text));
 }
 
 void RunRecorder::writeEvents(const OdometryOutput& output) {

@@ -25,6 +25,27 @@ void append(std::string& row, const Eigen::Vector3d& v) {
   for (const double x : v) append(row, x);
 }
 
+/// The keyframe's figures, from at_rest on; health and epoch stand before them.
+constexpr std::size_t kFirstFigure = kFirstCovariance + kCovariances + 2;
+constexpr std::size_t kFigures = 9;
+
+void readFigures(const CsvReader& csv, StoredState& state) {
+  std::array<double, kFigures> figures{};
+  for (std::size_t i = 0; i < kFigures; ++i) {
+    if (!parseDouble(csv.field(kFirstFigure + i), figures[i])) return;
+  }
+  state.has_figures = true;
+  state.figures.keyframe = true;
+  state.figures.at_rest = figures[0] != 0;
+  std::array<int*, 4> counts = {&state.figures.tracks, &state.figures.landmarks, &state.figures.inliers_mono,
+                                &state.figures.inliers_stereo};
+  for (std::size_t i = 0; i < counts.size(); ++i) *counts[i] = static_cast<int>(figures[1 + i]);
+  state.figures.track_length = figures[5];
+  state.figures.reprojection_rms = figures[6];
+  state.figures.imu_residual = figures[7];
+  state.figures.iterations = static_cast<int>(figures[8]);
+}
+
 }  // namespace
 
 std::string statesHeader() {
@@ -85,6 +106,13 @@ std::vector<StoredState> readStates(const std::string& path) {
     }
     if (!csv.numbers(1, names, v.data())) continue;
     state.T_world_body = SE3(Eigen::Quaterniond(v[3], v[4], v[5], v[6]), {v[0], v[1], v[2]});
+    state.v_world_body = {v[7], v[8], v[9]};
+    state.bias_gyro = {v[10], v[11], v[12]};
+    state.bias_accel = {v[13], v[14], v[15]};
+    for (int i = 0; i < kStateDim; ++i) {
+      state.variances[i] = v[kFirstVariance - 1 + static_cast<std::size_t>(i)];
+    }
+    readFigures(csv, state);
     std::size_t next = kFirstCovariance - 1;
     for (int i = 0; i < kPoseDim; ++i) {
       state.covariance(i, i) = v[kFirstVariance - 1 + static_cast<std::size_t>(i)];

@@ -20,11 +20,18 @@ std::string statesHeader();
 /// One row without line end; numbers in full precision.
 std::string statesRow(const KeyframeState& keyframe);
 
-/// What evaluation needs of a row.
+/// A row as it was stored.
 struct StoredState {
   Stamp stamp;
   SE3 T_world_body;
   Matrix6d covariance = Matrix6d::Zero();  ///< of (phi, p)
+  Eigen::Vector3d v_world_body = Eigen::Vector3d::Zero();
+  Eigen::Vector3d bias_gyro = Eigen::Vector3d::Zero();
+  Eigen::Vector3d bias_accel = Eigen::Vector3d::Zero();
+  /// Of the whole state: phi, p, v, bg, ba.
+  Eigen::Matrix<double, kStateDim, 1> variances = Eigen::Matrix<double, kStateDim, 1>::Zero();
+  bool has_figures = false;  ///< false: the row ends before, or there is text among them
+  FrameStatistics figures;   ///< a keyframe's
 };
 
 /// Reads a states.csv in time order; InputError names file and line.

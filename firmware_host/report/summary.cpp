@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <Eigen/Core>
+#include <cmath>
 
 #include "drivers/recorded/trajectory_file.hpp"
+#include "firmware_host/budget/budget_report.hpp"
 #include "firmware_host/report/line_file.hpp"
 #include "firmware_host/report/names.hpp"
 #include "firmware_host/settings/registry.hpp"
@@ -89,6 +91,24 @@ Json countersJson(const RunFacts& facts, const RunStatistics& statistics) {
   return json;
 }
 
+/// One line of text, not a line a number: "from_ms count" of each column that holds something.
+std::string histogramText(const LatencyHistogram& histogram) {
+  constexpr double kFirstEdge = 1e-6;  // s; what is shorter counts in the first column
+  constexpr int kDecades = 8;
+  std::string text;
+  std::uint64_t below = 0;
+  for (int i = 0; i < kDecades * kHistogramColumnsPerDecade && below < histogram.count(); ++i) {
+    const double from = kFirstEdge * std::pow(10.0, static_cast<double>(i) / kHistogramColumnsPerDecade);
+    const double to = kFirstEdge * std::pow(10.0, static_cast<double>(i + 1) / kHistogramColumnsPerDecade);
+    const std::uint64_t up_to = countUpTo(histogram, to);
+    if (up_to > below) {
+      text += fmt::format("{}{:.4g} {}", text.empty() ? "" : ", ", from * kMilli, up_to - below);
+    }
+    below = up_to;
+  }
+  return text;
+}
+
 Json distributionJson(const LatencyHistogram& histogram) {
   constexpr double kMedian = 0.5;
   constexpr double kP90 = 0.9;
@@ -98,7 +118,8 @@ Json distributionJson(const LatencyHistogram& histogram) {
           {"p90_ms", histogram.percentile(kP90) * kMilli},
           {"p99_ms", histogram.percentile(kP99) * kMilli},
           {"max_ms", histogram.max() * kMilli},
-          {"total_s", histogram.total()}};
+          {"total_s", histogram.total()},
+          {"histogram", histogramText(histogram)}};
 }
 
 Json latencyJson(const LatencyHistogram& wall, const LatencyHistogram& cpu) {

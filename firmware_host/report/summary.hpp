@@ -15,6 +15,10 @@
 
 namespace swiftlet {
 
+/// Of "histogram" in the timing of a stage: "from_ms count, from_ms count" of the columns that hold
+/// something, from the shortest on.
+inline constexpr int kHistogramColumnsPerDecade = 20;
+
 struct MemoryRow {
   std::string what;
   std::int64_t bytes = 0;

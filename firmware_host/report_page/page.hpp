@@ -1,0 +1,33 @@
+#pragma once
+// The report's file: one HTML page that needs nothing else.
+//
+// The page's program (plots and 3D view) is a data file of the installation, share/swiftlet/report_page.html
+// beside the bin folder, made at build time where npm is at hand; the document is put into it. Without that
+// file the page is plain: tables, and plots as SVG.
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "firmware_host/report_page/plot.hpp"
+#include "firmware_host/report_page/report_document.hpp"
+
+namespace swiftlet {
+
+/// Where the page's program is: beside the running program. Empty when it is not there.
+std::string findReportPage();
+
+/// `page`: the HTML of findReportPage(). InputError names `name` when it is no page of this format.
+std::string pageWith(const std::string& page, const std::string& name,
+                     const nlohmann::ordered_json& document);
+
+/// Without the page's program.
+std::string plainPage(const std::vector<ReportedRun>& runs);
+
+/// Text as it may stand in HTML.
+std::string htmlText(const std::string& text);
+
+/// The plot as an SVG element: axes, lines and what they are called.
+std::string svgPlot(const Plot& plot);
+
+}  // namespace swiftlet

@@ -1,0 +1,63 @@
+#pragma once
+// One plot of the report as data: what the page draws, and what the drawing without the page's program takes.
+//
+// Numbers are doubles here and 32-bit floats in the document. x of kTime is seconds since the run's first
+// image, rising; of kPlan metres, with the same scale as y; of kHistogram the left edges of columns on a
+// logarithmic axis, [ms].
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace swiftlet {
+
+enum class PlotKind { kTime, kPlan, kHistogram };
+enum class SeriesStyle {
+  kLine,
+  kPoints,
+  kTruth,  ///< a line in the colour of all truth
+  kBand,   ///< from -y to y, behind the lines
+};
+
+struct Series {
+  std::string name;
+  SeriesStyle style = SeriesStyle::kLine;
+  std::vector<double> x;
+  std::vector<double> y;
+  std::vector<double> value;  ///< for kPlan: what colours the line; empty: nothing
+};
+
+/// A line across the plot at x, a budget for instance.
+struct PlotMarker {
+  double x = 0;
+  std::string text;
+};
+
+struct Plot {
+  std::string id;
+  std::string group;  ///< the section it stands in
+  std::string title;
+  PlotKind kind = PlotKind::kTime;
+  std::string x_label;
+  std::string y_label;
+  std::string value_label;
+  std::vector<Series> series;
+  std::vector<PlotMarker> markers;
+  std::string note;  ///< what it cannot show and why; empty: nothing is missing
+
+  [[nodiscard]] bool empty() const;  ///< no series with a point
+};
+
+/// At most this many points of a series go into the document.
+inline constexpr std::size_t kMostPoints = 4000;
+
+/// The series with at most `most` points: each of most / 2 equal parts of it keeps its lowest and its highest
+/// value (of `value` where it has one, else of y), in order; the first and the last point stay. O(points).
+Series decimated(const Series& series, std::size_t most);
+
+/// {"id", "group", "title", "kind", "x_label", "y_label", "value_label", "note", "markers", "series":
+/// [{"name", "style", "count", "x", "y", "value"}]}; columns as base64 of little-endian 32-bit floats,
+/// decimated.
+nlohmann::ordered_json toJson(const Plot& plot);
+
+}  // namespace swiftlet

@@ -1,0 +1,186 @@
+// The page: one document in, sections of plots and tables out; later documents are appended to it.
+// The document is described in docs/report.md.
+
+import 'uplot/dist/uPlot.min.css';
+import './style.css';
+import { sharedBounds } from './columns.js';
+import { HistogramPlot } from './histogram_plot.js';
+import { PlanPlot } from './plan_plot.js';
+import { SceneView } from './scene.js';
+import { element, eventsTable, tableElement } from './tables.js';
+import { TimePlot } from './time_plot.js';
+import { Timeline } from './timeline.js';
+
+const kFormat = 1;
+const kinds = { time: TimePlot, plan: PlanPlot, histogram: HistogramPlot };
+
+class Run {
+  constructor(run, index, width) {
+    this.run = run;
+    this.key = `time${index}`;
+    this.plots = new Map();
+    this.width = width;
+    this.run.health ??= [];
+    this.run.events ??= [];
+  }
+
+  header(letter) {
+    const head = element('div', null, 'run');
+    head.append(element('h2', `${letter}${this.run.name}`));
+    for (const missing of this.run.missing ?? []) {
+      head.append(element('p', `${missing.file}: ${missing.what}`, 'missing'));
+    }
+    return head;
+  }
+
+  timeline(host) {
+    this.line = new Timeline(this.run, host, this.width, this.key);
+  }
+
+  plot(plot, host, width, shared) {
+    const figure = element('figure');
+    figure.dataset.plot = plot.id;
+    figure.append(element('figcaption', plot.title + (plot.y_label && plot.kind === 'time' ? ` [${plot.y_label}]` : '')));
+    host.append(figure);
+    const height = plot.kind === 'plan' ? 420 : 230;
+    const made = new kinds[plot.kind](plot, figure, width, height, this.key, shared);
+    if (plot.note) figure.append(element('p', plot.note, 'note'));
+    this.plots.set(plot.id, made);
+  }
+
+  tables(host) {
+    this.tablesHost = host;
+    host.append(eventsTable(this.run));
+    for (const table of this.run.tables ?? []) host.append(tableElement(table));
+  }
+
+  scene(host) {
+    const data = this.run.scene;
+    if (!data || data.trajectories.length + data.surfaces.length === 0) {
+      host.append(element('p', 'No trajectory and no surface to show.', 'note'));
+      return;
+    }
+    if (!SceneView.renderer()) {
+      host.append(element('p', 'This browser gives no WebGL: the 3D view is left out.', 'note'));
+      return;
+    }
+    this.view = new SceneView(data, host, this.width, Math.min(560, Math.round(this.width * 0.6)));
+  }
+
+  append(patch) {
+    if (patch.health) this.run.health = patch.health;
+    if (patch.events) this.run.events.push(...patch.events);
+    if (patch.duration != null) this.run.duration = patch.duration;
+    if (patch.health || patch.events || patch.duration != null) this.line?.refresh();
+    for (const plot of patch.plots ?? []) this.plots.get(plot.id)?.append(plot.series);
+    for (const table of patch.tables ?? []) {
+      const old = this.tablesHost?.querySelector(`[data-table="${CSS.escape(table.id)}"]`);
+      const next = tableElement(table);
+      if (old) next.open = old.open;
+      old ? old.replaceWith(next) : this.tablesHost?.append(next);
+    }
+    if (patch.scene) this.view?.append(patch.scene);
+  }
+}
+
+const report = {
+  document: null,
+  runs: [],
+  ready: false,
+
+  /** Shows a whole document. */
+  load(json) {
+    if (json.format !== kFormat) throw new Error(`this page shows format ${kFormat}, the document has ${json.format}`);
+    this.document = json;
+    const host = document.getElementById('report');
+    host.replaceChildren();
+    const beside = json.runs.length > 1;
+    document.title = `swiftlet: ${json.runs.map((r) => r.name).join(' and ')}`;
+    // Without the host's own margins.
+    const room = Math.min(host.clientWidth - 40, 1800);
+    const width = Math.floor((room - (beside ? 24 : 0)) / json.runs.length);
+    this.runs = json.runs.map((run, i) => new Run(run, i, width));
+    // A row of the page: one cell for each run.
+    const row = (title, fill) => {
+      if (title) host.append(element('h3', title));
+      const cells = element('div', null, beside ? 'beside' : 'alone');
+      this.runs.forEach((run, i) => {
+        const cell = element('div');
+        cells.append(cell);
+        fill(run, cell, i);
+      });
+      host.append(cells);
+    };
+    row('', (run, cell, i) => cell.append(run.header(beside ? `${'AB'[i]}: ` : '')));
+    if (beside) {
+      host.append(element('h3', 'Differences'));
+      if (!json.differences?.length) host.append(element('p', 'None.', 'note'));
+      for (const table of json.differences ?? []) host.append(tableElement(table));
+    }
+    row('Health and events', (run, cell) => run.timeline(cell));
+    const groups = [...new Set(json.runs.flatMap((run) => run.plots.map((plot) => plot.group)))];
+    const scenes = () => row('3D view', (run, cell) => { cell.className = 'scene'; run.sceneHost = cell; });
+    if (!groups.includes('Trajectory')) scenes();
+    for (const group of groups) {
+      if (beside) {
+        // A row for each plot, with one scale: what only one run has leaves the other's place empty.
+        host.append(element('h3', group));
+        const ids = new Set(json.runs.flatMap((run) => run.plots.filter((p) => p.group === group).map((p) => p.id)));
+        for (const id of ids) {
+          const plots = json.runs.map((run) => run.plots.find((p) => p.id === id));
+          const shared = sharedBounds(plots.filter(Boolean));
+          row('', (run, cell, i) => {
+            if (plots[i]) run.plot(plots[i], cell, width, shared);
+            else cell.append(element('p', `${plots[1 - i].title}: only ${'BA'[i]} has it`, 'note'));
+          });
+        }
+        if (group === 'Trajectory') scenes();
+        continue;
+      }
+      const across = width > 1300 ? 3 : width > 760 ? 2 : 1;
+      row(group, (run, cell) => {
+        cell.className = 'plots';
+        const wide = group === 'Trajectory' ? Math.min(across, 2) : across;
+        for (const plot of run.run.plots.filter((p) => p.group === group)) {
+          run.plot(plot, cell, Math.floor((width - 14 * (wide - 1)) / wide));
+        }
+      });
+      if (group === 'Trajectory') scenes();
+    }
+    row('Tables', (run, cell) => run.tables(cell));
+    host.append(element('p', json.program, 'note'));
+    // The plots are to be seen before the surfaces are made.
+    this.done = new Promise((resolve) => {
+      requestAnimationFrame(() => setTimeout(() => {
+        this.times = { plots: performance.now() };
+        for (const run of this.runs) {
+          run.scene(run.sceneHost);
+          run.view?.drawNow();
+        }
+        this.times.scene = performance.now();
+        this.ready = true;
+        resolve();
+      }, 0));
+    });
+    return this.done;
+  },
+
+  /** Adds to what is shown: {"run", "health", "events", "duration", "plots", "tables", "scene"}. */
+  append(patch) {
+    this.runs[patch.run ?? 0]?.append(patch);
+  },
+
+  /** What a test asks for: how much each plot shows. */
+  figures() {
+    return this.runs.map((run) => ({
+      name: run.run.name,
+      timeline: run.line?.count() ?? 0,
+      plots: Object.fromEntries([...run.plots].map(([id, plot]) => [id, plot.count()])),
+      sceneColours: run.view ? run.view.colours() : 0,
+    }));
+  },
+};
+
+window.swiftletReport = report;
+const embedded = document.getElementById('report-document');
+if (embedded) report.load(JSON.parse(embedded.textContent));

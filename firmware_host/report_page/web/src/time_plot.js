@@ -1,0 +1,121 @@
+// Lines over time; all plots over time of a run share cursor and zoom.
+
+import uPlot from 'uplot';
+import * as colours from './colours.js';
+import { floats, joined } from './columns.js';
+
+const following = new Map(); // sync key -> plots
+
+/** Zooms the others to what one was zoomed to. */
+export function follow(key, plot) {
+  if (!following.has(key)) following.set(key, new Set());
+  following.get(key).add(plot);
+}
+
+export function unfollow(key, plot) {
+  following.get(key)?.delete(plot);
+}
+
+let spreading = false;
+export function spreadZoom(key) {
+  return (plot, scale) => {
+    if (scale !== 'x' || spreading) return;
+    spreading = true;
+    const { min, max } = plot.scales.x;
+    for (const other of following.get(key) ?? []) {
+      if (other !== plot && (other.scales.x.min !== min || other.scales.x.max !== max)) {
+        other.setScale('x', { min, max });
+      }
+    }
+    spreading = false;
+  };
+}
+
+const shown = (value) => (value == null ? '' : Number(value).toPrecision(4));
+
+export class TimePlot {
+  constructor(plot, host, width, height, key, shared) {
+    const wide = shared && 0.05 * (shared.y[1] - shared.y[0] || 1);
+    this.columns = plot.series.map((s) => ({ name: s.name, style: s.style, x: floats(s.x), y: floats(s.y) }));
+    const series = [{ label: 't', value: (_, v) => (v == null ? '' : `${v.toFixed(3)} s`) }];
+    const bands = [];
+    let line = 0;
+    for (const column of this.columns) {
+      if (column.style === 'band') {
+        bands.push({ series: [series.length, series.length + 1], fill: colours.band });
+        const edge = { stroke: 'rgba(31,111,180,0.35)', width: 1, points: { show: false } };
+        series.push({ label: column.name, value: (_, v) => shown(v), ...edge });
+        series.push({ label: `-${column.name}`, value: (_, v) => shown(v), ...edge });
+        continue;
+      }
+      // The truth of each axis lies beside the line of that axis, lighter.
+      const truth = column.style === 'truth';
+      const stroke = truth ? `${colours.lines[line++ % 3]}88` : colours.lines[this.strokeOf(column)];
+      series.push({
+        label: column.name,
+        stroke,
+        width: truth ? 3 : 1.5,
+        dash: truth ? [4, 3] : undefined,
+        value: (_, v) => shown(v),
+        paths: column.style === 'points' ? () => null : undefined,
+        points: column.style === 'points' ? { show: true, size: 5, fill: stroke } : { show: this.sparse(column) },
+      });
+    }
+    this.plot = new uPlot(
+      {
+        width,
+        height,
+        series,
+        bands,
+        scales: {
+          x: { time: false },
+          y: shared ? { range: [shared.y[0] - wide, shared.y[1] + wide] } : {},
+        },
+        axes: [
+          { label: plot.x_label, labelSize: 18, size: 34, font: '11px system-ui', labelFont: '11px system-ui' },
+          { label: plot.y_label, labelSize: 18, size: 58, font: '11px system-ui', labelFont: '11px system-ui' },
+        ],
+        cursor: { sync: { key }, drag: { x: true, y: false } },
+        hooks: { setScale: [spreadZoom(key)] },
+      },
+      this.data(),
+      host,
+    );
+    follow(key, this.plot);
+  }
+
+  strokeOf(column) {
+    const own = this.columns.filter((c) => c.style !== 'truth' && c.style !== 'band');
+    return own.indexOf(column) % colours.lines.length;
+  }
+
+  sparse(column) {
+    return column.x.length < 60;
+  }
+
+  data() {
+    const tables = this.columns.map((c) =>
+      c.style === 'band' ? [c.x, c.y, c.y.map((y) => -y)] : [c.x, c.y]);
+    const same = tables.every((t) => t[0].length === tables[0][0].length && t[0].every((x, i) => x === tables[0][0][i]));
+    if (same && tables.length) return [tables[0][0], ...tables.flatMap((t) => t.slice(1))];
+    return uPlot.join(tables.map((t) => t.map((column) => Array.from(column))));
+  }
+
+  count() {
+    return this.columns.reduce((sum, c) => sum + c.x.length, 0);
+  }
+
+  append(series) {
+    for (const one of series) {
+      const column = this.columns.find((c) => c.name === one.name);
+      if (!column) continue;
+      column.x = joined(column.x, floats(one.x));
+      column.y = joined(column.y, floats(one.y));
+    }
+    this.plot.setData(this.data());
+  }
+
+  resize(width, height) {
+    this.plot.setSize({ width, height });
+  }
+}

@@ -1,0 +1,29 @@
+#!/bin/sh
+# Opens reports of a short log in headless Chromium: one run, and two beside each other.
+# usage: report_browser.sh SWIFTLET PAGE_FOLDER LOG
+# 77: skipped, there is no Chromium, no node or no bundle of the page.
+set -eu
+swiftlet=$1
+page=$2
+log=$3
+skip() {
+  echo "report_browser: skipped: $1"
+  exit 77
+}
+browser=$(command -v chromium || command -v chromium-browser || command -v google-chrome || true)
+[ -n "$browser" ] || skip "no chromium"
+command -v node >/dev/null 2>&1 || skip "no node"
+[ -d "$page/node_modules/playwright-core" ] || skip "the page was built without npm"
+
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+"$swiftlet" replay "$log" --out "$work/stereo" >"$work/replay.log"
+"$swiftlet" replay "$log" --mono --imu-rate --out "$work/mono" >>"$work/replay.log"
+"$swiftlet" report "$work/stereo" --out "$work/one.html"
+"$swiftlet" report "$work/stereo" "$work/mono" --out "$work/two.html"
+# What is missing is said on the page, and the rest of it works.
+rm "$work/mono/summary.json"
+"$swiftlet" report "$work/mono" --out "$work/damaged.html" 2>"$work/notes"
+grep -q "summary.json: is missing" "$work/notes"
+# One browser for all: its start is what takes long.
+node "$page/check_page.mjs" "$browser" "$work/one.html" "$work/two.html" "$work/damaged.html"
