@@ -69,21 +69,25 @@ Table accuracyTable(const RunView& view) {
   if (!view.hasTruth()) return table;
   const Accuracy& accuracy = view.odometry;
   const TrajectoryError& absolute = accuracy.absolute;
-  table.rows = {
-      {"poses with truth", fmt::format("{} of {}", accuracy.pairs, accuracy.estimates)},
-      {"path", fmt::format("{:.2f} m", absolute.path_length)},
-      {"ATE", fmt::format("rmse {:.4f} m, median {:.4f}, max {:.4f}", absolute.translation.rmse,
-                          absolute.translation.median, absolute.translation.max)},
-      {"ATE by axis", fmt::format("{:.4f} {:.4f} {:.4f} m", absolute.axis_rmse.x(), absolute.axis_rmse.y(),
-                                  absolute.axis_rmse.z())},
-      {"attitude", fmt::format("rmse {:.3f} deg, max {:.3f}", absolute.attitude.rmse, absolute.attitude.max)},
-      {fmt::format("RPE over {:g} s", accuracy.over_time.interval),
-       fmt::format("{:.4f} m, {:.3f} deg", accuracy.over_time.translation.rmse,
-                   accuracy.over_time.rotation.rmse)}};
+  // One number a row: two runs are compared by them.
+  const auto add = [&](const std::string& what, double value) {
+    table.rows.push_back({what, fmt::format("{:.4f}", value)});
+  };
+  table.rows = {{"poses", std::to_string(accuracy.estimates)},
+                {"poses with truth", std::to_string(accuracy.pairs)}};
+  add("path [m]", absolute.path_length);
+  add("ATE rmse [m]", absolute.translation.rmse);
+  add("ATE median [m]", absolute.translation.median);
+  add("ATE max [m]", absolute.translation.max);
+  for (int axis = 0; axis < 3; ++axis)
+    add(fmt::format("ATE rmse, {} [m]", "xyz"[axis]), absolute.axis_rmse[axis]);
+  add("attitude rmse [deg]", absolute.attitude.rmse);
+  add("attitude max [deg]", absolute.attitude.max);
+  add(fmt::format("RPE over {:g} s [m]", accuracy.over_time.interval), accuracy.over_time.translation.rmse);
+  add(fmt::format("RPE over {:g} s [deg]", accuracy.over_time.interval), accuracy.over_time.rotation.rmse);
   for (const RelativeError& error : accuracy.over_distance) {
-    table.rows.push_back(
-        {fmt::format("RPE over {:g} m", error.interval),
-         fmt::format("{:.3f} %, {:.4f} deg/m", error.translation.mean, error.rotation.mean)});
+    add(fmt::format("RPE over {:g} m [%]", error.interval), error.translation.mean);
+    add(fmt::format("RPE over {:g} m [deg/m]", error.interval), error.rotation.mean);
   }
   return table;
 }
@@ -175,8 +179,10 @@ std::map<std::string, std::string> namedFigures(const RunView& view, const std::
   }
   std::map<std::string, std::string> figures;
   for (const std::vector<std::string>& row : rows) {
-    // Histograms and sums differ always and say nothing beside their percentiles.
-    if (row[0].ends_with(".histogram") || row[0].ends_with("total_s")) continue;
+    // Histograms and sums differ always and say nothing beside their percentiles; stamps are in seconds too.
+    if (row[0].ends_with(".histogram") || row[0].ends_with("total_s") || row[0].ends_with("_ns")) {
+      continue;
+    }
     figures[row[0]] = row[1];
   }
   return figures;

@@ -15,9 +15,10 @@ const kFormat = 1;
 const kinds = { time: TimePlot, plan: PlanPlot, histogram: HistogramPlot };
 
 class Run {
-  constructor(run, index, width) {
+  constructor(run, width) {
     this.run = run;
-    this.key = `time${index}`;
+    // Runs of one log share the cursor and the zoom.
+    this.key = `time${run.first_image_ns}`;
     this.plots = new Map();
     this.width = width;
     this.run.health ??= [];
@@ -99,7 +100,7 @@ const report = {
     // Without the host's own margins.
     const room = Math.min(host.clientWidth - 40, 1800);
     const width = Math.floor((room - (beside ? 24 : 0)) / json.runs.length);
-    this.runs = json.runs.map((run, i) => new Run(run, i, width));
+    this.runs = json.runs.map((run) => new Run(run, width));
     // A row of the page: one cell for each run.
     const row = (title, fill) => {
       if (title) host.append(element('h3', title));
