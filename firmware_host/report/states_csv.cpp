@@ -14,10 +14,12 @@ namespace swiftlet {
 namespace {
 
 constexpr int kPoseDim = 6;
+constexpr double kUnit = 1e-6;  // of a quaternion's norm, from 17 digits
 constexpr std::size_t kFirstVariance = 17;
 constexpr std::size_t kFirstCovariance = kFirstVariance + kStateDim;
 constexpr std::size_t kCovariances = kPoseDim * (kPoseDim - 1) / 2;
-constexpr std::size_t kFigures = 11;  ///< health and what follows it
+constexpr std::size_t kNumbers = kFirstCovariance + kCovariances;
+constexpr std::size_t kFigures = 11;  // health and what follows it
 
 void append(std::string& row, double value) { row += fmt::format(",{:.17g}", value); }
 
@@ -25,25 +27,67 @@ void append(std::string& row, const Eigen::Vector3d& v) {
   for (const double x : v) append(row, x);
 }
 
-/// The keyframe's figures, from at_rest on; health and epoch stand before them.
-constexpr std::size_t kFirstFigure = kFirstCovariance + kCovariances + 2;
-constexpr std::size_t kFigures = 9;
-
-void readFigures(const CsvReader& csv, StoredState& state) {
-  std::array<double, kFigures> figures{};
-  for (std::size_t i = 0; i < kFigures; ++i) {
-    if (!parseDouble(csv.field(kFirstFigure + i), figures[i])) return;
+bool readHealth(std::string_view name, Health& health) {
+  for (const Health candidate : {Health::kInitializing, Health::kGood, Health::kDegraded, Health::kFailed}) {
+    if (healthName(candidate) != name) continue;
+    health = candidate;
+    return true;
   }
-  state.has_figures = true;
-  state.figures.keyframe = true;
-  state.figures.at_rest = figures[0] != 0;
-  std::array<int*, 4> counts = {&state.figures.tracks, &state.figures.landmarks, &state.figures.inliers_mono,
-                                &state.figures.inliers_stereo};
-  for (std::size_t i = 0; i < counts.size(); ++i) *counts[i] = static_cast<int>(figures[1 + i]);
-  state.figures.track_length = figures[5];
-  state.figures.reprojection_rms = figures[6];
-  state.figures.imu_residual = figures[7];
-  state.figures.iterations = static_cast<int>(figures[8]);
+  return false;
+}
+
+/// The row up to the covariances, and its quaternion's norm; false: rejected.
+bool readState(CsvReader& csv, NavState& state, double& norm) {
+  std::array<const char*, kNumbers - 1> names{};
+  names.fill("state or covariance");
+  std::array<double, kNumbers - 1> v{};
+  if (!parseNanoseconds(csv.field(0), state.stamp)) {
+    csv.reject("timestamp", "not a stamp in ns");
+    return false;
+  }
+  if (!csv.numbers(1, names, v.data())) return false;
+  const Eigen::Quaterniond q(v[3], v[4], v[5], v[6]);
+  norm = q.norm();
+  state.T_world_body = SE3(q, {v[0], v[1], v[2]});
+  state.v_world_body = {v[7], v[8], v[9]};
+  state.bias_gyro = {v[10], v[11], v[12]};
+  state.bias_accel = {v[13], v[14], v[15]};
+  std::size_t next = kFirstVariance - 1;
+  for (int i = 0; i < kStateDim; ++i) state.covariance(i, i) = v[next++];
+  for (int i = 0; i < kPoseDim; ++i) {
+    for (int j = i + 1; j < kPoseDim; ++j) {
+      state.covariance(i, j) = v[next++];
+      state.covariance(j, i) = state.covariance(i, j);
+    }
+  }
+  return true;
+}
+
+constexpr std::array<const char*, kFigures> kFigureNames = {
+    "health",         "epoch",        "at_rest",          "tracks",       "landmarks", "inliers_mono",
+    "inliers_stereo", "track_length", "reprojection_rms", "imu_residual", "iterations"};
+
+/// What stands behind the covariances, in the order of statesRow(). Gives the first of kFigureNames that is
+/// wrong, or their number.
+std::size_t readFigures(const CsvReader& csv, KeyframeState& keyframe) {
+  if (!readHealth(csv.field(kNumbers), keyframe.state.health)) return 0;
+  std::array<double, kFigures - 1> v{};
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    if (!parseDouble(csv.field(kNumbers + 1 + i), v[i]) || !std::isfinite(v[i])) return 1 + i;
+  }
+  keyframe.state.epoch = static_cast<std::uint32_t>(v[0]);
+  FrameStatistics& figures = keyframe.statistics;
+  figures.keyframe = true;
+  figures.at_rest = v[1] != 0;
+  figures.tracks = static_cast<int>(v[2]);
+  figures.landmarks = static_cast<int>(v[3]);
+  figures.inliers_mono = static_cast<int>(v[4]);
+  figures.inliers_stereo = static_cast<int>(v[5]);
+  figures.track_length = v[6];
+  figures.reprojection_rms = v[7];
+  figures.imu_residual = v[8];
+  figures.iterations = static_cast<int>(v[9]);
+  return kFigures;
 }
 
 }  // namespace
@@ -93,34 +137,21 @@ std::vector<StoredState> readStates(const std::string& path) {
   LogCounters counters;
   LogWarnings warnings;
   CsvReader csv(path, CsvReader::Separator::kComma, counters, warnings);
-  constexpr std::size_t kNumbers = kFirstCovariance + kCovariances;
-  std::array<const char*, kNumbers - 1> names{};
-  names.fill("state or covariance");
-  std::array<double, kNumbers - 1> v{};
   std::vector<StoredState> states;
   while (csv.next(kNumbers)) {
+    KeyframeState keyframe;
+    double norm = 0;
+    if (!readState(csv, keyframe.state, norm)) continue;
     StoredState state;
-    if (!parseNanoseconds(csv.field(0), state.stamp)) {
-      csv.reject("timestamp", "not a stamp in ns");
-      continue;
-    }
-    if (!csv.numbers(1, names, v.data())) continue;
-    state.T_world_body = SE3(Eigen::Quaterniond(v[3], v[4], v[5], v[6]), {v[0], v[1], v[2]});
-    state.v_world_body = {v[7], v[8], v[9]};
-    state.bias_gyro = {v[10], v[11], v[12]};
-    state.bias_accel = {v[13], v[14], v[15]};
-    for (int i = 0; i < kStateDim; ++i) {
-      state.variances[i] = v[kFirstVariance - 1 + static_cast<std::size_t>(i)];
-    }
-    readFigures(csv, state);
-    std::size_t next = kFirstCovariance - 1;
-    for (int i = 0; i < kPoseDim; ++i) {
-      state.covariance(i, i) = v[kFirstVariance - 1 + static_cast<std::size_t>(i)];
-      for (int j = i + 1; j < kPoseDim; ++j) {
-        state.covariance(i, j) = v[next++];
-        state.covariance(j, i) = state.covariance(i, j);
-      }
-    }
+    state.stamp = keyframe.state.stamp;
+    state.T_world_body = keyframe.state.T_world_body;
+    state.v_world_body = keyframe.state.v_world_body;
+    state.bias_gyro = keyframe.state.bias_gyro;
+    state.bias_accel = keyframe.state.bias_accel;
+    state.covariance = keyframe.state.covariance.topLeftCorner<kPoseDim, kPoseDim>();
+    state.variances = keyframe.state.covariance.diagonal();
+    state.has_figures = readFigures(csv, keyframe) == kFigures;
+    if (state.has_figures) state.figures = keyframe.statistics;
     states.push_back(state);
   }
   csv.finish("states", "Give a states.csv that `swiftlet replay` wrote");
@@ -128,78 +159,23 @@ std::vector<StoredState> readStates(const std::string& path) {
   return states;
 }
 
-namespace {
-
-bool readHealth(std::string_view name, Health& health) {
-  for (const Health candidate : {Health::kInitializing, Health::kGood, Health::kDegraded, Health::kFailed}) {
-    if (healthName(candidate) != name) continue;
-    health = candidate;
-    return true;
-  }
-  return false;
-}
-
-/// What stands behind the covariances, in the order of statesRow().
-bool readFigures(CsvReader& csv, std::size_t first, KeyframeState& keyframe) {
-  if (!readHealth(csv.field(first), keyframe.state.health)) {
-    csv.reject("health", quoteInput(csv.field(first)) + " is no health");
-    return false;
-  }
-  constexpr std::array<const char*, kFigures - 1> kNames = {
-      "epoch",          "at_rest",      "tracks",           "landmarks",    "inliers_mono",
-      "inliers_stereo", "track_length", "reprojection_rms", "imu_residual", "iterations"};
-  std::array<double, kNames.size()> v{};
-  if (!csv.numbers(first + 1, kNames, v.data())) return false;
-  keyframe.state.epoch = static_cast<std::uint32_t>(v[0]);
-  FrameStatistics& figures = keyframe.statistics;
-  figures.keyframe = true;
-  figures.at_rest = v[1] != 0;
-  figures.tracks = static_cast<int>(v[2]);
-  figures.landmarks = static_cast<int>(v[3]);
-  figures.inliers_mono = static_cast<int>(v[4]);
-  figures.inliers_stereo = static_cast<int>(v[5]);
-  figures.track_length = v[6];
-  figures.reprojection_rms = v[7];
-  figures.imu_residual = v[8];
-  figures.iterations = static_cast<int>(v[9]);
-  return true;
-}
-
-}  // namespace
-
 std::vector<KeyframeState> readKeyframes(const std::string& path) {
-  constexpr std::size_t kNumbers = kFirstCovariance + kCovariances;
   LogCounters counters;
   LogWarnings warnings;
   CsvReader csv(path, CsvReader::Separator::kComma, counters, warnings);
-  std::array<const char*, kNumbers - 1> names{};
-  names.fill("state or covariance");
-  std::array<double, kNumbers - 1> v{};
   std::vector<KeyframeState> keyframes;
   while (csv.next(kNumbers + kFigures)) {
     KeyframeState keyframe;
-    NavState& state = keyframe.state;
-    if (!parseNanoseconds(csv.field(0), state.stamp)) {
-      csv.reject("timestamp", "not a stamp in ns");
+    double norm = 0;
+    if (!readState(csv, keyframe.state, norm)) break;
+    if (const std::size_t wrong = readFigures(csv, keyframe); wrong < kFigures) {
+      const std::string text = quoteInput(csv.field(kNumbers + wrong));
+      csv.reject(kFigureNames[wrong], text + (wrong == 0 ? " is no health" : " is not a finite number"));
       break;
     }
-    if (!csv.numbers(1, names, v.data()) || !readFigures(csv, kNumbers, keyframe)) break;
-    const Eigen::Quaterniond q(v[3], v[4], v[5], v[6]);
-    if (!(std::abs(q.norm() - 1) < 1e-6)) {
-      csv.reject("quaternion", fmt::format("its norm is {:.4g}, not 1", q.norm()));
+    if (!(std::abs(norm - 1) < kUnit)) {
+      csv.reject("quaternion", fmt::format("its norm is {:.4g}, not 1", norm));
       break;
-    }
-    state.T_world_body = SE3(q, {v[0], v[1], v[2]});
-    state.v_world_body = {v[7], v[8], v[9]};
-    state.bias_gyro = {v[10], v[11], v[12]};
-    state.bias_accel = {v[13], v[14], v[15]};
-    std::size_t next = kFirstVariance - 1;
-    for (int i = 0; i < kStateDim; ++i) state.covariance(i, i) = v[next++];
-    for (int i = 0; i < kPoseDim; ++i) {
-      for (int j = i + 1; j < kPoseDim; ++j) {
-        state.covariance(i, j) = v[next++];
-        state.covariance(j, i) = state.covariance(i, j);
-      }
     }
     keyframes.push_back(keyframe);
   }
