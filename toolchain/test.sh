@@ -22,7 +22,7 @@ fuzz_seconds=15 # each fuzzer
 # Unit tests that run under sanitizers too; the statistical ones (imu, ransac, whole flights, rendering, the program)
 # repeat the same code thousands of times and would take most of an hour there.
 sanitized='core geometry camera frontend smoother drivers_calibration drivers_recorded drivers_recording drivers_image_decoder
-drivers_can drivers_device drivers_gpio drivers_mavlink drivers_serial drivers_v4l2 map mesher threaded'
+drivers_can drivers_device drivers_gpio drivers_mavlink drivers_serial drivers_v4l2 fault_timeline live map mesher threaded'
 # What shares memory between threads, the devices' threads, and the whole executor on a second of a log.
 threads='core realtime live threaded'
 jobs=$(nproc)
@@ -121,9 +121,9 @@ if [ $quick = no ]; then
   # shellcheck disable=SC2086 # a list of targets
   step "configure with sanitizers" configure asan -DSWIFTLET_BUILD_TESTS=ON &&
     step "build with sanitizers" build asan --target fuzzers $(echo $sanitized | sed 's/\([^ ]*\)/test_\1/g') && {
-    step "tests with sanitizers" run_ctest asan -R "^($(echo $sanitized | tr ' ' '|'))\$"
-    step "fuzzers" counted toolchain/fuzz.sh $fuzz_seconds
-  }
+      step "tests with sanitizers" run_ctest asan -R "^($(echo $sanitized | tr ' ' '|'))\$"
+      step "fuzzers" counted toolchain/fuzz.sh $fuzz_seconds
+    }
   # shellcheck disable=SC2086 # a list of targets
   step "configure for data races" configure tsan -DSWIFTLET_BUILD_TESTS=ON &&
     step "build for data races" build tsan --target $(echo $threads | sed 's/\([^ ]*\)/test_\1/g') &&

@@ -167,8 +167,24 @@ class Checker {
   }
   [[nodiscard]] Duration played() const { return time(e_.last_image); }
 
+  /// Faults of one kind that run into each other are one to who reads: told when the first begins.
+  [[nodiscard]] Duration beginOfChain(const PlannedFault& fault) const {
+    Duration begin = fault.begin;
+    for (bool grew = true; grew;) {
+      grew = false;
+      for (const PlannedFault& other : e_.faults.faults()) {
+        if (other.device != fault.device || other.kind != fault.kind) continue;
+        if (other.begin >= begin || other.begin + other.length < begin) continue;
+        begin = other.begin;
+        grew = true;
+      }
+    }
+    return begin;
+  }
+
   void checkTold(const PlannedFault& fault) {
     const std::optional<Duration> after = toldAfter(fault);
+    const Duration from = beginOfChain(fault);
     const FaultStretch shown = longestVisible(fault, e_.faults);
     Duration until = shown.end + kToldWithin;
     // A step that nobody hears shows when the sensor is heard again.
@@ -178,7 +194,7 @@ class Checker {
     const std::string device = deviceStart(fault.device);
     for (const HilEvidence::Line& line : e_.remarks) {
       const Duration at = time(line.stamp);
-      if (at < fault.begin || at > until || !line.text.starts_with(device)) continue;
+      if (at < from || at > until || !line.text.starts_with(device)) continue;
       const bool says = std::ranges::any_of(wordsOf(fault.kind), [&](std::string_view word) {
         return line.text.find(word) != std::string::npos;
       });
@@ -189,7 +205,7 @@ class Checker {
     add("told: " + faultName(fault), false, "",
         fmt::format(
             "no line of events.log from {:.2f} to {:.2f} s names the device, what it does and the remedy",
-            fault.begin.seconds(), until.seconds()));
+            from.seconds(), until.seconds()));
   }
 
   /// The lines of a device end with one that ends what stood.

@@ -168,6 +168,15 @@ TEST_CASE("What a device cannot show need not be told", "[hil]") {
   CHECK(stall.length() == Duration::fromSeconds(1.5));
 }
 
+TEST_CASE("Faults of one kind that run into each other are told once", "[hil]") {
+  HilEvidence evidence = flight("3,imu,unplug,1.5\n4,imu,unplug,2\n", 3, 6.6);
+  evidence.remarks = {{at(3.01), "IMU (/run/imu, bridge): gone; connect it again"}, kBack};
+  CHECK_FALSE(fails(evidence, "told: imu unplug at 4.000 s"));
+  // With a pause between them the second is another.
+  evidence.faults = FaultTimeline::parse("faults", "3,imu,unplug,0.5\n4,imu,unplug,2\n");
+  CHECK(fails(evidence, "told: imu unplug at 4.000 s"));
+}
+
 TEST_CASE("The checks as JUnit are XML that says what failed", "[hil]") {
   HilEvidence evidence = stalled();
   evidence.remarks = {kBack};
