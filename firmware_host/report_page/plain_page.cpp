@@ -191,10 +191,12 @@ std::string htmlText(const std::string& text) {
 
 std::string svgPlot(const Plot& plot) {
   const Frame frame(plot);
+  const std::string unit = plot.kind == PlotKind::kPlan ? ", up: " + plot.y_label
+                           : plot.y_label.empty()       ? ""
+                                                        : " [" + plot.y_label + "]";
   std::string svg = fmt::format(
       R"(<svg id="{}" viewBox="0 0 {} {}" width="{}" height="{}"><text class="title" x="{}" y="14">{}</text>)",
-      htmlText(plot.id), kWidth, kHeight, kWidth, kHeight, kLeft,
-      htmlText(plot.title + (plot.y_label.empty() ? "" : " [" + plot.y_label + "]")));
+      htmlText(plot.id), kWidth, kHeight, kWidth, kHeight, kLeft, htmlText(plot.title + unit));
   svg += frame.axes();
   const bool columns = plot.kind == PlotKind::kHistogram;
   double legend = kWidth - kRight;
@@ -227,9 +229,9 @@ std::string plainPage(const std::vector<ReportedRun>& runs) {
       "system-ui,sans-serif}svg .title{font-weight:600}table{border-collapse:collapse}td,th{padding:2px "
       "10px;text-align:left;border-bottom:1px solid #ddd}.missing{background:#fff2d8;padding:4px 8px}"
       "</style></head><body>\n<h1>swiftlet report</h1>\n"
-      "<p class=\"missing\">The page's program was not built (it needs npm): this report has tables and "
-      "fixed "
-      "plots only, without the 3D view.</p>\n";
+      "<p class=\"missing\">This is a plain report: tables and fixed plots, no 3D view. A program that was "
+      "built "
+      "where npm is at hand makes the full one.</p>\n";
   if (runs.size() == 2) {
     html += "<h2>Differences</h2>\n";
     for (const Table& table : differencesOf(runs[0].view, runs[1].view)) html += tableHtml(table);

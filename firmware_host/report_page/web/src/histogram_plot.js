@@ -6,6 +6,12 @@ import { bounds, floats } from './columns.js';
 
 const kStep = 10 ** (1 / 20); // summary.json has 20 columns a decade
 
+/** 1, 2 or 5 times a power of ten. */
+function isRound(value) {
+  const mantissa = value / 10 ** Math.floor(Math.log10(value) + 1e-9);
+  return [1, 2, 5].some((round) => Math.abs(mantissa - round) < 1e-6);
+}
+
 export class HistogramPlot {
   constructor(plot, host, width, height, key, shared) {
     this.shared = shared;
@@ -23,7 +29,13 @@ export class HistogramPlot {
           y: { distr: 3, range: () => [0.5, 1.5 * Math.max(2, this.most)] },
         },
         axes: [
-          { label: plot.x_label, size: 34, ...font },
+          {
+            label: plot.x_label,
+            size: 34,
+            ...font,
+            filter: (_, splits) => splits,
+            values: (_, splits) => splits.map((v) => (isRound(v) ? String(Number(v.toPrecision(1))) : '')),
+          },
           { label: plot.y_label, size: 58, ...font, values: (_, splits) => splits.map((v) => (v >= 1 && Number.isInteger(Math.log10(v)) ? String(v) : '')) },
         ],
         series: [

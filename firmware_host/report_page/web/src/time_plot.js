@@ -33,6 +33,14 @@ export function spreadZoom(key) {
 
 const shown = (value) => (value == null ? '' : Number(value).toPrecision(4));
 
+/** Around what there is; what differs by less than a thousandth of itself is a straight line. */
+function range(_, low, high) {
+  if (low == null) return [0, 1];
+  const size = Math.max(Math.abs(low), Math.abs(high));
+  if (high - low >= 1e-3 * size && high > low) return uPlot.rangeNum(low, high, 0.1, true);
+  return [low - 0.05 * (size || 1), high + 0.05 * (size || 1)];
+}
+
 export class TimePlot {
   constructor(plot, host, width, height, key, shared) {
     const wide = shared && 0.05 * (shared.y[1] - shared.y[0] || 1);
@@ -69,7 +77,7 @@ export class TimePlot {
         bands,
         scales: {
           x: { time: false },
-          y: shared ? { range: [shared.y[0] - wide, shared.y[1] + wide] } : {},
+          y: { range: shared ? [shared.y[0] - wide, shared.y[1] + wide] : range },
         },
         axes: [
           { label: plot.x_label, labelSize: 18, size: 34, font: '11px system-ui', labelFont: '11px system-ui' },
