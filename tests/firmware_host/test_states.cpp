@@ -25,6 +25,7 @@ KeyframeState randomKeyframe(std::int64_t ns, Random& random) {
   keyframe.state.v_world_body = v();
   keyframe.state.bias_gyro = 0.01 * v();
   keyframe.state.bias_accel = 0.1 * v();
+  keyframe.statistics = {true, true, static_cast<int>(ns % 200), 300, 11, 140, 7.125, 0.75, 1.5, 3};
   Matrix15d root;
   for (int i = 0; i < kStateDim; ++i) {
     for (int j = 0; j < kStateDim; ++j) root(i, j) = 0.01 * random.normal();
@@ -57,6 +58,17 @@ TEST_CASE("states.csv keeps pose and covariance to the last digit") {
     CHECK(states[i].stamp == state.stamp);
     CHECK(states[i].covariance == state.covariance.topLeftCorner<6, 6>());
     CHECK(states[i].T_world_body.translation == state.T_world_body.translation);
+    CHECK(states[i].v_world_body == state.v_world_body);
+    CHECK(states[i].bias_gyro == state.bias_gyro);
+    CHECK(states[i].bias_accel == state.bias_accel);
+    CHECK(states[i].variances == state.covariance.diagonal());
+    REQUIRE(states[i].has_figures);
+    CHECK(states[i].figures.tracks == written[i].statistics.tracks);
+    CHECK(states[i].figures.inliers_stereo == written[i].statistics.inliers_stereo);
+    CHECK(states[i].figures.track_length == Approx(written[i].statistics.track_length));
+    CHECK(states[i].figures.reprojection_rms == Approx(written[i].statistics.reprojection_rms));
+    CHECK(states[i].figures.imu_residual == Approx(written[i].statistics.imu_residual));
+    CHECK(states[i].figures.iterations == written[i].statistics.iterations);
     CHECK(states[i].T_world_body.rotation.angularDistance(state.T_world_body.rotation) < 1e-15);
     // The first 17 columns are EuRoC's.
     CHECK(trajectory[i].stamp == state.stamp);
