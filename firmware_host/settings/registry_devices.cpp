@@ -66,7 +66,8 @@ std::vector<Setting> deviceSettings() {
        "docs/ros2.md; "
        "for builds with SWIFTLET_WITH_DDS.",
        onOff(kRos2, &Ros2Group::enabled)},
-      {"ros2.domain", "", "ROS_DOMAIN_ID.", integer(kRos2, &Ros2Group::domain, 0, 232)},
+      {"ros2.domain", "", "The ROS_DOMAIN_ID of those who listen.",
+       integer(kRos2, &Ros2Group::domain, 0, 232)},
       {"ros2.interface", "", "Network interface to publish on; lo: this computer alone.",
        TextSetting{member(kRos2, &Ros2Group::interface), "an interface as lo or eth0"}},
       {"ros2.odometry_hz", "Hz", "Most states per second that are published.",

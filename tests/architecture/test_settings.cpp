@@ -82,7 +82,7 @@ TEST_CASE("every setting is explained") {
   for (const swiftlet::Setting& setting : swiftlet::settingsRegistry()) {
     INFO(setting.key);
     CHECK(keys.insert(std::string(setting.key)).second);
-    CHECK(std::regex_match(std::string(setting.key), std::regex("[a-z_]+\\.[a-z0-9_]+")));
+    CHECK(std::regex_match(std::string(setting.key), std::regex("[a-z0-9_]+\\.[a-z0-9_]+")));
     CHECK(setting.doc.size() > 20);
     CHECK(setting.doc.ends_with('.'));
     CHECK(!swiftlet::rangeText(setting).empty());

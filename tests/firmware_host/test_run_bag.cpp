@@ -2,6 +2,8 @@
 
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
+#include <algorithm>
+#include <tuple>
 
 #include <cstdlib>
 #include <iomanip>
