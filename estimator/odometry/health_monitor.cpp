@@ -6,7 +6,6 @@ namespace swiftlet {
 namespace {
 
 constexpr int kSettlingImages = 10;
-constexpr int kNominalSightings = 25;  // fewer: degraded
 // Coasting position error grows with the cube of time: after 3 s it is metres.
 constexpr double kCoastLimit = 3.0;  // s
 

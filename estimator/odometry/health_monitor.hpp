@@ -21,10 +21,12 @@ class HealthMonitor {
  public:
   /// s without an accepted image before "good" ends.
   static constexpr double kGoodAge = 0.3;
-  /// s without an accepted image after which a new epoch begins.
+  /// s without an accepted image after which a new epoch begins, unless the image shows what is known.
   static constexpr double kLongCoast = 1.0;
   /// A frame with fewer accepted sightings is not accepted.
   static constexpr int kMinSightings = 8;
+  /// With fewer it is not good.
+  static constexpr int kNominalSightings = 25;
 
   void reset();
 

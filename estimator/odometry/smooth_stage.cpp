@@ -97,7 +97,11 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
   Status status = smoother_.step(input);
   if (status.ok()) {
     trim_due_ = true;
-    if (blind > HealthMonitor::kLongCoast && sees) {
+    const FrameStatistics& figures = smoother_.statistics();
+    // Landmarks of before that are found again tie the image to the past, if not a few; new ones have no say
+    // yet.
+    const bool recognizes = figures.inliers_mono + figures.inliers_stereo >= HealthMonitor::kNominalSightings;
+    if (blind > HealthMonitor::kLongCoast && sees && !recognizes) {
       watch_.watchBlackout(tracked.stamp, blind, events_);
       status = restartFromCoast(input);
     }

@@ -2,14 +2,14 @@
 
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
-#include <algorithm>
-#include <tuple>
 
+#include <algorithm>
 #include <cstdlib>
 #include <iomanip>
 #include <map>
 #include <set>
 #include <sstream>
+#include <tuple>
 
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/export/bag_messages.hpp"
