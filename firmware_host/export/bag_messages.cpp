@@ -170,12 +170,12 @@ BagDiagnostics bagDiagnostics(const KeyframeState& keyframe) {
   return diagnostics;
 }
 
-BagDiagnostics bagDiagnostics(const RunEvent& event, const std::string& health) {
+BagDiagnostics bagDiagnostics(const EventLine& event, const std::string& health) {
   BagStatus status = statusOf("swiftlet/health", levelOf(health), health);
   BagStatus what = statusOf("swiftlet/event", BagStatus::OK,
-                            event.value.empty() ? event.name : event.name + " " + event.value);
+                            event.text.empty() ? event.name : event.name + " " + event.text);
   add(what, "event", event.name);
-  add(what, "value", event.value);
+  add(what, "value", event.text);
   BagDiagnostics diagnostics;
   diagnostics.header = bagHeader(event.stamp, "");
   diagnostics.status.push_back(status);

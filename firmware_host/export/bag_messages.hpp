@@ -60,6 +60,6 @@ BagVector bagVector(Stamp stamp, const std::string& frame, const Eigen::Vector3d
 BagMarker bagMarker(Stamp stamp, const std::string& frame, const std::string& name, const TriangleMesh& mesh);
 BagDiagnostics bagDiagnostics(const KeyframeState& keyframe);
 /// The event, and the health as it then is.
-BagDiagnostics bagDiagnostics(const RunEvent& event, const std::string& health);
+BagDiagnostics bagDiagnostics(const EventLine& event, const std::string& health);
 
 }  // namespace swiftlet

@@ -130,8 +130,8 @@ class RunBag {
 
   void planEvents() {
     std::string health(healthName(Health::kInitializing));
-    for (const RunEvent& event : run_.events) {
-      if (event.name == eventName(EventKind::kHealthChanged)) health = event.value;
+    for (const EventLine& event : run_.events) {
+      if (event.name == eventName(EventKind::kHealthChanged)) health = event.text;
       at(event.stamp, pathOf("events.log"), "/diagnostics",
          [&event, health] { return bagDiagnostics(event, health); });
     }

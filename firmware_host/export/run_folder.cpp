@@ -7,9 +7,8 @@
 #include <optional>
 
 #include "drivers/calibration/input_error.hpp"
-#include "drivers/recorded/csv_reader.hpp"
-#include "drivers/recorded/parse_number.hpp"
 #include "firmware_host/evaluation/association.hpp"
+#include "firmware_host/report/events_log.hpp"
 #include "firmware_host/report/states_csv.hpp"
 
 namespace swiftlet {
@@ -65,31 +64,6 @@ void sortKeyframes(std::vector<KeyframeState>& keyframes, const fs::path& file) 
 
 }  // namespace
 
-std::vector<RunEvent> readEvents(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(path, 0, "", "cannot be read", "Give the whole run folder");
-  std::vector<RunEvent> events;
-  std::string line;
-  for (int number = 1; std::getline(file, line); ++number) {
-    if (line.empty()) continue;
-    const std::size_t first = line.find(' ');
-    RunEvent event;
-    if (!parseSeconds(line.substr(0, first), event.stamp)) {
-      throw InputError(path, number, "stamp", quoteInput(line.substr(0, first)) + " is not a time in seconds",
-                       "A line is `seconds event value`. Replay again, or delete the line");
-    }
-    const std::size_t second = first == std::string::npos ? first : line.find(' ', first + 1);
-    if (first != std::string::npos) event.name = line.substr(first + 1, second - first - 1);
-    if (event.name.empty()) {
-      throw InputError(path, number, "event", "missing behind the stamp",
-                       "A line is `seconds event value`. Replay again, or delete the line");
-    }
-    if (second != std::string::npos) event.value = line.substr(second + 1);
-    events.push_back(std::move(event));
-  }
-  return events;
-}
-
 RunFolder readRunFolder(const std::string& path) {
   const fs::path folder(path);
   if (!fs::is_directory(folder)) {
@@ -109,7 +83,7 @@ RunFolder readRunFolder(const std::string& path) {
     requireFile(folder / "events.log");
     run.keyframes = readKeyframes(folder / "states.csv");
     sortKeyframes(run.keyframes, folder / "states.csv");
-    run.events = readEvents(folder / "events.log");
+    run.events = readEvents((folder / "events.log").string());
     run.imu_rate = readIfThere(folder / "imu_rate.tum");
     run.map = readIfThere(folder / "map.tum");
   }

@@ -11,16 +11,10 @@
 
 #include "drivers/recorded/trajectory_file.hpp"
 #include "estimator/messages/odometry_output.hpp"
+#include "firmware_host/report/events_log.hpp"
 #include "firmware_host/report/mesh_frames.hpp"
 
 namespace swiftlet {
-
-/// A line of events.log.
-struct RunEvent {
-  Stamp stamp;
-  std::string name;   ///< as eventName() has it, or "remark"
-  std::string value;  ///< the rest of the line
-};
 
 struct RunFolder {
   std::string path;
@@ -30,7 +24,7 @@ struct RunFolder {
   Trajectory imu_rate;                   ///< empty: none
   Trajectory map;                        ///< T_map_body; empty: none
   std::vector<KeyframeState> keyframes;  ///< readKeyframes(); in time order
-  std::vector<RunEvent> events;          ///< in the file's order
+  std::vector<EventLine> events;         ///< in the file's order
   std::vector<MeshFrame> meshes;         ///< of meshes/frames.csv
   std::string local_mesh;                ///< path; empty: none
   std::string map_mesh;                  ///< path; empty: none
@@ -39,9 +33,6 @@ struct RunFolder {
 };
 
 RunFolder readRunFolder(const std::string& path);
-
-/// events.log. InputError names file and line.
-std::vector<RunEvent> readEvents(const std::string& path);
 
 /// `T_map_world` at the odometry's stamps, from map.tum: between two keyframes the body's place and the
 /// rotation are interpolated, outside the nearest holds. The identity everywhere without a map, or when no

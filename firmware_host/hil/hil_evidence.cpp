@@ -23,13 +23,8 @@ struct HealthChange {
   std::uint32_t epoch = 0;
 };
 
-Health healthOf(const std::string& name) {
-  constexpr std::array<Health, 4> kAll = {Health::kInitializing, Health::kGood, Health::kDegraded,
-                                          Health::kFailed};
-  const auto found = std::ranges::find(kAll, name, healthName);
-  // A word from another version is no praise.
-  return found == kAll.end() ? Health::kFailed : *found;
-}
+/// A word from another version is no praise.
+Health healthOf(const std::string& name) { return healthNamed(name).value_or(Health::kFailed); }
 
 Json readJson(const fs::path& path) {
   std::ifstream file(path);
@@ -83,7 +78,8 @@ std::vector<HealthChange> readChanges(const fs::path& path) {
 
 std::vector<HilEvidence::Line> readRemarks(const fs::path& path) {
   std::vector<HilEvidence::Line> remarks;
-  for (const EventLine& line : readEvents(path.string())) {
+  std::size_t skipped = 0;
+  for (const EventLine& line : readEvents(path.string(), &skipped)) {
     if (line.name == kRemarkName) remarks.push_back({line.stamp, line.text});
   }
   return remarks;

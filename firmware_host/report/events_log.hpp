@@ -14,12 +14,12 @@ inline constexpr std::string_view kRemarkName = "remark";
 
 struct EventLine {
   Stamp stamp;
-  std::string name;
+  std::string name;  ///< as eventName() has it, or "remark"
   std::string text;  ///< the rest of the line
 };
 
-/// In the file's order; lines without a stamp are left out and counted in `skipped`. InputError when the file
-/// cannot be read.
+/// In the file's order. InputError when the file cannot be read, and on a line without stamp or name: where
+/// `skipped` is given such lines are left out and counted in it instead.
 std::vector<EventLine> readEvents(const std::string& path, std::size_t* skipped = nullptr);
 
 }  // namespace swiftlet

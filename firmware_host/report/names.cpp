@@ -16,6 +16,13 @@ std::string_view healthName(Health health) {
   return "unknown";
 }
 
+std::optional<Health> healthNamed(std::string_view name) {
+  for (const Health health : {Health::kInitializing, Health::kGood, Health::kDegraded, Health::kFailed}) {
+    if (healthName(health) == name) return health;
+  }
+  return std::nullopt;
+}
+
 std::string_view eventName(EventKind kind) {
   switch (kind) {
     case EventKind::kImuGap:

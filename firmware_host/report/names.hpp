@@ -1,6 +1,7 @@
 #pragma once
 // Words for the enumerations of the messages, as they stand in files.
 
+#include <optional>
 #include <string_view>
 
 #include "estimator/messages/odometry_output.hpp"
@@ -8,6 +9,8 @@
 namespace swiftlet {
 
 std::string_view healthName(Health health);
+/// None: no word of these.
+std::optional<Health> healthNamed(std::string_view name);
 std::string_view eventName(EventKind kind);
 
 }  // namespace swiftlet

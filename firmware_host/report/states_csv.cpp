@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "drivers/recorded/csv_reader.hpp"
 #include "drivers/recorded/parse_number.hpp"
@@ -25,15 +26,6 @@ void append(std::string& row, double value) { row += fmt::format(",{:.17g}", val
 
 void append(std::string& row, const Eigen::Vector3d& v) {
   for (const double x : v) append(row, x);
-}
-
-bool readHealth(std::string_view name, Health& health) {
-  for (const Health candidate : {Health::kInitializing, Health::kGood, Health::kDegraded, Health::kFailed}) {
-    if (healthName(candidate) != name) continue;
-    health = candidate;
-    return true;
-  }
-  return false;
 }
 
 /// The row up to the covariances, and its quaternion's norm; false: rejected.
@@ -70,11 +62,13 @@ constexpr std::array<const char*, kFigures> kFigureNames = {
 /// What stands behind the covariances, in the order of statesRow(). Gives the first of kFigureNames that is
 /// wrong, or their number.
 std::size_t readFigures(const CsvReader& csv, KeyframeState& keyframe) {
-  if (!readHealth(csv.field(kNumbers), keyframe.state.health)) return 0;
+  const std::optional<Health> health = healthNamed(csv.field(kNumbers));
+  if (!health) return 0;
   std::array<double, kFigures - 1> v{};
   for (std::size_t i = 0; i < v.size(); ++i) {
     if (!parseDouble(csv.field(kNumbers + 1 + i), v[i]) || !std::isfinite(v[i])) return 1 + i;
   }
+  keyframe.state.health = *health;
   keyframe.state.epoch = static_cast<std::uint32_t>(v[0]);
   FrameStatistics& figures = keyframe.statistics;
   figures.keyframe = true;
