@@ -1,7 +1,6 @@
 #include "firmware_host/hil/hil_evidence.hpp"
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>

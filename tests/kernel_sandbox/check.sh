@@ -4,20 +4,9 @@ set -u
 run=$(cd "$(dirname "$0")/../.." && pwd)/toolchain/kernel_sandbox/run.sh
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
+. "$(dirname "$0")/checks.sh"
 cd "$folder" || exit 1
-failed=0
 
-check() { # what, condition...
-  local what=$1
-  shift
-  if "$@"; then
-    echo "ok    $what"
-  else
-    echo "FAIL  $what"
-    failed=$((failed + 1))
-    return 1
-  fi
-}
 left_behind() { # folders of jobs, and kernels whose files lie in our temporary folder
   find "$folder" -maxdepth 1 -name 'swiftlet_sandbox.*'
   grep -lsz "[u]ml_dir=$folder/" /proc/[0-9]*/cmdline

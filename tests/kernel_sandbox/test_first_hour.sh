@@ -17,17 +17,8 @@ if [ "${SWIFTLET_SANDBOX:-}" != 1 ]; then
   exit
 fi
 
-failed=0
-check() { # what, condition...
-  local what=$1
-  shift
-  if "$@"; then
-    echo "ok    $what"
-  else
-    echo "FAIL  $what"
-    failed=$((failed + 1))
-  fi
-}
+. "$(dirname "$0")/checks.sh"
+
 play() { # seconds of the log; plays to whom opens the IMU, until the log's end
   "$program" hil "$log" --settings vehicle.yaml --out "hil_$1" --seconds "$1" --lead 0 --patience 60 >hil.txt 2>&1 &
   player=$!
