@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "firmware_host/dds/dds_thread.hpp"
+#include "firmware_host/commands/live_consumers.hpp"
 #include "firmware_host/pipeline/arming_monitor.hpp"
 #include "firmware_host/realtime/machine_report.hpp"
 #include "firmware_host/realtime/memory_lock.hpp"
@@ -59,14 +59,8 @@ bool flyThreaded(const Calibration& calibration, SensorInput& input, const Setti
   wanted.track_effort = &governors.track;
   wanted.smooth_effort = &governors.smooth;
   wanted.arming = &arming;
-  std::unique_ptr<LiveOutlet> outlet;
-  std::unique_ptr<DdsThread> ros2;
-  if (settings.ros2.enabled) {
-    outlet = std::make_unique<LiveOutlet>();
-    wanted.outlet = outlet.get();
-    ros2 = std::make_unique<DdsThread>(
-        *outlet, DdsThreadOptions{settings.ros2, request.host_stamps ? realtimeOffset() : Duration{0}});
-  }
+  LiveConsumers consumers(settings, request);
+  wanted.outlets = consumers.outlets();
   const auto wiring = std::make_unique<Wiring>(calibration.rig, calibration.noise, settings, log, wanted);
   reserveHeap(kHeapReserve);
   MemoryTable reserved;
@@ -106,7 +100,7 @@ bool flyThreaded(const Calibration& calibration, SensorInput& input, const Setti
     arming.begin(ground);
   };
   const ThreadedReport threads = runThreaded(input, *wiring, options, control);
-  if (ros2) report["ros2"] = ros2->finish();
+  consumers.finish(report);
   if (lock.current) unlockMemory();
   log.collect(*wiring);
 

@@ -100,7 +100,7 @@ class DdsThread::Work {
     const std::uint64_t number = outlet_.state.refresh();
     if (number == state_) return;
     state_ = number;
-    const NavState& state = outlet_.state.value();
+    const NavState& state = outlet_.state.value().state;
     if (state.health == Health::kFailed) return;  // no pose to be had by it
     DdsOdometry odometry;
     odometry.stamp = ros(state.stamp);

@@ -1,19 +1,27 @@
 #pragma once
-// The newest of what a run finds, for one thread outside of the wiring (ROS 2's topics): it takes what is
-// newest at its own pace and nobody waits for it. Written where Wiring::Options names it. Memory: three of
-// each value.
+// The newest of what a run finds, for one thread outside of the wiring (ROS 2's topics, an autopilot, the
+// live view): it takes what is newest at its own pace and nobody waits for it. Written where Wiring::Options
+// names it. Memory: three of each value.
 
 #include <atomic>
 #include <cstdint>
 #include <vector>
 
+#include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/newest.hpp"
 #include "estimator/messages/local_mesh.hpp"
 #include "estimator/messages/odometry_output.hpp"
+#include "firmware_host/realtime/ready_to_arm.hpp"
 #include "mapping/loop/loop_report.hpp"
 #include "mapping/surface/surface_patch.hpp"
 
 namespace swiftlet {
+
+/// The state propagated to an IMU sample.
+struct StateNews {
+  NavState state;
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  ///< of that sample, without bias [rad/s]
+};
 
 /// A frame that was smoothed, or waits to be.
 struct FrameNews {
@@ -36,12 +44,16 @@ struct SurfaceNews {
 };
 
 struct LiveOutlet {
-  Newest<NavState> state;            ///< of `propagate`: at every IMU sample
+  Newest<StateNews> state;           ///< of `propagate`: at every IMU sample
   Newest<FrameNews> frame;           ///< of `smooth`
   Newest<LocalMesh> mesh;            ///< of `mesh`: over the horizon
   Newest<MapCorrection> correction;  ///< of `loop`
   Newest<SurfaceNews> surface;       ///< of `map`, each time that surface_wanted is set
   std::atomic<bool> surface_wanted{false};
+  Newest<ArmingVerdict> arming;  ///< of `log`: each time that what is missing changes
 };
+
+/// One for each thread that listens.
+using LiveOutlets = FixedVector<LiveOutlet*, 4>;
 
 }  // namespace swiftlet

@@ -60,7 +60,7 @@ Wiring::Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, 
       log_(log),
       recorder_(options.recorder),
       arming_(options.arming),
-      outlet_(options.outlet),
+      outlets_(options.outlets),
       full_effort_(settings.effort),
       track_effort_(options.track_effort != nullptr ? options.track_effort : &full_effort_),
       smooth_effort_(options.smooth_effort != nullptr ? options.smooth_effort : &full_effort_),
@@ -168,9 +168,13 @@ bool Wiring::propagate() {
     return false;
   }
   const Status status =
-      propagation_.step(arrival->sample, states_ || outlet_ != nullptr ? &propagating_.state : nullptr);
+      propagation_.step(arrival->sample, states_ || !outlets_.empty() ? &propagating_.state : nullptr);
   if (states_ && status.ok()) static_cast<void>(states_->tryPush(propagating_.state));
-  if (outlet_ != nullptr && status.ok()) outlet_->state.write(propagating_.state);
+  if (status.ok()) {
+    for (LiveOutlet* outlet : outlets_) {
+      outlet->state.write({propagating_.state, arrival->sample.gyro - propagating_.state.bias_gyro});
+    }
+  }
   addTime(times_, StageId::kImu, {wallSeconds() - arrival->host.arrival, threadCpuSeconds() - cpu});
   imu_to_propagate_.pop();
   ++counters_.propagate.samples;
@@ -239,10 +243,10 @@ void Wiring::smoothFrame(const TrackMessage& message, FrameResult& out) {
     out.status = smooth_.step(message.tracked, out.step.effort, out.output);
     smooth_.fix(fix_.draft());
     fix_.publish();
-    if (outlet_ != nullptr) {
+    for (LiveOutlet* outlet : outlets_) {
       const OdometryOutput& output = out.output;
-      outlet_->frame.write({message.tracked.stamp, output.has_state, output.waiting_for, output.state.health,
-                            output.state.epoch, output.statistics});
+      outlet->frame.write({message.tracked.stamp, output.has_state, output.waiting_for, output.state.health,
+                           output.state.epoch, output.statistics});
     }
     if (drag_) drag_(StageId::kSmooth, threadCpuSeconds() - cpu);
   });
@@ -305,6 +309,7 @@ void Wiring::watchArming(const FrameResult& result) {
   const bool running = recorder_ != nullptr && recorder_->running();
   if (!arming_->update(result, sensorFacts(), running, lost, wallSeconds())) return;
   const ArmingVerdict& verdict = arming_->verdict();
+  for (LiveOutlet* outlet : outlets_) outlet->arming.write(verdict);
   std::string text = verdict.ready() ? "ready to arm" : "not ready to arm:";
   for (const MissingCondition& missing : verdict.missing) {
     text += std::string(" ") + missing.name() + " (" + missing.text.data() + ")";

@@ -126,7 +126,7 @@ class Wiring {
     /// For which `track` waits, after a frame's arrival, for the samples up to its stamp, on the host's
     /// clock; 0: never, for then whoever feeds the wiring hands them over first.
     Duration sample_patience{0};
-    LiveOutlet* outlet = nullptr;  ///< gets the newest of everything; null: nobody asks. Outlives the wiring
+    LiveOutlets outlets;  ///< each gets the newest of everything; they outlive the wiring
     /// Called by `log` each time: what the input has to say of itself, to the log. True: there was something.
     std::function<bool(RunLog&)> remarks;
     /// Called after a stage's work with its CPU seconds, within its wall time: tests slow stages down.
@@ -255,7 +255,7 @@ class Wiring {
   RunLog& log_;
   FlightRecorder* recorder_;
   ArmingMonitor* arming_;
-  LiveOutlet* outlet_;
+  LiveOutlets outlets_;
   ConstantEffort full_effort_;
   EffortSource* track_effort_;
   EffortSource* smooth_effort_;

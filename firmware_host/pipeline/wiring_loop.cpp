@@ -42,7 +42,7 @@ bool Wiring::loop() {
     LoopReport& out = report != nullptr ? *report : closing_.unread;
     static_cast<void>(loop_->step(input, LoopEffort{}, out));
     if (to_map_) publishMap();
-    if (outlet_ != nullptr) outlet_->correction.write(loop_->correction());
+    for (LiveOutlet* outlet : outlets_) outlet->correction.write(loop_->correction());
     if (report != nullptr) to_loop_->reports.commitPush();
     if (drag_) drag_(StageId::kLoop, threadCpuSeconds() - cpu);
   });

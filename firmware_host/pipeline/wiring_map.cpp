@@ -218,9 +218,8 @@ void Wiring::drawMap() {
   timed(StageId::kDistance, [&] { map_->updateDistance(mapping_.vehicle, {}, mapping_.report); });
 }
 
-// map -> newest surface, when it is asked for
+// map -> newest surface, to each who asks for it
 void Wiring::publishSurface(Stamp stamp) {
-  if (outlet_ == nullptr || !outlet_->surface_wanted.exchange(false, std::memory_order_acq_rel)) return;
   struct Gather : SurfaceSink {
     explicit Gather(std::vector<SurfaceVertex>& to) : vertices(to) {}
     void take(const SurfacePatch& patch) override {
@@ -231,12 +230,15 @@ void Wiring::publishSurface(Stamp stamp) {
     }
     std::vector<SurfaceVertex>& vertices;
   };
-  SurfaceNews& out = outlet_->surface.draft();
-  out.stamp = stamp;
-  out.vertices.clear();
-  Gather gather(out.vertices);
-  map_->visitSurface(gather);
-  outlet_->surface.publish();
+  for (LiveOutlet* outlet : outlets_) {
+    if (!outlet->surface_wanted.exchange(false, std::memory_order_acq_rel)) continue;
+    SurfaceNews& out = outlet->surface.draft();
+    out.stamp = stamp;
+    out.vertices.clear();
+    Gather gather(out.vertices);
+    map_->visitSurface(gather);
+    outlet->surface.publish();
+  }
 }
 
 bool Wiring::findMapImages(std::uint64_t frame) {

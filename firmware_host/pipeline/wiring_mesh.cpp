@@ -79,9 +79,9 @@ bool Wiring::findMeshImage(std::uint64_t number) {
 void Wiring::publishMesh(bool keyframe) {
   mesh_->horizonMesh(local_mesh_.draft());
   local_mesh_.publish();
-  if (outlet_ != nullptr) {
-    mesh_->horizonMesh(outlet_->mesh.draft());
-    outlet_->mesh.publish();
+  for (LiveOutlet* outlet : outlets_) {
+    mesh_->horizonMesh(outlet->mesh.draft());
+    outlet->mesh.publish();
   }
   if (const PlaneReport* planes = mesh_->newPlanes()) {
     planes_.draft() = *planes;

@@ -1,0 +1,32 @@
+#pragma once
+// Who follows a run while it goes on, each from a thread of its own: ROS 2's topics. Opened before the wiring
+// is built, ended after the executor. An executor that is not real-time has none.
+
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "firmware_host/commands/fly_threaded.hpp"
+#include "firmware_host/dds/dds_thread.hpp"
+#include "firmware_host/pipeline/live_outlet.hpp"
+
+namespace swiftlet {
+
+class LiveConsumers {
+ public:
+  /// Opens those that the settings switch on. InputError naming the setting where one does not open.
+  LiveConsumers(const Settings& settings, const FlightRequest& request);
+
+  /// For Wiring::Options; they live as long as this.
+  [[nodiscard]] const LiveOutlets& outlets() const { return outlets_; }
+  /// Ends them; `report` gets what each counted under its own name.
+  void finish(nlohmann::ordered_json& report);
+
+ private:
+  LiveOutlet& newOutlet(std::unique_ptr<LiveOutlet>& owner);
+
+  LiveOutlets outlets_;
+  std::unique_ptr<LiveOutlet> ros2_outlet_;
+  std::unique_ptr<DdsThread> ros2_;
+};
+
+}  // namespace swiftlet
