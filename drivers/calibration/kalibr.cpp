@@ -10,8 +10,6 @@ namespace {
 
 // Two statements of one transform in one file; Kalibr writes 16 digits.
 constexpr double kContradiction = 1e-6;
-constexpr double kShiftWarn_s = 0.1;
-constexpr double kShiftRefuse_s = 1.0;
 
 double distance(const SE3& a, const SE3& b) {
   const SE3 d = a.inverse() * b;
@@ -77,20 +75,6 @@ void chain(std::vector<ChainCamera>& cameras) {
         "neither T_cam_imu nor T_imu_cam, nor a chain of T_cn_cnm1 to a camera that has it",
         "Run the camera-IMU step of the calibration and give its camchain-imucam file");
   }
-}
-
-std::optional<double> readShift(const YamlField& camera, Warnings& warnings) {
-  if (!camera.has("timeshift_cam_imu")) return std::nullopt;
-  const YamlField field = camera.at("timeshift_cam_imu");
-  const double shift = field.number();
-  if (std::abs(shift) > kShiftRefuse_s) {
-    throw field.error(fmt::format("a shift of {} s", shift), "The unit is seconds: is this in milliseconds?");
-  }
-  if (std::abs(shift) > kShiftWarn_s) {
-    warnings.push_back(field.where() +
-                       fmt::format(": a shift of {} s is unusually large (unit: seconds)", shift));
-  }
-  return shift;
 }
 
 std::vector<CameraEntry> readChain(const YamlField& root, Warnings& warnings) {

@@ -13,6 +13,8 @@ constexpr double kOrthonormalWarn = 1e-6;
 constexpr double kOrthonormalRefuse = 1e-3;
 constexpr double kLastRowTolerance = 1e-9;
 constexpr double kMaxLever = 10;  // m; a rig is smaller, so more means millimetres
+constexpr double kShiftWarn_s = 0.1;
+constexpr double kShiftRefuse_s = 1.0;
 constexpr int kMinImageSide = 16;
 constexpr int kMaxImageSide = 16384;
 
@@ -188,6 +190,20 @@ CameraModel readLens(const YamlField& camera, const std::string& coefficients_ke
   const CameraModel model(camera_kind, width, height, intrinsics, distortion);
   checkCorners(intrinsics_field, model, warnings);
   return model;
+}
+
+std::optional<double> readShift(const YamlField& camera, Warnings& warnings) {
+  if (!camera.has("timeshift_cam_imu")) return std::nullopt;
+  const YamlField field = camera.at("timeshift_cam_imu");
+  const double shift = field.number();
+  if (std::abs(shift) > kShiftRefuse_s) {
+    throw field.error(fmt::format("a shift of {} s", shift), "The unit is seconds: is this in milliseconds?");
+  }
+  if (std::abs(shift) > kShiftWarn_s) {
+    warnings.push_back(field.where() +
+                       fmt::format(": a shift of {} s is unusually large (unit: seconds)", shift));
+  }
+  return shift;
 }
 
 ImuNoise readNoise(const YamlField& imu, const std::string& rate_key, Warnings& warnings) {

@@ -35,6 +35,9 @@ std::array<int, 2> readResolution(const YamlField& field);
 /// Lens from its four fields; refuses models swiftlet has no projection for.
 CameraModel readLens(const YamlField& camera, const std::string& coefficients_key, Warnings& warnings);
 
+/// `timeshift_cam_imu` of a camera [s]; empty where it is not given. Refuses more than a second.
+std::optional<double> readShift(const YamlField& camera, Warnings& warnings);
+
 /// The four densities and the rate under EuRoC's and Kalibr's common names.
 ImuNoise readNoise(const YamlField& imu, const std::string& rate_key, Warnings& warnings);
 

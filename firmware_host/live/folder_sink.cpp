@@ -1,5 +1,7 @@
 #include "firmware_host/live/folder_sink.hpp"
 
+#include <fmt/format.h>
+
 #include <filesystem>
 #include <stdexcept>
 
@@ -67,7 +69,10 @@ void FolderSink::openCamera(std::size_t index, const Calibration& calibration, d
   camera.folder = (folder / "data").string();
   camera.width = model.width();
   camera.height = model.height();
-  openRows(folder / "sensor.yaml", cameraYaml(model, calibration.rig.T_body_cam[index], rate, kOrigin, ""));
+  const std::string shift =
+      fmt::format("timeshift_cam_imu: {:.9f}\n", calibration.rig.camera_to_imu_shift.seconds());
+  openRows(folder / "sensor.yaml",
+           cameraYaml(model, calibration.rig.T_body_cam[index], rate, kOrigin, shift));
   camera.rows = openRows(folder / "data.csv", "#timestamp [ns],filename\n");
   // Each slot once around, so that none grows later.
   for (std::size_t i = 0; i < kImagesAhead; ++i) {

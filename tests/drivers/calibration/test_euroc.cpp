@@ -54,6 +54,17 @@ TEST_CASE("dialects of sensor.yaml read the same", "[calibration]") {
   CHECK(sameRig(texts.parse().rig, reference));
 }
 
+TEST_CASE("a sensor.yaml may say how the camera's clock lies", "[calibration]") {
+  EurocTexts texts;
+  texts.cam0 += "timeshift_cam_imu: 0.004\n";
+  texts.cam1 += "timeshift_cam_imu: 0.006\n";
+  CHECK(texts.parse().rig.camera_to_imu_shift.ns == 5'000'000);
+  texts.cam1 = edited(texts.cam1, "0.006", "6.0");
+  const InputError error = errorOf([&] { texts.parse(); });
+  CHECK(error.field == "timeshift_cam_imu");
+  CHECK(test::contains(error.remedy, "milliseconds"));
+}
+
 TEST_CASE("an equidistant lens is read as one", "[calibration]") {
   EurocTexts texts;
   texts.cam0 = edited(texts.cam0, "radial-tangential", "equidistant");

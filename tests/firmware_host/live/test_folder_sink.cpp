@@ -58,7 +58,8 @@ ImuSample sampleNumber(int i) {
 
 TEST_CASE("a recorded folder is read back with the same stamps, samples and pixels") {
   const ScratchFolder folder("folder_sink");
-  const Calibration given = calibration();
+  Calibration given = calibration();
+  given.rig.camera_to_imu_shift = Duration{-1'234'567};
   constexpr int kSamples = 60;
   constexpr int kFrames = 3;
   constexpr double kDigits = 1e-9;  // more than the f32 that sensors send
@@ -85,6 +86,7 @@ TEST_CASE("a recorded folder is read back with the same stamps, samples and pixe
   const auto log = openLog(folder.file("log"), options);
   CHECK(log->imuNoise().rate_hz == given.noise.rate_hz);
   CHECK(log->imuNoise().gyro_density == given.noise.gyro_density);
+  CHECK(log->rig().camera_to_imu_shift == given.rig.camera_to_imu_shift);
   CHECK((log->rig().T_body_cam[1].translation - given.rig.T_body_cam[1].translation).norm() < 1e-9);
   CHECK(log->rig().T_body_cam[1].rotation.angularDistance(given.rig.T_body_cam[1].rotation) < 1e-9);
   int samples = 0;
