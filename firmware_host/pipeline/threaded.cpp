@@ -33,7 +33,9 @@ class Run : public SensorSink {
     const std::vector<SensorInput::Thread> sensors = input_.threads(*this, control_);
     for (const SensorInput::Thread& sensor : sensors) sensing_ += sensor.of_vehicle ? 1 : 0;
     for (const SensorInput::Thread& sensor : sensors) {
-      if (sensor.of_vehicle) start(sensor.name, rt.sensor_priority, rt.sensor_cpu, [&] { sense(sensor); });
+      if (!sensor.of_vehicle) continue;
+      // One that could not be created has ended.
+      if (!start(sensor.name, rt.sensor_priority, rt.sensor_cpu, [&] { sense(sensor); })) sensorEnded();
     }
     if (options_.started) options_.started(report_.threads);
     for (const SensorInput::Thread& sensor : sensors) {
@@ -55,7 +57,7 @@ class Run : public SensorSink {
   /// The eight of wiring.cpp, and an input's: IMU, two cameras, trigger, and two to spare.
   static constexpr std::size_t kThreads = 14;
 
-  void start(const char* name, int priority, int cpu, std::function<void()> entry) {
+  bool start(const char* name, int priority, int cpu, std::function<void()> entry) {
     ThreadSettings settings;
     settings.name = name;
     settings.priority = options_.realtime.enabled ? priority : 0;
@@ -65,6 +67,9 @@ class Run : public SensorSink {
       entry();
       if (options_.watch) options_.watch(name, false);
     }));
+    const ThreadReport& report = report_.threads.back();
+    if (!report.started) report_.faults.push_back(report.name + ": " + report.message);
+    return report.started;
   }
 
   // Sink.
@@ -89,16 +94,18 @@ class Run : public SensorSink {
 
   // Threads.
 
+  /// The input ends with its last thread, whatever ends it.
+  void sensorEnded() {
+    if (sensing_.fetch_sub(1) > 1) return;
+    wiring_.endInput();
+    propagate_bell_.ring();
+    track_bell_.ring();
+  }
+
   void sense(const SensorInput::Thread& sensor) {
-    // The input ends with its last thread, whatever ends it.
     struct AtEnd {
       Run& run;
-      ~AtEnd() {
-        if (run.sensing_.fetch_sub(1) > 1) return;
-        run.wiring_.endInput();
-        run.propagate_bell_.ring();
-        run.track_bell_.ring();
-      }
+      ~AtEnd() { run.sensorEnded(); }
     } at_end{*this};
     sensor.run();
   }
