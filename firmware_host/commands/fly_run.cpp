@@ -80,7 +80,6 @@ FlyResult runFlight(const FlyRequest& request, Settings settings) {
   facts.wall = wallSeconds() - begin;
   facts.cpu = processCpuSeconds() - cpu;
   memory.note("grown_in_flight");
-  facts.log = "devices";
   facts.mono = !settings.odometry.use_stereo || calibration.rig.camera_count < 2;
   facts.memory = memory.rows();
   facts.calibration_form = calibration.form;

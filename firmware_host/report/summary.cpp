@@ -144,7 +144,7 @@ Json timingJson(const StageTable& table) {
 
 Json runJson(const RunFacts& facts, const RunStatistics& statistics) {
   Json json;
-  json["log"] = facts.log;
+  if (!facts.log.empty()) json["log"] = facts.log;
   if (!facts.tracks.empty()) json["tracks"] = facts.tracks;
   json["cameras"] = facts.mono ? 1 : 2;
   json["finished"] = facts.finished;
