@@ -59,6 +59,7 @@ std::size_t AutopilotLink::step(Stamp now, const NavState* state, const Eigen::V
   std::size_t written = answerTimesync(out);
   written += beat(now, state, out.subspan(written));
   written += tellPose(now, state, omega_body, out.subspan(written));
+  written += tellObstacles(out.subspan(written));
   return written + tellText(out.subspan(written));
 }
 
@@ -134,6 +135,14 @@ std::size_t AutopilotLink::writeLoss(Stamp now, std::span<std::uint8_t> out) {
   message.reset_counter = resets_;
   message.quality = mavlink::Odometry::kFailed;
   return mavlink::write(sender_, message, out);
+}
+
+std::size_t AutopilotLink::tellObstacles(std::span<std::uint8_t> out) {
+  if (!obstacles_) return 0;
+  const std::size_t length = mavlink::write(sender_, *obstacles_, out);
+  obstacles_.reset();
+  ++counters_.obstacles;
+  return length;
 }
 
 std::size_t AutopilotLink::tellText(std::span<std::uint8_t> out) {

@@ -1,6 +1,6 @@
 #pragma once
 // What goes to an autopilot and when: heartbeat, the newest pose at a set rate, answers to its TIMESYNC,
-// texts.
+// obstacles, texts.
 //
 // Bytes in, bytes out; whoever owns the port calls step() more often than the rate, with the clock.
 // - A pose is sent once, with the stamp of its state (CLOCK_MONOTONIC, which the answers to TIMESYNC tell the
@@ -13,12 +13,14 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 
 #include "drivers/mavlink/autopilot_pose.hpp"
 #include "drivers/mavlink/mavlink_link.hpp"
 #include "drivers/mavlink/mavlink_messages.hpp"
+#include "drivers/mavlink/vision_messages.hpp"
 #include "estimator/core/fixed_vector.hpp"
 
 namespace swiftlet {
@@ -36,6 +38,7 @@ struct AutopilotLinkCounters {
   std::uint64_t losses = 0;
   std::uint64_t too_old = 0;  ///< states that came too late to be sent
   std::uint64_t timesync_answers = 0;
+  std::uint64_t obstacles = 0;  ///< messages
   std::uint64_t texts_dropped = 0;
 };
 
@@ -44,8 +47,8 @@ class AutopilotLink {
   static constexpr Duration kOldest = Duration::fromMilliseconds(100);
   static constexpr Duration kSilence = Duration::fromMilliseconds(300);
   static constexpr Duration kTellLoss = Duration::fromMilliseconds(1000);
-  /// A heartbeat, a pose, an answer and a text at once.
-  static constexpr std::size_t kMostBytes = 4 * kLongestMavlinkFrame;
+  /// A heartbeat, a pose, obstacles, an answer and a text at once.
+  static constexpr std::size_t kMostBytes = 5 * kLongestMavlinkFrame;
 
   explicit AutopilotLink(const AutopilotLinkSettings& settings);
 
@@ -53,6 +56,9 @@ class AutopilotLink {
   void receive(std::span<const std::uint8_t> bytes, Stamp read_at, Duration byte_time);
   /// To be told once, cut to 50 characters; the oldest of more than kTexts go.
   void say(mavlink::StatusText::Severity severity, std::string_view text);
+
+  /// To be told once, by the next step.
+  void show(const mavlink::ObstacleDistance& obstacles) { obstacles_ = obstacles; }
 
   /// What is to be sent at `now`: bytes written, none for the most part. `state`: the newest, or null.
   std::size_t step(Stamp now, const NavState* state, const Eigen::Vector3d& omega_body,
@@ -62,7 +68,7 @@ class AutopilotLink {
   [[nodiscard]] const StreamCounters& received() const { return parser_.counters(); }
 
  private:
-  static constexpr std::size_t kTexts = 8;
+  static constexpr std::size_t kTexts = 16;
   struct Text {
     mavlink::StatusText::Severity severity = mavlink::StatusText::Severity::kInfo;
     std::array<char, mavlink::StatusText::kMostText> text = {};
@@ -73,6 +79,7 @@ class AutopilotLink {
   std::size_t beat(Stamp now, const NavState* state, std::span<std::uint8_t> out);
   std::size_t tellPose(Stamp now, const NavState* state, const Eigen::Vector3d& omega_body,
                        std::span<std::uint8_t> out);
+  std::size_t tellObstacles(std::span<std::uint8_t> out);
   std::size_t tellText(std::span<std::uint8_t> out);
   std::size_t writePose(const NavState& state, const Eigen::Vector3d& omega_body,
                         std::span<std::uint8_t> out);
@@ -84,6 +91,7 @@ class AutopilotLink {
   MavlinkParser parser_;
   FixedVector<mavlink::Timesync, 4> asked_;  ///< requests that wait for an answer
   FixedVector<Text, kTexts> texts_;
+  std::optional<mavlink::ObstacleDistance> obstacles_;
   bool any_ = false;   ///< a pose was ever sent
   bool lost_ = false;  ///< and since then the state was
   Stamp lost_since_;

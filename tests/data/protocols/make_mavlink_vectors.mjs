@@ -1,5 +1,6 @@
 // Random MAVLink 2 messages as node-mavlink writes them, for tests/drivers/mavlink:
 //   npm install node-mavlink mavlink-mappings && node make_mavlink_vectors.mjs > mavlink_vectors.json
+//   node make_mavlink_vectors.mjs vision > mavlink_vision_vectors.json   # what an autopilot is told
 // Integers of 64 bits are printed as they are: read them with a parser that keeps them.
 import { MavLinkProtocolV2, common, minimal } from 'node-mavlink'
 
@@ -21,6 +22,7 @@ const i64 = () => (oneIn(3) ? -u64() : u64())
 // Exactly a float32, with zeros often, so that trailing ones are cut.
 const f32 = () => (oneIn(4) ? 0 : Math.fround((below(2 ** 24) - 2 ** 23) * 2 ** (below(20) - 26)))
 const vector = () => [f32(), f32(), f32()]
+const many = (n, of) => Array.from({ length: n }, of)
 
 const kinds = {
   HIGHRES_IMU: () => {
@@ -76,8 +78,49 @@ const kinds = {
       pitchspeed: v.rates[1], yawspeed: v.rates[2] })
     return [v, m]
   },
+  ODOMETRY: () => {
+    const v = {
+      time_usec: u64(), frame: oneIn(2) ? 20 : 1, child: oneIn(2) ? 12 : 20, position: vector(),
+      q: [f32(), f32(), f32(), f32()], velocity: vector(), rates: vector(), pose_covariance: many(21, f32),
+      velocity_covariance: many(21, f32), reset_counter: u8(), estimator: below(5), quality: below(102) - 1 }
+    const m = new common.Odometry()
+    Object.assign(m, {
+      timeUsec: v.time_usec, frameId: v.frame, childFrameId: v.child, x: v.position[0], y: v.position[1],
+      z: v.position[2], q: v.q, vx: v.velocity[0], vy: v.velocity[1], vz: v.velocity[2], rollspeed: v.rates[0],
+      pitchspeed: v.rates[1], yawspeed: v.rates[2], poseCovariance: v.pose_covariance,
+      velocityCovariance: v.velocity_covariance, resetCounter: v.reset_counter, estimatorType: v.estimator,
+      quality: v.quality })
+    return [v, m]
+  },
+  VISION_POSITION_ESTIMATE: () => {
+    const v = { usec: u64(), position: vector(), rpy: vector(), covariance: many(21, f32), reset_counter: u8() }
+    const m = new common.VisionPositionEstimate()
+    Object.assign(m, {
+      usec: v.usec, x: v.position[0], y: v.position[1], z: v.position[2], roll: v.rpy[0], pitch: v.rpy[1],
+      yaw: v.rpy[2], covariance: v.covariance, resetCounter: v.reset_counter })
+    return [v, m]
+  },
+  OBSTACLE_DISTANCE: () => {
+    const v = {
+      time_usec: u64(), sensor: below(4), distance_cm: many(72, u16), min_cm: u16(), max_cm: u16(),
+      increment_deg: 1 + below(90), offset_deg: f32(), frame: oneIn(2) ? 12 : 20 }
+    const m = new common.ObstacleDistance()
+    Object.assign(m, {
+      timeUsec: v.time_usec, sensorType: v.sensor, distances: v.distance_cm, increment: v.increment_deg,
+      minDistance: v.min_cm, maxDistance: v.max_cm, incrementF: v.increment_deg, angleOffset: v.offset_deg,
+      frame: v.frame })
+    return [v, m]
+  },
+  STATUSTEXT: () => {
+    const text = many(below(50), () => String.fromCharCode(32 + below(95))).join('') + '.'
+    const v = { severity: [2, 3, 4, 6][below(4)], text }
+    const m = new common.StatusText()
+    Object.assign(m, { severity: v.severity, text: v.text, id: 0, chunkSeq: 0 })
+    return [v, m]
+  },
 }
-const counts = { HIGHRES_IMU: 120, TIMESYNC: 100, HEARTBEAT: 40, COMMAND_LONG: 60, CAMERA_TRIGGER: 40, ATTITUDE: 20 }
+const of_vision = { ODOMETRY: 80, VISION_POSITION_ESTIMATE: 40, OBSTACLE_DISTANCE: 40, STATUSTEXT: 40 }
+const counts = process.argv[2] === 'vision' ? of_vision : { HIGHRES_IMU: 120, TIMESYNC: 100, HEARTBEAT: 40, COMMAND_LONG: 60, CAMERA_TRIGGER: 40, ATTITUDE: 20 }
 
 const json = (v) => {
   if (typeof v === 'bigint') return v.toString()

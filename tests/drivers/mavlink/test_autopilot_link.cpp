@@ -171,9 +171,9 @@ TEST_CASE("TIMESYNC is answered with our clock and the asker's stamp, at once", 
 
 TEST_CASE("Texts are told one by one, the oldest of too many are dropped and counted", "[mavlink]") {
   Flight flight;
-  for (int i = 0; i < 11; ++i) flight.link.say(mavlink::StatusText::Severity::kWarning, std::string(80, 'x'));
+  for (int i = 0; i < 19; ++i) flight.link.say(mavlink::StatusText::Severity::kWarning, std::string(80, 'x'));
   flight.fly(Duration::fromMilliseconds(50));
-  CHECK(flight.autopilot.texts == 8);
+  CHECK(flight.autopilot.texts == 16);
   CHECK(flight.link.counters().texts_dropped == 3);
 }
 
