@@ -45,7 +45,8 @@ Status ClockMap::add(Stamp device, Stamp arrival, Stamp& host) {
   const std::int64_t delayed = arrival.ns - device.ns;
   if (!envelope_.empty()) {
     const double above = envelope_.heightOf(device, delayed);
-    if (device <= newest_ || above > kTooOld || above < -kAtOnce - tolerance(device)) {
+    if (device <= newest_ || above > kTooOld || above < -kAtOnce - tolerance(device) ||
+        nearerToCandidate(delayed, above)) {
       return suspect(device, arrival, delayed, host);
     }
     if (envelope_.bins() >= kLockBins && above < -tolerance(device)) {
@@ -58,6 +59,10 @@ Status ClockMap::add(Stamp device, Stamp arrival, Stamp& host) {
   envelope_.add(device, delayed);
   watchForStepBack();
   return handOut(device, arrival, host);
+}
+
+bool ClockMap::nearerToCandidate(std::int64_t delayed, double above) const {
+  return candidate_.count > 0 && 2 * std::abs(static_cast<double>(delayed - candidate_.lowest)) < above;
 }
 
 Status ClockMap::suspect(Stamp device, Stamp arrival, std::int64_t delayed, Stamp& host) {

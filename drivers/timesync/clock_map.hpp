@@ -9,8 +9,10 @@
 //   what rising asks of them.
 // - The device's clock steps: a stamp that repeats or goes back, that lies before what the delay allows, or a
 //   second older than its arrival, is refused; five such that agree with each other for 50 ms are a new
-//   clock. A smaller step ahead shows as a delay below the smallest, a smaller step back as 2 s or more
-//   without a delay near it. The offset then starts anew, the skew is kept.
+//   clock. A step back by less than that lasts no longer than it, and is followed on: what comes after it
+//   lies nearer to the stamps that went back than to the line. A smaller step ahead shows as a delay below
+//   the smallest, one back by less than a sample as 2 s or more without a delay near it. The offset then
+//   starts anew, the skew is kept.
 // - Lost samples and outages cost nothing; through an outage the line is carried on at its slope.
 // - A constant delay that grows for more than 2 s looks like a step back: nothing else can be told.
 //
@@ -54,6 +56,7 @@ class ClockMap {
     Stamp lowest_device;
     std::int64_t lowest = 0;
   };
+  [[nodiscard]] bool nearerToCandidate(std::int64_t delayed, double above) const;
   Status suspect(Stamp device, Stamp arrival, std::int64_t delayed, Stamp& host);
   [[nodiscard]] double tolerance(Stamp device) const;
   void watchForStepBack();

@@ -20,6 +20,7 @@ constexpr std::size_t kLockBins = 8;
 constexpr std::int64_t kLockSpan = 4'000'000'000;
 constexpr double kLockUncertainty = 2e5;               // ns
 constexpr double kMostUncertainty = 1e9;               // ns, for the report
+constexpr std::uint64_t kFirstExchanges = 5;
 constexpr std::int64_t kLongestTrip = 10'000'000'000;  // an answer to a question long forgotten
 
 }  // namespace
@@ -102,6 +103,7 @@ void TwoWayClockMap::learn(const ClockExchange& exchange) {
   round_trips_.add(exchange.receive, trip - smallest);
   if (trip.ns > 2 * smallest.ns) ++slow_;
   ++samples_;
+  was_locked_ = was_locked_ || lock() == LockState::kLocked;
 }
 
 std::optional<Stamp> TwoWayClockMap::toHost(Stamp remote) const {
@@ -113,6 +115,10 @@ LockState TwoWayClockMap::lock() const {
   if (back_.empty()) return LockState::kUnlocked;
   const bool enough = back_.bins() >= kLockBins && back_.span().ns >= kLockSpan;
   return enough && uncertainty(newest_) <= kLockUncertainty ? LockState::kLocked : LockState::kLocking;
+}
+
+bool TwoWayClockMap::usable() const {
+  return lock() == LockState::kLocked || (!was_locked_ && resets_ == 0 && samples_ >= kFirstExchanges);
 }
 
 TimesyncStatus TwoWayClockMap::status() const {

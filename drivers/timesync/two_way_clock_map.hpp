@@ -44,6 +44,9 @@ class TwoWayClockMap {
   [[nodiscard]] std::optional<Stamp> toHost(Stamp remote) const;
 
   [[nodiscard]] LockState lock() const;
+  /// Better than arrivals alone: locked, or, before it was so for the first time, after half a second at
+  /// TIMESYNC's rate, when the smallest delays to and fro are known to some tenths of a millisecond.
+  [[nodiscard]] bool usable() const;
   /// Residuals are of the round trip above the smallest.
   [[nodiscard]] TimesyncStatus status() const;
   [[nodiscard]] std::uint64_t slow() const { return slow_; }
@@ -68,6 +71,7 @@ class TwoWayClockMap {
   std::uint64_t resets_ = 0;
   std::uint64_t refused_ = 0;
   std::uint64_t slow_ = 0;
+  bool was_locked_ = false;
 };
 
 }  // namespace swiftlet

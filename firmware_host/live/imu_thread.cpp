@@ -2,6 +2,7 @@
 
 #include <poll.h>
 
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "firmware_host/live/device_times.hpp"
@@ -13,6 +14,12 @@ namespace {
 /// Two maps of one clock differ by the link's constant delay, which is less. Farther apart, one of them has
 /// not heard of a step yet.
 constexpr Duration kLongestDelay = Duration::fromMilliseconds(100);
+/// The constant delay hardly changes in flight. Where the maps are suddenly this much farther apart or
+/// nearer, one has heard of a step; where they stay so for kSettling, the link has changed.
+constexpr Duration kTransportChange = Duration::fromMilliseconds(3);
+constexpr Duration kSettling = Duration::fromMilliseconds(10'000);
+
+Duration magnitude(Duration d) { return {std::abs(d.ns)}; }
 
 }  // namespace
 
@@ -100,25 +107,35 @@ bool ImuThread::stampOf(const ImuReading& reading, Stamp& stamp) {
   }
   // Also where the exchange is sure: it hears of a step of the clock some tenths of a second later.
   if (!clock_.add(*reading.device, reading.arrival, stamp).ok()) return false;
-  const std::optional<Stamp> exchanged = byExchange(*reading.device);
-  if (!exchanged || *exchanged > reading.arrival) return true;
+  arrival_ = reading.arrival;
+  const std::optional<Stamp> one_way = clock_.toHost(*reading.device);
+  const std::optional<Stamp> exchanged = one_way ? byExchange(*reading.device, *one_way) : std::nullopt;
+  if (!exchanged || *exchanged > reading.arrival) {
+    stamp = stamp - transport_.value_or(Duration{});
+    return true;
+  }
+  transport_ = *one_way - *exchanged;
+  agreed_ = reading.arrival;
   stamp = *exchanged;
   ++counted_.by_exchange;
   return true;
 }
 
-std::optional<Stamp> ImuThread::byExchange(Stamp device) const {
-  const std::optional<Stamp> one_way = clock_.toHost(device);
-  std::optional<Stamp> exchanged = link_->toHost(device);
-  if (!one_way || !exchanged) return std::nullopt;
-  exchanged = *exchanged - delay_;
-  const Duration apart = *exchanged < *one_way ? *one_way - *exchanged : *exchanged - *one_way;
-  return apart <= kLongestDelay ? exchanged : std::nullopt;
+std::optional<Stamp> ImuThread::byExchange(Stamp device, Stamp one_way) const {
+  const std::optional<Stamp> exchanged = link_->toHost(device);
+  if (!exchanged) return std::nullopt;
+  const Duration apart = one_way - (*exchanged - delay_);
+  if (magnitude(apart) > kLongestDelay) return std::nullopt;
+  const bool lately = transport_ && arrival_ - agreed_ < kSettling;
+  if (lately && magnitude(apart - *transport_) > kTransportChange) return std::nullopt;
+  return *exchanged - delay_;
 }
 
 std::optional<Stamp> ImuThread::hostOf(Stamp device) const {
-  const std::optional<Stamp> exchanged = byExchange(device);
-  return exchanged ? exchanged : clock_.toHost(device);
+  const std::optional<Stamp> one_way = clock_.toHost(device);
+  if (!one_way) return std::nullopt;
+  const std::optional<Stamp> exchanged = byExchange(device, *one_way);
+  return exchanged ? exchanged : *one_way - transport_.value_or(Duration{});
 }
 
 /// Of a device that sends: its clock, and whether all of it comes.

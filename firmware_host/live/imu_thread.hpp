@@ -52,7 +52,7 @@ class ImuThread {
   void hand(const ImuReading& reading, SensorSink& sink);
   [[nodiscard]] bool stampOf(const ImuReading& reading, Stamp& stamp);
   /// By the protocol's exchange of clocks, where it is sure and the arrivals do not contradict it.
-  [[nodiscard]] std::optional<Stamp> byExchange(Stamp device) const;
+  [[nodiscard]] std::optional<Stamp> byExchange(Stamp device, Stamp one_way) const;
   /// Of other things on the sensor's clock: mapped as its samples are.
   [[nodiscard]] std::optional<Stamp> hostOf(Stamp device) const;
   void hear();
@@ -65,6 +65,11 @@ class ImuThread {
   Duration delay_;
   ClockMap clock_;
   RateWatch rate_;
+  /// What the one-way map holds and the exchange does not, when both were last believed, at `agreed_`: after
+  /// a step of the clock it goes on to be taken off until the exchange is sure again.
+  std::optional<Duration> transport_;
+  Stamp agreed_;
+  Stamp arrival_;               ///< of the newest reading with a clock
   Stamp newest_;                ///< handed over
   Stamp heard_;                 ///< when the newest sample was handed over, or since when there is none
   std::uint64_t received_ = 0;  ///< at `heard_`

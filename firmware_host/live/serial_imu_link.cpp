@@ -74,7 +74,7 @@ DeviceFault SerialImuLink::sendTimesync(const mavlink::Timesync& message) {
 }
 
 std::optional<Stamp> SerialImuLink::toHost(Stamp device) const {
-  if (exchange_.lock() != LockState::kLocked) return std::nullopt;
+  if (!exchange_.usable()) return std::nullopt;
   return exchange_.toHost(device);
 }
 
