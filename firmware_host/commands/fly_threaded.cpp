@@ -61,6 +61,10 @@ bool flyThreaded(const Calibration& calibration, SensorInput& input, const Setti
   wanted.arming = &arming;
   LiveConsumers consumers(settings, request);
   wanted.outlets = consumers.outlets();
+  wanted.remarks = [&consumers, of_input = std::move(wanted.remarks)](RunLog& to) {
+    const bool any = of_input && of_input(to);
+    return consumers.drainRemarks(to) || any;
+  };
   const auto wiring = std::make_unique<Wiring>(calibration.rig, calibration.noise, settings, log, wanted);
   reserveHeap(kHeapReserve);
   MemoryTable reserved;

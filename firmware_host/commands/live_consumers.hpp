@@ -1,10 +1,11 @@
 #pragma once
-// Who follows a run while it goes on, each from a thread of its own: ROS 2's topics. Opened before the wiring
-// is built, ended after the executor. An executor that is not real-time has none.
+// Who follows a run while it goes on, each from a thread of its own: an autopilot, ROS 2's topics. Opened
+// before the wiring is built, ended after the executor. An executor that is not real-time has none.
 
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "firmware_host/autopilot/autopilot_thread.hpp"
 #include "firmware_host/commands/fly_threaded.hpp"
 #include "firmware_host/dds/dds_thread.hpp"
 #include "firmware_host/pipeline/live_outlet.hpp"
@@ -18,6 +19,8 @@ class LiveConsumers {
 
   /// For Wiring::Options; they live as long as this.
   [[nodiscard]] const LiveOutlets& outlets() const { return outlets_; }
+  /// What they have to say of themselves since the last call, to the log. True: there was something.
+  bool drainRemarks(RunLog& log);
   /// Ends them; `report` gets what each counted under its own name.
   void finish(nlohmann::ordered_json& report);
 
@@ -25,6 +28,8 @@ class LiveConsumers {
   LiveOutlet& newOutlet(std::unique_ptr<LiveOutlet>& owner);
 
   LiveOutlets outlets_;
+  std::unique_ptr<LiveOutlet> autopilot_outlet_;
+  std::unique_ptr<AutopilotThread> autopilot_;
   std::unique_ptr<LiveOutlet> ros2_outlet_;
   std::unique_ptr<DdsThread> ros2_;
 };

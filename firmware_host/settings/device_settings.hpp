@@ -37,6 +37,22 @@ struct TriggerGroup {
   double delay_us = 0;
 };
 
+/// Who flies by the estimate, over MAVLink.
+struct AutopilotGroup {
+  std::string device = "";  ///< serial port or udp:HOST:PORT; empty: none
+  int baud = 921600;
+  int system = 1;
+  double rate_hz = 40;
+  std::string message = "odometry";
+  bool obstacles = true;
+  double roll_deg = 0;  ///< of the IMU in the vehicle
+  double pitch_deg = 0;
+  double yaw_deg = 0;
+  double arm_x = 0;  ///< m; from the IMU to the vehicle's reference point, in the IMU's axes
+  double arm_y = 0;
+  double arm_z = 0;
+};
+
 /// Other processes, over DDS.
 struct Ros2Group {
   bool enabled = false;

@@ -11,6 +11,8 @@ std::vector<Setting> deviceSettings() {
   constexpr auto kCameras = &Settings::cameras;
   constexpr auto kTrigger = &Settings::trigger;
   constexpr auto kHil = &Settings::hil;
+  using A = AutopilotGroup;
+  constexpr auto kAutopilot = &Settings::autopilot;
   constexpr auto kRos2 = &Settings::ros2;
   return {
       {"vehicle.calibration", "",
@@ -61,6 +63,36 @@ std::vector<Setting> deviceSettings() {
        ChoiceSetting{member(kTrigger, &T::edge), {"rising", "falling"}}},
       {"trigger.delay_us", "us", "From the edge to the begin of exposure.",
        real(kTrigger, &T::delay_us, 0, 100'000)},
+      {"autopilot.device", "",
+       "Where the autopilot is told of pose, obstacles and health by MAVLink, docs/mavlink.md: a serial "
+       "port, "
+       "or udp:HOST:PORT (udp:HOST:PORT@OWN_PORT to listen on a port of one's own); empty: nobody is told.",
+       TextSetting{member(kAutopilot, &A::device), "a port as /dev/ttyS1, udp:127.0.0.1:14580, or empty"}},
+      {"autopilot.baud", "Bd", "Rate of the autopilot's serial port; 40 poses a second want 115200 at least.",
+       integer(kAutopilot, &A::baud, 1200, 4'000'000)},
+      {"autopilot.system", "", "MAVLink system of the vehicle (PX4's MAV_SYS_ID, ArduPilot's SYSID_THISMAV).",
+       integer(kAutopilot, &A::system, 1, 255)},
+      {"autopilot.rate_hz", "Hz", "Poses per second; autopilots ask for 30 to 50.",
+       real(kAutopilot, &A::rate_hz, 1, 200)},
+      {"autopilot.message", "",
+       "What poses are told by; position_estimate is for autopilots without ODOMETRY.",
+       ChoiceSetting{member(kAutopilot, &A::message), {"odometry", "position_estimate"}}},
+      {"autopilot.obstacles", "", "Also tell the distance to the nearest of the local mesh in 72 sectors.",
+       onOff(kAutopilot, &A::obstacles)},
+      {"autopilot.roll_deg", "deg",
+       "How the IMU is turned in the vehicle, whose axes are forward, left, up: about forward, applied "
+       "first.",
+       real(kAutopilot, &A::roll_deg, -180, 180)},
+      {"autopilot.pitch_deg", "deg", "Likewise about left, applied second.",
+       real(kAutopilot, &A::pitch_deg, -180, 180)},
+      {"autopilot.yaw_deg", "deg", "Likewise about up, applied last.",
+       real(kAutopilot, &A::yaw_deg, -180, 180)},
+      {"autopilot.arm_x", "m",
+       "From the IMU to the vehicle's reference point, in the IMU's axes; the autopilot's own offset stays "
+       "0.",
+       real(kAutopilot, &A::arm_x, -10, 10)},
+      {"autopilot.arm_y", "m", "Likewise along the IMU's second axis.", real(kAutopilot, &A::arm_y, -10, 10)},
+      {"autopilot.arm_z", "m", "Likewise along the IMU's third axis.", real(kAutopilot, &A::arm_z, -10, 10)},
       {"ros2.enabled", "",
        "Publish pose, frames, mesh, surface and diagnostics of runs on threads as ROS 2's topics, "
        "docs/ros2.md; "

@@ -94,6 +94,7 @@ struct Settings {
   CamerasGroup cameras;
   TriggerGroup trigger;
   HilGroup hil;
+  AutopilotGroup autopilot;
   Ros2Group ros2;
   OdometrySettings odometry;
   Effort effort;

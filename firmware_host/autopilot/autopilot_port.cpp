@@ -1,0 +1,117 @@
+#include "firmware_host/autopilot/autopilot_port.hpp"
+
+#include <netdb.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <charconv>
+
+#include "drivers/calibration/input_error.hpp"
+#include "drivers/device/monotonic_now.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr std::string_view kUdp = "udp:";
+constexpr std::int64_t kNanosecondsPerMillisecond = 1'000'000;
+
+std::uint16_t portOf(std::string_view text, std::string_view device) {
+  std::uint16_t port = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
+  if (error != std::errc{} || end != text.data() + text.size() || port == 0) {
+    throw InputError("settings", 0, "autopilot.device", std::string(device) + ": no port from 1 to 65535",
+                     "Write udp:HOST:PORT, as udp:192.168.1.10:14550");
+  }
+  return port;
+}
+
+}  // namespace
+
+std::optional<UdpAddress> udpAddress(std::string_view device) {
+  if (!device.starts_with(kUdp)) return std::nullopt;
+  std::string_view rest = device.substr(kUdp.size());
+  UdpAddress address;
+  if (const auto at = rest.rfind('@'); at != std::string_view::npos) {
+    address.own_port = portOf(rest.substr(at + 1), device);
+    rest = rest.substr(0, at);
+  }
+  const auto colon = rest.rfind(':');
+  address.port = portOf(colon == std::string_view::npos ? "" : rest.substr(colon + 1), device);
+  address.host = rest.substr(0, colon);
+  if (address.host.empty()) {
+    throw InputError("settings", 0, "autopilot.device", std::string(device) + ": no host",
+                     "Write udp:HOST:PORT, as udp:192.168.1.10:14550");
+  }
+  return address;
+}
+
+AutopilotPort::AutopilotPort(const std::string& device, unsigned baud)
+    : udp_(udpAddress(device)), serial_(SerialSettings{device, baud}) {}
+
+void AutopilotPort::close() {
+  serial_.close();
+  if (socket_ >= 0) ::close(socket_);
+  socket_ = -1;
+}
+
+DeviceFault AutopilotPort::open() {
+  close();
+  return udp_ ? openUdp() : serial_.open();
+}
+
+DeviceFault AutopilotPort::openUdp() {
+  if (!peer_known_) {
+    addrinfo wanted = {};
+    wanted.ai_family = AF_INET;
+    wanted.ai_socktype = SOCK_DGRAM;
+    addrinfo* found = nullptr;
+    if (const int error = getaddrinfo(udp_->host.c_str(), nullptr, &wanted, &found); error != 0) {
+      return deviceFault(DeviceFaultKind::kMissing, 0, "host %s: %s", udp_->host.c_str(),
+                         gai_strerror(error));
+    }
+    peer_ = *reinterpret_cast<const sockaddr_in*>(found->ai_addr);
+    peer_.sin_port = htons(udp_->port);
+    freeaddrinfo(found);
+    peer_known_ = true;
+  }
+  socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (socket_ < 0) return openFault(errno, "UDP socket");
+  sockaddr_in own = {};
+  own.sin_family = AF_INET;
+  own.sin_port = htons(udp_->own_port);
+  if (::bind(socket_, reinterpret_cast<const sockaddr*>(&own), sizeof(own)) != 0) {
+    return deviceFault(errno == EADDRINUSE ? DeviceFaultKind::kBusy : DeviceFaultKind::kFailed, errno,
+                       "UDP port %d", udp_->own_port);
+  }
+  return {};
+}
+
+void AutopilotPort::wait(Duration most) {
+  pollfd asked = {udp_ ? socket_ : serial_.descriptor(), POLLIN, 0};
+  static_cast<void>(::poll(&asked, 1, static_cast<int>(most.ns / kNanosecondsPerMillisecond)));
+}
+
+DeviceFault AutopilotPort::read(std::span<std::uint8_t> into, std::size_t& count, Stamp& read_at) {
+  if (!udp_) return serial_.read(into, count, read_at);
+  count = 0;
+  sockaddr_in sender = {};
+  socklen_t length = sizeof(sender);
+  const ssize_t got =
+      ::recvfrom(socket_, into.data(), into.size(), 0, reinterpret_cast<sockaddr*>(&sender), &length);
+  read_at = monotonicNow();
+  // An autopilot that is not up yet answers our datagrams by ICMP: ECONNREFUSED is no fault.
+  if (got > 0 && sender.sin_addr.s_addr == peer_.sin_addr.s_addr) count = static_cast<std::size_t>(got);
+  return {};
+}
+
+DeviceFault AutopilotPort::write(std::span<const std::uint8_t> bytes) {
+  if (!udp_) return serial_.write(bytes, Duration{});
+  const ssize_t sent = ::sendto(socket_, bytes.data(), bytes.size(), 0,
+                                reinterpret_cast<const sockaddr*>(&peer_), sizeof(peer_));
+  if (sent == static_cast<ssize_t>(bytes.size())) return {};
+  return deviceFault(DeviceFaultKind::kFailed, errno, "datagram not taken");
+}
+
+}  // namespace swiftlet

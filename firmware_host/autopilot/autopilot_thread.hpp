@@ -1,0 +1,52 @@
+#pragma once
+// An autopilot told of the estimate while it flies by it: the thread that owns the port, docs/mavlink.md.
+//
+// It reads a LiveOutlet, steps an AutopilotLink and sends what that says; nobody waits for it and it waits
+// for nobody: a port that takes no bytes loses them, counted. Its priority is that of the mesh: below the
+// flight path, above all that may take long, so that a pose does not age while a planner computes. Beside
+// poses go obstacles (10 Hz), and texts: each reason not to arm when it comes and every 30 s, that all is
+// ready, every change of health.
+// A serial port that is unplugged is looked for five times a second; it and an autopilot that says nothing
+// for 3 s are told to the log, with the remedy. Clock: CLOCK_MONOTONIC. Stamps of a log are moved there by
+// their difference at the first state.
+
+#include <functional>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "drivers/mavlink/autopilot_link.hpp"
+#include "firmware_host/pipeline/live_outlet.hpp"
+#include "firmware_host/settings/device_settings.hpp"
+
+namespace swiftlet {
+
+struct AutopilotThreadOptions {
+  AutopilotGroup settings;
+  bool host_stamps = true;  ///< of CLOCK_MONOTONIC; false: of a log
+  int priority = 0;         ///< SCHED_FIFO; 0: none
+};
+
+/// q_vehicle_body and the lever arm as the settings say them.
+AutopilotLinkSettings linkSettings(const AutopilotGroup& settings);
+
+class AutopilotThread {
+ public:
+  /// Opens the port and begins. InputError naming the setting where it does not open. `outlet` outlives it.
+  AutopilotThread(LiveOutlet& outlet, const AutopilotThreadOptions& options);
+  /// Sends nothing more, and ends.
+  ~AutopilotThread();
+  AutopilotThread(const AutopilotThread&) = delete;
+  AutopilotThread& operator=(const AutopilotThread&) = delete;
+
+  /// What happened to the port since the last call; any one thread.
+  bool drainEvents(const std::function<void(Stamp, const std::string&)>& take);
+  /// Ends it, and gives what it counted, for the summary.
+  nlohmann::ordered_json finish();
+
+ private:
+  class Work;
+  std::unique_ptr<Work> work_;
+};
+
+}  // namespace swiftlet

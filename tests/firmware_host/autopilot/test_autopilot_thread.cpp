@@ -1,0 +1,264 @@
+// The thread beside a scripted run: over a pseudo-terminal that is unplugged and comes back, and over UDP.
+
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <thread>
+#include <vector>
+
+#include "drivers/calibration/input_error.hpp"
+#include "drivers/device/monotonic_now.hpp"
+#include "drivers/serial/pseudo_terminal.hpp"
+#include "firmware_host/autopilot/autopilot_port.hpp"
+#include "firmware_host/autopilot/autopilot_thread.hpp"
+#include "tests/firmware_host/scratch_folder.hpp"
+
+namespace swiftlet {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// What the autopilot heard.
+struct Heard {
+  std::vector<mavlink::Odometry> poses;
+  std::vector<mavlink::ObstacleDistance> obstacles;
+  std::vector<mavlink::Timesync> answers;
+  std::vector<std::string> texts;
+  std::size_t heartbeats = 0;
+  MavlinkParser parser;
+
+  void take(std::span<const std::uint8_t> bytes) {
+    while (!bytes.empty()) {
+      bytes = bytes.subspan(parser.feed(bytes, {}, {}));
+      for (MavlinkFrame frame; parser.next(frame);) {
+        mavlink::Odometry pose;
+        mavlink::ObstacleDistance obstacle;
+        mavlink::Timesync answer;
+        if (mavlink::read(frame, pose)) poses.push_back(pose);
+        if (mavlink::read(frame, obstacle)) obstacles.push_back(obstacle);
+        if (mavlink::read(frame, answer)) answers.push_back(answer);
+        if (frame.message == mavlink::StatusText::kId) {
+          // severity, then 50 characters
+          texts.emplace_back(reinterpret_cast<const char*>(frame.payload.data()) + 1, 50);
+          texts.back().resize(std::string(texts.back().c_str()).size());
+        }
+        if (frame.message == mavlink::Heartbeat::kId) ++heartbeats;
+      }
+    }
+  }
+};
+
+/// A vehicle that moves along x at 1 m/s, with states every 5 ms.
+struct Vehicle {
+  LiveOutlet outlet;
+  Stamp begin = monotonicNow();
+  Duration clock{};  ///< of the run's stamps before CLOCK_MONOTONIC
+
+  void move(Health health = Health::kGood) {
+    StateNews news;
+    const Stamp now = monotonicNow();
+    news.state.stamp = now - clock;
+    news.state.health = health;
+    news.state.T_world_body.translation.x() = (now - begin).seconds();
+    outlet.state.write(news);
+  }
+  void say(const char* what) {
+    ArmingVerdict verdict;
+    if (*what != 0) {
+      MissingCondition missing;
+      missing.condition = ArmingCondition::kSensors;
+      std::snprintf(missing.text.data(), missing.text.size(), "%s", what);
+      static_cast<void>(verdict.missing.tryPushBack(missing));
+    }
+    outlet.arming.write(verdict);
+  }
+  void tellHealth(Health health) {
+    FrameNews news;
+    news.health = health;
+    outlet.frame.write(news);
+  }
+};
+
+/// Lets `seconds` pass in steps of a state; `each` sees every one.
+template <typename Each>
+void pass(double seconds, Each&& each) {
+  const Stamp end = monotonicNow() + Duration::fromSeconds(seconds);
+  while (monotonicNow() < end) {
+    each();
+    std::this_thread::sleep_for(5ms);
+  }
+}
+
+AutopilotThreadOptions optionsOf(const std::string& device) {
+  AutopilotThreadOptions options;
+  options.settings.device = device;
+  return options;
+}
+
+void checkPoses(const Heard& heard, Stamp begin) {
+  for (std::size_t i = 0; i < heard.poses.size(); ++i) {
+    const mavlink::Odometry& pose = heard.poses[i];
+    if (pose.quality < 0) continue;
+    // Where the vehicle was at the stamp that the message has.
+    const double then = static_cast<double>(pose.time_usec) * 1e-6 - (begin - Stamp{}).seconds();
+    REQUIRE(std::abs(pose.position.x() - then) < 1e-4);
+    if (i > 0) REQUIRE(pose.time_usec > heard.poses[i - 1].time_usec);
+  }
+}
+
+TEST_CASE("Over a serial port: poses, reasons, health, clocks; unplugged and back", "[autopilot]") {
+  const ScratchFolder folder("autopilot_port");
+  const std::filesystem::path port = folder.file("by-id");
+  PseudoTerminal plug;
+  const auto plugIn = [&] {
+    REQUIRE(plug.open().ok());
+    std::filesystem::remove(port);
+    std::filesystem::create_symlink(plug.path(), port);
+  };
+  plugIn();
+  Vehicle vehicle;
+  Heard heard;
+  const auto listen = [&] {
+    std::array<std::uint8_t, 4096> bytes;
+    std::size_t count = 0;
+    while (plug.receive(bytes, count).ok() && count > 0) heard.take(std::span(bytes).first(count));
+  };
+  vehicle.say("the IMU delivers at 0.0 Hz");
+  AutopilotThread autopilot(vehicle.outlet, optionsOf(port));
+  pass(0.2, listen);
+  CHECK(heard.poses.empty());
+  CHECK(heard.heartbeats == 1);
+  REQUIRE(heard.texts.size() == 1);
+  CHECK(heard.texts[0] == "not ready: sensors: the IMU delivers at 0.0 Hz");
+
+  vehicle.say("");
+  vehicle.tellHealth(Health::kGood);
+  pass(1, [&] {
+    vehicle.move();
+    listen();
+  });
+  // Of 40 a second; a busy machine may cost some, never add any.
+  CHECK(heard.poses.size() > 10);
+  CHECK(heard.poses.size() <= 42);
+  CHECK(std::ranges::count(heard.texts, "swiftlet: ready to arm") == 1);
+  CHECK(std::ranges::count(heard.texts, "swiftlet: good") == 1);
+  CHECK(heard.texts.size() == 3);
+
+  MavlinkSender sender;
+  std::array<std::uint8_t, kLongestMavlinkFrame> request;
+  const std::size_t length = mavlink::write(sender, mavlink::Timesync{0, 123'456'789, 0, 0}, request);
+  std::size_t taken = 0;
+  REQUIRE(plug.send(std::span(request).first(length), taken).ok());
+  const Stamp asked = monotonicNow();
+  pass(0.3, [&] {
+    vehicle.move();
+    listen();
+  });
+  REQUIRE(heard.answers.size() == 1);
+  CHECK(heard.answers[0].ts1 == 123'456'789);
+  CHECK(heard.answers[0].tc1 >= asked.ns);
+  CHECK(heard.answers[0].tc1 <= monotonicNow().ns);
+
+  // A state that stands still is not sent again: quality -1 for a second, then nothing.
+  const std::size_t moved = heard.poses.size();
+  pass(1.8, listen);
+  REQUIRE(heard.poses.size() > moved);
+  for (std::size_t i = moved; i < heard.poses.size(); ++i)
+    CHECK((heard.poses[i].quality == -1 || i < moved + 2));
+  const std::size_t told = heard.poses.size();
+  pass(0.3, listen);
+  CHECK(heard.poses.size() == told);
+  checkPoses(heard, vehicle.begin);
+
+  plug.hangUp();
+  std::vector<std::string> lines;
+  pass(0.5, [&] {
+    vehicle.move();
+    autopilot.drainEvents([&](Stamp, const std::string& line) { lines.push_back(line); });
+  });
+  REQUIRE_FALSE(lines.empty());
+  CHECK(lines[0].find("autopilot (" + port.string() + ")") == 0);
+  CHECK(lines[0].find("connect it again") != std::string::npos);
+  plugIn();
+  const std::size_t before = heard.poses.size();
+  pass(1, [&] {
+    vehicle.move();
+    listen();
+    autopilot.drainEvents([&](Stamp, const std::string& line) { lines.push_back(line); });
+  });
+  CHECK(lines.back().find("works again") != std::string::npos);
+  REQUIRE(heard.poses.size() > before);
+  // After a loss poses begin anew.
+  CHECK(heard.poses.back().reset_counter != heard.poses[0].reset_counter);
+  checkPoses(heard, vehicle.begin);
+  const nlohmann::ordered_json counted = autopilot.finish();
+  CHECK(counted["poses"].get<std::size_t>() >= 10);
+  CHECK(counted["faults"].get<int>() >= 1);
+  CHECK(counted["timesync_answers"] == 1);
+  CHECK(counted["received"]["checksum_failures"] == 0);
+}
+
+TEST_CASE("Over UDP, of a log with a clock of its own, with obstacles; silence is said", "[autopilot]") {
+  AutopilotPort far("udp:127.0.0.1:24582@24581", 0);
+  REQUIRE(far.open().ok());
+  Vehicle vehicle;
+  vehicle.clock = Duration::fromSeconds(1234.5);
+  Heard heard;
+  const auto listen = [&] {
+    std::array<std::uint8_t, 2048> bytes;
+    std::size_t count = 1;
+    for (Stamp at; far.read(bytes, count, at).ok() && count > 0;) heard.take(std::span(bytes).first(count));
+  };
+  auto options = optionsOf("udp:127.0.0.1:24581@24582");
+  options.host_stamps = false;
+  AutopilotThread autopilot(vehicle.outlet, options);
+  std::vector<std::string> lines;
+  pass(3.5, [&] {
+    vehicle.move();
+    LocalMesh& mesh = vehicle.outlet.mesh.draft();
+    mesh = {};
+    mesh.stamp = monotonicNow() - vehicle.clock;
+    for (const Eigen::Vector3f& p : {Eigen::Vector3f(9, -1, -1), {9, 1, -1}, {9, 0, 1}}) {
+      static_cast<void>(mesh.vertices.tryPushBack({0, p, 0}));
+    }
+    static_cast<void>(mesh.faces.tryPushBack({{0, 1, 2}, kNoLabel}));
+    vehicle.outlet.mesh.publish();
+    autopilot.drainEvents([&](Stamp, const std::string& line) { lines.push_back(line); });
+    listen();
+  });
+  CHECK(heard.poses.size() > 30);
+  CHECK(heard.obstacles.size() > 8);
+  CHECK(heard.obstacles.size() <= 36);
+  for (const auto& told : heard.obstacles) {
+    const double then = static_cast<double>(told.time_usec) * 1e-6 - (vehicle.begin - Stamp{}).seconds();
+    // The wall stands at 9 m; the vehicle was within a mesh's age of where it was at the stamp.
+    CHECK(std::abs(told.distance_cm[0] * 0.01 - (9 - then)) < 0.3);
+  }
+  for (std::size_t i = 1; i < heard.poses.size(); ++i) {
+    // Moved to CLOCK_MONOTONIC by one difference, so all alike.
+    const double then =
+        static_cast<double>(heard.poses[i].time_usec) * 1e-6 - (vehicle.begin - Stamp{}).seconds();
+    const double first =
+        static_cast<double>(heard.poses[0].time_usec) * 1e-6 - (vehicle.begin - Stamp{}).seconds();
+    CHECK(std::abs((heard.poses[i].position.x() - heard.poses[0].position.x()) - (then - first)) < 1e-4);
+    CHECK(std::abs(heard.poses[i].position.x() - then) < 0.1);
+  }
+  REQUIRE(lines.size() == 1);
+  CHECK(lines[0].find("no MAVLink for 3 s") != std::string::npos);
+}
+
+TEST_CASE("A port that is not there is said before the flight", "[autopilot]") {
+  LiveOutlet outlet;
+  try {
+    AutopilotThread autopilot(outlet, optionsOf("/dev/no-such-port"));
+    FAIL("was opened");
+  } catch (const InputError& error) {
+    CHECK(error.field == "autopilot.device");
+    CHECK(std::string(error.what()).find("/dev/no-such-port") != std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace swiftlet
