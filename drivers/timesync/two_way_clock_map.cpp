@@ -18,8 +18,8 @@ constexpr std::size_t kRaisedBins = 8;
 constexpr double kSurprise = 16;
 constexpr std::size_t kLockBins = 8;
 constexpr std::int64_t kLockSpan = 4'000'000'000;
-constexpr double kLockUncertainty = 2e5;               // ns
-constexpr double kMostUncertainty = 1e9;               // ns, for the report
+constexpr double kLockUncertainty = 2e5;  // ns
+constexpr double kMostUncertainty = 1e9;  // ns, for the report
 constexpr std::uint64_t kFirstExchanges = 5;
 constexpr std::int64_t kLongestTrip = 10'000'000'000;  // an answer to a question long forgotten
 

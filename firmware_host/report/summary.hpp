@@ -25,7 +25,7 @@ struct MemoryRow {
 };
 
 struct RunFacts {
-  std::string log;  ///< empty: flown on devices
+  std::string log;                    ///< empty: flown on devices
   std::string tracks;                 ///< file of feature tracks; empty when images were used
   std::uint64_t track_surplus = 0;    ///< landmarks beyond kMaxFeatures in a frame, left out
   std::vector<std::string> warnings;  ///< lines for the user, of the input
