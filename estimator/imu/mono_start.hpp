@@ -56,7 +56,8 @@ Status solveMonoStart(std::span<const Preintegration> from_first, std::span<cons
                       const ImuNoise& noise, const StartPrior& prior, MonoStart& start);
 
 /// Gyro bias alone: minimizes the epipolar planes' smallest eigenvalues over bg; needs no
-/// translation and does not mind one. `sigma`: rad/s, the largest principal sigma, prior included.
+/// translation and does not mind one. `sigma`: rad/s, the largest principal sigma, prior included. A first
+/// guess: where turning and moving aside look alike, 3 % of simulated starts, it is 5 to 15 sigma off.
 Status solveGyroBias(std::span<const Preintegration> from_first, std::span<const BearingTrack> tracks,
                      const SE3& T_body_cam, double bearing_sigma, const StartPrior& prior,
                      Eigen::Vector3d& bias_gyro, double& sigma);

@@ -188,9 +188,9 @@ TEST_CASE("Mono start on simulated flights: scale sigma is honest", "[figures]")
   const SE3 T_body_cam(Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), Eigen::Vector3d(0.05, 0.02, -0.01));
   const double sigma = 1.3e-3;
   Random random(31);
-  int solved = 0, inside = 0, believed = 0, believed_bad = 0;
-  double milliseconds = 0, bias_error = 0;
-  const int runs = 40;
+  int solved = 0, inside = 0, believed = 0, believed_bad = 0, bias_inside = 0;
+  double milliseconds = 0, bias_error = 0, worst_bias = 0;
+  const int runs = 300;
   for (int n = 0; n < runs; ++n) {
     const AnalyticTrajectory path(static_cast<std::uint64_t>(n), 0.5, 0.6);
     const Window w = makeWindow(path, 10, 0.1, noise, prior, random);
@@ -199,7 +199,8 @@ TEST_CASE("Mono start on simulated flights: scale sigma is honest", "[figures]")
     double bias_sigma = 0;
     REQUIRE(solveGyroBias(w.from_first, tracks, T_body_cam, sigma, prior, bias, bias_sigma).ok());
     bias_error += (bias - kBiasGyro).norm() / runs;
-    CHECK((bias - kBiasGyro).norm() < 5 * bias_sigma);
+    bias_inside += (bias - kBiasGyro).norm() < 5 * bias_sigma ? 1 : 0;
+    worst_bias = std::max(worst_bias, (bias - kBiasGyro).norm());
     MonoStart start;
     const auto begin = std::chrono::steady_clock::now();
     const Status status =
@@ -220,11 +221,14 @@ TEST_CASE("Mono start on simulated flights: scale sigma is honest", "[figures]")
   std::printf(
       "mono start, simulated, 1 s: solved %d of %d, scale inside 2 sigma %.0f %%, sigma < 0.2: %d, of them "
       "above "
-      "0.4: %d, gyro bias alone %.4f rad/s, %.1f ms\n",
-      solved, runs, 100.0 * inside / solved, believed, believed_bad, bias_error, milliseconds);
+      "0.4: %d, gyro bias alone %.4f rad/s, worst %.4f, inside 5 sigma %.1f %%, %.1f ms\n",
+      solved, runs, 100.0 * inside / solved, believed, believed_bad, bias_error, worst_bias,
+      100.0 * bias_inside / runs, milliseconds);
   CHECK(solved > runs * 3 / 4);
   CHECK(inside >= solved * 85 / 100);
   CHECK(believed_bad <= 1);
+  CHECK(bias_inside >= runs * 95 / 100);
+  CHECK(worst_bias < 0.05);  // from where the start still finds its way: all of them do
 }
 
 TEST_CASE("Mono start refuses what does not show scale") {
