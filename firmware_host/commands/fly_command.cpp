@@ -6,6 +6,7 @@
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/fly_run.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
+#include "firmware_host/commands/view_option.hpp"
 #include "firmware_host/report/summary.hpp"
 
 namespace swiftlet {
@@ -14,12 +15,14 @@ namespace {
 struct FlyOptions {
   FlyRequest request;
   SettingsOptions settings;
+  ViewOption view;
 };
 
 int fly(const FlyOptions& options) {
   FlyRequest request = options.request;
   request.stop = &stopOnSignal();
   request.show_progress = true;
+  request.view = options.view.read();
   const FlyResult result = runFlight(request, options.settings.read());
   if (!result.missing.empty()) {
     for (const std::string& line : result.missing) fmt::print(stderr, "error: {}\n", line);
@@ -52,6 +55,7 @@ void addFlyCommand(CLI::App& app, int& exit_code) {
   command->add_flag("--map", request.map, "Fuse depth into a labelled map: map.ply, map.glb");
   command->add_flag("--record", request.record,
                     "Write what enters the estimator to recording/ in the run folder");
+  options->view.addTo(*command);
   options->settings.addTo(*command);
   command->footer(
       "Example, with the vehicle's devices in a settings file (docs/connecting.md):\n"

@@ -72,6 +72,8 @@ FlyResult runFlight(const FlyRequest& request, Settings settings) {
   FlightRequest flight;
   flight.announce = request.show_progress;
   flight.host_stamps = true;
+  flight.name = "flight";
+  flight.view = request.view;
   RunFacts facts;
   const double cpu = processCpuSeconds();
   flyThreaded(calibration, input, settings, output.log(), wanted, flight, control, facts.executor);

@@ -3,21 +3,24 @@
 
 #include <atomic>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "drivers/calibration/calibration.hpp"
 #include "firmware_host/settings/settings.hpp"
+#include "firmware_host/view/view_address.hpp"
 
 namespace swiftlet {
 
 struct FlyRequest {
   std::string out;
   bool imu_rate = false;
-  bool loop_closure = false;  ///< sets loop.enabled
-  bool map = false;           ///< sets map.enabled
-  bool record = false;        ///< write `recording/` into the run folder
-  double seconds = 0;         ///< end after this long; 0: when told to
+  bool loop_closure = false;        ///< sets loop.enabled
+  bool map = false;                 ///< sets map.enabled
+  bool record = false;              ///< write `recording/` into the run folder
+  std::optional<ViewAddress> view;  ///< serve the live view there
+  double seconds = 0;               ///< end after this long; 0: when told to
   const std::atomic<bool>* stop = nullptr;
   bool show_progress = false;
 };

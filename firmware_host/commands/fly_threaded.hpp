@@ -4,10 +4,13 @@
 
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
 
 #include "drivers/calibration/calibration.hpp"
 #include "firmware_host/pipeline/threaded.hpp"
 #include "firmware_host/pipeline/wiring.hpp"
+#include "firmware_host/view/view_address.hpp"
 
 namespace swiftlet {
 
@@ -16,6 +19,8 @@ struct FlightRequest {
   bool host_stamps = false;  ///< of CLOCK_MONOTONIC, not of a log
   bool announce = false;     ///< print the table of what was reserved, and what is missing
   std::function<void(const char* thread, bool begins)> watch;
+  std::string name;                 ///< what is flown, for those who look on
+  std::optional<ViewAddress> view;  ///< serve the live view there
 };
 
 /// `report` gets what the summary says of the executor. False when it was stopped.

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cstdio>
+
 #include "drivers/calibration/input_error.hpp"
 
 namespace swiftlet {
@@ -26,6 +28,11 @@ LiveConsumers::LiveConsumers(const Settings& settings, const FlightRequest& requ
         newOutlet(ros2_outlet_),
         DdsThreadOptions{settings.ros2, request.host_stamps ? realtimeOffset() : Duration{0}});
   }
+  if (request.view) {
+    view_ = std::make_unique<ViewThread>(newOutlet(view_outlet_), *request.view, request.name);
+    fmt::print("live view: {}\n", view_->url());
+    std::fflush(stdout);  // who reads through a pipe wants to look now
+  }
 }
 
 LiveOutlet& LiveConsumers::newOutlet(std::unique_ptr<LiveOutlet>& owner) {
@@ -44,6 +51,7 @@ bool LiveConsumers::drainRemarks(RunLog& log) {
 void LiveConsumers::finish(nlohmann::ordered_json& report) {
   if (autopilot_) report["autopilot"] = autopilot_->finish();
   if (ros2_) report["ros2"] = ros2_->finish();
+  if (view_) report["view"] = view_->finish();
 }
 
 }  // namespace swiftlet

@@ -1,6 +1,7 @@
 #pragma once
-// Who follows a run while it goes on, each from a thread of its own: an autopilot, ROS 2's topics. Opened
-// before the wiring is built, ended after the executor. An executor that is not real-time has none.
+// Who follows a run while it goes on, each from a thread of its own: an autopilot, ROS 2's topics, the live
+// view. Opened before the wiring is built, ended after the executor. An executor that is not real-time has
+// none.
 
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -9,12 +10,13 @@
 #include "firmware_host/commands/fly_threaded.hpp"
 #include "firmware_host/dds/dds_thread.hpp"
 #include "firmware_host/pipeline/live_outlet.hpp"
+#include "firmware_host/view/view_thread.hpp"
 
 namespace swiftlet {
 
 class LiveConsumers {
  public:
-  /// Opens those that the settings switch on. InputError naming the setting where one does not open.
+  /// Opens those that settings and request switch on. InputError naming the option where one does not open.
   LiveConsumers(const Settings& settings, const FlightRequest& request);
 
   /// For Wiring::Options; they live as long as this.
@@ -32,6 +34,8 @@ class LiveConsumers {
   std::unique_ptr<AutopilotThread> autopilot_;
   std::unique_ptr<LiveOutlet> ros2_outlet_;
   std::unique_ptr<DdsThread> ros2_;
+  std::unique_ptr<LiveOutlet> view_outlet_;
+  std::unique_ptr<ViewThread> view_;
 };
 
 }  // namespace swiftlet

@@ -8,6 +8,7 @@
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/replay_run.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
+#include "firmware_host/commands/view_option.hpp"
 #include "firmware_host/report/summary.hpp"
 
 namespace swiftlet {
@@ -17,6 +18,7 @@ struct ReplayOptions {
   ReplayRequest request;
   SettingsOptions settings;
   std::vector<std::string> calibration;
+  ViewOption view;
   double until = -1;
 };
 
@@ -42,6 +44,7 @@ int replay(const ReplayOptions& options) {
   ReplayRequest request = options.request;
   request.stop = &stopOnSignal();
   request.show_progress = true;
+  request.view = options.view.read();
   if (options.until >= 0) request.until = options.until;
   if (!options.calibration.empty()) request.calibration = options.calibration[0];
   if (options.calibration.size() > 1) request.imu_calibration = options.calibration[1];
@@ -99,6 +102,7 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
   command->add_option("--speed", request.speed, "Times faster than recorded (with --real-time)")
       ->check(CLI::Range(0.01, 100.0))
       ->needs(real_time);
+  options->view.addTo(*command)->needs(real_time);
   command->add_flag("--loop-closure", request.loop_closure,
                     "Recognize places seen before; they hold map.tum together");
   command->add_flag("--map", request.map, "Fuse depth into a labelled map: map.ply, map.glb");

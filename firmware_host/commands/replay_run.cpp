@@ -158,6 +158,8 @@ class ReplayRun {
       flight.speed = request_.speed;
       flight.watch = hooks_.watch;
       flight.announce = request_.show_progress;
+      flight.name = request_.log;
+      flight.view = request_.view;
       LogPlayer player(feed, request_.speed);
       facts_.finished = flyThreaded(source_->calibration(), player, settings_, output_->log(), wanted, flight,
                                     control_, facts_.executor);

@@ -11,6 +11,7 @@
 #include "drivers/recorded/log_source.hpp"
 #include "firmware_host/pipeline/run_listener.hpp"
 #include "firmware_host/settings/settings.hpp"
+#include "firmware_host/view/view_address.hpp"
 
 namespace swiftlet {
 
@@ -22,12 +23,13 @@ struct ReplayRequest {
   std::string tracks;           ///< file of feature tracks in place of the log's images or own tracks
   bool mono = false;
   bool imu_rate = false;
-  bool mesh_sequence = false;  ///< write the meshes of all frames to `meshes/`
-  bool loop_closure = false;   ///< recognize places; sets loop.enabled
-  bool map = false;            ///< fuse depth into a map; sets map.enabled
-  bool real_time = false;      ///< on threads, messages let out at their times
-  double speed = 1;            ///< real_time: times faster than recorded
-  bool record = false;         ///< write `recording/` into the run folder
+  bool mesh_sequence = false;       ///< write the meshes of all frames to `meshes/`
+  bool loop_closure = false;        ///< recognize places; sets loop.enabled
+  bool map = false;                 ///< fuse depth into a map; sets map.enabled
+  bool real_time = false;           ///< on threads, messages let out at their times
+  double speed = 1;                 ///< real_time: times faster than recorded
+  std::optional<ViewAddress> view;  ///< real_time: serve the live view there
+  bool record = false;              ///< write `recording/` into the run folder
   bool reproduce = false;  ///< `log` is a recording: repeat its threaded run step by step, with its settings
   double from = 0;         ///< s after the first image
   std::optional<double> until;  ///< s after the first image

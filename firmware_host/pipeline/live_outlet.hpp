@@ -31,6 +31,7 @@ struct FrameNews {
   Health health = Health::kInitializing;
   std::uint32_t epoch = 0;
   FrameStatistics statistics;
+  double since_arrival = 0;  ///< from the image's arrival until here, on the host's clock [s]
 };
 
 /// Vertices of the map's surface, in the map's axes.

@@ -246,7 +246,7 @@ void Wiring::smoothFrame(const TrackMessage& message, FrameResult& out) {
     for (LiveOutlet* outlet : outlets_) {
       const OdometryOutput& output = out.output;
       outlet->frame.write({message.tracked.stamp, output.has_state, output.waiting_for, output.state.health,
-                           output.state.epoch, output.statistics});
+                           output.state.epoch, output.statistics, wallSeconds() - message.host.arrival});
     }
     if (drag_) drag_(StageId::kSmooth, threadCpuSeconds() - cpu);
   });

@@ -21,19 +21,29 @@ std::string findReportPage() {
   return std::filesystem::exists(page, error) ? page.string() : "";
 }
 
-std::string pageWith(const std::string& page, const std::string& name,
-                     const nlohmann::ordered_json& document) {
+namespace {
+
+/// `page` with `text` in the document's place.
+std::string filled(const std::string& page, const std::string& name, std::string_view text) {
   const std::size_t at = page.find(kPlace);
   if (at == std::string::npos) {
     throw InputError(name, 0, "", "has no place for a report's document",
                      "Build and install the program anew");
   }
+  std::string whole;
+  whole.reserve(page.size() + text.size());
+  whole.append(page, 0, at);
+  whole += text;
+  return whole.append(page, at + kPlace.size());
+}
+
+}  // namespace
+
+std::string pageWith(const std::string& page, const std::string& name,
+                     const nlohmann::ordered_json& document) {
   // Text of files may hold what ends a script element; bytes that are no UTF-8 are replaced.
   const std::string json = document.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
-  std::string text;
-  text.reserve(page.size() + json.size());
-  text.append(page, 0, at);
-  text += R"(<script type="application/json" id="report-document">)";
+  std::string text = R"(<script type="application/json" id="report-document">)";
   for (const char c : json) {
     if (c == '<') {
       text += "\\u003c";
@@ -42,7 +52,11 @@ std::string pageWith(const std::string& page, const std::string& name,
     }
   }
   text += "</script>";
-  return text.append(page, at + kPlace.size());
+  return filled(page, name, text);
+}
+
+std::string livePage(const std::string& page, const std::string& name) {
+  return filled(page, name, R"(<meta id="swiftlet-live" content="stream">)");
 }
 
 }  // namespace swiftlet

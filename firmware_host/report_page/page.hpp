@@ -21,6 +21,9 @@ std::string findReportPage();
 std::string pageWith(const std::string& page, const std::string& name,
                      const nlohmann::ordered_json& document);
 
+/// The same page for a run that goes on: it takes its document from the address `stream` beside it.
+std::string livePage(const std::string& page, const std::string& name);
+
 /// Without the page's program.
 std::string plainPage(const std::vector<ReportedRun>& runs);
 

@@ -50,18 +50,6 @@ Json eventsJson(const RunView& view) {
   return events;
 }
 
-Json labelsJson(const ReportedRun& run) {
-  Json labels = Json::array();
-  constexpr int kMostLabels = 255;
-  for (int label = 1; label <= kMostLabels; ++label) {
-    const auto [red, green, blue] = labelColour(static_cast<std::uint8_t>(label));
-    const auto name = run.labels.find(label);
-    labels.push_back({{"name", name == run.labels.end() ? fmt::format("label {}", label) : name->second},
-                      {"colour", fmt::format("#{:02x}{:02x}{:02x}", red, green, blue)}});
-  }
-  return labels;
-}
-
 std::unique_ptr<MeshDistance> trueSurface(const ReportedRun& run, std::vector<MissingFile>& missing) {
   if (run.true_surface.empty() || (!run.view.files.map_mesh && !run.view.files.local_mesh)) return nullptr;
   try {
@@ -83,6 +71,18 @@ bool lacksHistograms(const RunView& view, const Json& plots) {
 
 }  // namespace
 
+Json labelsJson(const std::map<int, std::string>& names) {
+  Json labels = Json::array();
+  constexpr int kMostLabels = 255;
+  for (int label = 1; label <= kMostLabels; ++label) {
+    const auto [red, green, blue] = labelColour(static_cast<std::uint8_t>(label));
+    const auto name = names.find(label);
+    labels.push_back({{"name", name == names.end() ? fmt::format("label {}", label) : name->second},
+                      {"colour", fmt::format("#{:02x}{:02x}{:02x}", red, green, blue)}});
+  }
+  return labels;
+}
+
 Json runDocument(const ReportedRun& run) {
   const RunView& view = run.view;
   std::vector<MissingFile> missing = view.files.missing;
@@ -95,7 +95,7 @@ Json runDocument(const ReportedRun& run) {
   for (const Table& table : tablesOf(view)) tables.push_back(toJson(table));
   const auto surface = trueSurface(run, missing);
   Json scene = sceneOf(view, surface.get());
-  scene["labels"] = labelsJson(run);
+  scene["labels"] = labelsJson(run.labels);
   Json faults = Json::array();
   for (const MissingFile& one : missing) faults.push_back({{"file", one.file}, {"what", one.what}});
   return {{"name", view.files.name},

@@ -20,6 +20,9 @@ struct ReportedRun {
   std::map<int, std::string> labels;  ///< names of the map's labels; may be empty
 };
 
+/// The scene's "labels": name and colour of each; those without a name get one.
+nlohmann::ordered_json labelsJson(const std::map<int, std::string>& names);
+
 /// One run of the document. A surface that cannot be read is noted as missing.
 nlohmann::ordered_json runDocument(const ReportedRun& run);
 

@@ -77,6 +77,43 @@ std::string bytesText(const std::vector<std::uint8_t>& bytes) {
   return base64(std::span<const unsigned char>(bytes));
 }
 
+Json trajectoryJson(const std::string& name, const char* style, const Trajectory& poses,
+                    const std::vector<double>& value, const std::string& value_label) {
+  const std::size_t step = poses.size() / kMostPoints + 1;
+  std::vector<float> points;
+  std::vector<float> values;
+  for (std::size_t i = 0; i < poses.size(); i += step) {
+    for (int axis = 0; axis < 3; ++axis) {
+      points.push_back(static_cast<float>(poses[i].T_world_body.translation[axis]));
+    }
+    if (value.size() == poses.size()) values.push_back(static_cast<float>(value[i]));
+  }
+  Json json = {{"name", name},
+               {"style", style},
+               {"count", points.size() / 3},
+               {"points", base64Of(std::span<const float>(points))}};
+  if (!values.empty()) {
+    json["value"] = base64Of(std::span<const float>(values));
+    json["value_label"] = value_label;
+  }
+  return json;
+}
+
+}  // namespace
+
+TriangleMesh thinned(const TriangleMesh& mesh, std::size_t vertices, std::size_t faces, double& cell) {
+  cell = 0;
+  if (mesh.vertices.size() <= vertices && mesh.faces.size() <= faces) return mesh;
+  constexpr double kFirstCell = 0.02;  // m
+  constexpr double kCoarser = 1.25;
+  for (cell = kFirstCell;; cell *= kCoarser) {
+    const Grouping grouping = groupOf(mesh, cell);
+    if (grouping.count > vertices) continue;
+    TriangleMesh thin = joined(mesh, grouping);
+    if (thin.faces.size() <= faces) return thin;
+  }
+}
+
 Json surfaceJson(const char* id, const char* name, const TriangleMesh& whole, const Alignment& fit,
                  const MeshDistance* truth) {
   double cell = 0;
@@ -128,43 +165,6 @@ Json surfaceJson(const char* id, const char* name, const TriangleMesh& whole, co
                                mesh.faces.size(), whole.faces.size(), cell);
   }
   return json;
-}
-
-Json trajectoryJson(const std::string& name, const char* style, const Trajectory& poses,
-                    const std::vector<double>& value, const std::string& value_label) {
-  const std::size_t step = poses.size() / kMostPoints + 1;
-  std::vector<float> points;
-  std::vector<float> values;
-  for (std::size_t i = 0; i < poses.size(); i += step) {
-    for (int axis = 0; axis < 3; ++axis) {
-      points.push_back(static_cast<float>(poses[i].T_world_body.translation[axis]));
-    }
-    if (value.size() == poses.size()) values.push_back(static_cast<float>(value[i]));
-  }
-  Json json = {{"name", name},
-               {"style", style},
-               {"count", points.size() / 3},
-               {"points", base64Of(std::span<const float>(points))}};
-  if (!values.empty()) {
-    json["value"] = base64Of(std::span<const float>(values));
-    json["value_label"] = value_label;
-  }
-  return json;
-}
-
-}  // namespace
-
-TriangleMesh thinned(const TriangleMesh& mesh, std::size_t vertices, std::size_t faces, double& cell) {
-  cell = 0;
-  if (mesh.vertices.size() <= vertices && mesh.faces.size() <= faces) return mesh;
-  constexpr double kFirstCell = 0.02;  // m
-  constexpr double kCoarser = 1.25;
-  for (cell = kFirstCell;; cell *= kCoarser) {
-    const Grouping grouping = groupOf(mesh, cell);
-    if (grouping.count > vertices) continue;
-    TriangleMesh thin = joined(mesh, grouping);
-    if (thin.faces.size() <= faces) return thin;
-  }
 }
 
 Json sceneOf(const RunView& view, const MeshDistance* truth) {

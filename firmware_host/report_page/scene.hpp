@@ -19,6 +19,11 @@ inline constexpr std::size_t kMostFaces = 120'000;
 /// grid's width [m], 0 where nothing was thinned. O(triangles log triangles).
 TriangleMesh thinned(const TriangleMesh& mesh, std::size_t vertices, std::size_t faces, double& cell);
 
+/// One of the scene's "surfaces" (see below), thinned where it has to be; `mesh` has a corner. `fit`: from
+/// the mesh's axes to the truth's.
+nlohmann::ordered_json surfaceJson(const char* id, const char* name, const TriangleMesh& mesh,
+                                   const Alignment& fit = {}, const MeshDistance* truth = nullptr);
+
 /// {"trajectories": [{"name", "style", "count", "points", "value", "value_label"}], "surfaces": [{"id",
 /// "name", "vertices", "faces", "low", "size", "points", "grey", "triangles", "labels", "error",
 /// "error_most", "note"}]}. `truth`: the true surface in the truth's axes; null: surfaces have no error.

@@ -1,0 +1,22 @@
+#pragma once
+// Surfaces of the live view as parts of the report's scene.
+
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "estimator/geometry/se3.hpp"
+#include "estimator/messages/local_mesh.hpp"
+#include "firmware_host/evaluation/triangle_mesh.hpp"
+#include "mapping/surface/surface_patch.hpp"
+
+namespace swiftlet {
+
+TriangleMesh triangleMesh(const LocalMesh& mesh);
+
+/// {"id", "name", "count", "low", "size", "points", "grey", "labels", "note"}: 16-bit x y z from `low` over
+/// `size`, grey and label of each point in 8 bits. More than `most` are thinned by equal steps. `vertices`
+/// has at least one. `T_to_from`: to the axes of the scene.
+nlohmann::ordered_json cloudJson(const char* id, const char* name, std::span<const SurfaceVertex> vertices,
+                                 const SE3& T_to_from, std::size_t most);
+
+}  // namespace swiftlet

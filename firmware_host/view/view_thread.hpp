@@ -1,0 +1,35 @@
+#pragma once
+// The live view of a run (docs/view.md): takes the newest of it, from a low thread of its own at its own
+// pace, and serves it. It reads a LiveOutlet; nobody waits for it. In builds without cpp-httplib the
+// constructor says so.
+
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "firmware_host/pipeline/live_outlet.hpp"
+#include "firmware_host/view/view_address.hpp"
+
+namespace swiftlet {
+
+class ViewThread {
+ public:
+  /// Listens and begins. InputError naming --view where the address cannot be had. `outlet` outlives it.
+  /// `name`: what the page calls the run.
+  ViewThread(LiveOutlet& outlet, const ViewAddress& address, const std::string& name);
+  /// Tells the viewers of the end, and ends: within a second.
+  ~ViewThread();
+  ViewThread(const ViewThread&) = delete;
+  ViewThread& operator=(const ViewThread&) = delete;
+
+  /// "http://127.0.0.1:8320/", with the port that it has got.
+  [[nodiscard]] std::string url() const;
+  /// Ends it, and gives what it counted, for the summary.
+  nlohmann::ordered_json finish();
+
+ private:
+  class Work;
+  std::unique_ptr<Work> work_;
+};
+
+}  // namespace swiftlet
