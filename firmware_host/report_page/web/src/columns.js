@@ -30,6 +30,19 @@ export function joined(a, b) {
   return all;
 }
 
+const kMost = 20000;
+
+/**
+ * `old` and what came after it, or in place of it; `width` numbers a point. Where that is too much every second of the
+ * old points goes.
+ */
+export function grown(old, next, replace, width = 1) {
+  if (replace) return next;
+  const much = old.length + next.length > kMost * width;
+  const kept = much ? old.filter((_, i) => Math.floor(i / width) % 2 === 0) : old;
+  return joined(kept, next);
+}
+
 /** The bounds of a plot that stands in several runs, so that all of them get one scale. */
 export function sharedBounds(plots) {
   const x = [];

@@ -107,7 +107,14 @@ export class HistogramPlot {
   /** Counts replace what was there. */
   append(series) {
     this.take(series);
+  }
+
+  refresh() {
     this.plot.setData(this.data());
+  }
+
+  dispose() {
+    this.plot.destroy();
   }
 
   resize(width, height) {

@@ -5,13 +5,15 @@ import 'uplot/dist/uPlot.min.css';
 import './style.css';
 import { sharedBounds } from './columns.js';
 import { HistogramPlot } from './histogram_plot.js';
+import { LiveView } from './live.js';
 import { PlanPlot } from './plan_plot.js';
 import { SceneView } from './scene.js';
 import { element, eventsTable, tableElement } from './tables.js';
-import { TimePlot } from './time_plot.js';
+import { TimePlot, forget, setEnd } from './time_plot.js';
 import { Timeline } from './timeline.js';
 
 const kFormat = 1;
+const kMostEvents = 1000; // of a run that goes on
 const kinds = { time: TimePlot, plan: PlanPlot, histogram: HistogramPlot };
 
 class Run {
@@ -23,6 +25,8 @@ class Run {
     this.width = width;
     this.run.health ??= [];
     this.run.events ??= [];
+    this.stale = new Set(); // plots that have more than they show
+    this.hidden = new Set();
   }
 
   header(letter) {
@@ -47,6 +51,8 @@ class Run {
     const made = new kinds[plot.kind](plot, figure, width, height, this.key, shared);
     if (plot.note) figure.append(element('p', plot.note, 'note'));
     this.plots.set(plot.id, made);
+    figure.plotId = plot.id;
+    (this.figures ??= []).push(figure);
   }
 
   tables(host) {
@@ -70,17 +76,63 @@ class Run {
 
   append(patch) {
     if (patch.health) this.run.health = patch.health;
-    if (patch.events) this.run.events.push(...patch.events);
-    if (patch.duration != null) this.run.duration = patch.duration;
-    if (patch.health || patch.events || patch.duration != null) this.line?.refresh();
-    for (const plot of patch.plots ?? []) this.plots.get(plot.id)?.append(plot.series);
-    for (const table of patch.tables ?? []) {
-      const old = this.tablesHost?.querySelector(`[data-table="${CSS.escape(table.id)}"]`);
-      const next = tableElement(table);
-      if (old) next.open = old.open;
-      old ? old.replaceWith(next) : this.tablesHost?.append(next);
+    if (patch.events) {
+      this.run.events.push(...patch.events);
+      this.run.events.splice(0, this.run.events.length - kMostEvents);
+      this.replaceTable(eventsTable(this.run));
     }
+    if (patch.duration != null) {
+      this.run.duration = patch.duration;
+      if (!patch.health && this.run.health.length) this.run.health.at(-1).to = patch.duration;
+      if (patch.live) setEnd(this.key, patch.duration);
+    }
+    this.moved ||= patch.health || patch.events || patch.duration != null;
+    for (const plot of patch.plots ?? []) {
+      this.plots.get(plot.id)?.append(plot.series, plot.replace);
+      this.stale.add(plot.id);
+    }
+    for (const table of patch.tables ?? []) this.replaceTable(tableElement(table));
     if (patch.scene) this.view?.append(patch.scene);
+    this.refresh();
+  }
+
+  replaceTable(next) {
+    const old = this.tablesHost?.querySelector(`[data-table="${CSS.escape(next.dataset.table)}"]`);
+    if (old) next.open = old.open;
+    old ? old.replaceWith(next) : this.tablesHost?.append(next);
+  }
+
+  /** Draws what is in sight, once in the next frame; the rest when it comes into sight. */
+  refresh() {
+    if (!this.watch) {
+      this.watch = new IntersectionObserver((entries) => {
+        for (const { target, isIntersecting } of entries) {
+          if (isIntersecting) this.hidden.delete(target.plotId);
+          else this.hidden.add(target.plotId);
+        }
+        this.refresh();
+      });
+      for (const figure of this.figures ?? []) this.watch.observe(figure);
+    }
+    this.waiting ||= requestAnimationFrame(() => {
+      this.waiting = 0;
+      if (this.moved) this.line?.refresh();
+      this.moved = false;
+      for (const id of [...this.stale].filter((one) => !this.hidden.has(one))) {
+        this.plots.get(id)?.refresh();
+        this.stale.delete(id);
+      }
+    });
+  }
+
+  /** Gives back what a page that shows one run after the other would gather. */
+  dispose() {
+    this.watch?.disconnect();
+    cancelAnimationFrame(this.waiting);
+    this.line?.dispose();
+    for (const plot of this.plots.values()) plot.dispose();
+    this.view?.dispose();
+    forget(this.key);
   }
 }
 
@@ -94,6 +146,8 @@ const report = {
     if (json.format !== kFormat) throw new Error(`this page shows format ${kFormat}, the document has ${json.format}`);
     this.document = json;
     const host = document.getElementById('report');
+    const before = this.runs[0]?.view;
+    for (const run of this.runs) run.dispose();
     host.replaceChildren();
     const beside = json.runs.length > 1;
     document.title = `swiftlet: ${json.runs.map((r) => r.name).join(' and ')}`;
@@ -101,6 +155,7 @@ const report = {
     const room = Math.min(host.clientWidth - 40, 1800);
     const width = Math.floor((room - (beside ? 24 : 0)) / json.runs.length);
     this.runs = json.runs.map((run) => new Run(run, width));
+    if (json.live) for (const run of this.runs) setEnd(run.key, run.run.duration);
     // A row of the page: one cell for each run.
     const row = (title, fill) => {
       if (title) host.append(element('h3', title));
@@ -156,6 +211,7 @@ const report = {
         this.times = { plots: performance.now() };
         for (const run of this.runs) {
           run.scene(run.sceneHost);
+          if (before?.touched) run.view?.lookAs(before);
           run.view?.drawNow();
         }
         this.times.scene = performance.now();
@@ -185,3 +241,5 @@ const report = {
 window.swiftletReport = report;
 const embedded = document.getElementById('report-document');
 if (embedded) report.load(JSON.parse(embedded.textContent));
+const live = document.getElementById('swiftlet-live');
+if (live) report.live = new LiveView(report, live.content);

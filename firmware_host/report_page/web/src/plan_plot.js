@@ -2,7 +2,7 @@
 
 import uPlot from 'uplot';
 import * as colours from './colours.js';
-import { bounds, floats, joined } from './columns.js';
+import { bounds, floats, grown } from './columns.js';
 
 export class PlanPlot {
   constructor(plot, host, width, height) {
@@ -69,6 +69,7 @@ export class PlanPlot {
   }
 
   showAll() {
+    this.zoomed = false;
     const wide = ([low, high]) => [low - 0.05 * (high - low) - 0.01, high + 0.05 * (high - low) + 0.01];
     this.show(wide(bounds(this.columns.map((c) => c.x))), wide(bounds(this.columns.map((c) => c.y))));
   }
@@ -79,6 +80,7 @@ export class PlanPlot {
     const x = [u.posToVal(left, 'x'), u.posToVal(left + width, 'x')];
     const y = [u.posToVal(top + height, 'y'), u.posToVal(top, 'y')];
     u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+    this.zoomed = true;
     this.show(x, y);
   }
 
@@ -126,15 +128,24 @@ export class PlanPlot {
     return this.columns.reduce((sum, c) => sum + c.x.length, 0);
   }
 
-  append(series) {
+  append(series, replace) {
     for (const one of series) {
       const column = this.columns.find((c) => c.name === one.name);
       if (!column) continue;
-      for (const key of ['x', 'y', 'value']) column[key] = joined(column[key], floats(one[key]));
+      for (const key of ['x', 'y', 'value']) column[key] = grown(column[key], floats(one[key]), replace);
     }
+  }
+
+  /** Shows what was appended, all of it unless somebody looks at a part. */
+  refresh() {
     this.scale();
     this.plot.setData(this.data(), false);
-    this.showAll();
+    if (this.zoomed) this.plot.redraw(true);
+    else this.showAll();
+  }
+
+  dispose() {
+    this.plot.destroy();
   }
 
   resize(width, height) {

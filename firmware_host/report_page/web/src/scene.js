@@ -1,34 +1,25 @@
 // The 3D view: trajectories and surfaces, to be turned, with layers and the colour of one's choice.
 
 import {
-  AmbientLight, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, FrontSide, GridHelper, Mesh,
-  MeshLambertMaterial, PerspectiveCamera, Points, PointsMaterial, Scene, Vector3, WebGLRenderer, Box3,
+  AmbientLight, AxesHelper, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, FrontSide, GridHelper,
+  Mesh, MeshLambertMaterial, PerspectiveCamera, Points, PointsMaterial, Scene, Vector3, WebGLRenderer, Box3,
 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { Line2 } from 'three/examples/jsm/lines/Line2.js';
 import { LineGeometry } from 'three/examples/jsm/lines/LineGeometry.js';
 import { LineMaterial } from 'three/examples/jsm/lines/LineMaterial.js';
 import * as colours from './colours.js';
-import { bounds, bytes, floats, joined, shorts } from './columns.js';
+import { Cloud } from './cloud.js';
+import { bounds, bytes, floats, grown, shorts } from './columns.js';
+import { grey, height, kUnlabelled, labelColours, share } from './surface_colours.js';
 import { element } from './tables.js';
 
-const kUnlabelled = [0.62, 0.62, 0.62];
-
-function hex(text) {
-  const c = new Color(text);
-  return [c.r, c.g, c.b];
-}
-
-// Colours are given as they are to be seen; three.js computes in linear light.
-function linear(rgb) {
-  const c = new Color().setRGB(rgb[0] / 255, rgb[1] / 255, rgb[2] / 255, 'srgb');
-  return [c.r, c.g, c.b];
-}
+const kLookAnew = 2000; // ms between two looks at what a growing scene holds
 
 class Surface {
   constructor(data, labels) {
     this.data = data;
-    this.labels = labels.map((l) => hex(l.colour));
+    this.labels = labelColours(labels);
     this.label = bytes(data.labels);
     this.error = bytes(data.error);
     this.grey = bytes(data.grey);
@@ -62,24 +53,18 @@ class Surface {
     const target = this.geometry.attributes.color;
     // A way that this surface lacks: the first that it has.
     const chosen = this.ways().includes(way) ? way : this.ways()[0];
-    const memory = new Map();
-    const ramp = (share) => {
-      const step = Math.round(share * 64);
-      if (!memory.has(step)) memory.set(step, linear(colours.ramp(step / 64)));
-      return memory.get(step);
-    };
+    const ramp = height(heights);
     for (let i = 0; i < this.corner.length; ++i) {
       let rgb;
       if (chosen === 'label') {
         const label = this.label[Math.floor(i / 3)];
         rgb = label ? this.labels[label - 1] ?? kUnlabelled : kUnlabelled;
       } else if (chosen === 'error') {
-        rgb = ramp(this.error[this.corner[i]] / 255);
+        rgb = share(this.error[this.corner[i]] / 255);
       } else if (chosen === 'height') {
-        rgb = ramp((positions[3 * i + 2] - heights[0]) / (heights[1] - heights[0] || 1));
+        rgb = ramp(positions[3 * i + 2]);
       } else {
-        const grey = this.grey[this.corner[i]];
-        rgb = linear([grey, grey, grey]);
+        rgb = grey(this.grey[this.corner[i]]);
       }
       target.array.set(rgb, 3 * i);
     }
@@ -102,7 +87,7 @@ class Trajectory {
   }
 
   makeLine() {
-    const coloured = this.value.length > 0;
+    const coloured = this.data.value != null;
     this.range = bounds([this.value]);
     const material = new LineMaterial({
       color: coloured ? 0xffffff : 0x808080, linewidth: coloured ? 3 : 2, vertexColors: coloured,
@@ -119,16 +104,16 @@ class Trajectory {
       const [low, high] = this.range;
       const rgb = [];
       for (let i = 0; i < points.length / 3; ++i) {
-        rgb.push(...linear(colours.ramp((this.value[i] - low) / (high - low || 1))));
+        rgb.push(...share((this.value[i] - low) / (high - low || 1)));
       }
       geometry.setColors(rgb);
     }
     return geometry;
   }
 
-  append(points, value) {
-    this.points = joined(this.points, floats(points));
-    if (value != null) this.value = joined(this.value, floats(value));
+  append(points, value, replace) {
+    this.points = grown(this.points, floats(points), replace, 3);
+    if (value != null) this.value = grown(this.value, floats(value), replace);
     if (this.line) {
       this.range = bounds([this.value]);
       this.line.geometry.dispose();
@@ -157,18 +142,48 @@ export class SceneView {
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
     this.controls.addEventListener('change', () => this.draw());
-    this.surfaces = data.surfaces.map((s) => new Surface(s, data.labels ?? []));
+    this.controls.addEventListener('start', () => { this.touched = true; });
+    this.surfaces = [
+      ...data.surfaces.map((s) => new Surface(s, data.labels ?? [])),
+      ...(data.clouds ?? []).map((c) => new Cloud(c, data.labels ?? [])),
+    ];
     this.trajectories = data.trajectories.map((t) => new Trajectory(t));
     for (const layer of [...this.surfaces, ...this.trajectories]) this.scene.add(layer.object);
     this.bar = element('div', null, 'layers');
     this.legend = element('div', null, 'legend');
     host.append(this.bar, this.renderer.domElement, this.legend);
+    if (data.pose) this.move(data.pose);
     this.makeBar();
     this.findBounds();
     this.addGrid();
     this.colour(this.ways()[0]);
     this.renderer.setSize(width, height);
     this.look(new Vector3(0.8, -1.2, 0.9));
+    this.seen = true;
+    this.watch = new IntersectionObserver((entries) => {
+      this.seen = entries.at(-1).isIntersecting;
+      if (this.seen) this.draw();
+    });
+    this.watch.observe(this.renderer.domElement);
+  }
+
+  /** The vehicle: its axes. */
+  move([x, y, z, qx, qy, qz, qw]) {
+    if (!this.vehicle) {
+      this.vehicle = new AxesHelper(1);
+      this.scene.add(this.vehicle);
+    }
+    this.vehicle.position.set(x, y, z);
+    this.vehicle.quaternion.set(qx, qy, qz, qw);
+  }
+
+  dispose() {
+    this.watch.disconnect();
+    cancelAnimationFrame(this.waiting);
+    for (const layer of [...this.surfaces, ...this.trajectories]) layer.object.geometry.dispose();
+    this.controls.dispose();
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
   }
 
   /** What draws: '' without WebGL. */
@@ -187,13 +202,16 @@ export class SceneView {
   }
 
   makeBar() {
+    const before = this.way?.value;
+    this.bar.replaceChildren();
     for (const layer of [...this.surfaces, ...this.trajectories]) {
       const label = element('label');
       const box = element('input');
       box.type = 'checkbox';
-      box.checked = true;
+      box.checked = layer.object.visible;
       box.addEventListener('change', () => {
-        layer.object.visible = box.checked;
+        const shown = [...this.surfaces, ...this.trajectories].find((l) => l.data.name === layer.data.name);
+        shown.object.visible = box.checked;
         this.draw();
       });
       label.append(box, layer.data.name);
@@ -203,6 +221,8 @@ export class SceneView {
     if (this.surfaces.length) {
       const select = element('select');
       for (const way of this.ways()) select.append(element('option', way));
+      if (before && this.ways().includes(before)) select.value = before;
+      this.way = select;
       select.addEventListener('change', () => {
         this.colour(select.value);
         this.draw();
@@ -213,11 +233,10 @@ export class SceneView {
       both.title = 'Surfaces have a free side; from behind one sees through them';
       const box = element('input');
       box.type = 'checkbox';
+      box.checked = Boolean(this.bothSides);
       box.addEventListener('change', () => {
-        for (const surface of this.surfaces) {
-          surface.object.material.side = box.checked ? DoubleSide : FrontSide;
-          surface.object.material.needsUpdate = true;
-        }
+        this.bothSides = box.checked;
+        for (const surface of this.surfaces) this.side(surface);
         this.draw();
       });
       both.append(box, 'both sides');
@@ -225,9 +244,18 @@ export class SceneView {
     }
     for (const [name, from] of [['from above', [0, -0.001, 1]], ['from the side', [0, -1, 0.05]], ['oblique', [0.8, -1.2, 0.9]]]) {
       const button = element('button', name);
-      button.addEventListener('click', () => this.look(new Vector3(...from)));
+      button.addEventListener('click', () => {
+        this.touched = false;
+        this.from = from;
+        this.look(new Vector3(...from));
+      });
       this.bar.append(button);
     }
+  }
+
+  side(surface) {
+    surface.object.material.side = this.bothSides ? DoubleSide : FrontSide;
+    surface.object.material.needsUpdate = true;
   }
 
   /** Where nearly all of it is: a triangle far out does not make the rest small. */
@@ -251,6 +279,10 @@ export class SceneView {
   }
 
   addGrid() {
+    if (this.grid) {
+      this.scene.remove(this.grid);
+      this.grid.dispose();
+    }
     const size = this.box.getSize(new Vector3());
     const wide = Math.max(2, Math.ceil(Math.max(size.x, size.y) * 1.2));
     const cells = wide > 60 ? Math.ceil(wide / 10) : wide;
@@ -259,12 +291,19 @@ export class SceneView {
     const middle = this.box.getCenter(new Vector3());
     grid.position.set(middle.x, middle.y, this.box.min.z);
     this.cell = wide / cells;
+    this.grid = grid;
     this.scene.add(grid);
+    this.vehicle?.scale.setScalar(Math.max(0.2, 0.04 * size.length()));
   }
 
   colour(way) {
     const heights = [this.box.min.z, this.box.max.z];
     for (const surface of this.surfaces) surface.colour(way, heights);
+    this.makeLegend(way);
+  }
+
+  makeLegend(way) {
+    const heights = [this.box.min.z, this.box.max.z];
     this.legend.replaceChildren(element('span', `grid ${this.cell} m`));
     if (way === 'height') this.legend.append(colours.scaleLegend('height [m]', ...heights));
     if (way === 'error') {
@@ -297,9 +336,17 @@ export class SceneView {
     this.draw();
   }
 
+  /** As a view that was there before. */
+  lookAs(other) {
+    this.touched = true;
+    this.controls.target.copy(other.controls.target);
+    this.camera.position.copy(other.camera.position);
+    this.controls.update();
+  }
+
   /** Once in the next frame, however often it is asked for. */
   draw() {
-    if (this.waiting) return;
+    if (this.waiting || this.seen === false) return;
     this.waiting = requestAnimationFrame(() => this.drawNow());
   }
 
@@ -316,27 +363,49 @@ export class SceneView {
     this.draw();
   }
 
-  /** Longer trajectories by name; a surface replaces the one of its id. */
+  /** Longer trajectories by name; a surface or cloud replaces the one of its id; the vehicle moves. */
   append(patch) {
     for (const one of patch.trajectories ?? []) {
-      this.trajectories.find((t) => t.data.name === one.name)?.append(one.points, one.value);
+      this.trajectories.find((t) => t.data.name === one.name)?.append(one.points, one.value, one.replace);
     }
-    for (const one of patch.surfaces ?? []) {
-      const i = this.surfaces.findIndex((s) => s.data.id === one.id);
-      const next = new Surface(one, this.data.labels ?? []);
-      if (i >= 0) {
-        next.object.visible = this.surfaces[i].object.visible;
-        this.scene.remove(this.surfaces[i].object);
-        this.surfaces[i].geometry.dispose();
-        this.surfaces[i] = next;
-      } else {
-        this.surfaces.push(next);
-      }
-      this.scene.add(next.object);
-    }
-    this.findBounds();
-    this.colour(this.bar.querySelector('select')?.value ?? this.ways()[0]);
+    if (patch.pose) this.move(patch.pose);
+    for (const one of patch.surfaces ?? []) this.replace(new Surface(one, this.data.labels ?? []));
+    for (const one of patch.clouds ?? []) this.replace(new Cloud(one, this.data.labels ?? []));
+    if (!(performance.now() - this.looked < kLookAnew)) this.lookAnew();
     this.draw();
+  }
+
+  replace(next) {
+    const i = this.surfaces.findIndex((s) => s.data.id === next.data.id);
+    if (i >= 0) {
+      next.object.visible = this.surfaces[i].object.visible;
+      this.scene.remove(this.surfaces[i].object);
+      this.surfaces[i].geometry.dispose();
+      this.surfaces[i].object.material.dispose();
+      this.surfaces[i] = next;
+    } else {
+      this.surfaces.push(next);
+      this.makeBar();
+    }
+    if (next instanceof Surface) this.side(next);
+    next.colour(this.way?.value ?? this.ways()[0], [this.box.min.z, this.box.max.z]);
+    this.scene.add(next.object);
+  }
+
+  /** A scene that has grown: its bounds, its grid and, unless somebody has turned it, the whole of it. */
+  lookAnew() {
+    this.looked = performance.now();
+    const before = this.box;
+    this.findBounds();
+    const size = before.getSize(new Vector3()).length();
+    const moved = Math.max(before.min.distanceTo(this.box.min), before.max.distanceTo(this.box.max));
+    if (moved > 0.05 * size) {
+      this.addGrid();
+      this.colour(this.way?.value ?? this.ways()[0]);
+      if (!this.touched) this.look(new Vector3(...(this.from ?? [0.8, -1.2, 0.9])));
+    } else {
+      this.makeLegend(this.way?.value ?? this.ways()[0]);
+    }
   }
 
   /** How many different colours a drawing has: 1 is an empty one. */

@@ -2,7 +2,7 @@
 
 import uPlot from 'uplot';
 import * as colours from './colours.js';
-import { floats, joined } from './columns.js';
+import { floats, grown } from './columns.js';
 
 const following = new Map(); // sync key -> plots
 
@@ -16,12 +16,59 @@ export function unfollow(key, plot) {
   following.get(key)?.delete(plot);
 }
 
+// Of a run that goes on: what its plots show where nobody has zoomed, [s].
+const ranges = new Map(); // sync key -> [from, to]
+const ends = new Map();
+const zoomed = new Set(); // sync keys
+let seconds = 0;
+
+/** The last so many seconds; 0: all. */
+export function setWindow(wanted) {
+  seconds = wanted;
+  zoomed.clear();
+  for (const [key, end] of ends) setEnd(key, end);
+}
+
+/** The run goes on until `end`. */
+export function setEnd(key, end) {
+  ends.set(key, end);
+  ranges.set(key, [seconds > 0 ? Math.max(0, end - seconds) : 0, Math.max(end, 1e-3)]);
+}
+
+export function forget(key) {
+  for (const one of [ranges, ends, zoomed, following]) one.delete(key);
+}
+
+/** New data in a plot over time: it shows the run's range, or stays where it was zoomed to. */
+export function setDataOf(plot, key, data) {
+  const range = ranges.get(key);
+  if (!range) {
+    plot.setData(data);
+    return;
+  }
+  plot.batch(() => {
+    plot.setData(data, false);
+    const { min, max } = plot.scales.x;
+    plot.setScale('x', zoomed.has(key) ? { min, max } : { min: range[0], max: range[1] });
+  });
+}
+
 let spreading = false;
 export function spreadZoom(key) {
   return (plot, scale) => {
     if (scale !== 'x' || spreading) return;
-    spreading = true;
     const { min, max } = plot.scales.x;
+    const range = ranges.get(key);
+    if (range) {
+      // Plots that wait to be seen follow later: only what a user did is spread.
+      if (!plot.zoomedBy) return;
+      plot.zoomedBy = false;
+      const times = plot.data[0];
+      const all = min <= times[0] && max >= times[times.length - 1];
+      if (all) zoomed.delete(key);
+      else zoomed.add(key);
+    }
+    spreading = true;
     for (const other of following.get(key) ?? []) {
       if (other !== plot && (other.scales.x.min !== min || other.scales.x.max !== max)) {
         other.setScale('x', { min, max });
@@ -29,6 +76,17 @@ export function spreadZoom(key) {
     }
     spreading = false;
   };
+}
+
+/** Says of a plot that its next range is a user's: at the end of a drag, and at a double click. */
+export function zoomBy() {
+  const by = (u, _, handler) => (event) => {
+    u.zoomedBy = true;
+    handler(event);
+    // A click that zoomed nothing.
+    setTimeout(() => { u.zoomedBy = false; }, 100);
+  };
+  return { mouseup: by, dblclick: by };
 }
 
 const shown = (value) => (value == null ? '' : Number(value).toPrecision(4));
@@ -66,7 +124,7 @@ export class TimePlot {
         dash: truth ? [4, 3] : undefined,
         value: (_, v) => shown(v),
         paths: column.style === 'points' ? () => null : undefined,
-        points: column.style === 'points' ? { show: true, size: 5, fill: stroke } : { show: this.sparse(column) },
+        points: column.style === 'points' ? { show: true, size: 5, fill: stroke } : { show: () => this.sparse(column) },
       });
     }
     this.plot = new uPlot(
@@ -83,12 +141,13 @@ export class TimePlot {
           { label: plot.x_label, labelSize: 18, size: 34, font: '11px system-ui', labelFont: '11px system-ui' },
           { label: plot.y_label, labelSize: 18, size: 58, font: '11px system-ui', labelFont: '11px system-ui' },
         ],
-        cursor: { sync: { key }, drag: { x: true, y: false } },
+        cursor: { sync: { key }, drag: { x: true, y: false }, bind: zoomBy() },
         hooks: { setScale: [spreadZoom(key)] },
       },
       this.data(),
       host,
     );
+    this.key = key;
     follow(key, this.plot);
   }
 
@@ -113,14 +172,23 @@ export class TimePlot {
     return this.columns.reduce((sum, c) => sum + c.x.length, 0);
   }
 
-  append(series) {
+  append(series, replace) {
     for (const one of series) {
       const column = this.columns.find((c) => c.name === one.name);
       if (!column) continue;
-      column.x = joined(column.x, floats(one.x));
-      column.y = joined(column.y, floats(one.y));
+      column.x = grown(column.x, floats(one.x), replace);
+      column.y = grown(column.y, floats(one.y), replace);
     }
-    this.plot.setData(this.data());
+  }
+
+  /** Shows what was appended. */
+  refresh() {
+    setDataOf(this.plot, this.key, this.data());
+  }
+
+  dispose() {
+    unfollow(this.key, this.plot);
+    this.plot.destroy();
   }
 
   resize(width, height) {

@@ -2,7 +2,7 @@
 
 import uPlot from 'uplot';
 import * as colours from './colours.js';
-import { follow, spreadZoom, unfollow } from './time_plot.js';
+import { follow, setDataOf, spreadZoom, unfollow, zoomBy } from './time_plot.js';
 
 const kLane = 20; // px
 
@@ -39,7 +39,7 @@ export class Timeline {
           { size: 120, font: '11px system-ui', splits: () => middle, values: () => lanes, grid: { show: false }, ticks: { show: false } },
         ],
         series: [{}, { paths: () => null, points: { show: false } }],
-        cursor: { sync: { key: this.key }, y: false, points: { show: false } },
+        cursor: { sync: { key: this.key }, y: false, points: { show: false }, bind: zoomBy() },
         hooks: { draw: [(u) => this.draw(u)], setCursor: [(u) => this.point(u)], setScale: [spreadZoom(this.key)] },
       },
       this.data(),
@@ -111,7 +111,12 @@ export class Timeline {
 
   refresh() {
     if (this.lanes().length !== this.names.length) this.build(this.plot.width);
-    else this.plot.setData(this.data());
+    else setDataOf(this.plot, this.key, this.data());
+  }
+
+  dispose() {
+    unfollow(this.key, this.plot);
+    this.plot.destroy();
   }
 
   resize(width) {

@@ -1,0 +1,86 @@
+// Opens a live view in headless Chromium and stays until the run ends: node check_live.mjs CHROMIUM URL [SCREENSHOT.png]
+// Exit code 1 when the console shows an error, anything but the server is asked, a plot has no data, does not grow or
+// is blank, the 3D view does not draw, or the page does not say that the run has ended.
+import { chromium } from 'playwright-core';
+import { mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+
+const [executablePath, url, screenshot] = process.argv.slice(2);
+const profile = mkdtempSync(join(tmpdir(), 'swiftlet_live_'));
+const faults = [];
+const context = await chromium.launchPersistentContext(profile, {
+  executablePath,
+  headless: true,
+  viewport: { width: 1500, height: 1000 },
+  args: ['--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking',
+    '--disable-component-update', '--disable-sync', '--use-gl=angle', '--use-angle=swiftshader',
+    '--enable-unsafe-swiftshader'],
+});
+
+const figures = (page) => page.evaluate(() => window.swiftletReport.figures()[0]);
+
+async function check(page) {
+  let ended = false;
+  page.on('console', (message) => {
+    // The drawing of a test is read back; and after the end nobody answers any more.
+    if (ended || !['error', 'warning'].includes(message.type()) || /ReadPixels|getImageData/.test(message.text())) return;
+    faults.push(`console: ${message.text()}`);
+  });
+  page.on('pageerror', (error) => faults.push(`error: ${error.message}`));
+  page.on('request', (request) => {
+    if (!request.url().startsWith(url) && !/^(data|blob):/.test(request.url())) faults.push(`asks ${request.url()}`);
+  });
+  await page.goto(url);
+  await page.waitForFunction(() => window.swiftletReport?.ready && window.swiftletReport.live.state === 'live'
+    && window.swiftletReport.live.patches > 3, null, { timeout: 60000 });
+  const early = await figures(page);
+  const begun = await page.evaluate(() => window.swiftletReport.live.patches);
+  await page.waitForFunction((n) => window.swiftletReport.live.patches > n + 8, begun, { timeout: 60000 });
+  // What is out of sight is drawn when it comes into sight.
+  await page.evaluate(async () => {
+    for (const figure of document.querySelectorAll('figure, .scene')) {
+      figure.scrollIntoView();
+      await new Promise((resolve) => setTimeout(resolve, 60));
+    }
+    window.scrollTo(0, 0);
+  });
+  const late = await figures(page);
+  const blank = await page.evaluate(() => [...document.querySelectorAll('figure, .alone')].flatMap((host) =>
+    [...host.querySelectorAll('.uplot canvas')].filter((canvas) => {
+      const { width, height } = canvas;
+      const pixels = new Uint32Array(canvas.getContext('2d').getImageData(0, 0, width, height).data.buffer);
+      return new Set(pixels).size < 3;
+    }).map((canvas) => canvas.closest('figure')?.dataset.plot ?? 'timeline')));
+  for (const id of new Set(blank)) faults.push(`plot ${id} is blank`);
+  const ids = Object.keys(late.plots);
+  if (ids.length < 10) faults.push(`only ${ids.length} plots`);
+  for (const id of ids) {
+    if (!(late.plots[id] > early.plots[id])) faults.push(`plot ${id} does not grow: ${early.plots[id]}, ${late.plots[id]}`);
+  }
+  if (!(late.timeline > 0)) faults.push('the timeline is empty');
+  if (late.sceneColours < 8) faults.push(`the 3D view does not draw (${late.sceneColours} colours)`);
+  const bar = await page.locator('.live').innerText();
+  if (!/live/.test(bar) || !/arm/.test(bar)) faults.push(`the bar says: ${bar}`);
+  if (screenshot) await page.screenshot({ path: screenshot, fullPage: true });
+  await page.waitForFunction(() => window.swiftletReport.live.state === 'ended', null, { timeout: 120000 });
+  ended = true;
+  const { documents, patches } = await page.evaluate(() => {
+    const { documents, patches } = window.swiftletReport.live;
+    return { documents, patches };
+  });
+  if (documents !== 1) faults.push(`${documents} documents where one was to do`);
+  const total = Object.values(late.plots).reduce((sum, n) => sum + n, 0);
+  console.log(`${ids.length} plots with ${total} points, ${late.sceneColours} colours in 3D, ${patches} patches until the end`);
+}
+
+try {
+  await check(await context.newPage());
+} catch (error) {
+  faults.push(String(error));
+} finally {
+  await context.close();
+  rmSync(profile, { recursive: true, force: true });
+}
+for (const fault of faults) console.log(`FAULT ${fault}`);
+process.exit(faults.length ? 1 : 0);

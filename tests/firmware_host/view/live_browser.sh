@@ -1,0 +1,38 @@
+#!/bin/sh
+# Opens the live view of a slowed-down replay in headless Chromium and stays until it ends.
+# usage: live_browser.sh SWIFTLET PAGE_FOLDER LOG [SCREENSHOT.png]
+# 77: skipped, there is no Chromium, no node or no bundle of the page.
+set -eu
+swiftlet=$1
+page=$2
+log=$3
+screenshot=${4:-}
+skip() {
+  echo "live_browser: skipped: $1"
+  exit 77
+}
+browser=$(command -v chromium || command -v chromium-browser || command -v google-chrome || true)
+[ -n "$browser" ] || skip "no chromium"
+command -v node >/dev/null 2>&1 || skip "no node"
+[ -d "$page/node_modules/playwright-core" ] || skip "the page was built without npm"
+
+work=$(mktemp -d)
+replay=
+trap '[ -z "$replay" ] || kill "$replay" 2>/dev/null || true; rm -rf "$work"' EXIT
+# Long enough for a browser to start on a busy machine.
+"$swiftlet" replay "$log" --real-time --speed 0.25 --map --view 127.0.0.1:0 --out "$work/run" >"$work/replay.log" 2>&1 &
+replay=$!
+url=
+for _ in $(seq 100); do
+  url=$(sed -n 's/^live view: //p' "$work/replay.log")
+  [ -z "$url" ] || break
+  sleep 0.1
+done
+[ -n "$url" ] || { cat "$work/replay.log"; exit 1; }
+if ! node "$page/check_live.mjs" "$browser" "$url" $screenshot; then
+  cat "$work/replay.log"
+  exit 1
+fi
+wait "$replay"
+replay=
+grep -q '"view": {' "$work/run/summary.json" || { echo "summary.json says nothing of the view"; exit 1; }
