@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <memory>
 #include <optional>
 
@@ -158,7 +159,9 @@ class ReplayRun {
       flight.speed = request_.speed;
       flight.watch = hooks_.watch;
       flight.announce = request_.show_progress;
-      flight.name = request_.log;
+      // Of a folder named with a slash at its end, too.
+      const std::filesystem::path log = std::filesystem::path(request_.log).lexically_normal();
+      flight.name = (log.has_filename() ? log : log.parent_path()).filename().string();
       flight.view = request_.view;
       LogPlayer player(feed, request_.speed);
       facts_.finished = flyThreaded(source_->calibration(), player, settings_, output_->log(), wanted, flight,

@@ -1,7 +1,8 @@
 #pragma once
-// Counts what the flight path must not do, underneath everything: heap calls, and calls that take or wait for
-// a lock, on the threads that armed the trap. Link flight_trap.cpp into the program: it stands in for malloc
-// and for the pthread functions. Not with sanitizers, which do the same.
+// Counts what the flight path must not do, underneath everything: heap calls, calls that take or wait for a
+// lock, and calls of the kernel that may wait for a file, a socket or another program, on the threads that
+// armed the trap. Link flight_trap.cpp into the program: it stands in for malloc, for the pthread functions
+// and for those of the C library. Not with sanitizers, which do the same.
 
 #include <cstdint>
 
@@ -10,6 +11,7 @@ namespace swiftlet {
 struct TrapCounts {
   std::uint64_t heap = 0;
   std::uint64_t locks = 0;
+  std::uint64_t waits = 0;
 };
 
 /// For the calling thread.

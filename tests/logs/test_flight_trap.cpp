@@ -1,16 +1,24 @@
-// No heap call and no lock on the flight path, over a whole run on threads, seen from underneath the
-// program and its libraries.
+// No heap call, no lock and no call that waits for others on the flight path, over a whole run on threads,
+// seen from underneath the program and its libraries.
 
+#include <poll.h>
+
+#include <atomic>
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <cstdlib>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <thread>
+#include <vector>
 
 #include "firmware_host/commands/replay_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/flight_trap.hpp"
 #include "tests/logs/log_data.hpp"
+#include "tests/support/view_client.hpp"
 
 namespace swiftlet {
 namespace {
@@ -28,7 +36,8 @@ bool isFlightThread(std::string_view name) {
   return name == "sensor" || name == "propagate" || name == "track" || name == "smooth" || name == "mesh";
 }
 
-void checkRun(bool mono, bool record, bool planes = false, bool loops = false, bool map = false) {
+nlohmann::ordered_json checkRun(bool mono, bool record, bool planes = false, bool loops = false,
+                                bool map = false, const std::optional<ViewAddress>& view = {}) {
   const ScratchFolder folder("flight_trap");
   ReplayRequest request;
   request.log = chosenLog();
@@ -40,6 +49,7 @@ void checkRun(bool mono, bool record, bool planes = false, bool loops = false, b
   request.record = record;
   request.loop_closure = loops;
   request.map = map;
+  request.view = view;
   ReplayHooks hooks;
   int armed = 0;
   std::mutex guard;
@@ -68,9 +78,11 @@ void checkRun(bool mono, bool record, bool planes = false, bool loops = false, b
   CHECK(heapCallsOfAll() > all_before + 1000);  // the other threads do, and are seen
   CHECK(trapCounts().heap == before.heap);
   CHECK(trapCounts().locks == before.locks);
+  CHECK(trapCounts().waits == before.waits);
+  return result.summary;
 }
 
-TEST_CASE("the trap sees heap calls and locks of an armed thread") {
+TEST_CASE("the trap sees heap calls, locks and waits of an armed thread") {
   const TrapCounts before = trapCounts();
   armTrap();
   {
@@ -78,10 +90,13 @@ TEST_CASE("the trap sees heap calls and locks of an armed thread") {
     std::mutex mutex;
     const std::lock_guard lock(mutex);
     static_cast<void>(long_enough);
+    pollfd nothing{-1, 0, 0};
+    static_cast<void>(::poll(&nothing, 1, 0));
   }
   disarmTrap();
   CHECK(trapCounts().heap == before.heap + 2);  // taken and given back
   CHECK(trapCounts().locks == before.locks + 1);
+  CHECK(trapCounts().waits == before.waits + 1);
 }
 
 TEST_CASE("the flight path neither allocates nor locks") { checkRun(false, false); }
@@ -93,6 +108,37 @@ TEST_CASE("the flight path neither allocates nor locks with planes and loop clos
 TEST_CASE("the flight path neither allocates nor locks with loop closure and a map") {
   checkRun(false, true, false, true, true);
 }
+
+#ifdef SWIFTLET_LIVE_VIEW
+TEST_CASE("the flight path neither allocates nor locks nor waits while viewers look on") {
+  ViewAddress address;
+  address.port = freePort();
+  // One that reads, and three that take no byte of what they asked for.
+  std::atomic<bool> stop{false};
+  std::string stream;
+  std::thread viewers([&] {
+    std::vector<ViewClient> slow;
+    for (int i = 0; i < 3; ++i) slow.emplace_back(address.port, true);
+    for (ViewClient& one : slow) {
+      while (!stop && !one.connectAndAsk("/stream"))
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    ViewClient reader(address.port);
+    while (!stop && !reader.connectAndAsk("/stream"))
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    while (!stop && reader.readSome(0.1)) {
+    }
+    stream = reader.text();
+  });
+  const nlohmann::ordered_json summary = checkRun(false, true, false, true, true, address);
+  stop = true;
+  viewers.join();
+  CHECK(summary["executor"]["view"]["viewers"] == 4);
+  CHECK(summary["executor"]["view"]["delivered"] > 10);
+  CHECK(stream.find("event: patch") != std::string::npos);
+  CHECK(stream.find("event: end") != std::string::npos);
+}
+#endif
 
 }  // namespace
 }  // namespace swiftlet

@@ -39,7 +39,10 @@ export class LiveView {
       option.value = seconds;
       select.append(option);
     }
-    select.addEventListener('change', () => setWindow(Number(select.value)));
+    select.addEventListener('change', () => {
+      setWindow(Number(select.value));
+      for (const run of this.report.runs) run.refreshAll();
+    });
     const label = element('label', 'plots show ');
     label.append(select);
     this.bar.append(label);

@@ -96,6 +96,12 @@ class Run {
     this.refresh();
   }
 
+  refreshAll() {
+    for (const id of this.plots.keys()) this.stale.add(id);
+    this.moved = true;
+    this.refresh();
+  }
+
   replaceTable(next) {
     const old = this.tablesHost?.querySelector(`[data-table="${CSS.escape(next.dataset.table)}"]`);
     if (old) next.open = old.open;
