@@ -11,6 +11,7 @@ LiveTable::LiveTable(std::size_t columns, std::size_t judge) : columns_(columns)
 void LiveTable::add(std::span<const float> row) {
   if (row.size() != columns_.size()) return;
   if (rows() > 0 && row.front() <= columns_.front().back()) return;
+  if (rows() == 0) origin_ = row.front();
   if (rows() == kMost) thin();
   for (std::size_t i = 0; i < row.size(); ++i) columns_[i].push_back(row[i]);
 }
@@ -23,10 +24,11 @@ void LiveTable::sent() {
 void LiveTable::thin() {
   constexpr std::size_t kParts = kMost / 2;
   const std::vector<float>& time = columns_.front();
-  const double begin = time.front();
-  const double width = (static_cast<double>(time.back()) - begin) / static_cast<double>(kParts);
+  const double length = static_cast<double>(time.back()) - origin_;
+  if (stretch_ == 0) stretch_ = length / static_cast<double>(kParts);
+  while (length >= stretch_ * static_cast<double>(kParts)) stretch_ *= 2;
   const auto part = [&](std::size_t row) {
-    return std::min(kParts - 1, static_cast<std::size_t>((time[row] - begin) / width));
+    return static_cast<std::size_t>((time[row] - origin_) / stretch_);
   };
   std::vector<std::size_t> kept;
   kept.reserve(kParts);

@@ -1,10 +1,11 @@
 #pragma once
 // Figures over time in bounded memory: rows of 32-bit floats, the first column rising time.
 //
-// When the table is full the rows are thinned: of each of kMost / 2 equal stretches of time one row stays,
-// the one with the highest value of the column `judge`, or where there is none the first. So old figures
-// become coarser the longer a run lasts, and the newest keep their rate. Cost of add(): O(1), thinning
-// O(rows) once in at least kMost / 2 rows.
+// When the table is full the rows are thinned: of each of at most kMost / 2 equal stretches of time one row
+// stays, the one with the highest value of the column `judge`, or where there is none the first. Stretches
+// become twice as long whenever there are too many, so that thinning again and again takes nothing from the
+// same place. Old figures become coarser the longer a run lasts, the newest keep their rate. Cost of add():
+// O(1); thinning: O(rows), once in at least kMost / 2 rows.
 
 #include <cstddef>
 #include <span>
@@ -38,6 +39,8 @@ class LiveTable {
 
   std::vector<std::vector<float>> columns_;
   std::size_t judge_;
+  double origin_ = 0;   ///< of the stretches: the first row's time
+  double stretch_ = 0;  ///< 0: never thinned
   std::size_t unsent_ = 0;
   bool replaced_ = false;
 };
