@@ -2,10 +2,19 @@
 
 namespace swiftlet {
 
+std::size_t LowThreads::stackBytes() {
+#ifdef SWIFTLET_SANITIZED
+  return kFlightStackBytes;
+#else
+  constexpr std::size_t kSmall = 256 * 1024;
+  return kSmall;
+#endif
+}
+
 LowThreads::LowThreads() {
   ThreadSettings settings;
   settings.name = "view_answer";
-  settings.stack_bytes = kStack;
+  settings.stack_bytes = stackBytes();
   for (FlightThread& thread : threads_) static_cast<void>(thread.start(settings, [this] { run(); }));
 }
 

@@ -18,8 +18,8 @@ namespace swiftlet {
 /// stay in the kernel's short queue.
 class LowThreads {
  public:
-  /// Bytes of a stack: an answer takes some tens of kilobytes.
-  static constexpr std::size_t kStack = 256 * 1024;
+  /// Bytes of a stack: an answer takes some tens of kilobytes, sanitizers more than all else.
+  static std::size_t stackBytes();
   static constexpr std::size_t kMostWaiting = 8;
 
   LowThreads();

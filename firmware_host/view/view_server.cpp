@@ -23,6 +23,7 @@ namespace {
 
 constexpr double kGrace = 0.5;        // s: for viewers to take the end
 constexpr double kLookForNews = 0.1;  // s
+constexpr int kMostStart = 5000;      // ms
 constexpr int kSendBuffer = 131072;   // bytes: what a slow viewer has waiting is old when it comes
 constexpr const char* kHtml = "text/html; charset=utf-8";
 
@@ -101,21 +102,22 @@ class ViewServer::Work : public httplib::Server {
     }
     ThreadSettings settings;
     settings.name = "view_accept";
-    settings.stack_bytes = LowThreads::kStack;
+    settings.stack_bytes = LowThreads::stackBytes();
     const ThreadReport report = thread_.start(settings, [this] {
       yieldToOthers();
       static_cast<void>(listen_after_bind());
     });
     if (!report.started) throw InputError("--view", 0, address_.text(), report.message, "");
     // Before that, stop() would stop nothing.
-    while (!is_running()) sleepFor(Duration::fromMilliseconds(1));
+    for (int i = 0; i < kMostStart && !is_running(); ++i) sleepFor(Duration::fromMilliseconds(1));
   }
 
   [[noreturn]] void fail(int error) const {
     const bool taken = error == EADDRINUSE;
-    throw InputError("--view", 0, address_.text(),
-                     taken ? "another program serves there already"
-                           : "cannot be served at: " + std::generic_category().message(error),
+    std::string what = "cannot be served at: " + std::generic_category().message(error);
+    if (taken) what = "another program serves there already";
+    if (error == 0) what = "is no address of this host";
+    throw InputError("--view", 0, address_.text(), what,
                      taken ? "Choose another with --view ADDRESS:PORT, or port 0 for any that is free"
                            : "Give --view an address of this host and a port that this user may have");
   }

@@ -1,5 +1,6 @@
 // Figures over time in bounded memory.
 
+#include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
 
