@@ -70,6 +70,26 @@ async function check(page) {
     return { documents, patches };
   });
   if (documents !== 1) faults.push(`${documents} documents where one was to do`);
+  // What comes in a long run only: series thinned and sent anew, and, for a slow viewer, another document.
+  const replaced = await page.evaluate(async () => {
+    const report = window.swiftletReport;
+    const plots = ['velocity', 'plan'].map((id) => {
+      const { series } = report.document.runs[0].plots.find((p) => p.id === id);
+      return { id, replace: true, series: series.map(({ name }) => ({ name, x: [0, 1, 2], y: [1, 2, 3], value: [1, 1, 1] })) };
+    });
+    const scene = { trajectories: [{ name: 'odometry', replace: true, points: [0, 0, 0, 1, 1, 1], value: [0, 1] }] };
+    report.append({ run: 0, plots, scene, live: {}, duration: 3 });
+    const { plots: counts } = report.figures()[0];
+    const points = report.runs[0].view.trajectories[0].points.length;
+    // The first document was an early one: it gets what is drawn now.
+    const { scene: drawn } = report.document.runs[0];
+    drawn.surfaces = report.runs[0].view.surfaces.filter((s) => s.corner).map((s) => s.data);
+    await report.load(report.document);
+    const again = report.figures()[0];
+    return { counts: [counts.velocity, counts.plan], points, again: again.sceneColours, canvases: document.querySelectorAll('.scene canvas').length };
+  });
+  if (String(replaced.counts) !== '9,3' || replaced.points !== 6) faults.push(`replaced series have ${JSON.stringify(replaced)}`);
+  if (replaced.again < 8 || replaced.canvases !== 1) faults.push(`after a second document: ${JSON.stringify(replaced)}`);
   const total = Object.values(late.plots).reduce((sum, n) => sum + n, 0);
   console.log(`${ids.length} plots with ${total} points, ${late.sceneColours} colours in 3D, ${patches} patches until the end`);
 }
