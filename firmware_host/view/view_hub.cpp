@@ -6,7 +6,7 @@
 
 namespace swiftlet {
 
-void ViewHub::publish(Text patch) {
+void ViewHub::publish(const Text& patch) {
   {
     const std::lock_guard lock(mutex_);
     ++counters_.patches;
@@ -32,7 +32,7 @@ bool ViewHub::documentWanted() const {
                              [](const Place& place) { return place.taken && place.wish == Wish::kDocument; });
 }
 
-void ViewHub::offer(Text document) {
+void ViewHub::offer(const Text& document) {
   {
     const std::lock_guard lock(mutex_);
     ++counters_.documents;

@@ -44,11 +44,11 @@ class ViewHub {
 
   // Publishing thread.
   /// For all who have a document.
-  void publish(Text patch);
+  void publish(const Text& patch);
   /// Whether somebody waits for a document. It has to stand for the state after the last patch.
   [[nodiscard]] bool documentWanted() const;
   /// For those who wait for it.
-  void offer(Text document);
+  void offer(const Text& document);
   [[nodiscard]] std::size_t viewers() const;
   /// No further patches: viewers get what waits for them, then Next::kEnded.
   void end();
