@@ -71,6 +71,13 @@ nlohmann::ordered_json RunOutput::finish(RunFacts& facts) {
                                 {"without_image", mapping.without_image},
                                 {"without_scene", mapping.without_scene},
                                 {"refused", mapping.refused}};
+    if (mapping.held) {
+      summary["map"]["labels_in"] = {{"in_time", mapping.held->labelled},
+                                     {"late", mapping.held->late},
+                                     {"no_room", mapping.held->no_room},
+                                     {"nobody_there", mapping.held->nobody},
+                                     {"longest_wait_ms", mapping.held->longest_ms}};
+    }
   }
   return summary;
 }

@@ -13,6 +13,7 @@
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/odometry/pairing.hpp"
 #include "estimator/smoother/full_smoother.hpp"
+#include "firmware_host/pipeline/held_frames.hpp"
 #include "firmware_host/pipeline/stage_timer.hpp"
 #include "mapping/loop/loop_report.hpp"
 #include "mapping/map/map_stage.hpp"
@@ -71,6 +72,8 @@ struct MapThreadStatistics {
   std::uint64_t without_image = 0;  ///< of them, skipped: others came before they were looked at
   std::uint64_t without_scene = 0;  ///< of them, whose depth or labels were gone
   std::uint64_t refused = 0;        ///< by the stage
+  /// Where labels come after their images.
+  std::optional<HeldFrames::Counters> held;
 };
 
 /// Counters of a run. Host side: the lists grow with the number of changes, not of frames.

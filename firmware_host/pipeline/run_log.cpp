@@ -132,8 +132,12 @@ void RunLog::collect(const Wiring& wiring) {
   }
   if (const LoopStage* loops = wiring.loopStage()) keepLoops(*loops);
   if (MapStage* map = wiring.mapStage()) {
-    statistics_.mapping = {counters.map.frames, counters.map.without_image, counters.map.without_scene,
-                           counters.map.refused};
+    statistics_.mapping = {counters.map.frames,
+                           counters.map.without_image,
+                           counters.map.without_scene,
+                           counters.map.refused,
+                           {}};
+    if (const HeldFrames* held = wiring.heldFrames()) statistics_.mapping->held = held->counters();
     for (const auto& row : counters.map.faults.rows()) statistics_.faults[row.text] += row.count;
     listener_.onMap(*map, wiring.tiedEpochs());
   }

@@ -19,6 +19,7 @@
 //                        |                           v
 //   [track]   mapped frames' images --slots-----> [map] DEPTH, VOLUME, SURFACE, DISTANCE --> distance field
 //   [sensor]  depth, labels --slots----------------^ ^--ring-- frames with their poses, of [smooth]
+//                        |     [dds] labels that come later --places of the frames held for them--> [map]
 //                        +--ring--> [log] keyframes and IMU, kept for full smoothing after the run -> map.tum
 //   everything above, and what each stage took for a step --ring, slots--> [record] flight recorder
 //
@@ -94,6 +95,14 @@ Wiring::Wiring(const Rig& rig, const ImuNoise& noise, const Settings& settings, 
       SceneSlot& slot = to_map_->scenes.slot(i);
       if (mapping_.from_sensor) slot.depth.resize(options.depth_sensor->camera.pixels());
       if (settings.map_stage.labels) slot.labels.resize(pixels);
+    }
+    if (options.labels != nullptr && settings.map_stage.labels) {
+      std::array<std::size_t, kMaxCameras> sizes{};
+      for (std::size_t c = 0; c < rig_.camera_count; ++c) {
+        sizes[c] = static_cast<std::size_t>(rig_.camera[c].width() * rig_.camera[c].height());
+      }
+      held_ = std::make_unique<HeldFrames>(*options.labels, sizes,
+                                           mapping_.from_sensor ? options.depth_sensor->camera.pixels() : 0);
     }
   }
   if (loop_ || map_)
@@ -172,7 +181,10 @@ bool Wiring::propagate() {
   if (states_ && status.ok()) static_cast<void>(states_->tryPush(propagating_.state));
   if (status.ok()) {
     for (LiveOutlet* outlet : outlets_) {
-      outlet->state.write({propagating_.state, arrival->sample.gyro - propagating_.state.bias_gyro});
+      StateNews& news = outlet->state.draft();
+      news.state = propagating_.state;
+      news.omega_body = arrival->sample.gyro - propagating_.state.bias_gyro;
+      outlet->state.publish();
     }
   }
   addTime(times_, StageId::kImu, {wallSeconds() - arrival->host.arrival, threadCpuSeconds() - cpu});
@@ -362,6 +374,7 @@ void Wiring::addReservations(MemoryTable& table) const {
     add("loop closure", sizeof(LoopArrows) + between(before_loop_, before_map_));
   }
   if (map_) add("map", sizeof(MapArrows) + scenes + between(before_map_, after_map_));
+  if (held_) add("frames that wait for labels", static_cast<std::size_t>(held_->bytes()));
   if (keyframe_images_) add("keyframes for loop closure and map", sizeof(KeyframePool) + keyframe_images);
   add("IMU rings", sizeof(ImuRing) * 4);
   add("tracked frames", sizeof(tracked_ring_));
@@ -405,6 +418,7 @@ void Wiring::addLosses(std::map<std::string, std::uint64_t>& losses) const {
     note("labels_wrong_size", counters_.sensor.labels_wrong_size);
     note("depths_wrong_size", counters_.sensor.depths_wrong_size);
   }
+  if (held_) note("map_frames_without_labels", held_->counters().late + held_->counters().no_room);
   if (states_) note("states_to_log", states_->refused());
   if (to_recorder_) {
     note("imu_to_record", to_recorder_->imu.refused());

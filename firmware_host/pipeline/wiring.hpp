@@ -32,6 +32,7 @@
 #include "firmware_host/pipeline/arrows.hpp"
 #include "firmware_host/pipeline/effort_source.hpp"
 #include "firmware_host/pipeline/fault_counts.hpp"
+#include "firmware_host/pipeline/held_frames.hpp"
 #include "firmware_host/pipeline/live_outlet.hpp"
 #include "firmware_host/pipeline/run_log.hpp"
 #include "firmware_host/settings/settings.hpp"
@@ -127,6 +128,8 @@ class Wiring {
     /// clock; 0: never, for then whoever feeds the wiring hands them over first.
     Duration sample_patience{0};
     LiveOutlets outlets;  ///< each gets the newest of everything; they outlive the wiring
+    /// Over which labels come after their image; the map holds frames for them. Null: it does not wait.
+    LabelExchange* labels = nullptr;
     /// Called by `log` each time: what the input has to say of itself, to the log. True: there was something.
     std::function<bool(RunLog&)> remarks;
     /// Called after a stage's work with its CPU seconds, within its wall time: tests slow stages down.
@@ -179,6 +182,8 @@ class Wiring {
   /// Null where mapping is switched off; once the thread `map` has ended, but for the distance field, which
   /// any one thread may read at any time.
   [[nodiscard]] MapStage* mapStage() const { return map_.get(); }
+  /// Null where nobody sends labels after their images; once the thread `map` has ended.
+  [[nodiscard]] const HeldFrames* heldFrames() const { return held_.get(); }
   /// Earlier epochs whose worlds loop closure has tied to the newest; as mapStage().
   [[nodiscard]] std::span<const std::uint32_t> tiedEpochs() const {
     if (!to_map_) return {};
@@ -245,7 +250,11 @@ class Wiring {
   template <typename Work>
   void timed(StageId stage, Work&& work);
   void handFrame(const TrackMessage& message, const SmoothedWindow& window);
-  void mapFrame(const MapMessage& message);
+  void mapFrame(const MapMessage& message, const std::array<ImageView, kMaxCameras>& image,
+                const SceneImages& scene);
+  void holdFrames();
+  bool mapHeldFrame();
+  bool mapLeftOver(bool ended);
   [[nodiscard]] bool findMapImages(std::uint64_t frame);
   [[nodiscard]] bool findScene(Stamp stamp);
 
@@ -293,6 +302,7 @@ class Wiring {
   std::unique_ptr<KeyframePool> keyframe_images_;  ///< null where neither loop closure nor map is on
   std::unique_ptr<LoopArrows> to_loop_;            ///< null: switched off
   std::unique_ptr<MapArrows> to_map_;              ///< null: switched off
+  std::unique_ptr<HeldFrames> held_;               ///< of `map`; null where no labels are waited for
   std::unique_ptr<MeshRing> meshes_;               ///< null where nobody wants them
   std::unique_ptr<StateRing> states_;              ///< null where nobody wants them
   ResultRing results_;

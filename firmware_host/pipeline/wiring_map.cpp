@@ -1,7 +1,7 @@
 // The thread `map`: frames with their images, depth and labels, to volume, surface and distance field.
 //
 // Mapped are: with a depth sensor, frames that have a depth image; else keyframes seen by both cameras, and
-// frames that have labels.
+// frames that have labels. Where labels come after their images (Options::labels) frames are held for them.
 
 #include <algorithm>
 
@@ -126,35 +126,70 @@ void Wiring::handFrame(const TrackMessage& message, const SmoothedWindow& window
 // frames with poses, images, depth, labels, newest correction -> depth -> volume -> surface, distance field
 bool Wiring::map() {
   const bool ended = smoothDone() && loopDone();
-  const MapMessage* message = to_map_ ? to_map_->frames.front() : nullptr;
-  if (message == nullptr) {
-    if (map_ && map_->isCorrecting()) {
-      stepCorrection();
-      return true;
-    }
-    if (map_ && map_->counters().taken > 0 && !ended && !mapping_.report.distance.caught_up) {
-      // Time that no frame asks for: waves that the last step left.
-      timed(StageId::kDistance, [&] { map_->updateDistance(mapping_.vehicle, {}, mapping_.report); });
-      return true;
-    }
-    if (ended && !mapDone()) {
-      if (map_) map_->drawRest();
-      mapping_.images.reset();
-      mapping_.scene.reset();
-      map_done_.store(true, std::memory_order_release);
-    }
-    return false;
+  if (held_) {
+    holdFrames();
+    return mapHeldFrame() || mapLeftOver(ended && held_->empty());
   }
+  const MapMessage* message = to_map_ ? to_map_->frames.front() : nullptr;
+  if (message == nullptr) return mapLeftOver(ended);
   ++counters_.map.frames;
   correctMap(*message);
   if (findMapImages(message->frame)) {
-    mapFrame(*message);
+    mapFrame(*message, mapping_.images->image,
+             findScene(message->stamp) ? mapping_.scene->images : SceneImages{});
   } else {
     ++counters_.map.without_image;
   }
   to_map_->frames.pop();
   if (map_->isCorrecting()) stepCorrection();
   return true;
+}
+
+// frames with poses, images, depth -> held for their labels
+void Wiring::holdFrames() {
+  while (const MapMessage* message = held_->full() ? nullptr : to_map_->frames.front()) {
+    const bool has_images = findMapImages(message->frame);
+    const SceneImages scene =
+        has_images && findScene(message->stamp) ? mapping_.scene->images : SceneImages{};
+    held_->hold(*message, has_images ? &*mapping_.images : nullptr, scene, wallSeconds());
+    to_map_->frames.pop();
+  }
+}
+
+/// The oldest of those held, where it need not wait any more.
+bool Wiring::mapHeldFrame() {
+  const HeldFrames::Frame* frame = held_->due(wallSeconds());
+  if (frame == nullptr) return false;
+  ++counters_.map.frames;
+  correctMap(frame->message);
+  if (frame->has_images) {
+    mapFrame(frame->message, frame->image, frame->scene);
+  } else {
+    ++counters_.map.without_image;
+  }
+  held_->drop();
+  if (map_->isCorrecting()) stepCorrection();
+  return true;
+}
+
+/// What is to do while no frame is there; `ended`: none will come.
+bool Wiring::mapLeftOver(bool ended) {
+  if (map_ && map_->isCorrecting()) {
+    stepCorrection();
+    return true;
+  }
+  if (map_ && map_->counters().taken > 0 && !ended && !mapping_.report.distance.caught_up) {
+    // Time that no frame asks for: waves that the last step left.
+    timed(StageId::kDistance, [&] { map_->updateDistance(mapping_.vehicle, {}, mapping_.report); });
+    return true;
+  }
+  if (ended && !mapDone()) {
+    if (map_) map_->drawRest();
+    mapping_.images.reset();
+    mapping_.scene.reset();
+    map_done_.store(true, std::memory_order_release);
+  }
+  return false;
 }
 
 // newest window, newest correction -> poses of what was fused before
@@ -177,7 +212,8 @@ void Wiring::stepCorrection() {
   if (mapping_.corrected.waiting == 0) drawMap();
 }
 
-void Wiring::mapFrame(const MapMessage& message) {
+void Wiring::mapFrame(const MapMessage& message, const std::array<ImageView, kMaxCameras>& image,
+                      const SceneImages& scene) {
   MapInput input;
   input.stamp = message.stamp;
   input.frame = message.frame;
@@ -188,11 +224,10 @@ void Wiring::mapFrame(const MapMessage& message) {
     input.T_map_world = now.T_map_world;
     input.T_map_body = now.T_map_world * input.T_map_body;
   }
-  input.image = mapping_.images->image;
-  if (findScene(message.stamp)) {
-    input.depth = mapping_.scene->images.depth;
-    input.labels = mapping_.scene->images.labels;
-  } else if (mapping_.from_sensor) {
+  input.image = image;
+  input.depth = scene.depth;
+  input.labels = scene.labels;
+  if (mapping_.from_sensor && scene.empty()) {
     ++counters_.map.without_scene;
     return;
   }

@@ -1,0 +1,125 @@
+#pragma once
+// Images that the map waits to see labelled: they go out to whoever labels them, labels come back by stamp.
+//
+// Two threads. The map's opens a place for each frame that it holds and closes it when it maps the frame; the
+// other side (ROS 2's) shows the image of each open place once and offers labels. Labels are copied straight
+// into the place that waits for their stamp, exactly; nobody else's can push them out. Labels that are ahead
+// of the map's frames (of one who watches the camera himself) wait at the other side's: the last kEarly of
+// them. All others are counted and dropped. Neither side ever waits for the other: a place that the other
+// side works on is not closed now, and the map comes again. Memory: kPlaces images and labels, kEarly labels,
+// of camera 0's size. Cost: of an offer that nobody waits for a comparison a place, else a copy.
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "estimator/core/image_view.hpp"
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+class LabelExchange {
+ public:
+  static constexpr std::size_t kPlaces = 8;
+  static constexpr std::size_t kEarly = 4;
+
+  /// Of the other side; for others once it has ended.
+  struct Counters {
+    std::uint64_t shown = 0;       ///< images
+    std::uint64_t offered = 0;     ///< labels
+    std::uint64_t taken = 0;       ///< into a place that waited for them
+    std::uint64_t wrong_size = 0;  ///< not camera 0's
+    std::uint64_t unawaited = 0;   ///< too late, or of no frame that is mapped
+  };
+
+  /// Size of camera 0's images. `patience`: how long the map may hold a frame.
+  LabelExchange(int width, int height, Duration patience);
+
+  [[nodiscard]] std::int64_t bytes() const;
+  [[nodiscard]] Duration patience() const { return patience_; }
+
+  // The map's thread.
+
+  /// The place that now holds a copy of `image`, of this exchange's size; -1: none is free.
+  int open(Stamp stamp, const ImageView& image);
+  /// Its image, until freed.
+  [[nodiscard]] ImageView image(int place) const { return viewOf(at(place).image); }
+  [[nodiscard]] bool isLabelled(int place) const {
+    return at(place).state.load(std::memory_order_acquire) == State::kLabelled;
+  }
+  /// From then on the other side leaves it alone. False: it is at it right now.
+  [[nodiscard]] bool tryClose(int place);
+  /// Of a closed place; empty where none came.
+  [[nodiscard]] ImageView labels(int place) const;
+  void free(int place);
+  /// Whether there is anybody whose labels could come.
+  [[nodiscard]] bool hasLabeller() const { return has_labeller_.load(std::memory_order_relaxed); }
+
+  // The other side's thread.
+
+  void setLabeller(bool present) { has_labeller_.store(present, std::memory_order_relaxed); }
+  /// Calls `take(stamp, image)` for the oldest image that was not shown yet; false: there is none.
+  template <typename Take>
+  bool show(Take&& take) {
+    Place* const place = oldestUnseen();
+    if (place == nullptr) return false;
+    struct LetGo {
+      Place& place;
+      ~LetGo() { place.state.store(State::kOpen, std::memory_order_release); }
+    } let_go{*place};
+    ++counters_.shown;
+    last_shown_ = place->number;
+    take(place->stamp, viewOf(place->image));
+    return true;
+  }
+  /// Labels of the image of `stamp`; copied where somebody waits for them.
+  void offer(Stamp stamp, const ImageView& labels);
+  /// Now and then: offers again what came early.
+  void retryEarly();
+  [[nodiscard]] const Counters& counters() const { return counters_; }
+
+ private:
+  enum class State : std::uint32_t {
+    kFree,
+    kOpen,
+    kBusy,      ///< the other side's for a moment
+    kLabelled,  ///< open, with labels
+    kClosed,
+  };
+  struct Place {
+    std::atomic<State> state{State::kFree};
+    Stamp stamp;               ///< of whoever has the place: the map's, the other side's while kBusy
+    std::uint64_t number = 0;  ///< from 1, in the order of opening
+    bool labelled = false;
+    std::vector<std::uint8_t> image, labels;
+  };
+  struct Early {
+    Stamp stamp{kNever};
+    std::vector<std::uint8_t> labels;
+  };
+  static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
+
+  [[nodiscard]] const Place& at(int place) const { return places_[static_cast<std::size_t>(place)]; }
+  [[nodiscard]] Place& at(int place) { return places_[static_cast<std::size_t>(place)]; }
+  [[nodiscard]] ImageView viewOf(const std::vector<std::uint8_t>& pixels) const {
+    return {pixels.data(), width_, height_, width_};
+  }
+  [[nodiscard]] Place* oldestUnseen();
+  bool hand(Stamp stamp, const ImageView& labels);
+
+  int width_, height_;
+  Duration patience_;
+  std::array<Place, kPlaces> places_;
+  std::atomic<std::int64_t> newest_{kNever};  ///< stamp of those that were opened
+  std::atomic<bool> has_labeller_{false};
+  std::uint64_t opened_ = 0;  ///< of the map's thread
+  // Of the other side's.
+  std::uint64_t last_shown_ = 0;
+  std::array<Early, kEarly> early_;
+  std::size_t next_early_ = 0;
+  Counters counters_;
+};
+
+}  // namespace swiftlet
