@@ -1,8 +1,11 @@
 #include "drivers/dds/dds_link.hpp"
 
 #include <dds/dds.h>
+#include <net/if.h>
 
 #include <algorithm>
+#include <atomic>
+#include <cstdio>
 #include <cstring>
 
 #include "drivers/dds/ros_messages.h"  // made by idlc from ros_messages.idl
@@ -14,7 +17,8 @@ using Odometry = nav_msgs_msg_dds__Odometry_;
 using Header = std_msgs_msg_dds__Header_;
 
 constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-constexpr int kKept = 16;       ///< messages of a topic that a late or slow subscriber can still get
+constexpr int kKept = 16;       ///< diagnostics that a late or slow subscriber can still get
+constexpr int kKeptOut = 4;     ///< images likewise
 constexpr int kTriangles = 11;  ///< visualization_msgs/Marker::TRIANGLE_LIST
 constexpr int kAdd = 0;
 constexpr int kDelete = 2;
@@ -29,14 +33,42 @@ std::string configuration(const DdsSettings& settings) {
   const bool loopback = settings.interface == "lo";
   std::string text = "<General><Interfaces><NetworkInterface name=\"" + settings.interface +
                      "\"/></Interfaces><AllowMulticast>" + (loopback ? "false" : "spdp") +
-                     "</AllowMulticast></General><Internal><Watermarks><WhcHigh>" + kWatermark +
-                     "</WhcHigh></Watermarks></Internal>";
+                     "</AllowMulticast></General><Internal><MaxSampleSize>" +
+                     std::to_string(kLargestMessage) + " B</MaxSampleSize><Watermarks><WhcHigh>" +
+                     kWatermark + "</WhcHigh></Watermarks></Internal>";
   if (loopback) {
     text +=
         "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32"
         "</MaxAutoParticipantIndex><Peers><Peer address=\"127.0.0.1\"/></Peers></Discovery>";
   }
   return text;
+}
+
+/// What the library has to say goes to stderr, the first few lines: a flood of messages that are too large
+/// gives one each.
+void complain(void* lines, const dds_log_data_t* data) {
+  constexpr std::uint64_t kShown = 8;
+  if (static_cast<std::atomic<std::uint64_t>*>(lines)->fetch_add(1, std::memory_order_relaxed) < kShown) {
+    std::fprintf(stderr, "dds: %s", data->message);
+  }
+}
+/// Of all links: the library has one place for them.
+std::atomic<std::uint64_t>& complaints() {
+  static std::atomic<std::uint64_t> lines{0};
+  return lines;
+}
+
+/// Names of the network interfaces, with commas; `wanted` is set if it is one of them.
+std::string interfaces(const std::string& wanted, bool& found) {
+  std::string names;
+  found = false;
+  struct if_nameindex* const list = if_nameindex();
+  for (const struct if_nameindex* it = list; it != nullptr && it->if_name != nullptr; ++it) {
+    names += (names.empty() ? "" : ", ") + std::string(it->if_name);
+    found = found || wanted == it->if_name;
+  }
+  if (list != nullptr) if_freenameindex(list);
+  return names;
 }
 
 /// The message is read while it is written out and not kept: what C wants without const stays ours.
@@ -82,6 +114,26 @@ dds_qos_t* quality(bool reliable, int kept) {
   return qos;
 }
 
+/// False: not 8 bits, or smaller than it says.
+bool copyImage(const sensor_msgs_msg_dds__Image_& from, DdsImage& image) {
+  const std::string_view encoding = from.encoding;
+  const std::uint64_t needed = static_cast<std::uint64_t>(from.step) * from.height;
+  if ((encoding != "mono8" && encoding != "8UC1") || from.width == 0 || from.height == 0 ||
+      from.width > kMaxSide || from.height > kMaxSide || from.step < from.width ||
+      from.data._length < needed) {
+    return false;
+  }
+  image.stamp.ns = from.header.stamp.sec * kNsPerSecond + from.header.stamp.nanosec;
+  image.frame = from.header.frame_id;
+  image.width = static_cast<int>(from.width);
+  image.height = static_cast<int>(from.height);
+  image.pixels.resize(static_cast<std::size_t>(from.width) * from.height);
+  for (std::size_t y = 0; y < from.height; ++y) {
+    std::memcpy(image.pixels.data() + y * from.width, from.data._buffer + y * from.step, from.width);
+  }
+  return true;
+}
+
 }  // namespace
 
 struct DdsLink::Entities {
@@ -93,6 +145,9 @@ struct DdsLink::Entities {
   dds_entity_t cloud = 0;
   dds_entity_t diagnostics = 0;
   dds_entity_t labels = 0;
+  dds_entity_t image = 0;
+  std::atomic<std::uint64_t> images_came{0};  ///< counted by the library's thread
+  std::uint64_t images_seen = 0;
 
   // Room of the messages on their way out.
   std::array<std::string, 8> texts;
@@ -123,10 +178,15 @@ struct DdsLink::Entities {
     dds_delete_qos(qos);
     return made;
   }
-  [[nodiscard]] dds_entity_t reader(const dds_topic_descriptor_t& type, const std::string& name) const {
+  [[nodiscard]] dds_entity_t reader(const dds_topic_descriptor_t& type, const std::string& name) {
     // Best effort meets both kinds of writers, and asks no writer to wait for us.
-    dds_qos_t* qos = quality(false, 1);
-    const dds_entity_t made = dds_create_reader(participant, topic(type, name), qos, nullptr);
+    dds_qos_t* qos = quality(false, kKeptImages);
+    dds_listener_t* listener = dds_create_listener(&images_came);
+    dds_lset_data_available(listener, [](dds_entity_t, void* came) {
+      static_cast<std::atomic<std::uint64_t>*>(came)->fetch_add(1, std::memory_order_relaxed);
+    });
+    const dds_entity_t made = dds_create_reader(participant, topic(type, name), qos, listener);
+    dds_delete_listener(listener);
     dds_delete_qos(qos);
     return made;
   }
@@ -138,20 +198,27 @@ DdsLink::~DdsLink() = default;
 bool DdsLink::open(const DdsSettings& settings) {
   entities_ = std::make_unique<Entities>();
   Entities& e = *entities_;
-  const auto failed = [this](const std::string& what, std::int32_t result) {
-    error_ = what + ": " + dds_strretcode(result);
+  const auto failed = [this](const std::string& what, std::int32_t result = DDS_RETCODE_OK) {
+    error_ = what;
+    if (result != DDS_RETCODE_OK) error_ += std::string(" (") + dds_strretcode(result) + ")";
     entities_.reset();
     return false;
   };
   if (settings.prefix.empty() || settings.prefix.front() != '/' ||
       (!settings.label_topic.empty() && settings.label_topic.front() != '/')) {
-    return failed("a topic of ROS begins with /", DDS_RETCODE_BAD_PARAMETER);
+    return failed("a topic of ROS begins with /");
   }
+  bool found = false;
+  const std::string names = interfaces(settings.interface, found);
+  if (!found) {
+    return failed("there is no network interface '" + settings.interface + "', only " + names);
+  }
+  dds_set_log_sink(complain, &complaints());
   e.domain = dds_create_domain(settings.domain, configuration(settings).c_str());
   if (e.domain < 0) {
     return failed("DDS domain " + std::to_string(settings.domain) +
                       " cannot be opened on the network interface " + settings.interface +
-                      ": name one that `ip link` shows, and open a domain once in a program",
+                      ": it has to be up and have an address, and a program opens a domain once",
                   e.domain);
   }
   e.participant = dds_create_participant(settings.domain, nullptr, nullptr);
@@ -161,15 +228,17 @@ bool DdsLink::open(const DdsSettings& settings) {
                       ": 32 programs at most do on one computer",
                   e.participant);
   }
-  e.odometry = e.writer(nav_msgs_msg_dds__Odometry__desc, settings.prefix + "/odometry", kKept);
-  e.transforms = e.writer(tf2_msgs_msg_dds__TFMessage__desc, "/tf", kKept);
+  e.odometry = e.writer(nav_msgs_msg_dds__Odometry__desc, settings.prefix + "/odometry", kKeptStates);
+  e.transforms = e.writer(tf2_msgs_msg_dds__TFMessage__desc, "/tf", kKeptStates);
   e.mesh = e.writer(visualization_msgs_msg_dds__Marker__desc, settings.prefix + "/local_mesh", 1);
   e.cloud = e.writer(sensor_msgs_msg_dds__PointCloud2__desc, settings.prefix + "/surface", 1);
   e.diagnostics = e.writer(diagnostic_msgs_msg_dds__DiagnosticArray__desc, "/diagnostics", kKept);
   if (!settings.label_topic.empty()) {
     e.labels = e.reader(sensor_msgs_msg_dds__Image__desc, settings.label_topic);
+    e.image = e.writer(sensor_msgs_msg_dds__Image__desc, settings.prefix + "/mapped_image", kKeptOut);
   }
-  for (const dds_entity_t made : {e.odometry, e.transforms, e.mesh, e.cloud, e.diagnostics, e.labels}) {
+  for (const dds_entity_t made :
+       {e.odometry, e.transforms, e.mesh, e.cloud, e.diagnostics, e.labels, e.image}) {
     if (made < 0) return failed("a DDS topic cannot be made", made);
   }
   return true;
@@ -191,7 +260,9 @@ bool DdsLink::publish(const DdsOdometry& odometry) {
   message.child_frame_id = text(odometry.child_frame, entities_->texts[1]);
   const Eigen::Vector3d& p = odometry.T_frame_child.translation;
   message.pose.pose = {{p.x(), p.y(), p.z()}, turned(odometry.T_frame_child.rotation)};
-  message.twist.twist.linear = {odometry.velocity.x(), odometry.velocity.y(), odometry.velocity.z()};
+  const Eigen::Vector3d& v = odometry.velocity;
+  const Eigen::Vector3d& omega = odometry.angular_velocity;
+  message.twist.twist = {{v.x(), v.y(), v.z()}, {omega.x(), omega.y(), omega.z()}};
   std::ranges::copy(odometry.pose_covariance, message.pose.covariance);
   std::ranges::copy(odometry.twist_covariance, message.twist.covariance);
   return wrote(dds_write(entities_->odometry, &message));
@@ -300,38 +371,59 @@ bool DdsLink::publish(Stamp stamp, std::span<const DdsStatus> statuses) {
   return wrote(dds_write(e.diagnostics, &message));
 }
 
+bool DdsLink::publish(const DdsImageView& view) {
+  if (!entities_ || entities_->image <= 0 || view.image.empty()) return false;
+  Entities& e = *entities_;
+  const ImageView& image = view.image;
+  const auto width = static_cast<std::size_t>(image.width);
+  e.bytes.resize(width * static_cast<std::size_t>(image.height));
+  for (int y = 0; y < image.height; ++y) {
+    std::memcpy(e.bytes.data() + static_cast<std::size_t>(y) * width, image.row(y), width);
+  }
+  sensor_msgs_msg_dds__Image_ message{};
+  message.header = Header{timeOf(view.stamp), text(view.frame, e.texts[0])};
+  message.width = static_cast<std::uint32_t>(image.width);
+  message.height = static_cast<std::uint32_t>(image.height);
+  message.encoding = text("mono8", e.texts[1]);
+  message.step = message.width;
+  lend(message.data, e.bytes);
+  return wrote(dds_write(e.image, &message));
+}
+
 bool DdsLink::takeLabels(DdsImage& image) {
   if (!entities_ || entities_->labels <= 0) return false;
-  bool taken = false;
   void* sample = nullptr;
   dds_sample_info_t info;
-  while (dds_take(entities_->labels, &sample, &info, 1, 1) > 0) {
+  for (int looked = 0; looked < kKeptImages; ++looked) {
+    if (dds_take(entities_->labels, &sample, &info, 1, 1) <= 0) return false;
+    bool taken = false;
     if (info.valid_data) {
-      const auto& from = *static_cast<const sensor_msgs_msg_dds__Image_*>(sample);
-      const std::string_view encoding = from.encoding;
-      const bool bytes = encoding == "mono8" || encoding == "8UC1";
-      const std::uint64_t needed = static_cast<std::uint64_t>(from.step) * from.height;
-      if (!bytes || from.width == 0 || from.height == 0 || from.width > kMaxSide || from.height > kMaxSide ||
-          from.step < from.width || from.data._length < needed) {
-        ++counters_.images_refused;
-      } else {
-        if (taken) ++counters_.images_skipped;
-        taken = true;
-        ++counters_.images;
-        image.stamp.ns = from.header.stamp.sec * kNsPerSecond + from.header.stamp.nanosec;
-        image.frame = from.header.frame_id;
-        image.width = static_cast<int>(from.width);
-        image.height = static_cast<int>(from.height);
-        image.pixels.resize(static_cast<std::size_t>(from.width) * from.height);
-        for (std::size_t y = 0; y < from.height; ++y) {
-          std::memcpy(image.pixels.data() + y * from.width, from.data._buffer + y * from.step, from.width);
-        }
-      }
+      ++entities_->images_seen;
+      taken = copyImage(*static_cast<const sensor_msgs_msg_dds__Image_*>(sample), image);
+      ++(taken ? counters_.images : counters_.images_refused);
     }
     dds_return_loan(entities_->labels, &sample, 1);
     sample = nullptr;
+    if (taken) return true;
   }
-  return taken;
+  return false;
+}
+
+int DdsLink::labellers() const {
+  if (!entities_ || entities_->labels <= 0) return 0;
+  dds_subscription_matched_status_t status{};
+  if (dds_get_subscription_matched_status(entities_->labels, &status) < 0) return 0;
+  return static_cast<int>(status.current_count);
+}
+
+DdsCounters DdsLink::counters() const {
+  DdsCounters counters = counters_;
+  counters.complaints = complaints().load(std::memory_order_relaxed);
+  if (entities_) {
+    const std::uint64_t came = entities_->images_came.load(std::memory_order_relaxed);
+    counters.images_skipped = came - std::min(came, entities_->images_seen);
+  }
+  return counters;
 }
 
 int DdsLink::subscribers() const {

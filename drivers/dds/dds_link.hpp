@@ -6,9 +6,10 @@
 // and the library's throttle is out of reach, so that a subscriber that is slow, stopped or killed costs its
 // own messages and nobody else's. What a writer refuses all the same is counted. One thread calls publish and
 // take; the library has threads of its own, which inherit the scheduling of who called open(). Network:
-// loopback and unicast unless DdsSettings::interface names another. Memory: the last messages of each writer,
-// at most 16 of each topic, 1 of those with meshes and surfaces; grows to the largest message seen. No
-// exceptions.
+// loopback and unicast unless DdsSettings::interface names another. Memory: what a subscriber has not yet
+// acknowledged, at most the last kKeptStates odometries and transforms, 16 diagnostics, 4 images, 1 mesh, 1
+// surface; kKeptImages label images that were not yet taken; grows to the largest message seen, at most
+// kLargestMessage: larger ones are neither sent nor received. No exceptions.
 
 #include <Eigen/Core>
 #include <array>
@@ -20,16 +21,22 @@
 #include <utility>
 #include <vector>
 
+#include "estimator/core/image_view.hpp"
 #include "estimator/core/stamp.hpp"
 #include "estimator/geometry/se3.hpp"
 
 namespace swiftlet {
 
+/// One second at 200 Hz: a reader that gets no CPU for less loses nothing.
+inline constexpr int kKeptStates = 200;
+inline constexpr int kKeptImages = 8;
+inline constexpr std::size_t kLargestMessage = std::size_t{16} * 1024 * 1024;
+
 struct DdsSettings {
   std::uint32_t domain = 0;          ///< ROS_DOMAIN_ID, 0 to 232
   std::string interface = "lo";      ///< network interface; "lo": this computer alone
   std::string prefix = "/swiftlet";  ///< of our topics; /tf and /diagnostics have none
-  std::string label_topic;           ///< sensor_msgs/Image to read; empty: none
+  std::string label_topic;           ///< sensor_msgs/Image to read; empty: none, and no image goes out
 };
 
 struct DdsOdometry {
@@ -37,9 +44,10 @@ struct DdsOdometry {
   std::string_view frame;
   std::string_view child_frame;
   SE3 T_frame_child;
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s, child axes
-  std::array<double, 36> pose_covariance{};            ///< x y z, rotations about the frame's axes; rows
-  std::array<double, 36> twist_covariance{};           ///< child axes; rows
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< m/s, child axes
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< rad/s, child axes
+  std::array<double, 36> pose_covariance{};   ///< x y z, rotations about the frame's axes; rows
+  std::array<double, 36> twist_covariance{};  ///< child axes; rows
 };
 
 struct DdsTransform {
@@ -76,6 +84,13 @@ struct DdsStatus {
   std::vector<std::pair<std::string, std::string>> values;
 };
 
+/// On its way out, as mono8.
+struct DdsImageView {
+  Stamp stamp;
+  std::string_view frame;
+  ImageView image;
+};
+
 /// An 8-bit image, rows without gaps.
 struct DdsImage {
   Stamp stamp;
@@ -88,9 +103,10 @@ struct DdsImage {
 struct DdsCounters {
   std::uint64_t written = 0;
   std::uint64_t refused = 0;         ///< by the library: it would have had to wait
+  std::uint64_t complaints = 0;      ///< lines of the library; a message that is too large gives one
   std::uint64_t images = 0;          ///< taken
-  std::uint64_t images_skipped = 0;  ///< a newer one had come before they were looked at
   std::uint64_t images_refused = 0;  ///< not 8 bits, or smaller than they say
+  std::uint64_t images_skipped = 0;  ///< kKeptImages newer ones had come before they were looked at
 };
 
 class DdsLink {
@@ -110,12 +126,17 @@ class DdsLink {
   bool publish(const DdsMesh& mesh);
   bool publish(const DdsCloud& cloud);
   bool publish(Stamp stamp, std::span<const DdsStatus> statuses);
-  /// The newest label image that was not taken yet; false where there is none.
+  /// Camera 0's, for who labels it. Only where there is a label topic.
+  bool publish(const DdsImageView& image);
+  /// The oldest label image that was not taken yet; looks at kKeptImages at most, whatever they are. False
+  /// where there is none.
   bool takeLabels(DdsImage& image);
+  /// Writers of the label topic that are there now.
+  [[nodiscard]] int labellers() const;
 
   /// Subscribers of the odometry that are there now.
   [[nodiscard]] int subscribers() const;
-  [[nodiscard]] const DdsCounters& counters() const { return counters_; }
+  [[nodiscard]] DdsCounters counters() const;
 
  private:
   struct Entities;

@@ -59,8 +59,9 @@ bool flyThreaded(const Calibration& calibration, SensorInput& input, const Setti
   wanted.track_effort = &governors.track;
   wanted.smooth_effort = &governors.smooth;
   wanted.arming = &arming;
-  LiveConsumers consumers(settings, request);
+  LiveConsumers consumers(calibration, settings, request);
   wanted.outlets = consumers.outlets();
+  wanted.labels = consumers.labels();
   wanted.remarks = [&consumers, of_input = std::move(wanted.remarks)](RunLog& to) {
     const bool any = of_input && of_input(to);
     return consumers.drainRemarks(to) || any;
@@ -69,6 +70,7 @@ bool flyThreaded(const Calibration& calibration, SensorInput& input, const Setti
   reserveHeap(kHeapReserve);
   MemoryTable reserved;
   wiring->addReservations(reserved);
+  if (wanted.labels != nullptr) reserved.add("images to be labelled", wanted.labels->bytes());
   reserved.add("heap of the low threads", static_cast<std::int64_t>(kHeapReserve));
   MemoryLockReport lock;
   if (settings.realtime.lock_memory && settings.realtime.enabled) {

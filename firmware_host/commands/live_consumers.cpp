@@ -2,37 +2,72 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstdio>
 
 #include "drivers/calibration/input_error.hpp"
 
 namespace swiftlet {
+namespace {
 
-LiveConsumers::LiveConsumers(const Settings& settings, const FlightRequest& request) {
+void checkAutopilot(const Settings& settings, const FlightRequest& request) {
+  const std::string& device = settings.autopilot.device;
+  if (device == settings.imu_link.device) {
+    throw InputError("settings", 0, "autopilot.device", device + " is the IMU's port",
+                     "Give the autopilot a port of its own, or UDP");
+  }
+  if (request.speed != 1) {
+    throw InputError("--speed", 0, "", "an autopilot is told of a flight at its own speed",
+                     "Leave --speed out, or autopilot.device empty");
+  }
+}
+
+void checkLabels(const Settings& settings) {
+  const std::string& topic = settings.ros2.label_topic;
+  if (topic.front() != '/') {
+    throw InputError("settings", 0, "ros2.label_topic", "'" + topic + "' is no topic's name",
+                     "Begin it with a slash, as /segmentation/labels");
+  }
+  if (!settings.map.enabled || !settings.map_stage.labels) {
+    throw InputError("settings", 0, "ros2.label_topic", "labels go into the map, and none is made of them",
+                     "Switch map.enabled and map.labels on (--map), or leave ros2.label_topic empty");
+  }
+}
+
+}  // namespace
+
+LiveConsumers::LiveConsumers(const Calibration& calibration, const Settings& settings,
+                             const FlightRequest& request) {
   if (!settings.autopilot.device.empty()) {
-    if (settings.autopilot.device == settings.imu_link.device) {
-      throw InputError("settings", 0, "autopilot.device", settings.autopilot.device + " is the IMU's port",
-                       "Give the autopilot a port of its own, or UDP");
-    }
-    if (request.speed != 1) {
-      throw InputError("--speed", 0, "", "an autopilot is told of a flight at its own speed",
-                       "Leave --speed out, or autopilot.device empty");
-    }
-    const RealtimeGroup& realtime = settings.realtime;
-    autopilot_ = std::make_unique<AutopilotThread>(
-        newOutlet(autopilot_outlet_), AutopilotThreadOptions{settings.autopilot, request.host_stamps,
-                                                             realtime.enabled ? realtime.mesh_priority : 0});
+    checkAutopilot(settings, request);
+    AutopilotThreadOptions options;
+    options.settings = settings.autopilot;
+    options.host_stamps = request.host_stamps;
+    options.priority = settings.realtime.enabled ? settings.realtime.mesh_priority : 0;
+    autopilot_ = std::make_unique<AutopilotThread>(newOutlet(autopilot_outlet_), options);
   }
-  if (settings.ros2.enabled) {
-    ros2_ = std::make_unique<DdsThread>(
-        newOutlet(ros2_outlet_),
-        DdsThreadOptions{settings.ros2, request.host_stamps ? realtimeOffset() : Duration{0}});
-  }
+  if (settings.ros2.enabled) openRos2(calibration, settings, request);
   if (request.view) {
     view_ = std::make_unique<ViewThread>(newOutlet(view_outlet_), *request.view, request.name);
     fmt::print("live view: {}\n", view_->url());
     std::fflush(stdout);  // who reads through a pipe wants to look now
   }
+}
+
+void LiveConsumers::openRos2(const Calibration& calibration, const Settings& settings,
+                             const FlightRequest& request) {
+  DdsThreadOptions options;
+  options.settings = settings.ros2;
+  if (request.host_stamps) options.to_ros_clock = realtimeOffset();
+  options.gyro_sigma = calibration.noise.gyro_density * std::sqrt(calibration.noise.rate_hz);
+  if (!settings.ros2.label_topic.empty()) {
+    checkLabels(settings);
+    const CameraModel& camera = calibration.rig.camera[0];
+    labels_ = std::make_unique<LabelExchange>(camera.width(), camera.height(),
+                                              Duration::fromSeconds(settings.ros2.label_patience));
+    options.labels = labels_.get();
+  }
+  ros2_ = std::make_unique<DdsThread>(newOutlet(ros2_outlet_), options);
 }
 
 LiveOutlet& LiveConsumers::newOutlet(std::unique_ptr<LiveOutlet>& owner) {

@@ -1,7 +1,7 @@
 #pragma once
-// Who follows a run while it goes on, each from a thread of its own: an autopilot, ROS 2's topics, the live
-// view. Opened before the wiring is built, ended after the executor. An executor that is not real-time has
-// none.
+// Who follows a run while it goes on, each from a thread of its own: an autopilot, ROS 2's topics and labels
+// by them, the live view. Opened before the wiring is built, ended after the executor. An executor that is
+// not real-time has none.
 
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -9,6 +9,7 @@
 #include "firmware_host/autopilot/autopilot_thread.hpp"
 #include "firmware_host/commands/fly_threaded.hpp"
 #include "firmware_host/dds/dds_thread.hpp"
+#include "firmware_host/pipeline/label_exchange.hpp"
 #include "firmware_host/pipeline/live_outlet.hpp"
 #include "firmware_host/view/view_thread.hpp"
 
@@ -17,22 +18,26 @@ namespace swiftlet {
 class LiveConsumers {
  public:
   /// Opens those that settings and request switch on. InputError naming the option where one does not open.
-  LiveConsumers(const Settings& settings, const FlightRequest& request);
+  LiveConsumers(const Calibration& calibration, const Settings& settings, const FlightRequest& request);
 
   /// For Wiring::Options; they live as long as this.
   [[nodiscard]] const LiveOutlets& outlets() const { return outlets_; }
+  /// Likewise; null where nobody brings labels.
+  [[nodiscard]] LabelExchange* labels() const { return labels_.get(); }
   /// What they have to say of themselves since the last call, to the log. True: there was something.
   bool drainRemarks(RunLog& log);
   /// Ends them; `report` gets what each counted under its own name.
   void finish(nlohmann::ordered_json& report);
 
  private:
+  void openRos2(const Calibration& calibration, const Settings& settings, const FlightRequest& request);
   LiveOutlet& newOutlet(std::unique_ptr<LiveOutlet>& owner);
 
   LiveOutlets outlets_;
   std::unique_ptr<LiveOutlet> autopilot_outlet_;
   std::unique_ptr<AutopilotThread> autopilot_;
   std::unique_ptr<LiveOutlet> ros2_outlet_;
+  std::unique_ptr<LabelExchange> labels_;
   std::unique_ptr<DdsThread> ros2_;
   std::unique_ptr<LiveOutlet> view_outlet_;
   std::unique_ptr<ViewThread> view_;

@@ -20,7 +20,11 @@ namespace {
 
 constexpr double kSurfacePeriod = 2;      // s: as large as a map is, nobody looks more often
 constexpr double kDiagnosticsPeriod = 1;  // s; a change of health goes out at once
+/// Most between two looks at labels and at images to be labelled [s]: of 1600 images a second none is
+/// overrun by others.
+constexpr double kLabelPeriod = kKeptImages / 1600.0;
 constexpr float kFullColour = 255;
+constexpr const char* kCameraFrame = "cam0";
 
 Eigen::Vector3f colourOf(std::uint8_t label, std::uint8_t grey) {
   const auto [r, g, b] = label == 0 ? std::array{grey, grey, grey} : labelColour(label);
@@ -52,9 +56,10 @@ class DdsThread::Work {
     DdsSettings settings;
     settings.domain = static_cast<std::uint32_t>(options.settings.domain);
     settings.interface = options.settings.interface;
+    if (options.labels != nullptr) settings.label_topic = options.settings.label_topic;
     if (!link_.open(settings)) {
       throw InputError("settings", 0, "ros2.interface, ros2.domain", link_.error(),
-                       "Switch it off with ros2.enabled: false");
+                       "Or switch it off with ros2.enabled: false");
     }
     ThreadSettings thread;
     thread.name = "dds";
@@ -70,20 +75,33 @@ class DdsThread::Work {
     thread_.join();
   }
   [[nodiscard]] nlohmann::ordered_json json() const {
-    return {{"odometry", odometries_},
-            {"meshes", meshes_},
-            {"surfaces", surfaces_},
-            {"written", link_.counters().written},
-            {"refused", link_.counters().refused}};
+    const DdsCounters link = link_.counters();
+    nlohmann::ordered_json json = {{"odometry", odometries_}, {"meshes", meshes_},
+                                   {"surfaces", surfaces_},   {"written", link.written},
+                                   {"refused", link.refused}, {"complaints", link.complaints}};
+    if (options_.labels != nullptr) {
+      const LabelExchange::Counters& labels = options_.labels->counters();
+      json["labels"] = {{"images_shown", labels.shown},
+                        {"received", link.images + link.images_refused + link.images_skipped},
+                        {"used", labels.taken},
+                        {"overrun", link.images_skipped},
+                        {"wrong_encoding", link.images_refused},
+                        {"wrong_size", labels.wrong_size},
+                        {"unawaited", labels.unawaited}};
+    }
+    return json;
   }
 
  private:
   void run() {
-    const double period = 1 / options_.settings.odometry_hz;
+    const double state_period = 1 / options_.settings.odometry_hz;
+    const double turns = options_.labels != nullptr ? std::ceil(state_period / kLabelPeriod) : 1;
+    const double period = state_period / turns;
     double next = wallSeconds();
-    while (!stop_.load(std::memory_order_relaxed)) {
+    for (double turn = 0; !stop_.load(std::memory_order_relaxed); turn = std::fmod(turn + 1, turns)) {
       const double now = wallSeconds();
-      publishState();
+      if (turn == 0) publishState();
+      if (options_.labels != nullptr) exchangeLabels(*options_.labels);
       publishDiagnostics(now);
       if (mesh_pace_.due(now)) publishMesh();
       publishSurface(now);
@@ -108,8 +126,10 @@ class DdsThread::Work {
     odometry.child_frame = frames_.body;
     odometry.T_frame_child = state.T_world_body;
     odometry.velocity = bodyVelocity(state);
+    odometry.angular_velocity = outlet_.state.value().omega_body;
     Eigen::Map<RosCovariance>(odometry.pose_covariance.data()) = rosPoseCovariance(state);
-    Eigen::Map<RosCovariance>(odometry.twist_covariance.data()) = rosTwistCovariance(state);
+    Eigen::Map<RosCovariance>(odometry.twist_covariance.data()) =
+        rosTwistCovariance(state, options_.gyro_sigma);
     if (link_.publish(odometry)) ++odometries_;
     const MapCorrection& now = outlet_.correction.value();
     const bool corrected = outlet_.correction.sequence() > 0 && now.epoch == state.epoch;
@@ -177,6 +197,19 @@ class DdsThread::Work {
     if (link_.publish(DdsCloud{ros(surface.stamp), frames_.map, cloud_})) ++surfaces_;
   }
 
+  void exchangeLabels(LabelExchange& labels) {
+    labels.setLabeller(link_.labellers() > 0);
+    while (labels.show([this](Stamp stamp, const ImageView& image) {
+      link_.publish(DdsImageView{ros(stamp), kCameraFrame, image});
+    })) {
+    }
+    labels.retryEarly();
+    for (int i = 0; i < kKeptImages && link_.takeLabels(label_); ++i) {
+      labels.offer(label_.stamp - options_.to_ros_clock,
+                   {label_.pixels.data(), label_.width, label_.height, label_.width});
+    }
+  }
+
   LiveOutlet& outlet_;
   const DdsThreadOptions options_;
   const RosFrames frames_;
@@ -189,6 +222,7 @@ class DdsThread::Work {
   std::uint64_t odometries_ = 0, meshes_ = 0, surfaces_ = 0;  ///< published
   std::vector<Eigen::Vector3f> points_, colours_;
   std::vector<DdsCloudPoint> cloud_;
+  DdsImage label_;
   std::atomic<bool> stop_{false};
   FlightThread thread_;
 };

@@ -1,10 +1,12 @@
 #pragma once
 // The newest of a run as ROS 2's topics, from a low thread of its own at its own pace (docs/ros2.md). It
-// reads a LiveOutlet; nobody waits for it. In builds without SWIFTLET_WITH_DDS start() says so.
+// reads a LiveOutlet; nobody waits for it. Label images for the map come in by it (LabelExchange), at most
+// kKeptImages a turn. In builds without SWIFTLET_WITH_DDS the constructor says so.
 
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 
+#include "firmware_host/pipeline/label_exchange.hpp"
 #include "firmware_host/pipeline/live_outlet.hpp"
 #include "firmware_host/settings/device_settings.hpp"
 
@@ -14,6 +16,8 @@ struct DdsThreadOptions {
   Ros2Group settings;
   /// Added to every stamp: from the run's clock to that of ROS's other processes.
   Duration to_ros_clock{0};
+  double gyro_sigma = 0;            ///< rad/s, of one sample: of the angular velocity that goes out
+  LabelExchange* labels = nullptr;  ///< shown and filled; null: no labels are taken; outlives the thread
 };
 
 class DdsThread {

@@ -28,4 +28,12 @@ RosCovariance rosTwistCovariance(const NavState& state) {
   return covariance;
 }
 
+RosCovariance rosTwistCovariance(const NavState& state, double gyro_sigma) {
+  constexpr int kGyroBias = 9;
+  RosCovariance covariance = rosTwistCovariance(state);
+  covariance.bottomRightCorner<3, 3>() = state.covariance.block<3, 3>(kGyroBias, kGyroBias) +
+                                         gyro_sigma * gyro_sigma * Eigen::Matrix3d::Identity();
+  return covariance;
+}
+
 }  // namespace swiftlet

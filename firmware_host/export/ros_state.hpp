@@ -6,7 +6,8 @@
 // geometry_msgs/PoseWithCovariance: order x y z and rotations about the fixed axes of the header's frame;
 // ours is phi, p with phi about the body's axes (R <- R Exp(phi)). geometry_msgs/TwistWithCovariance of
 // nav_msgs/Odometry: in the child frame, so the velocity is turned into the body's axes. Angular velocity is
-// no part of the state: zero with kUnknownVariance.
+// no part of the state: zero with kUnknownVariance where the state stands alone; of a state at an IMU sample
+// it is that sample's, without bias.
 
 #include <Eigen/Core>
 #include <string>
@@ -32,6 +33,8 @@ RosCovariance rosPoseCovariance(const NavState& state);
 /// Of the linear velocity [m^2/s^2] and the angular one, both in body axes. To first order, with the
 /// attitude's part; covariances that `state` does not hold count as zero.
 RosCovariance rosTwistCovariance(const NavState& state);
+/// With the angular velocity of a gyroscope's sample of `gyro_sigma` [rad/s], less the state's bias.
+RosCovariance rosTwistCovariance(const NavState& state, double gyro_sigma);
 
 /// m/s, body axes.
 Eigen::Vector3d bodyVelocity(const NavState& state);

@@ -60,6 +60,8 @@ struct Ros2Group {
   std::string interface = "lo";  ///< network interface; lo: this computer alone
   double odometry_hz = 50;
   double mesh_hz = 5;
+  std::string label_topic = "";  ///< label images for the map; empty: none
+  double label_patience = 0.5;   ///< s, for which the map waits for them
 };
 
 /// The far ends of the devices above, for `hil`.

@@ -106,6 +106,12 @@ std::vector<Setting> deviceSettings() {
        real(kRos2, &Ros2Group::odometry_hz, 1, 1000)},
       {"ros2.mesh_hz", "Hz", "Most local meshes per second that are published.",
        real(kRos2, &Ros2Group::mesh_hz, 0.1, 50)},
+      {"ros2.label_topic", "",
+       "Topic of label images for the map (sensor_msgs/Image, mono8), which a network answers "
+       "/swiftlet/mapped_image with; empty: none.",
+       TextSetting{member(kRos2, &Ros2Group::label_topic), "a topic as /segmentation/labels, or empty"}},
+      {"ros2.label_patience", "s", "How long the map waits for an image's labels before it does without.",
+       real(kRos2, &Ros2Group::label_patience, 0.01, 10)},
       {"hil.output0", "",
        "For `hil`: video output node whose images camera 0 shows (vivid's); empty: none are shown.",
        TextSetting{member(kHil, &HilGroup::output0), "a node as /dev/video10, or empty"}},

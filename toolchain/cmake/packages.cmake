@@ -79,6 +79,7 @@ set(debian_nlohmann_json nlohmann-json3-dev)
 set(debian_Threads libc6-dev)
 set(debian_OpenMP libgomp1)
 set(debian_libgpiod "libgpiod-dev;pkg-config")
+set(debian_CycloneDDS cyclonedds-dev)
 set(development_depends "")
 foreach(line IN LISTS dependencies)
   # The last name of the line: libgpiod of find_dependency(PkgConfig), pkg_check_modules(libgpiod ...).

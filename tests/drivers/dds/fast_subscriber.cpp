@@ -1,35 +1,26 @@
 // A subscriber of another make: eProsima Fast DDS with the types that its own generator made, ROS 2's topics
 // and qualities of service. Takes what the link publishes until its standard input ends or SECONDS have gone
 // by, checks every message, publishes label images, and prints one line a topic: received, lost, torn,
-// repeated. usage: dds_subscriber SECONDS DOMAIN
+// repeated. usage: dds_subscriber SECONDS DOMAIN [DEPTH]   (messages of a topic that it keeps, 10)
 
 #include <poll.h>
 #include <unistd.h>
 
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <fastdds/dds/domain/DomainParticipant.hpp>
-#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
-#include <fastdds/dds/publisher/DataWriter.hpp>
-#include <fastdds/dds/publisher/Publisher.hpp>
-#include <fastdds/dds/subscriber/DataReader.hpp>
-#include <fastdds/dds/subscriber/DataReaderListener.hpp>
-#include <fastdds/dds/subscriber/SampleInfo.hpp>
-#include <fastdds/dds/subscriber/Subscriber.hpp>
-#include <fastdds/dds/topic/Topic.hpp>
-#include <memory>
 #include <string>
 #include <thread>
 
-#include "ros_messagesPubSubTypes.h"  // made by fastddsgen from ros_messages.idl
+#include "tests/drivers/dds/fast_peer.hpp"
 #include "tests/drivers/dds/test_messages.hpp"
 
-namespace fast = eprosima::fastdds::dds;
+using swiftlet::test::listener;
+using swiftlet::test::Peer;
 using swiftlet::test::pointsOf;
+namespace fast = swiftlet::test::fast;
 
 namespace {
 
@@ -60,7 +51,8 @@ void check(const nav_msgs::msg::dds_::Odometry_& m, Tally& tally) {
   bool whole = m.header().frame_id() == "odom" && m.child_frame_id() == "base_link" &&
                m.pose().pose().position().x() == v && m.pose().pose().position().y() == 0.5 * v &&
                m.pose().pose().position().z() == -v && m.pose().pose().orientation().w() == 1 &&
-               m.twist().twist().linear().x() == -v && m.twist().twist().angular().z() == 0;
+               m.twist().twist().linear().x() == -v && m.twist().twist().angular().x() == 0 &&
+               m.twist().twist().angular().z() == 2 * v;
   for (std::size_t i = 0; i < 36; ++i) {
     whole = whole && m.pose().covariance()[i] == v + static_cast<double>(i) &&
             m.twist().covariance()[i] == v - static_cast<double>(i);
@@ -124,66 +116,6 @@ void check(const diagnostic_msgs::msg::dds_::DiagnosticArray_& m, Tally& tally) 
   tally.note(n, whole);
 }
 
-template <typename Message>
-struct Listener : fast::DataReaderListener {
-  void on_data_available(fast::DataReader* reader) override {
-    Message message;
-    fast::SampleInfo info;
-    while (reader->take_next_sample(&message, &info) == ReturnCode_t::RETCODE_OK) {
-      if (info.valid_data) check(message, tally);
-    }
-  }
-  Tally tally;
-};
-
-class Peer {
- public:
-  explicit Peer(std::uint32_t domain) {
-    // As ROS 2 does it for processes that stay on one computer.
-    const auto loopback = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-    loopback->interfaceWhiteList.emplace_back("127.0.0.1");
-    fast::DomainParticipantQos qos = fast::PARTICIPANT_QOS_DEFAULT;
-    qos.transport().use_builtin_transports = false;
-    qos.transport().user_transports.push_back(loopback);
-    participant_ = fast::DomainParticipantFactory::get_instance()->create_participant(domain, qos);
-    if (participant_ == nullptr) std::abort();
-    subscriber_ = participant_->create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT);
-  }
-  ~Peer() {
-    participant_->delete_contained_entities();
-    fast::DomainParticipantFactory::get_instance()->delete_participant(participant_);
-  }
-  Peer(const Peer&) = delete;
-  Peer& operator=(const Peer&) = delete;
-
-  template <typename Type>
-  fast::Topic* topic(const std::string& name) {
-    fast::TypeSupport type(new Type());
-    type.register_type(participant_);
-    return participant_->create_topic("rt" + name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT);
-  }
-  /// As a subscription of ROS 2 is by default: reliable, volatile, the last ten.
-  template <typename Type>
-  void read(const std::string& name, fast::DataReaderListener& listener) {
-    fast::DataReaderQos qos = fast::DATAREADER_QOS_DEFAULT;
-    qos.reliability().kind = fast::RELIABLE_RELIABILITY_QOS;
-    qos.history().depth = 10;
-    if (subscriber_->create_datareader(topic<Type>(name), qos, &listener) == nullptr) std::abort();
-  }
-  template <typename Type>
-  fast::DataWriter* writer(const std::string& name) {
-    fast::DataWriterQos qos = fast::DATAWRITER_QOS_DEFAULT;
-    qos.reliability().kind = fast::RELIABLE_RELIABILITY_QOS;
-    qos.history().depth = 10;
-    return participant_->create_publisher(fast::PUBLISHER_QOS_DEFAULT)
-        ->create_datawriter(topic<Type>(name), qos);
-  }
-
- private:
-  fast::DomainParticipant* participant_;
-  fast::Subscriber* subscriber_;
-};
-
 void print(const char* topic, const Tally& tally) {
   std::printf("%s %llu %llu %llu %llu\n", topic, static_cast<unsigned long long>(tally.received),
               static_cast<unsigned long long>(tally.lost), static_cast<unsigned long long>(tally.torn),
@@ -195,19 +127,21 @@ void print(const char* topic, const Tally& tally) {
 int main(int argc, char** argv) {
   const double seconds = argc > 1 ? std::atof(argv[1]) : 10;
   const auto domain = static_cast<std::uint32_t>(argc > 2 ? std::atoi(argv[2]) : 0);
-  Listener<nav_msgs::msg::dds_::Odometry_> odometry;
-  Listener<tf2_msgs::msg::dds_::TFMessage_> transforms;
-  Listener<visualization_msgs::msg::dds_::Marker_> mesh;
-  Listener<sensor_msgs::msg::dds_::PointCloud2_> cloud;
-  Listener<diagnostic_msgs::msg::dds_::DiagnosticArray_> diagnostics;
+  Tally odometry, transforms, mesh, cloud, diagnostics;
+  const auto checks = [](auto& tally) { return [&tally](const auto& message) { check(message, tally); }; };
+  auto on_odometry = listener<nav_msgs::msg::dds_::Odometry_>(checks(odometry));
+  auto on_transforms = listener<tf2_msgs::msg::dds_::TFMessage_>(checks(transforms));
+  auto on_mesh = listener<visualization_msgs::msg::dds_::Marker_>(checks(mesh));
+  auto on_cloud = listener<sensor_msgs::msg::dds_::PointCloud2_>(checks(cloud));
+  auto on_diagnostics = listener<diagnostic_msgs::msg::dds_::DiagnosticArray_>(checks(diagnostics));
   const std::string prefix = swiftlet::test::kDdsPrefix;
   {
-    Peer peer(domain);
-    peer.read<nav_msgs::msg::dds_::Odometry_PubSubType>(prefix + "/odometry", odometry);
-    peer.read<tf2_msgs::msg::dds_::TFMessage_PubSubType>("/tf", transforms);
-    peer.read<visualization_msgs::msg::dds_::Marker_PubSubType>(prefix + "/local_mesh", mesh);
-    peer.read<sensor_msgs::msg::dds_::PointCloud2_PubSubType>(prefix + "/surface", cloud);
-    peer.read<diagnostic_msgs::msg::dds_::DiagnosticArray_PubSubType>("/diagnostics", diagnostics);
+    Peer peer(domain, argc > 3 ? std::atoi(argv[3]) : 10);
+    peer.read<nav_msgs::msg::dds_::Odometry_PubSubType>(prefix + "/odometry", on_odometry);
+    peer.read<tf2_msgs::msg::dds_::TFMessage_PubSubType>("/tf", on_transforms);
+    peer.read<visualization_msgs::msg::dds_::Marker_PubSubType>(prefix + "/local_mesh", on_mesh);
+    peer.read<sensor_msgs::msg::dds_::PointCloud2_PubSubType>(prefix + "/surface", on_cloud);
+    peer.read<diagnostic_msgs::msg::dds_::DiagnosticArray_PubSubType>("/diagnostics", on_diagnostics);
     fast::DataWriter* labels =
         peer.writer<sensor_msgs::msg::dds_::Image_PubSubType>(swiftlet::test::kDdsLabelTopic);
     sensor_msgs::msg::dds_::Image_ image;
@@ -233,10 +167,10 @@ int main(int argc, char** argv) {
       }
     }
   }
-  print("odometry", odometry.tally);
-  print("tf", transforms.tally);
-  print("local_mesh", mesh.tally);
-  print("surface", cloud.tally);
-  print("diagnostics", diagnostics.tally);
+  print("odometry", odometry);
+  print("tf", transforms);
+  print("local_mesh", mesh);
+  print("surface", cloud);
+  print("diagnostics", diagnostics);
   return 0;
 }
