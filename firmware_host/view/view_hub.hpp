@@ -4,12 +4,9 @@
 // A viewer first gets a document, then every patch after it, in order. One that does not keep up loses what
 // waits for it and gets a fresh document once it has taken what it was being sent. Nobody waits for a viewer.
 //
-// Threads: the publishing thread calls publish, offer, documentWanted; each viewer's thread admit, next,
-// leave.
-//   One lock, held for a few moves of pointers; no flight thread comes here.
-// Memory: texts are shared by all viewers; alive are at most the newest kMostWaiting patches, one document
-// and
-//   what each viewer is being sent.
+// Threads: one publishes, each viewer has its own. One lock, held for a few moves of pointers; no flight
+// thread comes here. Memory: texts are shared by all viewers; alive are at most the newest kMostWaiting
+// patches, one document and what each viewer is being sent.
 
 #include <array>
 #include <condition_variable>
