@@ -6,9 +6,10 @@
   flooded   a labeller answers each mapped image after 0.3 s and floods the label topic with 1000 images/s
 
 For each stage of the flight path: the 99th percentile of its CPU (and wall) time with, over without; the median of
-all pairs. All runs compute the state at every IMU sample (--imu-rate), as those with ROS 2 do. usage: tests/benchmark/ros2_beside_flight.py LOG [PAIRS]   (default 5; run from the project's root)
+all pairs. All runs compute the state at every IMU sample (--imu-rate), as those with ROS 2 do.
+usage: tests/benchmark/ros2_beside_flight.py LOG [PAIRS]   (default 5; run from the project's root)
 Needs build/release with SWIFTLET_WITH_DDS and the tests. Exit code 1 where the median of the CPU time of image to
-pose, tracking, smoothing, mesh or sample to state is above 1.15 and by more than 10 us.
+pose, tracking, smoothing, mesh or sample to state is above 1.15.
 """
 import json
 import pathlib
@@ -25,7 +26,6 @@ DOMAIN = 97
 STAGES = [(stage, kind) for stage in ("image_to_pose", "track", "smooth", "mesh") for kind in ("frames", "keyframes")]
 STAGES += [("imu", "all")]
 MOST = 1.15
-LEAST_MS = 0.01
 
 
 def replay(log, out, settings):
@@ -88,8 +88,7 @@ def main():
             for kind in kinds[1:]:
                 figures = p99[kind, stage, clock]
                 ratio = statistics.median(a / b for a, b in zip(figures, without))
-                more = statistics.median(a - b for a, b in zip(figures, without))
-                failed |= clock == "cpu" and ratio > MOST and more > LEAST_MS
+                failed |= clock == "cpu" and ratio > MOST
                 line += f"   {kind} {statistics.median(figures):8.4f} ({ratio:.2f})"
             print(line)
     print("frames dropped:", lost)
