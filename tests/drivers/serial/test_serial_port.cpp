@@ -46,7 +46,7 @@ std::vector<ImuReading> readReadings(SerialPort& port, ImuDecoder& decoder, std:
   return readings;
 }
 
-TEST_CASE("400 readings a second come over a serial port without loss", "[serial]") {
+TEST_CASE("400 readings a second come over a serial port without loss", "[serial][port]") {
   PseudoTerminal terminal;
   REQUIRE(terminal.open().ok());
   SerialPort port({terminal.path()});
@@ -82,7 +82,7 @@ TEST_CASE("400 readings a second come over a serial port without loss", "[serial
   CHECK(late[late.size() / 2] < Duration::fromMilliseconds(5));
 }
 
-TEST_CASE("Every protocol comes through a serial port as fast as it goes", "[serial]") {
+TEST_CASE("Every protocol comes through a serial port as fast as it goes", "[serial][port]") {
   for (const ImuProtocol protocol : kProtocols) {
     INFO(name(protocol));
     PseudoTerminal terminal;
@@ -104,7 +104,7 @@ TEST_CASE("Every protocol comes through a serial port as fast as it goes", "[ser
   }
 }
 
-TEST_CASE("Every byte passes a port unchanged, both ways", "[serial]") {
+TEST_CASE("Every byte passes a port unchanged, both ways", "[serial][port]") {
   PseudoTerminal terminal;
   REQUIRE(terminal.open().ok());
   SerialPort port({terminal.path()});
@@ -131,7 +131,7 @@ TEST_CASE("Every byte passes a port unchanged, both ways", "[serial]") {
   CHECK(count == 0);
 }
 
-TEST_CASE("What waited before the port was opened is not taken for new", "[serial]") {
+TEST_CASE("What waited before the port was opened is not taken for new", "[serial][port]") {
   PseudoTerminal terminal;
   REQUIRE(terminal.open().ok());
   const Bytes old(100, 0x55);
@@ -145,7 +145,7 @@ TEST_CASE("What waited before the port was opened is not taken for new", "[seria
   CHECK(count == 0);
 }
 
-TEST_CASE("Rates up to 4 Mbaud are set and read back", "[serial]") {
+TEST_CASE("Rates up to 4 Mbaud are set and read back", "[serial][port]") {
   PseudoTerminal terminal;
   REQUIRE(terminal.open().ok());
   for (const unsigned baud : {9'600U, 115'200U, 230'400U, 921'600U, 1'234'567U, 4'000'000U}) {
@@ -167,7 +167,7 @@ TEST_CASE("Rates up to 4 Mbaud are set and read back", "[serial]") {
   CHECK(slow.lowLatency() == LowLatency::kNotAsked);
 }
 
-TEST_CASE("A port that goes away is a fault, and can be taken up again", "[serial]") {
+TEST_CASE("A port that goes away is a fault, and can be taken up again", "[serial][port]") {
   const std::filesystem::path link =
       std::filesystem::temp_directory_path() / ("swiftlet_serial_" + std::to_string(now().ns));
   PseudoTerminal terminal;
@@ -210,7 +210,7 @@ TEST_CASE("What is no serial port is refused with its reason", "[serial]") {
   CHECK_FALSE(null.isOpen());
 }
 
-TEST_CASE("A write that nobody takes ends in time", "[serial]") {
+TEST_CASE("A write that nobody takes ends in time", "[serial][port]") {
   PseudoTerminal terminal;
   REQUIRE(terminal.open().ok());
   SerialPort port({terminal.path()});
