@@ -151,8 +151,8 @@ TEST_CASE("Over a serial port: poses, reasons, health, clocks; unplugged and bac
   std::array<std::uint8_t, kLongestMavlinkFrame> request;
   const std::size_t length = mavlink::write(sender, mavlink::Timesync{0, 123'456'789, 0, 0}, request);
   std::size_t taken = 0;
-  REQUIRE(plug.send(std::span(request).first(length), taken).ok());
   const Stamp asked = monotonicNow();
+  REQUIRE(plug.send(std::span(request).first(length), taken).ok());
   pass(0.3, [&] {
     vehicle.move();
     listen();
