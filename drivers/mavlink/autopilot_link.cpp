@@ -147,10 +147,21 @@ std::size_t AutopilotLink::tellObstacles(std::span<std::uint8_t> out) {
 
 std::size_t AutopilotLink::tellText(std::span<std::uint8_t> out) {
   if (texts_.empty()) return 0;
-  const Text& text = texts_.front();
-  const std::size_t length =
-      mavlink::write(sender_, mavlink::StatusText{text.severity, {text.text.data(), text.length}}, out);
-  texts_.erase(0);
+  Text& text = texts_.front();
+  mavlink::StatusText message;
+  message.severity = text.severity;
+  const std::string_view whole(text.text.data(), text.length);
+  message.text = whole.substr(text.told, mavlink::StatusText::kMostText);
+  if (text.length > mavlink::StatusText::kMostText) {
+    if (text.told == 0 && ++text_id_ == 0) ++text_id_;  // 0 is that of texts in one piece
+    message.id = text_id_;
+    message.chunk = static_cast<std::uint8_t>(text.told / mavlink::StatusText::kMostText);
+  }
+  text.told += message.text.size();
+  // Readers of chunks go on until one is not full.
+  const bool more = message.id != 0 && message.text.size() == mavlink::StatusText::kMostText;
+  const std::size_t length = mavlink::write(sender_, message, out);
+  if (!more) texts_.erase(0);
   return length;
 }
 

@@ -64,6 +64,18 @@ bool read(const MavlinkFrame& frame, ObstacleDistance& message) {
   return true;
 }
 
+bool read(const MavlinkFrame& frame, StatusText& message) {
+  if (frame.message != StatusText::kId) return false;
+  LittleFieldReader from = reader(frame);
+  message.severity = static_cast<StatusText::Severity>(from.u8());
+  const std::string_view text(reinterpret_cast<const char*>(frame.payload.data()) + 1, StatusText::kMostText);
+  message.text = text.substr(0, text.find('\0'));
+  for (std::size_t i = 0; i < StatusText::kMostText; ++i) from.u8();
+  message.id = from.u16();
+  message.chunk = from.u8();
+  return true;
+}
+
 std::size_t write(MavlinkSender& sender, const Odometry& message, std::span<std::uint8_t> out) {
   Payload payload;
   LittleFieldWriter& to = payload.fields;
@@ -116,6 +128,8 @@ std::size_t write(MavlinkSender& sender, const StatusText& message, std::span<st
   for (std::size_t i = 0; i < StatusText::kMostText; ++i) {
     to.u8(i < message.text.size() ? static_cast<std::uint8_t>(message.text[i]) : 0);
   }
+  to.u16(message.id);
+  to.u8(message.chunk);
   return payload.finish(sender, StatusText::kId, out);
 }
 

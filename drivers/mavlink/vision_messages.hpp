@@ -72,19 +72,22 @@ struct ObstacleDistance {
   Frame frame = Frame::kBodyFrd;
 };
 
-/// STATUSTEXT; longer texts are cut.
+/// STATUSTEXT. A text longer than kMostText goes in chunks of one id; the first with less is the last.
 struct StatusText {
   static constexpr std::uint32_t kId = 253;
   static constexpr std::size_t kMostText = 50;
   enum class Severity : std::uint8_t { kCritical = 2, kError = 3, kWarning = 4, kInfo = 6 };
 
   Severity severity = Severity::kInfo;
-  std::string_view text;
+  std::string_view text;   ///< longer is cut; read: in the frame, which outlives it
+  std::uint16_t id = 0;    ///< of a text in chunks; 0: whole
+  std::uint8_t chunk = 0;  ///< its number, from 0
 };
 
 bool read(const MavlinkFrame& frame, Odometry& message);
 bool read(const MavlinkFrame& frame, VisionPositionEstimate& message);
 bool read(const MavlinkFrame& frame, ObstacleDistance& message);
+bool read(const MavlinkFrame& frame, StatusText& message);
 
 std::size_t write(MavlinkSender& sender, const Odometry& message, std::span<std::uint8_t> out);
 std::size_t write(MavlinkSender& sender, const VisionPositionEstimate& message, std::span<std::uint8_t> out);

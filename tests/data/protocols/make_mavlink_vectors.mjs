@@ -113,9 +113,10 @@ const kinds = {
   },
   STATUSTEXT: () => {
     const text = many(below(50), () => String.fromCharCode(32 + below(95))).join('') + '.'
-    const v = { severity: [2, 3, 4, 6][below(4)], text }
+    // A third in chunks.
+    const v = { severity: [2, 3, 4, 6][below(4)], text, ...(oneIn(3) ? { id: 1 + below(65535), chunk: below(4) } : { id: 0, chunk: 0 }) }
     const m = new common.StatusText()
-    Object.assign(m, { severity: v.severity, text: v.text, id: 0, chunkSeq: 0 })
+    Object.assign(m, { severity: v.severity, text: v.text, id: v.id, chunkSeq: v.chunk })
     return [v, m]
   },
 }

@@ -20,7 +20,9 @@ struct Autopilot {
   std::vector<Stamp> pose_times;
   std::vector<mavlink::Heartbeat> beats;
   std::vector<mavlink::Timesync> answers;
-  std::size_t texts = 0;
+  std::vector<std::string> texts;  ///< joined
+  std::vector<int> chunks;         ///< of each
+  std::uint16_t text_id = 0;       ///< of the newest
   MavlinkParser parser;
 
   void hear(std::span<const std::uint8_t> bytes, Stamp now) {
@@ -36,7 +38,17 @@ struct Autopilot {
       }
       if (mavlink::read(frame, beat)) beats.push_back(beat);
       if (mavlink::read(frame, answer)) answers.push_back(answer);
-      if (frame.message == mavlink::StatusText::kId) ++texts;
+      mavlink::StatusText text;
+      if (!mavlink::read(frame, text)) continue;
+      if (text.chunk == 0) {
+        texts.emplace_back();
+        chunks.push_back(0);
+        REQUIRE((text.id == 0 || text.id != text_id));
+        text_id = text.id;
+      }
+      REQUIRE(text.id == text_id);
+      REQUIRE(text.chunk == chunks.back()++);
+      texts.back() += text.text;
     }
   }
 };
@@ -171,10 +183,33 @@ TEST_CASE("TIMESYNC is answered with our clock and the asker's stamp, at once", 
 
 TEST_CASE("Texts are told one by one, the oldest of too many are dropped and counted", "[mavlink]") {
   Flight flight;
-  for (int i = 0; i < 19; ++i) flight.link.say(mavlink::StatusText::Severity::kWarning, std::string(80, 'x'));
+  for (int i = 0; i < 19; ++i) {
+    flight.link.say(mavlink::StatusText::Severity::kWarning, "text " + std::to_string(i));
+  }
   flight.fly(Duration::fromMilliseconds(50));
-  CHECK(flight.autopilot.texts == 16);
+  REQUIRE(flight.autopilot.texts.size() == 16);
+  CHECK(flight.autopilot.texts.front() == "text 3");
+  CHECK(flight.autopilot.texts.back() == "text 18");
   CHECK(flight.link.counters().texts_dropped == 3);
+}
+
+TEST_CASE("Long texts go in chunks that a reader can join, short ones whole", "[mavlink]") {
+  Flight flight;
+  std::string letters;
+  for (int i = 0; i < 300; ++i) letters += static_cast<char>('a' + i % 26);
+  // Characters, and the messages that they take: the last of several is not full.
+  const std::vector<std::pair<std::size_t, int>> lengths = {{1, 1},   {49, 1},  {50, 1},  {51, 2}, {99, 2},
+                                                            {100, 3}, {130, 3}, {199, 4}, {300, 4}};
+  for (const auto& [length, messages] : lengths) {
+    flight.link.say(mavlink::StatusText::Severity::kWarning, letters.substr(0, length));
+  }
+  flight.fly(Duration::fromMilliseconds(50));
+  REQUIRE(flight.autopilot.texts.size() == lengths.size());
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    const auto& [length, messages] = lengths[i];
+    CHECK(flight.autopilot.texts[i] == letters.substr(0, std::min(length, std::size_t{199})));
+    CHECK(flight.autopilot.chunks[i] == messages);
+  }
 }
 
 TEST_CASE("Random bytes from the autopilot change nothing of what is sent", "[mavlink]") {
