@@ -3,6 +3,7 @@
 #include <netdb.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -27,6 +28,13 @@ std::uint16_t portOf(std::string_view text, std::string_view device) {
   return port;
 }
 
+/// What is not there is said when it is opened. (std::filesystem::equivalent does not compare devices.)
+bool sameNode(const std::string& a, const std::string& b) {
+  struct stat of_a = {}, of_b = {};
+  if (::stat(a.c_str(), &of_a) != 0 || ::stat(b.c_str(), &of_b) != 0) return false;
+  return S_ISCHR(of_a.st_mode) && S_ISCHR(of_b.st_mode) && of_a.st_rdev == of_b.st_rdev;
+}
+
 }  // namespace
 
 std::optional<UdpAddress> udpAddress(std::string_view device) {
@@ -45,6 +53,12 @@ std::optional<UdpAddress> udpAddress(std::string_view device) {
                      "Write udp:HOST:PORT, as udp:192.168.1.10:14550");
   }
   return address;
+}
+
+void checkOwnPort(const std::string& device, const std::string& imu_device) {
+  if (device != imu_device && !sameNode(device, imu_device)) return;
+  throw InputError("settings", 0, "autopilot.device", device + " is the IMU's port, imu_link.device",
+                   "Give the autopilot a port of its own (two of its MAVLink ports, or one and UDP)");
 }
 
 AutopilotPort::AutopilotPort(const std::string& device, unsigned baud)

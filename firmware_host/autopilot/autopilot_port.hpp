@@ -30,6 +30,9 @@ struct UdpAddress {
 /// read.
 std::optional<UdpAddress> udpAddress(std::string_view device);
 
+/// InputError where `device` is the IMU's too, by another name as well: who reads takes the other's bytes.
+void checkOwnPort(const std::string& device, const std::string& imu_device);
+
 class AutopilotPort {
  public:
   /// InputError as udpAddress().
@@ -49,6 +52,7 @@ class AutopilotPort {
   /// All of `bytes`, or a fault: kUnplugged, or kFailed where there is no room, which passes.
   DeviceFault write(std::span<const std::uint8_t> bytes);
 
+  [[nodiscard]] bool isUdp() const { return udp_.has_value(); }
   [[nodiscard]] Duration byteTime() const { return udp_ ? Duration{} : serial_.byteTime(); }
 
  private:

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <nlohmann/json.hpp>
@@ -24,7 +25,6 @@ namespace {
 /// Longest sleep: five rounds within a pose's period, an answer to TIMESYNC within one.
 constexpr Duration kRound = Duration::fromMilliseconds(5);
 constexpr Duration kObstaclePeriod = Duration::fromMilliseconds(100);
-constexpr Duration kReasonPeriod = Duration::fromMilliseconds(30'000);
 constexpr Duration kReopenPeriod = Duration::fromMilliseconds(200);
 /// Three heartbeats of an autopilot.
 constexpr Duration kSilence = Duration::fromMilliseconds(3000);
@@ -46,7 +46,7 @@ AutopilotLinkSettings linkSettings(const AutopilotGroup& settings) {
   };
   AutopilotLinkSettings link;
   link.rate = settings.rate_hz;
-  link.position_estimate = settings.message == "position_estimate";
+  link.position_estimate = settings.message == "vision_position_estimate";
   link.mounting.q_vehicle_body = about(settings.yaw_deg, Eigen::Vector3d::UnitZ()) *
                                  about(settings.pitch_deg, Eigen::Vector3d::UnitY()) *
                                  about(settings.roll_deg, Eigen::Vector3d::UnitX());
@@ -157,10 +157,11 @@ class AutopilotThread::Work {
   }
 
   void takeNews() {
-    if (outlet_.state.refresh() != number_) {
+    if (options_.to_host && !to_host_) to_host_ = options_.to_host();
+    const bool placed = !options_.to_host || to_host_;
+    if (outlet_.state.refresh() != number_ && placed) {
       number_ = outlet_.state.sequence();
       state_ = outlet_.state.value();
-      if (!options_.host_stamps && !to_host_) to_host_ = monotonicNow() - state_.state.stamp;
       state_.state.stamp = onHost(state_.state.stamp);
     }
     tellReasons();
@@ -179,7 +180,7 @@ class AutopilotThread::Work {
     const bool changed = number != reasons_;
     if (!changed && (verdict.ready() || now < next_reasons_)) return;
     reasons_ = number;
-    next_reasons_ = now + kReasonPeriod;
+    next_reasons_ = now + options_.repeat;
     if (verdict.ready()) link_.say(mavlink::StatusText::Severity::kInfo, "swiftlet: ready to arm");
     for (const MissingCondition& missing : verdict.missing) {
       link_.say(mavlink::StatusText::Severity::kWarning,
@@ -189,13 +190,14 @@ class AutopilotThread::Work {
 
   void tellObstacles() {
     const Stamp now = monotonicNow();
-    if (number_ == 0 || now < next_obstacles_) return;
-    next_obstacles_ = now + kObstaclePeriod;
-    if (outlet_.mesh.refresh() == mesh_) return;
-    mesh_ = outlet_.mesh.sequence();
-    // Both in the run's clock: the mesh's age counts from the newest state.
+    if (number_ == 0 || now < next_obstacles_ || outlet_.mesh.refresh() == 0) return;
+    // By the rate on the mean, and never two at once after a pause.
+    next_obstacles_ = std::max(next_obstacles_ + kObstaclePeriod, now + Duration{kObstaclePeriod.ns / 2});
+    const Stamp stamp = onHost(outlet_.mesh.value().stamp);
+    if (now - stamp > kOldestObstacles || now - state_.state.stamp > AutopilotLink::kOldest) return;
+    // A mesh that stands is told again as long as it is fresh, seen from where the vehicle is by now. Both
+    // are in the run's clock.
     if (auto message = obstacleDistanceOf(outlet_.mesh.value(), outlet_.state.value().state, mounting_)) {
-      const Stamp stamp = onHost(outlet_.mesh.value().stamp);
       message->time_usec = static_cast<std::uint64_t>(stamp.ns / kNanosecondsPerMicrosecond);
       link_.show(*message);
     }
@@ -210,9 +212,21 @@ class AutopilotThread::Work {
     if (const DeviceFault fault = port_.write(std::span(bytes).first(count)); !fault.ok()) {
       ++refused_;
       if (fault.kind == DeviceFaultKind::kUnplugged) return fail(fault);
+      noteRefusal(fault);
     } else if (link_.counters().poses > poses) {
       age_.add((monotonicNow() - state_.state.stamp).seconds());
     }
+  }
+
+  void noteRefusal(const DeviceFault& fault) {
+    const Stamp now = monotonicNow();
+    if (now < next_refusal_) return;
+    next_refusal_ = now + options_.repeat;
+    const char* remedy = port_.isUdp() ? "is the network up, and the host on it?"
+                                       : "raise autopilot.baud, or lower autopilot.rate_hz";
+    journal_.note(
+        now, deviceFault(DeviceFaultKind::kLossy, fault.error, "%llu writes were not taken until now: %s",
+                         static_cast<unsigned long long>(refused_), remedy));
   }
 
   [[nodiscard]] Stamp onHost(Stamp stamp) const { return stamp + to_host_.value_or(Duration{}); }
@@ -228,11 +242,12 @@ class AutopilotThread::Work {
   StateNews state_;  ///< stamp of CLOCK_MONOTONIC
   std::optional<Duration> to_host_;
   Health health_ = Health::kInitializing;
-  std::uint64_t number_ = 0, mesh_ = 0, reasons_ = 0;  ///< taken
-  std::uint64_t frames_ = 0;                           ///< heard
+  std::uint64_t number_ = 0, reasons_ = 0;  ///< taken
+  std::uint64_t frames_ = 0;                ///< heard
   Stamp heard_;
   Stamp next_obstacles_;
   Stamp next_reasons_;
+  Stamp next_refusal_;
   std::uint64_t refused_ = 0;
   LatencyHistogram age_;
   std::atomic<bool> stop_{false};

@@ -2,17 +2,17 @@
 // An autopilot told of the estimate while it flies by it: the thread that owns the port, docs/mavlink.md.
 //
 // It reads a LiveOutlet, steps an AutopilotLink and sends what that says; nobody waits for it and it waits
-// for nobody: a port that takes no bytes loses them, counted. Its priority is that of the mesh: below the
-// flight path, above all that may take long, so that a pose does not age while a planner computes. Beside
-// poses go obstacles (10 Hz), and texts: each reason not to arm when it comes and every 30 s, that all is
-// ready, every change of health.
-// A serial port that is unplugged is looked for five times a second; it and an autopilot that says nothing
-// for 3 s are told to the log, with the remedy. Clock: CLOCK_MONOTONIC. Stamps of a log are moved there by
-// their difference at the first state.
+// for nobody: a port that takes no bytes loses them, counted and noted with the remedy. Its priority is that
+// of the mesh: below the flight path, above all that may take long, so that a pose does not age while a
+// planner computes. Beside poses go obstacles (10 Hz), and texts: each reason not to arm when it comes and
+// every 30 s, that all is ready, every change of health. A serial port that is unplugged is looked for five
+// times a second; it and an autopilot that says nothing for 3 s are told to the log, with the remedy.
+// Clock: CLOCK_MONOTONIC. Stamps of a log are moved there by the one difference that its player knows.
 
 #include <functional>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 
 #include "drivers/mavlink/autopilot_link.hpp"
@@ -23,8 +23,11 @@ namespace swiftlet {
 
 struct AutopilotThreadOptions {
   AutopilotGroup settings;
-  bool host_stamps = true;  ///< of CLOCK_MONOTONIC; false: of a log
-  int priority = 0;         ///< SCHED_FIFO; 0: none
+  int priority = 0;  ///< SCHED_FIFO; 0: none
+  /// From the run's stamps to CLOCK_MONOTONIC, once it is known; none: they are of it.
+  std::function<std::optional<Duration>()> to_host;
+  /// After which reasons not to arm that still stand are said again, and writes that are refused noted again.
+  Duration repeat = Duration::fromMilliseconds(30'000);
 };
 
 /// q_vehicle_body and the lever arm as the settings say them.

@@ -17,7 +17,9 @@ namespace swiftlet {
 struct FlightRequest {
   double speed = 1;          ///< of the log's clock against the host's
   bool host_stamps = false;  ///< of CLOCK_MONOTONIC, not of a log
-  bool announce = false;     ///< print the table of what was reserved, and what is missing
+  /// From a log's stamps to CLOCK_MONOTONIC; gives none while that is not known. Any thread.
+  std::function<std::optional<Duration>()> to_host;
+  bool announce = false;  ///< print the table of what was reserved, and what is missing
   std::function<void(const char* thread, bool begins)> watch;
   std::string name;                 ///< what is flown, for those who look on
   std::optional<ViewAddress> view;  ///< serve the live view there

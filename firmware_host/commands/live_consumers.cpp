@@ -6,16 +6,13 @@
 #include <cstdio>
 
 #include "drivers/calibration/input_error.hpp"
+#include "firmware_host/autopilot/autopilot_port.hpp"
 
 namespace swiftlet {
 namespace {
 
 void checkAutopilot(const Settings& settings, const FlightRequest& request) {
-  const std::string& device = settings.autopilot.device;
-  if (device == settings.imu_link.device) {
-    throw InputError("settings", 0, "autopilot.device", device + " is the IMU's port",
-                     "Give the autopilot a port of its own, or UDP");
-  }
+  checkOwnPort(settings.autopilot.device, settings.imu_link.device);
   if (request.speed != 1) {
     throw InputError("--speed", 0, "", "an autopilot is told of a flight at its own speed",
                      "Leave --speed out, or autopilot.device empty");
@@ -42,7 +39,7 @@ LiveConsumers::LiveConsumers(const Calibration& calibration, const Settings& set
     checkAutopilot(settings, request);
     AutopilotThreadOptions options;
     options.settings = settings.autopilot;
-    options.host_stamps = request.host_stamps;
+    if (!request.host_stamps) options.to_host = request.to_host;
     options.priority = settings.realtime.enabled ? settings.realtime.mesh_priority : 0;
     autopilot_ = std::make_unique<AutopilotThread>(newOutlet(autopilot_outlet_), options);
   }

@@ -164,6 +164,7 @@ class ReplayRun {
       flight.name = (log.has_filename() ? log : log.parent_path()).filename().string();
       flight.view = request_.view;
       LogPlayer player(feed, request_.speed);
+      flight.to_host = [&player] { return player.toHost(); };
       facts_.finished = flyThreaded(source_->calibration(), player, settings_, output_->log(), wanted, flight,
                                     control_, facts_.executor);
       const LatencyHistogram& late = player.lateness();

@@ -79,6 +79,7 @@ void LogPlayer::begin(Stamp first) {
   // The other threads have a moment to fall asleep.
   constexpr double kLead = 0.05;  // s
   zero_ = wallSeconds() + kLead;
+  to_host_ns_.store((Duration::fromSeconds(zero_) - (first - Stamp{})).ns, std::memory_order_relaxed);
 }
 
 }  // namespace swiftlet

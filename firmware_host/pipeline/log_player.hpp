@@ -4,6 +4,8 @@
 
 #include <atomic>
 #include <exception>
+#include <limits>
+#include <optional>
 
 #include "estimator/core/spsc_ring.hpp"
 #include "firmware_host/pipeline/log_feed.hpp"
@@ -21,6 +23,11 @@ class LogPlayer : public SensorInput {
   /// An InputError of the log's reader is thrown again here.
   void finish() override;
 
+  /// From the log's stamps to CLOCK_MONOTONIC, at speed 1; empty before the first message. Any thread.
+  [[nodiscard]] std::optional<Duration> toHost() const {
+    const std::int64_t ns = to_host_ns_.load(std::memory_order_relaxed);
+    return ns == kNotYet ? std::nullopt : std::optional(Duration{ns});
+  }
   /// Of the thread `sensor` behind the log's times; once it has ended.
   [[nodiscard]] const LatencyHistogram& lateness() const { return lateness_; }
 
@@ -48,6 +55,8 @@ class LogPlayer : public SensorInput {
   std::atomic<std::uint64_t> images_out_{0};  ///< images whose memory the source may use again
   std::atomic<std::uint64_t> taken_{0};
   std::atomic<bool> read_done_{false};
+  static constexpr std::int64_t kNotYet = std::numeric_limits<std::int64_t>::min();
+  std::atomic<std::int64_t> to_host_ns_{kNotYet};
   std::exception_ptr read_error_;
 
   // Of `sensor`.

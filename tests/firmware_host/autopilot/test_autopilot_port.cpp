@@ -1,10 +1,13 @@
 // Names of ports, and datagrams to and fro.
 
 #include <catch2/catch.hpp>
+#include <filesystem>
 #include <vector>
 
 #include "drivers/calibration/input_error.hpp"
+#include "drivers/serial/pseudo_terminal.hpp"
 #include "firmware_host/autopilot/autopilot_port.hpp"
+#include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {
 namespace {
@@ -71,6 +74,30 @@ TEST_CASE("A port that another has, and a host that is none, are faults", "[auto
   CHECK(nowhere.open().kind == DeviceFaultKind::kMissing);
   AutopilotPort serial("/dev/no-such-port", 921'600);
   CHECK(serial.open().kind == DeviceFaultKind::kMissing);
+}
+
+TEST_CASE("The IMU's port is refused, by its other name too", "[autopilot]") {
+  const ScratchFolder folder("own_port");
+  PseudoTerminal imu, other;
+  REQUIRE(imu.open().ok());
+  REQUIRE(other.open().ok());
+  const std::string by_id = folder.file("by-id");
+  std::filesystem::create_symlink(imu.path(), by_id);
+  CHECK_NOTHROW(checkOwnPort(other.path(), imu.path()));
+  CHECK_NOTHROW(checkOwnPort("udp:127.0.0.1:14550", imu.path()));
+  CHECK_NOTHROW(checkOwnPort(imu.path(), ""));
+  CHECK_NOTHROW(checkOwnPort("/dev/no-such-port", "/dev/no-such-port-either"));
+  for (const std::string& device : {imu.path(), by_id}) {
+    INFO(device);
+    try {
+      checkOwnPort(device, imu.path());
+      FAIL("was taken");
+    } catch (const InputError& error) {
+      CHECK(error.field == "autopilot.device");
+      CHECK(std::string(error.what()).find(device) != std::string::npos);
+      CHECK_FALSE(error.remedy.empty());
+    }
+  }
 }
 
 }  // namespace

@@ -1,102 +1,19 @@
 // The thread beside a scripted run: over a pseudo-terminal that is unplugged and comes back, and over UDP.
 
 #include <catch2/catch.hpp>
-#include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <thread>
 #include <vector>
 
 #include "drivers/calibration/input_error.hpp"
-#include "drivers/device/monotonic_now.hpp"
 #include "drivers/serial/pseudo_terminal.hpp"
 #include "firmware_host/autopilot/autopilot_port.hpp"
-#include "firmware_host/autopilot/autopilot_thread.hpp"
+#include "tests/firmware_host/autopilot/scripted_vehicle.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
-namespace swiftlet {
+namespace swiftlet::test {
 namespace {
-
-using namespace std::chrono_literals;
-
-/// What the autopilot heard.
-struct Heard {
-  std::vector<mavlink::Odometry> poses;
-  std::vector<mavlink::ObstacleDistance> obstacles;
-  std::vector<mavlink::Timesync> answers;
-  std::vector<std::string> texts;
-  std::size_t heartbeats = 0;
-  MavlinkParser parser;
-
-  void take(std::span<const std::uint8_t> bytes) {
-    while (!bytes.empty()) {
-      bytes = bytes.subspan(parser.feed(bytes, {}, {}));
-      for (MavlinkFrame frame; parser.next(frame);) {
-        mavlink::Odometry pose;
-        mavlink::ObstacleDistance obstacle;
-        mavlink::Timesync answer;
-        if (mavlink::read(frame, pose)) poses.push_back(pose);
-        if (mavlink::read(frame, obstacle)) obstacles.push_back(obstacle);
-        if (mavlink::read(frame, answer)) answers.push_back(answer);
-        if (frame.message == mavlink::StatusText::kId) {
-          // severity, then 50 characters
-          texts.emplace_back(reinterpret_cast<const char*>(frame.payload.data()) + 1, 50);
-          texts.back().resize(std::string(texts.back().c_str()).size());
-        }
-        if (frame.message == mavlink::Heartbeat::kId) ++heartbeats;
-      }
-    }
-  }
-};
-
-/// A vehicle that moves along x at 1 m/s, with states every 5 ms.
-struct Vehicle {
-  LiveOutlet outlet;
-  Stamp begin = monotonicNow();
-  Duration clock{};  ///< of the run's stamps before CLOCK_MONOTONIC
-
-  void move(Health health = Health::kGood) {
-    StateNews news;
-    const Stamp now = monotonicNow();
-    news.state.stamp = now - clock;
-    news.state.health = health;
-    news.state.T_world_body.translation.x() = (now - begin).seconds();
-    outlet.state.write(news);
-  }
-  void say(const char* what) {
-    ArmingVerdict verdict;
-    if (*what != 0) {
-      MissingCondition missing;
-      missing.condition = ArmingCondition::kSensors;
-      std::snprintf(missing.text.data(), missing.text.size(), "%s", what);
-      static_cast<void>(verdict.missing.tryPushBack(missing));
-    }
-    outlet.arming.write(verdict);
-  }
-  void tellHealth(Health health) {
-    FrameNews news;
-    news.health = health;
-    outlet.frame.write(news);
-  }
-};
-
-/// Lets `seconds` pass in steps of a state; `each` sees every one.
-template <typename Each>
-void pass(double seconds, Each&& each) {
-  const Stamp end = monotonicNow() + Duration::fromSeconds(seconds);
-  while (monotonicNow() < end) {
-    each();
-    std::this_thread::sleep_for(5ms);
-  }
-}
-
-AutopilotThreadOptions optionsOf(const std::string& device) {
-  AutopilotThreadOptions options;
-  options.settings.device = device;
-  return options;
-}
 
 void checkPoses(const Heard& heard, Stamp begin) {
   for (std::size_t i = 0; i < heard.poses.size(); ++i) {
@@ -130,7 +47,7 @@ TEST_CASE("Over a serial port: poses, reasons, health, clocks; unplugged and bac
   AutopilotThread autopilot(vehicle.outlet, optionsOf(port));
   pass(0.2, listen);
   CHECK(heard.poses.empty());
-  CHECK(heard.heartbeats == 1);
+  CHECK(heard.heartbeats.size() == 1);
   REQUIRE(heard.texts.size() == 1);
   CHECK(heard.texts[0] == "not ready: sensors: the IMU delivers at 0.0 Hz");
 
@@ -213,7 +130,7 @@ TEST_CASE("Over UDP, of a log with a clock of its own, with obstacles; silence i
     for (Stamp at; far.read(bytes, count, at).ok() && count > 0;) heard.take(std::span(bytes).first(count));
   };
   auto options = optionsOf("udp:127.0.0.1:24581@24582");
-  options.host_stamps = false;
+  options.to_host = [&] { return std::optional(vehicle.clock); };
   AutopilotThread autopilot(vehicle.outlet, options);
   std::vector<std::string> lines;
   pass(3.5, [&] {
@@ -237,15 +154,7 @@ TEST_CASE("Over UDP, of a log with a clock of its own, with obstacles; silence i
     // The wall stands at 9 m; the vehicle was within a mesh's age of where it was at the stamp.
     CHECK(std::abs(told.distance_cm[0] * 0.01 - (9 - then)) < 0.3);
   }
-  for (std::size_t i = 1; i < heard.poses.size(); ++i) {
-    // Moved to CLOCK_MONOTONIC by one difference, so all alike.
-    const double then =
-        static_cast<double>(heard.poses[i].time_usec) * 1e-6 - (vehicle.begin - Stamp{}).seconds();
-    const double first =
-        static_cast<double>(heard.poses[0].time_usec) * 1e-6 - (vehicle.begin - Stamp{}).seconds();
-    CHECK(std::abs((heard.poses[i].position.x() - heard.poses[0].position.x()) - (then - first)) < 1e-4);
-    CHECK(std::abs(heard.poses[i].position.x() - then) < 0.1);
-  }
+  checkPoses(heard, vehicle.begin);
   REQUIRE(lines.size() == 1);
   CHECK(lines[0].find("no MAVLink for 3 s") != std::string::npos);
 }
@@ -262,4 +171,4 @@ TEST_CASE("A port that is not there is said before the flight", "[autopilot]") {
 }
 
 }  // namespace
-}  // namespace swiftlet
+}  // namespace swiftlet::test

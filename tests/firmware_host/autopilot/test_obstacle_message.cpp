@@ -54,6 +54,7 @@ TEST_CASE("A known wall is told in the sectors that look at it", "[autopilot]") 
 
   for (const double heading_deg : {0.0, 30.0, 75.0, -150.0}) {
     NavState state;
+    state.health = Health::kGood;
     state.stamp = kNow + Duration::fromMilliseconds(100);
     // The vehicle is level and looks along `heading`; the IMU is turned in it.
     const Eigen::Quaterniond q_world_vehicle(
@@ -88,6 +89,7 @@ TEST_CASE("Distances count from the vehicle's reference point, what touches it i
   AutopilotMounting mounting;
   mounting.p_body_vehicle = {1, 0, 0};
   NavState state;
+  state.health = Health::kGood;
   state.stamp = kNow;
   CHECK(obstacleDistanceOf(*mesh, state, mounting)->distance_cm[0] == 300);
   state.T_world_body.translation.x() = 3;
@@ -96,9 +98,27 @@ TEST_CASE("Distances count from the vehicle's reference point, what touches it i
   CHECK(touching->min_cm > 0);
 }
 
-TEST_CASE("An old mesh, or one of another epoch, says nothing", "[autopilot]") {
+TEST_CASE("What is seen beyond the reach is free up to there, what is not seen is unknown", "[autopilot]") {
+  AutopilotMounting mounting;
+  NavState state;
+  state.stamp = kNow;
+  state.health = Health::kDegraded;
+  for (const double distance : {19.99, 20.01, 250.0}) {
+    const auto made = obstacleDistanceOf(*wallAt({distance, 0, 0}), state, mounting);
+    REQUIRE(made);
+    const mavlink::ObstacleDistance told = throughBytes(*made);
+    CHECK(told.max_cm == 2000);
+    CHECK(told.distance_cm[0] == (distance < 20 ? 1999 : told.max_cm + 1));
+    for (std::size_t i = 5; i < told.distance_cm.size() - 5; ++i) {
+      CHECK(told.distance_cm[i] == mavlink::ObstacleDistance::kUnknown);
+    }
+  }
+}
+
+TEST_CASE("An old mesh, one of another epoch, one from a lost state say nothing", "[autopilot]") {
   const auto mesh = wallAt({4, 0, 0});
   NavState state;
+  state.health = Health::kGood;
   state.stamp = kNow + kOldestObstacles;
   CHECK(obstacleDistanceOf(*mesh, state, {}));
   state.stamp = state.stamp + Duration{1};
@@ -106,6 +126,12 @@ TEST_CASE("An old mesh, or one of another epoch, says nothing", "[autopilot]") {
   state.stamp = kNow;
   state.epoch = 1;
   CHECK_FALSE(obstacleDistanceOf(*mesh, state, {}));
+  state.epoch = 0;
+  CHECK(obstacleDistanceOf(*mesh, state, {}));
+  for (const Health health : {Health::kInitializing, Health::kFailed}) {
+    state.health = health;
+    CHECK_FALSE(obstacleDistanceOf(*mesh, state, {}));
+  }
 }
 
 }  // namespace

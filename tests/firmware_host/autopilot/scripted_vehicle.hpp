@@ -1,0 +1,96 @@
+#pragma once
+// A scripted run for the autopilot's thread, and what an autopilot at the other end of the port heard of it.
+
+#include <chrono>
+#include <cstdio>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "drivers/device/monotonic_now.hpp"
+#include "drivers/mavlink/mavlink_link.hpp"
+#include "drivers/mavlink/mavlink_messages.hpp"
+#include "drivers/mavlink/vision_messages.hpp"
+#include "firmware_host/autopilot/autopilot_thread.hpp"
+
+namespace swiftlet::test {
+
+/// What the autopilot heard.
+struct Heard {
+  std::vector<mavlink::Odometry> poses;
+  std::vector<mavlink::ObstacleDistance> obstacles;
+  std::vector<mavlink::Timesync> answers;
+  std::vector<std::string> texts;
+  std::vector<mavlink::Heartbeat> heartbeats;
+  MavlinkParser parser;
+
+  void take(std::span<const std::uint8_t> bytes) {
+    while (!bytes.empty()) {
+      bytes = bytes.subspan(parser.feed(bytes, {}, {}));
+      for (MavlinkFrame frame; parser.next(frame);) {
+        mavlink::Odometry pose;
+        mavlink::ObstacleDistance obstacle;
+        mavlink::Timesync answer;
+        if (mavlink::read(frame, pose)) poses.push_back(pose);
+        if (mavlink::read(frame, obstacle)) obstacles.push_back(obstacle);
+        if (mavlink::read(frame, answer)) answers.push_back(answer);
+        mavlink::StatusText text;
+        if (mavlink::read(frame, text)) {
+          if (text.chunk == 0) texts.emplace_back();
+          texts.back() += text.text;
+        }
+        mavlink::Heartbeat beat;
+        if (mavlink::read(frame, beat)) heartbeats.push_back(beat);
+      }
+    }
+  }
+};
+
+/// A vehicle that moves along x at 1 m/s, with states every 5 ms.
+struct Vehicle {
+  LiveOutlet outlet;
+  Stamp begin = monotonicNow();
+  Duration clock{};  ///< of the run's stamps before CLOCK_MONOTONIC
+
+  void move(Health health = Health::kGood) {
+    StateNews news;
+    const Stamp now = monotonicNow();
+    news.state.stamp = now - clock;
+    news.state.health = health;
+    news.state.T_world_body.translation.x() = (now - begin).seconds();
+    outlet.state.write(news);
+  }
+  void say(const char* what) {
+    ArmingVerdict verdict;
+    if (*what != 0) {
+      MissingCondition missing;
+      missing.condition = ArmingCondition::kSensors;
+      std::snprintf(missing.text.data(), missing.text.size(), "%s", what);
+      static_cast<void>(verdict.missing.tryPushBack(missing));
+    }
+    outlet.arming.write(verdict);
+  }
+  void tellHealth(Health health) {
+    FrameNews news;
+    news.health = health;
+    outlet.frame.write(news);
+  }
+};
+
+/// Lets `seconds` pass in steps of a state; `each` sees every one.
+template <typename Each>
+void pass(double seconds, Each&& each) {
+  const Stamp end = monotonicNow() + Duration::fromSeconds(seconds);
+  while (monotonicNow() < end) {
+    each();
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+}
+
+inline AutopilotThreadOptions optionsOf(const std::string& device) {
+  AutopilotThreadOptions options;
+  options.settings.device = device;
+  return options;
+}
+
+}  // namespace swiftlet::test
