@@ -20,6 +20,7 @@
 #include "firmware_host/report/kept_map.hpp"
 #include "firmware_host/report/ply_file.hpp"
 #include "mapping/pose_graph/pose_graph_optimizer.hpp"
+#include "tests/fuzz/fuzz_autopilot.hpp"
 #include "tests/fuzz/fuzz_can.hpp"
 #include "tests/fuzz/fuzz_clocks.hpp"
 #include "tests/fuzz/fuzz_decoders.hpp"
@@ -277,7 +278,7 @@ void keptMap(std::string_view text) {
   }
 }
 
-constexpr std::array<NamedTarget, 20> kTargets = {{{"imu_csv", &imuCsv},
+constexpr std::array<NamedTarget, 21> kTargets = {{{"imu_csv", &imuCsv},
                                                    {"image_csv", &imageCsv},
                                                    {"trajectory", &trajectory},
                                                    {"tracks", &tracks},
@@ -294,6 +295,7 @@ constexpr std::array<NamedTarget, 20> kTargets = {{{"imu_csv", &imuCsv},
                                                    {"xsens_stream", &xsensStream},
                                                    {"mip_stream", &mipStream},
                                                    {"mavlink_stream", &mavlinkStream},
+                                                   {"autopilot_stream", &autopilotStream},
                                                    {"bridge_stream", &bridgeStream},
                                                    {"clocks", &clocks},
                                                    {"faults", &faults}}};
