@@ -87,6 +87,22 @@ void pass(double seconds, Each&& each) {
   }
 }
 
+/// As long as it takes, on a machine under load too; false: it never was so.
+template <typename IsSo, typename Each>
+bool until(IsSo&& is_so, Each&& each) {
+  const Stamp end = monotonicNow() + Duration::fromMilliseconds(20'000);
+  while (!is_so() && monotonicNow() < end) {
+    each();
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return is_so();
+}
+
+/// What comes `rate` times a second can have come so often since `begin`, the first at once.
+inline std::size_t mostSince(Stamp begin, double rate) {
+  return static_cast<std::size_t>((monotonicNow() - begin).seconds() * rate) + 2;
+}
+
 inline AutopilotThreadOptions optionsOf(const std::string& device) {
   AutopilotThreadOptions options;
   options.settings.device = device;

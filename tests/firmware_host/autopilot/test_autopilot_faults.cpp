@@ -1,7 +1,7 @@
 // What the thread says when the estimate, or the port, is not as it should be.
 
+#include <algorithm>
 #include <catch2/catch.hpp>
-
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -32,38 +32,50 @@ TEST_CASE("Degraded, failed and good again are told as autopilots understand the
   Plug plug;
   Vehicle vehicle;
   AutopilotThread autopilot(vehicle.outlet, optionsOf(plug.terminal.path()));
-  const auto fly = [&](Health health, double seconds) {
+  using Pose = mavlink::Odometry;
+  const std::vector<Pose>& poses = plug.heard.poses;
+  // Until five poses, two heartbeats and a text of it came; gives what came of it.
+  const auto fly = [&](Health health, auto&& is_of_it) {
     vehicle.tellHealth(health);
-    const std::size_t from = plug.heard.poses.size();
-    pass(seconds, [&] {
+    const std::size_t texts = plug.heard.texts.size(), beats = plug.heard.heartbeats.size() + 2;
+    const auto from = static_cast<std::uint64_t>(monotonicNow().ns / 1000 + 1);
+    const auto since = [&] {
+      return std::span(std::ranges::lower_bound(poses, from, {}, &Pose::time_usec), poses.end());
+    };
+    const auto enough = [&] {
+      return std::ranges::count_if(since(), is_of_it) >= 5 && plug.heard.texts.size() > texts &&
+             plug.heard.heartbeats.size() >= beats;
+    };
+    REQUIRE(until(enough, [&] {
       vehicle.move(health);
       plug.listen();
-    });
-    return std::span(plug.heard.poses).subspan(from);
+    }));
+    return since();
   };
-  // The first of a new health may still be of the one before.
-  const auto good = fly(Health::kGood, 0.4);
-  REQUIRE(good.size() > 4);
-  CHECK(good.back().quality == 100);
-  const auto degraded = fly(Health::kDegraded, 0.4);
-  REQUIRE(degraded.size() > 4);
-  for (const auto& pose : degraded.subspan(1)) CHECK((pose.quality > 0 && pose.quality < 100));
-  CHECK(degraded.back().reset_counter == 0);
+  const auto isGood = [](const Pose& pose) { return pose.quality == 100; };
+  const auto isDegraded = [](const Pose& pose) { return pose.quality > 0 && pose.quality < 100; };
+  const auto isLost = [](const Pose& pose) { return pose.quality == -1 && std::isnan(pose.position.x()); };
+  static_cast<void>(fly(Health::kGood, isGood));
+  for (const Pose& pose : fly(Health::kDegraded, isDegraded)) CHECK_FALSE(isGood(pose));
+  const int resets = poses.back().reset_counter;
 
-  const auto failed = fly(Health::kFailed, 1.8);
-  REQUIRE(failed.size() > 10);
-  CHECK(failed.size() <= 43);  // a second of it, then silence
-  for (const auto& pose : failed.subspan(1)) {
-    CHECK(pose.quality == -1);
-    CHECK(std::isnan(pose.position.x()));
-  }
+  const auto lost = fly(Health::kFailed, isLost);
+  CHECK(std::ranges::all_of(lost, isLost));
   CHECK(plug.heard.heartbeats.back().system_status == kCritical);
-  const auto again = fly(Health::kGood, 1.2);
-  REQUIRE(again.size() > 10);
-  for (const auto& pose : again.subspan(1)) {
-    CHECK(pose.quality == 100);
-    CHECK(pose.reset_counter == 1);
-  }
+  const std::size_t before = poses.size() - lost.size();
+  const auto fail = [&] {
+    vehicle.move(Health::kFailed);
+    plug.listen();
+  };
+  // A second of it, then silence.
+  pass(0.5, fail);
+  const std::size_t told = poses.size();
+  CHECK(told - before <= 43);
+  pass(0.3, fail);
+  CHECK(poses.size() == told);
+
+  const auto again = fly(Health::kGood, isGood);
+  CHECK(again.back().reset_counter > resets);
   CHECK(plug.heard.heartbeats.back().system_status == kActive);
   const std::vector<std::string> wanted = {"swiftlet: good", "swiftlet: degraded", "swiftlet: failed",
                                            "swiftlet: good"};
@@ -76,17 +88,19 @@ TEST_CASE("Reasons that stand are said again after the period, readiness once", 
   AutopilotThreadOptions options = optionsOf(plug.terminal.path());
   options.repeat = Duration::fromMilliseconds(300);
   vehicle.say("no images");
+  const Stamp begin = monotonicNow();
   AutopilotThread autopilot(vehicle.outlet, options);
-  pass(1, [&] { plug.listen(); });
-  // At 0, 300, 600 and 900 ms; a busy machine may be late.
-  const auto said = static_cast<int>(plug.heard.texts.size());
-  CHECK(said >= 2);
-  CHECK(said <= 4);
+  const auto listen = [&] { plug.listen(); };
+  REQUIRE(until([&] { return plug.heard.texts.size() >= 3; }, listen));
+  const std::size_t said = plug.heard.texts.size();
+  CHECK(said <= mostSince(begin, 1 / options.repeat.seconds()));
+  CHECK(monotonicNow() - begin >= options.repeat + options.repeat);
   for (const std::string& text : plug.heard.texts) CHECK(text == "not ready: sensors: no images");
   vehicle.say("");
-  pass(0.8, [&] { plug.listen(); });
+  REQUIRE(until([&] { return plug.heard.texts.back() == "swiftlet: ready to arm"; }, listen));
+  pass(0.7, listen);
+  CHECK(plug.heard.texts.back() == "swiftlet: ready to arm");
   CHECK(std::ranges::count(plug.heard.texts, "swiftlet: ready to arm") == 1);
-  CHECK(static_cast<int>(plug.heard.texts.size()) <= said + 2);
 }
 
 TEST_CASE("A mesh that stands is told at the rate while it is fresh, from where the vehicle is by now",
@@ -94,23 +108,30 @@ TEST_CASE("A mesh that stands is told at the rate while it is fresh, from where 
   Plug plug;
   Vehicle vehicle;
   AutopilotThread autopilot(vehicle.outlet, optionsOf(plug.terminal.path()));
-  LocalMesh& mesh = vehicle.outlet.mesh.draft();
-  mesh = {};
-  mesh.stamp = monotonicNow();
-  for (const Eigen::Vector3f& p : {Eigen::Vector3f(9, -1, -1), {9, 1, -1}, {9, 0, 1}}) {
-    static_cast<void>(mesh.vertices.tryPushBack({0, p, 0}));
-  }
-  static_cast<void>(mesh.faces.tryPushBack({{0, 1, 2}, kNoLabel}));
-  vehicle.outlet.mesh.publish();
-  pass(1.2, [&] {
+  const auto& told = plug.heard.obstacles;
+  const auto fly = [&] {
     vehicle.move();
     plug.listen();
-  });
-  const auto& told = plug.heard.obstacles;
-  REQUIRE(told.size() >= 3);
-  CHECK(told.size() <= 6);  // half a second of it
-  for (std::size_t i = 1; i < told.size(); ++i) {
-    CHECK(told[i].time_usec == told[0].time_usec);
+  };
+  // Where the machine stands still while a mesh is fresh, the next mesh is looked at.
+  std::size_t first = 0;
+  for (int i = 0; i < 20 && told.size() < first + 3; ++i) {
+    first = told.size();
+    LocalMesh& mesh = vehicle.outlet.mesh.draft();
+    mesh = {};
+    mesh.stamp = monotonicNow();
+    const auto wall = static_cast<float>((mesh.stamp - vehicle.begin).seconds() + 9);
+    for (const Eigen::Vector3f& p : {Eigen::Vector3f(wall, -1, -1), {wall, 1, -1}, {wall, 0, 1}}) {
+      static_cast<void>(mesh.vertices.tryPushBack({0, p, 0}));
+    }
+    static_cast<void>(mesh.faces.tryPushBack({{0, 1, 2}, kNoLabel}));
+    vehicle.outlet.mesh.publish();
+    pass(1.2, fly);
+  }
+  REQUIRE(told.size() >= first + 3);
+  CHECK(told.size() <= first + 6);  // half a second of it
+  for (std::size_t i = first + 1; i < told.size(); ++i) {
+    CHECK(told[i].time_usec == told[first].time_usec);
     CHECK(told[i].distance_cm[0] < told[i - 1].distance_cm[0]);
   }
 }
@@ -126,33 +147,33 @@ TEST_CASE("A port that takes nothing loses what is sent, counted and noted, and 
   const auto drain = [&] {
     autopilot.drainEvents([&](Stamp, const std::string& line) { lines.push_back(line); });
   };
-  // Nobody reads: the kernel's buffer fills.
-  for (int i = 0; i < 20 && lines.empty(); ++i) {
-    pass(0.2, [&] {
-      vehicle.move();
-      drain();
+  const std::string wanted = "autopilot (" + plug.terminal.path() + ")";
+  const auto refusals = [&] {
+    return std::ranges::count_if(lines, [&](const std::string& line) {
+      return line.starts_with(wanted) && line.find("not taken") != std::string::npos &&
+             line.find("autopilot.baud") != std::string::npos;
     });
-  }
-  REQUIRE(lines.size() == 1);
-  CHECK(lines[0].find("autopilot (" + plug.terminal.path() + ")") == 0);
-  CHECK(lines[0].find("not taken") != std::string::npos);
-  CHECK(lines[0].find("autopilot.baud") != std::string::npos);
+  };
+  // Nobody reads: the kernel's buffer fills.
+  REQUIRE(until([&] { return refusals() > 0; },
+                [&] {
+                  vehicle.move();
+                  drain();
+                }));
   // Then it is read again: the newest comes through whole.
-  pass(0.5, [&] {
-    vehicle.move();
-    plug.listen();
-    drain();
-  });
-  const Stamp now = monotonicNow();
-  REQUIRE_FALSE(plug.heard.poses.empty());
-  const mavlink::Odometry& newest = plug.heard.poses.back();
-  CHECK(newest.quality == 100);
-  const double age = (now - Stamp{}).seconds() - static_cast<double>(newest.time_usec) * 1e-6;
-  CHECK(age < 0.3);
+  const Stamp read_again = monotonicNow();
+  const auto isNew = [&](const mavlink::Odometry& pose) {
+    return pose.quality == 100 && static_cast<std::int64_t>(pose.time_usec) > read_again.ns / 1000;
+  };
+  REQUIRE(until([&] { return std::ranges::any_of(plug.heard.poses, isNew); },
+                [&] {
+                  vehicle.move();
+                  plug.listen();
+                  drain();
+                }));
   const nlohmann::ordered_json counted = autopilot.finish();
   CHECK(counted["writes_refused"].get<int>() > 0);
-  CHECK(counted["faults"] == 0);
-  CHECK(lines.size() == 1);
+  CHECK(refusals() == 1);
 }
 
 }  // namespace

@@ -65,9 +65,15 @@ class FarSensor {
     std::array<std::uint8_t, ImuEncoder::kLongestFrame> frame;
     sendBytes(std::span(frame).first(encoder_.encode(reading, frame)));
   }
+  /// Waits for room: a pseudo-terminal holds 8 kB, and a machine may keep its reader from running for longer
+  /// than that.
   void sendBytes(std::span<const std::uint8_t> bytes) {
-    std::size_t taken = 0;
-    CHECK(terminal_.send(bytes, taken).ok());
+    REQUIRE(soon([&] {
+      std::size_t taken = 0;
+      CHECK(terminal_.send(bytes, taken).ok());
+      bytes = bytes.subspan(taken);
+      return bytes.empty();
+    }));
   }
 
   Duration offset = Duration{} - kUptime;  ///< of its clock to the host's
@@ -100,58 +106,86 @@ bool rising(const KeepingSink& sink) {
   return true;
 }
 
-TEST_CASE("samples of every protocol come stamped near the truth and in the body's axes") {
-  for (const ImuProtocol protocol : {ImuProtocol::kVectorNav, ImuProtocol::kXsens, ImuProtocol::kMip,
-                                     ImuProtocol::kMavlink, ImuProtocol::kBridge}) {
-    INFO(name(protocol));
-    FarSensor sensor(protocol);
-    KeepingSink sink;
-    ImuThread imu = threadOf(sensor, quarterTurn());
+/// A sensor's readings, taken up by a thread that has ended.
+struct Flown {
+  FarSensor sensor;
+  KeepingSink sink;
+  ImuThread imu;
+  std::size_t lines = 0;  ///< about the IMU
+
+  Flown(ImuProtocol protocol, const Eigen::Matrix3d& R, Duration delay, std::size_t readings)
+      : sensor(protocol), imu(threadOf(sensor, R, delay)) {
     REQUIRE(imu.open().ok());
     RunningImu running(imu, sink);
     REQUIRE(soon([&] {
       sensor.send(1);
-      return sink.count() >= 100;
+      return sink.count() >= readings;
     }));
     running.end();
+    lines = running.linesWith("IMU");
+  }
+  /// The longest that the machine kept a reading.
+  [[nodiscard]] Duration heldUp() const {
+    Duration longest;
+    for (std::size_t i = 0; i < sink.count(); ++i) {
+      const std::size_t number = numberOf(sink[i].sample);
+      REQUIRE(number < sensor.sensed.size());
+      longest = std::max(longest, sink[i].arrival - sensor.sensed[number]);
+    }
+    return longest;
+  }
+};
+
+/// By a machine that runs: a clock that begins with readings which it kept is not known to a millisecond.
+std::unique_ptr<Flown> fly(ImuProtocol protocol, const Eigen::Matrix3d& R, Duration delay,
+                           std::size_t readings) {
+  constexpr Duration kHeldUp = Duration::fromMilliseconds(10);
+  for (int i = 0; i < 20; ++i) {
+    auto flown = std::make_unique<Flown>(protocol, R, delay, readings);
+    if (flown->heldUp() < kHeldUp) return flown;
+  }
+  FAIL("the machine stood still in every flight");
+  return nullptr;
+}
+
+TEST_CASE("samples of every protocol come stamped near the truth and in the body's axes") {
+  for (const ImuProtocol protocol : {ImuProtocol::kVectorNav, ImuProtocol::kXsens, ImuProtocol::kMip,
+                                     ImuProtocol::kMavlink, ImuProtocol::kBridge}) {
+    INFO(name(protocol));
+    const auto flown = fly(protocol, quarterTurn(), {}, 100);
+    const KeepingSink& sink = flown->sink;
+    // Of readings that came together the later are moved on, to rise: by less than they were kept.
+    const Duration kept_back = flown->heldUp();
     CHECK(rising(sink));
     std::vector<std::int64_t> errors;
-    std::size_t missing = 0;
     for (std::size_t i = 0; i < sink.count(); ++i) {
       const KeepingSink::Kept& kept = sink[i];
       const std::size_t number = numberOf(kept.sample);
-      REQUIRE(number < sensor.sensed.size());
-      if (i > 0) missing += number - numberOf(sink[i - 1].sample) - 1;
-      CHECK(kept.sample.stamp <= kept.arrival);
-      errors.push_back((kept.sample.stamp - sensor.sensed[number]).ns);
+      if (i > 0) CHECK(number == numberOf(sink[i - 1].sample) + 1);
+      CHECK(kept.sample.stamp <= kept.arrival + kept_back);
+      errors.push_back((kept.sample.stamp - flown->sensor.sensed[number]).ns);
       CHECK((kept.sample.gyro.head<2>() - Eigen::Vector2d(0.25, 0.5)).norm() < 1e-6);
       CHECK((kept.sample.accel - Eigen::Vector3d(-2, 1, 9.5)).norm() < 1e-5);
     }
     std::ranges::sort(errors);
     CHECK(errors.front() > -1'000'000);  // Xsens counts tenths of a millisecond
     CHECK(errors[errors.size() / 2] < 2'000'000);
-    const ImuStatus status = imu.status();
+    const ImuStatus status = flown->imu.status();
     CHECK(status.samples == sink.count());
     CHECK(status.by_arrival == 0);
-    // A machine that held the first up by milliseconds begins the clock anew; no reading goes unseen.
-    CHECK(missing <= status.refused);
-    CHECK(running.linesWith("IMU") == 0);
+    CHECK(status.refused == 0);
+    CHECK(flown->lines == 0);
   }
 }
 
 TEST_CASE("the constant delay is taken off every stamp") {
   constexpr Duration kDelay = Duration::fromMilliseconds(40);
-  FarSensor sensor(ImuProtocol::kBridge);
-  KeepingSink sink;
-  ImuThread imu = threadOf(sensor, Eigen::Matrix3d::Identity(), kDelay);
-  REQUIRE(imu.open().ok());
-  RunningImu running(imu, sink);
-  REQUIRE(soon([&] {
-    sensor.send(5);
-    return sink.count() > 20;
-  }));
-  running.end();
-  for (std::size_t i = 0; i < sink.count(); ++i) CHECK(sink[i].arrival - sink[i].sample.stamp >= kDelay);
+  const auto flown = fly(ImuProtocol::kBridge, Eigen::Matrix3d::Identity(), kDelay, 20);
+  const KeepingSink& sink = flown->sink;
+  for (std::size_t i = 0; i < sink.count(); ++i) {
+    const Duration taken_off = sink[i].arrival - sink[i].sample.stamp;
+    CHECK(taken_off + flown->heldUp() >= kDelay);
+  }
 }
 
 TEST_CASE("what waited before the flight has no share in it") {
