@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
@@ -14,9 +13,9 @@
 #include "firmware_host/autopilot/autopilot_port.hpp"
 #include "firmware_host/autopilot/obstacle_message.hpp"
 #include "firmware_host/live/device_journal.hpp"
+#include "firmware_host/pipeline/follower_thread.hpp"
 #include "firmware_host/pipeline/host_sleep.hpp"
 #include "firmware_host/pipeline/latency_histogram.hpp"
-#include "firmware_host/realtime/flight_thread.hpp"
 #include "firmware_host/report/names.hpp"
 
 namespace swiftlet {
@@ -71,17 +70,10 @@ class AutopilotThread::Work {
     ThreadSettings thread;
     thread.name = "autopilot";
     thread.priority = options.priority;
-    const ThreadReport report = thread_.start(thread, [this] { run(); });
-    if (!report.started) throw InputError("settings", 0, "autopilot.device", report.message, "");
+    thread_.start(thread, "settings", "autopilot.device", [this] { run(); });
   }
-  ~Work() { end(); }
-  Work(const Work&) = delete;
-  Work& operator=(const Work&) = delete;
 
-  void end() {
-    stop_.store(true, std::memory_order_relaxed);
-    thread_.join();
-  }
+  void end() { thread_.end(); }
 
   bool drainEvents(const std::function<void(Stamp, const std::string&)>& take) {
     bool any = false;
@@ -111,7 +103,7 @@ class AutopilotThread::Work {
  private:
   void run() {
     heard_ = monotonicNow();
-    while (!stop_.load(std::memory_order_relaxed)) {
+    while (!thread_.ending()) {
       if (journal_.standing() != DeviceFaultKind::kNone) {
         reopen();
         continue;
@@ -250,8 +242,7 @@ class AutopilotThread::Work {
   Stamp next_refusal_;
   std::uint64_t refused_ = 0;
   LatencyHistogram age_;
-  std::atomic<bool> stop_{false};
-  FlightThread thread_;
+  FollowerThread thread_;
 };
 
 AutopilotThread::AutopilotThread(LiveOutlet& outlet, const AutopilotThreadOptions& options)

@@ -2,16 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <atomic>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/dds/dds_link.hpp"
 #include "firmware_host/export/ros_state.hpp"
-#include "firmware_host/pipeline/host_sleep.hpp"
-#include "firmware_host/pipeline/stage_timer.hpp"
-#include "firmware_host/realtime/flight_thread.hpp"
+#include "firmware_host/pipeline/follower_thread.hpp"
 #include "firmware_host/report/map_files.hpp"
 #include "firmware_host/report/names.hpp"
 
@@ -26,9 +23,8 @@ constexpr double kLabelPeriod = kKeptImages / 1600.0;
 constexpr float kFullColour = 255;
 constexpr const char* kCameraFrame = "cam0";
 
-Eigen::Vector3f colourOf(std::uint8_t label, std::uint8_t grey) {
-  const auto [r, g, b] = label == 0 ? std::array{grey, grey, grey} : labelColour(label);
-  return Eigen::Vector3f(r, g, b) / kFullColour;
+std::array<std::uint8_t, 3> colourOf(std::uint8_t label, std::uint8_t grey) {
+  return label == 0 ? std::array{grey, grey, grey} : labelColour(label);
 }
 
 std::uint8_t levelOf(Health health) {
@@ -63,17 +59,10 @@ class DdsThread::Work {
     }
     ThreadSettings thread;
     thread.name = "dds";
-    const ThreadReport report = thread_.start(thread, [this] { run(); });
-    if (!report.started) throw InputError("settings", 0, "ros2.enabled", report.message, "");
+    thread_.start(thread, "settings", "ros2.enabled", [this] { run(); });
   }
-  ~Work() { end(); }
-  Work(const Work&) = delete;
-  Work& operator=(const Work&) = delete;
 
-  void end() {
-    stop_.store(true, std::memory_order_relaxed);
-    thread_.join();
-  }
+  void end() { thread_.end(); }
   [[nodiscard]] nlohmann::ordered_json json() const {
     const DdsCounters link = link_.counters();
     nlohmann::ordered_json json = {{"odometry", odometries_}, {"meshes", meshes_},
@@ -96,19 +85,15 @@ class DdsThread::Work {
   void run() {
     const double state_period = 1 / options_.settings.odometry_hz;
     const double turns = options_.labels != nullptr ? std::ceil(state_period / kLabelPeriod) : 1;
-    const double period = state_period / turns;
-    double next = wallSeconds();
-    for (double turn = 0; !stop_.load(std::memory_order_relaxed); turn = std::fmod(turn + 1, turns)) {
-      const double now = wallSeconds();
+    double turn = 0;
+    thread_.repeat(state_period / turns, [&](double now) {
       if (turn == 0) publishState();
+      turn = std::fmod(turn + 1, turns);
       if (options_.labels != nullptr) exchangeLabels(*options_.labels);
       publishDiagnostics(now);
       if (mesh_pace_.due(now)) publishMesh();
       publishSurface(now);
-      // A thread that came late does not hurry after.
-      next = std::max(next + period, now);
-      sleepUntil(next);
-    }
+    });
   }
 
   [[nodiscard]] Stamp ros(Stamp stamp) const { return stamp + options_.to_ros_clock; }
@@ -173,7 +158,8 @@ class DdsThread::Work {
     for (const MeshFace& face : mesh.faces) {
       for (const std::uint32_t corner : face.vertex) {
         points_.push_back(mesh.vertices[corner].p_world);
-        colours_.push_back(colourOf(face.label, mesh.vertices[corner].grey));
+        const auto [r, g, b] = colourOf(face.label, mesh.vertices[corner].grey);
+        colours_.push_back(Eigen::Vector3f(r, g, b) / kFullColour);
       }
     }
     if (link_.publish(DdsMesh{ros(mesh.stamp), frames_.odom, points_, colours_})) ++meshes_;
@@ -188,8 +174,7 @@ class DdsThread::Work {
     cloud_.clear();
     for (const SurfaceVertex& vertex : surface.vertices) {
       const Eigen::Vector3f& p = vertex.p_world;
-      const auto [r, g, b] =
-          vertex.label == 0 ? std::array{vertex.grey, vertex.grey, vertex.grey} : labelColour(vertex.label);
+      const auto [r, g, b] = colourOf(vertex.label, vertex.grey);
       const std::uint32_t rgb =
           (static_cast<std::uint32_t>(r) << 16U) | (static_cast<std::uint32_t>(g) << 8U) | b;
       cloud_.push_back({p.x(), p.y(), p.z(), rgb, vertex.label});
@@ -223,8 +208,7 @@ class DdsThread::Work {
   std::vector<Eigen::Vector3f> points_, colours_;
   std::vector<DdsCloudPoint> cloud_;
   DdsImage label_;
-  std::atomic<bool> stop_{false};
-  FlightThread thread_;
+  FollowerThread thread_;
 };
 
 DdsThread::DdsThread(LiveOutlet& outlet, const DdsThreadOptions& options)

@@ -1,17 +1,13 @@
 #include "firmware_host/view/view_thread.hpp"
 
-#include <algorithm>
-#include <atomic>
 #include <fstream>
 #include <iterator>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
 
-#include "drivers/calibration/input_error.hpp"
-#include "firmware_host/pipeline/host_sleep.hpp"
+#include "firmware_host/pipeline/follower_thread.hpp"
 #include "firmware_host/pipeline/stage_timer.hpp"
-#include "firmware_host/realtime/flight_thread.hpp"
 #include "firmware_host/report_page/page.hpp"
 #include "firmware_host/view/live_document.hpp"
 #include "firmware_host/view/raised_niceness.hpp"
@@ -68,16 +64,11 @@ class ViewThread::Work {
     address_ = server_->address();
     ThreadSettings settings;
     settings.name = "view";
-    const ThreadReport report = thread_.start(settings, [this] { run(); });
-    if (!report.started) throw InputError("--view", 0, "", report.message, "");
+    thread_.start(settings, "--view", "", [this] { run(); });
   }
-  ~Work() { end(); }
-  Work(const Work&) = delete;
-  Work& operator=(const Work&) = delete;
 
   void end() {
-    stop_.store(true, std::memory_order_relaxed);
-    thread_.join();
+    thread_.end();
     server_.reset();
   }
   [[nodiscard]] const ViewAddress& address() const { return address_; }
@@ -90,15 +81,11 @@ class ViewThread::Work {
  private:
   void run() {
     yieldToOthers();
-    double next = wallSeconds();
-    for (int sample = 0; !stop_.load(std::memory_order_relaxed); ++sample) {
-      const double now = wallSeconds();
+    int sample = 0;
+    thread_.repeat(kSamplePeriod, [&](double now) {
       document_.sample(outlet_, now, hub_.viewers() > 0);
-      if (sample % kSamplesPerPatch == 0) publish(now);
-      // A thread that came late does not hurry after.
-      next = std::max(next + kSamplePeriod, now);
-      sleepUntil(next);
-    }
+      if (sample++ % kSamplesPerPatch == 0) publish(now);
+    });
     document_.sample(outlet_, wallSeconds(), hub_.viewers() > 0);
     publish(wallSeconds());
   }
@@ -125,8 +112,7 @@ class ViewThread::Work {
   std::string text_;
   std::unique_ptr<ViewServer> server_;
   ViewAddress address_;
-  std::atomic<bool> stop_{false};
-  FlightThread thread_;
+  FollowerThread thread_;
 };
 
 ViewThread::ViewThread(LiveOutlet& outlet, const ViewAddress& address, const std::string& name)
