@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "firmware_host/report/mesh_files.hpp"
 #include "firmware_host/report/names.hpp"
 #include "firmware_host/report/summary.hpp"
 #include "firmware_host/report_page/base64.hpp"
@@ -242,7 +243,7 @@ void LiveDocument::takeMesh(LiveOutlet& outlet) {
   if (number == mesh_number_) return;
   mesh_number_ = number;
   mesh_came_ = now_;
-  const TriangleMesh mesh = triangleMesh(outlet.mesh.value());
+  const TriangleMesh mesh = toTriangleMesh(outlet.mesh.value());
   if (mesh.faces.empty()) return;
   mesh_ = surfaceJson("local_mesh", "local mesh", mesh);
   mesh_changed_ = true;

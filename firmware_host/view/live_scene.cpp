@@ -9,19 +9,6 @@
 
 namespace swiftlet {
 
-TriangleMesh triangleMesh(const LocalMesh& mesh) {
-  TriangleMesh out;
-  for (const MeshVertex& vertex : mesh.vertices) {
-    out.vertices.push_back(vertex.p_world);
-    out.grey.push_back(vertex.grey);
-  }
-  for (const MeshFace& face : mesh.faces) {
-    out.faces.push_back(face.vertex);
-    out.labels.push_back(face.label);
-  }
-  return out;
-}
-
 nlohmann::ordered_json cloudJson(const char* id, const char* name, std::span<const SurfaceVertex> vertices,
                                  const SE3& T_to_from, std::size_t most) {
   const std::size_t step = (vertices.size() + most - 1) / most;

@@ -5,13 +5,9 @@
 #include <span>
 
 #include "estimator/geometry/se3.hpp"
-#include "estimator/messages/local_mesh.hpp"
-#include "firmware_host/evaluation/triangle_mesh.hpp"
 #include "mapping/surface/surface_patch.hpp"
 
 namespace swiftlet {
-
-TriangleMesh triangleMesh(const LocalMesh& mesh);
 
 /// {"id", "name", "count", "low", "size", "points", "grey", "labels", "note"}: 16-bit x y z from `low` over
 /// `size`, grey and label of each point in 8 bits. More than `most` are thinned by equal steps. `vertices`
