@@ -1,19 +1,12 @@
 #!/bin/sh
 # Opens reports of a short log in headless Chromium: one run, and two beside each other.
 # usage: report_browser.sh SWIFTLET PAGE_FOLDER LOG
-# 77: skipped, there is no Chromium, no node or no bundle of the page.
 set -eu
 swiftlet=$1
 page=$2
 log=$3
-skip() {
-  echo "report_browser: skipped: $1"
-  exit 77
-}
-browser=$(command -v chromium || command -v chromium-browser || command -v google-chrome || true)
-[ -n "$browser" ] || skip "no chromium"
-command -v node >/dev/null 2>&1 || skip "no node"
-[ -d "$page/node_modules/playwright-core" ] || skip "the page was built without npm"
+. "$(dirname "$0")/find_browser.sh"
+find_browser "$page"
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

@@ -2,8 +2,8 @@
 # Without a network nothing is made and nothing fails: reports are then plain. Arguments: NPM NODE SOURCE WORK
 # PAGE STAMP.
 file(MAKE_DIRECTORY ${WORK})
-file(COPY ${SOURCE}/package.json ${SOURCE}/package-lock.json ${SOURCE}/build.mjs ${SOURCE}/src ${SOURCE}/check_page.mjs ${SOURCE}/check_live.mjs
-     DESTINATION ${WORK})
+file(COPY ${SOURCE}/package.json ${SOURCE}/package-lock.json ${SOURCE}/build.mjs ${SOURCE}/src ${SOURCE}/browser.mjs
+     ${SOURCE}/check_page.mjs ${SOURCE}/check_live.mjs DESTINATION ${WORK})
 file(SHA256 ${SOURCE}/package-lock.json lock)
 set(fetched "")
 if(EXISTS ${WORK}/fetched)

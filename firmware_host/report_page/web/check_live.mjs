@@ -1,36 +1,16 @@
 // Opens a live view in headless Chromium and stays until the run ends: node check_live.mjs CHROMIUM URL [SCREENSHOT.png]
 // Exit code 1 when the console shows an error, anything but the server is asked, a plot has no data, does not grow or
 // is blank, the 3D view does not draw, or the page does not say that the run has ended.
-import { chromium } from 'playwright-core';
-import { mkdtempSync, rmSync } from 'node:fs';
-import { tmpdir } from 'node:os';
-import { join } from 'node:path';
+import { findBlankPlots, inBrowser, watch } from './browser.mjs';
 
 const [executablePath, url, screenshot] = process.argv.slice(2);
-const profile = mkdtempSync(join(tmpdir(), 'swiftlet_live_'));
-const faults = [];
-const context = await chromium.launchPersistentContext(profile, {
-  executablePath,
-  headless: true,
-  viewport: { width: 1500, height: 1000 },
-  args: ['--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking',
-    '--disable-component-update', '--disable-sync', '--use-gl=angle', '--use-angle=swiftshader',
-    '--enable-unsafe-swiftshader'],
-});
-
 const figures = (page) => page.evaluate(() => window.swiftletReport.figures()[0]);
 
-async function check(page) {
+await inBrowser(executablePath, async (context, faults) => {
+  const page = await context.newPage();
   let ended = false;
-  page.on('console', (message) => {
-    // The drawing of a test is read back; and after the end nobody answers any more.
-    if (ended || !['error', 'warning'].includes(message.type()) || /ReadPixels|getImageData/.test(message.text())) return;
-    faults.push(`console: ${message.text()}`);
-  });
-  page.on('pageerror', (error) => faults.push(`error: ${error.message}`));
-  page.on('request', (request) => {
-    if (!request.url().startsWith(url) && !/^(data|blob):/.test(request.url())) faults.push(`asks ${request.url()}`);
-  });
+  // After the end nobody answers any more.
+  watch(page, faults, (asked) => asked.startsWith(url), () => ended);
   await page.goto(url);
   await page.waitForFunction(() => window.swiftletReport?.ready && window.swiftletReport.live.state === 'live'
     && window.swiftletReport.live.patches > 3, null, { timeout: 60000 });
@@ -46,13 +26,7 @@ async function check(page) {
     window.scrollTo(0, 0);
   });
   const late = await figures(page);
-  const blank = await page.evaluate(() => [...document.querySelectorAll('figure, .alone')].flatMap((host) =>
-    [...host.querySelectorAll('.uplot canvas')].filter((canvas) => {
-      const { width, height } = canvas;
-      const pixels = new Uint32Array(canvas.getContext('2d').getImageData(0, 0, width, height).data.buffer);
-      return new Set(pixels).size < 3;
-    }).map((canvas) => canvas.closest('figure')?.dataset.plot ?? 'timeline')));
-  for (const id of new Set(blank)) faults.push(`plot ${id} is blank`);
+  await findBlankPlots(page, faults);
   const ids = Object.keys(late.plots);
   if (ids.length < 10) faults.push(`only ${ids.length} plots`);
   for (const id of ids) {
@@ -92,15 +66,4 @@ async function check(page) {
   if (replaced.again < 8 || replaced.canvases !== 1) faults.push(`after a second document: ${JSON.stringify(replaced)}`);
   const total = Object.values(late.plots).reduce((sum, n) => sum + n, 0);
   console.log(`${ids.length} plots with ${total} points, ${late.sceneColours} colours in 3D, ${patches} patches until the end`);
-}
-
-try {
-  await check(await context.newPage());
-} catch (error) {
-  faults.push(String(error));
-} finally {
-  await context.close();
-  rmSync(profile, { recursive: true, force: true });
-}
-for (const fault of faults) console.log(`FAULT ${fault}`);
-process.exit(faults.length ? 1 : 0);
+});
