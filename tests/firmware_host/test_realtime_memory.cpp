@@ -18,15 +18,10 @@
 
 #include "firmware_host/realtime/memory_lock.hpp"
 #include "tests/firmware_host/without_rights.hpp"
+#include "tests/sanitized.hpp"
 
 namespace swiftlet {
 namespace {
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kSanitized = true;  // mlockall does nothing there and malloc is another
-#else
-constexpr bool kSanitized = false;
-#endif
 
 bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;

@@ -8,20 +8,16 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <vector>
 
 #include "drivers/device/byte_fields.hpp"
 #include "drivers/mavlink/autopilot_link.hpp"
+#include "tests/fuzz/demand.hpp"
 
 namespace swiftlet::fuzz {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
-
-void demand(bool holds) {
-  if (!holds) std::abort();
-}
 
 constexpr Stamp kStart{1'000'000'000'000};
 constexpr Duration kStep = Duration::fromMilliseconds(5);

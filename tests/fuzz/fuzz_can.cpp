@@ -1,19 +1,15 @@
 #include "tests/fuzz/fuzz_can.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 #include <vector>
 
 #include "drivers/can/raw_imu.hpp"
+#include "tests/fuzz/demand.hpp"
 
 namespace swiftlet::fuzz {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
-
-void demand(bool holds) {
-  if (!holds) std::abort();
-}
 
 void demandSane(const RawImuDecoder& decoder, const ImuReading& reading) {
   demand(reading.gyro.allFinite() && reading.accel.allFinite());

@@ -2,20 +2,16 @@
 
 #include <array>
 #include <cstdint>
-#include <cstdlib>
 #include <limits>
 
 #include "drivers/timesync/clock_map.hpp"
 #include "drivers/timesync/realtime_offset.hpp"
 #include "drivers/timesync/trigger_matcher.hpp"
 #include "drivers/timesync/two_way_clock_map.hpp"
+#include "tests/fuzz/demand.hpp"
 
 namespace swiftlet::fuzz {
 namespace {
-
-void demand(bool holds) {
-  if (!holds) std::abort();
-}
 
 class Bytes {
  public:

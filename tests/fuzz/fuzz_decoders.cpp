@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -16,15 +15,12 @@
 #include "drivers/device/crc16.hpp"
 #include "drivers/serial/imu_decoder.hpp"
 #include "drivers/serial/imu_encoder.hpp"
+#include "tests/fuzz/demand.hpp"
 
 namespace swiftlet::fuzz {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
-
-void demand(bool holds) {
-  if (!holds) std::abort();
-}
 
 constexpr Stamp kStart{1'000'000'000'000};
 constexpr Duration kByteTime{10'851};  // 921600 baud, to the nanosecond

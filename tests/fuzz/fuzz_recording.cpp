@@ -1,21 +1,17 @@
 #include "tests/fuzz/fuzz_recording.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 #include <string>
 #include <vector>
 
 #include "drivers/recorded/recording_checksum.hpp"
 #include "drivers/recorded/recording_source.hpp"
+#include "tests/fuzz/demand.hpp"
 
 namespace swiftlet::fuzz {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
-
-void demand(bool holds) {
-  if (!holds) std::abort();
-}
 
 class MemorySegment final : public RecordingFile {
  public:

@@ -20,6 +20,7 @@
 #include "firmware_host/report/kept_map.hpp"
 #include "firmware_host/report/ply_file.hpp"
 #include "mapping/pose_graph/pose_graph_optimizer.hpp"
+#include "tests/fuzz/demand.hpp"
 #include "tests/fuzz/fuzz_autopilot.hpp"
 #include "tests/fuzz/fuzz_can.hpp"
 #include "tests/fuzz/fuzz_clocks.hpp"
@@ -29,11 +30,6 @@
 
 namespace swiftlet::fuzz {
 namespace {
-
-/// What a reader promises about its answer; stops the fuzzer where it does not hold.
-void demand(bool holds) {
-  if (!holds) std::abort();
-}
 
 template <typename Rows>
 void demandRisingStamps(const Rows& rows) {

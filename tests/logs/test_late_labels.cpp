@@ -16,15 +16,10 @@
 #include "firmware_host/pipeline/run_log.hpp"
 #include "firmware_host/pipeline/threaded.hpp"
 #include "tests/logs/log_data.hpp"
+#include "tests/sanitized.hpp"
 
 namespace swiftlet {
 namespace {
-
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
 
 constexpr int kWidth = 16;
 constexpr int kHeight = 12;

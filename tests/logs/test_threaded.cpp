@@ -27,17 +27,13 @@
 #include "firmware_host/pipeline/threaded.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
+#include "tests/sanitized.hpp"
 
 namespace swiftlet {
 namespace {
 
 /// Sanitizers slow everything down tenfold: a second of the log then, at a fifth of its speed, and nothing
 /// said about losses, which they cause.
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
 constexpr double kSlow = kSanitized ? 0.2 : 1;
 
 /// SWIFTLET_THREADED_RUNS: of random overloads, and of kills.
