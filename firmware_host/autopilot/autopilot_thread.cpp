@@ -153,8 +153,9 @@ class AutopilotThread::Work {
     const bool placed = !options_.to_host || to_host_;
     if (outlet_.state.refresh() != number_ && placed) {
       number_ = outlet_.state.sequence();
-      state_ = outlet_.state.value();
-      state_.state.stamp = onHost(state_.state.stamp);
+      state_ = outlet_.state.value().state();
+      omega_body_ = outlet_.state.value().omegaBody();
+      state_.stamp = onHost(state_.stamp);
     }
     tellReasons();
     if (outlet_.frame.refresh() > 0 && outlet_.frame.value().health != health_) {
@@ -186,10 +187,10 @@ class AutopilotThread::Work {
     // By the rate on the mean, and never two at once after a pause.
     next_obstacles_ = std::max(next_obstacles_ + kObstaclePeriod, now + Duration{kObstaclePeriod.ns / 2});
     const Stamp stamp = onHost(outlet_.mesh.value().stamp);
-    if (now - stamp > kOldestObstacles || now - state_.state.stamp > AutopilotLink::kOldest) return;
+    if (now - stamp > kOldestObstacles || now - state_.stamp > AutopilotLink::kOldest) return;
     // A mesh that stands is told again as long as it is fresh, seen from where the vehicle is by now. Both
     // are in the run's clock.
-    if (auto message = obstacleDistanceOf(outlet_.mesh.value(), outlet_.state.value().state, mounting_)) {
+    if (auto message = obstacleDistanceOf(outlet_.mesh.value(), outlet_.state.value().state(), mounting_)) {
       message->time_usec = static_cast<std::uint64_t>(stamp.ns / kNanosecondsPerMicrosecond);
       link_.show(*message);
     }
@@ -199,14 +200,14 @@ class AutopilotThread::Work {
     std::array<std::uint8_t, AutopilotLink::kMostBytes> bytes;
     const std::uint64_t poses = link_.counters().poses;
     const std::size_t count =
-        link_.step(monotonicNow(), number_ > 0 ? &state_.state : nullptr, state_.omega_body, bytes);
+        link_.step(monotonicNow(), number_ > 0 ? &state_ : nullptr, omega_body_, bytes);
     if (count == 0) return;
     if (const DeviceFault fault = port_.write(std::span(bytes).first(count)); !fault.ok()) {
       ++refused_;
       if (fault.kind == DeviceFaultKind::kUnplugged) return fail(fault);
       noteRefusal(fault);
     } else if (link_.counters().poses > poses) {
-      age_.add((monotonicNow() - state_.state.stamp).seconds());
+      age_.add((monotonicNow() - state_.stamp).seconds());
     }
   }
 
@@ -231,7 +232,8 @@ class AutopilotThread::Work {
   DeviceJournal journal_;
   AutopilotLink link_;
   AutopilotPort port_;
-  StateNews state_;  ///< stamp of CLOCK_MONOTONIC
+  NavState state_;  ///< stamp of CLOCK_MONOTONIC
+  Eigen::Vector3d omega_body_ = Eigen::Vector3d::Zero();
   std::optional<Duration> to_host_;
   Health health_ = Health::kInitializing;
   std::uint64_t number_ = 0, reasons_ = 0;  ///< taken

@@ -103,7 +103,7 @@ class DdsThread::Work {
     const std::uint64_t number = outlet_.state.refresh();
     if (number == state_) return;
     state_ = number;
-    const NavState& state = outlet_.state.value().state;
+    const NavState state = outlet_.state.value().state();
     if (state.health == Health::kFailed) return;  // no pose to be had by it
     DdsOdometry odometry;
     odometry.stamp = ros(state.stamp);
@@ -111,7 +111,7 @@ class DdsThread::Work {
     odometry.child_frame = frames_.body;
     odometry.T_frame_child = state.T_world_body;
     odometry.velocity = bodyVelocity(state);
-    odometry.angular_velocity = outlet_.state.value().omega_body;
+    odometry.angular_velocity = outlet_.state.value().omegaBody();
     Eigen::Map<RosCovariance>(odometry.pose_covariance.data()) = rosPoseCovariance(state);
     Eigen::Map<RosCovariance>(odometry.twist_covariance.data()) =
         rosTwistCovariance(state, options_.gyro_sigma);

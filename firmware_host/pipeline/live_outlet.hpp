@@ -11,17 +11,12 @@
 #include "estimator/core/newest.hpp"
 #include "estimator/messages/local_mesh.hpp"
 #include "estimator/messages/odometry_output.hpp"
+#include "firmware_host/pipeline/state_news.hpp"
 #include "firmware_host/realtime/ready_to_arm.hpp"
 #include "mapping/loop/loop_report.hpp"
 #include "mapping/surface/surface_patch.hpp"
 
 namespace swiftlet {
-
-/// The state propagated to an IMU sample.
-struct StateNews {
-  NavState state;
-  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  ///< of that sample, without bias [rad/s]
-};
 
 /// A frame that was smoothed, or waits to be.
 struct FrameNews {

@@ -179,13 +179,10 @@ bool Wiring::propagate() {
   const Status status =
       propagation_.step(arrival->sample, states_ || !outlets_.empty() ? &propagating_.state : nullptr);
   if (states_ && status.ok()) static_cast<void>(states_->tryPush(propagating_.state));
-  if (status.ok()) {
-    for (LiveOutlet* outlet : outlets_) {
-      StateNews& news = outlet->state.draft();
-      news.state = propagating_.state;
-      news.omega_body = arrival->sample.gyro - propagating_.state.bias_gyro;
-      outlet->state.publish();
-    }
+  if (status.ok() && !outlets_.empty()) {
+    const NavState& state = propagating_.state;
+    const StateNews news(state, arrival->sample.gyro - state.bias_gyro);
+    for (LiveOutlet* outlet : outlets_) outlet->state.write(news);
   }
   addTime(times_, StageId::kImu, {wallSeconds() - arrival->host.arrival, threadCpuSeconds() - cpu});
   imu_to_propagate_.pop();

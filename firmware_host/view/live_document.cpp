@@ -176,15 +176,15 @@ void LiveDocument::takeState(LiveOutlet& outlet, double now) {
   const std::uint64_t number = outlet.state.refresh();
   // Before there is a pose there is no state either.
   if (number == state_number_ || !frame_ || (!state_ && !frame_->has_state)) return;
-  const NavState& state = outlet.state.value().state;
+  const NavState state = outlet.state.value().state();
   const double t = seconds(state.stamp);
-  if (state_ && state.stamp <= state_->state.stamp) {
+  if (state_ && state.stamp <= state_->stamp) {
     state_number_ = number;
     return;
   }
   if (state_) {
     const double interval =
-        (state.stamp - state_->state.stamp).seconds() / static_cast<double>(number - state_number_);
+        (state.stamp - state_->stamp).seconds() / static_cast<double>(number - state_number_);
     state_intervals_.add(std::array{static_cast<float>(t), static_cast<float>(interval * kMilli)});
   }
   duration_ = std::max(duration_, t);
@@ -208,7 +208,7 @@ void LiveDocument::takeState(LiveOutlet& outlet, double now) {
   // A failed state has no pose to be had by it.
   if (state.health != Health::kFailed) states_.add(row);
   state_number_ = number;
-  state_ = outlet.state.value();
+  state_ = state;
   state_came_ = now;
   takeHealth(t, state.health, state.epoch);
 }
@@ -262,7 +262,7 @@ void LiveDocument::takeSurface(LiveOutlet& outlet, double now) {
   if (surface.vertices.empty()) return;
   // The map's axes are not the odometry's, where loop closure has moved the map.
   const MapCorrection& correction = outlet.correction.value();
-  const bool moved = outlet.correction.sequence() > 0 && state_ && correction.epoch == state_->state.epoch;
+  const bool moved = outlet.correction.sequence() > 0 && state_ && correction.epoch == state_->epoch;
   const SE3 T_world_map = moved ? correction.T_map_world.inverse() : SE3();
   cloud_ = cloudJson("map", "map", surface.vertices, T_world_map, kMostCloudPoints);
   cloud_changed_ = true;
@@ -321,7 +321,7 @@ Json LiveDocument::trajectoryJson(bool whole) const {
 
 Json LiveDocument::poseJson() const {
   if (!state_) return nullptr;
-  const SE3& pose = state_->state.T_world_body;
+  const SE3& pose = state_->T_world_body;
   const Eigen::Vector3d& p = pose.translation;
   const Eigen::Quaterniond q(pose.rotation);
   return {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
@@ -336,7 +336,7 @@ Json LiveDocument::liveJson() const {
                {"states", state_number_},
                {"silent_s", state_ ? now_ - state_came_ : 0.0}};
   if (state_) {
-    const NavState& state = state_->state;
+    const NavState& state = *state_;
     const Eigen::Vector3d& p = state.T_world_body.translation;
     json["position"] = {p.x(), p.y(), p.z()};
     json["speed"] = state.v_world_body.norm();
@@ -430,7 +430,7 @@ std::string LiveDocument::text() const {
       fmt::format("{}, {:.1f} s\nhealth    {}\n", name_, duration_, live["health"].get<std::string>());
   if (!waiting_for_.empty()) text += fmt::format("waits for {}\n", waiting_for_);
   if (state_) {
-    const NavState& s = state_->state;
+    const NavState& s = *state_;
     const Eigen::Vector3d& p = s.T_world_body.translation;
     const Eigen::Vector3d& v = s.v_world_body;
     text +=

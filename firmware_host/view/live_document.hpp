@@ -81,7 +81,7 @@ class LiveDocument {
   std::uint64_t frame_number_ = 0, state_number_ = 0, arming_number_ = 0, mesh_number_ = 0,
                 surface_number_ = 0;
   std::optional<FrameNews> frame_;
-  std::optional<StateNews> state_;
+  std::optional<NavState> state_;
   double now_ = 0, state_came_ = 0, mesh_came_ = -1e9, surface_asked_ = -1e9;
   LatencyHistogram latency_;
 

@@ -32,17 +32,16 @@ Stamp stampOf(std::int64_t n) { return {n * 1'000'000}; }
 
 StateNews stateOf(std::int64_t n) {
   const auto v = static_cast<double>(n);
-  StateNews news;
-  news.state.stamp = stampOf(n);
-  news.state.epoch = 1;
-  news.state.health = Health::kGood;
+  NavState state;
+  state.stamp = stampOf(n);
+  state.epoch = 1;
+  state.health = Health::kGood;
   // A quarter turn about z: body x is world y.
-  news.state.T_world_body.rotation = Eigen::Quaterniond(std::sqrt(0.5), 0, 0, std::sqrt(0.5));
-  news.state.T_world_body.translation = {v, 2 * v, -v};
-  news.state.v_world_body = {0, v, 1};
-  news.omega_body = {0.1, -0.2, v};
-  for (int i = 0; i < kStateDim; ++i) news.state.covariance(i, i) = i + 1;
-  return news;
+  state.T_world_body.rotation = Eigen::Quaterniond(std::sqrt(0.5), 0, 0, std::sqrt(0.5));
+  state.T_world_body.translation = {v, 2 * v, -v};
+  state.v_world_body = {0, v, 1};
+  for (int i = 0; i < kStateDim; ++i) state.covariance(i, i) = i + 1;
+  return {state, {0.1, -0.2, v}};
 }
 
 FrameNews frameOf(std::int64_t n) {

@@ -53,12 +53,12 @@ struct Vehicle {
   Duration clock{};  ///< of the run's stamps before CLOCK_MONOTONIC
 
   void move(Health health = Health::kGood) {
-    StateNews news;
+    NavState state;
     const Stamp now = monotonicNow();
-    news.state.stamp = now - clock;
-    news.state.health = health;
-    news.state.T_world_body.translation.x() = (now - begin).seconds();
-    outlet.state.write(news);
+    state.stamp = now - clock;
+    state.health = health;
+    state.T_world_body.translation.x() = (now - begin).seconds();
+    outlet.state.write({state, Eigen::Vector3d::Zero()});
   }
   void say(const char* what) {
     ArmingVerdict verdict;

@@ -77,15 +77,15 @@ struct Run {
     outlet->frame.write(news);
   }
   void state(double t, Health health = Health::kGood, std::uint32_t epoch = 0) {
-    StateNews news;
-    news.state.stamp = at(t);
-    news.state.health = health;
-    news.state.epoch = epoch;
-    news.state.T_world_body = SE3(expSo3({0, 0, 0.5}), {t, 2 * t, -t});
-    news.state.v_world_body = {1, 2, -1};
-    news.state.bias_gyro = {0.01, 0.02, 0.03};
-    news.state.covariance.diagonal().setConstant(0.01);
-    outlet->state.write(news);
+    NavState state;
+    state.stamp = at(t);
+    state.health = health;
+    state.epoch = epoch;
+    state.T_world_body = SE3(expSo3({0, 0, 0.5}), {t, 2 * t, -t});
+    state.v_world_body = {1, 2, -1};
+    state.bias_gyro = {0.01, 0.02, 0.03};
+    state.covariance.diagonal().setConstant(0.01);
+    outlet->state.write({state, Eigen::Vector3d::Zero()});
   }
   void sample(bool watched = true) {
     document.sample(*outlet, now, watched);

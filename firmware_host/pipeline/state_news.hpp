@@ -1,0 +1,40 @@
+#pragma once
+// The state propagated to an IMU sample, as it goes to another core at every sample: 0.5 kB, where NavState
+// has 2 kB, most of it covariance that nobody asks for at that rate. Values are NavState's; the covariance is
+// held in single precision, without the accelerometer bias's. Cost: 0.1 us to make, 0.2 us to take.
+
+#include <array>
+#include <cstddef>
+
+#include "estimator/messages/nav_state.hpp"
+
+namespace swiftlet {
+
+class StateNews {
+ public:
+  /// Of the state's error, from the first on: phi, p, v, bg.
+  static constexpr int kTold = 12;
+
+  StateNews() = default;
+  /// `omega_body`: of the sample, without bias [rad/s].
+  StateNews(const NavState& state, const Eigen::Vector3d& omega_body);
+
+  [[nodiscard]] const Eigen::Vector3d& omegaBody() const { return omega_body_; }
+  /// As it was given, but for what is said above: rows and columns of the accelerometer bias are 0.
+  [[nodiscard]] NavState state() const;
+
+ private:
+  static constexpr std::size_t kTriangle = std::size_t{kTold} * (kTold + 1) / 2;
+
+  Stamp stamp_;
+  std::uint32_t epoch_ = 0;
+  Health health_ = Health::kInitializing;
+  SE3 T_world_body_;
+  Eigen::Vector3d v_world_body_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d bias_gyro_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d bias_accel_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d omega_body_ = Eigen::Vector3d::Zero();
+  std::array<float, kTriangle> covariance_ = {};  ///< column by column, from the diagonal down
+};
+
+}  // namespace swiftlet
