@@ -197,8 +197,7 @@ TEST_CASE("Mono start on real IMU: scale and tilt", "[figures]") {
     Random random(17);
     std::vector<double> tilts, scales, sigmas, believed, bias_errors;
     int solved = 0, inside = 0, tried = 0, adopted = 0, adopted_bad = 0;
-    for (std::size_t n = 0; n < all.starts().size(); n += 4) {
-      const Start& s = all.starts()[n];
+    for (const Start& s : all.starts()) {
       if (s.truth + 320 >= all.log(s).truth.size()) continue;
       ++tried;
       const std::vector<ImuSample> samples = all.imu(s, seconds);
