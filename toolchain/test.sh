@@ -22,10 +22,11 @@ esac
 fuzz_seconds=15 # each fuzzer
 # Unit tests that run under sanitizers too; the statistical ones (imu, ransac, whole flights, rendering, the program)
 # repeat the same code thousands of times and would take most of an hour there.
-sanitized='core geometry camera frontend smoother drivers_calibration drivers_recorded drivers_recording drivers_image_decoder
-drivers_can drivers_device drivers_gpio drivers_mavlink drivers_serial drivers_v4l2 fault_timeline live map mesher threaded'
-# What shares memory between threads, the devices' threads, and the whole executor on a second of a log.
-threads='core realtime live threaded late_labels'
+sanitized='autopilot core geometry camera frontend smoother drivers_calibration drivers_recorded drivers_recording drivers_image_decoder
+drivers_can drivers_device drivers_gpio drivers_mavlink drivers_serial drivers_v4l2 fault_timeline live map mesher threaded view'
+# What shares memory between threads, the threads of devices, autopilot and viewers, and the whole executor on a second
+# of a log.
+threads='autopilot core realtime live threaded late_labels view'
 jobs=$(nproc)
 steps='' # lines "seconds result step"
 failed_steps=0
