@@ -199,8 +199,7 @@ class AutopilotThread::Work {
   void tell() {
     std::array<std::uint8_t, AutopilotLink::kMostBytes> bytes;
     const std::uint64_t poses = link_.counters().poses;
-    const std::size_t count =
-        link_.step(monotonicNow(), number_ > 0 ? &state_ : nullptr, omega_body_, bytes);
+    const std::size_t count = link_.step(monotonicNow(), number_ > 0 ? &state_ : nullptr, omega_body_, bytes);
     if (count == 0) return;
     if (const DeviceFault fault = port_.write(std::span(bytes).first(count)); !fault.ok()) {
       ++refused_;
