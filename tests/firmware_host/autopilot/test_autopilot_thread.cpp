@@ -53,6 +53,7 @@ TEST_CASE("Over a serial port: poses, reasons, health, clocks; unplugged and bac
   AutopilotThread autopilot(vehicle.outlet, optionsOf(port));
   REQUIRE(until([&] { return !heard.heartbeats.empty() && !heard.texts.empty(); }, listen));
   CHECK(heard.poses.empty());
+  CHECK(heard.heartbeats.size() <= mostSince(vehicle.begin, 1) - 1);
   REQUIRE(heard.texts.size() == 1);
   CHECK(heard.texts[0] == "not ready: sensors: the IMU delivers at 0.0 Hz");
 
@@ -149,6 +150,7 @@ TEST_CASE("Over UDP, of a log with a clock of its own, with obstacles; silence i
     CHECK(std::abs(told.distance_cm[0] * 0.01 - (9 - then)) < 0.3);
   }
   checkPoses(heard, vehicle.begin);
+  REQUIRE(lines.size() == 1);
   CHECK(lines[0].find("no MAVLink for 3 s") != std::string::npos);
 }
 
