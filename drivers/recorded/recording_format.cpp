@@ -33,6 +33,8 @@ const char* pluralName(RecordKind kind) {
       return "mesh steps";
     case RecordKind::kLoopStep:
       return "loop closure's steps";
+    case RecordKind::kMapStep:
+      return "mapping steps";
     default:
       return "marks";
   }

@@ -35,13 +35,14 @@ enum class RecordKind : std::uint16_t {
   kEnd = 8,   ///< the recording was ended in order
   kMeshStep = 9,
   kLoopStep = 10,
+  kMapStep = 11,
 };
-inline constexpr std::size_t kRecordKinds = 11;
+inline constexpr std::size_t kRecordKinds = 12;
 
 /// Messages and steps: what may be lost in front of the recorder.
 constexpr bool canBeLost(RecordKind kind) {
-  return (kind >= RecordKind::kImu && kind <= RecordKind::kSmoothStep) || kind == RecordKind::kMeshStep ||
-         kind == RecordKind::kLoopStep;
+  return (kind >= RecordKind::kImu && kind <= RecordKind::kSmoothStep) ||
+         (kind >= RecordKind::kMeshStep && kind <= RecordKind::kMapStep);
 }
 
 constexpr RecordKind imageKind(std::size_t camera) {
@@ -71,6 +72,8 @@ inline constexpr std::size_t kSmoothStepBytes = 40;
 inline constexpr std::size_t kSmoothStepBytesBeforePlanes = 32;  ///< as written by programs without a mesh
 inline constexpr std::size_t kMeshStepBytes = 24;
 inline constexpr std::size_t kLoopStepBytes = 32;
+inline constexpr std::size_t kMapStepHeadBytes = 80;  ///< then depth and labels, where there are any
+inline constexpr std::size_t kMapStepSceneAt = 48;    ///< of the scene's stamp within it
 inline constexpr std::size_t kLossBytes = 16;
 inline constexpr std::size_t kEndBytes = 8;
 

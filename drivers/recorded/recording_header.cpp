@@ -15,14 +15,26 @@ void put(LittleEndianWriter& to, const std::string& text) {
   to.bytes({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 
+void put(LittleEndianWriter& to, const SE3& T) {
+  for (int i = 0; i < 4; ++i) to.f64(T.rotation.coeffs()[i]);
+  for (int i = 0; i < 3; ++i) to.f64(T.translation[i]);
+}
+
 void put(LittleEndianWriter& to, const CameraModel& camera, const SE3& T_body_cam) {
   to.u32(camera.kind() == CameraKind::kPinholeRadtan ? 0U : 1U);
   to.i32(camera.width());
   to.i32(camera.height());
   for (int i = 0; i < 4; ++i) to.f64(camera.intrinsics()[i]);
   for (int i = 0; i < 4; ++i) to.f64(camera.distortion()[i]);
-  for (int i = 0; i < 4; ++i) to.f64(T_body_cam.rotation.coeffs()[i]);
-  for (int i = 0; i < 3; ++i) to.f64(T_body_cam.translation[i]);
+  put(to, T_body_cam);
+}
+
+void put(LittleEndianWriter& to, const DepthImageView& sensor) {
+  const PinholeIntrinsics& camera = sensor.camera;
+  to.i32(camera.width);
+  to.i32(camera.height);
+  for (const double value : {camera.fx, camera.fy, camera.cx, camera.cy}) to.f64(value);
+  put(to, sensor.T_body_camera);
 }
 
 void put(LittleEndianWriter& to, const ImuNoise& noise) {
@@ -38,6 +50,17 @@ bool get(LittleEndianReader& from, std::string& text) {
   return from.good();
 }
 
+bool saneSize(int width, int height) {
+  return width > 0 && height > 0 && width <= kMaxImageSide && height <= kMaxImageSide;
+}
+
+bool get(LittleEndianReader& from, SE3& T) {
+  // Past SE3's constructor, which would normalize and so change bits.
+  for (int i = 0; i < 4; ++i) T.rotation.coeffs()[i] = from.f64();
+  for (int i = 0; i < 3; ++i) T.translation[i] = from.f64();
+  return T.rotation.coeffs().allFinite() && T.translation.allFinite();
+}
+
 bool get(LittleEndianReader& from, CameraModel& camera, SE3& T_body_cam) {
   const std::uint32_t kind = from.u32();
   const std::int32_t width = from.i32();
@@ -46,17 +69,28 @@ bool get(LittleEndianReader& from, CameraModel& camera, SE3& T_body_cam) {
   Eigen::Vector4d distortion;
   for (int i = 0; i < 4; ++i) intrinsics[i] = from.f64();
   for (int i = 0; i < 4; ++i) distortion[i] = from.f64();
-  // Past SE3's constructor, which would normalize and so change bits.
-  for (int i = 0; i < 4; ++i) T_body_cam.rotation.coeffs()[i] = from.f64();
-  for (int i = 0; i < 3; ++i) T_body_cam.translation[i] = from.f64();
-  const bool sane = from.good() && kind <= 1 && width > 0 && height > 0 && width <= kMaxImageSide &&
-                    height <= kMaxImageSide && intrinsics.allFinite() && intrinsics[0] > 0 &&
-                    intrinsics[1] > 0 && distortion.allFinite() && T_body_cam.rotation.coeffs().allFinite() &&
-                    T_body_cam.translation.allFinite();
+  const bool placed = get(from, T_body_cam);
+  const bool sane = from.good() && kind <= 1 && saneSize(width, height) && intrinsics.allFinite() &&
+                    intrinsics[0] > 0 && intrinsics[1] > 0 && distortion.allFinite() && placed;
   if (!sane) return false;
   camera = CameraModel(kind == 0 ? CameraKind::kPinholeRadtan : CameraKind::kEquidistant, width, height,
                        intrinsics, distortion);
   return true;
+}
+
+bool get(LittleEndianReader& from, DepthImageView& sensor) {
+  PinholeIntrinsics& camera = sensor.camera;
+  camera.width = from.i32();
+  camera.height = from.i32();
+  Eigen::Vector4d intrinsics;
+  for (int i = 0; i < 4; ++i) intrinsics[i] = from.f64();
+  camera.fx = intrinsics[0];
+  camera.fy = intrinsics[1];
+  camera.cx = intrinsics[2];
+  camera.cy = intrinsics[3];
+  const bool placed = get(from, sensor.T_body_camera);
+  return from.good() && saneSize(camera.width, camera.height) && intrinsics.allFinite() && camera.fx > 0 &&
+         camera.fy > 0 && placed;
 }
 
 bool get(LittleEndianReader& from, ImuNoise& noise) {
@@ -83,6 +117,8 @@ std::vector<std::uint8_t> encodeRecordingHeader(const RecordingHeader& header) {
   put(to, header.calibration_form);
   put(to, header.settings);
   put(to, header.program_version);
+  // Only where there is one: other recordings stay readable by programs that know of no sensor.
+  if (header.depth_sensor) put(to, *header.depth_sensor);
   payload.resize(to.written());
   return payload;
 }
@@ -103,6 +139,8 @@ const char* decodeRecordingHeader(std::span<const std::uint8_t> payload, Recordi
   if (!get(from, header.calibration_form)) return "calibration form";
   if (!get(from, header.settings)) return "settings";
   if (!get(from, header.program_version)) return "program version";
+  header.depth_sensor.reset();
+  if (from.left() > 0 && !get(from, header.depth_sensor.emplace())) return "depth sensor";
   return from.left() == 0 ? nullptr : "length";
 }
 

@@ -3,12 +3,14 @@
 // the bits that it had.
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "estimator/camera/rig.hpp"
 #include "estimator/imu/imu_noise.hpp"
+#include "estimator/messages/depth_image.hpp"
 
 namespace swiftlet {
 
@@ -27,6 +29,8 @@ struct RecordingHeader {
   std::string settings;          ///< the settings in force, as YAML text
   std::string program_version;
   RecordOrder order = RecordOrder::kByArrival;
+  /// Camera and extrinsics of the sensor whose depth images the map took (without an image); none: no sensor.
+  std::optional<DepthImageView> depth_sensor;
 };
 
 /// The payload of the first record.

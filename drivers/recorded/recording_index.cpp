@@ -11,7 +11,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::size_t kLargestSmallPayload = 64;
+constexpr std::size_t kLargestSmallPayload = kMapStepHeadBytes;
 constexpr const char* kReplayBefore = "Remove this and the later segments to replay what is before it";
 
 [[noreturn]] void refuse(const RecordingFile& file, std::uint64_t offset, const std::string& what,
@@ -51,6 +51,8 @@ class Indexer {
   void takeSmoothStep(LittleEndianReader& from);
   void takeMeshStep(LittleEndianReader& from);
   void takeLoopStep(LittleEndianReader& from);
+  void takeMapStep(const RecordHeader& header, LittleEndianReader& from, const RecordingFile& file,
+                   std::uint64_t offset);
   void takeLoss(LittleEndianReader& from, const RecordingFile& file, std::uint64_t offset);
   void cutAt(std::uint64_t offset, const char* reason);
   [[nodiscard]] std::uint64_t soundRecords(RecordingWindow& window, std::size_t segment,
@@ -179,7 +181,7 @@ bool Indexer::takeRecord(RecordingWindow& window, std::uint64_t& offset) {
   return true;
 }
 
-/// Payload bytes of a kind; for images the least, for kRun unknown (0).
+/// Payload bytes of a kind; where pixels may follow the least, for kRun unknown (0).
 std::size_t payloadBytes(RecordKind kind) {
   switch (kind) {
     case RecordKind::kImu:
@@ -197,6 +199,8 @@ std::size_t payloadBytes(RecordKind kind) {
       return kMeshStepBytes;
     case RecordKind::kLoopStep:
       return kLoopStepBytes;
+    case RecordKind::kMapStep:
+      return kMapStepHeadBytes;
     case RecordKind::kLoss:
       return kLossBytes;
     case RecordKind::kEnd:
@@ -216,10 +220,11 @@ void Indexer::take(const RecordHeader& header, RecordingWindow& window, std::uin
            "Replay it with the program that recorded it");
   }
   if (kind == RecordKind::kRun) return takeRun(header, window, offset);
-  const bool image = kind == RecordKind::kImage0 || kind == RecordKind::kImage1;
+  const bool pixels =
+      kind == RecordKind::kImage0 || kind == RecordKind::kImage1 || kind == RecordKind::kMapStep;
   const bool older = kind == RecordKind::kSmoothStep && header.length == kSmoothStepBytesBeforePlanes;
   const std::size_t length = older ? kSmoothStepBytesBeforePlanes : payloadBytes(kind);
-  if (image ? header.length < kImageHeadBytes : header.length != length) {
+  if (pixels ? header.length < length : header.length != length) {
     refuse(file, offset, fmt::format("a record of {} has {} bytes", pluralName(kind), header.length),
            "Replay it with the program that recorded it");
   }
@@ -253,6 +258,8 @@ void Indexer::take(const RecordHeader& header, RecordingWindow& window, std::uin
       return takeMeshStep(from);
     case RecordKind::kLoopStep:
       return takeLoopStep(from);
+    case RecordKind::kMapStep:
+      return takeMapStep(header, from, file, offset);
     case RecordKind::kLoss:
       return takeLoss(from, file, offset);
     default:
@@ -346,6 +353,42 @@ void Indexer::takeLoopStep(LittleEndianReader& from) {
   for (std::uint64_t& image : step.image) image = from.u64();
 }
 
+void Indexer::takeMapStep(const RecordHeader& header, LittleEndianReader& from, const RecordingFile& file,
+                          std::uint64_t offset) {
+  MapStep& step = index_.steps.map.emplace_back();
+  step.frame = from.u64();
+  step.correction = from.u64();
+  step.spare_turns = from.u64();
+  for (std::uint64_t& image : step.image) image = from.u64();
+  const std::uint32_t end = from.u32();
+  step.end = end == 1;
+  (void)from.u32();
+  (void)from.i64();
+  (void)from.i64();
+  std::array<std::int64_t, 2> width{};
+  std::array<std::int64_t, 2> height{};
+  for (std::size_t i = 0; i < width.size(); ++i) {
+    width[i] = from.i32();
+    height[i] = from.i32();
+  }
+  const auto& sensor = index_.header.depth_sensor;
+  const bool no_depth = width[0] == 0 && height[0] == 0;
+  const bool depth_fits =
+      no_depth || (sensor && width[0] == sensor->camera.width && height[0] == sensor->camera.height);
+  const bool no_labels = width[1] == 0 && height[1] == 0;
+  const bool labels_fit = no_labels || (width[1] > 0 && height[1] > 0);
+  const std::int64_t pixels = static_cast<std::int64_t>(header.length) - std::int64_t{kMapStepHeadBytes};
+  const bool fits = depth_fits && labels_fit && header.length <= kMaxPayloadBytes &&
+                    std::int64_t{sizeof(float)} * width[0] * height[0] + width[1] * height[1] == pixels;
+  if (!fits || end > 1) {
+    refuse(file, offset,
+           fmt::format("a mapping step with depth of {}x{} and labels of {}x{} in {} bytes, end {}", width[0],
+                       height[0], width[1], height[1], pixels, end),
+           "Replay it with the program that recorded it");
+  }
+  index_.scenes.push_back({offset, segment_, header.length});
+}
+
 void Indexer::takeLoss(LittleEndianReader& from, const RecordingFile& file, std::uint64_t offset) {
   const std::uint32_t kind = from.u32();
   (void)from.u32();
@@ -355,7 +398,9 @@ void Indexer::takeLoss(LittleEndianReader& from, const RecordingFile& file, std:
     refuse(file, offset, fmt::format("{} lost records of kind {}", count, kind),
            "Replay it with the program that recorded it");
   }
-  index_.losses.push_back({static_cast<RecordKind>(kind), last_number_[kind], count});
+  const Stamp newest = index_.imu.empty() ? Stamp{} : index_.imu.back().sample.stamp;
+  index_.losses.push_back(
+      {static_cast<RecordKind>(kind), last_number_[kind], count, newest, segment_, offset});
   last_number_[kind] += count;
 }
 

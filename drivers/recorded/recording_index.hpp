@@ -8,7 +8,7 @@
 //   header damaged), or where files do not belong together (foreign file, another version, another run's
 //   segment, a renamed segment), or a sound record has contents that no writer of this version writes.
 // Cost: reads all bytes once, at the disk's speed. Memory: 65 bytes an IMU sample, 41 an
-//   image, 16, 64 and 32 a propagation, tracking and smoothing step (vectors: up to twice that).
+//   image, 16, 64, 40 and 56 a propagation, tracking, smoothing and mapping step (vectors: up to twice that).
 
 #include <array>
 #include <cstdint>
@@ -37,6 +37,13 @@ struct RecordedImage {
   std::uint32_t length = 0;  ///< of the record's payload
 };
 
+/// Where a mapping step's record is, with its depth image and its labels.
+struct RecordedScene {
+  std::uint64_t offset = 0;  ///< of the record within its segment
+  std::uint32_t segment = 0;
+  std::uint32_t length = 0;  ///< of the record's payload
+};
+
 /// What the stages took, each kind in the order of recording.
 struct RecordedSteps {
   std::vector<PropagateStep> propagate;
@@ -44,6 +51,7 @@ struct RecordedSteps {
   std::vector<SmoothStep> smooth;
   std::vector<MeshStep> mesh;
   std::vector<LoopStep> loop;
+  std::vector<MapStep> map;
 };
 
 /// Records that never reached the writer: `count` of `kind`, after number `after` of that kind.
@@ -51,6 +59,9 @@ struct RecordingLoss {
   RecordKind kind = RecordKind::kImu;
   std::uint64_t after = 0;
   std::uint64_t count = 0;
+  Stamp newest_sample;        ///< stamp of the IMU sample recorded before; 0: none was
+  std::uint32_t segment = 0;  ///< where the recording tells of it
+  std::uint64_t offset = 0;   ///< byte within that segment
 };
 
 struct RecordingCut {
@@ -69,6 +80,7 @@ struct RecordingIndex {
   /// kImu, kImage0 or kImage1: whose turn it is, by RecordingHeader::order.
   std::vector<std::uint8_t> turns;
   RecordedSteps steps;
+  std::vector<RecordedScene> scenes;  ///< of each mapping step
   std::vector<RecordingLoss> losses;
   std::uint64_t records = 0;
   bool ended = false;  ///< the end mark is there

@@ -12,8 +12,9 @@ namespace {
 // Slots begin at cache lines of their own.
 constexpr std::size_t kSlotAlignment = 64;
 
-/// Pixels and padding of an image's record.
+/// Pixels and padding of a record.
 std::size_t bodyBytes(const RecordedImage& entry) { return paddedSize(entry.length) - kImageHeadBytes; }
+std::size_t bodyBytes(const RecordedScene& entry) { return paddedSize(entry.length) - kMapStepHeadBytes; }
 
 }  // namespace
 
@@ -80,6 +81,9 @@ void RecordingSource::reservePools() {
     pool.slot_bytes = (largest + kSlotAlignment - 1) / kSlotAlignment * kSlotAlignment;
     pool.memory.resize(kImageSlots * pool.slot_bytes);
   }
+  std::size_t largest = 0;
+  for (const RecordedScene& entry : index_.scenes) largest = std::max(largest, bodyBytes(entry));
+  scene_.resize(largest / sizeof(float));  // a multiple of kRecordAlignment
 }
 
 void RecordingSource::warn() {
@@ -116,6 +120,18 @@ void RecordingSource::warn() {
 
 bool RecordingSource::complete() const {
   return index_.ended && index_.cut.reason == nullptr && index_.losses.empty();
+}
+
+std::optional<InputError> RecordingSource::firstLoss() const {
+  if (index_.losses.empty()) return {};
+  const RecordingLoss& loss = index_.losses.front();
+  std::string what = fmt::format("{} {} were lost while recording, after number {}", loss.count,
+                                 pluralName(loss.kind), loss.after);
+  if (loss.newest_sample.ns != 0) what += fmt::format(", at stamp {}", loss.newest_sample.ns);
+  if (index_.losses.size() > 1) what += fmt::format(" (the first of {} losses)", index_.losses.size());
+  return InputError(files_.segments[loss.segment]->name(), 0, fmt::format("byte {}", loss.offset),
+                    what + ": the run cannot be repeated",
+                    "Leave --reproduce out to replay what was recorded");
 }
 
 bool RecordingSource::next(SensorMessage& message) {
@@ -163,22 +179,11 @@ bool RecordingSource::image(std::size_t camera, std::uint64_t number, CameraFram
 }
 
 void RecordingSource::read(std::size_t camera, const RecordedImage& entry, CameraFrame& frame) {
-  const RecordingFile& file = *files_.segments[entry.segment];
-  std::array<std::uint8_t, kRecordHeaderBytes + kImageHeadBytes> head{};
-  RecordHeader header;
-  const bool head_there = file.read(entry.offset, head) == head.size();
-  if (!head_there || !decode(std::span(head).first<kRecordHeaderBytes>(), index_.run_checksum, header) ||
-      header.length != entry.length) {
-    refuseChanged(entry);
-  }
   Pool& pool = pools_[camera];
+  std::array<std::uint8_t, kRecordHeaderBytes + kImageHeadBytes> head{};
   const std::span<std::uint8_t> body(pool.memory.data() + pool.slot * pool.slot_bytes, bodyBytes(entry));
-  const std::size_t got = file.read(entry.offset + head.size(), body);
-  const std::span<const std::uint8_t> payload = std::span(head).subspan<kRecordHeaderBytes>();
-  const std::uint32_t crc = crc32c(index_.run_checksum, payload);
-  if (got != body.size() || crc32c(crc, body) != header.payload_crc) refuseChanged(entry);
-
-  LittleEndianReader from(payload);
+  readSound(entry, head, body);
+  LittleEndianReader from{std::span(head).subspan<kRecordHeaderBytes>()};
   frame.stamp.ns = from.i64();
   frame.arrival.ns = from.i64();
   if (frame.stamp != entry.stamp || frame.arrival != entry.arrival) refuseChanged(entry);
@@ -194,9 +199,64 @@ void RecordingSource::read(std::size_t camera, const RecordedImage& entry, Camer
   pool.slot = (pool.slot + 1) % kImageSlots;
 }
 
-void RecordingSource::refuseChanged(const RecordedImage& entry) const {
+bool RecordingSource::mapScene(std::size_t i, SceneImages& scene) {
+  scene = {};
+  if (i >= index_.scenes.size() || index_.scenes[i].length == kMapStepHeadBytes) return false;
+  const RecordedScene& entry = index_.scenes[i];
+  std::array<std::uint8_t, kRecordHeaderBytes + kMapStepHeadBytes> head{};
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): bytes of the floats that they are
+  const std::span<std::uint8_t> body(reinterpret_cast<std::uint8_t*>(scene_.data()), bodyBytes(entry));
+  readSound(entry, head, body);
+  LittleEndianReader from{std::span(head).subspan<kRecordHeaderBytes + kMapStepSceneAt>()};
+  scene.stamp.ns = from.i64();
+  const Stamp depth_stamp{from.i64()};
+  PinholeIntrinsics depth;
+  depth.width = from.i32();
+  depth.height = from.i32();
+  ImageView labels;
+  labels.width = from.i32();
+  labels.height = from.i32();
+  // The record's header is sound and so is its payload; but it may be another record than was indexed.
+  const std::size_t depth_bytes = sizeof(float) * depth.pixels();
+  const auto label_bytes = static_cast<std::size_t>(labels.width) * static_cast<std::size_t>(labels.height);
+  if (kMapStepHeadBytes + depth_bytes + label_bytes != entry.length) refuseChanged(entry);
+  if (depth_bytes > 0) {
+    if (!index_.header.depth_sensor) refuseChanged(entry);
+    scene.depth = *index_.header.depth_sensor;
+    if (depth.width != scene.depth.camera.width || depth.height != scene.depth.camera.height) {
+      refuseChanged(entry);
+    }
+    scene.depth.stamp = depth_stamp;
+    scene.depth.depth = scene_.data();
+  }
+  if (label_bytes > 0) {
+    labels.stride = labels.width;
+    labels.data = body.data() + depth_bytes;
+    scene.labels = labels;
+  }
+  return true;
+}
+
+/// The record at `entry`, checked again: its header and `head`, and the rest of it.
+template <typename Entry>
+void RecordingSource::readSound(const Entry& entry, std::span<std::uint8_t> head,
+                                std::span<std::uint8_t> body) const {
+  const RecordingFile& file = *files_.segments[entry.segment];
+  RecordHeader header;
+  const bool head_there = file.read(entry.offset, head) == head.size();
+  if (!head_there || !decode(head.first<kRecordHeaderBytes>(), index_.run_checksum, header) ||
+      header.length != entry.length) {
+    refuseChanged(entry);
+  }
+  const std::size_t got = file.read(entry.offset + head.size(), body);
+  const std::uint32_t crc = crc32c(index_.run_checksum, head.subspan(kRecordHeaderBytes));
+  if (got != body.size() || crc32c(crc, body) != header.payload_crc) refuseChanged(entry);
+}
+
+template <typename Entry>
+void RecordingSource::refuseChanged(const Entry& entry) const {
   throw InputError(files_.segments[entry.segment]->name(), 0, fmt::format("byte {}", entry.offset),
-                   "this image was sound when the recording was opened and is not any more",
+                   "this record was sound when the recording was opened and is not any more",
                    "The file was changed meanwhile or the disk fails; open it again to see what is left");
 }
 

@@ -7,7 +7,8 @@
 //   samples behind the last image included. Samples are in body axes. There is no truth: it did not enter.
 // Damage: the recording ends where it is damaged; warnings() name file, byte and how much is missing, and
 //   what its writer had lost (see recording_index.hpp for what is refused instead).
-// Memory: recording_index.hpp's per record, and LogSource::kImageSlots pictures a camera.
+// Memory: recording_index.hpp's per record, LogSource::kImageSlots pictures a camera, one depth image and
+//   one label image.
 // Cost: opening reads and checks the whole recording once; an image is read and checked again when wanted.
 // While it lives no program can begin a new recording in the folder.
 //
@@ -17,11 +18,14 @@
 #include <array>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/log_source.hpp"
 #include "drivers/recorded/recording_index.hpp"
+#include "estimator/messages/scene_images.hpp"
 
 namespace swiftlet {
 
@@ -43,6 +47,10 @@ class RecordingSource final : public LogSource {
   [[nodiscard]] const RecordingCut& cut() const { return index_.cut; }
   /// The end mark is there, nothing was cut and nothing was lost: a threaded run can be repeated to its end.
   [[nodiscard]] bool complete() const;
+  /// The first place where records were lost while recording, with file, byte, kind and number: a threaded
+  /// run cannot be repeated then. Nothing for a recording that is only cut off: it can, up to the cut, which
+  /// warnings() names.
+  [[nodiscard]] std::optional<InputError> firstLoss() const;
 
   /// IMU samples recorded, from 0; options make no difference.
   [[nodiscard]] std::size_t imuCount() const { return index_.imu.size(); }
@@ -54,6 +62,8 @@ class RecordingSource final : public LogSource {
   /// Image `number` (from 1, as TrackStep::image) of a camera; false when the recording does not have it. Its
   /// pixels stay valid until kImageSlots further images of that camera, those of next() counted.
   bool image(std::size_t camera, std::uint64_t number, CameraFrame& frame);
+  /// Depth and labels that steps().map[i] took; false where it took none. Valid until the next call.
+  bool mapScene(std::size_t i, SceneImages& scene);
 
  private:
   struct Pool {
@@ -68,7 +78,10 @@ class RecordingSource final : public LogSource {
   void warn();
   [[nodiscard]] bool delivers(RecordKind kind) const;
   void read(std::size_t camera, const RecordedImage& entry, CameraFrame& frame);
-  [[noreturn]] void refuseChanged(const RecordedImage& entry) const;
+  template <typename Entry>
+  void readSound(const Entry& entry, std::span<std::uint8_t> head, std::span<std::uint8_t> body) const;
+  template <typename Entry>
+  [[noreturn]] void refuseChanged(const Entry& entry) const;
 
   std::optional<RecordingReadLock> lock_;
   RecordingFiles files_;
@@ -79,6 +92,7 @@ class RecordingSource final : public LogSource {
   LogCounters counters_;
   LogWarnings warnings_;
   std::array<Pool, kMaxCameras> pools_;
+  std::vector<float> scene_;  ///< depth, then labels; for the largest
   std::size_t image_count_ = 0;
   std::size_t frame_count_ = 0;
   std::size_t turn_ = 0;

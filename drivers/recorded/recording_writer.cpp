@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <bit>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -42,15 +43,6 @@ Status statusOf(int error) {
   }
 }
 
-std::size_t pixelBytes(const ImageView& image) {
-  if (image.empty()) return 0;
-  return static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
-}
-
-std::span<const std::uint8_t> rowOf(const ImageView& image, int y) {
-  return {image.row(y), static_cast<std::size_t>(image.width)};
-}
-
 /// `piece` is only read, but iovec is made for reading and writing.
 iovec readOnly(std::span<const std::uint8_t> piece) {
   return {const_cast<std::uint8_t*>(piece.data()), piece.size()};
@@ -67,7 +59,9 @@ void appendEffort(LittleEndianWriter& to, const Effort& effort) {
 
 RecordingWriter::RecordingWriter(const std::string& folder, const RecordingHeader& header,
                                  const RecordingOptions& options)
-    : buffer_(std::max(options.buffer_bytes, kMinBufferBytes)), segment_bytes_(options.segment_bytes) {
+    : buffer_(std::max(options.buffer_bytes, kMinBufferBytes)),
+      segment_bytes_(options.segment_bytes),
+      depth_sensor_(header.depth_sensor) {
   try {
     const std::vector<std::uint8_t> run = encodeRecordingHeader(header);
     RecordingHeader read_back;
@@ -190,14 +184,22 @@ Status RecordingWriter::imu(const ImuSample& sample, Stamp arrival) {
   return put(RecordKind::kImu, payload.data(), payload.size());
 }
 
+/// Without gaps between its rows an image is one row.
+RecordingWriter::Pixels RecordingWriter::pixelsOf(const ImageView& image) {
+  if (image.empty()) return {};
+  const auto width = static_cast<std::size_t>(image.width);
+  const auto height = static_cast<std::size_t>(image.height);
+  if (image.stride == image.width) return {image.data, width * height, 0, 1};
+  return {image.data, width, static_cast<std::size_t>(image.stride), height};
+}
+
 Status RecordingWriter::image(const CameraFrame& frame) {
-  const std::size_t pixels = pixelBytes(frame.image);
+  const Pixels pixels = pixelsOf(frame.image);
   const RecordKind kind = imageKind(frame.camera);
-  if (frame.camera >= kMaxCameras || kImageHeadBytes + pixels > kMaxPayloadBytes) {
+  if (frame.camera >= kMaxCameras || kImageHeadBytes + pixels.bytes() > kMaxPayloadBytes) {
     ++statistics_.lost[static_cast<std::size_t>(kind)];
     return {StatusCode::kInvalidInput, "an image of no camera of the rig, or too large to record"};
   }
-  if (!status_.ok() || ended_) return refuse(kind);
   std::array<std::uint8_t, kImageHeadBytes> head{};
   LittleEndianWriter to(head.data());
   to.i64(frame.stamp.ns);
@@ -207,6 +209,50 @@ Status RecordingWriter::image(const CameraFrame& frame) {
   to.i32(frame.image.height);
   to.u32(static_cast<std::uint32_t>(frame.clock));
   to.u32(0);
+  return putPixels(kind, head, {&pixels, 1});
+}
+
+Status RecordingWriter::mapStep(const MapStep& step, const SceneImages& scene) {
+  // Depth goes to the file as it lies in memory.
+  static_assert(std::endian::native == std::endian::little);
+  const bool depth = scene.depth.depth != nullptr;
+  const PinholeIntrinsics& camera = scene.depth.camera;
+  std::array<Pixels, 2> planes{};
+  bool fits = true;
+  if (depth) {
+    fits = depth_sensor_ && camera.width == depth_sensor_->camera.width &&
+           camera.height == depth_sensor_->camera.height;
+    planes[0] = {reinterpret_cast<const std::uint8_t*>(scene.depth.depth),
+                 fits ? sizeof(float) * camera.pixels() : 0, 0, 1};
+  }
+  planes[1] = pixelsOf(scene.labels);
+  if (!fits || kMapStepHeadBytes + planes[0].bytes() + planes[1].bytes() > kMaxPayloadBytes) {
+    ++statistics_.lost[static_cast<std::size_t>(RecordKind::kMapStep)];
+    return {StatusCode::kInvalidInput, "a depth image of another sensor, or a scene too large to record"};
+  }
+  const bool labels = !scene.labels.empty();
+  std::array<std::uint8_t, kMapStepHeadBytes> head{};
+  LittleEndianWriter to(head.data());
+  to.u64(step.frame);
+  to.u64(step.correction);
+  to.u64(step.spare_turns);
+  for (const std::uint64_t image : step.image) to.u64(image);
+  to.u32(step.end ? 1 : 0);
+  to.u32(0);
+  to.i64(scene.stamp.ns);
+  to.i64(depth ? scene.depth.stamp.ns : 0);
+  to.i32(depth ? camera.width : 0);
+  to.i32(depth ? camera.height : 0);
+  to.i32(labels ? scene.labels.width : 0);
+  to.i32(labels ? scene.labels.height : 0);
+  return putPixels(RecordKind::kMapStep, head, planes);
+}
+
+Status RecordingWriter::putPixels(RecordKind kind, std::span<const std::uint8_t> head,
+                                  std::span<const Pixels> planes) {
+  if (!status_.ok() || ended_) return refuse(kind);
+  std::size_t pixels = 0;
+  for (const Pixels& plane : planes) pixels += plane.bytes();
   const std::size_t payload = head.size() + pixels;
   const std::size_t padding = paddedSize(payload) - payload;
   const bool direct = pixels >= kDirectBytes;
@@ -215,59 +261,54 @@ Status RecordingWriter::image(const CameraFrame& frame) {
   if (!fitsBuffer(in_buffer) && !flushBuffer()) return refuse(kind);
 
   RecordHeader header{kind, sequence_, static_cast<std::uint32_t>(payload), crc32c(run_checksum_, head)};
-  const bool gaps = pixels > 0 && frame.image.stride != frame.image.width;
-  if (gaps) {
-    for (int y = 0; y < frame.image.height; ++y) {
-      header.payload_crc = crc32c(header.payload_crc, rowOf(frame.image, y));
+  for (const Pixels& plane : planes) {
+    for (std::size_t y = 0; y < plane.rows; ++y) {
+      header.payload_crc = crc32c(header.payload_crc, plane.row(y));
     }
-  } else {
-    header.payload_crc = crc32c(header.payload_crc, {frame.image.data, pixels});
   }
   header.payload_crc = crc32c(header.payload_crc, {kPadding.data(), padding});
-  if (direct) return putImageDirect(frame, header, head.data());
+  if (direct) return putDirect(header, head, planes);
 
   appendHeader(header);
   LittleEndianWriter body(buffer_.data() + filled_);
   body.bytes(head);
-  for (int y = 0; pixels > 0 && y < frame.image.height; ++y) body.bytes(rowOf(frame.image, y));
+  for (const Pixels& plane : planes) {
+    for (std::size_t y = 0; y < plane.rows; ++y) body.bytes(plane.row(y));
+  }
   body.zeros(padding);
   filled_ += body.written();
   return okStatus();
 }
 
 /// The pixels go to the kernel from where they are, behind the buffer and with it.
-Status RecordingWriter::putImageDirect(const CameraFrame& frame, const RecordHeader& header,
-                                       const std::uint8_t* head) {
+Status RecordingWriter::putDirect(const RecordHeader& header, std::span<const std::uint8_t> head,
+                                  std::span<const Pixels> planes) {
   appendHeader(header);
-  std::memcpy(buffer_.data() + filled_, head, kImageHeadBytes);
-  filled_ += kImageHeadBytes;
+  std::memcpy(buffer_.data() + filled_, head.data(), head.size());
+  filled_ += head.size();
 
-  const ImageView& image = frame.image;
-  const std::size_t whole = header.length - kImageHeadBytes;
-  const std::size_t padding = paddedSize(header.length) - header.length;
-  const bool gaps = image.stride != image.width;
-  const int rows = gaps ? image.height : 1;
   std::array<iovec, kPiecesPerCall> pieces{};
   std::size_t count = 0;
   std::size_t written = 0;
-  pieces[count++] = readOnly({buffer_.data(), filled_});
-  for (int y = 0; y <= rows; ++y) {
-    const bool last = y == rows;
-    if (last) {
-      pieces[count++] = readOnly({kPadding.data(), padding});
-    } else {
-      pieces[count++] = readOnly(gaps ? rowOf(image, y) : std::span(image.data, whole));
-    }
-    if (!last && count < pieces.size()) continue;
+  const auto flushPieces = [&] {
     const WriteResult result = writeAll(pieces.data(), count);
     written += result.written;
     count = 0;
-    if (result.error != 0) {
-      loseBuffer(written);
-      fail(result.error);
-      return status_;
+    if (result.error == 0) return true;
+    loseBuffer(written);
+    fail(result.error);
+    return false;
+  };
+  pieces[count++] = readOnly({buffer_.data(), filled_});
+  for (const Pixels& plane : planes) {
+    for (std::size_t y = 0; y < plane.rows; ++y) {
+      if (count == pieces.size() && !flushPieces()) return status_;
+      pieces[count++] = readOnly(plane.row(y));
     }
   }
+  if (count == pieces.size() && !flushPieces()) return status_;
+  pieces[count++] = readOnly({kPadding.data(), paddedSize(header.length) - header.length});
+  if (!flushPieces()) return status_;
   offset_ += written;
   filled_ = 0;
   return okStatus();

@@ -26,6 +26,8 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -34,6 +36,7 @@
 #include "estimator/core/status.hpp"
 #include "estimator/messages/frames.hpp"
 #include "estimator/messages/imu_sample.hpp"
+#include "estimator/messages/scene_images.hpp"
 #include "estimator/messages/step_record.hpp"
 
 namespace swiftlet {
@@ -72,6 +75,10 @@ class RecordingWriter {
   Status smoothStep(const SmoothStep& step);
   Status meshStep(const MeshStep& step);
   Status loopStep(const LoopStep& step);
+  /// `scene`: what the map took with the frame, may be empty; only the metres of its depth image and its
+  /// labels are kept. kInvalidInput (counted as lost) for a depth image of another size than the header's
+  /// sensor, and for more than 256 MiB.
+  Status mapStep(const MapStep& step, const SceneImages& scene);
   /// `count` records of `kind` never came here because a buffer before the writer was full; they would have
   /// followed the last record of that kind.
   Status loss(RecordKind kind, std::uint64_t count);
@@ -90,13 +97,29 @@ class RecordingWriter {
     int error = 0;
   };
 
+  /// Rows of pixels in the caller's memory.
+  struct Pixels {
+    const std::uint8_t* data = nullptr;
+    std::size_t row_bytes = 0;
+    std::size_t stride = 0;  ///< bytes from row to row
+    std::size_t rows = 0;
+
+    [[nodiscard]] std::size_t bytes() const { return row_bytes * rows; }
+    [[nodiscard]] std::span<const std::uint8_t> row(std::size_t i) const {
+      return {data + i * stride, row_bytes};
+    }
+  };
+
   void openFolder(const std::string& folder);
   void removeEarlierRun(const std::string& folder);
   int beginSegment();
   void closeFiles();
 
   Status put(RecordKind kind, const std::uint8_t* payload, std::size_t size);
-  Status putImageDirect(const CameraFrame& frame, const RecordHeader& header, const std::uint8_t* head);
+  static Pixels pixelsOf(const ImageView& image);
+  Status putPixels(RecordKind kind, std::span<const std::uint8_t> head, std::span<const Pixels> planes);
+  Status putDirect(const RecordHeader& header, std::span<const std::uint8_t> head,
+                   std::span<const Pixels> planes);
   void appendHeader(const RecordHeader& header);
   bool makeRoom(std::size_t bytes);
   [[nodiscard]] bool fitsBuffer(std::size_t bytes) const { return filled_ + bytes <= buffer_.size(); }
@@ -114,6 +137,7 @@ class RecordingWriter {
   int file_ = -1;
   RunId run_{};
   std::uint32_t run_checksum_ = 0;
+  std::optional<DepthImageView> depth_sensor_;
   std::uint32_t segment_ = 0;
   std::uint64_t offset_ = 0;    ///< bytes of the segment that the kernel has
   std::uint64_t sequence_ = 0;  ///< of the next record

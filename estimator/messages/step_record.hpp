@@ -4,7 +4,7 @@
 //
 // Numbers count from 1 in the order of arrival at the estimator, 0 is none: IMU samples over the run,
 // images over the run of each camera, windows and fixes in the order in which `smooth` published them, plane
-// reports in the order in which `mesh` did.
+// reports in the order in which `mesh` did, corrections in the order in which `loop` did.
 
 #include <array>
 #include <cstdint>
@@ -58,6 +58,18 @@ struct LoopStep {
   std::array<std::uint64_t, kMaxCameras> image{};  ///< number of each camera's image; 0: none was at hand
 
   bool operator==(const LoopStep&) const = default;
+};
+
+/// A frame that the map took, and how much spare-time work it did since the frame before. The last step of a
+/// run has `end` instead of a frame: what the map did after its last frame.
+struct MapStep {
+  std::uint64_t frame = 0;                         ///< StereoFrame::index; meaningless where `end`
+  std::uint64_t correction = 0;                    ///< number of the newest correction that it took; 0: none
+  std::uint64_t spare_turns = 0;                   ///< pieces of spare-time work before it
+  std::array<std::uint64_t, kMaxCameras> image{};  ///< number of each camera's image; 0: none was at hand
+  bool end = false;
+
+  bool operator==(const MapStep&) const = default;
 };
 
 }  // namespace swiftlet

@@ -81,6 +81,7 @@ class ReplayRun {
     if (request_.reproduce) {
       std::unique_ptr<RecordingSource> recording = openRecording(request_.log, options);
       recording_ = recording.get();
+      if (const auto loss = recording_->firstLoss()) throw *loss;
       source_ = std::move(recording);
       settings_ = Settings{};
       readSettingsText(request_.log, recording_->header().settings, settings_);

@@ -90,6 +90,17 @@ void read(const std::vector<Bytes>& segments) {
       }
     }
     demand(samples == source.imuCount() && images == source.imageCount());
+    for (std::size_t i = 0; i < source.steps().map.size(); ++i) {
+      SceneImages scene;
+      if (!source.mapScene(i, scene)) continue;
+      demand(!scene.empty());
+      const std::size_t depths = scene.depth.depth != nullptr ? scene.depth.camera.pixels() : 0;
+      for (std::size_t k = 0; k < depths; ++k) sum += scene.depth.depth[k] > 0 ? 1U : 0U;
+      for (int y = 0; !scene.labels.empty() && y < scene.labels.height; ++y) {
+        for (int x = 0; x < scene.labels.width; ++x) sum += scene.labels.row(y)[x];
+      }
+    }
+    demand(source.firstLoss().has_value() == !source.losses().empty());
     // Keeps the reading of the pixels alive.
     volatile unsigned sink = sum;
     (void)sink;

@@ -185,11 +185,13 @@ TEST_CASE("overloaded, threads degrade by policy, recover, and are repeated byte
 
     ReplayRequest again = requestFor(folder.file("run"), folder.file("again"));
     again.reproduce = true;
+    // A disk that stands still for most of a second costs records; such a run is refused, with the place.
+    if (openRecording(folder.file("run"))->firstLoss()) {
+      CHECK_THROWS_AS(runReplay(again, Settings{}), InputError);
+      continue;
+    }
     const ReplayResult repeated = runReplay(again, Settings{});
-    // A disk that stands still for most of a second costs records; that is counted, not hidden.
-    const bool whole = openRecording(folder.file("run"))->complete();
-    CHECK(repeated.finished == whole);
-    if (!whole) continue;
+    CHECK(repeated.finished);
     ++complete;
     CHECK(result.statistics.loop.has_value() == request.loop_closure);
     if (request.loop_closure && repeated.statistics.loop) {

@@ -72,6 +72,30 @@ void wildImage(Random& random, Entry& entry) {
   frame.image = {entry.pixels.empty() ? nullptr : entry.pixels.data(), width, height, stride};
 }
 
+/// Depth, labels, both or none; small ones, and now and then labels that go to the kernel without a copy.
+void wildScene(Random& random, Entry& entry) {
+  const std::uint32_t what = random.below(4);
+  SceneImages& scene = entry.scene;
+  scene.stamp = wildStamp(random);
+  if (what % 2 == 1) {
+    scene.depth = *wildHeader(RecordOrder::kAsWritten).depth_sensor;
+    scene.depth.stamp = wildStamp(random);
+    entry.depth.resize(scene.depth.camera.pixels());
+    for (float& depth : entry.depth) {
+      depth = random.below(9) == 0 ? std::bit_cast<float>(0x7FC0'0000U | random.below(1U << 20U))
+                                   : static_cast<float>(random.uniform(0, 10));
+    }
+    scene.depth.depth = entry.depth.data();
+  }
+  if (what < 2) return;
+  const int width = 1 + static_cast<int>(random.below(40));
+  const int height = random.below(8) == 0 ? 1200 : 1 + static_cast<int>(random.below(20));
+  const int stride = width + static_cast<int>(random.below(3));
+  entry.pixels.resize(static_cast<std::size_t>(stride) * static_cast<std::size_t>(height));
+  for (std::uint8_t& pixel : entry.pixels) pixel = static_cast<std::uint8_t>(random.below(256));
+  scene.labels = {entry.pixels.data(), width, height, stride};
+}
+
 bool sameNumber(double a, double b) {
   return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
 }
@@ -103,6 +127,8 @@ Status record(RecordingWriter& writer, const Entry& entry) {
       return writer.meshStep(entry.mesh);
     case RecordKind::kLoopStep:
       return writer.loopStep(entry.loop);
+    case RecordKind::kMapStep:
+      return writer.mapStep(entry.map, entry.scene);
     default:
       return writer.loss(entry.loss.kind, entry.loss.count);
   }
@@ -110,11 +136,15 @@ Status record(RecordingWriter& writer, const Entry& entry) {
 
 Entry wildEntry(std::uint64_t seed, std::uint64_t i) {
   Random random(seed, i);
-  constexpr std::array<RecordKind, 13> kMix{
+  constexpr std::array<RecordKind, 14> kMix{
       RecordKind::kImu,           RecordKind::kImu,       RecordKind::kImu,        RecordKind::kImu,
       RecordKind::kImage0,        RecordKind::kImage1,    RecordKind::kImage1,     RecordKind::kMeshStep,
       RecordKind::kPropagateStep, RecordKind::kTrackStep, RecordKind::kSmoothStep, RecordKind::kLoss,
-      RecordKind::kLoopStep};
+      RecordKind::kLoopStep,      RecordKind::kMapStep};
+  constexpr std::array<RecordKind, 9> kLost{
+      RecordKind::kImu,           RecordKind::kImage0,    RecordKind::kImage1,
+      RecordKind::kPropagateStep, RecordKind::kTrackStep, RecordKind::kSmoothStep,
+      RecordKind::kMeshStep,      RecordKind::kLoopStep,  RecordKind::kMapStep};
   Entry entry;
   entry.kind = kMix[random.below(static_cast<std::uint32_t>(kMix.size()))];
   entry.sample.stamp = wildStamp(random);
@@ -127,9 +157,15 @@ Entry wildEntry(std::uint64_t seed, std::uint64_t i) {
   entry.smooth = {wildCount(random), wildCount(random), wildEffort(random), wildCount(random)};
   entry.mesh = {wildCount(random), wildCount(random), wildCount(random)};
   entry.loop = {wildCount(random), wildCount(random), {wildCount(random), wildCount(random)}};
-  entry.loss.kind = static_cast<RecordKind>(1 + random.below(6));
+  entry.map = {wildCount(random),
+               wildCount(random),
+               wildCount(random),
+               {wildCount(random), wildCount(random)},
+               random.below(9) == 0};
+  entry.loss.kind = kLost[random.below(static_cast<std::uint32_t>(kLost.size()))];
   entry.loss.count = 1 + random.below(1000);
   if (entry.kind == RecordKind::kImage0 || entry.kind == RecordKind::kImage1) wildImage(random, entry);
+  if (entry.kind == RecordKind::kMapStep) wildScene(random, entry);
   return entry;
 }
 
@@ -158,6 +194,10 @@ RecordingHeader wildHeader(RecordOrder order) {
   header.noise.gyro_density = 1e-4 * third;
   header.noise.accel_saturation = kInfinity;
   header.noise.gravity = std::nextafter(9.81, 10);
+  DepthImageView& sensor = header.depth_sensor.emplace();
+  sensor.camera = {50 * third, std::nextafter(16.5, 17), 7.9, -0.0, 16, 12};
+  sensor.T_body_camera.rotation.coeffs() << 0.1, -third, 0.3, 0.7;
+  sensor.T_body_camera.translation << -0.0, 0.05 * third, 5e-324;
   header.calibration_form = "EuRoC";
   header.settings = "smoother:\n  window: 12  # \xC3\xBC\n" + std::string(3, '\0');
   header.program_version = "1.2.3-4-gabcdef";
@@ -176,6 +216,29 @@ bool sameFrame(const CameraFrame& a, const CameraFrame& b) {
   if (a.image.empty() || b.image.empty()) return a.image.empty() == b.image.empty();
   for (int y = 0; y < a.image.height; ++y) {
     if (std::memcmp(a.image.row(y), b.image.row(y), static_cast<std::size_t>(a.image.width)) != 0)
+      return false;
+  }
+  return true;
+}
+
+bool sameScene(const SceneImages& a, const SceneImages& b) {
+  const auto has_depth = [](const SceneImages& scene) { return scene.depth.depth != nullptr; };
+  if (has_depth(a) != has_depth(b) || a.labels.empty() != b.labels.empty()) return false;
+  if (!a.empty() && a.stamp != b.stamp) return false;
+  if (has_depth(a)) {
+    const PinholeIntrinsics& p = a.depth.camera;
+    const PinholeIntrinsics& q = b.depth.camera;
+    const bool same =
+        p.width == q.width && p.height == q.height && sameNumber(p.fx, q.fx) && sameNumber(p.fy, q.fy) &&
+        sameNumber(p.cx, q.cx) && sameNumber(p.cy, q.cy) && a.depth.stamp == b.depth.stamp &&
+        sameNumbers(a.depth.T_body_camera.rotation.coeffs(), b.depth.T_body_camera.rotation.coeffs()) &&
+        sameNumbers(a.depth.T_body_camera.translation, b.depth.T_body_camera.translation);
+    if (!same || std::memcmp(a.depth.depth, b.depth.depth, p.pixels() * sizeof(float)) != 0) return false;
+  }
+  if (a.labels.empty()) return true;
+  if (a.labels.width != b.labels.width || a.labels.height != b.labels.height) return false;
+  for (int y = 0; y < a.labels.height; ++y) {
+    if (std::memcmp(a.labels.row(y), b.labels.row(y), static_cast<std::size_t>(a.labels.width)) != 0)
       return false;
   }
   return true;
@@ -238,15 +301,22 @@ std::string difference(RecordingSource& source, const std::vector<Entry>& script
       case RecordKind::kLoopStep:
         steps.loop.push_back(entry.loop);
         break;
+      case RecordKind::kMapStep: {
+        SceneImages scene;
+        const bool any = source.mapScene(steps.map.size(), scene);
+        if (any == entry.scene.empty() || !sameScene(scene, entry.scene)) return where + "another scene";
+        steps.map.push_back(entry.map);
+        break;
+      }
       default: {
         std::uint64_t& of_kind = number[static_cast<std::size_t>(entry.loss.kind)];
-        losses.push_back({entry.loss.kind, of_kind, entry.loss.count});
+        losses.push_back({entry.loss.kind, of_kind, entry.loss.count, {}, 0, 0});
         of_kind += entry.loss.count;
       }
     }
     if (entry.kind == RecordKind::kPropagateStep || entry.kind == RecordKind::kTrackStep ||
         entry.kind == RecordKind::kSmoothStep || entry.kind == RecordKind::kMeshStep ||
-        entry.kind == RecordKind::kLoopStep) {
+        entry.kind == RecordKind::kLoopStep || entry.kind == RecordKind::kMapStep) {
       ++last;
     }
   }
@@ -257,6 +327,7 @@ std::string difference(RecordingSource& source, const std::vector<Entry>& script
   if (source.steps().smooth != steps.smooth) return "other smoothing steps";
   if (source.steps().mesh != steps.mesh) return "other mesh steps";
   if (source.steps().loop != steps.loop) return "other steps of loop closure";
+  if (source.steps().map != steps.map) return "other mapping steps";
   const auto same_loss = [](const RecordingLoss& a, const RecordingLoss& b) {
     return a.kind == b.kind && a.after == b.after && a.count == b.count;
   };

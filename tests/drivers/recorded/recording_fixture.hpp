@@ -26,6 +26,9 @@ struct Entry {
   SmoothStep smooth;
   MeshStep mesh;
   LoopStep loop;
+  MapStep map;
+  SceneImages scene;         ///< its labels point into `pixels`, its depth into `depth`, or are empty
+  std::vector<float> depth;  ///< m
   RecordingLoss loss;
 
   Entry() = default;
@@ -41,7 +44,7 @@ Status record(RecordingWriter& writer, const Entry& entry);
 Entry wildEntry(std::uint64_t seed, std::uint64_t i);
 std::vector<Entry> wildScript(std::uint64_t seed, std::size_t count);
 
-/// Two cameras with doubles that no text would bring back.
+/// Two cameras and a depth sensor with doubles that no text would bring back.
 RecordingHeader wildHeader(RecordOrder order);
 
 /// What differs between the recording and the first `count` entries; empty when nothing does. Reads the
@@ -49,6 +52,7 @@ RecordingHeader wildHeader(RecordOrder order);
 std::string difference(RecordingSource& source, const std::vector<Entry>& script, std::size_t count);
 bool sameBits(const ImuSample& a, const ImuSample& b);
 bool sameFrame(const CameraFrame& a, const CameraFrame& b);
+bool sameScene(const SceneImages& a, const SceneImages& b);
 bool sameRig(const Rig& a, const Rig& b);
 
 class MemoryFile final : public RecordingFile {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 
+#include "drivers/recorded/recording_checksum.hpp"
 #include "estimator/core/random.hpp"
 #include "tests/drivers/recorded/asl_fixture.hpp"
 #include "tests/drivers/recorded/recording_fixture.hpp"
@@ -75,6 +76,68 @@ TEST_CASE("a recording cut off at any byte gives every record before it") {
   }
   CHECK(refused == recorded.ends.front());
   CHECK(outcome(recorded, recorded.segments, recorded.ends.size()).empty());
+}
+
+TEST_CASE("a recording that is only cut off has lost nothing: it can be repeated up to the cut") {
+  const TempFolder folder;
+  const bool loses = GENERATE(false, true);
+  {
+    RecordingWriter writer(folder.path().string(), wildHeader(RecordOrder::kAsWritten));
+    REQUIRE(writer.imu({{7}, {}, {}}, {}).ok());
+    if (loses) REQUIRE(writer.loss(RecordKind::kMapStep, 4).ok());
+    for (int i = 0; i < 3; ++i) REQUIRE(writer.mapStep({}, {}).ok());
+    // No end: as after a kill.
+  }
+  std::vector<Bytes> segments = readSegments(folder.path());
+  segments[0].resize(segments[0].size() - 5);
+  RecordingSource source(inMemory(segments), {});
+  CHECK(source.steps().map.size() == 2);
+  CHECK(anyContains(source.warnings(), "the recording ends here"));
+  const auto loss = source.firstLoss();
+  CHECK(loss.has_value() == loses);
+  if (loss)
+    CHECK(contains(loss->message, "4 mapping steps were lost while recording, after number 0, at stamp 7"));
+}
+
+TEST_CASE("a mapping step whose pixels are not what it says is refused with the place") {
+  const TempFolder folder;
+  const RecordingHeader header = wildHeader(RecordOrder::kAsWritten);
+  const std::vector<float> depth(header.depth_sensor->camera.pixels());
+  {
+    RecordingWriter writer(folder.path().string(), header);
+    SceneImages scene;
+    scene.depth = *header.depth_sensor;
+    scene.depth.depth = depth.data();
+    REQUIRE(writer.mapStep({}, scene).ok());
+    REQUIRE(writer.end().ok());
+  }
+  const Bytes sound = readSegments(folder.path())[0];
+  SegmentHeader segment;
+  (void)decode(std::span(sound).first<kSegmentHeaderBytes>(), segment);
+  const std::uint32_t run = runChecksum(segment.run);
+  std::size_t at = kSegmentHeaderBytes;
+  RecordHeader record;
+  REQUIRE(decode(std::span(sound).subspan(at).first<kRecordHeaderBytes>(), run, record));
+  at += kRecordHeaderBytes + paddedSize(record.length);
+  REQUIRE(decode(std::span(sound).subspan(at).first<kRecordHeaderBytes>(), run, record));
+  REQUIRE(record.kind == RecordKind::kMapStep);
+  struct Change {
+    std::size_t at;  ///< byte of the step
+    std::int32_t value;
+  };
+  // Depth of another width, of a negative and of an enormous size, labels that are not there, an end of 2.
+  for (const auto& [byte, value] :
+       {Change{64, 15}, Change{64, -16}, Change{68, 1 << 30}, Change{72, 1}, Change{76, -1}, Change{40, 2}}) {
+    Bytes bytes = sound;
+    const std::size_t payload = at + kRecordHeaderBytes;
+    LittleEndianWriter(bytes.data() + payload + byte).i32(value);
+    record.payload_crc = crc32c(run, std::span(bytes).subspan(payload, paddedSize(record.length)));
+    encode(record, run, std::span<std::uint8_t, kRecordHeaderBytes>(bytes.data() + at, kRecordHeaderBytes));
+    const InputError error = refusal({bytes});
+    INFO("byte " << byte << ": " << error.what());
+    CHECK(error.field == "byte " + std::to_string(at));
+    CHECK(contains(error.message, "a mapping step with depth of"));
+  }
 }
 
 TEST_CASE("a tail of zeros or of pages that were half written is cut off") {

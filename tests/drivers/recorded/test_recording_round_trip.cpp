@@ -110,8 +110,45 @@ TEST_CASE("the run's header comes back bit for bit") {
   CHECK(read.settings == given.settings);
   CHECK(read.program_version == given.program_version);
   CHECK(read.order == given.order);
+  REQUIRE(read.depth_sensor);
+  const std::vector<float> depth(given.depth_sensor->camera.pixels());
+  const auto sceneOf = [&](DepthImageView sensor) {
+    sensor.depth = depth.data();
+    return SceneImages{{}, sensor, {}};
+  };
+  CHECK(sameScene(sceneOf(*read.depth_sensor), sceneOf(*given.depth_sensor)));
   CHECK(source.complete());
+  CHECK_FALSE(source.firstLoss());
   CHECK(source.warnings().empty());
+}
+
+TEST_CASE("without a depth sensor the run's header is what it was before there were any") {
+  RecordingHeader given = wildHeader(RecordOrder::kAsWritten);
+  const std::size_t with = encodeRecordingHeader(given).size();
+  given.depth_sensor.reset();
+  std::vector<std::uint8_t> bytes = encodeRecordingHeader(given);
+  constexpr std::size_t kSensorBytes = 2 * 4 + 11 * 8;
+  CHECK(bytes.size() + kSensorBytes == with);
+  RecordingHeader read = wildHeader(RecordOrder::kAsWritten);
+  REQUIRE(decodeRecordingHeader(bytes, read) == nullptr);
+  CHECK_FALSE(read.depth_sensor);
+  bytes.resize(bytes.size() + kSensorBytes);  // a sensor of 0x0 pixels
+  CHECK(std::string(decodeRecordingHeader(bytes, read)) == "depth sensor");
+}
+
+TEST_CASE("a depth image of another size than the sensor's is refused and counted") {
+  const TempFolder folder;
+  RecordingHeader header = wildHeader(RecordOrder::kAsWritten);
+  RecordingWriter writer(folder.path().string(), header);
+  SceneImages scene;
+  scene.depth = *header.depth_sensor;
+  const std::vector<float> depth(2 * scene.depth.camera.pixels());
+  scene.depth.depth = depth.data();
+  CHECK(writer.mapStep({}, scene).ok());
+  scene.depth.camera.width *= 2;
+  CHECK(writer.mapStep({}, scene).code == StatusCode::kInvalidInput);
+  CHECK(writer.statistics().lost[static_cast<std::size_t>(RecordKind::kMapStep)] == 1);
+  CHECK(writer.status().ok());
 }
 
 TEST_CASE("a recording of a real log is that log, whatever order its recorder drained the streams in") {
@@ -234,6 +271,13 @@ TEST_CASE("numbers count what was lost, and what was lost is said") {
   CHECK(anyContains(source->warnings(), "3 images of camera 0 were lost while recording, after number 1"));
   CHECK(anyContains(source->warnings(), "2 tracking steps were lost"));
   CHECK_FALSE(source->complete());
+  const auto loss = source->firstLoss();
+  REQUIRE(loss);
+  CHECK(contains(loss->file, "recording_000000.swr"));
+  CHECK(contains(loss->field, "byte "));
+  CHECK(contains(loss->message, "3 images of camera 0 were lost while recording, after number 1"));
+  CHECK(contains(loss->message, "the first of 2 losses"));
+  CHECK_FALSE(loss->remedy.empty());
 }
 
 TEST_CASE("pixels stay valid for the promised number of further images") {
