@@ -63,7 +63,10 @@ void checkSensors(const ArmingFacts& facts, const ArmingSettings& settings, Armi
   const double allowed = settings.imu_rate_tolerance * facts.imu_rate_expected;
   const bool at_rate =
       facts.imu_rate_expected > 0 && std::abs(facts.imu_rate - facts.imu_rate_expected) <= allowed;
-  if (!at_rate) {
+  if (facts.has_sample && facts.sample_age > settings.sample_age) {
+    lack(verdict, ArmingCondition::kSensors, "look at the IMU's cable, its bus and its power",
+         "the IMU has delivered nothing for %.1f ms", facts.sample_age.seconds() * kMilli);
+  } else if (!at_rate) {
     lack(verdict, ArmingCondition::kSensors,
          "look at the IMU's rate in its calibration (update_rate), its settings and its bus",
          "the IMU delivers at %.1f Hz, expected are %.1f Hz within %.0f %%", facts.imu_rate,
@@ -119,6 +122,14 @@ void checkEffort(const ArmingFacts& facts, ArmingVerdict& verdict) {
        facts.smooth_level);
 }
 
+void checkMembers(const ArmingFacts& facts, ArmingVerdict& verdict) {
+  if (facts.members_unwell == 0) return;
+  lack(verdict, ArmingCondition::kMembers,
+       "wait if it is late; if it is lost, look into events.log and start the program again",
+       "%s is %s: %s%s", facts.first_unwell, facts.first_unwell_is, facts.first_unwell_text,
+       facts.members_unwell > 1 ? ", and others" : "");
+}
+
 }  // namespace
 
 const char* conditionName(ArmingCondition condition) {
@@ -137,6 +148,8 @@ const char* conditionName(ArmingCondition condition) {
       return "recorder";
     case ArmingCondition::kEffort:
       return "effort";
+    case ArmingCondition::kMembers:
+      return "members";
   }
   return "unknown";
 }
@@ -154,6 +167,7 @@ ArmingVerdict ReadyToArm::evaluate(const ArmingFacts& facts) const {
   checkInitialized(facts, settings_, verdict);
   checkRecorder(facts, verdict);
   checkEffort(facts, verdict);
+  checkMembers(facts, verdict);
   return verdict;
 }
 

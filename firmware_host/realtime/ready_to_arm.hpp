@@ -13,6 +13,7 @@
 // | `initialized`   | health has been good, and the epoch the same, for some seconds
 // | `recorder`      | a recorder that is wanted runs and has lost nothing
 // | `effort`        | the stages work at full effort
+// | `members`       | the supervisor finds no thread and no sensor at fault
 
 #include <array>
 #include <cstddef>
@@ -26,10 +27,19 @@
 
 namespace swiftlet {
 
-enum class ArmingCondition { kRights, kMemoryLocked, kClocks, kSensors, kInitialized, kRecorder, kEffort };
-inline constexpr std::size_t kArmingConditions = 7;
+enum class ArmingCondition {
+  kRights,
+  kMemoryLocked,
+  kClocks,
+  kSensors,
+  kInitialized,
+  kRecorder,
+  kEffort,
+  kMembers
+};
+inline constexpr std::size_t kArmingConditions = 8;
 
-/// "rights", "memory_locked", "clocks", "sensors", "initialized", "recorder", "effort".
+/// "rights", "memory_locked", "clocks", "sensors", "initialized", "recorder", "effort", "members".
 const char* conditionName(ArmingCondition condition);
 
 struct ArmingFacts {
@@ -45,6 +55,7 @@ struct ArmingFacts {
   Stamp newest_sample;
   Stamp newest_image;
 
+  Duration sample_age;  ///< since the arrival of the newest IMU sample
   double imu_rate = 0;  ///< Hz, measured over the look-back
   double imu_rate_expected = 0;
   int cameras = 0;                                ///< of the rig
@@ -61,11 +72,17 @@ struct ArmingFacts {
 
   int track_level = 0;  ///< levels below full effort
   int smooth_level = 0;
+
+  int members_unwell = 0;              ///< by the supervisor's table
+  const char* first_unwell = "";       ///< its name
+  const char* first_unwell_is = "";    ///< "late", "lost"
+  const char* first_unwell_text = "";  ///< "no turn for 0.4 s"
 };
 
 struct ArmingSettings {
   double imu_rate_tolerance = 0.2;                           ///< share of the expected rate
   Duration sensor_offset = Duration::fromMilliseconds(200);  ///< newest image against newest sample
+  Duration sample_age = Duration::fromMilliseconds(100);     ///< of the newest IMU sample
   Duration image_age = Duration::fromMilliseconds(500);      ///< of each camera's newest image
   Duration steady = Duration::fromMilliseconds(3000);        ///< of health and epoch
 };

@@ -63,6 +63,8 @@ const Withheld kWithheld[] = {
     {"a rate that was told", ArmingCondition::kSensors, [](ArmingFacts& f) { f.imu_rate = 241; }, "200.0 Hz"},
     {"a rate that is a number", ArmingCondition::kSensors,
      [](ArmingFacts& f) { f.imu_rate = std::numeric_limits<double>::quiet_NaN(); }, "nan"},
+    {"samples that go on", ArmingCondition::kSensors,
+     [](ArmingFacts& f) { f.sample_age = Duration::fromMilliseconds(150); }, "nothing for 150.0 ms"},
     {"an expected rate", ArmingCondition::kSensors, [](ArmingFacts& f) { f.imu_rate_expected = 0; },
      "0.0 Hz"},
     {"a camera", ArmingCondition::kSensors, [](ArmingFacts& f) { f.has_image_of[1] = false; }, "camera 1"},
@@ -80,6 +82,14 @@ const Withheld kWithheld[] = {
      "lost 9"},
     {"full tracking", ArmingCondition::kEffort, [](ArmingFacts& f) { f.track_level = 1; }, "by 1"},
     {"full smoothing", ArmingCondition::kEffort, [](ArmingFacts& f) { f.smooth_level = 2; }, "by 2"},
+    {"a thread", ArmingCondition::kMembers,
+     [](ArmingFacts& f) {
+       f.members_unwell = 2;
+       f.first_unwell = "mesh";
+       f.first_unwell_is = "lost";
+       f.first_unwell_text = "no memory";
+     },
+     "mesh is lost: no memory, and others"},
 };
 
 TEST_CASE("with every condition given the vehicle is ready to arm") {
@@ -123,7 +133,7 @@ TEST_CASE("a recorder that is not wanted is not missed") {
   CHECK(ReadyToArm().evaluate(facts).ready());
 }
 
-TEST_CASE("facts that nobody filled in block everything but effort and recorder") {
+TEST_CASE("facts that nobody filled in block all but effort, recorder and members") {
   const ArmingVerdict verdict = ReadyToArm().evaluate({});
   for (const ArmingCondition condition :
        {ArmingCondition::kRights, ArmingCondition::kMemoryLocked, ArmingCondition::kClocks,
@@ -139,6 +149,7 @@ TEST_CASE("everything missing at once finds room in the verdict") {
   facts.reversed_stamps = 1;
   facts.recorder_wanted = true;
   facts.track_level = 1;
+  facts.members_unwell = 1;
   const ArmingVerdict verdict = ReadyToArm().evaluate(facts);
   for (std::size_t i = 0; i < kArmingConditions; ++i) CHECK(verdict.lacks(static_cast<ArmingCondition>(i)));
   CHECK(verdict.missing.size() == ArmingVerdict::kMost);

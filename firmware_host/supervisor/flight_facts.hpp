@@ -1,0 +1,67 @@
+#pragma once
+// What the supervisor asks of a flight: plain values that its schedule collects for it ten times a second.
+// Times of the host are CLOCK_MONOTONIC; other stamps are of the run's clock (the log's in a replay).
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include "estimator/core/limits.hpp"
+#include "estimator/core/stamp.hpp"
+#include "estimator/messages/nav_state.hpp"
+
+namespace swiftlet {
+
+/// What stands before the first message and does not change.
+struct FlightGround {
+  int flight_threads = 0;
+  int threads_without_priority = 0;
+  std::array<char, 16> first_without_priority{};  ///< name; ends with a zero
+  bool memory_locked = false;
+  double imu_rate = 0;  ///< Hz, the calibration's
+  double speed = 1;     ///< of the run's clock against the host's
+  int cameras = 0;      ///< that are used
+  bool trigger = false;
+  bool recorder_wanted = false;
+  bool host_stamps = true;  ///< the run's clock is CLOCK_MONOTONIC
+};
+
+/// What one sensor delivered.
+struct SensorNews {
+  std::uint64_t messages = 0;
+  std::uint64_t reversed_stamps = 0;  ///< at or before the one before
+  Stamp newest;                       ///< run's clock; where messages > 0
+  Stamp arrival;                      ///< host; of the newest
+};
+
+/// The newest of the estimate.
+struct EstimateNews {
+  std::uint64_t states = 0;  ///< propagated
+  Health state_health = Health::kInitializing;
+  std::uint64_t frames = 0;  ///< smoothed, or waiting for initialization
+  Stamp frame;
+  bool has_state = false;
+  Health frame_health = Health::kInitializing;
+  std::uint32_t epoch = 0;
+  int track_level = 0;  ///< levels below full effort
+  int smooth_level = 0;
+};
+
+struct FlightFacts {
+  static constexpr std::size_t kTextBytes = 128;
+
+  SensorNews imu;
+  std::array<SensorNews, kMaxCameras> camera;
+  SensorNews trigger;
+  std::uint64_t equal_samples = 0;  ///< of the IMU, in a row, the newest included
+  EstimateNews estimate;
+  bool recorder_running = false;
+  std::uint64_t recorder_lost = 0;              ///< records
+  std::array<char, kTextBytes> file_problem{};  ///< empty: all files are written; ends with a zero
+  /// The run is ending in order: threads may return, sensors may fall silent. Set before the first thread
+  /// returns because of it.
+  bool ending = false;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,116 @@
+#pragma once
+// Owns the question "is everything alive?": looks ten times a second at every member's heartbeat and at what
+// the sensors and the estimate bring, and gives the one verdict (verdict.hpp) to everybody who asks.
+//
+// Use: add every member, begin(), start(); or, without a thread, step() at times of the caller's choice.
+// Threads: a thread of its own (ThreadSettings: below `track`, above `mesh`, so that work of low priority
+//   cannot silence it), which calls `facts` and the sinks; verdict() and expectEnd() from any thread;
+//   drainEvents from one. step() only where there is no thread.
+// Errors: none in flight; a thread that cannot be started is in start()'s report.
+// Memory: 150 kB, fixed; nothing allocates or locks after begin(). Cost: some 20 us a turn.
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "estimator/core/fixed_vector.hpp"
+#include "estimator/core/newest_shared.hpp"
+#include "estimator/core/spsc_ring.hpp"
+#include "firmware_host/realtime/doorbell.hpp"
+#include "firmware_host/realtime/flight_thread.hpp"
+#include "firmware_host/supervisor/arming_watch.hpp"
+#include "firmware_host/supervisor/flight_facts.hpp"
+#include "firmware_host/supervisor/heartbeat.hpp"
+#include "firmware_host/supervisor/liveness.hpp"
+#include "firmware_host/supervisor/systemd_notify.hpp"
+#include "firmware_host/supervisor/verdict.hpp"
+
+namespace swiftlet {
+
+class Supervisor {
+ public:
+  static constexpr Duration kPeriod = Duration::fromMilliseconds(100);
+  static constexpr std::size_t kMostSinks = 8;
+
+  using Facts = std::function<void(FlightFacts&)>;
+  using Sink = std::function<void(const Verdict&)>;
+
+  Supervisor() = default;
+  ~Supervisor() { stop(); }
+  Supervisor(const Supervisor&) = delete;
+  Supervisor& operator=(const Supervisor&) = delete;
+
+  /// Before begin(). `heart` outlives the supervisor. False: the table is full.
+  [[nodiscard]] bool add(std::string_view name, const Heartbeat& heart);
+  [[nodiscard]] bool addSink(Sink sink) { return sinks_.tryPushBack(std::move(sink)); }
+  /// `facts` fills in what it knows; both `facts` and `systemd` (null: nobody) outlive the supervisor.
+  void begin(const FlightGround& ground, Facts facts, SystemdNotify* systemd = nullptr);
+
+  ThreadReport start(const ThreadSettings& settings);
+  /// Waits for the thread, at most a turn.
+  void stop();
+  /// The run ends in order from here on: to be called before the first thread returns because of it.
+  void expectEnd() { ending_.store(true, std::memory_order_release); }
+
+  /// One turn at `now` of CLOCK_MONOTONIC.
+  void step(Stamp now);
+
+  /// The newest; `evaluated` is 0 before the first turn.
+  [[nodiscard]] Verdict verdict() const;
+  /// A flight thread was lost: the run is to end with exit code 1.
+  [[nodiscard]] bool runFailed() const { return run_failed_.load(std::memory_order_acquire); }
+  /// What changed since the last call, in words, with stamps of the run's clock.
+  bool drainEvents(const std::function<void(Stamp, const std::string&)>& take);
+  /// For the summary, after stop(): the last verdict, first readiness, each member's turns.
+  [[nodiscard]] nlohmann::ordered_json json() const;
+
+ private:
+  struct Event {
+    /// A verdict that misses every condition, in full.
+    static constexpr std::size_t kTextBytes = 2304;
+    Stamp stamp;
+    std::array<char, kTextBytes> text{};
+    std::size_t size = 0;
+  };
+  struct Member {
+    std::array<char, Trouble::kNameBytes> name{};
+    const Heartbeat* heart = nullptr;
+  };
+
+  void run();
+  [[nodiscard]] bool findRunClock(const FlightFacts& facts, Stamp now);
+  void tellTroubles(Stamp now);
+  void tellArming();
+  void tellSystemd(Stamp now);
+  template <typename Write>
+  void event(Write&& write);
+
+  FlightGround ground_;
+  Facts facts_;
+  FixedVector<Sink, kMostSinks> sinks_;
+  SystemdNotify* systemd_ = nullptr;
+  FixedVector<Member, Liveness::kMostMembers> members_;
+  Liveness liveness_;
+  ArmingWatch arming_;
+
+  Verdict verdict_;
+  Liveness::Troubles told_;  ///< troubles that events have named
+  bool arming_told_ = false;
+  std::optional<ArmingVerdict> last_arming_;
+  std::optional<Stamp> run_clock_;  ///< now, on the run's clock
+  std::optional<Stamp> first_ready_;
+  bool ready_sent_ = false, stopping_sent_ = false;
+
+  SpscRing<Event, 32> events_;
+  NewestShared<Verdict> newest_;
+  std::atomic<bool> ending_{false}, stopping_{false}, run_failed_{false};
+  Doorbell bell_;
+  FlightThread thread_;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,46 @@
+#pragma once
+// Tells systemd how the service is: the protocol of sd_notify(3), one datagram a message, without its
+// library.
+//
+// Without NOTIFY_SOCKET in the environment every call does nothing. Nothing blocks, allocates or fails: what
+// systemd does not take is lost, and repeated where it matters (the watchdog). One thread.
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+class SystemdNotify {
+ public:
+  /// Reads NOTIFY_SOCKET, WATCHDOG_USEC and WATCHDOG_PID, and opens the socket.
+  SystemdNotify();
+  ~SystemdNotify();
+  SystemdNotify(const SystemdNotify&) = delete;
+  SystemdNotify& operator=(const SystemdNotify&) = delete;
+
+  [[nodiscard]] bool wanted() const { return socket_ >= 0; }
+  /// Between two feeds of the watchdog; empty: systemd watches nobody.
+  [[nodiscard]] const std::optional<Duration>& watchdogPeriod() const { return watchdog_period_; }
+
+  void ready();
+  void stopping();
+  /// One line for `systemctl status`; sent when it differs from the one before.
+  void status(std::string_view line);
+  /// Feeds the watchdog where it is due; `alive` false: not.
+  void watchdog(bool alive, Stamp now);
+  /// Asks for `more` from now on, at a start or an end that takes long.
+  void extend(Duration more);
+
+ private:
+  void send(std::string_view message) const;
+
+  int socket_ = -1;
+  std::optional<Duration> watchdog_period_;
+  std::optional<Stamp> next_feed_;
+  std::uint64_t status_hash_ = 0;
+};
+
+}  // namespace swiftlet

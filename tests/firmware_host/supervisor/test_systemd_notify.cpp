@@ -1,0 +1,151 @@
+// What systemd hears, on a socket of the test's own.
+
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cstddef>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "firmware_host/supervisor/systemd_notify.hpp"
+#include "tests/firmware_host/supervisor/simulated_flight.hpp"
+
+namespace swiftlet {
+namespace {
+
+using test::kMembers;
+using test::SimulatedFlight;
+
+/// A socket in the abstract name space, and the environment that names it.
+class Listener {
+ public:
+  explicit Listener(const char* watchdog_usec, const std::string& pid = std::to_string(::getpid()))
+      : name_("@swiftlet-test-" + std::to_string(::getpid())) {
+    sockaddr_un address = {};
+    address.sun_family = AF_UNIX;
+    std::copy(name_.begin(), name_.end(), address.sun_path);
+    address.sun_path[0] = '\0';
+    socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0);
+    REQUIRE(::bind(socket_, reinterpret_cast<const sockaddr*>(&address),
+                   static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + name_.size())) == 0);
+    ::setenv("NOTIFY_SOCKET", name_.c_str(), 1);
+    if (watchdog_usec != nullptr) ::setenv("WATCHDOG_USEC", watchdog_usec, 1);
+    ::setenv("WATCHDOG_PID", pid.c_str(), 1);
+  }
+  ~Listener() {
+    ::close(socket_);
+    for (const char* name : {"NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID"}) ::unsetenv(name);
+  }
+  std::vector<std::string> hear() const {
+    std::vector<std::string> heard;
+    char bytes[2000];
+    for (ssize_t got = 0; (got = ::recv(socket_, bytes, sizeof bytes, 0)) > 0;) {
+      heard.emplace_back(bytes, static_cast<std::size_t>(got));
+    }
+    return heard;
+  }
+
+ private:
+  std::string name_;
+  int socket_ = -1;
+};
+
+/// The kernel keeps ten datagrams for a reader: it reads as time goes on.
+std::vector<std::string> heardIn(SimulatedFlight& flight, const Listener& listener, double seconds) {
+  std::vector<std::string> all;
+  for (double passed = 0; passed < seconds; passed += 0.5) {
+    flight.pass(0.5);
+    const std::vector<std::string> some = listener.hear();
+    all.insert(all.end(), some.begin(), some.end());
+  }
+  return all;
+}
+
+int count(const std::vector<std::string>& heard, const std::string& what) {
+  return static_cast<int>(std::count(heard.begin(), heard.end(), what));
+}
+
+TEST_CASE("without systemd nothing is sent", "[systemd]") {
+  ::unsetenv("NOTIFY_SOCKET");
+  SystemdNotify notify;
+  CHECK_FALSE(notify.wanted());
+  notify.ready();
+  notify.status("nobody listens");
+  notify.watchdog(true, Stamp{1});
+  CHECK_FALSE(notify.watchdogPeriod());
+}
+
+TEST_CASE("messages are those of sd_notify", "[systemd]") {
+  const Listener listener("2000000");
+  SystemdNotify notify;
+  REQUIRE(notify.watchdogPeriod());
+  CHECK(notify.watchdogPeriod()->seconds() == Approx(0.5));
+  notify.ready();
+  notify.status("good");
+  notify.status("good");
+  notify.status("degraded");
+  notify.extend(Duration::fromMilliseconds(1500));
+  notify.stopping();
+  CHECK(listener.hear() == std::vector<std::string>{"READY=1", "STATUS=good", "STATUS=degraded",
+                                                    "EXTEND_TIMEOUT_USEC=1500000", "STOPPING=1"});
+}
+
+TEST_CASE("the watchdog of another process is not ours", "[systemd]") {
+  const Listener listener("2000000", "1");
+  SystemdNotify notify;
+  CHECK(notify.wanted());
+  CHECK_FALSE(notify.watchdogPeriod());
+}
+
+TEST_CASE("a listener that reads nothing blocks nobody", "[systemd]") {
+  const Listener listener("2000000");
+  SystemdNotify notify;
+  for (int i = 0; i < 10'000; ++i) notify.ready();
+  CHECK(listener.hear().size() < 10'000);
+}
+
+TEST_CASE("the watchdog is fed until a flight thread stands for good", "[systemd]") {
+  for (const char* name : kMembers) {
+    INFO(name);
+    const Listener listener("2000000");
+    SystemdNotify notify;
+    SimulatedFlight flight(true, 1, &notify);
+    std::vector<std::string> heard = heardIn(flight, listener, 10.0);
+    CHECK(count(heard, "READY=1") == 1);
+    CHECK(heard.front() == "READY=1");
+    const int fed = count(heard, "WATCHDOG=1");
+    CHECK(fed >= 19);
+    CHECK(fed <= 21);
+    CHECK(count(heard, "STATUS=good, ready to arm") == 1);
+    // As long as the stall may pass it is fed: systemd's 2 s would end what is to recover after 2 s.
+    flight.stall(name);
+    CHECK(count(heardIn(flight, listener, 2.0), "WATCHDOG=1") >= 3);
+    heard = heardIn(flight, listener, 10.0);
+    if (memberRule(name).kind != MemberKind::kFlight) {
+      CHECK(count(heard, "WATCHDOG=1") >= 19);
+      CHECK(count(heard, "STATUS=degraded, not ready to arm; " + std::string(name) + " lost") == 1);
+      continue;
+    }
+    CHECK(count(heard, "STATUS=failed, not ready to arm; " + std::string(name) + " lost") == 1);
+    CHECK(heardIn(flight, listener, 10.0).empty());
+  }
+}
+
+TEST_CASE("the end is told", "[systemd]") {
+  const Listener listener(nullptr);
+  SystemdNotify notify;
+  SimulatedFlight flight(true, 1, &notify);
+  heardIn(flight, listener, 5.0);
+  flight.supervisor.expectEnd();
+  const std::vector<std::string> heard = heardIn(flight, listener, 5.0);
+  CHECK(count(heard, "STOPPING=1") == 1);
+  CHECK(count(heard, "WATCHDOG=1") == 0);
+}
+
+}  // namespace
+}  // namespace swiftlet
