@@ -49,6 +49,8 @@ class AutopilotLink {
   static constexpr Duration kTellLoss = Duration::fromMilliseconds(1000);
   /// A heartbeat, a pose, obstacles, an answer and a text at once.
   static constexpr std::size_t kMostBytes = 5 * kLongestMavlinkFrame;
+  /// Characters of a text: four chunks, of which the last is not full: readers know the end by that.
+  static constexpr std::size_t kMostText = 199;
 
   explicit AutopilotLink(const AutopilotLinkSettings& settings);
 
@@ -69,8 +71,6 @@ class AutopilotLink {
 
  private:
   static constexpr std::size_t kTexts = 16;
-  /// Four chunks, of which the last is not full: readers know the end by that.
-  static constexpr std::size_t kMostText = 199;
   struct Text {
     mavlink::StatusText::Severity severity = mavlink::StatusText::Severity::kInfo;
     std::array<char, kMostText> text = {};

@@ -2,7 +2,8 @@
 // The way to an autopilot as raw bytes: a serial port, or UDP datagrams. Nothing waits but wait().
 //
 // Named as the settings do: `/dev/ttyS1`, `udp:HOST:PORT`, or `udp:HOST:PORT@OWN_PORT` where the autopilot
-// sends to a port that was agreed on. Datagrams of others than HOST are not read. A serial port that goes
+// sends to a port that was agreed on. Datagrams of others than HOST are not read; without OWN_PORT, none of
+// other ports of HOST than PORT either. The kernel drops them: they wake nobody. A serial port that goes
 // away gives kUnplugged until reopen() finds it again; UDP knows no such thing, and what nobody takes is
 // lost.
 
@@ -47,11 +48,13 @@ class AutopilotPort {
 
   /// Waits until bytes are there or `most` has passed.
   void wait(Duration most);
-  /// What is there; `count` may be 0.
+  /// What is there; `count` may be 0. Passes over a bounded number of others' datagrams.
   DeviceFault read(std::span<std::uint8_t> into, std::size_t& count, Stamp& read_at);
   /// All of `bytes`, or a fault: kUnplugged, or kFailed where there is no room, which passes.
   DeviceFault write(std::span<const std::uint8_t> bytes);
 
+  /// Of UDP, once open: where answers come in.
+  [[nodiscard]] std::uint16_t ownPort() const;
   [[nodiscard]] bool isUdp() const { return udp_.has_value(); }
   [[nodiscard]] Duration byteTime() const { return udp_ ? Duration{} : serial_.byteTime(); }
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/device/monotonic_now.hpp"
@@ -29,6 +30,7 @@ constexpr Duration kReopenPeriod = Duration::fromMilliseconds(200);
 constexpr Duration kSilence = Duration::fromMilliseconds(3000);
 /// Reads of one round: more than a port at 4 Mbaud fills in it.
 constexpr int kMostReads = 8;
+constexpr Duration kFloodPause = Duration::fromMilliseconds(1);
 constexpr double kMillisecondsPerSecond = 1e3;
 
 mavlink::StatusText::Severity severityOf(Health health) {
@@ -55,6 +57,9 @@ AutopilotLinkSettings linkSettings(const AutopilotGroup& settings) {
 }
 
 class AutopilotThread::Work {
+  using Severity = mavlink::StatusText::Severity;
+  using Troubles = decltype(Verdict::troubles);
+
  public:
   Work(LiveOutlet& outlet, const AutopilotThreadOptions& options)
       : outlet_(outlet),
@@ -73,7 +78,10 @@ class AutopilotThread::Work {
     thread_.start(thread, "settings", "autopilot.device", [this] { run(); });
   }
 
-  void end() { thread_.end(); }
+  /// False: the thread is stuck and was left behind, with all of this.
+  bool end() { return thread_.end(); }
+  [[nodiscard]] const Heartbeat& heart() const { return thread_.heart(); }
+  [[nodiscard]] const std::string& fault() const { return thread_.fault(); }
 
   bool drainEvents(const std::function<void(Stamp, const std::string&)>& take) {
     bool any = false;
@@ -104,12 +112,14 @@ class AutopilotThread::Work {
   void run() {
     heard_ = monotonicNow();
     while (!thread_.ending()) {
+      thread_.heart().beat();
       if (journal_.standing() != DeviceFaultKind::kNone) {
         reopen();
         continue;
       }
       port_.wait(kRound);
-      hear();
+      // More than a port sends is a flood: the CPU is not to be taken by it.
+      if (!hear()) sleepFor(kFloodPause);
       takeNews();
       tell();
     }
@@ -128,12 +138,17 @@ class AutopilotThread::Work {
     journal_.works(heard_);
   }
 
-  void hear() {
+  /// False: there was more than a round reads.
+  bool hear() {
     std::array<std::uint8_t, MavlinkParser::kMostFed> bytes;
-    for (int i = 0; i < kMostReads; ++i) {
+    int reads = 0;
+    for (; reads < kMostReads; ++reads) {
       std::size_t count = 0;
       Stamp read_at;
-      if (const DeviceFault fault = port_.read(bytes, count, read_at); !fault.ok()) return fail(fault);
+      if (const DeviceFault fault = port_.read(bytes, count, read_at); !fault.ok()) {
+        fail(fault);
+        return true;
+      }
       if (count == 0) break;
       link_.receive(std::span(bytes).first(count), read_at, port_.byteTime());
     }
@@ -146,38 +161,101 @@ class AutopilotThread::Work {
       journal_.defect(now,
                       deviceFault(DeviceFaultKind::kSilent, 0, "no MAVLink for %.0f s", kSilence.seconds()));
     }
+    return reads < kMostReads;
   }
 
   void takeNews() {
+    const Stamp now = monotonicNow();
     if (options_.to_host && !to_host_) to_host_ = options_.to_host();
     const bool placed = !options_.to_host || to_host_;
     if (outlet_.state.refresh() != number_ && placed) {
       number_ = outlet_.state.sequence();
       state_ = outlet_.state.value().state();
       omega_body_ = outlet_.state.value().omegaBody();
+      own_health_ = state_.health;
       state_.stamp = onHost(state_.stamp);
+      state_came_ = now;
     }
-    tellReasons();
-    if (outlet_.frame.refresh() > 0 && outlet_.frame.value().health != health_) {
-      health_ = outlet_.frame.value().health;
-      link_.say(severityOf(health_), fmt::format("swiftlet: {}", healthName(health_)));
-    }
+    takeVerdict(now);
+    watchStates(now);
     if (options_.settings.obstacles) tellObstacles();
   }
 
-  void tellReasons() {
-    const std::uint64_t number = outlet_.arming.refresh();
-    if (number == 0) return;
-    const Stamp now = monotonicNow();
-    const ArmingVerdict& verdict = outlet_.arming.value();
-    const bool changed = number != reasons_;
-    if (!changed && (verdict.ready() || now < next_reasons_)) return;
-    reasons_ = number;
+  /// A text in fixed memory; AutopilotLink cuts it at the same length.
+  template <typename... Arguments>
+  void say(mavlink::StatusText::Severity severity, fmt::format_string<Arguments...> format,
+           Arguments&&... arguments) {
+    std::array<char, AutopilotLink::kMostText> text;
+    const auto end =
+        fmt::format_to_n(text.data(), text.size(), format, std::forward<Arguments>(arguments)...);
+    link_.say(severity, {text.data(), std::min(end.size, text.size())});
+  }
+
+  void takeVerdict(Stamp now) {
+    if (outlet_.verdict.refresh() == 0) return;
+    const Verdict& verdict = outlet_.verdict.value();
+    const bool supervised = !verdict.stale(now) || verdict.ending;
+    if (supervised != supervised_) {
+      supervised_ = supervised;
+      if (supervised) {
+        say(Severity::kInfo, "swiftlet: the supervisor is back");
+      } else {
+        say(Severity::kCritical, "swiftlet: the supervisor has stopped: health unknown");
+      }
+    }
+    if (!supervised) {
+      state_.health = worse(own_health_, Health::kDegraded);
+      return;
+    }
+    // An initialization is over when a state says so: the verdict is up to a period older.
+    const bool worsens = verdict.health == Health::kDegraded || verdict.health == Health::kFailed;
+    state_.health = worsens ? worse(own_health_, verdict.health) : own_health_;
+    tellTroubles(verdict);
+    tellReasons(verdict, now);
+    if (verdict.health == health_) return;
+    health_ = verdict.health;
+    say(severityOf(health_), "swiftlet: {}", healthName(health_));
+  }
+
+  void tellTroubles(const Verdict& verdict) {
+    if (verdict.trouble_changes == trouble_changes_) return;
+    trouble_changes_ = verdict.trouble_changes;
+    const auto in = [](const Troubles& troubles, const Trouble& wanted) {
+      return std::ranges::any_of(troubles, [&](const Trouble& one) { return one.row == wanted.row; });
+    };
+    for (const Trouble& trouble : verdict.troubles) {
+      if (std::ranges::any_of(told_, [&](const Trouble& one) { return one.sameAs(trouble); })) continue;
+      say(trouble.effect == Health::kFailed ? Severity::kCritical : Severity::kWarning,
+          "swiftlet: {} is {}: {}", trouble.name(), conditionName(trouble.condition), trouble.text.data());
+    }
+    for (const Trouble& before : told_) {
+      if (!in(verdict.troubles, before)) say(Severity::kInfo, "swiftlet: {} has recovered", before.name());
+    }
+    told_ = verdict.troubles;
+  }
+
+  void tellReasons(const Verdict& verdict, Stamp now) {
+    const ArmingVerdict& arming = verdict.arming;
+    const bool changed = verdict.arming_changes != reasons_;
+    if (!changed && (arming.ready() || now < next_reasons_)) return;
+    reasons_ = verdict.arming_changes;
     next_reasons_ = now + options_.repeat;
-    if (verdict.ready()) link_.say(mavlink::StatusText::Severity::kInfo, "swiftlet: ready to arm");
-    for (const MissingCondition& missing : verdict.missing) {
-      link_.say(mavlink::StatusText::Severity::kWarning,
-                fmt::format("not ready: {}: {}", missing.name(), missing.text.data()));
+    if (arming.ready()) say(Severity::kInfo, "swiftlet: ready to arm");
+    for (const MissingCondition& missing : arming.missing) {
+      say(Severity::kWarning, "not ready: {}: {}", missing.name(), missing.text.data());
+    }
+  }
+
+  /// What poses say by quality -1 and silence, in words, also where nobody supervises.
+  void watchStates(Stamp now) {
+    if (number_ == 0) return;
+    const bool stopped = now - state_came_ > AutopilotLink::kSilence && !outlet_.verdict.value().ending;
+    if (stopped == states_stopped_) return;
+    states_stopped_ = stopped;
+    if (stopped) {
+      say(Severity::kCritical, "swiftlet: no new state for {:.1f} s", AutopilotLink::kSilence.seconds());
+    } else {
+      say(Severity::kInfo, "swiftlet: states come again");
     }
   }
 
@@ -234,9 +312,14 @@ class AutopilotThread::Work {
   NavState state_;  ///< stamp of CLOCK_MONOTONIC
   Eigen::Vector3d omega_body_ = Eigen::Vector3d::Zero();
   std::optional<Duration> to_host_;
-  Health health_ = Health::kInitializing;
-  std::uint64_t number_ = 0, reasons_ = 0;  ///< taken
-  std::uint64_t frames_ = 0;                ///< heard
+  Health own_health_ = Health::kInitializing;  ///< that the state says of itself
+  Health health_ = Health::kInitializing;      ///< of the verdict, told last
+  bool supervised_ = true, states_stopped_ = false;
+  Troubles told_;
+  std::uint64_t number_ = 0;                         ///< of the newest state taken
+  std::uint32_t reasons_ = 0, trouble_changes_ = 0;  ///< told
+  std::uint64_t frames_ = 0;                         ///< heard
+  Stamp state_came_;
   Stamp heard_;
   Stamp next_obstacles_;
   Stamp next_reasons_;
@@ -248,15 +331,22 @@ class AutopilotThread::Work {
 
 AutopilotThread::AutopilotThread(LiveOutlet& outlet, const AutopilotThreadOptions& options)
     : work_(std::make_unique<Work>(outlet, options)) {}
-AutopilotThread::~AutopilotThread() = default;
+AutopilotThread::~AutopilotThread() {
+  // A thread that is left behind goes on using it.
+  if (!work_->end()) static_cast<void>(work_.release());
+}
+
+const Heartbeat& AutopilotThread::heart() const { return work_->heart(); }
 
 bool AutopilotThread::drainEvents(const std::function<void(Stamp, const std::string&)>& take) {
   return work_->drainEvents(take);
 }
 
 nlohmann::ordered_json AutopilotThread::finish() {
-  work_->end();
-  return work_->json();
+  static_cast<void>(work_->end());
+  nlohmann::ordered_json json = work_->json();
+  if (!work_->fault().empty()) json["fault"] = work_->fault();
+  return json;
 }
 
 }  // namespace swiftlet

@@ -4,10 +4,12 @@
 // It reads a LiveOutlet, steps an AutopilotLink and sends what that says; nobody waits for it and it waits
 // for nobody: a port that takes no bytes loses them, counted and noted with the remedy. Its priority is that
 // of the mesh: below the flight path, above all that may take long, so that a pose does not age while a
-// planner computes. Beside poses go obstacles (10 Hz), and texts: each reason not to arm when it comes and
-// every 30 s, that all is ready, every change of health. A serial port that is unplugged is looked for five
-// times a second; it and an autopilot that says nothing for 3 s are told to the log, with the remedy.
-// Clock: CLOCK_MONOTONIC. Stamps of a log are moved there by the one difference that its player knows.
+// planner computes. Beside poses go obstacles (10 Hz), and texts of the supervisor's verdict: each reason not
+// to arm when it comes and every 30 s, that all is ready, every change of health, who is late or lost and
+// recovers; and, of its own, that states stop and that the supervisor does. From its second turn on it
+// allocates nothing and takes no lock. A serial port that is unplugged is looked for five times a second; it
+// and an autopilot that says nothing for 3 s are told to the log, with the remedy. Clock: CLOCK_MONOTONIC.
+// Stamps of a log are moved there by the one difference that its player knows.
 
 #include <functional>
 #include <memory>
@@ -18,6 +20,7 @@
 #include "drivers/mavlink/autopilot_link.hpp"
 #include "firmware_host/pipeline/live_outlet.hpp"
 #include "firmware_host/settings/device_settings.hpp"
+#include "firmware_host/supervisor/heartbeat.hpp"
 
 namespace swiftlet {
 
@@ -37,14 +40,16 @@ class AutopilotThread {
  public:
   /// Opens the port and begins. InputError naming the setting where it does not open. `outlet` outlives it.
   AutopilotThread(LiveOutlet& outlet, const AutopilotThreadOptions& options);
-  /// Sends nothing more, and ends.
+  /// Sends nothing more, and ends; a thread that is stuck is left behind: `outlet` has to stay then.
   ~AutopilotThread();
   AutopilotThread(const AutopilotThread&) = delete;
   AutopilotThread& operator=(const AutopilotThread&) = delete;
 
   /// What happened to the port since the last call; any one thread.
   bool drainEvents(const std::function<void(Stamp, const std::string&)>& take);
-  /// Ends it, and gives what it counted, for the summary.
+  /// For the supervisor; as long as this object.
+  [[nodiscard]] const Heartbeat& heart() const;
+  /// Ends it, and gives what it counted, for the summary; `fault`: why it ended before, or that it is stuck.
   nlohmann::ordered_json finish();
 
  private:

@@ -4,9 +4,12 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/dds/dds_link.hpp"
+#include "drivers/device/monotonic_now.hpp"
 #include "firmware_host/export/ros_state.hpp"
 #include "firmware_host/pipeline/follower_thread.hpp"
 #include "firmware_host/report/map_files.hpp"
@@ -31,6 +34,9 @@ std::uint8_t levelOf(Health health) {
   if (health == Health::kGood) return 0;
   return health == Health::kFailed ? 2 : 1;
 }
+
+/// diagnostic_msgs/DiagnosticStatus: STALE.
+constexpr std::uint8_t kStaleLevel = 3;
 
 /// Lets through once a period.
 struct Pace {
@@ -62,7 +68,10 @@ class DdsThread::Work {
     thread_.start(thread, "settings", "ros2.enabled", [this] { run(); });
   }
 
-  void end() { thread_.end(); }
+  /// False: the thread is stuck and was left behind, with all of this.
+  bool end() { return thread_.end(); }
+  [[nodiscard]] const Heartbeat& heart() const { return thread_.heart(); }
+  [[nodiscard]] const std::string& fault() const { return thread_.fault(); }
   [[nodiscard]] nlohmann::ordered_json json() const {
     const DdsCounters link = link_.counters();
     nlohmann::ordered_json json = {{"odometry", odometries_}, {"meshes", meshes_},
@@ -124,28 +133,69 @@ class DdsThread::Work {
     link_.publish(transforms);
   }
 
+  /// At once when something changes and each second, whether or not frames come.
   void publishDiagnostics(double now) {
-    if (outlet_.frame.refresh() == 0) return;
-    const FrameNews& news = outlet_.frame.value();
-    const bool changed = news.health != health_;
+    const Stamp host = monotonicNow();
+    const bool judged = outlet_.verdict.refresh() > 0;
+    const Verdict& verdict = outlet_.verdict.value();
+    const bool stale = judged && verdict.stale(host) && !verdict.ending;
+    const bool any_frame = outlet_.frame.refresh() > 0;
+    if (!judged && !any_frame) return;
+    const Told told = {judged ? verdict.health : outlet_.frame.value().health, stale, verdict.trouble_changes,
+                       verdict.arming_changes};
+    const bool changed = told_ != told;
     if (!changed && !diagnostics_pace_.due(now)) return;
-    health_ = news.health;
+    told_ = told;
+    const FrameNews& news = outlet_.frame.value();
     DdsStatus status;
-    status.level = levelOf(news.health);
     status.name = "swiftlet/health";
-    status.message = std::string(healthName(news.health));
-    if (!news.has_state) status.message += std::string(", waits for ") + news.waiting_for;
+    status.level = stale ? kStaleLevel : levelOf(told.health);
+    status.message =
+        stale ? "the supervisor has stopped: health unknown" : std::string(healthName(told.health));
+    if (!news.has_state)
+      status.message += std::string(", waits for ") + (any_frame ? news.waiting_for : "images");
+    if (judged && !stale) {
+      for (const Trouble& trouble : verdict.troubles) {
+        status.message += fmt::format("; {} is {}", trouble.name(), conditionName(trouble.condition));
+      }
+      status.values.push_back({"ready_to_arm", verdict.arming.ready() ? "1" : "0"});
+      for (const MissingCondition& missing : verdict.arming.missing) {
+        status.values.push_back({std::string("not_ready/") + missing.name(), missing.text.data()});
+      }
+      for (const Trouble& trouble : verdict.troubles) {
+        status.values.push_back(
+            {fmt::format("{}/{}", conditionName(trouble.condition), trouble.name()),
+             fmt::format("{}; since {:.1f} s", trouble.text.data(), (host - trouble.since).seconds())});
+      }
+    }
+    if (any_frame) addFigures(news, status);
+    status.values.push_back({"dds_refused", std::to_string(link_.counters().refused)});
+    link_.publish(ros(stampOfNow(host)), {&status, 1});
+  }
+
+  /// On the run's clock: the newest frame's stamp, carried on by the host's while none comes.
+  Stamp stampOfNow(Stamp host) {
+    if (outlet_.frame.sequence() == 0) return host;
+    if (outlet_.frame.sequence() != frame_) {
+      frame_ = outlet_.frame.sequence();
+      frame_came_ = host;
+    }
+    return outlet_.frame.value().stamp + (host - frame_came_);
+  }
+
+  static void addFigures(const FrameNews& news, DdsStatus& status) {
     const FrameStatistics& figures = news.statistics;
-    status.values = {{"epoch", std::to_string(news.epoch)},
-                     {"at_rest", figures.at_rest ? "1" : "0"},
-                     {"tracks", std::to_string(figures.tracks)},
-                     {"landmarks", std::to_string(figures.landmarks)},
-                     {"inliers_mono", std::to_string(figures.inliers_mono)},
-                     {"inliers_stereo", std::to_string(figures.inliers_stereo)},
-                     {"reprojection_rms", fmt::format("{:.4f}", figures.reprojection_rms)},
-                     {"imu_residual", fmt::format("{:.4f}", figures.imu_residual)},
-                     {"dds_refused", std::to_string(link_.counters().refused)}};
-    link_.publish(ros(news.stamp), {&status, 1});
+    const auto add = [&status](const char* key, std::string value) {
+      status.values.push_back({key, std::move(value)});
+    };
+    add("epoch", std::to_string(news.epoch));
+    add("at_rest", figures.at_rest ? "1" : "0");
+    add("tracks", std::to_string(figures.tracks));
+    add("landmarks", std::to_string(figures.landmarks));
+    add("inliers_mono", std::to_string(figures.inliers_mono));
+    add("inliers_stereo", std::to_string(figures.inliers_stereo));
+    add("reprojection_rms", fmt::format("{:.4f}", figures.reprojection_rms));
+    add("imu_residual", fmt::format("{:.4f}", figures.imu_residual));
   }
 
   void publishMesh() {
@@ -202,7 +252,16 @@ class DdsThread::Work {
   Pace mesh_pace_;
   Pace surface_pace_{kSurfacePeriod};
   Pace diagnostics_pace_{kDiagnosticsPeriod};
-  Health health_ = Health::kFailed;
+  /// What diagnostics told last.
+  struct Told {
+    Health health = Health::kInitializing;
+    bool stale = false;
+    std::uint32_t troubles = 0, arming = 0;
+    bool operator==(const Told&) const = default;
+  };
+  std::optional<Told> told_;
+  std::uint64_t frame_ = 0;  ///< the newest that diagnostics saw
+  Stamp frame_came_;
   std::uint64_t state_ = 0, mesh_ = 0, surface_ = 0;          ///< numbers taken
   std::uint64_t odometries_ = 0, meshes_ = 0, surfaces_ = 0;  ///< published
   std::vector<Eigen::Vector3f> points_, colours_;
@@ -213,11 +272,18 @@ class DdsThread::Work {
 
 DdsThread::DdsThread(LiveOutlet& outlet, const DdsThreadOptions& options)
     : work_(std::make_unique<Work>(outlet, options)) {}
-DdsThread::~DdsThread() = default;
+DdsThread::~DdsThread() {
+  // A thread that is left behind goes on using it.
+  if (!work_->end()) static_cast<void>(work_.release());
+}
+
+const Heartbeat& DdsThread::heart() const { return work_->heart(); }
 
 nlohmann::ordered_json DdsThread::finish() {
-  work_->end();
-  return work_->json();
+  static_cast<void>(work_->end());
+  nlohmann::ordered_json json = work_->json();
+  if (!work_->fault().empty()) json["fault"] = work_->fault();
+  return json;
 }
 
 }  // namespace swiftlet

@@ -9,6 +9,7 @@
 #include "firmware_host/pipeline/label_exchange.hpp"
 #include "firmware_host/pipeline/live_outlet.hpp"
 #include "firmware_host/settings/device_settings.hpp"
+#include "firmware_host/supervisor/heartbeat.hpp"
 
 namespace swiftlet {
 
@@ -24,12 +25,14 @@ class DdsThread {
  public:
   /// Opens and begins. InputError naming the setting where DDS does not open. `outlet` outlives it.
   DdsThread(LiveOutlet& outlet, const DdsThreadOptions& options);
-  /// Publishes nothing more, and ends.
+  /// Publishes nothing more, and ends; a thread that is stuck is left behind: `outlet` has to stay then.
   ~DdsThread();
   DdsThread(const DdsThread&) = delete;
   DdsThread& operator=(const DdsThread&) = delete;
 
-  /// Ends it, and gives what it counted, for the summary.
+  /// For the supervisor; as long as this object.
+  [[nodiscard]] const Heartbeat& heart() const;
+  /// Ends it, and gives what it counted, for the summary; `fault`: why it ended before, or that it is stuck.
   nlohmann::ordered_json finish();
 
  private:

@@ -1,5 +1,7 @@
 #include "firmware_host/pipeline/follower_thread.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -11,18 +13,31 @@ namespace swiftlet {
 
 void FollowerThread::start(const ThreadSettings& settings, const std::string& file, const std::string& field,
                            std::function<void()> entry) {
-  const ThreadReport report = thread_.start(settings, std::move(entry));
+  name_ = settings.name;
+  const ThreadReport report =
+      thread_.start(settings, [this, entry = std::move(entry)] { runBeating(heart_, entry); });
   if (!report.started) throw InputError(file, 0, field, report.message, "");
 }
 
-void FollowerThread::end() {
+bool FollowerThread::end(Duration limit) {
   ending_.store(true, std::memory_order_relaxed);
-  thread_.join();
+  if (abandoned_) return false;
+  if (thread_.joinWithin(limit)) {
+    if (fault_.empty()) fault_ = thread_.fault();
+    return true;
+  }
+  abandoned_ = true;
+  fault_ =
+      fmt::format("thread {} did not end within {:.1f} s and was left behind{}{}", name_, limit.seconds(),
+                  *heart_.read().doing == '\0' ? "" : ", last seen at: ", heart_.read().doing);
+  thread_.abandon();
+  return false;
 }
 
-void FollowerThread::repeat(double period, const std::function<void(double now)>& turn) const {
+void FollowerThread::repeat(double period, const std::function<void(double now)>& turn) {
   double next = wallSeconds();
   while (!ending()) {
+    heart_.beat();
     const double now = wallSeconds();
     turn(now);
     next = std::max(next + period, now);

@@ -1,36 +1,53 @@
 #pragma once
-// A thread beside a run that follows it at its own pace: who reads a LiveOutlet.
+// A thread beside a run that follows it at its own pace: who reads a LiveOutlet. It beats at each turn.
 //
-// Ends when it is told to, or with this object: to be declared after all that its entry uses.
+// To be declared after all that its entry uses. Whoever owns it calls end(); where that gives the thread up,
+// all that the entry uses has to stay for good, this object included: the owner leaks it on purpose.
 
 #include <atomic>
 #include <functional>
 #include <string>
 
+#include "estimator/core/stamp.hpp"
 #include "firmware_host/realtime/flight_thread.hpp"
+#include "firmware_host/supervisor/heartbeat.hpp"
 
 namespace swiftlet {
 
 class FollowerThread {
  public:
+  /// A run's end takes 2 s at most, with three followers and the run's own threads.
+  static constexpr Duration kLongestEnd = Duration::fromMilliseconds(400);
+
   FollowerThread() = default;
-  ~FollowerThread() { end(); }
+  ~FollowerThread() { static_cast<void>(end()); }
   FollowerThread(const FollowerThread&) = delete;
   FollowerThread& operator=(const FollowerThread&) = delete;
 
   /// InputError of `file` and `field`, which asked for it, where there is no thread.
   void start(const ThreadSettings& settings, const std::string& file, const std::string& field,
              std::function<void()> entry);
-  /// Waits for the entry to return, which looks at ending().
-  void end();
+  /// Waits for the entry to return, which looks at ending(). False: it did not within `limit` and is given
+  /// up, now or by an earlier call.
+  [[nodiscard]] bool end(Duration limit = kLongestEnd);
   [[nodiscard]] bool ending() const { return ending_.load(std::memory_order_relaxed); }
+
+  /// Of the entry, at each turn; of the supervisor.
+  [[nodiscard]] Heartbeat& heart() { return heart_; }
+  [[nodiscard]] const Heartbeat& heart() const { return heart_; }
+  /// After end(): why it ended before it was told to, or that it was given up; empty: all in order.
+  [[nodiscard]] const std::string& fault() const { return fault_; }
 
   /// For the entry: `turn(now)` every `period` seconds of the host's clock, until it is to end. A thread that
   /// came late does not hurry after.
-  void repeat(double period, const std::function<void(double now)>& turn) const;
+  void repeat(double period, const std::function<void(double now)>& turn);
 
  private:
   std::atomic<bool> ending_{false};
+  bool abandoned_ = false;
+  Heartbeat heart_;
+  std::string name_;
+  std::string fault_;
   FlightThread thread_;
 };
 

@@ -1,7 +1,6 @@
 #pragma once
 // The newest of what a run finds, for one thread outside of the wiring (ROS 2's topics, an autopilot, the
-// live view): it takes what is newest at its own pace and nobody waits for it. Written where Wiring::Options
-// names it. Memory: three of each value.
+// live view): it takes what is newest at its own pace and nobody waits for it. Memory: three of each value.
 
 #include <atomic>
 #include <cstdint>
@@ -12,7 +11,7 @@
 #include "estimator/messages/local_mesh.hpp"
 #include "estimator/messages/odometry_output.hpp"
 #include "firmware_host/pipeline/state_news.hpp"
-#include "firmware_host/realtime/ready_to_arm.hpp"
+#include "firmware_host/supervisor/verdict.hpp"
 #include "mapping/loop/loop_report.hpp"
 #include "mapping/surface/surface_patch.hpp"
 
@@ -46,7 +45,7 @@ struct LiveOutlet {
   Newest<MapCorrection> correction;  ///< of `loop`
   Newest<SurfaceNews> surface;       ///< of `map`, each time that surface_wanted is set
   std::atomic<bool> surface_wanted{false};
-  Newest<ArmingVerdict> arming;  ///< of `log`: each time that what is missing changes
+  Newest<Verdict> verdict;  ///< of the supervisor, ten times a second: who reads it asks for its age
 };
 
 /// One for each thread that listens.

@@ -33,6 +33,7 @@
 
 #include <algorithm>
 
+#include "drivers/device/monotonic_now.hpp"
 #include "firmware_host/pipeline/arming_monitor.hpp"
 #include "firmware_host/pipeline/flight_recorder.hpp"
 #include "firmware_host/realtime/memory_lock.hpp"
@@ -316,9 +317,14 @@ void Wiring::watchArming(const FrameResult& result) {
     for (const Camera& camera : camera_) lost += camera.pool.refused(kRecordReads);
   }
   const bool running = recorder_ != nullptr && recorder_->running();
-  if (!arming_->update(result, sensorFacts(), running, lost, wallSeconds())) return;
+  const bool changed = arming_->update(result, sensorFacts(), running, lost, wallSeconds());
   const ArmingVerdict& verdict = arming_->verdict();
-  for (LiveOutlet* outlet : outlets_) outlet->arming.write(verdict);
+  told_.evaluated = monotonicNow();
+  told_.health = result.output.state.health;
+  told_.arming = verdict;
+  if (changed) ++told_.arming_changes;
+  for (LiveOutlet* outlet : outlets_) outlet->verdict.write(told_);
+  if (!changed) return;
   std::string text = verdict.ready() ? "ready to arm" : "not ready to arm:";
   for (const MissingCondition& missing : verdict.missing) {
     text += std::string(" ") + missing.name() + " (" + missing.text.data() + ")";

@@ -264,6 +264,7 @@ class Wiring {
   RunLog& log_;
   FlightRecorder* recorder_;
   ArmingMonitor* arming_;
+  Verdict told_;
   LiveOutlets outlets_;
   ConstantEffort full_effort_;
   EffortSource* track_effort_;

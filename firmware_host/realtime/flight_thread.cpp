@@ -111,7 +111,7 @@ int FlightThread::create(const ThreadSettings& settings, bool fifo, bool pinned)
   pthread_attr_t attributes;
   if (const int error = pthread_attr_init(&attributes); error != 0) return error;
   const sched_param priority{.sched_priority = fifo ? settings.priority : 0};
-  int error = pthread_attr_setstack(&attributes, stack_.low(), stack_.bytes());
+  int error = pthread_attr_setstack(&attributes, core_->stack.low(), core_->stack.bytes());
   // Explicit: a thread made by a real-time one would inherit its priority.
   if (error == 0) error = pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
   if (error == 0) error = pthread_attr_setschedpolicy(&attributes, fifo ? SCHED_FIFO : SCHED_OTHER);
@@ -122,7 +122,7 @@ int FlightThread::create(const ThreadSettings& settings, bool fifo, bool pinned)
     CPU_SET(static_cast<std::size_t>(settings.cpu), &set);
     error = pthread_attr_setaffinity_np(&attributes, sizeof set, &set);
   }
-  if (error == 0) error = pthread_create(&thread_, &attributes, &FlightThread::run, this);
+  if (error == 0) error = pthread_create(&thread_, &attributes, &FlightThread::run, core_.get());
   pthread_attr_destroy(&attributes);
   return error;
 }
@@ -148,16 +148,16 @@ ThreadReport FlightThread::start(const ThreadSettings& settings, std::function<v
   }
   bool pinned = settings.cpu >= 0 && settings.cpu < CPU_SETSIZE;
   if (settings.cpu >= CPU_SETSIZE) say(fmt::format("there is no CPU {}: it runs on any", settings.cpu));
-  if (!stack_.reserve(settings.stack_bytes)) {
+  core_ = std::make_unique<Core>();
+  if (!core_->stack.reserve(settings.stack_bytes)) {
     say(fmt::format("no memory for a stack of {} bytes ({}): lower it or raise RLIMIT_MEMLOCK (`ulimit -l`)",
                     settings.stack_bytes, errorText(errno)));
     return report;
   }
-  entry_ = std::move(entry);
+  core_->entry = std::move(entry);
+  core_->name = report.name;
   fault_.clear();
   stack_used_ = 0;
-  name_ = report.name;
-  begun_.store(false, std::memory_order_relaxed);
 
   int error = create(settings, fifo, pinned);
   // One wish after the other is given up, whichever the kernel refuses first.
@@ -175,52 +175,68 @@ ThreadReport FlightThread::start(const ThreadSettings& settings, std::function<v
   }
   if (error != 0) {
     say(fmt::format("the thread cannot be made ({})", errorText(error)));
-    entry_ = nullptr;
+    core_.reset();
     return report;
   }
   joinable_ = true;
-  begun_.wait(false, std::memory_order_acquire);
+  core_->begun.wait(false, std::memory_order_acquire);
   report.started = true;
-  report.actual_policy = seen_.actual_policy;
-  report.actual_priority = seen_.actual_priority;
-  report.actual_cpus = seen_.actual_cpus;
-  report.stack_bytes = stack_.bytes();
+  report.actual_policy = core_->seen.actual_policy;
+  report.actual_priority = core_->seen.actual_priority;
+  report.actual_cpus = core_->seen.actual_cpus;
+  report.stack_bytes = core_->stack.bytes();
   return report;
 }
 
-void* FlightThread::run(void* self) {
-  static_cast<FlightThread*>(self)->begin();
+void* FlightThread::run(void* core) {
+  begin(*static_cast<Core*>(core));
   return nullptr;
 }
 
-void FlightThread::begin() {
-  pthread_setname_np(pthread_self(), name_.c_str());
+void FlightThread::begin(Core& core) {
+  pthread_setname_np(pthread_self(), core.name.c_str());
   constexpr unsigned long kExactSleeps = 1;  // ns
   prctl(PR_SET_TIMERSLACK, kExactSleeps, 0, 0, 0);
   int policy = 0;
   sched_param priority{};
   pthread_getschedparam(pthread_self(), &policy, &priority);
-  seen_.actual_policy = policyOf(policy);
-  seen_.actual_priority = priority.sched_priority;
-  seen_.actual_cpus = allowedCpus();
-  begun_.store(true, std::memory_order_release);
-  begun_.notify_one();
+  core.seen.actual_policy = policyOf(policy);
+  core.seen.actual_priority = priority.sched_priority;
+  core.seen.actual_cpus = allowedCpus();
+  core.begun.store(true, std::memory_order_release);
+  core.begun.notify_one();
   try {
-    entry_();
+    core.entry();
   } catch (const std::exception& error) {
-    fault_ = *error.what() == '\0' ? "an exception without text" : error.what();
+    core.fault = *error.what() == '\0' ? "an exception without text" : error.what();
   } catch (...) {
-    fault_ = "something that is no std::exception was thrown";
+    core.fault = "something that is no std::exception was thrown";
   }
+  core.ended.ring();
+}
+
+bool FlightThread::joinWithin(Duration limit) {
+  if (!joinable_) return true;
+  if (!core_->ended.wait(0, limit)) return false;
+  join();
+  return true;
 }
 
 void FlightThread::join() {
   if (!joinable_) return;
   pthread_join(thread_, nullptr);
   joinable_ = false;
-  entry_ = nullptr;
-  stack_used_ = stack_.used();
-  stack_.release();
+  fault_ = std::move(core_->fault);
+  stack_used_ = core_->stack.used();
+  core_.reset();
+}
+
+void FlightThread::abandon() {
+  if (!joinable_) return;
+  pthread_detach(thread_);
+  joinable_ = false;
+  // Leaked on purpose: the thread may go on at any time.
+  static_cast<void>(core_.release());
 }
 
 }  // namespace swiftlet

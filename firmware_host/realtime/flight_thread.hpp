@@ -10,15 +10,22 @@
 //   thread begins: every page is resident then, and after the thread's end the deepest use can be read.
 // Exceptions: what escapes from `entry` ends the thread and is kept as text (fault()); nothing crosses.
 // Sleeps are exact: the thread's timer slack is 1 ns (SCHED_OTHER would have 50 us).
+// Stuck: joinWithin() waits for a bounded time, and abandon() leaves the thread to itself: its stack and
+// entry
+//   stay for good. What the entry refers to has to stay as well; that is the owner's matter.
 
 #include <pthread.h>
 
 #include <atomic>
 #include <cstddef>
 #include <functional>
+#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
+
+#include "estimator/core/stamp.hpp"
+#include "firmware_host/realtime/doorbell.hpp"
 
 namespace swiftlet {
 
@@ -68,7 +75,7 @@ std::string describe(const ThreadReport& report);
 class FlightThread {
  public:
   FlightThread() = default;
-  /// Joins: whoever owns the thread has told it to end before.
+  /// Joins, unless it was abandoned: whoever owns the thread has told it to end before.
   ~FlightThread();
   FlightThread(const FlightThread&) = delete;
   FlightThread& operator=(const FlightThread&) = delete;
@@ -78,6 +85,10 @@ class FlightThread {
   ThreadReport start(const ThreadSettings& settings, std::function<void()> entry);
   /// Waits for the end; nothing when there is no thread.
   void join();
+  /// Waits for the end, at most `limit`; false: it still runs. True when there is no thread.
+  [[nodiscard]] bool joinWithin(Duration limit);
+  /// Gives a thread up that does not end; nothing when there is none.
+  void abandon();
 
   [[nodiscard]] bool joinable() const { return joinable_; }
   /// After join: what() of the exception that ended the thread; empty: it returned.
@@ -103,18 +114,25 @@ class FlightThread {
     std::size_t guard_ = 0;
   };
 
-  static void* run(void* self);
-  void begin();
+  /// What the thread itself uses: it outlives this object where the thread is abandoned.
+  struct Core {
+    Stack stack;
+    std::function<void()> entry;
+    std::string fault;
+    std::string name;
+    ThreadReport seen;  ///< what the thread found of itself as it began
+    std::atomic<bool> begun{false};
+    Doorbell ended;  ///< rung by the thread's last step
+  };
+
+  static void* run(void* core);
+  static void begin(Core& core);
   int create(const ThreadSettings& settings, bool fifo, bool pinned);
 
-  Stack stack_;
-  std::function<void()> entry_;
-  std::string fault_;
-  std::string name_;
-  ThreadReport seen_;  ///< what the thread found of itself as it began
+  std::unique_ptr<Core> core_;
   pthread_t thread_{};
-  std::atomic<bool> begun_{false};
   bool joinable_ = false;
+  std::string fault_;
   std::size_t stack_used_ = 0;
 };
 

@@ -25,6 +25,7 @@ constexpr double kMilli = 1e3;
 constexpr double kMeshPeriod = 0.4;   // s
 constexpr double kSurfacePeriod = 3;  // s
 constexpr int kPatchesBetweenTables = 5;
+constexpr const char* kUnsupervised = "the supervisor has stopped: health unknown";
 
 /// Columns of the states' table.
 enum State : std::size_t {
@@ -129,7 +130,7 @@ void LiveDocument::sample(LiveOutlet& outlet, double now, bool watched) {
   now_ = now;
   takeFrame(outlet);
   takeState(outlet, now);
-  takeArming(outlet);
+  takeVerdict(outlet, now);
   if (!watched) return;
   if (now - mesh_came_ >= kMeshPeriod) takeMesh(outlet);
   takeSurface(outlet, now);
@@ -227,15 +228,43 @@ void LiveDocument::takeHealth(double t, Health health, std::uint32_t epoch) {
   note(t, "health_changed", name);
 }
 
-void LiveDocument::takeArming(LiveOutlet& outlet) {
-  const std::uint64_t number = outlet.arming.refresh();
-  if (number == arming_number_) return;
-  arming_number_ = number;
-  arming_ = outlet.arming.value();
-  std::string text = arming_->ready() ? "ready to arm" : "not ready:";
-  for (const MissingCondition& missing : arming_->missing) text += std::string(" ") + missing.name();
-  note(duration_, "arming", std::move(text));
-  patches_to_tables_ = 0;
+void LiveDocument::takeVerdict(LiveOutlet& outlet, double now) {
+  if (outlet.verdict.refresh() == 0) return;
+  const Verdict& verdict = outlet.verdict.value();
+  const bool supervised = verdict.ending || !verdict.stale(Stamp{} + Duration::fromSeconds(now));
+  if (supervised != supervised_) {
+    supervised_ = supervised;
+    note(duration_, "supervisor", supervised ? "the supervisor is back" : kUnsupervised);
+    patches_to_tables_ = 0;
+  }
+  const bool first = !verdict_;
+  const bool arming_changed = first || verdict.arming_changes != verdict_->arming_changes;
+  const bool troubles_changed = verdict.trouble_changes != (first ? 0 : verdict_->trouble_changes);
+  if (troubles_changed) noteTroubles(verdict);
+  if (arming_changed) {
+    std::string text = verdict.arming.ready() ? "ready to arm" : "not ready:";
+    for (const MissingCondition& missing : verdict.arming.missing) text += std::string(" ") + missing.name();
+    note(duration_, "arming", std::move(text));
+  }
+  if (arming_changed || troubles_changed) patches_to_tables_ = 0;
+  verdict_ = verdict;
+}
+
+void LiveDocument::noteTroubles(const Verdict& verdict) {
+  for (const Trouble& trouble : verdict.troubles) {
+    const bool known = verdict_ && std::ranges::any_of(verdict_->troubles, [&](const Trouble& before) {
+                         return before.sameAs(trouble);
+                       });
+    if (known) continue;
+    note(duration_, "supervisor",
+         fmt::format("{} is {}: {}", trouble.name(), conditionName(trouble.condition), trouble.text.data()));
+  }
+  if (!verdict_) return;
+  for (const Trouble& before : verdict_->troubles) {
+    const bool stands = std::ranges::any_of(
+        verdict.troubles, [&](const Trouble& trouble) { return trouble.row == before.row; });
+    if (!stands) note(duration_, "supervisor", fmt::format("{} has recovered", before.name()));
+  }
 }
 
 void LiveDocument::takeMesh(LiveOutlet& outlet) {
@@ -327,9 +356,15 @@ Json LiveDocument::poseJson() const {
   return {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
 }
 
+Json LiveDocument::healthJson() const {
+  if (!supervised_) return "unknown";
+  if (verdict_) return healthName(verdict_->health);
+  return spans_.empty() ? Json("nothing yet") : spans_.back()["health"];
+}
+
 Json LiveDocument::liveJson() const {
   Json json = {{"t", duration_},
-               {"health", spans_.empty() ? Json("nothing yet") : spans_.back()["health"]},
+               {"health", healthJson()},
                {"epoch", spans_.empty() ? Json(nullptr) : spans_.back()["epoch"]},
                {"waiting_for", waiting_for_},
                {"frames", frame_number_},
@@ -342,21 +377,31 @@ Json LiveDocument::liveJson() const {
     json["speed"] = state.v_world_body.norm();
   }
   if (frame_) json["at_rest"] = frame_->statistics.at_rest;
-  if (arming_) json["arming"] = toJson(*arming_);
+  if (!supervised_) json["unsupervised"] = kUnsupervised;
+  if (verdict_ && supervised_) json.update(toJson(*verdict_));
   return json;
 }
 
 Json LiveDocument::tablesJson() const {
   Json rows = Json::array();
-  if (!arming_) rows.push_back(Json::array({"nothing known yet", "", ""}));
-  if (arming_ && arming_->ready()) rows.push_back(Json::array({"ready to arm", "", ""}));
-  if (arming_) {
-    for (const MissingCondition& missing : arming_->missing) {
+  Json troubles = Json::array();
+  if (!verdict_) rows.push_back(Json::array({"nothing known yet", "", ""}));
+  if (!supervised_) {
+    rows.push_back(Json::array({"unknown", kUnsupervised, "look into events.log, start the program again"}));
+  } else if (verdict_) {
+    if (verdict_->arming.ready()) rows.push_back(Json::array({"ready to arm", "", ""}));
+    for (const MissingCondition& missing : verdict_->arming.missing) {
       rows.push_back(Json::array({missing.name(), missing.text.data(), missing.remedy}));
+    }
+    for (const Trouble& trouble : verdict_->troubles) {
+      troubles.push_back(
+          Json::array({trouble.name(), conditionName(trouble.condition), trouble.text.data()}));
     }
   }
   Json tables = Json::array();
   tables.push_back(table("arming", "Arming", {"condition", "what is missing", "remedy"}, rows));
+  tables.push_back(
+      table("supervision", "Threads and sensors at fault", {"name", "condition", "why"}, troubles));
   const auto ms = [](double seconds) { return fmt::format("{:.2f}", seconds * kMilli); };
   tables.push_back(
       table("latency", "Image's arrival to its pose, wall time [ms]", {"frames seen", "50 %", "99 %", "most"},
@@ -444,7 +489,15 @@ std::string LiveDocument::text() const {
     text += fmt::format("latency   {:.1f} ms from image to pose, 99 % {:.1f} ms\n",
                         frame_->since_arrival * kMilli, latency_.percentile(0.99) * kMilli);
   }
-  if (arming_) text += describe(*arming_) + "\n";
+  if (!supervised_) {
+    text += std::string(kUnsupervised) + "\n";
+  } else if (verdict_) {
+    for (const Trouble& trouble : verdict_->troubles) {
+      text += fmt::format("{} is {}: {}\n", trouble.name(), conditionName(trouble.condition),
+                          trouble.text.data());
+    }
+    text += describe(verdict_->arming) + "\n";
+  }
   return text;
 }
 

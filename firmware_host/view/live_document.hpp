@@ -60,12 +60,14 @@ class LiveDocument {
   void takeFrame(LiveOutlet& outlet);
   void takeState(LiveOutlet& outlet, double now);
   void takeHealth(double t, Health health, std::uint32_t epoch);
-  void takeArming(LiveOutlet& outlet);
+  void takeVerdict(LiveOutlet& outlet, double now);
+  void noteTroubles(const Verdict& verdict);
   void takeMesh(LiveOutlet& outlet);
   void takeSurface(LiveOutlet& outlet, double now);
   void note(double t, const char* name, std::string text);
   [[nodiscard]] Json plotJson(const PlotPlan& plan, bool whole) const;
   [[nodiscard]] Json trajectoryJson(bool whole) const;
+  [[nodiscard]] Json healthJson() const;
   [[nodiscard]] Json liveJson() const;
   [[nodiscard]] Json tablesJson() const;
   [[nodiscard]] Json poseJson() const;
@@ -78,8 +80,7 @@ class LiveDocument {
   double duration_ = 0;
   std::uint64_t sequence_ = 0;
 
-  std::uint64_t frame_number_ = 0, state_number_ = 0, arming_number_ = 0, mesh_number_ = 0,
-                surface_number_ = 0;
+  std::uint64_t frame_number_ = 0, state_number_ = 0, mesh_number_ = 0, surface_number_ = 0;
   std::optional<FrameNews> frame_;
   std::optional<NavState> state_;
   double now_ = 0, state_came_ = 0, mesh_came_ = -1e9, surface_asked_ = -1e9;
@@ -89,7 +90,8 @@ class LiveDocument {
   bool spans_changed_ = false;
   std::deque<Json> events_;
   std::size_t unsent_events_ = 0;
-  std::optional<ArmingVerdict> arming_;
+  std::optional<Verdict> verdict_;
+  bool supervised_ = true;  ///< the verdict is not stale
   std::string waiting_for_;
   Json mesh_, cloud_;  ///< null: none yet
   bool mesh_changed_ = false, cloud_changed_ = false;

@@ -67,10 +67,14 @@ class ViewThread::Work {
     thread_.start(settings, "--view", "", [this] { run(); });
   }
 
-  void end() {
-    thread_.end();
+  /// False: the thread is stuck and was left behind, with all of this.
+  bool end() {
+    if (!thread_.end()) return false;
     server_.reset();
+    return true;
   }
+  [[nodiscard]] const Heartbeat& heart() const { return thread_.heart(); }
+  [[nodiscard]] const std::string& fault() const { return thread_.fault(); }
   [[nodiscard]] const ViewAddress& address() const { return address_; }
   [[nodiscard]] nlohmann::ordered_json json() const {
     nlohmann::ordered_json json = {{"address", address_.text()}};
@@ -117,13 +121,20 @@ class ViewThread::Work {
 
 ViewThread::ViewThread(LiveOutlet& outlet, const ViewAddress& address, const std::string& name)
     : work_(std::make_unique<Work>(outlet, address, name)) {}
-ViewThread::~ViewThread() = default;
+ViewThread::~ViewThread() {
+  // A thread that is left behind goes on using it.
+  if (!work_->end()) static_cast<void>(work_.release());
+}
+
+const Heartbeat& ViewThread::heart() const { return work_->heart(); }
 
 std::string ViewThread::url() const { return "http://" + work_->address().text() + "/"; }
 
 nlohmann::ordered_json ViewThread::finish() {
-  work_->end();
-  return work_->json();
+  static_cast<void>(work_->end());
+  nlohmann::ordered_json json = work_->json();
+  if (!work_->fault().empty()) json["fault"] = work_->fault();
+  return json;
 }
 
 }  // namespace swiftlet

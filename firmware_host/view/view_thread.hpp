@@ -8,6 +8,7 @@
 #include <string>
 
 #include "firmware_host/pipeline/live_outlet.hpp"
+#include "firmware_host/supervisor/heartbeat.hpp"
 #include "firmware_host/view/view_address.hpp"
 
 namespace swiftlet {
@@ -17,14 +18,17 @@ class ViewThread {
   /// Listens and begins. InputError naming --view where the address cannot be had. `outlet` outlives it.
   /// `name`: what the page calls the run.
   ViewThread(LiveOutlet& outlet, const ViewAddress& address, const std::string& name);
-  /// Tells the viewers of the end, and ends: within a second.
+  /// Tells the viewers of the end, and ends: within a second. A thread that is stuck is left behind: `outlet`
+  /// has to stay then.
   ~ViewThread();
   ViewThread(const ViewThread&) = delete;
   ViewThread& operator=(const ViewThread&) = delete;
 
   /// "http://127.0.0.1:8320/", with the port that it has got.
   [[nodiscard]] std::string url() const;
-  /// Ends it, and gives what it counted, for the summary.
+  /// For the supervisor; as long as this object.
+  [[nodiscard]] const Heartbeat& heart() const;
+  /// Ends it, and gives what it counted, for the summary; `fault`: why it ended before, or that it is stuck.
   nlohmann::ordered_json finish();
 
  private:

@@ -7,11 +7,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "firmware_host/realtime/flight_thread.hpp"
@@ -176,6 +179,35 @@ TEST_CASE("no exception crosses the thread") {
   REQUIRE(thread.start({"returns", 0, -1, kStack}, [] {}).started);
   thread.join();
   CHECK(thread.fault().empty());
+}
+
+TEST_CASE("a thread that does not end is given up, and may end later") {
+  // Not of this function: the thread outlives it.
+  static std::atomic<bool> go{false}, gone{false};
+  {
+    FlightThread thread;
+    CHECK(thread.joinWithin(Duration{}));
+    REQUIRE(thread
+                .start({"stuck", 0, -1, kStack},
+                       [] {
+                         while (!go) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+                         gone = true;
+                       })
+                .started);
+    CHECK_FALSE(thread.joinWithin(Duration::fromMilliseconds(20)));
+    CHECK(thread.joinable());
+    thread.abandon();
+    CHECK_FALSE(thread.joinable());
+    // Free for another.
+    REQUIRE(thread.start({"next", 0, -1, kStack}, [] {}).started);
+    CHECK(thread.joinWithin(Duration::fromMilliseconds(20'000)));
+  }
+  go = true;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (!gone && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  CHECK(gone);
 }
 
 TEST_CASE("a thread is started once at a time") {

@@ -49,6 +49,7 @@ struct Heard {
 /// A vehicle that moves along x at 1 m/s, with states every 5 ms.
 struct Vehicle {
   LiveOutlet outlet;
+  Verdict verdict;
   Stamp begin = monotonicNow();
   Duration clock{};  ///< of the run's stamps before CLOCK_MONOTONIC
 
@@ -59,21 +60,40 @@ struct Vehicle {
     state.health = health;
     state.T_world_body.translation.x() = (now - begin).seconds();
     outlet.state.write({state, Eigen::Vector3d::Zero()});
+    supervise();
+  }
+  /// The verdict as it was, of now.
+  void supervise() {
+    verdict.evaluated = monotonicNow();
+    outlet.verdict.write(verdict);
   }
   void say(const char* what) {
-    ArmingVerdict verdict;
+    verdict.arming = {};
     if (*what != 0) {
       MissingCondition missing;
       missing.condition = ArmingCondition::kSensors;
       std::snprintf(missing.text.data(), missing.text.size(), "%s", what);
-      static_cast<void>(verdict.missing.tryPushBack(missing));
+      static_cast<void>(verdict.arming.missing.tryPushBack(missing));
     }
-    outlet.arming.write(verdict);
+    ++verdict.arming_changes;
+    supervise();
   }
   void tellHealth(Health health) {
-    FrameNews news;
-    news.health = health;
-    outlet.frame.write(news);
+    verdict.health = health;
+    supervise();
+  }
+  /// No other trouble but this; none where `condition` is ok.
+  void tellTrouble(const char* member, Condition condition, const char* text,
+                   Health effect = Health::kDegraded) {
+    verdict.troubles.clear();
+    Trouble trouble;
+    std::snprintf(trouble.member.data(), trouble.member.size(), "%s", member);
+    std::snprintf(trouble.text.data(), trouble.text.size(), "%s", text);
+    trouble.condition = condition;
+    trouble.effect = effect;
+    if (condition != Condition::kOk) static_cast<void>(verdict.troubles.tryPushBack(trouble));
+    ++verdict.trouble_changes;
+    supervise();
   }
 };
 

@@ -90,6 +90,64 @@ TEST_CASE("Degraded, failed and good again are told as autopilots understand the
   CHECK(plug.heard.texts == wanted);
 }
 
+TEST_CASE("Who is late or lost, that states stop, and that the supervisor does, is told in words",
+          "[autopilot]") {
+  Plug plug;
+  Vehicle vehicle;
+  AutopilotThread autopilot(vehicle.outlet, optionsOf(plug.terminal.path()));
+  const auto said = [&](const char* text) { return std::ranges::count(plug.heard.texts, text) > 0; };
+  const auto fly = [&] {
+    vehicle.move();
+    plug.listen();
+  };
+  const auto untilSaid = [&](const char* text, auto&& each) {
+    INFO(text);
+    const Stamp begin = monotonicNow();
+    CHECK(until([&] { return said(text); }, each));
+    return (monotonicNow() - begin).seconds();
+  };
+  vehicle.tellHealth(Health::kGood);
+  untilSaid("swiftlet: good", fly);
+  vehicle.verdict.health = Health::kDegraded;
+  vehicle.tellTrouble("mesh", Condition::kLost, "no memory");
+  untilSaid("swiftlet: mesh is lost: no memory", fly);
+  untilSaid("swiftlet: degraded", fly);
+  // The state calls itself good; what is said of it is the verdict.
+  const std::size_t poses = plug.heard.poses.size();
+  REQUIRE(until([&] { return plug.heard.poses.size() > poses + 5; }, fly));
+  CHECK(plug.heard.poses.back().quality == 40);
+  vehicle.tellTrouble("", Condition::kOk, "");
+  vehicle.tellHealth(Health::kGood);
+  untilSaid("swiftlet: mesh has recovered", fly);
+
+  const auto stand = [&] {
+    vehicle.supervise();
+    plug.listen();
+  };
+  untilSaid("swiftlet: no new state for 0.3 s", stand);
+  untilSaid("swiftlet: states come again", fly);
+
+  const auto unsupervised = [&] {
+    NavState state;
+    state.stamp = monotonicNow();
+    state.health = Health::kGood;
+    vehicle.outlet.state.write({state, Eigen::Vector3d::Zero()});
+    plug.listen();
+  };
+  untilSaid("swiftlet: the supervisor has stopped: health unknown", unsupervised);
+  const std::size_t since = plug.heard.poses.size();
+  REQUIRE(until([&] { return plug.heard.poses.size() > since + 5; }, unsupervised));
+  CHECK(plug.heard.poses.back().quality == 40);
+  untilSaid("swiftlet: the supervisor is back", fly);
+
+  // The end of a run is none of these.
+  vehicle.verdict.ending = true;
+  fly();
+  const std::size_t texts = plug.heard.texts.size();
+  pass(0.8, [&] { plug.listen(); });
+  CHECK(plug.heard.texts.size() == texts);
+}
+
 TEST_CASE("Reasons that stand are said again after the period, readiness once", "[autopilot]") {
   Plug plug;
   Vehicle vehicle;
@@ -98,7 +156,10 @@ TEST_CASE("Reasons that stand are said again after the period, readiness once", 
   vehicle.say("no images");
   const Stamp begin = monotonicNow();
   AutopilotThread autopilot(vehicle.outlet, options);
-  const auto listen = [&] { plug.listen(); };
+  const auto listen = [&] {
+    vehicle.supervise();
+    plug.listen();
+  };
   REQUIRE(until([&] { return plug.heard.texts.size() >= 3; }, listen));
   const std::size_t said = plug.heard.texts.size();
   CHECK(said <= mostSince(begin, 1 / options.repeat.seconds()));

@@ -1,15 +1,49 @@
 // Names of ports, and datagrams to and fro.
 
+#include <arpa/inet.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
 #include <catch2/catch.hpp>
+#include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "drivers/calibration/input_error.hpp"
+#include "drivers/device/monotonic_now.hpp"
 #include "drivers/serial/pseudo_terminal.hpp"
 #include "firmware_host/autopilot/autopilot_port.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {
+namespace test {
+
+/// Datagrams from an address of its own to a port of this host.
+class ForeignSender {
+ public:
+  ForeignSender(const char* from, std::uint16_t port) : socket_(::socket(AF_INET, SOCK_DGRAM, 0)) {
+    sockaddr_in own = {};
+    own.sin_family = AF_INET;
+    ::inet_pton(AF_INET, from, &own.sin_addr);
+    REQUIRE(::bind(socket_, reinterpret_cast<const sockaddr*>(&own), sizeof own) == 0);
+    to_.sin_family = AF_INET;
+    to_.sin_port = htons(port);
+    ::inet_pton(AF_INET, "127.0.0.1", &to_.sin_addr);
+  }
+  ~ForeignSender() { ::close(socket_); }
+  void send(const std::vector<std::uint8_t>& bytes) const {
+    static_cast<void>(::sendto(socket_, bytes.data(), bytes.size(), 0,
+                               reinterpret_cast<const sockaddr*>(&to_), sizeof to_));
+  }
+
+ private:
+  int socket_;
+  sockaddr_in to_ = {};
+};
+
+}  // namespace test
 namespace {
 
 TEST_CASE("A port's name is read, or refused with a remedy", "[autopilot]") {
@@ -63,6 +97,74 @@ TEST_CASE("Datagrams arrive whole; of a host that was not named none are read", 
   stranger.wait(Duration::fromMilliseconds(1000));
   REQUIRE(stranger.read(bytes, count, read_at).ok());
   CHECK(count == 0);
+}
+
+TEST_CASE("A flood of foreign datagrams neither ends a read nor wakes anybody", "[autopilot]") {
+  const std::vector<std::uint8_t> ours = {253, 1, 2, 3};
+  const std::vector<std::uint8_t> foreign(64, 99);
+  std::array<std::uint8_t, 512> bytes;
+  std::size_t count = 0;
+  Stamp read_at;
+  struct Case {
+    const char* device;
+    const char* autopilot;  ///< where ours come from
+    const char* stranger;   ///< where the flood comes from
+  };
+  // Of another port of the autopilot's host, and of another host where the autopilot's port is not agreed on.
+  for (const Case& one : {Case{"udp:127.0.0.1:24576@24577", "udp:127.0.0.1:24577@24576", "other host"},
+                          Case{"udp:127.0.0.1:24576", "", "other port"}}) {
+    INFO(one.stranger);
+    AutopilotPort port(one.device, 0);
+    REQUIRE(port.open().ok());
+    const bool agreed = *one.autopilot != 0;
+    const int own = agreed ? 24577 : port.ownPort();
+    const std::string to_us = "udp:127.0.0.1:" + std::to_string(own);
+    AutopilotPort autopilot(to_us + "@24576", 0);
+    REQUIRE(autopilot.open().ok());
+    test::ForeignSender stranger(agreed ? "127.0.0.3" : "127.0.0.1", static_cast<std::uint16_t>(own));
+    for (int i = 0; i < 5000; ++i) stranger.send(foreign);
+    // Nothing has come for us: nobody is woken.
+    const Stamp begin = monotonicNow();
+    port.wait(Duration::fromMilliseconds(50));
+    CHECK(monotonicNow() - begin >= Duration::fromMilliseconds(50));
+    REQUIRE(autopilot.write(ours).ok());
+    for (int i = 0; i < 5000; ++i) stranger.send(foreign);
+    port.wait(Duration::fromMilliseconds(1000));
+    REQUIRE(port.read(bytes, count, read_at).ok());
+    CHECK(std::vector<std::uint8_t>(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count)) ==
+          ours);
+    REQUIRE(port.read(bytes, count, read_at).ok());
+    CHECK(count == 0);
+  }
+}
+
+TEST_CASE("An autopilot that sends from any port to an agreed one is heard", "[autopilot]") {
+  AutopilotPort port("udp:127.0.0.1:24578@24579", 0);
+  REQUIRE(port.open().ok());
+  AutopilotPort autopilot("udp:127.0.0.1:24579", 0);  // from a port of the kernel's choice
+  REQUIRE(autopilot.open().ok());
+  const std::vector<std::uint8_t> sent = {253, 1, 2, 3};
+  REQUIRE(autopilot.write(sent).ok());
+  std::array<std::uint8_t, 512> bytes;
+  std::size_t count = 0;
+  Stamp read_at;
+  port.wait(Duration::fromMilliseconds(1000));
+  REQUIRE(port.read(bytes, count, read_at).ok());
+  CHECK(count == sent.size());
+}
+
+TEST_CASE("Where nobody listens yet, datagrams are lost and no fault", "[autopilot]") {
+  AutopilotPort port("udp:127.0.0.1:24580", 0);
+  REQUIRE(port.open().ok());
+  const std::vector<std::uint8_t> sent = {253, 1, 2, 3};
+  std::array<std::uint8_t, 512> bytes;
+  std::size_t count = 0;
+  Stamp read_at;
+  for (int i = 0; i < 20; ++i) {
+    CHECK(port.write(sent).ok());
+    CHECK(port.read(bytes, count, read_at).ok());
+    CHECK(count == 0);
+  }
 }
 
 TEST_CASE("A port that another has, and a host that is none, are faults", "[autopilot]") {

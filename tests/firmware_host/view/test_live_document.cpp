@@ -196,24 +196,70 @@ TEST_CASE("health is a history of spans, changes are events") {
 TEST_CASE("the verdict on arming is in the bar, in the table and among the events") {
   Run run;
   run.frame(0);
-  ArmingVerdict verdict;
+  Verdict verdict;
+  verdict.evaluated = Stamp{} + Duration::fromSeconds(1e6);  // never stale
+  verdict.arming_changes = 1;
   MissingCondition missing;
   missing.condition = ArmingCondition::kSensors;
   std::strcpy(missing.text.data(), "camera 1 is silent");
   missing.remedy = "look at its cable";
-  static_cast<void>(verdict.missing.tryPushBack(missing));
-  run.outlet->arming.write(verdict);
+  static_cast<void>(verdict.arming.missing.tryPushBack(missing));
+  run.outlet->verdict.write(verdict);
   run.sample();
   Json patch = run.document.patch();
   CHECK(patch["live"]["arming"]["ready"] == false);
   CHECK(patch["live"]["arming"]["missing"][0]["what"] == "camera 1 is silent");
   CHECK(named(patch["tables"], "id", "arming")["rows"][0][2] == "look at its cable");
   CHECK(run.document.text().find("look at its cable") != std::string::npos);
-  run.outlet->arming.write(ArmingVerdict{});
+  verdict.arming = {};
+  ++verdict.arming_changes;
+  run.outlet->verdict.write(verdict);
   run.sample();
   patch = run.document.patch();
   CHECK(patch["live"]["arming"]["ready"] == true);
   CHECK(named(patch["events"], "name", "arming")["text"] == "ready to arm");
+}
+
+TEST_CASE(
+    "who is late or lost is in the bar, in the table and among the events; a stale verdict says nothing") {
+  Run run;
+  run.frame(0);
+  run.state(0.01);
+  Verdict verdict;
+  verdict.evaluated = Stamp{} + Duration::fromSeconds(1e6);
+  verdict.health = Health::kDegraded;
+  verdict.trouble_changes = 1;
+  Trouble trouble;
+  std::strcpy(trouble.member.data(), "mesh");
+  std::strcpy(trouble.text.data(), "no memory");
+  trouble.condition = Condition::kLost;
+  trouble.cause = Cause::kThrew;
+  static_cast<void>(verdict.troubles.tryPushBack(trouble));
+  run.outlet->verdict.write(verdict);
+  run.sample();
+  Json patch = run.document.patch();
+  CHECK(patch["live"]["health"] == "degraded");
+  CHECK(patch["live"]["troubles"][0]["member"] == "mesh");
+  CHECK(named(patch["events"], "name", "supervisor")["text"] == "mesh is lost: no memory");
+  CHECK(named(patch["tables"], "id", "supervision")["rows"][0][2] == "no memory");
+  CHECK(run.document.text().find("mesh is lost: no memory") != std::string::npos);
+
+  verdict.troubles.clear();
+  ++verdict.trouble_changes;
+  verdict.health = Health::kGood;
+  run.outlet->verdict.write(verdict);
+  run.sample();
+  patch = run.document.patch();
+  CHECK(named(patch["events"], "name", "supervisor")["text"] == "mesh has recovered");
+  CHECK(patch["live"]["troubles"].empty());
+
+  verdict.evaluated = Stamp{} + Duration::fromSeconds(-1e6);
+  run.outlet->verdict.write(verdict);
+  run.sample();
+  patch = run.document.patch();
+  CHECK(patch["live"]["health"] == "unknown");
+  CHECK_FALSE(patch["live"].contains("arming"));
+  CHECK(patch["live"]["unsupervised"].get<std::string>().find("supervisor") != std::string::npos);
 }
 
 TEST_CASE("the local mesh and the map's surface are drawn where they are, for those who look") {

@@ -140,6 +140,9 @@ export class LiveView {
     this.bar.dataset.state = stuck ? 'silent' : this.state;
     this.parts.state.textContent = stuck ? `no state for ${number(now.silent_s, 0)} s` : words[this.state];
     this.parts.health.textContent = now.health ? `${now.health}${now.epoch ? `, epoch ${now.epoch}` : ''}` : '';
+    const troubles = now.unsupervised ? [now.unsupervised]
+      : (now.troubles ?? []).map((t) => `${t.member} is ${t.condition}: ${t.text}`);
+    if (troubles.length > 0) this.parts.health.textContent += `: ${troubles.join('; ')}`;
     if (now.waiting_for) this.parts.health.textContent += `: waits for ${now.waiting_for}`;
     this.parts.health.dataset.health = now.health ?? '';
     this.parts.time.textContent = now.t == null ? '' : `${number(now.t, 1)} s`;
