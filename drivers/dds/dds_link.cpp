@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cstdio>
 #include <cstring>
 
 #include "drivers/dds/ros_messages.h"  // made by idlc from ros_messages.idl
@@ -44,18 +43,22 @@ std::string configuration(const DdsSettings& settings) {
   return text;
 }
 
-/// What the library has to say goes to stderr, the first few lines: a flood of messages that are too large
-/// gives one each.
-void complain(void* lines, const dds_log_data_t* data) {
-  constexpr std::uint64_t kShown = 8;
-  if (static_cast<std::atomic<std::uint64_t>*>(lines)->fetch_add(1, std::memory_order_relaxed) < kShown) {
-    std::fprintf(stderr, "dds: %s", data->message);
-  }
+/// Of all links: the library has one place for what it says.
+struct Complaints {
+  std::atomic<std::uint64_t> lines{0};
+  std::atomic<void (*)(std::string_view)> tell{nullptr};
+};
+Complaints& complaints() {
+  static Complaints all;
+  return all;
 }
-/// Of all links: the library has one place for them.
-std::atomic<std::uint64_t>& complaints() {
-  static std::atomic<std::uint64_t> lines{0};
-  return lines;
+
+/// The first few lines are told: a flood of messages that are too large gives one each.
+void complain(void* to, const dds_log_data_t* data) {
+  constexpr std::uint64_t kTold = 8;
+  auto& all = *static_cast<Complaints*>(to);
+  if (all.lines.fetch_add(1, std::memory_order_relaxed) >= kTold) return;
+  if (auto* const tell = all.tell.load(std::memory_order_relaxed)) tell(data->message);
 }
 
 /// Names of the network interfaces, with commas; `wanted` is set if it is one of them.
@@ -213,6 +216,7 @@ bool DdsLink::open(const DdsSettings& settings) {
   if (!found) {
     return failed("there is no network interface '" + settings.interface + "', only " + names);
   }
+  complaints().tell.store(settings.complain, std::memory_order_relaxed);
   dds_set_log_sink(complain, &complaints());
   e.domain = dds_create_domain(settings.domain, configuration(settings).c_str());
   if (e.domain < 0) {
@@ -418,7 +422,7 @@ int DdsLink::labellers() const {
 
 DdsCounters DdsLink::counters() const {
   DdsCounters counters = counters_;
-  counters.complaints = complaints().load(std::memory_order_relaxed);
+  counters.complaints = complaints().lines.load(std::memory_order_relaxed);
   if (entities_) {
     const std::uint64_t came = entities_->images_came.load(std::memory_order_relaxed);
     counters.images_skipped = came - std::min(came, entities_->images_seen);

@@ -37,6 +37,9 @@ struct DdsSettings {
   std::string interface = "lo";      ///< network interface; "lo": this computer alone
   std::string prefix = "/swiftlet";  ///< of our topics; /tf and /diagnostics have none
   std::string label_topic;           ///< sensor_msgs/Image to read; empty: none, and no image goes out
+  /// Gets the library's first lines of warnings and errors, from any of its threads; null: nobody does. Of
+  /// the link that was opened last: the library has one place for all.
+  void (*complain)(std::string_view line) = nullptr;
 };
 
 struct DdsOdometry {

@@ -7,6 +7,7 @@
 #include "firmware_host/commands/fly_run.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
 #include "firmware_host/commands/view_option.hpp"
+#include "firmware_host/realtime/console.hpp"
 #include "firmware_host/report/summary.hpp"
 
 namespace swiftlet {
@@ -21,19 +22,20 @@ struct FlyOptions {
 int fly(const FlyOptions& options) {
   FlyRequest request = options.request;
   request.stop = &stopOnSignal();
+  request.hung_up = &surviveHangUp();
   request.show_progress = true;
   request.view = options.view.read();
   const FlyResult result = runFlight(request, options.settings.read());
   if (!result.missing.empty()) {
-    for (const std::string& line : result.missing) fmt::print(stderr, "error: {}\n", line);
-    fmt::print(stderr, "nothing was flown; `swiftlet doctor` looks at all devices and at this computer\n");
+    for (const std::string& line : result.missing) warn("error: " + line + "\n");
+    warn("nothing was flown; `swiftlet doctor` looks at all devices and at this computer\n");
     return kExitFailed;
   }
-  fmt::print("{}", summaryText(result.summary));
-  fmt::print("written to {}\n", request.out);
+  say(summaryText(result.summary));
+  say(fmt::format("written to {}\n", request.out));
   if (!result.has_pose) {
-    fmt::print(stderr, "error: no pose in the whole flight; {}/events.log says what the start waited for\n",
-               request.out);
+    warn(fmt::format("error: no pose in the whole flight; {}/events.log says what the start waited for\n",
+                     request.out));
     return kExitFailed;
   }
   return kExitDone;

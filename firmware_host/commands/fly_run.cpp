@@ -1,21 +1,23 @@
 #include "firmware_host/commands/fly_run.hpp"
 
-#include <fmt/format.h>
-
 #include <atomic>
 #include <memory>
 
+#include "drivers/device/monotonic_now.hpp"
 #include "firmware_host/commands/confusion_file.hpp"
 #include "firmware_host/commands/fly_threaded.hpp"
 #include "firmware_host/commands/moving_labels.hpp"
 #include "firmware_host/commands/run_output.hpp"
 #include "firmware_host/live/live_input.hpp"
+#include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {
 namespace {
 
 /// Longer than an IMU's samples take over any of the links: their buffers hold 16 ms at the most.
 constexpr Duration kSamplePatience = Duration::fromMilliseconds(25);
+constexpr const char* kHungUp =
+    "terminal closed (SIGHUP): the flight goes on; end it with SIGINT or SIGTERM (`pkill -INT swiftlet`)";
 
 }  // namespace
 
@@ -35,11 +37,11 @@ FlyResult runFlight(const FlyRequest& request, Settings settings) {
   if (request.map) settings.map.enabled = true;
   checkMovingLabels(settings.map_stage);
   const Calibration calibration = vehicleCalibration(settings);
-  for (const std::string& line : calibration.warnings) fmt::print(stderr, "warning: {}\n", line);
+  for (const std::string& line : calibration.warnings) warn("warning: " + line + "\n");
   MemoryTrack memory;
   LiveInput input(settings, calibration);
   LiveInput::Opened opened = input.open();
-  for (const std::string& line : opened.warnings) fmt::print(stderr, "warning: {}\n", line);
+  for (const std::string& line : opened.warnings) warn("warning: " + line + "\n");
   FlyResult result;
   if (!opened.faults.empty()) {
     result.missing = std::move(opened.faults);
@@ -54,11 +56,14 @@ FlyResult runFlight(const FlyRequest& request, Settings settings) {
   wanted.recorder = recorder.get();
   wanted.confusion = confusionOf(settings);
   wanted.sample_patience = kSamplePatience;
-  wanted.remarks = [&input](RunLog& log) {
-    return input.drainEvents([&log](Stamp stamp, const std::string& line) {
+  wanted.remarks = [&input, &request](RunLog& log) {
+    const auto remark = [&log](Stamp stamp, const std::string& line) {
       log.remark(stamp, line);
-      fmt::print(stderr, "{}\n", line);
-    });
+      warn(line + "\n");
+    };
+    const bool hung_up = request.hung_up != nullptr && request.hung_up->exchange(false);
+    if (hung_up) remark(monotonicNow(), kHungUp);
+    return input.drainEvents(remark) || hung_up;
   };
   // The executor asks ten times a second.
   std::atomic<bool> stop{false};

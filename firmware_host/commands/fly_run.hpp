@@ -22,6 +22,7 @@ struct FlyRequest {
   std::optional<ViewAddress> view;  ///< serve the live view there
   double seconds = 0;               ///< end after this long; 0: when told to
   const std::atomic<bool>* stop = nullptr;
+  std::atomic<bool>* hung_up = nullptr;  ///< set: the terminal has closed; noted as an event, and cleared
   bool show_progress = false;
 };
 

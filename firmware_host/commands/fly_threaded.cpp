@@ -7,6 +7,7 @@
 
 #include "firmware_host/commands/live_consumers.hpp"
 #include "firmware_host/pipeline/arming_monitor.hpp"
+#include "firmware_host/realtime/console.hpp"
 #include "firmware_host/realtime/machine_report.hpp"
 #include "firmware_host/realtime/memory_lock.hpp"
 
@@ -79,8 +80,8 @@ bool flyThreaded(const Calibration& calibration, SensorInput& input, const Setti
     lock.message = "switched off by realtime.lock_memory or realtime.enabled";
   }
   if (request.announce) {
-    fmt::print("{}", reserved.text());
-    if (!lock.message.empty()) fmt::print(stderr, "warning: memory not locked: {}\n", lock.message);
+    say(reserved.text());
+    if (!lock.message.empty()) warn(fmt::format("warning: memory not locked: {}\n", lock.message));
   }
 
   ThreadedOptions options;
@@ -95,7 +96,7 @@ bool flyThreaded(const Calibration& calibration, SensorInput& input, const Setti
       const bool has = thread.hasPriority() && thread.actual_policy == ThreadPolicy::kFifo;
       if (!has && ground.threads_without_priority++ == 0) ground.first_without_priority = thread.name;
       if (request.announce && !thread.message.empty()) {
-        fmt::print(stderr, "warning: thread {}: {}\n", thread.name, thread.message);
+        warn(fmt::format("warning: thread {}: {}\n", thread.name, thread.message));
       }
     }
     ground.memory_locked = lock.current;
@@ -123,7 +124,7 @@ bool flyThreaded(const Calibration& calibration, SensorInput& input, const Setti
   report["arming"] = toJson(arming.verdict());
   report["arming"]["first_ready_ns"] =
       arming.firstReady() ? nlohmann::ordered_json(arming.firstReady()->ns) : nlohmann::ordered_json(nullptr);
-  for (const std::string& fault : threads.faults) fmt::print(stderr, "error: thread {}\n", fault);
+  for (const std::string& fault : threads.faults) warn(fmt::format("error: thread {}\n", fault));
   return threads.finished && threads.faults.empty();
 }
 

@@ -6,6 +6,7 @@
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
 #include "firmware_host/hil/hil_run.hpp"
+#include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {
 namespace {
@@ -21,9 +22,9 @@ int hil(const HilOptions& options) {
   request.stop = &stopOnSignal();
   if (!options.faults.empty()) request.faults = FaultTimeline::read(options.faults);
   const HilResult result = runHil(request, options.settings.read());
-  fmt::print("{}\nwritten to {}\n", result.report.dump(2), request.out);
+  say(fmt::format("{}\nwritten to {}\n", result.report.dump(2), request.out));
   if (!result.complete) {
-    fmt::print(stderr, "error: not everything was played when it was due; hil.json says what\n");
+    warn("error: not everything was played when it was due; hil.json says what\n");
     return kExitFailed;
   }
   return kExitDone;

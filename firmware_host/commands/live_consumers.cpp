@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstdio>
 
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/autopilot/autopilot_port.hpp"
+#include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {
 namespace {
@@ -46,8 +46,7 @@ LiveConsumers::LiveConsumers(const Calibration& calibration, const Settings& set
   if (settings.ros2.enabled) openRos2(calibration, settings, request);
   if (request.view) {
     view_ = std::make_unique<ViewThread>(newOutlet(view_outlet_), *request.view, request.name);
-    fmt::print("live view: {}\n", view_->url());
-    std::fflush(stdout);  // who reads through a pipe wants to look now
+    say(fmt::format("live view: {}\n", view_->url()));
   }
 }
 
@@ -76,7 +75,7 @@ LiveOutlet& LiveConsumers::newOutlet(std::unique_ptr<LiveOutlet>& owner) {
 bool LiveConsumers::drainRemarks(RunLog& log) {
   return autopilot_ && autopilot_->drainEvents([&log](Stamp stamp, const std::string& line) {
     log.remark(stamp, line);
-    fmt::print(stderr, "{}\n", line);
+    warn(line + "\n");
   });
 }
 

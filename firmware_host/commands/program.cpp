@@ -4,11 +4,13 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/commands/command.hpp"
+#include "firmware_host/realtime/console.hpp"
 #include "firmware_host/report/summary.hpp"
 
 namespace swiftlet {
 
 int runProgram(int argc, char** argv) {
+  holdStandardStreams();
   CLI::App app("swiftlet: stereo-inertial state estimation for drones");
   app.set_version_flag("--version", versionText());
   app.require_subcommand(1);
@@ -38,10 +40,10 @@ int runProgram(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kExitDone : kExitBadInput;
   } catch (const InputError& error) {
-    fmt::print(stderr, "error: {}\n", error.what());
+    warn(fmt::format("error: {}\n", error.what()));
     return kExitBadInput;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "error: {}\n", error.what());
+    warn(fmt::format("error: {}\n", error.what()));
     return kExitFailed;
   }
   return exit_code;

@@ -7,6 +7,7 @@
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/record_run.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
+#include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {
 namespace {
@@ -19,30 +20,30 @@ struct RecordOptions {
 int record(const RecordOptions& options) {
   RecordRequest request = options.request;
   request.stop = &stopOnSignal();
+  surviveHangUp();
   const RecordResult result = runRecord(request, options.settings.read());
   if (!result.missing.empty()) {
-    for (const std::string& line : result.missing) fmt::print(stderr, "error: {}\n", line);
-    fmt::print(stderr, "nothing was recorded; `swiftlet doctor` looks at all devices and at this computer\n");
+    for (const std::string& line : result.missing) warn("error: " + line + "\n");
+    warn("nothing was recorded; `swiftlet doctor` looks at all devices and at this computer\n");
     return kExitFailed;
   }
   const FolderSink::Counters& written = result.written;
-  fmt::print("{} samples", written.samples);
+  std::string text = fmt::format("{} samples", written.samples);
   std::uint64_t lost = written.samples_lost;
   for (std::size_t c = 0; c < result.cameras; ++c) {
-    fmt::print(", {} images of camera {}", written.images[c], c);
+    text += fmt::format(", {} images of camera {}", written.images[c], c);
     lost += written.images_lost[c];
   }
   const auto images_end = written.images.begin() + static_cast<std::ptrdiff_t>(result.cameras);
-  fmt::print("\nwritten to {}\n", request.out);
+  say(fmt::format("{}\nwritten to {}\n", text, request.out));
   if (written.samples == 0 || std::count(written.images.begin(), images_end, 0U) > 0) {
-    fmt::print(stderr,
-               "error: a device gave nothing; `swiftlet doctor` with the same settings says which and why\n");
+    warn("error: a device gave nothing; `swiftlet doctor` with the same settings says which and why\n");
     return kExitFailed;
   }
   if (lost > 0) {
-    fmt::print(stderr,
-               "error: {} samples and {} images found no room: the disk is too slow for these cameras\n",
-               written.samples_lost, lost - written.samples_lost);
+    warn(
+        fmt::format("error: {} samples and {} images found no room: the disk is too slow for these cameras\n",
+                    written.samples_lost, lost - written.samples_lost));
     return kExitFailed;
   }
   return kExitDone;

@@ -1,11 +1,10 @@
 #include "firmware_host/commands/record_run.hpp"
 
-#include <fmt/format.h>
-
 #include "firmware_host/commands/fly_run.hpp"
 #include "firmware_host/live/live_input.hpp"
 #include "firmware_host/live/sensor_threads.hpp"
 #include "firmware_host/pipeline/host_sleep.hpp"
+#include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {
 
@@ -13,7 +12,7 @@ RecordResult runRecord(const RecordRequest& request, const Settings& settings) {
   const Calibration calibration = vehicleCalibration(settings);
   LiveInput input(settings, calibration);
   LiveInput::Opened opened = input.open();
-  for (const std::string& line : opened.warnings) fmt::print(stderr, "warning: {}\n", line);
+  for (const std::string& line : opened.warnings) warn("warning: " + line + "\n");
   RecordResult result;
   result.cameras = calibration.rig.camera_count;
   if (!opened.faults.empty()) {
@@ -22,9 +21,9 @@ RecordResult runRecord(const RecordRequest& request, const Settings& settings) {
   }
   FolderSink sink(request.out, calibration, settings.cameras.rate_hz);
   SensorThreads threads(input, sink, settings.realtime);
-  for (const std::string& line : threads.warnings()) fmt::print(stderr, "warning: {}\n", line);
+  for (const std::string& line : threads.warnings()) warn("warning: " + line + "\n");
   const auto print = [&input] {
-    input.drainEvents([](Stamp /*stamp*/, const std::string& line) { fmt::print(stderr, "{}\n", line); });
+    input.drainEvents([](Stamp /*stamp*/, const std::string& line) { warn(line + "\n"); });
   };
   const double begin = wallSeconds();
   constexpr Duration kPeriod = Duration::fromMilliseconds(50);

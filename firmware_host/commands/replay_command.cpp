@@ -9,6 +9,7 @@
 #include "firmware_host/commands/replay_run.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
 #include "firmware_host/commands/view_option.hpp"
+#include "firmware_host/realtime/console.hpp"
 #include "firmware_host/report/summary.hpp"
 
 namespace swiftlet {
@@ -52,23 +53,23 @@ int replay(const ReplayOptions& options) {
     throw InputError("--until", 0, "", "the section ends before it begins", "Give an --until after --from");
   }
   const ReplayResult result = runReplay(request, options.settings.read());
-  fmt::print("{}", summaryText(result.summary));
+  say(summaryText(result.summary));
   if (result.summary.contains("accuracy")) {
     for (const char* file : {"odometry", "states", "map"}) {
       for (const char* section : {"all", "from_3s"}) {
-        fmt::print("{}", accuracyLine(result.summary, file, section));
+        say(accuracyLine(result.summary, file, section));
       }
     }
-    fmt::print("{}", sameStampsLine(result.summary["accuracy"]));
+    say(sameStampsLine(result.summary["accuracy"]));
   }
-  fmt::print("written to {}\n", request.out);
+  say(fmt::format("written to {}\n", request.out));
   if (!result.finished) {
-    fmt::print(stderr, "stopped before the end; the run folder holds what was done\n");
+    warn("stopped before the end; the run folder holds what was done\n");
     return kExitFailed;
   }
   if (!result.has_pose) {
-    fmt::print(stderr, "error: {}: no pose in the whole log; events.log says what the start waited for\n",
-               request.log);
+    warn(fmt::format("error: {}: no pose in the whole log; events.log says what the start waited for\n",
+                     request.log));
     return kExitFailed;
   }
   return kExitDone;

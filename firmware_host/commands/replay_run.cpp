@@ -16,6 +16,7 @@
 #include "firmware_host/pipeline/lockstep.hpp"
 #include "firmware_host/pipeline/log_player.hpp"
 #include "firmware_host/pipeline/reproduce.hpp"
+#include "firmware_host/realtime/console.hpp"
 #include "firmware_host/report/progress.hpp"
 #include "firmware_host/report/summary.hpp"
 #include "firmware_host/settings/read_settings.hpp"
@@ -47,7 +48,7 @@ TrackFileFacts checkTracks(const std::string& path, const Rig& rig, bool mono) {
 
 void printWarnings(const LogSource& source, std::size_t from) {
   const auto& lines = source.warnings();
-  for (std::size_t i = from; i < lines.size(); ++i) fmt::print(stderr, "warning: {}\n", lines[i]);
+  for (std::size_t i = from; i < lines.size(); ++i) warn("warning: " + lines[i] + "\n");
 }
 
 /// What one run is made of, from opening to the summary.
@@ -115,7 +116,7 @@ class ReplayRun {
     }
     scenes_.emplace(request_.log, source_->calibration(),
                     SceneReader::Wanted{settings_.map.depth_sensor, settings_.map_stage.labels});
-    for (const std::string& line : scenes_->warnings()) fmt::print(stderr, "warning: {}\n", line);
+    for (const std::string& line : scenes_->warnings()) warn("warning: " + line + "\n");
     scene_warnings_ = scenes_->warnings().size();
     if (scenes_->depthSensor() == nullptr &&
         (source_->rig().camera_count < 2 || !settings_.odometry.use_stereo)) {
@@ -140,8 +141,8 @@ class ReplayRun {
     facts_.executor["kind"] = "reproduced";
     if (report.stopped_early.empty()) return;
     facts_.executor["stopped_early"] = report.stopped_early;
-    fmt::print(stderr, "warning: {}: the run was repeated for {} frames: {}\n", request_.log, report.frames,
-               report.stopped_early);
+    warn(fmt::format("warning: {}: the run was repeated for {} frames: {}\n", request_.log, report.frames,
+                     report.stopped_early));
   }
 
   void fly() {
@@ -190,11 +191,11 @@ class ReplayRun {
     facts_.memory = memory_.rows();
     printWarnings(*source_, warned_);
     for (std::size_t i = scene_warnings_; scenes_ && i < scenes_->warnings().size(); ++i) {
-      fmt::print(stderr, "warning: {}\n", scenes_->warnings()[i]);
+      warn("warning: " + scenes_->warnings()[i] + "\n");
     }
     if (tracks_) {
       facts_.track_surplus = tracks_->surplus();
-      for (const std::string& line : tracks_->warnings()) fmt::print(stderr, "warning: {}\n", line);
+      for (const std::string& line : tracks_->warnings()) warn("warning: " + line + "\n");
     }
     ReplayResult result;
     result.finished = facts_.finished;

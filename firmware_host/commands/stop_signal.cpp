@@ -6,8 +6,10 @@ namespace swiftlet {
 namespace {
 
 std::atomic<bool> stop_asked{false};
+std::atomic<bool> hung_up{false};
 
 extern "C" void askToStop(int /*signal*/) { stop_asked.store(true, std::memory_order_relaxed); }
+extern "C" void noteHangUp(int /*signal*/) { hung_up.store(true, std::memory_order_relaxed); }
 
 }  // namespace
 
@@ -15,7 +17,15 @@ const std::atomic<bool>& stopOnSignal() {
   stop_asked.store(false, std::memory_order_relaxed);
   std::signal(SIGINT, askToStop);
   std::signal(SIGTERM, askToStop);
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGTTOU, SIG_IGN);
   return stop_asked;
+}
+
+std::atomic<bool>& surviveHangUp() {
+  hung_up.store(false, std::memory_order_relaxed);
+  if (std::signal(SIGHUP, noteHangUp) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
+  return hung_up;
 }
 
 }  // namespace swiftlet

@@ -12,6 +12,7 @@
 #include "drivers/device/monotonic_now.hpp"
 #include "firmware_host/export/ros_state.hpp"
 #include "firmware_host/pipeline/follower_thread.hpp"
+#include "firmware_host/realtime/console.hpp"
 #include "firmware_host/report/map_files.hpp"
 #include "firmware_host/report/names.hpp"
 
@@ -58,6 +59,7 @@ class DdsThread::Work {
     DdsSettings settings;
     settings.domain = static_cast<std::uint32_t>(options.settings.domain);
     settings.interface = options.settings.interface;
+    settings.complain = [](std::string_view line) { warn("dds: " + std::string(line)); };
     if (options.labels != nullptr) settings.label_topic = options.settings.label_topic;
     if (!link_.open(settings)) {
       throw InputError("settings", 0, "ros2.interface, ros2.domain", link_.error(),

@@ -15,6 +15,7 @@
 #include "firmware_host/hil/played_imu.hpp"
 #include "firmware_host/live/device_times.hpp"
 #include "firmware_host/pipeline/host_sleep.hpp"
+#include "firmware_host/realtime/console.hpp"
 #include "firmware_host/report/line_file.hpp"
 
 namespace swiftlet {
@@ -135,8 +136,8 @@ class HilRun {
     LineFile((std::filesystem::path(request_.out) / "faults.csv").string()).write(request_.faults.text());
     openDevices();
     if (!waitForReader()) {
-      fmt::print(stderr, "error: nobody opened {} within {:.0f} s\n", settings_.imu_link.device,
-                 request_.patience);
+      warn(fmt::format("error: nobody opened {} within {:.0f} s\n", settings_.imu_link.device,
+                       request_.patience));
       return end(false);
     }
     chooseGrid();
@@ -244,7 +245,7 @@ class HilRun {
   bool broke(const DeviceFault& fault, const std::string& device) {
     if (fault.ok()) return false;
     fault_ = describe(fault, device);
-    fmt::print(stderr, "error: {}\n", fault_);
+    warn("error: " + fault_ + "\n");
     return true;
   }
 

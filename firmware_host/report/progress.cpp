@@ -4,9 +4,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
 
 #include "firmware_host/pipeline/stage_timer.hpp"
+#include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {
 namespace {
@@ -26,7 +26,7 @@ void Progress::update(std::uint64_t done) {
     const std::uint64_t tenths = std::min<std::uint64_t>(10, done * 10 / total_);
     if (tenths <= tenths_said_) return;
     tenths_said_ = tenths;
-    fmt::print(stderr, "{} {} %\n", what_, tenths * 10);
+    warn(fmt::format("{} {} %\n", what_, tenths * 10));
     return;
   }
   const double now = wallSeconds();
@@ -34,13 +34,12 @@ void Progress::update(std::uint64_t done) {
   last_drawn_ = now;
   const double left = share > 0 ? (now - start_) * (1 - share) / share : 0;
   const auto filled = static_cast<std::size_t>(share * kBarWidth);
-  fmt::print(stderr, "\r{} [{:=<{}}{: <{}}] {:3.0f} %  {:.0f} s left ", what_, "", filled, "",
-             kBarWidth - filled, 100 * share, left);
-  std::fflush(stderr);
+  warn(fmt::format("\r{} [{:=<{}}{: <{}}] {:3.0f} %  {:.0f} s left ", what_, "", filled, "",
+                   kBarWidth - filled, 100 * share, left));
 }
 
 void Progress::finish() {
-  if (terminal_ && last_drawn_ > 0) fmt::print(stderr, "\n");
+  if (terminal_ && last_drawn_ > 0) warn("\n");
 }
 
 }  // namespace swiftlet

@@ -7,7 +7,6 @@
 
 #include <atomic>
 #include <cerrno>
-#include <csignal>
 #include <limits>
 #include <system_error>
 
@@ -203,13 +202,8 @@ class ViewServer::Work : public httplib::Server {
   FlightThread thread_;
 };
 
-ViewServer::ViewServer(ViewHub& hub, const ViewAddress& address, ViewPages pages) {
-  // The library ignores SIGPIPE for the whole program from here on; nothing here needs that.
-  struct sigaction before {};
-  sigaction(SIGPIPE, nullptr, &before);
-  work_ = std::make_unique<Work>(hub, address, std::move(pages));
-  sigaction(SIGPIPE, &before, nullptr);
-}
+ViewServer::ViewServer(ViewHub& hub, const ViewAddress& address, ViewPages pages)
+    : work_(std::make_unique<Work>(hub, address, std::move(pages))) {}
 ViewServer::~ViewServer() = default;
 
 const ViewAddress& ViewServer::address() const { return work_->address(); }

@@ -3,7 +3,7 @@
 # usage: check_flight.sh PROGRAM accuracy|faults SECONDS [LINK...]
 #   accuracy  the odometry's ATE is within the larger of 20 % and 3 mm of a plain replay's
 #   faults    a timeline of several faults, flown twice: every check passes, and both flights list the same events
-#   LINK      of guest_flight.sh: serial, can, trigger, protocol=NAME
+#   LINK      of guest_flight.sh: serial, can, trigger, protocol=NAME, hangup
 # Needs euroc_mh01_20s in the folder SWIFTLET_DATA, or in ../shared/data beside the project. Exit code 77: skipped.
 set -u
 program=$1
@@ -50,6 +50,9 @@ events() {
 case $what in
   accuracy)
     fly flight "$@"
+    case " $* " in
+      *' hangup '*) grep 'terminal closed (SIGHUP)' "$out/flight/flight/events.log" || exit 1 ;;
+    esac
     "$program" evaluate "$out/flight/flight" --hil "$out/flight/hil" || exit 1
     "$program" replay "$log" --out "$out/plain" --set mesh.enabled=false >"$out/plain.txt" 2>&1 || {
       cat "$out/plain.txt"

@@ -1,10 +1,11 @@
 #!/bin/sh
 # Inside the kernel sandbox, cameras looping: plays a log out through the kernel's devices and flies on them with the
 # unmodified program.
-# usage: guest_flight.sh PROGRAM LOG OUT [serial|can] [trigger] [faults=FILE] [seconds=N] [protocol=NAME] [nomesh]
+# usage: guest_flight.sh PROGRAM LOG OUT [serial|can] [trigger] [faults=FILE] [seconds=N] [protocol=NAME] [nomesh] [hangup]
 #   PROGRAM  swiftlet
 #   LOG      EuRoC folder with calibration
 #   OUT      folder: vehicle.yaml, hil/, flight/, what each program said
+#   hangup   the flight's terminal closes: SIGHUP after 3 s
 # Exit code: 0 when both programs ended well.
 set -u
 program=$1
@@ -17,6 +18,7 @@ faults=''
 seconds=0
 protocol=bridge
 mesh=true
+hangup=no
 for option in "$@"; do
   case $option in
     serial | can) link=$option ;;
@@ -24,6 +26,7 @@ for option in "$@"; do
     faults=*) faults=${option#faults=} ;;
     seconds=*) seconds=${option#seconds=} ;;
     nomesh) mesh=false ;;
+    hangup) hangup=yes ;;
     protocol=*) protocol=${option#protocol=} ;;
     *)
       echo "guest_flight: what is $option?" >&2
@@ -74,6 +77,10 @@ for _ in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20; do
 done
 "$program" fly --settings "$out/vehicle.yaml" --imu-rate --out "$out/flight" >"$out/fly.txt" 2>&1 &
 fly=$!
+if [ $hangup = yes ]; then
+  sleep 3
+  kill -HUP $fly
+fi
 wait $hil
 played=$?
 kill -INT $fly

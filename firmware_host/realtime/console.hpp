@@ -1,0 +1,22 @@
+#pragma once
+// Messages of a run for people, on stdout and stderr. A terminal that is closed, a pipe without a reader, a
+// full disk behind a redirection or a reader that stands still costs messages, never the run: nothing here
+// throws, raises a signal, or waits longer than 0.1 s for a reader that stands still, and then not again
+// until it reads.
+//
+// Threads: any but those of the flight path. A message goes out whole where the reader takes it.
+
+#include <string_view>
+
+namespace swiftlet {
+
+/// To stdout. `text` ends its own lines.
+void say(std::string_view text);
+/// To stderr.
+void warn(std::string_view text);
+
+/// At the program's start: gives 0, 1 and 2 where they are closed to files that take and give nothing.
+/// Otherwise the first files of the run would get these numbers, and messages would be written into them.
+void holdStandardStreams();
+
+}  // namespace swiftlet
