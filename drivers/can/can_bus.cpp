@@ -13,45 +13,19 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <ctime>
+
+#include "drivers/device/host_clocks.hpp"
 
 namespace swiftlet {
 namespace {
 
 constexpr int kErrorFramesPerCall = 16;
-constexpr int kClockTries = 3;
 // A stamp older than this at its reading, or later than it, was taken before the wall clock was stepped.
 constexpr Duration kOldest = Duration::fromMilliseconds(10'000);
 constexpr can_err_mask_t kErrors =
     CAN_ERR_BUSOFF | CAN_ERR_RESTARTED | CAN_ERR_CRTL | CAN_ERR_TX_TIMEOUT | CAN_ERR_ACK;
 
 Stamp stampOf(const timespec& time) { return {time.tv_sec * 1'000'000'000 + time.tv_nsec}; }
-
-Stamp now(clockid_t clock) {
-  timespec time = {};
-  clock_gettime(clock, &time);
-  return stampOf(time);
-}
-
-struct HostTime {
-  Stamp monotonic;
-  Duration realtime_ahead;  ///< CLOCK_REALTIME - CLOCK_MONOTONIC
-};
-
-/// The wall clock between two readings of the steady one; of a few tries the one that was disturbed least.
-HostTime readClocks() {
-  HostTime best;
-  Duration narrowest;
-  for (int i = 0; i < kClockTries; ++i) {
-    const Stamp before = now(CLOCK_MONOTONIC);
-    const Stamp wall = now(CLOCK_REALTIME);
-    const Stamp after = now(CLOCK_MONOTONIC);
-    if (i > 0 && after - before >= narrowest) continue;
-    narrowest = after - before;
-    best = {after, {wall.ns - before.ns - narrowest.ns / 2}};
-  }
-  return best;
-}
 
 /// What came beside a frame.
 struct Beside {
@@ -281,7 +255,7 @@ DeviceFault CanBus::next(std::optional<CanFrame>& frame) {
     bus_off_ = false;
     down_ = false;
     frame = frameOf(raw, fd);
-    const HostTime time = readClocks();
+    const HostClocks time = readHostClocks();
     frame->arrival = time.monotonic;
     const Stamp stamped = beside.software.value_or(Stamp{}) - time.realtime_ahead;
     if (beside.software && stamped <= time.monotonic && time.monotonic - stamped < kOldest) {

@@ -54,7 +54,7 @@ void LiveConsumers::openRos2(const Calibration& calibration, const Settings& set
                              const FlightRequest& request) {
   DdsThreadOptions options;
   options.settings = settings.ros2;
-  if (request.host_stamps) options.to_ros_clock = realtimeOffset();
+  if (request.host_stamps) options.clocks = readHostClocks;
   options.gyro_sigma = calibration.noise.gyro_density * std::sqrt(calibration.noise.rate_hz);
   if (!settings.ros2.label_topic.empty()) {
     checkLabels(settings);

@@ -10,6 +10,7 @@
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/dds/dds_link.hpp"
 #include "drivers/device/monotonic_now.hpp"
+#include "firmware_host/dds/ros_clock.hpp"
 #include "firmware_host/export/ros_state.hpp"
 #include "firmware_host/pipeline/follower_thread.hpp"
 #include "firmware_host/realtime/console.hpp"
@@ -76,9 +77,10 @@ class DdsThread::Work {
   [[nodiscard]] const std::string& fault() const { return thread_.fault(); }
   [[nodiscard]] nlohmann::ordered_json json() const {
     const DdsCounters link = link_.counters();
-    nlohmann::ordered_json json = {{"odometry", odometries_}, {"meshes", meshes_},
-                                   {"surfaces", surfaces_},   {"written", link.written},
-                                   {"refused", link.refused}, {"complaints", link.complaints}};
+    nlohmann::ordered_json json = {{"odometry", odometries_},      {"meshes", meshes_},
+                                   {"surfaces", surfaces_},        {"written", link.written},
+                                   {"refused", link.refused},      {"complaints", link.complaints},
+                                   {"clock_steps", clock_.steps()}};
     if (options_.labels != nullptr) {
       const LabelExchange::Counters& labels = options_.labels->counters();
       json["labels"] = {{"images_shown", labels.shown},
@@ -98,6 +100,7 @@ class DdsThread::Work {
     const double turns = options_.labels != nullptr ? std::ceil(state_period / kLabelPeriod) : 1;
     double turn = 0;
     thread_.repeat(state_period / turns, [&](double now) {
+      if (options_.clocks) clock_.follow(options_.clocks());
       if (turn == 0) publishState();
       turn = std::fmod(turn + 1, turns);
       if (options_.labels != nullptr) exchangeLabels(*options_.labels);
@@ -107,7 +110,7 @@ class DdsThread::Work {
     });
   }
 
-  [[nodiscard]] Stamp ros(Stamp stamp) const { return stamp + options_.to_ros_clock; }
+  [[nodiscard]] Stamp ros(Stamp stamp) const { return clock_.toRos(stamp); }
 
   void publishState() {
     outlet_.correction.refresh();
@@ -237,12 +240,12 @@ class DdsThread::Work {
   void exchangeLabels(LabelExchange& labels) {
     labels.setLabeller(link_.labellers() > 0);
     while (labels.show([this](Stamp stamp, const ImageView& image) {
-      link_.publish(DdsImageView{ros(stamp), kCameraFrame, image});
+      link_.publish(DdsImageView{clock_.toRosAndBack(stamp), kCameraFrame, image});
     })) {
     }
     labels.retryEarly();
     for (int i = 0; i < kKeptImages && link_.takeLabels(label_); ++i) {
-      labels.offer(label_.stamp - options_.to_ros_clock,
+      labels.offer(clock_.fromRos(label_.stamp),
                    {label_.pixels.data(), label_.width, label_.height, label_.width});
     }
   }
@@ -250,6 +253,7 @@ class DdsThread::Work {
   LiveOutlet& outlet_;
   const DdsThreadOptions options_;
   const RosFrames frames_;
+  RosClock clock_;
   DdsLink link_;
   Pace mesh_pace_;
   Pace surface_pace_{kSurfacePeriod};

@@ -3,9 +3,11 @@
 // reads a LiveOutlet; nobody waits for it. Label images for the map come in by it (LabelExchange), at most
 // kKeptImages a turn. In builds without SWIFTLET_WITH_DDS the constructor says so.
 
+#include <functional>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 
+#include "drivers/device/host_clocks.hpp"
 #include "firmware_host/pipeline/label_exchange.hpp"
 #include "firmware_host/pipeline/live_outlet.hpp"
 #include "firmware_host/settings/device_settings.hpp"
@@ -15,8 +17,9 @@ namespace swiftlet {
 
 struct DdsThreadOptions {
   Ros2Group settings;
-  /// Added to every stamp: from the run's clock to that of ROS's other processes.
-  Duration to_ros_clock{0};
+  /// Read at every turn: live stamps are of CLOCK_MONOTONIC, ROS's of CLOCK_REALTIME. Null: stamps go out as
+  /// they are.
+  std::function<HostClocks()> clocks;
   double gyro_sigma = 0;            ///< rad/s, of one sample: of the angular velocity that goes out
   LabelExchange* labels = nullptr;  ///< shown and filled; null: no labels are taken; outlives the thread
 };
@@ -39,8 +42,5 @@ class DdsThread {
   class Work;
   std::unique_ptr<Work> work_;
 };
-
-/// From CLOCK_MONOTONIC, which live stamps are of, to CLOCK_REALTIME, which ROS's are: as both are now.
-Duration realtimeOffset();
 
 }  // namespace swiftlet

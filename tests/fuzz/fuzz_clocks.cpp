@@ -1,11 +1,9 @@
 #include "tests/fuzz/fuzz_clocks.hpp"
 
-#include <array>
 #include <cstdint>
 #include <limits>
 
 #include "drivers/timesync/clock_map.hpp"
-#include "drivers/timesync/realtime_offset.hpp"
 #include "drivers/timesync/trigger_matcher.hpp"
 #include "drivers/timesync/two_way_clock_map.hpp"
 #include "tests/fuzz/demand.hpp"
@@ -64,7 +62,6 @@ struct World {
   TwoWayClockMap two_way;
   EdgeTrain train;
   TriggerMatcher matcher;
-  RealtimeOffset realtime;
   Stamp last{std::numeric_limits<std::int64_t>::min()};
 };
 
@@ -100,16 +97,6 @@ void clocks(std::string_view text) {
       case 6:
         world.matcher.pairFirst(sequence);
         break;
-      case 7: {
-        const std::array<ClockReading, 2> readings = {
-            ClockReading{{host}, {device}, {sum(host, bytes.step())}},
-            ClockReading{{bytes.any()}, {bytes.any()}, {bytes.any()}}};
-        (void)world.realtime.measure(readings);
-        Stamp out;
-        (void)world.realtime.toMonotonic({device}, out);
-        (void)world.realtime.due({host});
-        break;
-      }
       case 8:
         (void)world.two_way.add({{bytes.any()}, {device}, {bytes.any()}});
         break;

@@ -2,6 +2,7 @@
 // topic; and labels on their way in, also while somebody floods them.
 
 #include <algorithm>
+#include <atomic>
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <cmath>
@@ -23,7 +24,8 @@ using test::PeerProcess;
 
 constexpr int kWidth = 64;
 constexpr int kHeight = 48;
-constexpr std::int64_t kOffset = 5'000'000'123;  ///< ns, from the run's clock to ROS's
+constexpr std::int64_t kOffset = 5'000'000'123;    ///< ns, from the run's clock to ROS's
+constexpr std::int64_t kStep = 3'600'000'000'077;  ///< ns, by which the wall clock is set ahead in a run
 constexpr double kGyroSigma = 0.01;
 
 // Everything of message n is a function of n, which is its stamp in milliseconds.
@@ -96,7 +98,8 @@ class Fields {
   double number() { return std::stod(word()); }
   /// n of a header's stamp.
   std::int64_t stamp() {
-    const std::int64_t ns = std::stoll(word()) - kOffset;
+    std::int64_t ns = std::stoll(word()) - kOffset;
+    if (ns >= kStep) ns -= kStep;
     REQUIRE(ns % 1'000'000 == 0);
     return ns / 1'000'000;
   }
@@ -241,14 +244,18 @@ class ScriptedMap {
   std::vector<std::pair<int, std::int64_t>> open_;
 };
 
+/// The wall clock, which a test may set.
+std::atomic<std::int64_t> ahead{kOffset};
+
 DdsThreadOptions optionsFor(LabelExchange& exchange) {
+  ahead = kOffset;
   DdsThreadOptions options;
   options.settings.enabled = true;
   options.settings.domain = static_cast<int>(ownDomain());
   options.settings.odometry_hz = 100;
   options.settings.mesh_hz = 20;
   options.settings.label_topic = "/segmentation/labels";
-  options.to_ros_clock = {kOffset};
+  options.clocks = [] { return HostClocks{monotonicNow(), {ahead.load()}, {1}}; };
   options.gyro_sigma = kGyroSigma;
   options.labels = &exchange;
   return options;
@@ -264,16 +271,17 @@ TEST_CASE("every field of a run reaches another implementation, and its labels c
   const auto outlet = std::make_unique<LiveOutlet>();
   LabelExchange exchange(kWidth, kHeight, Duration::fromSeconds(1));
   DdsThread thread(*outlet, optionsFor(exchange));
-  PeerProcess peer(SWIFTLET_DDS_LABELLER, peerArguments({"delay=0.3", "dump=1"}));
+  PeerProcess peer(SWIFTLET_DDS_LABELLER, peerArguments({"delay=0.7", "dump=1"}));
   MapCorrection correction;
   correction.epoch = 1;
   correction.T_map_world.translation = {0.25, -0.5, 1};
   outlet->correction.write(correction);
   ScriptedMap map(exchange);
   std::string text;
-  // Until it has been there for 2.5 s.
+  // Until it has been there for 3.5 s; half way the wall clock is set, while labels are awaited.
   std::int64_t since = -1;
-  for (std::int64_t n = 1; n < 20'000 && (since < 0 || n < since + 2500); n += 5) {
+  for (std::int64_t n = 1; n < 20'000 && (since < 0 || n < since + 3500); n += 5) {
+    if (since >= 0 && n == since + 1750) ahead += kStep;
     outlet->state.write(stateOf(n));
     if (n % 50 == 1) outlet->frame.write(frameOf(n));
     if (n % 50 == 1) fill(outlet->mesh.draft(), n), outlet->mesh.publish();
@@ -310,6 +318,8 @@ TEST_CASE("every field of a run reaches another implementation, and its labels c
   CHECK(seen["odometry"] <= said["odometry"].get<int>());
   CHECK(said["refused"] == 0);
   CHECK(map.labelled >= 8);
+  CHECK(map.unlabelled <= 1);
+  CHECK(said["clock_steps"] == 1);
   CHECK(map.wrong_pixels == 0);
   CHECK(said["labels"]["used"].get<int>() >= map.labelled);
   CHECK(said["labels"]["wrong_size"] == 0);
