@@ -86,7 +86,6 @@ bool flyThreaded(const Calibration& calibration, SensorInput& input, const Setti
 
   ThreadedOptions options;
   options.realtime = settings.realtime;
-  options.watch = request.watch;
   options.started = [&](const std::vector<ThreadReport>& threads) {
     ArmingGround ground;
     for (const ThreadReport& thread : threads) {

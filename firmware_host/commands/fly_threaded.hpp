@@ -19,8 +19,7 @@ struct FlightRequest {
   bool host_stamps = false;  ///< of CLOCK_MONOTONIC, not of a log
   /// From a log's stamps to CLOCK_MONOTONIC; gives none while that is not known. Any thread.
   std::function<std::optional<Duration>()> to_host;
-  bool announce = false;  ///< print the table of what was reserved, and what is missing
-  std::function<void(const char* thread, bool begins)> watch;
+  bool announce = false;            ///< print the table of what was reserved, and what is missing
   std::string name;                 ///< what is flown, for those who look on
   std::optional<ViewAddress> view;  ///< serve the live view there
 };

@@ -159,7 +159,6 @@ class ReplayRun {
     if (request_.real_time) {
       FlightRequest flight;
       flight.speed = request_.speed;
-      flight.watch = hooks_.watch;
       flight.announce = request_.show_progress;
       // Of a folder named with a slash at its end, too.
       const std::filesystem::path log = std::filesystem::path(request_.log).lexically_normal();

@@ -38,10 +38,9 @@ struct ReplayRequest {
   bool show_progress = false;
 };
 
-/// Tests slow stages down and set traps on threads with these.
+/// Tests slow stages down with these.
 struct ReplayHooks {
   std::function<void(StageId, double)> drag;
-  std::function<void(const char* thread, bool begins)> watch;
 };
 
 struct ReplayResult {

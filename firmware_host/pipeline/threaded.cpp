@@ -44,6 +44,7 @@ class Run : public SensorSink {
     waitForEnd();
     for (std::size_t i = 0; i < started_; ++i) {
       threads_[i].join();
+      report_.threads[i].faults = threads_[i].pageFaults();
       if (!threads_[i].fault().empty()) {
         report_.faults.push_back(report_.threads[i].name + ": " + threads_[i].fault());
       }
@@ -62,11 +63,7 @@ class Run : public SensorSink {
     settings.name = name;
     settings.priority = options_.realtime.enabled ? priority : 0;
     settings.cpu = options_.realtime.enabled ? cpu : -1;
-    report_.threads.push_back(threads_.at(started_++).start(settings, [this, name, entry] {
-      if (options_.watch) options_.watch(name, true);
-      entry();
-      if (options_.watch) options_.watch(name, false);
-    }));
+    report_.threads.push_back(threads_.at(started_++).start(settings, std::move(entry)));
     const ThreadReport& report = report_.threads.back();
     if (!report.started) report_.faults.push_back(report.name + ": " + report.message);
     return report.started;

@@ -22,8 +22,6 @@ struct ThreadedOptions {
   RealtimeGroup realtime;
   /// Called once with what the threads got, before the first message.
   std::function<void(const std::vector<ThreadReport>&)> started;
-  /// Called on each thread as it begins and ends: tests arm their traps here.
-  std::function<void(const char* thread, bool begins)> watch;
 };
 
 struct ThreadedReport {

@@ -4,13 +4,17 @@
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <exception>
+#include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <sstream>
 #include <utility>
 
 namespace swiftlet {
@@ -46,6 +50,33 @@ std::string joined(const std::vector<int>& numbers) {
 
 std::string errorText(int error) { return std::generic_category().message(error); }
 
+PageFaults ownFaults() {
+  rusage usage{};
+  getrusage(RUSAGE_THREAD, &usage);
+  return {static_cast<std::uint64_t>(usage.ru_minflt), static_cast<std::uint64_t>(usage.ru_majflt)};
+}
+
+/// Of another thread of this process; nothing where there is none.
+std::optional<PageFaults> faultsOf(pid_t thread) {
+  std::ifstream file(fmt::format("/proc/self/task/{}/stat", thread));
+  std::string text;
+  if (!std::getline(file, text)) return std::nullopt;
+  // After the name in brackets: state, 6 numbers, minor faults, those of children, major faults (proc(5)).
+  std::istringstream fields(text.substr(text.rfind(')') + 1));
+  constexpr int kBefore = 7;
+  std::string skipped;
+  for (int i = 0; i < kBefore; ++i) fields >> skipped;
+  PageFaults faults;
+  if (fields >> faults.minor >> skipped >> faults.major) return faults;
+  return std::nullopt;
+}
+
+PageFaults operator-(const PageFaults& a, const PageFaults& b) {
+  return {a.minor - b.minor, a.major - b.major};
+}
+
+std::atomic<void (*)(const char*, bool)> watch_of_all{nullptr};
+
 }  // namespace
 
 const char* policyName(ThreadPolicy policy) {
@@ -63,6 +94,7 @@ nlohmann::ordered_json toJson(const ThreadReport& report) {
            report.wanted_cpu < 0 ? nlohmann::ordered_json("any") : nlohmann::ordered_json(report.wanted_cpu)},
           {"cpus", report.actual_cpus},
           {"stack_bytes", report.stack_bytes},
+          {"page_faults", {{"minor", report.faults.minor}, {"major", report.faults.major}}},
           {"message", report.message}};
 }
 
@@ -203,8 +235,12 @@ void FlightThread::begin(Core& core) {
   core.seen.actual_policy = policyOf(policy);
   core.seen.actual_priority = priority.sched_priority;
   core.seen.actual_cpus = allowedCpus();
+  core.kernel_id = gettid();
+  const auto watch = watch_of_all.load(std::memory_order_relaxed);
+  core.faults_before = ownFaults();
   core.begun.store(true, std::memory_order_release);
   core.begun.notify_one();
+  if (watch != nullptr) watch(core.name.c_str(), true);
   try {
     core.entry();
   } catch (const std::exception& error) {
@@ -212,7 +248,22 @@ void FlightThread::begin(Core& core) {
   } catch (...) {
     core.fault = "something that is no std::exception was thrown";
   }
+  core.faults = ownFaults() - core.faults_before;
+  if (watch != nullptr) watch(core.name.c_str(), false);
+  core.over.store(true, std::memory_order_release);
   core.ended.ring();
+}
+
+PageFaults FlightThread::pageFaults() const {
+  if (!core_) return faults_;
+  if (core_->over.load(std::memory_order_acquire)) return core_->faults;
+  if (!core_->begun.load(std::memory_order_acquire)) return {};
+  const auto now = faultsOf(core_->kernel_id);
+  return now ? *now - core_->faults_before : PageFaults{};
+}
+
+void FlightThread::watchAll(void (*watch)(const char* thread, bool begins)) {
+  watch_of_all.store(watch, std::memory_order_relaxed);
 }
 
 bool FlightThread::joinWithin(Duration limit) {
@@ -227,6 +278,7 @@ void FlightThread::join() {
   pthread_join(thread_, nullptr);
   joinable_ = false;
   fault_ = std::move(core_->fault);
+  faults_ = core_->faults;
   stack_used_ = core_->stack.used();
   core_.reset();
 }

@@ -10,14 +10,15 @@
 //   thread begins: every page is resident then, and after the thread's end the deepest use can be read.
 // Exceptions: what escapes from `entry` ends the thread and is kept as text (fault()); nothing crosses.
 // Sleeps are exact: the thread's timer slack is 1 ns (SCHED_OTHER would have 50 us).
-// Stuck: joinWithin() waits for a bounded time, and abandon() leaves the thread to itself: its stack and
-// entry
+// Stuck: joinWithin() waits for a bounded time, and abandon() leaves the thread to itself: its stack and entry
 //   stay for good. What the entry refers to has to stay as well; that is the owner's matter.
 
 #include <pthread.h>
+#include <sys/types.h>
 
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
@@ -48,6 +49,12 @@ struct ThreadSettings {
   std::size_t stack_bytes = kFlightStackBytes;
 };
 
+/// Accesses to memory that was not there. Minor: a page was mapped or copied; major: read from a disk.
+struct PageFaults {
+  std::uint64_t minor = 0;
+  std::uint64_t major = 0;
+};
+
 /// What was wanted and what the kernel gave.
 struct ThreadReport {
   std::string name;
@@ -60,6 +67,7 @@ struct ThreadReport {
   std::size_t stack_bytes = 0;
   bool started = false;
   std::string message;  ///< what is missing and the remedy, one sentence each; empty: all as wanted
+  PageFaults faults;    ///< of its entry; whoever ends the thread fills them in
 
   /// It runs, with the policy and priority that it was to have.
   [[nodiscard]] bool hasPriority() const {
@@ -95,6 +103,13 @@ class FlightThread {
   [[nodiscard]] const std::string& fault() const { return fault_; }
   /// After join: deepest use of the stack in bytes, thread-local storage included.
   [[nodiscard]] std::size_t stackUsed() const { return stack_used_; }
+  /// Since `entry` began: of a thread that runs, or hangs, as the kernel counts them; of one that has ended,
+  /// all. Opens a file: not for the flight path.
+  [[nodiscard]] PageFaults pageFaults() const;
+
+  /// For tests, which arm their traps: called on each thread of the program as its entry begins and ends.
+  /// Null: nobody is.
+  static void watchAll(void (*watch)(const char* thread, bool begins));
 
  private:
   /// A mapping with a guard page at its low end.
@@ -121,7 +136,11 @@ class FlightThread {
     std::string fault;
     std::string name;
     ThreadReport seen;  ///< what the thread found of itself as it began
+    pid_t kernel_id = 0;
+    PageFaults faults_before;  ///< of making the thread
+    PageFaults faults;         ///< of an entry that has ended
     std::atomic<bool> begun{false};
+    std::atomic<bool> over{false};
     Doorbell ended;  ///< rung by the thread's last step
   };
 
@@ -133,6 +152,7 @@ class FlightThread {
   pthread_t thread_{};
   bool joinable_ = false;
   std::string fault_;
+  PageFaults faults_;  ///< of a thread that was joined
   std::size_t stack_used_ = 0;
 };
 

@@ -242,5 +242,55 @@ TEST_CASE("the deepest use of the stack is measured") {
 }
 #endif
 
+TEST_CASE("a thread's page faults are counted, while it hangs and after its end") {
+  constexpr std::size_t kPages = 50;
+  const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+  void* const memory =
+      mmap(nullptr, kPages * page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  REQUIRE(memory != MAP_FAILED);
+  // Else one fault may bring all of it.
+  madvise(memory, kPages * page, MADV_NOHUGEPAGE);
+  std::atomic<bool> touched{false}, end{false};
+  FlightThread thread;
+  CHECK(thread.pageFaults().minor == 0);
+  const ThreadReport report = thread.start({"faulty", 0, -1, kStack}, [&] {
+    for (std::size_t i = 0; i < kPages; ++i) static_cast<volatile char*>(memory)[i * page] = 1;
+    touched = true;
+    touched.notify_one();
+    end.wait(false);
+  });
+  REQUIRE(report.started);
+  touched.wait(false);
+  const PageFaults hanging = thread.pageFaults();
+  CHECK(hanging.minor >= kPages);
+  end = true;
+  end.notify_one();
+  thread.join();
+  CHECK(thread.pageFaults().minor >= hanging.minor);
+  CHECK(thread.pageFaults().minor < hanging.minor + kPages);
+  // Another entry counts anew.
+  REQUIRE(thread.start({"sound", 0, -1, kStack}, [] {}).started);
+  thread.join();
+  CHECK(thread.pageFaults().minor < kPages);
+  munmap(memory, kPages * page);
+}
+
+std::atomic<int> begins{0}, ends{0};
+
+TEST_CASE("a test sees every thread begin and end") {
+  FlightThread::watchAll([](const char* thread, bool begin) {
+    if (std::strcmp(thread, "watched") == 0) ++(begin ? begins : ends);
+  });
+  FlightThread thread;
+  REQUIRE(thread.start({"watched", 0, -1, kStack}, [] { throw std::runtime_error("it ends"); }).started);
+  thread.join();
+  CHECK(begins == 1);
+  CHECK(ends == 1);
+  FlightThread::watchAll(nullptr);
+  REQUIRE(thread.start({"watched", 0, -1, kStack}, [] {}).started);
+  thread.join();
+  CHECK(begins == 1);
+}
+
 }  // namespace
 }  // namespace swiftlet

@@ -1,9 +1,10 @@
 #!/bin/sh
 # Flights on a hardware-in-the-loop replay in the kernel sandbox, by simulated time.
-# usage: check_flight.sh PROGRAM accuracy|faults SECONDS [LINK...]
+# usage: check_flight.sh PROGRAM accuracy|faults|trap SECONDS [LINK...]
 #   accuracy  the odometry's ATE is within the larger of 20 % and 3 mm of a plain replay's
 #   faults    a timeline of several faults, flown twice: every check passes, and both flights list the same events
-#   LINK      of guest_flight.sh: serial, can, trigger, protocol=NAME, hangup
+#   trap      flyer=PROGRAM is trapped_program: no thread of the flight did what it must not, with faults and without
+#   LINK      of guest_flight.sh: serial, can, trigger, protocol=NAME, hangup, flyer=PROGRAM, autopilot
 # Needs euroc_mh01_20s in the folder SWIFTLET_DATA, or in ../shared/data beside the project. Exit code 77: skipped.
 set -u
 program=$1
@@ -27,7 +28,7 @@ fly() {
   shift
   SWIFTLET_SANDBOX_SHARE=$out SWIFTLET_SANDBOX_TIME=simulated SWIFTLET_SANDBOX_CAMERAS=loop \
     SWIFTLET_SANDBOX_MEMORY=1500M SWIFTLET_SANDBOX_TIMEOUT=160 "$root/toolchain/kernel_sandbox/run.sh" \
-    sh "$here/guest_flight.sh" "$program" "$log" "$out/$name" nomesh seconds="$seconds" "$@"
+    sh "$here/guest_flight.sh" "$program" "$log" "$out/$name" seconds="$seconds" "$@"
   code=$?
   [ $code -eq 77 ] && exit 77
   [ $code -eq 0 ] && return
@@ -49,7 +50,7 @@ events() {
 
 case $what in
   accuracy)
-    fly flight "$@"
+    fly flight nomesh "$@"
     case " $* " in
       *' hangup '*) grep 'terminal closed (SIGHUP)' "$out/flight/flight/events.log" || exit 1 ;;
     esac
@@ -73,7 +74,7 @@ case $what in
   faults)
     printf '%s\n' '2.0,imu,unplug,0.8' '2.5,camera1,stall,1.5' '3.0,imu,clock_step,0,-0.25' \
       '3.2,camera0,dark,0.7' '4.0,imu,drop,0.4,0.3' >"$out/faults.csv"
-    for name in first second; do fly $name "$@" faults="$out/faults.csv"; done
+    for name in first second; do fly $name nomesh "$@" faults="$out/faults.csv"; done
     "$program" evaluate "$out/first/flight" --hil "$out/first/hil" --junit "$out/first.xml" || exit 1
     grep -q '<testcase classname="hil" name="told: ' "$out/first.xml" || exit 1
     cmp "$out/first/hil/faults.csv" "$out/second/hil/faults.csv" || exit 1
@@ -81,6 +82,18 @@ case $what in
     events second >"$out/second.txt"
     cat "$out/first.txt"
     [ -s "$out/first.txt" ] && diff "$out/first.txt" "$out/second.txt"
+    ;;
+  trap)
+    printf '%s\n' '2.0,imu,unplug,0.8' '3.5,camera0,stall,1.5' '4.0,imu,clock_step,0,-0.25' \
+      '4.6,camera1,unplug,0.8' >"$out/faults.csv"
+    fly flight realtime "$@"
+    sed -n '/^thread  /,$p' "$out/flight/fly.txt"
+    SWIFTLET_TRAP_REOPENS=camera1
+    export SWIFTLET_TRAP_REOPENS
+    fly faults realtime "$@" faults="$out/faults.csv"
+    sed -n '/^thread  /,$p' "$out/faults/fly.txt"
+    events faults
+    grep -q '^imu  .*[0-9]' "$out/faults/fly.txt"
     ;;
   *)
     echo "check_flight: what is $what?" >&2

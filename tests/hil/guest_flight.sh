@@ -1,11 +1,15 @@
 #!/bin/sh
 # Inside the kernel sandbox, cameras looping: plays a log out through the kernel's devices and flies on them with the
 # unmodified program.
-# usage: guest_flight.sh PROGRAM LOG OUT [serial|can] [trigger] [faults=FILE] [seconds=N] [protocol=NAME] [nomesh] [hangup]
+# usage: guest_flight.sh PROGRAM LOG OUT [serial|can] [trigger] [faults=FILE] [seconds=N] [protocol=NAME] [nomesh]
+#                        [hangup] [flyer=PROGRAM] [realtime] [autopilot]
 #   PROGRAM  swiftlet
 #   LOG      EuRoC folder with calibration
 #   OUT      folder: vehicle.yaml, hil/, flight/, what each program said
 #   hangup   the flight's terminal closes: SIGHUP after 3 s
+#   flyer    flies in place of PROGRAM
+#   realtime priorities and locked memory as on a vehicle
+#   autopilot  an autopilot's port that nobody listens at
 # Exit code: 0 when both programs ended well.
 set -u
 program=$1
@@ -19,6 +23,9 @@ seconds=0
 protocol=bridge
 mesh=true
 hangup=no
+flyer=$program
+realtime=false
+autopilot=''
 for option in "$@"; do
   case $option in
     serial | can) link=$option ;;
@@ -27,6 +34,9 @@ for option in "$@"; do
     seconds=*) seconds=${option#seconds=} ;;
     nomesh) mesh=false ;;
     hangup) hangup=yes ;;
+    flyer=*) flyer=${option#flyer=} ;;
+    realtime) realtime=true ;;
+    autopilot) autopilot=udp:127.0.0.1:14550 ;;
     protocol=*) protocol=${option#protocol=} ;;
     *)
       echo "guest_flight: what is $option?" >&2
@@ -54,7 +64,9 @@ hil:
   output0: '$SANDBOX_OUTPUT0'
   output1: '$SANDBOX_OUTPUT1'
 realtime:
-  enabled: false
+  enabled: $realtime
+autopilot:
+  device: '$autopilot'
 mesh:
   enabled: $mesh
 END
@@ -75,7 +87,7 @@ for _ in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20; do
   if [ "$link" = can ] || [ -e "$imu" ]; then break; fi
   sleep 0.1
 done
-"$program" fly --settings "$out/vehicle.yaml" --imu-rate --out "$out/flight" >"$out/fly.txt" 2>&1 &
+"$flyer" fly --settings "$out/vehicle.yaml" --imu-rate --out "$out/flight" >"$out/fly.txt" 2>&1 &
 fly=$!
 if [ $hangup = yes ]; then
   sleep 3

@@ -5,15 +5,22 @@
 #include <poll.h>
 #include <pthread.h>
 #include <sys/epoll.h>
+#include <sys/resource.h>
 #include <sys/select.h>
 #include <sys/socket.h>
 #include <sys/uio.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstddef>
 #include <cstdlib>
+#include <cstring>
+#include <mutex>
+#include <utility>
+
+#include "firmware_host/realtime/flight_thread.hpp"
 
 extern "C" {
 void* __libc_malloc(std::size_t);
@@ -26,31 +33,54 @@ void __libc_free(void*);
 namespace swiftlet {
 namespace {
 
-std::atomic<std::uint64_t> heap_calls{0};
 std::atomic<std::uint64_t> heap_calls_of_all{0};
-std::atomic<std::uint64_t> lock_calls{0};
-std::atomic<std::uint64_t> wait_calls{0};
+
+struct Row {
+  std::array<char, 16> name{};  ///< as the kernel's: 15 characters
+  bool aborts = false;
+  std::atomic<std::uint64_t> heap{0}, locks{0}, waits{0}, minor_faults{0}, major_faults{0};
+};
+std::array<Row, 32> rows;
+std::atomic<std::size_t> row_count{0};
+std::mutex rows_mutex;  ///< among those that arm
+
 // Initial-exec: the storage is there before any code of the thread runs, and is not allocated on first use.
-__attribute__((tls_model("initial-exec"))) thread_local bool armed = false;
+__attribute__((tls_model("initial-exec"))) thread_local Row* armed = nullptr;
+__attribute__((tls_model("initial-exec"))) thread_local rusage at_arming{};
 
 void noteHeap() {
   heap_calls_of_all.fetch_add(1, std::memory_order_relaxed);
-  if (!armed) return;
-  heap_calls.fetch_add(1, std::memory_order_relaxed);
-  // For the debugger: who was it?
-  if (std::getenv("SWIFTLET_TRAP_ABORTS") != nullptr) std::abort();
+  if (armed == nullptr) return;
+  armed->heap.fetch_add(1, std::memory_order_relaxed);
+  if (armed->aborts) std::abort();
 }
 
 void noteLock() {
-  if (!armed) return;
-  lock_calls.fetch_add(1, std::memory_order_relaxed);
-  if (std::getenv("SWIFTLET_TRAP_ABORTS") != nullptr) std::abort();
+  if (armed == nullptr) return;
+  armed->locks.fetch_add(1, std::memory_order_relaxed);
+  if (armed->aborts) std::abort();
 }
 
 void noteWait() {
-  if (!armed) return;
-  wait_calls.fetch_add(1, std::memory_order_relaxed);
-  if (std::getenv("SWIFTLET_TRAP_ABORTS") != nullptr) std::abort();
+  if (armed != nullptr) armed->waits.fetch_add(1, std::memory_order_relaxed);
+}
+
+Row& rowOf(const char* name) {
+  const std::lock_guard lock(rows_mutex);
+  for (std::size_t i = 0; i < row_count; ++i) {
+    if (std::strncmp(rows[i].name.data(), name, rows[i].name.size() - 1) == 0) return rows[i];
+  }
+  Row& row = rows.at(row_count);
+  std::strncpy(row.name.data(), name, row.name.size() - 1);
+  const char* aborts = std::getenv("SWIFTLET_TRAP_ABORTS");
+  row.aborts = aborts != nullptr && std::strcmp(aborts, name) == 0;
+  ++row_count;
+  return row;
+}
+
+TrapCounts countsOf(const Row& row) {
+  return {row.heap.load(), row.locks.load(), row.waits.load(), row.minor_faults.load(),
+          row.major_faults.load()};
 }
 
 template <typename Function>
@@ -60,9 +90,62 @@ Function next(const char* name) {
 
 }  // namespace
 
-void armTrap() { armed = true; }
-void disarmTrap() { armed = false; }
-TrapCounts trapCounts() { return {heap_calls.load(), lock_calls.load(), wait_calls.load()}; }
+void armTrap(const char* name) {
+  Row& row = rowOf(name);
+  getrusage(RUSAGE_THREAD, &at_arming);
+  armed = &row;
+}
+
+void disarmTrap() {
+  Row* const row = std::exchange(armed, nullptr);
+  if (row == nullptr) return;
+  rusage now{};
+  getrusage(RUSAGE_THREAD, &now);
+  row->minor_faults += static_cast<std::uint64_t>(now.ru_minflt - at_arming.ru_minflt);
+  row->major_faults += static_cast<std::uint64_t>(now.ru_majflt - at_arming.ru_majflt);
+}
+
+void armAllThreads() {
+  FlightThread::watchAll([](const char* thread, bool begins) {
+    if (begins) {
+      armTrap(thread);
+    } else {
+      disarmTrap();
+    }
+  });
+}
+
+TrapCounts trapCounts() {
+  TrapCounts all;
+  for (std::size_t i = 0; i < row_count; ++i) {
+    const TrapCounts one = countsOf(rows[i]);
+    all = {all.heap + one.heap, all.locks + one.locks, all.waits + one.waits,
+           all.minor_faults + one.minor_faults, all.major_faults + one.major_faults};
+  }
+  return all;
+}
+
+std::vector<TrappedThread> trappedThreads() {
+  std::vector<TrappedThread> all;
+  for (std::size_t i = 0; i < row_count; ++i) all.push_back({rows[i].name.data(), countsOf(rows[i])});
+  return all;
+}
+
+TrapCounts trapCountsOf(const std::string& name) {
+  for (const TrappedThread& thread : trappedThreads()) {
+    if (thread.name == name) return thread.counts;
+  }
+  return {};
+}
+
+void resetTrap() {
+  for (Row& row : rows) {
+    for (auto* count : {&row.heap, &row.locks, &row.waits, &row.minor_faults, &row.major_faults}) *count = 0;
+    row.name = {};
+  }
+  row_count = 0;
+}
+
 std::uint64_t heapCallsOfAll() { return heap_calls_of_all.load(); }
 
 }  // namespace swiftlet
@@ -175,6 +258,12 @@ ssize_t recv(int socket, void* to, std::size_t bytes, int flags) {
   static const auto real = swiftlet::next<ssize_t (*)(int, void*, std::size_t, int)>("recv");
   swiftlet::noteWait();
   return real(socket, to, bytes, flags);
+}
+ssize_t recvfrom(int socket, void* to, std::size_t bytes, int flags, sockaddr* from, socklen_t* size) {
+  static const auto real =
+      swiftlet::next<ssize_t (*)(int, void*, std::size_t, int, sockaddr*, socklen_t*)>("recvfrom");
+  swiftlet::noteWait();
+  return real(socket, to, bytes, flags, from, size);
 }
 ssize_t recvmsg(int socket, msghdr* message, int flags) {
   static const auto real = swiftlet::next<ssize_t (*)(int, msghdr*, int)>("recvmsg");
