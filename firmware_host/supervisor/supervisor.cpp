@@ -202,8 +202,9 @@ void Supervisor::tellArming() {
 void Supervisor::tellSystemd(Stamp now) {
   if (systemd_ == nullptr) return;
   if (!std::exchange(ready_sent_, true)) systemd_->ready();
-  if (verdict_.ending && !std::exchange(stopping_sent_, true)) systemd_->stopping();
-  // A lost flight thread ends the run. Should that hang, systemd ends the process.
+  // A lost flight thread ends the run. Should that hang, the watchdog ends the process: it sleeps after
+  // STOPPING.
+  if (verdict_.ending && !verdict_.run_failed && !std::exchange(stopping_sent_, true)) systemd_->stopping();
   systemd_->watchdog(!verdict_.run_failed, now);
   std::array<char, 256> line;
   Text text(line);
