@@ -54,7 +54,7 @@ struct FlightFacts {
   SensorNews imu;
   std::array<SensorNews, kMaxCameras> camera;
   SensorNews trigger;
-  std::uint64_t equal_samples = 0;  ///< of the IMU, in a row, the newest included
+  std::uint64_t equal_samples = 0;  ///< of the IMU, as EqualReadings counts them
   EstimateNews estimate;
   bool recorder_running = false;
   std::uint64_t recorder_lost = 0;              ///< records

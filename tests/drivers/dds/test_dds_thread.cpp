@@ -6,12 +6,14 @@
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <thread>
 
 #include "drivers/calibration/input_error.hpp"
+#include "drivers/device/monotonic_now.hpp"
 #include "firmware_host/dds/dds_thread.hpp"
 #include "firmware_host/report/map_files.hpp"
 #include "tests/drivers/dds/peer_process.hpp"
@@ -186,7 +188,7 @@ void checkSurface(Fields& fields) {
 }
 
 void checkDiagnostics(Fields& fields) {
-  fields.stamp();
+  fields.word();  // the newest frame's stamp, carried on
   fields.expectWords({"-"});
   fields.expect({1, 1});
   fields.expectWords({"swiftlet/health", "degraded", "swiftlet"});
@@ -323,6 +325,56 @@ TEST_CASE("every field of a run reaches another implementation, and its labels c
   CHECK(map.wrong_pixels == 0);
   CHECK(said["labels"]["used"].get<int>() >= map.labelled);
   CHECK(said["labels"]["wrong_size"] == 0);
+}
+
+TEST_CASE("diagnostics tell the verdict at once, and go on while no frame comes", "[dds]") {
+  const auto outlet = std::make_unique<LiveOutlet>();
+  LabelExchange exchange(kWidth, kHeight, Duration::fromSeconds(1));
+  DdsThread thread(*outlet, optionsFor(exchange));
+  PeerProcess peer(SWIFTLET_DDS_LABELLER, peerArguments({"dump=1"}));
+  std::string text;
+  const auto heard = [&](const std::string& what) {
+    std::istringstream lines(text);
+    int count = 0;
+    for (std::string line; std::getline(lines, line);) {
+      count += line.starts_with("diagnostics") && line.find(what) != std::string::npos ? 1 : 0;
+    }
+    return count;
+  };
+  const auto until = [&](const std::string& what, int times, auto&& each) {
+    for (int i = 0; i < 4000 && heard(what) < times; ++i) {
+      each();
+      text += peer.poll();
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    CHECK(heard(what) >= times);
+  };
+  outlet->frame.write(frameOf(1));
+  Verdict verdict;
+  verdict.health = Health::kGood;
+  const auto supervise = [&] {
+    verdict.evaluated = monotonicNow();
+    outlet->verdict.write(verdict);
+  };
+  // Blanks are printed as underscores. No frame comes after the first.
+  until("swiftlet/health good", 3, supervise);
+  Trouble trouble;
+  std::snprintf(trouble.member.data(), trouble.member.size(), "mesh");
+  std::snprintf(trouble.text.data(), trouble.text.size(), "no memory");
+  trouble.condition = Condition::kLost;
+  trouble.since = monotonicNow();
+  static_cast<void>(verdict.troubles.tryPushBack(trouble));
+  ++verdict.trouble_changes;
+  verdict.health = Health::kDegraded;
+  until("degraded;_mesh_is_lost", 1, supervise);
+  CHECK(heard("lost/mesh no_memory;_since") > 0);
+  CHECK(heard("ready_to_arm 1") > 0);
+  until("the_supervisor_has_stopped", 2, [] {});
+  verdict.troubles.clear();
+  ++verdict.trouble_changes;
+  until("degraded swiftlet", 1, supervise);
+  static_cast<void>(thread.finish());
+  peer.finish();
 }
 
 TEST_CASE("a flood of label images costs them alone, each one counted", "[dds]") {

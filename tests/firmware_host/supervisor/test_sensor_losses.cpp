@@ -1,8 +1,10 @@
 // Sensors that fall silent, values that stand still, stages that turn without a product, and files that fail.
 
 #include <catch2/catch.hpp>
+#include <cstdint>
 #include <cstdio>
 
+#include "firmware_host/supervisor/equal_readings.hpp"
 #include "tests/firmware_host/supervisor/simulated_flight.hpp"
 
 namespace swiftlet {
@@ -138,6 +140,17 @@ TEST_CASE("an IMU that repeats one reading fails the health", "[supervisor]") {
   flight.facts.equal_samples = 1;
   flight.pass(0.2);
   CHECK(flight.verdict.health == Health::kGood);
+}
+
+TEST_CASE("equal readings are counted, whatever their stamps", "[supervisor]") {
+  EqualReadings readings;
+  ImuSample sample = {Stamp{1}, {0.1, 0.2, 0.3}, {0, 0, 9.8}};
+  CHECK(readings.note(sample) == 1);
+  sample.stamp = Stamp{2};
+  CHECK(readings.note(sample) == 2);
+  sample.accel.z() += 1e-6;
+  CHECK(readings.note(sample) == 1);
+  for (int i = 2; i <= 200; ++i) CHECK(readings.note(sample) == static_cast<std::uint64_t>(i));
 }
 
 TEST_CASE("files that fail cost neither the flight nor its arming", "[supervisor]") {
