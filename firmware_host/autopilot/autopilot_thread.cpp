@@ -80,6 +80,7 @@ class AutopilotThread::Work {
 
   /// False: the thread is stuck and was left behind, with all of this.
   bool end() { return thread_.end(); }
+  void tellEnd() { thread_.tellEnd(); }
   [[nodiscard]] const Heartbeat& heart() const { return thread_.heart(); }
   [[nodiscard]] const std::string& fault() const { return thread_.fault(); }
 
@@ -337,13 +338,15 @@ AutopilotThread::~AutopilotThread() {
 }
 
 const Heartbeat& AutopilotThread::heart() const { return work_->heart(); }
+void AutopilotThread::tellEnd() { work_->tellEnd(); }
 
 bool AutopilotThread::drainEvents(const std::function<void(Stamp, const std::string&)>& take) {
   return work_->drainEvents(take);
 }
 
 nlohmann::ordered_json AutopilotThread::finish() {
-  static_cast<void>(work_->end());
+  // What a thread that is left behind counts is still being written.
+  if (!work_->end()) return {{"fault", work_->fault()}};
   nlohmann::ordered_json json = work_->json();
   if (!work_->fault().empty()) json["fault"] = work_->fault();
   return json;

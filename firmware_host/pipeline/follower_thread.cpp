@@ -20,7 +20,7 @@ void FollowerThread::start(const ThreadSettings& settings, const std::string& fi
 }
 
 bool FollowerThread::end(Duration limit) {
-  ending_.store(true, std::memory_order_relaxed);
+  tellEnd();
   if (abandoned_) return false;
   if (thread_.joinWithin(limit)) {
     if (fault_.empty()) fault_ = thread_.fault();

@@ -16,8 +16,8 @@ namespace swiftlet {
 
 class FollowerThread {
  public:
-  /// A run's end takes 2 s at most, with three followers and the run's own threads.
-  static constexpr Duration kLongestEnd = Duration::fromMilliseconds(400);
+  /// A run's end takes 2 s at most, should all three followers be stuck.
+  static constexpr Duration kLongestEnd = Duration::fromMilliseconds(600);
 
   FollowerThread() = default;
   ~FollowerThread() { static_cast<void>(end()); }
@@ -30,6 +30,8 @@ class FollowerThread {
   /// Waits for the entry to return, which looks at ending(). False: it did not within `limit` and is given
   /// up, now or by an earlier call.
   [[nodiscard]] bool end(Duration limit = kLongestEnd);
+  /// Waits for nothing.
+  void tellEnd() { ending_.store(true, std::memory_order_relaxed); }
   [[nodiscard]] bool ending() const { return ending_.load(std::memory_order_relaxed); }
 
   /// Of the entry, at each turn; of the supervisor.

@@ -28,6 +28,8 @@ class ViewThread {
   [[nodiscard]] std::string url() const;
   /// For the supervisor; as long as this object.
   [[nodiscard]] const Heartbeat& heart() const;
+  /// Tells it to end, and waits for nothing: so that several end at the same time.
+  void tellEnd();
   /// Ends it, and gives what it counted, for the summary; `fault`: why it ended before, or that it is stuck.
   nlohmann::ordered_json finish();
 

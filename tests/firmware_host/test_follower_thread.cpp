@@ -43,7 +43,7 @@ TEST_CASE("a follower's exception is seen while the run goes on, and kept", "[fo
   thread.start(named("dds"), "settings", "", [] { throw std::runtime_error("no memory"); });
   CHECK(until([&] { return thread.heart().read().life == Life::kFailed; }));
   CHECK(thread.heart().read().fault == "no memory");
-  CHECK(thread.end());
+  CHECK(thread.end(Duration::fromMilliseconds(20'000)));
   CHECK(thread.fault() == "no memory");
 }
 
