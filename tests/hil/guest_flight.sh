@@ -2,7 +2,7 @@
 # Inside the kernel sandbox, cameras looping: plays a log out through the kernel's devices and flies on them with the
 # unmodified program.
 # usage: guest_flight.sh PROGRAM LOG OUT [serial|can] [trigger] [faults=FILE] [seconds=N] [protocol=NAME] [nomesh]
-#                        [hangup] [flyer=PROGRAM] [realtime] [autopilot]
+#                        [hangup] [flyer=PROGRAM] [realtime] [autopilot] [fly=OPTION...]
 #   PROGRAM  swiftlet
 #   LOG      EuRoC folder with calibration
 #   OUT      folder: vehicle.yaml, hil/, flight/, what each program said
@@ -10,6 +10,7 @@
 #   flyer    flies in place of PROGRAM
 #   realtime priorities and locked memory as on a vehicle
 #   autopilot  an autopilot's port that nobody listens at
+#   fly      options of `swiftlet fly`
 # Exit code: 0 when both programs ended well.
 set -u
 program=$1
@@ -26,6 +27,7 @@ hangup=no
 flyer=$program
 realtime=false
 autopilot=''
+fly_options=''
 for option in "$@"; do
   case $option in
     serial | can) link=$option ;;
@@ -34,6 +36,7 @@ for option in "$@"; do
     seconds=*) seconds=${option#seconds=} ;;
     nomesh) mesh=false ;;
     hangup) hangup=yes ;;
+    fly=*) fly_options="$fly_options ${option#fly=}" ;;
     flyer=*) flyer=${option#flyer=} ;;
     realtime) realtime=true ;;
     autopilot) autopilot=udp:127.0.0.1:14550 ;;
@@ -87,7 +90,8 @@ for _ in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20; do
   if [ "$link" = can ] || [ -e "$imu" ]; then break; fi
   sleep 0.1
 done
-"$flyer" fly --settings "$out/vehicle.yaml" --imu-rate --out "$out/flight" >"$out/fly.txt" 2>&1 &
+# shellcheck disable=SC2086 # options without blanks
+"$flyer" fly $fly_options --settings "$out/vehicle.yaml" --imu-rate --out "$out/flight" >"$out/fly.txt" 2>&1 &
 fly=$!
 if [ $hangup = yes ]; then
   sleep 3
