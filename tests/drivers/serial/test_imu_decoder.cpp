@@ -7,7 +7,6 @@
 #include "drivers/mavlink/mavlink_messages.hpp"
 #include "drivers/serial/device_count.hpp"
 #include "drivers/serial/imu_configuration.hpp"
-#include "drivers/serial/stream_fault.hpp"
 #include "estimator/core/random.hpp"
 #include "tests/drivers/serial/decoding.hpp"
 
@@ -319,22 +318,6 @@ TEST_CASE("After a restart half a frame is forgotten and clocks begin anew", "[s
   CHECK(*out.readings[0].counter == 3);
   CHECK(decoder.counters().clock_steps == 0);
   CHECK(decoder.counters().skipped_bytes == 20);
-}
-
-TEST_CASE("The state of a stream is said in words", "[serial]") {
-  ImuDecoder decoder(ImuProtocol::kVectorNav);
-  StreamCounters before = decoder.counters();
-  CHECK(streamFault(before, decoder.counters()).kind == DeviceFaultKind::kSilent);
-  (void)decode(decoder, Bytes(500, 0x55));
-  CHECK(streamFault(before, decoder.counters()).kind == DeviceFaultKind::kGarbage);
-  before = decoder.counters();
-  const nlohmann::json golden = protocolVectors("vectornav.json");
-  (void)decode(decoder, bytesOf(named(golden, "vn_manual_case1_ypr")));
-  const DeviceFault fault = streamFault(before, decoder.counters());
-  CHECK(fault.kind == DeviceFaultKind::kUnsupported);
-  CHECK(fault.text().find("configure") != std::string_view::npos);
-  (void)decode(decoder, bytesOf(named(golden, "vn_common_time_imu")));
-  CHECK(streamFault(before, decoder.counters()).ok());
 }
 
 TEST_CASE("A gap of hours between readings is an interruption, not lost samples", "[serial]") {
