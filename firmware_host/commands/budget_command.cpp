@@ -6,8 +6,8 @@
 #include "firmware_host/commands/budget_run.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/worst_case.hpp"
-#include "firmware_host/report/line_file.hpp"
 #include "firmware_host/report/summary.hpp"
+#include "firmware_host/report/whole_file.hpp"
 
 namespace swiftlet {
 namespace {
@@ -49,7 +49,7 @@ int budget(const BudgetOptions& options) {
              result.dropped, result.losses, result.effort_changes);
   const std::filesystem::path out(request.out);
   writeJson(out / "budget.json", result.json);
-  LineFile(out / "budget.xml").write(result.report.junit("swiftlet budget"));
+  writeWholeFile(out / "budget.xml", result.report.junit("swiftlet budget") + "\n");
   fmt::print("written to {}\n", request.out);
   return result.report.met() ? kExitDone : kExitFailed;
 }

@@ -13,8 +13,8 @@
 #include "firmware_host/hil/hil_checks.hpp"
 #include "firmware_host/report/accuracy_report.hpp"
 #include "firmware_host/report/confusion_picture.hpp"
-#include "firmware_host/report/line_file.hpp"
 #include "firmware_host/report/mesh_report.hpp"
+#include "firmware_host/report/whole_file.hpp"
 
 namespace swiftlet {
 namespace {
@@ -127,7 +127,7 @@ void compareMap(const EvaluateOptions& options, const Subject& subject, const Tr
 
 int evaluateHil(const EvaluateOptions& options) {
   const HilVerdict verdict = checkHil(readHilEvidence(options.run, options.hil));
-  if (!options.junit.empty()) LineFile(options.junit).write(verdict.junit(options.run));
+  if (!options.junit.empty()) writeWholeFile(options.junit, verdict.junit(options.run) + "\n");
   if (options.json) {
     Json json = Json::array();
     for (const HilCheck& check : verdict.checks()) {
@@ -177,7 +177,7 @@ int evaluate(const EvaluateOptions& options) {
     if (!options.json) fmt::print("{}", toText(found));
     if (found.map && found.map->labels.places() > 0) {
       const std::string picture = std::filesystem::path(options.run) / "label_confusion.svg";
-      LineFile(picture).write(confusionSvg(found.map->labels, readLabelNames(subject.log)));
+      writeWholeFile(picture, confusionSvg(found.map->labels, readLabelNames(subject.log)) + "\n");
       if (!options.json) fmt::print("  confusion of labels: {}\n", picture);
     }
   }

@@ -2,11 +2,12 @@
 
 #include <chrono>
 #include <cmath>
-#include <fstream>
+#include <sstream>
 
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/report/g2o_file.hpp"
 #include "firmware_host/report/summary.hpp"
+#include "firmware_host/report/whole_file.hpp"
 #include "mapping/pose_graph/outlier_injection.hpp"
 
 namespace swiftlet {
@@ -61,18 +62,14 @@ const char* nameOf(EdgeFate fate) {
 template <typename Pose>
 void writeLoops(const PoseGraphRequest& request, const std::vector<std::int64_t>& ids,
                 const PoseGraph<Pose>& graph, std::size_t own_edges, const RobustGraphReport& report) {
-  std::ofstream csv(request.loops, std::ios::binary | std::ios::trunc);
+  std::ostringstream csv;
   csv << "edge,from_id,to_id,fate,injected\n";
   for (std::size_t e = 0; e < graph.edges.size(); ++e) {
     if (report.fates[e] == EdgeFate::kOdometry) continue;
     csv << e << ',' << ids[graph.edges[e].from] << ',' << ids[graph.edges[e].to] << ','
         << nameOf(report.fates[e]) << ',' << (e >= own_edges ? 1 : 0) << '\n';
   }
-  csv.close();
-  if (!csv) {
-    throw InputError(request.loops, 0, "", "cannot be written",
-                     "Is the folder there and writable, the disk not full?");
-  }
+  writeWholeFile(request.loops, csv.str());
 }
 
 /// Rejected loops leave the graph.

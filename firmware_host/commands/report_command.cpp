@@ -10,7 +10,7 @@
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/evaluate_run.hpp"
 #include "firmware_host/report/confusion_picture.hpp"
-#include "firmware_host/report/line_file.hpp"
+#include "firmware_host/report/whole_file.hpp"
 #include "firmware_host/report_page/page.hpp"
 
 namespace swiftlet {
@@ -82,7 +82,7 @@ int report(const ReportOptions& options) {
     std::ifstream file(page, std::ios::binary);
     html = pageWith(std::string(std::istreambuf_iterator<char>(file), {}), page, reportDocument(runs));
   }
-  LineFile(options.out).write(html);
+  writeWholeFile(options.out, html + "\n");
   constexpr double kMebibyte = 1024.0 * 1024.0;
   fmt::print("written to {} ({:.2f} MiB)\n", options.out, static_cast<double>(html.size()) / kMebibyte);
   return kExitDone;

@@ -2,8 +2,8 @@
 
 #include "drivers/recorded/trajectory_file.hpp"
 #include "firmware_host/places/vocabulary_file.hpp"
-#include "firmware_host/report/line_file.hpp"
 #include "firmware_host/report/loops_csv.hpp"
+#include "firmware_host/report/whole_file.hpp"
 #include "firmware_host/settings/read_settings.hpp"
 
 namespace swiftlet {
@@ -11,8 +11,9 @@ namespace {
 
 void writeMap(const std::string& path, const std::vector<MapPose>& poses) {
   if (poses.empty()) return;
-  LineFile file(path);
-  for (const MapPose& pose : poses) file.write(formatTum(pose.stamp, pose.T_world_body));
+  WholeFile file(path);
+  for (const MapPose& pose : poses) file.write(formatTum(pose.stamp, pose.T_world_body) + "\n");
+  file.commit();
 }
 
 }  // namespace
@@ -25,7 +26,7 @@ RunOutput::RunOutput(const std::string& out, const Settings& settings, const Cal
       wanted_(wanted),
       recorder_(out, wanted.imu_rate, wanted.mesh_sequence),
       log_(recorder_) {
-  LineFile(out_ / "settings.yaml").write(printSettings(settings_, false));
+  writeWholeFile(out_ / "settings.yaml", printSettings(settings_, false) + "\n");
   if (settings_.full_smoothing) {
     log_.keepForMap(std::make_unique<MapKeeper>(out, calibration.rig, calibration.noise, settings_.odometry));
   }

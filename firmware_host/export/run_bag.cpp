@@ -12,6 +12,7 @@
 #include "firmware_host/export/bag_messages.hpp"
 #include "firmware_host/report/names.hpp"
 #include "firmware_host/report/ply_file.hpp"
+#include "firmware_host/report/whole_file.hpp"
 
 namespace swiftlet {
 namespace {
@@ -221,14 +222,17 @@ void removeFile(const std::string& file) {
 
 std::map<std::string, std::uint64_t> writeRunBag(const RunFolder& run, const BagTruth& truth,
                                                  const RunBagOptions& options, const std::string& file) {
+  const std::string part = file + ".part";
   try {
-    return RunBag(run, truth, options, file).write();
+    const std::map<std::string, std::uint64_t> counts = RunBag(run, truth, options, part).write();
+    commitPart(part, file);
+    return counts;
   } catch (const rosbag::BagException& error) {
-    removeFile(file);
+    removeFile(part);
     throw InputError(file, 0, "", std::string("cannot be written (") + error.what() + ")",
                      "Is the folder there and writable, and the disk not full?");
   } catch (const InputError&) {
-    removeFile(file);
+    removeFile(part);
     throw;
   }
 }

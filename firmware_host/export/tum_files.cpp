@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "drivers/calibration/input_error.hpp"
+#include "firmware_host/report/whole_file.hpp"
 
 namespace swiftlet {
 namespace {
@@ -36,28 +37,34 @@ std::vector<std::string> writeTumFiles(const RunFolder& run, const Trajectory& t
   std::vector<std::string> written;
   const auto copy = [&](const std::string& name, const Trajectory& read) {
     if (read.empty()) return;
-    fs::copy_file(from / name, to / name, error);
+    const std::string part = to / (name + ".part");
+    fs::copy_file(from / name, part, fs::copy_options::overwrite_existing, error);
     if (error) {
+      std::error_code ignored;
+      fs::remove(part, ignored);
       throw InputError(to / name, 0, "", "cannot be written: " + error.message(),
                        "Is the folder writable and the disk not full?");
     }
+    commitPart(part, to / name);
     written.push_back(name);
   };
   copy(run.odometry_file, run.odometry);
   copy("imu_rate.tum", run.imu_rate);
   copy("map.tum", run.map);
   if (!run.keyframes.empty()) {
-    TumWriter file(to / "keyframes.tum");
+    WholeFile file(to / "keyframes.tum");
     for (const KeyframeState& keyframe : run.keyframes) {
-      file.write(keyframe.state.stamp, keyframe.state.T_world_body);
+      file.write(formatTum(keyframe.state.stamp, keyframe.state.T_world_body) + "\n");
     }
-    file.close();
+    file.commit();
     written.emplace_back("keyframes.tum");
   }
   if (!truth.empty()) {
-    TumWriter file(to / "truth.tum");
-    for (const TrajectoryPoint& point : truth) file.write(point.stamp, point.T_world_body);
-    file.close();
+    WholeFile file(to / "truth.tum");
+    for (const TrajectoryPoint& point : truth) {
+      file.write(formatTum(point.stamp, point.T_world_body) + "\n");
+    }
+    file.commit();
     written.emplace_back("truth.tum");
   }
   return written;

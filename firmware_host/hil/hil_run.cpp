@@ -16,7 +16,7 @@
 #include "firmware_host/live/device_times.hpp"
 #include "firmware_host/pipeline/host_sleep.hpp"
 #include "firmware_host/realtime/console.hpp"
-#include "firmware_host/report/line_file.hpp"
+#include "firmware_host/report/whole_file.hpp"
 
 namespace swiftlet {
 namespace {
@@ -133,7 +133,7 @@ class HilRun {
           "interface");
     }
     std::filesystem::create_directories(request_.out);
-    LineFile((std::filesystem::path(request_.out) / "faults.csv").string()).write(request_.faults.text());
+    writeWholeFile(std::filesystem::path(request_.out) / "faults.csv", request_.faults.text() + "\n");
     openDevices();
     if (!waitForReader()) {
       warn(fmt::format("error: nobody opened {} within {:.0f} s\n", settings_.imu_link.device,
@@ -215,13 +215,14 @@ class HilRun {
   void writeTruth() {
     const Trajectory truth = source_->groundTruth();
     if (truth.empty()) return;
-    LineFile file((std::filesystem::path(request_.out) / "truth.tum").string());
+    WholeFile file(std::filesystem::path(request_.out) / "truth.tum");
     // Of what is played.
     for (const TrajectoryPoint& point : truth) {
       const Stamp host = grid_.toHost(point.stamp);
       if (host < grid_.first || host > grid_.instant(last_slot_)) continue;
-      file.write(formatTum(host, point.T_world_body));
+      file.write(formatTum(host, point.T_world_body) + "\n");
     }
+    file.commit();
   }
 
   bool play() {
@@ -276,7 +277,7 @@ class HilRun {
     json["complete"] = complete;
     if (!fault_.empty()) json["fault"] = fault_;
     result.complete = complete && bad == 0;
-    LineFile((std::filesystem::path(request_.out) / "hil.json").string()).write(json.dump(2));
+    writeWholeFile(std::filesystem::path(request_.out) / "hil.json", json.dump(2) + "\n");
     return result;
   }
 

@@ -8,6 +8,7 @@
 #include <iterator>
 
 #include "drivers/calibration/input_error.hpp"
+#include "firmware_host/report/whole_file.hpp"
 
 namespace swiftlet {
 namespace {
@@ -77,10 +78,7 @@ Vocabulary readVocabulary(const std::string& path) {
 
 void writeVocabulary(const std::string& path, const Vocabulary& vocabulary) {
   const std::vector<std::uint8_t> bytes = vocabulary.compact();
-  std::ofstream out(path, std::ios::binary);
-  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  out.close();
-  if (!out) throw InputError(path, 0, "", "cannot be written", "Check the folder and the space left");
+  writeWholeFile(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 }  // namespace swiftlet

@@ -11,6 +11,7 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/calibration/unpack_xz.hpp"
+#include "firmware_host/report/whole_file.hpp"
 
 namespace swiftlet {
 namespace {
@@ -50,21 +51,7 @@ G2oFile readG2oFile(const std::string& path) {
   return readG2oBytes(path, bytes);
 }
 
-void writeG2oFile(const std::string& path, const G2oGraph& graph) {
-  const std::string text = writeG2o(graph);
-  const std::string part = path + ".part";
-  std::ofstream file(part, std::ios::binary | std::ios::trunc);
-  file.write(text.data(), static_cast<std::streamsize>(text.size()));
-  file.close();
-  std::error_code error;
-  if (file) std::filesystem::rename(part, path, error);
-  if (!file || error) {
-    std::error_code ignored;
-    std::filesystem::remove(part, ignored);
-    throw InputError(path, 0, "", "cannot be written",
-                     "Is the folder there and writable, the disk not full?");
-  }
-}
+void writeG2oFile(const std::string& path, const G2oGraph& graph) { writeWholeFile(path, writeG2o(graph)); }
 
 std::string warningText(const std::string& name, const G2oMessage& warning) {
   return InputError(name, lineOf(warning), warning.field, warning.text, warning.remedy).what();

@@ -1,13 +1,14 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
+#include <ostream>
+#include <streambuf>
 #include <vector>
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 #include "firmware_host/report/kept_map_format.hpp"
+#include "firmware_host/report/whole_file.hpp"
 
 namespace swiftlet {
 namespace {
@@ -165,6 +166,20 @@ void MapWriter::writePatch(std::uint32_t entry) {
   finish(Kind::kPatch, to);
 }
 
+class IntoWholeFile : public std::streambuf {
+ public:
+  explicit IntoWholeFile(WholeFile& file) : file_(file) {}
+
+ protected:
+  std::streamsize xsputn(const char* bytes, std::streamsize count) override {
+    file_.write({bytes, static_cast<std::size_t>(count)});
+    return count;
+  }
+
+ private:
+  WholeFile& file_;
+};
+
 }  // namespace
 
 KeptMapCounts writeKeptMap(const std::string& name, std::ostream& out, const MapParts& map) {
@@ -173,18 +188,13 @@ KeptMapCounts writeKeptMap(const std::string& name, std::ostream& out, const Map
 
 KeptMapCounts writeKeptMapFile(const std::string& path, MapStage& map) {
   map.drawRest();
-  const std::string part = path + ".part";
-  KeptMapCounts counts;
-  {
-    std::ofstream out(part, std::ios::binary);
-    if (!out) throw InputError(part, 0, "", "cannot be written", "Check the folder and its rights");
-    counts = writeKeptMap(part, out, {map.volume(), map.surface(), map.epoch(), map.vehicle()});
-    out.close();
-    if (!out) throw InputError(part, 0, "", "cannot be written", "Check the space left");
-  }
-  std::error_code failed;
-  std::filesystem::rename(part, path, failed);
-  if (failed) throw InputError(path, 0, "", "cannot be written: " + failed.message(), "Check the folder");
+  WholeFile file(path);
+  IntoWholeFile buffer(file);
+  std::ostream out(&buffer);
+  out.exceptions(std::ios::badbit);  // lets the file's own error through
+  const KeptMapCounts counts =
+      writeKeptMap(path, out, {map.volume(), map.surface(), map.epoch(), map.vehicle()});
+  file.commit();
   return counts;
 }
 

@@ -6,7 +6,7 @@
 
 #include "drivers/recorded/csv_reader.hpp"
 #include "drivers/recorded/parse_number.hpp"
-#include "firmware_host/report/line_file.hpp"
+#include "firmware_host/report/whole_file.hpp"
 
 namespace swiftlet {
 namespace {
@@ -37,18 +37,19 @@ std::string_view verdictName(LoopVerdict verdict) {
 }
 
 void writeLoops(const std::string& path, std::span<const MapLoop> loops) {
-  LineFile file(path);
+  WholeFile file(path);
   file.write(
       "#old [ns],new [ns],verdict,inliers,p_x [m],p_y [m],p_z [m],q_x [],q_y [],q_z [],q_w [],"
-      "sigma_rotation [rad],sigma_translation [m]");
+      "sigma_rotation [rad],sigma_translation [m]\n");
   for (const MapLoop& loop : loops) {
     const Eigen::Vector3d& p = loop.T_old_new.translation;
     const Eigen::Quaterniond& q = loop.T_old_new.rotation;
-    file.write(fmt::format("{},{},{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.4g},{:.4g}",
+    file.write(fmt::format("{},{},{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.4g},{:.4g}\n",
                            loop.old_stamp.ns, loop.new_stamp.ns, verdictName(loop.verdict), loop.inliers,
                            p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w(), loop.rotation_sigma,
                            loop.translation_sigma));
   }
+  file.commit();
 }
 
 std::vector<MapLoop> readLoops(const std::string& path) {

@@ -4,11 +4,11 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 
 #include "drivers/calibration/input_error.hpp"
+#include "firmware_host/report/whole_file.hpp"
 
 namespace swiftlet {
 namespace {
@@ -38,12 +38,10 @@ class Bytes {
 };
 
 void writeAll(const std::string& path, const std::vector<char>& head, const std::vector<char>& body) {
-  std::ofstream file(path, std::ios::binary);
-  file.write(head.data(), static_cast<std::streamsize>(head.size()));
-  file.write(body.data(), static_cast<std::streamsize>(body.size()));
-  file.flush();
-  if (!file)
-    throw InputError(path, 0, "", "cannot be written", "Choose a folder with room that you may write to");
+  WholeFile file(path);
+  file.write({head.data(), head.size()});
+  file.write({body.data(), body.size()});
+  file.commit();
 }
 
 constexpr std::uint32_t kGlbMagic = 0x46546C67;

@@ -51,7 +51,8 @@ std::string MeshSequenceWriter::writeFile(const char* kind, std::uint64_t frame,
                                           const LocalMesh& mesh) const {
   if (mesh.faces.empty()) return {};
   std::string name = fmt::format("{}_{:06}.ply", kind, frame);
-  writePly(folder_ + "/" + name, toTriangleMesh(mesh));
+  // Two waits for the disk a frame would hold up the thread that writes them.
+  writePly(folder_ + "/" + name, toTriangleMesh(mesh), WholeFile::Sync::kNo);
   return name;
 }
 

@@ -242,15 +242,9 @@ std::string readBytes(const std::string& path) {
 
 }  // namespace
 
-void writePly(const std::string& path, const TriangleMesh& mesh) {
+void writePly(const std::string& path, const TriangleMesh& mesh, WholeFile::Sync sync) {
   checkWritable(path, mesh);
-  const std::string bytes = plyBytes(mesh);
-  File file(std::fopen(path.c_str(), "wb"));
-  const bool written = file && std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size();
-  if (!written || std::fclose(file.release()) != 0) {
-    throw InputError(path, 0, "", std::string("cannot be written: ") + std::strerror(errno),
-                     "Is the folder writable and the disk not full?");
-  }
+  writeWholeFile(path, plyBytes(mesh), sync);
 }
 
 TriangleMesh readPlyText(const std::string& name, std::string_view bytes) {

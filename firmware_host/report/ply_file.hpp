@@ -17,12 +17,14 @@
 #include <string_view>
 
 #include "firmware_host/evaluation/triangle_mesh.hpp"
+#include "firmware_host/report/whole_file.hpp"
 
 namespace swiftlet {
 
 /// Grey 128 and label 0 stand in for empty `grey` and `labels`. InputError when the file cannot be
 /// written, or when readPly() would refuse what was given (nothing is written then).
-void writePly(const std::string& path, const TriangleMesh& mesh);
+void writePly(const std::string& path, const TriangleMesh& mesh,
+              WholeFile::Sync sync = WholeFile::Sync::kYes);
 
 TriangleMesh readPly(const std::string& path);
 /// `name` stands for the file in messages.

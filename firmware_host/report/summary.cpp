@@ -7,8 +7,8 @@
 
 #include "drivers/recorded/trajectory_file.hpp"
 #include "firmware_host/budget/budget_report.hpp"
-#include "firmware_host/report/line_file.hpp"
 #include "firmware_host/report/names.hpp"
+#include "firmware_host/report/whole_file.hpp"
 #include "firmware_host/settings/registry.hpp"
 
 namespace swiftlet {
@@ -278,6 +278,6 @@ std::string summaryText(const Json& summary) {
   return text;
 }
 
-void writeJson(const std::string& path, const Json& json) { LineFile(path).write(json.dump(2)); }
+void writeJson(const std::string& path, const Json& json) { writeWholeFile(path, json.dump(2) + "\n"); }
 
 }  // namespace swiftlet
