@@ -31,7 +31,9 @@ constexpr double kDampingUp = 10.0;
 constexpr double kDampingStart = 1e-6;
 constexpr double kFirstMatchGate = 30;  // sigmas: what the loops' relative poses leave, and no more
 constexpr int kPullIterations = 10;
-constexpr double kPulledEnough = 2e-3;  // m, rad: largest step of a pose
+constexpr std::size_t kMostSightings = 120;  // of a landmark: 20 s at 6 keyframes a second
+constexpr double kPulledEnough = 2e-3;       // m, rad: largest step of a pose
+constexpr Status kStopped{StatusCode::kFailed, kFullSmoothingStopped};
 
 using Pose6x3 = Eigen::Matrix<double, kPoseDim, 3>;
 
@@ -49,10 +51,8 @@ using SparseFactor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::L
 class FullSmoother::Solver {
  public:
   Status solve(const System& system, double damping, Eigen::VectorXd& step) {
-    const Eigen::Index n = system.g.size();
-    Eigen::SparseMatrix<double> H(n, n);
-    H.setFromTriplets(system.H.begin(), system.H.end());
-    for (Eigen::Index k = 0; k < n; ++k) H.coeffRef(k, k) *= 1.0 + damping;
+    Eigen::SparseMatrix<double> H = system.matrix();
+    for (Eigen::Index k = 0; k < H.rows(); ++k) H.coeffRef(k, k) *= 1.0 + damping;
     factor_.compute(H);
     if (factor_.info() != Eigen::Success) {
       return {StatusCode::kNumerical, "the full system could not be factored"};
@@ -92,11 +92,24 @@ Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& stat
   for (const TrackedFeature& feature : frame.features) {
     Sighting sighting;
     if (!makeSighting(slot, feature.seen, feature.pixel, settings_.pixel_sigma, sighting)) continue;
-    tracks_[{state.epoch, feature.id}].sightings.push_back(sighting);
+    addSighting({state.epoch, feature.id}, sighting);
   }
   worlds_.try_emplace(state.epoch, state.epoch);
   keyframes_.push_back(std::move(keyframe));
   return okStatus();
+}
+
+void FullSmoother::addSighting(const TrackKey& key, const Sighting& sighting) {
+  Track& track = tracks_[key];
+  if (track.sightings.size() < kMostSightings) {
+    track.sightings.push_back(sighting);
+    return;
+  }
+  // The landmark goes on as another one: at rest one track would tie all keyframes to each other.
+  auto full = tracks_.extract(key);
+  full.key().second = next_revisit_track_--;
+  tracks_.insert(std::move(full));
+  tracks_[key].sightings.push_back(sighting);
 }
 
 bool FullSmoother::makeSighting(std::size_t keyframe, const std::array<bool, kMaxCameras>& seen,
@@ -259,17 +272,18 @@ void FullSmoother::linearizeMotion(System& system, double& cost) const {
 }
 
 double FullSmoother::linearize(System& system) {
-  system.H.clear();
-  system.g = Eigen::VectorXd::Zero(kStateDim * static_cast<Eigen::Index>(keyframes_.size()));
+  system.clear(keyframes_.size());
   double cost = 0;
   for (const auto& [id, track] : tracks_) {
+    if (stopped()) return cost;
     if (track.in_system) cost += linearizeTrack(track, system);
   }
   linearizeMotion(system, cost);
   return cost;
 }
 
-Status FullSmoother::solve(FullSmootherReport& report) {
+Status FullSmoother::solve(FullSmootherReport& report, const std::atomic<bool>* stop) {
+  stop_ = stop;
   if (keyframes_.size() < 3) return {StatusCode::kNotReady, "full smoothing needs three keyframes"};
   System system;
   Solver solver;
@@ -295,6 +309,7 @@ Status FullSmoother::solve(FullSmootherReport& report) {
     if (look_for_outliers) removeOutliers();
     const bool comparable = iteration > 2 * kOutlierRounds;
     const double new_cost = linearize(system);
+    if (stopped()) return kStopped;
     if (iteration == 0) report.initial_cost = new_cost;
     if (comparable && new_cost > cost) {
       for (std::size_t k = 0; k < keyframes_.size(); ++k) keyframes_[k].x = before[k];
@@ -302,6 +317,7 @@ Status FullSmoother::solve(FullSmootherReport& report) {
       placeCameras();
       triangulateAll();
       linearize(system);
+      if (stopped()) return kStopped;
     } else {
       if (comparable && cost - new_cost < kRelativeConvergence * cost) break;
       cost = new_cost;
@@ -334,6 +350,7 @@ Status FullSmoother::pullTogether(Solver& solver, System& system) {
     triangulateAll();
     linearize(system);
     linearizeRevisits(system);
+    if (stopped()) return kStopped;
     const Status solved = solver.solve(system, kDampingStart, step);
     if (!solved.ok()) return solved;
     retractAll(step);

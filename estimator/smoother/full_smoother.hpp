@@ -13,11 +13,14 @@
 // fewer than six that fit is left out as a whole. A pair of tracks counts once, however many loops name it.
 // Frames: as the odometry's; each epoch keeps its own world, held by its first keyframe; epochs that loops
 // tie share the world of the earliest.
-// Off the flight path: it allocates. Memory grows with the run up to `max_keyframes` (some 40 kB each
-// at 200 features and 200 Hz, and the sparse system while it solves); beyond it further keyframes are
-// refused (kCapacityReached) and the rest of the run is not in the map. A match takes 0.3 kB.
-// Source: Kaess et al., "Square Root SAM", IJRR 2006; the factors are those of docs/smoother.md.
+// Off the flight path: it allocates. Memory is linear in the keyframes, up to `max_keyframes`: some 40 kB
+// each at 200 features and 200 Hz, and the sparse system while it solves; a landmark that is seen for longer
+// than 120 keyframes goes on as another one, so that only loops tie keyframes farther apart. memoryNeeded()
+// says it before the solve. Beyond max_keyframes further ones are refused (kCapacityReached) and the rest of
+// the run is not in the map. A match takes 0.3 kB. Source: Kaess et al., "Square Root SAM", IJRR 2006; the
+// factors are those of docs/smoother.md.
 
+#include <atomic>
 #include <cstdint>
 #include <map>
 #include <set>
@@ -37,6 +40,9 @@
 #include "estimator/smoother/vision_factor.hpp"
 
 namespace swiftlet {
+
+/// Text of the status of a solve that was stopped.
+inline constexpr const char* kFullSmoothingStopped = "full smoothing was stopped";
 
 struct FullSmootherSettings {
   double pixel_sigma = 0.6;          ///< px
@@ -81,8 +87,13 @@ class FullSmoother {
   Status setPoses(std::span<const SE3> T_world_body);
 
   /// Minimizes over everything added so far. kNotReady below three keyframes; kNumerical when the
-  /// system cannot be factored (the states stay as they were).
-  Status solve(FullSmootherReport& report);
+  /// system cannot be factored (the states stay as they were). `stop` may be set by any thread meanwhile:
+  /// kFailed with kFullSmoothingStopped as its text within one factorization, and the states are of no use.
+  Status solve(FullSmootherReport& report, const std::atomic<bool>* stop = nullptr);
+
+  /// Bytes that this and solve() take at the most, for what was added so far: what is kept, the system, and
+  /// its factor as large as in the keyframes' own order (the solver's is smaller).
+  [[nodiscard]] std::size_t memoryNeeded() const;
 
   [[nodiscard]] std::size_t size() const { return keyframes_.size(); }
   /// State of keyframe k, with the image's stamp.
@@ -131,6 +142,7 @@ class FullSmoother {
   double linearizeTrack(const Track& track, System& system) const;
   void linearizeMotion(System& system, double& cost) const;
 
+  void addSighting(const TrackKey& key, const Sighting& sighting);
   [[nodiscard]] bool makeSighting(std::size_t keyframe, const std::array<bool, kMaxCameras>& seen,
                                   const std::array<Eigen::Vector2f, kMaxCameras>& pixel, double sigma,
                                   Sighting& sighting) const;
@@ -140,6 +152,7 @@ class FullSmoother {
   void joinWorlds();
   void moveWorld(std::uint32_t world, const SE3& T_to_from);
   void tieWorlds(bool by_matches);
+  [[nodiscard]] bool stopped() const { return stop_ != nullptr && stop_->load(std::memory_order_relaxed); }
   Status pullTogether(Solver& solver, System& system);
   void retractAll(const Eigen::VectorXd& step);
   void fillReport(FullSmootherReport& report) const;
@@ -164,6 +177,7 @@ class FullSmoother {
   std::map<std::uint32_t, std::uint32_t> worlds_;             // epoch to the epoch whose world it shares
   TrackId next_revisit_track_;
   bool poses_given_ = false;
+  const std::atomic<bool>* stop_ = nullptr;  ///< while solve() runs
 };
 
 }  // namespace swiftlet

@@ -2,8 +2,10 @@
 
 #include "estimator/smoother/full_smoother.hpp"
 
+#include <atomic>
 #include <catch2/catch.hpp>
 #include <cstdio>
+#include <string>
 
 #include "tests/smoother/smoother_run.hpp"
 
@@ -100,4 +102,49 @@ TEST_CASE("Full smoothing refuses what it cannot solve or hold", "[smoother][ful
   CHECK(full.addKeyframe(flight.frames()[2], state).code == StatusCode::kCapacityReached);
   CHECK(full.size() == 2);
   CHECK(full.solve(report).code == StatusCode::kNotReady);
+}
+
+TEST_CASE("full smoothing's memory is linear in the keyframes, at rest too") {
+  // The same landmarks in every keyframe: without an end of their tracks each would be tied to all others.
+  const auto needed = [](std::size_t keyframes) {
+    const TrackFlight flight(test::roomFlight(1, 1));
+    FullSmoother full(flight.rig(), flight.noise(), {});
+    TrackedFrame frame;
+    for (TrackId id = 0; id < 50; ++id) {
+      TrackedFeature feature;
+      feature.id = id;
+      feature.seen = {true, false};
+      feature.pixel[0] = {100.0F + 5.0F * static_cast<float>(id), 200.0F};
+      REQUIRE(frame.features.tryPushBack(feature));
+    }
+    for (std::size_t k = 0; k < keyframes; ++k) {
+      frame.stamp = {static_cast<std::int64_t>(k + 1) * 1'000'000'000};
+      REQUIRE(full.addKeyframe(frame, NavState{}).ok());
+    }
+    return static_cast<double>(full.memoryNeeded());
+  };
+  const double few = needed(400);
+  CHECK(needed(800) < 2.2 * few);
+  CHECK(needed(1600) < 4.4 * few);
+}
+
+TEST_CASE("a full smoother that is told to stop ends between two landmarks") {
+  const TrackFlight flight(test::roomFlight(4, 1));
+  FullSmoother full(flight.rig(), flight.noise(), {});
+  flight.play([&](const ImuSample& sample) { full.addImu(sample); },
+              [&](std::size_t k) {
+                const BodyState x = flight.truth(k);
+                NavState state;
+                state.stamp = flight.frames()[k].stamp;
+                state.T_world_body = x.T_world_body;
+                state.v_world_body = x.v_world_body;
+                REQUIRE(full.addKeyframe(flight.frames()[k], state).ok());
+              });
+  FullSmootherReport report;
+  std::atomic<bool> stop{true};
+  const Status status = full.solve(report, &stop);
+  CHECK_FALSE(status.ok());
+  CHECK(std::string(status.what) == kFullSmoothingStopped);
+  stop = false;
+  CHECK(full.solve(report, &stop).ok());
 }
