@@ -6,6 +6,7 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/report/ply_file.hpp"
+#include "firmware_host/report/run_claim.hpp"
 
 namespace swiftlet {
 namespace {
@@ -14,12 +15,12 @@ namespace {
 std::string madeAnew(const std::string& run_folder) {
   const std::filesystem::path folder = std::filesystem::path(run_folder) / "meshes";
   std::error_code error;
-  std::filesystem::remove_all(folder, error);
-  if (!error) std::filesystem::create_directories(folder, error);
+  std::filesystem::create_directories(folder, error);
   if (error) {
     throw InputError(folder.string(), 0, "", "cannot be created: " + error.message(),
                      "Give another folder with --out");
   }
+  removeMeshes(folder.string());
   return folder.string();
 }
 
