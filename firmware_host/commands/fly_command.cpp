@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <string>
 
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
@@ -23,6 +24,7 @@ int fly(const FlyOptions& options) {
   FlyRequest request = options.request;
   request.stop = &stopOnSignal();
   request.hung_up = &surviveHangUp();
+  request.renew_stop = [] { return &stopOnSignal(); };
   request.show_progress = true;
   request.view = options.view.read();
   const FlyResult result = runFlight(request, options.settings.read());
@@ -32,10 +34,14 @@ int fly(const FlyOptions& options) {
     return kExitFailed;
   }
   say(summaryText(result.summary));
-  say(fmt::format("written to {}\n", request.out));
+  if (!result.out.empty()) say(fmt::format("written to {}\n", result.out));
+  if (!result.lost.empty()) {
+    warn(fmt::format("warning: files of this flight are missing or end early, the first: {}\n", result.lost));
+  }
   if (!result.has_pose) {
-    warn(fmt::format("error: no pose in the whole flight; {}/events.log says what the start waited for\n",
-                     request.out));
+    const std::string events =
+        result.out.empty() ? "" : "; " + result.out + "/events.log says what the start waited for";
+    warn(fmt::format("error: no pose in the whole flight{}\n", events));
     return kExitFailed;
   }
   return kExitDone;
@@ -47,8 +53,9 @@ void addFlyCommand(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("fly", "Run the estimator live on the vehicle's cameras and IMU");
   auto options = std::make_shared<FlyOptions>();
   FlyRequest& request = options->request;
-  request.out = "flight";
-  command->add_option("--out", request.out, "Run folder to write")->capture_default_str();
+  command->add_option("--out", request.out,
+                      "Run folder to write; without: a new one for each flight in flights.folder");
+  command->add_flag("--replace", request.replace, "The folder of --out may hold a run, which is replaced");
   command->add_option("--seconds", request.seconds, "End after this long; without: with SIGINT or SIGTERM")
       ->check(nonNegative());
   command->add_flag("--imu-rate", request.imu_rate, "Also write imu_rate.tum, the state at every IMU sample");

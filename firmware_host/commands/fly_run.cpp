@@ -1,7 +1,9 @@
 #include "firmware_host/commands/fly_run.hpp"
 
 #include <atomic>
+#include <ctime>
 #include <memory>
+#include <optional>
 
 #include "drivers/device/monotonic_now.hpp"
 #include "firmware_host/commands/confusion_file.hpp"
@@ -10,6 +12,7 @@
 #include "firmware_host/commands/run_output.hpp"
 #include "firmware_host/live/live_input.hpp"
 #include "firmware_host/realtime/console.hpp"
+#include "firmware_host/report/run_claim.hpp"
 
 namespace swiftlet {
 namespace {
@@ -18,6 +21,27 @@ namespace {
 constexpr Duration kSamplePatience = Duration::fromMilliseconds(25);
 constexpr const char* kHungUp =
     "terminal closed (SIGHUP): the flight goes on; end it with SIGINT or SIGTERM (`pkill -INT swiftlet`)";
+
+/// The run folder; empty where there is none to be had.
+std::string claimFolder(const FlyRequest& request, const Settings& settings, std::optional<RunClaim>& claim,
+                        LostFiles& lost) {
+  try {
+    std::string out = request.out;
+    if (out.empty()) {
+      out = makeFlightFolder(settings.flights.folder, std::time(nullptr));
+      constexpr std::uint64_t kMebibyte = std::uint64_t{1} << 20U;
+      const std::uint64_t keep = kMebibyte * static_cast<std::uint64_t>(settings.flights.keep_free_mib);
+      for (const std::string& line : freeOldFlights(settings.flights.folder, keep, out)) {
+        warn(line + "\n");
+      }
+    }
+    claim.emplace(out, RunKind::kFlight, true);
+    return out;
+  } catch (const InputError& error) {
+    lost.add(fmt::format("{}: no file of this flight is written", error.what()));
+    return {};
+  }
+}
 
 }  // namespace
 
@@ -36,6 +60,8 @@ FlyResult runFlight(const FlyRequest& request, Settings settings) {
   if (request.loop_closure) settings.loop.enabled = true;
   if (request.map) settings.map.enabled = true;
   checkMovingLabels(settings.map_stage);
+  // A mistake that the user can correct, unlike a broken disk.
+  if (!request.out.empty() && !request.replace) refuseRunIn(request.out);
   const Calibration calibration = vehicleCalibration(settings);
   for (const std::string& line : calibration.warnings) warn("warning: " + line + "\n");
   MemoryTrack memory;
@@ -49,7 +75,10 @@ FlyResult runFlight(const FlyRequest& request, Settings settings) {
   }
   memory.note("devices");
 
-  RunOutput output(request.out, settings, calibration, RunOutput::Wanted{request.imu_rate, false});
+  LostFiles lost;
+  std::optional<RunClaim> claim;
+  result.out = claimFolder(request, settings, claim, lost);
+  RunOutput output(result.out, settings, calibration, RunOutput::Wanted{request.imu_rate, false, true}, lost);
   std::unique_ptr<FlightRecorder> recorder;
   if (request.record) recorder = output.startRecorder(RecordOrder::kByArrival);
   Wiring::Options wanted = output.wiringOptions();
@@ -91,9 +120,20 @@ FlyResult runFlight(const FlyRequest& request, Settings settings) {
   facts.memory = memory.rows();
   facts.calibration_form = calibration.form;
   facts.input["devices"] = input.counters();
-  if (recorder) facts.executor["recording"] = recordingJson(*recorder);
-  result.summary = output.finish(facts);
+  if (recorder) {
+    facts.executor["recording"] = recordingJson(*recorder);
+    if (!recorder->status().ok())
+      lost.add(fmt::format("{}/recording: {}", result.out, recorder->status().what));
+  }
+  output.close(facts);
+  result.summary = output.summary(facts);
   output.writeSummary(result.summary);
+  if (settings.flights.smooth && output.canSmooth()) {
+    output.smooth(request.renew_stop ? request.renew_stop() : nullptr, request.show_progress);
+    result.summary = output.summary(facts);
+    output.writeSummary(result.summary);
+  }
+  if (const char* problem = lost.problem()) result.lost = problem;
   result.has_pose = output.log().statistics().first_pose.has_value();
   return result;
 }

@@ -21,6 +21,7 @@ int runProgram(int argc, char** argv) {
   addSimulateCommand(app, exit_code);
   addReplayCommand(app, exit_code);
   addFlyCommand(app, exit_code);
+  addSmoothCommand(app, exit_code);
   addRecordCommand(app, exit_code);
   addDoctorCommand(app, exit_code);
   addHilCommand(app, exit_code);

@@ -67,6 +67,10 @@ int replay(const ReplayOptions& options) {
     warn("stopped before the end; the run folder holds what was done\n");
     return kExitFailed;
   }
+  if (!result.lost.empty()) {
+    fmt::print(stderr, "error: {}; the run folder is not complete\n", result.lost);
+    return kExitFailed;
+  }
   if (!result.has_pose) {
     warn(fmt::format("error: {}: no pose in the whole log; events.log says what the start waited for\n",
                      request.log));
@@ -85,6 +89,8 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
   command->add_option("LOG", request.log, "EuRoC/ASL folder, a recorded run, or a ROS 1 bag where supported")
       ->required();
   command->add_option("--out", request.out, "Run folder to write")->capture_default_str();
+  command->add_flag("--replace", request.replace,
+                    "Replace a flight's files, or files that no run wrote, in the folder of --out");
   command->add_flag("--mono", request.mono, "Camera 0 alone");
   command
       ->add_option("--calibration", options->calibration,

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "drivers/recorded/open_log.hpp"
+#include "drivers/recorded/recording_files.hpp"
 #include "drivers/recorded/recording_source.hpp"
 #include "firmware_host/commands/confusion_file.hpp"
 #include "firmware_host/commands/evaluate_run.hpp"
@@ -18,6 +19,7 @@
 #include "firmware_host/pipeline/reproduce.hpp"
 #include "firmware_host/realtime/console.hpp"
 #include "firmware_host/report/progress.hpp"
+#include "firmware_host/report/run_claim.hpp"
 #include "firmware_host/report/summary.hpp"
 #include "firmware_host/settings/read_settings.hpp"
 
@@ -125,10 +127,25 @@ class ReplayRun {
     }
   }
 
+  /// What an earlier run left in the folder goes, its recording too.
+  void refuseOwnLog() const {
+    const std::string recording = findRecordingFolder(request_.log);
+    if (recording.empty()) return;
+    std::error_code error;
+    const std::filesystem::path out(request_.out);
+    for (const auto& folder : {out, out / "recording"}) {
+      if (!std::filesystem::equivalent(folder, recording, error)) continue;
+      throw InputError(request_.out, 0, "", "is the folder of the recording that is replayed",
+                       "Give another folder with --out");
+    }
+  }
+
   void begin() {
     facts_.mono = !settings_.odometry.use_stereo || source_->rig().camera_count < 2;
+    refuseOwnLog();
+    claim_.emplace(request_.out, RunKind::kReplay, request_.replace);
     output_.emplace(request_.out, settings_, source_->calibration(),
-                    RunOutput::Wanted{request_.imu_rate, request_.mesh_sequence});
+                    RunOutput::Wanted{request_.imu_rate, request_.mesh_sequence}, lost_);
     progress_.emplace("replay", request_.show_progress ? steps_ : 0);
     control_.stop = request_.stop;
     control_.progress = [this](std::uint64_t images) { progress_->update(images); };
@@ -204,7 +221,13 @@ class ReplayRun {
     if (tracks_) {
       facts_.warnings.insert(facts_.warnings.end(), tracks_->warnings().begin(), tracks_->warnings().end());
     }
-    result.summary = output_->finish(facts_);
+    output_->close(facts_);
+    if (output_->canSmooth()) {
+      // It takes its time, and the run is worth something without it.
+      output_->writeSummary(output_->summary(facts_));
+      output_->smooth(request_.stop, request_.show_progress);
+    }
+    result.summary = output_->summary(facts_);
     result.statistics = output_->log().statistics();
     result.has_pose = result.statistics.first_pose.has_value();
     const Trajectory truth = source_->groundTruth();
@@ -213,6 +236,7 @@ class ReplayRun {
                                                    *result.statistics.first_image, settings_.evaluation);
     }
     output_->writeSummary(result.summary);
+    if (const char* problem = lost_.problem()) result.lost = problem;
     return result;
   }
 
@@ -228,6 +252,8 @@ class ReplayRun {
   std::optional<ConfusionModel> confusion_;
   std::size_t warned_ = 0;
   std::size_t steps_ = 0;
+  LostFiles lost_;
+  std::optional<RunClaim> claim_;
   std::optional<RunOutput> output_;
   std::optional<Progress> progress_;
   RunControl control_;

@@ -18,6 +18,7 @@ namespace swiftlet {
 struct ReplayRequest {
   std::string log;
   std::string out;
+  bool replace = false;         ///< files of a flight, or of no run, in `out` too
   std::string calibration;      ///< instead of the log's own; empty: the log's
   std::string imu_calibration;  ///< Kalibr's IMU file where it is not beside the camchain
   std::string tracks;           ///< file of feature tracks in place of the log's images or own tracks
@@ -47,10 +48,12 @@ struct ReplayResult {
   nlohmann::ordered_json summary;  ///< as written to summary.json
   bool finished = true;            ///< false: stopped
   bool has_pose = false;
+  std::string lost;  ///< the first file that could not be written to its end; empty: all were
   RunStatistics statistics;
 };
 
-/// Creates the run folder and everything in it. InputError for bad input.
+/// Creates the run folder and everything in it. InputError for bad input, and where `out` may not be written
+/// to.
 ReplayResult runReplay(const ReplayRequest& request, Settings settings, const ReplayHooks& hooks = {});
 
 }  // namespace swiftlet

@@ -1,35 +1,46 @@
 #include "firmware_host/commands/run_output.hpp"
 
-#include "drivers/recorded/trajectory_file.hpp"
+#include <fmt/format.h>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/commands/smooth_run.hpp"
 #include "firmware_host/places/vocabulary_file.hpp"
 #include "firmware_host/report/loops_csv.hpp"
 #include "firmware_host/report/whole_file.hpp"
 #include "firmware_host/settings/read_settings.hpp"
 
 namespace swiftlet {
-namespace {
 
-void writeMap(const std::string& path, const std::vector<MapPose>& poses) {
-  if (poses.empty()) return;
-  WholeFile file(path);
-  for (const MapPose& pose : poses) file.write(formatTum(pose.stamp, pose.T_world_body) + "\n");
-  file.commit();
+template <typename Write>
+void RunOutput::attempt(const Write& write) const {
+  if (!wanted_.fly_on) {
+    write();
+    return;
+  }
+  if (out_.empty()) return;
+  try {
+    write();
+  } catch (const InputError& error) {
+    lost_.add(error.what());
+  }
 }
 
-}  // namespace
-
 RunOutput::RunOutput(const std::string& out, const Settings& settings, const Calibration& calibration,
-                     Wanted wanted)
+                     Wanted wanted, LostFiles& lost)
     : out_(out),
       settings_(settings),
       calibration_(calibration),
       wanted_(wanted),
-      recorder_(out, wanted.imu_rate, wanted.mesh_sequence),
+      lost_(lost),
+      recorder_(out, {wanted.imu_rate, wanted.mesh_sequence, wanted.fly_on}, lost),
       log_(recorder_) {
-  writeWholeFile(out_ / "settings.yaml", printSettings(settings_, false) + "\n");
-  if (settings_.full_smoothing) {
-    log_.keepForMap(std::make_unique<MapKeeper>(out, calibration.rig, calibration.noise, settings_.odometry));
-  }
+  attempt([&] { writeWholeFile(out_ / "settings.yaml", printSettings(settings_, false) + "\n"); });
+  if (!settings_.full_smoothing) return;
+  attempt([&] {
+    log_.keepForMap(
+        std::make_unique<MapKeeper>(out, calibration.rig, calibration.noise, settings_.odometry, lost));
+    keeps_keyframes_ = true;
+  });
 }
 
 const Vocabulary* RunOutput::vocabulary() {
@@ -56,15 +67,42 @@ std::unique_ptr<FlightRecorder> RunOutput::startRecorder(RecordOrder order) cons
   header.settings = printSettings(settings_, false);
   header.program_version = versionText();
   header.order = order;
-  return std::make_unique<FlightRecorder>((out_ / "recording").string(), header);
+  std::unique_ptr<FlightRecorder> recorder;
+  attempt([&] { recorder = std::make_unique<FlightRecorder>((out_ / "recording").string(), header); });
+  return recorder;
 }
 
-nlohmann::ordered_json RunOutput::finish(RunFacts& facts) {
+void RunOutput::close(RunFacts& facts) {
   facts.peak_resident = peakResidentBytes();
-  writeMap(out_ / "map.tum", log_.solveMap());
-  if (settings_.loop.enabled) writeLoops(out_ / "loops.csv", log_.loops());
+  log_.finishKeeping();
+  if (settings_.loop.enabled) attempt([&] { writeLoops(out_ / "loops.csv", log_.loops()); });
+  if (!log_.nodes().empty()) attempt([&] { writeMapPoses(out_ / "map.tum", log_.nodes()); });
+}
+
+void RunOutput::smooth(const std::atomic<bool>* stop, bool announce) {
+  attempt([&] {
+    FullSmoothingOptions options = smoothingOptions(settings_, announce);
+    options.stop = stop;
+    const FullSmoothing found = smoothKeyframes(out_ / kKeyframeFile, options);
+    RunStatistics& statistics = log_.statistics();
+    addTime(statistics.times, StageId::kMap, found.spent);
+    for (const auto& row : found.faults.rows()) statistics.faults[row.text] += row.count;
+    if (found.poses.empty()) {
+      ++statistics.faults[found.problem];
+      if (announce) fmt::print(stderr, "warning: not smoothed: {}\n", found.problem);
+      return;
+    }
+    statistics.map = found.report;
+    writeMapPoses(out_ / "map.tum", found.poses);
+  });
+}
+
+nlohmann::ordered_json RunOutput::summary(const RunFacts& facts) {
   const RunStatistics& statistics = log_.statistics();
   nlohmann::ordered_json summary = summaryOf(facts, settings_, statistics);
+  if (const char* problem = lost_.problem()) {
+    summary["executor"]["files"] = {{"lost", lost_.count()}, {"first", problem}};
+  }
   if (!recorder_.map().is_null()) {
     summary["map"] = recorder_.map();
     const MapThreadStatistics& mapping = *statistics.mapping;
@@ -84,7 +122,7 @@ nlohmann::ordered_json RunOutput::finish(RunFacts& facts) {
 }
 
 void RunOutput::writeSummary(const nlohmann::ordered_json& summary) const {
-  writeJson(out_ / "summary.json", summary);
+  attempt([&] { writeJson(out_ / "summary.json", summary); });
 }
 
 nlohmann::ordered_json recordingJson(const FlightRecorder& recorder) {

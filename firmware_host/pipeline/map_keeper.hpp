@@ -1,66 +1,63 @@
 #pragma once
-// Keeps keyframes and IMU of a run for full smoothing after it, in a file: a flight's memory does not grow
-// with its length. The file has no name (it is unlinked as it is opened), so nothing is left behind.
+// Keeps keyframes and IMU of a run for full smoothing after it, in `keyframes.swk` of the run folder
+// (docs/formats.md): a flight's memory does not grow with its length, and `swiftlet smooth` can do it later.
 //
+// Each keyframe is handed to the system as it comes, so a program that is killed loses none but the newest.
 // Memory: a fixed buffer of kBufferBytes. Disk: some 10 kB a keyframe at 300 features and 200 Hz.
-// Errors: InputError when the file cannot be made; a write that fails ends the keeping, counted as a fault,
-// and the map covers what was kept before.
+// Errors: InputError when the file cannot be made; a write that fails ends the keeping, told to `lost`, and
+// the file holds what was kept before.
 
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "estimator/camera/rig.hpp"
+#include "estimator/imu/imu_noise.hpp"
 #include "estimator/imu/sample_monitor.hpp"
 #include "estimator/messages/loop_revisit.hpp"
+#include "estimator/messages/nav_state.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/odometry/odometry_settings.hpp"
-#include "estimator/smoother/full_smoother.hpp"
-#include "firmware_host/pipeline/fault_counts.hpp"
+#include "firmware_host/pipeline/keyframe_format.hpp"
+#include "firmware_host/pipeline/lost_files.hpp"
 
 namespace swiftlet {
 
-struct MapPose {
-  Stamp stamp;
-  SE3 T_world_body;
-};
+inline constexpr const char* kKeyframeFile = "keyframes.swk";
 
 class MapKeeper {
  public:
-  /// The file is made in `folder`.
+  /// The file is made in `folder`; an older one there is replaced. `lost` outlives this.
   MapKeeper(const std::string& folder, const Rig& rig, const ImuNoise& noise,
-            const OdometrySettings& settings);
+            const OdometrySettings& settings, LostFiles& lost);
 
   /// Every sample, in order; those that the odometry refuses are left out here too.
   void addImu(const ImuSample& sample);
   void addKeyframe(const TrackedFrame& frame, const NavState& state);
-
-  /// After the run, before solve(): a loop between two of the keyframes.
-  void addRevisit(const LoopRevisit& revisit) { revisits_.push_back(revisit); }
-  Status solve(FullSmootherReport& report, std::vector<MapPose>& poses);
-  [[nodiscard]] const FaultCounts& faults() const { return faults_; }
+  /// After the run: a loop between two of the keyframes.
+  void addRevisit(const LoopRevisit& revisit);
+  /// Marks the end and brings the file to the disk. Whatever comes later is left out.
+  void finish();
 
  private:
   static constexpr std::size_t kBufferBytes = std::size_t{256} * 1024;
 
-  template <typename T>
-  void put(const T& value);
-  template <typename T>
-  bool get(T& value);
-  bool readKeyframe(TrackedFrame& frame, NavState& state);
+  void writeHead(const Rig& rig, const ImuNoise& noise, double pixel_sigma);
+  void writeRecord(keyframe_file::Kind kind, std::size_t payload);
+  void check(bool written);
 
   struct Close {
     void operator()(std::FILE* file) const { std::fclose(file); }
   };
-  Rig rig_;
-  ImuNoise noise_;
-  double pixel_sigma_;
+  std::string path_;
+  LostFiles& lost_;
   SampleMonitor monitor_;
   std::vector<char> buffer_;
-  std::unique_ptr<std::FILE, Close> file_;
-  bool failed_ = false;
-  std::vector<LoopRevisit> revisits_;
-  FaultCounts faults_;
+  std::vector<std::uint8_t> record_;
+  std::unique_ptr<std::FILE, Close> file_;  ///< null: failed or finished
+  std::uint32_t head_crc_ = 0;
 };
 
 }  // namespace swiftlet

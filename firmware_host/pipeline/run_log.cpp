@@ -148,19 +148,4 @@ void RunLog::collect(const Wiring& wiring) {
   }
 }
 
-std::vector<MapPose> RunLog::solveMap() {
-  std::vector<MapPose> poses;
-  if (!keeper_) return nodes_;
-  FullSmootherReport report;
-  Status status;
-  addTime(statistics_.times, StageId::kMap, measured([&] { status = keeper_->solve(report, poses); }));
-  for (const auto& row : keeper_->faults().rows()) statistics_.faults[row.text] += row.count;
-  if (!status.ok()) {
-    ++statistics_.faults[status.what];
-    return poses;
-  }
-  statistics_.map = report;
-  return poses;
-}
-
 }  // namespace swiftlet

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "firmware_host/pipeline/arrows.hpp"
+#include "firmware_host/pipeline/full_smoothing.hpp"
 #include "firmware_host/pipeline/map_keeper.hpp"
 #include "firmware_host/pipeline/run_listener.hpp"
 #include "mapping/loop/loop_stage.hpp"
@@ -40,9 +41,12 @@ class RunLog {
   /// After the run: the loops that were found, for full smoothing.
   void keepLoops(const LoopStage& loops);
   [[nodiscard]] const std::vector<MapLoop>& loops() const { return loops_; }
-  /// After the run: full smoothing over what was kept, or the pose graph of the loops where nothing was.
-  /// Poses of the keyframes; empty when there is neither.
-  std::vector<MapPose> solveMap();
+  /// After the run: the keyframes' poses in the pose graph of the loops; empty without loop closure.
+  [[nodiscard]] const std::vector<MapPose>& nodes() const { return nodes_; }
+  /// After the run: closes the file of keyframes, where one was kept.
+  void finishKeeping() {
+    if (keeper_) keeper_->finish();
+  }
 
   [[nodiscard]] RunStatistics& statistics() { return statistics_; }
 

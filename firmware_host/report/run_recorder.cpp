@@ -25,59 +25,83 @@ std::string valueText(const Event& event) {
 
 }  // namespace
 
-RunRecorder::RunRecorder(const std::string& folder, bool imu_rate, bool meshes)
-    : folder_(folder), spilled_(folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) {
-    throw InputError(folder, 0, "", "the run folder cannot be created: " + error.message(),
-                     "Give another folder with --out");
-  }
+RunRecorder::RunRecorder(const std::string& folder, const Wanted& wanted, LostFiles& lost)
+    : folder_(folder), wanted_(wanted), lost_(lost), spilled_(folder) {
+  if (folder.empty()) return;
   const std::filesystem::path path(folder);
-  // What an earlier run left and this one does not write would be taken for this one's.
-  for (const char* name : {"imu_rate.tum", "imu_rate_health.csv", "map.tum", "loops.csv", "local_mesh.ply",
-                           "map.ply", "map.glb", "meshes", "summary.json"}) {
-    std::filesystem::remove_all(path / name, error);
+  if (wanted.meshes) open(meshes_, folder);
+  open(odometry_, path / "odometry.tum");
+  if (wanted.imu_rate) {
+    open(imu_rate_, path / "imu_rate.tum");
+    open(imu_rate_health_, path / "imu_rate_health.csv");
+    writeTo(imu_rate_health_, [](LineFile& file) { file.write("#timestamp [ns],health,epoch"); });
   }
-  if (meshes) meshes_.emplace(folder);
-  odometry_.emplace(path / "odometry.tum");
-  if (imu_rate) {
-    imu_rate_.emplace(path / "imu_rate.tum");
-    imu_rate_health_.emplace(path / "imu_rate_health.csv");
-    imu_rate_health_->write("#timestamp [ns],health,epoch");
+  open(states_, path / "states.csv");
+  writeTo(states_, [](LineFile& file) { file.write(statesHeader()); });
+  open(events_, path / "events.log");
+}
+
+template <typename Write>
+void RunRecorder::attempt(const Write& write) {
+  try {
+    write();
+  } catch (const InputError& error) {
+    lost_.add(error.what());
   }
-  states_.emplace(path / "states.csv");
-  states_->write(statesHeader());
-  events_.emplace(path / "events.log");
+}
+
+template <typename File, typename... Arguments>
+void RunRecorder::open(std::optional<File>& file, Arguments&&... arguments) {
+  if (!wanted_.fly_on) {
+    file.emplace(arguments...);
+    return;
+  }
+  attempt([&] { file.emplace(arguments...); });
+}
+
+template <typename File, typename Write>
+void RunRecorder::writeTo(std::optional<File>& file, const Write& write) {
+  if (!file) return;
+  try {
+    write(*file);
+  } catch (const InputError& error) {
+    lost_.add(error.what());
+    file.reset();
+  }
 }
 
 void RunRecorder::onFrame(const TrackedFrame& tracked, const OdometryOutput& output) {
   writeEvents(output);
   writeKeyframes(output);
   // One line per image at the image's own stamp; the state's is the same instant on the IMU's clock.
-  if (output.has_state) odometry_->write(formatTum(tracked.stamp, output.state.T_world_body));
+  if (!output.has_state) return;
+  writeTo(odometry_,
+          [&](LineFile& file) { file.write(formatTum(tracked.stamp, output.state.T_world_body)); });
 }
 
 void RunRecorder::onImuState(const NavState& state) {
-  if (!imu_rate_) return;
-  imu_rate_->write(formatTum(state.stamp, state.T_world_body));
+  writeTo(imu_rate_, [&](LineFile& file) { file.write(formatTum(state.stamp, state.T_world_body)); });
   if (health_ == state.health && epoch_ == state.epoch) return;
   health_ = state.health;
   epoch_ = state.epoch;
-  imu_rate_health_->write(fmt::format("{},{},{}", state.stamp.ns, healthName(state.health), state.epoch));
+  writeTo(imu_rate_health_, [&](LineFile& file) {
+    file.write(fmt::format("{},{},{}", state.stamp.ns, healthName(state.health), state.epoch));
+  });
 }
 
 void RunRecorder::onMesh(bool keyframe, const LocalMesh& frame, const LocalMesh* horizon,
                          std::span<const Eigen::Vector2f> hull) {
-  if (meshes_) meshes_->write(keyframe, frame, horizon, hull);
+  writeTo(meshes_, [&](MeshSequenceWriter& meshes) { meshes.write(keyframe, frame, horizon, hull); });
 }
 
 void RunRecorder::onLocalMesh(const LocalMesh& mesh) {
-  writePly((std::filesystem::path(folder_) / "local_mesh.ply").string(), toTriangleMesh(mesh));
+  if (folder_.empty()) return;
+  attempt([&] { writePly(std::filesystem::path(folder_) / "local_mesh.ply", toTriangleMesh(mesh)); });
 }
 
 void RunRecorder::onMap(MapStage& map, std::span<const std::uint32_t> tied) {
-  map_ = writeMap(folder_, map, spilled_, tied);
+  if (folder_.empty()) return;
+  attempt([&] { map_ = writeMap(folder_, map, spilled_, tied); });
 }
 
 void RunRecorder::onFinish(const OdometryOutput& output) {
@@ -86,18 +110,24 @@ void RunRecorder::onFinish(const OdometryOutput& output) {
 }
 
 void RunRecorder::onRemark(Stamp stamp, const std::string& text) {
-  events_->write(fmt::format("{} {} {}", formatSeconds(stamp), kRemarkName, text));
+  writeTo(events_, [&](LineFile& file) {
+    file.write(fmt::format("{} {} {}", formatSeconds(stamp), kRemarkName, text));
+  });
 }
 
 void RunRecorder::writeEvents(const OdometryOutput& output) {
   for (const Event& event : output.events) {
-    events_->write(
-        fmt::format("{} {} {}", formatSeconds(event.stamp), eventName(event.kind), valueText(event)));
+    writeTo(events_, [&](LineFile& file) {
+      file.write(
+          fmt::format("{} {} {}", formatSeconds(event.stamp), eventName(event.kind), valueText(event)));
+    });
   }
 }
 
 void RunRecorder::writeKeyframes(const OdometryOutput& output) {
-  for (const KeyframeState& keyframe : output.left_window) states_->write(statesRow(keyframe));
+  for (const KeyframeState& keyframe : output.left_window) {
+    writeTo(states_, [&](LineFile& file) { file.write(statesRow(keyframe)); });
+  }
 }
 
 }  // namespace swiftlet

@@ -2,12 +2,13 @@
 // Writes the files of a run folder that grow while the run goes on: odometry.tum; on request imu_rate.tum
 // with imu_rate_health.csv (a line where health or epoch of those states changes) and meshes/; states.csv,
 // events.log; and local_mesh.ply, map.ply and map.glb at its end. Lines go out as they come, in constant
-// memory.
+// memory. A file that cannot be written any more ends there, said once by its name; the others go on.
 
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
+#include "firmware_host/pipeline/lost_files.hpp"
 #include "firmware_host/pipeline/run_listener.hpp"
 #include "firmware_host/report/line_file.hpp"
 #include "firmware_host/report/mesh_files.hpp"
@@ -17,8 +18,14 @@ namespace swiftlet {
 
 class RunRecorder : public RunListener {
  public:
-  /// Creates the folder (its parents too). Files of an earlier run in it are replaced.
-  RunRecorder(const std::string& folder, bool imu_rate, bool meshes = false);
+  struct Wanted {
+    bool imu_rate = false;
+    bool meshes = false;
+    /// Go on without a file that cannot be made, too; else InputError.
+    bool fly_on = false;
+  };
+  /// The folder is there already; empty: write nothing. `lost` outlives this and gets what cannot be written.
+  RunRecorder(const std::string& folder, const Wanted& wanted, LostFiles& lost);
 
   void onFrame(const TrackedFrame& tracked, const OdometryOutput& output) override;
   void onImuState(const NavState& state) override;
@@ -34,10 +41,18 @@ class RunRecorder : public RunListener {
   [[nodiscard]] const nlohmann::ordered_json& map() const { return map_; }
 
  private:
+  template <typename File, typename... Arguments>
+  void open(std::optional<File>& file, Arguments&&... arguments);
+  template <typename File, typename Write>
+  void writeTo(std::optional<File>& file, const Write& write);
+  template <typename Write>
+  void attempt(const Write& write);
   void writeEvents(const OdometryOutput& output);
   void writeKeyframes(const OdometryOutput& output);
 
   std::string folder_;
+  Wanted wanted_;
+  LostFiles& lost_;
   std::optional<LineFile> odometry_;
   std::optional<LineFile> imu_rate_;
   std::optional<LineFile> imu_rate_health_;

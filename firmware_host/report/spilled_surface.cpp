@@ -10,7 +10,7 @@ namespace swiftlet {
 bool SpilledSurface::open() {
   if (file_ || failed_) return !failed_;
   const std::string path = folder_ + "/surface.tmp";
-  const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  const int file = folder_.empty() ? -1 : ::open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
   failed_ = file < 0;
   if (failed_) return false;
   unlink(path.c_str());

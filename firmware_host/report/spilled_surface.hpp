@@ -18,7 +18,7 @@ namespace swiftlet {
 
 class SpilledSurface : public SurfaceSink {
  public:
-  /// The file is made in `folder`, with the first patch.
+  /// The file is made in `folder`, with the first patch. Empty: no file, every patch is lost.
   explicit SpilledSurface(std::string folder) : folder_(std::move(folder)) {}
 
   void take(const SurfacePatch& patch) override;

@@ -71,12 +71,7 @@ Json countersJson(const RunFacts& facts, const RunStatistics& statistics) {
     json["events"][std::string(eventName(kind))] = {{"count", total.count}, {"value_sum", total.value}};
   }
   if (statistics.map) {
-    json["full_smoothing"] = {
-        {"keyframes", statistics.map->keyframes},         {"landmarks", statistics.map->landmarks},
-        {"iterations", statistics.map->iterations},       {"revisits", statistics.map->revisits},
-        {"revisits_used", statistics.map->revisits_used}, {"matches", statistics.map->matches},
-        {"matches_used", statistics.map->matches_used},   {"initial_cost", statistics.map->initial_cost},
-        {"final_cost", statistics.map->final_cost}};
+    json["full_smoothing"] = toJson(*statistics.map);
   }
   if (statistics.mesh) {
     json["mesh"] = toJson(statistics.mesh->stage, statistics.mesh->horizon);
@@ -126,22 +121,6 @@ Json latencyJson(const LatencyHistogram& wall, const LatencyHistogram& cpu) {
   return {{"count", wall.count()}, {"wall", distributionJson(wall)}, {"cpu", distributionJson(cpu)}};
 }
 
-Json timingJson(const StageTable& table) {
-  Json json;
-  for (std::size_t i = 0; i < table.size(); ++i) {
-    const StageTimes& times = table[i];
-    if (times.wall_frames.count() + times.wall_keyframes.count() == 0) continue;
-    Json stage;
-    const auto id = static_cast<StageId>(i);
-    const bool splits = id == StageId::kTrack || id == StageId::kSmooth || id == StageId::kTrim ||
-                        id == StageId::kMesh || id == StageId::kImageToPose || id == StageId::kExposureToPose;
-    stage[splits ? "frames" : "all"] = latencyJson(times.wall_frames, times.cpu_frames);
-    if (splits) stage["keyframes"] = latencyJson(times.wall_keyframes, times.cpu_keyframes);
-    json[std::string(stageName(id))] = stage;
-  }
-  return json;
-}
-
 Json runJson(const RunFacts& facts, const RunStatistics& statistics) {
   Json json;
   if (!facts.log.empty()) json["log"] = facts.log;
@@ -159,6 +138,30 @@ Json runJson(const RunFacts& facts, const RunStatistics& statistics) {
 }
 
 }  // namespace
+
+Json timingJson(const StageTable& table) {
+  Json json;
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const StageTimes& times = table[i];
+    if (times.wall_frames.count() + times.wall_keyframes.count() == 0) continue;
+    Json stage;
+    const auto id = static_cast<StageId>(i);
+    const bool splits = id == StageId::kTrack || id == StageId::kSmooth || id == StageId::kTrim ||
+                        id == StageId::kMesh || id == StageId::kImageToPose || id == StageId::kExposureToPose;
+    stage[splits ? "frames" : "all"] = latencyJson(times.wall_frames, times.cpu_frames);
+    if (splits) stage["keyframes"] = latencyJson(times.wall_keyframes, times.cpu_keyframes);
+    json[std::string(stageName(id))] = stage;
+  }
+  return json;
+}
+
+Json toJson(const FullSmootherReport& map) {
+  return {{"keyframes", map.keyframes},         {"landmarks", map.landmarks},
+          {"iterations", map.iterations},       {"revisits", map.revisits},
+          {"revisits_used", map.revisits_used}, {"matches", map.matches},
+          {"matches_used", map.matches_used},   {"initial_cost", map.initial_cost},
+          {"final_cost", map.final_cost}};
+}
 
 Json versionJson() {
   Json json;
@@ -278,6 +281,9 @@ std::string summaryText(const Json& summary) {
   return text;
 }
 
-void writeJson(const std::string& path, const Json& json) { writeWholeFile(path, json.dump(2) + "\n"); }
+void writeJson(const std::string& path, const Json& json) {
+  // File names in messages may hold any bytes.
+  writeWholeFile(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
 
 }  // namespace swiftlet

@@ -11,6 +11,7 @@
 
 #include "drivers/recorded/log_warnings.hpp"
 #include "firmware_host/pipeline/run_listener.hpp"
+#include "firmware_host/pipeline/stage_timer.hpp"
 #include "firmware_host/settings/settings.hpp"
 
 namespace swiftlet {
@@ -47,6 +48,10 @@ nlohmann::ordered_json summaryOf(const RunFacts& facts, const Settings& settings
                                  const RunStatistics& statistics);
 
 nlohmann::ordered_json toJson(const LogCounters& log);
+/// Of full smoothing, under "full_smoothing" in the counters.
+nlohmann::ordered_json toJson(const FullSmootherReport& map);
+/// Latencies of the stages that did something, by their names.
+nlohmann::ordered_json timingJson(const StageTable& table);
 
 /// Counters of the mesher, without those of the pipeline around it.
 nlohmann::ordered_json toJson(const MeshCounters& stage, const HorizonCounters& horizon);

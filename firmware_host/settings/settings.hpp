@@ -28,6 +28,13 @@ struct EvaluationGroup {
   double rpe_delta_s = 1.0;
 };
 
+/// Of `fly`, where no --out is given.
+struct FlightsGroup {
+  std::string folder = "flights";
+  int keep_free_mib = 0;  ///< 0: nothing is ever deleted
+  bool smooth = false;
+};
+
 struct MeshGroup {
   bool enabled = true;
 };
@@ -101,6 +108,7 @@ struct Settings {
   PairingGroup pairing;
   CalibrationGroup calibration;
   EvaluationGroup evaluation;
+  FlightsGroup flights;
   MeshGroup mesh;
   LoopGroup loop;
   LoopSettings loop_stage;
@@ -109,6 +117,7 @@ struct Settings {
   RealtimeGroup realtime;
   BudgetsGroup budgets;
   bool full_smoothing = true;  ///< smoother.horizon is `full`
+  int full_memory_mib = 2048;  ///< of full smoothing
 };
 
 }  // namespace swiftlet

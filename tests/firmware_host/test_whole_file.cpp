@@ -62,6 +62,8 @@ MapMesh manyFaces() {
 
 G2oGraph manyPoses() {
   G2oGraph graph;
+  graph.planar = false;
+  graph.has_poses = true;
   graph.space.poses.resize(kElements);
   for (std::size_t i = 0; i < kElements; ++i) graph.ids.push_back(static_cast<std::int64_t>(i));
   return graph;

@@ -69,11 +69,12 @@ int run(const std::string& path, double minutes, double speed) {
   const ScratchFolder folder("long_flight");
   const auto images_a_minute = static_cast<std::uint64_t>(openLog(path)->imageCount());
   RepeatedLog log(path, static_cast<int>(std::lround(minutes)));
-  RunRecorder recorder(folder.path(), true);
+  LostFiles lost;
+  RunRecorder recorder(folder.path(), {.imu_rate = true}, lost);
   RunLog run_log(recorder);
   Settings settings;
   run_log.keepForMap(
-      std::make_unique<MapKeeper>(folder.path(), log.rig(), log.imuNoise(), settings.odometry));
+      std::make_unique<MapKeeper>(folder.path(), log.rig(), log.imuNoise(), settings.odometry, lost));
   LogFeed feed(log, {}, nullptr);
   Wiring::Options wanted;
   wanted.imu_states = true;

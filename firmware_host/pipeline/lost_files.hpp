@@ -1,0 +1,31 @@
+#pragma once
+// What a run could not write: said once on stderr, kept for who asks. The run goes on.
+//
+// Threads: add() any, problem() and count() any, also while add() runs. Fixed memory, no lock.
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <string_view>
+
+namespace swiftlet {
+
+class LostFiles {
+ public:
+  static constexpr std::size_t kMostText = 400;  ///< bytes of the first one's text; a path and a reason
+
+  /// `what` names the file and the reason.
+  void add(std::string_view what);
+
+  /// The first of them, cut to kMostText; null: none so far. Valid and unchanged as long as this lives.
+  [[nodiscard]] const char* problem() const;
+  [[nodiscard]] std::uint32_t count() const { return count_.load(std::memory_order_relaxed); }
+
+ private:
+  std::array<char, kMostText> text_{};
+  std::atomic<bool> claimed_{false};
+  std::atomic<bool> readable_{false};
+  std::atomic<std::uint32_t> count_{0};
+};
+
+}  // namespace swiftlet
