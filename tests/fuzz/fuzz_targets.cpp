@@ -26,6 +26,7 @@
 #include "tests/fuzz/fuzz_clocks.hpp"
 #include "tests/fuzz/fuzz_decoders.hpp"
 #include "tests/fuzz/fuzz_faults.hpp"
+#include "tests/fuzz/fuzz_keyframes.hpp"
 #include "tests/fuzz/fuzz_recording.hpp"
 
 namespace swiftlet::fuzz {
@@ -274,7 +275,7 @@ void keptMap(std::string_view text) {
   }
 }
 
-constexpr std::array<NamedTarget, 21> kTargets = {{{"imu_csv", &imuCsv},
+constexpr std::array<NamedTarget, 22> kTargets = {{{"imu_csv", &imuCsv},
                                                    {"image_csv", &imageCsv},
                                                    {"trajectory", &trajectory},
                                                    {"tracks", &tracks},
@@ -286,6 +287,7 @@ constexpr std::array<NamedTarget, 21> kTargets = {{{"imu_csv", &imuCsv},
                                                    {"ply", &ply},
                                                    {"vocabulary", &vocabulary},
                                                    {"kept_map", &keptMap},
+                                                   {"keyframes", &keyframes},
                                                    {"dronecan", &dronecan},
                                                    {"vectornav_stream", &vectornavStream},
                                                    {"xsens_stream", &xsensStream},
