@@ -126,7 +126,7 @@ check "the service's start line, with the example's settings, ends for want of d
   start=$(sed -n "s/^ExecStart=//p" /usr/lib/systemd/system/swiftlet.service | sed -e "s/%%/%/g" -e "s/[$][$]/\$/g")
   mkdir -p /var/lib/swiftlet && chown swiftlet: /var/lib/swiftlet && cd /var/lib/swiftlet || exit 9
   code=0
-  INVOCATION_ID=0123456789abcdef setpriv --reuid swiftlet --regid swiftlet --init-groups \
+  setpriv --reuid swiftlet --regid swiftlet --init-groups \
     sh -c "eval \"\$1\"" sh "$start" >/opt/start.log 2>&1 || code=$?
   cat /opt/start.log
   [ $code -eq 1 ] && grep -q "nothing was flown" /opt/start.log && ! grep -qi "exception\|settings:" /opt/start.log'
