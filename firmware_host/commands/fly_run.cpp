@@ -38,7 +38,7 @@ std::string claimFolder(const FlyRequest& request, const Settings& settings, std
     claim.emplace(out, RunKind::kFlight, true);
     return out;
   } catch (const InputError& error) {
-    lost.add(fmt::format("{}: no file of this flight is written", error.what()));
+    lost.add(fmt::format("{}: no folder for this flight", error.what()));
     return {};
   }
 }

@@ -34,6 +34,7 @@ constexpr std::uint32_t kLargestNumber = 999'999;
 /// A board without a battery starts in 1970, or at the date of its image: 2020 and later is taken for set.
 constexpr int kFirstSetYear = 2020;
 constexpr int kTriesForName = 1000;
+constexpr const char* kFlightsRemedy = "Make flights.folder writable, or name another one";
 
 constexpr const char* word(RunKind kind) { return kind == RunKind::kFlight ? "flight" : "replay"; }
 
@@ -110,12 +111,11 @@ void removeEarlierRun(const fs::path& folder) {
   removeFiles(folder, isRunFile);
 }
 
-void makeFolders(const std::string& folder) {
+void makeFolders(const std::string& folder, const char* remedy) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) {
-    throw InputError(folder, 0, "", "the run folder cannot be made: " + error.message(),
-                     "Give another folder with --out");
+    throw InputError(folder, 0, "", "this folder cannot be made: " + error.message(), remedy);
   }
 }
 
@@ -195,7 +195,7 @@ std::optional<RunKind> runKindOf(const std::string& folder) {
 void refuseRunIn(const std::string& folder) { refuseOthers(folder, RunKind::kFlight); }
 
 RunClaim::RunClaim(const std::string& folder, RunKind kind, bool replace) {
-  makeFolders(folder);
+  makeFolders(folder, "Give another folder with --out");
   if (!replace) refuseOthers(folder, kind);
   removeEarlierRun(folder);
   const std::string mark = fs::path(folder) / kRunMark;
@@ -221,7 +221,7 @@ std::string flightName(std::uint32_t number, std::time_t now) {
 }
 
 std::string makeFlightFolder(const std::string& parent, std::time_t now) {
-  makeFolders(parent);
+  makeFolders(parent, kFlightsRemedy);
   const std::vector<OldFlight> flights = flightsIn(parent);
   std::uint32_t number = flights.empty() ? 1 : flights.back().number + 1;
   for (int i = 0; i < kTriesForName && number <= kLargestNumber; ++i, ++number) {
@@ -231,7 +231,7 @@ std::string makeFlightFolder(const std::string& parent, std::time_t now) {
     if (errno != EEXIST) {
       throw InputError(folder, 0, "",
                        std::string("the flight's folder cannot be made: ") + std::strerror(errno),
-                       "Make flights.folder writable, or name another one");
+                       kFlightsRemedy);
     }
   }
   throw InputError(parent, 0, "", "no number is left for a flight",

@@ -1,8 +1,10 @@
 #!/bin/sh
 # Flights on a hardware-in-the-loop replay in the kernel sandbox, by simulated time.
-# usage: check_flight.sh PROGRAM accuracy|faults|trap SECONDS [LINK...]
+# usage: check_flight.sh PROGRAM accuracy|faults|disk|trap SECONDS [LINK...]
 #   accuracy  the odometry's ATE is within the larger of 20 % and 3 mm of a plain replay's
 #   faults    a timeline of several faults, flown twice: every check passes, and both flights list the same events
+#   disk      a disk that is not there, read-only, full, or goes in flight costs files: the flight ends in order,
+#             says so and has its poses
 #   trap      flyer=PROGRAM is trapped_program: no thread of the flight did what it must not, with faults and without
 #   LINK      of guest_flight.sh: serial, can, trigger, protocol=NAME, hangup, flyer=PROGRAM, autopilot
 # Needs euroc_mh01_20s in the folder SWIFTLET_DATA, or in ../shared/data beside the project. Exit code 77: skipped.
@@ -94,6 +96,17 @@ case $what in
     sed -n '/^thread  /,$p' "$out/faults/fly.txt"
     events faults
     grep -q '^imu  .*[0-9]' "$out/faults/fly.txt"
+    ;;
+  disk)
+    for disk in none readonly full gone; do
+      fly $disk "$@" disk=$disk
+      said=$out/$disk/fly.txt
+      echo "check_flight: disk $disk: $(grep -c '; the run goes on without it' "$said") losses, the first:"
+      grep -m 1 '; the run goes on without it' "$said" || { cat "$said"; exit 1; }
+      grep -q 'warning: files of this flight are missing or end early' "$said" || { cat "$said"; exit 1; }
+      poses=$(sed -n 's/.* keyframes, \([0-9]*\) poses.*/\1/p' "$said")
+      [ "${poses:-0}" -ge $((seconds * 15)) ] || { cat "$said"; exit 1; }
+    done
     ;;
   *)
     echo "check_flight: what is $what?" >&2

@@ -11,6 +11,8 @@
 #   realtime priorities and locked memory as on a vehicle
 #   autopilot  an autopilot's port that nobody listens at
 #   fly      options of `swiftlet fly`
+#                        [disk=none|readonly|full|gone]
+#   disk     of the flight, which records: no folder to be had; a read-only one; one of 40 MB; one that goes after 3 s
 # Exit code: 0 when both programs ended well.
 set -u
 program=$1
@@ -28,6 +30,7 @@ flyer=$program
 realtime=false
 autopilot=''
 fly_options=''
+disk=''
 for option in "$@"; do
   case $option in
     serial | can) link=$option ;;
@@ -40,6 +43,7 @@ for option in "$@"; do
     flyer=*) flyer=${option#flyer=} ;;
     realtime) realtime=true ;;
     autopilot) autopilot=udp:127.0.0.1:14550 ;;
+    disk=*) disk=${option#disk=} ;;
     protocol=*) protocol=${option#protocol=} ;;
     *)
       echo "guest_flight: what is $option?" >&2
@@ -90,9 +94,26 @@ for _ in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20; do
   if [ "$link" = can ] || [ -e "$imu" ]; then break; fi
   sleep 0.1
 done
+set -- --imu-rate --out "$out/flight"
+if [ -n "$disk" ]; then
+  place=/run/flight_disk
+  mkdir -p $place
+  case $disk in
+    none) echo 'a file in the way' >$place/file && place=$place/file ;;
+    readonly) mount -t tmpfs -o ro tmpfs $place || exit 125 ;;
+    full | gone) mount -t tmpfs -o size=40M tmpfs $place || exit 125 ;;
+    *) exit 2 ;;
+  esac
+  set -- --imu-rate --set flights.folder=$place/flights
+  [ "$disk" = gone ] || set -- "$@" --record
+fi
 # shellcheck disable=SC2086 # options without blanks
-"$flyer" fly $fly_options --settings "$out/vehicle.yaml" --imu-rate --out "$out/flight" >"$out/fly.txt" 2>&1 &
+"$flyer" fly $fly_options --settings "$out/vehicle.yaml" "$@" >"$out/fly.txt" 2>&1 &
 fly=$!
+if [ "$disk" = gone ]; then
+  sleep 3
+  umount -l $place || exit 125
+fi
 if [ $hangup = yes ]; then
   sleep 3
   kill -HUP $fly
@@ -102,5 +123,6 @@ played=$?
 kill -INT $fly
 wait $fly
 flown=$?
+if [ "$disk" = full ]; then ls -l $place/flights/*/ $place/flights/*/recording >"$out/files.txt"; fi
 echo "guest_flight: hil $played, fly $flown"
 [ $played -eq 0 ] && [ $flown -eq 0 ]
