@@ -3,6 +3,7 @@
 # unmodified program.
 # usage: guest_flight.sh PROGRAM LOG OUT [serial|can] [trigger] [faults=FILE] [seconds=N] [protocol=NAME] [nomesh]
 #                        [hangup] [flyer=PROGRAM] [realtime] [autopilot] [fly=OPTION...]
+#                        [disk=none|readonly|full|gone]
 #   PROGRAM  swiftlet
 #   LOG      EuRoC folder with calibration
 #   OUT      folder: vehicle.yaml, hil/, flight/, what each program said
@@ -11,7 +12,6 @@
 #   realtime priorities and locked memory as on a vehicle
 #   autopilot  an autopilot's port that nobody listens at
 #   fly      options of `swiftlet fly`
-#                        [disk=none|readonly|full|gone]
 #   disk     of the flight, which records: no folder to be had; a read-only one; one of 40 MB; one that goes after 3 s
 # Exit code: 0 when both programs ended well.
 set -u
