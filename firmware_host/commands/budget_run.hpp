@@ -7,7 +7,7 @@
 
 #include "firmware_host/budget/budget_report.hpp"
 #include "firmware_host/budget/load_generator.hpp"
-#include "firmware_host/pipeline/run_listener.hpp"
+#include "firmware_host/graph/run_listener.hpp"
 
 namespace swiftlet {
 

@@ -13,6 +13,7 @@
 #include "firmware_host/live/sensor_threads.hpp"
 #include "firmware_host/live/status_json.hpp"
 #include "firmware_host/pipeline/host_sleep.hpp"
+#include "firmware_host/pipeline/stage_timer.hpp"
 
 namespace swiftlet {
 namespace {

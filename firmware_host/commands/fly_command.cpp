@@ -38,6 +38,10 @@ int fly(const FlyOptions& options) {
   if (!result.lost.empty()) {
     warn(fmt::format("warning: files of this flight are missing or end early, the first: {}\n", result.lost));
   }
+  if (!result.faultless) {
+    warn("error: a thread of the flight was lost; executor.thread_faults in summary.json says which\n");
+    return kExitFailed;
+  }
   if (!result.has_pose) {
     const std::string events =
         result.out.empty() ? "" : "; " + result.out + "/events.log says what the start waited for";

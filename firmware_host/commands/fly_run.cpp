@@ -1,5 +1,7 @@
 #include "firmware_host/commands/fly_run.hpp"
 
+#include <fmt/format.h>
+
 #include <atomic>
 #include <ctime>
 #include <memory>
@@ -56,85 +58,132 @@ Calibration vehicleCalibration(const Settings& settings) {
   return readCalibration(settings.vehicle.calibration, settings.vehicle.imu_calibration, options);
 }
 
+namespace {
+
+/// What a flight is made of. Threads refer to all of it.
+class FlightRun {
+ public:
+  FlightRun(const FlyRequest& request, Settings settings)
+      : request_(request),
+        settings_(std::move(settings)),
+        calibration_(vehicleCalibration(settings_)),
+        input_(settings_, calibration_) {}
+
+  FlyResult operator()() {
+    for (const std::string& line : calibration_.warnings) warn("warning: " + line + "\n");
+    LiveInput::Opened opened = input_.open();
+    for (const std::string& line : opened.warnings) warn("warning: " + line + "\n");
+    if (!opened.faults.empty()) {
+      result_.missing = std::move(opened.faults);
+      return result_;
+    }
+    memory_.note("devices");
+    result_.out = claimFolder(request_, settings_, claim_, lost_);
+    output_.emplace(result_.out, settings_, calibration_, RunOutput::Wanted{request_.imu_rate, false, true},
+                    lost_);
+    if (request_.record) recorder_ = output_->startRecorder(RecordOrder::kByArrival, nullptr);
+    fly();
+    end();
+    return result_;
+  }
+
+ private:
+  void fly() {
+    GraphOptions wanted = output_->graphOptions();
+    wanted.recorder = recorder_.get();
+    wanted.confusion = confusionOf(settings_);
+    wanted.sample_patience = kSamplePatience;
+    wanted.remarks = [this](RunLog& log) { return remark(log); };
+    // The schedule asks ten times a second.
+    const double begin = wallSeconds();
+    const double cpu = processCpuSeconds();
+    RunControl control;
+    control.stop = &stop_;
+    control.progress = [&](std::uint64_t /*images*/) {
+      const bool told = request_.stop != nullptr && request_.stop->load(std::memory_order_relaxed);
+      if (told || (request_.seconds > 0 && wallSeconds() - begin > request_.seconds)) stop_.store(true);
+    };
+    FlightRequest flight;
+    flight.announce = request_.show_progress;
+    flight.host_stamps = true;
+    flight.service = true;
+    flight.name = "flight";
+    flight.view = request_.view;
+    flight.file_problem = [this] { return lost_.problem(); };
+    const FlightEnd flown = flyThreaded(calibration_, input_, settings_, output_->log(), wanted, flight,
+                                        control, facts_.executor);
+    result_.faultless = flown.faultless;
+    result_.left_behind = flown.left_behind;
+    // A flight has no end of its own: to be told is its end.
+    facts_.finished = flown.faultless;
+    facts_.wall = wallSeconds() - begin;
+    facts_.cpu = processCpuSeconds() - cpu;
+  }
+
+  /// What the input and the terminal have to say, on the thread `log`.
+  bool remark(RunLog& log) {
+    const auto tell = [&log](Stamp stamp, const std::string& line) {
+      log.remark(stamp, line);
+      warn(line + "\n");
+    };
+    const bool hung_up = request_.hung_up != nullptr && request_.hung_up->exchange(false);
+    if (hung_up) tell(monotonicNow(), kHungUp);
+    return input_.drainEvents(tell) || hung_up;
+  }
+
+  void end() {
+    memory_.note("grown_in_flight");
+    facts_.mono = !settings_.odometry.use_stereo || calibration_.rig.camera_count < 2;
+    facts_.memory = memory_.rows();
+    facts_.calibration_form = calibration_.form;
+    facts_.input["devices"] = input_.counters();
+    if (recorder_) {
+      facts_.executor["recording"] = recordingJson(*recorder_);
+      if (!recorder_->status().ok()) {
+        lost_.add(fmt::format("{}/recording: {}", result_.out, recorder_->status().what));
+      }
+    }
+    output_->close(facts_);
+    writeSummary();
+    if (settings_.flights.smooth && output_->canSmooth()) {
+      output_->smooth(request_.renew_stop ? request_.renew_stop() : nullptr, request_.show_progress);
+      writeSummary();
+    }
+    if (const char* problem = lost_.problem()) result_.lost = problem;
+    result_.has_pose = output_->log().statistics().first_pose.has_value();
+  }
+
+  void writeSummary() {
+    result_.summary = output_->summary(facts_);
+    output_->writeSummary(result_.summary);
+  }
+
+  const FlyRequest request_;
+  MemoryTrack memory_;
+  const Settings settings_;
+  const Calibration calibration_;
+  LiveInput input_;
+  LostFiles lost_;
+  std::optional<RunClaim> claim_;
+  std::optional<RunOutput> output_;
+  std::unique_ptr<FlightRecorder> recorder_;
+  std::atomic<bool> stop_{false};
+  RunFacts facts_;
+  FlyResult result_;
+};
+
+}  // namespace
+
 FlyResult runFlight(const FlyRequest& request, Settings settings) {
   if (request.loop_closure) settings.loop.enabled = true;
   if (request.map) settings.map.enabled = true;
   checkMovingLabels(settings.map_stage);
   // A mistake that the user can correct, unlike a broken disk.
   if (!request.out.empty() && !request.replace) refuseRunIn(request.out);
-  const Calibration calibration = vehicleCalibration(settings);
-  for (const std::string& line : calibration.warnings) warn("warning: " + line + "\n");
-  MemoryTrack memory;
-  LiveInput input(settings, calibration);
-  LiveInput::Opened opened = input.open();
-  for (const std::string& line : opened.warnings) warn("warning: " + line + "\n");
-  FlyResult result;
-  if (!opened.faults.empty()) {
-    result.missing = std::move(opened.faults);
-    return result;
-  }
-  memory.note("devices");
-
-  LostFiles lost;
-  std::optional<RunClaim> claim;
-  result.out = claimFolder(request, settings, claim, lost);
-  RunOutput output(result.out, settings, calibration, RunOutput::Wanted{request.imu_rate, false, true}, lost);
-  std::unique_ptr<FlightRecorder> recorder;
-  if (request.record) recorder = output.startRecorder(RecordOrder::kByArrival);
-  Wiring::Options wanted = output.wiringOptions();
-  wanted.recorder = recorder.get();
-  wanted.confusion = confusionOf(settings);
-  wanted.sample_patience = kSamplePatience;
-  wanted.remarks = [&input, &request](RunLog& log) {
-    const auto remark = [&log](Stamp stamp, const std::string& line) {
-      log.remark(stamp, line);
-      warn(line + "\n");
-    };
-    const bool hung_up = request.hung_up != nullptr && request.hung_up->exchange(false);
-    if (hung_up) remark(monotonicNow(), kHungUp);
-    return input.drainEvents(remark) || hung_up;
-  };
-  // The executor asks ten times a second.
-  std::atomic<bool> stop{false};
-  RunControl control;
-  control.stop = &stop;
-  const double begin = wallSeconds();
-  control.progress = [&](std::uint64_t /*images*/) {
-    const bool told = request.stop != nullptr && request.stop->load(std::memory_order_relaxed);
-    if (told || (request.seconds > 0 && wallSeconds() - begin > request.seconds)) stop.store(true);
-  };
-  FlightRequest flight;
-  flight.announce = request.show_progress;
-  flight.host_stamps = true;
-  flight.name = "flight";
-  flight.view = request.view;
-  RunFacts facts;
-  const double cpu = processCpuSeconds();
-  flyThreaded(calibration, input, settings, output.log(), wanted, flight, control, facts.executor);
-  // A flight has no end of its own: to be told is its end.
-  facts.finished = true;
-  facts.wall = wallSeconds() - begin;
-  facts.cpu = processCpuSeconds() - cpu;
-  memory.note("grown_in_flight");
-  facts.mono = !settings.odometry.use_stereo || calibration.rig.camera_count < 2;
-  facts.memory = memory.rows();
-  facts.calibration_form = calibration.form;
-  facts.input["devices"] = input.counters();
-  if (recorder) {
-    facts.executor["recording"] = recordingJson(*recorder);
-    if (!recorder->status().ok())
-      lost.add(fmt::format("{}/recording: {}", result.out, recorder->status().what));
-  }
-  output.close(facts);
-  result.summary = output.summary(facts);
-  output.writeSummary(result.summary);
-  if (settings.flights.smooth && output.canSmooth()) {
-    output.smooth(request.renew_stop ? request.renew_stop() : nullptr, request.show_progress);
-    result.summary = output.summary(facts);
-    output.writeSummary(result.summary);
-  }
-  if (const char* problem = lost.problem()) result.lost = problem;
-  result.has_pose = output.log().statistics().first_pose.has_value();
+  auto run = std::make_unique<FlightRun>(request, std::move(settings));
+  FlyResult result = (*run)();
+  // Leaked on purpose: a thread that is stuck may go on at any time.
+  if (result.left_behind) static_cast<void>(run.release());
   return result;
 }
 

@@ -34,6 +34,8 @@ struct FlyResult {
   nlohmann::ordered_json summary;  ///< as written to summary.json
   std::string out;                 ///< the run folder; empty: it could not be made
   std::string lost;                ///< the first file that could not be written; empty: all were
+  bool faultless = true;           ///< false: a thread ended before its time; the summary says which
+  bool left_behind = false;        ///< a thread was stuck at the end, and what it uses stays in memory
   bool has_pose = false;
   std::vector<std::string> missing;  ///< devices that did not open, in words; nothing was flown then
 };

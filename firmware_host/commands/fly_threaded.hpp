@@ -1,6 +1,7 @@
 #pragma once
 // A run on threads with all that belongs around it: memory reserved, shown and locked, libraries confined,
-// what the machine says, effort governed by the budgets, and whether the vehicle might be armed.
+// what the machine says, effort governed by the budgets, those who follow the run, and the supervisor of them
+// all.
 
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -8,8 +9,8 @@
 #include <string>
 
 #include "drivers/calibration/calibration.hpp"
-#include "firmware_host/pipeline/threaded.hpp"
-#include "firmware_host/pipeline/wiring.hpp"
+#include "firmware_host/graph/graph.hpp"
+#include "firmware_host/schedule/threaded.hpp"
 #include "firmware_host/view/view_address.hpp"
 
 namespace swiftlet {
@@ -20,13 +21,23 @@ struct FlightRequest {
   /// From a log's stamps to CLOCK_MONOTONIC; gives none while that is not known. Any thread.
   std::function<std::optional<Duration>()> to_host;
   bool announce = false;            ///< print the table of what was reserved, and what is missing
+  bool service = false;             ///< tell systemd, where it asks to be told
   std::string name;                 ///< what is flown, for those who look on
   std::optional<ViewAddress> view;  ///< serve the live view there
+  /// What is wrong with the run's files; null: nothing. Any thread.
+  std::function<const char*()> file_problem;
+  std::function<bool(const char* node)> before_turn;  ///< ThreadedOptions::before_turn
 };
 
-/// `report` gets what the summary says of the executor. False when it was stopped.
-bool flyThreaded(const Calibration& calibration, SensorInput& input, const Settings& settings, RunLog& log,
-                 Wiring::Options wanted, const FlightRequest& request, const RunControl& control,
-                 nlohmann::ordered_json& report);
+struct FlightEnd {
+  bool finished = true;      ///< false: stopped
+  bool faultless = true;     ///< no thread ended before its time
+  bool left_behind = false;  ///< a thread is stuck: what it uses must stay (ThreadedReport::left_behind)
+};
+
+/// `report` gets what the summary says of the executor.
+FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const Settings& settings,
+                      RunLog& log, GraphOptions wanted, const FlightRequest& request,
+                      const RunControl& control, nlohmann::ordered_json& report);
 
 }  // namespace swiftlet

@@ -79,10 +79,32 @@ bool LiveConsumers::drainRemarks(RunLog& log) {
   });
 }
 
-void LiveConsumers::finish(nlohmann::ordered_json& report) {
-  if (autopilot_) report["autopilot"] = autopilot_->finish();
-  if (ros2_) report["ros2"] = ros2_->finish();
-  if (view_) report["view"] = view_->finish();
+void LiveConsumers::addTo(Supervisor& supervisor) {
+  const auto add = [&](const char* name, const auto& follower) {
+    if (follower) static_cast<void>(supervisor.add(name, follower->heart()));
+  };
+  add("autopilot", autopilot_);
+  add("dds", ros2_);
+  add("view", view_);
+  for (LiveOutlet* outlet : outlets_) {
+    static_cast<void>(
+        supervisor.addSink([outlet](const Verdict& verdict) { outlet->verdict.write(verdict); }));
+  }
+}
+
+bool LiveConsumers::finish(nlohmann::ordered_json& report, std::vector<std::string>& faults) {
+  bool sound = true;
+  const auto end = [&](const char* name, const auto& follower) {
+    if (!follower) return;
+    report[name] = follower->finish();
+    if (!report[name].contains("fault")) return;
+    faults.push_back(std::string(name) + ": " + report[name]["fault"].template get<std::string>());
+    sound = false;
+  };
+  end("autopilot", autopilot_);
+  end("ros2", ros2_);
+  end("view", view_);
+  return sound;
 }
 
 }  // namespace swiftlet

@@ -1,16 +1,19 @@
 #pragma once
 // Who follows a run while it goes on, each from a thread of its own: an autopilot, ROS 2's topics and labels
-// by them, the live view. Opened before the wiring is built, ended after the executor. An executor that is
+// by them, the live view. Opened before the graph is built, ended after the executor. An executor that is
 // not real-time has none.
 
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "firmware_host/autopilot/autopilot_thread.hpp"
 #include "firmware_host/commands/fly_threaded.hpp"
 #include "firmware_host/dds/dds_thread.hpp"
 #include "firmware_host/pipeline/label_exchange.hpp"
 #include "firmware_host/pipeline/live_outlet.hpp"
+#include "firmware_host/supervisor/supervisor.hpp"
 #include "firmware_host/view/view_thread.hpp"
 
 namespace swiftlet {
@@ -20,14 +23,17 @@ class LiveConsumers {
   /// Opens those that settings and request switch on. InputError naming the option where one does not open.
   LiveConsumers(const Calibration& calibration, const Settings& settings, const FlightRequest& request);
 
-  /// For Wiring::Options; they live as long as this.
+  /// For GraphOptions; they live as long as this.
   [[nodiscard]] const LiveOutlets& outlets() const { return outlets_; }
   /// Likewise; null where nobody brings labels.
   [[nodiscard]] LabelExchange* labels() const { return labels_.get(); }
   /// What they have to say of themselves since the last call, to the log. True: there was something.
   bool drainRemarks(RunLog& log);
-  /// Ends them; `report` gets what each counted under its own name.
-  void finish(nlohmann::ordered_json& report);
+  /// Before its begin(): puts them under supervision, and lets them have its verdicts.
+  void addTo(Supervisor& supervisor);
+  /// Ends them; `report` gets what each counted under its own name, `faults` what ended one before its time.
+  /// False: one may be stuck, and uses its outlet for good.
+  bool finish(nlohmann::ordered_json& report, std::vector<std::string>& faults);
 
  private:
   void openRos2(const Calibration& calibration, const Settings& settings, const FlightRequest& request);

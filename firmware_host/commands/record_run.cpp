@@ -4,6 +4,7 @@
 #include "firmware_host/live/live_input.hpp"
 #include "firmware_host/live/sensor_threads.hpp"
 #include "firmware_host/pipeline/host_sleep.hpp"
+#include "firmware_host/pipeline/stage_timer.hpp"
 #include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {

@@ -14,13 +14,13 @@
 #include "firmware_host/commands/fly_threaded.hpp"
 #include "firmware_host/commands/moving_labels.hpp"
 #include "firmware_host/commands/run_output.hpp"
-#include "firmware_host/pipeline/lockstep.hpp"
 #include "firmware_host/pipeline/log_player.hpp"
-#include "firmware_host/pipeline/reproduce.hpp"
 #include "firmware_host/realtime/console.hpp"
 #include "firmware_host/report/progress.hpp"
 #include "firmware_host/report/run_claim.hpp"
 #include "firmware_host/report/summary.hpp"
+#include "firmware_host/schedule/lockstep.hpp"
+#include "firmware_host/schedule/recorded.hpp"
 #include "firmware_host/settings/read_settings.hpp"
 
 namespace swiftlet {
@@ -152,8 +152,17 @@ class ReplayRun {
   }
 
   void repeat() {
-    const ReproduceReport report =
-        reproduce(*recording_, settings_, output_->log(), request_.imu_rate, control_, output_->vocabulary());
+    RecordedEfforts efforts;
+    GraphOptions wanted = output_->graphOptions();
+    wanted.track_effort = &efforts.track;
+    wanted.smooth_effort = &efforts.smooth;
+    wanted.confusion = confusionOf(settings_);
+    const auto& depth_sensor = recording_->header().depth_sensor;
+    if (depth_sensor) wanted.depth_sensor = &*depth_sensor;
+    const auto graph =
+        std::make_unique<Graph>(source_->rig(), source_->imuNoise(), settings_, output_->log(), wanted);
+    const RepeatReport report = runRecorded(*recording_, *graph, efforts, control_);
+    graph->report(output_->log());
     facts_.finished = report.finished && report.stopped_early.empty();
     facts_.executor["kind"] = "reproduced";
     if (report.stopped_early.empty()) return;
@@ -163,16 +172,16 @@ class ReplayRun {
   }
 
   void fly() {
-    std::unique_ptr<FlightRecorder> flight_recorder;
-    // One thread feeds the estimator.
-    if (request_.record) flight_recorder = output_->startRecorder(RecordOrder::kAsWritten);
-    Wiring::Options wanted = output_->wiringOptions();
-    wanted.recorder = flight_recorder.get();
+    if (request_.record) {  // one thread feeds the estimator
+      recorder_ = output_->startRecorder(RecordOrder::kAsWritten, scenes_ ? scenes_->depthSensor() : nullptr);
+    }
+    GraphOptions wanted = output_->graphOptions();
+    wanted.recorder = recorder_.get();
     wanted.drag = hooks_.drag;
     if (scenes_) wanted.depth_sensor = scenes_->depthSensor();
     wanted.confusion = confusion_;
-    LogFeed feed(*source_, {request_.from, request_.until, request_.last_stamp}, tracks_.get(),
-                 scenes_ ? &*scenes_ : nullptr);
+    LogFeed& feed = feed_.emplace(*source_, LogSection{request_.from, request_.until, request_.last_stamp},
+                                  tracks_.get(), scenes_ ? &*scenes_ : nullptr);
     if (request_.real_time) {
       FlightRequest flight;
       flight.speed = request_.speed;
@@ -181,24 +190,28 @@ class ReplayRun {
       const std::filesystem::path log = std::filesystem::path(request_.log).lexically_normal();
       flight.name = (log.has_filename() ? log : log.parent_path()).filename().string();
       flight.view = request_.view;
-      LogPlayer player(feed, request_.speed);
+      flight.before_turn = hooks_.before_turn;
+      flight.file_problem = [this] { return lost_.problem(); };
+      LogPlayer& player = player_.emplace(feed, request_.speed);
       flight.to_host = [&player] { return player.toHost(); };
-      facts_.finished = flyThreaded(source_->calibration(), player, settings_, output_->log(), wanted, flight,
-                                    control_, facts_.executor);
+      const FlightEnd flown = flyThreaded(source_->calibration(), player, settings_, output_->log(), wanted,
+                                          flight, control_, facts_.executor);
+      facts_.finished = flown.finished && flown.faultless;
+      left_behind_ = flown.left_behind;
       const LatencyHistogram& late = player.lateness();
       facts_.executor["late_ms"] = {{"p50", late.percentile(0.5) * kMilli},
                                     {"p99", late.percentile(0.99) * kMilli},
                                     {"max", late.max() * kMilli}};
     } else {
-      const auto wiring =
-          std::make_unique<Wiring>(source_->rig(), source_->imuNoise(), settings_, output_->log(), wanted);
+      const auto graph =
+          std::make_unique<Graph>(source_->rig(), source_->imuNoise(), settings_, output_->log(), wanted);
       memory_.note("estimator_at_start");
-      facts_.finished = runLockstep(feed, *wiring, control_);
-      output_->log().collect(*wiring);
+      facts_.finished = runLockstep(feed, *graph, control_);
+      graph->report(output_->log());
       facts_.executor["kind"] = "lockstep";
     }
     output_->log().statistics().times[static_cast<std::size_t>(StageId::kSource)] = feed.times();
-    if (flight_recorder) facts_.executor["recording"] = recordingJson(*flight_recorder);
+    if (recorder_) facts_.executor["recording"] = recordingJson(*recorder_);
   }
 
   ReplayResult end() {
@@ -215,6 +228,7 @@ class ReplayRun {
     }
     ReplayResult result;
     result.finished = facts_.finished;
+    result.left_behind = left_behind_;
     facts_.calibration_form = source_->calibration().form;
     facts_.input["log"] = toJson(source_->counters());
     facts_.warnings = source_->warnings();
@@ -240,9 +254,9 @@ class ReplayRun {
     return result;
   }
 
-  const ReplayRequest& request_;
+  const ReplayRequest request_;
   Settings settings_;
-  const ReplayHooks& hooks_;
+  const ReplayHooks hooks_;
   MemoryTrack memory_;
   std::unique_ptr<LogSource> source_;
   RecordingSource* recording_ = nullptr;  ///< source_, when it is to be repeated
@@ -255,15 +269,23 @@ class ReplayRun {
   LostFiles lost_;
   std::optional<RunClaim> claim_;
   std::optional<RunOutput> output_;
+  std::unique_ptr<FlightRecorder> recorder_;
+  std::optional<LogFeed> feed_;
+  std::optional<LogPlayer> player_;
   std::optional<Progress> progress_;
   RunControl control_;
   RunFacts facts_;
+  bool left_behind_ = false;
 };
 
 }  // namespace
 
 ReplayResult runReplay(const ReplayRequest& request, Settings settings, const ReplayHooks& hooks) {
-  return ReplayRun(request, std::move(settings), hooks)();
+  auto run = std::make_unique<ReplayRun>(request, std::move(settings), hooks);
+  ReplayResult result = (*run)();
+  // Leaked on purpose: a thread that is stuck may go on at any time.
+  if (result.left_behind) static_cast<void>(run.release());
+  return result;
 }
 
 }  // namespace swiftlet

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "drivers/recorded/log_source.hpp"
-#include "firmware_host/pipeline/run_listener.hpp"
+#include "firmware_host/graph/run_listener.hpp"
 #include "firmware_host/settings/settings.hpp"
 #include "firmware_host/view/view_address.hpp"
 
@@ -42,11 +42,13 @@ struct ReplayRequest {
 /// Tests slow stages down with these.
 struct ReplayHooks {
   std::function<void(StageId, double)> drag;
+  std::function<bool(const char* node)> before_turn;  ///< ThreadedOptions::before_turn
 };
 
 struct ReplayResult {
   nlohmann::ordered_json summary;  ///< as written to summary.json
-  bool finished = true;            ///< false: stopped
+  bool finished = true;            ///< false: stopped, or a thread ended before its time
+  bool left_behind = false;        ///< a thread was stuck at the end, and what it uses stays in memory
   bool has_pose = false;
   std::string lost;  ///< the first file that could not be written to its end; empty: all were
   RunStatistics statistics;

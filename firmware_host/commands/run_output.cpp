@@ -50,8 +50,8 @@ const Vocabulary* RunOutput::vocabulary() {
   return vocabulary_.get();
 }
 
-Wiring::Options RunOutput::wiringOptions() {
-  Wiring::Options options;
+GraphOptions RunOutput::graphOptions() {
+  GraphOptions options;
   options.imu_states = wanted_.imu_rate;
   options.meshes = wanted_.mesh_sequence;
   options.vocabulary = vocabulary();
@@ -59,7 +59,8 @@ Wiring::Options RunOutput::wiringOptions() {
   return options;
 }
 
-std::unique_ptr<FlightRecorder> RunOutput::startRecorder(RecordOrder order) const {
+std::unique_ptr<FlightRecorder> RunOutput::startRecorder(RecordOrder order,
+                                                         const DepthImageView* depth_sensor) const {
   RecordingHeader header;
   header.rig = calibration_.rig;
   header.noise = calibration_.noise;
@@ -67,6 +68,7 @@ std::unique_ptr<FlightRecorder> RunOutput::startRecorder(RecordOrder order) cons
   header.settings = printSettings(settings_, false);
   header.program_version = versionText();
   header.order = order;
+  if (depth_sensor != nullptr) header.depth_sensor = *depth_sensor;
   std::unique_ptr<FlightRecorder> recorder;
   attempt([&] { recorder = std::make_unique<FlightRecorder>((out_ / "recording").string(), header); });
   return recorder;

@@ -12,8 +12,8 @@
 
 #include "drivers/calibration/calibration.hpp"
 #include "drivers/recorded/recording_header.hpp"
-#include "firmware_host/pipeline/flight_recorder.hpp"
-#include "firmware_host/pipeline/wiring.hpp"
+#include "firmware_host/graph/flight_recorder.hpp"
+#include "firmware_host/graph/graph.hpp"
 #include "firmware_host/report/memory_use.hpp"
 #include "firmware_host/report/run_recorder.hpp"
 #include "firmware_host/report/summary.hpp"
@@ -36,10 +36,11 @@ class RunOutput {
   [[nodiscard]] RunLog& log() { return log_; }
   /// Of loop closure: null is the shipped one.
   [[nodiscard]] const Vocabulary* vocabulary();
-  /// What the wiring is to know of this folder.
-  [[nodiscard]] Wiring::Options wiringOptions();
-  /// Writes `recording/`; null where it cannot (fly_on).
-  [[nodiscard]] std::unique_ptr<FlightRecorder> startRecorder(RecordOrder order) const;
+  /// What the graph is to know of this folder.
+  [[nodiscard]] GraphOptions graphOptions();
+  /// Writes `recording/`. `depth_sensor`: of the map; null: none. Null where it cannot (fly_on).
+  [[nodiscard]] std::unique_ptr<FlightRecorder> startRecorder(RecordOrder order,
+                                                              const DepthImageView* depth_sensor) const;
 
   /// After the run: loops.csv, the keyframes closed, map.tum of the pose graph where there is one. Fills the
   /// facts' peak of memory.

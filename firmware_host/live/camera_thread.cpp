@@ -46,6 +46,7 @@ void CameraThread::run(SensorSink& sink, const RunControl& control) {
   discard();
   newest_ = hostNow();
   while (!control.stopped()) {
+    heart_.beat();
     takeEdges();
     if (!device_.isOpen()) {
       if (const DeviceFault fault = device_.reopen(); !fault.ok()) {

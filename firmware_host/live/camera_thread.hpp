@@ -49,6 +49,8 @@ class CameraThread {
   /// What the camera took otherwise than it was asked; after open().
   [[nodiscard]] std::span<const DeviceFault> warnings() const { return device_.warnings(); }
   void run(SensorSink& sink, const RunControl& control);
+  /// Of run(), at each turn.
+  [[nodiscard]] Heartbeat& heart() { return heart_; }
 
   /// Where the trigger's thread leaves its edges.
   [[nodiscard]] EdgeRing& edges() { return edges_; }
@@ -75,6 +77,7 @@ class CameraThread {
 
   Setup setup_;
   CameraDevice device_;
+  Heartbeat heart_;
   DeviceJournal journal_;
   Duration longest_silence_;
   ExposureTiming timing_;

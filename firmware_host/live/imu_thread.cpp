@@ -37,6 +37,7 @@ void ImuThread::run(SensorSink& sink, std::span<EdgeRing* const> edges, const Ru
   link_->discard();
   hear();
   while (!control.stopped()) {
+    heart_.beat();
     if (!link_->isOpen()) {
       if (const DeviceFault fault = link_->open(); !fault.ok()) {
         journal_.fault(hostNow(), fault);

@@ -38,6 +38,8 @@ class ImuThread {
   DeviceFault open() { return link_->open(); }
   /// `edges`: where edges of the trigger go that come through the link.
   void run(SensorSink& sink, std::span<EdgeRing* const> edges, const RunControl& control);
+  /// Of run(), at each turn.
+  [[nodiscard]] Heartbeat& heart() { return heart_; }
 
   [[nodiscard]] DeviceJournal& journal() { return journal_; }
   [[nodiscard]] const ImuLink& link() const { return *link_; }
@@ -60,6 +62,7 @@ class ImuThread {
   void watchQuality(std::size_t readings);
 
   std::unique_ptr<ImuLink> link_;
+  Heartbeat heart_;
   DeviceJournal journal_;
   Eigen::Matrix3d R_body_imu_;
   Duration delay_;

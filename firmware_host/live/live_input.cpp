@@ -123,18 +123,22 @@ LiveInput::Opened LiveInput::open() {
 std::vector<SensorInput::Thread> LiveInput::threads(SensorSink& sink, const RunControl& control) {
   static constexpr std::array<const char*, kMaxCameras> kCameraThreads = {"camera0", "camera1"};
   std::vector<Thread> threads;
-  threads.push_back({"imu", true, [this, &sink, &control] {
+  threads.push_back({"imu", true,
+                     [this, &sink, &control] {
                        imu_->run(sink,
                                  edges_by_imu_ ? std::span<EdgeRing* const>(edge_rings_)
                                                : std::span<EdgeRing* const>(),
                                  control);
-                     }});
+                     },
+                     &imu_->heart()});
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
-    threads.push_back(
-        {kCameraThreads[i], true, [this, i, &sink, &control] { cameras_[i]->run(sink, control); }});
+    threads.push_back({kCameraThreads[i], true,
+                       [this, i, &sink, &control] { cameras_[i]->run(sink, control); },
+                       &cameras_[i]->heart()});
   }
   if (trigger_) {
-    threads.push_back({"trigger", true, [this, &control] { trigger_->run(edge_rings_, control); }});
+    threads.push_back(
+        {"trigger", true, [this, &control] { trigger_->run(edge_rings_, control); }, &trigger_->heart()});
   }
   return threads;
 }

@@ -21,6 +21,7 @@ TriggerThread::TriggerThread(const TriggerGroup& settings, double rate)
 void TriggerThread::run(std::span<EdgeRing* const> cameras, const RunControl& control) {
   heard_ = hostNow();
   while (!control.stopped()) {
+    heart_.beat();
     if (!source_.isOpen()) {
       if (const DeviceFault fault = open(); !fault.ok()) {
         journal_.fault(hostNow(), fault);
@@ -46,7 +47,7 @@ void TriggerThread::run(std::span<EdgeRing* const> cameras, const RunControl& co
     if (count > 0) {
       heard_ = now;
       watchQuality(count);
-      counted_ = {source_.edges(), source_.missed()};
+      counted_ = {source_.edges(), source_.missed(), now};
       status_.write(counted_);
     } else if (now - heard_ > longest_silence_) {
       journal_.fault(

@@ -10,12 +10,14 @@
 #include "firmware_host/live/rate_watch.hpp"
 #include "firmware_host/pipeline/run_control.hpp"
 #include "firmware_host/settings/device_settings.hpp"
+#include "firmware_host/supervisor/heartbeat.hpp"
 
 namespace swiftlet {
 
 struct TriggerStatus {
   std::uint64_t edges = 0;
   std::uint64_t missed = 0;
+  Stamp heard;  ///< host time at which the newest edge was read
 };
 
 class TriggerThread {
@@ -25,6 +27,8 @@ class TriggerThread {
 
   DeviceFault open() { return source_.open(settings_); }
   void run(std::span<EdgeRing* const> cameras, const RunControl& control);
+  /// Of run(), at each turn.
+  [[nodiscard]] Heartbeat& heart() { return heart_; }
 
   [[nodiscard]] DeviceJournal& journal() { return journal_; }
   [[nodiscard]] TriggerStatus status() const {
@@ -38,6 +42,7 @@ class TriggerThread {
 
   EdgeSourceSettings settings_;
   Duration longest_silence_;
+  Heartbeat heart_;
   DeviceJournal journal_;
   EdgeSource source_;
   RateWatch rate_;

@@ -1,5 +1,5 @@
 #pragma once
-// The newest of what a run finds, for one thread outside of the wiring (ROS 2's topics, an autopilot, the
+// The newest of what a run finds, for one thread outside of the graph (ROS 2's topics, an autopilot, the
 // live view): it takes what is newest at its own pace and nobody waits for it. Memory: three of each value.
 
 #include <atomic>

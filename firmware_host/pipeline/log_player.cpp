@@ -49,7 +49,10 @@ void LogPlayer::play(SensorSink& sink, const RunControl& control) {
     const bool done = read_done_.load(std::memory_order_acquire);
     Ahead* message = ahead_.front();
     if (message == nullptr) {
-      if (done) break;
+      if (done) {
+        sink.expectEnd();
+        break;
+      }
       sleepFor(Duration::fromMilliseconds(1));
       continue;
     }

@@ -13,8 +13,10 @@
 #include "estimator/messages/frames.hpp"
 #include "estimator/messages/imu_sample.hpp"
 #include "estimator/messages/scene_images.hpp"
-#include "firmware_host/pipeline/arrows.hpp"
+#include "firmware_host/pipeline/host_times.hpp"
 #include "firmware_host/pipeline/run_control.hpp"
+#include "firmware_host/supervisor/flight_facts.hpp"
+#include "firmware_host/supervisor/heartbeat.hpp"
 
 namespace swiftlet {
 
@@ -29,8 +31,10 @@ class SensorSink {
   /// Of the thread of camera 0, before its image.
   virtual void takeScene(const SceneImages& scene) = 0;
   virtual void takeImage(const CameraFrame& image, const HostTimes& host) = 0;
-  /// As Wiring::takeImage: `image.image` says the size alone.
+  /// As SensorNode::takeImage: `image.image` says the size alone.
   virtual void takeImage(const CameraFrame& image, const HostTimes& host, const PixelWriter& pixels) = 0;
+  /// Any thread: the input has come to its end, and its threads return.
+  virtual void expectEnd() {}
 };
 
 class SensorInput {
@@ -39,6 +43,8 @@ class SensorInput {
     const char* name = "";
     bool of_vehicle = true;  ///< false: reads ahead from a file, at no priority
     std::function<void()> run;
+    /// Beats at each turn of one that returns only when it is told to; null: nobody watches it.
+    Heartbeat* heart = nullptr;
   };
 
   SensorInput() = default;
@@ -51,6 +57,8 @@ class SensorInput {
   virtual std::vector<Thread> threads(SensorSink& sink, const RunControl& control) = 0;
   /// Any thread: images gone by so far.
   [[nodiscard]] virtual std::uint64_t taken() const = 0;
+  /// Any thread: what it knows of its sensors that does not pass the sink.
+  virtual void look(FlightFacts& /*facts*/) const {}
   /// After the threads have ended; throws what ended the input before its time.
   virtual void finish() {}
 };

@@ -8,8 +8,8 @@
 #include <optional>
 #include <string>
 
+#include "firmware_host/graph/run_listener.hpp"
 #include "firmware_host/pipeline/lost_files.hpp"
-#include "firmware_host/pipeline/run_listener.hpp"
 #include "firmware_host/report/line_file.hpp"
 #include "firmware_host/report/mesh_files.hpp"
 #include "firmware_host/report/spilled_surface.hpp"
@@ -35,7 +35,7 @@ class RunRecorder : public RunListener {
   void onMap(MapStage& map, std::span<const std::uint32_t> tied) override;
   void onFinish(const OdometryOutput& output) override;
   void onRemark(Stamp stamp, const std::string& text) override;
-  /// For the wiring: where surface goes that the map has no room for.
+  /// For the graph: where surface goes that the map has no room for.
   [[nodiscard]] SpilledSurface& spilled() { return spilled_; }
   /// Of the map and its surface; null without one.
   [[nodiscard]] const nlohmann::ordered_json& map() const { return map_; }

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "drivers/recorded/log_warnings.hpp"
-#include "firmware_host/pipeline/run_listener.hpp"
+#include "firmware_host/graph/run_listener.hpp"
 #include "firmware_host/pipeline/stage_timer.hpp"
 #include "firmware_host/settings/settings.hpp"
 

@@ -20,8 +20,8 @@
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/evaluation/association.hpp"
 #include "firmware_host/evaluation/consistency.hpp"
-#include "firmware_host/pipeline/lockstep.hpp"
-#include "firmware_host/pipeline/run_listener.hpp"
+#include "firmware_host/schedule/lockstep.hpp"
+#include "firmware_host/graph/run_listener.hpp"
 #include "tests/support/statistics.hpp"
 
 namespace swiftlet {
@@ -55,13 +55,14 @@ Run runLog(const std::string& log, double from, double until) {
   const std::unique_ptr<LogSource> source = openLog(log, LogOptions{});
   StateKeeper keeper;
   RunLog run_log(keeper);
-  const auto wiring =
-      std::make_unique<Wiring>(source->rig(), source->imuNoise(), Settings{}, run_log, Wiring::Options{});
+  const Settings settings;
+  const auto graph =
+      std::make_unique<Graph>(source->rig(), source->imuNoise(), settings, run_log, GraphOptions{});
   LogSection section;
   section.from = from;
   if (until < kNotAsked) section.until = until;
   LogFeed feed(*source, section, nullptr);
-  runLockstep(feed, *wiring, RunControl{});
+  runLockstep(feed, *graph, RunControl{});
   const auto first = run_log.statistics().first_image;
   return {std::move(keeper.states), first ? *first : Stamp{}};
 }

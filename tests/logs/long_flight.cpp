@@ -76,7 +76,7 @@ int run(const std::string& path, double minutes, double speed) {
   run_log.keepForMap(
       std::make_unique<MapKeeper>(folder.path(), log.rig(), log.imuNoise(), settings.odometry, lost));
   LogFeed feed(log, {}, nullptr);
-  Wiring::Options wanted;
+  GraphOptions wanted;
   wanted.imu_states = true;
   FlightRequest flight;
   flight.speed = speed;
@@ -90,7 +90,7 @@ int run(const std::string& path, double minutes, double speed) {
   };
   nlohmann::ordered_json report;
   LogPlayer player(feed, speed);
-  const bool finished =
+  const FlightEnd flown =
       flyThreaded(log.calibration(), player, settings, run_log, wanted, flight, control, report);
   const std::int64_t at_end = peakResidentBytes();
   const RunStatistics& s = run_log.statistics();
@@ -98,7 +98,7 @@ int run(const std::string& path, double minutes, double speed) {
              100.0 * (static_cast<double>(at_end) / static_cast<double>(after_a_minute) - 1), s.frames,
              s.poses, s.frames_dropped, s.health.empty() ? 0U : s.health.back().epoch + 1);
   for (const auto& [arrow, count] : s.losses) fmt::print("lost: {} {}\n", arrow, count);
-  return finished ? 0 : 1;
+  return flown.finished && flown.faultless ? 0 : 1;
 }
 
 }  // namespace

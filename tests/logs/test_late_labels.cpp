@@ -10,11 +10,11 @@
 
 #include "drivers/recorded/open_log.hpp"
 #include "estimator/core/random.hpp"
-#include "firmware_host/pipeline/held_frames.hpp"
+#include "firmware_host/graph/held_frames.hpp"
 #include "firmware_host/pipeline/host_sleep.hpp"
 #include "firmware_host/pipeline/log_player.hpp"
-#include "firmware_host/pipeline/run_log.hpp"
-#include "firmware_host/pipeline/threaded.hpp"
+#include "firmware_host/graph/run_log.hpp"
+#include "firmware_host/schedule/threaded.hpp"
 #include "tests/logs/log_data.hpp"
 #include "tests/sanitized.hpp"
 
@@ -336,15 +336,15 @@ Flown fly(const Network::Behaviour& behaviour, Duration patience, double until) 
   const CameraModel& camera = source->rig().camera[0];
   LabelExchange exchange(camera.width(), camera.height(), patience);
   Network network(exchange, behaviour);
-  Wiring::Options options;
+  GraphOptions options;
   options.labels = &exchange;
-  const auto wiring = std::make_unique<Wiring>(source->rig(), source->imuNoise(), settings, log, options);
+  const auto graph = std::make_unique<Graph>(source->rig(), source->imuNoise(), settings, log, options);
   LogPlayer player(feed, 1);
-  const ThreadedReport report = runThreaded(player, *wiring, ThreadedOptions{}, RunControl{});
+  const ThreadedReport report = runThreaded(player, *graph, ThreadedOptions{}, RunControl{});
   network.end();
   CHECK(report.faults.empty());
   REQUIRE(report.finished);
-  log.collect(*wiring);
+  graph->report(log);
   struct Count : SurfaceSink {
     explicit Count(Flown& to) : flown(to) {}
     void take(const SurfacePatch& patch) override {
@@ -358,7 +358,7 @@ Flown fly(const Network::Behaviour& behaviour, Duration patience, double until) 
   };
   Flown flown{log.statistics(), exchange.counters()};
   Count count(flown);
-  wiring->mapStage()->visitSurface(count);
+  graph->map()->stage().visitSurface(count);
   return flown;
 }
 

@@ -24,7 +24,7 @@
 #include "estimator/core/random.hpp"
 #include "firmware_host/commands/replay_run.hpp"
 #include "firmware_host/pipeline/log_player.hpp"
-#include "firmware_host/pipeline/threaded.hpp"
+#include "firmware_host/schedule/threaded.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
 #include "tests/sanitized.hpp"
@@ -333,14 +333,14 @@ TEST_CASE("a log that fails ends neither the flight nor the waiting for its end"
   FailingListener listener;
   RunLog log(listener);
   LogFeed feed(*source, {}, nullptr);
-  const auto wiring =
-      std::make_unique<Wiring>(source->rig(), source->imuNoise(), Settings{}, log, Wiring::Options{});
+  const Settings settings;
+  const auto graph = std::make_unique<Graph>(source->rig(), source->imuNoise(), settings, log, GraphOptions{});
   LogPlayer player(feed, kSlow);
-  const ThreadedReport report = runThreaded(player, *wiring, ThreadedOptions{}, RunControl{});
+  const ThreadedReport report = runThreaded(player, *graph, ThreadedOptions{}, RunControl{});
   REQUIRE(report.faults.size() == 1);
   CHECK(report.faults[0] == "log: the disk is full");
-  CHECK(wiring->smoothDone());
-  CHECK(wiring->counters().sensor.images[0] == 80);
+  CHECK(graph->smooth().done());
+  CHECK(graph->sensors().counters().images[0] == 80);
 }
 
 TEST_CASE("a killed recording loses at most its last second") {

@@ -1,0 +1,67 @@
+#pragma once
+// Frames that the map holds back until their labels come over a LabelExchange, in their order: the oldest is
+// mapped when its labels are there, when they have not come in time, when nobody is there who could send
+// them, or when there is no room to wait. All of it is the map thread's; images, depth and labels are copies,
+// so that nothing of the flight path's is held. Memory: LabelExchange::kPlaces images of camera 1, labels and
+// depth images.
+
+#include <cstdint>
+#include <vector>
+
+#include "estimator/core/fixed_vector.hpp"
+#include "firmware_host/graph/images.hpp"
+#include "firmware_host/graph/messages.hpp"
+#include "firmware_host/pipeline/label_exchange.hpp"
+
+namespace swiftlet {
+
+class HeldFrames {
+ public:
+  struct Counters {
+    std::uint64_t labelled = 0;    ///< frames mapped with labels that came in time
+    std::uint64_t late = 0;        ///< without: they did not come in time
+    std::uint64_t no_room = 0;     ///< without: too many others waited behind it
+    std::uint64_t nobody = 0;      ///< without: nobody was there to label it
+    std::uint64_t longest_ms = 0;  ///< that a frame was held
+  };
+
+  struct Frame {
+    MapMessage message;
+    bool has_images = false;
+    std::array<std::uint64_t, kMaxCameras> number{};  ///< of each camera's image
+    std::array<ImageView, kMaxCameras> image;
+    SceneImages scene;  ///< empty where there is none
+
+    // Of HeldFrames.
+    int place = -1;    ///< of the exchange; -1: waits for nothing
+    double since = 0;  ///< host time [s]
+    std::array<std::vector<std::uint8_t>, kMaxCameras> pixels;
+    std::vector<float> depth;
+    std::vector<std::uint8_t> labels;
+  };
+
+  /// `depth_pixels`: of the depth sensor, 0 without. The exchange outlives it.
+  HeldFrames(LabelExchange& exchange, const std::array<std::size_t, kMaxCameras>& pixels,
+             std::size_t depth_pixels);
+
+  [[nodiscard]] bool empty() const { return count_ == 0; }
+  [[nodiscard]] bool full() const { return count_ == frames_.size(); }
+  [[nodiscard]] std::int64_t bytes() const;
+
+  /// While not full. `images` null: they are gone.
+  void hold(const MapMessage& message, const KeyframeImages* images, const SceneImages& scene, double now);
+  /// The oldest, once it is to be mapped; then drop() it.
+  [[nodiscard]] const Frame* due(double now);
+  void drop();
+
+  [[nodiscard]] const Counters& counters() const { return counters_; }
+
+ private:
+  LabelExchange& exchange_;
+  std::array<Frame, LabelExchange::kPlaces> frames_;
+  std::size_t first_ = 0, count_ = 0;
+  bool taken_ = false;  ///< due() gave the oldest
+  Counters counters_;
+};
+
+}  // namespace swiftlet

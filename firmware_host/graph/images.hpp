@@ -1,0 +1,70 @@
+#pragma once
+// Images between nodes: slots of fixed pools, lent by handle with a quota for each reader, so that no reader
+// can hold another's. Capacities: estimator/core/limits.hpp.
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "estimator/core/limits.hpp"
+#include "estimator/core/slot_pool.hpp"
+#include "estimator/messages/frames.hpp"
+#include "estimator/messages/scene_images.hpp"
+#include "firmware_host/graph/port.hpp"
+#include "firmware_host/pipeline/host_times.hpp"
+
+namespace swiftlet {
+
+/// An image in its slot; `frame.image` shows `pixels`.
+struct ImageSlot {
+  CameraFrame frame;
+  HostTimes host;
+  std::vector<std::uint8_t> pixels;  ///< reserved for the camera's size before the flight
+};
+
+/// Readers of images, each with its quota.
+enum ImageReader : std::size_t { kTrackReads, kMeshReads, kRecordReads, kImageReaders };
+
+/// Waiting in the ring, one at its head, one waiting for its partner, those of waiting frames, those in
+/// work, and one more that lets the newest in before the oldest goes.
+inline constexpr std::uint32_t kTrackQuota = kImageRing + kWaitingFrames + 4;
+/// Waiting in the ring, the one at its head, and one more that lets the newest in before the oldest goes.
+inline constexpr std::uint32_t kMeshQuota = kMeshImages + 2;
+inline constexpr std::uint32_t kRecordQuota = kRecordedImages;
+inline constexpr std::size_t kImageSlots = 1 + kTrackQuota + kMeshQuota + kRecordQuota;
+using ImagePool = SlotPool<ImageSlot, kImageSlots, kImageReaders>;
+
+/// Images of a keyframe, copied by `track`: the threads that look at keyframes are slow, and would otherwise
+/// hold the cameras' slots. `image` shows `pixels`; empty where missing.
+struct KeyframeImages {
+  std::uint64_t frame = 0;  ///< StereoFrame::index
+  std::array<std::uint64_t, kMaxCameras> number{};
+  std::array<ImageView, kMaxCameras> image;
+  std::array<std::vector<std::uint8_t>, kMaxCameras> pixels;
+};
+
+enum KeyframeReader : std::size_t { kLoopReads, kMapReads, kKeyframeReaders };
+
+/// Frames that wait for the map: as kLoopKeyframes.
+inline constexpr std::size_t kMapFrames = 4;
+/// As kMeshQuota.
+inline constexpr std::uint32_t kLoopQuota = kLoopKeyframes + 2;
+inline constexpr std::uint32_t kMapQuota = kMapFrames + 2;
+using KeyframePool = SlotPool<KeyframeImages, 1 + kLoopQuota + kMapQuota, kKeyframeReaders>;
+
+/// Depth and labels in their slot; `images` shows `depth` and `labels`.
+struct SceneSlot {
+  SceneImages images;
+  std::vector<float> depth;
+  std::vector<std::uint8_t> labels;
+};
+using ScenePool = SlotPool<SceneSlot, 1 + kMapQuota, 1>;
+
+using ImageIn = SlotIn<ImagePool, kTrackReads, kImageRing>;      ///< of `track`
+using MeshImageIn = SlotIn<ImagePool, kMeshReads, kMeshImages>;  ///< of `mesh`
+using RecordedImageIn = SlotIn<ImagePool, kRecordReads, kRecordQuota>;
+using LoopImagesIn = SlotIn<KeyframePool, kLoopReads, kLoopKeyframes>;
+using MapImagesIn = SlotIn<KeyframePool, kMapReads, kMapFrames>;
+using SceneIn = SlotIn<ScenePool, 0, kMapFrames>;
+
+}  // namespace swiftlet

@@ -1,0 +1,44 @@
+#pragma once
+// Copies of a frame's images for the nodes that look at keyframes: those are slow, and would otherwise hold
+// the cameras' slots. Of `track`'s thread. Memory: a pool of KeyframeImages once a reader is connected.
+
+#include <array>
+#include <cstdint>
+#include <memory>
+
+#include "estimator/messages/frames.hpp"
+#include "firmware_host/graph/images.hpp"
+#include "firmware_host/graph/node.hpp"
+
+namespace swiftlet {
+
+class KeyframeCopies {
+ public:
+  explicit KeyframeCopies(Node& track) : track_(track) {}
+
+  /// `pixels`: of each camera's image.
+  void to(LoopImagesIn& in, const std::array<std::size_t, kMaxCameras>& pixels) { lend(in, loop_, pixels); }
+  void to(MapImagesIn& in, const std::array<std::size_t, kMaxCameras>& pixels) { lend(in, map_, pixels); }
+  /// Whether the map gets them; where nobody is connected, nothing happens.
+  bool send(const StereoFrame& frame, bool to_loop, bool to_map);
+  /// Recorded schedule: images are at hand wherever they are asked for, so none is copied.
+  void skipCopies() { skips_ = true; }
+
+ private:
+  template <typename Reader>
+  void lend(Reader& in, Reader*& kept, const std::array<std::size_t, kMaxCameras>& pixels) {
+    reserve(pixels);
+    in.lendFrom(*pool_);
+    kept = &in;
+    connect(track_, in);
+  }
+  void reserve(const std::array<std::size_t, kMaxCameras>& pixels);
+
+  Node& track_;
+  std::unique_ptr<KeyframePool> pool_;
+  LoopImagesIn* loop_ = nullptr;
+  MapImagesIn* map_ = nullptr;
+  bool skips_ = false;
+};
+
+}  // namespace swiftlet

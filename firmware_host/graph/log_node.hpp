@@ -1,0 +1,33 @@
+#pragma once
+// The node `log`: what the run finds, to its listener (run_log.hpp), and the keyframes and samples to be
+// kept.
+//
+// When it falls behind: results, states and meshes are lost to the files, counted, not to the estimate.
+
+#include "firmware_host/graph/graph_options.hpp"
+#include "firmware_host/graph/messages.hpp"
+#include "firmware_host/graph/node.hpp"
+#include "firmware_host/graph/run_log.hpp"
+#include "firmware_host/graph/sample_in.hpp"
+
+namespace swiftlet {
+
+class LogNode final : public Node {
+ public:
+  LogNode(GraphContext& context, RunLog& log) : Node("log", Rank::kLow), context_(context), log_(log) {}
+
+  QueueIn<FrameResult, kResultRing> results{*this, "results_to_log", Arrow::kWaits};
+  QueueIn<NavState, kStateRing> states{*this, "states_to_log", Arrow::kWaits};
+  QueueIn<MeshResult, kResultRing> meshes{*this, "meshes_to_log", Arrow::kWaits};
+  QueueIn<LoopReport, kResultRing> loops{*this, "loops_to_log", Arrow::kWaits};
+  SampleIn samples{*this, "imu_to_log", Arrow::kWaits};
+  LatestIn<LocalMesh> mesh{*this, Arrow::kWaits};
+
+  bool turn() override;
+
+ private:
+  GraphContext& context_;
+  RunLog& log_;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,37 @@
+#pragma once
+// The node `loop`: keyframes with their images, one after the other, to places, loops and the pose graph.
+//
+// When it falls behind: it misses keyframes, or their images, counted; the next link bridges the gap where
+// the window still holds both keyframes.
+
+#include "firmware_host/graph/graph_options.hpp"
+#include "firmware_host/graph/images.hpp"
+#include "firmware_host/graph/messages.hpp"
+#include "firmware_host/graph/node.hpp"
+#include "mapping/loop/loop_stage.hpp"
+
+namespace swiftlet {
+
+class LoopNode final : public Node {
+ public:
+  explicit LoopNode(GraphContext& context);
+
+  QueueIn<KeyframeMessage, kLoopKeyframes> keyframes{*this, "keyframes_to_loop", Arrow::kWakes};
+  LoopImagesIn images{*this, "keyframe_images_to_loop", Arrow::kWaits};
+  Out<LoopReport> reports{*this};
+  Out<WorldsInMap> worlds{*this};
+  Out<LoopStep> steps{*this};
+
+  bool turn() override;
+  /// Once it is done.
+  [[nodiscard]] const LoopStage& stage() const { return stage_; }
+
+ private:
+  void step(const KeyframeMessage& message);
+  void publishWorlds();
+
+  GraphContext& context_;
+  LoopStage stage_;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,131 @@
+#pragma once
+// What goes from node to node, with the times that the host notes on it. Images: images.hpp.
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "estimator/core/fixed_vector.hpp"
+#include "estimator/core/limits.hpp"
+#include "estimator/core/status.hpp"
+#include "estimator/messages/frames.hpp"
+#include "estimator/messages/imu_sample.hpp"
+#include "estimator/messages/keyframe_link.hpp"
+#include "estimator/messages/local_mesh.hpp"
+#include "estimator/messages/odometry_output.hpp"
+#include "estimator/messages/scene_images.hpp"
+#include "estimator/messages/smoothed_window.hpp"
+#include "estimator/messages/state_fix.hpp"
+#include "estimator/messages/step_record.hpp"
+#include "estimator/messages/tracked_frame.hpp"
+#include "firmware_host/pipeline/host_times.hpp"
+#include "firmware_host/pipeline/stage_timer.hpp"
+#include "mapping/loop/loop_report.hpp"
+#include "mapping/map/volume_correction.hpp"
+
+namespace swiftlet {
+
+struct ImuArrival {
+  ImuSample sample;
+  std::uint64_t number = 0;  ///< from 1
+  Stamp arrival;             ///< on the log's clock
+  HostTimes host;
+};
+
+/// What came with a stamp, for `track`, which copies the images of that frame for the map.
+struct SceneNote {
+  Stamp stamp;
+  bool depth = false;
+  bool labels = false;
+};
+
+/// From `track` to `smooth`.
+struct TrackMessage {
+  enum class Kind : std::uint8_t {
+    kFrame,         ///< tracked
+    kFrameRefused,  ///< `status` says why; `tracked` is not filled
+    kImageRefused,  ///< by pairing
+    kEnd,           ///< of FrameResult alone: the run's last
+  };
+  Kind kind = Kind::kFrame;
+  Status status;
+  TrackStep step;
+  TrackedFrame tracked;
+  HostTimes host;        ///< of the later image
+  Spent spent;           ///< by `track`
+  int dropped = 0;       ///< frames that went by untracked since the message before
+  int effort_level = 0;  ///< steps below full effort
+  bool mapped = false;   ///< its images have gone to the map
+};
+
+/// What `smooth` publishes: for the log, and whoever else follows the estimate.
+struct FrameResult {
+  TrackMessage::Kind kind = TrackMessage::Kind::kFrame;
+  Status track_status;
+  Status status;  ///< of the smoother
+  TrackStep track_step;
+  SmoothStep step;
+  TrackedFrame tracked;
+  OdometryOutput output;
+  HostTimes host;
+  double published = 0;  ///< host time
+  Spent spent;           ///< by `track` and `smooth` until it was published
+  int dropped = 0;
+  int track_level = 0;
+  int smooth_level = 0;
+};
+
+/// From `smooth` to `mesh`: the window, and the frame that is its newest.
+struct MeshMessage {
+  SmoothedWindow window;
+  TrackedFrame tracked;
+  std::uint64_t image = 0;  ///< number of camera 0's image of that frame; 0: missing
+
+  /// False while the start waits.
+  [[nodiscard]] bool hasPose() const { return window.started && !window.poses.empty(); }
+};
+
+/// From `smooth` to `loop`: a keyframe as it stands once it has been smoothed.
+struct KeyframeMessage {
+  std::uint64_t window_number = 0;
+  SmoothedWindow window;
+  TrackedFrame tracked;
+  KeyframeLink link;
+  std::array<std::uint64_t, kMaxCameras> image{};  ///< numbers; 0: missing
+};
+
+/// From `smooth` to `map`: a frame that is to be mapped, and how the window stands with it.
+struct MapMessage {
+  std::uint64_t frame = 0;
+  Stamp stamp;  ///< of the images
+  std::uint32_t epoch = 0;
+  FixedVector<WindowPose, kMaxStates> poses;  ///< its own last
+};
+
+/// From `mesh` to `log`, where the meshes of all frames are wanted.
+struct MeshResult {
+  bool keyframe = false;  ///< `horizon` is of this frame
+  LocalMesh frame;
+  LocalMesh horizon;
+  FixedVector<Eigen::Vector2f, kMaxFeatures> hull;  ///< of the frame's features, raw pixels of camera 0
+};
+
+/// How the odometry's world lies in the map, now and at each keyframe of the newest epoch that is a node.
+struct WorldsInMap {
+  MapCorrection newest;
+  FixedVector<WorldInMap, LoopLimits{}.nodes> keyframes;  ///< by frame
+  FixedVector<std::uint32_t, kTiedEpochs> tied;           ///< earlier epochs of the same piece
+};
+
+/// From `map` to `record`: a step, with the depth and labels that it took.
+struct MapRecord {
+  MapStep step;
+  SceneImages scene;  ///< shows `depth` and `labels`
+  std::vector<float> depth;
+  std::vector<std::uint8_t> labels;
+};
+
+inline constexpr Stamp kEndOfTime{std::numeric_limits<std::int64_t>::max()};
+
+}  // namespace swiftlet

@@ -1,0 +1,86 @@
+#pragma once
+// What every node of the graph is: a stage with the ends of its arrows, stepped by a schedule.
+//
+// A node takes what waits on its arrows in turn(), at most one frame, and says whether it did anything. It
+// has ended (done) when the nodes before it have and nothing waits. A schedule calls turn from one thread:
+// all nodes from the same (lockstep, recorded), or each from its own (threaded).
+//
+// A new node: a class in a file of its own, its arrows in graph.cpp, its file in the CMake list.
+
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+
+#include "estimator/core/fixed_vector.hpp"
+#include "firmware_host/graph/port.hpp"
+#include "firmware_host/realtime/doorbell.hpp"
+#include "firmware_host/supervisor/heartbeat.hpp"
+
+namespace swiftlet {
+
+struct RunStatistics;
+
+/// Which real-time priority a node gets on a thread of its own.
+enum class Rank : std::uint8_t { kSensor, kPropagate, kTrack, kSmooth, kMesh, kLow };
+
+class Node {
+ public:
+  Node(const char* name, Rank rank) : name_(name), rank_(rank) {}
+  Node(const Node&) = delete;
+  Node& operator=(const Node&) = delete;
+  virtual ~Node() = default;
+
+  /// Literal text; the thread's name.
+  [[nodiscard]] const char* name() const { return name_; }
+  [[nodiscard]] Rank rank() const { return rank_; }
+
+  /// False: there was nothing to do.
+  virtual bool turn() = 0;
+  /// After the run: what it counted.
+  virtual void report(RunStatistics& /*statistics*/) const {}
+  /// What its arrows lost, by counter; at the end.
+  virtual void addLosses(std::map<std::string, std::uint64_t>& losses) const;
+
+  /// Any thread: it does nothing any more, and nobody waits for it.
+  [[nodiscard]] bool done() const { return done_.load(std::memory_order_acquire); }
+  /// Any thread: its thread has ended before its time, or stands still. Those behind it end as if it had.
+  void abandon() { done_.store(true, std::memory_order_release); }
+  /// Of the schedule, at the end: its thread is stuck and may go on at any time, so that nothing of it is
+  /// read.
+  void leaveBehind() { left_behind_ = true; }
+  [[nodiscard]] bool isLeftBehind() const { return left_behind_; }
+
+  /// Of its thread, where it has one.
+  [[nodiscard]] Heartbeat& heart() { return heart_; }
+  /// Rung for it when something arrived.
+  [[nodiscard]] Doorbell& bell() { return bell_; }
+  /// Rings those that look after a turn of this node.
+  void wakeReaders() {
+    for (Node* reader : woken_) reader->bell().ring();
+  }
+
+ protected:
+  void finish() { abandon(); }
+  /// The nodes before this one are done. To be asked before a look at the arrows that finds nothing.
+  [[nodiscard]] bool inputEnded() const;
+
+ private:
+  friend class In;
+  friend void connect(Node& writer, In& in);
+
+  static constexpr std::size_t kMostArrows = 12;
+
+  const char* name_;
+  Rank rank_;
+  std::atomic<bool> done_{false};
+  bool left_behind_ = false;
+  Heartbeat heart_;
+  Doorbell bell_;
+  FixedVector<In*, kMostArrows> ins_;
+  FixedVector<Node*, kMostArrows> before_;
+  FixedVector<Node*, kMostArrows> woken_;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,119 @@
+#include "firmware_host/graph/run_log.hpp"
+
+#include <fmt/format.h>
+
+namespace swiftlet {
+
+void RunLog::onResult(const FrameResult& result) {
+  const Stamp stamp = result.track_step.stamp;
+  if (result.dropped > 0) {
+    listener_.onRemark(
+        stamp, fmt::format("{} frame(s) before this one dropped: tracking was behind", result.dropped));
+  }
+  switch (result.kind) {
+    case TrackMessage::Kind::kFrame:
+      noteFrame(result);
+      break;
+    case TrackMessage::Kind::kFrameRefused:
+      ++statistics_.frames;
+      ++statistics_.frames_refused;
+      ++statistics_.faults[result.track_status.what];
+      listener_.onRemark(stamp, std::string("frame refused: ") + result.track_status.what);
+      break;
+    case TrackMessage::Kind::kImageRefused:
+      listener_.onRemark(stamp, std::string("image refused: ") + result.track_status.what);
+      break;
+    case TrackMessage::Kind::kEnd:
+      noteEvents(result.output);
+      listener_.onFinish(result.output);
+      break;
+  }
+}
+
+void RunLog::onLoop(const LoopReport& report) {
+  for (const LoopCandidate& candidate : report.candidates) {
+    const double ago = (candidate.new_stamp - candidate.old_stamp).seconds();
+    listener_.onRemark(
+        report.stamp,
+        fmt::format("{} of {:.1f} s before: {}, {} matches, {} agree", candidate.near ? "near node" : "place",
+                    ago, describe(candidate.fate), candidate.matches, candidate.inliers));
+  }
+  if (!report.moved) return;
+  const Eigen::Vector3d& p = report.correction.T_map_world.translation;
+  listener_.onRemark(report.stamp,
+                     fmt::format("map moved: {} of {} loops selected, T_map_world {:.3f} {:.3f} {:.3f} m",
+                                 report.selected, report.loops, p.x(), p.y(), p.z()));
+}
+
+void RunLog::keepLoops(const LoopStage& loops) {
+  statistics_.loop = loops.counters();
+  for (std::size_t i = 0; i < loops.nodeCount(); ++i) {
+    const MapNode node = loops.node(i);
+    nodes_.push_back({node.stamp, node.T_map_body});
+  }
+  for (std::uint32_t i = 0; i < loops.loopCount(); ++i) {
+    loops_.push_back(loops.loop(i));
+    LoopRevisit revisit;
+    if (keeper_ && loops.revisit(i, revisit)) keeper_->addRevisit(revisit);
+  }
+}
+
+void RunLog::noteFrame(const FrameResult& result) {
+  const TrackedFrame& tracked = result.tracked;
+  const OdometryOutput& output = result.output;
+  ++statistics_.frames;
+  if (!statistics_.first_image) statistics_.first_image = tracked.stamp;
+  statistics_.last_image = tracked.stamp;
+  if (!result.status.ok() && result.status.code != StatusCode::kNotReady) {
+    ++statistics_.smooth_faults;
+    ++statistics_.faults[result.status.what];
+  }
+  if (tracked.keyframe) ++statistics_.keyframes;
+  addTime(statistics_.times, StageId::kImageToPose,
+          {result.published - result.host.arrival, result.spent.cpu}, tracked.keyframe);
+  addTime(statistics_.times, StageId::kExposureToPose,
+          {result.published - result.host.exposure, result.spent.cpu}, tracked.keyframe);
+  noteEvents(output);
+  noteHealth(tracked.stamp, output);
+  noteEffort("track", result, result.track_step.effort, track_effort_);
+  noteEffort("smooth", result, result.step.effort, smooth_effort_);
+  any_frame_ = true;
+  if (keeper_ && tracked.keyframe && output.has_state) keeper_->addKeyframe(tracked, output.state);
+  listener_.onFrame(tracked, output);
+}
+
+void RunLog::noteEvents(const OdometryOutput& output) {
+  for (const Event& event : output.events) {
+    EventTotal& total = statistics_.events[event.kind];
+    ++total.count;
+    total.value += event.value;
+  }
+}
+
+void RunLog::noteEffort(const char* stage, const FrameResult& result, const Effort& now, Effort& last) {
+  if (any_frame_ && !(now == last)) {
+    ++statistics_.effort_changes;
+    listener_.onRemark(result.track_step.stamp,
+                       fmt::format("effort of {} is now {} iterations, {} features, {} keyframes", stage,
+                                   now.iterations, now.features, now.keyframes));
+  }
+  last = now;
+}
+
+void RunLog::noteHealth(Stamp stamp, const OdometryOutput& output) {
+  if (output.has_state) {
+    if (!statistics_.first_pose) statistics_.first_pose = stamp;
+    ++statistics_.poses;
+  } else if (*output.waiting_for != '\0' && waiting_for_ != output.waiting_for) {
+    waiting_for_ = output.waiting_for;
+    listener_.onRemark(stamp, "no pose yet, waiting for " + waiting_for_);
+  }
+  if (statistics_.first_pose) ++statistics_.frames_since_first_pose;
+  const HealthChange now{stamp, output.state.health, output.state.epoch};
+  if (statistics_.health.empty() || statistics_.health.back().health != now.health ||
+      statistics_.health.back().epoch != now.epoch) {
+    statistics_.health.push_back(now);
+  }
+}
+
+}  // namespace swiftlet

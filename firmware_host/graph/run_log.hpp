@@ -1,0 +1,70 @@
+#pragma once
+// What the node `log` does with what comes: what the run tells its listener, what it sums up, and what it
+// keeps for full smoothing. Host side, of one thread. Memory: constant but for the lists that RunStatistics
+// names.
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "firmware_host/graph/messages.hpp"
+#include "firmware_host/graph/run_listener.hpp"
+#include "firmware_host/pipeline/full_smoothing.hpp"
+#include "firmware_host/pipeline/map_keeper.hpp"
+#include "mapping/loop/loop_stage.hpp"
+
+namespace swiftlet {
+
+class RunLog {
+ public:
+  explicit RunLog(RunListener& listener) : listener_(listener) {}
+
+  /// Before the first message: keep keyframes and IMU for full smoothing.
+  void keepForMap(std::unique_ptr<MapKeeper> keeper) { keeper_ = std::move(keeper); }
+  [[nodiscard]] bool wantsImu() const { return keeper_ != nullptr; }
+
+  void onImu(const ImuSample& sample) { keeper_->addImu(sample); }
+  void onImuState(const NavState& state) { listener_.onImuState(state); }
+  void onResult(const FrameResult& result);
+  void onMesh(const MeshResult& result) {
+    listener_.onMesh(result.keyframe, result.frame, result.keyframe ? &result.horizon : nullptr,
+                     {result.hull.data(), result.hull.size()});
+  }
+  void onLoop(const LoopReport& report);
+  void onLocalMesh(const LocalMesh& mesh) { listener_.onLocalMesh(mesh); }
+  /// An executor's own remark, for events.log.
+  void remark(Stamp stamp, const std::string& text) { listener_.onRemark(stamp, text); }
+
+  /// After the run: the map that was made.
+  void showMap(MapStage& map, std::span<const std::uint32_t> tied) { listener_.onMap(map, tied); }
+  /// After the run: the loops that were found, for full smoothing.
+  void keepLoops(const LoopStage& loops);
+  [[nodiscard]] const std::vector<MapLoop>& loops() const { return loops_; }
+  /// After the run: the keyframes' poses in the pose graph of the loops; empty without loop closure.
+  [[nodiscard]] const std::vector<MapPose>& nodes() const { return nodes_; }
+  /// After the run: closes the file of keyframes, where one was kept.
+  void finishKeeping() {
+    if (keeper_) keeper_->finish();
+  }
+
+  [[nodiscard]] RunStatistics& statistics() { return statistics_; }
+
+ private:
+  void noteFrame(const FrameResult& result);
+  void noteEvents(const OdometryOutput& output);
+  void noteEffort(const char* stage, const FrameResult& result, const Effort& now, Effort& last);
+  void noteHealth(Stamp stamp, const OdometryOutput& output);
+
+  RunListener& listener_;
+  std::unique_ptr<MapKeeper> keeper_;
+  std::string waiting_for_;
+  bool any_frame_ = false;
+  Effort track_effort_;
+  Effort smooth_effort_;
+  RunStatistics statistics_;
+  std::vector<MapLoop> loops_;
+  std::vector<MapPose> nodes_;  ///< of the pose graph, at the end
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,154 @@
+#include "firmware_host/graph/sensor_node.hpp"
+
+#include <algorithm>
+
+#include "firmware_host/graph/run_listener.hpp"
+#include "firmware_host/pipeline/packed_copy.hpp"
+
+namespace swiftlet {
+
+namespace {
+
+void note(SensorNews& news, Stamp stamp, double host_arrival) {
+  if (news.messages > 0 && stamp <= news.newest) ++news.reversed_stamps;
+  ++news.messages;
+  news.newest = stamp;
+  news.arrival = Stamp{} + Duration::fromSeconds(host_arrival);
+}
+
+}  // namespace
+
+SensorNode::SensorNode(const GraphContext& context) : Node("sensor", Rank::kSensor), context_(context) {
+  for (std::size_t c = 0; c < context.rig.camera_count; ++c) {
+    const CameraModel& model = context.rig.camera[c];
+    for (std::size_t i = 0; i < kImageSlots; ++i) {
+      camera_[c].pool.slot(i).pixels.resize(static_cast<std::size_t>(model.width() * model.height()));
+    }
+  }
+}
+
+void SensorNode::scenesTo(SceneIn& in) {
+  scenes_ = std::make_unique<ScenePool>(ScenePool::Quotas{kMapQuota});
+  const CameraModel& camera = context_.rig.camera[0];
+  for (std::size_t i = 0; i < ScenePool::capacity(); ++i) {
+    SceneSlot& slot = scenes_->slot(i);
+    if (context_.options.depth_sensor != nullptr) {
+      slot.depth.resize(context_.options.depth_sensor->camera.pixels());
+    }
+    if (context_.settings.map_stage.labels) {
+      slot.labels.resize(static_cast<std::size_t>(camera.width() * camera.height()));
+    }
+  }
+  in.lendFrom(*scenes_);
+  scene_in_ = &in;
+  connect(*this, in);
+}
+
+void SensorNode::takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host) {
+  imu.send({sample, ++counters_.samples, arrival, host});
+  newest_imu_.store(sample.stamp.ns);
+  note(imu_sensed_.news, sample.stamp, host.arrival);
+  imu_sensed_.equal = equal_readings_.note(sample);
+  imu_news_.write(imu_sensed_);
+}
+
+void SensorNode::takeImage(const CameraFrame& image, const HostTimes& host) {
+  if (image.image.empty()) return;
+  const auto copy = [](const void* from, std::uint8_t* to) {
+    packedCopy(*static_cast<const ImageView*>(from), to);
+  };
+  takeImage(image, host, {copy, &image.image});
+}
+
+void SensorNode::takeImage(const CameraFrame& image, const HostTimes& host, const PixelWriter& pixels) {
+  if (image.camera >= context_.rig.camera_count) return;
+  Camera& camera = camera_[image.camera];
+  const CameraModel& model = context_.rig.camera[image.camera];
+  if (image.image.width != model.width() || image.image.height != model.height()) {
+    ++counters_.images_wrong_size[image.camera];
+    return;
+  }
+  const SlotHandle handle = camera.pool.tryAcquire();
+  if (!handle.valid()) {
+    ++counters_.images_lost[image.camera];
+    return;
+  }
+  ImageSlot& slot = camera.pool.fill(handle);
+  slot.frame = image;
+  slot.frame.number = ++counters_.images[image.camera];
+  slot.host = host;
+  pixels.write(pixels.device, slot.pixels.data());
+  slot.frame.image = {slot.pixels.data(), image.image.width, image.image.height, image.image.width};
+  if (camera.record != nullptr) camera.record->hand(handle);
+  if (camera.track != nullptr) camera.track->hand(handle);
+  if (camera.mesh != nullptr) camera.mesh->hand(handle);
+  camera.pool.finish(handle);
+  note(camera.sensed, image.stamp, host.arrival);
+  camera.news.write(camera.sensed);
+}
+
+void SensorNode::takeScene(const SceneImages& scene) {
+  if (scene_in_ == nullptr || scene.empty()) return;
+  const SlotHandle handle = scenes_->tryAcquire();
+  if (!handle.valid()) {
+    scene_in_->miss();
+    return;
+  }
+  SceneSlot& slot = scenes_->fill(handle);
+  fillScene(scene, slot);
+  if (!slot.images.empty()) {
+    scene_in_->hand(handle);
+    scene_notes.send({scene.stamp, slot.images.depth.depth != nullptr, !slot.images.labels.empty()});
+  }
+  scenes_->finish(handle);
+}
+
+void SensorNode::fillScene(const SceneImages& from, SceneSlot& slot) {
+  slot.images = SceneImages{};
+  slot.images.stamp = from.stamp;
+  if (from.depth.depth != nullptr && !slot.depth.empty()) {
+    if (from.depth.camera.pixels() == slot.depth.size()) {
+      std::copy_n(from.depth.depth, slot.depth.size(), slot.depth.begin());
+      slot.images.depth = from.depth;
+      slot.images.depth.depth = slot.depth.data();
+    } else {
+      ++counters_.depths_wrong_size;
+    }
+  }
+  if (!from.labels.empty() && !slot.labels.empty()) {
+    const CameraModel& camera = context_.rig.camera[0];
+    if (from.labels.width == camera.width() && from.labels.height == camera.height()) {
+      slot.images.labels = packedCopy(from.labels, slot.labels.data());
+    } else {
+      ++counters_.labels_wrong_size;
+    }
+  }
+}
+
+void SensorNode::look(FlightFacts& facts) const {
+  ImuNews of_imu;
+  if (imu_news_.read(of_imu) != 0) {
+    facts.imu = of_imu.news;
+    facts.equal_samples = of_imu.equal;
+  }
+  for (std::size_t c = 0; c < kMaxCameras; ++c) static_cast<void>(camera_[c].news.read(facts.camera[c]));
+}
+
+void SensorNode::report(RunStatistics& statistics) const {
+  for (const std::uint64_t images : counters_.images) statistics.images += images;
+}
+
+void SensorNode::addLosses(std::map<std::string, std::uint64_t>& losses) const {
+  const auto note = [&](const std::string& what, std::uint64_t count) {
+    if (count > 0) losses[what] += count;
+  };
+  for (std::size_t c = 0; c < kMaxCameras; ++c) {
+    const std::string camera = "camera_" + std::to_string(c);
+    note(camera + "_wrong_size", counters_.images_wrong_size[c]);
+    note(camera + "_lost", counters_.images_lost[c]);
+  }
+  note("labels_wrong_size", counters_.labels_wrong_size);
+  note("depths_wrong_size", counters_.depths_wrong_size);
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,97 @@
+#pragma once
+// Where sensors' messages enter the graph: samples to queues, images, depth and labels into slots.
+//
+// Threads: takeImu from the IMU's, takeImage from each camera's own (one thread may have both), takeScene
+// from
+//   camera 0's, endInput from the last of them. It has no turn: it ends when the input does.
+// An image is copied; one of another size than the calibration's is counted and goes no further.
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <limits>
+#include <memory>
+
+#include "estimator/core/newest_shared.hpp"
+#include "firmware_host/graph/graph_options.hpp"
+#include "firmware_host/graph/images.hpp"
+#include "firmware_host/graph/messages.hpp"
+#include "firmware_host/graph/node.hpp"
+#include "firmware_host/supervisor/equal_readings.hpp"
+#include "firmware_host/supervisor/flight_facts.hpp"
+
+namespace swiftlet {
+
+struct ImuNews {
+  SensorNews news;
+  std::uint64_t equal = 0;  ///< samples in a row with the same readings
+};
+
+class SensorNode final : public Node {
+ public:
+  explicit SensorNode(const GraphContext& context);
+
+  Out<ImuArrival> imu{*this};
+  Out<SceneNote> scene_notes{*this};
+  void imagesTo(std::size_t camera, ImageIn& in) { lend(camera, in, camera_[camera].track); }
+  void imagesTo(std::size_t camera, MeshImageIn& in) { lend(camera, in, camera_[camera].mesh); }
+  void imagesTo(std::size_t camera, RecordedImageIn& in) { lend(camera, in, camera_[camera].record); }
+  void scenesTo(SceneIn& in);
+
+  void takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host);
+  void takeImage(const CameraFrame& image, const HostTimes& host);
+  /// The same where the pixels are not grey bytes in rows: `image.image` says the size, `pixels` writes them.
+  void takeImage(const CameraFrame& image, const HostTimes& host, const PixelWriter& pixels);
+  /// Depth and labels of the image of camera 0 that comes next. Without a map: nothing happens.
+  void takeScene(const SceneImages& scene);
+  void endInput() { finish(); }
+  bool turn() override { return false; }
+
+  /// Any thread: of the newest sample; the earliest stamp of all before the first.
+  [[nodiscard]] Stamp newestSample() const { return Stamp{newest_imu_.load()}; }
+  /// Any thread: what the sensors did of late.
+  void look(FlightFacts& facts) const;
+
+  /// Once the sensors have ended.
+  struct Counters {
+    std::uint64_t samples = 0;
+    std::array<std::uint64_t, kMaxCameras> images{};
+    std::array<std::uint64_t, kMaxCameras> images_lost{};  ///< no slot was free
+    std::array<std::uint64_t, kMaxCameras> images_wrong_size{};
+    std::uint64_t labels_wrong_size = 0;
+    std::uint64_t depths_wrong_size = 0;
+  };
+  [[nodiscard]] const Counters& counters() const { return counters_; }
+  void report(RunStatistics& statistics) const override;
+  void addLosses(std::map<std::string, std::uint64_t>& losses) const override;
+
+ private:
+  struct Camera {
+    ImagePool pool{ImagePool::Quotas{kTrackQuota, kMeshQuota, kRecordQuota}};
+    ImageIn* track = nullptr;
+    MeshImageIn* mesh = nullptr;
+    RecordedImageIn* record = nullptr;
+    SensorNews sensed;  ///< of the camera's thread
+    NewestShared<SensorNews> news;
+  };
+
+  template <typename Reader>
+  void lend(std::size_t camera, Reader& in, Reader*& kept) {
+    in.lendFrom(camera_[camera].pool);
+    kept = &in;
+    connect(*this, in);
+  }
+  void fillScene(const SceneImages& from, SceneSlot& slot);
+
+  const GraphContext& context_;
+  std::array<Camera, kMaxCameras> camera_;
+  std::unique_ptr<ScenePool> scenes_;  ///< null without a map
+  SceneIn* scene_in_ = nullptr;
+  ImuNews imu_sensed_;
+  NewestShared<ImuNews> imu_news_;
+  EqualReadings equal_readings_;
+  std::atomic<std::int64_t> newest_imu_{std::numeric_limits<std::int64_t>::min()};
+  Counters counters_;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,137 @@
+#include "firmware_host/graph/smooth_node.hpp"
+
+namespace swiftlet {
+
+SmoothNode::SmoothNode(GraphContext& context)
+    : Node("smooth", Rank::kSmooth),
+      context_(context),
+      full_effort_(context.settings.effort),
+      effort_(context.options.smooth_effort != nullptr ? context.options.smooth_effort : &full_effort_),
+      stage_(context.rig, context.noise, context.settings.odometry) {}
+
+bool SmoothNode::turn() {
+  const bool ended = inputEnded();
+  const TrackMessage* message = tracked.front();
+  if (message != nullptr) {
+    take(*message);
+    tracked.pop();
+    return true;
+  }
+  samples.takeSurplus([this](const ImuSample& sample) { stage_.addImu(sample); });
+  if (ended && !done()) end();
+  return false;
+}
+
+void SmoothNode::take(const TrackMessage& message) {
+  FrameResult& out = results.draft();
+  out.kind = message.kind;
+  out.track_status = message.status;
+  out.status = okStatus();
+  out.track_step = message.step;
+  out.host = message.host;
+  out.spent = message.spent;
+  out.dropped = message.dropped;
+  out.track_level = message.effort_level;
+  const bool tracked_frame = message.kind == TrackMessage::Kind::kFrame;
+  if (tracked_frame) smoothFrame(message, out);
+  out.published = wallSeconds();
+  results.send();
+  if (!tracked_frame) return;
+  context_.count(StageId::kTrim, measured([&] { stage_.trim(); }), message.tracked.keyframe);
+  publishWindow(message);
+}
+
+void SmoothNode::smoothFrame(const TrackMessage& message, FrameResult& out) {
+  const double begin = wallSeconds();
+  out.step.frame = message.tracked.index;
+  out.step.effort = effort_->give();
+  out.smooth_level = effort_->level();
+  const Spent spent = context_.timed(StageId::kSmooth, [&] {
+    samples.takeUntil(message.tracked.stamp, [this](const ImuSample& sample) { stage_.addImu(sample); });
+    out.step.samples = samples.taken();
+    out.step.planes = planes.refresh();
+    if (out.step.planes != planes_) {
+      planes_ = out.step.planes;
+      stage_.take(planes.value());
+    }
+    out.status = stage_.step(message.tracked, out.step.effort, out.output);
+    stage_.fix(fix.draft());
+    fix.send();
+    for (LiveOutlet* outlet : context_.options.outlets) {
+      const OdometryOutput& output = out.output;
+      outlet->frame.write({message.tracked.stamp, output.has_state, output.waiting_for, output.state.health,
+                           output.state.epoch, output.statistics, wallSeconds() - message.host.arrival});
+    }
+  });
+  effort_->took({spent.wall, static_cast<int>(tracked.size()) - 1, begin - message.host.arrival});
+  out.tracked = message.tracked;
+  out.spent += spent;
+  const NavState& state = out.output.state;
+  frame_ = {frame_.count + 1, message.tracked.stamp, out.output.has_state, state.health,
+            state.epoch,      out.track_level,       out.smooth_level};
+  newest_frame_.write(frame_);
+  context_.count(StageId::kSmooth, spent, message.tracked.keyframe);
+  steps.send(out.step);
+}
+
+void SmoothNode::publishWindow(const TrackMessage& message) {
+  SmoothedWindow& smoothed = window.draft();
+  stage_.window(smoothed);
+  if (mesh.connected()) {
+    MeshMessage& to_mesh = mesh.draft();
+    to_mesh.window = smoothed;
+    to_mesh.tracked = message.tracked;
+    to_mesh.image = message.step.image[0];
+    mesh.send();
+  }
+  ++windows_;  // about to be sent
+  if (keyframes.connected() && message.tracked.keyframe && smoothed.started) sendKeyframe(message, smoothed);
+  if (mapped.connected() && message.mapped && smoothed.started) sendMapped(message, smoothed);
+  window.send();
+}
+
+void SmoothNode::sendKeyframe(const TrackMessage& message, const SmoothedWindow& smoothed) {
+  KeyframeMessage& out = keyframes.draft();
+  out.window = smoothed;
+  out.window_number = windows_;
+  out.tracked = message.tracked;
+  out.image = message.step.image;
+  stage_.link(out.window, out.link);
+  keyframes.send();
+}
+
+void SmoothNode::sendMapped(const TrackMessage& message, const SmoothedWindow& smoothed) {
+  const Health health = smoothed.newest.health;
+  // Where the pose is not to be flown on, or still being found, there is nothing to map.
+  if (smoothed.poses.empty() || (health != Health::kGood && health != Health::kDegraded)) return;
+  MapMessage& out = mapped.draft();
+  out.frame = message.tracked.index;
+  out.stamp = message.tracked.stamp;
+  out.epoch = smoothed.epoch;
+  out.poses = smoothed.poses;
+  mapped.send();
+}
+
+SmoothedFrameNews SmoothNode::newestFrame() const {
+  SmoothedFrameNews frame;
+  static_cast<void>(newest_frame_.read(frame));
+  return frame;
+}
+
+/// The last result holds what had not come out yet. It is not to be lost, unless nobody is left to take it.
+void SmoothNode::end() {
+  if (!results.hasRoom() && !results.readersDone()) return;
+  FrameResult& out = results.draft();
+  out.kind = TrackMessage::Kind::kEnd;
+  out.track_status = out.status = okStatus();
+  out.track_step = TrackStep{};
+  out.track_step.stamp = kEndOfTime;
+  out.dropped = 0;
+  out.output = OdometryOutput{};
+  stage_.finish(out.output);
+  out.published = wallSeconds();
+  results.send();
+  finish();
+}
+
+}  // namespace swiftlet

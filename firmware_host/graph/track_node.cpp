@@ -1,0 +1,123 @@
+#include "firmware_host/graph/track_node.hpp"
+
+#include "firmware_host/graph/run_listener.hpp"
+#include "firmware_host/graph/sensor_node.hpp"
+
+namespace swiftlet {
+
+TrackNode::TrackNode(GraphContext& context, const SensorNode& sensors)
+    : Node("track", Rank::kTrack),
+      frames(*this, context, sensors),
+      context_(context),
+      full_effort_(context.settings.effort),
+      effort_(context.options.track_effort != nullptr ? context.options.track_effort : &full_effort_),
+      stage_(context.rig, context.noise, context.settings.odometry) {}
+
+bool TrackNode::turn() {
+  const bool ended = inputEnded();
+  context_.count(StageId::kPairing, measured([&] {
+                   frames.takeArrivals([this](const FrameQueue::Refusal& refusal) { refuse(refusal); });
+                 }));
+  if (frames.front() == nullptr) {
+    samples.takeSurplus([this](const ImuSample& sample) { stage_.addImu(sample); });
+    return ended && !done() && flushAndFinish();
+  }
+  if (!tracked.hasRoom()) return false;
+  if (!ended && frames.awaitsSamples()) return false;
+  trackFrame();
+  return true;
+}
+
+void TrackNode::trackFrame() {
+  const StereoFrame frame = *frames.front();
+  TrackMessage& message = tracked.draft();
+  message.kind = TrackMessage::Kind::kFrame;
+  message.host = frames.hostTimes();
+  TrackStep& step = message.step;
+  step.frame = frame.index;
+  step.stamp = frame.stamp;
+  step.image = frame.number;
+  const double age = wallSeconds() - message.host.arrival;
+  step.effort = effort_->give();
+  message.effort_level = effort_->level();
+  message.spent = context_.timed(StageId::kTrack, [&] {
+    step.window = window.refresh();
+    if (step.window != window_) {
+      window_ = step.window;
+      stage_.take(window.value());
+    }
+    samples.takeUntil(frame.stamp, [this](const ImuSample& sample) { stage_.addImu(sample); });
+    step.samples = samples.taken();
+    message.status = stage_.step(frame, step.effort, message.tracked);
+  });
+  effort_->took({message.spent.wall, frames.size() - 1, age});
+  const bool ok = message.status.ok();
+  const bool keyframe = ok && message.tracked.keyframe;
+  if (!ok) message.kind = TrackMessage::Kind::kFrameRefused;
+  message.dropped = static_cast<int>(frame.index - next_frame_);
+  next_frame_ = frame.index + 1;
+  context_.count(StageId::kTrack, message.spent, keyframe);
+  steps.send(step);
+  message.mapped = copies.send(frame, keyframe, wantsMap(frame, keyframe) && ok);
+  tracked.send();
+  frames.pop();
+}
+
+void TrackNode::refuse(const FrameQueue::Refusal& refusal) {
+  if (!tracked.hasRoom()) return;
+  TrackMessage& message = tracked.draft();
+  message.kind = TrackMessage::Kind::kImageRefused;
+  message.status = refusal.status;
+  message.step = TrackStep{};
+  message.step.stamp = refusal.stamp;
+  message.dropped = 0;
+  tracked.send();
+}
+
+bool TrackNode::flushAndFinish() {
+  if (frames.flush()) return true;
+  finish();
+  return false;
+}
+
+/// Mapped are: with a depth sensor, frames that have a depth image; else keyframes seen by both cameras, and
+/// frames that have labels.
+bool TrackNode::wantsMap(const StereoFrame& frame, bool keyframe) {
+  bool depth = false, labels = false;
+  while (const SceneNote* note = scene_notes.front()) {
+    if (note->stamp > frame.stamp) break;
+    if (note->stamp == frame.stamp) {
+      depth = note->depth;
+      labels = note->labels;
+    }
+    scene_notes.pop();
+  }
+  if (context_.options.depth_sensor != nullptr) return depth;
+  return (keyframe || labels) && frame.has(0) && frame.has(1);
+}
+
+bool TrackNode::takeTracks(const TrackedFrame& frame) {
+  if (!tracked.hasRoom()) return false;
+  TrackMessage& message = tracked.draft();
+  message = TrackMessage{};
+  message.step.frame = frame.index;
+  message.step.stamp = frame.stamp;
+  message.tracked = frame;
+  message.host.arrival = message.host.exposure = wallSeconds();
+  tracked.send();
+  return true;
+}
+
+void TrackNode::report(RunStatistics& statistics) const {
+  statistics.pairing = frames.pairing();
+  statistics.frames_dropped = frames.counters().dropped;
+}
+
+void TrackNode::addLosses(std::map<std::string, std::uint64_t>& losses) const {
+  Node::addLosses(losses);
+  const FrameQueue::Counters& counters = frames.counters();
+  if (counters.dropped > 0) losses["frames_dropped"] += counters.dropped;
+  if (counters.without_samples > 0) losses["frames_without_samples"] += counters.without_samples;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,44 @@
+#pragma once
+// The recorded schedule: repeats a threaded run from its recording, on one thread. Before its turn each node
+// is told what it took then (samples, images, the window or fix that was newest for it, the effort), so that
+// every output has the same bytes however the threads had run.
+//
+// A node's turn waits until what it took is there: windows, fixes and plane reports are kept by number until
+// the step that took them. What a node missed then it passes by.
+
+#include <cstdint>
+#include <string>
+
+#include "drivers/recorded/recording_source.hpp"
+#include "firmware_host/graph/graph.hpp"
+#include "firmware_host/pipeline/run_control.hpp"
+
+namespace swiftlet {
+
+/// What the recording says that a stage spent.
+class RecordedEffort : public EffortSource {
+ public:
+  void tell(const Effort& effort) { effort_ = effort; }
+  [[nodiscard]] Effort give() const override { return effort_; }
+  void took(const StepTiming& /*timing*/) override {}
+  [[nodiscard]] int level() const override { return 0; }
+
+ private:
+  Effort effort_;
+};
+
+struct RecordedEfforts {
+  RecordedEffort track, smooth;
+};
+
+struct RepeatReport {
+  bool finished = true;  ///< false: stopped
+  std::uint64_t frames = 0;
+  std::string stopped_early;  ///< why the recording could not be followed to its end; empty: it was
+};
+
+/// The graph is one of the recording's rig, noise and settings, with `efforts` in its options.
+RepeatReport runRecorded(RecordingSource& recording, Graph& graph, RecordedEfforts& efforts,
+                         const RunControl& control);
+
+}  // namespace swiftlet
