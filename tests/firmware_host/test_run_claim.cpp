@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "drivers/calibration/input_error.hpp"
+#include "firmware_host/commands/fly_run.hpp"
 #include "firmware_host/report/run_claim.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
@@ -116,6 +117,17 @@ TEST_CASE("a flight is replaced by nothing that was not told to", "[files]") {
   CHECK_FALSE(fs::exists(folder.file("odometry.tum")));
   CHECK(runKindOf(folder.path()) == RunKind::kReplay);
   CHECK_THROWS_AS(refuseRunIn(folder.path()), InputError);  // a flight spares a replay too
+}
+
+TEST_CASE("fly refuses a folder with a run before it looks at anything else, unless told to replace it",
+          "[files]") {
+  const ScratchFolder folder("claim");
+  { const RunClaim earlier(folder.path(), RunKind::kReplay, false); }
+  FlyRequest request;
+  request.out = folder.path();
+  CHECK_THROWS_WITH(runFlight(request, Settings{}), Catch::Contains("holds a replay already"));
+  request.replace = true;
+  CHECK_THROWS_WITH(runFlight(request, Settings{}), Catch::Contains("vehicle.calibration"));
 }
 
 TEST_CASE("a flight's name has the time where the clock was set", "[files]") {

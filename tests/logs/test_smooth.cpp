@@ -193,6 +193,26 @@ TEST_CASE("more memory than allowed is refused before it is taken, with the reme
   CHECK_FALSE(runSmooth({.run = run}, Settings{}).poses.empty());
 }
 
+TEST_CASE("a replay removes neither the recording that it reads nor what is not its own") {
+  const ScratchFolder folder("smooth");
+  const std::string run = folder.file("run");
+  ReplayRequest request = requestFor(run);
+  request.record = true;
+  request.until = 0.5;
+  REQUIRE(runReplay(request, Settings{}).finished);
+  for (const std::string& log : {run, run + "/recording"}) {
+    ReplayRequest own = requestFor(run);
+    own.log = log;
+    own.replace = true;
+    CHECK_THROWS_WITH(runReplay(own, Settings{}), Catch::Contains("is the folder of the recording"));
+  }
+  CHECK(fs::exists(run + "/recording/recording_000000.swr"));
+  // Without --record there is no recording of another run beside this one's files.
+  request.record = false;
+  REQUIRE(runReplay(request, Settings{}).finished);
+  CHECK_FALSE(fs::exists(run + "/recording"));
+}
+
 TEST_CASE("a folder without keyframes and a foreign file are refused") {
   const ScratchFolder folder("smooth");
   CHECK_THROWS_AS(runSmooth({.run = folder.path()}, Settings{}), InputError);
