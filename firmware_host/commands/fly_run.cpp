@@ -107,6 +107,7 @@ class FlightRun {
     flight.announce = request_.show_progress;
     flight.host_stamps = true;
     flight.service = true;
+    flight.record = request_.record;
     flight.name = "flight";
     flight.view = request_.view;
     flight.file_problem = [this] { return lost_.problem(); };

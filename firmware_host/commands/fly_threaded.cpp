@@ -141,7 +141,7 @@ FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const 
   options.started = [&](const std::vector<ThreadReport>& threads) {
     FlightGround ground = groundOf(threads, calibration, settings, request);
     ground.memory_locked = lock.current;
-    ground.recorder_wanted = wanted.recorder != nullptr;
+    ground.recorder_wanted = request.record;
     for (const ThreadReport& thread : threads) {
       if (!request.announce || thread.message.empty()) continue;
       warn(fmt::format("warning: thread {}: {}\n", thread.name, thread.message));

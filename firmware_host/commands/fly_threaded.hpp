@@ -21,6 +21,7 @@ struct FlightRequest {
   /// From a log's stamps to CLOCK_MONOTONIC; gives none while that is not known. Any thread.
   std::function<std::optional<Duration>()> to_host;
   bool announce = false;            ///< print the table of what was reserved, and what is missing
+  bool record = false;              ///< the flight is to be recorded
   bool service = false;             ///< tell systemd, where it asks to be told
   std::string name;                 ///< what is flown, for those who look on
   std::optional<ViewAddress> view;  ///< serve the live view there

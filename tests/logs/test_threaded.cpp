@@ -12,6 +12,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <new>
 #include <sstream>
@@ -51,6 +52,17 @@ std::string textOf(const std::string& path) {
   std::ostringstream text;
   text << file.rdbuf();
   return text.str();
+}
+
+/// The same names with the same bytes, and at least one.
+bool sameFiles(const std::string& one, const std::string& other) {
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(one)) {
+    if (textOf(entry.path().string()) != textOf(other + "/" + entry.path().filename().string())) return false;
+    ++files;
+  }
+  const auto others = std::distance(std::filesystem::directory_iterator(other), {});
+  return files > 0 && files == static_cast<std::size_t>(others);
 }
 
 ReplayRequest requestFor(const std::string& log, const std::string& out) {
@@ -168,7 +180,9 @@ TEST_CASE("overloaded, threads degrade by policy, recover, and are repeated byte
     request.real_time = true;
     request.speed = kSpeed * kSlow;
     request.record = true;
-    request.loop_closure = !kSanitized && run % 2 == 0;  // its images take minutes under a sanitizer
+    request.mesh_sequence = true;
+    request.loop_closure = !kSanitized;  // its images take minutes under a sanitizer, the map's too
+    request.map = !kSanitized;
     RandomDrag drag(static_cast<std::uint32_t>(run));
     ReplayHooks hooks;
     hooks.drag = [&](StageId stage, double cpu) { drag(stage, cpu); };
@@ -199,8 +213,14 @@ TEST_CASE("overloaded, threads degrade by policy, recover, and are repeated byte
       CHECK(repeated.statistics.loop->nodes == result.statistics.loop->nodes);
       CHECK(repeated.statistics.loop->without_image == result.statistics.loop->without_image);
     }
-    for (const char* file : {"odometry.tum", "states.csv", "map.tum", "local_mesh.ply"}) {
+    CHECK(result.statistics.mapping.has_value() == request.map);
+    for (const char* file :
+         {"odometry.tum", "states.csv", "map.tum", "local_mesh.ply", "loops.csv", "map.ply", "map.glb"}) {
+      CAPTURE(file);
       CHECK(textOf(folder.file("run/") + file) == textOf(folder.file("again/") + file));
+    }
+    if (!result.statistics.losses.contains("meshes_to_log")) {
+      CHECK(sameFiles(folder.file("run/meshes"), folder.file("again/meshes")));
     }
     if (!result.statistics.losses.contains("states_to_log")) {
       CHECK(textOf(folder.file("run/imu_rate.tum")) == textOf(folder.file("again/imu_rate.tum")));
@@ -334,7 +354,8 @@ TEST_CASE("a log that fails ends neither the flight nor the waiting for its end"
   RunLog log(listener);
   LogFeed feed(*source, {}, nullptr);
   const Settings settings;
-  const auto graph = std::make_unique<Graph>(source->rig(), source->imuNoise(), settings, log, GraphOptions{});
+  const auto graph =
+      std::make_unique<Graph>(source->rig(), source->imuNoise(), settings, log, GraphOptions{});
   LogPlayer player(feed, kSlow);
   const ThreadedReport report = runThreaded(player, *graph, ThreadedOptions{}, RunControl{});
   REQUIRE(report.faults.size() == 1);
