@@ -56,7 +56,8 @@ class Stream {
   /// False where nobody reads, now or ever.
   bool hasRoom() {
     pollfd out{file_, POLLOUT, 0};
-    const int ready = ::poll(&out, 1, still_ ? 0 : kPatience);
+    int ready = ::poll(&out, 1, 0);
+    if (ready == 0 && !still_) ready = ::poll(&out, 1, kPatience);
     still_ = ready == 0;
     return ready == 1 && out.revents == POLLOUT;
   }
