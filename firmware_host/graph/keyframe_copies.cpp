@@ -13,7 +13,7 @@ void KeyframeCopies::reserve(const std::array<std::size_t, kMaxCameras>& pixels)
 }
 
 bool KeyframeCopies::send(const StereoFrame& frame, bool to_loop, bool to_map) {
-  if (skips_) return true;
+  if (told_) return *told_;
   to_loop = to_loop && loop_ != nullptr;
   to_map = to_map && map_ != nullptr;
   if (!to_loop && !to_map) return false;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "estimator/messages/frames.hpp"
 #include "firmware_host/graph/images.hpp"
@@ -21,8 +22,9 @@ class KeyframeCopies {
   void to(MapImagesIn& in, const std::array<std::size_t, kMaxCameras>& pixels) { lend(in, map_, pixels); }
   /// Whether the map gets them; where nobody is connected, nothing happens.
   bool send(const StereoFrame& frame, bool to_loop, bool to_map);
-  /// Recorded schedule: images are at hand wherever they are asked for, so none is copied.
-  void skipCopies() { skips_ = true; }
+  /// Recorded schedule: images are at hand wherever they are asked for, so none is copied; whether the map gets
+  /// those of the next frame.
+  void tell(bool mapped) { told_ = mapped; }
 
  private:
   template <typename Reader>
@@ -38,7 +40,7 @@ class KeyframeCopies {
   std::unique_ptr<KeyframePool> pool_;
   LoopImagesIn* loop_ = nullptr;
   MapImagesIn* map_ = nullptr;
-  bool skips_ = false;
+  std::optional<bool> told_;
 };
 
 }  // namespace swiftlet

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <set>
 
 namespace swiftlet {
 namespace {
@@ -13,10 +14,12 @@ class Repeat {
       : recording_(recording), steps_(recording.steps()), graph_(graph), efforts_(efforts) {
     graph.propagate().fix.keepAll();
     graph.track().window.keepAll();
-    graph.track().copies.skipCopies();
     graph.smooth().planes.keepAll();
     if (graph.mesh() != nullptr) graph.mesh()->window.keepAll();
     if (graph.map() != nullptr) graph.map()->worlds.keepAll();
+    for (const MapStep& step : steps_.map) {
+      if (!step.end) mapped_.insert(step.frame);
+    }
   }
 
   RepeatReport operator()(const RunControl& control) {
@@ -126,6 +129,7 @@ class Repeat {
     frame.number = step.image;
     if (!images(step.image, frame.image)) return false;
     node.frames.tell(frame);
+    node.copies.tell(mapped_.contains(step.frame));
     efforts_.track.tell(step.effort);
     node.turn();
     ++track_;
@@ -159,6 +163,7 @@ class Repeat {
     const MeshStep& step = steps_.mesh[mesh_];
     if (!node->window.expect(step.window)) return false;
     if (step.image > 0 && !image(0, step.image, mesh_image_.frame)) return false;
+    mesh_image_.frame.number = step.image;
     node->image.tell(step.image > 0 ? &mesh_image_ : nullptr);
     node->turn();
     ++mesh_;
@@ -255,7 +260,8 @@ class Repeat {
   std::size_t fed_ = 0;  ///< samples
   // Steps taken.
   std::size_t propagate_ = 0, track_ = 0, smooth_ = 0, mesh_ = 0, loop_ = 0, map_ = 0;
-  std::uint64_t spare_turns_ = 0;  ///< of `map`, before its next step
+  std::set<std::uint64_t> mapped_;  ///< frames that the map took
+  std::uint64_t spare_turns_ = 0;   ///< of `map`, before its next step
   ImageSlot mesh_image_;
   KeyframeImages keyframe_;
   SceneSlot scene_;

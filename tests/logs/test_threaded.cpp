@@ -198,6 +198,7 @@ TEST_CASE("overloaded, threads degrade by policy, recover, and are repeated byte
     effort_changes += result.statistics.effort_changes;
 
     ReplayRequest again = requestFor(folder.file("run"), folder.file("again"));
+    again.mesh_sequence = true;
     again.reproduce = true;
     // A disk that stands still for most of a second costs records; such a run is refused, with the place.
     if (openRecording(folder.file("run"))->firstLoss()) {
