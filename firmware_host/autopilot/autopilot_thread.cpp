@@ -112,8 +112,7 @@ class AutopilotThread::Work {
  private:
   void run() {
     heard_ = monotonicNow();
-    while (!thread_.ending()) {
-      thread_.heart().beat();
+    while (thread_.turn()) {
       if (journal_.standing() != DeviceFaultKind::kNone) {
         reopen();
         continue;

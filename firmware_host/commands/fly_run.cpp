@@ -81,7 +81,7 @@ class FlightRun {
     result_.out = claimFolder(request_, settings_, claim_, lost_);
     output_.emplace(result_.out, settings_, calibration_, RunOutput::Wanted{request_.imu_rate, false, true},
                     lost_);
-    if (request_.record) recorder_ = output_->startRecorder(RecordOrder::kByArrival, nullptr);
+    if (request_.record) recorder_ = output_->startRecorder(RecordOrder::kByArrival);
     fly();
     end();
     return result_;

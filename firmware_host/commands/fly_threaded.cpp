@@ -130,6 +130,7 @@ FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const 
 
   SystemdNotify systemd;
   consumers.addTo(supervisor);
+  if (request.verdict) static_cast<void>(supervisor.addSink(request.verdict));
   ThreadedOptions options;
   options.realtime = settings.realtime;
   options.before_turn = request.before_turn;

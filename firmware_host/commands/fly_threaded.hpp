@@ -28,6 +28,7 @@ struct FlightRequest {
   /// What is wrong with the run's files; null: nothing. Any thread.
   std::function<const char*()> file_problem;
   std::function<bool(const char* node)> before_turn;  ///< ThreadedOptions::before_turn
+  std::function<void(const Verdict&)> verdict;        ///< on the supervisor's thread; for tests
 };
 
 struct FlightEnd {

@@ -93,13 +93,16 @@ void LiveConsumers::addTo(Supervisor& supervisor) {
 }
 
 bool LiveConsumers::finish(nlohmann::ordered_json& report, std::vector<std::string>& faults) {
+  if (autopilot_) autopilot_->tellEnd();
+  if (ros2_) ros2_->tellEnd();
+  if (view_) view_->tellEnd();
   bool sound = true;
   const auto end = [&](const char* name, const auto& follower) {
     if (!follower) return;
     report[name] = follower->finish();
     if (!report[name].contains("fault")) return;
     faults.push_back(std::string(name) + ": " + report[name]["fault"].template get<std::string>());
-    sound = false;
+    if (report[name].size() == 1) sound = false;  // it is stuck: nothing is counted
   };
   end("autopilot", autopilot_);
   end("ros2", ros2_);

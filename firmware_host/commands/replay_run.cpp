@@ -191,6 +191,7 @@ class ReplayRun {
       flight.name = (log.has_filename() ? log : log.parent_path()).filename().string();
       flight.view = request_.view;
       flight.before_turn = hooks_.before_turn;
+      flight.verdict = hooks_.verdict;
       flight.record = request_.record;
       flight.file_problem = [this] { return lost_.problem(); };
       LogPlayer& player = player_.emplace(feed, request_.speed);

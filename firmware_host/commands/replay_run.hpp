@@ -11,6 +11,7 @@
 #include "drivers/recorded/log_source.hpp"
 #include "firmware_host/graph/run_listener.hpp"
 #include "firmware_host/settings/settings.hpp"
+#include "firmware_host/supervisor/verdict.hpp"
 #include "firmware_host/view/view_address.hpp"
 
 namespace swiftlet {
@@ -43,6 +44,7 @@ struct ReplayRequest {
 struct ReplayHooks {
   std::function<void(StageId, double)> drag;
   std::function<bool(const char* node)> before_turn;  ///< ThreadedOptions::before_turn
+  std::function<void(const Verdict&)> verdict;        ///< FlightRequest::verdict
 };
 
 struct ReplayResult {

@@ -39,8 +39,8 @@ class RunOutput {
   /// What the graph is to know of this folder.
   [[nodiscard]] GraphOptions graphOptions();
   /// Writes `recording/`. `depth_sensor`: of the map; null: none. Null where it cannot (fly_on).
-  [[nodiscard]] std::unique_ptr<FlightRecorder> startRecorder(RecordOrder order,
-                                                              const DepthImageView* depth_sensor) const;
+  [[nodiscard]] std::unique_ptr<FlightRecorder> startRecorder(
+      RecordOrder order, const DepthImageView* depth_sensor = nullptr) const;
 
   /// After the run: loops.csv, the keyframes closed, map.tum of the pose graph where there is one. Fills the
   /// facts' peak of memory.

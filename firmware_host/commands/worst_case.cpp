@@ -5,10 +5,9 @@
 
 #include "drivers/simulated/simulated_source.hpp"
 #include "drivers/simulated/track_simulator.hpp"
-#include "estimator/odometry/pairing.hpp"
 #include "estimator/odometry/propagation_stage.hpp"
-#include "estimator/odometry/smooth_stage.hpp"
-#include "estimator/odometry/track_stage.hpp"
+#include "firmware_host/graph/graph.hpp"
+#include "firmware_host/schedule/lockstep.hpp"
 
 namespace swiftlet {
 namespace {
@@ -18,11 +17,60 @@ constexpr double kRenderedSeconds = 6;
 constexpr double kTracksSeconds = 12;
 constexpr double kFastImu = 1000;  // Hz
 
-OdometrySettings mostFeatures(const Settings& settings) {
-  OdometrySettings most = settings.odometry;
-  most.max_features = static_cast<int>(kMaxFeatures);
-  most.use_stereo = true;
+/// At the limits of tracking and smoothing, and nothing beside them.
+Settings fullStages(const Settings& settings) {
+  Settings most = settings;
+  most.odometry.max_features = static_cast<int>(kMaxFeatures);
+  most.odometry.use_stereo = true;
+  most.effort.features = static_cast<int>(kMaxFeatures);
+  most.mesh.enabled = most.loop.enabled = most.map.enabled = false;
   return most;
+}
+
+/// A graph on simulated input, in lockstep.
+class Run : private RunListener {
+ public:
+  Run(const SimulatedFlight& flight, const Settings& settings)
+      : settings_(fullStages(settings)),
+        graph_(flight.givenRig(), flight.settings().imu.noise, settings_, log_, GraphOptions{}) {}
+
+  void take(const ImuSample& sample) { graph_.sensors().takeImu(sample, sample.stamp, now()); }
+  void take(const CameraFrame& image) {
+    graph_.sensors().takeImage(image, now());
+    runAll(graph_);
+  }
+  void take(const TrackedFrame& tracked) {
+    static_cast<void>(graph_.track().takeTracks(tracked));
+    runAll(graph_);
+  }
+  /// Once; the stages' times.
+  const StageTable& end() {
+    graph_.sensors().endInput();
+    runAll(graph_);
+    graph_.report(log_);
+    return log_.statistics().times;
+  }
+
+  std::size_t features = 0;   ///< most in a frame
+  std::size_t landmarks = 0;  ///< most in the window
+
+ private:
+  static HostTimes now() { return {wallSeconds(), wallSeconds()}; }
+  void onFrame(const TrackedFrame& tracked, const OdometryOutput& output) override {
+    features = std::max(features, tracked.features.size());
+    landmarks = std::max(landmarks, static_cast<std::size_t>(output.statistics.landmarks));
+  }
+  void onImuState(const NavState& /*state*/) override {}
+  void onFinish(const OdometryOutput& /*output*/) override {}
+  void onRemark(Stamp /*stamp*/, const std::string& /*text*/) override {}
+
+  const Settings settings_;
+  RunLog log_{*this};
+  Graph graph_;
+};
+
+void copyTimes(const StageTable& from, StageId stage, StageTable& to) {
+  to[static_cast<std::size_t>(stage)] = from[static_cast<std::size_t>(stage)];
 }
 
 void propagateWorst(const Settings& settings, StageTable& times) {
@@ -54,25 +102,19 @@ void trackWorst(const Settings& settings, WorstCase& worst) {
     simulation.faults.push_back({FaultKind::kBlackout, {start, start + 0.6}, -1});
   }
   SimulatedSource source(simulation);
-  const auto stage = std::make_unique<TrackStage>(
-      source.flight().givenRig(), source.flight().settings().imu.noise, mostFeatures(settings));
-  Pairing pairing{PairingSettings{}};
-  Effort effort = settings.effort;
-  effort.features = static_cast<int>(kMaxFeatures);
+  const auto run = std::make_unique<Run>(source.flight(), settings);
   ImuSample sample;
   CameraFrame image;
-  StereoFrame frame;
-  TrackedFrame tracked;
   for (auto item = source.next(sample, image); item != SimulatedSource::Item::kEnd;
        item = source.next(sample, image)) {
     if (item == SimulatedSource::Item::kImu) {
-      stage->addImu(sample);
-    } else if (pairing.push(image, frame).ok()) {
-      const Spent spent = measured([&] { static_cast<void>(stage->step(frame, effort, tracked)); });
-      addTime(worst.times, StageId::kTrack, spent, tracked.keyframe);
-      worst.features = std::max(worst.features, tracked.features.size());
+      run->take(sample);
+    } else {
+      run->take(image);
     }
   }
+  copyTimes(run->end(), StageId::kTrack, worst.times);
+  worst.features = run->features;
 }
 
 void smoothWorst(const Settings& settings, WorstCase& worst) {
@@ -86,27 +128,22 @@ void smoothWorst(const Settings& settings, WorstCase& worst) {
   simulation.tracks.right_share = 1;
   const SimulatedFlight flight(simulation);
   TrackSimulator simulator(flight.world(), flight.trueRig(), flight.trajectory(), flight.settings().tracks);
-  const auto stage =
-      std::make_unique<SmoothStage>(flight.givenRig(), flight.settings().imu.noise, mostFeatures(settings));
-  Effort effort = settings.effort;
-  effort.features = static_cast<int>(kMaxFeatures);
+  const auto run = std::make_unique<Run>(flight, settings);
   TrackedFrame tracked;
-  const auto output = std::make_unique<OdometryOutput>();
-  const auto window = std::make_unique<SmoothedWindow>();
   std::size_t next = 0;
   const auto& samples = flight.imu().samples;
   for (int k = 0; k < flight.imageCount(); ++k) {
     const Stamp stamp = flight.imageStamp(k);
-    for (; next < samples.size() && samples[next].stamp <= stamp; ++next) stage->addImu(samples[next]);
+    for (; next < samples.size() && samples[next].stamp <= stamp; ++next) run->take(samples[next]);
     simulator.step(flight.imageTime(k), stamp, tracked);
     tracked.index = static_cast<std::uint64_t>(k);
-    const Spent spent = measured([&] { static_cast<void>(stage->step(tracked, effort, *output)); });
-    addTime(worst.times, StageId::kSmooth, spent, tracked.keyframe);
-    addTime(worst.times, StageId::kTrim, measured([&] { stage->trim(); }), tracked.keyframe);
-    stage->window(*window);
-    worst.tracks = std::max(worst.tracks, tracked.features.size());
-    worst.landmarks = std::max(worst.landmarks, window->landmarks.size());
+    run->take(tracked);
   }
+  const StageTable& times = run->end();
+  copyTimes(times, StageId::kSmooth, worst.times);
+  copyTimes(times, StageId::kTrim, worst.times);
+  worst.tracks = run->features;
+  worst.landmarks = run->landmarks;
 }
 
 }  // namespace

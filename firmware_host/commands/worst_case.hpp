@@ -6,6 +6,7 @@
 //   found anew smooth:    simulated tracks at the most features a frame, all seen by both cameras,
 //   short-lived so that the
 //              landmarks fill up, with 1 kHz of IMU
+// `track` and `smooth` run in the graph, in lockstep.
 // Efforts as the settings give them.
 
 #include <functional>

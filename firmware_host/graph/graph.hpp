@@ -40,6 +40,15 @@ class Graph {
   Graph(const Graph&) = delete;
   Graph& operator=(const Graph&) = delete;
 
+  /// Before the run: one node more, whose maker connects it.
+  template <typename T>
+  T& add(std::unique_ptr<T> node) {
+    T& added = *node;
+    nodes_.push_back(node.get());
+    added_.push_back(std::move(node));
+    return added;
+  }
+
   /// In the order of the stream, but the sensors, which have no turn.
   [[nodiscard]] std::span<Node* const> nodes() const { return nodes_; }
 
@@ -83,6 +92,7 @@ class Graph {
   std::unique_ptr<MappingNode> map_;
   std::unique_ptr<LogNode> log_;
   std::unique_ptr<RecordNode> record_;
+  std::vector<std::unique_ptr<Node>> added_;
 };
 
 }  // namespace swiftlet

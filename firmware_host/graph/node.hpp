@@ -46,7 +46,12 @@ class Node {
   /// Any thread: it does nothing any more, and nobody waits for it.
   [[nodiscard]] bool done() const { return done_.load(std::memory_order_acquire); }
   /// Any thread: its thread has ended before its time, or stands still. Those behind it end as if it had.
-  void abandon() { done_.store(true, std::memory_order_release); }
+  void abandon() {
+    abandoned_.store(true, std::memory_order_relaxed);
+    finish();
+  }
+  /// Any thread, once done: not by itself.
+  [[nodiscard]] bool wasAbandoned() const { return abandoned_.load(std::memory_order_relaxed); }
   /// Of the schedule, at the end: its thread is stuck and may go on at any time, so that nothing of it is
   /// read.
   void leaveBehind() { left_behind_ = true; }
@@ -62,7 +67,7 @@ class Node {
   }
 
  protected:
-  void finish() { abandon(); }
+  void finish() { done_.store(true, std::memory_order_release); }
   /// The nodes before this one are done. To be asked before a look at the arrows that finds nothing.
   [[nodiscard]] bool inputEnded() const;
 
@@ -74,7 +79,7 @@ class Node {
 
   const char* name_;
   Rank rank_;
-  std::atomic<bool> done_{false};
+  std::atomic<bool> done_{false}, abandoned_{false};
   bool left_behind_ = false;
   Heartbeat heart_;
   Doorbell bell_;

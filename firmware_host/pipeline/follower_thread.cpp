@@ -10,6 +10,11 @@
 #include "firmware_host/pipeline/stage_timer.hpp"
 
 namespace swiftlet {
+namespace {
+
+std::atomic<bool (*)(const char*)> watch_of_all{nullptr};
+
+}  // namespace
 
 void FollowerThread::start(const ThreadSettings& settings, const std::string& file, const std::string& field,
                            std::function<void()> entry) {
@@ -34,12 +39,22 @@ bool FollowerThread::end(Duration limit) {
   return false;
 }
 
-void FollowerThread::repeat(double period, const std::function<void(double now)>& turn) {
+bool FollowerThread::turn() {
+  if (ending_.load(std::memory_order_relaxed)) return false;
+  heart_.beat();
+  const auto watch = watch_of_all.load(std::memory_order_relaxed);
+  return watch == nullptr || watch(name_.c_str());
+}
+
+void FollowerThread::watchTurns(bool (*watch)(const char* thread)) {
+  watch_of_all.store(watch, std::memory_order_relaxed);
+}
+
+void FollowerThread::repeat(double period, const std::function<void(double now)>& work) {
   double next = wallSeconds();
-  while (!ending()) {
-    heart_.beat();
+  while (turn()) {
     const double now = wallSeconds();
-    turn(now);
+    work(now);
     next = std::max(next + period, now);
     sleepUntil(next);
   }

@@ -32,17 +32,22 @@ class FollowerThread {
   [[nodiscard]] bool end(Duration limit = kLongestEnd);
   /// Waits for nothing.
   void tellEnd() { ending_.store(true, std::memory_order_relaxed); }
-  [[nodiscard]] bool ending() const { return ending_.load(std::memory_order_relaxed); }
+  /// Of the entry, at each turn: beats. False: it is to return.
+  [[nodiscard]] bool turn();
 
-  /// Of the entry, at each turn; of the supervisor.
+  /// Of the entry, which may say what it does; of the supervisor.
   [[nodiscard]] Heartbeat& heart() { return heart_; }
   [[nodiscard]] const Heartbeat& heart() const { return heart_; }
   /// After end(): why it ended before it was told to, or that it was given up; empty: all in order.
   [[nodiscard]] const std::string& fault() const { return fault_; }
 
-  /// For the entry: `turn(now)` every `period` seconds of the host's clock, until it is to end. A thread that
+  /// For the entry: `work(now)` every `period` seconds of the host's clock, until it is to end. A thread that
   /// came late does not hurry after.
-  void repeat(double period, const std::function<void(double now)>& turn);
+  void repeat(double period, const std::function<void(double now)>& work);
+
+  /// For tests, which throw and stall there: called on each follower's thread at each turn; false: it returns
+  /// early. Null: nobody is.
+  static void watchTurns(bool (*watch)(const char* thread));
 
  private:
   std::atomic<bool> ending_{false};

@@ -117,7 +117,12 @@ class Run : public SensorSink {
       return;
     }
     report.faults = thread.pageFaults();
-    if (!thread.fault().empty()) report_.faults.push_back(report.name + ": " + thread.fault());
+    const Node* node = threads_[i].node;
+    if (!thread.fault().empty()) {
+      report_.faults.push_back(report.name + ": " + thread.fault());
+    } else if (report.started && node != nullptr && node->wasAbandoned()) {
+      report_.faults.push_back(report.name + ": ended before its work was done");
+    }
   }
 
   // Sink.
@@ -170,7 +175,7 @@ class Run : public SensorSink {
     struct AtEnd {
       Node& node;
       ~AtEnd() {
-        node.abandon();
+        if (!node.done()) node.abandon();
         node.wakeReaders();
       }
     } at_end{node};

@@ -22,7 +22,7 @@ constexpr std::array<std::string_view, 4> kSensorThreads = {"imu", "camera0", "c
 /// Nor do these wait for anybody but the one before them.
 constexpr std::array<std::string_view, 4> kStageThreads = {"propagate", "track", "smooth", "mesh"};
 /// Followers with a real-time priority that are held to what sensors are.
-constexpr std::array<std::string_view, 0> kFollowersHeld = {};
+constexpr std::array<std::string_view, 1> kFollowersHeld = {"autopilot"};
 // All others run below the flight path (loop, map, log, record, dds with its library, view, decoders): their
 // counts are printed and not judged.
 

@@ -25,7 +25,7 @@ TEST_CASE("poses, obstacles, texts and answers cost the autopilot's thread no he
   // The thread asks at each turn until it is answered: its own place to arm the trap.
   options.to_host = [&]() -> std::optional<Duration> {
     if (++turns < 3) return std::nullopt;
-    armTrap();
+    armTrap("autopilot");
     return Duration{};
   };
   const TrapCounts before = trapCounts();
@@ -92,7 +92,7 @@ TEST_CASE("the supervisor's thread makes no heap call and takes no lock", "[supe
   REQUIRE(supervisor.add("smooth", smooth));
   std::atomic<int> looks{0};
   REQUIRE(supervisor.addSink([&](const Verdict&) {
-    if (++looks == 2) armTrap();
+    if (++looks == 2) armTrap("supervisor");
   }));
   FlightGround ground;
   ground.cameras = 2;
