@@ -96,6 +96,11 @@ bool SampleMonitor::checkAxis(double value, double floor, Run& run, double& limi
   return std::abs(value) >= limit;
 }
 
+void SampleMonitor::restart() {
+  has_last_ = false;
+  runs_ = {};
+}
+
 void SampleMonitor::reset() { *this = SampleMonitor(noise_); }
 
 }  // namespace swiftlet

@@ -50,6 +50,8 @@ class SampleMonitor {
   [[nodiscard]] double gyroLimit() const { return gyro_limit_; }
   [[nodiscard]] double accelLimit() const { return accel_limit_; }
 
+  /// The stream goes on at other stamps: the next sample is the first. Counters, rate and limits stay.
+  void restart();
   void reset();
 
  private:

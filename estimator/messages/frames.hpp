@@ -19,6 +19,8 @@ struct CameraFrame {
   std::uint32_t camera = 0;    ///< 0 left, 1 right
   std::uint64_t sequence = 0;  ///< the device's own count
   std::uint64_t number = 0;    ///< of this camera's images that entered the estimator, from 1; 0: not counted
+  std::uint32_t timeline =
+      0;  ///< of the IMU's stamps (estimator/odometry/stamp_guard.hpp), with which it goes
   ImageView image;
 };
 
@@ -28,6 +30,7 @@ struct StereoFrame {
   std::uint64_t index = 0;
   std::array<ImageView, kMaxCameras> image;         ///< empty() where that camera is missing
   std::array<std::uint64_t, kMaxCameras> number{};  ///< CameraFrame::number of each; 0 where missing
+  std::uint32_t timeline = 0;                       ///< CameraFrame::timeline
 
   [[nodiscard]] bool has(std::size_t camera) const { return !image[camera].empty(); }
 };

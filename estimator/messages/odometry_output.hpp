@@ -27,6 +27,7 @@ enum class EventKind : std::uint8_t {
   kHealthChanged,    ///< value: the new Health
   kReset,            ///< value: the new epoch
   kCapacityReached,  ///< value: items given up
+  kStampsWentBack,   ///< value: seconds by which the IMU's stamps went back for good; a new epoch begins
 };
 
 struct Event {

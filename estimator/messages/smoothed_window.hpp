@@ -39,6 +39,7 @@ struct WindowPlane {
 
 struct SmoothedWindow {
   std::uint32_t epoch = 0;
+  std::uint32_t timeline = 0;  ///< TrackedFrame::timeline of the frame it comes from
   bool started = false;  ///< false: no state yet in this epoch, nothing below but the calibration counts
   NavState newest;       ///< stamp on the IMU's clock
   CalibrationEstimate calibration;

@@ -15,10 +15,10 @@
 
 namespace swiftlet {
 
-/// Propagation started again from a fix; between samples `samples` and `samples + 1`.
+/// Propagation started again from a fix.
 struct PropagateStep {
-  std::uint64_t samples = 0;
-  std::uint64_t fix = 0;  ///< number of the fix
+  std::uint64_t samples = 0;  ///< number of the newest IMU sample taken before
+  std::uint64_t fix = 0;      ///< number of the fix
 
   bool operator==(const PropagateStep&) const = default;
 };
@@ -27,7 +27,7 @@ struct TrackStep {
   std::uint64_t frame = 0;  ///< StereoFrame::index
   Stamp stamp;
   std::array<std::uint64_t, kMaxCameras> image{};  ///< number of each camera's image; 0: missing
-  std::uint64_t samples = 0;                       ///< IMU samples taken before the frame
+  std::uint64_t samples = 0;                       ///< number of the newest IMU sample taken before it
   std::uint64_t window = 0;                        ///< number of the window that it predicted from
   Effort effort;
 
@@ -36,7 +36,7 @@ struct TrackStep {
 
 struct SmoothStep {
   std::uint64_t frame = 0;    ///< index of the tracked frame
-  std::uint64_t samples = 0;  ///< IMU samples taken before it
+  std::uint64_t samples = 0;  ///< number of the newest IMU sample taken before it
   Effort effort;
   std::uint64_t planes = 0;  ///< number of the plane report that was the newest
 

@@ -23,6 +23,7 @@ struct TrackedFeature {
 struct TrackedFrame {
   Stamp stamp;
   std::uint64_t index = 0;
+  std::uint32_t timeline = 0;  ///< StereoFrame::timeline
   std::array<bool, kMaxCameras> camera_present{};
   bool keyframe = false;
   /// Median pixel motion of the tracks since the previous frame; negative when unknown.

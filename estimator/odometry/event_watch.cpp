@@ -20,6 +20,19 @@ void EventBuffer::flush(OdometryOutput& output) {
   lost_ = 0;
 }
 
+void EventBuffer::merge(EventKind kind) {
+  std::size_t first = events_.size();
+  for (std::size_t i = 0; i < events_.size();) {
+    if (events_[i].kind != kind || first == events_.size()) {
+      if (events_[i].kind == kind) first = i;
+      ++i;
+      continue;
+    }
+    events_[first].value += events_[i].value;
+    events_.erase(i);
+  }
+}
+
 void EventWatch::reset() {
   any_ = false;
   initialized_ = false;

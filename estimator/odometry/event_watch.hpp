@@ -17,6 +17,8 @@ class EventBuffer {
   void raise(Stamp stamp, EventKind kind, double value);
   /// Moves the events to `output`.
   void flush(OdometryOutput& output);
+  /// All events of a kind become one at the first one's stamp, with the sum of their values.
+  void merge(EventKind kind);
 
  private:
   FixedVector<Event, 32> events_;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "estimator/odometry/stamp_guard.hpp"
+
 namespace swiftlet {
 namespace {
 
@@ -25,6 +27,7 @@ Duration Pairing::toleranceFor(const CameraFrame& frame) const {
 Status Pairing::giveSingle(const CameraFrame& frame, StereoFrame& paired) {
   paired = StereoFrame{};
   paired.stamp = frame.stamp;
+  paired.timeline = frame.timeline;
   paired.index = next_index_++;
   paired.image[frame.camera] = frame.image;
   paired.number[frame.camera] = frame.number;
@@ -41,6 +44,7 @@ Status Pairing::giveSingle(const CameraFrame& frame, StereoFrame& paired) {
 Status Pairing::givePair(const CameraFrame& a, const CameraFrame& b, StereoFrame& paired) {
   paired = StereoFrame{};
   paired.stamp = a.camera == 0 ? a.stamp : b.stamp;
+  paired.timeline = b.timeline;
   paired.index = next_index_++;
   paired.image[a.camera] = a.image;
   paired.image[b.camera] = b.image;
@@ -60,11 +64,31 @@ Status Pairing::waitOrGive(const CameraFrame& frame, StereoFrame& paired) {
   return {StatusCode::kNotReady, "waits for the other camera's frame"};
 }
 
+void Pairing::restart() {
+  waiting_ = false;
+  any_given_ = false;
+  any_seen_ = {};
+  missing_running_ = {};
+}
+
+/// Only images from when there was no IMU to go by can be so far ahead of it.
+void Pairing::forgetAheadOf(const CameraFrame& frame) {
+  for (std::size_t c = 0; c < kMaxCameras; ++c) {
+    if (any_seen_[c] && isFarAhead(frame.stamp, last_seen_[c])) any_seen_[c] = false;
+  }
+  if (any_given_ && isFarAhead(frame.stamp, last_given_)) any_given_ = false;
+  if (waiting_ && isFarAhead(frame.stamp, pending_.stamp)) {
+    waiting_ = false;
+    ++counters_.refused[pending_.camera];
+  }
+}
+
 Status Pairing::push(const CameraFrame& frame, StereoFrame& paired) {
   const std::size_t camera = frame.camera;
   if (camera >= kMaxCameras) return {StatusCode::kInvalidInput, "camera number beyond kMaxCameras"};
   if (camera >= settings_.cameras) return {StatusCode::kNotReady, "this camera is not used"};
   if (frame.image.empty()) return refuse(camera, "frame without pixels");
+  forgetAheadOf(frame);
   if (any_seen_[camera] && frame.stamp <= last_seen_[camera]) {
     return refuse(camera, "stamp repeated or reversed within one camera");
   }

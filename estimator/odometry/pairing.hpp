@@ -11,7 +11,8 @@
 //  - A camera missing in kLostAfter frames running counts as lost: the other's frames then go out at
 //    once, or with the next message's stamp where one was waiting already. Its first frame that comes
 //    back restores the waiting.
-//  - A frame not later than what went out already is refused: repeated, reversed, or too late.
+//  - A frame not later than what went out already is refused: repeated, reversed, or too late. If it is
+//    earlier by more than kFarAhead (stamp_guard.hpp), what was stamped far ahead is forgotten instead.
 // With `cameras` = 1, camera 0 passes through and the other camera's frames are ignored.
 //
 // Images are borrowed. Between two calls at most one image is held (`holdsImage`): it must stay valid
@@ -57,6 +58,9 @@ class Pairing {
   /// message. kNotReady otherwise.
   Status expire(Stamp now, StereoFrame& paired);
 
+  /// The IMU's stamps went back for good (stamp_guard.hpp): forgets what was before, also a frame that waits.
+  void restart();
+
   /// At the end of the input: gives out the frame that still waits, if any.
   Status flush(StereoFrame& paired);
 
@@ -74,6 +78,7 @@ class Pairing {
   [[nodiscard]] Duration toleranceFor(const CameraFrame& frame) const;
   Status giveSingle(const CameraFrame& frame, StereoFrame& paired);
   Status givePair(const CameraFrame& a, const CameraFrame& b, StereoFrame& paired);
+  void forgetAheadOf(const CameraFrame& frame);
   Status waitOrGive(const CameraFrame& frame, StereoFrame& paired);
 
   PairingSettings settings_;

@@ -15,7 +15,14 @@ Status PropagationStage::step(const ImuSample& sample, NavState* state) {
   return status;
 }
 
+void PropagationStage::restart(std::uint32_t timeline, Stamp /*first*/) {
+  timeline_ = timeline;
+  monitor_.restart();
+  propagator_.reset();
+}
+
 void PropagationStage::take(const StateFix& fix) {
+  if (fix.timeline != timeline_) return;
   if (fix.state.epoch != fix_.state.epoch) propagator_.forgetState();
   fix_ = fix;
   // A state that is not finite never leaves the smoother; a bridged hole is in the covariance.

@@ -25,11 +25,17 @@ class PropagationStage {
   /// reversed). `state` may be null.
   Status step(const ImuSample& sample, NavState* state);
 
+  /// A fix of another time line is ignored.
   void take(const StateFix& fix);
+
+  /// The IMU's stamps went back for good (stamp_guard.hpp): what was before is forgotten; there is no state
+  /// until the first fix of `timeline`.
+  void restart(std::uint32_t timeline, Stamp first);
 
  private:
   SampleMonitor monitor_;
   Propagator propagator_;
+  std::uint32_t timeline_ = 0;
   StateFix fix_;  // the newest; its epoch and health go with every state
 };
 

@@ -59,6 +59,11 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
   trim();  // where the caller left it out
   output.has_state = false;
   output.waiting_for = "";
+  if (tracked.timeline != timeline_) {
+    deliver(output);
+    output.waiting_for = "frame of another time line: dropped";
+    return {StatusCode::kInvalidInput, output.waiting_for};
+  }
   last_stamp_ = tracked.stamp;
   if (tracked.refused_before > 0) {
     events_.raise(tracked.refused_stamp, EventKind::kFrameDropped, tracked.refused_before);
@@ -149,10 +154,28 @@ void SmoothStage::reset() {
   frames_in_epoch_ = 0;
   fix_ = StateFix{};
   fix_.state.epoch = epoch_;
+  fix_.timeline = timeline_;
+}
+
+void SmoothStage::restart(std::uint32_t timeline, Stamp first) {
+  const double back = imu_.empty() ? 0 : (imu_.newest().stamp - first).seconds();
+  timeline_ = timeline;
+  last_stamp_ = first;
+  // One a sample, they would leave no room for what follows.
+  events_.merge(EventKind::kImuInvalid);
+  events_.raise(first, EventKind::kStampsWentBack, back);
+  reset();
+  monitor_.restart();
+  rest_.reset();
+  imu_.clear();
+  smoother_.forgetImu();
+  imu_gap_ = false;
+  gap_end_ = Stamp{};
 }
 
 void SmoothStage::window(SmoothedWindow& out) const {
   out.epoch = epoch_;
+  out.timeline = timeline_;
   out.started = fix_.has_state;
   out.newest = fix_.state;
   out.calibration = {smoother_.timeOffset(), smoother_.extrinsics()};

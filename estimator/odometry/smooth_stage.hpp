@@ -46,7 +46,8 @@ class SmoothStage {
   void take(const PlaneReport& report);
 
   /// kOk without a state while the start waits (`output.waiting_for`). kFailed when the window could not be
-  /// solved: it has been reset by then, with a new epoch.
+  /// solved: it has been reset by then, with a new epoch. kInvalidInput for a frame of another time line than
+  /// the samples': nothing was done with it.
   Status step(const TrackedFrame& tracked, const Effort& effort, OdometryOutput& output);
   /// After every step. Keyframes that leave come with the next output.
   void trim();
@@ -64,6 +65,10 @@ class SmoothStage {
 
   /// Forgets the state and starts again; raises the epoch.
   void reset();
+
+  /// The IMU's stamps went back for good (stamp_guard.hpp), with `first` as the first sample of the new time
+  /// line: as reset(), and the samples are forgotten too, as an event.
+  void restart(std::uint32_t timeline, Stamp first);
 
  private:
   bool start(const TrackedFrame& tracked, OdometryOutput& output);
@@ -92,6 +97,7 @@ class SmoothStage {
   FixedVector<KeyframeState, kMaxStates> left_step_;  // by one step
   bool trim_due_ = false;
   std::uint32_t epoch_ = 0;
+  std::uint32_t timeline_ = 0;
   Stamp last_stamp_;  // of the newest tracked frame
   bool imu_gap_ = false;
   Stamp gap_end_;      // of the last gap in the samples

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "estimator/imu/preintegration.hpp"
+#include "estimator/odometry/stamp_guard.hpp"
 
 namespace swiftlet {
 namespace {
@@ -35,11 +36,30 @@ void TrackStage::addImu(const ImuSample& sample) {
   static_cast<void>(propagator_.step(sample));  // kept, where there is no state yet
 }
 
+void TrackStage::restart(std::uint32_t timeline, Stamp /*first*/) {
+  timeline_ = timeline;
+  monitor_.restart();
+  propagator_.reset();
+  imu_.clear();
+  imu_gap_ = false;
+  window_.started = false;
+  restarted_ = true;
+  forgetTracks();
+}
+
+void TrackStage::forgetTracks() {
+  frontend_.reset();
+  has_frame_ = false;
+}
+
 void TrackStage::take(const SmoothedWindow& window) {
-  if (window.epoch != window_.epoch) {
+  if (window.timeline != timeline_) return;
+  // The new epoch that comes with a new time line has the tracks already.
+  if (window.epoch != window_.epoch && !restarted_) {
     frontend_.reset();
     propagator_.forgetState();
   }
+  restarted_ = false;
   window_ = window;
   if (window_.started) static_cast<void>(propagator_.setState(window_.newest));
 }
@@ -61,10 +81,14 @@ Status TrackStage::step(const StereoFrame& frame, const Effort& effort, TrackedF
 }
 
 Status TrackStage::process(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked) {
+  if (frame.timeline != timeline_) return {StatusCode::kInvalidInput, "frame of another time line: dropped"};
+  // No late frame: those before it, from when there was no IMU to go by, were stamped far ahead.
+  if (has_frame_ && isFarAhead(frame.stamp, last_stamp_)) forgetTracks();
   if (has_frame_ && frame.stamp <= last_stamp_) {
     return {StatusCode::kInvalidInput, "the frame's stamp repeats or goes back: frame dropped"};
   }
   predict(frame.stamp);
+  tracked.timeline = timeline_;
   return frontend_.step(frame, prediction_, std::min(effort.features, max_features_), tracked);
 }
 

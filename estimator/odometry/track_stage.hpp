@@ -30,15 +30,20 @@ class TrackStage {
 
   void addImu(const ImuSample& sample);
 
-  /// Copied; the next frame is predicted from it.
+  /// Copied; the next frame is predicted from it. A window of another time line is ignored.
   void take(const SmoothedWindow& window);
 
-  /// kInvalidInput for a repeated or reversed stamp, a frame without images, an image of the wrong size:
-  /// then `tracked` stays as it was, and the next tracked frame counts it.
+  /// The IMU's stamps went back for good (stamp_guard.hpp): samples, tracks and window are forgotten. The
+  /// calibration stays.
+  void restart(std::uint32_t timeline, Stamp first);
+
+  /// kInvalidInput for a repeated or reversed stamp, a frame of another time line or without images, an image
+  /// of the wrong size: then `tracked` stays as it was, and the next tracked frame counts it.
   Status step(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked);
 
  private:
   Status process(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked);
+  void forgetTracks();
   void predict(Stamp stamp);
   void predictLandmarks(Stamp stamp);
 
@@ -51,7 +56,9 @@ class TrackStage {
   ImuBuffer imu_;
   SmoothedWindow window_;
   FrontendPrediction prediction_;
-  bool imu_gap_ = false;  // since the last tracked frame
+  std::uint32_t timeline_ = 0;
+  bool restarted_ = false;  // no window of this time line was taken yet
+  bool imu_gap_ = false;    // since the last tracked frame
   bool has_frame_ = false;
   Stamp last_stamp_;
   int refused_ = 0;

@@ -81,6 +81,8 @@ class Smoother {
 
   /// One IMU sample, in order of stamps; those before a frame come before it.
   void addImu(const ImuSample& sample) { imu_.push(sample); }
+  /// After reset(): the samples to come have earlier stamps.
+  void forgetImu() { imu_.clear(); }
 
   /// The first state; its frame is the first that `step` gets.
   void start(const StartState& start) {

@@ -37,7 +37,7 @@ std::optional<FrameQueue::Refusal> FrameQueue::takeArrivals(Stamp newest_sample)
     if (held_[0].has_head && held_[1].has_head && held_[1].head().stamp < held_[0].head().stamp) first = 1;
     Held& held = held_[first];
     held.has_head = false;
-    const Status status = pairing_.push(held.head(), paired_);
+    const Status status = pair(held.head());
     if (status.ok()) push(paired_);
     if (status.code == StatusCode::kInvalidInput) {
       const Refusal refusal{status, held.head().stamp};
@@ -60,12 +60,18 @@ bool FrameQueue::takeHead(std::size_t camera) {
   return true;
 }
 
-void FrameQueue::push(const StereoFrame& frame) {
-  if (waiting_.full()) {
-    release(waiting_.front());
-    waiting_.erase(0);
-    ++counters_.dropped;
+Status FrameQueue::pair(const CameraFrame& image) {
+  // Handed over while the other camera's first image of the new time line was on its way.
+  if (image.timeline < timeline_) return {StatusCode::kInvalidInput, "image of a time line that has ended"};
+  if (image.timeline > timeline_) {
+    timeline_ = image.timeline;
+    pairing_.restart();
   }
+  return pairing_.push(image, paired_);
+}
+
+void FrameQueue::push(const StereoFrame& frame) {
+  if (waiting_.full()) drop();
   static_cast<void>(waiting_.tryPushBack(frame));
 }
 
@@ -84,6 +90,11 @@ void FrameQueue::pop() {
   if (told_) return told_.reset();
   release(waiting_.front());
   waiting_.erase(0);
+}
+
+void FrameQueue::drop() {
+  pop();
+  ++counters_.dropped;
 }
 
 bool FrameQueue::flush() {

@@ -2,8 +2,9 @@
 // Where images wait for `track`: borrowed from their slots, paired, the oldest frame first.
 //
 // Policy: of frames that wait (kWaitingFrames) the oldest goes with its images, counted. A frame waits for
-// the samples up to its stamp, not longer than GraphOptions::sample_patience after its arrival. Threads:
-// `track`'s, but awaitedSampleCame, which the IMU's calls.
+// the samples up to its stamp, not longer than GraphOptions::sample_patience after its arrival. Images of a
+// time line that has ended (estimator/odometry/stamp_guard.hpp) are refused. Threads: `track`'s, but
+// awaitedSampleCame, which the IMU's calls.
 
 #include <array>
 #include <atomic>
@@ -50,6 +51,8 @@ class FrameQueue {
   [[nodiscard]] bool awaitsSamples();
   /// Gives the front frame's images back, and those before them.
   void pop();
+  /// The same where nobody took it, counted.
+  void drop();
   /// The input has ended: what waits for a partner comes to the queue alone. False: nothing waited.
   bool flush();
 
@@ -81,6 +84,7 @@ class FrameQueue {
   [[nodiscard]] Stamp newestSample() const;
   std::optional<Refusal> takeArrivals(Stamp newest_sample);
   bool takeHead(std::size_t camera);
+  Status pair(const CameraFrame& image);
   void push(const StereoFrame& frame);
   void release(const StereoFrame& frame);
 
@@ -89,6 +93,7 @@ class FrameQueue {
   Duration sample_patience_;
   Duration sample_period_;
   Pairing pairing_;
+  std::uint32_t timeline_ = 0;  ///< of the newest image that went to pairing
   std::array<Held, kMaxCameras> held_;
   StereoFrame paired_;
   FixedVector<StereoFrame, kWaitingFrames> waiting_;

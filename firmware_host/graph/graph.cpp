@@ -110,7 +110,7 @@ void Graph::connectNodes(const RunLog& log) {
   // all that entered, and what each node took for a step -> recording
   if (record_) {
     RecordNode& record = *record_;
-    sensors.imu.to(record.samples);
+    sensors.imu_as_delivered.to(record.samples);
     for (std::size_t c = 0; c < context_.rig.camera_count; ++c) sensors.imagesTo(c, record.images[c]);
     propagate.steps.to(record.propagate);
     track.steps.to(record.track);

@@ -23,14 +23,15 @@ bool LogNode::turn() {
   any = drain(loops, [this](const LoopReport& report) { log_.onLoop(report); }) || any;
   any = drain(meshes, [this](const MeshResult& result) { log_.onMesh(result); }) || any;
   any = drain(states, [this](const NavState& state) { log_.onImuState(state); }) || any;
-  const auto keep = [this](const ImuSample& sample) { log_.onImu(sample); };
   if (const FrameResult* result = results.front(); result != nullptr) {
-    samples.takeUntil(result->track_step.stamp, keep);
+    // What the smoother had, so that a repetition of the run keeps the same.
+    if (result->kind == TrackMessage::Kind::kFrame) samples.takeUpTo(result->step.samples, log_);
+    if (result->kind == TrackMessage::Kind::kEnd) samples.takeUpTo(SampleIn::kNoLimit, log_);
     log_.onResult(*result);
     results.pop();
     return true;
   }
-  samples.takeSurplus(keep);
+  samples.takeSurplus(log_);
   if (ended && !any && !done()) {
     if (mesh.refresh() > 0) log_.onLocalMesh(mesh.value());
     finish();

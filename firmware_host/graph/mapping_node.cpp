@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "estimator/odometry/stamp_guard.hpp"
 #include "firmware_host/graph/run_listener.hpp"
 #include "firmware_host/pipeline/packed_copy.hpp"
 
@@ -50,6 +51,8 @@ MappingNode::AtHand MappingNode::findFor(const MapMessage& message) {
   if (found == nullptr) return at_hand;
   at_hand.image = &found->image;
   at_hand.number = found->number;
+  // Left from before the stamps went back.
+  scenes.forgetIf([&](const SceneSlot& slot) { return isFarAhead(message.stamp, slot.images.stamp); });
   const SceneSlot* scene =
       scenes.connected() ? scenes.find(message.stamp, [](const SceneSlot& slot) { return slot.images.stamp; })
                          : nullptr;

@@ -28,8 +28,9 @@ namespace swiftlet {
 
 struct ImuArrival {
   ImuSample sample;
-  std::uint64_t number = 0;  ///< from 1
-  Stamp arrival;             ///< on the log's clock
+  std::uint64_t number = 0;    ///< from 1; counts those too that the guard held out
+  std::uint32_t timeline = 0;  ///< of its stamp (estimator/odometry/stamp_guard.hpp)
+  Stamp arrival;               ///< on the log's clock
   HostTimes host;
 };
 

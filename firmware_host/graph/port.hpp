@@ -189,6 +189,11 @@ class SlotIn final : public In {
     }
     return keyOf(*head_) == wanted ? &*head_ : nullptr;
   }
+  /// Lets go of the slot that find has left for later, if `stale(slot)`.
+  template <typename Stale>
+  void forgetIf(Stale&& stale) {
+    if (head_ && stale(*head_)) head_.reset();
+  }
   void clear() { head_.reset(); }
   [[nodiscard]] std::size_t size() const { return ring_.size(); }
 

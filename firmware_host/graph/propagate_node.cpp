@@ -32,6 +32,7 @@ void PropagateNode::takeFix() {
 }
 
 void PropagateNode::propagate(const ImuArrival& arrival, double cpu) {
+  if (samples.begins(arrival)) stage_.restart(arrival.timeline, arrival.sample.stamp);
   const LiveOutlets& outlets = context_.options.outlets;
   const bool wanted = states.connected() || context_.options.supervised;
   const Status status = stage_.step(arrival.sample, wanted ? &state_ : nullptr);
@@ -52,7 +53,6 @@ void PropagateNode::propagate(const ImuArrival& arrival, double cpu) {
 }
 
 void PropagateNode::report(RunStatistics& statistics) const {
-  statistics.imu_samples = samples.taken();
   statistics.imu_refused = refused_;
   for (const auto& row : faults_.rows()) statistics.faults[row.text] += row.count;
 }

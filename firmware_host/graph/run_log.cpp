@@ -30,6 +30,12 @@ void RunLog::onResult(const FrameResult& result) {
   }
 }
 
+void RunLog::restart(std::uint32_t timeline, Stamp /*first*/) {
+  timeline_ = timeline;
+  keeper_->restart();
+  ++statistics_.faults["stamps went back: the map leaves out what was before"];
+}
+
 void RunLog::onLoop(const LoopReport& report) {
   for (const LoopCandidate& candidate : report.candidates) {
     const double ago = (candidate.new_stamp - candidate.old_stamp).seconds();
@@ -78,7 +84,8 @@ void RunLog::noteFrame(const FrameResult& result) {
   noteEffort("track", result, result.track_step.effort, track_effort_);
   noteEffort("smooth", result, result.step.effort, smooth_effort_);
   any_frame_ = true;
-  if (keeper_ && tracked.keyframe && output.has_state) keeper_->addKeyframe(tracked, output.state);
+  const bool kept = tracked.keyframe && output.has_state && tracked.timeline == timeline_;
+  if (keeper_ && kept) keeper_->addKeyframe(tracked, output.state);
   listener_.onFrame(tracked, output);
 }
 

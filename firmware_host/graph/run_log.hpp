@@ -24,7 +24,9 @@ class RunLog {
   void keepForMap(std::unique_ptr<MapKeeper> keeper) { keeper_ = std::move(keeper); }
   [[nodiscard]] bool wantsImu() const { return keeper_ != nullptr; }
 
-  void onImu(const ImuSample& sample) { keeper_->addImu(sample); }
+  void addImu(const ImuSample& sample) { keeper_->addImu(sample); }
+  /// The samples to come are of another time line.
+  void restart(std::uint32_t timeline, Stamp first);
   void onImuState(const NavState& state) { listener_.onImuState(state); }
   void onResult(const FrameResult& result);
   void onMesh(const MeshResult& result) {
@@ -58,6 +60,7 @@ class RunLog {
 
   RunListener& listener_;
   std::unique_ptr<MapKeeper> keeper_;
+  std::uint32_t timeline_ = 0;  ///< of the samples kept
   std::string waiting_for_;
   bool any_frame_ = false;
   Effort track_effort_;

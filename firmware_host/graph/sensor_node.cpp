@@ -9,16 +9,20 @@ namespace swiftlet {
 
 namespace {
 
-void note(SensorNews& news, Stamp stamp, double host_arrival) {
-  if (news.messages > 0 && stamp <= news.newest) ++news.reversed_stamps;
+/// A stamp that was held out says nothing of where the stream is.
+void note(SensorNews& news, Stamp stamp, double host_arrival, bool held_out) {
+  if (!held_out) {
+    if (news.messages > 0 && stamp <= news.newest) ++news.reversed_stamps;
+    news.newest = stamp;
+  }
   ++news.messages;
-  news.newest = stamp;
   news.arrival = Stamp{} + Duration::fromSeconds(host_arrival);
 }
 
 }  // namespace
 
-SensorNode::SensorNode(const GraphContext& context) : Node("sensor", Rank::kSensor), context_(context) {
+SensorNode::SensorNode(const GraphContext& context)
+    : Node("sensor", Rank::kSensor), context_(context), imu_guard_(context.noise.rate_hz) {
   for (std::size_t c = 0; c < context.rig.camera_count; ++c) {
     const CameraModel& model = context.rig.camera[c];
     for (std::size_t i = 0; i < kImageSlots; ++i) {
@@ -45,9 +49,18 @@ void SensorNode::scenesTo(SceneIn& in) {
 }
 
 void SensorNode::takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host) {
-  imu.send({sample, ++counters_.samples, arrival, host});
-  newest_imu_.store(sample.stamp.ns);
-  note(imu_sensed_.news, sample.stamp, host.arrival);
+  const bool held_out = imu_guard_.check(sample.stamp) == StampVerdict::kHeld;
+  const ImuArrival message{sample, ++counters_.samples, imu_guard_.timeline(), arrival, host};
+  imu_as_delivered.send(message);
+  if (held_out) {
+    ++counters_.samples_held_out;
+  } else {
+    imu.send(message);
+    newest_imu_.store(imu_guard_.time().newest.ns);
+    // After the sample: an image of a new time line finds its first sample in the queues.
+    imu_time_.write(imu_guard_.time());
+  }
+  note(imu_sensed_.news, sample.stamp, host.arrival, held_out);
   imu_sensed_.equal = equal_readings_.note(sample);
   imu_news_.write(imu_sensed_);
 }
@@ -73,17 +86,26 @@ void SensorNode::takeImage(const CameraFrame& image, const HostTimes& host, cons
     ++counters_.images_lost[image.camera];
     return;
   }
+  ImuTime imu_time;
+  static_cast<void>(imu_time_.read(imu_time));
+  const bool held_out =
+      camera.guard.check(image.stamp + context_.rig.camera_to_imu_shift, imu_time) == StampVerdict::kHeld;
   ImageSlot& slot = camera.pool.fill(handle);
   slot.frame = image;
+  slot.frame.timeline = imu_time.timeline;
   slot.frame.number = ++counters_.images[image.camera];
   slot.host = host;
   pixels.write(pixels.device, slot.pixels.data());
   slot.frame.image = {slot.pixels.data(), image.image.width, image.image.height, image.image.width};
   if (camera.record != nullptr) camera.record->hand(handle);
-  if (camera.track != nullptr) camera.track->hand(handle);
-  if (camera.mesh != nullptr) camera.mesh->hand(handle);
+  if (held_out) {
+    ++counters_.images_held_out[image.camera];
+  } else {
+    if (camera.track != nullptr) camera.track->hand(handle);
+    if (camera.mesh != nullptr) camera.mesh->hand(handle);
+  }
   camera.pool.finish(handle);
-  note(camera.sensed, image.stamp, host.arrival);
+  note(camera.sensed, image.stamp, host.arrival, held_out);
   camera.news.write(camera.sensed);
 }
 
@@ -135,6 +157,7 @@ void SensorNode::look(FlightFacts& facts) const {
 }
 
 void SensorNode::report(RunStatistics& statistics) const {
+  statistics.imu_samples = counters_.samples;
   for (const std::uint64_t images : counters_.images) statistics.images += images;
 }
 
@@ -142,8 +165,10 @@ void SensorNode::addLosses(std::map<std::string, std::uint64_t>& losses) const {
   const auto note = [&](const std::string& what, std::uint64_t count) {
     if (count > 0) losses[what] += count;
   };
+  note("imu_stamps_held_out", counters_.samples_held_out);
   for (std::size_t c = 0; c < kMaxCameras; ++c) {
     const std::string camera = "camera_" + std::to_string(c);
+    note(camera + "_stamps_held_out", counters_.images_held_out[c]);
     note(camera + "_wrong_size", counters_.images_wrong_size[c]);
     note(camera + "_lost", counters_.images_lost[c]);
   }

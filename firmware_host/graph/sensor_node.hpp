@@ -4,7 +4,9 @@
 // Threads: takeImu from the IMU's, takeImage from each camera's own (one thread may have both), takeScene
 // from
 //   camera 0's, endInput from the last of them. It has no turn: it ends when the input does.
-// An image is copied; one of another size than the calibration's is counted and goes no further.
+// An image is copied; one of another size than the calibration's is counted and goes no further. Messages
+// whose stamps have jumped (estimator/odometry/stamp_guard.hpp) go to the recording alone, counted: there
+// they are decided on again when the run is repeated.
 
 #include <array>
 #include <atomic>
@@ -13,6 +15,7 @@
 #include <memory>
 
 #include "estimator/core/newest_shared.hpp"
+#include "estimator/odometry/stamp_guard.hpp"
 #include "firmware_host/graph/graph_options.hpp"
 #include "firmware_host/graph/images.hpp"
 #include "firmware_host/graph/messages.hpp"
@@ -32,6 +35,7 @@ class SensorNode final : public Node {
   explicit SensorNode(const GraphContext& context);
 
   Out<ImuArrival> imu{*this};
+  Out<ImuArrival> imu_as_delivered{*this};  ///< with those that were held out
   Out<SceneNote> scene_notes{*this};
   void imagesTo(std::size_t camera, ImageIn& in) { lend(camera, in, camera_[camera].track); }
   void imagesTo(std::size_t camera, MeshImageIn& in) { lend(camera, in, camera_[camera].mesh); }
@@ -49,14 +53,18 @@ class SensorNode final : public Node {
 
   /// Any thread: of the newest sample; the earliest stamp of all before the first.
   [[nodiscard]] Stamp newestSample() const { return Stamp{newest_imu_.load()}; }
+  /// The IMU's thread: of the newest sample.
+  [[nodiscard]] std::uint32_t timeline() const { return imu_guard_.timeline(); }
   /// Any thread: what the sensors did of late.
   void look(FlightFacts& facts) const;
 
   /// Once the sensors have ended.
   struct Counters {
-    std::uint64_t samples = 0;
+    std::uint64_t samples = 0;           ///< those held out included; of images likewise
+    std::uint64_t samples_held_out = 0;  ///< stamps far ahead
     std::array<std::uint64_t, kMaxCameras> images{};
-    std::array<std::uint64_t, kMaxCameras> images_lost{};  ///< no slot was free
+    std::array<std::uint64_t, kMaxCameras> images_held_out{};  ///< stamps far from the IMU's
+    std::array<std::uint64_t, kMaxCameras> images_lost{};      ///< no slot was free
     std::array<std::uint64_t, kMaxCameras> images_wrong_size{};
     std::uint64_t labels_wrong_size = 0;
     std::uint64_t depths_wrong_size = 0;
@@ -71,7 +79,9 @@ class SensorNode final : public Node {
     ImageIn* track = nullptr;
     MeshImageIn* mesh = nullptr;
     RecordedImageIn* record = nullptr;
-    SensorNews sensed;  ///< of the camera's thread
+    // Of the camera's thread.
+    ImageGuard guard;
+    SensorNews sensed;
     NewestShared<SensorNews> news;
   };
 
@@ -87,6 +97,8 @@ class SensorNode final : public Node {
   std::array<Camera, kMaxCameras> camera_;
   std::unique_ptr<ScenePool> scenes_;  ///< null without a map
   SceneIn* scene_in_ = nullptr;
+  StampGuard imu_guard_;
+  NewestShared<ImuTime> imu_time_;  ///< for the cameras' threads
   ImuNews imu_sensed_;
   NewestShared<ImuNews> imu_news_;
   EqualReadings equal_readings_;

@@ -17,7 +17,7 @@ bool SmoothNode::turn() {
     tracked.pop();
     return true;
   }
-  samples.takeSurplus([this](const ImuSample& sample) { stage_.addImu(sample); });
+  samples.takeSurplus(stage_);
   if (ended && !done()) end();
   return false;
 }
@@ -47,7 +47,7 @@ void SmoothNode::smoothFrame(const TrackMessage& message, FrameResult& out) {
   out.step.effort = effort_->give();
   out.smooth_level = effort_->level();
   const Spent spent = context_.timed(StageId::kSmooth, [&] {
-    samples.takeUntil(message.tracked.stamp, [this](const ImuSample& sample) { stage_.addImu(sample); });
+    samples.takeUntil(message.tracked.stamp, message.tracked.timeline, stage_);
     out.step.samples = samples.taken();
     out.step.planes = planes.refresh();
     if (out.step.planes != planes_) {

@@ -1,5 +1,6 @@
 #include "firmware_host/graph/track_node.hpp"
 
+#include "estimator/odometry/stamp_guard.hpp"
 #include "firmware_host/graph/run_listener.hpp"
 #include "firmware_host/graph/sensor_node.hpp"
 
@@ -19,8 +20,12 @@ bool TrackNode::turn() {
                    frames.takeArrivals([this](const FrameQueue::Refusal& refusal) { refuse(refusal); });
                  }));
   if (frames.front() == nullptr) {
-    samples.takeSurplus([this](const ImuSample& sample) { stage_.addImu(sample); });
+    samples.takeSurplus(stage_);
     return ended && !done() && flushAndFinish();
+  }
+  if (frames.front()->timeline < samples.timeline()) {  // its samples were given up
+    frames.drop();
+    return true;
   }
   if (!tracked.hasRoom()) return false;
   if (!ended && frames.awaitsSamples()) return false;
@@ -46,7 +51,7 @@ void TrackNode::trackFrame() {
       window_ = step.window;
       stage_.take(window.value());
     }
-    samples.takeUntil(frame.stamp, [this](const ImuSample& sample) { stage_.addImu(sample); });
+    samples.takeUntil(frame.stamp, frame.timeline, stage_);
     step.samples = samples.taken();
     message.status = stage_.step(frame, step.effort, message.tracked);
   });
@@ -85,7 +90,8 @@ bool TrackNode::flushAndFinish() {
 bool TrackNode::wantsMap(const StereoFrame& frame, bool keyframe) {
   bool depth = false, labels = false;
   while (const SceneNote* note = scene_notes.front()) {
-    if (note->stamp > frame.stamp) break;
+    // Those far ahead are left from before the stamps went back.
+    if (note->stamp > frame.stamp && !isFarAhead(frame.stamp, note->stamp)) break;
     if (note->stamp == frame.stamp) {
       depth = note->depth;
       labels = note->labels;
@@ -96,13 +102,14 @@ bool TrackNode::wantsMap(const StereoFrame& frame, bool keyframe) {
   return (keyframe || labels) && frame.has(0) && frame.has(1);
 }
 
-bool TrackNode::takeTracks(const TrackedFrame& frame) {
+bool TrackNode::takeTracks(const TrackedFrame& frame, std::uint32_t timeline) {
   if (!tracked.hasRoom()) return false;
   TrackMessage& message = tracked.draft();
   message = TrackMessage{};
   message.step.frame = frame.index;
   message.step.stamp = frame.stamp;
   message.tracked = frame;
+  message.tracked.timeline = timeline;
   message.host.arrival = message.host.exposure = wallSeconds();
   tracked.send();
   return true;

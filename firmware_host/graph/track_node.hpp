@@ -31,8 +31,9 @@ class TrackNode final : public Node {
   bool turn() override;
   void report(RunStatistics& statistics) const override;
   void addLosses(std::map<std::string, std::uint64_t>& losses) const override;
-  /// In place of images, from the thread of all nodes: the back-end alone. False while there is no room.
-  bool takeTracks(const TrackedFrame& frame);
+  /// In place of images, from the thread of all nodes: the back-end alone. `timeline`: of the IMU's newest
+  /// sample. False while there is no room.
+  bool takeTracks(const TrackedFrame& frame, std::uint32_t timeline);
 
  private:
   void trackFrame();

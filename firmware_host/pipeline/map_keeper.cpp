@@ -69,6 +69,7 @@ void MapKeeper::writeHead(const Rig& rig, const ImuNoise& noise, double pixel_si
   to.bytes(encoded);
   head_crc_ = crc32c(0, {record_.data(), to.written()});
   to.u32(head_crc_);
+  head_bytes_ = static_cast<long>(to.written());
   check(std::fwrite(record_.data(), 1, to.written(), file_.get()) == to.written() &&
         std::fflush(file_.get()) == 0);
 }
@@ -91,6 +92,14 @@ void MapKeeper::writeRecord(Kind kind, std::size_t payload) {
   const bool flush = kind != Kind::kImu;
   check(std::fwrite(record_.data(), 1, size, file_.get()) == size &&
         (!flush || std::fflush(file_.get()) == 0));
+}
+
+void MapKeeper::restart() {
+  monitor_.restart();
+  if (!file_) return;
+  // The first writes out what the buffer holds.
+  check(std::fseek(file_.get(), head_bytes_, SEEK_SET) == 0 &&
+        ::ftruncate(::fileno(file_.get()), head_bytes_) == 0);
 }
 
 void MapKeeper::addImu(const ImuSample& sample) {

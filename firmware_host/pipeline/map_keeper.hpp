@@ -35,6 +35,8 @@ class MapKeeper {
 
   /// Every sample, in order; those that the odometry refuses are left out here too.
   void addImu(const ImuSample& sample);
+  /// The stamps went back for good: what was kept is given up, and the map covers what comes.
+  void restart();
   void addKeyframe(const TrackedFrame& frame, const NavState& state);
   /// After the run: a loop between two of the keyframes.
   void addRevisit(const LoopRevisit& revisit);
@@ -58,6 +60,7 @@ class MapKeeper {
   std::vector<std::uint8_t> record_;
   std::unique_ptr<std::FILE, Close> file_;  ///< null: failed or finished
   std::uint32_t head_crc_ = 0;
+  long head_bytes_ = 0;  // NOLINT(google-runtime-int): as fseek takes it
 };
 
 }  // namespace swiftlet

@@ -53,6 +53,8 @@ std::string_view eventName(EventKind kind) {
       return "reset";
     case EventKind::kCapacityReached:
       return "capacity_reached";
+    case EventKind::kStampsWentBack:
+      return "stamps_went_back";
   }
   return "unknown";
 }

@@ -29,7 +29,7 @@ bool runLockstep(LogFeed& feed, Graph& graph, const RunControl& control) {
       sensors.takeImage(feed.image(), now());
     } else {
       // Nobody is ahead of us: there is room.
-      static_cast<void>(graph.track().takeTracks(feed.tracks()));
+      static_cast<void>(graph.track().takeTracks(feed.tracks(), sensors.timeline()));
     }
     runAll(graph);
     if (control.progress && feed.taken() != told) control.progress(told = feed.taken());

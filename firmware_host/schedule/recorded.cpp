@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 #include <set>
+#include <vector>
 
 namespace swiftlet {
 namespace {
@@ -70,16 +72,23 @@ class Repeat {
     }
     const RecordedImu& imu = recording_.imu(fed_++);
     const double now = wallSeconds();
-    graph_.sensors().takeImu(imu.sample, imu.arrival, {now, now});
+    SensorNode& sensors = graph_.sensors();
+    sensors.takeImu(imu.sample, imu.arrival, {now, now});
+    if (timeline_starts_.size() < sensors.timeline()) timeline_starts_.push_back(fed_);
     return true;
   }
-  /// Feeds until the reader can make the total. False: not yet.
-  bool bring(SampleIn& samples, std::uint64_t total) {
-    while (!samples.has(total)) {
+  /// Feeds until the reader can take the samples up to this number. False: not yet.
+  bool bring(SampleIn& samples, std::uint64_t number) {
+    while (fed_ < number) {
       if (!feed()) return false;
     }
-    samples.limit(total);
+    samples.limit(number);
     return true;
+  }
+  /// Of a frame whose newest sample has this number.
+  [[nodiscard]] std::uint32_t timelineAt(std::uint64_t number) const {
+    const auto after = std::upper_bound(timeline_starts_.begin(), timeline_starts_.end(), number);
+    return static_cast<std::uint32_t>(after - timeline_starts_.begin());
   }
 
   [[nodiscard]] bool image(std::size_t camera, std::uint64_t number, CameraFrame& out) {
@@ -127,6 +136,7 @@ class Repeat {
     frame.stamp = step.stamp;
     frame.index = step.frame;
     frame.number = step.image;
+    frame.timeline = timelineAt(step.samples);
     if (!images(step.image, frame.image)) return false;
     node.frames.tell(frame);
     node.copies.tell(mapped_.contains(step.frame));
@@ -147,10 +157,6 @@ class Repeat {
       return stop(fmt::format("the smoother's step for frame {} is missing", message->tracked.index));
     }
     if (!bring(node.samples, step.samples) || !node.planes.expect(step.planes)) return false;
-    // The log keeps samples up to the frame's stamp.
-    while (fed_ < recording_.imuCount() && recording_.imu(fed_).sample.stamp <= message->tracked.stamp &&
-           feed()) {
-    }
     efforts_.smooth.tell(step.effort);
     node.turn();
     ++smooth_;
@@ -258,6 +264,8 @@ class Repeat {
   Graph& graph_;
   RecordedEfforts& efforts_;
   std::size_t fed_ = 0;  ///< samples
+  /// Number of the first sample of each time line after the first.
+  std::vector<std::uint64_t> timeline_starts_;
   // Steps taken.
   std::size_t propagate_ = 0, track_ = 0, smooth_ = 0, mesh_ = 0, loop_ = 0, map_ = 0;
   std::set<std::uint64_t> mapped_;  ///< frames that the map took
