@@ -1,7 +1,9 @@
 #!/bin/sh
 # Everything that can be checked, on a fresh Debian 12 too: the demo, all tests, the accuracy table
 # of every log found, tests under sanitizers, the threads under ThreadSanitizer, a short run of each fuzzer.
-# usage: toolchain/test.sh [--quick]   --quick leaves sanitizers and fuzzers out
+# usage: toolchain/test.sh [--quick | --minutes N]
+#   --quick      leaves sanitizers and fuzzers out
+#   --minutes N  begins no sanitizer's step later than N minutes after the start; what is left out is listed at the end
 # The release build has ROS 2's topics (SWIFTLET_WITH_DDS, off by default) where Cyclone DDS is installed.
 # SWIFTLET_DATA names the folder of recorded logs (default ../shared/data); without logs the tests
 # that need them say so and skip. Ends with a table of steps and a count of tests; exit code 0 when
@@ -10,11 +12,13 @@ set -u
 cd "$(dirname "$0")/.." || exit 2
 
 quick=no
+minutes=''
 case ${1:-} in
   '') ;;
   --quick) quick=yes ;;
+  --minutes) minutes=${2:?how many} ;;
   *)
-    sed -n '2,8s/^# \{0,1\}//p' "$0"
+    sed -n '2,10s/^# \{0,1\}//p' "$0"
     exit 2
     ;;
 esac
@@ -23,11 +27,14 @@ fuzz_seconds=15 # each fuzzer
 # Unit tests that run under sanitizers too; the statistical ones (imu, ransac, whole flights, rendering, the program)
 # repeat the same code thousands of times and would take most of an hour there.
 sanitized='autopilot core geometry camera frontend smoother drivers_calibration drivers_recorded drivers_recording drivers_image_decoder
-drivers_can drivers_device drivers_gpio drivers_mavlink drivers_serial drivers_v4l2 fault_timeline live map mesher threaded view'
+drivers_can drivers_device drivers_gpio drivers_mavlink drivers_serial drivers_v4l2 fault_timeline follower live map mesher run_files
+supervisor threaded view'
 # What shares memory between threads, the threads of devices, autopilot and viewers, and the whole executor on a second
 # of a log.
-threads='autopilot core realtime live threaded late_labels view'
+threads='added_node autopilot core follower late_labels live realtime supervisor threaded view'
 jobs=$(nproc)
+began=$(date +%s)
+left_out=''
 steps='' # lines "seconds result step"
 failed_steps=0
 passed=0
@@ -88,6 +95,12 @@ counted() { # command...: one more test
   fi
 }
 
+in_time() { # name of what begins now
+  if [ -z "$minutes" ] || [ $(($(date +%s) - began)) -lt $((60 * minutes)) ]; then return 0; fi
+  left_out="$left_out$1; "
+  return 1
+}
+
 cases() { # Catch2's own counts in ctest's log of the release build
   log=build/release/Testing/Temporary/LastTest.log
   [ -f $log ] || return 0
@@ -101,6 +114,7 @@ close() {
   cases
   skipped=$(sed -nE 's/^[[:space:]]*[0-9]+ - (.*) \(Skipped\).*$/\1/p' build/ctest_release.log 2>/dev/null | tr '\n' ' ')
   if [ -n "$skipped" ]; then echo "skipped, for want of a kernel (docs/kernel_sandbox.md): $skipped"; fi
+  if [ -n "$left_out" ]; then echo "NOT RUN, out of time (toolchain/test.sh runs them): $left_out"; fi
   all=$((passed + failed))
   percent=0
   if [ $all -gt 0 ]; then percent=$((100 * passed / all)); fi
@@ -119,18 +133,21 @@ step "configure release" configure release -DSWIFTLET_BUILD_TESTS=ON -DSWIFTLET_
 step "build release with tests" build release || close
 step "layout of the sources" counted toolchain/lint.sh format
 # The accuracy table is run by itself, so that it is printed when it passes too.
-step "tests" run_ctest release -E '^accuracy_table$'
+# Every fault of every thread takes minutes (label long): ctest -L long.
+step "tests" run_ctest release -E '^accuracy_table$' -LE long
 step "accuracy of all logs found" counted build/release/tests/logs/accuracy_table
 
 if [ $quick = no ]; then
   # shellcheck disable=SC2086 # a list of targets
-  step "configure with sanitizers" configure asan -DSWIFTLET_BUILD_TESTS=ON &&
+  in_time "tests with address and undefined sanitizers, fuzzers" &&
+    step "configure with sanitizers" configure asan -DSWIFTLET_BUILD_TESTS=ON &&
     step "build with sanitizers" build asan --target fuzzers $(echo $sanitized | sed 's/\([^ ]*\)/test_\1/g') && {
       step "tests with sanitizers" run_ctest asan -R "^($(echo $sanitized | tr ' ' '|'))\$"
       step "fuzzers" counted toolchain/fuzz.sh $fuzz_seconds
     }
   # shellcheck disable=SC2086 # a list of targets
-  step "configure for data races" configure tsan -DSWIFTLET_BUILD_TESTS=ON &&
+  in_time "threads with the thread sanitizer" &&
+    step "configure for data races" configure tsan -DSWIFTLET_BUILD_TESTS=ON &&
     step "build for data races" build tsan --target $(echo $threads | sed 's/\([^ ]*\)/test_\1/g') &&
     step "threads without data races" run_ctest tsan -R "^($(echo $threads | tr ' ' '|'))\$"
 fi

@@ -97,7 +97,6 @@ FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const 
   Supervisor& supervisor = flight->supervisor;
   wanted.track_effort = &flight->governors.track;
   wanted.smooth_effort = &flight->governors.smooth;
-  wanted.supervised = true;
   flight->consumers = std::make_unique<LiveConsumers>(calibration, settings, request);
   LiveConsumers& consumers = *flight->consumers;
   wanted.outlets = consumers.outlets();

@@ -68,7 +68,7 @@ int replay(const ReplayOptions& options) {
     return kExitFailed;
   }
   if (!result.lost.empty()) {
-    fmt::print(stderr, "error: {}; the run folder is not complete\n", result.lost);
+    warn(fmt::format("error: {}; the run folder is not complete\n", result.lost));
     return kExitFailed;
   }
   if (!result.has_pose) {

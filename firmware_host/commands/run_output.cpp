@@ -5,6 +5,7 @@
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/commands/smooth_run.hpp"
 #include "firmware_host/places/vocabulary_file.hpp"
+#include "firmware_host/realtime/console.hpp"
 #include "firmware_host/report/loops_csv.hpp"
 #include "firmware_host/report/whole_file.hpp"
 #include "firmware_host/settings/read_settings.hpp"
@@ -91,7 +92,7 @@ void RunOutput::smooth(const std::atomic<bool>* stop, bool announce) {
     for (const auto& row : found.faults.rows()) statistics.faults[row.text] += row.count;
     if (found.poses.empty()) {
       ++statistics.faults[found.problem];
-      if (announce) fmt::print(stderr, "warning: not smoothed: {}\n", found.problem);
+      if (announce) warn(fmt::format("warning: not smoothed: {}\n", found.problem));
       return;
     }
     statistics.map = found.report;

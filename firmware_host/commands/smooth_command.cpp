@@ -5,6 +5,7 @@
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/smooth_run.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
+#include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {
 namespace {
@@ -20,18 +21,18 @@ int smooth(const SmoothOptions& options) {
   request.announce = true;
   const FullSmoothing found = runSmooth(request, options.settings.read());
   if (!found.cut.empty()) {
-    fmt::print(stderr, "warning: {}/keyframes.swk: {}; what came before is smoothed\n", request.run,
-               found.cut);
+    warn(
+        fmt::format("warning: {}/keyframes.swk: {}; what came before is smoothed\n", request.run, found.cut));
   }
-  for (const auto& row : found.faults.rows()) fmt::print(stderr, "warning: {} ({})\n", row.text, row.count);
+  for (const auto& row : found.faults.rows()) warn(fmt::format("warning: {} ({})\n", row.text, row.count));
   if (found.poses.empty()) {
-    fmt::print(stderr, "error: {}: {}; the folder is as it was\n", request.run, found.problem);
+    warn(fmt::format("error: {}: {}; the folder is as it was\n", request.run, found.problem));
     return kExitFailed;
   }
-  fmt::print("{} keyframes, {} landmarks, {} of {} loops used, {} iterations in {:.1f} s\n",
-             found.report.keyframes, found.report.landmarks, found.report.revisits_used,
-             found.report.revisits, found.report.iterations, found.spent.wall);
-  fmt::print("written to {}/map.tum\n", request.run);
+  say(fmt::format("{} keyframes, {} landmarks, {} of {} loops used, {} iterations in {:.1f} s\n",
+                  found.report.keyframes, found.report.landmarks, found.report.revisits_used,
+                  found.report.revisits, found.report.iterations, found.spent.wall));
+  say(fmt::format("written to {}/map.tum\n", request.run));
   return kExitDone;
 }
 

@@ -9,6 +9,7 @@
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
 #include "firmware_host/pipeline/map_keeper.hpp"
+#include "firmware_host/realtime/console.hpp"
 #include "firmware_host/report/summary.hpp"
 #include "firmware_host/report/whole_file.hpp"
 
@@ -46,8 +47,8 @@ FullSmoothingOptions smoothingOptions(const Settings& settings, bool announce) {
   options.most_bytes = static_cast<std::size_t>(settings.full_memory_mib) * kMebibyte;
   if (announce) {
     options.begins = [](std::size_t keyframes, std::size_t bytes) {
-      fmt::print(stderr, "smoothing {} keyframes, in up to {} MiB of memory\n", keyframes,
-                 bytes / kMebibyte + 1);
+      warn(fmt::format("smoothing {} keyframes, in up to {} MiB of memory\n", keyframes,
+                       bytes / kMebibyte + 1));
     };
   }
   return options;

@@ -40,7 +40,7 @@ class Run : private RunListener {
     runAll(graph_);
   }
   void take(const TrackedFrame& tracked) {
-    static_cast<void>(graph_.track().takeTracks(tracked));
+    static_cast<void>(graph_.track().takeTracks(tracked, graph_.sensors().timeline()));
     runAll(graph_);
   }
   /// Once; the stages' times.

@@ -142,8 +142,14 @@ void Graph::report(RunLog& log) const {
 void Graph::look(FlightFacts& facts) const {
   sensors_->look(facts);
   const SmoothedFrameNews frame = smooth_->newestFrame();
-  facts.estimate = {propagate_->stateCount(), propagate_->health(), frame.count, frame.stamp,
-                    frame.has_state,          frame.health,         frame.epoch, frame.track_level,
+  facts.estimate = {propagate_->stateCount(),
+                    propagate_->askHealth(),
+                    frame.count,
+                    frame.stamp,
+                    frame.has_state,
+                    frame.health,
+                    frame.epoch,
+                    frame.track_level,
                     frame.smooth_level};
   if (!record_) return;
   facts.recorder_running = record_->recorder().running();

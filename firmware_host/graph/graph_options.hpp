@@ -32,8 +32,7 @@ struct GraphOptions {
   /// For which `track` waits, after a frame's arrival, for the samples up to its stamp, on the host's
   /// clock; 0: never, for then whoever feeds the graph hands them over first.
   Duration sample_patience{0};
-  bool supervised = false;  ///< somebody asks for states without getting them
-  LiveOutlets outlets;      ///< each gets the newest of everything; they outlive the graph
+  LiveOutlets outlets;  ///< each gets the newest of everything; they outlive the graph
   /// Over which labels come after their image; the map holds frames for them. Null: it does not wait.
   LabelExchange* labels = nullptr;
   /// Called by `log` each time: what the input has to say of itself, to the log. True: there was something.

@@ -22,8 +22,8 @@ class KeyframeCopies {
   void to(MapImagesIn& in, const std::array<std::size_t, kMaxCameras>& pixels) { lend(in, map_, pixels); }
   /// Whether the map gets them; where nobody is connected, nothing happens.
   bool send(const StereoFrame& frame, bool to_loop, bool to_map);
-  /// Recorded schedule: images are at hand wherever they are asked for, so none is copied; whether the map gets
-  /// those of the next frame.
+  /// Recorded schedule: images are at hand wherever they are asked for, so none is copied; whether the map
+  /// gets those of the next frame.
   void tell(bool mapped) { told_ = mapped; }
 
  private:

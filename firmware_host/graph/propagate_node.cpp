@@ -34,12 +34,14 @@ void PropagateNode::takeFix() {
 void PropagateNode::propagate(const ImuArrival& arrival, double cpu) {
   if (samples.begins(arrival)) stage_.restart(arrival.timeline, arrival.sample.stamp);
   const LiveOutlets& outlets = context_.options.outlets;
-  const bool wanted = states.connected() || context_.options.supervised;
+  const bool asked = health_wanted_.load(std::memory_order_relaxed);
+  const bool wanted = states.connected() || !outlets.empty() || asked;
   const Status status = stage_.step(arrival.sample, wanted ? &state_ : nullptr);
+  if (status.ok()) states_given_.add();
   if (status.ok() && wanted) {
     states.send(state_);
-    states_given_.add();
     health_.store(state_.health, std::memory_order_relaxed);
+    if (asked) health_wanted_.store(false, std::memory_order_relaxed);
     if (!outlets.empty()) {
       const StateNews news(state_, arrival.sample.gyro - state_.bias_gyro);
       for (LiveOutlet* outlet : outlets) outlet->state.write(news);

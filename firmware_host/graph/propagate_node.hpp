@@ -25,9 +25,14 @@ class PropagateNode final : public Node {
   Out<PropagateStep> steps{*this};
 
   bool turn() override;
-  /// Any thread: states so far, and the newest one's health.
+  /// Any thread: states so far.
   [[nodiscard]] std::uint64_t stateCount() const { return states_given_.value(); }
-  [[nodiscard]] Health health() const { return health_.load(std::memory_order_relaxed); }
+  /// One thread: the health of the newest state when this was last called, or of a later one. Where nobody
+  /// gets the states, this has the next one made.
+  [[nodiscard]] Health askHealth() {
+    health_wanted_.store(true, std::memory_order_relaxed);
+    return health_.load(std::memory_order_relaxed);
+  }
   void report(RunStatistics& statistics) const override;
 
  private:
@@ -40,6 +45,7 @@ class PropagateNode final : public Node {
   std::uint64_t fix_ = 0;
   EventCount states_given_;
   std::atomic<Health> health_{Health::kInitializing};
+  std::atomic<bool> health_wanted_{false};
   std::uint64_t refused_ = 0;
   FaultCounts faults_;
 };

@@ -1,9 +1,8 @@
 #pragma once
 // Where sensors' messages enter the graph: samples to queues, images, depth and labels into slots.
 //
-// Threads: takeImu from the IMU's, takeImage from each camera's own (one thread may have both), takeScene
-// from
-//   camera 0's, endInput from the last of them. It has no turn: it ends when the input does.
+// Threads: takeImu from the IMU's, takeImage from each camera's own (one thread may have both),
+//   takeScene from camera 0's, endInput from the last of them. It has no turn: it ends when the input does.
 // An image is copied; one of another size than the calibration's is counted and goes no further. Messages
 // whose stamps have jumped (estimator/odometry/stamp_guard.hpp) go to the recording alone, counted: there
 // they are decided on again when the run is repeated.

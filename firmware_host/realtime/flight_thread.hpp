@@ -10,8 +10,8 @@
 //   thread begins: every page is resident then, and after the thread's end the deepest use can be read.
 // Exceptions: what escapes from `entry` ends the thread and is kept as text (fault()); nothing crosses.
 // Sleeps are exact: the thread's timer slack is 1 ns (SCHED_OTHER would have 50 us).
-// Stuck: joinWithin() waits for a bounded time, and abandon() leaves the thread to itself: its stack and entry
-//   stay for good. What the entry refers to has to stay as well; that is the owner's matter.
+// Stuck: joinWithin() waits for a bounded time, and abandon() leaves the thread to itself. Its stack and
+//   entry stay for good. What the entry refers to has to stay as well; that is the owner's matter.
 
 #include <pthread.h>
 #include <sys/types.h>

@@ -14,6 +14,7 @@ constexpr double kOldestFrame = 1;  // s
 void ArmingWatch::measureRate(const SensorNews& imu, std::uint64_t reversed, ArmingFacts& facts) {
   if (imu.messages == 0) return;  // no stamp to begin from
   const Mark now{imu.newest, imu.messages, reversed};
+  if (newer_ && now.stamp < newer_->stamp) newer_.reset();  // stamps went back for good: measured anew
   if (!newer_ || now.stamp - newer_->stamp > kLookBack) {
     older_ = newer_ ? newer_ : now;
     newer_ = now;

@@ -20,8 +20,8 @@
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/evaluation/association.hpp"
 #include "firmware_host/evaluation/consistency.hpp"
-#include "firmware_host/schedule/lockstep.hpp"
 #include "firmware_host/graph/run_listener.hpp"
+#include "firmware_host/schedule/lockstep.hpp"
 #include "tests/support/statistics.hpp"
 
 namespace swiftlet {

@@ -59,7 +59,8 @@ struct Scene {
     if (fault == Fault::kThrows) throw std::runtime_error("made to fail");
     if (fault == Fault::kReturns) return false;
     const double seconds = fault == Fault::kStalls ? 2 : 60;
-    while (!released && (monotonicNow() - Stamp{now}).seconds() < seconds) sleepFor(Duration::fromMilliseconds(10));
+    while (!released && (monotonicNow() - Stamp{now}).seconds() < seconds)
+      sleepFor(Duration::fromMilliseconds(10));
     return true;
   }
 

@@ -92,6 +92,7 @@ struct SimulatedFlight {
   std::vector<std::string_view> stalled;
   bool imu_silent = false, trigger_silent = false, no_states = false, no_frames = false;
   std::array<bool, kMaxCameras> camera_silent{};
+  Duration stamp_shift;  ///< of all sensors' stamps
 
  private:
   static constexpr Duration kTurn = Duration::fromMilliseconds(5);
@@ -100,7 +101,7 @@ struct SimulatedFlight {
   void turn() {
     now = now + kTurn;
     ++turns;
-    const Stamp stamp = stamps_on_host ? now : Stamp{kLogEpoch} + (now - start);
+    const Stamp stamp = (stamps_on_host ? now : Stamp{kLogEpoch} + (now - start)) + stamp_shift;
     for (std::size_t i = 0; i < hearts.size(); ++i) {
       if (std::find(stalled.begin(), stalled.end(), std::string_view(kMembers[i])) == stalled.end()) {
         hearts[i]->beat(now);

@@ -55,6 +55,15 @@ TEST_CASE("readiness ends with the health of a frame that is not confirmed", "[a
   CHECK(flight.verdict.arming.lacks(ArmingCondition::kInitialized));
 }
 
+TEST_CASE("stamps that went back for good do not keep the vehicle on the ground", "[arming]") {
+  SimulatedFlight flight;
+  flight.pass(8.0);
+  REQUIRE(flight.verdict.arming.ready());
+  flight.stamp_shift = Duration::fromSeconds(-3600);
+  flight.pass(4.0);
+  CHECK(flight.verdict.arming.ready());
+}
+
 TEST_CASE("a new epoch takes readiness away for its time", "[arming]") {
   SimulatedFlight flight;
   flight.pass(8.0);
