@@ -21,7 +21,7 @@ namespace {
 constexpr std::array<std::string_view, 4> kSensorThreads = {"imu", "camera0", "camera1", "trigger"};
 /// Nor do these wait for anybody but the one before them.
 constexpr std::array<std::string_view, 4> kStageThreads = {"propagate", "track", "smooth", "mesh"};
-/// Followers with a real-time priority that are held to what sensors are.
+/// Followers with a real-time priority: as sensors, but for faults, since they begin before memory is locked.
 constexpr std::array<std::string_view, 1> kFollowersHeld = {"autopilot"};
 // All others run below the flight path (loop, map, log, record, dds with its library, view, decoders): their
 // counts are printed and not judged.
@@ -33,12 +33,13 @@ bool isIn(const List& list, std::string_view name) {
 
 bool keepsTheRules(const TrappedThread& thread) {
   const bool stage = isIn(kStageThreads, thread.name);
-  if (!stage && !isIn(kSensorThreads, thread.name) && !isIn(kFollowersHeld, thread.name)) return true;
+  const bool follower = isIn(kFollowersHeld, thread.name);
+  if (!stage && !follower && !isIn(kSensorThreads, thread.name)) return true;
   const char* reopens = std::getenv("SWIFTLET_TRAP_REOPENS");
   const bool maps = reopens != nullptr && thread.name == reopens;
   const TrapCounts& counts = thread.counts;
   return counts.heap == 0 && counts.locks == 0 && (!stage || counts.waits == 0) &&
-         (maps || counts.minor_faults + counts.major_faults == 0);
+         (maps || follower || counts.minor_faults + counts.major_faults == 0);
 }
 
 int run(int argc, char** argv) {
