@@ -108,6 +108,7 @@ class FlightRun {
     flight.host_stamps = true;
     flight.service = true;
     flight.record = request_.record;
+    flight.trigger = input_.trigger() != nullptr;
     flight.name = "flight";
     flight.view = request_.view;
     flight.file_problem = [this] { return lost_.problem(); };

@@ -65,7 +65,7 @@ FlightGround groundOf(const std::vector<ThreadReport>& threads, const Calibratio
   ground.speed = request.speed;
   ground.host_stamps = request.host_stamps;
   ground.cameras = static_cast<int>(settings.odometry.use_stereo ? calibration.rig.camera_count : 1);
-  ground.trigger = request.host_stamps && !settings.trigger.chip.empty();
+  ground.trigger = request.trigger;
   return ground;
 }
 

@@ -21,6 +21,7 @@ struct FlightRequest {
   /// From a log's stamps to CLOCK_MONOTONIC; gives none while that is not known. Any thread.
   std::function<std::optional<Duration>()> to_host;
   bool announce = false;            ///< print the table of what was reserved, and what is missing
+  bool trigger = false;             ///< a line of its own tells of edges (SensorInput::look)
   bool record = false;              ///< the flight is to be recorded
   bool service = false;             ///< tell systemd, where it asks to be told
   std::string name;                 ///< what is flown, for those who look on

@@ -16,14 +16,6 @@ std::int64_t heapBytes() {
   return static_cast<std::int64_t>(info.uordblks + info.hblkhd);
 }
 
-std::array<std::size_t, kMaxCameras> pixelsOf(const Rig& rig) {
-  std::array<std::size_t, kMaxCameras> pixels{};
-  for (std::size_t c = 0; c < rig.camera_count; ++c) {
-    pixels[c] = static_cast<std::size_t>(rig.camera[c].width() * rig.camera[c].height());
-  }
-  return pixels;
-}
-
 }  // namespace
 
 template <typename T, typename... Arguments>

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "estimator/camera/rig.hpp"
 #include "estimator/core/limits.hpp"
 #include "estimator/core/slot_pool.hpp"
 #include "estimator/messages/frames.hpp"
@@ -59,6 +60,15 @@ struct SceneSlot {
   std::vector<std::uint8_t> labels;
 };
 using ScenePool = SlotPool<SceneSlot, 1 + kMapQuota, 1>;
+
+/// Of each camera's image; 0 for one that is not in use.
+inline std::array<std::size_t, kMaxCameras> pixelsOf(const Rig& rig) {
+  std::array<std::size_t, kMaxCameras> pixels{};
+  for (std::size_t c = 0; c < rig.camera_count; ++c) {
+    pixels[c] = static_cast<std::size_t>(rig.camera[c].width() * rig.camera[c].height());
+  }
+  return pixels;
+}
 
 using ImageIn = SlotIn<ImagePool, kTrackReads, kImageRing>;      ///< of `track`
 using MeshImageIn = SlotIn<ImagePool, kMeshReads, kMeshImages>;  ///< of `mesh`

@@ -7,18 +7,6 @@
 #include "firmware_host/pipeline/packed_copy.hpp"
 
 namespace swiftlet {
-namespace {
-
-std::array<std::size_t, kMaxCameras> pixelsOf(const Rig& rig) {
-  std::array<std::size_t, kMaxCameras> pixels{};
-  for (std::size_t c = 0; c < rig.camera_count; ++c) {
-    pixels[c] = static_cast<std::size_t>(rig.camera[c].width() * rig.camera[c].height());
-  }
-  return pixels;
-}
-
-}  // namespace
-
 MappingNode::MappingNode(GraphContext& context)
     : Node("map", Rank::kLow),
       context_(context),

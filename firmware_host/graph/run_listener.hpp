@@ -43,7 +43,7 @@ class RunListener {
   virtual void onMap(MapStage& /*map*/, std::span<const std::uint32_t> /*tied*/) {}
   /// At the end: keyframes and events that had not come out yet.
   virtual void onFinish(const OdometryOutput& output) = 0;
-  /// A remark of the executor, for events.log.
+  /// A remark of the schedule or the supervisor, for events.log.
   virtual void onRemark(Stamp stamp, const std::string& text) = 0;
 };
 

@@ -35,7 +35,7 @@ class RunLog {
   }
   void onLoop(const LoopReport& report);
   void onLocalMesh(const LocalMesh& mesh) { listener_.onLocalMesh(mesh); }
-  /// An executor's own remark, for events.log.
+  /// A remark of the schedule or the supervisor, for events.log.
   void remark(Stamp stamp, const std::string& text) { listener_.onRemark(stamp, text); }
 
   /// After the run: the map that was made.

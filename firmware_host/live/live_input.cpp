@@ -143,6 +143,12 @@ std::vector<SensorInput::Thread> LiveInput::threads(SensorSink& sink, const RunC
   return threads;
 }
 
+void LiveInput::look(FlightFacts& facts) const {
+  if (!trigger_) return;
+  const TriggerStatus status = trigger_->status();
+  facts.trigger = {status.edges, 0, status.heard, status.heard};
+}
+
 std::uint64_t LiveInput::taken() const {
   std::uint64_t images = 0;
   for (const auto& camera : cameras_) images += camera->taken();

@@ -38,6 +38,8 @@ class LiveInput : public SensorInput {
   Opened open();
 
   std::vector<Thread> threads(SensorSink& sink, const RunControl& control) override;
+  /// The trigger's edges.
+  void look(FlightFacts& facts) const override;
   [[nodiscard]] std::uint64_t taken() const override;
 
   /// Of one thread: what happened to devices since, as lines for the user. True: there was something.
