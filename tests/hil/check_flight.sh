@@ -56,6 +56,8 @@ case $what in
     case " $* " in
       *' hangup '*) grep 'terminal closed (SIGHUP)' "$out/flight/flight/events.log" || exit 1 ;;
     esac
+    # The supervisor gives sensors 10 s for their first message.
+    if grep 'since the start' "$out/flight/flight/events.log"; then exit 1; fi
     "$program" evaluate "$out/flight/flight" --hil "$out/flight/hil" || exit 1
     "$program" replay "$log" --out "$out/plain" --set mesh.enabled=false >"$out/plain.txt" 2>&1 || {
       cat "$out/plain.txt"
