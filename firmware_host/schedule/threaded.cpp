@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <memory>
-#include <ranges>
+#include <span>
 
 #include "drivers/device/monotonic_now.hpp"
 #include "firmware_host/pipeline/host_sleep.hpp"
@@ -50,9 +50,11 @@ class Run : public SensorSink {
     sensors_ = input_.threads(*this, to_sensors_);
     tellMembers();
     // From the end of the stream to its beginning: whoever starts finds its readers running.
-    for (Node* node : std::views::reverse(graph_.nodes())) {
-      if (!start(
-              node->name(), placeOf(node->rank(), options_.realtime), [this, node] { step(*node); }, node)) {
+    const std::span<Node* const> nodes = graph_.nodes();
+    for (auto last = nodes.rbegin(); last != nodes.rend(); ++last) {
+      Node* const node = *last;
+      const Place place = placeOf(node->rank(), options_.realtime);
+      if (!start(node->name(), place, [this, node] { step(*node); }, node)) {
         node->heart().fail("the thread could not be started");
         node->abandon();
       }
