@@ -11,13 +11,13 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/device/monotonic_now.hpp"
+#include "estimator/messages/names.hpp"
 #include "firmware_host/autopilot/autopilot_port.hpp"
 #include "firmware_host/autopilot/obstacle_message.hpp"
 #include "firmware_host/live/device_journal.hpp"
 #include "firmware_host/pipeline/follower_thread.hpp"
 #include "firmware_host/pipeline/host_sleep.hpp"
 #include "firmware_host/pipeline/latency_histogram.hpp"
-#include "firmware_host/report/names.hpp"
 
 namespace swiftlet {
 namespace {

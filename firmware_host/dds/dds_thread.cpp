@@ -10,12 +10,12 @@
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/dds/dds_link.hpp"
 #include "drivers/device/monotonic_now.hpp"
+#include "estimator/messages/names.hpp"
 #include "firmware_host/dds/ros_clock.hpp"
 #include "firmware_host/export/ros_state.hpp"
 #include "firmware_host/pipeline/follower_thread.hpp"
 #include "firmware_host/realtime/console.hpp"
 #include "firmware_host/report/map_files.hpp"
-#include "firmware_host/report/names.hpp"
 
 namespace swiftlet {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <limits>
 
+#include "estimator/messages/names.hpp"
 #include "firmware_host/report/map_files.hpp"
-#include "firmware_host/report/names.hpp"
 
 namespace swiftlet {
 namespace {

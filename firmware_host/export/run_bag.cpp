@@ -9,8 +9,8 @@
 #include <functional>
 
 #include "drivers/calibration/input_error.hpp"
+#include "estimator/messages/names.hpp"
 #include "firmware_host/export/bag_messages.hpp"
-#include "firmware_host/report/names.hpp"
 #include "firmware_host/report/ply_file.hpp"
 #include "firmware_host/report/whole_file.hpp"
 

@@ -9,9 +9,9 @@
 #include <span>
 #include <string_view>
 
+#include "estimator/messages/names.hpp"
 #include "firmware_host/budget/xml_text.hpp"
 #include "firmware_host/evaluation/association.hpp"
-#include "firmware_host/report/names.hpp"
 
 namespace swiftlet {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/parse_number.hpp"
+#include "estimator/messages/names.hpp"
 #include "firmware_host/report/events_log.hpp"
-#include "firmware_host/report/names.hpp"
 
 namespace swiftlet {
 namespace {

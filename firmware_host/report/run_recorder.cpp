@@ -6,9 +6,9 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
+#include "estimator/messages/names.hpp"
 #include "firmware_host/report/events_log.hpp"
 #include "firmware_host/report/map_output.hpp"
-#include "firmware_host/report/names.hpp"
 #include "firmware_host/report/ply_file.hpp"
 #include "firmware_host/report/states_csv.hpp"
 

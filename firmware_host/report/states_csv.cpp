@@ -9,7 +9,7 @@
 
 #include "drivers/recorded/csv_reader.hpp"
 #include "drivers/recorded/parse_number.hpp"
-#include "firmware_host/report/names.hpp"
+#include "estimator/messages/names.hpp"
 
 namespace swiftlet {
 namespace {

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "drivers/recorded/trajectory_file.hpp"
+#include "estimator/messages/names.hpp"
 #include "firmware_host/budget/budget_report.hpp"
-#include "firmware_host/report/names.hpp"
 #include "firmware_host/report/whole_file.hpp"
 #include "firmware_host/settings/registry.hpp"
 

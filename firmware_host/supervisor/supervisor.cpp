@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "drivers/device/monotonic_now.hpp"
+#include "estimator/messages/names.hpp"
 
 namespace swiftlet {
 namespace {
@@ -25,20 +26,6 @@ bool sameTroubles(const Liveness::Troubles& a, const Liveness::Troubles& b) {
 const Trouble* ofRow(const Liveness::Troubles& troubles, std::uint8_t row) {
   const auto* found = std::ranges::find(troubles, row, &Trouble::row);
   return found != troubles.end() ? found : nullptr;
-}
-
-const char* wordOf(Health health) {
-  switch (health) {
-    case Health::kInitializing:
-      return "initializing";
-    case Health::kGood:
-      return "good";
-    case Health::kDegraded:
-      return "degraded";
-    case Health::kFailed:
-      return "failed";
-  }
-  return "unknown";
 }
 
 /// Appends to text in a fixed buffer; what does not fit is cut.
@@ -208,7 +195,8 @@ void Supervisor::tellSystemd(Stamp now) {
   systemd_->watchdog(!verdict_.run_failed, now);
   std::array<char, 256> line;
   Text text(line);
-  text.add("{}, {}", wordOf(verdict_.health), verdict_.arming.ready() ? "ready to arm" : "not ready to arm");
+  text.add("{}, {}", healthName(verdict_.health),
+           verdict_.arming.ready() ? "ready to arm" : "not ready to arm");
   for (const Trouble& trouble : verdict_.troubles) {
     text.add("; {} {}", trouble.name(), conditionName(trouble.condition));
   }
@@ -234,7 +222,7 @@ bool Supervisor::drainEvents(const std::function<void(Stamp, const std::string&)
 
 nlohmann::ordered_json Supervisor::json() const {
   nlohmann::ordered_json json = toJson(verdict_);
-  json["health"] = wordOf(verdict_.health);
+  json["health"] = healthName(verdict_.health);
   json["arming"]["first_ready_ns"] =
       first_ready_ ? nlohmann::ordered_json(first_ready_->ns) : nlohmann::ordered_json(nullptr);
   json["events_lost"] = events_.refused();

@@ -6,8 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "estimator/messages/names.hpp"
 #include "firmware_host/report/mesh_files.hpp"
-#include "firmware_host/report/names.hpp"
 #include "firmware_host/report/summary.hpp"
 #include "firmware_host/report_page/base64.hpp"
 #include "firmware_host/report_page/report_document.hpp"

@@ -1,4 +1,4 @@
-#include "firmware_host/report/names.hpp"
+#include "estimator/messages/names.hpp"
 
 namespace swiftlet {
 
