@@ -5,26 +5,17 @@
 
 #include "estimator/geometry/so3.hpp"
 #include "estimator/smoother/elimination.hpp"
+#include "estimator/smoother/keyframe_choice.hpp"
 #include "estimator/smoother/smoother.hpp"
 
 namespace swiftlet {
 namespace {
 
-// A keyframe with less than this share of its landmarks seen lately has nothing to add.
-constexpr double kMinSharedLandmarks = 0.05;
-// One radian of turn separates two keyframes as much as this distance.
-constexpr double kMetresPerRadian = 1.0;
-constexpr double kMinDistance = 1e-2;  // m, keeps the score finite
 // Bias walk within one increment is not modelled: longer intervals are not made by merging.
 constexpr double kLongestMergedInterval = 3.0;  // s
 // Parts of states that leave in one step because the window is to become shorter: bounds the time. Each new
 // keyframe makes at most one of either kind leave, so that two bring the window down.
 constexpr int kMaxDropsOfAKind = 2;
-
-double separation(const BodyState& a, const BodyState& b) {
-  return (a.T_world_body.translation - b.T_world_body.translation).norm() +
-         kMetresPerRadian * a.T_world_body.rotation.angularDistance(b.T_world_body.rotation) + kMinDistance;
-}
 
 }  // namespace
 
@@ -129,36 +120,23 @@ void Smoother::removeSightingsOf(std::uint8_t slot) {
   }
 }
 
-// First a keyframe whose landmarks are out of sight; else the one in the densest place, seen from
-// the newest (the distance score of Engel et al., "Direct Sparse Odometry", PAMI 2018, eq. 20).
 std::size_t Smoother::chooseKeyframeToDrop(std::size_t candidates) const {
-  std::array<int, kMaxStates> seen{};
-  std::array<int, kMaxStates> shared{};
+  std::array<KeyframeInWindow, kMaxStates> by_slot;
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     if (landmark_ids_[i] == 0) continue;
     const bool lately = landmarks_[i].last_frame >= oldest_recent_frame_;
     for (const Sighting& s : landmarks_[i].sightings) {
-      ++seen[s.slot];
-      if (lately) ++shared[s.slot];
+      ++by_slot[s.slot].seen;
+      if (lately) ++by_slot[s.slot].shared;
     }
   }
-  std::size_t best = 0;
-  double best_score = -1;
-  for (std::size_t k = 0; k < candidates; ++k) {
-    const std::uint8_t slot = order_[k];
-    if (shared[slot] < kMinSharedLandmarks * seen[slot] || seen[slot] == 0) return k;
-    double density = 0;
-    for (std::size_t m = 0; m < order_.size(); ++m) {
-      if (m != k && states_[order_[m]].keyframe)
-        density += 1.0 / separation(states_[slot].x, states_[order_[m]].x);
-    }
-    const double score = std::sqrt(separation(states_[slot].x, newest().x)) * density;
-    if (score > best_score) {
-      best_score = score;
-      best = k;
-    }
+  FixedVector<KeyframeInWindow, kMaxStates> window;
+  for (const std::uint8_t slot : order_) {
+    const WindowState& state = states_[slot];
+    static_cast<void>(
+        window.tryPushBack({state.x.T_world_body, state.keyframe, by_slot[slot].seen, by_slot[slot].shared}));
   }
-  return best;
+  return keyframeToDrop(window, candidates);
 }
 
 void Smoother::freeze(std::uint8_t slot) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "estimator/geometry/triangulation.hpp"
+#include "estimator/smoother/keyframe_choice.hpp"
 
 namespace swiftlet {
 namespace {
@@ -17,17 +18,8 @@ constexpr double kMaxShareLeftOut = 1.0 / 3.0;
 constexpr double kMaxRelativeDepthSigma = 1.0 / 3.0;
 // px: where a landmark at a given pose may be seen, its own error and the poses' included.
 constexpr float kGate = 8.0F;
-// As the smoother's: a keyframe with less than this share of its landmarks seen lately has nothing to add.
-constexpr double kMinSharedLandmarks = 0.05;
 // As the smoother's: the newest keyframes behind the recent frames are never chosen to go.
 constexpr std::size_t kProtectedKeyframes = 5;
-constexpr double kMetresPerRadian = 1.0;
-constexpr double kMinDistance = 1e-2;  // m, keeps the score finite
-
-double separation(const SE3& a, const SE3& b) {
-  return (a.translation - b.translation).norm() + kMetresPerRadian * a.rotation.angularDistance(b.rotation) +
-         kMinDistance;
-}
 
 /// Index of the bearing that misses the point by the largest angle.
 std::size_t worstSighting(const Eigen::Vector3d& point, const std::vector<Eigen::Vector3d>& bearings,
@@ -132,12 +124,11 @@ void GivenPoseWindow::trim() {
     const std::size_t keyframes = states_.size() - recent;
     const bool too_old = (states_.back().stamp - states_.front().stamp).seconds() > settings_.horizon;
     if (!too_old && keyframes <= static_cast<std::size_t>(settings_.max_keyframes)) break;
-    dropState(too_old ? 0 : keyframeToDrop(keyframes - std::min(kProtectedKeyframes, keyframes - 1)));
+    dropState(too_old ? 0 : chooseKeyframeToDrop(keyframes - std::min(kProtectedKeyframes, keyframes - 1)));
   }
 }
 
-// The smoother's choice (Smoother::chooseKeyframeToDrop); its source is named there.
-std::size_t GivenPoseWindow::keyframeToDrop(std::size_t candidates) const {
+std::size_t GivenPoseWindow::chooseKeyframeToDrop(std::size_t candidates) const {
   const auto recent = static_cast<std::size_t>(settings_.max_recent);
   const std::uint64_t oldest_recent = states_[states_.size() - recent].frame_index;
   std::map<std::uint64_t, std::pair<int, int>> seen_shared;
@@ -151,23 +142,12 @@ std::size_t GivenPoseWindow::keyframeToDrop(std::size_t candidates) const {
       if (landmark.last_frame >= oldest_recent) ++shared;
     }
   }
-  std::size_t best = 0;
-  double best_score = -1;
-  for (std::size_t k = 0; k < candidates; ++k) {
-    const auto [seen, shared] = seen_shared[states_[k].frame_index];
-    if (seen == 0 || shared < kMinSharedLandmarks * seen) return k;
-    double density = 0;
-    for (std::size_t m = 0; m < states_.size(); ++m) {
-      if (m == k || !states_[m].keyframe) continue;
-      density += 1.0 / separation(states_[k].T_world_body, states_[m].T_world_body);
-    }
-    const double score =
-        std::sqrt(separation(states_[k].T_world_body, states_.back().T_world_body)) * density;
-    if (score <= best_score) continue;
-    best_score = score;
-    best = k;
+  std::vector<KeyframeInWindow> window;
+  for (const WindowPose& state : states_) {
+    const auto [seen, shared] = seen_shared[state.frame_index];
+    window.push_back({state.T_world_body, state.keyframe, seen, shared});
   }
-  return best;
+  return keyframeToDrop(window, candidates);
 }
 
 void GivenPoseWindow::dropState(std::size_t position) {

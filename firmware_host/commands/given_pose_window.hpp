@@ -76,7 +76,7 @@ class GivenPoseWindow {
 
   void addViews(const TrackedFrame& tracked, const SE3& T_world_body);
   void trim();
-  [[nodiscard]] std::size_t keyframeToDrop(std::size_t candidates) const;
+  [[nodiscard]] std::size_t chooseKeyframeToDrop(std::size_t candidates) const;
   void dropState(std::size_t position);
   [[nodiscard]] Point locate(const Landmark& landmark);
   void writeWindow();
