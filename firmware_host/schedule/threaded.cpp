@@ -54,7 +54,8 @@ class Run : public SensorSink {
     for (auto last = nodes.rbegin(); last != nodes.rend(); ++last) {
       Node* const node = *last;
       const Place place = placeOf(node->rank(), options_.realtime);
-      if (!start(node->name(), place, [this, node] { step(*node); }, node)) {
+      if (!start(
+              node->name(), place, [this, node] { step(*node); }, node)) {
         node->heart().fail("the thread could not be started");
         node->abandon();
       }
