@@ -287,8 +287,10 @@ void FlightThread::abandon() {
   if (!joinable_) return;
   pthread_detach(thread_);
   joinable_ = false;
-  // Leaked on purpose: the thread may go on at any time.
-  static_cast<void>(core_.release());
+  // Kept to the program's end: the thread may go on at any time.
+  static std::atomic<Core*> left{nullptr};
+  Core* const core = core_.release();
+  core->left_before = left.exchange(core);
 }
 
 }  // namespace swiftlet

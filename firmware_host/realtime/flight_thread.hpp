@@ -142,6 +142,7 @@ class FlightThread {
     std::atomic<bool> begun{false};
     std::atomic<bool> over{false};
     Doorbell ended;  ///< rung by the thread's last step
+    Core* left_before = nullptr;
   };
 
   static void* run(void* core);

@@ -3,7 +3,6 @@
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <chrono>
-#include <memory>
 #include <stdexcept>
 #include <thread>
 
@@ -49,23 +48,22 @@ TEST_CASE("a follower's exception is seen while the run goes on, and kept", "[fo
 
 TEST_CASE("a follower that stands is left behind by name, within the time given", "[follower]") {
   static std::atomic<bool> go{false};
-  auto thread = std::make_unique<FollowerThread>();
-  thread->start(named("autopilot"), "settings", "", [follower = thread.get()] {
-    follower->heart().doing("write");
+  static FollowerThread thread;  // whose memory stays
+  thread.start(named("autopilot"), "settings", "", [] {
+    thread.heart().doing("write");
     while (!go) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    follower->heart().beat();
+    thread.heart().beat();
   });
-  CHECK(until([&] { return *thread->heart().read().doing != 0; }));
+  CHECK(until([&] { return *thread.heart().read().doing != 0; }));
   const Stamp begin = monotonicNow();
-  CHECK_FALSE(thread->end(Duration::fromMilliseconds(50)));
+  CHECK_FALSE(thread.end(Duration::fromMilliseconds(50)));
   CHECK(monotonicNow() - begin >= Duration::fromMilliseconds(50));
-  CHECK_FALSE(thread->end());  // known: nobody waits again
-  CHECK(thread->fault() ==
+  CHECK_FALSE(thread.end());  // known: nobody waits again
+  CHECK(thread.fault() ==
         "thread autopilot did not end within 0.1 s and was left behind, last seen at: write");
   // It goes on when it can, in memory that is still its own.
   go = true;
-  CHECK(until([&] { return thread->heart().read().life == Life::kEnded; }));
-  static_cast<void>(thread.release());
+  CHECK(until([&] { return thread.heart().read().life == Life::kEnded; }));
 }
 
 }  // namespace
