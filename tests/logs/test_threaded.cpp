@@ -240,10 +240,14 @@ TEST_CASE("a stage that stands still loses the oldest images, counted, and goes 
   request.record = true;
   ReplayHooks hooks;
   constexpr int kStalled = kSanitized ? 3 : 20;  // early enough for 16 frames to follow
+  // 16 frames long: more than the camera rings and the waiting frames hold; and shorter than the 3 s after
+  // which a flight thread counts as lost.
+  constexpr double kSpeed = kSanitized ? 0.5 : 1;
+  constexpr double kStall = 0.8 / kSpeed;  // s
+  request.speed = kSpeed;
   int frame = 0;
   hooks.drag = [&](StageId stage, double /*cpu*/) {
-    // 16 frames long: more than the camera rings and the waiting frames hold.
-    if (stage == StageId::kTrack && ++frame == kStalled) usleep(static_cast<useconds_t>(800'000 / kSlow));
+    if (stage == StageId::kTrack && ++frame == kStalled) usleep(static_cast<useconds_t>(1e6 * kStall));
   };
   const ReplayResult result = runReplay(request, Settings{}, hooks);
   REQUIRE(result.finished);
