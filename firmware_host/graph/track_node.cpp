@@ -27,7 +27,8 @@ bool TrackNode::turn() {
     frames.drop();
     return true;
   }
-  if (!tracked.hasRoom()) return false;
+  // Where smooth was given up its queue stays full.
+  if (!tracked.hasRoom() && !tracked.readersDone()) return false;
   if (!ended && frames.awaitsSamples()) return false;
   trackFrame();
   return true;

@@ -19,8 +19,10 @@ std::atomic<bool (*)(const char*)> watch_of_all{nullptr};
 void FollowerThread::start(const ThreadSettings& settings, const std::string& file, const std::string& field,
                            std::function<void()> entry) {
   name_ = settings.name;
-  const ThreadReport report =
-      thread_.start(settings, [this, entry = std::move(entry)] { runBeating(heart_, entry); });
+  const ThreadReport report = thread_.start(settings, [this, entry = std::move(entry)] {
+    runBeating(heart_, entry);
+    returned_early_ = !ending_.load(std::memory_order_relaxed);
+  });
   if (!report.started) throw InputError(file, 0, field, report.message, "");
 }
 
@@ -28,7 +30,7 @@ bool FollowerThread::end(Duration limit) {
   tellEnd();
   if (abandoned_) return false;
   if (thread_.joinWithin(limit)) {
-    if (fault_.empty()) fault_ = thread_.fault();
+    if (fault_.empty()) fault_ = returned_early_ ? kReturnedEarly : thread_.fault();
     return true;
   }
   abandoned_ = true;

@@ -52,6 +52,7 @@ class FollowerThread {
  private:
   std::atomic<bool> ending_{false};
   bool abandoned_ = false;
+  bool returned_early_ = false;  ///< of the thread; read after its end
   Heartbeat heart_;
   std::string name_;
   std::string fault_;

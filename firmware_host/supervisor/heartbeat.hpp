@@ -22,6 +22,9 @@
 
 namespace swiftlet {
 
+/// Of a thread that ended before it was told to.
+inline constexpr const char* kReturnedEarly = "the thread returned although the run goes on";
+
 enum class Life : std::uint32_t {
   kNotBegun,
   kRunning,

@@ -159,7 +159,7 @@ void Liveness::judgeThread(Row& row, const Beat& beat, bool ending, Stamp now) {
   } else if (ends && !ending) {
     found.condition = Condition::kLost;
     found.cause = Cause::kEndedEarly;
-    print(found.text, "the thread returned although the run goes on");
+    print(found.text, kReturnedEarly);
   } else if (!ends && silent > row.rule.late.seconds()) {
     found.condition = silent > row.rule.lost.seconds() ? Condition::kLost : Condition::kLate;
     found.cause = Cause::kNoTurn;

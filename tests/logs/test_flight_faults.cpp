@@ -179,6 +179,8 @@ void check(std::string_view thread, Fault fault) {
     if (thread != "log") CHECK(outcome.result.statistics.last_image == Stamp{1'403'636'588'713'555'456});
   }
   CHECK(outcome.result.left_behind == stuck);
+  // The one alone: those before and behind it end in order.
+  if (stuck) CHECK(outcome.result.summary["executor"]["thread_faults"].size() == 1);
   if (thread != "log" || fault == Fault::kStalls) CHECK(outcome.logged);
   const auto seconds = [](double value) {
     return value < 0 ? std::string("-") : fmt::format("{:.2f}", value);
