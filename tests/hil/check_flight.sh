@@ -1,8 +1,9 @@
 #!/bin/sh
 # Flights on a hardware-in-the-loop replay in the kernel sandbox, by simulated time.
-# usage: check_flight.sh PROGRAM accuracy|faults|disk|trap SECONDS [LINK...]
+# usage: check_flight.sh PROGRAM accuracy|faults|alone|disk|trap SECONDS [LINK...]
 #   accuracy  the odometry's ATE is within the larger of 20 % and 3 mm of a plain replay's
 #   faults    a timeline of several faults, flown twice: every check passes, and both flights list the same events
+#   alone     each fault of each device in a flight of its own (fault_campaign.sh)
 #   disk      a disk that is not there, read-only, full, or goes in flight costs files: the flight ends in order,
 #             says so and has its poses
 #   trap      flyer=PROGRAM is trapped_program: no thread of the flight did what it must not, with faults and without
@@ -98,6 +99,9 @@ case $what in
     sed -n '/^thread  /,$p' "$out/faults/fly.txt"
     events faults
     grep -q '^imu  .*[0-9]' "$out/faults/fly.txt"
+    ;;
+  alone)
+    "$here/fault_campaign.sh" "$program" "$log" "$out" alone
     ;;
   disk)
     for disk in none readonly full gone; do
