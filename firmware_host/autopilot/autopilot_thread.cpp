@@ -11,6 +11,7 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/device/monotonic_now.hpp"
+#include "estimator/core/units.hpp"
 #include "estimator/messages/names.hpp"
 #include "firmware_host/autopilot/autopilot_port.hpp"
 #include "firmware_host/autopilot/obstacle_message.hpp"
@@ -31,7 +32,6 @@ constexpr Duration kSilence = Duration::fromMilliseconds(3000);
 /// Reads of one round: more than a port at 4 Mbaud fills in it.
 constexpr int kMostReads = 8;
 constexpr Duration kFloodPause = Duration::fromMilliseconds(1);
-constexpr double kMillisecondsPerSecond = 1e3;
 
 mavlink::StatusText::Severity severityOf(Health health) {
   if (health == Health::kFailed) return mavlink::StatusText::Severity::kCritical;
@@ -104,9 +104,9 @@ class AutopilotThread::Work {
             {"faults", journal_.faults()},
             {"received", {{"frames", r.frames}, {"checksum_failures", r.checksum_failures}}},
             {"state_to_wire_ms",
-             {{"p50", kMillisecondsPerSecond * age_.percentile(0.5)},
-              {"p99", kMillisecondsPerSecond * age_.percentile(0.99)},
-              {"max", kMillisecondsPerSecond * age_.max()}}}};
+             {{"p50", kToMs * age_.percentile(0.5)},
+              {"p99", kToMs * age_.percentile(0.99)},
+              {"max", kToMs * age_.max()}}}};
   }
 
  private:

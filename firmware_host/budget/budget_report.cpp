@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "estimator/core/units.hpp"
 #include "firmware_host/budget/xml_text.hpp"
 
 namespace swiftlet {
@@ -16,7 +17,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kMilli = 1e3;
 constexpr double kMedian = 0.5;
 constexpr double kP99 = 0.99;
 constexpr double kAxisStart = 1e-6;  // s
@@ -65,7 +65,7 @@ std::string axis() {
   return line + "|1s";
 }
 
-double scaleOf(const BudgetFigure& figure) { return std::string_view(figure.name) == "spread" ? 1 : kMilli; }
+double scaleOf(const BudgetFigure& figure) { return std::string_view(figure.name) == "spread" ? 1 : kToMs; }
 const char* unitOf(const BudgetFigure& figure) {
   return std::string_view(figure.name) == "spread" ? "" : " ms";
 }
@@ -84,7 +84,7 @@ std::size_t nameWidth(const std::vector<BudgetRow>& rows) {
 }
 
 BudgetLimits limits(double p50_ms, double p99_ms, double max_ms) {
-  return {p50_ms / kMilli, p99_ms / kMilli, max_ms / kMilli, {}};
+  return {p50_ms / kToMs, p99_ms / kToMs, max_ms / kToMs, {}};
 }
 
 std::string junitCase(const BudgetRow& row, const BudgetFigure& figure) {
@@ -198,12 +198,12 @@ nlohmann::ordered_json BudgetReport::json() const {
     for (int i = 0; i < kColumns; ++i) {
       const std::uint64_t count = columns[static_cast<std::size_t>(i)];
       if (count == 0) continue;
-      histogram.push_back({{"from_ms", i == 0 ? 0.0 : columnEdge(i - 1) * kMilli}, {"count", count}});
+      histogram.push_back({{"from_ms", i == 0 ? 0.0 : columnEdge(i - 1) * kToMs}, {"count", count}});
     }
     rows.push_back({{"name", row.name},
                     {"kind", timeKindName(row.kind)},
                     {"count", row.measured.count()},
-                    {"mean_ms", row.measured.mean() * kMilli},
+                    {"mean_ms", row.measured.mean() * kToMs},
                     {"measured", measured},
                     {"allowed", allowed},
                     {"verdict", verdictName(row.verdict())},
@@ -251,14 +251,14 @@ BudgetReport evaluateBudgets(const BudgetMeasurements& measured, const BudgetsGr
   report.add("... at keyframes", TimeKind::kCpu, measured.image_to_pose_cpu_keyframes, spread);
   report.add("... at other frames", TimeKind::kCpu, measured.image_to_pose_cpu_frames, spread);
   report.add("sample to state", TimeKind::kCpu, measured.sample_to_state_cpu,
-             {b.sample_to_state_p50_ms / kMilli, b.sample_to_state_p99_ms / kMilli, {}, {}});
+             {b.sample_to_state_p50_ms / kToMs, b.sample_to_state_p99_ms / kToMs, {}, {}});
   report.add("track", TimeKind::kWall, measured.track_wall);
   report.add("smooth", TimeKind::kWall, measured.smooth_wall);
   report.add("image to pose", TimeKind::kWall, measured.image_to_pose_wall,
-             {{}, b.image_to_pose_wall_p99_ms / kMilli, b.image_to_pose_wall_max_ms / kMilli, {}});
+             {{}, b.image_to_pose_wall_p99_ms / kToMs, b.image_to_pose_wall_max_ms / kToMs, {}});
   report.add("exposure to pose", TimeKind::kWall, measured.exposure_to_pose_wall);
   report.add("sample to state", TimeKind::kWall, measured.sample_to_state_wall,
-             {{}, b.sample_to_state_wall_p99_ms / kMilli, b.sample_to_state_wall_max_ms / kMilli, {}});
+             {{}, b.sample_to_state_wall_p99_ms / kToMs, b.sample_to_state_wall_max_ms / kToMs, {}});
   report.add("bare timer loop", TimeKind::kWall, measured.bare_timer_wall);
   return report;
 }

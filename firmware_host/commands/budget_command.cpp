@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "estimator/core/units.hpp"
 #include "firmware_host/commands/budget_run.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/worst_case.hpp"
@@ -28,9 +29,8 @@ void printWorstCase(const Settings& settings) {
     const StageTimes& times = worst.times[static_cast<std::size_t>(stage)];
     LatencyHistogram all = times.cpu_frames;
     all.add(times.cpu_keyframes);
-    constexpr double kMilli = 1e3;
     fmt::print("{:<12}{:>8}{:>12.3f}{:>12.3f}{:>12.3f}\n", stageName(stage), all.count(),
-               all.percentile(0.5) * kMilli, all.percentile(0.99) * kMilli, all.max() * kMilli);
+               all.percentile(0.5) * kToMs, all.percentile(0.99) * kToMs, all.max() * kToMs);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "estimator/core/units.hpp"
 #include "firmware_host/commands/fly_run.hpp"
 #include "firmware_host/live/connected_devices.hpp"
 #include "firmware_host/live/counting_sink.hpp"
@@ -17,9 +18,6 @@
 
 namespace swiftlet {
 namespace {
-
-constexpr double kMilli = 1e3;
-constexpr double kMicro = 1e6;
 
 bool namesDevices(const Settings& settings) {
   return !settings.imu_link.device.empty() || !settings.cameras.device0.empty();
@@ -76,8 +74,8 @@ class VehicleCheck {
     const Duration largest = stream.largestStep();
     report.lines.push_back(
         line("IMU gaps",
-             fmt::format("largest step {:.2f} ms, usual {:.2f} ms", largest.seconds() * kMilli,
-                         typical.seconds() * kMilli),
+             fmt::format("largest step {:.2f} ms, usual {:.2f} ms", largest.seconds() * kToMs,
+                         typical.seconds() * kToMs),
              largest < typical + typical + typical,
              "samples are lost on the way: raise the baud rate, or take other outputs off"));
     const ImuStatus status = input_.imu().status();
@@ -89,8 +87,8 @@ class VehicleCheck {
     const std::string found = fmt::format(
         "{}, skew {:.1f} ppm, delay above the smallest: half below {:.2f} ms, 99 % below {:.2f} ms, "
         "steps {}",
-        lockName(status.clock.lock), status.clock.skew_ppm, status.clock.residual_p50.seconds() * kMilli,
-        status.clock.residual_p99.seconds() * kMilli, status.clock.resets);
+        lockName(status.clock.lock), status.clock.skew_ppm, status.clock.residual_p50.seconds() * kToMs,
+        status.clock.residual_p99.seconds() * kToMs, status.clock.resets);
     // drivers/timesync/clock_map.cpp: four seconds, and what opening and the first sample take.
     constexpr double kLockTime = 6;  // s
     if (status.clock.resets == 0 && status.clock.lock == LockState::kLocking && seconds_ < kLockTime) {
@@ -135,8 +133,8 @@ class VehicleCheck {
   void addPairs(MachineReport& report) {
     const std::vector<Duration> distances = sink_.pairDistances();
     if (distances.empty()) return;
-    const double median = distances[distances.size() / 2].seconds() * kMilli;
-    const double largest = distances.back().seconds() * kMilli;
+    const double median = distances[distances.size() / 2].seconds() * kToMs;
+    const double largest = distances.back().seconds() * kToMs;
     // Half a pixel at 400 px of focal length and 6 rad/s; docs/timesync.md.
     constexpr double kGood = 0.2;  // ms
     report.lines.push_back(
@@ -156,13 +154,12 @@ class VehicleCheck {
     }
     for (std::size_t i = 0; i < input_.cameras().size(); ++i) {
       const CameraStatus status = input_.cameras()[i]->status();
-      report.lines.push_back(
-          line(fmt::format("camera {} trigger", i),
-               fmt::format("{}, frame after edge {:.3f} ms, 99 % within {:.1f} us",
-                           lockName(status.trigger.lock), status.trigger.offset.seconds() * kMilli,
-                           status.trigger.residual_p99.seconds() * kMicro),
-               status.trigger.lock == LockState::kLocked,
-               "edges and frames do not go together: this camera is not triggered by that line"));
+      report.lines.push_back(line(
+          fmt::format("camera {} trigger", i),
+          fmt::format("{}, frame after edge {:.3f} ms, 99 % within {:.1f} us", lockName(status.trigger.lock),
+                      status.trigger.offset.seconds() * kToMs, status.trigger.residual_p99.seconds() * kToUs),
+          status.trigger.lock == LockState::kLocked,
+          "edges and frames do not go together: this camera is not triggered by that line"));
     }
   }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "estimator/core/units.hpp"
 #include "firmware_host/commands/live_consumers.hpp"
 #include "firmware_host/realtime/console.hpp"
 #include "firmware_host/realtime/machine_report.hpp"
@@ -15,7 +16,6 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kMilli = 1e-3;
 /// What the low-priority threads work with: text of the log, the libraries' own.
 constexpr std::size_t kHeapReserve = std::size_t{2} * 1024 * 1024;
 
@@ -27,15 +27,15 @@ Effort fullEffort(const Settings& settings) {
 
 GovernorSettings trackGovernor(const BudgetsGroup& budgets) {
   GovernorSettings governor;
-  governor.step_budget = budgets.track_max_ms * kMilli;
-  governor.age_budget = (budgets.image_to_pose_wall_p99_ms - budgets.smooth_p99_ms) * kMilli;
+  governor.step_budget = budgets.track_max_ms * kFromMs;
+  governor.age_budget = (budgets.image_to_pose_wall_p99_ms - budgets.smooth_p99_ms) * kFromMs;
   return governor;
 }
 
 GovernorSettings smoothGovernor(const BudgetsGroup& budgets) {
   GovernorSettings governor;
-  governor.step_budget = budgets.smooth_max_ms * kMilli;
-  governor.age_budget = budgets.image_to_pose_wall_p99_ms * kMilli;
+  governor.step_budget = budgets.smooth_max_ms * kFromMs;
+  governor.age_budget = budgets.image_to_pose_wall_p99_ms * kFromMs;
   return governor;
 }
 

@@ -18,7 +18,7 @@ struct FuseOptions {
   double until = -1;
 };
 
-void printSummary(const nlohmann::ordered_json& summary) {
+void printFusion(const nlohmann::ordered_json& summary) {
   const auto& moments = summary["moments"];
   const auto& map = summary["map"];
   fmt::print("{} depth images fused ({} with labels), {} without a pose, {} refused; {} triangles\n",
@@ -44,7 +44,7 @@ int fuse(const FuseOptions& options) {
     throw InputError("--until", 0, "", "the section ends before it begins", "Give an --until after --from");
   }
   const FuseRunResult result = runFuse(request, options.settings.read());
-  printSummary(result.summary);
+  printFusion(result.summary);
   fmt::print("written to {}\n", request.out);
   if (!result.finished) {
     fmt::print(stderr, "stopped before the end; the folder holds what was done\n");

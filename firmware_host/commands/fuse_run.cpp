@@ -9,6 +9,7 @@
 #include "drivers/recorded/depth_images.hpp"
 #include "drivers/recorded/label_images.hpp"
 #include "drivers/recorded/open_log.hpp"
+#include "estimator/core/units.hpp"
 #include "estimator/odometry/odometry_inputs.hpp"
 #include "estimator/odometry/pairing.hpp"
 #include "firmware_host/commands/confusion_file.hpp"
@@ -42,13 +43,12 @@ Json timingJson(const MapTimes& times) {
                                                                               {"surface", &times.surface},
                                                                               {"distance", &times.distance}}};
   for (const auto& [name, cpu] : parts) {
-    constexpr double kMilli = 1e3;
     json[name] = {{"count", cpu->count()},
                   {"cpu",
-                   {{"mean_ms", cpu->mean() * kMilli},
-                    {"p50_ms", cpu->percentile(0.5) * kMilli},
-                    {"p99_ms", cpu->percentile(0.99) * kMilli},
-                    {"max_ms", cpu->max() * kMilli}}}};
+                   {{"mean_ms", cpu->mean() * kToMs},
+                    {"p50_ms", cpu->percentile(0.5) * kToMs},
+                    {"p99_ms", cpu->percentile(0.99) * kToMs},
+                    {"max_ms", cpu->max() * kToMs}}}};
   }
   return json;
 }

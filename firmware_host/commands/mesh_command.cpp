@@ -18,7 +18,7 @@ struct MeshOptions {
   double until = -1;
 };
 
-void printSummary(const nlohmann::ordered_json& summary) {
+void printMeshing(const nlohmann::ordered_json& summary) {
   const auto& frames = summary["frames"];
   fmt::print("{} frames with a pose, {} keyframes, {} without a pose, {} jumps\n",
              frames["meshed"].get<std::uint64_t>(), frames["keyframes"].get<std::uint64_t>(),
@@ -42,7 +42,7 @@ int mesh(const MeshOptions& options) {
     throw InputError("--until", 0, "", "the section ends before it begins", "Give an --until after --from");
   }
   const MeshRunResult result = runMesh(request, options.settings.read());
-  printSummary(result.summary);
+  printMeshing(result.summary);
   fmt::print("written to {}\n", request.out);
   if (!result.finished) {
     fmt::print(stderr, "stopped before the end; the folder holds what was done\n");

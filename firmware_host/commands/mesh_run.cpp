@@ -7,12 +7,14 @@
 
 #include "drivers/recorded/label_images.hpp"
 #include "drivers/recorded/open_log.hpp"
+#include "estimator/core/units.hpp"
 #include "estimator/frontend/frontend.hpp"
 #include "estimator/odometry/odometry_inputs.hpp"
 #include "estimator/odometry/pairing.hpp"
 #include "firmware_host/commands/given_pose_window.hpp"
 #include "firmware_host/commands/given_poses.hpp"
 #include "firmware_host/pipeline/log_feed.hpp"
+#include "firmware_host/realtime/console.hpp"
 #include "firmware_host/report/line_file.hpp"
 #include "firmware_host/report/mesh_files.hpp"
 #include "firmware_host/report/ply_file.hpp"
@@ -65,12 +67,11 @@ TriangleMesh toTriangleMesh(const HorizonMesh& mesh) {
 }
 
 Json timingJson(const LatencyHistogram& cpu) {
-  constexpr double kMilli = 1e3;
   return {{"count", cpu.count()},
           {"cpu",
-           {{"p50_ms", cpu.percentile(0.5) * kMilli},
-            {"p99_ms", cpu.percentile(0.99) * kMilli},
-            {"max_ms", cpu.max() * kMilli}}}};
+           {{"p50_ms", cpu.percentile(0.5) * kToMs},
+            {"p99_ms", cpu.percentile(0.99) * kToMs},
+            {"max_ms", cpu.max() * kToMs}}}};
 }
 
 Json landmarksJson(const GivenPoseCounters& counters) {
@@ -87,10 +88,6 @@ LogOptions logOptions(const MeshRequest& request, const Settings& settings) {
   options.calibration_options.accept_unusual_rig = settings.calibration.accept_unusual_rig;
   options.mono = request.mono || !settings.odometry.use_stereo;
   return options;
-}
-
-void printWarnings(const std::vector<std::string>& lines) {
-  for (const std::string& line : lines) fmt::print(stderr, "warning: {}\n", line);
 }
 
 /// What one run is made of, from opening to the summary.
@@ -179,8 +176,8 @@ void MeshRun::begin() {
     frontend_ = std::make_unique<Frontend>(rig_, FrontendSettings{});
   }
   labels_.emplace(request_.log, ImageSize{rig_.camera[0].width(), rig_.camera[0].height()}, warnings_);
-  printWarnings(source_->warnings());
-  printWarnings(warnings_.lines());
+  warnAll(source_->warnings());
+  warnAll(warnings_.lines());
   local_ = std::make_unique<Mesher>(
       rig_, windowSettings(settings_, false), HorizonLimits{},
       MeshPlanes{settings_.odometry.regularity_enabled, settings_.odometry.plane_point_sigma});

@@ -21,7 +21,7 @@ std::string shareText(const nlohmann::ordered_json& share) {
   return share.is_null() ? "nothing to judge" : fmt::format("{:.1f} %", 100 * share.get<double>());
 }
 
-void printSummary(const nlohmann::ordered_json& summary) {
+void printPlaces(const nlohmann::ordered_json& summary) {
   const auto& retrieval = summary["retrieval"];
   fmt::print("{} keyframes of {} images, {} candidates\n",
              summary["images"]["keyframes"].get<std::uint64_t>(),
@@ -52,7 +52,7 @@ int place(const PlaceOptions& options) {
   if (!options.calibration.empty()) request.calibration = options.calibration[0];
   if (options.calibration.size() > 1) request.imu_calibration = options.calibration[1];
   const PlaceRunResult result = runPlace(request, options.settings.read());
-  printSummary(result.summary);
+  printPlaces(result.summary);
   fmt::print("written to {}\n", request.out);
   if (!result.finished) {
     fmt::print(stderr, "stopped before the end; the folder holds what was done\n");

@@ -4,9 +4,9 @@
 
 #include <filesystem>
 #include <memory>
-#include <numbers>
 
 #include "drivers/recorded/open_log.hpp"
+#include "estimator/core/units.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "estimator/odometry/odometry_inputs.hpp"
 #include "estimator/odometry/pairing.hpp"
@@ -15,6 +15,7 @@
 #include "firmware_host/commands/place_tally.hpp"
 #include "firmware_host/pipeline/log_feed.hpp"
 #include "firmware_host/places/vocabulary_file.hpp"
+#include "firmware_host/realtime/console.hpp"
 #include "firmware_host/report/line_file.hpp"
 #include "firmware_host/report/progress.hpp"
 #include "firmware_host/report/summary.hpp"
@@ -26,8 +27,6 @@ namespace swiftlet {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 LogOptions logOptions(const PlaceRequest& request, const Settings& settings) {
   LogOptions options;
@@ -50,10 +49,6 @@ PlaceDatabaseSettings databaseSettings(const PlaceRequest& request, const Settin
 Vocabulary vocabularyOf(const PlaceRequest& request, const Settings& settings) {
   const std::string& file = request.vocabulary.empty() ? settings.loop.vocabulary : request.vocabulary;
   return file.empty() ? Vocabulary::shipped() : readVocabulary(file);
-}
-
-void printWarnings(const std::vector<std::string>& lines) {
-  for (const std::string& line : lines) fmt::print(stderr, "warning: {}\n", line);
 }
 
 /// What the stages need beside an image, made when its size is known.
@@ -133,7 +128,7 @@ void PlaceRun::takePoses(Trajectory trajectory) {
     warnings_.add(fmt::format("{}: the poses jump {} times, first at {}: pairs across a jump are not judged",
                               poses_name_, poses_->jumps(), formatSeconds(poses_->firstJump())));
   }
-  printWarnings(warnings_.lines());
+  warnAll(warnings_.lines());
 }
 
 void PlaceRun::runFolder() {
@@ -203,7 +198,7 @@ void PlaceRun::runLog() {
   if (finished_ && pairing.flush(frame).ok()) take(frame, rig, false);
   progress.finish();
   log_warnings_ = source->warnings();
-  printWarnings(log_warnings_);
+  warnAll(log_warnings_);
 }
 
 /// `all`: whether it has moved or not.
@@ -217,7 +212,7 @@ void PlaceRun::take(const StereoFrame& frame, const Rig& rig, bool all) {
   if (last_ && !all && pose->piece == last_->piece) {
     const SE3 moved = last_->T_world_body.inverse() * pose->T_world_body;
     const bool enough = moved.translation.norm() >= request_.min_distance ||
-                        logSo3(moved.rotation).norm() * kDegrees >= request_.min_turn_deg ||
+                        logSo3(moved.rotation).norm() * kToDegrees >= request_.min_turn_deg ||
                         (frame.stamp - last_stamp_).seconds() >= request_.min_seconds;
     if (!enough) return;
   }
@@ -269,7 +264,7 @@ void PlaceRun::judge(const PlaceCandidate& candidate, Stamp stamp, const SE3& T_
   std::string text = fmt::format("{},{},{:.6g},{:.6g},{},", stamp.ns, candidate.stamp.ns, candidate.score,
                                  candidate.relative, candidate.consistent);
   text += judged ? fmt::format("{:.6g},{:.6g}", truth.translation.norm(),
-                               logSo3(truth.rotation).norm() * kDegrees)
+                               logSo3(truth.rotation).norm() * kToDegrees)
                  : ",";
   tally_.addCandidate(truth, judged);
   if (s.verifier) {

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <numbers>
 
+#include "estimator/core/units.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/evaluation/error_statistics.hpp"
 #include "firmware_host/evaluation/loop_accuracy.hpp"
@@ -15,8 +15,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
-
 struct PoseDistance {
   double metres = 0;
   double degrees = 0;
@@ -24,7 +22,7 @@ struct PoseDistance {
 
 PoseDistance between(const SE3& a, const SE3& b) {
   const SE3 difference = a.inverse() * b;
-  return {difference.translation.norm(), logSo3(difference.rotation).norm() * kDegrees};
+  return {difference.translation.norm(), logSo3(difference.rotation).norm() * kToDegrees};
 }
 
 bool samePlace(const SE3& T_a_b) {
@@ -42,11 +40,10 @@ Json share(std::uint64_t part, std::uint64_t all) {
 }
 
 Json timeJson(const LatencyHistogram& cpu) {
-  constexpr double kMilli = 1e3;
   return {{"count", cpu.count()},
-          {"p50_ms", cpu.percentile(0.5) * kMilli},
-          {"p99_ms", cpu.percentile(0.99) * kMilli},
-          {"max_ms", cpu.max() * kMilli}};
+          {"p50_ms", cpu.percentile(0.5) * kToMs},
+          {"p99_ms", cpu.percentile(0.99) * kToMs},
+          {"max_ms", cpu.max() * kToMs}};
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "drivers/recorded/open_log.hpp"
 #include "drivers/recorded/recording_files.hpp"
 #include "drivers/recorded/recording_source.hpp"
+#include "estimator/core/units.hpp"
 #include "firmware_host/commands/confusion_file.hpp"
 #include "firmware_host/commands/evaluate_run.hpp"
 #include "firmware_host/commands/fly_threaded.hpp"
@@ -25,8 +26,6 @@
 
 namespace swiftlet {
 namespace {
-
-constexpr double kMilli = 1e3;
 
 LogOptions logOptions(const ReplayRequest& request, const Settings& settings) {
   LogOptions options;
@@ -46,11 +45,6 @@ TrackFileFacts checkTracks(const std::string& path, const Rig& rig, bool mono) {
                      "Give the calibration of both with --calibration, or leave camera 1 out with --mono");
   }
   return facts;
-}
-
-void printWarnings(const LogSource& source, std::size_t from) {
-  const auto& lines = source.warnings();
-  for (std::size_t i = from; i < lines.size(); ++i) warn("warning: " + lines[i] + "\n");
 }
 
 /// What one run is made of, from opening to the summary.
@@ -91,7 +85,7 @@ class ReplayRun {
     } else {
       source_ = openLog(request_.log, options);
     }
-    printWarnings(*source_, 0);
+    warnAll(source_->warnings());
     warned_ = source_->warnings().size();
     memory_.note("log_reader");
     facts_.log = request_.log;
@@ -201,9 +195,9 @@ class ReplayRun {
       facts_.finished = flown.finished && flown.faultless;
       left_behind_ = flown.left_behind;
       const LatencyHistogram& late = player.lateness();
-      facts_.executor["late_ms"] = {{"p50", late.percentile(0.5) * kMilli},
-                                    {"p99", late.percentile(0.99) * kMilli},
-                                    {"max", late.max() * kMilli}};
+      facts_.executor["late_ms"] = {{"p50", late.percentile(0.5) * kToMs},
+                                    {"p99", late.percentile(0.99) * kToMs},
+                                    {"max", late.max() * kToMs}};
     } else {
       const auto graph =
           std::make_unique<Graph>(source_->rig(), source_->imuNoise(), settings_, output_->log(), wanted);
@@ -220,7 +214,7 @@ class ReplayRun {
     progress_->finish();
     memory_.note("grown_in_flight");
     facts_.memory = memory_.rows();
-    printWarnings(*source_, warned_);
+    warnAll(source_->warnings(), warned_);
     for (std::size_t i = scene_warnings_; scenes_ && i < scenes_->warnings().size(); ++i) {
       warn("warning: " + scenes_->warnings()[i] + "\n");
     }

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "drivers/calibration/input_error.hpp"
+#include "estimator/core/units.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/evaluate_run.hpp"
@@ -83,7 +84,6 @@ int report(const ReportOptions& options) {
     html = pageWith(std::string(std::istreambuf_iterator<char>(file), {}), page, reportDocument(runs));
   }
   writeWholeFile(options.out, html + "\n");
-  constexpr double kMebibyte = 1024.0 * 1024.0;
   fmt::print("written to {} ({:.2f} MiB)\n", options.out, static_cast<double>(html.size()) / kMebibyte);
   return kExitDone;
 }

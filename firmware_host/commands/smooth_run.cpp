@@ -8,6 +8,7 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
+#include "estimator/core/units.hpp"
 #include "firmware_host/pipeline/map_keeper.hpp"
 #include "firmware_host/realtime/console.hpp"
 #include "firmware_host/report/summary.hpp"
@@ -18,8 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-constexpr std::size_t kMebibyte = std::size_t{1} << 20U;
 
 /// A run that was killed has no summary; one that is no JSON any more is left alone.
 void addToSummary(const fs::path& path, const FullSmoothing& found) {

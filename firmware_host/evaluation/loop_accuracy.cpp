@@ -1,15 +1,13 @@
 #include "firmware_host/evaluation/loop_accuracy.hpp"
 
 #include <algorithm>
-#include <numbers>
 #include <vector>
 
+#include "estimator/core/units.hpp"
 #include "estimator/geometry/so3.hpp"
 
 namespace swiftlet {
 namespace {
-
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 double medianOf(std::vector<double>& values) {
   if (values.empty()) return 0;
@@ -33,7 +31,7 @@ LoopAccuracy loopAccuracy(std::span<const MapLoop> loops, const Trajectory& trut
     }
     const SE3 error = (old_pose->inverse() * *new_pose).inverse() * loop.T_old_new;
     const double distance = error.translation.norm();
-    const double degrees = logSo3(error.rotation).norm() * kDegrees;
+    const double degrees = logSo3(error.rotation).norm() * kToDegrees;
     const bool right = distance <= kFalseLoopDistance && degrees <= kFalseLoopDegrees;
     const bool selected = loop.verdict == LoopVerdict::kSelected;
     ++out.verified;

@@ -1,14 +1,12 @@
 #include "firmware_host/evaluation/relative_error.hpp"
 
 #include <algorithm>
-#include <numbers>
 
+#include "estimator/core/units.hpp"
 #include "estimator/geometry/so3.hpp"
 
 namespace swiftlet {
 namespace {
-
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 /// Errors over all (i, j) where `position` (time or distance, rising) grows by `interval`.
 RelativeError overIntervals(std::span<const PosePair> pairs, const std::vector<double>& position,
@@ -28,7 +26,7 @@ RelativeError overIntervals(std::span<const PosePair> pairs, const std::vector<d
     const SE3 estimate = pairs[i].estimate.inverse() * pairs[j].estimate;
     const SE3 error = truth.inverse() * estimate;
     translation.push_back(error.translation.norm() * translation_unit);
-    rotation.push_back(logSo3(error.rotation).norm() * kDegrees * rotation_unit);
+    rotation.push_back(logSo3(error.rotation).norm() * kToDegrees * rotation_unit);
   }
   result.translation = statisticsOf(std::move(translation));
   result.rotation = statisticsOf(std::move(rotation));

@@ -2,15 +2,13 @@
 
 #include <Eigen/SVD>
 #include <cmath>
-#include <numbers>
 
+#include "estimator/core/units.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/evaluation/yaw_rotation.hpp"
 
 namespace swiftlet {
 namespace {
-
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 Status align(Points from, Points to, AlignKind kind, Alignment& result) {
   switch (kind) {
@@ -41,7 +39,8 @@ ErrorStatistics rotationErrors(std::span<const PosePair> pairs, const Eigen::Qua
   std::vector<double> degrees;
   for (const PosePair& pair : pairs) {
     const Eigen::Quaterniond turned = R_truth_estimate * pair.estimate.rotation;
-    degrees.push_back(logSo3(Eigen::Quaterniond(pair.truth.rotation.conjugate() * turned)).norm() * kDegrees);
+    degrees.push_back(logSo3(Eigen::Quaterniond(pair.truth.rotation.conjugate() * turned)).norm() *
+                      kToDegrees);
   }
   return statisticsOf(std::move(degrees));
 }

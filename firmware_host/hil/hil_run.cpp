@@ -10,6 +10,7 @@
 
 #include "drivers/recorded/open_log.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
+#include "estimator/core/units.hpp"
 #include "firmware_host/hil/log_reader.hpp"
 #include "firmware_host/hil/played_camera.hpp"
 #include "firmware_host/hil/played_imu.hpp"
@@ -21,7 +22,6 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kMilli = 1e3;
 /// A log's images may be off the cameras' instants by so much: their stamps say when they were taken, and the
 /// camera will say when they were shown.
 constexpr Duration kOffGrid = Duration::fromMilliseconds(1);
@@ -261,9 +261,9 @@ class HilRun {
     json["imu"] = {{"sent", imu_->counters().sent},
                    {"withheld", imu_->counters().withheld},
                    {"late_ms",
-                    {{"p50", imu_->lateness().percentile(0.5) * kMilli},
-                     {"p99", imu_->lateness().percentile(0.99) * kMilli},
-                     {"max", imu_->lateness().max() * kMilli}}}};
+                    {{"p50", imu_->lateness().percentile(0.5) * kToMs},
+                     {"p99", imu_->lateness().percentile(0.99) * kToMs},
+                     {"max", imu_->lateness().max() * kToMs}}}};
     std::uint64_t bad = 0;
     for (std::size_t c = 0; c < cameras_.size(); ++c) {
       const PlayedCamera::Counters& counters = cameras_[c]->counters();

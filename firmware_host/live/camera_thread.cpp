@@ -2,14 +2,13 @@
 
 #include <poll.h>
 
+#include "estimator/core/units.hpp"
 #include "firmware_host/live/device_times.hpp"
 #include "firmware_host/pipeline/host_sleep.hpp"
 
 namespace swiftlet {
 namespace {
 
-constexpr double kMilli = 1e-3;
-constexpr double kMicro = 1e-6;
 /// Frames of one round: more wait only after the thread was held up.
 constexpr int kMostFrames = 8;
 /// Images running that show nothing, or nothing new, before it is said: a hand before the lens, a lost frame
@@ -28,9 +27,9 @@ CameraThread::CameraThread(const Setup& setup)
       longest_silence_(longestSilence(setup.settings.rate_hz)),
       train_(Duration::fromSeconds(1 / setup.settings.rate_hz)),
       rate_(setup.settings.rate_hz) {
-  timing_.readout = Duration::fromSeconds(setup_.settings.readout_ms * kMilli);
+  timing_.readout = Duration::fromSeconds(setup_.settings.readout_ms * kFromMs);
   timing_.rolling = setup_.settings.shutter == "rolling";
-  if (setup_.trigger) timing_.trigger_latency = Duration::fromSeconds(setup_.trigger->delay_us * kMicro);
+  if (setup_.trigger) timing_.trigger_latency = Duration::fromSeconds(setup_.trigger->delay_us * kFromUs);
 }
 
 DeviceFault CameraThread::open() {

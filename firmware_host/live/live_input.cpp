@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "drivers/calibration/input_error.hpp"
+#include "estimator/core/units.hpp"
 #include "firmware_host/live/can_imu_link.hpp"
 #include "firmware_host/live/serial_imu_link.hpp"
 #include "firmware_host/live/status_json.hpp"
@@ -10,7 +11,6 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kMilli = 1e-3;
 constexpr const char* kTriggerByImu = "imu";
 
 [[noreturn]] void failAt(const char* setting, const std::string& what, const std::string& remedy) {
@@ -30,7 +30,7 @@ CameraDeviceSettings deviceSettings(const CamerasGroup& group, const std::string
   device.width = width;
   device.height = height;
   device.rate = group.rate_hz;
-  if (group.exposure_ms > 0) device.exposure = Duration::fromSeconds(group.exposure_ms * kMilli);
+  if (group.exposure_ms > 0) device.exposure = Duration::fromSeconds(group.exposure_ms * kFromMs);
   if (group.gain >= 0) device.gain = group.gain;
   return device;
 }
@@ -81,7 +81,7 @@ LiveInput::LiveInput(const Settings& settings, const Calibration& calibration) {
   imu_ = std::make_unique<ImuThread>(
       fmt::format("IMU ({}, {})", settings.imu_link.device, settings.imu_link.protocol),
       makeImuLink(settings.imu_link), calibration.R_body_imu,
-      Duration::fromSeconds(settings.imu_link.delay_ms * kMilli), calibration.noise.rate_hz);
+      Duration::fromSeconds(settings.imu_link.delay_ms * kFromMs), calibration.noise.rate_hz);
   const std::size_t nodes = cameras.side_by_side ? 1 : rig.camera_count;
   for (std::size_t i = 0; i < nodes; ++i) {
     const std::string& path = i == 0 ? cameras.device0 : cameras.device1;

@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "estimator/core/units.hpp"
+
 namespace swiftlet {
 
 using Json = nlohmann::ordered_json;
@@ -31,13 +33,12 @@ const char* stampEventName(StampEvent event) {
 }
 
 Json toJson(const TimesyncStatus& status) {
-  constexpr double kMilli = 1e3;
   return {{"lock", lockName(status.lock)},
           {"offset_ns", status.offset.ns},
           {"skew_ppm", status.skew_ppm},
-          {"uncertainty_ms", status.uncertainty.seconds() * kMilli},
-          {"residual_p50_ms", status.residual_p50.seconds() * kMilli},
-          {"residual_p99_ms", status.residual_p99.seconds() * kMilli},
+          {"uncertainty_ms", status.uncertainty.seconds() * kToMs},
+          {"residual_p50_ms", status.residual_p50.seconds() * kToMs},
+          {"residual_p99_ms", status.residual_p99.seconds() * kToMs},
           {"samples", status.samples},
           {"resets", status.resets},
           {"refused", status.refused}};

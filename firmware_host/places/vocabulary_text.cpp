@@ -9,7 +9,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr const char* kRemedy = "Give a vocabulary as DBoW2 or ORB-SLAM write it (ORBvoc.txt)";
+constexpr const char* kTextRemedy = "Give a vocabulary as DBoW2 or ORB-SLAM write it (ORBvoc.txt)";
 constexpr std::int64_t kMaxBranching = 20, kMaxLevels = 10;  // as their loaders check
 
 /// Blank-separated words of a text, line by line.
@@ -57,7 +57,7 @@ class Words {
     return value;
   }
   [[nodiscard]] InputError error(const char* field, const std::string& message) const {
-    return {name_, line_number_, field, message, kRemedy};
+    return {name_, line_number_, field, message, kTextRemedy};
   }
 
  private:
@@ -99,7 +99,7 @@ std::vector<VocabularyNode> readVocabularyText(const std::string& name, std::str
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     if (!leaf[i] && !parent[i + 1]) {
       throw InputError(name, 0, "isLeaf", "node " + std::to_string(i + 1) + " is no leaf and has no children",
-                       kRemedy);
+                       kTextRemedy);
     }
   }
   return nodes;

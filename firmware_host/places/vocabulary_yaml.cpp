@@ -12,7 +12,7 @@ namespace {
 
 // OpenCV's FileStorage writes "key:value" without a blank, which general YAML parsers do not take for a key,
 // and a large vocabulary would be a million nodes of theirs: the one form that these files have is read here.
-constexpr const char* kRemedy = "Give a vocabulary as DBoW2 saves it";
+constexpr const char* kYamlRemedy = "Give a vocabulary as DBoW2 saves it";
 constexpr std::string_view kBlank = " \t\r\n";
 constexpr std::int64_t kMaxNodes = 16'000'000;
 
@@ -29,7 +29,7 @@ struct Item {
   int line;
 
   [[nodiscard]] InputError error(const char* field, const std::string& message) const {
-    return {name, line, field, message, kRemedy};
+    return {name, line, field, message, kYamlRemedy};
   }
   /// The value of a key; quotes are taken off.
   [[nodiscard]] std::optional<std::string_view> find(std::string_view key) const {
@@ -102,7 +102,8 @@ void forEachItem(const std::string& name, std::string_view text, const Use& use)
     line += static_cast<int>(std::count(text.begin() + static_cast<std::ptrdiff_t>(at),
                                         text.begin() + static_cast<std::ptrdiff_t>(open), '\n'));
     const std::size_t close = text.find('}', open);
-    if (close == std::string_view::npos) throw InputError(name, line, "", "a brace is not closed", kRemedy);
+    if (close == std::string_view::npos)
+      throw InputError(name, line, "", "a brace is not closed", kYamlRemedy);
     const std::string_view inside = text.substr(open + 1, close - open - 1);
     use(Item{name, inside, line});
     line += static_cast<int>(std::count(inside.begin(), inside.end(), '\n'));
@@ -132,17 +133,18 @@ std::vector<VocabularyNode> readVocabularyYaml(const std::string& name, std::str
   std::vector<bool> parent(listed.size() + 1, false);
   for (const auto& [id, node] : listed) {
     if (id != nodes.size() + 1) {
-      throw InputError(name, 0, "nodeId", "nodes are not numbered 1, 2, ... without gaps", kRemedy);
+      throw InputError(name, 0, "nodeId", "nodes are not numbered 1, 2, ... without gaps", kYamlRemedy);
     }
     if (node.parent > listed.size()) {
-      throw InputError(name, 0, "parentId", "node " + std::to_string(id) + "'s parent is not there", kRemedy);
+      throw InputError(name, 0, "parentId", "node " + std::to_string(id) + "'s parent is not there",
+                       kYamlRemedy);
     }
     parent[node.parent] = true;
     nodes.push_back(node);
   }
   for (const std::size_t leaf : leaves) {
     if (leaf > nodes.size() || parent[leaf]) {
-      throw InputError(name, 0, "words", "node " + std::to_string(leaf) + " is no leaf", kRemedy);
+      throw InputError(name, 0, "words", "node " + std::to_string(leaf) + " is no leaf", kYamlRemedy);
     }
   }
   return nodes;

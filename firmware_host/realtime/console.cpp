@@ -88,6 +88,10 @@ Stream& err() {
 void say(std::string_view text) { out().put(text); }
 void warn(std::string_view text) { err().put(text); }
 
+void warnAll(std::span<const std::string> warnings, std::size_t from) {
+  for (std::size_t i = from; i < warnings.size(); ++i) warn("warning: " + warnings[i] + "\n");
+}
+
 void holdStandardStreams() {
   for (const int file : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (::fcntl(file, F_GETFD) != -1 || errno != EBADF) continue;

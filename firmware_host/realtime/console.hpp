@@ -6,6 +6,9 @@
 //
 // Threads: any but those of the flight path. A message goes out whole where the reader takes it.
 
+#include <cstddef>
+#include <span>
+#include <string>
 #include <string_view>
 
 namespace swiftlet {
@@ -14,6 +17,8 @@ namespace swiftlet {
 void say(std::string_view text);
 /// To stderr.
 void warn(std::string_view text);
+/// A line to stderr for each, from the `from`-th on, as a warning.
+void warnAll(std::span<const std::string> warnings, std::size_t from = 0);
 
 /// At the program's start: gives 0, 1 and 2 where they are closed to files that take and give nothing.
 /// Otherwise the first files of the run would get these numbers, and messages would be written into them.

@@ -11,12 +11,11 @@
 #include <sstream>
 #include <string_view>
 
+#include "estimator/core/units.hpp"
 #include "firmware_host/realtime/machine_files.hpp"
 
 namespace swiftlet {
 namespace {
-
-constexpr double kPercent = 100;
 
 std::optional<bool> hasCapability(const Machine& machine, unsigned capability) {
   const auto effective = machine.lineAfter("/proc/self/status", "CapEff:");

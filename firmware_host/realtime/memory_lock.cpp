@@ -18,10 +18,11 @@
 #include <numeric>
 #include <system_error>
 
+#include "estimator/core/units.hpp"
+
 namespace swiftlet {
 namespace {
 
-constexpr double kMebibyte = 1024.0 * 1024.0;
 constexpr const char* kLockRemedy =
     "give the program the right: `setcap cap_ipc_lock+ep` on it, `LimitMEMLOCK=infinity` in its systemd "
     "unit, or `ulimit -l unlimited` (memlock in /etc/security/limits.conf)";
@@ -54,8 +55,6 @@ bool mayLockBeyondLimit() {
   }
   return false;
 }
-
-std::string errorText(int error) { return std::generic_category().message(error); }
 
 int threadsOfProcess() {
   std::error_code error;
@@ -96,13 +95,14 @@ MemoryLockReport lockMemory() {
     return report;
   }
   const int error = errno;
-  report.message = limited
-                       ? fmt::format(
-                             "memory is not locked ({}): {:.1f} MiB are mapped, RLIMIT_MEMLOCK allows {:.1f} "
-                             "MiB; {}",
-                             errorText(error), static_cast<double>(report.mapped_bytes) / kMebibyte,
-                             static_cast<double>(report.limit_bytes) / kMebibyte, kLockRemedy)
-                       : fmt::format("memory is not locked ({}): {}", errorText(error), kLockRemedy);
+  report.message =
+      limited
+          ? fmt::format(
+                "memory is not locked ({}): {:.1f} MiB are mapped, RLIMIT_MEMLOCK allows {:.1f} "
+                "MiB; {}",
+                std::generic_category().message(error), static_cast<double>(report.mapped_bytes) / kMebibyte,
+                static_cast<double>(report.limit_bytes) / kMebibyte, kLockRemedy)
+          : fmt::format("memory is not locked ({}): {}", std::generic_category().message(error), kLockRemedy);
   return report;
 }
 
@@ -198,7 +198,6 @@ std::int64_t MemoryTable::total() const {
 }
 
 std::string MemoryTable::text() const {
-  constexpr double kPercent = 100;
   constexpr std::string_view kTotal = "total";
   std::size_t width = kTotal.size();
   for (const Row& row : rows_) width = std::max(width, row.what.size());

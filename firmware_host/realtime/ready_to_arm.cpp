@@ -6,11 +6,10 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "estimator/core/units.hpp"
+
 namespace swiftlet {
 namespace {
-
-constexpr double kMilli = 1e3;
-constexpr double kPercent = 100;
 
 __attribute__((format(printf, 4, 5))) void lack(ArmingVerdict& verdict, ArmingCondition condition,
                                                 const char* remedy, const char* format, ...) {
@@ -54,7 +53,7 @@ void checkClocks(const ArmingFacts& facts, const ArmingSettings& settings, Armin
   if (offset > settings.sensor_offset || offset < -settings.sensor_offset) {
     lack(verdict, ArmingCondition::kClocks, "look at the time synchronization of camera and IMU",
          "the newest IMU sample is %.1f ms after the newest image, at most %.1f ms either way are allowed",
-         offset.seconds() * kMilli, settings.sensor_offset.seconds() * kMilli);
+         offset.seconds() * kToMs, settings.sensor_offset.seconds() * kToMs);
   }
 }
 
@@ -65,7 +64,7 @@ void checkSensors(const ArmingFacts& facts, const ArmingSettings& settings, Armi
       facts.imu_rate_expected > 0 && std::abs(facts.imu_rate - facts.imu_rate_expected) <= allowed;
   if (facts.has_sample && facts.sample_age > settings.sample_age) {
     lack(verdict, ArmingCondition::kSensors, "look at the IMU's cable, its bus and its power",
-         "the IMU has delivered nothing for %.1f ms", facts.sample_age.seconds() * kMilli);
+         "the IMU has delivered nothing for %.1f ms", facts.sample_age.seconds() * kToMs);
   } else if (!at_rate) {
     lack(verdict, ArmingCondition::kSensors,
          "look at the IMU's rate in its calibration (update_rate), its settings and its bus",
@@ -83,7 +82,7 @@ void checkSensors(const ArmingFacts& facts, const ArmingSettings& settings, Armi
            "camera %d has delivered nothing", i);
     } else if (facts.image_age[camera] > settings.image_age) {
       lack(verdict, ArmingCondition::kSensors, "look at its cable and driver",
-           "camera %d has delivered nothing for %.1f ms", i, facts.image_age[camera].seconds() * kMilli);
+           "camera %d has delivered nothing for %.1f ms", i, facts.image_age[camera].seconds() * kToMs);
     }
   }
 }

@@ -16,7 +16,7 @@ constexpr std::array<LoopVerdict, 5> kVerdicts = {LoopVerdict::kSelected, LoopVe
                                                   LoopVerdict::kReleased};
 constexpr std::size_t kVerdictField = 2;
 constexpr std::size_t kFirstNumber = 3;
-constexpr std::size_t kNumbers = 10;
+constexpr std::size_t kLoopNumbers = 10;
 
 }  // namespace
 
@@ -56,10 +56,10 @@ std::vector<MapLoop> readLoops(const std::string& path) {
   LogCounters counters;
   LogWarnings warnings;
   CsvReader csv(path, CsvReader::Separator::kComma, counters, warnings);
-  constexpr std::array<const char*, kNumbers> kNames = {
+  constexpr std::array<const char*, kLoopNumbers> kNames = {
       "inliers", "p_x", "p_y", "p_z", "q_x", "q_y", "q_z", "q_w", "sigma_rotation", "sigma_translation"};
   std::vector<MapLoop> loops;
-  while (csv.next(kFirstNumber + kNumbers)) {
+  while (csv.next(kFirstNumber + kLoopNumbers)) {
     MapLoop loop;
     if (!parseNanoseconds(csv.field(0), loop.old_stamp) || !parseNanoseconds(csv.field(1), loop.new_stamp)) {
       csv.reject("stamp", "not a stamp in ns");
@@ -72,7 +72,7 @@ std::vector<MapLoop> readLoops(const std::string& path) {
       csv.reject("verdict", "not a verdict of the selection");
       continue;
     }
-    std::array<double, kNumbers> v{};
+    std::array<double, kLoopNumbers> v{};
     if (!csv.numbers(kFirstNumber, kNames, v.data())) continue;
     loop.verdict = *verdict;
     loop.inliers = static_cast<std::size_t>(std::max(v[0], 0.0));

@@ -14,7 +14,6 @@
 namespace swiftlet {
 namespace {
 
-constexpr int kPoseDim = 6;
 constexpr double kUnit = 1e-6;  // of a quaternion's norm, from 17 digits
 constexpr std::size_t kFirstVariance = 17;
 constexpr std::size_t kFirstCovariance = kFirstVariance + kStateDim;

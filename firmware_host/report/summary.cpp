@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "drivers/recorded/trajectory_file.hpp"
+#include "estimator/core/units.hpp"
 #include "estimator/messages/names.hpp"
 #include "firmware_host/budget/budget_report.hpp"
 #include "firmware_host/report/whole_file.hpp"
@@ -15,9 +16,6 @@ namespace swiftlet {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr double kMilli = 1e3;
-constexpr double kMebibyte = 1024.0 * 1024.0;
 
 Json settingsJson(const Settings& settings) {
   Settings copy = settings;
@@ -97,7 +95,7 @@ std::string histogramText(const LatencyHistogram& histogram) {
     const double to = kFirstEdge * std::pow(10.0, static_cast<double>(i + 1) / kHistogramColumnsPerDecade);
     const std::uint64_t up_to = countUpTo(histogram, to);
     if (up_to > below) {
-      text += fmt::format("{}{:.4g} {}", text.empty() ? "" : ", ", from * kMilli, up_to - below);
+      text += fmt::format("{}{:.4g} {}", text.empty() ? "" : ", ", from * kToMs, up_to - below);
     }
     below = up_to;
   }
@@ -108,11 +106,11 @@ Json distributionJson(const LatencyHistogram& histogram) {
   constexpr double kMedian = 0.5;
   constexpr double kP90 = 0.9;
   constexpr double kP99 = 0.99;
-  return {{"mean_ms", histogram.mean() * kMilli},
-          {"p50_ms", histogram.percentile(kMedian) * kMilli},
-          {"p90_ms", histogram.percentile(kP90) * kMilli},
-          {"p99_ms", histogram.percentile(kP99) * kMilli},
-          {"max_ms", histogram.max() * kMilli},
+  return {{"mean_ms", histogram.mean() * kToMs},
+          {"p50_ms", histogram.percentile(kMedian) * kToMs},
+          {"p90_ms", histogram.percentile(kP90) * kToMs},
+          {"p99_ms", histogram.percentile(kP99) * kToMs},
+          {"max_ms", histogram.max() * kToMs},
           {"total_s", histogram.total()},
           {"histogram", histogramText(histogram)}};
 }

@@ -6,6 +6,9 @@
 
 namespace swiftlet {
 
+/// Bands that are drawn around an estimate, and limits that it is judged by.
+inline constexpr double kSigmas = 3;
+
 /// From above and from the side: where the run has truth coloured by the distance from it, else by 3 sigma of
 /// the position at the nearest keyframe.
 std::vector<Plot> trajectoryPlots(const RunView& view);

@@ -2,13 +2,12 @@
 
 #include <algorithm>
 
+#include "estimator/core/units.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/evaluation/yaw_rotation.hpp"
 
 namespace swiftlet {
 namespace {
-
-constexpr double kDegrees = 57.29577951308232;
 
 PoseErrors errorsOf(const RunView& view, const Association& pairs) {
   // The attitude's own fit: that of the positions is loose over a short path.
@@ -20,7 +19,7 @@ PoseErrors errorsOf(const RunView& view, const Association& pairs) {
     errors.t.push_back(view.files.seconds(pair.stamp));
     errors.distance.push_back((pair.truth.translation - view.fit * pair.estimate.translation).norm());
     const Eigen::Quaterniond left = pair.truth.rotation.conjugate() * turn * pair.estimate.rotation;
-    errors.degrees.push_back(logSo3(left).norm() * kDegrees);
+    errors.degrees.push_back(logSo3(left).norm() * kToDegrees);
   }
   return errors;
 }

@@ -3,12 +3,12 @@
 #include <cmath>
 #include <functional>
 
+#include "estimator/core/units.hpp"
 #include "firmware_host/report_page/run_plots.hpp"
 
 namespace swiftlet {
 namespace {
 
-constexpr double kSigmas = 3;
 constexpr std::array<const char*, 3> kAxes = {"x", "y", "z"};
 
 using OfState = std::function<double(const StoredState&)>;
@@ -68,7 +68,6 @@ Plot sigmaPlot(const RunView& view, const char* id, const char* title, const cha
 
 std::vector<Plot> statePlots(const RunView& view) {
   if (view.files.states.empty()) return {};
-  constexpr double kDegrees = 57.29577951308232;
   std::vector<Plot> plots = {
       vectorPlot(view, "velocity", "Velocity", "m/s", &StoredState::v_world_body,
                  &TrajectoryPoint::v_world_body),
@@ -77,7 +76,7 @@ std::vector<Plot> statePlots(const RunView& view) {
       vectorPlot(view, "bias_accel", "Accelerometer bias", "m/s^2", &StoredState::bias_accel,
                  &TrajectoryPoint::bias_accel),
       sigmaPlot(view, "sigma_position", "3 sigma of position", "m", 1, 1),
-      sigmaPlot(view, "sigma_attitude", "3 sigma of attitude", "deg", 0, kDegrees),
+      sigmaPlot(view, "sigma_attitude", "3 sigma of attitude", "deg", 0, kToDegrees),
       sigmaPlot(view, "sigma_velocity", "3 sigma of velocity", "m/s", 2, 1),
       figurePlot(view, "features", "Features and inliers", "count",
                  {{"tracks", [](const StoredState& s) { return s.figures.tracks; }},

@@ -2,6 +2,7 @@
 
 #include <map>
 
+#include "estimator/core/units.hpp"
 #include "firmware_host/report_page/run_plots.hpp"
 #include "firmware_host/report_page/table.hpp"
 
@@ -9,8 +10,6 @@ namespace swiftlet {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr double kMebibyte = 1024.0 * 1024.0;
 
 std::string plain(const Json& json) {
   if (json.is_string()) return json.get<std::string>();
@@ -159,12 +158,11 @@ Table loopsTable(const RunView& view) {
               {"at [s]", "place of [s]", "verdict", "inliers", "1 sigma [m]", "1 sigma [deg]"},
               {},
               true};
-  constexpr double kDegrees = 57.29577951308232;
   for (const MapLoop& loop : view.files.loops) {
     table.rows.push_back({fmt::format("{:.2f}", view.files.seconds(loop.new_stamp)),
                           fmt::format("{:.2f}", view.files.seconds(loop.old_stamp)),
                           std::string(verdictName(loop.verdict)), std::to_string(loop.inliers),
-                          shown(loop.translation_sigma), shown(loop.rotation_sigma * kDegrees)});
+                          shown(loop.translation_sigma), shown(loop.rotation_sigma * kToDegrees)});
   }
   return table;
 }

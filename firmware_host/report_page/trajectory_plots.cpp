@@ -2,14 +2,12 @@
 #include <array>
 #include <cmath>
 
+#include "estimator/core/units.hpp"
 #include "firmware_host/report_page/run_plots.hpp"
 
 namespace swiftlet {
 namespace {
 
-constexpr double kDegrees = 57.29577951308232;
-constexpr double kSigmas = 3;
-constexpr double kMilli = 1e3;
 constexpr const char* kTime = "time [s]";
 
 /// The value of the sample nearest in time; `t` rises.
@@ -104,7 +102,7 @@ Plot axisError(const RunView& view, int index) {
                                                   "Position, y",
                                                   "Position, z"};
   const bool angle = index < 3;
-  const double scale = angle ? kDegrees : 1;
+  const double scale = angle ? kToDegrees : 1;
   Plot plot = overTime(kIds[static_cast<std::size_t>(index)], "Error and 3 sigma of the keyframes",
                        kTitles[static_cast<std::size_t>(index)], angle ? "deg" : "m");
   Series band{"3 sigma", SeriesStyle::kBand, {}, {}, {}};
@@ -156,7 +154,7 @@ std::vector<Plot> intervalPlots(const RunView& view) {
     Series series{"interval", SeriesStyle::kLine, {}, {}, {}};
     for (std::size_t i = 1; i < poses.size(); ++i) {
       series.x.push_back(view.files.seconds(poses[i].stamp));
-      series.y.push_back((poses[i].stamp - poses[i - 1].stamp).seconds() * kMilli);
+      series.y.push_back((poses[i].stamp - poses[i - 1].stamp).seconds() * kToMs);
     }
     plot.series.push_back(series);
     plots.push_back(plot);

@@ -9,13 +9,13 @@
 #include <cerrno>
 #include <string_view>
 
+#include "estimator/core/units.hpp"
 #include "firmware_host/pipeline/stage_timer.hpp"
 
 namespace swiftlet {
 namespace {
 
 constexpr double kLook = 0.1;  // s: how often a wait looks whether all ends
-constexpr double kMilli = 1e3;
 
 bool isHeader(std::string_view line, std::string_view name) {
   return line.size() > name.size() && line[name.size()] == ':' &&
@@ -33,7 +33,7 @@ bool Connection::wait(short events, double until) const {
     const double left = std::min(until, deadline_.load(std::memory_order_relaxed)) - now;
     if (left <= 0) return false;
     pollfd one{socket_, events, 0};
-    const int ready = ::poll(&one, 1, 1 + static_cast<int>(std::min(left, kLook) * kMilli));
+    const int ready = ::poll(&one, 1, 1 + static_cast<int>(std::min(left, kLook) * kToMs));
     if (ready > 0) return true;
     if (ready < 0 && errno != EINTR) return false;
   }

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "estimator/core/units.hpp"
 #include "estimator/messages/names.hpp"
 #include "firmware_host/report/mesh_files.hpp"
 #include "firmware_host/report/summary.hpp"
@@ -20,8 +21,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kSigmas = 3;
-constexpr double kDegrees = 57.29577951308232;
-constexpr double kMilli = 1e3;
 constexpr double kMeshPeriod = 0.4;   // s
 constexpr double kSurfacePeriod = 3;  // s
 constexpr int kPatchesBetweenTables = 5;
@@ -146,7 +145,7 @@ void LiveDocument::takeFrame(LiveOutlet& outlet) {
   if (frame_) {
     const double interval =
         (news.stamp - frame_->stamp).seconds() / static_cast<double>(number - frame_number_);
-    frame_intervals_.add(std::array{static_cast<float>(t), static_cast<float>(interval * kMilli)});
+    frame_intervals_.add(std::array{static_cast<float>(t), static_cast<float>(interval * kToMs)});
   }
   const FrameStatistics& s = news.statistics;
   const auto row = std::array<double, kFrameColumns>{t,
@@ -162,7 +161,7 @@ void LiveDocument::takeFrame(LiveOutlet& outlet) {
   std::ranges::transform(row, narrow.begin(), [](double v) { return static_cast<float>(v); });
   frames_.add(narrow);
   latency_.add(news.since_arrival);
-  latencies_.add(std::array{static_cast<float>(t), static_cast<float>(news.since_arrival * kMilli)});
+  latencies_.add(std::array{static_cast<float>(t), static_cast<float>(news.since_arrival * kToMs)});
   const std::string waits = news.has_state ? "" : news.waiting_for;
   if (waits != waiting_for_) {
     waiting_for_ = waits;
@@ -186,7 +185,7 @@ void LiveDocument::takeState(LiveOutlet& outlet, double now) {
   if (state_) {
     const double interval =
         (state.stamp - state_->stamp).seconds() / static_cast<double>(number - state_number_);
-    state_intervals_.add(std::array{static_cast<float>(t), static_cast<float>(interval * kMilli)});
+    state_intervals_.add(std::array{static_cast<float>(t), static_cast<float>(interval * kToMs)});
   }
   duration_ = std::max(duration_, t);
   std::array<float, kStateColumns> row{};
@@ -203,7 +202,7 @@ void LiveDocument::takeState(LiveOutlet& outlet, double now) {
   put(kBiasGyro, state.bias_gyro);
   put(kBiasAccel, state.bias_accel);
   put(kSigmaPosition, sigma(1));
-  put(kSigmaAttitude, sigma(0) * kDegrees);
+  put(kSigmaAttitude, sigma(0) * kToDegrees);
   put(kSigmaVelocity, sigma(2));
   row[kLargestSigma] = static_cast<float>(sigma(1).maxCoeff());
   // A failed state has no pose to be had by it.
@@ -402,7 +401,7 @@ Json LiveDocument::tablesJson() const {
   tables.push_back(table("arming", "Arming", {"condition", "what is missing", "remedy"}, rows));
   tables.push_back(
       table("supervision", "Threads and sensors at fault", {"name", "condition", "why"}, troubles));
-  const auto ms = [](double seconds) { return fmt::format("{:.2f}", seconds * kMilli); };
+  const auto ms = [](double seconds) { return fmt::format("{:.2f}", seconds * kToMs); };
   tables.push_back(
       table("latency", "Image's arrival to its pose, wall time [ms]", {"frames seen", "50 %", "99 %", "most"},
             Json::array({Json::array({std::to_string(latency_.count()), ms(latency_.percentile(0.5)),
@@ -487,7 +486,7 @@ std::string LiveDocument::text() const {
     text += fmt::format("features  {} tracks, {} and {} inliers by one and by both cameras\n", s.tracks,
                         s.inliers_mono, s.inliers_stereo);
     text += fmt::format("latency   {:.1f} ms from image to pose, 99 % {:.1f} ms\n",
-                        frame_->since_arrival * kMilli, latency_.percentile(0.99) * kMilli);
+                        frame_->since_arrival * kToMs, latency_.percentile(0.99) * kToMs);
   }
   if (!supervised_) {
     text += std::string(kUnsupervised) + "\n";
