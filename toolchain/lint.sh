@@ -2,7 +2,7 @@
 # Format and lint the project's own files.
 # usage: toolchain/lint.sh [format | tidy] [FILE...]
 #   format  clang-format: layout only, seconds
-#   tidy    clang-tidy: naming and defects, minutes; needs build/release (cmake --preset release)
+#   tidy    clang-tidy: naming and defects, minutes
 #   (nothing) both; FILE... limits either to these files
 set -eu
 cd "$(dirname "$0")/.."
@@ -31,11 +31,10 @@ if [ "$what" != tidy ]; then
 fi
 
 if [ "$what" != format ]; then
-  database=build/release/compile_commands.json
-  if [ ! -f $database ]; then
-    echo "lint: $database is missing; run cmake --preset release" >&2
-    exit 2
-  fi
+  # A configuration of its own: each file alone, with what it includes itself.
+  cmake -S . -B build/lint -G Ninja -DCMAKE_BUILD_TYPE=Release -DSWIFTLET_JOINED_UNITS=OFF \
+    -DSWIFTLET_PRECOMPILED_HEADERS=OFF >build/configure_lint.log || exit 2
+  database=build/lint/compile_commands.json
   if [ $# -gt 0 ]; then files=$*; else files=$(files_of -name '*.cpp'); fi
   # Only what this configuration compiles can be parsed.
   known=''
@@ -45,6 +44,6 @@ if [ "$what" != format ]; then
   echo "lint: clang-tidy on $(echo "$known" | wc -w) files"
   # GCC's own warning options stand in the compile commands; clang need not know them.
   echo "$known" | tr ' ' '\n' | sed '/^$/d' |
-    xargs -P "$(nproc)" -n 1 clang-tidy -p build/release --quiet --extra-arg=-Wno-unknown-warning-option
+    xargs -P "$(nproc)" -n 1 clang-tidy -p build/lint --quiet --extra-arg=-Wno-unknown-warning-option
 fi
 echo "lint: clean"

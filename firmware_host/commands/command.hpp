@@ -6,13 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "firmware_host/commands/program.hpp"  // exit codes
 #include "firmware_host/settings/settings.hpp"
 
 namespace swiftlet {
-
-inline constexpr int kExitDone = 0;
-inline constexpr int kExitFailed = 1;    ///< the run or the check failed
-inline constexpr int kExitBadInput = 2;  ///< wrong use or bad input
 
 /// The options that every command has.
 struct SettingsOptions {
@@ -43,8 +40,5 @@ void addVocabularyCommand(CLI::App& app, int& exit_code);
 void addSettingsCommand(CLI::App& app, int& exit_code);
 /// Needs all others in `app` when it runs; not in the help.
 void addManCommand(CLI::App& app, int& exit_code);
-
-/// The whole program: parses, runs, prints errors, gives the exit code.
-int runProgram(int argc, char** argv);
 
 }  // namespace swiftlet

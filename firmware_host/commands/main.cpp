@@ -1,3 +1,3 @@
-#include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/program.hpp"
 
 int main(int argc, char** argv) { return swiftlet::runProgram(argc, argv); }

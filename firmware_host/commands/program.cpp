@@ -1,3 +1,5 @@
+#include "firmware_host/commands/program.hpp"
+
 #include <fmt/format.h>
 
 #include <exception>

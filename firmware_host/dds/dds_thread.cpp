@@ -40,17 +40,6 @@ std::uint8_t levelOf(Health health) {
 /// diagnostic_msgs/DiagnosticStatus: STALE.
 constexpr std::uint8_t kStaleLevel = 3;
 
-/// Lets through once a period.
-struct Pace {
-  double period;
-  double next = 0;
-  bool due(double now) {
-    if (now < next) return false;
-    next = now + period;
-    return true;
-  }
-};
-
 }  // namespace
 
 class DdsThread::Work {
@@ -96,6 +85,17 @@ class DdsThread::Work {
   }
 
  private:
+  /// Lets through once a period.
+  struct Pace {
+    double period;
+    double next = 0;
+    bool due(double now) {
+      if (now < next) return false;
+      next = now + period;
+      return true;
+    }
+  };
+
   void run() {
     const double state_period = 1 / options_.settings.odometry_hz;
     const double turns = options_.labels != nullptr ? std::ceil(state_period / kLabelPeriod) : 1;

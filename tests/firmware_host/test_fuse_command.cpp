@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/program.hpp"
 #include "firmware_host/report/ply_file.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 

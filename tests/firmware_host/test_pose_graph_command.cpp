@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "drivers/calibration/input_error.hpp"
-#include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/pose_graph_run.hpp"
+#include "firmware_host/commands/program.hpp"
 #include "firmware_host/report/g2o_file.hpp"
 #include "mapping/pose_graph/pose_error.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"

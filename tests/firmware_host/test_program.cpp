@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "drivers/recorded/trajectory_file.hpp"
-#include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/program.hpp"
 #include "firmware_host/report/line_file.hpp"
 #include "firmware_host/report/summary.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"

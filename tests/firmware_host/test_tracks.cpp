@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "drivers/recorded/track_file.hpp"
-#include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/program.hpp"
 #include "firmware_host/commands/replay_run.hpp"
 #include "firmware_host/pipeline/track_feeder.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"

@@ -10,7 +10,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/program.hpp"
 #include "tests/logs/flight_trap.hpp"
 
 namespace swiftlet {
