@@ -83,8 +83,10 @@ int report(const ReportOptions& options) {
     std::ifstream file(page, std::ios::binary);
     html = pageWith(std::string(std::istreambuf_iterator<char>(file), {}), page, reportDocument(runs));
   }
-  writeWholeFile(options.out, html + "\n");
-  fmt::print("written to {} ({:.2f} MiB)\n", options.out, static_cast<double>(html.size()) / kMebibyte);
+  const std::string out =
+      options.out.empty() ? (fs::path(options.runs.front()) / "report.html").string() : options.out;
+  writeWholeFile(out, html + "\n");
+  fmt::print("written to {} ({:.2f} MiB)\n", out, static_cast<double>(html.size()) / kMebibyte);
   return kExitDone;
 }
 
@@ -93,9 +95,8 @@ int report(const ReportOptions& options) {
 void addReportCommand(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("report", "Show a run, or two beside each other, as one HTML file");
   auto options = std::make_shared<ReportOptions>();
-  options->out = "report.html";
   command->add_option("RUN", options->runs, "Run folder; two are compared")->required()->expected(1, 2);
-  command->add_option("--out", options->out, "File to write")->capture_default_str();
+  command->add_option("--out", options->out, "File to write; default: report.html in the (first) run folder");
   command
       ->add_option(
           "--truth", options->truth,
@@ -105,7 +106,7 @@ void addReportCommand(CLI::App& app, int& exit_code) {
   command->add_flag("--plain", options->plain, "Tables and fixed plots, which need no script");
   options->settings.addTo(*command);
   command->footer(
-      "Example:\n  swiftlet report run_mh01 --out mh01.html\n"
+      "Example:\n  swiftlet report run_mh01\n"
       "  swiftlet report run_before run_after --out compared.html");
   command->callback([options, &exit_code] { exit_code = report(*options); });
 }

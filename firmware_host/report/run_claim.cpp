@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 constexpr std::array kRunFiles = {
     "odometry.tum",        "states.csv", "events.log", "settings.yaml",  "summary.json", "imu_rate.tum",
     "imu_rate_health.csv", "map.tum",    "loops.csv",  "local_mesh.ply", "map.ply",      "map.glb",
-    "keyframes.swk"};
+    "keyframes.swk",       "report.html"};
 constexpr std::array kRunFolders = {"meshes", "recording"};
 constexpr std::size_t kNumberDigits = 6;
 constexpr std::uint32_t kLargestNumber = 999'999;

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cstdio>
 #include <fstream>
 #include <iterator>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <string_view>
@@ -102,6 +104,22 @@ void sortByPath(std::vector<SourceFile>& files) {
             [](const SourceFile& a, const SourceFile& b) { return a.path < b.path; });
 }
 
+/// Names of git's files in the root, where users leave what they made; empty: not a clone.
+std::set<std::string> trackedAtRoot() {
+  const std::string command = "git -C '" + projectRoot().string() + "' ls-files 2>/dev/null";
+  std::set<std::string> names;
+  FILE* pipe = popen(command.c_str(), "r");
+  if (pipe == nullptr) return names;
+  std::array<char, 4096> line{};
+  while (std::fgets(line.data(), static_cast<int>(line.size()), pipe) != nullptr) {
+    std::string name(line.data());
+    name.erase(name.find_last_not_of('\n') + 1);
+    if (name.find('/') == std::string::npos) names.insert(name);
+  }
+  pclose(pipe);
+  return names;
+}
+
 }  // namespace
 
 bool SourceFile::isHeader() const { return path.ends_with(".hpp"); }
@@ -151,7 +169,10 @@ std::vector<SourceFile> readSources(const std::vector<std::string>& folders) {
 
 std::vector<SourceFile> readTextFiles() {
   std::vector<SourceFile> files;
+  const std::set<std::string> tracked = trackedAtRoot();
   for (const auto& entry : fs::directory_iterator(projectRoot())) {
+    const std::string name = entry.path().filename().string();
+    if (!tracked.empty() && !tracked.contains(name)) continue;
     if (entry.is_regular_file() && isText(entry.path())) files.push_back(readFile(entry.path()));
   }
   for (const char* folder :

@@ -3,6 +3,7 @@
 #include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -65,6 +66,19 @@ TEST_CASE("evaluate compares two files; without common stamps it fails") {
   CHECK(run({"evaluate", elsewhere, "--truth", truth}) == kExitFailed);
   CHECK(run({"evaluate", estimate}) == kExitBadInput);  // nothing to compare with
   CHECK(run({"evaluate", folder.path()}) == kExitBadInput);
+}
+
+TEST_CASE("a report goes into the folder of its run") {
+  const ScratchFolder folder("report_place");
+  {
+    LineFile odometry(folder.file("odometry.tum"));
+    for (int i = 0; i < 100; ++i) {
+      odometry.write(formatTum({1'000'000'000 + i * 10'000'000LL},
+                               SE3(Eigen::Quaterniond::Identity(), {0.01 * i, 0, 0})));
+    }
+  }
+  CHECK(run({"report", folder.path(), "--plain"}) == kExitDone);
+  CHECK(std::filesystem::exists(folder.file("report.html")));
 }
 
 TEST_CASE("summary.json has what DESIGN's run folder promises") {
