@@ -20,8 +20,11 @@ if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
 endif()
 
-# Second builds are faster where ccache is installed; nothing depends on it.
-find_program(SWIFTLET_CCACHE ccache)
+# Second builds are faster where ccache is installed; nothing depends on it. A build tree that began without
+# goes on without: other commands would compile all of it again.
+if(NOT DEFINED CACHE{SWIFTLET_CCACHE})
+  find_program(SWIFTLET_CCACHE ccache)
+endif()
 mark_as_advanced(SWIFTLET_CCACHE)
 if(SWIFTLET_CCACHE AND NOT DEFINED CMAKE_CXX_COMPILER_LAUNCHER)
   # What ccache asks for where headers are precompiled.
