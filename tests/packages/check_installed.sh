@@ -87,10 +87,16 @@ if echo "$said" | grep -q '^ *settings '; then fail "doctor refuses the example:
 [ $? -le 2 ] && grep -q "$example/no" "$root/refused.txt" || fail "fly does not name the calibration that it lacks"
 echo "example of a vehicle: settings and calibration accepted"
 
+# A state folder that cannot be made or written costs a flight its files: nothing in the unit insists on it.
+unit=$root/program/lib/systemd/system/swiftlet.service
+if grep -q '^StateDirectory=' "$unit" || grep '^[^#].*/var/lib/swiftlet' "$unit" | grep -qv '=-'; then
+  fail "the unit does not start where its state folder cannot be made"
+fi
+
 # The rule that keeps a service with wrong settings from starting again.
 code=0
 "$root/program/bin/swiftlet" fly --settings "$root/nothing.yaml" --out "$root/flight" 2>/dev/null || code=$?
-grep -q "^RestartPreventExitStatus=$code\$" "$root/program/lib/systemd/system/swiftlet.service" ||
+grep -q "^RestartPreventExitStatus=$code\$" "$unit" ||
   fail "fly ends with $code on wrong settings, and the service starts it again"
 for script in postinst prerm postrm; do
   sh -n "$(dirname "$0")/../../toolchain/packaging/debian/$script" || fail "$script is no shell script"
