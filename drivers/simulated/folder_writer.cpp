@@ -11,10 +11,11 @@
 #include <stdexcept>
 #include <tuple>
 
-#include "drivers/simulated/asl_text.hpp"
-#include "drivers/simulated/image_files.hpp"
+#include "drivers/recorded/asl_text.hpp"
+#include "drivers/recorded/image_files.hpp"
 #include "drivers/simulated/parallel.hpp"
 #include "drivers/simulated/simulated_flight.hpp"
+#include "drivers/simulated/truth_text.hpp"
 
 namespace swiftlet {
 namespace {

@@ -4,11 +4,11 @@
 #include <memory>
 
 #include "estimator/core/units.hpp"
-#include "firmware_host/commands/budget_run.hpp"
 #include "firmware_host/commands/command.hpp"
-#include "firmware_host/commands/worst_case.hpp"
-#include "firmware_host/report/summary.hpp"
-#include "firmware_host/report/whole_file.hpp"
+#include "firmware_host/files/whole_file.hpp"
+#include "firmware_host/lab/budget/budget_run.hpp"
+#include "firmware_host/lab/budget/worst_case.hpp"
+#include "firmware_host/outputs/run_folder/summary.hpp"
 
 namespace swiftlet {
 namespace {

@@ -4,8 +4,8 @@
 
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
-#include "firmware_host/commands/doctor_run.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
+#include "firmware_host/runs/doctor_run.hpp"
 
 namespace swiftlet {
 namespace {

@@ -8,13 +8,13 @@
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
-#include "firmware_host/commands/evaluate_meshes.hpp"
-#include "firmware_host/commands/evaluate_run.hpp"
-#include "firmware_host/hil/hil_checks.hpp"
-#include "firmware_host/report/accuracy_report.hpp"
-#include "firmware_host/report/confusion_picture.hpp"
-#include "firmware_host/report/mesh_report.hpp"
-#include "firmware_host/report/whole_file.hpp"
+#include "firmware_host/files/whole_file.hpp"
+#include "firmware_host/lab/evaluation/accuracy_report.hpp"
+#include "firmware_host/lab/evaluation/confusion_picture.hpp"
+#include "firmware_host/lab/evaluation/evaluate_meshes.hpp"
+#include "firmware_host/lab/evaluation/evaluate_run.hpp"
+#include "firmware_host/lab/evaluation/mesh_report.hpp"
+#include "firmware_host/lab/hil/hil_checks.hpp"
 
 namespace swiftlet {
 namespace {

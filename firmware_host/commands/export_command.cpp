@@ -4,9 +4,9 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/commands/command.hpp"
-#include "firmware_host/commands/evaluate_run.hpp"
-#include "firmware_host/export/run_bag.hpp"
-#include "firmware_host/export/tum_files.hpp"
+#include "firmware_host/lab/evaluation/evaluate_run.hpp"
+#include "firmware_host/lab/export/run_bag.hpp"
+#include "firmware_host/lab/export/tum_files.hpp"
 
 namespace swiftlet {
 namespace {

@@ -5,11 +5,11 @@
 
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
-#include "firmware_host/commands/fly_run.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
 #include "firmware_host/commands/view_option.hpp"
+#include "firmware_host/outputs/run_folder/summary.hpp"
 #include "firmware_host/realtime/console.hpp"
-#include "firmware_host/report/summary.hpp"
+#include "firmware_host/runs/fly_run.hpp"
 
 namespace swiftlet {
 namespace {

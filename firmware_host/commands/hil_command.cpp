@@ -5,7 +5,7 @@
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
-#include "firmware_host/hil/hil_run.hpp"
+#include "firmware_host/lab/hil/hil_run.hpp"
 #include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {

@@ -8,7 +8,7 @@
 
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/man_page.hpp"
-#include "firmware_host/report/summary.hpp"
+#include "firmware_host/outputs/run_folder/summary.hpp"
 
 namespace swiftlet {
 namespace {

@@ -5,8 +5,8 @@
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
-#include "firmware_host/commands/mesh_run.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
+#include "firmware_host/lab/modules/mesh_run.hpp"
 
 namespace swiftlet {
 namespace {

@@ -4,8 +4,8 @@
 
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
-#include "firmware_host/commands/place_run.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
+#include "firmware_host/lab/modules/place_run.hpp"
 #include "mapping/place/place_database.hpp"
 
 namespace swiftlet {

@@ -7,7 +7,7 @@
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
-#include "firmware_host/commands/pose_graph_run.hpp"
+#include "firmware_host/lab/modules/pose_graph_run.hpp"
 
 namespace swiftlet {
 namespace {

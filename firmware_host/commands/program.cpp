@@ -6,8 +6,9 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/lab_commands.hpp"
+#include "firmware_host/outputs/run_folder/summary.hpp"
 #include "firmware_host/realtime/console.hpp"
-#include "firmware_host/report/summary.hpp"
 
 namespace swiftlet {
 
@@ -20,23 +21,13 @@ int runProgram(int argc, char** argv) {
       "Example:\n  swiftlet replay data/euroc_mh01_20s --out run_mh01\n"
       "`swiftlet <command> --help` explains each command.");
   int exit_code = kExitDone;
-  addSimulateCommand(app, exit_code);
   addReplayCommand(app, exit_code);
   addFlyCommand(app, exit_code);
   addSmoothCommand(app, exit_code);
   addRecordCommand(app, exit_code);
   addDoctorCommand(app, exit_code);
-  addHilCommand(app, exit_code);
-  addEvaluateCommand(app, exit_code);
-  addExportCommand(app, exit_code);
-  addReportCommand(app, exit_code);
-  addMeshCommand(app, exit_code);
-  addFuseCommand(app, exit_code);
-  addPlaceCommand(app, exit_code);
-  addPoseGraphCommand(app, exit_code);
-  addBudgetCommand(app, exit_code);
-  addVocabularyCommand(app, exit_code);
   addSettingsCommand(app, exit_code);
+  addLabCommands(app, exit_code);
   addManCommand(app, exit_code);
   try {
     app.parse(argc, argv);

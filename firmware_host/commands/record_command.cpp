@@ -5,9 +5,9 @@
 
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
-#include "firmware_host/commands/record_run.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
 #include "firmware_host/realtime/console.hpp"
+#include "firmware_host/runs/record_run.hpp"
 
 namespace swiftlet {
 namespace {

@@ -6,11 +6,12 @@
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
-#include "firmware_host/commands/replay_run.hpp"
+#include "firmware_host/commands/lab_commands.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
 #include "firmware_host/commands/view_option.hpp"
+#include "firmware_host/outputs/run_folder/summary.hpp"
 #include "firmware_host/realtime/console.hpp"
-#include "firmware_host/report/summary.hpp"
+#include "firmware_host/runs/replay_run.hpp"
 
 namespace swiftlet {
 namespace {
@@ -45,6 +46,7 @@ int replay(const ReplayOptions& options) {
   ReplayRequest request = options.request;
   request.stop = &stopOnSignal();
   request.show_progress = true;
+  request.accuracy = labAccuracy();
   request.view = options.view.read();
   if (options.until >= 0) request.until = options.until;
   if (!options.calibration.empty()) request.calibration = options.calibration[0];

@@ -9,10 +9,11 @@
 #include "estimator/core/units.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
-#include "firmware_host/commands/evaluate_run.hpp"
-#include "firmware_host/report/confusion_picture.hpp"
-#include "firmware_host/report/whole_file.hpp"
-#include "firmware_host/report_page/page.hpp"
+#include "firmware_host/files/whole_file.hpp"
+#include "firmware_host/lab/evaluation/confusion_picture.hpp"
+#include "firmware_host/lab/evaluation/evaluate_run.hpp"
+#include "firmware_host/lab/report/plain_page.hpp"
+#include "firmware_host/outputs/page/page.hpp"
 
 namespace swiftlet {
 namespace {

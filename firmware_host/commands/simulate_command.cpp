@@ -8,7 +8,7 @@
 #include "drivers/simulated/folder_writer.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
-#include "firmware_host/report/progress.hpp"
+#include "firmware_host/realtime/progress.hpp"
 
 namespace swiftlet {
 namespace {

@@ -3,9 +3,9 @@
 #include <memory>
 
 #include "firmware_host/commands/command.hpp"
-#include "firmware_host/commands/smooth_run.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
 #include "firmware_host/realtime/console.hpp"
+#include "firmware_host/runs/smooth_run.hpp"
 
 namespace swiftlet {
 namespace {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "firmware_host/view/view_address.hpp"
+#include "firmware_host/outputs/view/view_address.hpp"
 
 namespace swiftlet {
 

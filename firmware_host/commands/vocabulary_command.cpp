@@ -4,8 +4,8 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/commands/command.hpp"
-#include "firmware_host/places/vocabulary_file.hpp"
-#include "firmware_host/places/vocabulary_images.hpp"
+#include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
+#include "firmware_host/lab/modules/vocabulary_images.hpp"
 #include "mapping/place/place_extractor.hpp"
 #include "mapping/place/vocabulary_training.hpp"
 

@@ -1,6 +1,6 @@
 #include "firmware_host/graph/flight_recorder.hpp"
 
-#include "firmware_host/pipeline/stage_timer.hpp"
+#include "firmware_host/realtime/stage_timer.hpp"
 
 namespace swiftlet {
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "firmware_host/pipeline/packed_copy.hpp"
+#include "firmware_host/interfaces/packed_copy.hpp"
 
 namespace swiftlet {
 

@@ -11,20 +11,13 @@
 #include "estimator/core/fixed_vector.hpp"
 #include "firmware_host/graph/images.hpp"
 #include "firmware_host/graph/messages.hpp"
-#include "firmware_host/pipeline/label_exchange.hpp"
+#include "firmware_host/interfaces/label_exchange.hpp"
+#include "firmware_host/interfaces/run_listener.hpp"
 
 namespace swiftlet {
 
 class HeldFrames {
  public:
-  struct Counters {
-    std::uint64_t labelled = 0;    ///< frames mapped with labels that came in time
-    std::uint64_t late = 0;        ///< without: they did not come in time
-    std::uint64_t no_room = 0;     ///< without: too many others waited behind it
-    std::uint64_t nobody = 0;      ///< without: nobody was there to label it
-    std::uint64_t longest_ms = 0;  ///< that a frame was held
-  };
-
   struct Frame {
     MapMessage message;
     bool has_images = false;
@@ -54,14 +47,14 @@ class HeldFrames {
   [[nodiscard]] const Frame* due(double now);
   void drop();
 
-  [[nodiscard]] const Counters& counters() const { return counters_; }
+  [[nodiscard]] const HeldFrameCounters& counters() const { return counters_; }
 
  private:
   LabelExchange& exchange_;
   std::array<Frame, LabelExchange::kPlaces> frames_;
   std::size_t first_ = 0, count_ = 0;
   bool taken_ = false;  ///< due() gave the oldest
-  Counters counters_;
+  HeldFrameCounters counters_;
 };
 
 }  // namespace swiftlet

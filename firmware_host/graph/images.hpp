@@ -12,7 +12,7 @@
 #include "estimator/messages/frames.hpp"
 #include "estimator/messages/scene_images.hpp"
 #include "firmware_host/graph/port.hpp"
-#include "firmware_host/pipeline/host_times.hpp"
+#include "firmware_host/interfaces/host_times.hpp"
 
 namespace swiftlet {
 

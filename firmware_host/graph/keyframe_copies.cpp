@@ -1,6 +1,6 @@
 #include "firmware_host/graph/keyframe_copies.hpp"
 
-#include "firmware_host/pipeline/packed_copy.hpp"
+#include "firmware_host/interfaces/packed_copy.hpp"
 
 namespace swiftlet {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "estimator/odometry/stamp_guard.hpp"
-#include "firmware_host/graph/run_listener.hpp"
-#include "firmware_host/pipeline/packed_copy.hpp"
+#include "firmware_host/interfaces/packed_copy.hpp"
+#include "firmware_host/interfaces/run_listener.hpp"
 
 namespace swiftlet {
 MappingNode::MappingNode(GraphContext& context)

@@ -16,7 +16,7 @@
 #include "firmware_host/graph/images.hpp"
 #include "firmware_host/graph/messages.hpp"
 #include "firmware_host/graph/node.hpp"
-#include "firmware_host/pipeline/fault_counts.hpp"
+#include "firmware_host/interfaces/fault_counts.hpp"
 #include "mapping/map/map_stage.hpp"
 
 namespace swiftlet {

@@ -1,6 +1,6 @@
 #include "firmware_host/graph/mesh_node.hpp"
 
-#include "firmware_host/graph/run_listener.hpp"
+#include "firmware_host/interfaces/run_listener.hpp"
 
 namespace swiftlet {
 

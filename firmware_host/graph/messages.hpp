@@ -19,8 +19,8 @@
 #include "estimator/messages/state_fix.hpp"
 #include "estimator/messages/step_record.hpp"
 #include "estimator/messages/tracked_frame.hpp"
-#include "firmware_host/pipeline/host_times.hpp"
-#include "firmware_host/pipeline/stage_timer.hpp"
+#include "firmware_host/interfaces/host_times.hpp"
+#include "firmware_host/realtime/stage_timer.hpp"
 #include "mapping/loop/loop_report.hpp"
 #include "mapping/map/volume_correction.hpp"
 

@@ -11,7 +11,7 @@
 #include "firmware_host/graph/graph_options.hpp"
 #include "firmware_host/graph/node.hpp"
 #include "firmware_host/graph/sample_in.hpp"
-#include "firmware_host/pipeline/fault_counts.hpp"
+#include "firmware_host/interfaces/fault_counts.hpp"
 
 namespace swiftlet {
 

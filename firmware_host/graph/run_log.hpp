@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "firmware_host/graph/messages.hpp"
-#include "firmware_host/graph/run_listener.hpp"
-#include "firmware_host/pipeline/full_smoothing.hpp"
-#include "firmware_host/pipeline/map_keeper.hpp"
+#include "firmware_host/interfaces/run_listener.hpp"
+#include "firmware_host/smoothing/full_smoothing.hpp"
+#include "firmware_host/smoothing/map_keeper.hpp"
 #include "mapping/loop/loop_stage.hpp"
 
 namespace swiftlet {

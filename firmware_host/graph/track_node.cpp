@@ -1,8 +1,8 @@
 #include "firmware_host/graph/track_node.hpp"
 
 #include "estimator/odometry/stamp_guard.hpp"
-#include "firmware_host/graph/run_listener.hpp"
 #include "firmware_host/graph/sensor_node.hpp"
+#include "firmware_host/interfaces/run_listener.hpp"
 
 namespace swiftlet {
 

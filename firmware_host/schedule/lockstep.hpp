@@ -3,8 +3,8 @@
 // in.
 
 #include "firmware_host/graph/graph.hpp"
-#include "firmware_host/pipeline/log_feed.hpp"
-#include "firmware_host/pipeline/run_control.hpp"
+#include "firmware_host/inputs/log/log_feed.hpp"
+#include "firmware_host/interfaces/run_control.hpp"
 
 namespace swiftlet {
 

@@ -11,7 +11,7 @@
 
 #include "drivers/recorded/recording_source.hpp"
 #include "firmware_host/graph/graph.hpp"
-#include "firmware_host/pipeline/run_control.hpp"
+#include "firmware_host/interfaces/run_control.hpp"
 
 namespace swiftlet {
 

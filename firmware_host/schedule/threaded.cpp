@@ -7,7 +7,7 @@
 #include <span>
 
 #include "drivers/device/monotonic_now.hpp"
-#include "firmware_host/pipeline/host_sleep.hpp"
+#include "firmware_host/realtime/host_sleep.hpp"
 
 namespace swiftlet {
 namespace {

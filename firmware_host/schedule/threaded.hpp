@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "firmware_host/graph/graph.hpp"
-#include "firmware_host/pipeline/run_control.hpp"
-#include "firmware_host/pipeline/sensor_input.hpp"
+#include "firmware_host/interfaces/run_control.hpp"
+#include "firmware_host/interfaces/sensor_input.hpp"
 #include "firmware_host/realtime/flight_thread.hpp"
 #include "firmware_host/settings/settings.hpp"
 

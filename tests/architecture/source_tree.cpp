@@ -125,13 +125,21 @@ std::set<std::string> trackedAtRoot() {
 bool SourceFile::isHeader() const { return path.ends_with(".hpp"); }
 
 std::string SourceFile::room() const {
-  const std::size_t first = path.find('/');
-  if (first == std::string::npos) return "";
-  const std::string top = path.substr(0, first);
-  // The program and the tests are one room each; elsewhere the second folder is the room.
-  if (top == "firmware_host" || top == "tests" || top == "mesher") return top;
-  const std::size_t second = path.find('/', first + 1);
-  return second == std::string::npos ? top : path.substr(0, second);
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  if (folder.empty()) return "";
+  const std::string top = *folder.begin();
+  // The tests and the mesher are one room each; of the program, inputs, outputs and lab are groups of rooms.
+  std::size_t depth = top == "tests" || top == "mesher" ? 1 : 2;
+  if (top == "firmware_host") {
+    const std::string group = folder == top ? "" : std::next(folder.begin())->string();
+    if (group == "inputs" || group == "outputs" || group == "lab") depth = 3;
+  }
+  std::filesystem::path room;
+  for (const std::filesystem::path& part : folder) {
+    if (depth-- == 0) break;
+    room /= part;
+  }
+  return room.string();
 }
 
 std::string describe(const std::vector<Violation>& violations) {

@@ -16,7 +16,7 @@ struct SourceFile {
   std::vector<std::string> code_lines;  ///< comments and literals blanked, same numbering
 
   [[nodiscard]] bool isHeader() const;
-  /// The folder, as the room table names it: "estimator/core", "mapping/volume", "firmware_host".
+  /// The folder, as the room table names it: "estimator/core", "mesher", "firmware_host/lab/hil".
   [[nodiscard]] std::string room() const;
 };
 

@@ -36,14 +36,15 @@ TEST_CASE("comments and literals are no code, line numbers stay") {
 
 TEST_CASE("rooms are folders of the table") {
   CHECK(parseSource("estimator/core/stamp.hpp", "").room() == "estimator/core");
-  CHECK(parseSource("firmware_host/commands/replay.cpp", "").room() == "firmware_host");
+  CHECK(parseSource("firmware_host/commands/replay.cpp", "").room() == "firmware_host/commands");
+  CHECK(parseSource("firmware_host/lab/hil/hil_run.cpp", "").room() == "firmware_host/lab/hil");
   CHECK(parseSource("mesher/plane.hpp", "").room() == "mesher");
   CHECK(parseSource("mapping/volume/block.hpp", "").room() == "mapping/volume");
 }
 
 TEST_CASE("locks are found by include and by name") {
   const auto locks = [](const std::string& text) {
-    return checkNoLocks(parseSource("firmware_host/pipeline/a.cpp", text)).size();
+    return checkNoLocks(parseSource("firmware_host/graph/a.cpp", text)).size();
   };
   CHECK(locks("#include <mutex>\n") == 1);
   CHECK(locks("std::scoped_lock guard(m);\n") == 1);
@@ -74,7 +75,11 @@ TEST_CASE("include directions: forbidden, allowed and unknown") {
   CHECK(includes("estimator/odometry/a.cpp", "estimator/core/stamp.hpp").empty());
   CHECK(includes("mapping/surface/a.cpp", "mapping/volume/block.hpp").empty());
   CHECK(includes("drivers/recorded/a.cpp", "estimator/imu/imu_noise.hpp").empty());
-  CHECK(includes("firmware_host/a.cpp", "estimator/odometry/odometry.hpp").empty());
+  CHECK(includes("firmware_host/graph/a.cpp", "estimator/odometry/odometry.hpp").empty());
+  CHECK(includes("firmware_host/lab/hil/a.cpp", "firmware_host/inputs/devices/b.hpp").empty());
+  CHECK(includes("firmware_host/runs/a.cpp", "firmware_host/lab/hil/b.hpp").size() == 1);
+  CHECK(includes("firmware_host/graph/a.cpp", "firmware_host/inputs/log/b.hpp").size() == 1);
+  CHECK(includes("estimator/core/a.hpp", "firmware_host/realtime/b.hpp").size() == 1);
 
   CHECK(includes("estimator/frontend/a.cpp", "estimator/smoother/state.hpp").size() == 1);
   CHECK(includes("mapping/volume/a.cpp", "mapping/surface/a.hpp").size() == 1);

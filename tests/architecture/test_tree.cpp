@@ -67,13 +67,13 @@ TEST_CASE("the flight path has no locks, exceptions, heap calls or clocks") {
 
 TEST_CASE("the program's flight path has no locks") {
   // The executor, the threads of devices with their drivers, and followers at a real-time priority.
-  static const std::vector<std::string> kFolders = {"firmware_host/pipeline",
+  static const std::vector<std::string> kFolders = {"firmware_host/interfaces",
                                                     "firmware_host/graph",
                                                     "firmware_host/schedule",
                                                     "firmware_host/supervisor",
                                                     "firmware_host/realtime",
-                                                    "firmware_host/live",
-                                                    "firmware_host/autopilot",
+                                                    "firmware_host/inputs",
+                                                    "firmware_host/outputs/autopilot",
                                                     "drivers/device",
                                                     "drivers/v4l2",
                                                     "drivers/serial",

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "firmware_host/report/g2o_file.hpp"
+#include "firmware_host/lab/modules/g2o_file.hpp"
 #include "mapping/pose_graph/pose_graph_optimizer.hpp"
 #include "tests/benchmark/pose_graph_ceres.hpp"
 #include "tests/mapping/graph_data.hpp"

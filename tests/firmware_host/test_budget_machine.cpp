@@ -17,8 +17,8 @@
 #include <thread>
 #include <vector>
 
-#include "firmware_host/budget/bare_timer_loop.hpp"
-#include "firmware_host/budget/load_generator.hpp"
+#include "firmware_host/lab/budget/bare_timer_loop.hpp"
+#include "firmware_host/lab/budget/load_generator.hpp"
 
 namespace {
 

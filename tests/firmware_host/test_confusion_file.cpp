@@ -4,7 +4,7 @@
 #include <fstream>
 
 #include "drivers/calibration/input_error.hpp"
-#include "firmware_host/commands/confusion_file.hpp"
+#include "firmware_host/settings/confusion_file.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 using namespace swiftlet;

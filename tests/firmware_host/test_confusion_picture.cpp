@@ -6,7 +6,7 @@
 #include <string>
 
 #include "drivers/calibration/input_error.hpp"
-#include "firmware_host/report/confusion_picture.hpp"
+#include "firmware_host/lab/evaluation/confusion_picture.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 using namespace swiftlet;

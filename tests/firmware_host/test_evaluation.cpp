@@ -8,12 +8,12 @@
 
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
-#include "firmware_host/evaluation/accuracy.hpp"
-#include "firmware_host/evaluation/common_stamps.hpp"
-#include "firmware_host/evaluation/consistency.hpp"
-#include "firmware_host/evaluation/loop_accuracy.hpp"
-#include "firmware_host/evaluation/revisits.hpp"
-#include "firmware_host/report/loops_csv.hpp"
+#include "firmware_host/lab/evaluation/accuracy.hpp"
+#include "firmware_host/lab/evaluation/common_stamps.hpp"
+#include "firmware_host/lab/evaluation/consistency.hpp"
+#include "firmware_host/lab/evaluation/loop_accuracy.hpp"
+#include "firmware_host/lab/evaluation/revisits.hpp"
+#include "firmware_host/outputs/run_folder/loops_csv.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {

@@ -8,9 +8,9 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "estimator/geometry/so3.hpp"
-#include "firmware_host/export/run_bag.hpp"
-#include "firmware_host/export/tum_files.hpp"
-#include "firmware_host/report/states_csv.hpp"
+#include "firmware_host/lab/export/run_bag.hpp"
+#include "firmware_host/lab/export/tum_files.hpp"
+#include "firmware_host/outputs/run_folder/states_csv.hpp"
 #include "tests/firmware_host/exported_run.hpp"
 
 namespace swiftlet {

@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 
 #include "drivers/calibration/input_error.hpp"
-#include "firmware_host/hil/fault_timeline.hpp"
+#include "firmware_host/lab/hil/fault_timeline.hpp"
 
 namespace swiftlet {
 namespace {

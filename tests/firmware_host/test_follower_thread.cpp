@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "drivers/device/monotonic_now.hpp"
-#include "firmware_host/pipeline/follower_thread.hpp"
+#include "firmware_host/interfaces/follower_thread.hpp"
 
 namespace swiftlet {
 namespace {

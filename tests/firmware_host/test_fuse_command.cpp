@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "firmware_host/commands/program.hpp"
-#include "firmware_host/report/ply_file.hpp"
+#include "firmware_host/outputs/map_files/ply_file.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {

@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "estimator/core/random.hpp"
-#include "firmware_host/commands/given_pose_window.hpp"
-#include "firmware_host/commands/given_poses.hpp"
+#include "firmware_host/lab/modules/given_pose_window.hpp"
+#include "firmware_host/lab/modules/given_poses.hpp"
 
 namespace swiftlet {
 namespace {

@@ -13,7 +13,7 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
-#include "firmware_host/report/kept_map.hpp"
+#include "firmware_host/outputs/map_files/kept_map.hpp"
 #include "mapping/surface/surface_stage.hpp"
 #include "tests/mapping/volume_scene.hpp"
 

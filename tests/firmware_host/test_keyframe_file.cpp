@@ -10,8 +10,8 @@
 #include <string>
 
 #include "drivers/calibration/input_error.hpp"
-#include "firmware_host/pipeline/keyframe_reader.hpp"
-#include "firmware_host/pipeline/map_keeper.hpp"
+#include "firmware_host/smoothing/keyframe_reader.hpp"
+#include "firmware_host/smoothing/map_keeper.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {

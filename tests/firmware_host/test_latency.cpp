@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "estimator/core/random.hpp"
-#include "firmware_host/pipeline/latency_histogram.hpp"
+#include "firmware_host/realtime/latency_histogram.hpp"
 
 namespace swiftlet {
 namespace {

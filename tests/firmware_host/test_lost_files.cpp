@@ -9,10 +9,10 @@
 #include <thread>
 
 #include "drivers/calibration/input_error.hpp"
-#include "firmware_host/commands/run_output.hpp"
-#include "firmware_host/pipeline/lost_files.hpp"
-#include "firmware_host/pipeline/map_keeper.hpp"
-#include "firmware_host/report/run_recorder.hpp"
+#include "firmware_host/files/lost_files.hpp"
+#include "firmware_host/outputs/run_folder/run_recorder.hpp"
+#include "firmware_host/runs/run_output.hpp"
+#include "firmware_host/smoothing/map_keeper.hpp"
 #include "tests/firmware_host/file_size_limit.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 

@@ -3,8 +3,8 @@
 #include <catch2/catch.hpp>
 
 #include "estimator/geometry/so3.hpp"
-#include "firmware_host/evaluation/label_confusion.hpp"
-#include "firmware_host/evaluation/mesh_accuracy.hpp"
+#include "firmware_host/lab/evaluation/label_confusion.hpp"
+#include "firmware_host/lab/evaluation/mesh_accuracy.hpp"
 
 namespace swiftlet {
 namespace {

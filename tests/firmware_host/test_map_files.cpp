@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "drivers/calibration/input_error.hpp"
-#include "firmware_host/report/map_files.hpp"
-#include "firmware_host/report/ply_file.hpp"
+#include "firmware_host/outputs/map_files/map_files.hpp"
+#include "firmware_host/outputs/map_files/ply_file.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {

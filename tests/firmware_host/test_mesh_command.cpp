@@ -12,10 +12,10 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
-#include "firmware_host/commands/mesh_run.hpp"
 #include "firmware_host/commands/program.hpp"
-#include "firmware_host/report/line_file.hpp"
-#include "firmware_host/report/ply_file.hpp"
+#include "firmware_host/files/line_file.hpp"
+#include "firmware_host/lab/modules/mesh_run.hpp"
+#include "firmware_host/outputs/map_files/ply_file.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {

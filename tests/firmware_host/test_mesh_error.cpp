@@ -14,12 +14,12 @@
 #include "drivers/calibration/input_error.hpp"
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
-#include "firmware_host/commands/evaluate_meshes.hpp"
-#include "firmware_host/commands/evaluate_run.hpp"
 #include "firmware_host/commands/program.hpp"
-#include "firmware_host/report/line_file.hpp"
-#include "firmware_host/report/mesh_frames.hpp"
-#include "firmware_host/report/ply_file.hpp"
+#include "firmware_host/files/line_file.hpp"
+#include "firmware_host/lab/evaluation/evaluate_meshes.hpp"
+#include "firmware_host/lab/evaluation/evaluate_run.hpp"
+#include "firmware_host/lab/evaluation/mesh_frames.hpp"
+#include "firmware_host/outputs/map_files/ply_file.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {

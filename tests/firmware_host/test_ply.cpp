@@ -11,7 +11,7 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "estimator/core/random.hpp"
-#include "firmware_host/report/ply_file.hpp"
+#include "firmware_host/outputs/map_files/ply_file.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {

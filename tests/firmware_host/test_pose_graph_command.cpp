@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "drivers/calibration/input_error.hpp"
-#include "firmware_host/commands/pose_graph_run.hpp"
 #include "firmware_host/commands/program.hpp"
-#include "firmware_host/report/g2o_file.hpp"
+#include "firmware_host/lab/modules/g2o_file.hpp"
+#include "firmware_host/lab/modules/pose_graph_run.hpp"
 #include "mapping/pose_graph/pose_error.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 

@@ -12,8 +12,8 @@
 
 #include "drivers/recorded/trajectory_file.hpp"
 #include "firmware_host/commands/program.hpp"
-#include "firmware_host/report/line_file.hpp"
-#include "firmware_host/report/summary.hpp"
+#include "firmware_host/files/line_file.hpp"
+#include "firmware_host/outputs/run_folder/summary.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {

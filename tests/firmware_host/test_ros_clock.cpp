@@ -2,7 +2,7 @@
 
 #include <cstdlib>
 
-#include "firmware_host/dds/ros_clock.hpp"
+#include "firmware_host/outputs/ros2/ros_clock.hpp"
 
 namespace swiftlet {
 namespace {

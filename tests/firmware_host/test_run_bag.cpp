@@ -12,8 +12,8 @@
 #include <tuple>
 
 #include "drivers/calibration/input_error.hpp"
-#include "firmware_host/export/bag_messages.hpp"
-#include "firmware_host/export/run_bag.hpp"
+#include "firmware_host/lab/export/bag_messages.hpp"
+#include "firmware_host/lab/export/run_bag.hpp"
 #include "tests/firmware_host/exported_run.hpp"
 
 namespace swiftlet {

@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "drivers/calibration/input_error.hpp"
-#include "firmware_host/commands/fly_run.hpp"
-#include "firmware_host/report/run_claim.hpp"
+#include "firmware_host/files/run_claim.hpp"
+#include "firmware_host/runs/fly_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "firmware_host/report/spilled_surface.hpp"
+#include "firmware_host/outputs/map_files/spilled_surface.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 using namespace swiftlet;

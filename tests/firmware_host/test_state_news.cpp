@@ -4,7 +4,7 @@
 
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
-#include "firmware_host/pipeline/state_news.hpp"
+#include "firmware_host/interfaces/state_news.hpp"
 
 namespace swiftlet {
 namespace {

@@ -9,8 +9,8 @@
 #include "drivers/recorded/trajectory_file.hpp"
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
-#include "firmware_host/report/line_file.hpp"
-#include "firmware_host/report/states_csv.hpp"
+#include "firmware_host/files/line_file.hpp"
+#include "firmware_host/outputs/run_folder/states_csv.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {

@@ -19,8 +19,8 @@
 #include <string>
 
 #include "firmware_host/commands/stop_signal.hpp"
-#include "firmware_host/pipeline/stage_timer.hpp"
 #include "firmware_host/realtime/console.hpp"
+#include "firmware_host/realtime/stage_timer.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {

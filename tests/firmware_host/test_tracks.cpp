@@ -10,8 +10,9 @@
 
 #include "drivers/recorded/track_file.hpp"
 #include "firmware_host/commands/program.hpp"
-#include "firmware_host/commands/replay_run.hpp"
-#include "firmware_host/pipeline/track_feeder.hpp"
+#include "firmware_host/inputs/log/track_feeder.hpp"
+#include "firmware_host/lab/evaluation/evaluate_run.hpp"
+#include "firmware_host/runs/replay_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {
@@ -97,6 +98,7 @@ TEST_CASE("the run says how many tracks were too many") {
   text.insert(text.find(stamp) + 1, crowd);
   std::ofstream(file, std::ios::binary) << text;
   ReplayRequest request;
+  request.accuracy = runAccuracyJson;
   request.log = flight;
   request.out = folder.file("run");
   const ReplayResult result = runReplay(request, Settings{});

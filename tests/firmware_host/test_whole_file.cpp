@@ -11,14 +11,14 @@
 #include <vector>
 
 #include "drivers/calibration/input_error.hpp"
-#include "firmware_host/report/g2o_file.hpp"
-#include "firmware_host/report/kept_map.hpp"
-#include "firmware_host/report/loops_csv.hpp"
-#include "firmware_host/report/map_files.hpp"
-#include "firmware_host/report/map_mesh.hpp"
-#include "firmware_host/report/ply_file.hpp"
-#include "firmware_host/report/summary.hpp"
-#include "firmware_host/report/whole_file.hpp"
+#include "firmware_host/files/whole_file.hpp"
+#include "firmware_host/lab/modules/g2o_file.hpp"
+#include "firmware_host/outputs/map_files/kept_map.hpp"
+#include "firmware_host/outputs/map_files/map_files.hpp"
+#include "firmware_host/outputs/map_files/map_mesh.hpp"
+#include "firmware_host/outputs/map_files/ply_file.hpp"
+#include "firmware_host/outputs/run_folder/loops_csv.hpp"
+#include "firmware_host/outputs/run_folder/summary.hpp"
 #include "tests/firmware_host/file_size_limit.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 

@@ -8,7 +8,7 @@
 #include "drivers/recorded/recording_checksum.hpp"
 #include "drivers/recorded/recording_format.hpp"
 #include "estimator/smoother/full_smoother.hpp"
-#include "firmware_host/pipeline/keyframe_reader.hpp"
+#include "firmware_host/smoothing/keyframe_reader.hpp"
 #include "tests/fuzz/demand.hpp"
 
 namespace swiftlet::fuzz {

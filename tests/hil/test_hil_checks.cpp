@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "firmware_host/hil/hil_checks.hpp"
+#include "firmware_host/lab/hil/hil_checks.hpp"
 #include "tests/firmware_host/xml_reader.hpp"
 
 namespace swiftlet {

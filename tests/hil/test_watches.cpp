@@ -2,9 +2,9 @@
 
 #include <vector>
 
-#include "firmware_host/live/device_journal.hpp"
-#include "firmware_host/live/image_watch.hpp"
-#include "firmware_host/live/rate_watch.hpp"
+#include "firmware_host/inputs/devices/image_watch.hpp"
+#include "firmware_host/inputs/devices/rate_watch.hpp"
+#include "firmware_host/interfaces/device_journal.hpp"
 
 namespace swiftlet {
 namespace {

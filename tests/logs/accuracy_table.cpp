@@ -17,7 +17,8 @@
 #include <limits>
 
 #include "drivers/calibration/input_error.hpp"
-#include "firmware_host/commands/replay_run.hpp"
+#include "firmware_host/lab/evaluation/evaluate_run.hpp"
+#include "firmware_host/runs/replay_run.hpp"
 #include "tests/logs/accuracy_rows.hpp"
 #include "tests/logs/log_data.hpp"
 

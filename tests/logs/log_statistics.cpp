@@ -18,9 +18,9 @@
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/open_log.hpp"
 #include "estimator/geometry/so3.hpp"
-#include "firmware_host/evaluation/association.hpp"
-#include "firmware_host/evaluation/consistency.hpp"
-#include "firmware_host/graph/run_listener.hpp"
+#include "firmware_host/interfaces/run_listener.hpp"
+#include "firmware_host/lab/evaluation/association.hpp"
+#include "firmware_host/lab/evaluation/consistency.hpp"
 #include "firmware_host/schedule/lockstep.hpp"
 #include "tests/support/statistics.hpp"
 

@@ -15,11 +15,11 @@
 #include <string>
 
 #include "drivers/recorded/open_log.hpp"
-#include "firmware_host/commands/fly_threaded.hpp"
-#include "firmware_host/pipeline/log_player.hpp"
-#include "firmware_host/pipeline/map_keeper.hpp"
-#include "firmware_host/report/memory_use.hpp"
-#include "firmware_host/report/run_recorder.hpp"
+#include "firmware_host/inputs/log/log_player.hpp"
+#include "firmware_host/outputs/run_folder/run_recorder.hpp"
+#include "firmware_host/realtime/memory_use.hpp"
+#include "firmware_host/runs/fly_threaded.hpp"
+#include "firmware_host/smoothing/map_keeper.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {

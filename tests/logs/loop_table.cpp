@@ -14,7 +14,8 @@
 #include <filesystem>
 
 #include "drivers/calibration/input_error.hpp"
-#include "firmware_host/commands/replay_run.hpp"
+#include "firmware_host/lab/evaluation/evaluate_run.hpp"
+#include "firmware_host/runs/replay_run.hpp"
 
 namespace swiftlet {
 namespace {
@@ -31,6 +32,7 @@ struct Errors {
 
 Json replay(const std::string& flight, const std::string& out, bool loops, const Settings& settings) {
   ReplayRequest request;
+  request.accuracy = runAccuracyJson;
   request.log = flight;
   request.out = out;
   request.loop_closure = loops;

@@ -5,7 +5,7 @@
 
 #include "drivers/recorded/open_log.hpp"
 #include "firmware_host/graph/graph.hpp"
-#include "firmware_host/pipeline/log_player.hpp"
+#include "firmware_host/inputs/log/log_player.hpp"
 #include "firmware_host/schedule/lockstep.hpp"
 #include "firmware_host/schedule/threaded.hpp"
 #include "tests/logs/log_data.hpp"

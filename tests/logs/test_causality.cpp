@@ -13,7 +13,7 @@
 
 #include "drivers/recorded/parse_number.hpp"
 #include "estimator/core/random.hpp"
-#include "firmware_host/commands/replay_run.hpp"
+#include "firmware_host/runs/replay_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
 

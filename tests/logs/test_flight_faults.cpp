@@ -16,9 +16,9 @@
 #include <vector>
 
 #include "drivers/device/monotonic_now.hpp"
-#include "firmware_host/commands/replay_run.hpp"
-#include "firmware_host/pipeline/follower_thread.hpp"
-#include "firmware_host/pipeline/host_sleep.hpp"
+#include "firmware_host/interfaces/follower_thread.hpp"
+#include "firmware_host/realtime/host_sleep.hpp"
+#include "firmware_host/runs/replay_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
 #include "tests/support/view_client.hpp"

@@ -16,8 +16,8 @@
 #include <thread>
 #include <vector>
 
-#include "firmware_host/commands/replay_run.hpp"
 #include "firmware_host/realtime/flight_thread.hpp"
+#include "firmware_host/runs/replay_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/flight_trap.hpp"
 #include "tests/logs/log_data.hpp"

@@ -4,7 +4,8 @@
 #include <fstream>
 #include <string>
 
-#include "firmware_host/commands/replay_run.hpp"
+#include "firmware_host/lab/evaluation/evaluate_run.hpp"
+#include "firmware_host/runs/replay_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
 
@@ -24,6 +25,7 @@ struct Expected {
 void checkRun(const Expected& expected) {
   const ScratchFolder folder(expected.mono ? "short_log_mono" : "short_log_stereo");
   ReplayRequest request;
+  request.accuracy = runAccuracyJson;
   request.log = shortLog();
   request.out = folder.file("run");
   request.mono = expected.mono;

@@ -12,9 +12,9 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "estimator/odometry/odometry_inputs.hpp"
-#include "firmware_host/commands/replay_run.hpp"
-#include "firmware_host/commands/smooth_run.hpp"
-#include "firmware_host/pipeline/map_keeper.hpp"
+#include "firmware_host/runs/replay_run.hpp"
+#include "firmware_host/runs/smooth_run.hpp"
+#include "firmware_host/smoothing/map_keeper.hpp"
 #include "tests/firmware_host/file_size_limit.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"

@@ -14,7 +14,7 @@
 #include "drivers/recorded/recording_source.hpp"
 #include "drivers/recorded/recording_writer.hpp"
 #include "estimator/core/random.hpp"
-#include "firmware_host/commands/replay_run.hpp"
+#include "firmware_host/runs/replay_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
 #include "tests/sanitized.hpp"

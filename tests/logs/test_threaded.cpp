@@ -23,8 +23,9 @@
 #include "drivers/recorded/open_log.hpp"
 #include "drivers/recorded/recording_source.hpp"
 #include "estimator/core/random.hpp"
-#include "firmware_host/commands/replay_run.hpp"
-#include "firmware_host/pipeline/log_player.hpp"
+#include "firmware_host/inputs/log/log_player.hpp"
+#include "firmware_host/lab/evaluation/evaluate_run.hpp"
+#include "firmware_host/runs/replay_run.hpp"
 #include "firmware_host/schedule/threaded.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
@@ -67,6 +68,7 @@ bool sameFiles(const std::string& one, const std::string& other) {
 
 ReplayRequest requestFor(const std::string& log, const std::string& out) {
   ReplayRequest request;
+  request.accuracy = runAccuracyJson;
   request.log = log;
   request.out = out;
   request.imu_rate = true;

@@ -19,7 +19,7 @@
 #include <thread>
 #include <vector>
 
-#include "firmware_host/commands/replay_run.hpp"
+#include "firmware_host/runs/replay_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
 #include "tests/support/statistics.hpp"

@@ -14,7 +14,7 @@
 #include "drivers/calibration/calibration.hpp"
 #include "drivers/recorded/image_list.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
-#include "firmware_host/report/ply_file.hpp"
+#include "firmware_host/outputs/map_files/ply_file.hpp"
 
 namespace swiftlet::testing {
 namespace {

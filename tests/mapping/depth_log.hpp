@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "estimator/messages/depth_image.hpp"
-#include "firmware_host/evaluation/triangle_mesh.hpp"
+#include "firmware_host/outputs/map_files/triangle_mesh.hpp"
 
 namespace swiftlet::testing {
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "estimator/geometry/se3.hpp"
-#include "firmware_host/evaluation/triangle_mesh.hpp"
+#include "firmware_host/outputs/map_files/triangle_mesh.hpp"
 
 namespace swiftlet::loop_sets {
 

@@ -10,8 +10,8 @@
 
 #include "drivers/calibration/calibration.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
-#include "firmware_host/evaluation/association.hpp"
-#include "firmware_host/report/ply_file.hpp"
+#include "firmware_host/lab/evaluation/association.hpp"
+#include "firmware_host/outputs/map_files/ply_file.hpp"
 #include "mapping/place/feature_depth.hpp"
 #include "mapping/place/place_extractor.hpp"
 #include "tests/mapping/loop_sets.hpp"

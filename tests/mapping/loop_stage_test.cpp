@@ -10,7 +10,7 @@
 
 #include "drivers/recorded/open_log.hpp"
 #include "estimator/geometry/so3.hpp"
-#include "firmware_host/evaluation/association.hpp"
+#include "firmware_host/lab/evaluation/association.hpp"
 #include "mapping/pose_graph/pose_tangent.hpp"
 
 using namespace swiftlet;

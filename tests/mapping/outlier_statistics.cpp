@@ -29,7 +29,7 @@
 
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/alignment.hpp"
-#include "firmware_host/report/g2o_file.hpp"
+#include "firmware_host/lab/modules/g2o_file.hpp"
 #include "mapping/pose_graph/outlier_injection.hpp"
 #include "mapping/pose_graph/robust_graph.hpp"
 #include "tests/mapping/graph_data.hpp"

@@ -6,7 +6,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "firmware_host/places/vocabulary_file.hpp"
+#include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
 #include "mapping/place/place_database.hpp"
 #include "tests/mapping/place_scene.hpp"
 #include "tests/support/cpu_time.hpp"

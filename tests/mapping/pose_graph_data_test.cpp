@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cstdio>
 
-#include "firmware_host/report/g2o_file.hpp"
+#include "firmware_host/lab/modules/g2o_file.hpp"
 #include "mapping/pose_graph/odometry_start.hpp"
 #include "mapping/pose_graph/pose_graph_optimizer.hpp"
 #include "tests/mapping/graph_data.hpp"

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "firmware_host/commands/program.hpp"
-#include "firmware_host/places/vocabulary_file.hpp"
-#include "firmware_host/report/line_file.hpp"
+#include "firmware_host/files/line_file.hpp"
+#include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {

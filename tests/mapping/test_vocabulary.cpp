@@ -6,7 +6,7 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "estimator/core/random.hpp"
-#include "firmware_host/places/vocabulary_file.hpp"
+#include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
 #include "mapping/place/hamming.hpp"
 #include "mapping/place/vocabulary_training.hpp"
 

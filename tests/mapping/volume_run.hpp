@@ -5,7 +5,7 @@
 #include <map>
 #include <vector>
 
-#include "firmware_host/evaluation/mesh_accuracy.hpp"
+#include "firmware_host/lab/evaluation/mesh_accuracy.hpp"
 #include "mapping/surface/surface_stage.hpp"
 #include "mapping/volume/volume_integrator.hpp"
 #include "tests/mapping/depth_log.hpp"

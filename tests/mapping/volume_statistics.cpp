@@ -6,7 +6,7 @@
 #include <exception>
 #include <string>
 
-#include "firmware_host/report/ply_file.hpp"
+#include "firmware_host/outputs/map_files/ply_file.hpp"
 #include "tests/mapping/volume_run.hpp"
 
 using namespace swiftlet;

@@ -14,8 +14,8 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/device/monotonic_now.hpp"
-#include "firmware_host/dds/dds_thread.hpp"
-#include "firmware_host/report/map_files.hpp"
+#include "firmware_host/outputs/map_files/map_files.hpp"
+#include "firmware_host/outputs/ros2/dds_thread.hpp"
 #include "tests/drivers/dds/peer_process.hpp"
 
 namespace swiftlet {

@@ -11,7 +11,7 @@
 #include "drivers/mavlink/mavlink_link.hpp"
 #include "drivers/mavlink/mavlink_messages.hpp"
 #include "drivers/mavlink/vision_messages.hpp"
-#include "firmware_host/autopilot/autopilot_thread.hpp"
+#include "firmware_host/outputs/autopilot/autopilot_thread.hpp"
 
 namespace swiftlet::test {
 

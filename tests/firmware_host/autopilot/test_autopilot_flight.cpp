@@ -10,7 +10,7 @@
 
 #include "estimator/geometry/so3.hpp"
 #include "estimator/imu/propagation.hpp"
-#include "firmware_host/autopilot/autopilot_thread.hpp"
+#include "firmware_host/outputs/autopilot/autopilot_thread.hpp"
 
 namespace swiftlet {
 namespace {

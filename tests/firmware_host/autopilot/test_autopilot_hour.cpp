@@ -16,7 +16,7 @@
 #include "drivers/serial/imu_encoder.hpp"
 #include "drivers/timesync/two_way_clock_map.hpp"
 #include "estimator/core/random.hpp"
-#include "firmware_host/live/imu_thread.hpp"
+#include "firmware_host/inputs/devices/imu_thread.hpp"
 
 namespace swiftlet {
 namespace {

@@ -14,7 +14,7 @@
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/device/monotonic_now.hpp"
 #include "drivers/serial/pseudo_terminal.hpp"
-#include "firmware_host/autopilot/autopilot_port.hpp"
+#include "firmware_host/outputs/autopilot/autopilot_port.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {

@@ -9,7 +9,7 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/serial/pseudo_terminal.hpp"
-#include "firmware_host/autopilot/autopilot_port.hpp"
+#include "firmware_host/outputs/autopilot/autopilot_port.hpp"
 #include "tests/firmware_host/autopilot/scripted_vehicle.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 

@@ -5,7 +5,7 @@
 #include <catch2/catch.hpp>
 #include <cstdint>
 
-#include "firmware_host/autopilot/autopilot_port.hpp"
+#include "firmware_host/outputs/autopilot/autopilot_port.hpp"
 #include "firmware_host/supervisor/supervisor.hpp"
 #include "tests/firmware_host/autopilot/scripted_vehicle.hpp"
 #include "tests/logs/flight_trap.hpp"

@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "drivers/mavlink/mavlink_link.hpp"
-#include "firmware_host/autopilot/autopilot_thread.hpp"
-#include "firmware_host/autopilot/obstacle_message.hpp"
+#include "firmware_host/outputs/autopilot/autopilot_thread.hpp"
+#include "firmware_host/outputs/autopilot/obstacle_message.hpp"
 
 namespace swiftlet {
 namespace {

@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "firmware_host/live/imu_thread.hpp"
+#include "firmware_host/inputs/devices/imu_thread.hpp"
 
 namespace swiftlet::test {
 

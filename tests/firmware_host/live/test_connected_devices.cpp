@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "firmware_host/live/connected_devices.hpp"
+#include "firmware_host/inputs/devices/connected_devices.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {

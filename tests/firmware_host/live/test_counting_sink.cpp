@@ -2,7 +2,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "firmware_host/live/counting_sink.hpp"
+#include "firmware_host/inputs/devices/counting_sink.hpp"
 
 namespace swiftlet {
 namespace {

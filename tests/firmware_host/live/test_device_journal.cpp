@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 #include <vector>
 
-#include "firmware_host/live/device_journal.hpp"
+#include "firmware_host/interfaces/device_journal.hpp"
 
 namespace swiftlet {
 namespace {

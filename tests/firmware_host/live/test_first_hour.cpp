@@ -12,8 +12,8 @@
 #include <functional>
 #include <sstream>
 
-#include "firmware_host/commands/doctor_run.hpp"
 #include "firmware_host/commands/program.hpp"
+#include "firmware_host/runs/doctor_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/firmware_host/without_rights.hpp"
 

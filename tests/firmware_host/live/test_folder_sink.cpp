@@ -9,7 +9,7 @@
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/open_log.hpp"
 #include "drivers/simulated/rig_presets.hpp"
-#include "firmware_host/live/folder_sink.hpp"
+#include "firmware_host/outputs/recorder/folder_sink.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {

@@ -7,7 +7,7 @@
 
 #include <deque>
 
-#include "firmware_host/live/device_times.hpp"
+#include "firmware_host/inputs/devices/device_times.hpp"
 #include "tests/firmware_host/live/imu_bench.hpp"
 
 namespace swiftlet::test {

@@ -9,8 +9,8 @@
 #include "drivers/serial/imu_encoder.hpp"
 #include "drivers/serial/pseudo_terminal.hpp"
 #include "estimator/core/random.hpp"
-#include "firmware_host/live/device_times.hpp"
-#include "firmware_host/live/serial_imu_link.hpp"
+#include "firmware_host/inputs/devices/device_times.hpp"
+#include "firmware_host/inputs/devices/serial_imu_link.hpp"
 #include "tests/firmware_host/live/imu_bench.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 

@@ -8,8 +8,8 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/simulated/rig_presets.hpp"
-#include "firmware_host/live/live_input.hpp"
-#include "firmware_host/live/sensor_threads.hpp"
+#include "firmware_host/inputs/devices/live_input.hpp"
+#include "firmware_host/inputs/devices/sensor_threads.hpp"
 
 namespace swiftlet {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "estimator/geometry/so3.hpp"
-#include "firmware_host/view/live_document.hpp"
+#include "firmware_host/outputs/view/live_document.hpp"
 
 namespace swiftlet {
 namespace {

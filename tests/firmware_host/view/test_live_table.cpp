@@ -4,7 +4,7 @@
 #include <array>
 #include <catch2/catch.hpp>
 
-#include "firmware_host/view/live_table.hpp"
+#include "firmware_host/outputs/view/live_table.hpp"
 
 namespace swiftlet {
 namespace {

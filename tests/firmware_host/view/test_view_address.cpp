@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "drivers/calibration/input_error.hpp"
-#include "firmware_host/view/view_address.hpp"
+#include "firmware_host/outputs/view/view_address.hpp"
 
 namespace swiftlet {
 namespace {

@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 #include <string>
 
-#include "firmware_host/view/view_hub.hpp"
+#include "firmware_host/outputs/view/view_hub.hpp"
 
 namespace swiftlet {
 namespace {

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "drivers/calibration/input_error.hpp"
-#include "firmware_host/pipeline/stage_timer.hpp"
-#include "firmware_host/view/view_server.hpp"
-#include "firmware_host/view/view_thread.hpp"
+#include "firmware_host/outputs/view/view_server.hpp"
+#include "firmware_host/outputs/view/view_thread.hpp"
+#include "firmware_host/realtime/stage_timer.hpp"
 #include "tests/support/view_client.hpp"
 
 namespace swiftlet {

@@ -1,0 +1,22 @@
+#pragma once
+// The text files of an EuRoC/ASL folder, for who writes one: sensor.yaml, and data.csv of an IMU.
+
+#include <string>
+#include <string_view>
+
+#include "estimator/camera/camera_model.hpp"
+#include "estimator/geometry/se3.hpp"
+#include "estimator/imu/imu_noise.hpp"
+#include "estimator/messages/imu_sample.hpp"
+
+namespace swiftlet {
+
+/// sensor.yaml of a camera; `origin` says where the data come from, `extra` lines go at its end.
+std::string cameraYaml(const CameraModel& camera, const SE3& T_body_cam, double rate_hz,
+                       std::string_view origin, const std::string& extra);
+std::string imuYaml(const ImuNoise& noise, std::string_view origin);
+/// data.csv of an IMU: its first line, and a line for each sample, both with their ends.
+std::string imuCsvHeader();
+std::string imuCsvRow(const ImuSample& sample);
+
+}  // namespace swiftlet

@@ -1,0 +1,24 @@
+#include "firmware_host/commands/lab_commands.hpp"
+
+#include "firmware_host/commands/command.hpp"
+#include "firmware_host/lab/evaluation/evaluate_run.hpp"
+
+namespace swiftlet {
+
+void addLabCommands(CLI::App& app, int& exit_code) {
+  addSimulateCommand(app, exit_code);
+  addHilCommand(app, exit_code);
+  addEvaluateCommand(app, exit_code);
+  addExportCommand(app, exit_code);
+  addReportCommand(app, exit_code);
+  addMeshCommand(app, exit_code);
+  addFuseCommand(app, exit_code);
+  addPlaceCommand(app, exit_code);
+  addPoseGraphCommand(app, exit_code);
+  addBudgetCommand(app, exit_code);
+  addVocabularyCommand(app, exit_code);
+}
+
+AccuracyOfRun labAccuracy() { return runAccuracyJson; }
+
+}  // namespace swiftlet

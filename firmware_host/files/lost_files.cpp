@@ -1,0 +1,23 @@
+#include "firmware_host/files/lost_files.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+namespace swiftlet {
+
+void LostFiles::add(std::string_view what) {
+  count_.fetch_add(1, std::memory_order_relaxed);
+  // A terminal that is gone is no reason to fail either: the result is not looked at.
+  std::fprintf(stderr, "warning: %.*s (the run goes on without it)\n", static_cast<int>(what.size()),
+               what.data());
+  if (claimed_.exchange(true, std::memory_order_relaxed)) return;
+  const std::size_t size = std::min(what.size(), text_.size() - 1);
+  std::copy_n(what.data(), size, text_.data());
+  readable_.store(true, std::memory_order_release);
+}
+
+const char* LostFiles::problem() const {
+  return readable_.load(std::memory_order_acquire) ? text_.data() : nullptr;
+}
+
+}  // namespace swiftlet

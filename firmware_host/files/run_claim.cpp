@@ -1,0 +1,273 @@
+#include "firmware_host/files/run_claim.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <string_view>
+
+#include "drivers/calibration/input_error.hpp"
+#include "drivers/recorded/recording_format.hpp"
+#include "firmware_host/files/whole_file.hpp"
+
+namespace swiftlet {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::array kRunFiles = {
+    "odometry.tum",        "states.csv", "events.log", "settings.yaml",  "summary.json", "imu_rate.tum",
+    "imu_rate_health.csv", "map.tum",    "loops.csv",  "local_mesh.ply", "map.ply",      "map.glb",
+    "keyframes.swk",       "report.html"};
+constexpr std::array kRunFolders = {"meshes", "recording"};
+constexpr std::size_t kNumberDigits = 6;
+constexpr std::uint32_t kLargestNumber = 999'999;
+/// A board without a battery starts in 1970, or at the date of its image: 2020 and later is taken for set.
+constexpr int kFirstSetYear = 2020;
+constexpr int kTriesForName = 1000;
+constexpr const char* kFlightsRemedy = "Make flights.folder writable, or name another one";
+
+constexpr const char* word(RunKind kind) { return kind == RunKind::kFlight ? "flight" : "replay"; }
+
+bool allDigits(std::string_view text) {
+  return !text.empty() && std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });
+}
+
+/// `prefix` digits `suffix`.
+bool isNumbered(std::string_view name, std::string_view prefix, std::string_view suffix) {
+  return name.size() > prefix.size() + suffix.size() && name.starts_with(prefix) && name.ends_with(suffix) &&
+         allDigits(name.substr(prefix.size(), name.size() - prefix.size() - suffix.size()));
+}
+
+bool isRunFile(const std::string& name) {
+  return std::ranges::find(kRunFiles, name) != kRunFiles.end() || isNumbered(name, "map_epoch_", ".ply");
+}
+
+/// The first thing of a run's names; empty: none.
+std::string firstRunFile(const fs::path& folder) {
+  std::string first;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    const bool of_run = isRunFile(name) || std::ranges::find(kRunFolders, name) != kRunFolders.end();
+    if (of_run && (first.empty() || name < first)) first = name;
+  }
+  return first;
+}
+
+/// Removes the files whose names `ours` knows.
+template <typename Ours>
+void removeFiles(const fs::path& folder, const Ours& ours) {
+  std::vector<fs::path> found;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (ours(entry.path().filename().string()) && !entry.is_directory(error)) found.push_back(entry.path());
+  }
+  for (const fs::path& path : found) {
+    if (::unlink(path.c_str()) == 0 || errno == ENOENT) continue;
+    throw InputError(path.string(), 0, "",
+                     std::string("of an earlier run, cannot be removed: ") + std::strerror(errno),
+                     "Give another folder with --out");
+  }
+}
+
+/// A recording that is being read or written belongs to that program.
+void removeRecording(const fs::path& folder) {
+  const int lock = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (lock < 0) return;
+  const bool in_use = ::flock(lock, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  if (!in_use) {
+    try {
+      removeFiles(folder, [](const std::string& name) {
+        std::uint32_t segment = 0;
+        return parseSegmentName(name, segment);
+      });
+    } catch (...) {
+      ::close(lock);
+      throw;
+    }
+  }
+  ::close(lock);
+  if (in_use) {
+    throw InputError(folder.string(), 0, "", "this recording is being written or read by another program",
+                     "Give another folder with --out, or wait until that program has ended");
+  }
+  ::rmdir(folder.c_str());  // stays where something else is in it
+}
+
+void removeEarlierRun(const fs::path& folder) {
+  removeRecording(folder / "recording");
+  removeMeshes((folder / "meshes").string());
+  ::rmdir((folder / "meshes").c_str());
+  removeFiles(folder, isRunFile);
+}
+
+void makeFolders(const std::string& folder, const char* remedy) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) {
+    throw InputError(folder, 0, "", "this folder cannot be made: " + error.message(), remedy);
+  }
+}
+
+void refuseOthers(const std::string& folder, RunKind kind) {
+  constexpr const char* kRemedy = "Give another folder with --out, or --replace to have these files replaced";
+  const std::optional<RunKind> held = runKindOf(folder);
+  if (held == RunKind::kFlight || (held && kind == RunKind::kFlight)) {
+    throw InputError(folder, 0, "", fmt::format("holds a {} already", word(*held)), kRemedy);
+  }
+  if (held) return;
+  const std::string file = firstRunFile(folder);
+  if (file.empty()) return;
+  throw InputError(folder, 0, "", fmt::format("holds {} and no mark of a replay ({})", file, kRunMark),
+                   kRemedy);
+}
+
+/// Number of a flight's folder name; none for any other name.
+std::optional<std::uint32_t> flightNumber(const std::string& name) {
+  constexpr std::string_view kTime = "_20261123T160412Z";
+  const std::string_view digits = std::string_view(name).substr(0, kNumberDigits);
+  if (digits.size() != kNumberDigits || !allDigits(digits)) return std::nullopt;
+  if (name.size() != kNumberDigits) {
+    if (name.size() != kNumberDigits + kTime.size()) return std::nullopt;
+    for (std::size_t i = 0; i < kTime.size(); ++i) {
+      const char c = name[kNumberDigits + i];
+      if (allDigits(kTime.substr(i, 1)) ? !allDigits({&c, 1}) : c != kTime[i]) return std::nullopt;
+    }
+  }
+  return static_cast<std::uint32_t>(std::stoul(std::string(digits)));
+}
+
+struct OldFlight {
+  std::uint32_t number = 0;
+  std::string name;
+  auto operator<=>(const OldFlight&) const = default;
+};
+
+std::vector<OldFlight> flightsIn(const std::string& parent) {
+  std::vector<OldFlight> flights;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(parent, error)) {
+    const std::string name = entry.path().filename().string();
+    const bool folder = entry.is_directory(error) && !entry.is_symlink(error);
+    if (const auto number = flightNumber(name); number && folder) flights.push_back({*number, name});
+  }
+  std::ranges::sort(flights);
+  return flights;
+}
+
+bool isClaimed(const fs::path& folder) {
+  const int mark = ::open((folder / kRunMark).c_str(), O_RDONLY | O_CLOEXEC);
+  if (mark < 0) return true;
+  const bool claimed = ::flock(mark, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  ::close(mark);
+  return claimed;
+}
+
+/// None where the system does not say.
+std::optional<std::uint64_t> freeBytes(const std::string& folder) {
+  std::error_code error;
+  const fs::space_info space = fs::space(folder, error);
+  if (error) return std::nullopt;
+  return space.available;
+}
+
+}  // namespace
+
+std::optional<RunKind> runKindOf(const std::string& folder) {
+  std::ifstream file(fs::path(folder) / kRunMark);
+  std::string held;
+  file >> held;
+  if (held == word(RunKind::kFlight)) return RunKind::kFlight;
+  if (held == word(RunKind::kReplay)) return RunKind::kReplay;
+  return std::nullopt;
+}
+
+void refuseRunIn(const std::string& folder) { refuseOthers(folder, RunKind::kFlight); }
+
+RunClaim::RunClaim(const std::string& folder, RunKind kind, bool replace) {
+  makeFolders(folder, "Give another folder with --out");
+  if (!replace) refuseOthers(folder, kind);
+  removeEarlierRun(folder);
+  const std::string mark = fs::path(folder) / kRunMark;
+  writeWholeFile(mark, fmt::format("{}\n", word(kind)));
+  mark_ = ::open(mark.c_str(), O_RDONLY | O_CLOEXEC);
+  if (mark_ >= 0) (void)::flock(mark_, LOCK_SH | LOCK_NB);
+}
+
+RunClaim::~RunClaim() {
+  if (mark_ >= 0) ::close(mark_);
+}
+
+std::string flightName(std::uint32_t number, std::time_t now) {
+  constexpr int kEpochOfTm = 1900;
+  constexpr int kLastYear = 9999;
+  std::string name = fmt::format("{:0{}}", number, kNumberDigits);
+  std::tm utc{};
+  if (::gmtime_r(&now, &utc) == nullptr) return name;
+  const int year = utc.tm_year + kEpochOfTm;
+  if (year < kFirstSetYear || year > kLastYear) return name;
+  return name + fmt::format("_{:04}{:02}{:02}T{:02}{:02}{:02}Z", year, utc.tm_mon + 1, utc.tm_mday,
+                            utc.tm_hour, utc.tm_min, utc.tm_sec);
+}
+
+std::string makeFlightFolder(const std::string& parent, std::time_t now) {
+  makeFolders(parent, kFlightsRemedy);
+  const std::vector<OldFlight> flights = flightsIn(parent);
+  std::uint32_t number = flights.empty() ? 1 : flights.back().number + 1;
+  for (int i = 0; i < kTriesForName && number <= kLargestNumber; ++i, ++number) {
+    const std::string folder = fs::path(parent) / flightName(number, now);
+    // Making it is the claim: of two programs that try one name, one is told that it is there.
+    if (::mkdir(folder.c_str(), 0755) == 0) return folder;
+    if (errno != EEXIST) {
+      throw InputError(folder, 0, "",
+                       std::string("the flight's folder cannot be made: ") + std::strerror(errno),
+                       kFlightsRemedy);
+    }
+  }
+  throw InputError(parent, 0, "", "no number is left for a flight",
+                   "Name another folder with flights.folder");
+}
+
+std::vector<std::string> freeOldFlights(const std::string& parent, std::uint64_t bytes,
+                                        const std::string& current) {
+  constexpr std::uint64_t kMebibyte = 1U << 20U;
+  std::vector<std::string> lines;
+  std::optional<std::uint64_t> available = freeBytes(parent);
+  for (const OldFlight& flight : flightsIn(parent)) {
+    if (!available || *available >= bytes) break;
+    const fs::path folder = fs::path(parent) / flight.name;
+    std::error_code error;
+    if (fs::equivalent(folder, current, error)) continue;
+    if (runKindOf(folder.string()) != RunKind::kFlight || isClaimed(folder)) continue;
+    fs::remove_all(folder, error);
+    available = freeBytes(parent);
+    lines.push_back(
+        error ? fmt::format("{}: cannot be deleted to free space: {}", folder.string(), error.message())
+              : fmt::format("{}: deleted to free space (flights.keep_free_mib)", folder.string()));
+  }
+  if (available && *available < bytes) {
+    lines.push_back(
+        fmt::format("{}: {} MiB are free, {} are asked for by flights.keep_free_mib, and no older "
+                    "flight can be deleted",
+                    parent, *available / kMebibyte, bytes / kMebibyte));
+  }
+  return lines;
+}
+
+void removeMeshes(const std::string& folder) {
+  removeFiles(folder, [](const std::string& name) {
+    return name == "frames.csv" || isNumbered(name, "frame_", ".ply") || isNumbered(name, "horizon_", ".ply");
+  });
+}
+
+}  // namespace swiftlet

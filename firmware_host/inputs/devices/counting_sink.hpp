@@ -1,0 +1,54 @@
+#pragma once
+// Keeps the stamps of what devices deliver, for a look at them afterwards: rates, gaps, how far apart two
+// cameras are. Memory: as much as is asked for at construction; what goes beyond is counted only.
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "estimator/core/limits.hpp"
+#include "firmware_host/interfaces/sensor_input.hpp"
+
+namespace swiftlet {
+
+class CountingSink : public SensorSink {
+ public:
+  struct Stream {
+    std::vector<Stamp> stamps;
+    std::uint64_t beyond = 0;  ///< came after `stamps` was full
+
+    /// Per second, of the stamps kept; 0 for less than two.
+    [[nodiscard]] double rate() const;
+    /// The largest step between stamps that follow each other.
+    [[nodiscard]] Duration largestStep() const;
+    /// The steps' median.
+    [[nodiscard]] Duration medianStep() const;
+  };
+
+  explicit CountingSink(std::size_t most);
+
+  void takeImu(const ImuSample& sample, Stamp /*arrival*/, const HostTimes& /*host*/) override {
+    keep(imu_, sample.stamp);
+  }
+  void takeScene(const SceneImages& /*scene*/) override {}
+  void takeImage(const CameraFrame& image, const HostTimes& /*host*/) override {
+    keep(camera_.at(image.camera), image.stamp);
+  }
+  void takeImage(const CameraFrame& image, const HostTimes& host, const PixelWriter& /*pixels*/) override {
+    takeImage(image, host);
+  }
+
+  // After the devices' threads have ended.
+  [[nodiscard]] const Stream& imu() const { return imu_; }
+  [[nodiscard]] const Stream& camera(std::size_t index) const { return camera_.at(index); }
+  /// From each image of camera 1 to the nearest of camera 0, smallest first; empty without both.
+  [[nodiscard]] std::vector<Duration> pairDistances() const;
+
+ private:
+  static void keep(Stream& stream, Stamp stamp);
+
+  Stream imu_;
+  std::array<Stream, kMaxCameras> camera_;
+};
+
+}  // namespace swiftlet

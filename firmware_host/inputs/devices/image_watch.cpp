@@ -1,0 +1,36 @@
+#include "firmware_host/inputs/devices/image_watch.hpp"
+
+#include <algorithm>
+
+namespace swiftlet {
+namespace {
+
+/// Grey; as the front-end, which takes such images for absent.
+constexpr std::uint64_t kDarkMean = 12;
+// FNV-1a's.
+constexpr std::uint64_t kStart = 0xcbf29ce484222325;
+constexpr std::uint64_t kFactor = 0x100000001b3;
+
+}  // namespace
+
+ImageWatch::Look ImageWatch::look(const RawImage& image) {
+  const int width = std::min(image.width, kWidest);
+  std::uint64_t signature = kStart;
+  std::uint64_t sum = 0;
+  std::uint64_t pixels = 0;
+  for (int y = 0; y < image.height; y += kRowStep) {
+    toGrey(crop(image, 0, y, width, 1), row_.data(), width);
+    for (int x = 0; x < width; ++x) {
+      const std::uint8_t grey = row_[static_cast<std::size_t>(x)];
+      signature = (signature ^ grey) * kFactor;
+      sum += grey;
+    }
+    pixels += static_cast<std::uint64_t>(width);
+  }
+  const bool repeated = signature == signature_;
+  signature_ = signature;
+  if (sum <= kDarkMean * pixels) return Look::kDark;
+  return repeated ? Look::kRepeated : Look::kNew;
+}
+
+}  // namespace swiftlet

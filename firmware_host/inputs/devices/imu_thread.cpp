@@ -1,0 +1,183 @@
+#include "firmware_host/inputs/devices/imu_thread.hpp"
+
+#include <poll.h>
+
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "firmware_host/inputs/devices/device_times.hpp"
+#include "firmware_host/realtime/host_sleep.hpp"
+
+namespace swiftlet {
+namespace {
+
+/// Two maps of one clock differ by the link's constant delay, which is less. Farther apart, one of them has
+/// not heard of a step yet.
+constexpr Duration kLongestDelay = Duration::fromMilliseconds(100);
+/// The constant delay hardly changes in flight. Where the maps are suddenly this much farther apart or
+/// nearer, one has heard of a step; where they stay so for kSettling, the link has changed.
+constexpr Duration kTransportChange = Duration::fromMilliseconds(3);
+constexpr Duration kSettling = Duration::fromMilliseconds(10'000);
+
+Duration magnitude(Duration d) { return {std::abs(d.ns)}; }
+
+}  // namespace
+
+ImuThread::ImuThread(std::string name, std::unique_ptr<ImuLink> link, const Eigen::Matrix3d& R_body_imu,
+                     Duration delay, double rate)
+    : link_(std::move(link)),
+      journal_(std::move(name)),
+      R_body_imu_(R_body_imu),
+      delay_(delay),
+      clock_(ClockMapSettings{delay}),
+      rate_(rate) {}
+
+void ImuThread::run(SensorSink& sink, std::span<EdgeRing* const> edges, const RunControl& control) {
+  // What came before the flight has lost its time of arrival.
+  link_->discard();
+  hear();
+  while (!control.stopped()) {
+    heart_.beat();
+    if (!link_->isOpen()) {
+      if (const DeviceFault fault = link_->open(); !fault.ok()) {
+        journal_.fault(hostNow(), fault);
+        sleepFor(kReopenPeriod);
+        continue;
+      }
+      hear();
+    }
+    pollfd waiting{link_->fd(), POLLIN, 0};
+    poll(&waiting, 1, kPollMilliseconds);
+    const Stamp now = hostNow();
+    const DeviceFault fault = link_->receive(now);
+    takeReadings(sink, edges);
+    if (fault.ok()) {
+      watchSilence(now);
+    } else {
+      journal_.fault(now, fault);
+    }
+  }
+}
+
+void ImuThread::takeReadings(SensorSink& sink, std::span<EdgeRing* const> edges) {
+  const std::uint64_t handed = counted_.samples;
+  ImuReading reading;
+  std::size_t readings = 0;
+  while (link_->next(reading)) {
+    hand(reading, sink);
+    ++readings;
+  }
+  TriggerEdge edge;
+  while (link_->nextEdge(edge)) {
+    const std::optional<Stamp> stamp = hostOf(edge.device);
+    if (!stamp) continue;
+    for (EdgeRing* ring : edges) static_cast<void>(ring->tryPush({*stamp, edge.counter}));
+  }
+  if (readings == 0) return;
+  if (counted_.samples > handed) {
+    hear();
+    watchQuality(readings);
+  }
+  status_.write(counted_);
+}
+
+void ImuThread::hear() {
+  heard_ = hostNow();
+  received_ = link_->received();
+  refused_ = counted_.refused;
+}
+
+void ImuThread::hand(const ImuReading& reading, SensorSink& sink) {
+  ImuSample sample;
+  if (!stampOf(reading, sample.stamp) || sample.stamp <= newest_) {
+    ++counted_.refused;
+    return;
+  }
+  newest_ = sample.stamp;
+  sample.gyro = R_body_imu_ * reading.gyro;
+  sample.accel = R_body_imu_ * reading.accel;
+  ++counted_.samples;
+  sink.takeImu(sample, reading.arrival, {secondsOf(sample.stamp), wallSeconds()});
+}
+
+bool ImuThread::stampOf(const ImuReading& reading, Stamp& stamp) {
+  if (!reading.device) {
+    stamp = reading.arrival - delay_;
+    ++counted_.by_arrival;
+    return true;
+  }
+  // Also where the exchange is sure: it hears of a step of the clock some tenths of a second later.
+  if (!clock_.add(*reading.device, reading.arrival, stamp).ok()) return false;
+  arrival_ = reading.arrival;
+  const std::optional<Stamp> one_way = clock_.toHost(*reading.device);
+  const std::optional<Stamp> exchanged = one_way ? byExchange(*reading.device, *one_way) : std::nullopt;
+  if (!exchanged || *exchanged > reading.arrival) {
+    stamp = stamp - transport_.value_or(Duration{});
+    return true;
+  }
+  transport_ = *one_way - *exchanged;
+  agreed_ = reading.arrival;
+  stamp = *exchanged;
+  ++counted_.by_exchange;
+  return true;
+}
+
+std::optional<Stamp> ImuThread::byExchange(Stamp device, Stamp one_way) const {
+  const std::optional<Stamp> exchanged = link_->toHost(device);
+  if (!exchanged) return std::nullopt;
+  const Duration apart = one_way - (*exchanged - delay_);
+  if (magnitude(apart) > kLongestDelay) return std::nullopt;
+  const bool lately = transport_ && arrival_ - agreed_ < kSettling;
+  if (lately && magnitude(apart - *transport_) > kTransportChange) return std::nullopt;
+  return *exchanged - delay_;
+}
+
+std::optional<Stamp> ImuThread::hostOf(Stamp device) const {
+  const std::optional<Stamp> one_way = clock_.toHost(device);
+  if (!one_way) return std::nullopt;
+  const std::optional<Stamp> exchanged = byExchange(device, *one_way);
+  return exchanged ? exchanged : *one_way - transport_.value_or(Duration{});
+}
+
+/// Of a device that sends: its clock, and whether all of it comes.
+void ImuThread::watchQuality(std::size_t readings) {
+  const TimesyncStatus before = counted_.clock;
+  counted_.clock = clock_.status();
+  if (counted_.clock.resets > before.resets) {
+    journal_.note(heard_, deviceFault(DeviceFaultKind::kClockJumped, 0, "by %.3f s",
+                                      (before.offset - counted_.clock.offset).seconds()));
+  }
+  const bool returned = journal_.standing() != DeviceFaultKind::kNone;
+  journal_.works(heard_);
+  if (returned) {
+    rate_.restart(heard_);
+  } else if (rate_.add(heard_, readings)) {
+    if (rate_.tooFew()) {
+      journal_.defect(heard_, deviceFault(DeviceFaultKind::kLossy, 0, "%.0f of %.0f samples in a second",
+                                          rate_.seen(), rate_.expected()));
+    } else {
+      journal_.sound(heard_);
+    }
+  }
+}
+
+void ImuThread::watchSilence(Stamp now) {
+  if (!link_->isOpen() || now - heard_ < kLongestSilence) return;
+  const double silent = (now - heard_).seconds();
+  const auto received = static_cast<unsigned long long>(link_->received() - received_);
+  const auto refused = static_cast<unsigned long long>(counted_.refused - refused_);
+  if (received == 0) {
+    journal_.fault(now, deviceFault(DeviceFaultKind::kSilent, 0, "nothing came for %.1f s", silent));
+  } else if (refused == 0) {
+    journal_.fault(now,
+                   deviceFault(DeviceFaultKind::kGarbage, 0,
+                               "%llu bytes or frames in %.1f s, and no reading in them", received, silent));
+  } else {
+    journal_.fault(
+        now, deviceFault(DeviceFaultKind::kFailed, 0,
+                         "%llu readings in %.1f s, and the sensor's clock stands still or goes back", refused,
+                         silent));
+  }
+}
+
+}  // namespace swiftlet

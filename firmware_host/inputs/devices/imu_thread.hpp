@@ -1,0 +1,84 @@
+#pragma once
+// The thread of the IMU: readings from its link to the sink, stamped on CLOCK_MONOTONIC and turned into the
+// body's axes. Survives that the device goes and returns, falls silent or restarts its clock.
+//
+// Stamps: of the sensor's own clock where it sends one, by the protocol's exchange of clocks where that is
+// sure, else by the lower envelope of the delays (drivers/timesync/clock_map.hpp); without a clock, arrivals.
+// Threads: open() before the flight, run() on its own thread, journal and status from any.
+
+#include <memory>
+#include <span>
+
+#include "drivers/calibration/calibration.hpp"
+#include "drivers/timesync/clock_map.hpp"
+#include "estimator/core/newest_shared.hpp"
+#include "firmware_host/inputs/devices/edge_message.hpp"
+#include "firmware_host/inputs/devices/imu_link.hpp"
+#include "firmware_host/inputs/devices/rate_watch.hpp"
+#include "firmware_host/interfaces/device_journal.hpp"
+#include "firmware_host/interfaces/sensor_input.hpp"
+
+namespace swiftlet {
+
+/// What the IMU did so far.
+struct ImuStatus {
+  std::uint64_t samples = 0;
+  std::uint64_t refused = 0;  ///< no stamp, or one that does not rise
+  std::uint64_t by_exchange = 0;
+  std::uint64_t by_arrival = 0;
+  TimesyncStatus clock;
+};
+
+class ImuThread {
+ public:
+  /// `delay`: from sensing to arrival at the least. `rate`: samples a second that are expected; 0: unknown.
+  ImuThread(std::string name, std::unique_ptr<ImuLink> link, const Eigen::Matrix3d& R_body_imu,
+            Duration delay, double rate = 0);
+
+  DeviceFault open() { return link_->open(); }
+  /// `edges`: where edges of the trigger go that come through the link.
+  void run(SensorSink& sink, std::span<EdgeRing* const> edges, const RunControl& control);
+  /// Of run(), at each turn.
+  [[nodiscard]] Heartbeat& heart() { return heart_; }
+
+  [[nodiscard]] DeviceJournal& journal() { return journal_; }
+  [[nodiscard]] const ImuLink& link() const { return *link_; }
+  [[nodiscard]] ImuStatus status() const {
+    ImuStatus status;
+    static_cast<void>(status_.read(status));
+    return status;
+  }
+
+ private:
+  void takeReadings(SensorSink& sink, std::span<EdgeRing* const> edges);
+  void hand(const ImuReading& reading, SensorSink& sink);
+  [[nodiscard]] bool stampOf(const ImuReading& reading, Stamp& stamp);
+  /// By the protocol's exchange of clocks, where it is sure and the arrivals do not contradict it.
+  [[nodiscard]] std::optional<Stamp> byExchange(Stamp device, Stamp one_way) const;
+  /// Of other things on the sensor's clock: mapped as its samples are.
+  [[nodiscard]] std::optional<Stamp> hostOf(Stamp device) const;
+  void hear();
+  void watchSilence(Stamp now);
+  void watchQuality(std::size_t readings);
+
+  std::unique_ptr<ImuLink> link_;
+  Heartbeat heart_;
+  DeviceJournal journal_;
+  Eigen::Matrix3d R_body_imu_;
+  Duration delay_;
+  ClockMap clock_;
+  RateWatch rate_;
+  /// What the one-way map holds and the exchange does not, when both were last believed, at `agreed_`: after
+  /// a step of the clock it goes on to be taken off until the exchange is sure again.
+  std::optional<Duration> transport_;
+  Stamp agreed_;
+  Stamp arrival_;               ///< of the newest reading with a clock
+  Stamp newest_;                ///< handed over
+  Stamp heard_;                 ///< when the newest sample was handed over, or since when there is none
+  std::uint64_t received_ = 0;  ///< at `heard_`
+  std::uint64_t refused_ = 0;   ///< likewise
+  ImuStatus counted_;
+  NewestShared<ImuStatus> status_;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,191 @@
+#include "firmware_host/inputs/devices/live_input.hpp"
+
+#include <fmt/format.h>
+
+#include "drivers/calibration/input_error.hpp"
+#include "estimator/core/units.hpp"
+#include "firmware_host/inputs/devices/can_imu_link.hpp"
+#include "firmware_host/inputs/devices/serial_imu_link.hpp"
+#include "firmware_host/inputs/devices/status_json.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr const char* kTriggerByImu = "imu";
+
+[[noreturn]] void failAt(const char* setting, const std::string& what, const std::string& remedy) {
+  throw InputError("settings", 0, setting, what, remedy);
+}
+
+std::unique_ptr<ImuLink> makeImuLink(const ImuLinkGroup& settings) {
+  if (settings.protocol == "dronecan") return std::make_unique<CanImuLink>(settings);
+  return std::make_unique<SerialImuLink>(settings);
+}
+
+CameraDeviceSettings deviceSettings(const CamerasGroup& group, const std::string& path, int width,
+                                    int height) {
+  CameraDeviceSettings device;
+  device.setPath(path.c_str());
+  device.setFormat(group.format.c_str());
+  device.width = width;
+  device.height = height;
+  device.rate = group.rate_hz;
+  if (group.exposure_ms > 0) device.exposure = Duration::fromSeconds(group.exposure_ms * kFromMs);
+  if (group.gain >= 0) device.gain = group.gain;
+  return device;
+}
+
+void checkCameras(const CamerasGroup& group, const Rig& rig) {
+  if (group.device0.empty()) {
+    failAt("cameras.device0", "no camera is named", "Name its video node; `swiftlet doctor` lists them");
+  }
+  const bool second = group.side_by_side || !group.device1.empty();
+  if (rig.camera_count == 2 && !second) {
+    failAt("cameras.device1", "the calibration has two cameras, the settings name one",
+           "Name the second's video node, or set cameras.side_by_side where one node gives both");
+  }
+  if (rig.camera_count == 1 && second) {
+    failAt("vehicle.calibration", "the settings name two cameras, the calibration has one",
+           "Calibrate both, or leave cameras.device1 and cameras.side_by_side out");
+  }
+  if (!group.side_by_side && group.device0 == group.device1) {
+    failAt("cameras.device1", "the same video node as cameras.device0",
+           "Name the other camera's; set cameras.side_by_side where one node gives both");
+  }
+  if (group.side_by_side && !group.device1.empty()) {
+    failAt("cameras.device1", "named beside cameras.side_by_side, where device0 gives both cameras",
+           "Leave one of the two out");
+  }
+  if (group.side_by_side &&
+      (rig.camera[0].width() != rig.camera[1].width() || rig.camera[0].height() != rig.camera[1].height())) {
+    failAt("cameras.side_by_side",
+           "the calibration's cameras differ in size: they are no halves of one image",
+           "Give the calibration of these cameras");
+  }
+}
+
+}  // namespace
+
+LiveInput::LiveInput(const Settings& settings, const Calibration& calibration) {
+  if (settings.imu_link.device.empty()) {
+    failAt("imu_link.device", "no IMU is named",
+           "Name its serial port or CAN interface; `swiftlet doctor` lists them");
+  }
+  if (settings.trigger.chip == kTriggerByImu && settings.imu_link.protocol == "dronecan") {
+    failAt("trigger.chip", "dronecan tells of no edges",
+           "Name the GPIO chip that sees the trigger, or leave trigger.chip out");
+  }
+  const CamerasGroup& cameras = settings.cameras;
+  const Rig& rig = calibration.rig;
+  checkCameras(cameras, rig);
+  imu_ = std::make_unique<ImuThread>(
+      fmt::format("IMU ({}, {})", settings.imu_link.device, settings.imu_link.protocol),
+      makeImuLink(settings.imu_link), calibration.R_body_imu,
+      Duration::fromSeconds(settings.imu_link.delay_ms * kFromMs), calibration.noise.rate_hz);
+  const std::size_t nodes = cameras.side_by_side ? 1 : rig.camera_count;
+  for (std::size_t i = 0; i < nodes; ++i) {
+    const std::string& path = i == 0 ? cameras.device0 : cameras.device1;
+    CameraThread::Setup setup;
+    setup.name = fmt::format("camera {} ({})", cameras.side_by_side ? "0 and 1" : std::to_string(i), path);
+    const int halves = cameras.side_by_side ? 2 : 1;
+    setup.device = deviceSettings(cameras, path, halves * rig.camera[i].width(), rig.camera[i].height());
+    setup.first = static_cast<std::uint32_t>(i);
+    setup.settings = cameras;
+    if (!settings.trigger.chip.empty()) setup.trigger = settings.trigger;
+    cameras_.push_back(std::make_unique<CameraThread>(setup));
+    edge_rings_.push_back(&cameras_.back()->edges());
+  }
+  if (settings.trigger.chip == kTriggerByImu) {
+    edges_by_imu_ = true;
+  } else if (!settings.trigger.chip.empty()) {
+    trigger_ = std::make_unique<TriggerThread>(settings.trigger, cameras.rate_hz);
+  }
+}
+
+LiveInput::~LiveInput() = default;
+
+LiveInput::Opened LiveInput::open() {
+  Opened opened;
+  const auto note = [&](const DeviceFault& fault, const DeviceJournal& journal) {
+    if (!fault.ok()) opened.faults.push_back(describe(fault, journal.name()));
+  };
+  note(imu_->open(), imu_->journal());
+  for (const auto& camera : cameras_) {
+    note(camera->open(), camera->journal());
+    for (const DeviceFault& warning : camera->warnings()) {
+      opened.warnings.push_back(describe(warning, camera->journal().name()));
+    }
+  }
+  if (trigger_) note(trigger_->open(), trigger_->journal());
+  return opened;
+}
+
+std::vector<SensorInput::Thread> LiveInput::threads(SensorSink& sink, const RunControl& control) {
+  static constexpr std::array<const char*, kMaxCameras> kCameraThreads = {"camera0", "camera1"};
+  std::vector<Thread> threads;
+  threads.push_back({"imu", true,
+                     [this, &sink, &control] {
+                       imu_->run(sink,
+                                 edges_by_imu_ ? std::span<EdgeRing* const>(edge_rings_)
+                                               : std::span<EdgeRing* const>(),
+                                 control);
+                     },
+                     &imu_->heart()});
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    threads.push_back({kCameraThreads[i], true,
+                       [this, i, &sink, &control] { cameras_[i]->run(sink, control); },
+                       &cameras_[i]->heart()});
+  }
+  if (trigger_) {
+    threads.push_back(
+        {"trigger", true, [this, &control] { trigger_->run(edge_rings_, control); }, &trigger_->heart()});
+  }
+  return threads;
+}
+
+void LiveInput::look(FlightFacts& facts) const {
+  if (!trigger_) return;
+  const TriggerStatus status = trigger_->status();
+  facts.trigger = {status.edges, 0, status.heard, status.heard};
+}
+
+std::uint64_t LiveInput::taken() const {
+  std::uint64_t images = 0;
+  for (const auto& camera : cameras_) images += camera->taken();
+  return images;
+}
+
+std::vector<DeviceJournal*> LiveInput::journals() {
+  std::vector<DeviceJournal*> all = {&imu_->journal()};
+  for (const auto& camera : cameras_) all.push_back(&camera->journal());
+  if (trigger_) all.push_back(&trigger_->journal());
+  return all;
+}
+
+bool LiveInput::drainEvents(const std::function<void(Stamp, const std::string&)>& take) {
+  bool any = false;
+  DeviceEvent event;
+  for (DeviceJournal* journal : journals()) {
+    while (journal->next(event)) {
+      take(event.stamp, journal->text(event));
+      any = true;
+    }
+  }
+  return any;
+}
+
+nlohmann::ordered_json LiveInput::counters() {
+  nlohmann::ordered_json json;
+  json["imu"] = toJson(imu_->status());
+  json["imu"]["link"] = imu_->link().counters();
+  for (std::size_t i = 0; i < cameras_.size(); ++i)
+    json[fmt::format("camera{}", i)] = toJson(cameras_[i]->status());
+  if (trigger_) json["trigger"] = toJson(trigger_->status());
+  for (const DeviceJournal* journal : journals()) {
+    json["faults"][journal->name()] = journal->faults();
+    if (journal->lost() > 0) json["lines_lost"][journal->name()] = journal->lost();
+  }
+  return json;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,65 @@
+#pragma once
+// The vehicle's devices as the input of a threaded run: one thread each for the IMU, every video node and the
+// trigger line, as the settings name them.
+//
+// All devices must be there when the flight begins; in flight each may go and return, fall silent or send
+// garbage, and the others go on. What happens to them goes to the log, by name and with the remedy.
+
+#include <functional>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "drivers/calibration/calibration.hpp"
+#include "firmware_host/inputs/devices/camera_thread.hpp"
+#include "firmware_host/inputs/devices/imu_thread.hpp"
+#include "firmware_host/inputs/devices/trigger_thread.hpp"
+#include "firmware_host/interfaces/sensor_input.hpp"
+#include "firmware_host/settings/settings.hpp"
+
+namespace swiftlet {
+
+class LiveInput : public SensorInput {
+ public:
+  /// IMU, cameras, trigger.
+  static constexpr std::size_t kMostThreads = 2 + kMaxCameras;
+
+  /// InputError, naming the setting, where the settings name too few devices or too many for the rig.
+  LiveInput(const Settings& settings, const Calibration& calibration);
+  ~LiveInput() override;
+
+  /// Opens all. What is wrong with those that did not open, or took a setting otherwise, one line each.
+  struct Opened {
+    std::vector<std::string> faults;
+    std::vector<std::string> warnings;
+  };
+  Opened open();
+
+  std::vector<Thread> threads(SensorSink& sink, const RunControl& control) override;
+  /// The trigger's edges.
+  void look(FlightFacts& facts) const override;
+  [[nodiscard]] std::uint64_t taken() const override;
+
+  /// Of one thread: what happened to devices since, as lines for the user. True: there was something.
+  bool drainEvents(const std::function<void(Stamp, const std::string&)>& take);
+  /// After the flight: what the devices did.
+  [[nodiscard]] nlohmann::ordered_json counters();
+
+  [[nodiscard]] ImuThread& imu() { return *imu_; }
+  [[nodiscard]] std::span<const std::unique_ptr<CameraThread>> cameras() const { return cameras_; }
+  /// Null: no line is connected.
+  [[nodiscard]] TriggerThread* trigger() { return trigger_.get(); }
+
+ private:
+  [[nodiscard]] std::vector<DeviceJournal*> journals();
+
+  std::unique_ptr<ImuThread> imu_;
+  std::vector<std::unique_ptr<CameraThread>> cameras_;
+  std::unique_ptr<TriggerThread> trigger_;
+  std::vector<EdgeRing*> edge_rings_;  ///< one a video node
+  bool edges_by_imu_ = false;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,35 @@
+#pragma once
+// The threads of an input, without an executor: for recording and for looking at devices.
+
+#include <atomic>
+#include <string>
+#include <vector>
+
+#include "firmware_host/inputs/devices/live_input.hpp"
+#include "firmware_host/realtime/flight_thread.hpp"
+#include "firmware_host/settings/settings.hpp"
+
+namespace swiftlet {
+
+class SensorThreads {
+ public:
+  /// Starts them. Input and sink outlive this.
+  SensorThreads(SensorInput& input, SensorSink& sink, const RealtimeGroup& realtime);
+  ~SensorThreads() { join(); }
+  SensorThreads(const SensorThreads&) = delete;
+  SensorThreads& operator=(const SensorThreads&) = delete;
+
+  /// Tells them to end and waits.
+  void join();
+  /// What threads did not get, in words.
+  [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
+
+ private:
+  std::atomic<bool> stop_{false};
+  RunControl control_;
+  std::array<FlightThread, LiveInput::kMostThreads> threads_;
+  std::size_t started_ = 0;
+  std::vector<std::string> warnings_;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,23 @@
+#pragma once
+// What devices did, for the summary, and in words for `doctor`.
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "firmware_host/inputs/devices/camera_thread.hpp"
+#include "firmware_host/inputs/devices/imu_thread.hpp"
+#include "firmware_host/inputs/devices/trigger_thread.hpp"
+
+namespace swiftlet {
+
+/// "unlocked", "locking", "locked".
+const char* lockName(LockState lock);
+/// What a driver's stamps mark, in words.
+const char* stampEventName(StampEvent event);
+
+nlohmann::ordered_json toJson(const TimesyncStatus& status);
+nlohmann::ordered_json toJson(const ImuStatus& status);
+nlohmann::ordered_json toJson(const CameraStatus& status);
+nlohmann::ordered_json toJson(const TriggerStatus& status);
+
+}  // namespace swiftlet

@@ -1,0 +1,54 @@
+#pragma once
+// The newest of what a run finds, for one thread outside of the graph (ROS 2's topics, an autopilot, the
+// live view): it takes what is newest at its own pace and nobody waits for it. Memory: three of each value.
+
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+#include "estimator/core/fixed_vector.hpp"
+#include "estimator/core/newest.hpp"
+#include "estimator/messages/local_mesh.hpp"
+#include "estimator/messages/odometry_output.hpp"
+#include "firmware_host/interfaces/state_news.hpp"
+#include "firmware_host/supervisor/verdict.hpp"
+#include "mapping/loop/loop_report.hpp"
+#include "mapping/surface/surface_patch.hpp"
+
+namespace swiftlet {
+
+/// A frame that was smoothed, or waits to be.
+struct FrameNews {
+  Stamp stamp;
+  bool has_state = false;
+  const char* waiting_for = "";  ///< literal text while initializing
+  Health health = Health::kInitializing;
+  std::uint32_t epoch = 0;
+  FrameStatistics statistics;
+  double since_arrival = 0;  ///< from the image's arrival until here, on the host's clock [s]
+};
+
+/// Vertices of the map's surface, in the map's axes.
+struct SurfaceNews {
+  static constexpr std::size_t kMost = 200'000;  ///< the rest is left out
+
+  SurfaceNews() { vertices.reserve(kMost); }
+
+  Stamp stamp;  ///< of the frame that was mapped last
+  std::vector<SurfaceVertex> vertices;
+};
+
+struct LiveOutlet {
+  Newest<StateNews> state;           ///< of `propagate`: at every IMU sample
+  Newest<FrameNews> frame;           ///< of `smooth`
+  Newest<LocalMesh> mesh;            ///< of `mesh`: over the horizon
+  Newest<MapCorrection> correction;  ///< of `loop`
+  Newest<SurfaceNews> surface;       ///< of `map`, each time that surface_wanted is set
+  std::atomic<bool> surface_wanted{false};
+  Newest<Verdict> verdict;  ///< of the supervisor, ten times a second: who reads it asks for its age
+};
+
+/// One for each thread that listens.
+using LiveOutlets = FixedVector<LiveOutlet*, 4>;
+
+}  // namespace swiftlet

@@ -1,0 +1,47 @@
+#pragma once
+// A thread that does nothing but sleep to the next multiple of its period and note how late it woke: what
+// the machine itself costs a real-time thread of that priority, as cyclictest measures it.
+//
+// Threads: start and stop from one thread; lateness() and the counts after stop.
+// Memory: fixed, allocated by start; the loop allocates nothing.
+// Bounds: stop waits for at most one period (and the machine's lateness).
+
+#include <atomic>
+#include <cstdint>
+
+#include "estimator/core/stamp.hpp"
+#include "firmware_host/realtime/flight_thread.hpp"
+#include "firmware_host/realtime/latency_histogram.hpp"
+
+namespace swiftlet {
+
+class BareTimerLoop {
+ public:
+  static constexpr Duration kPeriod = Duration::fromMilliseconds(1);
+
+  BareTimerLoop() = default;
+  ~BareTimerLoop() { stop(); }
+  BareTimerLoop(const BareTimerLoop&) = delete;
+  BareTimerLoop& operator=(const BareTimerLoop&) = delete;
+
+  /// Begins anew with empty figures; nothing but the report when it is running already.
+  ThreadReport start(const ThreadSettings& settings, Duration period = kPeriod);
+  void stop();
+
+  /// s, one entry a wake-up.
+  [[nodiscard]] const LatencyHistogram& lateness() const { return lateness_; }
+  /// Periods that were over before the thread woke for them; each is part of the lateness of the wake-up
+  /// before and counts in no entry of its own.
+  [[nodiscard]] std::uint64_t skipped() const { return skipped_; }
+
+ private:
+  void loop();
+
+  FlightThread thread_;
+  LatencyHistogram lateness_;
+  Duration period_ = kPeriod;
+  std::uint64_t skipped_ = 0;
+  std::atomic<bool> stop_{false};
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,135 @@
+#include "firmware_host/lab/evaluation/accuracy_report.hpp"
+
+#include <fmt/format.h>
+
+namespace swiftlet {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json statisticsJson(const ErrorStatistics& s) {
+  return {{"rmse", s.rmse}, {"mean", s.mean}, {"median", s.median}, {"std", s.deviation},
+          {"min", s.min},   {"max", s.max},   {"sse", s.sse},       {"count", s.count}};
+}
+
+}  // namespace
+
+Json toJson(const Accuracy& accuracy) {
+  const TrajectoryError& absolute = accuracy.absolute;
+  Json json;
+  json["align"] = alignName(absolute.kind);
+  json["max_truth_gap_ms"] = accuracy.max_gap.seconds() * 1e3;
+  json["poses"] = accuracy.estimates;
+  json["pairs"] = accuracy.pairs;
+  json["coverage"] = accuracy.coverage();
+  json["duration_s"] = accuracy.duration;
+  json["path_m"] = absolute.path_length;
+  if (!absolute.status.ok()) json["note"] = absolute.status.what;
+  if (accuracy.pairs == 0) return json;
+  json["ate_m"] = statisticsJson(absolute.translation);
+  json["ate_axis_rmse_m"] = {absolute.axis_rmse.x(), absolute.axis_rmse.y(), absolute.axis_rmse.z()};
+  json["rotation_deg"] = statisticsJson(absolute.rotation);
+  json["attitude_deg"] = statisticsJson(absolute.attitude);
+  json["scale"] = absolute.alignment.scale;
+  json["rpe_time"] = {{"interval_s", accuracy.over_time.interval},
+                      {"translation_m", statisticsJson(accuracy.over_time.translation)},
+                      {"rotation_deg", statisticsJson(accuracy.over_time.rotation)}};
+  json["rpe_distance"] = Json::array();
+  for (const RelativeError& error : accuracy.over_distance) {
+    json["rpe_distance"].push_back({{"length_m", error.interval},
+                                    {"translation_percent", statisticsJson(error.translation)},
+                                    {"rotation_deg_per_m", statisticsJson(error.rotation)}});
+  }
+  return json;
+}
+
+Json toJson(const Consistency& consistency) {
+  return {{"states", consistency.count},
+          {"without_covariance", consistency.without_covariance},
+          {"nees_pose_6dof", consistency.nees_pose},
+          {"nees_rotation_3dof", consistency.nees_rotation},
+          {"nees_position_3dof", consistency.nees_position},
+          {"inside_3_sigma", consistency.inside_3_sigma}};
+}
+
+Json toJson(const CommonStamps& map_beside_odometry) {
+  return {{"pairs", map_beside_odometry.pairs},
+          {"odometry_ate_rmse_m", map_beside_odometry.reference_rmse},
+          {"map_ate_rmse_m", map_beside_odometry.other_rmse},
+          {"ratio", map_beside_odometry.ratio()}};
+}
+
+Json toJson(const Revisits& revisits) {
+  return {{"samples", revisits.samples}, {"revisiting", revisits.revisiting}, {"pairs", revisits.pairs}};
+}
+
+std::string toText(const CommonStamps& map_beside_odometry) {
+  return fmt::format("  ATE rmse of odometry.tum {:.4f} m, of map.tum {:.4f} m: {:.2f} times  ({} poses)\n",
+                     map_beside_odometry.reference_rmse, map_beside_odometry.other_rmse,
+                     map_beside_odometry.ratio(), map_beside_odometry.pairs);
+}
+
+Json toJson(const LoopAccuracy& loops) {
+  return {{"verified", loops.verified},
+          {"verified_right", loops.verified_right},
+          {"selected", loops.selected},
+          {"selected_right", loops.selected_right},
+          {"without_truth", loops.without_truth},
+          {"median_error_m", loops.median_distance},
+          {"median_error_deg", loops.median_degrees}};
+}
+
+std::string toText(const LoopAccuracy& loops) {
+  return fmt::format(
+      "  {} of {} verified are right (within {:g} m and {:g} deg), {} of {} selected; median error {:.4f} m, "
+      "{:.3f} deg\n",
+      loops.verified_right, loops.verified, kFalseLoopDistance, kFalseLoopDegrees, loops.selected_right,
+      loops.selected, loops.median_distance, loops.median_degrees);
+}
+
+std::string toText(const Revisits& revisits) {
+  return fmt::format(
+      "  {} of {} places (one every 0.5 s) are within 1 m and 30 degrees of one more than 20 s before\n",
+      revisits.revisiting, revisits.samples);
+}
+
+std::string toText(const std::string& title, const Accuracy& accuracy) {
+  const TrajectoryError& absolute = accuracy.absolute;
+  std::string text = fmt::format("{}: {} of {} poses have truth (gap at most {:g} ms)", title, accuracy.pairs,
+                                 accuracy.estimates, accuracy.max_gap.seconds() * 1e3);
+  if (accuracy.pairs == 0) return text + ": nothing to compare\n";
+  text += fmt::format(", {:.1f} s, {:.1f} m\n", accuracy.duration, absolute.path_length);
+  text += fmt::format(
+      "  ATE ({} alignment)  rmse {:.4f} m  mean {:.4f}  median {:.4f}  max {:.4f}  per axis {:.4f} {:.4f} "
+      "{:.4f}\n",
+      alignName(absolute.kind), absolute.translation.rmse, absolute.translation.mean,
+      absolute.translation.median, absolute.translation.max, absolute.axis_rmse.x(), absolute.axis_rmse.y(),
+      absolute.axis_rmse.z());
+  if (!absolute.status.ok()) text += fmt::format("  note: {}\n", absolute.status.what);
+  if (absolute.kind == AlignKind::kSim3) text += fmt::format("  scale {:.5f}\n", absolute.alignment.scale);
+  text +=
+      fmt::format("  rotation  rmse {:.3f} deg  max {:.3f}\n", absolute.rotation.rmse, absolute.rotation.max);
+  text += fmt::format("  RPE over {:g} s  rmse {:.4f} m  {:.3f} deg  ({} intervals)\n",
+                      accuracy.over_time.interval, accuracy.over_time.translation.rmse,
+                      accuracy.over_time.rotation.rmse, accuracy.over_time.translation.count);
+  for (const RelativeError& error : accuracy.over_distance) {
+    text += fmt::format("  RPE over {:g} m  mean {:.3f} %  {:.4f} deg/m  ({} segments)\n", error.interval,
+                        error.translation.mean, error.rotation.mean, error.translation.count);
+  }
+  return text;
+}
+
+std::string toText(const Consistency& consistency) {
+  if (consistency.count == 0) {
+    return fmt::format("  NEES: none of {} keyframes has a usable covariance\n",
+                       consistency.without_covariance);
+  }
+  return fmt::format(
+      "  NEES  pose {:.2f} (6 = consistent)  rotation {:.2f} (3)  position {:.2f} (3)  inside 3 sigma {:.1f} "
+      "%"
+      "  ({} keyframes)\n",
+      consistency.nees_pose, consistency.nees_rotation, consistency.nees_position,
+      100 * consistency.inside_3_sigma, consistency.count);
+}
+
+}  // namespace swiftlet

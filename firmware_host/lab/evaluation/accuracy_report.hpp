@@ -1,0 +1,30 @@
+#pragma once
+// Accuracy figures as JSON for summary.json and as lines for the terminal. Every number stands beside
+// the alignment, the association tolerance and the number of pairs it was made from.
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "firmware_host/lab/evaluation/accuracy.hpp"
+#include "firmware_host/lab/evaluation/common_stamps.hpp"
+#include "firmware_host/lab/evaluation/consistency.hpp"
+#include "firmware_host/lab/evaluation/loop_accuracy.hpp"
+#include "firmware_host/lab/evaluation/revisits.hpp"
+
+namespace swiftlet {
+
+nlohmann::ordered_json toJson(const Accuracy& accuracy);
+nlohmann::ordered_json toJson(const Consistency& consistency);
+/// Of map.tum (the other) beside odometry.tum (the reference).
+nlohmann::ordered_json toJson(const CommonStamps& map_beside_odometry);
+nlohmann::ordered_json toJson(const Revisits& revisits);
+nlohmann::ordered_json toJson(const LoopAccuracy& loops);
+
+/// `title`: which section and file, "odometry.tum, from 3 s".
+std::string toText(const std::string& title, const Accuracy& accuracy);
+std::string toText(const Consistency& consistency);
+std::string toText(const CommonStamps& map_beside_odometry);
+std::string toText(const Revisits& revisits);
+std::string toText(const LoopAccuracy& loops);
+
+}  // namespace swiftlet

@@ -1,0 +1,165 @@
+#include "firmware_host/lab/evaluation/evaluate_meshes.hpp"
+
+#include <filesystem>
+
+#include "drivers/calibration/input_error.hpp"
+#include "drivers/recorded/open_log.hpp"
+#include "firmware_host/lab/evaluation/mesh_frames.hpp"
+#include "firmware_host/outputs/map_files/ply_file.hpp"
+
+namespace swiftlet {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kMapFile = "map.ply";
+
+struct Fit {
+  Alignment alignment;
+  std::string text;
+};
+
+Fit fitOf(const Trajectory& estimate, const Trajectory& truth, const AccuracyOptions& options) {
+  const Association association = associate(estimate, truth, options.association);
+  const TrajectoryError error = trajectoryError(association.pairs, options.align);
+  Fit fit;
+  fit.alignment = error.alignment;
+  fit.text = std::string(alignName(options.align)) + " alignment";
+  if (!error.status.ok() && !association.pairs.empty()) {
+    const PosePair& middle = association.pairs[association.pairs.size() / 2];
+    fit.alignment = Alignment();
+    fit.alignment.T_to_from = middle.truth * middle.estimate.inverse();
+    fit.text = "one pose (" + std::string(error.status.what) + ")";
+  }
+  return fit;
+}
+
+std::string truthMesh(const MeshEvaluationRequest& request) {
+  if (!request.truth_mesh.empty()) return request.truth_mesh;
+  const fs::path path = fs::path(request.log) / "truth" / "mesh.ply";
+  if (!fs::exists(path)) {
+    throw InputError(request.log, 0, "", "has no truth/mesh.ply to judge meshes by",
+                     "Give the true surface with --truth-mesh");
+  }
+  return path;
+}
+
+/// Judges the frames of meshes/frames.csv.
+class SequenceJudge {
+ public:
+  SequenceJudge(const MeshEvaluationRequest& request, const Trajectory& truth, const AccuracyOptions& options,
+                const Alignment& alignment, const TrueSurface& surface)
+      : truth_(&truth),
+        options_(&options),
+        alignment_(&alignment),
+        surface_(&surface),
+        frames_(readMeshFrames((fs::path(request.run) / "meshes").string())) {
+    LogOptions log_options;
+    log_options.without_images = true;
+    const auto log = openLog(request.log, log_options);
+    camera_ = log->rig().camera[0];
+    T_body_cam_ = log->rig().T_body_cam[0];
+  }
+
+  void operator()(MeshAccuracy& accuracy) {
+    choose(accuracy);
+    const RayGrid grid(camera_, kGridStep);
+    MeshSequence frame(*surface_, density(&MeshFrame::frame_mesh));
+    MeshSequence horizon(*surface_, density(&MeshFrame::horizon_mesh));
+    for (const Judged& judged : judged_) {
+      const MeshFrame& listed = *judged.listed;
+      const SeenSurface seen =
+          seenSurface(grid, listed.hull, judged.T_world_body * T_body_cam_, surface_->distance());
+      if (!listed.frame_mesh.empty()) frame.add(read(listed.frame_mesh), seen);
+      if (!listed.horizon_mesh.empty()) horizon.add(read(listed.horizon_mesh), seen);
+    }
+    accuracy.frame = frame.result();
+    accuracy.horizon = horizon.result();
+    if (accuracy.frame->meshes == 0) accuracy.frame.reset();
+    if (accuracy.horizon->meshes == 0) accuracy.horizon.reset();
+  }
+
+ private:
+  struct Judged {
+    const MeshFrame* listed = nullptr;
+    SE3 T_world_body;  ///< true
+  };
+
+  void choose(MeshAccuracy& accuracy) {
+    const AssociationOptions& section = options_->association;
+    for (const MeshFrame& listed : frames_) {
+      if ((section.from && listed.stamp < *section.from) ||
+          (section.until && listed.stamp > *section.until)) {
+        continue;
+      }
+      ++accuracy.frames;
+      const std::optional<SE3> pose = interpolate(*truth_, listed.stamp, section.max_gap);
+      if (!pose) {
+        ++accuracy.without_truth;
+        continue;
+      }
+      if (listed.keyframe && listed.frame_mesh.empty()) ++accuracy.keyframes_bare;
+      judged_.push_back({&listed, *pose});
+    }
+  }
+
+  [[nodiscard]] TriangleMesh read(const std::string& path) const { return moved(readPly(path), *alignment_); }
+
+  /// One for all meshes of a kind, from the area that they have together.
+  [[nodiscard]] double density(std::string MeshFrame::*file) const {
+    double area = 0;
+    for (const Judged& judged : judged_) {
+      const std::string& path = judged.listed->*file;
+      if (!path.empty()) area += areaOf(read(path));
+    }
+    return sequenceDensity(area);
+  }
+
+  const Trajectory* truth_;
+  const AccuracyOptions* options_;
+  const Alignment* alignment_;
+  const TrueSurface* surface_;
+  std::vector<MeshFrame> frames_;
+  std::vector<Judged> judged_;
+  CameraModel camera_;
+  SE3 T_body_cam_;
+};
+
+}  // namespace
+
+MeshAccuracy evaluateMeshes(const MeshEvaluationRequest& request, const Trajectory& estimate,
+                            const Trajectory& truth, const AccuracyOptions& options) {
+  MeshAccuracy accuracy;
+  accuracy.truth = truthMesh(request);
+  const TriangleMesh true_mesh = readPly(accuracy.truth);
+  if (true_mesh.faces.empty()) {
+    throw InputError(accuracy.truth, 0, "face", "a surface without triangles", "Give a mesh, not points");
+  }
+  const TrueSurface surface(true_mesh);
+  const Fit fit = fitOf(estimate, truth, options);
+  accuracy.alignment = fit.text;
+  const fs::path run(request.run);
+  const bool has_sequence = fs::exists(run / "meshes" / "frames.csv");
+  if (has_sequence) SequenceJudge(request, truth, options, fit.alignment, surface)(accuracy);
+  const fs::path observed = fs::path(accuracy.truth).parent_path() / "observed.ply";
+  const TriangleMesh points = fs::exists(observed) ? readPly(observed) : TriangleMesh();
+  const auto judge = [&](const char* name) {
+    const TriangleMesh mesh = moved(readPly(run / name), fit.alignment);
+    CompleteMeshAccuracy judged = completeMeshAccuracy(mesh, surface, points.vertices);
+    judged.file = name;
+    if (std::string_view(name) == kMapFile) judgeRegistered(mesh, true_mesh, surface, judged);
+    return judged;
+  };
+  for (const char* name : {"complete_mesh.ply", "local_mesh.ply"}) {
+    if (!accuracy.complete && fs::exists(run / name)) accuracy.complete = judge(name);
+  }
+  if (fs::exists(run / kMapFile)) accuracy.map = judge(kMapFile);
+  if (!has_sequence && !accuracy.complete && !accuracy.map) {
+    throw InputError(
+        request.run, 0, "", "no meshes in this folder",
+        "Replay with --mesh-sequence or --map, or give what `swiftlet mesh` or `swiftlet fuse` wrote");
+  }
+  return accuracy;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,51 @@
+#pragma once
+// The trajectories of a run folder, or of a single file, against the truth.
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "drivers/recorded/trajectory_file.hpp"
+#include "firmware_host/lab/evaluation/accuracy.hpp"
+#include "firmware_host/lab/evaluation/common_stamps.hpp"
+#include "firmware_host/lab/evaluation/consistency.hpp"
+#include "firmware_host/lab/evaluation/loop_accuracy.hpp"
+#include "firmware_host/lab/evaluation/revisits.hpp"
+#include "firmware_host/settings/settings.hpp"
+
+namespace swiftlet {
+
+/// Seconds after the first image from which every system is compared: all have started by then.
+inline constexpr double kCommonStart = 3.0;
+
+AccuracyOptions accuracyOptions(const EvaluationGroup& settings, AlignKind align);
+
+/// A truth file's or a log's truth, in the estimator's body.
+struct Truth {
+  Trajectory poses;
+  std::string name;
+  std::optional<Stamp> first_image;  ///< where a log says
+};
+/// `without_images`: a log is read as one of tracks, which need not hold images.
+Truth readTruth(const std::string& path, bool without_images = false);
+
+/// What summary.json holds under "accuracy": odometry.tum over all and from kCommonStart, SE(3) and yaw
+/// alignment; states.csv with its consistency; map.tum when it exists, by itself and beside odometry.tum at
+/// the same stamps; how much of the flight revisits.
+nlohmann::ordered_json runAccuracyJson(const std::string& folder, const Trajectory& truth,
+                                       const std::string& truth_name, Stamp first_image,
+                                       const EvaluationGroup& settings);
+
+/// Of a loops.csv.
+LoopAccuracy loopsOf(const std::string& loops_file, const Trajectory& truth, const EvaluationGroup& settings);
+
+/// Over the part of the truth that `estimate` (not empty) covers.
+Revisits revisitsOf(const Trajectory& estimate, const Trajectory& truth);
+
+/// A trajectory file of any kind readTrajectory() takes; InputError when it has no pose.
+Trajectory readEstimate(const std::string& path);
+
+/// NEES of a run's keyframes. Keyframes without truth are left out.
+Consistency consistencyOf(const std::string& states_file, const Trajectory& truth, Duration max_gap);
+
+}  // namespace swiftlet

@@ -1,0 +1,186 @@
+#include "firmware_host/lab/export/bag_messages.hpp"
+
+#include <fmt/format.h>
+
+#include <limits>
+
+#include "estimator/messages/names.hpp"
+#include "firmware_host/outputs/map_files/map_files.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+constexpr float kFullColour = 255;
+
+template <typename Point>
+void set(Point& to, const Eigen::Vector3d& from) {
+  to.x = from.x();
+  to.y = from.y();
+  to.z = from.z();
+}
+
+template <typename Quaternion>
+void set(Quaternion& to, const Eigen::Quaterniond& from) {
+  to.x = from.x();
+  to.y = from.y();
+  to.z = from.z();
+  to.w = from.w();
+}
+
+BagMarker::_color_type colourOf(std::uint8_t red, std::uint8_t green, std::uint8_t blue) {
+  BagMarker::_color_type colour;
+  colour.r = static_cast<float>(red) / kFullColour;
+  colour.g = static_cast<float>(green) / kFullColour;
+  colour.b = static_cast<float>(blue) / kFullColour;
+  colour.a = 1;
+  return colour;
+}
+
+std::int8_t levelOf(const std::string& health) {
+  if (health == healthName(Health::kGood)) return BagStatus::OK;
+  return health == healthName(Health::kFailed) ? BagStatus::ERROR : BagStatus::WARN;
+}
+
+/// `name` as rqt_robot_monitor groups it: what stands before the slash is one tree.
+BagStatus statusOf(const char* name, std::int8_t level, const std::string& message) {
+  BagStatus status;
+  status.name = name;
+  status.hardware_id = "swiftlet";
+  status.level = static_cast<std::int8_t>(level);
+  status.message = message.c_str();
+  return status;
+}
+
+void add(BagStatus& status, const char* key, const std::string& value) {
+  BagStatus::_values_type::value_type pair;
+  pair.key = key;
+  pair.value = value.c_str();
+  status.values.push_back(pair);
+}
+
+}  // namespace
+
+bool bagHolds(Stamp stamp) {
+  return stamp.ns > 0 && stamp.ns / kNsPerSecond < std::numeric_limits<std::uint32_t>::max();
+}
+
+ros::Time bagTime(Stamp stamp) {
+  return {static_cast<std::uint32_t>(stamp.ns / kNsPerSecond),
+          static_cast<std::uint32_t>(stamp.ns % kNsPerSecond)};
+}
+
+BagHeader bagHeader(Stamp stamp, const std::string& frame) {
+  BagHeader header;
+  header.stamp = bagTime(stamp);
+  header.frame_id = frame.c_str();
+  return header;
+}
+
+BagPose bagPose(Stamp stamp, const std::string& frame, const SE3& T_frame_body) {
+  BagPose pose;
+  pose.header = bagHeader(stamp, frame);
+  set(pose.pose.position, T_frame_body.translation);
+  set(pose.pose.orientation, T_frame_body.rotation);
+  return pose;
+}
+
+BagTransform bagTransform(Stamp stamp, const std::string& frame, const std::string& child,
+                          const SE3& T_frame_child) {
+  BagTransform transform;
+  transform.header = bagHeader(stamp, frame);
+  transform.child_frame_id = child.c_str();
+  set(transform.transform.translation, T_frame_child.translation);
+  set(transform.transform.rotation, T_frame_child.rotation);
+  return transform;
+}
+
+BagOdometry bagOdometry(const NavState& state, const RosFrames& frames) {
+  BagOdometry odometry;
+  odometry.header = bagHeader(state.stamp, frames.odom);
+  odometry.child_frame_id = frames.body.c_str();
+  set(odometry.pose.pose.position, state.T_world_body.translation);
+  set(odometry.pose.pose.orientation, state.T_world_body.rotation);
+  set(odometry.twist.twist.linear, bodyVelocity(state));
+  Eigen::Map<RosCovariance>(odometry.pose.covariance.data()) = rosPoseCovariance(state);
+  Eigen::Map<RosCovariance>(odometry.twist.covariance.data()) = rosTwistCovariance(state);
+  return odometry;
+}
+
+BagPath bagPath(const std::string& frame, const Trajectory& trajectory) {
+  BagPath path;
+  path.header = bagHeader(trajectory.front().stamp, frame);
+  path.poses.reserve(trajectory.size());
+  for (const TrajectoryPoint& point : trajectory) {
+    path.poses.push_back(bagPose(point.stamp, frame, point.T_world_body));
+  }
+  return path;
+}
+
+BagVector bagVector(Stamp stamp, const std::string& frame, const Eigen::Vector3d& vector) {
+  BagVector message;
+  message.header = bagHeader(stamp, frame);
+  set(message.vector, vector);
+  return message;
+}
+
+BagMarker bagMarker(Stamp stamp, const std::string& frame, const std::string& name,
+                    const TriangleMesh& mesh) {
+  BagMarker marker;
+  marker.header = bagHeader(stamp, frame);
+  marker.ns = name.c_str();
+  marker.type = BagMarker::TRIANGLE_LIST;
+  marker.action = mesh.faces.empty() ? BagMarker::DELETE : BagMarker::ADD;
+  marker.pose.orientation.w = 1;
+  marker.scale.x = marker.scale.y = marker.scale.z = 1;
+  marker.color = colourOf(128, 128, 128);
+  marker.points.reserve(3 * mesh.faces.size());
+  marker.colors.reserve(3 * mesh.faces.size());
+  for (std::size_t face = 0; face < mesh.faces.size(); ++face) {
+    const std::uint8_t label = mesh.labels.empty() ? std::uint8_t{0} : mesh.labels[face];
+    for (const std::uint32_t corner : mesh.faces[face]) {
+      BagMarker::_points_type::value_type point;
+      set(point, mesh.vertices[corner].cast<double>());
+      marker.points.push_back(point);
+      const std::uint8_t grey = mesh.grey.empty() ? std::uint8_t{128} : mesh.grey[corner];
+      const auto [r, g, b] = label == 0 ? std::array{grey, grey, grey} : labelColour(label);
+      marker.colors.push_back(colourOf(r, g, b));
+    }
+  }
+  return marker;
+}
+
+BagDiagnostics bagDiagnostics(const KeyframeState& keyframe) {
+  const std::string health(healthName(keyframe.state.health));
+  const FrameStatistics& figures = keyframe.statistics;
+  BagStatus status = statusOf("swiftlet/keyframe", levelOf(health), health);
+  add(status, "epoch", fmt::format("{}", keyframe.state.epoch));
+  add(status, "at_rest", figures.at_rest ? "1" : "0");
+  add(status, "tracks", fmt::format("{}", figures.tracks));
+  add(status, "landmarks", fmt::format("{}", figures.landmarks));
+  add(status, "inliers_mono", fmt::format("{}", figures.inliers_mono));
+  add(status, "inliers_stereo", fmt::format("{}", figures.inliers_stereo));
+  add(status, "track_length", fmt::format("{}", figures.track_length));
+  add(status, "reprojection_rms", fmt::format("{}", figures.reprojection_rms));
+  add(status, "imu_residual", fmt::format("{}", figures.imu_residual));
+  add(status, "iterations", fmt::format("{}", figures.iterations));
+  BagDiagnostics diagnostics;
+  diagnostics.header = bagHeader(keyframe.state.stamp, "");
+  diagnostics.status.push_back(status);
+  return diagnostics;
+}
+
+BagDiagnostics bagDiagnostics(const EventLine& event, const std::string& health) {
+  BagStatus status = statusOf("swiftlet/health", levelOf(health), health);
+  BagStatus what = statusOf("swiftlet/event", BagStatus::OK,
+                            event.text.empty() ? event.name : event.name + " " + event.text);
+  add(what, "event", event.name);
+  add(what, "value", event.text);
+  BagDiagnostics diagnostics;
+  diagnostics.header = bagHeader(event.stamp, "");
+  diagnostics.status.push_back(status);
+  diagnostics.status.push_back(what);
+  return diagnostics;
+}
+
+}  // namespace swiftlet

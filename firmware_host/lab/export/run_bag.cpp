@@ -1,0 +1,242 @@
+#include "firmware_host/lab/export/run_bag.hpp"
+
+#include <fmt/format.h>
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <functional>
+
+#include "drivers/calibration/input_error.hpp"
+#include "estimator/messages/names.hpp"
+#include "firmware_host/files/whole_file.hpp"
+#include "firmware_host/lab/export/bag_messages.hpp"
+#include "firmware_host/outputs/map_files/ply_file.hpp"
+
+namespace swiftlet {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A record's size is a u32 and viewers hold a marker several times over: 120 bytes a face.
+constexpr std::size_t kMostFaces = 4'000'000;
+
+/// Gathers what is to be written, then writes it in the order of the stamps.
+class RunBag {
+ public:
+  RunBag(const RunFolder& run, const BagTruth& truth, const RunBagOptions& options, const std::string& file)
+      : run_(run), truth_(truth), frames_(options.frames), meshes_(options.meshes), file_(file) {}
+
+  std::map<std::string, std::uint64_t> write() {
+    plan();
+    std::ranges::stable_sort(entries_, {}, &Entry::stamp);
+    bag_.open(file_, rosbag::bagmode::Write);
+    for (const Entry& entry : entries_) entry.write();
+    bag_.close();
+    check();
+    return counts_;
+  }
+
+ private:
+  struct Entry {
+    Stamp stamp;
+    std::function<void()> write;
+  };
+
+  void plan() {
+    planTransforms();
+    planTrajectories();
+    planKeyframes();
+    planEvents();
+    planTruth();
+    if (meshes_) planMeshes();
+  }
+
+  /// `make` gives the message when its turn has come.
+  template <typename Make>
+  void at(Stamp stamp, const std::string& where, const std::string& topic, Make make, bool latched = false) {
+    if (!bagHolds(stamp)) {
+      throw InputError(where, 0, "stamp", fmt::format("{} ns has no place in a ROS bag", stamp.ns),
+                       "A bag holds times from 1 ns to the year 2106; `--tum` takes the others too");
+    }
+    entries_.push_back({stamp, [this, stamp, topic, make, latched] { put(stamp, topic, make(), latched); }});
+  }
+
+  template <typename Message>
+  void put(Stamp stamp, const std::string& topic, Message message, bool latched) {
+    const auto sequence = static_cast<std::uint32_t>(counts_[topic]++);
+    if constexpr (requires { message.header.seq; }) message.header.seq = sequence;
+    boost::shared_ptr<ros::M_string> fields;
+    if (latched) {
+      // What a player needs to repeat the last message to who comes late.
+      fields = boost::make_shared<ros::M_string>();
+      (*fields)["topic"] = topic;
+      (*fields)["type"] = ros::message_traits::datatype(message);
+      (*fields)["md5sum"] = ros::message_traits::md5sum(message);
+      (*fields)["message_definition"] = ros::message_traits::definition(message);
+      (*fields)["latching"] = "1";
+    }
+    bag_.write(topic, bagTime(stamp), message, fields);
+  }
+
+  void planTransforms() {
+    const std::string where = pathOf(run_.odometry_file);
+    const Stamp first = run_.odometry.front().stamp;
+    // One message: a player repeats only the last of a topic.
+    if (run_.map.empty() || !truth_.poses.empty()) {
+      at(
+          first, where, "/tf_static",
+          [this, first] {
+            BagTransforms fixed;
+            if (run_.map.empty()) fixed.transforms.push_back(mapTransform(first, {}));
+            if (!truth_.poses.empty()) {
+              fixed.transforms.push_back(
+                  bagTransform(first, frames_.odom, frames_.truth, truth_.T_world_truth));
+            }
+            return fixed;
+          },
+          true);
+    }
+    const std::vector<SE3> corrections = mapCorrections(run_);
+    for (std::size_t i = 0; i < run_.odometry.size(); ++i) {
+      const TrajectoryPoint& point = run_.odometry[i];
+      at(point.stamp, where, "/tf", [this, &point, correction = corrections[i]] {
+        const BagTransform body = bagTransform(point.stamp, frames_.odom, frames_.body, point.T_world_body);
+        if (run_.map.empty()) return transforms({body});
+        return transforms({mapTransform(point.stamp, correction), body});
+      });
+    }
+  }
+
+  void planTrajectories() {
+    planPath("/swiftlet/path", frames_.odom, run_.odometry, pathOf(run_.odometry_file));
+    planPoses("/swiftlet/pose", frames_.odom, run_.odometry, pathOf(run_.odometry_file));
+    planPoses("/swiftlet/imu_rate", frames_.odom, run_.imu_rate, pathOf("imu_rate.tum"));
+    planPath("/swiftlet/map_path", frames_.map, run_.map, pathOf("map.tum"));
+  }
+
+  void planKeyframes() {
+    const std::string where = pathOf("states.csv");
+    for (const KeyframeState& keyframe : run_.keyframes) {
+      const NavState& state = keyframe.state;
+      at(state.stamp, where, "/swiftlet/odometry", [this, &state] { return bagOdometry(state, frames_); });
+      at(state.stamp, where, "/swiftlet/bias_gyro",
+         [this, &state] { return bagVector(state.stamp, frames_.body, state.bias_gyro); });
+      at(state.stamp, where, "/swiftlet/bias_accel",
+         [this, &state] { return bagVector(state.stamp, frames_.body, state.bias_accel); });
+      at(state.stamp, where, "/diagnostics", [&keyframe] { return bagDiagnostics(keyframe); });
+    }
+  }
+
+  void planEvents() {
+    std::string health(healthName(Health::kInitializing));
+    for (const EventLine& event : run_.events) {
+      if (event.name == eventName(EventKind::kHealthChanged)) health = event.text;
+      at(event.stamp, pathOf("events.log"), "/diagnostics",
+         [&event, health] { return bagDiagnostics(event, health); });
+    }
+  }
+
+  void planTruth() {
+    planPath("/truth/path", frames_.truth, truth_.poses, "the truth");
+    planPoses("/truth/pose", frames_.truth, truth_.poses, "the truth");
+  }
+
+  void planMeshes() {
+    const std::string where = pathOf("meshes/frames.csv");
+    for (const MeshFrame& frame : run_.meshes) {
+      planMesh("/swiftlet/frame_mesh", frames_.odom, frame.stamp, frame.frame_mesh, where);
+      planMesh("/swiftlet/local_mesh", frames_.odom, frame.stamp, frame.horizon_mesh, where);
+    }
+    const std::string odometry = pathOf(run_.odometry_file);
+    planMesh("/swiftlet/local_mesh", frames_.odom, run_.odometry.back().stamp, run_.local_mesh, odometry);
+    planMesh("/swiftlet/map_mesh", frames_.map, run_.odometry.front().stamp, run_.map_mesh, odometry);
+  }
+
+  void planPoses(const std::string& topic, const std::string& frame, const Trajectory& trajectory,
+                 const std::string& where) {
+    for (const TrajectoryPoint& point : trajectory) {
+      at(point.stamp, where, topic,
+         [&frame, &point] { return bagPose(point.stamp, frame, point.T_world_body); });
+    }
+  }
+
+  /// All of it at its beginning: what grows with every pose would fill the bag with itself.
+  void planPath(const std::string& topic, const std::string& frame, const Trajectory& trajectory,
+                const std::string& where) {
+    if (trajectory.empty()) return;
+    at(
+        trajectory.front().stamp, where, topic, [&frame, &trajectory] { return bagPath(frame, trajectory); },
+        true);
+  }
+
+  void planMesh(const std::string& topic, const std::string& frame, Stamp stamp, const std::string& mesh_file,
+                const std::string& where) {
+    if (mesh_file.empty()) return;
+    const std::string name = topic.substr(topic.rfind('/') + 1);
+    at(stamp, where, topic, [&frame, stamp, mesh_file, name] {
+      const TriangleMesh mesh = readPly(mesh_file);
+      if (mesh.faces.size() > kMostFaces) {
+        throw InputError(mesh_file, 0, "",
+                         fmt::format("{} faces are too many for one message", mesh.faces.size()),
+                         "Export with --no-meshes and open map.glb beside the bag");
+      }
+      return bagMarker(stamp, frame, name, mesh);
+    });
+  }
+
+  [[nodiscard]] BagTransform mapTransform(Stamp stamp, const SE3& T_map_world) const {
+    return bagTransform(stamp, frames_.map, frames_.odom, T_map_world);
+  }
+  static BagTransforms transforms(std::initializer_list<BagTransform> list) {
+    BagTransforms message;
+    for (const BagTransform& transform : list) message.transforms.push_back(transform);
+    return message;
+  }
+  [[nodiscard]] std::string pathOf(const std::string& name) const { return fs::path(run_.path) / name; }
+
+  /// A full disk shows when the file is closed, and rosbag does not look.
+  void check() const {
+    rosbag::Bag written(file_, rosbag::bagmode::Read);
+    if (rosbag::View(written).size() == entries_.size()) return;
+    throw rosbag::BagIOException("messages are missing in the file written");
+  }
+
+  const RunFolder& run_;
+  const BagTruth& truth_;
+  const RosFrames frames_;
+  const bool meshes_;
+  const std::string file_;
+  std::vector<Entry> entries_;
+  rosbag::Bag bag_;
+  std::map<std::string, std::uint64_t> counts_;
+};
+
+void removeFile(const std::string& file) {
+  std::error_code ignored;
+  fs::remove(file, ignored);
+}
+
+}  // namespace
+
+std::map<std::string, std::uint64_t> writeRunBag(const RunFolder& run, const BagTruth& truth,
+                                                 const RunBagOptions& options, const std::string& file) {
+  const std::string part = file + ".part";
+  try {
+    const std::map<std::string, std::uint64_t> counts = RunBag(run, truth, options, part).write();
+    commitPart(part, file);
+    return counts;
+  } catch (const rosbag::BagException& error) {
+    removeFile(part);
+    throw InputError(file, 0, "", std::string("cannot be written (") + error.what() + ")",
+                     "Is the folder there and writable, and the disk not full?");
+  } catch (const InputError&) {
+    removeFile(part);
+    throw;
+  }
+}
+
+bool canWriteBags() { return true; }
+
+}  // namespace swiftlet

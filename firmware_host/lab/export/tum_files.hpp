@@ -1,0 +1,18 @@
+#pragma once
+// The trajectories of a run folder as TUM files for evo: one file each, eight columns.
+
+#include <string>
+#include <vector>
+
+#include "firmware_host/lab/export/run_folder.hpp"
+
+namespace swiftlet {
+
+/// Writes into `folder`, which is made: the run's own TUM files byte for byte (odometry.tum or
+/// trajectory.tum, map.tum, imu_rate.tum), keyframes.tum from states.csv, truth.tum from `truth` (none where
+/// it is empty). Files of these names that the run has no part for are removed. Gives the names written.
+/// InputError where a file cannot be written, and for a folder that is the run itself.
+std::vector<std::string> writeTumFiles(const RunFolder& run, const Trajectory& truth,
+                                       const std::string& folder);
+
+}  // namespace swiftlet

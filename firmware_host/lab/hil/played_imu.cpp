@@ -1,0 +1,73 @@
+#include "firmware_host/lab/hil/played_imu.hpp"
+
+#include <cmath>
+
+namespace swiftlet {
+namespace {
+
+/// Where the sensor's clock stands at the log's first image: it was switched on some time before.
+constexpr Duration kSensorUptime = Duration::fromMilliseconds(1'234'567);
+constexpr double kMillion = 1e6;
+
+}  // namespace
+
+PlayedImu::PlayedImu(std::unique_ptr<ImuWire> wire, LogReader& reader, const FaultTimeline& faults,
+                     const Eigen::Matrix3d& R_body_imu, double skew_ppm)
+    : wire_(std::move(wire)),
+      reader_(reader),
+      faults_(faults),
+      R_imu_body_(R_body_imu.transpose()),
+      rate_(1 + skew_ppm / kMillion),
+      next_(reader.sample()) {}
+
+void PlayedImu::begin(const FrameGrid& grid, Stamp last_log) {
+  grid_ = grid;
+  // A vehicle that moves in front of black images is a flight that nobody made.
+  while (next_ && next_->stamp < grid.first_log - grid.period) next_ = reader_.sample();
+  last_log_ = last_log;
+}
+
+std::optional<Stamp> PlayedImu::due() const {
+  if (!next_ || next_->stamp > last_log_) return std::nullopt;
+  return grid_.toHost(next_->stamp);
+}
+
+DeviceFault PlayedImu::step(Stamp now) {
+  const Duration time = now - grid_.first;
+  const bool gone = faults_.active(FaultDevice::kImu, FaultKind::kUnplug, time) != nullptr;
+  if (gone != unplugged_) {
+    const DeviceFault fault = gone ? wire_->unplug() : wire_->open();
+    if (!fault.ok()) return fault;
+    unplugged_ = gone;
+  }
+  for (std::optional<Stamp> when = due(); when && *when <= now; when = due()) {
+    lateness_.add((now - *when).seconds());
+    if (const DeviceFault fault = send(*next_, *when - grid_.first); !fault.ok()) return fault;
+    next_ = reader_.sample();
+  }
+  return {};
+}
+
+DeviceFault PlayedImu::send(const ImuSample& sample, Duration time) {
+  const std::uint64_t number = number_++;
+  const PlannedFault* drop = faults_.active(FaultDevice::kImu, FaultKind::kDrop, time);
+  const bool dropped = drop != nullptr && faults_.strikes(*drop, number);
+  if (unplugged_ || dropped || faults_.active(FaultDevice::kImu, FaultKind::kStall, time) != nullptr) {
+    ++counters_.withheld;
+    return {};
+  }
+  if (faults_.active(FaultDevice::kImu, FaultKind::kGarbage, time) != nullptr) {
+    ++counters_.withheld;
+    return wire_->sendGarbage(number);
+  }
+  ImuReading reading;
+  reading.device =
+      Stamp{} + kSensorUptime + Duration::fromSeconds(time.seconds() * rate_) + faults_.clockStep(time);
+  reading.counter = number;
+  reading.gyro = R_imu_body_ * sample.gyro;
+  reading.accel = R_imu_body_ * sample.accel;
+  ++counters_.sent;
+  return wire_->send(reading);
+}
+
+}  // namespace swiftlet

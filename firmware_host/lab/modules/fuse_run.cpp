@@ -1,0 +1,334 @@
+#include "firmware_host/lab/modules/fuse_run.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <filesystem>
+#include <memory>
+
+#include "drivers/recorded/depth_images.hpp"
+#include "drivers/recorded/label_images.hpp"
+#include "drivers/recorded/open_log.hpp"
+#include "estimator/core/units.hpp"
+#include "estimator/odometry/odometry_inputs.hpp"
+#include "estimator/odometry/pairing.hpp"
+#include "firmware_host/files/line_file.hpp"
+#include "firmware_host/inputs/log/log_feed.hpp"
+#include "firmware_host/lab/modules/given_poses.hpp"
+#include "firmware_host/outputs/map_files/kept_map.hpp"
+#include "firmware_host/outputs/map_files/map_output.hpp"
+#include "firmware_host/outputs/run_folder/summary.hpp"
+#include "firmware_host/realtime/progress.hpp"
+#include "firmware_host/settings/confusion_file.hpp"
+#include "firmware_host/settings/moving_labels.hpp"
+#include "mapping/map/map_stage.hpp"
+
+namespace swiftlet {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// CPU of a step's parts.
+struct MapTimes {
+  LatencyHistogram depth;
+  LatencyHistogram volume;
+  LatencyHistogram surface;
+  LatencyHistogram distance;
+};
+
+Json timingJson(const MapTimes& times) {
+  Json json;
+  const std::array<std::pair<const char*, const LatencyHistogram*>, 4> parts{{{"depth", &times.depth},
+                                                                              {"volume", &times.volume},
+                                                                              {"surface", &times.surface},
+                                                                              {"distance", &times.distance}}};
+  for (const auto& [name, cpu] : parts) {
+    json[name] = {{"count", cpu->count()},
+                  {"cpu",
+                   {{"mean_ms", cpu->mean() * kToMs},
+                    {"p50_ms", cpu->percentile(0.5) * kToMs},
+                    {"p99_ms", cpu->percentile(0.99) * kToMs},
+                    {"max_ms", cpu->max() * kToMs}}}};
+  }
+  return json;
+}
+
+LogOptions logOptions(const FuseRequest& request, const Settings& settings) {
+  LogOptions options;
+  options.calibration = request.calibration;
+  options.imu_calibration = request.imu_calibration;
+  options.calibration_options.accept_unusual_rig = settings.calibration.accept_unusual_rig;
+  return options;
+}
+
+/// Given poses stay as they are.
+Settings withoutCorrection(Settings settings) {
+  settings.map_stage.keyframes_mib = 0;
+  return settings;
+}
+
+/// What one run is made of, from opening to the summary.
+class FuseRun {
+ public:
+  FuseRun(const FuseRequest& request, const Settings& settings)
+      : request_(request),
+        settings_(withoutCorrection(settings)),
+        source_(openLog(request.log, logOptions(request, settings))),
+        rig_(source_->rig()),
+        depth_(request.log, warnings_, source_->calibration().T_body_filebody),
+        labels_(request.log, {rig_.camera[0].width(), rig_.camera[0].height()}, warnings_) {}
+
+  FuseRunResult operator()() {
+    begin();
+    run();
+    progress_->finish();
+    if (!poses_out_) failWithoutPose();
+    return end();
+  }
+
+ private:
+  void begin();
+  void openPoses();
+  void openKept();
+  void run();
+  void take(const StereoFrame& frame);
+  void takeSensorUntil(Stamp stamp, const StereoFrame* frame);
+  void fuse(Stamp stamp, const StereoFrame* frame, const DepthImageView& depth);
+  [[noreturn]] void failWithoutPose() const;
+  FuseRunResult end();
+  [[nodiscard]] std::string file(const char* name) const {
+    return std::filesystem::path(request_.out) / name;
+  }
+
+  const FuseRequest& request_;
+  const Settings settings_;
+  std::unique_ptr<LogSource> source_;
+  Rig rig_;
+  LogWarnings warnings_;
+  DepthImages depth_;
+  LabelImages labels_;
+  std::string poses_name_;
+  std::optional<GivenPoses> poses_;
+  std::optional<Progress> progress_;
+  SpilledSurface spilled_{request_.out};
+  std::unique_ptr<MapStage> map_;
+  std::optional<TumWriter> poses_out_;
+  std::optional<KeptMapReport> continued_;
+  MapReport report_;
+  MapTimes times_;
+  bool sensor_ = false;
+  std::size_t next_depth_ = 0;  ///< row
+  std::optional<Stamp> first_image_, last_image_, last_pair_;
+  bool finished_ = true;
+  std::uint64_t moments_ = 0, without_pose_ = 0, refused_ = 0, fused_ = 0, labelled_ = 0;
+};
+
+void FuseRun::openPoses() {
+  NamedTrajectory trajectory = openTrajectory(request_.trajectory, request_.log, *source_, warnings_);
+  poses_name_ = trajectory.name;
+  poses_.emplace(std::move(trajectory.poses), Duration::fromSeconds(request_.max_gap));
+  if (poses_->jumps() > 0) {
+    warnings_.add(fmt::format("{}: the poses jump {} times, first at {}: the map begins anew after each",
+                              poses_name_, poses_->jumps(), formatSeconds(poses_->firstJump())));
+  }
+}
+
+void FuseRun::begin() {
+  checkMovingLabels(settings_.map_stage);
+  const std::optional<ConfusionModel> confusion = confusionOf(settings_);
+  openPoses();
+  sensor_ =
+      request_.depth == DepthSource::kSensor || (request_.depth == DepthSource::kAny && !depth_.empty());
+  if (sensor_ && depth_.empty()) {
+    throw InputError(request_.log, 0, "", "has no depth images (mav0/depth0)", "Use --depth stereo");
+  }
+  if (!sensor_ && rig_.camera_count < 2) {
+    throw InputError(request_.log, 0, "", "one camera and no depth images: nothing gives depth",
+                     "Give a log with two cameras or with mav0/depth0");
+  }
+  if (sensor_) {
+    DepthImageView camera;
+    camera.camera = depth_.sensor().camera;
+    camera.T_body_camera = depth_.sensor().T_body_camera;
+    map_ = std::make_unique<MapStage>(rig_, settings_.map_stage, &camera, &spilled_);
+  } else {
+    map_ = std::make_unique<MapStage>(rig_, settings_.map_stage, nullptr, &spilled_);
+  }
+  if (confusion) map_->setConfusion(*confusion);
+  openKept();
+  for (const std::string& line : source_->warnings()) fmt::print(stderr, "warning: {}\n", line);
+  for (const std::string& line : warnings_.lines()) fmt::print(stderr, "warning: {}\n", line);
+  progress_.emplace("fuse", request_.show_progress ? source_->imageCount() : 0);
+}
+
+void FuseRun::openKept() {
+  if (!request_.keep.empty()) {
+    // Now and not after an hour's work.
+    const std::filesystem::path folder = std::filesystem::absolute(request_.keep).parent_path();
+    if (!std::filesystem::is_directory(folder) || std::filesystem::is_directory(request_.keep)) {
+      throw InputError(request_.keep, 0, "--keep", "is not a file in a folder that exists",
+                       "Make the folder first, or give another file");
+    }
+  }
+  if (request_.continued.empty()) return;
+  continued_ = readKeptMapFile(request_.continued, *map_);
+  const KeptMapCounts& without = continued_->without_room;
+  if (without.blocks + without.free_blocks + without.patches > 0) {
+    warnings_.add(fmt::format(
+        "{}: {} of {} blocks, {} of {} free blocks and {} of {} patches have no room and are left "
+        "out, the farthest from where the vehicle was last; map.volume_mib and map.surface_mib "
+        "give more",
+        request_.continued, without.blocks, continued_->held.blocks, without.free_blocks,
+        continued_->held.free_blocks, without.patches, continued_->held.patches));
+  }
+}
+
+void FuseRun::run() {
+  LogFeed feed(*source_, {request_.from, request_.until, std::nullopt}, nullptr);
+  PairingSettings pairing_settings;
+  pairing_settings.cameras = rig_.camera_count;
+  pairing_settings.tolerance = Duration::fromSeconds(settings_.pairing.tolerance_ms * 1e-3);
+  pairing_settings.patience = Duration::fromSeconds(settings_.pairing.patience_ms * 1e-3);
+  Pairing pairing(pairing_settings);
+  StereoFrame frame;
+  for (;;) {
+    if (request_.stop != nullptr && request_.stop->load(std::memory_order_relaxed)) {
+      finished_ = false;
+      return;
+    }
+    const LogFeed::Next next = feed.next();
+    if (next == LogFeed::Next::kEnd) break;
+    if (next == LogFeed::Next::kImage) {
+      if (pairing.push(feed.image(), frame).ok()) take(frame);
+    } else if (next == LogFeed::Next::kSample) {
+      if (pairing.expire(feed.sample().stamp, frame).ok()) take(frame);
+    }
+    progress_->update(feed.taken());
+  }
+  if (pairing.flush(frame).ok()) take(frame);
+}
+
+void FuseRun::take(const StereoFrame& frame) {
+  if (!first_image_) {
+    first_image_ = frame.stamp;
+    // What was measured before the part of the log that is wanted is not.
+    while (next_depth_ < depth_.rows().size() && depth_.rows()[next_depth_].stamp < frame.stamp)
+      ++next_depth_;
+  }
+  last_image_ = frame.stamp;
+  if (sensor_) {
+    takeSensorUntil(frame.stamp, &frame);
+    return;
+  }
+  if (frame.image[0].empty() || frame.image[1].empty()) return;
+  const bool due = !last_pair_ || (frame.stamp - *last_pair_).seconds() >= request_.interval;
+  if (!due && labels_.at(frame.stamp).empty()) return;
+  last_pair_ = frame.stamp;
+  fuse(frame.stamp, &frame, {});
+}
+
+/// Depth images up to a frame's stamp; the one at the stamp gets the frame's grey values and labels.
+void FuseRun::takeSensorUntil(Stamp stamp, const StereoFrame* frame) {
+  for (; next_depth_ < depth_.rows().size() && depth_.rows()[next_depth_].stamp <= stamp; ++next_depth_) {
+    const Stamp at = depth_.rows()[next_depth_].stamp;
+    const DepthImageView view = depth_.at(at);
+    if (view.depth != nullptr) fuse(at, at == stamp ? frame : nullptr, view);
+  }
+}
+
+void FuseRun::fuse(Stamp stamp, const StereoFrame* frame, const DepthImageView& depth) {
+  ++moments_;
+  const auto pose = poses_->at(stamp);
+  if (!pose) {
+    ++without_pose_;
+    return;
+  }
+  if (!poses_out_) {
+    std::filesystem::create_directories(request_.out);
+    poses_out_.emplace(file("trajectory.tum"));
+  }
+  poses_out_->write(stamp, pose->T_world_body);
+  MapInput input;
+  input.stamp = stamp;
+  input.epoch = (continued_ ? continued_->epoch : 0) + static_cast<std::uint32_t>(pose->piece);
+  input.T_map_body = pose->T_world_body;
+  input.depth = depth;
+  if (frame != nullptr) input.image = frame->image;
+  if (settings_.map_stage.labels) input.labels = labels_.at(stamp);
+  bool taken = false;
+  const Spent depth_time = measured([&] { taken = map_->measure(input, {}, report_).ok(); });
+  const Spent volume_time = measured(
+      [&] { taken = taken && map_->integrate(input, {}, report_).code != StatusCode::kInvalidInput; });
+  if (!taken) {
+    ++refused_;
+    return;
+  }
+  ++fused_;
+  labelled_ += report_.with_labels ? 1 : 0;
+  times_.depth.add(depth_time.cpu);
+  times_.volume.add(volume_time.cpu);
+  const Eigen::Vector3d& vehicle = pose->T_world_body.translation;
+  // What is left over is counted in the report and drawn later.
+  times_.surface.add(measured([&] { static_cast<void>(map_->draw(vehicle, {}, report_)); }).cpu);
+  times_.distance.add(measured([&] { map_->updateDistance(vehicle, {}, report_); }).cpu);
+}
+
+void FuseRun::failWithoutPose() const {
+  if (!first_image_ || moments_ == 0) {
+    throw InputError(request_.log, 0, "", "no depth in the part of the log that was asked for",
+                     "Give another --from or --until");
+  }
+  throw InputError(
+      poses_name_, 0, "timestamp",
+      fmt::format("no depth image has a pose: the poses go from {} to {}, the images from {} to {}",
+                  formatSeconds(poses_->begin()), formatSeconds(poses_->end()), formatSeconds(*first_image_),
+                  formatSeconds(*last_image_)),
+      fmt::format("Both need stamps of one clock, and poses at most --max-gap={:g} s apart",
+                  request_.max_gap));
+}
+
+Json countsJson(const KeptMapCounts& counts) {
+  return {{"blocks", counts.blocks}, {"free_blocks", counts.free_blocks}, {"patches", counts.patches}};
+}
+
+FuseRunResult FuseRun::end() {
+  poses_out_->close();
+  map_->drawRest();
+  Json json;
+  json["version"] = versionJson();
+  json["run"] = {{"command", "fuse"},
+                 {"log", request_.log},
+                 {"trajectory", poses_name_},
+                 {"depth", sensor_ ? "sensor" : "stereo"},
+                 {"finished", finished_},
+                 {"first_image_ns", first_image_->ns},
+                 {"last_image_ns", last_image_->ns}};
+  json["moments"] = {{"with_depth", moments_},
+                     {"without_pose", without_pose_},
+                     {"refused", refused_},
+                     {"fused", fused_},
+                     {"with_labels", labelled_}};
+  json["map"] = writeMap(request_.out, *map_, spilled_, {});
+  if (continued_) {
+    json["continued"] = {{"file", request_.continued},
+                         {"held", countsJson(continued_->held)},
+                         {"without_room", countsJson(continued_->without_room)}};
+  }
+  if (!request_.keep.empty()) {
+    json["kept"] = countsJson(writeKeptMapFile(request_.keep, *map_));
+    json["kept"]["file"] = request_.keep;
+  }
+  json["timing"] = timingJson(times_);
+  json["warnings"] = source_->warnings();
+  for (const std::string& line : warnings_.lines()) json["warnings"].push_back(line);
+  writeJson(file("summary.json"), json);
+  return {json, finished_, json["map"]["mesh"]["faces"].get<std::size_t>() > 0};
+}
+
+}  // namespace
+
+FuseRunResult runFuse(const FuseRequest& request, const Settings& settings) {
+  return FuseRun(request, settings)();
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,60 @@
+#include "firmware_host/lab/modules/g2o_file.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+
+#include "drivers/calibration/input_error.hpp"
+#include "drivers/calibration/unpack_xz.hpp"
+#include "firmware_host/files/whole_file.hpp"
+
+namespace swiftlet {
+namespace {
+
+/// A line number as InputError counts them.
+int lineOf(const G2oMessage& message) {
+  constexpr std::size_t kLargest = std::numeric_limits<int>::max();
+  return static_cast<int>(std::min(message.line, kLargest));
+}
+
+}  // namespace
+
+G2oFile readG2oBytes(const std::string& name, std::string_view bytes) {
+  std::string unpacked;
+  if (isXz(bytes)) {
+    unpacked = unpackXz(name, bytes, kMaxG2oText);
+    bytes = unpacked;
+  }
+  G2oFile file;
+  G2oMessage fault;
+  if (!readG2o(bytes, file.graph, file.report, fault)) {
+    throw InputError(name, lineOf(fault), fault.field, fault.text, fault.remedy);
+  }
+  return file;
+}
+
+G2oFile readG2oFile(const std::string& path) {
+  if (std::filesystem::is_directory(path)) {
+    throw InputError(path, 0, "", "is a folder", "Give a .g2o or .g2o.xz file");
+  }
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw InputError(path, 0, "", std::string("cannot be read: ") + std::strerror(errno), "");
+  std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  if (bytes.size() > kMaxG2oText) {
+    throw InputError(path, 0, "", "is larger than 1 GiB", "Is it a pose graph?");
+  }
+  return readG2oBytes(path, bytes);
+}
+
+void writeG2oFile(const std::string& path, const G2oGraph& graph) { writeWholeFile(path, writeG2o(graph)); }
+
+std::string warningText(const std::string& name, const G2oMessage& warning) {
+  return InputError(name, lineOf(warning), warning.field, warning.text, warning.remedy).what();
+}
+
+}  // namespace swiftlet

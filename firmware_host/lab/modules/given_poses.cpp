@@ -1,0 +1,60 @@
+#include "firmware_host/lab/modules/given_poses.hpp"
+
+#include <algorithm>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/lab/evaluation/association.hpp"
+
+namespace swiftlet {
+namespace {
+
+// Faster than this no drone flies or turns that sees anything.
+constexpr double kMaxSpeed = 20.0;     // m/s
+constexpr double kMaxTurnRate = 20.0;  // rad/s
+// What a pose may stand aside of its neighbour without being a jump: millimetres of noise between poses at
+// 1 kHz are metres a second.
+constexpr double kFreeDistance = 0.05;  // m
+constexpr double kFreeAngle = 0.05;     // rad
+
+bool isJump(const TrajectoryPoint& a, const TrajectoryPoint& b) {
+  const double seconds = (b.stamp - a.stamp).seconds();
+  const double distance = (b.T_world_body.translation - a.T_world_body.translation).norm();
+  const double angle = a.T_world_body.rotation.angularDistance(b.T_world_body.rotation);
+  return distance > kFreeDistance + kMaxSpeed * seconds || angle > kFreeAngle + kMaxTurnRate * seconds;
+}
+
+}  // namespace
+
+NamedTrajectory openTrajectory(const std::string& file, const std::string& log, const LogSource& source,
+                               LogWarnings& warnings) {
+  if (!file.empty()) {
+    LogCounters counters;
+    return {file, readTrajectory(file, counters, warnings)};
+  }
+  NamedTrajectory truth{source.groundTruthName(), source.groundTruth()};
+  if (truth.poses.empty()) {
+    throw InputError(log, 0, "", "the log has no truth to take poses from",
+                     "Give a trajectory file with --trajectory (TUM, or EuRoC csv)");
+  }
+  return truth;
+}
+
+GivenPoses::GivenPoses(Trajectory trajectory, Duration max_gap)
+    : trajectory_(std::move(trajectory)), max_gap_(max_gap) {
+  for (std::size_t i = 1; i < trajectory_.size(); ++i) {
+    if (isJump(trajectory_[i - 1], trajectory_[i])) jumps_.push_back(i);
+  }
+}
+
+std::optional<GivenPoses::Pose> GivenPoses::at(Stamp stamp) const {
+  const std::optional<SE3> pose = interpolate(trajectory_, stamp, max_gap_);
+  if (!pose) return std::nullopt;
+  const auto after = std::ranges::lower_bound(trajectory_, stamp, {}, &TrajectoryPoint::stamp);
+  const auto index = static_cast<std::size_t>(after - trajectory_.begin());
+  const auto jump = std::ranges::lower_bound(jumps_, index);
+  const bool across = after->stamp != stamp && jump != jumps_.end() && *jump == index;
+  if (across) return std::nullopt;
+  return Pose{*pose, static_cast<std::size_t>(std::ranges::upper_bound(jumps_, index) - jumps_.begin())};
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,201 @@
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <ostream>
+#include <streambuf>
+#include <vector>
+
+#include "drivers/calibration/input_error.hpp"
+#include "drivers/recorded/recording_checksum.hpp"
+#include "firmware_host/files/whole_file.hpp"
+#include "firmware_host/outputs/map_files/kept_map_format.hpp"
+
+namespace swiftlet {
+namespace {
+
+using namespace kept;  // NOLINT(google-build-using-namespace)
+
+struct Placed {
+  Nearness nearness;
+  std::uint32_t slot = 0;
+  bool operator<(const Placed& other) const { return nearness < other.nearness; }
+};
+
+class MapWriter {
+ public:
+  MapWriter(const std::string& name, std::ostream& out, const MapParts& map)
+      : name_(name), out_(out), map_(map), bytes_(kRecordBytes + kMostPayload) {}
+
+  KeptMapCounts operator()() {
+    place();
+    writeHead();
+    for (const Placed& block : blocks_) writeBlock(block.slot);
+    writeFree();
+    for (const Placed& patch : patches_) writePatch(patch.slot);
+    finish(Kind::kEnd, payload());
+    out_.flush();
+    if (!out_) throw InputError(name_, 0, "", "cannot be written", "Check the folder and the space left");
+    return head_.counts;
+  }
+
+ private:
+  void place();
+  void writeHead();
+  void writeBlock(std::uint32_t slot);
+  void writeFree();
+  void writePatch(std::uint32_t entry);
+  LittleEndianWriter payload() { return LittleEndianWriter(bytes_.data() + kRecordBytes); }
+  void finish(Kind kind, const LittleEndianWriter& payload);
+  static void index(LittleEndianWriter& to, const BlockIndex& block) {
+    to.i32(block.x);
+    to.i32(block.y);
+    to.i32(block.z);
+  }
+
+  const std::string& name_;
+  std::ostream& out_;
+  MapParts map_;
+  Head head_;
+  std::vector<Placed> blocks_, free_, patches_;
+  SurfacePatch patch_;
+  std::vector<std::uint8_t> bytes_;
+  std::uint32_t head_crc_ = 0;
+};
+
+void MapWriter::place() {
+  const VolumeSettings& settings = map_.volume.settings();
+  head_ = {settings.voxel_size, settings.truncation, settings.reference_sigma,
+           settings.labels,     map_.epoch,          {},
+           map_.p_map_vehicle};
+  const BlockIndex vehicle = vehicleBlock(head_);
+  for (std::uint32_t slot = 0; slot < map_.volume.slots(); ++slot) {
+    const BlockHeader& header = map_.volume.header(slot);
+    if (header.state == BlockState::kVoxels) blocks_.push_back({nearness(header.index, vehicle), slot});
+    if (header.state == BlockState::kFree) free_.push_back({nearness(header.index, vehicle), slot});
+  }
+  for (std::uint32_t entry = 0; entry < map_.surface.entries(); ++entry) {
+    if (map_.surface.read(entry, patch_)) patches_.push_back({nearness(patch_.block, vehicle), entry});
+  }
+  for (auto* list : {&blocks_, &free_, &patches_}) std::sort(list->begin(), list->end());
+  head_.counts = {static_cast<std::uint32_t>(blocks_.size()), static_cast<std::uint32_t>(free_.size()),
+                  static_cast<std::uint32_t>(patches_.size())};
+}
+
+void MapWriter::writeHead() {
+  LittleEndianWriter to(bytes_.data());
+  to.bytes(kMagic);
+  to.u32(kVersion);
+  to.u32(static_cast<std::uint32_t>(kHeadBytes));
+  to.f64(head_.voxel_size);
+  to.f64(head_.truncation);
+  to.f64(head_.reference_sigma);
+  to.u32(head_.labels ? kHasLabels : 0U);
+  to.u32(head_.epoch);
+  to.u32(head_.counts.blocks);
+  to.u32(head_.counts.free_blocks);
+  to.u32(head_.counts.patches);
+  to.u32(kBlockSide);
+  for (int axis = 0; axis < 3; ++axis) to.f64(head_.p_map_vehicle[axis]);
+  to.zeros(kHeadCrcAt - to.written());
+  head_crc_ = crc32c(0, {bytes_.data(), kHeadCrcAt});
+  to.u32(head_crc_);
+  out_.write(reinterpret_cast<const char*>(bytes_.data()), static_cast<std::streamsize>(kHeadBytes));
+}
+
+void MapWriter::finish(Kind kind, const LittleEndianWriter& payload) {
+  const std::size_t size = payload.written();
+  LittleEndianWriter to(bytes_.data());
+  to.u32(0);
+  to.u16(static_cast<std::uint16_t>(kind));
+  to.u16(0);
+  to.u32(static_cast<std::uint32_t>(size));
+  constexpr std::size_t kCrc = sizeof(std::uint32_t);
+  const std::uint32_t crc = crc32c(head_crc_, {bytes_.data() + kCrc, kRecordBytes - kCrc + size});
+  LittleEndianWriter(bytes_.data()).u32(crc);
+  out_.write(reinterpret_cast<const char*>(bytes_.data()), static_cast<std::streamsize>(kRecordBytes + size));
+}
+
+void MapWriter::writeBlock(std::uint32_t slot) {
+  const BlockHeader& header = map_.volume.header(slot);
+  const VoxelBlock& voxels = *map_.volume.voxels(slot);
+  LittleEndianWriter to = payload();
+  index(to, header.index);
+  to.u8(header.sides);
+  to.zeros(3);
+  to.u32(std::bit_cast<std::uint32_t>(header.drift));
+  for (const std::int16_t distance : voxels.distance) to.u16(static_cast<std::uint16_t>(distance));
+  for (const std::uint16_t weight : voxels.weight) to.u16(weight);
+  to.bytes(voxels.grey);
+  if (const LabelBlock* labels = map_.volume.labels(slot); labels != nullptr) {
+    for (const LabelCounts& counts : labels->counts) {
+      for (const std::uint16_t word : counts.words()) to.u16(word);
+    }
+  }
+  finish(Kind::kBlock, to);
+}
+
+void MapWriter::writeFree() {
+  for (std::size_t first = 0; first < free_.size(); first += kMostFree) {
+    LittleEndianWriter to = payload();
+    for (std::size_t i = first; i < std::min(first + kMostFree, free_.size()); ++i) {
+      const BlockHeader& header = map_.volume.header(free_[i].slot);
+      index(to, header.index);
+      to.u16(header.free_count);
+      to.u16(0);
+    }
+    finish(Kind::kFree, to);
+  }
+}
+
+void MapWriter::writePatch(std::uint32_t entry) {
+  (void)map_.surface.read(entry, patch_);
+  LittleEndianWriter to = payload();
+  index(to, patch_.block);
+  to.u16(static_cast<std::uint16_t>(patch_.vertices.size()));
+  to.u16(static_cast<std::uint16_t>(patch_.triangles.size()));
+  for (const SurfaceVertex& vertex : patch_.vertices) {
+    for (int axis = 0; axis < 3; ++axis) to.u32(std::bit_cast<std::uint32_t>(vertex.p_world[axis]));
+    for (const std::int8_t part : vertex.normal) to.u8(static_cast<std::uint8_t>(part));
+    to.u8(vertex.grey);
+    to.u8(vertex.label);
+    to.u8(vertex.probability);
+  }
+  for (const SurfaceTriangle& triangle : patch_.triangles) {
+    for (const std::uint16_t corner : triangle) to.u16(corner);
+  }
+  finish(Kind::kPatch, to);
+}
+
+class IntoWholeFile : public std::streambuf {
+ public:
+  explicit IntoWholeFile(WholeFile& file) : file_(file) {}
+
+ protected:
+  std::streamsize xsputn(const char* bytes, std::streamsize count) override {
+    file_.write({bytes, static_cast<std::size_t>(count)});
+    return count;
+  }
+
+ private:
+  WholeFile& file_;
+};
+
+}  // namespace
+
+KeptMapCounts writeKeptMap(const std::string& name, std::ostream& out, const MapParts& map) {
+  return MapWriter(name, out, map)();
+}
+
+KeptMapCounts writeKeptMapFile(const std::string& path, MapStage& map) {
+  map.drawRest();
+  WholeFile file(path);
+  IntoWholeFile buffer(file);
+  std::ostream out(&buffer);
+  out.exceptions(std::ios::badbit);  // lets the file's own error through
+  const KeptMapCounts counts =
+      writeKeptMap(path, out, {map.volume(), map.surface(), map.epoch(), map.vehicle()});
+  file.commit();
+  return counts;
+}
+
+}  // namespace swiftlet

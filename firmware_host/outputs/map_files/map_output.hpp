@@ -1,0 +1,20 @@
+#pragma once
+// The map's surface as files at the end of a run: map.ply and map.glb, and map_epoch_N.ply for each earlier
+// epoch whose world nothing ties to the newest.
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+
+#include "firmware_host/outputs/map_files/spilled_surface.hpp"
+#include "mapping/map/map_stage.hpp"
+
+namespace swiftlet {
+
+/// `tied`: earlier epochs that lie in the newest one's map. Gives what summary.json says of the map.
+/// InputError where a file cannot be written.
+nlohmann::ordered_json writeMap(const std::string& folder, MapStage& map, SpilledSurface& spilled,
+                                std::span<const std::uint32_t> tied);
+
+}  // namespace swiftlet

@@ -1,0 +1,47 @@
+#pragma once
+// The numbers behind a PLY header, one after the other, whatever they are encoded in.
+
+#include <string>
+#include <string_view>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/outputs/map_files/ply_header.hpp"
+
+namespace swiftlet {
+
+class PlyValues {
+ public:
+  /// All three must outlive the reader.
+  PlyValues(const std::string& name, std::string_view bytes, const PlyHeader& header);
+
+  /// Before and behind every row: in ASCII a row is a line, blank lines do not count.
+  void beginRow(const PlyElement& element, std::uint64_t index);
+  void endRow();
+  /// The next number of the row, which `type` can hold; NaN and infinity are numbers here.
+  double next(PlyType type, std::string_view property);
+  /// A list's length.
+  std::uint64_t nextLength(PlyType type, std::string_view property);
+  /// When all rows are read: nothing but blanks may follow.
+  void finish();
+
+  /// Names the row's line or the last value's byte.
+  [[nodiscard]] InputError error(std::string_view property, const std::string& message,
+                                 const std::string& remedy) const;
+
+ private:
+  std::string_view takeWord();
+  double nextText(PlyType type, std::string_view property);
+  double nextBinary(PlyType type, std::string_view property);
+
+  const std::string& name_;
+  std::string_view bytes_;
+  bool binary_;
+  std::size_t at_ = 0;    ///< of the next byte
+  std::size_t from_ = 0;  ///< of the last value
+  int line_ = 0;
+  std::string_view row_;  ///< what is left of the line
+  const PlyElement* element_ = nullptr;
+  std::uint64_t index_ = 0;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,33 @@
+#pragma once
+// The report's file: one HTML page that needs nothing else.
+//
+// The page's program (plots and 3D view) is a data file of the installation, share/swiftlet/report_page.html
+// beside the bin folder, made at build time where npm is at hand; the document is put into it. Without that
+// file the page is plain: tables, and plots as SVG.
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace swiftlet {
+
+/// Raised when a page of an earlier program could not read the document.
+inline constexpr int kReportFormat = 1;
+
+/// Where the page's program is: beside the running program. Empty when it is not there.
+std::string findReportPage();
+
+/// `page`: the HTML of findReportPage(). InputError names `name` when it is no page of this format.
+std::string pageWith(const std::string& page, const std::string& name,
+                     const nlohmann::ordered_json& document);
+
+/// The same page for a run that goes on: it takes its document from the address `stream` beside it.
+std::string livePage(const std::string& page, const std::string& name);
+
+/// Text as it may stand in HTML.
+std::string htmlText(const std::string& text);
+
+/// The scene's "labels": name and colour of each; those without a name get one.
+nlohmann::ordered_json labelsJson(const std::map<int, std::string>& names);
+
+}  // namespace swiftlet

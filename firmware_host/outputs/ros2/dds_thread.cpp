@@ -1,0 +1,298 @@
+#include "firmware_host/outputs/ros2/dds_thread.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+
+#include "drivers/calibration/input_error.hpp"
+#include "drivers/dds/dds_link.hpp"
+#include "drivers/device/monotonic_now.hpp"
+#include "estimator/messages/names.hpp"
+#include "firmware_host/interfaces/follower_thread.hpp"
+#include "firmware_host/outputs/map_files/map_files.hpp"
+#include "firmware_host/outputs/ros2/ros_clock.hpp"
+#include "firmware_host/outputs/ros2/ros_state.hpp"
+#include "firmware_host/realtime/console.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr double kSurfacePeriod = 2;      // s: as large as a map is, nobody looks more often
+constexpr double kDiagnosticsPeriod = 1;  // s; a change of health goes out at once
+/// Most between two looks at labels and at images to be labelled [s]: of 1600 images a second none is
+/// overrun by others.
+constexpr double kLabelPeriod = kKeptImages / 1600.0;
+constexpr float kFullColour = 255;
+constexpr const char* kCameraFrame = "cam0";
+
+std::array<std::uint8_t, 3> colourOf(std::uint8_t label, std::uint8_t grey) {
+  return label == 0 ? std::array{grey, grey, grey} : labelColour(label);
+}
+
+std::uint8_t levelOf(Health health) {
+  if (health == Health::kGood) return 0;
+  return health == Health::kFailed ? 2 : 1;
+}
+
+/// diagnostic_msgs/DiagnosticStatus: STALE.
+constexpr std::uint8_t kStaleLevel = 3;
+
+}  // namespace
+
+class DdsThread::Work {
+ public:
+  Work(LiveOutlet& outlet, const DdsThreadOptions& options)
+      : outlet_(outlet), options_(options), mesh_pace_{1 / options.settings.mesh_hz} {
+    DdsSettings settings;
+    settings.domain = static_cast<std::uint32_t>(options.settings.domain);
+    settings.interface = options.settings.interface;
+    settings.complain = [](std::string_view line) { warn("dds: " + std::string(line)); };
+    if (options.labels != nullptr) settings.label_topic = options.settings.label_topic;
+    if (!link_.open(settings)) {
+      throw InputError("settings", 0, "ros2.interface, ros2.domain", link_.error(),
+                       "Or switch it off with ros2.enabled: false");
+    }
+    ThreadSettings thread;
+    thread.name = "dds";
+    thread_.start(thread, "settings", "ros2.enabled", [this] { run(); });
+  }
+
+  /// False: the thread is stuck and was left behind, with all of this.
+  bool end() { return thread_.end(); }
+  void tellEnd() { thread_.tellEnd(); }
+  [[nodiscard]] const Heartbeat& heart() const { return thread_.heart(); }
+  [[nodiscard]] const std::string& fault() const { return thread_.fault(); }
+  [[nodiscard]] nlohmann::ordered_json json() const {
+    const DdsCounters link = link_.counters();
+    nlohmann::ordered_json json = {{"odometry", odometries_},      {"meshes", meshes_},
+                                   {"surfaces", surfaces_},        {"written", link.written},
+                                   {"refused", link.refused},      {"complaints", link.complaints},
+                                   {"clock_steps", clock_.steps()}};
+    if (options_.labels != nullptr) {
+      const LabelExchange::Counters& labels = options_.labels->counters();
+      json["labels"] = {{"images_shown", labels.shown},
+                        {"received", link.images + link.images_refused + link.images_skipped},
+                        {"used", labels.taken},
+                        {"overrun", link.images_skipped},
+                        {"wrong_encoding", link.images_refused},
+                        {"wrong_size", labels.wrong_size},
+                        {"unawaited", labels.unawaited}};
+    }
+    return json;
+  }
+
+ private:
+  /// Lets through once a period.
+  struct Pace {
+    double period;
+    double next = 0;
+    bool due(double now) {
+      if (now < next) return false;
+      next = now + period;
+      return true;
+    }
+  };
+
+  void run() {
+    const double state_period = 1 / options_.settings.odometry_hz;
+    const double turns = options_.labels != nullptr ? std::ceil(state_period / kLabelPeriod) : 1;
+    double turn = 0;
+    thread_.repeat(state_period / turns, [&](double now) {
+      if (options_.clocks) clock_.follow(options_.clocks());
+      if (turn == 0) publishState();
+      turn = std::fmod(turn + 1, turns);
+      if (options_.labels != nullptr) exchangeLabels(*options_.labels);
+      publishDiagnostics(now);
+      if (mesh_pace_.due(now)) publishMesh();
+      publishSurface(now);
+    });
+  }
+
+  [[nodiscard]] Stamp ros(Stamp stamp) const { return clock_.toRos(stamp); }
+
+  void publishState() {
+    outlet_.correction.refresh();
+    const std::uint64_t number = outlet_.state.refresh();
+    if (number == state_) return;
+    state_ = number;
+    const NavState state = outlet_.state.value().state();
+    if (state.health == Health::kFailed) return;  // no pose to be had by it
+    DdsOdometry odometry;
+    odometry.stamp = ros(state.stamp);
+    odometry.frame = frames_.odom;
+    odometry.child_frame = frames_.body;
+    odometry.T_frame_child = state.T_world_body;
+    odometry.velocity = bodyVelocity(state);
+    odometry.angular_velocity = outlet_.state.value().omegaBody();
+    Eigen::Map<RosCovariance>(odometry.pose_covariance.data()) = rosPoseCovariance(state);
+    Eigen::Map<RosCovariance>(odometry.twist_covariance.data()) =
+        rosTwistCovariance(state, options_.gyro_sigma);
+    if (link_.publish(odometry)) ++odometries_;
+    const MapCorrection& now = outlet_.correction.value();
+    const bool corrected = outlet_.correction.sequence() > 0 && now.epoch == state.epoch;
+    const std::array<DdsTransform, 2> transforms = {
+        DdsTransform{odometry.stamp, frames_.map, frames_.odom, corrected ? now.T_map_world : SE3()},
+        DdsTransform{odometry.stamp, frames_.odom, frames_.body, state.T_world_body}};
+    link_.publish(transforms);
+  }
+
+  /// At once when something changes and each second, whether or not frames come.
+  void publishDiagnostics(double now) {
+    const Stamp host = monotonicNow();
+    const bool judged = outlet_.verdict.refresh() > 0;
+    const Verdict& verdict = outlet_.verdict.value();
+    const bool stale = judged && verdict.stale(host) && !verdict.ending;
+    const bool any_frame = outlet_.frame.refresh() > 0;
+    if (!judged && !any_frame) return;
+    const Told told = {judged ? verdict.health : outlet_.frame.value().health, stale, verdict.trouble_changes,
+                       verdict.arming_changes};
+    const bool changed = told_ != told;
+    if (!changed && !diagnostics_pace_.due(now)) return;
+    told_ = told;
+    const FrameNews& news = outlet_.frame.value();
+    DdsStatus status;
+    status.name = "swiftlet/health";
+    status.level = stale ? kStaleLevel : levelOf(told.health);
+    status.message =
+        stale ? "the supervisor has stopped: health unknown" : std::string(healthName(told.health));
+    if (!news.has_state)
+      status.message += std::string(", waits for ") + (any_frame ? news.waiting_for : "images");
+    if (judged && !stale) {
+      for (const Trouble& trouble : verdict.troubles) {
+        status.message += fmt::format("; {} is {}", trouble.name(), conditionName(trouble.condition));
+      }
+      status.values.push_back({"ready_to_arm", verdict.arming.ready() ? "1" : "0"});
+      for (const MissingCondition& missing : verdict.arming.missing) {
+        status.values.push_back({std::string("not_ready/") + missing.name(), missing.text.data()});
+      }
+      for (const Trouble& trouble : verdict.troubles) {
+        status.values.push_back(
+            {fmt::format("{}/{}", conditionName(trouble.condition), trouble.name()),
+             fmt::format("{}; since {:.1f} s", trouble.text.data(), (host - trouble.since).seconds())});
+      }
+    }
+    if (any_frame) addFigures(news, status);
+    status.values.push_back({"dds_refused", std::to_string(link_.counters().refused)});
+    link_.publish(ros(stampOfNow(host)), {&status, 1});
+  }
+
+  /// On the run's clock: the newest frame's stamp, carried on by the host's while none comes.
+  Stamp stampOfNow(Stamp host) {
+    if (outlet_.frame.sequence() == 0) return host;
+    if (outlet_.frame.sequence() != frame_) {
+      frame_ = outlet_.frame.sequence();
+      frame_came_ = host;
+    }
+    return outlet_.frame.value().stamp + (host - frame_came_);
+  }
+
+  static void addFigures(const FrameNews& news, DdsStatus& status) {
+    const FrameStatistics& figures = news.statistics;
+    const auto add = [&status](const char* key, std::string value) {
+      status.values.push_back({key, std::move(value)});
+    };
+    add("epoch", std::to_string(news.epoch));
+    add("at_rest", figures.at_rest ? "1" : "0");
+    add("tracks", std::to_string(figures.tracks));
+    add("landmarks", std::to_string(figures.landmarks));
+    add("inliers_mono", std::to_string(figures.inliers_mono));
+    add("inliers_stereo", std::to_string(figures.inliers_stereo));
+    add("reprojection_rms", fmt::format("{:.4f}", figures.reprojection_rms));
+    add("imu_residual", fmt::format("{:.4f}", figures.imu_residual));
+  }
+
+  void publishMesh() {
+    const std::uint64_t number = outlet_.mesh.refresh();
+    if (number == mesh_) return;
+    mesh_ = number;
+    const LocalMesh& mesh = outlet_.mesh.value();
+    points_.clear();
+    colours_.clear();
+    for (const MeshFace& face : mesh.faces) {
+      for (const std::uint32_t corner : face.vertex) {
+        points_.push_back(mesh.vertices[corner].p_world);
+        const auto [r, g, b] = colourOf(face.label, mesh.vertices[corner].grey);
+        colours_.push_back(Eigen::Vector3f(r, g, b) / kFullColour);
+      }
+    }
+    if (link_.publish(DdsMesh{ros(mesh.stamp), frames_.odom, points_, colours_})) ++meshes_;
+  }
+
+  void publishSurface(double now) {
+    if (surface_pace_.due(now)) outlet_.surface_wanted.store(true, std::memory_order_release);
+    const std::uint64_t number = outlet_.surface.refresh();
+    if (number == surface_) return;
+    surface_ = number;
+    const SurfaceNews& surface = outlet_.surface.value();
+    cloud_.clear();
+    for (const SurfaceVertex& vertex : surface.vertices) {
+      const Eigen::Vector3f& p = vertex.p_world;
+      const auto [r, g, b] = colourOf(vertex.label, vertex.grey);
+      const std::uint32_t rgb =
+          (static_cast<std::uint32_t>(r) << 16U) | (static_cast<std::uint32_t>(g) << 8U) | b;
+      cloud_.push_back({p.x(), p.y(), p.z(), rgb, vertex.label});
+    }
+    if (link_.publish(DdsCloud{ros(surface.stamp), frames_.map, cloud_})) ++surfaces_;
+  }
+
+  void exchangeLabels(LabelExchange& labels) {
+    labels.setLabeller(link_.labellers() > 0);
+    while (labels.show([this](Stamp stamp, const ImageView& image) {
+      link_.publish(DdsImageView{clock_.toRosAndBack(stamp), kCameraFrame, image});
+    })) {
+    }
+    labels.retryEarly();
+    for (int i = 0; i < kKeptImages && link_.takeLabels(label_); ++i) {
+      labels.offer(clock_.fromRos(label_.stamp),
+                   {label_.pixels.data(), label_.width, label_.height, label_.width});
+    }
+  }
+
+  LiveOutlet& outlet_;
+  const DdsThreadOptions options_;
+  const RosFrames frames_;
+  RosClock clock_;
+  DdsLink link_;
+  Pace mesh_pace_;
+  Pace surface_pace_{kSurfacePeriod};
+  Pace diagnostics_pace_{kDiagnosticsPeriod};
+  /// What diagnostics told last.
+  struct Told {
+    Health health = Health::kInitializing;
+    bool stale = false;
+    std::uint32_t troubles = 0, arming = 0;
+    bool operator==(const Told&) const = default;
+  };
+  std::optional<Told> told_;
+  std::uint64_t frame_ = 0;  ///< the newest that diagnostics saw
+  Stamp frame_came_;
+  std::uint64_t state_ = 0, mesh_ = 0, surface_ = 0;          ///< numbers taken
+  std::uint64_t odometries_ = 0, meshes_ = 0, surfaces_ = 0;  ///< published
+  std::vector<Eigen::Vector3f> points_, colours_;
+  std::vector<DdsCloudPoint> cloud_;
+  DdsImage label_;
+  FollowerThread thread_;
+};
+
+DdsThread::DdsThread(LiveOutlet& outlet, const DdsThreadOptions& options)
+    : work_(std::make_unique<Work>(outlet, options)) {}
+DdsThread::~DdsThread() {
+  // A thread that is left behind goes on using it.
+  if (!work_->end()) static_cast<void>(work_.release());
+}
+
+const Heartbeat& DdsThread::heart() const { return work_->heart(); }
+void DdsThread::tellEnd() { work_->tellEnd(); }
+
+nlohmann::ordered_json DdsThread::finish() {
+  // What a thread that is left behind counts is still being written.
+  if (!work_->end()) return {{"fault", work_->fault()}};
+  nlohmann::ordered_json json = work_->json();
+  if (!work_->fault().empty()) json["fault"] = work_->fault();
+  return json;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,68 @@
+#pragma once
+// Writes the files of a run folder that grow while the run goes on: odometry.tum; on request imu_rate.tum
+// with imu_rate_health.csv (a line where health or epoch of those states changes) and meshes/; states.csv,
+// events.log; and local_mesh.ply, map.ply and map.glb at its end. Lines go out as they come, in constant
+// memory. A file that cannot be written any more ends there, said once by its name; the others go on.
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "firmware_host/files/line_file.hpp"
+#include "firmware_host/files/lost_files.hpp"
+#include "firmware_host/interfaces/run_listener.hpp"
+#include "firmware_host/outputs/map_files/mesh_files.hpp"
+#include "firmware_host/outputs/map_files/spilled_surface.hpp"
+
+namespace swiftlet {
+
+class RunRecorder : public RunListener {
+ public:
+  struct Wanted {
+    bool imu_rate = false;
+    bool meshes = false;
+    /// Go on without a file that cannot be made, too; else InputError.
+    bool fly_on = false;
+  };
+  /// The folder is there already; empty: write nothing. `lost` outlives this and gets what cannot be written.
+  RunRecorder(const std::string& folder, const Wanted& wanted, LostFiles& lost);
+
+  void onFrame(const TrackedFrame& tracked, const OdometryOutput& output) override;
+  void onImuState(const NavState& state) override;
+  void onMesh(bool keyframe, const LocalMesh& frame, const LocalMesh* horizon,
+              std::span<const Eigen::Vector2f> hull) override;
+  void onLocalMesh(const LocalMesh& mesh) override;
+  void onMap(MapStage& map, std::span<const std::uint32_t> tied) override;
+  void onFinish(const OdometryOutput& output) override;
+  void onRemark(Stamp stamp, const std::string& text) override;
+  /// For the graph: where surface goes that the map has no room for.
+  [[nodiscard]] SpilledSurface& spilled() { return spilled_; }
+  /// Of the map and its surface; null without one.
+  [[nodiscard]] const nlohmann::ordered_json& map() const { return map_; }
+
+ private:
+  template <typename File, typename... Arguments>
+  void open(std::optional<File>& file, Arguments&&... arguments);
+  template <typename File, typename Write>
+  void writeTo(std::optional<File>& file, const Write& write);
+  template <typename Write>
+  void attempt(const Write& write);
+  void writeEvents(const OdometryOutput& output);
+  void writeKeyframes(const OdometryOutput& output);
+
+  std::string folder_;
+  Wanted wanted_;
+  LostFiles& lost_;
+  std::optional<LineFile> odometry_;
+  std::optional<LineFile> imu_rate_;
+  std::optional<LineFile> imu_rate_health_;
+  std::optional<Health> health_;  ///< the newest of imu_rate_health_
+  std::uint32_t epoch_ = 0;       ///< likewise
+  std::optional<LineFile> states_;
+  std::optional<LineFile> events_;
+  std::optional<MeshSequenceWriter> meshes_;
+  SpilledSurface spilled_;
+  nlohmann::ordered_json map_;
+};
+
+}  // namespace swiftlet

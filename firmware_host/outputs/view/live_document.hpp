@@ -1,0 +1,102 @@
+#pragma once
+// What the live view shows, as the report's document (docs/report.md) and the patches that make it grow
+// (docs/view.md): made of the newest values of a LiveOutlet.
+//
+// sample() is asked to be called some twenty times a second, patch() a few times. document() stands for the
+// state after the last patch. One thread. Memory: bounded (LiveTable, and the bounds below), whatever the
+// run's length.
+
+#include <cstdint>
+#include <deque>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "firmware_host/interfaces/live_outlet.hpp"
+#include "firmware_host/outputs/view/live_table.hpp"
+#include "firmware_host/realtime/latency_histogram.hpp"
+
+namespace swiftlet {
+
+class LiveDocument {
+ public:
+  static constexpr std::size_t kMostEvents = 300;
+  static constexpr std::size_t kMostSpans = 100;          ///< of health
+  static constexpr std::size_t kMostCloudPoints = 40000;  ///< of the map's surface, of equal steps through it
+
+  explicit LiveDocument(std::string name);
+
+  /// Takes what is new. `now`: the host's clock [s]. `watched`: somebody looks, so that surfaces are worth
+  /// their work.
+  void sample(LiveOutlet& outlet, double now, bool watched);
+  /// What came since the last patch; counts them from 1.
+  nlohmann::ordered_json patch();
+  [[nodiscard]] nlohmann::ordered_json document() const;
+  /// The newest figures in lines of text.
+  [[nodiscard]] std::string text() const;
+  /// Whose summary tells how the view itself fares.
+  void setViewers(const nlohmann::ordered_json& counters) { viewers_ = counters; }
+
+ private:
+  using Json = nlohmann::ordered_json;
+  struct Line {
+    const char* name;
+    std::size_t column;
+  };
+  struct PlotPlan {
+    const char* id;
+    const char* group;
+    const char* title;
+    const char* y_label;
+    const LiveTable* table;
+    std::vector<Line> lines;
+    /// Of a plan: column of x; the time's otherwise.
+    std::size_t x = 0;
+  };
+
+  [[nodiscard]] double seconds(Stamp stamp) const { return (stamp - first_).seconds(); }
+  void begin(Stamp stamp);
+  void takeFrame(LiveOutlet& outlet);
+  void takeState(LiveOutlet& outlet, double now);
+  void takeHealth(double t, Health health, std::uint32_t epoch);
+  void takeVerdict(LiveOutlet& outlet, double now);
+  void noteTroubles(const Verdict& verdict);
+  void takeMesh(LiveOutlet& outlet);
+  void takeSurface(LiveOutlet& outlet, double now);
+  void note(double t, const char* name, std::string text);
+  [[nodiscard]] Json plotJson(const PlotPlan& plan, bool whole) const;
+  [[nodiscard]] Json trajectoryJson(bool whole) const;
+  [[nodiscard]] Json healthJson() const;
+  [[nodiscard]] Json liveJson() const;
+  [[nodiscard]] Json tablesJson() const;
+  [[nodiscard]] Json poseJson() const;
+
+  std::string name_;
+  LiveTable states_, frames_, state_intervals_, frame_intervals_, latencies_;
+  std::vector<PlotPlan> plans_;
+  bool begun_ = false;
+  Stamp first_;
+  double duration_ = 0;
+  std::uint64_t sequence_ = 0;
+
+  std::uint64_t frame_number_ = 0, state_number_ = 0, mesh_number_ = 0, surface_number_ = 0;
+  std::optional<FrameNews> frame_;
+  std::optional<NavState> state_;
+  double now_ = 0, state_came_ = 0, mesh_came_ = -1e9, surface_asked_ = -1e9;
+  LatencyHistogram latency_;
+
+  std::deque<Json> spans_;
+  bool spans_changed_ = false;
+  std::deque<Json> events_;
+  std::size_t unsent_events_ = 0;
+  std::optional<Verdict> verdict_;
+  bool supervised_ = true;  ///< the verdict is not stale
+  std::string waiting_for_;
+  Json mesh_, cloud_;  ///< null: none yet
+  bool mesh_changed_ = false, cloud_changed_ = false;
+  Json viewers_;
+  int patches_to_tables_ = 0;
+};
+
+}  // namespace swiftlet

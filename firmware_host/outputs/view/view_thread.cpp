@@ -1,0 +1,143 @@
+#include "firmware_host/outputs/view/view_thread.hpp"
+
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json.hpp>
+
+#include "firmware_host/interfaces/follower_thread.hpp"
+#include "firmware_host/outputs/page/page.hpp"
+#include "firmware_host/outputs/view/live_document.hpp"
+#include "firmware_host/outputs/view/raised_niceness.hpp"
+#include "firmware_host/outputs/view/view_server.hpp"
+#include "firmware_host/realtime/stage_timer.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr double kSamplePeriod = 0.05;  // s
+constexpr int kSamplesPerPatch = 4;
+constexpr double kDocumentPeriod = 0.25;  // s: at most so often
+
+std::string livePageText() {
+  const std::string name = findReportPage();
+  if (name.empty()) return "";
+  std::ifstream file(name, std::ios::binary);
+  const std::string page{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  return livePage(page, name);
+}
+
+/// Without the page's program: figures as text, asked for again every second.
+std::string plainLivePage(const std::string& text) {
+  return "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">"
+         "<meta http-equiv=\"refresh\" content=\"1\"><title>swiftlet live</title></head>"
+         "<body><h1>swiftlet live</h1><pre>" +
+         htmlText(text) +
+         "</pre><p>This installation has no page with plots (share/swiftlet/report_page.html): npm makes it "
+         "when swiftlet is built.</p></body></html>";
+}
+
+/// A message of Server-Sent Events.
+ViewHub::Text message(const char* event, const nlohmann::ordered_json& data) {
+  std::string text = "event: ";
+  text += event;
+  text += "\ndata: ";
+  text += data.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  text += "\n\n";
+  return std::make_shared<const std::string>(std::move(text));
+}
+
+}  // namespace
+
+class ViewThread::Work {
+ public:
+  Work(LiveOutlet& outlet, const ViewAddress& address, const std::string& name)
+      : outlet_(outlet), document_(name), page_(livePageText()) {
+    text_ = document_.text();
+    const auto text = [this] {
+      const std::lock_guard lock(mutex_);
+      return text_;
+    };
+    ViewPages pages{[this, text] { return page_.empty() ? plainLivePage(text()) : page_; }, text};
+    server_ = std::make_unique<ViewServer>(hub_, address, std::move(pages));
+    address_ = server_->address();
+    ThreadSettings settings;
+    settings.name = "view";
+    thread_.start(settings, "--view", "", [this] { run(); });
+  }
+
+  /// False: the thread is stuck and was left behind, with all of this.
+  bool end() {
+    if (!thread_.end()) return false;
+    server_.reset();
+    return true;
+  }
+  void tellEnd() { thread_.tellEnd(); }
+  [[nodiscard]] const Heartbeat& heart() const { return thread_.heart(); }
+  [[nodiscard]] const std::string& fault() const { return thread_.fault(); }
+  [[nodiscard]] const ViewAddress& address() const { return address_; }
+  [[nodiscard]] nlohmann::ordered_json json() const {
+    nlohmann::ordered_json json = {{"address", address_.text()}};
+    json.update(toJson(hub_.counters()));
+    return json;
+  }
+
+ private:
+  void run() {
+    yieldToOthers();
+    int sample = 0;
+    thread_.repeat(kSamplePeriod, [&](double now) {
+      document_.sample(outlet_, now, hub_.viewers() > 0);
+      if (sample++ % kSamplesPerPatch == 0) publish(now);
+    });
+    document_.sample(outlet_, wallSeconds(), hub_.viewers() > 0);
+    publish(wallSeconds());
+  }
+
+  void publish(double now) {
+    document_.setViewers(toJson(hub_.counters()));
+    // Made in any case: what came is counted as sent by it.
+    hub_.publish(message("patch", document_.patch()));
+    if (hub_.documentWanted() && now - document_made_ >= kDocumentPeriod) {
+      document_made_ = now;
+      hub_.offer(message("document", document_.document()));
+    }
+    std::string text = document_.text();
+    const std::lock_guard lock(mutex_);
+    text_.swap(text);
+  }
+
+  LiveOutlet& outlet_;
+  ViewHub hub_;
+  LiveDocument document_;
+  const std::string page_;  ///< empty: this installation has none
+  double document_made_ = 0;
+  std::mutex mutex_;  ///< between this thread and those that answer
+  std::string text_;
+  std::unique_ptr<ViewServer> server_;
+  ViewAddress address_;
+  FollowerThread thread_;
+};
+
+ViewThread::ViewThread(LiveOutlet& outlet, const ViewAddress& address, const std::string& name)
+    : work_(std::make_unique<Work>(outlet, address, name)) {}
+ViewThread::~ViewThread() {
+  // A thread that is left behind goes on using it.
+  if (!work_->end()) static_cast<void>(work_.release());
+}
+
+const Heartbeat& ViewThread::heart() const { return work_->heart(); }
+void ViewThread::tellEnd() { work_->tellEnd(); }
+
+std::string ViewThread::url() const { return "http://" + work_->address().text() + "/"; }
+
+nlohmann::ordered_json ViewThread::finish() {
+  // What a thread that is left behind counts is still being written.
+  if (!work_->end()) return {{"fault", work_->fault()}};
+  nlohmann::ordered_json json = work_->json();
+  if (!work_->fault().empty()) json["fault"] = work_->fault();
+  return json;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,222 @@
+#include "firmware_host/runs/doctor_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "estimator/core/units.hpp"
+#include "firmware_host/inputs/devices/connected_devices.hpp"
+#include "firmware_host/inputs/devices/counting_sink.hpp"
+#include "firmware_host/inputs/devices/live_input.hpp"
+#include "firmware_host/inputs/devices/sensor_threads.hpp"
+#include "firmware_host/inputs/devices/status_json.hpp"
+#include "firmware_host/realtime/host_sleep.hpp"
+#include "firmware_host/realtime/stage_timer.hpp"
+#include "firmware_host/runs/fly_run.hpp"
+
+namespace swiftlet {
+namespace {
+
+bool namesDevices(const Settings& settings) {
+  return !settings.imu_link.device.empty() || !settings.cameras.device0.empty();
+}
+
+MachineLine line(const std::string& what, std::string found, bool good, std::string remedy) {
+  return {what, std::move(found), good ? MachineVerdict::kGood : MachineVerdict::kPoor,
+          good ? "" : std::move(remedy)};
+}
+
+/// Watches the opened devices and says what they did.
+class VehicleCheck {
+ public:
+  VehicleCheck(const Settings& settings, const Calibration& calibration, LiveInput& input, double seconds)
+      : settings_(settings), calibration_(calibration), input_(input), seconds_(seconds), sink_(most()) {}
+
+  void run(const std::atomic<bool>* stop, MachineReport& report) {
+    SensorThreads threads(input_, sink_, settings_.realtime);
+    const double begin = wallSeconds();
+    constexpr Duration kPeriod = Duration::fromMilliseconds(50);
+    while (wallSeconds() - begin < seconds_ && !(stop != nullptr && stop->load(std::memory_order_relaxed))) {
+      sleepFor(kPeriod);
+    }
+    threads.join();
+    input_.drainEvents([&report](Stamp /*stamp*/, const std::string& text) {
+      report.lines.push_back({"in this time", text, MachineVerdict::kNote, ""});
+    });
+    addImu(report);
+    for (std::size_t i = 0; i < input_.cameras().size(); ++i) addCamera(i, report);
+    addPairs(report);
+    addTrigger(report);
+  }
+
+ private:
+  [[nodiscard]] std::size_t most() const {
+    constexpr double kFastest = 2000;  // Hz, of any IMU
+    constexpr double kMost = 1e6;      // 8 MB a stream: ten minutes of the fastest
+    return static_cast<std::size_t>(std::min(seconds_ * kFastest, kMost)) + 1;
+  }
+
+  void addImu(MachineReport& report) {
+    const CountingSink::Stream& stream = sink_.imu();
+    const double wanted = calibration_.noise.rate_hz;
+    constexpr double kTolerance = 0.05;  // of the rate
+    report.lines.push_back(line("IMU rate",
+                                fmt::format("{:.1f} Hz, calibration {:.1f} Hz", stream.rate(), wanted),
+                                std::abs(stream.rate() - wanted) < kTolerance * wanted,
+                                stream.stamps.empty() ? "nothing came: check power and wires, and that "
+                                                        "imu_link.protocol and imu_link.baud are the device's"
+                                                      : "set the device's output rate, or correct rate_hz in "
+                                                        "the calibration: its noise depends on it"));
+    if (stream.stamps.size() < 2) return;
+    const Duration typical = stream.medianStep();
+    const Duration largest = stream.largestStep();
+    report.lines.push_back(
+        line("IMU gaps",
+             fmt::format("largest step {:.2f} ms, usual {:.2f} ms", largest.seconds() * kToMs,
+                         typical.seconds() * kToMs),
+             largest < typical + typical + typical,
+             "samples are lost on the way: raise the baud rate, or take other outputs off"));
+    const ImuStatus status = input_.imu().status();
+    if (status.by_arrival > 0) {
+      report.lines.push_back({"IMU clock", "the device sends none: samples are stamped as they arrive",
+                              MachineVerdict::kPoor, "switch its time output on"});
+      return;
+    }
+    const std::string found = fmt::format(
+        "{}, skew {:.1f} ppm, delay above the smallest: half below {:.2f} ms, 99 % below {:.2f} ms, "
+        "steps {}",
+        lockName(status.clock.lock), status.clock.skew_ppm, status.clock.residual_p50.seconds() * kToMs,
+        status.clock.residual_p99.seconds() * kToMs, status.clock.resets);
+    // drivers/timesync/clock_map.cpp: four seconds, and what opening and the first sample take.
+    constexpr double kLockTime = 6;  // s
+    if (status.clock.resets == 0 && status.clock.lock == LockState::kLocking && seconds_ < kLockTime) {
+      report.lines.push_back(
+          {"IMU clock", found, MachineVerdict::kNote, "`--seconds 10` shows whether it locks"});
+      return;
+    }
+    report.lines.push_back(line(
+        "IMU clock", found, status.clock.lock == LockState::kLocked && status.clock.resets == 0,
+        status.clock.resets > 0 ? "the device restarts, or its clock is set while it runs"
+                                : "the link is overloaded: raise the baud rate, or take other outputs off"));
+  }
+
+  void addCamera(std::size_t index, MachineReport& report) {
+    const CameraThread& camera = *input_.cameras()[index];
+    const CameraStatus status = camera.status();
+    const CountingSink::Stream& stream = sink_.camera(index);
+    const std::string name = fmt::format("camera {}", index);
+    const double wanted = settings_.cameras.rate_hz;
+    constexpr double kTolerance = 0.02;  // of the rate
+    report.lines.push_back(
+        line(name + " rate", fmt::format("{:.2f} Hz, asked {:.2f} Hz", stream.rate(), wanted),
+             std::abs(stream.rate() - wanted) < kTolerance * wanted,
+             stream.stamps.empty()
+                 ? "nothing came: a camera with an external trigger waits for it"
+                 : "light: a long exposure lowers the rate; or set cameras.rate_hz to what it can"));
+    const CameraCounters& c = status.counters;
+    report.lines.push_back(
+        line(name + " frames",
+             fmt::format("{} taken, {} missed, {} damaged, {} too short", c.frames, c.missed, c.damaged,
+                         c.too_short),
+             c.missed + c.damaged + c.too_short == 0,
+             "the bus is too slow for these cameras: other USB controllers, shorter cables, or a "
+             "lower rate"));
+    report.lines.push_back(line(name + " stamps", stampEventName(camera.facts().event),
+                                camera.facts().event != StampEvent::kArrival && c.stamp_ahead == 0,
+                                c.stamp_ahead > 0
+                                    ? "the driver stamps frames later than it gives them out"
+                                    : "the driver's clock is unknown: connect the trigger line"));
+  }
+
+  void addPairs(MachineReport& report) {
+    const std::vector<Duration> distances = sink_.pairDistances();
+    if (distances.empty()) return;
+    const double median = distances[distances.size() / 2].seconds() * kToMs;
+    const double largest = distances.back().seconds() * kToMs;
+    // Half a pixel at 400 px of focal length and 6 rad/s; docs/timesync.md.
+    constexpr double kGood = 0.2;  // ms
+    report.lines.push_back(
+        line("stereo pairs", fmt::format("apart by {:.3f} ms, at most {:.3f} ms", median, largest),
+             median < kGood, "free-running cameras drift apart: trigger both from one line"));
+  }
+
+  void addTrigger(MachineReport& report) {
+    if (settings_.trigger.chip.empty()) return;
+    if (const TriggerThread* trigger = input_.trigger()) {
+      const TriggerStatus status = trigger->status();
+      report.lines.push_back(line(
+          "trigger edges", fmt::format("{} in {:.1f} s, {} missed", status.edges, seconds_, status.missed),
+          status.edges > 0 && status.missed == 0,
+          status.edges == 0 ? "no edge: check trigger.line, and that the source is on"
+                            : "another interrupt holds the CPU: move it by smp_affinity"));
+    }
+    for (std::size_t i = 0; i < input_.cameras().size(); ++i) {
+      const CameraStatus status = input_.cameras()[i]->status();
+      report.lines.push_back(line(
+          fmt::format("camera {} trigger", i),
+          fmt::format("{}, frame after edge {:.3f} ms, 99 % within {:.1f} us", lockName(status.trigger.lock),
+                      status.trigger.offset.seconds() * kToMs, status.trigger.residual_p99.seconds() * kToUs),
+          status.trigger.lock == LockState::kLocked,
+          "edges and frames do not go together: this camera is not triggered by that line"));
+    }
+  }
+
+  const Settings& settings_;
+  const Calibration& calibration_;
+  LiveInput& input_;
+  double seconds_;
+  CountingSink sink_;
+};
+
+void addNext(const Settings& settings, DoctorReport& report) {
+  if (!namesDevices(settings)) {
+    report.next = {"connect cameras and IMU; `swiftlet doctor` lists them then",
+                   "`swiftlet settings > vehicle.yaml`; fill in vehicle, imu_link and cameras",
+                   "`swiftlet doctor --settings vehicle.yaml` watches them at work"};
+    return;
+  }
+  if (!report.ready()) {
+    report.next = {"mend what is poor above under \"this vehicle\", first line first, and run this again"};
+    return;
+  }
+  report.next = {"`swiftlet fly` with the same settings"};
+}
+
+}  // namespace
+
+bool DoctorReport::ready() const {
+  return !vehicle.lines.empty() && std::ranges::none_of(vehicle.lines, [](const MachineLine& line) {
+    return line.verdict == MachineVerdict::kPoor;
+  });
+}
+
+DoctorReport examine(const DoctorRequest& request, const Settings& settings) {
+  DoctorReport report;
+  report.computer = inspectMachine("", settings.realtime.sensor_priority);
+  report.connected = connectedDevices();
+  if (namesDevices(settings)) {
+    std::optional<Calibration> calibration;
+    try {
+      calibration = vehicleCalibration(settings);
+      LiveInput input(settings, *calibration);
+      const LiveInput::Opened opened = input.open();
+      for (const std::string& text : opened.faults) {
+        report.vehicle.lines.push_back({"device", text, MachineVerdict::kPoor, ""});
+      }
+      for (const std::string& text : opened.warnings) {
+        report.vehicle.lines.push_back({"device", text, MachineVerdict::kNote, ""});
+      }
+      if (opened.faults.empty()) {
+        VehicleCheck(settings, *calibration, input, request.seconds).run(request.stop, report.vehicle);
+      }
+    } catch (const InputError& error) {
+      report.vehicle.lines.push_back({"settings", error.what(), MachineVerdict::kPoor, ""});
+    }
+  }
+  addNext(settings, report);
+  return report;
+}
+
+}  // namespace swiftlet

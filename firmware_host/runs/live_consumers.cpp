@@ -1,0 +1,113 @@
+#include "firmware_host/runs/live_consumers.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/outputs/autopilot/autopilot_port.hpp"
+#include "firmware_host/realtime/console.hpp"
+
+namespace swiftlet {
+namespace {
+
+void checkAutopilot(const Settings& settings, const FlightRequest& request) {
+  checkOwnPort(settings.autopilot.device, settings.imu_link.device);
+  if (request.speed != 1) {
+    throw InputError("--speed", 0, "", "an autopilot is told of a flight at its own speed",
+                     "Leave --speed out, or autopilot.device empty");
+  }
+}
+
+void checkLabels(const Settings& settings) {
+  const std::string& topic = settings.ros2.label_topic;
+  if (topic.front() != '/') {
+    throw InputError("settings", 0, "ros2.label_topic", "'" + topic + "' is no topic's name",
+                     "Begin it with a slash, as /segmentation/labels");
+  }
+  if (!settings.map.enabled || !settings.map_stage.labels) {
+    throw InputError("settings", 0, "ros2.label_topic", "labels go into the map, and none is made of them",
+                     "Switch map.enabled and map.labels on (--map), or leave ros2.label_topic empty");
+  }
+}
+
+}  // namespace
+
+LiveConsumers::LiveConsumers(const Calibration& calibration, const Settings& settings,
+                             const FlightRequest& request) {
+  if (!settings.autopilot.device.empty()) {
+    checkAutopilot(settings, request);
+    AutopilotThreadOptions options;
+    options.settings = settings.autopilot;
+    if (!request.host_stamps) options.to_host = request.to_host;
+    options.priority = settings.realtime.enabled ? settings.realtime.mesh_priority : 0;
+    autopilot_ = std::make_unique<AutopilotThread>(newOutlet(autopilot_outlet_), options);
+  }
+  if (settings.ros2.enabled) openRos2(calibration, settings, request);
+  if (request.view) {
+    view_ = std::make_unique<ViewThread>(newOutlet(view_outlet_), *request.view, request.name);
+    say(fmt::format("live view: {}\n", view_->url()));
+  }
+}
+
+void LiveConsumers::openRos2(const Calibration& calibration, const Settings& settings,
+                             const FlightRequest& request) {
+  DdsThreadOptions options;
+  options.settings = settings.ros2;
+  if (request.host_stamps) options.clocks = readHostClocks;
+  options.gyro_sigma = calibration.noise.gyro_density * std::sqrt(calibration.noise.rate_hz);
+  if (!settings.ros2.label_topic.empty()) {
+    checkLabels(settings);
+    const CameraModel& camera = calibration.rig.camera[0];
+    labels_ = std::make_unique<LabelExchange>(camera.width(), camera.height(),
+                                              Duration::fromSeconds(settings.ros2.label_patience));
+    options.labels = labels_.get();
+  }
+  ros2_ = std::make_unique<DdsThread>(newOutlet(ros2_outlet_), options);
+}
+
+LiveOutlet& LiveConsumers::newOutlet(std::unique_ptr<LiveOutlet>& owner) {
+  owner = std::make_unique<LiveOutlet>();
+  static_cast<void>(outlets_.tryPushBack(owner.get()));
+  return *owner;
+}
+
+bool LiveConsumers::drainRemarks(RunLog& log) {
+  return autopilot_ && autopilot_->drainEvents([&log](Stamp stamp, const std::string& line) {
+    log.remark(stamp, line);
+    warn(line + "\n");
+  });
+}
+
+void LiveConsumers::addTo(Supervisor& supervisor) {
+  const auto add = [&](const char* name, const auto& follower) {
+    if (follower) static_cast<void>(supervisor.add(name, follower->heart()));
+  };
+  add("autopilot", autopilot_);
+  add("dds", ros2_);
+  add("view", view_);
+  for (LiveOutlet* outlet : outlets_) {
+    static_cast<void>(
+        supervisor.addSink([outlet](const Verdict& verdict) { outlet->verdict.write(verdict); }));
+  }
+}
+
+bool LiveConsumers::finish(nlohmann::ordered_json& report, std::vector<std::string>& faults) {
+  if (autopilot_) autopilot_->tellEnd();
+  if (ros2_) ros2_->tellEnd();
+  if (view_) view_->tellEnd();
+  bool sound = true;
+  const auto end = [&](const char* name, const auto& follower) {
+    if (!follower) return;
+    report[name] = follower->finish();
+    if (!report[name].contains("fault")) return;
+    faults.push_back(std::string(name) + ": " + report[name]["fault"].template get<std::string>());
+    if (report[name].size() == 1) sound = false;  // it is stuck: nothing is counted
+  };
+  end("autopilot", autopilot_);
+  end("ros2", ros2_);
+  end("view", view_);
+  return sound;
+}
+
+}  // namespace swiftlet

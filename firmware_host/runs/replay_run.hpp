@@ -1,0 +1,69 @@
+#pragma once
+// A replay as a function: log and settings in, run folder and summary out. What `swiftlet replay` and
+// the tests on whole logs call.
+
+#include <atomic>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "drivers/recorded/log_source.hpp"
+#include "firmware_host/interfaces/run_listener.hpp"
+#include "firmware_host/outputs/view/view_address.hpp"
+#include "firmware_host/settings/settings.hpp"
+#include "firmware_host/supervisor/verdict.hpp"
+
+namespace swiftlet {
+
+/// The files of a run folder beside the truth, for the summary.
+using AccuracyOfRun = std::function<nlohmann::ordered_json(const std::string& folder, const Trajectory& truth,
+                                                           const std::string& truth_name, Stamp first_image,
+                                                           const EvaluationGroup& settings)>;
+
+struct ReplayRequest {
+  std::string log;
+  std::string out;
+  bool replace = false;         ///< files of a flight, or of no run, in `out` too
+  std::string calibration;      ///< instead of the log's own; empty: the log's
+  std::string imu_calibration;  ///< Kalibr's IMU file where it is not beside the camchain
+  std::string tracks;           ///< file of feature tracks in place of the log's images or own tracks
+  bool mono = false;
+  bool imu_rate = false;
+  bool mesh_sequence = false;       ///< write the meshes of all frames to `meshes/`
+  bool loop_closure = false;        ///< recognize places; sets loop.enabled
+  bool map = false;                 ///< fuse depth into a map; sets map.enabled
+  bool real_time = false;           ///< on threads, messages let out at their times
+  double speed = 1;                 ///< real_time: times faster than recorded
+  std::optional<ViewAddress> view;  ///< real_time: serve the live view there
+  bool record = false;              ///< write `recording/` into the run folder
+  bool reproduce = false;  ///< `log` is a recording: repeat its threaded run step by step, with its settings
+  double from = 0;         ///< s after the first image
+  std::optional<double> until;  ///< s after the first image
+  std::optional<Stamp> last_stamp;
+  const std::atomic<bool>* stop = nullptr;
+  bool show_progress = false;
+  AccuracyOfRun accuracy;  ///< of a log with truth (lab/evaluation/evaluate_run.hpp); empty: none is made
+};
+
+/// Tests slow stages down with these.
+struct ReplayHooks {
+  std::function<void(StageId, double)> drag;
+  std::function<bool(const char* node)> before_turn;  ///< ThreadedOptions::before_turn
+  std::function<void(const Verdict&)> verdict;        ///< FlightRequest::verdict
+};
+
+struct ReplayResult {
+  nlohmann::ordered_json summary;  ///< as written to summary.json
+  bool finished = true;            ///< false: stopped, or a thread ended before its time
+  bool left_behind = false;        ///< a thread was stuck at the end, and what it uses stays in memory
+  bool has_pose = false;
+  std::string lost;  ///< the first file that could not be written to its end; empty: all were
+  RunStatistics statistics;
+};
+
+/// Creates the run folder and everything in it. InputError for bad input, and where `out` may not be written
+/// to.
+ReplayResult runReplay(const ReplayRequest& request, Settings settings, const ReplayHooks& hooks = {});
+
+}  // namespace swiftlet

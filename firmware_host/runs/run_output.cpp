@@ -1,0 +1,145 @@
+#include "firmware_host/runs/run_output.hpp"
+
+#include <fmt/format.h>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/files/whole_file.hpp"
+#include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
+#include "firmware_host/outputs/run_folder/loops_csv.hpp"
+#include "firmware_host/realtime/console.hpp"
+#include "firmware_host/runs/smooth_run.hpp"
+#include "firmware_host/settings/read_settings.hpp"
+
+namespace swiftlet {
+
+template <typename Write>
+void RunOutput::attempt(const Write& write) const {
+  if (!wanted_.fly_on) {
+    write();
+    return;
+  }
+  if (out_.empty()) return;
+  try {
+    write();
+  } catch (const InputError& error) {
+    lost_.add(error.what());
+  }
+}
+
+RunOutput::RunOutput(const std::string& out, const Settings& settings, const Calibration& calibration,
+                     Wanted wanted, LostFiles& lost)
+    : out_(out),
+      settings_(settings),
+      calibration_(calibration),
+      wanted_(wanted),
+      lost_(lost),
+      recorder_(out, {wanted.imu_rate, wanted.mesh_sequence, wanted.fly_on}, lost),
+      log_(recorder_) {
+  attempt([&] { writeWholeFile(out_ / "settings.yaml", printSettings(settings_, false) + "\n"); });
+  if (!settings_.full_smoothing) return;
+  attempt([&] {
+    log_.keepForMap(
+        std::make_unique<MapKeeper>(out, calibration.rig, calibration.noise, settings_.odometry, lost));
+    keeps_keyframes_ = true;
+  });
+}
+
+const Vocabulary* RunOutput::vocabulary() {
+  const std::string& file = settings_.loop.vocabulary;
+  if (!settings_.loop.enabled || file.empty()) return nullptr;
+  if (!vocabulary_) vocabulary_ = std::make_unique<const Vocabulary>(readVocabulary(file));
+  return vocabulary_.get();
+}
+
+GraphOptions RunOutput::graphOptions() {
+  GraphOptions options;
+  options.imu_states = wanted_.imu_rate;
+  options.meshes = wanted_.mesh_sequence;
+  options.vocabulary = vocabulary();
+  options.spill = &recorder_.spilled();
+  return options;
+}
+
+std::unique_ptr<FlightRecorder> RunOutput::startRecorder(RecordOrder order,
+                                                         const DepthImageView* depth_sensor) const {
+  RecordingHeader header;
+  header.rig = calibration_.rig;
+  header.noise = calibration_.noise;
+  header.calibration_form = calibration_.form;
+  header.settings = printSettings(settings_, false);
+  header.program_version = versionText();
+  header.order = order;
+  if (depth_sensor != nullptr) header.depth_sensor = *depth_sensor;
+  std::unique_ptr<FlightRecorder> recorder;
+  attempt([&] { recorder = std::make_unique<FlightRecorder>((out_ / "recording").string(), header); });
+  return recorder;
+}
+
+void RunOutput::close(RunFacts& facts) {
+  facts.peak_resident = peakResidentBytes();
+  log_.finishKeeping();
+  if (settings_.loop.enabled) attempt([&] { writeLoops(out_ / "loops.csv", log_.loops()); });
+  if (!log_.nodes().empty()) attempt([&] { writeMapPoses(out_ / "map.tum", log_.nodes()); });
+}
+
+void RunOutput::smooth(const std::atomic<bool>* stop, bool announce) {
+  attempt([&] {
+    FullSmoothingOptions options = smoothingOptions(settings_, announce);
+    options.stop = stop;
+    const FullSmoothing found = smoothKeyframes(out_ / kKeyframeFile, options);
+    RunStatistics& statistics = log_.statistics();
+    addTime(statistics.times, StageId::kMap, found.spent);
+    for (const auto& row : found.faults.rows()) statistics.faults[row.text] += row.count;
+    if (found.poses.empty()) {
+      ++statistics.faults[found.problem];
+      if (announce) warn(fmt::format("warning: not smoothed: {}\n", found.problem));
+      return;
+    }
+    statistics.map = found.report;
+    writeMapPoses(out_ / "map.tum", found.poses);
+  });
+}
+
+nlohmann::ordered_json RunOutput::summary(const RunFacts& facts) {
+  const RunStatistics& statistics = log_.statistics();
+  nlohmann::ordered_json summary = summaryOf(facts, settings_, statistics);
+  if (const char* problem = lost_.problem()) {
+    summary["executor"]["files"] = {{"lost", lost_.count()}, {"first", problem}};
+  }
+  if (!recorder_.map().is_null()) {
+    summary["map"] = recorder_.map();
+    const MapThreadStatistics& mapping = *statistics.mapping;
+    summary["map"]["frames"] = {{"to_map", mapping.frames},
+                                {"without_image", mapping.without_image},
+                                {"without_scene", mapping.without_scene},
+                                {"refused", mapping.refused}};
+    if (mapping.held) {
+      summary["map"]["labels_in"] = {{"in_time", mapping.held->labelled},
+                                     {"late", mapping.held->late},
+                                     {"no_room", mapping.held->no_room},
+                                     {"nobody_there", mapping.held->nobody},
+                                     {"longest_wait_ms", mapping.held->longest_ms}};
+    }
+  }
+  return summary;
+}
+
+void RunOutput::writeSummary(const nlohmann::ordered_json& summary) const {
+  attempt([&] { writeJson(out_ / "summary.json", summary); });
+}
+
+nlohmann::ordered_json recordingJson(const FlightRecorder& recorder) {
+  const RecordingStatistics& statistics = recorder.statistics();
+  nlohmann::ordered_json lost = nlohmann::ordered_json::object();
+  for (std::size_t kind = 0; kind < kRecordKinds; ++kind) {
+    if (statistics.lost[kind] > 0) lost[pluralName(static_cast<RecordKind>(kind))] = statistics.lost[kind];
+  }
+  return {{"records", statistics.records},
+          {"bytes", statistics.bytes},
+          {"segments", statistics.segments},
+          {"syncs", statistics.syncs},
+          {"lost", lost},
+          {"error", recorder.status().ok() ? "" : recorder.status().what}};
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,92 @@
+#pragma once
+// The run folder while a run writes it, whatever the run is fed by: what its threads log into, the recorder,
+// and at the end the loops, the summary and, smoothed, the trajectory of the map.
+//
+// With Wanted::fly_on nothing that the disk does ends the run: what cannot be written is in lost(), the rest
+// goes on. Else InputError where a file cannot be made.
+
+#include <atomic>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "drivers/calibration/calibration.hpp"
+#include "drivers/recorded/recording_header.hpp"
+#include "firmware_host/graph/flight_recorder.hpp"
+#include "firmware_host/graph/graph.hpp"
+#include "firmware_host/outputs/run_folder/run_recorder.hpp"
+#include "firmware_host/outputs/run_folder/summary.hpp"
+#include "firmware_host/realtime/memory_use.hpp"
+
+namespace swiftlet {
+
+class RunOutput {
+ public:
+  struct Wanted {
+    bool imu_rate = false;       ///< imu_rate.tum
+    bool mesh_sequence = false;  ///< meshes/
+    bool fly_on = false;         ///< without files rather than not
+  };
+
+  /// `out` is there and the run's own (run_claim.hpp); empty: there is none, and nothing is written.
+  /// Settings, calibration and `lost` outlive this.
+  RunOutput(const std::string& out, const Settings& settings, const Calibration& calibration, Wanted wanted,
+            LostFiles& lost);
+
+  [[nodiscard]] RunLog& log() { return log_; }
+  /// Of loop closure: null is the shipped one.
+  [[nodiscard]] const Vocabulary* vocabulary();
+  /// What the graph is to know of this folder.
+  [[nodiscard]] GraphOptions graphOptions();
+  /// Writes `recording/`. `depth_sensor`: of the map; null: none. Null where it cannot (fly_on).
+  [[nodiscard]] std::unique_ptr<FlightRecorder> startRecorder(
+      RecordOrder order, const DepthImageView* depth_sensor = nullptr) const;
+
+  /// After the run: loops.csv, the keyframes closed, map.tum of the pose graph where there is one. Fills the
+  /// facts' peak of memory.
+  void close(RunFacts& facts);
+  /// Whether smooth() has something to do.
+  [[nodiscard]] bool canSmooth() const { return keeps_keyframes_; }
+  /// After close(), with the summary written before: map.tum of all keyframes smoothed together. `stop` ends
+  /// it without one.
+  void smooth(const std::atomic<bool>* stop, bool announce);
+
+  /// What is to be the summary, of what was done so far.
+  [[nodiscard]] nlohmann::ordered_json summary(const RunFacts& facts);
+  void writeSummary(const nlohmann::ordered_json& summary) const;
+
+ private:
+  template <typename Write>
+  void attempt(const Write& write) const;
+
+  std::filesystem::path out_;
+  const Settings& settings_;
+  const Calibration& calibration_;
+  Wanted wanted_;
+  LostFiles& lost_;
+  bool keeps_keyframes_ = false;
+  std::unique_ptr<const Vocabulary> vocabulary_;
+  RunRecorder recorder_;
+  RunLog log_;
+};
+
+/// Memory as it grew: what each part made resident.
+class MemoryTrack {
+ public:
+  MemoryTrack() : last_(residentBytes()) { rows_.push_back({"program_at_start", last_}); }
+  void note(const std::string& what) {
+    const std::int64_t now = residentBytes();
+    rows_.push_back({what, now - last_});
+    last_ = now;
+  }
+  [[nodiscard]] const std::vector<MemoryRow>& rows() const { return rows_; }
+
+ private:
+  std::vector<MemoryRow> rows_;
+  std::int64_t last_;
+};
+
+/// Of the summary.
+nlohmann::ordered_json recordingJson(const FlightRecorder& recorder);
+
+}  // namespace swiftlet

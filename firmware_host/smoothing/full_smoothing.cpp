@@ -1,0 +1,93 @@
+#include "firmware_host/smoothing/full_smoothing.hpp"
+
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/smoothing/keyframe_reader.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr std::size_t kMebibyte = std::size_t{1} << 20U;
+
+void add(const Status& kept, FaultCounts& faults) {
+  if (!kept.ok()) faults.add(kept);
+}
+
+bool stopped(const FullSmoothingOptions& options) {
+  return options.stop != nullptr && options.stop->load(std::memory_order_relaxed);
+}
+
+/// Takes everything in; stops early where that is asked for.
+void fill(KeyframeReader& reader, const FullSmoothingOptions& options, FullSmoother& smoother,
+          FullSmoothing& result) {
+  while (!stopped(options)) {
+    switch (reader.next()) {
+      case KeyframeReader::Next::kSample:
+        smoother.addImu(reader.sample());
+        break;
+      case KeyframeReader::Next::kKeyframe:
+        add(smoother.addKeyframe(reader.frame(), reader.state()), result.faults);
+        break;
+      case KeyframeReader::Next::kRevisit:
+        add(smoother.addRevisit(reader.revisit()), result.faults);
+        break;
+      case KeyframeReader::Next::kEnd:
+        result.cut = reader.cut();
+        return;
+    }
+  }
+}
+
+void solve(FullSmoother& smoother, const FullSmoothingOptions& options, FullSmoothing& result) {
+  const std::size_t bytes = smoother.memoryNeeded();
+  if (bytes > options.most_bytes) {
+    result.problem = fmt::format(
+        "full smoothing of {} keyframes takes up to {} MiB, above smoother.full_memory_mib ({}). Raise it on "
+        "a "
+        "computer with as much memory, with `swiftlet smooth RUN --set smoother.full_memory_mib={}`",
+        smoother.size(), bytes / kMebibyte + 1, options.most_bytes / kMebibyte, bytes / kMebibyte + 1);
+    return;
+  }
+  if (options.begins) options.begins(smoother.size(), bytes);
+  const Status status = smoother.solve(result.report, options.stop);
+  if (!status.ok()) {
+    result.problem = status.what;
+    return;
+  }
+  result.poses.reserve(smoother.size());
+  for (std::size_t k = 0; k < smoother.size(); ++k) {
+    const NavState solved = smoother.state(k);
+    result.poses.push_back({solved.stamp, solved.T_world_body});
+  }
+}
+
+}  // namespace
+
+FullSmoothing smoothKeyframes(const std::string& path, const FullSmoothingOptions& options) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) {
+    throw InputError(path, 0, "", std::string("cannot be read: ") + std::strerror(errno),
+                     "Give the folder of a run with smoother.horizon: full");
+  }
+  FullSmoothing result;
+  result.spent = measured([&] {
+    KeyframeReader reader(path, in);
+    FullSmootherSettings settings;
+    settings.pixel_sigma = reader.pixelSigma();
+    FullSmoother smoother(reader.rig(), reader.noise(), settings);
+    fill(reader, options, smoother, result);
+    if (stopped(options)) {
+      result.problem = kFullSmoothingStopped;
+      return;
+    }
+    solve(smoother, options, result);
+  });
+  return result;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,154 @@
+#include "firmware_host/smoothing/map_keeper.hpp"
+
+#include <unistd.h>
+
+#include <bit>
+#include <cerrno>
+#include <cstring>
+
+#include "drivers/calibration/input_error.hpp"
+#include "drivers/recorded/recording_checksum.hpp"
+#include "drivers/recorded/recording_format.hpp"
+#include "drivers/recorded/recording_header.hpp"
+#include "estimator/odometry/odometry_inputs.hpp"
+
+namespace swiftlet {
+namespace {
+
+using namespace keyframe_file;  // NOLINT(google-build-using-namespace)
+
+void put(LittleEndianWriter& to, const Eigen::Vector3d& vector) {
+  for (int i = 0; i < 3; ++i) to.f64(vector[i]);
+}
+
+void put(LittleEndianWriter& to, const SE3& pose) {
+  for (int i = 0; i < 4; ++i) to.f64(pose.rotation.coeffs()[i]);
+  put(to, pose.translation);
+}
+
+void put(LittleEndianWriter& to, TrackId id, const std::array<bool, kMaxCameras>& seen,
+         const std::array<Eigen::Vector2f, kMaxCameras>& pixel) {
+  to.u64(id);
+  for (const bool by : seen) to.u8(by ? 1 : 0);
+  to.u16(0);
+  for (std::size_t c = 0; c < kMaxCameras; ++c) {
+    // What was not seen has no pixel: the same run is to give the same bytes.
+    for (int i = 0; i < 2; ++i) to.u32(seen[c] ? std::bit_cast<std::uint32_t>(pixel[c][i]) : 0U);
+  }
+}
+
+}  // namespace
+
+MapKeeper::MapKeeper(const std::string& folder, const Rig& rig, const ImuNoise& noise,
+                     const OdometrySettings& settings, LostFiles& lost)
+    : path_(folder + "/" + kKeyframeFile),
+      lost_(lost),
+      monitor_(noise),
+      buffer_(kBufferBytes),
+      record_(kRecordBytes + kMostPayload),
+      file_(std::fopen(path_.c_str(), "wbe")) {
+  if (!file_) {
+    throw InputError(path_, 0, "", std::string("cannot be written: ") + std::strerror(errno),
+                     "Give a folder that can be written with --out, or --set smoother.horizon=30");
+  }
+  std::setvbuf(file_.get(), buffer_.data(), _IOFBF, buffer_.size());
+  writeHead(rigInUse(rig, settings), inflatedNoise(noise, settings), settings.pixel_sigma);
+}
+
+void MapKeeper::writeHead(const Rig& rig, const ImuNoise& noise, double pixel_sigma) {
+  RecordingHeader calibration;
+  calibration.rig = rig;
+  calibration.noise = noise;
+  const std::vector<std::uint8_t> encoded = encodeRecordingHeader(calibration);
+  const std::size_t length = sizeof(double) + encoded.size() + kCrcBytes;
+  LittleEndianWriter to(record_.data());
+  to.bytes(kMagic);
+  to.u32(kVersion);
+  to.u32(static_cast<std::uint32_t>(length));
+  to.f64(pixel_sigma);
+  to.bytes(encoded);
+  head_crc_ = crc32c(0, {record_.data(), to.written()});
+  to.u32(head_crc_);
+  head_bytes_ = static_cast<long>(to.written());
+  check(std::fwrite(record_.data(), 1, to.written(), file_.get()) == to.written() &&
+        std::fflush(file_.get()) == 0);
+}
+
+void MapKeeper::check(bool written) {
+  if (written) return;
+  lost_.add(path_ + ": cannot be written: " + std::strerror(errno) + "; it ends here");
+  file_.reset();
+}
+
+void MapKeeper::writeRecord(Kind kind, std::size_t payload) {
+  LittleEndianWriter to(record_.data());
+  to.u32(0);
+  to.u16(static_cast<std::uint16_t>(kind));
+  to.u16(0);
+  to.u32(static_cast<std::uint32_t>(payload));
+  const std::size_t size = kRecordBytes + payload;
+  const std::uint32_t crc = crc32c(head_crc_, {record_.data() + kCrcBytes, size - kCrcBytes});
+  LittleEndianWriter(record_.data()).u32(crc);
+  const bool flush = kind != Kind::kImu;
+  check(std::fwrite(record_.data(), 1, size, file_.get()) == size &&
+        (!flush || std::fflush(file_.get()) == 0));
+}
+
+void MapKeeper::restart() {
+  monitor_.restart();
+  if (!file_) return;
+  // The first writes out what the buffer holds.
+  check(std::fseek(file_.get(), head_bytes_, SEEK_SET) == 0 &&
+        ::ftruncate(::fileno(file_.get()), head_bytes_) == 0);
+}
+
+void MapKeeper::addImu(const ImuSample& sample) {
+  if (!monitor_.check(sample).status.ok() || !file_) return;
+  LittleEndianWriter to(record_.data() + kRecordBytes);
+  to.i64(sample.stamp.ns);
+  put(to, sample.gyro);
+  put(to, sample.accel);
+  writeRecord(Kind::kImu, to.written());
+}
+
+void MapKeeper::addKeyframe(const TrackedFrame& frame, const NavState& state) {
+  if (!file_) return;
+  LittleEndianWriter to(record_.data() + kRecordBytes);
+  to.i64(frame.stamp.ns);
+  to.u32(state.epoch);
+  to.u32(static_cast<std::uint32_t>(frame.features.size()));
+  put(to, state.T_world_body);
+  put(to, state.v_world_body);
+  put(to, state.bias_gyro);
+  put(to, state.bias_accel);
+  for (const TrackedFeature& feature : frame.features) put(to, feature.id, feature.seen, feature.pixel);
+  writeRecord(Kind::kKeyframe, to.written());
+}
+
+void MapKeeper::addRevisit(const LoopRevisit& revisit) {
+  if (!file_) return;
+  const std::size_t matches = std::min(revisit.matches.size(), kMostMatches);
+  LittleEndianWriter to(record_.data() + kRecordBytes);
+  to.i64(revisit.old_stamp.ns);
+  to.i64(revisit.new_stamp.ns);
+  put(to, revisit.T_old_new);
+  for (int i = 0; i < revisit.information.size(); ++i) to.f64(revisit.information.data()[i]);
+  to.u32(static_cast<std::uint32_t>(matches));
+  for (std::size_t i = 0; i < matches; ++i) {
+    for (const RevisitFeature* feature : {&revisit.matches[i].old_feature, &revisit.matches[i].new_feature}) {
+      to.u32(feature->has_track ? 1 : 0);
+      put(to, feature->track, feature->seen, feature->pixel);
+    }
+  }
+  writeRecord(Kind::kRevisit, to.written());
+}
+
+void MapKeeper::finish() {
+  if (!file_) return;
+  writeRecord(Kind::kEnd, 0);
+  if (!file_) return;
+  check(::fsync(::fileno(file_.get())) == 0);
+  file_.reset();
+}
+
+}  // namespace swiftlet
