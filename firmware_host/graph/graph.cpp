@@ -26,7 +26,7 @@ std::unique_ptr<T> Graph::make(Arguments&&... arguments) {
   return node;
 }
 
-Graph::Graph(const Rig& rig, const ImuNoise& noise, const Settings& settings, RunLog& log,
+Graph::Graph(const Rig& rig, const ImuNoise& noise, const Settings& settings, RunObserver& observer,
              const GraphOptions& options)
     : context_{rigInUse(rig, settings.odometry), noise, settings, options, {}} {
   sensors_ = make<SensorNode>(context_);
@@ -36,14 +36,14 @@ Graph::Graph(const Rig& rig, const ImuNoise& noise, const Settings& settings, Ru
   if (settings.mesh.enabled) mesh_ = make<MeshNode>(context_);
   if (settings.loop.enabled) loop_ = make<LoopNode>(context_);
   if (settings.map.enabled) map_ = make<MappingNode>(context_);
-  log_ = make<LogNode>(context_, log);
+  log_ = make<LogNode>(context_, observer);
   if (options.recorder != nullptr) record_ = make<RecordNode>(*options.recorder, *sensors_);
   for (Node* node : std::initializer_list<Node*>{propagate_.get(), track_.get(), smooth_.get(), mesh_.get(),
                                                  loop_.get(), map_.get(), log_.get(), record_.get()}) {
     if (node != nullptr) nodes_.push_back(node);
   }
   const std::int64_t before = heapBytes();
-  connectNodes(log);
+  connectNodes(observer);
   reserved_.push_back({"arrows", heapBytes() - before});
 }
 
@@ -51,7 +51,7 @@ Graph::~Graph() = default;
 
 // The system in one screen: from where, to where. Capacity, policy and counter of an arrow stand with the
 // reader's end, in the reader's header.
-void Graph::connectNodes(const RunLog& log) {
+void Graph::connectNodes(const RunObserver& observer) {
   const GraphOptions& options = context_.options;
   SensorNode& sensors = *sensors_;
   PropagateNode& propagate = *propagate_;
@@ -72,7 +72,7 @@ void Graph::connectNodes(const RunLog& log) {
   smooth.fix.to(propagate.fix);
   smooth.window.to(track.window);
   smooth.results.to(log_->results);
-  if (log.wantsImu()) sensors.imu.to(log_->samples);
+  if (observer.wantsImu()) sensors.imu.to(log_->samples);
 
   // windows, images of camera 0         -> meshes; planes back to the smoother
   if (mesh_) {
@@ -113,8 +113,8 @@ void Graph::connectNodes(const RunLog& log) {
   }
 }
 
-void Graph::report(RunLog& log) const {
-  RunStatistics& statistics = log.statistics();
+void Graph::report(RunObserver& observer) const {
+  RunStatistics& statistics = observer.statistics();
   sensors_->report(statistics);
   sensors_->addLosses(statistics.losses);
   for (const Node* node : nodes_) {
@@ -123,8 +123,8 @@ void Graph::report(RunLog& log) const {
     node->addLosses(statistics.losses);
   }
   if (log_->isLeftBehind()) return;
-  if (loop_ && !loop_->isLeftBehind()) log.keepLoops(loop_->stage());
-  if (map_ && !map_->isLeftBehind()) log.showMap(map_->stage(), map_->tiedEpochs());
+  if (loop_ && !loop_->isLeftBehind()) observer.keepLoops(loop_->stage());
+  if (map_ && !map_->isLeftBehind()) observer.showMap(map_->stage(), map_->tiedEpochs());
   for (std::size_t i = 0; i < statistics.times.size(); ++i) {
     const StageTimes& times = context_.times[i];
     if (times.wall_frames.count() + times.wall_keyframes.count() > 0) statistics.times[i] = times;

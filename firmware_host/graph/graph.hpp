@@ -34,7 +34,7 @@ class MemoryTable;
 class Graph {
  public:
   /// `settings` and `log` outlive it.
-  Graph(const Rig& rig, const ImuNoise& noise, const Settings& settings, RunLog& log,
+  Graph(const Rig& rig, const ImuNoise& noise, const Settings& settings, RunObserver& observer,
         const GraphOptions& options);
   ~Graph();
   Graph(const Graph&) = delete;
@@ -66,7 +66,7 @@ class Graph {
   /// Any thread: what the supervisor asks of it.
   void look(FlightFacts& facts) const;
   /// After the run: what the nodes counted, found and lost, to the log.
-  void report(RunLog& log) const;
+  void report(RunObserver& observer) const;
   /// What was reserved for what, by the constructor.
   void addReservations(MemoryTable& table) const;
 
@@ -74,7 +74,7 @@ class Graph {
   /// Makes a node and notes what it reserved.
   template <typename T, typename... Arguments>
   std::unique_ptr<T> make(Arguments&&... arguments);
-  void connectNodes(const RunLog& log);
+  void connectNodes(const RunObserver& observer);
 
   GraphContext context_;
   struct Reserved {

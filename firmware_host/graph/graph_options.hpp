@@ -17,7 +17,7 @@
 namespace swiftlet {
 
 class FlightRecorder;
-class RunLog;
+class RunObserver;
 
 struct GraphOptions {
   bool imu_states = false;               ///< ask for RunListener::onImuState
@@ -36,7 +36,7 @@ struct GraphOptions {
   /// Over which labels come after their image; the map holds frames for them. Null: it does not wait.
   LabelExchange* labels = nullptr;
   /// Called by `log` each time: what the input has to say of itself, to the log. True: there was something.
-  std::function<bool(RunLog&)> remarks;
+  std::function<bool(RunObserver&)> remarks;
   /// Called after a stage's work with its CPU seconds, within its wall time: tests slow stages down.
   std::function<void(StageId, double)> drag;
 };

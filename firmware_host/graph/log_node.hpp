@@ -1,5 +1,5 @@
 #pragma once
-// The node `log`: what the run finds, to its listener (run_log.hpp), and the keyframes and samples to be
+// The node `log`: what the run finds, to its listener (run_observer.hpp), and the keyframes and samples to be
 // kept.
 //
 // When it falls behind: results, states and meshes are lost to the files, counted, not to the estimate.
@@ -7,14 +7,15 @@
 #include "firmware_host/graph/graph_options.hpp"
 #include "firmware_host/graph/messages.hpp"
 #include "firmware_host/graph/node.hpp"
-#include "firmware_host/graph/run_log.hpp"
+#include "firmware_host/graph/run_observer.hpp"
 #include "firmware_host/graph/sample_in.hpp"
 
 namespace swiftlet {
 
 class LogNode final : public Node {
  public:
-  LogNode(GraphContext& context, RunLog& log) : Node("log", Rank::kLow), context_(context), log_(log) {}
+  LogNode(GraphContext& context, RunObserver& observer)
+      : Node("log", Rank::kLow), context_(context), observer_(observer) {}
 
   QueueIn<FrameResult, kResultRing> results{*this, "results_to_log", Arrow::kWaits};
   QueueIn<NavState, kStateRing> states{*this, "states_to_log", Arrow::kWaits};
@@ -27,7 +28,7 @@ class LogNode final : public Node {
 
  private:
   GraphContext& context_;
-  RunLog& log_;
+  RunObserver& observer_;
 };
 
 }  // namespace swiftlet

@@ -93,7 +93,7 @@ class FlightRun {
     wanted.recorder = recorder_.get();
     wanted.confusion = confusionOf(settings_);
     wanted.sample_patience = kSamplePatience;
-    wanted.remarks = [this](RunLog& log) { return remark(log); };
+    wanted.remarks = [this](RunObserver& observer) { return remark(observer); };
     // The schedule asks ten times a second.
     const double begin = wallSeconds();
     const double cpu = processCpuSeconds();
@@ -112,7 +112,7 @@ class FlightRun {
     flight.name = "flight";
     flight.view = request_.view;
     flight.file_problem = [this] { return lost_.problem(); };
-    const FlightEnd flown = flyThreaded(calibration_, input_, settings_, output_->log(), wanted, flight,
+    const FlightEnd flown = flyThreaded(calibration_, input_, settings_, output_->observer(), wanted, flight,
                                         control, facts_.executor);
     result_.faultless = flown.faultless;
     result_.left_behind = flown.left_behind;
@@ -123,9 +123,9 @@ class FlightRun {
   }
 
   /// What the input and the terminal have to say, on the thread `log`.
-  bool remark(RunLog& log) {
-    const auto tell = [&log](Stamp stamp, const std::string& line) {
-      log.remark(stamp, line);
+  bool remark(RunObserver& observer) {
+    const auto tell = [&observer](Stamp stamp, const std::string& line) {
+      observer.remark(stamp, line);
       warn(line + "\n");
     };
     const bool hung_up = request_.hung_up != nullptr && request_.hung_up->exchange(false);
@@ -152,7 +152,7 @@ class FlightRun {
       writeSummary();
     }
     if (const char* problem = lost_.problem()) result_.lost = problem;
-    result_.has_pose = output_->log().statistics().first_pose.has_value();
+    result_.has_pose = output_->observer().statistics().first_pose.has_value();
   }
 
   void writeSummary() {

@@ -80,7 +80,7 @@ ThreadSettings supervisorThread(const RealtimeGroup& realtime) {
 }  // namespace
 
 FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const Settings& settings,
-                      RunLog& log, GraphOptions wanted, const FlightRequest& request,
+                      RunObserver& observer, GraphOptions wanted, const FlightRequest& request,
                       const RunControl& control, nlohmann::ordered_json& report) {
   const std::string confined = confineMalloc();
   const LibraryReport libraries = confineLibraries();
@@ -101,7 +101,7 @@ FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const 
   LiveConsumers& consumers = *flight->consumers;
   wanted.outlets = consumers.outlets();
   wanted.labels = consumers.labels();
-  wanted.remarks = [&consumers, &supervisor, of_input = std::move(wanted.remarks)](RunLog& to) {
+  wanted.remarks = [&consumers, &supervisor, of_input = std::move(wanted.remarks)](RunObserver& to) {
     bool any = of_input && of_input(to);
     any = consumers.drainRemarks(to) || any;
     return supervisor.drainEvents([&to](Stamp stamp, const std::string& line) {
@@ -109,7 +109,7 @@ FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const 
       warn(line + "\n");
     }) || any;
   };
-  flight->graph = std::make_unique<Graph>(calibration.rig, calibration.noise, settings, log, wanted);
+  flight->graph = std::make_unique<Graph>(calibration.rig, calibration.noise, settings, observer, wanted);
   Graph& graph = *flight->graph;
   reserveHeap(kHeapReserve);
   MemoryTable reserved;
@@ -163,7 +163,7 @@ FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const 
   end.left_behind = !consumers.finish(report, faults) || end.left_behind;
   supervisor.stop();
   if (lock.current) unlockMemory();
-  graph.report(log);
+  graph.report(observer);
 
   report["kind"] = "threaded";
   report["speed"] = request.speed;

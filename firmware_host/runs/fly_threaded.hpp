@@ -40,7 +40,7 @@ struct FlightEnd {
 
 /// `report` gets what the summary says of the executor.
 FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const Settings& settings,
-                      RunLog& log, GraphOptions wanted, const FlightRequest& request,
+                      RunObserver& observer, GraphOptions wanted, const FlightRequest& request,
                       const RunControl& control, nlohmann::ordered_json& report);
 
 }  // namespace swiftlet

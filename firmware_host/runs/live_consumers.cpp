@@ -72,9 +72,9 @@ LiveOutlet& LiveConsumers::newOutlet(std::unique_ptr<LiveOutlet>& owner) {
   return *owner;
 }
 
-bool LiveConsumers::drainRemarks(RunLog& log) {
-  return autopilot_ && autopilot_->drainEvents([&log](Stamp stamp, const std::string& line) {
-    log.remark(stamp, line);
+bool LiveConsumers::drainRemarks(RunObserver& observer) {
+  return autopilot_ && autopilot_->drainEvents([&observer](Stamp stamp, const std::string& line) {
+    observer.remark(stamp, line);
     warn(line + "\n");
   });
 }

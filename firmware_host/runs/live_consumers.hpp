@@ -28,7 +28,7 @@ class LiveConsumers {
   /// Likewise; null where nobody brings labels.
   [[nodiscard]] LabelExchange* labels() const { return labels_.get(); }
   /// What they have to say of themselves since the last call, to the log. True: there was something.
-  bool drainRemarks(RunLog& log);
+  bool drainRemarks(RunObserver& observer);
   /// Before its begin(): puts them under supervision, and lets them have its verdicts.
   void addTo(Supervisor& supervisor);
   /// Ends them; `report` gets what each counted under its own name, `faults` what ended one before its time.

@@ -153,9 +153,9 @@ class ReplayRun {
     const auto& depth_sensor = recording_->header().depth_sensor;
     if (depth_sensor) wanted.depth_sensor = &*depth_sensor;
     const auto graph =
-        std::make_unique<Graph>(source_->rig(), source_->imuNoise(), settings_, output_->log(), wanted);
+        std::make_unique<Graph>(source_->rig(), source_->imuNoise(), settings_, output_->observer(), wanted);
     const RepeatReport report = runRecorded(*recording_, *graph, efforts, control_);
-    graph->report(output_->log());
+    graph->report(output_->observer());
     facts_.finished = report.finished && report.stopped_early.empty();
     facts_.executor["kind"] = "reproduced";
     if (report.stopped_early.empty()) return;
@@ -189,8 +189,8 @@ class ReplayRun {
       flight.file_problem = [this] { return lost_.problem(); };
       LogPlayer& player = player_.emplace(feed, request_.speed);
       flight.to_host = [&player] { return player.toHost(); };
-      const FlightEnd flown = flyThreaded(source_->calibration(), player, settings_, output_->log(), wanted,
-                                          flight, control_, facts_.executor);
+      const FlightEnd flown = flyThreaded(source_->calibration(), player, settings_, output_->observer(),
+                                          wanted, flight, control_, facts_.executor);
       facts_.finished = flown.finished && flown.faultless;
       left_behind_ = flown.left_behind;
       const LatencyHistogram& late = player.lateness();
@@ -198,14 +198,14 @@ class ReplayRun {
                                     {"p99", late.percentile(0.99) * kToMs},
                                     {"max", late.max() * kToMs}};
     } else {
-      const auto graph =
-          std::make_unique<Graph>(source_->rig(), source_->imuNoise(), settings_, output_->log(), wanted);
+      const auto graph = std::make_unique<Graph>(source_->rig(), source_->imuNoise(), settings_,
+                                                 output_->observer(), wanted);
       memory_.note("estimator_at_start");
       facts_.finished = runLockstep(feed, *graph, control_);
-      graph->report(output_->log());
+      graph->report(output_->observer());
       facts_.executor["kind"] = "lockstep";
     }
-    output_->log().statistics().times[static_cast<std::size_t>(StageId::kSource)] = feed.times();
+    output_->observer().statistics().times[static_cast<std::size_t>(StageId::kSource)] = feed.times();
     if (recorder_) facts_.executor["recording"] = recordingJson(*recorder_);
   }
 
@@ -237,7 +237,7 @@ class ReplayRun {
       output_->smooth(request_.stop, request_.show_progress);
     }
     result.summary = output_->summary(facts_);
-    result.statistics = output_->log().statistics();
+    result.statistics = output_->observer().statistics();
     result.has_pose = result.statistics.first_pose.has_value();
     const Trajectory truth = source_->groundTruth();
     if (request_.accuracy && !truth.empty() && result.has_pose) {

@@ -34,11 +34,11 @@ RunOutput::RunOutput(const std::string& out, const Settings& settings, const Cal
       wanted_(wanted),
       lost_(lost),
       recorder_(out, {wanted.imu_rate, wanted.mesh_sequence, wanted.fly_on}, lost),
-      log_(recorder_) {
+      observer_(recorder_) {
   attempt([&] { writeWholeFile(out_ / "settings.yaml", printSettings(settings_, false) + "\n"); });
   if (!settings_.full_smoothing) return;
   attempt([&] {
-    log_.keepForMap(
+    observer_.keepForMap(
         std::make_unique<MapKeeper>(out, calibration.rig, calibration.noise, settings_.odometry, lost));
     keeps_keyframes_ = true;
   });
@@ -77,9 +77,9 @@ std::unique_ptr<FlightRecorder> RunOutput::startRecorder(RecordOrder order,
 
 void RunOutput::close(RunFacts& facts) {
   facts.peak_resident = peakResidentBytes();
-  log_.finishKeeping();
-  if (settings_.loop.enabled) attempt([&] { writeLoops(out_ / "loops.csv", log_.loops()); });
-  if (!log_.nodes().empty()) attempt([&] { writeMapPoses(out_ / "map.tum", log_.nodes()); });
+  observer_.finishKeeping();
+  if (settings_.loop.enabled) attempt([&] { writeLoops(out_ / "loops.csv", observer_.loops()); });
+  if (!observer_.nodes().empty()) attempt([&] { writeMapPoses(out_ / "map.tum", observer_.nodes()); });
 }
 
 void RunOutput::smooth(const std::atomic<bool>* stop, bool announce) {
@@ -87,7 +87,7 @@ void RunOutput::smooth(const std::atomic<bool>* stop, bool announce) {
     FullSmoothingOptions options = smoothingOptions(settings_, announce);
     options.stop = stop;
     const FullSmoothing found = smoothKeyframes(out_ / kKeyframeFile, options);
-    RunStatistics& statistics = log_.statistics();
+    RunStatistics& statistics = observer_.statistics();
     addTime(statistics.times, StageId::kMap, found.spent);
     for (const auto& row : found.faults.rows()) statistics.faults[row.text] += row.count;
     if (found.poses.empty()) {
@@ -101,7 +101,7 @@ void RunOutput::smooth(const std::atomic<bool>* stop, bool announce) {
 }
 
 nlohmann::ordered_json RunOutput::summary(const RunFacts& facts) {
-  const RunStatistics& statistics = log_.statistics();
+  const RunStatistics& statistics = observer_.statistics();
   nlohmann::ordered_json summary = summaryOf(facts, settings_, statistics);
   if (const char* problem = lost_.problem()) {
     summary["executor"]["files"] = {{"lost", lost_.count()}, {"first", problem}};

@@ -33,7 +33,7 @@ class RunOutput {
   RunOutput(const std::string& out, const Settings& settings, const Calibration& calibration, Wanted wanted,
             LostFiles& lost);
 
-  [[nodiscard]] RunLog& log() { return log_; }
+  [[nodiscard]] RunObserver& observer() { return observer_; }
   /// Of loop closure: null is the shipped one.
   [[nodiscard]] const Vocabulary* vocabulary();
   /// What the graph is to know of this folder.
@@ -67,7 +67,7 @@ class RunOutput {
   bool keeps_keyframes_ = false;
   std::unique_ptr<const Vocabulary> vocabulary_;
   RunRecorder recorder_;
-  RunLog log_;
+  RunObserver observer_;
 };
 
 /// Memory as it grew: what each part made resident.

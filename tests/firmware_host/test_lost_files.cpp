@@ -118,7 +118,7 @@ TEST_CASE("a folder that takes no file costs each of them, or the run where it h
   CHECK_THAT(lost.problem(), Catch::Contains("No such file or directory"));
   CHECK(output.startRecorder(RecordOrder::kByArrival) != nullptr);  // makes its folders itself
   CHECK_FALSE(output.canSmooth());
-  CHECK_FALSE(output.log().wantsImu());
+  CHECK_FALSE(output.observer().wantsImu());
 }
 
 TEST_CASE("a recorder that cannot begin is lost, not the flight", "[files]") {

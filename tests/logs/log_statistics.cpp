@@ -54,16 +54,16 @@ struct Run {
 Run runLog(const std::string& log, double from, double until) {
   const std::unique_ptr<LogSource> source = openLog(log, LogOptions{});
   StateKeeper keeper;
-  RunLog run_log(keeper);
+  RunObserver run_observer(keeper);
   const Settings settings;
   const auto graph =
-      std::make_unique<Graph>(source->rig(), source->imuNoise(), settings, run_log, GraphOptions{});
+      std::make_unique<Graph>(source->rig(), source->imuNoise(), settings, run_observer, GraphOptions{});
   LogSection section;
   section.from = from;
   if (until < kNotAsked) section.until = until;
   LogFeed feed(*source, section, nullptr);
   runLockstep(feed, *graph, RunControl{});
-  const auto first = run_log.statistics().first_image;
+  const auto first = run_observer.statistics().first_image;
   return {std::move(keeper.states), first ? *first : Stamp{}};
 }
 

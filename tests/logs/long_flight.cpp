@@ -71,9 +71,9 @@ int run(const std::string& path, double minutes, double speed) {
   RepeatedLog log(path, static_cast<int>(std::lround(minutes)));
   LostFiles lost;
   RunRecorder recorder(folder.path(), {.imu_rate = true}, lost);
-  RunLog run_log(recorder);
+  RunObserver run_observer(recorder);
   Settings settings;
-  run_log.keepForMap(
+  run_observer.keepForMap(
       std::make_unique<MapKeeper>(folder.path(), log.rig(), log.imuNoise(), settings.odometry, lost));
   LogFeed feed(log, {}, nullptr);
   GraphOptions wanted;
@@ -91,9 +91,9 @@ int run(const std::string& path, double minutes, double speed) {
   nlohmann::ordered_json report;
   LogPlayer player(feed, speed);
   const FlightEnd flown =
-      flyThreaded(log.calibration(), player, settings, run_log, wanted, flight, control, report);
+      flyThreaded(log.calibration(), player, settings, run_observer, wanted, flight, control, report);
   const std::int64_t at_end = peakResidentBytes();
-  const RunStatistics& s = run_log.statistics();
+  const RunStatistics& s = run_observer.statistics();
   fmt::print("at the end:     {} bytes ({:+.2f} %)\n{} frames, {} poses, dropped {}, epochs {}\n", at_end,
              100.0 * (static_cast<double>(at_end) / static_cast<double>(after_a_minute) - 1), s.frames,
              s.poses, s.frames_dropped, s.health.empty() ? 0U : s.health.back().epoch + 1);

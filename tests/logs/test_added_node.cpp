@@ -57,18 +57,18 @@ class NoListener : public RunListener {
 struct Run {
   std::unique_ptr<LogSource> source = openLog(shortLog());
   NoListener listener;
-  RunLog log{listener};
+  RunObserver observer{listener};
   Settings settings;
-  Graph graph{source->rig(), source->imuNoise(), settings, log, GraphOptions{}};
+  Graph graph{source->rig(), source->imuNoise(), settings, observer, GraphOptions{}};
   KeyframeCountNode& node = addKeyframeCount(graph);
   LogFeed feed{*source, {0, kSanitized ? 1.0 : 10.0, {}}, nullptr};
 
   void check() {
-    graph.report(log);
+    graph.report(observer);
     CHECK(node.done());
     CHECK(node.count() > (kSanitized ? 1 : 5));
-    CHECK(node.count() == log.statistics().keyframes);
-    CHECK(log.statistics().losses.count("results_to_keyframes") == 0);
+    CHECK(node.count() == observer.statistics().keyframes);
+    CHECK(observer.statistics().losses.count("results_to_keyframes") == 0);
   }
 };
 

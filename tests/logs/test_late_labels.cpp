@@ -11,7 +11,7 @@
 #include "drivers/recorded/open_log.hpp"
 #include "estimator/core/random.hpp"
 #include "firmware_host/graph/held_frames.hpp"
-#include "firmware_host/graph/run_log.hpp"
+#include "firmware_host/graph/run_observer.hpp"
 #include "firmware_host/inputs/log/log_player.hpp"
 #include "firmware_host/realtime/host_sleep.hpp"
 #include "firmware_host/schedule/threaded.hpp"
@@ -329,7 +329,7 @@ struct Flown {
 Flown fly(const Network::Behaviour& behaviour, Duration patience, double until) {
   const auto source = openLog(shortLog());
   Ignoring listener;
-  RunLog log(listener);
+  RunObserver observer(listener);
   LogFeed feed(*source, {0, until, {}}, nullptr);
   Settings settings;
   settings.map.enabled = true;
@@ -338,13 +338,13 @@ Flown fly(const Network::Behaviour& behaviour, Duration patience, double until) 
   Network network(exchange, behaviour);
   GraphOptions options;
   options.labels = &exchange;
-  const auto graph = std::make_unique<Graph>(source->rig(), source->imuNoise(), settings, log, options);
+  const auto graph = std::make_unique<Graph>(source->rig(), source->imuNoise(), settings, observer, options);
   LogPlayer player(feed, 1);
   const ThreadedReport report = runThreaded(player, *graph, ThreadedOptions{}, RunControl{});
   network.end();
   CHECK(report.faults.empty());
   REQUIRE(report.finished);
-  graph->report(log);
+  graph->report(observer);
   struct Count : SurfaceSink {
     explicit Count(Flown& to) : flown(to) {}
     void take(const SurfacePatch& patch) override {
@@ -356,7 +356,7 @@ Flown fly(const Network::Behaviour& behaviour, Duration patience, double until) 
     }
     Flown& flown;
   };
-  Flown flown{log.statistics(), exchange.counters()};
+  Flown flown{observer.statistics(), exchange.counters()};
   Count count(flown);
   graph->map()->stage().visitSurface(count);
   return flown;

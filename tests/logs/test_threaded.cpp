@@ -358,11 +358,11 @@ TEST_CASE("a map that falls behind misses frames, counted, and nobody waits for 
 TEST_CASE("a log that fails ends neither the flight nor the waiting for its end") {
   const auto source = openLog(shortLog());
   FailingListener listener;
-  RunLog log(listener);
+  RunObserver observer(listener);
   LogFeed feed(*source, {}, nullptr);
   const Settings settings;
   const auto graph =
-      std::make_unique<Graph>(source->rig(), source->imuNoise(), settings, log, GraphOptions{});
+      std::make_unique<Graph>(source->rig(), source->imuNoise(), settings, observer, GraphOptions{});
   LogPlayer player(feed, kSlow);
   const ThreadedReport report = runThreaded(player, *graph, ThreadedOptions{}, RunControl{});
   REQUIRE(report.faults.size() == 1);

@@ -32,7 +32,7 @@ class Run : private RunListener {
  public:
   Run(const SimulatedFlight& flight, const Settings& settings)
       : settings_(fullStages(settings)),
-        graph_(flight.givenRig(), flight.settings().imu.noise, settings_, log_, GraphOptions{}) {}
+        graph_(flight.givenRig(), flight.settings().imu.noise, settings_, observer_, GraphOptions{}) {}
 
   void take(const ImuSample& sample) { graph_.sensors().takeImu(sample, sample.stamp, now()); }
   void take(const CameraFrame& image) {
@@ -47,8 +47,8 @@ class Run : private RunListener {
   const StageTable& end() {
     graph_.sensors().endInput();
     runAll(graph_);
-    graph_.report(log_);
-    return log_.statistics().times;
+    graph_.report(observer_);
+    return observer_.statistics().times;
   }
 
   std::size_t features = 0;   ///< most in a frame
@@ -65,7 +65,7 @@ class Run : private RunListener {
   void onRemark(Stamp /*stamp*/, const std::string& /*text*/) override {}
 
   const Settings settings_;
-  RunLog log_{*this};
+  RunObserver observer_{*this};
   Graph graph_;
 };
 

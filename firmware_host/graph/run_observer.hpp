@@ -16,9 +16,9 @@
 
 namespace swiftlet {
 
-class RunLog {
+class RunObserver {
  public:
-  explicit RunLog(RunListener& listener) : listener_(listener) {}
+  explicit RunObserver(RunListener& listener) : listener_(listener) {}
 
   /// Before the first message: keep keyframes and IMU for full smoothing.
   void keepForMap(std::unique_ptr<MapKeeper> keeper) { keeper_ = std::move(keeper); }

@@ -1,10 +1,10 @@
-#include "firmware_host/graph/run_log.hpp"
+#include "firmware_host/graph/run_observer.hpp"
 
 #include <fmt/format.h>
 
 namespace swiftlet {
 
-void RunLog::onResult(const FrameResult& result) {
+void RunObserver::onResult(const FrameResult& result) {
   const Stamp stamp = result.track_step.stamp;
   if (result.dropped > 0) {
     listener_.onRemark(
@@ -30,13 +30,13 @@ void RunLog::onResult(const FrameResult& result) {
   }
 }
 
-void RunLog::restart(std::uint32_t timeline, Stamp /*first*/) {
+void RunObserver::restart(std::uint32_t timeline, Stamp /*first*/) {
   timeline_ = timeline;
   keeper_->restart();
   ++statistics_.faults["stamps went back: the map leaves out what was before"];
 }
 
-void RunLog::onLoop(const LoopReport& report) {
+void RunObserver::onLoop(const LoopReport& report) {
   for (const LoopCandidate& candidate : report.candidates) {
     const double ago = (candidate.new_stamp - candidate.old_stamp).seconds();
     listener_.onRemark(
@@ -51,7 +51,7 @@ void RunLog::onLoop(const LoopReport& report) {
                                  report.selected, report.loops, p.x(), p.y(), p.z()));
 }
 
-void RunLog::keepLoops(const LoopStage& loops) {
+void RunObserver::keepLoops(const LoopStage& loops) {
   statistics_.loop = loops.counters();
   for (std::size_t i = 0; i < loops.nodeCount(); ++i) {
     const MapNode node = loops.node(i);
@@ -64,7 +64,7 @@ void RunLog::keepLoops(const LoopStage& loops) {
   }
 }
 
-void RunLog::noteFrame(const FrameResult& result) {
+void RunObserver::noteFrame(const FrameResult& result) {
   const TrackedFrame& tracked = result.tracked;
   const OdometryOutput& output = result.output;
   ++statistics_.frames;
@@ -89,7 +89,7 @@ void RunLog::noteFrame(const FrameResult& result) {
   listener_.onFrame(tracked, output);
 }
 
-void RunLog::noteEvents(const OdometryOutput& output) {
+void RunObserver::noteEvents(const OdometryOutput& output) {
   for (const Event& event : output.events) {
     EventTotal& total = statistics_.events[event.kind];
     ++total.count;
@@ -97,7 +97,7 @@ void RunLog::noteEvents(const OdometryOutput& output) {
   }
 }
 
-void RunLog::noteEffort(const char* stage, const FrameResult& result, const Effort& now, Effort& last) {
+void RunObserver::noteEffort(const char* stage, const FrameResult& result, const Effort& now, Effort& last) {
   if (any_frame_ && !(now == last)) {
     ++statistics_.effort_changes;
     listener_.onRemark(result.track_step.stamp,
@@ -107,7 +107,7 @@ void RunLog::noteEffort(const char* stage, const FrameResult& result, const Effo
   last = now;
 }
 
-void RunLog::noteHealth(Stamp stamp, const OdometryOutput& output) {
+void RunObserver::noteHealth(Stamp stamp, const OdometryOutput& output) {
   if (output.has_state) {
     if (!statistics_.first_pose) statistics_.first_pose = stamp;
     ++statistics_.poses;
