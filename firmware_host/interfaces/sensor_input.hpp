@@ -1,5 +1,6 @@
 #pragma once
-// What feeds a threaded run: a log let out at its times (log_player.hpp), or devices (firmware_host/inputs/devices).
+// What feeds a threaded run: a log let out at its times (log_player.hpp), or devices
+// (firmware_host/inputs/devices).
 //
 // An input brings its own threads, one for each device; the executor starts them, at the priority of sensors,
 // and ends the run when the last has ended. Each hands its messages to the sink from its own thread: those of
