@@ -12,6 +12,7 @@
 #include "firmware_host/lab/export/tum_files.hpp"
 #include "firmware_host/outputs/run_folder/states_csv.hpp"
 #include "tests/firmware_host/exported_run.hpp"
+#include "tests/support/skip_case.hpp"
 
 namespace swiftlet {
 namespace {
@@ -214,6 +215,13 @@ TEST_CASE("export says what it needs", "[export]") {
   CHECK(run({"export", exported.run, "--bag", bag}) == (canWriteBags() ? kExitDone : kExitBadInput));
   CHECK(std::filesystem::exists(bag) == canWriteBags());
 }
+
+#ifdef SWIFTLET_NO_RUN_BAG
+TEST_CASE("a run as a ROS 1 bag", "[export]") {
+  skipCase("built without librosbag-storage-dev and ROS's message packages",
+           "toolchain/install.sh optional, then toolchain/test.sh");
+}
+#endif
 
 }  // namespace
 }  // namespace swiftlet

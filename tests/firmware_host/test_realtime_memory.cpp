@@ -19,6 +19,7 @@
 #include "firmware_host/realtime/memory_lock.hpp"
 #include "tests/firmware_host/without_rights.hpp"
 #include "tests/sanitized.hpp"
+#include "tests/support/skip_case.hpp"
 
 namespace swiftlet {
 namespace {
@@ -53,25 +54,24 @@ std::size_t residentPages(void* memory, std::size_t bytes) {
       std::count_if(pages.begin(), pages.end(), [](unsigned char page) { return (page & 1U) != 0; }));
 }
 
-TEST_CASE("memory is locked, or the report says what is missing") {
+// Sanitizers turn mlockall off.
+TEST_CASE("memory is locked, or the report says what is missing", "[unsanitized]") {
   const MemoryLockReport report = lockMemory();
   CHECK(report.mapped_bytes > 0);
-  if (kSanitized) {
-    WARN("sanitizers turn mlockall off");
-  } else if (report.current) {
+  if (report.current) {
     CHECK(report.message.empty() == report.future);
     CHECK(lockedKib() > 0);
     unlockMemory();
     CHECK(lockedKib() == 0);
   } else {
-    WARN("this user may not lock memory: " << report.message);
+    skipCase("this user may not lock memory: " + report.message, "sudo toolchain/test.sh");
     CHECK(contains(report.message, "ulimit -l"));
   }
   CHECK(toJson(report)["current"] == report.current);
 }
 
-TEST_CASE("without the right and beyond the limit nothing is locked, and the remedy is said") {
-  if (kSanitized) return;
+TEST_CASE("without the right and beyond the limit nothing is locked, and the remedy is said",
+          "[unsanitized]") {
   const WithoutRights guard;
   const int result = inChild([] {
     rlimit limit{};
@@ -127,8 +127,7 @@ TEST_CASE("confined malloc in a fresh process", "[.][fresh_malloc]") {
   CHECK(mallinfo2().hblks == 0);      // no block with a mapping of its own
 }
 
-TEST_CASE("one arena for all threads, and a heap that is there in advance and stays") {
-  if (kSanitized) return;
+TEST_CASE("one arena for all threads, and a heap that is there in advance and stays", "[unsanitized]") {
   // An arena, once made for a thread, stays: only a process without threads so far shows it.
   const int result = inChild([] {
     execl("/proc/self/exe", "test_realtime", "[fresh_malloc]", static_cast<char*>(nullptr));

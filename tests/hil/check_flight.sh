@@ -18,7 +18,7 @@ here=$(dirname "$(realpath "$0")")
 root=$here/../..
 log=${SWIFTLET_DATA:-$root/../shared/data}/euroc_mh01_20s
 if [ ! -d "$log" ]; then
-  echo "check_flight: skipped: no $log. Name the folder of euroc_mh01_20s in SWIFTLET_DATA."
+  echo "SKIPPED: no $log; run with: SWIFTLET_DATA=FOLDER toolchain/test.sh --all"
   exit 77
 fi
 log=$(realpath "$log")

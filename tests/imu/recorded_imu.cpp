@@ -46,6 +46,8 @@ std::string dataFolder() {
   return folder != nullptr ? folder : SWIFTLET_SOURCE_DIR "/../shared/data";
 }
 
+std::string noLogs(const std::string& group) { return "no " + group + " in " + dataFolder(); }
+
 std::vector<std::string> logNames(const std::string& group) {
   std::vector<std::string> names;
   const std::filesystem::path folder = std::filesystem::path(dataFolder()) / group;

@@ -30,6 +30,9 @@ struct RecordedLog {
 /// The data folder: SWIFTLET_DATA, or ../shared/data beside the source tree.
 std::string dataFolder();
 
+/// Why a case is skipped: "no GROUP in FOLDER".
+std::string noLogs(const std::string& group);
+
 /// Names of the folders that exist below `group` ("euroc_imu_gt_all", "imu_broad").
 std::vector<std::string> logNames(const std::string& group);
 

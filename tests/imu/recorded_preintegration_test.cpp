@@ -8,6 +8,7 @@
 #include "estimator/geometry/so3.hpp"
 #include "estimator/imu/preintegration.hpp"
 #include "tests/imu/recorded_imu.hpp"
+#include "tests/support/skip_case.hpp"
 
 using namespace swiftlet;
 using namespace swiftlet::test;
@@ -134,5 +135,5 @@ TEST_CASE("Preintegration over 1 s of the real logs beside a fine-step reference
     CHECK(velocity < 1.02 * fine_velocity);
     CHECK(position < 1.02 * fine_position);
   }
-  if (logs == 0) WARN("no euroc_imu_gt_all under SWIFTLET_DATA: skipped");
+  if (logs == 0) skipCase(noLogs("euroc_imu_gt_all"), kRunWithData);
 }

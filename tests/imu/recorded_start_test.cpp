@@ -12,6 +12,7 @@
 #include "estimator/imu/stereo_start.hpp"
 #include "tests/imu/analytic_trajectory.hpp"
 #include "tests/imu/recorded_imu.hpp"
+#include "tests/support/skip_case.hpp"
 
 using namespace swiftlet;
 using namespace swiftlet::test;
@@ -93,7 +94,7 @@ const Starts& allStarts() {
 TEST_CASE("Tilt from the accelerometer before the first image, real starts in motion", "[figures]") {
   const Starts& all = allStarts();
   if (all.starts().empty()) {
-    WARN("no euroc_imu_gt_all under SWIFTLET_DATA: skipped");
+    skipCase(noLogs("euroc_imu_gt_all"), kRunWithData);
     return;
   }
   const ImuNoise noise;
@@ -123,7 +124,7 @@ TEST_CASE("Tilt from the accelerometer before the first image, real starts in mo
 TEST_CASE("Stereo start on real IMU: tilt and velocity", "[figures]") {
   const Starts& all = allStarts();
   if (all.starts().empty()) {
-    WARN("no euroc_imu_gt_all under SWIFTLET_DATA: skipped");
+    skipCase(noLogs("euroc_imu_gt_all"), kRunWithData);
     return;
   }
   const ImuNoise noise;
@@ -186,7 +187,7 @@ TEST_CASE("Stereo start on real IMU: tilt and velocity", "[figures]") {
 TEST_CASE("Mono start on real IMU: scale and tilt", "[figures]") {
   const Starts& all = allStarts();
   if (all.starts().empty()) {
-    WARN("no euroc_imu_gt_all under SWIFTLET_DATA: skipped");
+    skipCase(noLogs("euroc_imu_gt_all"), kRunWithData);
     return;
   }
   const ImuNoise noise;

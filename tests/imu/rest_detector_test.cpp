@@ -9,6 +9,7 @@
 #include "estimator/geometry/so3.hpp"
 #include "tests/imu/analytic_trajectory.hpp"
 #include "tests/imu/recorded_imu.hpp"
+#include "tests/support/skip_case.hpp"
 
 using namespace swiftlet;
 using namespace swiftlet::test;
@@ -169,7 +170,7 @@ TEST_CASE("Rest on the real logs: share found, and share of motion taken for res
       }
     }
     if (total.motion == 0) {
-      WARN("no " << group << " under SWIFTLET_DATA: skipped");
+      skipCase(noLogs(group), kRunWithData);
       continue;
     }
     std::printf("rest %s in all: found %.1f %%, wrong %.4f %%; with images %.1f %%, %.4f %%\n", group.c_str(),

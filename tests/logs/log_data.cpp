@@ -13,7 +13,8 @@ std::optional<std::string> findLog(const std::string& name) {
                        : std::filesystem::path(SWIFTLET_SOURCE_DIR) / ".." / "shared" / "data";
   const std::filesystem::path path = (root / name).lexically_normal();
   if (std::filesystem::is_directory(path)) return path.string();
-  std::fprintf(stderr, "skipped: log %s is not in %s (set SWIFTLET_DATA)\n", name.c_str(), root.c_str());
+  std::fprintf(stderr, "log %s is not in %s: name the folder of logs in SWIFTLET_DATA\n", name.c_str(),
+               root.c_str());
   return std::nullopt;
 }
 

@@ -362,8 +362,9 @@ Flown fly(const Network::Behaviour& behaviour, Duration patience, double until) 
   return flown;
 }
 
-TEST_CASE("labels that come 0.3 s after their image are in the map, amid a flood of others") {
-  if (kSanitized) return;  // a map's images take minutes there
+// A map's images take minutes under a sanitizer.
+TEST_CASE("labels that come 0.3 s after their image are in the map, amid a flood of others",
+          "[unsanitized]") {
   const Flown flown = fly({0.3, true}, Duration::fromSeconds(1), 4);
   REQUIRE(flown.statistics.mapping);
   REQUIRE(flown.statistics.mapping->held);
@@ -383,8 +384,7 @@ TEST_CASE("labels that come 0.3 s after their image are in the map, amid a flood
   CHECK(flown.statistics.frames_dropped == 0);
 }
 
-TEST_CASE("a network that never answers delays the map and costs it no frame") {
-  if (kSanitized) return;
+TEST_CASE("a network that never answers delays the map and costs it no frame", "[unsanitized]") {
   const Flown flown = fly({-1, false}, Duration::fromMilliseconds(300), 2.5);
   REQUIRE(flown.statistics.mapping);
   REQUIRE(flown.statistics.mapping->held);

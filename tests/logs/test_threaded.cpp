@@ -371,8 +371,8 @@ TEST_CASE("a log that fails ends neither the flight nor the waiting for its end"
   CHECK(graph->sensors().counters().images[0] == 80);
 }
 
-TEST_CASE("a killed recording loses at most its last second") {
-  if (kSanitized) return;  // threads after fork are not for them
+// Sanitizers do not follow threads after a fork.
+TEST_CASE("a killed recording loses at most its last second", "[unsanitized]") {
   const int runs = chosenRuns(20);
   constexpr std::uint64_t kFramesPerSecond = 20;
   Random random(11);

@@ -1,12 +1,12 @@
 // The public benchmark graphs: the best known cost of each, from the poses in its file. SWIFTLET_DATA.
 
 #include <catch2/catch.hpp>
-#include <cstdio>
 
 #include "firmware_host/lab/modules/g2o_file.hpp"
 #include "mapping/pose_graph/odometry_start.hpp"
 #include "mapping/pose_graph/pose_graph_optimizer.hpp"
 #include "tests/mapping/graph_data.hpp"
+#include "tests/support/skip_case.hpp"
 
 namespace swiftlet::test {
 namespace {
@@ -36,7 +36,7 @@ void check(const GraphReference& reference, double cost, const OptimizeReport& r
 TEST_CASE("every public graph ends at its best known cost") {
   const std::vector<GraphReference> references = readReferences();
   if (references.empty()) {
-    std::puts("skipped: no pose_graphs in SWIFTLET_DATA");
+    skipCase("no pose_graphs in the folder of logs", kRunWithData);
     return;
   }
   CHECK(references.size() >= 30);

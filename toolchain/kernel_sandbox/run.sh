@@ -20,6 +20,11 @@ export LC_ALL=C
 here=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd)
 root=$(readlink -f "$here/../..")
 
+skip() { # reason, what to do
+  echo "SKIPPED: $1; run with: $2" >&2
+  exit 77
+}
+
 fail() { # exit code, words
   echo "sandbox: $2" >&2
   exit "$1"
@@ -73,9 +78,9 @@ clean_up() {
 }
 
 [ $# -gt 0 ] || { sed -n '2,17s/^# \{0,1\}//p' "$0" >&2 && exit 2; }
-if [ "$(uname -m)" != x86_64 ]; then fail 77 "skipped: the kernel runs on x86-64 only"; fi
-kernel=$(find_kernel) || fail 77 "skipped: no kernel. Name one in SWIFTLET_SANDBOX_KERNEL, or build one: \
-toolchain/kernel_sandbox/build_kernel.sh"
+if [ "$(uname -m)" != x86_64 ]; then skip "the sandbox's kernel runs on x86-64 only" "an x86-64 computer"; fi
+kernel=$(find_kernel) || skip "no kernel for the sandbox (docs/kernel_sandbox.md)" \
+  "toolchain/kernel_sandbox/build_kernel.sh, or its file in SWIFTLET_SANDBOX_KERNEL, then toolchain/test.sh --all"
 
 share=$(readlink -e "${SWIFTLET_SANDBOX_SHARE:-$PWD}") || fail 2 "SWIFTLET_SANDBOX_SHARE is not a folder"
 case $share in
