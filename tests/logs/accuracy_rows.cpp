@@ -46,6 +46,32 @@ std::vector<std::string> findWorse(const std::vector<AccuracyRow>& now,
   return lines;
 }
 
+std::vector<std::string> findLost(const std::vector<AccuracyRow>& now,
+                                  const std::vector<AccuracyRow>& before) {
+  std::vector<std::string> lines;
+  for (const AccuracyRow& row : before) {
+    if (findCase(now, row) == nullptr) lines.push_back(nameOf(row));
+  }
+  return lines;
+}
+
+std::vector<AccuracyRow> updatedRows(const std::vector<AccuracyRow>& now, std::vector<AccuracyRow> before) {
+  const auto replayed = [&](const AccuracyRow& row) {
+    return std::ranges::any_of(now, [&](const AccuracyRow& r) { return r.log == row.log; });
+  };
+  std::erase_if(before,
+                [&](const AccuracyRow& row) { return replayed(row) && findCase(now, row) == nullptr; });
+  for (const AccuracyRow& row : now) {
+    const auto found = std::ranges::find_if(before, [&](const AccuracyRow& r) { return r.sameCase(row); });
+    if (found == before.end()) {
+      before.push_back(row);
+    } else {
+      *found = row;
+    }
+  }
+  return before;
+}
+
 std::vector<AccuracyRow> readAccuracyRows(std::istream& in) {
   std::vector<AccuracyRow> rows;
   std::string line;

@@ -20,8 +20,8 @@ struct AccuracyRow {
 };
 
 /// A figure may grow by the larger of these before it counts as worse.
-inline constexpr double kAllowedShare = 0.10;
-inline constexpr double kAllowedMetres = 0.002;
+inline constexpr double kAllowedShare = 0.05;
+inline constexpr double kAllowedMetres = 0.0003;
 
 /// True when `now` exceeds `before` by more than what is allowed, or is no number.
 bool isWorse(double now, double before);
@@ -29,6 +29,14 @@ bool isWorse(double now, double before);
 /// What got worse, a line each: "log, 2 cameras, odometry, all: 0.0120 m, committed 0.0070 m".
 std::vector<std::string> findWorse(const std::vector<AccuracyRow>& now,
                                    const std::vector<AccuracyRow>& before);
+
+/// Committed rows that a run no longer produces, a line each: "log, 2 cameras, map".
+std::vector<std::string> findLost(const std::vector<AccuracyRow>& now,
+                                  const std::vector<AccuracyRow>& before);
+
+/// The committed rows after `now`: new figures replace the old ones. What the logs of `now` no longer produce
+/// goes, rows of other logs stay.
+std::vector<AccuracyRow> updatedRows(const std::vector<AccuracyRow>& now, std::vector<AccuracyRow> before);
 
 /// `log,cameras,trajectory,all_m,from_3s_m`, 4 decimals. Throws std::runtime_error naming the line.
 std::vector<AccuracyRow> readAccuracyRows(std::istream& in);
