@@ -61,6 +61,7 @@ std::vector<AccuracyRow> replayAll(const std::filesystem::path& out) {
     if (!path) continue;
     for (const int cameras : {2, 1}) {
       ReplayRequest request;
+      request.accuracy = runAccuracyJson;
       request.log = *path;
       request.mono = cameras == 1;
       request.out = out / fmt::format("{}_{}", log, cameras == 1 ? "mono" : "stereo");
