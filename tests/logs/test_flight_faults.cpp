@@ -1,6 +1,6 @@
 // A thread of a threaded run throws, returns early, or stands still: what is said, after how long, what goes
-// on, and how the run ends. Prints a table of it. SWIFTLET_FAULTS=all: every node and follower; else one of
-// each kind.
+// on, and how the run ends. Prints a table of it. In the long set (tests/support/long_run.hpp):
+// every node and follower; else one of each kind.
 
 #include <fmt/format.h>
 
@@ -21,6 +21,7 @@
 #include "firmware_host/runs/replay_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
+#include "tests/support/long_run.hpp"
 #include "tests/support/view_client.hpp"
 
 namespace swiftlet {
@@ -192,11 +193,6 @@ void check(std::string_view thread, Fault fault) {
   scene->released = true;
 }
 
-bool all() {
-  const char* chosen = std::getenv("SWIFTLET_FAULTS");
-  return chosen != nullptr && std::string_view(chosen) == "all";
-}
-
 TEST_CASE(
     "a thread that throws, returns early or stands still is named, and the flight does what its loss means") {
   fmt::print(
@@ -208,7 +204,7 @@ TEST_CASE(
 #ifdef SWIFTLET_TEST_DDS
   threads.push_back("dds");
 #endif
-  if (!all()) {
+  if (!longRun()) {
     check("track", Fault::kThrows);
     check("mesh", Fault::kReturns);
     check("smooth", Fault::kStalls);

@@ -115,17 +115,23 @@ TEST_CASE("the trap sees heap calls, locks and waits of an armed thread") {
 }
 
 TEST_CASE("the flight path neither allocates nor locks") { checkRun(false, false); }
-TEST_CASE("the flight path neither allocates nor locks while it is recorded") { checkRun(false, true); }
 TEST_CASE("the flight path neither allocates nor locks with one camera") { checkRun(true, false); }
-TEST_CASE("the flight path neither allocates nor locks with planes and loop closure") {
+
+// All of it at once is below, and in the plain set; one by one they tell which it is.
+TEST_CASE("the flight path neither allocates nor locks while it is recorded", "[.][long]") {
+  checkRun(false, true);
+}
+TEST_CASE("the flight path neither allocates nor locks with planes and loop closure", "[.][long]") {
   checkRun(false, false, true, true);
 }
-TEST_CASE("the flight path neither allocates nor locks with loop closure and a map") {
+TEST_CASE("the flight path neither allocates nor locks with loop closure and a map", "[.][long]") {
   checkRun(false, true, false, true, true);
 }
 
 #ifdef SWIFTLET_LIVE_VIEW
-TEST_CASE("the flight path neither allocates nor locks nor waits while viewers look on") {
+TEST_CASE(
+    "recorded, with planes, loop closure, a map and viewers the flight path neither allocates nor locks nor "
+    "waits") {
   ViewAddress address;
   address.port = freePort();
   // One that reads, and three that take no byte of what they asked for.
@@ -145,13 +151,17 @@ TEST_CASE("the flight path neither allocates nor locks nor waits while viewers l
     }
     stream = reader.text();
   });
-  const nlohmann::ordered_json summary = checkRun(false, true, false, true, true, address);
+  const nlohmann::ordered_json summary = checkRun(false, true, true, true, true, address);
   stop = true;
   viewers.join();
   CHECK(summary["executor"]["view"]["viewers"] == 4);
   CHECK(summary["executor"]["view"]["delivered"] > 10);
   CHECK(stream.find("event: patch") != std::string::npos);
   CHECK(stream.find("event: end") != std::string::npos);
+}
+#else
+TEST_CASE("recorded, with planes, loop closure and a map the flight path neither allocates nor locks") {
+  checkRun(false, true, true, true, true);
 }
 #endif
 

@@ -18,6 +18,7 @@
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
 #include "tests/sanitized.hpp"
+#include "tests/support/long_run.hpp"
 
 namespace swiftlet {
 namespace {
@@ -238,8 +239,8 @@ TEST_CASE("a threaded run whose stamps jump is repeated byte for byte") {
   }
 }
 
-TEST_CASE("after jumps of any stream by any time a good pose comes back") {
-  for (int run = 0; run < (kSanitized ? 1 : 8); ++run) {
+TEST_CASE("after jumps of any stream by any time a good pose comes back", "[long]") {
+  for (int run = 0; run < (kSanitized ? 1 : longOr(20, 3)); ++run) {
     INFO("run " << run);
     Random random(31, static_cast<std::uint64_t>(run));
     std::vector<Jump> jumps;

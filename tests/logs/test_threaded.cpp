@@ -30,6 +30,7 @@
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
 #include "tests/sanitized.hpp"
+#include "tests/support/long_run.hpp"
 
 namespace swiftlet {
 namespace {
@@ -38,11 +39,8 @@ namespace {
 /// said about losses, which they cause.
 constexpr double kSlow = kSanitized ? 0.2 : 1;
 
-/// SWIFTLET_THREADED_RUNS: of random overloads, and of kills.
-int chosenRuns(int usual) {
-  const char* text = std::getenv("SWIFTLET_THREADED_RUNS");
-  return text != nullptr ? std::atoi(text) : usual;
-}
+/// Of random overloads, and of kills.
+int chosenRuns() { return longOr(20, 4); }
 
 /// Of the short log.
 constexpr std::uint64_t kImages = kSanitized ? 42 : 160;  // of both cameras
@@ -168,8 +166,8 @@ class RandomDrag {
   int smoothed_ = 0;  // of the thread `smooth`
 };
 
-TEST_CASE("overloaded, threads degrade by policy, recover, and are repeated byte for byte") {
-  const int runs = kSanitized ? 2 : chosenRuns(20);
+TEST_CASE("overloaded, threads degrade by policy, recover, and are repeated byte for byte", "[long]") {
+  const int runs = kSanitized ? 2 : chosenRuns();
   // A frame every 17 ms for stages that take 7 to 12, and up to 48 where they are dragged.
   constexpr double kSpeed = 3;
   std::uint64_t dropped = 0;
@@ -372,8 +370,8 @@ TEST_CASE("a log that fails ends neither the flight nor the waiting for its end"
 }
 
 // Sanitizers do not follow threads after a fork.
-TEST_CASE("a killed recording loses at most its last second", "[unsanitized]") {
-  const int runs = chosenRuns(20);
+TEST_CASE("a killed recording loses at most its last second", "[unsanitized][long]") {
+  const int runs = chosenRuns();
   constexpr std::uint64_t kFramesPerSecond = 20;
   Random random(11);
   void* shared = mmap(nullptr, sizeof(std::atomic<std::uint64_t>), PROT_READ | PROT_WRITE,

@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "tests/smoother/plane_ties.hpp"
+#include "tests/support/long_run.hpp"
 
 using namespace swiftlet;
 using test::FlightRecord;
@@ -35,12 +36,13 @@ struct Sum {
 
 }  // namespace
 
-TEST_CASE("Planes of the room help or do no harm, wrong ties are bounded", "[smoother][plane_flight]") {
+TEST_CASE("Planes of the room help or do no harm, wrong ties are bounded", "[smoother][plane_flight][long]") {
   Sum structureless;
   Sum promoted;
   Sum tied;
   Sum wrong;
-  for (std::uint64_t seed = 2; seed <= 3; ++seed) {
+  const std::uint64_t flights = longOr<std::uint64_t>(4, 1);
+  for (std::uint64_t seed = 2; seed < 2 + flights; ++seed) {
     const TrackFlight flight(test::roomFlight(25, seed));
     structureless.add(test::fly(flight, nullptr));
     TieSettings settings;
@@ -61,10 +63,10 @@ TEST_CASE("Planes of the room help or do no harm, wrong ties are bounded", "[smo
     CHECK(astray.wrongTies() > 50);
   }
   std::printf(
-      "2 flights of 25 s: structureless %.4f m (NEES %.2f), promoted %.4f (%.2f), planes %.4f (%.2f), "
+      "%llu flights of 25 s: structureless %.4f m (NEES %.2f), promoted %.4f (%.2f), planes %.4f (%.2f), "
       "one tie in five wrong %.4f (%.2f)\n",
-      structureless.error(), structureless.meanNees(), promoted.error(), promoted.meanNees(), tied.error(),
-      tied.meanNees(), wrong.error(), wrong.meanNees());
+      static_cast<unsigned long long>(flights), structureless.error(), structureless.meanNees(),
+      promoted.error(), promoted.meanNees(), tied.error(), tied.meanNees(), wrong.error(), wrong.meanNees());
   CHECK(promoted.error() < 1.1 * structureless.error());
   CHECK(tied.error() < 1.1 * structureless.error());
   CHECK(wrong.error() < 1.5 * structureless.error());

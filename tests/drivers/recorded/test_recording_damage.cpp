@@ -8,6 +8,7 @@
 #include "estimator/core/random.hpp"
 #include "tests/drivers/recorded/asl_fixture.hpp"
 #include "tests/drivers/recorded/recording_fixture.hpp"
+#include "tests/support/long_run.hpp"
 
 namespace swiftlet::test {
 namespace {
@@ -171,7 +172,7 @@ TEST_CASE("a tail of zeros or of pages that were half written is cut off") {
   }
 }
 
-TEST_CASE("a flipped bit ends the recording where it is, and the records behind it are counted") {
+TEST_CASE("a flipped bit ends the recording where it is, and the records behind it are counted", "[long]") {
   RecordedScript recorded = recordScript(23, 50, GENERATE(std::size_t{4000}, std::size_t{1} << 30U));
   std::vector<bool> in_header(recorded.size(), false);
   for (std::size_t i = 0; i < recorded.segments.size(); ++i) {
@@ -179,7 +180,8 @@ TEST_CASE("a flipped bit ends the recording where it is, and the records behind 
                 true);
   }
   Random random(6);
-  for (std::uint64_t at = 0; at < recorded.size(); at += 1 + random.below(3)) {
+  const std::uint32_t most = longOr(3U, 15U);  // bytes from one flip to the next
+  for (std::uint64_t at = 0; at < recorded.size(); at += 1 + random.below(most)) {
     const auto bit = static_cast<std::uint8_t>(1U << random.below(8));
     recorded.byte(at) ^= bit;
     const std::size_t whole = recorded.wholeBefore(at);
