@@ -14,7 +14,6 @@ namespace {
 
 constexpr std::array<std::uint8_t, 3> kJpegMagic = {0xFF, 0xD8, 0xFF};
 constexpr std::array<std::uint8_t, 8> kPngMagic = {0x89, 'P', 'N', 'G', 0x0D, 0x0A, 0x1A, 0x0A};
-constexpr png_uint_32 kMaxSide = 16384;
 
 /// Bytes a pixel.
 enum class Grey : std::uint8_t { k8 = 1, k16 = 2 };
@@ -58,7 +57,7 @@ bool askForGrey16(png_structp png, png_infop info) {
 DecodeResult readPng(png_structp png, png_infop info, PngInput* input, ImageSize expected, Grey grey,
                      std::uint8_t* out, ImageSize* found) {
   if (setjmp(png_jmpbuf(png)) != 0) return DecodeResult::kDamaged;
-  png_set_user_limits(png, kMaxSide, kMaxSide);
+  png_set_user_limits(png, kMaxImageSide, kMaxImageSide);
   png_set_read_fn(png, input, &readPngBytes);
   png_read_info(png, info);
   found->width = static_cast<int>(png_get_image_width(png, info));

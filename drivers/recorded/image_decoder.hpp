@@ -12,6 +12,8 @@
 
 namespace swiftlet {
 
+inline constexpr int kMaxImageSide = 16384;  // pixels; a larger one is damage, not a picture
+
 enum class DecodeResult { kOk, kUnknownFormat, kDamaged, kWrongSize };
 
 struct ImageSize {

@@ -6,7 +6,7 @@
 namespace swiftlet {
 namespace {
 
-std::vector<ImageRow> readRows(CsvReader& csv, LogCounters& counters, LogWarnings& warnings) {
+std::vector<ImageRow> readImageRows(CsvReader& csv, LogCounters& counters, LogWarnings& warnings) {
   std::vector<ImageRow> rows;
   while (csv.next(1)) {
     ImageRow row;
@@ -26,13 +26,13 @@ std::vector<ImageRow> readRows(CsvReader& csv, LogCounters& counters, LogWarning
 
 std::vector<ImageRow> readImageList(const std::string& path, LogCounters& counters, LogWarnings& warnings) {
   CsvReader csv(path, CsvReader::Separator::kComma, counters, warnings);
-  return readRows(csv, counters, warnings);
+  return readImageRows(csv, counters, warnings);
 }
 
 std::vector<ImageRow> readImageListText(const std::string& name, std::string_view text, LogCounters& counters,
                                         LogWarnings& warnings) {
   CsvReader csv(name, text, CsvReader::Separator::kComma, counters, warnings);
-  return readRows(csv, counters, warnings);
+  return readImageRows(csv, counters, warnings);
 }
 
 }  // namespace swiftlet

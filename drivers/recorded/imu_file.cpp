@@ -38,7 +38,7 @@ double medianNorm(const std::vector<ImuSample>& samples, Eigen::Vector3d ImuSamp
   return *middle;
 }
 
-std::vector<ImuSample> readRows(CsvReader& csv, LogCounters& counters, LogWarnings& warnings) {
+std::vector<ImuSample> readImuRows(CsvReader& csv, LogCounters& counters, LogWarnings& warnings) {
   std::vector<ImuSample> samples;
   bool accel_first = false;
   while (csv.next(7)) {
@@ -102,13 +102,13 @@ double medianRate(const std::vector<ImuSample>& samples) {
 
 std::vector<ImuSample> readImuFile(const std::string& path, LogCounters& counters, LogWarnings& warnings) {
   CsvReader csv(path, CsvReader::Separator::kComma, counters, warnings);
-  return readRows(csv, counters, warnings);
+  return readImuRows(csv, counters, warnings);
 }
 
 std::vector<ImuSample> readImuText(const std::string& name, std::string_view text, LogCounters& counters,
                                    LogWarnings& warnings) {
   CsvReader csv(name, text, CsvReader::Separator::kComma, counters, warnings);
-  return readRows(csv, counters, warnings);
+  return readImuRows(csv, counters, warnings);
 }
 
 }  // namespace swiftlet

@@ -6,8 +6,6 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-
 bool allDigits(std::string_view text) {
   for (const char c : text) {
     if (c < '0' || c > '9') return false;

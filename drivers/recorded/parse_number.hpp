@@ -1,11 +1,14 @@
 #pragma once
 // Numbers and stamps from text, without locale, allocation or loss: stamps never pass through double.
 
+#include <cstdint>
 #include <string_view>
 
 #include "estimator/core/stamp.hpp"
 
 namespace swiftlet {
+
+inline constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
 /// The whole of `text` as a double (a leading '+' allowed, "nan" and "inf" recognised).
 [[nodiscard]] bool parseDouble(std::string_view text, double& value);

@@ -1,12 +1,11 @@
 #include "drivers/recorded/recording_header.hpp"
 
+#include "drivers/recorded/image_decoder.hpp"
 #include "drivers/recorded/recording_format.hpp"
 
 namespace swiftlet {
 namespace {
 
-// Larger than any imager; keeps width * height within 32 bits.
-constexpr int kMaxImageSide = 1 << 15;
 // Everything but the texts, with room to spare.
 constexpr std::size_t kFixedPartBytes = 1024;
 

@@ -3,13 +3,14 @@
 #include <bit>
 #include <cstring>
 
+#include "drivers/recorded/image_decoder.hpp"
+#include "drivers/recorded/parse_number.hpp"
+
 namespace swiftlet {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "bodies are copied as they are");
 
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-constexpr std::uint32_t kMaxSide = 16384;
 // Luma weights of ITU-R BT.601 in 14 bits, rounding half up.
 constexpr std::uint32_t kRed = 4899;
 constexpr std::uint32_t kGreen = 9617;
@@ -112,7 +113,7 @@ bool readRosImage(std::span<const std::uint8_t> body, RosImage& image) {
   std::uint8_t big_endian = 0;
   if (!reader.readHeader(image.stamp) || !reader.read(height) || !reader.read(width) ||
       !reader.readString(image.encoding) || !reader.read(big_endian) || !reader.read(image.step) ||
-      !reader.readArray(image.data) || width > kMaxSide || height > kMaxSide) {
+      !reader.readArray(image.data) || width > kMaxImageSide || height > kMaxImageSide) {
     return false;
   }
   image.size = {static_cast<int>(width), static_cast<int>(height)};

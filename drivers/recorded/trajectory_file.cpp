@@ -148,11 +148,11 @@ Trajectory readTrajectoryText(const std::string& name, std::string_view text, Lo
 }
 
 std::string formatSeconds(Stamp stamp) {
-  constexpr std::uint64_t kNsPerSecond = 1'000'000'000;
   const bool negative = stamp.ns < 0;
   const auto ns = static_cast<std::uint64_t>(stamp.ns);
   const std::uint64_t magnitude = negative ? 0 - ns : ns;
-  return fmt::format("{}{}.{:09}", negative ? "-" : "", magnitude / kNsPerSecond, magnitude % kNsPerSecond);
+  constexpr std::uint64_t kSecond = kNsPerSecond;
+  return fmt::format("{}{}.{:09}", negative ? "-" : "", magnitude / kSecond, magnitude % kSecond);
 }
 
 std::string formatTum(Stamp stamp, const SE3& T_world_body) {

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kLowLight = 0.05;           // share of normal light
 constexpr double kLowLightExposure = 0.010;  // s
-constexpr double kPathStep = 0.1;            // s between points that furniture keeps clear of
+constexpr double kClearanceStep = 0.1;            // s between points that furniture keeps clear of
 constexpr double kSharpTime = 1e-9;          // s: image times are multiples of a period to rounding
 
 Rig turnedRig(const Rig& rig, const SimulationSettings& settings) {
@@ -97,7 +97,7 @@ void SimulatedFlight::flyAndBuild() {
     duration_ = trajectory_.endTime();
   }
   std::vector<Eigen::Vector3d> path;
-  for (double t = 0; t <= duration_; t += kPathStep) path.push_back(trajectory_.pose(t).translation);
+  for (double t = 0; t <= duration_; t += kClearanceStep) path.push_back(trajectory_.pose(t).translation);
   if (!s.given_motion.empty() && !fitWorld(s.world, path)) {
     throw std::invalid_argument(
         "world.kind: a given motion needs a world that can be resized (room, hall, cluttered)");

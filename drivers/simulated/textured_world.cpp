@@ -14,7 +14,7 @@ namespace {
 constexpr double kLightSpacing = 0.12;     // m between grid points of the light
 constexpr double kMaxLightPoints = 30000;  // in the whole world
 constexpr double kLightTexels = 20;        // between grid points at least: coarse paint needs no fine light
-constexpr float kWhite = 215.0F;           // stored value of reflectance 1 in light 1: headroom under lamps
+constexpr float kStoredWhite = 215.0F;           // stored value of reflectance 1 in light 1: headroom under lamps
 
 Texture paintLit(const World& world, std::size_t index, double texel, double light_spacing) {
   const Patch& patch = world.patches()[index];
@@ -35,7 +35,7 @@ Texture paintLit(const World& world, std::size_t index, double texel, double lig
       const float u = static_cast<float>((x + 0.5) * texel);
       const float v = static_cast<float>((y + 0.5) * texel);
       texels[k] = static_cast<std::uint8_t>(
-          std::clamp(kWhite * reflectance[k] * light.at(u, v) + 0.5F, 0.0F, 255.0F));
+          std::clamp(kStoredWhite * reflectance[k] * light.at(u, v) + 0.5F, 0.0F, 255.0F));
     }
   }
   return {std::move(texels), width, height, static_cast<float>(per_metre)};

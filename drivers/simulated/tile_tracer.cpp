@@ -7,7 +7,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr float kPi = std::numbers::pi_v<float>;
+constexpr float kPiFloat = std::numbers::pi_v<float>;
 constexpr float kNearest = 1e-3F;  // m
 // A tile wider than this has no useful frustum: every patch is then tested.
 constexpr float kMaxTileTangent = 2.0F;
@@ -219,13 +219,13 @@ SurfaceHit surfaceAt(const ViewedPatch& patch, const Tile& tile, int i) {
   const float north = p.dot(patch.normal);
   const float up = p.dot(patch.v_axis);
   const float angle = std::atan2(north, east);
-  const float u = patch.radius * (angle < 0 ? angle + 2 * kPi : angle);
+  const float u = patch.radius * (angle < 0 ? angle + 2 * kPiFloat : angle);
   if (patch.shape == Shape::kCylinder) {
     const Eigen::Vector3f normal = (east * patch.u_axis + north * patch.normal) / patch.radius;
     return {u, up, -ray.dot(normal)};
   }
   const float latitude = std::asin(std::clamp(up / patch.radius, -1.0F, 1.0F));
-  return {u, patch.radius * (latitude + kPi / 2), -ray.dot(p) / patch.radius};
+  return {u, patch.radius * (latitude + kPiFloat / 2), -ray.dot(p) / patch.radius};
 }
 
 }  // namespace swiftlet

@@ -6,7 +6,7 @@ option(SWIFTLET_BUILD_TESTS "Build the tests (needs Catch2, OpenCV)" ON)
 option(SWIFTLET_BUILD_BENCHMARKS "Build the benchmarks (needs Google Benchmark, OpenCV, Ceres, OpenGV)" OFF)
 option(SWIFTLET_BUILD_FUZZERS "Build the libFuzzer targets (needs clang)" OFF)
 option(SWIFTLET_PRECOMPILED_HEADERS "Parse Eigen and the standard library once, not in each unit" ON)
-option(SWIFTLET_JOINED_UNITS "Compile the short files of the program's rooms ten at a time" ON)
+option(SWIFTLET_JOINED_UNITS "Compile the short files of a room of the program together" ON)
 option(SWIFTLET_WARNINGS_AS_ERRORS "Treat warnings as errors" ON)
 set(SWIFTLET_SANITIZE "" CACHE STRING "Sanitizers, as -fsanitize takes them: address,undefined or thread")
 
@@ -49,7 +49,9 @@ target_compile_options(swiftlet_flags INTERFACE
   $<$<BOOL:${SWIFTLET_WARNINGS_AS_ERRORS}>:-Werror>
   # GCC 12 warns inside Eigen 3.4's fixed-size expressions and, falsely, inside the standard
   # library's string operator+ (GCC bug 105651).
-  $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overread -Wno-stringop-overflow -Wno-restrict>)
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overread -Wno-stringop-overflow -Wno-restrict>
+  # Its default makes GCC collect garbage so often that a build takes 7 % longer; a unit needs 1.4 GB instead of 1.2.
+  $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=1000000>)
 target_compile_definitions(swiftlet_flags INTERFACE
   $<$<CONFIG:Debug>:EIGEN_RUNTIME_NO_MALLOC EIGEN_INITIALIZE_MATRICES_BY_NAN>)
 if(SWIFTLET_SANITIZE)

@@ -27,11 +27,11 @@ function(swiftlet_use_headers target name)
   endif()
 endfunction()
 
-# The program's rooms are many short files that include the same headers: joined, they are parsed once in
-# ten. The estimator's files stay alone: what is inlined where could change the last bit of a result.
+# The rooms of logs and program are many short files that include the same headers: joined, they are parsed once
+# in twenty. The estimator's files stay alone: what is inlined where could change the last bit of a result.
 function(swiftlet_join_units target)
   file(RELATIVE_PATH room ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
-  if(SWIFTLET_JOINED_UNITS AND room MATCHES "^firmware_host/")
-    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
+  if(SWIFTLET_JOINED_UNITS AND room MATCHES "^(drivers/(calibration|recorded|simulated)|firmware_host/)")
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 20)
   endif()
 endfunction()

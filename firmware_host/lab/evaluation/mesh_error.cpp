@@ -11,7 +11,7 @@ namespace {
 constexpr double kR2[] = {0.7548776662466927, 0.5698402909980532};
 constexpr double kHigh = 0.95;
 
-double share(std::size_t part, std::size_t whole) {
+double shareOf(std::size_t part, std::size_t whole) {
   return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
@@ -103,9 +103,9 @@ void SurfaceError::add(const SurfaceError& other) {
   label_right += other.label_right;
 }
 
-double SurfaceError::labelShare() const { return share(label_right, labelled); }
+double SurfaceError::labelShare() const { return shareOf(label_right, labelled); }
 
-double SurfaceError::unlabelledShare() const { return share(distances.size() - labelled, distances.size()); }
+double SurfaceError::unlabelledShare() const { return shareOf(distances.size() - labelled, distances.size()); }
 
 SurfaceError surfaceError(const TriangleMesh& mesh, const TrueSurface& truth, double density,
                           LabelConfusion* labels) {
