@@ -105,7 +105,9 @@ void SurfaceError::add(const SurfaceError& other) {
 
 double SurfaceError::labelShare() const { return shareOf(label_right, labelled); }
 
-double SurfaceError::unlabelledShare() const { return shareOf(distances.size() - labelled, distances.size()); }
+double SurfaceError::unlabelledShare() const {
+  return shareOf(distances.size() - labelled, distances.size());
+}
 
 SurfaceError surfaceError(const TriangleMesh& mesh, const TrueSurface& truth, double density,
                           LabelConfusion* labels) {
