@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kLowLight = 0.05;           // share of normal light
 constexpr double kLowLightExposure = 0.010;  // s
-constexpr double kClearanceStep = 0.1;            // s between points that furniture keeps clear of
+constexpr double kClearanceStep = 0.1;       // s between points that furniture keeps clear of
 constexpr double kSharpTime = 1e-9;          // s: image times are multiples of a period to rounding
 
 Rig turnedRig(const Rig& rig, const SimulationSettings& settings) {
