@@ -1,9 +1,10 @@
 #!/bin/sh
-# Everything that can be checked, on a fresh Debian 12 too: the demo, all tests, the accuracy table
-# of every log found, tests under sanitizers, the threads under ThreadSanitizer, a short run of each fuzzer.
-# usage: toolchain/test.sh [--quick | --minutes N]
-#   --quick      leaves sanitizers and fuzzers out
-#   --minutes N  begins no sanitizer's step later than N minutes after the start; what is left out is listed at the end
+# The tests, on a fresh Debian 12 too: the demo, then what guards correctness, in 20 minutes on two processors.
+# usage: toolchain/test.sh [--all | --minutes N]
+#   --all        also the long and the sandbox's campaigns, the guides, sanitizers over all rooms, fuzzers: two hours
+#   --minutes N  also sanitizers and fuzzers, each only if it is likely to end within N minutes of the start; what is
+#                left out is listed at the end
+# Sets are CTest labels; docs/building.md says which test is in which.
 # The release build has ROS 2's topics (SWIFTLET_WITH_DDS, off by default) where Cyclone DDS is installed.
 # SWIFTLET_DATA names the folder of recorded logs (default ../shared/data); without logs the tests
 # that need them say so and skip. Ends with a table of steps and a count of tests; exit code 0 when
@@ -11,24 +12,20 @@
 set -u
 cd "$(dirname "$0")/.." || exit 2
 
-quick=no
-minutes=''
+all_sets=no
+minutes=0
 case ${1:-} in
   '') ;;
-  --quick) quick=yes ;;
+  --all) all_sets=yes ;;
   --minutes) minutes=${2:?how many} ;;
   *)
-    sed -n '2,10s/^# \{0,1\}//p' "$0"
+    sed -n '2,12s/^# \{0,1\}//p' "$0"
     exit 2
     ;;
 esac
 
-fuzz_seconds=15 # each fuzzer
-# Unit tests that run under sanitizers too; the statistical ones (imu, ransac, whole flights, rendering, the program)
-# repeat the same code thousands of times and would take most of an hour there.
-sanitized='autopilot core geometry camera frontend smoother drivers_calibration drivers_recorded drivers_recording drivers_image_decoder
-drivers_can drivers_device drivers_gpio drivers_mavlink drivers_serial drivers_v4l2 fault_timeline follower live map mesher run_files
-supervisor threaded view'
+fuzz_seconds=15        # each fuzzer
+beyond='long|campaign|guide' # labels of what only --all runs
 # What shares memory between threads, the threads of devices, autopilot and viewers, and the whole executor on a second
 # of a log.
 threads='added_node autopilot core follower late_labels live realtime supervisor threaded view'
@@ -102,9 +99,9 @@ accuracy() { # one more test; none on a machine without logs, which the table sa
   [ $code -eq 77 ] || counted test $code -eq 0
 }
 
-in_time() { # name of what begins now
-  if [ -z "$minutes" ] || [ $(($(date +%s) - began)) -lt $((60 * minutes)) ]; then return 0; fi
-  left_out="$left_out$1; "
+in_time() { # name of what begins now, the minutes that it takes on two processors
+  if [ $all_sets = yes ] || [ $(($(date +%s) - began)) -lt $((60 * (minutes - $2))) ]; then return 0; fi
+  if [ "$minutes" -gt 0 ]; then left_out="$left_out$1; "; fi
   return 1
 }
 
@@ -123,7 +120,7 @@ close() {
     skipped=$(toolchain/skipped.sh build/release build/ctest_release.log)
     if [ -n "$skipped" ]; then printf 'SKIPPED, which counts as nothing:\n%s\n' "$skipped"; fi
   fi
-  if [ -n "$left_out" ]; then echo "NOT RUN, out of time (toolchain/test.sh runs them): $left_out"; fi
+  if [ -n "$left_out" ]; then echo "NOT RUN, out of time (toolchain/test.sh --all runs them): $left_out"; fi
   all=$((passed + failed))
   percent=0
   if [ $all -gt 0 ]; then percent=$((100 * passed / all)); fi
@@ -142,22 +139,22 @@ step "configure release" configure release -DSWIFTLET_BUILD_TESTS=ON -DSWIFTLET_
 step "build release with tests" build release || close
 step "layout of the sources" counted toolchain/lint.sh format
 # The accuracy table is run by itself, so that it is printed when it passes too.
-# Every fault of every thread takes minutes (label long): ctest -L long.
-step "tests" run_ctest release -E '^accuracy_table$' -LE long
+step "tests" run_ctest release -E '^accuracy_table$' -LE "^($beyond)\$"
 step "accuracy of all logs found" accuracy
 
-if [ $quick = no ]; then
-  # shellcheck disable=SC2086 # a list of targets
-  in_time "tests with address and undefined sanitizers, fuzzers" &&
-    step "configure with sanitizers" configure asan -DSWIFTLET_BUILD_TESTS=ON &&
-    step "build with sanitizers" build asan --target fuzzers $(echo $sanitized | sed 's/\([^ ]*\)/test_\1/g') && {
-      step "tests with sanitizers" run_ctest asan -R "^($(echo $sanitized | tr ' ' '|'))\$"
-      step "fuzzers" counted toolchain/fuzz.sh $fuzz_seconds
-    }
-  # shellcheck disable=SC2086 # a list of targets
-  in_time "threads with the thread sanitizer" &&
-    step "configure for data races" configure tsan -DSWIFTLET_BUILD_TESTS=ON &&
-    step "build for data races" build tsan --target $(echo $threads | sed 's/\([^ ]*\)/test_\1/g') &&
-    step "threads without data races" run_ctest tsan -R "^($(echo $threads | tr ' ' '|'))\$"
+if [ $all_sets = yes ]; then
+  step "programs run by hand" build release --target by_hand
+  step "long statistics, the sandbox's campaign, guides" run_ctest release -L "^($beyond)\$"
 fi
+# shellcheck disable=SC2086 # a list of targets
+in_time "threads with the thread sanitizer" 15 &&
+  step "configure for data races" configure tsan -DSWIFTLET_BUILD_TESTS=ON &&
+  step "build for data races" build tsan --target $(echo $threads | sed 's/\([^ ]*\)/test_\1/g') &&
+  step "threads without data races" run_ctest tsan -R "^($(echo $threads | tr ' ' '|'))\$" -LE "^($beyond)\$"
+in_time "tests with address and undefined sanitizers, fuzzers" 45 &&
+  step "configure with sanitizers" configure asan -DSWIFTLET_BUILD_TESTS=ON &&
+  step "build with sanitizers" build asan && {
+    step "tests with sanitizers" run_ctest asan -LE "^($beyond)\$"
+    step "fuzzers" counted toolchain/fuzz.sh $fuzz_seconds
+  }
 close
