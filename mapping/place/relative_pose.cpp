@@ -136,6 +136,7 @@ struct System {
   double cost = 0;
   double chi_squared = 0;
   double dof = 0;
+  int equations = 0;  ///< as dof, whatever the weights
   std::size_t used = 0;
 };
 
@@ -163,6 +164,7 @@ void addMatch(const Eigen::Matrix3d& R_new_old, const Eigen::Vector3d& t, double
   system.cost += huberCost(m.chi_squared, threshold);
   system.chi_squared += weight * m.chi_squared;
   system.dof += weight * m.dof();
+  system.equations += m.dof();
   ++system.used;
 }
 
@@ -229,7 +231,8 @@ Status refineRelativePose(const RelativePoseSettings& settings, std::span<Matche
   dropBehind(points);
   System system = assemble(T, settings.huber, points);
   for (; fit.steps < settings.steps; ++fit.steps) {
-    if (system.dof < 6) return {StatusCode::kDegenerate, "relative pose: too few matches"};
+    // Far from the solution all weights are small: they say nothing yet.
+    if (system.equations < 6) return {StatusCode::kDegenerate, "relative pose: too few matches"};
     const Eigen::LDLT<Matrix6d> solver(system.H);
     if (solver.info() != Eigen::Success || !solver.isPositive()) {
       return {StatusCode::kDegenerate, "relative pose: the matches do not determine it"};
@@ -248,6 +251,7 @@ Status refineRelativePose(const RelativePoseSettings& settings, std::span<Matche
     system = assemble(T, settings.huber, points);
     if (step.head<3>().norm() < settings.converged && step.tail<3>().norm() < settings.converged) break;
   }
+  if (system.dof < 6) return {StatusCode::kDegenerate, "relative pose: too few matches agree"};
   T_old_new = T;
   fit.information = system.H;
   fit.chi_squared = system.chi_squared;

@@ -152,7 +152,7 @@ std::uint64_t restartsOf(const ReplayResult& result) {
 }  // namespace
 
 TEST_CASE("one sample or image an hour ahead is held out, and nothing else is lost") {
-  const Streams streams = GENERATE(kImu, kCamera0, kCamera1);
+  const Streams streams = GENERATE(values<Streams>({kImu, kCamera0, kCamera1}));
   const ScratchFolder folder("stamps_one");
   // Around one message: half a width is less than half a period.
   const double half = streams == kImu ? 0.002 : 0.02;
@@ -168,15 +168,15 @@ TEST_CASE("one sample or image an hour ahead is held out, and nothing else is lo
 }
 
 TEST_CASE("the log's first messages an hour ahead are got over") {
-  const Streams streams = GENERATE(kImu, kCamera0, kCamera1, kAll);
+  const Streams streams = GENERATE(values<Streams>({kImu, kCamera0, kCamera1, kAll}));
   const ScratchFolder folder("stamps_first");
   const ReplayResult result = replayed(folder, {{streams, 0, 0.004, kHour}});
   checkBack(folder, result);
 }
 
 TEST_CASE("one camera's stream an hour ahead and back costs that camera's images, not the estimate") {
-  const Streams streams = GENERATE(kCamera0, kCamera1);
-  const Duration by = GENERATE(kHour, -kHour);
+  const Streams streams = GENERATE(values<Streams>({kCamera0, kCamera1}));
+  const Duration by = GENERATE(values<Duration>({kHour, -kHour}));
   const ScratchFolder folder("stamps_camera");
   const ReplayResult result = replayed(folder, {{streams, 0.7, 2.7, by}});
   checkBack(folder, result);
@@ -196,7 +196,7 @@ TEST_CASE("the IMU's stream an hour ahead and back begins a new epoch, said with
 }
 
 TEST_CASE("all streams back for good begin a new epoch on the new stamps") {
-  const Duration by = GENERATE(-kHour, Duration{-1'000'000'000}, Duration{-300'000'000});
+  const Duration by = GENERATE(values<Duration>({-kHour, {-1'000'000'000}, {-300'000'000}}));
   const ScratchFolder folder("stamps_all");
   const ReplayResult result = replayed(folder, {{kAll, 1.7, kForGood, by}});
   checkBack(folder, result, by);
@@ -213,7 +213,7 @@ TEST_CASE("all streams ahead for good are a gap") {
 
 TEST_CASE("a threaded run whose stamps jump is repeated byte for byte") {
   const Jump jump =
-      GENERATE(Jump{kAll, 1.7, kForGood, Duration{-300'000'000}}, Jump{kCamera0, 0.7, 2.2, kHour});
+      GENERATE(values<Jump>({{kAll, 1.7, kForGood, Duration{-300'000'000}}, {kCamera0, 0.7, 2.2, kHour}}));
   const ScratchFolder folder("stamps_threaded");
   recordWithJumps(folder.file("log"), {jump});
   ReplayRequest request;

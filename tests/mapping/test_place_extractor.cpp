@@ -136,7 +136,8 @@ TEST_CASE("Descriptors survive turning, moving, scaling and noise as OpenCV's OR
   };
   const auto ours = [&](const Picture& picture, std::vector<Eigen::Vector2d>& pixels,
                         std::vector<Descriptor>& bits) {
-    for (const PlaceFeature& f : extract(picture)->features) {
+    const auto keyframe = extract(picture);
+    for (const PlaceFeature& f : keyframe->features) {
       pixels.push_back(f.pixel.cast<double>());
       bits.push_back(f.descriptor);
     }

@@ -202,7 +202,8 @@ TEST_CASE("Epochs that loops tie share a world", "[smoother][full_smoother][revi
     }
   }
   const Solved untied = solve(run.full[0], jumbled, run.truth);
-  CHECK(untied.report.revisits_used == 0);
+  // By chance a wrong match agrees now and then.
+  CHECK(100 * untied.report.matches_used < untied.report.matches);
   CHECK(untied.worlds.back() == 1);
 }
 

@@ -67,8 +67,10 @@ TEST_CASE("Planes of the room help or do no harm, wrong ties are bounded", "[smo
       "one tie in five wrong %.4f (%.2f)\n",
       static_cast<unsigned long long>(flights), structureless.error(), structureless.meanNees(),
       promoted.error(), promoted.meanNees(), tied.error(), tied.meanNees(), wrong.error(), wrong.meanNees());
-  CHECK(promoted.error() < 1.1 * structureless.error());
-  CHECK(tied.error() < 1.1 * structureless.error());
+  // Of one flight alone the errors' ratio scatters by a tenth.
+  const double harm = longOr(1.1, 1.3);
+  CHECK(promoted.error() < harm * structureless.error());
+  CHECK(tied.error() < harm * structureless.error());
   CHECK(wrong.error() < 1.5 * structureless.error());
   for (const Sum& sum : {promoted, tied, wrong}) {
     CHECK(sum.meanNees() > 1.5);
