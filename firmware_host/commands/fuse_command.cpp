@@ -2,10 +2,9 @@
 
 #include <memory>
 
-#include "drivers/calibration/input_error.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
-#include "firmware_host/commands/stop_signal.hpp"
+#include "firmware_host/commands/log_options.hpp"
 #include "firmware_host/lab/modules/fuse_run.hpp"
 
 namespace swiftlet {
@@ -14,8 +13,7 @@ namespace {
 struct FuseOptions {
   FuseRequest request;
   SettingsOptions settings;
-  std::vector<std::string> calibration;
-  double until = -1;
+  LogCommandOptions log;
 };
 
 void printFusion(const nlohmann::ordered_json& summary) {
@@ -35,14 +33,7 @@ void printFusion(const nlohmann::ordered_json& summary) {
 
 int fuse(const FuseOptions& options) {
   FuseRequest request = options.request;
-  request.stop = &stopOnSignal();
-  request.show_progress = true;
-  if (options.until >= 0) request.until = options.until;
-  if (!options.calibration.empty()) request.calibration = options.calibration[0];
-  if (options.calibration.size() > 1) request.imu_calibration = options.calibration[1];
-  if (request.until && *request.until < request.from) {
-    throw InputError("--until", 0, "", "the section ends before it begins", "Give an --until after --from");
-  }
+  options.log.fill(request);
   const FuseRunResult result = runFuse(request, options.settings.read());
   printFusion(result.summary);
   fmt::print("written to {}\n", request.out);
@@ -90,14 +81,8 @@ void addFuseCommand(CLI::App& app, int& exit_code) {
                    "Poses are interpolated between neighbours at most this far apart [s]")
       ->check(positive())
       ->capture_default_str();
-  command
-      ->add_option("--calibration", options->calibration,
-                   "Calibration instead of the log's own: a folder, or Kalibr camchain and IMU files")
-      ->expected(1, 2);
-  command->add_option("--from", request.from, "Start this many seconds after the first image")
-      ->check(nonNegative());
-  command->add_option("--until", options->until, "End this many seconds after the first image")
-      ->check(nonNegative());
+  options->log.addCalibration(*command);
+  options->log.addSection(*command, request);
   options->settings.addTo(*command);
   command->footer(
       "Example:\n  swiftlet fuse data/vil_v102 --out map_v102\n"

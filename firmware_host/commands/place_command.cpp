@@ -4,7 +4,7 @@
 
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
-#include "firmware_host/commands/stop_signal.hpp"
+#include "firmware_host/commands/log_options.hpp"
 #include "firmware_host/lab/modules/place_run.hpp"
 #include "mapping/place/place_database.hpp"
 
@@ -14,7 +14,7 @@ namespace {
 struct PlaceOptions {
   PlaceRequest request;
   SettingsOptions settings;
-  std::vector<std::string> calibration;
+  LogCommandOptions log;
 };
 
 std::string shareText(const nlohmann::ordered_json& share) {
@@ -47,10 +47,7 @@ void printPlaces(const nlohmann::ordered_json& summary) {
 
 int place(const PlaceOptions& options) {
   PlaceRequest request = options.request;
-  request.stop = &stopOnSignal();
-  request.show_progress = true;
-  if (!options.calibration.empty()) request.calibration = options.calibration[0];
-  if (options.calibration.size() > 1) request.imu_calibration = options.calibration[1];
+  options.log.fill(request);
   const PlaceRunResult result = runPlace(request, options.settings.read());
   printPlaces(result.summary);
   fmt::print("written to {}\n", request.out);
@@ -70,7 +67,7 @@ void addPlaceCommand(CLI::App& app, int& exit_code) {
   request.out = "place";
   command
       ->add_option(
-          "LOG", request.input,
+          "LOG", request.log,
           "EuRoC/ASL folder, a recorded run, a ROS 1 bag where supported; or a plain folder of images")
       ->required();
   command->add_option("--trajectory", request.trajectory,
@@ -78,10 +75,7 @@ void addPlaceCommand(CLI::App& app, int& exit_code) {
   command->add_option("--out", request.out, "Folder to write")->capture_default_str();
   command->add_option("--vocabulary", request.vocabulary,
                       "Words: compact, ORBvoc.txt or DBoW2 YAML (.gz); default: loop.vocabulary");
-  command
-      ->add_option("--calibration", options->calibration,
-                   "Calibration instead of the log's own: a folder, or Kalibr camchain and IMU files")
-      ->expected(1, 2);
+  options->log.addCalibration(*command);
   command->add_option("--candidates", request.candidates, "Earlier images given for each, at most")
       ->check(CLI::Range(1, static_cast<int>(kMaxPlaceCandidates)))
       ->capture_default_str();

@@ -3,11 +3,10 @@
 #include <filesystem>
 #include <memory>
 
-#include "drivers/calibration/input_error.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/lab_commands.hpp"
-#include "firmware_host/commands/stop_signal.hpp"
+#include "firmware_host/commands/log_options.hpp"
 #include "firmware_host/commands/view_option.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"
 #include "firmware_host/realtime/console.hpp"
@@ -19,9 +18,8 @@ namespace {
 struct ReplayOptions {
   ReplayRequest request;
   SettingsOptions settings;
-  std::vector<std::string> calibration;
+  LogCommandOptions log;
   ViewOption view;
-  double until = -1;
 };
 
 std::string accuracyLine(const nlohmann::ordered_json& summary, const char* file, const char* section) {
@@ -44,16 +42,9 @@ std::string sameStampsLine(const nlohmann::ordered_json& accuracy) {
 
 int replay(const ReplayOptions& options) {
   ReplayRequest request = options.request;
-  request.stop = &stopOnSignal();
-  request.show_progress = true;
+  options.log.fill(request);
   request.accuracy = labAccuracy();
   request.view = options.view.read();
-  if (options.until >= 0) request.until = options.until;
-  if (!options.calibration.empty()) request.calibration = options.calibration[0];
-  if (options.calibration.size() > 1) request.imu_calibration = options.calibration[1];
-  if (request.until && *request.until < request.from) {
-    throw InputError("--until", 0, "", "the section ends before it begins", "Give an --until after --from");
-  }
   const ReplayResult result = runReplay(request, options.settings.read());
   say(summaryText(result.summary));
   if (result.summary.contains("accuracy")) {
@@ -94,15 +85,9 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
   command->add_flag("--replace", request.replace,
                     "Replace a flight's files, or files that no run wrote, in the folder of --out");
   command->add_flag("--mono", request.mono, "Camera 0 alone");
-  command
-      ->add_option("--calibration", options->calibration,
-                   "Calibration instead of the log's own: a folder, or Kalibr camchain and IMU files")
-      ->expected(1, 2);
+  options->log.addCalibration(*command);
   command->add_option("--tracks", request.tracks, "File of feature tracks in place of the log's images");
-  command->add_option("--from", request.from, "Start this many seconds after the first image")
-      ->check(nonNegative());
-  command->add_option("--until", options->until, "End this many seconds after the first image")
-      ->check(nonNegative());
+  options->log.addSection(*command, request);
   command->add_flag("--imu-rate", request.imu_rate, "Also write imu_rate.tum, the state at every IMU sample");
   command->add_flag("--mesh-sequence", request.mesh_sequence,
                     "Also write meshes/, the mesh of every frame and that over the horizon at keyframes");

@@ -3,19 +3,6 @@
 #include "firmware_host/graph/sensor_node.hpp"
 
 namespace swiftlet {
-namespace {
-
-PairingSettings pairingSettings(const GraphContext& context) {
-  const Settings& settings = context.settings;
-  PairingSettings result;
-  result.cameras = context.rig.camera_count;
-  result.tolerance = Duration::fromSeconds(settings.pairing.tolerance_ms * 1e-3);
-  result.patience = Duration::fromSeconds(settings.pairing.patience_ms * 1e-3);
-  return result;
-}
-
-}  // namespace
-
 FrameQueue::FrameQueue(Node& track, const GraphContext& context, const SensorNode& sensors)
     : images{ImageIn(track, "camera_0_dropped", Arrow::kWakes),
              ImageIn(track, "camera_1_dropped", Arrow::kWakes)},
@@ -23,7 +10,7 @@ FrameQueue::FrameQueue(Node& track, const GraphContext& context, const SensorNod
       cameras_(context.rig.camera_count),
       sample_patience_(context.options.sample_patience),
       sample_period_(Duration::fromSeconds(context.noise.rate_hz > 0 ? 1 / context.noise.rate_hz : 0)),
-      pairing_(pairingSettings(context)) {}
+      pairing_(context.settings.pairing.of(context.rig.camera_count)) {}
 
 Stamp FrameQueue::newestSample() const { return sensors_.newestSample(); }
 

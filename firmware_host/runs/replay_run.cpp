@@ -26,16 +26,6 @@
 namespace swiftlet {
 namespace {
 
-LogOptions logOptions(const ReplayRequest& request, const Settings& settings) {
-  LogOptions options;
-  options.calibration = request.calibration;
-  options.imu_calibration = request.imu_calibration;
-  options.calibration_options.accept_unusual_rig = settings.calibration.accept_unusual_rig;
-  options.mono = request.mono;
-  options.without_images = !request.tracks.empty();
-  return options;
-}
-
 /// Reads the whole file once, so that a bad one is refused before anything is written.
 TrackFileFacts checkTracks(const std::string& path, const Rig& rig, bool mono) {
   const TrackFileFacts facts = surveyTrackFile(path);
@@ -73,7 +63,8 @@ class ReplayRun {
 
  private:
   void open() {
-    const LogOptions options = logOptions(request_, settings_);
+    LogOptions options = request_.options(settings_);
+    options.without_images = !request_.tracks.empty();
     if (request_.reproduce) {
       std::unique_ptr<RecordingSource> recording = openRecording(request_.log, options);
       recording_ = recording.get();
@@ -173,8 +164,7 @@ class ReplayRun {
     wanted.drag = hooks_.drag;
     if (scenes_) wanted.depth_sensor = scenes_->depthSensor();
     wanted.confusion = confusion_;
-    LogFeed& feed = feed_.emplace(*source_, LogSection{request_.from, request_.until, request_.last_stamp},
-                                  tracks_.get(), scenes_ ? &*scenes_ : nullptr);
+    LogFeed& feed = feed_.emplace(*source_, request_.section(), tracks_.get(), scenes_ ? &*scenes_ : nullptr);
     if (request_.real_time) {
       FlightRequest flight;
       flight.speed = request_.speed;

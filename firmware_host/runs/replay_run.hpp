@@ -2,16 +2,14 @@
 // A replay as a function: log and settings in, run folder and summary out. What `swiftlet replay` and
 // the tests on whole logs call.
 
-#include <atomic>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
-#include "drivers/recorded/log_source.hpp"
+#include "firmware_host/inputs/log/log_request.hpp"
 #include "firmware_host/interfaces/run_listener.hpp"
 #include "firmware_host/outputs/view/view_address.hpp"
-#include "firmware_host/settings/settings.hpp"
 #include "firmware_host/supervisor/verdict.hpp"
 
 namespace swiftlet {
@@ -21,14 +19,10 @@ using AccuracyOfRun = std::function<nlohmann::ordered_json(const std::string& fo
                                                            const std::string& truth_name, Stamp first_image,
                                                            const EvaluationGroup& settings)>;
 
-struct ReplayRequest {
-  std::string log;
+struct ReplayRequest : LogRequest {
   std::string out;
-  bool replace = false;         ///< files of a flight, or of no run, in `out` too
-  std::string calibration;      ///< instead of the log's own; empty: the log's
-  std::string imu_calibration;  ///< Kalibr's IMU file where it is not beside the camchain
-  std::string tracks;           ///< file of feature tracks in place of the log's images or own tracks
-  bool mono = false;
+  bool replace = false;  ///< files of a flight, or of no run, in `out` too
+  std::string tracks;    ///< file of feature tracks in place of the log's images or own tracks
   bool imu_rate = false;
   bool mesh_sequence = false;       ///< write the meshes of all frames to `meshes/`
   bool loop_closure = false;        ///< recognize places; sets loop.enabled
@@ -38,11 +32,6 @@ struct ReplayRequest {
   std::optional<ViewAddress> view;  ///< real_time: serve the live view there
   bool record = false;              ///< write `recording/` into the run folder
   bool reproduce = false;  ///< `log` is a recording: repeat its threaded run step by step, with its settings
-  double from = 0;         ///< s after the first image
-  std::optional<double> until;  ///< s after the first image
-  std::optional<Stamp> last_stamp;
-  const std::atomic<bool>* stop = nullptr;
-  bool show_progress = false;
   AccuracyOfRun accuracy;  ///< of a log with truth (lab/evaluation/evaluate_run.hpp); empty: none is made
 };
 

@@ -8,6 +8,7 @@
 
 #include "estimator/messages/effort.hpp"
 #include "estimator/odometry/odometry_settings.hpp"
+#include "estimator/odometry/pairing.hpp"
 #include "firmware_host/settings/device_settings.hpp"
 #include "mapping/loop/loop_settings.hpp"
 #include "mapping/map/map_settings.hpp"
@@ -17,6 +18,14 @@ namespace swiftlet {
 struct PairingGroup {
   double tolerance_ms = 2.5;
   double patience_ms = 50;
+
+  [[nodiscard]] PairingSettings of(std::size_t cameras) const {
+    PairingSettings result;
+    result.cameras = cameras;
+    result.tolerance = Duration::fromSeconds(tolerance_ms * 1e-3);
+    result.patience = Duration::fromSeconds(patience_ms * 1e-3);
+    return result;
+  }
 };
 
 struct CalibrationGroup {

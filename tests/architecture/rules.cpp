@@ -53,7 +53,7 @@ RoomTable programNeighbours() {
       {"supervisor", {"realtime"}},
       {"interfaces", {"supervisor"}},
       {"smoothing", {"files", "interfaces"}},
-      {"inputs/log", {"interfaces"}},
+      {"inputs/log", {"interfaces", "settings"}},
       {"inputs/devices", {"interfaces", "settings"}},
       {"inputs/vocabulary", {"files"}},
       {"graph", {"settings", "smoothing"}},

@@ -26,9 +26,12 @@ TEST_CASE("given poses are interpolated, but not across gaps and jumps") {
     point.T_world_body = poseAlongX(i < 15 ? t : t + 10);  // a jump of 10 m
     trajectory.push_back(point);
   }
-  const GivenPoses poses(trajectory, Duration::fromMilliseconds(100));
-  CHECK(poses.jumps() == 1);
-  CHECK(poses.firstJump() == trajectory[15].stamp);
+  const GivenPoses poses({"truth.csv", trajectory}, Duration::fromMilliseconds(100));
+  LogWarnings warnings;
+  poses.warnOfJumps("nothing goes on", warnings);
+  REQUIRE(warnings.lines().size() == 1);
+  CHECK(warnings.lines()[0] == "truth.csv: the poses jump 1 times, first at " +
+                                   formatSeconds(trajectory[15].stamp) + ": nothing goes on");
   REQUIRE(poses.at(at(0.22)));
   CHECK(poses.at(at(0.22))->T_world_body.translation.x() == Approx(0.22));
   CHECK(poses.at(at(0.22))->piece == 0);

@@ -8,17 +8,11 @@
 
 #include "drivers/recorded/depth_images.hpp"
 #include "drivers/recorded/label_images.hpp"
-#include "drivers/recorded/open_log.hpp"
 #include "estimator/core/units.hpp"
-#include "estimator/odometry/odometry_inputs.hpp"
-#include "estimator/odometry/pairing.hpp"
 #include "firmware_host/files/line_file.hpp"
-#include "firmware_host/inputs/log/log_feed.hpp"
-#include "firmware_host/lab/modules/given_poses.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"
 #include "firmware_host/outputs/map_files/map_output.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"
-#include "firmware_host/realtime/progress.hpp"
 #include "firmware_host/settings/confusion_file.hpp"
 #include "firmware_host/settings/moving_labels.hpp"
 #include "mapping/map/map_stage.hpp"
@@ -53,14 +47,6 @@ Json timingJson(const MapTimes& times) {
   return json;
 }
 
-LogOptions logOptions(const FuseRequest& request, const Settings& settings) {
-  LogOptions options;
-  options.calibration = request.calibration;
-  options.imu_calibration = request.imu_calibration;
-  options.calibration_options.accept_unusual_rig = settings.calibration.accept_unusual_rig;
-  return options;
-}
-
 /// Given poses stay as they are.
 Settings withoutCorrection(Settings settings) {
   settings.map_stage.keyframes_mib = 0;
@@ -73,28 +59,24 @@ class FuseRun {
   FuseRun(const FuseRequest& request, const Settings& settings)
       : request_(request),
         settings_(withoutCorrection(settings)),
-        source_(openLog(request.log, logOptions(request, settings))),
-        rig_(source_->rig()),
-        depth_(request.log, warnings_, source_->calibration().T_body_filebody),
-        labels_(request.log, {rig_.camera[0].width(), rig_.camera[0].height()}, warnings_) {}
+        log_(request, settings),
+        rig_(log_.rig()),
+        depth_(request.log, log_.warnings(), log_.source().calibration().T_body_filebody),
+        labels_(request.log, {rig_.camera[0].width(), rig_.camera[0].height()}, log_.warnings()) {}
 
   FuseRunResult operator()() {
     begin();
-    run();
-    progress_->finish();
-    if (!poses_out_) failWithoutPose();
+    finished_ = log_.run("fuse", {[this](const StereoFrame& frame) { take(frame); }, {}});
+    if (!poses_out_) log_.failWithoutPose("depth image", moments_ > 0);
     return end();
   }
 
  private:
   void begin();
-  void openPoses();
   void openKept();
-  void run();
   void take(const StereoFrame& frame);
   void takeSensorUntil(Stamp stamp, const StereoFrame* frame);
   void fuse(Stamp stamp, const StereoFrame* frame, const DepthImageView& depth);
-  [[noreturn]] void failWithoutPose() const;
   FuseRunResult end();
   [[nodiscard]] std::string file(const char* name) const {
     return std::filesystem::path(request_.out) / name;
@@ -102,14 +84,10 @@ class FuseRun {
 
   const FuseRequest& request_;
   const Settings settings_;
-  std::unique_ptr<LogSource> source_;
-  Rig rig_;
-  LogWarnings warnings_;
+  PosedLog log_;
+  const Rig& rig_;
   DepthImages depth_;
   LabelImages labels_;
-  std::string poses_name_;
-  std::optional<GivenPoses> poses_;
-  std::optional<Progress> progress_;
   SpilledSurface spilled_{request_.out};
   std::unique_ptr<MapStage> map_;
   std::optional<TumWriter> poses_out_;
@@ -118,25 +96,16 @@ class FuseRun {
   MapTimes times_;
   bool sensor_ = false;
   std::size_t next_depth_ = 0;  ///< row
-  std::optional<Stamp> first_image_, last_image_, last_pair_;
+  bool any_frame_ = false;
+  std::optional<Stamp> last_pair_;
   bool finished_ = true;
   std::uint64_t moments_ = 0, without_pose_ = 0, refused_ = 0, fused_ = 0, labelled_ = 0;
 };
 
-void FuseRun::openPoses() {
-  NamedTrajectory trajectory = openTrajectory(request_.trajectory, request_.log, *source_, warnings_);
-  poses_name_ = trajectory.name;
-  poses_.emplace(std::move(trajectory.poses), Duration::fromSeconds(request_.max_gap));
-  if (poses_->jumps() > 0) {
-    warnings_.add(fmt::format("{}: the poses jump {} times, first at {}: the map begins anew after each",
-                              poses_name_, poses_->jumps(), formatSeconds(poses_->firstJump())));
-  }
-}
-
 void FuseRun::begin() {
   checkMovingLabels(settings_.map_stage);
   const std::optional<ConfusionModel> confusion = confusionOf(settings_);
-  openPoses();
+  log_.poses().warnOfJumps("the map begins anew after each", log_.warnings());
   sensor_ =
       request_.depth == DepthSource::kSensor || (request_.depth == DepthSource::kAny && !depth_.empty());
   if (sensor_ && depth_.empty()) {
@@ -156,9 +125,6 @@ void FuseRun::begin() {
   }
   if (confusion) map_->setConfusion(*confusion);
   openKept();
-  for (const std::string& line : source_->warnings()) fmt::print(stderr, "warning: {}\n", line);
-  for (const std::string& line : warnings_.lines()) fmt::print(stderr, "warning: {}\n", line);
-  progress_.emplace("fuse", request_.show_progress ? source_->imageCount() : 0);
 }
 
 void FuseRun::openKept() {
@@ -174,7 +140,7 @@ void FuseRun::openKept() {
   continued_ = readKeptMapFile(request_.continued, *map_);
   const KeptMapCounts& without = continued_->without_room;
   if (without.blocks + without.free_blocks + without.patches > 0) {
-    warnings_.add(fmt::format(
+    log_.warnings().add(fmt::format(
         "{}: {} of {} blocks, {} of {} free blocks and {} of {} patches have no room and are left "
         "out, the farthest from where the vehicle was last; map.volume_mib and map.surface_mib "
         "give more",
@@ -183,39 +149,13 @@ void FuseRun::openKept() {
   }
 }
 
-void FuseRun::run() {
-  LogFeed feed(*source_, {request_.from, request_.until, std::nullopt}, nullptr);
-  PairingSettings pairing_settings;
-  pairing_settings.cameras = rig_.camera_count;
-  pairing_settings.tolerance = Duration::fromSeconds(settings_.pairing.tolerance_ms * 1e-3);
-  pairing_settings.patience = Duration::fromSeconds(settings_.pairing.patience_ms * 1e-3);
-  Pairing pairing(pairing_settings);
-  StereoFrame frame;
-  for (;;) {
-    if (request_.stop != nullptr && request_.stop->load(std::memory_order_relaxed)) {
-      finished_ = false;
-      return;
-    }
-    const LogFeed::Next next = feed.next();
-    if (next == LogFeed::Next::kEnd) break;
-    if (next == LogFeed::Next::kImage) {
-      if (pairing.push(feed.image(), frame).ok()) take(frame);
-    } else if (next == LogFeed::Next::kSample) {
-      if (pairing.expire(feed.sample().stamp, frame).ok()) take(frame);
-    }
-    progress_->update(feed.taken());
-  }
-  if (pairing.flush(frame).ok()) take(frame);
-}
-
 void FuseRun::take(const StereoFrame& frame) {
-  if (!first_image_) {
-    first_image_ = frame.stamp;
+  if (!any_frame_) {
+    any_frame_ = true;
     // What was measured before the part of the log that is wanted is not.
     while (next_depth_ < depth_.rows().size() && depth_.rows()[next_depth_].stamp < frame.stamp)
       ++next_depth_;
   }
-  last_image_ = frame.stamp;
   if (sensor_) {
     takeSensorUntil(frame.stamp, &frame);
     return;
@@ -238,7 +178,7 @@ void FuseRun::takeSensorUntil(Stamp stamp, const StereoFrame* frame) {
 
 void FuseRun::fuse(Stamp stamp, const StereoFrame* frame, const DepthImageView& depth) {
   ++moments_;
-  const auto pose = poses_->at(stamp);
+  const auto pose = log_.poses().at(stamp);
   if (!pose) {
     ++without_pose_;
     return;
@@ -273,20 +213,6 @@ void FuseRun::fuse(Stamp stamp, const StereoFrame* frame, const DepthImageView& 
   times_.distance.add(measured([&] { map_->updateDistance(vehicle, {}, report_); }).cpu);
 }
 
-void FuseRun::failWithoutPose() const {
-  if (!first_image_ || moments_ == 0) {
-    throw InputError(request_.log, 0, "", "no depth in the part of the log that was asked for",
-                     "Give another --from or --until");
-  }
-  throw InputError(
-      poses_name_, 0, "timestamp",
-      fmt::format("no depth image has a pose: the poses go from {} to {}, the images from {} to {}",
-                  formatSeconds(poses_->begin()), formatSeconds(poses_->end()), formatSeconds(*first_image_),
-                  formatSeconds(*last_image_)),
-      fmt::format("Both need stamps of one clock, and poses at most --max-gap={:g} s apart",
-                  request_.max_gap));
-}
-
 Json countsJson(const KeptMapCounts& counts) {
   return {{"blocks", counts.blocks}, {"free_blocks", counts.free_blocks}, {"patches", counts.patches}};
 }
@@ -298,11 +224,11 @@ FuseRunResult FuseRun::end() {
   json["version"] = versionJson();
   json["run"] = {{"command", "fuse"},
                  {"log", request_.log},
-                 {"trajectory", poses_name_},
+                 {"trajectory", log_.poses().name()},
                  {"depth", sensor_ ? "sensor" : "stereo"},
                  {"finished", finished_},
-                 {"first_image_ns", first_image_->ns},
-                 {"last_image_ns", last_image_->ns}};
+                 {"first_image_ns", log_.first()->ns},
+                 {"last_image_ns", log_.last()->ns}};
   json["moments"] = {{"with_depth", moments_},
                      {"without_pose", without_pose_},
                      {"refused", refused_},
@@ -319,8 +245,7 @@ FuseRunResult FuseRun::end() {
     json["kept"]["file"] = request_.keep;
   }
   json["timing"] = timingJson(times_);
-  json["warnings"] = source_->warnings();
-  for (const std::string& line : warnings_.lines()) json["warnings"].push_back(line);
+  json["warnings"] = log_.warningsJson();
   writeJson(file("summary.json"), json);
   return {json, finished_, json["map"]["mesh"]["faces"].get<std::size_t>() > 0};
 }

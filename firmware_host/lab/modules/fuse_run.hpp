@@ -5,12 +5,11 @@
 // wherever labels exist or `interval` has passed. Moments without a pose are skipped and counted; where the
 // trajectory jumps a new epoch begins, and the volume with it.
 
-#include <atomic>
+#include <cstdint>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 
-#include "firmware_host/settings/settings.hpp"
+#include "firmware_host/lab/modules/posed_log.hpp"
 
 namespace swiftlet {
 
@@ -20,21 +19,12 @@ enum class DepthSource : std::uint8_t {
   kStereo,
 };
 
-struct FuseRequest {
-  std::string log;
-  std::string trajectory;       ///< TUM, EuRoC csv; empty: the log's own truth
-  std::string out;              ///< folder to write
-  std::string keep;             ///< file that the map is kept in; empty: none
-  std::string continued;        ///< kept map to begin with, in whose frame the poses are; empty: a new map
-  std::string calibration;      ///< instead of the log's own; empty: the log's
-  std::string imu_calibration;  ///< Kalibr's IMU file where it is not beside the camchain
+struct FuseRequest : PosedLogRequest {
+  std::string out;        ///< folder to write
+  std::string keep;       ///< file that the map is kept in; empty: none
+  std::string continued;  ///< kept map to begin with, in whose frame the poses are; empty: a new map
   DepthSource depth = DepthSource::kAny;
-  double interval = 0.2;        ///< s between stereo pairs that are matched, where no labels ask for one
-  double max_gap = 0.1;         ///< s between poses, to interpolate
-  double from = 0;              ///< s after the first image
-  std::optional<double> until;  ///< s after the first image
-  const std::atomic<bool>* stop = nullptr;
-  bool show_progress = false;
+  double interval = 0.2;  ///< s between stereo pairs that are matched, where no labels ask for one
 };
 
 struct FuseRunResult {

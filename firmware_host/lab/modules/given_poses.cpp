@@ -1,5 +1,7 @@
 #include "firmware_host/lab/modules/given_poses.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "drivers/calibration/input_error.hpp"
@@ -39,11 +41,27 @@ NamedTrajectory openTrajectory(const std::string& file, const std::string& log, 
   return truth;
 }
 
-GivenPoses::GivenPoses(Trajectory trajectory, Duration max_gap)
-    : trajectory_(std::move(trajectory)), max_gap_(max_gap) {
+GivenPoses::GivenPoses(NamedTrajectory trajectory, Duration max_gap)
+    : name_(std::move(trajectory.name)), trajectory_(std::move(trajectory.poses)), max_gap_(max_gap) {
   for (std::size_t i = 1; i < trajectory_.size(); ++i) {
     if (isJump(trajectory_[i - 1], trajectory_[i])) jumps_.push_back(i);
   }
+}
+
+void GivenPoses::warnOfJumps(const char* what, LogWarnings& warnings) const {
+  if (jumps_.empty()) return;
+  warnings.add(fmt::format("{}: the poses jump {} times, first at {}: {}", name_, jumps_.size(),
+                           formatSeconds(trajectory_[jumps_.front()].stamp), what));
+}
+
+void GivenPoses::failWithout(const char* what, Stamp first, Stamp last) const {
+  throw InputError(
+      name_, 0, "timestamp",
+      fmt::format("no {} has a pose: the poses go from {} to {}, the images from {} to {}", what,
+                  formatSeconds(trajectory_.front().stamp), formatSeconds(trajectory_.back().stamp),
+                  formatSeconds(first), formatSeconds(last)),
+      fmt::format("Both need stamps of one clock, and poses at most --max-gap={:g} s apart",
+                  max_gap_.seconds()));
 }
 
 std::optional<GivenPoses::Pose> GivenPoses::at(Stamp stamp) const {

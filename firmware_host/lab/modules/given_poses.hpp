@@ -33,16 +33,18 @@ class GivenPoses {
     std::size_t piece = 0;  ///< counts the jumps before it
   };
 
-  GivenPoses(Trajectory trajectory, Duration max_gap);
+  GivenPoses(NamedTrajectory trajectory, Duration max_gap);
+
+  [[nodiscard]] const std::string& name() const { return name_; }
 
   [[nodiscard]] std::optional<Pose> at(Stamp stamp) const;
-  [[nodiscard]] std::size_t jumps() const { return jumps_.size(); }
-  /// Of the first pose after the first jump; meaningful with jumps.
-  [[nodiscard]] Stamp firstJump() const { return trajectory_[jumps_.front()].stamp; }
-  [[nodiscard]] Stamp begin() const { return trajectory_.front().stamp; }
-  [[nodiscard]] Stamp end() const { return trajectory_.back().stamp; }
+  /// Where the poses jump: how often, and `what` each jump does.
+  void warnOfJumps(const char* what, LogWarnings& warnings) const;
+  /// Refuses a run in which no `what`, the first and last of which were at these stamps, had a pose.
+  [[noreturn]] void failWithout(const char* what, Stamp first, Stamp last) const;
 
  private:
+  std::string name_;
   Trajectory trajectory_;  ///< in time order, not empty
   Duration max_gap_;
   std::vector<std::size_t> jumps_;  ///< indices of the poses that begin a piece, without the first

@@ -1,25 +1,16 @@
 #include "firmware_host/lab/modules/mesh_run.hpp"
 
-#include <fmt/format.h>
-
 #include <filesystem>
 #include <memory>
 
 #include "drivers/recorded/label_images.hpp"
-#include "drivers/recorded/open_log.hpp"
 #include "estimator/core/units.hpp"
 #include "estimator/frontend/frontend.hpp"
-#include "estimator/odometry/odometry_inputs.hpp"
-#include "estimator/odometry/pairing.hpp"
 #include "firmware_host/files/line_file.hpp"
-#include "firmware_host/inputs/log/log_feed.hpp"
 #include "firmware_host/lab/modules/given_pose_window.hpp"
-#include "firmware_host/lab/modules/given_poses.hpp"
 #include "firmware_host/outputs/map_files/mesh_files.hpp"
 #include "firmware_host/outputs/map_files/ply_file.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"
-#include "firmware_host/realtime/console.hpp"
-#include "firmware_host/realtime/progress.hpp"
 #include "mesher/mesh_stage.hpp"
 
 namespace swiftlet {
@@ -81,29 +72,24 @@ Json landmarksJson(const GivenPoseCounters& counters) {
           {"no_fit", counters.no_fit}};
 }
 
-LogOptions logOptions(const MeshRequest& request, const Settings& settings) {
-  LogOptions options;
-  options.calibration = request.calibration;
-  options.imu_calibration = request.imu_calibration;
-  options.calibration_options.accept_unusual_rig = settings.calibration.accept_unusual_rig;
-  options.mono = request.mono || !settings.odometry.use_stereo;
-  return options;
+MeshRequest inUse(MeshRequest request, const Settings& settings) {
+  request.mono = request.mono || !settings.odometry.use_stereo;
+  return request;
 }
 
 /// What one run is made of, from opening to the summary.
 class MeshRun {
  public:
   MeshRun(const MeshRequest& request, const Settings& settings)
-      : request_(request),
-        settings_(settings),
-        source_(openLog(request.log, logOptions(request, settings))),
-        rig_(rigInUse(source_->rig(), settings.odometry)) {}
+      : request_(inUse(request, settings)), settings_(settings), log_(request_, settings), rig_(log_.rig()) {}
 
   MeshRunResult operator()() {
     begin();
-    run();
-    progress_->finish();
-    if (!output_) failWithoutPose();
+    finished_ = log_.run("mesh", {[this](const StereoFrame& frame) { take(frame); },
+                                  [this](const TrackedFrame& tracks) {
+                                    if (const auto pose = poseAt(tracks.stamp)) mesh(tracks, *pose, {});
+                                  }});
+    if (!output_) log_.failWithoutPose("image", frames_ > 0);
     return end();
   }
 
@@ -123,29 +109,22 @@ class MeshRun {
   };
 
   void begin();
-  void run();
   void take(const StereoFrame& frame);
   void mesh(const TrackedFrame& tracked, const GivenPoses::Pose& pose, const ImageView& image);
   void step(Mesher& mesher, const TrackedFrame& tracked, const SE3& T_world_body, const MeshInput& views);
   std::optional<GivenPoses::Pose> poseAt(Stamp stamp);
   void noteJump(std::size_t piece);
-  [[noreturn]] void failWithoutPose() const;
   [[nodiscard]] Json timingsJson() const;
   MeshRunResult end();
   [[nodiscard]] std::string file(const char* name) const {
     return std::filesystem::path(request_.out) / name;
   }
 
-  const MeshRequest& request_;
+  const MeshRequest request_;
   const Settings& settings_;
-  std::unique_ptr<LogSource> source_;
-  Rig rig_;
-  LogWarnings warnings_;
-  std::string poses_name_;
-  std::optional<GivenPoses> poses_;
-  std::unique_ptr<TrackReader> tracks_;
+  PosedLog log_;
+  const Rig& rig_;
   std::optional<LabelImages> labels_;
-  std::optional<Progress> progress_;
   std::unique_ptr<Frontend> frontend_;
   std::unique_ptr<Mesher> local_, complete_;
   FrontendPrediction prediction_;
@@ -155,29 +134,14 @@ class MeshRun {
   bool finished_ = true;
   bool has_mesh_ = false;
   std::size_t piece_ = 0;
-  std::optional<Stamp> first_image_, last_image_;
   std::uint64_t frames_ = 0, without_pose_ = 0, refused_ = 0, meshed_ = 0, keyframes_ = 0, jumps_ = 0,
                 labelled_ = 0;
 };
 
 void MeshRun::begin() {
-  NamedTrajectory trajectory = openTrajectory(request_.trajectory, request_.log, *source_, warnings_);
-  poses_name_ = trajectory.name;
-  poses_.emplace(std::move(trajectory.poses), Duration::fromSeconds(request_.max_gap));
-  if (poses_->jumps() > 0) {
-    warnings_.add(fmt::format("{}: the poses jump {} times, first at {}: a new mesh begins after each",
-                              poses_name_, poses_->jumps(), formatSeconds(poses_->firstJump())));
-  }
-  std::size_t steps = source_->imageCount();
-  if (!source_->trackFile().empty()) {
-    steps = surveyTrackFile(source_->trackFile()).frames;
-    tracks_ = std::make_unique<TrackReader>(source_->trackFile());
-  } else {
-    frontend_ = std::make_unique<Frontend>(rig_, FrontendSettings{});
-  }
-  labels_.emplace(request_.log, ImageSize{rig_.camera[0].width(), rig_.camera[0].height()}, warnings_);
-  warnAll(source_->warnings());
-  warnAll(warnings_.lines());
+  log_.poses().warnOfJumps("a new mesh begins after each", log_.warnings());
+  if (!log_.hasTracks()) frontend_ = std::make_unique<Frontend>(rig_, FrontendSettings{});
+  labels_.emplace(request_.log, ImageSize{rig_.camera[0].width(), rig_.camera[0].height()}, log_.warnings());
   local_ = std::make_unique<Mesher>(
       rig_, windowSettings(settings_, false), HorizonLimits{},
       MeshPlanes{settings_.odometry.regularity_enabled, settings_.odometry.plane_point_sigma});
@@ -185,41 +149,11 @@ void MeshRun::begin() {
     complete_ =
         std::make_unique<Mesher>(rig_, windowSettings(settings_, true), completeLimits(), MeshPlanes{});
   }
-  progress_.emplace("mesh", request_.show_progress ? steps : 0);
-}
-
-void MeshRun::run() {
-  LogFeed feed(*source_, {request_.from, request_.until, std::nullopt}, tracks_.get());
-  PairingSettings pairing_settings;
-  pairing_settings.cameras = rig_.camera_count;
-  pairing_settings.tolerance = Duration::fromSeconds(settings_.pairing.tolerance_ms * 1e-3);
-  pairing_settings.patience = Duration::fromSeconds(settings_.pairing.patience_ms * 1e-3);
-  Pairing pairing(pairing_settings);
-  StereoFrame frame;
-  for (;;) {
-    if (request_.stop != nullptr && request_.stop->load(std::memory_order_relaxed)) {
-      finished_ = false;
-      return;
-    }
-    const LogFeed::Next next = feed.next();
-    if (next == LogFeed::Next::kEnd) break;
-    if (next == LogFeed::Next::kTracks) {
-      if (const auto pose = poseAt(feed.tracks().stamp)) mesh(feed.tracks(), *pose, {});
-    } else if (next == LogFeed::Next::kImage) {
-      if (pairing.push(feed.image(), frame).ok()) take(frame);
-    } else if (pairing.expire(feed.sample().stamp, frame).ok()) {
-      take(frame);
-    }
-    progress_->update(feed.taken());
-  }
-  if (pairing.flush(frame).ok()) take(frame);
 }
 
 std::optional<GivenPoses::Pose> MeshRun::poseAt(Stamp stamp) {
   ++frames_;
-  if (!first_image_) first_image_ = stamp;
-  last_image_ = stamp;
-  const auto pose = poses_->at(stamp);
+  const auto pose = log_.poses().at(stamp);
   if (!pose) ++without_pose_;
   return pose;
 }
@@ -277,19 +211,6 @@ void MeshRun::step(Mesher& mesher, const TrackedFrame& tracked, const SE3& T_wor
   (tracked.keyframe ? mesher.keyframe_times : mesher.frame_times).add(spent.cpu);
 }
 
-void MeshRun::failWithoutPose() const {
-  if (!first_image_) {
-    throw InputError(request_.log, 0, "", "no image in the part of the log that was asked for",
-                     "Give another --from or --until");
-  }
-  throw InputError(poses_name_, 0, "timestamp",
-                   fmt::format("no image has a pose: the poses go from {} to {}, the images from {} to {}",
-                               formatSeconds(poses_->begin()), formatSeconds(poses_->end()),
-                               formatSeconds(*first_image_), formatSeconds(*last_image_)),
-                   fmt::format("Both need stamps of one clock, and poses at most --max-gap={:g} s apart",
-                               request_.max_gap));
-}
-
 Json MeshRun::timingsJson() const {
   Json json;
   json["frames"] = timingJson(local_->frame_times);
@@ -308,11 +229,11 @@ MeshRunResult MeshRun::end() {
   json["version"] = versionJson();
   json["run"] = {{"command", "mesh"},
                  {"log", request_.log},
-                 {"trajectory", poses_name_},
+                 {"trajectory", log_.poses().name()},
                  {"cameras", rig_.camera_count},
                  {"finished", finished_},
-                 {"first_image_ns", first_image_->ns},
-                 {"last_image_ns", last_image_->ns}};
+                 {"first_image_ns", log_.first()->ns},
+                 {"last_image_ns", log_.last()->ns}};
   json["frames"] = {{"images", frames_},       {"without_pose", without_pose_}, {"refused", refused_},
                     {"meshed", meshed_},       {"keyframes", keyframes_},       {"jumps", jumps_},
                     {"with_labels", labelled_}};
@@ -328,8 +249,7 @@ MeshRunResult MeshRun::end() {
                                   {"counters", toJson(complete_->stage->counters(), mesh.counters())}};
   }
   json["timing"] = timingsJson();
-  json["warnings"] = source_->warnings();
-  for (const std::string& line : warnings_.lines()) json["warnings"].push_back(line);
+  json["warnings"] = log_.warningsJson();
   writeJson(file("summary.json"), json);
   return {json, finished_, has_mesh_};
 }

@@ -5,28 +5,16 @@
 // triangulated with the given poses (GivenPoseWindow), and MeshStage steps once a frame. Frames without a
 // pose are skipped and counted; where the trajectory jumps a new epoch begins, and with it a new mesh.
 
-#include <atomic>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 
-#include "firmware_host/settings/settings.hpp"
+#include "firmware_host/lab/modules/posed_log.hpp"
 
 namespace swiftlet {
 
-struct MeshRequest {
-  std::string log;
-  std::string trajectory;       ///< TUM, EuRoC csv; empty: the log's own truth
-  std::string out;              ///< folder to write
-  std::string calibration;      ///< instead of the log's own; empty: the log's
-  std::string imu_calibration;  ///< Kalibr's IMU file where it is not beside the camchain
-  bool mono = false;
-  bool complete = false;        ///< also the mesh over the whole flight
-  double max_gap = 0.1;         ///< s between poses, to interpolate
-  double from = 0;              ///< s after the first image
-  std::optional<double> until;  ///< s after the first image
-  const std::atomic<bool>* stop = nullptr;
-  bool show_progress = false;
+struct MeshRequest : PosedLogRequest {
+  std::string out;        ///< folder to write
+  bool complete = false;  ///< also the mesh over the whole flight
 };
 
 struct MeshRunResult {

@@ -5,15 +5,10 @@
 #include <filesystem>
 #include <memory>
 
-#include "drivers/recorded/open_log.hpp"
 #include "estimator/core/units.hpp"
 #include "estimator/geometry/so3.hpp"
-#include "estimator/odometry/odometry_inputs.hpp"
-#include "estimator/odometry/pairing.hpp"
 #include "firmware_host/files/line_file.hpp"
-#include "firmware_host/inputs/log/log_feed.hpp"
 #include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
-#include "firmware_host/lab/modules/given_poses.hpp"
 #include "firmware_host/lab/modules/place_images.hpp"
 #include "firmware_host/lab/modules/place_tally.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"
@@ -27,15 +22,6 @@ namespace swiftlet {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-LogOptions logOptions(const PlaceRequest& request, const Settings& settings) {
-  LogOptions options;
-  options.calibration = request.calibration;
-  options.imu_calibration = request.imu_calibration;
-  options.calibration_options.accept_unusual_rig = settings.calibration.accept_unusual_rig;
-  options.mono = !settings.odometry.use_stereo;
-  return options;
-}
 
 PlaceDatabaseSettings databaseSettings(const PlaceRequest& request, const Settings& settings) {
   PlaceDatabaseSettings out;
@@ -79,7 +65,7 @@ class PlaceRun {
       : request_(request), settings_(settings), vocabulary_(vocabularyOf(request, settings)) {}
 
   PlaceRunResult operator()() {
-    if (isPlainImageFolder(request_.input)) {
+    if (isPlainImageFolder(request_.log)) {
       runFolder();
     } else {
       runLog();
@@ -91,8 +77,7 @@ class PlaceRun {
  private:
   void runFolder();
   void runLog();
-  void takePoses(Trajectory trajectory);
-  [[nodiscard]] bool stopped();
+  void takePoses(GivenPoses poses, LogWarnings& warnings);
   void take(const StereoFrame& frame, const Rig& rig, bool all);
   void see(const StereoFrame& frame, const GivenPoses::Pose& pose, const Rig& rig);
   void judge(const PlaceCandidate& candidate, Stamp stamp, const SE3& T_world_body);
@@ -103,52 +88,45 @@ class PlaceRun {
   const PlaceRequest& request_;
   const Settings& settings_;
   const Vocabulary vocabulary_;
-  LogWarnings warnings_;
-  std::vector<std::string> log_warnings_;
-  std::string poses_name_;
+  Json warnings_ = Json::array();
   std::optional<GivenPoses> poses_;
   std::unique_ptr<Stages> stages_;
   std::optional<LineFile> rows_;
   std::optional<GivenPoses::Pose> last_;
-  Stamp last_stamp_;
+  Stamp last_stamp_, first_image_, last_image_;
   bool verifies_ = false;
   bool finished_ = true;
   std::uint64_t images_ = 0, without_pose_ = 0, without_features_ = 0;
   PlaceTally tally_;
 };
 
-bool PlaceRun::stopped() {
-  if (request_.stop != nullptr && request_.stop->load(std::memory_order_relaxed)) finished_ = false;
-  return !finished_;
-}
-
-void PlaceRun::takePoses(Trajectory trajectory) {
-  poses_.emplace(std::move(trajectory), Duration::fromSeconds(request_.max_gap));
-  if (poses_->jumps() > 0) {
-    warnings_.add(fmt::format("{}: the poses jump {} times, first at {}: pairs across a jump are not judged",
-                              poses_name_, poses_->jumps(), formatSeconds(poses_->firstJump())));
-  }
-  warnAll(warnings_.lines());
+void PlaceRun::takePoses(GivenPoses poses, LogWarnings& warnings) {
+  poses_ = std::move(poses);
+  poses_->warnOfJumps("pairs across a jump are not judged", warnings);
 }
 
 void PlaceRun::runFolder() {
   if (request_.trajectory.empty()) {
-    throw InputError(request_.input, 0, "", "a folder of images has no poses", "Give them with --trajectory");
+    throw InputError(request_.log, 0, "", "a folder of images has no poses", "Give them with --trajectory");
   }
   if (!request_.calibration.empty()) {
     throw InputError("--calibration", 0, "", "a plain folder of images gives no depths to verify with",
                      "Leave the calibration out (retrieval only), or give a log with two cameras");
   }
   LogCounters counters;
-  poses_name_ = request_.trajectory;
-  const Trajectory trajectory = readTrajectory(request_.trajectory, counters, warnings_);
-  const std::vector<PlaceImage> files = stampedImages(request_.input, trajectory);
-  takePoses(trajectory);
+  LogWarnings warnings;
+  const Trajectory trajectory = readTrajectory(request_.trajectory, counters, warnings);
+  const std::vector<PlaceImage> files = stampedImages(request_.log, trajectory);
+  takePoses({{request_.trajectory, trajectory}, Duration::fromSeconds(request_.max_gap)}, warnings);
+  warnAll(warnings.lines());
+  warnings_ = warnings.lines();
   ImageFile image;
   Progress progress("place", request_.show_progress ? files.size() : 0);
   std::optional<ImageSize> size;
   Rig rig;
-  for (std::size_t i = 0; i < files.size() && !stopped(); ++i) {
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    finished_ = !request_.stopped();
+    if (!finished_) break;
     progress.update(i);
     if (!image.read(files[i].path)) {
       throw InputError(files[i].path, 0, "", "not a readable image", "Remove it from the folder");
@@ -171,39 +149,23 @@ void PlaceRun::runFolder() {
 }
 
 void PlaceRun::runLog() {
-  const std::unique_ptr<LogSource> source = openLog(request_.input, logOptions(request_, settings_));
-  if (!source->trackFile().empty()) {
-    throw InputError(request_.input, 0, "", "the log holds feature tracks, no images",
+  PosedLogRequest request = request_;
+  request.mono = !settings_.odometry.use_stereo;
+  PosedLog log(request, settings_);
+  if (log.hasTracks()) {
+    throw InputError(request_.log, 0, "", "the log holds feature tracks, no images",
                      "Places are recognized by images");
   }
-  const Rig rig = rigInUse(source->rig(), settings_.odometry);
-  verifies_ = rig.camera_count > 1;
-  NamedTrajectory trajectory = openTrajectory(request_.trajectory, request_.input, *source, warnings_);
-  poses_name_ = trajectory.name;
-  takePoses(std::move(trajectory.poses));
-  LogFeed feed(*source, {}, nullptr);
-  PairingSettings pairing_settings;
-  pairing_settings.cameras = rig.camera_count;
-  pairing_settings.tolerance = Duration::fromSeconds(settings_.pairing.tolerance_ms * 1e-3);
-  pairing_settings.patience = Duration::fromSeconds(settings_.pairing.patience_ms * 1e-3);
-  Pairing pairing(pairing_settings);
-  Progress progress("place", request_.show_progress ? source->imageCount() : 0);
-  StereoFrame frame;
-  for (LogFeed::Next next = feed.next(); next != LogFeed::Next::kEnd && !stopped(); next = feed.next()) {
-    const bool paired = next == LogFeed::Next::kImage ? pairing.push(feed.image(), frame).ok()
-                                                      : pairing.expire(feed.sample().stamp, frame).ok();
-    if (paired) take(frame, rig, false);
-    progress.update(feed.taken());
-  }
-  if (finished_ && pairing.flush(frame).ok()) take(frame, rig, false);
-  progress.finish();
-  log_warnings_ = source->warnings();
-  warnAll(log_warnings_);
+  verifies_ = log.rig().camera_count > 1;
+  takePoses(log.poses(), log.warnings());
+  finished_ = log.run("place", {[&](const StereoFrame& frame) { take(frame, log.rig(), false); }, {}});
+  warnings_ = log.warningsJson();
 }
 
 /// `all`: whether it has moved or not.
 void PlaceRun::take(const StereoFrame& frame, const Rig& rig, bool all) {
-  ++images_;
+  if (images_++ == 0) first_image_ = frame.stamp;
+  last_image_ = frame.stamp;
   const auto pose = poses_->at(frame.stamp);
   if (!pose || frame.image[0].empty()) {
     ++without_pose_;
@@ -279,19 +241,16 @@ void PlaceRun::judge(const PlaceCandidate& candidate, Stamp stamp, const SE3& T_
 }
 
 void PlaceRun::failWithoutPose() const {
-  throw InputError(poses_name_, 0, "timestamp",
-                   fmt::format("none of the {} images has a pose and features: the poses go from {} to {}",
-                               images_, formatSeconds(poses_->begin()), formatSeconds(poses_->end())),
-                   fmt::format("Both need stamps of one clock, and poses at most --max-gap={:g} s apart",
-                               request_.max_gap));
+  if (images_ == 0) throw InputError(request_.log, 0, "", "has no image", "Give a log with images");
+  poses_->failWithout("image with features", first_image_, last_image_);
 }
 
 PlaceRunResult PlaceRun::end() {
   Json json;
   json["version"] = versionJson();
-  json["run"] = {{"command", "place"},        {"input", request_.input},
-                 {"trajectory", poses_name_}, {"vocabulary_words", vocabulary_.words()},
-                 {"verified", verifies_},     {"finished", finished_}};
+  json["run"] = {{"command", "place"},           {"input", request_.log},
+                 {"trajectory", poses_->name()}, {"vocabulary_words", vocabulary_.words()},
+                 {"verified", verifies_},        {"finished", finished_}};
   const PlaceDatabaseCounts& counts = stages_->place.database().counts();
   json["images"] = {{"seen", images_},
                     {"without_pose", without_pose_},
@@ -299,8 +258,7 @@ PlaceRunResult PlaceRun::end() {
                     {"keyframes", counts.added},
                     {"forgotten", counts.removed}};
   tally_.write(json);
-  json["warnings"] = log_warnings_;
-  for (const std::string& line : warnings_.lines()) json["warnings"].push_back(line);
+  json["warnings"] = warnings_;
   writeJson((std::filesystem::path(request_.out) / "summary.json").string(), json);
   return {json, finished_};
 }

@@ -10,31 +10,23 @@
 // whole. Each is described, asked about, verified and stored, in the order of time. Where the poses jump a
 // new epoch begins: its world is another, so that pairs across are not judged. Host side.
 
-#include <atomic>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 
-#include "firmware_host/settings/settings.hpp"
+#include "firmware_host/lab/modules/posed_log.hpp"
 
 namespace swiftlet {
 
-struct PlaceRequest {
-  std::string input;       ///< log, or plain folder of images
-  std::string trajectory;  ///< TUM, EuRoC csv; empty: the log's own truth
-  std::string out;         ///< folder to write
-  std::string vocabulary;  ///< file; empty: the settings', else the shipped one
-  std::string calibration;
-  std::string imu_calibration;
+/// `log` may be a plain folder of images.
+struct PlaceRequest : PosedLogRequest {
+  std::string out;               ///< folder to write
+  std::string vocabulary;        ///< file; empty: the settings', else the shipped one
   int candidates = 10;           ///< of an image, at most
   double exclude = 10;           ///< s: images nearer in time are no revisit
   double min_distance = 0.25;    ///< m: a log's image is a keyframe when it has moved by this,
   double min_turn_deg = 11.5;    ///< turned by this
   double min_seconds = 2;        ///< or when this much time has passed since the last one
   std::size_t keyframes = 2000;  ///< that are remembered at most
-  double max_gap = 0.1;          ///< s between poses, to interpolate
-  const std::atomic<bool>* stop = nullptr;
-  bool show_progress = false;
 };
 
 struct PlaceRunResult {

@@ -1,0 +1,22 @@
+#pragma once
+// The options of the commands that read a log: whose calibration, which part.
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "firmware_host/inputs/log/log_request.hpp"
+
+namespace swiftlet {
+
+struct LogCommandOptions {
+  std::vector<std::string> calibration;
+  double until = -1;
+
+  void addCalibration(CLI::App& command);
+  void addSection(CLI::App& command, LogRequest& request);
+  /// What was given, progress on stderr, and signals that stop the run. InputError.
+  void fill(LogRequest& request) const;
+};
+
+}  // namespace swiftlet

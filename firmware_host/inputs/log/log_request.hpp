@@ -1,0 +1,38 @@
+#pragma once
+// What a run that reads a log is asked: which log, whose calibration, which part of it. The base of the
+// requests of the commands.
+
+#include <atomic>
+#include <optional>
+#include <string>
+
+#include "drivers/recorded/log_source.hpp"
+#include "firmware_host/inputs/log/log_feed.hpp"
+#include "firmware_host/settings/settings.hpp"
+
+namespace swiftlet {
+
+struct LogRequest {
+  std::string log;
+  std::string calibration;          ///< instead of the log's own; empty: the log's
+  std::string imu_calibration;      ///< Kalibr's IMU file where it is not beside the camchain
+  bool mono = false;                ///< camera 0 alone
+  double from = 0;                  ///< s after the first image
+  std::optional<double> until;      ///< s after the first image
+  std::optional<Stamp> last_stamp;  ///< the same as a stamp
+  const std::atomic<bool>* stop = nullptr;
+  bool show_progress = false;
+
+  [[nodiscard]] LogOptions options(const Settings& settings) const {
+    LogOptions options;
+    options.calibration = calibration;
+    options.imu_calibration = imu_calibration;
+    options.calibration_options.accept_unusual_rig = settings.calibration.accept_unusual_rig;
+    options.mono = mono;
+    return options;
+  }
+  [[nodiscard]] LogSection section() const { return {from, until, last_stamp}; }
+  [[nodiscard]] bool stopped() const { return stop != nullptr && stop->load(std::memory_order_relaxed); }
+};
+
+}  // namespace swiftlet
