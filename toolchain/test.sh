@@ -24,8 +24,10 @@ case ${1:-} in
     ;;
 esac
 
-fuzz_seconds=15        # each fuzzer
+fuzz_seconds=15              # each fuzzer
 beyond='long|campaign|guide' # labels of what only --all runs
+# What reads bytes of others.
+parsers='drivers_calibration drivers_can drivers_image_decoder drivers_mavlink drivers_serial'
 # What shares memory between threads, the threads of devices, autopilot and viewers, and the whole executor on a second
 # of a log.
 threads='added_node autopilot core follower late_labels live realtime supervisor threaded view'
@@ -113,6 +115,14 @@ cases() { # Catch2's own counts in ctest's log of the release build
     awk '{a += $1; c += $2} END {printf "release: %d test cases, %d assertions\n", c, a}'
 }
 
+# shellcheck disable=SC2086,SC2046 # lists of tests
+sanitized() { # preset, the minutes that it takes, name, tests
+  in_time "$3" "$2" || return 0
+  step "configure $1" configure "$1" -DSWIFTLET_BUILD_TESTS=ON &&
+    step "build $1" build "$1" --target $(echo $4 | sed 's/\([^ ]*\)/test_\1/g') &&
+    step "$3" run_ctest "$1" -R "^($(echo $4 | tr ' ' '|'))\$" -LE "^($beyond)\$"
+}
+
 close() {
   printf '\n==== steps\n%s' "$steps"
   cases
@@ -146,15 +156,16 @@ if [ $all_sets = yes ]; then
   step "programs run by hand" build release --target by_hand
   step "long statistics, the sandbox's campaign, guides" run_ctest release -L "^($beyond)\$"
 fi
-# shellcheck disable=SC2086 # a list of targets
-in_time "threads with the thread sanitizer" 15 &&
-  step "configure for data races" configure tsan -DSWIFTLET_BUILD_TESTS=ON &&
-  step "build for data races" build tsan --target $(echo $threads | sed 's/\([^ ]*\)/test_\1/g') &&
-  step "threads without data races" run_ctest tsan -R "^($(echo $threads | tr ' ' '|'))\$" -LE "^($beyond)\$"
-in_time "tests with address and undefined sanitizers, fuzzers" 45 &&
+# Short lists first: what is left of half an hour is enough for them.
+if [ $all_sets = no ]; then
+  sanitized tsan 3 "carriers under the thread sanitizer" core
+  sanitized asan 5 "parsers under address and undefined sanitizers" "$parsers"
+fi
+sanitized tsan 15 "threads under the thread sanitizer" "$threads"
+in_time "all rooms under address and undefined sanitizers, fuzzers" 30 &&
   step "configure with sanitizers" configure asan -DSWIFTLET_BUILD_TESTS=ON &&
   step "build with sanitizers" build asan && {
-    step "tests with sanitizers" run_ctest asan -LE "^($beyond)\$"
+    step "all rooms under address and undefined sanitizers" run_ctest asan -LE "^($beyond)\$"
     step "fuzzers" counted toolchain/fuzz.sh $fuzz_seconds
   }
 close

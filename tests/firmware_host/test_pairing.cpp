@@ -136,6 +136,21 @@ TEST_CASE("a lost camera does not delay the other, and comes back") {
   CHECK_FALSE(pairing.isLost(1));
 }
 
+TEST_CASE("a camera is waited for until it has missed three frames running") {
+  for (const int missed : {2, 3}) {
+    Pairing pairing{PairingSettings{}};
+    StereoFrame paired;
+    std::int64_t stamp = 100 * kMs;
+    for (int i = 0; i < missed; ++i, stamp += 100 * kMs) {
+      pairing.push(frameAt(0, stamp), paired);
+      REQUIRE(pairing.expire({stamp + 60 * kMs}, paired).ok());
+    }
+    CAPTURE(missed);
+    CHECK(pairing.isLost(1) == (missed == 3));
+    CHECK(pairing.push(frameAt(0, stamp), paired).ok() == (missed == 3));
+  }
+}
+
 /// What must come out, seen from above: instants in order, with the images that were not dropped.
 struct Model {
   std::vector<CameraFrame> frames;

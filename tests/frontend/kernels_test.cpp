@@ -116,6 +116,34 @@ TEST_CASE("corner scores are OpenCV's smaller eigenvalues, and corners keep thei
   }
 }
 
+TEST_CASE("no corner is weaker than both thresholds allow, however faint the image") {
+  Canvas image = draw(Texture(5), 320, 240, {0, 0}, 2.0);
+  // The left half is faint, the right one fainter.
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+    const int contrast = i % 320 < 160 ? 8 : 32;
+    image.pixels[i] = static_cast<std::uint8_t>(100 + image.pixels[i] / contrast);
+  }
+  Pyramid pyramid(image.width, image.height, 1);
+  pyramid.build(image.view());
+  CornerDetector detector(image.width, image.height);
+  auto corners = std::make_unique<FixedVector<Corner, kMaxFeatures>>();
+  CornerSettings all;
+  all.min_score = all.relative = 0;
+  detector.detect(pyramid.level(0), {}, 60, kMaxFeatures, all, *corners);
+  REQUIRE(corners->size() > 20);
+  const float best = corners->front().score;
+  const float middle = (*corners)[corners->size() / 2].score;
+  // Either threshold at the middle of the scores, the other far below.
+  for (const bool absolute : {true, false}) {
+    CornerSettings settings;
+    settings.min_score = absolute ? middle : 0;
+    settings.relative = absolute ? 0 : middle / best;
+    detector.detect(pyramid.level(0), {}, 60, kMaxFeatures, settings, *corners);
+    CHECK_FALSE(corners->empty());
+    for (const Corner& corner : *corners) CHECK(corner.score >= middle);
+  }
+}
+
 TEST_CASE("no corners on a flat image or along a straight edge") {
   Canvas image{200, 160, std::vector<std::uint8_t>(200 * 160, 90)};
   for (int y = 0; y < 160; ++y) {

@@ -190,6 +190,37 @@ TEST_CASE("a query interpolates the distance to a wall, signed, with its normal"
   }
 }
 
+TEST_CASE("the gradient is the numeric derivative of the interpolated distance") {
+  DistanceField field(smallLimits());
+  Surface surface;
+  Random random(12);
+  for (int x = -20; x < 20; ++x) {
+    for (int y = -18; y < 18; ++y) {
+      for (int z = -14; z < 14; ++z) field.setSpace({x, y, z}, Space::kFree);
+    }
+  }
+  for (int i = 0; i < 30; ++i) setOne(field, surface, randomCell(field, random), randomOffset(random));
+  settle(field);
+  constexpr double kStep = 1e-7;  // m: within one cell's trilinear piece, but for a chance of 1e-5
+  int compared = 0;
+  for (int n = 0; n < 500; ++n) {
+    const Eigen::Vector3d at(random.uniform(-1.9, 1.9), random.uniform(-1.7, 1.7), random.uniform(-1.3, 1.3));
+    DistanceSample sample;
+    if (!field.query(at, sample) || !sample.bounded) continue;
+    Eigen::Vector3d slope;
+    for (int axis = 0; axis < 3; ++axis) {
+      DistanceSample before, after;
+      REQUIRE(field.query(at - kStep * Eigen::Vector3d::Unit(axis), before));
+      REQUIRE(field.query(at + kStep * Eigen::Vector3d::Unit(axis), after));
+      slope[axis] = (after.distance - before.distance) / (2 * kStep);
+    }
+    if (slope.norm() < 0.1) continue;  // between two surfaces
+    ++compared;
+    CHECK((sample.gradient - slope.normalized()).norm() < 1e-4);
+  }
+  CHECK(compared > 200);
+}
+
 TEST_CASE("work is bounded, and the rest goes on in the next step") {
   DistanceField field(smallLimits());
   Surface surface;
