@@ -158,8 +158,8 @@ if [ $all_sets = yes ]; then
 fi
 # Short lists first: what is left of half an hour is enough for them.
 if [ $all_sets = no ]; then
-  sanitized tsan 3 "carriers under the thread sanitizer" core
-  sanitized asan 5 "parsers under address and undefined sanitizers" "$parsers"
+  sanitized tsan 1 "carriers under the thread sanitizer" core
+  sanitized asan 4 "parsers under address and undefined sanitizers" "$parsers"
 fi
 sanitized tsan 15 "threads under the thread sanitizer" "$threads"
 in_time "all rooms under address and undefined sanitizers, fuzzers" 30 &&
