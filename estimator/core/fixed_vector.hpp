@@ -18,6 +18,11 @@ class FixedVector {
   [[nodiscard]] bool empty() const { return size_ == 0; }
   [[nodiscard]] bool full() const { return size_ == kCapacity; }
 
+  /// Appends where the caller knows that there is room; without any, nothing changes.
+  void pushBack(const T& value) {
+    assert(!full());
+    if (!full()) items_[size_++] = value;
+  }
   /// Appends; false (and no change) when full.
   [[nodiscard]] bool tryPushBack(const T& value) {
     if (full()) return false;

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "estimator/smoother/landmark_block.hpp"
 #include "estimator/smoother/vision_factor.hpp"
 
 namespace swiftlet {
@@ -30,24 +31,17 @@ bool PointFactor::compute(Eigen::Matrix3d C) {
   return true;
 }
 
-void EliminatedPoint::begin(const PointFactor& L, const Eigen::Vector3d& z) {
-  L_ = L;
-  z_ = z;
+void EliminatedPoint::keep(const LandmarkBlock& landmark) {
+  L_ = landmark.factor();
+  z_ = landmark.z();
   states_.clear();
-  calibration_dimension_ = 0;
-}
-
-void EliminatedPoint::addState(std::uint32_t slot, const double* y0, const double* y1, const double* y2) {
-  using Column = Eigen::Map<const Eigen::Matrix<double, kPoseDim, 1>>;
-  StateColumns columns;
-  columns.slot = slot;
-  columns.Y << Column(y0).cast<float>(), Column(y1).cast<float>(), Column(y2).cast<float>();
-  static_cast<void>(states_.tryPushBack(columns));
-}
-
-void EliminatedPoint::setCalibration(const Eigen::Matrix<double, kMaxCalibrationDim, 3>& Y, int dimension) {
-  Y_calibration_ = Y.cast<float>();
-  calibration_dimension_ = dimension;
+  for (const LandmarkBlock::State& state : landmark.states()) {
+    using Columns = Eigen::Matrix<double, kPaddedRows, 3>;
+    states_.pushBack(
+        {state.slot, Eigen::Map<const Columns>(state.point[0]).topRows<kPoseDim>().cast<float>()});
+  }
+  calibration_dimension_ = landmark.calibrationDimension();
+  if (calibration_dimension_ > 0) Y_calibration_ = landmark.calibration().point.cast<float>();
 }
 
 Eigen::Vector3d EliminatedPoint::step(const VectorMap& dx,

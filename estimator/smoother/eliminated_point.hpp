@@ -1,7 +1,7 @@
 #pragma once
 // What eliminating a landmark leaves behind: enough for the point's own step once the states' is known.
 //
-// With B_i, c and C = L L^T as in landmark_lanes.hpp, Y_i = B_i L^-T and z = L^-1 c, the step of the whole
+// With B_i, c and C = L L^T as in landmark_block.hpp, Y_i = B_i L^-T and z = L^-1 c, the step of the whole
 // system has the point's part
 //   dp = -C^-1 (c + sum_i B_i^T dx_i) = -L^-T (z + sum_i Y_i^T dx_i)       (back-substitution),
 // i over the states that see it and, where calibration is estimated, its columns. Units: the point's
@@ -15,8 +15,8 @@
 #include <cstdint>
 
 #include "estimator/core/fixed_vector.hpp"
+#include "estimator/smoother/calibration_columns.hpp"
 #include "estimator/smoother/cholesky.hpp"
-#include "estimator/smoother/prior.hpp"
 #include "estimator/smoother/state.hpp"
 
 namespace swiftlet {
@@ -43,13 +43,12 @@ struct PointFactor {
   }
 };
 
+class LandmarkBlock;
+
 class EliminatedPoint {
  public:
-  void begin(const PointFactor& L, const Eigen::Vector3d& z);
-  /// `y`: the three columns of Y_i, six rows each.
-  void addState(std::uint32_t slot, const double* y0, const double* y1, const double* y2);
-  /// Y of the calibration's columns.
-  void setCalibration(const Eigen::Matrix<double, kMaxCalibrationDim, 3>& Y, int dimension);
+  /// Of a landmark just eliminated.
+  void keep(const LandmarkBlock& landmark);
 
   /// The point's step that goes with the states' step `dx` (columns as in `states`, calibration first).
   [[nodiscard]] Eigen::Vector3d step(const VectorMap& dx,

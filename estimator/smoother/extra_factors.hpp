@@ -1,9 +1,8 @@
 #pragma once
-// Factors on extra states: the sightings of an explicit landmark, a point on a plane, a plane's direction.
+// Factors on extra states: a point on a plane, a plane's direction. Sightings: landmark_block.hpp.
 //
 // Residuals r at the current values, Jacobians at the linearization (frozen: first estimates), by the error
 // states of state.hpp and extra_states.hpp; world axes, z up:
-//  - sighting: as in vision_factor.hpp with p itself for the point; d r / d p = -d r / d p_body.
 //  - point on plane: r = (n . p - d) / sigma; d r = (n^T dp + p^T dn - dd) / sigma.
 //  - direction: horizontal (a floor, n along z) r = (n_x, n_y) / sigma; vertical (a wall) r = n_z / sigma.
 // Robust, Cauchy at 2 sigma, as sightings are: points of another surface must not bend the window.
@@ -38,11 +37,5 @@ struct ExtraFactor {
 /// `landmark` is not looked at for a direction.
 void linearize(const ExtraFactor& factor, const ExtraState& plane, const ExtraState& landmark,
                LinearFactor& linear);
-
-/// One camera's sighting of an explicit landmark by the state whose columns start at `pose_offset`. False
-/// when the point is not in front (vision_factor.hpp), at the values or the linearization.
-[[nodiscard]] bool linearizeSighting(const CameraSighting& view, std::size_t camera, const RigPose& rig,
-                                     const SE3& T_body_cam, const CalibrationLayout& calibration,
-                                     int pose_offset, const ExtraState& landmark, LinearFactor& linear);
 
 }  // namespace swiftlet

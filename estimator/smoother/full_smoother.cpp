@@ -8,12 +8,14 @@
 #endif
 #include <Eigen/SparseCore>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include "estimator/geometry/so3.hpp"
 #include "estimator/smoother/full_smoother_system.hpp"
 #include "estimator/smoother/imu_factor.hpp"
+#include "estimator/smoother/landmark_block.hpp"
 
 namespace swiftlet {
 namespace {
@@ -35,8 +37,6 @@ constexpr std::size_t kMostSightings = 120;  // of a landmark: 20 s at 6 keyfram
 constexpr double kPulledEnough = 2e-3;       // m, rad: largest step of a pose
 constexpr Status kStopped{StatusCode::kFailed, kFullSmoothingStopped};
 
-using Pose6x3 = Eigen::Matrix<double, kPoseDim, 3>;
-
 // Without CHOLMOD (a GPL library, see docs/licences.md) Eigen's own factorization serves: the same
 // steps to rounding, slower on long runs.
 #ifdef SWIFTLET_WITH_CHOLMOD
@@ -50,10 +50,10 @@ using SparseFactor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::L
 /// Factors the system and solves it. Kept between iterations.
 class FullSmoother::Solver {
  public:
-  Status solve(const System& system, double damping, Eigen::VectorXd& step) {
-    Eigen::SparseMatrix<double> H = system.matrix();
-    for (Eigen::Index k = 0; k < H.rows(); ++k) H.coeffRef(k, k) *= 1.0 + damping;
-    factor_.compute(H);
+  Status solve(System& system, double damping, Eigen::VectorXd& step) {
+    const Eigen::SparseMatrix<double>& H = system.matrix(damping);
+    if (system.takeNewPattern()) factor_.analyzePattern(H);
+    factor_.factorize(H);
     if (factor_.info() != Eigen::Success) {
       return {StatusCode::kNumerical, "the full system could not be factored"};
     }
@@ -70,7 +70,10 @@ FullSmoother::FullSmoother(const Rig& rig, const ImuNoise& noise, const FullSmoo
     : rig_(rig),
       noise_(noise),
       settings_(settings),
-      next_revisit_track_(std::numeric_limits<TrackId>::max()) {}
+      next_revisit_track_(std::numeric_limits<TrackId>::max()),
+      landmark_(std::make_unique<LandmarkBlock>(kMostSightings)) {}
+
+FullSmoother::~FullSmoother() = default;
 
 Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& state) {
   if (keyframes_.size() >= settings_.max_keyframes) {
@@ -188,52 +191,21 @@ void FullSmoother::removeOutliers() {
   }
 }
 
-double FullSmoother::linearizeTrack(const Track& track, System& system) const {
-  const PointBasis basis = PointBasis::of(track.point.bearing);
-  const std::size_t n = track.sightings.size();
-  std::vector<Pose6x3> pose_point(n, Pose6x3::Zero());
-  std::vector<Eigen::Matrix<double, kPoseDim, kPoseDim>> pose_pose(
-      n, Eigen::Matrix<double, kPoseDim, kPoseDim>::Zero());
-  Eigen::Matrix3d point_point = Eigen::Matrix3d::Zero();
-  point_point(2, 2) = kInverseDepthInformation;
-  Eigen::Vector3d point_gradient = Eigen::Vector3d::Zero();
-  double cost = 0;
-  for (std::size_t s = 0; s < n; ++s) {
-    const Sighting& sighting = track.sightings[s];
-    for (std::size_t c = 0; c < rig_.camera_count; ++c) {
-      const CameraSighting& view = sighting.camera[c];
-      const CameraPose& camera = poses_[sighting.slot].current[c];
-      Eigen::Vector2d r;
-      SightingJacobians J;
-      if (!view.used || !reprojectionResidual(view, camera, track.point, r) ||
-          !reprojectionJacobians(view, camera, rig_.T_body_cam[c], track.point, basis, false, J)) {
-        continue;
-      }
-      const RobustWeight robust = RobustWeight::cauchy(r.squaredNorm());
-      cost += robust.cost;
-      pose_pose[s] += robust.weight * J.pose.transpose() * J.pose;
-      pose_point[s] += robust.weight * J.pose.transpose() * J.point;
-      system.g.segment<kPoseDim>(kStateDim * sighting.slot) += robust.weight * J.pose.transpose() * r;
-      point_point += robust.weight * J.point.transpose() * J.point;
-      point_gradient += robust.weight * J.point.transpose() * r;
-    }
-  }
-  const Eigen::LLT<Eigen::Matrix3d> llt(point_point);
-  if (llt.info() != Eigen::Success) return cost;
-  const Eigen::Vector3d z = llt.matrixL().solve(point_gradient);
-  for (std::size_t s = 0; s < n; ++s) {
-    pose_point[s] = llt.matrixL().solve(pose_point[s].transpose()).transpose();
-    system.g.segment<kPoseDim>(kStateDim * track.sightings[s].slot) -= pose_point[s] * z;
-  }
-  for (std::size_t i = 0; i < n; ++i) {
-    const Eigen::Index row = kStateDim * static_cast<Eigen::Index>(track.sightings[i].slot);
-    system.addBlock(row, row, pose_pose[i] - pose_point[i] * pose_point[i].transpose());
+double FullSmoother::linearizeTrack(const Track& track, System& system) {
+  landmark_->linearize({track.sightings, poses_, rig_.T_body_cam, {}}, track.point);
+  if (!landmark_->eliminate()) return 0;
+  const auto states = landmark_->states();
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    const std::size_t row = states[i].slot;
+    system.g.segment<kPoseDim>(kStateDim * static_cast<Eigen::Index>(row)) +=
+        Eigen::Map<const Vector6d>(states[i].gradient);
+    system.poseBlock(row, row).add(states[i].information);
+    const PairProduct product(states[i]);
     for (std::size_t j = 0; j < i; ++j) {
-      system.addBlock(row, kStateDim * static_cast<Eigen::Index>(track.sightings[j].slot),
-                      -pose_point[i] * pose_point[j].transpose());
+      product.subtract(states[j], system.poseBlock(row, states[j].slot));
     }
   }
-  return cost;
+  return landmark_->cost();
 }
 
 void FullSmoother::linearizeMotion(System& system, double& cost) const {
@@ -250,7 +222,7 @@ void FullSmoother::linearizeMotion(System& system, double& cost) const {
       prior.block<3, 3>(3, 3) = gauge * Eigen::Matrix3d::Identity();
       prior.block<3, 3>(9, 9) = Eigen::Matrix3d::Identity() / (kGyroBiasSigma * kGyroBiasSigma);
       prior.block<3, 3>(12, 12) = Eigen::Matrix3d::Identity() / (kAccelBiasSigma * kAccelBiasSigma);
-      system.addBlock(at, at, prior);
+      system.own(k) += prior;
       system.g.segment<3>(at + 9) += keyframe.x.bias_gyro / (kGyroBiasSigma * kGyroBiasSigma);
       system.g.segment<3>(at + 12) += keyframe.x.bias_accel / (kAccelBiasSigma * kAccelBiasSigma);
       continue;
@@ -263,16 +235,16 @@ void FullSmoother::linearizeMotion(System& system, double& cost) const {
                            : constantVelocityFactor(dt, noise_, x_i, keyframe.x, x_i, keyframe.x, factor);
     if (!valid) continue;
     cost += 0.5 * factor.residual.squaredNorm();
-    system.addBlock(at - kStateDim, at - kStateDim, factor.jacobian_i.transpose() * factor.jacobian_i);
-    system.addBlock(at, at - kStateDim, factor.jacobian_j.transpose() * factor.jacobian_i);
-    system.addBlock(at, at, factor.jacobian_j.transpose() * factor.jacobian_j);
+    system.own(k - 1) += factor.jacobian_i.transpose() * factor.jacobian_i;
+    system.before(k) += factor.jacobian_j.transpose() * factor.jacobian_i;
+    system.own(k) += factor.jacobian_j.transpose() * factor.jacobian_j;
     system.g.segment<kStateDim>(at - kStateDim) += factor.jacobian_i.transpose() * factor.residual;
     system.g.segment<kStateDim>(at) += factor.jacobian_j.transpose() * factor.residual;
   }
 }
 
 double FullSmoother::linearize(System& system) {
-  system.clear(keyframes_.size());
+  system.clear();
   double cost = 0;
   for (const auto& [id, track] : tracks_) {
     if (stopped()) return cost;
@@ -282,11 +254,35 @@ double FullSmoother::linearize(System& system) {
   return cost;
 }
 
+// Every pair that may come to be tied: matches are taken in and withdrawn as the solve goes on.
+void FullSmoother::tieAll(System& system) const {
+  system.start(keyframes_.size());
+  std::map<TrackKey, std::vector<std::uint32_t>> further;
+  for (const Match& match : matches_) further[match.track].push_back(match.sighting.slot);
+  std::vector<std::uint32_t> seen;
+  for (const auto& [key, track] : tracks_) {
+    seen.clear();
+    for (const Sighting& sighting : track.sightings) seen.push_back(sighting.slot);
+    if (const auto at = further.find(key); at != further.end()) {
+      seen.insert(seen.end(), at->second.begin(), at->second.end());
+      std::ranges::sort(seen);
+      seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+    }
+    system.tie(seen);
+  }
+  for (const Revisit& revisit : revisits_) {
+    const std::array pair{static_cast<std::uint32_t>(revisit.old_keyframe),
+                          static_cast<std::uint32_t>(revisit.new_keyframe)};
+    system.tie(pair);
+  }
+}
+
 Status FullSmoother::solve(FullSmootherReport& report, const std::atomic<bool>* stop) {
   stop_ = stop;
   if (keyframes_.size() < 3) return {StatusCode::kNotReady, "full smoothing needs three keyframes"};
   System system;
   Solver solver;
+  tieAll(system);
   if (!revisits_.empty()) {
     joinWorlds();
     const Status pulled = pullTogether(solver, system);

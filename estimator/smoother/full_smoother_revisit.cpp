@@ -195,9 +195,9 @@ void FullSmoother::linearizeRevisits(System& system) const {
     const Eigen::Index j = kStateDim * static_cast<Eigen::Index>(revisit.new_keyframe);
     const Matrix6d& J_i = factor.jacobian_old;
     const Matrix6d& J_j = factor.jacobian_new;
-    system.addBlock(i, i, weight * J_i.transpose() * J_i);
-    system.addBlock(j, i, weight * J_j.transpose() * J_i);
-    system.addBlock(j, j, weight * J_j.transpose() * J_j);
+    system.addPoses(revisit.old_keyframe, revisit.old_keyframe, weight * J_i.transpose() * J_i);
+    system.addPoses(revisit.new_keyframe, revisit.old_keyframe, weight * J_j.transpose() * J_i);
+    system.addPoses(revisit.new_keyframe, revisit.new_keyframe, weight * J_j.transpose() * J_j);
     system.g.segment<kPoseDim>(i) += weight * J_i.transpose() * factor.residual;
     system.g.segment<kPoseDim>(j) += weight * J_j.transpose() * factor.residual;
   }

@@ -1,100 +1,173 @@
 #pragma once
-// The sparse system of full smoothing while it is built: internal to FullSmoother's sources.
+// The sparse system of full smoothing: internal to FullSmoother's sources.
 //
-// The lower triangle of the reduced normal equations, kStateDim columns a keyframe, as one block for each
-// pair of keyframes that something ties. Contributions are summed as they come, in their order.
-// Memory: 3.6 kB a keyframe, kPairBytes a pair of keyframes that are no neighbours.
+// The lower triangle of the reduced normal equations, kStateDim columns a keyframe: for each keyframe a block
+// of its own and one with the keyframe before it, and a pose block for each pair that something ties. Which
+// pairs there are is said once (tie), before anything is added; contributions are summed as they come.
+// Memory: kKeyframeBytes a keyframe, kPairBytes a pair, values and indices of the matrix included.
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
 #include <algorithm>
-#include <map>
+#include <cstdint>
+#include <iterator>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "estimator/smoother/full_smoother.hpp"
+#include "estimator/smoother/padded_block.hpp"
 
 namespace swiftlet {
 
 struct FullSmoother::System {
-  /// A block of a std::map with its node, and its values and indices in the matrix and in the permuted copy
-  /// of it that is factored.
-  static constexpr std::size_t kPairBytes = 288 + 64 + 2 * 36 * 12;
+  /// A block with its column, and its values and indices in the matrix and in the copy that is factored.
+  static constexpr std::size_t kPairBytes = sizeof(PaddedBlock) + sizeof(std::uint32_t) + 2 * 36 * 12;
   static constexpr std::size_t kKeyframeBytes = 2 * (225 * 8 + 2 * 225 * 12) + 128;
 
   Eigen::VectorXd g;
 
-  void clear(std::size_t keyframes) {
-    g = Eigen::VectorXd::Zero(kStateDim * static_cast<Eigen::Index>(keyframes));
-    own_.assign(keyframes, Near{});
-    next_.assign(keyframes, Near{});
-    far_.assign(keyframes, {});
+  /// Forgets all pairs but those of neighbours.
+  void start(std::size_t keyframes) {
+    rows_.assign(keyframes, {});
+    own_.resize(keyframes);
+    before_.resize(keyframes);
+    for (std::uint32_t k = 0; k < keyframes; ++k) {
+      if (k > 0) rows_[k].columns.push_back(k - 1);
+      rows_[k].columns.push_back(k);
+    }
+    laid_ = false;
   }
 
-  /// Of a whole state or of its pose with another; `row` and `column` are the first of their keyframes.
-  /// Blocks above the diagonal are left out.
-  template <typename Derived>
-  void addBlock(Eigen::Index row, Eigen::Index column, const Eigen::MatrixBase<Derived>& block) {
-    constexpr int kSize = Derived::RowsAtCompileTime;
-    static_assert(kSize == kStateDim || kSize == kPoseDim);
-    if (row < column) return;
-    const Eigen::Matrix<double, kSize, kSize> value = block;
-    const auto k = static_cast<std::size_t>(column / kStateDim);
-    const auto other = static_cast<std::size_t>(row / kStateDim);
-    if (other <= k + 1) {
-      Near& near = other == k ? own_[k] : next_[k];
-      near.size = std::max(near.size, kSize);
-      near.H.template topLeftCorner<kSize, kSize>() += value;
-    } else if constexpr (kSize == kPoseDim) {
-      far_[k].try_emplace(other, Matrix6d::Constant(kNothing)).first->second += value;
+  /// All pairs of these keyframes, which ascend.
+  void tie(std::span<const std::uint32_t> keyframes) {
+    for (std::size_t i = 0; i < keyframes.size(); ++i) {
+      std::vector<std::uint32_t>& columns = rows_[keyframes[i]].columns;
+      const auto tied = keyframes.first(i + 1);
+      if (std::ranges::includes(columns, tied)) continue;
+      std::vector<std::uint32_t> all;
+      std::ranges::set_union(columns, tied, std::back_inserter(all));
+      columns = std::move(all);
+    }
+    laid_ = false;
+  }
+
+  /// Zero, over all pairs tied so far.
+  void clear() {
+    if (!laid_) lay();
+    g.setZero();
+    for (Row& row : rows_) std::ranges::fill(row.blocks, PaddedBlock{});
+    std::ranges::fill(own_, Matrix15d::Zero());
+    std::ranges::fill(before_, Matrix15d::Zero());
+  }
+
+  /// Of two keyframes that are tied, row not before column. Of a keyframe with itself the lower triangle
+  /// counts.
+  PaddedBlock& poseBlock(std::size_t row, std::size_t column) {
+    Row& r = rows_[row];
+    const auto at = std::ranges::lower_bound(r.columns, static_cast<std::uint32_t>(column));
+    return r.blocks[static_cast<std::size_t>(at - r.columns.begin())];
+  }
+  void addPoses(std::size_t row, std::size_t column, const Matrix6d& block) {
+    PaddedBlock& target = poseBlock(row, column);
+    for (std::size_t c = 0; c < kPoseDim; ++c) {
+      for (std::size_t r = 0; r < kPoseDim; ++r) {
+        target.column[c][r] += block(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
+      }
     }
   }
+  /// Of a keyframe with itself, and rows of it with columns of the one before.
+  Matrix15d& own(std::size_t keyframe) { return own_[keyframe]; }
+  Matrix15d& before(std::size_t keyframe) { return before_[keyframe]; }
 
-  [[nodiscard]] Eigen::SparseMatrix<double> matrix() const {
-    const Eigen::Index n = g.size();
-    Eigen::SparseMatrix<double> H(n, n);
-    H.reserve(entries());
-    for (std::size_t k = 0; k < own_.size(); ++k) {
-      const Eigen::Index at = kStateDim * static_cast<Eigen::Index>(k);
-      for (Eigen::Index c = 0; c < kStateDim; ++c) {
-        H.startVec(at + c);
-        for (Eigen::Index r = c; c < own_[k].size && r < own_[k].size; ++r) {
-          H.insertBack(at + r, at + c) = own_[k].H(r, c);
+  /// True once after lay: the pattern is another than before.
+  [[nodiscard]] bool takeNewPattern() { return std::exchange(new_pattern_, false); }
+
+  /// With the diagonal times 1 + damping.
+  [[nodiscard]] const Eigen::SparseMatrix<double>& matrix(double damping) {
+    double* value = H_.valuePtr();
+    for (std::size_t k = 0; k < rows_.size(); ++k) {
+      const PaddedBlock& own = rows_[k].blocks.back();
+      for (std::size_t c = 0; c < kStateDim; ++c) {
+        for (std::size_t r = c; r < kStateDim; ++r) {
+          *value = at(own_[k], r, c) + (r < kPoseDim ? own.column[c][r] : 0.0);
+          if (r == c) *value *= 1.0 + damping;
+          ++value;
         }
-        for (Eigen::Index r = 0; c < next_[k].size && r < next_[k].size; ++r) {
-          H.insertBack(at + kStateDim + r, at + c) = next_[k].H(r, c);
+        if (k + 1 < rows_.size()) {
+          const PaddedBlock& next = *(rows_[k + 1].blocks.end() - 2);
+          for (std::size_t r = 0; r < kStateDim; ++r) {
+            *value++ = at(before_[k + 1], r, c) + (r < kPoseDim && c < kPoseDim ? next.column[c][r] : 0.0);
+          }
         }
         if (c >= kPoseDim) continue;
-        for (const auto& [other, block] : far_[k]) {
-          const Eigen::Index row = kStateDim * static_cast<Eigen::Index>(other);
-          for (Eigen::Index r = 0; r < kPoseDim; ++r) H.insertBack(row + r, at + c) = block(r, c);
+        for (const Far& far : far_[k]) {
+          for (std::size_t r = 0; r < kPoseDim; ++r) {
+            *value++ = rows_[far.row].blocks[far.index].column[c][r];
+          }
         }
       }
     }
-    H.finalize();
-    return H;
+    return H_;
   }
 
  private:
-  /// The first addend comes out as it is, whatever the sign of its zeros.
-  static constexpr double kNothing = -0.0;
-
-  struct Near {
-    int size = 0;  ///< 0: nothing ties them; else that of the largest block so far
-    Matrix15d H = Matrix15d::Constant(kNothing);
+  struct Row {
+    std::vector<std::uint32_t> columns;  ///< ascending; the last two are the keyframe before and its own
+    std::vector<PaddedBlock> blocks;
+  };
+  struct Far {
+    std::uint32_t row = 0;
+    std::uint32_t index = 0;  ///< of the block in its row
   };
 
-  [[nodiscard]] Eigen::Index entries() const {
-    Eigen::Index count = 0;
-    for (std::size_t k = 0; k < own_.size(); ++k) {
-      count += own_[k].size * (own_[k].size + 1) / 2 + next_[k].size * next_[k].size;
-      count += kPoseDim * kPoseDim * static_cast<Eigen::Index>(far_[k].size());
-    }
-    return count;
+  static double at(const Matrix15d& block, std::size_t r, std::size_t c) {
+    return block(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
   }
 
-  std::vector<Near> own_;                             ///< of a keyframe with itself
-  std::vector<Near> next_;                            ///< rows of the next keyframe
-  std::vector<std::map<std::size_t, Matrix6d>> far_;  ///< by column: rows of later keyframes
+  // Memory for all pairs, and the matrix's pattern.
+  void lay() {
+    const std::size_t n = rows_.size();
+    far_.assign(n, {});
+    Eigen::Index entries = 0;
+    for (std::size_t k = 0; k < n; ++k) {
+      rows_[k].blocks.resize(rows_[k].columns.size());
+      entries += kStateDim * (kStateDim + 1) / 2 + (k > 0 ? kStateDim * kStateDim : 0);
+      for (std::uint32_t i = 0; i + 2 < rows_[k].columns.size(); ++i) {
+        far_[rows_[k].columns[i]].push_back({static_cast<std::uint32_t>(k), i});
+        entries += kPoseDim * kPoseDim;
+      }
+    }
+    const Eigen::Index dimension = kStateDim * static_cast<Eigen::Index>(n);
+    g.resize(dimension);
+    H_.resize(dimension, dimension);
+    H_.reserve(entries);
+    for (std::size_t k = 0; k < n; ++k) {
+      const Eigen::Index first = kStateDim * static_cast<Eigen::Index>(k);
+      for (Eigen::Index c = 0; c < kStateDim; ++c) {
+        H_.startVec(first + c);
+        const Eigen::Index last = k + 1 < n ? 2 * kStateDim : kStateDim;
+        for (Eigen::Index r = c; r < last; ++r) H_.insertBack(first + r, first + c) = 0;
+        if (c >= kPoseDim) continue;
+        for (const Far& far : far_[k]) {
+          for (Eigen::Index r = 0; r < kPoseDim; ++r) {
+            H_.insertBack(kStateDim * static_cast<Eigen::Index>(far.row) + r, first + c) = 0;
+          }
+        }
+      }
+    }
+    H_.finalize();
+    laid_ = true;
+    new_pattern_ = true;
+  }
+
+  bool laid_ = false;
+  bool new_pattern_ = false;
+  std::vector<Row> rows_;
+  std::vector<Matrix15d> own_;
+  std::vector<Matrix15d> before_;
+  std::vector<std::vector<Far>> far_;  ///< by column
+  Eigen::SparseMatrix<double> H_;
 };
 
 }  // namespace swiftlet

@@ -7,43 +7,31 @@
 // Shapes: H is n x n, g is n x 1, n = dimension() <= kMaxSystemDim; of H the lower triangle counts.
 // Columns are the error states of state.hpp and extra_states.hpp. Jacobians at the linearization, residuals
 // at the values. Memory: about 2.9 MiB, reserved by the constructor. Cost of a landmark: linear in its
-// sightings to linearize, quadratic in the states that see it to eliminate; both in vector lanes. While the
-// calibration is estimated, linearization goes view by view. Source: Triggs et al., "Bundle Adjustment - A
-// Modern Synthesis", 1999, section 6.
+// sightings to linearize, quadratic in the states that see it to eliminate; both in vector lanes
+// (landmark_block.hpp). Source: Triggs et al., "Bundle Adjustment - A Modern Synthesis", 1999, section 6.
 
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
-#include <span>
+#include <memory>
 #include <vector>
 
+#include "estimator/smoother/calibration_columns.hpp"
 #include "estimator/smoother/cholesky.hpp"
 #include "estimator/smoother/eliminated_point.hpp"
 #include "estimator/smoother/imu_factor.hpp"
 #include "estimator/smoother/linear_factor.hpp"
+#include "estimator/smoother/padded_block.hpp"
 #include "estimator/smoother/prior.hpp"
 #include "estimator/smoother/state.hpp"
 #include "estimator/smoother/vision_factor.hpp"
 
 namespace swiftlet {
 
-/// What the normal equations need to know of the calibration that is being estimated.
-struct CalibrationLayout {
-  bool time_offset = false;
-  bool extrinsics = false;
-  std::size_t cameras = 0;
-
-  [[nodiscard]] int dimension() const {
-    return int{time_offset} + (extrinsics ? kPoseDim * static_cast<int>(cameras) : 0);
-  }
-  [[nodiscard]] int extrinsicOffset(std::size_t camera) const {
-    return int{time_offset} + kPoseDim * static_cast<int>(camera);
-  }
-};
-
 class NormalEquations {
  public:
   NormalEquations();
+  ~NormalEquations();
 
   /// Starts a system: calibration first, then whatever has an `offset`.
   void begin(const CalibrationLayout& calibration, int dimension);
@@ -70,33 +58,22 @@ class NormalEquations {
   /// Eliminates a landmark; `eliminated`, unless null, gets what its back-substitution needs. False when
   /// it does not constrain anything (fewer than two states, or not in front of a camera at the
   /// linearization point).
-  bool addLandmark(const Landmark& landmark, RigPoses poses, const std::array<SE3, kMaxCameras>& T_body_cam,
+  bool addLandmark(const LandmarkViews& views, const LandmarkPoint& point,
                    const std::array<WindowState, kMaxStates>& states, EliminatedPoint* eliminated = nullptr);
+
+  /// Views of a landmark that has columns of its own, from `offset` on: by its position, with Jacobians at
+  /// `linearization` (m, world).
+  void addExplicitLandmark(const LandmarkViews& views, const Eigen::Vector3d& position,
+                           const Eigen::Vector3d& linearization, int offset,
+                           const std::array<WindowState, kMaxStates>& states);
 
   /// Scatters the pose blocks; call once after all factors. Fills the lower triangle of H.
   void finish(const std::array<WindowState, kMaxStates>& states);
 
  private:
-  static constexpr std::size_t kRows = 8;  // rows of a padded pose block
-  using PoseBlock = std::array<double, kRows * kPoseDim>;
+  void addStates(const std::array<WindowState, kMaxStates>& states);
 
-  /// A state that saw an eliminated landmark, and its Y (landmark_lanes.hpp) in padded columns.
-  struct EliminatedPose {
-    std::uint32_t slot = 0;
-    alignas(32) double y[3][kRows];
-  };
-
-  bool addLandmarkInLanes(const Landmark& landmark, RigPoses poses,
-                          const std::array<SE3, kMaxCameras>& T_body_cam,
-                          const std::array<WindowState, kMaxStates>& states, EliminatedPoint* kept);
-  bool addLandmarkWithCalibration(const Landmark& landmark, RigPoses poses,
-                                  const std::array<SE3, kMaxCameras>& T_body_cam,
-                                  const std::array<WindowState, kMaxStates>& states, EliminatedPoint* kept);
-  /// -Y_i Y_j^T for each pair of different states.
-  void subtractPairs(std::span<const EliminatedPose> poses,
-                     const std::array<WindowState, kMaxStates>& states);
-
-  [[nodiscard]] PoseBlock& block(std::size_t slot_i, std::size_t slot_j) {
+  [[nodiscard]] PaddedBlock& block(std::size_t slot_i, std::size_t slot_j) {
     return blocks_[slot_i * kMaxStates + slot_j];
   }
 
@@ -105,7 +82,8 @@ class NormalEquations {
   double cost_ = 0;
   std::vector<double> h_;
   std::vector<double> g_;
-  std::vector<PoseBlock> blocks_;  // [slot_i][slot_j], used where offset_i >= offset_j
+  std::unique_ptr<LandmarkBlock> landmark_;
+  std::vector<PaddedBlock> blocks_;  // [slot_i][slot_j], used where offset_i >= offset_j
   std::array<std::array<double, kPoseDim>, kMaxStates> pose_gradient_{};
   std::array<bool, kMaxStates> touched_{};
 };

@@ -13,14 +13,13 @@
 #include <vector>
 
 #include "estimator/core/fixed_vector.hpp"
+#include "estimator/smoother/calibration_columns.hpp"
 #include "estimator/smoother/cholesky.hpp"
 #include "estimator/smoother/extra_states.hpp"
 #include "estimator/smoother/state.hpp"
 
 namespace swiftlet {
 
-/// Columns of the calibration block: time offset (1), then phi, p of T_body_cam per camera.
-inline constexpr int kMaxCalibrationDim = 13;
 inline constexpr int kMaxSystemDim = static_cast<int>(kMaxStates) * kStateDim + kMaxCalibrationDim +
                                      static_cast<int>(kMaxExtraStates) * kExtraDim;
 /// Body states, extra states and the calibration.

@@ -346,6 +346,10 @@ void Smoother::triangulateAll(int iterations) {
   }
 }
 
+LandmarkViews Smoother::viewsOf(std::span<const Sighting> sightings) const {
+  return {sightings, rig_poses_, T_body_cam_, calibration_};
+}
+
 // The points' part of the step that was solved for.
 void Smoother::substitutePoints(const VectorMap& step) {
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
@@ -453,7 +457,7 @@ void Smoother::buildSystem() {
   for (std::size_t k = 1; k < order_.size(); ++k) addMotionFactor(k);
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     if (in_system_[i] == 0 || landmarks_[i].extra != kNoExtra) continue;
-    if (!system_.addLandmark(landmarks_[i], rig_poses_, T_body_cam_, states_, &eliminated_[i])) {
+    if (!system_.addLandmark(viewsOf(landmarks_[i].views()), landmarks_[i].point, states_, &eliminated_[i])) {
       in_system_[i] = 0;
     }
   }

@@ -22,6 +22,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "estimator/camera/rig.hpp"
@@ -192,6 +193,7 @@ class Smoother {
   void addMotionFactor(std::size_t position);
   void addRestFactor(const WindowState& i, const WindowState& j);
   void triangulateAll(int iterations);
+  [[nodiscard]] LandmarkViews viewsOf(std::span<const Sighting> sightings) const;
   void substitutePoints(const VectorMap& step);
   void startPrior();
   [[nodiscard]] Eigen::Matrix<double, kMaxCalibrationDim, 1> calibrationDeviation() const;

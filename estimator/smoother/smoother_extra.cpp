@@ -187,17 +187,13 @@ void Smoother::linearizeFactor(const ExtraFactor& factor, LinearFactor& linear) 
 
 // Of one state, or with kNoSlot of all.
 void Smoother::addSightingsOf(const ExtraState& extra, std::uint8_t slot) {
-  LinearFactor linear;
-  for (const Sighting& sighting : landmarks_[extra.landmark].sightings) {
-    if (slot != kNoSlot && sighting.slot != slot) continue;
-    for (std::size_t c = 0; c < rig_.camera_count; ++c) {
-      const CameraSighting& view = sighting.camera[c];
-      if (view.used && linearizeSighting(view, c, rig_poses_[sighting.slot], T_body_cam_[c], calibration_,
-                                         states_[sighting.slot].offset, extra, linear)) {
-        system_.addFactor(linear);
-      }
-    }
+  std::span<const Sighting> sightings = landmarks_[extra.landmark].views();
+  if (slot != kNoSlot) {
+    const auto at = std::ranges::find(sightings, slot, &Sighting::slot);
+    sightings = {at, at == sightings.end() ? at : at + 1};
   }
+  system_.addExplicitLandmark(viewsOf(sightings), extra.x.point, extra.linearization().point, extra.offset,
+                              states_);
 }
 
 // The system of one plane with its points held, by whitened rows that allow for the points' own depths too;

@@ -193,7 +193,7 @@ void Smoother::buildMarginalSystem(const Departure& departure) {
     for (std::size_t i = 0; i < landmarks_.size(); ++i) {
       if (landmark_ids_[i] == 0 || !leavesWith(landmarks_[i], slot)) continue;
       if (in_system_[i] != 0) {
-        static_cast<void>(system_.addLandmark(landmarks_[i], rig_poses_, T_body_cam_, states_));
+        static_cast<void>(system_.addLandmark(viewsOf(landmarks_[i].views()), landmarks_[i].point, states_));
       }
       removeLandmark(landmarks_[i]);
     }

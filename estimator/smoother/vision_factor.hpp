@@ -15,6 +15,7 @@
 #include <span>
 
 #include "estimator/camera/rig.hpp"
+#include "estimator/smoother/calibration_columns.hpp"
 #include "estimator/smoother/landmark.hpp"
 #include "estimator/smoother/state.hpp"
 
@@ -38,6 +39,14 @@ struct RigPose {
 
 /// Indexed by Sighting::slot.
 using RigPoses = std::span<const RigPose>;
+
+/// What a landmark is linearized from: its views, cameras as placed and as mounted. Borrowed, for one call.
+struct LandmarkViews {
+  std::span<const Sighting> sightings;
+  RigPoses poses;
+  const std::array<SE3, kMaxCameras>& T_body_cam;
+  CalibrationLayout calibration;
+};
 
 /// The point's tangent basis at its bearing (world axes, orthonormal), shared by all its sightings.
 struct PointBasis {

@@ -211,7 +211,8 @@ bool BenchmarkWindow::update(int iterations) {
       system_.addMotion(factor, states[order[k - 1]], states[order[k]]);
     }
     for (std::size_t i = 0; i < landmarks.size(); ++i) {
-      if (!system_.addLandmark(landmarks[i], poses_, rig.T_body_cam, states, &eliminated_[i])) return false;
+      const LandmarkViews views{landmarks[i].views(), poses_, rig.T_body_cam, {}};
+      if (!system_.addLandmark(views, landmarks[i].point, states, &eliminated_[i])) return false;
     }
     system_.finish(states);
     MatrixMap H = system_.H();

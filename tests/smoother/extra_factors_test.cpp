@@ -232,18 +232,21 @@ Eigen::Vector2d sightingResidual(const CameraSighting& view, const BodyState& x,
 
 }  // namespace
 
-TEST_CASE("Sightings of an explicit landmark: Jacobians numerically, calibration included",
+TEST_CASE("Sightings of an explicit landmark: information and gradient numerically, calibration included",
           "[smoother][extra]") {
   Random random(56);
   const Rig rig = makeRig(RigKind::kEuroc).rig;
   const CalibrationLayout calibration{true, true, rig.camera_count};
-  const int pose_offset = calibration.dimension() + kExtraDim;
+  const int point_offset = calibration.dimension();
+  const int pose_offset = point_offset + kExtraDim;
+  const int dimension = pose_offset + kPoseDim;
+  const auto system = std::make_unique<NormalEquations>();
   for (int trial = 0; trial < 20; ++trial) {
     test::WindowScene scene = test::sceneAround(rig, 1, 0.3, random);
     const Eigen::Vector3d p = scene.inSight(rig, random.uniform(1.0, 6.0), random);
     const std::vector<Sighting> seen = scene.sightings(rig, p, kPixelSigma, 1.0, random);
     if (seen.empty()) continue;
-    ExtraState landmark = pointState(p + randomVector(random, 0.01), calibration.dimension());
+    ExtraState landmark = pointState(p + randomVector(random, 0.01), point_offset);
     const Eigen::Vector3d p_at = landmark.x.point;
     BodyState x = scene.states[0];
     const BodyState x_at = x;
@@ -256,34 +259,44 @@ TEST_CASE("Sightings of an explicit landmark: Jacobians numerically, calibration
         pose.current[c] = CameraPose::of(x.T_world_body, rig.T_body_cam[c]);
       }
     }
+    Eigen::MatrixXd H = Eigen::MatrixXd::Zero(dimension, dimension);
+    Eigen::VectorXd g = Eigen::VectorXd::Zero(dimension);
+    double cost = 0;
     for (std::size_t c = 0; c < rig.camera_count; ++c) {
       const CameraSighting& view = seen[0].camera[c];
       if (!view.used) continue;
       const SE3& T = rig.T_body_cam[c];
-      LinearFactor linear;
-      REQUIRE(linearizeSighting(view, c, pose, T, calibration, pose_offset, landmark, linear));
       const Eigen::Vector2d r = sightingResidual(view, x, T, landmark.x.point);
-      const double root = std::sqrt(RobustWeight::cauchy(r.squaredNorm()).weight);
-      CHECK((linear.residual.head<2>() - root * r).norm() < 1e-9);
-      const auto by_pose = numericJacobian<2, 6>(
+      const RobustWeight robust = RobustWeight::cauchy(r.squaredNorm());
+      Eigen::MatrixXd J = Eigen::MatrixXd::Zero(2, dimension);
+      J.middleCols<kPoseDim>(pose_offset) = numericJacobian<2, 6>(
           [&](const SE3& T_world_body) {
             BodyState y = x_at;
             y.T_world_body = T_world_body;
             return sightingResidual(view, y, T, p_at);
           },
           x_at.T_world_body);
-      const auto by_point = numericJacobian<2, 3>(
+      J.middleCols<kExtraDim>(point_offset) = numericJacobian<2, 3>(
           [&](const Eigen::Vector3d& q) { return sightingResidual(view, x_at, T, q); }, p_at);
-      const auto by_extrinsic = numericJacobian<2, 6>(
+      J.middleCols<kPoseDim>(calibration.extrinsicOffset(c)) = numericJacobian<2, 6>(
           [&](const SE3& T_body_cam) { return sightingResidual(view, x_at, T_body_cam, p_at); }, T);
-      const Eigen::Vector2d by_offset =
-          by_pose.leftCols<3>() * pose.omega_body + by_pose.rightCols<3>() * pose.v_world;
-      CHECK(relativeDifference(jacobianOf(linear, pose_offset, 6).topRows<2>(), root * by_pose) < 1e-6);
-      CHECK(relativeDifference(jacobianOf(linear, landmark.offset, 3).topRows<2>(), root * by_point) < 1e-6);
-      CHECK(relativeDifference(jacobianOf(linear, 0, 1).topRows<2>(), root * by_offset) < 1e-6);
-      CHECK(relativeDifference(jacobianOf(linear, calibration.extrinsicOffset(c), 6).topRows<2>(),
-                               root * by_extrinsic) < 1e-6);
+      J.col(0) =
+          J.middleCols<3>(pose_offset) * pose.omega_body + J.middleCols<3>(pose_offset + 3) * pose.v_world;
+      H += robust.weight * J.transpose() * J;
+      g += robust.weight * J.transpose() * r;
+      cost += robust.cost;
     }
+    std::array<WindowState, kMaxStates> states{};
+    states[0].offset = pose_offset;
+    system->begin(calibration, dimension);
+    system->addExplicitLandmark({seen, {&pose, 1}, rig.T_body_cam, calibration}, landmark.x.point,
+                                landmark.linearization().point, point_offset, states);
+    system->finish(states);
+    const Eigen::MatrixXd lower = H.triangularView<Eigen::Lower>();
+    const Eigen::MatrixXd built = Eigen::MatrixXd(system->H()).triangularView<Eigen::Lower>();
+    CHECK((built - lower).norm() < 1e-6 * lower.norm());
+    CHECK((system->g() - g).norm() < 1e-6 * g.norm());
+    CHECK(system->cost() == Approx(cost).epsilon(1e-9));
   }
 }
 
@@ -295,11 +308,17 @@ TEST_CASE("A point behind the camera gives no factor", "[smoother][extra]") {
   const std::vector<Sighting> seen = scene.sightings(rig, p, kPixelSigma, 0, random);
   REQUIRE(seen.size() == 1);
   const Eigen::Vector3d& centre = scene.poses[0].current[0].center;
-  LinearFactor linear;
-  CHECK(linearizeSighting(seen[0].camera[0], 0, scene.poses[0], rig.T_body_cam[0], {}, 3, pointState(p, 0),
-                          linear));
-  CHECK_FALSE(linearizeSighting(seen[0].camera[0], 0, scene.poses[0], rig.T_body_cam[0], {}, 3,
-                                pointState(2 * centre - p, 0), linear));
+  std::array<WindowState, kMaxStates> states{};
+  states[0].offset = kExtraDim;
+  const auto system = std::make_unique<NormalEquations>();
+  for (const bool behind : {false, true}) {
+    const Eigen::Vector3d at = behind ? Eigen::Vector3d(2 * centre - p) : p;
+    system->begin({}, kExtraDim + kPoseDim);
+    system->addExplicitLandmark({seen, scene.poses, rig.T_body_cam, {}}, at, at, 0, states);
+    system->finish(states);
+    const Eigen::MatrixXd lower = Eigen::MatrixXd(system->H()).triangularView<Eigen::Lower>();
+    CHECK((lower.cwiseAbs().maxCoeff() == 0) == behind);
+  }
 }
 
 namespace {
@@ -367,18 +386,13 @@ struct Bundle {
     for (std::size_t m = 0; m < landmarks.size(); ++m) {
       if (structureless) {
         REQUIRE(triangulate(poses, landmarks[m].views(), 20, landmarks[m].point));
-        REQUIRE(system.addLandmark(landmarks[m], poses, rig.T_body_cam, states));
+        REQUIRE(system.addLandmark({landmarks[m].views(), poses, rig.T_body_cam, {}}, landmarks[m].point,
+                                   states));
         continue;
       }
-      LinearFactor linear;
-      for (const Sighting& s : landmarks[m].sightings) {
-        for (std::size_t c = 0; c < rig.camera_count; ++c) {
-          if (!s.camera[c].used) continue;
-          REQUIRE(linearizeSighting(s.camera[c], c, poses[s.slot], rig.T_body_cam[c], {},
-                                    states[s.slot].offset, extras[m], linear));
-          system.addFactor(linear);
-        }
-      }
+      const Eigen::Vector3d& p = extras[m].x.point;
+      system.addExplicitLandmark({landmarks[m].views(), poses, rig.T_body_cam, {}}, p, p, extras[m].offset,
+                                 states);
     }
     system.finish(states);
     Eigen::VectorXd step = -system.g();
@@ -438,20 +452,13 @@ TEST_CASE("Columns of explicit landmarks, eliminated, are the structureless syst
     bundle.states[k].offset = kPoseDim * static_cast<int>(k);
     copy.states[k].offset = extra_dimension + bundle.states[k].offset;
   }
-  LinearFactor linear;
   for (std::size_t m = 0; m < bundle.landmarks.size(); ++m) {
     Landmark& landmark = bundle.landmarks[m];
     REQUIRE(triangulate(bundle.poses, landmark.views(), 20, landmark.point));
-    REQUIRE(structureless->addLandmark(landmark, bundle.poses, bundle.rig.T_body_cam, bundle.states));
-    const ExtraState extra = pointState(landmark.point.position(), kExtraDim * static_cast<int>(m));
-    for (const Sighting& s : landmark.sightings) {
-      for (std::size_t c = 0; c < bundle.rig.camera_count; ++c) {
-        if (!s.camera[c].used) continue;
-        REQUIRE(linearizeSighting(s.camera[c], c, bundle.poses[s.slot], bundle.rig.T_body_cam[c], {},
-                                  copy.states[s.slot].offset, extra, linear));
-        with_columns->addFactor(linear);
-      }
-    }
+    const LandmarkViews views{landmark.views(), bundle.poses, bundle.rig.T_body_cam, {}};
+    REQUIRE(structureless->addLandmark(views, landmark.point, bundle.states));
+    const Eigen::Vector3d p = landmark.point.position();
+    with_columns->addExplicitLandmark(views, p, p, kExtraDim * static_cast<int>(m), copy.states);
   }
   structureless->finish(bundle.states);
   with_columns->finish(copy.states);

@@ -1,4 +1,5 @@
-// Vector lanes against their scalar twins: one landmark eliminated, one point's system, on random windows
+// Vector lanes against their scalar twins: one landmark eliminated, with and without calibration columns and
+// columns of its own, one point's system, on random windows
 // with any number of sightings, cameras missing, views behind the camera, linearizations left behind.
 
 #include <catch2/catch.hpp>
@@ -10,6 +11,7 @@
 #include "estimator/geometry/so3.hpp"
 #include "estimator/smoother/normal_equations.hpp"
 #include "estimator/smoother/point_system.hpp"
+#include "tests/smoother/scalar_landmark.hpp"
 #include "tests/smoother/window_scene.hpp"
 #include "tests/support/numeric_jacobian.hpp"
 
@@ -45,6 +47,10 @@ struct Window {
     }
   }
 
+  LandmarkViews views(const Landmark& landmark, const CalibrationLayout& layout) const {
+    return {landmark.views(), poses, rig.T_body_cam, layout};
+  }
+
   // Seen by every state; then views are taken out, and some are turned to where the point is behind them.
   Landmark landmark(Random& random) const {
     Landmark result;
@@ -75,34 +81,60 @@ struct Window {
   }
 };
 
-// The window's system of one landmark. With a time offset, whose column comes first, it is the scalar code.
 struct Reduced {
   bool used = false;
   Eigen::MatrixXd H;
   Eigen::VectorXd g;
   double cost = 0;
 
-  Reduced(const Window& window, const Landmark& landmark, bool scalar) {
-    CalibrationLayout layout;
-    layout.time_offset = scalar;
-    layout.cameras = kMaxCameras;
-    std::array<WindowState, kMaxStates> states{};
-    int dimension = layout.dimension();
-    for (std::size_t k = 0; k < window.slots.size(); ++k) {
-      WindowState& state = states[window.slots[k]];
-      state.used = true;
-      state.has_motion = k % 3 == 2;
-      state.offset = dimension;
-      dimension += state.dimension();
+  // Slots have their columns in order of time, behind the calibration's.
+  static std::array<Eigen::Index, kMaxStates> columns(const Window& window, const CalibrationLayout& layout) {
+    std::array<Eigen::Index, kMaxStates> at{};
+    Eigen::Index next = layout.dimension();
+    for (const std::uint32_t slot : window.slots) {
+      at[slot] = next;
+      next += kPoseDim;
     }
+    return at;
+  }
+
+  static Reduced lanes(const Window& window, const Landmark& landmark, const CalibrationLayout& layout) {
+    std::array<WindowState, kMaxStates> states{};
+    const auto at = columns(window, layout);
+    for (const std::uint32_t slot : window.slots) {
+      states[slot].used = true;
+      states[slot].has_motion = false;
+      states[slot].offset = static_cast<int>(at[slot]);
+    }
+    const int dimension = layout.dimension() + kPoseDim * static_cast<int>(window.slots.size());
     const auto system = std::make_unique<NormalEquations>();
     system->begin(layout, dimension);
-    used = system->addLandmark(landmark, window.poses, window.rig.T_body_cam, states);
+    Reduced result;
+    result.used = system->addLandmark(window.views(landmark, layout), landmark.point, states);
     system->finish(states);
-    const Eigen::Index n = dimension - layout.dimension();
-    H = Eigen::MatrixXd(system->H()).bottomRightCorner(n, n).triangularView<Eigen::Lower>();
-    g = system->g().tail(n);
-    cost = system->cost();
+    result.H = Eigen::MatrixXd(system->H()).triangularView<Eigen::Lower>();
+    result.g = system->g();
+    result.cost = system->cost();
+    return result;
+  }
+
+  static Reduced scalar(const Window& window, const Landmark& landmark, const CalibrationLayout& layout) {
+    const Eigen::Index n = layout.dimension() + kPoseDim * static_cast<Eigen::Index>(window.slots.size());
+    test::ScalarLandmark twin(n + 3);
+    const auto at = columns(window, layout);
+    twin.add(window.views(landmark, layout), landmark.point, landmark.point,
+             PointBasis::of(landmark.point.bearing), false, at);
+    Reduced result;
+    result.used = twin.eliminate();
+    if (!result.used) {
+      result.H = Eigen::MatrixXd::Zero(n, n);
+      result.g = Eigen::VectorXd::Zero(n);
+      return result;
+    }
+    result.H = Eigen::MatrixXd(twin.H.topLeftCorner(n, n)).triangularView<Eigen::Lower>();
+    result.g = twin.g.head(n);
+    result.cost = twin.cost;
+    return result;
   }
 };
 
@@ -153,8 +185,10 @@ TEST_CASE("Lanes: a landmark eliminated in fours equals the scalar elimination",
       for (int trial = 0; trial < 4; ++trial) {
         INFO(count << " states, share frozen " << frozen << ", trial " << trial);
         const Landmark landmark = window.landmark(random);
-        const Reduced lanes(window, landmark, false);
-        const Reduced twin(window, landmark, true);
+        // With the time offset, both cameras' extrinsics, both, none.
+        const CalibrationLayout layout{trial % 2 == 1, trial >= 2, window.rig.camera_count};
+        const Reduced lanes = Reduced::lanes(window, landmark, layout);
+        const Reduced twin = Reduced::scalar(window, landmark, layout);
         REQUIRE(lanes.used == twin.used);
         CHECK((lanes.H - twin.H).norm() <= kTwin * twin.H.norm());
         CHECK((lanes.g - twin.g).norm() <= kTwin * twin.g.norm());
@@ -166,6 +200,49 @@ TEST_CASE("Lanes: a landmark eliminated in fours equals the scalar elimination",
   // Both happen, else the comparison is empty.
   CHECK(eliminated > 200);
   CHECK(unused > 5);
+}
+
+TEST_CASE("Lanes: a landmark that keeps its columns equals the scalar sum", "[smoother][lanes]") {
+  Random random(34);
+  for (std::size_t count = 1; count <= kMaxStates; ++count) {
+    const Window window(count, 0.4, random);
+    for (int trial = 0; trial < 4; ++trial) {
+      INFO(count << " states, trial " << trial);
+      const CalibrationLayout layout{trial % 2 == 1, trial >= 2, window.rig.camera_count};
+      const Landmark landmark = window.landmark(random);
+      const Eigen::Vector3d p = landmark.point.reference + 3 * landmark.point.bearing;
+      const Eigen::Vector3d p_lin = p + randomVector(random, 0.02);
+      // The point's columns stand before the poses.
+      std::array<WindowState, kMaxStates> states{};
+      std::array<Eigen::Index, kMaxStates> at = Reduced::columns(window, layout);
+      const int dimension = layout.dimension() + kPoseDim * static_cast<int>(window.slots.size()) + 3;
+      for (const std::uint32_t slot : window.slots) states[slot].offset = static_cast<int>(at[slot]) + 3;
+      const auto system = std::make_unique<NormalEquations>();
+      system->begin(layout, dimension);
+      system->addExplicitLandmark(window.views(landmark, layout), p, p_lin, layout.dimension(), states);
+      system->finish(states);
+      test::ScalarLandmark twin(dimension);
+      const auto pointAt = [](const Eigen::Vector3d& x) {
+        LandmarkPoint point;
+        point.bearing = Eigen::Vector3d::UnitX();
+        point.inverse_depth = 0.5;
+        point.reference = x - 2 * point.bearing;
+        return point;
+      };
+      twin.add(window.views(landmark, layout), pointAt(p), pointAt(p_lin), {}, true, at);
+      const Eigen::Index k = layout.dimension();
+      const Eigen::Index n = dimension - 3 - k;
+      Eigen::VectorXi order(dimension);  // twin's columns, in the system's order
+      for (Eigen::Index i = 0; i < dimension; ++i) {
+        order[i] = static_cast<int>(i < k ? i : (i < k + 3 ? k + n + (i - k) : i - 3));
+      }
+      const Eigen::MatrixXd expected = twin.H(order, order).triangularView<Eigen::Lower>();
+      const Eigen::MatrixXd H = Eigen::MatrixXd(system->H()).triangularView<Eigen::Lower>();
+      CHECK((H - expected).norm() <= kTwin * expected.norm());
+      CHECK((system->g() - twin.g(order)).norm() <= kTwin * twin.g.norm());
+      CHECK(std::abs(system->cost() - twin.cost) <= kTwin * twin.cost);
+    }
+  }
 }
 
 TEST_CASE("Lanes: a point's system equals the scalar sum", "[smoother][lanes]") {

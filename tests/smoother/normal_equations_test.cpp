@@ -78,6 +78,10 @@ struct Window {
     if (landmark.sightings.size() >= 2) landmarks.push_back(landmark);
   }
 
+  [[nodiscard]] LandmarkViews views(const Landmark& landmark) const {
+    return {landmark.views(), poses, rig.T_body_cam, calibration};
+  }
+
   [[nodiscard]] std::size_t timeOf(std::uint32_t slot) const {
     return static_cast<std::size_t>(std::find(kSlots.begin(), kSlots.end(), slot) - kSlots.begin());
   }
@@ -153,7 +157,7 @@ void checkAgainstDense(const Window& w) {
   system->begin(w.calibration, w.dimension);
   std::vector<EliminatedPoint> eliminated(w.landmarks.size());
   for (std::size_t i = 0; i < w.landmarks.size(); ++i) {
-    REQUIRE(system->addLandmark(w.landmarks[i], w.poses, w.rig.T_body_cam, w.states, &eliminated[i]));
+    REQUIRE(system->addLandmark(w.views(w.landmarks[i]), w.landmarks[i].point, w.states, &eliminated[i]));
   }
   system->finish(w.states);
   Dense dense = denseSystem(w);
@@ -222,9 +226,9 @@ TEST_CASE("A landmark needs two states", "[smoother][normal_equations]") {
   system->begin(w.calibration, w.dimension);
   Landmark landmark = w.landmarks[0];
   while (landmark.sightings.size() > 1) landmark.sightings.popBack();
-  CHECK_FALSE(system->addLandmark(landmark, w.poses, w.rig.T_body_cam, w.states));
+  CHECK_FALSE(system->addLandmark(w.views(landmark), landmark.point, w.states));
   landmark.sightings.clear();
-  CHECK_FALSE(system->addLandmark(landmark, w.poses, w.rig.T_body_cam, w.states));
+  CHECK_FALSE(system->addLandmark(w.views(landmark), landmark.point, w.states));
   system->finish(w.states);
   CHECK(system->H().cwiseAbs().maxCoeff() == 0);
   CHECK(system->g().cwiseAbs().maxCoeff() == 0);
@@ -283,7 +287,7 @@ TEST_CASE("Eliminated landmarks do not see position and yaw, wherever the states
     auto system = std::make_unique<NormalEquations>();
     system->begin(w.calibration, w.dimension);
     for (const Landmark& landmark : w.landmarks) {
-      REQUIRE(system->addLandmark(landmark, w.poses, w.rig.T_body_cam, w.states));
+      REQUIRE(system->addLandmark(w.views(landmark), landmark.point, w.states));
     }
     system->finish(w.states);
     const Eigen::MatrixXd H = Eigen::MatrixXd(system->H()).selfadjointView<Eigen::Lower>();
