@@ -39,6 +39,14 @@ class FixedVector {
     assert(size <= kCapacity);
     size_ = size;
   }
+  /// Inserts before element `index`, keeping the order of the others, where the caller knows that there is
+  /// room. O(size).
+  void insert(std::size_t index, const T& value) {
+    assert(!full() && index <= size_);
+    if (full()) return;
+    for (std::size_t i = size_++; i > index; --i) items_[i] = items_[i - 1];
+    items_[index] = value;
+  }
   /// Removes element `index`, keeping the order of the others. O(size).
   void erase(std::size_t index) {
     assert(index < size_);

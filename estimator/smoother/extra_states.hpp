@@ -26,6 +26,11 @@ inline constexpr std::size_t kMaxExtraStates = kMaxExplicitLandmarks + kMaxPlane
 inline constexpr std::uint8_t kNoExtra = 255;
 static_assert(kMaxStates + kMaxExtraStates < kNoExtra, "slots are bytes");
 
+/// Keeps columns that nothing determines (a plane without points, a landmark that one camera sees once) from
+/// being singular; only in the solve, not in what goes into the prior. A kilometre and a thousand radian: ten
+/// orders below a sighting.
+inline constexpr double kWeakInformation = 1e-6;  // 1/m^2, 1/rad^2
+
 /// Of one smoother: never given twice.
 using PlaneId = std::uint64_t;
 

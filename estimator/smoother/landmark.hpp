@@ -12,6 +12,7 @@
 // Memory: 4.3 kB a landmark of the window. Equations and Jacobians: docs/smoother.md.
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -55,11 +56,15 @@ struct Landmark {
   std::uint64_t last_frame = 0;  ///< index of the newest frame that saw it
   int frames_seen = 0;
   int rejections = 0;             ///< solves in which it did not fit
+  bool in_system = false;         ///< takes part in the solve at hand
   std::uint8_t extra = kNoExtra;  ///< index of its own state; none: structureless
   LandmarkPoint point;
   FixedVector<Sighting, kMaxStates> sightings;
 
   [[nodiscard]] std::span<const Sighting> views() const { return {sightings.data(), sightings.size()}; }
+  [[nodiscard]] bool seenFrom(std::uint32_t slot) const {
+    return std::ranges::find(sightings, slot, &Sighting::slot) != sightings.end();
+  }
   /// Sightings, each camera counted.
   [[nodiscard]] int viewCount() const {
     int count = 0;

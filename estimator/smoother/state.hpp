@@ -50,7 +50,7 @@ struct WindowState {
   bool frozen = false;     ///< the prior touches it: Jacobians are taken at `moved_estimate`
   BodyState x;
   BodyState first_estimate;  ///< the prior's reference
-  BodyState moved_estimate;  ///< first_estimate, moved with the window (see Smoother::moveEstimates)
+  BodyState moved_estimate;  ///< first_estimate, moved with the window (Window::moveEstimates)
   LinkKind link = LinkKind::kNone;
   Preintegration imu;        ///< from the previous state with motion, when link is kImu
   double link_duration = 0;  ///< s

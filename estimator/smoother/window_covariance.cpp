@@ -1,51 +1,56 @@
-// Covariances from the factor of the last solve, and the record of a keyframe that leaves.
+#include "estimator/smoother/window_covariance.hpp"
 
 #include <Eigen/Cholesky>
 
 #include "estimator/geometry/so3.hpp"
-#include "estimator/smoother/smoother.hpp"
 
 namespace swiftlet {
 
-// The factor outlives the system, which marginalization reuses.
-void Smoother::keepFactor() {
-  system_.swapMatrix(factor_);
-  const MatrixMap L = alignedMap(factor_, dimension_);
-  factor_dimension_ = dimension_;
-  for (const std::uint8_t slot : order_) {
-    states_[slot].factor_offset = states_[slot].offset;
-    states_[slot].factor_dimension = states_[slot].dimension();
+WindowCovariance::WindowCovariance()
+    : factor_(alignedMapSize(kMaxSystemDim)),
+      columns_i_(static_cast<std::size_t>(kMaxSystemDim) * kStateDim),
+      columns_j_(static_cast<std::size_t>(kMaxSystemDim) * kStateDim) {}
+
+void WindowCovariance::take(NormalEquations& system, WindowProblem& problem) {
+  system.swapMatrix(factor_);
+  dimension_ = problem.dimension;
+  for (const std::uint8_t slot : problem.window.order()) {
+    WindowState& state = problem.window.inSlot(slot);
+    state.factor_offset = state.offset;
+    state.factor_dimension = state.dimension();
   }
-  for (ExtraState& extra : extras_) extra.factor_offset = extra.kind == ExtraKind::kNone ? -1 : extra.offset;
+  for (ExtraState& extra : problem.extras.states()) {
+    extra.factor_offset = extra.kind == ExtraKind::kNone ? -1 : extra.offset;
+  }
   // The newest state is last: its marginal is the inverse of the factor's last diagonal block.
-  const int at = states_[order_.back()].offset;
+  const MatrixMap L = factor();
+  const int at = problem.window.newest().offset;
   Matrix15d corner = Matrix15d::Zero();
   for (int c = 0; c < kStateDim; ++c) {
     for (int r = c; r < kStateDim; ++r) corner(r, c) = L(at + r, at + c);
   }
   const Matrix15d inverse = corner.triangularView<Eigen::Lower>().solve(Matrix15d::Identity());
-  covariance_ = inverse.transpose() * inverse;
+  newest_ = inverse.transpose() * inverse;
 }
 
-void Smoother::solveFactorColumns(int offset, int count, std::vector<double>& columns) {
-  const MatrixMap L = alignedMap(factor_, factor_dimension_);
+void WindowCovariance::solveColumns(int offset, int count, std::vector<double>& columns) {
+  const MatrixMap L = factor();
   for (int c = 0; c < count; ++c) {
-    VectorMap column(columns.data() + static_cast<std::ptrdiff_t>(c) * factor_dimension_, factor_dimension_);
+    VectorMap column(columns.data() + static_cast<std::ptrdiff_t>(c) * dimension_, dimension_);
     column.setZero();
     column[offset + c] = 1.0;
     choleskyForward(L, column, offset + c);
   }
 }
 
-bool Smoother::relativeCovariance(std::size_t i, std::size_t j, Eigen::Matrix<double, 6, 6>& covariance) {
-  const WindowState& a = states_[order_[i]];
-  const WindowState& b = states_[order_[j]];
-  if (a.factor_offset < 0 || b.factor_offset < 0 || factor_dimension_ == 0) return false;
-  solveFactorColumns(a.factor_offset, kPoseDim, columns_i_);
-  solveFactorColumns(b.factor_offset, kPoseDim, columns_j_);
+bool WindowCovariance::relative(const WindowState& a, const WindowState& b,
+                                Eigen::Matrix<double, 6, 6>& covariance) {
+  if (a.factor_offset < 0 || b.factor_offset < 0 || dimension_ == 0) return false;
+  solveColumns(a.factor_offset, kPoseDim, columns_i_);
+  solveColumns(b.factor_offset, kPoseDim, columns_j_);
   using Columns = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, kPoseDim>>;
-  const Columns Y_a(columns_i_.data(), factor_dimension_, kPoseDim);
-  const Columns Y_b(columns_j_.data(), factor_dimension_, kPoseDim);
+  const Columns Y_a(columns_i_.data(), dimension_, kPoseDim);
+  const Columns Y_b(columns_j_.data(), dimension_, kPoseDim);
   Eigen::Matrix<double, 12, 12> joint;
   joint.topLeftCorner<6, 6>().noalias() = Y_a.transpose() * Y_a;
   joint.bottomRightCorner<6, 6>().noalias() = Y_b.transpose() * Y_b;
@@ -66,7 +71,17 @@ bool Smoother::relativeCovariance(std::size_t i, std::size_t j, Eigen::Matrix<do
   return true;
 }
 
-KeyframeState Smoother::record(const WindowState& state) {
+Eigen::Matrix3d WindowCovariance::of(const ExtraState& extra) {
+  if (extra.factor_offset < 0) return Eigen::Matrix3d::Zero();
+  solveColumns(extra.factor_offset, kExtraDim, columns_i_);
+  const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, kExtraDim>> Y(columns_i_.data(), dimension_,
+                                                                             kExtraDim);
+  Eigen::Matrix3d covariance;
+  covariance.noalias() = Y.transpose() * Y;
+  return covariance;
+}
+
+KeyframeState WindowCovariance::record(const WindowState& state) {
   KeyframeState keyframe;
   keyframe.state.stamp = state.stamp - Duration::fromSeconds(state.time_offset);
   keyframe.state.health = state.health;
@@ -77,24 +92,15 @@ KeyframeState Smoother::record(const WindowState& state) {
   keyframe.state.covariance = state.covariance;
   keyframe.statistics = state.statistics;
   if (state.factor_offset < 0) return keyframe;
-  // Velocity and biases of a pose-only keyframe keep the covariance they had when they left; their
-  // correlation with the pose, which has been refined since, is not known any more.
   const int count = state.factor_dimension;
   const int rest = kStateDim - count;
   keyframe.state.covariance.topRightCorner(count, rest).setZero();
   keyframe.state.covariance.bottomLeftCorner(rest, count).setZero();
-  solveFactorColumns(state.factor_offset, count, columns_i_);
+  solveColumns(state.factor_offset, count, columns_i_);
   const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxSystemDim, kStateDim>>
-      Y(columns_i_.data(), factor_dimension_, count);
+      Y(columns_i_.data(), dimension_, count);
   keyframe.state.covariance.topLeftCorner(count, count) = Y.transpose() * Y;
   return keyframe;
-}
-
-void Smoother::flush(FixedVector<KeyframeState, kMaxStates>& left_window) {
-  left_window.clear();
-  for (const std::uint8_t slot : order_) {
-    if (states_[slot].keyframe) static_cast<void>(left_window.tryPushBack(record(states_[slot])));
-  }
 }
 
 }  // namespace swiftlet

@@ -1,0 +1,60 @@
+#include "estimator/smoother/calibration_state.hpp"
+
+#include "estimator/geometry/so3.hpp"
+
+namespace swiftlet {
+namespace {
+
+// What a given calibration is known to, where it is estimated.
+constexpr double kTimeOffsetSigma = 5e-3;         // s
+constexpr double kExtrinsicRotationSigma = 0.01;  // rad
+// Calibrations give positions to a few millimetres; a looser prior gives up the baseline, stereo's scale.
+constexpr double kExtrinsicPositionSigma = 2e-3;  // m
+
+}  // namespace
+
+CalibrationState::CalibrationState(const Rig& rig, bool estimate_time_offset, bool estimate_extrinsics)
+    : layout_{estimate_time_offset, estimate_extrinsics, rig.camera_count},
+      now_{rig.camera_to_imu_shift.seconds(), rig.T_body_cam},
+      reference_(now_),
+      backup_(now_) {}
+
+void CalibrationState::hold(MatrixMap H) {
+  reference_ = now_;
+  if (layout_.time_offset) H(0, 0) = 1.0 / (kTimeOffsetSigma * kTimeOffsetSigma);
+  if (!layout_.extrinsics) return;
+  for (std::size_t c = 0; c < layout_.cameras; ++c) {
+    const int at = layout_.extrinsicOffset(c);
+    for (int k = 0; k < 3; ++k) {
+      H(at + k, at + k) = 1.0 / (kExtrinsicRotationSigma * kExtrinsicRotationSigma);
+      H(at + 3 + k, at + 3 + k) = 1.0 / (kExtrinsicPositionSigma * kExtrinsicPositionSigma);
+    }
+  }
+}
+
+CalibrationState::Vector CalibrationState::deviation() const {
+  Vector d = Vector::Zero();
+  if (layout_.time_offset) d[0] = now_.time_offset - reference_.time_offset;
+  if (!layout_.extrinsics) return d;
+  for (std::size_t c = 0; c < layout_.cameras; ++c) {
+    const int at = layout_.extrinsicOffset(c);
+    const SE3& now = now_.T_body_cam[c];
+    const SE3& then = reference_.T_body_cam[c];
+    d.segment<3>(at) = logSo3(then.rotation.conjugate() * now.rotation);
+    d.segment<3>(at + 3) = now.translation - then.translation;
+  }
+  return d;
+}
+
+void CalibrationState::retract(const Eigen::Ref<const Eigen::VectorXd>& step) {
+  if (layout_.time_offset) now_.time_offset += step[0];
+  if (!layout_.extrinsics) return;
+  for (std::size_t c = 0; c < layout_.cameras; ++c) {
+    const int at = layout_.extrinsicOffset(c);
+    SE3& T = now_.T_body_cam[c];
+    T.rotation = (T.rotation * expSo3(step.segment<3>(at))).normalized();
+    T.translation += step.segment<3>(at + 3);
+  }
+}
+
+}  // namespace swiftlet

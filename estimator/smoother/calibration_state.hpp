@@ -1,0 +1,49 @@
+#pragma once
+// The calibration as the window holds it: given, or with columns of its own and estimated.
+//
+// Time offset (t_imu = t_image + offset, s) and T_body_cam of each camera; error state and columns as in
+// calibration_columns.hpp. The prior's reference is the value of `hold`.
+
+#include <Eigen/Core>
+#include <array>
+
+#include "estimator/camera/rig.hpp"
+#include "estimator/smoother/calibration_columns.hpp"
+#include "estimator/smoother/cholesky.hpp"
+
+namespace swiftlet {
+
+class CalibrationState {
+ public:
+  using Vector = Eigen::Matrix<double, kMaxCalibrationDim, 1>;
+
+  CalibrationState(const Rig& rig, bool estimate_time_offset, bool estimate_extrinsics);
+
+  [[nodiscard]] const CalibrationLayout& layout() const { return layout_; }
+  [[nodiscard]] int dimension() const { return layout_.dimension(); }
+  [[nodiscard]] double timeOffset() const { return now_.time_offset; }
+  [[nodiscard]] const std::array<SE3, kMaxCameras>& T_body_cam() const { return now_.T_body_cam; }
+
+  /// The values of now become the reference, and H, of a new prior, gets what is known of a calibration
+  /// beforehand.
+  void hold(MatrixMap H);
+  /// Values [-] reference, in the first dimension() rows.
+  [[nodiscard]] Vector deviation() const;
+  /// By the first dimension() rows of a step.
+  void retract(const Eigen::Ref<const Eigen::VectorXd>& step);
+  void backup() { backup_ = now_; }
+  void restore() { now_ = backup_; }
+
+ private:
+  struct Values {
+    double time_offset = 0;
+    std::array<SE3, kMaxCameras> T_body_cam;
+  };
+
+  CalibrationLayout layout_;
+  Values now_;
+  Values reference_;
+  Values backup_;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,91 @@
+#pragma once
+// Explicit landmarks and planes of the window: their slots, the factors that tie them, how they enter and
+// leave.
+//
+// Slots 0 to kMaxExplicitLandmarks - 1 are landmarks', the others planes'. What leaves is marked, goes into
+// the prior with the next marginalization (marginalization.hpp), and is freed there; what the prior does not
+// know is freed at once. Memory: 45 kB. Cost of each call: linear in slots and factors.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "estimator/core/fixed_vector.hpp"
+#include "estimator/core/status.hpp"
+#include "estimator/messages/plane_report.hpp"
+#include "estimator/smoother/extra_factors.hpp"
+#include "estimator/smoother/landmark_table.hpp"
+
+namespace swiftlet {
+
+/// Everything that is tied to planes: each explicit landmark to two, each plane with a direction.
+inline constexpr std::size_t kMaxExtraFactors = 2 * kMaxExplicitLandmarks + kMaxPlanes;
+
+class ExtraTable {
+ public:
+  explicit ExtraTable(LandmarkTable& landmarks) : landmarks_(landmarks) {}
+
+  void clear();
+
+  // As Smoother says of them.
+  Status promote(TrackId id);
+  [[nodiscard]] bool promoted(TrackId id) const;
+  std::optional<PlaneId> addPlane(const Plane& plane);
+  Status addPointOnPlane(TrackId id, PlaneId plane, double sigma);
+  Status addPlaneDirection(PlaneId plane, PlaneDirection direction, double sigma);
+  void removePointOnPlane(TrackId id, PlaneId plane);
+  /// True when the prior knows it: marked as leaving then, gone otherwise.
+  bool removePlane(PlaneId plane);
+  [[nodiscard]] const ExtraState* findPlane(PlaneId id) const;
+  [[nodiscard]] int pointsOn(const ExtraState& plane) const;
+  [[nodiscard]] std::size_t count(ExtraKind kind) const;
+
+  [[nodiscard]] std::array<ExtraState, kMaxExtraStates>& states() { return extras_; }
+  [[nodiscard]] const std::array<ExtraState, kMaxExtraStates>& states() const { return extras_; }
+  [[nodiscard]] const FixedVector<ExtraFactor, kMaxExtraFactors>& factors() const { return factors_; }
+  [[nodiscard]] std::uint8_t indexOf(const ExtraState& extra) const {
+    return static_cast<std::uint8_t>(&extra - extras_.data());
+  }
+  /// Whitened and weighted.
+  void linearize(const ExtraFactor& factor, LinearFactor& linear) const;
+  /// A plane's factors count once its points determine it.
+  [[nodiscard]] bool counts(const ExtraFactor& factor) const { return extras_[factor.plane].settled; }
+  /// New planes are fitted to their points before they count.
+  void settlePlanes();
+
+  /// Gives each its columns; returns the first one behind them. columns(): how many there are.
+  int assignOffsets(int first);
+  [[nodiscard]] int columns() const { return columns_; }
+  void retract(const Eigen::Ref<const Eigen::VectorXd>& step);
+  void backup();
+  void restore();
+  void moveEstimates(const Eigen::Vector3d& shift);
+
+  /// A landmark fits nowhere: what is in the prior cannot be taken back, the rest goes at once.
+  void discard(Landmark& landmark);
+  /// Explicit landmarks leave as structureless ones do: with a keyframe, once no frame from `oldest_recent`
+  /// on sees them; planes with the last of their points.
+  void markDepartures(std::uint8_t slot, std::uint64_t oldest_recent);
+  [[nodiscard]] bool departs(const ExtraFactor& factor) const;
+  void vacate(ExtraState& extra);
+  /// Marks what is left without a sighting or a point, and frees what the prior does not know. True when the
+  /// rest needs a marginalization.
+  bool release();
+
+ private:
+  ExtraState* findFree(std::size_t first, std::size_t last);
+  ExtraState* findPlaneToChange(PlaneId id) { return const_cast<ExtraState*>(findPlane(id)); }
+  void follow(const ExtraState& extra);
+  double linearizePlane(const ExtraState& plane, Eigen::Matrix3d& H, Eigen::Vector3d& g) const;
+  void dropFactorsOf(std::uint8_t extra);
+  void markBarePlanes();
+
+  LandmarkTable& landmarks_;
+  std::array<ExtraState, kMaxExtraStates> extras_;
+  FixedVector<ExtraFactor, kMaxExtraFactors> factors_;
+  int columns_ = 0;
+  PlaneId next_plane_ = 1;
+};
+
+}  // namespace swiftlet

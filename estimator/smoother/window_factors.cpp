@@ -1,0 +1,149 @@
+#include "estimator/smoother/window_factors.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/geometry/so3.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr double kRestVelocitySigma = 0.01;    // m/s
+constexpr double kRestPositionSigma = 3e-4;    // m, between two frames at rest: 6 mm/s at 20 Hz
+constexpr double kRestRotationSigma = 3.5e-4;  // rad, likewise
+
+// Rest is soft: the velocity is near zero, and two frames at rest are at nearly the same pose. It
+// lives and leaves with the motion factor between the two states, so that the prior inherits it.
+void addRest(const WindowState& i, const WindowState& j, NormalEquations& system) {
+  if (!j.at_rest) return;
+  system.addDiagonal(j, 6, j.x.v_world_body, kRestVelocitySigma);
+  if (!i.at_rest) return;
+  MotionFactor factor;
+  factor.residual.setZero();
+  factor.jacobian_i.setZero();
+  factor.jacobian_j.setZero();
+  factor.residual.segment<3>(0) =
+      logSo3(i.x.T_world_body.rotation.conjugate() * j.x.T_world_body.rotation) / kRestRotationSigma;
+  factor.residual.segment<3>(3) =
+      (j.x.T_world_body.translation - i.x.T_world_body.translation) / kRestPositionSigma;
+  factor.jacobian_i.block<3, 3>(0, 0) = -Eigen::Matrix3d::Identity() / kRestRotationSigma;
+  factor.jacobian_j.block<3, 3>(0, 0) = Eigen::Matrix3d::Identity() / kRestRotationSigma;
+  factor.jacobian_i.block<3, 3>(3, 3) = -Eigen::Matrix3d::Identity() / kRestPositionSigma;
+  factor.jacobian_j.block<3, 3>(3, 3) = Eigen::Matrix3d::Identity() / kRestPositionSigma;
+  system.addMotion(factor, i, j);
+}
+
+void addSightings(const WindowProblem& problem, const ExtraState& extra, std::span<const Sighting> sightings,
+                  NormalEquations& system) {
+  system.addExplicitLandmark(problem.viewsOf(sightings), extra.x.point, extra.linearization().point,
+                             extra.offset, problem.window.slots());
+}
+
+void addFactor(const WindowProblem& problem, const ExtraFactor& factor, NormalEquations& system) {
+  LinearFactor linear;
+  problem.extras.linearize(factor, linear);
+  system.addFactor(linear);
+}
+
+}  // namespace
+
+double addPrior(WindowProblem& problem, NormalEquations& system, std::vector<double>& work) {
+  Prior& prior = problem.prior;
+  if (prior.empty()) return 0;
+  double cost = 0;
+  MatrixMap H = system.H();
+  VectorMap g = system.g();
+  MatrixMap prior_H = prior.H();
+  Eigen::Map<Eigen::VectorXd> deviation(work.data(), prior.dimension());
+  for (const PriorBlock& block : prior.blocks()) {
+    if (block.slot == PriorBlock::kCalibration) {
+      deviation.segment(block.offset, block.dimension) =
+          problem.calibration.deviation().head(block.dimension);
+    } else if (block.isExtra()) {
+      deviation.segment<kExtraDim>(block.offset) =
+          problem.extras.states()[block.slot - kMaxStates].deviation();
+    } else {
+      deviation.segment(block.offset, block.dimension) =
+          problem.window.inSlot(block.slot).x.minus(block.reference).head(block.dimension);
+    }
+  }
+  for (const PriorBlock& row : prior.blocks()) {
+    const int at = problem.offsetOf(row.slot);
+    for (const PriorBlock& column : prior.blocks()) {
+      const int to = problem.offsetOf(column.slot);
+      if (to > at) continue;
+      H.block(at, to, row.dimension, column.dimension) +=
+          prior_H.block(row.offset, column.offset, row.dimension, column.dimension);
+    }
+    for (int k = 0; k < row.dimension; ++k) {
+      double force = 0;
+      for (int m = 0; m < prior.dimension(); ++m) force += prior_H(m, row.offset + k) * deviation[m];
+      const double b = prior.b()[row.offset + k];
+      g[at + k] += b + force;
+      cost += deviation[row.offset + k] * (b + 0.5 * force);
+    }
+  }
+  return cost;
+}
+
+double addMotion(const WindowProblem& problem, std::size_t position, NormalEquations& system) {
+  if (position == 0) return -1;
+  const WindowState& i = problem.window[position - 1];
+  const WindowState& j = problem.window[position];
+  if (!i.has_motion || !j.has_motion || j.link == LinkKind::kNone) return -1;
+  MotionFactor factor;
+  const bool valid =
+      j.link == LinkKind::kImu
+          ? imuFactor(j.imu, problem.noise, i.x, j.x, i.linearization(), j.linearization(), factor)
+          : constantVelocityFactor(j.link_duration, problem.noise, i.x, j.x, i.linearization(),
+                                   j.linearization(), factor);
+  if (!valid) return -1;
+  system.addMotion(factor, i, j);
+  addRest(i, j, system);
+  return std::sqrt(factor.residual.head<9>().squaredNorm() / 9.0);
+}
+
+void addExtras(const WindowProblem& problem, NormalEquations& system) {
+  for (const ExtraState& extra : problem.extras.states()) {
+    if (extra.isLandmark()) addSightings(problem, extra, problem.landmarks[extra.landmark].views(), system);
+  }
+  for (const ExtraFactor& factor : problem.extras.factors()) {
+    if (problem.extras.counts(factor)) addFactor(problem, factor, system);
+  }
+}
+
+// The sigma of a landmark's inverse depth is that along its first ray with everything else held, as
+// triangulation gives it.
+void finishExtras(WindowProblem& problem, NormalEquations& system) {
+  MatrixMap H = system.H();
+  for (const ExtraState& extra : problem.extras.states()) {
+    if (extra.kind == ExtraKind::kNone) continue;
+    for (int k = 0; k < kExtraDim; ++k) H(extra.offset + k, extra.offset + k) += kWeakInformation;
+    if (!extra.isLandmark()) continue;
+    LandmarkPoint& point = problem.landmarks[extra.landmark].point;
+    const Eigen::Matrix3d lower = H.block<kExtraDim, kExtraDim>(extra.offset, extra.offset);
+    const Eigen::Matrix3d information = lower.selfadjointView<Eigen::Lower>();
+    const double variance = point.bearing.dot(information.llt().solve(point.bearing));
+    point.inverse_depth_sigma =
+        point.inverse_depth * point.inverse_depth * std::sqrt(std::max(variance, 0.0));
+  }
+}
+
+void addDepartingExtras(const WindowProblem& problem, const std::uint8_t* slot, NormalEquations& system) {
+  for (const ExtraState& extra : problem.extras.states()) {
+    if (!extra.isLandmark()) continue;
+    const std::span<const Sighting> sightings = problem.landmarks[extra.landmark].views();
+    if (extra.leaving) {
+      addSightings(problem, extra, sightings, system);
+    } else if (slot != nullptr) {
+      const auto at = std::ranges::find(sightings, *slot, &Sighting::slot);
+      if (at != sightings.end()) addSightings(problem, extra, {at, 1}, system);
+    }
+  }
+  for (const ExtraFactor& factor : problem.extras.factors()) {
+    if (problem.extras.departs(factor) && problem.extras.counts(factor)) addFactor(problem, factor, system);
+  }
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,193 @@
+#include "estimator/smoother/window_solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/smoother/window_factors.hpp"
+
+namespace swiftlet {
+namespace {
+
+// First-order bias correction of an increment is exact to about (bias change x duration)^2 / 2.
+constexpr double kReintegrateGyro = 5e-4;   // rad/s
+constexpr double kReintegrateAccel = 5e-2;  // m/s^2
+constexpr double kRelativeDamping = 1e-10;
+constexpr int kTriangulationStart = 6;         // iterations for a landmark in its first solve
+constexpr int kTriangulationRestart = 2;       // and for all when states have gone back
+constexpr double kConverged = 1e-4;            // largest step worth another iteration: m, rad, m/s
+constexpr double kCostIncreaseAllowed = 0.02;  // of the factors' cost, before a step is taken back
+constexpr double kOutlierSigmas = 20.0;        // of one sighting, during the solve
+constexpr double kFinalOutlierSigmas = 3.5;
+constexpr int kMaxRejections = 3;  // solves in which a landmark may fail to fit
+
+// Of the 3-vectors that a step is made of, the longest, and the time offset's where it comes first. Lengths,
+// not components: when the iteration ends must not depend on which way the world's axes point. Without the
+// extra states' columns, `extra` behind the first `calibration`: points far away are not worth an iteration.
+double largestStep(const VectorMap& step, bool with_time_offset, int calibration, int extra) {
+  double largest = with_time_offset ? std::abs(step[0]) : 0;
+  for (Eigen::Index k = with_time_offset ? 1 : 0; k + 3 <= step.size(); k += 3) {
+    if (k >= calibration && k < calibration + extra) continue;
+    largest = std::max(largest, step.segment<3>(k).norm());
+  }
+  return largest;
+}
+
+// Of the poses' parts alone, the longest.
+double largestPoseStep(const VectorMap& step, const Window& window) {
+  double largest = 0;
+  for (std::size_t k = 0; k < window.size(); ++k) {
+    const Eigen::Index at = window[k].offset;
+    largest = std::max({largest, step.segment<3>(at).norm(), step.segment<3>(at + 3).norm()});
+  }
+  return largest;
+}
+
+// A failed fit; true when it was the last that is allowed.
+bool reject(WindowProblem& problem, Landmark& landmark) {
+  if (++landmark.rejections < kMaxRejections) return false;
+  landmark.in_system = false;
+  problem.extras.discard(landmark);
+  return true;
+}
+
+}  // namespace
+
+WindowSolver::WindowSolver() : eliminated_(kMaxLandmarks), step_(kMaxSystemDim) {}
+
+void WindowSolver::reintegrate(WindowProblem& problem) const {
+  Window& window = problem.window;
+  for (std::size_t k = 1; k < window.size(); ++k) {
+    WindowState& state = window[k];
+    const WindowState& previous = window[k - 1];
+    if (!previous.has_motion || state.link != LinkKind::kImu) continue;
+    const bool moved = (previous.x.bias_gyro - state.imu.biasGyro()).norm() > kReintegrateGyro ||
+                       (previous.x.bias_accel - state.imu.biasAccel()).norm() > kReintegrateAccel;
+    // The newest interval but one ended without the sample behind its last image.
+    if (moved || k + 2 == window.size()) problem.integrateLink(state, previous);
+  }
+}
+
+// Landmarks that have no point yet get one; the others move by `iterations` steps of their own, with none
+// they are only looked at.
+void WindowSolver::triangulateAll(WindowProblem& problem, int iterations) const {
+  for (Landmark& landmark : problem.landmarks) {
+    if (landmark.extra != kNoExtra) {
+      landmark.in_system = !landmark.sightings.empty();
+      continue;
+    }
+    const int steps = landmark.point.triangulated ? iterations : kTriangulationStart;
+    landmark.in_system = landmark.sightings.size() >= 2 &&
+                         triangulate(problem.rig_poses, landmark.views(), steps, landmark.point);
+  }
+}
+
+void WindowSolver::build(WindowProblem& problem, NormalEquations& system, FrameStatistics& statistics) {
+  system.begin(problem.calibration.layout(), problem.dimension);
+  prior_cost_ = addPrior(problem, system, step_);
+  for (std::size_t k = 1; k < problem.window.size(); ++k) {
+    const double residual = addMotion(problem, k, system);
+    if (k + 1 == problem.window.size() && residual >= 0) statistics.imu_residual = residual;
+  }
+  for (Landmark& landmark : problem.landmarks) {
+    if (!landmark.in_system || landmark.extra != kNoExtra) continue;
+    landmark.in_system =
+        system.addLandmark(problem.viewsOf(landmark.views()), landmark.point, problem.window.slots(),
+                           &eliminated_[problem.landmarks.indexOf(landmark)]);
+  }
+  addExtras(problem, system);
+  system.finish(problem.window.slots());
+  finishExtras(problem, system);
+}
+
+// The points' part of the step that was solved for.
+void WindowSolver::substitutePoints(WindowProblem& problem, const VectorMap& step) const {
+  for (Landmark& landmark : problem.landmarks) {
+    if (!landmark.in_system || landmark.extra != kNoExtra) continue;
+    LandmarkPoint& point = landmark.point;
+    const Eigen::Vector3d point_step =
+        eliminated_[problem.landmarks.indexOf(landmark)].step(step, problem.window.slots());
+    landmark.in_system = point_step.allFinite();
+    if (landmark.in_system) movePoint(point_step, PointBasis::of(point.bearing), point);
+  }
+}
+
+Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, WindowCovariance& covariance,
+                           int iterations, double pose_tolerance, FrameStatistics& statistics) {
+  problem.assignOffsets();
+  problem.extras.settlePlanes();
+  reintegrate(problem);
+  const int calibration = problem.calibration.dimension();
+  const bool time_offset = problem.calibration.layout().time_offset;
+  double cost = 0;
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    problem.moveEstimates();
+    problem.placeCameras();
+    if (iteration == 0) triangulateAll(problem, 0);
+    if (iteration == 1) rejectNewestSightings(problem, kOutlierSigmas);
+    build(problem, system, statistics);
+    // The prior's cost has an offset of its own: only differences of the sum mean anything.
+    const double total = system.cost() + prior_cost_;
+    if (iteration > 1 && total > cost + kCostIncreaseAllowed * system.cost()) {
+      problem.restore();
+      problem.placeCameras();
+      triangulateAll(problem, kTriangulationRestart);
+      break;
+    }
+    cost = total;
+    MatrixMap H = system.H();
+    for (int k = 0; k < problem.dimension; ++k) H(k, k) *= 1.0 + kRelativeDamping;
+    if (!choleskyInPlace(H)) {
+      if (iteration == 0) return {StatusCode::kFailed, "the window's normal equations are singular; reset"};
+      break;
+    }
+    covariance.take(system, problem);
+    VectorMap step(step_.data(), problem.dimension);
+    step = -system.g();
+    choleskySolve(covariance.factor(), step);
+    if (!step.allFinite()) return {StatusCode::kFailed, "the window's solution is not finite; reset"};
+    problem.backup();
+    substitutePoints(problem, step);
+    problem.retract(step);
+    statistics.iterations = iteration + 1;
+    if (largestStep(step, time_offset, calibration, problem.extras.columns()) < kConverged ||
+        largestPoseStep(step, problem.window) < pose_tolerance) {
+      break;
+    }
+  }
+  problem.placeCameras();
+  rejectNewestSightings(problem, kFinalOutlierSigmas);
+  rejectLandmarks(problem, kFinalOutlierSigmas);
+  return okStatus();
+}
+
+void rejectNewestSightings(WindowProblem& problem, double sigmas) {
+  const std::uint8_t newest = problem.window.newestSlot();
+  for (Landmark& landmark : problem.landmarks) {
+    if (!landmark.in_system || landmark.sightings.empty()) continue;
+    Sighting& sighting = landmark.sightings.back();
+    if (sighting.slot != newest) continue;
+    for (std::size_t c = 0; c < problem.rig.camera_count; ++c) {
+      CameraSighting& view = sighting.camera[c];
+      if (!view.used) continue;
+      Eigen::Vector2d r;
+      view.used = reprojectionResidual(view, problem.rig_poses[newest].current[c], landmark.point, r) &&
+                  r.squaredNorm() <= sigmas * sigmas;
+    }
+    if (sighting.camera[0].used || sighting.camera[1].used) continue;
+    landmark.sightings.popBack();
+    reject(problem, landmark);
+  }
+}
+
+void rejectLandmarks(WindowProblem& problem, double sigmas) {
+  for (Landmark& landmark : problem.landmarks) {
+    if (landmark.sightings.size() < 2) continue;
+    if (landmark.in_system &&
+        meanSquaredResidual(problem.rig_poses, landmark.views(), landmark.point) <= sigmas * sigmas) {
+      continue;
+    }
+    if (!reject(problem, landmark) && landmark.extra == kNoExtra) landmark.point.triangulated = false;
+  }
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,42 @@
+#pragma once
+// Gauss-Newton over the window: all factors linearized, landmarks eliminated, one step, until it is small.
+//
+// Points move with the step (back-substitution); sightings and landmarks that do not fit are left out by
+// named limits. Nothing is allocated after the constructor. Memory: 2 MiB. Cost: docs/smoother.md.
+
+#include <vector>
+
+#include "estimator/core/status.hpp"
+#include "estimator/smoother/normal_equations.hpp"
+#include "estimator/smoother/window_covariance.hpp"
+#include "estimator/smoother/window_problem.hpp"
+
+namespace swiftlet {
+
+class WindowSolver {
+ public:
+  WindowSolver();
+
+  /// `pose_tolerance`: m, rad; a step in which no pose moves further is the last. `statistics` gets
+  /// iterations and the IMU's residual. kFailed when the system cannot be solved.
+  Status solve(WindowProblem& problem, NormalEquations& system, WindowCovariance& covariance, int iterations,
+               double pose_tolerance, FrameStatistics& statistics);
+
+ private:
+  void reintegrate(WindowProblem& problem) const;
+  void triangulateAll(WindowProblem& problem, int iterations) const;
+  void build(WindowProblem& problem, NormalEquations& system, FrameStatistics& statistics);
+  void substitutePoints(WindowProblem& problem, const VectorMap& step) const;
+
+  std::vector<EliminatedPoint> eliminated_;  // by landmark
+  std::vector<double> step_;
+  double prior_cost_ = 0;  // without its constant
+};
+
+/// Takes out sightings of the newest state that are further than `sigmas` off; a landmark that loses them
+/// kMaxRejections times goes.
+void rejectNewestSightings(WindowProblem& problem, double sigmas);
+/// Takes out landmarks whose sightings are further than `sigmas` off on the mean, kMaxRejections times.
+void rejectLandmarks(WindowProblem& problem, double sigmas);
+
+}  // namespace swiftlet
