@@ -76,20 +76,6 @@ Status Delaunay::build(std::span<const Eigen::Vector2f> points) {
   return okStatus();
 }
 
-Status Delaunay::insert(const Eigen::Vector2f& point) {
-  if (point_count_ == kMaxDelaunayPoints) {
-    ++skipped_.over_capacity;
-    return {StatusCode::kCapacityReached, "the triangulation is full: the point is skipped"};
-  }
-  const auto index = static_cast<std::uint16_t>(point_count_++);
-  if (!snapToGrid(point, point_[index])) {
-    ++skipped_.invalid;
-    return {StatusCode::kInvalidInput, "the point is not finite or out of range: it is skipped"};
-  }
-  collected_ = false;
-  return place(index);
-}
-
 // Counting sort: stable, hence the lowest index of a duplicate point comes first.
 void Delaunay::sortAlongCurve(std::size_t count) {
   if (count == 0) return;

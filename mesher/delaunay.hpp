@@ -64,13 +64,9 @@ class Delaunay {
   /// were skipped. O(n) for image features, O(n^2) at worst.
   Status build(std::span<const Eigen::Vector2f> points);
 
-  /// Adds one point [px]; its index is the number of points given before, skipped ones included.
-  /// kInvalidInput: skipped, as it is invalid or a duplicate. kCapacityReached: skipped, and it has no index.
-  Status insert(const Eigen::Vector2f& point);
-
   void clear();
 
-  /// Triangles of all points up to now, empty while these are on one line. Valid until the next change.
+  /// Empty when there is no triangle. Valid until the next change.
   std::span<const DelaunayTriangle> triangles();
   /// The convex hull, counter-clockwise, with the vertices inside its straight sides; empty without
   /// triangles.

@@ -1,5 +1,5 @@
 #pragma once
-// What the four RANSACs share: samples, and how many of them are enough.
+// What RANSACs share: samples, and how many of them are enough.
 
 #include <algorithm>
 #include <array>

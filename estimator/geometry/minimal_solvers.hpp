@@ -2,8 +2,7 @@
 // Motion from the fewest correspondences, on unit bearings (any lens, any angle).
 //
 // Bearings and points of the previous and the current camera frame: p_cur = R p_prev + t, and
-// E = hat(t) R, so that cur^T E prev = 0. The 3-point solver is alignRigid (alignment.hpp) on three
-// points; the 1-point solver is translationFromPoint.
+// E = hat(t) R, so that cur^T E prev = 0.
 
 #include <Eigen/Core>
 #include <array>
@@ -41,11 +40,5 @@ Eigen::Matrix3d rotationFromTwoPoints(std::span<const Eigen::Vector3d, 2> prev,
 /// one plane with the translation). Troiani et al., ICRA 2014.
 Eigen::Vector3d translationFromTwoPoints(const Eigen::Matrix3d& R, std::span<const Eigen::Vector3d, 2> prev,
                                          std::span<const Eigen::Vector3d, 2> cur);
-
-/// Translation [m] from one point known in both frames and the rotation.
-inline Eigen::Vector3d translationFromPoint(const Eigen::Matrix3d& R, const Eigen::Vector3d& prev,
-                                            const Eigen::Vector3d& cur) {
-  return cur - R * prev;
-}
 
 }  // namespace swiftlet

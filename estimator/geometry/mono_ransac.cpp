@@ -381,22 +381,4 @@ Status MonoRansac::twoPoint(Bearings prev, Bearings cur, const Eigen::Quaternion
   return finish(tracks_, gates, settings_, prior, best, rotation, result);
 }
 
-std::size_t monoInliers(Bearings prev, Bearings cur, const SE3& T_cur_prev, const RansacSettings& settings,
-                        FixedVector<bool, kMaxFeatures>& inlier) {
-  inlier.clear();
-  if (prev.size() != cur.size() || prev.size() > kMaxFeatures || !settings.valid()) return 0;
-  const Gates gates(settings);
-  const Eigen::Matrix3d R = T_cur_prev.R();
-  const double length = T_cur_prev.translation.norm();
-  const Eigen::Vector3d t =
-      length > 0 ? Eigen::Vector3d(T_cur_prev.translation / length) : Eigen::Vector3d::Zero();
-  inlier.resize(prev.size());
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < prev.size(); ++i) {
-    inlier[i] = gatedError(R, t, prev[i], cur[i], gates) < 1.0;  // false for NaN
-    if (inlier[i]) ++count;
-  }
-  return count;
-}
-
 }  // namespace swiftlet

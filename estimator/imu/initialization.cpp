@@ -19,7 +19,6 @@ constexpr double kAccelerationTime = 0.3;  // s
 // A scatter seen in a short window underestimates the acceleration that stays constant in it.
 constexpr double kLeastAcceleration = 0.45;  // m/s^2, RMS per axis of hand-held and flown starts
 constexpr double kLeastForceShare = 0.5;     // of gravity: below it the body falls
-constexpr double kRestVelocitySigma = 0.01;  // m/s
 
 }  // namespace
 
@@ -64,44 +63,6 @@ Status estimateTilt(std::span<const ImuSample> samples, Stamp at, const ImuNoise
   const double excess = std::abs(mean.norm() - noise.gravity) / noise.gravity;  // acceleration that showed
   const double sigma = std::hypot(manoeuvre, excess, prior.bias_accel_sigma / noise.gravity);
   tilt.sigma = std::clamp(sigma, kLeastTiltSigma, kMostTiltSigma);
-  return okStatus();
-}
-
-Status initializeAtRest(const RestState& rest, Stamp at, const ImuNoise& noise, const StartPrior& prior,
-                        NavState& state) {
-  if (!rest.at_rest || rest.duration <= 0) return {StatusCode::kNotReady, "the body is not at rest"};
-  const Eigen::Vector3d force = rest.mean_accel - prior.bias_accel;
-  const double magnitude = force.norm();
-  if (magnitude < kLeastForceShare * noise.gravity) {
-    return {StatusCode::kDegenerate, "force at rest far below gravity"};
-  }
-  const Eigen::Vector3d up = force / magnitude;
-  state = NavState{};
-  state.stamp = at;
-  state.health = Health::kGood;
-  state.T_world_body = SE3(gravityAlignedRotation(up), Eigen::Vector3d::Zero());
-  state.bias_gyro = rest.mean_gyro;
-  state.bias_accel = prior.bias_accel + (magnitude - noise.gravity) * up;
-
-  // R_true up_true = z with up_true = (mean - ba) / g: a horizontal bias error b turns the tilt by
-  // phi = up x b / g. Yaw (phi along up) is gauge.
-  const double gyro_variance = noise.gyro_density * noise.gyro_density / rest.duration +
-                               noise.gyro_walk * noise.gyro_walk * rest.duration / 3.0;
-  const double accel_variance = noise.accel_density * noise.accel_density / rest.duration +
-                                noise.accel_walk * noise.accel_walk * rest.duration / 3.0;
-  const double bias_variance = prior.bias_accel_sigma * prior.bias_accel_sigma;
-  const Eigen::Matrix3d along = up * up.transpose();
-  const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - along;
-  const Eigen::Matrix3d turn = hat(up) / noise.gravity;
-  Matrix15d& P = state.covariance;
-  P.block<3, 3>(0, 0) = turn * ((bias_variance + accel_variance) * across) * turn.transpose() +
-                        prior.gauge_sigma * prior.gauge_sigma * along;
-  P.block<3, 3>(0, 12) = turn * (bias_variance * across);
-  P.block<3, 3>(12, 0) = P.block<3, 3>(0, 12).transpose();
-  P.block<3, 3>(12, 12) = bias_variance * across + accel_variance * along;
-  P.block<3, 3>(3, 3) = prior.gauge_sigma * prior.gauge_sigma * Eigen::Matrix3d::Identity();
-  P.block<3, 3>(6, 6) = kRestVelocitySigma * kRestVelocitySigma * Eigen::Matrix3d::Identity();
-  P.block<3, 3>(9, 9) = gyro_variance * Eigen::Matrix3d::Identity();
   return okStatus();
 }
 

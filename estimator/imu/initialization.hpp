@@ -1,9 +1,9 @@
 #pragma once
-// First states: tilt from the accelerometer, and the full state of a body at rest.
+// What is known at the first image: tilt from the accelerometer.
 //
 // Convention: `up` is the unit vector in body axes along which a still accelerometer reads
 // +gravity (world z seen from the body). Tilt error phi: R_true = R Exp(phi), up_true = Exp(-phi) up.
-// The solves in motion are in stereo_start.hpp (positions known in metres) and mono_start.hpp.
+// The start in motion with one camera is in mono_start.hpp.
 // All functions are plain, deterministic and allocate nothing.
 
 #include <Eigen/Core>
@@ -13,19 +13,16 @@
 #include "estimator/core/stamp.hpp"
 #include "estimator/core/status.hpp"
 #include "estimator/imu/imu_noise.hpp"
-#include "estimator/imu/rest_detector.hpp"
 #include "estimator/messages/imu_sample.hpp"
-#include "estimator/messages/nav_state.hpp"
 
 namespace swiftlet {
 
-/// What is known before any data: the biases of MEMS sensors and the gauge.
+/// What is known before any data: the biases of MEMS sensors.
 struct StartPrior {
   Eigen::Vector3d bias_gyro = Eigen::Vector3d::Zero();   ///< rad/s
   Eigen::Vector3d bias_accel = Eigen::Vector3d::Zero();  ///< m/s^2
   double bias_gyro_sigma = 0.1;                          ///< rad/s
   double bias_accel_sigma = 0.12;                        ///< m/s^2
-  double gauge_sigma = 1e-4;                             ///< m and rad: first position and yaw
 };
 
 struct TiltEstimate {
@@ -43,11 +40,5 @@ Eigen::Quaterniond gravityAlignedRotation(const Eigen::Vector3d& up);
 /// kDegenerate when the mean force is below half of gravity (free fall).
 Status estimateTilt(std::span<const ImuSample> samples, Stamp at, const ImuNoise& noise,
                     const StartPrior& prior, TiltEstimate& tilt);
-
-/// The state of a body at rest, world origin at the body, yaw by gravityAlignedRotation: tilt from the
-/// mean force, gyro bias from the mean rate, accelerometer bias along gravity only; covariance
-/// with the correlation of tilt and horizontal accelerometer bias. kNotReady when not at rest.
-Status initializeAtRest(const RestState& rest, Stamp at, const ImuNoise& noise, const StartPrior& prior,
-                        NavState& state);
 
 }  // namespace swiftlet

@@ -1,7 +1,7 @@
 #pragma once
 // Start in motion from one camera: velocity (hence scale), tilt and biases from bearings and IMU.
 //
-// Model: the camera's positions follow from v, tilt and biases as in stereo_start.hpp; a track seen
+// Model: the camera's positions follow from v, tilt and biases as in start_parameters.hpp; a track seen
 // from frames i and j says n . (c_j - c_i) = 0 with n = (R_i f_i) x (R_j f_j): linear in v and in
 // gravity, no point needed. Steps: gyro bias by the smallest eigenvalue of sum n n' per frame pair;
 // linear v and tilt, reweighted to angular residuals; then Levenberg-Marquardt on the angular
@@ -28,7 +28,7 @@
 #include "estimator/imu/imu_noise.hpp"
 #include "estimator/imu/initialization.hpp"
 #include "estimator/imu/preintegration.hpp"
-#include "estimator/imu/stereo_start.hpp"
+#include "estimator/imu/start_parameters.hpp"
 
 namespace swiftlet {
 

@@ -116,45 +116,6 @@ Status Preintegration::integrate(std::span<const ImuSample> samples, Stamp from,
   return okStatus();
 }
 
-void Preintegration::append(const Preintegration& next) {
-  const Eigen::Matrix3d R = rotation_.toRotationMatrix();
-  const double T = next.duration_;
-  const Eigen::Vector3d v = R * next.deltaVelocity(bias_gyro_, bias_accel_);
-  const Eigen::Vector3d p = R * next.deltaPosition(bias_gyro_, bias_accel_);
-
-  // theta' = theta + R theta2,  p' = p + T v - p2 x theta + R p2,  v' = v - v2 x theta + R v2.
-  const Eigen::Matrix3d theta = cov_.theta_theta;
-  const Eigen::Matrix3d p_theta = cov_.p_theta + T * cov_.v_theta - cross(p, theta);
-  const Eigen::Matrix3d v_theta = cov_.v_theta - cross(v, theta);
-  // cov(p', .) = cov(p, .) + T cov(v, .) - p2 x cov(theta, .)
-  const Eigen::Matrix3d p_v = cov_.p_v + T * cov_.v_v - cross(p, cov_.v_theta.transpose());
-  const Eigen::Matrix3d p_p = cov_.p_p + T * cov_.p_v.transpose() - cross(p, cov_.p_theta.transpose());
-  const Eigen::Matrix3d v_v = cov_.v_v - cross(v, cov_.v_theta.transpose());
-  const auto turned = [&R](const Eigen::Matrix3d& block) -> Eigen::Matrix3d {
-    return R * block * R.transpose();
-  };
-  Blocks sum;
-  sum.theta_theta = theta + turned(next.cov_.theta_theta);
-  sum.p_theta = p_theta + turned(next.cov_.p_theta);
-  sum.v_theta = v_theta + turned(next.cov_.v_theta);
-  // M hat(a)' = (hat(a) M')'
-  sum.p_p = p_p + T * p_v - cross(p, p_theta.transpose()).transpose() + turned(next.cov_.p_p);
-  sum.p_v = p_v - cross(v, p_theta.transpose()).transpose() + turned(next.cov_.p_v);
-  sum.v_v = v_v - cross(v, v_theta.transpose()).transpose() + turned(next.cov_.v_v);
-  cov_ = sum;
-
-  p_gyro_ += T * v_gyro_ - cross(p, theta_gyro_) + R * next.p_gyro_;
-  v_gyro_ += -cross(v, theta_gyro_) + R * next.v_gyro_;
-  theta_gyro_ += R * next.theta_gyro_;
-  p_accel_ += T * v_accel_ + R * next.p_accel_;
-  v_accel_ += R * next.v_accel_;
-  position_ += T * velocity_ + p;
-  velocity_ += v;
-  rotation_ = (rotation_ * next.deltaRotation(bias_gyro_)).normalized();
-  duration_ += T;
-  gap_duration_ += next.gap_duration_;
-}
-
 Matrix9d Preintegration::covariance() const {
   const Eigen::Matrix3d Rt = rotation_.toRotationMatrix().transpose();
   Matrix9d out;

@@ -46,11 +46,6 @@ class Preintegration {
   /// interpolated, or held where no sample lies beyond. kInvalidInput without any sample.
   Status integrate(std::span<const ImuSample> samples, Stamp from, Stamp to);
 
-  /// Appends the interval that `next` covers (it begins where this one ends): the same increments,
-  /// Jacobians and covariance as integrating straight through, to first order in the difference
-  /// of the two's linearization biases. For leaving out the state between two intervals.
-  void append(const Preintegration& next);
-
   [[nodiscard]] double duration() const { return duration_; }         ///< s
   [[nodiscard]] double gapDuration() const { return gap_duration_; }  ///< s of it without samples
   [[nodiscard]] const Eigen::Vector3d& biasGyro() const { return bias_gyro_; }

@@ -29,6 +29,9 @@
 
 namespace swiftlet {
 
+/// m/s, 1 sigma of the velocity of a body that is at rest.
+inline constexpr double kRestVelocitySigma = 0.01;
+
 struct RestState {
   bool at_rest = false;
   Stamp since;                                           ///< start of the rest (valid at rest)

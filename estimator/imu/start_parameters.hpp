@@ -1,17 +1,31 @@
 #pragma once
-// The unknowns that both starts in motion share, and the poses that follow from them.
+// The unknowns of a start in motion, and the poses that follow from them.
 //
 // In body axes at image 0: velocity v, tilt (up on the sphere), biases. The IMU then gives the pose
-// of every later instant (equation 4): p = v t - gravity up t^2 / 2 + alpha(bg, ba), R = dR(bg).
+// of every later instant: p = v t - gravity up t^2 / 2 + alpha(bg, ba), R = dR(bg).
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
 #include "estimator/imu/initialization.hpp"
 #include "estimator/imu/preintegration.hpp"
-#include "estimator/imu/stereo_start.hpp"
 
 namespace swiftlet {
+
+using Matrix12d = Eigen::Matrix<double, 12, 12>;
+
+/// The state at image 0. Error order of the covariance: phi, v, bg, ba; phi has no part along `up`
+/// (yaw is gauge).
+struct MotionStart {
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();        ///< unit, body axes at image 0
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();   ///< m/s, body axes at image 0
+  Eigen::Vector3d bias_gyro = Eigen::Vector3d::Zero();  ///< rad/s
+  Eigen::Vector3d bias_accel = Eigen::Vector3d::Zero();
+  Matrix12d covariance = Matrix12d::Zero();
+  double tilt_sigma = 0;      ///< rad: the larger principal sigma of phi
+  double velocity_sigma = 0;  ///< m/s: the largest principal sigma
+  double residual_rms = 0;    ///< whitened; about 1 when the model holds
+};
 
 /// Pose of the body relative to image 0, with derivatives by the unknowns.
 struct StartPose {

@@ -13,8 +13,7 @@ constexpr int kStartIterations = 8;
 constexpr double kStartVelocitySigma = 2.0;    // m/s
 constexpr double kStartGyroBiasSigma = 0.1;    // rad/s
 constexpr double kStartAccelBiasSigma = 0.15;  // m/s^2
-constexpr double kCarriedBias = 2.0;         // times the sigma with which it was left: marginals are hopeful
-constexpr double kRestVelocitySigma = 0.01;  // m/s
+constexpr double kCarriedBias = 2.0;  // times the sigma with which it was left: marginals are hopeful
 
 SmootherSettings smootherSettings(const OdometrySettings& settings) {
   SmootherSettings s;

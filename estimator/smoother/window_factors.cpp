@@ -5,11 +5,11 @@
 #include <cmath>
 
 #include "estimator/geometry/so3.hpp"
+#include "estimator/imu/rest_detector.hpp"
 
 namespace swiftlet {
 namespace {
 
-constexpr double kRestVelocitySigma = 0.01;    // m/s
 constexpr double kRestPositionSigma = 3e-4;    // m, between two frames at rest: 6 mm/s at 20 Hz
 constexpr double kRestRotationSigma = 3.5e-4;  // rad, likewise
 

@@ -1,4 +1,4 @@
-// Five-point and three-point RANSAC beside OpenGV's, on the same seeded scenes in one process:
+// Five-point RANSAC beside OpenGV's, on the same seeded scenes in one process:
 // 65 % true tracks, 200 tracks, 0.5 px noise, EuRoC's lens. Printed, never asserted.
 
 #include <benchmark/benchmark.h>
@@ -21,9 +21,6 @@ constexpr std::uint64_t kScenes = 16;
 constexpr double kPixelSigma = 0.5;
 constexpr double kConfidence = 0.99;  // OpenGV's default, for both
 constexpr int kMaxIterations = 1000;
-// Kimera's 3-point threshold, 0.5 m between the points.
-constexpr double kPointThreshold = 0.5;
-constexpr double kFarthestPoint = 30;  // [m]
 
 // CPU time of the process [us]: other programs of the machine do not count.
 double cpuMicroseconds() { return 1e6 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
@@ -31,7 +28,7 @@ double cpuMicroseconds() { return 1e6 * static_cast<double>(std::clock()) / CLOC
 struct Figures {
   double microseconds = 0;
   double rotation_error = 0;
-  double translation_error = 0;  // five-point: angle [deg]; three-point: [m]
+  double translation_error = 0;  // [deg]
   double removed = 0;
   double lost = 0;
 };
@@ -46,14 +43,13 @@ RansacSettings settings(const Scene& scene) {
 
 using Mask = std::vector<bool>;
 
-void account(const Scene& scene, const SE3& T_cur_prev, const Mask& kept, bool mono, Figures& figures) {
+void account(const Scene& scene, const SE3& T_cur_prev, const Mask& kept, Figures& figures) {
   constexpr double kDegrees = 180 / std::numbers::pi;
   const Eigen::Vector3d& truth = scene.T_cur_prev.translation;
   const Eigen::Vector3d& t = T_cur_prev.translation;
   figures.rotation_error +=
       kDegrees / kScenes * logSo3((scene.T_cur_prev.inverse() * T_cur_prev).rotation).norm();
-  figures.translation_error +=
-      (mono ? kDegrees * std::atan2(truth.cross(t).norm(), truth.dot(t)) : (truth - t).norm()) / kScenes;
+  figures.translation_error += kDegrees / kScenes * std::atan2(truth.cross(t).norm(), truth.dot(t));
   double bad = 0, removed = 0, good = 0, lost = 0;
   for (std::size_t i = 0; i < kept.size(); ++i) {
     (scene.good(i) ? good : bad) += 1;
@@ -63,15 +59,9 @@ void account(const Scene& scene, const SE3& T_cur_prev, const Mask& kept, bool m
   figures.lost += 100 * lost / good / kScenes;
 }
 
-std::pair<SE3, Mask> ours(const Scene& scene, bool mono, MonoRansac& mono_ransac,
-                          StereoRansac& stereo_ransac) {
+std::pair<SE3, Mask> ours(const Scene& scene, MonoRansac& ransac) {
   RansacResult result;
-  if (mono) {
-    (void)mono_ransac.fivePoint(scene.prev, scene.cur, 1, result);
-  } else {
-    stereo_ransac.setExtrinsics(scene.T_cam1_cam0);
-    (void)stereo_ransac.threePoint(scene.prev_stereo, scene.cur_stereo, 1, result);
-  }
+  (void)ransac.fivePoint(scene.prev, scene.cur, 1, result);
   return {result.T_cur_prev, Mask(result.inlier.begin(), result.inlier.end())};
 }
 
@@ -108,35 +98,8 @@ std::pair<SE3, Mask> opengvFivePoint(const Scene& scene) {
   return fromPlain(result, all, all.size());
 }
 
-// OpenGV wants points: made here, within the time, as in Kimera.
-bool stereoPoint(const SE3& T_cam0_cam1, const StereoBearings& pair, Eigen::Vector3d& point) {
-  const Eigen::Vector3d right = T_cam0_cam1.rotation * pair.right;
-  const Eigen::Vector3d& baseline = T_cam0_cam1.translation;
-  const double cosine = pair.left.dot(right);
-  const double depth = (pair.left.dot(baseline) - cosine * right.dot(baseline)) / (1 - cosine * cosine);
-  point = depth * pair.left;
-  return depth > 0 && depth < kFarthestPoint;
-}
-
-std::pair<SE3, Mask> opengvThreePoint(const Scene& scene) {
-  const SE3 T_cam0_cam1 = scene.T_cam1_cam0.inverse();
-  std::vector<Eigen::Vector3d> prev, cur;
-  std::vector<std::size_t> index;
-  for (std::size_t i = 0; i < scene.kind.size(); ++i) {
-    Eigen::Vector3d p, q;
-    if (!stereoPoint(T_cam0_cam1, scene.prev_stereo[i], p)) continue;
-    if (!stereoPoint(T_cam0_cam1, scene.cur_stereo[i], q)) continue;
-    prev.push_back(p);
-    cur.push_back(q);
-    index.push_back(i);
-  }
-  const OpengvResult result =
-      opengvThreePointRansac(plain(prev), plain(cur), kPointThreshold, kConfidence, kMaxIterations);
-  return fromPlain(result, index, scene.kind.size());
-}
-
 template <typename Method>
-Figures measure(const std::vector<Scene>& scenes, bool mono, const Method& method) {
+Figures measure(const std::vector<Scene>& scenes, const Method& method) {
   Figures figures;
   constexpr int kRepeats = 10;
   for (const Scene& scene : scenes) {
@@ -144,16 +107,16 @@ Figures measure(const std::vector<Scene>& scenes, bool mono, const Method& metho
     for (int i = 0; i < kRepeats; ++i) benchmark::DoNotOptimize(method(scene));
     figures.microseconds += (cpuMicroseconds() - begin) / kRepeats / kScenes;
     const auto [T_cur_prev, kept] = method(scene);
-    account(scene, T_cur_prev, kept, mono, figures);
+    account(scene, T_cur_prev, kept, figures);
   }
   return figures;
 }
 
-void print(const char* name, const Figures& f, const char* unit) {
+void print(const char* name, const Figures& f) {
   std::printf(
-      "%-22s %9.1f us   rotation %7.4f deg   translation %8.4f %-3s   false out %6.2f %%   good lost %5.2f "
+      "%-22s %9.1f us   rotation %7.4f deg   translation %8.4f deg   false out %6.2f %%   good lost %5.2f "
       "%%\n",
-      name, f.microseconds, f.rotation_error, f.translation_error, unit, f.removed, f.lost);
+      name, f.microseconds, f.rotation_error, f.translation_error, f.removed, f.lost);
 }
 
 void compareSolvers(const Scene& scene) {
@@ -175,19 +138,12 @@ int compare() {
   std::vector<Scene> scenes;
   for (std::uint64_t seed = 0; seed < kScenes; ++seed) scenes.push_back(makeScene(euroc(), {}, seed));
   const auto mono = std::make_unique<MonoRansac>(settings(scenes[0]));
-  const auto stereo = std::make_unique<StereoRansac>(scenes[0].T_cam1_cam0, settings(scenes[0]));
   compareSolvers(scenes[0]);
-  for (const bool is_mono : {true, false}) {
-    const Figures own =
-        measure(scenes, is_mono, [&](const Scene& scene) { return ours(scene, is_mono, *mono, *stereo); });
-    const Figures theirs = measure(scenes, is_mono, [&](const Scene& scene) {
-      return is_mono ? opengvFivePoint(scene) : opengvThreePoint(scene);
-    });
-    const char* unit = is_mono ? "deg" : "m";
-    print(is_mono ? "5-point RANSAC" : "3-point RANSAC", own, unit);
-    print(is_mono ? "  OpenGV" : "  OpenGV + stereo", theirs, unit);
-    std::printf("%-22s OpenGV / own: %.1f\n", "", theirs.microseconds / own.microseconds);
-  }
+  const Figures own = measure(scenes, [&](const Scene& scene) { return ours(scene, *mono); });
+  const Figures theirs = measure(scenes, [](const Scene& scene) { return opengvFivePoint(scene); });
+  print("5-point RANSAC", own);
+  print("  OpenGV", theirs);
+  std::printf("%-22s OpenGV / own: %.1f\n", "", theirs.microseconds / own.microseconds);
   return 0;
 }
 

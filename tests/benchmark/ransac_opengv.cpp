@@ -2,12 +2,9 @@
 
 #include <ctime>
 #include <memory>
-#include <opengv/point_cloud/PointCloudAdapter.hpp>
-#include <opengv/point_cloud/methods.hpp>
 #include <opengv/relative_pose/CentralRelativeAdapter.hpp>
 #include <opengv/relative_pose/methods.hpp>
 #include <opengv/sac/Ransac.hpp>
-#include <opengv/sac_problems/point_cloud/PointCloudSacProblem.hpp>
 #include <opengv/sac_problems/relative_pose/CentralRelativePoseSacProblem.hpp>
 
 namespace swiftlet::test {
@@ -48,15 +45,6 @@ OpengvResult opengvFivePointRansac(const std::vector<Bearing>& prev, const std::
   opengv::relative_pose::CentralRelativeAdapter adapter(first, second);
   return run(std::make_shared<Problem>(adapter, Problem::NISTER, false), threshold, confidence,
              max_iterations);
-}
-
-OpengvResult opengvThreePointRansac(const std::vector<Bearing>& prev, const std::vector<Bearing>& cur,
-                                    double threshold, double confidence, int max_iterations) {
-  using Problem = opengv::sac_problems::point_cloud::PointCloudSacProblem;
-  const opengv::points_t first = vectors(cur);
-  const opengv::points_t second = vectors(prev);
-  opengv::point_cloud::PointCloudAdapter adapter(first, second);
-  return run(std::make_shared<Problem>(adapter, false), threshold, confidence, max_iterations);
 }
 
 double opengvFivePointMicroseconds(const std::vector<Bearing>& prev, const std::vector<Bearing>& cur,

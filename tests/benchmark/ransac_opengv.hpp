@@ -16,8 +16,6 @@ struct OpengvResult {
 
 OpengvResult opengvFivePointRansac(const std::vector<Bearing>& prev, const std::vector<Bearing>& cur,
                                    double threshold, double confidence, int max_iterations);
-OpengvResult opengvThreePointRansac(const std::vector<Bearing>& prev, const std::vector<Bearing>& cur,
-                                    double threshold, double confidence, int max_iterations);
 /// CPU time of one fivept_nister on five bearings.
 double opengvFivePointMicroseconds(const std::vector<Bearing>& prev, const std::vector<Bearing>& cur,
                                    int repeats);

@@ -35,8 +35,6 @@ struct Scene {
   std::vector<TrackKind> kind;
   std::vector<Eigen::Vector3d> prev;  ///< cam0
   std::vector<Eigen::Vector3d> cur;   ///< cam0
-  std::vector<StereoBearings> prev_stereo;
-  std::vector<StereoBearings> cur_stereo;
 
   [[nodiscard]] bool good(std::size_t i) const {
     return kind[i] == TrackKind::kNear || kind[i] == TrackKind::kFar;
@@ -151,8 +149,6 @@ class SceneMaker {
     scene_.kind.push_back(kind);
     scene_.prev.push_back(seen[0]);
     scene_.cur.push_back(seen[2]);
-    scene_.prev_stereo.push_back({.left = seen[0], .right = seen[1]});
-    scene_.cur_stereo.push_back({.left = seen[2], .right = seen[3]});
   }
 
   SceneSettings settings_;

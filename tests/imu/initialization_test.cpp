@@ -1,4 +1,4 @@
-// Starts on simulated data with exact truth: at rest, in motion with stereo, with one camera.
+// Starts on simulated data with exact truth: tilt, and in motion with one camera.
 
 #include "estimator/imu/initialization.hpp"
 
@@ -10,7 +10,6 @@
 
 #include "estimator/geometry/so3.hpp"
 #include "estimator/imu/mono_start.hpp"
-#include "estimator/imu/stereo_start.hpp"
 #include "tests/imu/analytic_trajectory.hpp"
 
 using namespace swiftlet;
@@ -82,104 +81,12 @@ TEST_CASE("The gravity-aligned rotation takes up to z and turns least") {
   CHECK((gravityAlignedRotation(-Eigen::Vector3d::UnitZ()) * -Eigen::Vector3d::UnitZ()).z() == Approx(1.0));
 }
 
-TEST_CASE("Start at rest: errors agree with the covariance") {
-  const ImuNoise noise;
-  StartPrior prior;
-  Random random(12);
-  double tilt_nees = 0, bias_nees = 0;
-  const int runs = 300;
-  for (int n = 0; n < runs; ++n) {
-    const Eigen::Vector3d true_up = normalVector(random).normalized();
-    const Eigen::Vector3d bias = prior.bias_accel_sigma * normalVector(random);
-    RestState rest;
-    rest.at_rest = true;
-    rest.duration = 2;
-    rest.mean_gyro = kBiasGyro + noise.gyro_density / std::sqrt(2.0) * normalVector(random);
-    rest.mean_accel =
-        noise.gravity * true_up + bias + noise.accel_density / std::sqrt(2.0) * normalVector(random);
-    NavState state;
-    REQUIRE(initializeAtRest(rest, stampOf(1), noise, prior, state).ok());
-    const Eigen::Quaterniond q = state.T_world_body.rotation;
-    // The true attitude nearest to the estimate: up_true = Exp(-phi) up.
-    const Eigen::Vector3d up = q.conjugate() * Eigen::Vector3d::UnitZ();
-    const Eigen::Vector3d phi = true_up.cross(up);
-    Eigen::Matrix<double, 6, 1> error;
-    error << phi, bias - state.bias_accel;
-    Eigen::Matrix<double, 6, 6> P;
-    P << state.covariance.block<3, 3>(0, 0), state.covariance.block<3, 3>(0, 12),
-        state.covariance.block<3, 3>(12, 0), state.covariance.block<3, 3>(12, 12);
-    CHECK(Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>>(P).eigenvalues()[0] > -1e-12);
-    tilt_nees += phi.squaredNorm() / P.topLeftCorner<3, 3>().trace() / runs;
-    bias_nees += error.tail<3>().squaredNorm() / P.bottomRightCorner<3, 3>().trace() / runs;
-    // Tilt and bias are told apart by nothing: their correlation predicts one from the other.
-    const Eigen::Vector3d predicted = up.cross(error.tail<3>()) / noise.gravity;
-    CHECK((predicted - phi).norm() < 2e-3);
-  }
-  CHECK(tilt_nees == Approx(1.0).margin(0.2));
-  CHECK(bias_nees == Approx(1.0).margin(0.2));
-  NavState state;
-  CHECK(initializeAtRest(RestState{}, stampOf(1), noise, prior, state).code == StatusCode::kNotReady);
-}
-
 TEST_CASE("Tilt: refused without samples and in free fall") {
   const ImuNoise noise;
   TiltEstimate tilt;
   CHECK(estimateTilt({}, stampOf(1), noise, {}, tilt).code == StatusCode::kInvalidInput);
   const std::vector<ImuSample> falling{{stampOf(0.9), Eigen::Vector3d::Zero(), Eigen::Vector3d(0, 0, 0.5)}};
   CHECK(estimateTilt(falling, stampOf(1), noise, {}, tilt).code == StatusCode::kDegenerate);
-}
-
-TEST_CASE("Stereo start on simulated flights is right and consistent", "[figures]") {
-  const ImuNoise noise;
-  const StartPrior prior;
-  Random random(21);
-  double velocity_nees = 0, bias_nees = 0, rms = 0, velocity_error = 0, worst_tilt = 0, microseconds = 0;
-  const int runs = 200;
-  for (int n = 0; n < runs; ++n) {
-    const AnalyticTrajectory path(static_cast<std::uint64_t>(n), 0.5, 1.0);
-    const Window w = makeWindow(path, 10, 0.05, noise, prior, random);
-    const Eigen::Vector3d offset = 0.002 * normalVector(random);
-    std::vector<StartFrame> frames;
-    for (int k = 1; k <= 10; ++k) {
-      const double t = 1 + 0.05 * k;
-      StartFrame frame;
-      frame.from_first = &w.from_first[static_cast<std::size_t>(k - 1)];
-      frame.position = path.rotation(1).conjugate() * (path.position(t) - path.position(1)) +
-                       0.002 * normalVector(random) - offset;
-      frame.rotation = path.rotation(1).conjugate() * path.rotation(t) * expSo3(0.001 * normalVector(random));
-      frame.position_sigma = 0.002;
-      frame.rotation_sigma = 0.001;
-      frames.push_back(frame);
-    }
-    MotionStart start;
-    const auto begin = std::chrono::steady_clock::now();
-    REQUIRE(solveStereoStart(frames, w.tilt, noise, prior, start).ok());
-    microseconds +=
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() * 1e6 / runs;
-    const Eigen::Vector3d v = w.velocity - start.velocity;
-    const Eigen::Vector3d b = kBiasGyro - start.bias_gyro;
-    velocity_nees += v.dot(start.covariance.block<3, 3>(3, 3).inverse() * v) / runs;
-    bias_nees += b.dot(start.covariance.block<3, 3>(6, 6).inverse() * b) / runs;
-    rms += start.residual_rms / runs;
-    velocity_error += v.norm() / runs;
-    worst_tilt = std::max(worst_tilt, angle(w.up, start.up));
-
-    const NavState state = toNavState(start, stampOf(1), prior);
-    CHECK((state.T_world_body.rotation * start.up - Eigen::Vector3d::UnitZ()).norm() < 1e-9);
-    CHECK((state.T_world_body.rotation.conjugate() * state.v_world_body - start.velocity).norm() < 1e-9);
-  }
-  std::printf(
-      "stereo start, simulated, 0.5 s, 2 mm: NEES velocity %.2f, gyro bias %.2f (3 dof), residual %.2f, "
-      "velocity %.3f m/s, worst tilt %.2f deg, %.0f us\n",
-      velocity_nees, bias_nees, rms, velocity_error, worst_tilt * 57.3, microseconds);
-  CHECK(velocity_nees < 4.0);
-  CHECK(velocity_nees > 1.5);
-  CHECK(bias_nees < 4.0);
-  CHECK(bias_nees > 1.5);
-  CHECK(rms == Approx(1.0).margin(0.15));
-  CHECK(velocity_error < 0.04);
-  MotionStart start;
-  CHECK(solveStereoStart({}, {}, noise, prior, start).code == StatusCode::kNotReady);
 }
 
 TEST_CASE("Mono start on simulated flights: scale sigma is honest", "[figures]") {

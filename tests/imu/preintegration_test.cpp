@@ -213,40 +213,6 @@ TEST_CASE("Covariance agrees with Monte Carlo") {
   CHECK(correlationError(sample, P) < 0.09);
 }
 
-TEST_CASE("Appending equals integrating straight through") {
-  const ImuNoise noise;
-  const AnalyticTrajectory path(4);
-  Random random(3);
-  const auto samples = path.samples(0, 1, noise, kBiasGyro, kBiasAccel, &random);
-  const auto run = [&](double from, double to, const Eigen::Vector3d& bg, const Eigen::Vector3d& ba) {
-    Preintegration imu(noise, bg, ba);
-    REQUIRE(imu.integrate(samples, stampOf(from), stampOf(to)).ok());
-    return imu;
-  };
-  const Preintegration whole = run(0, 1, kBiasGyro, kBiasAccel);
-  Preintegration joined = run(0, 0.4, kBiasGyro, kBiasAccel);
-  joined.append(run(0.4, 0.7, kBiasGyro, kBiasAccel));
-  joined.append(run(0.7, 1, kBiasGyro, kBiasAccel));
-  CHECK(joined.duration() == Approx(1.0));
-  CHECK(logSo3(joined.deltaRotation().conjugate() * whole.deltaRotation()).norm() < 1e-12);
-  CHECK((joined.deltaVelocity() - whole.deltaVelocity()).norm() < 1e-12);
-  CHECK((joined.deltaPosition() - whole.deltaPosition()).norm() < 1e-12);
-  CHECK(relative(joined.jacobianGyro(), whole.jacobianGyro()) < 1e-12);
-  CHECK(relative(joined.jacobianAccel(), whole.jacobianAccel()) < 1e-12);
-  CHECK(correlationError(joined.covariance(), whole.covariance()) < 1e-9);
-
-  // Another linearization point in the second part: equal to first order.
-  const auto mixed_error = [&](double s) {
-    Preintegration mixed = run(0, 0.4, kBiasGyro, kBiasAccel);
-    mixed.append(run(0.4, 1, kBiasGyro + s * Eigen::Vector3d(2e-3, 1e-3, -2e-3),
-                     kBiasAccel + s * Eigen::Vector3d(0.02, 0.01, 0.03)));
-    return (mixed.deltaPosition() - whole.deltaPosition()).norm() +
-           logSo3(mixed.deltaRotation().conjugate() * whole.deltaRotation()).norm();
-  };
-  CHECK(mixed_error(1.0) < 1e-5);
-  CHECK(mixed_error(1.0) / mixed_error(0.5) == Approx(4.0).margin(0.3));
-}
-
 TEST_CASE("Holes, gaps and saturated samples raise the covariance") {
   const ImuNoise noise;
   const AnalyticTrajectory path(6);

@@ -9,7 +9,6 @@
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "estimator/imu/mono_start.hpp"
-#include "estimator/imu/stereo_start.hpp"
 #include "tests/imu/analytic_trajectory.hpp"
 #include "tests/imu/recorded_imu.hpp"
 #include "tests/support/long_run.hpp"
@@ -119,69 +118,6 @@ TEST_CASE("Tilt from the accelerometer before the first image, real starts in mo
         before, quantile(errors, 0.5) * kDegrees, quantile(errors, 0.9) * kDegrees, 100 * covered);
     CHECK(quantile(errors, 0.5) * kDegrees < 5.5);
     CHECK(covered > 0.8);
-  }
-}
-
-TEST_CASE("Stereo start on real IMU: tilt and velocity", "[figures]") {
-  const Starts& all = allStarts();
-  if (all.starts().empty()) {
-    skipCase(noLogs("euroc_imu_gt_all"), kRunWithData);
-    return;
-  }
-  const ImuNoise noise;
-  const StartPrior prior;
-  for (const double position_sigma : {0.001, 0.003}) {
-    for (const double seconds : {0.2, 0.3, 0.5, 1.0}) {
-      Random random(7);
-      std::vector<double> tilts, speeds, biases;
-      double nees = 0;
-      int converged = 0;
-      for (const Start& s : all.starts()) {
-        const std::vector<ImuSample> samples = all.imu(s, seconds);
-        const TruthRow& first = all.row(s, 0);
-        TiltEstimate tilt;
-        REQUIRE(estimateTilt(samples, first.stamp, noise, prior, tilt).ok());
-        const Eigen::Vector3d offset = position_sigma * normalVector(random);
-        const auto count = static_cast<std::size_t>(std::lround(seconds * 20));
-        std::vector<Preintegration> imu;
-        std::vector<StartFrame> frames;
-        imu.reserve(count);
-        for (std::size_t k = 1; k <= count; ++k) {
-          const TruthRow& row = all.row(s, 10 * k);
-          imu.emplace_back(noise, prior.bias_gyro, prior.bias_accel);
-          REQUIRE(imu.back().integrate(samples, first.stamp, row.stamp).ok());
-          StartFrame frame;
-          frame.from_first = &imu.back();
-          frame.position =
-              first.q.conjugate() * (row.p - first.p) + position_sigma * normalVector(random) - offset;
-          frame.rotation = first.q.conjugate() * row.q * expSo3(0.001 * normalVector(random));
-          frame.position_sigma = position_sigma;
-          frame.rotation_sigma = 0.002;  // truth's own orientation noise included
-          frames.push_back(frame);
-        }
-        MotionStart start;
-        const Status status = solveStereoStart(frames, tilt, noise, prior, start);
-        if (!status.ok()) continue;
-        ++converged;
-        const Eigen::Vector3d true_velocity = first.q.conjugate() * first.v;
-        tilts.push_back(tiltError(start.up, first));
-        speeds.push_back((start.velocity - true_velocity).norm());
-        biases.push_back((start.bias_gyro - first.bias_gyro).norm());
-        nees += std::pow(tilts.back() / start.tilt_sigma, 2);
-      }
-      std::printf(
-          "stereo start %.1f s, %.0f mm: solved %d, tilt median %.2f deg 90 %% %.2f deg, velocity median "
-          "%.3f m/s, "
-          "gyro bias median %.4f rad/s, mean (tilt error / largest sigma)^2 %.2f\n",
-          seconds, position_sigma * 1e3, converged, quantile(tilts, 0.5) * kDegrees,
-          quantile(tilts, 0.9) * kDegrees, quantile(speeds, 0.5), quantile(biases, 0.5), nees / converged);
-      CHECK(converged == static_cast<int>(all.starts().size()));
-      if (seconds >= 0.5) {
-        CHECK(quantile(tilts, 0.5) * kDegrees < 1.3);
-        CHECK(quantile(tilts, 0.9) * kDegrees < 2.2);
-        CHECK(quantile(speeds, 0.5) < 0.05);
-      }
-    }
   }
 }
 
