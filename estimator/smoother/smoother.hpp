@@ -137,8 +137,8 @@ class Smoother {
   [[nodiscard]] bool promoted(TrackId id) const { return problem_.extras.promoted(id); }
 
   /// A new plane, without any information: `plane` is where to start from. Its factors count from the step on
-  /// at which they determine its normal (extra_table.hpp). It leaves with the next step unless a point is tied
-  /// to it by then, and later when the last point tied to it has left. None when kMaxPlanes are held.
+  /// at which they determine its normal (extra_table.hpp). It leaves with the next step unless a point is
+  /// tied to it by then, and later when the last point tied to it has left. None when kMaxPlanes are held.
   std::optional<PlaneId> addPlane(const Plane& plane) { return problem_.extras.addPlane(plane); }
   /// Ties a promoted landmark to a plane, `sigma` m. Refused: kInvalidInput without such a landmark or plane,
   /// or when they are tied already; kCapacityReached with kMaxExtraFactors.
