@@ -50,6 +50,9 @@ class EliminatedPoint {
   /// Of a landmark just eliminated.
   void keep(const LandmarkBlock& landmark);
 
+  /// 1/m, 1 sigma with the states held.
+  [[nodiscard]] double inverseDepthSigma() const { return L_.i22; }
+
   /// The point's step that goes with the states' step `dx` (columns as in `states`, calibration first).
   [[nodiscard]] Eigen::Vector3d step(const VectorMap& dx,
                                      const std::array<WindowState, kMaxStates>& states) const;

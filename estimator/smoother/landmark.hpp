@@ -57,6 +57,7 @@ struct Landmark {
   int frames_seen = 0;
   int rejections = 0;             ///< solves in which it did not fit
   bool in_system = false;         ///< takes part in the solve at hand
+  double mean_square = 0;         ///< of its whitened residuals after the last solve
   std::uint8_t extra = kNoExtra;  ///< index of its own state; none: structureless
   LandmarkPoint point;
   FixedVector<Sighting, kMaxStates> sightings;

@@ -126,7 +126,7 @@ void Smoother::updateStatistics() {
     if (!landmark.in_system || landmark.sightings.empty()) continue;
     ++statistics_.landmarks;
     const int count = landmark.viewCount();
-    sum += meanSquaredResidual(problem_.rig_poses, landmark.views(), landmark.point) * count;
+    sum += landmark.mean_square * count;
     views += count;
     const Sighting& last = landmark.sightings.back();
     if (last.slot != problem_.window.newestSlot()) continue;

@@ -68,16 +68,19 @@ void WindowSolver::reintegrate(WindowProblem& problem) const {
 }
 
 // Landmarks that have no point yet get one; the others move by `iterations` steps of their own, with none
-// they are only looked at.
+// they stay where the last step put them. A point behind a camera that saw it is found when sightings are
+// checked.
 void WindowSolver::triangulateAll(WindowProblem& problem, int iterations) const {
   for (Landmark& landmark : problem.landmarks) {
     if (landmark.extra != kNoExtra) {
       landmark.in_system = !landmark.sightings.empty();
       continue;
     }
+    landmark.in_system = landmark.sightings.size() >= 2;
     const int steps = landmark.point.triangulated ? iterations : kTriangulationStart;
-    landmark.in_system = landmark.sightings.size() >= 2 &&
-                         triangulate(problem.rig_poses, landmark.views(), steps, landmark.point);
+    if (landmark.in_system && steps > 0) {
+      landmark.in_system = triangulate(problem.rig_poses, landmark.views(), steps, landmark.point);
+    }
   }
 }
 
@@ -181,11 +184,12 @@ void rejectNewestSightings(WindowProblem& problem, double sigmas) {
 
 void rejectLandmarks(WindowProblem& problem, double sigmas) {
   for (Landmark& landmark : problem.landmarks) {
-    if (landmark.sightings.size() < 2) continue;
-    if (landmark.in_system &&
-        meanSquaredResidual(problem.rig_poses, landmark.views(), landmark.point) <= sigmas * sigmas) {
+    if (landmark.sightings.size() < 2) {
+      landmark.mean_square = meanSquaredResidual(problem.rig_poses, landmark.views(), landmark.point);
       continue;
     }
+    landmark.mean_square = meanSquaredResidual(problem.rig_poses, landmark.views(), landmark.point);
+    if (landmark.in_system && landmark.mean_square <= sigmas * sigmas) continue;
     if (!reject(problem, landmark) && landmark.extra == kNoExtra) landmark.point.triangulated = false;
   }
 }
