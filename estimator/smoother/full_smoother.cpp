@@ -70,10 +70,7 @@ FullSmoother::FullSmoother(const Rig& rig, const ImuNoise& noise, const FullSmoo
     : rig_(rig),
       noise_(noise),
       settings_(settings),
-      next_revisit_track_(std::numeric_limits<TrackId>::max()),
-      landmark_(std::make_unique<LandmarkBlock>(kMostSightings)) {}
-
-FullSmoother::~FullSmoother() = default;
+      next_revisit_track_(std::numeric_limits<TrackId>::max()) {}
 
 Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& state) {
   if (keyframes_.size() >= settings_.max_keyframes) {
@@ -191,10 +188,11 @@ void FullSmoother::removeOutliers() {
   }
 }
 
-double FullSmoother::linearizeTrack(const Track& track, System& system) {
-  landmark_->linearize({track.sightings, poses_, rig_.T_body_cam, {}}, track.point);
-  if (!landmark_->eliminate()) return 0;
-  const auto states = landmark_->states();
+double FullSmoother::linearizeTrack(const Track& track, System& system) const {
+  LandmarkBlock& landmark = system.landmark;
+  landmark.linearize({track.sightings, poses_, rig_.T_body_cam, {}}, track.point);
+  if (!landmark.eliminate()) return 0;
+  const auto states = landmark.states();
   for (std::size_t i = 0; i < states.size(); ++i) {
     const std::size_t row = states[i].slot;
     system.g.segment<kPoseDim>(kStateDim * static_cast<Eigen::Index>(row)) +=
@@ -205,7 +203,7 @@ double FullSmoother::linearizeTrack(const Track& track, System& system) {
       product.subtract(states[j], system.poseBlock(row, states[j].slot));
     }
   }
-  return landmark_->cost();
+  return landmark.cost();
 }
 
 void FullSmoother::linearizeMotion(System& system, double& cost) const {

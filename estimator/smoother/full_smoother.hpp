@@ -23,7 +23,6 @@
 #include <atomic>
 #include <cstdint>
 #include <map>
-#include <memory>
 #include <set>
 #include <span>
 #include <utility>
@@ -66,12 +65,9 @@ struct FullSmootherReport {
   std::size_t matches_used = 0;
 };
 
-class LandmarkBlock;
-
 class FullSmoother {
  public:
   FullSmoother(const Rig& rig, const ImuNoise& noise, const FullSmootherSettings& settings);
-  ~FullSmoother();
 
   /// Every sample, in order, before the frames that follow it.
   void addImu(const ImuSample& sample) { pending_imu_.push_back(sample); }
@@ -144,7 +140,7 @@ class FullSmoother {
   void removeOutliers();
   double linearize(System& system);
   void tieAll(System& system) const;
-  double linearizeTrack(const Track& track, System& system);
+  double linearizeTrack(const Track& track, System& system) const;
   void linearizeMotion(System& system, double& cost) const;
 
   void addSighting(const TrackKey& key, const Sighting& sighting);
@@ -182,7 +178,6 @@ class FullSmoother {
   std::map<std::uint32_t, std::uint32_t> worlds_;             // epoch to the epoch whose world it shares
   TrackId next_revisit_track_;
   bool poses_given_ = false;
-  std::unique_ptr<LandmarkBlock> landmark_;
   const std::atomic<bool>* stop_ = nullptr;  ///< while solve() runs
 };
 

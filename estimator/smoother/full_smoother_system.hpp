@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "estimator/smoother/full_smoother.hpp"
+#include "estimator/smoother/landmark_block.hpp"
 #include "estimator/smoother/padded_block.hpp"
 
 namespace swiftlet {
@@ -26,6 +27,7 @@ struct FullSmoother::System {
   static constexpr std::size_t kKeyframeBytes = 2 * (225 * 8 + 2 * 225 * 12) + 128;
 
   Eigen::VectorXd g;
+  LandmarkBlock landmark{kMaxStates};  ///< the one at hand
 
   /// Forgets all pairs but those of neighbours.
   void start(std::size_t keyframes) {

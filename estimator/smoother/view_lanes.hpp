@@ -3,7 +3,7 @@
 //
 // What an image says of a landmark is a few dozen products of 3-vectors, too small to vectorize one by
 // one and the same for every view. Residuals, Jacobians and weights equal the scalar functions' to
-// rounding (tests/smoother/lanes_test.cpp). Sums run over lanes first, in a fixed order: deterministic.
+// rounding (tests/smoother/test_lanes.cpp). Sums run over lanes first, in a fixed order: deterministic.
 // Lanes are the compiler's vector extensions, lowered to whatever registers the target has.
 // Frames, units as in vision_factor.hpp. Shapes: arrays of V, one number of four views each; 3 x 3 and
 // 2 x 3 matrices by columns, as Eigen stores them. V is only passed in memory, so that no interface

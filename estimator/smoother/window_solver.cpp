@@ -84,7 +84,8 @@ void WindowSolver::triangulateAll(WindowProblem& problem, int iterations) const 
   }
 }
 
-void WindowSolver::build(WindowProblem& problem, NormalEquations& system, FrameStatistics& statistics) {
+void WindowSolver::build(WindowProblem& problem, NormalEquations& system, bool first,
+                         FrameStatistics& statistics) {
   system.begin(problem.calibration.layout(), problem.dimension);
   prior_cost_ = addPrior(problem, system, step_);
   for (std::size_t k = 1; k < problem.window.size(); ++k) {
@@ -93,9 +94,10 @@ void WindowSolver::build(WindowProblem& problem, NormalEquations& system, FrameS
   }
   for (Landmark& landmark : problem.landmarks) {
     if (!landmark.in_system || landmark.extra != kNoExtra) continue;
-    landmark.in_system =
-        system.addLandmark(problem.viewsOf(landmark.views()), landmark.point, problem.window.slots(),
-                           &eliminated_[problem.landmarks.indexOf(landmark)]);
+    EliminatedPoint& eliminated = eliminated_[problem.landmarks.indexOf(landmark)];
+    landmark.in_system = system.addLandmark(problem.viewsOf(landmark.views()), landmark.point,
+                                            problem.window.slots(), &eliminated);
+    if (landmark.in_system && first) landmark.point.inverse_depth_sigma = eliminated.inverseDepthSigma();
   }
   addExtras(problem, system);
   system.finish(problem.window.slots());
@@ -127,7 +129,7 @@ Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, Wind
     problem.placeCameras();
     if (iteration == 0) triangulateAll(problem, 0);
     if (iteration == 1) rejectNewestSightings(problem, kOutlierSigmas);
-    build(problem, system, statistics);
+    build(problem, system, iteration == 0, statistics);
     // The prior's cost has an offset of its own: only differences of the sum mean anything.
     const double total = system.cost() + prior_cost_;
     if (iteration > 1 && total > cost + kCostIncreaseAllowed * system.cost()) {

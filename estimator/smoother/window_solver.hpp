@@ -25,7 +25,8 @@ class WindowSolver {
  private:
   void reintegrate(WindowProblem& problem) const;
   void triangulateAll(WindowProblem& problem, int iterations) const;
-  void build(WindowProblem& problem, NormalEquations& system, FrameStatistics& statistics);
+  /// `first` of a solve: points get their sigmas, with the states where the last solve left them.
+  void build(WindowProblem& problem, NormalEquations& system, bool first, FrameStatistics& statistics);
   void substitutePoints(WindowProblem& problem, const VectorMap& step) const;
 
   std::vector<EliminatedPoint> eliminated_;  // by landmark
