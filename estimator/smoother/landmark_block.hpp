@@ -1,6 +1,6 @@
 #pragma once
-// One landmark linearized at the states that see it, and its point eliminated: the only place where that is
-// done, for the fixed lag, full smoothing, starts and planes.
+// One landmark linearized at the states that see it, and its point eliminated: for the fixed lag, full
+// smoothing and landmarks on planes. The start with one camera (mono_start.cpp) has its own.
 //
 // For state i with Jacobians J_i (pose), P_i (point) and K_i (calibration) of all its views, whitened and
 // weighted, and residuals r_i:
@@ -12,7 +12,7 @@
 // The point is either a bearing with inverse depth (landmark.hpp) or, for one that keeps its columns, a
 // position. Residuals and robust weights are taken at the current poses, Jacobians at the linearization's.
 // Frames and Jacobians: vision_factor.hpp. Four states at a time, in vector lanes (view_lanes.hpp); the
-// scalar twin is in tests/smoother/scalar_landmark.hpp. Memory: 1.4 kB a sighting (3 kB with calibration),
+// scalar twin is in tests/smoother/scalar_landmark.hpp. Memory: 1.1 kB a sighting (2.4 kB with calibration),
 // reserved by the constructor. Cost: linear in the views. Source: Triggs et al., "Bundle Adjustment - A
 // Modern Synthesis", 1999, section 6.
 
@@ -63,9 +63,10 @@ class LandmarkBlock {
   void linearize(const LandmarkViews& views, const Eigen::Vector3d& position,
                  const Eigen::Vector3d& linearization);
 
-  /// One of the two follows. False when fewer than two states have the point in front of a camera or its
+  /// After linearize(). False when fewer than two states have the point in front of a camera or its
   /// information is singular: there is nothing to add then.
   [[nodiscard]] bool eliminate();
+  /// In place of eliminate(), for a landmark with columns of its own.
   void keepPoint();
 
   [[nodiscard]] std::span<const State> states() const { return {states_.data(), states_.size()}; }
@@ -108,7 +109,7 @@ class LandmarkBlock {
     lanes::V point[kViewCalibrationDim][3]{};
     lanes::V gradient[kViewCalibrationDim]{};
   };
-  /// One row of a view's Jacobian, weighted where it is named so.
+  /// One row of four views: Jacobian and residual, not weighted yet, and the weight.
   struct Row {
     lanes::V pose[kPoseDim];
     lanes::V point[3];

@@ -3,7 +3,7 @@
 //
 // The factors that touch what leaves are linearized once more, with first estimates of everything that they
 // touch frozen, expanded at these, and the leaving columns eliminated (elimination.hpp). Equations:
-// docs/smoother.md. Memory: 0.2 MiB, reserved by the constructor. Cost: cubic in the columns touched.
+// docs/smoother.md. Memory: 0.1 MiB, reserved by the constructor. Cost: cubic in the columns touched.
 
 #include <array>
 #include <cstdint>

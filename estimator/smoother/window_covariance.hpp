@@ -2,7 +2,7 @@
 // Covariances of the window from the factor of its last solve, which outlives the system.
 //
 // covariance(a, b) = Y_a^T Y_b with Y = L^-1 of the columns asked for. Error states as in state.hpp and
-// extra_states.hpp. Memory: 3.8 MiB, reserved by the constructor. Cost: a triangular solve a column.
+// extra_states.hpp. Memory: 2.8 MiB, reserved by the constructor. Cost: a triangular solve a column.
 
 #include <Eigen/Core>
 #include <optional>
