@@ -1,33 +1,20 @@
 // Depth stages allocate nothing after construction: malloc is counted.
 #include <catch2/catch.hpp>
 #include <cstddef>
-#include <cstdlib>
 #include <vector>
 
 #include "estimator/core/random.hpp"
 #include "mapping/depth/depth_stage.hpp"
 #include "mapping/depth/sensor_depth.hpp"
 #include "tests/mapping/depth_scene.hpp"
+#include "tests/support/counted_malloc.hpp"
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-
-namespace {
-// One thread only.
-long allocations = 0;
-}  // namespace
-
-extern "C" void* __libc_malloc(std::size_t size);
-extern "C" void* malloc(std::size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
+#ifdef SWIFTLET_COUNTS_MALLOC
 
 using namespace swiftlet;
 
 TEST_CASE("depth: steps do not allocate") {
-  const long before_probe = allocations;
-  free(malloc(8));
-  REQUIRE(allocations > before_probe);
+  REQUIRE(test::mallocIsCounted());
 
   const Rig rig = depth_scene::makeRig(CameraKind::kPinholeRadtan);
   DepthStage stage(rig);
@@ -48,12 +35,12 @@ TEST_CASE("depth: steps do not allocate") {
   const int width = rig.camera[0].width(), height = rig.camera[0].height();
   const ImageView l{left.data(), width, height, width}, r{right.data(), width, height, width};
   for (int round = 0; round < 2; ++round) {
-    const long before = allocations;
+    const long before = test::malloc_calls;
     const Status stepped = stage.step(l, r, Stamp{1}, {}, out);
     const Status labelled = stage.addLabels(l, out);
     const Status sensed = sensor.step(counts.data(), width, height, width, Stamp{1}, sensor_out);
     const Status refused = stage.step(l, {}, Stamp{2}, {}, out);
-    const long after = allocations;
+    const long after = test::malloc_calls;
     CHECK(stepped.ok());
     CHECK(labelled.ok());
     CHECK(sensed.ok());

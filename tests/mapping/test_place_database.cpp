@@ -9,23 +9,7 @@
 #include "estimator/core/random.hpp"
 #include "mapping/place/place_database.hpp"
 #include "mapping/place/vocabulary.hpp"
-
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define SWIFTLET_COUNTS_ALLOCATIONS
-#endif
-
-namespace {
-// One thread only. Stays 0 under a sanitizer, which has its own allocator.
-std::size_t allocations = 0;
-}  // namespace
-
-#ifdef SWIFTLET_COUNTS_ALLOCATIONS
-extern "C" void* __libc_malloc(std::size_t size);
-extern "C" void* malloc(std::size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
-#endif
+#include "tests/support/counted_malloc.hpp"
 
 using namespace swiftlet;
 
@@ -67,18 +51,18 @@ TEST_CASE("The index finds what comparing with every keyframe finds, through add
   Random random(21);
   std::vector<Kept> kept;
   const std::size_t reserved = database.bytes();
-#ifdef SWIFTLET_COUNTS_ALLOCATIONS
-  REQUIRE(allocations > 0);
+#ifdef SWIFTLET_COUNTS_MALLOC
+  REQUIRE(test::mallocIsCounted());
 #endif
   auto query = std::make_unique<PlaceQuery>();
   for (std::uint64_t i = 0; i < 400; ++i) {
     const Stamp now = at(0.5 * static_cast<double>(i));
     const BagOfWords bag = bagAt(random.uniform(0, kWords), random);
-    const std::size_t before = allocations;
+    const long before = test::malloc_calls;
     const Status status = database.query(now, 0, bag, *query);
     std::uint32_t slot = 0;
     const Status added = database.add(i, now, 0, bag, slot);
-    REQUIRE(allocations == before);
+    REQUIRE(test::malloc_calls == before);
     // Who left is asked of the database; all others must be found with the right score.
     std::vector<std::pair<float, std::uint64_t>> expected;
     for (const Kept& k : kept) {

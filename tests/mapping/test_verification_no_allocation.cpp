@@ -1,34 +1,21 @@
 // Matching, depths and verification allocate nothing after construction: malloc is counted.
 #include <catch2/catch.hpp>
 #include <cstddef>
-#include <cstdlib>
 #include <memory>
 #include <vector>
 
 #include "mapping/place/feature_depth.hpp"
 #include "mapping/place/loop_verification.hpp"
 #include "tests/mapping/loop_scene.hpp"
+#include "tests/support/counted_malloc.hpp"
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-
-namespace {
-// One thread only.
-long allocations = 0;
-}  // namespace
-
-extern "C" void* __libc_malloc(std::size_t size);
-extern "C" void* malloc(std::size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
+#ifdef SWIFTLET_COUNTS_MALLOC
 
 using namespace swiftlet;              // NOLINT(google-build-using-namespace)
 using namespace swiftlet::loop_scene;  // NOLINT(google-build-using-namespace)
 
 TEST_CASE("verification of a loop does not allocate") {
-  const long before_probe = allocations;
-  free(malloc(8));
-  REQUIRE(allocations > before_probe);
+  REQUIRE(test::mallocIsCounted());
 
   const Rig rig = makeRig();
   LoopVerificationSettings settings;
@@ -48,10 +35,10 @@ TEST_CASE("verification of a loop does not allocate") {
     LoopPrior prior;
     prior.R_old_new = scene.T_old_new.rotation;
     std::size_t found = 0;
-    const long before = allocations;
+    const long before = test::malloc_calls;
     const Status verified = verifier->verify(scene.old_keyframe, scene.new_keyframe, prior, 1.0, *result);
     const Status filled = depth.fill(image, image, scene.old_keyframe, found);
-    const long after = allocations;
+    const long after = test::malloc_calls;
     CHECK(verified.ok());
     CHECK(filled.ok());
     CHECK(result->accepted() == (twins < 1));

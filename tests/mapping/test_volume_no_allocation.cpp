@@ -1,33 +1,20 @@
 // Fusing, evicting and drawing allocate nothing after construction: malloc is counted.
 #include <catch2/catch.hpp>
 #include <cstddef>
-#include <cstdlib>
 #include <memory>
 #include <vector>
 
 #include "mapping/surface/surface_stage.hpp"
 #include "tests/mapping/volume_scene.hpp"
+#include "tests/support/counted_malloc.hpp"
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-
-namespace {
-// One thread only.
-long allocations = 0;
-}  // namespace
-
-extern "C" void* __libc_malloc(std::size_t size);
-extern "C" void* malloc(std::size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
+#ifdef SWIFTLET_COUNTS_MALLOC
 
 using namespace swiftlet;           // NOLINT(google-build-using-namespace)
 using namespace swiftlet::testing;  // NOLINT(google-build-using-namespace)
 
 TEST_CASE("the volume and its surface do not allocate") {
-  const long before_probe = allocations;
-  free(malloc(8));
-  REQUIRE(allocations > before_probe);
+  REQUIRE(test::mallocIsCounted());
 
   VolumeSettings settings = sceneSettings();
   settings.memory_bytes = 120 * 8000;
@@ -46,12 +33,12 @@ TEST_CASE("the volume and its surface do not allocate") {
   }
   VolumeStep fused;
   SurfaceStep drawn;
-  const long before = allocations;
+  const long before = test::malloc_calls;
   for (std::size_t i = 0; i < images.size(); ++i) {
     (void)integrator.step(images[i].view(), poses[i], {}, fused);
     (void)stage->step(poses[i].translation.cast<float>(), {}, drawn);
   }
-  const long after = allocations;
+  const long after = test::malloc_calls;
   CHECK(after == before);
   CHECK(volume.counters().evicted > 0);
   CHECK(store.counters().lost > 0);

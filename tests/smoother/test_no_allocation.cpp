@@ -1,22 +1,12 @@
 // A step of the smoother allocates nothing, with planes and promotions between the steps: malloc is counted.
 
 #include <catch2/catch.hpp>
-#include <cstdlib>
 #include <memory>
 
 #include "tests/smoother/plane_ties.hpp"
+#include "tests/support/counted_malloc.hpp"
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-
-namespace {
-long allocation_count = 0;
-}  // namespace
-
-extern "C" void* __libc_malloc(std::size_t size);
-extern "C" void* malloc(std::size_t size) {
-  ++allocation_count;
-  return __libc_malloc(size);
-}
+#ifdef SWIFTLET_COUNTS_MALLOC
 
 using namespace swiftlet;
 
@@ -28,14 +18,12 @@ TEST_CASE("Neither a step nor what happens between two steps allocates", "[smoot
   settings.planes = true;
   settings.directions = true;
   test::PlaneTies ties(flight, settings);
-  const long control = allocation_count;
-  free(malloc(8));
-  const bool counting = allocation_count > control;
+  const bool counting = test::mallocIsCounted();
   long allocated = 0;
   bool ok = true;
   flight.play([&](const ImuSample& s) { run.addImu(s); },
               [&](std::size_t k) {
-                const long before = allocation_count;
+                const long before = test::malloc_calls;
                 ok = run.step(k).ok() && ok;
                 ties.update(run.smoother());
                 if (k % 40 == 39) {
@@ -43,7 +31,7 @@ TEST_CASE("Neither a step nor what happens between two steps allocates", "[smoot
                     if (surface.id) run.smoother().removePlane(*surface.id);
                   }
                 }
-                allocated += allocation_count - before;
+                allocated += test::malloc_calls - before;
               });
   CHECK(counting);
   CHECK(ok);
