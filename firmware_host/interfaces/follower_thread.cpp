@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "drivers/calibration/input_error.hpp"
@@ -60,6 +61,20 @@ void FollowerThread::repeat(double period, const std::function<void(double now)>
     next = std::max(next + period, now);
     sleepUntil(next);
   }
+}
+
+Follower::~Follower() {
+  // A thread that is left behind goes on using it.
+  if (work_ && !work_->end()) static_cast<void>(work_.release());
+}
+
+nlohmann::ordered_json Follower::finish() {
+  const std::string& fault = work_->thread_.fault();
+  // What a thread that is left behind counts is still being written.
+  if (!work_->end()) return {{"fault", fault}};
+  nlohmann::ordered_json json = work_->json();
+  if (!fault.empty()) json["fault"] = fault;
+  return json;
 }
 
 }  // namespace swiftlet

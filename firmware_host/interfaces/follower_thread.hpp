@@ -6,6 +6,8 @@
 
 #include <atomic>
 #include <functional>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "estimator/core/stamp.hpp"
@@ -57,6 +59,44 @@ class FollowerThread {
   std::string name_;
   std::string fault_;
   FlightThread thread_;
+};
+
+/// What follows a run, as the run sees it. Each kind of follower derives its own Work, whose last step of
+/// construction is to start the thread.
+class Follower {
+ public:
+  Follower(const Follower&) = delete;
+  Follower& operator=(const Follower&) = delete;
+
+  /// For the supervisor; as long as this object.
+  [[nodiscard]] const Heartbeat& heart() const { return work_->thread_.heart(); }
+  /// Tells it to end, and waits for nothing: so that several end at the same time.
+  void tellEnd() { work_->thread_.tellEnd(); }
+  /// Ends it, and gives what it counted, for the summary; `fault`: why it ended before, or that it is stuck.
+  nlohmann::ordered_json finish();
+
+ protected:
+  class Work {
+   public:
+    Work() = default;
+    virtual ~Work() = default;
+    Work(const Work&) = delete;
+    Work& operator=(const Work&) = delete;
+
+    /// False: the thread is stuck and was left behind, with all of this.
+    [[nodiscard]] virtual bool end() { return thread_.end(); }
+    /// What it counted, once it has ended.
+    [[nodiscard]] virtual nlohmann::ordered_json json() const = 0;
+
+   protected:
+    FollowerThread thread_;
+    friend Follower;
+  };
+  explicit Follower(std::unique_ptr<Work> work) : work_(std::move(work)) {}
+  /// Ends it; a thread that is stuck is left behind: its outlet has to stay then.
+  ~Follower();
+
+  std::unique_ptr<Work> work_;
 };
 
 }  // namespace swiftlet

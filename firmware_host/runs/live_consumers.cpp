@@ -80,12 +80,9 @@ bool LiveConsumers::drainRemarks(RunObserver& observer) {
 }
 
 void LiveConsumers::addTo(Supervisor& supervisor) {
-  const auto add = [&](const char* name, const auto& follower) {
-    if (follower) static_cast<void>(supervisor.add(name, follower->heart()));
-  };
-  add("autopilot", autopilot_);
-  add("dds", ros2_);
-  add("view", view_);
+  for (const auto& [name, thread, follower] : followers()) {
+    if (follower != nullptr) static_cast<void>(supervisor.add(thread, follower->heart()));
+  }
   for (LiveOutlet* outlet : outlets_) {
     static_cast<void>(
         supervisor.addSink([outlet](const Verdict& verdict) { outlet->verdict.write(verdict); }));
@@ -93,20 +90,17 @@ void LiveConsumers::addTo(Supervisor& supervisor) {
 }
 
 bool LiveConsumers::finish(nlohmann::ordered_json& report, std::vector<std::string>& faults) {
-  if (autopilot_) autopilot_->tellEnd();
-  if (ros2_) ros2_->tellEnd();
-  if (view_) view_->tellEnd();
+  for (const Named& each : followers()) {
+    if (each.follower != nullptr) each.follower->tellEnd();
+  }
   bool sound = true;
-  const auto end = [&](const char* name, const auto& follower) {
-    if (!follower) return;
+  for (const auto& [name, thread, follower] : followers()) {
+    if (follower == nullptr) continue;
     report[name] = follower->finish();
-    if (!report[name].contains("fault")) return;
-    faults.push_back(std::string(name) + ": " + report[name]["fault"].template get<std::string>());
+    if (!report[name].contains("fault")) continue;
+    faults.push_back(std::string(name) + ": " + report[name]["fault"].get<std::string>());
     if (report[name].size() == 1) sound = false;  // it is stuck: nothing is counted
-  };
-  end("autopilot", autopilot_);
-  end("ros2", ros2_);
-  end("view", view_);
+  }
   return sound;
 }
 

@@ -3,6 +3,7 @@
 // by them, the live view. Opened before the graph is built, ended after the executor. An executor that is
 // not real-time has none.
 
+#include <array>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -38,6 +39,16 @@ class LiveConsumers {
  private:
   void openRos2(const Calibration& calibration, const Settings& settings, const FlightRequest& request);
   LiveOutlet& newOutlet(std::unique_ptr<LiveOutlet>& owner);
+  struct Named {
+    const char* name;    ///< in the summary
+    const char* thread;  ///< to the supervisor
+    Follower* follower;  ///< null: there is none
+  };
+  [[nodiscard]] std::array<Named, 3> followers() const {
+    return {{{"autopilot", "autopilot", autopilot_.get()},
+             {"ros2", "dds", ros2_.get()},
+             {"view", "view", view_.get()}}};
+  }
 
   LiveOutlets outlets_;
   std::unique_ptr<LiveOutlet> autopilot_outlet_;

@@ -14,7 +14,6 @@
 #include "estimator/core/units.hpp"
 #include "estimator/messages/names.hpp"
 #include "firmware_host/interfaces/device_journal.hpp"
-#include "firmware_host/interfaces/follower_thread.hpp"
 #include "firmware_host/outputs/autopilot/autopilot_port.hpp"
 #include "firmware_host/outputs/autopilot/obstacle_message.hpp"
 #include "firmware_host/realtime/host_sleep.hpp"
@@ -56,7 +55,7 @@ AutopilotLinkSettings linkSettings(const AutopilotGroup& settings) {
   return link;
 }
 
-class AutopilotThread::Work {
+class AutopilotThread::Work final : public Follower::Work {
   using Severity = mavlink::StatusText::Severity;
   using Troubles = decltype(Verdict::troubles);
 
@@ -78,19 +77,13 @@ class AutopilotThread::Work {
     thread_.start(thread, "settings", "autopilot.device", [this] { run(); });
   }
 
-  /// False: the thread is stuck and was left behind, with all of this.
-  bool end() { return thread_.end(); }
-  void tellEnd() { thread_.tellEnd(); }
-  [[nodiscard]] const Heartbeat& heart() const { return thread_.heart(); }
-  [[nodiscard]] const std::string& fault() const { return thread_.fault(); }
-
   bool drainEvents(const std::function<void(Stamp, const std::string&)>& take) {
     bool any = false;
     for (DeviceEvent event; journal_.next(event); any = true) take(event.stamp, journal_.text(event));
     return any;
   }
 
-  [[nodiscard]] nlohmann::ordered_json json() const {
+  [[nodiscard]] nlohmann::ordered_json json() const override {
     const AutopilotLinkCounters& c = link_.counters();
     const StreamCounters& r = link_.received();
     return {{"poses", c.poses},
@@ -326,29 +319,13 @@ class AutopilotThread::Work {
   Stamp next_refusal_;
   std::uint64_t refused_ = 0;
   LatencyHistogram age_;
-  FollowerThread thread_;
 };
 
 AutopilotThread::AutopilotThread(LiveOutlet& outlet, const AutopilotThreadOptions& options)
-    : work_(std::make_unique<Work>(outlet, options)) {}
-AutopilotThread::~AutopilotThread() {
-  // A thread that is left behind goes on using it.
-  if (!work_->end()) static_cast<void>(work_.release());
-}
-
-const Heartbeat& AutopilotThread::heart() const { return work_->heart(); }
-void AutopilotThread::tellEnd() { work_->tellEnd(); }
+    : Follower(std::make_unique<Work>(outlet, options)) {}
 
 bool AutopilotThread::drainEvents(const std::function<void(Stamp, const std::string&)>& take) {
-  return work_->drainEvents(take);
-}
-
-nlohmann::ordered_json AutopilotThread::finish() {
-  // What a thread that is left behind counts is still being written.
-  if (!work_->end()) return {{"fault", work_->fault()}};
-  nlohmann::ordered_json json = work_->json();
-  if (!work_->fault().empty()) json["fault"] = work_->fault();
-  return json;
+  return static_cast<Work&>(*work_).drainEvents(take);
 }
 
 }  // namespace swiftlet

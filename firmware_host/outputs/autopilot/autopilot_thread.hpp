@@ -12,15 +12,13 @@
 // Stamps of a log are moved there by the one difference that its player knows.
 
 #include <functional>
-#include <memory>
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 
 #include "drivers/mavlink/autopilot_link.hpp"
+#include "firmware_host/interfaces/follower_thread.hpp"
 #include "firmware_host/interfaces/live_outlet.hpp"
 #include "firmware_host/settings/device_settings.hpp"
-#include "firmware_host/supervisor/heartbeat.hpp"
 
 namespace swiftlet {
 
@@ -36,27 +34,16 @@ struct AutopilotThreadOptions {
 /// q_vehicle_body and the lever arm as the settings say them.
 AutopilotLinkSettings linkSettings(const AutopilotGroup& settings);
 
-class AutopilotThread {
+class AutopilotThread : public Follower {
  public:
   /// Opens the port and begins. InputError naming the setting where it does not open. `outlet` outlives it.
   AutopilotThread(LiveOutlet& outlet, const AutopilotThreadOptions& options);
-  /// Sends nothing more, and ends; a thread that is stuck is left behind: `outlet` has to stay then.
-  ~AutopilotThread();
-  AutopilotThread(const AutopilotThread&) = delete;
-  AutopilotThread& operator=(const AutopilotThread&) = delete;
 
   /// What happened to the port since the last call; any one thread.
   bool drainEvents(const std::function<void(Stamp, const std::string&)>& take);
-  /// For the supervisor; as long as this object.
-  [[nodiscard]] const Heartbeat& heart() const;
-  /// Tells it to end, and waits for nothing: so that several end at the same time.
-  void tellEnd();
-  /// Ends it, and gives what it counted, for the summary; `fault`: why it ended before, or that it is stuck.
-  nlohmann::ordered_json finish();
 
  private:
   class Work;
-  std::unique_ptr<Work> work_;
 };
 
 }  // namespace swiftlet

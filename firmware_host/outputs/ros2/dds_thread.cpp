@@ -11,7 +11,6 @@
 #include "drivers/dds/dds_link.hpp"
 #include "drivers/device/monotonic_now.hpp"
 #include "estimator/messages/names.hpp"
-#include "firmware_host/interfaces/follower_thread.hpp"
 #include "firmware_host/outputs/map_files/map_files.hpp"
 #include "firmware_host/outputs/ros2/ros_clock.hpp"
 #include "firmware_host/outputs/ros2/ros_state.hpp"
@@ -42,7 +41,7 @@ constexpr std::uint8_t kStaleLevel = 3;
 
 }  // namespace
 
-class DdsThread::Work {
+class DdsThread::Work final : public Follower::Work {
  public:
   Work(LiveOutlet& outlet, const DdsThreadOptions& options)
       : outlet_(outlet), options_(options), mesh_pace_{1 / options.settings.mesh_hz} {
@@ -60,12 +59,7 @@ class DdsThread::Work {
     thread_.start(thread, "settings", "ros2.enabled", [this] { run(); });
   }
 
-  /// False: the thread is stuck and was left behind, with all of this.
-  bool end() { return thread_.end(); }
-  void tellEnd() { thread_.tellEnd(); }
-  [[nodiscard]] const Heartbeat& heart() const { return thread_.heart(); }
-  [[nodiscard]] const std::string& fault() const { return thread_.fault(); }
-  [[nodiscard]] nlohmann::ordered_json json() const {
+  [[nodiscard]] nlohmann::ordered_json json() const override {
     const DdsCounters link = link_.counters();
     nlohmann::ordered_json json = {{"odometry", odometries_},      {"meshes", meshes_},
                                    {"surfaces", surfaces_},        {"written", link.written},
@@ -274,25 +268,9 @@ class DdsThread::Work {
   std::vector<Eigen::Vector3f> points_, colours_;
   std::vector<DdsCloudPoint> cloud_;
   DdsImage label_;
-  FollowerThread thread_;
 };
 
 DdsThread::DdsThread(LiveOutlet& outlet, const DdsThreadOptions& options)
-    : work_(std::make_unique<Work>(outlet, options)) {}
-DdsThread::~DdsThread() {
-  // A thread that is left behind goes on using it.
-  if (!work_->end()) static_cast<void>(work_.release());
-}
-
-const Heartbeat& DdsThread::heart() const { return work_->heart(); }
-void DdsThread::tellEnd() { work_->tellEnd(); }
-
-nlohmann::ordered_json DdsThread::finish() {
-  // What a thread that is left behind counts is still being written.
-  if (!work_->end()) return {{"fault", work_->fault()}};
-  nlohmann::ordered_json json = work_->json();
-  if (!work_->fault().empty()) json["fault"] = work_->fault();
-  return json;
-}
+    : Follower(std::make_unique<Work>(outlet, options)) {}
 
 }  // namespace swiftlet

@@ -4,14 +4,12 @@
 // kKeptImages a turn. In builds without SWIFTLET_WITH_DDS the constructor says so.
 
 #include <functional>
-#include <memory>
-#include <nlohmann/json_fwd.hpp>
 
 #include "drivers/device/host_clocks.hpp"
+#include "firmware_host/interfaces/follower_thread.hpp"
 #include "firmware_host/interfaces/label_exchange.hpp"
 #include "firmware_host/interfaces/live_outlet.hpp"
 #include "firmware_host/settings/device_settings.hpp"
-#include "firmware_host/supervisor/heartbeat.hpp"
 
 namespace swiftlet {
 
@@ -24,25 +22,13 @@ struct DdsThreadOptions {
   LabelExchange* labels = nullptr;  ///< shown and filled; null: no labels are taken; outlives the thread
 };
 
-class DdsThread {
+class DdsThread : public Follower {
  public:
   /// Opens and begins. InputError naming the setting where DDS does not open. `outlet` outlives it.
   DdsThread(LiveOutlet& outlet, const DdsThreadOptions& options);
-  /// Publishes nothing more, and ends; a thread that is stuck is left behind: `outlet` has to stay then.
-  ~DdsThread();
-  DdsThread(const DdsThread&) = delete;
-  DdsThread& operator=(const DdsThread&) = delete;
-
-  /// For the supervisor; as long as this object.
-  [[nodiscard]] const Heartbeat& heart() const;
-  /// Tells it to end, and waits for nothing: so that several end at the same time.
-  void tellEnd();
-  /// Ends it, and gives what it counted, for the summary; `fault`: why it ended before, or that it is stuck.
-  nlohmann::ordered_json finish();
 
  private:
   class Work;
-  std::unique_ptr<Work> work_;
 };
 
 }  // namespace swiftlet

@@ -6,7 +6,6 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
-#include "firmware_host/interfaces/follower_thread.hpp"
 #include "firmware_host/outputs/page/page.hpp"
 #include "firmware_host/outputs/view/live_document.hpp"
 #include "firmware_host/outputs/view/raised_niceness.hpp"
@@ -50,7 +49,7 @@ ViewHub::Text message(const char* event, const nlohmann::ordered_json& data) {
 
 }  // namespace
 
-class ViewThread::Work {
+class ViewThread::Work final : public Follower::Work {
  public:
   Work(LiveOutlet& outlet, const ViewAddress& address, const std::string& name)
       : outlet_(outlet), document_(name), page_(livePageText()) {
@@ -67,17 +66,13 @@ class ViewThread::Work {
     thread_.start(settings, "--view", "", [this] { run(); });
   }
 
-  /// False: the thread is stuck and was left behind, with all of this.
-  bool end() {
+  bool end() override {
     if (!thread_.end()) return false;
     server_.reset();
     return true;
   }
-  void tellEnd() { thread_.tellEnd(); }
-  [[nodiscard]] const Heartbeat& heart() const { return thread_.heart(); }
-  [[nodiscard]] const std::string& fault() const { return thread_.fault(); }
   [[nodiscard]] const ViewAddress& address() const { return address_; }
-  [[nodiscard]] nlohmann::ordered_json json() const {
+  [[nodiscard]] nlohmann::ordered_json json() const override {
     nlohmann::ordered_json json = {{"address", address_.text()}};
     json.update(toJson(hub_.counters()));
     return json;
@@ -117,27 +112,13 @@ class ViewThread::Work {
   std::string text_;
   std::unique_ptr<ViewServer> server_;
   ViewAddress address_;
-  FollowerThread thread_;
 };
 
 ViewThread::ViewThread(LiveOutlet& outlet, const ViewAddress& address, const std::string& name)
-    : work_(std::make_unique<Work>(outlet, address, name)) {}
-ViewThread::~ViewThread() {
-  // A thread that is left behind goes on using it.
-  if (!work_->end()) static_cast<void>(work_.release());
-}
+    : Follower(std::make_unique<Work>(outlet, address, name)) {}
 
-const Heartbeat& ViewThread::heart() const { return work_->heart(); }
-void ViewThread::tellEnd() { work_->tellEnd(); }
-
-std::string ViewThread::url() const { return "http://" + work_->address().text() + "/"; }
-
-nlohmann::ordered_json ViewThread::finish() {
-  // What a thread that is left behind counts is still being written.
-  if (!work_->end()) return {{"fault", work_->fault()}};
-  nlohmann::ordered_json json = work_->json();
-  if (!work_->fault().empty()) json["fault"] = work_->fault();
-  return json;
+std::string ViewThread::url() const {
+  return "http://" + static_cast<const Work&>(*work_).address().text() + "/";
 }
 
 }  // namespace swiftlet
