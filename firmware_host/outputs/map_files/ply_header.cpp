@@ -185,21 +185,7 @@ class HeaderReader {
 }  // namespace
 
 std::size_t sizeOf(PlyType type) {
-  switch (type) {
-    case PlyType::kInt8:
-    case PlyType::kUint8:
-      return 1;
-    case PlyType::kInt16:
-    case PlyType::kUint16:
-      return 2;
-    case PlyType::kInt32:
-    case PlyType::kUint32:
-    case PlyType::kFloat:
-      return 4;
-    case PlyType::kDouble:
-      return 8;
-  }
-  return 0;
+  return withNumber(type, [](auto number) { return sizeof number; });
 }
 
 PlyHeader readPlyHeader(const std::string& name, std::string_view bytes) {

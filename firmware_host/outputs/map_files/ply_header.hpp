@@ -10,6 +10,30 @@ namespace swiftlet {
 
 enum class PlyType : std::uint8_t { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
 
+/// What `with` makes of a number of this type.
+template <typename With>
+auto withNumber(PlyType type, const With& with) {
+  switch (type) {
+    case PlyType::kInt8:
+      return with(std::int8_t{});
+    case PlyType::kUint8:
+      return with(std::uint8_t{});
+    case PlyType::kInt16:
+      return with(std::int16_t{});
+    case PlyType::kUint16:
+      return with(std::uint16_t{});
+    case PlyType::kInt32:
+      return with(std::int32_t{});
+    case PlyType::kUint32:
+      return with(std::uint32_t{});
+    case PlyType::kFloat:
+      return with(float{});
+    case PlyType::kDouble:
+      break;
+  }
+  return with(double{});
+}
+
 /// Bytes of one value in a binary file.
 std::size_t sizeOf(PlyType type);
 

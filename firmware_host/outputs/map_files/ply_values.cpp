@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <type_traits>
 
 #include "drivers/recorded/csv_reader.hpp"
 #include "drivers/recorded/parse_number.hpp"
@@ -17,60 +18,19 @@ static_assert(std::endian::native == std::endian::little, "binary PLY is copied 
 constexpr const char* kBlanks = " \t\r";
 constexpr const char* kCutShort = "The file is cut short: write it again";
 
-template <typename Number>
-double valueAt(const char* bytes) {
-  Number value;
-  std::memcpy(&value, bytes, sizeof value);
-  return static_cast<double>(value);
-}
-
 double decode(PlyType type, const char* bytes) {
-  switch (type) {
-    case PlyType::kInt8:
-      return valueAt<std::int8_t>(bytes);
-    case PlyType::kUint8:
-      return valueAt<std::uint8_t>(bytes);
-    case PlyType::kInt16:
-      return valueAt<std::int16_t>(bytes);
-    case PlyType::kUint16:
-      return valueAt<std::uint16_t>(bytes);
-    case PlyType::kInt32:
-      return valueAt<std::int32_t>(bytes);
-    case PlyType::kUint32:
-      return valueAt<std::uint32_t>(bytes);
-    case PlyType::kFloat:
-      return valueAt<float>(bytes);
-    case PlyType::kDouble:
-      return valueAt<double>(bytes);
-  }
-  return 0;
-}
-
-template <typename Number>
-bool inRange(double value) {
-  return value >= std::numeric_limits<Number>::min() && value <= std::numeric_limits<Number>::max() &&
-         value == std::floor(value);
+  return withNumber(type, [bytes](auto number) {
+    std::memcpy(&number, bytes, sizeof number);
+    return static_cast<double>(number);
+  });
 }
 
 bool holds(PlyType type, double value) {
-  switch (type) {
-    case PlyType::kInt8:
-      return inRange<std::int8_t>(value);
-    case PlyType::kUint8:
-      return inRange<std::uint8_t>(value);
-    case PlyType::kInt16:
-      return inRange<std::int16_t>(value);
-    case PlyType::kUint16:
-      return inRange<std::uint16_t>(value);
-    case PlyType::kInt32:
-      return inRange<std::int32_t>(value);
-    case PlyType::kUint32:
-      return inRange<std::uint32_t>(value);
-    case PlyType::kFloat:
-    case PlyType::kDouble:
-      return true;
-  }
-  return false;
+  return withNumber(type, [value]<typename Number>(Number) {
+    if constexpr (std::is_floating_point_v<Number>) return true;
+    return value >= std::numeric_limits<Number>::min() && value <= std::numeric_limits<Number>::max() &&
+           value == std::floor(value);
+  });
 }
 
 }  // namespace
