@@ -21,8 +21,6 @@ namespace swiftlet {
 namespace {
 
 constexpr std::size_t kKernelNameLength = 15;
-/// What an untouched byte of the stack holds; zero would be common in use.
-constexpr unsigned char kPaint = 0xA5;
 constexpr const char* kPriorityRemedy =
     "give the program the right: `setcap cap_sys_nice+ep` on it, `LimitRTPRIO=99` in its systemd unit, or "
     "`ulimit -r 99` (rtprio in /etc/security/limits.conf); in a control group of version 1 also "
@@ -119,7 +117,7 @@ bool FlightThread::Stack::reserve(std::size_t bytes) {
   mapping_ = mapping;
   low_ = static_cast<char*>(mapping) + guard_;
   if (mprotect(mapping_, guard_, PROT_NONE) != 0) return false;
-  std::memset(low_, kPaint, bytes_);
+  std::memset(low_, 0, bytes_);  // touches every page
   return true;
 }
 
@@ -127,14 +125,6 @@ void FlightThread::Stack::release() {
   if (mapping_ != nullptr) munmap(mapping_, bytes_ + guard_);
   mapping_ = nullptr;
   low_ = nullptr;
-}
-
-// A sanitizer may hold parts of a dead thread's stack for unreadable.
-__attribute__((no_sanitize("address"))) std::size_t FlightThread::Stack::used() const {
-  const auto* bytes = static_cast<const volatile unsigned char*>(low_);
-  std::size_t untouched = 0;
-  while (untouched < bytes_ && bytes[untouched] == kPaint) ++untouched;
-  return bytes_ - untouched;
 }
 
 FlightThread::~FlightThread() { join(); }
@@ -189,7 +179,6 @@ ThreadReport FlightThread::start(const ThreadSettings& settings, std::function<v
   core_->entry = std::move(entry);
   core_->name = report.name;
   fault_.clear();
-  stack_used_ = 0;
 
   int error = create(settings, fifo, pinned);
   // One wish after the other is given up, whichever the kernel refuses first.
@@ -279,7 +268,6 @@ void FlightThread::join() {
   joinable_ = false;
   fault_ = std::move(core_->fault);
   faults_ = core_->faults;
-  stack_used_ = core_->stack.used();
   core_.reset();
 }
 

@@ -1,13 +1,13 @@
 #pragma once
-// A thread as the flight path needs it: a name, a real-time priority, a CPU and a stack that is fixed,
-// touched in advance and measured. What it got is a value; a missing right is no error.
+// A thread as the flight path needs it: a name, a real-time priority, a CPU and a stack that is fixed and
+// touched in advance. What it got is a value; a missing right is no error.
 //
 // Where the right to SCHED_FIFO is missing the thread runs under SCHED_OTHER, where the CPU does not exist
 // or may not be used it runs on any, and the report says what is missing and how to get it. Whether that is
 // good enough is not decided here (ready_to_arm.hpp).
 //
-// Memory: the stack is a mapping of its own with a guard page below, filled with a pattern before the
-//   thread begins: every page is resident then, and after the thread's end the deepest use can be read.
+// Memory: the stack is a mapping of its own with a guard page below, written before the thread begins: every
+//   page is resident then.
 // Exceptions: what escapes from `entry` ends the thread and is kept as text (fault()); nothing crosses.
 // Sleeps are exact: the thread's timer slack is 1 ns (SCHED_OTHER would have 50 us).
 // Stuck: joinWithin() waits for a bounded time, and abandon() leaves the thread to itself. Its stack and
@@ -101,8 +101,6 @@ class FlightThread {
   [[nodiscard]] bool joinable() const { return joinable_; }
   /// After join: what() of the exception that ended the thread; empty: it returned.
   [[nodiscard]] const std::string& fault() const { return fault_; }
-  /// After join: deepest use of the stack in bytes, thread-local storage included.
-  [[nodiscard]] std::size_t stackUsed() const { return stack_used_; }
   /// Since `entry` began: of a thread that runs, or hangs, as the kernel counts them; of one that has ended,
   /// all. Opens a file: not for the flight path.
   [[nodiscard]] PageFaults pageFaults() const;
@@ -118,7 +116,6 @@ class FlightThread {
     ~Stack() { release(); }
     [[nodiscard]] bool reserve(std::size_t bytes);
     void release();
-    [[nodiscard]] std::size_t used() const;
     [[nodiscard]] void* low() const { return low_; }
     [[nodiscard]] std::size_t bytes() const { return bytes_; }
 
@@ -154,7 +151,6 @@ class FlightThread {
   bool joinable_ = false;
   std::string fault_;
   PageFaults faults_;  ///< of a thread that was joined
-  std::size_t stack_used_ = 0;
 };
 
 }  // namespace swiftlet

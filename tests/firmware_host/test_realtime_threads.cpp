@@ -219,30 +219,6 @@ TEST_CASE("a thread is started once at a time") {
   CHECK(contains(second.message, "join"));
 }
 
-// AddressSanitizer moves large frames to the heap, ThreadSanitizer keeps most of a MiB of its own in the
-// thread-local storage, which lies on the stack.
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-/// Writes half a stack of its own frame.
-__attribute__((noinline)) void useStack() {
-  char block[kStack / 2];
-  std::memset(block, 1, sizeof block);
-  asm volatile("" : : "r"(block) : "memory");  // the block is looked at: it cannot be left out
-}
-
-TEST_CASE("the deepest use of the stack is measured") {
-  FlightThread thread;
-  REQUIRE(thread.start({"shallow", 0, -1, kStack}, [] {}).started);
-  thread.join();
-  const std::size_t shallow = thread.stackUsed();
-  REQUIRE(thread.start({"deep", 0, -1, kStack}, useStack).started);
-  thread.join();
-  CHECK(shallow > 0);
-  CHECK(shallow < kStack / 4);
-  CHECK(thread.stackUsed() >= kStack / 2);
-  CHECK(thread.stackUsed() < kStack / 2 + kStack / 4);
-}
-#endif
-
 TEST_CASE("a thread's page faults are counted, while it hangs and after its end") {
   constexpr std::size_t kPages = 50;
   const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
