@@ -88,11 +88,4 @@ void SystemdNotify::watchdog(bool alive, Stamp now) {
   send("WATCHDOG=1");
 }
 
-void SystemdNotify::extend(Duration more) {
-  std::array<char, kMessageBytes> message;
-  const auto end = fmt::format_to_n(message.data(), message.size(), "EXTEND_TIMEOUT_USEC={}",
-                                    more.ns / kNanosecondsPerMicrosecond);
-  send({message.data(), end.size});
-}
-
 }  // namespace swiftlet

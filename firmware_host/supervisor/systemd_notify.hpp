@@ -31,8 +31,6 @@ class SystemdNotify {
   void status(std::string_view line);
   /// Feeds the watchdog where it is due; `alive` false: not.
   void watchdog(bool alive, Stamp now);
-  /// Asks for `more` from now on, at a start or an end that takes long.
-  void extend(Duration more);
 
  private:
   void send(std::string_view message) const;
