@@ -18,8 +18,9 @@ void printLoops(const char* name, const LoopCount& count) {
   fmt::print(
       "{:<14} {} kept, {} rejected: {} against the odometry, {} inconsistent, {} unsupported, {} against the "
       "solution\n",
-      name, count.kept, count.rejected(), count.against_odometry, count.inconsistent, count.unsupported,
-      count.against_solution);
+      name, count.of(EdgeFate::kKept), count.rejected(), count.of(EdgeFate::kAgainstOdometry),
+      count.of(EdgeFate::kInconsistent), count.of(EdgeFate::kUnsupported),
+      count.of(EdgeFate::kAgainstSolution));
 }
 
 void print(const PoseGraphRequest& request, const PoseGraphResult& result) {

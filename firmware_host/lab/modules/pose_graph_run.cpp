@@ -41,24 +41,6 @@ Status solvePlainly(const PoseGraphRequest& request, const std::vector<std::uint
   return status;
 }
 
-const char* nameOf(EdgeFate fate) {
-  switch (fate) {
-    case EdgeFate::kOdometry:
-      return "odometry";
-    case EdgeFate::kKept:
-      return "kept";
-    case EdgeFate::kAgainstOdometry:
-      return "against_odometry";
-    case EdgeFate::kInconsistent:
-      return "inconsistent";
-    case EdgeFate::kUnsupported:
-      return "unsupported";
-    case EdgeFate::kAgainstSolution:
-      return "against_solution";
-  }
-  return "";
-}
-
 template <typename Pose>
 void writeLoops(const PoseGraphRequest& request, const std::vector<std::int64_t>& ids,
                 const PoseGraph<Pose>& graph, std::size_t own_edges, const RobustGraphReport& report) {
@@ -67,7 +49,7 @@ void writeLoops(const PoseGraphRequest& request, const std::vector<std::int64_t>
   for (std::size_t e = 0; e < graph.edges.size(); ++e) {
     if (report.fates[e] == EdgeFate::kOdometry) continue;
     csv << e << ',' << ids[graph.edges[e].from] << ',' << ids[graph.edges[e].to] << ','
-        << nameOf(report.fates[e]) << ',' << (e >= own_edges ? 1 : 0) << '\n';
+        << kFateNames[static_cast<std::size_t>(report.fates[e])] << ',' << (e >= own_edges ? 1 : 0) << '\n';
   }
   writeWholeFile(request.loops, csv.str());
 }
@@ -108,37 +90,15 @@ void solve(const PoseGraphRequest& request, const G2oGraph& file, PoseGraph<Pose
 }
 
 nlohmann::ordered_json toJson(const LoopCount& count) {
-  return {{"kept", count.kept},
-          {"rejected", count.rejected()},
-          {"against_odometry", count.against_odometry},
-          {"inconsistent", count.inconsistent},
-          {"unsupported", count.unsupported},
-          {"against_solution", count.against_solution}};
+  nlohmann::ordered_json json = {{"kept", count.of(EdgeFate::kKept)}, {"rejected", count.rejected()}};
+  for (const EdgeFate fate : {EdgeFate::kAgainstOdometry, EdgeFate::kInconsistent, EdgeFate::kUnsupported,
+                              EdgeFate::kAgainstSolution}) {
+    json[kFateNames[static_cast<std::size_t>(fate)]] = count.of(fate);
+  }
+  return json;
 }
 
 }  // namespace
-
-void LoopCount::add(EdgeFate fate) {
-  switch (fate) {
-    case EdgeFate::kOdometry:
-      break;
-    case EdgeFate::kKept:
-      ++kept;
-      break;
-    case EdgeFate::kAgainstOdometry:
-      ++against_odometry;
-      break;
-    case EdgeFate::kInconsistent:
-      ++inconsistent;
-      break;
-    case EdgeFate::kUnsupported:
-      ++unsupported;
-      break;
-    case EdgeFate::kAgainstSolution:
-      ++against_solution;
-      break;
-  }
-}
 
 PoseGraphResult runPoseGraph(const PoseGraphRequest& request) {
   if (request.robust && request.start == StartRule::kGiven) {

@@ -2,6 +2,7 @@
 // `swiftlet pose-graph`: a g2o file optimized, and written again with the poses found; on request without its
 // false loops (mapping/pose_graph/robust_graph.hpp).
 
+#include <array>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -25,17 +26,19 @@ struct PoseGraphRequest {
   std::string loops;  ///< with `robust`: CSV of all loops and what became of them; empty: not written
 };
 
-/// What became of the loops of a graph.
-struct LoopCount {
-  std::uint32_t kept = 0;
-  std::uint32_t against_odometry = 0;
-  std::uint32_t inconsistent = 0;
-  std::uint32_t unsupported = 0;
-  std::uint32_t against_solution = 0;
+/// "odometry", "kept" and the reasons why a loop is rejected; as EdgeFate.
+inline constexpr std::array kFateNames = {
+    "odometry", "kept", "against_odometry", "inconsistent", "against_solution", "unsupported"};
 
-  void add(EdgeFate fate);
+/// What became of the loops of a graph: how many of each fate.
+struct LoopCount {
+  std::array<std::uint32_t, kFateNames.size()> counts{};
+
+  void add(EdgeFate fate) { ++counts[static_cast<std::size_t>(fate)]; }
+  [[nodiscard]] std::uint32_t of(EdgeFate fate) const { return counts[static_cast<std::size_t>(fate)]; }
   [[nodiscard]] std::uint32_t rejected() const {
-    return against_odometry + inconsistent + unsupported + against_solution;
+    return of(EdgeFate::kAgainstOdometry) + of(EdgeFate::kInconsistent) + of(EdgeFate::kUnsupported) +
+           of(EdgeFate::kAgainstSolution);
   }
 };
 
