@@ -96,16 +96,8 @@ void findBounds(RunFiles& files) {
 
 const Json& RunFiles::at(const std::string& path) const {
   static const Json kNull;
-  const Json* json = &summary;
-  for (std::size_t begin = 0; begin <= path.size();) {
-    const std::size_t end = std::min(path.find('/', begin), path.size());
-    if (!json->is_object()) return kNull;
-    const auto found = json->find(path.substr(begin, end - begin));
-    if (found == json->end()) return kNull;
-    json = &*found;
-    begin = end + 1;
-  }
-  return *json;
+  const Json::json_pointer pointer("/" + path);
+  return summary.contains(pointer) ? summary.at(pointer) : kNull;
 }
 
 std::string RunFiles::text(const std::string& path) const {
