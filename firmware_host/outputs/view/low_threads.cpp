@@ -1,6 +1,16 @@
 #include "firmware_host/outputs/view/low_threads.hpp"
 
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
 namespace swiftlet {
+
+void yieldToOthers() {
+  constexpr int kNice = 10;
+  // Of this thread alone, as Linux has it.
+  static_cast<void>(setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), kNice));
+}
 
 std::size_t LowThreads::stackBytes() {
 #ifdef SWIFTLET_SANITIZED

@@ -8,11 +8,14 @@
 #include <functional>
 #include <mutex>
 
-#include "firmware_host/outputs/view/raised_niceness.hpp"
 #include "firmware_host/outputs/view/view_server.hpp"
 #include "firmware_host/realtime/flight_thread.hpp"
 
 namespace swiftlet {
+
+/// Threads that only serve viewers give way to all others, also where no thread may have real-time priority:
+/// the calling thread gets a niceness of 10. Where that is refused it stays as it is.
+void yieldToOthers();
 
 /// A connection more than there are threads and places to wait makes the accepting thread wait: further ones
 /// stay in the kernel's short queue.

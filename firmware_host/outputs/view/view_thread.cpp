@@ -8,7 +8,7 @@
 
 #include "firmware_host/outputs/page/page.hpp"
 #include "firmware_host/outputs/view/live_document.hpp"
-#include "firmware_host/outputs/view/raised_niceness.hpp"
+#include "firmware_host/outputs/view/low_threads.hpp"
 #include "firmware_host/outputs/view/view_server.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
 
