@@ -1,5 +1,5 @@
 #pragma once
-// The files in which a machine says what it is, for the report on it. Private to this folder.
+// The files in which a machine says what it is and grants. Private to this folder.
 
 #include <cctype>
 #include <cstdint>
@@ -42,6 +42,14 @@ class Machine {
       if (line.starts_with(start)) return line.substr(start.size());
     }
     return std::nullopt;
+  }
+
+  /// Whether it is in the effective set of the thread whose status this file is.
+  [[nodiscard]] std::optional<bool> hasCapability(const std::string& status, unsigned capability) const {
+    const auto effective = lineAfter(status, "CapEff:");
+    if (!effective) return std::nullopt;
+    constexpr int kHexadecimal = 16;
+    return (std::strtoull(effective->c_str(), nullptr, kHexadecimal) >> capability & 1U) != 0;
   }
 
   static std::optional<std::int64_t> toNumber(const std::string& text) {

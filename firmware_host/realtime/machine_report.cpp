@@ -1,6 +1,7 @@
 #include "firmware_host/realtime/machine_report.hpp"
 
 #include <fmt/format.h>
+#include <linux/capability.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -16,13 +17,6 @@
 
 namespace swiftlet {
 namespace {
-
-std::optional<bool> hasCapability(const Machine& machine, unsigned capability) {
-  const auto effective = machine.lineAfter("/proc/self/status", "CapEff:");
-  if (!effective) return std::nullopt;
-  constexpr int kHexadecimal = 16;
-  return (std::strtoull(effective->c_str(), nullptr, kHexadecimal) >> capability & 1U) != 0;
-}
 
 /// The soft limit's words in /proc/self/limits: the first after the name.
 std::optional<std::string> limitOf(const Machine& machine, std::string_view name) {
@@ -64,9 +58,8 @@ MachineLine throttling(const Machine& machine) {
 }
 
 MachineLine priorityRight(const Machine& machine, int wanted) {
-  constexpr unsigned kCapSysNice = 23;
   const char* what = "real-time priority";
-  const auto capability = hasCapability(machine, kCapSysNice);
+  const auto capability = machine.hasCapability("/proc/self/status", CAP_SYS_NICE);
   const auto limit = limitOf(machine, "Max realtime priority");
   if (capability.value_or(false)) {
     return {what, fmt::format("any (CAP_SYS_NICE; RLIMIT_RTPRIO {})", limit.value_or("unknown")),
@@ -83,9 +76,8 @@ MachineLine priorityRight(const Machine& machine, int wanted) {
 }
 
 MachineLine lockRight(const Machine& machine) {
-  constexpr unsigned kCapIpcLock = 14;
   const char* what = "locked memory";
-  const auto capability = hasCapability(machine, kCapIpcLock);
+  const auto capability = machine.hasCapability("/proc/self/status", CAP_IPC_LOCK);
   const auto limit = limitOf(machine, "Max locked memory");
   if (capability.value_or(false)) {
     return {what, fmt::format("any (CAP_IPC_LOCK; RLIMIT_MEMLOCK {} bytes)", limit.value_or("unknown")),

@@ -2,6 +2,7 @@
 
 #include <dlfcn.h>
 #include <fmt/format.h>
+#include <linux/capability.h>
 #include <malloc.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
@@ -19,6 +20,7 @@
 #include <system_error>
 
 #include "estimator/core/units.hpp"
+#include "firmware_host/realtime/machine_files.hpp"
 
 namespace swiftlet {
 namespace {
@@ -45,15 +47,7 @@ std::int64_t lockLimit() {
 
 /// The capability that lifts the limit, in the thread's effective set.
 bool mayLockBeyondLimit() {
-  constexpr unsigned kCapIpcLock = 14;  // linux/capability.h
-  std::ifstream file("/proc/thread-self/status");
-  for (std::string line; std::getline(file, line);) {
-    if (!line.starts_with("CapEff:")) continue;
-    constexpr std::size_t kLabel = 7;
-    constexpr int kHexadecimal = 16;
-    return (std::strtoull(line.c_str() + kLabel, nullptr, kHexadecimal) >> kCapIpcLock & 1U) != 0;
-  }
-  return false;
+  return Machine("").hasCapability("/proc/thread-self/status", CAP_IPC_LOCK).value_or(false);
 }
 
 int threadsOfProcess() {
