@@ -250,6 +250,37 @@ TEST_CASE("NaN bearings are outliers, the others are not disturbed", "[ransac]")
   }
 }
 
+TEST_CASE("tracks of points nearer than the settings allow are outliers", "[ransac]") {
+  constexpr std::size_t kEach = 10;
+  for (const Method method : kMethods) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      Scene scene = makeScene(fisheye(180), {.displaced_share = 0, .behind_share = 0}, seed);
+      const std::size_t begin = scene.kind.size();
+      const double baseline = scene.T_cur_prev.translation.norm();
+      Random random(seed, 5);
+      for (std::size_t i = 0; i < 2 * kEach; ++i) {
+        // Across the motion: the parallax is far from what noise makes of it.
+        const Eigen::Vector3d across =
+            (scene.T_cur_prev.rotation.conjugate() * scene.T_cur_prev.translation).cross(randomUnit(random));
+        const Eigen::Vector3d point = (i < kEach ? 0.4 : 0.6) * baseline * across.normalized();
+        scene.prev.push_back(point.normalized());
+        scene.cur.push_back((scene.T_cur_prev * point).normalized());
+      }
+      RansacSettings settings = settingsFor(scene, 0.5);
+      settings.min_depth_over_baseline = 0.5;
+      RansacResult result;
+      REQUIRE(run(method, scene, settings, seed, result).ok());
+      const auto kept = [&](std::size_t from) {
+        const auto* first = result.inlier.begin() + static_cast<std::ptrdiff_t>(from);
+        return std::count(first, first + kEach, true);
+      };
+      CAPTURE(nameOf(method), seed);
+      CHECK(kept(begin) == 0);
+      CHECK(kept(begin + kEach) == kEach);
+    }
+  }
+}
+
 TEST_CASE("equal seeds give equal bytes", "[ransac]") {
   const Scene scene = makeScene(euroc(), {}, 7);
   for (const Method method : kMethods) {
