@@ -1,6 +1,8 @@
 #include "mapping/pose_graph/graduated_selection.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <vector>
 
 #include "estimator/core/random.hpp"
@@ -73,6 +75,48 @@ TEST_CASE("A measurement left out at the start comes back when it fits", "[pose_
   CHECK(report.kept == 20);
   std::fill(weights.begin(), weights.end(), 0.0);
   CHECK(selectGraduated(settings, mean, weights, chi_squared, report).code == StatusCode::kDegenerate);
+}
+
+/// Loops whose chi-squared no weight changes; keeps the weights that it was asked to solve with.
+class Unmoved : public WeightedLoops {
+ public:
+  explicit Unmoved(std::vector<double> chi_squared) : chi_squared_(std::move(chi_squared)) {}
+  Status solve(std::span<const double> weights, std::span<double> chi_squared) override {
+    asked.emplace_back(weights.begin(), weights.end());
+    std::copy(chi_squared_.begin(), chi_squared_.end(), chi_squared.begin());
+    return okStatus();
+  }
+  std::vector<std::vector<double>> asked;
+
+ private:
+  std::vector<double> chi_squared_;
+};
+
+TEST_CASE("Weights minimize the surrogate of the truncated cost, below the limit and above", "[pose_graph]") {
+  constexpr double kLimit = 20;
+  std::vector<double> chi_squared;
+  for (double value = 1; value <= 60; value += 1) chi_squared.push_back(value);
+  const std::vector<double> given = chi_squared;
+  Unmoved problem(given);
+  std::vector<double> weights(chi_squared.size(), 1.0);
+  GraduatedSettings settings;
+  settings.max_chi_squared = kLimit;
+  GraduatedReport report;
+  REQUIRE(selectGraduated(settings, problem, weights, chi_squared, report).ok());
+  REQUIRE(problem.asked.size() > 3);
+  // The source's remark 5, and its table of penalties: w chi2 + mu (1 - w) / (mu + w) c2.
+  double mu = kLimit / (2 * given.back() - kLimit);
+  for (std::size_t solution = 1; solution <= 3; ++solution, mu *= settings.growth) {
+    int between = 0;
+    for (std::size_t k = 0; k < given.size(); ++k) {
+      const auto surrogate = [&](double w) { return w * given[k] + mu * (1 - w) / (mu + w) * kLimit; };
+      const double weight = problem.asked[solution][k];
+      CAPTURE(solution, given[k], weight);
+      for (int step = 0; step <= 1000; ++step) CHECK(surrogate(weight) <= surrogate(1e-3 * step) + 1e-9);
+      between += given[k] < kLimit && weight < 1 ? 1 : 0;
+    }
+    CHECK(between > 5);
+  }
 }
 
 }  // namespace
