@@ -1,5 +1,14 @@
-# Debian packages by `cpack` in the build folder: swiftlet (program, service), libswiftlet-dev (libraries,
-# headers), swiftlet-doc. One component each; docs/packages.md says what is in them.
+# Debian packages by `cpack` in the build folder: swiftlet or, without the lab, swiftlet-vehicle (program,
+# service), libswiftlet-dev (libraries, headers), swiftlet-doc. One component each; docs/packages.md says what is
+# in them.
+if(SWIFTLET_BUILD_LAB)
+  set(program_package swiftlet)
+  set(other_program_package swiftlet-vehicle)
+else()
+  set(program_package swiftlet-vehicle)
+  set(other_program_package swiftlet)
+  set(CPACK_DEBIAN_PROGRAM_PACKAGE_PROVIDES swiftlet)
+endif()
 set(packaging ${PROJECT_SOURCE_DIR}/toolchain/packaging)
 
 # Debian wants text packed, and without a stamp so that the same files give the same package.
@@ -39,7 +48,7 @@ install(DIRECTORY docs DESTINATION share/doc/swiftlet COMPONENT documentation
         FILES_MATCHING PATTERN "*.md" PATTERN "*.svg" PATTERN "*.png")
 
 if(SWIFTLET_BUILD_PROGRAM)
-  swiftlet_package_texts(swiftlet program)
+  swiftlet_package_texts(${program_package} program)
   install(FILES ${packaging}/swiftlet.service DESTINATION lib/systemd/system COMPONENT program)
   install(FILES ${packaging}/60-swiftlet.rules DESTINATION lib/udev/rules.d COMPONENT program)
   install(DIRECTORY ${packaging}/vehicle DESTINATION share/swiftlet/examples COMPONENT program)
@@ -121,15 +130,23 @@ set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
 set(CPACK_DEBIAN_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 
-set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME swiftlet)
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME ${program_package})
+# Both have the same files in the same places: one replaces the other.
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_CONFLICTS ${other_program_package})
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_REPLACES ${other_program_package})
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS adduser)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "systemd, udev")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS swiftlet-doc)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_CONTROL_EXTRA
     ${packaging}/debian/postinst ${packaging}/debian/prerm ${packaging}/debian/postrm)
-set(CPACK_COMPONENT_PROGRAM_DESCRIPTION
-    "The program swiftlet, a service that flies with a vehicle's settings,\nrules for its devices, an example of the settings, and the manual page.\nBuilt for ${SWIFTLET_CPU}.")
+set(program_description
+    "The program swiftlet, a service that flies with a vehicle's settings,\nrules for its devices, an example of the settings, and the manual page.")
+if(NOT SWIFTLET_BUILD_LAB)
+  string(APPEND program_description
+         "\nOnly what a vehicle needs: it flies, records, replays and smooths. Commands\nthat simulate, evaluate and show flights are in the package swiftlet.")
+endif()
+set(CPACK_COMPONENT_PROGRAM_DESCRIPTION "${program_description}\nBuilt for ${SWIFTLET_CPU}.")
 
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libswiftlet-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)

@@ -5,7 +5,8 @@
 #   the library: tests/install/consumer is built against find_package(swiftlet) and runs
 #   the documentation; removal, which leaves settings and flights alone
 # usage: toolchain/packaging/check_packages.sh [--keep]   --keep takes the folder of the last time, without installing
-#   anew what was there (BUILD names the build folder, default build/release)
+#   anew what was there (BUILD names the build folder, default build/release; one configured with
+#   -DSWIFTLET_BUILD_LAB=OFF makes swiftlet-vehicle)
 # Needs debootstrap, a network, and some minutes. Exit code 0 when all holds.
 set -eu
 cd "$(dirname "$0")/../.."
@@ -17,7 +18,7 @@ case ${1:-} in
   '') ;;
   --keep) keep=yes ;;
   *)
-    sed -n '2,9s/^# \{0,1\}//p' "$0"
+    sed -n '2,10s/^# \{0,1\}//p' "$0"
     exit 2
     ;;
 esac
@@ -83,6 +84,10 @@ for deb in "$build"/packages/*.deb; do
   dpkg-deb -f "$deb" Depends | sed 's/^/        depends on /'
 done
 check "three packages" [ "$(find "$build/packages" -maxdepth 1 -name '*.deb' | wc -l)" -eq 3 ]
+# swiftlet or, without the lab, swiftlet-vehicle.
+program=$(cd "$build/packages" && find . -name 'swiftlet_*.deb' -o -name 'swiftlet-vehicle_*.deb')
+program=${program#./}
+name=${program%%_*}
 if command -v lintian >/dev/null; then
   lintian --allow-root --fail-on none "$build"/packages/*.deb >build/lintian.log 2>&1 || true
   check "lintian has no errors (warnings are in build/lintian.log)" sh -c '! grep "^E:" build/lintian.log'
@@ -111,7 +116,7 @@ if [ $keep = yes ]; then apt purge '*swiftlet*' >/dev/null 2>&1 || true; fi
 
 echo "== the program alone"
 before=$(inside dpkg-query -W | wc -l)
-check "apt installs it with what it needs" apt install $(cd "$root" && ls ./opt/swiftlet/swiftlet_*.deb | sed 's/^\.//')
+check "apt installs it with what it needs" apt install "/opt/swiftlet/$program"
 echo "        $(($(inside dpkg-query -W | wc -l) - before)) packages came with it"
 check "it says its version" inside swiftlet --version
 check "it replays a log" inside swiftlet replay /opt/log --out /opt/run
@@ -163,11 +168,10 @@ sed 's/^/        /' build/check_packages.log
 echo "== documentation, removal"
 check "the documentation is installed" apt install $(cd "$root" && ls ./opt/swiftlet/swiftlet-doc_*.deb | sed 's/^\.//')
 check "it has this page" inside test -s /usr/share/doc/swiftlet/docs/packages.md
-check "each package has its copyright" inside test -s /usr/share/doc/swiftlet/copyright \
+check "each package has its copyright" inside test -s "/usr/share/doc/$name/copyright" \
   -a -s /usr/share/doc/libswiftlet-dev/copyright -a -s /usr/share/doc/swiftlet-doc/copyright
-check "installing again changes nothing" apt install --reinstall \
-  $(cd "$root" && ls ./opt/swiftlet/swiftlet_*.deb | sed 's/^\.//')
-check "all are purged" apt purge swiftlet libswiftlet-dev swiftlet-doc
+check "installing again changes nothing" apt install --reinstall "/opt/swiftlet/$program"
+check "all are purged" apt purge "$name" libswiftlet-dev swiftlet-doc
 check "nothing of them is left but what is the user's" inside sh -c \
   'left=$(find /usr /lib /etc /var/lib -name "*swiftlet*" ! -path "/var/lib/apt/*" ! -path "/var/cache/*" | sort | tr "\n" " ")
    echo "$left"; [ "$left" = "/etc/swiftlet /var/lib/swiftlet " ] && [ -f /etc/swiftlet/vehicle.yaml ]'
