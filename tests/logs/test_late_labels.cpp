@@ -319,6 +319,40 @@ class Ignoring : public RunListener {
   void onRemark(Stamp /*stamp*/, const std::string& /*text*/) override {}
 };
 
+TEST_CASE("the images of a frame that the front-end refuses do not wait for the map, nor push others out") {
+  const auto source = openLog(shortLog());
+  Ignoring listener;
+  RunObserver observer(listener);
+  Settings settings;
+  settings.map.enabled = settings.map_stage.labels = true;
+  const auto graph =
+      std::make_unique<Graph>(source->rig(), source->imuNoise(), settings, observer, GraphOptions{});
+  const CameraModel& camera = source->rig().camera[0];
+  const Plain image(90, camera.width(), camera.height());
+  const MapImagesIn& waiting = graph->map()->images;
+  // A labelled frame at stamp n; the same stamp again is refused.
+  const auto give = [&](int n) {
+    SceneImages scene;
+    scene.stamp = at(n);
+    scene.labels = image.view;
+    graph->sensors().takeScene(scene);
+    StereoFrame frame;
+    frame.stamp = at(n);
+    frame.index = static_cast<std::uint64_t>(n);
+    frame.image = {image.view, image.view};
+    graph->track().frames.tell(frame);
+    REQUIRE(graph->track().turn());
+    graph->smooth().turn();
+  };
+  give(1);
+  CHECK(waiting.size() == 1);
+  for (int k = 0; k < 6; ++k) give(1);
+  CHECK(waiting.size() == 1);
+  CHECK(waiting.lost() == 0);
+  give(2);
+  CHECK(waiting.size() == 2);
+}
+
 struct Flown {
   RunStatistics statistics;
   LabelExchange::Counters labels;
