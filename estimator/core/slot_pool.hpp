@@ -112,10 +112,9 @@ class SlotPool {
 
   /// Writer. A slot that nobody holds, now held by the writer; an invalid handle, counted, when there is
   /// none.
+  /// The first slot that is free: a run that needs few of them stays in few pages, and in the cache.
   [[nodiscard]] SlotHandle tryAcquire() {
-    for (std::size_t tried = 0; tried < kSlots; ++tried) {
-      const std::size_t index = next_;
-      next_ = next_ + 1 < kSlots ? next_ + 1 : 0;
+    for (std::size_t index = 0; index < kSlots; ++index) {
       const std::uint64_t state = states_[index].word.load(std::memory_order_acquire);
       if (holdersOf(state) != 0) continue;
       const std::uint32_t generation = generationOf(state) + 1;
@@ -221,7 +220,6 @@ class SlotPool {
   std::array<Reader, kReaders> readers_{};
   std::array<T, kSlots> slots_{};
   // The writer's own.
-  alignas(kCacheLine) std::size_t next_ = 0;
   Quotas quotas_;
   std::array<std::uint64_t, kReaders> handed_{};
   std::array<EventCount, kReaders> refused_{};

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "estimator/camera/rig.hpp"
@@ -20,7 +21,9 @@ namespace swiftlet {
 struct ImageSlot {
   CameraFrame frame;
   HostTimes host;
-  std::vector<std::uint8_t> pixels;  ///< reserved for the camera's size before the flight
+  /// Reserved for the camera's size before the flight; not written until then, so that a run in one thread,
+  /// which needs few slots, does not pay for the pages of all.
+  std::unique_ptr<std::uint8_t[]> pixels;
 };
 
 /// Readers of images, each with its quota.

@@ -4,6 +4,7 @@
 
 #include "firmware_host/interfaces/packed_copy.hpp"
 #include "firmware_host/interfaces/run_listener.hpp"
+#include "firmware_host/realtime/memory_lock.hpp"
 
 namespace swiftlet {
 
@@ -24,10 +25,17 @@ void note(SensorNews& news, Stamp stamp, double host_arrival, bool held_out) {
 SensorNode::SensorNode(const GraphContext& context)
     : Node("sensor", Rank::kSensor), context_(context), imu_guard_(context.noise.rate_hz) {
   for (std::size_t c = 0; c < context.rig.camera_count; ++c) {
-    const CameraModel& model = context.rig.camera[c];
     for (std::size_t i = 0; i < kImageSlots; ++i) {
-      camera_[c].pool.slot(i).pixels.resize(static_cast<std::size_t>(model.width() * model.height()));
+      camera_[c].pool.slot(i).pixels =
+          std::make_unique_for_overwrite<std::uint8_t[]>(pixelsOf(context.rig)[c]);
     }
+  }
+}
+
+void SensorNode::touchImages() {
+  const std::array<std::size_t, kMaxCameras> pixels = pixelsOf(context_.rig);
+  for (std::size_t c = 0; c < context_.rig.camera_count; ++c) {
+    for (std::size_t i = 0; i < kImageSlots; ++i) touchPages(camera_[c].pool.slot(i).pixels.get(), pixels[c]);
   }
 }
 
@@ -95,8 +103,8 @@ void SensorNode::takeImage(const CameraFrame& image, const HostTimes& host, cons
   slot.frame.timeline = imu_time.timeline;
   slot.frame.number = ++counters_.images[image.camera];
   slot.host = host;
-  pixels.write(pixels.device, slot.pixels.data());
-  slot.frame.image = {slot.pixels.data(), image.image.width, image.image.height, image.image.width};
+  pixels.write(pixels.device, slot.pixels.get());
+  slot.frame.image = {slot.pixels.get(), image.image.width, image.image.height, image.image.width};
   if (camera.record != nullptr) camera.record->hand(handle);
   if (held_out) {
     ++counters_.images_held_out[image.camera];

@@ -119,13 +119,6 @@ void touchPages(void* memory, std::size_t bytes) {
   first[bytes - 1] = first[bytes - 1];
 }
 
-void touchPages(std::span<const std::byte> memory) {
-  if (memory.empty()) return;
-  const volatile std::byte* first = memory.data();
-  for (std::size_t i = 0; i < memory.size(); i += pageBytes()) static_cast<void>(first[i]);
-  static_cast<void>(first[memory.size() - 1]);
-}
-
 #if defined(__GLIBC__)
 namespace {
 constexpr int kHeapBlockBytes = 4 * 1024 * 1024;  ///< larger ones get a mapping of their own

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -29,8 +28,6 @@ nlohmann::ordered_json toJson(const MemoryLockReport& report);
 /// Makes every page of a writable range resident and private by writing each back as it is. No other
 /// thread may write there meanwhile.
 void touchPages(void* memory, std::size_t bytes);
-/// Makes every page of a readable range resident; a page never written may still be the shared zero page.
-void touchPages(std::span<const std::byte> memory);
 
 /// Holds malloc to memory that neither shrinks nor spreads. Once, before other threads exist.
 /// - One arena (M_ARENA_MAX 1): by default each thread gets one of its own, and what one thread frees the

@@ -111,6 +111,7 @@ FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const 
   };
   flight->graph = std::make_unique<Graph>(calibration.rig, calibration.noise, settings, observer, wanted);
   Graph& graph = *flight->graph;
+  graph.sensors().touchImages();
   reserveHeap(kHeapReserve);
   MemoryTable reserved;
   graph.addReservations(reserved);
