@@ -46,6 +46,8 @@ class LogSource {
   [[nodiscard]] virtual const Calibration& calibration() const = 0;
   /// The next message; false at the end. Images that cannot be used are skipped and counted.
   virtual bool next(SensorMessage& message) = 0;
+  /// False where the next message is certainly no image.
+  [[nodiscard]] virtual bool imageIsNext() const { return true; }
   /// Images the log lists, all cameras together, for progress.
   [[nodiscard]] virtual std::size_t imageCount() const = 0;
   /// Distinct image stamps the log lists: the most poses a replay can give.

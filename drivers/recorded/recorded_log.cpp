@@ -56,13 +56,17 @@ void RecordedLog::prepare(const std::string& name) {
   }
 }
 
+bool RecordedLog::imageIsNext() const {
+  if (next_image_ == images_.size()) return false;
+  return next_sample_ == samples_.size() || samples_[next_sample_].stamp > images_[next_image_].stamp;
+}
+
 bool RecordedLog::next(SensorMessage& message) {
   while (true) {
     const bool image_left = next_image_ < images_.size();
-    const bool sample_left = next_sample_ < samples_.size();
     if (!image_left && !images_.empty() && !options_.imu_after_last_image) return false;
-    if (!image_left && !sample_left) return false;
-    if (sample_left && (!image_left || samples_[next_sample_].stamp <= images_[next_image_].stamp)) {
+    if (!image_left && next_sample_ == samples_.size()) return false;
+    if (!imageIsNext()) {
       message = samples_[next_sample_++];
       ++counters_.imu_samples;
       return true;

@@ -52,10 +52,11 @@ struct GraphContext {
   /// Runs a stage's work and counts its time.
   template <typename Work>
   Spent timed(StageId stage, Work&& work) {
+    if (!options.drag) return measured(work);
     return measured([&] {
       const double cpu = threadCpuSeconds();
       work();
-      if (options.drag) options.drag(stage, threadCpuSeconds() - cpu);
+      options.drag(stage, threadCpuSeconds() - cpu);
     });
   }
   void count(StageId stage, const Spent& spent, bool keyframe = false) {

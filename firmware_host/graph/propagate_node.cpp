@@ -11,13 +11,14 @@ PropagateNode::PropagateNode(GraphContext& context)
 
 bool PropagateNode::turn() {
   const bool ended = inputEnded();
-  const double cpu = threadCpuSeconds();
-  takeFix();
   const ImuArrival* arrival = samples.next();
   if (arrival == nullptr) {
+    takeFix();
     if (ended) finish();
     return false;
   }
+  const double cpu = threadCpuSeconds();
+  takeFix();
   propagate(*arrival, cpu);
   samples.drop();
   return true;

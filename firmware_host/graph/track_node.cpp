@@ -16,9 +16,15 @@ TrackNode::TrackNode(GraphContext& context, const SensorNode& sensors)
 
 bool TrackNode::turn() {
   const bool ended = inputEnded();
-  context_.count(StageId::kPairing, measured([&] {
-                   frames.takeArrivals([this](const FrameQueue::Refusal& refusal) { refuse(refusal); });
-                 }));
+  const bool images_came = frames.images[0].size() > 0 || frames.images[1].size() > 0;
+  const auto pair = [&] {
+    frames.takeArrivals([this](const FrameQueue::Refusal& refusal) { refuse(refusal); });
+  };
+  if (images_came) {
+    context_.count(StageId::kPairing, measured(pair));
+  } else {
+    pair();
+  }
   if (frames.front() == nullptr) {
     samples.takeSurplus(stage_);
     return ended && !done() && flushAndFinish();
