@@ -4,7 +4,7 @@
 // A step has two parts: `step` gives the state as soon as it stands; `trim` then makes room in the window
 // (marginalization). What others go on from is taken in between and after: the fix for propagation
 // after `step`, the window for tracking after `trim`.
-// Samples come before the first frame whose stamp is not earlier. Memory: the smoother's 15.6 MiB, 0.9 MiB of
+// Samples come before the first frame whose stamp is not earlier. Memory: the smoother's 14.1 MiB, 0.9 MiB of
 // waiting frames (one camera), half a MiB of samples; no allocation after the constructor.
 // Rules of start, health, events and reset: docs/odometry.md.
 

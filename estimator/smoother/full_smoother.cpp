@@ -88,11 +88,10 @@ Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& stat
   }
   std::erase_if(pending_imu_,
                 [&](const ImuSample& s) { return s.stamp < at - Duration::fromSeconds(kKeptAhead); });
-  const std::size_t slot = keyframes_.size();
+  const auto slot = static_cast<std::uint32_t>(keyframes_.size());
   for (const TrackedFeature& feature : frame.features) {
-    Sighting sighting;
-    if (!makeSighting(slot, feature.seen, feature.pixel, settings_.pixel_sigma, sighting)) continue;
-    addSighting({state.epoch, feature.id}, sighting);
+    const Sighting sighting = makeSighting(rig_, feature.seen, feature.pixel, settings_.pixel_sigma, slot);
+    if (sighting.any()) addSighting({state.epoch, feature.id}, sighting);
   }
   worlds_.try_emplace(state.epoch, state.epoch);
   keyframes_.push_back(std::move(keyframe));
@@ -110,22 +109,6 @@ void FullSmoother::addSighting(const TrackKey& key, const Sighting& sighting) {
   full.key().second = next_revisit_track_--;
   tracks_.insert(std::move(full));
   tracks_[key].sightings.push_back(sighting);
-}
-
-bool FullSmoother::makeSighting(std::size_t keyframe, const std::array<bool, kMaxCameras>& seen,
-                                const std::array<Eigen::Vector2f, kMaxCameras>& pixel, double sigma,
-                                Sighting& sighting) const {
-  sighting.slot = static_cast<std::uint32_t>(keyframe);
-  bool any = false;
-  for (std::size_t c = 0; c < rig_.camera_count; ++c) {
-    CameraSighting& view = sighting.camera[c];
-    Eigen::Vector2d back;
-    view.used = seen[c] && rig_.camera[c].unproject(pixel[c].cast<double>(), view.bearing) &&
-                rig_.camera[c].project(view.bearing, back, &view.weight);
-    if (view.used) view.weight /= sigma;
-    any = any || view.used;
-  }
-  return any;
 }
 
 NavState FullSmoother::state(std::size_t k) const {
@@ -183,7 +166,7 @@ void FullSmoother::removeOutliers() {
                     r.squaredNorm() < kOutlierSigmas * kOutlierSigmas;
       }
     }
-    std::erase_if(track.sightings, [](const Sighting& s) { return !s.camera[0].used && !s.camera[1].used; });
+    std::erase_if(track.sightings, [](const Sighting& s) { return !s.any(); });
     track.in_system = track.sightings.size() >= 2;
   }
 }

@@ -144,9 +144,6 @@ class FullSmoother {
   void linearizeMotion(System& system, double& cost) const;
 
   void addSighting(const TrackKey& key, const Sighting& sighting);
-  [[nodiscard]] bool makeSighting(std::size_t keyframe, const std::array<bool, kMaxCameras>& seen,
-                                  const std::array<Eigen::Vector2f, kMaxCameras>& pixel, double sigma,
-                                  Sighting& sighting) const;
   [[nodiscard]] bool findKeyframe(Stamp stamp, std::size_t& k) const;
   [[nodiscard]] bool findOldTrack(std::size_t keyframe, const RevisitFeature& feature, TrackKey& key);
   void addMatch(const RevisitMatch& match, Revisit& revisit);

@@ -85,8 +85,9 @@ bool FullSmoother::findOldTrack(std::size_t keyframe, const RevisitFeature& feat
     key = {epoch, feature.track};
     if (tracks_.contains(key)) return true;
   }
-  Sighting sighting;
-  if (!makeSighting(keyframe, feature.seen, feature.pixel, settings_.match_sigma, sighting)) return false;
+  const Sighting sighting = makeSighting(rig_, feature.seen, feature.pixel, settings_.match_sigma,
+                                         static_cast<std::uint32_t>(keyframe));
+  if (!sighting.any()) return false;
   // Ids of the odometry count up from zero, these down from the top.
   key = {epoch, next_revisit_track_--};
   tracks_[key].sightings.push_back(sighting);
@@ -98,14 +99,16 @@ void FullSmoother::addMatch(const RevisitMatch& match, Revisit& revisit) {
   Match made;
   const RevisitFeature& seen = match.new_feature;
   const TrackKey new_key{keyframes_[new_keyframe].epoch, seen.track};
-  if (!makeSighting(new_keyframe, seen.seen, seen.pixel, settings_.match_sigma, made.sighting)) {
+  made.sighting = makeSighting(rig_, seen.seen, seen.pixel, settings_.match_sigma,
+                               static_cast<std::uint32_t>(new_keyframe));
+  if (!made.sighting.any()) {
     const auto track = seen.has_track ? tracks_.find(new_key) : tracks_.end();
     if (track == tracks_.end()) return;
     const auto at = std::ranges::find(track->second.sightings, new_keyframe, &Sighting::slot);
     if (at == track->second.sightings.end()) return;
     made.sighting = *at;
     for (CameraSighting& view : made.sighting.camera) {
-      if (view.used) view.weight *= settings_.pixel_sigma / settings_.match_sigma;
+      if (view.used) view.weight *= static_cast<float>(settings_.pixel_sigma / settings_.match_sigma);
     }
   }
   if (!findOldTrack(revisit.old_keyframe, match.old_feature, made.track)) return;

@@ -4,7 +4,7 @@
 // Each has a place that it keeps until it is removed; a new one gets the lowest free place, and iteration
 // runs in the order of places, so that sums do not depend on how landmarks came and went. Full is normal
 // (kMaxLandmarks): the landmark lost longest ago makes room; those with columns of their own leave in their
-// own way (extra_table.hpp). Memory: 4.2 MiB, reserved by the constructor. Cost: a search is logarithmic;
+// own way (extra_table.hpp). Memory: 2.1 MiB, reserved by the constructor. Cost: a search is logarithmic;
 // adding one with an id above all others is O(1) until the table is full.
 
 #include <array>

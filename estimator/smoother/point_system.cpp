@@ -23,6 +23,9 @@ void inGroups(RigPoses poses, std::span<const Sighting> sightings, const F& use)
   if (lane > 0) use(pointers);
 }
 
+// Mean squared residual of a point behind a camera that saw it: fits nowhere.
+constexpr double kBehindCamera = 1e6;
+
 struct Sums {
   lanes::PointSums sums;
   int views = 0;
@@ -41,6 +44,22 @@ struct Sums {
 };
 
 }  // namespace
+
+double meanSquaredResidual(RigPoses poses, std::span<const Sighting> sightings, const LandmarkPoint& point) {
+  lanes::V squares{};
+  int views = 0;
+  bool in_front = true;
+  inGroups(poses, sightings, [&](const lanes::ViewPointers& p) {
+    const lanes::ViewGroup group(p);
+    const lanes::Residuals residuals(group, point);
+    in_front = in_front && !lanes::any(group.used & ~residuals.in_front);
+    // A lane that is not used computes with another's numbers.
+    squares += group.used ? residuals.r[0] * residuals.r[0] + residuals.r[1] * residuals.r[1] : lanes::V{};
+    views += lanes::count(group.used);
+  });
+  if (!in_front) return kBehindCamera;
+  return views > 0 ? lanes::sum(squares) / views : -1.0;
+}
 
 PointViews::PointViews(RigPoses poses, std::span<const Sighting> sightings) : poses_(poses) {
   const std::size_t gathered = std::min(sightings.size(), kMaxStates);

@@ -81,32 +81,15 @@ TrackId Smoother::newestIdTaken(const TrackedFrame& frame, int max_features) {
   return *last;
 }
 
-bool Smoother::sightingOf(const TrackedFeature& feature, Sighting& sighting) const {
-  bool any = false;
-  for (std::size_t c = 0; c < problem_.rig.camera_count; ++c) {
-    if (!feature.seen[c]) continue;
-    const CameraModel& camera = problem_.rig.camera[c];
-    CameraSighting& view = sighting.camera[c];
-    Eigen::Vector2d pixel;
-    Matrix23d J;
-    if (!camera.unproject(feature.pixel[c].cast<double>(), view.bearing)) continue;
-    if (!camera.project(view.bearing, pixel, &J)) continue;
-    view.weight = J / settings_.pixel_sigma;
-    view.used = true;
-    any = true;
-  }
-  return any;
-}
-
 void Smoother::addSightings(const TrackedFrame& frame, int max_features) {
   statistics_ = FrameStatistics{};
   double age = 0;
   const TrackId newest_taken = newestIdTaken(frame, max_features);
   for (const TrackedFeature& feature : frame.features) {
     if (feature.id > newest_taken) continue;
-    Sighting sighting;
-    sighting.slot = problem_.window.newestSlot();
-    if (!sightingOf(feature, sighting)) continue;
+    const Sighting sighting = makeSighting(problem_.rig, feature.seen, feature.pixel, settings_.pixel_sigma,
+                                           problem_.window.newestSlot());
+    if (!sighting.any()) continue;
     Landmark* const known = problem_.landmarks.find(feature.id);
     Landmark& landmark = known != nullptr ? *known : problem_.landmarks.add(feature.id);
     landmark.last_frame = frame.index;

@@ -10,7 +10,7 @@
 // The parts: window, landmark_table, extra_table, calibration_state, prior (what there is: window_problem);
 // window_factors, window_solver, window_covariance, window_trim, marginalization (what is done to it).
 // Frames: world (z up, origin and yaw of the first state), body (= IMU), cameras. SI units, pixels.
-// Memory: 15.6 MiB, all reserved by the constructor (table in docs/smoother.md); nothing is allocated
+// Memory: 14.1 MiB, all reserved by the constructor (table in docs/smoother.md); nothing is allocated
 // after it. Full is normal: the landmark not seen for longest, and the oldest IMU samples, go first.
 // Cost: linear in landmarks, cubic in the window's dimension (at most 192 columns by default, and 3
 // for each explicit landmark and plane).
@@ -166,7 +166,6 @@ class Smoother {
   void linkState(WindowState& state, const WindowState& previous, bool gap) const;
   [[nodiscard]] TrackId newestIdTaken(const TrackedFrame& frame, int max_features);
   void addSightings(const TrackedFrame& frame, int max_features);
-  [[nodiscard]] bool sightingOf(const TrackedFeature& feature, Sighting& sighting) const;
   void updateStatistics();
 
   SmootherSettings settings_;

@@ -76,8 +76,8 @@ struct ViewGroup {
   explicit ViewGroup(const ViewPointers& p) : used(p.used()) {
     const double* R[kLanes];
     const double* c[kLanes];
-    const double* m[kLanes];
-    const double* W[kLanes];
+    const float* m[kLanes];
+    const float* W[kLanes];
     SWIFTLET_UNROLL
     for (std::size_t l = 0; l < kLanes; ++l) {
       R[l] = p.camera(l).R_cam_world.data();

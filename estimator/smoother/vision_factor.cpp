@@ -23,7 +23,7 @@ void triangulateLinearly(RigPoses poses, std::span<const Sighting> sightings, La
   const std::size_t c0 = first.camera[0].used ? 0 : 1;
   const CameraPose& anchor = poses[first.slot].current[c0];
   point.reference = anchor.center;
-  point.bearing = anchor.R_cam_world.transpose() * first.camera[c0].bearing;
+  point.bearing = anchor.R_cam_world.transpose() * first.camera[c0].ray();
   double numerator = 0;
   double denominator = 0;
   for (const Sighting& sighting : sightings) {
@@ -31,8 +31,9 @@ void triangulateLinearly(RigPoses poses, std::span<const Sighting> sightings, La
       const CameraSighting& view = sighting.camera[c];
       if (!view.used) continue;
       const CameraPose& camera = poses[sighting.slot].current[c];
-      const Eigen::Vector2d a = view.weight * (camera.R_cam_world * point.bearing);
-      const Eigen::Vector2d b = view.weight * (camera.R_cam_world * (point.reference - camera.center));
+      const Matrix23d W = view.whitening();
+      const Eigen::Vector2d a = W * (camera.R_cam_world * point.bearing);
+      const Eigen::Vector2d b = W * (camera.R_cam_world * (point.reference - camera.center));
       numerator -= a.dot(b);
       denominator += b.dot(b);
     }
@@ -70,13 +71,28 @@ RobustWeight RobustWeight::cauchy(double squared_norm, double information_scale)
           0.5 * information_scale * c2 * std::log1p(squared_norm / c2)};
 }
 
+Sighting makeSighting(const Rig& rig, const std::array<bool, kMaxCameras>& seen,
+                      const std::array<Eigen::Vector2f, kMaxCameras>& pixel, double pixel_sigma,
+                      std::uint32_t slot) {
+  Sighting sighting;
+  sighting.slot = slot;
+  for (std::size_t c = 0; c < rig.camera_count; ++c) {
+    Eigen::Vector3d ray;
+    Eigen::Vector2d back;
+    Matrix23d J;
+    if (!seen[c] || !rig.camera[c].unproject(pixel[c].cast<double>(), ray)) continue;
+    if (rig.camera[c].project(ray, back, &J)) sighting.camera[c] = CameraSighting::of(ray, J / pixel_sigma);
+  }
+  return sighting;
+}
+
 bool reprojectionResidual(const CameraSighting& sighting, const CameraPose& camera,
                           const LandmarkPoint& point, Eigen::Vector2d& residual) {
   const Eigen::Vector3d h =
       camera.R_cam_world * (point.bearing + point.inverse_depth * (point.reference - camera.center));
-  const double along = sighting.bearing.dot(h);
+  const double along = sighting.ray().dot(h);
   if (!(along > kMinCosine * h.norm())) return false;
-  residual = sighting.weight * h / along;
+  residual = sighting.whitening() * h / along;
   return true;
 }
 
@@ -85,10 +101,12 @@ bool reprojectionJacobians(const CameraSighting& sighting, const CameraPose& cam
                            SightingJacobians& jacobians) {
   const Eigen::Vector3d arm = point.reference - camera.center;
   const Eigen::Vector3d h = camera.R_cam_world * (point.bearing + point.inverse_depth * arm);
-  const double along = sighting.bearing.dot(h);
+  const Eigen::Vector3d m = sighting.ray();
+  const Matrix23d W = sighting.whitening();
+  const double along = m.dot(h);
   if (!(along > kMinCosine * h.norm())) return false;
-  const Eigen::Vector2d r = sighting.weight * h / along;
-  const Matrix23d G = (sighting.weight - r * sighting.bearing.transpose()) / along;  // d r / d h
+  const Eigen::Vector2d r = W * h / along;
+  const Matrix23d G = (W - r * m.transpose()) / along;  // d r / d h
   const Matrix23d M = G * camera.R_cam_world;
   const Eigen::Matrix3d R_body_cam = T_body_cam.R();
   const Matrix23d K = G * R_body_cam.transpose();  // d r / d (ray in body axes)
@@ -144,21 +162,6 @@ bool triangulate(RigPoses poses, std::span<const Sighting> sightings, int max_it
   point.inverse_depth_sigma = std::sqrt(std::max(column.z(), 0.0));
   point.triangulated = true;
   return true;
-}
-
-double meanSquaredResidual(RigPoses poses, std::span<const Sighting> sightings, const LandmarkPoint& point) {
-  double sum = 0;
-  int count = 0;
-  for (const Sighting& sighting : sightings) {
-    for (std::size_t c = 0; c < kMaxCameras; ++c) {
-      if (!sighting.camera[c].used) continue;
-      Eigen::Vector2d r;
-      if (!reprojectionResidual(sighting.camera[c], poses[sighting.slot].current[c], point, r)) return 1e6;
-      sum += r.squaredNorm();
-      ++count;
-    }
-  }
-  return count > 0 ? sum / count : -1.0;
 }
 
 }  // namespace swiftlet

@@ -61,6 +61,12 @@ struct SightingJacobians {
   Eigen::Matrix<double, 2, 6> extrinsic;  ///< phi, p of T_body_cam
 };
 
+/// What the cameras of a state saw at their pixels; `pixel_sigma` px. A camera that has no ray for its pixel
+/// is unused.
+[[nodiscard]] Sighting makeSighting(const Rig& rig, const std::array<bool, kMaxCameras>& seen,
+                                    const std::array<Eigen::Vector2f, kMaxCameras>& pixel, double pixel_sigma,
+                                    std::uint32_t slot);
+
 /// Whitened residual, 2 x 1. False when the point is not in front of the measured ray (cosine of the
 /// angle between them at most 0.2).
 [[nodiscard]] bool reprojectionResidual(const CameraSighting& sighting, const CameraPose& camera,

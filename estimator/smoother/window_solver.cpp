@@ -178,7 +178,7 @@ void rejectNewestSightings(WindowProblem& problem, double sigmas) {
       view.used = reprojectionResidual(view, problem.rig_poses[newest].current[c], landmark.point, r) &&
                   r.squaredNorm() <= sigmas * sigmas;
     }
-    if (sighting.camera[0].used || sighting.camera[1].used) continue;
+    if (sighting.any()) continue;
     landmark.sightings.popBack();
     reject(problem, landmark);
   }
@@ -186,11 +186,8 @@ void rejectNewestSightings(WindowProblem& problem, double sigmas) {
 
 void rejectLandmarks(WindowProblem& problem, double sigmas) {
   for (Landmark& landmark : problem.landmarks) {
-    if (landmark.sightings.size() < 2) {
-      landmark.mean_square = meanSquaredResidual(problem.rig_poses, landmark.views(), landmark.point);
-      continue;
-    }
     landmark.mean_square = meanSquaredResidual(problem.rig_poses, landmark.views(), landmark.point);
+    if (landmark.sightings.size() < 2) continue;
     if (landmark.in_system && landmark.mean_square <= sigmas * sigmas) continue;
     if (!reject(problem, landmark) && landmark.extra == kNoExtra) landmark.point.triangulated = false;
   }

@@ -227,7 +227,7 @@ constexpr double kPixelSigma = 0.6;
 Eigen::Vector2d sightingResidual(const CameraSighting& view, const BodyState& x, const SE3& T_body_cam,
                                  const Eigen::Vector3d& p) {
   const Eigen::Vector3d h = T_body_cam.inverse() * (x.T_world_body.inverse() * p);
-  return view.weight * h / view.bearing.dot(h);
+  return view.whitening() * h / view.ray().dot(h);
 }
 
 }  // namespace

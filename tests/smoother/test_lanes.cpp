@@ -63,11 +63,12 @@ struct Window {
         CameraSighting& view = sighting.camera[c];
         const Eigen::Vector3d ray = (scene.states[k].T_world_body * rig.T_body_cam[c]).inverse() * p;
         const double sign = random.uniform(0, 1) < behind ? -1 : 1;
-        view.used = random.uniform(0, 1) < 0.7;
-        view.bearing = sign * (expSo3(randomVector(random, 0.004)) * ray.normalized());
-        view.weight = test::tangentWeight(view.bearing, 450 / kPixelSigma);
+        const bool used = random.uniform(0, 1) < 0.7;
+        const Eigen::Vector3d measured = sign * (expSo3(randomVector(random, 0.004)) * ray.normalized());
+        view = CameraSighting::of(measured, test::tangentWeight(measured, 450 / kPixelSigma));
+        view.used = used;
         // What is not used must not be read.
-        if (!view.used) view.bearing.setConstant(std::numeric_limits<double>::quiet_NaN());
+        if (!view.used) view.bearing.setConstant(std::numeric_limits<float>::quiet_NaN());
       }
       if (!sighting.camera[0].used && !sighting.camera[1].used) continue;
       static_cast<void>(result.sightings.tryPushBack(sighting));

@@ -106,7 +106,7 @@ TEST_CASE("Reprojection Jacobians at a point without depth", "[smoother][vision_
   Random random(12);
   const CameraModel pinhole = makeRig(RigKind::kEuroc).rig.camera[0];
   Case c = randomCase(pinhole, 0.3, random);
-  const Eigen::Vector3d ray = (c.T_world_body * c.T_body_cam).rotation * c.sighting.bearing;
+  const Eigen::Vector3d ray = (c.T_world_body * c.T_body_cam).rotation * c.sighting.ray();
   c.point.bearing = ray;
   c.point.inverse_depth = 0;
   checkJacobians(c);
@@ -130,7 +130,7 @@ TEST_CASE("The residual is the reprojection error in sigmas, to first order", "[
     Eigen::Vector2d predicted;
     Eigen::Vector2d measured;
     REQUIRE(camera.project(pose.R_cam_world * (c.point.position() - pose.center), predicted));
-    REQUIRE(camera.project(c.sighting.bearing, measured));
+    REQUIRE(camera.project(c.sighting.ray(), measured));
     const Eigen::Vector2d expected = (predicted - measured) / kPixelSigma;
     // Errors are some 3 px of a focal length of 250 to 450 px: second order is a few per cent.
     CHECK((r - expected).norm() < 0.05 * expected.norm() + 1e-6);
@@ -280,10 +280,8 @@ TEST_CASE("Triangulation refuses sightings whose rays point apart", "[smoother][
     sightings[k].slot = k;
     // Two world directions more than 90 degrees apart: no point is in front of both.
     const Eigen::Vector3d world = k == 0 ? Eigen::Vector3d(1, 0.1, 0) : Eigen::Vector3d(-1, 0.1, 0);
-    CameraSighting& view = sightings[k].camera[0];
-    view.used = true;
-    view.bearing = (scene.poses[k].current[0].R_cam_world * world).normalized();
-    view.weight = test::tangentWeight(view.bearing, 400 / kPixelSigma);
+    const Eigen::Vector3d ray = (scene.poses[k].current[0].R_cam_world * world).normalized();
+    sightings[k].camera[0] = CameraSighting::of(ray, test::tangentWeight(ray, 400 / kPixelSigma));
   }
   LandmarkPoint point;
   CHECK_FALSE(triangulate(scene.poses, sightings, 10, point));

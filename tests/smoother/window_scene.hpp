@@ -26,11 +26,10 @@ inline CameraModel wideFisheye() {
 /// A sighting with the measured ray `ray` (any length). False outside the lens model.
 inline bool sightingOf(const CameraModel& camera, const Eigen::Vector3d& ray, double pixel_sigma,
                        CameraSighting& sighting) {
-  sighting.used = true;
-  sighting.bearing = ray.normalized();
   Eigen::Vector2d pixel;
-  if (!camera.project(sighting.bearing, pixel, &sighting.weight)) return false;
-  sighting.weight /= pixel_sigma;
+  Matrix23d J;
+  if (!camera.project(ray.normalized(), pixel, &J)) return false;
+  sighting = CameraSighting::of(ray.normalized(), J / pixel_sigma);
   return true;
 }
 
