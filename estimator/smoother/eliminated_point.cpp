@@ -31,27 +31,48 @@ bool PointFactor::compute(Eigen::Matrix3d C) {
   return true;
 }
 
+StepOfStates::StepOfStates(const VectorMap& dx, const std::array<WindowState, kMaxStates>& states,
+                           int calibration) {
+  for (std::size_t slot = 0; slot < kMaxStates; ++slot) {
+    const int offset = states[slot].offset;
+    if (offset < 0 || offset + kPoseDim > dx.size()) continue;
+    for (int k = 0; k < kPoseDim; ++k)
+      pose_[slot][static_cast<std::size_t>(k)] = static_cast<float>(dx[offset + k]);
+  }
+  for (int k = 0; k < calibration; ++k) calibration_[static_cast<std::size_t>(k)] = static_cast<float>(dx[k]);
+}
+
 void EliminatedPoint::keep(const LandmarkBlock& landmark) {
   L_ = landmark.factor();
   z_ = landmark.z();
-  states_.clear();
+  count_ = 0;
   for (const LandmarkBlock::State& state : landmark.states()) {
-    using Columns = Eigen::Matrix<double, kPaddedRows, 3>;
-    states_.pushBack(
-        {state.slot, Eigen::Map<const Columns>(state.point[0]).topRows<kPoseDim>().cast<float>()});
+    StateColumns& columns = states_[count_++];
+    columns.slot = state.slot;
+    for (std::size_t k = 0; k < 3; ++k) {
+      for (std::size_t r = 0; r < kPaddedRows; ++r) columns.Y[k][r] = static_cast<float>(state.point[k][r]);
+    }
   }
   calibration_dimension_ = landmark.calibrationDimension();
   if (calibration_dimension_ > 0) Y_calibration_ = landmark.calibration().point.cast<float>();
 }
 
-Eigen::Vector3d EliminatedPoint::step(const VectorMap& dx,
-                                      const std::array<WindowState, kMaxStates>& states) const {
-  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-  for (const StateColumns& columns : states_) {
-    sum += columns.Y.transpose() * dx.segment<kPoseDim>(states[columns.slot].offset).cast<float>();
+Eigen::Vector3d EliminatedPoint::step(const StepOfStates& states) const {
+  alignas(32) float lanes[3][kPaddedRows] = {};
+  for (std::size_t s = 0; s < count_; ++s) {
+    const std::array<float, kPaddedRows>& dx = states.pose_[states_[s].slot];
+    for (std::size_t k = 0; k < 3; ++k) {
+      for (std::size_t r = 0; r < kPaddedRows; ++r) lanes[k][r] += states_[s].Y[k][r] * dx[r];
+    }
+  }
+  Eigen::Vector3f sum;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const float* const lane = lanes[k];
+    sum[static_cast<Eigen::Index>(k)] =
+        ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]));
   }
   for (int k = 0; k < calibration_dimension_; ++k) {
-    sum += Y_calibration_.row(k).transpose() * static_cast<float>(dx[k]);
+    sum += Y_calibration_.row(k).transpose() * states.calibration_[static_cast<std::size_t>(k)];
   }
   Eigen::Vector3d result = -(z_ + sum.cast<double>());
   L_.solveTransposed(result);

@@ -106,11 +106,11 @@ void WindowSolver::build(WindowProblem& problem, NormalEquations& system, bool f
 
 // The points' part of the step that was solved for.
 void WindowSolver::substitutePoints(WindowProblem& problem, const VectorMap& step) const {
+  const StepOfStates states(step, problem.window.slots(), problem.calibration.dimension());
   for (Landmark& landmark : problem.landmarks) {
     if (!landmark.in_system || landmark.extra != kNoExtra) continue;
     LandmarkPoint& point = landmark.point;
-    const Eigen::Vector3d point_step =
-        eliminated_[problem.landmarks.indexOf(landmark)].step(step, problem.window.slots());
+    const Eigen::Vector3d point_step = eliminated_[problem.landmarks.indexOf(landmark)].step(states);
     landmark.in_system = point_step.allFinite();
     if (landmark.in_system) movePoint(point_step, PointBasis::of(point.bearing), point);
   }

@@ -221,9 +221,10 @@ bool BenchmarkWindow::update(int iterations) {
     step_ = -system_.g();
     const VectorMap step(step_.data(), dimension_);
     choleskySolve(H, step);
+    const StepOfStates of_states(step, states, 0);
     for (std::size_t i = 0; i < landmarks.size(); ++i) {
       LandmarkPoint& point = landmarks[i].point;
-      movePoint(eliminated_[i].step(step, states), PointBasis::of(point.bearing), point);
+      movePoint(eliminated_[i].step(of_states), PointBasis::of(point.bearing), point);
     }
     for (const std::uint8_t slot : order) {
       WindowState& state = states[slot];

@@ -191,9 +191,9 @@ void checkAgainstDense(const Window& w) {
 
   // Back-substitution: the points' part, to single precision.
   Eigen::VectorXd points_step(m);
+  const StepOfStates of_states(VectorMap(step.data(), n), w.states, w.calibration.dimension());
   for (std::size_t i = 0; i < eliminated.size(); ++i) {
-    points_step.segment<3>(3 * static_cast<Eigen::Index>(i)) =
-        eliminated[i].step(VectorMap(step.data(), n), w.states);
+    points_step.segment<3>(3 * static_cast<Eigen::Index>(i)) = eliminated[i].step(of_states);
   }
   CHECK((points_step - full.tail(m)).norm() < 1e-5 * full.tail(m).norm());
 }
