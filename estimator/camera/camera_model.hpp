@@ -7,7 +7,7 @@
 //    radius where the radial polynomial is monotonic: beyond it points fold back into the image.
 //  - equidistant (Kannala, Brandt, PAMI 2006): theta_d = theta (1 + k1 theta^2 + ... + k4 theta^8),
 //    (xd, yd) = theta_d (x, y) / |(x, y)|; valid up to `maxTheta()`, which may exceed 90 degrees.
-// Projection costs about 20 ns; unprojection iterates (Newton, at most 20 steps).
+// Projection costs about 8 ns; unprojection, by Newton's method in at most 20 steps, about 50 ns.
 
 #include <Eigen/Core>
 #include <array>
