@@ -23,6 +23,8 @@ constexpr double kExtraInliers = 0.05;
 constexpr double kExtraOfUnexplained = 0.15;
 constexpr int kRefineSteps = 3;
 constexpr int kFinalRefineSteps = 6;
+// A step that lowers the cost by less than this share is the last.
+constexpr double kSettled = 1e-3;
 constexpr int kMaxRotationSamples = 60;
 constexpr std::size_t kLanes = 8;
 // After how many tracks the cost of a hypothesis is compared with the best.
@@ -113,24 +115,65 @@ double essentialCost(const Eigen::Matrix3d& E, const MonoTracks& tracks, double 
   return cost;
 }
 
-// Squared error over the gate of one track under a motion; 1 or more: outlier.
-double gatedError(const Eigen::Matrix3d& R, const Eigen::Vector3d& t, const Eigen::Vector3d& prev,
-                  const Eigen::Vector3d& cur, const Gates& gates) {
-  const Eigen::Vector3d turned = R * prev;
-  if (t.isZero(0)) return (cur - turned).squaredNorm() / gates.turned_squared;
-  const Eigen::Vector3d normal = t.cross(turned);  // of the epipolar plane
-  const Eigen::Vector3d cur_normal = t.cross(cur);
-  const double e = normal.dot(cur);
-  const double error =
-      e * e / (gates.sampson_squared * (normal.squaredNorm() + cur_normal.squaredNorm() + kTiny));
-  if (error >= 1.0) return error;
-  // With depths d' cur = d turned + t: d' and d are positive multiples of `towards` and `from`,
-  // and d / |t| = from / towards. Both are sines times |normal|, noisy by the parallax gate.
-  const double slack = gates.parallax * normal.norm();
-  const double towards = cur.dot(turned.cross(normal));
-  const double from = normal.dot(cur_normal);
-  const bool in_front = towards > -slack && from > -slack && cur.dot(turned) > 0;
-  return in_front && from + slack > gates.min_depth * towards ? error : 1.0;
+// Four tracks at a time.
+using Lanes = Eigen::Array4d;
+constexpr std::size_t kRayLanes = 4;
+static_assert(kMaxFeatures % kRayLanes == 0);
+
+struct Rays {
+  Lanes x, y, z;
+
+  static Rays of(const MonoTracks::Coordinates& c, std::size_t i) {
+    return {Lanes::Map(&c.x[i]), Lanes::Map(&c.y[i]), Lanes::Map(&c.z[i])};
+  }
+  static Rays of(const Eigen::Vector3d& v) {
+    return {Lanes::Constant(v.x()), Lanes::Constant(v.y()), Lanes::Constant(v.z())};
+  }
+};
+
+Rays operator*(const Eigen::Matrix3d& R, const Rays& v) {
+  return {R(0, 0) * v.x + R(0, 1) * v.y + R(0, 2) * v.z, R(1, 0) * v.x + R(1, 1) * v.y + R(1, 2) * v.z,
+          R(2, 0) * v.x + R(2, 1) * v.y + R(2, 2) * v.z};
+}
+Rays operator-(const Rays& a, const Rays& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+Rays cross(const Rays& a, const Rays& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+Lanes dot(const Rays& a, const Rays& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
+/// One a track; whole lanes: what stands behind the last track means nothing.
+using Errors = std::array<double, kMaxFeatures>;
+
+// Squared errors over the gate of all tracks under a motion; 1 or more: outlier.
+void gatedErrors(const Model& model, const MonoTracks& tracks, const Gates& gates, Errors& errors) {
+  const bool turns_only = model.turnsOnly();
+  const Rays t = Rays::of(model.t);
+  for (std::size_t i = 0; i < tracks.count; i += kRayLanes) {
+    const Rays cur = Rays::of(tracks.cur, i);
+    const Rays turned = model.R * Rays::of(tracks.prev, i);
+    if (turns_only) {
+      const Rays difference = cur - turned;
+      Lanes::Map(&errors[i]) = dot(difference, difference) / gates.turned_squared;
+      continue;
+    }
+    const Rays normal = cross(t, turned);  // of the epipolar plane
+    const Rays cur_normal = cross(t, cur);
+    const Lanes e = dot(normal, cur);
+    const Lanes normal_squared = dot(normal, normal);
+    const Lanes error =
+        e * e / (gates.sampson_squared * (normal_squared + dot(cur_normal, cur_normal) + kTiny));
+    // With depths d' cur = d turned + t: d' and d are positive multiples of `towards` and `from`,
+    // and d / |t| = from / towards. Both are sines times |normal|, noisy by the parallax gate.
+    const Lanes slack = gates.parallax * normal_squared.sqrt();
+    const Lanes towards = dot(cur, cross(turned, normal));
+    const Lanes from = dot(normal, cur_normal) + slack;
+    const Lanes in_front =
+        (towards + slack).min(from).min(dot(cur, turned)).min(from - gates.min_depth * towards);
+    for (std::size_t k = 0; k < kRayLanes; ++k) {
+      const auto lane = static_cast<Eigen::Index>(k);
+      errors[i + k] = in_front[lane] > 0 ? error[lane] : std::max(error[lane], 1.0);
+    }
+  }
 }
 
 // Prior of the rotation; no information: free, infinite: fixed.
@@ -149,10 +192,11 @@ void score(const MonoTracks& tracks, const Gates& gates, const RotationPrior& pr
                  kGateSquared;
   }
   model.inliers = 0;
+  Errors errors;
+  gatedErrors(model, tracks, gates, errors);
   for (std::size_t i = 0; i < tracks.count; ++i) {
-    const double error = gatedError(model.R, model.t, tracks.prevAt(i), tracks.curAt(i), gates);
-    model.cost += std::min(error, 1.0);
-    if (error < 1.0) ++model.inliers;
+    model.cost += std::min(errors[i], 1.0);
+    model.inliers += errors[i] < 1.0 ? 1 : 0;
   }
 }
 
@@ -193,21 +237,49 @@ Model stepMotion(const MonoTracks& tracks, const Gates& gates, const RotationPri
   const Eigen::Vector3d axis = model.t.unitOrthogonal();
   Eigen::Matrix<double, 3, 2> tangent;
   tangent << axis, model.t.cross(axis);
-  Matrix5d H = Matrix5d::Zero();
-  Vector5d g = Vector5d::Zero();
-  for (std::size_t i = 0; i < tracks.count; ++i) {
-    const Eigen::Vector3d prev = tracks.prevAt(i);
-    const Eigen::Vector3d cur = tracks.curAt(i);
-    if (gatedError(model.R, model.t, prev, cur, gates) >= 1.0) continue;
-    const Eigen::Vector3d turned = model.R * prev;
-    const Eigen::Vector3d cur_normal = cur.cross(model.t);
-    const double gradient = (model.t.cross(turned)).squaredNorm() + cur_normal.squaredNorm() + kTiny;
-    Vector5d J;
-    J.head<3>() = prev.cross(model.R.transpose() * cur_normal);
-    J.tail<2>() = tangent.transpose() * turned.cross(cur);
-    const double weight = gates.inverse_variance / gradient;
-    H += weight * J * J.transpose();
-    g += weight * model.t.dot(turned.cross(cur)) * J;
+  Errors errors;
+  gatedErrors(model, tracks, gates, errors);
+  std::array<std::array<Lanes, 5>, 5> products;
+  std::array<Lanes, 5> gradients;
+  for (std::size_t a = 0; a < 5; ++a) {
+    gradients[a].setZero();
+    for (std::size_t b = 0; b <= a; ++b) products[a][b].setZero();
+  }
+  const Eigen::Matrix3d R_back = model.R.transpose();
+  const Rays t = Rays::of(model.t);
+  const std::array<Rays, 2> tangents{Rays::of(tangent.col(0)), Rays::of(tangent.col(1))};
+  for (std::size_t i = 0; i < tracks.count; i += kRayLanes) {
+    const Rays prev = Rays::of(tracks.prev, i);
+    const Rays cur = Rays::of(tracks.cur, i);
+    const Rays turned = model.R * prev;
+    const Rays normal = cross(t, turned);
+    const Rays cur_normal = cross(cur, t);
+    const Rays along = cross(turned, cur);
+    const Rays turns = cross(prev, R_back * cur_normal);
+    const std::array<Lanes, 5> J{turns.x, turns.y, turns.z, dot(tangents[0], along), dot(tangents[1], along)};
+    const Lanes gradient = dot(normal, normal) + dot(cur_normal, cur_normal) + kTiny;
+    Lanes weight;
+    for (std::size_t k = 0; k < kRayLanes; ++k) {
+      const auto lane = static_cast<Eigen::Index>(k);
+      const bool used = i + k < tracks.count && errors[i + k] < 1.0;
+      weight[lane] = used ? gates.inverse_variance / gradient[lane] : 0.0;
+    }
+    const Lanes residual = dot(t, along);
+    for (std::size_t a = 0; a < 5; ++a) {
+      const Lanes weighted = weight * J[a];
+      gradients[a] += weighted * residual;
+      for (std::size_t b = 0; b <= a; ++b) products[a][b] += weighted * J[b];
+    }
+  }
+  Matrix5d H;
+  Vector5d g;
+  for (std::size_t a = 0; a < 5; ++a) {
+    const auto row = static_cast<Eigen::Index>(a);
+    g[row] = gradients[a].sum();
+    for (std::size_t b = 0; b <= a; ++b) {
+      const auto column = static_cast<Eigen::Index>(b);
+      H(row, column) = H(column, row) = products[a][b].sum();
+    }
   }
   addPrior(prior, model.R, H.topLeftCorner<3, 3>(), g.head<3>());
   Vector5d step = Vector5d::Zero();
@@ -232,7 +304,9 @@ void refine(const MonoTracks& tracks, const Gates& gates, const RotationPrior& p
     if (!next.R.allFinite() || !next.t.allFinite()) return;
     score(tracks, gates, prior, next);
     if (!(next.cost < model.cost)) return;
+    const bool settled = next.cost > (1.0 - kSettled) * model.cost;
     model = next;
+    if (settled) return;
   }
 }
 
@@ -290,10 +364,9 @@ Status finish(const MonoTracks& tracks, const Gates& gates, const RansacSettings
   }
   result.T_cur_prev = SE3(chosen.R, chosen.t);
   result.inlier_count = chosen.inliers;
-  for (std::size_t i = 0; i < tracks.count; ++i) {
-    result.inlier[tracks.index[i]] =
-        gatedError(chosen.R, chosen.t, tracks.prevAt(i), tracks.curAt(i), gates) < 1.0;
-  }
+  Errors errors;
+  gatedErrors(chosen, tracks, gates, errors);
+  for (std::size_t i = 0; i < tracks.count; ++i) result.inlier[tracks.index[i]] = errors[i] < 1.0;
   if (!result.no_parallax) return okStatus();
   return {StatusCode::kDegenerate, "mono ransac: no parallax, a rotation alone explains the tracks"};
 }
@@ -352,9 +425,10 @@ Status MonoRansac::twoPoint(Bearings prev, Bearings cur, const Eigen::Quaternion
   // Only tracks that moved beyond their noise carry a direction.
   std::array<std::size_t, kMaxFeatures> moved{};
   std::size_t moved_count = 0;
+  Errors errors;
+  gatedErrors(rotation, tracks_, gates, errors);
   for (std::size_t i = 0; i < tracks_.count; ++i) {
-    const double error = gatedError(rotation.R, rotation.t, tracks_.prevAt(i), tracks_.curAt(i), gates);
-    if (error >= 1.0) moved[moved_count++] = i;
+    if (errors[i] >= 1.0) moved[moved_count++] = i;
   }
   Model best;
   int needed = moved_count < 2 ? 0 : settings_.max_iterations;
@@ -371,11 +445,9 @@ Status MonoRansac::twoPoint(Bearings prev, Bearings cur, const Eigen::Quaternion
     if (!(model.cost < best.cost)) continue;
     refine(tracks_, gates, prior, kRefineSteps, model);
     best = model;
+    gatedErrors(best, tracks_, gates, errors);
     std::size_t agree = 0;
-    for (std::size_t i = 0; i < moved_count; ++i) {
-      const std::size_t at = moved[i];
-      if (gatedError(best.R, best.t, tracks_.prevAt(at), tracks_.curAt(at), gates) < 1.0) ++agree;
-    }
+    for (std::size_t i = 0; i < moved_count; ++i) agree += errors[moved[i]] < 1.0 ? 1 : 0;
     needed = samplesNeeded(agree, moved_count, 2, settings_.confidence, settings_.max_iterations);
   }
   return finish(tracks_, gates, settings_, prior, best, rotation, result);
