@@ -30,7 +30,7 @@ struct Scalar {
   struct Float32x16 {
     float lane[16];
   };
-  /// Places in a row of 32 bytes.
+  /// Places in two rows of 16 bytes, one for each half of the lanes.
   struct Places {
     std::int16_t lane[16];
   };
@@ -153,12 +153,11 @@ struct Scalar {
     for (int i = 0; i < 16; ++i) p.lane[i] = v.lane[i];
     return p;
   }
-  /// from[place], zero for places outside 0 to 31. Reads 32 bytes.
-  static Int16x16 pick(const std::uint8_t* from, const Places& place) {
+  /// low[place] for the first eight lanes, high[place] for the others; places are 0 to 15, lanes with others
+  /// hold anything. Reads 16 bytes of each.
+  static Int16x16 pick(const std::uint8_t* low, const std::uint8_t* high, const Places& place) {
     Int16x16 v;
-    for (int i = 0; i < 16; ++i) {
-      v.lane[i] = place.lane[i] >= 0 && place.lane[i] < 32 ? from[place.lane[i]] : std::int16_t{0};
-    }
+    for (int i = 0; i < 16; ++i) v.lane[i] = (i < 8 ? low : high)[place.lane[i] & 15];
     return v;
   }
 
@@ -230,10 +229,7 @@ struct Native {
     __m256 low;
     __m256 high;
   };
-  struct Places {
-    __m128i low;   ///< in the first half of the row; top bit set where not there
-    __m128i high;  ///< likewise in the second
-  };
+  using Places = __m256i;  ///< of the low bytes; a high byte's top bit makes it zero
 
   static Int32x8 zero() { return _mm256_setzero_si256(); }
   static Int16x16 load(const std::int16_t* from) {
@@ -284,15 +280,11 @@ struct Native {
   static void storeBytes(std::uint8_t* to, Int16x16 v) {
     _mm_storeu_si128(reinterpret_cast<__m128i*>(to), bytes(v));
   }
-  static Places places(Int16x16 v) {
-    const __m128i place = bytes(v);
-    // A shuffle gives zero where the top bit is set: from 16 on, and below 16.
-    return {_mm_adds_epu8(place, _mm_set1_epi8(0x70)), _mm_sub_epi8(place, _mm_set1_epi8(16))};
-  }
-  static Int16x16 pick(const std::uint8_t* from, const Places& place) {
-    const __m128i* const row = reinterpret_cast<const __m128i*>(from);
-    return _mm256_cvtepu8_epi16(_mm_or_si128(_mm_shuffle_epi8(_mm_loadu_si128(row), place.low),
-                                             _mm_shuffle_epi8(_mm_loadu_si128(row + 1), place.high)));
+  static Places places(Int16x16 v) { return _mm256_or_si256(v, _mm256_set1_epi16(-0x8000)); }
+  static Int16x16 pick(const std::uint8_t* low, const std::uint8_t* high, Places place) {
+    const __m128i first = _mm_loadu_si128(reinterpret_cast<const __m128i*>(low));
+    const __m128i second = _mm_loadu_si128(reinterpret_cast<const __m128i*>(high));
+    return _mm256_shuffle_epi8(_mm256_set_m128i(second, first), place);
   }
 
   static Float32x16 zeroFloats() { return {_mm256_setzero_ps(), _mm256_setzero_ps()}; }
@@ -426,11 +418,10 @@ struct Native {
   }
   static void storeBytes(std::uint8_t* to, const Int16x16& v) { vst1q_u8(to, places(v)); }
   static Places places(const Int16x16& v) { return vcombine_u8(vqmovun_s16(v.low), vqmovun_s16(v.high)); }
-  static Int16x16 pick(const std::uint8_t* from, const Places& place) {
-    const uint8x16x2_t row = {{vld1q_u8(from), vld1q_u8(from + 16)}};
-    const uint8x16_t bytes = vqtbl2q_u8(row, place);
-    return {vreinterpretq_s16_u16(vmovl_u8(vget_low_u8(bytes))),
-            vreinterpretq_s16_u16(vmovl_u8(vget_high_u8(bytes)))};
+  static Int16x16 pick(const std::uint8_t* low, const std::uint8_t* high, const Places& place) {
+    const uint8x8_t first = vqtbl1_u8(vld1q_u8(low), vget_low_u8(place));
+    const uint8x8_t second = vqtbl1_u8(vld1q_u8(high), vget_high_u8(place));
+    return {vreinterpretq_s16_u16(vmovl_u8(first)), vreinterpretq_s16_u16(vmovl_u8(second))};
   }
 
   static Float32x16 zeroFloats() { return broadcastFloat(0); }

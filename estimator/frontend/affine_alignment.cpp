@@ -21,98 +21,112 @@ constexpr float kMinDeterminant = 0.1F;
 constexpr float kMaxDeterminant = 10.0F;
 // Steps below this [px] end the iterations.
 constexpr float kStop = 0.01F;
-// Greys are taken from the middle of their range, where floats are finest.
-constexpr float kMiddle = 128.0F;
+// Greys are taken from the middle of their range, so that sums are small.
+constexpr std::int16_t kMiddle = 128;
 
 // A disc: pixels in the corners of the square are the first to leave the surface that carries the
 // feature. On rendered flights the full square gives young tracks 5 % less error and old ones (80
 // frames) a third more outliers.
 const PatchWindow kWindow = makePatchWindow([](float x, float y) { return std::sqrt(x * x + y * y); });
 
-struct Gradients {
-  alignas(32) float value[kRows * kLanes];  ///< less kMiddle
-  alignas(32) float x[kRows * kLanes];      ///< weighted
-  alignas(32) float y[kRows * kLanes];      ///< weighted
+// Weights are in 1/8, greys less 128 too: all sums over the window then stay below 2^31 and are exact.
+constexpr int kWeightUnits = 8;
+constexpr int kGreyUnits = 8;
+
+constexpr std::size_t kLaneCount = static_cast<std::size_t>(kRows) * kLanes;
+using Plane = std::array<std::int16_t, kLaneCount>;
+
+const struct alignas(32) IntegerWindow {
+  IntegerWindow() {
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      weight[i] = static_cast<std::int16_t>(std::lround(kWindow[i] * kWeightUnits));
+    }
+    for (std::size_t c = 0; c < kPatchSize; ++c) {
+      column[c] = static_cast<std::int16_t>(static_cast<int>(c) - kPatchRadius);
+    }
+  }
+  Plane weight{};
+  std::array<std::int16_t, kLanes> column{};
+} kIntegerWindow;
+
+/// Of the template, weighted.
+struct alignas(32) Pattern {
+  Plane value;  ///< grey less kMiddle
+  Plane x, y;   ///< doubled gradients
 };
 
 template <typename Isa>
-void readTemplate(const ImageView& patch, int cx, int cy, Gradients& g) {
-  const auto middle = Isa::broadcast(static_cast<std::int16_t>(kMiddle));
-  const auto half = Isa::broadcastFloat(0.5F);
+void readTemplate(const ImageView& patch, int cx, int cy, Pattern& pattern) {
+  const auto middle = Isa::broadcast(kMiddle);
   for (int r = 0; r < kRows; ++r) {
     const std::uint8_t* row = patch.row(cy - kPatchRadius + r) + (cx - kPatchRadius);
     // Whole vectors: the columns beyond the window have weight zero.
     const int at = r * kLanes;
-    const auto w = Isa::multiply(half, Isa::loadFloats(kWindow.data() + at));
+    const auto w = Isa::load(kIntegerWindow.weight.data() + at);
     const auto x = Isa::subtract(Isa::widen(row + 1), Isa::widen(row - 1));
     const auto y = Isa::subtract(Isa::widen(row + patch.stride), Isa::widen(row - patch.stride));
-    Isa::storeFloats(g.value + at, Isa::toFloats(Isa::subtract(Isa::widen(row), middle)));
-    Isa::storeFloats(g.x + at, Isa::multiply(w, Isa::toFloats(x)));
-    Isa::storeFloats(g.y + at, Isa::multiply(w, Isa::toFloats(y)));
+    Isa::store(pattern.value.data() + at, Isa::multiply(w, Isa::subtract(Isa::widen(row), middle)));
+    Isa::store(pattern.x.data() + at, Isa::multiply(w, x));
+    Isa::store(pattern.y.data() + at, Isa::multiply(w, y));
   }
 }
 
-const std::array<float, kLanes> kColumn = [] {
-  std::array<float, kLanes> column{};
-  for (std::size_t c = 0; c < kPatchSize; ++c)
-    column[c] = static_cast<float>(static_cast<int>(c) - kPatchRadius);
-  return column;
-}();
-
-// `row`: function of the row's index to the image's sixteen values there.
-template <typename Isa, typename Rows>
-AffineTemplate::Sums sumWindow(const Gradients& g, const Rows& row) {
-  auto one = Isa::zeroFloats(), square = Isa::zeroFloats(), value = Isa::zeroFloats();
-  auto x0 = Isa::zeroFloats(), y0 = Isa::zeroFloats(), x1 = Isa::zeroFloats(), y1 = Isa::zeroFloats();
+// `image`: the window of the image, in kGreyUnits.
+template <typename Isa>
+AffineTemplate::Sums sumWindow(const Pattern& pattern, const Plane& image) {
+  auto one = Isa::zero(), square = Isa::zero(), value = Isa::zero();
+  auto x = Isa::zero(), xx = Isa::zero(), xy = Isa::zero();
+  auto y = Isa::zero(), yx = Isa::zero(), yy = Isa::zero();
+  const auto column = Isa::load(kIntegerWindow.column.data());
   for (int r = 0; r < kRows; ++r) {
     const int at = r * kLanes;
-    const auto s = row(r);
-    const auto w = Isa::loadFloats(kWindow.data() + at);
-    const auto ws = Isa::multiply(w, s);
+    const auto s = Isa::load(image.data() + at);
+    const auto w = Isa::load(kIntegerWindow.weight.data() + at);
+    const auto gx = Isa::load(pattern.x.data() + at);
+    const auto gy = Isa::load(pattern.y.data() + at);
+    const auto s_column = Isa::multiply(s, column);
+    const auto s_row = Isa::multiply(s, Isa::broadcast(static_cast<std::int16_t>(r - kPatchRadius)));
     one = Isa::multiplyAdd(one, w, s);
-    square = Isa::multiplyAdd(square, ws, s);
-    value = Isa::multiplyAdd(value, ws, Isa::loadFloats(g.value + at));
-    const auto gx = Isa::loadFloats(g.x + at);
-    const auto gy = Isa::loadFloats(g.y + at);
-    const auto rs = Isa::multiply(Isa::broadcastFloat(static_cast<float>(r - kPatchRadius)), s);
-    x0 = Isa::multiplyAdd(x0, gx, s);
-    y0 = Isa::multiplyAdd(y0, gy, s);
-    x1 = Isa::multiplyAdd(x1, gx, rs);
-    y1 = Isa::multiplyAdd(y1, gy, rs);
+    square = Isa::multiplyAdd(square, Isa::multiply(w, s), s);
+    value = Isa::multiplyAdd(value, Isa::load(pattern.value.data() + at), s);
+    x = Isa::multiplyAdd(x, gx, s);
+    y = Isa::multiplyAdd(y, gy, s);
+    xx = Isa::multiplyAdd(xx, gx, s_column);
+    xy = Isa::multiplyAdd(xy, gx, s_row);
+    yx = Isa::multiplyAdd(yx, gy, s_column);
+    yy = Isa::multiplyAdd(yy, gy, s_row);
   }
-  // Fused with zero: a plain product might or might not be fused with the sum over lanes.
-  const auto column = Isa::loadFloats(kColumn.data());
-  const auto column_x = Isa::multiplyAdd(Isa::zeroFloats(), column, x0);
-  const auto column_y = Isa::multiplyAdd(Isa::zeroFloats(), column, y0);
+  constexpr float kUnit = 1.0F / (kWeightUnits * kGreyUnits);
+  const auto total = [](const auto& sum, float unit) { return unit * static_cast<float>(Isa::total(sum)); };
   AffineTemplate::Sums sums;
-  sums.one = Isa::total(one);
-  sums.square = Isa::total(square);
-  sums.value = Isa::total(value);
-  sums.moment << Isa::total(x0), Isa::total(y0), Isa::total(column_x), Isa::total(x1), Isa::total(column_y),
-      Isa::total(y1);
+  sums.one = total(one, kUnit);
+  sums.square = total(square, kUnit / kGreyUnits);
+  sums.value = total(value, kUnit);
+  constexpr float kHalf = 0.5F * kUnit;  // gradients are doubled
+  sums.moment << total(x, kHalf), total(y, kHalf), total(xx, kHalf), total(xy, kHalf), total(yx, kHalf),
+      total(yy, kHalf);
   return sums;
 }
 
 }  // namespace
 
 bool AffineTemplate::build(const ImageView& patch, int cx, int cy) {
-  const float* window = kWindow.data();
-  Gradients g;
-  readTemplate<simd::Native>(patch, cx, cy, g);
+  Pattern pattern;
+  readTemplate<simd::Native>(patch, cx, cy, pattern);
   // Parameters: t_x, t_y, then dA row by row; the last two are gain and offset.
   Eigen::Matrix<float, 8, 8> H = Eigen::Matrix<float, 8, 8>::Zero();
   for (int r = 0; r < kRows; ++r) {
     for (int c = 0; c < kPatchSize; ++c) {
-      const int i = r * kLanes + c;
-      const float w = window[i];
-      if (w <= 0) continue;
+      const auto i = static_cast<std::size_t>(r * kLanes + c);
+      const auto weight = static_cast<float>(kIntegerWindow.weight[i]);
+      if (weight <= 0) continue;
       const auto x = static_cast<float>(c - kPatchRadius);
       const auto y = static_cast<float>(r - kPatchRadius);
       Eigen::Matrix<float, 8, 1> j;
-      const float gx = g.x[i] / w;
-      const float gy = g.y[i] / w;
-      j << gx, gy, gx * x, gx * y, gy * x, gy * y, g.value[i], 1.0F;
-      H.noalias() += w * j * j.transpose();
+      const float gx = static_cast<float>(pattern.x[i]) / (2 * weight);
+      const float gy = static_cast<float>(pattern.y[i]) / (2 * weight);
+      j << gx, gy, gx * x, gx * y, gy * x, gy * y, static_cast<float>(pattern.value[i]) / weight, 1.0F;
+      H.noalias() += (weight / kWeightUnits) * j * j.transpose();
     }
   }
   const float determinant = H(6, 6) * H(7, 7) - H(6, 7) * H(7, 6);
@@ -124,8 +138,17 @@ bool AffineTemplate::build(const ImageView& patch, int cx, int cy) {
   for (int k = 2; k < 6; ++k) reduced(k, k) += kAffinePrior;
   const Eigen::LLT<Eigen::Matrix<float, 6, 6>> factor(reduced);
   if (factor.info() != Eigen::Success) return false;
-  own_ = sumWindow<simd::Native>(g, [&g](int r) { return simd::Native::loadFloats(g.value + r * kLanes); });
-  constant_ = sumWindow<simd::Native>(g, [](int) { return simd::Native::broadcastFloat(1); });
+  Plane plane;
+  for (int r = 0; r < kRows; ++r) {
+    const std::uint8_t* row = patch.row(cy - kPatchRadius + r) + (cx - kPatchRadius);
+    for (int c = 0; c < kLanes; ++c) {
+      plane[static_cast<std::size_t>(r * kLanes + c)] =
+          static_cast<std::int16_t>((row[c] - kMiddle) * kGreyUnits);
+    }
+  }
+  own_ = sumWindow<simd::Native>(pattern, plane);
+  plane.fill(kGreyUnits);
+  constant_ = sumWindow<simd::Native>(pattern, plane);
   inverse_hessian_ = factor.solve(Eigen::Matrix<float, 6, 6>::Identity());
   return inverse_hessian_.allFinite();
 }
@@ -169,17 +192,20 @@ bool windowInside(const ImageView& image, const AffineTemplate::Estimate& e) {
 template <typename Isa>
 bool AffineTemplate::align(const ImageView& patch, int cx, int cy, const ImageView& image, int iterations,
                            Estimate& estimate) const {
-  Gradients g;
-  readTemplate<Isa>(patch, cx, cy, g);
-  const auto to_grey = Isa::broadcastFloat(1.0F / AffineSampler<Isa>::kUnitsPerGrey);
-  const auto middle = Isa::broadcast(static_cast<std::int16_t>(kMiddle * AffineSampler<Isa>::kUnitsPerGrey));
+  Pattern pattern;
+  readTemplate<Isa>(patch, cx, cy, pattern);
+  constexpr int kUnits = AffineSampler<Isa>::kUnitsPerGrey;
+  const auto middle = Isa::broadcast(kMiddle * kUnits);
+  const auto to_units = Isa::broadcast((1 << 15) * kGreyUnits / kUnits);
   AffineSampler<Isa> sampler;
+  alignas(32) Plane plane;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     if (!windowInside(image, estimate) || !sampler.prepare(estimate.warp, kPatchRadius)) return false;
-    const Sums sums = sumWindow<Isa>(g, [&](int r) {
+    for (int r = 0; r < kRows; ++r) {
       const auto sampled = sampler.sample(image, estimate.position, r - kPatchRadius);
-      return Isa::multiply(Isa::toFloats(Isa::subtract(sampled, middle)), to_grey);
-    });
+      Isa::store(plane.data() + r * kLanes, Isa::multiplyFraction(Isa::subtract(sampled, middle), to_units));
+    }
+    const Sums sums = sumWindow<Isa>(pattern, plane);
     const Light light = fitLight(sums, own_, constant_);
     estimate.correlation = light.correlation;
     if (!(light.gain > 0.1F)) return false;

@@ -5,8 +5,8 @@
 // Model: I(W(x)) = a T(x) + b, W(x) = A x + t, weighted least squares over the window of
 // patch_template.hpp, inverse compositional: W <- W o dW^-1 (Baker, Matthews, IJCV 2004; affine
 // templates: Shi, Tomasi, CVPR 1994). Gain and offset are solved exactly in each iteration; the
-// Hessian, with both eliminated and a prior on the affine part, is inverted once per template. One
-// iteration costs about 0.2 us.
+// Hessian, with both eliminated and a prior on the affine part, is inverted once per template. The window's
+// sums are exact, in integers. One iteration costs about 0.2 us.
 
 #include <Eigen/Core>
 
@@ -27,8 +27,9 @@ class AffineTemplate {
     Eigen::Matrix2f warp;      ///< offsets in the template to offsets in the image
     float correlation = 0;     ///< weighted, after the last but one step
   };
-  /// Refines `estimate`. False when it leaves the image, degenerates, or when the window's rows become
-  /// longer than 29 px. `patch` and (x, y) as given to build(). Rows of `image` are read 32 px wide.
+  /// Refines `estimate`. False when it leaves the image, degenerates, or when neighbours in a row of the
+  /// window come more than 1.85 px apart. `patch` and (x, y) as given to build(). Rows of `image` are read 32
+  /// px wide.
   template <typename Isa = simd::Native>
   [[nodiscard]] bool align(const ImageView& patch, int x, int y, const ImageView& image, int iterations,
                            Estimate& estimate) const;

@@ -15,7 +15,7 @@ class WarpedPatch {
   /// Samples `source` at centre + inverse_warp * d for every offset d of a template with its
   /// gradient border; bilinear, rounded to 8 bits. `inverse_warp` takes offsets in the other view
   /// to offsets in the source. `border` pixels around the source may be read, too. False when a
-  /// sample would lie outside, and for maps that stretch a row beyond twice its length. Rows of `source`
+  /// sample would lie outside, and for maps that stretch a row beyond 1.85 times its length. Rows of `source`
   /// are read 32 px wide. About 0.25 us.
   template <typename Isa = simd::Native>
   [[nodiscard]] bool sample(const ImageView& source, const Eigen::Vector2f& centre,

@@ -12,6 +12,7 @@ namespace {
 // Weights of neighbours, in 1/128: a byte times them fits 15 bits with its rounding.
 constexpr int kWeightBits = 7;
 constexpr int kLanes = 16;
+constexpr int kHalf = kLanes / 2;
 constexpr int kOne = 1 << kWeightBits;
 
 struct Neighbour {
@@ -48,7 +49,7 @@ PlacePyramid::PlacePyramid(int width, int height, int octaves)
     // Whole blocks: what lies beyond the last column repeats it.
     for (int x = 0; x < (level.width + kLanes - 1) / kLanes * kLanes; ++x) {
       const Neighbour n = source(std::min(x, level.width - 1), level.width, from_width);
-      if (x % kLanes == 0) level.first.push_back(n.first);
+      if (x % kHalf == 0) level.first.push_back(n.first);
       level.left.push_back(static_cast<std::int16_t>(n.first - level.first.back()));
       level.weight.push_back(static_cast<std::int16_t>(n.weight));
     }
@@ -86,13 +87,13 @@ void PlacePyramid::shrink(const Level& from, Level& to) {
       Isa::storeBytes(row_.data() + x, Isa::template shiftRight<kWeightBits>(Isa::add(sum, half)));
     }
     std::uint8_t* out = to.pixels.data() + static_cast<std::ptrdiff_t>(y) * to.stride;
-    for (std::size_t block = 0; block < to.first.size(); ++block) {
-      const std::size_t x = block * kLanes;
-      const std::uint8_t* source_row = row_.data() + to.first[block];
+    for (std::size_t x = 0; x < to.left.size(); x += kLanes) {
+      const std::uint8_t* low = row_.data() + to.first[x / kHalf];
+      const std::uint8_t* high = row_.data() + to.first[x / kHalf + 1];
       const auto left = Isa::load(to.left.data() + x);
       const auto weight = Isa::load(to.weight.data() + x);
-      const auto a = Isa::pick(source_row, Isa::places(left));
-      const auto b = Isa::pick(source_row, Isa::places(Isa::add(left, one)));
+      const auto a = Isa::pick(low, high, Isa::places(left));
+      const auto b = Isa::pick(low, high, Isa::places(Isa::add(left, one)));
       const auto sum = Isa::add(Isa::multiply(a, Isa::subtract(whole, weight)), Isa::multiply(b, weight));
       Isa::storeBytes(out + x, Isa::template shiftRight<kWeightBits>(Isa::add(sum, half)));
     }

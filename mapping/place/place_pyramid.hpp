@@ -39,7 +39,7 @@ class PlacePyramid {
     int stride = 0;
     Eigen::Array2f ratio = Eigen::Array2f::Ones();  ///< pixels of the image per pixel, along x and y
     std::vector<std::uint8_t> pixels;
-    /// Where sixteen columns in a row come from in the level before: the first, and from there their left
+    /// Where eight columns in a row come from in the level before: the first, and from there their left
     /// neighbours and the weights of their right ones.
     std::vector<std::int32_t> first;
     std::vector<std::int16_t> left, weight;
