@@ -187,6 +187,26 @@ bool windowInside(const ImageView& image, const AffineTemplate::Estimate& e) {
          e.position.y() + half.y() < static_cast<float>(image.height - 1);
 }
 
+// The image under the window, in kGreyUnits. False where its rows become too long.
+template <typename Isa>
+bool sampleWindow(const ImageView& image, const AffineTemplate::Estimate& e, Plane& plane) {
+  if (!UprightSampler<Isa>().sample(image, e.position, e.warp, kPatchRadius, plane.data())) {
+    AffineSampler<Isa> sampler;
+    if (!sampler.prepare(e.warp, kPatchRadius)) return false;
+    for (int r = 0; r < kRows; ++r) {
+      Isa::store(plane.data() + r * kLanes, sampler.sample(image, e.position, r - kPatchRadius));
+    }
+  }
+  constexpr int kUnits = SamplerParts<Isa>::kUnitsPerGrey;
+  const auto middle = Isa::broadcast(kMiddle * kUnits);
+  const auto to_units = Isa::broadcast((1 << 15) * kGreyUnits / kUnits);
+  for (int r = 0; r < kRows; ++r) {
+    std::int16_t* const row = plane.data() + r * kLanes;
+    Isa::store(row, Isa::multiplyFraction(Isa::subtract(Isa::load(row), middle), to_units));
+  }
+  return true;
+}
+
 }  // namespace
 
 template <typename Isa>
@@ -194,17 +214,9 @@ bool AffineTemplate::align(const ImageView& patch, int cx, int cy, const ImageVi
                            Estimate& estimate) const {
   Pattern pattern;
   readTemplate<Isa>(patch, cx, cy, pattern);
-  constexpr int kUnits = AffineSampler<Isa>::kUnitsPerGrey;
-  const auto middle = Isa::broadcast(kMiddle * kUnits);
-  const auto to_units = Isa::broadcast((1 << 15) * kGreyUnits / kUnits);
-  AffineSampler<Isa> sampler;
   alignas(32) Plane plane;
   for (int iteration = 0; iteration < iterations; ++iteration) {
-    if (!windowInside(image, estimate) || !sampler.prepare(estimate.warp, kPatchRadius)) return false;
-    for (int r = 0; r < kRows; ++r) {
-      const auto sampled = sampler.sample(image, estimate.position, r - kPatchRadius);
-      Isa::store(plane.data() + r * kLanes, Isa::multiplyFraction(Isa::subtract(sampled, middle), to_units));
-    }
+    if (!windowInside(image, estimate) || !sampleWindow<Isa>(image, estimate, plane)) return false;
     const Sums sums = sumWindow<Isa>(pattern, plane);
     const Light light = fitLight(sums, own_, constant_);
     estimate.correlation = light.correlation;

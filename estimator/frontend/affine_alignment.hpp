@@ -6,7 +6,7 @@
 // patch_template.hpp, inverse compositional: W <- W o dW^-1 (Baker, Matthews, IJCV 2004; affine
 // templates: Shi, Tomasi, CVPR 1994). Gain and offset are solved exactly in each iteration; the
 // Hessian, with both eliminated and a prior on the affine part, is inverted once per template. The window's
-// sums are exact, in integers. One iteration costs about 0.2 us.
+// sums are exact, in integers. One iteration costs about 0.16 us, 0.2 us where the patch is turned.
 
 #include <Eigen/Core>
 
@@ -29,7 +29,7 @@ class AffineTemplate {
   };
   /// Refines `estimate`. False when it leaves the image, degenerates, or when neighbours in a row of the
   /// window come more than 1.85 px apart. `patch` and (x, y) as given to build(). Rows of `image` are read 32
-  /// px wide.
+  /// px wide and up to 3 px beyond the window: it needs the border of a Pyramid level.
   template <typename Isa = simd::Native>
   [[nodiscard]] bool align(const ImageView& patch, int x, int y, const ImageView& image, int iterations,
                            Estimate& estimate) const;
