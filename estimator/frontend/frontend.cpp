@@ -75,6 +75,7 @@ void Frontend::Impl::takeImages(const StereoFrame& frame, const FrontendPredicti
     if (prediction.has_rotation) {
       const Eigen::Quaterniond& q = rig_.T_body_cam[c].rotation;
       camera.R_prev_cur = camera.R_prev_cur * (q.conjugate() * prediction.R_body_prev_body_cur * q);
+      camera.R_cur_prev = camera.R_prev_cur.conjugate().toRotationMatrix();
     }
     camera.present = frame.has(c);
     if (camera.has_history && frame.stamp - camera.last > kMaxHold) {

@@ -54,6 +54,7 @@ class Frontend::Impl {
     Stamp last;                ///< stamp of its newest image
     bool rotation_known = false;
     Eigen::Quaterniond R_prev_cur = Eigen::Quaterniond::Identity();  ///< camera axes, since `last`
+    Eigen::Matrix3d R_cur_prev = Eigen::Matrix3d::Identity();        ///< its inverse
 
     [[nodiscard]] const Pyramid& now() const { return pyramid[newest]; }
     [[nodiscard]] const Pyramid& before() const { return pyramid[1 - newest]; }

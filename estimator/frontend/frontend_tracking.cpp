@@ -38,8 +38,7 @@ Frontend::Impl::Guess Frontend::Impl::predict(const Track& track, std::size_t c,
   }
   const Camera& camera = camera_[c];
   Eigen::Vector2d projected;
-  if (!camera.rotation_known ||
-      !rig_.camera[c].project(camera.R_prev_cur.conjugate() * track.bearing[c], projected)) {
+  if (!camera.rotation_known || !rig_.camera[c].project(camera.R_cur_prev * track.bearing[c], projected)) {
     return {track.pixel[c], settings_.pyramid_levels, false};
   }
   return {projected.cast<float>(), kLevelsWithRotation, false};
@@ -129,20 +128,16 @@ void Frontend::Impl::trackCamera(std::size_t c, const FrontendPrediction& predic
 
 Eigen::Matrix2f Frontend::Impl::turn(std::size_t c, const Eigen::Vector3d& from_bearing) const {
   const Camera& camera = camera_[c];
-  Eigen::Matrix2f turn = Eigen::Matrix2f::Identity();
-  if (!camera.rotation_known) return turn;
-  // d pixel_cur / d pixel_prev = J_cur R J_prev^+ with J = d pixel / d bearing.
-  const Eigen::Matrix3d R = camera.R_prev_cur.conjugate().toRotationMatrix();
+  if (!camera.rotation_known) return Eigen::Matrix2f::Identity();
   Eigen::Vector2d pixel;
   Matrix23d before;
   Matrix23d after;
   const CameraModel& model = rig_.camera[c];
-  if (!model.project(from_bearing, pixel, &before) || !model.project(R * from_bearing, pixel, &after)) {
-    return turn;
+  if (!model.project(from_bearing, pixel, &before) ||
+      !model.project(camera.R_cur_prev * from_bearing, pixel, &after)) {
+    return Eigen::Matrix2f::Identity();
   }
-  const Eigen::Matrix2d square = before * before.transpose();
-  turn = (after * R * before.transpose() * square.inverse()).cast<float>();
-  return turn;
+  return pixelWarp(before, camera.R_cur_prev, after);
 }
 
 void Frontend::Impl::verifyMotion(std::size_t c, std::uint64_t seed) {

@@ -25,37 +25,37 @@ constexpr float kRivalMargin = 0.1F;
 constexpr float kAmbiguity = 0.04F;
 // Matches this far beyond infinity are noise of distant points [px of disparity].
 constexpr double kBeyondInfinity = 0.7;
-// Step of the numeric warp [px]: half a patch.
-constexpr float kWarpStep = 6.0F;
 
 }  // namespace
 
+StereoMatcher::StereoMatcher(const Rig& rig, const StereoMatcherSettings& settings)
+    : rig_(rig), settings_(settings) {
+  const SE3 T_1_0 = rig.T_cam1_cam0();
+  const SE3 T_0_1 = T_1_0.inverse();
+  rotation_ = {T_1_0.rotation.toRotationMatrix(), T_0_1.rotation.toRotationMatrix()};
+  translation_ = {T_1_0.translation, T_0_1.translation};
+}
+
 double StereoMatcher::epipolarDistance(const Eigen::Vector3d& bearing0,
                                        const Eigen::Vector3d& bearing1) const {
-  const SE3 T_1_0 = rig_.T_cam1_cam0();
-  const Eigen::Vector3d normal = (T_1_0.rotation * bearing0).cross(T_1_0.translation);
+  const Eigen::Vector3d normal = (rotation_[0] * bearing0).cross(translation_[0]);
   const double norm = normal.norm();
   // On the baseline itself every direction is in plane.
   if (!(norm > 1e-9)) return 0;
   return std::abs(bearing1.dot(normal)) / norm * rig_.camera[1].focal();
 }
 
-bool StereoMatcher::warpAt(std::size_t from, const Eigen::Vector2f& from_pixel, double inverse_distance,
+bool StereoMatcher::warpAt(std::size_t from, const Eigen::Vector3d& bearing, double inverse_distance,
                            Eigen::Matrix2f& warp) const {
-  const SE3 T = toOther(from);
-  const CameraModel& source = rig_.camera[from];
-  const CameraModel& target = rig_.camera[1 - from];
-  for (int axis = 0; axis < 2; ++axis) {
-    std::array<Eigen::Vector2d, 2> end;
-    for (std::size_t side = 0; side < 2; ++side) {
-      Eigen::Vector2d pixel = from_pixel.cast<double>();
-      pixel[axis] += side == 0 ? -kWarpStep : kWarpStep;
-      Eigen::Vector3d bearing;
-      if (!source.unproject(pixel, bearing)) return false;
-      if (!target.project(T.rotation * bearing + inverse_distance * T.translation, end[side])) return false;
-    }
-    warp.col(axis) = ((end[1] - end[0]) / (2.0 * kWarpStep)).cast<float>();
+  Eigen::Vector2d pixel;
+  Matrix23d before;
+  Matrix23d after;
+  const Eigen::Vector3d point = rotation_[from] * bearing + inverse_distance * translation_[from];
+  if (!rig_.camera[from].project(bearing, pixel, &before) ||
+      !rig_.camera[1 - from].project(point, pixel, &after)) {
+    return false;
   }
+  warp = pixelWarp(before, rotation_[from], after);
   return true;
 }
 
@@ -65,8 +65,8 @@ StereoMatcher::Candidates StereoMatcher::search(const Pyramid& from_image, std::
                                                 const Pyramid& to_image) const {
   Candidates found;
   const CameraModel& target = rig_.camera[1 - from];
-  const SE3 T = toOther(from);
-  const Eigen::Vector3d rotated = T.rotation * bearing;
+  const Eigen::Vector3d rotated = rotation_[from] * bearing;
+  const Eigen::Vector3d& translation = translation_[from];
   const double nearest = 1.0 / settings_.min_depth;
   const int level = std::min(kSearchLevel, to_image.levels() - 1);
   const auto scale = static_cast<float>(1 << level);
@@ -75,7 +75,7 @@ StereoMatcher::Candidates StereoMatcher::search(const Pyramid& from_image, std::
   WarpedPatch patch;
   SearchPatch pattern;
   // The warp of a middling distance serves the search: between 0.5 m and infinity it changes little.
-  if (!warpAt(from, from_pixel, 0.1 * nearest, warp) || !(std::abs(warp.determinant()) > 0.05F)) return found;
+  if (!warpAt(from, bearing, 0.1 * nearest, warp) || !(std::abs(warp.determinant()) > 0.05F)) return found;
   if (!patch.sample(from_image.level(level), from_pixel / scale, warp.inverse(), kPyramidBorder / 2))
     return found;
   if (!pattern.build(patch.centre(), patch.stride())) return found;
@@ -84,7 +84,7 @@ StereoMatcher::Candidates StereoMatcher::search(const Pyramid& from_image, std::
   Eigen::Vector2d far_end;
   Eigen::Vector2d near_end;
   int samples = kMaxSamples;
-  if (target.project(rotated, far_end) && target.project(rotated + nearest * T.translation, near_end)) {
+  if (target.project(rotated, far_end) && target.project(rotated + nearest * translation, near_end)) {
     samples = std::clamp(static_cast<int>((near_end - far_end).norm() / scale) + 2, 2, kMaxSamples);
   }
   std::array<Candidate, kMaxSamples> sample;
@@ -94,7 +94,7 @@ StereoMatcher::Candidates StereoMatcher::search(const Pyramid& from_image, std::
     Candidate& c = sample[static_cast<std::size_t>(i)];
     c.inverse_distance = nearest * i / (samples - 1);
     Eigen::Vector2d pixel;
-    if (!target.project(rotated + c.inverse_distance * T.translation, pixel)) continue;
+    if (!target.project(rotated + c.inverse_distance * translation, pixel)) continue;
     c.pixel = pixel.cast<float>();
     if (!patchInside(to_image.level(0), c.pixel)) continue;
     c.correlation = pattern.correlation(image, static_cast<int>(std::lround(c.pixel.x() / scale)),
@@ -114,7 +114,7 @@ bool StereoMatcher::refine(const Pyramid& from_image, std::size_t from, const Ei
                            const Eigen::Vector3d& bearing, const Pyramid& to_image,
                            Candidate& candidate) const {
   Eigen::Matrix2f warp;
-  if (!warpAt(from, from_pixel, candidate.inverse_distance, warp)) return false;
+  if (!warpAt(from, bearing, candidate.inverse_distance, warp)) return false;
   const AlignmentLimits limits;
   const int levels = std::min(kSearchLevel + 1, to_image.levels());
   if (!alignWarped(from_image, from_pixel, warp, to_image, levels, limits, candidate.pixel,
@@ -128,9 +128,9 @@ bool StereoMatcher::refine(const Pyramid& from_image, std::size_t from, const Ei
   const double distance = from == 0 ? epipolarDistance(bearing, other) : epipolarDistance(other, bearing);
   if (distance > settings_.epipolar_gate) return false;
   // Disparity towards the epipole direction: the component of the match beyond infinity.
-  const SE3 T = toOther(from);
-  const Eigen::Vector3d at_infinity = T.rotation * bearing;
-  const Eigen::Vector3d along = T.translation - at_infinity * at_infinity.dot(T.translation);
+  const Eigen::Vector3d at_infinity = rotation_[from] * bearing;
+  const Eigen::Vector3d& translation = translation_[from];
+  const Eigen::Vector3d along = translation - at_infinity * at_infinity.dot(translation);
   const double norm = along.norm();
   if (norm > 1e-9) {
     const double disparity = (other - at_infinity).dot(along) / norm * rig_.camera[1 - from].focal();

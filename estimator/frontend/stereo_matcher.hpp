@@ -11,6 +11,7 @@
 // Cost per feature on 752 x 480, 11 cm baseline: about 5 us. No memory beyond the object.
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
 
 #include "estimator/camera/rig.hpp"
@@ -27,7 +28,7 @@ struct StereoMatcherSettings {
 
 class StereoMatcher {
  public:
-  StereoMatcher(const Rig& rig, const StereoMatcherSettings& settings) : rig_(rig), settings_(settings) {}
+  StereoMatcher(const Rig& rig, const StereoMatcherSettings& settings);
 
   /// Pixel in camera `from` to pixel in the other camera. False when there is no safe match.
   [[nodiscard]] bool match(const Pyramid& from_image, std::size_t from, const Eigen::Vector2f& from_pixel,
@@ -54,15 +55,14 @@ class StereoMatcher {
                             const Eigen::Vector3d& bearing, const Pyramid& to_image,
                             Candidate& candidate) const;
   /// Offsets in camera `from` to offsets in the other, for a patch facing the ray at that distance.
-  [[nodiscard]] bool warpAt(std::size_t from, const Eigen::Vector2f& from_pixel, double inverse_distance,
+  [[nodiscard]] bool warpAt(std::size_t from, const Eigen::Vector3d& bearing, double inverse_distance,
                             Eigen::Matrix2f& warp) const;
-  [[nodiscard]] SE3 toOther(std::size_t from) const {
-    const SE3 T_1_0 = rig_.T_cam1_cam0();
-    return from == 0 ? T_1_0 : T_1_0.inverse();
-  }
 
   Rig rig_;
   StereoMatcherSettings settings_;
+  /// From each camera to the other.
+  std::array<Eigen::Matrix3d, 2> rotation_;
+  std::array<Eigen::Vector3d, 2> translation_;
 };
 
 }  // namespace swiftlet

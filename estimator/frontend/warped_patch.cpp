@@ -37,6 +37,12 @@ template bool WarpedPatch::sample<simd::Scalar>(const ImageView&, const Eigen::V
                                                 const Eigen::Matrix2f&, int);
 #endif
 
+Eigen::Matrix2f pixelWarp(const Matrix23d& before, const Eigen::Matrix3d& R, const Matrix23d& after) {
+  // J_after R J_before^+
+  const Eigen::Matrix2d square = before * before.transpose();
+  return (after * R * before.transpose() * square.inverse()).cast<float>();
+}
+
 bool alignWarped(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Eigen::Matrix2f& warp,
                  const Pyramid& to, int levels, const AlignmentLimits& limits, Eigen::Vector2f& to_pixel,
                  float* correlation) {

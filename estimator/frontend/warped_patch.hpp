@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 
+#include "estimator/camera/camera_model.hpp"
 #include "estimator/core/image_view.hpp"
 #include "estimator/frontend/patch_template.hpp"
 #include "estimator/frontend/pyramid.hpp"
@@ -30,6 +31,11 @@ class WarpedPatch {
   static constexpr int kStride = 32;  ///< 16-lane loads run past the last column
   alignas(32) std::uint8_t pixels_[(kSide + 1) * kStride]{};
 };
+
+/// Offsets in an image to offsets in another that sees the same points in a frame turned by `R`: `before` and
+/// `after` are the projections' Jacobians there, of the points at the same distance in both.
+[[nodiscard]] Eigen::Matrix2f pixelWarp(const Matrix23d& before, const Eigen::Matrix3d& R,
+                                        const Matrix23d& after);
 
 /// Aligns the patch around `from_pixel` of `from`, warped by `warp` (offsets in `from` to offsets in
 /// `to`), at levels - 1 down to 0 of `to`. `to_pixel` holds the guess and receives the answer,
