@@ -8,13 +8,13 @@ namespace {
 // The patch, its gradient pixel and the interpolation's neighbour.
 constexpr float kBorder = static_cast<float>(kPatchRadius) + 2.0F;
 
+// `finish`: of level 0.
 bool trackForward(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Pyramid& to, int levels,
-                  const AlignmentLimits& limits, Eigen::Vector2f& to_pixel) {
+                  const AlignmentLimits& limits, PatchTemplate::Finish finish, Eigen::Vector2f& to_pixel) {
   PatchTemplate patch;
   for (int level = std::min(levels, from.levels()) - 1; level >= 0; --level) {
     const ImageView& image = from.level(level);
     const auto scale = static_cast<float>(1 << level);
-    const auto finish = level == 0 ? PatchTemplate::Finish::kFine : PatchTemplate::Finish::kCoarse;
     const Eigen::Vector2f centre = from_pixel / scale;
     const auto x = static_cast<int>(std::lround(centre.x()));
     const auto y = static_cast<int>(std::lround(centre.y()));
@@ -24,7 +24,8 @@ bool trackForward(const Pyramid& from, const Eigen::Vector2f& from_pixel, const 
       continue;
     }
     Eigen::Vector2f position = to_pixel / scale - offset;
-    if (!patch.align(to.level(level), limits, finish, position)) {
+    if (!patch.align(to.level(level), limits, level == 0 ? finish : PatchTemplate::Finish::kCoarse,
+                     position)) {
       if (level == 0) return false;
       continue;
     }
@@ -44,7 +45,10 @@ bool patchInside(const ImageView& image, const Eigen::Vector2f& pixel) {
 bool trackPoint(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Pyramid& to,
                 const LucasKanadeSettings& settings, Eigen::Vector2f& to_pixel) {
   if (!patchInside(from.level(0), from_pixel)) return false;
-  if (!trackForward(from, from_pixel, to, settings.levels, settings.limits, to_pixel)) return false;
+  if (!trackForward(from, from_pixel, to, settings.levels, settings.limits, PatchTemplate::Finish::kFine,
+                    to_pixel)) {
+    return false;
+  }
   if (!patchInside(to.level(0), to_pixel)) return false;
   return settings.back_check <= 0 || tracksBack(from, from_pixel, to, settings, to_pixel);
 }
@@ -52,7 +56,11 @@ bool trackPoint(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Py
 bool tracksBack(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Pyramid& to,
                 const LucasKanadeSettings& settings, const Eigen::Vector2f& to_pixel) {
   Eigen::Vector2f back = from_pixel;
-  if (!trackForward(to, to_pixel, from, settings.back_levels, settings.limits, back)) return false;
+  // What the finish adds is far below what is allowed.
+  if (!trackForward(to, to_pixel, from, settings.back_levels, settings.limits, PatchTemplate::Finish::kCoarse,
+                    back)) {
+    return false;
+  }
   return (back - from_pixel).squaredNorm() <= settings.back_check * settings.back_check;
 }
 

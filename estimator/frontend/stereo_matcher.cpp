@@ -117,8 +117,8 @@ bool StereoMatcher::refine(const Pyramid& from_image, std::size_t from, const Ei
   if (!warpAt(from, bearing, candidate.inverse_distance, warp)) return false;
   const AlignmentLimits limits;
   const int levels = std::min(kSearchLevel + 1, to_image.levels());
-  if (!alignWarped(from_image, from_pixel, warp, to_image, levels, limits, candidate.pixel,
-                   &candidate.correlation)) {
+  if (!alignWarped(from_image, from_pixel, warp, to_image, levels, limits, PatchTemplate::Finish::kFine,
+                   candidate.pixel, &candidate.correlation)) {
     return false;
   }
   if (candidate.correlation < settings_.min_correlation) return false;
@@ -138,7 +138,8 @@ bool StereoMatcher::refine(const Pyramid& from_image, std::size_t from, const Ei
   }
   if (settings_.back_check <= 0) return true;
   Eigen::Vector2f back = from_pixel;
-  if (!alignWarped(to_image, candidate.pixel, warp.inverse(), from_image, levels, limits, back, nullptr)) {
+  if (!alignWarped(to_image, candidate.pixel, warp.inverse(), from_image, levels, limits,
+                   PatchTemplate::Finish::kCoarse, back, nullptr)) {
     return false;
   }
   return (back - from_pixel).squaredNorm() < settings_.back_check * settings_.back_check;

@@ -44,8 +44,8 @@ Eigen::Matrix2f pixelWarp(const Matrix23d& before, const Eigen::Matrix3d& R, con
 }
 
 bool alignWarped(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Eigen::Matrix2f& warp,
-                 const Pyramid& to, int levels, const AlignmentLimits& limits, Eigen::Vector2f& to_pixel,
-                 float* correlation) {
+                 const Pyramid& to, int levels, const AlignmentLimits& limits, PatchTemplate::Finish finish,
+                 Eigen::Vector2f& to_pixel, float* correlation) {
   const float determinant = warp.determinant();
   if (!(std::abs(determinant) > 0.05F)) return false;
   const Eigen::Matrix2f inverse = warp.inverse();
@@ -55,11 +55,11 @@ bool alignWarped(const Pyramid& from, const Eigen::Vector2f& from_pixel, const E
   constexpr int kBorder = kPyramidBorder / 2;
   for (int level = levels - 1; level >= 0; --level) {
     const auto scale = static_cast<float>(1 << level);
-    const auto finish = level == 0 ? PatchTemplate::Finish::kFine : PatchTemplate::Finish::kCoarse;
     const bool built = patch.sample(from.level(level), from_pixel / scale, inverse, kBorder) &&
                        pattern.build(patch.centre(), patch.stride());
     Eigen::Vector2f position = to_pixel / scale;
-    const bool found = built && pattern.align(to.level(level), limits, finish, position);
+    const bool found = built && pattern.align(to.level(level), limits,
+                                              level == 0 ? finish : PatchTemplate::Finish::kCoarse, position);
     if (found) to_pixel = position * scale;
     if (!found && level == 0) return false;
   }

@@ -38,10 +38,11 @@ class WarpedPatch {
                                         const Matrix23d& after);
 
 /// Aligns the patch around `from_pixel` of `from`, warped by `warp` (offsets in `from` to offsets in
-/// `to`), at levels - 1 down to 0 of `to`. `to_pixel` holds the guess and receives the answer,
-/// `correlation` (may be null) the final one at level 0. False when lost.
+/// `to`), at levels - 1 down to 0 of `to`, `finish` being that of level 0. `to_pixel` holds the guess and
+/// receives the answer, `correlation` (may be null) the final one at level 0. False when lost.
 [[nodiscard]] bool alignWarped(const Pyramid& from, const Eigen::Vector2f& from_pixel,
                                const Eigen::Matrix2f& warp, const Pyramid& to, int levels,
-                               const AlignmentLimits& limits, Eigen::Vector2f& to_pixel, float* correlation);
+                               const AlignmentLimits& limits, PatchTemplate::Finish finish,
+                               Eigen::Vector2f& to_pixel, float* correlation);
 
 }  // namespace swiftlet
