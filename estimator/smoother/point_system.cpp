@@ -41,6 +41,11 @@ struct Sums {
     sums.weigh(residuals, counts, weight);
     for (std::size_t row = 0; row < 2; ++row) sums.add(weight, J.point[row], residuals.r[row]);
   }
+  void addCost(const lanes::ViewGroup& group, const LandmarkPoint& point) {
+    const lanes::Residuals residuals(group, point);
+    lanes::V weight;
+    sums.weigh(residuals, group.used & residuals.in_front, weight);
+  }
 };
 
 }  // namespace
@@ -73,6 +78,13 @@ PointSystem PointViews::linearize(const LandmarkPoint& point, const PointBasis& 
   for (std::size_t k = 0; k < count_; ++k) sums.add(groups_[k], point, basis);
   inGroups(poses_, rest_, [&](const lanes::ViewPointers& p) { sums.add(lanes::ViewGroup(p), point, basis); });
   return {sums.sums.H(), sums.sums.g(), sums.sums.cost(), sums.views, sums.in_front};
+}
+
+double PointViews::cost(const LandmarkPoint& point) const {
+  Sums sums;
+  for (std::size_t k = 0; k < count_; ++k) sums.addCost(groups_[k], point);
+  inGroups(poses_, rest_, [&](const lanes::ViewPointers& p) { sums.addCost(lanes::ViewGroup(p), point); });
+  return sums.sums.cost();
 }
 
 }  // namespace swiftlet

@@ -30,6 +30,8 @@ class PointViews {
 
   /// Residuals and Jacobians at `point`, whose basis is `basis`.
   [[nodiscard]] PointSystem linearize(const LandmarkPoint& point, const PointBasis& basis) const;
+  /// The cost alone.
+  [[nodiscard]] double cost(const LandmarkPoint& point) const;
 
  private:
   static constexpr std::size_t kCapacity = kMaxStates * kMaxCameras / lanes::kLanes;

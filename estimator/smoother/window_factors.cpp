@@ -6,6 +6,7 @@
 
 #include "estimator/geometry/so3.hpp"
 #include "estimator/imu/rest_detector.hpp"
+#include "estimator/smoother/point_system.hpp"
 
 namespace swiftlet {
 namespace {
@@ -13,8 +14,27 @@ namespace {
 constexpr double kRestPositionSigma = 3e-4;    // m, between two frames at rest: 6 mm/s at 20 Hz
 constexpr double kRestRotationSigma = 3.5e-4;  // rad, likewise
 
+// False where nothing ties the state to the one before it.
+bool motionFactor(const WindowProblem& problem, std::size_t position, MotionFactor& factor) {
+  const WindowState& i = problem.window[position - 1];
+  const WindowState& j = problem.window[position];
+  if (!i.has_motion || !j.has_motion || j.link == LinkKind::kNone) return false;
+  return j.link == LinkKind::kImu
+             ? imuFactor(j.imu, problem.noise, i.x, j.x, i.linearization(), j.linearization(), factor)
+             : constantVelocityFactor(j.link_duration, problem.noise, i.x, j.x, i.linearization(),
+                                      j.linearization(), factor);
+}
+
 // Rest is soft: the velocity is near zero, and two frames at rest are at nearly the same pose. It
 // lives and leaves with the motion factor between the two states, so that the prior inherits it.
+Eigen::Matrix<double, kPoseDim, 1> restResidual(const WindowState& i, const WindowState& j) {
+  Eigen::Matrix<double, kPoseDim, 1> residual;
+  residual.head<3>() =
+      logSo3(i.x.T_world_body.rotation.conjugate() * j.x.T_world_body.rotation) / kRestRotationSigma;
+  residual.tail<3>() = (j.x.T_world_body.translation - i.x.T_world_body.translation) / kRestPositionSigma;
+  return residual;
+}
+
 void addRest(const WindowState& i, const WindowState& j, NormalEquations& system) {
   if (!j.at_rest) return;
   system.addDiagonal(j, 6, j.x.v_world_body, kRestVelocitySigma);
@@ -23,15 +43,31 @@ void addRest(const WindowState& i, const WindowState& j, NormalEquations& system
   factor.residual.setZero();
   factor.jacobian_i.setZero();
   factor.jacobian_j.setZero();
-  factor.residual.segment<3>(0) =
-      logSo3(i.x.T_world_body.rotation.conjugate() * j.x.T_world_body.rotation) / kRestRotationSigma;
-  factor.residual.segment<3>(3) =
-      (j.x.T_world_body.translation - i.x.T_world_body.translation) / kRestPositionSigma;
+  factor.residual.head<kPoseDim>() = restResidual(i, j);
   factor.jacobian_i.block<3, 3>(0, 0) = -Eigen::Matrix3d::Identity() / kRestRotationSigma;
   factor.jacobian_j.block<3, 3>(0, 0) = Eigen::Matrix3d::Identity() / kRestRotationSigma;
   factor.jacobian_i.block<3, 3>(3, 3) = -Eigen::Matrix3d::Identity() / kRestPositionSigma;
   factor.jacobian_j.block<3, 3>(3, 3) = Eigen::Matrix3d::Identity() / kRestPositionSigma;
   system.addMotion(factor, i, j);
+}
+
+// Of the states that the prior knows, from its reference. Memory: `work`.
+VectorMap priorDeviation(WindowProblem& problem, std::vector<double>& work) {
+  const Prior& prior = problem.prior;
+  VectorMap deviation(work.data(), prior.dimension());
+  for (const PriorBlock& block : prior.blocks()) {
+    if (block.slot == PriorBlock::kCalibration) {
+      deviation.segment(block.offset, block.dimension) =
+          problem.calibration.deviation().head(block.dimension);
+    } else if (block.isExtra()) {
+      deviation.segment<kExtraDim>(block.offset) =
+          problem.extras.states()[block.slot - kMaxStates].deviation();
+    } else {
+      deviation.segment(block.offset, block.dimension) =
+          problem.window.inSlot(block.slot).x.minus(block.reference).head(block.dimension);
+    }
+  }
+  return deviation;
 }
 
 void addSightings(const WindowProblem& problem, const ExtraState& extra, std::span<const Sighting> sightings,
@@ -55,19 +91,7 @@ double addPrior(WindowProblem& problem, NormalEquations& system, std::vector<dou
   MatrixMap H = system.H();
   VectorMap g = system.g();
   MatrixMap prior_H = prior.H();
-  Eigen::Map<Eigen::VectorXd> deviation(work.data(), prior.dimension());
-  for (const PriorBlock& block : prior.blocks()) {
-    if (block.slot == PriorBlock::kCalibration) {
-      deviation.segment(block.offset, block.dimension) =
-          problem.calibration.deviation().head(block.dimension);
-    } else if (block.isExtra()) {
-      deviation.segment<kExtraDim>(block.offset) =
-          problem.extras.states()[block.slot - kMaxStates].deviation();
-    } else {
-      deviation.segment(block.offset, block.dimension) =
-          problem.window.inSlot(block.slot).x.minus(block.reference).head(block.dimension);
-    }
-  }
+  const VectorMap deviation = priorDeviation(problem, work);
   for (const PriorBlock& row : prior.blocks()) {
     const int at = problem.offsetOf(row.slot);
     for (const PriorBlock& column : prior.blocks()) {
@@ -88,17 +112,10 @@ double addPrior(WindowProblem& problem, NormalEquations& system, std::vector<dou
 }
 
 double addMotion(const WindowProblem& problem, std::size_t position, NormalEquations& system) {
-  if (position == 0) return -1;
+  MotionFactor factor;
+  if (position == 0 || !motionFactor(problem, position, factor)) return -1;
   const WindowState& i = problem.window[position - 1];
   const WindowState& j = problem.window[position];
-  if (!i.has_motion || !j.has_motion || j.link == LinkKind::kNone) return -1;
-  MotionFactor factor;
-  const bool valid =
-      j.link == LinkKind::kImu
-          ? imuFactor(j.imu, problem.noise, i.x, j.x, i.linearization(), j.linearization(), factor)
-          : constantVelocityFactor(j.link_duration, problem.noise, i.x, j.x, i.linearization(),
-                                   j.linearization(), factor);
-  if (!valid) return -1;
   system.addMotion(factor, i, j);
   addRest(i, j, system);
   return std::sqrt(factor.residual.head<9>().squaredNorm() / 9.0);
@@ -144,6 +161,36 @@ void addDepartingExtras(const WindowProblem& problem, const std::uint8_t* slot, 
   for (const ExtraFactor& factor : problem.extras.factors()) {
     if (problem.extras.departs(factor) && problem.extras.counts(factor)) addFactor(problem, factor, system);
   }
+}
+
+WindowCost costOf(WindowProblem& problem, std::vector<double>& work) {
+  WindowCost cost;
+  if (!problem.prior.empty()) {
+    const VectorMap d = priorDeviation(problem, work);
+    cost.prior = problem.prior.b().dot(d) + 0.5 * d.dot(problem.prior.H().lazyProduct(d));
+  }
+  for (std::size_t k = 1; k < problem.window.size(); ++k) {
+    MotionFactor factor;
+    if (!motionFactor(problem, k, factor)) continue;
+    const WindowState& i = problem.window[k - 1];
+    const WindowState& j = problem.window[k];
+    double squares = factor.residual.squaredNorm();
+    if (j.at_rest) squares += (j.x.v_world_body / kRestVelocitySigma).squaredNorm();
+    if (j.at_rest && i.at_rest) squares += restResidual(i, j).squaredNorm();
+    cost.factors += 0.5 * squares;
+  }
+  for (const Landmark& landmark : problem.landmarks) {
+    // The point of an explicit one follows its state.
+    if (landmark.in_system)
+      cost.factors += PointViews(problem.rig_poses, landmark.views()).cost(landmark.point);
+  }
+  LinearFactor linear;
+  for (const ExtraFactor& factor : problem.extras.factors()) {
+    if (!problem.extras.counts(factor)) continue;
+    problem.extras.linearize(factor, linear);
+    cost.factors += linear.cost;
+  }
+  return cost;
 }
 
 }  // namespace swiftlet

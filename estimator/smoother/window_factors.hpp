@@ -28,4 +28,12 @@ void finishExtras(WindowProblem& problem, NormalEquations& system);
 /// others.
 void addDepartingExtras(const WindowProblem& problem, const std::uint8_t* slot, NormalEquations& system);
 
+/// What the system's cost and the prior's would be at the states and points as they are, cameras placed;
+/// no landmark is linearized. `work` as above. Cost: below that of building the system.
+struct WindowCost {
+  double factors = 0;
+  double prior = 0;  ///< without its constant
+};
+[[nodiscard]] WindowCost costOf(WindowProblem& problem, std::vector<double>& work);
+
 }  // namespace swiftlet

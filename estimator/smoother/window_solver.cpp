@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/smoother/window_factors.hpp"
-
 namespace swiftlet {
 namespace {
 
@@ -40,6 +38,12 @@ double largestPoseStep(const VectorMap& step, const Window& window) {
     largest = std::max({largest, step.segment<3>(at).norm(), step.segment<3>(at + 3).norm()});
   }
   return largest;
+}
+
+// The prior's cost has an offset of its own: only differences of the sum mean anything.
+bool rises(const WindowCost& before, const WindowCost& after) {
+  const double change = after.factors + after.prior - (before.factors + before.prior);
+  return change > kCostIncreaseAllowed * after.factors;
 }
 
 // A failed fit; true when it was the last that is allowed.
@@ -87,7 +91,7 @@ void WindowSolver::triangulateAll(WindowProblem& problem, int iterations) const 
 void WindowSolver::build(WindowProblem& problem, NormalEquations& system, bool first,
                          FrameStatistics& statistics) {
   system.begin(problem.calibration.layout(), problem.dimension);
-  prior_cost_ = addPrior(problem, system, step_);
+  cost_.prior = addPrior(problem, system, step_);
   for (std::size_t k = 1; k < problem.window.size(); ++k) {
     const double residual = addMotion(problem, k, system);
     if (k + 1 == problem.window.size() && residual >= 0) statistics.imu_residual = residual;
@@ -102,6 +106,7 @@ void WindowSolver::build(WindowProblem& problem, NormalEquations& system, bool f
   addExtras(problem, system);
   system.finish(problem.window.slots());
   finishExtras(problem, system);
+  cost_.factors = system.cost();
 }
 
 // The points' part of the step that was solved for.
@@ -116,6 +121,12 @@ void WindowSolver::substitutePoints(WindowProblem& problem, const VectorMap& ste
   }
 }
 
+void WindowSolver::takeBack(WindowProblem& problem) const {
+  problem.restore();
+  problem.placeCameras();
+  triangulateAll(problem, kTriangulationRestart);
+}
+
 Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, WindowCovariance& covariance,
                            int iterations, double pose_tolerance, FrameStatistics& statistics) {
   problem.assignOffsets();
@@ -123,22 +134,20 @@ Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, Wind
   reintegrate(problem);
   const int calibration = problem.calibration.dimension();
   const bool time_offset = problem.calibration.layout().time_offset;
-  double cost = 0;
+  bool unchecked = false;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     problem.moveEstimates();
     problem.placeCameras();
     if (iteration == 0) triangulateAll(problem, 0);
     if (iteration == 1) rejectNewestSightings(problem, kOutlierSigmas);
+    const WindowCost before = cost_;
     build(problem, system, iteration == 0, statistics);
-    // The prior's cost has an offset of its own: only differences of the sum mean anything.
-    const double total = system.cost() + prior_cost_;
-    if (iteration > 1 && total > cost + kCostIncreaseAllowed * system.cost()) {
-      problem.restore();
-      problem.placeCameras();
-      triangulateAll(problem, kTriangulationRestart);
+    // Not the first step: the sightings are others since.
+    if (iteration > 1 && rises(before, cost_)) {
+      takeBack(problem);
+      unchecked = false;
       break;
     }
-    cost = total;
     MatrixMap H = system.H();
     for (int k = 0; k < problem.dimension; ++k) H(k, k) *= 1.0 + kRelativeDamping;
     if (!choleskyInPlace(H)) {
@@ -154,12 +163,12 @@ Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, Wind
     substitutePoints(problem, step);
     problem.retract(step);
     statistics.iterations = iteration + 1;
-    if (largestStep(step, time_offset, calibration, problem.extras.columns()) < kConverged ||
-        largestPoseStep(step, problem.window) < pose_tolerance) {
-      break;
-    }
+    unchecked = largestStep(step, time_offset, calibration, problem.extras.columns()) >= kConverged &&
+                largestPoseStep(step, problem.window) >= pose_tolerance;
+    if (!unchecked) break;
   }
   problem.placeCameras();
+  if (unchecked && rises(cost_, costOf(problem, step_))) takeBack(problem);
   rejectNewestSightings(problem, kFinalOutlierSigmas);
   rejectLandmarks(problem, kFinalOutlierSigmas);
   return okStatus();

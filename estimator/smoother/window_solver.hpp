@@ -1,14 +1,16 @@
 #pragma once
 // Gauss-Newton over the window: all factors linearized, landmarks eliminated, one step, until it is small.
 //
-// Points move with the step (back-substitution); sightings and landmarks that do not fit are left out by
-// named limits. Nothing is allocated after the constructor. Memory: 2 MiB. Cost: docs/smoother.md.
+// Points move with the step (back-substitution); a step that raises the cost is taken back; sightings and
+// landmarks that do not fit are left out by named limits. Nothing is allocated after the constructor. Memory:
+// 2 MiB. Cost: docs/smoother.md.
 
 #include <vector>
 
 #include "estimator/core/status.hpp"
 #include "estimator/smoother/normal_equations.hpp"
 #include "estimator/smoother/window_covariance.hpp"
+#include "estimator/smoother/window_factors.hpp"
 #include "estimator/smoother/window_problem.hpp"
 
 namespace swiftlet {
@@ -28,10 +30,11 @@ class WindowSolver {
   /// `first` of a solve: points get their sigmas, with the states where the last solve left them.
   void build(WindowProblem& problem, NormalEquations& system, bool first, FrameStatistics& statistics);
   void substitutePoints(WindowProblem& problem, const VectorMap& step) const;
+  void takeBack(WindowProblem& problem) const;
 
   std::vector<EliminatedPoint> eliminated_;  // by landmark
   std::vector<double> step_;
-  double prior_cost_ = 0;  // without its constant
+  WindowCost cost_;  // where the system was last built
 };
 
 /// Takes out sightings of the newest state that are further than `sigmas` off; a landmark that loses them
