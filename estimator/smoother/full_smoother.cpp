@@ -98,6 +98,21 @@ Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& stat
   return okStatus();
 }
 
+void FullSmoother::setCalibration(const CalibrationEstimate& calibration) {
+  const bool later = calibration.camera_to_imu_shift > rig_.camera_to_imu_shift;
+  rig_.camera_to_imu_shift = calibration.camera_to_imu_shift;
+  rig_.T_body_cam = calibration.T_body_cam;
+  // A keyframe's samples end at its stamp as it was: what lies behind came with the next keyframe.
+  for (std::size_t k = 1; later && k + 1 < keyframes_.size(); ++k) {
+    std::vector<ImuSample>& samples = keyframes_[k].samples;
+    const Stamp end = keyframes_[k].stamp + rig_.camera_to_imu_shift + Duration::fromSeconds(kKeptAhead);
+    for (const ImuSample& sample : keyframes_[k + 1].samples) {
+      const bool behind = !samples.empty() && sample.stamp > samples.back().stamp;
+      if (behind && sample.stamp < end) samples.push_back(sample);
+    }
+  }
+}
+
 void FullSmoother::addSighting(const TrackKey& key, const Sighting& sighting) {
   Track& track = tracks_[key];
   if (track.sightings.size() < kMostSightings) {

@@ -5,8 +5,8 @@
 // Keyframes are kept as they come from the odometry (its causal states are the initial values);
 // `solve` then minimizes over the fixed-lag smoother's factors (but rest): preintegrated IMU between
 // neighbours, landmarks eliminated by their Schur complement, Cauchy weights, outliers removed. The
-// calibration is the given one. The reduced system (15 columns a keyframe) is sparse and factored by
-// CHOLMOD, or by Eigen in a build without it.
+// calibration is the given one, or an estimate that was made before (setCalibration). The reduced system
+// (15 columns a keyframe) is sparse and factored by CHOLMOD, or by Eigen in a build without it.
 // Revisits: each match of a loop is a further sighting of the old landmark, from the new keyframe, with the
 // noise of a match. The loops' relative poses pull the keyframes together first and are then dropped (they
 // were made of the same matches). Matches that do not fit are not used, and tried again twice; a loop with
@@ -31,6 +31,7 @@
 #include "estimator/camera/rig.hpp"
 #include "estimator/core/status.hpp"
 #include "estimator/imu/imu_noise.hpp"
+#include "estimator/messages/calibration_estimate.hpp"
 #include "estimator/messages/loop_revisit.hpp"
 #include "estimator/messages/nav_state.hpp"
 #include "estimator/messages/tracked_frame.hpp"
@@ -85,6 +86,10 @@ class FullSmoother {
   /// pose graph. Epochs that loops tie are taken to share a world already. Velocities turn with their poses.
   /// kInvalidInput when the number is not size() or a pose is not finite.
   Status setPoses(std::span<const SE3> T_world_body);
+
+  /// The calibration to solve with in place of the constructor's: the odometry's last estimate. After the
+  /// keyframes. The shift may differ from the constructor's by less than 0.1 s.
+  void setCalibration(const CalibrationEstimate& calibration);
 
   /// Minimizes over everything added so far. kNotReady below three keyframes; kNumerical when the
   /// system cannot be factored (the states stay as they were). `stop` may be set by any thread meanwhile:

@@ -85,7 +85,10 @@ void RunObserver::noteFrame(const FrameResult& result) {
   noteEffort("smooth", result, result.step.effort, smooth_effort_);
   any_frame_ = true;
   const bool kept = tracked.keyframe && output.has_state && tracked.timeline == timeline_;
-  if (keeper_ && kept) keeper_->addKeyframe(tracked, output.state);
+  if (keeper_ && kept) {
+    keeper_->addCalibration(output.calibration);
+    keeper_->addKeyframe(tracked, output.state);
+  }
   listener_.onFrame(tracked, output);
 }
 

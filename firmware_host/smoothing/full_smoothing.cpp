@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <optional>
 
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/smoothing/keyframe_reader.hpp"
@@ -22,9 +23,10 @@ bool stopped(const FullSmoothingOptions& options) {
   return options.stop != nullptr && options.stop->load(std::memory_order_relaxed);
 }
 
-/// Takes everything in; stops early where that is asked for.
+/// Takes everything in, the last estimate of the calibration last; stops early where that is asked for.
 void fill(KeyframeReader& reader, const FullSmoothingOptions& options, FullSmoother& smoother,
           FullSmoothing& result) {
+  std::optional<CalibrationEstimate> calibration;
   while (!stopped(options)) {
     switch (reader.next()) {
       case KeyframeReader::Next::kSample:
@@ -36,7 +38,11 @@ void fill(KeyframeReader& reader, const FullSmoothingOptions& options, FullSmoot
       case KeyframeReader::Next::kRevisit:
         add(smoother.addRevisit(reader.revisit()), result.faults);
         break;
+      case KeyframeReader::Next::kCalibration:
+        calibration = reader.calibration();
+        break;
       case KeyframeReader::Next::kEnd:
+        if (calibration) smoother.setCalibration(*calibration);
         result.cut = reader.cut();
         return;
     }

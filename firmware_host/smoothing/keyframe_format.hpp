@@ -22,9 +22,10 @@ inline constexpr std::size_t kMostHead = std::size_t{64} * 1024;
 inline constexpr std::size_t kRecordBytes = 12;
 inline constexpr std::size_t kCrcBytes = 4;
 
-enum class Kind : std::uint16_t { kImu = 1, kKeyframe = 2, kRevisit = 3, kEnd = 4 };
+enum class Kind : std::uint16_t { kImu = 1, kKeyframe = 2, kRevisit = 3, kEnd = 4, kCalibration = 5 };
 
 inline constexpr std::size_t kImuBytes = 56;
+inline constexpr std::size_t kCalibrationBytes = 8 + kMaxCameras * 56;
 inline constexpr std::size_t kStateBytes = 144;  ///< of a keyframe, before its features
 inline constexpr std::size_t kFeatureBytes = 28;
 inline constexpr std::size_t kRevisitHeadBytes = 364;  ///< before its matches

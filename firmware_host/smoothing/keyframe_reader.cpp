@@ -22,6 +22,8 @@ constexpr double kLargestSigma = 100;  // px; the setting allows 10
 constexpr std::int64_t kMostStamp = std::int64_t{1} << 61U;  // ns, 73 years
 constexpr Duration kMostShift = Duration::fromSeconds(10);
 
+bool sane(Duration shift) { return shift <= kMostShift && shift >= -kMostShift; }
+
 bool sane(Stamp stamp) { return stamp.ns > -kMostStamp && stamp.ns < kMostStamp; }
 
 Eigen::Vector3d getVector(LittleEndianReader& from) {
@@ -88,8 +90,7 @@ KeyframeReader::KeyframeReader(std::string name, std::istream& in)
   const char* wrong = decodeRecordingHeader({bytes_.data() + begin, covered - begin}, calibration);
   if (wrong == nullptr && !(pixel_sigma_ > 0 && pixel_sigma_ < kLargestSigma)) wrong = "pixel noise";
   if (wrong == nullptr && calibration.rig.camera_count == 0) wrong = "number of cameras";
-  const std::int64_t shift = calibration.rig.camera_to_imu_shift.ns;
-  if (wrong == nullptr && (shift > kMostShift.ns || shift < -kMostShift.ns)) wrong = "clock shift";
+  if (wrong == nullptr && !sane(calibration.rig.camera_to_imu_shift)) wrong = "clock shift";
   const ImuNoise& noise = calibration.noise;
   if (wrong == nullptr && !(noise.gyro_density > 0 && noise.accel_density > 0 && noise.gyro_walk > 0 &&
                             noise.accel_walk > 0 && noise.rate_hz > 0)) {
@@ -139,6 +140,10 @@ KeyframeReader::Next KeyframeReader::next() {
     case Kind::kRevisit:
       good = decodeRevisit();
       next = Next::kRevisit;
+      break;
+    case Kind::kCalibration:
+      good = decodeCalibration();
+      next = Next::kCalibration;
       break;
     case Kind::kEnd:
       good = payload_ == 0;
@@ -204,6 +209,15 @@ bool KeyframeReader::decodeRevisit() {
     }
   }
   return good && from.good() && revisit_.information.allFinite();
+}
+
+bool KeyframeReader::decodeCalibration() {
+  if (payload_ != kCalibrationBytes) return false;
+  LittleEndianReader from({bytes_.data() + kRecordBytes, payload_});
+  calibration_.camera_to_imu_shift.ns = from.i64();
+  bool good = sane(calibration_.camera_to_imu_shift);
+  for (SE3& T : calibration_.T_body_cam) good = getPose(from, T) && good;
+  return good;
 }
 
 }  // namespace swiftlet

@@ -12,6 +12,7 @@
 
 #include "estimator/camera/rig.hpp"
 #include "estimator/imu/imu_noise.hpp"
+#include "estimator/messages/calibration_estimate.hpp"
 #include "estimator/messages/imu_sample.hpp"
 #include "estimator/messages/loop_revisit.hpp"
 #include "estimator/messages/nav_state.hpp"
@@ -29,13 +30,15 @@ class KeyframeReader {
   [[nodiscard]] const ImuNoise& noise() const { return noise_; }  ///< as in flight
   [[nodiscard]] double pixelSigma() const { return pixel_sigma_; }
 
-  enum class Next { kSample, kKeyframe, kRevisit, kEnd };
+  enum class Next { kSample, kKeyframe, kRevisit, kCalibration, kEnd };
   /// What the next record is; it is then in the accessor of that name until the next call.
   Next next();
   [[nodiscard]] const ImuSample& sample() const { return sample_; }
   [[nodiscard]] const TrackedFrame& frame() const { return frame_; }
   [[nodiscard]] const NavState& state() const { return state_; }  ///< of frame()
   [[nodiscard]] const LoopRevisit& revisit() const { return revisit_; }
+  /// The estimate that was in use from the next keyframe on.
+  [[nodiscard]] const CalibrationEstimate& calibration() const { return calibration_; }
 
   /// After kEnd: in words, where the file was cut off or is damaged; empty: it ends in order.
   [[nodiscard]] const std::string& cut() const { return cut_; }
@@ -46,6 +49,7 @@ class KeyframeReader {
   bool decodeSample();
   bool decodeKeyframe();
   bool decodeRevisit();
+  bool decodeCalibration();
 
   std::string name_;
   std::istream& in_;
@@ -60,6 +64,7 @@ class KeyframeReader {
   TrackedFrame frame_;
   NavState state_;
   LoopRevisit revisit_;
+  CalibrationEstimate calibration_;
   std::string cut_;
   bool ended_ = false;
   bool any_sample_ = false;

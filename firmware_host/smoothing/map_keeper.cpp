@@ -42,6 +42,7 @@ void put(LittleEndianWriter& to, TrackId id, const std::array<bool, kMaxCameras>
 MapKeeper::MapKeeper(const std::string& folder, const Rig& rig, const ImuNoise& noise,
                      const OdometrySettings& settings, LostFiles& lost)
     : path_(folder + "/" + kKeyframeFile),
+      calibration_estimated_(settings.estimate_time_offset || settings.estimate_extrinsics),
       lost_(lost),
       monitor_(noise),
       buffer_(kBufferBytes),
@@ -89,7 +90,7 @@ void MapKeeper::writeRecord(Kind kind, std::size_t payload) {
   const std::size_t size = kRecordBytes + payload;
   const std::uint32_t crc = crc32c(head_crc_, {record_.data() + kCrcBytes, size - kCrcBytes});
   LittleEndianWriter(record_.data()).u32(crc);
-  const bool flush = kind != Kind::kImu;
+  const bool flush = kind != Kind::kImu && kind != Kind::kCalibration;
   check(std::fwrite(record_.data(), 1, size, file_.get()) == size &&
         (!flush || std::fflush(file_.get()) == 0));
 }
@@ -123,6 +124,14 @@ void MapKeeper::addKeyframe(const TrackedFrame& frame, const NavState& state) {
   put(to, state.bias_accel);
   for (const TrackedFeature& feature : frame.features) put(to, feature.id, feature.seen, feature.pixel);
   writeRecord(Kind::kKeyframe, to.written());
+}
+
+void MapKeeper::addCalibration(const CalibrationEstimate& calibration) {
+  if (!file_ || !calibration_estimated_) return;
+  LittleEndianWriter to(record_.data() + kRecordBytes);
+  to.i64(calibration.camera_to_imu_shift.ns);
+  for (const SE3& T : calibration.T_body_cam) put(to, T);
+  writeRecord(Kind::kCalibration, to.written());
 }
 
 void MapKeeper::addRevisit(const LoopRevisit& revisit) {

@@ -16,6 +16,7 @@
 #include "estimator/camera/rig.hpp"
 #include "estimator/imu/imu_noise.hpp"
 #include "estimator/imu/sample_monitor.hpp"
+#include "estimator/messages/calibration_estimate.hpp"
 #include "estimator/messages/loop_revisit.hpp"
 #include "estimator/messages/nav_state.hpp"
 #include "estimator/messages/tracked_frame.hpp"
@@ -38,6 +39,8 @@ class MapKeeper {
   /// The stamps went back for good: what was kept is given up, and the map covers what comes.
   void restart();
   void addKeyframe(const TrackedFrame& frame, const NavState& state);
+  /// Before the keyframe that it was estimated with; without effect unless the settings ask for an estimate.
+  void addCalibration(const CalibrationEstimate& calibration);
   /// After the run: a loop between two of the keyframes.
   void addRevisit(const LoopRevisit& revisit);
   /// Marks the end and brings the file to the disk. Whatever comes later is left out.
@@ -54,6 +57,7 @@ class MapKeeper {
     void operator()(std::FILE* file) const { std::fclose(file); }
   };
   std::string path_;
+  bool calibration_estimated_;
   LostFiles& lost_;
   SampleMonitor monitor_;
   std::vector<char> buffer_;

@@ -70,14 +70,23 @@ LoopRevisit revisit() {
   return loop;
 }
 
-std::string kept(const std::string& folder, bool finished = true) {
+CalibrationEstimate calibrationOf(int k) {
+  CalibrationEstimate calibration;
+  calibration.camera_to_imu_shift.ns = -1234567 + k;
+  calibration.T_body_cam[0] = stateOf(k).T_world_body;
+  calibration.T_body_cam[1].translation = {0.1, 1.0 / 3.0, 1e-3 * k};
+  return calibration;
+}
+
+std::string kept(const std::string& folder, bool finished = true, const OdometrySettings& settings = {}) {
   LostFiles lost;
   ImuNoise noise;
   noise.rate_hz = 200;
   {
-    MapKeeper keeper(folder, twoCameras(), noise, OdometrySettings{}, lost);
+    MapKeeper keeper(folder, twoCameras(), noise, settings, lost);
     for (int k = 0; k < kKeyframes; ++k) {
       for (int i = 0; i < kSamplesEach; ++i) keeper.addImu(sampleAt(kSecond * k + 5'000'000 * (i + 1)));
+      keeper.addCalibration(calibrationOf(k));
       keeper.addKeyframe(frameOf(k), stateOf(k));
     }
     keeper.addRevisit(revisit());
@@ -89,7 +98,7 @@ std::string kept(const std::string& folder, bool finished = true) {
 }
 
 struct Counts {
-  int samples = 0, keyframes = 0, revisits = 0;
+  int samples = 0, keyframes = 0, revisits = 0, calibrations = 0;
   std::string cut;
 };
 
@@ -107,6 +116,9 @@ Counts countsIn(const std::string& bytes) {
         break;
       case KeyframeReader::Next::kRevisit:
         ++counts.revisits;
+        break;
+      case KeyframeReader::Next::kCalibration:
+        ++counts.calibrations;
         break;
       case KeyframeReader::Next::kEnd:
         counts.cut = reader.cut();
@@ -168,6 +180,33 @@ TEST_CASE("keyframes, samples and loops come back bit for bit", "[files]") {
   CHECK(reader.next() == KeyframeReader::Next::kEnd);
   CHECK(reader.cut().empty());
   CHECK(reader.next() == KeyframeReader::Next::kEnd);
+}
+
+TEST_CASE("the calibration's estimate comes back with each keyframe where there is one", "[files]") {
+  const ScratchFolder folder("keyframes");
+  CHECK(countsIn(kept(folder.path())).calibrations == 0);
+  for (const bool time_offset : {true, false}) {
+    OdometrySettings settings;
+    settings.estimate_time_offset = time_offset;
+    settings.estimate_extrinsics = !time_offset;
+    const std::string bytes = kept(folder.path(), true, settings);
+    CHECK(countsIn(bytes).calibrations == kKeyframes);
+    std::istringstream in(bytes);
+    KeyframeReader reader("keyframes.swk", in);
+    for (int k = 0; k < kKeyframes; ++k) {
+      KeyframeReader::Next next = reader.next();
+      while (next == KeyframeReader::Next::kSample) next = reader.next();
+      REQUIRE(next == KeyframeReader::Next::kCalibration);
+      const CalibrationEstimate expected = calibrationOf(k);
+      CHECK(reader.calibration().camera_to_imu_shift == expected.camera_to_imu_shift);
+      for (std::size_t c = 0; c < kMaxCameras; ++c) {
+        CHECK(reader.calibration().T_body_cam[c].rotation.coeffs() ==
+              expected.T_body_cam[c].rotation.coeffs());
+        CHECK(reader.calibration().T_body_cam[c].translation == expected.T_body_cam[c].translation);
+      }
+      REQUIRE(reader.next() == KeyframeReader::Next::kKeyframe);
+    }
+  }
 }
 
 TEST_CASE("cut off anywhere, the file ends at its last sound record", "[files]") {

@@ -49,6 +49,9 @@ void read(const std::string& bytes) {
       } else if (next == KeyframeReader::Next::kKeyframe) {
         demand(reader.state().T_world_body.translation.allFinite());
         (void)smoother.addKeyframe(reader.frame(), reader.state());
+      } else if (next == KeyframeReader::Next::kCalibration) {
+        demand(reader.calibration().T_body_cam[0].translation.allFinite());
+        smoother.setCalibration(reader.calibration());
       } else {
         demand(reader.revisit().information.allFinite());
         (void)smoother.addRevisit(reader.revisit());

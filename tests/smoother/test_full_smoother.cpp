@@ -17,17 +17,24 @@ namespace {
 struct FullRun {
   std::vector<NavState> causal;  // at keyframes
   std::vector<NavState> full;
+  std::vector<NavState> full_given;  // with the given calibration, where it was estimated
   std::vector<BodyState> truth;
   FullSmootherReport report;
   Status status;
 };
 
-FullRun runFull(const TrackFlight& flight) {
+std::vector<NavState> statesOf(const FullSmoother& full) {
+  std::vector<NavState> states;
+  for (std::size_t k = 0; k < full.size(); ++k) states.push_back(full.state(k));
+  return states;
+}
+
+FullRun runFull(const TrackFlight& flight, const SmootherSettings& causal_settings) {
   FullRun run;
   FullSmootherSettings settings;
-  settings.pixel_sigma = flight.flight().settings().tracks.pixel_sigma;
+  settings.pixel_sigma = causal_settings.pixel_sigma;
   FullSmoother full(flight.rig(), flight.noise(), settings);
-  test::SmootherRun causal(flight);
+  test::SmootherRun causal(flight, causal_settings);
   flight.play(
       [&](const ImuSample& sample) {
         causal.addImu(sample);
@@ -48,9 +55,34 @@ FullRun runFull(const TrackFlight& flight) {
         run.causal.push_back(state);
         run.truth.push_back(flight.truth(k));
       });
+  if (causal_settings.estimate_time_offset || causal_settings.estimate_extrinsics) {
+    FullSmoother given = full;
+    REQUIRE(given.solve(run.report).ok());
+    run.full_given = statesOf(given);
+    full.setCalibration({causal.smoother().timeOffset(), causal.smoother().extrinsics()});
+  }
   run.status = full.solve(run.report);
-  for (std::size_t k = 0; k < full.size(); ++k) run.full.push_back(full.state(k));
+  run.full = statesOf(full);
   return run;
+}
+
+FullRun runFull(const TrackFlight& flight) { return runFull(flight, test::settingsFor(flight)); }
+
+// As the flight says whose calibration was given wrongly.
+void checkEstimateUsed(const SimulationSettings& flown, bool time_offset, bool extrinsics) {
+  const TrackFlight flight(flown);
+  SmootherSettings settings = test::settingsFor(flight);
+  settings.estimate_time_offset = time_offset;
+  settings.estimate_extrinsics = extrinsics;
+  const FullRun run = runFull(flight, settings);
+  REQUIRE(run.status.ok());
+  const double causal = test::positionError(run.causal, run.truth);
+  const double given = test::positionError(run.full_given, run.truth);
+  const double full = test::positionError(run.full, run.truth);
+  std::printf("calibration given wrongly: causal %.4f m, full %.4f m, full with what was given %.4f m\n",
+              causal, full, given);
+  CHECK(full < causal * 1.05 + 1e-3);
+  CHECK(full < 0.7 * given);
 }
 
 }  // namespace
@@ -74,6 +106,19 @@ TEST_CASE("Full smoothing is at least as good as the causal estimate", "[smoothe
     full_sum += full;
   }
   CHECK(full_sum < causal_sum);
+}
+
+TEST_CASE("Full smoothing goes on from the estimated calibration", "[smoother][full_smoother]") {
+  SimulationSettings flown = test::roomFlight(20, 5);
+  flown.flight.aggressiveness = 1.5;
+  for (const double sign : {1.0, -1.0}) {
+    SimulationSettings late = flown;
+    late.image_stamp_offset = Duration::fromSeconds(sign * 5e-3);
+    checkEstimateUsed(late, true, false);
+  }
+  SimulationSettings bent = flown;
+  bent.rig_turn_deg = 0.5 * Eigen::Vector3d(1, -1, 1).normalized();
+  checkEstimateUsed(bent, false, true);
 }
 
 TEST_CASE("Full smoothing gives the same bytes twice", "[smoother][full_smoother]") {
