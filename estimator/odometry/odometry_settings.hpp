@@ -1,12 +1,14 @@
 #pragma once
 // The settings a user may need; every other number is a named constant beside its reason.
 
+#include "estimator/messages/track_noise.hpp"
+
 namespace swiftlet {
 
 struct OdometrySettings {
-  int max_features = 300;     ///< features tracked at once, at most kMaxFeatures
-  double horizon = 30.0;      ///< s of fixed lag: no state older than this stays in the window
-  double pixel_sigma = 0.45;  ///< px, noise of one tracked coordinate
+  int max_features = 300;                 ///< features tracked at once, at most kMaxFeatures
+  double horizon = 30.0;                  ///< s of fixed lag: no state older than this stays in the window
+  double pixel_sigma = kTrackPixelSigma;  ///< px, noise of one tracked coordinate
   /// Factors on the calibration's white-noise densities. A calibration is made at rest; in flight
   /// vibration, scale and misalignment come on top. 1 where the figures already hold in flight.
   double gyro_inflation = 1.5;

@@ -34,6 +34,7 @@
 #include "estimator/messages/calibration_estimate.hpp"
 #include "estimator/messages/loop_revisit.hpp"
 #include "estimator/messages/nav_state.hpp"
+#include "estimator/messages/track_noise.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/smoother/landmark.hpp"
 #include "estimator/smoother/relative_pose_factor.hpp"
@@ -46,9 +47,9 @@ namespace swiftlet {
 inline constexpr const char* kFullSmoothingStopped = "full smoothing was stopped";
 
 struct FullSmootherSettings {
-  double pixel_sigma = 0.6;          ///< px
-  double match_sigma = 1.2;          ///< px, of a loop's match, pixel noise included
-  std::size_t max_keyframes = 4000;  ///< 11 minutes at 6 a second
+  double pixel_sigma = kTrackPixelSigma;  ///< px
+  double match_sigma = 1.2;               ///< px, of a loop's match, pixel noise included
+  std::size_t max_keyframes = 4000;       ///< 11 minutes at 6 a second
   std::size_t max_revisits = 4000;
   int max_iterations = 12;
 };

@@ -30,6 +30,7 @@
 #include "estimator/imu/imu_noise.hpp"
 #include "estimator/messages/plane_report.hpp"
 #include "estimator/messages/smoothed_window.hpp"
+#include "estimator/messages/track_noise.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/smoother/marginalization.hpp"
 #include "estimator/smoother/normal_equations.hpp"
@@ -40,13 +41,13 @@
 namespace swiftlet {
 
 struct SmootherSettings {
-  double pixel_sigma = 0.6;           ///< px
-  double horizon = 30.0;              ///< s
-  int max_recent = 4;                 ///< newest frames, keyframe or not, that stay whole
-  int max_motion_keyframes = 5;       ///< keyframes behind them that keep velocity and biases
-  int max_keyframes = 12;             ///< these and the pose-only ones; with max_recent below kMaxStates
-  bool estimate_time_offset = false;  ///< camera to IMU clock
-  bool estimate_extrinsics = false;   ///< T_body_cam of each camera
+  double pixel_sigma = kTrackPixelSigma;  ///< px
+  double horizon = 30.0;                  ///< s
+  int max_recent = 4;                     ///< newest frames, keyframe or not, that stay whole
+  int max_motion_keyframes = 5;           ///< keyframes behind them that keep velocity and biases
+  int max_keyframes = 12;                 ///< these and the pose-only ones; with max_recent below kMaxStates
+  bool estimate_time_offset = false;      ///< camera to IMU clock
+  bool estimate_extrinsics = false;       ///< T_body_cam of each camera
 };
 
 /// A plane of the window.

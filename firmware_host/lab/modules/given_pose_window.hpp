@@ -17,13 +17,14 @@
 #include "estimator/camera/rig.hpp"
 #include "estimator/frontend/frontend_prediction.hpp"
 #include "estimator/messages/smoothed_window.hpp"
+#include "estimator/messages/track_noise.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 
 namespace swiftlet {
 
 struct GivenPoseSettings {
-  double pixel_sigma = 0.45;  ///< px
-  double horizon = 30.0;      ///< s: no state older than this stays
+  double pixel_sigma = kTrackPixelSigma;  ///< px
+  double horizon = 30.0;                  ///< s: no state older than this stays
   int max_recent = 4;
   int max_keyframes = 12;
   /// Sightings in keyframes stay for good, so that a landmark found again is known by all of them. Memory
