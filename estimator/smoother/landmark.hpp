@@ -17,6 +17,7 @@
 #include <cstdint>
 #include <span>
 
+#include "estimator/camera/camera_model.hpp"
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/limits.hpp"
 #include "estimator/messages/tracked_frame.hpp"
@@ -24,13 +25,12 @@
 
 namespace swiftlet {
 
-using Matrix23d = Eigen::Matrix<double, 2, 3>;
-
 /// In single precision, which places a ray to 1e-4 px: half the memory that a solve reads.
 struct CameraSighting {
   bool used = false;
-  Eigen::Vector3f bearing;            ///< m, unit, camera frame
-  Eigen::Matrix<float, 2, 3> weight;  ///< W, 1 / (unit ray): pixels per ray over the pixel noise
+  Eigen::Vector3f bearing = Eigen::Vector3f::Zero();  ///< m, unit, camera frame
+  /// W, 1 / (unit ray): pixels per ray over the pixel noise.
+  Eigen::Matrix<float, 2, 3> weight = Eigen::Matrix<float, 2, 3>::Zero();
 
   static CameraSighting of(const Eigen::Vector3d& ray, const Matrix23d& whitening) {
     return {true, ray.cast<float>(), whitening.cast<float>()};
