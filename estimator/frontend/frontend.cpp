@@ -151,7 +151,7 @@ void Frontend::Impl::replenish(int max_features) {
 void Frontend::Impl::detect(std::size_t c, int wanted, int max_features) {
   occupied_.clear();
   for (const Track& track : tracks_) {
-    if (track.live[c]) static_cast<void>(occupied_.tryPushBack(track.pixel[c]));
+    if (track.live[c]) occupied_.pushBack(track.pixel[c]);
   }
   CornerSettings corner_settings;
   corner_settings.min_distance = settings_.min_distance;
@@ -163,7 +163,7 @@ void Frontend::Impl::detect(std::size_t c, int wanted, int max_features) {
     track.id = next_id_++;
     track.slot = anchors_.acquire(track.id);
     anchors_[track.slot].patch[c].take(camera_[c].now(), corner.pixel);
-    static_cast<void>(tracks_.tryPushBack(track));
+    tracks_.pushBack(track);
     ++statistics_.detected;
   }
 }
@@ -209,7 +209,7 @@ void Frontend::Impl::write(const StereoFrame& frame, bool keyframe, TrackedFrame
     }
     anchors_[track.slot].last_seen = frame.index;
     ++track.age;
-    if (feature.seen[0] || feature.seen[1]) static_cast<void>(out.features.tryPushBack(feature));
+    if (feature.seen[0] || feature.seen[1]) out.features.pushBack(feature);
   }
 }
 

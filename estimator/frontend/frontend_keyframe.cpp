@@ -25,7 +25,7 @@ float Frontend::Impl::medianMotion() {
   for (const Track& track : tracks_) {
     for (std::size_t c = 0; c < rig_.camera_count; ++c) {
       if (!camera_[c].present || !track.live[c] || !track.had_previous[c]) continue;
-      static_cast<void>(values_.tryPushBack((track.pixel[c] - track.previous[c]).norm()));
+      values_.pushBack((track.pixel[c] - track.previous[c]).norm());
     }
   }
   return values_.size() < kMinForMedian ? -1.0F : median(values_);
@@ -42,7 +42,7 @@ float Frontend::Impl::medianParallax() const {
     // Bearing at the keyframe as it would be seen now without translation.
     const Eigen::Vector3d expected = q.conjugate() * (rotation.conjugate() * (q * track.keyframe_bearing[c]));
     const double angle = std::atan2(expected.cross(track.bearing[c]).norm(), expected.dot(track.bearing[c]));
-    static_cast<void>(parallax.tryPushBack(static_cast<float>(angle * rig_.camera[c].focal())));
+    parallax.pushBack(static_cast<float>(angle * rig_.camera[c].focal()));
   }
   return parallax.size() < kMinForMedian ? 0.0F : median(parallax);
 }

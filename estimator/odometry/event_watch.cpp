@@ -6,12 +6,12 @@ namespace swiftlet {
 
 void EventBuffer::raise(Stamp stamp, EventKind kind, double value) {
   if (events_.size() + 1 < events_.capacity()) {
-    static_cast<void>(events_.tryPushBack({stamp, kind, value}));
+    events_.pushBack({stamp, kind, value});
     return;
   }
   ++lost_;
   if (events_.full()) events_.popBack();
-  static_cast<void>(events_.tryPushBack({stamp, EventKind::kCapacityReached, static_cast<double>(lost_)}));
+  events_.pushBack({stamp, EventKind::kCapacityReached, static_cast<double>(lost_)});
 }
 
 void EventBuffer::flush(OdometryOutput& output) {

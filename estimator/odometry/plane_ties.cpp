@@ -65,7 +65,7 @@ void PlaneTies::readWindow(const Smoother& smoother) {
   smoother.window(window_);
   by_id_.clear();
   for (std::size_t i = 0; i < window_.landmarks.size(); ++i) {
-    static_cast<void>(by_id_.tryPushBack(static_cast<std::uint16_t>(i)));
+    by_id_.pushBack(static_cast<std::uint16_t>(i));
   }
   std::sort(by_id_.begin(), by_id_.end(), [this](std::uint16_t a, std::uint16_t b) {
     return window_.landmarks[a].id < window_.landmarks[b].id;
@@ -150,7 +150,7 @@ void PlaneTies::collectCandidates(const TrackedFrame& coming) {
     Candidate candidate{point.id, point.plane, 0, known->p_world};
     candidate.normal_sigma = known->inverse_depth_sigma * depth * std::abs(plane->normal.dot(ray));
     if (!(candidate.normal_sigma <= kMaxNormalSigma)) continue;
-    static_cast<void>(candidates_.tryPushBack(candidate));
+    candidates_.pushBack(candidate);
   }
 }
 
@@ -177,7 +177,7 @@ void PlaneTies::addPlanes(Smoother& smoother) {
     }
     plane.id = *id;
     static_cast<void>(smoother.addPlaneDirection(*id, reported.direction, kDirectionSigma));
-    static_cast<void>(held_.tryPushBack(plane));
+    held_.pushBack(plane);
     ++counters_.planes_added;
   }
 }
@@ -256,7 +256,7 @@ void PlaneTies::review(Smoother& smoother) {
     if (plane->solved && disagrees(height, tie.normal_sigma, point_sigma_)) untie(smoother, t);
   }
   for (const HeldPlane& plane : held_) {
-    if (plane.solved && plane.ties > 0) static_cast<void>(estimates_.tryPushBack(plane.estimate));
+    if (plane.solved && plane.ties > 0) estimates_.pushBack(plane.estimate);
   }
 }
 
@@ -274,7 +274,7 @@ void PlaneTies::untie(Smoother& smoother, std::size_t tie) {
 
 void PlaneTies::refuse(TrackId id, std::uint64_t plane) {
   if (refusals_.full()) refusals_.erase(0);
-  static_cast<void>(refusals_.tryPushBack({id, plane, kRefusedReports}));
+  refusals_.pushBack({id, plane, kRefusedReports});
 }
 
 bool PlaneTies::refused(TrackId id, std::uint64_t plane) const {

@@ -135,7 +135,7 @@ void TrackStage::predictLandmarks(Stamp stamp) {
     if (!predicted.visible[0] && !predicted.visible[1]) continue;
     const double gate = kGateSigmas * rig_.camera[0].focal() * (angle + distance / depth);
     predicted.gate = std::clamp(static_cast<float>(gate), kMinGate, kMaxGate);
-    static_cast<void>(prediction_.landmarks.tryPushBack(predicted));
+    prediction_.landmarks.pushBack(predicted);
   }
 }
 

@@ -18,9 +18,7 @@ bool Prior::touches(std::uint8_t slot) const {
 void Prior::begin() { clear(); }
 
 void Prior::addBlock(std::uint8_t slot, int dimension, const BodyState& reference) {
-  const bool added = blocks_.tryPushBack({slot, dimension, dimension_, reference});
-  assert(added);
-  static_cast<void>(added);
+  blocks_.pushBack({slot, dimension, dimension_, reference});
   dimension_ += dimension;
 }
 
