@@ -58,23 +58,35 @@ bool isPositive(const Matrix15d& P) { return Eigen::LLT<Matrix15d>(P).info() == 
 }  // namespace
 
 TEST_CASE("Smoother: a flight of 20 s stays near the truth, its errors within its sigmas", "[smoother]") {
-  double nees = 0;
-  int samples = 0;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const TrackFlight flight(test::roomFlight(20, seed));
     const std::vector<Step> steps = run(flight, test::settingsFor(flight));
     const double rms = positionRms(flight, steps);
     std::printf("smoother, seed %d: %.4f m RMS in the start's frame\n", static_cast<int>(seed), rms);
     CHECK(rms < 0.05);
-    for (std::size_t k = 60; k < steps.size(); k += 20) {
-      const Vector15d error = flight.truth(k).minus(steps[k].x);
-      nees += error.head<6>().dot(steps[k].covariance.topLeftCorner<6, 6>().llt().solve(error.head<6>()));
-      ++samples;
-    }
   }
-  // Three flights, correlated in time: a factor, not an interval. consistency_statistics has the rest.
-  std::printf("smoother: pose NEES %.2f over %d samples of 3 flights\n", nees / samples, samples);
-  CHECK(nees / samples < 2.5 * 6);
+}
+
+TEST_CASE("Smoother: errors of pose, velocity and biases are as large as the covariance says", "[smoother]") {
+  // The last state of each flight: one independent sample. Start errors are drawn from the start's sigmas.
+  constexpr int kFlights = 12;
+  double pose = 0;
+  double motion = 0;
+  for (std::uint64_t seed = 31; seed < 31 + kFlights; ++seed) {
+    const TrackFlight flight(test::roomFlight(6, seed));
+    const std::vector<Step> steps = run(flight, test::settingsFor(flight));
+    const Vector15d error = flight.truth(steps.size() - 1).minus(steps.back().x);
+    const Matrix15d& P = steps.back().covariance;
+    pose += error.head<6>().dot(P.topLeftCorner<6, 6>().llt().solve(error.head<6>())) / kFlights;
+    motion += error.tail<9>().dot(P.bottomRightCorner<9, 9>().llt().solve(error.tail<9>())) / kFlights;
+  }
+  std::printf("smoother: NEES of %d flights' last states: pose %.2f (6), velocity and biases %.2f (9)\n",
+              kFlights, pose, motion);
+  // The sums are chi-square with 72 and 108 degrees of freedom: 0.1 % and 99.9 %.
+  CHECK(pose > 40.4 / kFlights);
+  CHECK(pose < 114.8 / kFlights);
+  CHECK(motion > 68.1 / kFlights);
+  CHECK(motion < 159.2 / kFlights);
 }
 
 TEST_CASE("Smoother: nothing is learned of position and yaw after the start", "[smoother][observability]") {
