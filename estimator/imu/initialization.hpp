@@ -3,7 +3,7 @@
 //
 // Convention: `up` is the unit vector in body axes along which a still accelerometer reads
 // +gravity (world z seen from the body). Tilt error phi: R_true = R Exp(phi), up_true = Exp(-phi) up.
-// The start in motion with one camera is in estimator/smoother/mono_start.hpp.
+// The start in motion with one camera is in mono_start.hpp.
 // All functions are plain, deterministic and allocate nothing.
 
 #include <Eigen/Core>

@@ -89,8 +89,8 @@ bool MonoStarter::trySolve(const ImuBuffer& imu, const StartPrior& prior, double
   }
   MonoStart mono;
   const Status status =
-      solver_.solve(std::span(from_first_).first(n - 1), std::span(tracks_).first(tracks), rig_.T_body_cam[0],
-                    pixel_sigma / rig_.camera[0].focal(), tilt, noise_, prior, mono);
+      solveMonoStart(std::span(from_first_).first(n - 1), std::span(tracks_).first(tracks),
+                     rig_.T_body_cam[0], pixel_sigma / rig_.camera[0].focal(), tilt, noise_, prior, mono);
   waiting_for = status.ok() ? "acceleration that shows the scale" : "parallax";
   const bool solved = status.ok() && mono.scale_sigma < (impatient ? kScaleSigmaAccepted : kScaleSigmaWanted);
   if (!solved && !impatient) return false;

@@ -12,9 +12,9 @@
 
 #include "estimator/camera/rig.hpp"
 #include "estimator/imu/initialization.hpp"
+#include "estimator/imu/mono_start.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/smoother/imu_buffer.hpp"
-#include "estimator/smoother/mono_start.hpp"
 #include "estimator/smoother/smoother.hpp"
 
 namespace swiftlet {
@@ -53,7 +53,6 @@ class MonoStarter {
   std::vector<BearingTrack> tracks_;
   std::vector<TrackId> track_ids_;
   std::vector<Preintegration> from_first_;
-  MonoStartSolver solver_;
 };
 
 }  // namespace swiftlet

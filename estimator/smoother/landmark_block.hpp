@@ -1,6 +1,6 @@
 #pragma once
 // One landmark linearized at the states that see it, and its point eliminated: for the fixed lag, full
-// smoothing, landmarks on planes and the start with one camera.
+// smoothing and landmarks on planes. The start with one camera (mono_start.cpp) has its own.
 //
 // For state i with Jacobians J_i (pose), P_i (point) and K_i (calibration) of all its views, whitened and
 // weighted, and residuals r_i:

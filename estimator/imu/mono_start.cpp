@@ -1,4 +1,4 @@
-#include "estimator/smoother/mono_start.hpp"
+#include "estimator/imu/mono_start.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -9,8 +9,7 @@
 
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/geometry/so3.hpp"
-#include "estimator/smoother/landmark_block.hpp"
-#include "estimator/smoother/point_system.hpp"
+#include "estimator/imu/start_parameters.hpp"
 
 namespace swiftlet {
 namespace {
@@ -20,15 +19,20 @@ constexpr std::size_t kLeastTracks = 15;
 constexpr int kBiasIterations = 5;
 constexpr int kLinearIterations = 6;
 constexpr int kIterations = 12;
-constexpr int kPointIterations = 6;
+constexpr int kPointIterations = 2;
+// Each bearing stands in two pairs (twice the information), and the noise of the planes is not that
+// of a linear model: measured on simulated flights, errors are up to twice what remains.
+constexpr double kBiasInflation = 8.0;  // on the variance
 // What the model leaves out (the IMU's own noise, scale and axes; vibration) costs so much scale on
 // the real logs however long the start; the covariance is raised to show it.
 constexpr double kLeastScaleSigma = 0.04;
-constexpr double kOutlier = 3.0;        // sigma: a track's RMS beyond it is left out
-constexpr double kLeastParallax = 8.0;  // bearing sigmas
-constexpr double kFirstSpeed = 1.0;     // m/s, for the first weights of the linear solve
-constexpr double kConverged = 1e-6;     // relative decrease of the cost
-// Noise puts some far points at infinity; more than this share means a mirrored path.
+constexpr double kHuber = 2.0;             // sigma
+constexpr double kOutlier = 3.0;           // sigma: a track's RMS beyond it is left out
+constexpr double kLeastParallax = 8.0;     // bearing sigmas
+constexpr double kInverseDepthPrior = 10;  // 1/m about 0: only to keep points without parallax finite
+constexpr double kFirstSpeed = 1.0;        // m/s, for the first weights of the linear solve
+constexpr double kConverged = 1e-6;        // relative decrease of the cost
+// Noise puts some far points behind the camera; more than this share means a mirrored path.
 constexpr double kMostBehind = 0.25;
 // First guesses, as multiples of the linear solution's velocity, tried until one fits.
 constexpr std::array<double, 4> kVelocityGuesses{1.0, -1.0, 3.0, -3.0};
@@ -38,30 +42,22 @@ constexpr double kUselessTilt = 0.5;  // rad
 using Matrix11d = StartParameters::Matrix;
 using Vector11d = StartParameters::Vector;
 using Row11d = Eigen::Matrix<double, 1, StartParameters::kSize>;
-using Matrix3x11d = Eigen::Matrix<double, 3, StartParameters::kSize>;
 
-// The camera of one frame in the axes of image 0's body.
-struct StartCamera {
+// Camera of one frame in the axes of image 0's body.
+struct CameraPose {
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
   Eigen::Vector3d c = Eigen::Vector3d::Zero();
-  Matrix3x11d d_c = Matrix3x11d::Zero();
+  Eigen::Matrix<double, 3, StartParameters::kSize> d_c =
+      Eigen::Matrix<double, 3, StartParameters::kSize>::Zero();
   Eigen::Matrix3d d_phi = Eigen::Matrix3d::Zero();  // right error of R by the gyro bias
   double variance = 0;                              // m^2 per axis, of the preintegrated position
-  Eigen::Matrix<double, kPoseDim, StartParameters::kSize> d_pose =
-      Eigen::Matrix<double, kPoseDim, StartParameters::kSize>::Zero();  // of the body
 };
-
-struct Cameras {
-  FixedVector<StartCamera, kMaxMonoFrames> of_frame;
-  std::array<RigPose, kMaxMonoFrames> poses;
-
-  const StartCamera& operator[](std::size_t k) const { return of_frame[k]; }
-};
+using Cameras = FixedVector<CameraPose, kMaxMonoFrames>;
 
 struct Problem {
   std::span<const Preintegration> from_first;
   std::span<const BearingTrack> tracks;
-  const std::array<SE3, kMaxCameras>& T_body_cam;
+  const SE3& T_body_cam;
   double sigma;
   double gravity;
   std::bitset<kMaxMonoTracks> rejected;
@@ -74,36 +70,44 @@ struct Problem {
 bool seenIn(const BearingTrack& track, std::size_t frame) { return ((track.seen >> frame) & 1U) != 0; }
 
 void makeCameras(const Problem& problem, const StartParameters& x, Cameras& cameras) {
-  const Eigen::Matrix3d R_body_cam = problem.T_body_cam[0].R();
-  const Eigen::Vector3d& lever = problem.T_body_cam[0].translation;
-  cameras.of_frame.clear();
-  for (std::size_t k = 0; k < problem.frames(); ++k) {
-    SE3 T;
-    StartCamera camera;
-    if (k > 0) {
-      const Preintegration& imu = problem.from_first[k - 1];
-      const StartPose pose = x.poseAt(imu, problem.gravity);
-      T = SE3(pose.rotation, pose.position);
-      camera.d_pose.block<3, 3>(0, StartParameters::kBiasGyro) = pose.d_rotation;
-      camera.d_pose.bottomRows<3>() = pose.d_position;
-      camera.variance = imu.covariance().block<3, 3>(3, 3).trace() / 3.0;
-    }
-    camera.R = T.R() * R_body_cam;
-    camera.c = T * lever;
-    camera.d_c = camera.d_pose.bottomRows<3>() - T.R() * hat(lever) * camera.d_pose.topRows<3>();
-    camera.d_phi = R_body_cam.transpose() * camera.d_pose.block<3, 3>(0, StartParameters::kBiasGyro);
-    cameras.of_frame.pushBack(camera);
-    cameras.poses[k].current[0] = cameras.poses[k].linearization[0] =
-        CameraPose::of(T, problem.T_body_cam[0]);
+  const Eigen::Matrix3d R_body_cam = problem.T_body_cam.R();
+  const Eigen::Vector3d& lever = problem.T_body_cam.translation;
+  cameras.clear();
+  CameraPose first;
+  first.R = R_body_cam;
+  first.c = lever;
+  (void)cameras.tryPushBack(first);
+  for (const Preintegration& imu : problem.from_first) {
+    const StartPose pose = x.poseAt(imu, problem.gravity);
+    const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
+    CameraPose camera;
+    camera.R = R * R_body_cam;
+    camera.c = pose.position + R * lever;
+    camera.d_c = pose.d_position;
+    camera.d_c.middleCols<3>(StartParameters::kBiasGyro) -= R * hat(lever) * pose.d_rotation;
+    camera.d_phi = R_body_cam.transpose() * pose.d_rotation;
+    camera.variance = imu.covariance().block<3, 3>(3, 3).trace() / 3.0;
+    (void)cameras.tryPushBack(camera);
   }
 }
 
-double weightOf(double whitened) { return RobustWeight::cauchy(whitened * whitened, 1.0).weight; }
+Eigen::Matrix<double, 3, 2> tangent(const Eigen::Vector3d& f) {
+  const Eigen::Vector3d other = std::abs(f.x()) < 0.7 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
+  Eigen::Matrix<double, 3, 2> B;
+  B.col(0) = f.cross(other).normalized();
+  B.col(1) = f.cross(B.col(0));
+  return B;
+}
+
+double huberWeight(double whitened) { return whitened <= kHuber ? 1.0 : kHuber / whitened; }
+double huberCost(double whitened) {
+  return whitened <= kHuber ? whitened * whitened : kHuber * (2.0 * whitened - kHuber);
+}
 
 // ---- Gyro bias by the eigenvalue method.
 
 // Adds one frame pair's normal equations by the gyro bias, the translation direction eliminated.
-void addBiasPair(const Problem& problem, const StartCamera& a, const StartCamera& b, std::size_t i,
+void addBiasPair(const Problem& problem, const CameraPose& a, const CameraPose& b, std::size_t i,
                  std::size_t j, Eigen::Matrix3d& H, Eigen::Vector3d& g) {
   Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
   std::size_t count = 0;
@@ -131,7 +135,7 @@ void addBiasPair(const Problem& problem, const StartCamera& a, const StartCamera
     const double sigma =
         problem.sigma * std::sqrt(t.cross(f).squaredNorm() + t.cross(h).squaredNorm() + 1e-6);
     const double r = n.dot(t) / sigma;
-    const double w = weightOf(r);
+    const double w = huberWeight(std::abs(r));
     const Eigen::Matrix3d d_f = -a.R * hat(track.bearing[i]) * a.d_phi;
     const Eigen::Matrix3d d_h = -b.R * hat(track.bearing[j]) * b.d_phi;
     const Eigen::Vector3d Jb = (hat(f) * d_h - hat(h) * d_f).transpose() * t / sigma;
@@ -148,7 +152,7 @@ void addBiasPair(const Problem& problem, const StartCamera& a, const StartCamera
   g += gb - Hbt * inverse * gt;
 }
 
-Status gyroBias(const Problem& problem, const StartPrior& prior, Eigen::Vector3d& bias) {
+Status gyroBias(const Problem& problem, const StartPrior& prior, Eigen::Vector3d& bias, double& sigma) {
   bias = prior.bias_gyro;
   const double weight = 1.0 / (prior.bias_gyro_sigma * prior.bias_gyro_sigma);
   for (int iteration = 0; iteration < kBiasIterations; ++iteration) {
@@ -165,8 +169,12 @@ Status gyroBias(const Problem& problem, const StartPrior& prior, Eigen::Vector3d
     const Eigen::Vector3d step = -H.llt().solve(g);
     if (!step.allFinite()) return {StatusCode::kNumerical, "gyro bias iteration diverged"};
     bias += step;
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+    eigen.computeDirect(H, Eigen::EigenvaluesOnly);
+    sigma = std::sqrt(kBiasInflation / eigen.eigenvalues()[0]);
     if (step.norm() < 1e-6) break;
   }
+  sigma = std::min(sigma, prior.bias_gyro_sigma);
   return okStatus();
 }
 
@@ -184,8 +192,8 @@ Status linearSolve(const Problem& problem, const TiltEstimate& tilt, const Start
     for (std::size_t s = 1; s <= 2; ++s) {
       for (std::size_t i = 0; i + s * problem.stride() < problem.frames(); ++i) {
         const std::size_t j = i + s * problem.stride();
-        const StartCamera& a = cameras[i];
-        const StartCamera& b = cameras[j];
+        const CameraPose& a = cameras[i];
+        const CameraPose& b = cameras[j];
         const Eigen::Vector3d d = b.c - a.c;
         const double span = static_cast<double>(j - i) * problem.from_first.back().duration() /
                             static_cast<double>(problem.from_first.size());
@@ -198,7 +206,7 @@ Status linearSolve(const Problem& problem, const TiltEstimate& tilt, const Start
                                    ? kFirstSpeed * span
                                    : std::sqrt(d.cross(f).squaredNorm() + d.cross(h).squaredNorm()) + 1e-3;
           const double r = n.dot(d) / (problem.sigma * reach);
-          const double w = iteration < 2 ? 1.0 : weightOf(r);
+          const double w = iteration < 2 ? 1.0 : huberWeight(std::abs(r));
           const Row11d J = n.transpose() * (b.d_c - a.d_c) / (problem.sigma * reach);
           H += w * J.transpose() * J;
           g += w * r * J.transpose();
@@ -218,125 +226,150 @@ Status linearSolve(const Problem& problem, const TiltEstimate& tilt, const Start
 
 // ---- Refinement: reprojection errors, each point eliminated.
 
+struct TrackPoint {
+  std::size_t anchor = 0;
+  Eigen::Vector3d direction;  // unit, anchor camera's axes
+  double inverse_depth = 0;   // 1/m
+};
+
+struct Sighting {
+  Eigen::Vector2d residual;
+  Eigen::Matrix<double, 2, 3> d_point;  // direction (2, tangent), inverse depth
+  Eigen::Matrix<double, 2, StartParameters::kSize> d_x;
+  double norm = 0;  // whitened
+};
+
+// `with_x` false: the point's derivatives only.
+Sighting sight(const Problem& problem, const Cameras& cameras, const TrackPoint& point,
+               const Eigen::Matrix<double, 3, 2>& B, const Eigen::Vector3d& bearing, std::size_t k,
+               bool with_x) {
+  const CameraPose& anchor = cameras[point.anchor];
+  const CameraPose& camera = cameras[k];
+  const Eigen::Vector3d base = anchor.c - camera.c;
+  const Eigen::Matrix3d Rt = camera.R.transpose();
+  const Eigen::Matrix3d R_rel = Rt * anchor.R;
+  const Eigen::Vector3d y = R_rel * point.direction + point.inverse_depth * (Rt * base);
+  const double length = std::max(y.norm(), 1e-9);
+  const Eigen::Vector3d unit = y / length;
+  const double rho = point.inverse_depth;
+  const double sigma = std::sqrt(problem.sigma * problem.sigma + rho * rho * camera.variance);
+  const Eigen::Matrix<double, 2, 3> P = tangent(bearing).transpose() / sigma;
+  const Eigen::Matrix<double, 2, 3> D = P * (Eigen::Matrix3d::Identity() - unit * unit.transpose()) / length;
+  Sighting s;
+  s.residual = P * unit;
+  s.norm = s.residual.norm();
+  s.d_point.leftCols<2>() = D * R_rel * B;
+  s.d_point.col(2) = D * (Rt * base);
+  if (!with_x) return s;
+  s.d_x = rho * D * Rt * (anchor.d_c - camera.d_c);
+  s.d_x.middleCols<3>(StartParameters::kBiasGyro) +=
+      D * (hat(y) * camera.d_phi - R_rel * hat(point.direction) * anchor.d_phi);
+  return s;
+}
+
+// The point that fits the track best with the cameras as they are.
+TrackPoint triangulate(const Problem& problem, const Cameras& cameras, const BearingTrack& track) {
+  TrackPoint point;
+  while (!seenIn(track, point.anchor)) ++point.anchor;
+  point.direction = track.bearing[point.anchor];
+  for (int iteration = 0; iteration < kPointIterations; ++iteration) {
+    const Eigen::Matrix<double, 3, 2> B = tangent(point.direction);
+    Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+    H(2, 2) = 1.0 / (kInverseDepthPrior * kInverseDepthPrior);
+    Eigen::Vector3d g(0, 0, H(2, 2) * point.inverse_depth);
+    for (std::size_t k = point.anchor; k < problem.frames(); ++k) {
+      if (!seenIn(track, k)) continue;
+      const Sighting s = sight(problem, cameras, point, B, track.bearing[k], k, false);
+      const double w = huberWeight(s.norm);
+      H += w * s.d_point.transpose() * s.d_point;
+      g += w * s.d_point.transpose() * s.residual;
+    }
+    const Eigen::Vector3d step = -H.llt().solve(g);
+    if (!step.allFinite()) break;
+    point.direction = (point.direction + B * step.head<2>()).normalized();
+    point.inverse_depth += step.z();
+  }
+  return point;
+}
+
 struct Normal {
   Matrix11d H = Matrix11d::Zero();
   Vector11d g = Vector11d::Zero();
-  double cost = 0;  // half the sum of whitened squares, robust
+  double cost = 0;
   double squares = 0;
   int rows = 0;
   int tracks = 0;
-  int behind = 0;  // tracks without a point in front of their cameras
+  int behind = 0;  // tracks whose point lies behind its camera
 
   // n . d = 0 does not know the sign of d: a mirrored path puts the points behind the cameras.
   [[nodiscard]] double shareBehind() const { return tracks > 0 ? static_cast<double>(behind) / tracks : 0.0; }
 };
 
-using TrackSightings = FixedVector<Sighting, kMaxMonoFrames>;
-
-// `inverse_depth`: of the point; the nearer it is, the more the IMU's noise in the position counts.
-void weighSightings(const Problem& problem, const Cameras& cameras, double inverse_depth,
-                    TrackSightings& sightings) {
-  for (Sighting& sighting : sightings) {
-    CameraSighting& view = sighting.camera[0];
-    const PointBasis basis = PointBasis::of(view.ray());
-    const double moved = inverse_depth * inverse_depth * cameras[sighting.slot].variance;
-    const double sigma = std::sqrt(problem.sigma * problem.sigma + moved);
-    Matrix23d W;
-    W << basis.b1.transpose() / sigma, basis.b2.transpose() / sigma;
-    view = CameraSighting::of(view.ray(), W);
-  }
-}
-
-// The point that fits the track best with the cameras as they are; at infinity where none is in front of
-// them.
-LandmarkPoint pointOf(const Problem& problem, const Cameras& cameras, const BearingTrack& track,
-                      TrackSightings& sightings) {
-  sightings.clear();
-  for (std::size_t k = 0; k < problem.frames(); ++k) {
+void addTrack(const Problem& problem, const Cameras& cameras, const BearingTrack& track, Normal& normal,
+              double& mean_square) {
+  const TrackPoint point = triangulate(problem, cameras, track);
+  const Eigen::Matrix<double, 3, 2> B = tangent(point.direction);
+  Eigen::Matrix3d Hpp = Eigen::Matrix3d::Zero();
+  Hpp(2, 2) = 1.0 / (kInverseDepthPrior * kInverseDepthPrior);
+  Eigen::Vector3d gp(0, 0, Hpp(2, 2) * point.inverse_depth);
+  Eigen::Matrix<double, StartParameters::kSize, 3> Hxp =
+      Eigen::Matrix<double, StartParameters::kSize, 3>::Zero();
+  double squares = 0;
+  int sightings = 0;
+  for (std::size_t k = point.anchor; k < problem.frames(); ++k) {
     if (!seenIn(track, k)) continue;
-    Sighting sighting;
-    sighting.slot = static_cast<std::uint32_t>(k);
-    sighting.camera[0] = CameraSighting::of(track.bearing[k], Matrix23d::Zero());
-    sightings.pushBack(sighting);
+    const Sighting s = sight(problem, cameras, point, B, track.bearing[k], k, true);
+    const double w = huberWeight(s.norm);
+    Hpp += w * s.d_point.transpose() * s.d_point;
+    gp += w * s.d_point.transpose() * s.residual;
+    Hxp += w * s.d_x.transpose() * s.d_point;
+    normal.H += w * s.d_x.transpose() * s.d_x;
+    normal.g += w * s.d_x.transpose() * s.residual;
+    normal.cost += huberCost(s.norm);
+    squares += s.norm * s.norm;
+    ++sightings;
   }
-  const std::span<const Sighting> views{sightings.data(), sightings.size()};
-  LandmarkPoint point;
-  weighSightings(problem, cameras, 0, sightings);
-  bool found = triangulate(cameras.poses, views, kPointIterations, point);
-  weighSightings(problem, cameras, point.inverse_depth, sightings);
-  found = found && triangulate(cameras.poses, views, kPointIterations, point);
-  if (found) return point;
-  const Sighting& first = sightings.front();
-  point = {};
-  point.reference = cameras[first.slot].c;
-  point.bearing = cameras[first.slot].R * first.camera[0].ray();
-  return point;
+  const Eigen::Matrix3d inverse = Hpp.inverse();
+  normal.H -= Hxp * inverse * Hxp.transpose();
+  normal.g -= Hxp * inverse * gp;
+  ++normal.tracks;
+  normal.behind += point.inverse_depth < 0 ? 1 : 0;
+  normal.squares += squares;
+  normal.rows += 2 * sightings - 3;
+  mean_square = squares / std::max(1, 2 * sightings - 3);
 }
-
-// Information and gradient of one frame's pose, before any point is eliminated.
-struct PoseSums {
-  Eigen::Matrix<double, kPoseDim, kPoseDim> H = Eigen::Matrix<double, kPoseDim, kPoseDim>::Zero();
-  Eigen::Matrix<double, kPoseDim, 1> g = Eigen::Matrix<double, kPoseDim, 1>::Zero();
-};
 
 // Linearizes all tracks; `reject`: leaves out those that fit badly from now on.
-Normal linearize(Problem& problem, LandmarkBlock& landmark, const StartParameters& x,
-                 const TiltEstimate& tilt, const StartPrior& prior, bool reject) {
+Normal linearize(Problem& problem, const StartParameters& x, const TiltEstimate& tilt,
+                 const StartPrior& prior, bool reject) {
   Cameras cameras;
   makeCameras(problem, x, cameras);
   Normal normal;
-  std::array<PoseSums, kMaxMonoFrames> sums;
-  TrackSightings sightings;
   for (std::size_t t = 0; t < problem.tracks.size(); ++t) {
     if (problem.rejected[t]) continue;
-    const LandmarkPoint point = pointOf(problem, cameras, problem.tracks[t], sightings);
-    const std::span<const Sighting> views{sightings.data(), sightings.size()};
-    const int rows = std::max(1, 2 * static_cast<int>(views.size()) - 3);
-    const double squares =
-        static_cast<double>(views.size()) * meanSquaredResidual(cameras.poses, views, point);
-    if (reject && squares > kOutlier * kOutlier * rows) {
+    Normal with = normal;
+    double mean_square = 0;
+    addTrack(problem, cameras, problem.tracks[t], with, mean_square);
+    if (reject && mean_square > kOutlier * kOutlier) {
       problem.rejected.set(t);
-      continue;
+    } else {
+      normal = with;
     }
-    landmark.linearize({views, cameras.poses, problem.T_body_cam, {}}, point);
-    if (!landmark.eliminate()) continue;
-    // With D = d pose / d x the reduced blocks A_i - Y_i Y_i^T and -Y_i Y_j^T are in x
-    // sum D_i^T A_i D_i - U U^T, U = sum D_i^T Y_i.
-    Eigen::Matrix<double, StartParameters::kSize, 3> U =
-        Eigen::Matrix<double, StartParameters::kSize, 3>::Zero();
-    for (const LandmarkBlock::State& state : landmark.states()) {
-      using Columns = Eigen::Matrix<double, kPaddedRows, kPoseDim>;
-      using PointColumns = Eigen::Matrix<double, kPaddedRows, 3>;
-      const auto A = Eigen::Map<const Columns>(state.information.column[0]).topRows<kPoseDim>();
-      const auto Y = Eigen::Map<const PointColumns>(state.point[0]).topRows<kPoseDim>();
-      PoseSums& sum = sums[state.slot];
-      sum.H += Y * Y.transpose();
-      sum.H += A.selfadjointView<Eigen::Lower>();
-      sum.g += Eigen::Map<const Eigen::Matrix<double, kPoseDim, 1>>(state.gradient);
-      U += cameras[state.slot].d_pose.transpose() * Y;
-    }
-    normal.H -= U * U.transpose();
-    normal.cost += landmark.cost();
-    normal.squares += squares;
-    normal.rows += rows;
-    ++normal.tracks;
-    normal.behind += point.inverse_depth > 0 ? 0 : 1;
   }
-  for (std::size_t k = 1; k < problem.frames(); ++k) {
-    const auto& D = cameras[k].d_pose;
-    normal.H += D.transpose() * sums[k].H * D;
-    normal.g += D.transpose() * sums[k].g;
-  }
-  x.addPrior(tilt, prior, normal.H, normal.g);
-  normal.cost += 0.5 * x.priorCost(tilt, prior);
+  Matrix11d prior_H = Matrix11d::Zero();
+  Vector11d prior_g = Vector11d::Zero();
+  x.addPrior(tilt, prior, prior_H, prior_g);
+  normal.H += prior_H;
+  normal.g += prior_g;
+  normal.cost += x.priorCost(tilt, prior);
   return normal;
 }
 
 // Levenberg-Marquardt; `normal` is left linearized at the final x.
-bool refine(Problem& problem, LandmarkBlock& landmark, const TiltEstimate& tilt, const StartPrior& prior,
-            StartParameters& x, Normal& normal) {
+bool refine(Problem& problem, const TiltEstimate& tilt, const StartPrior& prior, StartParameters& x,
+            Normal& normal) {
   double lambda = 1e-3;
-  normal = linearize(problem, landmark, x, tilt, prior, false);
+  normal = linearize(problem, x, tilt, prior, false);
   bool converged = false;
   for (int iteration = 0; iteration < kIterations && !converged; ++iteration) {
     Matrix11d damped = normal.H;
@@ -345,7 +378,7 @@ bool refine(Problem& problem, LandmarkBlock& landmark, const TiltEstimate& tilt,
     if (!step.allFinite()) return false;
     StartParameters moved = x;
     moved.retract(step);
-    const Normal next = linearize(problem, landmark, moved, tilt, prior, false);
+    const Normal next = linearize(problem, moved, tilt, prior, false);
     if (next.cost <= normal.cost) {
       converged = normal.cost - next.cost < kConverged * normal.cost;
       x = moved;
@@ -360,8 +393,8 @@ bool refine(Problem& problem, LandmarkBlock& landmark, const TiltEstimate& tilt,
 }
 
 // The refinement from several first guesses; the best fit with its points before the cameras.
-bool refineBest(Problem& problem, LandmarkBlock& landmark, const TiltEstimate& tilt, const StartPrior& prior,
-                StartParameters& x, Normal& normal) {
+bool refineBest(Problem& problem, const TiltEstimate& tilt, const StartPrior& prior, StartParameters& x,
+                Normal& normal) {
   const StartParameters linear = x;
   bool found = false;
   for (const double factor : kVelocityGuesses) {
@@ -371,7 +404,7 @@ bool refineBest(Problem& problem, LandmarkBlock& landmark, const TiltEstimate& t
     guess.retract(change);
     if (factor != 1.0) guess.setUp(tilt.up);
     Normal at;
-    if (!refine(problem, landmark, tilt, prior, guess, at) || at.shareBehind() > kMostBehind) continue;
+    if (!refine(problem, tilt, prior, guess, at) || at.shareBehind() > kMostBehind) continue;
     if (!found || at.cost < normal.cost) {
       x = guess;
       normal = at;
@@ -406,7 +439,7 @@ double medianParallax(const Problem& problem, const Cameras& cameras) {
 double scaleSigma(const Cameras& cameras, const Matrix11d& covariance) {
   Row11d along = Row11d::Zero();
   double squares = 0;
-  for (std::size_t k = 1; k < cameras.of_frame.size(); ++k) {
+  for (std::size_t k = 1; k < cameras.size(); ++k) {
     const Eigen::Vector3d path = cameras[k].c - cameras[0].c;
     along += path.transpose() * cameras[k].d_c;
     squares += path.squaredNorm();
@@ -416,34 +449,46 @@ double scaleSigma(const Cameras& cameras, const Matrix11d& covariance) {
   return std::sqrt((along * covariance * along.transpose()).value());
 }
 
-}  // namespace
-
-MonoStartSolver::MonoStartSolver() : landmark_(std::make_unique<LandmarkBlock>(kMaxMonoFrames)) {}
-
-MonoStartSolver::~MonoStartSolver() = default;
-
-Status MonoStartSolver::solve(std::span<const Preintegration> from_first,
-                              std::span<const BearingTrack> tracks, const SE3& T_body_cam,
-                              double bearing_sigma, const TiltEstimate& tilt, const ImuNoise& noise,
-                              const StartPrior& prior, MonoStart& start) {
-  start = MonoStart{};
-  if (from_first.size() + 1 < kLeastFrames || tracks.size() < kLeastTracks) {
-    return {StatusCode::kNotReady, "fewer than 4 frames or 15 tracks"};
-  }
-  const std::array<SE3, kMaxCameras> mounted{T_body_cam, T_body_cam};
+Problem makeProblem(std::span<const Preintegration> from_first, std::span<const BearingTrack> tracks,
+                    const SE3& T_body_cam, double bearing_sigma, double gravity) {
   Problem problem{from_first.first(std::min(from_first.size(), kMaxMonoFrames - 1)),
                   tracks.first(std::min(tracks.size(), kMaxMonoTracks)),
-                  mounted,
+                  T_body_cam,
                   bearing_sigma,
-                  noise.gravity,
+                  gravity,
                   {}};
   // Sightings beyond the frames in use do not count; one sighting says nothing.
   const std::uint32_t mask = (1U << problem.frames()) - 1U;
   for (std::size_t t = 0; t < problem.tracks.size(); ++t) {
     if (std::popcount(problem.tracks[t].seen & mask) < 2) problem.rejected.set(t);
   }
+  return problem;
+}
+
+}  // namespace
+
+Status solveGyroBias(std::span<const Preintegration> from_first, std::span<const BearingTrack> tracks,
+                     const SE3& T_body_cam, double bearing_sigma, const StartPrior& prior,
+                     Eigen::Vector3d& bias_gyro, double& sigma) {
+  if (from_first.empty() || tracks.size() < kLeastTracks) {
+    return {StatusCode::kNotReady, "fewer than 2 frames or 15 tracks"};
+  }
+  const Problem problem = makeProblem(from_first, tracks, T_body_cam, bearing_sigma, 0);
+  return gyroBias(problem, prior, bias_gyro, sigma);
+}
+
+Status solveMonoStart(std::span<const Preintegration> from_first, std::span<const BearingTrack> tracks,
+                      const SE3& T_body_cam, double bearing_sigma, const TiltEstimate& tilt,
+                      const ImuNoise& noise, const StartPrior& prior, MonoStart& start) {
+  start = MonoStart{};
+  if (from_first.size() + 1 < kLeastFrames || tracks.size() < kLeastTracks) {
+    return {StatusCode::kNotReady, "fewer than 4 frames or 15 tracks"};
+  }
+  Problem problem = makeProblem(from_first, tracks, T_body_cam, bearing_sigma, noise.gravity);
   StartPrior guess = prior;
-  if (const Status status = gyroBias(problem, prior, guess.bias_gyro); !status.ok()) return status;
+  double bias_sigma = 0;
+  if (const Status status = gyroBias(problem, prior, guess.bias_gyro, bias_sigma); !status.ok())
+    return status;
   StartParameters x(tilt.up, guess);
   Cameras cameras;
   makeCameras(problem, x, cameras);
@@ -452,11 +497,11 @@ Status MonoStartSolver::solve(std::span<const Preintegration> from_first,
   if (const Status status = linearSolve(problem, tilt, guess, x); !status.ok()) return status;
 
   Normal normal;
-  if (!refineBest(problem, *landmark_, tilt, prior, x, normal)) {
+  if (!refineBest(problem, tilt, prior, x, normal)) {
     return {StatusCode::kDegenerate, "no path fits the bearings with points before the camera"};
   }
-  linearize(problem, *landmark_, x, tilt, prior, true);
-  if (problem.rejected.any() && !refine(problem, *landmark_, tilt, prior, x, normal)) {
+  linearize(problem, x, tilt, prior, true);
+  if (problem.rejected.any() && !refine(problem, tilt, prior, x, normal)) {
     return {StatusCode::kNumerical, "mono start diverged"};
   }
   if (normal.shareBehind() > kMostBehind) return {StatusCode::kDegenerate, "points behind the camera"};

@@ -8,7 +8,7 @@
 
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
-#include "estimator/smoother/mono_start.hpp"
+#include "estimator/imu/mono_start.hpp"
 #include "tests/imu/analytic_trajectory.hpp"
 #include "tests/imu/recorded_imu.hpp"
 #include "tests/support/long_run.hpp"
@@ -133,7 +133,6 @@ TEST_CASE("Mono start on real IMU: scale and tilt", "[figures][long]") {
   const double bearing_sigma = 0.6 / 458;
   for (const double seconds : {0.4, 0.7, 1.0, 1.5}) {
     Random random(17);
-    MonoStartSolver solver;
     std::vector<double> tilts, scales, sigmas, believed, bias_errors;
     int solved = 0, inside = 0, tried = 0, adopted = 0, adopted_bad = 0;
     const std::size_t step = longOr<std::size_t>(1, 3);  // of all starts, or of a third
@@ -177,7 +176,7 @@ TEST_CASE("Mono start on real IMU: scale and tilt", "[figures][long]") {
         }
       }
       MonoStart start;
-      const Status status = solver.solve(imu, tracks, T_body_cam, bearing_sigma, tilt, noise, prior, start);
+      const Status status = solveMonoStart(imu, tracks, T_body_cam, bearing_sigma, tilt, noise, prior, start);
       if (!status.ok()) continue;
       ++solved;
       // Scale: the estimated path against the true one, in the camera's positions at the end.
