@@ -1,9 +1,8 @@
 #pragma once
 // The few vector operations that the image kernels need, behind one wrapper: AVX2, NEON (64-bit ARM)
 // and a scalar twin that defines the result. All three give the same bits: the integer operations are
-// exact, the float ones rounded once each (products are fused with their sums) and summed over lanes in
-// one order. Kernels are templates over the instruction set, and tests run them with both
-// `simd::Native` and `simd::Scalar`.
+// exact, the float ones rounded once each (products are fused with their sums). Kernels are templates over
+// the instruction set, and tests run them with both `simd::Native` and `simd::Scalar`.
 
 #include <cmath>
 #include <cstdint>
@@ -161,7 +160,6 @@ struct Scalar {
     return v;
   }
 
-  static Float32x16 zeroFloats() { return {}; }
   static Float32x16 loadFloats(const float* from) {
     Float32x16 v;
     for (int i = 0; i < 16; ++i) v.lane[i] = from[i];
@@ -210,13 +208,6 @@ struct Scalar {
     Float32x16 v;
     for (int i = 0; i < 16; ++i) v.lane[i] = std::fma(a.lane[i], b.lane[i], sum.lane[i]);
     return v;
-  }
-  /// Halves are added until one is left.
-  static float total(Float32x16 v) {
-    for (int half = 8; half > 0; half /= 2) {
-      for (int i = 0; i < half; ++i) v.lane[i] += v.lane[i + half];
-    }
-    return v.lane[0];
   }
 };
 
@@ -287,7 +278,6 @@ struct Native {
     return _mm256_shuffle_epi8(_mm256_set_m128i(second, first), place);
   }
 
-  static Float32x16 zeroFloats() { return {_mm256_setzero_ps(), _mm256_setzero_ps()}; }
   static Float32x16 loadFloats(const float* from) {
     return {_mm256_loadu_ps(from), _mm256_loadu_ps(from + 8)};
   }
@@ -319,12 +309,6 @@ struct Native {
   }
   static Float32x16 multiplyAdd(const Float32x16& sum, const Float32x16& a, const Float32x16& b) {
     return {_mm256_fmadd_ps(a.low, b.low, sum.low), _mm256_fmadd_ps(a.high, b.high, sum.high)};
-  }
-  static float total(const Float32x16& v) {
-    const __m256 eight = _mm256_add_ps(v.low, v.high);
-    __m128 four = _mm_add_ps(_mm256_castps256_ps128(eight), _mm256_extractf128_ps(eight, 1));
-    four = _mm_add_ps(four, _mm_movehl_ps(four, four));
-    return _mm_cvtss_f32(_mm_add_ss(four, _mm_movehdup_ps(four)));
   }
 
  private:
@@ -424,7 +408,6 @@ struct Native {
     return {vreinterpretq_s16_u16(vmovl_u8(first)), vreinterpretq_s16_u16(vmovl_u8(second))};
   }
 
-  static Float32x16 zeroFloats() { return broadcastFloat(0); }
   static Float32x16 loadFloats(const float* from) {
     return {{vld1q_f32(from), vld1q_f32(from + 4), vld1q_f32(from + 8), vld1q_f32(from + 12)}};
   }
@@ -470,12 +453,6 @@ struct Native {
     Float32x16 v;
     for (int i = 0; i < 4; ++i) v.quarter[i] = vfmaq_f32(sum.quarter[i], a.quarter[i], b.quarter[i]);
     return v;
-  }
-  static float total(const Float32x16& v) {
-    const float32x4_t four =
-        vaddq_f32(vaddq_f32(v.quarter[0], v.quarter[2]), vaddq_f32(v.quarter[1], v.quarter[3]));
-    const float32x2_t two = vadd_f32(vget_low_f32(four), vget_high_f32(four));
-    return vget_lane_f32(two, 0) + vget_lane_f32(two, 1);
   }
 };
 

@@ -29,7 +29,7 @@ void finishExtras(WindowProblem& problem, NormalEquations& system);
 void addDepartingExtras(const WindowProblem& problem, const std::uint8_t* slot, NormalEquations& system);
 
 /// What the system's cost and the prior's would be at the states and points as they are, cameras placed;
-/// no landmark is linearized. `work` as above. Cost: below that of building the system.
+/// no landmark is linearized. `work` as above. Cost: less than building the system.
 struct WindowCost {
   double factors = 0;
   double prior = 0;  ///< without its constant

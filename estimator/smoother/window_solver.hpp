@@ -3,7 +3,7 @@
 //
 // Points move with the step (back-substitution); a step that raises the cost is taken back; sightings and
 // landmarks that do not fit are left out by named limits. Nothing is allocated after the constructor. Memory:
-// 2 MiB. Cost: docs/smoother.md.
+// 2.6 MiB. Cost: docs/smoother.md.
 
 #include <vector>
 

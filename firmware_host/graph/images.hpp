@@ -21,8 +21,8 @@ namespace swiftlet {
 struct ImageSlot {
   CameraFrame frame;
   HostTimes host;
-  /// Reserved for the camera's size before the flight; not written until then, so that a run in one thread,
-  /// which needs few slots, does not pay for the pages of all.
+  /// Reserved for the camera's size before the flight, and not zeroed: a run in one thread uses few slots,
+  /// and the pages of the others stay untouched.
   std::unique_ptr<std::uint8_t[]> pixels;
 };
 

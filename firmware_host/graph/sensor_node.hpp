@@ -40,7 +40,7 @@ class SensorNode final : public Node {
   void imagesTo(std::size_t camera, MeshImageIn& in) { lend(camera, in, camera_[camera].mesh); }
   void imagesTo(std::size_t camera, RecordedImageIn& in) { lend(camera, in, camera_[camera].record); }
   void scenesTo(SceneIn& in);
-  /// Before the threads start: no image is the first in its memory.
+  /// Makes the memory of all images resident. Before the threads start.
   void touchImages();
 
   void takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host);

@@ -165,13 +165,30 @@ PointSystem scalarSystem(RigPoses poses, std::span<const Sighting> sightings, co
 
 void checkPointSystem(RigPoses poses, std::span<const Sighting> sightings, const LandmarkPoint& point) {
   const PointBasis basis = PointBasis::of(point.bearing);
-  const PointSystem lanes = PointViews(poses, sightings).linearize(point, basis);
+  const PointViews views(poses, sightings);
+  const PointSystem lanes = views.linearize(point, basis);
   const PointSystem twin = scalarSystem(poses, sightings, point, basis);
   CHECK(lanes.views == twin.views);
   CHECK(lanes.in_front == twin.in_front);
   CHECK((lanes.H - twin.H).norm() <= kTwin * twin.H.norm());
   CHECK((lanes.g - twin.g).norm() <= kTwin * twin.g.norm());
   CHECK(std::abs(lanes.cost - twin.cost) <= kTwin * twin.cost);
+  CHECK(std::abs(views.cost(point) - twin.cost) <= kTwin * twin.cost);
+  double squares = 0;
+  for (const Sighting& sighting : sightings) {
+    for (std::size_t c = 0; c < kMaxCameras; ++c) {
+      const CameraSighting& view = sighting.camera[c];
+      Eigen::Vector2d r;
+      if (!view.used || !reprojectionResidual(view, poses[sighting.slot].current[c], point, r)) continue;
+      squares += r.squaredNorm();
+    }
+  }
+  const double mean = meanSquaredResidual(poses, sightings, point);
+  if (twin.in_front && twin.views > 0) {
+    CHECK(std::abs(mean - squares / twin.views) <= kTwin * mean);
+  } else if (!twin.in_front) {
+    CHECK(mean > 1e5);  // fits nowhere
+  }
 }
 
 }  // namespace
