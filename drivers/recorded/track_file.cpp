@@ -145,7 +145,6 @@ bool TrackReader::next(TrackedFrame& frame) {
   frame.index = next_index_++;
   frame.camera_present = {};
   frame.keyframe = row_.keyframe;
-  frame.median_motion = -1;
   frame.features.clear();
   slots_.clear();
   const std::uint64_t surplus_before = surplus_;

@@ -38,8 +38,8 @@ class TrackReader {
   TrackReader(const TrackReader&) = delete;
   TrackReader& operator=(const TrackReader&) = delete;
 
-  /// The next frame; false at the end. Sets everything but `median_motion`, which is left unknown, and
-  /// `keyframe` where the file does not tell. A camera counts as present when it saw something.
+  /// The next frame; false at the end. Sets everything but `keyframe` where the file does not tell. A camera
+  /// counts as present when it saw something.
   bool next(TrackedFrame& frame);
 
   /// The file says which frames are keyframes.

@@ -103,25 +103,20 @@ void TrackSimulator::startTracks(double seconds, const SE3& T_world_cam) {
 }
 
 void TrackSimulator::chooseKeyframe(double seconds, TrackedFrame& frame) {
-  std::vector<double> motion;
   std::vector<double> since_keyframe;
   std::size_t known = 0;
   for (const Track& track : tracks_) {
-    if (track.has_last) motion.push_back((track.now - track.last).norm());
     if (track.has_keyframe) {
       since_keyframe.push_back((track.now - track.keyframe).norm());
       ++known;
     }
   }
-  frame.median_motion = static_cast<float>(medianOf(motion));
   // Stamps are whole nanoseconds: half a millisecond of slack keeps the interval's count of frames.
   constexpr double kSlack = 5e-4;
   frame.keyframe = seconds - last_keyframe_ > settings_.keyframe_interval - kSlack ||
                    medianOf(since_keyframe) > settings_.keyframe_motion ||
                    static_cast<double>(known) < kMinKeptShare * static_cast<double>(tracks_.size());
   for (Track& track : tracks_) {
-    track.last = track.now;
-    track.has_last = true;
     if (frame.keyframe) {
       track.keyframe = track.now;
       track.has_keyframe = true;

@@ -67,10 +67,8 @@ class TrackSimulator {
     TrackId id = 0;
     std::uint32_t landmark = 0;
     double end = 0;  ///< s of the trajectory
-    bool has_last = false;
     bool has_keyframe = false;
-    Eigen::Vector2d last = Eigen::Vector2d::Zero();      ///< true left pixel in the frame before
-    Eigen::Vector2d keyframe = Eigen::Vector2d::Zero();  ///< and in the last keyframe
+    Eigen::Vector2d keyframe = Eigen::Vector2d::Zero();  ///< true left pixel in the last keyframe
     Eigen::Vector2d now = Eigen::Vector2d::Zero();
   };
   [[nodiscard]] bool visible(const SE3& T_cam_world, std::size_t camera, const Landmark& landmark,

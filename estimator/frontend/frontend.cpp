@@ -11,6 +11,8 @@ namespace {
 // Features of a camera whose image is missing are held this long: at 1 rad/s and 450 px the view
 // moves by a fifth of the image in it, and beyond that little is found again by tracking.
 constexpr Duration kMaxHold = Duration::fromMilliseconds(250);
+// Sigmas of the estimated extrinsics by which stereo matches may miss the epipolar curve.
+constexpr double kExtrinsicSigmas = 3.0;
 // Below this share of the wanted features new ones are detected without waiting for a keyframe.
 constexpr float kReplenishShare = 0.6F;
 // A feature that the other camera does not show is looked for again at the next keyframe, then after one more
@@ -60,6 +62,13 @@ Status Frontend::Impl::check(const StereoFrame& frame) const {
   }
   if (!any) return {StatusCode::kInvalidInput, "frame without images refused"};
   return okStatus();
+}
+
+void Frontend::Impl::takeExtrinsics(const FrontendPrediction& prediction) {
+  if (!usesStereo() || !prediction.has_extrinsics) return;
+  rig_.T_body_cam = prediction.T_body_cam;
+  const double slack = kExtrinsicSigmas * prediction.stereo_rotation_sigma * rig_.camera[1].focal();
+  matcher_.setExtrinsics(rig_.T_body_cam, static_cast<float>(slack));
 }
 
 void Frontend::Impl::takeImages(const StereoFrame& frame, const FrontendPrediction& prediction) {
@@ -197,7 +206,6 @@ void Frontend::Impl::write(const StereoFrame& frame, bool keyframe, TrackedFrame
   out.stamp = frame.stamp;
   out.index = frame.index;
   out.keyframe = keyframe;
-  out.median_motion = medianMotion();
   out.features.clear();
   for (std::size_t c = 0; c < kMaxCameras; ++c) out.camera_present[c] = camera_[c].present;
   for (Track& track : tracks_) {
@@ -218,6 +226,7 @@ Status Frontend::Impl::step(const StereoFrame& frame, const FrontendPrediction& 
   if (const Status status = check(frame); !status.ok()) return status;
   const int limit = std::clamp(max_features, 0, static_cast<int>(kMaxFeatures));
   statistics_ = {};
+  takeExtrinsics(prediction);
   takeImages(frame, prediction);
   joinPredictions(prediction);
   for (std::size_t c = 0; c < rig_.camera_count; ++c) {

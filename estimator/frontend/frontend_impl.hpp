@@ -27,9 +27,8 @@ struct Track {
   int landmark = -1;   ///< index of its prediction in this frame's list
   /// Has a position in that camera's newest image (which may be an earlier frame's).
   std::array<bool, kMaxCameras> live{};
-  std::array<bool, kMaxCameras> had_previous{};  ///< `previous` holds the frame before
+  std::array<bool, kMaxCameras> had_previous{};  ///< `previous_bearing` holds the frame before
   std::array<Eigen::Vector2f, kMaxCameras> pixel{};
-  std::array<Eigen::Vector2f, kMaxCameras> previous{};
   std::array<Eigen::Vector3d, kMaxCameras> bearing{};
   std::array<Eigen::Vector3d, kMaxCameras> previous_bearing{};
   std::array<bool, kMaxCameras> in_keyframe{};
@@ -61,6 +60,7 @@ class Frontend::Impl {
   };
 
   Status check(const StereoFrame& frame) const;
+  void takeExtrinsics(const FrontendPrediction& prediction);
   void takeImages(const StereoFrame& frame, const FrontendPrediction& prediction);
   void joinPredictions(const FrontendPrediction& prediction);
   void trackCamera(std::size_t c, const FrontendPrediction& prediction);
@@ -87,7 +87,6 @@ class Frontend::Impl {
   void markKeyframe(Stamp stamp);
   void write(const StereoFrame& frame, bool keyframe, TrackedFrame& out);
   void darkImages();
-  [[nodiscard]] float medianMotion();
   bool place(Track& track, std::size_t c, const Eigen::Vector2f& pixel);
   [[nodiscard]] bool usesStereo() const { return rig_.camera_count > 1; }
 
@@ -110,7 +109,6 @@ class Frontend::Impl {
   std::array<int, kMaxLandmarks> track_of_landmark_{};        ///< -1: not tracked
   FixedVector<Eigen::Vector3d, kMaxFeatures> bearings_prev_, bearings_cur_;
   FixedVector<std::size_t, kMaxFeatures> owners_;
-  FixedVector<float, kMaxFeatures * kMaxCameras> values_;
   TrackId next_id_ = 1;
   bool has_keyframe_ = false;
   Stamp keyframe_stamp_;

@@ -1,4 +1,4 @@
-// Frontend::Impl: when a frame becomes a keyframe, and how much the image moved.
+// Frontend::Impl: when a frame becomes a keyframe.
 
 #include <algorithm>
 #include <cmath>
@@ -19,17 +19,6 @@ float median(FixedVector<float, kCapacity>& values) {
 }
 
 }  // namespace
-
-float Frontend::Impl::medianMotion() {
-  values_.clear();
-  for (const Track& track : tracks_) {
-    for (std::size_t c = 0; c < rig_.camera_count; ++c) {
-      if (!camera_[c].present || !track.live[c] || !track.had_previous[c]) continue;
-      values_.pushBack((track.pixel[c] - track.previous[c]).norm());
-    }
-  }
-  return values_.size() < kMinForMedian ? -1.0F : median(values_);
-}
 
 float Frontend::Impl::medianParallax() const {
   FixedVector<float, kMaxFeatures> parallax;

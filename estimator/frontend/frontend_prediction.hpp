@@ -23,6 +23,10 @@ struct FrontendPrediction {
   /// Body at this frame to body at the previous one: R_prev_cur (gyro, bias removed).
   Eigen::Quaterniond R_body_prev_body_cur = Eigen::Quaterniond::Identity();
   FixedVector<PredictedLandmark, kMaxLandmarks> landmarks;
+  /// Where extrinsics are estimated: how they stand, and how well one camera is known against the other.
+  bool has_extrinsics = false;
+  std::array<SE3, kMaxCameras> T_body_cam;
+  double stereo_rotation_sigma = 0;  ///< rad
 };
 
 }  // namespace swiftlet

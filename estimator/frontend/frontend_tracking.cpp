@@ -108,7 +108,6 @@ void Frontend::Impl::trackCamera(std::size_t c, const FrontendPrediction& predic
     if (!track.live[c]) continue;
     track.live[c] = false;
     if (!camera.has_history) continue;
-    const Eigen::Vector2f from = track.pixel[c];
     const Eigen::Vector3d from_bearing = track.bearing[c];
     Eigen::Vector2f pixel;
     if (!follow(track, c, predict(track, c, prediction), pixel)) {
@@ -119,7 +118,6 @@ void Frontend::Impl::trackCamera(std::size_t c, const FrontendPrediction& predic
       ++statistics_.lost;
       continue;
     }
-    track.previous[c] = from;
     track.previous_bearing[c] = from_bearing;
     track.had_previous[c] = true;
     ++statistics_.tracked;
@@ -176,7 +174,8 @@ void Frontend::Impl::verifyStereo() {
   if (!usesStereo() || !camera_[0].present || !camera_[1].present) return;
   for (Track& track : tracks_) {
     if (!track.live[0] || !track.live[1]) continue;
-    if (matcher_.epipolarDistance(track.bearing[0], track.bearing[1]) > settings_.stereo_gate) {
+    if (matcher_.epipolarDistance(track.bearing[0], track.bearing[1]) >
+        static_cast<double>(matcher_.gate())) {
       track.live[1] = false;
       ++statistics_.false_stereo;
     }

@@ -14,6 +14,7 @@ namespace {
 
 constexpr int kSearchLevel = 1;
 constexpr int kMaxSamples = 256;
+constexpr int kMaxStrips = 10;  // on each side of the curve
 // Below this a sampled place is not worth refining: the warp at infinity and whole-pixel sampling
 // cost some correlation, so it is lower than the final threshold.
 constexpr float kMinSearchCorrelation = 0.6F;
@@ -30,7 +31,13 @@ constexpr double kBeyondInfinity = 0.7;
 
 StereoMatcher::StereoMatcher(const Rig& rig, const StereoMatcherSettings& settings)
     : rig_(rig), settings_(settings) {
-  const SE3 T_1_0 = rig.T_cam1_cam0();
+  setExtrinsics(rig.T_body_cam, 0);
+}
+
+void StereoMatcher::setExtrinsics(const std::array<SE3, kMaxCameras>& T_body_cam, float slack) {
+  rig_.T_body_cam = T_body_cam;
+  slack_ = slack;
+  const SE3 T_1_0 = rig_.T_cam1_cam0();
   const SE3 T_0_1 = T_1_0.inverse();
   rotation_ = {T_1_0.rotation.toRotationMatrix(), T_0_1.rotation.toRotationMatrix()};
   translation_ = {T_1_0.translation, T_0_1.translation};
@@ -68,6 +75,7 @@ StereoMatcher::Candidates StereoMatcher::search(const Pyramid& from_image, std::
   const Eigen::Vector3d rotated = rotation_[from] * bearing;
   const Eigen::Vector3d& translation = translation_[from];
   const double nearest = 1.0 / settings_.min_depth;
+  const double farthest = -static_cast<double>(slack_) / (target.focal() * translation.norm());
   const int level = std::min(kSearchLevel, to_image.levels() - 1);
   const auto scale = static_cast<float>(1 << level);
 
@@ -84,30 +92,53 @@ StereoMatcher::Candidates StereoMatcher::search(const Pyramid& from_image, std::
   Eigen::Vector2d far_end;
   Eigen::Vector2d near_end;
   int samples = kMaxSamples;
-  if (target.project(rotated, far_end) && target.project(rotated + nearest * translation, near_end)) {
-    samples = std::clamp(static_cast<int>((near_end - far_end).norm() / scale) + 2, 2, kMaxSamples);
+  int strips = 0;  // beside the curve, on each side
+  Eigen::Vector2f step = Eigen::Vector2f::Zero();
+  if (target.project(rotated + farthest * translation, far_end) &&
+      target.project(rotated + nearest * translation, near_end)) {
+    const Eigen::Vector2d along = near_end - far_end;
+    samples = std::clamp(static_cast<int>(along.norm() / scale) + 2, 2, kMaxSamples);
+    strips = std::min(static_cast<int>(std::lround(slack_ / scale)), kMaxStrips);
+    step = scale * Eigen::Vector2d(-along.y(), along.x()).normalized().cast<float>();
   }
-  std::array<Candidate, kMaxSamples> sample;
-  int best = -1;
-  const ImageView& image = to_image.level(level);
-  for (int i = 0; i < samples; ++i) {
-    Candidate& c = sample[static_cast<std::size_t>(i)];
-    c.inverse_distance = nearest * i / (samples - 1);
+  const auto at = [&](double inverse_distance, const Eigen::Vector2f& aside, Candidate& c) {
+    c = Candidate{};
+    c.inverse_distance = inverse_distance;
     Eigen::Vector2d pixel;
-    if (!target.project(rotated + c.inverse_distance * translation, pixel)) continue;
-    c.pixel = pixel.cast<float>();
-    if (!patchInside(to_image.level(0), c.pixel)) continue;
-    c.correlation = pattern.correlation(image, static_cast<int>(std::lround(c.pixel.x() / scale)),
-                                        static_cast<int>(std::lround(c.pixel.y() / scale)));
-    if (best < 0 || c.correlation > sample[static_cast<std::size_t>(best)].correlation) best = i;
-  }
-  if (best < 0) return found;
-  found.best = sample[static_cast<std::size_t>(best)];
-  for (int i = 0; i < samples; ++i) {
-    const Candidate& c = sample[static_cast<std::size_t>(i)];
-    if (std::abs(i - best) > kPeakWidth && c.correlation > found.rival.correlation) found.rival = c;
+    if (!target.project(rotated + inverse_distance * translation, pixel)) return;
+    c.pixel = pixel.cast<float>() + aside;
+    if (!patchInside(to_image.level(0), c.pixel)) return;
+    c.correlation =
+        pattern.correlation(to_image.level(level), static_cast<int>(std::lround(c.pixel.x() / scale)),
+                            static_cast<int>(std::lround(c.pixel.y() / scale)));
+  };
+  std::array<Candidate, kMaxSamples> sample;
+  for (int strip = -strips; strip <= strips; ++strip) {
+    int best = 0;
+    for (int i = 0; i < samples; ++i) {
+      at(farthest + (nearest - farthest) * i / (samples - 1), static_cast<float>(strip) * step,
+         sample[static_cast<std::size_t>(i)]);
+      if (sample[static_cast<std::size_t>(i)].correlation >
+          sample[static_cast<std::size_t>(best)].correlation)
+        best = i;
+    }
+    Candidate rival;
+    for (int i = 0; i < samples; ++i) {
+      const Candidate& c = sample[static_cast<std::size_t>(i)];
+      if (std::abs(i - best) > kPeakWidth && c.correlation > rival.correlation) rival = c;
+    }
+    found.add(sample[static_cast<std::size_t>(best)], rival, strips > 0 ? scale * kPeakWidth : 0);
   }
   return found;
+}
+
+// Another strip's; what lies beside the best one is part of its peak.
+void StereoMatcher::Candidates::add(const Candidate& other_best, const Candidate& other_rival, float peak) {
+  Candidate second = other_best;
+  if (other_best.correlation > best.correlation) std::swap(best, second);
+  for (const Candidate& c : {second, other_rival}) {
+    if (c.correlation > rival.correlation && (c.pixel - best.pixel).norm() > peak) rival = c;
+  }
 }
 
 bool StereoMatcher::refine(const Pyramid& from_image, std::size_t from, const Eigen::Vector2f& from_pixel,
@@ -126,7 +157,7 @@ bool StereoMatcher::refine(const Pyramid& from_image, std::size_t from, const Ei
   Eigen::Vector3d other;
   if (!rig_.camera[1 - from].unproject(candidate.pixel.cast<double>(), other)) return false;
   const double distance = from == 0 ? epipolarDistance(bearing, other) : epipolarDistance(other, bearing);
-  if (distance > settings_.epipolar_gate) return false;
+  if (distance > static_cast<double>(gate())) return false;
   // Disparity towards the epipole direction: the component of the match beyond infinity.
   const Eigen::Vector3d at_infinity = rotation_[from] * bearing;
   const Eigen::Vector3d& translation = translation_[from];
@@ -134,7 +165,7 @@ bool StereoMatcher::refine(const Pyramid& from_image, std::size_t from, const Ei
   const double norm = along.norm();
   if (norm > 1e-9) {
     const double disparity = (other - at_infinity).dot(along) / norm * rig_.camera[1 - from].focal();
-    if (disparity < -kBeyondInfinity) return false;
+    if (disparity < -kBeyondInfinity - static_cast<double>(slack_)) return false;
   }
   if (settings_.back_check <= 0) return true;
   Eigen::Vector2f back = from_pixel;

@@ -30,6 +30,10 @@ class StereoMatcher {
  public:
   StereoMatcher(const Rig& rig, const StereoMatcherSettings& settings);
 
+  /// Where the cameras are, when that is estimated, and how far beyond the gate [px] a match may be because
+  /// of what is not known of it yet. Searching costs the more the larger that is.
+  void setExtrinsics(const std::array<SE3, kMaxCameras>& T_body_cam, float slack);
+
   /// Pixel in camera `from` to pixel in the other camera. False when there is no safe match.
   [[nodiscard]] bool match(const Pyramid& from_image, std::size_t from, const Eigen::Vector2f& from_pixel,
                            const Pyramid& to_image, Eigen::Vector2f& to_pixel) const;
@@ -39,6 +43,9 @@ class StereoMatcher {
   [[nodiscard]] double epipolarDistance(const Eigen::Vector3d& bearing0,
                                         const Eigen::Vector3d& bearing1) const;
 
+  /// px from the epipolar curve, what is not known of the cameras included.
+  [[nodiscard]] float gate() const { return settings_.epipolar_gate + slack_; }
+
  private:
   struct Candidate {
     double inverse_distance = 0;
@@ -47,6 +54,7 @@ class StereoMatcher {
   };
   struct Candidates {
     Candidate best, rival;
+    void add(const Candidate& other_best, const Candidate& other_rival, float peak);
   };
   [[nodiscard]] Candidates search(const Pyramid& from_image, std::size_t from,
                                   const Eigen::Vector2f& from_pixel, const Eigen::Vector3d& bearing,
@@ -60,6 +68,7 @@ class StereoMatcher {
 
   Rig rig_;
   StereoMatcherSettings settings_;
+  float slack_ = 0;  // px
   /// From each camera to the other.
   std::array<Eigen::Matrix3d, 2> rotation_;
   std::array<Eigen::Vector3d, 2> translation_;

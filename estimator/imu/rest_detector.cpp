@@ -44,15 +44,13 @@ constexpr double kDrift = 5.0;
 constexpr double kDriftGyroFloor = 0.006;  // rad/s
 constexpr double kDriftAccelFloor = 0.06;  // m/s^2
 
-constexpr double kStillPixels = 0.2;   // median motion of a frame: tracking noise is 0.05
-constexpr double kMovingPixels = 0.5;  // certainly motion
-constexpr Duration kStillTime = Duration::fromMilliseconds(250);
 constexpr Duration kImageLife = Duration::fromMilliseconds(300);  // an older verdict says nothing
 
 constexpr double kUnknownBias = 0.15;   // rad/s: a larger mean rate is no bias of a working sensor
 constexpr double kBiasMargin = 0.005;   // rad/s beyond 3 sigma of the known bias
 constexpr double kGravityMargin = 0.6;  // m/s^2: accelerometer bias and scale
 constexpr double kStandingSpeed = 0.1;  // m/s beyond 3 sigma: the estimate says that it moves
+constexpr double kSurelySlow = 0.03;    // m/s, speed + 2 sigma below it: the body is not moving
 
 double rms(const Eigen::Vector3d& squares, const Eigen::Vector3d& sum, double count) {
   const double variance = (squares / count - (sum / count).cwiseAbs2()).sum() / 3.0;
@@ -81,7 +79,7 @@ void RestDetector::addImu(const ImuSample& sample) {
   }
   has_last_ = true;
   last_ = sample.stamp;
-  if (state_.at_rest && images() != Images::kStill && jumps(sample)) startAnew();
+  if (state_.at_rest && images() != ImageMotion::kStill && jumps(sample)) startAnew();
   if (open_.count > 0 && sample.stamp - open_.begin >= kBlock) closeBlock();
   if (open_.count == 0) open_.begin = sample.stamp;
   open_.gyro += sample.gyro;
@@ -91,20 +89,12 @@ void RestDetector::addImu(const ImuSample& sample) {
   open_.count += 1;
 }
 
-void RestDetector::addFrame(Stamp stamp, double median_motion) {
-  if (median_motion < 0) {
-    image_kind_ = Images::kUnknown;
-    return;
-  }
-  const bool was_still = image_kind_ == Images::kStill && stamp - image_stamp_ <= kImageLife;
-  if (median_motion < kStillPixels) {
-    image_kind_ = Images::kStill;
-    if (!was_still) still_since_ = stamp;
-  } else {
-    image_kind_ = median_motion < kMovingPixels ? Images::kUncertain : Images::kMoving;
-  }
+void RestDetector::addFrame(Stamp stamp, ImageMotion motion) {
+  // Images are back: the IMU alone cannot tell rest from constant velocity, so they have to confirm it.
+  const bool first = images() == ImageMotion::kUnknown && motion == ImageMotion::kUncertain;
+  image_motion_ = motion;
   image_stamp_ = stamp;
-  if (image_kind_ == Images::kMoving) end();
+  if (motion == ImageMotion::kMoving || first) end();
 }
 
 void RestDetector::setEstimate(const Eigen::Vector3d& bias_gyro, double bias_gyro_sigma, double speed,
@@ -116,10 +106,8 @@ void RestDetector::setEstimate(const Eigen::Vector3d& bias_gyro, double bias_gyr
   speed_sigma_ = speed_sigma;
 }
 
-RestDetector::Images RestDetector::images() const {
-  if (last_ - image_stamp_ > kImageLife) return Images::kUnknown;
-  if (image_kind_ == Images::kStill && image_stamp_ - still_since_ < kStillTime) return Images::kUncertain;
-  return image_kind_;
+ImageMotion RestDetector::images() const {
+  return last_ - image_stamp_ > kImageLife ? ImageMotion::kUnknown : image_motion_;
 }
 
 RestDetector::Window RestDetector::window(std::size_t blocks) const {
@@ -156,6 +144,10 @@ bool RestDetector::speedAllows() const {
   return !has_estimate_ || speed_ < 3.0 * speed_sigma_ + kStandingSpeed;
 }
 
+bool RestDetector::standsByEstimate() const {
+  return has_estimate_ && speed_ + 2.0 * speed_sigma_ < kSurelySlow;
+}
+
 bool RestDetector::within(const Window& w, double slow_factor, double gyro_limit, double accel_limit) const {
   return w.slow_gyro < slow_factor * slow_gyro_limit_ && w.slow_accel < slow_factor * slow_accel_limit_ &&
          w.gyro < gyro_limit && w.accel < accel_limit && meansAllow(w);
@@ -179,14 +171,14 @@ bool RestDetector::drifts(const Block& block) const {
 void RestDetector::closeBlock() {
   blocks_[block_count_ % kLongBlocks] = open_;
   ++block_count_;
-  if (state_.at_rest && images() != Images::kStill && drifts(open_)) end();
+  if (state_.at_rest && images() != ImageMotion::kStill && drifts(open_)) end();
   if (state_.at_rest) rest_.add(open_);
   open_ = Block{};
   if (block_count_ < kImageBlocks) return;
 
-  const Images images = this->images();
+  const ImageMotion images = this->images();
   const Window image_window = window(kImageBlocks);
-  const bool by_images = images == Images::kStill && withinImageLimits(image_window);
+  const bool by_images = images == ImageMotion::kStill && speedAllows() && withinImageLimits(image_window);
   if (block_count_ < kShortBlocks) {
     if (by_images && !state_.at_rest) begin(image_window);
     return;
@@ -208,22 +200,22 @@ void RestDetector::closeBlock() {
   drift_accel_ = std::max(kDrift * short_window.slow_accel, kDriftAccelFloor);
 
   if (state_.at_rest) {
-    const bool holds = images == Images::kStill
+    const bool holds = images == ImageMotion::kStill
                            ? withinImageLimits(short_window)
                            : within(short_window, kHoldFactor, kImageGyroLimit, kImageAccelLimit);
     if (!holds) end();
   }
   if (block_count_ >= kLongBlocks) updateLimits(window(kLongBlocks));
-  if (!state_.at_rest && images != Images::kMoving) {
-    const bool imu_may = speedAllows();
-    if (by_images) {
-      begin(image_window);
-    } else if (imu_may && within(short_window, kShortSlowFactor, kShortGyroLimit, kShortAccelLimit)) {
-      begin(short_window);
-    } else if (imu_may && block_count_ >= kLongBlocks) {
-      const Window long_window = window(kLongBlocks);
-      if (within(long_window, 1.0, kGyroLimit, kAccelLimit)) begin(long_window);
-    }
+  const bool quiet = within(short_window, kShortSlowFactor, kShortGyroLimit, kShortAccelLimit);
+  const Window long_window = block_count_ >= kLongBlocks ? window(kLongBlocks) : short_window;
+  const bool long_quiet = block_count_ >= kLongBlocks && within(long_window, 1.0, kGyroLimit, kAccelLimit);
+  const bool slow = images == ImageMotion::kStill || images == ImageMotion::kSlow;
+  state_.quiet = (quiet || long_quiet) && slow;
+  const bool imu_may = images == ImageMotion::kUnknown || (slow && standsByEstimate());
+  if (!state_.at_rest && by_images) {
+    begin(image_window);
+  } else if (!state_.at_rest && imu_may && speedAllows() && (quiet || long_quiet)) {
+    begin(quiet ? short_window : long_window);
   }
   if (state_.at_rest) {
     state_.duration = (last_ - rest_.begin).seconds();
@@ -235,6 +227,7 @@ void RestDetector::closeBlock() {
 void RestDetector::begin(const Window& w) {
   rest_ = w.sum;
   state_.at_rest = true;
+  state_.number = ++rests_;
   state_.since = w.sum.begin;
   state_.duration = (last_ - rest_.begin).seconds();
   state_.mean_gyro = rest_.gyro / rest_.count;
@@ -249,6 +242,8 @@ void RestDetector::startAnew() {
 
 void RestDetector::end() {
   state_.at_rest = false;
+  state_.quiet = false;
+  state_.number = 0;
   state_.duration = 0;
 }
 

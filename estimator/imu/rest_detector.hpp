@@ -7,11 +7,12 @@
 // and any sample that jumps out of it ends a rest at once. The slow limits follow the sensor's own
 // noise (the quietest window so far) between fixed bounds, so that they are neither blind to a
 // coarse sensor nor lax on a fine one.
-//   IMU alone:  1 s within the limits, or 0.5 s well within them; not while the estimate says that
-//               the body moves, nor with a mean rate that no bias explains.
-//   Images:     still images (below 0.2 px a frame) for 0.25 s admit and hold a rest at wider IMU
-//               limits; moving ones (from 0.5 px) end and forbid it. In between, and where the
-//               motion is unknown (negative), the IMU decides alone.
+//   IMU alone:  1 s within the limits, or 0.5 s well within them, where there are no images.
+//   Images:     still: a rest begins and continues within wider IMU limits. Slow: a rest begins within the
+//               normal limits if the estimated speed is also near zero. Moving: a rest ends. Otherwise no
+//               rest begins, and one in progress continues within the IMU limits.
+// No rest begins while the estimated speed is significantly above zero, or while the mean rate exceeds any
+// plausible gyro bias.
 // Frames: body axes. Units: SI, pixels.
 // Use: `at_rest` is for a SOFT factor (zero velocity, unchanged pose), never for setting a state.
 // Cost: about 30 ns a sample; fixed memory (3 kB); nothing is allocated.
@@ -32,8 +33,16 @@ namespace swiftlet {
 /// m/s, 1 sigma of the velocity of a body that is at rest.
 inline constexpr double kRestVelocitySigma = 0.01;
 
+/// Image motion, as ImageStillness (estimator/odometry) classifies it.
+enum class ImageMotion : std::uint8_t { kUnknown, kStill, kSlow, kUncertain, kMoving };
+
 struct RestState {
   bool at_rest = false;
+  /// The IMU is within the rest limits and the images move slowly at most. Weaker than `at_rest`: only a
+  /// prior for the first velocity.
+  bool quiet = false;
+  /// Number of the rest, from 1; 0: not at rest. States with the same number have the same pose.
+  std::uint32_t number = 0;
   Stamp since;                                           ///< start of the rest (valid at rest)
   double duration = 0;                                   ///< s of the rest that the means cover
   Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero();   ///< rad/s over the rest: the gyro bias
@@ -50,13 +59,15 @@ class RestDetector {
   /// start anew.
   void addImu(const ImuSample& sample);
 
-  /// Takes the median pixel motion since the previous frame; negative: unknown (no tracks).
-  void addFrame(Stamp stamp, double median_motion);
+  void addFrame(Stamp stamp, ImageMotion motion);
 
   /// Takes what the smoother knows, once it is converged; without it biases up to 0.15 rad/s pass.
   /// `bias_gyro_sigma`: rad/s. `speed`, `speed_sigma`: m/s.
   void setEstimate(const Eigen::Vector3d& bias_gyro, double bias_gyro_sigma, double speed,
                    double speed_sigma);
+
+  /// After a reset of the smoother: discards the bias and speed of setEstimate.
+  void forgetEstimate() { has_estimate_ = false; }
 
   [[nodiscard]] const RestState& state() const { return state_; }
   void reset();
@@ -77,16 +88,16 @@ class RestDetector {
     double gyro = 0, accel = 0;            // RMS deviation of the samples
     double slow_gyro = 0, slow_accel = 0;  // RMS deviation of the 0.1 s means
   };
-  enum class Images : std::uint8_t { kUnknown, kStill, kUncertain, kMoving };
 
   static constexpr std::size_t kLongBlocks = 20;   // 1 s
   static constexpr std::size_t kShortBlocks = 10;  // 0.5 s
   static constexpr std::size_t kImageBlocks = 6;   // 0.3 s
 
   [[nodiscard]] Window window(std::size_t blocks) const;
-  [[nodiscard]] Images images() const;
+  [[nodiscard]] ImageMotion images() const;
   [[nodiscard]] bool meansAllow(const Window& w) const;
   [[nodiscard]] bool speedAllows() const;
+  [[nodiscard]] bool standsByEstimate() const;
   [[nodiscard]] bool within(const Window& w, double slow_factor, double gyro_limit, double accel_limit) const;
   [[nodiscard]] bool withinImageLimits(const Window& w) const;
   [[nodiscard]] bool jumps(const ImuSample& sample) const;
@@ -99,6 +110,7 @@ class RestDetector {
 
   ImuNoise noise_;
   RestState state_;
+  std::uint32_t rests_ = 0;
   std::array<Block, kLongBlocks> blocks_{};
   std::size_t block_count_ = 0;  // blocks ever closed since the windows began
   Block open_;
@@ -113,9 +125,8 @@ class RestDetector {
   Eigen::Vector3d window_accel_ = Eigen::Vector3d::Zero();
   double slow_gyro_limit_;
   double slow_accel_limit_;
-  Images image_kind_ = Images::kUnknown;
+  ImageMotion image_motion_ = ImageMotion::kUnknown;
   Stamp image_stamp_;
-  Stamp still_since_;
   bool has_estimate_ = false;
   Eigen::Vector3d bias_gyro_ = Eigen::Vector3d::Zero();
   double bias_gyro_sigma_ = 0;

@@ -9,9 +9,21 @@
 
 namespace swiftlet {
 
+/// Prior standard deviations of the given calibration, used when it is estimated in flight.
+inline constexpr double kTimeOffsetPriorSigma = 5e-3;         ///< s
+inline constexpr double kExtrinsicRotationPriorSigma = 0.01;  ///< rad
+/// Calibrations give positions to a few millimetres. A looser prior would lose the baseline, hence stereo's
+/// scale.
+inline constexpr double kExtrinsicPositionPriorSigma = 2e-3;  ///< m
+
+/// Sigmas: largest over the axes, from the last solve; 0 where the value is not estimated.
 struct CalibrationEstimate {
   Duration camera_to_imu_shift;  ///< t_imu = t_image + shift
   std::array<SE3, kMaxCameras> T_body_cam;
+  double shift_sigma = 0;                            ///< s
+  std::array<double, kMaxCameras> rotation_sigma{};  ///< rad
+  std::array<double, kMaxCameras> position_sigma{};  ///< m
+  double stereo_rotation_sigma = 0;                  ///< rad, of camera 1 relative to camera 0
 };
 
 }  // namespace swiftlet

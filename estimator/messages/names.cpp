@@ -55,6 +55,36 @@ std::string_view eventName(EventKind kind) {
       return "capacity_reached";
     case EventKind::kStampsWentBack:
       return "stamps_went_back";
+    case EventKind::kDoubt:
+      return "doubt";
+  }
+  return "unknown";
+}
+
+std::string_view doubtName(Doubt doubt) {
+  switch (doubt) {
+    case Doubt::kNone:
+      return "none";
+    case Doubt::kNoImage:
+      return "no_image";
+    case Doubt::kImplausible:
+      return "implausible";
+    case Doubt::kTracksDisagree:
+      return "tracks_disagree";
+    case Doubt::kImuDisagrees:
+      return "imu_disagrees";
+    case Doubt::kUncertain:
+      return "uncertain";
+    case Doubt::kScaleDisagrees:
+      return "scale_disagrees";
+    case Doubt::kScaleUnknown:
+      return "scale_unknown";
+    case Doubt::kSettling:
+      return "settling";
+    case Doubt::kCameraMissing:
+      return "camera_missing";
+    case Doubt::kFewSightings:
+      return "few_sightings";
   }
   return "unknown";
 }

@@ -12,5 +12,6 @@ std::string_view healthName(Health health);
 /// None: no word of these.
 std::optional<Health> healthNamed(std::string_view name);
 std::string_view eventName(EventKind kind);
+std::string_view doubtName(Doubt doubt);
 
 }  // namespace swiftlet

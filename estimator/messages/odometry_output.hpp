@@ -28,6 +28,23 @@ enum class EventKind : std::uint8_t {
   kReset,            ///< value: the new epoch
   kCapacityReached,  ///< value: items given up
   kStampsWentBack,   ///< value: seconds by which the IMU's stamps went back for good; a new epoch begins
+  kDoubt,            ///< value: the Doubt by which health is not good
+};
+
+/// Why health is not good: the first condition that holds, in this order.
+enum class Doubt : std::uint8_t {
+  kNone,
+  kNoImage,         ///< no image accepted for 0.3 s: coasting on the IMU
+  kImplausible,     ///< speed or acceleration above the vehicle's limits
+  kTracksDisagree,  ///< many tracks do not fit one motion: calibration, rolling shutter, stamps or a moving
+                    ///< scene
+  kImuDisagrees,    ///< IMU residuals too large: extrinsics, axes, stamps or noise densities
+  kUncertain,       ///< sigma of velocity or tilt too large
+  kScaleDisagrees,  ///< one camera: the accelerometer contradicts the scale
+  kScaleUnknown,    ///< one camera: not enough acceleration yet to confirm the scale
+  kSettling,        ///< shortly after a start or after another doubt
+  kCameraMissing,
+  kFewSightings,
 };
 
 struct Event {
@@ -41,12 +58,16 @@ struct FrameStatistics {
   bool keyframe = false;
   bool at_rest = false;
   int tracks = 0;               ///< features handed in
+  int known = 0;                ///< of these, features whose landmark has earlier sightings in the window
   int landmarks = 0;            ///< landmarks in the solved window
   int inliers_mono = 0;         ///< accepted sightings of this frame, by one camera
   int inliers_stereo = 0;       ///< accepted, by both cameras
   double track_length = 0;      ///< mean frames a track of this frame has lived
   double reprojection_rms = 0;  ///< px, accepted sightings of the window
-  double imu_residual = 0;      ///< whitened IMU residual of the newest interval, RMS (1 = nominal)
+  double imu_residual = 0;      ///< whitened IMU residuals of the window, RMS (1: as the noise model says)
+  /// One camera: true over estimated length, as the accelerometer says, and its sigma (scale_check.hpp).
+  double scale = 1;
+  double scale_sigma = 0;
   int iterations = 0;
 };
 
@@ -61,6 +82,7 @@ struct OdometryOutput {
   const char* waiting_for = "";  ///< literal text while initializing
   NavState state;
   FrameStatistics statistics;
+  Doubt doubt = Doubt::kSettling;  ///< none: health is good
   CalibrationEstimate calibration;
   FixedVector<KeyframeState, kMaxStates> left_window;
   FixedVector<Event, 32> events;

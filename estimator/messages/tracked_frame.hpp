@@ -26,8 +26,6 @@ struct TrackedFrame {
   std::uint32_t timeline = 0;  ///< StereoFrame::timeline
   std::array<bool, kMaxCameras> camera_present{};
   bool keyframe = false;
-  /// Median pixel motion of the tracks since the previous frame; negative when unknown.
-  float median_motion = -1.0F;
   /// Frames refused since the last tracked one, and the newest refused one's stamp.
   int refused_before = 0;
   Stamp refused_stamp;

@@ -37,6 +37,7 @@ void EventWatch::reset() {
   any_ = false;
   initialized_ = false;
   health_ = Health::kInitializing;
+  doubt_ = Doubt::kNone;
 }
 
 void EventWatch::step(const Frame& frame, EventBuffer& events) {
@@ -45,6 +46,7 @@ void EventWatch::step(const Frame& frame, EventBuffer& events) {
   if (frame.health != health_) {
     events.raise(frame.stamp, EventKind::kHealthChanged, static_cast<double>(frame.health));
   }
+  watchDoubt(frame, events);
   health_ = frame.health;
   if (!initialized_ && frame.health != Health::kInitializing) {
     initialized_ = true;
@@ -56,6 +58,17 @@ void EventWatch::step(const Frame& frame, EventBuffer& events) {
   at_rest_ = frame.at_rest;
   watchCameras(frame, events);
   watchBlackout(frame.stamp, frame.seconds_without_image, events);
+}
+
+// With each change of health, and while it stays bad when the reason changes, but not more often than that.
+void EventWatch::watchDoubt(const Frame& frame, EventBuffer& events) {
+  if (frame.doubt == doubt_ || frame.doubt == Doubt::kSettling) return;
+  constexpr Duration kPause = Duration::fromMilliseconds(1000);
+  const bool pause_over = doubt_ == Doubt::kNone || frame.stamp - doubt_told_ >= kPause;
+  if (frame.health == health_ && !pause_over) return;
+  doubt_ = frame.doubt;
+  doubt_told_ = frame.stamp;
+  if (doubt_ != Doubt::kNone) events.raise(frame.stamp, EventKind::kDoubt, static_cast<double>(doubt_));
 }
 
 void EventWatch::watchCameras(const Frame& frame, EventBuffer& events) {

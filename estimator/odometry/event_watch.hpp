@@ -36,6 +36,7 @@ class EventWatch {
     std::size_t cameras = 1;  ///< of the rig
     bool at_rest = false;
     Health health = Health::kInitializing;
+    Doubt doubt = Doubt::kSettling;
     double seconds_without_image = 0;
   };
   void step(const Frame& frame, EventBuffer& events);
@@ -43,6 +44,7 @@ class EventWatch {
   void watchBlackout(Stamp stamp, double seconds_without_image, EventBuffer& events);
 
  private:
+  void watchDoubt(const Frame& frame, EventBuffer& events);
   void watchCameras(const Frame& frame, EventBuffer& events);
 
   /// One missed image happens on a busy bus; three running are a fault (as in Pairing).
@@ -54,6 +56,8 @@ class EventWatch {
   bool dark_ = false;
   Stamp dark_since_;
   Health health_ = Health::kInitializing;
+  Doubt doubt_ = Doubt::kNone;  ///< the last that was told of
+  Stamp doubt_told_;
   std::array<int, kMaxCameras> missing_{};
 };
 

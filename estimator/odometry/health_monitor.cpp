@@ -1,40 +1,162 @@
 #include "estimator/odometry/health_monitor.hpp"
 
 #include <algorithm>
+#include <cmath>
+
+#include "estimator/messages/state_sigmas.hpp"
+#include "estimator/odometry/scale_check.hpp"
 
 namespace swiftlet {
 namespace {
 
-constexpr int kSettlingImages = 10;
 // Coasting position error grows with the cube of time: after 3 s it is metres.
 constexpr double kCoastLimit = 3.0;  // s
+// After a start and after a doubt: ten images at 20 Hz.
+constexpr double kSettlingTime = 0.45;  // s
+constexpr double kStampSlack = 1e-3;    // s: sums of frame intervals are exact to rounding
+// The settling time doubles with each loss, until the estimate has been good for long.
+constexpr int kMostLosses = 4;
+constexpr double kForgivenTime = 10.0;  // s of good
+// Figures of single frames scatter: low pass.
+constexpr double kAverageTime = 0.5;  // s
+// 3 sigma: 0.6 m/s and 6 degrees. Healthy flights stay below a third of it.
+constexpr double kVelocitySigma = 0.2;  // m/s
+constexpr double kTiltSigma = 0.035;    // rad
+// Inliers among the sightings of known landmarks; healthy flights have 87 % or more, with a person in view
+// too.
+constexpr double kFitShare = 0.75;
+// Residuals of the IMU's motion, in sigmas of its noise as in flight. Where the noise model holds they are
+// 0.1 to 0.3, with real sensors up to 1.2.
+constexpr double kImuResidual = 2.0;
+// Far outside the limits: the estimate is useless.
+constexpr double kUselessVelocitySigma = 1.0;  // m/s
+constexpr double kUselessImuResidual = 5.0;
+constexpr double kUselessShare = 0.3;
+constexpr double kLostTime = 2.0;  // s, until the state is discarded
+// One camera: a contradicted start is discarded sooner than a scale that was good before.
+constexpr double kWrongStartTime = 1.0;  // s
+constexpr double kWrongScaleTime = 3.0;  // s
+
+double lowPass(double before, double now, double seconds) {
+  return before + (1 - std::exp(-seconds / kAverageTime)) * (now - before);
+}
+
+bool scaleOffBy(double bound, const FrameStatistics& statistics) {
+  return std::abs(statistics.scale - 1) > bound + 2 * statistics.scale_sigma;
+}
 
 }  // namespace
 
 void HealthMonitor::reset() {
   health_ = Health::kInitializing;
+  doubt_ = Doubt::kSettling;
   has_image_ = false;
-  settling_ = kSettlingImages;
+  last_.reset();
+  settled_ = 0;
+  share_ = 1;
+  imu_square_ = 0;
+  acceleration_ = 0;
+  scale_known_ = false;
+  beyond_use_ = 0;
+  contradicted_ = 0;
+  was_good_ = false;
+  good_ = 0;
+  lost_ = false;
 }
 
-Health HealthMonitor::update(const TrackedFrame& frame, const FrameStatistics& statistics,
-                             std::size_t cameras, bool imu_missing, bool first_of_epoch) {
-  const int sightings = statistics.inliers_mono + statistics.inliers_stereo;
-  if (first_of_epoch) settling_ = kSettlingImages;
+void HealthMonitor::average(const Evidence& evidence, double seconds) {
+  const FrameStatistics& s = evidence.statistics;
+  const int fit = s.inliers_mono + s.inliers_stereo;
+  if (s.known >= kMinSightings)
+    share_ = lowPass(share_, std::min(1.0, fit / static_cast<double>(s.known)), seconds);
+  imu_square_ = lowPass(imu_square_, s.imu_residual * s.imu_residual, seconds);
+  if (seconds > 0) {
+    acceleration_ =
+        lowPass(acceleration_, (evidence.state.v_world_body - last_velocity_).norm() / seconds, seconds);
+  }
+}
+
+Doubt HealthMonitor::inputDoubt(const Evidence& evidence) const {
+  bool all_cameras = true;
+  for (std::size_t c = 0; c < cameras_; ++c) all_cameras = all_cameras && evidence.frame.camera_present[c];
+  if (!all_cameras) return Doubt::kCameraMissing;
+  if (evidence.statistics.inliers_mono + evidence.statistics.inliers_stereo < kNominalSightings) {
+    return Doubt::kFewSightings;
+  }
+  return Doubt::kNone;
+}
+
+// Once confirmed the scale stays known without further acceleration, until the accelerometer contradicts it.
+Doubt HealthMonitor::scaleDoubt(const FrameStatistics& statistics) {
+  if (cameras_ != 1) return Doubt::kNone;
+  if (scaleOffBy(ScaleCheck::kAgrees, statistics)) return Doubt::kScaleDisagrees;
+  scale_known_ = scale_known_ || (statistics.scale_sigma < ScaleCheck::kKnown &&
+                                  std::abs(statistics.scale - 1) < ScaleCheck::kAgrees);
+  return scale_known_ ? Doubt::kNone : Doubt::kScaleUnknown;
+}
+
+Doubt HealthMonitor::accuracyDoubt(const Evidence& evidence) {
+  const NavState& state = evidence.state;
+  if (state.v_world_body.norm() > max_speed_ || acceleration_ > max_acceleration_) return Doubt::kImplausible;
+  if (share_ < kFitShare) return Doubt::kTracksDisagree;
+  if (imu_square_ > kImuResidual * kImuResidual) return Doubt::kImuDisagrees;
+  if (velocitySigma(state) > kVelocitySigma || tiltSigma(state) > kTiltSigma) return Doubt::kUncertain;
+  return scaleDoubt(evidence.statistics);
+}
+
+// One camera only: with two, a new start from the same data would end the same way.
+bool HealthMonitor::contradicted(const FrameStatistics& statistics) const {
+  if (cameras_ != 1) return false;
+  if (scaleOffBy(ScaleCheck::kContradicts, statistics)) return true;
+  return !was_good_ && (imu_square_ > kImuResidual * kImuResidual || share_ < kFitShare);
+}
+
+bool HealthMonitor::beyondUse(const NavState& state) const {
+  return state.v_world_body.norm() > max_speed_ || velocitySigma(state) > kUselessVelocitySigma ||
+         imu_square_ > kUselessImuResidual * kUselessImuResidual || share_ < kUselessShare;
+}
+
+double HealthMonitor::settlingTime() const { return kSettlingTime * static_cast<double>(1 << losses_); }
+
+Health HealthMonitor::update(const Evidence& evidence) {
+  const TrackedFrame& frame = evidence.frame;
+  const FrameStatistics& statistics = evidence.statistics;
+  const double seconds = last_ ? (frame.stamp - *last_).seconds() : 0;
   const double without_image = secondsWithoutImage(frame.stamp);
-  if (imu_missing || without_image > kGoodAge) settling_ = std::max(settling_, kSettlingImages);
-  if (sightings >= kMinSightings || first_of_epoch) {
+  const bool accepted =
+      evidence.first_of_epoch || statistics.inliers_mono + statistics.inliers_stereo >= kMinSightings;
+  if (!evidence.first_of_epoch) average(evidence, seconds);
+  last_ = frame.stamp;
+  last_velocity_ = evidence.state.v_world_body;
+  if (accepted) {
+    // Time without images does not count as settling.
+    if (without_image <= kGoodAge) settled_ += seconds;
     last_accepted_ = frame.stamp;
     has_image_ = true;
-    settling_ = std::max(settling_ - 1, 0);
   }
-  bool all_cameras = true;
-  for (std::size_t c = 0; c < cameras; ++c) all_cameras = all_cameras && frame.camera_present[c];
-  if (first_of_epoch || (health_ == Health::kInitializing && settling_ > 0)) {
-    health_ = Health::kInitializing;
-  } else {
-    health_ =
-        sightings >= kNominalSightings && all_cameras && settling_ == 0 ? Health::kGood : Health::kDegraded;
+  const Doubt accuracy = accuracyDoubt(evidence);
+  if (accuracy != Doubt::kNone || evidence.imu_missing || without_image > kGoodAge) settled_ = 0;
+  if (accepted) {
+    beyond_use_ = beyondUse(evidence.state) ? beyond_use_ + seconds : 0;
+    contradicted_ = contradicted(evidence.statistics) ? contradicted_ + seconds : 0;
+  }
+  const bool lost_before = lost_;
+  lost_ = beyond_use_ > kLostTime || contradicted_ > (was_good_ ? kWrongScaleTime : kWrongStartTime);
+  if (lost_ && !lost_before) losses_ = std::min(losses_ + 1, kMostLosses);
+  const Doubt input = inputDoubt(evidence);
+  doubt_ = without_image > kGoodAge && !accepted     ? Doubt::kNoImage
+           : accuracy != Doubt::kNone                ? accuracy
+           : settled_ < settlingTime() - kStampSlack ? Doubt::kSettling
+                                                     : input;
+  if (doubt_ == Doubt::kNone) {
+    health_ = Health::kGood;
+    was_good_ = true;
+    good_ += seconds;
+    if (good_ > kForgivenTime) losses_ = 0;
+  } else if (health_ != Health::kInitializing) {
+    health_ = beyond_use_ > 0 ? Health::kFailed : Health::kDegraded;
+  } else if (doubt_ == Doubt::kCameraMissing || doubt_ == Doubt::kFewSightings) {
+    health_ = Health::kDegraded;  // accurate, with less than nominal input
   }
   health_ = at(frame.stamp);
   return health_;

@@ -1,19 +1,26 @@
 #pragma once
-// What the estimate may be used for: the rules that turn a frame's figures into `Health`.
+// Health: a statement of the estimate's accuracy, made after each solve.
 //
-//  initializing  until the 10th accepted image of an epoch: tilt and velocity settle
-//  good          25 accepted sightings, an image of every camera of the rig, none accepted over 0.3 s ago
-//  degraded      a camera missing, fewer sightings, or coasting on the IMU for less than the limit; samples
-//                missing, or coasting for more than 0.3 s, and the 9 accepted images after it, in which the
-//                state that drifted settles again
-//  failed        no accepted image (8 sightings) for 3 s; the next accepted image ends it
-// Sightings by both cameras count once. Residuals and covariance are not looked at. No memory, O(1).
+//  initializing  until the epoch is good for the first time
+//  good          no doubt now, nor during the settling time (0.45 s of accepted images) before
+//  degraded      a doubt; or coasting on the IMU for less than 3 s
+//  failed        no accepted image (8 sightings) for 3 s; or, after the epoch was good, figures far outside
+//                the limits
+// Doubt (odometry_output.hpp) lists the conditions: bounds on the sigmas of velocity and tilt, on the share
+// of inliers, on the IMU residuals relative to the noise model, on speed and acceleration, and with one
+// camera on the disagreement with the accelerometer's scale (scale_check.hpp).
+// tests/odometry/health_statistics.cpp shows what they achieve on good and faulty flights. `lost()` asks for
+// a new epoch: figures far outside the limits for 2 s, or with one camera a contradicted start (1 s) or scale
+// (3 s). After each such loss the settling time doubles. Sightings by both cameras count once. No memory,
+// O(1).
 
 #include <cstdint>
+#include <optional>
 
 #include "estimator/messages/nav_state.hpp"
 #include "estimator/messages/odometry_output.hpp"
 #include "estimator/messages/tracked_frame.hpp"
+#include "estimator/odometry/odometry_settings.hpp"
 
 namespace swiftlet {
 
@@ -28,14 +35,27 @@ class HealthMonitor {
   /// With fewer it is not good.
   static constexpr int kNominalSightings = 25;
 
+  HealthMonitor(const OdometrySettings& settings, std::size_t cameras)
+      : max_speed_(settings.max_speed), max_acceleration_(settings.max_acceleration), cameras_(cameras) {}
+
   void reset();
 
-  /// After a solve. `imu_missing`: samples were missing since the last frame.
-  Health update(const TrackedFrame& frame, const FrameStatistics& statistics, std::size_t cameras,
-                bool imu_missing, bool first_of_epoch);
+  struct Evidence {
+    const TrackedFrame& frame;
+    const FrameStatistics& statistics;
+    const NavState& state;     ///< with its covariance
+    bool imu_missing = false;  ///< samples were missing since the last frame
+    bool first_of_epoch = false;
+  };
+  /// After a solve.
+  Health update(const Evidence& evidence);
 
   /// The health after the last update.
   [[nodiscard]] Health health() const { return health_; }
+  /// Why it is not good.
+  [[nodiscard]] Doubt doubt() const { return doubt_; }
+  /// The state should be discarded and started again.
+  [[nodiscard]] bool lost() const { return lost_; }
   /// The health at a later stamp without a new frame: images that stay away degrade it.
   [[nodiscard]] Health at(Stamp stamp) const;
   /// The same for who has only the last verdict and the stamp of the last accepted image.
@@ -45,10 +65,34 @@ class HealthMonitor {
   [[nodiscard]] double secondsWithoutImage(Stamp stamp) const;
 
  private:
+  void average(const Evidence& evidence, double seconds);
+  [[nodiscard]] Doubt inputDoubt(const Evidence& evidence) const;
+  [[nodiscard]] Doubt accuracyDoubt(const Evidence& evidence);
+  [[nodiscard]] Doubt scaleDoubt(const FrameStatistics& statistics);
+  [[nodiscard]] double settlingTime() const;
+  [[nodiscard]] bool contradicted(const FrameStatistics& statistics) const;
+  [[nodiscard]] bool beyondUse(const NavState& state) const;
+
+  double max_speed_;
+  double max_acceleration_;
+  std::size_t cameras_;
   Health health_ = Health::kInitializing;
+  Doubt doubt_ = Doubt::kSettling;
   bool has_image_ = false;
   Stamp last_accepted_;
-  int settling_ = 0;  ///< accepted images until the state has settled
+  std::optional<Stamp> last_;  ///< frame of the epoch
+  Eigen::Vector3d last_velocity_ = Eigen::Vector3d::Zero();
+  double settled_ = 0;        ///< s of accepted images since the last doubt
+  double share_ = 1;          ///< of a frame's sightings that fit, low pass
+  double imu_square_ = 0;     ///< of the IMU's residual, low pass
+  double acceleration_ = 0;   ///< m/s^2, low pass
+  bool scale_known_ = false;  ///< shown once in this epoch
+  double beyond_use_ = 0;     ///< s
+  double contradicted_ = 0;   ///< s
+  bool was_good_ = false;     ///< in this epoch
+  double good_ = 0;           ///< s, in this epoch
+  int losses_ = 0;            ///< epochs given up, not forgiven yet
+  bool lost_ = false;
 };
 
 }  // namespace swiftlet

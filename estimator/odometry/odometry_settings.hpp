@@ -16,6 +16,9 @@ struct OdometrySettings {
   bool estimate_time_offset = false;
   bool estimate_extrinsics = false;
   bool use_stereo = true;  ///< false: camera 0 alone
+  /// What the vehicle can do: an estimate beyond it is not good.
+  double max_speed = 30;         ///< m/s
+  double max_acceleration = 50;  ///< m/s^2, over half a second
   /// Ties landmarks to the planes that the mesher finds.
   bool regularity_enabled = false;
   double plane_point_sigma =

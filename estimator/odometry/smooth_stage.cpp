@@ -6,13 +6,15 @@
 namespace swiftlet {
 namespace {
 
-// The first frames decide tilt, velocity and biases: they get more iterations than the steady state.
-constexpr std::uint64_t kStartFrames = 20;
+// The first second's frames decide tilt, velocity and biases: they get more iterations than the steady state.
+constexpr double kStartTime = 1.0;    // s
+constexpr double kStampSlack = 1e-3;  // s: stamps of frames a period apart are so to rounding
 constexpr int kStartIterations = 8;
 // What a flying body may be doing at its first image, in each axis.
 constexpr double kStartVelocitySigma = 2.0;    // m/s
 constexpr double kStartGyroBiasSigma = 0.1;    // rad/s
 constexpr double kStartAccelBiasSigma = 0.15;  // m/s^2
+constexpr double kQuietVelocitySigma = 0.05;   // m/s: quiet IMU and slow images, no proof of rest
 constexpr double kCarriedBias = 2.0;  // times the sigma with which it was left: marginals are hopeful
 
 SmootherSettings smootherSettings(const OdometrySettings& settings) {
@@ -34,8 +36,12 @@ SmoothStage::SmoothStage(const Rig& rig, const ImuNoise& noise, const OdometrySe
       ties_(settings.plane_point_sigma),
       monitor_(noise_),
       rest_(noise_),
+      stillness_(rig_),
+      scale_(noise_),
+      health_(settings_, rig_.camera_count),
       mono_starter_(rig_, noise_),
-      imu_(kImuHistory) {}
+      imu_(kImuHistory),
+      calibration_(smoother_.calibration()) {}
 
 void SmoothStage::addImu(const ImuSample& sample) {
   const SampleVerdict verdict = monitor_.check(sample);
@@ -67,18 +73,17 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
   if (tracked.refused_before > 0) {
     events_.raise(tracked.refused_stamp, EventKind::kFrameDropped, tracked.refused_before);
   }
-  rest_.addFrame(tracked.stamp, static_cast<double>(tracked.median_motion));
+  rest_.addFrame(tracked.stamp, stillness_.update(tracked));
   const bool imu_gap = imu_gap_ || isSilent(imu_, noise_, tracked.stamp + smoother_.timeOffset());
   double blind = health_.secondsWithoutImage(tracked.stamp);
   const bool sees = static_cast<int>(tracked.features.size()) >= HealthMonitor::kMinSightings;
   lost_ = smoother_.started() && (lost_ || (imu_gap && blind > HealthMonitor::kGoodAge));
   if (lost_ && sees) {
     watch_.watchBlackout(tracked.stamp, blind, events_);
-    const StartState left_at = newestAsStart();
-    reset();
-    left_at_ = left_at;
+    leave(newestAsStart());
     blind = 0;
   }
+  if (health_.lost()) giveUp();
   if (!smoother_.started() && !start(tracked, output)) {
     deliver(output);
     return okStatus();
@@ -91,13 +96,13 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
   Smoother::StepInput input;
   input.frame = &tracked;
   input.imu_gap = imu_gap;
-  input.at_rest = rest_.state().at_rest;
+  input.rest = rest_.state().number;
+  if (!epoch_began_) epoch_began_ = tracked.stamp;
   input.iterations =
-      frames_in_epoch_ < kStartFrames ? std::max(kStartIterations, effort.iterations) : effort.iterations;
+      starting(tracked.stamp) ? std::max(kStartIterations, effort.iterations) : effort.iterations;
   input.max_features = effort.features;
   input.max_keyframes = effort.keyframes;
   imu_gap_ = false;
-  ++frames_in_epoch_;
   Status status = smoother_.step(input);
   if (status.ok()) {
     trim_due_ = true;
@@ -119,6 +124,7 @@ void SmoothStage::trim() {
   if (!trim_due_) return;
   trim_due_ = false;
   smoother_.trim(left_step_);
+  if (rig_.camera_count == 1) scale_.update(smoother_);
   ties_.review(smoother_);
   handOver();
 }
@@ -148,9 +154,11 @@ void SmoothStage::reset() {
   smoother_.reset();
   ties_.reset();
   health_.reset();
+  scale_.reset();
+  rest_.forgetEstimate();
   watch_.reset();
   mono_starter_.reset();
-  frames_in_epoch_ = 0;
+  epoch_began_.reset();
   fix_ = StateFix{};
   fix_.state.epoch = epoch_;
   fix_.timeline = timeline_;
@@ -177,7 +185,7 @@ void SmoothStage::window(SmoothedWindow& out) const {
   out.timeline = timeline_;
   out.started = fix_.has_state;
   out.newest = fix_.state;
-  out.calibration = {smoother_.timeOffset(), smoother_.extrinsics()};
+  out.calibration = calibration_;
   out.planes = ties_.planes();
   if (fix_.has_state) {
     smoother_.window(out);
@@ -233,7 +241,8 @@ bool SmoothStage::start(const TrackedFrame& tracked, OdometryOutput& output) {
   }
   StartState start;
   start.velocity_sigma = kStartVelocitySigma;
-  if (rig_.camera_count == 1 && !rest_.state().at_rest) {
+  const bool nearly_still = rest_.state().at_rest || rest_.state().quiet;
+  if (rig_.camera_count == 1 && !nearly_still) {
     mono_starter_.push(tracked);
     if (!mono_starter_.trySolve(imu_, prior, settings_.pixel_sigma, start, output.waiting_for)) return false;
   } else {
@@ -243,21 +252,42 @@ bool SmoothStage::start(const TrackedFrame& tracked, OdometryOutput& output) {
     start.tilt_sigma = tilt.sigma;
     start.gyro_bias_sigma = kStartGyroBiasSigma;
     start.accel_bias_sigma = kStartAccelBiasSigma;
-    if (left_at_) {
-      // Place, heading and biases go on from where they were; the motion since is unknown.
-      const Eigen::Quaterniond& before = left_at_->state.T_world_body.rotation;
-      start.state = left_at_->state;
-      start.state.v_world_body.setZero();
-      start.state.T_world_body.rotation =
-          Eigen::Quaterniond::FromTwoVectors(before * tilt.up, Eigen::Vector3d::UnitZ()) * before;
+    if (left_at_ && left_at_->gyro_bias_sigma > 0) {
+      start.state.bias_gyro = left_at_->state.bias_gyro;
+      start.state.bias_accel = left_at_->state.bias_accel;
       start.gyro_bias_sigma = std::min(start.gyro_bias_sigma, kCarriedBias * left_at_->gyro_bias_sigma);
       start.accel_bias_sigma = std::min(start.accel_bias_sigma, kCarriedBias * left_at_->accel_bias_sigma);
     }
-    if (rest_.state().at_rest) start.velocity_sigma = kRestVelocitySigma;
+    if (nearly_still) start.velocity_sigma = rest_.state().at_rest ? kRestVelocitySigma : kQuietVelocitySigma;
   }
+  if (left_at_) goOnFrom(left_at_->state.T_world_body, start.state);
   smoother_.start(start);
-  frames_in_epoch_ = 0;
   return true;
+}
+
+/// Ends the epoch; the next one goes on from there.
+void SmoothStage::leave(const StartState& at) {
+  reset();
+  left_at_ = at;
+}
+
+/// Discards a lost state. The next epoch starts at its position and heading, or at the last good ones if the
+/// health is failed.
+void SmoothStage::giveUp() {
+  StartState at = newestAsStart();
+  if (health_.health() == Health::kFailed && last_good_) at.state.T_world_body = *last_good_;
+  at.gyro_bias_sigma = 0;  // not to be carried on
+  leave(at);
+}
+
+/// Turns and moves a start to a place and heading; its tilt, and its velocity in body axes, stay.
+void SmoothStage::goOnFrom(const SE3& place, BodyState& state) {
+  const Eigen::Quaterniond start = state.T_world_body.rotation;
+  const Eigen::Vector3d up = start.conjugate() * Eigen::Vector3d::UnitZ();
+  state.T_world_body.rotation =
+      Eigen::Quaterniond::FromTwoVectors(place.rotation * up, Eigen::Vector3d::UnitZ()) * place.rotation;
+  state.T_world_body.translation = place.translation;
+  state.v_world_body = state.T_world_body.rotation * (start.conjugate() * state.v_world_body);
 }
 
 /// The newest state with its marginal sigmas, the largest over the axes.
@@ -284,7 +314,7 @@ Status SmoothStage::restartFromCoast(const Smoother::StepInput& input) {
   const StartState start = newestAsStart();
   reset();
   smoother_.start(start);
-  ++frames_in_epoch_;
+  epoch_began_ = input.frame->stamp;
   const Status status = smoother_.step(input);
   trim_due_ = status.ok();
   return status;
@@ -299,6 +329,7 @@ Status SmoothStage::catchUp() {
     const Status status = smoother_.step(input);
     if (!status.ok()) return status;
     smoother_.trim(left_step_);
+    if (rig_.camera_count == 1) scale_.update(smoother_);
     handOver();
   }
   mono_starter_.reset();
@@ -312,6 +343,10 @@ Status SmoothStage::fail(const Status& status, OdometryOutput& output) {
   return status;
 }
 
+bool SmoothStage::starting(Stamp stamp) const {
+  return !epoch_began_ || (stamp - *epoch_began_).seconds() < kStartTime - kStampSlack;
+}
+
 void SmoothStage::publish(const TrackedFrame& tracked, bool imu_missing, OdometryOutput& output) {
   const WindowState& newest = smoother_.newest();
   NavState& state = output.state;
@@ -323,17 +358,22 @@ void SmoothStage::publish(const TrackedFrame& tracked, bool imu_missing, Odometr
   state.bias_accel = newest.x.bias_accel;
   state.covariance = smoother_.covariance();
   output.statistics = smoother_.statistics();
-  output.calibration = {smoother_.timeOffset(), smoother_.extrinsics()};
+  output.statistics.scale = scale_.scale();
+  output.statistics.scale_sigma = rig_.camera_count == 1 ? scale_.sigma() : 0;
+  calibration_ = smoother_.calibration();
+  output.calibration = calibration_;
   state.health =
-      health_.update(tracked, output.statistics, rig_.camera_count, imu_missing, frames_in_epoch_ <= 1);
+      health_.update({tracked, output.statistics, state, imu_missing, *epoch_began_ == tracked.stamp});
+  output.doubt = health_.doubt();
+  if (state.health == Health::kGood) last_good_ = state.T_world_body;
   smoother_.setHealth(state.health);
   watch_.step({tracked.stamp, tracked.camera_present, rig_.camera_count, rest_.state().at_rest, state.health,
-               health_.secondsWithoutImage(tracked.stamp)},
+               output.doubt, health_.secondsWithoutImage(tracked.stamp)},
               events_);
   fix_.has_state = true;
   fix_.state = state;
   fix_.last_accepted = health_.lastAccepted();
-  if (frames_in_epoch_ > kStartFrames) {
+  if (!starting(tracked.stamp)) {
     const Matrix15d& P = state.covariance;
     rest_.setEstimate(state.bias_gyro, std::sqrt(P.diagonal().segment<3>(9).maxCoeff()),
                       state.v_world_body.norm(), std::sqrt(P.diagonal().segment<3>(6).maxCoeff()));

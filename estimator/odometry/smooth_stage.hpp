@@ -26,10 +26,12 @@
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/odometry/event_watch.hpp"
 #include "estimator/odometry/health_monitor.hpp"
+#include "estimator/odometry/image_stillness.hpp"
 #include "estimator/odometry/mono_starter.hpp"
 #include "estimator/odometry/odometry_inputs.hpp"
 #include "estimator/odometry/odometry_settings.hpp"
 #include "estimator/odometry/plane_ties.hpp"
+#include "estimator/odometry/scale_check.hpp"
 #include "estimator/smoother/imu_buffer.hpp"
 #include "estimator/smoother/smoother.hpp"
 
@@ -72,10 +74,15 @@ class SmoothStage {
 
  private:
   bool start(const TrackedFrame& tracked, OdometryOutput& output);
+  void leave(const StartState& at);
+  void giveUp();
+  static void goOnFrom(const SE3& place, BodyState& state);
   Status restartFromCoast(const Smoother::StepInput& input);
   [[nodiscard]] StartState newestAsStart() const;
   Status catchUp();
   Status fail(const Status& status, OdometryOutput& output);
+  /// The first second of an epoch.
+  [[nodiscard]] bool starting(Stamp stamp) const;
   void publish(const TrackedFrame& tracked, bool imu_missing, OdometryOutput& output);
   void deliver(OdometryOutput& output);
   void handOver();
@@ -87,9 +94,12 @@ class SmoothStage {
   PlaneTies ties_;
   SampleMonitor monitor_;
   RestDetector rest_;
+  ImageStillness stillness_;
+  ScaleCheck scale_;
   HealthMonitor health_;
   MonoStarter mono_starter_;
   ImuBuffer imu_;
+  CalibrationEstimate calibration_;
   EventBuffer events_;
   EventWatch watch_;
   StateFix fix_;
@@ -102,8 +112,9 @@ class SmoothStage {
   bool imu_gap_ = false;
   Stamp gap_end_;      // of the last gap in the samples
   bool lost_ = false;  // samples were missing while no image was accepted: where the body is, nobody knows
-  std::optional<StartState> left_at_;  // from which a new epoch goes on that begins because of it
-  std::uint64_t frames_in_epoch_ = 0;
+  std::optional<StartState> left_at_;  // from which the next epoch goes on; biases unless their sigma is 0
+  std::optional<SE3> last_good_;       // T_world_body
+  std::optional<Stamp> epoch_began_;   // its first frame
 };
 
 }  // namespace swiftlet

@@ -26,6 +26,9 @@ TrackStage::TrackStage(const Rig& rig, const ImuNoise& noise, const OdometrySett
       imu_(kImuHistory) {
   window_.calibration.camera_to_imu_shift = rig_.camera_to_imu_shift;
   window_.calibration.T_body_cam = rig_.T_body_cam;
+  if (settings.estimate_extrinsics) {
+    window_.calibration.stereo_rotation_sigma = std::sqrt(2.0) * kExtrinsicRotationPriorSigma;
+  }
 }
 
 void TrackStage::addImu(const ImuSample& sample) {
@@ -95,6 +98,9 @@ Status TrackStage::process(const StereoFrame& frame, const Effort& effort, Track
 void TrackStage::predict(Stamp stamp) {
   prediction_.has_rotation = false;
   prediction_.landmarks.clear();
+  prediction_.T_body_cam = window_.calibration.T_body_cam;
+  prediction_.stereo_rotation_sigma = window_.calibration.stereo_rotation_sigma;
+  prediction_.has_extrinsics = prediction_.stereo_rotation_sigma > 0;
   if (!has_frame_ || imu_.empty()) return;
   const Duration shift = window_.calibration.camera_to_imu_shift;
   const Stamp from = last_stamp_ + shift;

@@ -1,17 +1,9 @@
 #include "estimator/smoother/calibration_state.hpp"
 
 #include "estimator/geometry/so3.hpp"
+#include "estimator/messages/calibration_estimate.hpp"
 
 namespace swiftlet {
-namespace {
-
-// What a given calibration is known to, where it is estimated.
-constexpr double kTimeOffsetSigma = 5e-3;         // s
-constexpr double kExtrinsicRotationSigma = 0.01;  // rad
-// Calibrations give positions to a few millimetres; a looser prior gives up the baseline, stereo's scale.
-constexpr double kExtrinsicPositionSigma = 2e-3;  // m
-
-}  // namespace
 
 CalibrationState::CalibrationState(const Rig& rig, bool estimate_time_offset, bool estimate_extrinsics)
     : layout_{estimate_time_offset, estimate_extrinsics, rig.camera_count},
@@ -21,13 +13,13 @@ CalibrationState::CalibrationState(const Rig& rig, bool estimate_time_offset, bo
 
 void CalibrationState::hold(MatrixMap H) {
   reference_ = now_;
-  if (layout_.time_offset) H(0, 0) = 1.0 / (kTimeOffsetSigma * kTimeOffsetSigma);
+  if (layout_.time_offset) H(0, 0) = 1.0 / (kTimeOffsetPriorSigma * kTimeOffsetPriorSigma);
   if (!layout_.extrinsics) return;
   for (std::size_t c = 0; c < layout_.cameras; ++c) {
     const int at = layout_.extrinsicOffset(c);
     for (int k = 0; k < 3; ++k) {
-      H(at + k, at + k) = 1.0 / (kExtrinsicRotationSigma * kExtrinsicRotationSigma);
-      H(at + 3 + k, at + 3 + k) = 1.0 / (kExtrinsicPositionSigma * kExtrinsicPositionSigma);
+      H(at + k, at + k) = 1.0 / (kExtrinsicRotationPriorSigma * kExtrinsicRotationPriorSigma);
+      H(at + 3 + k, at + 3 + k) = 1.0 / (kExtrinsicPositionPriorSigma * kExtrinsicPositionPriorSigma);
     }
   }
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "estimator/smoother/window_factors.hpp"
 #include "estimator/smoother/window_trim.hpp"
 
 namespace swiftlet {
@@ -40,7 +41,7 @@ void Smoother::addState(const StepInput& input) {
   state.stamp = input.frame->stamp + Duration::fromSeconds(state.time_offset);
   state.frame_index = input.frame->index;
   state.keyframe = input.frame->keyframe || first;
-  state.at_rest = input.at_rest;
+  state.rest = input.rest;
   if (first) {
     state.x = start_->state;
     problem_.startPrior(*start_);
@@ -92,6 +93,7 @@ void Smoother::addSightings(const TrackedFrame& frame, int max_features) {
     if (!sighting.any()) continue;
     Landmark* const known = problem_.landmarks.find(feature.id);
     Landmark& landmark = known != nullptr ? *known : problem_.landmarks.add(feature.id);
+    statistics_.known += landmark.sightings.empty() ? 0 : 1;
     landmark.last_frame = frame.index;
     ++landmark.frames_seen;
     age += landmark.frames_seen;
@@ -117,9 +119,10 @@ void Smoother::updateStatistics() {
     ++(both ? statistics_.inliers_stereo : statistics_.inliers_mono);
   }
   if (views > 0) statistics_.reprojection_rms = settings_.pixel_sigma * std::sqrt(sum / views);
+  statistics_.imu_residual = motionResidual(problem_);
   WindowState& state = problem_.window.newest();
   statistics_.keyframe = state.keyframe;
-  statistics_.at_rest = state.at_rest;
+  statistics_.at_rest = state.rest != 0;
   state.statistics = statistics_;
 }
 
@@ -153,6 +156,34 @@ void Smoother::window(SmoothedWindow& out) const {
     out.landmarks.pushBack({landmark.id, landmark.point.position(), landmark.point.inverse_depth_sigma,
                             static_cast<int>(landmark.sightings.size())});
   }
+}
+
+CalibrationEstimate Smoother::calibration() {
+  CalibrationEstimate estimate;
+  estimate.camera_to_imu_shift = timeOffset();
+  estimate.T_body_cam = problem_.calibration.T_body_cam();
+  const CalibrationLayout& layout = problem_.calibration.layout();
+  CalibrationMatrix P;
+  if (!covariance_.calibration(layout.dimension(), P)) {
+    if (layout.time_offset) estimate.shift_sigma = kTimeOffsetPriorSigma;
+    if (layout.extrinsics) estimate.stereo_rotation_sigma = std::sqrt(2.0) * kExtrinsicRotationPriorSigma;
+    return estimate;
+  }
+  if (layout.time_offset) estimate.shift_sigma = std::sqrt(P(0, 0));
+  if (!layout.extrinsics) return estimate;
+  // Both cameras' turns in body axes, one less the other.
+  Eigen::Matrix<double, 3, kMaxCalibrationDim> J = Eigen::Matrix<double, 3, kMaxCalibrationDim>::Zero();
+  for (std::size_t c = 0; c < layout.cameras; ++c) {
+    const int at = layout.extrinsicOffset(c);
+    const auto sigma = [&P](int first) { return std::sqrt(P.diagonal().segment<3>(first).maxCoeff()); };
+    estimate.rotation_sigma[c] = sigma(at);
+    estimate.position_sigma[c] = sigma(at + 3);
+    J.middleCols<3>(at) = (c == 0 ? 1.0 : -1.0) * estimate.T_body_cam[c].R();
+  }
+  const auto used = J.leftCols(P.cols());
+  const Eigen::Matrix3d turn = used * P * used.transpose();
+  if (layout.cameras > 1) estimate.stereo_rotation_sigma = std::sqrt(turn.diagonal().maxCoeff());
+  return estimate;
 }
 
 void Smoother::removePlane(PlaneId plane) {

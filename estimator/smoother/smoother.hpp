@@ -28,6 +28,7 @@
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/status.hpp"
 #include "estimator/imu/imu_noise.hpp"
+#include "estimator/messages/calibration_estimate.hpp"
 #include "estimator/messages/plane_report.hpp"
 #include "estimator/messages/smoothed_window.hpp"
 #include "estimator/messages/track_noise.hpp"
@@ -76,9 +77,9 @@ class Smoother {
 
   struct StepInput {
     const TrackedFrame* frame = nullptr;
-    bool imu_gap = false;  ///< samples are missing since the previous frame
-    bool at_rest = false;
-    int iterations = 2;  ///< at most
+    bool imu_gap = false;    ///< samples are missing since the previous frame
+    std::uint32_t rest = 0;  ///< number of the rest at the frame (RestState); 0: in motion
+    int iterations = 2;      ///< at most
     /// m, rad: a step in which no pose moves further is the last. It has changed Jacobians and robust weights
     /// by less than the noise shows, and the rest of a state enters linearly.
     double pose_tolerance = 1e-3;
@@ -99,6 +100,14 @@ class Smoother {
   /// From here on `window()` is without what left.
   void trim(FixedVector<KeyframeState, kMaxStates>& left_window);
 
+  /// Values and links of all states, in order of time.
+  [[nodiscard]] const Window& states() const { return problem_.window; }
+  /// After a trim: of these, the first so many are keyframes that stay.
+  [[nodiscard]] std::size_t settled() const {
+    const auto recent = static_cast<std::size_t>(settings_.max_recent);
+    return problem_.window.size() > recent ? problem_.window.size() - recent : 0;
+  }
+
   /// Not before the first step.
   [[nodiscard]] const WindowState& newest() const { return problem_.window.newest(); }
   [[nodiscard]] const FrameStatistics& statistics() const { return statistics_; }
@@ -108,13 +117,11 @@ class Smoother {
   void setHealth(Health health) {
     if (started()) problem_.window.newest().health = health;
   }
+  /// As given, or as estimated, with sigmas. Cost with an estimate: up to 13 triangular solves.
+  [[nodiscard]] CalibrationEstimate calibration();
   /// t_imu = t_image + offset: the calibration's, or its estimate.
   [[nodiscard]] Duration timeOffset() const {
     return Duration::fromSeconds(problem_.calibration.timeOffset());
-  }
-  /// T_body_cam: the calibration's, or its estimate.
-  [[nodiscard]] const std::array<SE3, kMaxCameras>& extrinsics() const {
-    return problem_.calibration.T_body_cam();
   }
 
   /// Covariance of the motion between two poses of the window, T_i_j = T_world_i^-1 T_world_j, in j's error

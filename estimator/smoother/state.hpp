@@ -45,7 +45,7 @@ struct WindowState {
   Stamp stamp;  ///< on the IMU's clock
   std::uint64_t frame_index = 0;
   bool keyframe = false;
-  bool at_rest = false;
+  std::uint32_t rest = 0;  ///< number of the rest that the state is part of; 0: none
   bool has_motion = true;  ///< velocity and biases are still variables
   bool frozen = false;     ///< the prior touches it: Jacobians are taken at `moved_estimate`
   BodyState x;

@@ -71,6 +71,16 @@ bool WindowCovariance::relative(const WindowState& a, const WindowState& b,
   return true;
 }
 
+bool WindowCovariance::calibration(int dimension, CalibrationMatrix& covariance) {
+  if (dimension == 0 || dimension_ == 0) return false;
+  solveColumns(0, dimension, columns_i_);
+  const Eigen::Map<
+      const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxSystemDim, kMaxCalibrationDim>>
+      Y(columns_i_.data(), dimension_, dimension);
+  covariance = Y.transpose() * Y;
+  return true;
+}
+
 Eigen::Matrix3d WindowCovariance::of(const ExtraState& extra) {
   if (extra.factor_offset < 0) return Eigen::Matrix3d::Zero();
   solveColumns(extra.factor_offset, kExtraDim, columns_i_);

@@ -14,6 +14,9 @@
 
 namespace swiftlet {
 
+using CalibrationMatrix =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxCalibrationDim, kMaxCalibrationDim>;
+
 class WindowCovariance {
  public:
   WindowCovariance();
@@ -28,6 +31,9 @@ class WindowCovariance {
   /// joint marginal. False for a state that was not in the last solve.
   [[nodiscard]] bool relative(const WindowState& i, const WindowState& j,
                               Eigen::Matrix<double, 6, 6>& covariance);
+  /// Of what is estimated of the calibration, all in its columns (calibration_columns.hpp); false before a
+  /// solve.
+  [[nodiscard]] bool calibration(int dimension, CalibrationMatrix& covariance);
   /// Zero for one that was not in the last solve.
   [[nodiscard]] Eigen::Matrix3d of(const ExtraState& extra);
   /// A keyframe with its covariance. Velocity and biases of a pose-only one keep the covariance with which

@@ -36,9 +36,9 @@ Eigen::Matrix<double, kPoseDim, 1> restResidual(const WindowState& i, const Wind
 }
 
 void addRest(const WindowState& i, const WindowState& j, NormalEquations& system) {
-  if (!j.at_rest) return;
+  if (j.rest == 0) return;
   system.addDiagonal(j, 6, j.x.v_world_body, kRestVelocitySigma);
-  if (!i.at_rest) return;
+  if (i.rest != j.rest) return;  // moved in between, though no frame of that may be left
   MotionFactor factor;
   factor.residual.setZero();
   factor.jacobian_i.setZero();
@@ -111,14 +111,25 @@ double addPrior(WindowProblem& problem, NormalEquations& system, std::vector<dou
   return cost;
 }
 
-double addMotion(const WindowProblem& problem, std::size_t position, NormalEquations& system) {
+void addMotion(const WindowProblem& problem, std::size_t position, NormalEquations& system) {
   MotionFactor factor;
-  if (position == 0 || !motionFactor(problem, position, factor)) return -1;
+  if (position == 0 || !motionFactor(problem, position, factor)) return;
   const WindowState& i = problem.window[position - 1];
   const WindowState& j = problem.window[position];
   system.addMotion(factor, i, j);
   addRest(i, j, system);
-  return std::sqrt(factor.residual.head<9>().squaredNorm() / 9.0);
+}
+
+double motionResidual(const WindowProblem& problem) {
+  double squares = 0;
+  double rows = 0;
+  for (std::size_t k = 1; k < problem.window.size(); ++k) {
+    MotionFactor factor;
+    if (!motionFactor(problem, k, factor)) continue;
+    squares += factor.residual.squaredNorm();
+    rows += static_cast<double>(factor.residual.size());
+  }
+  return rows > 0 ? std::sqrt(squares / rows) : 0;
 }
 
 void addExtras(const WindowProblem& problem, NormalEquations& system) {
@@ -175,8 +186,8 @@ WindowCost costOf(WindowProblem& problem, std::vector<double>& work) {
     const WindowState& i = problem.window[k - 1];
     const WindowState& j = problem.window[k];
     double squares = factor.residual.squaredNorm();
-    if (j.at_rest) squares += (j.x.v_world_body / kRestVelocitySigma).squaredNorm();
-    if (j.at_rest && i.at_rest) squares += restResidual(i, j).squaredNorm();
+    if (j.rest != 0) squares += (j.x.v_world_body / kRestVelocitySigma).squaredNorm();
+    if (j.rest != 0 && i.rest == j.rest) squares += restResidual(i, j).squaredNorm();
     cost.factors += 0.5 * squares;
   }
   for (const Landmark& landmark : problem.landmarks) {

@@ -16,9 +16,11 @@ namespace swiftlet {
 double addPrior(WindowProblem& problem, NormalEquations& system, std::vector<double>& work);
 
 /// Between the states at `position` - 1 and `position`, where both have motion, with rest where there is.
-/// Returns the root mean square of the whitened residual's nine rows of pose and velocity; negative without a
-/// factor.
-double addMotion(const WindowProblem& problem, std::size_t position, NormalEquations& system);
+void addMotion(const WindowProblem& problem, std::size_t position, NormalEquations& system);
+
+/// Root mean square of the whitened residuals of all motion in the window, with the states as they are: about
+/// 1 where IMU and images disagree by as much as the noise says; 0 without motion.
+[[nodiscard]] double motionResidual(const WindowProblem& problem);
 
 /// Explicit landmarks, and planes that count.
 void addExtras(const WindowProblem& problem, NormalEquations& system);

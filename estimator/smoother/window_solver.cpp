@@ -88,14 +88,10 @@ void WindowSolver::triangulateAll(WindowProblem& problem, int iterations) const 
   }
 }
 
-void WindowSolver::build(WindowProblem& problem, NormalEquations& system, bool first,
-                         FrameStatistics& statistics) {
+void WindowSolver::build(WindowProblem& problem, NormalEquations& system, bool first) {
   system.begin(problem.calibration.layout(), problem.dimension);
   cost_.prior = addPrior(problem, system, step_);
-  for (std::size_t k = 1; k < problem.window.size(); ++k) {
-    const double residual = addMotion(problem, k, system);
-    if (k + 1 == problem.window.size() && residual >= 0) statistics.imu_residual = residual;
-  }
+  for (std::size_t k = 1; k < problem.window.size(); ++k) addMotion(problem, k, system);
   for (Landmark& landmark : problem.landmarks) {
     if (!landmark.in_system || landmark.extra != kNoExtra) continue;
     EliminatedPoint& eliminated = eliminated_[problem.landmarks.indexOf(landmark)];
@@ -141,7 +137,7 @@ Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, Wind
     if (iteration == 0) triangulateAll(problem, 0);
     if (iteration == 1) rejectNewestSightings(problem, kOutlierSigmas);
     const WindowCost before = cost_;
-    build(problem, system, iteration == 0, statistics);
+    build(problem, system, iteration == 0);
     // Not the first step: the sightings are others since.
     if (iteration > 1 && rises(before, cost_)) {
       takeBack(problem);

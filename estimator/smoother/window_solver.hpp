@@ -28,7 +28,7 @@ class WindowSolver {
   void reintegrate(WindowProblem& problem) const;
   void triangulateAll(WindowProblem& problem, int iterations) const;
   /// `first` of a solve: points get their sigmas, with the states where the last solve left them.
-  void build(WindowProblem& problem, NormalEquations& system, bool first, FrameStatistics& statistics);
+  void build(WindowProblem& problem, NormalEquations& system, bool first);
   void substitutePoints(WindowProblem& problem, const VectorMap& step) const;
   void takeBack(WindowProblem& problem) const;
 

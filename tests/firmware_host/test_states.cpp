@@ -25,7 +25,16 @@ KeyframeState randomKeyframe(std::int64_t ns, Random& random) {
   keyframe.state.v_world_body = v();
   keyframe.state.bias_gyro = 0.01 * v();
   keyframe.state.bias_accel = 0.1 * v();
-  keyframe.statistics = {true, true, static_cast<int>(ns % 200), 300, 11, 140, 7.125, 0.75, 1.5, 3};
+  keyframe.statistics = {.keyframe = true,
+                         .at_rest = true,
+                         .tracks = static_cast<int>(ns % 200),
+                         .landmarks = 300,
+                         .inliers_mono = 11,
+                         .inliers_stereo = 140,
+                         .track_length = 7.125,
+                         .reprojection_rms = 0.75,
+                         .imu_residual = 1.5,
+                         .iterations = 3};
   Matrix15d root;
   for (int i = 0; i < kStateDim; ++i) {
     for (int j = 0; j < kStateDim; ++j) root(i, j) = 0.01 * random.normal();

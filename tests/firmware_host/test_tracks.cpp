@@ -142,19 +142,5 @@ TEST_CASE("keyframes come from the file, else from the reader's own rule") {
   CHECK(keyframesOf(movingTracks(90, 7, false)) == std::vector<int>{0, 3, 6});    // not before 0.14 s
 }
 
-TEST_CASE("the median motion since the frame before is added") {
-  const std::string text = movingTracks(6, 2, false);
-  TrackReader reader("tracks.csv", text);
-  TrackFeeder feeder(&reader);
-  const TrackedFrame* frame = feeder.dueBefore(Stamp{1});
-  REQUIRE(frame != nullptr);
-  CHECK(frame->median_motion < 0);
-  feeder.take();
-  CHECK(feeder.dueBefore(Stamp{50'000'000}) == nullptr);
-  frame = feeder.dueBefore(Stamp{50'000'001});
-  REQUIRE(frame != nullptr);
-  CHECK(frame->median_motion == Approx(6));
-}
-
 }  // namespace
 }  // namespace swiftlet

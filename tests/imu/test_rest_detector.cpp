@@ -37,7 +37,8 @@ Kind kindOf(const RecordedLog& log, std::size_t row, std::size_t reach, bool fla
   return speed > kMotionSpeed || rate > kMotionRate ? Kind::kMotion : Kind::kNeither;
 }
 
-// `images`: hand in synthetic median motion at 20 Hz: what a point 4 m away does, with tracking noise.
+// `images`: hand in what images at 20 Hz of a point 4 m away would say, with tracking noise
+// (image_stillness.hpp says so of tracks).
 Share score(const RecordedLog& log, double rate_hz, bool flag, bool images) {
   ImuNoise noise;
   noise.rate_hz = rate_hz;
@@ -49,16 +50,23 @@ Share score(const RecordedLog& log, double rate_hz, bool flag, bool images) {
   const auto reach = static_cast<std::size_t>(std::max(1.0, 0.1 * truth_rate));
   std::size_t row = reach;
   std::size_t last_frame_row = 0;
+  std::size_t reference_row = 0;
   for (const ImuSample& sample : log.imu) {
     detector.addImu(sample);
     while (row + 1 + reach < log.truth.size() && log.truth[row + 1].stamp <= sample.stamp) ++row;
     if (sample.stamp < log.truth[reach].stamp || row + 1 + reach >= log.truth.size()) continue;
     const double since_frame = (log.truth[row].stamp - log.truth[last_frame_row].stamp).seconds();
     if (images && since_frame >= 0.0499) {
-      const TruthRow& a = log.truth[last_frame_row];
+      const TruthRow& a = log.truth[reference_row];
       const TruthRow& b = log.truth[row];
       const double pixels = 458 * ((b.p - a.p).norm() / 4 + logSo3(a.q.conjugate() * b.q).norm());
-      detector.addFrame(sample.stamp, std::hypot(pixels, 0.05 * random.normal()));
+      const double seen = std::hypot(pixels, 0.05 * random.normal());
+      const double seconds = (b.stamp - a.stamp).seconds();
+      const bool is_still = (seen + 0.1) / 458 < 0.4e-3 * seconds;
+      detector.addFrame(sample.stamp, seen >= 0.5 ? ImageMotion::kMoving
+                                      : is_still  ? ImageMotion::kStill
+                                                  : ImageMotion::kUncertain);
+      if (seen >= 0.5) reference_row = row;
       last_frame_row = row;
     }
     double speed = 0;
@@ -115,16 +123,63 @@ TEST_CASE("Images: moving ones forbid a rest that the IMU would claim, still one
     const double t = 0.005 * i;
     ImuSample sample = still(t, noise, random);
     gliding.addImu(sample);  // constant velocity: the IMU reads as at rest
-    if (i % 10 == 0) gliding.addFrame(sample.stamp, 1.5);
+    if (i % 10 == 0) gliding.addFrame(sample.stamp, ImageMotion::kMoving);
     rest_claimed |= gliding.state().at_rest;
     sample.accel += 0.5 * normalVector(random);  // rotors
     sample.gyro += 0.04 * normalVector(random);
     idling.addImu(sample);
-    if (i % 10 == 0) idling.addFrame(sample.stamp, 0.05);
+    if (i % 10 == 0) idling.addFrame(sample.stamp, ImageMotion::kStill);
     idling_found += idling.state().at_rest ? 1 : 0;
   }
   CHECK_FALSE(rest_claimed);
   CHECK(idling_found > 400);
+}
+
+TEST_CASE("With images no rest begins before they are known to stand still") {
+  const ImuNoise noise;
+  Random random(7);
+  RestDetector detector(noise);
+  double t = 0;
+  for (; t < 2; t += 0.005) detector.addImu(still(t, noise, random));
+  REQUIRE(detector.state().at_rest);  // the IMU alone, which cannot tell gliding from rest
+  detector.addFrame(stampOf(t), ImageMotion::kUncertain);
+  CHECK_FALSE(detector.state().at_rest);
+  for (int i = 0; t < 4; t += 0.005, ++i) {
+    detector.addImu(still(t, noise, random));
+    if (i % 10 == 0) detector.addFrame(stampOf(t), ImageMotion::kUncertain);
+    CHECK_FALSE(detector.state().at_rest);
+  }
+  for (int i = 0; t < 5; t += 0.005, ++i) {
+    detector.addImu(still(t, noise, random));
+    if (i % 10 == 0) detector.addFrame(stampOf(t), ImageMotion::kStill);
+  }
+  CHECK(detector.state().at_rest);
+  // A moving estimate forbids it with still images too: they may show what moves along.
+  RestDetector carried(noise);
+  carried.setEstimate({0, 0.02, 0.08}, 1e-3, 0.5, 0.02);
+  for (int i = 0; i < 400; ++i) {
+    carried.addImu(still(0.005 * i, noise, random));
+    if (i % 10 == 0) carried.addFrame(stampOf(0.005 * i), ImageMotion::kStill);
+    CHECK_FALSE(carried.state().at_rest);
+  }
+}
+
+TEST_CASE("Each rest has its own number") {
+  const ImuNoise noise;
+  Random random(8);
+  RestDetector detector(noise);
+  double t = 0;
+  for (; t < 2; t += 0.005) detector.addImu(still(t, noise, random));
+  const std::uint32_t first = detector.state().number;
+  REQUIRE(first != 0);
+  for (; t < 2.2; t += 0.005) {
+    ImuSample nudge = still(t, noise, random);
+    nudge.gyro.z() += 0.4;
+    detector.addImu(nudge);
+  }
+  CHECK(detector.state().number == 0);
+  for (; t < 5; t += 0.005) detector.addImu(still(t, noise, random));
+  CHECK(detector.state().number > first);
 }
 
 TEST_CASE("The estimate's speed and bias forbid a rest by IMU alone") {
@@ -143,6 +198,10 @@ TEST_CASE("The estimate's speed and bias forbid a rest by IMU alone") {
     CHECK_FALSE(turning.state().at_rest);
   }
   CHECK(resting.state().at_rest);
+  // What a smoother of before knew is nothing to a new one.
+  moving.forgetEstimate();
+  for (int i = 600; i < 1000; ++i) moving.addImu(still(0.005 * i, noise, random));
+  CHECK(moving.state().at_rest);
 }
 
 TEST_CASE("Rest on the real logs: share found, and share of motion taken for rest", "[figures]") {

@@ -20,6 +20,7 @@ struct RunFrame {
   NavState state;
   BodyState truth;
   FrameStatistics statistics;
+  Doubt doubt = Doubt::kNone;
   CalibrationEstimate calibration;
 };
 
@@ -59,6 +60,7 @@ inline OdometryRun runOdometry(const TrackFlight& flight, const OdometrySettings
         frame.truth = flight.truth(k);
         frame.state = output->state;
         frame.statistics = output->statistics;
+        frame.doubt = output->doubt;
         frame.calibration = output->calibration;
         run.frames.push_back(frame);
         run.events.insert(run.events.end(), output->events.begin(), output->events.end());

@@ -59,7 +59,7 @@ FullRun runFull(const TrackFlight& flight, const SmootherSettings& causal_settin
     FullSmoother given = full;
     REQUIRE(given.solve(run.report).ok());
     run.full_given = statesOf(given);
-    full.setCalibration({causal.smoother().timeOffset(), causal.smoother().extrinsics()});
+    full.setCalibration(causal.smoother().calibration());
   }
   run.status = full.solve(run.report);
   run.full = statesOf(full);

@@ -22,7 +22,6 @@ bool applyFaults(const SimulatedFlight& flight, double seconds, TrackedFrame& fr
     if (feature.seen[0] || feature.seen[1]) static_cast<void>(kept.tryPushBack(feature));
   }
   frame.features = kept;
-  if (kept.empty()) frame.median_motion = -1.0F;
   return any;
 }
 

@@ -1,0 +1,58 @@
+#pragma once
+// Checks the scale of a one-camera estimate against the accelerometer, independently of the smoother's own
+// belief.
+//
+// A Kalman filter over neighbouring keyframes. The smoother gives their displacement up to an unknown factor
+// s (true length over estimated length); the IMU gives it in metres. States: velocity, s, tilt of the world,
+// accelerometer bias. The model is linear in all of them:
+//   s (p_j - p_i) = v_i t + g t^2 / 2 + R_i alpha(ba),   v_j = v_i + g t + R_i beta(ba).
+// s becomes observable when the body accelerates. Process noise on s forgets old evidence, so a scale that
+// drifts or collapses later is detected too. Rotations and gyro bias are taken from the smoother: images
+// determine them.
+// Frames: world, body. Memory: 2 kB. Cost: 12 triangular solves of the window's system a keyframe.
+// Source: Martinelli, "Closed-form solution of visual-inertial structure from motion", IJCV 2014 (alignment).
+
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "estimator/imu/imu_noise.hpp"
+#include "estimator/smoother/smoother.hpp"
+
+namespace swiftlet {
+
+class ScaleCheck {
+ public:
+  /// The scale counts as known below this relative sigma.
+  static constexpr double kKnown = 0.10;
+  /// |s - 1| below it, plus two sigmas: the scale agrees.
+  static constexpr double kAgrees = 0.10;
+  /// |s - 1| above it, plus two sigmas: the estimate has to start again.
+  static constexpr double kContradicts = 0.15;
+
+  explicit ScaleCheck(const ImuNoise& noise) : noise_(noise) { reset(); }
+
+  /// A new epoch: nothing is known.
+  void reset();
+  /// After a step's trim: takes the newest keyframe that stays, once.
+  void update(Smoother& smoother);
+
+  /// True over estimated length.
+  [[nodiscard]] double scale() const { return x_[kScale]; }
+  [[nodiscard]] double sigma() const;
+
+ private:
+  enum : int { kVelocity = 0, kScale = 3, kTilt = 4, kBias = 6, kSize = 9, kMoved = 9, kAll = 12 };
+  using Vector = Eigen::Matrix<double, kAll, 1>;
+  using Matrix = Eigen::Matrix<double, kAll, kAll>;
+
+  void propagate(const WindowState& i, const Preintegration& imu);
+  void measure(const Eigen::Vector3d& displacement, double variance);
+
+  ImuNoise noise_;
+  Vector x_ = Vector::Zero();
+  Matrix P_ = Matrix::Zero();
+  bool any_ = false;
+  std::uint64_t newest_ = 0;  // frame of the keyframe taken last
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,155 @@
+#include "tests/odometry/faulty_flight.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include "estimator/core/random.hpp"
+#include "estimator/geometry/so3.hpp"
+
+namespace swiftlet::test {
+namespace {
+
+constexpr std::uint64_t kStream = 77;
+constexpr double kReadout = 0.030;        // s, first to last row
+constexpr double kJitterSigma = 0.020;    // s
+constexpr double kMovingPeriod = 4;       // s, to and fro
+constexpr double kBlurredLifetime = 0.4;  // s
+
+double signedUniform(Random& random, double low, double high) {
+  const double size = random.uniform(low, high);
+  return random.uniform() < 0.5 ? -size : size;
+}
+
+SimulationSettings settingsWith(SimulationSettings settings, RigFault fault, Random& random) {
+  if (fault == RigFault::kLate) {
+    settings.image_stamp_offset = Duration::fromSeconds(signedUniform(random, 0.020, 0.150));
+    // No sample is missing at either end.
+    settings.first_image += 0.2;
+  }
+  if (fault == RigFault::kBlur) {
+    settings.tracks.pixel_sigma = random.uniform(3, 6);
+    settings.tracks.mean_lifetime = kBlurredLifetime;
+    settings.tracks.dropout = 0.3;
+  }
+  return settings;
+}
+
+CameraModel withFocal(const CameraModel& camera, double factor) {
+  Eigen::Vector4d intrinsics = camera.intrinsics();
+  intrinsics.head<2>() *= factor;
+  return {camera.kind(), camera.width(), camera.height(), intrinsics, camera.distortion()};
+}
+
+Eigen::Vector3d direction(Random& random) {
+  Eigen::Vector3d v;
+  for (int k = 0; k < 3; ++k) v[k] = random.normal();
+  return v.normalized();
+}
+
+void spoilRig(RigFault fault, Random& random, FaultyFlight& out) {
+  if (fault == RigFault::kFocal) {
+    const double factor = 1 + signedUniform(random, 0.05, 0.15);
+    for (CameraModel& camera : out.rig.camera) {
+      if (camera.width() > 0) camera = withFocal(camera, factor);
+    }
+  } else if (fault == RigFault::kTurned) {
+    const double angle = random.uniform(3, 20) * std::numbers::pi / 180;
+    const Eigen::Quaterniond turn = expSo3(angle * direction(random));
+    for (SE3& T : out.rig.T_body_cam) T.rotation = turn * T.rotation;
+  } else if (fault == RigFault::kLoud || fault == RigFault::kQuiet) {
+    const double factor = fault == RigFault::kLoud ? 10 : 0.1;
+    for (double* const density :
+         {&out.noise.gyro_density, &out.noise.accel_density, &out.noise.gyro_walk, &out.noise.accel_walk}) {
+      *density *= factor;
+    }
+  }
+}
+
+void exchangeAxes(Random& random, std::vector<ImuSample>& samples) {
+  // One of the proper rotations that exchange axes, other than none.
+  const int kind = static_cast<int>(random.below(4));
+  Eigen::Matrix3d R = Eigen::Matrix3d::Zero();
+  if (kind == 0) R << 0, 1, 0, 1, 0, 0, 0, 0, -1;
+  if (kind == 1) R << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+  if (kind == 2) R << 0, 1, 0, 0, 0, 1, 1, 0, 0;
+  if (kind == 3) R << -1, 0, 0, 0, -1, 0, 0, 0, 1;
+  for (ImuSample& sample : samples) {
+    sample.gyro = R * sample.gyro;
+    sample.accel = R * sample.accel;
+  }
+}
+
+void jitter(Random& random, std::vector<TrackedFrame>& frames) {
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    frames[k].stamp = frames[k].stamp + Duration::fromSeconds(kJitterSigma * random.normal());
+    if (k == 0) continue;
+    frames[k].stamp = std::max(frames[k].stamp, frames[k - 1].stamp + Duration::fromMilliseconds(1));
+  }
+}
+
+// Each row is seen at its own time: along the line from where the track is to where it is next.
+void roll(const Rig& rig, std::vector<TrackedFrame>& frames) {
+  for (std::size_t k = 0; k + 1 < frames.size(); ++k) {
+    const double dt = (frames[k + 1].stamp - frames[k].stamp).seconds();
+    std::map<TrackId, const TrackedFeature*> next;
+    for (const TrackedFeature& feature : frames[k + 1].features) next[feature.id] = &feature;
+    for (TrackedFeature& feature : frames[k].features) {
+      const auto found = next.find(feature.id);
+      for (std::size_t c = 0; c < kMaxCameras; ++c) {
+        if (!feature.seen[c] || found == next.end() || !found->second->seen[c]) continue;
+        const float row = feature.pixel[c].y() / static_cast<float>(rig.camera[c].height()) - 0.5F;
+        const auto share = static_cast<float>(kReadout / dt) * row;
+        feature.pixel[c] += share * (found->second->pixel[c] - feature.pixel[c]);
+      }
+    }
+  }
+}
+
+void moveScene(Random& random, FaultyFlight& out) {
+  const Eigen::Vector3d swing = random.uniform(0.2, 0.8) * direction(random);  // m
+  const double share = random.uniform(0.3, 0.5);
+  const Rig& rig = out.flight.flight().trueRig();
+  for (std::size_t k = 0; k < out.frames.size(); ++k) {
+    const SE3 T_world_body = out.flight.truth(k).T_world_body;
+    const double phase = std::sin(2 * std::numbers::pi / kMovingPeriod * out.flight.seconds(k));
+    for (TrackedFeature& feature : out.frames[k].features) {
+      // Which ones follows from the id alone.
+      if (Random(feature.id, kStream).uniform() > share) continue;
+      for (std::size_t c = 0; c < rig.camera_count; ++c) {
+        const SE3 T_cam_world = (T_world_body * rig.T_body_cam[c]).inverse();
+        const Eigen::Vector3d& still = out.flight.landmark(feature.id);
+        Eigen::Vector2d there;
+        Eigen::Vector2d moved;
+        if (!feature.seen[c] || !rig.camera[c].project(T_cam_world * still, there) ||
+            !rig.camera[c].project(T_cam_world * (still + phase * swing), moved) ||
+            !rig.camera[c].inImage(moved)) {
+          continue;
+        }
+        feature.pixel[c] += (moved - there).cast<float>();
+      }
+    }
+  }
+}
+
+}  // namespace
+
+FaultyFlight::FaultyFlight(const SimulationSettings& settings, RigFault fault, std::uint64_t seed)
+    : flight([&] {
+        Random random(seed, kStream);
+        return settingsWith(settings, fault, random);
+      }()),
+      rig(flight.rig()),
+      noise(flight.noise()),
+      frames(flight.frames()),
+      samples(flight.flight().imu().samples) {
+  Random random(seed, kStream + 1);
+  spoilRig(fault, random, *this);
+  if (fault == RigFault::kExchanged) exchangeAxes(random, samples);
+  if (fault == RigFault::kJitter) jitter(random, frames);
+  if (fault == RigFault::kRolling) roll(rig, frames);
+  if (fault == RigFault::kMoving) moveScene(random, *this);
+}
+
+}  // namespace swiftlet::test
