@@ -6,6 +6,7 @@
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
+#include "firmware_host/commands/verdict.hpp"
 #include "firmware_host/commands/view_option.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"
 #include "firmware_host/realtime/console.hpp"
@@ -48,7 +49,7 @@ int fly(const FlyOptions& options) {
     warn(fmt::format("error: no pose in the whole flight{}\n", events));
     return kExitFailed;
   }
-  return kExitDone;
+  return verdictOf(result.summary);
 }
 
 }  // namespace

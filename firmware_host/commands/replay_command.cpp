@@ -7,6 +7,7 @@
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/lab_commands.hpp"
 #include "firmware_host/commands/log_options.hpp"
+#include "firmware_host/commands/verdict.hpp"
 #include "firmware_host/commands/view_option.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"
 #include "firmware_host/realtime/console.hpp"
@@ -69,7 +70,7 @@ int replay(const ReplayOptions& options) {
                      request.log));
     return kExitFailed;
   }
-  return kExitDone;
+  return verdictOf(result.summary);
 }
 
 }  // namespace

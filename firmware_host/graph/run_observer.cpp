@@ -81,6 +81,7 @@ void RunObserver::noteFrame(const FrameResult& result) {
           {result.published - result.host.exposure, result.spent.cpu}, tracked.keyframe);
   noteEvents(output);
   noteHealth(tracked.stamp, output);
+  statistics_.verdict.add(tracked.stamp, output);
   noteEffort("track", result, result.track_step.effort, track_effort_);
   noteEffort("smooth", result, result.step.effort, smooth_effort_);
   any_frame_ = true;

@@ -13,6 +13,7 @@
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/odometry/pairing.hpp"
 #include "estimator/smoother/full_smoother.hpp"
+#include "firmware_host/interfaces/run_verdict.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
 #include "mapping/loop/loop_report.hpp"
 #include "mapping/map/map_stage.hpp"
@@ -109,6 +110,7 @@ struct RunStatistics {
   std::map<std::string, std::uint64_t> faults;  ///< statuses that were not ok, by their text
   std::map<std::string, std::uint64_t> losses;  ///< what did not fit an arrow between threads, by its name
   std::vector<HealthChange> health;
+  RunVerdict verdict;
   StageTable times;
 };
 

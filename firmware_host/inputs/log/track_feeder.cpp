@@ -44,10 +44,7 @@ bool TrackFeeder::read() {
   for (const TrackedFeature& feature : frame_.features) {
     now[feature.id] = feature.pixel[feature.seen[0] ? 0 : 1];
   }
-  std::size_t common = 0;
-  frame_.median_motion = medianMotion(previous_, now, common);
   if (!reader_->hasKeyframes()) chooseKeyframe(now);
-  previous_ = std::move(now);
   ready_ = true;
   return true;
 }

@@ -31,7 +31,6 @@ class TrackFeeder {
   TrackReader* reader_;
   TrackedFrame frame_;
   bool ready_ = false;
-  Pixels previous_;
   Pixels keyframe_;
   Stamp keyframe_stamp_;
 };

@@ -20,6 +20,9 @@ std::string valueText(const Event& event) {
   if (event.kind == EventKind::kHealthChanged) {
     return std::string(healthName(static_cast<Health>(static_cast<int>(event.value))));
   }
+  if (event.kind == EventKind::kDoubt) {
+    return std::string(doubtName(static_cast<Doubt>(static_cast<int>(event.value))));
+  }
   return fmt::format("{:g}", event.value);
 }
 

@@ -233,6 +233,7 @@ Json summaryOf(const RunFacts& facts, const Settings& settings, const RunStatist
   json["run"] = runJson(facts, statistics);
   json["calibration"] = facts.calibration_form;
   json["settings"] = settingsJson(settings);
+  json["verdict"] = statistics.verdict.json();
   json["health"] = healthJson(statistics);
   json["counters"] = countersJson(facts, statistics);
   json["warnings"] = facts.warnings;
@@ -257,6 +258,7 @@ std::string summaryText(const Json& summary) {
   const Json& first = summary["run"]["time_to_first_pose_s"];
   text += first.is_null() ? std::string(", no pose\n")
                           : fmt::format(", the first {:.3f} s after the first image\n", first.get<double>());
+  for (const Json& line : summary["verdict"]["in_words"]) text += line.get<std::string>() + "\n";
   const Json& cpu = summary["cpu"];
   text += fmt::format(
       "{:.1f} s of flight in {:.2f} s ({:.2f} s of CPU, {:.3f} per second of flight), peak "

@@ -1,0 +1,25 @@
+#pragma once
+// The exit code of a run that went to its end.
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "firmware_host/commands/program.hpp"
+#include "firmware_host/realtime/console.hpp"
+
+namespace swiftlet {
+
+/// kExitFailed, with a line that says so, when the estimate was good for less than half of the run.
+inline int verdictOf(const nlohmann::ordered_json& summary) {
+  constexpr double kMost = 0.5;
+  const double share = summary["verdict"]["share_good"].get<double>();
+  if (share >= kMost) return kExitDone;
+  warn(fmt::format(
+      "error: the estimate was good for only {:.0f} % of the run; the lines under \"health\" above, and "
+      "events.log, say why\n",
+      100 * share));
+  return kExitFailed;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,131 @@
+#include "firmware_host/interfaces/run_verdict.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/messages/names.hpp"
+#include "estimator/messages/state_sigmas.hpp"
+
+namespace swiftlet {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::array kHealths{Health::kInitializing, Health::kGood, Health::kDegraded, Health::kFailed};
+constexpr double kDegrees = 180.0 / M_PI;
+// Shorter than this a doubt is not worth a line.
+constexpr double kWorthTelling = 0.05;  // of the run's time
+
+/// What to look at first.
+const char* remedy(Doubt doubt) {
+  switch (doubt) {
+    case Doubt::kNoImage:
+      return "no images, or dark ones: cables, exposure, light";
+    case Doubt::kImplausible:
+      return "beyond health.max_speed or health.max_acceleration: calibration, axes, stamps";
+    case Doubt::kTracksDisagree:
+      return "tracks do not fit one motion: calibration, rolling shutter, stamps, or a moving scene";
+    case Doubt::kImuDisagrees:
+      return "IMU and images disagree: T_body_cam, the IMU's axes, stamps, noise figures";
+    case Doubt::kUncertain:
+      return "velocity or tilt is known badly: few or far features, noise figures";
+    case Doubt::kScaleDisagrees:
+      return "the accelerometer says another scale: focal length, T_body_cam, stamps";
+    case Doubt::kScaleUnknown:
+      return "one camera: the scale shows only when the body accelerates";
+    case Doubt::kSettling:
+      return "starts and interruptions: missing images or samples, resets";
+    case Doubt::kCameraMissing:
+      return "images of one camera are missing";
+    case Doubt::kFewSightings:
+      return "few features: texture, light, motion blur, focus";
+    case Doubt::kNone:
+      break;
+  }
+  return "";
+}
+
+}  // namespace
+
+void RunVerdict::add(Stamp stamp, const OdometryOutput& output) {
+  const Health health = output.has_state ? output.state.health : Health::kInitializing;
+  const Doubt doubt = output.has_state ? output.doubt : Doubt::kSettling;
+  // Each frame stands for the time since the one before.
+  const double seconds = last_ ? std::max(0.0, (stamp - *last_).seconds()) : 0;
+  last_ = stamp;
+  seconds_ += seconds;
+  by_health_[static_cast<std::size_t>(health)] += seconds;
+  if (health != Health::kGood) by_doubt_[doubt] += seconds;
+  resets_ = std::max(resets_, output.state.epoch);
+  if (!output.has_state) return;
+  calibration_ = output.calibration;
+  top_speed_ = std::max(top_speed_, output.state.v_world_body.norm());
+  if (health != Health::kGood) return;
+  largest_velocity_sigma_ = std::max(largest_velocity_sigma_, velocitySigma(output.state));
+  largest_tilt_sigma_ = std::max(largest_tilt_sigma_, tiltSigma(output.state));
+}
+
+double RunVerdict::shareGood() const {
+  return seconds_ > 0 ? by_health_[static_cast<std::size_t>(Health::kGood)] / seconds_ : 1;
+}
+
+Json RunVerdict::json() const {
+  Json json;
+  json["in_words"] = words();
+  json["seconds"] = seconds_;
+  json["share_good"] = shareGood();
+  for (const Health health : kHealths) {
+    json["health_s"][std::string(healthName(health))] = by_health_[static_cast<std::size_t>(health)];
+  }
+  json["doubts_s"] = Json::object();
+  for (const auto& [doubt, seconds] : by_doubt_) json["doubts_s"][std::string(doubtName(doubt))] = seconds;
+  json["resets"] = resets_;
+  json["top_speed_m_s"] = top_speed_;
+  json["largest_velocity_sigma_good_m_s"] = largest_velocity_sigma_;
+  json["largest_tilt_sigma_good_deg"] = kDegrees * largest_tilt_sigma_;
+  if (!calibration_) return json;
+  const CalibrationEstimate& c = *calibration_;
+  Json estimate = Json::object();
+  if (c.shift_sigma > 0) {
+    estimate["t_imu_minus_t_image_s"] = c.camera_to_imu_shift.seconds();
+    estimate["sigma_s"] = c.shift_sigma;
+  }
+  for (std::size_t i = 0; i < kMaxCameras; ++i) {
+    if (c.rotation_sigma[i] <= 0) continue;
+    const Eigen::Matrix3d R = c.T_body_cam[i].R();
+    const Eigen::Vector3d& p = c.T_body_cam[i].translation;
+    Json rows = Json::array();
+    for (int r = 0; r < 3; ++r) rows.push_back({R(r, 0), R(r, 1), R(r, 2), p[r]});
+    rows.push_back({0, 0, 0, 1});
+    estimate[fmt::format("cam{}", i)] = {{"T_body_cam", rows},
+                                         {"rotation_sigma_deg", kDegrees * c.rotation_sigma[i]},
+                                         {"position_sigma_m", c.position_sigma[i]}};
+  }
+  if (!estimate.empty()) json["estimated_calibration"] = estimate;
+  return json;
+}
+
+std::vector<std::string> RunVerdict::words() const {
+  if (seconds_ <= 0) return {};
+  std::string first = "health:";
+  for (const Health health : kHealths) {
+    const double share = by_health_[static_cast<std::size_t>(health)] / seconds_;
+    if (share > 0 || health == Health::kGood)
+      first += fmt::format(" {} {:.1f} %,", healthName(health), 100 * share);
+  }
+  first += fmt::format(" {} resets; top speed {:.2f} m/s", resets_, top_speed_);
+  if (shareGood() > 0) {
+    first += fmt::format("; while good, largest sigmas: velocity {:.3f} m/s, tilt {:.2f} deg",
+                         largest_velocity_sigma_, kDegrees * largest_tilt_sigma_);
+  }
+  std::vector<std::string> words{first};
+  for (const auto& [doubt, seconds] : by_doubt_) {
+    if (seconds < kWorthTelling * seconds_) continue;
+    words.push_back(fmt::format("  {:.1f} s {}: {}", seconds, doubtName(doubt), remedy(doubt)));
+  }
+  return words;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,42 @@
+#pragma once
+// What is said of a whole run in the end: how long it was trusted, and what to look at first where it was
+// not.
+//
+// Added to frame by frame; constant memory.
+
+#include <array>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator/messages/odometry_output.hpp"
+
+namespace swiftlet {
+
+class RunVerdict {
+ public:
+  /// A frame's answer; without a state it counts as initializing.
+  void add(Stamp stamp, const OdometryOutput& output);
+
+  /// Of the run's time, from the first image on; 1 for a run without frames.
+  [[nodiscard]] double shareGood() const;
+  /// For summary.json: shares, doubts, sigmas, the estimated calibration where there is one, and `words`.
+  [[nodiscard]] nlohmann::ordered_json json() const;
+
+ private:
+  /// Lines for a person.
+  [[nodiscard]] std::vector<std::string> words() const;
+
+  std::optional<Stamp> last_;
+  double seconds_ = 0;
+  std::array<double, 4> by_health_{};  ///< s, by Health
+  std::map<Doubt, double> by_doubt_;   ///< s
+  std::uint32_t resets_ = 0;
+  double top_speed_ = 0;                                        ///< m/s
+  double largest_velocity_sigma_ = 0, largest_tilt_sigma_ = 0;  ///< m/s, rad, while good
+  std::optional<CalibrationEstimate> calibration_;              ///< the newest
+};
+
+}  // namespace swiftlet

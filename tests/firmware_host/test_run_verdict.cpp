@@ -1,0 +1,45 @@
+// What is said of a whole run.
+
+#include "firmware_host/interfaces/run_verdict.hpp"
+
+#include <catch2/catch.hpp>
+#include <memory>
+
+using namespace swiftlet;
+
+TEST_CASE("run verdict: shares of time, doubts, sigmas and the estimated calibration", "[verdict]") {
+  RunVerdict verdict;
+  CHECK(verdict.shareGood() == 1);  // nothing flown, nothing to blame
+  auto output = std::make_unique<OdometryOutput>();
+  const auto frames = [&](int from, int to, Health health, Doubt doubt, bool has_state = true) {
+    for (int k = from; k < to; ++k) {
+      output->has_state = has_state;
+      output->state.health = health;
+      output->doubt = doubt;
+      output->state.v_world_body = {health == Health::kDegraded ? 3.0 : 1.0, 0, 0};
+      output->state.covariance = (health == Health::kGood ? 1e-4 : 1.0) * Matrix15d::Identity();
+      verdict.add(Stamp{k * 50'000'000LL}, *output);
+    }
+  };
+  frames(0, 21, Health::kGood, Doubt::kNone, false);  // no state yet, whatever the fields say: 1 s
+  frames(21, 141, Health::kGood, Doubt::kNone);       // 6 s
+  output->state.epoch = 2;
+  output->calibration.shift_sigma = 1e-4;
+  output->calibration.camera_to_imu_shift = Duration::fromMilliseconds(3);
+  frames(141, 201, Health::kDegraded, Doubt::kTracksDisagree);  // 3 s
+  CHECK(verdict.shareGood() == Approx(0.6));
+  const auto json = verdict.json();
+  CHECK(json["seconds"].get<double>() == Approx(10));
+  CHECK(json["health_s"]["initializing"].get<double>() == Approx(1));
+  CHECK(json["health_s"]["degraded"].get<double>() == Approx(3));
+  CHECK(json["doubts_s"]["tracks_disagree"].get<double>() == Approx(3));
+  CHECK(json["resets"] == 2);
+  CHECK(json["top_speed_m_s"].get<double>() == Approx(3));
+  CHECK(json["largest_velocity_sigma_good_m_s"].get<double>() == Approx(0.01));
+  CHECK(json["estimated_calibration"]["t_imu_minus_t_image_s"].get<double>() == Approx(3e-3));
+  CHECK_FALSE(json["estimated_calibration"].contains("cam0"));
+  const auto words = json["in_words"].get<std::vector<std::string>>();
+  REQUIRE(words.size() == 3);
+  CHECK(words[0].find("good 60.0 %") != std::string::npos);
+  CHECK(words[2].find("3.0 s tracks_disagree: ") != std::string::npos);
+}
