@@ -40,13 +40,13 @@ TEST_CASE("simulated tracks replay and evaluate from end to end") {
   const ScratchFolder folder("tracks");
   const std::string flight = folder.file("flight");
   const std::string first = folder.file("run");
-  REQUIRE(run({"simulate", "--tracks", "--duration", "5", "--seed", "7", "--out", flight}) == kExitDone);
+  REQUIRE(run({"simulate", "--tracks", "--duration", "12", "--seed", "7", "--out", flight}) == kExitDone);
   REQUIRE(run({"replay", flight, "--out", first}) == kExitDone);
   CHECK(run({"evaluate", first}) == kExitDone);
   const auto summary = summaryIn(first);
   CHECK(summary["run"]["tracks"] == (fs::path(flight) / "mav0/tracks0/data.csv").string());
   CHECK(summary["run"]["cameras"] == 2);
-  CHECK(summary["counters"]["odometry"]["frames"] == 98);  // 20 Hz from 0.1 s on
+  CHECK(summary["counters"]["odometry"]["frames"] == 238);  // 20 Hz from 0.1 s on
   CHECK(summary["counters"]["tracks"]["surplus"] == 0);
   CHECK(summary["run"]["tracking_coverage"].get<double>() > 0.9);
   // Half a pixel of noise over a few metres of path: millimetres to centimetres.
