@@ -44,6 +44,10 @@ constexpr double kDrift = 5.0;
 constexpr double kDriftGyroFloor = 0.006;  // rad/s
 constexpr double kDriftAccelFloor = 0.06;  // m/s^2
 
+// Both may be so much larger while the images move slowly: rotors that spin up reach 1.7 times, a
+// take-off 3.4 (EuRoC V1_01, MH_05).
+constexpr double kSlowSlack = 2.5;
+
 constexpr Duration kImageLife = Duration::fromMilliseconds(300);  // an older verdict says nothing
 
 constexpr double kUnknownBias = 0.15;   // rad/s: a larger mean rate is no bias of a working sensor
@@ -110,6 +114,10 @@ ImageMotion RestDetector::images() const {
   return last_ - image_stamp_ > kImageLife ? ImageMotion::kUnknown : image_motion_;
 }
 
+bool RestDetector::imagesHold() const {
+  return images() == ImageMotion::kStill || images() == ImageMotion::kSlow;
+}
+
 RestDetector::Window RestDetector::window(std::size_t blocks) const {
   Window w;
   const std::size_t first = block_count_ - blocks;
@@ -159,14 +167,19 @@ bool RestDetector::withinImageLimits(const Window& w) const {
 }
 
 bool RestDetector::jumps(const ImuSample& sample) const {
-  return ((sample.gyro - window_gyro_).cwiseAbs().array() > jump_gyro_.array()).any() ||
-         ((sample.accel - window_accel_).cwiseAbs().array() > jump_accel_.array()).any();
+  const double slack = imuSlack();
+  return ((sample.gyro - window_gyro_).cwiseAbs().array() > slack * jump_gyro_.array()).any() ||
+         ((sample.accel - window_accel_).cwiseAbs().array() > slack * jump_accel_.array()).any();
 }
 
 bool RestDetector::drifts(const Block& block) const {
-  return (block.gyro / block.count - window_gyro_).cwiseAbs().maxCoeff() > drift_gyro_ ||
-         (block.accel / block.count - window_accel_).cwiseAbs().maxCoeff() > drift_accel_;
+  const double slack = imuSlack();
+  return (block.gyro / block.count - window_gyro_).cwiseAbs().maxCoeff() > slack * drift_gyro_ ||
+         (block.accel / block.count - window_accel_).cwiseAbs().maxCoeff() > slack * drift_accel_;
 }
+
+// How much more than usual a reading has to differ to end a rest.
+double RestDetector::imuSlack() const { return images() == ImageMotion::kSlow ? kSlowSlack : 1.0; }
 
 void RestDetector::closeBlock() {
   blocks_[block_count_ % kLongBlocks] = open_;
@@ -200,18 +213,16 @@ void RestDetector::closeBlock() {
   drift_accel_ = std::max(kDrift * short_window.slow_accel, kDriftAccelFloor);
 
   if (state_.at_rest) {
-    const bool holds = images == ImageMotion::kStill
-                           ? withinImageLimits(short_window)
-                           : within(short_window, kHoldFactor, kImageGyroLimit, kImageAccelLimit);
+    const bool holds = imagesHold() ? withinImageLimits(short_window)
+                                    : within(short_window, kHoldFactor, kImageGyroLimit, kImageAccelLimit);
     if (!holds) end();
   }
   if (block_count_ >= kLongBlocks) updateLimits(window(kLongBlocks));
   const bool quiet = within(short_window, kShortSlowFactor, kShortGyroLimit, kShortAccelLimit);
   const Window long_window = block_count_ >= kLongBlocks ? window(kLongBlocks) : short_window;
   const bool long_quiet = block_count_ >= kLongBlocks && within(long_window, 1.0, kGyroLimit, kAccelLimit);
-  const bool slow = images == ImageMotion::kStill || images == ImageMotion::kSlow;
-  state_.quiet = (quiet || long_quiet) && slow;
-  const bool imu_may = images == ImageMotion::kUnknown || (slow && standsByEstimate());
+  state_.quiet = (quiet || long_quiet) && imagesHold();
+  const bool imu_may = images == ImageMotion::kUnknown || (imagesHold() && standsByEstimate());
   if (!state_.at_rest && by_images) {
     begin(image_window);
   } else if (!state_.at_rest && imu_may && speedAllows() && (quiet || long_quiet)) {

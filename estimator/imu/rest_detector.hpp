@@ -8,9 +8,10 @@
 // noise (the quietest window so far) between fixed bounds, so that they are neither blind to a
 // coarse sensor nor lax on a fine one.
 //   IMU alone:  1 s within the limits, or 0.5 s well within them, where there are no images.
-//   Images:     still: a rest begins and continues within wider IMU limits. Slow: a rest begins within the
-//               normal limits if the estimated speed is also near zero. Moving: a rest ends. Otherwise no
-//               rest begins, and one in progress continues within the IMU limits.
+//   Images:     still: a rest begins within wider IMU limits. Slow: it begins within the normal limits if
+//               the estimated speed is also near zero. Still or slow: a rest in progress continues within
+//               the wider limits. Moving: a rest ends. Otherwise no rest begins, and one in progress
+//               continues within the normal limits.
 // No rest begins while the estimated speed is significantly above zero, or while the mean rate exceeds any
 // plausible gyro bias.
 // Frames: body axes. Units: SI, pixels.
@@ -95,6 +96,7 @@ class RestDetector {
 
   [[nodiscard]] Window window(std::size_t blocks) const;
   [[nodiscard]] ImageMotion images() const;
+  [[nodiscard]] bool imagesHold() const;
   [[nodiscard]] bool meansAllow(const Window& w) const;
   [[nodiscard]] bool speedAllows() const;
   [[nodiscard]] bool standsByEstimate() const;
@@ -102,6 +104,7 @@ class RestDetector {
   [[nodiscard]] bool withinImageLimits(const Window& w) const;
   [[nodiscard]] bool jumps(const ImuSample& sample) const;
   [[nodiscard]] bool drifts(const Block& block) const;
+  [[nodiscard]] double imuSlack() const;
   void closeBlock();
   void startAnew();
   void begin(const Window& w);

@@ -6,8 +6,10 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kMoved = 0.5;      // px; noise of a median is about 0.1
-constexpr double kFlowNoise = 0.1;  // px
+// Rotors that spin up on the ground shake the image by up to 2 mrad (EuRoC V1_01).
+constexpr double kMoved = 3e-3;      // rad
+constexpr double kLeastMoved = 0.5;  // px; noise of a median is about 0.1
+constexpr double kFlowNoise = 0.1;   // px
 // Of the line of sight.
 constexpr double kStillRate = 0.4e-3;  // rad/s
 constexpr double kSlowRate = 5e-3;     // rad/s
@@ -64,7 +66,7 @@ ImageMotion ImageStillness::update(const TrackedFrame& frame) {
     takeReference(frame);
     return ImageMotion::kUncertain;
   }
-  if (pixels >= kMoved) {
+  if (pixels >= std::max(kLeastMoved, kMoved * rig_.camera[c].focal())) {
     takeReference(frame);
     return ImageMotion::kMoving;
   }

@@ -4,7 +4,7 @@
 // Tracks are compared with a reference frame instead of the previous frame, so slow drift accumulates until
 // it exceeds tracking noise. With d the displacement since the reference in radians, noise included, and t
 // the elapsed time:
-//  moving     displacement of 0.5 px or more; the current frame becomes the reference
+//  moving     displacement of 3 mrad or more, at least 0.5 px; the current frame becomes the reference
 //  still      d / t below 0.4 mrad/s: 2 cm/s at a distance of 50 m
 //  slow       d / t below 5 mrad/s: 1.5 cm/s at 3 m
 //  uncertain  d / t above that: more time is needed

@@ -135,6 +135,25 @@ TEST_CASE("Images: moving ones forbid a rest that the IMU would claim, still one
   CHECK(idling_found > 400);
 }
 
+TEST_CASE("While images move slowly, rotors that spin up do not end a rest, a take-off does") {
+  const ImuNoise noise;
+  for (const double push : {0.12, 0.6}) {  // m/s^2 for 0.1 s; the scatter's own limit is 0.06
+    INFO(push << " m/s^2");
+    Random random(9);
+    RestDetector detector(noise);
+    bool ended = false;
+    for (int i = 0; i < 500; ++i) {
+      ImuSample sample = still(0.005 * i, noise, random);
+      if (i >= 400 && i < 420) sample.accel.x() += push;
+      detector.addImu(sample);
+      if (i % 10 == 0) detector.addFrame(sample.stamp, i < 390 ? ImageMotion::kStill : ImageMotion::kSlow);
+      if (i == 399) REQUIRE(detector.state().at_rest);
+      ended |= i >= 400 && !detector.state().at_rest;
+    }
+    CHECK(ended == (push > 0.3));
+  }
+}
+
 TEST_CASE("With images no rest begins before they are known to stand still") {
   const ImuNoise noise;
   Random random(7);

@@ -19,14 +19,15 @@ struct View {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s of the camera, its axes
   double rate = 20;                                    ///< Hz
   int passer_by = 0;  ///< tracks of the left upper quadrant that move at 1 px a frame
+  double shake = 0;   ///< rad, the camera turns to and fro by as much at 7 Hz
 };
 
-// Share of the frames from `from` on that are called still.
-double shareStill(const Rig& rig, const View& view, double seconds, double from) {
+// Share of the frames from `from` on that are called `wanted`.
+double share(const Rig& rig, const View& view, double seconds, double from, ImageMotion wanted) {
   ImageStillness stillness(rig);
   Random random(4);
   const CameraModel& camera = rig.camera[0];
-  int still = 0;
+  int called = 0;
   int frames = 0;
   for (int k = 0; k < seconds * view.rate; ++k) {
     const double t = k / view.rate;
@@ -40,7 +41,8 @@ double shareStill(const Rig& rig, const View& view, double seconds, double from)
       Eigen::Vector3d ray;
       if (!camera.unproject(at, ray)) continue;
       Eigen::Vector2d pixel;
-      const Eigen::Vector3d point = ray * (view.height / std::max(ray.z(), 0.2)) - t * view.velocity;
+      Eigen::Vector3d point = ray * (view.height / std::max(ray.z(), 0.2)) - t * view.velocity;
+      point.x() += view.shake * std::sin(2 * M_PI * 7 * t) * point.z();
       if (!camera.project(point, pixel)) continue;
       for (int axis = 0; axis < 2; ++axis) pixel[axis] += kTrackNoise * random.normal();
       if (at.x() < 0.5 * camera.width() && at.y() < 0.5 * camera.height() && passing-- > 0)
@@ -54,9 +56,13 @@ double shareStill(const Rig& rig, const View& view, double seconds, double from)
     const ImageMotion motion = stillness.update(frame);
     if (t < from) continue;
     ++frames;
-    still += motion == ImageMotion::kStill ? 1 : 0;
+    called += motion == wanted ? 1 : 0;
   }
-  return still / static_cast<double>(frames);
+  return called / static_cast<double>(frames);
+}
+
+double shareStill(const Rig& rig, const View& view, double seconds, double from) {
+  return share(rig, view, seconds, from, ImageMotion::kStill);
 }
 
 }  // namespace
@@ -83,6 +89,23 @@ TEST_CASE("Image stillness: what stands still is found, beside a passer-by too",
       INFO(rigName(kind) << " at " << rate << " Hz");
       CHECK(shareStill(rig, {3, Eigen::Vector3d::Zero(), rate}, 6, 3) > 0.95);
       CHECK(shareStill(rig, {3, Eigen::Vector3d::Zero(), rate, 60}, 6, 3) > 0.95);
+    }
+  }
+}
+
+TEST_CASE("Image stillness: shaken on the spot is not moving", "[image_stillness]") {
+  for (const RigKind kind : {RigKind::kEuroc, RigKind::kWide, RigKind::kFisheye}) {
+    const Rig rig = makeRig(kind).rig;
+    View view;
+    view.height = 3;
+    for (const double rate : {20.0, 60.0}) {
+      view.rate = rate;
+      INFO(rigName(kind) << " at " << rate << " Hz");
+      view.shake = 1.4e-3;
+      CHECK(share(rig, view, 6, 0, ImageMotion::kMoving) == 0);
+      CHECK(share(rig, view, 6, 2, ImageMotion::kSlow) + shareStill(rig, view, 6, 2) > 0.95);
+      view.shake = 10e-3;
+      CHECK(share(rig, view, 6, 2, ImageMotion::kMoving) > 0.2);
     }
   }
 }
