@@ -11,6 +11,7 @@ namespace swiftlet {
 
 Smoother::Smoother(const Rig& rig, const ImuNoise& noise, const SmootherSettings& settings)
     : settings_(settings),
+      pixel_noise_(settings.pixel_sigma),
       problem_(rig, noise, settings.estimate_time_offset, settings.estimate_extrinsics) {}
 
 void Smoother::reset() {
@@ -84,11 +85,12 @@ TrackId Smoother::newestIdTaken(const TrackedFrame& frame, int max_features) {
 
 void Smoother::addSightings(const TrackedFrame& frame, int max_features) {
   statistics_ = FrameStatistics{};
+  statistics_.pixel_sigma = pixel_noise_.sigma();
   double age = 0;
   const TrackId newest_taken = newestIdTaken(frame, max_features);
   for (const TrackedFeature& feature : frame.features) {
     if (feature.id > newest_taken) continue;
-    const Sighting sighting = makeSighting(problem_.rig, feature.seen, feature.pixel, settings_.pixel_sigma,
+    const Sighting sighting = makeSighting(problem_.rig, feature.seen, feature.pixel, statistics_.pixel_sigma,
                                            problem_.window.newestSlot());
     if (!sighting.any()) continue;
     Landmark* const known = problem_.landmarks.find(feature.id);
@@ -118,12 +120,13 @@ void Smoother::updateStatistics() {
     const bool both = last.camera[0].used && last.camera[1].used;
     ++(both ? statistics_.inliers_stereo : statistics_.inliers_mono);
   }
-  if (views > 0) statistics_.reprojection_rms = settings_.pixel_sigma * std::sqrt(sum / views);
+  if (views > 0) statistics_.reprojection_rms = pixel_noise_.sigma() * std::sqrt(sum / views);
   statistics_.imu_residual = motionResidual(problem_);
   WindowState& state = problem_.window.newest();
   statistics_.keyframe = state.keyframe;
   statistics_.at_rest = state.rest != 0;
   state.statistics = statistics_;
+  if (statistics_.median_square > 0) pixel_noise_.update(statistics_.median_square, state.link_duration);
 }
 
 void Smoother::trim(FixedVector<KeyframeState, kMaxStates>& left_window) {

@@ -35,6 +35,7 @@
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/smoother/marginalization.hpp"
 #include "estimator/smoother/normal_equations.hpp"
+#include "estimator/smoother/pixel_noise.hpp"
 #include "estimator/smoother/window_covariance.hpp"
 #include "estimator/smoother/window_problem.hpp"
 #include "estimator/smoother/window_solver.hpp"
@@ -42,7 +43,7 @@
 namespace swiftlet {
 
 struct SmootherSettings {
-  double pixel_sigma = kTrackPixelSigma;  ///< px
+  double pixel_sigma = kTrackPixelSigma;  ///< px, at least: raised where the tracks fit worse
   double horizon = 30.0;                  ///< s
   int max_recent = 4;                     ///< newest frames, keyframe or not, that stay whole
   int max_motion_keyframes = 5;           ///< keyframes behind them that keep velocity and biases
@@ -111,6 +112,8 @@ class Smoother {
   /// Not before the first step.
   [[nodiscard]] const WindowState& newest() const { return problem_.window.newest(); }
   [[nodiscard]] const FrameStatistics& statistics() const { return statistics_; }
+  /// px, of the next frame's sightings; kept by reset().
+  [[nodiscard]] double pixelSigma() const { return pixel_noise_.sigma(); }
   /// Marginal covariance of the newest state, error-state order.
   [[nodiscard]] const Matrix15d& covariance() const { return covariance_.newest(); }
   /// The verdict on the newest frame, to be recorded with it.
@@ -177,6 +180,7 @@ class Smoother {
   void updateStatistics();
 
   SmootherSettings settings_;
+  PixelNoise pixel_noise_;
   WindowProblem problem_;
   NormalEquations system_;
   WindowSolver solver_;

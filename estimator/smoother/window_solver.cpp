@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/smoother/pixel_noise.hpp"
+
 namespace swiftlet {
 namespace {
 
@@ -56,7 +58,9 @@ bool reject(WindowProblem& problem, Landmark& landmark) {
 
 }  // namespace
 
-WindowSolver::WindowSolver() : eliminated_(kMaxLandmarks), step_(kMaxSystemDim) {}
+WindowSolver::WindowSolver() : eliminated_(kMaxLandmarks), step_(kMaxSystemDim) {
+  squares_.reserve(kMaxCameras * kMaxLandmarks);
+}
 
 void WindowSolver::reintegrate(WindowProblem& problem) const {
   Window& window = problem.window;
@@ -123,6 +127,31 @@ void WindowSolver::takeBack(WindowProblem& problem) const {
   triangulateAll(problem, kTriangulationRestart);
 }
 
+// Before any is rejected. A point takes three of the 2 n components of its n views.
+double WindowSolver::medianSquare(const WindowProblem& problem) {
+  squares_.clear();
+  const std::uint8_t newest = problem.window.newestSlot();
+  for (const Landmark& landmark : problem.landmarks) {
+    if (!landmark.in_system || landmark.sightings.empty()) continue;
+    const Sighting& sighting = landmark.sightings.back();
+    if (sighting.slot != newest) continue;
+    const double components = 2.0 * landmark.viewCount();
+    if (landmark.sightings.size() < 2 || components <= 3) continue;
+    const double share = (components - 3) / components;
+    for (std::size_t c = 0; c < problem.rig.camera_count; ++c) {
+      const CameraSighting& view = sighting.camera[c];
+      Eigen::Vector2d r;
+      if (view.used && reprojectionResidual(view, problem.rig_poses[newest].current[c], landmark.point, r)) {
+        squares_.push_back(r.squaredNorm() / share);
+      }
+    }
+  }
+  if (squares_.size() < PixelNoise::kFewestSightings) return 0;
+  const auto middle = squares_.begin() + static_cast<std::ptrdiff_t>(squares_.size() / 2);
+  std::nth_element(squares_.begin(), middle, squares_.end());
+  return *middle;
+}
+
 Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, WindowCovariance& covariance,
                            int iterations, double pose_tolerance, FrameStatistics& statistics) {
   problem.assignOffsets();
@@ -135,7 +164,10 @@ Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, Wind
     problem.moveEstimates();
     problem.placeCameras();
     if (iteration == 0) triangulateAll(problem, 0);
-    if (iteration == 1) rejectNewestSightings(problem, kOutlierSigmas);
+    if (iteration == 1) {
+      statistics.median_square = medianSquare(problem);
+      rejectNewestSightings(problem, kOutlierSigmas);
+    }
     const WindowCost before = cost_;
     build(problem, system, iteration == 0);
     // Not the first step: the sightings are others since.
@@ -165,6 +197,7 @@ Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, Wind
   }
   problem.placeCameras();
   if (unchecked && rises(cost_, costOf(problem, step_))) takeBack(problem);
+  if (statistics.iterations < 2) statistics.median_square = medianSquare(problem);
   rejectNewestSightings(problem, kFinalOutlierSigmas);
   rejectLandmarks(problem, kFinalOutlierSigmas);
   return okStatus();

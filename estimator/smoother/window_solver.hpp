@@ -31,8 +31,11 @@ class WindowSolver {
   void build(WindowProblem& problem, NormalEquations& system, bool first);
   void substitutePoints(WindowProblem& problem, const VectorMap& step) const;
   void takeBack(WindowProblem& problem) const;
+  /// Of the newest state's residuals, squared norms in sigmas; 0: too few.
+  double medianSquare(const WindowProblem& problem);
 
   std::vector<EliminatedPoint> eliminated_;  // by landmark
+  std::vector<double> squares_;              // scratch of medianSquare()
   std::vector<double> step_;
   WindowCost cost_;  // where the system was last built
 };

@@ -5,6 +5,7 @@
 // Added to frame by frame; constant memory.
 
 #include <array>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -28,12 +29,17 @@ class RunVerdict {
  private:
   /// Lines for a person.
   [[nodiscard]] std::vector<std::string> words() const;
+  /// px; 0 without a state.
+  [[nodiscard]] double meanPixelSigma() const;
 
   std::optional<Stamp> last_;
   double seconds_ = 0;
   std::array<double, 4> by_health_{};  ///< s, by Health
   std::map<Doubt, double> by_doubt_;   ///< s
   std::uint32_t resets_ = 0;
+  double state_seconds_ = 0;
+  double pixel_sigma_s_ = 0;  ///< px s, over the time with a state
+  double least_pixel_sigma_ = std::numeric_limits<double>::infinity();
   double top_speed_ = 0;                                        ///< m/s
   double largest_velocity_sigma_ = 0, largest_tilt_sigma_ = 0;  ///< m/s, rad, while good
   std::optional<CalibrationEstimate> calibration_;              ///< the newest

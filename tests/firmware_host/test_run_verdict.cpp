@@ -17,6 +17,7 @@ TEST_CASE("run verdict: shares of time, doubts, sigmas and the estimated calibra
       output->state.health = health;
       output->doubt = doubt;
       output->state.v_world_body = {health == Health::kDegraded ? 3.0 : 1.0, 0, 0};
+      output->statistics.pixel_sigma = health == Health::kDegraded ? 2.5 : 0.5;  // 1.17 on the mean
       output->state.covariance = (health == Health::kGood ? 1e-4 : 1.0) * Matrix15d::Identity();
       verdict.add(Stamp{k * 50'000'000LL}, *output);
     }
@@ -39,7 +40,9 @@ TEST_CASE("run verdict: shares of time, doubts, sigmas and the estimated calibra
   CHECK(json["estimated_calibration"]["t_imu_minus_t_image_s"].get<double>() == Approx(3e-3));
   CHECK_FALSE(json["estimated_calibration"].contains("cam0"));
   const auto words = json["in_words"].get<std::vector<std::string>>();
-  REQUIRE(words.size() == 3);
+  CHECK(json["mean_pixel_sigma_px"].get<double>() == Approx((6 * 0.5 + 3 * 2.5) / 9));
+  REQUIRE(words.size() == 4);
+  CHECK(words[1].find("tracks fit to 1.2 px on average, smoother.pixel_sigma is 0.50") != std::string::npos);
   CHECK(words[0].find("good 60.0 %") != std::string::npos);
   CHECK(words[2].find("3.0 s tracks_disagree: ") != std::string::npos);
 }

@@ -1,0 +1,67 @@
+// The noise of tracks is found from their residuals, and only ever raised.
+
+#include <catch2/catch.hpp>
+
+#include "estimator/smoother/pixel_noise.hpp"
+#include "tests/odometry/odometry_run.hpp"
+
+using namespace swiftlet;
+using test::OdometryRun;
+using test::RunFrame;
+using test::TrackFlight;
+
+namespace {
+
+OdometryRun noisyRun(double pixel_sigma, bool stereo) {
+  SimulationSettings settings = test::roomFlight(12, 77);
+  settings.tracks.pixel_sigma = pixel_sigma;
+  const TrackFlight flight(settings);
+  OdometrySettings odometry = test::settingsFor(flight, stereo);
+  odometry.pixel_sigma = OdometrySettings{}.pixel_sigma;
+  return test::runOdometry(flight, odometry);
+}
+
+double worstVelocity(const OdometryRun& run, double from) {
+  double worst = 0;
+  for (const RunFrame& f : run.frames) {
+    if (!f.has_state || f.seconds < from) continue;
+    const Eigen::Quaterniond turn = f.state.T_world_body.rotation * f.truth.T_world_body.rotation.conjugate();
+    worst = std::max(worst, (f.state.v_world_body - turn * f.truth.v_world_body).norm());
+  }
+  return worst;
+}
+
+}  // namespace
+
+TEST_CASE("Pixel noise: follows residuals, between once and six times what is set", "[odometry]") {
+  PixelNoise noise(0.5);
+  CHECK(noise.sigma() == 0.5);
+  const auto after = [&noise](double sigma) {  // residuals of tracks with that noise, for 20 s
+    for (int k = 0; k < 400; ++k) {
+      noise.update(1.3863 * (sigma / noise.sigma()) * (sigma / noise.sigma()), 0.05);
+    }
+    return noise.sigma();
+  };
+  CHECK(after(0.1) == 0.5);
+  CHECK(after(2.0) == Approx(2.0).epsilon(0.01));
+  CHECK(after(50.0) == Approx(3.0).epsilon(0.01));
+  CHECK(after(0.6) == Approx(0.6).epsilon(0.01));
+  CHECK(after(0.1) == 0.5);
+}
+
+TEST_CASE("Odometry: tracks four times as noisy as set are weighted as they are", "[odometry]") {
+  for (const bool stereo : {true, false}) {
+    CAPTURE(stereo);
+    const OdometryRun run = noisyRun(2.0, stereo);
+    CHECK(run.frames.back().statistics.pixel_sigma == Approx(2.0).epsilon(0.15));
+    CHECK(run.frames.back().state.epoch == 0);
+    CHECK(worstVelocity(run, 6) < 0.25);
+  }
+}
+
+TEST_CASE("Odometry: tracks as noisy as set leave the noise as it is", "[odometry]") {
+  const OdometryRun run = noisyRun(OdometrySettings{}.pixel_sigma, true);
+  for (const RunFrame& f : run.frames) {
+    if (f.has_state) CHECK(f.statistics.pixel_sigma < 1.1 * OdometrySettings{}.pixel_sigma);
+  }
+}
