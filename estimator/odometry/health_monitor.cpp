@@ -14,6 +14,8 @@ constexpr double kCoastLimit = 3.0;  // s
 // After a start and after a doubt: ten images at 20 Hz.
 constexpr double kSettlingTime = 0.45;  // s
 constexpr double kStampSlack = 1e-3;    // s: sums of frame intervals are exact to rounding
+// After a disagreement of what had been good: its figures fall below the limits for moments too.
+constexpr double kReconciledTime = 2.0;  // s
 // The settling time doubles with each loss, until the estimate has been good for long.
 constexpr int kMostLosses = 4;
 constexpr double kForgivenTime = 10.0;  // s of good
@@ -25,8 +27,8 @@ constexpr double kTiltSigma = 0.035;    // rad
 // Inliers among the sightings of known landmarks; healthy flights have 87 % or more, with a person in view
 // too.
 constexpr double kFitShare = 0.75;
-// Residuals of the IMU's motion, in sigmas of its noise as in flight. Where the noise model holds they are
-// 0.1 to 0.3, with real sensors up to 1.2.
+// Residuals of the IMU's motion, in sigmas of its noise as in flight, times what the pixel noise was raised
+// by. Where the noise model holds they are 0.1 to 0.3, with real sensors up to 1.2.
 constexpr double kImuResidual = 2.0;
 // Far outside the limits: the estimate is useless.
 constexpr double kUselessVelocitySigma = 1.0;  // m/s
@@ -39,6 +41,10 @@ constexpr double kWrongScaleTime = 3.0;  // s
 
 double lowPass(double before, double now, double seconds) {
   return before + (1 - std::exp(-seconds / kAverageTime)) * (now - before);
+}
+
+bool isDisagreement(Doubt doubt) {
+  return doubt == Doubt::kTracksDisagree || doubt == Doubt::kImuDisagrees || doubt == Doubt::kScaleDisagrees;
 }
 
 bool scaleOffBy(double bound, const FrameStatistics& statistics) {
@@ -60,6 +66,7 @@ void HealthMonitor::reset() {
   beyond_use_ = 0;
   contradicted_ = 0;
   was_good_ = false;
+  disagreed_ = false;
   good_ = 0;
   lost_ = false;
 }
@@ -69,7 +76,9 @@ void HealthMonitor::average(const Evidence& evidence, double seconds) {
   const int fit = s.inliers_mono + s.inliers_stereo;
   if (s.known >= kMinSightings)
     share_ = lowPass(share_, std::min(1.0, fit / static_cast<double>(s.known)), seconds);
-  imu_square_ = lowPass(imu_square_, s.imu_residual * s.imu_residual, seconds);
+  // Noise of tracks alone would not make the IMU's residuals larger, but weigh the tracks less against it.
+  const double disagreement = s.imu_residual * std::max(1.0, s.pixel_sigma / pixel_sigma_);
+  imu_square_ = lowPass(imu_square_, disagreement * disagreement, seconds);
   if (seconds > 0) {
     acceleration_ =
         lowPass(acceleration_, (evidence.state.v_world_body - last_velocity_).norm() / seconds, seconds);
@@ -116,7 +125,10 @@ bool HealthMonitor::beyondUse(const NavState& state) const {
          imu_square_ > kUselessImuResidual * kUselessImuResidual || share_ < kUselessShare;
 }
 
-double HealthMonitor::settlingTime() const { return kSettlingTime * static_cast<double>(1 << losses_); }
+double HealthMonitor::settlingTime() const {
+  const double time = kSettlingTime * static_cast<double>(1 << losses_);
+  return disagreed_ ? std::max(time, kReconciledTime) : time;
+}
 
 Health HealthMonitor::update(const Evidence& evidence) {
   const TrackedFrame& frame = evidence.frame;
@@ -136,10 +148,14 @@ Health HealthMonitor::update(const Evidence& evidence) {
   }
   const Doubt accuracy = accuracyDoubt(evidence);
   if (accuracy != Doubt::kNone || evidence.imu_missing || without_image > kGoodAge) settled_ = 0;
-  if (accepted) {
+  // What coasts is not judged by figures of images, but no vehicle is faster than the limit.
+  if (accepted || evidence.state.v_world_body.norm() > max_speed_) {
     beyond_use_ = beyondUse(evidence.state) ? beyond_use_ + seconds : 0;
+  }
+  if (accepted) {
     contradicted_ = contradicted(evidence.statistics) ? contradicted_ + seconds : 0;
   }
+  disagreed_ = disagreed_ || (was_good_ && isDisagreement(accuracy));
   const bool lost_before = lost_;
   lost_ = beyond_use_ > kLostTime || contradicted_ > (was_good_ ? kWrongScaleTime : kWrongStartTime);
   if (lost_ && !lost_before) losses_ = std::min(losses_ + 1, kMostLosses);
@@ -151,6 +167,7 @@ Health HealthMonitor::update(const Evidence& evidence) {
   if (doubt_ == Doubt::kNone) {
     health_ = Health::kGood;
     was_good_ = true;
+    disagreed_ = false;
     good_ += seconds;
     if (good_ > kForgivenTime) losses_ = 0;
   } else if (health_ != Health::kInitializing) {

@@ -2,7 +2,8 @@
 // Health: a statement of the estimate's accuracy, made after each solve.
 //
 //  initializing  until the epoch is good for the first time
-//  good          no doubt now, nor during the settling time (0.45 s of accepted images) before
+//  good          no doubt now, nor during the settling time (0.45 s of accepted images, 2 s after a
+//                disagreement) before
 //  degraded      a doubt; or coasting on the IMU for less than 3 s
 //  failed        no accepted image (8 sightings) for 3 s; or, after the epoch was good, figures far outside
 //                the limits
@@ -36,7 +37,10 @@ class HealthMonitor {
   static constexpr int kNominalSightings = 25;
 
   HealthMonitor(const OdometrySettings& settings, std::size_t cameras)
-      : max_speed_(settings.max_speed), max_acceleration_(settings.max_acceleration), cameras_(cameras) {}
+      : max_speed_(settings.max_speed),
+        max_acceleration_(settings.max_acceleration),
+        pixel_sigma_(settings.pixel_sigma),
+        cameras_(cameras) {}
 
   void reset();
 
@@ -56,6 +60,8 @@ class HealthMonitor {
   [[nodiscard]] Doubt doubt() const { return doubt_; }
   /// The state should be discarded and started again.
   [[nodiscard]] bool lost() const { return lost_; }
+  /// Not far outside the limits: the position may be gone on from.
+  [[nodiscard]] bool useful() const { return beyond_use_ == 0; }
   /// The health at a later stamp without a new frame: images that stay away degrade it.
   [[nodiscard]] Health at(Stamp stamp) const;
   /// The same for who has only the last verdict and the stamp of the last accepted image.
@@ -75,6 +81,7 @@ class HealthMonitor {
 
   double max_speed_;
   double max_acceleration_;
+  double pixel_sigma_;  // px, as set
   std::size_t cameras_;
   Health health_ = Health::kInitializing;
   Doubt doubt_ = Doubt::kSettling;
@@ -89,6 +96,7 @@ class HealthMonitor {
   bool scale_known_ = false;  ///< shown once in this epoch
   double beyond_use_ = 0;     ///< s
   double contradicted_ = 0;   ///< s
+  bool disagreed_ = false;    // since it was good
   bool was_good_ = false;     ///< in this epoch
   double good_ = 0;           ///< s, in this epoch
   int losses_ = 0;            ///< epochs given up, not forgiven yet

@@ -14,12 +14,23 @@ constexpr double kAccelBiasSigma = 0.15;  // m/s^2
 // Random walk of the scale error: 6 % in 10 s.
 constexpr double kScaleWalk = 0.02;  // 1/sqrt(s)
 constexpr double kTiltWalk = 1e-3;   // rad/sqrt(s)
+// A start's evidence is void when the smoother has corrected its scale by more than this since.
+constexpr double kCorrected = 0.10;
+// Keyframes closer together than this do not show a correction of the scale.
+constexpr double kLeastDistance = 0.2;  // m
 // Errors of a track are correlated in time, which the smoother's covariance does not include.
 constexpr double kVisionInflation = 4.0;  // on the variance
 
 }  // namespace
 
 void ScaleCheck::reset() {
+  forget();
+  any_ = false;
+  confirmed_ = false;
+  old_.reset();
+}
+
+void ScaleCheck::forget() {
   x_.setZero();
   x_[kScale] = 1;
   P_.setZero();
@@ -27,7 +38,7 @@ void ScaleCheck::reset() {
   P_(kScale, kScale) = kScaleSigma * kScaleSigma;
   P_.diagonal().segment<2>(kTilt).setConstant(kTiltSigma * kTiltSigma);
   P_.diagonal().segment<3>(kBias).setConstant(kAccelBiasSigma * kAccelBiasSigma);
-  any_ = false;
+  corrected_ = 1;
 }
 
 double ScaleCheck::sigma() const { return std::sqrt(P_(kScale, kScale)); }
@@ -42,6 +53,7 @@ void ScaleCheck::update(Smoother& smoother) {
   const bool follows = any_ && i.frame_index == newest_;
   any_ = true;
   newest_ = j.frame_index;
+  if (!confirmed_) watchCorrections(window, settled);
   if (!follows || j.link != LinkKind::kImu || !i.has_motion || !j.has_motion) {
     // No IMU link from the last keyframe taken: its velocity is unknown here.
     P_.topRows<3>().setZero();
@@ -58,6 +70,31 @@ void ScaleCheck::update(Smoother& smoother) {
   propagate(i, j.imu);
   measure(j.x.T_world_body.translation - i.x.T_world_body.translation,
           kVisionInflation * covariance.bottomRightCorner<3, 3>().trace() / 3);
+  confirmed_ = confirmed_ || (sigma() < kKnown && std::abs(scale() - 1) < kAgrees);
+}
+
+// Displacements before and after a correction of the scale cannot be compared.
+void ScaleCheck::watchCorrections(const Window& window, std::size_t settled) {
+  const auto find = [&](std::uint64_t frame) {
+    std::size_t k = 0;
+    while (k < settled && window[k].frame_index != frame) ++k;
+    return k;
+  };
+  if (old_) {
+    const std::size_t a = find(old_->first);
+    const std::size_t b = find(old_->last);
+    if (a < settled && b < settled) {
+      corrected_ *= (window[b].x.T_world_body.translation - window[a].x.T_world_body.translation).norm() /
+                    old_->distance;
+    }
+    if (std::abs(std::log(corrected_)) > kCorrected) forget();
+  }
+  // The oldest keyframe may leave before the next call.
+  const WindowState& first = window[1];
+  const WindowState& last = window[settled - 1];
+  const double distance = (last.x.T_world_body.translation - first.x.T_world_body.translation).norm();
+  old_.reset();
+  if (distance > kLeastDistance) old_ = Baseline{first.frame_index, last.frame_index, distance};
 }
 
 // To the instant of the next keyframe; `kMoved` becomes the displacement since.

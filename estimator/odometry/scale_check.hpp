@@ -7,13 +7,15 @@
 // accelerometer bias. The model is linear in all of them:
 //   s (p_j - p_i) = v_i t + g t^2 / 2 + R_i alpha(ba),   v_j = v_i + g t + R_i beta(ba).
 // s becomes observable when the body accelerates. Process noise on s forgets old evidence, so a scale that
-// drifts or collapses later is detected too. Rotations and gyro bias are taken from the smoother: images
-// determine them.
-// Frames: world, body. Memory: 2 kB. Cost: 12 triangular solves of the window's system a keyframe.
-// Source: Martinelli, "Closed-form solution of visual-inertial structure from motion", IJCV 2014 (alignment).
+// drifts or collapses later is detected too. While a start settles, the smoother corrects the scale of its
+// whole window; until the scale is confirmed such a correction makes the evidence void. Rotations and gyro
+// bias are taken from the smoother: images determine them. Frames: world, body. Memory: 2 kB. Cost: 12
+// triangular solves of the window's system a keyframe. Source: Martinelli, "Closed-form solution of
+// visual-inertial structure from motion", IJCV 2014 (alignment).
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 
 #include "estimator/imu/imu_noise.hpp"
 #include "estimator/smoother/smoother.hpp"
@@ -23,7 +25,7 @@ namespace swiftlet {
 class ScaleCheck {
  public:
   /// The scale counts as known below this relative sigma.
-  static constexpr double kKnown = 0.10;
+  static constexpr double kKnown = 0.08;
   /// |s - 1| below it, plus two sigmas: the scale agrees.
   static constexpr double kAgrees = 0.10;
   /// |s - 1| above it, plus two sigmas: the estimate has to start again.
@@ -45,6 +47,8 @@ class ScaleCheck {
   using Vector = Eigen::Matrix<double, kAll, 1>;
   using Matrix = Eigen::Matrix<double, kAll, kAll>;
 
+  void forget();
+  void watchCorrections(const Window& window, std::size_t settled);
   void propagate(const WindowState& i, const Preintegration& imu);
   void measure(const Eigen::Vector3d& displacement, double variance);
 
@@ -52,7 +56,15 @@ class ScaleCheck {
   Vector x_ = Vector::Zero();
   Matrix P_ = Matrix::Zero();
   bool any_ = false;
-  std::uint64_t newest_ = 0;  // frame of the keyframe taken last
+  bool confirmed_ = false;
+  double corrected_ = 1;  // the smoother's factor on its scale since the evidence begins
+  struct Baseline {
+    std::uint64_t first;
+    std::uint64_t last;
+    double distance;
+  };
+  std::optional<Baseline> old_;  // between two keyframes of the window, at the last call
+  std::uint64_t newest_ = 0;     // frame of the keyframe taken last
 };
 
 }  // namespace swiftlet

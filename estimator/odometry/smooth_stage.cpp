@@ -244,7 +244,7 @@ bool SmoothStage::start(const TrackedFrame& tracked, OdometryOutput& output) {
   const bool nearly_still = rest_.state().at_rest || rest_.state().quiet;
   if (rig_.camera_count == 1 && !nearly_still) {
     mono_starter_.push(tracked);
-    if (!mono_starter_.trySolve(imu_, prior, settings_.pixel_sigma, start, output.waiting_for)) return false;
+    if (!mono_starter_.trySolve(imu_, prior, smoother_.pixelSigma(), start, output.waiting_for)) return false;
   } else {
     mono_starter_.reset();
     start.stamp = stamp;
@@ -275,7 +275,8 @@ void SmoothStage::leave(const StartState& at) {
 /// health is failed.
 void SmoothStage::giveUp() {
   StartState at = newestAsStart();
-  if (health_.health() == Health::kFailed && last_good_) at.state.T_world_body = *last_good_;
+  const bool failed = health_.health() == Health::kFailed && last_good_;
+  if (const auto& place = failed ? last_good_ : last_useful_) at.state.T_world_body = *place;
   at.gyro_bias_sigma = 0;  // not to be carried on
   leave(at);
 }
@@ -366,6 +367,7 @@ void SmoothStage::publish(const TrackedFrame& tracked, bool imu_missing, Odometr
       health_.update({tracked, output.statistics, state, imu_missing, *epoch_began_ == tracked.stamp});
   output.doubt = health_.doubt();
   if (state.health == Health::kGood) last_good_ = state.T_world_body;
+  if (health_.useful()) last_useful_ = state.T_world_body;
   smoother_.setHealth(state.health);
   watch_.step({tracked.stamp, tracked.camera_present, rig_.camera_count, rest_.state().at_rest, state.health,
                output.doubt, health_.secondsWithoutImage(tracked.stamp)},

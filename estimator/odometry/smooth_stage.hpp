@@ -114,6 +114,7 @@ class SmoothStage {
   bool lost_ = false;  // samples were missing while no image was accepted: where the body is, nobody knows
   std::optional<StartState> left_at_;  // from which the next epoch goes on; biases unless their sigma is 0
   std::optional<SE3> last_good_;       // T_world_body
+  std::optional<SE3> last_useful_;     // likewise
   std::optional<Stamp> epoch_began_;   // its first frame
 };
 

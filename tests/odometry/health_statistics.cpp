@@ -140,14 +140,14 @@ Verdict judge(const std::vector<RunFrame>& frames, const FaultyFlight& flight, R
     char line[400];
     std::snprintf(line, sizeof line,
                   "%d,%s,%d,%.2f,%u,%d,%.3f,%.3f,%.4f,%.4f,%.4f,%.5f,%.4f,%.4f,%d,%d,%d,%d,%.3f,%.2f,%.1f,%d,"
-                  "%d,%.4f,%.4f,%d,%d\n",
+                  "%d,%.4f,%.4f,%d,%d,%.3f\n",
                   index, test::kRigFaultNames[static_cast<std::size_t>(fault)], mono, f.seconds,
                   f.state.epoch, static_cast<int>(f.state.health), velocity, scale, test::tiltError(f),
                   sigma(6), sigma(0), sigma(9), sigma(12), f.state.v_world_body.norm(), f.statistics.tracks,
                   f.statistics.landmarks, f.statistics.inliers_mono, f.statistics.inliers_stereo,
                   f.statistics.reprojection_rms, f.statistics.imu_residual, f.statistics.track_length,
                   f.statistics.at_rest, f.statistics.iterations, f.statistics.scale, f.statistics.scale_sigma,
-                  static_cast<int>(f.doubt), f.statistics.known);
+                  static_cast<int>(f.doubt), f.statistics.known, f.statistics.pixel_sigma);
     lines += line;
   }
   if (csv != nullptr) {
@@ -226,7 +226,7 @@ int main(int argc, char** argv) {
     std::fputs(
         "run,fault,mono,t,epoch,health,dv,dscale,dtilt,sv,sr,sbg,sba,speed,tracks,landmarks,mono_in,stereo_"
         "in,rms,"
-        "imu,length,rest,iterations,fs,fss,doubt,known\n",
+        "imu,length,rest,iterations,fs,fss,doubt,known,pixel_sigma\n",
         csv);
   }
   // A flight without a fault and one with; every kind of fault in turn.

@@ -15,6 +15,7 @@ struct Watched {
     statistics.tracks = statistics.known = 100;
     statistics.inliers_stereo = 95;
     statistics.imu_residual = 0.3;
+    statistics.pixel_sigma = OdometrySettings{}.pixel_sigma;
     statistics.scale_sigma = cameras == 1 ? 0.02 : 0;
     state.covariance = 1e-4 * Matrix15d::Identity();
   }
@@ -129,5 +130,40 @@ TEST_CASE("Health: figures far outside the limits are failed, then lost", "[heal
   CHECK(watched.steps_of(20) == Health::kFailed);
   CHECK_FALSE(watched.monitor.lost());
   watched.steps_of(25);
+  CHECK(watched.monitor.lost());
+}
+
+TEST_CASE("Health: after a disagreement it takes two seconds to be good again", "[health]") {
+  Watched watched;
+  REQUIRE(watched.steps_of(20) == Health::kGood);
+  const FrameStatistics sound = watched.statistics;
+  watched.statistics.imu_residual = 3;
+  REQUIRE(watched.steps_of(20) == Health::kDegraded);
+  watched.statistics = sound;
+  double seconds = 0;
+  while (watched.step() != Health::kGood && seconds < 10) {
+    seconds = watched.monitor.doubt() == Doubt::kSettling ? seconds + 0.05 : 0;
+  }
+  CHECK(seconds == Approx(2).margin(0.11));
+}
+
+TEST_CASE("Health: raised pixel noise does not excuse the IMU's residuals", "[health]") {
+  Watched watched;
+  watched.statistics.pixel_sigma *= 5;  // noise of the tracks alone
+  REQUIRE(watched.steps_of(20) == Health::kGood);
+  watched.statistics.imu_residual = 0.6;
+  CHECK(watched.steps_of(20) == Health::kDegraded);
+  CHECK(watched.monitor.doubt() == Doubt::kImuDisagrees);
+}
+
+TEST_CASE("Health: a speed that no vehicle has is lost without accepted images too", "[health]") {
+  Watched watched;
+  REQUIRE(watched.steps_of(20) == Health::kGood);
+  CHECK(watched.monitor.useful());
+  watched.statistics.inliers_stereo = 0;
+  watched.state.v_world_body = {1000, 0, 0};
+  watched.step();
+  CHECK_FALSE(watched.monitor.useful());
+  watched.steps_of(45);
   CHECK(watched.monitor.lost());
 }
