@@ -22,6 +22,22 @@ void CalibrationState::hold(MatrixMap H) {
       H(at + 3 + k, at + 3 + k) = 1.0 / (kExtrinsicPositionPriorSigma * kExtrinsicPositionPriorSigma);
     }
   }
+  if (layout_.cameras > 1) holdBaseline(H);
+}
+
+// Its length alone: a rig that is turned as a whole turns its baseline too.
+void CalibrationState::holdBaseline(MatrixMap H) const {
+  const Eigen::Vector3d baseline = now_.T_body_cam[1].translation - now_.T_body_cam[0].translation;
+  const double sigma = kBaselinePriorSigma * baseline.norm();
+  if (sigma <= 0) return;
+  const Eigen::Vector3d u = baseline.normalized();
+  const Eigen::Matrix3d information = u * u.transpose() / (sigma * sigma);
+  const int p0 = layout_.extrinsicOffset(0) + 3;
+  const int p1 = layout_.extrinsicOffset(1) + 3;
+  H.block<3, 3>(p0, p0) += information;
+  H.block<3, 3>(p1, p1) += information;
+  H.block<3, 3>(p0, p1) -= information;
+  H.block<3, 3>(p1, p0) -= information;
 }
 
 CalibrationState::Vector CalibrationState::deviation() const {

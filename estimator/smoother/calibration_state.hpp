@@ -35,6 +35,8 @@ class CalibrationState {
   void restore() { now_ = backup_; }
 
  private:
+  void holdBaseline(MatrixMap H) const;
+
   struct Values {
     double time_offset = 0;
     std::array<SE3, kMaxCameras> T_body_cam;
