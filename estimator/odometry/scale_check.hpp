@@ -9,9 +9,9 @@
 // s becomes observable when the body accelerates. Process noise on s forgets old evidence, so a scale that
 // drifts or collapses later is detected too. While a start settles, the smoother corrects the scale of its
 // whole window; until the scale is confirmed such a correction makes the evidence void. Rotations and gyro
-// bias are taken from the smoother: images determine them. Frames: world, body. Memory: 2 kB. Cost: 12
-// triangular solves of the window's system a keyframe. Source: Martinelli, "Closed-form solution of
-// visual-inertial structure from motion", IJCV 2014 (alignment).
+// bias are taken from the smoother: images determine them.
+// Frames: world, body. Memory: 2 kB. Cost: 12 triangular solves of the window's system a keyframe.
+// Source: Martinelli, "Closed-form solution of visual-inertial structure from motion", IJCV 2014 (alignment).
 
 #include <Eigen/Core>
 #include <cstdint>

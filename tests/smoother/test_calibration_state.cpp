@@ -3,6 +3,7 @@
 #include "estimator/smoother/calibration_state.hpp"
 
 #include <catch2/catch.hpp>
+#include <cmath>
 
 #include "drivers/simulated/rig_presets.hpp"
 #include "estimator/messages/calibration_estimate.hpp"
