@@ -15,7 +15,7 @@ inline constexpr double kTimeOffsetPriorSigma = 10e-3;        ///< s
 inline constexpr double kExtrinsicRotationPriorSigma = 0.01;  ///< rad
 /// Calibrations give positions on the IMU to a few millimetres.
 inline constexpr double kExtrinsicPositionPriorSigma = 2e-3;  ///< m
-/// And the length of the baseline, which is stereo's scale, to a thousandth.
+/// Calibrations give the baseline's length, the scale of two cameras, to a thousandth of itself.
 inline constexpr double kBaselinePriorSigma = 1e-3;
 
 /// Sigmas: largest over the axes, from the last solve; 0 where the value is not estimated.

@@ -64,7 +64,6 @@ struct FrameStatistics {
   int inliers_stereo = 0;       ///< accepted, by both cameras
   double track_length = 0;      ///< mean frames a track of this frame has lived
   double reprojection_rms = 0;  ///< px, accepted sightings of the window
-  double median_square = 0;     ///< of this frame's residuals, in sigmas, outliers included; 0: too few
   double pixel_sigma = 0;       ///< px, the noise in use for this frame's sightings
   double imu_residual = 0;      ///< whitened IMU residuals of the window, RMS (1: as the noise model says)
   /// One camera: true over estimated length, as the accelerometer says, and its sigma (scale_check.hpp).

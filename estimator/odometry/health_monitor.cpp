@@ -62,7 +62,6 @@ void HealthMonitor::reset() {
   share_ = 1;
   imu_square_ = 0;
   acceleration_ = 0;
-  scale_known_ = false;
   beyond_use_ = 0;
   contradicted_ = 0;
   was_good_ = false;
@@ -95,22 +94,19 @@ Doubt HealthMonitor::inputDoubt(const Evidence& evidence) const {
   return Doubt::kNone;
 }
 
-// Once confirmed the scale stays known without further acceleration, until the accelerometer contradicts it.
-Doubt HealthMonitor::scaleDoubt(const FrameStatistics& statistics) {
+Doubt HealthMonitor::scaleDoubt(const Evidence& evidence) const {
   if (cameras_ != 1) return Doubt::kNone;
-  if (scaleOffBy(ScaleCheck::kAgrees, statistics)) return Doubt::kScaleDisagrees;
-  scale_known_ = scale_known_ || (statistics.scale_sigma < ScaleCheck::kKnown &&
-                                  std::abs(statistics.scale - 1) < ScaleCheck::kAgrees);
-  return scale_known_ ? Doubt::kNone : Doubt::kScaleUnknown;
+  if (scaleOffBy(ScaleCheck::kAgrees, evidence.statistics)) return Doubt::kScaleDisagrees;
+  return evidence.scale_known ? Doubt::kNone : Doubt::kScaleUnknown;
 }
 
-Doubt HealthMonitor::accuracyDoubt(const Evidence& evidence) {
+Doubt HealthMonitor::accuracyDoubt(const Evidence& evidence) const {
   const NavState& state = evidence.state;
   if (state.v_world_body.norm() > max_speed_ || acceleration_ > max_acceleration_) return Doubt::kImplausible;
   if (share_ < kFitShare) return Doubt::kTracksDisagree;
   if (imu_square_ > kImuResidual * kImuResidual) return Doubt::kImuDisagrees;
   if (velocitySigma(state) > kVelocitySigma || tiltSigma(state) > kTiltSigma) return Doubt::kUncertain;
-  return scaleDoubt(evidence.statistics);
+  return scaleDoubt(evidence);
 }
 
 // One camera only: with two, a new start from the same data would end the same way.

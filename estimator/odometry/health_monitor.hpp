@@ -50,6 +50,7 @@ class HealthMonitor {
     const NavState& state;     ///< with its covariance
     bool imu_missing = false;  ///< samples were missing since the last frame
     bool first_of_epoch = false;
+    bool scale_known = false;  ///< one camera: confirmed in this epoch (ScaleCheck)
   };
   /// After a solve.
   Health update(const Evidence& evidence);
@@ -73,8 +74,8 @@ class HealthMonitor {
  private:
   void average(const Evidence& evidence, double seconds);
   [[nodiscard]] Doubt inputDoubt(const Evidence& evidence) const;
-  [[nodiscard]] Doubt accuracyDoubt(const Evidence& evidence);
-  [[nodiscard]] Doubt scaleDoubt(const FrameStatistics& statistics);
+  [[nodiscard]] Doubt accuracyDoubt(const Evidence& evidence) const;
+  [[nodiscard]] Doubt scaleDoubt(const Evidence& evidence) const;
   [[nodiscard]] double settlingTime() const;
   [[nodiscard]] bool contradicted(const FrameStatistics& statistics) const;
   [[nodiscard]] bool beyondUse(const NavState& state) const;
@@ -89,17 +90,16 @@ class HealthMonitor {
   Stamp last_accepted_;
   std::optional<Stamp> last_;  ///< frame of the epoch
   Eigen::Vector3d last_velocity_ = Eigen::Vector3d::Zero();
-  double settled_ = 0;        ///< s of accepted images since the last doubt
-  double share_ = 1;          ///< of a frame's sightings that fit, low pass
-  double imu_square_ = 0;     ///< of the IMU's residual, low pass
-  double acceleration_ = 0;   ///< m/s^2, low pass
-  bool scale_known_ = false;  ///< shown once in this epoch
-  double beyond_use_ = 0;     ///< s
-  double contradicted_ = 0;   ///< s
-  bool disagreed_ = false;    // since it was good
-  bool was_good_ = false;     ///< in this epoch
-  double good_ = 0;           ///< s, in this epoch
-  int losses_ = 0;            ///< epochs given up, not forgiven yet
+  double settled_ = 0;       ///< s of accepted images since the last doubt
+  double share_ = 1;         ///< of a frame's sightings that fit, low pass
+  double imu_square_ = 0;    ///< of the IMU's residual, low pass
+  double acceleration_ = 0;  ///< m/s^2, low pass
+  double beyond_use_ = 0;    ///< s
+  double contradicted_ = 0;  ///< s
+  bool disagreed_ = false;   // since it was good
+  bool was_good_ = false;    ///< in this epoch
+  double good_ = 0;          ///< s, in this epoch
+  int losses_ = 0;           ///< epochs given up, not forgiven yet
   bool lost_ = false;
 };
 

@@ -41,6 +41,8 @@ class ScaleCheck {
   /// True over estimated length.
   [[nodiscard]] double scale() const { return x_[kScale]; }
   [[nodiscard]] double sigma() const;
+  /// It was known and agreed once since reset(): it stays so without further acceleration.
+  [[nodiscard]] bool confirmed() const { return confirmed_; }
 
  private:
   enum : int { kVelocity = 0, kScale = 3, kTilt = 4, kBias = 6, kSize = 9, kMoved = 9, kAll = 12 };

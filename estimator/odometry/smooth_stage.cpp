@@ -363,8 +363,8 @@ void SmoothStage::publish(const TrackedFrame& tracked, bool imu_missing, Odometr
   output.statistics.scale_sigma = rig_.camera_count == 1 ? scale_.sigma() : 0;
   calibration_ = smoother_.calibration();
   output.calibration = calibration_;
-  state.health =
-      health_.update({tracked, output.statistics, state, imu_missing, *epoch_began_ == tracked.stamp});
+  state.health = health_.update(
+      {tracked, output.statistics, state, imu_missing, *epoch_began_ == tracked.stamp, scale_.confirmed()});
   output.doubt = health_.doubt();
   if (state.health == Health::kGood) last_good_ = state.T_world_body;
   if (health_.useful()) last_useful_ = state.T_world_body;

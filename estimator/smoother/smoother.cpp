@@ -126,7 +126,7 @@ void Smoother::updateStatistics() {
   statistics_.keyframe = state.keyframe;
   statistics_.at_rest = state.rest != 0;
   state.statistics = statistics_;
-  if (statistics_.median_square > 0) pixel_noise_.update(statistics_.median_square, state.link_duration);
+  if (solver_.medianSquare() > 0) pixel_noise_.update(solver_.medianSquare(), state.link_duration);
 }
 
 void Smoother::trim(FixedVector<KeyframeState, kMaxStates>& left_window) {

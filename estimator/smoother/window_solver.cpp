@@ -128,7 +128,7 @@ void WindowSolver::takeBack(WindowProblem& problem) const {
 }
 
 // Before any is rejected. A point takes three of the 2 n components of its n views.
-double WindowSolver::medianSquare(const WindowProblem& problem) {
+double WindowSolver::medianOfNewest(const WindowProblem& problem) {
   squares_.clear();
   const std::uint8_t newest = problem.window.newestSlot();
   for (const Landmark& landmark : problem.landmarks) {
@@ -165,7 +165,7 @@ Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, Wind
     problem.placeCameras();
     if (iteration == 0) triangulateAll(problem, 0);
     if (iteration == 1) {
-      statistics.median_square = medianSquare(problem);
+      median_square_ = medianOfNewest(problem);
       rejectNewestSightings(problem, kOutlierSigmas);
     }
     const WindowCost before = cost_;
@@ -197,7 +197,7 @@ Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, Wind
   }
   problem.placeCameras();
   if (unchecked && rises(cost_, costOf(problem, step_))) takeBack(problem);
-  if (statistics.iterations < 2) statistics.median_square = medianSquare(problem);
+  if (statistics.iterations < 2) median_square_ = medianOfNewest(problem);
   rejectNewestSightings(problem, kFinalOutlierSigmas);
   rejectLandmarks(problem, kFinalOutlierSigmas);
   return okStatus();

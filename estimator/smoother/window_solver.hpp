@@ -24,6 +24,10 @@ class WindowSolver {
   Status solve(WindowProblem& problem, NormalEquations& system, WindowCovariance& covariance, int iterations,
                double pose_tolerance, FrameStatistics& statistics);
 
+  /// Of the last solve: median of the squared norms of the newest state's residuals, in sigmas, before any
+  /// was rejected; 0: too few.
+  [[nodiscard]] double medianSquare() const { return median_square_; }
+
  private:
   void reintegrate(WindowProblem& problem) const;
   void triangulateAll(WindowProblem& problem, int iterations) const;
@@ -31,11 +35,11 @@ class WindowSolver {
   void build(WindowProblem& problem, NormalEquations& system, bool first);
   void substitutePoints(WindowProblem& problem, const VectorMap& step) const;
   void takeBack(WindowProblem& problem) const;
-  /// Of the newest state's residuals, squared norms in sigmas; 0: too few.
-  double medianSquare(const WindowProblem& problem);
+  double medianOfNewest(const WindowProblem& problem);
 
   std::vector<EliminatedPoint> eliminated_;  // by landmark
-  std::vector<double> squares_;              // scratch of medianSquare()
+  std::vector<double> squares_;              // scratch of medianOfNewest()
+  double median_square_ = 0;
   std::vector<double> step_;
   WindowCost cost_;  // where the system was last built
 };

@@ -126,7 +126,7 @@ std::vector<Setting> estimationSettings() {
        "MiB",
        "Memory that smoothing all keyframes together may take. A run that needs more is not smoothed.",
        {IntegerSetting{[](Settings& settings) -> int& { return settings.full_memory_mib; }, 64, 1 << 20}}},
-      {"smoother.pixel_sigma", "px", "Noise of one tracked coordinate, 1 sigma.",
+      {"smoother.pixel_sigma", "px", "Least noise of one tracked coordinate, 1 sigma.",
        real(kOdometry, &O::pixel_sigma, 0.05, 10)},
       {"smoother.estimate_time_offset", "", "Estimate the offset between camera and IMU clocks in flight.",
        onOff(kOdometry, &O::estimate_time_offset)},

@@ -23,7 +23,7 @@ struct Watched {
   Health step(double seconds = 0.05) {
     frame.stamp = frame.stamp + Duration::fromSeconds(seconds);
     const bool first = steps++ == 0;
-    return monitor.update({frame, statistics, state, false, first});
+    return monitor.update({frame, statistics, state, false, first, scale_known});
   }
   Health steps_of(int count) {
     Health health = Health::kInitializing;
@@ -36,6 +36,7 @@ struct Watched {
   FrameStatistics statistics;
   NavState state;
   int steps = 0;
+  bool scale_known = true;
 };
 
 }  // namespace
@@ -89,10 +90,12 @@ TEST_CASE("Health: each doubt ends good by its name, and good comes back after i
 TEST_CASE("Health: one camera is initializing until its scale is confirmed", "[health]") {
   Watched watched(1);
   watched.statistics.scale_sigma = 1;
+  watched.scale_known = false;
   CHECK(watched.steps_of(100) == Health::kInitializing);
   CHECK(watched.monitor.doubt() == Doubt::kScaleUnknown);
   CHECK_FALSE(watched.monitor.lost());
   watched.statistics.scale_sigma = 0.05;
+  watched.scale_known = true;
   CHECK(watched.steps_of(11) == Health::kGood);
   // Hovering, the filter forgets; the scale does not change by that.
   watched.statistics.scale_sigma = 0.4;

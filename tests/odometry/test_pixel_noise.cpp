@@ -1,5 +1,6 @@
 // The noise of tracks is found from their residuals, and only ever raised.
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 
 #include "estimator/smoother/pixel_noise.hpp"
@@ -24,9 +25,7 @@ OdometryRun noisyRun(double pixel_sigma, bool stereo) {
 double worstVelocity(const OdometryRun& run, double from) {
   double worst = 0;
   for (const RunFrame& f : run.frames) {
-    if (!f.has_state || f.seconds < from) continue;
-    const Eigen::Quaterniond turn = f.state.T_world_body.rotation * f.truth.T_world_body.rotation.conjugate();
-    worst = std::max(worst, (f.state.v_world_body - turn * f.truth.v_world_body).norm());
+    if (f.has_state && f.seconds >= from) worst = std::max(worst, test::velocityError(f));
   }
   return worst;
 }
