@@ -150,7 +150,8 @@ exec {out}>&- {err}>&-
 sleep "$limit" &
 timer_pid=$!
 
-wait -n -p ended "$kernel_pid" "$timer_pid"
+# A kernel that a signal ends makes the shell say so, in the middle of the command's own standard error.
+wait -n -p ended "$kernel_pid" "$timer_pid" 2>/dev/null
 if [ "$ended" = "$timer_pid" ]; then
   timer_pid=
   kill -KILL "$kernel_pid" 2>/dev/null
