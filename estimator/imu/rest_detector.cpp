@@ -114,9 +114,11 @@ ImageMotion RestDetector::images() const {
   return last_ - image_stamp_ > kImageLife ? ImageMotion::kUnknown : image_motion_;
 }
 
-bool RestDetector::imagesHold() const {
-  return images() == ImageMotion::kStill || images() == ImageMotion::kSlow;
+bool RestDetector::shaken() const {
+  return images() == ImageMotion::kInPlace || images() == ImageMotion::kSlow;
 }
+
+bool RestDetector::imagesHold() const { return images() == ImageMotion::kStill || shaken(); }
 
 RestDetector::Window RestDetector::window(std::size_t blocks) const {
   Window w;
@@ -179,7 +181,7 @@ bool RestDetector::drifts(const Block& block) const {
 }
 
 // How much more than usual a reading has to differ to end a rest.
-double RestDetector::imuSlack() const { return images() == ImageMotion::kSlow ? kSlowSlack : 1.0; }
+double RestDetector::imuSlack() const { return shaken() ? kSlowSlack : 1.0; }
 
 void RestDetector::closeBlock() {
   blocks_[block_count_ % kLongBlocks] = open_;
@@ -221,8 +223,8 @@ void RestDetector::closeBlock() {
   const bool quiet = within(short_window, kShortSlowFactor, kShortGyroLimit, kShortAccelLimit);
   const Window long_window = block_count_ >= kLongBlocks ? window(kLongBlocks) : short_window;
   const bool long_quiet = block_count_ >= kLongBlocks && within(long_window, 1.0, kGyroLimit, kAccelLimit);
-  state_.quiet = (quiet || long_quiet) && imagesHold();
-  const bool imu_may = images == ImageMotion::kUnknown || (imagesHold() && standsByEstimate());
+  const bool imu_may = images == ImageMotion::kUnknown || images == ImageMotion::kInPlace ||
+                       (imagesHold() && standsByEstimate());
   if (!state_.at_rest && by_images) {
     begin(image_window);
   } else if (!state_.at_rest && imu_may && speedAllows() && (quiet || long_quiet)) {
@@ -253,7 +255,6 @@ void RestDetector::startAnew() {
 
 void RestDetector::end() {
   state_.at_rest = false;
-  state_.quiet = false;
   state_.number = 0;
   state_.duration = 0;
 }

@@ -8,10 +8,10 @@
 // noise (the quietest window so far) between fixed bounds, so that they are neither blind to a
 // coarse sensor nor lax on a fine one.
 //   IMU alone:  1 s within the limits, or 0.5 s well within them, where there are no images.
-//   Images:     still: a rest begins within wider IMU limits. Slow: it begins within the normal limits if
-//               the estimated speed is also near zero. Still or slow: a rest in progress continues within
-//               the wider limits. Moving: a rest ends. Otherwise no rest begins, and one in progress
-//               continues within the normal limits.
+//   Images:     still: a rest begins within wider IMU limits. In place: it begins within the normal limits.
+//               Slow: likewise if the estimated speed is also near zero. Still, in place or slow: a rest in
+//               progress continues within the wider limits. Moving: a rest ends. Otherwise no rest begins,
+//               and one in progress continues within the normal limits.
 // No rest begins while the estimated speed is significantly above zero, or while the mean rate exceeds any
 // plausible gyro bias.
 // Frames: body axes. Units: SI, pixels.
@@ -35,13 +35,10 @@ namespace swiftlet {
 inline constexpr double kRestVelocitySigma = 0.01;
 
 /// Image motion, as ImageStillness (estimator/odometry) classifies it.
-enum class ImageMotion : std::uint8_t { kUnknown, kStill, kSlow, kUncertain, kMoving };
+enum class ImageMotion : std::uint8_t { kUnknown, kStill, kInPlace, kSlow, kUncertain, kMoving };
 
 struct RestState {
   bool at_rest = false;
-  /// The IMU is within the rest limits and the images move slowly at most. Weaker than `at_rest`: only a
-  /// prior for the first velocity.
-  bool quiet = false;
   /// Number of the rest, from 1; 0: not at rest. States with the same number have the same pose.
   std::uint32_t number = 0;
   Stamp since;                                           ///< start of the rest (valid at rest)
@@ -63,7 +60,7 @@ class RestDetector {
   void addFrame(Stamp stamp, ImageMotion motion);
 
   /// Takes what the smoother knows, once it is converged; without it biases up to 0.15 rad/s pass.
-  /// `bias_gyro_sigma`: rad/s. `speed`, `speed_sigma`: m/s.
+  /// `bias_gyro_sigma`: rad/s. `speed`, `speed_sigma`: m/s; an infinite sigma where the speed is unknown.
   void setEstimate(const Eigen::Vector3d& bias_gyro, double bias_gyro_sigma, double speed,
                    double speed_sigma);
 
@@ -96,6 +93,8 @@ class RestDetector {
 
   [[nodiscard]] Window window(std::size_t blocks) const;
   [[nodiscard]] ImageMotion images() const;
+  /// Images move, but hardly.
+  [[nodiscard]] bool shaken() const;
   [[nodiscard]] bool imagesHold() const;
   [[nodiscard]] bool meansAllow(const Window& w) const;
   [[nodiscard]] bool speedAllows() const;

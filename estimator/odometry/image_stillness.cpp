@@ -13,6 +13,12 @@ constexpr double kFlowNoise = 0.1;   // px
 // Of the line of sight.
 constexpr double kStillRate = 0.4e-3;  // rad/s
 constexpr double kSlowRate = 5e-3;     // rad/s
+// An image that shakes while it drifts passes through where it was: not for longer than a period.
+constexpr double kStillTime = 0.25;  // s
+// Takes shaking by rotors (above 5 Hz) to a fifteenth. The reference itself is shaken, so that what the low
+// pass gives says something only against what it gave once it had settled.
+constexpr double kLowPass = 0.5;  // s
+constexpr double kSettled = 1.0;  // s after the reference
 constexpr std::size_t kQuadrantTracks = 5;
 
 float median(FixedVector<float, kMaxFeatures>& values) {
@@ -31,9 +37,13 @@ void ImageStillness::takeReference(const TrackedFrame& frame) {
     std::sort(reference_.begin(), reference_.end(), before);
   }
   since_ = frame.stamp;
+  last_not_still_ = frame.stamp;
+  last_ = frame.stamp;
+  means_.fill(Eigen::Vector2d::Zero());
+  settled_ = means_;
 }
 
-double ImageStillness::moved(const TrackedFrame& frame, std::size_t c) {
+ImageStillness::Moved ImageStillness::moved(const TrackedFrame& frame, std::size_t c) {
   for (Motions& quadrant : quadrants_) quadrant = {};
   const float middle_x = 0.5F * static_cast<float>(rig_.camera[c].width());
   const float middle_y = 0.5F * static_cast<float>(rig_.camera[c].height());
@@ -46,13 +56,24 @@ double ImageStillness::moved(const TrackedFrame& frame, std::size_t c) {
     motions.x.pushBack(feature.pixel[c].x() - then.x());
     motions.y.pushBack(feature.pixel[c].y() - then.y());
   }
-  FixedVector<double, 4> moved;
-  for (Motions& motions : quadrants_) {
-    if (motions.x.size() >= kQuadrantTracks) moved.pushBack(std::hypot(median(motions.x), median(motions.y)));
+  const double share = 1 - std::exp(-(frame.stamp - last_).seconds() / kLowPass);
+  last_ = frame.stamp;
+  const bool settling = (frame.stamp - since_).seconds() <= kSettled;
+  FixedVector<double, 4> now;
+  FixedVector<double, 4> drift;
+  for (std::size_t q = 0; q < quadrants_.size(); ++q) {
+    Motions& motions = quadrants_[q];
+    if (motions.x.size() < kQuadrantTracks) continue;
+    const Eigen::Vector2d motion(median(motions.x), median(motions.y));
+    means_[q] += share * (motion - means_[q]);
+    if (settling) settled_[q] = means_[q];
+    now.pushBack(motion.norm());
+    drift.pushBack((means_[q] - settled_[q]).norm());
   }
-  if (moved.size() < 2) return -1;
-  std::sort(moved.begin(), moved.end());
-  return moved[moved.size() - 2];
+  if (now.size() < 2) return {};
+  std::sort(now.begin(), now.end());
+  std::sort(drift.begin(), drift.end());
+  return {now[now.size() - 2], drift[drift.size() - 2]};
 }
 
 ImageMotion ImageStillness::update(const TrackedFrame& frame) {
@@ -61,18 +82,22 @@ ImageMotion ImageStillness::update(const TrackedFrame& frame) {
     return ImageMotion::kUnknown;
   }
   const std::size_t c = frame.camera_present[0] ? 0 : 1;
-  const double pixels = moved(frame, c);
-  if (pixels < 0) {
+  const Moved pixels = moved(frame, c);
+  if (pixels.now < 0) {
     takeReference(frame);
     return ImageMotion::kUncertain;
   }
-  if (pixels >= std::max(kLeastMoved, kMoved * rig_.camera[c].focal())) {
+  if (pixels.now >= std::max(kLeastMoved, kMoved * rig_.camera[c].focal())) {
     takeReference(frame);
     return ImageMotion::kMoving;
   }
   const double seconds = (frame.stamp - since_).seconds();
-  const double turned = (pixels + kFlowNoise) / rig_.camera[c].focal();
-  if (turned < kStillRate * seconds) return ImageMotion::kStill;
+  const double focal = rig_.camera[c].focal();
+  const double turned = (pixels.now + kFlowNoise) / focal;
+  if (turned >= kStillRate * seconds) last_not_still_ = frame.stamp;
+  if ((frame.stamp - last_not_still_).seconds() > kStillTime) return ImageMotion::kStill;
+  const double drifted = (pixels.drift + kFlowNoise) / focal;
+  if (drifted < kStillRate * (seconds - kSettled)) return ImageMotion::kInPlace;
   return turned < kSlowRate * seconds ? ImageMotion::kSlow : ImageMotion::kUncertain;
 }
 

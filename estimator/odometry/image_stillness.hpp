@@ -5,9 +5,9 @@
 // it exceeds tracking noise. With d the displacement since the reference in radians, noise included, and t
 // the elapsed time:
 //  moving     displacement of 3 mrad or more, at least 0.5 px; the current frame becomes the reference
-//  still      d / t below 0.4 mrad/s: 2 cm/s at a distance of 50 m
-//  slow       d / t below 5 mrad/s: 1.5 cm/s at 3 m
-//  uncertain  d / t above that: more time is needed
+//  still      d / t below 0.4 mrad/s for 0.25 s: 2 cm/s at a distance of 50 m
+//  in place   the low-passed displacement (0.5 s) drifts by less than that rate, from 1 s on: shaken on the
+//  spot slow       d / t below 5 mrad/s: 1.5 cm/s at 3 m uncertain  d / t above that: more time is needed
 //  unknown    too few tracks
 // The displacement is the second largest of the medians of the four image quadrants. Forward motion moves all
 // four; a passing person moves one.
@@ -36,13 +36,21 @@ class ImageStillness {
   };
 
   void takeReference(const TrackedFrame& frame);
-  /// px since the reference, in camera `c`; negative: unknown.
-  double moved(const TrackedFrame& frame, std::size_t c);
+  struct Moved {
+    double now = -1;    ///< px since the reference; negative: unknown
+    double drift = -1;  ///< px, low-passed, since a second after the reference; negative: unknown
+  };
+  /// In camera `c`.
+  Moved moved(const TrackedFrame& frame, std::size_t c);
 
   Rig rig_;
   Stamp since_;
   FixedVector<TrackedFeature, kMaxFeatures> reference_;  // by rising id
+  Stamp last_;
+  Stamp last_not_still_;
   std::array<Motions, 4> quadrants_;
+  std::array<Eigen::Vector2d, 4> means_;    ///< px since the reference, low-passed
+  std::array<Eigen::Vector2d, 4> settled_;  ///< means_ at kSettled
 };
 
 }  // namespace swiftlet

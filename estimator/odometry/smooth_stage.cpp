@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace swiftlet {
 namespace {
@@ -14,8 +15,9 @@ constexpr int kStartIterations = 8;
 constexpr double kStartVelocitySigma = 2.0;    // m/s
 constexpr double kStartGyroBiasSigma = 0.1;    // rad/s
 constexpr double kStartAccelBiasSigma = 0.15;  // m/s^2
-constexpr double kQuietVelocitySigma = 0.05;   // m/s: quiet IMU and slow images, no proof of rest
-constexpr double kCarriedBias = 2.0;  // times the sigma with which it was left: marginals are hopeful
+// So long the accelerometer carries the speed on from a rest, to a few cm/s.
+constexpr double kRestRemembered = 2;  // s
+constexpr double kCarriedBias = 2.0;   // times the sigma with which it was left: marginals are hopeful
 
 SmootherSettings smootherSettings(const OdometrySettings& settings) {
   SmootherSettings s;
@@ -159,6 +161,7 @@ void SmoothStage::reset() {
   watch_.reset();
   mono_starter_.reset();
   epoch_began_.reset();
+  last_rest_.reset();
   fix_ = StateFix{};
   fix_.state.epoch = epoch_;
   fix_.timeline = timeline_;
@@ -241,8 +244,8 @@ bool SmoothStage::start(const TrackedFrame& tracked, OdometryOutput& output) {
   }
   StartState start;
   start.velocity_sigma = kStartVelocitySigma;
-  const bool nearly_still = rest_.state().at_rest || rest_.state().quiet;
-  if (rig_.camera_count == 1 && !nearly_still) {
+  const bool at_rest = rest_.state().at_rest;
+  if (rig_.camera_count == 1 && !at_rest) {
     mono_starter_.push(tracked);
     if (!mono_starter_.trySolve(imu_, prior, smoother_.pixelSigma(), start, output.waiting_for)) return false;
   } else {
@@ -258,7 +261,7 @@ bool SmoothStage::start(const TrackedFrame& tracked, OdometryOutput& output) {
       start.gyro_bias_sigma = std::min(start.gyro_bias_sigma, kCarriedBias * left_at_->gyro_bias_sigma);
       start.accel_bias_sigma = std::min(start.accel_bias_sigma, kCarriedBias * left_at_->accel_bias_sigma);
     }
-    if (nearly_still) start.velocity_sigma = rest_.state().at_rest ? kRestVelocitySigma : kQuietVelocitySigma;
+    if (at_rest) start.velocity_sigma = kRestVelocitySigma;
   }
   if (left_at_) goOnFrom(left_at_->state.T_world_body, start.state);
   smoother_.start(start);
@@ -376,9 +379,15 @@ void SmoothStage::publish(const TrackedFrame& tracked, bool imu_missing, Odometr
   fix_.state = state;
   fix_.last_accepted = health_.lastAccepted();
   if (!starting(tracked.stamp)) {
+    if (rest_.state().at_rest) last_rest_ = tracked.stamp;
+    // One camera that has hardly moved takes the first guess of the distances for a measurement.
+    const bool speed_known = rig_.camera_count > 1 || scale_.confirmed() ||
+                             (last_rest_ && (tracked.stamp - *last_rest_).seconds() < kRestRemembered);
     const Matrix15d& P = state.covariance;
     rest_.setEstimate(state.bias_gyro, std::sqrt(P.diagonal().segment<3>(9).maxCoeff()),
-                      state.v_world_body.norm(), std::sqrt(P.diagonal().segment<3>(6).maxCoeff()));
+                      state.v_world_body.norm(),
+                      speed_known ? std::sqrt(P.diagonal().segment<3>(6).maxCoeff())
+                                  : std::numeric_limits<double>::infinity());
   }
   state.stamp = tracked.stamp;
   output.has_state = true;

@@ -116,6 +116,7 @@ class SmoothStage {
   std::optional<SE3> last_good_;       // T_world_body
   std::optional<SE3> last_useful_;     // likewise
   std::optional<Stamp> epoch_began_;   // its first frame
+  std::optional<Stamp> last_rest_;     // in this epoch
 };
 
 }  // namespace swiftlet
