@@ -33,12 +33,12 @@ std::string cameraYaml(const CameraModel& camera, const SE3& T_body_cam, double 
       radtan ? "radial-tangential" : "equidistant", d[0], d[1], d[2], d[3], extra);
 }
 
-std::string imuYaml(const ImuNoise& noise, std::string_view origin) {
+std::string imuYaml(const ImuNoise& noise, std::string_view origin, const SE3& T_body_imu) {
   return fmt::format(
       "sensor_type: imu\ncomment: {}\n{}rate_hz: {:g}\ngyroscope_noise_density: {:g}\n"
       "gyroscope_random_walk: {:g}\naccelerometer_noise_density: {:g}\naccelerometer_random_walk: {:g}\n",
-      origin, transformYaml(SE3()), noise.rate_hz, noise.gyro_density, noise.gyro_walk, noise.accel_density,
-      noise.accel_walk);
+      origin, transformYaml(T_body_imu), noise.rate_hz, noise.gyro_density, noise.gyro_walk,
+      noise.accel_density, noise.accel_walk);
 }
 
 std::string imuCsvHeader() {

@@ -14,7 +14,7 @@ namespace swiftlet {
 /// sensor.yaml of a camera; `origin` says where the data come from, `extra` lines go at its end.
 std::string cameraYaml(const CameraModel& camera, const SE3& T_body_cam, double rate_hz,
                        std::string_view origin, const std::string& extra);
-std::string imuYaml(const ImuNoise& noise, std::string_view origin);
+std::string imuYaml(const ImuNoise& noise, std::string_view origin, const SE3& T_body_imu = SE3());
 /// data.csv of an IMU: its first line, and a line for each sample, both with their ends.
 std::string imuCsvHeader();
 std::string imuCsvRow(const ImuSample& sample);

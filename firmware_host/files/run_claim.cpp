@@ -28,7 +28,7 @@ constexpr std::array kRunFiles = {
     "odometry.tum",        "states.csv", "events.log", "settings.yaml",  "summary.json", "imu_rate.tum",
     "imu_rate_health.csv", "map.tum",    "loops.csv",  "local_mesh.ply", "map.ply",      "map.glb",
     "keyframes.swk",       "report.html"};
-constexpr std::array kRunFolders = {"meshes", "recording"};
+constexpr std::array kRunFolders = {"meshes", "recording", "estimated_calibration"};
 constexpr std::size_t kNumberDigits = 6;
 constexpr std::uint32_t kLargestNumber = 999'999;
 /// A board without a battery starts in 1970, or at the date of its image: 2020 and later is taken for set.
@@ -104,9 +104,19 @@ void removeRecording(const fs::path& folder) {
   ::rmdir(folder.c_str());  // stays where something else is in it
 }
 
+/// The files of calibration_files.hpp.
+void removeCalibration(const fs::path& folder) {
+  for (const char* sensor : {"cam0", "cam1", "imu0"}) {
+    removeFiles(folder / sensor, [](const std::string& name) { return name == "sensor.yaml"; });
+    ::rmdir((folder / sensor).c_str());
+  }
+  ::rmdir(folder.c_str());
+}
+
 void removeEarlierRun(const fs::path& folder) {
   removeRecording(folder / "recording");
   removeMeshes((folder / "meshes").string());
+  removeCalibration(folder / "estimated_calibration");
   ::rmdir((folder / "meshes").c_str());
   removeFiles(folder, isRunFile);
 }

@@ -78,6 +78,12 @@ double RunVerdict::shareGood() const {
   return seconds_ > 0 ? by_health_[static_cast<std::size_t>(Health::kGood)] / seconds_ : 1;
 }
 
+const CalibrationEstimate* RunVerdict::estimatedCalibration() const {
+  return calibration_ && (calibration_->shift_sigma > 0 || calibration_->rotation_sigma[0] > 0)
+             ? &*calibration_
+             : nullptr;
+}
+
 Json RunVerdict::json() const {
   Json json;
   json["in_words"] = words();
@@ -93,7 +99,7 @@ Json RunVerdict::json() const {
   json["largest_velocity_sigma_good_m_s"] = largest_velocity_sigma_;
   json["largest_tilt_sigma_good_deg"] = kDegrees * largest_tilt_sigma_;
   json["mean_pixel_sigma_px"] = meanPixelSigma();
-  if (!calibration_) return json;
+  if (estimatedCalibration() == nullptr) return json;
   const CalibrationEstimate& c = *calibration_;
   Json estimate = Json::object();
   if (c.shift_sigma > 0) {
@@ -111,7 +117,7 @@ Json RunVerdict::json() const {
                                          {"rotation_sigma_deg", kDegrees * c.rotation_sigma[i]},
                                          {"position_sigma_m", c.position_sigma[i]}};
   }
-  if (!estimate.empty()) json["estimated_calibration"] = estimate;
+  json["estimated_calibration"] = estimate;
   return json;
 }
 

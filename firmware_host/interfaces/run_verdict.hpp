@@ -23,6 +23,8 @@ class RunVerdict {
 
   /// Of the run's time, from the first image on; 1 for a run without frames.
   [[nodiscard]] double shareGood() const;
+  /// The newest, where something of it is estimated.
+  [[nodiscard]] const CalibrationEstimate* estimatedCalibration() const;
   /// For summary.json: shares, doubts, sigmas, the estimated calibration where there is one, and `words`.
   [[nodiscard]] nlohmann::ordered_json json() const;
 

@@ -5,6 +5,7 @@
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
+#include "firmware_host/outputs/run_folder/calibration_files.hpp"
 #include "firmware_host/outputs/run_folder/loops_csv.hpp"
 #include "firmware_host/realtime/console.hpp"
 #include "firmware_host/runs/smooth_run.hpp"
@@ -79,7 +80,19 @@ void RunOutput::close(RunFacts& facts) {
   facts.peak_resident = peakResidentBytes();
   observer_.finishKeeping();
   if (settings_.loop.enabled) attempt([&] { writeLoops(out_ / "loops.csv", observer_.loops()); });
+  writeCalibration();
   if (!observer_.nodes().empty()) attempt([&] { writeMapPoses(out_ / "map.tum", observer_.nodes()); });
+}
+
+void RunOutput::writeCalibration() {
+  const RunStatistics& statistics = observer_.statistics();
+  const CalibrationEstimate* estimate = statistics.verdict.estimatedCalibration();
+  if (estimate == nullptr) return;
+  const double seconds = (*statistics.last_image - *statistics.first_image).seconds();
+  const double rate = seconds > 0 ? static_cast<double>(statistics.frames) / seconds : 0;
+  attempt([&] {
+    writeEstimatedCalibration((out_ / "estimated_calibration").string(), calibration_, *estimate, rate);
+  });
 }
 
 void RunOutput::smooth(const std::atomic<bool>* stop, bool announce) {

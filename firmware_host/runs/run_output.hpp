@@ -42,8 +42,8 @@ class RunOutput {
   [[nodiscard]] std::unique_ptr<FlightRecorder> startRecorder(
       RecordOrder order, const DepthImageView* depth_sensor = nullptr) const;
 
-  /// After the run: loops.csv, the keyframes closed, map.tum of the pose graph where there is one. Fills the
-  /// facts' peak of memory.
+  /// After the run: loops.csv, estimated_calibration/ where one is, the keyframes closed, map.tum of the pose
+  /// graph where there is one. Fills the facts' peak of memory.
   void close(RunFacts& facts);
   /// Whether smooth() has something to do.
   [[nodiscard]] bool canSmooth() const { return keeps_keyframes_; }
@@ -58,6 +58,7 @@ class RunOutput {
  private:
   template <typename Write>
   void attempt(const Write& write) const;
+  void writeCalibration();
 
   std::filesystem::path out_;
   const Settings& settings_;

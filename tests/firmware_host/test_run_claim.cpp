@@ -51,6 +51,7 @@ const std::vector<std::string>& runFiles() {
                                                   "map_epoch_3.ply",
                                                   "keyframes.swk",
                                                   "local_mesh.ply",
+                                                  "estimated_calibration/cam0/sensor.yaml",
                                                   "meshes/frames.csv",
                                                   "meshes/frame_000001.ply",
                                                   "meshes/horizon_000001.ply",

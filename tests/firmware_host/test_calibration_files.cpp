@@ -1,0 +1,49 @@
+// An estimated calibration, written and read again.
+
+#include <catch2/catch.hpp>
+#include <filesystem>
+
+#include "drivers/calibration/calibration.hpp"
+#include "drivers/simulated/rig_presets.hpp"
+#include "estimator/geometry/so3.hpp"
+#include "firmware_host/outputs/run_folder/calibration_files.hpp"
+
+using namespace swiftlet;
+
+TEST_CASE("calibration files: what was estimated is read again, what was not stays", "[calibration_files]") {
+  const auto folder = std::filesystem::temp_directory_path() / "swiftlet_calibration_files";
+  std::filesystem::remove_all(folder);
+  Calibration given;
+  given.rig = makeRig(GENERATE(RigKind::kEuroc, RigKind::kFisheye)).rig;
+  given.noise.gyro_density = 3e-4;
+  given.noise.rate_hz = 250;
+  given.camera_rate_hz = {30, 0};
+  // An IMU that is turned in its body and sits beside its origin.
+  given.R_body_imu = expSo3({0.1, -0.7, 1.2}).toRotationMatrix();
+  given.T_body_filebody.translation = {0.03, -0.02, 0.01};
+  CalibrationEstimate estimate;
+  estimate.camera_to_imu_shift = Duration::fromSeconds(-4.25e-3);
+  for (std::size_t c = 0; c < 2; ++c) {
+    estimate.T_body_cam[c] = given.rig.T_body_cam[c];
+    estimate.T_body_cam[c].rotation = expSo3({0.004, 0.002, -0.003}) * estimate.T_body_cam[c].rotation;
+    estimate.T_body_cam[c].translation.x() += 0.002;
+  }
+  estimate.shift_sigma = 1e-4;
+  estimate.rotation_sigma = {2e-4, 3e-4};
+
+  writeEstimatedCalibration(folder.string(), given, estimate, 20);
+  const Calibration read = readCalibration(folder.string());
+  for (std::size_t c = 0; c < 2; ++c) {
+    CHECK(read.rig.T_body_cam[c].R().isApprox(estimate.T_body_cam[c].R(), 1e-12));
+    CHECK((read.rig.T_body_cam[c].translation - estimate.T_body_cam[c].translation).norm() < 1e-12);
+    CHECK(read.rig.camera[c].intrinsics().isApprox(given.rig.camera[c].intrinsics()));
+    CHECK(read.rig.camera[c].distortion().isApprox(given.rig.camera[c].distortion()));
+  }
+  CHECK(read.rig.camera_to_imu_shift == estimate.camera_to_imu_shift);
+  CHECK(read.R_body_imu.isApprox(given.R_body_imu, 1e-12));
+  CHECK((read.T_body_filebody.translation - given.T_body_filebody.translation).norm() < 1e-12);
+  CHECK(read.noise.gyro_density == Approx(3e-4));
+  CHECK(read.camera_rate_hz[0] == 30);
+  CHECK(read.camera_rate_hz[1] == 20);
+  std::filesystem::remove_all(folder);
+}
