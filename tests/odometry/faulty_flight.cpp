@@ -23,11 +23,7 @@ double signedUniform(Random& random, double low, double high) {
 }
 
 SimulationSettings settingsWith(SimulationSettings settings, RigFault fault, Random& random) {
-  if (fault == RigFault::kLate) {
-    settings.image_stamp_offset = Duration::fromSeconds(signedUniform(random, 0.020, 0.150));
-    // No sample is missing at either end.
-    settings.first_image += 0.2;
-  }
+  if (fault == RigFault::kLate) settings.first_image += 0.2;  // no sample is missing when stamps are early
   if (fault == RigFault::kBlur) {
     settings.tracks.pixel_sigma = random.uniform(3, 6);
     settings.tracks.mean_lifetime = kBlurredLifetime;
@@ -48,7 +44,7 @@ Eigen::Vector3d direction(Random& random) {
   return v.normalized();
 }
 
-void spoilRig(RigFault fault, Random& random, FaultyFlight& out) {
+void spoilCalibration(RigFault fault, Random& random, GivenFlight& out) {
   if (fault == RigFault::kFocal) {
     const double factor = 1 + signedUniform(random, 0.05, 0.15);
     for (CameraModel& camera : out.rig.camera) {
@@ -81,11 +77,11 @@ void exchangeAxes(Random& random, std::vector<ImuSample>& samples) {
   }
 }
 
-void jitter(Random& random, std::vector<TrackedFrame>& frames) {
-  for (std::size_t k = 0; k < frames.size(); ++k) {
-    frames[k].stamp = frames[k].stamp + Duration::fromSeconds(kJitterSigma * random.normal());
+void jitter(Random& random, std::vector<Stamp>& stamps) {
+  for (std::size_t k = 0; k < stamps.size(); ++k) {
+    stamps[k] = stamps[k] + Duration::fromSeconds(kJitterSigma * random.normal());
     if (k == 0) continue;
-    frames[k].stamp = std::max(frames[k].stamp, frames[k - 1].stamp + Duration::fromMilliseconds(1));
+    stamps[k] = std::max(stamps[k], stamps[k - 1] + Duration::fromMilliseconds(1));
   }
 }
 
@@ -135,21 +131,32 @@ void moveScene(Random& random, FaultyFlight& out) {
 
 }  // namespace
 
+void spoil(RigFault fault, std::uint64_t seed, GivenFlight& given) {
+  Random random(seed, kStream + 1);
+  spoilCalibration(fault, random, given);
+  if (fault == RigFault::kExchanged) exchangeAxes(random, given.samples);
+  if (fault == RigFault::kLate) {
+    const Duration offset = Duration::fromSeconds(signedUniform(random, 0.020, 0.150));
+    for (Stamp& stamp : given.stamps) stamp = stamp + offset;
+  }
+  if (fault == RigFault::kJitter) jitter(random, given.stamps);
+}
+
 FaultyFlight::FaultyFlight(const SimulationSettings& settings, RigFault fault, std::uint64_t seed)
     : flight([&] {
         Random random(seed, kStream);
         return settingsWith(settings, fault, random);
       }()),
-      rig(flight.rig()),
-      noise(flight.noise()),
-      frames(flight.frames()),
-      samples(flight.flight().imu().samples) {
-  Random random(seed, kStream + 1);
-  spoilRig(fault, random, *this);
-  if (fault == RigFault::kExchanged) exchangeAxes(random, samples);
-  if (fault == RigFault::kJitter) jitter(random, frames);
-  if (fault == RigFault::kRolling) roll(rig, frames);
-  if (fault == RigFault::kMoving) moveScene(random, *this);
+      given{flight.rig(), flight.noise(), flight.flight().imu().samples, {}},
+      frames(flight.frames()) {
+  if (fault == RigFault::kRolling) roll(given.rig, frames);
+  if (fault == RigFault::kMoving) {
+    Random random(seed, kStream + 1);
+    moveScene(random, *this);
+  }
+  for (const TrackedFrame& frame : frames) given.stamps.push_back(frame.stamp);
+  spoil(fault, seed, given);
+  for (std::size_t k = 0; k < frames.size(); ++k) frames[k].stamp = given.stamps[k];
 }
 
 }  // namespace swiftlet::test

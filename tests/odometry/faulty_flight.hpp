@@ -1,6 +1,6 @@
 #pragma once
-// Simulated flights (feature tracks, no images) of which something is not as the estimator is told:
-// calibration, stamps, noise, or the scene. For what is asked of health.
+// Simulated flights of which something is not as the estimator is told: calibration, stamps, noise, or the
+// scene. For what is asked of health.
 
 #include <array>
 #include <cstdint>
@@ -26,15 +26,24 @@ enum class RigFault : std::uint8_t {
 inline constexpr std::array<const char*, 11> kRigFaultNames{
     "none", "focal", "turned", "exchanged", "late", "jitter", "rolling", "loud", "quiet", "moving", "blur"};
 
+/// What the estimator is told of a flight, whatever it sees.
+struct GivenFlight {
+  Rig rig;
+  ImuNoise noise;
+  std::vector<ImuSample> samples;
+  std::vector<Stamp> stamps;  ///< of the images
+};
+
+/// Faults of calibration, stamps and noise figures; others leave it as it is.
+void spoil(RigFault fault, std::uint64_t seed, GivenFlight& given);
+
 /// What the estimator gets of a flight.
 struct FaultyFlight {
   FaultyFlight(const SimulationSettings& settings, RigFault fault, std::uint64_t seed);
 
   TrackFlight flight;  ///< with the truth
-  Rig rig;
-  ImuNoise noise;
+  GivenFlight given;
   std::vector<TrackedFrame> frames;
-  std::vector<ImuSample> samples;
 };
 
 }  // namespace swiftlet::test

@@ -11,13 +11,14 @@
 #include <functional>
 #include <map>
 #include <string>
-#include <thread>
 
 #include "estimator/geometry/alignment.hpp"
 #include "tests/odometry/odometry_run.hpp"
+#include "tests/support/parallel.hpp"
 #include "tests/support/statistics.hpp"
 
 using namespace swiftlet;
+using test::forEach;
 using test::mean;
 using test::OdometryRun;
 using test::quantile;
@@ -33,19 +34,6 @@ bool report(const char* what, double value, const char* unit, double low, double
   const bool ok = value >= low && value <= high;
   std::printf("  %-58s %9.4f %-5s asked [%g, %g]%s\n", what, value, unit, low, high, ok ? "" : "  MISSED");
   return ok;
-}
-
-void forEach(int count, const std::function<void(int)>& work) {
-  std::atomic<int> next = 0;
-  const auto worker = [&] {
-    for (int i = next++; i < count; i = next++) work(i);
-  };
-  std::vector<std::thread> threads;
-  for (unsigned t = 1; t < std::max(1U, std::thread::hardware_concurrency()); ++t) {
-    threads.emplace_back(worker);
-  }
-  worker();
-  for (std::thread& t : threads) t.join();
 }
 
 std::uint64_t seedOf(int flight) { return 100 + static_cast<std::uint64_t>(flight); }
