@@ -76,6 +76,9 @@ SimulatedImu simulateImu(const SplineTrajectory& trajectory, const ImuSimulation
   const VibrationSignal vibration(settings.vibration, settings.seed);
   const bool vibrates = !settings.noise_free &&
                         (settings.vibration.accel_amplitude > 0 || settings.vibration.gyro_amplitude > 0);
+  const Eigen::Matrix3d ideal = Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d gyro_matrix = settings.noise_free ? ideal : settings.gyro_matrix;
+  const Eigen::Matrix3d accel_matrix = settings.noise_free ? ideal : settings.accel_matrix;
   Eigen::Vector3d bias_gyro = settings.bias_gyro;
   Eigen::Vector3d bias_accel = settings.bias_accel;
   if (settings.noise_free) {
@@ -94,9 +97,10 @@ SimulatedImu simulateImu(const SplineTrajectory& trajectory, const ImuSimulation
     const MotionState motion = trajectory.at(t);
     ImuSample sample;
     sample.stamp = zero + Duration{std::llround(static_cast<double>(k) * 1e9 / noise.rate_hz)};
-    sample.gyro = motion.omega_body + bias_gyro + noise.gyro_density * white_scale * normal3(white);
-    sample.accel = motion.T_world_body.rotation.conjugate() * (motion.a_world_body + up) + bias_accel +
-                   noise.accel_density * white_scale * normal3(white);
+    sample.gyro =
+        gyro_matrix * motion.omega_body + bias_gyro + noise.gyro_density * white_scale * normal3(white);
+    const Eigen::Vector3d force = motion.T_world_body.rotation.conjugate() * (motion.a_world_body + up);
+    sample.accel = accel_matrix * force + bias_accel + noise.accel_density * white_scale * normal3(white);
     if (vibrates) {
       const Eigen::Matrix<double, 6, 1> shake = vibration.at(t);
       sample.gyro += settings.vibration.gyro_amplitude * shake.head<3>();

@@ -1,7 +1,8 @@
 #pragma once
 // What an IMU on a trajectory reads: exact rate and specific force, then the noise model's errors.
 //
-// reading = truth + bias + white noise + vibration, then clipped at the saturation.
+// reading = M truth + bias + white noise + vibration, then clipped at the saturation. M: scale errors and
+// misalignment, one matrix for each sensor.
 // White noise of density n has standard deviation n sqrt(rate) a sample; biases are random walks
 // with steps of density sqrt(1 / rate) (Woodman, UCAM-CL-TR-696, 2007; Kalibr's IMU noise model).
 // Specific force: R_body_world (a_world + (0, 0, gravity)). SI units, body axes.
@@ -36,13 +37,15 @@ struct TimeSpan {
 
 struct ImuSimulationSettings {
   ImuNoise noise;           ///< densities, rate, gravity, saturation
-  bool noise_free = false;  ///< exact readings: no noise, no bias, no vibration
+  bool noise_free = false;  ///< exact readings: no noise, no bias, no vibration, ideal matrices
   /// Initial biases. Drawn with these standard deviations per axis when `draw_bias`.
   bool draw_bias = true;
   double gyro_bias_sigma = 0.02;   ///< rad/s
   double accel_bias_sigma = 0.08;  ///< m/s^2
   Eigen::Vector3d bias_gyro = Eigen::Vector3d::Zero();
   Eigen::Vector3d bias_accel = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d gyro_matrix = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d accel_matrix = Eigen::Matrix3d::Identity();
   Vibration vibration;
   std::vector<TimeSpan> gaps;  ///< no samples here
   /// Spans in which the sensor clips at these lower limits.

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "estimator/geometry/so3.hpp"
@@ -39,11 +40,13 @@ struct OdometryRun {
   std::vector<Event> events;
 };
 
-/// `first`: frames and IMU samples before that frame are left out, but for `imu_before` seconds.
+/// `first`: frames and IMU samples before that frame are left out, but for `imu_before` seconds. `told`: the
+/// noise figures that the odometry is given; none: the flight's own.
 inline OdometryRun runOdometry(const TrackFlight& flight, const OdometrySettings& settings,
-                               std::size_t first = 0, double imu_before = 0.5) {
+                               std::size_t first = 0, double imu_before = 0.5,
+                               const std::optional<ImuNoise>& told = {}) {
   OdometryRun run;
-  Odometry odometry(flight.rig(), flight.noise(), settings);
+  Odometry odometry(flight.rig(), told.value_or(flight.noise()), settings);
   const Stamp begin = flight.frames()[first].stamp - Duration::fromSeconds(imu_before);
   auto output = std::make_unique<OdometryOutput>();
   flight.play(

@@ -1,0 +1,169 @@
+// What an IMU costs that is not as its calibration says: simulated flights of 60 s (feature tracks, no
+// images), default settings, with two cameras and with one.
+//   imu_statistics [--flights N] [--cameras 1|2]   default: 50 flights a row, both
+// Printed for each row: ATE from 3 s on over that of the same flights with an IMU as told, and pose NEES at
+// 10, 30 and 60 s (6 is right). Same seeds, same figures. Exit code 1 when a figure misses.
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <functional>
+#include <numbers>
+#include <vector>
+
+#include "estimator/core/random.hpp"
+#include "estimator/geometry/alignment.hpp"
+#include "estimator/geometry/so3.hpp"
+#include "tests/odometry/odometry_run.hpp"
+#include "tests/support/parallel.hpp"
+#include "tests/support/statistics.hpp"
+
+using namespace swiftlet;
+using test::OdometryRun;
+using test::RunFrame;
+using test::TrackFlight;
+
+namespace {
+
+constexpr double kDuration = 60.2;  // s
+constexpr double kFrom = 3;         // s, from which ATE is measured, as on the logs
+constexpr std::array kTimes{10.0, 30.0, 60.0};
+
+struct Outcome {
+  double ate = std::nan("");  ///< m
+  std::array<double, 3> nees{};
+  double share_good = 0;
+};
+
+struct Row {
+  const char* name;
+  std::function<void(Random&, ImuSimulationSettings&)> spoil;
+};
+
+double sign(Random& random) { return random.uniform() < 0.5 ? -1 : 1; }
+
+Eigen::Vector3d direction(Random& random) {
+  Eigen::Vector3d v;
+  for (int k = 0; k < 3; ++k) v[k] = random.normal();
+  return v.normalized();
+}
+
+void scaleNoise(ImuNoise& noise, double factor) {
+  noise.gyro_density *= factor;
+  noise.accel_density *= factor;
+}
+
+const std::array<Row, 7> kRows{{
+    {"as told", [](Random&, ImuSimulationSettings&) {}},
+    {"scale 1 %",
+     [](Random& random, ImuSimulationSettings& imu) {
+       for (int k = 0; k < 3; ++k) {
+         imu.gyro_matrix(k, k) += 0.01 * sign(random);
+         imu.accel_matrix(k, k) += 0.01 * sign(random);
+       }
+     }},
+    {"misaligned 0.5 deg",
+     [](Random& random, ImuSimulationSettings& imu) {
+       constexpr double kTurn = 0.5 * std::numbers::pi / 180;
+       imu.gyro_matrix = expSo3(kTurn * direction(random)).toRotationMatrix();
+       imu.accel_matrix = expSo3(kTurn * direction(random)).toRotationMatrix();
+     }},
+    {"noise 3 times", [](Random&, ImuSimulationSettings& imu) { scaleNoise(imu.noise, 3); }},
+    {"noise 10 times", [](Random&, ImuSimulationSettings& imu) { scaleNoise(imu.noise, 10); }},
+    {"noise a third", [](Random&, ImuSimulationSettings& imu) { scaleNoise(imu.noise, 1.0 / 3); }},
+    {"vibration 2 m/s^2",
+     [](Random&, ImuSimulationSettings& imu) {
+       imu.vibration.accel_amplitude = 2;
+       imu.vibration.gyro_amplitude = 0.05;
+     }},
+}};
+
+double ate(const OdometryRun& run) {
+  std::vector<Eigen::Vector3d> estimate;
+  std::vector<Eigen::Vector3d> truth;
+  for (const RunFrame& f : run.frames) {
+    if (!f.has_state || f.seconds < kFrom) continue;
+    estimate.push_back(f.state.T_world_body.translation);
+    truth.push_back(f.truth.T_world_body.translation);
+  }
+  Alignment fit;
+  return alignRigid(estimate, truth, fit).ok() ? fit.rms : std::nan("");
+}
+
+Outcome fly(int index, const Row& row, bool stereo) {
+  SimulationSettings settings = test::roomFlight(kDuration, 300 + static_cast<std::uint64_t>(index));
+  settings.flight.aggressiveness = 0.5 + 0.5 * (index % 3);
+  settings.world.kind = index % 2 == 0 ? WorldKind::kRoom : WorldKind::kHall;
+  settings.mono = !stereo;
+  const ImuNoise told = settings.imu.noise;
+  Random random(settings.seed, 79);
+  row.spoil(random, settings.imu);
+  const TrackFlight flight(settings);
+  OdometrySettings odometry;
+  odometry.use_stereo = stereo;
+  const OdometryRun run = test::runOdometry(flight, odometry, 0, 0.5, told);
+  Outcome outcome;
+  const auto first = std::ranges::find(run.frames, true, &RunFrame::has_state);
+  if (first == run.frames.end()) return outcome;
+  outcome.ate = ate(run);
+  const SE3 T = test::worldFromTruth(*first);
+  for (std::size_t k = 0; k < kTimes.size(); ++k) {
+    const auto frame = std::ranges::find_if(
+        run.frames, [&](const RunFrame& f) { return f.seconds >= std::min(kTimes[k], kDuration - 0.4); });
+    const auto error = test::poseError(*frame, T);
+    const Eigen::Matrix<double, 6, 6> P = frame->state.covariance.topLeftCorner<6, 6>();
+    outcome.nees[k] = error.dot(P.llt().solve(error));
+  }
+  for (const RunFrame& f : run.frames) {
+    if (f.has_state && f.state.health == Health::kGood)
+      outcome.share_good += 1.0 / static_cast<double>(run.frames.size());
+  }
+  return outcome;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  int flights = 50;
+  int cameras = 0;
+  for (int i = 1; i + 1 < argc; i += 2) {
+    if (std::strcmp(argv[i], "--flights") == 0) flights = std::atoi(argv[i + 1]);
+    if (std::strcmp(argv[i], "--cameras") == 0) cameras = std::atoi(argv[i + 1]);
+  }
+  bool ok = true;
+  for (const bool stereo : {true, false}) {
+    if (cameras == (stereo ? 1 : 2)) continue;
+    std::printf("%s\n%-20s %9s %9s %9s   %s\n", stereo ? "two cameras" : "one camera", "IMU", "ATE [mm]",
+                "ratio", "good [%]", "NEES at 10, 30, 60 s: mean, median");
+    double reference = 0;
+    for (const Row& row : kRows) {
+      std::vector<Outcome> outcomes(static_cast<std::size_t>(flights));
+      test::forEach(flights, [&](int i) { outcomes[static_cast<std::size_t>(i)] = fly(i, row, stereo); });
+      std::vector<double> error;
+      std::vector<double> good;
+      std::array<std::vector<double>, 3> nees;
+      for (const Outcome& o : outcomes) {
+        error.push_back(o.ate);
+        good.push_back(o.share_good);
+        for (std::size_t k = 0; k < nees.size(); ++k) nees[k].push_back(o.nees[k]);
+      }
+      // One flight that starts wrong would be the mean.
+      const double typical = test::quantile(error, 0.5);
+      if (reference == 0) reference = typical;
+      const double ratio = typical / reference;
+      ok &= ratio <= (stereo ? 1.3 : 1.5);
+      std::printf("%-20s %9.2f %9.2f %9.1f", row.name, typical * 1e3, ratio, 100 * test::mean(good));
+      for (const auto& values : nees) {
+        ok &= test::mean(values) >= 4 && test::mean(values) <= 9;
+        std::printf("   %7.2f %6.2f", test::mean(values), test::quantile(values, 0.5));
+      }
+      std::printf("\n");
+      std::fflush(stdout);
+    }
+  }
+  std::printf("asked: ratio at most 1.3, one camera 1.5; NEES 4 to 9%s\n", ok ? "" : "  MISSED");
+  return ok ? 0 : 1;
+}
