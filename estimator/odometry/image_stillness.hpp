@@ -6,8 +6,9 @@
 // the elapsed time:
 //  moving     displacement of 3 mrad or more, at least 0.5 px; the current frame becomes the reference
 //  still      d / t below 0.4 mrad/s for 0.25 s: 2 cm/s at a distance of 50 m
-//  in place   the low-passed displacement (0.5 s) drifts by less than that rate, from 1 s on: shaken on the
-//  spot slow       d / t below 5 mrad/s: 1.5 cm/s at 3 m uncertain  d / t above that: more time is needed
+//  in place   shaken on the spot: from 1 s on, d low-passed over 0.5 s drifts by less than that
+//  slow       d / t below 5 mrad/s: 1.5 cm/s at 3 m
+//  uncertain  d / t above that: more time is needed
 //  unknown    too few tracks
 // The displacement is the second largest of the medians of the four image quadrants. Forward motion moves all
 // four; a passing person moves one.

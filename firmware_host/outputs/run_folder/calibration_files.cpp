@@ -45,9 +45,10 @@ void writeEstimatedCalibration(const std::string& folder, const Calibration& giv
       fmt::format("timeshift_cam_imu: {:.9f}\n", estimate.camera_to_imu_shift.seconds());
   for (std::size_t c = 0; c < given.rig.camera_count; ++c) {
     const double rate = given.camera_rate_hz[c] > 0 ? given.camera_rate_hz[c] : rate_hz;
-    writeSensor(root / fmt::format("cam{}", c),
-                cameraYaml(given.rig.camera[c], T_filebody_body * estimate.T_body_cam[c], rate,
-                           originText(estimate, c), shift));
+    // A camera that was left out stays as given.
+    const SE3& T_body_cam = estimate.rotation_sigma[c] > 0 ? estimate.T_body_cam[c] : given.rig.T_body_cam[c];
+    writeSensor(root / fmt::format("cam{}", c), cameraYaml(given.rig.camera[c], T_filebody_body * T_body_cam,
+                                                           rate, originText(estimate, c), shift));
   }
   const SE3 T_filebody_imu(Eigen::Quaterniond(given.R_body_imu), T_filebody_body.translation);
   writeSensor(root / "imu0", imuYaml(given.noise, "as given", T_filebody_imu));
