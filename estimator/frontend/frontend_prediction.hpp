@@ -7,6 +7,7 @@
 
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/limits.hpp"
+#include "estimator/geometry/se3.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 
 namespace swiftlet {
