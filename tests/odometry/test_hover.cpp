@@ -92,6 +92,8 @@ TEST_CASE("hover: drifting at 5 cm/s is never rest", "[hover]") {
     for (const double rate : {20.0, 120.0}) {
       for (const double height : {1.0, 7.0, 50.0}) {
         for (const bool stereo : {true, false}) {
+          // Frames cost the same at any rate: the fast camera once, where the scale is unknown.
+          if (rate > 100 && (stereo || rig != RigKind::kEuroc)) continue;
           INFO(rigName(rig) << ", " << height << " m, " << rate << " Hz, stereo " << stereo);
           const Outcome outcome = hover({rig, height, rate, stereo}, 4);
           CHECK(outcome.rests == 0);
