@@ -116,8 +116,8 @@ void removeCalibration(const fs::path& folder) {
 void removeEarlierRun(const fs::path& folder) {
   removeRecording(folder / "recording");
   removeMeshes((folder / "meshes").string());
-  removeCalibration(folder / "estimated_calibration");
   ::rmdir((folder / "meshes").c_str());
+  removeCalibration(folder / "estimated_calibration");
   removeFiles(folder, isRunFile);
 }
 

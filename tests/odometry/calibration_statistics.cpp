@@ -18,7 +18,6 @@
 #include <vector>
 
 #include "estimator/core/random.hpp"
-#include "estimator/geometry/alignment.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "tests/odometry/rendered_flight.hpp"
 #include "tests/support/parallel.hpp"
@@ -53,19 +52,6 @@ struct Result {
   double ate_ratio = 1;
 };
 
-/// ATE RMSE [m] after the best fit of position and heading.
-double ate(const std::vector<RunFrame>& frames) {
-  std::vector<Eigen::Vector3d> estimate;
-  std::vector<Eigen::Vector3d> truth;
-  for (const RunFrame& f : frames) {
-    if (!f.has_state || f.seconds < kFrom) continue;
-    estimate.push_back(f.state.T_world_body.translation);
-    truth.push_back(f.truth.T_world_body.translation);
-  }
-  Alignment fit;
-  return alignYaw(estimate, truth, fit).ok() ? fit.rms : std::nan("");
-}
-
 Result judge(const std::vector<RunFrame>& frames, const Rig& truth, Duration true_shift, Wrong wrong,
              const std::vector<RunFrame>& reference) {
   const CalibrationEstimate& end = frames.back().calibration;
@@ -78,7 +64,7 @@ Result judge(const std::vector<RunFrame>& frames, const Rig& truth, Duration tru
   result.rig_sigma = end.rotation_sigma[0];
   result.shift_sigma = end.shift_sigma;
   result.position = (truth.T_body_cam[0].translation - end.T_body_cam[0].translation).norm();
-  result.ate_ratio = ate(frames) / ate(reference);
+  result.ate_ratio = test::ate(frames, kFrom) / test::ate(reference, kFrom);
   return result;
 }
 
@@ -92,10 +78,7 @@ SimulationSettings flightSettings(int index) {
   return settings;
 }
 
-Eigen::Quaterniond halfDegree(Random& random) {
-  const Eigen::Vector3d axis(random.normal(), random.normal(), random.normal());
-  return expSo3(kTurn * axis.normalized());
-}
+Eigen::Quaterniond halfDegree(Random& random) { return expSo3(kTurn * test::randomDirection(random)); }
 
 std::vector<Result> flyAll(int index, const std::string& images) {
   const SimulationSettings settings = flightSettings(index);
@@ -104,7 +87,7 @@ std::vector<Result> flyAll(int index, const std::string& images) {
   Random random(settings.seed, 78);
   std::vector<Result> results;
   const std::vector<RunFrame> reference = flight.fly(flight.given(), {});
-  std::printf("flight %d: ATE %.4f m with the true calibration\n", index, ate(reference));
+  std::printf("flight %d: ATE %.4f m with the true calibration\n", index, test::ate(reference, kFrom));
   const auto fly = [&](const GivenFlight& given, Duration shift, Wrong wrong) {
     OdometrySettings odometry;
     odometry.estimate_extrinsics = wrong != Wrong::kStamps;

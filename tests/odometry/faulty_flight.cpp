@@ -7,6 +7,7 @@
 
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
+#include "tests/odometry/odometry_run.hpp"
 
 namespace swiftlet::test {
 namespace {
@@ -38,12 +39,6 @@ CameraModel withFocal(const CameraModel& camera, double factor) {
   return {camera.kind(), camera.width(), camera.height(), intrinsics, camera.distortion()};
 }
 
-Eigen::Vector3d direction(Random& random) {
-  Eigen::Vector3d v;
-  for (int k = 0; k < 3; ++k) v[k] = random.normal();
-  return v.normalized();
-}
-
 void spoilCalibration(RigFault fault, Random& random, GivenFlight& out) {
   if (fault == RigFault::kFocal) {
     const double factor = 1 + signedUniform(random, 0.05, 0.15);
@@ -52,7 +47,7 @@ void spoilCalibration(RigFault fault, Random& random, GivenFlight& out) {
     }
   } else if (fault == RigFault::kTurned) {
     const double angle = random.uniform(3, 20) * std::numbers::pi / 180;
-    const Eigen::Quaterniond turn = expSo3(angle * direction(random));
+    const Eigen::Quaterniond turn = expSo3(angle * randomDirection(random));
     for (SE3& T : out.rig.T_body_cam) T.rotation = turn * T.rotation;
   } else if (fault == RigFault::kLoud || fault == RigFault::kQuiet) {
     const double factor = fault == RigFault::kLoud ? 10 : 0.1;
@@ -104,7 +99,7 @@ void roll(const Rig& rig, std::vector<TrackedFrame>& frames) {
 }
 
 void moveScene(Random& random, FaultyFlight& out) {
-  const Eigen::Vector3d swing = random.uniform(0.2, 0.8) * direction(random);  // m
+  const Eigen::Vector3d swing = random.uniform(0.2, 0.8) * randomDirection(random);  // m
   const double share = random.uniform(0.3, 0.5);
   const Rig& rig = out.flight.flight().trueRig();
   for (std::size_t k = 0; k < out.frames.size(); ++k) {

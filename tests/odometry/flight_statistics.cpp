@@ -12,12 +12,12 @@
 #include <map>
 #include <string>
 
-#include "estimator/geometry/alignment.hpp"
 #include "tests/odometry/odometry_run.hpp"
 #include "tests/support/parallel.hpp"
 #include "tests/support/statistics.hpp"
 
 using namespace swiftlet;
+using test::ate;
 using test::forEach;
 using test::mean;
 using test::OdometryRun;
@@ -37,18 +37,6 @@ bool report(const char* what, double value, const char* unit, double low, double
 }
 
 std::uint64_t seedOf(int flight) { return 100 + static_cast<std::uint64_t>(flight); }
-
-double ate(const OdometryRun& run, double from = 0) {
-  std::vector<Eigen::Vector3d> estimate;
-  std::vector<Eigen::Vector3d> truth;
-  for (const RunFrame& f : run.frames) {
-    if (!f.has_state || f.seconds < from) continue;
-    estimate.push_back(f.state.T_world_body.translation);
-    truth.push_back(f.truth.T_world_body.translation);
-  }
-  Alignment alignment;
-  return alignRigid(estimate, truth, alignment).ok() ? alignment.rms : std::nan("");
-}
 
 const RunFrame* firstPose(const OdometryRun& run) {
   for (const RunFrame& f : run.frames) {
@@ -179,7 +167,7 @@ bool calibration() {
     SimulationSettings settings = test::roomFlight(60, seedOf(i / 2));
     settings.flight.aggressiveness = 1.5;
     const TrackFlight plain(settings);
-    const double before = ate(test::runOdometry(plain, test::settingsFor(plain)), 3);
+    const double before = ate(test::runOdometry(plain, test::settingsFor(plain)).frames, 3);
 
     SimulationSettings late = settings;
     late.image_stamp_offset = Duration::fromSeconds(sign * 5e-3);
@@ -189,7 +177,7 @@ bool calibration() {
     const OdometryRun run = test::runOdometry(shifted, with);
     const double found = run.frames.back().calibration.camera_to_imu_shift.seconds();
     offset[at] = std::abs(found + late.image_stamp_offset.seconds()) * 1e3;
-    ratio_offset[at] = ate(run, 3) / before;
+    ratio_offset[at] = ate(run.frames, 3) / before;
 
     SimulationSettings bent = settings;
     bent.rig_turn_deg = sign * 0.5 * Eigen::Vector3d(1, -1, 1).normalized();
@@ -203,7 +191,7 @@ bool calibration() {
           turned.flight().trueRig().T_body_cam[c].rotation);
       turn[at] = std::max(turn[at], angle * kDegrees);
     }
-    ratio_turn[at] = ate(turned_run, 3) / before;
+    ratio_turn[at] = ate(turned_run.frames, 3) / before;
   });
   bool ok = report("time offset error, largest", quantile(offset, 1), "ms", 0, 0.3);
   std::printf("  median %.3f ms\n", quantile(offset, 0.5));
@@ -223,7 +211,7 @@ bool vibration() {
     SimulationSettings settings = test::roomFlight(30, seedOf(i / 2));
     if (i % 2 == 1) settings.imu.vibration.accel_amplitude = 2;
     const TrackFlight flight(settings);
-    const double error = ate(test::runOdometry(flight, OdometrySettings{}));
+    const double error = ate(test::runOdometry(flight, OdometrySettings{}).frames);
     (i % 2 == 1 ? with : without)[static_cast<std::size_t>(i / 2)] = error;
   });
   std::printf("  ATE %.4f m with, %.4f m without, default settings\n", mean(with), mean(without));
@@ -242,7 +230,7 @@ bool cameraLost() {
     settings.faults.push_back({FaultKind::kCameraMissing, {10, 15}, i % 2});
     const TrackFlight flight(settings);
     const OdometryRun run = test::runOdometry(flight, OdometrySettings{});
-    errors[static_cast<std::size_t>(i)] = ate(run);
+    errors[static_cast<std::size_t>(i)] = ate(run.frames);
     for (const RunFrame& f : run.frames) {
       const double t = flight.seconds(f.index);
       if (f.state.epoch != 0) ++resets;

@@ -61,11 +61,8 @@ std::vector<RunFrame> fly(const FaultyFlight& flight, bool mono) {
     RunFrame frame;
     frame.index = k;
     frame.seconds = flight.flight.seconds(k) - flight.flight.seconds(0);
-    frame.has_state = output->has_state;
     frame.truth = flight.flight.truth(k);
-    frame.state = output->state;
-    frame.statistics = output->statistics;
-    frame.doubt = output->doubt;
+    test::take(*output, frame);
     frames.push_back(frame);
   }
   return frames;

@@ -15,7 +15,6 @@
 #include <vector>
 
 #include "estimator/core/random.hpp"
-#include "estimator/geometry/alignment.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "tests/odometry/odometry_run.hpp"
 #include "tests/support/parallel.hpp"
@@ -45,12 +44,6 @@ struct Row {
 
 double sign(Random& random) { return random.uniform() < 0.5 ? -1 : 1; }
 
-Eigen::Vector3d direction(Random& random) {
-  Eigen::Vector3d v;
-  for (int k = 0; k < 3; ++k) v[k] = random.normal();
-  return v.normalized();
-}
-
 void scaleNoise(ImuNoise& noise, double factor) {
   noise.gyro_density *= factor;
   noise.accel_density *= factor;
@@ -68,8 +61,8 @@ const std::array<Row, 7> kRows{{
     {"misaligned 0.5 deg",
      [](Random& random, ImuSimulationSettings& imu) {
        constexpr double kTurn = 0.5 * std::numbers::pi / 180;
-       imu.gyro_matrix = expSo3(kTurn * direction(random)).toRotationMatrix();
-       imu.accel_matrix = expSo3(kTurn * direction(random)).toRotationMatrix();
+       imu.gyro_matrix = expSo3(kTurn * test::randomDirection(random)).toRotationMatrix();
+       imu.accel_matrix = expSo3(kTurn * test::randomDirection(random)).toRotationMatrix();
      }},
     {"noise 3 times", [](Random&, ImuSimulationSettings& imu) { scaleNoise(imu.noise, 3); }},
     {"noise 10 times", [](Random&, ImuSimulationSettings& imu) { scaleNoise(imu.noise, 10); }},
@@ -80,18 +73,6 @@ const std::array<Row, 7> kRows{{
        imu.vibration.gyro_amplitude = 0.05;
      }},
 }};
-
-double ate(const OdometryRun& run) {
-  std::vector<Eigen::Vector3d> estimate;
-  std::vector<Eigen::Vector3d> truth;
-  for (const RunFrame& f : run.frames) {
-    if (!f.has_state || f.seconds < kFrom) continue;
-    estimate.push_back(f.state.T_world_body.translation);
-    truth.push_back(f.truth.T_world_body.translation);
-  }
-  Alignment fit;
-  return alignRigid(estimate, truth, fit).ok() ? fit.rms : std::nan("");
-}
 
 Outcome fly(int index, const Row& row, bool stereo) {
   SimulationSettings settings = test::roomFlight(kDuration, 300 + static_cast<std::uint64_t>(index));
@@ -108,7 +89,7 @@ Outcome fly(int index, const Row& row, bool stereo) {
   Outcome outcome;
   const auto first = std::ranges::find(run.frames, true, &RunFrame::has_state);
   if (first == run.frames.end()) return outcome;
-  outcome.ate = ate(run);
+  outcome.ate = test::ate(run.frames, kFrom);
   const SE3 T = test::worldFromTruth(*first);
   for (std::size_t k = 0; k < kTimes.size(); ++k) {
     const auto frame = std::ranges::find_if(

@@ -3,10 +3,13 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "estimator/core/random.hpp"
+#include "estimator/geometry/alignment.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "estimator/odometry/odometry.hpp"
 #include "tests/smoother/track_flight.hpp"
@@ -35,6 +38,15 @@ inline OdometrySettings settingsFor(const TrackFlight& flight, bool stereo = tru
   return settings;
 }
 
+/// What the odometry says of a frame.
+inline void take(const OdometryOutput& output, RunFrame& frame) {
+  frame.has_state = output.has_state;
+  frame.state = output.state;
+  frame.statistics = output.statistics;
+  frame.doubt = output.doubt;
+  frame.calibration = output.calibration;
+}
+
 struct OdometryRun {
   std::vector<RunFrame> frames;
   std::vector<Event> events;
@@ -59,16 +71,18 @@ inline OdometryRun runOdometry(const TrackFlight& flight, const OdometrySettings
         RunFrame frame;
         frame.index = k;
         frame.seconds = flight.seconds(k) - flight.seconds(first);
-        frame.has_state = output->has_state;
         frame.truth = flight.truth(k);
-        frame.state = output->state;
-        frame.statistics = output->statistics;
-        frame.doubt = output->doubt;
-        frame.calibration = output->calibration;
+        take(*output, frame);
         run.frames.push_back(frame);
         run.events.insert(run.events.end(), output->events.begin(), output->events.end());
       });
   return run;
+}
+
+inline Eigen::Vector3d randomDirection(Random& random) {
+  Eigen::Vector3d v;
+  for (int k = 0; k < 3; ++k) v[k] = random.normal();
+  return v.normalized();
 }
 
 /// Takes the truth into the estimate's world: the first pose's position and heading agree.
@@ -106,6 +120,19 @@ inline double velocityError(const RunFrame& frame) {
   return (frame.state.T_world_body.rotation.conjugate() * frame.state.v_world_body -
           frame.truth.T_world_body.rotation.conjugate() * frame.truth.v_world_body)
       .norm();
+}
+
+/// ATE RMSE [m] after the best fit of pose, from `from` seconds on; NaN where there is none.
+inline double ate(const std::vector<RunFrame>& frames, double from = 0) {
+  std::vector<Eigen::Vector3d> estimate;
+  std::vector<Eigen::Vector3d> truth;
+  for (const RunFrame& f : frames) {
+    if (!f.has_state || f.seconds < from) continue;
+    estimate.push_back(f.state.T_world_body.translation);
+    truth.push_back(f.truth.T_world_body.translation);
+  }
+  Alignment fit;
+  return alignRigid(estimate, truth, fit).ok() ? fit.rms : std::nan("");
 }
 
 inline int count(const OdometryRun& run, EventKind kind) {

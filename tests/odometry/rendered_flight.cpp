@@ -102,11 +102,7 @@ std::vector<RunFrame> RenderedFlight::fly(const GivenFlight& given, const Odomet
     result.truth = truth(k);
     if (!odometry.track(frame, Effort{}, *tracked).ok()) continue;
     static_cast<void>(odometry.smooth(*tracked, Effort{}, *output));
-    result.has_state = output->has_state;
-    result.state = output->state;
-    result.statistics = output->statistics;
-    result.doubt = output->doubt;
-    result.calibration = output->calibration;
+    take(*output, result);
   }
   return run;
 }
