@@ -2,6 +2,8 @@
 // The IMU's noise model: continuous densities, as calibration files give them, and one named
 // inflation for what the static figures leave out (vibration, scale, misalignment).
 
+#include "estimator/messages/noise_in_use.hpp"
+
 namespace swiftlet {
 
 struct ImuNoise {
@@ -13,6 +15,13 @@ struct ImuNoise {
   double gravity = 9.81;          ///< m/s^2; gravity in world axes is (0, 0, -gravity)
   double gyro_saturation = 34.9;  ///< rad/s (2000 deg/s); readings at or beyond count as saturated
   double accel_saturation = 156;  ///< m/s^2 (16 g)
+
+  [[nodiscard]] ImuNoise times(const ImuFactors& factors) const {
+    ImuNoise noise = *this;
+    noise.gyro_density *= factors.gyro;
+    noise.accel_density *= factors.accel;
+    return noise;
+  }
 };
 
 }  // namespace swiftlet

@@ -9,6 +9,7 @@
 #include "estimator/core/stamp.hpp"
 #include "estimator/messages/calibration_estimate.hpp"
 #include "estimator/messages/nav_state.hpp"
+#include "estimator/messages/noise_in_use.hpp"
 
 namespace swiftlet {
 
@@ -64,8 +65,8 @@ struct FrameStatistics {
   int inliers_stereo = 0;       ///< accepted, by both cameras
   double track_length = 0;      ///< mean frames a track of this frame has lived
   double reprojection_rms = 0;  ///< px, accepted sightings of the window
-  double pixel_sigma = 0;       ///< px, the noise in use for this frame's sightings
-  double imu_residual = 0;      ///< whitened IMU residuals of the window, RMS (1: as the noise model says)
+  NoiseInUse noise;             ///< for this frame's sightings and the motion to it
+  double imu_residual = 0;      ///< whitened IMU residuals of the window, RMS (1: as the noise in use says)
   /// One camera: true over estimated length, as the accelerometer says, and its sigma (scale_check.hpp).
   double scale = 1;
   double scale_sigma = 0;

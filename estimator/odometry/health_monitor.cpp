@@ -30,6 +30,7 @@ constexpr double kFitShare = 0.75;
 // Residuals of the IMU's motion, in sigmas of its noise as in flight, times what the pixel noise was raised
 // by. Where the noise model holds they are 0.1 to 0.3, with real sensors up to 1.2.
 constexpr double kImuResidual = 2.0;
+constexpr double kImuFactor = 20.0;
 // Far outside the limits: the estimate is useless.
 constexpr double kUselessVelocitySigma = 1.0;  // m/s
 constexpr double kUselessImuResidual = 5.0;
@@ -76,7 +77,7 @@ void HealthMonitor::average(const Evidence& evidence, double seconds) {
   if (s.known >= kMinSightings)
     share_ = lowPass(share_, std::min(1.0, fit / static_cast<double>(s.known)), seconds);
   // Noise of tracks alone would not make the IMU's residuals larger, but weigh the tracks less against it.
-  const double disagreement = s.imu_residual * std::max(1.0, s.pixel_sigma / pixel_sigma_);
+  const double disagreement = s.imu_residual * std::max(1.0, s.noise.pixel_sigma / pixel_sigma_);
   imu_square_ = lowPass(imu_square_, disagreement * disagreement, seconds);
   if (seconds > 0) {
     acceleration_ =
@@ -105,6 +106,8 @@ Doubt HealthMonitor::accuracyDoubt(const Evidence& evidence) const {
   if (state.v_world_body.norm() > max_speed_ || acceleration_ > max_acceleration_) return Doubt::kImplausible;
   if (share_ < kFitShare) return Doubt::kTracksDisagree;
   if (imu_square_ > kImuResidual * kImuResidual) return Doubt::kImuDisagrees;
+  if (std::max(evidence.statistics.noise.imu.gyro, evidence.statistics.noise.imu.accel) > kImuFactor)
+    return Doubt::kImuDisagrees;
   if (velocitySigma(state) > kVelocitySigma || tiltSigma(state) > kTiltSigma) return Doubt::kUncertain;
   return scaleDoubt(evidence);
 }

@@ -22,10 +22,8 @@ inline Rig rigInUse(Rig rig, const OdometrySettings& settings) {
 }
 
 /// The calibration's densities, as in flight.
-inline ImuNoise inflatedNoise(ImuNoise noise, const OdometrySettings& settings) {
-  noise.gyro_density *= settings.gyro_inflation;
-  noise.accel_density *= settings.accel_inflation;
-  return noise;
+inline ImuNoise inflatedNoise(const ImuNoise& noise, const OdometrySettings& settings) {
+  return noise.times({settings.gyro_inflation, settings.accel_inflation});
 }
 
 /// No sample for so long before `stamp` that holding the last reading is no measurement.

@@ -72,7 +72,7 @@ FullSmoother::FullSmoother(const Rig& rig, const ImuNoise& noise, const FullSmoo
       settings_(settings),
       next_revisit_track_(std::numeric_limits<TrackId>::max()) {}
 
-Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& state) {
+Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& state, const NoiseInUse& noise) {
   if (keyframes_.size() >= settings_.max_keyframes) {
     return {StatusCode::kCapacityReached, "full smoothing holds no more keyframes; the rest is left out"};
   }
@@ -80,6 +80,7 @@ Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& stat
   keyframe.stamp = frame.stamp;
   keyframe.epoch = state.epoch;
   keyframe.x = {state.T_world_body, state.v_world_body, state.bias_gyro, state.bias_accel};
+  keyframe.noise = noise;
   const Stamp at = frame.stamp + rig_.camera_to_imu_shift;
   if (!keyframes_.empty() && keyframes_.back().epoch == state.epoch) {
     const double dt = (frame.stamp - keyframes_.back().stamp).seconds();
@@ -90,7 +91,7 @@ Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& stat
                 [&](const ImuSample& s) { return s.stamp < at - Duration::fromSeconds(kKeptAhead); });
   const auto slot = static_cast<std::uint32_t>(keyframes_.size());
   for (const TrackedFeature& feature : frame.features) {
-    const Sighting sighting = makeSighting(rig_, feature.seen, feature.pixel, settings_.pixel_sigma, slot);
+    const Sighting sighting = makeSighting(rig_, feature.seen, feature.pixel, noise.pixel_sigma, slot);
     if (sighting.any()) addSighting({state.epoch, feature.id}, sighting);
   }
   worlds_.try_emplace(state.epoch, state.epoch);
@@ -154,7 +155,7 @@ void FullSmoother::integrateLinks() {
     Keyframe& keyframe = keyframes_[k];
     if (!keyframe.linked) continue;
     const Keyframe& before = keyframes_[k - 1];
-    keyframe.imu = Preintegration(noise_, before.x.bias_gyro, before.x.bias_accel);
+    keyframe.imu = Preintegration(noise_.times(keyframe.noise.imu), before.x.bias_gyro, before.x.bias_accel);
     keyframe.linked = keyframe.imu
                           .integrate(keyframe.samples, before.stamp + rig_.camera_to_imu_shift,
                                      keyframe.stamp + rig_.camera_to_imu_shift)

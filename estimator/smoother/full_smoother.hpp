@@ -34,7 +34,7 @@
 #include "estimator/messages/calibration_estimate.hpp"
 #include "estimator/messages/loop_revisit.hpp"
 #include "estimator/messages/nav_state.hpp"
-#include "estimator/messages/track_noise.hpp"
+#include "estimator/messages/noise_in_use.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/smoother/landmark.hpp"
 #include "estimator/smoother/relative_pose_factor.hpp"
@@ -47,9 +47,8 @@ namespace swiftlet {
 inline constexpr const char* kFullSmoothingStopped = "full smoothing was stopped";
 
 struct FullSmootherSettings {
-  double pixel_sigma = kTrackPixelSigma;  ///< px
-  double match_sigma = 1.2;               ///< px, of a loop's match, pixel noise included
-  std::size_t max_keyframes = 4000;       ///< 11 minutes at 6 a second
+  double match_sigma = 1.2;          ///< px, of a loop's match, pixel noise included
+  std::size_t max_keyframes = 4000;  ///< 11 minutes at 6 a second
   std::size_t max_revisits = 4000;
   int max_iterations = 12;
 };
@@ -74,9 +73,9 @@ class FullSmoother {
   /// Every sample, in order, before the frames that follow it.
   void addImu(const ImuSample& sample) { pending_imu_.push_back(sample); }
 
-  /// A keyframe with the odometry's state for it, in order of time. A new epoch starts a new, unconnected
-  /// trajectory. kCapacityReached beyond max_keyframes.
-  Status addKeyframe(const TrackedFrame& frame, const NavState& state);
+  /// A keyframe with the odometry's state for it and the noise that it was estimated with, in order of time.
+  /// A new epoch starts a new, unconnected trajectory. kCapacityReached beyond max_keyframes.
+  Status addKeyframe(const TrackedFrame& frame, const NavState& state, const NoiseInUse& noise);
 
   /// A verified loop between two keyframes added before. kInvalidInput when there is no keyframe at a stamp,
   /// the old one is not the older, or the pose or its information is not usable; kCapacityReached beyond
@@ -113,6 +112,7 @@ class FullSmoother {
     Stamp stamp;
     std::uint32_t epoch = 0;
     BodyState x;
+    NoiseInUse noise;
     bool linked = false;  ///< by IMU to the keyframe before
     std::vector<ImuSample> samples;
     Preintegration imu;

@@ -85,13 +85,13 @@ TrackId Smoother::newestIdTaken(const TrackedFrame& frame, int max_features) {
 
 void Smoother::addSightings(const TrackedFrame& frame, int max_features) {
   statistics_ = FrameStatistics{};
-  statistics_.pixel_sigma = pixel_noise_.sigma();
+  statistics_.noise.pixel_sigma = pixel_noise_.sigma();
   double age = 0;
   const TrackId newest_taken = newestIdTaken(frame, max_features);
   for (const TrackedFeature& feature : frame.features) {
     if (feature.id > newest_taken) continue;
-    const Sighting sighting = makeSighting(problem_.rig, feature.seen, feature.pixel, statistics_.pixel_sigma,
-                                           problem_.window.newestSlot());
+    const Sighting sighting = makeSighting(problem_.rig, feature.seen, feature.pixel,
+                                           statistics_.noise.pixel_sigma, problem_.window.newestSlot());
     if (!sighting.any()) continue;
     Landmark* const known = problem_.landmarks.find(feature.id);
     Landmark& landmark = known != nullptr ? *known : problem_.landmarks.add(feature.id);
@@ -121,8 +121,12 @@ void Smoother::updateStatistics() {
     ++(both ? statistics_.inliers_stereo : statistics_.inliers_mono);
   }
   if (views > 0) statistics_.reprojection_rms = pixel_noise_.sigma() * std::sqrt(sum / views);
-  statistics_.imu_residual = motionResidual(problem_);
   WindowState& state = problem_.window.newest();
+  MotionResiduals residuals = motionResiduals(problem_);
+  if (problem_.rig.camera_count == 1) residuals.accel = 0;
+  statistics_.imu_residual = std::sqrt(residuals.all);
+  statistics_.noise.imu = state.imu_factors;
+  problem_.imu_excess.update(residuals, state.link_duration);
   statistics_.keyframe = state.keyframe;
   statistics_.at_rest = state.rest != 0;
   state.statistics = statistics_;

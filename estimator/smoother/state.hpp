@@ -12,6 +12,7 @@
 #include "estimator/geometry/se3.hpp"
 #include "estimator/imu/preintegration.hpp"
 #include "estimator/messages/nav_state.hpp"
+#include "estimator/messages/noise_in_use.hpp"
 #include "estimator/messages/odometry_output.hpp"
 
 namespace swiftlet {
@@ -53,6 +54,7 @@ struct WindowState {
   BodyState moved_estimate;  ///< first_estimate, moved with the window (Window::moveEstimates)
   LinkKind link = LinkKind::kNone;
   Preintegration imu;        ///< from the previous state with motion, when link is kImu
+  ImuFactors imu_factors;    ///< on the noise that imu was integrated with
   double link_duration = 0;  ///< s
   double time_offset = 0;    ///< s, camera-to-IMU offset at which `stamp` was placed on the IMU's clock
   Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  ///< rad/s at the stamp

@@ -13,6 +13,8 @@ namespace {
 
 constexpr double kRestPositionSigma = 3e-4;    // m, between two frames at rest: 6 mm/s at 20 Hz
 constexpr double kRestRotationSigma = 3.5e-4;  // rad, likewise
+constexpr double kResidualTime = 5.0;          // s of the window that say how the IMU errs
+constexpr double kSumTime = 1.0;               // s, longer than most turns keep their rate
 
 // False where nothing ties the state to the one before it.
 bool motionFactor(const WindowProblem& problem, std::size_t position, MotionFactor& factor) {
@@ -24,6 +26,37 @@ bool motionFactor(const WindowProblem& problem, std::size_t position, MotionFact
              : constantVelocityFactor(j.link_duration, problem.noise, i.x, j.x, i.linearization(),
                                       j.linearization(), factor);
 }
+
+// Residuals of one sensor, from newest to oldest. Errors that last show in sums over a second.
+class SensorResiduals {
+ public:
+  void add(const Eigen::Vector3d& residual, double seconds) {
+    squares_ += residual.squaredNorm();
+    ++count_;
+    sum_ += residual;
+    seconds_ += seconds;
+    ++in_sum_;
+    if (seconds_ < kSumTime) return;
+    sum_squares_ += sum_.squaredNorm() / in_sum_;
+    ++sums_;
+    sum_.setZero();
+    seconds_ = 0;
+    in_sum_ = 0;
+  }
+  /// Of a coordinate, singly or in sums, whichever is larger; 0 before the first sum.
+  [[nodiscard]] double meanSquare() const {
+    return sums_ > 0 ? std::max(squares_ / count_, sum_squares_ / sums_) / 3 : 0;
+  }
+
+ private:
+  double squares_ = 0;
+  double sum_squares_ = 0;
+  double seconds_ = 0;
+  int count_ = 0;
+  int in_sum_ = 0;
+  int sums_ = 0;
+  Eigen::Vector3d sum_ = Eigen::Vector3d::Zero();
+};
 
 // Rest is soft: the velocity is near zero, and two frames at rest are at nearly the same pose. It
 // lives and leaves with the motion factor between the two states, so that the prior inherits it.
@@ -120,16 +153,27 @@ void addMotion(const WindowProblem& problem, std::size_t position, NormalEquatio
   addRest(i, j, system);
 }
 
-double motionResidual(const WindowProblem& problem) {
-  double squares = 0;
+MotionResiduals motionResiduals(const WindowProblem& problem) {
+  MotionResiduals result;
   double rows = 0;
-  for (std::size_t k = 1; k < problem.window.size(); ++k) {
+  SensorResiduals gyro;
+  SensorResiduals accel;
+  for (std::size_t k = problem.window.size(); k-- > 1;) {
     MotionFactor factor;
     if (!motionFactor(problem, k, factor)) continue;
-    squares += factor.residual.squaredNorm();
+    const WindowState& state = problem.window[k];
+    result.all += factor.residual.squaredNorm();
     rows += static_cast<double>(factor.residual.size());
+    if (state.link != LinkKind::kImu) continue;
+    if ((problem.window.newest().stamp - state.stamp).seconds() >= kResidualTime) continue;
+    // Whitening is lower triangular: rotation comes first, and is the gyro's alone.
+    gyro.add(state.imu_factors.gyro * factor.residual.head<3>(), state.link_duration);
+    accel.add(state.imu_factors.accel * factor.residual.segment<3>(6), state.link_duration);
   }
-  return rows > 0 ? std::sqrt(squares / rows) : 0;
+  if (rows > 0) result.all /= rows;
+  result.gyro = gyro.meanSquare();
+  result.accel = accel.meanSquare();
+  return result;
 }
 
 void addExtras(const WindowProblem& problem, NormalEquations& system) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "estimator/smoother/imu_excess.hpp"
 #include "estimator/smoother/normal_equations.hpp"
 #include "estimator/smoother/window_problem.hpp"
 
@@ -18,9 +19,8 @@ double addPrior(WindowProblem& problem, NormalEquations& system, std::vector<dou
 /// Between the states at `position` - 1 and `position`, where both have motion, with rest where there is.
 void addMotion(const WindowProblem& problem, std::size_t position, NormalEquations& system);
 
-/// Root mean square of the whitened residuals of all motion in the window, with the states as they are: about
-/// 1 where IMU and images disagree by as much as the noise says; 0 without motion.
-[[nodiscard]] double motionResidual(const WindowProblem& problem);
+/// Of all motion in the window, with the states as they are.
+[[nodiscard]] MotionResiduals motionResiduals(const WindowProblem& problem);
 
 /// Explicit landmarks, and planes that count.
 void addExtras(const WindowProblem& problem, NormalEquations& system);

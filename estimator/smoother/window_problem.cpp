@@ -102,7 +102,8 @@ void WindowProblem::restore() {
 }
 
 void WindowProblem::integrateLink(WindowState& state, const WindowState& previous) const {
-  state.imu = Preintegration(noise, previous.x.bias_gyro, previous.x.bias_accel);
+  state.imu_factors = imu_excess.factors();
+  state.imu = Preintegration(noise.times(state.imu_factors), previous.x.bias_gyro, previous.x.bias_accel);
   static_cast<void>(
       state.imu.integrate(imu.around(previous.stamp, state.stamp), previous.stamp, state.stamp));
 }

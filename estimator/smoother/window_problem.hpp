@@ -13,6 +13,7 @@
 #include "estimator/smoother/calibration_state.hpp"
 #include "estimator/smoother/extra_table.hpp"
 #include "estimator/smoother/imu_buffer.hpp"
+#include "estimator/smoother/imu_excess.hpp"
 #include "estimator/smoother/landmark_table.hpp"
 #include "estimator/smoother/prior.hpp"
 #include "estimator/smoother/vision_factor.hpp"
@@ -35,7 +36,8 @@ struct WindowProblem {
                 bool estimate_extrinsics);
 
   Rig rig;
-  ImuNoise noise;
+  ImuNoise noise;        ///< as told
+  ImuExcess imu_excess;  ///< beyond it
   ImuBuffer imu;
   Window window;
   LandmarkTable landmarks;

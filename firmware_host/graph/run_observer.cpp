@@ -88,7 +88,7 @@ void RunObserver::noteFrame(const FrameResult& result) {
   const bool kept = tracked.keyframe && output.has_state && tracked.timeline == timeline_;
   if (keeper_ && kept) {
     keeper_->addCalibration(output.calibration);
-    keeper_->addKeyframe(tracked, output.state);
+    keeper_->addKeyframe(tracked, output.state, output.statistics.noise);
   }
   listener_.onFrame(tracked, output);
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "estimator/messages/names.hpp"
 #include "estimator/messages/state_sigmas.hpp"
@@ -18,6 +19,7 @@ constexpr double kDegrees = 180.0 / M_PI;
 // Shorter than this a doubt is not worth a line.
 constexpr double kWorthTelling = 0.05;  // of the run's time
 constexpr double kNoisyTracks = 1.5;    // of the noise set
+constexpr double kNoisyImu = 1.5;       // likewise
 
 /// What to look at first.
 const char* remedy(Doubt doubt) {
@@ -63,16 +65,16 @@ void RunVerdict::add(Stamp stamp, const OdometryOutput& output) {
   if (!output.has_state) return;
   calibration_ = output.calibration;
   top_speed_ = std::max(top_speed_, output.state.v_world_body.norm());
-  const double pixel_sigma = output.statistics.pixel_sigma;
+  const double pixel_sigma = output.statistics.noise.pixel_sigma;
   least_pixel_sigma_ = std::min(least_pixel_sigma_, pixel_sigma);
   pixel_sigma_s_ += seconds * pixel_sigma;
+  gyro_factor_s_ += seconds * output.statistics.noise.imu.gyro;
+  accel_factor_s_ += seconds * output.statistics.noise.imu.accel;
   state_seconds_ += seconds;
   if (health != Health::kGood) return;
   largest_velocity_sigma_ = std::max(largest_velocity_sigma_, velocitySigma(output.state));
   largest_tilt_sigma_ = std::max(largest_tilt_sigma_, tiltSigma(output.state));
 }
-
-double RunVerdict::meanPixelSigma() const { return state_seconds_ > 0 ? pixel_sigma_s_ / state_seconds_ : 0; }
 
 double RunVerdict::shareGood() const {
   return seconds_ > 0 ? by_health_[static_cast<std::size_t>(Health::kGood)] / seconds_ : 1;
@@ -98,7 +100,9 @@ Json RunVerdict::json() const {
   json["top_speed_m_s"] = top_speed_;
   json["largest_velocity_sigma_good_m_s"] = largest_velocity_sigma_;
   json["largest_tilt_sigma_good_deg"] = kDegrees * largest_tilt_sigma_;
-  json["mean_pixel_sigma_px"] = meanPixelSigma();
+  json["mean_pixel_sigma_px"] = mean(pixel_sigma_s_);
+  json["mean_gyro_factor"] = mean(gyro_factor_s_);
+  json["mean_accel_factor"] = mean(accel_factor_s_);
   if (estimatedCalibration() == nullptr) return json;
   const CalibrationEstimate& c = *calibration_;
   Json estimate = Json::object();
@@ -135,11 +139,19 @@ std::vector<std::string> RunVerdict::words() const {
                          largest_velocity_sigma_, kDegrees * largest_tilt_sigma_);
   }
   std::vector<std::string> words{first};
-  if (meanPixelSigma() > kNoisyTracks * least_pixel_sigma_) {
+  if (mean(pixel_sigma_s_) > kNoisyTracks * least_pixel_sigma_) {
     words.push_back(
         fmt::format("  tracks fit to {:.1f} px on average, smoother.pixel_sigma is {:.2f}: "
                     "calibration, rolling shutter, stamps or motion blur",
-                    meanPixelSigma(), least_pixel_sigma_));
+                    mean(pixel_sigma_s_), least_pixel_sigma_));
+  }
+  for (const auto& [sensor, sum] :
+       {std::pair("gyro", gyro_factor_s_), std::pair("accelerometer", accel_factor_s_)}) {
+    if (mean(sum) < kNoisyImu) continue;
+    words.push_back(
+        fmt::format("  the {} errs {:.1f} times as much as it is told to: scale, misalignment, vibration, "
+                    "densities too small",
+                    sensor, mean(sum)));
   }
   for (const auto& [doubt, seconds] : by_doubt_) {
     if (seconds < kWorthTelling * seconds_) continue;

@@ -31,8 +31,8 @@ class RunVerdict {
  private:
   /// Lines for a person.
   [[nodiscard]] std::vector<std::string> words() const;
-  /// px; 0 without a state.
-  [[nodiscard]] double meanPixelSigma() const;
+  /// Of what was summed over the time with a state; 0 without one.
+  [[nodiscard]] double mean(double sum) const { return state_seconds_ > 0 ? sum / state_seconds_ : 0; }
 
   std::optional<Stamp> last_;
   double seconds_ = 0;
@@ -40,7 +40,8 @@ class RunVerdict {
   std::map<Doubt, double> by_doubt_;   ///< s
   std::uint32_t resets_ = 0;
   double state_seconds_ = 0;
-  double pixel_sigma_s_ = 0;  ///< px s, over the time with a state
+  double pixel_sigma_s_ = 0;                       ///< px s, over the time with a state
+  double gyro_factor_s_ = 0, accel_factor_s_ = 0;  ///< s, likewise
   double least_pixel_sigma_ = std::numeric_limits<double>::infinity();
   double top_speed_ = 0;                                        ///< m/s
   double largest_velocity_sigma_ = 0, largest_tilt_sigma_ = 0;  ///< m/s, rad, while good

@@ -33,7 +33,7 @@ void fill(KeyframeReader& reader, const FullSmoothingOptions& options, FullSmoot
         smoother.addImu(reader.sample());
         break;
       case KeyframeReader::Next::kKeyframe:
-        add(smoother.addKeyframe(reader.frame(), reader.state()), result.faults);
+        add(smoother.addKeyframe(reader.frame(), reader.state(), reader.noiseInUse()), result.faults);
         break;
       case KeyframeReader::Next::kRevisit:
         add(smoother.addRevisit(reader.revisit()), result.faults);
@@ -83,9 +83,7 @@ FullSmoothing smoothKeyframes(const std::string& path, const FullSmoothingOption
   FullSmoothing result;
   result.spent = measured([&] {
     KeyframeReader reader(path, in);
-    FullSmootherSettings settings;
-    settings.pixel_sigma = reader.pixelSigma();
-    FullSmoother smoother(reader.rig(), reader.noise(), settings);
+    FullSmoother smoother(reader.rig(), reader.noise(), {});
     fill(reader, options, smoother, result);
     if (stopped(options)) {
       result.problem = kFullSmoothingStopped;

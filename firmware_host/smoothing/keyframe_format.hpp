@@ -16,7 +16,7 @@
 namespace swiftlet::keyframe_file {
 
 inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'S', 'W', 'K', '\r', '\n', 0x1A, '\n'};
-inline constexpr std::uint32_t kVersion = 1;
+inline constexpr std::uint32_t kVersion = 2;
 inline constexpr std::size_t kPrefixBytes = 16;  ///< magic, version, bytes of the head that follow
 inline constexpr std::size_t kMostHead = std::size_t{64} * 1024;
 inline constexpr std::size_t kRecordBytes = 12;
@@ -26,7 +26,7 @@ enum class Kind : std::uint16_t { kImu = 1, kKeyframe = 2, kRevisit = 3, kEnd = 
 
 inline constexpr std::size_t kImuBytes = 56;
 inline constexpr std::size_t kCalibrationBytes = 8 + kMaxCameras * 56;
-inline constexpr std::size_t kStateBytes = 144;  ///< of a keyframe, before its features
+inline constexpr std::size_t kStateBytes = 168;  ///< of a keyframe, before its features
 inline constexpr std::size_t kFeatureBytes = 28;
 inline constexpr std::size_t kRevisitHeadBytes = 364;  ///< before its matches
 inline constexpr std::size_t kMatchBytes = 2 * (kFeatureBytes + 4);

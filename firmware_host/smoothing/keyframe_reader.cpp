@@ -17,7 +17,8 @@ namespace {
 using namespace keyframe_file;  // NOLINT(google-build-using-namespace)
 
 constexpr const char* kRemedy = "Give the folder of a run with smoother.horizon: full";
-constexpr double kLargestSigma = 100;  // px; the setting allows 10
+constexpr double kLargestSigma = 1000;   // px; the setting allows 10, a flight raises it 6 times
+constexpr double kLargestFactor = 1000;  // a flight shows 30
 /// Beyond these, differences of stamps would not fit; calibrations with a shift above 1 s are refused.
 constexpr std::int64_t kMostStamp = std::int64_t{1} << 61U;  // ns, 73 years
 constexpr Duration kMostShift = Duration::fromSeconds(10);
@@ -77,18 +78,16 @@ KeyframeReader::KeyframeReader(std::string name, std::istream& in)
   const std::size_t length = prefix.u32();
   constexpr const char* kDamaged = "the head is damaged or cut off";
   constexpr const char* kLost = "Nothing can be smoothed without it; copy the file again if this is a copy";
-  if (length < sizeof(double) + kCrcBytes || length > kMostHead - kPrefixBytes ||
+  if (length < kCrcBytes || length > kMostHead - kPrefixBytes ||
       read(bytes_.data() + kPrefixBytes, length) < length) {
     refuse(kDamaged, kLost);
   }
   const std::size_t covered = kPrefixBytes + length - kCrcBytes;
   head_crc_ = crc32c(0, {bytes_.data(), covered});
   if (LittleEndianReader({bytes_.data() + covered, kCrcBytes}).u32() != head_crc_) refuse(kDamaged, kLost);
-  pixel_sigma_ = LittleEndianReader({bytes_.data() + kPrefixBytes, sizeof(double)}).f64();
   RecordingHeader calibration;
-  const std::size_t begin = kPrefixBytes + sizeof(double);
-  const char* wrong = decodeRecordingHeader({bytes_.data() + begin, covered - begin}, calibration);
-  if (wrong == nullptr && !(pixel_sigma_ > 0 && pixel_sigma_ < kLargestSigma)) wrong = "pixel noise";
+  const char* wrong =
+      decodeRecordingHeader({bytes_.data() + kPrefixBytes, covered - kPrefixBytes}, calibration);
   if (wrong == nullptr && calibration.rig.camera_count == 0) wrong = "number of cameras";
   if (wrong == nullptr && !sane(calibration.rig.camera_to_imu_shift)) wrong = "clock shift";
   const ImuNoise& noise = calibration.noise;
@@ -183,6 +182,12 @@ bool KeyframeReader::decodeKeyframe() {
   state_.bias_accel = getVector(from);
   good = good && state_.v_world_body.allFinite() && state_.bias_gyro.allFinite() &&
          state_.bias_accel.allFinite();
+  in_use_.pixel_sigma = from.f64();
+  good = in_use_.pixel_sigma > 0 && in_use_.pixel_sigma < kLargestSigma && good;
+  for (double* factor : {&in_use_.imu.gyro, &in_use_.imu.accel}) {
+    *factor = from.f64();
+    good = *factor > 0 && *factor < kLargestFactor && good;
+  }
   frame_.keyframe = true;
   frame_.features.resize(features);
   for (TrackedFeature& feature : frame_.features) {

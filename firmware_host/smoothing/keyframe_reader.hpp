@@ -16,6 +16,7 @@
 #include "estimator/messages/imu_sample.hpp"
 #include "estimator/messages/loop_revisit.hpp"
 #include "estimator/messages/nav_state.hpp"
+#include "estimator/messages/noise_in_use.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "firmware_host/smoothing/keyframe_format.hpp"
 
@@ -27,15 +28,15 @@ class KeyframeReader {
   KeyframeReader(std::string name, std::istream& in);
 
   [[nodiscard]] const Rig& rig() const { return rig_; }           ///< the cameras in use
-  [[nodiscard]] const ImuNoise& noise() const { return noise_; }  ///< as in flight
-  [[nodiscard]] double pixelSigma() const { return pixel_sigma_; }
+  [[nodiscard]] const ImuNoise& noise() const { return noise_; }  ///< as in flight, before what it showed
 
   enum class Next { kSample, kKeyframe, kRevisit, kCalibration, kEnd };
   /// What the next record is; it is then in the accessor of that name until the next call.
   Next next();
   [[nodiscard]] const ImuSample& sample() const { return sample_; }
   [[nodiscard]] const TrackedFrame& frame() const { return frame_; }
-  [[nodiscard]] const NavState& state() const { return state_; }  ///< of frame()
+  [[nodiscard]] const NavState& state() const { return state_; }          ///< of frame()
+  [[nodiscard]] const NoiseInUse& noiseInUse() const { return in_use_; }  ///< likewise
   [[nodiscard]] const LoopRevisit& revisit() const { return revisit_; }
   /// The estimate that was in use from the next keyframe on.
   [[nodiscard]] const CalibrationEstimate& calibration() const { return calibration_; }
@@ -59,10 +60,10 @@ class KeyframeReader {
   std::uint32_t head_crc_ = 0;
   Rig rig_;
   ImuNoise noise_;
-  double pixel_sigma_ = 0;
   ImuSample sample_;
   TrackedFrame frame_;
   NavState state_;
+  NoiseInUse in_use_;
   LoopRevisit revisit_;
   CalibrationEstimate calibration_;
   std::string cut_;

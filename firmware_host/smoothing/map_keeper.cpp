@@ -53,20 +53,19 @@ MapKeeper::MapKeeper(const std::string& folder, const Rig& rig, const ImuNoise& 
                      "Give a folder that can be written with --out, or --set smoother.horizon=30");
   }
   std::setvbuf(file_.get(), buffer_.data(), _IOFBF, buffer_.size());
-  writeHead(rigInUse(rig, settings), inflatedNoise(noise, settings), settings.pixel_sigma);
+  writeHead(rigInUse(rig, settings), inflatedNoise(noise, settings));
 }
 
-void MapKeeper::writeHead(const Rig& rig, const ImuNoise& noise, double pixel_sigma) {
+void MapKeeper::writeHead(const Rig& rig, const ImuNoise& noise) {
   RecordingHeader calibration;
   calibration.rig = rig;
   calibration.noise = noise;
   const std::vector<std::uint8_t> encoded = encodeRecordingHeader(calibration);
-  const std::size_t length = sizeof(double) + encoded.size() + kCrcBytes;
+  const std::size_t length = encoded.size() + kCrcBytes;
   LittleEndianWriter to(record_.data());
   to.bytes(kMagic);
   to.u32(kVersion);
   to.u32(static_cast<std::uint32_t>(length));
-  to.f64(pixel_sigma);
   to.bytes(encoded);
   head_crc_ = crc32c(0, {record_.data(), to.written()});
   to.u32(head_crc_);
@@ -112,7 +111,7 @@ void MapKeeper::addImu(const ImuSample& sample) {
   writeRecord(Kind::kImu, to.written());
 }
 
-void MapKeeper::addKeyframe(const TrackedFrame& frame, const NavState& state) {
+void MapKeeper::addKeyframe(const TrackedFrame& frame, const NavState& state, const NoiseInUse& noise) {
   if (!file_) return;
   LittleEndianWriter to(record_.data() + kRecordBytes);
   to.i64(frame.stamp.ns);
@@ -122,6 +121,7 @@ void MapKeeper::addKeyframe(const TrackedFrame& frame, const NavState& state) {
   put(to, state.v_world_body);
   put(to, state.bias_gyro);
   put(to, state.bias_accel);
+  for (const double figure : {noise.pixel_sigma, noise.imu.gyro, noise.imu.accel}) to.f64(figure);
   for (const TrackedFeature& feature : frame.features) put(to, feature.id, feature.seen, feature.pixel);
   writeRecord(Kind::kKeyframe, to.written());
 }

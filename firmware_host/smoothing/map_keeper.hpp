@@ -19,6 +19,7 @@
 #include "estimator/messages/calibration_estimate.hpp"
 #include "estimator/messages/loop_revisit.hpp"
 #include "estimator/messages/nav_state.hpp"
+#include "estimator/messages/noise_in_use.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/odometry/odometry_settings.hpp"
 #include "firmware_host/files/lost_files.hpp"
@@ -38,7 +39,7 @@ class MapKeeper {
   void addImu(const ImuSample& sample);
   /// The stamps went back for good: what was kept is given up, and the map covers what comes.
   void restart();
-  void addKeyframe(const TrackedFrame& frame, const NavState& state);
+  void addKeyframe(const TrackedFrame& frame, const NavState& state, const NoiseInUse& noise);
   /// Before the keyframe that it was estimated with; without effect unless the settings ask for an estimate.
   void addCalibration(const CalibrationEstimate& calibration);
   /// After the run: a loop between two of the keyframes.
@@ -49,7 +50,7 @@ class MapKeeper {
  private:
   static constexpr std::size_t kBufferBytes = std::size_t{256} * 1024;
 
-  void writeHead(const Rig& rig, const ImuNoise& noise, double pixel_sigma);
+  void writeHead(const Rig& rig, const ImuNoise& noise);
   void writeRecord(keyframe_file::Kind kind, std::size_t payload);
   void check(bool written);
 

@@ -46,6 +46,8 @@ NavState stateOf(int k) {
   return state;
 }
 
+NoiseInUse noiseOf(int k) { return {0.45 + 0.1 * k, {1 + 1.0 / 3.0, 1.0 + k}}; }
+
 TrackedFrame frameOf(int k) {
   TrackedFrame frame;
   frame.stamp = {kSecond * (k + 1)};
@@ -87,7 +89,7 @@ std::string kept(const std::string& folder, bool finished = true, const Odometry
     for (int k = 0; k < kKeyframes; ++k) {
       for (int i = 0; i < kSamplesEach; ++i) keeper.addImu(sampleAt(kSecond * k + 5'000'000 * (i + 1)));
       keeper.addCalibration(calibrationOf(k));
-      keeper.addKeyframe(frameOf(k), stateOf(k));
+      keeper.addKeyframe(frameOf(k), stateOf(k), noiseOf(k));
     }
     keeper.addRevisit(revisit());
     if (finished) keeper.finish();
@@ -140,7 +142,6 @@ TEST_CASE("keyframes, samples and loops come back bit for bit", "[files]") {
   CHECK(reader.rig().camera_to_imu_shift == rig.camera_to_imu_shift);
   CHECK(reader.rig().T_body_cam[1].translation == rig.T_body_cam[1].translation);
   CHECK(reader.rig().camera[0].intrinsics() == rig.camera[0].intrinsics());
-  CHECK(reader.pixelSigma() == OdometrySettings{}.pixel_sigma);
   for (int k = 0; k < kKeyframes; ++k) {
     for (int i = 0; i < kSamplesEach; ++i) {
       REQUIRE(reader.next() == KeyframeReader::Next::kSample);
@@ -157,6 +158,9 @@ TEST_CASE("keyframes, samples and loops come back bit for bit", "[files]") {
     CHECK(reader.state().v_world_body == state.v_world_body);
     CHECK(reader.state().bias_gyro == state.bias_gyro);
     CHECK(reader.state().bias_accel == state.bias_accel);
+    CHECK(reader.noiseInUse().pixel_sigma == noiseOf(k).pixel_sigma);
+    CHECK(reader.noiseInUse().imu.gyro == noiseOf(k).imu.gyro);
+    CHECK(reader.noiseInUse().imu.accel == noiseOf(k).imu.accel);
     const TrackedFrame frame = frameOf(k);
     CHECK(reader.frame().stamp == frame.stamp);
     REQUIRE(reader.frame().features.size() == frame.features.size());
@@ -262,8 +266,8 @@ TEST_CASE("foreign files and other versions are refused with the reason", "[file
   CHECK_THROWS_WITH(countsIn("a text of somebody else's, long enough"),
                     Catch::Contains("is no file of keyframes"));
   std::string later = bytes;
-  later[8] = 2;
-  CHECK_THROWS_WITH(countsIn(later), Catch::Contains("version: is 2, this program reads 1"));
+  later[8] = 3;
+  CHECK_THROWS_WITH(countsIn(later), Catch::Contains("version: is 3, this program reads 2"));
   std::string damaged = bytes;
   damaged[30] = static_cast<char>(damaged[30] + 1);
   CHECK_THROWS_WITH(countsIn(damaged), Catch::Contains("the head is damaged"));

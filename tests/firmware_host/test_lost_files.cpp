@@ -168,7 +168,7 @@ TEST_CASE("keyframes that find no room end their file, said once", "[files]") {
     const FileSizeLimit limit(kLimit);
     for (int i = 1; i < 50; ++i) {
       frame.stamp = {i};
-      keeper.addKeyframe(frame, stateAt(i));
+      keeper.addKeyframe(frame, stateAt(i), {});
     }
     keeper.finish();
   }

@@ -17,7 +17,7 @@ TEST_CASE("run verdict: shares of time, doubts, sigmas and the estimated calibra
       output->state.health = health;
       output->doubt = doubt;
       output->state.v_world_body = {health == Health::kDegraded ? 3.0 : 1.0, 0, 0};
-      output->statistics.pixel_sigma = health == Health::kDegraded ? 2.5 : 0.5;  // 1.17 on the mean
+      output->statistics.noise.pixel_sigma = health == Health::kDegraded ? 2.5 : 0.5;  // 1.17 on the mean
       output->state.covariance = (health == Health::kGood ? 1e-4 : 1.0) * Matrix15d::Identity();
       verdict.add(Stamp{k * 50'000'000LL}, *output);
     }

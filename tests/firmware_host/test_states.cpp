@@ -33,6 +33,7 @@ KeyframeState randomKeyframe(std::int64_t ns, Random& random) {
                          .inliers_stereo = 140,
                          .track_length = 7.125,
                          .reprojection_rms = 0.75,
+                         .noise = {},
                          .imu_residual = 1.5,
                          .iterations = 3};
   Matrix15d root;

@@ -40,15 +40,15 @@ void read(const std::string& bytes) {
   std::istringstream in(bytes);
   try {
     KeyframeReader reader("keyframes.swk", in);
-    FullSmoother smoother(reader.rig(), reader.noise(),
-                          {.pixel_sigma = reader.pixelSigma(), .max_iterations = 2});
+    FullSmoother smoother(reader.rig(), reader.noise(), {.max_iterations = 2});
     for (KeyframeReader::Next next{}; (next = reader.next()) != KeyframeReader::Next::kEnd;) {
       if (next == KeyframeReader::Next::kSample) {
         demand(reader.sample().gyro.allFinite() && reader.sample().accel.allFinite());
         smoother.addImu(reader.sample());
       } else if (next == KeyframeReader::Next::kKeyframe) {
         demand(reader.state().T_world_body.translation.allFinite());
-        (void)smoother.addKeyframe(reader.frame(), reader.state());
+        demand(reader.noiseInUse().pixel_sigma > 0 && reader.noiseInUse().imu.gyro > 0);
+        (void)smoother.addKeyframe(reader.frame(), reader.state(), reader.noiseInUse());
       } else if (next == KeyframeReader::Next::kCalibration) {
         demand(reader.calibration().T_body_cam[0].translation.allFinite());
         smoother.setCalibration(reader.calibration());

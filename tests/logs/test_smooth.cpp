@@ -72,9 +72,7 @@ TEST_CASE("loops come back from the file and tie the keyframes as they did in me
   flown.tracks.landmarks = 2000;
   const test::TrackFlight flight(flown);
   OdometrySettings settings;
-  FullSmootherSettings of_memory;
-  of_memory.pixel_sigma = settings.pixel_sigma;
-  FullSmoother memory(flight.rig(), inflatedNoise(flight.noise(), settings), of_memory);
+  FullSmoother memory(flight.rig(), inflatedNoise(flight.noise(), settings), {});
   LostFiles lost;
   MapKeeper keeper(folder.path(), flight.rig(), flight.noise(), settings, lost);
   std::vector<std::size_t> keyframes;
@@ -91,8 +89,9 @@ TEST_CASE("loops come back from the file and tie the keyframes as they did in me
         state.stamp = frame.stamp;
         state.T_world_body = x.T_world_body;
         state.v_world_body = x.v_world_body;
-        REQUIRE(memory.addKeyframe(frame, state).ok());
-        keeper.addKeyframe(frame, state);
+        const NoiseInUse noise{0.6, {1.5, k % 2 == 0 ? 1.0 : 2.0}};
+        REQUIRE(memory.addKeyframe(frame, state, noise).ok());
+        keeper.addKeyframe(frame, state, noise);
         keyframes.push_back(k);
       });
   const std::vector<LoopRevisit> loops = trueLoops(flight, keyframes, {});

@@ -98,7 +98,7 @@ void writeFrames(std::FILE* csv, int run, const std::vector<RunFrame>& frames, R
                   f.statistics.landmarks, f.statistics.inliers_mono, f.statistics.inliers_stereo,
                   f.statistics.reprojection_rms, f.statistics.imu_residual, f.statistics.track_length,
                   f.statistics.at_rest, f.statistics.iterations, f.statistics.scale, f.statistics.scale_sigma,
-                  static_cast<int>(f.doubt), f.statistics.known, f.statistics.pixel_sigma);
+                  static_cast<int>(f.doubt), f.statistics.known, f.statistics.noise.pixel_sigma);
     lines += line;
   }
   static std::mutex mutex;

@@ -15,7 +15,7 @@ struct Watched {
     statistics.tracks = statistics.known = 100;
     statistics.inliers_stereo = 95;
     statistics.imu_residual = 0.3;
-    statistics.pixel_sigma = OdometrySettings{}.pixel_sigma;
+    statistics.noise.pixel_sigma = OdometrySettings{}.pixel_sigma;
     statistics.scale_sigma = cameras == 1 ? 0.02 : 0;
     state.covariance = 1e-4 * Matrix15d::Identity();
   }
@@ -152,7 +152,7 @@ TEST_CASE("Health: after a disagreement it takes two seconds to be good again", 
 
 TEST_CASE("Health: raised pixel noise does not excuse the IMU's residuals", "[health]") {
   Watched watched;
-  watched.statistics.pixel_sigma *= 5;  // noise of the tracks alone
+  watched.statistics.noise.pixel_sigma *= 5;  // noise of the tracks alone
   REQUIRE(watched.steps_of(20) == Health::kGood);
   watched.statistics.imu_residual = 0.6;
   CHECK(watched.steps_of(20) == Health::kDegraded);

@@ -52,7 +52,7 @@ TEST_CASE("Odometry: tracks four times as noisy as set are weighted as they are"
   for (const bool stereo : {true, false}) {
     CAPTURE(stereo);
     const OdometryRun run = noisyRun(2.0, stereo);
-    CHECK(run.frames.back().statistics.pixel_sigma == Approx(2.0).epsilon(0.15));
+    CHECK(run.frames.back().statistics.noise.pixel_sigma == Approx(2.0).epsilon(0.15));
     CHECK(run.frames.back().state.epoch == 0);
     CHECK(worstVelocity(run, 6) < 0.25);
   }
@@ -61,6 +61,6 @@ TEST_CASE("Odometry: tracks four times as noisy as set are weighted as they are"
 TEST_CASE("Odometry: tracks as noisy as set leave the noise as it is", "[odometry]") {
   const OdometryRun run = noisyRun(OdometrySettings{}.pixel_sigma, true);
   for (const RunFrame& f : run.frames) {
-    if (f.has_state) CHECK(f.statistics.pixel_sigma < 1.1 * OdometrySettings{}.pixel_sigma);
+    if (f.has_state) CHECK(f.statistics.noise.pixel_sigma < 1.1 * OdometrySettings{}.pixel_sigma);
   }
 }

@@ -31,9 +31,7 @@ std::vector<NavState> statesOf(const FullSmoother& full) {
 
 FullRun runFull(const TrackFlight& flight, const SmootherSettings& causal_settings) {
   FullRun run;
-  FullSmootherSettings settings;
-  settings.pixel_sigma = causal_settings.pixel_sigma;
-  FullSmoother full(flight.rig(), flight.noise(), settings);
+  FullSmoother full(flight.rig(), flight.noise(), {});
   test::SmootherRun causal(flight, causal_settings);
   flight.play(
       [&](const ImuSample& sample) {
@@ -51,7 +49,7 @@ FullRun runFull(const TrackFlight& flight, const SmootherSettings& causal_settin
         state.v_world_body = x.v_world_body;
         state.bias_gyro = x.bias_gyro;
         state.bias_accel = x.bias_accel;
-        REQUIRE(full.addKeyframe(frame, state).ok());
+        REQUIRE(full.addKeyframe(frame, state, causal.smoother().newest().statistics.noise).ok());
         run.causal.push_back(state);
         run.truth.push_back(flight.truth(k));
       });
@@ -142,9 +140,9 @@ TEST_CASE("Full smoothing refuses what it cannot solve or hold", "[smoother][ful
   FullSmootherReport report;
   CHECK(full.solve(report).code == StatusCode::kNotReady);
   NavState state;
-  CHECK(full.addKeyframe(flight.frames()[0], state).ok());
-  CHECK(full.addKeyframe(flight.frames()[1], state).ok());
-  CHECK(full.addKeyframe(flight.frames()[2], state).code == StatusCode::kCapacityReached);
+  CHECK(full.addKeyframe(flight.frames()[0], state, {}).ok());
+  CHECK(full.addKeyframe(flight.frames()[1], state, {}).ok());
+  CHECK(full.addKeyframe(flight.frames()[2], state, {}).code == StatusCode::kCapacityReached);
   CHECK(full.size() == 2);
   CHECK(full.solve(report).code == StatusCode::kNotReady);
 }
@@ -164,7 +162,7 @@ TEST_CASE("full smoothing's memory is linear in the keyframes, at rest too") {
     }
     for (std::size_t k = 0; k < keyframes; ++k) {
       frame.stamp = {static_cast<std::int64_t>(k + 1) * 1'000'000'000};
-      REQUIRE(full.addKeyframe(frame, NavState{}).ok());
+      REQUIRE(full.addKeyframe(frame, NavState{}, {}).ok());
     }
     return static_cast<double>(full.memoryNeeded());
   };
@@ -183,7 +181,7 @@ TEST_CASE("a full smoother that is told to stop ends between two landmarks") {
                 state.stamp = flight.frames()[k].stamp;
                 state.T_world_body = x.T_world_body;
                 state.v_world_body = x.v_world_body;
-                REQUIRE(full.addKeyframe(flight.frames()[k], state).ok());
+                REQUIRE(full.addKeyframe(flight.frames()[k], state, {}).ok());
               });
   FullSmootherReport report;
   std::atomic<bool> stop{true};

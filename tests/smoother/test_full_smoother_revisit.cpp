@@ -28,12 +28,6 @@ struct Prepared {
   }
 };
 
-FullSmootherSettings fullSettings(const TrackFlight& flight) {
-  FullSmootherSettings settings;
-  settings.pixel_sigma = flight.flight().settings().tracks.pixel_sigma;
-  return settings;
-}
-
 /// From `cut` seconds on the odometry is in its second epoch, whose world is T_second_first from the first.
 Prepared prepared(double duration, std::uint64_t seed, double cut = 1e9, const SE3& T_second_first = {}) {
   Prepared run;
@@ -42,7 +36,7 @@ Prepared prepared(double duration, std::uint64_t seed, double cut = 1e9, const S
   settings.tracks.landmarks = 2000;
   run.flight = std::make_unique<TrackFlight>(settings);
   const TrackFlight& flight = *run.flight;
-  run.full.emplace_back(flight.rig(), flight.noise(), fullSettings(flight));
+  run.full.emplace_back(flight.rig(), flight.noise(), FullSmootherSettings{});
   test::SmootherRun causal(flight);
   flight.play(
       [&](const ImuSample& sample) {
@@ -65,7 +59,7 @@ Prepared prepared(double duration, std::uint64_t seed, double cut = 1e9, const S
           state.T_world_body = T_second_first * state.T_world_body;
           state.v_world_body = T_second_first.rotation * state.v_world_body;
         }
-        REQUIRE(run.full[0].addKeyframe(frame, state).ok());
+        REQUIRE(run.full[0].addKeyframe(frame, state, causal.smoother().newest().statistics.noise).ok());
         run.keyframes.push_back(k);
         run.causal.push_back(state);
         run.truth.push_back(flight.truth(k));
@@ -237,7 +231,7 @@ TEST_CASE("Loops with pixels in place of tracks, and loops that cannot be used",
   CHECK(by_pixels.report.matches_used > by_tracks.report.matches_used / 2);
   CHECK(by_pixels.error < 0.8 * without.error);
 
-  FullSmootherSettings small = fullSettings(*run.flight);
+  FullSmootherSettings small;
   small.max_revisits = 0;
   FullSmoother none(run.flight->rig(), run.flight->noise(), small);
   CHECK(none.addRevisit(tracks[0]).code == StatusCode::kCapacityReached);
