@@ -20,13 +20,13 @@ Eigen::Matrix3d cross(const Eigen::Vector3d& a, const Eigen::Matrix3d& m) {
 }  // namespace
 
 Preintegration::Preintegration(const ImuNoise& noise, const Eigen::Vector3d& bias_gyro,
-                               const Eigen::Vector3d& bias_accel)
-    : noise_(noise), bias_gyro_(bias_gyro), bias_accel_(bias_accel) {}
+                               const Eigen::Vector3d& bias_accel, const GyroIntrinsics& intrinsics)
+    : noise_(noise), bias_gyro_(bias_gyro), bias_accel_(bias_accel), intrinsics_(intrinsics) {}
 
 void Preintegration::integrate(double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel,
                                double gyro_factor, double accel_factor) {
   const Eigen::Matrix3d R = rotation_.toRotationMatrix();
-  const IntegrationStep step = integrationStep((gyro - bias_gyro_) * dt);
+  const IntegrationStep step = integrationStep((intrinsics_.rate(gyro) - bias_gyro_) * dt);
   const Eigen::Quaterniond middle = rotation_ * step.half;
   const Eigen::Matrix3d R_half = middle.toRotationMatrix();
   const Eigen::Vector3d force = R_half * (accel - bias_accel_);
@@ -46,6 +46,7 @@ void Preintegration::integrate(double dt, const Eigen::Vector3d& gyro, const Eig
   position_ += velocity_ * dt + 0.5 * dt * dt * force;
   velocity_ += dt * force;
   rotation_ = (middle * step.half).normalized();
+  gyro_integral_ += dt * gyro;
   duration_ += dt;
 }
 

@@ -25,6 +25,7 @@
 #include "estimator/core/stamp.hpp"
 #include "estimator/core/status.hpp"
 #include "estimator/imu/imu_noise.hpp"
+#include "estimator/messages/gyro_intrinsics.hpp"
 #include "estimator/messages/imu_sample.hpp"
 
 namespace swiftlet {
@@ -35,7 +36,8 @@ using Vector9d = Eigen::Matrix<double, 9, 1>;
 class Preintegration {
  public:
   Preintegration() = default;
-  Preintegration(const ImuNoise& noise, const Eigen::Vector3d& bias_gyro, const Eigen::Vector3d& bias_accel);
+  Preintegration(const ImuNoise& noise, const Eigen::Vector3d& bias_gyro, const Eigen::Vector3d& bias_accel,
+                 const GyroIntrinsics& intrinsics = {});
 
   /// Appends `dt` seconds (> 0) over which rate and specific force had these mean values. The factors
   /// multiply the noise variances.
@@ -50,7 +52,18 @@ class Preintegration {
   [[nodiscard]] double gapDuration() const { return gap_duration_; }  ///< s of it without samples
   [[nodiscard]] const Eigen::Vector3d& biasGyro() const { return bias_gyro_; }
   [[nodiscard]] const Eigen::Vector3d& biasAccel() const { return bias_accel_; }
+  /// rad/s, of the readings: by it a change of the intrinsics acts as one of the bias does. Exact to first
+  /// order for the rotation, and while the rate stays the same for position and velocity.
+  [[nodiscard]] Eigen::Vector3d meanGyro() const {
+    const double covered = duration_ - gap_duration_;
+    return covered > 0 ? Eigen::Vector3d(gyro_integral_ / covered) : Eigen::Vector3d::Zero();
+  }
   [[nodiscard]] Matrix9d covariance() const;
+
+  /// The gyro bias at which this increment is that of `intrinsics` and `bias`, to first order.
+  [[nodiscard]] Eigen::Vector3d biasFor(const GyroIntrinsics& intrinsics, const Eigen::Vector3d& bias) const {
+    return bias + (intrinsics.matrix - intrinsics_.matrix) * meanGyro();
+  }
 
   /// Increments at biases that differ from those of the construction, to first order.
   [[nodiscard]] Eigen::Quaterniond deltaRotation(const Eigen::Vector3d& bias_gyro) const;
@@ -84,6 +97,8 @@ class Preintegration {
   ImuNoise noise_;
   Eigen::Vector3d bias_gyro_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d bias_accel_ = Eigen::Vector3d::Zero();
+  GyroIntrinsics intrinsics_;
+  Eigen::Vector3d gyro_integral_ = Eigen::Vector3d::Zero();  // of the readings
   double duration_ = 0;
   double gap_duration_ = 0;
   Eigen::Quaterniond rotation_ = Eigen::Quaterniond::Identity();

@@ -68,8 +68,9 @@ bool finite(const NavState& state) {
 
 }  // namespace
 
-void Propagator::Current::set(const NavState& state) {
+void Propagator::Current::set(const NavState& state, const GyroIntrinsics& gyro) {
   nav = state;
+  intrinsics = gyro;
   turnRotationError(nav.covariance, nav.T_world_body.R());
   gap_seconds = 0;
 }
@@ -94,7 +95,7 @@ void Propagator::Current::advance(const ImuSample* before, const ImuSample* afte
 void Propagator::Current::advanceMeasured(const ImuSegment& segment, const ImuNoise& noise) {
   const double dt = segment.dt;
   const Eigen::Matrix3d R = nav.T_world_body.R();
-  const IntegrationStep step = integrationStep((segment.gyro - nav.bias_gyro) * dt);
+  const IntegrationStep step = integrationStep((intrinsics.rate(segment.gyro) - nav.bias_gyro) * dt);
   const Eigen::Quaterniond middle = nav.T_world_body.rotation * step.half;
   const Eigen::Matrix3d R_half = middle.toRotationMatrix();
   const Eigen::Vector3d force = R_half * (segment.accel - nav.bias_accel);
@@ -131,9 +132,9 @@ void Propagator::Current::advanceGap(double dt, const ImuNoise& noise) {
   gap_seconds += dt;
 }
 
-Status Propagator::setState(const NavState& state) {
+Status Propagator::setState(const NavState& state, const GyroIntrinsics& intrinsics) {
   if (!finite(state)) return {StatusCode::kInvalidInput, "state to propagate from is not finite"};
-  current_.set(state);
+  current_.set(state, intrinsics);
   has_state_ = true;
   const std::uint64_t kept = std::min<std::uint64_t>(count_, kRing);
   const std::uint64_t oldest = count_ - kept;

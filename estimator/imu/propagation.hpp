@@ -21,6 +21,7 @@
 #include "estimator/core/status.hpp"
 #include "estimator/imu/imu_noise.hpp"
 #include "estimator/imu/integration_rule.hpp"
+#include "estimator/messages/gyro_intrinsics.hpp"
 #include "estimator/messages/imu_sample.hpp"
 #include "estimator/messages/nav_state.hpp"
 
@@ -30,9 +31,9 @@ class Propagator {
  public:
   explicit Propagator(const ImuNoise& noise) : noise_(noise) {}
 
-  /// Takes a (smoothed) state and re-applies the samples after its stamp. A state later than the
-  /// last sample is kept as it is; the next sample starts from it.
-  Status setState(const NavState& state);
+  /// Takes a (smoothed) state, with the intrinsics that go with its biases, and re-applies the samples after
+  /// its stamp. A state later than the last sample is kept as it is; the next sample starts from it.
+  Status setState(const NavState& state, const GyroIntrinsics& intrinsics = {});
 
   /// Takes one sample. `state` (may be null) gets the state at its stamp.
   Status step(const ImuSample& sample, NavState* state = nullptr);
@@ -58,9 +59,10 @@ class Propagator {
   // The state with its rotation error in world axes (theta = R phi), which makes the transition sparse.
   struct Current {
     NavState nav;
+    GyroIntrinsics intrinsics;
     double gap_seconds = 0;
 
-    void set(const NavState& state);
+    void set(const NavState& state, const GyroIntrinsics& gyro);
     [[nodiscard]] NavState toNavState() const;
     void advance(const ImuSample* before, const ImuSample* after, Stamp to, const ImuNoise& noise);
     void advanceMeasured(const ImuSegment& segment, const ImuNoise& noise);

@@ -6,6 +6,7 @@
 #include "estimator/core/limits.hpp"
 #include "estimator/core/stamp.hpp"
 #include "estimator/geometry/se3.hpp"
+#include "estimator/messages/gyro_intrinsics.hpp"
 
 namespace swiftlet {
 
@@ -22,6 +23,7 @@ inline constexpr double kBaselinePriorSigma = 1e-3;
 struct CalibrationEstimate {
   Duration camera_to_imu_shift;  ///< t_imu = t_image + shift
   std::array<SE3, kMaxCameras> T_body_cam;
+  GyroIntrinsics gyro;                               ///< zero where they are not estimated
   double shift_sigma = 0;                            ///< s
   std::array<double, kMaxCameras> rotation_sigma{};  ///< rad
   std::array<double, kMaxCameras> position_sigma{};  ///< m

@@ -30,6 +30,8 @@ constexpr double kFitShare = 0.75;
 // Residuals of the IMU's motion, in sigmas of its noise as in flight, times what the pixel noise was raised
 // by. Where the noise model holds they are 0.1 to 0.3, with real sensors up to 1.2.
 constexpr double kImuResidual = 2.0;
+// By which gyro or accelerometer err beyond their noise as set; with a gyro 10 times as noisy as told 5
+// to 10.
 constexpr double kImuFactor = 20.0;
 // Far outside the limits: the estimate is useless.
 constexpr double kUselessVelocitySigma = 1.0;  // m/s
@@ -106,8 +108,8 @@ Doubt HealthMonitor::accuracyDoubt(const Evidence& evidence) const {
   if (state.v_world_body.norm() > max_speed_ || acceleration_ > max_acceleration_) return Doubt::kImplausible;
   if (share_ < kFitShare) return Doubt::kTracksDisagree;
   if (imu_square_ > kImuResidual * kImuResidual) return Doubt::kImuDisagrees;
-  if (std::max(evidence.statistics.noise.imu.gyro, evidence.statistics.noise.imu.accel) > kImuFactor)
-    return Doubt::kImuDisagrees;
+  const ImuFactors& factors = evidence.statistics.noise.imu;
+  if (std::max(factors.gyro, factors.accel) > kImuFactor) return Doubt::kImuDisagrees;
   if (velocitySigma(state) > kVelocitySigma || tiltSigma(state) > kTiltSigma) return Doubt::kUncertain;
   return scaleDoubt(evidence);
 }

@@ -59,6 +59,8 @@ class HealthMonitor {
   [[nodiscard]] Health health() const { return health_; }
   /// Why it is not good.
   [[nodiscard]] Doubt doubt() const { return doubt_; }
+  /// s of good in this epoch.
+  [[nodiscard]] double secondsGood() const { return good_; }
   /// The state should be discarded and started again.
   [[nodiscard]] bool lost() const { return lost_; }
   /// Not far outside the limits: the position may be gone on from.

@@ -15,6 +15,7 @@ struct OdometrySettings {
   double accel_inflation = 5.0;
   bool estimate_time_offset = false;
   bool estimate_extrinsics = false;
+  bool estimate_gyro = true;
   bool use_stereo = true;  ///< false: camera 0 alone
   /// What the vehicle can do: an estimate beyond it is not good.
   double max_speed = 30;         ///< m/s

@@ -26,7 +26,7 @@ void PropagationStage::take(const StateFix& fix) {
   if (fix.state.epoch != fix_.state.epoch) propagator_.forgetState();
   fix_ = fix;
   // A state that is not finite never leaves the smoother; a bridged hole is in the covariance.
-  if (fix.has_state) static_cast<void>(propagator_.setState(fix.state));
+  if (fix.has_state) static_cast<void>(propagator_.setState(fix.state, fix.gyro));
 }
 
 }  // namespace swiftlet

@@ -11,6 +11,9 @@ namespace {
 constexpr double kStartTime = 1.0;    // s
 constexpr double kStampSlack = 1e-3;  // s: stamps of frames a period apart are so to rounding
 constexpr int kStartIterations = 8;
+// Of good health before an estimate corrects the gyro: a start that is wrong would take its errors for the
+// gyro's.
+constexpr double kTrustedTime = 2.0;  // s
 // What a flying body may be doing at its first image, in each axis.
 constexpr double kStartVelocitySigma = 2.0;    // m/s
 constexpr double kStartGyroBiasSigma = 0.1;    // rad/s
@@ -25,6 +28,7 @@ SmootherSettings smootherSettings(const OdometrySettings& settings) {
   s.horizon = settings.horizon;
   s.estimate_time_offset = settings.estimate_time_offset;
   s.estimate_extrinsics = settings.estimate_extrinsics;
+  s.estimate_gyro = settings.estimate_gyro;
   return s;
 }
 
@@ -99,6 +103,7 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
   input.frame = &tracked;
   input.imu_gap = imu_gap;
   input.rest = rest_.state().number;
+  input.move_gyro = health_.health() == Health::kGood && health_.secondsGood() > kTrustedTime;
   if (!epoch_began_) epoch_began_ = tracked.stamp;
   input.iterations =
       starting(tracked.stamp) ? std::max(kStartIterations, effort.iterations) : effort.iterations;
@@ -377,6 +382,7 @@ void SmoothStage::publish(const TrackedFrame& tracked, bool imu_missing, Odometr
               events_);
   fix_.has_state = true;
   fix_.state = state;
+  fix_.gyro = calibration_.gyro;
   fix_.last_accepted = health_.lastAccepted();
   if (!starting(tracked.stamp)) {
     if (rest_.state().at_rest) last_rest_ = tracked.stamp;

@@ -64,7 +64,7 @@ void TrackStage::take(const SmoothedWindow& window) {
   }
   restarted_ = false;
   window_ = window;
-  if (window_.started) static_cast<void>(propagator_.setState(window_.newest));
+  if (window_.started) static_cast<void>(propagator_.setState(window_.newest, window_.calibration.gyro));
 }
 
 Status TrackStage::step(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked) {
@@ -108,7 +108,7 @@ void TrackStage::predict(Stamp stamp) {
   if (imu_gap_ || isSilent(imu_, noise_, to))
     return;  // better no prediction than a turn that was not measured
   const Eigen::Vector3d bias = window_.started ? window_.newest.bias_gyro : Eigen::Vector3d::Zero();
-  Preintegration turn(noise_, bias, Eigen::Vector3d::Zero());
+  Preintegration turn(noise_, bias, Eigen::Vector3d::Zero(), window_.calibration.gyro);
   if (!turn.integrate(imu_.around(from, to), from, to).ok()) return;
   prediction_.has_rotation = true;
   prediction_.R_body_prev_body_cur = turn.deltaRotation();

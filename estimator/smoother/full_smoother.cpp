@@ -103,6 +103,7 @@ void FullSmoother::setCalibration(const CalibrationEstimate& calibration) {
   const bool later = calibration.camera_to_imu_shift > rig_.camera_to_imu_shift;
   rig_.camera_to_imu_shift = calibration.camera_to_imu_shift;
   rig_.T_body_cam = calibration.T_body_cam;
+  intrinsics_ = calibration.gyro;
   // A keyframe's samples end at its stamp as it was: what lies behind came with the next keyframe.
   for (std::size_t k = 1; later && k + 1 < keyframes_.size(); ++k) {
     std::vector<ImuSample>& samples = keyframes_[k].samples;
@@ -155,7 +156,8 @@ void FullSmoother::integrateLinks() {
     Keyframe& keyframe = keyframes_[k];
     if (!keyframe.linked) continue;
     const Keyframe& before = keyframes_[k - 1];
-    keyframe.imu = Preintegration(noise_.times(keyframe.noise.imu), before.x.bias_gyro, before.x.bias_accel);
+    keyframe.imu = Preintegration(noise_.times(keyframe.noise.imu), before.x.bias_gyro, before.x.bias_accel,
+                                  intrinsics_);
     keyframe.linked = keyframe.imu
                           .integrate(keyframe.samples, before.stamp + rig_.camera_to_imu_shift,
                                      keyframe.stamp + rig_.camera_to_imu_shift)

@@ -32,6 +32,7 @@
 #include "estimator/core/status.hpp"
 #include "estimator/imu/imu_noise.hpp"
 #include "estimator/messages/calibration_estimate.hpp"
+#include "estimator/messages/gyro_intrinsics.hpp"
 #include "estimator/messages/loop_revisit.hpp"
 #include "estimator/messages/nav_state.hpp"
 #include "estimator/messages/noise_in_use.hpp"
@@ -169,6 +170,7 @@ class FullSmoother {
 
   Rig rig_;
   ImuNoise noise_;
+  GyroIntrinsics intrinsics_;
   FullSmootherSettings settings_;
   std::vector<Keyframe> keyframes_;
   std::map<TrackKey, Track> tracks_;

@@ -30,26 +30,29 @@ Eigen::Vector3d gravityVector(const ImuNoise& noise) { return {0, 0, -noise.grav
 }  // namespace
 
 bool imuFactor(const Preintegration& imu, const ImuNoise& noise, const BodyState& x_i, const BodyState& x_j,
-               const BodyState& lin_i, const BodyState& lin_j, MotionFactor& factor) {
+               const BodyState& lin_i, const BodyState& lin_j, MotionFactor& factor,
+               const GyroIntrinsicsState& intrinsics) {
   const double dt = imu.duration();
   if (!(dt > 0)) return false;
+  const Eigen::Vector3d bias_gyro = imu.biasFor(intrinsics.now(), x_i.bias_gyro);
+  const Eigen::Vector3d lin_bias_gyro = imu.biasFor(intrinsics.now(), lin_i.bias_gyro);
   const Eigen::Vector3d g = gravityVector(noise);
 
   const auto residual = [&](const BodyState& a, const BodyState& b) {
     const Eigen::Quaterniond R_b_w = a.T_world_body.rotation.conjugate();
     Vector9d r;
-    r << logSo3(imu.deltaRotation(a.bias_gyro).conjugate() * R_b_w * b.T_world_body.rotation),
+    r << logSo3(imu.deltaRotation(bias_gyro).conjugate() * R_b_w * b.T_world_body.rotation),
         R_b_w * (b.T_world_body.translation - a.T_world_body.translation - a.v_world_body * dt -
                  0.5 * dt * dt * g) -
-            imu.deltaPosition(a.bias_gyro, a.bias_accel),
-        R_b_w * (b.v_world_body - a.v_world_body - g * dt) - imu.deltaVelocity(a.bias_gyro, a.bias_accel);
+            imu.deltaPosition(bias_gyro, a.bias_accel),
+        R_b_w * (b.v_world_body - a.v_world_body - g * dt) - imu.deltaVelocity(bias_gyro, a.bias_accel);
     return r;
   };
   const Vector9d r = residual(x_i, x_j);
 
   const Eigen::Matrix3d R_i_t = lin_i.T_world_body.R().transpose();
   const Eigen::Matrix3d R_j = lin_j.T_world_body.R();
-  const Eigen::Vector3d r_phi = logSo3(imu.deltaRotation(lin_i.bias_gyro).conjugate() *
+  const Eigen::Vector3d r_phi = logSo3(imu.deltaRotation(lin_bias_gyro).conjugate() *
                                        lin_i.T_world_body.rotation.conjugate() * lin_j.T_world_body.rotation);
   const Eigen::Matrix3d jr_inverse = rightJacobianInverseSo3(r_phi);
   const Eigen::Vector3d moved = R_i_t * (lin_j.T_world_body.translation - lin_i.T_world_body.translation -
@@ -61,7 +64,7 @@ bool imuFactor(const Preintegration& imu, const ImuNoise& noise, const BodyState
   J_i.block<3, 3>(0, 0) = -jr_inverse * R_j.transpose() * R_i_t.transpose();
   const Eigen::Matrix3d gyro_to_phi = imu.jacobianGyro().topRows<3>();
   J_i.block<3, 3>(0, 9) = -jr_inverse * expSo3Matrix(r_phi).transpose() *
-                          rightJacobianSo3(gyro_to_phi * (lin_i.bias_gyro - imu.biasGyro())) * gyro_to_phi;
+                          rightJacobianSo3(gyro_to_phi * (lin_bias_gyro - imu.biasGyro())) * gyro_to_phi;
   J_j.block<3, 3>(0, 0) = jr_inverse;
   J_i.block<3, 3>(3, 0) = hat(moved);
   J_i.block<3, 3>(3, 3) = -R_i_t;
@@ -82,6 +85,13 @@ bool imuFactor(const Preintegration& imu, const ImuNoise& noise, const BodyState
   factor.residual.head<9>() = llt.matrixL().solve(r);
   factor.jacobian_i.topRows<9>() = llt.matrixL().solve(J_i);
   factor.jacobian_j.topRows<9>() = llt.matrixL().solve(J_j);
+  factor.with_gyro = intrinsics.active();
+  if (factor.with_gyro) {
+    for (int c = 0; c < 3; ++c) {
+      factor.jacobian_gyro_matrix.middleCols<3>(3 * c) =
+          imu.meanGyro()[c] * factor.jacobian_i.block<9, 3>(0, 9);
+    }
+  }
   biasWalk(dt, noise, x_i, x_j, factor);
   return true;
 }

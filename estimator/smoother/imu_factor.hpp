@@ -13,6 +13,7 @@
 
 #include "estimator/imu/imu_noise.hpp"
 #include "estimator/imu/preintegration.hpp"
+#include "estimator/smoother/gyro_intrinsics_state.hpp"
 #include "estimator/smoother/state.hpp"
 
 namespace swiftlet {
@@ -21,12 +22,16 @@ struct MotionFactor {
   Vector15d residual;
   Eigen::Matrix<double, 15, 15> jacobian_i;
   Eigen::Matrix<double, 15, 15> jacobian_j;
+  /// By the gyro's matrix, of the first nine rows; only where it is estimated.
+  Eigen::Matrix<double, 9, kGyroMatrixDim> jacobian_gyro_matrix;
+  bool with_gyro = false;
 };
 
 /// False when the covariance is not positive definite (an interval without duration).
 [[nodiscard]] bool imuFactor(const Preintegration& imu, const ImuNoise& noise, const BodyState& x_i,
                              const BodyState& x_j, const BodyState& linearization_i,
-                             const BodyState& linearization_j, MotionFactor& factor);
+                             const BodyState& linearization_j, MotionFactor& factor,
+                             const GyroIntrinsicsState& intrinsics = {false, 0});
 
 /// `duration`: s between the states. False unless positive.
 [[nodiscard]] bool constantVelocityFactor(double duration, const ImuNoise& noise, const BodyState& x_i,

@@ -38,7 +38,7 @@ void Marginalization::involve(WindowProblem& problem, const Departure& departure
   involved_.fill(false);
   if (slot_ != kNoSlot) involved_[slot_] = true;
   for (const PriorBlock& block : problem.prior.blocks()) {
-    if (block.slot != PriorBlock::kCalibration) involved_[block.slot] = true;
+    if (block.isState()) involved_[block.slot] = true;
   }
   if (departure.with_motion_factor) involved_[problem.window.order()[departure.position + 1]] = true;
   if (landmarks_of_ != kNoSlot) {
@@ -109,6 +109,9 @@ void Marginalization::expandAtReferences(const WindowProblem& problem, NormalEqu
   d.setZero();
   const int calibration = problem.calibration.dimension();
   d.head(calibration) = problem.calibration.deviation().head(calibration);
+  if (problem.intrinsics.estimated()) {
+    d.segment<kGyroMatrixDim>(problem.intrinsics.offset()) = problem.intrinsics.deviation();
+  }
   for (std::size_t e = 0; e < kMaxExtraStates; ++e) {
     const ExtraState& extra = problem.extras.states()[e];
     if (involved_[kMaxStates + e]) d.segment<kExtraDim>(extra.offset) = extra.deviation();
@@ -133,12 +136,14 @@ void Marginalization::eliminate(const WindowProblem& problem, NormalEquations& s
   const ColumnRange body{state_leaves ? problem.window.inSlot(slot_).offset + departure.first : 0,
                          departure.count};
   constexpr std::size_t kMaxRanges =
-      kMaxStates + 2 + (kMaxExtraStates * kExtraDim + kStateDim - 1) / kStateDim;
+      kMaxStates + 3 + (kMaxExtraStates * kExtraDim + kStateDim - 1) / kStateDim;
   FixedVector<ColumnRange, kMaxRanges> others;
   const int calibration = problem.calibration.dimension();
   if (calibration > 0) others.pushBack({0, calibration});
+  if (problem.intrinsics.estimated()) others.pushBack({problem.intrinsics.offset(), kGyroMatrixDim});
+  const int extras = calibration + problem.intrinsics.dimension();
   for (int c = 0; c < problem.extras.columns(); c += kStateDim) {
-    others.pushBack({calibration + c, std::min(kStateDim, problem.extras.columns() - c)});
+    others.pushBack({extras + c, std::min(kStateDim, problem.extras.columns() - c)});
   }
   for (const std::uint8_t slot : problem.window.order()) {
     if (!involved_[slot]) continue;
@@ -164,6 +169,7 @@ void Marginalization::writePrior(WindowProblem& problem, NormalEquations& system
   if (problem.calibration.dimension() > 0) {
     prior.addBlock(PriorBlock::kCalibration, problem.calibration.dimension(), {});
   }
+  if (problem.intrinsics.estimated()) prior.addBlock(PriorBlock::kGyroIntrinsics, kGyroMatrixDim, {});
   for (std::size_t e = 0; e < kMaxExtraStates; ++e) {
     if (!involved_[kMaxStates + e] || problem.extras.states()[e].leaving) continue;
     prior.addBlock(static_cast<std::uint8_t>(kMaxStates + e), kExtraDim, {});

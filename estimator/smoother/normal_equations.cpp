@@ -37,7 +37,8 @@ MatrixMap NormalEquations::H() { return alignedMap(h_, dimension_); }
 
 VectorMap NormalEquations::g() { return {g_.data(), dimension_}; }
 
-void NormalEquations::addMotion(const MotionFactor& factor, const WindowState& i, const WindowState& j) {
+void NormalEquations::addMotion(const MotionFactor& factor, const WindowState& i, const WindowState& j,
+                                int gyro_offset) {
   MatrixMap h = H();
   VectorMap gradient = g();
   h.block<15, 15>(i.offset, i.offset) += factor.jacobian_i.transpose() * factor.jacobian_i;
@@ -50,6 +51,12 @@ void NormalEquations::addMotion(const MotionFactor& factor, const WindowState& i
   gradient.segment<15>(i.offset) += factor.jacobian_i.transpose() * factor.residual;
   gradient.segment<15>(j.offset) += factor.jacobian_j.transpose() * factor.residual;
   cost_ += 0.5 * factor.residual.squaredNorm();
+  if (!factor.with_gyro) return;
+  const auto& J = factor.jacobian_gyro_matrix;
+  h.block<kGyroMatrixDim, kGyroMatrixDim>(gyro_offset, gyro_offset) += J.transpose() * J;
+  h.block<15, kGyroMatrixDim>(i.offset, gyro_offset) += factor.jacobian_i.topRows<9>().transpose() * J;
+  h.block<15, kGyroMatrixDim>(j.offset, gyro_offset) += factor.jacobian_j.topRows<9>().transpose() * J;
+  gradient.segment<kGyroMatrixDim>(gyro_offset) += J.transpose() * factor.residual.head<9>();
 }
 
 void NormalEquations::addDiagonal(const WindowState& state, int first, const Eigen::Vector3d& residual,

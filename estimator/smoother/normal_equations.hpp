@@ -45,8 +45,9 @@ class NormalEquations {
   /// there is no H. A factor is kept in this way without being copied.
   void swapMatrix(std::vector<double>& memory) { h_.swap(memory); }
 
-  /// Both states have all 15 columns.
-  void addMotion(const MotionFactor& factor, const WindowState& i, const WindowState& j);
+  /// Both states have all 15 columns; those of the intrinsics, where the factor has any, are from
+  /// `gyro_offset` on.
+  void addMotion(const MotionFactor& factor, const WindowState& i, const WindowState& j, int gyro_offset = 0);
 
   /// Information 1 / sigma^2 on three columns of one state, from `first` on: `residual` is their value
   /// minus its reference, in their unit, as is `sigma`.

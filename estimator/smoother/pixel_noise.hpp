@@ -15,8 +15,8 @@ namespace swiftlet {
 
 class PixelNoise {
  public:
-  /// From 0.45 px, the default: 2.7 px.
-  static constexpr double kMostRaised = 6.0;
+  /// From 0.45 px, the default: 6.75 px, as motion blur makes it.
+  static constexpr double kMostRaised = 15.0;
   /// Fewer sightings of a frame say nothing.
   static constexpr int kFewestSightings = 20;
 

@@ -16,24 +16,27 @@
 #include "estimator/smoother/calibration_columns.hpp"
 #include "estimator/smoother/cholesky.hpp"
 #include "estimator/smoother/extra_states.hpp"
+#include "estimator/smoother/gyro_intrinsics_state.hpp"
 #include "estimator/smoother/state.hpp"
 
 namespace swiftlet {
 
 inline constexpr int kMaxSystemDim = static_cast<int>(kMaxStates) * kStateDim + kMaxCalibrationDim +
-                                     static_cast<int>(kMaxExtraStates) * kExtraDim;
-/// Body states, extra states and the calibration.
-inline constexpr std::size_t kMaxPriorBlocks = kMaxStates + kMaxExtraStates + 1;
+                                     kGyroMatrixDim + static_cast<int>(kMaxExtraStates) * kExtraDim;
+/// Body states, extra states, the calibration and the gyro's intrinsics.
+inline constexpr std::size_t kMaxPriorBlocks = kMaxStates + kMaxExtraStates + 2;
 
 /// Columns of one state, body or extra, or of the calibration in the prior.
 struct PriorBlock {
   static constexpr std::uint8_t kCalibration = 255;
-  std::uint8_t slot = 0;  ///< of the state, extra ones from kMaxStates on, or kCalibration
+  static constexpr std::uint8_t kGyroIntrinsics = 254;
+  std::uint8_t slot = 0;  ///< of the state, extra ones from kMaxStates on, or one of the above
   int dimension = 0;      ///< a body state's first 6 or 15 columns, or all of the others
   int offset = 0;         ///< first column in H and b
   BodyState reference;    ///< of a body state; an extra state and the calibration have theirs with them
 
-  [[nodiscard]] bool isExtra() const { return slot >= kMaxStates && slot != kCalibration; }
+  [[nodiscard]] bool isState() const { return slot < kMaxStates + kMaxExtraStates; }
+  [[nodiscard]] bool isExtra() const { return isState() && slot >= kMaxStates; }
 };
 
 class Prior {

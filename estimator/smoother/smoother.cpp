@@ -12,7 +12,8 @@ namespace swiftlet {
 Smoother::Smoother(const Rig& rig, const ImuNoise& noise, const SmootherSettings& settings)
     : settings_(settings),
       pixel_noise_(settings.pixel_sigma),
-      problem_(rig, noise, settings.estimate_time_offset, settings.estimate_extrinsics) {}
+      problem_(rig, noise, settings.estimate_time_offset, settings.estimate_extrinsics,
+               settings.estimate_gyro) {}
 
 void Smoother::reset() {
   problem_.clear();
@@ -23,6 +24,7 @@ void Smoother::reset() {
 Status Smoother::step(const StepInput& input) {
   if (!started() && !start_) return {StatusCode::kNotReady, "no start state"};
   if (trim_due_) return {StatusCode::kInvalidInput, "the window has not been trimmed since the last step"};
+  problem_.intrinsics.setActive(input.move_gyro);
   addState(input);
   addSightings(*input.frame, input.max_features);
   const Status status =
@@ -50,7 +52,8 @@ void Smoother::addState(const StepInput& input) {
     linkState(state, window[window.size() - 2], input.imu_gap);
   }
   const auto samples = problem_.imu.around(state.stamp, state.stamp);
-  if (!samples.empty()) state.omega_body = samples.front().gyro - state.x.bias_gyro;
+  if (!samples.empty())
+    state.omega_body = problem_.intrinsics.now().rate(samples.front().gyro) - state.x.bias_gyro;
 }
 
 void Smoother::linkState(WindowState& state, const WindowState& previous, bool gap) const {
@@ -123,6 +126,7 @@ void Smoother::updateStatistics() {
   if (views > 0) statistics_.reprojection_rms = pixel_noise_.sigma() * std::sqrt(sum / views);
   WindowState& state = problem_.window.newest();
   MotionResiduals residuals = motionResiduals(problem_);
+  // It alone knows one camera's scale: a window that doubts it loses the scale, and doubts it the more.
   if (problem_.rig.camera_count == 1) residuals.accel = 0;
   statistics_.imu_residual = std::sqrt(residuals.all);
   statistics_.noise.imu = state.imu_factors;
@@ -169,6 +173,7 @@ CalibrationEstimate Smoother::calibration() {
   CalibrationEstimate estimate;
   estimate.camera_to_imu_shift = timeOffset();
   estimate.T_body_cam = problem_.calibration.T_body_cam();
+  estimate.gyro = problem_.intrinsics.now();
   const CalibrationLayout& layout = problem_.calibration.layout();
   CalibrationMatrix P;
   if (!covariance_.calibration(layout.dimension(), P)) {

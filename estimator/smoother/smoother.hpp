@@ -50,6 +50,7 @@ struct SmootherSettings {
   int max_keyframes = 12;                 ///< these and the pose-only ones; with max_recent below kMaxStates
   bool estimate_time_offset = false;      ///< camera to IMU clock
   bool estimate_extrinsics = false;       ///< T_body_cam of each camera
+  bool estimate_gyro = false;             ///< scale and misalignment of the gyro
 };
 
 /// A plane of the window.
@@ -80,7 +81,9 @@ class Smoother {
     const TrackedFrame* frame = nullptr;
     bool imu_gap = false;    ///< samples are missing since the previous frame
     std::uint32_t rest = 0;  ///< number of the rest at the frame (RestState); 0: in motion
-    int iterations = 2;      ///< at most
+    /// Where they are estimated, the gyro's intrinsics move with this step; else they are held.
+    bool move_gyro = true;
+    int iterations = 2;  ///< at most
     /// m, rad: a step in which no pose moves further is the last. It has changed Jacobians and robust weights
     /// by less than the noise shows, and the rest of a state enters linearly.
     double pose_tolerance = 1e-3;

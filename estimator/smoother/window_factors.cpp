@@ -21,10 +21,10 @@ bool motionFactor(const WindowProblem& problem, std::size_t position, MotionFact
   const WindowState& i = problem.window[position - 1];
   const WindowState& j = problem.window[position];
   if (!i.has_motion || !j.has_motion || j.link == LinkKind::kNone) return false;
-  return j.link == LinkKind::kImu
-             ? imuFactor(j.imu, problem.noise, i.x, j.x, i.linearization(), j.linearization(), factor)
-             : constantVelocityFactor(j.link_duration, problem.noise, i.x, j.x, i.linearization(),
-                                      j.linearization(), factor);
+  return j.link == LinkKind::kImu ? imuFactor(j.imu, problem.noise, i.x, j.x, i.linearization(),
+                                              j.linearization(), factor, problem.intrinsics)
+                                  : constantVelocityFactor(j.link_duration, problem.noise, i.x, j.x,
+                                                           i.linearization(), j.linearization(), factor);
 }
 
 // Residuals of one sensor, from newest to oldest. Errors that last show in sums over a second.
@@ -92,6 +92,8 @@ VectorMap priorDeviation(WindowProblem& problem, std::vector<double>& work) {
     if (block.slot == PriorBlock::kCalibration) {
       deviation.segment(block.offset, block.dimension) =
           problem.calibration.deviation().head(block.dimension);
+    } else if (block.slot == PriorBlock::kGyroIntrinsics) {
+      deviation.segment<kGyroMatrixDim>(block.offset) = problem.intrinsics.deviation();
     } else if (block.isExtra()) {
       deviation.segment<kExtraDim>(block.offset) =
           problem.extras.states()[block.slot - kMaxStates].deviation();
@@ -149,7 +151,7 @@ void addMotion(const WindowProblem& problem, std::size_t position, NormalEquatio
   if (position == 0 || !motionFactor(problem, position, factor)) return;
   const WindowState& i = problem.window[position - 1];
   const WindowState& j = problem.window[position];
-  system.addMotion(factor, i, j);
+  system.addMotion(factor, i, j, problem.intrinsics.offset());
   addRest(i, j, system);
 }
 

@@ -12,12 +12,13 @@ constexpr double kGaugeSigma = 1e-4;  // m, rad
 }  // namespace
 
 WindowProblem::WindowProblem(const Rig& given_rig, const ImuNoise& imu_noise, bool estimate_time_offset,
-                             bool estimate_extrinsics)
+                             bool estimate_extrinsics, bool estimate_gyro)
     : rig(given_rig),
       noise(imu_noise),
       imu(kImuCapacity),
       extras(landmarks),
-      calibration(given_rig, estimate_time_offset, estimate_extrinsics) {}
+      calibration(given_rig, estimate_time_offset, estimate_extrinsics),
+      intrinsics(estimate_gyro, calibration.dimension()) {}
 
 void WindowProblem::clear() {
   window.clear();
@@ -27,11 +28,12 @@ void WindowProblem::clear() {
 }
 
 void WindowProblem::assignOffsets() {
-  dimension = window.assignOffsets(extras.assignOffsets(calibration.dimension()));
+  dimension = window.assignOffsets(extras.assignOffsets(calibration.dimension() + intrinsics.dimension()));
 }
 
 int WindowProblem::offsetOf(std::uint8_t slot) const {
   if (slot == PriorBlock::kCalibration) return 0;
+  if (slot == PriorBlock::kGyroIntrinsics) return intrinsics.offset();
   return slot < kMaxStates ? window.inSlot(slot).offset : extras.states()[slot - kMaxStates].offset;
 }
 
@@ -65,11 +67,13 @@ LandmarkViews WindowProblem::viewsOf(std::span<const Sighting> sightings) const 
 void WindowProblem::startPrior(const StartState& start) {
   prior.begin();
   if (calibration.dimension() > 0) prior.addBlock(PriorBlock::kCalibration, calibration.dimension(), {});
+  if (intrinsics.estimated()) prior.addBlock(PriorBlock::kGyroIntrinsics, kGyroMatrixDim, {});
   prior.addBlock(window.newestSlot(), kStateDim, start.state);
   prior.allocate();
   MatrixMap H = prior.H();
   calibration.hold(H);
-  const int at = calibration.dimension();
+  intrinsics.hold(H);
+  const int at = calibration.dimension() + intrinsics.dimension();
   const double tilt = 1.0 / (start.tilt_sigma * start.tilt_sigma);
   const double gauge = 1.0 / (kGaugeSigma * kGaugeSigma);
   // The rotation error lives in body axes; the vertical there is R^T z.
@@ -85,6 +89,7 @@ void WindowProblem::startPrior(const StartState& start) {
 
 void WindowProblem::retract(const Eigen::Ref<const Eigen::VectorXd>& step) {
   calibration.retract(step);
+  intrinsics.retract(step);
   window.retract(step);
   extras.retract(step);
 }
@@ -93,17 +98,20 @@ void WindowProblem::backup() {
   window.backup();
   extras.backup();
   calibration.backup();
+  intrinsics.backup();
 }
 
 void WindowProblem::restore() {
   window.restore();
   calibration.restore();
+  intrinsics.restore();
   extras.restore();
 }
 
 void WindowProblem::integrateLink(WindowState& state, const WindowState& previous) const {
   state.imu_factors = imu_excess.factors();
-  state.imu = Preintegration(noise.times(state.imu_factors), previous.x.bias_gyro, previous.x.bias_accel);
+  state.imu = Preintegration(noise.times(state.imu_factors), previous.x.bias_gyro, previous.x.bias_accel,
+                             intrinsics.now());
   static_cast<void>(
       state.imu.integrate(imu.around(previous.stamp, state.stamp), previous.stamp, state.stamp));
 }

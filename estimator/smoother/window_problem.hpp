@@ -2,7 +2,7 @@
 // What the smoother's parts work on: states, landmarks, planes, calibration, prior, and where they stand in
 // the system. One thread; the parts take it by reference and keep nothing of it.
 //
-// Columns of a system: calibration, explicit landmarks and planes, states in order of time.
+// Columns of a system: calibration, gyro intrinsics, explicit landmarks and planes, states in order of time.
 
 #include <array>
 #include <cstdint>
@@ -12,6 +12,7 @@
 #include "estimator/imu/imu_noise.hpp"
 #include "estimator/smoother/calibration_state.hpp"
 #include "estimator/smoother/extra_table.hpp"
+#include "estimator/smoother/gyro_intrinsics_state.hpp"
 #include "estimator/smoother/imu_buffer.hpp"
 #include "estimator/smoother/imu_excess.hpp"
 #include "estimator/smoother/landmark_table.hpp"
@@ -33,7 +34,7 @@ struct StartState {
 
 struct WindowProblem {
   WindowProblem(const Rig& given_rig, const ImuNoise& imu_noise, bool estimate_time_offset,
-                bool estimate_extrinsics);
+                bool estimate_extrinsics, bool estimate_gyro);
 
   Rig rig;
   ImuNoise noise;        ///< as told
@@ -43,6 +44,7 @@ struct WindowProblem {
   LandmarkTable landmarks;
   ExtraTable extras;
   CalibrationState calibration;
+  GyroIntrinsicsState intrinsics;
   Prior prior;
   std::array<RigPose, kMaxStates> rig_poses;  ///< by slot, as last placed
   std::uint64_t oldest_recent_frame = 0;      ///< a landmark not seen since is out of sight

@@ -68,7 +68,8 @@ void WindowSolver::reintegrate(WindowProblem& problem) const {
     WindowState& state = window[k];
     const WindowState& previous = window[k - 1];
     if (!previous.has_motion || state.link != LinkKind::kImu) continue;
-    const bool moved = (previous.x.bias_gyro - state.imu.biasGyro()).norm() > kReintegrateGyro ||
+    const Eigen::Vector3d gyro = state.imu.biasFor(problem.intrinsics.now(), previous.x.bias_gyro);
+    const bool moved = (gyro - state.imu.biasGyro()).norm() > kReintegrateGyro ||
                        (previous.x.bias_accel - state.imu.biasAccel()).norm() > kReintegrateAccel;
     // The newest interval but one ended without the sample behind its last image.
     if (moved || k + 2 == window.size()) problem.integrateLink(state, previous);
@@ -191,7 +192,8 @@ Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, Wind
     substitutePoints(problem, step);
     problem.retract(step);
     statistics.iterations = iteration + 1;
-    unchecked = largestStep(step, time_offset, calibration, problem.extras.columns()) >= kConverged &&
+    unchecked = largestStep(step, time_offset, calibration,
+                            problem.intrinsics.dimension() + problem.extras.columns()) >= kConverged &&
                 largestPoseStep(step, problem.window) >= pose_tolerance;
     if (!unchecked) break;
   }

@@ -20,6 +20,7 @@ constexpr double kDegrees = 180.0 / M_PI;
 constexpr double kWorthTelling = 0.05;  // of the run's time
 constexpr double kNoisyTracks = 1.5;    // of the noise set
 constexpr double kNoisyImu = 1.5;       // likewise
+constexpr double kBentGyro = 0.01;      // of a reading: two sigmas of a sensor as it leaves the factory
 
 /// What to look at first.
 const char* remedy(Doubt doubt) {
@@ -103,6 +104,12 @@ Json RunVerdict::json() const {
   json["mean_pixel_sigma_px"] = mean(pixel_sigma_s_);
   json["mean_gyro_factor"] = mean(gyro_factor_s_);
   json["mean_accel_factor"] = mean(accel_factor_s_);
+  if (calibration_ && !calibration_->gyro.matrix.isZero()) {
+    Json rows = Json::array();
+    const Eigen::Matrix3d& M = calibration_->gyro.matrix;
+    for (int r = 0; r < 3; ++r) rows.push_back({M(r, 0), M(r, 1), M(r, 2)});
+    json["gyro_matrix"] = rows;
+  }
   if (estimatedCalibration() == nullptr) return json;
   const CalibrationEstimate& c = *calibration_;
   Json estimate = Json::object();
@@ -145,13 +152,19 @@ std::vector<std::string> RunVerdict::words() const {
                     "calibration, rolling shutter, stamps or motion blur",
                     mean(pixel_sigma_s_), least_pixel_sigma_));
   }
-  for (const auto& [sensor, sum] :
-       {std::pair("gyro", gyro_factor_s_), std::pair("accelerometer", accel_factor_s_)}) {
+  for (const auto& [sensor, sum] : {std::pair("gyro", gyro_factor_s_), std::pair("accel", accel_factor_s_)}) {
     if (mean(sum) < kNoisyImu) continue;
+    words.push_back(fmt::format(
+        "  the {} errs {:.1f} times as much as its density and imu.{}_inflation say: vibration, or a "
+        "density too small",
+        sensor, mean(sum), sensor));
+  }
+  const double bent = calibration_ ? calibration_->gyro.matrix.cwiseAbs().maxCoeff() : 0;
+  if (bent > kBentGyro) {
     words.push_back(
-        fmt::format("  the {} errs {:.1f} times as much as it is told to: scale, misalignment, vibration, "
-                    "densities too small",
-                    sensor, mean(sum)));
+        fmt::format("  the gyro's scale or axes are off by up to {:.1f} %, as estimated: its "
+                    "calibration, or that of the cameras",
+                    100 * bent));
   }
   for (const auto& [doubt, seconds] : by_doubt_) {
     if (seconds < kWorthTelling * seconds_) continue;

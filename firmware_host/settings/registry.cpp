@@ -132,6 +132,8 @@ std::vector<Setting> estimationSettings() {
        onOff(kOdometry, &O::estimate_time_offset)},
       {"smoother.estimate_extrinsics", "", "Estimate how the cameras sit on the IMU in flight.",
        onOff(kOdometry, &O::estimate_extrinsics)},
+      {"smoother.estimate_gyro", "", "Estimate scale and misalignment of the gyro in flight.",
+       onOff(kOdometry, &O::estimate_gyro)},
       {"regularity.enabled", "", "Tie landmarks to the floors and walls that the mesher finds.",
        onOff(kOdometry, &O::regularity_enabled)},
       {"regularity.point_sigma", "m", "By which a point of a wall is off its plane, 1 sigma.",

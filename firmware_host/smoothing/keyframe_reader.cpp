@@ -19,6 +19,7 @@ using namespace keyframe_file;  // NOLINT(google-build-using-namespace)
 constexpr const char* kRemedy = "Give the folder of a run with smoother.horizon: full";
 constexpr double kLargestSigma = 1000;   // px; the setting allows 10, a flight raises it 6 times
 constexpr double kLargestFactor = 1000;  // a flight shows 30
+constexpr double kLargestGyroMatrix = 1;
 /// Beyond these, differences of stamps would not fit; calibrations with a shift above 1 s are refused.
 constexpr std::int64_t kMostStamp = std::int64_t{1} << 61U;  // ns, 73 years
 constexpr Duration kMostShift = Duration::fromSeconds(10);
@@ -222,7 +223,8 @@ bool KeyframeReader::decodeCalibration() {
   calibration_.camera_to_imu_shift.ns = from.i64();
   bool good = sane(calibration_.camera_to_imu_shift);
   for (SE3& T : calibration_.T_body_cam) good = getPose(from, T) && good;
-  return good;
+  for (double& entry : calibration_.gyro.matrix.reshaped<Eigen::RowMajor>()) entry = from.f64();
+  return good && calibration_.gyro.matrix.allFinite() && calibration_.gyro.matrix.norm() < kLargestGyroMatrix;
 }
 
 }  // namespace swiftlet

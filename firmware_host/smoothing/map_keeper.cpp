@@ -42,7 +42,8 @@ void put(LittleEndianWriter& to, TrackId id, const std::array<bool, kMaxCameras>
 MapKeeper::MapKeeper(const std::string& folder, const Rig& rig, const ImuNoise& noise,
                      const OdometrySettings& settings, LostFiles& lost)
     : path_(folder + "/" + kKeyframeFile),
-      calibration_estimated_(settings.estimate_time_offset || settings.estimate_extrinsics),
+      calibration_estimated_(settings.estimate_time_offset || settings.estimate_extrinsics ||
+                             settings.estimate_gyro),
       lost_(lost),
       monitor_(noise),
       buffer_(kBufferBytes),
@@ -131,6 +132,7 @@ void MapKeeper::addCalibration(const CalibrationEstimate& calibration) {
   LittleEndianWriter to(record_.data() + kRecordBytes);
   to.i64(calibration.camera_to_imu_shift.ns);
   for (const SE3& T : calibration.T_body_cam) put(to, T);
+  for (const double entry : calibration.gyro.matrix.reshaped<Eigen::RowMajor>()) to.f64(entry);
   writeRecord(Kind::kCalibration, to.written());
 }
 

@@ -77,10 +77,19 @@ CalibrationEstimate calibrationOf(int k) {
   calibration.camera_to_imu_shift.ns = -1234567 + k;
   calibration.T_body_cam[0] = stateOf(k).T_world_body;
   calibration.T_body_cam[1].translation = {0.1, 1.0 / 3.0, 1e-3 * k};
+  calibration.gyro.matrix(2, 1) = 1e-2 / 3.0 * k;
   return calibration;
 }
 
-std::string kept(const std::string& folder, bool finished = true, const OdometrySettings& settings = {}) {
+/// Nothing of the calibration is estimated.
+OdometrySettings givenCalibration() {
+  OdometrySettings settings;
+  settings.estimate_gyro = false;
+  return settings;
+}
+
+std::string kept(const std::string& folder, bool finished = true,
+                 const OdometrySettings& settings = givenCalibration()) {
   LostFiles lost;
   ImuNoise noise;
   noise.rate_hz = 200;
@@ -190,7 +199,7 @@ TEST_CASE("the calibration's estimate comes back with each keyframe where there 
   const ScratchFolder folder("keyframes");
   CHECK(countsIn(kept(folder.path())).calibrations == 0);
   for (const bool time_offset : {true, false}) {
-    OdometrySettings settings;
+    OdometrySettings settings = givenCalibration();
     settings.estimate_time_offset = time_offset;
     settings.estimate_extrinsics = !time_offset;
     const std::string bytes = kept(folder.path(), true, settings);
@@ -208,6 +217,7 @@ TEST_CASE("the calibration's estimate comes back with each keyframe where there 
               expected.T_body_cam[c].rotation.coeffs());
         CHECK(reader.calibration().T_body_cam[c].translation == expected.T_body_cam[c].translation);
       }
+      CHECK(reader.calibration().gyro.matrix == expected.gyro.matrix);
       REQUIRE(reader.next() == KeyframeReader::Next::kKeyframe);
     }
   }

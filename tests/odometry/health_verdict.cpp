@@ -76,7 +76,7 @@ HealthVerdict judgeHealth(const std::vector<RunFrame>& frames, double rest, RigF
 void writeFramesHeader(std::FILE* csv) {
   std::fputs(
       "run,fault,mono,t,epoch,health,dv,dscale,dtilt,sv,sr,sbg,sba,speed,tracks,landmarks,mono_in,stereo_in,"
-      "rms,imu,length,rest,iterations,fs,fss,doubt,known,pixel_sigma\n",
+      "rms,imu,length,rest,iterations,fs,fss,doubt,known,pixel_sigma,gyro_factor,accel_factor\n",
       csv);
 }
 
@@ -91,14 +91,15 @@ void writeFrames(std::FILE* csv, int run, const std::vector<RunFrame>& frames, R
     char line[400];
     std::snprintf(line, sizeof line,
                   "%d,%s,%d,%.2f,%u,%d,%.3f,%.3f,%.4f,%.4f,%.4f,%.5f,%.4f,%.4f,%d,%d,%d,%d,%.3f,%.2f,%.1f,%d,"
-                  "%d,%.4f,%.4f,%d,%d,%.3f\n",
+                  "%d,%.4f,%.4f,%d,%d,%.3f,%.2f,%.2f\n",
                   run, kRigFaultNames[static_cast<std::size_t>(fault)], mono, f.seconds, f.state.epoch,
                   static_cast<int>(f.state.health), velocityError(f), scaleError(frames, k), tiltError(f),
                   sigma(6), sigma(0), sigma(9), sigma(12), f.state.v_world_body.norm(), f.statistics.tracks,
                   f.statistics.landmarks, f.statistics.inliers_mono, f.statistics.inliers_stereo,
                   f.statistics.reprojection_rms, f.statistics.imu_residual, f.statistics.track_length,
                   f.statistics.at_rest, f.statistics.iterations, f.statistics.scale, f.statistics.scale_sigma,
-                  static_cast<int>(f.doubt), f.statistics.known, f.statistics.noise.pixel_sigma);
+                  static_cast<int>(f.doubt), f.statistics.known, f.statistics.noise.pixel_sigma,
+                  f.statistics.noise.imu.gyro, f.statistics.noise.imu.accel);
     lines += line;
   }
   static std::mutex mutex;

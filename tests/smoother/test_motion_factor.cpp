@@ -7,6 +7,7 @@
 
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
+#include "estimator/smoother/gyro_intrinsics_state.hpp"
 #include "estimator/smoother/imu_factor.hpp"
 #include "tests/support/numeric_jacobian.hpp"
 
@@ -134,6 +135,63 @@ TEST_CASE("IMU factor: Jacobians in every block, biases off the increment's", "[
                        MotionFactor& f) { return imuFactor(imu, noise, a, b, a, b, f); },
                    x_i, x_j);
   }
+}
+
+TEST_CASE("IMU factor: Jacobian by the gyro's matrix", "[smoother][imu_factor]") {
+  const ImuNoise noise;
+  Random random(11);
+  using Matrix = GyroIntrinsicsState::Vector;
+  const auto plus = [](const GyroIntrinsicsState& matrix, const Matrix& step) {
+    GyroIntrinsicsState moved = matrix;
+    moved.retract(step);
+    return moved;
+  };
+  const auto minus = [](const Vector9d& a, const Vector9d& b) { return Vector9d(a - b); };
+  for (int trial = 0; trial < 10; ++trial) {
+    INFO("trial " << trial);
+    const BodyState x_i = randomState(random);
+    const Preintegration imu = livelyIncrement(noise, x_i.bias_gyro, x_i.bias_accel, random);
+    const BodyState x_j = reached(x_i, imu, noise, random, 0.01);
+    const auto residual = [&](const GyroIntrinsicsState& matrix) {
+      MotionFactor f;
+      REQUIRE(imuFactor(imu, noise, x_i, x_j, x_i, x_j, f, matrix));
+      return Vector9d(f.residual.head<9>());
+    };
+    Matrix step;
+    for (int k = 0; k < kGyroMatrixDim; ++k) step[k] = 5e-3 * random.normal();
+    const GyroIntrinsicsState at = plus(GyroIntrinsicsState(true, 0), step);
+    MotionFactor factor;
+    REQUIRE(imuFactor(imu, noise, x_i, x_j, x_i, x_j, factor, at));
+    REQUIRE(factor.with_gyro);
+    const auto J = numericJacobian<9, kGyroMatrixDim>(residual, at, plus, minus);
+    CHECK(relativeDifference(factor.jacobian_gyro_matrix, J) < kJacobianTolerance);
+  }
+}
+
+TEST_CASE("IMU factor: a gyro's matrix acts on an increment as it does on its samples",
+          "[smoother][imu_factor]") {
+  Random random(12);
+  const Eigen::Vector3d bias = randomVector(random, 0.02);
+  GyroIntrinsics wrong;
+  for (double& entry : wrong.matrix.reshaped()) entry = 5e-3 * random.normal();
+  Preintegration given(ImuNoise{}, bias, Eigen::Vector3d::Zero());
+  Preintegration corrected(ImuNoise{}, bias, Eigen::Vector3d::Zero(), wrong);
+  for (int k = 0; k < 200; ++k) {
+    const Eigen::Vector3d gyro = Eigen::Vector3d(0.4, -0.8, 1.5) + randomVector(random, 0.5);
+    const Eigen::Vector3d accel = Eigen::Vector3d(9.0, 2.0, -3.0) + randomVector(random, 1.0);
+    given.integrate(0.005, gyro, accel);
+    corrected.integrate(0.005, gyro, accel);
+  }
+  const Eigen::Vector3d at = given.biasFor(wrong, bias);
+  const auto turn = [](const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
+    return a.angularDistance(b);
+  };
+  const double effect = turn(given.deltaRotation(), corrected.deltaRotation());
+  CHECK(effect > 3e-3);
+  CHECK(turn(given.deltaRotation(at), corrected.deltaRotation()) < 0.05 * effect);
+  CHECK((given.deltaVelocity(at, Eigen::Vector3d::Zero()) - corrected.deltaVelocity()).norm() <
+        0.05 * (given.deltaVelocity() - corrected.deltaVelocity()).norm());
+  CHECK(turn(corrected.deltaRotation(corrected.biasFor(wrong, bias)), corrected.deltaRotation()) < 1e-12);
 }
 
 TEST_CASE("IMU factor: residual at the values, Jacobians at the linearization", "[smoother][imu_factor]") {

@@ -261,7 +261,8 @@ TEST_CASE("Motion and diagonal factors land in their columns", "[smoother][norma
   for (const bool swapped : {false, true}) {
     system->begin(w.calibration, w.dimension);
     if (swapped) {
-      const MotionFactor turned{factor.residual, factor.jacobian_j, factor.jacobian_i};
+      MotionFactor turned = factor;
+      std::swap(turned.jacobian_i, turned.jacobian_j);
       system->addMotion(turned, j, i);
     } else {
       system->addMotion(factor, i, j);

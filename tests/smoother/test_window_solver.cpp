@@ -38,7 +38,7 @@ struct Scene {
     Random random(seed, 21);
     const Rig rig = makeRig(RigKind::kEuroc).rig;
     const WindowScene truth = test::sceneAround(rig, kStates, 0.5, random);
-    problem = std::make_unique<WindowProblem>(rig, ImuNoise{}, false, false);
+    problem = std::make_unique<WindowProblem>(rig, ImuNoise{}, false, false, false);
     for (std::size_t k = 0; k <= kStates; ++k) {
       WindowState& state = problem->window.inSlot(problem->window.add());
       state.x = truth.states[std::min(k, kStates - 1)];

@@ -39,7 +39,8 @@ std::size_t worstSighting(const Eigen::Vector3d& point, const std::vector<Eigen:
 
 GivenPoseWindow::GivenPoseWindow(const Rig& rig, const GivenPoseSettings& settings)
     : rig_(rig), settings_(settings) {
-  window_.calibration = {.camera_to_imu_shift = rig.camera_to_imu_shift, .T_body_cam = rig.T_body_cam};
+  window_.calibration.camera_to_imu_shift = rig.camera_to_imu_shift;
+  window_.calibration.T_body_cam = rig.T_body_cam;
 }
 
 void GivenPoseWindow::startEpoch() {

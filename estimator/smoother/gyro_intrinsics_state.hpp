@@ -1,0 +1,58 @@
+#pragma once
+// Scale and misalignment of the gyro as the window holds them: zero, or with columns of their own and
+// estimated.
+//
+// Nine columns, the matrix by columns, behind those of the cameras' calibration. The prior's reference is the
+// value of `hold`. Turns that do not excite an entry leave it at the prior: it then adds to the covariance
+// what it may be off.
+
+#include <Eigen/Core>
+
+#include "estimator/messages/gyro_intrinsics.hpp"
+#include "estimator/smoother/cholesky.hpp"
+
+namespace swiftlet {
+
+inline constexpr int kGyroMatrixDim = 9;
+
+class GyroIntrinsicsState {
+ public:
+  using Vector = Eigen::Matrix<double, kGyroMatrixDim, 1>;
+
+  /// `offset`: its first column in every system.
+  GyroIntrinsicsState(bool estimated, int offset) : estimated_(estimated), offset_(offset) {}
+
+  [[nodiscard]] bool estimated() const { return estimated_; }
+  /// Motion moves them, where they are estimated; else they are held.
+  void setActive(bool active) { active_ = active; }
+  [[nodiscard]] bool active() const { return estimated_ && active_; }
+  [[nodiscard]] int offset() const { return offset_; }
+  [[nodiscard]] int dimension() const { return estimated_ ? kGyroMatrixDim : 0; }
+  [[nodiscard]] const GyroIntrinsics& now() const { return now_; }
+
+  /// The value of now becomes the reference, and H, of a new prior, gets what is known beforehand.
+  void hold(MatrixMap H) {
+    reference_ = now_;
+    for (int k = 0; k < dimension(); ++k) {
+      H(offset_ + k, offset_ + k) = 1.0 / (kGyroMatrixPriorSigma * kGyroMatrixPriorSigma);
+    }
+  }
+  /// Value minus reference.
+  [[nodiscard]] Vector deviation() const { return (now_.matrix - reference_.matrix).reshaped(); }
+  /// By its columns of a system's step.
+  void retract(const Eigen::Ref<const Eigen::VectorXd>& step) {
+    if (estimated_) now_.matrix.reshaped() += step.segment<kGyroMatrixDim>(offset_);
+  }
+  void backup() { backup_ = now_; }
+  void restore() { now_ = backup_; }
+
+ private:
+  bool estimated_;
+  bool active_ = true;
+  int offset_;
+  GyroIntrinsics now_;
+  GyroIntrinsics reference_;
+  GyroIntrinsics backup_;
+};
+
+}  // namespace swiftlet
