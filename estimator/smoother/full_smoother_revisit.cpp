@@ -108,7 +108,8 @@ void FullSmoother::addMatch(const RevisitMatch& match, Revisit& revisit) {
     if (at == track->second.sightings.end()) return;
     made.sighting = *at;
     for (CameraSighting& view : made.sighting.camera) {
-      if (view.used) view.weight *= static_cast<float>(keyframes_[new_keyframe].noise.pixel_sigma / settings_.match_sigma);
+      if (view.used)
+        view.weight *= static_cast<float>(keyframes_[new_keyframe].noise.pixel_sigma / settings_.match_sigma);
     }
   }
   if (!findOldTrack(revisit.old_keyframe, match.old_feature, made.track)) return;

@@ -3,10 +3,9 @@
 //
 // Vibration, g-sensitivity, scale and misalignment are in no data sheet's noise density; weighted as if they
 // were not there, they pull the estimate from the images. How large they are shows in what IMU and images
-// disagree by after smoothing (motionResiduals). Smoothing takes its part: with a noise f times as told, a share
-// f^2 / (f^2 + kImages) of a link's mean square is left, kImages being what the images leave open of it, in
-// variances of the noise as told. The factor only raises the noise, as a low pass.
-// O(1), no memory.
+// disagree by after smoothing (motionResiduals). Smoothing takes its part: with a noise f times as told, a
+// share f^2 / (f^2 + kImages) of a link's mean square is left, kImages being what the images leave open of
+// it, in variances of the noise as told. The factor only raises the noise, as a low pass. O(1), no memory.
 
 #include <algorithm>
 #include <cmath>
@@ -37,7 +36,7 @@ class ImuExcess {
  private:
   static void update(double mean_square, double seconds, double& factor) {
     constexpr double kAverageTime = 2.0;  // s
-    constexpr double kImages = 3.0;       // a quarter is left at f = 1; 0.12 to 0.19 of noise as told were seen
+    constexpr double kImages = 3.0;  // a quarter is left at f = 1; 0.12 to 0.19 of noise as told were seen
     const double square = factor * factor;
     const double now = std::clamp(mean_square * (1 + kImages / square), 1.0, kMostRaised * kMostRaised);
     factor = std::sqrt(square + (1 - std::exp(-seconds / kAverageTime)) * (now - square));
