@@ -3,8 +3,8 @@
 // estimated.
 //
 // Nine columns, the matrix by columns, behind those of the cameras' calibration. The prior's reference is the
-// value of `hold`. Turns that do not excite an entry leave it at the prior: it then adds to the covariance
-// what it may be off.
+// value of `hold`. Turns that do not excite an entry leave it at the prior, and the covariance includes what
+// it may be off. While the matrix is held, it adds nothing to the covariance.
 
 #include <Eigen/Core>
 
@@ -23,7 +23,7 @@ class GyroIntrinsicsState {
   GyroIntrinsicsState(bool estimated, int offset) : estimated_(estimated), offset_(offset) {}
 
   [[nodiscard]] bool estimated() const { return estimated_; }
-  /// Motion moves them, where they are estimated; else they are held.
+  /// Active: motion moves the matrix, where it is estimated. Else it is held.
   void setActive(bool active) { active_ = active; }
   [[nodiscard]] bool active() const { return estimated_ && active_; }
   [[nodiscard]] int offset() const { return offset_; }

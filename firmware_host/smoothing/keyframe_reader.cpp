@@ -17,7 +17,7 @@ namespace {
 using namespace keyframe_file;  // NOLINT(google-build-using-namespace)
 
 constexpr const char* kRemedy = "Give the folder of a run with smoother.horizon: full";
-constexpr double kLargestSigma = 1000;   // px; the setting allows 10, a flight raises it 6 times
+constexpr double kLargestSigma = 1000;   // px; the setting allows 10, a flight raises it 15 times
 constexpr double kLargestFactor = 1000;  // a flight shows 30
 constexpr double kLargestGyroMatrix = 1;
 /// Beyond these, differences of stamps would not fit; calibrations with a shift above 1 s are refused.
