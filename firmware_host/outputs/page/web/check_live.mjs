@@ -13,7 +13,9 @@ await inBrowser(executablePath, async (context, faults) => {
   watch(page, faults, (asked) => asked.startsWith(url), () => ended);
   await page.goto(url);
   await page.waitForFunction(() => window.swiftletReport?.ready && window.swiftletReport.live.state === 'live'
-    && window.swiftletReport.live.patches > 3, null, { timeout: 60000 });
+    && window.swiftletReport.live.patches > 3
+    // Before the first pose there is nothing to plot.
+    && Object.values(window.swiftletReport.figures()[0].plots).every((points) => points > 0), null, { timeout: 60000 });
   const early = await figures(page);
   const begun = await page.evaluate(() => window.swiftletReport.live.patches);
   await page.waitForFunction((n) => window.swiftletReport.live.patches > n + 8, begun, { timeout: 60000 });
