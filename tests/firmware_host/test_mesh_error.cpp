@@ -237,47 +237,57 @@ TEST_CASE("completeness of half a wall, and the hull's share of the image") {
   Alignment motion;
   motion.T_to_from = T;
   const MeshDistance moved_truth(moved(wall, motion));
-  const SeenSurface seen = seenSurface(grid, rectangle(-1, -1, 640, 480), T, moved_truth);
+  const SeenSurface seen = seenSurface(grid, rectangle(-1, -1, 640, 480), T, &moved_truth);
   CHECK(seen.polygon_share == 1);
-  CHECK(seen.points.size() == grid.pixels());
+  CHECK(seen.rays.size() == grid.pixels());
 
   // At 2 m the image is 4 m wide. Mesh on the left half covers 0.1 m of the right one too.
   TriangleMesh half;
   addQuad(half, {-10, -10, 2}, {10, 0, 0}, {0, 20, 0});
-  const Completeness share = completenessOf(seen.points, MeshDistance(moved(half, motion)));
+  const Completeness share = completenessOf(seen, MeshDistance(moved(half, motion)), &moved_truth);
   CHECK(share.share() == Approx(0.525).margin(0.5 / 80));
   CHECK(share.areaShare() == Approx(share.share()).epsilon(1e-3));
   CHECK(share.seen_area == Approx(12).epsilon(0.001));
+  CHECK(share.drawnShare() == Approx(0.5).margin(0.5 / 80));
+  CHECK(share.relativeRmse() < 1e-6);
   // 3 cm in front all of it is covered, 11 cm in front nothing; without mesh nothing.
   TriangleMesh front;
   addQuad(front, {-10, -10, 1.97}, {20, 0, 0}, {0, 20, 0});
-  CHECK(completenessOf(seen.points, MeshDistance(moved(front, motion))).share() == 1);
+  CHECK(completenessOf(seen, MeshDistance(moved(front, motion)), &moved_truth).share() == 1);
+  // Points at 1.97 m and more from the camera; rays in proportion to the tangent of the angle.
+  double squares = 0;
+  for (const SeenRay& ray : seen.rays) squares += std::pow(0.03 / (1.97 / 2 * ray.distance), 2);
+  CHECK(completenessOf(seen, MeshDistance(moved(front, motion)), &moved_truth).relativeRmse() ==
+        Approx(std::sqrt(squares / static_cast<double>(seen.rays.size()))).epsilon(1e-4));
   for (Eigen::Vector3f& p : front.vertices) p.z() = 1.89f;
-  CHECK(completenessOf(seen.points, MeshDistance(moved(front, motion))).share() == 0);
-  CHECK(completenessOf(seen.points, MeshDistance(TriangleMesh())).share() == 0);
+  CHECK(completenessOf(seen, MeshDistance(moved(front, motion)), &moved_truth).share() == 0);
+  CHECK(completenessOf(seen, MeshDistance(TriangleMesh()), nullptr).share() == 0);
 
-  CHECK(seenSurface(grid, rectangle(0, 0, 320, 240), SE3(), truth).polygon_share == 0.25);
+  CHECK(seenSurface(grid, rectangle(0, 0, 320, 240), SE3(), &truth).polygon_share == 0.25);
   std::vector<Eigen::Vector2f> turned = rectangle(0, 0, 320, 240);
   std::reverse(turned.begin(), turned.end());
-  CHECK(seenSurface(grid, turned, SE3(), truth).polygon_share == 0.25);
+  CHECK(seenSurface(grid, turned, SE3(), &truth).polygon_share == 0.25);
   const std::vector<Eigen::Vector2f> triangle = {{-8, -8}, {648, -8}, {-8, 488}};
-  CHECK(seenSurface(grid, triangle, SE3(), truth).polygon_share == Approx(0.5).margin(0.02));
+  CHECK(seenSurface(grid, triangle, SE3(), &truth).polygon_share == Approx(0.5).margin(0.02));
   turned.resize(2);
-  CHECK(seenSurface(grid, turned, SE3(), truth).polygon_share == 0);
-  CHECK(seenSurface(grid, {}, SE3(), truth).points.empty());
+  CHECK(seenSurface(grid, turned, SE3(), &truth).polygon_share == 0);
+  CHECK(seenSurface(grid, {}, SE3(), &truth).rays.empty());
   // A camera that looks away sees nothing of it.
-  CHECK(seenSurface(grid, rectangle(0, 0, 320, 240), SE3(expSo3({kPi, 0, 0}), {0, 0, 0}), truth)
-            .points.empty());
+  const SeenSurface away =
+      seenSurface(grid, rectangle(0, 0, 320, 240), SE3(expSo3({kPi, 0, 0}), {0, 0, 0}), &truth);
+  CHECK(away.rays.size() == grid.pixels() / 4);
+  CHECK(completenessOf(away, MeshDistance(wall), nullptr).seen == 0);
 }
 
 TEST_CASE("points weigh the surface that they stand for") {
   // The wall z = 2 + x, seen through |x / z|, |y / z| < 1/2: 8 / sqrt(2) * (2 - 2/9) m^2 of it.
   TriangleMesh wall;
   addQuad(wall, {-20, -20, -18}, {40, 0, 40}, {0, 40, 0});
+  const MeshDistance truth(wall);
   const SeenSurface seen =
-      seenSurface(RayGrid(pinhole(), 4), rectangle(159.5, 79.5, 479.5, 399.5), SE3(), MeshDistance(wall));
+      seenSurface(RayGrid(pinhole(), 4), rectangle(159.5, 79.5, 479.5, 399.5), SE3(), &truth);
   double area = 0;
-  for (const SeenPoint& point : seen.points) area += point.area;
+  for (const SeenRay& ray : seen.rays) area += ray.area;
   CHECK(area == Approx(8 / std::sqrt(2.0) * (2 - 2.0 / 9)).epsilon(0.01));
 }
 
@@ -286,14 +296,14 @@ TEST_CASE("a sequence pools its meshes by area and its frames by pixel") {
   addQuad(wall, {-10, -10, 2}, {20, 0, 0}, {0, 20, 0}, 3);
   const TrueSurface truth(wall);
   const RayGrid grid(pinhole(), 8);
-  MeshSequence sequence(truth, kSurfaceDensity);
+  MeshSequence sequence(&truth, kSurfaceDensity);
   TriangleMesh large;
   addQuad(large, {-10, -10, 2.02}, {20, 0, 0}, {0, 20, 0}, 3);
   TriangleMesh small;
   addQuad(small, {-0.5, -0.5, 2.08}, {1, 0, 0}, {0, 1, 0}, 4);
-  sequence.add(large, seenSurface(grid, rectangle(0, 0, 320, 480), SE3(), truth.distance()));
-  sequence.add(small, seenSurface(grid, rectangle(-1, -1, 640, 480), SE3(), truth.distance()));
-  sequence.add({}, seenSurface(grid, rectangle(0, 0, 320, 480), SE3(), truth.distance()));
+  sequence.add(large, seenSurface(grid, rectangle(0, 0, 320, 480), SE3(), &truth.distance()));
+  sequence.add(small, seenSurface(grid, rectangle(-1, -1, 640, 480), SE3(), &truth.distance()));
+  sequence.add({}, seenSurface(grid, rectangle(0, 0, 320, 480), SE3(), &truth.distance()));
   const MeshSequenceAccuracy result = sequence.result();
   CHECK(result.meshes == 3);
   CHECK(result.empty == 1);

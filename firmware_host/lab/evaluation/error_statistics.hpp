@@ -1,6 +1,7 @@
 #pragma once
 // evo's statistics of a list of errors: rmse, mean, median, std (population), min, max, sse.
 
+#include <cstddef>
 #include <vector>
 
 namespace swiftlet {
@@ -15,6 +16,11 @@ struct ErrorStatistics {
   double max = 0;
   double sse = 0;
 };
+
+/// 0 of nothing.
+inline double shareOf(std::size_t part, std::size_t whole) {
+  return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
+}
 
 /// All zero for an empty list.
 ErrorStatistics statisticsOf(std::vector<double> errors);

@@ -34,25 +34,30 @@ Fit fitOf(const Trajectory& estimate, const Trajectory& truth, const AccuracyOpt
   return fit;
 }
 
+/// Empty where nobody knows the true surface.
 std::string truthMesh(const MeshEvaluationRequest& request) {
   if (!request.truth_mesh.empty()) return request.truth_mesh;
   const fs::path path = fs::path(request.log) / "truth" / "mesh.ply";
-  if (!fs::exists(path)) {
-    throw InputError(request.log, 0, "", "has no truth/mesh.ply to judge meshes by",
-                     "Give the true surface with --truth-mesh");
+  return fs::exists(path) ? path.string() : std::string();
+}
+
+TriangleMesh readTruth(const std::string& file) {
+  TriangleMesh mesh = readPly(file);
+  if (mesh.faces.empty()) {
+    throw InputError(file, 0, "face", "a surface without triangles", "Give a mesh, not points");
   }
-  return path;
+  return mesh;
 }
 
 /// Judges the frames of meshes/frames.csv.
 class SequenceJudge {
  public:
   SequenceJudge(const MeshEvaluationRequest& request, const Trajectory& truth, const AccuracyOptions& options,
-                const Alignment& alignment, const TrueSurface& surface)
+                const Alignment& alignment, const TrueSurface* surface)
       : truth_(&truth),
         options_(&options),
         alignment_(&alignment),
-        surface_(&surface),
+        surface_(surface),
         frames_(readMeshFrames((fs::path(request.run) / "meshes").string())) {
     LogOptions log_options;
     log_options.without_images = true;
@@ -64,12 +69,12 @@ class SequenceJudge {
   void operator()(MeshAccuracy& accuracy) {
     choose(accuracy);
     const RayGrid grid(camera_, kGridStep);
-    MeshSequence frame(*surface_, density(&MeshFrame::frame_mesh));
-    MeshSequence horizon(*surface_, density(&MeshFrame::horizon_mesh));
+    MeshSequence frame(surface_, density(&MeshFrame::frame_mesh));
+    MeshSequence horizon(surface_, density(&MeshFrame::horizon_mesh));
     for (const Judged& judged : judged_) {
       const MeshFrame& listed = *judged.listed;
-      const SeenSurface seen =
-          seenSurface(grid, listed.hull, judged.T_world_body * T_body_cam_, surface_->distance());
+      const SeenSurface seen = seenSurface(grid, listed.hull, judged.T_world_body * T_body_cam_,
+                                           surface_ == nullptr ? nullptr : &surface_->distance());
       if (!listed.frame_mesh.empty()) frame.add(read(listed.frame_mesh), seen);
       if (!listed.horizon_mesh.empty()) horizon.add(read(listed.horizon_mesh), seen);
     }
@@ -131,16 +136,21 @@ MeshAccuracy evaluateMeshes(const MeshEvaluationRequest& request, const Trajecto
                             const Trajectory& truth, const AccuracyOptions& options) {
   MeshAccuracy accuracy;
   accuracy.truth = truthMesh(request);
-  const TriangleMesh true_mesh = readPly(accuracy.truth);
-  if (true_mesh.faces.empty()) {
-    throw InputError(accuracy.truth, 0, "face", "a surface without triangles", "Give a mesh, not points");
-  }
-  const TrueSurface surface(true_mesh);
-  const Fit fit = fitOf(estimate, truth, options);
-  accuracy.alignment = fit.text;
   const fs::path run(request.run);
   const bool has_sequence = fs::exists(run / "meshes" / "frames.csv");
-  if (has_sequence) SequenceJudge(request, truth, options, fit.alignment, surface)(accuracy);
+  const Fit fit = fitOf(estimate, truth, options);
+  accuracy.alignment = fit.text;
+  if (accuracy.truth.empty()) {
+    if (!has_sequence) {
+      throw InputError(request.log, 0, "", "has no truth/mesh.ply to judge meshes by",
+                       "Give the true surface with --truth-mesh");
+    }
+    SequenceJudge(request, truth, options, fit.alignment, nullptr)(accuracy);
+    return accuracy;
+  }
+  const TriangleMesh true_mesh = readTruth(accuracy.truth);
+  const TrueSurface surface(true_mesh);
+  if (has_sequence) SequenceJudge(request, truth, options, fit.alignment, &surface)(accuracy);
   const fs::path observed = fs::path(accuracy.truth).parent_path() / "observed.ply";
   const TriangleMesh points = fs::exists(observed) ? readPly(observed) : TriangleMesh();
   const auto judge = [&](const char* name) {

@@ -9,10 +9,13 @@ namespace swiftlet {
 void MeshSequence::add(const TriangleMesh& mesh, const SeenSurface& seen) {
   ++meshes_;
   hull_share_.push_back(seen.polygon_share);
-  const SurfaceError error = surfaceError(mesh, *truth_, density_);
-  if (!error.distances.empty()) rmse_.push_back(statisticsOf(error.distances).rmse);
-  error_.add(error);
-  const Completeness completeness = completenessOf(seen.points, MeshDistance(mesh));
+  if (truth_ != nullptr) {
+    const SurfaceError error = surfaceError(mesh, *truth_, density_);
+    if (!error.distances.empty()) rmse_.push_back(statisticsOf(error.distances).rmse);
+    error_.add(error);
+  }
+  const Completeness completeness =
+      completenessOf(seen, MeshDistance(mesh), truth_ == nullptr ? nullptr : &truth_->distance());
   if (completeness.seen > 0) share_.push_back(completeness.share());
   completeness_.add(completeness);
 }

@@ -33,10 +33,11 @@ struct MeshSequenceAccuracy {
   double unlabelled_share = 0;
 };
 
-/// Gathers the meshes of a sequence; each in the true surface's axes, with what its frame saw.
+/// Gathers the meshes of a sequence; each in the true surface's axes, with what its frame saw. Without a true
+/// surface (null) only what is drawn of the hull can be said.
 class MeshSequence {
  public:
-  MeshSequence(const TrueSurface& truth, double density) : truth_(&truth), density_(density) {}
+  MeshSequence(const TrueSurface* truth, double density) : truth_(truth), density_(density) {}
   void add(const TriangleMesh& mesh, const SeenSurface& seen);
   [[nodiscard]] MeshSequenceAccuracy result() const;
 

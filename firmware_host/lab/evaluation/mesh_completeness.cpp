@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "firmware_host/lab/evaluation/error_statistics.hpp"
+
 namespace swiftlet {
 namespace {
 
@@ -50,45 +52,59 @@ RayGrid::RayGrid(const CameraModel& camera, int step) {
 }
 
 SeenSurface seenSurface(const RayGrid& grid, std::span<const Eigen::Vector2f> polygon, const SE3& T_world_cam,
-                        const MeshDistance& truth) {
+                        const MeshDistance* truth) {
   SeenSurface seen;
+  seen.camera = T_world_cam.translation;
   if (polygon.size() < 3 || grid.pixels() == 0) return seen;
-  std::size_t pixels = 0;
   for (const RayGrid::Ray& ray : grid.rays()) {
     if (!inside(polygon, ray.pixel)) continue;
-    ++pixels;
-    const Eigen::Vector3d direction = T_world_cam.rotation * ray.bearing;
-    const auto hit = truth.cast(T_world_cam.translation, direction);
+    SeenRay& added = seen.rays.emplace_back(SeenRay{T_world_cam.rotation * ray.bearing});
+    const auto hit = truth == nullptr ? std::nullopt : truth->cast(seen.camera, added.direction);
     if (!hit) continue;
-    const double cosine = std::max(std::abs(truth.normal(hit->face).dot(direction)), kLeastCosine);
-    seen.points.push_back({T_world_cam.translation + hit->distance * direction,
-                           ray.solid_angle * hit->distance * hit->distance / cosine});
+    const double cosine = std::max(std::abs(truth->normal(hit->face).dot(added.direction)), kLeastCosine);
+    added.distance = hit->distance;
+    added.area = ray.solid_angle * hit->distance * hit->distance / cosine;
   }
-  seen.polygon_share = static_cast<double>(pixels) / static_cast<double>(grid.pixels());
+  seen.polygon_share = static_cast<double>(seen.rays.size()) / static_cast<double>(grid.pixels());
   return seen;
 }
 
 void Completeness::add(const Completeness& other) {
+  rays += other.rays;
+  drawn += other.drawn;
+  squared_errors += other.squared_errors;
   seen += other.seen;
   covered += other.covered;
   seen_area += other.seen_area;
   covered_area += other.covered_area;
 }
 
-double Completeness::share() const {
-  return seen == 0 ? 0 : static_cast<double>(covered) / static_cast<double>(seen);
+double Completeness::share() const { return shareOf(covered, seen); }
+
+double Completeness::drawnShare() const { return shareOf(drawn, rays); }
+
+double Completeness::relativeRmse() const {
+  return drawn == 0 ? 0 : std::sqrt(squared_errors / static_cast<double>(drawn));
 }
 
 double Completeness::areaShare() const { return seen_area > 0 ? covered_area / seen_area : 0; }
 
-Completeness completenessOf(std::span<const SeenPoint> points, const MeshDistance& mesh) {
+Completeness completenessOf(const SeenSurface& seen, const MeshDistance& mesh, const MeshDistance* truth) {
   Completeness result;
-  result.seen = points.size();
-  for (const SeenPoint& seen : points) {
-    result.seen_area += seen.area;
-    if (!mesh.nearest(seen.point, kCovered)) continue;
+  result.rays = seen.rays.size();
+  for (const SeenRay& ray : seen.rays) {
+    if (const auto hit = mesh.cast(seen.camera, ray.direction)) {
+      ++result.drawn;
+      const auto near =
+          truth == nullptr ? std::nullopt : truth->nearest(seen.camera + hit->distance * ray.direction);
+      if (near) result.squared_errors += std::pow(near->distance / hit->distance, 2);
+    }
+    if (ray.distance <= 0) continue;
+    ++result.seen;
+    result.seen_area += ray.area;
+    if (!mesh.nearest(seen.camera + ray.distance * ray.direction, kCovered)) continue;
     ++result.covered;
-    result.covered_area += seen.area;
+    result.covered_area += ray.area;
   }
   return result;
 }

@@ -1,12 +1,16 @@
 #pragma once
-// Which share of the true surface that a camera saw has mesh near it.
+// What a camera saw of the true surface, and what a mesh has of it.
 //
-// Seen: rays through a grid of raw pixels inside a polygon, from the true camera pose by the lens model
-// to the first true triangle. A point is covered when mesh lies within kCovered of it. Every pixel
-// weighs the same (the main figure); beside it, every point weighs the area of surface that stands for
-// it: solid angle * distance^2 / cos(incidence), the cosine not below kLeastCosine, so that a few
-// glancing pixels do not stand for everything.
-// Cost: about 1 us a pixel for the ray and as much for each mesh judged.
+// Rays go through a grid of raw pixels inside a polygon, from the true camera pose by the lens model.
+//  - Complete: of the points where they meet the true surface, those with mesh within kCovered. Every pixel
+//    weighs the same (the main figure); beside it, every point weighs the area of surface that stands for it:
+//    solid angle * distance^2 / cos(incidence), the cosine not below kLeastCosine, so that a few glancing
+//    pixels do not stand for everything.
+//  - Drawn: of all rays, those that meet the mesh, wherever. Needs no true surface.
+//  - Relative error: of the points where rays meet the mesh, the distance to the nearest true surface over
+//  the
+//    distance from the camera.
+// Cost: about 1 us a pixel for the ray and twice as much for each mesh judged.
 
 #include <Eigen/Core>
 #include <span>
@@ -40,22 +44,28 @@ class RayGrid {
   std::size_t pixels_ = 0;
 };
 
-struct SeenPoint {
-  Eigen::Vector3d point;  ///< in the true surface's axes
-  double area = 0;        ///< m^2 of surface it stands for
+/// A ray inside the polygon.
+struct SeenRay {
+  Eigen::Vector3d direction;  ///< unit, in the true surface's axes
+  double distance = 0;        ///< m, to the true surface; 0: meets none
+  double area = 0;            ///< m^2 of surface it stands for
 };
 
 struct SeenSurface {
-  std::vector<SeenPoint> points;
+  Eigen::Vector3d camera = Eigen::Vector3d::Zero();  ///< centre, in the true surface's axes
+  std::vector<SeenRay> rays;
   double polygon_share = 0;  ///< of the image's grid pixels, inside the polygon
 };
 
-/// A polygon [raw px] of fewer than three corners has nothing inside.
+/// A polygon [raw px] of fewer than three corners has nothing inside. `truth` may be null.
 SeenSurface seenSurface(const RayGrid& grid, std::span<const Eigen::Vector2f> polygon, const SE3& T_world_cam,
-                        const MeshDistance& truth);
+                        const MeshDistance* truth);
 
 struct Completeness {
-  std::size_t seen = 0;
+  std::size_t rays = 0;
+  std::size_t drawn = 0;      ///< rays that meet the mesh
+  double squared_errors = 0;  ///< sum over them, relative to the distance from the camera
+  std::size_t seen = 0;       ///< rays that meet the true surface
   std::size_t covered = 0;
   double seen_area = 0;     ///< m^2
   double covered_area = 0;  ///< m^2
@@ -63,9 +73,11 @@ struct Completeness {
   void add(const Completeness& other);
   [[nodiscard]] double share() const;      ///< 0 when nothing was seen
   [[nodiscard]] double areaShare() const;  ///< the same by area
+  [[nodiscard]] double drawnShare() const;
+  [[nodiscard]] double relativeRmse() const;  ///< over the distance from the camera
 };
 
-/// `mesh` in the true surface's axes.
-Completeness completenessOf(std::span<const SeenPoint> points, const MeshDistance& mesh);
+/// `mesh` in the true surface's axes; `truth` may be null.
+Completeness completenessOf(const SeenSurface& seen, const MeshDistance& mesh, const MeshDistance* truth);
 
 }  // namespace swiftlet

@@ -4,16 +4,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "firmware_host/lab/evaluation/error_statistics.hpp"
+
 namespace swiftlet {
 namespace {
 
 // 1/g and 1/g^2 of g^3 = g + 1: the R2 sequence.
 constexpr double kR2[] = {0.7548776662466927, 0.5698402909980532};
 constexpr double kHigh = 0.95;
-
-double shareOf(std::size_t part, std::size_t whole) {
-  return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
-}
 
 struct Corners {
   Eigen::Vector3d a;

@@ -30,6 +30,8 @@ Json sequenceJson(const MeshSequenceAccuracy& sequence) {
           {"completeness_by_area", sequence.completeness.areaShare()},
           {"median_completeness", sequence.median_completeness},
           {"seen_points", sequence.completeness.seen},
+          {"drawn_share", sequence.completeness.drawnShare()},
+          {"relative_rmse", sequence.completeness.relativeRmse()},
           {"median_hull_share", sequence.median_hull_share},
           {"label_share", sequence.label_share},
           {"unlabelled_share", sequence.unlabelled_share}};
@@ -81,10 +83,11 @@ std::string labelText(double right, double unlabelled, std::size_t samples) {
 
 std::string sequenceText(const char* name, const MeshSequenceAccuracy& sequence) {
   const DistanceStatistics& distance = sequence.distance;
-  return fmt::format("  {:<10}{:6}{}{:9.1f} %{:8.1f} %{:8.1f} %{:8.1f} %{}\n", name, sequence.meshes,
-                     distanceText(distance), 100 * sequence.completeness.share(),
+  return fmt::format("  {:<10}{:6}{}{:9.1f} %{:8.1f} %{:8.1f} %{:8.1f} %{:8.1f} %{:8.2f} %{}\n", name,
+                     sequence.meshes, distanceText(distance), 100 * sequence.completeness.share(),
                      100 * sequence.median_completeness, 100 * sequence.completeness.areaShare(),
-                     100 * sequence.median_hull_share,
+                     100 * sequence.median_hull_share, 100 * sequence.completeness.drawnShare(),
+                     100 * sequence.completeness.relativeRmse(),
                      labelText(sequence.label_share, sequence.unlabelled_share, distance.count)) +
          (sequence.empty > 0 ? fmt::format("  {:<10}{:6} of them without area\n", "", sequence.empty) : "");
 }
@@ -133,7 +136,10 @@ Json toJson(const MeshAccuracy& accuracy) {
 }
 
 std::string toText(const MeshAccuracy& accuracy) {
-  std::string text = fmt::format("meshes against {}, moved by {}\n", accuracy.truth, accuracy.alignment);
+  std::string text =
+      fmt::format("meshes against {}, moved by {}\n",
+                  accuracy.truth.empty() ? "no true surface: only what is drawn counts" : accuracy.truth,
+                  accuracy.alignment);
   if (accuracy.frame || accuracy.horizon) {
     text += fmt::format("  {} frames", accuracy.frames);
     if (accuracy.without_truth > 0)
@@ -142,9 +148,11 @@ std::string toText(const MeshAccuracy& accuracy) {
       text += fmt::format(", {} keyframes without mesh", accuracy.keyframes_bare);
     text += fmt::format(
         "; distance [m]; complete: seen points of all frames with mesh within {:g} m, median of frames, by "
-        "area\n  {:<10}{:>6}{:>9}{:>9}{:>9}{:>9}{:>11}{:>10}{:>10}{:>10}{:>8}{:>12}\n",
+        "area; hull: of the image; drawn: of the hull; relative: RMSE of what is drawn over its distance "
+        "from the camera\n"
+        "  {:<10}{:>6}{:>9}{:>9}{:>9}{:>9}{:>11}{:>10}{:>10}{:>10}{:>10}{:>10}{:>8}{:>12}\n",
         kCovered, "mesh", "count", "mean", "RMSE", "median", "95 %", "complete", "median", "by area", "hull",
-        "labels", "unlabelled");
+        "drawn", "relative", "labels", "unlabelled");
   }
   if (accuracy.frame) text += sequenceText("frame", *accuracy.frame);
   if (accuracy.horizon) text += sequenceText("horizon", *accuracy.horizon);
