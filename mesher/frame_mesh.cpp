@@ -7,13 +7,19 @@
 namespace swiftlet {
 namespace {
 
-// Sine of the least angle between a face and the line of sight to its middle. Walls and floors of a room are
-// seen at more than 15 degrees nearly everywhere; a face from a thing to the wall behind it at less.
-constexpr float kMinSineToSight = 0.25F;
-// Of the distance from the camera.
-constexpr float kMaxEdgeOverDepth = 0.5F;
 constexpr float kMinHeight = 2.0F;  // px
 constexpr float kMaxRelativeSigma = 0.1F;
+// A diagonal is turned where that makes its ends differ less by this in the logarithm of the distance: less
+// is noise.
+constexpr float kLeastGain = 0.1F;
+// Geometric mean of how far a face reaches along the line of sight and of what its neighbours disagree with
+// it, both relative to the distance. On two rendered rooms faces up to here are off by 1.2 and 1.4 % of their
+// distance, at 0.10 by 1.1 and 1.3 %, at 0.14 by 1.3 and 1.5 %.
+constexpr float kMaxTear = 0.12F;
+// Of what lies on the plane's other side.
+constexpr float kMostDisagreement = 1.0F;
+// 14 degrees. Walls and floors of a room are seen at more nearly everywhere.
+constexpr float kMinSineToSight = 0.25F;
 
 // Places in a face at which the label image is read: spread, away from the edges.
 struct Barycentric {
@@ -29,10 +35,11 @@ constexpr std::array<Barycentric, 7> kLabelPlaces = {{{1 / 3.0F, 1 / 3.0F, 1 / 3
 
 }  // namespace
 
-FaceVerdict FrameMesh::judge(const FrameFace& face) const {
-  const FramePoint& a = points_[face.point[0]];
-  const FramePoint& b = points_[face.point[1]];
-  const FramePoint& c = points_[face.point[2]];
+FaceVerdict FrameMesh::judge(std::size_t index) const {
+  const auto& vertex = triangles_[index].vertex;
+  const FramePoint& a = points_[vertex[0]];
+  const FramePoint& b = points_[vertex[1]];
+  const FramePoint& c = points_[vertex[2]];
   if (std::max({a.relative_sigma, b.relative_sigma, c.relative_sigma}) > kMaxRelativeSigma) {
     return FaceVerdict::kUnknown;
   }
@@ -42,15 +49,93 @@ FaceVerdict FrameMesh::judge(const FrameFace& face) const {
   const float longest_px =
       std::sqrt(std::max({ab.squaredNorm(), ac.squaredNorm(), (b.pixel - c.pixel).squaredNorm()}));
   if (twice_area < kMinHeight * longest_px) return FaceVerdict::kThin;
-  const Eigen::Vector3f middle = (a.p_cam + b.p_cam + c.p_cam) / 3;
-  const float longest =
-      std::sqrt(std::max({(a.p_cam - b.p_cam).squaredNorm(), (b.p_cam - c.p_cam).squaredNorm(),
-                          (c.p_cam - a.p_cam).squaredNorm()}));
-  const float distance = middle.norm();
-  if (longest > kMaxFaceEdge || longest > kMaxEdgeOverDepth * distance) return FaceVerdict::kLong;
-  const Eigen::Vector3f normal = (b.p_cam - a.p_cam).cross(c.p_cam - a.p_cam);
-  if (std::abs(normal.dot(middle)) < kMinSineToSight * normal.norm() * distance) return FaceVerdict::kSteep;
-  return FaceVerdict::kKept;
+  return tear(index) > kMaxTear ? FaceVerdict::kTorn : FaceVerdict::kKept;
+}
+
+// A surface goes on beyond a face's edges: what lies on two sides of it tells whether it is one. Between the
+// straight edge of a thing and a wall behind it the faces are all in one plane, but nearly along the line of
+// sight: there what lies on the third side must agree too.
+float FrameMesh::tear(std::size_t index) const {
+  const DelaunayTriangle& triangle = triangles_[index];
+  const auto& vertex = triangle.vertex;
+  const Eigen::Vector3f& a = points_[vertex[0]].p_cam;
+  Eigen::Vector3f plane = (points_[vertex[1]].p_cam - a).cross(points_[vertex[2]].p_cam - a);
+  plane /= plane.dot(a);  // plane . p = 1 on it, distance over the plane's along the ray elsewhere
+  FixedVector<float, 3> disagreement;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (triangle.neighbour[k] == DelaunayTriangle::kNoNeighbour) continue;
+    const float ratio = plane.dot(points_[apexBeyond(index, k)].p_cam);
+    disagreement.pushBack(ratio > 0 ? std::max(ratio, 1 / ratio) - 1 : kMostDisagreement);
+  }
+  std::sort(disagreement.begin(), disagreement.end());
+  const Eigen::Vector3f middle = (a + points_[vertex[1]].p_cam + points_[vertex[2]].p_cam) / 3;
+  const bool steep = std::abs(plane.dot(middle)) < kMinSineToSight * plane.norm() * middle.norm();
+  if (disagreement.empty()) return steep ? kMostDisagreement : 0;
+  const std::size_t wanted = std::min<std::size_t>(disagreement.size(), steep ? 3 : 2);
+  const auto [nearest, farthest] =
+      std::minmax({log_distance_[vertex[0]], log_distance_[vertex[1]], log_distance_[vertex[2]]});
+  return std::sqrt((std::exp(farthest - nearest) - 1) * disagreement[wanted - 1]);
+}
+
+std::size_t FrameMesh::edgeTowards(std::size_t from, std::size_t to) const {
+  const auto& neighbours = triangles_[from].neighbour;
+  return static_cast<std::size_t>(std::find(neighbours.begin(), neighbours.end(), to) - neighbours.begin());
+}
+
+std::uint16_t FrameMesh::apexBeyond(std::size_t index, std::size_t edge) const {
+  const std::size_t beyond = triangles_[index].neighbour[edge];
+  return triangles_[beyond].vertex[(edgeTowards(beyond, index) + 2) % 3];
+}
+
+// Delaunay's triangles know nothing of depth. Where two of them could as well be joined along the other
+// diagonal, the one is taken whose ends are at more equal distances: along the edge of a thing, not from it
+// to what is behind.
+void FrameMesh::alignWithDepth() {
+  const auto twiceArea = [this](std::uint16_t a, std::uint16_t b, std::uint16_t c) {
+    const Eigen::Vector2f ab = pixels_[b] - pixels_[a];
+    const Eigen::Vector2f ac = pixels_[c] - pixels_[a];
+    return ab.x() * ac.y() - ab.y() * ac.x();
+  };
+  for (std::size_t t = 0; t < triangles_.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (triangles_[t].neighbour[k] == DelaunayTriangle::kNoNeighbour) continue;
+      const std::uint16_t a = triangles_[t].vertex[k];
+      const std::uint16_t b = triangles_[t].vertex[(k + 1) % 3];
+      const std::uint16_t c = triangles_[t].vertex[(k + 2) % 3];
+      const std::uint16_t d = apexBeyond(t, k);
+      const float gain =
+          std::abs(log_distance_[a] - log_distance_[b]) - std::abs(log_distance_[c] - log_distance_[d]);
+      const float least = kMinHeight * (pixels_[c] - pixels_[d]).norm();
+      if (gain < kLeastGain || twiceArea(a, d, c) < least || twiceArea(d, b, c) < least) continue;
+      turnDiagonal(t, k);
+      break;
+    }
+  }
+}
+
+// Triangles a b c and b a d become a d c and d b c.
+void FrameMesh::turnDiagonal(std::size_t index, std::size_t edge) {
+  DelaunayTriangle& near = triangles_[index];
+  const std::uint16_t beyond = near.neighbour[edge];
+  DelaunayTriangle& far = triangles_[beyond];
+  const std::size_t back = edgeTowards(beyond, index);
+  const auto self = static_cast<std::uint16_t>(index);
+  const std::uint16_t d = far.vertex[(back + 2) % 3];
+  const std::uint16_t a = near.vertex[edge];
+  const std::uint16_t b = near.vertex[(edge + 1) % 3];
+  const std::uint16_t c = near.vertex[(edge + 2) % 3];
+  const std::uint16_t past_bc = near.neighbour[(edge + 1) % 3];
+  const std::uint16_t past_ca = near.neighbour[(edge + 2) % 3];
+  const std::uint16_t past_ad = far.neighbour[(back + 1) % 3];
+  const std::uint16_t past_db = far.neighbour[(back + 2) % 3];
+  if (past_bc != DelaunayTriangle::kNoNeighbour) {
+    triangles_[past_bc].neighbour[edgeTowards(past_bc, index)] = beyond;
+  }
+  if (past_ad != DelaunayTriangle::kNoNeighbour) {
+    triangles_[past_ad].neighbour[edgeTowards(past_ad, beyond)] = self;
+  }
+  near = {{a, d, c}, {past_ad, beyond, past_ca}};
+  far = {{d, b, c}, {past_db, past_bc, self}};
 }
 
 // A face across a border between labels is of neither.
@@ -72,13 +157,22 @@ std::uint8_t FrameMesh::labelOf(const FrameFace& face, const ImageView& labels) 
 void FrameMesh::build(const Points& points, const ImageView& labels) {
   points_ = points;
   faces_.clear();
-  for (std::size_t i = 0; i < points_.size(); ++i) pixels_[i] = points_[i].pixel;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    pixels_[i] = points_[i].pixel;
+    log_distance_[i] = std::log(points_[i].p_cam.norm());
+  }
   static_cast<void>(delaunay_.build({pixels_.data(), points_.size()}));
-  for (const auto& triangle : delaunay_.triangles()) {
+  triangles_.clear();
+  for (const DelaunayTriangle& triangle : delaunay_.triangles()) {
+    static_cast<void>(triangles_.tryPushBack(triangle));
+  }
+  alignWithDepth();
+  for (std::size_t i = 0; i < triangles_.size(); ++i) {
+    const DelaunayTriangle& triangle = triangles_[i];
     FrameFace face;
     // y points down in the image: what is counter-clockwise in its axes is clockwise to the eye.
     face.point = {triangle.vertex[0], triangle.vertex[2], triangle.vertex[1]};
-    face.verdict = judge(face);
+    face.verdict = judge(i);
     if (!labels.empty()) face.label = labelOf(face, labels);
     static_cast<void>(faces_.tryPushBack(face));
   }

@@ -14,6 +14,8 @@ constexpr float kBehind = 0.05F;  // m
 constexpr float kBehindSigmas = 3.0F;
 // What is nearer to the camera's centre does not project well [m].
 constexpr double kMinDistance = 0.1;
+// A face whose landmarks have moved apart by this is not the one that was seen.
+constexpr float kMaxGrowth = 1.5F;
 // Labels: so many sightings in a row of another label change a face's.
 constexpr std::uint8_t kMaxVotes = 8;
 
@@ -136,7 +138,7 @@ void HorizonMesh::review(const FrameMesh& frame) {
     const TripletTable::Triplet points = {point_of_[face.vertex[0]], point_of_[face.vertex[1]],
                                           point_of_[face.vertex[2]]};
     const bool tracked = std::find(points.begin(), points.end(), kNone) == points.end();
-    if (tooLong(face)) continue;
+    if (longestEdge(face) > kMaxGrowth * face.edge) continue;
     if (tracked && joined_.find(points) == kNone) {
       ++counters_.replaced;
       continue;
@@ -161,6 +163,7 @@ void HorizonMesh::addFaces(const FrameMesh& frame) {
               seen.label,
               static_cast<std::uint8_t>(seen.label == kNoLabel ? 0 : 1)};
     if (std::find(face.vertex.begin(), face.vertex.end(), kNone) != face.vertex.end()) continue;
+    face.edge = longestEdge(face);
     const std::uint32_t index = known_.find(face.vertex);
     if (index == kNone) {
       if (faces_.size() == limits_.faces) {
@@ -212,12 +215,11 @@ bool HorizonMesh::seenThrough(const Face& face, const FrameMesh& frame) const {
   return false;
 }
 
-bool HorizonMesh::tooLong(const Face& face) const {
+float HorizonMesh::longestEdge(const Face& face) const {
   const Eigen::Vector3f& a = vertices_[face.vertex[0]].p_world;
   const Eigen::Vector3f& b = vertices_[face.vertex[1]].p_world;
   const Eigen::Vector3f& c = vertices_[face.vertex[2]].p_world;
-  return std::max({(a - b).squaredNorm(), (b - c).squaredNorm(), (c - a).squaredNorm()}) >
-         kMaxFaceEdge * kMaxFaceEdge;
+  return std::sqrt(std::max({(a - b).squaredNorm(), (b - c).squaredNorm(), (c - a).squaredNorm()}));
 }
 
 }  // namespace swiftlet

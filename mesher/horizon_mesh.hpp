@@ -4,7 +4,7 @@
 // A vertex is a landmark; its place is the newest window's, always. It leaves with its landmark (or never:
 // `keep_all`, the complete mesh of a flight), or when no face has it. A face stays until one of its vertices
 // leaves, until a newer frame that sees all three joins them otherwise, until a landmark is seen through it,
-// or until an edge has grown longer than a new face's may be. Frames: world, metres. Sources: Rosinol et al.,
+// or until its longest edge has grown by half. Frames: world, metres. Sources: Rosinol et al.,
 // ICRA 2019 (vertices and triplets); Lovi, Birkbeck, Cobzas, Jagersand, "Incremental Free-Space Carving for
 // Real-Time 3D Reconstruction", 3DPVT 2010 (what is seen through). Memory: 300 bytes a vertex of the
 // capacity, all reserved by the constructor. Full: new vertices and faces are refused and counted. Cost:
@@ -42,6 +42,7 @@ class HorizonMesh {
     std::array<std::uint32_t, 3> vertex{};
     std::uint8_t label = kNoLabel;
     std::uint8_t votes = 0;  ///< sightings of the label less those of others
+    float edge = 0;          ///< m, its longest when it was first seen
   };
 
   explicit HorizonMesh(const HorizonLimits& limits);
@@ -70,7 +71,7 @@ class HorizonMesh {
   void review(const FrameMesh& frame);
   void addFaces(const FrameMesh& frame);
   [[nodiscard]] bool seenThrough(const Face& face, const FrameMesh& frame) const;
-  [[nodiscard]] bool tooLong(const Face& face) const;
+  [[nodiscard]] float longestEdge(const Face& face) const;
 
   HorizonLimits limits_;
   std::vector<MeshVertex> vertices_, merged_;

@@ -92,7 +92,45 @@ TEST_CASE("a thing in front of a wall is not joined to it") {
   CHECK(areaOf(*mesh) > 0.4 * 0.4 + 5);  // the thing whole, and the wall around it
 }
 
-TEST_CASE("faces with unknown depth, long, thin or steep ones are judged by name") {
+TEST_CASE("a floor that runs away is one surface, however steep its faces look") {
+  const Rig rig = pinholeRig();
+  MeshStage stage(rig, {});
+  MeshScene scene(rig, at(0, 0, 0), 1);
+  // 1 m below the camera, 2.2 to 12 m away: near its end a face reaches 1 m and a fifth of its distance
+  // along a line of sight that it meets at 5 degrees.
+  TrackId id = 1;
+  for (double z = 2.2; z < 12; z *= 1.2) {
+    for (int i = -3; i <= 3; ++i) scene.add(id++, {0.1 * i * z, 1, z});
+  }
+  REQUIRE(stage.step(scene.input()).ok());
+  double kept = 0;
+  double all = 0;
+  for (const FrameFace& face : stage.frame().faces()) {
+    all += 1;
+    kept += face.verdict == FaceVerdict::kKept ? 1 : 0;
+  }
+  // Those at its ends have but one face beside them.
+  CHECK(kept / all > 0.85);
+}
+
+TEST_CASE("a diagonal joins what is at one distance") {
+  const Rig rig = pinholeRig();
+  MeshStage stage(rig, {});
+  MeshScene scene(rig, at(0, 0, 0), 1);
+  // Seen from the camera a rhombus, its short diagonal from 2 to 4: Delaunay's.
+  scene.add(1, {-0.5, 0, 2});
+  scene.add(2, {0, -0.4, 2});
+  scene.add(3, {0.5, 0, 2});
+  scene.add(4, {0, 0.8, 4});
+  REQUIRE(stage.step(scene.input()).ok());
+  REQUIRE(stage.frame().faces().size() == 2);
+  for (const FrameFace& face : stage.frame().faces()) {
+    const bool far = std::ranges::find(face.point, 3) != face.point.end();
+    CHECK(face.verdict == (far ? FaceVerdict::kTorn : FaceVerdict::kKept));
+  }
+}
+
+TEST_CASE("faces with unknown depth, thin or torn ones are judged by name") {
   const Rig rig = pinholeRig();
   const auto verdictOf = [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                              double sigma) {
@@ -107,10 +145,10 @@ TEST_CASE("faces with unknown depth, long, thin or steep ones are judged by name
   };
   CHECK(verdictOf({0, 0, 4}, {0.5, 0, 4}, {0, 0.5, 4}, 0.001) == FaceVerdict::kKept);
   CHECK(verdictOf({0, 0, 4}, {0.5, 0, 4}, {0, 0.5, 4}, 0.03) == FaceVerdict::kUnknown);
-  CHECK(verdictOf({0, 0, 4}, {1.1, 0, 4}, {0, 0.5, 4}, 0.001) == FaceVerdict::kLong);
-  CHECK(verdictOf({0, 0, 1}, {0.6, 0, 1}, {0, 0.3, 1}, 0.001) == FaceVerdict::kLong);
+  // A hall's: ten times as large, and as far.
+  CHECK(verdictOf({0, 0, 40}, {5, 0, 40}, {0, 5, 40}, 0.0001) == FaceVerdict::kKept);
   CHECK(verdictOf({0, 0, 4}, {0.5, 0, 4}, {0.25, 0.01, 4}, 0.001) == FaceVerdict::kThin);
-  CHECK(verdictOf({0, 0, 4}, {0.1, 0, 4}, {0.05, 0.06, 4.6}, 0.001) == FaceVerdict::kSteep);
+  CHECK(verdictOf({0, 0, 4}, {0.1, 0, 4}, {0.05, 0.06, 4.6}, 0.001) == FaceVerdict::kTorn);
 }
 
 TEST_CASE("the horizon follows its landmarks and forgets those that left") {
