@@ -9,11 +9,14 @@ namespace swiftlet {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-// A landmark some metres off is known to centimetres: two bins hold a plane's vertices.
-constexpr float kBinSize = 0.05F;           // m
-constexpr std::size_t kDistanceBins = 512;  // +-12.8 m: beyond, stereo of a drone's size knows no plane
-constexpr std::size_t kAzimuthBins = 120;   // 3 degrees: 8 cm over 3 m of wall on either side of its middle
-constexpr std::size_t kHeightRows = 2;      // what looks up, what looks down
+// A landmark some metres off is known to centimetres: two bins hold a plane's vertices. Like the noise of
+// stereo the bins grow with the square of the distance: four times as wide at kReach, and there is no end.
+constexpr float kBinSize = 0.05F;  // m, nearby
+constexpr std::size_t kDistanceBins = 512;
+constexpr float kHalfBins = 0.5F * static_cast<float>(kDistanceBins);
+constexpr float kReach = kHalfBins * kBinSize;  // 12.8 m
+constexpr std::size_t kAzimuthBins = 120;  // 3 degrees: 8 cm over 3 m of wall on either side of its middle
+constexpr std::size_t kHeightRows = 2;     // what looks up, what looks down
 // A triangle with edges of 30 cm and corners off by 3 cm is off by 8 degrees (1 sigma).
 constexpr float kMaxTiltSine = 0.342F;    // sin(20 deg): a face may stand for a direction
 constexpr float kMaxTiltCosine = 0.940F;  // its cosine
@@ -25,6 +28,13 @@ std::size_t azimuthBin(const Eigen::Vector3f& normal) {
   const double turns = std::atan2(normal.y(), normal.x()) / (2 * kPi);  // -0.5 to 0.5
   const auto bin = static_cast<int>(std::lround((turns + 1.0) * static_cast<double>(kAzimuthBins)));
   return static_cast<std::size_t>(bin) % kAzimuthBins;
+}
+
+// From 0 to kDistanceBins; a bin's middle is at its index and a half.
+float placeOf(float distance) { return kHalfBins + distance / (1 + std::abs(distance) / kReach) / kBinSize; }
+float distanceAt(float place) {
+  const float shortened = (place - kHalfBins) * kBinSize;
+  return shortened / (1 - std::abs(shortened) / kReach);
 }
 
 }  // namespace
@@ -47,7 +57,7 @@ void PlaneVotes::clear() {
 
 // Shared by the two bins whose middles are nearest.
 void PlaneVotes::spread(std::size_t row, float distance, float weight) {
-  const float at = distance / kBinSize + 0.5F * static_cast<float>(kDistanceBins) - 0.5F;
+  const float at = placeOf(distance) - 0.5F;
   if (!(at >= 0) || at >= static_cast<float>(kDistanceBins - 1)) return;
   const auto bin = static_cast<std::size_t>(at);
   const float share = at - static_cast<float>(bin);
@@ -95,7 +105,7 @@ std::optional<PlaneGuess> PlaneVotes::strongest(float least) {
   const float* bins = &bins_[row * kDistanceBins];
   const auto bin = static_cast<std::size_t>(std::find(bins, bins + kDistanceBins, *best) - bins);
   PlaneGuess guess;
-  guess.distance = (static_cast<float>(bin) + 0.5F - 0.5F * static_cast<float>(kDistanceBins)) * kBinSize;
+  guess.distance = distanceAt(static_cast<float>(bin) + 0.5F);
   if (row < kHeightRows) {
     guess.normal = row == 0 ? Eigen::Vector3f(0, 0, 1) : Eigen::Vector3f(0, 0, -1);
   } else {
@@ -113,7 +123,7 @@ std::size_t PlaneVotes::rowOf(const PlaneGuess& guess) const {
 void PlaneVotes::suppress(const PlaneGuess& guess) {
   const bool level = guess.direction == PlaneDirection::kHorizontal;
   const std::size_t row = rowOf(guess);
-  const auto bin = static_cast<int>(guess.distance / kBinSize + 0.5F * static_cast<float>(kDistanceBins));
+  const auto bin = static_cast<int>(placeOf(guess.distance));
   const int rows = level ? 0 : 1;
   for (int dr = -rows; dr <= rows; ++dr) {
     const std::size_t at =

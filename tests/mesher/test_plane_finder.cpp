@@ -83,6 +83,17 @@ TEST_CASE("A room's floor, ceiling and walls are found where they are", "[mesher
   }
 }
 
+TEST_CASE("A hall's walls are found, too", "[mesher][planes]") {
+  PlaneScene scene(7, 0.02);
+  Finder planes;
+  for (int k = 0; k < 8; ++k) {
+    scene.begin(0.05 * k * Vector3d(1, 1, 0));
+    addRoom(scene, {25, 18, 3}, 0.4);
+    planes.step(scene);
+  }
+  CHECK(planes.report->planes.size() == 6);
+}
+
 TEST_CASE("Points that are known best come first", "[mesher][planes]") {
   PlaneScene scene(3, 0.01);
   Finder planes;
