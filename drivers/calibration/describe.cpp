@@ -55,6 +55,10 @@ std::string describe(const Calibration& calibration) {
   }
   const double shift_ms = 1e3 * rig.camera_to_imu_shift.seconds();
   text += fmt::format("time: {:+.3f} ms from image stamp to IMU clock\n", shift_ms);
+  if (rig.rolls()) {
+    text += fmt::format("rows: read over {:.3f} ms (rolling shutter), stamps are the middle row's\n",
+                        1e3 * rig.readout.seconds());
+  }
   const ImuNoise& n = calibration.noise;
   const double root = std::sqrt(n.rate_hz);
   text += fmt::format(

@@ -14,6 +14,7 @@ CameraEntry readCamera(const YamlField& root, Warnings& warnings) {
   entry.model = readLens(root, "distortion_coefficients", warnings);
   if (root.has("rate_hz")) entry.rate_hz = root.at("rate_hz").number();
   entry.shift_s = readShift(root, warnings);
+  entry.readout_s = readReadout(root);
   entry.file = T_BS.file();
   entry.line = T_BS.line();
   entry.field = T_BS.name();

@@ -97,6 +97,7 @@ std::vector<CameraEntry> readChain(const YamlField& root, Warnings& warnings) {
     entry.model = readLens(camera.fields, "distortion_coeffs", warnings);
     entry.T_body_cam = *camera.T_body_cam;
     entry.shift_s = readShift(camera.fields, warnings);
+    entry.readout_s = readReadout(camera.fields);
     if (camera.fields.has("rostopic")) entry.topic = camera.fields.at("rostopic").text();
     const std::string key = camera.extrinsics_key.empty() ? "T_cn_cnm1" : camera.extrinsics_key;
     entry.file = camera.fields.file();

@@ -13,6 +13,7 @@ namespace swiftlet {
 namespace {
 
 constexpr double kMaxShiftDifference_s = 0.5e-3;
+constexpr double kMaxReadoutDifference_s = 0.1e-3;  // at 5 rad/s and 450 px, 0.1 px
 constexpr double kMaxAxisAngle = 30.0 * std::numbers::pi / 180.0;
 constexpr double kMinBaseline = 1e-3;  // m
 
@@ -71,6 +72,18 @@ void joinShifts(const std::vector<CameraEntry>& cameras, Calibration& calibratio
   }
 }
 
+// Rows of both cameras that are read at one time see the same part of a scene: with one readout for both.
+void joinReadouts(const std::vector<CameraEntry>& cameras, Rig& rig) {
+  rig.readout = Duration::fromSeconds(cameras[0].readout_s);
+  if (rig.camera_count < 2) return;
+  const double difference = std::abs(cameras[0].readout_s - cameras[1].readout_s);
+  if (difference <= kMaxReadoutDifference_s) return;
+  throw InputError(
+      cameras[1].file, 0, "readout_ms",
+      fmt::format("{:g} ms, camera 0 has {:g} ms", 1e3 * cameras[1].readout_s, 1e3 * cameras[0].readout_s),
+      "Both cameras must read their rows alike: the same shutter and readout_ms");
+}
+
 }  // namespace
 
 void assembleRig(const std::vector<CameraEntry>& cameras, const CalibrationOptions& options,
@@ -85,6 +98,7 @@ void assembleRig(const std::vector<CameraEntry>& cameras, const CalibrationOptio
     calibration.camera_topic[i] = cameras[i].topic;
   }
   joinShifts(cameras, calibration);
+  joinReadouts(cameras, rig);
   if (rig.camera_count == 2) checkPair(cameras, options, calibration.warnings);
 }
 

@@ -5,6 +5,8 @@
 #include <Eigen/SVD>
 #include <cmath>
 
+#include "estimator/core/units.hpp"
+
 namespace swiftlet {
 namespace {
 
@@ -15,6 +17,7 @@ constexpr double kLastRowTolerance = 1e-9;
 constexpr double kMaxLever = 10;  // m; a rig is smaller, so more means millimetres
 constexpr double kShiftWarn_s = 0.1;
 constexpr double kShiftRefuse_s = 1.0;
+constexpr double kReadoutRefuse_s = 0.2;  // the slowest phone takes 61 ms
 constexpr int kMinImageSide = 16;
 constexpr int kMaxImageSide = 16384;
 
@@ -204,6 +207,27 @@ std::optional<double> readShift(const YamlField& camera, Warnings& warnings) {
                        fmt::format(": a shift of {} s is unusually large (unit: seconds)", shift));
   }
   return shift;
+}
+
+double readReadout(const YamlField& camera) {
+  bool rolls = camera.has("readout_ms");
+  if (camera.has("shutter")) {
+    const YamlField field = camera.at("shutter");
+    const std::string shutter = field.text();
+    if (shutter != "global" && shutter != "rolling") {
+      throw field.error("`" + shutter + "` is no shutter", "Write global or rolling");
+    }
+    rolls = shutter == "rolling";
+  }
+  if (!rolls) return 0;
+  const YamlField field = camera.at(
+      "readout_ms", "Give the time from the first row to the last: (width + blanking) / pixel rate x rows");
+  const double readout_s = kFromMs * field.number();
+  if (!(readout_s > 0 && readout_s <= kReadoutRefuse_s)) {
+    throw field.error(fmt::format("a readout of {} ms", field.number()),
+                      "Give the milliseconds from the first row to the last: 5 to 60 are usual");
+  }
+  return readout_s;
 }
 
 ImuNoise readNoise(const YamlField& imu, const std::string& rate_key, Warnings& warnings) {

@@ -18,6 +18,7 @@ struct CameraEntry {
   SE3 T_body_cam;
   double rate_hz = 0;
   std::optional<double> shift_s;  ///< t_imu = t_cam + shift
+  double readout_s = 0;           ///< of a rolling shutter
   std::string topic;
   std::string file;  ///< where the extrinsics stand, for the checks across cameras
   int line = 0;
@@ -37,6 +38,9 @@ CameraModel readLens(const YamlField& camera, const std::string& coefficients_ke
 
 /// `timeshift_cam_imu` of a camera [s]; empty where it is not given. Refuses more than a second.
 std::optional<double> readShift(const YamlField& camera, Warnings& warnings);
+
+/// `readout_ms` of a camera whose `shutter` is `rolling` [s]; 0 for a global one, which it is unless said.
+double readReadout(const YamlField& camera);
 
 /// The four densities and the rate under EuRoC's and Kalibr's common names.
 ImuNoise readNoise(const YamlField& imu, const std::string& rate_key, Warnings& warnings);

@@ -33,6 +33,11 @@ std::string cameraYaml(const CameraModel& camera, const SE3& T_body_cam, double 
       radtan ? "radial-tangential" : "equidistant", d[0], d[1], d[2], d[3], extra);
 }
 
+std::string shutterYaml(Duration readout) {
+  if (readout.ns == 0) return {};
+  return fmt::format("shutter: rolling\nreadout_ms: {:.9g}\n", 1e3 * readout.seconds());
+}
+
 std::string imuYaml(const ImuNoise& noise, std::string_view origin, const SE3& T_body_imu) {
   return fmt::format(
       "sensor_type: imu\ncomment: {}\n{}rate_hz: {:g}\ngyroscope_noise_density: {:g}\n"

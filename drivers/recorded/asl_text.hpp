@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "estimator/camera/camera_model.hpp"
+#include "estimator/core/stamp.hpp"
 #include "estimator/geometry/se3.hpp"
 #include "estimator/imu/imu_noise.hpp"
 #include "estimator/messages/imu_sample.hpp"
@@ -14,6 +15,8 @@ namespace swiftlet {
 /// sensor.yaml of a camera; `origin` says where the data come from, `extra` lines go at its end.
 std::string cameraYaml(const CameraModel& camera, const SE3& T_body_cam, double rate_hz,
                        std::string_view origin, const std::string& extra);
+/// Lines of a camera's sensor.yaml for a rolling shutter; empty for a global one.
+std::string shutterYaml(Duration readout);
 std::string imuYaml(const ImuNoise& noise, std::string_view origin, const SE3& T_body_imu = SE3());
 /// data.csv of an IMU: its first line, and a line for each sample, both with their ends.
 std::string imuCsvHeader();

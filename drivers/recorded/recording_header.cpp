@@ -8,6 +8,10 @@ namespace {
 
 // Everything but the texts, with room to spare.
 constexpr std::size_t kFixedPartBytes = 1024;
+// Beside the order in its word: the cameras' readout follows the clock shift. Programs that know of no
+// rolling shutter refuse such a recording.
+constexpr std::uint32_t kRolls = 2;
+constexpr Duration kMaxReadout = Duration::fromMilliseconds(1000);
 
 void put(LittleEndianWriter& to, const std::string& text) {
   to.u32(static_cast<std::uint32_t>(text.size()));
@@ -106,12 +110,13 @@ std::vector<std::uint8_t> encodeRecordingHeader(const RecordingHeader& header) {
   std::vector<std::uint8_t> payload(kFixedPartBytes + header.calibration_form.size() +
                                     header.settings.size() + header.program_version.size());
   LittleEndianWriter to(payload.data());
-  to.u32(static_cast<std::uint32_t>(header.order));
+  to.u32(static_cast<std::uint32_t>(header.order) | (header.rig.rolls() ? kRolls : 0));
   to.u32(static_cast<std::uint32_t>(header.rig.camera_count));
   for (std::size_t i = 0; i < header.rig.camera_count; ++i) {
     put(to, header.rig.camera[i], header.rig.T_body_cam[i]);
   }
   to.i64(header.rig.camera_to_imu_shift.ns);
+  if (header.rig.rolls()) to.i64(header.rig.readout.ns);
   put(to, header.noise);
   put(to, header.calibration_form);
   put(to, header.settings);
@@ -125,8 +130,8 @@ std::vector<std::uint8_t> encodeRecordingHeader(const RecordingHeader& header) {
 const char* decodeRecordingHeader(std::span<const std::uint8_t> payload, RecordingHeader& header) {
   LittleEndianReader from(payload);
   const std::uint32_t order = from.u32();
-  if (order > 1) return "order";
-  header.order = static_cast<RecordOrder>(order);
+  if ((order & ~kRolls) > 1) return "order";
+  header.order = static_cast<RecordOrder>(order & ~kRolls);
   header.rig = {};
   header.rig.camera_count = from.u32();
   if (header.rig.camera_count > kMaxCameras) return "number of cameras";
@@ -134,6 +139,10 @@ const char* decodeRecordingHeader(std::span<const std::uint8_t> payload, Recordi
     if (!get(from, header.rig.camera[i], header.rig.T_body_cam[i])) return "camera";
   }
   header.rig.camera_to_imu_shift.ns = from.i64();
+  if ((order & kRolls) != 0) {
+    header.rig.readout.ns = from.i64();
+    if (header.rig.readout.ns <= 0 || header.rig.readout > kMaxReadout) return "readout";
+  }
   if (!get(from, header.noise)) return "IMU noise";
   if (!get(from, header.calibration_form)) return "calibration form";
   if (!get(from, header.settings)) return "settings";

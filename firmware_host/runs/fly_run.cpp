@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "drivers/device/monotonic_now.hpp"
+#include "estimator/core/units.hpp"
 #include "firmware_host/files/run_claim.hpp"
 #include "firmware_host/inputs/devices/live_input.hpp"
 #include "firmware_host/realtime/console.hpp"
@@ -55,7 +56,18 @@ Calibration vehicleCalibration(const Settings& settings) {
   }
   CalibrationOptions options;
   options.accept_unusual_rig = settings.calibration.accept_unusual_rig;
-  return readCalibration(settings.vehicle.calibration, settings.vehicle.imu_calibration, options);
+  Calibration calibration =
+      readCalibration(settings.vehicle.calibration, settings.vehicle.imu_calibration, options);
+  const CamerasGroup& cameras = settings.cameras;
+  if (cameras.shutter == kRolling && !calibration.rig.rolls()) {
+    if (cameras.readout_ms <= 0) {
+      throw InputError("settings", 0, "cameras.readout_ms",
+                       "a rolling shutter's rows are read at their own times",
+                       "Give the milliseconds from the first row to the last, here or in the calibration");
+    }
+    calibration.rig.readout = Duration::fromSeconds(cameras.readout_ms * kFromMs);
+  }
+  return calibration;
 }
 
 namespace {

@@ -18,6 +18,9 @@ struct ImuLinkGroup {
   int can_node = 0;  ///< 0: any
 };
 
+/// CamerasGroup::shutter of a rolling one.
+inline constexpr const char* kRolling = "rolling";
+
 struct CamerasGroup {
   std::string device0 = "";
   std::string device1 = "";

@@ -28,7 +28,7 @@ CameraThread::CameraThread(const Setup& setup)
       train_(Duration::fromSeconds(1 / setup.settings.rate_hz)),
       rate_(setup.settings.rate_hz) {
   timing_.readout = Duration::fromSeconds(setup_.settings.readout_ms * kFromMs);
-  timing_.rolling = setup_.settings.shutter == "rolling";
+  timing_.rolling = setup_.settings.shutter == kRolling;
   if (setup_.trigger) timing_.trigger_latency = Duration::fromSeconds(setup_.trigger->delay_us * kFromUs);
 }
 

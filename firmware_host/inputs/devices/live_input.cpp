@@ -75,8 +75,12 @@ LiveInput::LiveInput(const Settings& settings, const Calibration& calibration) {
     failAt("trigger.chip", "dronecan tells of no edges",
            "Name the GPIO chip that sees the trigger, or leave trigger.chip out");
   }
-  const CamerasGroup& cameras = settings.cameras;
   const Rig& rig = calibration.rig;
+  CamerasGroup cameras = settings.cameras;
+  if (rig.rolls()) {
+    cameras.shutter = kRolling;
+    cameras.readout_ms = rig.readout.seconds() / kFromMs;
+  }
   checkCameras(cameras, rig);
   imu_ = std::make_unique<ImuThread>(
       fmt::format("IMU ({}, {})", settings.imu_link.device, settings.imu_link.protocol),

@@ -69,10 +69,11 @@ void FolderSink::openCamera(std::size_t index, const Calibration& calibration, d
   camera.folder = (folder / "data").string();
   camera.width = model.width();
   camera.height = model.height();
-  const std::string shift =
-      fmt::format("timeshift_cam_imu: {:.9f}\n", calibration.rig.camera_to_imu_shift.seconds());
+  const std::string times =
+      fmt::format("timeshift_cam_imu: {:.9f}\n", calibration.rig.camera_to_imu_shift.seconds()) +
+      shutterYaml(calibration.rig.readout);
   openRows(folder / "sensor.yaml",
-           cameraYaml(model, calibration.rig.T_body_cam[index], rate, kOrigin, shift));
+           cameraYaml(model, calibration.rig.T_body_cam[index], rate, kOrigin, times));
   camera.rows = openRows(folder / "data.csv", "#timestamp [ns],filename\n");
   // Each slot once around, so that none grows later.
   for (std::size_t i = 0; i < kImagesAhead; ++i) {

@@ -65,6 +65,35 @@ TEST_CASE("a sensor.yaml may say how the camera's clock lies", "[calibration]") 
   CHECK(test::contains(error.remedy, "milliseconds"));
 }
 
+TEST_CASE("a sensor.yaml may say that the shutter rolls", "[calibration]") {
+  EurocTexts texts;
+  const std::string cam0 = texts.cam0;
+  const std::string cam1 = texts.cam1;
+  const auto with = [&](const std::string& lines0, const std::string& lines1) {
+    texts.cam0 = cam0 + lines0;
+    texts.cam1 = cam1 + lines1;
+  };
+  CHECK_FALSE(texts.parse().rig.rolls());
+  with("shutter: global\n", "");
+  CHECK_FALSE(texts.parse().rig.rolls());
+  with("shutter: rolling\nreadout_ms: 20\n", "readout_ms: 20.05\n");
+  const Calibration rolling = texts.parse();
+  CHECK(rolling.rig.readout.ns == 20'000'000);
+  CHECK(rolling.rig.rowTime(0, 0) == Approx(-0.010));
+  CHECK(rolling.rig.rowTime(1, 479) == Approx(0.010));
+  CHECK(test::contains(describe(rolling), "20.000 ms (rolling shutter)"));
+
+  const auto error = [&] { return errorOf([&] { static_cast<void>(texts.parse()); }); };
+  with("shutter: rolling\n", "shutter: rolling\n");
+  CHECK(error().field == "readout_ms");
+  with("shutter: rolled\n", "");
+  CHECK(error().field == "shutter");
+  with("readout_ms: 20000\n", "readout_ms: 20000\n");
+  CHECK(error().field == "readout_ms");
+  with("readout_ms: 20\n", "readout_ms: 30\n");
+  CHECK(test::contains(error().remedy, "alike"));
+}
+
 TEST_CASE("an equidistant lens is read as one", "[calibration]") {
   EurocTexts texts;
   texts.cam0 = edited(texts.cam0, "radial-tangential", "equidistant");

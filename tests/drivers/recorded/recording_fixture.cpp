@@ -180,6 +180,7 @@ RecordingHeader wildHeader(RecordOrder order) {
   header.order = order;
   header.rig.camera_count = 2;
   header.rig.camera_to_imu_shift.ns = -1234567891;
+  header.rig.readout.ns = 19'999'999;
   const double third = 1.0 / 3.0;
   header.rig.camera[0] =
       CameraModel(CameraKind::kPinholeRadtan, 40, 20, {400.1 * third, 401 * third, 20.3, 10},
@@ -245,7 +246,8 @@ bool sameScene(const SceneImages& a, const SceneImages& b) {
 }
 
 bool sameRig(const Rig& a, const Rig& b) {
-  bool same = a.camera_count == b.camera_count && a.camera_to_imu_shift == b.camera_to_imu_shift;
+  bool same = a.camera_count == b.camera_count && a.camera_to_imu_shift == b.camera_to_imu_shift &&
+              a.readout == b.readout;
   for (std::size_t i = 0; same && i < a.camera_count; ++i) {
     const CameraModel& p = a.camera[i];
     const CameraModel& q = b.camera[i];
