@@ -16,11 +16,7 @@ constexpr double kPixelsPerSample = 1.0;  // px of motion that one sample may le
 constexpr float kFullScale = 215.0F;      // stored texture value of radiance 1
 constexpr float kMinCosine = 0.08F;       // footprints of grazing rays grow no further
 
-struct Sample {
-  float dx = 0;  // px beside the pixel's centre
-  float dy = 0;
-  double instant = 0;  // share of the exposure from its middle, -0.5 to 0.5
-};
+using Sample = CameraRenderer::Sample;
 
 // Places that are spread over the pixel and have zero mean, so that the image is not shifted.
 std::vector<Sample> samplePattern(int count) {
@@ -73,66 +69,110 @@ Grid tileGrid(const RayTable& rays) {
   return {(rays.width() + kTileSide - 1) / kTileSide, (rays.height() + kTileSide - 1) / kTileSide};
 }
 
+void turnRows(const CameraRenderer::RowTurns& turns, Tile& tile) {
+  for (std::size_t i = 0; i < turns.size() * kTileSide; ++i) {
+    const Eigen::Vector3f ray = turns[i / kTileSide] * Eigen::Vector3f(tile.x[i], tile.y[i], tile.z[i]);
+    tile.x[i] = ray.x();
+    tile.y[i] = ray.y();
+    tile.z[i] = ray.z();
+  }
+}
+
 }  // namespace
+
+// One camera's place at each sample's instant about one time: of all rows, or of a band of them.
+struct CameraRenderer::Instant {
+  std::vector<View> views;
+  View middle;
+  float turn = 0;   // rad, during the exposure
+  float slack = 0;  // m
+};
 
 CameraRenderer::CameraRenderer(const TexturedWorld& world, const CameraModel& camera, const SE3& T_body_cam)
     : world_(&world), camera_(camera), T_body_cam_(T_body_cam), rays_(camera) {}
 
-void CameraRenderer::renderImage(const SplineTrajectory& trajectory, double seconds,
-                                 const RenderSettings& settings, std::vector<float>& radiance) const {
+CameraRenderer::Instant CameraRenderer::instantAt(const SplineTrajectory& trajectory, double seconds,
+                                                  double exposure, std::span<const Sample> samples) const {
   const MotionState motion = trajectory.at(seconds);
-  const double turn = motion.omega_body.norm() * settings.exposure;
-  const double shift =
-      (motion.v_world_body.norm() + motion.omega_body.norm() * T_body_cam_.translation.norm()) *
-      settings.exposure;
-  // Something at a metre's distance moves by this much on top of the turn.
-  const double moved = (turn + shift) * camera_.focal();
-  const int count = settings.samples <= 1 ? 1 : moved > 4 * kPixelsPerSample ? kMaxSamples : 4;
-  const std::vector<Sample> samples = samplePattern(count);
-
+  const double shift = speedOf(motion) * exposure;
   // The same patches in every view, so that one list of candidates serves all: slack keeps those
   // that turn their visible side to the camera during the exposure only.
   const double slack = shift + 1e-3;
-  std::vector<View> views;
-  views.reserve(samples.size());
-  const SE3 middle = motion.T_world_body * T_body_cam_;
-  const View middle_view(world_->world(), middle, slack);
+  Instant instant{{},
+                  View(world_->world(), motion.T_world_body * T_body_cam_, slack),
+                  static_cast<float>(motion.omega_body.norm() * exposure),
+                  static_cast<float>(slack)};
+  instant.views.reserve(samples.size());
   constexpr double kKeepAll = 1e9;
   for (const Sample& sample : samples) {
-    const SE3 pose = trajectory.pose(seconds + sample.instant * settings.exposure) * T_body_cam_;
-    views.emplace_back(world_->world(), pose, kKeepAll);
+    const SE3 pose = trajectory.pose(seconds + sample.instant * exposure) * T_body_cam_;
+    instant.views.emplace_back(world_->world(), pose, kKeepAll);
   }
+  return instant;
+}
 
-  radiance.assign(static_cast<std::size_t>(rays_.width()) * static_cast<std::size_t>(rays_.height()), 0.0F);
-  const Grid grid = tileGrid(rays_);
-  const float scale = 1.0F / (kFullScale * static_cast<float>(count));
-  parallelFor(grid.rows, settings.threads, [&](int tile_row) {
-    Tile tile;
-    std::vector<std::int32_t> candidates;
-    for (int tile_column = 0; tile_column < grid.columns; ++tile_column) {
-      const int column = tile_column * kTileSide;
-      const int row = tile_row * kTileSide;
-      patchesInTile(middle_view, rays_, column, row, static_cast<float>(turn), static_cast<float>(slack),
-                    candidates);
-      // From places in the middle view to places in views that keep every patch.
-      for (std::int32_t& id : candidates) {
-        id = static_cast<std::int32_t>(middle_view.patches()[static_cast<std::size_t>(id)].index);
-      }
-      std::array<float, kTilePixels> sum{};
-      for (std::size_t s = 0; s < samples.size(); ++s) {
-        loadRays(rays_, column, row, samples[s].dx, samples[s].dy, tile);
-        traceTile(views[s], candidates, tile);
-        // A sample covers a part of the pixel only: half a level finer than the pixel's footprint.
-        const float blend = (static_cast<float>(s % 4) + 0.5F) / 4.0F;
-        shadeTile({world_, rays_.pixelAngle(), blend - 0.5F}, views[s], tile, sum);
-      }
-      const int width = std::min(kTileSide, rays_.width() - column);
-      const int height = std::min(kTileSide, rays_.height() - row);
-      for (int j = 0; j < height; ++j) {
-        float* out = radiance.data() + static_cast<std::ptrdiff_t>(row + j) * rays_.width() + column;
-        for (int i = 0; i < width; ++i) out[i] = scale * sum[static_cast<std::size_t>(j * kTileSide + i)];
-      }
+double CameraRenderer::speedOf(const MotionState& motion) const {
+  return motion.v_world_body.norm() + motion.omega_body.norm() * T_body_cam_.translation.norm();
+}
+
+void CameraRenderer::renderRows(const Instant& instant, std::span<const Sample> samples, int row, int rows,
+                                const RowTurns* turns, std::vector<float>& radiance) const {
+  const float scale = 1.0F / (kFullScale * static_cast<float>(samples.size()));
+  Tile tile;
+  std::vector<std::int32_t> candidates;
+  for (int column = 0; column < rays_.width(); column += kTileSide) {
+    patchesInTile(instant.middle, rays_, column, row, instant.turn, instant.slack, candidates);
+    // From places in the middle view to places in views that keep every patch.
+    for (std::int32_t& id : candidates) {
+      id = static_cast<std::int32_t>(instant.middle.patches()[static_cast<std::size_t>(id)].index);
     }
+    std::array<float, kTilePixels> sum{};
+    for (std::size_t s = 0; s < samples.size(); ++s) {
+      loadRays(rays_, column, row, samples[s].dx, samples[s].dy, tile);
+      if (turns != nullptr) turnRows(*turns, tile);
+      traceTile(instant.views[s], candidates, tile);
+      // A sample covers a part of the pixel only: half a level finer than the pixel's footprint.
+      const float blend = (static_cast<float>(s % 4) + 0.5F) / 4.0F;
+      shadeTile({world_, rays_.pixelAngle(), blend - 0.5F}, instant.views[s], tile, sum);
+    }
+    const int width = std::min(kTileSide, rays_.width() - column);
+    const int height = std::min(rows, rays_.height() - row);
+    for (int j = 0; j < height; ++j) {
+      float* out = radiance.data() + static_cast<std::ptrdiff_t>(row + j) * rays_.width() + column;
+      for (int i = 0; i < width; ++i) out[i] = scale * sum[static_cast<std::size_t>(j * kTileSide + i)];
+    }
+  }
+}
+
+void CameraRenderer::renderImage(const SplineTrajectory& trajectory, double seconds,
+                                 const RenderSettings& settings, std::vector<float>& radiance) const {
+  const MotionState motion = trajectory.at(seconds);
+  // Something at a metre's distance moves by this much on top of the turn.
+  const double moved = (motion.omega_body.norm() + speedOf(motion)) * settings.exposure * camera_.focal();
+  const int count = settings.samples <= 1 ? 1 : moved > 4 * kPixelsPerSample ? kMaxSamples : 4;
+  const std::vector<Sample> samples = samplePattern(count);
+  radiance.assign(static_cast<std::size_t>(rays_.width()) * static_cast<std::size_t>(rays_.height()), 0.0F);
+  if (settings.readout == 0) {
+    const Instant all = instantAt(trajectory, seconds, settings.exposure, samples);
+    parallelFor(tileGrid(rays_).rows, settings.threads, [&](int tile_row) {
+      renderRows(all, samples, tile_row * kTileSide, kTileSide, nullptr, radiance);
+    });
+    return;
+  }
+  const auto timeOf = [&](double row) {
+    return seconds + settings.readout * (row / (rays_.height() - 1) - 0.5);
+  };
+  parallelFor((rays_.height() + kBandRows - 1) / kBandRows, settings.threads, [&](int band) {
+    const int row = band * kBandRows;
+    const double middle = timeOf(row + 0.5 * (kBandRows - 1));
+    const Instant instant = instantAt(trajectory, middle, settings.exposure, samples);
+    const Eigen::Matrix3d R_cam_world = (trajectory.pose(middle) * T_body_cam_).R().transpose();
+    RowTurns turns;
+    for (int j = 0; j < kBandRows; ++j) {
+      turns[static_cast<std::size_t>(j)] =
+          (R_cam_world * (trajectory.pose(timeOf(row + j)) * T_body_cam_).R()).cast<float>();
+    }
+    renderRows(instant, samples, row, kBandRows, &turns, radiance);
   });
 }
 

@@ -239,10 +239,11 @@ void writeFlight(const SimulatedFlight& flight, const fs::path& folder) {
   for (std::size_t c = 0; c < flight.trueRig().camera_count; ++c) {
     fs::create_directories(folder / fmt::format("mav0/cam{}", c));
     const CameraModel& camera = flight.trueRig().camera[c];
+    const std::string shutter = shutterYaml(flight.trueRig().readout);
     writeText(folder / fmt::format("mav0/cam{}/sensor.yaml", c),
-              cameraYaml(camera, flight.givenRig().T_body_cam[c], s.camera_rate, kOrigin, ""));
+              cameraYaml(camera, flight.givenRig().T_body_cam[c], s.camera_rate, kOrigin, shutter));
     writeText(folder / fmt::format("truth/cam{}.yaml", c),
-              cameraYaml(camera, flight.trueRig().T_body_cam[c], s.camera_rate, kOrigin, ""));
+              cameraYaml(camera, flight.trueRig().T_body_cam[c], s.camera_rate, kOrigin, shutter));
   }
   writeText(folder / "mav0/imu0/sensor.yaml", imuYaml(s.imu.noise, kOrigin));
   std::string samples = imuCsvHeader();

@@ -55,13 +55,14 @@ SimulatedFlight::SimulatedFlight(const SimulationSettings& settings) : settings_
   true_rig_ = mounted.rig;
   if (s.mono) true_rig_.camera_count = 1;
   true_rig_.camera_to_imu_shift = -s.image_stamp_offset;
+  true_rig_.readout = Duration::fromSeconds(s.render.readout);
   given_rig_ = turnedRig(true_rig_, s);
   given_rig_.camera_to_imu_shift = Duration{};
 
   flyAndBuild();
   imu_ = simulateImu(trajectory_, s.imu, s.start, duration_);
-  // Half an exposure of motion must exist after the last image.
-  const double last = duration_ - 0.5 * s.render.exposure;
+  // Half an exposure of motion must exist after the last row.
+  const double last = duration_ - 0.5 * (s.render.exposure + s.render.readout);
   image_count_ =
       std::max(0, static_cast<int>(std::floor((last - s.first_image) * s.camera_rate + kSharpTime)) + 1);
   if (image_count_ == 0) throw std::invalid_argument("flight.duration: too short for an image");
@@ -80,9 +81,11 @@ void SimulatedFlight::checkSettings() const {
           "imu.noise.rate_hz: must lie in (0, 10000] Hz");
   require(settings_.render.exposure > 0 && settings_.render.exposure < 1 / settings_.camera_rate,
           "render.exposure: must be positive and shorter than a frame");
+  require(settings_.render.readout >= 0 && settings_.render.readout < 1 / settings_.camera_rate,
+          "render.readout: must be shorter than a frame");
   require(settings_.jpeg_quality >= 1 && settings_.jpeg_quality <= 100, "jpeg_quality: must lie in [1, 100]");
-  require(settings_.first_image >= 0.5 * settings_.render.exposure,
-          "first_image: must leave half an exposure");
+  require(settings_.first_image >= 0.5 * (settings_.render.exposure + settings_.render.readout),
+          "first_image: must leave half an exposure and half a readout");
   require(settings_.paint.texel > 0 && settings_.paint.max_texels > 0, "paint.texel: must be positive");
   require(settings_.threads >= 1, "threads: at least 1");
 }

@@ -43,13 +43,38 @@ TrackSimulator::TrackSimulator(const World& world, const Rig& rig, const SplineT
   }
 }
 
-bool TrackSimulator::visible(const SE3& T_cam_world, std::size_t camera, const Landmark& landmark,
+TrackSimulator::Place TrackSimulator::placeAt(double seconds) const {
+  Place place;
+  place.seconds = seconds;
+  const SE3 T_world_body = trajectory_->pose(seconds);
+  for (std::size_t c = 0; c < rig_->camera_count; ++c) {
+    place.T_world_cam[c] = T_world_body * rig_->T_body_cam[c];
+    place.T_cam_world[c] = place.T_world_cam[c].inverse();
+  }
+  return place;
+}
+
+// A rolling shutter sees it in the row that is read while it is there.
+bool TrackSimulator::atItsRow(double seconds, std::size_t camera, const Eigen::Vector3d& position,
+                              Eigen::Vector2d& pixel) const {
+  constexpr int kRounds = 4;  // each leaves some hundredth of the error before it
+  for (int i = 0; i < kRounds; ++i) {
+    const double row_time = seconds + rig_->rowTime(camera, pixel.y());
+    const SE3 T_cam_world = (trajectory_->pose(row_time) * rig_->T_body_cam[camera]).inverse();
+    if (!rig_->camera[camera].project(T_cam_world * position, pixel)) return false;
+  }
+  return true;
+}
+
+bool TrackSimulator::visible(const Place& place, std::size_t camera, const Landmark& landmark,
                              Eigen::Vector2d& pixel) const {
-  const Eigen::Vector3d p = T_cam_world * landmark.position;
+  const Eigen::Vector3d p = place.T_cam_world[camera] * landmark.position;
   const double range = p.norm();
   if (range < settings_.min_range || range > settings_.max_range) return false;
   const CameraModel& model = rig_->camera[camera];
-  return model.project(p, pixel) && model.inImage(pixel, settings_.border);
+  if (!model.project(p, pixel) || !model.inImage(pixel, settings_.border)) return false;
+  return !rig_->rolls() || (atItsRow(place.seconds, camera, landmark.position, pixel) &&
+                            model.inImage(pixel, settings_.border));
 }
 
 bool TrackSimulator::inSight(const SE3& T_world_cam, const Landmark& landmark) const {
@@ -59,12 +84,11 @@ bool TrackSimulator::inSight(const SE3& T_world_cam, const Landmark& landmark) c
   return !settings_.occlusion || world_->sees(T_world_cam.translation, landmark.position);
 }
 
-void TrackSimulator::keepTracks(double seconds, const SE3& T_world_cam) {
-  const SE3 T_cam_world = T_world_cam.inverse();
+void TrackSimulator::keepTracks(const Place& place) {
   std::erase_if(tracks_, [&](Track& track) {
     Landmark& landmark = landmarks_[track.landmark];
-    if (seconds < track.end && visible(T_cam_world, 0, landmark, track.now) &&
-        inSight(T_world_cam, landmark)) {
+    if (place.seconds < track.end && visible(place, 0, landmark, track.now) &&
+        inSight(place.T_world_cam[0], landmark)) {
       return false;
     }
     landmark.tracked = false;
@@ -72,13 +96,12 @@ void TrackSimulator::keepTracks(double seconds, const SE3& T_world_cam) {
   });
 }
 
-void TrackSimulator::startTracks(double seconds, const SE3& T_world_cam) {
+void TrackSimulator::startTracks(const Place& place) {
   const int wanted = settings_.max_tracks - static_cast<int>(tracks_.size());
   if (wanted <= 0) return;
   std::array<int, kGridX * kGridY> taken{};
   for (const Track& track : tracks_) ++taken[cellOf(track.now, rig_->camera[0])];
   const int cell_limit = settings_.max_tracks / (kGridX * kGridY) + 1;
-  const SE3 T_cam_world = T_world_cam.inverse();
   int started = 0;
   // Landmarks were drawn at random: going round them from a random one is as good as drawing.
   const auto count = static_cast<std::uint32_t>(landmarks_.size());
@@ -87,16 +110,16 @@ void TrackSimulator::startTracks(double seconds, const SE3& T_world_cam) {
     const std::uint32_t index = (k + offset) % count;
     Landmark& landmark = landmarks_[index];
     Eigen::Vector2d pixel;
-    if (landmark.tracked || !visible(T_cam_world, 0, landmark, pixel)) continue;
+    if (landmark.tracked || !visible(place, 0, landmark, pixel)) continue;
     int& in_cell = taken[cellOf(pixel, rig_->camera[0])];
-    if (in_cell >= cell_limit || !inSight(T_world_cam, landmark)) continue;
+    if (in_cell >= cell_limit || !inSight(place.T_world_cam[0], landmark)) continue;
     ++in_cell;
     ++started;
     landmark.tracked = true;
     Track track;
     track.id = next_id_++;
     track.landmark = index;
-    track.end = seconds - settings_.mean_lifetime * std::log(1.0 - random_.uniform());
+    track.end = place.seconds - settings_.mean_lifetime * std::log(1.0 - random_.uniform());
     track.now = pixel;
     tracks_.push_back(track);
   }
@@ -144,13 +167,10 @@ Eigen::Vector2d TrackSimulator::disturbed(const Eigen::Vector2d& pixel, const Ca
 }
 
 void TrackSimulator::step(double seconds, Stamp stamp, TrackedFrame& frame, std::vector<TrackTruth>* truth) {
-  const SE3 T_world_body = trajectory_->pose(seconds);
   const std::size_t cameras = settings_.mono ? 1 : rig_->camera_count;
-  std::array<SE3, kMaxCameras> T_world_cam;
-  for (std::size_t c = 0; c < cameras; ++c) T_world_cam[c] = T_world_body * rig_->T_body_cam[c];
-
-  keepTracks(seconds, T_world_cam[0]);
-  startTracks(seconds, T_world_cam[0]);
+  const Place place = placeAt(seconds);
+  keepTracks(place);
+  startTracks(place);
 
   frame.features.clear();
   frame.stamp = stamp;
@@ -158,7 +178,6 @@ void TrackSimulator::step(double seconds, Stamp stamp, TrackedFrame& frame, std:
   frame.camera_present = {};
   for (std::size_t c = 0; c < cameras; ++c) frame.camera_present[c] = true;
   if (truth != nullptr) truth->clear();
-  const SE3 T_right_world = cameras > 1 ? T_world_cam[1].inverse() : SE3();
   for (const Track& track : tracks_) {
     if (random_.uniform() < settings_.dropout) continue;
     const Landmark& landmark = landmarks_[track.landmark];
@@ -171,8 +190,8 @@ void TrackSimulator::step(double seconds, Stamp stamp, TrackedFrame& frame, std:
     record.pixel[0] = track.now;
     feature.pixel[0] = disturbed(track.now, rig_->camera[0], record.outlier[0]).cast<float>();
     Eigen::Vector2d right;
-    if (cameras > 1 && random_.uniform() < settings_.right_share &&
-        visible(T_right_world, 1, landmark, right) && inSight(T_world_cam[1], landmark)) {
+    if (cameras > 1 && random_.uniform() < settings_.right_share && visible(place, 1, landmark, right) &&
+        inSight(place.T_world_cam[1], landmark)) {
       feature.seen[1] = true;
       record.pixel[1] = right;
       feature.pixel[1] = disturbed(right, rig_->camera[1], record.outlier[1]).cast<float>();

@@ -71,11 +71,20 @@ class TrackSimulator {
     Eigen::Vector2d keyframe = Eigen::Vector2d::Zero();  ///< true left pixel in the last keyframe
     Eigen::Vector2d now = Eigen::Vector2d::Zero();
   };
-  [[nodiscard]] bool visible(const SE3& T_cam_world, std::size_t camera, const Landmark& landmark,
+  /// The cameras at one time of the trajectory.
+  struct Place {
+    double seconds = 0;
+    std::array<SE3, kMaxCameras> T_world_cam;
+    std::array<SE3, kMaxCameras> T_cam_world;
+  };
+  [[nodiscard]] Place placeAt(double seconds) const;
+  [[nodiscard]] bool visible(const Place& place, std::size_t camera, const Landmark& landmark,
                              Eigen::Vector2d& pixel) const;
+  [[nodiscard]] bool atItsRow(double seconds, std::size_t camera, const Eigen::Vector3d& position,
+                              Eigen::Vector2d& pixel) const;
   [[nodiscard]] bool inSight(const SE3& T_world_cam, const Landmark& landmark) const;
-  void keepTracks(double seconds, const SE3& T_world_cam);
-  void startTracks(double seconds, const SE3& T_world_cam);
+  void keepTracks(const Place& place);
+  void startTracks(const Place& place);
   void chooseKeyframe(double seconds, TrackedFrame& frame);
   Eigen::Vector2d disturbed(const Eigen::Vector2d& pixel, const CameraModel& camera, bool& outlier);
 

@@ -18,6 +18,7 @@ struct SimulateOptions {
   SettingsOptions settings;
   std::string out = "flight";
   double vibration = 0;
+  double readout_ms = 0;
   double stamp_offset_ms = 0;
   std::vector<double> blackout;
   std::vector<double> camera_missing;
@@ -52,6 +53,7 @@ int simulate(const SimulateOptions& options) {
   static_cast<void>(options.settings.read());  // complains about wrong settings as every command does
   SimulationSettings settings = options.simulation;
   settings.imu.vibration.accel_amplitude = options.vibration;
+  settings.render.readout = options.readout_ms * 1e-3;
   settings.image_stamp_offset = Duration::fromSeconds(options.stamp_offset_ms * 1e-3);
   settings.format = options.png ? ImageFormat::kPng : ImageFormat::kJpeg;
   addFault(settings.faults, FaultKind::kBlackout, options.blackout, -1);
@@ -123,6 +125,9 @@ void addSimulateCommand(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_option("--vibration", options->vibration, "Motor vibration, 80 to 150 Hz [m/s^2]")
       ->check(nonNegative());
+  command
+      ->add_option("--readout", options->readout_ms, "Rolling shutter: from the first row to the last [ms]")
+      ->check(range(0.0, 100.0));
   command->add_option("--stamp-offset", options->stamp_offset_ms, "Added to the image stamps [ms]");
   command->add_option("--blackout", options->blackout, "Dark images: START SECONDS")->expected(2);
   command->add_option("--camera-missing", options->camera_missing, "No images of camera 1: START SECONDS")

@@ -188,6 +188,39 @@ TEST_CASE("motion blur is centred on mid-exposure and as long as the motion") {
   CHECK(added == Approx(length / std::sqrt(12.0)).epsilon(0.1));
 }
 
+TEST_CASE("a rolling shutter shows a point in the row that was read when it was there") {
+  const MountedRig mounted = makeRig(RigKind::kEuroc);
+  Rig rig = mounted.rig;
+  rig.readout = Duration::fromMilliseconds(20);
+  std::vector<SE3> controls;  // about the optical axis and across it, and sideways
+  for (int k = 0; k < 20; ++k) {
+    const double s = (k - 10) * 0.05;
+    controls.push_back(SE3(expSo3(s * Eigen::Vector3d(1, -2, 1.5)), s * Eigen::Vector3d(1, 0.5, -1)) *
+                       rig.T_body_cam[0].inverse());
+  }
+  const SplineTrajectory moving(0, 0.05, controls);
+  constexpr double kTime = 0.4;
+  const SE3 T_world_cam = moving.pose(kTime) * rig.T_body_cam[0];
+  for (const Eigen::Vector3d direction : {Eigen::Vector3d(0.3, -0.35, 1), Eigen::Vector3d(-0.4, 0.3, 1)}) {
+    const DotWorld dot = makeDot(T_world_cam, direction, 3.0, 0.03);
+    const TexturedWorld textured(dot.world, coarsePaint());
+    const CameraRenderer renderer(textured, rig.camera[0], rig.T_body_cam[0]);
+    RenderSettings settings;
+    settings.readout = rig.readout.seconds();
+    std::vector<float> radiance;
+    renderer.renderImage(moving, kTime, settings, radiance);
+    Eigen::Vector2d pixel;
+    REQUIRE(rig.camera[0].project(T_world_cam.inverse() * dot.dot, pixel));
+    const Eigen::Vector2d in_middle = pixel;
+    for (int round = 0; round < 8; ++round) {
+      const SE3 T = moving.pose(kTime + rig.rowTime(0, pixel.y())) * rig.T_body_cam[0];
+      REQUIRE(rig.camera[0].project(T.inverse() * dot.dot, pixel));
+    }
+    CHECK((blobOf(radiance, 752).centre - pixel).norm() < 0.15);
+    CHECK((in_middle - pixel).norm() > 3);
+  }
+}
+
 TEST_CASE("the left image warped by depth is the right image") {
   const Scene scene = makeScene(WorldKind::kRoom, RigKind::kEuroc, 2);
   const TexturedWorld textured(scene.world, coarsePaint());
