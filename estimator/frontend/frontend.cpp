@@ -93,6 +93,8 @@ void Frontend::Impl::takeImages(const StereoFrame& frame, const FrontendPredicti
     }
     if (!camera.present) continue;
     camera.newest = 1 - camera.newest;
+    camera.scan_before = camera.scan;
+    camera.scan = prediction.scan;
     camera.pyramid[camera.newest].build(frame.image[c]);
     camera.last = frame.stamp;
   }

@@ -14,6 +14,7 @@
 #include "estimator/frontend/lucas_kanade.hpp"
 #include "estimator/frontend/stereo_matcher.hpp"
 #include "estimator/geometry/ransac.hpp"
+#include "estimator/messages/camera_scan.hpp"
 
 namespace swiftlet {
 
@@ -30,6 +31,7 @@ struct Track {
   std::array<bool, kMaxCameras> had_previous{};  ///< `previous_bearing` holds the frame before
   std::array<Eigen::Vector2f, kMaxCameras> pixel{};
   std::array<Eigen::Vector3d, kMaxCameras> bearing{};
+  /// Seen from a rolling shutter's middle row, were it far away.
   std::array<Eigen::Vector3d, kMaxCameras> previous_bearing{};
   std::array<bool, kMaxCameras> in_keyframe{};
   std::array<Eigen::Vector3d, kMaxCameras> keyframe_bearing{};
@@ -54,6 +56,8 @@ class Frontend::Impl {
     bool rotation_known = false;
     Eigen::Quaterniond R_prev_cur = Eigen::Quaterniond::Identity();  ///< camera axes, since `last`
     Eigen::Matrix3d R_cur_prev = Eigen::Matrix3d::Identity();        ///< its inverse
+    ScanTurn scan;                                                   ///< of the newest image's rows
+    ScanTurn scan_before;                                            ///< of the image before
 
     [[nodiscard]] const Pyramid& now() const { return pyramid[newest]; }
     [[nodiscard]] const Pyramid& before() const { return pyramid[1 - newest]; }
@@ -74,6 +78,8 @@ class Frontend::Impl {
   [[nodiscard]] bool follow(const Track& track, std::size_t c, const Guess& guess, Eigen::Vector2f& pixel);
   [[nodiscard]] Eigen::Matrix2f turn(std::size_t c, const Eigen::Vector3d& from_bearing) const;
   void verifyMotion(std::size_t c, std::uint64_t seed);
+  [[nodiscard]] Eigen::Vector3d inMiddleRow(std::size_t c, const ScanTurn& scan, const Eigen::Vector2f& pixel,
+                                            const Eigen::Vector3d& bearing) const;
   void verifyStereo();
   void findAgain(const FrontendPrediction& prediction, int max_features);
   [[nodiscard]] bool locate(AnchorPatch& anchor, std::size_t c, const PredictedLandmark& landmark,

@@ -8,6 +8,7 @@
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/limits.hpp"
 #include "estimator/geometry/se3.hpp"
+#include "estimator/messages/scan_motion.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 
 namespace swiftlet {
@@ -23,6 +24,8 @@ struct FrontendPrediction {
   bool has_rotation = false;
   /// Body at this frame to body at the previous one: R_prev_cur (gyro, bias removed).
   Eigen::Quaterniond R_body_prev_body_cur = Eigen::Quaterniond::Identity();
+  /// Of this frame's rows, where they have their own times.
+  ScanTurn scan;
   FixedVector<PredictedLandmark, kMaxLandmarks> landmarks;
   /// Where extrinsics are estimated: how they stand, and how well one camera is known against the other.
   bool has_extrinsics = false;

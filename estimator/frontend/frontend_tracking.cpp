@@ -108,7 +108,7 @@ void Frontend::Impl::trackCamera(std::size_t c, const FrontendPrediction& predic
     if (!track.live[c]) continue;
     track.live[c] = false;
     if (!camera.has_history) continue;
-    const Eigen::Vector3d from_bearing = track.bearing[c];
+    const Eigen::Vector3d from_bearing = inMiddleRow(c, camera.scan_before, track.pixel[c], track.bearing[c]);
     Eigen::Vector2f pixel;
     if (!follow(track, c, predict(track, c, prediction), pixel)) {
       ++statistics_.lost;
@@ -138,6 +138,13 @@ Eigen::Matrix2f Frontend::Impl::turn(std::size_t c, const Eigen::Vector3d& from_
   return pixelWarp(before, camera.R_cur_prev, after);
 }
 
+Eigen::Vector3d Frontend::Impl::inMiddleRow(std::size_t c, const ScanTurn& scan, const Eigen::Vector2f& pixel,
+                                            const Eigen::Vector3d& bearing) const {
+  if (!rig_.rolls()) return bearing;
+  const CameraScan camera(rig_.T_body_cam[c], {scan, Eigen::Vector3d::Zero()});
+  return camera.turnAt(rig_.rowTime(c, static_cast<double>(pixel.y()))) * bearing;
+}
+
 void Frontend::Impl::verifyMotion(std::size_t c, std::uint64_t seed) {
   bearings_prev_.clear();
   bearings_cur_.clear();
@@ -146,7 +153,8 @@ void Frontend::Impl::verifyMotion(std::size_t c, std::uint64_t seed) {
     const Track& track = tracks_[i];
     if (!track.live[c] || !track.had_previous[c]) continue;
     static_cast<void>(bearings_prev_.tryPushBack(track.previous_bearing[c]));
-    static_cast<void>(bearings_cur_.tryPushBack(track.bearing[c]));
+    static_cast<void>(
+        bearings_cur_.tryPushBack(inMiddleRow(c, camera_[c].scan, track.pixel[c], track.bearing[c])));
     static_cast<void>(owners_.tryPushBack(i));
   }
   if (owners_.size() < kMinTracksToVerify) return;

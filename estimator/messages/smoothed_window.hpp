@@ -8,6 +8,7 @@
 #include "estimator/core/limits.hpp"
 #include "estimator/messages/calibration_estimate.hpp"
 #include "estimator/messages/nav_state.hpp"
+#include "estimator/messages/scan_motion.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 
 namespace swiftlet {
@@ -17,6 +18,7 @@ struct WindowPose {
   std::uint64_t frame_index = 0;
   bool keyframe = false;
   SE3 T_world_body;
+  ScanMotion scan;  ///< while a rolling shutter's rows were read; else nothing
 };
 
 struct WindowLandmark {

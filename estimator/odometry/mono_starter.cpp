@@ -4,6 +4,8 @@
 #include <array>
 #include <bit>
 
+#include "estimator/messages/camera_scan.hpp"
+
 namespace swiftlet {
 namespace {
 
@@ -35,12 +37,18 @@ void MonoStarter::push(const TrackedFrame& frame) {
 }
 
 // Tracks of the chosen frames with enough sightings, moved to the front of `tracks_`.
-std::size_t MonoStarter::gatherTracks(std::span<const std::size_t> chosen) {
+std::size_t MonoStarter::gatherTracks(std::span<const std::size_t> chosen, const ImuBuffer& imu,
+                                      const Eigen::Vector3d& bias_gyro) {
   std::size_t count = 0;
   for (std::size_t k = 0; k < chosen.size(); ++k) {
+    const CameraScan scan(rig_.T_body_cam[0],
+                          {turnOfRows(frame(chosen[k]).stamp, imu, bias_gyro), Eigen::Vector3d::Zero()});
     for (const TrackedFeature& feature : frame(chosen[k]).features) {
       Eigen::Vector3d bearing;
       if (!feature.seen[0] || !rig_.camera[0].unproject(feature.pixel[0].cast<double>(), bearing)) continue;
+      // While the velocity is steady it moves the places of all frames alike.
+      if (rig_.rolls())
+        bearing = scan.turnAt(rig_.rowTime(0, static_cast<double>(feature.pixel[0].y()))) * bearing;
       const auto end = track_ids_.begin() + static_cast<std::ptrdiff_t>(count);
       const auto found = std::find(track_ids_.begin(), end, feature.id);
       const auto index = static_cast<std::size_t>(found - track_ids_.begin());
@@ -61,6 +69,12 @@ std::size_t MonoStarter::gatherTracks(std::span<const std::size_t> chosen) {
   return kept;
 }
 
+ScanTurn MonoStarter::turnOfRows(Stamp image, const ImuBuffer& imu, const Eigen::Vector3d& bias_gyro) const {
+  if (!rig_.rolls() || imu.empty()) return {};
+  const Stamp stamp = image + rig_.camera_to_imu_shift;
+  return scanTurn(imu.around(stamp - rig_.readout, stamp + rig_.readout), stamp, rig_.readout, bias_gyro, {});
+}
+
 bool MonoStarter::trySolve(const ImuBuffer& imu, const StartPrior& prior, double pixel_sigma,
                            StartState& start, const char*& waiting_for) {
   waiting_for = "more frames (one camera: the scale is found from motion)";
@@ -73,7 +87,7 @@ bool MonoStarter::trySolve(const ImuBuffer& imu, const StartPrior& prior, double
   std::array<std::size_t, kMaxMonoFrames> chosen{};
   const std::size_t n = std::min(count_, kMaxMonoFrames);
   for (std::size_t k = 0; k < n; ++k) chosen[k] = k * (count_ - 1) / (n - 1);
-  const std::size_t tracks = gatherTracks(std::span(chosen).first(n));
+  const std::size_t tracks = gatherTracks(std::span(chosen).first(n), imu, prior.bias_gyro);
 
   const Stamp first = frame(0).stamp + shift;
   TiltEstimate tilt;

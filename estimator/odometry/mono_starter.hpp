@@ -13,6 +13,7 @@
 #include "estimator/camera/rig.hpp"
 #include "estimator/imu/initialization.hpp"
 #include "estimator/imu/mono_start.hpp"
+#include "estimator/imu/scan_turn.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/smoother/imu_buffer.hpp"
 #include "estimator/smoother/smoother.hpp"
@@ -43,7 +44,10 @@ class MonoStarter {
                 const char*& waiting_for);
 
  private:
-  [[nodiscard]] std::size_t gatherTracks(std::span<const std::size_t> chosen);
+  [[nodiscard]] std::size_t gatherTracks(std::span<const std::size_t> chosen, const ImuBuffer& imu,
+                                         const Eigen::Vector3d& bias_gyro);
+  [[nodiscard]] ScanTurn turnOfRows(Stamp image, const ImuBuffer& imu,
+                                    const Eigen::Vector3d& bias_gyro) const;
 
   Rig rig_;
   ImuNoise noise_;

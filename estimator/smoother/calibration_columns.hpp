@@ -1,7 +1,8 @@
 #pragma once
-// Columns of the calibration that is being estimated: time offset (1), then phi, p of T_body_cam per camera.
+// Columns of the calibration that is being estimated: the images' times (offset, then the readout of a
+// rolling shutter), then phi, p of T_body_cam per camera.
 //
-// They come first in every system. A view has the time offset's and its own camera's (kViewCalibrationDim).
+// They come first in every system. A view has the times' and its own camera's (kViewCalibrationDim).
 
 #include <Eigen/Core>
 #include <array>
@@ -12,26 +13,30 @@
 namespace swiftlet {
 
 inline constexpr int kExtrinsicDim = 6;
-inline constexpr int kViewCalibrationDim = 1 + kExtrinsicDim;
-inline constexpr int kMaxCalibrationDim = 1 + kExtrinsicDim * static_cast<int>(kMaxCameras);
+inline constexpr int kMostTimes = 2;
+inline constexpr int kViewCalibrationDim = kMostTimes + kExtrinsicDim;
+inline constexpr int kMaxCalibrationDim = kMostTimes + kExtrinsicDim * static_cast<int>(kMaxCameras);
 
 struct CalibrationLayout {
   bool time_offset = false;
   bool extrinsics = false;
   std::size_t cameras = 0;
+  bool readout = false;  ///< with the time offset
 
+  [[nodiscard]] int times() const { return int{time_offset} + int{readout}; }
   [[nodiscard]] int dimension() const {
-    return int{time_offset} + (extrinsics ? kExtrinsicDim * static_cast<int>(cameras) : 0);
+    return times() + (extrinsics ? kExtrinsicDim * static_cast<int>(cameras) : 0);
   }
   [[nodiscard]] int extrinsicOffset(std::size_t camera) const {
-    return int{time_offset} + kExtrinsicDim * static_cast<int>(camera);
+    return times() + kExtrinsicDim * static_cast<int>(camera);
   }
   /// Columns in the system of a view's own: -1 for what is not estimated.
   [[nodiscard]] std::array<int, kViewCalibrationDim> columnsOf(std::size_t camera) const {
     std::array<int, kViewCalibrationDim> columns{};
     columns[0] = time_offset ? 0 : -1;
+    columns[1] = readout ? 1 : -1;
     for (std::size_t k = 0; k < kExtrinsicDim; ++k) {
-      columns[1 + k] = extrinsics ? extrinsicOffset(camera) + static_cast<int>(k) : -1;
+      columns[kMostTimes + k] = extrinsics ? extrinsicOffset(camera) + static_cast<int>(k) : -1;
     }
     return columns;
   }

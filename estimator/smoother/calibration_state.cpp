@@ -6,14 +6,16 @@
 namespace swiftlet {
 
 CalibrationState::CalibrationState(const Rig& rig, bool estimate_time_offset, bool estimate_extrinsics)
-    : layout_{estimate_time_offset, estimate_extrinsics, rig.camera_count},
-      now_{rig.camera_to_imu_shift.seconds(), rig.T_body_cam},
+    : layout_{estimate_time_offset, estimate_extrinsics, rig.camera_count,
+              estimate_time_offset && rig.rolls()},
+      now_{rig.camera_to_imu_shift.seconds(), rig.readout.seconds(), rig.T_body_cam},
       reference_(now_),
       backup_(now_) {}
 
 void CalibrationState::hold(MatrixMap H) {
   reference_ = now_;
   if (layout_.time_offset) H(0, 0) = 1.0 / (kTimeOffsetPriorSigma * kTimeOffsetPriorSigma);
+  if (layout_.readout) H(1, 1) = 1.0 / (kReadoutPriorSigma * kReadoutPriorSigma);
   if (!layout_.extrinsics) return;
   for (std::size_t c = 0; c < layout_.cameras; ++c) {
     const int at = layout_.extrinsicOffset(c);
@@ -43,6 +45,7 @@ void CalibrationState::holdBaseline(MatrixMap H) const {
 CalibrationState::Vector CalibrationState::deviation() const {
   Vector d = Vector::Zero();
   if (layout_.time_offset) d[0] = now_.time_offset - reference_.time_offset;
+  if (layout_.readout) d[1] = now_.readout - reference_.readout;
   if (!layout_.extrinsics) return d;
   for (std::size_t c = 0; c < layout_.cameras; ++c) {
     const int at = layout_.extrinsicOffset(c);
@@ -56,6 +59,7 @@ CalibrationState::Vector CalibrationState::deviation() const {
 
 void CalibrationState::retract(const Eigen::Ref<const Eigen::VectorXd>& step) {
   if (layout_.time_offset) now_.time_offset += step[0];
+  if (layout_.readout) now_.readout += step[1];
   if (!layout_.extrinsics) return;
   for (std::size_t c = 0; c < layout_.cameras; ++c) {
     const int at = layout_.extrinsicOffset(c);

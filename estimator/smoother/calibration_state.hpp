@@ -1,8 +1,9 @@
 #pragma once
 // The calibration as the window holds it: given, or with columns of its own and estimated.
 //
-// Time offset (t_imu = t_image + offset, s) and T_body_cam of each camera; error state and columns as in
-// calibration_columns.hpp. The prior's reference is the value of `hold`.
+// Time offset (t_imu = t_image + offset, s), with it the readout of a rolling shutter (s), and T_body_cam of
+// each camera; error state and columns as in calibration_columns.hpp. The prior's reference is the value of
+// `hold`.
 
 #include <Eigen/Core>
 #include <array>
@@ -22,6 +23,7 @@ class CalibrationState {
   [[nodiscard]] const CalibrationLayout& layout() const { return layout_; }
   [[nodiscard]] int dimension() const { return layout_.dimension(); }
   [[nodiscard]] double timeOffset() const { return now_.time_offset; }
+  [[nodiscard]] double readout() const { return now_.readout; }
   [[nodiscard]] const std::array<SE3, kMaxCameras>& T_body_cam() const { return now_.T_body_cam; }
 
   /// The values of now become the reference, and H, of a new prior, gets what is known of a calibration
@@ -39,6 +41,7 @@ class CalibrationState {
 
   struct Values {
     double time_offset = 0;
+    double readout = 0;
     std::array<SE3, kMaxCameras> T_body_cam;
   };
 

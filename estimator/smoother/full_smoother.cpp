@@ -13,6 +13,7 @@
 #include <limits>
 
 #include "estimator/geometry/so3.hpp"
+#include "estimator/imu/scan_turn.hpp"
 #include "estimator/smoother/full_smoother_system.hpp"
 #include "estimator/smoother/imu_factor.hpp"
 #include "estimator/smoother/landmark_block.hpp"
@@ -102,6 +103,7 @@ Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& stat
 void FullSmoother::setCalibration(const CalibrationEstimate& calibration) {
   const bool later = calibration.camera_to_imu_shift > rig_.camera_to_imu_shift;
   rig_.camera_to_imu_shift = calibration.camera_to_imu_shift;
+  rig_.readout = calibration.readout;
   rig_.T_body_cam = calibration.T_body_cam;
   intrinsics_ = calibration.gyro;
   // A keyframe's samples end at its stamp as it was: what lies behind came with the next keyframe.
@@ -144,9 +146,11 @@ NavState FullSmoother::state(std::size_t k) const {
 void FullSmoother::placeCameras() {
   poses_.resize(keyframes_.size());
   for (std::size_t k = 0; k < keyframes_.size(); ++k) {
+    const Keyframe& keyframe = keyframes_[k];
+    poses_[k].v_world = keyframe.x.v_world_body;
     for (std::size_t c = 0; c < rig_.camera_count; ++c) {
-      poses_[k].current[c] = CameraPose::of(keyframes_[k].x.T_world_body, rig_.T_body_cam[c]);
-      poses_[k].linearization[c] = poses_[k].current[c];
+      poses_[k].place(c, rig_.T_body_cam[c], keyframe.x.T_world_body, nullptr, rig_.readout.seconds(),
+                      keyframe.scan);
     }
   }
 }
@@ -162,6 +166,14 @@ void FullSmoother::integrateLinks() {
                           .integrate(keyframe.samples, before.stamp + rig_.camera_to_imu_shift,
                                      keyframe.stamp + rig_.camera_to_imu_shift)
                           .ok();
+  }
+  for (std::size_t k = 0; rig_.rolls() && k < keyframes_.size(); ++k) {
+    Keyframe& keyframe = keyframes_[k];
+    // The samples behind a keyframe come with the next.
+    const bool last = k + 1 == keyframes_.size() || keyframes_[k + 1].samples.empty();
+    keyframe.scan =
+        scanTurn(last ? keyframe.samples : keyframes_[k + 1].samples,
+                 keyframe.stamp + rig_.camera_to_imu_shift, rig_.readout, keyframe.x.bias_gyro, intrinsics_);
   }
 }
 

@@ -117,6 +117,7 @@ class FullSmoother {
     bool linked = false;  ///< by IMU to the keyframe before
     std::vector<ImuSample> samples;
     Preintegration imu;
+    ScanTurn scan;  ///< of its rows
   };
   struct Track {
     std::vector<Sighting> sightings;

@@ -8,7 +8,9 @@
 // and the residual of a sighting with measured unit bearing m is
 //   r = W h / (m . h),   W = d pixel / d ray at m, divided by the pixel noise   (2 x 3, W m = 0):
 // the reprojection error in units of sigma, to first order in the error, for any lens, also beyond
-// 90 degrees, without evaluating the lens model in the solver.
+// 90 degrees, without evaluating the lens model in the solver. With a rolling shutter m and W are
+// turned to the axes of the image's middle row (RowMotion), and center_i is where the camera was at the
+// sighting's own row.
 // Memory: 2.1 kB a landmark of the window. Equations and Jacobians: docs/smoother.md.
 
 #include <Eigen/Core>
@@ -31,6 +33,7 @@ struct CameraSighting {
   Eigen::Vector3f bearing = Eigen::Vector3f::Zero();  ///< m, unit, camera frame
   /// W, 1 / (unit ray): pixels per ray over the pixel noise.
   Eigen::Matrix<float, 2, 3> weight = Eigen::Matrix<float, 2, 3>::Zero();
+  float row = 0;  ///< that saw it: from -0.5, the first, to 0.5, the last
 
   static CameraSighting of(const Eigen::Vector3d& ray, const Matrix23d& whitening) {
     return {true, ray.cast<float>(), whitening.cast<float>()};

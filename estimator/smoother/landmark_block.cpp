@@ -9,7 +9,7 @@ using lanes::kLanes;
 using lanes::V;
 
 bool samePlace(const CameraPose& a, const CameraPose& b) {
-  return a.center == b.center && a.R_cam_world == b.R_cam_world;
+  return a.center == b.center && a.R_cam_world == b.R_cam_world && a.rows.velocity == b.rows.velocity;
 }
 
 // M x + offset, M the same for all lanes.
@@ -95,6 +95,7 @@ void LandmarkBlock::addViews(std::size_t c, const Camera& camera, std::span<cons
     current.set(l, rig.current[c], view);
     linearization.set(l, rig.linearization[c], view);
     moved = moved || !samePlace(rig.current[c], rig.linearization[c]);
+    rows_[l] = static_cast<double>(view.row);
   }
   if (current.empty()) return;
   const lanes::ViewGroup now_views(current);
@@ -149,17 +150,19 @@ void LandmarkBlock::addRows(std::size_t c, const Camera& camera, const lanes::Vi
   }
 }
 
-// d r / d time offset = what the body's motion does in it; d r / d T_body_cam, rotation on the right.
+// d r / d time offset = what the body's motion does in it; d r / d readout, as much of it as the row is away
+// from the middle; d r / d T_body_cam, rotation on the right.
 void LandmarkBlock::addCalibration(std::size_t c, const Camera& camera, const lanes::Residuals& at,
                                    double inverse_depth, const V (&G)[3], const Row& row, std::size_t group) {
   V K[3];
   transform(camera.R_body_cam, G, Eigen::Vector3d::Zero(), K);
   V columns[kViewCalibrationDim]{};
   for (std::size_t k = 0; k < kPoseDim; ++k) columns[0] += row.pose[k] * rates_[k];
-  columns[1] = G[1] * at.h[2] - G[2] * at.h[1];
-  columns[2] = G[2] * at.h[0] - G[0] * at.h[2];
-  columns[3] = G[0] * at.h[1] - G[1] * at.h[0];
-  for (std::size_t k = 0; k < 3; ++k) columns[4 + k] = -inverse_depth * K[k];
+  columns[1] = rows_ * columns[0];
+  columns[2] = G[1] * at.h[2] - G[2] * at.h[1];
+  columns[3] = G[2] * at.h[0] - G[0] * at.h[2];
+  columns[4] = G[0] * at.h[1] - G[1] * at.h[0];
+  for (std::size_t k = 0; k < 3; ++k) columns[5 + k] = -inverse_depth * K[k];
   CalibrationSums& sums = calibration_sums_[c];
   CrossGroup& cross = cross_groups_[group][c];
   for (std::size_t i = 0; i < kViewCalibrationDim; ++i) {

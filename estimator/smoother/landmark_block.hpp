@@ -140,6 +140,7 @@ class LandmarkBlock {
   std::vector<std::array<CrossGroup, kMaxCameras>> cross_groups_;
   std::array<CalibrationSums, kMaxCameras> calibration_sums_;
   lanes::V rates_[6];  // angular rate (body) and velocity (world) of the four states at hand
+  lanes::V rows_{};    // of the views in hand (CameraSighting::row)
   Calibration calibration_;
   std::vector<PoseCalibration> cross_;
 };

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "estimator/imu/scan_turn.hpp"
 #include "estimator/smoother/window_factors.hpp"
 #include "estimator/smoother/window_trim.hpp"
 
@@ -54,6 +55,14 @@ void Smoother::addState(const StepInput& input) {
   const auto samples = problem_.imu.around(state.stamp, state.stamp);
   if (!samples.empty())
     state.omega_body = problem_.intrinsics.now().rate(samples.front().gyro) - state.x.bias_gyro;
+  state.scan = turnOfRows(state);
+}
+
+ScanTurn Smoother::turnOfRows(const WindowState& state) const {
+  const Duration readout = problem_.rig.readout;
+  if (!problem_.rig.rolls()) return {};
+  return scanTurn(problem_.imu.around(state.stamp - readout, state.stamp + readout), state.stamp, readout,
+                  state.x.bias_gyro, problem_.intrinsics.now());
 }
 
 void Smoother::linkState(WindowState& state, const WindowState& previous, bool gap) const {
@@ -160,7 +169,9 @@ void Smoother::window(SmoothedWindow& out) const {
   out.landmarks.clear();
   for (const std::uint8_t slot : problem_.window.order()) {
     const WindowState& s = problem_.window.inSlot(slot);
-    out.poses.pushBack({s.stamp, s.frame_index, s.keyframe, s.x.T_world_body});
+    const SE3& T = s.x.T_world_body;
+    out.poses.pushBack({s.stamp, s.frame_index, s.keyframe, T, {}});
+    if (problem_.rig.rolls()) out.poses.back().scan = {s.scan, T.rotation.conjugate() * s.x.v_world_body};
   }
   for (const Landmark& landmark : problem_.landmarks) {
     if (!landmark.in_system || landmark.point.inverse_depth <= 0) continue;
@@ -172,16 +183,19 @@ void Smoother::window(SmoothedWindow& out) const {
 CalibrationEstimate Smoother::calibration() {
   CalibrationEstimate estimate;
   estimate.camera_to_imu_shift = timeOffset();
+  estimate.readout = Duration::fromSeconds(problem_.calibration.readout());
   estimate.T_body_cam = problem_.calibration.T_body_cam();
   estimate.gyro = problem_.intrinsics.now();
   const CalibrationLayout& layout = problem_.calibration.layout();
   CalibrationMatrix P;
   if (!covariance_.calibration(layout.dimension(), P)) {
     if (layout.time_offset) estimate.shift_sigma = kTimeOffsetPriorSigma;
+    if (layout.readout) estimate.readout_sigma = kReadoutPriorSigma;
     if (layout.extrinsics) estimate.stereo_rotation_sigma = std::sqrt(2.0) * kExtrinsicRotationPriorSigma;
     return estimate;
   }
   if (layout.time_offset) estimate.shift_sigma = std::sqrt(P(0, 0));
+  if (layout.readout) estimate.readout_sigma = std::sqrt(P(1, 1));
   if (!layout.extrinsics) return estimate;
   // Both cameras' turns in body axes, one less the other.
   Eigen::Matrix<double, 3, kMaxCalibrationDim> J = Eigen::Matrix<double, 3, kMaxCalibrationDim>::Zero();

@@ -14,6 +14,7 @@
 #include "estimator/messages/nav_state.hpp"
 #include "estimator/messages/noise_in_use.hpp"
 #include "estimator/messages/odometry_output.hpp"
+#include "estimator/messages/scan_motion.hpp"
 
 namespace swiftlet {
 
@@ -58,6 +59,7 @@ struct WindowState {
   double link_duration = 0;  ///< s
   double time_offset = 0;    ///< s, camera-to-IMU offset at which `stamp` was placed on the IMU's clock
   Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  ///< rad/s at the stamp
+  ScanTurn scan;                                         ///< of the image's rows
   int offset = -1;                                       ///< first column in the normal equations
   int factor_offset = -1;                                ///< first column in the factor of the last solve
   int factor_dimension = 0;                              ///< columns there

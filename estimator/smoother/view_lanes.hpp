@@ -93,8 +93,40 @@ struct ViewGroup {
     for (std::size_t k = 0; k < 3; ++k) bearing[k] = V{m[0][k], m[1][k], m[2][k], m[3][k]};
     SWIFTLET_UNROLL
     for (std::size_t k = 0; k < 6; ++k) weight[k] = V{W[0][k], W[1][k], W[2][k], W[3][k]};
+    if (!p.camera(0).rows.none()) takeRows(p);
   }
+
+ private:
+  void takeRows(const ViewPointers& p);
 };
+
+// As CameraPose::centerAt() and inMiddleRow(). The angle is below 0.2 rad: its sine and cosine by series, to
+// 1e-9.
+inline void ViewGroup::takeRows(const ViewPointers& p) {
+  V angle[3];
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    const RowMotion& rows = p.camera(l).rows;
+    const auto row = static_cast<double>(p.view(l).row);
+    const double time = rows.readout * row;
+    const Eigen::Vector3d& rate = row < 0 ? rows.before : rows.after;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      angle[k][l] = time * rate[i];
+      center[k][l] += time * rows.velocity[i];
+    }
+  }
+  const V square = angle[0] * angle[0] + angle[1] * angle[1] + angle[2] * angle[2];
+  const V first = 1.0 - square / 6.0 * (1.0 - square / 20.0);
+  const V second = 0.5 - square / 24.0 * (1.0 - square / 30.0);
+  const auto turn = [&](V& x, V& y, V& z) {
+    const V once[3] = {angle[1] * z - angle[2] * y, angle[2] * x - angle[0] * z, angle[0] * y - angle[1] * x};
+    x += first * once[0] + second * (angle[1] * once[2] - angle[2] * once[1]);
+    y += first * once[1] + second * (angle[2] * once[0] - angle[0] * once[2]);
+    z += first * once[2] + second * (angle[0] * once[1] - angle[1] * once[0]);
+  };
+  turn(bearing[0], bearing[1], bearing[2]);
+  for (std::size_t i = 0; i < 2; ++i) turn(weight[i], weight[i + 2], weight[i + 4]);
+}
 
 /// As reprojectionResidual(). A view that the point is not in front of is given the ray that it measured
 /// instead, whose residual is zero: its numbers stay finite, and the caller gives it weight zero.

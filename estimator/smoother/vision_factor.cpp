@@ -22,8 +22,8 @@ void triangulateLinearly(RigPoses poses, std::span<const Sighting> sightings, La
   const Sighting& first = sightings.front();
   const std::size_t c0 = first.camera[0].used ? 0 : 1;
   const CameraPose& anchor = poses[first.slot].current[c0];
-  point.reference = anchor.center;
-  point.bearing = anchor.R_cam_world.transpose() * first.camera[c0].ray();
+  point.reference = anchor.centerAt(first.camera[c0]);
+  point.bearing = anchor.R_cam_world.transpose() * anchor.inMiddleRow(first.camera[c0]).ray;
   double numerator = 0;
   double denominator = 0;
   for (const Sighting& sighting : sightings) {
@@ -31,9 +31,9 @@ void triangulateLinearly(RigPoses poses, std::span<const Sighting> sightings, La
       const CameraSighting& view = sighting.camera[c];
       if (!view.used) continue;
       const CameraPose& camera = poses[sighting.slot].current[c];
-      const Matrix23d W = view.whitening();
+      const Matrix23d W = camera.inMiddleRow(view).whitening;
       const Eigen::Vector2d a = W * (camera.R_cam_world * point.bearing);
-      const Eigen::Vector2d b = W * (camera.R_cam_world * (point.reference - camera.center));
+      const Eigen::Vector2d b = W * (camera.R_cam_world * (point.reference - camera.centerAt(view)));
       numerator -= a.dot(b);
       denominator += b.dot(b);
     }
@@ -48,7 +48,34 @@ void triangulateLinearly(RigPoses poses, std::span<const Sighting> sightings, La
 
 CameraPose CameraPose::of(const SE3& T_world_body, const SE3& T_body_cam) {
   const SE3 T_world_cam = T_world_body * T_body_cam;
-  return {T_world_cam.R().transpose(), T_world_cam.translation};
+  return {T_world_cam.R().transpose(), T_world_cam.translation, {}};
+}
+
+RowMotion RowMotion::of(double readout, const ScanTurn& turn, const SE3& T_body_cam, const SE3& T_world_body,
+                        const Eigen::Vector3d& v_world) {
+  const Eigen::Quaterniond R_cam_body = T_body_cam.rotation.conjugate();
+  return {readout, v_world + T_world_body.rotation * turn.mean().cross(T_body_cam.translation),
+          R_cam_body * turn.before, R_cam_body * turn.after};
+}
+
+Eigen::Vector3d CameraPose::centerAt(const CameraSighting& sighting) const {
+  return center + rows.readout * static_cast<double>(sighting.row) * rows.velocity;
+}
+
+CameraPose::Seen CameraPose::inMiddleRow(const CameraSighting& sighting) const {
+  if (rows.none()) return {sighting.ray(), sighting.whitening()};
+  const auto row = static_cast<double>(sighting.row);
+  const Eigen::Matrix3d R = expSo3Matrix(rows.readout * row * (row < 0 ? rows.before : rows.after));
+  return {R * sighting.ray(), sighting.whitening() * R.transpose()};
+}
+
+void RigPose::place(std::size_t c, const SE3& T_body_cam, const SE3& now, const SE3* then, double readout,
+                    const ScanTurn& scan) {
+  current[c] = CameraPose::of(now, T_body_cam);
+  linearization[c] = then != nullptr ? CameraPose::of(*then, T_body_cam) : current[c];
+  if (readout == 0) return;
+  linearization[c].rows = current[c].rows = RowMotion::of(readout, scan, T_body_cam, now, v_world);
+  linearization[c].rows.velocity.setZero();
 }
 
 PointBasis PointBasis::of(const Eigen::Vector3d& bearing) {
@@ -81,7 +108,9 @@ Sighting makeSighting(const Rig& rig, const std::array<bool, kMaxCameras>& seen,
     Eigen::Vector2d back;
     Matrix23d J;
     if (!seen[c] || !rig.camera[c].unproject(pixel[c].cast<double>(), ray)) continue;
-    if (rig.camera[c].project(ray, back, &J)) sighting.camera[c] = CameraSighting::of(ray, J / pixel_sigma);
+    if (!rig.camera[c].project(ray, back, &J)) continue;
+    sighting.camera[c] = CameraSighting::of(ray, J / pixel_sigma);
+    sighting.camera[c].row = static_cast<float>(rig.row(c, static_cast<double>(pixel[c].y())));
   }
   return sighting;
 }
@@ -89,20 +118,21 @@ Sighting makeSighting(const Rig& rig, const std::array<bool, kMaxCameras>& seen,
 bool reprojectionResidual(const CameraSighting& sighting, const CameraPose& camera,
                           const LandmarkPoint& point, Eigen::Vector2d& residual) {
   const Eigen::Vector3d h =
-      camera.R_cam_world * (point.bearing + point.inverse_depth * (point.reference - camera.center));
-  const double along = sighting.ray().dot(h);
+      camera.R_cam_world *
+      (point.bearing + point.inverse_depth * (point.reference - camera.centerAt(sighting)));
+  const CameraPose::Seen seen = camera.inMiddleRow(sighting);
+  const double along = seen.ray.dot(h);
   if (!(along > kMinCosine * h.norm())) return false;
-  residual = sighting.whitening() * h / along;
+  residual = seen.whitening * h / along;
   return true;
 }
 
 bool reprojectionJacobians(const CameraSighting& sighting, const CameraPose& camera, const SE3& T_body_cam,
                            const LandmarkPoint& point, const PointBasis& basis, bool with_extrinsic,
                            SightingJacobians& jacobians) {
-  const Eigen::Vector3d arm = point.reference - camera.center;
+  const Eigen::Vector3d arm = point.reference - camera.centerAt(sighting);
   const Eigen::Vector3d h = camera.R_cam_world * (point.bearing + point.inverse_depth * arm);
-  const Eigen::Vector3d m = sighting.ray();
-  const Matrix23d W = sighting.whitening();
+  const auto [m, W] = camera.inMiddleRow(sighting);
   const double along = m.dot(h);
   if (!(along > kMinCosine * h.norm())) return false;
   const Eigen::Vector2d r = W * h / along;

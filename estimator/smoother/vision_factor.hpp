@@ -4,7 +4,8 @@
 //
 // First-estimate rule: the Jacobian blocks of a sighting (pose and point) are taken at one and the
 // same point with the pose at its linearization value; the residual at the current values. The four
-// unobservable directions (position, yaw) then stay null whatever the point is.
+// unobservable directions (position, yaw) then stay null whatever the point is. For that the linearization
+// of a rolling shutter's camera has turning rows without a velocity: columns of the velocity are left out.
 // Frames: points and centres in the world, rays in the camera. Residuals are in sigmas of the pixel
 // noise. Nothing is allocated; triangulation is linear in sightings and iterations.
 // Sources: robust weight: Huber, "Robust Statistics", 1981, section 6.3; first-estimate rule: Huang,
@@ -15,26 +16,52 @@
 #include <span>
 
 #include "estimator/camera/rig.hpp"
+#include "estimator/messages/scan_motion.hpp"
 #include "estimator/smoother/calibration_columns.hpp"
 #include "estimator/smoother/landmark.hpp"
 #include "estimator/smoother/state.hpp"
 
 namespace swiftlet {
 
+/// How a camera moves while a rolling shutter's rows are read. None: a global shutter.
+struct RowMotion {
+  double readout = 0;                                  ///< s, from the first row to the last
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of the centre, m/s, world
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();    ///< rad/s, camera axes: rows before the middle
+  Eigen::Vector3d after = Eigen::Vector3d::Zero();     ///< rows after it
+
+  static RowMotion of(double readout, const ScanTurn& turn, const SE3& T_body_cam, const SE3& T_world_body,
+                      const Eigen::Vector3d& v_world);
+  [[nodiscard]] bool none() const { return readout == 0; }
+};
+
 /// A camera placed in the world by a body state.
 struct CameraPose {
   Eigen::Matrix3d R_cam_world = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< world
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< world; both at the image's stamp
+  RowMotion rows;
 
   static CameraPose of(const SE3& T_world_body, const SE3& T_body_cam);
+  /// World, when the row of a sighting was read.
+  [[nodiscard]] Eigen::Vector3d centerAt(const CameraSighting& sighting) const;
+  /// m and W of a sighting in the axes of the middle row.
+  struct Seen {
+    Eigen::Vector3d ray;
+    Matrix23d whitening;
+  };
+  [[nodiscard]] Seen inMiddleRow(const CameraSighting& sighting) const;
 };
 
 /// The rig placed at one state: current values, linearization values.
 struct RigPose {
   std::array<CameraPose, kMaxCameras> current;
   std::array<CameraPose, kMaxCameras> linearization;
-  Eigen::Vector3d v_world = Eigen::Vector3d::Zero();     ///< m/s, for the time offset
-  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  ///< rad/s, for the time offset
+  Eigen::Vector3d v_world = Eigen::Vector3d::Zero();     ///< m/s, for the time offset and rows
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  ///< rad/s, for the time offset and rows
+
+  /// Camera c at the body's pose and, where it differs, at its linearization; `scan`: of a rolling shutter.
+  void place(std::size_t c, const SE3& T_body_cam, const SE3& now, const SE3* then, double readout,
+             const ScanTurn& scan);
 };
 
 /// Indexed by Sighting::slot.

@@ -52,10 +52,9 @@ void WindowProblem::placeCameras() {
       T.rotation = (T.rotation * expSo3(shift * state.omega_body)).normalized();
       T.translation += shift * state.x.v_world_body;
     }
+    const SE3* const then = state.frozen ? &state.moved_estimate.T_world_body : nullptr;
     for (std::size_t c = 0; c < rig.camera_count; ++c) {
-      placed.current[c] = CameraPose::of(T, T_body_cam[c]);
-      placed.linearization[c] =
-          state.frozen ? CameraPose::of(state.moved_estimate.T_world_body, T_body_cam[c]) : placed.current[c];
+      placed.place(c, T_body_cam[c], T, then, calibration.readout(), state.scan);
     }
   }
 }

@@ -20,12 +20,13 @@ constexpr double kOutlierSigmas = 20.0;        // of one sighting, during the so
 constexpr double kFinalOutlierSigmas = 3.5;
 constexpr int kMaxRejections = 3;  // solves in which a landmark may fail to fit
 
-// Of the 3-vectors that a step is made of, the longest, and the time offset's where it comes first. Lengths,
+// Of the 3-vectors that a step is made of, the longest, and the images' times', which come first. Lengths,
 // not components: when the iteration ends must not depend on which way the world's axes point. Without the
 // extra states' columns, `extra` behind the first `calibration`: points far away are not worth an iteration.
-double largestStep(const VectorMap& step, bool with_time_offset, int calibration, int extra) {
-  double largest = with_time_offset ? std::abs(step[0]) : 0;
-  for (Eigen::Index k = with_time_offset ? 1 : 0; k + 3 <= step.size(); k += 3) {
+double largestStep(const VectorMap& step, int times, int calibration, int extra) {
+  double largest = 0;
+  for (Eigen::Index k = 0; k < times; ++k) largest = std::max(largest, std::abs(step[k]));
+  for (Eigen::Index k = times; k + 3 <= step.size(); k += 3) {
     if (k >= calibration && k < calibration + extra) continue;
     largest = std::max(largest, step.segment<3>(k).norm());
   }
@@ -159,7 +160,7 @@ Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, Wind
   problem.extras.settlePlanes();
   reintegrate(problem);
   const int calibration = problem.calibration.dimension();
-  const bool time_offset = problem.calibration.layout().time_offset;
+  const int times = problem.calibration.layout().times();
   bool unchecked = false;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     problem.moveEstimates();
@@ -192,7 +193,7 @@ Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, Wind
     substitutePoints(problem, step);
     problem.retract(step);
     statistics.iterations = iteration + 1;
-    unchecked = largestStep(step, time_offset, calibration,
+    unchecked = largestStep(step, times, calibration,
                             problem.intrinsics.dimension() + problem.extras.columns()) >= kConverged &&
                 largestPoseStep(step, problem.window) >= pose_tolerance;
     if (!unchecked) break;

@@ -133,6 +133,7 @@ void MappingNode::fuse(const MapMessage& message, const AtHand& at_hand) {
   input.frame = message.frame;
   input.epoch = message.epoch;
   input.T_map_body = message.poses.back().T_world_body;
+  input.scan = message.poses.back().scan;
   if (const MapCorrection& now = worlds.value().newest; worlds_ > 0 && now.epoch == message.epoch) {
     input.T_map_world = now.T_map_world;
     input.T_map_body = now.T_map_world * input.T_map_body;

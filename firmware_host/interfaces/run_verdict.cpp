@@ -117,6 +117,10 @@ Json RunVerdict::json() const {
     estimate["t_imu_minus_t_image_s"] = c.camera_to_imu_shift.seconds();
     estimate["sigma_s"] = c.shift_sigma;
   }
+  if (c.readout_sigma > 0) {
+    estimate["readout_s"] = c.readout.seconds();
+    estimate["readout_sigma_s"] = c.readout_sigma;
+  }
   for (std::size_t i = 0; i < kMaxCameras; ++i) {
     if (c.rotation_sigma[i] <= 0) continue;
     const Eigen::Matrix3d R = c.T_body_cam[i].R();

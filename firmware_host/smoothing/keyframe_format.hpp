@@ -26,6 +26,7 @@ enum class Kind : std::uint16_t { kImu = 1, kKeyframe = 2, kRevisit = 3, kEnd = 
 
 inline constexpr std::size_t kImuBytes = 56;
 inline constexpr std::size_t kCalibrationBytes = 8 + kMaxCameras * 56 + 72;
+inline constexpr std::size_t kReadoutBytes = 8;  ///< behind it, of a rolling shutter
 inline constexpr std::size_t kStateBytes = 168;  ///< of a keyframe, before its features
 inline constexpr std::size_t kFeatureBytes = 28;
 inline constexpr std::size_t kRevisitHeadBytes = 364;  ///< before its matches

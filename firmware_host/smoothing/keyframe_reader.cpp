@@ -218,12 +218,15 @@ bool KeyframeReader::decodeRevisit() {
 }
 
 bool KeyframeReader::decodeCalibration() {
-  if (payload_ != kCalibrationBytes) return false;
+  const bool with_readout = rig_.rolls();
+  if (payload_ != kCalibrationBytes + (with_readout ? kReadoutBytes : 0)) return false;
   LittleEndianReader from({bytes_.data() + kRecordBytes, payload_});
   calibration_.camera_to_imu_shift.ns = from.i64();
   bool good = sane(calibration_.camera_to_imu_shift);
   for (SE3& T : calibration_.T_body_cam) good = getPose(from, T) && good;
   for (double& entry : calibration_.gyro.matrix.reshaped<Eigen::RowMajor>()) entry = from.f64();
+  calibration_.readout.ns = with_readout ? from.i64() : 0;
+  good = sane(calibration_.readout) && good;
   return good && calibration_.gyro.matrix.allFinite() && calibration_.gyro.matrix.norm() < kLargestGyroMatrix;
 }
 

@@ -133,6 +133,7 @@ void MapKeeper::addCalibration(const CalibrationEstimate& calibration) {
   to.i64(calibration.camera_to_imu_shift.ns);
   for (const SE3& T : calibration.T_body_cam) put(to, T);
   for (const double entry : calibration.gyro.matrix.reshaped<Eigen::RowMajor>()) to.f64(entry);
+  if (calibration.readout.ns != 0) to.i64(calibration.readout.ns);
   writeRecord(Kind::kCalibration, to.written());
 }
 

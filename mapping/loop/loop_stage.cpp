@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "estimator/messages/camera_scan.hpp"
 #include "mapping/place/vocabulary.hpp"
 #include "mapping/pose_graph/pose_tangent.hpp"
 
@@ -165,7 +166,25 @@ bool LoopStage::describePlace(const LoopInput& input) {
     static_cast<void>(stereo_->fill(input.image[0], input.image[1], newest_, found));
   }
   static_cast<void>(landmarks_.fill(*input.window, rig_.T_body_cam[0], newest_, found));
+  if (const WindowPose* const pose = poseOfFrame(*input.window, input.tracks->index);
+      pose != nullptr && rig_.rolls()) {
+    moveToMiddleRow(pose->scan);
+  }
   return true;
+}
+
+// What rows saw at their own times, as the middle row would have: the pose is of its time.
+void LoopStage::moveToMiddleRow(const ScanMotion& motion) {
+  const CameraScan scan(rig_.T_body_cam[0], motion);
+  constexpr double kFar = 1e3;  // m: of a feature without depth the direction matters alone
+  for (PlaceFeature& feature : newest_.features) {
+    const bool known = feature.inverse_depth > 0;
+    const double distance = known ? 1.0 / static_cast<double>(feature.inverse_depth) : kFar;
+    const Eigen::Vector3d p = scan.fromRow(distance * feature.bearing.cast<double>(),
+                                           rig_.rowTime(0, static_cast<double>(feature.pixel.y())));
+    feature.bearing = p.normalized().cast<float>();
+    if (known) feature.inverse_depth = static_cast<float>(1.0 / p.norm());
+  }
 }
 
 void LoopStage::keepPlace() {

@@ -119,6 +119,7 @@ class LoopStage {
   [[nodiscard]] bool movedEnough(Stamp now) const;
   Status addNode(const WindowPose& pose);
   [[nodiscard]] bool describePlace(const LoopInput& input);
+  void moveToMiddleRow(const ScanMotion& motion);
   void closeLoops(const LoopEffort& effort, LoopReport& report);
   void keepPlace();
   void closeNearLoops(const LoopEffort& effort, LoopReport& report);

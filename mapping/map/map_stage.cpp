@@ -80,7 +80,10 @@ MapStage::Sensor::Sensor(const DepthImageView& camera, const Rig& rig, const Map
       buffer(depth.makeBuffer()) {}
 
 MapStage::Pair::Pair(const Rig& rig, const MapSettings& settings)
-    : depth(rig, depthSettings(settings)), buffer(depth.makeBuffer()) {}
+    : depth(rig, depthSettings(settings)), buffer(depth.makeBuffer()) {
+  const StereoRectification& ideal = depth.rectification();
+  if (rig.rolls() && depth.status().ok()) unrolled.emplace(rig, ideal.intrinsics(), ideal.T_body_camera());
+}
 
 MapStage::MapStage(const Rig& rig, const MapSettings& settings, const DepthImageView* depth_sensor,
                    SurfaceSink* spill)
@@ -146,6 +149,7 @@ Status MapStage::measureByPair(const MapInput& input, const DepthEffort& effort)
   if (status.ok() && !input.labels.empty() && !pair_->depth.addLabels(input.labels, pair_->buffer).ok()) {
     ++counters_.wrong_size;
   }
+  if (status.ok() && pair_->unrolled) pair_->unrolled->apply(input.scan, pair_->buffer);
   return status;
 }
 

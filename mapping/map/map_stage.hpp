@@ -22,6 +22,7 @@
 #include "estimator/camera/rig.hpp"
 #include "mapping/depth/depth_stage.hpp"
 #include "mapping/depth/sensor_depth.hpp"
+#include "mapping/depth/unrolled_depth.hpp"
 #include "mapping/distance/volume_distance.hpp"
 #include "mapping/map/map_settings.hpp"
 #include "mapping/map/view_warp.hpp"
@@ -36,6 +37,7 @@ struct MapInput {
   std::uint64_t frame = 0;  ///< names the moment where poses are corrected later
   std::uint32_t epoch = 0;
   SE3 T_map_body;
+  ScanMotion scan;  ///< while a rolling shutter's rows were read
   SE3 T_map_world;  ///< of the odometry's world, whoever corrects its poses; otherwise left alone
   std::array<ImageView, kMaxCameras> image;  ///< raw; empty where missing
   DepthImageView depth;                      ///< of a sensor; `depth` null: from the images
@@ -141,6 +143,7 @@ class MapStage {
     Pair(const Rig& rig, const MapSettings& settings);
     DepthStage depth;
     DepthBuffer buffer;
+    std::optional<UnrolledDepth> unrolled;  ///< where the shutter rolls
   };
 
   Status measureBySensor(const MapInput& input);

@@ -44,6 +44,10 @@ TEST_CASE("given poses are interpolated, but not across gaps and jumps") {
   CHECK(poses.at(at(1.75))->piece == 1);
   CHECK(poses.at(at(1.78))->T_world_body.translation.x() == Approx(10.78));
   CHECK_FALSE(poses.at(at(1.96)));
+  const ScanMotion scan = poses.scanAt(at(0.22), Duration::fromMilliseconds(20));
+  CHECK(scan.v_body.x() == Approx(1));
+  CHECK(scan.turn.mean().norm() < 1e-6);
+  CHECK(poses.scanAt(at(0.9), Duration::fromMilliseconds(20)).v_body.isZero());
 }
 
 Rig stereoRig() {

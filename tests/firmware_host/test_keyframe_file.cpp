@@ -89,15 +89,17 @@ OdometrySettings givenCalibration() {
 }
 
 std::string kept(const std::string& folder, bool finished = true,
-                 const OdometrySettings& settings = givenCalibration()) {
+                 const OdometrySettings& settings = givenCalibration(), const Rig& rig = twoCameras()) {
   LostFiles lost;
   ImuNoise noise;
   noise.rate_hz = 200;
   {
-    MapKeeper keeper(folder, twoCameras(), noise, settings, lost);
+    MapKeeper keeper(folder, rig, noise, settings, lost);
     for (int k = 0; k < kKeyframes; ++k) {
       for (int i = 0; i < kSamplesEach; ++i) keeper.addImu(sampleAt(kSecond * k + 5'000'000 * (i + 1)));
-      keeper.addCalibration(calibrationOf(k));
+      CalibrationEstimate calibration = calibrationOf(k);
+      if (rig.rolls()) calibration.readout.ns = rig.readout.ns + k;
+      keeper.addCalibration(calibration);
       keeper.addKeyframe(frameOf(k), stateOf(k), noiseOf(k));
     }
     keeper.addRevisit(revisit());
@@ -220,6 +222,26 @@ TEST_CASE("the calibration's estimate comes back with each keyframe where there 
       CHECK(reader.calibration().gyro.matrix == expected.gyro.matrix);
       REQUIRE(reader.next() == KeyframeReader::Next::kKeyframe);
     }
+  }
+}
+
+TEST_CASE("a rolling shutter's readout comes back, as given and as estimated", "[files]") {
+  const ScratchFolder folder("keyframes");
+  Rig rig = twoCameras();
+  rig.readout = Duration::fromMilliseconds(20);
+  OdometrySettings settings = givenCalibration();
+  settings.estimate_time_offset = true;
+  const std::string bytes = kept(folder.path(), true, settings, rig);
+  CHECK(countsIn(bytes).calibrations == kKeyframes);
+  std::istringstream in(bytes);
+  KeyframeReader reader("keyframes.swk", in);
+  CHECK(reader.rig().readout == rig.readout);
+  KeyframeReader::Next next = reader.next();
+  while (next != KeyframeReader::Next::kEnd) {
+    if (next == KeyframeReader::Next::kKeyframe) {
+      CHECK(reader.calibration().readout.ns == rig.readout.ns + reader.frame().stamp.ns / kSecond - 1);
+    }
+    next = reader.next();
   }
 }
 

@@ -32,7 +32,7 @@ struct MeshScene {
     window->newest.T_world_body = T_world_body;
     window->calibration.T_body_cam = rig.T_body_cam;
     const Stamp stamp{static_cast<std::int64_t>(index) * 50'000'000};
-    static_cast<void>(window->poses.tryPushBack({stamp, index, true, T_world_body}));
+    static_cast<void>(window->poses.tryPushBack({stamp, index, true, T_world_body, {}}));
     tracks->stamp = stamp;
     tracks->index = index;
     tracks->keyframe = true;

@@ -1,5 +1,5 @@
-// What an IMU costs that is not as its calibration says: simulated flights of 60 s (feature tracks, no
-// images), default settings, with two cameras and with one.
+// What an IMU costs that is not as its calibration says, and a rolling shutter: simulated flights of 60 s
+// (feature tracks, no images), default settings, with two cameras and with one.
 //   imu_statistics [--flights N] [--cameras 1|2]   default: 50 flights a row, both
 // Printed for each row: ATE from 3 s on over that of the same flights with an IMU as told, and pose NEES at
 // 10, 30 and 60 s (6 is right). Same seeds, same figures. Exit code 1 when a figure misses.
@@ -39,7 +39,7 @@ struct Outcome {
 
 struct Row {
   const char* name;
-  std::function<void(Random&, ImuSimulationSettings&)> spoil;
+  std::function<void(Random&, SimulationSettings&)> spoil;
 };
 
 double sign(Random& random) { return random.uniform() < 0.5 ? -1 : 1; }
@@ -49,29 +49,32 @@ void scaleNoise(ImuNoise& noise, double factor) {
   noise.accel_density *= factor;
 }
 
-const std::array<Row, 7> kRows{{
-    {"as told", [](Random&, ImuSimulationSettings&) {}},
+const std::array<Row, 8> kRows{{
+    {"as told", [](Random&, SimulationSettings&) {}},
     {"scale 1 %",
-     [](Random& random, ImuSimulationSettings& imu) {
+     [](Random& random, SimulationSettings& flown) {
+       ImuSimulationSettings& imu = flown.imu;
        for (int k = 0; k < 3; ++k) {
          imu.gyro_matrix(k, k) += 0.01 * sign(random);
          imu.accel_matrix(k, k) += 0.01 * sign(random);
        }
      }},
     {"misaligned 0.5 deg",
-     [](Random& random, ImuSimulationSettings& imu) {
+     [](Random& random, SimulationSettings& flown) {
+       ImuSimulationSettings& imu = flown.imu;
        constexpr double kTurn = 0.5 * std::numbers::pi / 180;
        imu.gyro_matrix = expSo3(kTurn * test::randomDirection(random)).toRotationMatrix();
        imu.accel_matrix = expSo3(kTurn * test::randomDirection(random)).toRotationMatrix();
      }},
-    {"noise 3 times", [](Random&, ImuSimulationSettings& imu) { scaleNoise(imu.noise, 3); }},
-    {"noise 10 times", [](Random&, ImuSimulationSettings& imu) { scaleNoise(imu.noise, 10); }},
-    {"noise a third", [](Random&, ImuSimulationSettings& imu) { scaleNoise(imu.noise, 1.0 / 3); }},
+    {"noise 3 times", [](Random&, SimulationSettings& flown) { scaleNoise(flown.imu.noise, 3); }},
+    {"noise 10 times", [](Random&, SimulationSettings& flown) { scaleNoise(flown.imu.noise, 10); }},
+    {"noise a third", [](Random&, SimulationSettings& flown) { scaleNoise(flown.imu.noise, 1.0 / 3); }},
     {"vibration 2 m/s^2",
-     [](Random&, ImuSimulationSettings& imu) {
-       imu.vibration.accel_amplitude = 2;
-       imu.vibration.gyro_amplitude = 0.05;
+     [](Random&, SimulationSettings& flown) {
+       flown.imu.vibration.accel_amplitude = 2;
+       flown.imu.vibration.gyro_amplitude = 0.05;
      }},
+    {"rolling 20 ms", [](Random&, SimulationSettings& flown) { flown.render.readout = 0.02; }},
 }};
 
 Outcome fly(int index, const Row& row, bool stereo) {
@@ -81,7 +84,7 @@ Outcome fly(int index, const Row& row, bool stereo) {
   settings.mono = !stereo;
   const ImuNoise told = settings.imu.noise;
   Random random(settings.seed, 79);
-  row.spoil(random, settings.imu);
+  row.spoil(random, settings);
   const TrackFlight flight(settings);
   OdometrySettings odometry;
   odometry.use_stereo = stereo;

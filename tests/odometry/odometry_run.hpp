@@ -53,12 +53,12 @@ struct OdometryRun {
 };
 
 /// `first`: frames and IMU samples before that frame are left out, but for `imu_before` seconds. `told`: the
-/// noise figures that the odometry is given; none: the flight's own.
+/// noise figures that the odometry is given, `rig`: the calibration; none: the flight's own.
 inline OdometryRun runOdometry(const TrackFlight& flight, const OdometrySettings& settings,
                                std::size_t first = 0, double imu_before = 0.5,
-                               const std::optional<ImuNoise>& told = {}) {
+                               const std::optional<ImuNoise>& told = {}, const std::optional<Rig>& rig = {}) {
   OdometryRun run;
-  Odometry odometry(flight.rig(), told.value_or(flight.noise()), settings);
+  Odometry odometry(rig.value_or(flight.rig()), told.value_or(flight.noise()), settings);
   const Stamp begin = flight.frames()[first].stamp - Duration::fromSeconds(imu_before);
   auto output = std::make_unique<OdometryOutput>();
   flight.play(

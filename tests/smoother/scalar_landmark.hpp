@@ -45,6 +45,7 @@ struct ScalarLandmark {
         if (views.calibration.time_offset) {
           row.col(0) = J.pose.leftCols<3>() * rig.omega_body + J.pose.rightCols<3>() * rig.v_world;
         }
+        if (views.calibration.readout) row.col(1) = static_cast<double>(view.row) * row.col(0);
         if (views.calibration.extrinsics) {
           row.middleCols<kPoseDim>(views.calibration.extrinsicOffset(c)) = J.extrinsic;
         }

@@ -119,6 +119,19 @@ TEST_CASE("Full smoothing goes on from the estimated calibration", "[smoother][f
   checkEstimateUsed(bent, false, true);
 }
 
+TEST_CASE("Full smoothing of a rolling shutter", "[smoother][full_smoother]") {
+  SimulationSettings flown = test::roomFlight(20, 6);
+  flown.flight.aggressiveness = 1.5;
+  flown.render.readout = 0.02;
+  const FullRun run = runFull(TrackFlight(flown));
+  REQUIRE(run.status.ok());
+  const double causal = test::positionError(run.causal, run.truth);
+  const double full = test::positionError(run.full, run.truth);
+  std::printf("rolling shutter: causal %.4f m, full %.4f m\n", causal, full);
+  CHECK(full < causal * 1.05 + 1e-3);
+  CHECK(full < 0.02);
+}
+
 TEST_CASE("Full smoothing gives the same bytes twice", "[smoother][full_smoother]") {
   const TrackFlight flight(test::roomFlight(6, 4));
   const FullRun a = runFull(flight);

@@ -1,6 +1,7 @@
 // Vector lanes against their scalar twins: one landmark eliminated, with and without calibration columns and
 // columns of its own, one point's system, on random windows
-// with any number of sightings, cameras missing, views behind the camera, linearizations left behind.
+// with any number of sightings, cameras missing, views behind the camera, linearizations left behind, rolling
+// shutters.
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -31,18 +32,20 @@ struct Window {
   std::vector<bool> frozen;
   test::WindowScene scene;
 
+  // Every other one with a rolling shutter.
   Window(std::size_t count, double share_frozen, Random& random) {
+    const double readout = random.uniform(0, 1) < 0.5 ? 0.02 : 0;
     scene = test::sceneAround(rig, count, 0.4, random);
     for (std::size_t k = 0; k < count; ++k) {
       slots.push_back(static_cast<std::uint32_t>((7 * k + 3) % kMaxStates));
       frozen.push_back(random.uniform(0, 1) < share_frozen);
       RigPose& pose = poses[slots[k]] = scene.poses[k];
-      if (!frozen[k]) continue;
       const SE3& T = scene.states[k].T_world_body;
       const SE3 then(T.rotation * expSo3(randomVector(random, 0.01)),
                      T.translation + randomVector(random, 0.01));
+      const ScanTurn scan{randomVector(random, 2), randomVector(random, 2)};
       for (std::size_t c = 0; c < kMaxCameras; ++c) {
-        pose.linearization[c] = CameraPose::of(then, rig.T_body_cam[c]);
+        pose.place(c, rig.T_body_cam[c], T, frozen[k] ? &then : nullptr, readout, scan);
       }
     }
   }
@@ -66,6 +69,7 @@ struct Window {
         const bool used = random.uniform(0, 1) < 0.7;
         const Eigen::Vector3d measured = sign * (expSo3(randomVector(random, 0.004)) * ray.normalized());
         view = CameraSighting::of(measured, test::tangentWeight(measured, 450 / kPixelSigma));
+        view.row = static_cast<float>(random.uniform(-0.5, 0.5));
         view.used = used;
         // What is not used must not be read.
         if (!view.used) view.bearing.setConstant(std::numeric_limits<float>::quiet_NaN());
@@ -203,8 +207,8 @@ TEST_CASE("Lanes: a landmark eliminated in fours equals the scalar elimination",
       for (int trial = 0; trial < 4; ++trial) {
         INFO(count << " states, share frozen " << frozen << ", trial " << trial);
         const Landmark landmark = window.landmark(random);
-        // With the time offset, both cameras' extrinsics, both, none.
-        const CalibrationLayout layout{trial % 2 == 1, trial >= 2, window.rig.camera_count};
+        // With the time offset, both cameras' extrinsics, both and the readout, none.
+        const CalibrationLayout layout{trial % 2 == 1, trial >= 2, window.rig.camera_count, trial == 3};
         const Reduced lanes = Reduced::lanes(window, landmark, layout);
         const Reduced twin = Reduced::scalar(window, landmark, layout);
         REQUIRE(lanes.used == twin.used);
@@ -226,7 +230,7 @@ TEST_CASE("Lanes: a landmark that keeps its columns equals the scalar sum", "[sm
     const Window window(count, 0.4, random);
     for (int trial = 0; trial < 4; ++trial) {
       INFO(count << " states, trial " << trial);
-      const CalibrationLayout layout{trial % 2 == 1, trial >= 2, window.rig.camera_count};
+      const CalibrationLayout layout{trial % 2 == 1, trial >= 2, window.rig.camera_count, trial == 3};
       const Landmark landmark = window.landmark(random);
       const Eigen::Vector3d p = landmark.point.reference + 3 * landmark.point.bearing;
       const Eigen::Vector3d p_lin = p + randomVector(random, 0.02);

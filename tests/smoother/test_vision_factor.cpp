@@ -45,7 +45,14 @@ struct Case {
   SE3 T_body_cam;
   CameraSighting sighting;
   LandmarkPoint point;
+  RowMotion rows{};
 };
+
+CameraPose placed(const Case& c, const SE3& T_world_body, const SE3& T_body_cam) {
+  CameraPose camera = CameraPose::of(T_world_body, T_body_cam);
+  camera.rows = c.rows;
+  return camera;
+}
 
 // A camera anywhere, a point `angle` off its optical axis, measured with an error of some sigmas.
 Case randomCase(const CameraModel& camera, double angle, Random& random) {
@@ -64,13 +71,13 @@ Case randomCase(const CameraModel& camera, double angle, Random& random) {
 }
 
 void checkJacobians(const Case& c) {
-  const CameraPose camera = CameraPose::of(c.T_world_body, c.T_body_cam);
+  const CameraPose camera = placed(c, c.T_world_body, c.T_body_cam);
   const PointBasis basis = PointBasis::of(c.point.bearing);
   SightingJacobians J;
   REQUIRE(reprojectionJacobians(c.sighting, camera, c.T_body_cam, c.point, basis, true, J));
   const auto residual = [&](const SE3& T_world_body, const SE3& T_body_cam, const LandmarkPoint& point) {
     Eigen::Vector2d r;
-    REQUIRE(reprojectionResidual(c.sighting, CameraPose::of(T_world_body, T_body_cam), point, r));
+    REQUIRE(reprojectionResidual(c.sighting, placed(c, T_world_body, T_body_cam), point, r));
     return r;
   };
   const auto of_pose =
@@ -99,7 +106,54 @@ TEST_CASE("Reprojection Jacobians: pose, point and extrinsics", "[smoother][visi
     checkJacobians(randomCase(fisheye, random.uniform(0, 1.5), random));
     // Beyond 90 degrees, where z is negative.
     checkJacobians(randomCase(fisheye, random.uniform(1.6, 1.9), random));
+    Case rolling = randomCase(pinhole, random.uniform(0, 0.6), random);
+    rolling.sighting.row = static_cast<float>(random.uniform(-0.5, 0.5));
+    rolling.rows = {0.02, randomVector(random, 2), randomVector(random, 1), randomVector(random, 1)};
+    checkJacobians(rolling);
   }
+}
+
+TEST_CASE("A rolling shutter's residual is that of the camera when the row was read",
+          "[smoother][vision_factor]") {
+  Random random(15);
+  Rig rig = makeRig(RigKind::kEuroc).rig;
+  rig.readout = Duration::fromMilliseconds(30);
+  double largest = 0;
+  double untold = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    const SE3 T(expSo3(randomVector(random, 1.5)), randomVector(random, 3));
+    const Eigen::Vector3d omega = randomVector(random, 2);
+    const Eigen::Vector3d v = randomVector(random, 3);
+    RigPose rig_pose;
+    rig_pose.v_world = v;
+    std::array<bool, kMaxCameras> seen{};
+    std::array<Eigen::Vector2f, kMaxCameras> pixel{};
+    const Eigen::Vector3d at_middle(random.uniform(-1, 1), random.uniform(-0.7, 0.7), random.uniform(2, 10));
+    const Eigen::Vector3d p = T * rig.T_body_cam[0] * at_middle;
+    for (std::size_t c = 0; c < kMaxCameras; ++c) {
+      rig_pose.place(c, rig.T_body_cam[c], T, nullptr, rig.readout.seconds(), {omega, omega});
+      Eigen::Vector2d at(0, 240);
+      for (int round = 0; round < 8; ++round) {
+        const double t = rig.rowTime(c, at.y());
+        const SE3 then(T.rotation * expSo3(t * omega), T.translation + t * v);
+        seen[c] = rig.camera[c].project((then * rig.T_body_cam[c]).inverse() * p, at);
+      }
+      pixel[c] = at.cast<float>();
+    }
+    const Sighting sighting = makeSighting(rig, seen, pixel, kPixelSigma, 0);
+    const LandmarkPoint point = pointAt(rig_pose.current[0].center, p);
+    for (std::size_t c = 0; c < kMaxCameras; ++c) {
+      Eigen::Vector2d r;
+      if (!sighting.camera[c].used) continue;
+      REQUIRE(reprojectionResidual(sighting.camera[c], rig_pose.current[c], point, r));
+      largest = std::max(largest, kPixelSigma * r.norm());
+      const CameraPose global = CameraPose::of(T, rig.T_body_cam[c]);
+      REQUIRE(reprojectionResidual(sighting.camera[c], global, point, r));
+      untold = std::max(untold, kPixelSigma * r.norm());
+    }
+  }
+  CHECK(largest < 0.02);  // px: the lever arm turns while the rows are read, which is left out
+  CHECK(untold > 10);
 }
 
 TEST_CASE("Reprojection Jacobians at a point without depth", "[smoother][vision_factor]") {

@@ -192,6 +192,7 @@ void FuseRun::fuse(Stamp stamp, const StereoFrame* frame, const DepthImageView& 
   input.stamp = stamp;
   input.epoch = (continued_ ? continued_->epoch : 0) + static_cast<std::uint32_t>(pose->piece);
   input.T_map_body = pose->T_world_body;
+  input.scan = log_.poses().scanAt(stamp, rig_.readout);
   input.depth = depth;
   if (frame != nullptr) input.image = frame->image;
   if (settings_.map_stage.labels) input.labels = labels_.at(stamp);

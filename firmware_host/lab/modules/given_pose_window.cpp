@@ -40,6 +40,7 @@ std::size_t worstSighting(const Eigen::Vector3d& point, const std::vector<Eigen:
 GivenPoseWindow::GivenPoseWindow(const Rig& rig, const GivenPoseSettings& settings)
     : rig_(rig), settings_(settings) {
   window_.calibration.camera_to_imu_shift = rig.camera_to_imu_shift;
+  window_.calibration.readout = rig.readout;
   window_.calibration.T_body_cam = rig.T_body_cam;
 }
 
@@ -84,7 +85,7 @@ void GivenPoseWindow::add(const TrackedFrame& tracked, const SE3& T_world_body) 
     velocity = (T_world_body.translation - states_.back().T_world_body.translation) /
                (stamp - states_.back().stamp).seconds();
   }
-  states_.push_back({stamp, tracked.index, tracked.keyframe, T_world_body});
+  states_.push_back({stamp, tracked.index, tracked.keyframe, T_world_body, {}});
   addViews(tracked, T_world_body);
   trim();
   window_.started = true;

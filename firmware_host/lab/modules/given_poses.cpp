@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "drivers/calibration/input_error.hpp"
+#include "estimator/geometry/so3.hpp"
 #include "firmware_host/lab/evaluation/association.hpp"
 
 namespace swiftlet {
@@ -73,6 +74,23 @@ std::optional<GivenPoses::Pose> GivenPoses::at(Stamp stamp) const {
   const bool across = after->stamp != stamp && jump != jumps_.end() && *jump == index;
   if (across) return std::nullopt;
   return Pose{*pose, static_cast<std::size_t>(std::ranges::upper_bound(jumps_, index) - jumps_.begin())};
+}
+
+ScanMotion GivenPoses::scanAt(Stamp stamp, Duration readout) const {
+  if (readout.ns == 0) return {};
+  const Duration half{readout.ns / 2};
+  const auto before = at(stamp - half);
+  const auto middle = at(stamp);
+  const auto after = at(stamp + half);
+  if (!before || !middle || !after) return {};
+  const double seconds = half.seconds();
+  const SE3& T = middle->T_world_body;
+  ScanMotion motion;
+  motion.turn.before = logSo3(before->T_world_body.rotation.conjugate() * T.rotation) / seconds;
+  motion.turn.after = logSo3(T.rotation.conjugate() * after->T_world_body.rotation) / seconds;
+  motion.v_body = T.rotation.conjugate() *
+                  (after->T_world_body.translation - before->T_world_body.translation) / (2 * seconds);
+  return motion;
 }
 
 }  // namespace swiftlet

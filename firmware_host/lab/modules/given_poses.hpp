@@ -12,6 +12,7 @@
 
 #include "drivers/recorded/log_source.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
+#include "estimator/messages/scan_motion.hpp"
 
 namespace swiftlet {
 
@@ -38,6 +39,9 @@ class GivenPoses {
   [[nodiscard]] const std::string& name() const { return name_; }
 
   [[nodiscard]] std::optional<Pose> at(Stamp stamp) const;
+  /// How the body moved between half a readout before a stamp and half of one after it; zero where there are
+  /// no poses about it.
+  [[nodiscard]] ScanMotion scanAt(Stamp stamp, Duration readout) const;
   /// Where the poses jump: how often, and `what` each jump does.
   void warnOfJumps(const char* what, LogWarnings& warnings) const;
   /// Refuses a run in which no `what`, the first and last of which were at these stamps, had a pose.
