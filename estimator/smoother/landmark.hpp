@@ -11,7 +11,7 @@
 // 90 degrees, without evaluating the lens model in the solver. With a rolling shutter m and W are
 // turned to the axes of the image's middle row (RowMotion), and center_i is where the camera was at the
 // sighting's own row.
-// Memory: 2.1 kB a landmark of the window. Equations and Jacobians: docs/smoother.md.
+// Memory: 2.3 kB a landmark of the window. Equations and Jacobians: docs/smoother.md.
 
 #include <Eigen/Core>
 #include <algorithm>

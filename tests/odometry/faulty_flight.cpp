@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
 
 #include "estimator/core/random.hpp"
@@ -25,6 +24,7 @@ double signedUniform(Random& random, double low, double high) {
 
 SimulationSettings settingsWith(SimulationSettings settings, RigFault fault, Random& random) {
   if (fault == RigFault::kLate) settings.first_image += 0.2;  // no sample is missing when stamps are early
+  if (fault == RigFault::kRolling) settings.render.readout = kReadout;
   if (fault == RigFault::kBlur) {
     settings.tracks.pixel_sigma = random.uniform(3, 6);
     settings.tracks.mean_lifetime = kBlurredLifetime;
@@ -49,6 +49,8 @@ void spoilCalibration(RigFault fault, Random& random, GivenFlight& out) {
     const double angle = random.uniform(3, 20) * std::numbers::pi / 180;
     const Eigen::Quaterniond turn = expSo3(angle * randomDirection(random));
     for (SE3& T : out.rig.T_body_cam) T.rotation = turn * T.rotation;
+  } else if (fault == RigFault::kRolling) {
+    out.rig.readout = Duration{};
   } else if (fault == RigFault::kLoud || fault == RigFault::kQuiet) {
     const double factor = fault == RigFault::kLoud ? 10 : 0.1;
     for (double* const density :
@@ -77,24 +79,6 @@ void jitter(Random& random, std::vector<Stamp>& stamps) {
     stamps[k] = stamps[k] + Duration::fromSeconds(kJitterSigma * random.normal());
     if (k == 0) continue;
     stamps[k] = std::max(stamps[k], stamps[k - 1] + Duration::fromMilliseconds(1));
-  }
-}
-
-// Each row is seen at its own time: along the line from where the track is to where it is next.
-void roll(const Rig& rig, std::vector<TrackedFrame>& frames) {
-  for (std::size_t k = 0; k + 1 < frames.size(); ++k) {
-    const double dt = (frames[k + 1].stamp - frames[k].stamp).seconds();
-    std::map<TrackId, const TrackedFeature*> next;
-    for (const TrackedFeature& feature : frames[k + 1].features) next[feature.id] = &feature;
-    for (TrackedFeature& feature : frames[k].features) {
-      const auto found = next.find(feature.id);
-      for (std::size_t c = 0; c < kMaxCameras; ++c) {
-        if (!feature.seen[c] || found == next.end() || !found->second->seen[c]) continue;
-        const float row = feature.pixel[c].y() / static_cast<float>(rig.camera[c].height()) - 0.5F;
-        const auto share = static_cast<float>(kReadout / dt) * row;
-        feature.pixel[c] += share * (found->second->pixel[c] - feature.pixel[c]);
-      }
-    }
   }
 }
 
@@ -144,7 +128,6 @@ FaultyFlight::FaultyFlight(const SimulationSettings& settings, RigFault fault, s
       }()),
       given{flight.rig(), flight.noise(), flight.flight().imu().samples, {}},
       frames(flight.frames()) {
-  if (fault == RigFault::kRolling) roll(given.rig, frames);
   if (fault == RigFault::kMoving) {
     Random random(seed, kStream + 1);
     moveScene(random, *this);
