@@ -58,15 +58,16 @@ struct Event {
 struct FrameStatistics {
   bool keyframe = false;
   bool at_rest = false;
-  int tracks = 0;               ///< features handed in
-  int known = 0;                ///< of these, features whose landmark has earlier sightings in the window
-  int landmarks = 0;            ///< landmarks in the solved window
-  int inliers_mono = 0;         ///< accepted sightings of this frame, by one camera
-  int inliers_stereo = 0;       ///< accepted, by both cameras
-  double track_length = 0;      ///< mean frames a track of this frame has lived
-  double reprojection_rms = 0;  ///< px, accepted sightings of the window
-  NoiseInUse noise;             ///< for this frame's sightings and the motion to it
-  double imu_residual = 0;      ///< whitened IMU residuals of the window, RMS (1: as the noise in use says)
+  int tracks = 0;                   ///< features handed in
+  int known = 0;                    ///< of these, features whose landmark has earlier sightings in the window
+  int landmarks = 0;                ///< landmarks in the solved window
+  int inliers_mono = 0;             ///< accepted sightings of this frame, by one camera
+  int inliers_stereo = 0;           ///< accepted, by both cameras
+  double track_length = 0;          ///< mean frames a track of this frame has lived
+  double reprojection_rms = 0;      ///< px, accepted sightings of the window
+  NoiseInUse noise;                 ///< for this frame's sightings and the motion to it
+  double pose_variance_factor = 1;  ///< in the covariances, for tracks whose errors last
+  double imu_residual = 0;  ///< whitened IMU residuals of the window, RMS (1: as the noise in use says)
   /// One camera: true over estimated length, as the accelerometer says, and its sigma (scale_check.hpp).
   double scale = 1;
   double scale_sigma = 0;

@@ -79,7 +79,7 @@ void HealthMonitor::average(const Evidence& evidence, double seconds) {
   if (s.known >= kMinSightings)
     share_ = lowPass(share_, std::min(1.0, fit / static_cast<double>(s.known)), seconds);
   // Noise of tracks alone would not make the IMU's residuals larger, but weigh the tracks less against it.
-  const double disagreement = s.imu_residual * std::max(1.0, s.noise.pixel_sigma / pixel_sigma_);
+  const double disagreement = s.imu_residual * s.noise.pixel_sigma / pixel_sigma_;
   imu_square_ = lowPass(imu_square_, disagreement * disagreement, seconds);
   if (seconds > 0) {
     acceleration_ =

@@ -1,6 +1,7 @@
 #include "estimator/smoother/smoother.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -9,6 +10,11 @@
 #include "estimator/smoother/window_trim.hpp"
 
 namespace swiftlet {
+namespace {
+
+constexpr double kOutlierSigmas = 3.5;  // of a residual that says something of its track's errors
+
+}  // namespace
 
 Smoother::Smoother(const Rig& rig, const ImuNoise& noise, const SmootherSettings& settings)
     : settings_(settings),
@@ -139,11 +145,50 @@ void Smoother::updateStatistics() {
   if (problem_.rig.camera_count == 1) residuals.accel = 0;
   statistics_.imu_residual = std::sqrt(residuals.all);
   statistics_.noise.imu = state.imu_factors;
+  statistics_.pose_variance_factor = track_correlation_.varianceFactor();
   problem_.imu_excess.update(residuals, state.link_duration);
   statistics_.keyframe = state.keyframe;
   statistics_.at_rest = state.rest != 0;
   state.statistics = statistics_;
   if (solver_.medianSquare() > 0) pixel_noise_.update(solver_.medianSquare(), state.link_duration);
+  if (state.keyframe) updateTrackCorrelation();
+}
+
+// Of the two newest keyframes that stay: the newest frames and one more stand behind them.
+void Smoother::updateTrackCorrelation() {
+  const Window& window = problem_.window;
+  const std::size_t recent = static_cast<std::size_t>(settings_.max_recent) + 1;
+  if (window.size() < recent + 2) return;
+  const WindowState& last = window[window.size() - recent - 1];
+  const WindowState& before = window[window.size() - recent - 2];
+  const auto slots =
+      std::array{window.order()[window.size() - recent - 2], window.order()[window.size() - recent - 1]};
+  double product = 0;
+  double square = 0;
+  for (const Landmark& landmark : problem_.landmarks) {
+    if (!landmark.in_system) continue;
+    std::array<const Sighting*, 2> seen{};
+    for (const Sighting& sighting : landmark.sightings) {
+      if (sighting.slot == slots[0]) seen[0] = &sighting;
+      if (sighting.slot == slots[1]) seen[1] = &sighting;
+    }
+    if (seen[0] == nullptr || seen[1] == nullptr) continue;
+    for (std::size_t c = 0; c < problem_.rig.camera_count; ++c) {
+      std::array<Eigen::Vector2d, 2> r;
+      bool fits = true;
+      for (std::size_t k = 0; fits && k < 2; ++k) {
+        const CameraSighting& view = seen[k]->camera[c];
+        fits = view.used &&
+               reprojectionResidual(view, problem_.rig_poses[slots[k]].current[c], landmark.point, r[k]) &&
+               r[k].squaredNorm() < kOutlierSigmas * kOutlierSigmas;
+      }
+      if (!fits) continue;
+      product += r[0].dot(r[1]);
+      square += 0.5 * (r[0].squaredNorm() + r[1].squaredNorm());
+    }
+  }
+  track_correlation_.update(product, square, (last.stamp - before.stamp).seconds());
+  covariance_.setPoseVarianceFactor(track_correlation_.varianceFactor());
 }
 
 void Smoother::trim(FixedVector<KeyframeState, kMaxStates>& left_window) {

@@ -36,6 +36,7 @@
 #include "estimator/smoother/marginalization.hpp"
 #include "estimator/smoother/normal_equations.hpp"
 #include "estimator/smoother/pixel_noise.hpp"
+#include "estimator/smoother/track_correlation.hpp"
 #include "estimator/smoother/window_covariance.hpp"
 #include "estimator/smoother/window_problem.hpp"
 #include "estimator/smoother/window_solver.hpp"
@@ -43,7 +44,7 @@
 namespace swiftlet {
 
 struct SmootherSettings {
-  double pixel_sigma = kTrackPixelSigma;  ///< px, at least: raised where the tracks fit worse
+  double pixel_sigma = kTrackPixelSigma;  ///< px, to begin with: found in flight (pixel_noise.hpp)
   double horizon = 30.0;                  ///< s
   int max_recent = 4;                     ///< newest frames, keyframe or not, that stay whole
   int max_motion_keyframes = 5;           ///< keyframes behind them that keep velocity and biases
@@ -182,9 +183,11 @@ class Smoother {
   void addSightings(const TrackedFrame& frame, int max_features);
   [[nodiscard]] ScanTurn turnOfRows(const WindowState& state) const;
   void updateStatistics();
+  void updateTrackCorrelation();
 
   SmootherSettings settings_;
   PixelNoise pixel_noise_;
+  TrackCorrelation track_correlation_;
   WindowProblem problem_;
   NormalEquations system_;
   WindowSolver solver_;

@@ -1,10 +1,21 @@
 #include "estimator/smoother/window_covariance.hpp"
 
 #include <Eigen/Cholesky>
+#include <cmath>
 
 #include "estimator/geometry/so3.hpp"
 
 namespace swiftlet {
+namespace {
+
+// Correlations stay as they are.
+void scalePose(double factor, Matrix15d& covariance) {
+  const double sigmas = std::sqrt(factor);
+  covariance.topRows<kPoseDim>() *= sigmas;
+  covariance.leftCols<kPoseDim>() *= sigmas;
+}
+
+}  // namespace
 
 WindowCovariance::WindowCovariance()
     : factor_(alignedMapSize(kMaxSystemDim)),
@@ -31,6 +42,7 @@ void WindowCovariance::take(NormalEquations& system, WindowProblem& problem) {
   }
   const Matrix15d inverse = corner.triangularView<Eigen::Lower>().solve(Matrix15d::Identity());
   newest_ = inverse.transpose() * inverse;
+  scalePose(factor_of_poses_, newest_);
 }
 
 void WindowCovariance::solveColumns(int offset, int count, std::vector<double>& columns) {
@@ -67,7 +79,7 @@ bool WindowCovariance::relative(const WindowState& a, const WindowState& b,
   J.block<3, 3>(3, 0) = hat(p_i_j);
   J.block<3, 3>(3, 3) = -R_i_t;
   J.block<3, 3>(3, 9) = R_i_t;
-  covariance = J * joint * J.transpose();
+  covariance = factor_of_poses_ * J * joint * J.transpose();
   return true;
 }
 
@@ -77,7 +89,7 @@ bool WindowCovariance::calibration(int dimension, CalibrationMatrix& covariance)
   const Eigen::Map<
       const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxSystemDim, kMaxCalibrationDim>>
       Y(columns_i_.data(), dimension_, dimension);
-  covariance = Y.transpose() * Y;
+  covariance = factor_of_poses_ * Y.transpose() * Y;
   return true;
 }
 
@@ -87,7 +99,7 @@ Eigen::Matrix3d WindowCovariance::of(const ExtraState& extra) {
   const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, kExtraDim>> Y(columns_i_.data(), dimension_,
                                                                              kExtraDim);
   Eigen::Matrix3d covariance;
-  covariance.noalias() = Y.transpose() * Y;
+  covariance.noalias() = factor_of_poses_ * Y.transpose() * Y;
   return covariance;
 }
 
@@ -110,6 +122,7 @@ KeyframeState WindowCovariance::record(const WindowState& state) {
   const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxSystemDim, kStateDim>>
       Y(columns_i_.data(), dimension_, count);
   keyframe.state.covariance.topLeftCorner(count, count) = Y.transpose() * Y;
+  scalePose(factor_of_poses_, keyframe.state.covariance);
   return keyframe;
 }
 

@@ -1,8 +1,10 @@
 #pragma once
 // Covariances of the window from the factor of its last solve, which outlives the system.
 //
-// covariance(a, b) = Y_a^T Y_b with Y = L^-1 of the columns asked for. Error states as in state.hpp and
-// extra_states.hpp. Memory: 2.8 MiB, reserved by the constructor. Cost: a triangular solve a column.
+// covariance(a, b) = Y_a^T Y_b with Y = L^-1 of the columns asked for, times the pose variance factor where
+// images decide: poses, calibration, landmarks and planes. Velocity and biases, the IMU's, go without. Error
+// states as in state.hpp and extra_states.hpp. Memory: 2.8 MiB, reserved by the constructor. Cost: a
+// triangular solve a column.
 
 #include <Eigen/Core>
 #include <optional>
@@ -24,6 +26,9 @@ class WindowCovariance {
   /// Takes the factor L out of the system, and notes where the variables stand in it.
   void take(NormalEquations& system, WindowProblem& problem);
   [[nodiscard]] MatrixMap factor() { return alignedMap(factor_, dimension_); }
+
+  /// Of what is given out from now on (track_correlation.hpp).
+  void setPoseVarianceFactor(double factor) { factor_of_poses_ = factor; }
 
   /// Of the newest state of the last solve.
   [[nodiscard]] const Matrix15d& newest() const { return newest_; }
@@ -47,6 +52,7 @@ class WindowCovariance {
   std::vector<double> columns_i_;
   std::vector<double> columns_j_;
   int dimension_ = 0;
+  double factor_of_poses_ = 1;
   Matrix15d newest_ = Matrix15d::Zero();
 };
 

@@ -67,8 +67,9 @@ void RunVerdict::add(Stamp stamp, const OdometryOutput& output) {
   calibration_ = output.calibration;
   top_speed_ = std::max(top_speed_, output.state.v_world_body.norm());
   const double pixel_sigma = output.statistics.noise.pixel_sigma;
-  least_pixel_sigma_ = std::min(least_pixel_sigma_, pixel_sigma);
+  if (state_seconds_ == 0) first_pixel_sigma_ = pixel_sigma;
   pixel_sigma_s_ += seconds * pixel_sigma;
+  pose_variance_factor_s_ += seconds * output.statistics.pose_variance_factor;
   gyro_factor_s_ += seconds * output.statistics.noise.imu.gyro;
   accel_factor_s_ += seconds * output.statistics.noise.imu.accel;
   state_seconds_ += seconds;
@@ -102,6 +103,7 @@ Json RunVerdict::json() const {
   json["largest_velocity_sigma_good_m_s"] = largest_velocity_sigma_;
   json["largest_tilt_sigma_good_deg"] = kDegrees * largest_tilt_sigma_;
   json["mean_pixel_sigma_px"] = mean(pixel_sigma_s_);
+  json["mean_pose_variance_factor"] = mean(pose_variance_factor_s_);
   json["mean_gyro_factor"] = mean(gyro_factor_s_);
   json["mean_accel_factor"] = mean(accel_factor_s_);
   if (calibration_ && !calibration_->gyro.matrix.isZero()) {
@@ -150,11 +152,11 @@ std::vector<std::string> RunVerdict::words() const {
                          largest_velocity_sigma_, kDegrees * largest_tilt_sigma_);
   }
   std::vector<std::string> words{first};
-  if (mean(pixel_sigma_s_) > kNoisyTracks * least_pixel_sigma_) {
+  if (mean(pixel_sigma_s_) > kNoisyTracks * first_pixel_sigma_) {
     words.push_back(
         fmt::format("  tracks fit to {:.1f} px on average, smoother.pixel_sigma is {:.2f}: "
                     "calibration, rolling shutter, stamps or motion blur",
-                    mean(pixel_sigma_s_), least_pixel_sigma_));
+                    mean(pixel_sigma_s_), first_pixel_sigma_));
   }
   for (const auto& [sensor, sum] : {std::pair("gyro", gyro_factor_s_), std::pair("accel", accel_factor_s_)}) {
     if (mean(sum) < kNoisyImu) continue;

@@ -5,7 +5,6 @@
 // Added to frame by frame; constant memory.
 
 #include <array>
-#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -42,7 +41,8 @@ class RunVerdict {
   double state_seconds_ = 0;
   double pixel_sigma_s_ = 0;                       ///< px s, over the time with a state
   double gyro_factor_s_ = 0, accel_factor_s_ = 0;  ///< s, likewise
-  double least_pixel_sigma_ = std::numeric_limits<double>::infinity();
+  double first_pixel_sigma_ = 0;                   ///< as set
+  double pose_variance_factor_s_ = 0;
   double top_speed_ = 0;                                        ///< m/s
   double largest_velocity_sigma_ = 0, largest_tilt_sigma_ = 0;  ///< m/s, rad, while good
   std::optional<CalibrationEstimate> calibration_;              ///< the newest

@@ -1,9 +1,10 @@
-// The noise of tracks is found from their residuals, and only ever raised.
+// The noise of tracks is found from their residuals, and how long their errors last.
 
 #include <algorithm>
 #include <catch2/catch.hpp>
 
 #include "estimator/smoother/pixel_noise.hpp"
+#include "estimator/smoother/track_correlation.hpp"
 #include "tests/odometry/odometry_run.hpp"
 
 using namespace swiftlet;
@@ -32,7 +33,7 @@ double worstVelocity(const OdometryRun& run, double from) {
 
 }  // namespace
 
-TEST_CASE("Pixel noise: follows residuals, between once and fifteen times what is set", "[odometry]") {
+TEST_CASE("Pixel noise: follows residuals, between 0.55 and fifteen times what is set", "[odometry]") {
   PixelNoise noise(0.5);
   CHECK(noise.sigma() == 0.5);
   const auto after = [&noise](double sigma) {  // residuals of tracks with that noise, for 20 s
@@ -41,11 +42,11 @@ TEST_CASE("Pixel noise: follows residuals, between once and fifteen times what i
     }
     return noise.sigma();
   };
-  CHECK(after(0.1) == 0.5);
+  CHECK(after(0.1) == Approx(0.5 / 1.8));
+  CHECK(after(0.4) == Approx(0.4).epsilon(0.01));
   CHECK(after(2.0) == Approx(2.0).epsilon(0.01));
   CHECK(after(50.0) == Approx(7.5).epsilon(0.01));
   CHECK(after(0.6) == Approx(0.6).epsilon(0.01));
-  CHECK(after(0.1) == 0.5);
 }
 
 TEST_CASE("Odometry: tracks four times as noisy as set are weighted as they are", "[odometry]") {
@@ -56,6 +57,22 @@ TEST_CASE("Odometry: tracks four times as noisy as set are weighted as they are"
     CHECK(run.frames.back().state.epoch == 0);
     CHECK(worstVelocity(run, 6) < 0.25);
   }
+}
+
+TEST_CASE("Track correlation: a pose's variance grows with what lasts", "[odometry]") {
+  TrackCorrelation tracks;
+  CHECK(tracks.varianceFactor() == 1);
+  for (int k = 0; k < 100; ++k) tracks.update(-7, 100, 0.25);
+  CHECK(tracks.varianceFactor() == 1);
+  for (int k = 0; k < 200; ++k) tracks.update(50, 100, 0.25);
+  CHECK(tracks.varianceFactor() == Approx(2).epsilon(0.01));
+  for (int k = 0; k < 200; ++k) tracks.update(99, 100, 0.25);
+  CHECK(tracks.varianceFactor() == Approx(4));
+}
+
+TEST_CASE("Odometry: independent errors of tracks leave the covariance as it is", "[odometry]") {
+  const OdometryRun run = noisyRun(0.5, true);
+  CHECK(run.frames.back().statistics.pose_variance_factor < 1.1);
 }
 
 TEST_CASE("Odometry: tracks as noisy as set leave the noise as it is", "[odometry]") {
