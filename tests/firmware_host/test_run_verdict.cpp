@@ -46,3 +46,27 @@ TEST_CASE("run verdict: shares of time, doubts, sigmas and the estimated calibra
   CHECK(words[0].find("good 60.0 %") != std::string::npos);
   CHECK(words[2].find("3.0 s tracks_disagree: ") != std::string::npos);
 }
+
+TEST_CASE("run verdict: what is found of sensors and tracks", "[verdict]") {
+  RunVerdict verdict;
+  auto output = std::make_unique<OdometryOutput>();
+  output->has_state = true;
+  output->state.health = Health::kGood;
+  output->statistics.pose_variance_factor = 1.6;
+  output->statistics.noise.imu.gyro = 3.1;
+  output->calibration.gyro.matrix(0, 1) = 0.01;
+  output->calibration.shift_sigma = 1e-4;
+  output->calibration.readout = Duration::fromMilliseconds(20);
+  output->calibration.readout_sigma = 5e-5;
+  for (int k = 0; k < 41; ++k) verdict.add(Stamp{k * 50'000'000LL}, *output);
+  const auto json = verdict.json();
+  CHECK(json["mean_pose_variance_factor"].get<double>() == Approx(1.6));
+  CHECK(json["mean_gyro_factor"].get<double>() == Approx(3.1));
+  CHECK(json["mean_accel_factor"].get<double>() == Approx(1));
+  CHECK(json["gyro_matrix"][0][1].get<double>() == Approx(0.01));
+  CHECK(json["estimated_calibration"]["readout_s"].get<double>() == Approx(0.02));
+  CHECK(json["estimated_calibration"]["readout_sigma_s"].get<double>() == Approx(5e-5));
+  const auto words = json["in_words"].get<std::vector<std::string>>();
+  REQUIRE(words.size() == 2);
+  CHECK(words[1].find("the gyro errs 3.1 times as much") != std::string::npos);
+}
