@@ -31,6 +31,10 @@ class CameraScan {
   [[nodiscard]] Eigen::Vector3d fromRow(const Eigen::Vector3d& p, double seconds) const {
     return turnAt(seconds) * p + seconds * velocity_;
   }
+  /// m/s: how a point that stands still moves in the camera's axes, on the mean over the rows.
+  [[nodiscard]] Eigen::Vector3d flow(const Eigen::Vector3d& p) const {
+    return -(R_cam_body_ * turn_.mean()).cross(p) - velocity_;
+  }
 
  private:
   Eigen::Quaterniond R_cam_body_;

@@ -81,8 +81,7 @@ MapStage::Sensor::Sensor(const DepthImageView& camera, const Rig& rig, const Map
 
 MapStage::Pair::Pair(const Rig& rig, const MapSettings& settings)
     : depth(rig, depthSettings(settings)), buffer(depth.makeBuffer()) {
-  const StereoRectification& ideal = depth.rectification();
-  if (rig.rolls() && depth.status().ok()) unrolled.emplace(rig, ideal.intrinsics(), ideal.T_body_camera());
+  if (rig.rolls() && depth.status().ok()) unrolled.emplace(rig, depth.rectification());
 }
 
 MapStage::MapStage(const Rig& rig, const MapSettings& settings, const DepthImageView* depth_sensor,
