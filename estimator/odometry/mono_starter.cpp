@@ -41,8 +41,9 @@ std::size_t MonoStarter::gatherTracks(std::span<const std::size_t> chosen, const
                                       const Eigen::Vector3d& bias_gyro) {
   std::size_t count = 0;
   for (std::size_t k = 0; k < chosen.size(); ++k) {
-    const CameraScan scan(rig_.T_body_cam[0],
-                          {turnOfRows(frame(chosen[k]).stamp, imu, bias_gyro), Eigen::Vector3d::Zero()});
+    const Stamp stamp = frame(chosen[k]).stamp + rig_.camera_to_imu_shift;
+    const ScanTurn turn = imu.scanTurnAt(stamp, rig_.readout, bias_gyro, {});
+    const CameraScan scan(rig_.T_body_cam[0], {turn, Eigen::Vector3d::Zero()});
     for (const TrackedFeature& feature : frame(chosen[k]).features) {
       Eigen::Vector3d bearing;
       if (!feature.seen[0] || !rig_.camera[0].unproject(feature.pixel[0].cast<double>(), bearing)) continue;
@@ -67,12 +68,6 @@ std::size_t MonoStarter::gatherTracks(std::span<const std::size_t> chosen, const
     if (std::popcount(tracks_[i].seen) >= kMinSightings) tracks_[kept++] = tracks_[i];
   }
   return kept;
-}
-
-ScanTurn MonoStarter::turnOfRows(Stamp image, const ImuBuffer& imu, const Eigen::Vector3d& bias_gyro) const {
-  if (!rig_.rolls() || imu.empty()) return {};
-  const Stamp stamp = image + rig_.camera_to_imu_shift;
-  return scanTurn(imu.around(stamp - rig_.readout, stamp + rig_.readout), stamp, rig_.readout, bias_gyro, {});
 }
 
 bool MonoStarter::trySolve(const ImuBuffer& imu, const StartPrior& prior, double pixel_sigma,

@@ -13,7 +13,6 @@
 #include "estimator/camera/rig.hpp"
 #include "estimator/imu/initialization.hpp"
 #include "estimator/imu/mono_start.hpp"
-#include "estimator/imu/scan_turn.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/smoother/imu_buffer.hpp"
 #include "estimator/smoother/smoother.hpp"
@@ -46,8 +45,6 @@ class MonoStarter {
  private:
   [[nodiscard]] std::size_t gatherTracks(std::span<const std::size_t> chosen, const ImuBuffer& imu,
                                          const Eigen::Vector3d& bias_gyro);
-  [[nodiscard]] ScanTurn turnOfRows(Stamp image, const ImuBuffer& imu,
-                                    const Eigen::Vector3d& bias_gyro) const;
 
   Rig rig_;
   ImuNoise noise_;

@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "estimator/imu/preintegration.hpp"
-#include "estimator/imu/scan_turn.hpp"
 #include "estimator/messages/camera_scan.hpp"
 #include "estimator/odometry/stamp_guard.hpp"
 
@@ -132,10 +131,7 @@ void TrackStage::predict(Stamp stamp) {
   if (!turn.integrate(imu_.around(from, to), from, to).ok()) return;
   prediction_.has_rotation = true;
   prediction_.R_body_prev_body_cur = turn.deltaRotation();
-  if (rig_.rolls()) {
-    prediction_.scan = scanTurn(imu_.around(to - rig_.readout, to + rig_.readout), to, rig_.readout, bias,
-                                window_.calibration.gyro);
-  }
+  prediction_.scan = imu_.scanTurnAt(to, rig_.readout, bias, window_.calibration.gyro);
   if (window_.started && propagator_.hasState()) predictLandmarks(to);
 }
 

@@ -4,10 +4,12 @@
 // array, compacted when its end is reached). Full is normal: the oldest samples go first.
 // Memory: twice `capacity` samples of 56 bytes, reserved by the constructor.
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <span>
 #include <vector>
 
+#include "estimator/imu/scan_turn.hpp"
 #include "estimator/messages/imu_sample.hpp"
 
 namespace swiftlet {
@@ -44,6 +46,13 @@ class ImuBuffer {
     if (low != first && (low == last || low->stamp > from)) --low;
     if (high != last) ++high;
     return {&*low, static_cast<std::size_t>(high - low)};
+  }
+
+  /// Of the rows of an image whose middle one was read at `middle`, as far as samples go; none without them.
+  [[nodiscard]] ScanTurn scanTurnAt(Stamp middle, Duration readout, const Eigen::Vector3d& bias_gyro,
+                                    const GyroIntrinsics& intrinsics) const {
+    if (empty() || readout.ns == 0) return {};
+    return scanTurn(around(middle - readout, middle + readout), middle, readout, bias_gyro, intrinsics);
   }
 
  private:

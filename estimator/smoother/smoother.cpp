@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "estimator/imu/scan_turn.hpp"
 #include "estimator/smoother/window_factors.hpp"
 #include "estimator/smoother/window_trim.hpp"
 
@@ -61,14 +60,8 @@ void Smoother::addState(const StepInput& input) {
   const auto samples = problem_.imu.around(state.stamp, state.stamp);
   if (!samples.empty())
     state.omega_body = problem_.intrinsics.now().rate(samples.front().gyro) - state.x.bias_gyro;
-  state.scan = turnOfRows(state);
-}
-
-ScanTurn Smoother::turnOfRows(const WindowState& state) const {
-  const Duration readout = problem_.rig.readout;
-  if (!problem_.rig.rolls()) return {};
-  return scanTurn(problem_.imu.around(state.stamp - readout, state.stamp + readout), state.stamp, readout,
-                  state.x.bias_gyro, problem_.intrinsics.now());
+  state.scan = problem_.imu.scanTurnAt(state.stamp, problem_.rig.readout, state.x.bias_gyro,
+                                       problem_.intrinsics.now());
 }
 
 void Smoother::linkState(WindowState& state, const WindowState& previous, bool gap) const {

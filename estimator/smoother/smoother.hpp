@@ -181,7 +181,6 @@ class Smoother {
   void linkState(WindowState& state, const WindowState& previous, bool gap) const;
   [[nodiscard]] TrackId newestIdTaken(const TrackedFrame& frame, int max_features);
   void addSightings(const TrackedFrame& frame, int max_features);
-  [[nodiscard]] ScanTurn turnOfRows(const WindowState& state) const;
   void updateStatistics();
   void updateTrackCorrelation();
 

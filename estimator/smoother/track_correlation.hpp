@@ -3,8 +3,8 @@
 //
 // A patch that is found beside its place is found there in the next keyframe too: what is averaged over a
 // track's sightings is known less well than their number says. The residuals' correlation r from one keyframe
-// to the next is 0 where errors are independent (a little less: a point is fitted to them) and some 0.4 to
-// 0.6 on images. For a constant seen at equal times the variance is (1 + r) / (1 - r) times that of
+// to the next is 0 where errors are independent (a little less: a point is fitted to them) and some 0.3 to
+// 0.5 on images. For a constant seen at equal times the variance is (1 + r) / (1 - r) times that of
 // independent sightings (an autoregressive error of first order); the part that a landmark's point takes up
 // does no harm, so poses get 1 / (1 - r). On eleven rendered flights that makes their NEES 6.
 // The factor is for covariances that are given out; weights stay as they are. O(1), no memory.

@@ -39,10 +39,10 @@ class RunVerdict {
   std::map<Doubt, double> by_doubt_;   ///< s
   std::uint32_t resets_ = 0;
   double state_seconds_ = 0;
-  double pixel_sigma_s_ = 0;                       ///< px s, over the time with a state
-  double gyro_factor_s_ = 0, accel_factor_s_ = 0;  ///< s, likewise
-  double first_pixel_sigma_ = 0;                   ///< as set
-  double pose_variance_factor_s_ = 0;
+  double pixel_sigma_s_ = 0;                                    ///< px s, over the time with a state
+  double gyro_factor_s_ = 0, accel_factor_s_ = 0;               ///< s, likewise
+  double first_pixel_sigma_ = 0;                                ///< as set
+  double pose_variance_factor_s_ = 0;                           ///< s, over the time with a state
   double top_speed_ = 0;                                        ///< m/s
   double largest_velocity_sigma_ = 0, largest_tilt_sigma_ = 0;  ///< m/s, rad, while good
   std::optional<CalibrationEstimate> calibration_;              ///< the newest
