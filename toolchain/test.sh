@@ -30,7 +30,7 @@ beyond='long|campaign|guide' # labels of what only --all runs
 parsers='drivers_calibration drivers_can drivers_image_decoder drivers_mavlink drivers_serial'
 # What shares memory between threads, the threads of devices, autopilot and viewers, and the whole executor on a second
 # of a log.
-threads='added_node autopilot core follower late_labels live realtime supervisor threaded view'
+threads='added_node autopilot core distance follower late_labels live realtime supervisor threaded view'
 jobs=$(nproc)
 began=$(date +%s)
 left_out=''
@@ -158,7 +158,7 @@ if [ $all_sets = yes ]; then
 fi
 # Short lists first: what is left of half an hour is enough for them.
 if [ $all_sets = no ]; then
-  sanitized tsan 1 "carriers under the thread sanitizer" core
+  sanitized tsan 2 "carriers and distance field under the thread sanitizer" 'core distance'
   sanitized asan 4 "parsers under address and undefined sanitizers" "$parsers"
 fi
 sanitized tsan 15 "threads under the thread sanitizer" "$threads"

@@ -1,33 +1,97 @@
 #include "mapping/distance/distance_field.hpp"
 
-#include <array>
-
-#include "mapping/distance/distance_word.hpp"
+#include <cmath>
+#include <cstring>
 
 namespace swiftlet {
 namespace {
 
-constexpr std::uint32_t kNone = 0xFFFFFFFF;
-// Buckets of the queue to a cell of distance: waves run outwards evenly enough that few cells are taken
-// twice.
-constexpr float kBucketsPerCell = 4;
-// A cell takes another surface that is nearer by more than this [cells]: what is as good makes no waves. On
-// the way from a cell to its nearest surface the gain does not fall, so none is kept from farther cells.
-constexpr float kGain = 0.05F;
-
-bool isNearer(float squared, float than) {
-  // sqrt(than) - sqrt(squared) > kGain, but for kGain^2.
-  const float gain = than - squared;
-  return gain > 0 && gain * gain > 4 * kGain * kGain * than;
-}
-
-// Cells lie in memory in bricks of 8 x 8 x 8, a page of 4 KiB each: a cell's neighbours are in few pages, and
-// what waves wait for is memory.
-constexpr std::uint32_t kBrickBits = 3;
-constexpr std::uint32_t kBrickSide = 1U << kBrickBits;
-static_assert(kBrickSide == kDistanceStep);
+// Surface lies up to so far [cells] from the middles of the cells that hold it.
+constexpr float kSpread = 1.5F;
+constexpr int kSpreadCells = 2;  // whole ones
 // The window moves once the vehicle is an eighth of it away from its middle.
 constexpr int kSlack = 8;
+// Unknown cells are looked for in cells of so many a side.
+constexpr int kCoarse = 2;
+// A query goes along the surface for so many cells at most; on logs it needs one or two.
+constexpr int kMostDescents = 4;
+constexpr int kStep = kDistanceStep;
+constexpr int kFour = kStep / kCoarse;   // coarse cells along x side by side
+constexpr std::uint32_t kTagShift = 29;  // of both words: one bit an axis
+
+/// The surface point inside a cell, 7 bits an axis, +-0.5 cells from its middle, present or not; the
+/// cell's space; the axes along which the cell has surface on both sides; the tag.
+struct StateWord {
+  static constexpr float kScale = 126;  // 63 at half a cell
+  static constexpr std::uint32_t kPresent = 1U << 21U;
+  static constexpr std::uint32_t kSpaceShift = 22;
+  static constexpr std::uint32_t kSidesShift = 24;
+
+  static std::uint32_t pack(Space space) { return static_cast<std::uint32_t>(space) << kSpaceShift; }
+  static std::uint32_t pack(Space space, const SurfacePoint& point) {
+    std::uint32_t word = pack(space) | kPresent;
+    for (int i = 0; i < 3; ++i) {
+      const float kept = std::clamp(point.offset[i], -kMostOffset, kMostOffset) * kScale;
+      const auto bits = static_cast<std::uint32_t>(std::lround(kept) + 64);
+      word |= bits << (7U * static_cast<std::uint32_t>(i));
+      if (point.both_sides[static_cast<std::size_t>(i)])
+        word |= 1U << (kSidesShift + static_cast<std::uint32_t>(i));
+    }
+    return word;
+  }
+  static Space space(std::uint32_t word) { return static_cast<Space>(word >> kSpaceShift & 3U); }
+  static bool isUnknown(std::uint32_t word) { return space(word) == Space::kUnknown; }
+  static bool holds(std::uint32_t word, std::uint32_t tag) {
+    return (word & kPresent) != 0 && word >> kTagShift == tag >> kTagShift;
+  }
+  /// From a point to the surface of a cell whose middle is at `middle` from it.
+  static float squaredTo(std::uint32_t word, const Eigen::Vector3f& middle) {
+    float squared = 0;
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      const float offset = static_cast<float>(static_cast<int>(word >> (7U * i) & 127U) - 64) / kScale;
+      const float to = middle[i];
+      const bool both = (word >> (kSidesShift + i) & 1U) != 0;
+      const float along = both ? std::abs(to) - std::abs(offset) : to + offset;
+      squared += along * along;
+    }
+    return squared;
+  }
+};
+
+/// Steps to the cell with the nearest surface, 7 bits an axis, biased by 64, or, where none is in reach, how
+/// far there is none for sure [cells]; how far nothing is unknown [cells]; the tag.
+struct NearestWord {
+  static constexpr int kBias = 64;
+  static constexpr std::uint32_t kHasSurface = 1U << 21U;
+  static constexpr std::uint32_t kKnownShift = 22;
+
+  static Eigen::Vector3i steps(std::uint32_t word) {
+    return {static_cast<int>(word & 127U) - kBias, static_cast<int>(word >> 7U & 127U) - kBias,
+            static_cast<int>(word >> 14U & 127U) - kBias};
+  }
+  static float atLeast(std::uint32_t word) { return static_cast<float>(word & 127U); }
+  static int knownTo(std::uint32_t word) { return static_cast<int>(word >> kKnownShift & 127U); }
+};
+
+constexpr std::size_t kLanes = static_cast<std::size_t>(NearestSeeds::kColumns) * NearestSeeds::kLayers;
+template <typename Value>
+using Lanes = std::array<Value, kLanes>;
+
+/// From words of NearestSeeds; nothing is known of surfaces from `edges` and `edge_y` cells on. `rest`,
+/// `tag`: the other bits.
+void toNearest(Lanes<std::uint32_t>& words, const Lanes<int>& edges, int edge_y,
+               const Lanes<std::uint32_t>& rest, std::uint32_t tag) {
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const NearestSeeds::Word seed = words[i];
+    const int within = std::min(edges[i], edge_y);
+    const auto biased = [](int steps) { return static_cast<std::uint32_t>(steps + NearestWord::kBias); };
+    const std::uint32_t found = biased(NearestSeeds::xOf(seed)) | biased(NearestSeeds::yOf(seed)) << 7U |
+                                biased(NearestSeeds::zOf(seed)) << 14U | NearestWord::kHasSurface;
+    const auto none = static_cast<std::uint32_t>(std::max(within - kSpreadCells, 0));
+    words[i] = NearestSeeds::squaredOf(seed) <= within * within ? found : none;
+    words[i] |= rest[i] | tag;
+  }
+}
 
 int floorDiv(int a, int b) { return a / b - (a % b < 0 ? 1 : 0); }
 int wrapped(int a, int b) {
@@ -42,7 +106,7 @@ constexpr std::int64_t kOriginBias = 1 << 20;
 std::uint64_t packOrigin(const Eigen::Vector3i& origin) {
   std::uint64_t word = 0;
   for (int i = 0; i < 3; ++i) {
-    const std::int64_t steps = origin[i] / kDistanceStep + kOriginBias;
+    const std::int64_t steps = origin[i] / kStep + kOriginBias;
     word |= (static_cast<std::uint64_t>(steps) & kOriginMask) << (21U * static_cast<unsigned>(i));
   }
   return word;
@@ -52,52 +116,52 @@ Eigen::Vector3i unpackOrigin(std::uint64_t word) {
   Eigen::Vector3i origin;
   for (int i = 0; i < 3; ++i) {
     const std::uint64_t steps = word >> (21U * static_cast<unsigned>(i)) & kOriginMask;
-    origin[i] = static_cast<int>(static_cast<std::int64_t>(steps) - kOriginBias) * kDistanceStep;
+    origin[i] = static_cast<int>(static_cast<std::int64_t>(steps) - kOriginBias) * kStep;
   }
   return origin;
 }
 
 DistanceLimits checked(DistanceLimits limits) {
-  for (int i = 0; i < 3; ++i) {
-    limits.cells[i] = std::max(limits.cells[i] / kDistanceStep, 2) * kDistanceStep;
-  }
-  limits.reach = std::clamp(limits.reach, 1, kMostReach);
+  for (int i = 0; i < 3; ++i) limits.cells[i] = std::max(limits.cells[i] / kStep, 2) * kStep;
+  limits.reach = std::clamp(limits.reach, 2, kMostReach);
   return limits;
 }
 
-bool within(const Eigen::Vector3i& cell, const Eigen::Vector3i& origin, const Eigen::Vector3i& cells) {
-  const Eigen::Vector3i from = cell - origin;
-  return (from.array() >= 0).all() && (from.array() < cells.array()).all();
+/// Cells to the nearest one outside a line of `count`.
+int edge(int at, int count) { return std::min(at + 1, count - at); }
+
+Eigen::Vector3i cornerOf(int i) { return {i & 1, i >> 1 & 1, i >> 2 & 1}; }
+
+/// Of eight bits whether one of each pair is set.
+std::uint8_t pairs(std::uint8_t bits) {
+  std::uint32_t result = 0;
+  for (std::uint32_t i = 0; i < 4; ++i) result |= (bits >> (2 * i) & 3U) != 0 ? 1U << i : 0U;
+  return static_cast<std::uint8_t>(result);
 }
 
 }  // namespace
 
 DistanceField::DistanceField(const DistanceLimits& limits)
     : limits_(checked(limits)),
-      squared_reach_(static_cast<float>(limits_.reach * limits_.reach)),
-      cell_(static_cast<std::size_t>(limits_.cells.prod())),
-      surface_(cell_.size()),
-      next_(cell_.size(), kNone),
-      head_(static_cast<std::size_t>(static_cast<float>(limits_.reach + 2) * kBucketsPerCell), kNone),
-      lowest_(head_.size()) {
-  std::uint32_t stride = 1U << (3 * kBrickBits);
-  for (int i = 0; i < 3; ++i) {
-    brick_stride_[static_cast<std::size_t>(i)] = stride;
-    stride *= static_cast<std::uint32_t>(limits_.cells[i]) >> kBrickBits;
-  }
-  for (int i = 0; i < 3; ++i) origin_[i] = -floorDiv(limits_.cells[i] / 2, kDistanceStep) * kDistanceStep;
-  for (std::uint32_t slot = 0; slot < cell_.size(); ++slot) {
-    cell_[slot].nearest.store(tagOf(cellAt(slot)) << NearestWord::kTagShift, std::memory_order_relaxed);
-    surface_[slot].store(0, std::memory_order_relaxed);
-  }
+      state_(static_cast<std::size_t>(limits_.cells.prod())),
+      nearest_(state_.size()),
+      surface_bits_(state_.size() / kStep),
+      unknown_bits_(surface_bits_.size()),
+      surface_changed_(static_cast<std::size_t>(limits_.cells.y())),
+      unknown_changed_(surface_changed_.size()),
+      surfaces_(limits_.cells, limits_.reach),
+      unknown_(limits_.cells / kCoarse, limits_.reach / kCoarse + 1, 1),
+      known_to_(state_.size() / (kCoarse * kCoarse * kCoarse)) {
+  for (int i = 0; i < 3; ++i) origin_[i] = -floorDiv(limits_.cells[i] / 2, kStep) * kStep;
+  clearSlab(0, origin_.x(), origin_.x() + limits_.cells.x());
   publishOrigin();
 }
 
 void DistanceField::publishOrigin() { shown_origin_.store(packOrigin(origin_), std::memory_order_release); }
 
 std::size_t DistanceField::bytes() const {
-  return cell_.size() * (sizeof(Cell) + sizeof(Word) + sizeof(std::uint32_t)) +
-         head_.size() * sizeof(std::uint32_t);
+  return state_.size() * 2 * sizeof(Word) + surface_bits_.size() + unknown_bits_.size() + known_to_.size() +
+         surfaces_.bytes() + unknown_.bytes();
 }
 
 Eigen::Vector3i DistanceField::cellOf(const Eigen::Vector3d& p_map) const {
@@ -108,19 +172,17 @@ Eigen::Vector3d DistanceField::centreOf(const Eigen::Vector3i& cell) const {
   return (cell.cast<double>().array() + 0.5) * limits_.cell_size;
 }
 
-bool DistanceField::inside(const Eigen::Vector3i& cell) const { return within(cell, origin_, limits_.cells); }
-
-std::uint32_t DistanceField::partOfSlot(int axis, int at) const {
-  const auto shift = static_cast<std::uint32_t>(axis) * kBrickBits;
-  const auto place = static_cast<std::uint32_t>(at);
-  return (place >> kBrickBits) * brick_stride_[static_cast<std::size_t>(axis)] +
-         ((place & (kBrickSide - 1)) << shift);
+bool DistanceField::inside(const Eigen::Vector3i& cell) const {
+  const Eigen::Vector3i from = cell - origin_;
+  return (from.array() >= 0).all() && (from.array() < limits_.cells.array()).all();
 }
 
-std::uint32_t DistanceField::slotOf(const Eigen::Vector3i& cell) const {
-  std::uint32_t slot = 0;
-  for (int i = 0; i < 3; ++i) slot += partOfSlot(i, wrapped(cell[i], limits_.cells[i]));
-  return slot;
+std::size_t DistanceField::slotOf(const Eigen::Vector3i& cell) const {
+  const Eigen::Vector3i& n = limits_.cells;
+  const int x = wrapped(cell.x(), n.x()), y = wrapped(cell.y(), n.y()), z = wrapped(cell.z(), n.z());
+  const int line = x / kStep * (n.z() / NearestSeeds::kLayers) + z / NearestSeeds::kLayers;
+  return static_cast<std::size_t>(line * n.y() + y) * kLanes +
+         static_cast<std::size_t>(z % NearestSeeds::kLayers * kStep + x % kStep);
 }
 
 std::uint32_t DistanceField::tagOf(const Eigen::Vector3i& cell) const {
@@ -129,109 +191,32 @@ std::uint32_t DistanceField::tagOf(const Eigen::Vector3i& cell) const {
     const auto turns = static_cast<std::uint32_t>(floorDiv(cell[i], limits_.cells[i]));
     tag |= (turns & 1U) << static_cast<unsigned>(i);
   }
-  return tag;
-}
-
-Eigen::Vector3i DistanceField::cellAt(std::uint32_t slot) const {
-  Eigen::Vector3i cell;
-  std::uint32_t brick = slot >> (3 * kBrickBits);
-  for (int i = 0; i < 3; ++i) {
-    const auto bricks = static_cast<std::uint32_t>(limits_.cells[i]) >> kBrickBits;
-    const std::uint32_t within = slot >> (static_cast<std::uint32_t>(i) * kBrickBits) & (kBrickSide - 1);
-    const int at = static_cast<int>((brick % bricks << kBrickBits) + within);
-    brick /= bricks;
-    cell[i] = origin_[i] + wrapped(at - origin_[i], limits_.cells[i]);
-  }
-  return cell;
-}
-
-/// What a cell with this word takes for its nearest surface, the one in `surface`, is there and has not
-/// moved.
-bool DistanceField::holdsTrue(const Eigen::Vector3i& surface, std::uint32_t nearest) const {
-  if (!inside(surface)) return false;
-  const std::uint32_t word = surface_[slotOf(surface)].load(std::memory_order_relaxed);
-  if ((word & SurfaceWord::kPresent) == 0) return false;
-  return ((word & SurfaceWord::kParity) != 0) == ((nearest & NearestWord::kParity) != 0);
-}
-
-/// The bits by which a cell says that its nearest surface is that one.
-std::uint32_t DistanceField::linkTo(const Eigen::Vector3i& cell, const Eigen::Vector3i& surface) const {
-  const std::uint32_t word = surface_[slotOf(surface)].load(std::memory_order_relaxed);
-  return NearestWord::pack(surface - cell) | NearestWord::kHasSurface |
-         ((word & SurfaceWord::kParity) != 0 ? NearestWord::kParity : 0U);
-}
-
-float DistanceField::squaredTo(const Eigen::Vector3i& surface, const Eigen::Vector3i& cell) const {
-  const std::uint32_t word = surface_[slotOf(surface)].load(std::memory_order_relaxed);
-  Eigen::Vector3f to = (surface - cell).cast<float>();
-  if ((word & SurfaceWord::kPresent) != 0 && word >> SurfaceWord::kTagShift == tagOf(surface)) {
-    to += SurfaceWord::offset(word);
-  }
-  return to.squaredNorm();
-}
-
-float DistanceField::squaredDistance(const Eigen::Vector3i& cell) const {
-  const std::uint32_t word = cell_[slotOf(cell)].nearest.load(std::memory_order_relaxed);
-  if ((word & NearestWord::kHasSurface) == 0) return -1;
-  return squaredTo(cell + NearestWord::offset(word), cell);
+  return tag << kTagShift;
 }
 
 bool DistanceField::holdsSurface(const Eigen::Vector3i& cell) const {
-  return inside(cell) &&
-         (surface_[slotOf(cell)].load(std::memory_order_relaxed) & SurfaceWord::kPresent) != 0;
+  return inside(cell) && (state_[slotOf(cell)].load(std::memory_order_relaxed) & StateWord::kPresent) != 0;
 }
 
-void DistanceField::push(std::uint32_t slot, float squared) {
-  const std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed);
-  // Who waits already is taken later than its new distance asks for: more cells are taken twice, the end is
-  // the same.
-  if ((word & NearestWord::kQueued) != 0) return;
-  cell_[slot].nearest.store(word | NearestWord::kQueued, std::memory_order_relaxed);
-  const auto wanted = static_cast<std::size_t>(std::sqrt(std::max(squared, 0.0F)) * kBucketsPerCell);
-  const std::size_t bucket = std::min(wanted, head_.size() - 1);
-  next_[slot] = head_[bucket];
-  head_[bucket] = slot;
-  lowest_ = std::min(lowest_, bucket);
-  ++queued_;
-}
-
-bool DistanceField::pop(std::uint32_t& slot) {
-  while (lowest_ < head_.size() && head_[lowest_] == kNone) ++lowest_;
-  if (lowest_ == head_.size()) return false;
-  slot = head_[lowest_];
-  head_[lowest_] = next_[slot];
-  --queued_;
-  const std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed);
-  cell_[slot].nearest.store(word & ~NearestWord::kQueued, std::memory_order_relaxed);
-  return true;
-}
-
-void DistanceField::setState(std::uint32_t slot, const Eigen::Vector3i& cell, Space space) {
-  const std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed);
-  const std::uint32_t kept = word & (NearestWord::kLink | NearestWord::kRaise | NearestWord::kQueued);
-  cell_[slot].nearest.store(kept | static_cast<std::uint32_t>(space) << NearestWord::kSpaceShift |
-                                tagOf(cell) << NearestWord::kTagShift,
-                            std::memory_order_relaxed);
-}
-
-/// The cell's nearest surface is no more: what it was nearest to is to be raised.
-void DistanceField::remove(std::uint32_t slot) {
-  const std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed);
-  cell_[slot].nearest.store((word & ~NearestWord::kLink) | NearestWord::kRaise, std::memory_order_relaxed);
+void DistanceField::put(std::size_t slot, int y, std::uint32_t word) {
+  const std::uint32_t before = state_[slot].load(std::memory_order_relaxed);
+  if (word == before) return;
+  state_[slot].store(word, std::memory_order_relaxed);
+  const auto bit = static_cast<std::uint8_t>(1U << slot % kStep);
+  const auto at = static_cast<std::size_t>(y - origin_.y());
+  const auto flip = [&](bool flipped, std::uint8_t& bits, std::uint8_t& changed) {
+    if (!flipped) return;
+    bits ^= bit;
+    changed = 1;
+    changed_ = true;
+  };
+  flip(((word ^ before) & StateWord::kPresent) != 0, surface_bits_[slot / kStep], surface_changed_[at]);
+  flip(StateWord::isUnknown(word) != StateWord::isUnknown(before), unknown_bits_[slot / kStep],
+       unknown_changed_[at]);
 }
 
 void DistanceField::setSpace(const Eigen::Vector3i& cell, Space space) {
-  if (!inside(cell)) return;
-  const std::uint32_t slot = slotOf(cell);
-  setState(slot, cell, space);
-  dropSurface(slot, cell);
-}
-
-void DistanceField::dropSurface(std::uint32_t slot, const Eigen::Vector3i& cell) {
-  const std::uint32_t before = surface_[slot].load(std::memory_order_relaxed);
-  if ((before & SurfaceWord::kPresent) == 0) return;
-  surface_[slot].store(before & SurfaceWord::kParity, std::memory_order_relaxed);
-  askAnew(slot, cell);
+  if (inside(cell)) put(slotOf(cell), cell.y(), tagOf(cell) | StateWord::pack(space));
 }
 
 void DistanceField::setSpaces(const Eigen::Vector3i& first, std::uint32_t cells,
@@ -239,177 +224,15 @@ void DistanceField::setSpaces(const Eigen::Vector3i& first, std::uint32_t cells,
   // The window begins and ends at multiples of kDistanceStep: a row lies in it whole, and in slots side by
   // side.
   if (!inside(first)) return;
-  const std::uint32_t slot = slotOf(first);
-  const std::uint32_t tag = tagOf(first) << NearestWord::kTagShift;
-  for (std::uint32_t i = 0; i < kDistanceStep; ++i) {
-    if ((cells >> i & 1U) == 0) continue;
-    const std::uint32_t word = cell_[slot + i].nearest.load(std::memory_order_relaxed);
-    const std::uint32_t now = (word & (NearestWord::kLink | NearestWord::kRaise | NearestWord::kQueued)) |
-                              static_cast<std::uint32_t>(space[i]) << NearestWord::kSpaceShift | tag;
-    if (now != word) cell_[slot + i].nearest.store(now, std::memory_order_relaxed);
-    dropSurface(slot + i, first + Eigen::Vector3i(static_cast<int>(i), 0, 0));
+  const std::size_t slot = slotOf(first);
+  const std::uint32_t tag = tagOf(first);
+  for (std::size_t i = 0; i < kStep; ++i) {
+    if ((cells >> i & 1U) != 0) put(slot + i, first.y(), tag | StateWord::pack(space[i]));
   }
 }
 
-void DistanceField::setSurface(const Eigen::Vector3i& cell, Space space, const Eigen::Vector3f& offset) {
-  if (!inside(cell)) return;
-  const std::uint32_t slot = slotOf(cell);
-  setState(slot, cell, space);
-  const std::uint32_t before = surface_[slot].load(std::memory_order_relaxed);
-  const std::uint32_t packed = SurfaceWord::pack(offset) | tagOf(cell) << SurfaceWord::kTagShift;
-  const bool present = (before & SurfaceWord::kPresent) != 0;
-  // Noise of less than this is not worth waves: the point stays where it was told to be [cells].
-  constexpr float kMoved = 0.1F;
-  if (present && (SurfaceWord::offset(before) - SurfaceWord::offset(packed)).norm() < kMoved) return;
-  // Who took the point as it was is told by the parity.
-  const std::uint32_t parity = (before & SurfaceWord::kParity) ^ (present ? SurfaceWord::kParity : 0U);
-  surface_[slot].store(packed | parity, std::memory_order_relaxed);
-  if (present) askAnew(slot, cell);
-  takeOwn(slot, cell);
-  push(slot, SurfaceWord::offset(packed).squaredNorm());
-}
-
-/// A cell with surface in it, for which no other is nearer to its middle.
-void DistanceField::takeOwn(std::uint32_t slot, const Eigen::Vector3i& cell) {
-  const std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed);
-  const float own = SurfaceWord::offset(surface_[slot].load(std::memory_order_relaxed)).squaredNorm();
-  if ((word & NearestWord::kHasSurface) != 0 && own >= cell_[slot].squared) return;
-  cell_[slot].nearest.store((word & ~NearestWord::kLink) | linkTo(cell, cell), std::memory_order_relaxed);
-  cell_[slot].squared = own;
-}
-
-/// The surface in the cell left or moved: the cell, and after it those that took it for their nearest, look
-/// again.
-void DistanceField::askAnew(std::uint32_t slot, const Eigen::Vector3i& cell) {
-  const std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed);
-  if ((word & NearestWord::kHasSurface) != 0 && !holdsTrue(cell + NearestWord::offset(word), word))
-    remove(slot);
-  const std::uint32_t now = cell_[slot].nearest.load(std::memory_order_relaxed);
-  cell_[slot].nearest.store(now | NearestWord::kRaise, std::memory_order_relaxed);
-  push(slot, cell_[slot].squared);
-}
-
-/// The slots around a cell: along each axis what the three coordinates add to the slot, kNone outside the
-/// window.
-struct DistanceField::Around {
-  std::array<std::array<std::uint32_t, 3>, 3> part;  ///< [axis][step + 1]
-};
-
-DistanceField::Around DistanceField::around(const Eigen::Vector3i& cell) const {
-  Around result;
-  for (int axis = 0; axis < 3; ++axis) {
-    const int cells = limits_.cells[axis];
-    const int inside_at = cell[axis] - origin_[axis];
-    const int slot_at = wrapped(cell[axis], cells);
-    for (int step = -1; step <= 1; ++step) {
-      const int next = slot_at + step == cells ? 0 : slot_at + step < 0 ? cells - 1 : slot_at + step;
-      const bool within_window = inside_at + step >= 0 && inside_at + step < cells;
-      result.part[static_cast<std::size_t>(axis)][static_cast<std::size_t>(step + 1)] =
-          within_window ? partOfSlot(axis, next) : kNone;
-    }
-  }
-  return result;
-}
-
-/// Calls `visit(slot, x, y, z)` with steps of -1, 0, 1 for the neighbours in the window.
-template <typename Visit>
-void DistanceField::forNeighbours(const Around& around, const Visit& visit) {
-  for (int z = -1; z <= 1; ++z) {
-    const std::uint32_t at_z = around.part[2][static_cast<std::size_t>(z + 1)];
-    if (at_z == kNone) continue;
-    for (int y = -1; y <= 1; ++y) {
-      const std::uint32_t at_y = around.part[1][static_cast<std::size_t>(y + 1)];
-      if (at_y == kNone) continue;
-      for (int x = -1; x <= 1; ++x) {
-        const std::uint32_t at_x = around.part[0][static_cast<std::size_t>(x + 1)];
-        if (at_x == kNone || (x == 0 && y == 0 && z == 0)) continue;
-        visit(at_z + at_y + at_x, x, y, z);
-      }
-    }
-  }
-}
-
-std::size_t DistanceField::propagate(std::size_t work) {
-  std::size_t taken = 0;
-  for (std::uint32_t slot = 0; taken < work && pop(slot); ++taken) {
-    const Eigen::Vector3i cell = cellAt(slot);
-    const Around neighbours = around(cell);
-    if ((cell_[slot].nearest.load(std::memory_order_relaxed) & NearestWord::kRaise) != 0)
-      raise(slot, cell, neighbours);
-    const bool holds = (surface_[slot].load(std::memory_order_relaxed) & SurfaceWord::kPresent) != 0;
-    if (holds) takeOwn(slot, cell);
-    const std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed);
-    // A cell hands on its own surface too, where another is nearer to its own middle: the neighbours may
-    // differ.
-    if (holds) lower(neighbours, Eigen::Vector3i::Zero(), linkTo(cell, cell), surface_[slot]);
-    if ((word & NearestWord::kHasSurface) == 0 || (word & NearestWord::kRaise) != 0) continue;
-    const Eigen::Vector3i offset = NearestWord::offset(word);
-    if (offset.isZero() || !holdsTrue(cell + NearestWord::offset(word), word)) continue;
-    lower(neighbours, offset, word & NearestWord::kLink, surface_[slotOf(cell + offset)]);
-  }
-  return taken;
-}
-
-/// Neighbours whose surface is no more are to be raised too. Of those of the others the cell takes the
-/// nearest for its own: so they need not be asked to hand theirs on.
-void DistanceField::raise(std::uint32_t slot, const Eigen::Vector3i& cell, const Around& neighbours) {
-  float best = squared_reach_;
-  Eigen::Vector3i found = Eigen::Vector3i::Zero();
-  bool any = false;
-  forNeighbours(neighbours, [&](std::uint32_t beside, int x, int y, int z) {
-    const std::uint32_t word = cell_[beside].nearest.load(std::memory_order_relaxed);
-    if ((word & NearestWord::kHasSurface) == 0 || (word & NearestWord::kRaise) != 0) return;
-    const Eigen::Vector3i surface = cell + Eigen::Vector3i(x, y, z) + NearestWord::offset(word);
-    if (!holdsTrue(surface, word)) {
-      remove(beside);
-      push(beside, cell_[beside].squared);
-      return;
-    }
-    const float squared = squaredTo(surface, cell);
-    if (squared > best) return;
-    best = squared;
-    found = surface;
-    any = true;
-  });
-  std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed) & ~NearestWord::kRaise;
-  const bool holds = (word & NearestWord::kHasSurface) != 0;
-  if (any && (!holds || isNearer(best, cell_[slot].squared))) {
-    word = (word & ~NearestWord::kLink) | linkTo(cell, found);
-    cell_[slot].squared = best;
-  }
-  cell_[slot].nearest.store(word, std::memory_order_relaxed);
-  // Handed on into what was raised before.
-  if (any || holds) push(slot, cell_[slot].squared);
-}
-
-/// Hands the surface point in the cell at `offset` on to the neighbours. `link`: how the cell itself names
-/// it.
-void DistanceField::lower(const Around& neighbours, const Eigen::Vector3i& offset, std::uint32_t link,
-                          const Word& surface) {
-  const Eigen::Vector3f to =
-      offset.cast<float>() + SurfaceWord::offset(surface.load(std::memory_order_relaxed));
-  std::array<std::array<float, 3>, 3> square{};  // [axis][step + 1]
-  for (int axis = 0; axis < 3; ++axis) {
-    for (int step = -1; step <= 1; ++step) {
-      const float along = to[axis] - static_cast<float>(step);
-      square[static_cast<std::size_t>(axis)][static_cast<std::size_t>(step + 1)] = along * along;
-    }
-  }
-  forNeighbours(neighbours, [&](std::uint32_t beside, int x, int y, int z) {
-    const float squared = square[0][static_cast<std::size_t>(x + 1)] +
-                          square[1][static_cast<std::size_t>(y + 1)] +
-                          square[2][static_cast<std::size_t>(z + 1)];
-    if (squared > squared_reach_) return;
-    const std::uint32_t word = cell_[beside].nearest.load(std::memory_order_relaxed);
-    if ((word & NearestWord::kRaise) != 0) return;
-    if ((word & NearestWord::kHasSurface) != 0 && !isNearer(squared, cell_[beside].squared)) return;
-    // Within reach no component of the offset leaves its seven bits, so that steps are subtracted from all at
-    // once.
-    const std::uint32_t shifted = link - static_cast<std::uint32_t>(x + (y << 7) + (z << 14));
-    cell_[beside].nearest.store((word & ~NearestWord::kLink) | shifted, std::memory_order_relaxed);
-    cell_[beside].squared = squared;
-    push(beside, squared);
-  });
+void DistanceField::setSurface(const Eigen::Vector3i& cell, Space space, const SurfacePoint& point) {
+  if (inside(cell)) put(slotOf(cell), cell.y(), tagOf(cell) | StateWord::pack(space, point));
 }
 
 bool DistanceField::follow(const Eigen::Vector3d& p_map) {
@@ -418,110 +241,282 @@ bool DistanceField::follow(const Eigen::Vector3d& p_map) {
   for (int axis = 0; axis < 3; ++axis) {
     const int cells = limits_.cells[axis];
     const int wanted = cell[axis] - cells / 2;
-    if (std::abs(wanted - origin_[axis]) <= std::max(cells / kSlack, kDistanceStep)) continue;
+    if (std::abs(wanted - origin_[axis]) <= std::max(cells / kSlack, kStep)) continue;
     const int from = origin_[axis];
-    const int to = floorDiv(wanted, kDistanceStep) * kDistanceStep;
+    const int to = floorDiv(wanted, kStep) * kStep;
     const int steps = std::min(std::abs(to - from), cells);
     // Who asks meanwhile finds words of another place, and takes them for unknown.
     origin_[axis] = to;
     publishOrigin();
-    if (to > from) {
-      clearSlab(axis, to + cells - steps, to + cells);
-      wakeLayer(axis, to);
-      wakeLayer(axis, to + cells - steps - 1);
-    } else {
-      clearSlab(axis, to, to + steps);
-      wakeLayer(axis, to + cells - 1);
-      wakeLayer(axis, to + steps);
-    }
+    clearSlab(axis, to > from ? to + cells - steps : to, to > from ? to + cells : to + steps);
   }
   return origin_ != before;
 }
 
-/// The cells that entered, from `first` to before `last`, are unknown. Those in the queue stay in it.
+/// The cells that entered, from `first` to before `last`, are unknown.
 void DistanceField::clearSlab(int axis, int first, int last) {
   Eigen::Vector3i low = origin_;
   Eigen::Vector3i high = origin_ + limits_.cells;
   low[axis] = first;
   high[axis] = last;
-  for (int z = low.z(); z < high.z(); ++z) {
-    for (int y = low.y(); y < high.y(); ++y) {
-      for (int x = low.x(); x < high.x(); ++x) {
-        const Eigen::Vector3i cell(x, y, z);
-        const std::uint32_t slot = slotOf(cell);
-        const std::uint32_t queued =
-            cell_[slot].nearest.load(std::memory_order_relaxed) & NearestWord::kQueued;
-        cell_[slot].nearest.store(queued | tagOf(cell) << NearestWord::kTagShift, std::memory_order_relaxed);
-        surface_[slot].store(0, std::memory_order_relaxed);
+  for (int x = low.x(); x < high.x(); x += kStep) {
+    for (int z = low.z(); z < high.z(); ++z) {
+      for (int y = low.y(); y < high.y(); ++y) {
+        const std::size_t slot = slotOf({x, y, z});
+        const std::uint32_t tag = tagOf({x, y, z});
+        for (std::size_t i = 0; i < kStep; ++i) {
+          nearest_[slot + i].store(tag, std::memory_order_relaxed);
+          state_[slot + i].store(tag, std::memory_order_relaxed);
+        }
+        surface_bits_[slot / kStep] = 0;
+        unknown_bits_[slot / kStep] = 0xFF;
+      }
+    }
+  }
+  // All lies elsewhere in the window now.
+  std::fill(surface_changed_.begin(), surface_changed_.end(), std::uint8_t{1});
+  std::fill(unknown_changed_.begin(), unknown_changed_.end(), std::uint8_t{1});
+  changed_ = true;
+}
+
+void DistanceField::update(Stamp up_to) {
+  if (changed_) {
+    findUnknown();
+    findSurfaces();
+    changed_ = false;
+  }
+  up_to_.store(up_to.ns, std::memory_order_release);
+}
+
+void DistanceField::findUnknown() {
+  const Eigen::Vector3i n = limits_.cells / kCoarse;
+  for (int y = 0; y < n.y(); ++y) {
+    std::uint8_t* const changed = &unknown_changed_[static_cast<std::size_t>(kCoarse * y)];
+    if (changed[0] == 0 && changed[1] == 0) continue;
+    changed[0] = changed[1] = 0;
+    for (int z = 0; z < n.z(); ++z) {
+      const auto row = unknown_.seeds(z);
+      std::fill(row.begin(), row.end(), std::uint8_t{0});
+      for (int block = 0; block < limits_.cells.x() / kStep; ++block) {
+        std::uint8_t bits = 0;
+        for (int i = 0; i < kCoarse * kCoarse; ++i) {
+          const Eigen::Vector3i cell(kStep * block, kCoarse * y + i % kCoarse, kCoarse * z + i / kCoarse);
+          bits |= unknown_bits_[slotOf(origin_ + cell) / kStep];
+        }
+        row[static_cast<std::size_t>(block / 2)] |= static_cast<std::uint8_t>(pairs(bits) << (block % 2 * 4));
+      }
+    }
+    unknown_.transformPlane(y);
+  }
+  for (int x = 0; x < n.x(); x += kStep) {
+    for (int z = 0; z < n.z(); z += NearestSeeds::kLayers) keepKnown(x, z);
+  }
+}
+
+/// Of the coarse cells x to x + 7, z and z + 1, for every y.
+void DistanceField::keepKnown(int x, int z) {
+  const Eigen::Vector3i n = limits_.cells / kCoarse;
+  const auto lines = unknown_.transformLines(x, z);
+  for (int half = 0; half < 2 && x + half * kFour < n.x(); ++half) {
+    for (int layer = 0; layer < NearestSeeds::kLayers; ++layer) {
+      std::uint8_t* known = &known_to_[placeOfKnown(x + half * kFour, z + layer)];
+      for (int y = 0; y < n.y(); ++y) {
+        const int edge_yz = std::min(edge(y, n.y()), edge(z + layer, n.z()));
+        for (int i = 0; i < kFour; ++i) {
+          const auto word = lines[static_cast<std::size_t>(y)][static_cast<std::size_t>(layer)]
+                                 [static_cast<std::size_t>(half * kFour + i)];
+          // Outside the window nothing is known: as far as there are cells between.
+          const int at_most = std::min(edge_yz, edge(x + half * kFour + i, n.x())) - 1;
+          const float gap = std::sqrt(static_cast<float>(NearestSeeds::squaredOf(word)));
+          const int known_to = std::min(static_cast<int>(gap * kCoarse), kCoarse * at_most);
+          *known++ = static_cast<std::uint8_t>(std::min(known_to, limits_.reach));
+        }
       }
     }
   }
 }
 
-/// A layer next to where the window changed: raised where its surface left, else handed on into what entered.
-void DistanceField::wakeLayer(int axis, int at) {
-  Eigen::Vector3i low = origin_;
-  Eigen::Vector3i high = origin_ + limits_.cells;
-  if (at < low[axis] || at >= high[axis]) return;
-  low[axis] = at;
-  high[axis] = at + 1;
-  for (int z = low.z(); z < high.z(); ++z) {
-    for (int y = low.y(); y < high.y(); ++y) {
-      for (int x = low.x(); x < high.x(); ++x) {
-        const Eigen::Vector3i cell(x, y, z);
-        const std::uint32_t slot = slotOf(cell);
-        const std::uint32_t word = cell_[slot].nearest.load(std::memory_order_relaxed);
-        if ((word & NearestWord::kHasSurface) == 0) continue;
-        if (!holdsTrue(cell + NearestWord::offset(word), word)) remove(slot);
-        push(slot, cell_[slot].squared);
+std::size_t DistanceField::placeOfKnown(int x, int z) const {
+  const Eigen::Vector3i n = limits_.cells / kCoarse;
+  return static_cast<std::size_t>(((x / kFour * n.z()) + z) * n.y() * kFour);
+}
+
+void DistanceField::findSurfaces() {
+  const Eigen::Vector3i& n = limits_.cells;
+  for (int y = 0; y < n.y(); ++y) {
+    std::uint8_t& changed = surface_changed_[static_cast<std::size_t>(y)];
+    if (changed == 0) continue;
+    changed = 0;
+    for (int z = 0; z < n.z(); ++z) {
+      const auto row = surfaces_.seeds(z);
+      for (int block = 0; block < n.x() / kStep; ++block) {
+        const std::size_t slot = slotOf(origin_ + Eigen::Vector3i(kStep * block, y, z));
+        row[static_cast<std::size_t>(block)] = surface_bits_[slot / kStep];
       }
     }
+    surfaces_.transformPlane(y);
+  }
+  for (int x = 0; x < n.x(); x += kStep) {
+    for (int z = 0; z < n.z(); z += NearestSeeds::kLayers) writeLines(x, z);
   }
 }
 
-DistanceField::Corner DistanceField::corner(const Eigen::Vector3i& cell) const {
-  const std::uint32_t word = cell_[slotOf(cell)].nearest.load(std::memory_order_relaxed);
-  Corner out;
-  if (word >> NearestWord::kTagShift != tagOf(cell)) return out;
-  out.known = true;
-  out.space = static_cast<Space>((word & NearestWord::kSpaceMask) >> NearestWord::kSpaceShift);
-  out.bounded = (word & NearestWord::kHasSurface) != 0;
-  const float squared = out.bounded ? squaredTo(cell + NearestWord::offset(word), cell) : squared_reach_;
-  const float distance = std::min(std::sqrt(squared), static_cast<float>(limits_.reach));
-  out.distance = out.space == Space::kBehindSurface ? -distance : distance;
-  return out;
+/// What readers see of the cells x to x + 7, z and z + 1, for every y.
+void DistanceField::writeLines(int x, int z) {
+  const Eigen::Vector3i& n = limits_.cells;
+  const auto lines = surfaces_.transformLines(x, z);
+  const std::uint8_t* known = &known_to_[placeOfKnown(x / kCoarse, z / kCoarse)];
+  // A surface outside the window may be nearer than what is farther than the window's edge.
+  Lanes<int> edges;
+  for (int i = 0; i < static_cast<int>(kLanes); ++i)
+    edges[static_cast<std::size_t>(i)] =
+        std::min({edge(x + i % kStep, n.x()), edge(z + i / kStep, n.z()), limits_.reach});
+  const Eigen::Vector3i first = origin_ + Eigen::Vector3i(x, 0, z);
+  std::size_t slot = slotOf(first);
+  std::uint32_t tag = tagOf(first);
+  Lanes<std::uint32_t> words, rest;
+  for (int y = 0; y < n.y(); ++y) {
+    if (y % kCoarse == 0) {
+      for (std::size_t i = 0; i < kLanes; ++i)
+        rest[i] = std::uint32_t{known[i % kStep / kCoarse]} << NearestWord::kKnownShift;
+      known += kFour;
+    }
+    std::memcpy(words.data(), &lines[static_cast<std::size_t>(y)], sizeof(words));
+    toNearest(words, edges, edge(y, n.y()), rest, tag);
+    for (std::size_t i = 0; i < kLanes; ++i) nearest_[slot + i].store(words[i], std::memory_order_relaxed);
+    slot += kLanes;
+    if (wrapped(first.y() + y + 1, n.y()) != 0) continue;
+    // Around the window's seam.
+    slot -= static_cast<std::size_t>(n.y()) * kLanes;
+    tag ^= 2U << kTagShift;
+  }
 }
 
-bool DistanceField::query(const Eigen::Vector3d& p_map, DistanceSample& out) const {
-  out = DistanceSample{};
+/// A cell that holds surface, from the first corner of a query [cells].
+struct DistanceField::Holder {
+  Eigen::Vector3i cell;
+  std::uint32_t state = 0;
+  [[nodiscard]] float squaredTo(const Eigen::Vector3f& p) const {
+    return StateWord::squaredTo(state, cell.cast<float>() - p);
+  }
+};
+
+/// What a query asks of one of the eight cells around the point.
+struct DistanceField::Corner {
+  Space space = Space::kUnknown;
+  std::uint32_t nearest = 0;  ///< NearestWord
+  bool held = false;          ///< its nearest surface is still there
+  Holder holder;
+  /// No surface lies nearer to the cell's middle [cells].
+  [[nodiscard]] float atLeast() const {
+    if ((nearest & NearestWord::kHasSurface) == 0) return NearestWord::atLeast(nearest);
+    return NearestWord::steps(nearest).cast<float>().norm() - kSpread;
+  }
+};
+
+/// False where one is of another place: outside the window, or the window moves.
+bool DistanceField::corners(const Eigen::Vector3i& first, std::array<Corner, 8>& out) const {
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3i cell = first + cornerOf(i);
+    const std::size_t slot = slotOf(cell);
+    const std::uint32_t tag = tagOf(cell);
+    const std::uint32_t state = state_[slot].load(std::memory_order_relaxed);
+    Corner& corner = out[static_cast<std::size_t>(i)];
+    corner.nearest = nearest_[slot].load(std::memory_order_relaxed);
+    if (state >> kTagShift != tag >> kTagShift || corner.nearest >> kTagShift != tag >> kTagShift)
+      return false;
+    corner.space = StateWord::space(state);
+    if ((corner.nearest & NearestWord::kHasSurface) == 0) continue;
+    corner.holder.cell = cornerOf(i) + NearestWord::steps(corner.nearest);
+    corner.held = findHolder(first, corner.holder);
+  }
+  return true;
+}
+
+bool DistanceField::findHolder(const Eigen::Vector3i& first, Holder& holder) const {
+  const Eigen::Vector3i cell = first + holder.cell;
+  holder.state = state_[slotOf(cell)].load(std::memory_order_relaxed);
+  return StateWord::holds(holder.state, tagOf(cell));
+}
+
+/// The nearest cell need not hold the nearest point: from the nearest of those that the corners name from
+/// neighbour to neighbour along the surface, as long as that leads nearer.
+DistanceField::Holder DistanceField::descend(const Eigen::Vector3i& first, const Eigen::Vector3f& part,
+                                             const std::array<Corner, 8>& corner) const {
+  Holder best = corner[0].holder;
+  float least = best.squaredTo(part);
+  const auto take = [&](const Holder& holder) {
+    const float squared = holder.squaredTo(part);
+    if (squared >= least) return;
+    least = squared;
+    best = holder;
+  };
+  for (const Corner& one : corner) take(one.holder);
+  for (int round = 0; round < kMostDescents; ++round) {
+    const Eigen::Vector3i middle = best.cell;
+    for (int i = 0; i < 27; ++i) {
+      Holder beside{middle + Eigen::Vector3i(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1), 0};
+      if (findHolder(first, beside)) take(beside);
+    }
+    if (best.cell == middle) break;
+  }
+  return best;
+}
+
+DistanceSample DistanceField::query(const Eigen::Vector3d& p_map) const {
+  DistanceSample out;
+  out.up_to.ns = up_to_.load(std::memory_order_acquire);
+  out.stale = out.up_to.ns < newest_.load(std::memory_order_relaxed);
   const Eigen::Vector3d at = p_map.array() / limits_.cell_size - 0.5;
   const Eigen::Vector3i origin = unpackOrigin(shown_origin_.load(std::memory_order_acquire));
   const Eigen::Array3d from = at.array() - origin.cast<double>().array();
-  if (!((from >= 0).all() && (from < limits_.cells.cast<double>().array() - 1).all())) return false;
+  if (!((from >= 0).all() && (from < limits_.cells.cast<double>().array() - 1).all())) return out;
   const Eigen::Vector3i first = at.array().floor().cast<int>();
   const Eigen::Vector3d part = at - first.cast<double>();
-  const Eigen::Vector3i own = (at.array() + 0.5).floor().cast<int>();
-  double distance = 0;
+  std::array<Corner, 8> corner;
+  if (!corners(first, corner)) return out;
+  const auto bit = [&](int axis) { return part[axis] < 0.5 ? 0 : 1 << axis; };
+  const Corner& own = corner[static_cast<std::size_t>(bit(0) + bit(1) + bit(2))];
+  out.space = own.space;
+  if (out.space == Space::kUnknown) return out;
+  out.known_to = limits_.cell_size * NearestWord::knownTo(own.nearest);
+  const bool measured = std::all_of(corner.begin(), corner.end(), [](const Corner& one) { return one.held; });
+  if (measured) {
+    interpolate(corner, descend(first, part.cast<float>(), corner), part, out);
+  } else {
+    out.kind = DistanceKind::kAtLeast;
+    for (int i = 0; i < 8; ++i) {
+      const double there = static_cast<double>(corner[static_cast<std::size_t>(i)].atLeast());
+      out.distance = std::max(out.distance, there - (cornerOf(i).cast<double>() - part).norm());
+    }
+    if (out.space == Space::kBehindSurface) out.distance = -out.distance;
+  }
+  out.distance *= limits_.cell_size;
+  return out;
+}
+
+/// The distance between cells' middles is linear along each axis. In cells.
+void DistanceField::interpolate(const std::array<Corner, 8>& corner, const Holder& near_point,
+                                const Eigen::Vector3d& part, DistanceSample& out) {
+  out.kind = DistanceKind::kDistance;
   Eigen::Vector3d slope = Eigen::Vector3d::Zero();
-  bool bounded = true;
   for (int i = 0; i < 8; ++i) {
-    const Eigen::Vector3i bit(i & 1, i >> 1 & 1, i >> 2 & 1);
-    const Corner value = corner(first + bit);
-    if (!value.known) return false;
-    bounded = bounded && value.bounded;
-    if (first + bit == own) out.space = value.space;
+    const Eigen::Vector3i bit = cornerOf(i);
+    float squared = near_point.squaredTo(bit.cast<float>());
+    for (const Corner& one : corner) squared = std::min(squared, one.holder.squaredTo(bit.cast<float>()));
+    const Space space = corner[static_cast<std::size_t>(i)].space;
+    // Between the point and an unknown cell there is no surface that is known.
+    const bool behind = (space == Space::kUnknown ? out.space : space) == Space::kBehindSurface;
+    const double distance = static_cast<double>(behind ? -std::sqrt(squared) : std::sqrt(squared));
     Eigen::Vector3d weight;
     for (int axis = 0; axis < 3; ++axis) weight[axis] = bit[axis] != 0 ? part[axis] : 1 - part[axis];
-    distance += weight.prod() * static_cast<double>(value.distance);
+    out.distance += weight.prod() * distance;
     for (int axis = 0; axis < 3; ++axis) {
       const double others = weight[(axis + 1) % 3] * weight[(axis + 2) % 3];
-      slope[axis] += (bit[axis] != 0 ? others : -others) * static_cast<double>(value.distance);
+      slope[axis] += (bit[axis] != 0 ? others : -others) * distance;
     }
   }
-  out.distance = distance * limits_.cell_size;
-  out.bounded = bounded;
-  if (bounded && slope.norm() > 0) out.gradient = slope.normalized();
-  return true;
+  if (slope.norm() > 0) out.gradient = slope.normalized();
 }
 
 }  // namespace swiftlet

@@ -1,24 +1,27 @@
 #pragma once
-// How far it is to the nearest surface, and which way leads from it: for planners, around the vehicle.
+// How far it is to the nearest surface, which way leads from it, and how far all is known: for planners,
+// around the vehicle.
 //
 // A window of cells that follows the vehicle, in fixed memory. The writer (the map thread) says which cells
-// the surface passes through and which are free; waves carry the nearest such cell on from cell to cell
-// (dynamic brushfire: Lau, Sprunk, Burgard, RAS 61, 2013): a removed one raises the cells that it was nearest
-// to, then those around lower them again. Each step takes as many cells from the queue as it may; what is
-// left goes on in the next. Readers on other threads ask without locks or waiting: the window is an array of
+// the surface passes through, which are free and which unknown; update() finds the nearest surface cell of
+// every cell anew (NearestSeeds: exact), and how far it is to the nearest unknown one. Its cost does not
+// depend on how much changed. Readers on other threads ask without locks or waiting: the window is arrays of
 // 32-bit words, each written and read whole, and each says which of the places that share its slot it is of.
-// Frames: map; metres. The distance is that to the surface point inside the nearest cell (not to the cell's
-// middle), negative behind the surface. Unknown cells let waves pass: the distance is to all known surface
-// within `reach`. Errors: none; what lies outside the window is ignored by the writer and unknown to the
-// reader. Memory: 12 bytes a cell. Cost: 0.15 to 0.3 us a cell taken from the queue; a query 0.1 us.
-// docs/distance.md.
+// A reader beside an update finds old words or new ones; what a word names and is no longer there counts as
+// "at least". Frames: map; metres. Errors: none; what lies outside the window is ignored by the writer and
+// unknown to the reader. Memory: 13 bytes a cell. Cost: an update about 25 ms for the default window; a query
+// 0.2 us. docs/distance.md.
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
+
+#include "estimator/core/stamp.hpp"
+#include "mapping/distance/nearest_seeds.hpp"
 
 namespace swiftlet {
 
@@ -30,17 +33,35 @@ struct DistanceLimits {
 };
 /// The window moves in steps of so many cells.
 inline constexpr int kDistanceStep = 8;
-/// An offset to the nearest surface is kept in 7 bits an axis.
-inline constexpr int kMostReach = 60;
+static_assert(kDistanceStep == NearestSeeds::kColumns);
 
 enum class Space : std::uint8_t { kUnknown = 0, kFree = 1, kBehindSurface = 2 };
 
+/// Where the surface passes in a cell.
+struct SurfacePoint {
+  Eigen::Vector3f offset = Eigen::Vector3f::Zero();  ///< cells, from its middle; each within kMostOffset
+  std::array<bool, 3> both_sides{};  ///< by axis: there is as much on the other side of the middle, too
+};
+inline constexpr float kMostOffset = 0.5F;
+
+enum class DistanceKind : std::uint8_t {
+  kUnknown,  ///< the point lies in unknown space or outside the window: nothing is said
+  kAtLeast,  ///< all known surface is farther than `distance`
+  kDistance
+};
+
 struct DistanceSample {
+  DistanceKind kind = DistanceKind::kUnknown;
   Space space = Space::kUnknown;  ///< of the cell that the point lies in
-  double distance = 0;            ///< m; where `bounded` is false, at least this far
+  double distance = 0;            ///< m, to the nearest known surface; negative behind it
+  double known_to = 0;            ///< m: so far around the point nothing is unknown
   Eigen::Vector3d gradient =
-      Eigen::Vector3d::Zero();  ///< unit, away from the surface; zero where not bounded
-  bool bounded = false;         ///< a surface lies within reach
+      Eigen::Vector3d::Zero();  ///< unit, away from the surface; zero but for kDistance
+  Stamp up_to;                  ///< of the newest image that is in it
+  bool stale = true;            ///< the map has newer images
+
+  /// What a vehicle may count on [m]: unknown space is none.
+  [[nodiscard]] double clearance() const { return std::clamp(distance, 0.0, known_to); }
 };
 
 class DistanceField {
@@ -49,6 +70,8 @@ class DistanceField {
 
   // For one writer.
 
+  /// The map has an image of this time.
+  void announce(Stamp newest) { newest_.store(newest.ns, std::memory_order_relaxed); }
   /// Keeps `p_map` near the window's middle. What leaves the window is forgotten; what enters is unknown: the
   /// caller gives it again where it is known. True when the window moved.
   bool follow(const Eigen::Vector3d& p_map);
@@ -58,81 +81,61 @@ class DistanceField {
   /// set in `cells`.
   void setSpaces(const Eigen::Vector3i& first, std::uint32_t cells,
                  const std::array<Space, kDistanceStep>& space);
-  /// A cell that the surface passes through, at `offset` [cells] from its middle, each component within +-1.
-  void setSurface(const Eigen::Vector3i& cell, Space space, const Eigen::Vector3f& offset);
-  /// Takes at most `work` cells from the queue; returns how many it took.
-  std::size_t propagate(std::size_t work);
-  [[nodiscard]] std::size_t queued() const { return queued_; }
+  void setSurface(const Eigen::Vector3i& cell, Space space, const SurfacePoint& point);
+  /// Brings the distances up to what the cells say, which is all that images up to `up_to` gave.
+  void update(Stamp up_to);
 
   // For any reader, on any thread.
 
-  /// The distance at a point, interpolated between cells. False outside the window.
-  bool query(const Eigen::Vector3d& p_map, DistanceSample& out) const;
+  /// At a point, interpolated between cells.
+  [[nodiscard]] DistanceSample query(const Eigen::Vector3d& p_map) const;
 
   [[nodiscard]] const DistanceLimits& limits() const { return limits_; }
-  /// First cell of the window. Writer's thread.
-  [[nodiscard]] const Eigen::Vector3i& origin() const { return origin_; }
   [[nodiscard]] Eigen::Vector3i cellOf(const Eigen::Vector3d& p_map) const;
   [[nodiscard]] Eigen::Vector3d centreOf(const Eigen::Vector3i& cell) const;
-  /// Squared distance [cells^2] of a cell's middle to its nearest surface point; negative where none is in
-  /// reach.
-  [[nodiscard]] float squaredDistance(const Eigen::Vector3i& cell) const;
+  [[nodiscard]] std::size_t bytes() const;
+  /// First cell of the window. Writer's thread.
+  [[nodiscard]] const Eigen::Vector3i& origin() const { return origin_; }
   /// A surface passes through the cell, as the writer was told. Writer's thread.
   [[nodiscard]] bool holdsSurface(const Eigen::Vector3i& cell) const;
-  [[nodiscard]] std::size_t bytes() const;
 
  private:
   using Word = std::atomic<std::uint32_t>;
-  /// Side by side, as waves ask for both.
-  struct Cell {
-    Word nearest{0};    ///< where its nearest surface is
-    float squared = 0;  ///< to it, as it was taken [cells^2]
-  };
-  struct Around;
-  struct Corner {
-    float distance = 0;  ///< cells, signed
-    bool known = false;  ///< the slot is of this cell
-    bool bounded = false;
-    Space space = Space::kUnknown;
-  };
+  struct Holder;
+  struct Corner;
 
   [[nodiscard]] bool inside(const Eigen::Vector3i& cell) const;
-  [[nodiscard]] std::uint32_t partOfSlot(int axis, int at) const;
-  [[nodiscard]] std::uint32_t slotOf(const Eigen::Vector3i& cell) const;
+  [[nodiscard]] std::size_t slotOf(const Eigen::Vector3i& cell) const;
   [[nodiscard]] std::uint32_t tagOf(const Eigen::Vector3i& cell) const;
-  [[nodiscard]] Eigen::Vector3i cellAt(std::uint32_t slot) const;
-  [[nodiscard]] bool holdsTrue(const Eigen::Vector3i& surface, std::uint32_t nearest) const;
-  [[nodiscard]] std::uint32_t linkTo(const Eigen::Vector3i& cell, const Eigen::Vector3i& surface) const;
-  [[nodiscard]] float squaredTo(const Eigen::Vector3i& surface, const Eigen::Vector3i& cell) const;
-  [[nodiscard]] Corner corner(const Eigen::Vector3i& cell) const;
-  void setState(std::uint32_t slot, const Eigen::Vector3i& cell, Space space);
-  void dropSurface(std::uint32_t slot, const Eigen::Vector3i& cell);
-  void push(std::uint32_t slot, float squared);
-  bool pop(std::uint32_t& slot);
-  [[nodiscard]] Around around(const Eigen::Vector3i& cell) const;
-  template <typename Visit>
-  static void forNeighbours(const Around& around, const Visit& visit);
-  void raise(std::uint32_t slot, const Eigen::Vector3i& cell, const Around& neighbours);
-  void lower(const Around& neighbours, const Eigen::Vector3i& offset, std::uint32_t link,
-             const Word& surface);
-  void remove(std::uint32_t slot);
-  void takeOwn(std::uint32_t slot, const Eigen::Vector3i& cell);
-  void askAnew(std::uint32_t slot, const Eigen::Vector3i& cell);
+  void put(std::size_t slot, int y, std::uint32_t word);
   void clearSlab(int axis, int first, int last);
-  void wakeLayer(int axis, int at);
   void publishOrigin();
+  void findUnknown();
+  void findSurfaces();
+  void keepKnown(int x, int z);
+  void writeLines(int x, int z);
+  [[nodiscard]] std::size_t placeOfKnown(int x, int z) const;
+  [[nodiscard]] bool corners(const Eigen::Vector3i& first, std::array<Corner, 8>& out) const;
+  bool findHolder(const Eigen::Vector3i& first, Holder& holder) const;
+  [[nodiscard]] Holder descend(const Eigen::Vector3i& first, const Eigen::Vector3f& part,
+                               const std::array<Corner, 8>& corner) const;
+  static void interpolate(const std::array<Corner, 8>& corner, const Holder& near_point,
+                          const Eigen::Vector3d& part, DistanceSample& out);
 
   DistanceLimits limits_;
-  float squared_reach_;
-  std::array<std::uint32_t, 3> brick_stride_{};  ///< slots from a brick to the next along each axis
   Eigen::Vector3i origin_;
   std::atomic<std::uint64_t> shown_origin_{0};
-  std::vector<Cell> cell_;           ///< of each slot
-  std::vector<Word> surface_;        ///< of each slot: the surface in it
-  std::vector<std::uint32_t> next_;  ///< in the queue
-  std::vector<std::uint32_t> head_;  ///< of the queue, by distance
-  std::size_t lowest_ = 0;           ///< no lower bucket holds a cell
-  std::size_t queued_ = 0;
+  std::atomic<std::int64_t> newest_{0}, up_to_{0};
+  // By slot: for each eight of x, for each two of z, for each y these sixteen cells.
+  std::vector<Word> state_;    ///< the cell's space, and the surface in it
+  std::vector<Word> nearest_;  ///< where its nearest surface is, how far all is known
+  // The writer's: bits of the same slots, and what changed since the last update, by y in the window.
+  std::vector<std::uint8_t> surface_bits_, unknown_bits_;
+  std::vector<std::uint8_t> surface_changed_, unknown_changed_;
+  bool changed_ = false;
+  NearestSeeds surfaces_;
+  NearestSeeds unknown_;                ///< of cells twice the size
+  std::vector<std::uint8_t> known_to_;  ///< cells, of those: for each y, four of x, z
 };
 
 }  // namespace swiftlet

@@ -7,9 +7,6 @@
 namespace swiftlet {
 namespace {
 
-// Flatter than this the distance does not say where its zero is [per voxel of 1].
-constexpr float kLeastSlope = 0.3F;
-
 constexpr std::uint32_t kWholeRow = (1U << kBlockSide) - 1;
 static_assert(kBlockSide == kDistanceStep, "a block lies in the window whole or not at all");
 
@@ -50,9 +47,10 @@ void VolumeDistance::forgetEntered(const Eigen::Vector3i& origin_before) {
   }
 }
 
-void VolumeDistance::step(const Eigen::Vector3d& p_map_vehicle, const DistanceEffort& effort,
+void VolumeDistance::step(Stamp newest, const Eigen::Vector3d& p_map_vehicle, const DistanceEffort& effort,
                           DistanceStep& out) {
   out = {};
+  field_.announce(newest);
   const Eigen::Vector3i origin = field_.origin();
   if (field_.follow(p_map_vehicle)) forgetEntered(origin);
   const auto slots = static_cast<std::uint32_t>(seen_.size());
@@ -72,8 +70,9 @@ void VolumeDistance::step(const Eigen::Vector3d& p_map_vehicle, const DistanceEf
     seen = shown || !used ? now : Seen{};
     if (dropped || shown) ++out.blocks;
   }
-  out.cells = field_.propagate(effort.cells);
-  out.caught_up = visited == slots && field_.queued() == 0;
+  out.caught_up = visited == slots;
+  if (out.caught_up) up_to_ = newest;
+  field_.update(up_to_);
 }
 
 void VolumeDistance::erase(std::uint64_t key) {
@@ -219,19 +218,28 @@ void VolumeDistance::readVoxel(const VoxelIndex& voxel) {
     field_.setSpace(cellOf(voxel), space);
     return;
   }
+  // Slopes [per voxel]: across the surface, of both sides' size where it passes on both; else from one side
+  // to the other.
   Eigen::Vector3f slope = Eigen::Vector3f::Zero();
+  SurfacePoint point;
   for (int axis = 0; axis < 3; ++axis) {
     const auto after = static_cast<std::size_t>(2 * axis);
     const std::size_t before = after + 1;
-    const float high = known[after] ? beside[after] : own;
-    const float low = known[before] ? beside[before] : own;
-    const float span = static_cast<float>(static_cast<int>(known[after]) + static_cast<int>(known[before]));
-    if (span > 0) slope[axis] = (high - low) / (span * volume_.voxelSize());
+    const float rise = known[after] ? beside[after] - own : 0;
+    const float fall = known[before] ? own - beside[before] : 0;
+    const bool crossed_after = known[after] && changesSign(own, beside[after]);
+    const bool crossed_before = known[before] && changesSign(own, beside[before]);
+    if (crossed_after && crossed_before) {
+      point.both_sides[static_cast<std::size_t>(axis)] = true;
+      slope[axis] = (rise - fall) / 2;
+    } else if (crossed_after || crossed_before) {
+      slope[axis] = crossed_after ? rise : fall;
+    } else {
+      slope[axis] = (rise + fall) / (known[after] && known[before] ? 2.0F : 1.0F);
+    }
   }
-  const float squared = slope.squaredNorm();
-  Eigen::Vector3f offset = Eigen::Vector3f::Zero();
-  if (squared > kLeastSlope * kLeastSlope) offset = -own / (squared * volume_.voxelSize()) * slope;
-  field_.setSurface(cellOf(voxel), space, offset.cwiseMax(-1.0F).cwiseMin(1.0F));
+  point.offset = (-own / slope.squaredNorm() * slope).cwiseMax(-kMostOffset).cwiseMin(kMostOffset);
+  field_.setSurface(cellOf(voxel), space, point);
 }
 
 }  // namespace swiftlet

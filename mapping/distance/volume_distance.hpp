@@ -2,8 +2,8 @@
 // Keeps a distance field true to a volume: surfaces, free space and the unknown, as blocks change.
 //
 // Per step: the window follows the vehicle; at most `effort.blocks` blocks that changed since they were last
-// read are read, in the order of the volume's slots from where the last step ended; then at most
-// `effort.cells` cells of the field's waves. A voxel holds surface where the signed distance changes sign to
+// read are read, in the order of the volume's slots from where the last step ended; then the field is
+// updated. A voxel holds surface where the signed distance changes sign to
 // a neighbour that lies no nearer; the surface point is where the distance's slope leads to zero (one Newton
 // step), so it is found to a part of a voxel. What the volume dropped becomes unknown. Cells are the volume's
 // voxels. Map axes, metres. Memory: 16 bytes for each of the volume's slots, beside the field's. Not thread
@@ -19,13 +19,11 @@ namespace swiftlet {
 
 struct DistanceEffort {
   std::size_t blocks = 500;
-  std::size_t cells = 100'000;  ///< nearest to surfaces first
 };
 
 struct DistanceStep {
   std::size_t blocks = 0;  ///< read
-  std::size_t cells = 0;   ///< taken from the queue
-  bool caught_up = false;  ///< nothing waits
+  bool caught_up = false;  ///< no block waits
 };
 
 class VolumeDistance {
@@ -33,7 +31,9 @@ class VolumeDistance {
   /// `limits.cell_size` is the volume's. Both outlive this.
   VolumeDistance(const VoxelVolume& volume, DistanceField& field);
 
-  void step(const Eigen::Vector3d& p_map_vehicle, const DistanceEffort& effort, DistanceStep& out);
+  /// `newest`: stamp of the newest image in the volume.
+  void step(Stamp newest, const Eigen::Vector3d& p_map_vehicle, const DistanceEffort& effort,
+            DistanceStep& out);
 
  private:
   struct Seen {
@@ -62,6 +62,7 @@ class VolumeDistance {
   DistanceField& field_;
   std::vector<Seen> seen_;  ///< by slot
   std::uint32_t cursor_ = 0;
+  Stamp up_to_;  ///< images up to here are in the field
   // Of the block in hand: its slot and those around it, x fastest.
   BlockIndex block_;
   std::array<std::uint32_t, 27> around_{};

@@ -158,6 +158,7 @@ Status MapStage::integrate(const MapInput& input, const VolumeEffort& effort, Ma
   report.status = integrator_.step(measured_->view(), input.T_map_body, effort, report.volume);
   if (report.status.code == StatusCode::kInvalidInput) return report.status;
   ++counters_.taken;
+  newest_ = input.stamp;
   correction_.keep(measured_->view(), input.frame, input.T_map_world,
                    input.T_map_world.inverse() * input.T_map_body);
   return report.status;
@@ -196,7 +197,7 @@ Status MapStage::draw(const Eigen::Vector3d& p_map_vehicle, const SurfaceEffort&
 
 void MapStage::updateDistance(const Eigen::Vector3d& p_map_vehicle, const DistanceEffort& effort,
                               MapReport& report) {
-  volume_distance_.step(p_map_vehicle, effort, report.distance);
+  volume_distance_.step(newest_, p_map_vehicle, effort, report.distance);
 }
 
 }  // namespace swiftlet

@@ -92,6 +92,7 @@ class MapStage {
   Status integrate(const MapInput& input, const VolumeEffort& effort, MapReport& report);
   /// The surface of what changed.
   Status draw(const Eigen::Vector3d& p_map_vehicle, const SurfaceEffort& effort, MapReport& report);
+  /// The field takes what `integrate` gave up to now.
   void updateDistance(const Eigen::Vector3d& p_map_vehicle, const DistanceEffort& effort, MapReport& report);
 
   // Corrections of what was integrated before, of this epoch: VolumeCorrection's.
@@ -167,6 +168,7 @@ class MapStage {
   SurfacePatch patch_;
   std::uint32_t epoch_ = 0;
   Eigen::Vector3d vehicle_ = Eigen::Vector3d::Zero();  ///< last
+  Stamp newest_;                                       ///< image in the volume
   MapCounters counters_;
 };
 

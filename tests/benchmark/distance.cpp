@@ -1,15 +1,13 @@
-// Keeping the distance field true to a volume, beside making it anew with every image: true depth and poses
-// of the vil logs, default window. Anew in two ways: by the same code from nothing (the volume read, waves
-// from all its surfaces), and by the plain exact transform over all cells of the window, given where surface
-// is (Felzenszwalb, Huttenlocher, "Distance Transforms of Sampled Functions", Theory of Computing 8, 2012),
-// without parts of a cell. CPU time of this thread, all in one process.
-#include <algorithm>
-#include <cmath>
+// The distance field's update beside a textbook transform of the same window: true depth and poses of the vil
+// logs, default window. The update reads the blocks that changed, finds the nearest surface cell of every
+// cell, which one it is and how far the unknown is. The textbook's finds squared distances from cell to cell,
+// given where surface is (Felzenszwalb, Huttenlocher, "Distance Transforms of Sampled Functions", Theory of
+// Computing 8, 2012). CPU time of this thread, all in one process.
 #include <cstdio>
 #include <limits>
-#include <memory>
 #include <vector>
 
+#include "estimator/core/random.hpp"
 #include "mapping/distance/volume_distance.hpp"
 #include "mapping/volume/volume_integrator.hpp"
 #include "tests/mapping/depth_log.hpp"
@@ -21,10 +19,9 @@ using namespace swiftlet::testing;
 
 namespace {
 
-/// Images between two fields from nothing, which take long.
-constexpr std::size_t kAnewEvery = 10;
-constexpr DistanceEffort kAll{std::numeric_limits<std::size_t>::max(),
-                              std::numeric_limits<std::size_t>::max()};
+/// Images between two textbook transforms.
+constexpr std::size_t kPlainEvery = 5;
+constexpr int kQueries = 100'000;
 
 /// Squared distances along one line, in place.
 class LineTransform {
@@ -97,84 +94,53 @@ class PlainTransform {
   std::vector<float> squared_;
 };
 
-struct Difference {
-  std::size_t cells = 0, half = 0;
-  double sum = 0, most = 0;
-};
-
-double distanceOf(const DistanceField& field, const Eigen::Vector3i& cell) {
-  const float squared = field.squaredDistance(cell);
-  const double reach = field.limits().reach;
-  return squared < 0 ? reach : std::min(std::sqrt(static_cast<double>(squared)), reach);
-}
-
-template <typename Visit>
-void forCells(const DistanceField& field, const Visit& visit) {
-  const Eigen::Vector3i& n = field.limits().cells;
-  std::size_t at = 0;
-  for (int z = 0; z < n.z(); ++z) {
-    for (int y = 0; y < n.y(); ++y) {
-      for (int x = 0; x < n.x(); ++x) visit(at++, Eigen::Vector3i(field.origin() + Eigen::Vector3i(x, y, z)));
-    }
-  }
-}
-
 void measure(const std::string& folder) {
   const DepthLog log = readDepthLog(folder);
   VolumeSettings settings;
   settings.labels = false;
   VoxelVolume volume(settings);
   VolumeIntegrator integrator(volume, log.camera.pixels());
-  DistanceField kept, bounded;
-  VolumeDistance keeper(volume, kept), bounded_keeper(volume, bounded);
-  PlainTransform plain(kept.limits().cells);
-  std::vector<double> update, step, anew, transform;
-  double cells = 0, step_cells = 0;
+  DistanceField field;
+  VolumeDistance distance(volume, field);
+  PlainTransform plain(field.limits().cells);
+  std::vector<double> update, transform;
   std::size_t behind = 0;
-  Difference difference;
   VolumeStep fused;
   DistanceStep done;
   for (std::size_t i = 0; i < log.frames.size(); ++i) {
-    const SE3& T = log.frames[i].T_world_body;
-    (void)integrator.step(log.view(i, false), T, {}, fused);
-    update.push_back(test::timed([&] { keeper.step(T.translation, kAll, done); }));
-    cells += static_cast<double>(done.cells);
-    step.push_back(test::timed([&] { bounded_keeper.step(T.translation, {}, done); }));
-    step_cells += static_cast<double>(done.cells);
+    const DepthFrame& frame = log.frames[i];
+    const Eigen::Vector3d& vehicle = frame.T_world_body.translation;
+    (void)integrator.step(log.view(i, false), frame.T_world_body, {}, fused);
+    update.push_back(test::timed([&] { distance.step(frame.stamp, vehicle, {}, done); }));
     behind += done.caught_up ? 0U : 1U;
-    if (i % kAnewEvery != kAnewEvery - 1) continue;
-    DistanceField fresh;
-    VolumeDistance reader(volume, fresh);
-    // To the very same window: a window follows in steps, from wherever it was.
-    const Eigen::Vector3d middle = kept.centreOf(kept.origin() + kept.limits().cells / 2);
-    fresh.follow(middle + Eigen::Vector3d::Constant(100));
-    anew.push_back(test::timed([&] { reader.step(middle, kAll, done); }));
-    forCells(fresh, [&](std::size_t /*at*/, const Eigen::Vector3i& cell) {
-      const double off = std::abs(distanceOf(fresh, cell) - distanceOf(kept, cell));
-      ++difference.cells;
-      difference.sum += off;
-      difference.half += off > 0.5 ? 1U : 0U;
-      difference.most = std::max(difference.most, off);
-    });
-    forCells(kept, [&](std::size_t at, const Eigen::Vector3i& cell) {
-      plain.squared()[at] = kept.holdsSurface(cell) ? 0 : std::numeric_limits<float>::infinity();
-    });
+    if (i % kPlainEvery != kPlainEvery - 1) continue;
+    std::size_t at = 0;
+    const Eigen::Vector3i& n = field.limits().cells;
+    for (int z = 0; z < n.z(); ++z) {
+      for (int y = 0; y < n.y(); ++y) {
+        for (int x = 0; x < n.x(); ++x) {
+          const bool holds = field.holdsSurface(field.origin() + Eigen::Vector3i(x, y, z));
+          plain.squared()[at++] = holds ? 0 : std::numeric_limits<float>::infinity();
+        }
+      }
+    }
     transform.push_back(test::timed([&] { plain(); }));
   }
+  Random random(1);
+  double sum = 0;
+  const double asked = test::timed([&] {
+    for (int i = 0; i < kQueries; ++i) {
+      const Eigen::Vector3d to(random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(-1, 1));
+      sum += field.query(log.frames.back().T_world_body.translation + to).clearance();
+    }
+  });
   const double ms = meanOf(update);
-  std::printf("%s: update %.1f ms an image (p50 %.1f, p99 %.1f), %.0f cells taken\n", log.name.c_str(), ms,
-              percentileOf(update, 0.5), percentileOf(update, 0.99),
-              cells / static_cast<double>(update.size()));
   std::printf(
-      "  default effort: %.1f ms (p50 %.1f, p99 %.1f), %.0f cells taken, behind after %zu of %zu images\n",
-      meanOf(step), percentileOf(step, 0.5), percentileOf(step, 0.99),
-      step_cells / static_cast<double>(step.size()), behind, step.size());
-  std::printf("  from nothing %.1f ms, update / that %.2f; plain transform %.1f ms, update / that %.2f\n",
-              meanOf(anew), ms / meanOf(anew), meanOf(transform), ms / meanOf(transform));
-  std::printf("  update against from nothing: mean %.4f cells, %.3f %% by more than half a cell, most %.2f\n",
-              difference.sum / static_cast<double>(difference.cells),
-              100.0 * static_cast<double>(difference.half) / static_cast<double>(difference.cells),
-              difference.most);
+      "%s: update %.1f ms (p50 %.1f, p99 %.1f), textbook transform %.1f ms (p50 %.1f), update / that %.2f; "
+      "blocks left after %zu of %zu images; query %.2f us (mean clearance %.2f m); %.1f bytes a cell\n",
+      log.name.c_str(), ms, percentileOf(update, 0.5), percentileOf(update, 0.99), meanOf(transform),
+      percentileOf(transform, 0.5), ms / meanOf(transform), behind, update.size(), 1e3 * asked / kQueries,
+      sum / kQueries, static_cast<double>(field.bytes()) / static_cast<double>(field.limits().cells.prod()));
 }
 
 }  // namespace
