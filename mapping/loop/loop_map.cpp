@@ -65,18 +65,16 @@ class LoopMap::Weighting : public WeightedLoops {
   Status solve(std::span<const double> weights, std::span<double> chi_squared) override {
     ++map_.counters_.graduated_solutions;
     PoseGraphOptimizer<SE3>& optimizer = map_.optimizer_;
-    for (std::size_t id = 0; id < weights.size(); ++id) {
-      static_cast<void>(optimizer.setWeight(map_.edges_[id], weights[id]));
-    }
+    for (std::uint32_t id = 0; id < weights.size(); ++id) map_.setWeight(id, weights[id]);
     OptimizeEffort effort;
     effort.iterations = kGraduatedIterations;
     OptimizeReport report;
     const Status status = optimizer.optimize(effort, report);
     const PoseGraph<SE3>& graph = optimizer.graph();
-    for (std::size_t id = 0; id < weights.size(); ++id) {
-      const RelativePose<SE3>& edge = graph.edges[map_.edges_[id]];
+    for (std::uint32_t id = 0; id < weights.size(); ++id) {
+      const RelativePose<SE3>& edge = map_.selection_.loop(id);
       // What the odometry speaks against takes no part.
-      chi_squared[id] = map_.selection_.verdict(static_cast<std::uint32_t>(id)) == LoopVerdict::kSelected
+      chi_squared[id] = map_.selection_.verdict(id) == LoopVerdict::kSelected
                             ? 2 * edgeCost(edge, graph.poses[edge.from], graph.poses[edge.to])
                             : std::numeric_limits<double>::infinity();
     }
@@ -159,14 +157,14 @@ Status LoopMap::addLoop(std::uint32_t from, std::uint32_t to, const SE3& T_from_
   loops_[id] = Loop{old_node.stamp, new_node.stamp, old_node.frame, new_node.frame, false, false};
   asked_[id] = version_;
   if (another || optimizer_.graph().edges.size() >= graphLimits(limits_).max_edges) {
-    rebuild();
+    status = rebuild();
   } else {
     edges_[id] = static_cast<std::uint32_t>(optimizer_.graph().edges.size());
-    static_cast<void>(optimizer_.addEdge(edge));
-    static_cast<void>(optimizer_.setWeight(edges_[id], 0));
+    status = optimizer_.addEdge(edge);
+    setWeight(id, 0);
   }
   weigh();
-  return okStatus();
+  return status;
 }
 
 /// Of loops that all agree the one with the nearest other: it says least that is not said.
@@ -283,10 +281,9 @@ bool LoopMap::makeRoom(Node& left) {
   nodes_.erase(nodes_.begin() + k);
   ++counters_.nodes_removed;
   scratch_.edges.clear();
-  static_cast<void>(optimizer_.assign(scratch_));
-  rebuild();
+  const bool built = optimizer_.assign(scratch_).ok() && rebuild().ok();
   dropReleased();
-  return true;
+  return built;
 }
 
 /// Loops that went with a node, and those that had only their support.
@@ -295,7 +292,7 @@ void LoopMap::dropReleased() {
   for (std::uint32_t id = 0; id < selection_.held(); ++id) {
     if (loops_[id].selected && selection_.verdict(id) != LoopVerdict::kSelected) {
       loops_[id].selected = false;
-      static_cast<void>(optimizer_.setWeight(edges_[id], 0));
+      setWeight(id, 0);
       unsettled_ = true;
     }
     selected_ += loops_[id].selected ? 1U : 0U;
@@ -303,7 +300,7 @@ void LoopMap::dropReleased() {
 }
 
 /// The optimizer's graph from nodes and loops, its poses as they are.
-void LoopMap::rebuild() {
+Status LoopMap::rebuild() {
   scratch_.poses.assign(optimizer_.graph().poses.begin(), optimizer_.graph().poses.end());
   scratch_.edges.clear();
   for (std::uint32_t k = 1; k < nodes_.size(); ++k) {
@@ -315,15 +312,19 @@ void LoopMap::rebuild() {
     edge.information = informationOf(nodes_[k].covariance);
     scratch_.edges.push_back(edge);
   }
-  const std::size_t first = scratch_.edges.size();
   for (std::uint32_t id = 0; id < selection_.held(); ++id) {
-    edges_[id] = static_cast<std::uint32_t>(first + id);
-    scratch_.edges.push_back(selection_.loop(id));
+    // A loop that was given up waits for another to take its place; what it names is no longer kept true.
+    const bool held = selection_.verdict(id) != LoopVerdict::kReleased;
+    edges_[id] = held ? static_cast<std::uint32_t>(scratch_.edges.size()) : kNoEdge;
+    if (held) scratch_.edges.push_back(selection_.loop(id));
   }
-  static_cast<void>(optimizer_.assign(scratch_));
-  for (std::uint32_t id = 0; id < selection_.held(); ++id) {
-    static_cast<void>(optimizer_.setWeight(edges_[id], loops_[id].selected ? 1 : 0));
-  }
+  const Status status = optimizer_.assign(scratch_);
+  for (std::uint32_t id = 0; id < selection_.held(); ++id) setWeight(id, loops_[id].selected ? 1 : 0);
+  return status;
+}
+
+void LoopMap::setWeight(std::uint32_t id, double weight) {
+  if (edges_[id] != kNoEdge) static_cast<void>(optimizer_.setWeight(edges_[id], weight));
 }
 
 /// The selection's loops have their weight, the others none.
@@ -339,7 +340,7 @@ void LoopMap::weigh() {
     if (chosen) ++next;
     if (loops_[id].selected == chosen) continue;
     loops_[id].selected = chosen;
-    static_cast<void>(optimizer_.setWeight(edges_[id], chosen ? 1 : 0));
+    setWeight(id, chosen ? 1 : 0);
     unsettled_ = true;
   }
   selected_ = static_cast<std::uint32_t>(selected.size());
@@ -362,7 +363,7 @@ void LoopMap::graduate() {
   for (std::uint32_t id = 0; id < selection_.held(); ++id) {
     loops_[id].selected = status.ok() && weights_[id] == 1;
     selected_ += loops_[id].selected ? 1U : 0U;
-    static_cast<void>(optimizer_.setWeight(edges_[id], loops_[id].selected ? 1 : 0));
+    setWeight(id, loops_[id].selected ? 1 : 0);
   }
   unsettled_ = true;
 }
@@ -433,6 +434,11 @@ bool LoopMap::reconsider() {
 LoopVerdict LoopMap::verdict(std::uint32_t id) const {
   const LoopVerdict verdict = selection_.verdict(id);
   return verdict == LoopVerdict::kSelected && !loops_[id].selected ? LoopVerdict::kInconsistent : verdict;
+}
+
+std::optional<double> LoopMap::loopWeight(std::uint32_t id) const {
+  if (edges_[id] == kNoEdge) return std::nullopt;
+  return optimizer_.weight(edges_[id]);
 }
 
 LoopMapCounters LoopMap::counters() const {

@@ -32,6 +32,7 @@
 // selection and the optimizer's iterations. No clock; deterministic. Errors: Status.
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "estimator/core/stamp.hpp"
@@ -116,18 +117,22 @@ class LoopMap {
   /// As carried.
   [[nodiscard]] const RelativePose<SE3>& loopEdge(std::uint32_t id) const { return selection_.loop(id); }
   [[nodiscard]] LoopVerdict verdict(std::uint32_t id) const;
+  /// In the optimizer; empty for a loop that was given up, which has no edge there.
+  [[nodiscard]] std::optional<double> loopWeight(std::uint32_t id) const;
   [[nodiscard]] std::uint32_t selected() const { return selected_; }
   [[nodiscard]] LoopMapCounters counters() const;
   [[nodiscard]] const PoseGraph<SE3>& graph() const { return optimizer_.graph(); }
 
  private:
   class Weighting;
+  static constexpr std::uint32_t kNoEdge = 0xFFFFFFFF;  ///< of a loop that was given up
 
   [[nodiscard]] std::uint32_t leastLoss();
   [[nodiscard]] double stretch(std::uint32_t k) const;
   [[nodiscard]] double viewDistance(std::uint32_t k) const;
   [[nodiscard]] std::uint32_t mostRepeatedLoop(const RelativePose<SE3>& added) const;
-  void rebuild();
+  Status rebuild();
+  void setWeight(std::uint32_t id, double weight);
   void dropReleased();
   void weigh();
   void graduate();

@@ -6,9 +6,11 @@
 #include <malloc.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "estimator/core/random.hpp"
@@ -281,4 +283,130 @@ TEST_CASE("graduated non-convexity keeps true loops and none of the false ones")
     CHECK_FALSE(wanderer.map->loop(id).selected);
   }
   CHECK(wanderer.error() < 0.03);
+}
+
+namespace {
+
+/// What a LoopMap must hold, kept without cleverness: nodes by their frames, loops by the frames at their
+/// ends.
+class PlainMap {
+ public:
+  struct Loop {
+    std::uint64_t from = 0, to = 0;  ///< frames; may be those of neighbours once theirs are gone
+    bool carried = false;
+  };
+
+  void add(std::uint64_t frame) { frames_.push_back(frame); }
+  void remove(std::uint64_t frame) {
+    const auto at = std::find(frames_.begin(), frames_.end(), frame);
+    REQUIRE(at != frames_.end());
+    frames_.erase(at);
+  }
+  void addLoop(std::uint32_t id, std::uint64_t from, std::uint64_t to) {
+    if (id >= loops_.size()) loops_.resize(id + 1);
+    loops_[id] = {from, to, false};
+  }
+
+  /// Every loop that was not given up is an edge of the graph, between the nodes that it was found between
+  /// or, where these are gone, others; and nothing else is.
+  void check(const LoopMap& map) {
+    REQUIRE(map.size() == frames_.size());
+    const PoseGraph<SE3>& graph = map.graph();
+    REQUIRE(graph.poses.size() == frames_.size());
+    std::size_t links = 0;
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      REQUIRE(map.node(k).frame == frames_[k]);
+      links += map.node(k).linked ? 1 : 0;
+    }
+    std::size_t held = 0, selected = 0;
+    for (std::uint32_t id = 0; id < map.loops(); ++id) {
+      if (map.verdict(id) == LoopVerdict::kReleased) {
+        REQUIRE_FALSE(map.loop(id).selected);
+        continue;
+      }
+      ++held;
+      selected += map.loop(id).selected ? 1 : 0;
+      const RelativePose<SE3>& loop = map.loopEdge(id);
+      REQUIRE(loop.from != loop.to);
+      REQUIRE(std::max(loop.from, loop.to) < frames_.size());
+      follow(frames_[loop.from], loops_[id].from);
+      follow(frames_[loop.to], loops_[id].to);
+      const std::optional<double> weight = map.loopWeight(id);
+      REQUIRE(weight.has_value());
+      REQUIRE(*weight == (map.loop(id).selected ? 1 : 0));
+      const auto same = [&](const RelativePose<SE3>& edge) {
+        return edge.from == loop.from && edge.to == loop.to &&
+               edge.T_from_to.translation == loop.T_from_to.translation;
+      };
+      REQUIRE(std::count_if(graph.edges.begin(), graph.edges.end(), same) >= 1);
+    }
+    REQUIRE(map.selected() == selected);
+    REQUIRE(graph.edges.size() >= links + held);
+  }
+
+ private:
+  /// A loop's end stays as long as its node does.
+  void follow(std::uint64_t found, std::uint64_t& kept) const {
+    if (std::find(frames_.begin(), frames_.end(), kept) != frames_.end()) REQUIRE(found == kept);
+    kept = found;
+  }
+
+  std::vector<std::uint64_t> frames_;
+  std::vector<Loop> loops_;
+};
+
+}  // namespace
+
+TEST_CASE("ten thousand random operations lose no loop") {
+  for (const int kind : {0, 1, 2}) {
+    LoopSettings settings;
+    settings.consistency = kind != 0;
+    settings.graduated = kind == 2;
+    const LoopLimits limits{40, 25};
+    LoopMap map(settings, limits);
+    PlainMap plain;
+    Random random(60 + static_cast<std::uint64_t>(kind));
+    std::uint64_t frame = 0;
+    std::size_t added = 0;
+    const int operations = kind == 2 ? 1000 : 4500;  // graduated: up to sixty solutions a loop
+    for (int i = 0; i < operations; ++i) {
+      const double what = random.uniform(0, 1);
+      if (what < 0.3 || map.size() < 3) {
+        LoopMap::Node left;
+        if (map.full() && map.makeRoom(left)) plain.remove(left.frame);
+        LoopMap::Node node;
+        node.frame = ++frame;
+        node.stamp = Stamp{} + Duration::fromSeconds(0.5 * static_cast<double>(frame));
+        node.T_previous_this = poseExp(draw(random, 0.1, 0.2));
+        node.covariance = covarianceOf(kOdometryTurn, kOdometryMove);
+        node.linked = random.uniform(0, 1) < 0.97;
+        node.T_world_body = poseExp(draw(random, 0.1, 2));
+        REQUIRE(map.add(node).ok());
+        plain.add(frame);
+      } else if (what < 0.4) {
+        LoopMap::Node left;
+        if (map.makeRoom(left)) plain.remove(left.frame);
+      } else if (what < 0.8) {
+        const auto to = static_cast<std::uint32_t>(random.uniform(1, static_cast<double>(map.size()) - 1e-9));
+        // Next to each other, too.
+        const auto from =
+            random.uniform(0, 1) < 0.3 ? to - 1 : static_cast<std::uint32_t>(random.uniform(0, to - 1e-9));
+        const SE3 truth = map.pose(from).inverse() * map.pose(to);
+        const SE3 measured = random.uniform(0, 1) < 0.7 ? truth * poseExp(draw(random, kLoopTurn, kLoopMove))
+                                                        : poseExp(draw(random, 1, 3));
+        std::uint32_t id = 0;
+        const Status status = map.addLoop(from, to, measured, covarianceOf(kLoopTurn, kLoopMove), id);
+        REQUIRE(status.ok());
+        plain.addLoop(id, map.node(from).frame, map.node(to).frame);
+        ++added;
+      } else {
+        bool moved = false;
+        static_cast<void>(map.settle(2, moved));
+      }
+      plain.check(map);
+    }
+    CHECK(added > static_cast<std::size_t>(operations) / 4);
+    CHECK(map.counters().loops_released > 50);
+    CHECK(map.counters().loops_carried > 20);
+  }
 }
