@@ -165,7 +165,6 @@ void VolumeCorrection::dropSeen() {
   for (auto slot = seen; slot != leaving_.end(); ++slot) {
     const BlockIndex block = volume_.header(*slot).index;
     dropped_.push_back(block);
-    if (store_.find(block) == SurfaceStore::kNone) continue;
     empty_.block = block;
     store_.put(empty_, {});
   }

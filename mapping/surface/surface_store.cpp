@@ -37,6 +37,7 @@ SurfaceStore::SurfaceStore(std::size_t bytes, double block_size, SurfaceSink* si
 
 void SurfaceStore::clear() {
   hash_.clear();
+  left_.reset();
   std::fill(entries_.begin(), entries_.end(), Entry{});
   unused_entries_.clear();
   for (std::size_t i = entries_.size(); i-- > 0;) unused_entries_.push_back(static_cast<std::uint32_t>(i));
@@ -47,7 +48,8 @@ void SurfaceStore::clear() {
 }
 
 std::size_t SurfaceStore::bytes() const {
-  return hash_.bytes() + entries_.size() * (sizeof(Entry) + sizeof(std::uint32_t) + sizeof(Farness)) +
+  return sizeof(left_) + hash_.bytes() +
+         entries_.size() * (sizeof(Entry) + sizeof(std::uint32_t) + sizeof(Farness)) +
          page_.size() * (sizeof(Page) + sizeof(std::uint32_t));
 }
 
@@ -92,10 +94,25 @@ void SurfaceStore::leaveAll() {
 void SurfaceStore::leave(const SurfacePatch& patch) {
   if (sink_ != nullptr) {
     sink_->take(patch);
+    left_.set(bitOf(patch.block));
     ++counters_.spilled;
   } else {
     ++counters_.lost;
   }
+}
+
+std::size_t SurfaceStore::bitOf(const BlockIndex& block) {
+  // Fibonacci hashing, as BlockHash.
+  return static_cast<std::size_t>((keyOf(block) * 0x9E3779B97F4A7C15ULL) >> (64 - kLeftBitsLog));
+}
+
+/// The sink is told that the block has no surface any more.
+void SurfaceStore::withdraw(const BlockIndex& block) {
+  if (sink_ == nullptr || !left_.test(bitOf(block))) return;
+  leaving_.block = block;
+  leaving_.vertices.clear();
+  leaving_.triangles.clear();
+  sink_->take(leaving_);
 }
 
 /// False where `block` itself would be among those that go.
@@ -124,7 +141,10 @@ bool SurfaceStore::makeRoom(std::size_t pages, const BlockIndex& block, const Ei
 
 void SurfaceStore::put(const SurfacePatch& patch, const Eigen::Vector3f& vehicle) {
   if (const std::uint32_t old = find(patch.block); old != kNone) remove(old);
-  if (patch.triangles.empty()) return;
+  if (patch.triangles.empty()) {
+    withdraw(patch.block);
+    return;
+  }
   const std::size_t pages = pagesFor(patch.vertices.size(), patch.triangles.size());
   if ((free_pages_ < pages || unused_entries_.empty()) && !makeRoom(pages, patch.block, vehicle)) {
     leave(patch);

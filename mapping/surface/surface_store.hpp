@@ -5,11 +5,13 @@
 // A patch lies in pages of 240 bytes from a pool, found by its block. A new patch of a block takes the place
 // of the one before. When pages or entries run out the patches farthest from the vehicle go: handed to the
 // sink where there is one (a file in the run folder), lost otherwise; both are counted. A patch that is
-// itself the farthest goes at once. A sink that hears of one block again should keep the later patch. Cost: a
-// copy; when full, a pass over all entries for every 1/32 of them that goes.
+// itself the farthest goes at once. A sink that hears of one block again should keep the later patch; an
+// empty one says that a patch it may have is surface no more. Cost: a copy; when full, a pass over all
+// entries for every 1/32 of them that goes.
 
 #include <Eigen/Core>
 #include <array>
+#include <bitset>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -42,7 +44,7 @@ class SurfaceStore {
   /// outlives the store's use.
   SurfaceStore(std::size_t bytes, double block_size, SurfaceSink* sink = nullptr);
 
-  /// An empty patch takes the block's out.
+  /// An empty patch takes the block's out, and out of the sink.
   void put(const SurfacePatch& patch, const Eigen::Vector3f& vehicle);
   void clear();
   /// All patches go to the sink (or are lost, counted), ordered by block.
@@ -88,6 +90,8 @@ class SurfaceStore {
                                 const Eigen::Vector3f& vehicle) const;
   void remove(std::uint32_t entry);
   void leave(const SurfacePatch& patch);
+  [[nodiscard]] static std::size_t bitOf(const BlockIndex& block);
+  void withdraw(const BlockIndex& block);
   bool makeRoom(std::size_t pages, const BlockIndex& block, const Eigen::Vector3f& vehicle);
   void write(const SurfacePatch& patch, Entry& entry);
 
@@ -102,6 +106,9 @@ class SurfaceStore {
   std::size_t free_pages_ = 0;
   std::vector<Farness> far_;  ///< scratch
   SurfacePatch leaving_;      ///< scratch
+  /// Bits of keys whose patches went to the sink. Who shares a bit with one is withdrawn in vain.
+  static constexpr unsigned kLeftBitsLog = 17;
+  std::bitset<(std::size_t{1} << kLeftBitsLog)> left_;
   SurfaceStoreCounters counters_;
 };
 

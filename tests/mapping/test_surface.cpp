@@ -348,6 +348,59 @@ TEST_CASE("evicted surface stays in the store") {
 
 namespace {
 
+/// Patches that left the store, under those that are in it.
+struct Everything : SurfaceSink {
+  std::map<BlockIndex, std::vector<SurfaceVertex>> vertices;
+  void take(const SurfacePatch& patch) override {
+    vertices[patch.block].assign(patch.vertices.begin(), patch.vertices.end());
+  }
+};
+
+}  // namespace
+
+TEST_CASE("what moves or vanishes while nobody looks leaves no ghost once its place is seen again") {
+  // Patches that stay in the store, and a store so small that they went to the sink.
+  for (const std::size_t store_bytes : {std::size_t{4} << 20, std::size_t{60'000}}) {
+    CAPTURE(store_bytes);
+    VolumeSettings settings = sceneSettings();
+    settings.memory_bytes = 150 * 8000;
+    Everything left;
+    Mapped map(settings, store_bytes, &left);
+    double time = 1;
+    const auto wall = [&](double x, double y, double z = 0) {
+      const SE3 pose = lookAt({x, y, z}, {3, y, z});
+      map.add(render(pose, time += 1, Plane{{-1, 0, 0}, -3}), pose);
+    };
+    const auto ghosts = [&] {
+      Everything all = left;
+      const auto patch = std::make_unique<SurfacePatch>();
+      map.store.visit(all, *patch);
+      std::size_t count = 0;
+      for (const auto& [block, vertices] : all.vertices) {
+        for (const SurfaceVertex& v : vertices) {
+          const double radius = (v.p_world.cast<double>() - kBall.centre).norm();
+          count += radius < kBall.radius + 0.1 ? 1 : 0;
+        }
+      }
+      return count;
+    };
+    for (const SE3& pose : viewsAround(kBall, 1.5)) map.add(render(pose, time += 1, kBall), pose);
+    for (int i = 4; i < 40; ++i) wall(1.5, 0.25 * i);
+    REQUIRE(map.volume.counters().evicted > 20);
+    REQUIRE(ghosts() > 500);  // the ball, which nobody has missed yet
+    REQUIRE((map.store.counters().spilled > 0) == (store_bytes < 100'000));
+    // It went: the wall behind it is seen through its place.
+    for (int i = 0; i < 6; ++i) {
+      for (const double z : {-0.5, 0.0, 0.5}) {
+        for (const double y : {-0.6, -0.2, 0.2, 0.6}) wall(-1.5, y, z);
+      }
+    }
+    CHECK(ghosts() == 0);
+  }
+}
+
+namespace {
+
 SurfacePatch patchAt(std::int32_t x, std::size_t triangles, std::uint8_t grey) {
   SurfacePatch patch;
   patch.block = {x, 0, 0};
