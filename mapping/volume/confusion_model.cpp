@@ -72,11 +72,15 @@ LabelEstimate ConfusionModel::estimate(const LabelCounts& counts) const {
     if (known.label != 0) return known;
   }
   std::array<float, kLabelValues> sum{};
+  bool any = false;
   for (int slot = 0; slot < LabelCounts::kSlots && counts.count(slot) > 0; ++slot) {
+    if (counts.label(slot) >= labels_) continue;
+    any = true;
     const auto& row = log_[counts.label(slot)];
     const auto n = static_cast<float>(counts.count(slot));
     for (std::size_t i = 0; i < kLabelValues; ++i) sum[i] += n * row[i];
   }
+  if (!any) return {};
   const auto count = static_cast<std::size_t>(labels_);
   std::size_t best = 1;
   for (std::size_t i = 2; i < count; ++i) best = sum[i] > sum[best] ? i : best;

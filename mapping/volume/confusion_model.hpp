@@ -4,7 +4,8 @@
 // The model C(s, t) is the probability that a segmentation says s where t is true. With even priors Bayes'
 // rule gives P(t | counts) proportional to the product over s of C(s, t)^count(s) (McCormac et al.,
 // "SemanticFusion", ICRA 2017; Rosinol et al., ICRA 2020), so the counts are all that a voxel has to keep.
-// Label 0 (unknown) is neither true nor counted. A table answers where a place saw one label only.
+// Label 0 (unknown) and labels that the model does not have are neither true nor counted. A table answers
+// where a place saw one label only.
 
 #include <array>
 #include <cstdint>

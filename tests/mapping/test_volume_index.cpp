@@ -166,6 +166,19 @@ TEST_CASE("the default model: right nine times of ten") {
   CHECK(once.probability == Approx(0.9F).margin(1e-3));
 }
 
+TEST_CASE("a label that the model does not know is not taken for one that it does") {
+  const ConfusionModel model(4);
+  LabelCounts counts;
+  for (int i = 0; i < 5; ++i) counts.add(9);
+  CHECK(model.estimate(counts).label == 0);
+  CHECK(model.estimate(counts).probability == 0);
+  counts.add(2);
+  CHECK(model.estimate(counts).label == 2);
+  LabelCounts alone;
+  alone.add(2);
+  CHECK(model.estimate(counts).probability == model.estimate(alone).probability);
+}
+
 TEST_CASE("a confusion matrix that is none is refused") {
   ConfusionModel model(4);
   ConfusionModel::Matrix matrix{};
