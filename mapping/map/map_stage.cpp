@@ -11,9 +11,6 @@ constexpr double kTruncationVoxels = 3;
 constexpr double kBehindVoxels = 2;
 /// VolumeSettings::most_sigma in truncation distances.
 constexpr double kMostSigma = 2;
-/// A depth sensor's errors are those that it says: one measurement is a surface. Stereo repeats its
-/// mismatches from image to image; that takes more (SurfaceSettings::least_weight).
-constexpr double kLeastSensorWeight = 1.0 / kWeightSteps;
 
 VolumeSettings volumeSettings(const MapSettings& settings) {
   VolumeSettings volume;
@@ -42,7 +39,7 @@ SensorDepthSettings sensorSettings(const MapSettings& settings) {
 
 SurfaceSettings surfaceSettings(bool has_sensor) {
   SurfaceSettings surface;
-  if (has_sensor) surface.least_weight = kLeastSensorWeight;
+  if (has_sensor) surface.least_weight = SurfaceSettings::kLeastSensorWeight;
   return surface;
 }
 

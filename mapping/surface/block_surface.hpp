@@ -18,7 +18,11 @@
 namespace swiftlet {
 
 struct SurfaceSettings {
-  /// Voxels of less weight count as unobserved.
+  /// Of a depth sensor, whose errors are those that it says: one measurement is a surface.
+  static constexpr double kLeastSensorWeight = 1.0 / kWeightSteps;
+
+  /// Voxels of less weight count as unobserved. Stereo repeats its mismatches from image to image: it takes
+  /// more than one.
   double least_weight = 0.02;
   /// No surface passes through a cube in which distances along an edge differ by more voxels than this: such
   /// a step is the edge of what was seen, between a thing and the free space beside it. 0: no limit.

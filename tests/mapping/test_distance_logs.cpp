@@ -111,7 +111,8 @@ Figures judge(const DepthLog& log) {
   VolumeIntegrator integrator(volume, log.camera.pixels());
   const ConfusionModel confusion;
   SurfaceStore store(std::size_t{128} << 20U, settings.voxel_size * kBlockSide, nullptr);
-  const auto surface = std::make_unique<SurfaceStage>(volume, confusion, store);
+  const SurfaceSettings sensor{.least_weight = SurfaceSettings::kLeastSensorWeight, .most_step = 0};
+  const auto surface = std::make_unique<SurfaceStage>(volume, confusion, store, sensor);
   const auto patch = std::make_unique<SurfacePatch>();
   DistanceField field;
   VolumeDistance distance(volume, field);

@@ -41,7 +41,7 @@ struct VolumeRun {
 
 struct RunOptions {
   VolumeSettings settings;
-  SurfaceSettings surface;
+  SurfaceSettings surface{.least_weight = SurfaceSettings::kLeastSensorWeight, .most_step = 0};
   std::size_t surface_bytes = std::size_t{32} << 20U;
   VolumeEffort effort;
 };
