@@ -1,77 +1,16 @@
 #include "mapping/distance/distance_field.hpp"
 
-#include <cmath>
+#include <algorithm>
 #include <cstring>
+
+#include "mapping/distance/distance_word.hpp"
 
 namespace swiftlet {
 namespace {
 
-// Surface lies up to so far [cells] from the middles of the cells that hold it.
-constexpr float kSpread = 1.5F;
-constexpr int kSpreadCells = 2;  // whole ones
 // The window moves once the vehicle is an eighth of it away from its middle.
 constexpr int kSlack = 8;
-// Unknown cells are looked for in cells of so many a side.
-constexpr int kCoarse = 2;
-// A query goes along the surface for so many cells at most; on logs it needs one or two.
-constexpr int kMostDescents = 4;
 constexpr int kStep = kDistanceStep;
-constexpr int kFour = kStep / kCoarse;   // coarse cells along x side by side
-constexpr std::uint32_t kTagShift = 29;  // of both words: one bit an axis
-
-/// The surface point inside a cell, 7 bits an axis, +-0.5 cells from its middle, present or not; the
-/// cell's space; the axes along which the cell has surface on both sides; the tag.
-struct StateWord {
-  static constexpr float kScale = 126;  // 63 at half a cell
-  static constexpr std::uint32_t kPresent = 1U << 21U;
-  static constexpr std::uint32_t kSpaceShift = 22;
-  static constexpr std::uint32_t kSidesShift = 24;
-
-  static std::uint32_t pack(Space space) { return static_cast<std::uint32_t>(space) << kSpaceShift; }
-  static std::uint32_t pack(Space space, const SurfacePoint& point) {
-    std::uint32_t word = pack(space) | kPresent;
-    for (int i = 0; i < 3; ++i) {
-      const float kept = std::clamp(point.offset[i], -kMostOffset, kMostOffset) * kScale;
-      const auto bits = static_cast<std::uint32_t>(std::lround(kept) + 64);
-      word |= bits << (7U * static_cast<std::uint32_t>(i));
-      if (point.both_sides[static_cast<std::size_t>(i)])
-        word |= 1U << (kSidesShift + static_cast<std::uint32_t>(i));
-    }
-    return word;
-  }
-  static Space space(std::uint32_t word) { return static_cast<Space>(word >> kSpaceShift & 3U); }
-  static bool isUnknown(std::uint32_t word) { return space(word) == Space::kUnknown; }
-  static bool holds(std::uint32_t word, std::uint32_t tag) {
-    return (word & kPresent) != 0 && word >> kTagShift == tag >> kTagShift;
-  }
-  /// From a point to the surface of a cell whose middle is at `middle` from it.
-  static float squaredTo(std::uint32_t word, const Eigen::Vector3f& middle) {
-    float squared = 0;
-    for (std::uint32_t i = 0; i < 3; ++i) {
-      const float offset = static_cast<float>(static_cast<int>(word >> (7U * i) & 127U) - 64) / kScale;
-      const float to = middle[i];
-      const bool both = (word >> (kSidesShift + i) & 1U) != 0;
-      const float along = both ? std::abs(to) - std::abs(offset) : to + offset;
-      squared += along * along;
-    }
-    return squared;
-  }
-};
-
-/// Steps to the cell with the nearest surface, 7 bits an axis, biased by 64, or, where none is in reach, how
-/// far there is none for sure [cells]; how far nothing is unknown [cells]; the tag.
-struct NearestWord {
-  static constexpr int kBias = 64;
-  static constexpr std::uint32_t kHasSurface = 1U << 21U;
-  static constexpr std::uint32_t kKnownShift = 22;
-
-  static Eigen::Vector3i steps(std::uint32_t word) {
-    return {static_cast<int>(word & 127U) - kBias, static_cast<int>(word >> 7U & 127U) - kBias,
-            static_cast<int>(word >> 14U & 127U) - kBias};
-  }
-  static float atLeast(std::uint32_t word) { return static_cast<float>(word & 127U); }
-  static int knownTo(std::uint32_t word) { return static_cast<int>(word >> kKnownShift & 127U); }
-};
 
 constexpr std::size_t kLanes = static_cast<std::size_t>(NearestSeeds::kColumns) * NearestSeeds::kLayers;
 template <typename Value>
@@ -87,7 +26,7 @@ void toNearest(Lanes<std::uint32_t>& words, const Lanes<int>& edges, int edge_y,
     const auto biased = [](int steps) { return static_cast<std::uint32_t>(steps + NearestWord::kBias); };
     const std::uint32_t found = biased(NearestSeeds::xOf(seed)) | biased(NearestSeeds::yOf(seed)) << 7U |
                                 biased(NearestSeeds::zOf(seed)) << 14U | NearestWord::kHasSurface;
-    const auto none = static_cast<std::uint32_t>(std::max(within - kSpreadCells, 0));
+    const auto none = static_cast<std::uint32_t>(std::max(within - NearestWord::kSpreadCells, 0));
     words[i] = NearestSeeds::squaredOf(seed) <= within * within ? found : none;
     words[i] |= rest[i] | tag;
   }
@@ -112,15 +51,6 @@ std::uint64_t packOrigin(const Eigen::Vector3i& origin) {
   return word;
 }
 
-Eigen::Vector3i unpackOrigin(std::uint64_t word) {
-  Eigen::Vector3i origin;
-  for (int i = 0; i < 3; ++i) {
-    const std::uint64_t steps = word >> (21U * static_cast<unsigned>(i)) & kOriginMask;
-    origin[i] = static_cast<int>(static_cast<std::int64_t>(steps) - kOriginBias) * kStep;
-  }
-  return origin;
-}
-
 DistanceLimits checked(DistanceLimits limits) {
   for (int i = 0; i < 3; ++i) limits.cells[i] = std::max(limits.cells[i] / kStep, 2) * kStep;
   limits.reach = std::clamp(limits.reach, 2, kMostReach);
@@ -129,15 +59,6 @@ DistanceLimits checked(DistanceLimits limits) {
 
 /// Cells to the nearest one outside a line of `count`.
 int edge(int at, int count) { return std::min(at + 1, count - at); }
-
-Eigen::Vector3i cornerOf(int i) { return {i & 1, i >> 1 & 1, i >> 2 & 1}; }
-
-/// Of eight bits whether one of each pair is set.
-std::uint8_t pairs(std::uint8_t bits) {
-  std::uint32_t result = 0;
-  for (std::uint32_t i = 0; i < 4; ++i) result |= (bits >> (2 * i) & 3U) != 0 ? 1U << i : 0U;
-  return static_cast<std::uint8_t>(result);
-}
 
 }  // namespace
 
@@ -150,8 +71,7 @@ DistanceField::DistanceField(const DistanceLimits& limits)
       surface_changed_(static_cast<std::size_t>(limits_.cells.y())),
       unknown_changed_(surface_changed_.size()),
       surfaces_(limits_.cells, limits_.reach),
-      unknown_(limits_.cells / kCoarse, limits_.reach / kCoarse + 1, 1),
-      known_to_(state_.size() / (kCoarse * kCoarse * kCoarse)) {
+      known_(limits_.cells, limits_.reach) {
   for (int i = 0; i < 3; ++i) origin_[i] = -floorDiv(limits_.cells[i] / 2, kStep) * kStep;
   clearSlab(0, origin_.x(), origin_.x() + limits_.cells.x());
   publishOrigin();
@@ -159,9 +79,19 @@ DistanceField::DistanceField(const DistanceLimits& limits)
 
 void DistanceField::publishOrigin() { shown_origin_.store(packOrigin(origin_), std::memory_order_release); }
 
+Eigen::Vector3i DistanceField::shownOrigin() const {
+  const std::uint64_t word = shown_origin_.load(std::memory_order_acquire);
+  Eigen::Vector3i origin;
+  for (int i = 0; i < 3; ++i) {
+    const std::uint64_t steps = word >> (21U * static_cast<unsigned>(i)) & kOriginMask;
+    origin[i] = static_cast<int>(static_cast<std::int64_t>(steps) - kOriginBias) * kStep;
+  }
+  return origin;
+}
+
 std::size_t DistanceField::bytes() const {
-  return state_.size() * 2 * sizeof(Word) + surface_bits_.size() + unknown_bits_.size() + known_to_.size() +
-         surfaces_.bytes() + unknown_.bytes();
+  return state_.size() * 2 * sizeof(Word) + surface_bits_.size() + unknown_bits_.size() + surfaces_.bytes() +
+         known_.bytes();
 }
 
 Eigen::Vector3i DistanceField::cellOf(const Eigen::Vector3d& p_map) const {
@@ -289,56 +219,21 @@ void DistanceField::update(Stamp up_to) {
 }
 
 void DistanceField::findUnknown() {
-  const Eigen::Vector3i n = limits_.cells / kCoarse;
-  for (int y = 0; y < n.y(); ++y) {
-    std::uint8_t* const changed = &unknown_changed_[static_cast<std::size_t>(kCoarse * y)];
-    if (changed[0] == 0 && changed[1] == 0) continue;
-    changed[0] = changed[1] = 0;
-    for (int z = 0; z < n.z(); ++z) {
-      const auto row = unknown_.seeds(z);
-      std::fill(row.begin(), row.end(), std::uint8_t{0});
-      for (int block = 0; block < limits_.cells.x() / kStep; ++block) {
-        std::uint8_t bits = 0;
-        for (int i = 0; i < kCoarse * kCoarse; ++i) {
-          const Eigen::Vector3i cell(kStep * block, kCoarse * y + i % kCoarse, kCoarse * z + i / kCoarse);
-          bits |= unknown_bits_[slotOf(origin_ + cell) / kStep];
-        }
-        row[static_cast<std::size_t>(block / 2)] |= static_cast<std::uint8_t>(pairs(bits) << (block % 2 * 4));
+  constexpr int kSide = KnownRange::kSide;
+  for (int y = 0; y < limits_.cells.y() / kSide; ++y) {
+    std::uint8_t* const changed = &unknown_changed_[static_cast<std::size_t>(kSide * y)];
+    if (std::all_of(changed, changed + kSide, [](std::uint8_t flag) { return flag == 0; })) continue;
+    std::fill_n(changed, kSide, std::uint8_t{0});
+    known_.setPlane(y, [&](int block, int z) {
+      std::uint8_t bits = 0;
+      for (int i = 0; i < kSide * kSide; ++i) {
+        const Eigen::Vector3i cell(kStep * block, kSide * y + i % kSide, kSide * z + i / kSide);
+        bits |= unknown_bits_[slotOf(origin_ + cell) / kStep];
       }
-    }
-    unknown_.transformPlane(y);
+      return bits;
+    });
   }
-  for (int x = 0; x < n.x(); x += kStep) {
-    for (int z = 0; z < n.z(); z += NearestSeeds::kLayers) keepKnown(x, z);
-  }
-}
-
-/// Of the coarse cells x to x + 7, z and z + 1, for every y.
-void DistanceField::keepKnown(int x, int z) {
-  const Eigen::Vector3i n = limits_.cells / kCoarse;
-  const auto lines = unknown_.transformLines(x, z);
-  for (int half = 0; half < 2 && x + half * kFour < n.x(); ++half) {
-    for (int layer = 0; layer < NearestSeeds::kLayers; ++layer) {
-      std::uint8_t* known = &known_to_[placeOfKnown(x + half * kFour, z + layer)];
-      for (int y = 0; y < n.y(); ++y) {
-        const int edge_yz = std::min(edge(y, n.y()), edge(z + layer, n.z()));
-        for (int i = 0; i < kFour; ++i) {
-          const auto word = lines[static_cast<std::size_t>(y)][static_cast<std::size_t>(layer)]
-                                 [static_cast<std::size_t>(half * kFour + i)];
-          // Outside the window nothing is known: as far as there are cells between.
-          const int at_most = std::min(edge_yz, edge(x + half * kFour + i, n.x())) - 1;
-          const float gap = std::sqrt(static_cast<float>(NearestSeeds::squaredOf(word)));
-          const int known_to = std::min(static_cast<int>(gap * kCoarse), kCoarse * at_most);
-          *known++ = static_cast<std::uint8_t>(std::min(known_to, limits_.reach));
-        }
-      }
-    }
-  }
-}
-
-std::size_t DistanceField::placeOfKnown(int x, int z) const {
-  const Eigen::Vector3i n = limits_.cells / kCoarse;
-  return static_cast<std::size_t>(((x / kFour * n.z()) + z) * n.y() * kFour);
+  known_.update();
 }
 
 void DistanceField::findSurfaces() {
@@ -365,7 +260,7 @@ void DistanceField::findSurfaces() {
 void DistanceField::writeLines(int x, int z) {
   const Eigen::Vector3i& n = limits_.cells;
   const auto lines = surfaces_.transformLines(x, z);
-  const std::uint8_t* known = &known_to_[placeOfKnown(x / kCoarse, z / kCoarse)];
+  const std::uint8_t* known = known_.line(x, z);
   // A surface outside the window may be nearer than what is farther than the window's edge.
   Lanes<int> edges;
   for (int i = 0; i < static_cast<int>(kLanes); ++i)
@@ -376,10 +271,10 @@ void DistanceField::writeLines(int x, int z) {
   std::uint32_t tag = tagOf(first);
   Lanes<std::uint32_t> words, rest;
   for (int y = 0; y < n.y(); ++y) {
-    if (y % kCoarse == 0) {
+    if (y % KnownRange::kSide == 0) {
       for (std::size_t i = 0; i < kLanes; ++i)
-        rest[i] = std::uint32_t{known[i % kStep / kCoarse]} << NearestWord::kKnownShift;
-      known += kFour;
+        rest[i] = std::uint32_t{known[i % kStep / KnownRange::kSide]} << NearestWord::kKnownShift;
+      known += KnownRange::kAcross;
     }
     std::memcpy(words.data(), &lines[static_cast<std::size_t>(y)], sizeof(words));
     toNearest(words, edges, edge(y, n.y()), rest, tag);
@@ -390,133 +285,6 @@ void DistanceField::writeLines(int x, int z) {
     slot -= static_cast<std::size_t>(n.y()) * kLanes;
     tag ^= 2U << kTagShift;
   }
-}
-
-/// A cell that holds surface, from the first corner of a query [cells].
-struct DistanceField::Holder {
-  Eigen::Vector3i cell;
-  std::uint32_t state = 0;
-  [[nodiscard]] float squaredTo(const Eigen::Vector3f& p) const {
-    return StateWord::squaredTo(state, cell.cast<float>() - p);
-  }
-};
-
-/// What a query asks of one of the eight cells around the point.
-struct DistanceField::Corner {
-  Space space = Space::kUnknown;
-  std::uint32_t nearest = 0;  ///< NearestWord
-  bool held = false;          ///< its nearest surface is still there
-  Holder holder;
-  /// No surface lies nearer to the cell's middle [cells].
-  [[nodiscard]] float atLeast() const {
-    if ((nearest & NearestWord::kHasSurface) == 0) return NearestWord::atLeast(nearest);
-    return NearestWord::steps(nearest).cast<float>().norm() - kSpread;
-  }
-};
-
-/// False where one is of another place: outside the window, or the window moves.
-bool DistanceField::corners(const Eigen::Vector3i& first, std::array<Corner, 8>& out) const {
-  for (int i = 0; i < 8; ++i) {
-    const Eigen::Vector3i cell = first + cornerOf(i);
-    const std::size_t slot = slotOf(cell);
-    const std::uint32_t tag = tagOf(cell);
-    const std::uint32_t state = state_[slot].load(std::memory_order_relaxed);
-    Corner& corner = out[static_cast<std::size_t>(i)];
-    corner.nearest = nearest_[slot].load(std::memory_order_relaxed);
-    if (state >> kTagShift != tag >> kTagShift || corner.nearest >> kTagShift != tag >> kTagShift)
-      return false;
-    corner.space = StateWord::space(state);
-    if ((corner.nearest & NearestWord::kHasSurface) == 0) continue;
-    corner.holder.cell = cornerOf(i) + NearestWord::steps(corner.nearest);
-    corner.held = findHolder(first, corner.holder);
-  }
-  return true;
-}
-
-bool DistanceField::findHolder(const Eigen::Vector3i& first, Holder& holder) const {
-  const Eigen::Vector3i cell = first + holder.cell;
-  holder.state = state_[slotOf(cell)].load(std::memory_order_relaxed);
-  return StateWord::holds(holder.state, tagOf(cell));
-}
-
-/// The nearest cell need not hold the nearest point: from the nearest of those that the corners name from
-/// neighbour to neighbour along the surface, as long as that leads nearer.
-DistanceField::Holder DistanceField::descend(const Eigen::Vector3i& first, const Eigen::Vector3f& part,
-                                             const std::array<Corner, 8>& corner) const {
-  Holder best = corner[0].holder;
-  float least = best.squaredTo(part);
-  const auto take = [&](const Holder& holder) {
-    const float squared = holder.squaredTo(part);
-    if (squared >= least) return;
-    least = squared;
-    best = holder;
-  };
-  for (const Corner& one : corner) take(one.holder);
-  for (int round = 0; round < kMostDescents; ++round) {
-    const Eigen::Vector3i middle = best.cell;
-    for (int i = 0; i < 27; ++i) {
-      Holder beside{middle + Eigen::Vector3i(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1), 0};
-      if (findHolder(first, beside)) take(beside);
-    }
-    if (best.cell == middle) break;
-  }
-  return best;
-}
-
-DistanceSample DistanceField::query(const Eigen::Vector3d& p_map) const {
-  DistanceSample out;
-  out.up_to.ns = up_to_.load(std::memory_order_acquire);
-  out.stale = out.up_to.ns < newest_.load(std::memory_order_relaxed);
-  const Eigen::Vector3d at = p_map.array() / limits_.cell_size - 0.5;
-  const Eigen::Vector3i origin = unpackOrigin(shown_origin_.load(std::memory_order_acquire));
-  const Eigen::Array3d from = at.array() - origin.cast<double>().array();
-  if (!((from >= 0).all() && (from < limits_.cells.cast<double>().array() - 1).all())) return out;
-  const Eigen::Vector3i first = at.array().floor().cast<int>();
-  const Eigen::Vector3d part = at - first.cast<double>();
-  std::array<Corner, 8> corner;
-  if (!corners(first, corner)) return out;
-  const auto bit = [&](int axis) { return part[axis] < 0.5 ? 0 : 1 << axis; };
-  const Corner& own = corner[static_cast<std::size_t>(bit(0) + bit(1) + bit(2))];
-  out.space = own.space;
-  if (out.space == Space::kUnknown) return out;
-  out.known_to = limits_.cell_size * NearestWord::knownTo(own.nearest);
-  const bool measured = std::all_of(corner.begin(), corner.end(), [](const Corner& one) { return one.held; });
-  if (measured) {
-    interpolate(corner, descend(first, part.cast<float>(), corner), part, out);
-  } else {
-    out.kind = DistanceKind::kAtLeast;
-    for (int i = 0; i < 8; ++i) {
-      const double there = static_cast<double>(corner[static_cast<std::size_t>(i)].atLeast());
-      out.distance = std::max(out.distance, there - (cornerOf(i).cast<double>() - part).norm());
-    }
-    if (out.space == Space::kBehindSurface) out.distance = -out.distance;
-  }
-  out.distance *= limits_.cell_size;
-  return out;
-}
-
-/// The distance between cells' middles is linear along each axis. In cells.
-void DistanceField::interpolate(const std::array<Corner, 8>& corner, const Holder& near_point,
-                                const Eigen::Vector3d& part, DistanceSample& out) {
-  out.kind = DistanceKind::kDistance;
-  Eigen::Vector3d slope = Eigen::Vector3d::Zero();
-  for (int i = 0; i < 8; ++i) {
-    const Eigen::Vector3i bit = cornerOf(i);
-    float squared = near_point.squaredTo(bit.cast<float>());
-    for (const Corner& one : corner) squared = std::min(squared, one.holder.squaredTo(bit.cast<float>()));
-    const Space space = corner[static_cast<std::size_t>(i)].space;
-    // Between the point and an unknown cell there is no surface that is known.
-    const bool behind = (space == Space::kUnknown ? out.space : space) == Space::kBehindSurface;
-    const double distance = static_cast<double>(behind ? -std::sqrt(squared) : std::sqrt(squared));
-    Eigen::Vector3d weight;
-    for (int axis = 0; axis < 3; ++axis) weight[axis] = bit[axis] != 0 ? part[axis] : 1 - part[axis];
-    out.distance += weight.prod() * distance;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double others = weight[(axis + 1) % 3] * weight[(axis + 2) % 3];
-      slope[axis] += (bit[axis] != 0 ? others : -others) * distance;
-    }
-  }
-  if (slope.norm() > 0) out.gradient = slope.normalized();
 }
 
 }  // namespace swiftlet

@@ -13,14 +13,14 @@
 // 0.2 us. docs/distance.md.
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
-#include "estimator/core/stamp.hpp"
+#include "mapping/distance/distance_sample.hpp"
+#include "mapping/distance/known_range.hpp"
 #include "mapping/distance/nearest_seeds.hpp"
 
 namespace swiftlet {
@@ -34,35 +34,6 @@ struct DistanceLimits {
 /// The window moves in steps of so many cells.
 inline constexpr int kDistanceStep = 8;
 static_assert(kDistanceStep == NearestSeeds::kColumns);
-
-enum class Space : std::uint8_t { kUnknown = 0, kFree = 1, kBehindSurface = 2 };
-
-/// Where the surface passes in a cell.
-struct SurfacePoint {
-  Eigen::Vector3f offset = Eigen::Vector3f::Zero();  ///< cells, from its middle; each within kMostOffset
-  std::array<bool, 3> both_sides{};  ///< by axis: there is as much on the other side of the middle, too
-};
-inline constexpr float kMostOffset = 0.5F;
-
-enum class DistanceKind : std::uint8_t {
-  kUnknown,  ///< the point lies in unknown space or outside the window: nothing is said
-  kAtLeast,  ///< all known surface is farther than `distance`
-  kDistance
-};
-
-struct DistanceSample {
-  DistanceKind kind = DistanceKind::kUnknown;
-  Space space = Space::kUnknown;  ///< of the cell that the point lies in
-  double distance = 0;            ///< m, to the nearest known surface; negative behind it
-  double known_to = 0;            ///< m: so far around the point nothing is unknown
-  Eigen::Vector3d gradient =
-      Eigen::Vector3d::Zero();  ///< unit, away from the surface; zero but for kDistance
-  Stamp up_to;                  ///< of the newest image that is in it
-  bool stale = true;            ///< the map has newer images
-
-  /// What a vehicle may count on [m]: unknown space is none.
-  [[nodiscard]] double clearance() const { return std::clamp(distance, 0.0, known_to); }
-};
 
 class DistanceField {
  public:
@@ -110,11 +81,10 @@ class DistanceField {
   void put(std::size_t slot, int y, std::uint32_t word);
   void clearSlab(int axis, int first, int last);
   void publishOrigin();
+  [[nodiscard]] Eigen::Vector3i shownOrigin() const;
   void findUnknown();
   void findSurfaces();
-  void keepKnown(int x, int z);
   void writeLines(int x, int z);
-  [[nodiscard]] std::size_t placeOfKnown(int x, int z) const;
   [[nodiscard]] bool corners(const Eigen::Vector3i& first, std::array<Corner, 8>& out) const;
   bool findHolder(const Eigen::Vector3i& first, Holder& holder) const;
   [[nodiscard]] Holder descend(const Eigen::Vector3i& first, const Eigen::Vector3f& part,
@@ -134,8 +104,7 @@ class DistanceField {
   std::vector<std::uint8_t> surface_changed_, unknown_changed_;
   bool changed_ = false;
   NearestSeeds surfaces_;
-  NearestSeeds unknown_;                ///< of cells twice the size
-  std::vector<std::uint8_t> known_to_;  ///< cells, of those: for each y, four of x, z
+  KnownRange known_;
 };
 
 }  // namespace swiftlet
