@@ -3,17 +3,18 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 namespace swiftlet {
 namespace {
 
-constexpr std::uint32_t kWholeRow = (1U << kBlockSide) - 1;
 static_assert(kBlockSide == kDistanceStep, "a block lies in the window whole or not at all");
 
-constexpr std::array<VoxelIndex, 6> kFaces{
-    {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
+constexpr float kUnseen = std::numeric_limits<float>::quiet_NaN();
 
-Eigen::Vector3i cellOf(const VoxelIndex& voxel) { return {voxel.x, voxel.y, voxel.z}; }
+constexpr std::array<BlockIndex, 6> kFaces{
+    {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
 
 BlockIndex blockFrom(std::uint64_t key) {
   const auto part = [key](unsigned shift) {
@@ -22,29 +23,21 @@ BlockIndex blockFrom(std::uint64_t key) {
   return {part(0), part(21), part(42)};
 }
 
-Eigen::Vector3i firstCell(const BlockIndex& block) { return cellOf(block) * kBlockSide; }
+Eigen::Vector3i firstCell(const BlockIndex& block) {
+  return Eigen::Vector3i(block.x, block.y, block.z) * kBlockSide;
+}
 
-bool changesSign(float a, float b) { return (a < 0) != (b < 0); }
+/// Surface passes between the two.
+bool crossed(float own, float beside) { return !std::isnan(beside) && (own < 0) != (beside < 0); }
 
 }  // namespace
 
 VolumeDistance::VolumeDistance(const VoxelVolume& volume, DistanceField& field)
-    : volume_(volume), field_(field), seen_(volume.slots()) {}
+    : volume_(volume), field_(field), seen_(volume.slots()), waits_(volume.slots()) {}
 
-bool VolumeDistance::inWindow(const BlockIndex& block) const {
-  const Eigen::Vector3i first = cellOf(block) * kBlockSide - field_.origin();
-  return ((first.array() + kBlockSide) > 0).all() && (first.array() < field_.limits().cells.array()).all();
-}
-
-/// Blocks that were not wholly in the window before are read anew.
-void VolumeDistance::forgetEntered(const Eigen::Vector3i& origin_before) {
-  for (Seen& seen : seen_) {
-    if (seen.key == 0) continue;
-    const Eigen::Vector3i first = cellOf(blockFrom(seen.key)) * kBlockSide - origin_before;
-    const bool was_inside =
-        (first.array() >= 0).all() && ((first.array() + kBlockSide) <= field_.limits().cells.array()).all();
-    if (!was_inside) seen = {};
-  }
+bool VolumeDistance::inWindow(const BlockIndex& block, const Eigen::Vector3i& origin) const {
+  const Eigen::Vector3i first = firstCell(block) - origin;
+  return (first.array() >= 0).all() && (first.array() < field_.limits().cells.array()).all();
 }
 
 void VolumeDistance::step(Stamp newest, const Eigen::Vector3d& p_map_vehicle, const DistanceEffort& effort,
@@ -52,194 +45,168 @@ void VolumeDistance::step(Stamp newest, const Eigen::Vector3d& p_map_vehicle, co
   out = {};
   field_.announce(newest);
   const Eigen::Vector3i origin = field_.origin();
-  if (field_.follow(p_map_vehicle)) forgetEntered(origin);
+  if (field_.follow(p_map_vehicle)) {
+    // Blocks that were not in the window before are read anew.
+    for (Seen& seen : seen_) {
+      if (seen.key != 0 && !inWindow(blockFrom(seen.key), origin)) seen = {};
+    }
+  }
+  findChanges();
   const auto slots = static_cast<std::uint32_t>(seen_.size());
-  std::uint32_t visited = 0;
-  for (; visited < slots && out.blocks < effort.blocks; ++visited) {
+  for (std::uint32_t visited = 0; waiting_ > 0 && visited < slots && out.blocks < effort.blocks; ++visited) {
     const std::uint32_t slot = cursor_;
     cursor_ = cursor_ + 1 < slots ? cursor_ + 1 : 0;
-    const BlockHeader& header = volume_.header(slot);
-    const bool used = header.state != BlockState::kUnused;
-    const Seen now{used ? keyOf(header.index) : 0, used ? header.revision : 0};
-    Seen& seen = seen_[slot];
-    if (seen.key == now.key && (now.key == 0 || seen.revision == now.revision)) continue;
-    const bool dropped = seen.key != 0 && seen.key != now.key;
-    const bool shown = used && inWindow(header.index);
-    if (dropped) erase(seen.key);
-    if (shown) read(slot);
-    seen = shown || !used ? now : Seen{};
-    if (dropped || shown) ++out.blocks;
+    if (waits_[slot] == 0) continue;
+    waits_[slot] = 0;
+    --waiting_;
+    read(slot);
+    ++out.blocks;
   }
-  out.caught_up = visited == slots;
+  out.caught_up = waiting_ == 0;
   if (out.caught_up) up_to_ = newest;
   field_.update(up_to_);
 }
 
-void VolumeDistance::erase(std::uint64_t key) {
-  // It may stand elsewhere in the volume by now, or have come back.
-  const BlockIndex block = blockFrom(key);
-  if (volume_.find(block) == VoxelVolume::kNone) fill(block, Space::kUnknown);
+void VolumeDistance::findChanges() {
+  for (std::uint32_t slot = 0; slot < seen_.size(); ++slot) {
+    const BlockHeader& header = volume_.header(slot);
+    const bool shown = header.state != BlockState::kUnused && inWindow(header.index, field_.origin());
+    const Seen now = shown ? Seen{keyOf(header.index), header.revision} : Seen{};
+    Seen& seen = seen_[slot];
+    if (seen.key == now.key && seen.revision == now.revision) continue;
+    if (seen.key != 0 && seen.key != now.key) {
+      // It may stand elsewhere in the volume by now, or have come back.
+      const BlockIndex dropped = blockFrom(seen.key);
+      if (volume_.find(dropped) == VoxelVolume::kNone) fill(dropped, Space::kUnknown);
+      askAround(dropped);
+    }
+    if (shown) {
+      ask(slot);
+      askAround(header.index);
+    }
+    seen = now;
+  }
+}
+
+void VolumeDistance::ask(std::uint32_t slot) {
+  waiting_ += waits_[slot] == 0 ? 1U : 0U;
+  waits_[slot] = 1;
+}
+
+/// What a block's outer voxels hold depends on the blocks beside it.
+void VolumeDistance::askAround(const BlockIndex& block) {
+  for (const BlockIndex& face : kFaces) {
+    const std::uint32_t slot = volume_.find(block + face);
+    if (slot != VoxelVolume::kNone && volume_.voxels(slot) != nullptr) ask(slot);
+  }
 }
 
 void VolumeDistance::fill(const BlockIndex& block, Space space) {
   std::array<Space, kBlockSide> row;
   row.fill(space);
   for (int z = 0; z < kBlockSide; ++z) {
-    for (int y = 0; y < kBlockSide; ++y)
+    for (int y = 0; y < kBlockSide; ++y) {
       field_.setSpaces(firstCell(block) + Eigen::Vector3i(0, y, z), kWholeRow, row);
+    }
   }
 }
 
 void VolumeDistance::read(std::uint32_t slot) {
   const BlockHeader& header = volume_.header(slot);
+  if (header.state == BlockState::kUnused) return;
   if (header.state == BlockState::kFree) {
     fill(header.index, Space::kFree);
     return;
   }
-  gatherAround(header.index);
-  gatherValues();
-  const VoxelIndex first{header.index.x * kBlockSide, header.index.y * kBlockSide,
-                         header.index.z * kBlockSide};
+  gather(slot);
   for (int z = 0; z < kBlockSide; ++z) {
-    for (int y = 0; y < kBlockSide; ++y) readRow(first + VoxelIndex{0, y, z}, y, z);
-  }
-  readBorder(first);
-}
-
-/// Distances of the block and one voxel beyond each face, by sign: 1 in front, -1 behind, 0 not observed.
-void VolumeDistance::gatherValues() {
-  sign_.fill(0);
-  const auto signsOf = [this](const BlockIndex& beside, int from, int to, const auto& place) {
-    const std::uint32_t slot = around_[static_cast<std::size_t>(13 + beside.x + 3 * beside.y + 9 * beside.z)];
-    if (slot == VoxelVolume::kNone) return;
-    const VoxelBlock* const voxels = volume_.voxels(slot);
-    for (int i = from; i < to; ++i) {
-      const VoxelIndex voxel = place(i);
-      const std::size_t within = offsetOf(voxel);
-      const bool seen = voxels == nullptr || voxels->weight[within] > 0;
-      const bool behind = voxels != nullptr && voxels->distance[within] < 0;
-      sign_[signAt(voxel.x, voxel.y, voxel.z)] = static_cast<std::int8_t>(!seen ? 0 : behind ? -1 : 1);
-    }
-  };
-  constexpr int kFace = kBlockSide * kBlockSide;
-  const auto low = [](int i) { return i & kBlockMask; };
-  const auto high = [](int i) { return i >> kBlockBits; };
-  signsOf({}, 0, static_cast<int>(kBlockVoxels), [&](int i) {
-    return VoxelIndex{low(i), low(high(i)), high(high(i))};
-  });
-  for (const int side : {-1, 1}) {
-    const int at = side < 0 ? -1 : kBlockSide;
-    signsOf({side, 0, 0}, 0, kFace, [&](int i) { return VoxelIndex{at, low(i), high(i)}; });
-    signsOf({0, side, 0}, 0, kFace, [&](int i) { return VoxelIndex{low(i), at, high(i)}; });
-    signsOf({0, 0, side}, 0, kFace, [&](int i) { return VoxelIndex{low(i), high(i), at}; });
+    for (int y = 0; y < kBlockSide; ++y) readRow(firstCell(header.index) + Eigen::Vector3i(0, y, z), y, z);
   }
 }
 
-/// Eight voxels: those beside one of the other sign by themselves, the others as a row.
-void VolumeDistance::readRow(const VoxelIndex& first, int y, int z) {
-  const std::int8_t* const own = &sign_[signAt(0, y, z)];
-  constexpr std::array<int, 6> kBeside = {
-      1, -1, kSignRow, -kSignRow, kSignRow * kSignSide, -kSignRow * kSignSide};
-  std::array<Space, kBlockSide> space;
-  std::uint32_t crossed = 0;
-  for (int x = 0; x < kBlockSide; ++x) {
-    int other = 0;
-    for (const int beside : kBeside) other |= own[x] * own[x + beside];
-    crossed |= (other < 0 ? 1U : 0U) << static_cast<unsigned>(x);
-    space[static_cast<std::size_t>(x)] = own[x] == 0  ? Space::kUnknown
-                                         : own[x] < 0 ? Space::kBehindSurface
-                                                      : Space::kFree;
-  }
-  field_.setSpaces(cellOf(first), kWholeRow & ~crossed, space);
-  for (; crossed != 0; crossed &= crossed - 1) readVoxel(first + VoxelIndex{std::countr_zero(crossed), 0, 0});
-}
-
-/// One voxel beyond each face: what it holds depends on this block where surface passes between the two, or
-/// did.
-void VolumeDistance::readBorder(const VoxelIndex& first) {
-  const auto look = [&](int x, int y, int z, int inner_x, int inner_y, int inner_z) {
-    const VoxelIndex voxel = first + VoxelIndex{x, y, z};
-    const bool crossed = sign_[signAt(x, y, z)] * sign_[signAt(inner_x, inner_y, inner_z)] < 0;
-    if (crossed || field_.holdsSurface(cellOf(voxel))) readVoxel(voxel);
-  };
-  for (const int side : {-1, 1}) {
-    const int outer = side < 0 ? -1 : kBlockSide, inner = side < 0 ? 0 : kBlockSide - 1;
-    for (int j = 0; j < kBlockSide; ++j) {
-      for (int i = 0; i < kBlockSide; ++i) {
-        look(outer, i, j, inner, i, j);
-        look(i, outer, j, i, inner, j);
-        look(i, j, outer, i, j, inner);
+/// Distances of the block and of one voxel beyond each face.
+void VolumeDistance::gather(std::uint32_t slot) {
+  const BlockIndex block = volume_.header(slot).index;
+  value_.fill(kUnseen);
+  const auto take = [this](std::uint32_t from, const BlockIndex& beside) {
+    const VoxelBlock* const voxels = volume_.voxels(from);
+    // Of a block beside only the layer that touches.
+    const auto range = [](int side) {
+      return side == 0  ? std::pair{0, kBlockSide}
+             : side < 0 ? std::pair{kBlockSide - 1, kBlockSide}
+                        : std::pair{0, 1};
+    };
+    const auto [x0, x1] = range(beside.x);
+    const auto [y0, y1] = range(beside.y);
+    const auto [z0, z1] = range(beside.z);
+    for (int z = z0; z < z1; ++z) {
+      for (int y = y0; y < y1; ++y) {
+        for (int x = x0; x < x1; ++x) {
+          const auto at = static_cast<std::size_t>(x + kBlockSide * (y + kBlockSide * z));
+          float& value = value_[placeOf(x + kBlockSide * beside.x, y + kBlockSide * beside.y,
+                                        z + kBlockSide * beside.z)];
+          if (voxels == nullptr) {
+            value = static_cast<float>(volume_.settings().truncation);
+          } else if (voxels->weight[at] > 0) {
+            value = volume_.distanceStep() * static_cast<float>(voxels->distance[at]);
+          }
+        }
       }
     }
+  };
+  take(slot, {});
+  for (const BlockIndex& face : kFaces) {
+    const std::uint32_t beside = volume_.find(block + face);
+    if (beside != VoxelVolume::kNone) take(beside, face);
   }
 }
 
-void VolumeDistance::gatherAround(const BlockIndex& block) {
-  block_ = block;
-  std::size_t i = 0;
-  for (int z = -1; z <= 1; ++z) {
-    for (int y = -1; y <= 1; ++y) {
-      for (int x = -1; x <= 1; ++x) around_[i++] = volume_.find(block + BlockIndex{x, y, z});
+/// Eight voxels: those that hold surface by themselves, the others as a row.
+void VolumeDistance::readRow(const Eigen::Vector3i& first, int y, int z) {
+  std::array<Space, kBlockSide> space;
+  std::uint32_t holding = 0;
+  for (int x = 0; x < kBlockSide; ++x) {
+    const float* const own = &value_[placeOf(x, y, z)];
+    bool holds = false;
+    for (const int step : kSteps) {
+      for (const float beside : {own[step], own[-step]})
+        holds = holds || (crossed(*own, beside) && std::abs(*own) <= std::abs(beside));
     }
+    holding |= holds ? 1U << static_cast<unsigned>(x) : 0U;
+    space[static_cast<std::size_t>(x)] = std::isnan(*own) ? Space::kUnknown
+                                         : *own < 0       ? Space::kBehindSurface
+                                                          : Space::kFree;
+  }
+  field_.setSpaces(first, kWholeRow & ~holding, space);
+  for (; holding != 0; holding &= holding - 1) {
+    const int x = std::countr_zero(holding);
+    field_.setSurface(first + Eigen::Vector3i(x, 0, 0), space[static_cast<std::size_t>(x)],
+                      surfaceAt(&value_[placeOf(x, y, z)]));
   }
 }
 
-/// VoxelVolume::distanceAt without a search: `voxel` lies in the block in hand or beside it.
-bool VolumeDistance::valueAt(const VoxelIndex& voxel, float& distance) const {
-  const BlockIndex at = blockOf(voxel);
-  const int which = at.x - block_.x + 1 + 3 * (at.y - block_.y + 1) + 9 * (at.z - block_.z + 1);
-  const std::uint32_t slot = around_[static_cast<std::size_t>(which)];
-  if (slot == VoxelVolume::kNone) return false;
-  const VoxelBlock* voxels = volume_.voxels(slot);
-  if (voxels == nullptr) {
-    distance = static_cast<float>(volume_.settings().truncation);
-    return true;
-  }
-  const std::size_t within = offsetOf(voxel);
-  distance = volume_.distanceStep() * static_cast<float>(voxels->distance[within]);
-  return voxels->weight[within] > 0;
-}
-
-void VolumeDistance::readVoxel(const VoxelIndex& voxel) {
-  float own = 0;
-  if (!valueAt(voxel, own)) {
-    field_.setSpace(cellOf(voxel), Space::kUnknown);
-    return;
-  }
-  std::array<float, 6> beside{};
-  std::array<bool, 6> known{};
-  bool crossed = false;
-  for (std::size_t i = 0; i < kFaces.size(); ++i) {
-    known[i] = valueAt(voxel + kFaces[i], beside[i]);
-    crossed = crossed || (known[i] && changesSign(own, beside[i]) && std::abs(own) <= std::abs(beside[i]));
-  }
-  const Space space = own < 0 ? Space::kBehindSurface : Space::kFree;
-  if (!crossed) {
-    field_.setSpace(cellOf(voxel), space);
-    return;
-  }
-  // Slopes [per voxel]: across the surface, of both sides' size where it passes on both; else from one side
-  // to the other.
-  Eigen::Vector3f slope = Eigen::Vector3f::Zero();
+/// Where the plane with the slopes of the distance has its zero. Slopes [per voxel]: across the surface, of
+/// both sides' size where it passes on both; else from one side to the other.
+SurfacePoint VolumeDistance::surfaceAt(const float* own) {
   SurfacePoint point;
+  Eigen::Vector3f slope = Eigen::Vector3f::Zero();
   for (int axis = 0; axis < 3; ++axis) {
-    const auto after = static_cast<std::size_t>(2 * axis);
-    const std::size_t before = after + 1;
-    const float rise = known[after] ? beside[after] - own : 0;
-    const float fall = known[before] ? own - beside[before] : 0;
-    const bool crossed_after = known[after] && changesSign(own, beside[after]);
-    const bool crossed_before = known[before] && changesSign(own, beside[before]);
+    const float after = own[kSteps[static_cast<std::size_t>(axis)]];
+    const float before = own[-kSteps[static_cast<std::size_t>(axis)]];
+    const float rise = std::isnan(after) ? 0 : after - *own;
+    const float fall = std::isnan(before) ? 0 : *own - before;
+    const bool crossed_after = crossed(*own, after), crossed_before = crossed(*own, before);
     if (crossed_after && crossed_before) {
       point.both_sides[static_cast<std::size_t>(axis)] = true;
       slope[axis] = (rise - fall) / 2;
     } else if (crossed_after || crossed_before) {
       slope[axis] = crossed_after ? rise : fall;
     } else {
-      slope[axis] = (rise + fall) / (known[after] && known[before] ? 2.0F : 1.0F);
+      slope[axis] = (rise + fall) / (std::isnan(after) || std::isnan(before) ? 1.0F : 2.0F);
     }
   }
-  point.offset = (-own / slope.squaredNorm() * slope).cwiseMax(-kMostOffset).cwiseMin(kMostOffset);
-  field_.setSurface(cellOf(voxel), space, point);
+  point.offset = -*own / slope.squaredNorm() * slope;
+  return point;
 }
 
 }  // namespace swiftlet

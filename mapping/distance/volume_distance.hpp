@@ -2,11 +2,11 @@
 // Keeps a distance field true to a volume: surfaces, free space and the unknown, as blocks change.
 //
 // Per step: the window follows the vehicle; at most `effort.blocks` blocks that changed since they were last
-// read are read, in the order of the volume's slots from where the last step ended; then the field is
-// updated. A voxel holds surface where the signed distance changes sign to
-// a neighbour that lies no nearer; the surface point is where the distance's slope leads to zero (one Newton
+// read, or that lie beside one that did, are read, in the order of the volume's slots from where the last
+// step ended; then the field is updated. A voxel holds surface where the signed distance changes sign to a
+// neighbour that lies no nearer; the surface point is where the distance's slope leads to zero (one Newton
 // step), so it is found to a part of a voxel. What the volume dropped becomes unknown. Cells are the volume's
-// voxels. Map axes, metres. Memory: 16 bytes for each of the volume's slots, beside the field's. Not thread
+// voxels. Map axes, metres. Memory: 17 bytes for each of the volume's slots, beside the field's. Not thread
 // safe; the field's readers are free.
 
 #include <array>
@@ -18,7 +18,7 @@
 namespace swiftlet {
 
 struct DistanceEffort {
-  std::size_t blocks = 500;
+  std::size_t blocks = 1000;  ///< read; 3 us each
 };
 
 struct DistanceStep {
@@ -41,32 +41,32 @@ class VolumeDistance {
     std::uint32_t revision = 0;
   };
 
-  void forgetEntered(const Eigen::Vector3i& origin_before);
-  [[nodiscard]] bool inWindow(const BlockIndex& block) const;
-  static constexpr int kSignRow = kBlockSide + 2, kSignSide = kBlockSide + 2;
-  [[nodiscard]] static std::size_t signAt(int x, int y, int z) {
-    return static_cast<std::size_t>((x + 1) + kSignRow * ((y + 1) + kSignSide * (z + 1)));
-  }
-
+  [[nodiscard]] bool inWindow(const BlockIndex& block, const Eigen::Vector3i& origin) const;
+  void findChanges();
+  void ask(std::uint32_t slot);
+  void askAround(const BlockIndex& block);
   void read(std::uint32_t slot);
   void fill(const BlockIndex& block, Space space);
-  void gatherValues();
-  void readRow(const VoxelIndex& first, int y, int z);
-  void readBorder(const VoxelIndex& first);
-  void readVoxel(const VoxelIndex& voxel);
-  void gatherAround(const BlockIndex& block);
-  bool valueAt(const VoxelIndex& voxel, float& distance) const;
-  void erase(std::uint64_t key);
+  void gather(std::uint32_t slot);
+  void readRow(const Eigen::Vector3i& first, int y, int z);
+  [[nodiscard]] static SurfacePoint surfaceAt(const float* own);
+
+  static constexpr std::uint32_t kWholeRow = (1U << kBlockSide) - 1;
+  // Of the block in hand and one voxel beyond each face.
+  static constexpr int kSide = kBlockSide + 2;
+  static constexpr std::array<int, 3> kSteps{1, kSide, kSide* kSide};  ///< to the next along each axis
+  [[nodiscard]] static std::size_t placeOf(int x, int y, int z) {
+    return static_cast<std::size_t>((x + 1) + kSide * ((y + 1) + kSide * (z + 1)));
+  }
 
   const VoxelVolume& volume_;
   DistanceField& field_;
-  std::vector<Seen> seen_;  ///< by slot
+  std::vector<Seen> seen_;           ///< by slot
+  std::vector<std::uint8_t> waits_;  ///< by slot: to be read
+  std::size_t waiting_ = 0;
   std::uint32_t cursor_ = 0;
   Stamp up_to_;  ///< images up to here are in the field
-  // Of the block in hand: its slot and those around it, x fastest.
-  BlockIndex block_;
-  std::array<std::uint32_t, 27> around_{};
-  std::array<std::int8_t, static_cast<std::size_t>(kSignRow) * kSignSide * kSignSide> sign_{};
+  std::array<float, static_cast<std::size_t>(kSide) * kSide * kSide> value_{};  ///< m; not a number: unseen
 };
 
 }  // namespace swiftlet
