@@ -157,6 +157,7 @@ void MappingNode::fuse(const MapMessage& message, const AtHand& at_hand) {
   vehicle_ = input.T_map_body.translation;
   draw();
   publishSurface(message.stamp);
+  publishObstacle(message.stamp);
 }
 
 void MappingNode::draw() {
@@ -186,6 +187,11 @@ void MappingNode::publishSurface(Stamp stamp) {
     stage_.visitSurface(gather);
     outlet->surface.publish();
   }
+}
+
+void MappingNode::publishObstacle(Stamp stamp) {
+  for (LiveOutlet* outlet : context_.options.outlets)
+    outlet->obstacle.write({stamp, vehicle_, stage_.distance().query(vehicle_)});
 }
 
 void MappingNode::record(const MapStep& step, const SceneImages& scene) {

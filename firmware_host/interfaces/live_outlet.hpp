@@ -2,6 +2,7 @@
 // The newest of what a run finds, for one thread outside of the graph (ROS 2's topics, an autopilot, the
 // live view): it takes what is newest at its own pace and nobody waits for it. Memory: three of each value.
 
+#include <Eigen/Core>
 #include <atomic>
 #include <cstdint>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "estimator/messages/odometry_output.hpp"
 #include "firmware_host/interfaces/state_news.hpp"
 #include "firmware_host/supervisor/verdict.hpp"
+#include "mapping/distance/distance_sample.hpp"
 #include "mapping/loop/loop_report.hpp"
 #include "mapping/surface/surface_patch.hpp"
 
@@ -38,6 +40,13 @@ struct SurfaceNews {
   std::vector<SurfaceVertex> vertices;
 };
 
+/// What the map's distance field says of the place where the vehicle was mapped last.
+struct ObstacleNews {
+  Stamp stamp;                                      ///< of that frame
+  Eigen::Vector3d p_map = Eigen::Vector3d::Zero();  ///< m
+  DistanceSample nearest;
+};
+
 struct LiveOutlet {
   Newest<StateNews> state;           ///< of `propagate`: at every IMU sample
   Newest<FrameNews> frame;           ///< of `smooth`
@@ -45,7 +54,8 @@ struct LiveOutlet {
   Newest<MapCorrection> correction;  ///< of `loop`
   Newest<SurfaceNews> surface;       ///< of `map`, each time that surface_wanted is set
   std::atomic<bool> surface_wanted{false};
-  Newest<Verdict> verdict;  ///< of the supervisor, ten times a second: who reads it asks for its age
+  Newest<ObstacleNews> obstacle;  ///< of `map`: with every frame that is mapped
+  Newest<Verdict> verdict;        ///< of the supervisor, ten times a second: who reads it asks for its age
 };
 
 /// One for each thread that listens.

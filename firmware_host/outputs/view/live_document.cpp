@@ -52,6 +52,9 @@ enum Frame : std::size_t {
   kFrameColumns
 };
 
+/// And of the nearest obstacle's.
+enum Obstacle : std::size_t { kToSurface = 1, kToUnknown, kObstacleColumns };
+
 std::string encoded(std::span<const float> values) { return base64Of(values); }
 
 Json table(const char* id, const char* title, Json columns, Json rows) {
@@ -70,7 +73,8 @@ LiveDocument::LiveDocument(std::string name)
       frames_(kFrameColumns),
       state_intervals_(2, 1),
       frame_intervals_(2, 1),
-      latencies_(2, 1) {
+      latencies_(2, 1),
+      obstacles_(kObstacleColumns) {
   const auto axes = [](std::size_t first) {
     return std::vector<Line>{{"x", first}, {"y", first + 1}, {"z", first + 2}};
   };
@@ -115,6 +119,12 @@ LiveDocument::LiveDocument(std::string name)
        "ms",
        &state_intervals_,
        {{"ms", 1}}},
+      {"obstacle",
+       "Map",
+       "Room around the vehicle, with a map",
+       "m",
+       &obstacles_,
+       {{"to the nearest surface", kToSurface}, {"to the unknown", kToUnknown}}},
       {"image_to_pose", "Latency", "Image's arrival to its pose, wall time", "ms", &latencies_, {{"ms", 1}}},
   };
 }
@@ -130,6 +140,7 @@ void LiveDocument::sample(LiveOutlet& outlet, double now, bool watched) {
   takeFrame(outlet);
   takeState(outlet, now);
   takeVerdict(outlet, now);
+  takeObstacle(outlet);
   if (!watched) return;
   if (now - mesh_came_ >= kMeshPeriod) takeMesh(outlet);
   takeSurface(outlet, now);
@@ -296,6 +307,16 @@ void LiveDocument::takeSurface(LiveOutlet& outlet, double now) {
   cloud_changed_ = true;
 }
 
+void LiveDocument::takeObstacle(LiveOutlet& outlet) {
+  const std::uint64_t number = outlet.obstacle.refresh();
+  if (number == obstacle_number_ || !begun_) return;
+  obstacle_number_ = number;
+  const ObstacleNews& news = outlet.obstacle.value();
+  const DistanceSample& nearest = news.nearest;
+  obstacles_.add(std::array{static_cast<float>(seconds(news.stamp)), static_cast<float>(nearest.distance),
+                            static_cast<float>(nearest.known_to)});
+}
+
 void LiveDocument::note(double t, const char* name, std::string text) {
   events_.push_back({{"t", t}, {"name", name}, {"text", std::move(text)}});
   ++unsent_events_;
@@ -442,7 +463,10 @@ Json LiveDocument::patch() {
   if (!scene.empty()) json["scene"] = std::move(scene);
   spans_changed_ = mesh_changed_ = cloud_changed_ = false;
   unsent_events_ = 0;
-  for (LiveTable* one : {&states_, &frames_, &state_intervals_, &frame_intervals_, &latencies_}) one->sent();
+  for (LiveTable* one :
+       {&states_, &frames_, &state_intervals_, &frame_intervals_, &latencies_, &obstacles_}) {
+    one->sent();
+  }
   return json;
 }
 

@@ -64,6 +64,7 @@ class LiveDocument {
   void noteTroubles(const Verdict& verdict);
   void takeMesh(LiveOutlet& outlet);
   void takeSurface(LiveOutlet& outlet, double now);
+  void takeObstacle(LiveOutlet& outlet);
   void note(double t, const char* name, std::string text);
   [[nodiscard]] Json plotJson(const PlotPlan& plan, bool whole) const;
   [[nodiscard]] Json trajectoryJson(bool whole) const;
@@ -73,14 +74,15 @@ class LiveDocument {
   [[nodiscard]] Json poseJson() const;
 
   std::string name_;
-  LiveTable states_, frames_, state_intervals_, frame_intervals_, latencies_;
+  LiveTable states_, frames_, state_intervals_, frame_intervals_, latencies_, obstacles_;
   std::vector<PlotPlan> plans_;
   bool begun_ = false;
   Stamp first_;
   double duration_ = 0;
   std::uint64_t sequence_ = 0;
 
-  std::uint64_t frame_number_ = 0, state_number_ = 0, mesh_number_ = 0, surface_number_ = 0;
+  std::uint64_t frame_number_ = 0, state_number_ = 0, mesh_number_ = 0, surface_number_ = 0,
+                obstacle_number_ = 0;
   std::optional<FrameNews> frame_;
   std::optional<NavState> state_;
   double now_ = 0, state_came_ = 0, mesh_came_ = -1e9, surface_asked_ = -1e9;

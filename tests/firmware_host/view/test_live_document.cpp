@@ -103,7 +103,7 @@ TEST_CASE("before anything comes the document is a whole one") {
   CHECK(document["sequence"] == 1);
   REQUIRE(document["runs"].is_array());
   REQUIRE(document["runs"].size() == 1);
-  CHECK(document["runs"][0]["plots"].size() == 16);
+  CHECK(document["runs"][0]["plots"].size() == 17);
   CHECK(document["runs"][0]["scene"]["trajectories"].size() == 1);
   CHECK(document["runs"][0]["scene"]["pose"].is_null());
   CHECK(document["live"]["health"] == "nothing yet");
@@ -307,6 +307,24 @@ TEST_CASE("the local mesh and the map's surface are drawn where they are, for th
   run.outlet->surface.publish();
   run.sample();
   CHECK_FALSE(run.document.patch()["scene"].contains("clouds"));
+}
+
+TEST_CASE("the nearest obstacle is a row with each frame that was mapped") {
+  Run run;
+  run.frame(0);
+  ObstacleNews news;
+  news.stamp = Run::at(0.1);
+  news.nearest.kind = DistanceKind::kDistance;
+  news.nearest.distance = 1.25;
+  news.nearest.known_to = 0.5;
+  run.outlet->obstacle.write(news);
+  run.sample();
+  const Json patch = run.document.patch();
+  CHECK(series(patch, "obstacle", "to the nearest surface", "x") == std::vector<float>{0.1F});
+  CHECK(series(patch, "obstacle", "to the nearest surface", "y") == std::vector<float>{1.25F});
+  CHECK(series(patch, "obstacle", "to the unknown", "y") == std::vector<float>{0.5F});
+  run.sample();
+  for (const Json& plot : run.document.patch()["plots"]) CHECK(plot["id"] != "obstacle");
 }
 
 TEST_CASE("an hour's document stays small, and a thinned series is sent anew") {
