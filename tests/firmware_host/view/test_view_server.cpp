@@ -216,7 +216,14 @@ TEST_CASE("a run is followed from an outlet to a viewer") {
   FrameNews frame;
   frame.has_state = true;
   frame.health = Health::kGood;
-  for (int i = 0; i < 30; ++i) {
+  const auto patches = [&client] {
+    const std::string text = client.text();
+    std::size_t count = 0;
+    for (std::size_t at = 0; (at = text.find("event: patch", at)) != std::string::npos; ++at) ++count;
+    return count;
+  };
+  // As long as it takes, on a machine that is slow.
+  for (int i = 0; i < 600 && patches() < 2; ++i) {
     frame.stamp.ns += 50'000'000;
     outlet->frame.write(frame);
     client.readSome(0.05);
