@@ -161,7 +161,7 @@ void DistanceField::setSpaces(const Eigen::Vector3i& first, std::uint32_t cells,
   }
 }
 
-void DistanceField::setSurface(const Eigen::Vector3i& cell, Space space, const SurfacePoint& point) {
+void DistanceField::setSurface(const Eigen::Vector3i& cell, Space space, const CellSurface& point) {
   if (inside(cell)) put(slotOf(cell), cell.y(), tagOf(cell) | StateWord::pack(space, point));
 }
 

@@ -52,7 +52,7 @@ class DistanceField {
   /// set in `cells`.
   void setSpaces(const Eigen::Vector3i& first, std::uint32_t cells,
                  const std::array<Space, kDistanceStep>& space);
-  void setSurface(const Eigen::Vector3i& cell, Space space, const SurfacePoint& point);
+  void setSurface(const Eigen::Vector3i& cell, Space space, const CellSurface& point);
   /// Brings the distances up to what the cells say, which is all that images up to `up_to` gave.
   void update(Stamp up_to);
 

@@ -13,7 +13,7 @@ namespace swiftlet {
 enum class Space : std::uint8_t { kUnknown = 0, kFree = 1, kBehindSurface = 2 };
 
 /// Where the surface passes in a cell.
-struct SurfacePoint {
+struct CellSurface {
   Eigen::Vector3f offset = Eigen::Vector3f::Zero();  ///< cells, from its middle; each within kMostOffset
   std::array<bool, 3> both_sides{};  ///< by axis: there is as much on the other side of the middle, too
 };

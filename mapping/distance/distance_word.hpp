@@ -22,7 +22,7 @@ struct StateWord {
   static constexpr std::uint32_t kSidesShift = 24;
 
   static std::uint32_t pack(Space space) { return static_cast<std::uint32_t>(space) << kSpaceShift; }
-  static std::uint32_t pack(Space space, const SurfacePoint& point) {
+  static std::uint32_t pack(Space space, const CellSurface& point) {
     std::uint32_t word = pack(space) | kPresent;
     for (int i = 0; i < 3; ++i) {
       const float kept = std::clamp(point.offset[i], -kMostOffset, kMostOffset) * kScale;

@@ -187,8 +187,8 @@ void VolumeDistance::readRow(const Eigen::Vector3i& first, int y, int z) {
 
 /// Where the plane with the slopes of the distance has its zero. Slopes [per voxel]: across the surface, of
 /// both sides' size where it passes on both; else from one side to the other.
-SurfacePoint VolumeDistance::surfaceAt(const float* own) {
-  SurfacePoint point;
+CellSurface VolumeDistance::surfaceAt(const float* own) {
+  CellSurface point;
   Eigen::Vector3f slope = Eigen::Vector3f::Zero();
   for (int axis = 0; axis < 3; ++axis) {
     const float after = own[kSteps[static_cast<std::size_t>(axis)]];

@@ -49,7 +49,7 @@ class VolumeDistance {
   void fill(const BlockIndex& block, Space space);
   void gather(std::uint32_t slot);
   void readRow(const Eigen::Vector3i& first, int y, int z);
-  [[nodiscard]] static SurfacePoint surfaceAt(const float* own);
+  [[nodiscard]] static CellSurface surfaceAt(const float* own);
 
   static constexpr std::uint32_t kWholeRow = (1U << kBlockSide) - 1;
   // Of the block in hand and one voxel beyond each face.
