@@ -175,10 +175,10 @@ bool DistanceField::follow(const Eigen::Vector3d& p_map) {
     const int from = origin_[axis];
     const int to = floorDiv(wanted, kStep) * kStep;
     const int steps = std::min(std::abs(to - from), cells);
-    // Who asks meanwhile finds words of another place, and takes them for unknown.
     origin_[axis] = to;
-    publishOrigin();
     clearSlab(axis, to > from ? to + cells - steps : to, to > from ? to + cells : to + steps);
+    // Who asks before this finds what left unknown.
+    publishOrigin();
   }
   return origin_ != before;
 }
