@@ -191,7 +191,7 @@ void MappingNode::publishSurface(Stamp stamp) {
 
 void MappingNode::publishObstacle(Stamp stamp) {
   for (LiveOutlet* outlet : context_.options.outlets)
-    outlet->obstacle.write({stamp, vehicle_, stage_.distance().query(vehicle_)});
+    outlet->obstacle.write({stamp, stage_.distance().query(vehicle_)});
 }
 
 void MappingNode::record(const MapStep& step, const SceneImages& scene) {

@@ -2,7 +2,6 @@
 // The newest of what a run finds, for one thread outside of the graph (ROS 2's topics, an autopilot, the
 // live view): it takes what is newest at its own pace and nobody waits for it. Memory: three of each value.
 
-#include <Eigen/Core>
 #include <atomic>
 #include <cstdint>
 #include <vector>
@@ -42,8 +41,7 @@ struct SurfaceNews {
 
 /// What the map's distance field says of the place where the vehicle was mapped last.
 struct ObstacleNews {
-  Stamp stamp;                                      ///< of that frame
-  Eigen::Vector3d p_map = Eigen::Vector3d::Zero();  ///< m
+  Stamp stamp;  ///< of that frame
   DistanceSample nearest;
 };
 

@@ -145,10 +145,6 @@ void DistanceField::put(std::size_t slot, int y, std::uint32_t word) {
        unknown_changed_[at]);
 }
 
-void DistanceField::setSpace(const Eigen::Vector3i& cell, Space space) {
-  if (inside(cell)) put(slotOf(cell), cell.y(), tagOf(cell) | StateWord::pack(space));
-}
-
 void DistanceField::setSpaces(const Eigen::Vector3i& first, std::uint32_t cells,
                               const std::array<Space, kDistanceStep>& space) {
   // The window begins and ends at multiples of kDistanceStep: a row lies in it whole, and in slots side by

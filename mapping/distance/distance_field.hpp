@@ -46,12 +46,11 @@ class DistanceField {
   /// Keeps `p_map` near the window's middle. What leaves the window is forgotten; what enters is unknown: the
   /// caller gives it again where it is known. True when the window moved.
   bool follow(const Eigen::Vector3d& p_map);
-  /// A cell without surface in it.
-  void setSpace(const Eigen::Vector3i& cell, Space space);
-  /// The same for cells in a row along x from `first` on, x a multiple of kDistanceStep: those whose bit is
-  /// set in `cells`.
+  /// Cells without surface in a row along x from `first` on, x a multiple of kDistanceStep: those whose bit
+  /// is set in `cells`.
   void setSpaces(const Eigen::Vector3i& first, std::uint32_t cells,
                  const std::array<Space, kDistanceStep>& space);
+  /// A cell that the surface passes through.
   void setSurface(const Eigen::Vector3i& cell, Space space, const CellSurface& point);
   /// Brings the distances up to what the cells say, which is all that images up to `up_to` gave.
   void update(Stamp up_to);

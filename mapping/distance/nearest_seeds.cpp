@@ -7,7 +7,7 @@
 namespace swiftlet {
 namespace {
 
-// Steps between two looks at whether any lane can still gain.
+// Steps are taken so many at a time.
 constexpr int kStride = 4;
 constexpr int kNoSeed = -(1 << 20);
 

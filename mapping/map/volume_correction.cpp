@@ -165,8 +165,7 @@ void VolumeCorrection::dropSeen() {
   for (auto slot = seen; slot != leaving_.end(); ++slot) {
     const BlockIndex block = volume_.header(*slot).index;
     dropped_.push_back(block);
-    empty_.block = block;
-    store_.put(empty_, {});
+    store_.takeOut(block);
   }
   volume_.discard({leaving_.data() + (seen - leaving_.begin()), dropped_.size()});
   counters_.blocks_dropped += dropped_.size();

@@ -96,7 +96,6 @@ class VolumeCorrection {
   std::vector<std::uint32_t> leaving_;  ///< scratch: slots
   std::vector<BlockIndex> dropped_;     ///< scratch
   DepthTiles tiles_;                    ///< scratch, of one image
-  SurfacePatch empty_;
   CorrectionCounters counters_;
 };
 

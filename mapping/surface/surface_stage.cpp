@@ -43,13 +43,8 @@ void SurfaceStage::findChanges() {
       is_old_[slot] = 0;
       continue;
     }
-    if (header.state == BlockState::kFree) {
-      // Its surface, from before it was dropped, is no more.
-      patch_.block = header.index;
-      patch_.vertices.clear();
-      patch_.triangles.clear();
-      store_.put(patch_, vehicle_);
-    }
+    // What it had before it was dropped is no more.
+    if (header.state == BlockState::kFree) store_.takeOut(header.index);
     for (int z = -1; z <= 1; ++z) {
       for (int y = -1; y <= 1; ++y) {
         for (int x = -1; x <= 1; ++x) {

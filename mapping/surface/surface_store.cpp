@@ -102,12 +102,11 @@ void SurfaceStore::leave(const SurfacePatch& patch) {
 }
 
 std::size_t SurfaceStore::bitOf(const BlockIndex& block) {
-  // Fibonacci hashing, as BlockHash.
-  return static_cast<std::size_t>((keyOf(block) * 0x9E3779B97F4A7C15ULL) >> (64 - kLeftBitsLog));
+  return static_cast<std::size_t>(mixedKey(keyOf(block)) >> (64U - kLeftBitsLog));
 }
 
-/// The sink is told that the block has no surface any more.
-void SurfaceStore::withdraw(const BlockIndex& block) {
+void SurfaceStore::takeOut(const BlockIndex& block) {
+  if (const std::uint32_t old = find(block); old != kNone) remove(old);
   if (sink_ == nullptr || !left_.test(bitOf(block))) return;
   leaving_.block = block;
   leaving_.vertices.clear();
@@ -140,11 +139,11 @@ bool SurfaceStore::makeRoom(std::size_t pages, const BlockIndex& block, const Ei
 }
 
 void SurfaceStore::put(const SurfacePatch& patch, const Eigen::Vector3f& vehicle) {
-  if (const std::uint32_t old = find(patch.block); old != kNone) remove(old);
   if (patch.triangles.empty()) {
-    withdraw(patch.block);
+    takeOut(patch.block);
     return;
   }
+  if (const std::uint32_t old = find(patch.block); old != kNone) remove(old);
   const std::size_t pages = pagesFor(patch.vertices.size(), patch.triangles.size());
   if ((free_pages_ < pages || unused_entries_.empty()) && !makeRoom(pages, patch.block, vehicle)) {
     leave(patch);

@@ -44,8 +44,10 @@ class SurfaceStore {
   /// outlives the store's use.
   SurfaceStore(std::size_t bytes, double block_size, SurfaceSink* sink = nullptr);
 
-  /// An empty patch takes the block's out, and out of the sink.
+  /// An empty patch takes the block's out, as takeOut() does.
   void put(const SurfacePatch& patch, const Eigen::Vector3f& vehicle);
+  /// The block has no surface any more: its patch goes, out of the sink too.
+  void takeOut(const BlockIndex& block);
   void clear();
   /// All patches go to the sink (or are lost, counted), ordered by block.
   void leaveAll();
@@ -91,7 +93,6 @@ class SurfaceStore {
   void remove(std::uint32_t entry);
   void leave(const SurfacePatch& patch);
   [[nodiscard]] static std::size_t bitOf(const BlockIndex& block);
-  void withdraw(const BlockIndex& block);
   bool makeRoom(std::size_t pages, const BlockIndex& block, const Eigen::Vector3f& vehicle);
   void write(const SurfacePatch& patch, Entry& entry);
 
@@ -106,7 +107,7 @@ class SurfaceStore {
   std::size_t free_pages_ = 0;
   std::vector<Farness> far_;  ///< scratch
   SurfacePatch leaving_;      ///< scratch
-  /// Bits of keys whose patches went to the sink. Who shares a bit with one is withdrawn in vain.
+  /// Bits of keys whose patches went to the sink. Who shares a bit with one is taken out in vain.
   static constexpr unsigned kLeftBitsLog = 17;
   std::bitset<(std::size_t{1} << kLeftBitsLog)> left_;
   SurfaceStoreCounters counters_;

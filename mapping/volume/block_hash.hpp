@@ -11,6 +11,10 @@
 
 namespace swiftlet {
 
+/// The high bits are spread evenly: Fibonacci hashing (Knuth, TAOCP 3, 6.4) after a fold that brings the high
+/// coordinate down.
+inline std::uint64_t mixedKey(std::uint64_t key) { return (key ^ (key >> 31U)) * 0x9E3779B97F4A7C15ULL; }
+
 class BlockHash {
  public:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
@@ -48,9 +52,7 @@ class BlockHash {
   };
 
   [[nodiscard]] std::size_t home(std::uint64_t key) const {
-    // Fibonacci hashing (Knuth, TAOCP 3, 6.4) after a fold that brings the high coordinate down.
-    const std::uint64_t folded = key ^ (key >> 31U);
-    return static_cast<std::size_t>((folded * 0x9E3779B97F4A7C15ULL) >> shift_);
+    return static_cast<std::size_t>(mixedKey(key) >> shift_);
   }
 
   std::vector<Entry> table_;

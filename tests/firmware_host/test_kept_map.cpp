@@ -236,7 +236,7 @@ TEST_CASE("a map that was kept and continued is that of an uninterrupted flight"
   second.fly(11, 20);
   // Blocks, label counts, the drift that decides when a block is drawn, patches: all of it.
   CHECK(second.kept() == whole.kept());
-  // The distance field is made anew from the volume; it is the same but for blocks' order.
+  // The distance field is made anew from the volume, whose blocks lie in another order.
   for (Flight* flight : {&whole, &second}) {
     MapReport done;
     do {

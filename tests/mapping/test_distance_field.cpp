@@ -119,6 +119,13 @@ void freeRest(DistanceField& field, const Eigen::Vector3i& window) {
 
 void freeAll(DistanceField& field) { freeRest(field, field.origin() - field.limits().cells); }
 
+void setSpace(DistanceField& field, const Eigen::Vector3i& cell, Space space) {
+  std::array<Space, kDistanceStep> row;
+  row.fill(space);
+  const int within = cell.x() & (kDistanceStep - 1);
+  field.setSpaces(cell - Eigen::Vector3i(within, 0, 0), 1U << static_cast<unsigned>(within), row);
+}
+
 Eigen::Vector3i randomCell(const DistanceField& field, Random& random) {
   Eigen::Vector3i cell = field.origin();
   for (int i = 0; i < 3; ++i) cell[i] += static_cast<int>(random.uniform(0, field.limits().cells[i] - 1e-9));
@@ -165,7 +172,7 @@ TEST_CASE("surfaces that come and go leave no false distance behind") {
     while (surface.size() > 120) {
       auto gone = surface.begin();
       std::advance(gone, static_cast<int>(random.uniform(0, static_cast<double>(surface.size()) - 1e-9)));
-      field.setSpace(gone->first, Space::kFree);
+      setSpace(field, gone->first, Space::kFree);
       surface.erase(gone);
     }
     // Before the update what is gone is "at least" as far as it was, or the others' distance.
@@ -190,7 +197,7 @@ TEST_CASE("a wall gives its distance to a tenth of a cell, signed, with its norm
         if (std::abs(to) <= 0.5) {
           field.setSurface(cell, space, {{static_cast<float>(to), 0, 0}, {}});
         } else {
-          field.setSpace(cell, space);
+          setSpace(field, cell, space);
         }
       }
     }
@@ -290,10 +297,9 @@ TEST_CASE("clearance ends where the unknown begins") {
     }
   }
   for (int i = 0; i < 12; ++i) known.erase(randomCell(field, random));
-  for (const Eigen::Vector3i& cell : known) field.setSpace(cell, Space::kFree);
+  for (const Eigen::Vector3i& cell : known) setSpace(field, cell, Space::kFree);
   field.update({});
   const double size = field.limits().cell_size;
-  int compared = 0;
   double gained = 0, possible = 0;
   for (int i = 0; i < 300; ++i) {
     Eigen::Vector3d at;
@@ -305,11 +311,9 @@ TEST_CASE("clearance ends where the unknown begins") {
     const double truth = nearestUnknown(known, field, at);
     REQUIRE(sample.known_to <= truth * size + 1e-9);
     REQUIRE(sample.clearance() <= sample.known_to);
-    ++compared;
     gained += sample.known_to;
     possible += std::min<double>(truth, field.limits().reach) * size;
   }
-  CHECK(compared == 300);
   CHECK(gained > 0.6 * possible);
 }
 
@@ -407,7 +411,7 @@ TEST_CASE("a reader beside the writer sees no distance that was never true") {
       if (choice.uniform(0, 1) < 0.5) {
         field.setSurface(guest, Space::kFree, {});
       } else {
-        field.setSpace(guest, Space::kFree);
+        setSpace(field, guest, Space::kFree);
       }
     }
     field.update({});

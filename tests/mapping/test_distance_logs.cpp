@@ -149,9 +149,8 @@ TEST_CASE("at random points of a log's map distances are those to its surface") 
     const double share = static_cast<double>(figures.in_range_with_distance) / figures.in_range;
     std::printf(
         "%s: %d observed, %zu with a distance, off by %.4f m (median), %.4f (99 %%), %.4f (most), %ld beyond "
-        "half a voxel; in range %d, of them with a distance %.2f %%; at least %d, above the truth %d (%.4f "
-        "m); "
-        "unknown %d, said to be free %d\n",
+        "half a voxel; in range %d, of them with a distance %.2f %%; at least %d, above the truth %d "
+        "(%.4f m); unknown %d, said to be free %d\n",
         name, figures.observed, figures.off.size(), percentileOf(figures.off, 0.5),
         percentileOf(figures.off, 0.99), percentileOf(figures.off, 1), static_cast<long>(wide),
         figures.in_range, 100 * share, figures.at_least, figures.above_truth, figures.most_above,

@@ -291,11 +291,6 @@ namespace {
 /// ends.
 class PlainMap {
  public:
-  struct Loop {
-    std::uint64_t from = 0, to = 0;  ///< frames; may be those of neighbours once theirs are gone
-    bool carried = false;
-  };
-
   void add(std::uint64_t frame) { frames_.push_back(frame); }
   void remove(std::uint64_t frame) {
     const auto at = std::find(frames_.begin(), frames_.end(), frame);
@@ -304,11 +299,11 @@ class PlainMap {
   }
   void addLoop(std::uint32_t id, std::uint64_t from, std::uint64_t to) {
     if (id >= loops_.size()) loops_.resize(id + 1);
-    loops_[id] = {from, to, false};
+    loops_[id] = {from, to};
   }
 
   /// Every loop that was not given up is an edge of the graph, between the nodes that it was found between
-  /// or, where these are gone, others; and nothing else is.
+  /// or, where these are gone, others.
   void check(const LoopMap& map) {
     REQUIRE(map.size() == frames_.size());
     const PoseGraph<SE3>& graph = map.graph();
@@ -352,7 +347,10 @@ class PlainMap {
   }
 
   std::vector<std::uint64_t> frames_;
-  std::vector<Loop> loops_;
+  struct Ends {
+    std::uint64_t from = 0, to = 0;  ///< frames; those of neighbours once theirs are gone
+  };
+  std::vector<Ends> loops_;
 };
 
 }  // namespace

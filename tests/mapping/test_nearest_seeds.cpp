@@ -20,16 +20,17 @@ struct Case {
 };
 
 struct Planes {
-  Planes(const Case& given, Random& random) : transform(given.cells, given.reach, given.gap) {
+  Planes(const Case& given, Random& random)
+      : transform(given.cells, given.reach, given.gap), layers(given.cells.z()) {
     for (int i = 0; i < given.seeds; ++i) {
       seeds.emplace_back();
       for (int axis = 0; axis < 3; ++axis)
         seeds.back()[axis] = static_cast<int>(random.uniform(0, given.cells[axis] - 1e-9));
     }
-    for (int y = 0; y < given.cells.y(); ++y) give(y, given.cells.z());
+    for (int y = 0; y < given.cells.y(); ++y) give(y);
   }
 
-  void give(int y, int layers) {
+  void give(int y) {
     for (int z = 0; z < layers; ++z) {
       const auto row = transform.seeds(z);
       std::fill(row.begin(), row.end(), std::uint8_t{0});
@@ -42,6 +43,7 @@ struct Planes {
   }
 
   NearestSeeds transform;
+  int layers;
   std::vector<Eigen::Vector3i> seeds;
 };
 
@@ -113,7 +115,7 @@ TEST_CASE("a plane given again counts, the others are kept") {
     const int y = static_cast<int>(random.uniform(0, 20 - 1e-9));
     std::erase_if(planes.seeds, [&](const Eigen::Vector3i& seed) { return seed.y() == y; });
     planes.seeds.emplace_back(static_cast<int>(random.uniform(0, 24 - 1e-9)), y, 3);
-    planes.give(y, given.cells.z());
+    planes.give(y);
     int wrong = 0;
     forCells(given, planes, [&](const Eigen::Vector3i& cell, NearestSeeds::Word word) {
       const int truth = squaredToNearest(planes, cell, 0);
