@@ -1,5 +1,5 @@
 #!/bin/sh
-# Draws the time per new loop of loop selection against the loops held, beside doing it again from nothing.
+# Draws the time per new loop of loop selection against the loops held, beside one search over all of them.
 # usage: toolchain/plot_loop_selection.sh GROWTH.csv OUT.svg
 #   GROWTH.csv  what benchmark_loop_selection prints
 # Needs gnuplot (packages_optional.txt). Exit code 0 when drawn, 2 wrong use.
@@ -25,5 +25,5 @@ set key top left
 set grid
 plot growth using 1:2 skip 1 with linespoints lw 2 pt 7 title "new loop, mean since the point before", \
      growth using 1:3 skip 1 with linespoints lw 2 pt 5 title "new loop, worst", \
-     growth using 1:($4*1000) skip 1 with linespoints lw 2 pt 9 title "all again from nothing"
+     growth using 1:($4*1000) skip 1 with linespoints lw 2 pt 9 title "one search over all"
 GNUPLOT

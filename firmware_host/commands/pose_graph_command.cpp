@@ -16,11 +16,12 @@ constexpr std::size_t kWarningsShown = 10;
 
 void printLoops(const char* name, const LoopCount& count) {
   fmt::print(
-      "{:<14} {} kept, {} rejected: {} against the odometry, {} inconsistent, {} unsupported, {} against the "
+      "{:<14} {} selected, {} rejected: {} against the odometry, {} inconsistent, {} unsupported, {} against "
+      "the "
       "solution\n",
-      name, count.of(EdgeFate::kKept), count.rejected(), count.of(EdgeFate::kAgainstOdometry),
-      count.of(EdgeFate::kInconsistent), count.of(EdgeFate::kUnsupported),
-      count.of(EdgeFate::kAgainstSolution));
+      name, count.of(LoopVerdict::kSelected), count.rejected(), count.of(LoopVerdict::kAgainstOdometry),
+      count.of(LoopVerdict::kInconsistent), count.of(LoopVerdict::kUnsupported),
+      count.of(LoopVerdict::kAgainstSolution));
 }
 
 void print(const PoseGraphRequest& request, const PoseGraphResult& result) {

@@ -189,10 +189,6 @@ std::vector<Setting> estimationSettings() {
        "Believe a loop only where it agrees with the odometry and other loops; false, to compare: every one "
        "that geometry verifies.",
        onOff(&Settings::loop_stage, &LoopSettings::consistency)},
-      {"loop.graduated", "",
-       "Tell loops from false ones by graduated non-convexity on the whole graph in place of the largest set "
-       "that agrees pair by pair.",
-       onOff(&Settings::loop_stage, &LoopSettings::graduated)},
       {"map.enabled", "",
        "Fuse depth into a map in flight: labelled surface (map.ply, map.glb) and distance field.",
        onOff(&Settings::map, &MapGroup::enabled)},

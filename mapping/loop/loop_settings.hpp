@@ -10,9 +10,6 @@ struct LoopSettings {
   /// Believe loops only where they agree with the odometry and with each other; false: all that geometry
   /// verifies, for comparison.
   bool consistency = true;
-  /// With consistency: graduated non-convexity on the whole graph in place of the largest set of loops that
-  /// agree pair by pair (docs/pose_graph.md section 4).
-  bool graduated = false;
 };
 
 }  // namespace swiftlet

@@ -146,11 +146,10 @@ Status LoopStage::addNode(const WindowPose& pose) {
   node.epoch = epoch_;
   node.place = PlaceDatabase::kNoSlot;
   node.T_world_body = pose.T_world_body;
-  node.linked = pending_.linked;
-  node.T_previous_this = pending_.T_node_this;
-  node.covariance = pending_.covariance;
-  if (const Status status = map_.add(node); !status.ok()) return status;
-  counters_.components += node.linked ? 0 : 1;
+  const LoopMap::Link link{pending_.T_node_this, pending_.covariance};
+  const bool linked = pending_.linked;
+  if (const Status status = map_.add(node, linked ? &link : nullptr); !status.ok()) return status;
+  counters_.components += linked ? 0 : 1;
   ++counters_.nodes;
   pending_ = Pending{};
   pending_.linked = true;
@@ -335,7 +334,7 @@ void LoopStage::tiedEpochs(std::uint32_t epoch, FixedVector<std::uint32_t, kTied
   for (std::size_t before = 0, pass = 0; pass == 0 || out.size() > before; ++pass) {
     before = out.size();
     for (std::uint32_t i = 0; i < map_.loops(); ++i) {
-      if (map_.verdict(i) != LoopVerdict::kSelected) continue;
+      if (!map_.selected(i)) continue;
       const RelativePose<SE3>& edge = map_.loopEdge(i);
       const std::uint32_t a = map_.node(edge.from).epoch, b = map_.node(edge.to).epoch;
       if (isTied(a) != isTied(b)) static_cast<void>(out.tryPushBack(isTied(a) ? b : a));
@@ -354,13 +353,13 @@ MapLoop LoopStage::loop(std::uint32_t i) const {
   out.rotation_sigma = std::sqrt(covariance.diagonal().head<3>().maxCoeff());
   out.translation_sigma = std::sqrt(covariance.diagonal().tail<3>().maxCoeff());
   out.inliers = inliers_[i].size();
-  out.verdict = map_.verdict(i);
+  out.verdict = map_.graph().verdict(i);
   return out;
 }
 
 bool LoopStage::revisit(std::uint32_t i, LoopRevisit& out) const {
   const LoopMap::Loop& loop = map_.loop(i);
-  if (!loop.selected || loop.carried) return false;
+  if (!map_.selected(i) || loop.carried) return false;
   const RelativePose<SE3>& edge = map_.loopEdge(i);
   const LoopMap::Node& from = map_.node(edge.from);
   const LoopMap::Node& to = map_.node(edge.to);

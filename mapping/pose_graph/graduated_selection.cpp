@@ -39,50 +39,44 @@ bool settle(double limit, std::span<double> weights, std::span<const double> chi
 
 }  // namespace
 
-Status selectGraduated(const GraduatedSettings& settings, WeightedLoops& problem, std::span<double> weights,
-                       std::span<double> chi_squared, GraduatedReport& report) {
-  report = {};
-  const double limit = settings.max_chi_squared;
-  const auto solve = [&] {
-    ++report.solutions;
-    return problem.solve(weights, chi_squared);
-  };
-  if (const Status status = solve(); !status.ok()) {
-    return status;
-  }
-  double worst = 0;
+void GraduatedSelection::begin() {
+  report_ = {};
+  stage_ = Stage::kFirst;
+  settlings_ = 0;
+}
+
+void GraduatedSelection::weigh(std::span<const double> chi_squared, std::span<double> weights) const {
   for (std::size_t k = 0; k < weights.size(); ++k) {
-    worst = weights[k] > kOut ? std::max(worst, chi_squared[k]) : worst;
+    if (weights[k] == kOut) continue;
+    weights[k] = std::max(graduatedWeight(chi_squared[k], settings_.max_chi_squared, mu_), kAlmostOut);
   }
-  if (worst > limit) {
+}
+
+bool GraduatedSelection::next(std::span<const double> chi_squared, std::span<double> weights) {
+  ++report_.solutions;
+  const double limit = settings_.max_chi_squared;
+  if (stage_ == Stage::kFirst) {
+    double worst = 0;
+    for (std::size_t k = 0; k < weights.size(); ++k) {
+      if (weights[k] > kOut) worst = std::max(worst, chi_squared[k]);
+    }
+    stage_ = worst > limit ? Stage::kGrowing : Stage::kSettling;
     // 2 worst > limit: mu starts above 0 and where the surrogate is convex.
-    double mu = limit / (2 * worst - limit);
-    while (report.solutions < settings.max_solutions) {
-      for (std::size_t k = 0; k < weights.size(); ++k) {
-        if (weights[k] > kOut) {
-          weights[k] = std::max(graduatedWeight(chi_squared[k], limit, mu), kAlmostOut);
-        }
-      }
-      if (const Status status = solve(); !status.ok()) {
-        return status;
-      }
-      if (decided(weights)) {
-        break;
-      }
-      mu *= settings.growth;
-    }
+    mu_ = limit / (2 * worst - limit);
+  } else if (stage_ == Stage::kGrowing) {
+    mu_ *= settings_.growth;
+    if (decided(weights) || report_.solutions >= settings_.max_solutions) stage_ = Stage::kSettling;
   }
-  for (std::uint32_t k = 0; k < settings.max_settling && !report.settled; ++k) {
-    if (settle(limit, weights, chi_squared)) {
-      if (const Status status = solve(); !status.ok()) {
-        return status;
-      }
-    } else {
-      report.settled = true;
-    }
+  if (stage_ == Stage::kGrowing) {
+    weigh(chi_squared, weights);
+    return true;
   }
-  report.kept = static_cast<std::uint32_t>(std::count(weights.begin(), weights.end(), 1.0));
-  return okStatus();
+  const bool may = settlings_ < settings_.max_settling;
+  const bool changed = may && settle(limit, weights, chi_squared);
+  settlings_ += changed ? 1 : 0;
+  report_.settled = may && !changed;
+  report_.kept = static_cast<std::uint32_t>(std::count(weights.begin(), weights.end(), 1.0));
+  return changed;
 }
 
 }  // namespace swiftlet

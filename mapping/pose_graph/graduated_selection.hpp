@@ -11,25 +11,16 @@
 // At the end loops are in or out: those within c2 are taken, the rest left out, and this is repeated until it
 // changes nothing (or `max_settling` times): a loop that was left out but fits comes back.
 //
-// The solver behind it is the caller's. Cost: as many solutions as `Report::solutions` says, 20 to 40, each
-// from the poses of the one before. Deterministic when the solver is. No allocation.
-// Source: Yang, Antonante, Tzoumas, Carlone, "Graduated Non-Convexity for Robust Spatial Perception: From
-// Non-Minimal Solvers to Global Outlier Rejection", RA-L 2020, section V; mu's start is their remark 5.
+// The caller solves: begin(), then next() with each solution's chi-squared until it returns false. So the
+// work can be spread over as many steps as the caller likes; 20 to 40 solutions, each from the poses of the
+// one before. Deterministic. No allocation. Source: Yang, Antonante, Tzoumas, Carlone, "Graduated
+// Non-Convexity for Robust Spatial Perception: From Non-Minimal Solvers to Global Outlier Rejection", RA-L
+// 2020, section V; mu's start is their remark 5.
 
 #include <cstdint>
 #include <span>
 
-#include "estimator/core/status.hpp"
-
 namespace swiftlet {
-
-/// The least-squares problem with weights on its loops.
-class WeightedLoops {
- public:
-  virtual ~WeightedLoops() = default;
-  /// Solves with `weights` (in [0, 1], one a loop) and gives each loop's chi-squared, unweighted, there.
-  virtual Status solve(std::span<const double> weights, std::span<double> chi_squared) = 0;
-};
 
 struct GraduatedSettings {
   double max_chi_squared = 0;        ///< c2; of 3 or 6 degrees of freedom
@@ -44,10 +35,28 @@ struct GraduatedReport {
   bool settled = false;    ///< the last solution changed no weight
 };
 
-/// `weights` in: 0 leaves a loop out until the end (it may still come back when it fits), anything above lets
-/// it take part from the start; out: 0 or 1. `chi_squared` out: at the last solution. Both as long as there
-/// are loops. Returns the solver's status when it fails: `weights` are then those of its last call.
-Status selectGraduated(const GraduatedSettings& settings, WeightedLoops& problem, std::span<double> weights,
-                       std::span<double> chi_squared, GraduatedReport& report);
+class GraduatedSelection {
+ public:
+  explicit GraduatedSelection(const GraduatedSettings& settings) : settings_(settings) {}
+
+  /// A new problem. Its first solution is the caller's, with its own weights: 0 leaves a loop out until the
+  /// end (it may still come back when it fits), anything above lets it take part from the start.
+  void begin();
+  /// `chi_squared`: each loop's, unweighted, at the solution of `weights`, which become those of the next
+  /// solution. False: they have not changed or may not any more, and are 0 or 1.
+  bool next(std::span<const double> chi_squared, std::span<double> weights);
+  [[nodiscard]] const GraduatedReport& report() const { return report_; }
+
+ private:
+  enum class Stage : std::uint8_t { kFirst, kGrowing, kSettling };
+
+  void weigh(std::span<const double> chi_squared, std::span<double> weights) const;
+
+  GraduatedSettings settings_;
+  GraduatedReport report_;
+  Stage stage_ = Stage::kFirst;
+  double mu_ = 0;
+  std::uint32_t settlings_ = 0;
+};
 
 }  // namespace swiftlet

@@ -19,6 +19,7 @@
 // Maximization for Robust Multi-robot Map Merging", ICRA 2018, equations 3 and 4; the sums and their overlap
 // are this project's.
 
+#include <Eigen/Cholesky>
 #include <cstdint>
 #include <limits>
 
@@ -66,6 +67,13 @@ struct ChainedLoop {
 /// large beside all others (kUnknownVarianceRatio times the least), so that the tests do not look at them.
 template <typename Matrix>
 Matrix covarianceFromInformation(const Matrix& information);
+
+/// Inverse of a covariance, symmetric.
+template <typename Matrix>
+Matrix informationFromCovariance(const Matrix& covariance) {
+  const Matrix information = covariance.ldlt().solve(Matrix::Identity());
+  return 0.5 * (information + information.transpose());
+}
 
 /// `loop.from` and `loop.to` must be in the chain.
 template <typename Pose>

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "mapping/pose_graph/chance_limit.hpp"
 
 namespace swiftlet {
 namespace {
@@ -56,7 +59,8 @@ LoopSelection<Pose>::LoopSelection(const LoopSelectionLimits& limits, const Loop
   held_.reserve(limits.max_loops);
   groups_.reserve(limits.max_loops);
   selected_.reserve(limits.max_loops);
-  order_.reserve(limits.max_loops);
+  carried_.reserve(limits.max_loops);
+  least_chances_.reserve(limits.max_loops);
 }
 
 template <typename Pose>
@@ -104,7 +108,7 @@ Status LoopSelection<Pose>::place(const RelativePose<Pose>& loop, std::uint32_t&
   held.group = groupOf(held.chained);
   held_[id] = held;
   ++counters_.added;
-  applyGate(held_[id], held.chained.withinComponent() ? odometryTest(chain_, held.chained) : CycleTest{0, 0});
+  testGate(held_[id]);
   if (held_[id].passed) {
     testPairs(id);
   }
@@ -154,11 +158,24 @@ std::uint32_t LoopSelection<Pose>::groupOf(const ChainedLoop<Pose>& chained) {
 }
 
 template <typename Pose>
-void LoopSelection<Pose>::applyGate(Held& held, const CycleTest& gate) {
-  held.gate = gate;
-  held.passed = gate.chi_squared <= settings_.gate_chi_squared;
-  held.proven = held.chained.withinComponent() &&
-                logChance<Pose>(gate, chain_.logBox(held.chained.to)) <= std::log(settings_.max_gate_chance);
+void LoopSelection<Pose>::testGate(Held& held) const {
+  held.gate = held.chained.withinComponent() ? odometryTest(chain_, held.chained) : CycleTest{0, 0};
+  held.passed = held.gate.chi_squared <= settings_.gate_chi_squared;
+  held.log_chance = held.least_log_chance = std::numeric_limits<double>::infinity();
+  if (!held.chained.withinComponent()) return;
+  const double log_box = chain_.logBox(held.chained.to);
+  held.log_chance = logChance<Pose>(held.gate, log_box);
+  held.least_log_chance = logChance<Pose>({0, held.gate.log_deviation}, log_box);
+}
+
+template <typename Pose>
+void LoopSelection<Pose>::limitGateChance() {
+  least_chances_.clear();
+  for (const Held& held : held_) {
+    if (!held.released && held.chained.withinComponent()) least_chances_.push_back(held.least_log_chance);
+  }
+  log_gate_limit_ =
+      std::min(std::log(settings_.max_gate_chance), logChanceLimit(settings_.max_false, least_chances_));
 }
 
 template <typename Pose>
@@ -263,7 +280,7 @@ void LoopSelection<Pose>::leave(std::uint32_t id) {
 template <typename Pose>
 void LoopSelection<Pose>::giveUp(std::uint32_t id) {
   leave(id);
-  held_[id].passed = held_[id].proven = false;
+  held_[id].passed = false;
   held_[id].released = true;
   ++counters_.released;
 }
@@ -299,8 +316,7 @@ void LoopSelection<Pose>::carry(RelativePose<Pose>& loop, std::uint32_t pose, st
     R += back * Q * back.transpose();
     loop.from = onto;
   }
-  const Matrix information = R.ldlt().solve(Matrix::Identity());
-  loop.information = 0.5 * (information + information.transpose());
+  loop.information = informationFromCovariance(R);
 }
 
 template <typename Pose>
@@ -309,8 +325,7 @@ Status LoopSelection<Pose>::removePose(std::uint32_t pose, std::uint32_t onto) {
   if (!known || chain_.component(pose) != chain_.component(onto)) {
     return {StatusCode::kInvalidInput, "no such pose to remove, or none beside it to carry its loops to"};
   }
-  std::vector<std::uint32_t>& carried = order_;
-  carried.clear();
+  carried_.clear();
   for (std::uint32_t k = 0; k < held(); ++k) {
     RelativePose<Pose>& loop = held_[k].loop;
     if (held_[k].released || (loop.from != pose && loop.to != pose)) {
@@ -321,7 +336,7 @@ Status LoopSelection<Pose>::removePose(std::uint32_t pose, std::uint32_t onto) {
       continue;
     }
     carry(loop, pose, onto);
-    carried.push_back(k);
+    carried_.push_back(k);
   }
   chain_.erase(pose);
   const auto moveDown = [pose](std::uint32_t& k) { k -= k > pose ? 1U : 0U; };
@@ -331,61 +346,12 @@ Status LoopSelection<Pose>::removePose(std::uint32_t pose, std::uint32_t onto) {
     moveDown(held.chained.from);
     moveDown(held.chained.to);
   }
-  for (const std::uint32_t k : carried) {
+  for (const std::uint32_t k : carried_) {
     held_[k].chained = chainLoop(chain_, held_[k].loop);
   }
-  counters_.carried += carried.size();
+  counters_.carried += carried_.size();
   select();
   return okStatus();
-}
-
-template <typename Pose>
-Status LoopSelection<Pose>::reconsider(std::uint32_t id, const CycleTest& gate, std::uint32_t max_nodes) {
-  if (id >= held() || held_[id].released) {
-    return {StatusCode::kInvalidInput, "no such loop"};
-  }
-  const bool before = held_[id].passed;
-  const bool in_set = testBit(sets_, id);
-  applyGate(held_[id], gate);
-  if (before && !held_[id].passed) {
-    leave(id);
-    if (in_set) {
-      searchGroup(held_[id].group, max_nodes);
-    }
-  } else if (!before && held_[id].passed) {
-    testPairs(id);
-    extend(id, max_nodes);
-  }
-  select();
-  return okStatus();
-}
-
-template <typename Pose>
-void LoopSelection<Pose>::replay(std::uint32_t max_nodes) {
-  consistency_.clear();
-  support_.clear();
-  std::fill(sets_.begin(), sets_.end(), 0);
-  groups_.clear();
-  order_.clear();
-  for (std::uint32_t k = 0; k < held(); ++k) {
-    held_[k].passed = false;
-    if (!held_[k].released) {
-      order_.push_back(k);
-    }
-  }
-  std::sort(order_.begin(), order_.end(),
-            [&](std::uint32_t a, std::uint32_t b) { return held_[a].arrival < held_[b].arrival; });
-  for (const std::uint32_t k : order_) {
-    Held& held = held_[k];
-    held.chained = chainLoop(chain_, held.loop);
-    held.group = groupOf(held.chained);
-    applyGate(held, held.chained.withinComponent() ? odometryTest(chain_, held.chained) : CycleTest{0, 0});
-    if (held.passed) {
-      testPairs(k);
-      extend(k, max_nodes);
-    }
-  }
-  select();
 }
 
 template <typename Pose>
@@ -407,10 +373,12 @@ void LoopSelection<Pose>::select() {
 
 template <typename Pose>
 void LoopSelection<Pose>::dropUnsupported() {
+  limitGateChance();
   for (bool changed = true; changed;) {
     changed = false;
     forEachBit(ConstBitSet(chosen_), [&](std::uint32_t k) {
-      if (!held_[k].proven && countBoth(support_.row(k), chosen_) < settings_.min_support) {
+      const bool proven = held_[k].log_chance <= log_gate_limit_;
+      if (!proven && countBoth(support_.row(k), chosen_) < settings_.min_support) {
         clearBit(chosen_, k);
         changed = true;
       }

@@ -2,21 +2,18 @@
 // Which loop closures to believe: those that agree with the odometry, with each other, and not by chance.
 //
 // 1. Gate. A loop within one component must agree with the chain of the odometry (loop_consistency.hpp): its
-//    chi-squared at most that of the settings. One that does not stays held and is asked again by
-//    reconsider().
+//    chi-squared at most that of the settings. One that does not stays held.
 // 2. Pairs. A loop that passed is tested against those held (only it: one row and column of the graph of
 //    consistency). Loops agree or conflict; those of different pairs of components do neither.
 // 3. Set. For each pair of components the largest set of loops that all agree (maximum_clique.hpp). A larger
-// set
-//    after a loop arrives must contain it, so only its neighbours are searched; of sets of equal size the one
-//    found first stays. The set is a function of the loops in the order of their arrival and of the nodes
-//    given for each: kept up loop by loop it is the same as when everything is done again from nothing
-//    (replay()).
+//    set after a loop arrives must contain it, so only its neighbours are searched; of sets of equal size the
+//    one found first stays. The set is a function of the loops in the order of their arrival and of the nodes
+//    given for each.
 // 4. Support. Where odometry is vague nearly any loop agrees with nearly all others, and agreement proves
 //    nothing. A loop of the set is selected when a random one would hardly have passed its gate (chance at
-//    most `max_chance`, loop_consistency.hpp), or when at least `min_support` loops agree with it, themselves
-//    selected, in pair tests that a random one would hardly have passed. Between two components, where there
-//    is no gate, also at least `min_between` loops must be left, else none is selected.
+//    most gateChanceLimit(), loop_consistency.hpp), or when at least `min_support` loops agree with it,
+//    themselves selected, in pair tests that a random one would hardly have passed. Between two components,
+//    where there is no gate, also at least `min_between` loops must be left, else none is selected.
 //
 // Full: a new loop takes the place of the held one that is not selected and agrees with fewest (of equals the
 // oldest); when all held are in the sets it is refused (kCapacityReached): all of them say the same already.
@@ -49,9 +46,10 @@ struct LoopSelectionSettings {
   double gate_chi_squared =
       0;  ///< chiSquaredOfTail(dof, probability), or the square of a Mahalanobis distance
   double pair_chi_squared = 0;
-  /// That a random loop agrees as well with the odometry, for the gate alone to prove the loop: of thousands
-  /// of false loops a few.
+  /// That a random loop agrees as well with the odometry, for the gate alone to prove the loop: at most this,
+  /// and so small that of all loops tested `max_false` would reach it, were all random (chance_limit.hpp).
   double max_gate_chance = 1e-3;
+  double max_false = 0.05;  ///< the usual 5 %: one graph of twenty believes a random loop
   /// That a random loop agrees as well with another, for the pair to count as support.
   /// loopSelectionSettings() takes 1e-4 in the plane and 1e-2 in space, where few pairs can prove more
   /// (docs/pose_graph.md).
@@ -75,7 +73,9 @@ enum class LoopVerdict : std::uint8_t {
   kInconsistent,     ///< passed the gate, is not in the largest set
   kUnsupported,      ///< in the set, but chance would agree as well, or too few loops between components
   kReleased,         ///< given up for room
+  kAgainstSolution,  ///< selected, but does not fit the solved graph (RobustGraph)
 };
+inline constexpr std::size_t kLoopVerdicts = 6;
 
 struct LoopSelectionCounters {
   std::uint64_t added = 0;
@@ -104,10 +104,6 @@ class LoopSelection {
   /// One search over all held loops of each pair of components, for many loops at once. The result is a set
   /// of the same size as loop by loop where both are exact, not always the same one.
   void search(std::uint32_t max_nodes);
-  /// A better test of a loop than the odometry's, such as that of an optimized graph: replaces its gate. A
-  /// loop that now passes is treated as if it just arrived; one that no longer does leaves the set, which is
-  /// then searched again.
-  Status reconsider(std::uint32_t id, const CycleTest& gate, std::uint32_t max_nodes);
   /// Gives a held loop up: it leaves pairs and sets (one that others agreed with for its support may take
   /// them out of the selection), and its id is the next to be given to another loop.
   Status release(std::uint32_t id);
@@ -117,16 +113,16 @@ class LoopSelection {
   /// Loops between the two, and all where pose == onto, are released. Not the last pose. Linear in poses and
   /// loops.
   Status removePose(std::uint32_t pose, std::uint32_t onto);
-  /// Everything again from nothing, in the order of arrival, with the chain as it is now (it may have been
-  /// refined) and the gates of the odometry.
-  void replay(std::uint32_t max_nodes);
-
   /// Ids of the selected loops, ascending.
   [[nodiscard]] std::span<const std::uint32_t> selected() const { return selected_; }
   [[nodiscard]] LoopVerdict verdict(std::uint32_t id) const;
   [[nodiscard]] const RelativePose<Pose>& loop(std::uint32_t id) const { return held_[id].loop; }
   [[nodiscard]] const CycleTest& gate(std::uint32_t id) const { return held_[id].gate; }
+  /// As it stands to the odometry.
+  [[nodiscard]] const ChainedLoop<Pose>& chained(std::uint32_t id) const { return held_[id].chained; }
   [[nodiscard]] std::uint32_t held() const { return static_cast<std::uint32_t>(held_.size()); }
+  /// The chance up to which a gate alone proves a loop, with the loops held now; logarithm.
+  [[nodiscard]] double gateChanceLimit() const { return log_gate_limit_; }
   /// All sets are proven to be the largest.
   [[nodiscard]] bool exact() const;
   [[nodiscard]] const LoopSelectionCounters& counters() const { return counters_; }
@@ -137,10 +133,11 @@ class LoopSelection {
     RelativePose<Pose> loop;
     ChainedLoop<Pose> chained;
     CycleTest gate;
+    double log_chance = 0;        ///< that a random loop passes the gate as well; infinite between components
+    double least_log_chance = 0;  ///< of a random loop that agrees perfectly
     std::uint64_t arrival = 0;
     std::uint32_t group = 0;
     bool passed = false;  ///< the gate
-    bool proven = false;  ///< by the gate alone
     bool released = false;
   };
   /// Loops between the same two components.
@@ -154,7 +151,8 @@ class LoopSelection {
   Status place(const RelativePose<Pose>& loop, std::uint32_t& id);
   [[nodiscard]] bool findLeast(std::uint32_t& id) const;
   std::uint32_t groupOf(const ChainedLoop<Pose>& chained);
-  void applyGate(Held& held, const CycleTest& gate);
+  void testGate(Held& held) const;
+  void limitGateChance();
   void testPairs(std::uint32_t id);
   void extend(std::uint32_t id, std::uint32_t max_nodes);
   void searchGroup(std::uint32_t group, std::uint32_t max_nodes);
@@ -177,7 +175,9 @@ class LoopSelection {
   std::vector<std::uint64_t> chosen_;  ///< bits of selected_
   std::vector<std::uint64_t> scratch_;
   std::vector<std::uint32_t> selected_;
-  std::vector<std::uint32_t> order_;  ///< scratch of replay()
+  std::vector<std::uint32_t> carried_;  ///< scratch of removePose()
+  std::vector<double> least_chances_;   ///< scratch of limitGateChance()
+  double log_gate_limit_ = 0;
   std::uint64_t arrivals_ = 0;
   LoopSelectionCounters counters_;
 };

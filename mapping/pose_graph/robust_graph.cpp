@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
 
 #include "mapping/pose_graph/chance_limit.hpp"
 
@@ -15,298 +14,24 @@ constexpr double kFitTail = 1e-3;
 /// As far as the search for the largest set helps on the public graphs (docs/pose_graph.md).
 constexpr std::uint32_t kNodes = 200;
 
-/// 340 MB of pairs, and about a minute of pair tests.
-constexpr std::uint32_t kCandidates = 30000;
-
 /// Covariances of relative poses on the solved graph: 10 ms each on the largest public ones.
 constexpr std::uint32_t kReconsidered = 300;
 
-/// The usual 5 %: were all loops random, one of twenty graphs would believe one.
-constexpr double kMaxFalse = 0.05;
+constexpr int kSolutionIterations = 100;
 
 /// While weights change a rough solution will do.
 constexpr int kGraduatedIterations = 5;
 constexpr double kGraduatedTolerance = 1e-4;
 
-/// Loops come back in at most so many rounds; most graphs need two or three.
-constexpr int kRounds = 10;
-
-constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-
 /// Logarithm of a chance that no limit reaches.
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
-/// The optimizer, as graduated selection sees it.
+/// A loop and the solution, round.
 template <typename Pose>
-class GraphLoops : public WeightedLoops {
- public:
-  GraphLoops(PoseGraphOptimizer<Pose>& optimizer, std::span<const std::uint32_t> edges)
-      : optimizer_(optimizer), edges_(edges) {
-    effort_.iterations = kGraduatedIterations;
-    effort_.tolerance = kGraduatedTolerance;
-  }
-
-  Status solve(std::span<const double> weights, std::span<double> chi_squared) override {
-    for (std::size_t k = 0; k < edges_.size(); ++k) {
-      if (const Status status = optimizer_.setWeight(edges_[k], weights[k]); !status.ok()) return status;
-    }
-    OptimizeReport report;
-    const Status status = optimizer_.optimize(effort_, report);
-    const PoseGraph<Pose>& graph = optimizer_.graph();
-    for (std::size_t k = 0; k < edges_.size(); ++k) {
-      const auto& edge = graph.edges[edges_[k]];
-      chi_squared[k] = 2 * edgeCost(edge, graph.poses[edge.from], graph.poses[edge.to]);
-    }
-    return status;
-  }
-
- private:
-  PoseGraphOptimizer<Pose>& optimizer_;
-  std::span<const std::uint32_t> edges_;
-  OptimizeEffort effort_;
-};
-
-/// Loops of the optimizer's graph.
-struct TakenLoops {
-  std::vector<std::uint32_t> edges;    ///< in the whole graph
-  std::vector<std::uint32_t> numbers;  ///< in the optimizer's
-  std::vector<double> weights;
-};
-
-/// A loop that was not selected, and how many of the largest set it contradicts.
-struct OpenLoop {
-  std::uint32_t edge = 0;
-  std::uint32_t conflicts = 0;
-  double log_chance = kNever;  ///< beside the present solution, while step 5 looks
-  bool fits = false;
-};
-
-/// Step 2: fates of all loops.
-template <typename Pose>
-Status selectLoops(const RobustGraphSettings& settings, const OdometryChain<Pose>& chain,
-                   const PoseGraph<Pose>& graph, TakenLoops& taken, std::vector<OpenLoop>& open,
-                   RobustGraphReport& report) {
-  std::vector<std::uint32_t> passed;
-  std::vector<double> least_chances;
-  for (std::uint32_t e = 0; e < graph.edges.size(); ++e) {
-    if (report.fates[e] == EdgeFate::kOdometry) continue;
-    const auto chained = chainLoop(chain, graph.edges[e]);
-    if (!chained.withinComponent()) {
-      passed.push_back(e);
-      continue;
-    }
-    const CycleTest gate = odometryTest(chain, chained);
-    if (gate.chi_squared <= settings.selection.gate_chi_squared) passed.push_back(e);
-    least_chances.push_back(logChance<Pose>({0, gate.log_deviation}, chain.logBox(chained.to)));
-  }
-  report.passed = static_cast<std::uint32_t>(passed.size());
-  if (passed.size() > settings.max_candidates) {
-    return {StatusCode::kCapacityReached, "more loops agree with the odometry than can be compared in pairs"};
-  }
-  LoopSelectionSettings adapted = settings.selection;
-  adapted.max_gate_chance =
-      std::min(adapted.max_gate_chance, std::exp(logChanceLimit(settings.max_false, least_chances)));
-  LoopSelection<Pose> selection({chain.size(), report.passed}, adapted);
-  selection.odometry() = chain;
-  for (const std::uint32_t e : passed) {
-    std::uint32_t id = 0;
-    if (const Status status = selection.holdLoop(graph.edges[e], id); !status.ok()) return status;
-  }
-  selection.search(settings.max_nodes);
-  report.exact = selection.exact();
-  report.selected = static_cast<std::uint32_t>(selection.selected().size());
-  std::vector<std::uint64_t> set(selection.consistency().words());
-  for (std::uint32_t id = 0; id < selection.held(); ++id) {
-    if (selection.verdict(id) != LoopVerdict::kInconsistent) setBit(set, id);
-  }
-  const std::uint32_t size = countBits(set);
-  for (std::uint32_t id = 0; id < selection.held(); ++id) {
-    const std::uint32_t e = passed[id];
-    const LoopVerdict verdict = selection.verdict(id);
-    if (verdict == LoopVerdict::kSelected) {
-      report.fates[e] = EdgeFate::kKept;
-      taken.edges.push_back(e);
-      taken.weights.push_back(1);
-      continue;
-    }
-    report.fates[e] = verdict == LoopVerdict::kUnsupported ? EdgeFate::kUnsupported : EdgeFate::kInconsistent;
-    if (chain.component(graph.edges[e].from) != chain.component(graph.edges[e].to)) continue;
-    open.push_back({e, size - countBoth(selection.consistency().row(id), set), kNever, false});
-  }
-  return okStatus();
-}
-
-/// Loops chosen, to the poses of the graph.
-template <typename Pose>
-class RobustSolution {
- public:
-  RobustSolution(const RobustGraphSettings& settings, const OdometryChain<Pose>& chain,
-                 const PoseGraph<Pose>& graph, TakenLoops& taken, std::size_t spare_edges,
-                 const RobustGraphReport& report)
-      : settings_(settings), chain_(chain), whole_(graph), taken_(taken), loops_(report.loops) {
-    part_.poses = graph.poses;
-    for (std::uint32_t e = 0; e < graph.edges.size(); ++e) {
-      if (report.fates[e] == EdgeFate::kOdometry) part_.edges.push_back(graph.edges[e]);
-    }
-    for (const std::uint32_t e : taken.edges) {
-      taken_.numbers.push_back(static_cast<std::uint32_t>(part_.edges.size()));
-      part_.edges.push_back(graph.edges[e]);
-    }
-    optimizer_ = std::make_unique<PoseGraphOptimizer<Pose>>(
-        PoseGraphLimits{part_.poses.size(), part_.edges.size() + spare_edges, settings.max_factor_values});
-  }
-
-  Status solve(std::span<const std::uint32_t> fixed, RobustGraphReport& report) {
-    Status status = optimizer_->assign(part_);
-    for (const std::uint32_t pose : fixed) {
-      if (status.ok()) status = optimizer_->hold(pose, true);
-    }
-    if (status.ok()) status = optimizer_->start(report.start);
-    if (status.ok()) status = optimizer_->optimize(settings_.effort, report.solve);
-    return status;
-  }
-
-  Status graduate(RobustGraphReport& report) {
-    GraphLoops<Pose> problem(*optimizer_, taken_.numbers);
-    std::vector<double> chi_squared(taken_.numbers.size());
-    GraduatedReport graduated;
-    const Status status =
-        selectGraduated(settings_.graduated, problem, taken_.weights, chi_squared, graduated);
-    report.graduated.solutions += graduated.solutions;
-    report.graduated.kept = graduated.kept;
-    report.graduated.settled = graduated.settled;
-    return status.ok() ? optimizer_->optimize(settings_.effort, report.solve) : status;
-  }
-
-  /// Step 5 once: how many loops came back.
-  Status takeBack(std::vector<OpenLoop>& open, std::uint32_t& count) {
-    // Those that fit with their own covariance first: they bend the solution least, and it knows more then.
-    count = 0;
-    for (const bool own_covariance : {true, false}) {
-      if (const Status status = findFits(open, own_covariance); !status.ok()) return status;
-      std::erase_if(open, [](const OpenLoop& loop) { return loop.fits; });
-      count = static_cast<std::uint32_t>(back_.size());
-      if (count > 0) break;
-    }
-    // Added only now: a new edge would cost a new factor for the next covariance.
-    for (const std::uint32_t e : back_) {
-      if (const Status status = take(e); !status.ok()) return status;
-    }
-    back_.clear();
-    return okStatus();
-  }
-
-  [[nodiscard]] const std::vector<Pose>& poses() const { return optimizer_->graph().poses; }
-
- private:
-  /// A loop and the solution, round.
-  struct Cycle {
-    ChainedLoop<Pose> chained;
-    PoseVector<Pose> error;
-
-    Cycle(const OdometryChain<Pose>& chain, const PoseGraph<Pose>& solved, const RelativePose<Pose>& loop)
-        : chained(chainLoop(chain, loop)) {
-      const Pose Z = chain.pose(chained.from).inverse() * chained.T_chain_loop;
-      error = poseLog(Z.inverse() * (solved.poses[chained.from].inverse() * solved.poses[chained.to]));
-    }
-  };
-
-  /// Which open loops fit, and not by chance: to back_.
-  Status findFits(std::vector<OpenLoop>& open, bool own_covariance) {
-    std::vector<double> log_chances;
-    std::uint32_t asked = 0;
-    for (OpenLoop& loop : open) {
-      const Cycle cycle(chain_, optimizer_->graph(), whole_.edges[loop.edge]);
-      CycleTest test;
-      double limit = settings_.graduated.max_chi_squared;
-      if (own_covariance) {
-        test = cycleTest<Pose>(cycle.chained.covariance, cycle.error);
-      } else if (asked < settings_.max_reconsidered && mayAgree(cycle)) {
-        ++asked;
-        limit = settings_.selection.gate_chi_squared;
-        PoseMatrix<Pose> known;
-        const Status status = optimizer_->relativeCovariance(cycle.chained.from, cycle.chained.to, known);
-        if (!status.ok()) return status;
-        test = cycleTest<Pose>(cycle.chained.covariance + known, cycle.error);
-      }
-      loop.log_chance =
-          test.chi_squared <= limit ? logChance<Pose>(test, chain_.logBox(cycle.chained.to)) : kNever;
-      if (loop.log_chance < kNever) log_chances.push_back(loop.log_chance);
-    }
-    const double limit = std::min(std::log(settings_.selection.max_gate_chance),
-                                  logDiscoveryLimit(settings_.max_false, loopsLeft(), log_chances));
-    for (OpenLoop& loop : open) {
-      loop.fits = loop.log_chance <= limit;
-      if (loop.fits) back_.push_back(loop.edge);
-    }
-    return okStatus();
-  }
-
-  /// Not in the solution, those that the odometry spoke against too: how well one agrees with it was seen
-  /// before.
-  [[nodiscard]] std::size_t loopsLeft() const {
-    return loops_ - static_cast<std::size_t>(std::count(taken_.weights.begin(), taken_.weights.end(), 1.0));
-  }
-
-  /// The solution knows the relative pose better than the odometry alone: what fails this would fail the
-  /// test.
-  [[nodiscard]] bool mayAgree(const Cycle& cycle) const {
-    const PoseMatrix<Pose> loose =
-        cycle.chained.covariance + chain_.covariance(cycle.chained.from, cycle.chained.to);
-    return cycleTest<Pose>(loose, cycle.error).chi_squared <= settings_.selection.gate_chi_squared;
-  }
-
-  Status take(std::uint32_t e) {
-    const auto found = std::find(taken_.edges.begin(), taken_.edges.end(), e);
-    if (found != taken_.edges.end()) {
-      taken_.weights[static_cast<std::size_t>(found - taken_.edges.begin())] = 1;
-      return okStatus();
-    }
-    taken_.edges.push_back(e);
-    taken_.numbers.push_back(static_cast<std::uint32_t>(optimizer_->graph().edges.size()));
-    taken_.weights.push_back(1);
-    return optimizer_->addEdge(whole_.edges[e]);
-  }
-
-  const RobustGraphSettings& settings_;
-  const OdometryChain<Pose>& chain_;
-  const PoseGraph<Pose>& whole_;
-  TakenLoops& taken_;
-  std::size_t loops_;
-  PoseGraph<Pose> part_;
-  std::unique_ptr<PoseGraphOptimizer<Pose>> optimizer_;
-  std::vector<std::uint32_t> back_;
-};
-
-/// Steps 3 to 5.
-template <typename Pose>
-Status solveTaken(const RobustGraphSettings& settings, std::span<const std::uint32_t> fixed,
-                  const OdometryChain<Pose>& chain, TakenLoops& taken, std::vector<OpenLoop>& open,
-                  PoseGraph<Pose>& graph, RobustGraphReport& report) {
-  std::stable_sort(open.begin(), open.end(),
-                   [](const OpenLoop& a, const OpenLoop& b) { return a.conflicts < b.conflicts; });
-  RobustSolution<Pose> solution(settings, chain, graph, taken, open.size(), report);
-  Status status = solution.solve(fixed, report);
-  if (status.ok() && settings.method != RobustMethod::kSelection) status = solution.graduate(report);
-  if (settings.method == RobustMethod::kSelectionAndGraduated) {
-    std::uint32_t count = 1;
-    for (int round = 0; round < kRounds && count > 0 && status.ok(); ++round) {
-      status = solution.takeBack(open, count);
-      if (status.ok() && count > 0) status = solution.graduate(report);
-    }
-  }
-  if (!status.ok()) return status;
-  for (std::size_t k = 0; k < taken.edges.size(); ++k) {
-    EdgeFate& fate = report.fates[taken.edges[k]];
-    if (taken.weights[k] == 1) {
-      ++report.kept;
-      fate = EdgeFate::kKept;
-    } else if (fate == EdgeFate::kKept) {
-      fate = EdgeFate::kAgainstSolution;
-    }
-  }
-  graph.poses = solution.poses();
-  return okStatus();
+PoseVector<Pose> cycleError(const OdometryChain<Pose>& chain, const ChainedLoop<Pose>& loop,
+                            const std::vector<Pose>& solved) {
+  const Pose Z = chain.pose(loop.from).inverse() * loop.T_chain_loop;
+  return poseLog(Z.inverse() * (solved[loop.from].inverse() * solved[loop.to]));
 }
 
 }  // namespace
@@ -317,89 +42,476 @@ RobustGraphSettings robustGraphSettings() {
   settings.selection = loopSelectionSettings<Pose>();
   settings.graduated.max_chi_squared = chiSquaredOfTail(PoseSpace<Pose>::kDof, kFitTail);
   settings.max_nodes = kNodes;
-  settings.max_candidates = kCandidates;
   settings.max_reconsidered = kReconsidered;
-  settings.max_false = kMaxFalse;
-  settings.effort.iterations = 100;
+  settings.effort.iterations = kSolutionIterations;
   return settings;
 }
 
 template <typename Pose>
-Status chainOdometry(const PoseGraph<Pose>& graph, OdometryChain<Pose>& chain,
-                     std::vector<bool>& is_odometry) {
-  std::vector<std::uint32_t> step(graph.poses.size(), kNone);  // edge to each pose from the one before
-  is_odometry.assign(graph.edges.size(), false);
-  for (const bool forward : {true, false}) {
-    for (std::uint32_t e = 0; e < graph.edges.size(); ++e) {
-      const auto& edge = graph.edges[e];
-      if (edge.from >= graph.poses.size() || edge.to >= graph.poses.size()) {
-        return {StatusCode::kInvalidInput, "an edge names a pose that is not there"};
-      }
-      const bool next = forward ? edge.to == edge.from + 1 : edge.from == edge.to + 1;
-      const std::uint32_t later = std::max(edge.from, edge.to);
-      if (next && step[later] == kNone) {
-        step[later] = e;
-        is_odometry[e] = true;
-      }
+RobustGraph<Pose>::RobustGraph(const RobustGraphLimits& limits, const RobustGraphSettings& settings)
+    : limits_(limits),
+      settings_(settings),
+      selection_({limits.poses, limits.loops}, settings.selection),
+      // Of a loop that gave way to another the edge stays, without weight, until the graph is built anew.
+      optimizer_({limits.poses, limits.poses + 2 * std::size_t{limits.loops}, 0}),
+      members_(limits.loops),
+      graduated_(settings.graduated),
+      set_(selection_.consistency().words()) {
+  step_edges_.reserve(limits.poses);
+  for (auto* list : {&weights_, &chi_squared_, &log_chances_}) list->reserve(limits.loops);
+  graduated_ids_.reserve(limits.loops);
+  open_.reserve(limits.loops);
+  scratch_.poses.reserve(limits.poses);
+  scratch_.edges.reserve(limits.poses + limits.loops);
+}
+
+template <typename Pose>
+Status RobustGraph<Pose>::beginComponent(const Pose& T_map_body) {
+  if (size() == limits_.poses) return {StatusCode::kCapacityReached, "the graph has no room for a pose"};
+  Status status = optimizer_.addPose(T_map_body);
+  if (status.ok()) status = selection_.odometry().beginComponent();
+  if (status.ok()) step_edges_.push_back(kNoEdge);
+  return status;
+}
+
+template <typename Pose>
+Status RobustGraph<Pose>::addPose(const RelativePose<Pose>& odometry) {
+  const std::uint32_t k = size();
+  if (k == limits_.poses) return {StatusCode::kCapacityReached, "the graph has no room for a pose"};
+  const bool forward = odometry.to == k && odometry.from + 1 == k;
+  if (!forward && !(odometry.from == k && odometry.to + 1 == k)) {
+    return {StatusCode::kInvalidInput, "odometry that does not join the next pose to the last"};
+  }
+  Pose T_previous_this = odometry.T_from_to;
+  PoseMatrix<Pose> covariance = covarianceFromInformation(odometry.information);
+  if (!forward) {
+    // Z Exp(zeta) inverted is Z^-1 Exp(-Ad(Z) zeta).
+    const PoseMatrix<Pose> adjoint = poseAdjoint(odometry.T_from_to);
+    covariance = (adjoint * covariance * adjoint.transpose()).eval();
+    T_previous_this = odometry.T_from_to.inverse();
+  }
+  Status status = selection_.odometry().append(T_previous_this, covariance);
+  if (status.ok()) status = optimizer_.addPose(pose(k - 1) * T_previous_this);
+  if (!status.ok()) return status;
+  step_edges_.push_back(static_cast<std::uint32_t>(graph().edges.size()));
+  return optimizer_.addEdge(odometry);
+}
+
+template <typename Pose>
+Status RobustGraph<Pose>::addLoop(const RelativePose<Pose>& loop, std::uint32_t& id) {
+  const Status status = selection_.addLoop(loop, settings_.max_nodes, id);
+  if (!status.ok()) return status;
+  forget(id);
+  follow();
+  return okStatus();
+}
+
+template <typename Pose>
+void RobustGraph<Pose>::search() {
+  selection_.search(settings_.max_nodes);
+  follow();
+}
+
+template <typename Pose>
+Status RobustGraph<Pose>::release(std::uint32_t id) {
+  const Status status = selection_.release(id);
+  if (status.ok()) follow();
+  return status;
+}
+
+/// Poses and odometry to scratch_; a pose left out is bridged by the product of its two steps.
+template <typename Pose>
+void RobustGraph<Pose>::gather(std::uint32_t left_out) {
+  const OdometryChain<Pose>& chain = odometry();
+  scratch_.poses.assign(graph().poses.begin(), graph().poses.end());
+  scratch_.edges.clear();
+  if (left_out != kNoPose) scratch_.poses.erase(scratch_.poses.begin() + left_out);
+  for (std::uint32_t k = 1; k < size(); ++k) {
+    const bool bridges = k == left_out + 1;
+    if (k == left_out || !linked(k) || (bridges && !linked(left_out))) continue;
+    RelativePose<Pose> edge = graph().edges[step_edges_[k]];
+    if (bridges) {
+      edge.from = k - 2;
+      edge.to = k;
+      edge.T_from_to = chain.relative(k - 2, k);
+      edge.information = informationFromCovariance<PoseMatrix<Pose>>(chain.covariance(k - 2, k));
+    }
+    edge.from -= edge.from > left_out ? 1 : 0;
+    edge.to -= edge.to > left_out ? 1 : 0;
+    scratch_.edges.push_back(edge);
+  }
+}
+
+/// The optimizer's graph from what gather() found and the loops that take part.
+template <typename Pose>
+Status RobustGraph<Pose>::assemble() {
+  step_edges_.assign(scratch_.poses.size(), kNoEdge);
+  for (std::uint32_t e = 0; e < scratch_.edges.size(); ++e) {
+    step_edges_[std::max(scratch_.edges[e].from, scratch_.edges[e].to)] = e;
+  }
+  for (std::uint32_t id = 0; id < loops(); ++id) {
+    Member& member = members_[id];
+    if (selection_.verdict(id) == LoopVerdict::kReleased) member = Member{};
+    member.edge = member.taken ? static_cast<std::uint32_t>(scratch_.edges.size()) : kNoEdge;
+    if (member.taken) scratch_.edges.push_back(loop(id));
+  }
+  const Status status = optimizer_.assign(scratch_);
+  for (std::uint32_t id = 0; id < loops(); ++id) setWeight(id, members_[id].weight);
+  for (std::size_t k = 0; phase_ == Phase::kGraduate && k < graduated_ids_.size(); ++k) {
+    setWeight(graduated_ids_[k], weights_[k]);
+  }
+  return status;
+}
+
+template <typename Pose>
+Status RobustGraph<Pose>::removePose(std::uint32_t pose, std::uint32_t onto) {
+  const bool known = pose + 1 < size() && onto < size();
+  if (!known || odometry().component(pose) != odometry().component(onto)) {
+    return {StatusCode::kInvalidInput, "no such pose to remove, or none beside it to carry its loops to"};
+  }
+  bool bent = false;
+  for (std::uint32_t id = 0; id < loops(); ++id) {
+    bent = bent || (believed(id) && (loop(id).from == pose || loop(id).to == pose));
+  }
+  gather(pose);
+  Status status = selection_.removePose(pose, onto);
+  if (status.ok()) status = assemble();
+  if (bent) restart(Phase::kSolve);
+  follow();
+  return status;
+}
+
+template <typename Pose>
+void RobustGraph<Pose>::setWeight(std::uint32_t id, double weight) {
+  if (members_[id].edge != kNoEdge) static_cast<void>(optimizer_.setWeight(members_[id].edge, weight));
+}
+
+/// The loop's place is another's now.
+template <typename Pose>
+void RobustGraph<Pose>::forget(std::uint32_t id) {
+  setWeight(id, 0);
+  if (believed(id)) restart(Phase::kSolve);
+  members_[id] = Member{};
+}
+
+template <typename Pose>
+Status RobustGraph<Pose>::take(std::uint32_t id) {
+  Member& member = members_[id];
+  member.taken = true;
+  member.weight = 1;
+  if (member.edge == kNoEdge && graph().edges.size() == limits_.poses + 2 * std::size_t{limits_.loops}) {
+    gather(kNoPose);
+    return assemble();
+  }
+  Status status;
+  if (member.edge == kNoEdge) {
+    member.edge = static_cast<std::uint32_t>(graph().edges.size());
+    status = optimizer_.addEdge(loop(id));
+  }
+  setWeight(id, 1);
+  return status;
+}
+
+/// Whatever was at work begins again with this, but for graduated weights, which come to their end first.
+template <typename Pose>
+void RobustGraph<Pose>::restart(Phase phase) {
+  if (phase_ == Phase::kGraduate) {
+    behind_ = true;
+    return;
+  }
+  // Asking follows solving.
+  if (phase == Phase::kAskOwn && (phase_ == Phase::kSolve || phase_ == Phase::kSolveAgain)) return;
+  phase_ = phase;
+  solve_iterations_ = 0;
+}
+
+/// What the selection says now is what takes part.
+template <typename Pose>
+void RobustGraph<Pose>::follow() {
+  bool changed = false;
+  for (std::uint32_t id = 0; id < loops(); ++id) {
+    Member& member = members_[id];
+    const LoopVerdict verdict = selection_.verdict(id);
+    if (verdict == LoopVerdict::kReleased) member.back = false;
+    const bool chosen = verdict == LoopVerdict::kSelected || member.back;
+    if (chosen == member.taken) continue;
+    if (phase_ == Phase::kGraduate && chosen) {
+      behind_ = true;  // takes part in the next
+      continue;
+    }
+    changed = changed || chosen || member.weight > 0;
+    if (chosen) {
+      static_cast<void>(take(id));  // refused only where the selection would have refused it
+    } else {
+      setWeight(id, 0);
+      member.taken = false;
+      member.weight = 0;
     }
   }
-  for (std::uint32_t k = 0; k < graph.poses.size(); ++k) {
+  countBelieved();
+  if (changed) {
+    restart(Phase::kSolve);
+  } else if (settings_.robust) {
+    restart(Phase::kAskOwn);
+  }
+}
+
+template <typename Pose>
+void RobustGraph<Pose>::countBelieved() {
+  believed_ = 0;
+  for (std::uint32_t id = 0; id < loops(); ++id) believed_ += believed(id) ? 1 : 0;
+}
+
+template <typename Pose>
+Status RobustGraph<Pose>::settle(int iterations, bool& moved) {
+  moved = false;
+  while (phase_ != Phase::kRest && iterations > 0) {
     Status status;
-    if (step[k] == kNone) {
-      status = chain.beginComponent();
-    } else {
-      const auto& edge = graph.edges[step[k]];
-      PoseMatrix<Pose> covariance = covarianceFromInformation(edge.information);
-      if (edge.to == k) {
-        status = chain.append(edge.T_from_to, covariance);
-      } else {
-        // Z Exp(zeta) inverted is Z^-1 Exp(-Ad(Z) zeta).
-        const PoseMatrix<Pose> adjoint = poseAdjoint(edge.T_from_to);
-        covariance = (adjoint * covariance * adjoint.transpose()).eval();
-        status = chain.append(edge.T_from_to.inverse(), covariance);
-      }
+    switch (phase_) {
+      case Phase::kSolve:
+      case Phase::kSolveAgain:
+        status = solve(iterations);
+        moved = true;
+        break;
+      case Phase::kGraduate:
+        status = graduate(iterations);
+        moved = true;
+        break;
+      case Phase::kAskOwn:
+        askOwn();
+        --iterations;
+        break;
+      case Phase::kAskCovariance:
+        askNext(iterations);
+        break;
+      case Phase::kRest:
+        break;
     }
-    if (!status.ok()) return status;
+    if (!status.ok()) {
+      phase_ = Phase::kRest;
+      return status;
+    }
   }
   return okStatus();
 }
 
 template <typename Pose>
-Status solveRobustly(const RobustGraphSettings& settings, std::span<const std::uint32_t> fixed,
-                     PoseGraph<Pose>& graph, RobustGraphReport& report) {
-  report = {};
-  OdometryChain<Pose> chain(static_cast<std::uint32_t>(graph.poses.size()));
-  std::vector<bool> is_odometry;
-  if (const Status status = chainOdometry(graph, chain, is_odometry); !status.ok()) return status;
-  report.components = chain.components();
-  for (const bool odometry : is_odometry) {
-    report.fates.push_back(odometry ? EdgeFate::kOdometry : EdgeFate::kAgainstOdometry);
-    report.loops += odometry ? 0U : 1U;
-  }
-  TakenLoops taken;
-  std::vector<OpenLoop> open;
-  if (settings.method == RobustMethod::kGraduated) {
-    for (std::uint32_t e = 0; e < graph.edges.size(); ++e) {
-      if (is_odometry[e]) continue;
-      report.fates[e] = EdgeFate::kKept;
-      taken.edges.push_back(e);
-      taken.weights.push_back(1);
-    }
-    report.selected = report.loops;
+Status RobustGraph<Pose>::solve(int& iterations) {
+  OptimizeEffort effort = settings_.effort;
+  effort.iterations = std::min(iterations, effort.iterations - solve_iterations_);
+  ++counters_.optimizations;
+  const Status status = optimizer_.optimize(effort, solution_);
+  if (!status.ok()) return status;
+  iterations -= std::max(1, solution_.iterations);
+  solve_iterations_ += solution_.iterations;
+  if (!solution_.converged && solve_iterations_ < settings_.effort.iterations) return status;
+  if (!settings_.robust) {
+    phase_ = Phase::kRest;
+  } else if (phase_ == Phase::kSolve) {
+    beginGraduated();
   } else {
-    const Status status = selectLoops(settings, chain, graph, taken, open, report);
-    if (!status.ok()) return status;
+    phase_ = Phase::kAskOwn;
   }
-  return solveTaken(settings, fixed, chain, taken, open, graph, report);
+  return status;
+}
+
+template <typename Pose>
+void RobustGraph<Pose>::fits() {
+  for (std::size_t k = 0; k < graduated_ids_.size(); ++k) {
+    const RelativePose<Pose>& edge = loop(graduated_ids_[k]);
+    // One given up meanwhile takes no part.
+    chi_squared_[k] =
+        members_[graduated_ids_[k]].taken ? 2 * edgeCost(edge, pose(edge.from), pose(edge.to)) : kNever;
+  }
+}
+
+/// 4 begins at a solution; where all loops fit it is its end as well.
+template <typename Pose>
+void RobustGraph<Pose>::beginGraduated() {
+  graduated_ids_.clear();
+  weights_.clear();
+  for (std::uint32_t id = 0; id < loops(); ++id) {
+    if (!members_[id].taken) continue;
+    graduated_ids_.push_back(id);
+    weights_.push_back(members_[id].weight);
+  }
+  chi_squared_.resize(weights_.size());
+  graduated_.begin();
+  phase_ = Phase::kGraduate;
+  weighNext();
+}
+
+template <typename Pose>
+void RobustGraph<Pose>::weighNext() {
+  fits();
+  const bool more = graduated_.next(chi_squared_, weights_);
+  for (std::size_t k = 0; k < weights_.size(); ++k) setWeight(graduated_ids_[k], weights_[k]);
+  if (!more) endGraduated();
+}
+
+template <typename Pose>
+Status RobustGraph<Pose>::graduate(int& iterations) {
+  OptimizeEffort effort = settings_.effort;
+  effort.iterations = std::min(iterations, kGraduatedIterations);
+  effort.tolerance = kGraduatedTolerance;
+  ++counters_.optimizations;
+  ++counters_.graduated_solutions;
+  const Status status = optimizer_.optimize(effort, solution_);
+  if (!status.ok()) return status;
+  iterations -= std::max(1, solution_.iterations);
+  weighNext();
+  return status;
+}
+
+template <typename Pose>
+void RobustGraph<Pose>::endGraduated() {
+  for (std::size_t k = 0; k < weights_.size(); ++k) members_[graduated_ids_[k]].weight = weights_[k];
+  dropThinTies();
+  countBelieved();
+  phase_ = graduated_.report().solutions > 1 ? Phase::kSolveAgain : Phase::kAskOwn;
+  solve_iterations_ = 0;
+  if (!behind_) return;
+  behind_ = false;
+  phase_ = Phase::kSolve;
+  follow();
+}
+
+/// Between two components a loop or two fit whatever they say.
+template <typename Pose>
+void RobustGraph<Pose>::dropThinTies() {
+  const auto ends = [&](std::uint32_t id) {
+    const ChainedLoop<Pose>& chained = selection_.chained(id);
+    return std::pair(chained.from_component, chained.to_component);
+  };
+  for (const std::uint32_t a : graduated_ids_) {
+    if (!believed(a) || ends(a).first == ends(a).second) continue;
+    const auto same = [&](std::uint32_t b) { return believed(b) && ends(a) == ends(b); };
+    const auto ties = std::count_if(graduated_ids_.begin(), graduated_ids_.end(), same);
+    if (ties >= settings_.selection.min_between) continue;
+    for (const std::uint32_t b : graduated_ids_) {
+      if (!same(b)) continue;
+      members_[b].weight = 0;
+      setWeight(b, 0);
+    }
+  }
+}
+
+/// Loops that do not take part, and may: those between two components have no cycle of their own.
+template <typename Pose>
+bool RobustGraph<Pose>::isOpen(std::uint32_t id) const {
+  return !members_[id].taken && selection_.verdict(id) != LoopVerdict::kReleased &&
+         selection_.chained(id).withinComponent();
+}
+
+/// Those that fit with their own covariance first: they bend the solution least, and it knows more then.
+template <typename Pose>
+void RobustGraph<Pose>::askOwn() {
+  open_.clear();
+  for (std::uint32_t id = 0; id < loops(); ++id) {
+    if (!isOpen(id)) continue;
+    const ChainedLoop<Pose>& chained = selection_.chained(id);
+    const CycleTest test =
+        cycleTest<Pose>(chained.covariance, cycleError(odometry(), chained, graph().poses));
+    const bool fit = test.chi_squared <= settings_.graduated.max_chi_squared;
+    open_.push_back({id, 0, fit ? logChance<Pose>(test, odometry().logBox(chained.to)) : kNever});
+  }
+  counters_.reconsidered += open_.size();
+  if (believeFits()) return;
+  phase_ = open_.empty() ? Phase::kRest : Phase::kAskCovariance;
+  orderOpen();
+}
+
+/// Those first that contradict fewest of the sets.
+template <typename Pose>
+void RobustGraph<Pose>::orderOpen() {
+  std::fill(set_.begin(), set_.end(), 0);
+  for (std::uint32_t id = 0; id < loops(); ++id) {
+    const LoopVerdict verdict = selection_.verdict(id);
+    if (verdict == LoopVerdict::kSelected || verdict == LoopVerdict::kUnsupported) setBit(set_, id);
+  }
+  const std::uint32_t size = countBits(set_);
+  for (OpenLoop& open : open_) {
+    open.conflicts = size - countBoth(selection_.consistency().row(open.id), set_);
+    open.log_chance = kNever;
+  }
+  std::sort(open_.begin(), open_.end(), [](const OpenLoop& a, const OpenLoop& b) {
+    return std::pair(a.conflicts, a.id) < std::pair(b.conflicts, b.id);
+  });
+  next_open_ = 0;
+  covariances_ = 0;
+}
+
+/// Up to the next loop that a covariance must be asked for.
+template <typename Pose>
+void RobustGraph<Pose>::askNext(int& iterations) {
+  const double limit = settings_.selection.gate_chi_squared;
+  while (next_open_ < open_.size() && covariances_ < settings_.max_reconsidered) {
+    OpenLoop& open = open_[next_open_++];
+    if (!isOpen(open.id)) continue;
+    const ChainedLoop<Pose>& chained = selection_.chained(open.id);
+    const PoseVector<Pose> error = cycleError(odometry(), chained, graph().poses);
+    // The solution knows the relative pose better than the odometry alone: what fails this would fail the
+    // test.
+    const PoseMatrix<Pose> loose = chained.covariance + odometry().covariance(chained.from, chained.to);
+    if (!(cycleTest<Pose>(loose, error).chi_squared <= limit)) continue;
+    ++covariances_;
+    --iterations;
+    PoseMatrix<Pose> known;
+    if (!optimizer_.relativeCovariance(chained.from, chained.to, known).ok()) continue;
+    const CycleTest test = cycleTest<Pose>(chained.covariance + known, error);
+    if (test.chi_squared <= limit) open.log_chance = logChance<Pose>(test, odometry().logBox(chained.to));
+    return;
+  }
+  if (!believeFits()) phase_ = Phase::kRest;
+}
+
+/// Of the open loops those that fit, and not by chance, come back. True where there are such.
+template <typename Pose>
+bool RobustGraph<Pose>::believeFits() {
+  log_chances_.clear();
+  for (const OpenLoop& open : open_) {
+    if (open.log_chance < kNever) log_chances_.push_back(open.log_chance);
+  }
+  // Those that the odometry spoke against count too: how well one agrees with it was seen before.
+  std::size_t left = 0;
+  for (std::uint32_t id = 0; id < loops(); ++id) {
+    left += !believed(id) && selection_.verdict(id) != LoopVerdict::kReleased ? 1 : 0;
+  }
+  const double limit = std::min(std::log(settings_.selection.max_gate_chance),
+                                logDiscoveryLimit(settings_.selection.max_false, left, log_chances_));
+  std::uint32_t count = 0;
+  // Added only now: a new edge would cost a new factor for the next covariance.
+  for (const OpenLoop& open : open_) {
+    if (!(open.log_chance <= limit) || !isOpen(open.id)) continue;
+    members_[open.id].back = take(open.id).ok();
+    ++count;
+  }
+  counters_.taken_back += count;
+  if (count == 0) return false;
+  countBelieved();
+  phase_ = Phase::kSolve;
+  solve_iterations_ = 0;
+  return true;
+}
+
+template <typename Pose>
+LoopVerdict RobustGraph<Pose>::verdict(std::uint32_t id) const {
+  const Member& member = members_[id];
+  if (member.weight == 1) return LoopVerdict::kSelected;
+  if (member.taken) return LoopVerdict::kAgainstSolution;
+  const LoopVerdict verdict = selection_.verdict(id);
+  return verdict == LoopVerdict::kSelected ? LoopVerdict::kUnsupported : verdict;
+}
+
+template <typename Pose>
+std::optional<double> RobustGraph<Pose>::weight(std::uint32_t id) const {
+  if (members_[id].edge == kNoEdge) return std::nullopt;
+  return optimizer_.weight(members_[id].edge);
 }
 
 template RobustGraphSettings robustGraphSettings<SE2>();
 template RobustGraphSettings robustGraphSettings<SE3>();
-template Status chainOdometry(const PoseGraph<SE2>&, OdometryChain<SE2>&, std::vector<bool>&);
-template Status chainOdometry(const PoseGraph<SE3>&, OdometryChain<SE3>&, std::vector<bool>&);
-template Status solveRobustly(const RobustGraphSettings&, std::span<const std::uint32_t>, PoseGraph<SE2>&,
-                              RobustGraphReport&);
-template Status solveRobustly(const RobustGraphSettings&, std::span<const std::uint32_t>, PoseGraph<SE3>&,
-                              RobustGraphReport&);
+template class RobustGraph<SE2>;
+template class RobustGraph<SE3>;
 
 }  // namespace swiftlet

@@ -168,14 +168,14 @@ TEST_CASE("--robust leaves false loops out, says which, and writes the graph wit
   const auto figures = nlohmann::json::parse(textOf(json));
   CHECK(figures["edges"] == 179);
   CHECK(figures["robust"]["loops"] == 100);
-  CHECK(figures["robust"]["own"]["kept"] == 40);
+  CHECK(figures["robust"]["own"]["selected"] == 40);
   CHECK(figures["robust"]["own"]["rejected"] == 0);
   CHECK(figures["robust"]["injected"]["rejected"] == 60);
   // Every loop with its ids; those of the file that are not kept are those that are not written.
   std::istringstream lines(textOf(csv));
   std::string line;
   std::getline(lines, line);
-  CHECK(line == "edge,from_id,to_id,fate,injected");
+  CHECK(line == "edge,from_id,to_id,verdict,injected");
   int injected = 0;
   int kept = 0;
   for (int count = 0; std::getline(lines, line); ++count) {

@@ -31,7 +31,7 @@
 #include "estimator/geometry/alignment.hpp"
 #include "firmware_host/lab/modules/g2o_file.hpp"
 #include "mapping/pose_graph/outlier_injection.hpp"
-#include "mapping/pose_graph/robust_graph.hpp"
+#include "mapping/pose_graph/robust_solution.hpp"
 #include "tests/mapping/graph_data.hpp"
 #include "tests/support/cpu_time.hpp"
 
@@ -50,7 +50,7 @@ struct Options {
   std::vector<double> shares{10, 30, 50, 70, 90};
   std::vector<std::uint64_t> seeds{1, 2, 3};
   std::uint32_t group = 1;
-  std::size_t alone = 0;
+  bool flown = false;
   bool all = false;
   double max_false = 0;
   std::string csv;
@@ -120,6 +120,49 @@ std::vector<Pose> optimum(const PoseGraph<Pose>& graph, double& cost) {
   return optimizer.graph().poses;
 }
 
+template <typename Pose>
+OdometryChain<Pose> chainOf(const PoseGraph<Pose>& graph) {
+  const std::vector<std::uint32_t> steps = odometryEdges(graph);
+  RobustGraph<Pose> robust({static_cast<std::uint32_t>(graph.poses.size()), 0}, robustGraphSettings<Pose>());
+  while (robust.size() < graph.poses.size() && addNextPose(graph, steps, robust).ok()) {
+  }
+  return robust.odometry();
+}
+
+/// What a flight's map does (mapping/loop): a loop is asked when its later pose is there.
+template <typename Pose>
+Status solveAsFlown(const RobustGraphSettings& settings, PoseGraph<Pose>& graph, RobustSolution& solution) {
+  constexpr int kIterations = 3;  // as LoopEffort
+  const std::vector<std::uint32_t> steps = odometryEdges(graph);
+  solution.is_odometry.assign(graph.edges.size(), false);
+  std::vector<std::vector<std::uint32_t>> arriving(graph.poses.size());
+  for (const std::uint32_t e : steps) {
+    if (e != kNoStep) solution.is_odometry[e] = true;
+  }
+  for (std::uint32_t e = 0; e < graph.edges.size(); ++e) {
+    if (solution.is_odometry[e]) continue;
+    ++solution.loops;
+    arriving[std::max(graph.edges[e].from, graph.edges[e].to)].push_back(e);
+  }
+  RobustGraph<Pose> robust({static_cast<std::uint32_t>(graph.poses.size()), solution.loops}, settings);
+  std::vector<std::uint32_t> ids(graph.edges.size());
+  Status status;
+  bool moved = false;
+  for (std::size_t k = 0; k < graph.poses.size() && status.ok(); ++k) {
+    status = addNextPose(graph, steps, robust);
+    for (const std::uint32_t e : arriving[k]) {
+      if (status.ok()) status = robust.addLoop(graph.edges[e], ids[e]);
+    }
+    if (status.ok()) status = robust.settle(kIterations, moved);
+  }
+  if (status.ok()) status = robust.settle(std::numeric_limits<int>::max(), moved);
+  for (std::uint32_t e = 0; e < graph.edges.size(); ++e) {
+    solution.verdicts.push_back(solution.is_odometry[e] ? LoopVerdict::kSelected : robust.verdict(ids[e]));
+  }
+  graph.poses = robust.graph().poses;
+  return status;
+}
+
 /// The optimum's own error, by redrawing all measurements about it.
 template <typename Pose>
 double expectedError(const PoseGraph<Pose>& graph, const std::vector<Pose>& best) {
@@ -173,21 +216,24 @@ struct Case {
   }
 
   /// `loops`: where each loop and its fate is written; none where it is closed.
-  [[nodiscard]] Row run(const RobustGraphSettings& settings, const OutlierInjection& injection,
+  [[nodiscard]] Row run(const RobustGraphSettings& settings, bool flown, const OutlierInjection& injection,
                         const std::string& label, std::ofstream& loops_out) const {
     Row row;
     PoseGraph<Pose> spoiled = graph;
     if (injection.count > 0 && !injectOutliers(injection, spoiled).ok()) return row;
     row.true_loops = loops;
     row.false_loops = injection.count;
-    RobustGraphReport report;
+    RobustSolution report;
     Status status;
-    row.seconds = 1e-3 * timed([&] { status = solveRobustly(settings, {}, spoiled, report); });
+    row.seconds = 1e-3 * timed([&] {
+                    status = flown ? solveAsFlown(settings, spoiled, report)
+                                   : solveRobustly(settings, {}, spoiled, report);
+                  });
     row.solved = status.ok();
     if (!row.solved) return row;
     std::uint32_t kept = 0;
     for (std::size_t e = 0; e < spoiled.edges.size(); ++e) {
-      if (report.fates[e] != EdgeFate::kKept) continue;
+      if (report.is_odometry[e] || report.verdicts[e] != LoopVerdict::kSelected) continue;
       (e < graph.edges.size() ? kept : row.false_kept) += 1;
     }
     row.lost = 100.0 * (loops - kept) / loops;
@@ -199,13 +245,11 @@ struct Case {
     return row;
   }
 
-  void writeLoops(const PoseGraph<Pose>& spoiled, const RobustGraphReport& report, const std::string& label,
+  void writeLoops(const PoseGraph<Pose>& spoiled, const RobustSolution& report, const std::string& label,
                   std::ofstream& out) const {
-    OdometryChain<Pose> chain(static_cast<std::uint32_t>(graph.poses.size()));
-    std::vector<bool> ignored;
-    if (!chainOdometry(graph, chain, ignored).ok()) return;
+    const OdometryChain<Pose> chain = chainOf(graph);
     for (std::size_t e = 0; e < spoiled.edges.size(); ++e) {
-      if (report.fates[e] == EdgeFate::kOdometry) continue;
+      if (report.is_odometry[e]) continue;
       const auto& edge = spoiled.edges[e];
       const auto loop = chainLoop(chain, edge);
       if (!loop.withinComponent()) continue;
@@ -217,7 +261,7 @@ struct Case {
       const CycleTest own = cycleTest<Pose>(covarianceFromInformation(edge.information),
                                             poseLog(edge.T_from_to.inverse() * solved));
       out << label << ',' << e << ',' << edge.from << ',' << edge.to << ',' << (e >= graph.edges.size())
-          << ',' << static_cast<int>(report.fates[e]) << ','
+          << ',' << static_cast<int>(report.verdicts[e]) << ','
           << 2 * edgeCost(edge, best[edge.from], best[edge.to]) << ',' << gate.chi_squared << ','
           << log10_chance(gate) << ',' << own.chi_squared << ',' << log10_chance(own) << '\n';
     }
@@ -249,10 +293,15 @@ Row worse(Row a, const Row& b) {
 template <typename Pose>
 bool qualifies(const PoseGraph<Pose>& given, Case<Pose>& out, std::string& reason) {
   out.graph = given;
-  OdometryChain<Pose> chain(static_cast<std::uint32_t>(given.poses.size()));
-  if (!chainOdometry(given, chain, out.is_odometry).ok()) {
+  const OdometryChain<Pose> chain = chainOf(given);
+  if (chain.size() < given.poses.size()) {
     reason = "no odometry";
     return false;
+  }
+  const std::vector<std::uint32_t> steps = odometryEdges(given);
+  out.is_odometry.assign(given.edges.size(), false);
+  for (const std::uint32_t e : steps) {
+    if (e != kNoStep) out.is_odometry[e] = true;
   }
   std::uint32_t inside = 0;
   std::uint32_t inside_log = 0;
@@ -320,48 +369,30 @@ void runGraph(const G2oGraph& file, const GraphReference& named, const PoseGraph
         << ',' << row.ratio << ',' << row.own_ratio << ',' << row.seconds << std::endl;
   };
   RobustGraphSettings settings = robustGraphSettings<Pose>();
-  if (options.max_false > 0) settings.max_false = options.max_false;
-  RobustGraphSettings alone = settings;
-  alone.method = RobustMethod::kGraduated;
-  alone.max_factor_values = options.alone;
-  const Row clean = graph.run(settings, {}, named.name + ",0,0", loops);
+  if (options.max_false > 0) settings.selection.max_false = options.max_false;
+  const Row clean = graph.run(settings, options.flown, {}, named.name + ",0,0", loops);
   graph.clean_ratio = clean.ratio;
   std::printf("  %3.0f %%         %s\n", 0.0, describe(clean).c_str());
   std::fflush(stdout);
-  record("robust", 0, 0, clean);
+  record(options.flown ? "flown" : "at once", 0, 0, clean);
   for (const double share : options.shares) {
     Row worst;
-    Row worst_alone;
     for (std::size_t s = 0; s < options.seeds.size(); ++s) {
       const OutlierInjection injection{outlierCount(graph.loops, share / 100), options.seeds[s],
                                        options.group};
       std::ostringstream label;
       label << named.name << ',' << share << ',' << injection.seed;
-      const Row row = graph.run(settings, injection, label.str(), loops);
-      record("robust", share, injection.seed, row);
+      const Row row = graph.run(settings, options.flown, injection, label.str(), loops);
+      record(options.flown ? "flown" : "at once", share, injection.seed, row);
       std::printf("  %3.0f %% seed %-3llu %s\n", share, static_cast<unsigned long long>(options.seeds[s]),
                   describe(row).c_str());
       std::fflush(stdout);
       worst = s == 0 ? row : worse(worst, row);
-      if (options.alone == 0) continue;
-      std::ofstream none;
-      const Row other = graph.run(alone, injection, {}, none);
-      record("graduated", share, injection.seed, other);
-      std::printf("        graduated alone %s\n", describe(other).c_str());
-      std::fflush(stdout);
-      worst_alone = s == 0 ? other : worse(worst_alone, other);
     }
     char line[320];
-    int used =
-        std::snprintf(line, sizeof line, "| %s | %u | %u | %.0f | %.2f | %.2f | %.4f %s | %.3f (%.3f) |",
-                      named.name.c_str(), worst.true_loops, worst.false_loops, share, worst.rejected,
-                      worst.lost, worst.error, graph.has_truth ? "t" : "o", worst.ratio, worst.own_ratio);
-    if (options.alone > 0 && worst_alone.solved) {
-      std::snprintf(line + used, sizeof line - static_cast<std::size_t>(used), " %.2f, %.2f, %.3f |",
-                    worst_alone.rejected, worst_alone.lost, worst_alone.ratio);
-    } else {
-      std::snprintf(line + used, sizeof line - static_cast<std::size_t>(used), " - |");
-    }
+    std::snprintf(line, sizeof line, "| %s | %u | %u | %.0f | %.2f | %.2f | %.4f %s | %.3f (%.3f) |",
+                  named.name.c_str(), worst.true_loops, worst.false_loops, share, worst.rejected, worst.lost,
+                  worst.error, graph.has_truth ? "t" : "o", worst.ratio, worst.own_ratio);
     table.emplace_back(line);
   }
 }
@@ -384,8 +415,8 @@ int run(const Options& options) {
     }
   }
   std::puts("\nworst of the seeds:\n");
-  std::puts("| graph | true | false | share % | rejected % | lost % | error m | ratio | graduated alone |");
-  std::puts("|---|---|---|---|---|---|---|---|---|");
+  std::puts("| graph | true | false | share % | rejected % | lost % | error m | ratio |");
+  std::puts("|---|---|---|---|---|---|---|---|");
   for (const std::string& line : table) std::puts(line.c_str());
   return 0;
 }
@@ -400,8 +431,9 @@ int main(int argc, char** argv) {
   app.add_option("--shares", options.shares, "Percent of all loops")->delimiter(',')->capture_default_str();
   app.add_option("--seeds", options.seeds, "Of the injection")->delimiter(',')->capture_default_str();
   app.add_option("--group", options.group, "False loops that agree with each other")->capture_default_str();
-  app.add_option("--alone", options.alone, "Largest factor of graduated selection alone; 0: not run");
-  app.add_option("--max-false", options.max_false, "RobustGraphSettings::max_false; 0: as it is");
+  app.add_flag("--as-flown", options.flown,
+               "Poses and loops one by one, three iterations a pose, as in flight; else all loops at once");
+  app.add_option("--max-false", options.max_false, "LoopSelectionSettings::max_false; 0: as it is");
   app.add_option("--csv", options.csv, "A row a run is appended to this file");
   app.add_option("--loops", options.loops, "Every loop and its fate is appended to this file");
   app.add_flag("--all", options.all, "Graphs that do not qualify, too");

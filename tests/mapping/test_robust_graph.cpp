@@ -1,4 +1,4 @@
-#include "mapping/pose_graph/robust_graph.hpp"
+#include "mapping/pose_graph/robust_solution.hpp"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -49,7 +49,7 @@ struct Walk {
 TEMPLATE_TEST_CASE("A graph is solved as if its false loops were not there", "[pose_graph]", SE2, SE3) {
   const Walk<TestType> walk(5);
   PoseGraph<TestType> clean = walk.graph;
-  RobustGraphReport report;
+  RobustSolution report;
   REQUIRE(solveRobustly(robustGraphSettings<TestType>(), {}, clean, report).ok());
   CHECK(report.components == 1);
   CHECK(report.loops == kTrue);
@@ -59,15 +59,14 @@ TEMPLATE_TEST_CASE("A graph is solved as if its false loops were not there", "[p
   const std::size_t own = walk.graph.edges.size();
   const PoseGraph<TestType> given = spoiled;
   REQUIRE(solveRobustly(robustGraphSettings<TestType>(), {}, spoiled, report).ok());
-  REQUIRE(report.fates.size() == spoiled.edges.size());
+  REQUIRE(report.verdicts.size() == spoiled.edges.size());
   CHECK(report.loops == kTrue + 140);
   std::uint32_t lost = 0;
   std::uint32_t odometry = 0;
   for (std::size_t e = 0; e < spoiled.edges.size(); ++e) {
-    const EdgeFate fate = report.fates[e];
-    odometry += fate == EdgeFate::kOdometry ? 1U : 0U;
-    if (e >= own) CHECK(fate != EdgeFate::kKept);
-    if (e < own && fate != EdgeFate::kOdometry && fate != EdgeFate::kKept) ++lost;
+    odometry += report.is_odometry[e] ? 1U : 0U;
+    if (e >= own) CHECK(report.verdicts[e] != LoopVerdict::kSelected);
+    if (e < own && report.verdicts[e] != LoopVerdict::kSelected) ++lost;
   }
   CHECK(odometry == kPoses - 1);
   CHECK(lost <= 1);
@@ -75,9 +74,9 @@ TEMPLATE_TEST_CASE("A graph is solved as if its false loops were not there", "[p
   CHECK(walk.error(given) > 1.5 * walk.error(spoiled));
   // The same again, bit by bit.
   PoseGraph<TestType> again = given;
-  RobustGraphReport other;
+  RobustSolution other;
   REQUIRE(solveRobustly(robustGraphSettings<TestType>(), {}, again, other).ok());
-  CHECK(other.fates == report.fates);
+  CHECK(other.verdicts == report.verdicts);
   CHECK(again.poses.back().translation == spoiled.poses.back().translation);
 }
 
@@ -98,20 +97,20 @@ TEST_CASE("A loop that only the solved graph can vouch for comes back", "[pose_g
   const std::size_t alone = graph.edges.size();
   graph.edges.push_back(chain.loop(60, 110, noise, random));
   RobustGraphSettings settings = robustGraphSettings<SE2>();
-  RobustGraphReport report;
-  settings.method = RobustMethod::kSelection;
+  RobustSolution report;
+  settings.selection.max_false = 1e-9;  // nothing comes back
   PoseGraph<SE2> selected = graph;
   REQUIRE(solveRobustly(settings, {}, selected, report).ok());
-  CHECK(report.fates[alone] == EdgeFate::kUnsupported);
+  CHECK(report.verdicts[alone] == LoopVerdict::kUnsupported);
   // With loops on both its ends it is still not supported in pairs of its own stretch, but the graph knows
   // it.
   for (std::uint32_t k = 0; k < 12; ++k) {
     graph.edges.push_back(chain.loop(40 + k, 64 + k, noise, random));
     graph.edges.push_back(chain.loop(66 + k, 104 + k, noise, random));
   }
-  settings.method = RobustMethod::kSelectionAndGraduated;
-  REQUIRE(solveRobustly(settings, {}, graph, report).ok());
-  CHECK(report.fates[alone] == EdgeFate::kKept);
+  REQUIRE(solveRobustly(robustGraphSettings<SE2>(), {}, graph, report).ok());
+  CHECK(report.verdicts[alone] == LoopVerdict::kSelected);
+  CHECK(report.counters.taken_back > 0);
 }
 
 TEST_CASE("Loops of which none is proven prove each other, a single one is not believed", "[pose_graph]") {
@@ -137,11 +136,11 @@ TEST_CASE("Loops of which none is proven prove each other, a single one is not b
       graph.edges.push_back(chain.loop(kPoses - 60 + k, kPoses - 45 + k, noise, random));
     }
     REQUIRE(injectOutliers({400, 5, 1}, graph).ok());
-    RobustGraphReport report;
+    RobustSolution report;
     REQUIRE(solveRobustly(settings, {}, graph, report).ok());
     const auto kept = [&](std::size_t from, std::size_t to) {
-      return std::count(report.fates.begin() + static_cast<std::ptrdiff_t>(from),
-                        report.fates.begin() + static_cast<std::ptrdiff_t>(to), EdgeFate::kKept);
+      return std::count(report.verdicts.begin() + static_cast<std::ptrdiff_t>(from),
+                        report.verdicts.begin() + static_cast<std::ptrdiff_t>(to), LoopVerdict::kSelected);
     };
     CHECK(kept(first + loops, graph.edges.size()) == 0);
     if (loops == 1) {
@@ -165,35 +164,107 @@ TEST_CASE("Odometry is found turned round, broken and doubled", "[pose_graph]") 
   turn(edges[10]);
   edges.push_back(edges[20]);
   edges[100].from = 0;  // 100 -> 101 is no more: a loop in its place, a false one
-  OdometryChain<SE2> chain(kPoses);
-  std::vector<bool> is_odometry;
-  REQUIRE(chainOdometry(walk.graph, chain, is_odometry).ok());
+  const std::vector<std::uint32_t> steps = odometryEdges(walk.graph);
+  CHECK(steps[0] == kNoStep);
+  CHECK(steps[11] == 10);
+  CHECK(steps[21] == 20);
+  CHECK(steps[101] == kNoStep);
+  RobustGraph<SE2> robust({kPoses, 0}, robustGraphSettings<SE2>());
+  for (std::uint32_t k = 0; k < kPoses; ++k) REQUIRE(addNextPose(walk.graph, steps, robust).ok());
+  const OdometryChain<SE2>& chain = robust.odometry();
   CHECK(chain.components() == 2);
-  CHECK(is_odometry[10]);
-  CHECK(is_odometry[20]);
-  CHECK_FALSE(is_odometry[100]);
-  CHECK_FALSE(is_odometry.back());
   CHECK((chain.pose(50).translation - walk.chain.odometry.pose(50).translation).norm() < 1e-9);
   CHECK((chain.cumulated(50) - walk.chain.odometry.cumulated(50)).norm() <
         1e-9 * walk.chain.odometry.cumulated(50).norm());
-  RobustGraphReport report;
+  RobustSolution report;
   REQUIRE(solveRobustly(robustGraphSettings<SE2>(), {}, walk.graph, report).ok());
   CHECK(report.components == 2);
-  CHECK(report.fates[100] != EdgeFate::kKept);
-  CHECK(report.fates.back() == EdgeFate::kKept);
+  CHECK(report.verdicts[100] != LoopVerdict::kSelected);
+  CHECK(report.verdicts.back() == LoopVerdict::kSelected);
 }
 
-TEST_CASE("More loops than can be compared, and edges to nowhere, are refused and change nothing",
-          "[pose_graph]") {
+TEST_CASE("Edges to nowhere are refused and change nothing", "[pose_graph]") {
   Walk<SE2> walk(7);
-  RobustGraphSettings settings = robustGraphSettings<SE2>();
-  settings.max_candidates = 10;
-  RobustGraphReport report;
+  RobustSolution report;
   const auto before = walk.graph.poses;
-  CHECK(solveRobustly(settings, {}, walk.graph, report).code == StatusCode::kCapacityReached);
-  CHECK(walk.graph.poses.back().translation == before.back().translation);
   walk.graph.edges.back().to = kPoses;
   CHECK(solveRobustly(robustGraphSettings<SE2>(), {}, walk.graph, report).code == StatusCode::kInvalidInput);
+  CHECK(walk.graph.poses.back().translation == before.back().translation);
+}
+
+TEST_CASE("What pairs let in, graduated weights drop, in however small steps", "[pose_graph]") {
+  Walk<SE3> walk(6);
+  for (std::uint32_t k = 0; k < 12; ++k) walk.addLoop(20 + k, 150 + k);
+  const std::size_t own = walk.graph.edges.size();
+  PoseVector<SE3> off = PoseVector<SE3>::Zero();
+  for (std::uint32_t k = 0; k < 8; ++k) {
+    // Near enough to what the odometry says to pass its test, and each off another way.
+    walk.addLoop(20 + k, 150 + k);
+    off.tail<2>() << 0.25 * std::cos(2.4 * k), 0.25 * std::sin(2.4 * k);
+    walk.graph.edges.back().T_from_to = walk.graph.edges.back().T_from_to * poseExp(off);
+  }
+  RobustGraphSettings settings = robustGraphSettings<SE3>();
+  settings.selection.pairwise = false;
+  RobustSolution at_once;
+  PoseGraph<SE3> solved = walk.graph;
+  REQUIRE(solveRobustly(settings, {}, solved, at_once).ok());
+  CHECK(at_once.counters.graduated_solutions > 3);
+  std::uint32_t lost = 0;
+  for (std::size_t e = 0; e < walk.graph.edges.size(); ++e) {
+    if (e >= own) CHECK(at_once.verdicts[e] == LoopVerdict::kAgainstSolution);
+    lost += e < own && at_once.verdicts[e] != LoopVerdict::kSelected ? 1 : 0;
+  }
+  CHECK(lost <= 1);
+  RobustGraph<SE3> slow({kPoses, at_once.loops}, settings);
+  const std::vector<std::uint32_t> steps = odometryEdges(walk.graph);
+  for (std::uint32_t k = 0; k < kPoses; ++k) REQUIRE(addNextPose(walk.graph, steps, slow).ok());
+  std::vector<std::uint32_t> ids(walk.graph.edges.size());
+  bool moved = false;
+  for (std::size_t e = 0; e < walk.graph.edges.size(); ++e) {
+    if (at_once.is_odometry[e]) continue;
+    // The first false ones come while weights are at work.
+    REQUIRE(slow.addLoop(walk.graph.edges[e], ids[e]).ok());
+    REQUIRE(slow.settle(1, moved).ok());
+  }
+  for (int step = 0; step < 1000 && !slow.atRest(); ++step) REQUIRE(slow.settle(1, moved).ok());
+  REQUIRE(slow.atRest());
+  for (std::size_t e = 0; e < walk.graph.edges.size(); ++e) {
+    if (at_once.is_odometry[e]) continue;
+    CAPTURE(e, own);
+    CHECK(slow.verdict(ids[e]) == at_once.verdicts[e]);
+  }
+}
+
+TEMPLATE_TEST_CASE("Grown as in flight, in small steps, the graph believes the same loops", "[pose_graph]",
+                   SE2, SE3) {
+  Walk<TestType> walk(5);
+  REQUIRE(injectOutliers({60, 3, 1}, walk.graph).ok());
+  RobustSolution at_once;
+  PoseGraph<TestType> solved = walk.graph;
+  REQUIRE(solveRobustly(robustGraphSettings<TestType>(), {}, solved, at_once).ok());
+  RobustGraph<TestType> flown({kPoses, at_once.loops}, robustGraphSettings<TestType>());
+  const std::vector<std::uint32_t> steps = odometryEdges(walk.graph);
+  std::vector<std::uint32_t> ids(walk.graph.edges.size());
+  bool moved = false;
+  for (std::uint32_t k = 0; k < kPoses; ++k) {
+    REQUIRE(addNextPose(walk.graph, steps, flown).ok());
+    for (std::size_t e = 0; e < walk.graph.edges.size(); ++e) {
+      const auto& edge = walk.graph.edges[e];
+      if (at_once.is_odometry[e] || std::max(edge.from, edge.to) != k) continue;
+      REQUIRE(flown.addLoop(edge, ids[e]).ok());
+    }
+    REQUIRE(flown.settle(2, moved).ok());
+  }
+  for (int step = 0; step < 2000 && !flown.atRest(); ++step) REQUIRE(flown.settle(2, moved).ok());
+  REQUIRE(flown.atRest());
+  std::uint32_t differ = 0;
+  for (std::size_t e = 0; e < walk.graph.edges.size(); ++e) {
+    if (at_once.is_odometry[e]) continue;
+    differ += flown.believed(ids[e]) != (at_once.verdicts[e] == LoopVerdict::kSelected) ? 1U : 0U;
+  }
+  CHECK(differ <= 1);
+  PoseGraph<TestType> grown{flown.graph().poses, {}};
+  CHECK(walk.error(grown) == Approx(walk.error(solved)).epsilon(0.05));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/lab/modules/g2o_file.hpp"
+#include "firmware_host/outputs/run_folder/loops_csv.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"
 #include "mapping/pose_graph/outlier_injection.hpp"
 
@@ -43,13 +44,13 @@ Status solvePlainly(const PoseGraphRequest& request, const std::vector<std::uint
 
 template <typename Pose>
 void writeLoops(const PoseGraphRequest& request, const std::vector<std::int64_t>& ids,
-                const PoseGraph<Pose>& graph, std::size_t own_edges, const RobustGraphReport& report) {
+                const PoseGraph<Pose>& graph, std::size_t own_edges, const RobustSolution& solution) {
   std::ostringstream csv;
-  csv << "edge,from_id,to_id,fate,injected\n";
+  csv << "edge,from_id,to_id,verdict,injected\n";
   for (std::size_t e = 0; e < graph.edges.size(); ++e) {
-    if (report.fates[e] == EdgeFate::kOdometry) continue;
+    if (solution.is_odometry[e]) continue;
     csv << e << ',' << ids[graph.edges[e].from] << ',' << ids[graph.edges[e].to] << ','
-        << kFateNames[static_cast<std::size_t>(report.fates[e])] << ',' << (e >= own_edges ? 1 : 0) << '\n';
+        << verdictName(solution.verdicts[e]) << ',' << (e >= own_edges ? 1 : 0) << '\n';
   }
   writeWholeFile(request.loops, csv.str());
 }
@@ -67,9 +68,9 @@ Status solveWithoutFalse(const PoseGraphRequest& request, const G2oGraph& file, 
   if (!request.loops.empty()) writeLoops(request, file.ids, graph, own_edges, result.robust);
   std::vector<RelativePose<Pose>> left;
   for (std::size_t e = 0; e < graph.edges.size(); ++e) {
-    const EdgeFate fate = result.robust.fates[e];
-    (e < own_edges ? result.loops : result.false_loops).add(fate);
-    if (fate == EdgeFate::kOdometry || fate == EdgeFate::kKept) left.push_back(graph.edges[e]);
+    const LoopVerdict verdict = result.robust.verdicts[e];
+    if (!result.robust.is_odometry[e]) (e < own_edges ? result.loops : result.false_loops).add(verdict);
+    if (verdict == LoopVerdict::kSelected) left.push_back(graph.edges[e]);
   }
   graph.edges.swap(left);
   return status;
@@ -90,10 +91,11 @@ void solve(const PoseGraphRequest& request, const G2oGraph& file, PoseGraph<Pose
 }
 
 nlohmann::ordered_json toJson(const LoopCount& count) {
-  nlohmann::ordered_json json = {{"kept", count.of(EdgeFate::kKept)}, {"rejected", count.rejected()}};
-  for (const EdgeFate fate : {EdgeFate::kAgainstOdometry, EdgeFate::kInconsistent, EdgeFate::kUnsupported,
-                              EdgeFate::kAgainstSolution}) {
-    json[kFateNames[static_cast<std::size_t>(fate)]] = count.of(fate);
+  nlohmann::ordered_json json = {{"selected", count.of(LoopVerdict::kSelected)},
+                                 {"rejected", count.rejected()}};
+  for (const LoopVerdict verdict : {LoopVerdict::kAgainstOdometry, LoopVerdict::kInconsistent,
+                                    LoopVerdict::kUnsupported, LoopVerdict::kAgainstSolution}) {
+    json[verdictName(verdict)] = count.of(verdict);
   }
   return json;
 }

@@ -1,14 +1,15 @@
 #pragma once
 // `swiftlet pose-graph`: a g2o file optimized, and written again with the poses found; on request without its
-// false loops (mapping/pose_graph/robust_graph.hpp).
+// false loops (mapping/pose_graph/robust_solution.hpp).
 
 #include <array>
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <string>
 #include <vector>
 
-#include "mapping/pose_graph/robust_graph.hpp"
+#include "mapping/pose_graph/robust_solution.hpp"
 
 namespace swiftlet {
 
@@ -26,19 +27,16 @@ struct PoseGraphRequest {
   std::string loops;  ///< with `robust`: CSV of all loops and what became of them; empty: not written
 };
 
-/// "odometry", "kept" and the reasons why a loop is rejected; as EdgeFate.
-inline constexpr std::array kFateNames = {
-    "odometry", "kept", "against_odometry", "inconsistent", "against_solution", "unsupported"};
-
-/// What became of the loops of a graph: how many of each fate.
+/// What became of the loops of a graph: how many of each verdict.
 struct LoopCount {
-  std::array<std::uint32_t, kFateNames.size()> counts{};
+  std::array<std::uint32_t, kLoopVerdicts> counts{};
 
-  void add(EdgeFate fate) { ++counts[static_cast<std::size_t>(fate)]; }
-  [[nodiscard]] std::uint32_t of(EdgeFate fate) const { return counts[static_cast<std::size_t>(fate)]; }
+  void add(LoopVerdict verdict) { ++counts[static_cast<std::size_t>(verdict)]; }
+  [[nodiscard]] std::uint32_t of(LoopVerdict verdict) const {
+    return counts[static_cast<std::size_t>(verdict)];
+  }
   [[nodiscard]] std::uint32_t rejected() const {
-    return of(EdgeFate::kAgainstOdometry) + of(EdgeFate::kInconsistent) + of(EdgeFate::kUnsupported) +
-           of(EdgeFate::kAgainstSolution);
+    return std::accumulate(counts.begin(), counts.end(), 0U) - of(LoopVerdict::kSelected);
   }
 };
 
@@ -48,9 +46,9 @@ struct PoseGraphResult {
   std::size_t edges = 0;  ///< with the false loops, before any is rejected
   std::uint32_t pieces = 0;
   std::uint32_t outliers = 0;
-  RobustGraphReport robust;  ///< with `robust`
-  LoopCount loops;           ///< of the file
-  LoopCount false_loops;     ///< injected
+  RobustSolution robust;  ///< with `robust`
+  LoopCount loops;        ///< of the file
+  LoopCount false_loops;  ///< injected
   StartReport start;
   OptimizeReport solve;      ///< initial_cost: at the start that was chosen
   double seconds = 0;        ///< wall time of start and optimization, without files

@@ -11,9 +11,9 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::array<LoopVerdict, 5> kVerdicts = {LoopVerdict::kSelected, LoopVerdict::kAgainstOdometry,
-                                                  LoopVerdict::kInconsistent, LoopVerdict::kUnsupported,
-                                                  LoopVerdict::kReleased};
+constexpr std::array<LoopVerdict, kLoopVerdicts> kVerdicts = {
+    LoopVerdict::kSelected,    LoopVerdict::kAgainstOdometry, LoopVerdict::kInconsistent,
+    LoopVerdict::kUnsupported, LoopVerdict::kReleased,        LoopVerdict::kAgainstSolution};
 constexpr std::size_t kVerdictField = 2;
 constexpr std::size_t kFirstNumber = 3;
 constexpr std::size_t kLoopNumbers = 10;
@@ -32,6 +32,8 @@ std::string_view verdictName(LoopVerdict verdict) {
       return "unsupported";
     case LoopVerdict::kReleased:
       return "released";
+    case LoopVerdict::kAgainstSolution:
+      return "against_solution";
   }
   return "unknown";
 }
