@@ -66,9 +66,9 @@ Status LoopMap::add(const Node& node, const Link* link) {
     edge.to = edge.from + 1;
     edge.T_from_to = link->T_previous_this;
     edge.information = informationOf(link->covariance);
-    status = graph_.addPose(edge);
+    status = graph_.addPose(edge, node.tilt);
   } else {
-    status = graph_.beginComponent(node.T_world_body);
+    status = graph_.beginComponent(node.T_world_body, node.tilt);
   }
   if (status.ok()) nodes_.push_back(node);
   return status;

@@ -59,6 +59,7 @@ class LoopMap {
     std::uint32_t epoch = 0;
     std::uint32_t place = 0;  ///< the caller's
     SE3 T_world_body;         ///< as the odometry had it then
+    Tilt tilt;                ///< likewise; not known: no gravity factor
   };
   /// The odometry from the node before.
   struct Link {

@@ -72,7 +72,7 @@ Status LoopStage::step(const LoopInput& input, const LoopEffort& effort, LoopRep
   extendPending(input);
   Status status;
   if (movedEnough(pose.stamp)) {
-    status = addNode(pose);
+    status = addNode(*input.window);
     if (!status.ok()) {
       ++counters_.refused;
     } else if (describePlace(input)) {
@@ -135,7 +135,8 @@ bool LoopStage::movedEnough(Stamp now) const {
          (now - map_.node(map_.size() - 1).stamp).seconds() > kNodeSeconds;
 }
 
-Status LoopStage::addNode(const WindowPose& pose) {
+Status LoopStage::addNode(const SmoothedWindow& window) {
+  const WindowPose& pose = window.poses.back();
   LoopMap::Node left;
   if (map_.full() && map_.makeRoom(left) && place_.database().holds(left.place, left.frame, left.epoch)) {
     place_.forget(left.place);
@@ -146,6 +147,10 @@ Status LoopStage::addNode(const WindowPose& pose) {
   node.epoch = epoch_;
   node.place = PlaceDatabase::kNoSlot;
   node.T_world_body = pose.T_world_body;
+  if (window.started) {
+    node.tilt.up_body = pose.T_world_body.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+    node.tilt.covariance = window.newest.covariance.topLeftCorner<3, 3>();
+  }
   const LoopMap::Link link{pending_.T_node_this, pending_.covariance};
   const bool linked = pending_.linked;
   if (const Status status = map_.add(node, linked ? &link : nullptr); !status.ok()) return status;

@@ -117,7 +117,7 @@ class LoopStage {
   void bridge(const LoopInput& input);
   void appendLink(const SE3& T_previous_this, const Matrix6d& covariance);
   [[nodiscard]] bool movedEnough(Stamp now) const;
-  Status addNode(const WindowPose& pose);
+  Status addNode(const SmoothedWindow& window);
   [[nodiscard]] bool describePlace(const LoopInput& input);
   void moveToMiddleRow(const ScanMotion& motion);
   void closeLoops(const LoopEffort& effort, LoopReport& report);

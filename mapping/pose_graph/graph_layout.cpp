@@ -40,21 +40,26 @@ bool GraphLayout::append(const BlockPair& ends) {
 }
 
 void GraphLayout::arrange(std::size_t poses, std::span<const BlockPair> ends,
-                          const std::vector<bool>& given_held) {
+                          const std::vector<bool>& given_held, const std::vector<bool>& knows_vertical) {
   const std::vector<std::uint32_t> piece = graphPieces(poses, ends, pieces);
   std::vector<bool> has_held(pieces, false);
+  std::vector<bool> upright(pieces, false);
   for (std::size_t k = 0; k < poses; ++k) {
     if (given_held[k]) has_held[piece[k]] = true;
+    if (knows_vertical[k]) upright[piece[k]] = true;
   }
   unknown.assign(poses, kHeld);
   held.clear();
+  anchors.clear();
   unknowns = 0;
   for (std::uint32_t k = 0; k < poses; ++k) {
-    if (given_held[k] || !has_held[piece[k]]) {
-      has_held[piece[k]] = true;
+    const bool first = !has_held[piece[k]];
+    has_held[piece[k]] = true;
+    if (given_held[k] || (first && !upright[piece[k]])) {
       held.push_back(k);
     } else {
       unknown[k] = unknowns++;
+      if (first) anchors.push_back(k);
     }
   }
   // Edges sorted by their two unknowns: each run is one pair.

@@ -2,7 +2,8 @@
 // Which poses of a graph are unknowns, and which block of the normal equations each edge adds to.
 //
 // Poses that are held are no unknowns. A piece of the graph (poses joined by edges) in which no pose is held
-// is held by its first pose: its place among the other pieces is not determined.
+// is held by its first pose: its place among the other pieces is not determined. Where a pose of the piece
+// knows the vertical, the first is an unknown as the others, but an anchor: heading and position are held.
 
 #include <cstdint>
 #include <span>
@@ -22,15 +23,17 @@ struct GraphLayout {
   std::vector<BlockPair> pairs;          ///< of unknowns, first < second, rising
   std::uint32_t unknowns = 0;
   std::uint32_t pieces = 0;
-  std::vector<std::uint32_t> held;  ///< all held poses, given or chosen, rising
+  std::vector<std::uint32_t> held;     ///< all held poses, given or chosen, rising
+  std::vector<std::uint32_t> anchors;  ///< first poses of pieces that know the vertical, rising
   BlockStructure structure;
 
   /// Takes one more edge without arranging anew: true where both ends are unknowns that an edge joins
   /// already.
   bool append(const BlockPair& ends);
 
-  /// `ends`: (from, to) of each edge. `given_held`: one flag per pose.
-  void arrange(std::size_t poses, std::span<const BlockPair> ends, const std::vector<bool>& given_held);
+  /// `ends`: (from, to) of each edge. One flag per pose: `given_held`, and whether it knows the vertical.
+  void arrange(std::size_t poses, std::span<const BlockPair> ends, const std::vector<bool>& given_held,
+               const std::vector<bool>& knows_vertical);
 };
 
 /// The piece of each pose, numbered in the order of their first poses.

@@ -41,6 +41,12 @@ struct RelativePose {
   Information information = Information::Identity();  ///< (rotation, translation), 1/rad^2, 1/m^2
 };
 
+/// The vertical as a pose of space knows it (gravity_factor.hpp).
+struct GravityFactor {
+  Eigen::Vector3d up_body = Eigen::Vector3d::UnitZ();     ///< unit
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< 1/rad^2, in the body's axes; 0: no factor
+};
+
 template <typename Pose>
 struct PoseGraph {
   std::vector<Pose> poses;  ///< T_map_body

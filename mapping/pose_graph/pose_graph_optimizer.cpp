@@ -20,6 +20,13 @@ constexpr double kShrink = 0.5;                 // of the region after a step th
 constexpr double kGrow = 3;                     // and after a good one
 constexpr double kInformationAsymmetry = 1e-9;  // of the largest entry
 
+/// Of an anchor's own diagonal: it holds whatever the poses pull at.
+constexpr double kAnchorStiffness = 1e6;
+
+/// The map's vertical in the body's axes.
+Eigen::Vector3d upOf(const SE3& pose) { return pose.rotation.conjugate() * Eigen::Vector3d::UnitZ(); }
+Eigen::Vector3d upOf(const SE2& /*pose*/) { return Eigen::Vector3d::UnitZ(); }
+
 bool finite(const SE2& pose) { return std::isfinite(pose.angle) && pose.translation.allFinite(); }
 bool finite(const SE3& pose) { return pose.rotation.coeffs().allFinite() && pose.translation.allFinite(); }
 
@@ -31,6 +38,7 @@ PoseGraphOptimizer<Pose>::PoseGraphOptimizer(const PoseGraphLimits& limits) : li
   graph_.edges.reserve(limits.max_edges);
   weights_.reserve(limits.max_edges);
   held_.reserve(limits.max_poses);
+  gravity_.reserve(limits.max_poses);
   trial_.reserve(limits.max_poses);
   factor_.reserve(limits.max_factor_values);
 }
@@ -42,6 +50,7 @@ Status PoseGraphOptimizer<Pose>::addPose(const Pose& T_map_body) {
   if (!finite(T_map_body)) return {StatusCode::kInvalidInput, "a pose is not finite"};
   graph_.poses.push_back(T_map_body);
   held_.push_back(false);
+  gravity_.emplace_back();
   arranged_ = linear_at_poses_ = false;
   return okStatus();
 }
@@ -75,6 +84,7 @@ Status PoseGraphOptimizer<Pose>::assign(const PoseGraph<Pose>& graph) {
   graph_.edges.clear();
   weights_.clear();
   held_.clear();
+  gravity_.clear();
   radius_ = 0;
   for (const Pose& pose : graph.poses) {
     if (const Status status = addPose(pose); !status.ok()) return status;
@@ -104,6 +114,19 @@ Status PoseGraphOptimizer<Pose>::setWeight(std::size_t edge, double weight) {
 }
 
 template <typename Pose>
+Status PoseGraphOptimizer<Pose>::setGravity(std::size_t pose, const GravityFactor& factor) {
+  if (pose >= graph_.poses.size() || !factor.information.allFinite() || !factor.up_body.allFinite()) {
+    return {StatusCode::kInvalidInput, "no such pose, or a gravity factor that is not finite"};
+  }
+  if (kDof == 3) return okStatus();
+  const bool known = gravity_[pose].information.trace() > 0;
+  if (known != (factor.information.trace() > 0)) arranged_ = false;
+  linear_at_poses_ = false;
+  gravity_[pose] = factor;
+  return okStatus();
+}
+
+template <typename Pose>
 Status PoseGraphOptimizer<Pose>::setPose(std::size_t pose, const Pose& T_map_body) {
   if (pose >= graph_.poses.size() || !finite(T_map_body)) {
     return {StatusCode::kInvalidInput, "no such pose, or one that is not finite"};
@@ -128,6 +151,7 @@ Status PoseGraphOptimizer<Pose>::truncate(std::size_t poses, std::size_t edges) 
   graph_.edges.resize(edges);
   weights_.resize(edges);
   held_.resize(poses);
+  gravity_.resize(poses);
   arranged_ = linear_at_poses_ = false;
   return okStatus();
 }
@@ -139,7 +163,9 @@ Status PoseGraphOptimizer<Pose>::arrange() {
   std::vector<BlockPair> ends;
   ends.reserve(graph_.edges.size());
   for (const RelativePose<Pose>& edge : graph_.edges) ends.emplace_back(edge.from, edge.to);
-  layout_.arrange(graph_.poses.size(), ends, held_);
+  std::vector<bool> knows_vertical;
+  for (const GravityFactor& factor : gravity_) knows_vertical.push_back(factor.information.trace() > 0);
+  layout_.arrange(graph_.poses.size(), ends, held_, knows_vertical);
   const std::size_t needed = BlockCholesky<kDof>::values(layout_.structure);
   if (limits_.max_factor_values > 0 && needed > limits_.max_factor_values) {
     return {StatusCode::kCapacityReached, "the graph's factor needs more memory than was reserved"};
@@ -162,6 +188,11 @@ double PoseGraphOptimizer<Pose>::costAt(const std::vector<Pose>& poses) const {
     if (weights_[e] == 0) continue;
     const RelativePose<Pose>& edge = graph_.edges[e];
     cost += weights_[e] * edgeCost(edge, poses[edge.from], poses[edge.to]);
+  }
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    if (!(gravity_[k].information.trace() > 0)) continue;
+    const Eigen::Vector3d e = upOf(poses[k]).cross(gravity_[k].up_body);
+    cost += 0.5 * e.dot(gravity_[k].information * e);
   }
   return cost;
 }
@@ -199,6 +230,8 @@ void PoseGraphOptimizer<Pose>::linearize() {
       H_.pairs[pair] -= WA.transpose();
     }
   }
+  linearizeGravity();
+  anchor();
   scale_.resize(gradient_.size());
   double largest = 0;
   for (std::size_t k = 0; k < H_.diagonal.size(); ++k) {
@@ -209,6 +242,45 @@ void PoseGraphOptimizer<Pose>::linearize() {
   constexpr double kLeastScale = 1e-12;
   const double least = largest > 0 ? kLeastScale * largest : 1.0;
   scale_ = scale_.cwiseMax(least).cwiseSqrt();
+}
+
+template <typename Pose>
+void PoseGraphOptimizer<Pose>::linearizeGravity() {
+  for (std::size_t k = 0; k < graph_.poses.size(); ++k) {
+    const GravityFactor& factor = gravity_[k];
+    if (!(factor.information.trace() > 0)) continue;
+    const Eigen::Vector3d e = upOf(graph_.poses[k]).cross(factor.up_body);
+    cost_ += 0.5 * e.dot(factor.information * e);
+    if (layout_.unknown[k] == GraphLayout::kHeld) continue;
+    const Eigen::Matrix3d J = -hat(factor.up_body) * hat(upOf(graph_.poses[k]));
+    const Eigen::Matrix3d weighted = J.transpose() * factor.information;
+    H_.diagonal[layout_.unknown[k]].template topLeftCorner<3, 3>() += weighted * J;
+    gradient_.segment<3>(static_cast<Eigen::Index>(layout_.unknown[k]) * kDof) += weighted * e;
+  }
+}
+
+/// Heading and position of a whole piece cost nothing: what holds them at its first pose bears no load.
+template <typename Pose>
+void PoseGraphOptimizer<Pose>::anchor() {
+  for (const std::uint32_t k : layout_.anchors) {
+    auto& block = H_.diagonal[layout_.unknown[k]];
+    const Eigen::Vector3d up = upOf(graph_.poses[k]);
+    const double turn = kAnchorStiffness * block.template topLeftCorner<3, 3>().trace();
+    const double move = kAnchorStiffness * block.template bottomRightCorner<3, 3>().trace();
+    block.template topLeftCorner<3, 3>() += turn * up * up.transpose();
+    block.template bottomRightCorner<3, 3>().diagonal().array() += move;
+  }
+}
+
+/// Only the Gauss-Newton step knows of itself that anchors stay.
+template <typename Pose>
+void PoseGraphOptimizer<Pose>::stayAnchored(Eigen::VectorXd& step) const {
+  for (const std::uint32_t k : layout_.anchors) {
+    const Eigen::Vector3d up = upOf(graph_.poses[k]);
+    auto at = step.segment<kDof>(static_cast<Eigen::Index>(layout_.unknown[k]) * kDof);
+    at.template head<3>() -= up * up.dot(at.template head<3>());
+    at.template tail<3>().setZero();
+  }
 }
 
 template <typename Pose>
@@ -281,7 +353,8 @@ Status PoseGraphOptimizer<Pose>::iterate(const OptimizeEffort& effort, OptimizeR
   newton_ = -gradient_;
   factor_.solve(newton_);
   if (!newton_.allFinite()) return {StatusCode::kNumerical, "the normal equations' solution is not finite"};
-  const Eigen::VectorXd downhill = -gradient_.cwiseQuotient(scale_.cwiseAbs2());
+  Eigen::VectorXd downhill = -gradient_.cwiseQuotient(scale_.cwiseAbs2());
+  stayAnchored(downhill);
   const double slope = -gradient_.dot(downhill);
   const double curvature = downhill.dot(timesH(downhill));
   cauchy_ = curvature > 0 ? Eigen::VectorXd(slope / curvature * downhill) : newton_;
@@ -342,6 +415,7 @@ Status PoseGraphOptimizer<Pose>::start(StartReport& report) {
   if (report.given_cost <= kNothingToGain) return okStatus();
   if (const Status status = arrange(); !status.ok()) return status;
   std::vector<Pose> poses = graph_.poses;
+  if (!layout_.anchors.empty()) return okStatus();  // it needs a held pose in each piece
   ChordalStart<Pose> chordal;
   if (!chordal.run(graph_.edges, weights_, layout_, poses).ok()) return okStatus();
   report.chordal_cost = costAt(poses);

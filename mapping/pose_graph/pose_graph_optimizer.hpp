@@ -7,7 +7,8 @@
 // For use along a flight: keep one optimizer, add poses and edges, and call optimize() with what the time
 // allows; it goes on from the present poses, with the ordering and the memory of the last call while no new
 // pair of poses was joined. Frames: T_map_body. Held poses do not move: those given to hold(), and the first
-// pose of every piece of the graph without one. Weights multiply an edge's information: 0 leaves an edge out,
+// pose of every piece of the graph without one (of which only heading and position are held where a pose of
+// the piece knows the vertical). Weights multiply an edge's information: 0 leaves an edge out,
 // between 0 and 1 discounts it (graduated non-convexity). Errors: Status. Memory: poses and edges are
 // reserved at construction; the factor's numbers are reserved too where max_factor_values says how many, and
 // a graph whose factor needs more is refused. Ordering and analysis of a changed graph take scratch memory.
@@ -76,6 +77,8 @@ class PoseGraphOptimizer {
   /// kInvalidInput: no such pose or edge, or a weight below 0 or not finite.
   Status hold(std::size_t pose, bool held);
   Status setWeight(std::size_t edge, double weight);
+  /// What the pose knows of the vertical, in place of what it knew. In space; ignored in the plane.
+  Status setGravity(std::size_t pose, const GravityFactor& factor);
   Status setPose(std::size_t pose, const Pose& T_map_body);
   /// Leaves out all edges from number `edges` on, and poses from number `poses` on.
   Status truncate(std::size_t poses, std::size_t edges);
@@ -102,8 +105,11 @@ class PoseGraphOptimizer {
  private:
   Status arrange();
   void linearize();
+  void linearizeGravity();
+  void anchor();
   Status factorNormalEquations();
   Status iterate(const OptimizeEffort& effort, OptimizeReport& report, bool& done);
+  void stayAnchored(Eigen::VectorXd& step) const;
   void dogleg(Eigen::VectorXd& step) const;
   [[nodiscard]] double predictedDecrease(const Eigen::VectorXd& step) const;
   [[nodiscard]] Eigen::VectorXd timesH(const Eigen::VectorXd& x) const;
@@ -114,6 +120,7 @@ class PoseGraphOptimizer {
   PoseGraph<Pose> graph_;
   std::vector<double> weights_;
   std::vector<bool> held_;
+  std::vector<GravityFactor> gravity_;  ///< of each pose
   bool arranged_ = false;
   bool linear_at_poses_ = false;  ///< H and its factor, undamped, belong to the present poses and weights
   double radius_ = 0;             ///< of the trust region, scaled; 0: not known yet

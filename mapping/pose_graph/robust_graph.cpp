@@ -23,6 +23,9 @@ constexpr int kSolutionIterations = 100;
 constexpr int kGraduatedIterations = 5;
 constexpr double kGraduatedTolerance = 1e-4;
 
+/// Sigmas of its tilt that a pose may lean before the graph is solved for that alone.
+constexpr double kLeaning = 3;
+
 /// Logarithm of a chance that no limit reaches.
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
@@ -58,6 +61,7 @@ RobustGraph<Pose>::RobustGraph(const RobustGraphLimits& limits, const RobustGrap
       graduated_(settings.graduated),
       set_(selection_.consistency().words()) {
   step_edges_.reserve(limits.poses);
+  tilts_.reserve(limits.poses);
   for (auto* list : {&weights_, &chi_squared_, &log_chances_}) list->reserve(limits.loops);
   graduated_ids_.reserve(limits.loops);
   open_.reserve(limits.loops);
@@ -66,16 +70,18 @@ RobustGraph<Pose>::RobustGraph(const RobustGraphLimits& limits, const RobustGrap
 }
 
 template <typename Pose>
-Status RobustGraph<Pose>::beginComponent(const Pose& T_map_body) {
+Status RobustGraph<Pose>::beginComponent(const Pose& T_map_body, const Tilt& tilt) {
   if (size() == limits_.poses) return {StatusCode::kCapacityReached, "the graph has no room for a pose"};
   Status status = optimizer_.addPose(T_map_body);
   if (status.ok()) status = selection_.odometry().beginComponent();
-  if (status.ok()) step_edges_.push_back(kNoEdge);
-  return status;
+  if (!status.ok()) return status;
+  step_edges_.push_back(kNoEdge);
+  tilts_.push_back(tilt);
+  return setGravity(size() - 1);
 }
 
 template <typename Pose>
-Status RobustGraph<Pose>::addPose(const RelativePose<Pose>& odometry) {
+Status RobustGraph<Pose>::addPose(const RelativePose<Pose>& odometry, const Tilt& tilt) {
   const std::uint32_t k = size();
   if (k == limits_.poses) return {StatusCode::kCapacityReached, "the graph has no room for a pose"};
   const bool forward = odometry.to == k && odometry.from + 1 == k;
@@ -94,7 +100,33 @@ Status RobustGraph<Pose>::addPose(const RelativePose<Pose>& odometry) {
   if (status.ok()) status = optimizer_.addPose(pose(k - 1) * T_previous_this);
   if (!status.ok()) return status;
   step_edges_.push_back(static_cast<std::uint32_t>(graph().edges.size()));
-  return optimizer_.addEdge(odometry);
+  tilts_.push_back(tilt);
+  status = optimizer_.addEdge(odometry);
+  if (status.ok()) status = setGravity(k);
+  if (leans(k)) restart(Phase::kSolve);
+  return status;
+}
+
+/// Further from the vertical than its tilt allows.
+template <typename Pose>
+bool RobustGraph<Pose>::leans(std::uint32_t k) const {
+  if constexpr (PoseSpace<Pose>::kDof == 6) {
+    const GravityFactor alone = gravityFactor(tilts_[k]);
+    const Eigen::Vector3d e = (pose(k).rotation.conjugate() * Eigen::Vector3d::UnitZ()).cross(alone.up_body);
+    return e.dot(alone.information * e) > kLeaning * kLeaning;
+  }
+  return false;
+}
+
+template <typename Pose>
+Status RobustGraph<Pose>::setGravity(std::uint32_t k) {
+  if constexpr (PoseSpace<Pose>::kDof == 6) {
+    if (!linked(k)) return optimizer_.setGravity(k, gravityFactor(tilts_[k]));
+    const Eigen::Matrix3d Q = odometry().covariance(k - 1, k).template topLeftCorner<3, 3>();
+    const Eigen::Matrix3d R_previous_this = odometry().relative(k - 1, k).R();
+    return optimizer_.setGravity(k, gravityFactor(tilts_[k], tilts_[k - 1], R_previous_this, Q));
+  }
+  return okStatus();
 }
 
 template <typename Pose>
@@ -155,7 +187,8 @@ Status RobustGraph<Pose>::assemble() {
     member.edge = member.taken ? static_cast<std::uint32_t>(scratch_.edges.size()) : kNoEdge;
     if (member.taken) scratch_.edges.push_back(loop(id));
   }
-  const Status status = optimizer_.assign(scratch_);
+  Status status = optimizer_.assign(scratch_);
+  for (std::uint32_t k = 0; k < size() && status.ok(); ++k) status = setGravity(k);
   for (std::uint32_t id = 0; id < loops(); ++id) setWeight(id, members_[id].weight);
   for (std::size_t k = 0; phase_ == Phase::kGraduate && k < graduated_ids_.size(); ++k) {
     setWeight(graduated_ids_[k], weights_[k]);
@@ -174,6 +207,7 @@ Status RobustGraph<Pose>::removePose(std::uint32_t pose, std::uint32_t onto) {
     bent = bent || (believed(id) && (loop(id).from == pose || loop(id).to == pose));
   }
   gather(pose);
+  tilts_.erase(tilts_.begin() + pose);
   Status status = selection_.removePose(pose, onto);
   if (status.ok()) status = assemble();
   if (bent) restart(Phase::kSolve);

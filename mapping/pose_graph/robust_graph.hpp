@@ -19,6 +19,12 @@
 // settle() does 3 to 5 in bounded pieces, so that a flight can spread them over its steps; until it is at
 // rest the poses are those of the work in progress. A loop that arrives while 4 is at work waits for its end.
 //
+// Gravity. A pose may come with the odometry's tilt; what the accelerometer says of it is a factor of the
+// graph (gravity_factor.hpp), so that a loop cannot tilt the map beyond what the odometry knows. Of a piece
+// with such poses the first one is held in heading and position alone. A pose that arrives and leans against
+// its own tilt sets 3 to work also where there is no loop: an odometry that starts in the air finds the
+// vertical some seconds later.
+//
 // Frames: T_map_body; a component's first pose is given, others follow the odometry. Memory: reserved by the
 // constructor but for the optimizer's factor: that of LoopSelection, and 0.9 KiB a loop and pose. Cost:
 // adding a loop, that of the selection; settle(), an iteration of the optimizer or one of its covariances for
@@ -31,6 +37,7 @@
 
 #include "estimator/core/status.hpp"
 #include "mapping/pose_graph/graduated_selection.hpp"
+#include "mapping/pose_graph/gravity_factor.hpp"
 #include "mapping/pose_graph/loop_selection.hpp"
 #include "mapping/pose_graph/pose_graph_optimizer.hpp"
 
@@ -68,9 +75,9 @@ class RobustGraph {
   RobustGraph(const RobustGraphLimits& limits, const RobustGraphSettings& settings);
 
   /// A pose that no odometry joins to those before.
-  Status beginComponent(const Pose& T_map_body);
+  Status beginComponent(const Pose& T_map_body, const Tilt& tilt = {});
   /// The next pose: `odometry` joins it, number size(), and the one before, in either direction.
-  Status addPose(const RelativePose<Pose>& odometry);
+  Status addPose(const RelativePose<Pose>& odometry, const Tilt& tilt = {});
   /// Before the first solution: the pose does not move. Forgotten by removePose().
   Status hold(std::uint32_t pose) { return optimizer_.hold(pose, true); }
   /// LoopSelection::removePose(); the odometry's two edges become their product.
@@ -138,6 +145,8 @@ class RobustGraph {
   void setWeight(std::uint32_t id, double weight);
   void gather(std::uint32_t left_out);
   Status assemble();
+  Status setGravity(std::uint32_t k);
+  [[nodiscard]] bool leans(std::uint32_t k) const;
   void restart(Phase phase);
   void countBelieved();
 
@@ -159,6 +168,7 @@ class RobustGraph {
   LoopSelection<Pose> selection_;
   PoseGraphOptimizer<Pose> optimizer_;
   std::vector<std::uint32_t> step_edges_;  ///< of each pose, to the one before
+  std::vector<Tilt> tilts_;                ///< of each pose
   std::vector<Member> members_;            ///< by the selection's ids
   std::uint32_t believed_ = 0;
 
