@@ -146,6 +146,14 @@ TEST_CASE("ATE by hand: one point off in a symmetric cross") {
   CHECK(error.path_length == Approx(3 * std::sqrt(2)));
   // All rotations are off by the same turn: their own fit takes it away.
   CHECK(error.attitude.max < 1e-9);
+  CHECK(error.tilt.max < 1e-9);
+  // Their tilt is what no alignment may take away.
+  for (PosePair& pair : pairs) {
+    pair.estimate.rotation = expSo3(Eigen::Vector3d(0.2, 0, 0)) * pair.estimate.rotation;
+  }
+  const TrajectoryError tilted = trajectoryError(pairs, AlignKind::kSe3);
+  CHECK(tilted.tilt.rmse == Approx(0.2 * kDegrees).epsilon(1e-9));
+  CHECK(tilted.attitude.max < 1e-9);
 }
 
 TEST_CASE("ATE is the minimum over all rigid motions (evo's definition), to 1e-6") {

@@ -171,20 +171,20 @@ TEST_CASE("--robust leaves false loops out, says which, and writes the graph wit
   CHECK(figures["robust"]["own"]["selected"] == 40);
   CHECK(figures["robust"]["own"]["rejected"] == 0);
   CHECK(figures["robust"]["injected"]["rejected"] == 60);
-  // Every loop with its ids; those of the file that are not kept are those that are not written.
+  // Every loop with its ids; those of the file that are not selected are those that are not written.
   std::istringstream lines(textOf(csv));
   std::string line;
   std::getline(lines, line);
   CHECK(line == "edge,from_id,to_id,verdict,injected");
   int injected = 0;
-  int kept = 0;
+  int selected = 0;
   for (int count = 0; std::getline(lines, line); ++count) {
-    if (count == 0) CHECK(line.find(",3,123,kept,0") != std::string::npos);
+    if (count == 0) CHECK(line.find(",3,123,selected,0") != std::string::npos);
     injected += line.ends_with(",1") ? 1 : 0;
-    kept += line.find(",kept,") != std::string::npos ? 1 : 0;
+    selected += line.find(",selected,") != std::string::npos ? 1 : 0;
   }
   CHECK(injected == 60);
-  CHECK(kept == 40);
+  CHECK(selected == 40);
   CHECK(readG2oFile(out).graph.edgeCount() == 119);
   // The poses are those of the graph that was never spoiled.
   const std::string whole = folder.file("whole.g2o");

@@ -30,6 +30,7 @@ Json toJson(const Accuracy& accuracy) {
   json["ate_axis_rmse_m"] = {absolute.axis_rmse.x(), absolute.axis_rmse.y(), absolute.axis_rmse.z()};
   json["rotation_deg"] = statisticsJson(absolute.rotation);
   json["attitude_deg"] = statisticsJson(absolute.attitude);
+  json["tilt_deg"] = statisticsJson(absolute.tilt);
   json["scale"] = absolute.alignment.scale;
   json["rpe_time"] = {{"interval_s", accuracy.over_time.interval},
                       {"translation_m", statisticsJson(accuracy.over_time.translation)},
@@ -108,7 +109,8 @@ std::string toText(const std::string& title, const Accuracy& accuracy) {
   if (!absolute.status.ok()) text += fmt::format("  note: {}\n", absolute.status.what);
   if (absolute.kind == AlignKind::kSim3) text += fmt::format("  scale {:.5f}\n", absolute.alignment.scale);
   text +=
-      fmt::format("  rotation  rmse {:.3f} deg  max {:.3f}\n", absolute.rotation.rmse, absolute.rotation.max);
+      fmt::format("  rotation  rmse {:.3f} deg  max {:.3f}; tilt, as it is  rmse {:.3f} deg  max {:.3f}\n",
+                  absolute.rotation.rmse, absolute.rotation.max, absolute.tilt.rmse, absolute.tilt.max);
   text += fmt::format("  RPE over {:g} s  rmse {:.4f} m  {:.3f} deg  ({} intervals)\n",
                       accuracy.over_time.interval, accuracy.over_time.translation.rmse,
                       accuracy.over_time.rotation.rmse, accuracy.over_time.translation.count);

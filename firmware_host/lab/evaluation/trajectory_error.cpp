@@ -45,6 +45,16 @@ ErrorStatistics rotationErrors(std::span<const PosePair> pairs, const Eigen::Qua
   return statisticsOf(std::move(degrees));
 }
 
+ErrorStatistics tiltErrors(std::span<const PosePair> pairs) {
+  std::vector<double> degrees;
+  for (const PosePair& pair : pairs) {
+    const Eigen::Vector3d estimate = pair.estimate.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d truth = pair.truth.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+    degrees.push_back(std::atan2(estimate.cross(truth).norm(), estimate.dot(truth)) * kToDegrees);
+  }
+  return statisticsOf(std::move(degrees));
+}
+
 }  // namespace
 
 std::string_view alignName(AlignKind kind) {
@@ -82,6 +92,7 @@ TrajectoryError trajectoryError(std::span<const PosePair> pairs, AlignKind kind)
   result.translation = statisticsOf(std::move(translation));
   result.rotation = rotationErrors(pairs, result.alignment.T_to_from.rotation);
   result.attitude = rotationErrors(pairs, fitRotation(pairs, kind));
+  result.tilt = tiltErrors(pairs);
   result.axis_rmse = (axis_sum / static_cast<double>(pairs.size())).cwiseSqrt();
   return result;
 }

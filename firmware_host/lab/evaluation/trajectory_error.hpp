@@ -7,6 +7,8 @@
 //   rotation error_i    = angle of R_truth_i^T R_A R_estimate_i               [deg]
 //   attitude error_i    = the same with the R that fits the rotations themselves best (about gravity
 //                         only for yaw alignment)                             [deg]
+//   tilt error_i        = angle between the verticals that both poses see, z of their worlds, as they are: of
+//                         use where the truth's z is gravity's                [deg]
 // R_A comes from positions: over a short path it is loose, at rest it is arbitrary, and the rotation
 // error with it; the attitude error is not.
 // RMSE of the translation is what evo_ape prints with -a (SE(3)) or -as (Sim(3)); yaw alignment keeps
@@ -35,6 +37,7 @@ struct TrajectoryError {
   ErrorStatistics translation;  ///< m
   ErrorStatistics rotation;     ///< degrees, under the alignment of the positions
   ErrorStatistics attitude;     ///< degrees, under the best fit of the rotations
+  ErrorStatistics tilt;         ///< degrees, without any alignment
   Eigen::Vector3d axis_rmse = Eigen::Vector3d::Zero();  ///< m, along the truth's axes
   double path_length = 0;                               ///< m, of the truth over the pairs
 };
