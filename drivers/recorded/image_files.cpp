@@ -41,11 +41,10 @@ void writeAll(const std::string& path, const std::uint8_t* data, std::size_t siz
 // False when libpng reports an error, which it does by a jump back to here: nothing with a
 // destructor may be made between.
 bool encodePng(png_structp png, png_infop info, const std::uint8_t* rows, std::ptrdiff_t stride, int width,
-               int height, int depth) {
+               int height, int depth, int colour) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;
-  png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), depth,
-               PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
-               PNG_FILTER_TYPE_DEFAULT);
+  png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), depth, colour,
+               PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_set_compression_level(png, kPngLevel);
   png_set_filter(png, 0, PNG_FILTER_UP);
   png_write_info(png, info);
@@ -56,14 +55,14 @@ bool encodePng(png_structp png, png_infop info, const std::uint8_t* rows, std::p
 }
 
 void writePng(const std::string& path, const std::uint8_t* rows, std::ptrdiff_t stride, int width, int height,
-              int depth) {
+              int depth, int colour = PNG_COLOR_TYPE_GRAY) {
   std::vector<std::uint8_t> bytes;
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
   png_infop info = png == nullptr ? nullptr : png_create_info_struct(png);
   bool good = info != nullptr;
   if (good) {
     png_set_write_fn(png, &bytes, appendBytes, nullptr);
-    good = encodePng(png, info, rows, stride, width, height, depth);
+    good = encodePng(png, info, rows, stride, width, height, depth, colour);
   }
   png_destroy_write_struct(&png, &info);
   if (!good) throw std::runtime_error(path + ": the PNG encoder failed");
@@ -79,6 +78,10 @@ void writePng8(const std::string& path, const std::uint8_t* grey, int width, int
 void writePng16(const std::string& path, const std::uint16_t* grey, int width, int height) {
   writePng(path, reinterpret_cast<const std::uint8_t*>(grey), 2 * static_cast<std::ptrdiff_t>(width), width,
            height, 16);
+}
+
+void writePngRgb8(const std::string& path, const std::uint8_t* rgb, int width, int height) {
+  writePng(path, rgb, 3 * static_cast<std::ptrdiff_t>(width), width, height, 8, PNG_COLOR_TYPE_RGB);
 }
 
 void writeJpeg(const std::string& path, const std::uint8_t* grey, int width, int height, int quality) {

@@ -1,5 +1,5 @@
 #pragma once
-// Writes grey images: 8 and 16 bit PNG (libpng), 8 bit JPEG (libjpeg-turbo). Throws
+// Writes grey images: 8 and 16 bit PNG (libpng), 8 bit JPEG (libjpeg-turbo); and 8 bit PNG in colours. Throws
 // std::runtime_error naming the file.
 
 #include <cstdint>
@@ -9,6 +9,8 @@ namespace swiftlet {
 
 void writePng8(const std::string& path, const std::uint8_t* grey, int width, int height);
 void writePng16(const std::string& path, const std::uint16_t* grey, int width, int height);
+/// `rgb`: red, green, blue of each pixel.
+void writePngRgb8(const std::string& path, const std::uint8_t* rgb, int width, int height);
 void writeJpeg(const std::string& path, const std::uint8_t* grey, int width, int height, int quality);
 
 }  // namespace swiftlet

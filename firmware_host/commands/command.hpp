@@ -29,6 +29,7 @@ void addDoctorCommand(CLI::App& app, int& exit_code);
 void addHilCommand(CLI::App& app, int& exit_code);
 void addMeshCommand(CLI::App& app, int& exit_code);
 void addFuseCommand(CLI::App& app, int& exit_code);
+void addMapCommand(CLI::App& app, int& exit_code);
 void addPlaceCommand(CLI::App& app, int& exit_code);
 void addPoseGraphCommand(CLI::App& app, int& exit_code);
 void addExportCommand(CLI::App& app, int& exit_code);

@@ -13,6 +13,7 @@ void addLabCommands(CLI::App& app, int& exit_code) {
   addReportCommand(app, exit_code);
   addMeshCommand(app, exit_code);
   addFuseCommand(app, exit_code);
+  addMapCommand(app, exit_code);
   addPlaceCommand(app, exit_code);
   addPoseGraphCommand(app, exit_code);
   addBudgetCommand(app, exit_code);

@@ -69,11 +69,16 @@ std::string usage(const CLI::App& command) {
   return line;
 }
 
-void addCommand(const CLI::App& command, std::string& page) {
-  page += fmt::format(".SS swiftlet {} {}\n{}.\n", escapeRoff(command.get_name()), escapeRoff(usage(command)),
+/// `before`: the program, and the command that it is a part of.
+void addCommand(const std::string& before, const CLI::App& command, std::string& page) {
+  const std::string name = before + " " + command.get_name();
+  const auto parts = command.get_subcommands({});
+  page += fmt::format(".SS {} {}\n{}.\n", escapeRoff(name),
+                      parts.empty() ? escapeRoff(usage(command)) : "COMMAND [OPTIONS]",
                       escapeRoff(command.get_description()));
   addOptions(command, false, page);
   if (!command.get_footer().empty()) page += ".PP\n" + footer(command.get_footer());
+  for (const CLI::App* part : parts) addCommand(name, *part, page);
 }
 
 void addSettings(std::string& page) {
@@ -136,7 +141,7 @@ std::string manPage(const CLI::App& app, const std::string& version, const std::
   addOptions(app, true, page);
   page += ".SH COMMANDS\n";
   for (const CLI::App* command : app.get_subcommands({})) {
-    if (!command->get_group().empty()) addCommand(*command, page);
+    if (!command->get_group().empty()) addCommand("swiftlet", *command, page);
   }
   addSettings(page);
   return page + kExitStatus + kFiles + kSeeAlso;

@@ -16,6 +16,9 @@ std::string pageOfASmallProgram() {
   look->add_option("PLACE", "Where to look")->required();
   look->add_option("-n,--times", "How often");
   look->footer(".hidden files count.\nExample:\n  swiftlet look 'a place'\n  swiftlet look \\server");
+  CLI::App* map = app.add_subcommand("map", "Look at maps");
+  map->footer("");
+  map->add_subcommand("slice", "Cut a map")->add_option("MAP", "What to cut")->required();
   app.add_subcommand("secret", "Not to be shown")->group("");
   return manPage(app, "swiftlet 1.2", "2026-01-31");
 }
@@ -29,6 +32,8 @@ TEST_CASE("man page: commands, options, examples line by line") {
   CHECK(has(page, ".SS swiftlet look [OPTIONS] PLACE\nLook at a place.\n"));
   CHECK(has(page, ".TP\n\\fB\\-n,\\-\\-times\\fR\nHow often\n"));
   CHECK(has(page, ".EX\nswiftlet look \\(aqa place\\(aq\nswiftlet look \\eserver\n.EE\n"));
+  CHECK(has(page, ".SS swiftlet map COMMAND [OPTIONS]\nLook at maps.\n"));
+  CHECK(has(page, ".SS swiftlet map slice [OPTIONS] MAP\nCut a map.\n"));
   CHECK_FALSE(has(page, "secret"));
 }
 

@@ -53,4 +53,8 @@ void loadKeptMap(const std::string& name, std::istream& in, VoxelVolume& volume,
 KeptMapReport readKeptMap(const std::string& name, std::istream& in, MapStage& map);
 KeptMapReport readKeptMapFile(const std::string& path, MapStage& map);
 
+/// The volume of a kept map alone, for who looks at it and does not go on with it: with the settings that it
+/// was kept with, in as much memory as the whole of it takes. Throws for a file that is missing or damaged.
+VoxelVolume readKeptVolumeFile(const std::string& path);
+
 }  // namespace swiftlet

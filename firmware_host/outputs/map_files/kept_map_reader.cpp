@@ -303,12 +303,11 @@ void MapReader::readPatch(MapTaker& taker) {
   taker.patch(patch_);
 }
 
-/// Into a volume and a store, both empty: what comes later lies farther, and is left out where room ends.
-class Loader final : public MapTaker {
+/// Into an empty volume: what comes later lies farther, and is left out where room ends.
+class VolumeLoader : public MapTaker {
  public:
-  Loader(VoxelVolume& volume, SurfaceStore& surface, const Eigen::Vector3d& p_map_vehicle,
-         KeptMapReport& report)
-      : volume_(volume), surface_(surface), vehicle_(p_map_vehicle.cast<float>()), report_(report) {}
+  VolumeLoader(VoxelVolume& volume, const Eigen::Vector3d& p_map_vehicle, KeptMapReport& report)
+      : volume_(volume), vehicle_(p_map_vehicle.cast<float>()), report_(report) {}
 
   void block(const ReadBlock& block) override {
     const bool room = volume_.blockCount() < volume_.blockCapacity();
@@ -334,20 +333,56 @@ class Loader final : public MapTaker {
       volume_.changeHeader(slot).free_count = images;
     }
   }
+
+ protected:
+  [[nodiscard]] const Eigen::Vector3f& vehicle() const { return vehicle_; }
+  [[nodiscard]] KeptMapReport& report() const { return report_; }
+
+ private:
+  VoxelVolume& volume_;
+  Eigen::Vector3f vehicle_;
+  KeptMapReport& report_;
+};
+
+/// The same, and patches into an empty store.
+class Loader final : public VolumeLoader {
+ public:
+  Loader(VoxelVolume& volume, SurfaceStore& surface, const Eigen::Vector3d& p_map_vehicle,
+         KeptMapReport& report)
+      : VolumeLoader(volume, p_map_vehicle, report), surface_(surface) {}
+
   void patch(const SurfacePatch& patch) override {
     const SurfaceStoreCounters before = surface_.counters();
-    surface_.put(patch, vehicle_);
+    surface_.put(patch, vehicle());
     const SurfaceStoreCounters& after = surface_.counters();
-    report_.without_room.patches +=
+    report().without_room.patches +=
         static_cast<std::uint32_t>(after.lost + after.spilled - before.lost - before.spilled);
   }
 
  private:
-  VoxelVolume& volume_;
   SurfaceStore& surface_;
-  Eigen::Vector3f vehicle_;
-  KeptMapReport& report_;
 };
+
+std::ifstream opened(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw InputError(path, 0, "", "cannot be opened", "Give a file that --keep wrote");
+  return in;
+}
+
+/// Memory that holds all of it.
+VolumeSettings settingsOf(const Head& head) {
+  VolumeSettings settings;
+  settings.voxel_size = head.voxel_size;
+  settings.truncation = head.truncation;
+  settings.reference_sigma = head.reference_sigma;
+  settings.labels = head.labels;
+  const std::size_t blocks =
+      std::max<std::size_t>(head.counts.blocks, head.counts.free_blocks / VoxelVolume::kFreePerBlock + 1);
+  settings.memory_bytes = blocks * sizeof(VoxelBlock);
+  while (VoxelVolume::blocksFor(settings.memory_bytes, settings.labels) < blocks)
+    settings.memory_bytes += settings.memory_bytes / 8;
+  return settings;
+}
 
 }  // namespace
 
@@ -382,9 +417,26 @@ KeptMapReport readKeptMap(const std::string& name, std::istream& in, MapStage& m
 }
 
 KeptMapReport readKeptMapFile(const std::string& path, MapStage& map) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw InputError(path, 0, "", "cannot be opened", "Give a file that --keep wrote");
+  std::ifstream in = opened(path);
   return readKeptMap(path, in, map);
+}
+
+VoxelVolume readKeptVolumeFile(const std::string& path) {
+  std::ifstream in = opened(path);
+  MapTaker nobody;
+  MapReader checker(path, in);
+  checker.walk(nobody);
+  MapReader reader(path, in);
+  VoxelVolume volume(settingsOf(checker.head()));
+  volume.beginChange();
+  KeptMapReport report;
+  VolumeLoader loader(volume, reader.head().p_map_vehicle, report);
+  reader.walk(loader);
+  if (report.without_room.blocks + report.without_room.free_blocks > 0) {
+    throw InputError(path, 0, "", "blocks of the map find no place in the volume's index",
+                     "Keep the map anew");
+  }
+  return volume;
 }
 
 }  // namespace swiftlet

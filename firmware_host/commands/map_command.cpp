@@ -1,0 +1,64 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "firmware_host/commands/command.hpp"
+#include "firmware_host/lab/modules/map_slice_run.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr std::array<const char*, kSliceKinds> kMeanings{
+    "unknown (grey)", "surface (black)", "behind a surface (violet)", "no surface in reach (blue)",
+    "with a distance (red to yellow)"};
+
+void printSlice(const nlohmann::ordered_json& summary) {
+  const auto& x = summary["extent_m"]["x"];
+  const auto& y = summary["extent_m"]["y"];
+  fmt::print("x {:.2f} to {:.2f} m, y {:.2f} to {:.2f} m, z {:.3f} m; {} x {} pixels of {:g} m\n",
+             x[0].get<double>(), x[1].get<double>(), y[0].get<double>(), y[1].get<double>(),
+             summary["z_m"].get<double>(), summary["pixels"]["width"].get<int>(),
+             summary["pixels"]["height"].get<int>(), summary["pixel_m"].get<double>());
+  for (std::size_t i = 0; i < kSliceKinds; ++i) {
+    const auto& kind = summary["kinds"][kSliceKindNames[i]];
+    fmt::print("  {:<32} {:>9} pixels {:5.1f} %\n", kMeanings[i], kind["pixels"].get<std::size_t>(),
+               100 * kind["share"].get<double>());
+  }
+  fmt::print("largest distance {:.3f} m, reach {:g} m\n", summary["largest_distance_m"].get<double>(),
+             summary["reach_m"].get<double>());
+}
+
+void addSlice(CLI::App& map, int& exit_code) {
+  CLI::App* command = map.add_subcommand("slice", "Draw a kept map's distance field at one height");
+  auto request = std::make_shared<MapSliceRequest>();
+  command->add_option("KEPT_MAP", request->map, "File that `swiftlet fuse --keep` wrote")->required();
+  command
+      ->add_option("--out", request->out,
+                   "Picture to write, *.png; the distances in millimetres go to *_mm.png beside it")
+      ->required();
+  command->add_option("--z", request->z,
+                      "Height in the map's frame [m]; default: the middle of the map's height");
+  command->add_option("--json", request->json, "File to write the figures to");
+  command->footer(
+      "One pixel is one voxel; x grows to the right, y upwards. *_mm.png has 16 bits: millimetres to the\n"
+      "nearest surface, 0 where no distance is known, and on and behind surfaces.\n"
+      "Example:\n  swiftlet fuse data/vil_v102 --keep v102.swm --out map_v102\n"
+      "  swiftlet map slice v102.swm --z 1.2 --out slice.png");
+  command->callback([request, &exit_code] {
+    const MapSliceResult result = runMapSlice(*request);
+    printSlice(result.summary);
+    fmt::print("written to {} and {}\n", request->out, result.millimetres);
+    exit_code = kExitDone;
+  });
+}
+
+}  // namespace
+
+void addMapCommand(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("map", "Look at a kept map");
+  command->require_subcommand(1);
+  command->footer("Example:\n  swiftlet map slice v102.swm --out slice.png");
+  addSlice(*command, exit_code);
+}
+
+}  // namespace swiftlet
