@@ -23,6 +23,7 @@ constexpr int kAdd = 0;
 constexpr int kDelete = 2;
 constexpr std::uint8_t kFloat32 = 7;  ///< sensor_msgs/PointField
 constexpr std::uint8_t kUint32 = 6;
+constexpr std::size_t kFieldBytes = 4;
 constexpr std::uint32_t kMaxSide = 16384;
 
 /// Beyond this many unacknowledged bytes the library would hold a writer back: more than it can ever keep.
@@ -146,6 +147,7 @@ struct DdsLink::Entities {
   dds_entity_t transforms = 0;
   dds_entity_t mesh = 0;
   dds_entity_t cloud = 0;
+  dds_entity_t obstacle = 0;
   dds_entity_t diagnostics = 0;
   dds_entity_t labels = 0;
   dds_entity_t image = 0;
@@ -153,12 +155,13 @@ struct DdsLink::Entities {
   std::uint64_t images_seen = 0;
 
   // Room of the messages on their way out.
-  std::array<std::string, 8> texts;
+  std::array<std::string, 2> texts;
   std::vector<geometry_msgs_msg_dds__TransformStamped_> transform_list;
   std::vector<std::string> names;
   std::vector<geometry_msgs_msg_dds__Point_> points;
   std::vector<std_msgs_msg_dds__ColorRGBA_> colours;
   std::vector<std::uint8_t> bytes;
+  std::vector<sensor_msgs_msg_dds__PointField_> fields;
   std::vector<diagnostic_msgs_msg_dds__DiagnosticStatus_> statuses;
   std::vector<diagnostic_msgs_msg_dds__KeyValue_> values;
 
@@ -168,6 +171,12 @@ struct DdsLink::Entities {
   ~Entities() {
     if (participant > 0) dds_delete(participant);
     if (domain > 0) dds_delete(domain);
+  }
+
+  template <typename Point>
+  void take(std::span<const Point> from) {
+    bytes.resize(from.size_bytes());
+    if (!bytes.empty()) std::memcpy(bytes.data(), from.data(), bytes.size());
   }
 
   /// ROS's name of a topic begins with a slash, DDS's with rt.
@@ -236,13 +245,14 @@ bool DdsLink::open(const DdsSettings& settings) {
   e.transforms = e.writer(tf2_msgs_msg_dds__TFMessage__desc, "/tf", kKeptStates);
   e.mesh = e.writer(visualization_msgs_msg_dds__Marker__desc, settings.prefix + "/local_mesh", 1);
   e.cloud = e.writer(sensor_msgs_msg_dds__PointCloud2__desc, settings.prefix + "/surface", 1);
+  e.obstacle = e.writer(sensor_msgs_msg_dds__PointCloud2__desc, settings.prefix + "/nearest_obstacle", 1);
   e.diagnostics = e.writer(diagnostic_msgs_msg_dds__DiagnosticArray__desc, "/diagnostics", kKept);
   if (!settings.label_topic.empty()) {
     e.labels = e.reader(sensor_msgs_msg_dds__Image__desc, settings.label_topic);
     e.image = e.writer(sensor_msgs_msg_dds__Image__desc, settings.prefix + "/mapped_image", kKeptOut);
   }
   for (const dds_entity_t made :
-       {e.odometry, e.transforms, e.mesh, e.cloud, e.diagnostics, e.labels, e.image}) {
+       {e.odometry, e.transforms, e.mesh, e.cloud, e.obstacle, e.diagnostics, e.labels, e.image}) {
     if (made < 0) return failed("a DDS topic cannot be made", made);
   }
   return true;
@@ -320,28 +330,43 @@ bool DdsLink::publish(const DdsMesh& mesh) {
 
 bool DdsLink::publish(const DdsCloud& cloud) {
   if (!entities_) return false;
+  // `rgb` is a float's bits by custom: viewers look for it so.
+  constexpr std::array<const char*, 5> kFields = {"x", "y", "z", "rgb", "label"};
+  static_assert(sizeof(DdsCloudPoint) == kFields.size() * kFieldBytes);
+  entities_->take(cloud.points);
+  return publishPoints(entities_->cloud, cloud.stamp, cloud.frame, true, kFields);
+}
+
+bool DdsLink::publish(const DdsObstacle& obstacle) {
+  if (!entities_) return false;
+  // Of a point with a normal, as PCL names them; then ours.
+  constexpr std::array<const char*, 10> kFields = {"x",        "y",        "z",        "normal_x", "normal_y",
+                                                   "normal_z", "distance", "known_to", "age",      "kind"};
+  static_assert(sizeof(DdsObstacle::Point) == kFields.size() * kFieldBytes);
+  entities_->take(std::span(&obstacle.point, 1));
+  return publishPoints(entities_->obstacle, obstacle.stamp, obstacle.frame, obstacle.point.p.allFinite(),
+                       kFields);
+}
+
+bool DdsLink::publishPoints(std::int32_t writer, Stamp stamp, std::string_view frame, bool dense,
+                            std::span<const char* const> fields) {
   Entities& e = *entities_;
-  static_assert(sizeof(DdsCloudPoint) == 20);
-  e.bytes.resize(cloud.points.size() * sizeof(DdsCloudPoint));
-  if (!e.bytes.empty()) std::memcpy(e.bytes.data(), cloud.points.data(), e.bytes.size());
-  constexpr std::array<const char*, 5> kNames = {"x", "y", "z", "rgb", "label"};
-  std::array<sensor_msgs_msg_dds__PointField_, 5> fields{};
+  e.names.resize(fields.size());
+  e.fields.resize(fields.size());
   for (std::size_t i = 0; i < fields.size(); ++i) {
-    // `rgb` is a float's bits by custom: viewers look for it so.
-    fields[i] = {text(kNames[i], e.texts[1 + i]), static_cast<std::uint32_t>(4 * i),
-                 i < 4 ? kFloat32 : kUint32, 1};
+    e.fields[i] = {text(fields[i], e.names[i]), static_cast<std::uint32_t>(i * kFieldBytes),
+                   i + 1 < fields.size() ? kFloat32 : kUint32, 1};
   }
   sensor_msgs_msg_dds__PointCloud2_ message{};
-  message.header = Header{timeOf(cloud.stamp), text(cloud.frame, e.texts[0])};
+  message.header = Header{timeOf(stamp), text(frame, e.texts[0])};
   message.height = 1;
-  message.width = static_cast<std::uint32_t>(cloud.points.size());
-  message.fields._maximum = message.fields._length = static_cast<std::uint32_t>(fields.size());
-  message.fields._buffer = fields.data();
-  message.point_step = sizeof(DdsCloudPoint);
+  message.point_step = static_cast<std::uint32_t>(fields.size() * kFieldBytes);
   message.row_step = static_cast<std::uint32_t>(e.bytes.size());
+  message.width = message.row_step / message.point_step;
+  lend(message.fields, e.fields);
   lend(message.data, e.bytes);
-  message.is_dense = true;
-  return wrote(dds_write(e.cloud, &message));
+  message.is_dense = dense;
+  return wrote(dds_write(writer, &message));
 }
 
 bool DdsLink::publish(Stamp stamp, std::span<const DdsStatus> statuses) {

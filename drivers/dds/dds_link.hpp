@@ -8,12 +8,13 @@
 // take; the library has threads of its own, which inherit the scheduling of who called open(). Network:
 // loopback and unicast unless DdsSettings::interface names another. Memory: what a subscriber has not yet
 // acknowledged, at most the last kKeptStates odometries and transforms, 16 diagnostics, 4 images, 1 mesh, 1
-// surface; kKeptImages label images that were not yet taken; grows to the largest message seen, at most
-// kLargestMessage: larger ones are neither sent nor received. No exceptions.
+// surface, 1 obstacle; kKeptImages label images that were not yet taken; grows to the largest message seen,
+// at most kLargestMessage: larger ones are neither sent nor received. No exceptions.
 
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -80,6 +81,22 @@ struct DdsCloud {
   std::span<const DdsCloudPoint> points;
 };
 
+/// The nearest obstacle, as a cloud of one point.
+struct DdsObstacle {
+  /// As it goes over the wire, in this order.
+  struct Point {
+    Eigen::Vector3f p = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());  ///< m; NaN: none
+    Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< unit, away from the surface; zero without a point
+    float distance = 0;                                ///< m
+    float known_to = 0;                                ///< m
+    float age = 0;           ///< s, from the newest image that is in it to the stamp
+    std::uint32_t kind = 0;  ///< 0 unknown, 1 at least `distance`, 2 `distance`
+  };
+  Stamp stamp;
+  std::string_view frame;
+  Point point;
+};
+
 struct DdsStatus {
   std::uint8_t level = 0;  ///< 0 ok, 1 warning, 2 error, 3 stale
   std::string name;
@@ -128,6 +145,7 @@ class DdsLink {
   bool publish(std::span<const DdsTransform> transforms);
   bool publish(const DdsMesh& mesh);
   bool publish(const DdsCloud& cloud);
+  bool publish(const DdsObstacle& obstacle);
   bool publish(Stamp stamp, std::span<const DdsStatus> statuses);
   /// Camera 0's, for who labels it. Only where there is a label topic.
   bool publish(const DdsImageView& image);
@@ -144,6 +162,10 @@ class DdsLink {
  private:
   struct Entities;
   bool wrote(std::int32_t result);
+  /// The points in Entities::bytes: fields of 32 bits by their names, the last one an integer. `dense`: all
+  /// points are somewhere.
+  bool publishPoints(std::int32_t writer, Stamp stamp, std::string_view frame, bool dense,
+                     std::span<const char* const> fields);
 
   std::unique_ptr<Entities> entities_;
   std::string error_;

@@ -157,7 +157,7 @@ void MappingNode::fuse(const MapMessage& message, const AtHand& at_hand) {
   vehicle_ = input.T_map_body.translation;
   draw();
   publishSurface(message.stamp);
-  publishObstacle(message.stamp);
+  publishObstacle(message.stamp, input.T_map_body);
 }
 
 void MappingNode::draw() {
@@ -189,9 +189,9 @@ void MappingNode::publishSurface(Stamp stamp) {
   }
 }
 
-void MappingNode::publishObstacle(Stamp stamp) {
+void MappingNode::publishObstacle(Stamp stamp, const SE3& T_map_body) {
   for (LiveOutlet* outlet : context_.options.outlets)
-    outlet->obstacle.write({stamp, stage_.distance().query(vehicle_)});
+    outlet->obstacle.write({stamp, T_map_body, stage_.distance().query(T_map_body.translation)});
 }
 
 void MappingNode::record(const MapStep& step, const SceneImages& scene) {

@@ -65,7 +65,7 @@ class MappingNode final : public Node {
   void fuse(const MapMessage& message, const AtHand& at_hand);
   void draw();
   void publishSurface(Stamp stamp);
-  void publishObstacle(Stamp stamp);
+  void publishObstacle(Stamp stamp, const SE3& T_map_body);
   void record(const MapStep& step, const SceneImages& scene);
   void spend(StageId stage, auto&& work) { context_.count(stage, context_.timed(stage, work)); }
 

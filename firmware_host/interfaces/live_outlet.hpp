@@ -42,7 +42,8 @@ struct SurfaceNews {
 /// What the map's distance field says of the place where the vehicle was mapped last.
 struct ObstacleNews {
   Stamp stamp;  ///< of that frame
-  DistanceSample nearest;
+  SE3 T_map_body;
+  DistanceSample nearest;  ///< at the body
 };
 
 struct LiveOutlet {

@@ -36,6 +36,32 @@ std::uint8_t levelOf(Health health) {
   return health == Health::kFailed ? 2 : 1;
 }
 
+DdsObstacle::Point obstaclePoint(const ObstacleNews& news) {
+  const DistanceSample& nearest = news.nearest;
+  DdsObstacle::Point point;
+  point.kind = static_cast<std::uint32_t>(nearest.kind);
+  point.distance = static_cast<float>(nearest.distance);
+  point.known_to = static_cast<float>(nearest.known_to);
+  if (nearest.stale) point.age = static_cast<float>((news.stamp - nearest.up_to).seconds());
+  // Zero where nothing is known, and between two surfaces that are as near.
+  if (!nearest.gradient.isZero()) {
+    const Eigen::Vector3d normal_body = news.T_map_body.rotation.conjugate() * nearest.gradient;
+    point.p = (-nearest.distance * normal_body).cast<float>();
+    point.normal = normal_body.cast<float>();
+  }
+  return point;
+}
+static_assert(static_cast<int>(DistanceKind::kUnknown) == 0 &&
+              static_cast<int>(DistanceKind::kAtLeast) == 1 &&
+              static_cast<int>(DistanceKind::kDistance) == 2);
+
+/// "1.25 m, 0.3 s old", "at least 2.00 m, 0.3 s old", "unknown".
+std::string obstacleText(const DistanceSample& nearest, Stamp now) {
+  if (nearest.kind == DistanceKind::kUnknown) return "unknown";
+  return fmt::format("{}{:.2f} m, {:.1f} s old", nearest.kind == DistanceKind::kAtLeast ? "at least " : "",
+                     nearest.distance, (now - nearest.up_to).seconds());
+}
+
 /// diagnostic_msgs/DiagnosticStatus: STALE.
 constexpr std::uint8_t kStaleLevel = 3;
 
@@ -61,10 +87,10 @@ class DdsThread::Work final : public Follower::Work {
 
   [[nodiscard]] nlohmann::ordered_json json() const override {
     const DdsCounters link = link_.counters();
-    nlohmann::ordered_json json = {{"odometry", odometries_},      {"meshes", meshes_},
-                                   {"surfaces", surfaces_},        {"written", link.written},
-                                   {"refused", link.refused},      {"complaints", link.complaints},
-                                   {"clock_steps", clock_.steps()}};
+    nlohmann::ordered_json json = {{"odometry", odometries_},       {"meshes", meshes_},
+                                   {"surfaces", surfaces_},         {"obstacles", obstacles_},
+                                   {"written", link.written},       {"refused", link.refused},
+                                   {"complaints", link.complaints}, {"clock_steps", clock_.steps()}};
     if (options_.labels != nullptr) {
       const LabelExchange::Counters& labels = options_.labels->counters();
       json["labels"] = {{"images_shown", labels.shown},
@@ -102,6 +128,7 @@ class DdsThread::Work final : public Follower::Work {
       publishDiagnostics(now);
       if (mesh_pace_.due(now)) publishMesh();
       publishSurface(now);
+      publishObstacle();
     });
   }
 
@@ -169,8 +196,12 @@ class DdsThread::Work final : public Follower::Work {
       }
     }
     if (any_frame) addFigures(news, status);
+    const Stamp stamp = stampOfNow(host);
+    if (obstacle_ > 0) {
+      status.values.push_back({"nearest_obstacle", obstacleText(outlet_.obstacle.value().nearest, stamp)});
+    }
     status.values.push_back({"dds_refused", std::to_string(link_.counters().refused)});
-    link_.publish(ros(stampOfNow(host)), {&status, 1});
+    link_.publish(ros(stamp), {&status, 1});
   }
 
   /// On the run's clock: the newest frame's stamp, carried on by the host's while none comes.
@@ -232,6 +263,14 @@ class DdsThread::Work final : public Follower::Work {
     if (link_.publish(DdsCloud{ros(surface.stamp), frames_.map, cloud_})) ++surfaces_;
   }
 
+  void publishObstacle() {
+    const std::uint64_t number = outlet_.obstacle.refresh();
+    if (number == obstacle_) return;
+    obstacle_ = number;
+    const ObstacleNews& news = outlet_.obstacle.value();
+    if (link_.publish(DdsObstacle{ros(news.stamp), frames_.body, obstaclePoint(news)})) ++obstacles_;
+  }
+
   void exchangeLabels(LabelExchange& labels) {
     labels.setLabeller(link_.labellers() > 0);
     while (labels.show([this](Stamp stamp, const ImageView& image) {
@@ -263,8 +302,8 @@ class DdsThread::Work final : public Follower::Work {
   std::optional<Told> told_;
   std::uint64_t frame_ = 0;  ///< the newest that diagnostics saw
   Stamp frame_came_;
-  std::uint64_t state_ = 0, mesh_ = 0, surface_ = 0;          ///< numbers taken
-  std::uint64_t odometries_ = 0, meshes_ = 0, surfaces_ = 0;  ///< published
+  std::uint64_t state_ = 0, mesh_ = 0, surface_ = 0, obstacle_ = 0;           ///< numbers taken
+  std::uint64_t odometries_ = 0, meshes_ = 0, surfaces_ = 0, obstacles_ = 0;  ///< published
   std::vector<Eigen::Vector3f> points_, colours_;
   std::vector<DdsCloudPoint> cloud_;
   DdsImage label_;

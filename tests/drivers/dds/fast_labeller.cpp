@@ -96,17 +96,19 @@ void dump(const visualization_msgs::msg::dds_::Marker_& m) {
   for (const auto& c : m.colors()) line << c.r() << c.g() << c.b() << c.a();
 }
 
-void dump(const sensor_msgs::msg::dds_::PointCloud2_& m) {
-  Line line("surface");
+/// Numbers of 32 bits, the last `integers` of a point no floats.
+void dump(const char* topic, std::size_t integers, const sensor_msgs::msg::dds_::PointCloud2_& m) {
+  Line line(topic);
   line << m.header() << m.height() << m.width() << m.point_step() << m.row_step() << m.is_bigendian()
        << m.is_dense() << static_cast<double>(m.fields().size());
   for (const auto& f : m.fields()) line << f.name() << f.offset() << f.datatype() << f.count();
-  for (std::size_t i = 0; i + 20 <= m.data().size(); i += 20) {
-    float p[3];
-    std::uint32_t rest[2];
-    std::memcpy(p, m.data().data() + i, 12);
-    std::memcpy(rest, m.data().data() + i + 12, 8);
-    line << p[0] << p[1] << p[2] << rest[0] << rest[1];
+  const std::size_t numbers = m.point_step() / 4;
+  for (std::size_t i = 0; 4 * (i + 1) <= m.data().size(); ++i) {
+    float real = 0;
+    std::uint32_t integer = 0;
+    std::memcpy(&real, m.data().data() + 4 * i, 4);
+    std::memcpy(&integer, m.data().data() + 4 * i, 4);
+    line << (i % numbers + integers < numbers ? static_cast<double>(real) : integer);
   }
 }
 
@@ -180,7 +182,9 @@ int main(int argc, char** argv) {
   auto on_odometry = listener<nav_msgs::msg::dds_::Odometry_>(show);
   auto on_transforms = listener<tf2_msgs::msg::dds_::TFMessage_>(show);
   auto on_mesh = listener<visualization_msgs::msg::dds_::Marker_>(show);
-  auto on_cloud = listener<sensor_msgs::msg::dds_::PointCloud2_>(show);
+  using Cloud = sensor_msgs::msg::dds_::PointCloud2_;
+  auto on_cloud = listener<Cloud>([](const Cloud& cloud) { dump("surface", 2, cloud); });
+  auto on_obstacle = listener<Cloud>([](const Cloud& cloud) { dump("nearest_obstacle", 1, cloud); });
   auto on_diagnostics = listener<diagnostic_msgs::msg::dds_::DiagnosticArray_>(show);
   const std::string prefix = kDdsPrefix;
   {
@@ -191,6 +195,7 @@ int main(int argc, char** argv) {
       peer.read<tf2_msgs::msg::dds_::TFMessage_PubSubType>("/tf", on_transforms);
       peer.read<visualization_msgs::msg::dds_::Marker_PubSubType>(prefix + "/local_mesh", on_mesh);
       peer.read<sensor_msgs::msg::dds_::PointCloud2_PubSubType>(prefix + "/surface", on_cloud);
+      peer.read<sensor_msgs::msg::dds_::PointCloud2_PubSubType>(prefix + "/nearest_obstacle", on_obstacle);
       peer.read<diagnostic_msgs::msg::dds_::DiagnosticArray_PubSubType>("/diagnostics", on_diagnostics);
     }
     fast::DataWriter* labels = peer.writer<sensor_msgs::msg::dds_::Image_PubSubType>(options["topic"]);

@@ -6,6 +6,7 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -86,6 +87,24 @@ void check(const visualization_msgs::msg::dds_::Marker_& m, Tally& tally) {
   tally.note(n, whole);
 }
 
+/// One point with ten fields.
+void checkObstacle(const sensor_msgs::msg::dds_::PointCloud2_& m, Tally& tally) {
+  const std::uint64_t n = numberOf(m.header());
+  const auto v = static_cast<float>(n);
+  bool whole = m.header().frame_id() == "base_link" && m.height() == 1 && m.width() == 1 && m.is_dense() &&
+               m.point_step() == 40 && m.row_step() == 40 && m.data().size() == 40 &&
+               m.fields().size() == 10 && m.fields()[3].name() == "normal_x" &&
+               m.fields()[9].name() == "kind" && m.fields()[9].offset() == 36 &&
+               m.fields()[9].datatype() == 6;
+  if (whole) {
+    const std::array<float, 9> expected = {v, -v, 0.5F, 0, 0, -1, v, 2 * v, 3 * v};
+    const auto kind = static_cast<std::uint32_t>(n % 3);
+    whole = std::memcmp(m.data().data(), expected.data(), 36) == 0 &&
+            std::memcmp(m.data().data() + 36, &kind, 4) == 0;
+  }
+  tally.note(n, whole);
+}
+
 void check(const sensor_msgs::msg::dds_::PointCloud2_& m, Tally& tally) {
   const std::uint64_t n = numberOf(m.header());
   const auto points = static_cast<std::size_t>(pointsOf(n));
@@ -127,12 +146,14 @@ void print(const char* topic, const Tally& tally) {
 int main(int argc, char** argv) {
   const double seconds = argc > 1 ? std::atof(argv[1]) : 10;
   const auto domain = static_cast<std::uint32_t>(argc > 2 ? std::atoi(argv[2]) : 0);
-  Tally odometry, transforms, mesh, cloud, diagnostics;
+  Tally odometry, transforms, mesh, cloud, obstacle, diagnostics;
   const auto checks = [](auto& tally) { return [&tally](const auto& message) { check(message, tally); }; };
   auto on_odometry = listener<nav_msgs::msg::dds_::Odometry_>(checks(odometry));
   auto on_transforms = listener<tf2_msgs::msg::dds_::TFMessage_>(checks(transforms));
   auto on_mesh = listener<visualization_msgs::msg::dds_::Marker_>(checks(mesh));
   auto on_cloud = listener<sensor_msgs::msg::dds_::PointCloud2_>(checks(cloud));
+  auto on_obstacle = listener<sensor_msgs::msg::dds_::PointCloud2_>(
+      [&](const auto& message) { checkObstacle(message, obstacle); });
   auto on_diagnostics = listener<diagnostic_msgs::msg::dds_::DiagnosticArray_>(checks(diagnostics));
   const std::string prefix = swiftlet::test::kDdsPrefix;
   {
@@ -141,6 +162,7 @@ int main(int argc, char** argv) {
     peer.read<tf2_msgs::msg::dds_::TFMessage_PubSubType>("/tf", on_transforms);
     peer.read<visualization_msgs::msg::dds_::Marker_PubSubType>(prefix + "/local_mesh", on_mesh);
     peer.read<sensor_msgs::msg::dds_::PointCloud2_PubSubType>(prefix + "/surface", on_cloud);
+    peer.read<sensor_msgs::msg::dds_::PointCloud2_PubSubType>(prefix + "/nearest_obstacle", on_obstacle);
     peer.read<diagnostic_msgs::msg::dds_::DiagnosticArray_PubSubType>("/diagnostics", on_diagnostics);
     fast::DataWriter* labels =
         peer.writer<sensor_msgs::msg::dds_::Image_PubSubType>(swiftlet::test::kDdsLabelTopic);
@@ -171,6 +193,7 @@ int main(int argc, char** argv) {
   print("tf", transforms);
   print("local_mesh", mesh);
   print("surface", cloud);
+  print("nearest_obstacle", obstacle);
   print("diagnostics", diagnostics);
   return 0;
 }

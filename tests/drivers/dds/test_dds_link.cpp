@@ -84,6 +84,10 @@ class Publisher {
       cloud_[i].label = static_cast<std::uint32_t>(n % 32);
     }
     timed([&] { link_.publish(DdsCloud{stampOf(n), "map", cloud_}); });
+    const auto v = static_cast<float>(n);
+    const DdsObstacle::Point point{{v, -v, 0.5F}, {0, 0, -1}, v,
+                                   2 * v,         3 * v,      static_cast<std::uint32_t>(n % 3)};
+    timed([&] { link_.publish(DdsObstacle{stampOf(n), "base_link", point}); });
   }
   void diagnostics() {
     const std::uint64_t n = ++diagnostics_;
@@ -124,7 +128,7 @@ std::string spread(const char* what, std::vector<double> times) {
 }
 
 void checkWhole(const std::map<std::string, Received>& topics) {
-  REQUIRE(topics.size() == 5);
+  REQUIRE(topics.size() == 6);
   for (const auto& [topic, counts] : topics) {
     INFO(topic << " received " << counts.received << " lost " << counts.lost);
     CHECK(counts.received > 0);

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -87,6 +88,22 @@ void fill(SurfaceNews& surface, std::int64_t n) {
   surface.vertices[1].label = 9;
 }
 
+/// By turns unknown, at least 2 m, a surface at 1.25 m; every other one of them without the newest image.
+ObstacleNews obstacleOf(std::int64_t n) {
+  ObstacleNews news;
+  news.stamp = stampOf(n);
+  // Body x is map y.
+  news.T_map_body.rotation = Eigen::Quaterniond(std::sqrt(0.5), 0, 0, std::sqrt(0.5));
+  news.nearest.kind = static_cast<DistanceKind>(n % 3);
+  news.nearest.stale = n % 2 == 0;
+  news.nearest.up_to = stampOf(news.nearest.stale ? n - 750 : n);
+  if (news.nearest.kind == DistanceKind::kUnknown) return news;
+  news.nearest.known_to = 0.5;
+  news.nearest.distance = news.nearest.kind == DistanceKind::kAtLeast ? 2 : 1.25;
+  if (news.nearest.kind == DistanceKind::kDistance) news.nearest.gradient = {0, 0.8, -0.6};
+  return news;
+}
+
 /// The words of a printed message after its topic.
 class Fields {
  public:
@@ -106,7 +123,10 @@ class Fields {
     return ns / 1'000'000;
   }
   void expect(std::initializer_list<double> values) {
-    for (const double value : values) CHECK(number() == Approx(value).margin(1e-6));
+    for (const double value : values) {
+      const double said = number();
+      CHECK((std::isnan(value) ? std::isnan(said) : said == Approx(value).margin(1e-6)));
+    }
   }
   void expectWords(std::initializer_list<const char*> values) {
     for (const char* value : values) CHECK(word() == value);
@@ -187,15 +207,44 @@ void checkSurface(Fields& fields) {
   fields.expect({-1, -2, -3, static_cast<double>((r << 16) | (g << 8) | b), 9});
 }
 
+/// Of what kind it was.
+std::int64_t checkObstacle(Fields& fields) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const std::int64_t n = fields.stamp();
+  const std::int64_t kind = n % 3;
+  fields.expectWords({"base_link"});
+  fields.expect({1, 1, 40, 40, 0, kind == 2 ? 1.0 : 0.0, 10});
+  int offset = 0;
+  for (const char* name :
+       {"x", "y", "z", "normal_x", "normal_y", "normal_z", "distance", "known_to", "age", "kind"}) {
+    fields.expectWords({name});
+    fields.expect({static_cast<double>(offset), offset < 36 ? 7.0 : 6.0, 1});
+    offset += 4;
+  }
+  if (kind == 2) {
+    fields.expect({-1, 0, 0.75, 0.8, 0, -0.6, 1.25, 0.5});  // map y is body x
+  } else if (kind == 1) {
+    fields.expect({kNone, kNone, kNone, 0, 0, 0, 2, 0.5});
+  } else {
+    fields.expect({kNone, kNone, kNone, 0, 0, 0, 0, 0});
+  }
+  fields.expect({n % 2 == 0 ? 0.75 : 0.0, static_cast<double>(kind)});
+  return kind;
+}
+
 void checkDiagnostics(Fields& fields) {
   fields.word();  // the newest frame's stamp, carried on
   fields.expectWords({"-"});
   fields.expect({1, 1});
   fields.expectWords({"swiftlet/health", "degraded", "swiftlet"});
-  fields.expect({9});
+  fields.expect({10});
   fields.expectWords({"epoch", "3", "at_rest", "1", "tracks", "101", "landmarks", "102", "inliers_mono",
                       "103", "inliers_stereo", "104", "reprojection_rms", "0.2500", "imu_residual", "1.5000",
-                      "dds_refused", "0"});
+                      "nearest_obstacle"});
+  const std::string obstacle = fields.word();
+  const bool known = obstacle.starts_with("at_least_2.00_m,_") || obstacle.starts_with("1.25_m,_");
+  CHECK((obstacle == "unknown" || (known && obstacle.ends_with("_s_old"))));
+  fields.expectWords({"dds_refused", "0"});
 }
 
 std::vector<std::uint8_t> imageOf(std::int64_t n) {
@@ -289,6 +338,7 @@ TEST_CASE("every field of a run reaches another implementation, and its labels c
     outlet->state.write(stateOf(n));
     if (n % 50 == 1) outlet->frame.write(frameOf(n));
     if (n % 50 == 1) fill(outlet->mesh.draft(), n), outlet->mesh.publish();
+    if (n % 25 == 1) outlet->obstacle.write(obstacleOf(n));
     if (outlet->surface_wanted.exchange(false)) fill(outlet->surface.draft(), n), outlet->surface.publish();
     map.step(n, exchange.hasLabeller() && n % 200 == 1);
     text += peer.poll();
@@ -299,6 +349,7 @@ TEST_CASE("every field of a run reaches another implementation, and its labels c
   text += peer.finish();
   INFO(said.dump());
   std::map<std::string, int> seen;
+  std::map<std::int64_t, int> kinds;
   std::map<std::string, std::int64_t> last;
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
@@ -309,6 +360,7 @@ TEST_CASE("every field of a run reaches another implementation, and its labels c
     if (fields.topic == "tf") checkTransforms(fields);
     if (fields.topic == "local_mesh") checkMesh(fields);
     if (fields.topic == "surface") checkSurface(fields);
+    if (fields.topic == "nearest_obstacle") ++kinds[checkObstacle(fields)];
     if (fields.topic == "diagnostics") checkDiagnostics(fields);
     if (fields.topic == "mapped_image") checkImage(fields);
     if (fields.topic != "labeller") fields.expectEnd();
@@ -317,6 +369,8 @@ TEST_CASE("every field of a run reaches another implementation, and its labels c
   CHECK(seen["tf"] >= 100);
   CHECK(seen["local_mesh"] >= 20);
   CHECK(seen["surface"] >= 1);
+  CHECK(seen["nearest_obstacle"] <= said["obstacles"].get<int>());
+  for (const std::int64_t kind : {0, 1, 2}) CHECK(kinds[kind] >= 10);
   CHECK(seen["diagnostics"] >= 1);
   CHECK(seen["mapped_image"] >= 8);
   CHECK(seen["odometry"] <= said["odometry"].get<int>());
