@@ -90,7 +90,7 @@ struct DdsObstacle {
     float distance = 0;                                ///< m
     float known_to = 0;                                ///< m
     float age = 0;           ///< s, from the newest image that is in it to the stamp
-    std::uint32_t kind = 0;  ///< 0 unknown, 1 at least `distance`, 2 `distance`
+    std::uint32_t kind = 0;  ///< 0 in unknown space, 1 at least `distance`, 2 `distance`
   };
   Stamp stamp;
   std::string_view frame;

@@ -101,12 +101,13 @@ DistanceSample DistanceField::query(const Eigen::Vector3d& p_map) const {
   const auto bit = [&](int axis) { return part[axis] < 0.5 ? 0 : 1 << axis; };
   const Corner& own = corner[static_cast<std::size_t>(bit(0) + bit(1) + bit(2))];
   out.space = own.space;
-  if (out.space == Space::kUnknown) return out;
-  out.known_to = limits_.cell_size * NearestWord::knownTo(own.nearest);
+  const bool unknown = out.space == Space::kUnknown;
+  if (!unknown) out.known_to = limits_.cell_size * NearestWord::knownTo(own.nearest);
   const bool measured = std::all_of(corner.begin(), corner.end(), [](const Corner& one) { return one.held; });
   if (measured) {
     interpolate(corner, descend(first, part.cast<float>(), corner), part, out);
-  } else {
+    if (!unknown) out.kind = DistanceKind::kDistance;
+  } else if (!unknown) {
     out.kind = DistanceKind::kAtLeast;
     for (int i = 0; i < 8; ++i) {
       const double there = static_cast<double>(corner[static_cast<std::size_t>(i)].atLeast());
@@ -121,15 +122,15 @@ DistanceSample DistanceField::query(const Eigen::Vector3d& p_map) const {
 /// The distance between cells' middles is linear along each axis. In cells.
 void DistanceField::interpolate(const std::array<Corner, 8>& corner, const Holder& near_point,
                                 const Eigen::Vector3d& part, DistanceSample& out) {
-  out.kind = DistanceKind::kDistance;
   Eigen::Vector3d slope = Eigen::Vector3d::Zero();
   for (int i = 0; i < 8; ++i) {
     const Eigen::Vector3i bit = cornerOf(i);
     float squared = near_point.squaredTo(bit.cast<float>());
     for (const Corner& one : corner) squared = std::min(squared, one.holder.squaredTo(bit.cast<float>()));
     const Space space = corner[static_cast<std::size_t>(i)].space;
-    // Between the point and an unknown cell there is no surface that is known.
-    const bool behind = (space == Space::kUnknown ? out.space : space) == Space::kBehindSurface;
+    // Between the point and an unknown cell there is no surface that is known. An unknown point has no side.
+    const bool behind = out.space != Space::kUnknown &&
+                        (space == Space::kUnknown ? out.space : space) == Space::kBehindSurface;
     const double distance = static_cast<double>(behind ? -std::sqrt(squared) : std::sqrt(squared));
     Eigen::Vector3d weight;
     for (int axis = 0; axis < 3; ++axis) weight[axis] = bit[axis] != 0 ? part[axis] : 1 - part[axis];

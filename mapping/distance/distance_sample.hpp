@@ -20,7 +20,7 @@ struct CellSurface {
 inline constexpr float kMostOffset = 0.5F;
 
 enum class DistanceKind : std::uint8_t {
-  kUnknown,  ///< the point lies in unknown space or outside the window: nothing is said
+  kUnknown,  ///< the point lies in unknown space or outside the window: nothing is clear
   kAtLeast,  ///< all known surface is farther than `distance`
   kDistance
 };
@@ -28,12 +28,13 @@ enum class DistanceKind : std::uint8_t {
 struct DistanceSample {
   DistanceKind kind = DistanceKind::kUnknown;
   Space space = Space::kUnknown;  ///< of the cell that the point lies in
-  double distance = 0;            ///< m, to the nearest known surface; negative behind it
-  double known_to = 0;            ///< m: so far around the point nothing is unknown
-  Eigen::Vector3d gradient =
-      Eigen::Vector3d::Zero();  ///< unit, away from the surface; zero but for kDistance
-  Stamp up_to;                  ///< of the newest image that is in it
-  bool stale = true;            ///< the map has newer images
+  /// m, to the nearest known surface; negative behind it. In unknown space, too, where surface is in reach.
+  double distance = 0;
+  double known_to = 0;  ///< m: so far around the point nothing is unknown
+  /// Unit, away from the surface; zero where none is in reach.
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  Stamp up_to;        ///< of the newest image that is in it
+  bool stale = true;  ///< the map has newer images
 
   /// What a vehicle may count on [m]: unknown space is none.
   [[nodiscard]] double clearance() const { return std::clamp(distance, 0.0, known_to); }

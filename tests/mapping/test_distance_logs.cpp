@@ -24,10 +24,12 @@ namespace {
 
 /// Moments at which the map is drawn whole and asked.
 constexpr std::size_t kMoments = 10;
-constexpr int kSamples = 1000;  // in observed space, each
+constexpr int kSamples = 1000;     // in observed space, each
+constexpr int kUnknownEvery = 50;  // samples in unknown space of which one is measured
 
 struct Figures {
-  std::vector<double> off;  ///< of the distances from the mesh's [m]
+  std::vector<double> off;             ///< of the distances from the mesh's [m]
+  std::vector<double> off_in_unknown;  ///< likewise
   int observed = 0, unknown = 0, free_in_unknown = 0;
   int at_least = 0, above_truth = 0;
   int in_range = 0, in_range_with_distance = 0;
@@ -75,6 +77,12 @@ void ask(const DistanceField& field, const VoxelVolume& volume, const MeshDistan
   const double size = field.limits().cell_size;
   const std::vector<Eigen::Vector3d> points = crossings(volume);
   const int wanted = out.observed + kSamples;
+  const auto trueDistance = [&](const Eigen::Vector3d& p) {
+    const auto nearest = mesh.nearest(p);
+    double truth = nearest ? nearest->distance : 1e9;
+    for (const Eigen::Vector3d& point : points) truth = std::min(truth, (point - p).norm());
+    return truth;
+  };
   while (out.observed < wanted) {
     Eigen::Vector3d from;
     for (int axis = 0; axis < 3; ++axis) from[axis] = random.uniform(1, field.limits().cells[axis] - 1);
@@ -83,12 +91,12 @@ void ask(const DistanceField& field, const VoxelVolume& volume, const MeshDistan
     if (!isObserved(volume, p)) {
       ++out.unknown;
       out.free_in_unknown += sample.kind != DistanceKind::kUnknown || sample.clearance() > 0 ? 1 : 0;
+      if (out.unknown % kUnknownEvery == 0 && !sample.gradient.isZero())
+        out.off_in_unknown.push_back(std::abs(sample.distance - trueDistance(p)));
       continue;
     }
     ++out.observed;
-    const auto nearest = mesh.nearest(p);
-    double truth = nearest ? nearest->distance : 1e9;
-    for (const Eigen::Vector3d& point : points) truth = std::min(truth, (point - p).norm());
+    const double truth = trueDistance(p);
     const double edge =
         size * std::min(from.minCoeff(), (field.limits().cells.cast<double>() - from).minCoeff());
     const bool in_range = truth < std::min(edge, size * field.limits().reach);
@@ -150,14 +158,18 @@ TEST_CASE("at random points of a log's map distances are those to its surface") 
     std::printf(
         "%s: %d observed, %zu with a distance, off by %.4f m (median), %.4f (99 %%), %.4f (most), %ld beyond "
         "half a voxel; in range %d, of them with a distance %.2f %%; at least %d, above the truth %d "
-        "(%.4f m); unknown %d, said to be free %d\n",
+        "(%.4f m); unknown %d, said to be free %d, %zu with a distance off by %.4f (99 %%), %.4f (most)\n",
         name, figures.observed, figures.off.size(), percentileOf(figures.off, 0.5),
         percentileOf(figures.off, 0.99), percentileOf(figures.off, 1), static_cast<long>(wide),
         figures.in_range, 100 * share, figures.at_least, figures.above_truth, figures.most_above,
-        figures.unknown, figures.free_in_unknown);
+        figures.unknown, figures.free_in_unknown, figures.off_in_unknown.size(),
+        percentileOf(figures.off_in_unknown, 0.99), percentileOf(figures.off_in_unknown, 1));
     // With other random points one in eight thousand is off by more than half a voxel, none by a whole one.
     CHECK(static_cast<double>(wide) <= 1e-3 * static_cast<double>(figures.off.size()));
     CHECK(percentileOf(figures.off, 1) < 2 * half);
+    CHECK(figures.off_in_unknown.size() > 300);
+    CHECK(percentileOf(figures.off_in_unknown, 0.99) < half);
+    CHECK(percentileOf(figures.off_in_unknown, 1) < 2 * half);
     CHECK(share >= 0.95);
     CHECK(figures.above_truth == 0);
     CHECK(figures.free_in_unknown == 0);

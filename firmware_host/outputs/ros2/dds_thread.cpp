@@ -55,11 +55,15 @@ static_assert(static_cast<int>(DistanceKind::kUnknown) == 0 &&
               static_cast<int>(DistanceKind::kAtLeast) == 1 &&
               static_cast<int>(DistanceKind::kDistance) == 2);
 
-/// "1.25 m, 0.3 s old", "at least 2.00 m, 0.3 s old", "unknown".
+/// "1.25 m, 0.3 s old", "at least 2.00 m, 0.3 s old", "unknown here, 1.25 m, 0.3 s old", "unknown".
 std::string obstacleText(const DistanceSample& nearest, Stamp now) {
-  if (nearest.kind == DistanceKind::kUnknown) return "unknown";
-  return fmt::format("{}{:.2f} m, {:.1f} s old", nearest.kind == DistanceKind::kAtLeast ? "at least " : "",
-                     nearest.distance, (now - nearest.up_to).seconds());
+  const char* before = "";
+  if (nearest.kind == DistanceKind::kAtLeast) before = "at least ";
+  if (nearest.kind == DistanceKind::kUnknown) {
+    if (nearest.gradient.isZero()) return "unknown";
+    before = "unknown here, ";
+  }
+  return fmt::format("{}{:.2f} m, {:.1f} s old", before, nearest.distance, (now - nearest.up_to).seconds());
 }
 
 /// diagnostic_msgs/DiagnosticStatus: STALE.
