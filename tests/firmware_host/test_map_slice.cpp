@@ -298,14 +298,15 @@ std::string refusal(const MapSliceRequest& request) {
   return "nothing";
 }
 
-/// A wall seen once.
-void keepWall(const std::string& path) {
+/// A wall seen once, and free blocks beside it.
+void keepWall(const std::string& path, const std::vector<BlockIndex>& free = {}) {
   VoxelVolume volume(sceneSettings());
   VolumeIntegrator integrator(volume, kSceneCamera.pixels());
   const SE3 pose = lookAt(Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX());
   VolumeStep step;
   REQUIRE(
       integrator.step(render(pose, 1, Plane{-Eigen::Vector3d::UnitX(), -1.5}).view(), pose, {}, step).ok());
+  for (const BlockIndex& block : free) volume.addFree(block, Eigen::Vector3f::Zero());
   keep(path, volume);
 }
 
@@ -327,6 +328,9 @@ TEST_CASE("what cannot be drawn is refused with file, option and remedy, and not
   seen_free.beginChange();
   seen_free.addFree({1, 2, 3}, Eigen::Vector3f::Zero());
   keep(free, seen_free);
+  const std::string gap = folder.file("gap.swm"), wide = folder.file("wide.swm");
+  keepWall(gap, {{3, 0, 20}});
+  keepWall(wide, {{2000, 0, 0}});
   const auto files = [&] {
     return std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator());
   };
@@ -347,6 +351,8 @@ TEST_CASE("what cannot be drawn is refused with file, option and remedy, and not
     CHECK_THAT(with(kept, z), Contains(kept) && Contains("--z") && Contains("outside the map") &&
                                   Contains("Give a height from"));
   }
+  CHECK_THAT(with(gap, 5), Contains(gap) && Contains("--z") && Contains("nothing is known at 5.025 m"));
+  CHECK_THAT(with(wide, 0.1), Contains(wide) && Contains("voxels wide") && Contains("map.voxel_size"));
   CHECK_THAT(refusal({kept, folder.file("slice.jpg"), {}, ""}), Contains("--out") && Contains(".png"));
   CHECK_THAT(refusal({kept, folder.file("no/slice.png"), {}, ""}), Contains("--out") && Contains("folder"));
   CHECK_THAT(refusal({kept, out, {}, folder.file("no/slice.json")}),
