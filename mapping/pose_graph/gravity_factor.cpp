@@ -18,19 +18,19 @@ Eigen::Matrix<double, 3, 2> across(const Eigen::Vector3d& up) {
 
 GravityFactor gravityFactor(const Tilt& tilt) {
   GravityFactor factor;
-  factor.up_body = tilt.up_body;
   if (!tilt.known()) return factor;
   const Eigen::Matrix<double, 3, 2> axes = across(tilt.up_body);
   const Eigen::Matrix2d P = axes.transpose() * tilt.covariance * axes;
+  factor.up_body = tilt.up_body;
   factor.information = axes * P.inverse() * axes.transpose();
-  return factor;
+  return factor.information.allFinite() ? factor : GravityFactor{};
 }
 
 GravityFactor gravityFactor(const Tilt& tilt, const Tilt& previous, const Eigen::Matrix3d& R_previous_this,
                             const Eigen::Matrix3d& Q) {
   if (!tilt.known() || !previous.known()) return gravityFactor(tilt);
-  GravityFactor factor;
-  factor.up_body = tilt.up_body;
+  GravityFactor factor = gravityFactor(tilt);
+  if (factor.information.isZero()) return factor;
   const Eigen::Matrix<double, 3, 2> axes = across(tilt.up_body);
   const Eigen::Matrix3d said = R_previous_this.transpose() * previous.covariance * R_previous_this + Q;
   const Eigen::Matrix2d P = axes.transpose() * tilt.covariance * axes;
@@ -39,7 +39,7 @@ GravityFactor gravityFactor(const Tilt& tilt, const Tilt& previous, const Eigen:
   const Eigen::Vector2d values = learned.eigenvalues().cwiseMax(0);
   const Eigen::Matrix<double, 3, 2> directions = axes * learned.eigenvectors();
   factor.information = directions * values.asDiagonal() * directions.transpose();
-  return factor;
+  return factor.information.allFinite() ? factor : GravityFactor{};
 }
 
 }  // namespace swiftlet

@@ -21,11 +21,14 @@ namespace swiftlet {
 struct Tilt {
   Eigen::Vector3d up_body = Eigen::Vector3d::UnitZ();    ///< unit
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< rad^2, R <- R Exp(phi); 0: not known
-  [[nodiscard]] bool known() const { return covariance.trace() > 0; }
+  [[nodiscard]] bool known() const {
+    return covariance.trace() > 0 && covariance.allFinite() && up_body.allFinite();
+  }
 };
 
 /// Of a pose with `tilt`; `previous`, the pose before, is R_previous_this away with covariance Q (rad^2, in
-/// the axes of this pose). Without information where the tilt is not known, or not better than from there.
+/// the axes of this pose). Without information where the tilt is not known, not better than from there, or
+/// its covariance is no covariance.
 GravityFactor gravityFactor(const Tilt& tilt, const Tilt& previous, const Eigen::Matrix3d& R_previous_this,
                             const Eigen::Matrix3d& Q);
 /// Of the first pose of a component.

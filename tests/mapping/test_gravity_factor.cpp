@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <limits>
 
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
@@ -98,6 +99,19 @@ TEST_CASE("A filter along the chain has the odometry's own tilt at every pose", 
   const GravityFactor nothing =
       gravityFactor(previous, previous, Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Zero());
   CHECK(nothing.information.norm() < 1e-6 / previous.covariance.trace());
+  // What is no covariance says nothing, and costs the pose nothing.
+  for (const double bad : {0.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    Tilt tilt = previous;
+    tilt.covariance.col(0).setConstant(bad);
+    tilt.covariance.row(0).setConstant(bad);
+    tilt.covariance.col(1).setConstant(bad);
+    tilt.covariance.row(1).setConstant(bad);
+    CHECK(gravityFactor(tilt).information.allFinite());
+    RobustGraph<SE3> graph({2, 1}, robustGraphSettings<SE3>());
+    CHECK(graph.beginComponent(SE3(), tilt).ok());
+    CHECK(graph.addPose({0, 1, SE3(), PoseMatrix<SE3>::Identity()}, tilt).ok());
+    CHECK(graph.graph().poses.size() == graph.size());
+  }
 }
 
 TEST_CASE("The optimum has no slope but what anchors hold, and the first pose keeps heading and place",
