@@ -186,8 +186,8 @@ std::vector<Setting> estimationSettings() {
        "before it; once a loop is believed, keyframes near each other in the map need none.",
        real(&Settings::loop_stage, &LoopSettings::min_similarity, 0, 10)},
       {"loop.consistency", "",
-       "Believe a loop only where it agrees with the odometry and other loops; false, to compare: every one "
-       "that geometry verifies.",
+       "Reject loop closures that contradict the odometry, other loops or the solved graph. false: every "
+       "geometrically verified loop is used, for comparison only.",
        onOff(&Settings::loop_stage, &LoopSettings::consistency)},
       {"map.enabled", "",
        "Fuse depth into a map in flight: labelled surface (map.ply, map.glb) and distance field.",

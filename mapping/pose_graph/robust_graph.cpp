@@ -322,7 +322,10 @@ Status RobustGraph<Pose>::settle(int iterations, bool& moved) {
         break;
     }
     if (!status.ok()) {
+      // Weights that were on their way are not left behind.
+      for (std::uint32_t id = 0; id < loops(); ++id) setWeight(id, members_[id].weight);
       phase_ = Phase::kRest;
+      behind_ = false;
       return status;
     }
   }
@@ -350,7 +353,7 @@ Status RobustGraph<Pose>::solve(int& iterations) {
 }
 
 template <typename Pose>
-void RobustGraph<Pose>::fits() {
+void RobustGraph<Pose>::measureFits() {
   for (std::size_t k = 0; k < graduated_ids_.size(); ++k) {
     const RelativePose<Pose>& edge = loop(graduated_ids_[k]);
     // One given up meanwhile takes no part.
@@ -377,7 +380,7 @@ void RobustGraph<Pose>::beginGraduated() {
 
 template <typename Pose>
 void RobustGraph<Pose>::weighNext() {
-  fits();
+  measureFits();
   const bool more = graduated_.next(chi_squared_, weights_);
   for (std::size_t k = 0; k < weights_.size(); ++k) setWeight(graduated_ids_[k], weights_[k]);
   if (!more) endGraduated();

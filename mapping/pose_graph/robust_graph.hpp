@@ -153,7 +153,7 @@ class RobustGraph {
   Status solve(int& iterations);
   void beginGraduated();
   Status graduate(int& iterations);
-  void fits();
+  void measureFits();
   void weighNext();
   void endGraduated();
   void dropThinTies();

@@ -23,6 +23,7 @@
 #include "firmware_host/outputs/map_files/kept_map.hpp"
 #include "mapping/distance/volume_distance.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/mapping/volume_crossings.hpp"
 #include "tests/mapping/volume_scene.hpp"
 
 using namespace swiftlet;           // NOLINT(google-build-using-namespace)
@@ -97,38 +98,6 @@ std::vector<std::uint16_t> readMillimetres(const std::string& path, int width, i
   ImageSize found;
   REQUIRE(ImageDecoder::decode16(bytesOf(path), {width, height}, pixels.data(), found) == DecodeResult::kOk);
   return pixels;
-}
-
-/// Towards the neighbours of a voxel between which and it the distance changes sign [voxels].
-template <typename Found>
-void forCrossings(const VoxelVolume& volume, const VoxelIndex& voxel, const Found& found) {
-  float own = 0, other = 0;
-  if (!volume.distanceAt(voxel, own)) return;
-  for (int axis = 0; axis < 3; ++axis) {
-    for (const int sign : {-1, 1}) {
-      const Eigen::Vector3i step = sign * Eigen::Vector3i::Unit(axis);
-      if (!volume.distanceAt(voxel + VoxelIndex{step.x(), step.y(), step.z()}, other)) continue;
-      if ((own < 0) != (other < 0)) found(static_cast<double>(own / (own - other)) * step.cast<double>());
-    }
-  }
-}
-
-/// Where the volume's surface passes between two voxels [m].
-std::vector<Eigen::Vector3d> surfacePoints(const VoxelVolume& volume) {
-  std::vector<Eigen::Vector3d> points;
-  for (std::uint32_t slot = 0; slot < volume.slots(); ++slot) {
-    if (volume.voxels(slot) == nullptr) continue;
-    const BlockIndex& block = volume.header(slot).index;
-    for (int i = 0; i < static_cast<int>(kBlockVoxels); ++i) {
-      const Eigen::Vector3i voxel =
-          Eigen::Vector3i(block.x, block.y, block.z) * kBlockSide + Eigen::Vector3i(i % 8, i / 8 % 8, i / 64);
-      forCrossings(volume, {voxel.x(), voxel.y(), voxel.z()}, [&](const Eigen::Vector3d& to) {
-        points.emplace_back((voxel.cast<double>() + Eigen::Vector3d::Constant(0.5) + to) *
-                            volume.settings().voxel_size);
-      });
-    }
-  }
-  return points;
 }
 
 enum class Shade { kGrey, kBlack, kViolet, kBlue, kWarm };
@@ -206,7 +175,7 @@ TEST_CASE("a slice gives what brute force over the volume's voxels gives, across
   REQUIRE(voxelsFrom("x", 1) - voxelsFrom("x", 0) == width);
   REQUIRE(voxelsFrom("y", 1) - voxelsFrom("y", 0) == height);
 
-  const std::vector<Eigen::Vector3d> surface = surfacePoints(room);
+  const std::vector<Eigen::Vector3d> surface = surfaceCrossings(room);
   Tally tally;
   double largest = 0;
   for (int row = 0; row < height; ++row) {

@@ -14,6 +14,7 @@
 #include "mapping/volume/volume_integrator.hpp"
 #include "tests/logs/log_data.hpp"
 #include "tests/mapping/depth_log.hpp"
+#include "tests/mapping/volume_crossings.hpp"
 #include "tests/mapping/volume_run.hpp"
 #include "tests/support/skip_case.hpp"
 
@@ -42,40 +43,10 @@ bool isObserved(const VoxelVolume& volume, const Eigen::Vector3d& p) {
   return volume.distanceAt(volume.voxelAt(p), distance);
 }
 
-/// Where the distance changes sign between two voxels that were seen. The mesh goes through the same points,
-/// but for cells of which not all corners were seen: there it has none.
-std::vector<Eigen::Vector3d> crossings(const VoxelVolume& volume) {
-  std::vector<Eigen::Vector3d> points;
-  for (std::uint32_t slot = 0; slot < volume.slots(); ++slot) {
-    if (volume.voxels(slot) == nullptr) continue;
-    const BlockIndex& block = volume.header(slot).index;
-    for (int i = 0; i < static_cast<int>(kBlockVoxels); ++i) {
-      const VoxelIndex within{i % kBlockSide, i / kBlockSide % kBlockSide, i / kBlockSide / kBlockSide};
-      const VoxelIndex voxel{block.x * kBlockSide + within.x, block.y * kBlockSide + within.y,
-                             block.z * kBlockSide + within.z};
-      float own = 0;
-      if (!volume.distanceAt(voxel, own)) continue;
-      for (int axis = 0; axis < 3; ++axis) {
-        const Eigen::Vector3i step = Eigen::Vector3i::Unit(axis);
-        for (const int sign : {-1, 1}) {
-          float other = 0;
-          const VoxelIndex beside = voxel + VoxelIndex{sign * step.x(), sign * step.y(), sign * step.z()};
-          if (!volume.distanceAt(beside, other) || (own < 0) == (other < 0)) continue;
-          const double part = static_cast<double>(own / (own - other)) * sign;
-          points.push_back((Eigen::Vector3d(voxel.x, voxel.y, voxel.z).array() + 0.5).matrix() +
-                           part * step.cast<double>());
-        }
-      }
-    }
-  }
-  for (Eigen::Vector3d& point : points) point *= static_cast<double>(volume.voxelSize());
-  return points;
-}
-
 void ask(const DistanceField& field, const VoxelVolume& volume, const MeshDistance& mesh, Random& random,
          Figures& out) {
   const double size = field.limits().cell_size;
-  const std::vector<Eigen::Vector3d> points = crossings(volume);
+  const std::vector<Eigen::Vector3d> points = testing::surfaceCrossings(volume);
   const int wanted = out.observed + kSamples;
   const auto trueDistance = [&](const Eigen::Vector3d& p) {
     const auto nearest = mesh.nearest(p);
