@@ -201,7 +201,6 @@ template <typename Pose>
 void PoseGraphOptimizer<Pose>::linearize() {
   H_.reset(layout_.unknowns, layout_.pairs.size());
   gradient_.setZero(static_cast<Eigen::Index>(layout_.unknowns) * kDof);
-  cost_ = 0;
   for (std::size_t e = 0; e < graph_.edges.size(); ++e) {
     const double weight = weights_[e];
     if (weight == 0) continue;
@@ -212,7 +211,6 @@ void PoseGraphOptimizer<Pose>::linearize() {
         linearized(edge.T_from_to, graph_.poses[edge.from], graph_.poses[edge.to]);
     const PoseBlock<Pose> weighted = weight * lin.jacobian_to.transpose() * edge.information;
     const PoseTangent<Pose> g = weighted * lin.error;
-    cost_ += 0.5 * weight * lin.error.dot(edge.information * lin.error);
     const PoseBlock<Pose> W = weighted * lin.jacobian_to;
     if (to != GraphLayout::kHeld) {
       H_.diagonal[to] += W;
@@ -250,7 +248,6 @@ void PoseGraphOptimizer<Pose>::linearizeGravity() {
     const GravityFactor& factor = gravity_[k];
     if (!(factor.information.trace() > 0)) continue;
     const Eigen::Vector3d e = upOf(graph_.poses[k]).cross(factor.up_body);
-    cost_ += 0.5 * e.dot(factor.information * e);
     if (layout_.unknown[k] == GraphLayout::kHeld) continue;
     const Eigen::Matrix3d J = -hat(factor.up_body) * hat(upOf(graph_.poses[k]));
     const Eigen::Matrix3d weighted = J.transpose() * factor.information;
@@ -371,22 +368,21 @@ Status PoseGraphOptimizer<Pose>::iterate(const OptimizeEffort& effort, OptimizeR
           retracted(trial_[k], step.segment<kDof>(static_cast<Eigen::Index>(layout_.unknown[k]) * kDof));
     }
     const double cost = costAt(trial_);
-    const double gain = cost_ - cost;
+    const double gain = report.final_cost - cost;
     const double length = scale_.cwiseProduct(step).norm();
     if (gain > kAccepted * predicted && gain > 0) {
       if (gain > kGood * predicted) radius_ = std::max(radius_, kGrow * length);
       if (gain < kPoor * predicted) radius_ = kShrink * length;
       graph_.poses.swap(trial_);
+      done = gain <= effort.tolerance * report.final_cost || cost <= effort.cost_floor;
       report.final_cost = cost;
-      done = gain <= effort.tolerance * cost_ || cost <= effort.cost_floor;
       return okStatus();
     }
     ++report.rejected;
     // Neither the model nor the cost can tell the two apart any more.
-    if (predicted <= effort.tolerance * cost_ || !(predicted > 0)) break;
+    if (predicted <= effort.tolerance * report.final_cost || !(predicted > 0)) break;
     radius_ = kShrink * std::min(length, radius_);
   }
-  // The poses stay, and with them final_cost, which a sum in another order would change by its rounding.
   done = true;
   return okStatus();
 }

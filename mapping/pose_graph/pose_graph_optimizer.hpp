@@ -133,7 +133,6 @@ class PoseGraphOptimizer {
   Eigen::VectorXd damping_;
   Eigen::VectorXd newton_;
   Eigen::VectorXd cauchy_;
-  double cost_ = 0;  ///< at the linearization
   std::vector<Pose> trial_;
 };
 
