@@ -77,7 +77,7 @@ void VolumeDistance::findChanges() {
     if (seen.key != 0 && seen.key != now.key) {
       // It may stand elsewhere in the volume by now, or have come back.
       const BlockIndex dropped = blockFrom(seen.key);
-      if (volume_.find(dropped) == VoxelVolume::kNone) fill(dropped, Space::kUnknown);
+      if (volume_.find(dropped) == VoxelVolume::kNone) fill(dropped, 0);
       askAround(dropped);
     }
     if (shown) {
@@ -101,11 +101,14 @@ void VolumeDistance::askAround(const BlockIndex& block) {
   }
 }
 
-void VolumeDistance::fill(const BlockIndex& block, Space space) {
+void VolumeDistance::fill(const BlockIndex& block, std::uint64_t free_parts) {
   std::array<Space, kBlockSide> row;
-  row.fill(space);
   for (int z = 0; z < kBlockSide; ++z) {
     for (int y = 0; y < kBlockSide; ++y) {
+      for (int x = 0; x < kBlockSide; ++x) {
+        const bool free = (free_parts & partBit(x / kPartVoxels, y / kPartVoxels, z / kPartVoxels)) != 0;
+        row[static_cast<std::size_t>(x)] = free ? Space::kFree : Space::kUnknown;
+      }
       field_.setSpaces(firstCell(block) + Eigen::Vector3i(0, y, z), kWholeRow, row);
     }
   }
@@ -115,7 +118,7 @@ void VolumeDistance::read(std::uint32_t slot) {
   const BlockHeader& header = volume_.header(slot);
   if (header.state == BlockState::kUnused) return;
   if (header.state == BlockState::kFree) {
-    fill(header.index, Space::kFree);
+    fill(header.index, header.free_parts);
     return;
   }
   gather(slot);

@@ -46,7 +46,7 @@ class VolumeDistance {
   void ask(std::uint32_t slot);
   void askAround(const BlockIndex& block);
   void read(std::uint32_t slot);
-  void fill(const BlockIndex& block, Space space);
+  void fill(const BlockIndex& block, std::uint64_t free_parts);
   void gather(std::uint32_t slot);
   void readRow(const Eigen::Vector3i& first, int y, int z);
   [[nodiscard]] static CellSurface surfaceAt(const float* own);

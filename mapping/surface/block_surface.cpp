@@ -11,7 +11,7 @@
 namespace swiftlet {
 namespace {
 
-/// In place of a block without voxels: seen free as a whole, or not at all.
+/// In place of a block without voxels: seen free as a whole, or not.
 constexpr VoxelBlock evenBlock(std::uint16_t weight) {
   VoxelBlock block{};
   block.distance.fill(static_cast<std::int16_t>(kDistanceSteps));
@@ -75,8 +75,7 @@ bool BlockSurface::gatherNeighbours(const BlockIndex& block) {
         neighbour_[neighbourAt(x, y, z)] = slot;
         if (slot == VoxelVolume::kNone) continue;
         const BlockHeader& header = volume_.header(slot);
-        sides = static_cast<std::uint8_t>(
-            sides | (header.state == BlockState::kFree ? BlockHeader::kInFront : header.sides));
+        sides = static_cast<std::uint8_t>(sides | (header.isFree() ? BlockHeader::kInFront : header.sides));
       }
     }
   }
@@ -123,7 +122,8 @@ void BlockSurface::fillPadded() {
   for (std::size_t i = 0; i < block.size(); ++i) {
     const std::uint32_t slot = neighbour_[i];
     const VoxelBlock* const voxels = slot == VoxelVolume::kNone ? nullptr : volume_.voxels(slot);
-    block[i] = voxels != nullptr ? voxels : slot == VoxelVolume::kNone ? &kNowhereSeen : &kFreeBlock;
+    const bool free = slot != VoxelVolume::kNone && volume_.header(slot).isFree();
+    block[i] = voxels != nullptr ? voxels : free ? &kFreeBlock : &kNowhereSeen;
   }
   for (int z = -1; z <= kBlockSide + 1; ++z) {
     for (int y = -1; y <= kBlockSide + 1; ++y) {

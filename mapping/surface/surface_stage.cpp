@@ -43,8 +43,11 @@ void SurfaceStage::findChanges() {
       is_old_[slot] = 0;
       continue;
     }
-    // What it had before it was dropped is no more.
-    if (header.state == BlockState::kFree) store_.takeOut(header.index);
+    if (header.state == BlockState::kFree) {
+      if (!header.isFree()) continue;
+      // What it had before it was dropped is no more.
+      store_.takeOut(header.index);
+    }
     for (int z = -1; z <= 1; ++z) {
       for (int y = -1; y <= 1; ++y) {
         for (int x = -1; x <= 1; ++x) {

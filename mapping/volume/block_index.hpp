@@ -53,4 +53,23 @@ inline std::size_t offsetOf(const VoxelIndex& voxel) {
                                   ((voxel.z & kBlockMask) << (2 * kBlockBits)));
 }
 
+/// What is free without voxels of its own is known by parts of a block: 64 cubes of two voxels along an edge,
+/// a bit each, x fastest.
+inline constexpr int kPartVoxels = 2;
+inline constexpr int kPartsAlong = kBlockSide / kPartVoxels;
+inline constexpr std::uint64_t kAllParts = ~std::uint64_t{0};
+static_assert(kPartsAlong * kPartsAlong * kPartsAlong == 64);
+
+/// Of part (x, y, z) of a block, each from 0 to kPartsAlong - 1.
+constexpr std::uint64_t partBit(int x, int y, int z) {
+  return std::uint64_t{1} << static_cast<unsigned>(x + kPartsAlong * (y + kPartsAlong * z));
+}
+/// Of the part that holds the voxel at this place of a block.
+constexpr std::uint64_t partBitAt(std::size_t offset) {
+  const auto along = [offset](int axis) {
+    return static_cast<int>(offset >> static_cast<unsigned>(axis * kBlockBits)) % kBlockSide / kPartVoxels;
+  };
+  return partBit(along(0), along(1), along(2));
+}
+
 }  // namespace swiftlet

@@ -131,6 +131,17 @@ void VolumeIntegrator::begin(const SE3& T_world_camera) {
   const Eigen::Matrix3d R = T_world_camera.R();
   R_blocks_camera_ = (R / block).cast<float>();
   half_extent_ = (0.5 * block * R.transpose().cwiseAbs().rowwise().sum()).cast<float>();
+  for (int i = 0; i < 8; ++i) {
+    const auto half = [](int k) { return Eigen::Vector3i(k & 1, k >> 1 & 1, k >> 2); };
+    PartOctant& octant = octants_[static_cast<std::size_t>(i)];
+    octant.centre =
+        (0.5 * block * R.transpose() * (half(i).cast<double>().array() - 0.5).matrix()).cast<float>();
+    octant.bits = 0;
+    for (int k = 0; k < 8; ++k) {
+      const Eigen::Vector3i part = 2 * half(i) + half(k);
+      octant.bits |= octant.bit[static_cast<std::size_t>(k)] = partBit(part.x(), part.y(), part.z());
+    }
+  }
   update_.begin(image_, T_camera_world_);
   window_.clear();
   volume_.beginChange();
@@ -261,33 +272,53 @@ bool VolumeIntegrator::walk(const Eigen::Vector3f& direction, float length, std:
 void VolumeIntegrator::meetOnRay(const BlockIndex& block, VolumeStep& out) {
   const std::uint32_t slot = volume_.find(block);
   if (holdsImage(slot)) return;
-  const bool has_voxels = slot != VoxelVolume::kNone && volume_.header(slot).state == BlockState::kVoxels;
+  const BlockState state = slot != VoxelVolume::kNone ? volume_.header(slot).state : BlockState::kUnused;
+  const std::uint64_t known = state == BlockState::kFree ? volume_.header(slot).free_parts : 0;
+  if (known == kAllParts) return;
+  const Eigen::Vector3f centre = (T_camera_world_ * volume_.centreOf(block).cast<double>()).cast<float>();
+  const float behind = freeBehind(centre, 1);
   const auto truncation = static_cast<float>(volume_.settings().truncation);
-  const float behind = freeBehind(block);
-  if (has_voxels) {
+  if (state == BlockState::kVoxels) {
     // In front of a surface seen at a glancing angle, much depth is little distance.
     update(slot, behind >= truncation / PreparedImage::kLeastSlope, out);
-  } else if (behind >= truncation) {
-    volume_.addFree(block, vehicle_);
-    ++out.freed;
+  } else if (const std::uint64_t parts = behind >= truncation ? kAllParts : freeParts(centre, known);
+             parts != 0) {
+    volume_.addFree(block, parts, vehicle_);
   }
 }
 
-float VolumeIntegrator::freeBehind(const BlockIndex& block) const {
+std::uint64_t VolumeIntegrator::freeParts(const Eigen::Vector3f& centre, std::uint64_t known) const {
+  const auto truncation = static_cast<float>(volume_.settings().truncation);
+  std::uint64_t parts = 0;
+  // By halves: an octant that is free as a whole needs one look.
+  for (const PartOctant& octant : octants_) {
+    if ((known & octant.bits) == octant.bits) continue;
+    const Eigen::Vector3f middle = centre + octant.centre;
+    if (freeBehind(middle, 0.5F) >= truncation) {
+      parts |= octant.bits;
+      continue;
+    }
+    for (std::size_t k = 0; k < octant.bit.size(); ++k) {
+      if ((known & octant.bit[k]) != 0) continue;
+      if (freeBehind(middle + 0.5F * octants_[k].centre, 0.25F) >= truncation) parts |= octant.bit[k];
+    }
+  }
+  return parts;
+}
+
+float VolumeIntegrator::freeBehind(const Eigen::Vector3f& centre, float share) const {
   constexpr float kUnknown = -1;
-  const Eigen::Vector3f centre = (T_camera_world_ * volume_.centreOf(block).cast<double>()).cast<float>();
-  const float nearest = centre.z() - half_extent_.z(), farthest = centre.z() + half_extent_.z();
+  const Eigen::Vector3f extent = share * half_extent_;
+  const float nearest = centre.z() - extent.z(), farthest = centre.z() + extent.z();
   if (nearest < kNearestBlock) return kUnknown;
   const PinholeIntrinsics& c = image_.camera();
-  // Of the block's box in camera axes, the corners that project farthest out.
+  // Of the cube's box in camera axes, the corners that project farthest out.
   const auto low = [&](float x) { return x / (x < 0 ? nearest : farthest); };
   const auto high = [&](float x) { return x / (x > 0 ? nearest : farthest); };
-  const auto left = static_cast<float>(c.fx) * low(centre.x() - half_extent_.x()) + static_cast<float>(c.cx);
-  const auto right =
-      static_cast<float>(c.fx) * high(centre.x() + half_extent_.x()) + static_cast<float>(c.cx);
-  const auto top = static_cast<float>(c.fy) * low(centre.y() - half_extent_.y()) + static_cast<float>(c.cy);
-  const auto bottom =
-      static_cast<float>(c.fy) * high(centre.y() + half_extent_.y()) + static_cast<float>(c.cy);
+  const auto left = static_cast<float>(c.fx) * low(centre.x() - extent.x()) + static_cast<float>(c.cx);
+  const auto right = static_cast<float>(c.fx) * high(centre.x() + extent.x()) + static_cast<float>(c.cx);
+  const auto top = static_cast<float>(c.fy) * low(centre.y() - extent.y()) + static_cast<float>(c.cy);
+  const auto bottom = static_cast<float>(c.fy) * high(centre.y() + extent.y()) + static_cast<float>(c.cy);
   if (!(left >= 0 && top >= 0 && right <= static_cast<float>(c.width - 1) &&
         bottom <= static_cast<float>(c.height - 1))) {
     return kUnknown;

@@ -42,7 +42,6 @@ struct VolumeStep {
   std::uint32_t created = 0;   ///< of them, new
   std::uint32_t updated = 0;   ///< blocks projected, band and others
   std::uint32_t carved = 0;    ///< blocks with voxels, free as a whole
-  std::uint32_t freed = 0;     ///< blocks without voxels, free as a whole
   std::uint32_t changed = 0;   ///< blocks that readers have to look at
   std::uint32_t left_out = 0;  ///< for lack of effort; blocks met behind that are not counted
   std::uint32_t no_room = 0;   ///< new blocks refused
@@ -84,6 +83,13 @@ class VolumeIntegrator {
     SE3 T_world_body;
   };
 
+  /// An eighth of a block.
+  struct PartOctant {
+    Eigen::Vector3f centre = Eigen::Vector3f::Zero();  ///< from the block's, in camera axes [m]
+    std::array<std::uint64_t, 8> bit{};                ///< of its parts, in the order of the octants
+    std::uint64_t bits = 0;                            ///< all of them
+  };
+
   Status fuse(const DepthImageView& image, const SE3& T_world_camera, const VolumeEffort& effort,
               VolumeStep& out);
   [[nodiscard]] bool holdsImage(std::uint32_t slot) const {
@@ -96,8 +102,11 @@ class VolumeIntegrator {
   void walkBundles(std::uint32_t blocks, VolumeStep& out);
   bool walk(const Eigen::Vector3f& direction, float length, std::uint32_t blocks, VolumeStep& out);
   void meetOnRay(const BlockIndex& block, VolumeStep& out);
-  /// Depth [m] between the block and what is measured behind it; negative where that is not known.
-  [[nodiscard]] float freeBehind(const BlockIndex& block) const;
+  /// Depth [m] between a cube, `share` as large as a block, and what is measured behind it; negative where
+  /// that is not known. `centre`: in camera axes.
+  [[nodiscard]] float freeBehind(const Eigen::Vector3f& centre, float share) const;
+  /// Those that the image sees free of the block with this centre; `known` ones need not be looked at.
+  [[nodiscard]] std::uint64_t freeParts(const Eigen::Vector3f& centre, std::uint64_t known) const;
   void update(std::uint32_t slot, bool carve, VolumeStep& out);
 
   VoxelVolume& volume_;
@@ -118,6 +127,7 @@ class VolumeIntegrator {
   Eigen::Vector3f origin_ = Eigen::Vector3f::Zero();
   Eigen::Matrix3f R_blocks_camera_ = Eigen::Matrix3f::Identity();
   Eigen::Vector3f half_extent_ = Eigen::Vector3f::Zero();  ///< of a block in camera axes [m]
+  std::array<PartOctant, 8> octants_;
   std::array<std::int32_t, 6> last_band_{};
 };
 

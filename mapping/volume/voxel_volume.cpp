@@ -73,12 +73,12 @@ Eigen::Vector3f VoxelVolume::centreOf(const BlockIndex& block) const {
 bool VoxelVolume::distanceAt(const VoxelIndex& voxel, float& distance) const {
   const std::uint32_t slot = find(blockOf(voxel));
   if (slot == kNone) return false;
+  const std::size_t at = offsetOf(voxel);
   if (headers_[slot].state == BlockState::kFree) {
     distance = static_cast<float>(settings_.truncation);
-    return true;
+    return (headers_[slot].free_parts & partBitAt(at)) != 0;
   }
   const VoxelBlock& block = blocks_[headers_[slot].data];
-  const std::size_t at = offsetOf(voxel);
   distance = distanceStep() * static_cast<float>(block.distance[at]);
   return block.weight[at] > 0;
 }
@@ -153,42 +153,43 @@ std::uint32_t VoxelVolume::obtain(const BlockIndex& block) {
     ++counters_.refused;
     return kNone;
   }
-  float weight = 0;
   if (slot == kNone) {
     slot = newHeader(block);
     if (slot == kNone) return kNone;
   } else {
     --free_count_;
-    // Free by the depth in front of what was measured, which is more than the distance: one observation.
-    weight = 1;
   }
   BlockHeader& header = headers_[slot];
+  const std::uint64_t free_parts = std::exchange(header.free_parts, 0);
   header.state = BlockState::kVoxels;
   header.data = unused_data_.back();
-  header.sides = weight > 0 ? BlockHeader::kInFront : std::uint8_t{0};
+  header.sides = free_parts != 0 ? BlockHeader::kInFront : std::uint8_t{0};
   header.drift = 0;
   header.revision = revision_;
   unused_data_.pop_back();
   VoxelBlock& voxels = blocks_[header.data];
   voxels.distance.fill(static_cast<std::int16_t>(kDistanceSteps));
-  voxels.weight.fill(static_cast<std::uint16_t>(std::min(kWeightSteps * weight, 65535.0F)));
+  // Free by the depth in front of what was measured, which is more than the distance: one observation.
+  for (std::size_t at = 0; at < kBlockVoxels; ++at)
+    voxels.weight[at] = (free_parts & partBitAt(at)) != 0 ? static_cast<std::uint16_t>(kWeightSteps) : 0;
   voxels.grey.fill(0);
   if (!labels_.empty()) labels_[header.data].counts.fill(LabelCounts{});
   return slot;
 }
 
-void VoxelVolume::addFree(const BlockIndex& block, const Eigen::Vector3f& vehicle) {
+void VoxelVolume::addFree(const BlockIndex& block, std::uint64_t parts, const Eigen::Vector3f& vehicle) {
   std::uint32_t slot = find(block);
   if (slot == kNone) {
     if (free_count_ == freeCapacity()) dropFarFree(vehicle);
     slot = newHeader(block);
     if (slot == kNone) return;
     headers_[slot].state = BlockState::kFree;
-    headers_[slot].revision = revision_;
     ++free_count_;
   }
   BlockHeader& header = headers_[slot];
-  if (header.free_count < std::numeric_limits<std::uint16_t>::max()) ++header.free_count;
+  if ((parts & ~header.free_parts) == 0) return;
+  header.free_parts |= parts;
+  header.revision = revision_;
 }
 
 void VoxelVolume::dropFarFree(const Eigen::Vector3f& vehicle) {

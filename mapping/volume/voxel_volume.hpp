@@ -2,7 +2,8 @@
 // The volume: blocks of voxels around surfaces, and blocks known to be free, in memory fixed at construction.
 //
 // World axes (of whoever gives the poses), metres. A block is in one of two states: kVoxels, with data from
-// the block pool; kFree, seen free as a whole, without data. What is not in the volume is unknown.
+// the block pool; kFree, without data, of which some parts were seen free and nothing is known of the others.
+// What is not in the volume is unknown.
 //
 // For readers (surface, distance field): slots 0 to slots() - 1 in order are every block, in an order that
 // only the history decides; revision(slot) tells each reader by itself what has changed since it last looked;
@@ -33,7 +34,7 @@ struct BlockHeader {
   std::uint32_t data = BlockHash::kNone;  ///< in the pool, for kVoxels
   std::uint32_t revision = 0;             ///< the volume's at the last change
   std::uint32_t born = 0;                 ///< the volume's when the block became known
-  std::uint16_t free_count = 0;           ///< for kFree: images that saw it free, saturating
+  std::uint64_t free_parts = 0;           ///< for kFree: never 0
   BlockState state = BlockState::kUnused;
   /// For kVoxels: kInFront and kBehind, where any observed voxel is on that side of a surface. A surface
   /// passes between voxels of both sides only.
@@ -43,6 +44,8 @@ struct BlockHeader {
 
   static constexpr std::uint8_t kInFront = 1;
   static constexpr std::uint8_t kBehind = 2;
+
+  [[nodiscard]] bool isFree() const { return free_parts == kAllParts; }  ///< as a whole
 };
 
 class VoxelVolume;
@@ -128,10 +131,10 @@ class VoxelVolume {
   /// drops blocks, and takes out of `wanted` those that are refused. Slots may change hands.
   void makeRoom(const Eigen::Vector3f& vehicle, std::vector<BlockIndex>& wanted);
   /// The slot of a block with voxels: the one there is, else a new one, its voxels unobserved (or free,
-  /// by one observation, where the block was seen free). kNone when full: makeRoom() first.
+  /// by one observation, where they were seen free). kNone when full: makeRoom() first.
   std::uint32_t obtain(const BlockIndex& block);
-  /// One more image saw the whole block free, which has no voxels. A full table drops the farthest.
-  void addFree(const BlockIndex& block, const Eigen::Vector3f& vehicle);
+  /// These parts of the block, which has no voxels, were seen free. A full table drops the farthest.
+  void addFree(const BlockIndex& block, std::uint64_t parts, const Eigen::Vector3f& vehicle);
 
   /// Drops blocks after the listeners have seen them.
   void remove(std::span<const std::uint32_t> slots);

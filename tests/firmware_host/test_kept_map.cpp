@@ -95,7 +95,8 @@ Place mapped(int views) {
   place.volume.beginChange();
   // More than one record has room for, in no order.
   for (std::int32_t i = 0; i < 600; ++i)
-    place.volume.addFree({i * 7 % 600, 40, i % 3}, place.vehicle.cast<float>());
+    place.volume.addFree({i * 7 % 600, 40, i % 3}, i % 4 == 0 ? kAllParts : std::uint64_t{1} << (i % 64),
+                         place.vehicle.cast<float>());
   place.epoch = 3;
   return place;
 }
@@ -134,13 +135,35 @@ std::string smallMap() {
     }
     place.volume.changeHeader(slot).sides = BlockHeader::kInFront | BlockHeader::kBehind;
   }
-  for (const std::int32_t x : {4, 5, 6}) place.volume.addFree({x, 0, 0}, Eigen::Vector3f::Zero());
+  for (const std::int32_t x : {4, 5, 6}) place.volume.addFree({x, 0, 0}, kAllParts, Eigen::Vector3f::Zero());
   const ConfusionModel confusion;
   SurfaceStage stage(place.volume, confusion, place.surface);
   SurfaceStep drawn;
   REQUIRE(stage.step(Eigen::Vector3f::Zero(), {}, drawn).ok());
   REQUIRE(place.surface.patches() == 2);
   return place.kept();
+}
+
+/// The map as version 1 had it: without parts of free blocks, all of which are free as a whole.
+std::string asVersion1(const std::string& bytes) {
+  constexpr std::size_t kIndex = 12, kParts = 8;
+  constexpr char kFree = 2;
+  std::string out = bytes.substr(0, kHead);
+  out[8] = 1;
+  for (const std::size_t at : recordsOf(bytes)) {
+    std::string record = bytes.substr(at, kRecord + word(bytes, at + 8));
+    if (record[4] == kFree) {
+      std::string entries;
+      for (std::size_t i = kRecord; i < record.size(); i += kIndex + kParts)
+        entries += record.substr(i, kIndex) + std::string("\5\0\0\0", 4);
+      const auto length = static_cast<std::uint32_t>(entries.size());
+      std::memcpy(record.data() + 8, &length, sizeof(length));
+      record = record.substr(0, kRecord) + entries;
+    }
+    out += record;
+  }
+  reseal(out);
+  return out;
 }
 
 /// A stage with a depth sensor, over the same ball.
@@ -223,6 +246,14 @@ TEST_CASE("a map comes back bit by bit, with its surface", "[kept_map]") {
     }
     REQUIRE(std::equal(a->triangles.begin(), a->triangles.end(), b->triangles.begin(), b->triangles.end()));
   }
+}
+
+TEST_CASE("a map of version 1 is read, its free blocks as free as a whole", "[kept_map]") {
+  const std::string bytes = smallMap(), old = asVersion1(bytes);
+  CHECK(old.size() == bytes.size() - 3 * 4);
+  Place place;
+  CHECK(load(old, place).held.free_blocks == 3);
+  CHECK(place.kept() == bytes);
 }
 
 TEST_CASE("a map that was kept and continued is that of an uninterrupted flight", "[kept_map]") {
@@ -308,7 +339,7 @@ TEST_CASE("what no map holds is refused though its checksums are right", "[kept_
     CHECK(refusal(changed).find(field) != std::string::npos);
   };
   const std::size_t payload = at[0] + kRecord;
-  refused(8, {2}, "version");
+  refused(8, {3}, "version");
   refused(12, {97}, "head's length");
   refused(22, {0, 0x80}, "settings");
   refused(40, {3}, "flags");
@@ -323,7 +354,7 @@ TEST_CASE("what no map holds is refused though its checksums are right", "[kept_
   refused(payload + 20, {0, 0x80}, "distance");
   refused(payload + 20 + 5 * 512 + 2, {1, 8}, "label counts");
   refused(at[1] + kRecord, {0}, "farther");
-  refused(at[2] + kRecord + 12, {0, 0}, "images that saw it free");
+  refused(at[2] + kRecord + 12, {0, 0, 0, 0, 0, 0, 0, 0}, "free parts");
   refused(at[3] + kRecord + 12, {9}, "vertices and triangles");
   refused(at[3] + kRecord + 16, {0, 0, 0x80, 0x7F}, "vertex");
   refused(at[3] + kRecord + 16 + 16, {77}, "label");

@@ -275,7 +275,7 @@ void keepWall(const std::string& path, const std::vector<BlockIndex>& free = {})
   VolumeStep step;
   REQUIRE(
       integrator.step(render(pose, 1, Plane{-Eigen::Vector3d::UnitX(), -1.5}).view(), pose, {}, step).ok());
-  for (const BlockIndex& block : free) volume.addFree(block, Eigen::Vector3f::Zero());
+  for (const BlockIndex& block : free) volume.addFree(block, kAllParts, Eigen::Vector3f::Zero());
   keep(path, volume);
 }
 
@@ -295,7 +295,7 @@ TEST_CASE("what cannot be drawn is refused with file, option and remedy, and not
   keep(empty, VoxelVolume(sceneSettings()));
   VoxelVolume seen_free(sceneSettings());
   seen_free.beginChange();
-  seen_free.addFree({1, 2, 3}, Eigen::Vector3f::Zero());
+  seen_free.addFree({1, 2, 3}, kAllParts, Eigen::Vector3f::Zero());
   keep(free, seen_free);
   const std::string gap = folder.file("gap.swm"), wide = folder.file("wide.swm");
   keepWall(gap, {{3, 0, 20}});

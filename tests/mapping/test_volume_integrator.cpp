@@ -47,11 +47,22 @@ void forObserved(const VoxelVolume& volume, const F& f) {
   }
 }
 
+/// f(position) for every voxel that is free without data of its own.
+template <typename F>
+void forFree(const VoxelVolume& volume, const F& f) {
+  for (std::uint32_t slot = 0; slot < volume.slots(); ++slot) {
+    const BlockHeader& header = volume.header(slot);
+    for (std::size_t i = 0; header.state == BlockState::kFree && i < kBlockVoxels; ++i) {
+      if ((header.free_parts & partBitAt(i)) != 0) f(centreOf(volume, header.index, i));
+    }
+  }
+}
+
 bool sameBytes(const VoxelVolume& a, const VoxelVolume& b) {
   if (a.slots() != b.slots()) return false;
   for (std::uint32_t slot = 0; slot < a.slots(); ++slot) {
-    if (!(a.header(slot).index == b.header(slot).index) || a.header(slot).state != b.header(slot).state)
-      return false;
+    const BlockHeader &ha = a.header(slot), &hb = b.header(slot);
+    if (!(ha.index == hb.index) || ha.state != hb.state || ha.free_parts != hb.free_parts) return false;
     const VoxelBlock *va = a.voxels(slot), *vb = b.voxels(slot);
     if (va == nullptr) continue;
     if (std::memcmp(va, vb, sizeof(VoxelBlock)) != 0) return false;
@@ -192,11 +203,53 @@ TEST_CASE("what has gone is carved away, and blocks in front are free") {
   CHECK(distance > 0.14F);
   CHECK(fused.volume.freeCount() > 0);
   // Free is only what lies in front of the wall.
-  for (std::uint32_t slot = 0; slot < fused.volume.slots(); ++slot) {
-    if (fused.volume.header(slot).state != BlockState::kFree) continue;
-    CHECK(fused.volume.centreOf(fused.volume.header(slot).index).x() < 3 - 0.15F - 0.2F);
-  }
+  forFree(fused.volume, [&](const Eigen::Vector3d& p) { CHECK(p.x() < 3 - 0.15 - 0.025); });
   CHECK_FALSE(fused.volume.distanceAt(fused.volume.voxelAt({4, 0, 0}), distance));
+}
+
+TEST_CASE("parts of a block are free where some image saw them, though none saw the whole block") {
+  // Two views that overlap by less than a block, so that the blocks between are seen in parts alone.
+  Fused fused;
+  const SE3 left = lookAt({0, 0, 0}, {1, 0.7, 0}), right = lookAt({0, 0, 0}, {1, -0.7, 0});
+  REQUIRE(fused.add(render(left, 1, kWall), left).ok());
+  REQUIRE(fused.add(render(right, 2, kWall), right).ok());
+  // The half extent of a part in voxels: its voxels' centres lie half a voxel inside.
+  const double voxel = fused.volume.settings().voxel_size;
+  const auto sees = [&](const SE3& view, const Eigen::Vector3d& p, double margin) {
+    const Eigen::Vector3d c = view.inverse() * p;
+    const PinholeIntrinsics& k = kSceneCamera;
+    const double u = k.fx * c.x() / c.z() + k.cx, v = k.fy * c.y() / c.z() + k.cy,
+                 pixels = margin * k.fx / c.z();
+    return c.z() > 0.05 + margin && std::min({u, v, k.width - 1 - u, k.height - 1 - v}) > pixels;
+  };
+  std::size_t unseen = 0, whole = 0, parts = 0;
+  forFree(fused.volume,
+          [&](const Eigen::Vector3d& p) { unseen += sees(left, p, 0) || sees(right, p, 0) ? 0U : 1U; });
+  CHECK(unseen == 0);
+  for (std::uint32_t slot = 0; slot < fused.volume.slots(); ++slot) {
+    const BlockHeader& header = fused.volume.header(slot);
+    if (header.state != BlockState::kFree) continue;
+    (header.isFree() ? whole : parts) += 1;
+  }
+  CHECK(whole > 20);
+  CHECK(parts > 20);
+  // Everything that a view sees with a part around it is known, as far as the bundles of rays, 16 pixels
+  // apart, are less than half a block apart.
+  std::size_t missing = 0, all = 0;
+  const double margin = 2 * std::sqrt(3.0) * kPartVoxels * voxel;
+  for (double x = 0.3; x < 1.2; x += 0.03) {
+    for (double y = -2; y < 2; y += 0.07) {
+      for (double z = -1; z < 1; z += 0.07) {
+        const Eigen::Vector3d p(x, y, z);
+        if (!sees(left, p, margin) && !sees(right, p, margin)) continue;
+        float distance = 0;
+        ++all;
+        missing += fused.volume.distanceAt(fused.volume.voxelAt(p), distance) ? 0U : 1U;
+      }
+    }
+  }
+  CHECK(all > 5000);
+  CHECK(missing == 0);
 }
 
 TEST_CASE("masked labels give no surface and carve up to themselves only") {

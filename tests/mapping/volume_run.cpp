@@ -45,6 +45,8 @@ VolumeRun fuse(const DepthLog& log, const RunOptions& options) {
     if (!options.settings.labels) image.intensity = nullptr;
     VolumeStep fused;
     SurfaceStep drawn;
+    float unused = 0;
+    run.body_known += volume.distanceAt(volume.voxelAt(T.translation), unused) ? 1U : 0U;
     run.integration_ms.push_back(
         test::timed([&] { (void)integrator.step(image, T, options.effort, fused); }));
     run.surface_ms.push_back(test::timed([&] { (void)stage->step(T.translation.cast<float>(), {}, drawn); }));

@@ -31,6 +31,7 @@ struct VolumeRun {
   std::vector<double> integration_ms;  ///< CPU, each image
   std::vector<double> surface_ms;
   std::size_t blocks = 0, most_blocks = 0, capacity = 0, free_blocks = 0;
+  std::size_t body_known = 0;  ///< images at whose body the volume knew the voxel before
   std::size_t volume_bytes = 0, integrator_bytes = 0, surface_bytes = 0;
   std::size_t drawn = 0;
   VolumeCounters volume;

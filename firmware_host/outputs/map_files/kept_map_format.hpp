@@ -20,7 +20,9 @@ namespace swiftlet::kept {
 
 /// As a recording's (recording_format.hpp), for maps.
 inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'S', 'W', 'M', '\r', '\n', 0x1A, '\n'};
-inline constexpr std::uint32_t kVersion = 1;
+inline constexpr std::uint32_t kVersion = 2;
+/// Blocks were free as a whole or not at all: in place of their parts, the images that saw them so.
+inline constexpr std::uint32_t kVersionOfWholeBlocks = 1;
 inline constexpr std::size_t kHeadBytes = 96;
 inline constexpr std::size_t kHeadCrcAt = kHeadBytes - sizeof(std::uint32_t);
 inline constexpr std::uint32_t kHasLabels = 1;
@@ -33,8 +35,9 @@ inline constexpr std::size_t kIndexBytes = 12;
 /// Index, sides, three zeros, drift, then distances, weights, grey values.
 inline constexpr std::size_t kBlockBytes = kIndexBytes + 8 + kBlockVoxels * 5;
 inline constexpr std::size_t kLabelBytes = kBlockVoxels * 8;
-/// Index, images that saw it free, a zero.
-inline constexpr std::size_t kFreeBytes = kIndexBytes + 4;
+/// Index, the parts that were seen free.
+inline constexpr std::size_t kFreeBytes = kIndexBytes + 8;
+inline constexpr std::size_t kFreeBytesOfWholeBlocks = kIndexBytes + 4;
 inline constexpr std::size_t kMostFree = 256;  ///< in a record
 /// Index, vertices, triangles.
 inline constexpr std::size_t kPatchBytes = kIndexBytes + 4;

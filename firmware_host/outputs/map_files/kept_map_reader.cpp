@@ -33,7 +33,7 @@ class MapTaker {
  public:
   virtual ~MapTaker() = default;
   virtual void block(const ReadBlock& /*block*/) {}
-  virtual void freeBlock(const BlockIndex& /*block*/, std::uint16_t /*images*/) {}
+  virtual void freeBlock(const BlockIndex& /*block*/, std::uint64_t /*parts*/) {}
   virtual void patch(const SurfacePatch& /*patch*/) {}
 };
 
@@ -81,6 +81,7 @@ class MapReader {
   std::uint64_t record_ = 0;  ///< first byte of the record in hand
   std::size_t length_ = 0;    ///< of its payload
   std::vector<std::uint8_t> bytes_;
+  bool whole_blocks_ = false;  ///< kVersionOfWholeBlocks
   Head head_;
   BlockIndex vehicle_;
   std::uint32_t head_crc_ = 0;
@@ -114,10 +115,12 @@ void MapReader::readHead() {
   head_crc_ = crc32c(0, {bytes_.data(), kHeadCrcAt});
   const bool sound = head_crc_ == LittleEndianReader({bytes_.data() + kHeadCrcAt, sizeof(head_crc_)}).u32();
   demand(sound, 0, "head's checksum", "is not that of its bytes: the file is damaged");
-  if (version != kVersion) {
-    throw InputError(name_, 0, fmt::format("byte {}: version", kVersionAt),
-                     fmt::format("is {}, this program reads {}", version, kVersion),
-                     "Use the program that kept the map, or begin a new one");
+  whole_blocks_ = version == kVersionOfWholeBlocks;
+  if (version != kVersion && !whole_blocks_) {
+    throw InputError(
+        name_, 0, fmt::format("byte {}: version", kVersionAt),
+        fmt::format("is {}, this program reads {} and {}", version, kVersionOfWholeBlocks, kVersion),
+        "Use the program that kept the map, or begin a new one");
   }
   demand(bytes == kHeadBytes, kSizeAt, "head's length", "is not that of this version");
   head_.voxel_size = from.f64();
@@ -251,14 +254,21 @@ void MapReader::readBlock(MapTaker& taker) {
 }
 
 void MapReader::readFree(MapTaker& taker) {
-  demand(length_ > 0 && length_ % kFreeBytes == 0, record_, "free blocks' length", "is not that of some");
+  const std::size_t each = whole_blocks_ ? kFreeBytesOfWholeBlocks : kFreeBytes;
+  demand(length_ > 0 && length_ % each == 0, record_, "free blocks' length", "is not that of some");
   LittleEndianReader from = payload();
-  for (std::size_t i = 0; i < length_; i += kFreeBytes) {
+  for (std::size_t i = 0; i < length_; i += each) {
     const BlockIndex block = readIndex(from, i);
-    const std::uint16_t images = from.u16();
-    demand(images > 0 && from.u16() == 0, at(i + kIndexBytes), "images that saw it free", "are none");
+    std::uint64_t parts = kAllParts;
+    if (whole_blocks_) {
+      const std::uint16_t images = from.u16();
+      demand(images > 0 && from.u16() == 0, at(i + kIndexBytes), "images that saw it free", "are none");
+    } else {
+      parts = from.u64();
+      demand(parts != 0, at(i + kIndexBytes), "free parts", "are none");
+    }
     ++found_.free_blocks;
-    taker.freeBlock(block, images);
+    taker.freeBlock(block, parts);
   }
 }
 
@@ -323,15 +333,10 @@ class VolumeLoader : public MapTaker {
     volume_.changeVoxels(slot) = block.voxels;
     if (LabelBlock* labels = volume_.changeLabels(slot); labels != nullptr) *labels = block.labels;
   }
-  void freeBlock(const BlockIndex& block, std::uint16_t images) override {
+  void freeBlock(const BlockIndex& block, std::uint64_t parts) override {
     const bool room = volume_.freeCount() < volume_.freeCapacity();
-    if (room && volume_.find(block) == VoxelVolume::kNone) volume_.addFree(block, vehicle_);
-    const std::uint32_t slot = volume_.find(block);
-    if (slot == VoxelVolume::kNone) {
-      ++report_.without_room.free_blocks;
-    } else if (volume_.header(slot).state == BlockState::kFree) {
-      volume_.changeHeader(slot).free_count = images;
-    }
+    if (room && volume_.find(block) == VoxelVolume::kNone) volume_.addFree(block, parts, vehicle_);
+    if (volume_.find(block) == VoxelVolume::kNone) ++report_.without_room.free_blocks;
   }
 
  protected:

@@ -140,8 +140,7 @@ void MapWriter::writeFree() {
     for (std::size_t i = first; i < std::min(first + kMostFree, free_.size()); ++i) {
       const BlockHeader& header = map_.volume.header(free_[i].slot);
       index(to, header.index);
-      to.u16(header.free_count);
-      to.u16(0);
+      to.u64(header.free_parts);
     }
     finish(Kind::kFree, to);
   }
