@@ -404,7 +404,7 @@ Status PoseGraphOptimizer<Pose>::optimize(const OptimizeEffort& effort, Optimize
 }
 
 template <typename Pose>
-Status PoseGraphOptimizer<Pose>::start(StartReport& report) {
+Status PoseGraphOptimizer<Pose>::start(StartReport& report, bool anew) {
   report = {};
   report.given_cost = cost();
   report.chordal_cost = std::numeric_limits<double>::infinity();
@@ -415,7 +415,7 @@ Status PoseGraphOptimizer<Pose>::start(StartReport& report) {
   ChordalStart<Pose> chordal;
   if (!chordal.run(graph_.edges, weights_, layout_, poses).ok()) return okStatus();
   report.chordal_cost = costAt(poses);
-  if (!(report.chordal_cost < report.given_cost)) return okStatus();
+  if (!(report.chordal_cost < report.given_cost) && !anew) return okStatus();
   report.choice = StartChoice::kChordal;
   graph_.poses.swap(poses);
   linear_at_poses_ = false;

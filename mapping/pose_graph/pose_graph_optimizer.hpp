@@ -84,8 +84,8 @@ class PoseGraphOptimizer {
   Status truncate(std::size_t poses, std::size_t edges);
 
   /// Compares the present poses with those of ChordalStart and keeps the better (docs/pose_graph.md section
-  /// 3). kNumerical when neither can be had.
-  Status start(StartReport& report);
+  /// 3); where `anew`, ChordalStart's whatever they cost. kNumerical when neither can be had.
+  Status start(StartReport& report, bool anew = false);
 
   /// kNotReady without poses; kNumerical when the normal equations cannot be factored even with damping;
   /// kCapacityReached when the factor needs more than max_factor_values. The poses are then the best so far.

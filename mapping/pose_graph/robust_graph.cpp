@@ -23,6 +23,9 @@ constexpr int kSolutionIterations = 100;
 constexpr int kGraduatedIterations = 5;
 constexpr double kGraduatedTolerance = 1e-4;
 
+/// Of the cost: what another minimum must be lower by. So the search for lower ones ends.
+constexpr double kWorthwhile = 1e-3;
+
 /// Sigmas of its tilt that a pose may lean before the graph is solved for that alone.
 constexpr double kLeaning = 3;
 
@@ -529,6 +532,45 @@ bool RobustGraph<Pose>::believeFits() {
   phase_ = Phase::kSolve;
   solve_iterations_ = 0;
   return true;
+}
+
+template <typename Pose>
+Status RobustGraph<Pose>::settleAnew() {
+  const auto dropped = [](const Member& member) { return member.taken && member.weight < 1; };
+  const auto costNow = [this] {
+    return optimizer_.cost() + 0.5 * settings_.graduated.max_chi_squared * (loops() - believed_);
+  };
+  while (std::any_of(members_.begin(), members_.end(), dropped)) {
+    const std::vector<Pose> poses = graph().poses;
+    const std::vector<Member> members = members_;
+    const OptimizeReport solution = solution_;
+    const double cost = costNow();
+    StartReport start;
+    Status status = optimizer_.start(start, true);
+    if (!status.ok() || start.choice == StartChoice::kGiven) return status;
+    // Dropped ones are as good as those that were not selected.
+    for (std::uint32_t id = 0; id < loops(); ++id) {
+      if (dropped(members_[id]) && selection_.chained(id).withinComponent()) members_[id].taken = false;
+    }
+    restart(Phase::kSolve);
+    bool moved = false;
+    status = settle(std::numeric_limits<int>::max(), moved);
+    for (std::uint32_t id = 0; id < loops(); ++id) {
+      members_[id].taken = members_[id].taken || members[id].taken;
+    }
+    if (status.ok() && costNow() < (1 - kWorthwhile) * cost) continue;
+    for (std::uint32_t k = 0; k < size(); ++k) static_cast<void>(optimizer_.setPose(k, poses[k]));
+    for (std::uint32_t id = 0; id < loops(); ++id) {
+      const std::uint32_t edge = members_[id].edge;
+      members_[id] = members[id];
+      members_[id].edge = edge;
+      setWeight(id, members[id].weight);
+    }
+    countBelieved();
+    solution_ = solution;
+    break;
+  }
+  return okStatus();
 }
 
 template <typename Pose>

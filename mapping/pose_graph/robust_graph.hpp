@@ -11,6 +11,7 @@
 //    two tests: with the loop's own covariance alone; or, for the `max_reconsidered` that contradict fewest
 //    of the others, with that of the relative pose on the solved graph added (a true loop may be far off a
 //    solution without it where that is vague). Then 3 and 4 again, until no loop comes back.
+// 6. Off the flight, settleAnew(): 3 to 5 again from first poses without those that were dropped.
 // How small a chance must be follows from how many loops are tested and how many agree (chance_limit.hpp): in
 // 2 such that `max_false` random loops a graph are believed on the odometry alone, were all random; in 5 such
 // that of those coming back no larger share is random, and a random one comes back to `max_false` of the
@@ -96,6 +97,10 @@ class RobustGraph {
   /// Works on 3 to 5, at most `iterations` of the optimizer. `moved`: poses may have changed. The
   /// optimizer's errors; it is then at rest until something changes.
   Status settle(int iterations, bool& moved);
+  /// Off the flight, at rest: where loops were dropped, again from first poses out of the believed ones alone
+  /// (false ones may have led the solution into a wrong minimum), as long as that lowers the cost, in which
+  /// one that is not believed counts what lets it be dropped.
+  Status settleAnew();
   [[nodiscard]] bool atRest() const { return phase_ == Phase::kRest; }
 
   [[nodiscard]] std::uint32_t size() const { return selection_.odometry().size(); }

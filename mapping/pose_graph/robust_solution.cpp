@@ -74,8 +74,9 @@ Status solveRobustly(const RobustGraphSettings& settings, std::span<const std::u
   solution.selected = robust.believed();
   if (const Status status = robust.start(solution.start); !status.ok()) return status;
   bool moved = false;
-  const Status status = robust.settle(std::numeric_limits<int>::max(), moved);
-  if (!status.ok()) return status;
+  if (const Status status = robust.settle(std::numeric_limits<int>::max(), moved); !status.ok())
+    return status;
+  if (const Status status = robust.settleAnew(); !status.ok()) return status;
   solution.solve = robust.solution();
   solution.counters = robust.counters();
   solution.kept = robust.believed();
