@@ -97,9 +97,9 @@ class RobustGraph {
   /// Works on 3 to 5, at most `iterations` of the optimizer. `moved`: poses may have changed. The
   /// optimizer's errors; it is then at rest until something changes.
   Status settle(int iterations, bool& moved);
-  /// Off the flight, at rest: where loops were dropped, again from first poses out of the believed ones alone
-  /// (false ones may have led the solution into a wrong minimum), as long as that lowers the cost, in which
-  /// one that is not believed counts what lets it be dropped.
+  /// Off the flight, at rest. Where loops were dropped, false ones may have led the solution into a wrong
+  /// minimum: begins again from first poses out of the believed ones alone, as long as that lowers the cost.
+  /// A loop that is not believed costs as much as one at the limit of 4.
   Status settleAnew();
   [[nodiscard]] bool atRest() const { return phase_ == Phase::kRest; }
 

@@ -75,7 +75,8 @@ bool BlockSurface::gatherNeighbours(const BlockIndex& block) {
         neighbour_[neighbourAt(x, y, z)] = slot;
         if (slot == VoxelVolume::kNone) continue;
         const BlockHeader& header = volume_.header(slot);
-        sides = static_cast<std::uint8_t>(sides | (header.isFree() ? BlockHeader::kInFront : header.sides));
+        sides =
+            static_cast<std::uint8_t>(sides | (header.isWhollyFree() ? BlockHeader::kInFront : header.sides));
       }
     }
   }
@@ -122,7 +123,7 @@ void BlockSurface::fillPadded() {
   for (std::size_t i = 0; i < block.size(); ++i) {
     const std::uint32_t slot = neighbour_[i];
     const VoxelBlock* const voxels = slot == VoxelVolume::kNone ? nullptr : volume_.voxels(slot);
-    const bool free = slot != VoxelVolume::kNone && volume_.header(slot).isFree();
+    const bool free = slot != VoxelVolume::kNone && volume_.header(slot).isWhollyFree();
     block[i] = voxels != nullptr ? voxels : free ? &kFreeBlock : &kNowhereSeen;
   }
   for (int z = -1; z <= kBlockSide + 1; ++z) {

@@ -44,7 +44,7 @@ void SurfaceStage::findChanges() {
       continue;
     }
     if (header.state == BlockState::kFree) {
-      if (!header.isFree()) continue;
+      if (!header.isWhollyFree()) continue;
       // What it had before it was dropped is no more.
       store_.takeOut(header.index);
     }

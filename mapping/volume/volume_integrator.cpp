@@ -13,11 +13,30 @@ constexpr int kBandStride = 4;
 constexpr int kBundleTiles = 2;
 /// How much farther than its depth a ray may be long: a corner of a view of 110 degrees.
 constexpr double kRayStretch = 1.75;
-/// A block nearer than this [m] is not judged as a whole.
+/// A cube nearer than this [m] is not judged as a whole.
 constexpr float kNearestBlock = 0.05F;
 /// Two images of one pose may differ by this much at once: the noise of an estimate.
 constexpr double kPoseSlack = 0.05;  // m
 constexpr double kTurnSlack = 0.05;  // rad
+
+/// The parts of an eighth of a block, in the order of the eighths: x fastest.
+struct Octant {
+  std::array<std::uint64_t, 8> part{};
+  std::uint64_t all = 0;
+};
+constexpr std::array<Octant, 8> kOctants = [] {
+  std::array<Octant, 8> octants{};
+  for (int i = 0; i < 8; ++i) {
+    Octant& octant = octants[static_cast<std::size_t>(i)];
+    for (int k = 0; k < 8; ++k) {
+      const auto along = [i, k](int axis) { return 2 * (i >> axis & 1) + (k >> axis & 1); };
+      const std::uint64_t bit = partBit(along(0), along(1), along(2));
+      octant.part[static_cast<std::size_t>(k)] = bit;
+      octant.all |= bit;
+    }
+  }
+  return octants;
+}();
 
 bool finite(const SE3& T) { return T.rotation.coeffs().allFinite() && T.translation.allFinite(); }
 
@@ -132,15 +151,9 @@ void VolumeIntegrator::begin(const SE3& T_world_camera) {
   R_blocks_camera_ = (R / block).cast<float>();
   half_extent_ = (0.5 * block * R.transpose().cwiseAbs().rowwise().sum()).cast<float>();
   for (int i = 0; i < 8; ++i) {
-    const auto half = [](int k) { return Eigen::Vector3i(k & 1, k >> 1 & 1, k >> 2); };
-    PartOctant& octant = octants_[static_cast<std::size_t>(i)];
-    octant.centre =
-        (0.5 * block * R.transpose() * (half(i).cast<double>().array() - 0.5).matrix()).cast<float>();
-    octant.bits = 0;
-    for (int k = 0; k < 8; ++k) {
-      const Eigen::Vector3i part = 2 * half(i) + half(k);
-      octant.bits |= octant.bit[static_cast<std::size_t>(k)] = partBit(part.x(), part.y(), part.z());
-    }
+    const Eigen::Vector3d side(i & 1, i >> 1 & 1, i >> 2);
+    octant_centre_[static_cast<std::size_t>(i)] =
+        (0.5 * block * R.transpose() * (side.array() - 0.5).matrix()).cast<float>();
   }
   update_.begin(image_, T_camera_world_);
   window_.clear();
@@ -291,16 +304,17 @@ std::uint64_t VolumeIntegrator::freeParts(const Eigen::Vector3f& centre, std::ui
   const auto truncation = static_cast<float>(volume_.settings().truncation);
   std::uint64_t parts = 0;
   // By halves: an octant that is free as a whole needs one look.
-  for (const PartOctant& octant : octants_) {
-    if ((known & octant.bits) == octant.bits) continue;
-    const Eigen::Vector3f middle = centre + octant.centre;
+  for (std::size_t i = 0; i < kOctants.size(); ++i) {
+    if ((known & kOctants[i].all) == kOctants[i].all) continue;
+    const Eigen::Vector3f middle = centre + octant_centre_[i];
     if (freeBehind(middle, 0.5F) >= truncation) {
-      parts |= octant.bits;
+      parts |= kOctants[i].all;
       continue;
     }
-    for (std::size_t k = 0; k < octant.bit.size(); ++k) {
-      if ((known & octant.bit[k]) != 0) continue;
-      if (freeBehind(middle + 0.5F * octants_[k].centre, 0.25F) >= truncation) parts |= octant.bit[k];
+    for (std::size_t k = 0; k < kOctants.size(); ++k) {
+      const std::uint64_t part = kOctants[i].part[k];
+      if ((known & part) != 0) continue;
+      if (freeBehind(middle + 0.5F * octant_centre_[k], 0.25F) >= truncation) parts |= part;
     }
   }
   return parts;

@@ -83,13 +83,6 @@ class VolumeIntegrator {
     SE3 T_world_body;
   };
 
-  /// An eighth of a block.
-  struct PartOctant {
-    Eigen::Vector3f centre = Eigen::Vector3f::Zero();  ///< from the block's, in camera axes [m]
-    std::array<std::uint64_t, 8> bit{};                ///< of its parts, in the order of the octants
-    std::uint64_t bits = 0;                            ///< all of them
-  };
-
   Status fuse(const DepthImageView& image, const SE3& T_world_camera, const VolumeEffort& effort,
               VolumeStep& out);
   [[nodiscard]] bool holdsImage(std::uint32_t slot) const {
@@ -127,7 +120,7 @@ class VolumeIntegrator {
   Eigen::Vector3f origin_ = Eigen::Vector3f::Zero();
   Eigen::Matrix3f R_blocks_camera_ = Eigen::Matrix3f::Identity();
   Eigen::Vector3f half_extent_ = Eigen::Vector3f::Zero();  ///< of a block in camera axes [m]
-  std::array<PartOctant, 8> octants_;
+  std::array<Eigen::Vector3f, 8> octant_centre_;           ///< from the block's, in camera axes [m]
   std::array<std::int32_t, 6> last_band_{};
 };
 

@@ -45,7 +45,7 @@ struct BlockHeader {
   static constexpr std::uint8_t kInFront = 1;
   static constexpr std::uint8_t kBehind = 2;
 
-  [[nodiscard]] bool isFree() const { return free_parts == kAllParts; }  ///< as a whole
+  [[nodiscard]] bool isWhollyFree() const { return free_parts == kAllParts; }
 };
 
 class VoxelVolume;

@@ -213,8 +213,6 @@ TEST_CASE("parts of a block are free where some image saw them, though none saw 
   const SE3 left = lookAt({0, 0, 0}, {1, 0.7, 0}), right = lookAt({0, 0, 0}, {1, -0.7, 0});
   REQUIRE(fused.add(render(left, 1, kWall), left).ok());
   REQUIRE(fused.add(render(right, 2, kWall), right).ok());
-  // The half extent of a part in voxels: its voxels' centres lie half a voxel inside.
-  const double voxel = fused.volume.settings().voxel_size;
   const auto sees = [&](const SE3& view, const Eigen::Vector3d& p, double margin) {
     const Eigen::Vector3d c = view.inverse() * p;
     const PinholeIntrinsics& k = kSceneCamera;
@@ -229,14 +227,14 @@ TEST_CASE("parts of a block are free where some image saw them, though none saw 
   for (std::uint32_t slot = 0; slot < fused.volume.slots(); ++slot) {
     const BlockHeader& header = fused.volume.header(slot);
     if (header.state != BlockState::kFree) continue;
-    (header.isFree() ? whole : parts) += 1;
+    (header.isWhollyFree() ? whole : parts) += 1;
   }
   CHECK(whole > 20);
   CHECK(parts > 20);
   // Everything that a view sees with a part around it is known, as far as the bundles of rays, 16 pixels
   // apart, are less than half a block apart.
   std::size_t missing = 0, all = 0;
-  const double margin = 2 * std::sqrt(3.0) * kPartVoxels * voxel;
+  const double margin = 2 * std::sqrt(3.0) * kPartVoxels * fused.volume.settings().voxel_size;
   for (double x = 0.3; x < 1.2; x += 0.03) {
     for (double y = -2; y < 2; y += 0.07) {
       for (double z = -1; z < 1; z += 0.07) {
