@@ -5,6 +5,7 @@
 
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/kept_map_options.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
 #include "firmware_host/commands/verdict.hpp"
 #include "firmware_host/commands/view_option.hpp"
@@ -66,6 +67,7 @@ void addFlyCommand(CLI::App& app, int& exit_code) {
   command->add_flag("--imu-rate", request.imu_rate, "Also write imu_rate.tum, the state at every IMU sample");
   command->add_flag("--loop-closure", request.loop_closure,
                     "Recognize places seen before; they hold map.tum together");
+  addKeptMapOptions(*command, request.kept_maps);
   command->add_flag("--map", request.map, "Fuse depth into a labelled map: map.ply, map.glb");
   command->add_flag("--record", request.record,
                     "Write what enters the estimator to recording/ in the run folder");

@@ -5,6 +5,7 @@
 
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/kept_map_options.hpp"
 #include "firmware_host/commands/lab_commands.hpp"
 #include "firmware_host/commands/log_options.hpp"
 #include "firmware_host/commands/verdict.hpp"
@@ -100,6 +101,7 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
   options->view.addTo(*command)->needs(real_time);
   command->add_flag("--loop-closure", request.loop_closure,
                     "Recognize places seen before; they hold map.tum together");
+  addKeptMapOptions(*command, request.kept_maps);
   command->add_flag("--map", request.map, "Fuse depth into a labelled map: map.ply, map.glb");
   command->add_flag("--record", request.record,
                     "Write what enters the estimator to recording/ in the run folder");
@@ -112,6 +114,8 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
       "Example:\n  swiftlet replay data/euroc_mh01_20s --out run_mh01\n"
       "  swiftlet replay data/vil_v102 --mono --set smoother.horizon=3\n"
       "  swiftlet replay data/vil_v102 --real-time --record --out run\n"
+      "  swiftlet replay data/vil_v102 --until 40 --keep-map room --out first\n"
+      "  swiftlet replay data/vil_v102 --from 40 --in-map room --out second\n"
       "  swiftlet replay run --reproduce --out again");
   command->callback([options, &exit_code] { exit_code = replay(*options); });
 }

@@ -11,6 +11,7 @@
 #include "firmware_host/interfaces/live_outlet.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
 #include "firmware_host/settings/settings.hpp"
+#include "mapping/loop/kept_graph.hpp"
 #include "mapping/map/map_stage.hpp"
 #include "mapping/place/vocabulary.hpp"
 
@@ -29,6 +30,7 @@ struct GraphOptions {
   std::optional<ConfusionModel> confusion;       ///< of the map's labels; empty: the settings' certainty
   SurfaceSink* spill = nullptr;            ///< takes surface for which the map has no room; null: it is lost
   const Vocabulary* vocabulary = nullptr;  ///< of loop closure; null: the shipped one; outlives the graph
+  const KeptGraph* kept_map = nullptr;     ///< of settings.loop.in_map; outlives the graph's constructor
   /// For which `track` waits, after a frame's arrival, for the samples up to its stamp, on the host's
   /// clock; 0: never, for then whoever feeds the graph hands them over first.
   Duration sample_patience{0};

@@ -1,12 +1,32 @@
 #include "firmware_host/graph/loop_node.hpp"
 
+#include "drivers/calibration/input_error.hpp"
+
 namespace swiftlet {
+namespace {
+
+/// The flight's, and beside it room for a kept map.
+LoopLimits limitsBeside(const KeptGraph* kept) {
+  LoopLimits limits;
+  if (kept == nullptr) return limits;
+  limits.nodes += kept->nodes.size();
+  limits.loops += kept->loops.size();
+  return limits;
+}
+
+}  // namespace
 
 LoopNode::LoopNode(GraphContext& context)
     : Node("loop", Rank::kLow),
       context_(context),
-      stage_(context.rig, context.settings.loop_stage, LoopLimits{},
-             context.options.vocabulary != nullptr ? *context.options.vocabulary : Vocabulary::shipped()) {}
+      stage_(context.rig, context.settings.loop_stage, limitsBeside(context.options.kept_map),
+             context.options.vocabulary != nullptr ? *context.options.vocabulary : Vocabulary::shipped()) {
+  if (context.options.kept_map == nullptr) return;
+  const KeptUse use = context.settings.loop.extend_map ? KeptUse::kExtend : KeptUse::kLocalize;
+  const Status status = stage_.takeIn(*context.options.kept_map, use);
+  if (status.ok()) return;
+  throw InputError(context.settings.loop.in_map, 0, "", status.what, "Name another kept map");
+}
 
 bool LoopNode::turn() {
   const bool ended = inputEnded();

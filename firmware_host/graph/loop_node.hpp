@@ -24,7 +24,7 @@ class LoopNode final : public Node {
 
   bool turn() override;
   /// Once it is done.
-  [[nodiscard]] const LoopStage& stage() const { return stage_; }
+  [[nodiscard]] LoopStage& stage() { return stage_; }
 
  private:
   void step(const KeyframeMessage& message);

@@ -41,9 +41,12 @@ void RunObserver::onLoop(const LoopReport& report) {
     const double ago = (candidate.new_stamp - candidate.old_stamp).seconds();
     listener_.onRemark(
         report.stamp,
-        fmt::format("{} of {:.1f} s before: {}, {} matches, {} agree", candidate.near ? "near node" : "place",
-                    ago, describe(candidate.fate), candidate.matches, candidate.inliers));
+        fmt::format("{} of {}: {}, {} matches, {} agree", candidate.near ? "near node" : "place",
+                    candidate.kept ? "the kept map" : fmt::format("{:.1f} s before", ago),
+                    describe(candidate.fate), candidate.matches, candidate.inliers));
   }
+  if (statistics_.located) noteLocated(report);
+  listener_.onLoop(report);
   if (!report.moved) return;
   const Eigen::Vector3d& p = report.correction.T_map_world.translation;
   listener_.onRemark(report.stamp,
@@ -51,14 +54,27 @@ void RunObserver::onLoop(const LoopReport& report) {
                                  report.selected, report.loops, p.x(), p.y(), p.z()));
 }
 
-void RunObserver::keepLoops(const LoopStage& loops) {
+void RunObserver::noteLocated(const LoopReport& report) {
+  LocatedStatistics& located = *statistics_.located;
+  const bool now = report.correction.located;
+  located.keyframes += now ? 1 : 0;
+  if (now == located.now) return;
+  located.now = now;
+  located.taken_back += now ? 0 : 1;
+  if (now && !located.first) located.first = report.stamp;
+  listener_.onRemark(report.stamp, now ? "located in the kept map" : "not located in the kept map any more");
+}
+
+void RunObserver::keepLoops(LoopStage& loops) {
+  listener_.onPlaces(loops);
   statistics_.loop = loops.counters();
-  for (std::size_t i = 0; i < loops.nodeCount(); ++i) {
+  for (std::size_t i = loops.keptCount(); i < loops.nodeCount(); ++i) {
     const MapNode node = loops.node(i);
     nodes_.push_back({node.stamp, node.T_map_body});
   }
   for (std::uint32_t i = 0; i < loops.loopCount(); ++i) {
-    loops_.push_back(loops.loop(i));
+    const MapLoop loop = loops.loop(i);
+    if (!loop.kept) loops_.push_back(loop);
     LoopRevisit revisit;
     if (keeper_ && loops.revisit(i, revisit)) keeper_->addRevisit(revisit);
   }

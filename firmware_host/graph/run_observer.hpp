@@ -22,6 +22,8 @@ class RunObserver {
 
   /// Before the first message: keep keyframes and IMU for full smoothing.
   void keepForMap(std::unique_ptr<MapKeeper> keeper) { keeper_ = std::move(keeper); }
+  /// Before the first message: the flight is to be located in a kept map of so many nodes.
+  void awaitLocation(std::size_t nodes) { statistics_.located.emplace().nodes = nodes; }
   [[nodiscard]] bool wantsImu() const { return keeper_ != nullptr; }
 
   void addImu(const ImuSample& sample) { keeper_->addImu(sample); }
@@ -41,7 +43,7 @@ class RunObserver {
   /// After the run: the map that was made.
   void showMap(MapStage& map, std::span<const std::uint32_t> tied) { listener_.onMap(map, tied); }
   /// After the run: the loops that were found, for full smoothing.
-  void keepLoops(const LoopStage& loops);
+  void keepLoops(LoopStage& loops);
   [[nodiscard]] const std::vector<MapLoop>& loops() const { return loops_; }
   /// After the run: the keyframes' poses in the pose graph of the loops; empty without loop closure.
   [[nodiscard]] const std::vector<MapPose>& nodes() const { return nodes_; }
@@ -53,6 +55,7 @@ class RunObserver {
   [[nodiscard]] RunStatistics& statistics() { return statistics_; }
 
  private:
+  void noteLocated(const LoopReport& report);
   void noteFrame(const FrameResult& result);
   void noteEvents(const OdometryOutput& output);
   void noteEffort(const char* stage, const FrameResult& result, const Effort& now, Effort& last);

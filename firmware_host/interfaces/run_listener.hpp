@@ -15,7 +15,7 @@
 #include "estimator/smoother/full_smoother.hpp"
 #include "firmware_host/interfaces/run_verdict.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
-#include "mapping/loop/loop_report.hpp"
+#include "mapping/loop/loop_stage.hpp"
 #include "mapping/map/map_stage.hpp"
 #include "mesher/mesh_stage.hpp"
 
@@ -39,6 +39,10 @@ class RunListener {
                       std::span<const Eigen::Vector2f> /*hull*/) {}
   /// At the end: the newest mesh over the horizon, when there is one.
   virtual void onLocalMesh(const LocalMesh& /*mesh*/) {}
+  /// After each keyframe that loop closure has looked at.
+  virtual void onLoop(const LoopReport& /*report*/) {}
+  /// At the end: places and graph, when there are any; no report comes after it.
+  virtual void onPlaces(LoopStage& /*places*/) {}
   /// At the end: the map, when there is one; `tied`: earlier epochs that lie in it, by loop closure.
   virtual void onMap(MapStage& /*map*/, std::span<const std::uint32_t> /*tied*/) {}
   /// At the end: keyframes and events that had not come out yet.
@@ -85,6 +89,15 @@ struct MapThreadStatistics {
   std::optional<HeldFrameCounters> held;
 };
 
+/// What became of a flight in a kept map.
+struct LocatedStatistics {
+  std::size_t nodes = 0;  ///< of the kept map
+  bool now = false;
+  std::optional<Stamp> first;   ///< located
+  std::uint64_t keyframes = 0;  ///< while located
+  std::uint64_t taken_back = 0;
+};
+
 /// Counters of a run. Host side: the lists grow with the number of changes, not of frames.
 struct RunStatistics {
   std::uint64_t imu_samples = 0;  ///< handed in
@@ -106,6 +119,7 @@ struct RunStatistics {
   std::optional<FullSmootherReport> map;        ///< figures of the full smoothing, when it ran
   std::optional<MeshStatistics> mesh;           ///< when the run meshed
   std::optional<LoopCounters> loop;             ///< when the run closed loops
+  std::optional<LocatedStatistics> located;     ///< when it flew in a kept map
   std::optional<MapThreadStatistics> mapping;   ///< when the run mapped
   std::map<std::string, std::uint64_t> faults;  ///< statuses that were not ok, by their text
   std::map<std::string, std::uint64_t> losses;  ///< what did not fit an arrow between threads, by its name

@@ -91,8 +91,7 @@ class FlightRun {
     }
     memory_.note("devices");
     result_.out = claimFolder(request_, settings_, claim_, lost_);
-    output_.emplace(result_.out, settings_, calibration_, RunOutput::Wanted{request_.imu_rate, false, true},
-                    lost_);
+    output_.emplace(result_.out, settings_, calibration_, RunOutput::Wanted{request_.imu_rate, false, request_.kept_maps.keep, true}, lost_);
     if (request_.record) recorder_ = output_->startRecorder(RecordOrder::kByArrival);
     fly();
     end();
@@ -190,6 +189,7 @@ class FlightRun {
 
 FlyResult runFlight(const FlyRequest& request, Settings settings) {
   if (request.loop_closure) settings.loop.enabled = true;
+  request.kept_maps.apply(settings);
   if (request.map) settings.map.enabled = true;
   checkMovingLabels(settings.map_stage);
   // A mistake that the user can correct, unlike a broken disk.

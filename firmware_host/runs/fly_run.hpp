@@ -10,6 +10,7 @@
 
 #include "drivers/calibration/calibration.hpp"
 #include "firmware_host/outputs/view/view_address.hpp"
+#include "firmware_host/runs/kept_map_request.hpp"
 #include "firmware_host/settings/settings.hpp"
 
 namespace swiftlet {
@@ -19,6 +20,7 @@ struct FlyRequest {
   bool replace = false;  ///< a run in `out` may be replaced
   bool imu_rate = false;
   bool loop_closure = false;        ///< sets loop.enabled
+  KeptMapRequest kept_maps;
   bool map = false;                 ///< sets map.enabled
   bool record = false;              ///< write `recording/` into the run folder
   std::optional<ViewAddress> view;  ///< serve the live view there

@@ -43,6 +43,7 @@ class ReplayRun {
       : request_(request), settings_(std::move(settings)), hooks_(hooks) {
     if (request_.mono) settings_.odometry.use_stereo = false;
     if (request_.loop_closure) settings_.loop.enabled = true;
+    request_.kept_maps.apply(settings_);
     if (request_.map) settings_.map.enabled = true;
   }
 
@@ -129,7 +130,7 @@ class ReplayRun {
     refuseOwnLog();
     claim_.emplace(request_.out, RunKind::kReplay, request_.replace);
     output_.emplace(request_.out, settings_, source_->calibration(),
-                    RunOutput::Wanted{request_.imu_rate, request_.mesh_sequence}, lost_);
+                    RunOutput::Wanted{request_.imu_rate, request_.mesh_sequence, request_.kept_maps.keep}, lost_);
     progress_.emplace("replay", request_.show_progress ? steps_ : 0);
     control_.stop = request_.stop;
     control_.progress = [this](std::uint64_t images) { progress_->update(images); };

@@ -10,6 +10,7 @@
 #include "firmware_host/inputs/log/log_request.hpp"
 #include "firmware_host/interfaces/run_listener.hpp"
 #include "firmware_host/outputs/view/view_address.hpp"
+#include "firmware_host/runs/kept_map_request.hpp"
 #include "firmware_host/supervisor/verdict.hpp"
 
 namespace swiftlet {
@@ -26,6 +27,7 @@ struct ReplayRequest : LogRequest {
   bool imu_rate = false;
   bool mesh_sequence = false;       ///< write the meshes of all frames to `meshes/`
   bool loop_closure = false;        ///< recognize places; sets loop.enabled
+  KeptMapRequest kept_maps;
   bool map = false;                 ///< fuse depth into a map; sets map.enabled
   bool real_time = false;           ///< on threads, messages let out at their times
   double speed = 1;                 ///< real_time: times faster than recorded

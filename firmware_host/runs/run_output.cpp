@@ -34,8 +34,14 @@ RunOutput::RunOutput(const std::string& out, const Settings& settings, const Cal
       calibration_(calibration),
       wanted_(wanted),
       lost_(lost),
-      recorder_(out, {wanted.imu_rate, wanted.mesh_sequence, wanted.fly_on}, lost),
+      kept_map_(settings.loop.in_map.empty()
+                    ? nullptr
+                    : std::make_unique<const KeptGraph>(readKeptFolder(settings.loop.in_map))),
+      recorder_(out,
+                {wanted.imu_rate, wanted.mesh_sequence, kept_map_ != nullptr, wanted.keep_map, wanted.fly_on},
+                lost),
       observer_(recorder_) {
+  if (kept_map_) observer_.awaitLocation(kept_map_->nodes.size());
   attempt([&] { writeWholeFile(out_ / "settings.yaml", printSettings(settings_, false) + "\n"); });
   if (!settings_.full_smoothing) return;
   attempt([&] {
@@ -57,6 +63,7 @@ GraphOptions RunOutput::graphOptions() {
   options.imu_states = wanted_.imu_rate;
   options.meshes = wanted_.mesh_sequence;
   options.vocabulary = vocabulary();
+  options.kept_map = kept_map_.get();
   options.spill = &recorder_.spilled();
   return options;
 }
@@ -79,6 +86,7 @@ std::unique_ptr<FlightRecorder> RunOutput::startRecorder(RecordOrder order,
 void RunOutput::close(RunFacts& facts) {
   facts.peak_resident = peakResidentBytes();
   observer_.finishKeeping();
+  recorder_.commitMap();
   if (settings_.loop.enabled) attempt([&] { writeLoops(out_ / "loops.csv", observer_.loops()); });
   writeCalibration();
   if (!observer_.nodes().empty()) attempt([&] { writeMapPoses(out_ / "map.tum", observer_.nodes()); });

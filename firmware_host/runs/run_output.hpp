@@ -25,6 +25,7 @@ class RunOutput {
   struct Wanted {
     bool imu_rate = false;       ///< imu_rate.tum
     bool mesh_sequence = false;  ///< meshes/
+    std::string keep_map;        ///< folder; empty: no map is kept
     bool fly_on = false;         ///< without files rather than not
   };
 
@@ -67,6 +68,7 @@ class RunOutput {
   LostFiles& lost_;
   bool keeps_keyframes_ = false;
   std::unique_ptr<const Vocabulary> vocabulary_;
+  std::unique_ptr<const KeptGraph> kept_map_;
   RunRecorder recorder_;
   RunObserver observer_;
 };

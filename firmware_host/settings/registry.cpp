@@ -181,6 +181,14 @@ std::vector<Setting> estimationSettings() {
        "File of the words that places are known by: compact, ORBvoc.txt or DBoW2's; empty: the one that is "
        "part of the program.",
        TextSetting{member(&Settings::loop, &LoopGroup::vocabulary), "a file's name, or empty"}},
+      {"loop.in_map", "",
+       "Folder of a kept map (`--keep-map`) to fly in: places seen in it give T_map_world in its frame and "
+       "in_map.tum; empty: none.",
+       TextSetting{member(&Settings::loop, &LoopGroup::in_map), "a folder's name, or empty"}},
+      {"loop.extend_map", "",
+       "What this flight sees becomes part of the map of loop.in_map, and its loops move it; false: the map "
+       "stays as it was kept.",
+       onOff(&Settings::loop, &LoopGroup::extend_map)},
       {"loop.min_similarity", "",
        "Least similarity of a place looked at as a revisit, relative to that of a keyframe with the one "
        "before it; once a loop is believed, keyframes near each other in the map need none.",

@@ -51,6 +51,8 @@ struct MeshGroup {
 struct LoopGroup {
   bool enabled = false;
   std::string vocabulary = "";  ///< file; empty: the shipped one
+  std::string in_map = "";      ///< folder of a kept map to be located in; empty: none
+  bool extend_map = false;      ///< go on with it
 };
 
 struct MapGroup {

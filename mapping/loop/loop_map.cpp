@@ -47,8 +47,11 @@ LoopMap::LoopMap(const LoopSettings& settings, const LoopLimits& limits)
 }
 
 bool LoopMap::find(std::uint64_t frame, std::uint32_t epoch, std::uint32_t& k) const {
-  const auto found = std::lower_bound(nodes_.begin(), nodes_.end(), frame,
-                                      [](const Node& node, std::uint64_t f) { return node.frame < f; });
+  const auto flight = nodes_.begin() + static_cast<std::ptrdiff_t>(kept_);
+  const bool is_kept = frame >= kKeptFrames;
+  const auto found =
+      std::lower_bound(is_kept ? nodes_.begin() : flight, is_kept ? flight : nodes_.end(), frame,
+                       [](const Node& node, std::uint64_t f) { return node.frame < f; });
   k = static_cast<std::uint32_t>(found - nodes_.begin());
   return found != nodes_.end() && found->frame == frame && found->epoch == epoch;
 }
@@ -71,6 +74,25 @@ Status LoopMap::add(const Node& node, const Link* link) {
     status = graph_.beginComponent(node.T_world_body, node.tilt);
   }
   if (status.ok()) nodes_.push_back(node);
+  return status;
+}
+
+Status LoopMap::addKept(const Node& node, const Link* link, bool held) {
+  if (kept_ != nodes_.size()) {
+    return {StatusCode::kInvalidInput, "a kept node behind those of the flight"};
+  }
+  const auto k = static_cast<std::uint32_t>(kept_);
+  Status status = add(node, link);
+  if (status.ok()) status = graph_.setPose(k, node.T_world_body);
+  if (status.ok() && held) status = graph_.hold(k);
+  kept_ = nodes_.size();
+  return status;
+}
+
+Status LoopMap::settle(int iterations, bool& moved) {
+  pieces_.align(graph_);
+  const Status status = graph_.settle(iterations, moved);
+  pieces_.follow(graph_);
   return status;
 }
 
@@ -155,6 +177,7 @@ std::uint32_t LoopMap::leastLoss() {
   std::uint32_t best = 0;
   double least = std::numeric_limits<double>::infinity();
   for (std::uint32_t k = 0; k + 1 < nodes_.size(); ++k) {
+    if (graph_.held(k)) continue;
     const bool alone = !linked(k) && !linked(k + 1);
     const double extent = alone && node_loops_[k] > 0 ? 1 : stretch(k);
     const double held = extent * (1 + node_loops_[k]);
@@ -172,6 +195,7 @@ bool LoopMap::makeRoom(Node& left) {
   if (nodes_.size() < 3) return false;
   const OdometryChain<SE3>& chain = graph_.odometry();
   const std::uint32_t k = leastLoss();
+  if (graph_.held(k)) return false;  // all that may leave are
   const bool back = linked(k);
   const bool ahead = linked(k + 1);
   std::uint32_t onto = k;
@@ -187,6 +211,7 @@ bool LoopMap::makeRoom(Node& left) {
   if (!graph_.removePose(k, onto).ok()) return false;
   left = nodes_[k];
   nodes_.erase(nodes_.begin() + k);
+  kept_ -= k < kept_ ? 1 : 0;
   ++nodes_removed_;
   return true;
 }

@@ -20,6 +20,9 @@
 // Loops. A new one takes the place of one that is not believed (LoopSelection); when all are, of the one
 // whose ends lie nearest to the ends of another (in nodes), which says nearly the same.
 //
+// Kept nodes. Those of an earlier flight's map come first (addKept). Where they are held they stay, and only
+// the flight's nodes leave for room.
+//
 // Memory: reserved by the constructor but for the optimizer's factor; scratch of its analysis. Cost of a
 // step: making room is quadratic in nodes (2 ms for 1000), everything else linear but for the search of the
 // selection and the optimizer's iterations. No clock; deterministic. Errors: Status.
@@ -29,6 +32,7 @@
 
 #include "estimator/core/stamp.hpp"
 #include "estimator/core/status.hpp"
+#include "mapping/loop/joined_pieces.hpp"
 #include "mapping/loop/loop_settings.hpp"
 #include "mapping/pose_graph/robust_graph.hpp"
 
@@ -43,6 +47,10 @@ struct LoopLimits {
 inline constexpr double kNodeDistance = 0.25;  // m
 inline constexpr double kNodeTurn = 0.2;       // rad
 inline constexpr double kNodeSeconds = 2;
+
+/// Frame indices and epochs of kept nodes begin here: those of a flight stay below.
+inline constexpr std::uint64_t kKeptFrames = std::uint64_t{1} << 63U;
+inline constexpr std::uint32_t kKeptEpochs = std::uint32_t{1} << 31U;
 
 struct LoopMapCounters {
   std::uint64_t nodes_removed = 0;   ///< for room
@@ -89,6 +97,14 @@ class LoopMap {
   /// Adds a node, tied to the last by `link`; null: the first of a component, at its T_world_body.
   /// kCapacityReached: full, see makeRoom(); kInvalidInput: not finite.
   Status add(const Node& node, const Link* link);
+  /// Before the flight's first node: one of an earlier map, at its T_world_body, with frame and epoch from
+  /// kKeptFrames and kKeptEpochs on. `held`: it does not move.
+  Status addKept(const Node& node, const Link* link, bool held);
+  [[nodiscard]] std::size_t kept() const { return kept_; }
+  /// Whether odometry and believed loops hold the two in one map.
+  [[nodiscard]] bool joined(std::uint32_t a, std::uint32_t b) const {
+    return pieces_.joined(component(a), component(b));
+  }
   /// Whether the odometry ties node k to the one before.
   [[nodiscard]] bool linked(std::uint32_t k) const { return graph_.linked(k); }
   /// The piece that the odometry alone holds together.
@@ -99,7 +115,11 @@ class LoopMap {
   Status addLoop(std::uint32_t from, std::uint32_t to, const SE3& T_from_to,
                  const PoseMatrix<SE3>& covariance, std::uint32_t& id);
   /// RobustGraph::settle(): up to `iterations` of its work. `moved`: poses may have changed.
-  Status settle(int iterations, bool& moved) { return graph_.settle(iterations, moved); }
+  Status settle(int iterations, bool& moved);
+  /// Of T_from_to, perturbed on the right, on the solved graph.
+  Status relativeCovariance(std::uint32_t from, std::uint32_t to, PoseMatrix<SE3>& out) {
+    return graph_.relativeCovariance(from, to, out);
+  }
   [[nodiscard]] bool atRest() const { return graph_.atRest(); }
 
   [[nodiscard]] std::uint32_t loops() const { return graph_.loops(); }
@@ -119,7 +139,9 @@ class LoopMap {
 
   LoopLimits limits_;
   RobustGraph<SE3> graph_;
+  JoinedPieces pieces_;
   std::vector<Node> nodes_;
+  std::size_t kept_ = 0;  ///< of the nodes, the first
   std::vector<Loop> loops_;                ///< by the graph's ids
   std::vector<std::uint32_t> node_loops_;  ///< scratch: loops that hold each node
   std::uint64_t nodes_removed_ = 0;

@@ -18,6 +18,7 @@ struct LoopCandidate {
   Stamp old_stamp;
   std::uint64_t new_frame = 0;  ///< the newest, or where `near` one before it
   Stamp new_stamp;
+  bool kept = false;  ///< the old one is of a kept map: of another flight, and another clock
   bool near = false;  ///< known by where the map has them, not by their words
   LoopFate fate = LoopFate::kInvalidInput;
   std::size_t matches = 0;
@@ -34,6 +35,7 @@ inline constexpr std::size_t kTiedEpochs = 16;
 /// How the newest epoch's world lies in the map.
 struct MapCorrection {
   std::uint32_t epoch = 0;
+  bool located = false;  ///< in a kept map: loops hold the newest node in it, and the map's frame is its own
   std::uint64_t version = 0;  ///< raised by every keyframe
   SE3 T_map_world;
 };
@@ -59,6 +61,7 @@ struct LoopCounters {
   std::uint64_t loops = 0;                        ///< verified
   std::uint64_t near_loops = 0;                   ///< of them, those from near candidates
   std::uint64_t selected = 0;                     ///< at the end
+  std::uint64_t kept_loops = 0;                   ///< of the verified, those that lead into a kept map
   std::uint64_t refused = 0;                      ///< keyframes that the map did not take
   LoopMapCounters map;                            ///< what was done for room, and rejected loops asked again
 };

@@ -203,7 +203,9 @@ void LoopStage::closeLoops(const LoopEffort& effort, LoopReport& report) {
   const auto newest = static_cast<std::uint32_t>(map_.size() - 1);
   if (!hasPlace(newest) || effort.candidates == 0) return;
   Comparisons& made = comparisons_[map_.node(newest).place];
-  const bool tied = compareNearest(newest, effort, report);
+  bool tied = compareNearest(newest, effort, report);
+  // The place that the first verified candidate shows.
+  std::uint32_t shown = newest;
   for (const PlaceCandidate& candidate : place_step_.query.candidates) {
     if (report.candidates.size() >= std::min(effort.candidates, kMaxLoopCandidates)) return;
     std::uint32_t from = 0;
@@ -211,14 +213,15 @@ void LoopStage::closeLoops(const LoopEffort& effort, LoopReport& report) {
     if (std::find(made.frames.begin(), made.frames.end(), candidate.index) != made.frames.end()) continue;
     // A second loop to the same place says little more. One to another place gainsays the first: a map gone
     // wrong must not be asked about itself alone.
-    if (tied && view(from, newest) <= 1) continue;
+    if (tied && view(from, shown) <= 1) continue;
     static_cast<void>(made.frames.tryPushBack(candidate.index));
     LoopCandidate told;
     told.similarity = static_cast<double>(candidate.relative);
-    if (verify(from, newest, told, effort, report)) {
-      made.near_left = 0;
-      return;
-    }
+    if (!verify(from, newest, told, effort, report)) continue;
+    made.near_left = 0;
+    if (map_.kept() == 0 || located(newest)) return;
+    tied = true;
+    shown = from;
   }
 }
 
@@ -262,7 +265,7 @@ bool LoopStage::hasPlace(std::uint32_t k) const {
 
 /// How far apart the map has two views, in units of what near is.
 double LoopStage::view(std::uint32_t a, std::uint32_t b) const {
-  if (map_.component(a) != map_.component(b)) return std::numeric_limits<double>::infinity();
+  if (!map_.joined(a, b)) return std::numeric_limits<double>::infinity();
   const double distance = (map_.pose(a).translation - map_.pose(b).translation).norm() / kNearDistance;
   if (distance > 1) return distance;
   return std::max(distance, map_.pose(a).rotation.angularDistance(map_.pose(b).rotation) / kNearTurn);
@@ -271,10 +274,12 @@ double LoopStage::view(std::uint32_t a, std::uint32_t b) const {
 /// Of the nodes near `to` that it was not compared with the nearest.
 bool LoopStage::nearestNode(std::uint32_t to, std::uint32_t& from) const {
   const auto& compared = comparisons_[map_.node(to).place].frames;
-  const Stamp now = map_.node(to).stamp;
+  const LoopMap::Node& now = map_.node(to);
   double least = 1;
   bool found = false;
-  for (std::uint32_t k = 0; k < to && (now - map_.node(k).stamp).seconds() >= kRevisitSeconds; ++k) {
+  for (std::uint32_t k = 0; k < to; ++k) {
+    const LoopMap::Node& before = map_.node(k);
+    if (before.epoch == now.epoch && (now.stamp - before.stamp).seconds() < kRevisitSeconds) break;
     const double apart = view(k, to);
     if (apart >= least || !hasPlace(k)) continue;
     if (std::find(compared.begin(), compared.end(), map_.node(k).frame) != compared.end()) continue;
@@ -294,6 +299,7 @@ bool LoopStage::verify(std::uint32_t from, std::uint32_t to, LoopCandidate& told
                                      effort.verification, verification_));
   ++counters_.fates[static_cast<std::size_t>(verification_.fate)];
   counters_.near += told.near ? 1 : 0;
+  told.kept = from < map_.kept();
   told.old_frame = old_node.frame;
   told.old_stamp = old_node.stamp;
   told.new_frame = new_node.frame;
@@ -309,16 +315,18 @@ bool LoopStage::verify(std::uint32_t from, std::uint32_t to, LoopCandidate& told
   }
   inliers_[id] = verification_.inliers;
   ++counters_.loops;
+  counters_.kept_loops += told.kept ? 1 : 0;
   counters_.near_loops += told.near ? 1 : 0;
   return true;
 }
 
 void LoopStage::correct(const SmoothedWindow& window) {
-  if (map_.size() == 0) return;
+  if (map_.size() == map_.kept()) return;
   const LoopMap::Node& node = map_.node(map_.size() - 1);
   const WindowPose* now = poseOfFrame(window, node.frame);
   const SE3 T_world_node = now != nullptr ? now->T_world_body : node.T_world_body;
   correction_.epoch = node.epoch;
+  correction_.located = located(static_cast<std::uint32_t>(map_.size() - 1));
   correction_.T_map_world = map_.pose(map_.size() - 1) * T_world_node.inverse();
   ++correction_.version;
 }
@@ -346,6 +354,7 @@ void LoopStage::tiedEpochs(std::uint32_t epoch, FixedVector<std::uint32_t, kTied
     }
   }
   std::sort(out.begin(), out.end());
+  while (!out.empty() && out.back() >= kKeptEpochs) out.popBack();
 }
 
 MapLoop LoopStage::loop(std::uint32_t i) const {
@@ -354,6 +363,7 @@ MapLoop LoopStage::loop(std::uint32_t i) const {
   MapLoop out;
   out.old_stamp = map_.node(edge.from).stamp;
   out.new_stamp = map_.node(edge.to).stamp;
+  out.kept = edge.from < map_.kept();
   out.T_old_new = edge.T_from_to;
   out.rotation_sigma = std::sqrt(covariance.diagonal().head<3>().maxCoeff());
   out.translation_sigma = std::sqrt(covariance.diagonal().tail<3>().maxCoeff());
@@ -368,7 +378,7 @@ bool LoopStage::revisit(std::uint32_t i, LoopRevisit& out) const {
   const RelativePose<SE3>& edge = map_.loopEdge(i);
   const LoopMap::Node& from = map_.node(edge.from);
   const LoopMap::Node& to = map_.node(edge.to);
-  if (!place_.database().holds(from.place, from.frame, from.epoch) ||
+  if (edge.from < map_.kept() || !place_.database().holds(from.place, from.frame, from.epoch) ||
       !place_.database().holds(to.place, to.frame, to.epoch)) {
     return false;
   }

@@ -15,6 +15,11 @@
 // have no loop yet, the newest first. So how strict the words are asked decides which loop is the first,
 // hardly which come after it. A near candidate is verified and selected as any other.
 //
+// A kept map (kept_graph.hpp) taken in before the flight is its first piece, and the map's frame that of the
+// kept one. Until loops tie the flight to it, each node asks its candidates further after the first that
+// geometry verifies, at places elsewhere: two that look the same must both be heard (loop_selection.hpp).
+// From then on MapCorrection::located holds, for as long as these loops are believed.
+//
 // Every piece that neither odometry nor loops join keeps its own world; an epoch of the odometry begins a
 // piece. Frames: world is the odometry's of an epoch, map that of the first piece. Errors: kInvalidInput (no
 // window, tracks of another frame, a pose that is not finite): nothing changes. Full: a node leaves for each
@@ -34,6 +39,7 @@
 #include "estimator/messages/loop_revisit.hpp"
 #include "estimator/messages/smoothed_window.hpp"
 #include "estimator/messages/tracked_frame.hpp"
+#include "mapping/loop/kept_graph.hpp"
 #include "mapping/loop/loop_map.hpp"
 #include "mapping/loop/loop_report.hpp"
 #include "mapping/loop/loop_settings.hpp"
@@ -62,6 +68,7 @@ struct LoopInput {
 struct MapLoop {
   Stamp old_stamp;  ///< of the nodes that it joins now: neighbours of those that saw it, when these had to go
   Stamp new_stamp;
+  bool kept = false;  ///< the old node is of a kept map: its stamp is of another clock
   SE3 T_old_new;
   double rotation_sigma = 0;     ///< rad, of the worst direction
   double translation_sigma = 0;  ///< m
@@ -84,11 +91,21 @@ class LoopStage {
   LoopStage(const Rig& rig, const LoopSettings& settings, const LoopLimits& limits = {},
             const Vocabulary& vocabulary = Vocabulary::shipped());
 
+  /// Before the first step: an earlier map. Its nodes need room in `limits` beside those of the flight.
+  /// kCapacityReached, kInvalidInput (not finite, loops between nodes that are not there): a part is taken
+  /// in. Allocates nothing but scratch; solves the graph that is extended.
+  Status takeIn(const KeptGraph& kept, KeptUse use);
+  /// After the flight: what later ones need. Of all that odometry and loops hold together with the kept map,
+  /// or without one with most nodes; allocates.
+  void keep(KeptGraph& out);
+
   Status step(const LoopInput& input, const LoopEffort& effort, LoopReport& report);
 
   [[nodiscard]] const MapCorrection& correction() const { return correction_; }
   [[nodiscard]] LoopCounters counters() const;
+  /// The first keptCount() of them are of a kept map.
   [[nodiscard]] std::size_t nodeCount() const { return map_.size(); }
+  [[nodiscard]] std::size_t keptCount() const { return map_.kept(); }
   [[nodiscard]] MapNode node(std::size_t i) const;
   /// The epochs before `epoch` whose worlds loops hold in the same map, ascending.
   void tiedEpochs(std::uint32_t epoch, FixedVector<std::uint32_t, kTiedEpochs>& out) const;
@@ -118,6 +135,9 @@ class LoopStage {
   void appendLink(const SE3& T_previous_this, const Matrix6d& covariance);
   [[nodiscard]] bool movedEnough(Stamp now) const;
   Status addNode(const SmoothedWindow& window);
+  void keepKeptPlace(const KeptNode& node);
+  [[nodiscard]] bool located(std::uint32_t k) const { return map_.kept() > 0 && map_.joined(0, k); }
+  [[nodiscard]] std::uint32_t largestPiece() const;
   [[nodiscard]] bool describePlace(const LoopInput& input);
   void moveToMiddleRow(const ScanMotion& motion);
   void closeLoops(const LoopEffort& effort, LoopReport& report);

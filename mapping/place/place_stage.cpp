@@ -19,4 +19,12 @@ Status PlaceStage::step(const ImageView& image, const TrackedFrame& tracked, std
   return out.forgot ? okStatus() : added;
 }
 
+Status PlaceStage::keep(const PlaceKeyframe& keyframe, std::uint32_t& slot) {
+  slot = PlaceDatabase::kNoSlot;
+  BagOfWords bag;
+  const Status described = vocabulary_.describe(keyframe, bag);
+  return described.ok() ? database_.add(keyframe.index, keyframe.stamp, keyframe.epoch, bag, slot)
+                        : described;
+}
+
 }  // namespace swiftlet

@@ -39,6 +39,8 @@ class PlaceStage {
   [[nodiscard]] Status step(const ImageView& image, const TrackedFrame& tracked, std::uint32_t epoch,
                             PlaceKeyframe& keyframe, PlaceStep& out);
 
+  /// Stores a keyframe of an earlier flight, described then. As step(), but nothing is asked.
+  [[nodiscard]] Status keep(const PlaceKeyframe& keyframe, std::uint32_t& slot);
   /// The keyframe of a slot is needed no more.
   void forget(std::uint32_t slot) { static_cast<void>(database_.forget(slot)); }
   [[nodiscard]] const PlaceDatabase& database() const { return database_; }

@@ -69,6 +69,7 @@ Status LoopSelection<Pose>::addLoop(const RelativePose<Pose>& loop, std::uint32_
   const Status status = place(loop, id);
   if (status.ok()) {
     extend(id, max_nodes);
+    weighRival(held_[id].group, max_nodes);
     select();
   }
   return status;
@@ -183,6 +184,10 @@ void LoopSelection<Pose>::testPairs(std::uint32_t id) {
   const Held& a = held_[id];
   const PairTest<Pose> test(chain_, a.chained);
   const double log_chance = std::log(settings_.max_pair_chance);
+  // A false loop between two components may lead anywhere in the larger one.
+  const bool within = a.chained.withinComponent();
+  const double log_room =
+      within ? 0 : std::max(chain_.logWholeBox(a.chained.from), chain_.logWholeBox(a.chained.to));
   for (std::uint32_t k = 0; k < held(); ++k) {
     const Held& b = held_[k];
     if (k == id || !b.passed || b.group != a.group) {
@@ -194,7 +199,7 @@ void LoopSelection<Pose>::testPairs(std::uint32_t id) {
       continue;
     }
     consistency_.connect(id, k);
-    const double log_box = chain_.logBox(std::max(a.chained.to, b.chained.to));
+    const double log_box = within ? chain_.logBox(std::max(a.chained.to, b.chained.to)) : log_room;
     if (logChance<Pose>(pair, log_box) <= log_chance) {
       support_.connect(id, k);
     }
@@ -256,6 +261,28 @@ void LoopSelection<Pose>::searchGroup(std::uint32_t group, std::uint32_t max_nod
   if (result.size > 0) {
     replaceSet(group);
   }
+  weighRival(group, max_nodes);
+}
+
+/// The largest set of those that speak against the group's: of loops that agree with less than half of it.
+template <typename Pose>
+void LoopSelection<Pose>::weighRival(std::uint32_t group, std::uint32_t max_nodes) {
+  Group& ties = groups_[group];
+  ties.rival = 0;
+  if (ties.from == ties.to) {
+    return;
+  }
+  std::vector<std::uint64_t>& against = chosen_;  // made anew by select()
+  std::fill(against.begin(), against.end(), 0);
+  for (std::uint32_t k = 0; k < held(); ++k) {
+    const bool asked = held_[k].group == group && held_[k].passed && !testBit(sets_, k);
+    if (asked && 2 * countBoth(consistency_.row(k), sets_) < ties.size) {
+      setBit(against, k);
+    }
+  }
+  const CliqueResult result = clique_.search(consistency_, against, 0, max_nodes, scratch_);
+  counters_.nodes += result.nodes;
+  ties.rival = result.size;
 }
 
 template <typename Pose>
@@ -393,7 +420,10 @@ void LoopSelection<Pose>::dropUnsupported() {
     for (std::uint32_t k = 0; k < held(); ++k) {
       count += chosen(k) ? 1U : 0U;
     }
-    for (std::uint32_t k = 0; count < settings_.min_between && k < held(); ++k) {
+    const double lead = static_cast<double>(count) - groups_[group].rival;
+    const double all = static_cast<double>(count) + groups_[group].rival;
+    const bool beyond_doubt = lead > 0 && lead * lead >= settings_.min_between * all;
+    for (std::uint32_t k = 0; !beyond_doubt && k < held(); ++k) {
       if (chosen(k)) {
         clearBit(chosen_, k);
       }

@@ -13,7 +13,9 @@
 //    nothing. A loop of the set is selected when a random one would hardly have passed its gate (chance at
 //    most gateChanceLimit(), loop_consistency.hpp), or when at least `min_support` loops agree with it,
 //    themselves selected, in pair tests that a random one would hardly have passed. Between two components,
-//    where there is no gate, also at least `min_between` loops must be left, else none is selected.
+//    where there is no gate, n loops must be left beside m of the largest set that contradicts them (places
+//    that look the same) with (n - m)^2 >= min_between (n + m), else none is selected: without any other,
+//    `min_between`; two sets that differ as chance would make them differ say nothing.
 //
 // Full: a new loop takes the place of the held one that is not selected and agrees with fewest (of equals the
 // oldest); when all held are in the sets it is refused (kCapacityReached): all of them say the same already.
@@ -55,7 +57,7 @@ struct LoopSelectionSettings {
   /// (docs/pose_graph.md).
   double max_pair_chance = 1e-4;
   std::uint32_t min_support = 1;  ///< agreeing loops, where the gate alone is no proof
-  std::uint32_t min_between = 3;  ///< loops that tie two components at least
+  std::uint32_t min_between = 3;  ///< loops that tie two components at least, if none contradict them
   bool pairwise = true;           ///< false: all that pass the gate are selected (for comparison)
 };
 
@@ -146,6 +148,7 @@ class LoopSelection {
     std::uint32_t to = 0;
     std::uint32_t size = 0;  ///< of its set
     bool exact = true;
+    std::uint32_t rival = 0;  ///< size of the largest set that speaks against it; between components
   };
 
   Status place(const RelativePose<Pose>& loop, std::uint32_t& id);
@@ -157,6 +160,7 @@ class LoopSelection {
   void extend(std::uint32_t id, std::uint32_t max_nodes);
   void searchGroup(std::uint32_t group, std::uint32_t max_nodes);
   void replaceSet(std::uint32_t group);
+  void weighRival(std::uint32_t group, std::uint32_t max_nodes);
   void leave(std::uint32_t id);
   void giveUp(std::uint32_t id);
   void carry(RelativePose<Pose>& loop, std::uint32_t pose, std::uint32_t onto) const;

@@ -1,5 +1,7 @@
 #include "mapping/pose_graph/odometry_chain.hpp"
 
+#include <algorithm>
+
 namespace swiftlet {
 
 template <typename Pose>
@@ -44,6 +46,14 @@ template <typename Pose>
 double OdometryChain<Pose>::logBox(std::uint32_t k) const {
   const Point sides = nodes_[k].high - nodes_[k].low;
   return sides.cwiseMax(kThinnest * sides.maxCoeff()).array().log().sum();
+}
+
+template <typename Pose>
+double OdometryChain<Pose>::logWholeBox(std::uint32_t k) const {
+  const auto end =
+      std::upper_bound(nodes_.begin(), nodes_.end(), component(k),
+                       [](std::uint32_t of, const Node& node) { return of < node.component; });
+  return logBox(static_cast<std::uint32_t>(end - nodes_.begin()) - 1);
 }
 
 template class OdometryChain<SE2>;

@@ -55,6 +55,8 @@ class OdometryChain {
   /// Logarithm of the volume [m^3, in the plane m^2] of the box around the component's poses up to k; sides
   /// are at least kThinnest of the longest.
   [[nodiscard]] double logBox(std::uint32_t k) const;
+  /// That around all poses of k's component.
+  [[nodiscard]] double logWholeBox(std::uint32_t k) const;
 
   /// Takes pose k away; those after it move down by one. What lies between the others, and how well it is
   /// known, stays exactly as it was. Not the last pose. Linear in the poses after k.

@@ -64,7 +64,7 @@ RobustGraph<Pose>::RobustGraph(const RobustGraphLimits& limits, const RobustGrap
       graduated_(settings.graduated),
       set_(selection_.consistency().words()) {
   step_edges_.reserve(limits.poses);
-  tilts_.reserve(limits.poses);
+  known_.reserve(limits.poses);
   for (auto* list : {&weights_, &chi_squared_, &log_chances_}) list->reserve(limits.loops);
   graduated_ids_.reserve(limits.loops);
   open_.reserve(limits.loops);
@@ -79,7 +79,7 @@ Status RobustGraph<Pose>::beginComponent(const Pose& T_map_body, const Tilt& til
   if (status.ok()) status = selection_.odometry().beginComponent();
   if (!status.ok()) return status;
   step_edges_.push_back(kNoEdge);
-  tilts_.push_back(tilt);
+  known_.push_back({tilt});
   return setGravity(size() - 1);
 }
 
@@ -103,7 +103,7 @@ Status RobustGraph<Pose>::addPose(const RelativePose<Pose>& odometry, const Tilt
   if (status.ok()) status = optimizer_.addPose(pose(k - 1) * T_previous_this);
   if (!status.ok()) return status;
   step_edges_.push_back(static_cast<std::uint32_t>(graph().edges.size()));
-  tilts_.push_back(tilt);
+  known_.push_back({tilt});
   status = optimizer_.addEdge(odometry);
   if (status.ok()) status = setGravity(k);
   if (leans(k)) restart(Phase::kSolve);
@@ -114,7 +114,7 @@ Status RobustGraph<Pose>::addPose(const RelativePose<Pose>& odometry, const Tilt
 template <typename Pose>
 bool RobustGraph<Pose>::leans(std::uint32_t k) const {
   if constexpr (PoseSpace<Pose>::kDof == 6) {
-    const GravityFactor alone = gravityFactor(tilts_[k]);
+    const GravityFactor alone = gravityFactor(known_[k].tilt);
     const Eigen::Vector3d e = (pose(k).rotation.conjugate() * Eigen::Vector3d::UnitZ()).cross(alone.up_body);
     return e.dot(alone.information * e) > kLeaning * kLeaning;
   }
@@ -124,10 +124,10 @@ bool RobustGraph<Pose>::leans(std::uint32_t k) const {
 template <typename Pose>
 Status RobustGraph<Pose>::setGravity(std::uint32_t k) {
   if constexpr (PoseSpace<Pose>::kDof == 6) {
-    if (!linked(k)) return optimizer_.setGravity(k, gravityFactor(tilts_[k]));
+    if (!linked(k)) return optimizer_.setGravity(k, gravityFactor(known_[k].tilt));
     const Eigen::Matrix3d Q = odometry().covariance(k - 1, k).template topLeftCorner<3, 3>();
     const Eigen::Matrix3d R_previous_this = odometry().relative(k - 1, k).R();
-    return optimizer_.setGravity(k, gravityFactor(tilts_[k], tilts_[k - 1], R_previous_this, Q));
+    return optimizer_.setGravity(k, gravityFactor(known_[k].tilt, known_[k - 1].tilt, R_previous_this, Q));
   }
   return okStatus();
 }
@@ -191,7 +191,10 @@ Status RobustGraph<Pose>::assemble() {
     if (member.taken) scratch_.edges.push_back(loop(id));
   }
   Status status = optimizer_.assign(scratch_);
-  for (std::uint32_t k = 0; k < size() && status.ok(); ++k) status = setGravity(k);
+  for (std::uint32_t k = 0; k < size() && status.ok(); ++k) {
+    status = setGravity(k);
+    if (held(k)) static_cast<void>(optimizer_.hold(k, true));
+  }
   for (std::uint32_t id = 0; id < loops(); ++id) setWeight(id, members_[id].weight);
   for (std::size_t k = 0; phase_ == Phase::kGraduate && k < graduated_ids_.size(); ++k) {
     setWeight(graduated_ids_[k], weights_[k]);
@@ -210,7 +213,7 @@ Status RobustGraph<Pose>::removePose(std::uint32_t pose, std::uint32_t onto) {
     bent = bent || (believed(id) && (loop(id).from == pose || loop(id).to == pose));
   }
   gather(pose);
-  tilts_.erase(tilts_.begin() + pose);
+  known_.erase(known_.begin() + pose);
   Status status = selection_.removePose(pose, onto);
   if (status.ok()) status = assemble();
   if (bent) restart(Phase::kSolve);

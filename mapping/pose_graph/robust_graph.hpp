@@ -79,8 +79,14 @@ class RobustGraph {
   Status beginComponent(const Pose& T_map_body, const Tilt& tilt = {});
   /// The next pose: `odometry` joins it, number size(), and the one before, in either direction.
   Status addPose(const RelativePose<Pose>& odometry, const Tilt& tilt = {});
-  /// Before the first solution: the pose does not move. Forgotten by removePose().
-  Status hold(std::uint32_t pose) { return optimizer_.hold(pose, true); }
+  /// The pose does not move.
+  Status hold(std::uint32_t pose) {
+    if (pose < size()) known_[pose].held = true;
+    return optimizer_.hold(pose, true);
+  }
+  [[nodiscard]] bool held(std::uint32_t pose) const { return known_[pose].held; }
+  /// Where the next solution begins.
+  Status setPose(std::uint32_t pose, const Pose& T_map_body) { return optimizer_.setPose(pose, T_map_body); }
   /// LoopSelection::removePose(); the odometry's two edges become their product.
   Status removePose(std::uint32_t pose, std::uint32_t onto);
 
@@ -105,6 +111,10 @@ class RobustGraph {
 
   [[nodiscard]] std::uint32_t size() const { return selection_.odometry().size(); }
   [[nodiscard]] const Pose& pose(std::size_t k) const { return optimizer_.graph().poses[k]; }
+  /// PoseGraphOptimizer::relativeCovariance().
+  Status relativeCovariance(std::uint32_t from, std::uint32_t to, PoseMatrix<Pose>& out) {
+    return optimizer_.relativeCovariance(from, to, out);
+  }
   [[nodiscard]] const OdometryChain<Pose>& odometry() const { return selection_.odometry(); }
   /// Whether the odometry joins pose k to the one before.
   [[nodiscard]] bool linked(std::uint32_t k) const { return step_edges_[k] != kNoEdge; }
@@ -130,6 +140,11 @@ class RobustGraph {
   static constexpr std::uint32_t kNoPose = 0xfffffffeU;  ///< and the next number
   enum class Phase : std::uint8_t { kRest, kSolve, kGraduate, kSolveAgain, kAskOwn, kAskCovariance };
 
+  /// Of a pose, from elsewhere.
+  struct Known {
+    Tilt tilt;
+    bool held = false;
+  };
   /// A loop's part in the solution.
   struct Member {
     std::uint32_t edge = kNoEdge;
@@ -173,7 +188,7 @@ class RobustGraph {
   LoopSelection<Pose> selection_;
   PoseGraphOptimizer<Pose> optimizer_;
   std::vector<std::uint32_t> step_edges_;  ///< of each pose, to the one before
-  std::vector<Tilt> tilts_;                ///< of each pose
+  std::vector<Known> known_;               ///< of each pose
   std::vector<Member> members_;            ///< by the selection's ids
   std::uint32_t believed_ = 0;
 

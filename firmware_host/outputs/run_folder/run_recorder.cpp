@@ -30,8 +30,10 @@ std::string valueText(const Event& event) {
 
 RunRecorder::RunRecorder(const std::string& folder, const Wanted& wanted, LostFiles& lost)
     : folder_(folder), wanted_(wanted), lost_(lost), spilled_(folder) {
+  if (!wanted.keep_map.empty()) kept_.emplace(wanted.keep_map);  // what is asked for is refused in time
   if (folder.empty()) return;
   const std::filesystem::path path(folder);
+  if (wanted.in_map) open(in_map_, path / "in_map.tum");
   if (wanted.meshes) open(meshes_, folder);
   open(odometry_, path / "odometry.tum");
   if (wanted.imu_rate) {
@@ -80,6 +82,7 @@ void RunRecorder::onFrame(const TrackedFrame& tracked, const OdometryOutput& out
   if (!output.has_state) return;
   writeTo(odometry_,
           [&](LineFile& file) { file.write(formatTum(tracked.stamp, output.state.T_world_body)); });
+  writeTo(in_map_, [&](InMapFile& file) { file.addFrame(tracked.index, tracked.stamp, output.state); });
 }
 
 void RunRecorder::onImuState(const NavState& state) {
@@ -102,7 +105,24 @@ void RunRecorder::onLocalMesh(const LocalMesh& mesh) {
   attempt([&] { writePly(std::filesystem::path(folder_) / "local_mesh.ply", toTriangleMesh(mesh)); });
 }
 
+void RunRecorder::onLoop(const LoopReport& report) {
+  writeTo(in_map_, [&](InMapFile& file) { file.addReport(report); });
+}
+
+void RunRecorder::onPlaces(LoopStage& places) {
+  writeTo(in_map_, [](InMapFile& file) { file.finish(); });
+  if (!kept_) return;
+  KeptGraph graph;
+  places.keep(graph);
+  attempt([&] { kept_->write(graph); });
+}
+
+void RunRecorder::commitMap() {
+  if (kept_) attempt([&] { kept_->commit(); });
+}
+
 void RunRecorder::onMap(MapStage& map, std::span<const std::uint32_t> tied) {
+  if (kept_) attempt([&] { kept_->write(map); });
   if (folder_.empty()) return;
   attempt([&] { map_ = writeMap(folder_, map, spilled_, tied); });
 }

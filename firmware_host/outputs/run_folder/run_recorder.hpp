@@ -11,8 +11,10 @@
 #include "firmware_host/files/line_file.hpp"
 #include "firmware_host/files/lost_files.hpp"
 #include "firmware_host/interfaces/run_listener.hpp"
+#include "firmware_host/outputs/map_files/kept_folder.hpp"
 #include "firmware_host/outputs/map_files/mesh_files.hpp"
 #include "firmware_host/outputs/map_files/spilled_surface.hpp"
+#include "firmware_host/outputs/run_folder/in_map_file.hpp"
 
 namespace swiftlet {
 
@@ -21,6 +23,8 @@ class RunRecorder : public RunListener {
   struct Wanted {
     bool imu_rate = false;
     bool meshes = false;
+    bool in_map = false;   ///< in_map.tum
+    std::string keep_map;  ///< folder of the map to keep; empty: none
     /// Go on without a file that cannot be made, too; else InputError.
     bool fly_on = false;
   };
@@ -32,11 +36,15 @@ class RunRecorder : public RunListener {
   void onMesh(bool keyframe, const LocalMesh& frame, const LocalMesh* horizon,
               std::span<const Eigen::Vector2f> hull) override;
   void onLocalMesh(const LocalMesh& mesh) override;
+  void onLoop(const LoopReport& report) override;
+  void onPlaces(LoopStage& places) override;
   void onMap(MapStage& map, std::span<const std::uint32_t> tied) override;
   void onFinish(const OdometryOutput& output) override;
   void onRemark(Stamp stamp, const std::string& text) override;
   /// For the graph: where surface goes that the map has no room for.
   [[nodiscard]] SpilledSurface& spilled() { return spilled_; }
+  /// The map that is kept gets its name.
+  void commitMap();
   /// Of the map and its surface; null without one.
   [[nodiscard]] const nlohmann::ordered_json& map() const { return map_; }
 
@@ -60,6 +68,8 @@ class RunRecorder : public RunListener {
   std::uint32_t epoch_ = 0;       ///< likewise
   std::optional<LineFile> states_;
   std::optional<LineFile> events_;
+  std::optional<InMapFile> in_map_;
+  std::optional<KeptFolder> kept_;
   std::optional<MeshSequenceWriter> meshes_;
   SpilledSurface spilled_;
   nlohmann::ordered_json map_;

@@ -34,6 +34,15 @@ double sinceFirstImage(const RunStatistics& statistics, Stamp stamp) {
   return statistics.first_image ? (stamp - *statistics.first_image).seconds() : 0;
 }
 
+Json toJson(const LocatedStatistics& located, const RunStatistics& run) {
+  return {{"nodes", located.nodes},
+          {"first_located_s", located.first ? Json(sinceFirstImage(run, *located.first)) : Json(nullptr)},
+          {"located_at_end", located.now},
+          {"keyframes_located", located.keyframes},
+          {"taken_back", located.taken_back},
+          {"verified", run.loop ? run.loop->kept_loops : 0}};
+}
+
 Json healthJson(const RunStatistics& statistics) {
   Json history = Json::array();
   for (const HealthChange& change : statistics.health) {
@@ -76,6 +85,7 @@ Json countersJson(const RunFacts& facts, const RunStatistics& statistics) {
     json["mesh"]["without_image"] = statistics.mesh->without_image;
   }
   if (statistics.loop) json["loop"] = toJson(*statistics.loop);
+  if (statistics.located) json["in_map"] = toJson(*statistics.located, statistics);
   json["losses"] = Json::object();
   for (const auto& [arrow, count] : statistics.losses) json["losses"][arrow] = count;
   json["faults"] = Json::object();

@@ -1,0 +1,22 @@
+#pragma once
+// What a run is asked of kept maps.
+
+#include <string>
+
+#include "firmware_host/settings/settings.hpp"
+
+namespace swiftlet {
+
+struct KeptMapRequest {
+  std::string keep;     ///< new folder for this run's places, graph and volume; empty: none; closes loops
+  std::string in;       ///< folder of a kept map to be located in; sets loop.in_map
+  bool extend = false;  ///< go on with it; sets loop.extend_map
+
+  void apply(Settings& settings) const {
+    if (!in.empty()) settings.loop.in_map = in;
+    if (extend) settings.loop.extend_map = true;
+    if (!keep.empty() || !settings.loop.in_map.empty()) settings.loop.enabled = true;
+  }
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,134 @@
+#include "mapping/loop/kept_graph.hpp"
+
+#include <algorithm>
+
+#include "mapping/loop/loop_stage.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr int kIterations = 100;  // of the solution of a graph that is extended, a round
+
+/// What is said of another vehicle's body, as if it had been this one's at the same camera.
+struct OwnBody {
+  SE3 T_theirs_ours;
+
+  [[nodiscard]] SE3 pose(const SE3& T_map_theirs) const { return T_map_theirs * T_theirs_ours; }
+  [[nodiscard]] SE3 relative(const SE3& T) const { return T_theirs_ours.inverse() * T * T_theirs_ours; }
+  [[nodiscard]] PoseMatrix<SE3> covariance(const PoseMatrix<SE3>& theirs) const {
+    const PoseMatrix<SE3> turn = poseAdjoint(T_theirs_ours.inverse());
+    return turn * theirs * turn.transpose();
+  }
+  [[nodiscard]] Tilt tilt(const Tilt& theirs) const {
+    const Eigen::Matrix3d R = T_theirs_ours.R().transpose();
+    return {R * theirs.up_body, R * theirs.covariance * R.transpose()};
+  }
+};
+
+}  // namespace
+
+Status LoopStage::takeIn(const KeptGraph& kept, KeptUse use) {
+  const OwnBody own{kept.T_body_cam * rig_.T_body_cam[0].inverse()};
+  const bool held = use == KeptUse::kLocalize;
+  std::uint32_t piece = 0;
+  for (const KeptNode& from : kept.nodes) {
+    LoopMap::Node node;
+    node.stamp = from.stamp;
+    node.frame = kKeptFrames + map_.kept();
+    node.place = PlaceDatabase::kNoSlot;
+    node.T_world_body = own.pose(from.T_map_body);
+    node.tilt = own.tilt(from.tilt);
+    // A map whose poses stay is one piece, whatever held it together when it was made.
+    const bool first = map_.kept() == 0;
+    const bool linked = !first && (held || from.linked);
+    piece += !first && !from.linked ? 1 : 0;
+    node.epoch = kKeptEpochs + piece;
+    LoopMap::Link link{own.relative(from.T_previous_this), own.covariance(from.covariance)};
+    if (linked && held) {
+      link.T_previous_this = map_.pose(map_.kept() - 1).inverse() * node.T_world_body;
+    }
+    if (const Status status = map_.addKept(node, linked ? &link : nullptr, held); !status.ok()) return status;
+    if (!from.features.empty()) keepKeptPlace(from);
+  }
+  for (const KeptLoop& loop : kept.loops) {
+    std::uint32_t id = 0;
+    if (held) break;
+    const Status status =
+        map_.addLoop(loop.from, loop.to, own.relative(loop.T_from_to), own.covariance(loop.covariance), id);
+    if (!status.ok()) return status;
+    inliers_[id].clear();
+  }
+  for (bool moved = false; !map_.atRest();) {
+    if (const Status status = map_.settle(kIterations, moved); !status.ok()) return status;
+  }
+  return okStatus();
+}
+
+/// Of the node added last. A place that is refused is none.
+void LoopStage::keepKeptPlace(const KeptNode& from) {
+  const LoopMap::Node& node = map_.node(map_.kept() - 1);
+  newest_.index = node.frame;
+  newest_.stamp = node.stamp;
+  newest_.epoch = node.epoch;
+  newest_.features.clear();
+  for (const PlaceFeature& feature : from.features) static_cast<void>(newest_.features.tryPushBack(feature));
+  static_cast<void>(place_.keep(newest_, place_step_.slot));
+  keepPlace();
+  // It was compared with its like in its own flight.
+  if (place_step_.slot != PlaceDatabase::kNoSlot) comparisons_[place_step_.slot].near_left = 0;
+}
+
+/// The first node of those joined to it that are the most.
+std::uint32_t LoopStage::largestPiece() const {
+  std::uint32_t best = 0;
+  std::size_t most = 0;
+  for (std::uint32_t k = 0; k < map_.size(); ++k) {
+    if (k > 0 && map_.joined(0, k)) continue;
+    std::size_t count = 0;
+    for (std::uint32_t other = k; other < map_.size(); ++other) count += map_.joined(k, other) ? 1 : 0;
+    if (count <= most) continue;
+    most = count;
+    best = k;
+  }
+  return best;
+}
+
+void LoopStage::keep(KeptGraph& out) {
+  out = {};
+  out.T_body_cam = rig_.T_body_cam[0];
+  if (map_.size() == 0) return;
+  constexpr std::uint32_t kLeftOut = 0xffffffffU;
+  const std::uint32_t piece = map_.kept() > 0 ? 0 : largestPiece();
+  std::vector<std::uint32_t> number(map_.size(), kLeftOut);
+  std::uint32_t before = kLeftOut;
+  for (std::uint32_t k = 0; k < map_.size(); ++k) {
+    if (!map_.joined(piece, k)) continue;
+    number[k] = static_cast<std::uint32_t>(out.nodes.size());
+    const LoopMap::Node& node = map_.node(k);
+    KeptNode& kept = out.nodes.emplace_back();
+    kept.stamp = node.stamp;
+    kept.T_map_body = map_.pose(k);
+    kept.tilt = node.tilt;
+    if (before != kLeftOut && map_.linked(k)) {
+      kept.linked = true;
+      kept.T_previous_this = map_.graph().odometry().relative(before, k);
+      kept.covariance = map_.graph().odometry().covariance(before, k);
+    } else if (before != kLeftOut) {
+      kept.T_previous_this = map_.pose(before).inverse() * map_.pose(k);
+      if (!map_.relativeCovariance(before, k, kept.covariance).ok()) kept.covariance.setIdentity();
+    }
+    before = k;
+    if (!hasPlace(k)) continue;
+    const auto& features = places_[node.place].features;
+    kept.features.assign(features.begin(), features.end());
+    for (PlaceFeature& feature : kept.features) feature.has_landmark = false;
+  }
+  for (std::uint32_t id = 0; id < map_.loops(); ++id) {
+    const RelativePose<SE3>& edge = map_.loopEdge(id);
+    if (!map_.selected(id) || number[edge.from] == kLeftOut) continue;
+    out.loops.push_back({number[edge.from], number[edge.to], edge.T_from_to,
+                         covarianceFromInformation(edge.information)});
+  }
+}
+
+}  // namespace swiftlet
