@@ -1,6 +1,7 @@
 #!/bin/sh
 # Flights of 60 to 90 s that come back to where they were, for the tables of loop closure: one on the motion of each
-# of the eleven EuRoC sequences, and some through twin_rooms (two identical rooms that are not the same place).
+# of the eleven EuRoC sequences, some through twin_rooms (two identical rooms that are not the same place), and some
+# that share a world, for kept maps: shared_mh01, shared_mh02 and shared_mh03, and so on.
 # usage: toolchain/revisit_flights.sh [--list | --tracks] OUT [NAME...]
 #   OUT       folder to write: OUT/NAME is an EuRoC folder with truth, for swiftlet replay
 #   NAME...   only these; default all
@@ -30,10 +31,17 @@ v201_90 109 90 V2_01_easy 15
 v202_60 110 60 V2_02_medium 25
 v203_75 111 75 V2_03_difficult 30
 twin_60 201 60 twin_rooms 0
-twin_90 202 90 twin_rooms 0'
+twin_90 202 90 twin_rooms 0
+shared_mh01 301 60 MH_01_easy 90
+shared_mh02 302 60 MH_02_easy 80
+shared_mh03 303 60 MH_03_medium 25
+shared_v101 306 60 V1_01_easy 65
+shared_v102 307 60 V1_02_medium 5
+shared_v201 309 60 V2_01_easy 15
+shared_v202 310 60 V2_02_medium 25'
 
 usage() {
-  sed -n '2,16s/^# \{0,1\}//p' "$0"
+  sed -n '2,17s/^# \{0,1\}//p' "$0"
 }
 
 kind=images
@@ -72,6 +80,12 @@ fly() { # name seed seconds sequence skip
     twin_rooms) motion='--world twin_rooms' ;;
     MH_*) motion="--world hall --motion $data/$4/groundtruth.csv.xz --motion-skip $5" ;;
     *) motion="--world room --motion $data/$4/groundtruth.csv.xz --motion-skip $5" ;;
+  esac
+  case $1 in
+    shared_*)
+      motion="$motion --world-seed 7"
+      for other in "$data/${4%%_*}"_*/groundtruth.csv.xz; do motion="$motion --world-for $other"; done
+      ;;
   esac
   case $kind in
     tracks) what=--tracks ;;

@@ -100,8 +100,16 @@ void SimulatedFlight::flyAndBuild() {
     duration_ = trajectory_.endTime();
   }
   std::vector<Eigen::Vector3d> path;
-  for (double t = 0; t <= duration_; t += kClearanceStep) path.push_back(trajectory_.pose(t).translation);
-  if (!s.given_motion.empty() && !fitWorld(s.world, path)) {
+  const auto add = [&path](const auto& trajectory, double seconds) {
+    for (double t = 0; t <= seconds; t += kClearanceStep) path.push_back(trajectory.pose(t).translation);
+  };
+  for (const std::string& motion : s.world_for) {
+    const SplineTrajectory other = readGivenMotion(motion);
+    add(other, other.endTime());
+  }
+  if (path.empty()) add(trajectory_, duration_);
+  const bool fits_motions = !s.given_motion.empty() || !s.world_for.empty();
+  if (fits_motions && !fitWorld(s.world, path)) {
     throw std::invalid_argument(
         "world.kind: a given motion needs a world that can be resized (room, hall, cluttered)");
   }

@@ -43,6 +43,9 @@ struct SimulationSettings {
   FlightSettings flight;  ///< duration, speed, aggressiveness, rests; its R_flu_body comes from the rig
   /// EuRoC ground truth to fly in place of an own path (given_motion.hpp); flight.duration cuts it.
   std::string given_motion;
+  /// Motions that the world is fitted to and kept clear for, in place of the flight's own: flights with the
+  /// same list and world_seed are in the same world.
+  std::vector<std::string> world_for;
   double motion_skip = 0;  ///< s of it left out at the beginning
 
   RigKind rig = RigKind::kEuroc;

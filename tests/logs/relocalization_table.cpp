@@ -120,7 +120,13 @@ struct Start {
   double longest_wrong = 0;   ///< s
   double squares = 0;         ///< m^2, of lines that are not wrong
   std::size_t lines = 0;
+  double near_squares = 0;  ///< of these, where the view is near one of the map
+  std::size_t near_lines = 0;
 };
+
+double rms(double squares, std::size_t lines) {
+  return lines > 0 ? std::sqrt(squares / static_cast<double>(lines)) : 0;
+}
 
 Start judge(const Log& log, const Map& map, double from, const Trajectory& found) {
   Start start;
@@ -150,6 +156,9 @@ Start judge(const Log& log, const Map& map, double from, const Trajectory& found
     } else {
       start.squares += distance * distance;
       ++start.lines;
+      if (!map.near(*pose)) continue;
+      start.near_squares += distance * distance;
+      ++start.near_lines;
     }
   }
   return start;
@@ -157,8 +166,8 @@ Start judge(const Log& log, const Map& map, double from, const Trajectory& found
 
 void printRow(const std::string& name, const Map& map, const std::vector<Start>& starts) {
   std::vector<double> after;
-  std::size_t could = 0, in_time = 0, located = 0, wrong = 0, kept_wrong = 0, lines = 0;
-  double squares = 0;
+  std::size_t could = 0, in_time = 0, located = 0, wrong = 0, kept_wrong = 0, lines = 0, near_lines = 0;
+  double squares = 0, near_squares = 0;
   for (const Start& start : starts) {
     const bool quick = start.located_after >= 0 && start.located_after <= kInTime;
     could += start.could ? 1 : 0;
@@ -168,13 +177,15 @@ void printRow(const std::string& name, const Map& map, const std::vector<Start>&
     kept_wrong += start.longest_wrong > kKeptLongest ? 1 : 0;
     squares += start.squares;
     lines += start.lines;
+    near_squares += start.near_squares;
+    near_lines += start.near_lines;
     if (start.located_after >= 0) after.push_back(start.located_after);
   }
   std::sort(after.begin(), after.end());
   const double median = after.empty() ? 0 : after[after.size() / 2];
-  const double rms = lines > 0 ? std::sqrt(squares / static_cast<double>(lines)) : 0;
-  fmt::print("| {} | {} | {} | {} | {} | {:.2f} | {} | {} | {:.4f} | {:.4f} |\n", name, starts.size(), could, in_time,
-             located, median, wrong, kept_wrong, rms, map.rms);
+  fmt::print("| {} | {} | {} | {} | {} | {:.2f} | {} | {} | {:.4f} | {:.4f} | {:.4f} |\n", name, starts.size(),
+             could, in_time, located, median, wrong, kept_wrong, rms(squares, lines), rms(near_squares, near_lines),
+             map.rms);
   std::fflush(stdout);
 }
 
@@ -192,7 +203,7 @@ void flyInto(const Log& log, const Map& map, double from, const std::string& nam
     const Start& start = starts.back();
     fmt::print(stderr, "{} {:5.1f} s: {}, located after {:.2f} s, wrong for {:.2f} s, rms {:.4f} m\n", name, t,
                start.could ? "could be" : "-", start.located_after, start.longest_wrong,
-               start.lines > 0 ? std::sqrt(start.squares / static_cast<double>(start.lines)) : 0);
+               rms(start.squares, start.lines));
   }
   printRow(name, map, starts);
 }
