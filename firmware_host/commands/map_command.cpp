@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "firmware_host/commands/command.hpp"
+#include "firmware_host/lab/modules/map_merge_run.hpp"
 #include "firmware_host/lab/modules/map_slice_run.hpp"
 
 namespace swiftlet {
@@ -52,12 +53,45 @@ void addSlice(CLI::App& map, int& exit_code) {
   });
 }
 
+void addMerge(CLI::App& map, int& exit_code) {
+  CLI::App* command = map.add_subcommand("merge", "Make one kept map of two that show the same places");
+  auto request = std::make_shared<MapMergeRequest>();
+  command->add_option("FIRST", request->first, "Folder that --keep-map wrote; the result has its frame")
+      ->required();
+  command->add_option("SECOND", request->second, "Another, of the same or another vehicle")->required();
+  command->add_option("--out", request->out, "New folder for the merged map")->required();
+  command->footer("Example:\n  swiftlet map merge monday tuesday --out both");
+  command->callback([request, &exit_code] {
+    const nlohmann::ordered_json summary = runMapMerge(*request);
+    const auto count = [&](const char* which, const char* what) {
+      return summary[which][what].get<std::size_t>();
+    };
+    fmt::print("{} + {} nodes: {} in the merged map, {} loops between the two\nwritten to {}\n",
+               count("first", "nodes"), count("second", "nodes"), count("merged", "nodes"),
+               summary["loops_between"].get<std::size_t>(), request->out);
+    exit_code = kExitDone;
+  });
+}
+
+void addInfo(CLI::App& map, int& exit_code) {
+  CLI::App* command = map.add_subcommand("info", "Print what a kept map holds, as JSON");
+  auto folder = std::make_shared<std::string>();
+  command->add_option("KEPT_MAP", *folder, "Folder that --keep-map wrote")->required();
+  command->footer("Example:\n  swiftlet map info monday");
+  command->callback([folder, &exit_code] {
+    fmt::print("{}\n", mapInfo(*folder).dump(2));
+    exit_code = kExitDone;
+  });
+}
+
 }  // namespace
 
 void addMapCommand(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("map", "Look at a kept map");
+  CLI::App* command = app.add_subcommand("map", "Look at kept maps and merge them");
   command->require_subcommand(1);
   command->footer("Example:\n  swiftlet map slice v102.swm --out slice.png");
+  addInfo(*command, exit_code);
+  addMerge(*command, exit_code);
   addSlice(*command, exit_code);
 }
 

@@ -15,11 +15,13 @@
 #include "estimator/smoother/full_smoother.hpp"
 #include "firmware_host/interfaces/run_verdict.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
-#include "mapping/loop/loop_stage.hpp"
+#include "mapping/loop/loop_report.hpp"
 #include "mapping/map/map_stage.hpp"
 #include "mesher/mesh_stage.hpp"
 
 namespace swiftlet {
+
+class LoopStage;
 
 /// Called on the thread `log`, in the order of the stream.
 class RunListener {

@@ -13,11 +13,21 @@ constexpr int kIterations = 100;  // of the solution of a graph that is extended
 struct OwnBody {
   SE3 T_theirs_ours;
 
-  [[nodiscard]] SE3 pose(const SE3& T_map_theirs) const { return T_map_theirs * T_theirs_ours; }
   [[nodiscard]] SE3 relative(const SE3& T) const { return T_theirs_ours.inverse() * T * T_theirs_ours; }
   [[nodiscard]] PoseMatrix<SE3> covariance(const PoseMatrix<SE3>& theirs) const {
     const PoseMatrix<SE3> turn = poseAdjoint(T_theirs_ours.inverse());
     return turn * theirs * turn.transpose();
+  }
+  [[nodiscard]] LoopMap::Node node(const KeptNode& theirs) const {
+    LoopMap::Node out;
+    out.stamp = theirs.stamp;
+    out.place = PlaceDatabase::kNoSlot;
+    out.T_world_body = theirs.T_map_body * T_theirs_ours;
+    out.tilt = tilt(theirs.tilt);
+    return out;
+  }
+  [[nodiscard]] LoopMap::Link link(const KeptNode& theirs) const {
+    return {relative(theirs.T_previous_this), covariance(theirs.covariance)};
   }
   [[nodiscard]] Tilt tilt(const Tilt& theirs) const {
     const Eigen::Matrix3d R = T_theirs_ours.R().transpose();
@@ -32,50 +42,86 @@ Status LoopStage::takeIn(const KeptGraph& kept, KeptUse use) {
   const bool held = use == KeptUse::kLocalize;
   std::uint32_t piece = 0;
   for (const KeptNode& from : kept.nodes) {
-    LoopMap::Node node;
-    node.stamp = from.stamp;
-    node.frame = kKeptFrames + map_.kept();
-    node.place = PlaceDatabase::kNoSlot;
-    node.T_world_body = own.pose(from.T_map_body);
-    node.tilt = own.tilt(from.tilt);
+    LoopMap::Node node = own.node(from);
     // A map whose poses stay is one piece, whatever held it together when it was made.
     const bool first = map_.kept() == 0;
     const bool linked = !first && (held || from.linked);
     piece += !first && !from.linked ? 1 : 0;
+    node.frame = kKeptFrames + map_.kept();
     node.epoch = kKeptEpochs + piece;
-    LoopMap::Link link{own.relative(from.T_previous_this), own.covariance(from.covariance)};
-    if (linked && held) {
-      link.T_previous_this = map_.pose(map_.kept() - 1).inverse() * node.T_world_body;
-    }
+    LoopMap::Link link = own.link(from);
+    if (linked && held) link.T_previous_this = map_.pose(map_.kept() - 1).inverse() * node.T_world_body;
     if (const Status status = map_.addKept(node, linked ? &link : nullptr, held); !status.ok()) return status;
-    if (!from.features.empty()) keepKeptPlace(from);
+    if (from.features.empty()) continue;
+    loadFeatures(from, node);
+    static_cast<void>(place_.keep(newest_, place_step_));  // a place that is refused is none
+    keepPlace();
+    // It was compared with its like in its own flight.
+    if (place_step_.slot != PlaceDatabase::kNoSlot) comparisons_[place_step_.slot].near_left = 0;
   }
   for (const KeptLoop& loop : kept.loops) {
-    std::uint32_t id = 0;
     if (held) break;
-    const Status status =
-        map_.addLoop(loop.from, loop.to, own.relative(loop.T_from_to), own.covariance(loop.covariance), id);
-    if (!status.ok()) return status;
-    inliers_[id].clear();
+    if (const Status status = addKeptLoop(loop, 0, own.T_theirs_ours); !status.ok()) return status;
   }
-  for (bool moved = false; !map_.atRest();) {
-    if (const Status status = map_.settle(kIterations, moved); !status.ok()) return status;
-  }
-  return okStatus();
+  return settleWhole();
 }
 
-/// Of the node added last. A place that is refused is none.
-void LoopStage::keepKeptPlace(const KeptNode& from) {
-  const LoopMap::Node& node = map_.node(map_.kept() - 1);
+Status LoopStage::flyAgain(const KeptGraph& other, const LoopEffort& effort) {
+  const OwnBody own{other.T_body_cam * rig_.T_body_cam[0].inverse()};
+  const auto first = static_cast<std::uint32_t>(map_.size());
+  std::vector<KeptLoop> loops = other.loops;
+  std::stable_sort(loops.begin(), loops.end(),
+                   [](const KeptLoop& a, const KeptLoop& b) { return a.to < b.to; });
+  auto loop = loops.begin();
+  for (const KeptNode& from : other.nodes) {
+    LoopMap::Node node = own.node(from);
+    const auto number = static_cast<std::uint32_t>(map_.size()) - first;
+    const bool linked = number > 0 && from.linked;
+    epoch_ += number > 0 && !linked ? 1 : 0;
+    node.frame = number;
+    node.epoch = epoch_;
+    const LoopMap::Link link = own.link(from);
+    if (const Status status = map_.add(node, linked ? &link : nullptr); !status.ok()) return status;
+    for (; loop != loops.end() && loop->to == number; ++loop) {
+      if (const Status status = addKeptLoop(*loop, first, own.T_theirs_ours); !status.ok()) return status;
+    }
+    LoopReport report;
+    if (!from.features.empty()) {
+      loadFeatures(from, node);
+      if (place_.step(newest_, place_step_).ok()) {
+        keepPlace();
+        closeLoops(effort, report);
+      }
+    }
+    closeNearLoops(effort, report);
+    if (const Status status = map_.settle(effort.iterations, report.moved); !status.ok()) return status;
+  }
+  return settleWhole();
+}
+
+/// Features of a place to newest_.
+void LoopStage::loadFeatures(const KeptNode& from, const LoopMap::Node& node) {
   newest_.index = node.frame;
   newest_.stamp = node.stamp;
   newest_.epoch = node.epoch;
   newest_.features.clear();
   for (const PlaceFeature& feature : from.features) static_cast<void>(newest_.features.tryPushBack(feature));
-  static_cast<void>(place_.keep(newest_, place_step_.slot));
-  keepPlace();
-  // It was compared with its like in its own flight.
-  if (place_step_.slot != PlaceDatabase::kNoSlot) comparisons_[place_step_.slot].near_left = 0;
+}
+
+Status LoopStage::addKeptLoop(const KeptLoop& loop, std::uint32_t first_node, const SE3& T_theirs_ours) {
+  const OwnBody own{T_theirs_ours};
+  std::uint32_t id = 0;
+  const Status status = map_.addLoop(first_node + loop.from, first_node + loop.to,
+                                     own.relative(loop.T_from_to), own.covariance(loop.covariance), id);
+  if (status.ok()) inliers_[id].clear();
+  return status;
+}
+
+Status LoopStage::settleWhole() {
+  for (bool moved = false; !map_.atRest();) {
+    if (const Status status = map_.settle(kIterations, moved); !status.ok()) return status;
+  }
+  return okStatus();
 }
 
 /// The first node of those joined to it that are the most.
@@ -95,6 +141,7 @@ std::uint32_t LoopStage::largestPiece() const {
 
 void LoopStage::keep(KeptGraph& out) {
   out = {};
+  out.camera = rig_.camera[0];
   out.T_body_cam = rig_.T_body_cam[0];
   if (map_.size() == 0) return;
   constexpr std::uint32_t kLeftOut = 0xffffffffU;

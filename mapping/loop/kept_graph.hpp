@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "estimator/camera/camera_model.hpp"
 #include "estimator/core/stamp.hpp"
 #include "estimator/geometry/se3.hpp"
 #include "mapping/place/place_keyframe.hpp"
@@ -39,7 +40,8 @@ struct KeptLoop {
 };
 
 struct KeptGraph {
-  SE3 T_body_cam;  ///< camera 0
+  CameraModel camera;  ///< camera 0 of the flight, of the first of several
+  SE3 T_body_cam;
   std::vector<KeptNode> nodes;
   std::vector<KeptLoop> loops;
 };

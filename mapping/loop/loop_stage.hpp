@@ -95,6 +95,9 @@ class LoopStage {
   /// kCapacityReached, kInvalidInput (not finite, loops between nodes that are not there): a part is taken
   /// in. Allocates nothing but scratch; solves the graph that is extended.
   Status takeIn(const KeptGraph& kept, KeptUse use);
+  /// In place of a flight: what another map holds, as if it had been flown now. Its nodes need room too.
+  /// Errors as takeIn().
+  Status flyAgain(const KeptGraph& other, const LoopEffort& effort);
   /// After the flight: what later ones need. Of all that odometry and loops hold together with the kept map,
   /// or without one with most nodes; allocates.
   void keep(KeptGraph& out);
@@ -135,7 +138,9 @@ class LoopStage {
   void appendLink(const SE3& T_previous_this, const Matrix6d& covariance);
   [[nodiscard]] bool movedEnough(Stamp now) const;
   Status addNode(const SmoothedWindow& window);
-  void keepKeptPlace(const KeptNode& node);
+  void loadFeatures(const KeptNode& from, const LoopMap::Node& node);
+  Status addKeptLoop(const KeptLoop& loop, std::uint32_t first_node, const SE3& T_theirs_ours);
+  Status settleWhole();
   [[nodiscard]] bool located(std::uint32_t k) const { return map_.kept() > 0 && map_.joined(0, k); }
   [[nodiscard]] std::uint32_t largestPiece() const;
   [[nodiscard]] bool describePlace(const LoopInput& input);

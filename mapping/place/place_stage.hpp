@@ -22,6 +22,13 @@ struct PlaceStep {
   BagOfWords bag;
   std::uint32_t slot = PlaceDatabase::kNoSlot;
   bool forgot = false;  ///< another keyframe left for this one
+
+  void clear() {
+    query = {};
+    bag.clear();
+    slot = PlaceDatabase::kNoSlot;
+    forgot = false;
+  }
 };
 
 class PlaceStage {
@@ -39,13 +46,17 @@ class PlaceStage {
   [[nodiscard]] Status step(const ImageView& image, const TrackedFrame& tracked, std::uint32_t epoch,
                             PlaceKeyframe& keyframe, PlaceStep& out);
 
-  /// Stores a keyframe of an earlier flight, described then. As step(), but nothing is asked.
-  [[nodiscard]] Status keep(const PlaceKeyframe& keyframe, std::uint32_t& slot);
+  /// The same for a keyframe whose features were extracted before.
+  [[nodiscard]] Status step(const PlaceKeyframe& keyframe, PlaceStep& out);
+  /// Stores such a keyframe without a query.
+  [[nodiscard]] Status keep(const PlaceKeyframe& keyframe, PlaceStep& out);
   /// The keyframe of a slot is needed no more.
   void forget(std::uint32_t slot) { static_cast<void>(database_.forget(slot)); }
   [[nodiscard]] const PlaceDatabase& database() const { return database_; }
 
  private:
+  [[nodiscard]] Status store(const PlaceKeyframe& keyframe, PlaceStep& out);
+
   CameraModel camera_;
   const Vocabulary& vocabulary_;
   PlaceExtractor extractor_;

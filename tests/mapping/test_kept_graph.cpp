@@ -122,6 +122,34 @@ TEST_CASE("a map that is extended holds what both flights saw, in its own frame"
   CHECK(report.correction.located);
 }
 
+TEST_CASE("two maps of one place become one, and maps of places that share nothing stay apart") {
+  const KeptGraph first = mapOf({SE3()});
+  Flight other;
+  double seconds = 0;
+  for (const Picture& picture : pictures().all) other.see(picture, seconds += kSpacing, elsewhere());
+  KeptGraph second;
+  other.stage->keep(second);
+  SECTION("one place") {
+    Flight merged = flightIn(first, KeptUse::kExtend);
+    REQUIRE(merged.stage->flyAgain(second, LoopEffort{}).ok());
+    KeptGraph both;
+    merged.stage->keep(both);
+    REQUIRE(both.nodes.size() == first.nodes.size() + second.nodes.size());
+    for (std::size_t i = 0; i < pictures().all.size(); ++i) {
+      const SE3& found = both.nodes[first.nodes.size() + i].T_map_body;
+      CHECK((found.translation - pictures().all[i].T_truth_body.translation).norm() < 0.05);
+    }
+  }
+  SECTION("nothing shared") {
+    for (KeptNode& node : second.nodes) node.features.clear();
+    Flight merged = flightIn(first, KeptUse::kExtend);
+    REQUIRE(merged.stage->flyAgain(second, LoopEffort{}).ok());
+    KeptGraph both;
+    merged.stage->keep(both);
+    CHECK(both.nodes.size() == first.nodes.size());
+  }
+}
+
 TEST_CASE("the map of a body that carries its camera elsewhere is taken as of one's own") {
   KeptGraph map = mapOf({SE3()});
   const SE3 X(expSo3(Eigen::Vector3d(0.3, -0.2, 1)), Eigen::Vector3d(0.1, 0.2, -0.3));

@@ -10,9 +10,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kGraphFile = "graph.swg";
-constexpr const char* kVolumeFile = "volume.swm";
-
 /// With a slash at its end too.
 fs::path folderOf(const std::string& path) {
   const fs::path folder = fs::path(path).lexically_normal();
@@ -27,25 +24,25 @@ KeptFolder::KeptFolder(const std::string& path) : path_(folderOf(path)), part_(p
     throw InputError(path, 0, "", "is there already; a kept map is never written over",
                      "Name another folder, or remove this one");
   }
-  fs::remove(part_ / kGraphFile, error);
-  fs::remove(part_ / kVolumeFile, error);
+  fs::remove(part_ / kKeptGraphFile, error);
+  fs::remove(part_ / kKeptVolumeFile, error);
   fs::create_directories(part_, error);
   if (error) throw InputError(part_.string(), 0, "", error.message(), "Name a folder that can be made");
 }
 
 KeptFolder::~KeptFolder() {
   std::error_code error;
-  fs::remove(part_ / kGraphFile, error);
-  fs::remove(part_ / kVolumeFile, error);
+  fs::remove(part_ / kKeptGraphFile, error);
+  fs::remove(part_ / kKeptVolumeFile, error);
   fs::remove(part_, error);
 }
 
 void KeptFolder::write(const KeptGraph& graph) const {
   const std::vector<std::uint8_t> bytes = keptGraphBytes(graph);
-  writeWholeFile((part_ / kGraphFile).string(), {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  writeWholeFile((part_ / kKeptGraphFile).string(), {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
-void KeptFolder::write(MapStage& map) const { writeKeptMapFile((part_ / kVolumeFile).string(), map); }
+void KeptFolder::write(MapStage& map) const { writeKeptMapFile((part_ / kKeptVolumeFile).string(), map); }
 
 void KeptFolder::commit() {
   std::error_code error;
@@ -56,7 +53,7 @@ void KeptFolder::commit() {
 }
 
 KeptGraph readKeptFolder(const std::string& path) {
-  return readKeptGraphFile((folderOf(path) / kGraphFile).string());
+  return readKeptGraphFile((folderOf(path) / kKeptGraphFile).string());
 }
 
 }  // namespace swiftlet

@@ -10,6 +10,9 @@
 
 namespace swiftlet {
 
+inline constexpr const char* kKeptGraphFile = "graph.swg";
+inline constexpr const char* kKeptVolumeFile = "volume.swm";
+
 class KeptFolder {
  public:
   /// InputError where there is something of that name already, or nothing can be made there.

@@ -18,8 +18,8 @@ namespace {
 
 constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'S', 'W', 'G', '\r', '\n', 0x1A, '\n'};
 constexpr std::uint32_t kVersion = 1;
-/// Magic, version, nodes, loops, T_body_cam.
-constexpr std::size_t kHeadBytes = 8 + 3 * 4 + 7 * 8;
+/// Magic, version, nodes, loops, camera, T_body_cam.
+constexpr std::size_t kHeadBytes = 8 + 3 * 4 + 3 * 4 + 8 * 8 + 7 * 8;
 constexpr std::size_t kCovarianceBytes = 21 * 8;
 /// Stamp, pose, up, tilt's covariance, flags, relative pose with covariance, number of features.
 constexpr std::size_t kNodeBytes = 8 + 7 * 8 + 3 * 8 + 6 * 8 + 4 + 7 * 8 + kCovarianceBytes + 4;
@@ -33,6 +33,7 @@ constexpr double kUnitTolerance = 1e-3;
 // Far beyond any building; a number above it is damage.
 constexpr double kFar = 1e6;  // m
 constexpr int kMostOctaves = 16;
+constexpr int kMostPixels = 1 << 15;  // a side
 
 class GraphWriter {
  public:
@@ -43,6 +44,11 @@ class GraphWriter {
     to_.u32(kVersion);
     to_.u32(static_cast<std::uint32_t>(graph.nodes.size()));
     to_.u32(static_cast<std::uint32_t>(graph.loops.size()));
+    to_.u32(graph.camera.kind() == CameraKind::kPinholeRadtan ? 0U : 1U);
+    to_.i32(graph.camera.width());
+    to_.i32(graph.camera.height());
+    for (int i = 0; i < 4; ++i) to_.f64(graph.camera.intrinsics()[i]);
+    for (int i = 0; i < 4; ++i) to_.f64(graph.camera.distortion()[i]);
     pose(graph.T_body_cam);
     for (const KeptNode& it : graph.nodes) node(it);
     for (const KeptLoop& loop : graph.loops) {
@@ -115,6 +121,7 @@ class GraphReader {
     const std::uint32_t loops = from_.u32();
     demand(nodes <= from_.left() / kNodeBytes, "nodes", "are more than the file has room for");
     KeptGraph graph;
+    graph.camera = camera();
     graph.T_body_cam = pose("T_body_cam");
     graph.nodes.resize(nodes);
     for (KeptNode& it : graph.nodes) node(it);
@@ -159,6 +166,17 @@ class GraphReader {
     }
     demand(m.allFinite() && m.diagonal().minCoeff() >= 0, field, "is no covariance");
     return m;
+  }
+  CameraModel camera() {
+    const std::uint32_t kind = from_.u32();
+    const std::int32_t width = from_.i32(), height = from_.i32();
+    const Eigen::Vector4d intrinsics = vector<4>();
+    const Eigen::Vector4d distortion = vector<4>();
+    demand(kind <= 1 && width > 0 && width <= kMostPixels && height > 0 && height <= kMostPixels &&
+               intrinsics.allFinite() && intrinsics.head<2>().minCoeff() > 0 && distortion.allFinite(),
+           "camera", "is none");
+    return {kind == 0 ? CameraKind::kPinholeRadtan : CameraKind::kEquidistant, width, height, intrinsics,
+            distortion};
   }
   void node(KeptNode& node) {
     demand(from_.left() >= kNodeBytes, "node", "the file ends within it");

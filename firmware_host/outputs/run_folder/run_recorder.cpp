@@ -11,6 +11,7 @@
 #include "firmware_host/outputs/map_files/ply_file.hpp"
 #include "firmware_host/outputs/run_folder/events_log.hpp"
 #include "firmware_host/outputs/run_folder/states_csv.hpp"
+#include "mapping/loop/loop_stage.hpp"
 
 namespace swiftlet {
 namespace {

@@ -1,0 +1,96 @@
+#include "firmware_host/lab/modules/map_merge_run.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/outputs/map_files/kept_folder.hpp"
+#include "firmware_host/outputs/map_files/kept_map.hpp"
+#include "mapping/loop/loop_stage.hpp"
+
+namespace swiftlet {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json graphJson(const KeptGraph& graph) {
+  std::size_t pieces = graph.nodes.empty() ? 0 : 1, places = 0, features = 0;
+  Eigen::AlignedBox3d box;
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    const KeptNode& node = graph.nodes[i];
+    pieces += i > 0 && !node.linked ? 1 : 0;
+    places += node.features.empty() ? 0 : 1;
+    features += node.features.size();
+    box.extend(node.T_map_body.translation);
+  }
+  Json json = {{"nodes", graph.nodes.size()},
+               {"pieces", pieces},
+               {"loops", graph.loops.size()},
+               {"places", places},
+               {"features", features}};
+  if (!graph.nodes.empty()) {
+    for (int axis = 0; axis < 3; ++axis) {
+      json["extent_m"][std::string(1, "xyz"[axis])] = {box.min()[axis], box.max()[axis]};
+    }
+  }
+  return json;
+}
+
+void demand(const Status& status, const std::string& folder) {
+  if (!status.ok()) throw InputError(folder, 0, "", status.what, "Name another kept map");
+}
+
+}  // namespace
+
+Json runMapMerge(const MapMergeRequest& request) {
+  const KeptGraph first = readKeptFolder(request.first);
+  const KeptGraph second = readKeptFolder(request.second);
+  KeptFolder out(request.out);
+  LoopLimits limits;
+  limits.nodes = first.nodes.size() + second.nodes.size();
+  limits.loops += first.loops.size() + second.loops.size();
+  Rig rig;
+  rig.camera_count = 1;
+  rig.camera[0] = first.camera;
+  rig.T_body_cam[0] = first.T_body_cam;
+  const auto stage = std::make_unique<LoopStage>(rig, LoopSettings{}, limits);
+  demand(stage->takeIn(first, KeptUse::kExtend), request.first);
+  LoopEffort effort;
+  effort.candidates = kMaxLoopCandidates;  // there is time
+  demand(stage->flyAgain(second, effort), request.second);
+  KeptGraph merged;
+  stage->keep(merged);
+  if (merged.nodes.size() == first.nodes.size()) {
+    throw InputError(request.second, 0, "", "no loops tie this map to " + request.first,
+                     "Merge maps that show the same places; nothing was written");
+  }
+  out.write(merged);
+  out.commit();
+  Json json = {{"first", graphJson(first)}, {"second", graphJson(second)}, {"merged", graphJson(merged)}};
+  const auto between = [&](const KeptLoop& loop) {
+    return loop.from < first.nodes.size() && loop.to >= first.nodes.size();
+  };
+  json["loops_between"] = std::count_if(merged.loops.begin(), merged.loops.end(), between);
+  return json;
+}
+
+Json mapInfo(const std::string& folder) {
+  Json json = graphJson(readKeptFolder(folder));
+  json["graph_bytes"] = std::filesystem::file_size(std::filesystem::path(folder) / kKeptGraphFile);
+  const std::filesystem::path volume = std::filesystem::path(folder) / kKeptVolumeFile;
+  if (!std::filesystem::exists(volume)) return json;
+  const VoxelVolume held = readKeptVolumeFile(volume.string());
+  std::size_t blocks = 0, free_blocks = 0;
+  for (std::uint32_t slot = 0; slot < held.slots(); ++slot) {
+    blocks += held.header(slot).state == BlockState::kVoxels ? 1 : 0;
+    free_blocks += held.header(slot).state == BlockState::kFree ? 1 : 0;
+  }
+  json["volume"] = {{"bytes", std::filesystem::file_size(volume)},
+                    {"voxel_size_m", held.settings().voxel_size},
+                    {"blocks", blocks},
+                    {"free_blocks", free_blocks}};
+  return json;
+}
+
+}  // namespace swiftlet
