@@ -1,0 +1,119 @@
+// Whole runs that keep a map, fly in it and go on with it, on the seconds of log in the repository.
+
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "drivers/calibration/input_error.hpp"
+#include "drivers/recorded/trajectory_file.hpp"
+#include "firmware_host/lab/evaluation/association.hpp"
+#include "firmware_host/lab/modules/map_merge_run.hpp"
+#include "firmware_host/outputs/map_files/kept_folder.hpp"
+#include "firmware_host/runs/replay_run.hpp"
+#include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/logs/log_data.hpp"
+#include "tests/sanitized.hpp"
+
+namespace swiftlet {
+namespace {
+
+std::string textOf(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+Settings quick() {
+  Settings settings;
+  settings.mesh.enabled = false;
+  settings.full_smoothing = false;
+  return settings;
+}
+
+ReplayResult fly(const std::string& out, const KeptMapRequest& maps) {
+  ReplayRequest request;
+  request.log = shortLog();
+  request.out = out;
+  request.kept_maps = maps;
+  return runReplay(request, quick());
+}
+
+Trajectory read(const std::string& path) { return readWholeTrajectory(path, "Run again"); }
+
+TEST_CASE("a run is located in the map of another, which stays as it is") {
+  const ScratchFolder folder("known_map");
+  const std::string map = folder.file("map");
+  fly(folder.file("first"), {map, "", false});
+  CHECK(std::filesystem::exists(map + "/graph.swg"));
+  CHECK_FALSE(std::filesystem::exists(map + ".part"));
+  const std::string kept = textOf(map + "/graph.swg");
+
+  const ReplayResult second = fly(folder.file("second"), {"", map, false});
+  const auto& in_map = second.summary.at("counters").at("in_map");
+  CHECK(in_map.at("nodes").get<std::size_t>() == readKeptFolder(map).nodes.size());
+  CHECK(in_map.at("located_at_end").get<bool>());
+  CHECK(in_map.at("taken_back").get<int>() == 0);
+  CHECK(textOf(map + "/graph.swg") == kept);
+  // The same images: the map's frame is the first run's world.
+  const Trajectory lines = read(folder.file("second/in_map.tum"));
+  REQUIRE(lines.size() > 5);
+  AssociationOptions exact;
+  for (const PosePair& pair : associate(lines, read(folder.file("first/odometry.tum")), exact).pairs) {
+    CHECK((pair.estimate.translation - pair.truth.translation).norm() < 0.02);
+  }
+  // Nothing is written before the run is located.
+  const double located = in_map.at("first_located_s").get<double>();
+  const Stamp begin = *second.statistics.first_image;
+  CHECK((lines.front().stamp - begin).seconds() == Approx(located).margin(1e-6));
+
+  SECTION("an extended map, and one merged of two, hold both runs' nodes") {
+    const std::string extended = folder.file("extended");
+    fly(folder.file("third"), {extended, map, true});
+    CHECK(textOf(map + "/graph.swg") == kept);
+    CHECK(readKeptFolder(extended).nodes.size() > readKeptFolder(map).nodes.size());
+    const auto merged = runMapMerge({map, extended, folder.file("merged")});
+    CHECK(merged.at("loops_between").get<int>() >= 3);
+    CHECK(mapInfo(folder.file("merged")).at("nodes") == merged.at("merged").at("nodes"));
+  }
+  SECTION("what is there already, missing or damaged is refused with its name, and nothing is written") {
+    CHECK_THROWS_WITH(fly(folder.file("x"), {map, "", false}), Catch::Contains("is there already"));
+    CHECK_THROWS_WITH(fly(folder.file("y"), {"", folder.file("none"), false}), Catch::Contains("none/graph.swg"));
+    std::string damaged = kept;
+    damaged[damaged.size() / 2] ^= 1;
+    std::filesystem::create_directories(folder.file("damaged"));
+    std::ofstream(folder.file("damaged/graph.swg"), std::ios::binary) << damaged;
+    CHECK_THROWS_WITH(fly(folder.file("z"), {"", folder.file("damaged"), false}), Catch::Contains("checksum"));
+    CHECK_THROWS_AS(runMapMerge({map, folder.file("damaged"), folder.file("m")}), InputError);
+    CHECK_FALSE(std::filesystem::exists(folder.file("m")));
+    CHECK_FALSE(std::filesystem::exists(folder.file("m.part")));
+  }
+}
+
+TEST_CASE("a threaded run in a map is repeated byte for byte") {
+  const ScratchFolder folder("known_map_threaded");
+  const std::string map = folder.file("map");
+  fly(folder.file("first"), {map, "", false});
+  ReplayRequest request;
+  request.log = shortLog();
+  request.out = folder.file("run");
+  request.real_time = true;
+  request.speed = kSanitized ? 0.2 : 2;
+  request.record = true;
+  request.kept_maps.in = map;
+  const ReplayResult flown = runReplay(request, quick());
+  REQUIRE(flown.finished);
+  REQUIRE(flown.summary.at("counters").at("in_map").at("located_at_end").get<bool>());
+  ReplayRequest again;
+  again.log = folder.file("run");
+  again.out = folder.file("again");
+  again.reproduce = true;
+  REQUIRE(runReplay(again, Settings{}).finished);
+  CHECK_FALSE(textOf(folder.file("run/in_map.tum")).empty());
+  for (const char* file : {"odometry.tum", "in_map.tum", "map.tum"}) {
+    CAPTURE(file);
+    CHECK(textOf(folder.file("run/") + file) == textOf(folder.file("again/") + file));
+  }
+}
+
+}  // namespace
+}  // namespace swiftlet
