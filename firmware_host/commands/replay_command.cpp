@@ -112,7 +112,7 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
   options->settings.addTo(*command);
   command->footer(
       "Example:\n  swiftlet replay data/euroc_mh01_20s --out run_mh01\n"
-      "  swiftlet replay data/vil_v102 --mono --set smoother.horizon=3\n"
+      "  swiftlet replay data/vil_v102 --mono --set mesh.enabled=false\n"
       "  swiftlet replay data/vil_v102 --real-time --record --out run\n"
       "  swiftlet replay data/vil_v102 --until 40 --keep-map room --out first\n"
       "  swiftlet replay data/vil_v102 --from 40 --in-map room --out second\n"

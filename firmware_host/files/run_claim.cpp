@@ -24,10 +24,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kRunFiles = {
-    "odometry.tum",        "states.csv", "events.log", "settings.yaml",  "summary.json", "imu_rate.tum",
-    "imu_rate_health.csv", "map.tum", "in_map.tum",   "loops.csv",  "local_mesh.ply", "map.ply",      "map.glb",
-    "keyframes.swk",       "report.html"};
+constexpr std::array kRunFiles = {"odometry.tum", "states.csv",    "events.log",          "settings.yaml",
+                                  "summary.json", "imu_rate.tum",  "imu_rate_health.csv", "map.tum",
+                                  "in_map.tum",   "loops.csv",     "local_mesh.ply",      "map.ply",
+                                  "map.glb",      "keyframes.swk", "report.html"};
 constexpr std::array kRunFolders = {"meshes", "recording", "estimated_calibration"};
 constexpr std::size_t kNumberDigits = 6;
 constexpr std::uint32_t kLargestNumber = 999'999;

@@ -91,7 +91,8 @@ class FlightRun {
     }
     memory_.note("devices");
     result_.out = claimFolder(request_, settings_, claim_, lost_);
-    output_.emplace(result_.out, settings_, calibration_, RunOutput::Wanted{request_.imu_rate, false, request_.kept_maps.keep, true}, lost_);
+    output_.emplace(result_.out, settings_, calibration_,
+                    RunOutput::Wanted{request_.imu_rate, false, request_.kept_maps.keep, true}, lost_);
     if (request_.record) recorder_ = output_->startRecorder(RecordOrder::kByArrival);
     fly();
     end();

@@ -19,7 +19,7 @@ struct FlyRequest {
   std::string out;       ///< empty: a new folder in flights.folder
   bool replace = false;  ///< a run in `out` may be replaced
   bool imu_rate = false;
-  bool loop_closure = false;        ///< sets loop.enabled
+  bool loop_closure = false;  ///< sets loop.enabled
   KeptMapRequest kept_maps;
   bool map = false;                 ///< sets map.enabled
   bool record = false;              ///< write `recording/` into the run folder

@@ -130,7 +130,8 @@ class ReplayRun {
     refuseOwnLog();
     claim_.emplace(request_.out, RunKind::kReplay, request_.replace);
     output_.emplace(request_.out, settings_, source_->calibration(),
-                    RunOutput::Wanted{request_.imu_rate, request_.mesh_sequence, request_.kept_maps.keep}, lost_);
+                    RunOutput::Wanted{request_.imu_rate, request_.mesh_sequence, request_.kept_maps.keep},
+                    lost_);
     progress_.emplace("replay", request_.show_progress ? steps_ : 0);
     control_.stop = request_.stop;
     control_.progress = [this](std::uint64_t images) { progress_->update(images); };

@@ -25,8 +25,8 @@ struct ReplayRequest : LogRequest {
   bool replace = false;  ///< files of a flight, or of no run, in `out` too
   std::string tracks;    ///< file of feature tracks in place of the log's images or own tracks
   bool imu_rate = false;
-  bool mesh_sequence = false;       ///< write the meshes of all frames to `meshes/`
-  bool loop_closure = false;        ///< recognize places; sets loop.enabled
+  bool mesh_sequence = false;  ///< write the meshes of all frames to `meshes/`
+  bool loop_closure = false;   ///< recognize places; sets loop.enabled
   KeptMapRequest kept_maps;
   bool map = false;                 ///< fuse depth into a map; sets map.enabled
   bool real_time = false;           ///< on threads, messages let out at their times

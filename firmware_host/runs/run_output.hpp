@@ -25,7 +25,7 @@ class RunOutput {
   struct Wanted {
     bool imu_rate = false;       ///< imu_rate.tum
     bool mesh_sequence = false;  ///< meshes/
-    std::string keep_map;        ///< folder; empty: no map is kept
+    std::string keep_map = "";   ///< folder; empty: no map is kept
     bool fly_on = false;         ///< without files rather than not
   };
 

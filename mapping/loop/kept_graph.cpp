@@ -173,8 +173,8 @@ void LoopStage::keep(KeptGraph& out) {
   for (std::uint32_t id = 0; id < map_.loops(); ++id) {
     const RelativePose<SE3>& edge = map_.loopEdge(id);
     if (!map_.selected(id) || number[edge.from] == kLeftOut) continue;
-    out.loops.push_back({number[edge.from], number[edge.to], edge.T_from_to,
-                         covarianceFromInformation(edge.information)});
+    out.loops.push_back(
+        {number[edge.from], number[edge.to], edge.T_from_to, covarianceFromInformation(edge.information)});
   }
 }
 

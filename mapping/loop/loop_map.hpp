@@ -141,7 +141,7 @@ class LoopMap {
   RobustGraph<SE3> graph_;
   JoinedPieces pieces_;
   std::vector<Node> nodes_;
-  std::size_t kept_ = 0;  ///< of the nodes, the first
+  std::size_t kept_ = 0;                   ///< of the nodes, the first
   std::vector<Loop> loops_;                ///< by the graph's ids
   std::vector<std::uint32_t> node_loops_;  ///< scratch: loops that hold each node
   std::uint64_t nodes_removed_ = 0;

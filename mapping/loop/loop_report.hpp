@@ -35,7 +35,8 @@ inline constexpr std::size_t kTiedEpochs = 16;
 /// How the newest epoch's world lies in the map.
 struct MapCorrection {
   std::uint32_t epoch = 0;
-  bool located = false;  ///< in a kept map: loops hold the newest node in it, and the map's frame is its own
+  bool kept_map = false;  ///< there is a map to be located in
+  bool located = false;   ///< in a kept map: loops hold the newest node in it, and the map's frame is its own
   std::uint64_t version = 0;  ///< raised by every keyframe
   SE3 T_map_world;
 };

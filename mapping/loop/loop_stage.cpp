@@ -326,6 +326,7 @@ void LoopStage::correct(const SmoothedWindow& window) {
   const WindowPose* now = poseOfFrame(window, node.frame);
   const SE3 T_world_node = now != nullptr ? now->T_world_body : node.T_world_body;
   correction_.epoch = node.epoch;
+  correction_.kept_map = map_.kept() > 0;
   correction_.located = located(static_cast<std::uint32_t>(map_.size() - 1));
   correction_.T_map_world = map_.pose(map_.size() - 1) * T_world_node.inverse();
   ++correction_.version;

@@ -50,9 +50,8 @@ double OdometryChain<Pose>::logBox(std::uint32_t k) const {
 
 template <typename Pose>
 double OdometryChain<Pose>::logWholeBox(std::uint32_t k) const {
-  const auto end =
-      std::upper_bound(nodes_.begin(), nodes_.end(), component(k),
-                       [](std::uint32_t of, const Node& node) { return of < node.component; });
+  const auto end = std::upper_bound(nodes_.begin(), nodes_.end(), component(k),
+                                    [](std::uint32_t of, const Node& node) { return of < node.component; });
   return logBox(static_cast<std::uint32_t>(end - nodes_.begin()) - 1);
 }
 

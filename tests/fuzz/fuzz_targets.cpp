@@ -17,6 +17,7 @@
 #include "drivers/recorded/trajectory_file.hpp"
 #include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
 #include "firmware_host/lab/modules/g2o_file.hpp"
+#include "firmware_host/outputs/map_files/kept_graph_file.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"
 #include "firmware_host/outputs/map_files/ply_file.hpp"
 #include "mapping/pose_graph/pose_graph_optimizer.hpp"
@@ -222,6 +223,24 @@ void g2o(std::string_view text) {
   }
 }
 
+void keptGraph(std::string_view text) {
+  std::vector<std::uint8_t> bytes(text.begin(), text.end());
+  constexpr std::size_t kCrc = 4;
+  for (const bool mended : {false, true}) {
+    if (mended && bytes.size() >= kCrc) {
+      const std::size_t covered = bytes.size() - kCrc;
+      LittleEndianWriter(bytes.data() + covered).u32(crc32c(0, {bytes.data(), covered}));
+    }
+    try {
+      const KeptGraph graph = readKeptGraph("graph.swg", bytes);
+      for (const KeptNode& node : graph.nodes) demand(node.covariance.allFinite());
+      for (const KeptLoop& loop : graph.loops) demand(loop.to < graph.nodes.size());
+      demand(keptGraphBytes(graph) == bytes);
+    } catch (const InputError&) {
+    }
+  }
+}
+
 /// A kept map's checksums, as far as lengths lead from record to record.
 std::string withMapChecksums(std::string_view text) {
   constexpr std::size_t kHead = 96, kRecord = 12, kCrc = 4, kLengthAt = 8;  // docs/formats.md
@@ -275,7 +294,7 @@ void keptMap(std::string_view text) {
   }
 }
 
-constexpr std::array<NamedTarget, 22> kTargets = {{{"imu_csv", &imuCsv},
+constexpr std::array<NamedTarget, 23> kTargets = {{{"imu_csv", &imuCsv},
                                                    {"image_csv", &imageCsv},
                                                    {"trajectory", &trajectory},
                                                    {"tracks", &tracks},
@@ -287,6 +306,7 @@ constexpr std::array<NamedTarget, 22> kTargets = {{{"imu_csv", &imuCsv},
                                                    {"ply", &ply},
                                                    {"vocabulary", &vocabulary},
                                                    {"kept_map", &keptMap},
+                                                   {"kept_graph", &keptGraph},
                                                    {"keyframes", &keyframes},
                                                    {"dronecan", &dronecan},
                                                    {"vectornav_stream", &vectornavStream},

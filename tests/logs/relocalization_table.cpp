@@ -1,7 +1,8 @@
 // Cold starts in a kept map, as rows of docs/accuracy.md.
 //
-//   relocalization_table FLIGHT...               each flight's first half is the map, starts every 2 s of the rest
-//   relocalization_table --map FLIGHT FLIGHT...  the whole of one is the map; the others fly in the same world
+//   relocalization_table FLIGHT...               each flight's first half is the map, starts every 2 s of the
+//   rest relocalization_table --map FLIGHT FLIGHT...  the whole of one is the map; the others fly in the same
+//   world
 //   --out FOLDER keeps the run folders
 //
 // A start counts as one that could be located where for half of its first 3 s the view is within 1 m and 30
@@ -30,10 +31,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kStartEvery = 2;     // s
-constexpr double kFlown = 10;         // s of each start
-constexpr double kInTime = 3;         // s
-constexpr double kNearDistance = 1;   // m
+constexpr double kStartEvery = 2;    // s
+constexpr double kFlown = 10;        // s of each start
+constexpr double kInTime = 3;        // s
+constexpr double kNearDistance = 1;  // m
 constexpr double kNearTurn = 30 / kToDegrees;
 constexpr double kWrongDistance = 0.5;  // m: no error of a right location
 constexpr double kWrongTurn = 5 / kToDegrees;
@@ -183,9 +184,9 @@ void printRow(const std::string& name, const Map& map, const std::vector<Start>&
   }
   std::sort(after.begin(), after.end());
   const double median = after.empty() ? 0 : after[after.size() / 2];
-  fmt::print("| {} | {} | {} | {} | {} | {:.2f} | {} | {} | {:.4f} | {:.4f} | {:.4f} |\n", name, starts.size(),
-             could, in_time, located, median, wrong, kept_wrong, rms(squares, lines), rms(near_squares, near_lines),
-             map.rms);
+  fmt::print("| {} | {} | {} | {} | {} | {:.2f} | {} | {} | {:.4f} | {:.4f} | {:.4f} |\n", name,
+             starts.size(), could, in_time, located, median, wrong, kept_wrong, rms(squares, lines),
+             rms(near_squares, near_lines), map.rms);
   std::fflush(stdout);
 }
 
@@ -201,8 +202,8 @@ void flyInto(const Log& log, const Map& map, double from, const std::string& nam
         fs::file_size(lines) > 0 ? readTrajectory(lines.string(), counters, warnings) : Trajectory{};
     starts.push_back(judge(log, map, t, found));
     const Start& start = starts.back();
-    fmt::print(stderr, "{} {:5.1f} s: {}, located after {:.2f} s, wrong for {:.2f} s, rms {:.4f} m\n", name, t,
-               start.could ? "could be" : "-", start.located_after, start.longest_wrong,
+    fmt::print(stderr, "{} {:5.1f} s: {}, located after {:.2f} s, wrong for {:.2f} s, rms {:.4f} m\n", name,
+               t, start.could ? "could be" : "-", start.located_after, start.longest_wrong,
                rms(start.squares, start.lines));
   }
   printRow(name, map, starts);
@@ -221,9 +222,9 @@ int main(int argc, char** argv) {
   app.add_option("--map", map_flight, "The flight that makes the map; default: the first half of each");
   app.add_option("--out", out, "Keep the run folders here");
   CLI11_PARSE(app, argc, argv);
-  const fs::path folder = out.empty()
-                              ? fs::temp_directory_path() / fmt::format("swiftlet_relocalization_{}", getpid())
-                              : fs::path(out);
+  const fs::path folder =
+      out.empty() ? fs::temp_directory_path() / fmt::format("swiftlet_relocalization_{}", getpid())
+                  : fs::path(out);
   fs::create_directories(folder);
   const auto nameOf = [](const std::string& path) { return fs::path(path).filename().string(); };
   try {

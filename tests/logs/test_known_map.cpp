@@ -77,12 +77,14 @@ TEST_CASE("a run is located in the map of another, which stays as it is") {
   }
   SECTION("what is there already, missing or damaged is refused with its name, and nothing is written") {
     CHECK_THROWS_WITH(fly(folder.file("x"), {map, "", false}), Catch::Contains("is there already"));
-    CHECK_THROWS_WITH(fly(folder.file("y"), {"", folder.file("none"), false}), Catch::Contains("none/graph.swg"));
+    CHECK_THROWS_WITH(fly(folder.file("y"), {"", folder.file("none"), false}),
+                      Catch::Contains("none/graph.swg"));
     std::string damaged = kept;
     damaged[damaged.size() / 2] ^= 1;
     std::filesystem::create_directories(folder.file("damaged"));
     std::ofstream(folder.file("damaged/graph.swg"), std::ios::binary) << damaged;
-    CHECK_THROWS_WITH(fly(folder.file("z"), {"", folder.file("damaged"), false}), Catch::Contains("checksum"));
+    CHECK_THROWS_WITH(fly(folder.file("z"), {"", folder.file("damaged"), false}),
+                      Catch::Contains("checksum"));
     CHECK_THROWS_AS(runMapMerge({map, folder.file("damaged"), folder.file("m")}), InputError);
     CHECK_FALSE(std::filesystem::exists(folder.file("m")));
     CHECK_FALSE(std::filesystem::exists(folder.file("m.part")));

@@ -2,6 +2,8 @@
 
 #include "mapping/loop/kept_graph.hpp"
 
+#include <malloc.h>
+
 #include <catch2/catch.hpp>
 
 #include "drivers/calibration/input_error.hpp"
@@ -88,6 +90,29 @@ TEST_CASE("a flight that begins in a kept map finds itself there, and the map st
   }
 }
 
+TEST_CASE("ten minutes in a kept map take no more memory than the first") {
+  const KeptGraph map = mapOf({SE3()});
+  constexpr std::size_t kFlightNodes = 20;
+  Flight flight({map.nodes.size() + kFlightNodes, 100});
+  REQUIRE(flight.stage->takeIn(map, KeptUse::kLocalize).ok());
+  constexpr int kMinutes = 10;
+  double seconds = 0;
+  std::size_t early = 0;
+  for (std::size_t i = 0; seconds < 60 * kMinutes; ++i) {
+    const Picture& picture = pictures().all[i % pictures().all.size()];
+    const LoopReport report = flight.see(picture, seconds += kSpacing, elsewhere());
+    if (i > kFlightNodes) CHECK(report.correction.located);
+    if (seconds < 120) early = mallinfo2().uordblks;
+  }
+  // The optimizer's factor is taken anew where the graph's shape changes.
+  constexpr std::size_t kFactor = std::size_t{256} << 10U;
+  CHECK(mallinfo2().uordblks < early + kFactor);
+  CHECK(flight.stage->nodeCount() == map.nodes.size() + kFlightNodes);
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {  // none of them left for room
+    CHECK(flight.stage->node(i).T_map_body.translation.isApprox(map.nodes[i].T_map_body.translation, 1e-9));
+  }
+}
+
 TEST_CASE("where two places of the map look the same it is unknown which of them the flight is at") {
   SE3 twin;
   twin.translation.x() = 10;
@@ -164,7 +189,8 @@ TEST_CASE("the map of a body that carries its camera elsewhere is taken as of on
   Flight flight = flightIn(map, use);
   LoopReport report;
   double seconds = 0;
-  for (const Picture& picture : pictures().all) report = flight.see(picture, seconds += kSpacing, elsewhere());
+  for (const Picture& picture : pictures().all)
+    report = flight.see(picture, seconds += kSpacing, elsewhere());
   CHECK(report.correction.located);
   CHECK(errorOf(report, pictures().all.back()) < 0.05);
 }

@@ -39,7 +39,8 @@ KeptFolder::~KeptFolder() {
 
 void KeptFolder::write(const KeptGraph& graph) const {
   const std::vector<std::uint8_t> bytes = keptGraphBytes(graph);
-  writeWholeFile((part_ / kKeptGraphFile).string(), {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  writeWholeFile((part_ / kKeptGraphFile).string(),
+                 {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 void KeptFolder::write(MapStage& map) const { writeKeptMapFile((part_ / kKeptVolumeFile).string(), map); }

@@ -204,6 +204,9 @@ class DdsThread::Work final : public Follower::Work {
     if (obstacle_ > 0) {
       status.values.push_back({"nearest_obstacle", obstacleText(outlet_.obstacle.value().nearest, stamp)});
     }
+    if (const MapCorrection& map = outlet_.correction.value(); map.kept_map) {
+      status.values.push_back({"kept_map", map.located ? "located" : "searching"});
+    }
     status.values.push_back({"dds_refused", std::to_string(link_.counters().refused)});
     link_.publish(ros(stamp), {&status, 1});
   }

@@ -23,8 +23,8 @@ class RunRecorder : public RunListener {
   struct Wanted {
     bool imu_rate = false;
     bool meshes = false;
-    bool in_map = false;   ///< in_map.tum
-    std::string keep_map;  ///< folder of the map to keep; empty: none
+    bool in_map = false;        ///< in_map.tum
+    std::string keep_map = "";  ///< folder of the map to keep; empty: none
     /// Go on without a file that cannot be made, too; else InputError.
     bool fly_on = false;
   };
