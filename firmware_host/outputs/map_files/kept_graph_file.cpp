@@ -16,17 +16,17 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'S', 'W', 'G', '\r', '\n', 0x1A, '\n'};
-constexpr std::uint32_t kVersion = 1;
+constexpr std::array<std::uint8_t, 8> kGraphMagic{0x89, 'S', 'W', 'G', '\r', '\n', 0x1A, '\n'};
+constexpr std::uint32_t kGraphVersion = 1;
 /// Magic, version, nodes, loops, camera, T_body_cam.
-constexpr std::size_t kHeadBytes = 8 + 3 * 4 + 3 * 4 + 8 * 8 + 7 * 8;
-constexpr std::size_t kCovarianceBytes = 21 * 8;
+constexpr std::size_t kGraphHeadBytes = 8 + 3 * 4 + 3 * 4 + 8 * 8 + 7 * 8;
+constexpr std::size_t kGraphCovarianceBytes = 21 * 8;
 /// Stamp, pose, up, tilt's covariance, flags, relative pose with covariance, number of features.
-constexpr std::size_t kNodeBytes = 8 + 7 * 8 + 3 * 8 + 6 * 8 + 4 + 7 * 8 + kCovarianceBytes + 4;
-constexpr std::size_t kFeatureBytes = 32 + 7 * 4 + 4;
-constexpr std::size_t kLoopBytes = 2 * 4 + 7 * 8 + kCovarianceBytes;
-constexpr std::size_t kCrcBytes = 4;
-constexpr std::uint32_t kLinked = 1;
+constexpr std::size_t kGraphNodeBytes = 8 + 7 * 8 + 3 * 8 + 6 * 8 + 4 + 7 * 8 + kGraphCovarianceBytes + 4;
+constexpr std::size_t kGraphFeatureBytes = 32 + 7 * 4 + 4;
+constexpr std::size_t kGraphLoopBytes = 2 * 4 + 7 * 8 + kGraphCovarianceBytes;
+constexpr std::size_t kGraphCrcBytes = 4;
+constexpr std::uint32_t kGraphLinked = 1;
 
 // What passes for a unit: doubles and floats as written by programs that rounded them.
 constexpr double kUnitTolerance = 1e-3;
@@ -40,8 +40,8 @@ class GraphWriter {
   explicit GraphWriter(std::size_t bytes) : bytes_(bytes), to_(bytes_.data()) {}
 
   std::vector<std::uint8_t> operator()(const KeptGraph& graph) {
-    to_.bytes(kMagic);
-    to_.u32(kVersion);
+    to_.bytes(kGraphMagic);
+    to_.u32(kGraphVersion);
     to_.u32(static_cast<std::uint32_t>(graph.nodes.size()));
     to_.u32(static_cast<std::uint32_t>(graph.loops.size()));
     to_.u32(graph.camera.kind() == CameraKind::kPinholeRadtan ? 0U : 1U);
@@ -57,7 +57,7 @@ class GraphWriter {
       pose(loop.T_from_to);
       symmetric(loop.covariance);
     }
-    to_.u32(crc32c(0, {bytes_.data(), bytes_.size() - kCrcBytes}));
+    to_.u32(crc32c(0, {bytes_.data(), bytes_.size() - kGraphCrcBytes}));
     return std::move(bytes_);
   }
 
@@ -78,7 +78,7 @@ class GraphWriter {
     pose(node.T_map_body);
     for (int i = 0; i < 3; ++i) to_.f64(node.tilt.up_body[i]);
     symmetric(node.tilt.covariance);
-    to_.u32(node.linked ? kLinked : 0U);
+    to_.u32(node.linked ? kGraphLinked : 0U);
     pose(node.T_previous_this);
     symmetric(node.covariance);
     to_.u32(static_cast<std::uint32_t>(node.features.size()));
@@ -102,30 +102,31 @@ class GraphReader {
       : name_(name), size_(bytes.size()), from_(bytes) {}
 
   KeptGraph operator()(std::span<const std::uint8_t> bytes) {
-    const auto magic = from_.bytes(kMagic.size());
-    if (!std::equal(magic.begin(), magic.end(), kMagic.begin(), kMagic.end())) {
+    const auto magic = from_.bytes(kGraphMagic.size());
+    if (!std::equal(magic.begin(), magic.end(), kGraphMagic.begin(), kGraphMagic.end())) {
       throw InputError(name_, 0, "byte 0: magic", "this is no graph that swiftlet kept",
                        "Name a folder that --keep-map wrote");
     }
     const std::uint32_t version = from_.u32();
-    if (version != kVersion) {
+    if (version != kGraphVersion) {
       throw InputError(name_, 0, "byte 8: version",
-                       fmt::format("is {}, this program reads {}", version, kVersion),
+                       fmt::format("is {}, this program reads {}", version, kGraphVersion),
                        "Use the program that kept the map, or keep a new one");
     }
-    demand(bytes.size() >= kHeadBytes + kCrcBytes, "head", "the file ends within it");
-    const std::span<const std::uint8_t> covered = bytes.first(bytes.size() - kCrcBytes);
+    demand(bytes.size() >= kGraphHeadBytes + kGraphCrcBytes, "head", "the file ends within it");
+    const std::span<const std::uint8_t> covered = bytes.first(bytes.size() - kGraphCrcBytes);
     LittleEndianReader crc(bytes.subspan(covered.size()));
     demand(crc.u32() == crc32c(0, covered), "checksum", "is not that of the bytes: the file is damaged");
     const std::uint32_t nodes = from_.u32();
     const std::uint32_t loops = from_.u32();
-    demand(nodes <= from_.left() / kNodeBytes, "nodes", "are more than the file has room for");
+    demand(nodes <= from_.left() / kGraphNodeBytes, "nodes", "are more than the file has room for");
     KeptGraph graph;
     graph.camera = camera();
     graph.T_body_cam = pose("T_body_cam");
     graph.nodes.resize(nodes);
     for (KeptNode& it : graph.nodes) node(it);
-    demand(from_.left() == loops * kLoopBytes + kCrcBytes, "loops", "do not fill the rest of the file");
+    demand(from_.left() == loops * kGraphLoopBytes + kGraphCrcBytes, "loops",
+           "do not fill the rest of the file");
     for (std::uint32_t i = 0; i < loops; ++i) {
       KeptLoop& loop = graph.loops.emplace_back();
       loop.from = from_.u32();
@@ -179,20 +180,20 @@ class GraphReader {
             distortion};
   }
   void node(KeptNode& node) {
-    demand(from_.left() >= kNodeBytes, "node", "the file ends within it");
+    demand(from_.left() >= kGraphNodeBytes, "node", "the file ends within it");
     node.stamp.ns = from_.i64();
     node.T_map_body = pose("pose of a node");
     node.tilt.up_body = vector<3>();
     demand(std::abs(node.tilt.up_body.norm() - 1) < kUnitTolerance, "vertical of a node", "is not unit");
     node.tilt.covariance = symmetric<3>("covariance of a tilt");
     const std::uint32_t flags = from_.u32();
-    demand(flags <= kLinked, "flags of a node", "are not of this version");
-    node.linked = flags == kLinked;
+    demand(flags <= kGraphLinked, "flags of a node", "are not of this version");
+    node.linked = flags == kGraphLinked;
     node.T_previous_this = pose("relative pose of a node");
     node.covariance = symmetric<6>("covariance of a node");
     const std::uint32_t features = from_.u32();
-    demand(features <= kMaxPlaceFeatures && features <= from_.left() / kFeatureBytes, "features of a node",
-           "are more than a place has");
+    demand(features <= kMaxPlaceFeatures && features <= from_.left() / kGraphFeatureBytes,
+           "features of a node", "are more than a place has");
     node.features.resize(features);
     for (PlaceFeature& it : node.features) feature(it);
   }
@@ -221,8 +222,9 @@ class GraphReader {
 }  // namespace
 
 std::vector<std::uint8_t> keptGraphBytes(const KeptGraph& graph) {
-  std::size_t bytes = kHeadBytes + graph.loops.size() * kLoopBytes + kCrcBytes;
-  for (const KeptNode& node : graph.nodes) bytes += kNodeBytes + node.features.size() * kFeatureBytes;
+  std::size_t bytes = kGraphHeadBytes + graph.loops.size() * kGraphLoopBytes + kGraphCrcBytes;
+  for (const KeptNode& node : graph.nodes)
+    bytes += kGraphNodeBytes + node.features.size() * kGraphFeatureBytes;
   return GraphWriter(bytes)(graph);
 }
 
