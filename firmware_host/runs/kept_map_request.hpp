@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "drivers/calibration/input_error.hpp"
 #include "firmware_host/settings/settings.hpp"
 
 namespace swiftlet {
@@ -12,9 +13,14 @@ struct KeptMapRequest {
   std::string in;       ///< folder of a kept map to be located in; sets loop.in_map
   bool extend = false;  ///< go on with it; sets loop.extend_map
 
+  /// InputError where a map is to be kept that is not to be extended.
   void apply(Settings& settings) const {
     if (!in.empty()) settings.loop.in_map = in;
     if (extend) settings.loop.extend_map = true;
+    if (!keep.empty() && !settings.loop.in_map.empty() && !settings.loop.extend_map) {
+      throw InputError(keep, 0, "--keep-map", "the map of --in-map is not to be changed",
+                       "Add --extend to go on with it in a new folder, or leave --keep-map out");
+    }
     if (!keep.empty() || !settings.loop.in_map.empty()) settings.loop.enabled = true;
   }
 };

@@ -22,7 +22,8 @@ void forEachTie(const RobustGraph<SE3>& graph, const With& with) {
 
 JoinedPieces::JoinedPieces() : fits_(loopSelectionSettings<SE3>().gate_chi_squared) {}
 
-void JoinedPieces::follow(const RobustGraph<SE3>& graph) {
+void JoinedPieces::follow(RobustGraph<SE3>& graph) {
+  before_.swap(first_);
   first_.resize(graph.odometry().components());
   std::iota(first_.begin(), first_.end(), 0U);
   if (first_.size() < 2) return;
@@ -30,12 +31,11 @@ void JoinedPieces::follow(const RobustGraph<SE3>& graph) {
     const auto [low, high] = std::minmax(first_[a], first_[b]);
     std::replace(first_.begin(), first_.end(), std::uint32_t{high}, std::uint32_t{low});
   });
+  if (first_ != before_) align(graph);
 }
 
 void JoinedPieces::align(RobustGraph<SE3>& graph) {
-  const std::uint32_t components = graph.odometry().components();
-  if (components < 2) return;
-  placed_.assign(components, false);
+  placed_.assign(first_.size(), false);
   queue_.clear();
   const auto place = [this](std::uint32_t component) {
     if (placed_[component]) return;

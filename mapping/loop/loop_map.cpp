@@ -83,14 +83,14 @@ Status LoopMap::addKept(const Node& node, const Link* link, bool held) {
   }
   const auto k = static_cast<std::uint32_t>(kept_);
   Status status = add(node, link);
-  if (status.ok()) status = graph_.setPose(k, node.T_world_body);
   if (status.ok() && held) status = graph_.hold(k);
+  if (status.ok()) status = graph_.setPose(k, node.T_world_body);
   kept_ = nodes_.size();
   return status;
 }
 
 Status LoopMap::settle(int iterations, bool& moved) {
-  pieces_.align(graph_);
+  pieces_.follow(graph_);
   const Status status = graph_.settle(iterations, moved);
   pieces_.follow(graph_);
   return status;

@@ -420,10 +420,8 @@ void LoopSelection<Pose>::dropUnsupported() {
     for (std::uint32_t k = 0; k < held(); ++k) {
       count += chosen(k) ? 1U : 0U;
     }
-    // One loop alone agrees with itself whatever it says.
-    const double rival = groups_[group].rival > 0 ? groups_[group].rival - 1 : 0;
-    const double lead = count - rival;
-    const double all = count + rival;
+    const double lead = static_cast<double>(count) - groups_[group].rival;
+    const double all = static_cast<double>(count) + groups_[group].rival;
     const bool beyond_doubt = lead > 0 && lead * lead >= settings_.min_between * all;
     for (std::uint32_t k = 0; !beyond_doubt && k < held(); ++k) {
       if (chosen(k)) {

@@ -13,10 +13,9 @@
 //    nothing. A loop of the set is selected when a random one would hardly have passed its gate (chance at
 //    most gateChanceLimit(), loop_consistency.hpp), or when at least `min_support` loops agree with it,
 //    themselves selected, in pair tests that a random one would hardly have passed. Between two components,
-//    where there is no gate, n loops must be left with (n - m)^2 >= min_between (n + m), else none is
-//    selected. m + 1 is the size of the largest set that contradicts them: places that look the same. So
-//    `min_between` are enough where at most one contradicts them, and two sets that differ by chance select
-//    nothing.
+//    where there is no gate, n loops must be left beside m of the largest set that contradicts them (places
+//    that look the same) with (n - m)^2 >= min_between (n + m), else none is selected: `min_between` where
+//    none contradicts them; two sets that differ by chance select nothing.
 //
 // Full: a new loop takes the place of the held one that is not selected and agrees with fewest (of equals the
 // oldest); when all held are in the sets it is refused (kCapacityReached): all of them say the same already.

@@ -86,7 +86,10 @@ class RobustGraph {
   }
   [[nodiscard]] bool held(std::uint32_t pose) const { return known_[pose].held; }
   /// Where the next solution begins.
-  Status setPose(std::uint32_t pose, const Pose& T_map_body) { return optimizer_.setPose(pose, T_map_body); }
+  Status setPose(std::uint32_t pose, const Pose& T_map_body) {
+    if (!held(pose)) restart(Phase::kSolve);
+    return optimizer_.setPose(pose, T_map_body);
+  }
   /// LoopSelection::removePose(); the odometry's two edges become their product.
   Status removePose(std::uint32_t pose, std::uint32_t onto);
 

@@ -79,6 +79,7 @@ TEST_CASE("a run is located in the map of another, which stays as it is") {
     CHECK_THROWS_WITH(fly(folder.file("x"), {map, "", false}), Catch::Contains("is there already"));
     CHECK_THROWS_WITH(fly(folder.file("y"), {"", folder.file("none"), false}),
                       Catch::Contains("none/graph.swg"));
+    CHECK_THROWS_WITH(fly(folder.file("w"), {folder.file("new"), map, false}), Catch::Contains("--extend"));
     std::string damaged = kept;
     damaged[damaged.size() / 2] ^= 1;
     std::filesystem::create_directories(folder.file("damaged"));
