@@ -37,15 +37,19 @@ KeptFolder::~KeptFolder() {
   fs::remove(part_, error);
 }
 
-void KeptFolder::write(const KeptGraph& graph) const {
+void KeptFolder::write(const KeptGraph& graph) {
   const std::vector<std::uint8_t> bytes = keptGraphBytes(graph);
   writeWholeFile((part_ / kKeptGraphFile).string(),
                  {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  has_graph_ = true;
 }
 
-void KeptFolder::write(MapStage& map) const { writeKeptMapFile((part_ / kKeptVolumeFile).string(), map); }
+void KeptFolder::write(MapStage& map) { writeKeptMapFile((part_ / kKeptVolumeFile).string(), map); }
 
 void KeptFolder::commit() {
+  if (!has_graph_) {
+    throw InputError(path_.string(), 0, "", "the run ended without its places; no map is kept", "Fly again");
+  }
   std::error_code error;
   fs::rename(part_, path_, error);
   if (error) {

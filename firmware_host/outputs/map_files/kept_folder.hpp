@@ -23,13 +23,15 @@ class KeptFolder {
   ~KeptFolder();
 
   /// InputError where they cannot be written.
-  void write(const KeptGraph& graph) const;
-  void write(MapStage& map) const;
+  void write(const KeptGraph& graph);
+  void write(MapStage& map);
+  /// Also where no graph was written.
   void commit();
 
  private:
   std::filesystem::path path_;
   std::filesystem::path part_;
+  bool has_graph_ = false;
 };
 
 /// InputError where the folder holds no sound graph.
