@@ -23,15 +23,6 @@ void put(LittleEndianWriter& to, const SE3& T) {
   for (int i = 0; i < 3; ++i) to.f64(T.translation[i]);
 }
 
-void put(LittleEndianWriter& to, const CameraModel& camera, const SE3& T_body_cam) {
-  to.u32(camera.kind() == CameraKind::kPinholeRadtan ? 0U : 1U);
-  to.i32(camera.width());
-  to.i32(camera.height());
-  for (int i = 0; i < 4; ++i) to.f64(camera.intrinsics()[i]);
-  for (int i = 0; i < 4; ++i) to.f64(camera.distortion()[i]);
-  put(to, T_body_cam);
-}
-
 void put(LittleEndianWriter& to, const DepthImageView& sensor) {
   const PinholeIntrinsics& camera = sensor.camera;
   to.i32(camera.width);
@@ -64,23 +55,6 @@ bool get(LittleEndianReader& from, SE3& T) {
   return T.rotation.coeffs().allFinite() && T.translation.allFinite();
 }
 
-bool get(LittleEndianReader& from, CameraModel& camera, SE3& T_body_cam) {
-  const std::uint32_t kind = from.u32();
-  const std::int32_t width = from.i32();
-  const std::int32_t height = from.i32();
-  Eigen::Vector4d intrinsics;
-  Eigen::Vector4d distortion;
-  for (int i = 0; i < 4; ++i) intrinsics[i] = from.f64();
-  for (int i = 0; i < 4; ++i) distortion[i] = from.f64();
-  const bool placed = get(from, T_body_cam);
-  const bool sane = from.good() && kind <= 1 && saneSize(width, height) && intrinsics.allFinite() &&
-                    intrinsics[0] > 0 && intrinsics[1] > 0 && distortion.allFinite() && placed;
-  if (!sane) return false;
-  camera = CameraModel(kind == 0 ? CameraKind::kPinholeRadtan : CameraKind::kEquidistant, width, height,
-                       intrinsics, distortion);
-  return true;
-}
-
 bool get(LittleEndianReader& from, DepthImageView& sensor) {
   PinholeIntrinsics& camera = sensor.camera;
   camera.width = from.i32();
@@ -106,6 +80,32 @@ bool get(LittleEndianReader& from, ImuNoise& noise) {
 
 }  // namespace
 
+void encodeCamera(LittleEndianWriter& to, const CameraModel& camera, const SE3& T_body_cam) {
+  to.u32(camera.kind() == CameraKind::kPinholeRadtan ? 0U : 1U);
+  to.i32(camera.width());
+  to.i32(camera.height());
+  for (int i = 0; i < 4; ++i) to.f64(camera.intrinsics()[i]);
+  for (int i = 0; i < 4; ++i) to.f64(camera.distortion()[i]);
+  put(to, T_body_cam);
+}
+
+bool decodeCamera(LittleEndianReader& from, CameraModel& camera, SE3& T_body_cam) {
+  const std::uint32_t kind = from.u32();
+  const std::int32_t width = from.i32();
+  const std::int32_t height = from.i32();
+  Eigen::Vector4d intrinsics;
+  Eigen::Vector4d distortion;
+  for (int i = 0; i < 4; ++i) intrinsics[i] = from.f64();
+  for (int i = 0; i < 4; ++i) distortion[i] = from.f64();
+  const bool placed = get(from, T_body_cam);
+  const bool sane = from.good() && kind <= 1 && saneSize(width, height) && intrinsics.allFinite() &&
+                    intrinsics[0] > 0 && intrinsics[1] > 0 && distortion.allFinite() && placed;
+  if (!sane) return false;
+  camera = CameraModel(kind == 0 ? CameraKind::kPinholeRadtan : CameraKind::kEquidistant, width, height,
+                       intrinsics, distortion);
+  return true;
+}
+
 std::vector<std::uint8_t> encodeRecordingHeader(const RecordingHeader& header) {
   std::vector<std::uint8_t> payload(kFixedPartBytes + header.calibration_form.size() +
                                     header.settings.size() + header.program_version.size());
@@ -113,7 +113,7 @@ std::vector<std::uint8_t> encodeRecordingHeader(const RecordingHeader& header) {
   to.u32(static_cast<std::uint32_t>(header.order) | (header.rig.rolls() ? kRolls : 0));
   to.u32(static_cast<std::uint32_t>(header.rig.camera_count));
   for (std::size_t i = 0; i < header.rig.camera_count; ++i) {
-    put(to, header.rig.camera[i], header.rig.T_body_cam[i]);
+    encodeCamera(to, header.rig.camera[i], header.rig.T_body_cam[i]);
   }
   to.i64(header.rig.camera_to_imu_shift.ns);
   if (header.rig.rolls()) to.i64(header.rig.readout.ns);
@@ -136,7 +136,7 @@ const char* decodeRecordingHeader(std::span<const std::uint8_t> payload, Recordi
   header.rig.camera_count = from.u32();
   if (header.rig.camera_count > kMaxCameras) return "number of cameras";
   for (std::size_t i = 0; i < header.rig.camera_count; ++i) {
-    if (!get(from, header.rig.camera[i], header.rig.T_body_cam[i])) return "camera";
+    if (!decodeCamera(from, header.rig.camera[i], header.rig.T_body_cam[i])) return "camera";
   }
   header.rig.camera_to_imu_shift.ns = from.i64();
   if ((order & kRolls) != 0) {

@@ -14,6 +14,9 @@
 
 namespace swiftlet {
 
+class LittleEndianReader;
+class LittleEndianWriter;
+
 enum class RecordOrder : std::uint8_t {
   /// Several threads fed the estimator: a reader merges the streams by arrival (ties: IMU, camera 0,
   /// camera 1), each stream kept in its own order.
@@ -32,6 +35,12 @@ struct RecordingHeader {
   /// Camera and extrinsics of the sensor whose depth images the map took (without an image); none: no sensor.
   std::optional<DepthImageView> depth_sensor;
 };
+
+/// A camera and its place on the body, in kCameraBytes.
+inline constexpr std::size_t kCameraBytes = 3 * 4 + 8 * 8 + 7 * 8;
+void encodeCamera(LittleEndianWriter& to, const CameraModel& camera, const SE3& T_body_cam);
+/// False where it is none.
+bool decodeCamera(LittleEndianReader& from, CameraModel& camera, SE3& T_body_cam);
 
 /// The payload of the first record.
 std::vector<std::uint8_t> encodeRecordingHeader(const RecordingHeader& header);

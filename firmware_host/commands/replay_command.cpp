@@ -114,8 +114,8 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
       "Example:\n  swiftlet replay data/euroc_mh01_20s --out run_mh01\n"
       "  swiftlet replay data/vil_v102 --mono --set mesh.enabled=false\n"
       "  swiftlet replay data/vil_v102 --real-time --record --out run\n"
-      "  swiftlet replay data/vil_v102 --until 40 --keep-map room --out first\n"
-      "  swiftlet replay data/vil_v102 --from 40 --in-map room --out second\n"
+      "  swiftlet replay data/vil_v102 --until 10 --keep-map room --out first\n"
+      "  swiftlet replay data/vil_v102 --from 10 --in-map room --out second\n"
       "  swiftlet replay run --reproduce --out again");
   command->callback([options, &exit_code] { exit_code = replay(*options); });
 }

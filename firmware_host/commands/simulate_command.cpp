@@ -83,7 +83,7 @@ void addFlightOptions(CLI::App& command, SimulationSettings& s) {
       ->capture_default_str();
   command.add_option("--seed", s.seed, "Of everything random: same seed, same bytes")->capture_default_str();
   command.add_option("--world-seed", s.world_seed,
-                     "Seed of the world alone: other flights see the same world. 0: as --seed");
+                     "Seed of the world alone, for several flights in one world. 0: same as --seed");
   addChoice<WorldKind>(command, "--world", s.world.kind, "Where to fly",
                        {{"room", WorldKind::kRoom},
                         {"hall", WorldKind::kHall},
@@ -103,9 +103,10 @@ void addFlightOptions(CLI::App& command, SimulationSettings& s) {
       ->check(nonNegative())
       ->capture_default_str();
   command.add_option("--motion", s.given_motion, "EuRoC ground truth to fly (data.csv or data.csv.xz)");
-  command.add_option("--world-for", s.world_for,
-                     "Motions that the world has room for, in place of the flight's own: give each flight of "
-                     "one world the same list and --world-seed");
+  command.add_option(
+      "--world-for", s.world_for,
+      "Motions that the world is made to fit, instead of this flight's own. Flights in one world "
+      "need the same list and the same --world-seed");
   command.add_option("--motion-skip", s.motion_skip, "Leave out its first seconds [s]")->check(nonNegative());
 }
 

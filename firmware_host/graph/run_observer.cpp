@@ -62,7 +62,7 @@ void RunObserver::noteLocated(const LoopReport& report) {
   located.now = now;
   located.taken_back += now ? 0 : 1;
   if (now && !located.first) located.first = report.stamp;
-  listener_.onRemark(report.stamp, now ? "located in the kept map" : "not located in the kept map any more");
+  listener_.onRemark(report.stamp, now ? "located in the kept map" : "no longer located in the kept map");
 }
 
 void RunObserver::keepLoops(LoopStage& loops) {

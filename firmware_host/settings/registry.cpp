@@ -182,12 +182,12 @@ std::vector<Setting> estimationSettings() {
        "part of the program.",
        TextSetting{member(&Settings::loop, &LoopGroup::vocabulary), "a file's name, or empty"}},
       {"loop.in_map", "",
-       "Folder of a kept map (`--keep-map`) to fly in: places seen in it give T_map_world in its frame and "
-       "in_map.tum; empty: none.",
+       "Folder of a kept map, written by `--keep-map`. The flight is localized in this map: T_map_world and "
+       "in_map.tum are in its frame. Empty: disabled.",
        TextSetting{member(&Settings::loop, &LoopGroup::in_map), "a folder's name, or empty"}},
       {"loop.extend_map", "",
-       "What this flight sees becomes part of the map of loop.in_map, and its loops move it; false: the map "
-       "stays as it was kept.",
+       "Add this flight's keyframes to the map of loop.in_map and optimize all of it. false: localization "
+       "only, the map does not change.",
        onOff(&Settings::loop, &LoopGroup::extend_map)},
       {"loop.min_similarity", "",
        "Least similarity of a place looked at as a revisit, relative to that of a keyframe with the one "

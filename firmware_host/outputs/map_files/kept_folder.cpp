@@ -48,7 +48,8 @@ void KeptFolder::write(MapStage& map) { writeKeptMapFile((part_ / kKeptVolumeFil
 
 void KeptFolder::commit() {
   if (!has_graph_) {
-    throw InputError(path_.string(), 0, "", "the run ended without its places; no map is kept", "Fly again");
+    throw InputError(path_.string(), 0, "", "no map was written: loop closure did not finish",
+                     "Repeat the run");
   }
   std::error_code error;
   fs::rename(part_, path_, error);

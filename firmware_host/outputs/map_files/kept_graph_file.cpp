@@ -12,14 +12,15 @@
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 #include "drivers/recorded/recording_format.hpp"
+#include "drivers/recorded/recording_header.hpp"
 
 namespace swiftlet {
 namespace {
 
 constexpr std::array<std::uint8_t, 8> kGraphMagic{0x89, 'S', 'W', 'G', '\r', '\n', 0x1A, '\n'};
 constexpr std::uint32_t kGraphVersion = 1;
-/// Magic, version, nodes, loops, camera, T_body_cam.
-constexpr std::size_t kGraphHeadBytes = 8 + 3 * 4 + 3 * 4 + 8 * 8 + 7 * 8;
+/// Magic, version, nodes, loops, camera.
+constexpr std::size_t kGraphHeadBytes = 8 + 3 * 4 + kCameraBytes;
 constexpr std::size_t kGraphCovarianceBytes = 21 * 8;
 /// Stamp, pose, up, tilt's covariance, flags, relative pose with covariance, number of features.
 constexpr std::size_t kGraphNodeBytes = 8 + 7 * 8 + 3 * 8 + 6 * 8 + 4 + 7 * 8 + kGraphCovarianceBytes + 4;
@@ -33,7 +34,6 @@ constexpr double kUnitTolerance = 1e-3;
 // Far beyond any building; a number above it is damage.
 constexpr double kFar = 1e6;  // m
 constexpr int kMostOctaves = 16;
-constexpr int kMostPixels = 1 << 15;  // a side
 
 class GraphWriter {
  public:
@@ -44,12 +44,7 @@ class GraphWriter {
     to_.u32(kGraphVersion);
     to_.u32(static_cast<std::uint32_t>(graph.nodes.size()));
     to_.u32(static_cast<std::uint32_t>(graph.loops.size()));
-    to_.u32(graph.camera.kind() == CameraKind::kPinholeRadtan ? 0U : 1U);
-    to_.i32(graph.camera.width());
-    to_.i32(graph.camera.height());
-    for (int i = 0; i < 4; ++i) to_.f64(graph.camera.intrinsics()[i]);
-    for (int i = 0; i < 4; ++i) to_.f64(graph.camera.distortion()[i]);
-    pose(graph.T_body_cam);
+    encodeCamera(to_, graph.camera, graph.T_body_cam);
     for (const KeptNode& it : graph.nodes) node(it);
     for (const KeptLoop& loop : graph.loops) {
       to_.u32(loop.from);
@@ -121,8 +116,8 @@ class GraphReader {
     const std::uint32_t loops = from_.u32();
     demand(nodes <= from_.left() / kGraphNodeBytes, "nodes", "are more than the file has room for");
     KeptGraph graph;
-    graph.camera = camera();
-    graph.T_body_cam = pose("T_body_cam");
+    demand(decodeCamera(from_, graph.camera, graph.T_body_cam), "camera", "is none");
+    demandPose(graph.T_body_cam, "T_body_cam");
     graph.nodes.resize(nodes);
     for (KeptNode& it : graph.nodes) node(it);
     demand(from_.left() == loops * kGraphLoopBytes + kGraphCrcBytes, "loops",
@@ -155,9 +150,12 @@ class GraphReader {
     SE3 T;
     T.translation = vector<3>();
     T.rotation.coeffs() = vector<4>();
+    demandPose(T, field);
+    return T;
+  }
+  void demandPose(const SE3& T, const char* field) const {
     demand(T.translation.allFinite() && T.translation.norm() < kFar, field, "is not a place");
     demand(std::abs(T.rotation.norm() - 1) < kUnitTolerance, field, "is not a rotation");
-    return T;
   }
   template <int kSize>
   Eigen::Matrix<double, kSize, kSize> symmetric(const char* field) {
@@ -167,17 +165,6 @@ class GraphReader {
     }
     demand(m.allFinite() && m.diagonal().minCoeff() >= 0, field, "is no covariance");
     return m;
-  }
-  CameraModel camera() {
-    const std::uint32_t kind = from_.u32();
-    const std::int32_t width = from_.i32(), height = from_.i32();
-    const Eigen::Vector4d intrinsics = vector<4>();
-    const Eigen::Vector4d distortion = vector<4>();
-    demand(kind <= 1 && width > 0 && width <= kMostPixels && height > 0 && height <= kMostPixels &&
-               intrinsics.allFinite() && intrinsics.head<2>().minCoeff() > 0 && distortion.allFinite(),
-           "camera", "is none");
-    return {kind == 0 ? CameraKind::kPinholeRadtan : CameraKind::kEquidistant, width, height, intrinsics,
-            distortion};
   }
   void node(KeptNode& node) {
     demand(from_.left() >= kGraphNodeBytes, "node", "the file ends within it");
