@@ -28,7 +28,7 @@ struct GraphOptions {
   EffortSource* smooth_effort = nullptr;
   const DepthImageView* depth_sensor = nullptr;  ///< of the map; null: none, depth from the cameras
   std::optional<ConfusionModel> confusion;       ///< of the map's labels; empty: the settings' certainty
-  SurfaceSink* spill = nullptr;            ///< takes surface for which the map has no room; null: it is lost
+  BlockStorage* storage = nullptr;         ///< of the map; null: what its volume has no room for is lost
   const Vocabulary* vocabulary = nullptr;  ///< of loop closure; null: the shipped one; outlives the graph
   const KeptGraph* kept_map = nullptr;     ///< of settings.loop.in_map; outlives the graph's constructor
   /// For which `track` waits, after a frame's arrival, for the samples up to its stamp, on the host's

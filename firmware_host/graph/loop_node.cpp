@@ -72,8 +72,9 @@ void LoopNode::publishWorlds() {
   stage_.tiedEpochs(out.newest.epoch, out.tied);
   for (std::size_t i = 0; i < stage_.nodeCount(); ++i) {
     const MapNode node = stage_.node(i);
-    if (node.epoch != out.newest.epoch) continue;
-    static_cast<void>(out.keyframes.tryPushBack({node.frame, node.T_map_body * node.T_world_body.inverse()}));
+    if (node.epoch != out.newest.epoch && std::ranges::find(out.tied, node.epoch) == out.tied.end()) continue;
+    static_cast<void>(
+        out.keyframes.tryPushBack({node.frame, node.epoch, node.T_map_body, node.T_world_body}));
   }
   worlds.send();
 }

@@ -10,7 +10,7 @@ namespace swiftlet {
 MappingNode::MappingNode(GraphContext& context)
     : Node("map", Rank::kLow),
       context_(context),
-      stage_(context.rig, context.settings.map_stage, context.options.depth_sensor, context.options.spill) {
+      stage_(context.rig, context.settings.map_stage, context.options.depth_sensor, context.options.storage) {
   const GraphOptions& options = context.options;
   if (options.confusion) stage_.setConfusion(*options.confusion);
   if (options.labels == nullptr || !context.settings.map_stage.labels) return;
@@ -50,7 +50,7 @@ MappingNode::AtHand MappingNode::findFor(const MapMessage& message) {
 
 void MappingNode::take(const MapMessage& message, const AtHand& at_hand) {
   ++taken_;
-  correct(message);
+  correct();
   if (records.connected()) record({message.frame, worlds_, spare_turns_, at_hand.number}, at_hand.scene);
   spare_turns_ = 0;
   if (at_hand.image != nullptr) {
@@ -80,14 +80,13 @@ bool MappingNode::takeHeldFrame() {
 }
 
 bool MappingNode::useSpareTime(bool ended) {
-  // At the end what moved is still put right; the distance field is nobody's any more.
-  if (stage_.isCorrecting() || !ended) {
-    if (!spareTurn()) return false;
-    ++spare_turns_;
-    return true;
+  if (ended) {
+    if (!done()) end();
+    return false;
   }
-  if (ended && !done()) end();
-  return false;
+  if (!spareTurn()) return false;
+  ++spare_turns_;
+  return true;
 }
 
 bool MappingNode::spareTurn() {
@@ -101,6 +100,7 @@ bool MappingNode::spareTurn() {
 }
 
 void MappingNode::end() {
+  correct();
   if (records.connected()) record({0, worlds_, spare_turns_, {}, true}, {});
   stage_.drawRest();
   images.clear();
@@ -108,23 +108,18 @@ void MappingNode::end() {
   finish();
 }
 
-/// The poses of what was fused before, as window and loop closure have them now.
-void MappingNode::correct(const MapMessage& message) {
-  refined_.clear();
-  for (const WindowPose& pose : message.poses) {
-    static_cast<void>(refined_.tryPushBack({pose.frame_index, pose.T_world_body}));
-  }
-  stage_.refine({refined_.data(), refined_.size()});
+/// What was fused before, as loop closure has it now.
+void MappingNode::correct() {
   const std::uint64_t number = worlds.refresh();
   if (number == worlds_) return;
   worlds_ = number;
   const WorldsInMap& now = worlds.value();
-  if (now.newest.epoch == message.epoch) stage_.correct({now.keyframes.data(), now.keyframes.size()});
+  spend(StageId::kCorrection, [&] { stage_.correct({now.keyframes.data(), now.keyframes.size()}); });
 }
 
 void MappingNode::stepCorrection() {
   spend(StageId::kCorrection, [&] { stage_.stepCorrection({}, corrected_); });
-  if (corrected_.waiting == 0) draw();
+  if (corrected_.done) draw();
 }
 
 void MappingNode::fuse(const MapMessage& message, const AtHand& at_hand) {
@@ -132,8 +127,8 @@ void MappingNode::fuse(const MapMessage& message, const AtHand& at_hand) {
   input.stamp = message.stamp;
   input.frame = message.frame;
   input.epoch = message.epoch;
-  input.T_map_body = message.poses.back().T_world_body;
-  input.scan = message.poses.back().scan;
+  input.T_map_body = message.pose.T_world_body;
+  input.scan = message.pose.scan;
   if (const MapCorrection& now = worlds.value().newest; worlds_ > 0 && now.epoch == message.epoch) {
     input.T_map_world = now.T_map_world;
     input.T_map_body = now.T_map_world * input.T_map_body;

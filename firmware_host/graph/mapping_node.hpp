@@ -60,7 +60,7 @@ class MappingNode final : public Node {
   void holdFrames();
   bool takeHeldFrame();
   bool useSpareTime(bool ended);
-  void correct(const MapMessage& message);
+  void correct();
   void stepCorrection();
   void fuse(const MapMessage& message, const AtHand& at_hand);
   void draw();
@@ -74,7 +74,6 @@ class MappingNode final : public Node {
   std::unique_ptr<HeldFrames> held_;  ///< null where no labels are waited for
   std::uint64_t worlds_ = 0;
   std::uint64_t spare_turns_ = 0;  ///< since the last frame
-  FixedVector<RefinedPose, kMaxStates> refined_;
   CorrectionStep corrected_;
   Eigen::Vector3d vehicle_ = Eigen::Vector3d::Zero();  ///< in the map
   MapReport report_;

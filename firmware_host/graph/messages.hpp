@@ -22,7 +22,7 @@
 #include "firmware_host/interfaces/host_times.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
 #include "mapping/loop/loop_report.hpp"
-#include "mapping/map/volume_correction.hpp"
+#include "mapping/map/submaps.hpp"
 
 namespace swiftlet {
 
@@ -96,12 +96,12 @@ struct KeyframeMessage {
   std::array<std::uint64_t, kMaxCameras> image{};  ///< numbers; 0: missing
 };
 
-/// From `smooth` to `map`: a frame that is to be mapped, and how the window stands with it.
+/// From `smooth` to `map`: a frame that is to be mapped.
 struct MapMessage {
   std::uint64_t frame = 0;
   Stamp stamp;  ///< of the images
   std::uint32_t epoch = 0;
-  FixedVector<WindowPose, kMaxStates> poses;  ///< its own last
+  WindowPose pose;
 };
 
 /// From `mesh` to `log`, where the meshes of all frames are wanted.
@@ -112,10 +112,11 @@ struct MeshResult {
   FixedVector<Eigen::Vector2f, kMaxFeatures> hull;  ///< of the frame's features, raw pixels of camera 0
 };
 
-/// How the odometry's world lies in the map, now and at each keyframe of the newest epoch that is a node.
+/// How the odometry's world lies in the map, now and at each keyframe that is a node of the newest one's
+/// piece.
 struct WorldsInMap {
   MapCorrection newest;
-  FixedVector<WorldInMap, LoopLimits{}.nodes> keyframes;  ///< by frame
+  FixedVector<WorldInMap, LoopLimits{}.nodes> keyframes;  ///< by frame, which rises with the epoch
   FixedVector<std::uint32_t, kTiedEpochs> tied;           ///< earlier epochs of the same piece
 };
 

@@ -108,7 +108,7 @@ void SmoothNode::sendMapped(const TrackMessage& message, const SmoothedWindow& s
   out.frame = message.tracked.index;
   out.stamp = message.tracked.stamp;
   out.epoch = smoothed.epoch;
-  out.poses = smoothed.poses;
+  out.pose = smoothed.poses.back();
   mapped.send();
 }
 

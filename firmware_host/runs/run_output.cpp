@@ -64,7 +64,7 @@ GraphOptions RunOutput::graphOptions() {
   options.meshes = wanted_.mesh_sequence;
   options.vocabulary = vocabulary();
   options.kept_map = kept_map_.get();
-  options.spill = &recorder_.spilled();
+  options.storage = &recorder_.storage();
   return options;
 }
 

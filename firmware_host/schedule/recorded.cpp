@@ -250,6 +250,7 @@ class Repeat {
     if (MappingNode* node = graph_.map(); node != nullptr && !node->done()) {
       const bool told = map_ < steps_.map.size() && steps_.map[map_].end;
       for (std::uint64_t i = 0; told && i < steps_.map[map_].spare_turns; ++i) node->spareTurn();
+      if (told) static_cast<void>(node->worlds.expect(steps_.map[map_].correction));
       node->end();
     }
     // The others end by themselves.

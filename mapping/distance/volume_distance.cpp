@@ -16,13 +16,6 @@ constexpr float kUnseen = std::numeric_limits<float>::quiet_NaN();
 constexpr std::array<BlockIndex, 6> kFaces{
     {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
 
-BlockIndex blockFrom(std::uint64_t key) {
-  const auto part = [key](unsigned shift) {
-    return static_cast<std::int32_t>(key >> shift & 0x1FFFFFU) - (1 << 20);
-  };
-  return {part(0), part(21), part(42)};
-}
-
 Eigen::Vector3i firstCell(const BlockIndex& block) {
   return Eigen::Vector3i(block.x, block.y, block.z) * kBlockSide;
 }
@@ -48,7 +41,7 @@ void VolumeDistance::step(Stamp newest, const Eigen::Vector3d& p_map_vehicle, co
   if (field_.follow(p_map_vehicle)) {
     // Blocks that were not in the window before are read anew.
     for (Seen& seen : seen_) {
-      if (seen.key != 0 && !inWindow(blockFrom(seen.key), origin)) seen = {};
+      if (seen.key != 0 && !inWindow(indexFrom(seen.key), origin)) seen = {};
     }
   }
   findChanges();
@@ -76,7 +69,7 @@ void VolumeDistance::findChanges() {
     if (seen.key == now.key && seen.revision == now.revision) continue;
     if (seen.key != 0 && seen.key != now.key) {
       // It may stand elsewhere in the volume by now, or have come back.
-      const BlockIndex dropped = blockFrom(seen.key);
+      const BlockIndex dropped = indexFrom(seen.key);
       if (volume_.find(dropped) == VoxelVolume::kNone) fill(dropped, 0);
       askAround(dropped);
     }

@@ -10,8 +10,7 @@ namespace swiftlet {
 struct MapSettings {
   double voxel_size = 0.05;      ///< m; the truncation distance is three of them
   int volume_mib = 64;           ///< voxels: some 100 m^2 of labelled surface
-  int surface_mib = 32;          ///< triangles, of what the volume dropped too
-  int keyframes_mib = 64;        ///< images kept to correct the map: some 300 of 752 x 480
+  int surface_mib = 32;          ///< triangles to look at in flight, of what the volume dropped too
   double most_range = 10;        ///< m; what is measured farther away is left out
   bool labels = true;            ///< keep labels where a log or a network gives them
   double label_certainty = 0.9;  ///< probability that a pixel's label is right

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <utility>
 
 namespace swiftlet {
 namespace {
@@ -82,20 +83,22 @@ MapStage::Pair::Pair(const Rig& rig, const MapSettings& settings)
 }
 
 MapStage::MapStage(const Rig& rig, const MapSettings& settings, const DepthImageView* depth_sensor,
-                   SurfaceSink* spill)
+                   BlockStorage* storage, MapPoses poses)
     : rig_(rig),
       confusion_(kLabelValues, static_cast<float>(settings.label_certainty)),
       volume_(volumeSettings(settings)),
       sensor_(depth_sensor == nullptr ? nullptr : std::make_unique<Sensor>(*depth_sensor, rig, settings)),
       pair_(rig.camera_count < 2 ? nullptr : std::make_unique<Pair>(rig, settings)),
       integrator_(volume_, mostPixels(rig, depth_sensor)),
-      spill_(spill),
-      store_(static_cast<std::size_t>(settings.surface_mib) << 20U, volume_.blockSize(), spill),
-      surface_(volume_, confusion_, store_, surfaceSettings(depth_sensor != nullptr)),
-      correction_(volume_, integrator_, store_, static_cast<std::size_t>(settings.keyframes_mib) << 20U,
-                  mostPixels(rig, depth_sensor)),
+      store_(static_cast<std::size_t>(settings.surface_mib) << 20U, volume_.blockSize()),
+      surface_settings_(surfaceSettings(depth_sensor != nullptr)),
+      surface_(volume_, confusion_, store_, surface_settings_),
       distance_(distanceLimits(settings)),
-      volume_distance_(volume_, distance_) {}
+      submaps_(volume_, storage, poses,
+               0.5 * distance_.limits().cell_size * distance_.limits().cells.cast<double>()),
+      volume_distance_(volume_, distance_) {
+  if (storage != nullptr) integrator_.setOverflow(&submaps_);
+}
 
 Status MapStage::step(const MapInput& input, const MapEffort& effort, MapReport& report) {
   if (!measure(input, effort.depth, report).ok()) return report.status;
@@ -152,23 +155,22 @@ Status MapStage::measureByPair(const MapInput& input, const DepthEffort& effort)
 Status MapStage::integrate(const MapInput& input, const VolumeEffort& effort, MapReport& report) {
   if (measured_ == nullptr) return report.status = {StatusCode::kInvalidInput, "nothing was measured"};
   if (input.epoch != epoch_) beginEpoch(input.epoch);
+  const SE3 T_world_body = input.T_map_world.inverse() * input.T_map_body;
+  submaps_.follow(
+      {input.stamp, input.frame, input.epoch, T_world_body, input.T_map_world, input.T_map_world});
   report.status = integrator_.step(measured_->view(), input.T_map_body, effort, report.volume);
   if (report.status.code == StatusCode::kInvalidInput) return report.status;
   ++counters_.taken;
   newest_ = input.stamp;
-  correction_.keep(measured_->view(), input.frame, input.T_map_world,
-                   input.T_map_world.inverse() * input.T_map_body);
   return report.status;
 }
 
 void MapStage::beginEpoch(std::uint32_t epoch) {
-  drawRest();
-  store_.leaveAll();
-  if (spill_ != nullptr) spill_->beginSubmap(epoch);
+  submaps_.storeAll();
   volume_.clear();
+  store_.clear();
   surface_.drawAll();
   integrator_.restart();
-  correction_.restart();
   epoch_ = epoch;
   ++counters_.epochs;
 }
@@ -181,10 +183,65 @@ void MapStage::drawRest() {
 void MapStage::resume(std::uint32_t epoch, const Eigen::Vector3d& p_map_vehicle) {
   surface_.takeAsDrawn();
   integrator_.restart();
-  correction_.restart();
   epoch_ = epoch;
-  if (spill_ != nullptr) spill_->beginSubmap(epoch);
   vehicle_ = p_map_vehicle;
+}
+
+void MapStage::visitSurface(SurfaceSink& sink) {
+  struct Moved : SurfaceSink {
+    Moved(const Submaps& s, SurfaceSink& t, SurfacePatch& p) : submaps(s), to(t), patch(p) {}
+    void take(const SurfacePatch& from) override {
+      const Submap* const submap = from.submap < submaps.size() ? &submaps[from.submap] : nullptr;
+      if (submap == nullptr || !submap->hasMoved()) {
+        to.take(from);
+        return;
+      }
+      patch = from;
+      const SE3 motion = submap->motion();
+      for (SurfaceVertex& vertex : patch.vertices)
+        vertex.p_world = (motion * vertex.p_world.cast<double>()).cast<float>();
+      to.take(patch);
+    }
+    const Submaps& submaps;
+    SurfaceSink& to;
+    SurfacePatch& patch;
+  } moved(submaps_.submaps(), sink, moved_patch_);
+  store_.visit(moved, patch_);
+}
+
+VoxelVolume MapStage::wholeVolume(const std::function<bool(std::uint32_t epoch)>& wanted) {
+  if (!std::exchange(all_stored_, true)) submaps_.storeAll();
+  const auto visit = [&](const auto& take) {
+    submaps_.visitWhole([&](const Submap& submap) { return wanted(submap.epoch); }, take);
+  };
+  std::size_t blocks = 1, free = 0;
+  visit([&](const VoxelVolume& tile, std::span<const std::uint32_t> slots) {
+    for (const std::uint32_t slot : slots) ++(tile.voxels(slot) != nullptr ? blocks : free);
+  });
+  VolumeSettings settings = volume_.settings();
+  settings.memory_bytes =
+      VoxelVolume::bytesFor(std::max(blocks, free / VoxelVolume::kFreePerBlock + 1), settings.labels);
+  VoxelVolume whole(settings);
+  whole.beginChange();
+  visit([&](const VoxelVolume& tile, std::span<const std::uint32_t> slots) {
+    for (const std::uint32_t slot : slots) whole.copy(tile, slot);
+  });
+  return whole;
+}
+
+void MapStage::visitWholeSurface(const std::function<bool(std::uint32_t epoch)>& wanted, SurfaceSink& sink) {
+  if (!std::exchange(all_stored_, true)) submaps_.storeAll();
+  const VoxelVolume* drawn = nullptr;
+  std::optional<BlockSurface> surface;
+  submaps_.visitWhole([&](const Submap& submap) { return wanted(submap.epoch); },
+                      [&](const VoxelVolume& volume, std::span<const std::uint32_t> slots) {
+                        if (std::exchange(drawn, &volume) != &volume)
+                          surface.emplace(volume, confusion_, surface_settings_);
+                        for (const std::uint32_t slot : slots) {
+                          surface->extract(slot, patch_);
+                          if (!patch_.triangles.empty()) sink.take(patch_);
+                        }
+                      });
 }
 
 Status MapStage::draw(const Eigen::Vector3d& p_map_vehicle, const SurfaceEffort& effort, MapReport& report) {

@@ -5,12 +5,12 @@
 // are any. Depth comes from the sensor when it gives one, else from the two cameras. Grey values and labels
 // are brought from camera 0 to the depth's pixels. Then the volume takes the depth, the surface follows the
 // blocks that changed, the distance field follows the volume. `MapEffort` bounds each. Where poses turn out
-// otherwise later, refine() and correct() say so, and stepCorrection() puts the volume right bit by bit. A
-// new epoch has a world of its own, a submap: the surface so far goes to `spill`, all else begins anew.
-// Errors: kInvalidInput, counted, where nothing could be taken: no depth and no pair of images, a wrong size,
-// a pose that is not finite or jumped (VolumeIntegrator). kCapacityReached: taken, in part. Frames: map (or
-// world, of whoever gives the poses), body, metres. Memory: all reserved by the constructor (bytes() says how
-// much); nothing is allocated later. No clock, no randomness: same input, same bytes.
+// otherwise later, correct() says so, and stepCorrection() brings back bit by bit what lies near
+// (MapSubmaps). What the volume has no room for, and all of an epoch that is over, is in the storage, if
+// there is one. Errors: kInvalidInput, counted, where nothing could be taken: no depth and no pair of images,
+// a wrong size, a pose that is not finite or jumped (VolumeIntegrator). kCapacityReached: taken, in part.
+// Frames: map (or world, of whoever gives the poses), body, metres. Memory: all reserved by the constructor
+// (bytes() says how much); nothing is allocated later. No clock, no randomness: same input, same bytes.
 
 #include <array>
 #include <memory>
@@ -25,8 +25,8 @@
 #include "mapping/depth/unrolled_depth.hpp"
 #include "mapping/distance/volume_distance.hpp"
 #include "mapping/map/map_settings.hpp"
+#include "mapping/map/map_submaps.hpp"
 #include "mapping/map/view_warp.hpp"
-#include "mapping/map/volume_correction.hpp"
 #include "mapping/surface/surface_stage.hpp"
 #include "mapping/volume/volume_integrator.hpp"
 
@@ -76,9 +76,9 @@ std::optional<std::uint32_t> labelMask(std::string_view labels);
 class MapStage {
  public:
   /// Moving labels that are no list count as none: check them first. `depth_sensor`: its camera, where one
-  /// gives depth images. `spill` takes the surface that leaves the store; may be null, outlives the stage.
+  /// gives depth images. `storage`: StoredBlocks.
   MapStage(const Rig& rig, const MapSettings& settings, const DepthImageView* depth_sensor = nullptr,
-           SurfaceSink* spill = nullptr);
+           BlockStorage* storage = nullptr, MapPoses poses = MapPoses::kEstimated);
 
   /// Before the first step: in place of MapSettings::label_certainty.
   void setConfusion(const ConfusionModel& confusion) { confusion_ = confusion; }
@@ -95,25 +95,32 @@ class MapStage {
   /// The field takes what `integrate` gave up to now.
   void updateDistance(const Eigen::Vector3d& p_map_vehicle, const DistanceEffort& effort, MapReport& report);
 
-  // Corrections of what was integrated before, of this epoch: VolumeCorrection's.
-  void refine(std::span<const RefinedPose> poses) { correction_.refine(poses); }
-  void correct(std::span<const WorldInMap> worlds) { correction_.correct(worlds); }
-  [[nodiscard]] bool isCorrecting() const { return correction_.busy(); }
+  // Corrections of what was integrated before: MapSubmaps'.
+  void correct(std::span<const WorldInMap> worlds) { submaps_.correct(worlds); }
+  [[nodiscard]] bool isCorrecting() const { return submaps_.busy(); }
   void stepCorrection(const CorrectionEffort& effort, CorrectionStep& out) {
-    correction_.step(vehicle_.cast<float>(), effort, out);
+    submaps_.step(vehicle_, effort, out);
   }
-  [[nodiscard]] const VolumeCorrection& correction() const { return correction_; }
+  [[nodiscard]] const MapSubmaps& submaps() const { return submaps_; }
 
   /// Draws all that waits: work without a bound, for the end of a run.
   void drawRest();
-  /// A kept map in place of what there is: `fill(volume, store)` puts its blocks and patches into both,
-  /// empty. The surface counts as that of the volume; the next pose is not judged against the last.
+  /// The surface of all that was ever mapped in epochs for which `wanted` holds, where it belongs by now; of
+  /// the volume alone where there is no storage. Once, at the end of a run: the volume's blocks are stored.
+  void visitWholeSurface(const std::function<bool(std::uint32_t epoch)>& wanted, SurfaceSink& sink);
+  /// The map of `wanted` epochs, all in one volume and as much memory as it takes; else as
+  /// visitWholeSurface().
+  VoxelVolume wholeVolume(const std::function<bool(std::uint32_t epoch)>& wanted);
+  /// A kept map before the first step: `fill(volume, store, submaps)` puts its blocks and patches into both,
+  /// and blocks that have no room into the submaps. The surface counts as that of the volume; the next pose
+  /// is not judged against the last.
   template <typename Fill>
   void restore(std::uint32_t epoch, const Eigen::Vector3d& p_map_vehicle, const Fill& fill) {
     volume_.clear();
-    volume_.beginChange();
     store_.clear();
-    fill(volume_, store_);
+    submaps_.follow({{}, 0, epoch, {}, {}, {}});
+    volume_.beginChange();
+    fill(volume_, store_, submaps_);
     resume(epoch, p_map_vehicle);
   }
   [[nodiscard]] std::uint32_t epoch() const { return epoch_; }
@@ -126,8 +133,8 @@ class MapStage {
   [[nodiscard]] const VoxelVolume& volume() const { return volume_; }
   [[nodiscard]] const VolumeIntegrator& integrator() const { return integrator_; }
   [[nodiscard]] const SurfaceStore& surface() const { return store_; }
-  /// All patches, ordered by block.
-  void visitSurface(SurfaceSink& sink) { store_.visit(sink, patch_); }
+  /// All patches in memory, ordered by block, each where its submap lies by now.
+  void visitSurface(SurfaceSink& sink);
   [[nodiscard]] const SurfaceStage& surfaceStage() const { return surface_; }
   [[nodiscard]] const MapCounters& counters() const { return counters_; }
 
@@ -159,14 +166,15 @@ class MapStage {
   std::unique_ptr<Pair> pair_;
   const DepthBuffer* measured_ = nullptr;  ///< of the sensor or the pair
   VolumeIntegrator integrator_;
-  SurfaceSink* spill_;
   SurfaceStore store_;
+  SurfaceSettings surface_settings_;
   SurfaceStage surface_;
-  VolumeCorrection correction_;
   DistanceField distance_;
+  MapSubmaps submaps_;
   VolumeDistance volume_distance_;
-  SurfacePatch patch_;
+  SurfacePatch patch_, moved_patch_;
   std::uint32_t epoch_ = 0;
+  bool all_stored_ = false;
   Eigen::Vector3d vehicle_ = Eigen::Vector3d::Zero();  ///< last
   Stamp newest_;                                       ///< image in the volume
   MapCounters counters_;

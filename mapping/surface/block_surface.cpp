@@ -144,6 +144,7 @@ inline std::uint32_t BlockSurface::cubesIn(std::size_t y, std::size_t z) const {
 
 void BlockSurface::extract(std::uint32_t slot, SurfacePatch& patch) {
   patch.block = volume_.header(slot).index;
+  patch.submap = volume_.header(slot).submap;
   patch.vertices.clear();
   patch.triangles.clear();
   if (volume_.header(slot).state != BlockState::kVoxels || !gatherNeighbours(patch.block)) return;

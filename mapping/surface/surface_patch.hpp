@@ -30,6 +30,7 @@ inline constexpr std::size_t kMostPatchTriangles = 6 * kBlockVoxels;
 
 struct SurfacePatch {
   BlockIndex block;
+  SubmapId submap = 0;  ///< of the block
   FixedVector<SurfaceVertex, kMostPatchVertices> vertices;
   FixedVector<SurfaceTriangle, kMostPatchTriangles> triangles;
 };

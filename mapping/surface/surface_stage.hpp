@@ -50,6 +50,8 @@ class SurfaceStage : public BlockListener {
   /// `vehicle` in world: what the store keeps when it is full. kCapacityReached while blocks wait.
   Status step(const Eigen::Vector3f& vehicle, const SurfaceEffort& effort, SurfaceStep& out);
   void beforeRemoval(const VoxelVolume& volume, std::span<const std::uint32_t> slots) override;
+  /// What there is of the block is drawn anew with the changes to come.
+  void beforeRenewal(const VoxelVolume& /*volume*/, std::uint32_t /*slot*/) override {}
   /// Every block is out of date: after the volume was cleared or moved.
   void drawAll();
   /// No block is: after the volume was loaded and the store with it.

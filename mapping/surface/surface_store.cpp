@@ -17,8 +17,8 @@ std::size_t pageCount(std::size_t items, std::size_t each) { return (items + eac
 
 static_assert(sizeof(SurfaceVertex) == 20 && sizeof(SurfaceTriangle) == 6);
 
-SurfaceStore::SurfaceStore(std::size_t bytes, double block_size, SurfaceSink* sink)
-    : block_size_(static_cast<float>(block_size)), sink_(sink), hash_(1) {
+SurfaceStore::SurfaceStore(std::size_t bytes, double block_size)
+    : block_size_(static_cast<float>(block_size)), hash_(1) {
   static_assert(kPageTriangles * sizeof(SurfaceTriangle) <= sizeof(Page));
   constexpr std::size_t kEach = kUsualPages * (sizeof(Page) + sizeof(std::uint32_t)) + sizeof(Entry) +
                                 sizeof(std::uint32_t) + sizeof(Farness);
@@ -37,7 +37,6 @@ SurfaceStore::SurfaceStore(std::size_t bytes, double block_size, SurfaceSink* si
 
 void SurfaceStore::clear() {
   hash_.clear();
-  left_.reset();
   std::fill(entries_.begin(), entries_.end(), Entry{});
   unused_entries_.clear();
   for (std::size_t i = entries_.size(); i-- > 0;) unused_entries_.push_back(static_cast<std::uint32_t>(i));
@@ -48,8 +47,7 @@ void SurfaceStore::clear() {
 }
 
 std::size_t SurfaceStore::bytes() const {
-  return sizeof(left_) + hash_.bytes() +
-         entries_.size() * (sizeof(Entry) + sizeof(std::uint32_t) + sizeof(Farness)) +
+  return hash_.bytes() + entries_.size() * (sizeof(Entry) + sizeof(std::uint32_t) + sizeof(Farness)) +
          page_.size() * (sizeof(Page) + sizeof(std::uint32_t));
 }
 
@@ -78,40 +76,8 @@ void SurfaceStore::remove(std::uint32_t at) {
   unused_entries_.push_back(at);
 }
 
-void SurfaceStore::leaveAll() {
-  std::size_t count = 0;
-  for (std::uint32_t i = 0; i < entries_.size(); ++i) {
-    if (entries_[i].triangles > 0) far_[count++] = {0, keyOf(entries_[i].block), i};
-  }
-  std::sort(far_.begin(), far_.begin() + static_cast<std::ptrdiff_t>(count));
-  for (std::size_t i = 0; i < count; ++i) {
-    (void)read(far_[i].entry, leaving_);
-    leave(leaving_);
-  }
-  clear();
-}
-
-void SurfaceStore::leave(const SurfacePatch& patch) {
-  if (sink_ != nullptr) {
-    sink_->take(patch);
-    left_.set(bitOf(patch.block));
-    ++counters_.spilled;
-  } else {
-    ++counters_.lost;
-  }
-}
-
-std::size_t SurfaceStore::bitOf(const BlockIndex& block) {
-  return static_cast<std::size_t>(mixedKey(keyOf(block)) >> (64U - kLeftBitsLog));
-}
-
 void SurfaceStore::takeOut(const BlockIndex& block) {
   if (const std::uint32_t old = find(block); old != kNone) remove(old);
-  if (sink_ == nullptr || !left_.test(bitOf(block))) return;
-  leaving_.block = block;
-  leaving_.vertices.clear();
-  leaving_.triangles.clear();
-  sink_->take(leaving_);
 }
 
 /// False where `block` itself would be among those that go.
@@ -130,9 +96,8 @@ bool SurfaceStore::makeRoom(std::size_t pages, const BlockIndex& block, const Ei
     if (*limit < own) return false;
     std::sort(limit, end, [](const Farness& a, const Farness& b) { return b < a; });
     for (auto it = limit; it != end; ++it) {
-      (void)read(it->entry, leaving_);
-      leave(leaving_);
       remove(it->entry);
+      ++counters_.dropped;
     }
   }
   return true;
@@ -146,12 +111,12 @@ void SurfaceStore::put(const SurfacePatch& patch, const Eigen::Vector3f& vehicle
   if (const std::uint32_t old = find(patch.block); old != kNone) remove(old);
   const std::size_t pages = pagesFor(patch.vertices.size(), patch.triangles.size());
   if ((free_pages_ < pages || unused_entries_.empty()) && !makeRoom(pages, patch.block, vehicle)) {
-    leave(patch);
+    ++counters_.dropped;
     return;
   }
   const std::uint32_t at = unused_entries_.back();
   if (!hash_.insert(keyOf(patch.block), at)) {
-    leave(patch);
+    ++counters_.dropped;
     return;
   }
   unused_entries_.pop_back();
@@ -160,6 +125,7 @@ void SurfaceStore::put(const SurfacePatch& patch, const Eigen::Vector3f& vehicle
 
 void SurfaceStore::write(const SurfacePatch& patch, Entry& entry) {
   entry.block = patch.block;
+  entry.submap = patch.submap;
   entry.vertices = static_cast<std::uint16_t>(patch.vertices.size());
   entry.triangles = static_cast<std::uint16_t>(patch.triangles.size());
   // The chain of free pages is cut off behind the last one taken.
@@ -182,6 +148,7 @@ bool SurfaceStore::read(std::uint32_t at, SurfacePatch& patch) const {
   const Entry& entry = entries_[at];
   if (entry.triangles == 0) return false;
   patch.block = entry.block;
+  patch.submap = entry.submap;
   patch.vertices.resize(entry.vertices);
   patch.triangles.resize(entry.triangles);
   std::uint32_t page = entry.first;

@@ -2,16 +2,13 @@
 // The surface of the map, block by block, in fixed memory: what the volume still holds and what it has
 // dropped.
 //
-// A patch lies in pages of 240 bytes from a pool, found by its block. A new patch of a block takes the place
-// of the one before. When pages or entries run out the patches farthest from the vehicle go: handed to the
-// sink where there is one (a file in the run folder), lost otherwise; both are counted. A patch that is
-// itself the farthest goes at once. A sink that hears of one block again should keep the later patch; an
-// empty one says that a patch it may have is surface no more. Cost: a copy; when full, a pass over all
-// entries for every 1/32 of them that goes.
+// For who looks at the map in flight. A patch lies in pages of 240 bytes from a pool, found by its block. A
+// new patch of a block takes the place of the one before. When pages or entries run out the patches farthest
+// from the vehicle go, counted; a patch that is itself the farthest goes at once. Cost: a copy; when full, a
+// pass over all entries for every 1/32 of them that goes.
 
 #include <Eigen/Core>
 #include <array>
-#include <bitset>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -22,35 +19,29 @@
 
 namespace swiftlet {
 
-/// Takes patches that leave the store, or all of them for an export.
+/// Takes patches one by one.
 class SurfaceSink {
  public:
   virtual ~SurfaceSink() = default;
   virtual void take(const SurfacePatch& patch) = 0;
-  /// What comes from now on is of another world.
-  virtual void beginSubmap(std::uint32_t /*epoch*/) {}
 };
 
 struct SurfaceStoreCounters {
-  std::uint64_t spilled = 0;  ///< patches that went to the sink
-  std::uint64_t lost = 0;     ///< patches that went, without a sink
+  std::uint64_t dropped = 0;  ///< patches that went for lack of room
 };
 
 class SurfaceStore {
  public:
   static constexpr std::uint32_t kNone = BlockHash::kNone;
 
-  /// `bytes`: everything together. `block_size` [m] gives distances from the vehicle. `sink` may be null and
-  /// outlives the store's use.
-  SurfaceStore(std::size_t bytes, double block_size, SurfaceSink* sink = nullptr);
+  /// `bytes`: everything together. `block_size` [m] gives distances from the vehicle.
+  SurfaceStore(std::size_t bytes, double block_size);
 
   /// An empty patch takes the block's out, as takeOut() does.
   void put(const SurfacePatch& patch, const Eigen::Vector3f& vehicle);
-  /// The block has no surface any more: its patch goes, out of the sink too.
+  /// The block has no surface any more.
   void takeOut(const BlockIndex& block);
   void clear();
-  /// All patches go to the sink (or are lost, counted), ordered by block.
-  void leaveAll();
 
   /// For readers: entries 0 to entries() - 1, some unused; an order that only the history decides.
   [[nodiscard]] std::uint32_t entries() const { return static_cast<std::uint32_t>(entries_.size()); }
@@ -77,6 +68,7 @@ class SurfaceStore {
     std::uint32_t first = kNone;  ///< pages: vertices, then triangles
     std::uint16_t vertices = 0;
     std::uint16_t triangles = 0;  ///< 0: unused
+    SubmapId submap = 0;
   };
   struct Farness {
     float squared = 0;
@@ -91,13 +83,10 @@ class SurfaceStore {
   [[nodiscard]] Farness farness(const BlockIndex& block, std::uint32_t entry,
                                 const Eigen::Vector3f& vehicle) const;
   void remove(std::uint32_t entry);
-  void leave(const SurfacePatch& patch);
-  [[nodiscard]] static std::size_t bitOf(const BlockIndex& block);
   bool makeRoom(std::size_t pages, const BlockIndex& block, const Eigen::Vector3f& vehicle);
   void write(const SurfacePatch& patch, Entry& entry);
 
   float block_size_;
-  SurfaceSink* sink_;
   BlockHash hash_;
   std::vector<Entry> entries_;
   std::vector<std::uint32_t> unused_entries_;
@@ -106,10 +95,6 @@ class SurfaceStore {
   std::uint32_t first_free_ = kNone;
   std::size_t free_pages_ = 0;
   std::vector<Farness> far_;  ///< scratch
-  SurfacePatch leaving_;      ///< scratch
-  /// Bits of keys whose patches went to the sink. Who shares a bit with one is taken out in vain.
-  static constexpr unsigned kLeftBitsLog = 17;
-  std::bitset<(std::size_t{1} << kLeftBitsLog)> left_;
   SurfaceStoreCounters counters_;
 };
 

@@ -43,6 +43,14 @@ inline std::uint64_t keyOf(const BlockIndex& block) {
   return part(block.x) | (part(block.y) << 21U) | (part(block.z) << 42U) | (std::uint64_t{1} << 63U);
 }
 
+/// The block whose key it is.
+inline BlockIndex indexFrom(std::uint64_t key) {
+  const auto part = [key](unsigned shift) {
+    return static_cast<std::int32_t>(key >> shift & 0x1FFFFFU) - (1 << 20);
+  };
+  return {part(0), part(21), part(42)};
+}
+
 inline BlockIndex blockOf(const VoxelIndex& voxel) {
   return {voxel.x >> kBlockBits, voxel.y >> kBlockBits, voxel.z >> kBlockBits};
 }
@@ -52,6 +60,9 @@ inline std::size_t offsetOf(const VoxelIndex& voxel) {
   return static_cast<std::size_t>((voxel.x & kBlockMask) + ((voxel.y & kBlockMask) << kBlockBits) +
                                   ((voxel.z & kBlockMask) << (2 * kBlockBits)));
 }
+
+/// Of a part of the map whose images move as one: mapping/map/submaps.hpp.
+using SubmapId = std::uint16_t;
 
 /// What is free without voxels of its own is known by parts of a block: 64 cubes of two voxels along an edge,
 /// a bit each, x fastest.

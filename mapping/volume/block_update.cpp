@@ -12,6 +12,8 @@ namespace {
 constexpr float kNearestDepth = 0.05F;
 constexpr float kMostWeightSteps = 65535.0F;
 
+}  // namespace
+
 std::uint8_t sidesOf(const VoxelBlock& block) {
   lanes::Shorts in_front{}, behind{};
   for (std::size_t at = 0; at < kBlockVoxels; at += lanes::kLanes) {
@@ -28,8 +30,6 @@ std::uint8_t sidesOf(const VoxelBlock& block) {
   return static_cast<std::uint8_t>(((f[0] | f[1]) != 0 ? BlockHeader::kInFront : 0) |
                                    ((b[0] | b[1]) != 0 ? BlockHeader::kBehind : 0));
 }
-
-}  // namespace
 
 using lanes::Floats;
 using lanes::Ints;

@@ -21,6 +21,9 @@
 
 namespace swiftlet {
 
+/// On which sides of a surface a block has observed voxels, as in BlockHeader.
+std::uint8_t sidesOf(const VoxelBlock& block);
+
 /// What all blocks of an image share.
 class BlockUpdate {
  public:

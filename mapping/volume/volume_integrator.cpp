@@ -91,7 +91,6 @@ Status VolumeIntegrator::checkPose(const DepthImageView& image, const SE3& T_wor
 Status VolumeIntegrator::step(const DepthImageView& image, const SE3& T_world_body,
                               const VolumeEffort& effort, VolumeStep& out) {
   out = {};
-  since_ = 0;
   Status status = checkPose(image, T_world_body);
   if (status.ok()) {
     const SE3 T_world_camera = T_world_body * image.T_body_camera;
@@ -102,19 +101,6 @@ Status VolumeIntegrator::step(const DepthImageView& image, const SE3& T_world_bo
   return status;
 }
 
-Status VolumeIntegrator::again(const DepthImageView& image, const SE3& T_world_body, std::uint32_t since,
-                               const Eigen::Vector3f& vehicle, const VolumeEffort& effort, VolumeStep& out) {
-  out = {};
-  since_ = since;
-  if (!finite(T_world_body) || !finite(image.T_body_camera)) {
-    return {StatusCode::kInvalidInput, "depth image: the pose is not finite"};
-  }
-  vehicle_ = vehicle;
-  const Status status = fuse(image, T_world_body * image.T_body_camera, effort, out);
-  if (status.code != StatusCode::kInvalidInput) ++counters_.again;
-  return status;
-}
-
 Status VolumeIntegrator::fuse(const DepthImageView& image, const SE3& T_world_camera,
                               const VolumeEffort& effort, VolumeStep& out) {
   if (const Status status = image_.prepare(image, volume_.settings(), counters_.pixels); !status.ok()) {
@@ -122,13 +108,12 @@ Status VolumeIntegrator::fuse(const DepthImageView& image, const SE3& T_world_ca
   }
   begin(T_world_camera);
   listBand(effort.blocks, out);
-  for (const BlockIndex& block : band_) {
-    if (holdsImage(volume_.find(block))) continue;
-    const std::uint32_t slot = volume_.obtain(block);
+  for (std::size_t i = 0; i < band_.size(); ++i) {
+    const std::uint32_t slot = i < with_room_ ? volume_.obtain(band_[i]) : VoxelVolume::kNone;
     if (slot != VoxelVolume::kNone) {
       update(slot, false, out);
     } else {
-      ++out.no_room;
+      fuseApart(band_[i], out);
     }
   }
   walkBundles(effort.blocks, out);
@@ -207,14 +192,13 @@ void VolumeIntegrator::listBand(std::uint32_t blocks, VolumeStep& out) {
     band_.resize(blocks);
   }
   out.band = static_cast<std::uint32_t>(band_.size());
-  const std::size_t listed = band_.size();
   const std::size_t before = volume_.blockCount();
-  volume_.makeRoom(vehicle_, band_);
-  out.no_room += static_cast<std::uint32_t>(listed - band_.size());
+  with_room_ = volume_.makeRoom(vehicle_, band_);
   out.created = static_cast<std::uint32_t>(before);
 }
 
 void VolumeIntegrator::update(std::uint32_t slot, bool carve, VolumeStep& out) {
+  volume_.touch(slot);
   BlockHeader& header = volume_.changeHeader(slot);
   VoxelBlock& voxels = volume_.changeVoxels(slot);
   const BlockUpdate::Result result =
@@ -228,6 +212,21 @@ void VolumeIntegrator::update(std::uint32_t slot, bool carve, VolumeStep& out) {
     volume_.markChanged(slot);
     ++out.changed;
   }
+}
+
+void VolumeIntegrator::fuseApart(const BlockIndex& block, VolumeStep& out) {
+  if (overflow_ == nullptr) {
+    ++out.no_room;
+    return;
+  }
+  apart_.distance.fill(static_cast<std::int16_t>(kDistanceSteps));
+  apart_.weight.fill(0);
+  apart_.grey.fill(0);
+  LabelBlock* const labels = volume_.settings().labels ? &labels_apart_ : nullptr;
+  if (labels != nullptr) labels->counts.fill({});
+  if (update_.project(block, apart_, labels).observed > 0) overflow_->take(block, apart_, labels);
+  ++out.updated;
+  ++out.apart;
 }
 
 void VolumeIntegrator::walkBundles(std::uint32_t blocks, VolumeStep& out) {
@@ -284,7 +283,6 @@ bool VolumeIntegrator::walk(const Eigen::Vector3f& direction, float length, std:
 
 void VolumeIntegrator::meetOnRay(const BlockIndex& block, VolumeStep& out) {
   const std::uint32_t slot = volume_.find(block);
-  if (holdsImage(slot)) return;
   const BlockState state = slot != VoxelVolume::kNone ? volume_.header(slot).state : BlockState::kUnused;
   const std::uint64_t known = state == BlockState::kFree ? volume_.header(slot).free_parts : 0;
   if (known == kAllParts) return;

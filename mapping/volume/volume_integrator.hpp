@@ -10,6 +10,9 @@
 //    updated.
 // 3. Update: block_update.hpp, voxel by voxel.
 //
+// A block near surface for which the volume has no room is fused apart, from this image alone, and given away
+// (BlockOverflow): who keeps blocks elsewhere lays it over what was given before.
+//
 // `effort` bounds the blocks that are updated: the band's go first, nearest first. Memory fixed at
 // construction, no clock, no randomness: the same images give the same bytes.
 // kInvalidInput, with a counter, for images that were refused: wrong size or intrinsics, a pose or an
@@ -30,6 +33,13 @@
 
 namespace swiftlet {
 
+/// Takes what one image shows of a block for which there is no room.
+class BlockOverflow {
+ public:
+  virtual ~BlockOverflow() = default;
+  virtual void take(const BlockIndex& index, const VoxelBlock& voxels, const LabelBlock* labels) = 0;
+};
+
 struct VolumeEffort {
   std::uint32_t blocks = 1U << 20U;  ///< updated or carved, for one image
 
@@ -45,11 +55,11 @@ struct VolumeStep {
   std::uint32_t changed = 0;   ///< blocks that readers have to look at
   std::uint32_t left_out = 0;  ///< for lack of effort; blocks met behind that are not counted
   std::uint32_t no_room = 0;   ///< new blocks refused
+  std::uint32_t apart = 0;     ///< new blocks without room, given away
 };
 
 struct IntegratorCounters {
   std::uint64_t images = 0;   ///< fused
-  std::uint64_t again = 0;    ///< fused once more
   std::uint64_t refused = 0;  ///< of these three kinds and all others
   std::uint64_t pose_jumps = 0;
   std::uint64_t bad_poses = 0;
@@ -62,14 +72,11 @@ class VolumeIntegrator {
  public:
   /// `volume` outlives it. `most_pixels`: of any image to come.
   VolumeIntegrator(VoxelVolume& volume, std::size_t most_pixels);
+  /// Null: new blocks without room are refused. Outlives the use.
+  void setOverflow(BlockOverflow* overflow) { overflow_ = overflow; }
 
   [[nodiscard]] Status step(const DepthImageView& image, const SE3& T_world_body, const VolumeEffort& effort,
                             VolumeStep& out);
-  /// Fuses an image once more, into the blocks that became known after revision `since` of the volume: those
-  /// before hold it already. 0: into all. Its stamp and pose are not compared with the last. `vehicle`: what
-  /// is far from there goes first when the volume is full; otherwise that is the camera.
-  [[nodiscard]] Status again(const DepthImageView& image, const SE3& T_world_body, std::uint32_t since,
-                             const Eigen::Vector3f& vehicle, const VolumeEffort& effort, VolumeStep& out);
   /// Forgets the last pose and stamp: for a new epoch, or a map that was moved.
   void restart() { last_.reset(); }
 
@@ -85,9 +92,6 @@ class VolumeIntegrator {
 
   Status fuse(const DepthImageView& image, const SE3& T_world_camera, const VolumeEffort& effort,
               VolumeStep& out);
-  [[nodiscard]] bool holdsImage(std::uint32_t slot) const {
-    return slot != VoxelVolume::kNone && volume_.header(slot).born <= since_;
-  }
   Status checkPose(const DepthImageView& image, const SE3& T_world_body);
   void begin(const SE3& T_world_camera);
   void listBand(std::uint32_t blocks, VolumeStep& out);
@@ -101,6 +105,7 @@ class VolumeIntegrator {
   /// Those that the image sees free of the block with this centre; `known` ones need not be looked at.
   [[nodiscard]] std::uint64_t freeParts(const Eigen::Vector3f& centre, std::uint64_t known) const;
   void update(std::uint32_t slot, bool carve, VolumeStep& out);
+  void fuseApart(const BlockIndex& block, VolumeStep& out);
 
   VoxelVolume& volume_;
   PreparedImage image_;
@@ -108,11 +113,14 @@ class VolumeIntegrator {
   BlockWindow window_;
   std::size_t most_band_;
   std::vector<BlockIndex> band_;
+  std::size_t with_room_ = 0;  ///< of the band, those before
+  BlockOverflow* overflow_ = nullptr;
+  VoxelBlock apart_;  ///< scratch
+  LabelBlock labels_apart_;
   std::optional<Pose> last_;
   IntegratorCounters counters_;
 
   // Of the image in hand. Rays and points are in blocks, from the camera's block.
-  std::uint32_t since_ = 0;  ///< blocks that are no younger hold it
   SE3 T_world_camera_;
   SE3 T_camera_world_;
   Eigen::Vector3f vehicle_ = Eigen::Vector3f::Zero();

@@ -3,7 +3,9 @@
 //
 // 5 bytes a voxel (2 560 a block), and 8 more (4 096) where labels are kept.
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <utility>
 
@@ -15,6 +17,8 @@ namespace swiftlet {
 inline constexpr float kDistanceSteps = 32767.0F;
 /// Weights are kept in 1/256: an observation as good as the reference has weight 1.
 inline constexpr float kWeightSteps = 256.0F;
+/// Of what is known from elsewhere than a block's own images, in these steps: any image overrules it.
+inline constexpr std::uint16_t kHintWeight = 1;
 
 struct alignas(64) VoxelBlock {
   std::array<std::int16_t, kBlockVoxels> distance;  ///< to the surface, positive in front of it
@@ -32,6 +36,8 @@ class LabelCounts {
 
   /// `label` from 1 to 31. True when the most frequent label is another than before.
   bool add(std::uint8_t label);
+  /// What another voxel saw of the same place: the four most frequent labels of both stay.
+  void add(const LabelCounts& other);
   /// By falling count.
   [[nodiscard]] std::uint8_t label(int slot) const {
     return static_cast<std::uint8_t>(slots_[static_cast<std::size_t>(slot)] >> 11U);
@@ -93,6 +99,38 @@ inline bool LabelCounts::add(std::uint8_t label) {
   for (; i > 0 && (slots_[i] & kMostCount) > (slots_[i - 1] & kMostCount); --i)
     std::swap(slots_[i], slots_[i - 1]);
   return i == 0;
+}
+
+inline void LabelCounts::add(const LabelCounts& other) {
+  if (empty()) {
+    slots_ = other.slots_;
+    return;
+  }
+  struct Seen {
+    unsigned label = 0;
+    unsigned count = 0;
+  };
+  std::array<Seen, std::size_t{2} * kSlots> seen{};
+  std::size_t size = 0;
+  for (const Words* words : {static_cast<const Words*>(&slots_), &other.slots_}) {
+    for (const std::uint16_t word : *words) {
+      if (word == 0) continue;
+      std::size_t i = 0;
+      const unsigned label = unsigned{word} >> 11U;
+      while (i < size && seen[i].label != label) ++i;
+      seen[i] = {label, seen[i].count + (word & kMostCount)};
+      size = i == size ? size + 1 : size;
+    }
+  }
+  std::sort(seen.begin(), seen.begin() + static_cast<std::ptrdiff_t>(size), [](const Seen& a, const Seen& b) {
+    return a.count != b.count ? a.count > b.count : a.label < b.label;
+  });
+  // Shares stay as they are.
+  const unsigned divisor = seen[0].count / (kMostCount + 1U) + 1U;
+  for (std::size_t i = 0; i < kSlots; ++i) {
+    const unsigned count = (seen[i].count + divisor - 1) / divisor;
+    slots_[i] = i < size ? static_cast<std::uint16_t>(seen[i].label << 11U | count) : std::uint16_t{0};
+  }
 }
 
 struct alignas(64) LabelBlock {

@@ -26,6 +26,12 @@ std::size_t VoxelVolume::blocksFor(std::size_t memory_bytes, bool labels) {
   return std::max<std::size_t>(blocks, 1);
 }
 
+std::size_t VoxelVolume::bytesFor(std::size_t blocks, bool labels) {
+  std::size_t bytes = blocks * sizeof(VoxelBlock);
+  while (blocksFor(bytes, labels) < blocks) bytes += bytes / 8;
+  return bytes;
+}
+
 VoxelVolume::VoxelVolume(const VolumeSettings& settings)
     : settings_(settings),
       hash_(blocksFor(settings.memory_bytes, settings.labels) * (1 + kFreePerBlock)),
@@ -94,13 +100,13 @@ VoxelVolume::Farness VoxelVolume::farness(const BlockIndex& block, std::uint32_t
   return {(centreOf(block) - vehicle).squaredNorm(), keyOf(block), slot};
 }
 
-void VoxelVolume::makeRoom(const Eigen::Vector3f& vehicle, std::vector<BlockIndex>& wanted) {
+std::size_t VoxelVolume::makeRoom(const Eigen::Vector3f& vehicle, std::span<BlockIndex> wanted) {
   const auto isNew = [&](const BlockIndex& block) {
     const std::uint32_t slot = find(block);
     return slot == kNone || headers_[slot].state != BlockState::kVoxels;
   };
   const auto fresh = static_cast<std::size_t>(std::ranges::count_if(wanted, isNew));
-  if (fresh <= unused_data_.size()) return;
+  if (fresh <= unused_data_.size()) return wanted.size();
   std::size_t count = 0;
   for (std::uint32_t slot = 0; slot < headers_.size(); ++slot) {
     if (headers_[slot].state == BlockState::kVoxels)
@@ -111,7 +117,7 @@ void VoxelVolume::makeRoom(const Eigen::Vector3f& vehicle, std::vector<BlockInde
     if (isNew(block) && count < far_.size()) far_[count++] = farness(block, kNone, vehicle);
   }
   const std::size_t keep = blocks_.size() - std::min(blocks_.size() - 1, blocks_.size() / kEvictionShare);
-  if (count <= keep) return;
+  if (count <= keep) return wanted.size();
   std::nth_element(far_.begin(), far_.begin() + static_cast<std::ptrdiff_t>(keep),
                    far_.begin() + static_cast<std::ptrdiff_t>(count));
   const Farness limit = far_[keep];
@@ -126,7 +132,11 @@ void VoxelVolume::makeRoom(const Eigen::Vector3f& vehicle, std::vector<BlockInde
   counters_.evicted += leaving;
   remove({leaving_.data(), leaving});
   // Among these are blocks that were there and have just left.
-  std::erase_if(wanted, [&](const BlockIndex& block) { return isNew(block) && tooFar(block); });
+  std::size_t kept = 0;
+  for (BlockIndex& block : wanted) {
+    if (!isNew(block) || !tooFar(block)) std::swap(wanted[kept++], block);
+  }
+  return kept;
 }
 
 std::uint32_t VoxelVolume::newHeader(const BlockIndex& block) {
@@ -142,7 +152,8 @@ std::uint32_t VoxelVolume::newHeader(const BlockIndex& block) {
   unused_headers_.pop_back();
   headers_[slot] = BlockHeader{};
   headers_[slot].index = block;
-  headers_[slot].born = revision_;
+  headers_[slot].submap = submap_;
+  headers_[slot].touched = submap_;
   return slot;
 }
 
@@ -187,9 +198,45 @@ void VoxelVolume::addFree(const BlockIndex& block, std::uint64_t parts, const Ei
     ++free_count_;
   }
   BlockHeader& header = headers_[slot];
+  // What was free long ago is not in doubt for that alone.
+  if (outdated_ != nullptr && outdated_[header.submap] != 0) {
+    for (std::size_t i = 0; i < listener_count_; ++i) listeners_[i]->beforeRenewal(*this, slot);
+    header.free_parts = 0;
+    header.submap = submap_;
+  }
+  header.touched = submap_;
   if ((parts & ~header.free_parts) == 0) return;
   header.free_parts |= parts;
   header.revision = revision_;
+}
+
+void VoxelVolume::beginSubmap(SubmapId id, SubmapId stale_before, const std::uint8_t* outdated) {
+  submap_ = id;
+  stale_before_ = stale_before;
+  outdated_ = outdated;
+}
+
+void VoxelVolume::renew(std::uint32_t slot) {
+  if (headers_[slot].observed) {
+    for (std::size_t i = 0; i < listener_count_; ++i) listeners_[i]->beforeRenewal(*this, slot);
+  }
+  BlockHeader& header = headers_[slot];
+  header.submap = submap_;
+  header.hinted = true;
+  for (std::uint16_t& weight : blocks_[header.data].weight) weight = std::min(weight, kHintWeight);
+  if (!labels_.empty()) labels_[header.data].counts.fill(LabelCounts{});
+  markChanged(slot);
+}
+
+void VoxelVolume::copy(const VoxelVolume& from, std::uint32_t slot) {
+  const BlockHeader& theirs = from.headers_[slot];
+  if (theirs.state == BlockState::kFree) addFree(theirs.index, theirs.free_parts, {});
+  if (theirs.state != BlockState::kVoxels) return;
+  const std::uint32_t own = obtain(theirs.index);
+  if (own == kNone) return;
+  headers_[own].sides = theirs.sides;
+  changeVoxels(own) = *from.voxels(slot);
+  if (!labels_.empty() && !from.labels_.empty()) *changeLabels(own) = *from.labels(slot);
 }
 
 void VoxelVolume::dropFarFree(const Eigen::Vector3f& vehicle) {

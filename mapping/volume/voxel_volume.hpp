@@ -5,6 +5,9 @@
 // the block pool; kFree, without data, of which some parts were seen free and nothing is known of the others.
 // What is not in the volume is unknown.
 //
+// A block belongs to the submap in which it became known: its images moved as one since, where loops moved
+// them (mapping/map/submaps.hpp). touch() comes before every image that changes it.
+//
 // For readers (surface, distance field): slots 0 to slots() - 1 in order are every block, in an order that
 // only the history decides; revision(slot) tells each reader by itself what has changed since it last looked;
 // a BlockListener hears of blocks before they are dropped. Readers hold no references across updates.
@@ -33,12 +36,15 @@ struct BlockHeader {
   BlockIndex index;
   std::uint32_t data = BlockHash::kNone;  ///< in the pool, for kVoxels
   std::uint32_t revision = 0;             ///< the volume's at the last change
-  std::uint32_t born = 0;                 ///< the volume's when the block became known
+  SubmapId submap = 0;                    ///< of its first image
+  SubmapId touched = 0;                   ///< of its last
   std::uint64_t free_parts = 0;           ///< for kFree: never 0
   BlockState state = BlockState::kUnused;
   /// For kVoxels: kInFront and kBehind, where any observed voxel is on that side of a surface. A surface
   /// passes between voxels of both sides only.
   std::uint8_t sides = 0;
+  bool observed = false;  ///< an image changed it since it became known or began anew
+  bool hinted = false;    ///< it holds voxels of kHintWeight that are not of its own images
   /// Largest change of a distance since the last that counted as one [steps], summed.
   float drift = 0;
 
@@ -50,11 +56,13 @@ struct BlockHeader {
 
 class VoxelVolume;
 
-/// Who wants to see blocks before they are dropped: the volume is whole when it is called.
+/// Who wants to see blocks before they are dropped or begin anew: the volume is whole when it is called.
 class BlockListener {
  public:
   virtual ~BlockListener() = default;
   virtual void beforeRemoval(const VoxelVolume& volume, std::span<const std::uint32_t> slots) = 0;
+  /// The block begins anew (VoxelVolume::touch).
+  virtual void beforeRenewal(const VoxelVolume& volume, std::uint32_t slot) = 0;
 };
 
 struct VolumeCounters {
@@ -113,12 +121,27 @@ class VoxelVolume {
   [[nodiscard]] std::size_t bytes() const;
   /// Of `memory_bytes`, how many blocks with voxels it makes.
   static std::size_t blocksFor(std::size_t memory_bytes, bool labels);
+  /// Memory that makes at least so many.
+  static std::size_t bytesFor(std::size_t blocks, bool labels);
   [[nodiscard]] const VolumeCounters& counters() const { return counters_; }
 
   // ---- changing ----
 
   /// At most kMostListeners, which outlive the volume's use; false beyond.
   bool addListener(BlockListener* listener);
+
+  /// Blocks that become known from now on are of submap `id`. Those touched last in a submap before
+  /// `stale_before`, or of one that is `outdated` (by id; may be null, outlives the volume's use), begin anew
+  /// when they are touched; free blocks in the second case alone.
+  void beginSubmap(SubmapId id, SubmapId stale_before, const std::uint8_t* outdated);
+  /// An image is about to change a block with voxels. Where it begins anew the listeners see it
+  /// before, and what it held stays as a hint: with the least weight, for as long as nothing newer is known.
+  void touch(std::uint32_t slot) {
+    BlockHeader& header = headers_[slot];
+    if (isOutdated(header)) renew(slot);
+    header.touched = submap_;
+    header.observed = true;
+  }
 
   /// Begins a set of changes and gives its revision.
   std::uint32_t beginChange() { return ++revision_; }
@@ -127,14 +150,18 @@ class VoxelVolume {
     headers_[slot].drift = 0;
   }
 
-  /// Makes sure that `blocks` new ones with voxels fit beside what stays, farthest from `vehicle` first:
-  /// drops blocks, and takes out of `wanted` those that are refused. Slots may change hands.
-  void makeRoom(const Eigen::Vector3f& vehicle, std::vector<BlockIndex>& wanted);
+  /// Makes room for the new ones with voxels among `wanted` beside what stays, farthest from `vehicle` first:
+  /// drops blocks, and moves those of `wanted` that are refused behind the others, which keep their order.
+  /// How many these are. Slots may change hands.
+  std::size_t makeRoom(const Eigen::Vector3f& vehicle, std::span<BlockIndex> wanted);
   /// The slot of a block with voxels: the one there is, else a new one, its voxels unobserved (or free,
   /// by one observation, where they were seen free). kNone when full: makeRoom() first.
   std::uint32_t obtain(const BlockIndex& block);
   /// These parts of the block, which has no voxels, were seen free. A full table drops the farthest.
   void addFree(const BlockIndex& block, std::uint64_t parts, const Eigen::Vector3f& vehicle);
+
+  /// A block of another volume, which is not here yet: as it is there.
+  void copy(const VoxelVolume& from, std::uint32_t slot);
 
   /// Drops blocks after the listeners have seen them.
   void remove(std::span<const std::uint32_t> slots);
@@ -164,6 +191,10 @@ class VoxelVolume {
   [[nodiscard]] Farness farness(const BlockIndex& block, std::uint32_t slot,
                                 const Eigen::Vector3f& vehicle) const;
   std::uint32_t newHeader(const BlockIndex& block);
+  [[nodiscard]] bool isOutdated(const BlockHeader& header) const {
+    return header.touched < stale_before_ || (outdated_ != nullptr && outdated_[header.submap] != 0);
+  }
+  void renew(std::uint32_t slot);
   void drop(std::uint32_t slot);
   void dropFarFree(const Eigen::Vector3f& vehicle);
 
@@ -178,6 +209,9 @@ class VoxelVolume {
   std::vector<std::uint32_t> leaving_;
   std::size_t free_count_ = 0;
   std::uint32_t revision_ = 0;
+  SubmapId submap_ = 0;
+  SubmapId stale_before_ = 0;
+  const std::uint8_t* outdated_ = nullptr;
   std::array<BlockListener*, kMostListeners> listeners_{};
   std::size_t listener_count_ = 0;
   VolumeCounters counters_;

@@ -104,7 +104,7 @@ Place mapped(int views) {
 KeptMapReport load(const std::string& bytes, Place& place) {
   std::istringstream in(bytes);
   KeptMapReport report = checkKeptMap("kept", in, place.volume.settings());
-  loadKeptMap("kept", in, place.volume, place.surface, report);
+  loadKeptMap("kept", in, place.volume, place.surface, nullptr, report);
   place.epoch = report.epoch;
   place.vehicle = report.p_map_vehicle;
   return report;
@@ -176,7 +176,7 @@ struct Flight {
     sensor.camera = kSceneCamera;
     settings.volume_mib = 8;
     settings.surface_mib = 4;
-    map = std::make_unique<MapStage>(rig, settings, &sensor);
+    map = std::make_unique<MapStage>(rig, settings, &sensor, nullptr, MapPoses::kGiven);
   }
   void fly(int first, int last, std::uint32_t epoch = 0) {
     const std::vector<SE3> poses = viewsAround(kBall, 1.5);

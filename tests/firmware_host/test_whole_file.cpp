@@ -94,7 +94,10 @@ const std::vector<std::pair<const char*, Write>>& writers() {
       {"map.ply", [](const std::string& path) { writeMapPly(path, manyFaces()); }},
       {"map.glb", [](const std::string& path) { writeMapGlb(path, manyFaces()); }},
       {"graph.g2o", [](const std::string& path) { writeG2oFile(path, manyPoses()); }},
-      {"kept map", [](const std::string& path) { (void)writeKeptMapFile(path, *emptyMap()); }},
+      {"kept map",
+       [](const std::string& path) {
+         (void)writeKeptMapFile(path, *emptyMap(), [](std::uint32_t) { return true; });
+       }},
   };
   return kWriters;
 }

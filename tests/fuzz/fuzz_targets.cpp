@@ -271,7 +271,7 @@ struct MapPlace {
     KeptMapReport report = checkKeptMap("map", in, volume.settings());
     volume.clear();
     surface.clear();
-    loadKeptMap("map", in, volume, surface, report);
+    loadKeptMap("map", in, volume, surface, nullptr, report);
     return report;
   }
   std::string kept(const KeptMapReport& report) {

@@ -89,7 +89,7 @@ Figures judge(const DepthLog& log) {
   VoxelVolume volume(settings);
   VolumeIntegrator integrator(volume, log.camera.pixels());
   const ConfusionModel confusion;
-  SurfaceStore store(std::size_t{128} << 20U, settings.voxel_size * kBlockSide, nullptr);
+  SurfaceStore store(std::size_t{128} << 20U, settings.voxel_size * kBlockSide);
   const SurfaceSettings sensor{.least_weight = SurfaceSettings::kLeastSensorWeight, .most_step = 0};
   const auto surface = std::make_unique<SurfaceStage>(volume, confusion, store, sensor);
   const auto patch = std::make_unique<SurfacePatch>();

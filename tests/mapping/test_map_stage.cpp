@@ -7,7 +7,10 @@
 #include <cmath>
 #include <vector>
 
+#include "tests/mapping/memory_storage.hpp"
+
 using namespace swiftlet;
+using namespace swiftlet::testing;
 
 namespace {
 
@@ -177,17 +180,10 @@ TEST_CASE("what does not fit is refused or left out, and counted") {
   CHECK(map.counters().taken == 1);
 }
 
-TEST_CASE("a new epoch is a submap of its own; the surface of the old goes to who keeps it") {
-  struct Kept : Count {
-    void take(const SurfacePatch& patch) override {
-      CHECK(submap == 0);
-      Count::take(patch);
-    }
-    void beginSubmap(std::uint32_t epoch) override { submap = epoch; }
-    std::uint32_t submap = 0;
-  } kept;
+TEST_CASE("a new epoch is a world of its own; the surface of the old is drawn apart from it") {
   Wall wall;
-  MapStage map(wall.rig, smallSettings(), &wall.sensor, &kept);
+  MemoryStorage storage;
+  MapStage map(wall.rig, smallSettings(), &wall.sensor, &storage);
   MapReport report;
   REQUIRE(map.step(wall.at(0), {}, report).ok());
   const std::size_t before = countOf(map).triangles;
@@ -196,11 +192,59 @@ TEST_CASE("a new epoch is a submap of its own; the surface of the old goes to wh
   next.T_map_body.translation.x() = -20;
   REQUIRE(map.step(next, {}, report).ok());
   CHECK(map.counters().epochs == 1);
-  CHECK(kept.triangles == before);
-  CHECK(kept.submap == 1);
-  CHECK(map.surface().counters().lost == 0);
+  CHECK(map.submaps().stored().lost() == 0);
   CHECK(countOf(map).triangles > before / 2);
   CHECK(map.distance().query({1.0, 0, 0}).kind == DistanceKind::kUnknown);
+  Count old;
+  map.visitWholeSurface([](std::uint32_t epoch) { return epoch == 0; }, old);
+  CHECK(old.triangles == before);
+  CHECK(old.worst < 0.005F);
+  Count both;
+  map.visitWholeSurface([](std::uint32_t /*epoch*/) { return true; }, both);
+  CHECK(both.triangles > before * 3 / 2);
+}
+
+TEST_CASE("the whole surface of a map that nothing moved is that of its volume, bit by bit") {
+  struct Patches : SurfaceSink {
+    void take(const SurfacePatch& patch) override {
+      for (const SurfaceVertex& v : patch.vertices) {
+        // The probability of a label that stays is not drawn anew.
+        vertices.push_back({v.p_world.x(), v.p_world.y(), v.p_world.z(), static_cast<float>(v.label),
+                            static_cast<float>(v.grey)});
+      }
+    }
+    std::vector<std::array<float, 5>> vertices;
+  } drawn, whole;
+  Wall wall;
+  MemoryStorage storage;
+  MapStage map(wall.rig, smallSettings(), &wall.sensor, &storage);
+  MapReport report;
+  for (int i = 0; i < 5; ++i) REQUIRE(map.step(wall.at(i), {}, report).ok());
+  map.drawRest();
+  map.visitSurface(drawn);
+  map.visitWholeSurface([](std::uint32_t /*epoch*/) { return true; }, whole);
+  std::ranges::sort(drawn.vertices);
+  std::ranges::sort(whole.vertices);
+  REQUIRE(drawn.vertices.size() > 1000);
+  REQUIRE(drawn.vertices.size() == whole.vertices.size());
+  std::size_t differ = 0;
+  for (std::size_t i = 0; i < whole.vertices.size(); ++i)
+    differ += drawn.vertices[i] != whole.vertices[i] ? 1 : 0;
+  CHECK(differ == 0);
+}
+
+TEST_CASE("surface that is shown moves with its submap") {
+  Wall wall;
+  MemoryStorage storage;
+  MapStage map(wall.rig, smallSettings(), &wall.sensor, &storage);
+  MapReport report;
+  for (int i = 0; i < 3; ++i) REQUIRE(map.step(wall.at(i), {}, report).ok());
+  CHECK(countOf(map).worst < 0.005F);
+  const std::size_t triangles = countOf(map).triangles;
+  map.correct(std::vector<WorldInMap>{{0, 0, SE3(Eigen::Quaterniond::Identity(), {0.3, 0, 0}), {}}});
+  const Count moved = countOf(map);
+  CHECK(moved.triangles == triangles);
+  CHECK(moved.worst == Approx(0.3F).margin(0.005));
 }
 
 TEST_CASE("the same input gives the same bytes") {

@@ -37,7 +37,7 @@ VolumeRun fuse(const DepthLog& log, const RunOptions& options) {
   VolumeIntegrator integrator(volume, log.camera.pixels());
   const ConfusionModel confusion;
   MeshSink sink;
-  SurfaceStore store(options.surface_bytes, options.settings.voxel_size * kBlockSide, &sink);
+  SurfaceStore store(options.surface_bytes, options.settings.voxel_size * kBlockSide);
   const auto stage = std::make_unique<SurfaceStage>(volume, confusion, store, options.surface);
   for (std::size_t i = 0; i < log.frames.size(); ++i) {
     const SE3& T = log.frames[i].T_world_body;

@@ -29,11 +29,11 @@ void print(const char* what, const VolumeRun& run, const DepthLog& log, const Tr
   std::printf(
       "  %zu of %zu blocks (most %zu), %zu free; volume %.1f MB, integrator %.1f MB, surface %.1f MB; "
       "evicted %llu, "
-      "refused %llu, spilled %llu; body in known space %zu of %zu times\n",
+      "refused %llu, patches dropped %llu; body in known space %zu of %zu times\n",
       run.blocks, run.capacity, run.most_blocks, run.free_blocks,
       static_cast<double>(run.volume_bytes) / kMega, static_cast<double>(run.integrator_bytes) / kMega,
       static_cast<double>(run.surface_bytes) / kMega, static_cast<unsigned long long>(run.volume.evicted),
-      static_cast<unsigned long long>(run.volume.refused), static_cast<unsigned long long>(run.store.spilled),
+      static_cast<unsigned long long>(run.volume.refused), static_cast<unsigned long long>(run.store.dropped),
       run.body_known, log.frames.size());
 }
 

@@ -10,6 +10,7 @@
 #include "drivers/recorded/label_images.hpp"
 #include "estimator/core/units.hpp"
 #include "firmware_host/files/line_file.hpp"
+#include "firmware_host/outputs/map_files/block_file.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"
 #include "firmware_host/outputs/map_files/map_output.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"
@@ -47,18 +48,12 @@ Json timingJson(const MapTimes& times) {
   return json;
 }
 
-/// Given poses stay as they are.
-Settings withoutCorrection(Settings settings) {
-  settings.map_stage.keyframes_mib = 0;
-  return settings;
-}
-
 /// What one run is made of, from opening to the summary.
 class FuseRun {
  public:
   FuseRun(const FuseRequest& request, const Settings& settings)
       : request_(request),
-        settings_(withoutCorrection(settings)),
+        settings_(settings),
         log_(request, settings),
         rig_(log_.rig()),
         depth_(request.log, log_.warnings(), log_.source().calibration().T_body_filebody),
@@ -88,7 +83,7 @@ class FuseRun {
   const Rig& rig_;
   DepthImages depth_;
   LabelImages labels_;
-  SpilledSurface spilled_{request_.out};
+  BlockFile storage_{request_.out};
   std::unique_ptr<MapStage> map_;
   std::optional<TumWriter> poses_out_;
   std::optional<KeptMapReport> continued_;
@@ -119,9 +114,9 @@ void FuseRun::begin() {
     DepthImageView camera;
     camera.camera = depth_.sensor().camera;
     camera.T_body_camera = depth_.sensor().T_body_camera;
-    map_ = std::make_unique<MapStage>(rig_, settings_.map_stage, &camera, &spilled_);
+    map_ = std::make_unique<MapStage>(rig_, settings_.map_stage, &camera, &storage_, MapPoses::kGiven);
   } else {
-    map_ = std::make_unique<MapStage>(rig_, settings_.map_stage, nullptr, &spilled_);
+    map_ = std::make_unique<MapStage>(rig_, settings_.map_stage, nullptr, &storage_, MapPoses::kGiven);
   }
   if (confusion) map_->setConfusion(*confusion);
   openKept();
@@ -235,14 +230,15 @@ FuseRunResult FuseRun::end() {
                      {"refused", refused_},
                      {"fused", fused_},
                      {"with_labels", labelled_}};
-  json["map"] = writeMap(request_.out, *map_, spilled_, {});
+  json["map"] = writeMap(request_.out, *map_, {});
   if (continued_) {
     json["continued"] = {{"file", request_.continued},
                          {"held", countsJson(continued_->held)},
                          {"without_room", countsJson(continued_->without_room)}};
   }
   if (!request_.keep.empty()) {
-    json["kept"] = countsJson(writeKeptMapFile(request_.keep, *map_));
+    json["kept"] = countsJson(writeKeptMapFile(
+        request_.keep, *map_, [this](std::uint32_t epoch) { return epoch == map_->epoch(); }));
     json["kept"]["file"] = request_.keep;
   }
   json["timing"] = timingJson(times_);

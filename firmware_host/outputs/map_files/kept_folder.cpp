@@ -44,7 +44,9 @@ void KeptFolder::write(const KeptGraph& graph) {
   has_graph_ = true;
 }
 
-void KeptFolder::write(MapStage& map) { writeKeptMapFile((part_ / kKeptVolumeFile).string(), map); }
+void KeptFolder::write(MapStage& map, const std::function<bool(std::uint32_t epoch)>& wanted) {
+  writeKeptMapFile((part_ / kKeptVolumeFile).string(), map, wanted);
+}
 
 void KeptFolder::commit() {
   if (!has_graph_) {

@@ -3,6 +3,7 @@
 // (kept_map.hpp). The folder is there as a whole or not at all: it is filled as `<folder>.part` and renamed.
 
 #include <filesystem>
+#include <functional>
 #include <string>
 
 #include "mapping/loop/kept_graph.hpp"
@@ -24,7 +25,7 @@ class KeptFolder {
 
   /// InputError where they cannot be written.
   void write(const KeptGraph& graph);
-  void write(MapStage& map);
+  void write(MapStage& map, const std::function<bool(std::uint32_t epoch)>& wanted);
   /// Also where no graph was written.
   void commit();
 

@@ -4,12 +4,13 @@
 // Kept are the volume's blocks bit by bit (distances, weights, grey values, label counts, what is free), the
 // surface's patches, the epoch and where the vehicle was last. The same map gives the same bytes. Blocks and
 // patches lie in order of their distance from the vehicle, so that a smaller pool takes the nearest: what has
-// no room is counted. Every record has a CRC; a file is read twice, first only to check it, so that nothing
-// is loaded from a damaged one. Memory: one record (kMostRecordBytes) and 12 bytes a block or patch for
-// writing. InputError names the file, the byte, the field and the remedy.
+// no room goes to the map's storage. Every record has a CRC; a file is read twice, first only to check it, so
+// that nothing is loaded from a damaged one. Memory: one record (kMostRecordBytes) and 12 bytes a block or
+// patch for writing. InputError names the file, the byte, the field and the remedy.
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <iosfwd>
 #include <string>
 
@@ -39,15 +40,17 @@ struct MapParts {
 };
 
 KeptMapCounts writeKeptMap(const std::string& name, std::ostream& out, const MapParts& map);
-/// Draws what waits, then writes beside `path` and renames: an older file is whole until the new one is.
-KeptMapCounts writeKeptMapFile(const std::string& path, MapStage& map);
+/// All of the epochs for which `wanted` holds, where it belongs by now (MapStage::wholeVolume). Written
+/// beside `path` and renamed: an older file is whole until the new one is.
+KeptMapCounts writeKeptMapFile(const std::string& path, MapStage& map,
+                               const std::function<bool(std::uint32_t epoch)>& wanted);
 
 /// Checks the whole of `in` for a map with `settings`; throws where anything is amiss.
 KeptMapReport checkKeptMap(const std::string& name, std::istream& in, const VolumeSettings& settings);
-/// Puts it into an empty volume and store, after checkKeptMap(). Where it throws (the file changed since)
-/// both hold a part.
+/// Puts it into an empty volume and store, blocks without room into `submaps` (may be null), after
+/// checkKeptMap(). Where it throws (the file changed since) all hold a part.
 void loadKeptMap(const std::string& name, std::istream& in, VoxelVolume& volume, SurfaceStore& surface,
-                 KeptMapReport& report);
+                 MapSubmaps* submaps, KeptMapReport& report);
 /// In place of what `map` holds. Where it throws the map is as it was; empty where the file changed
 /// meanwhile.
 KeptMapReport readKeptMap(const std::string& name, std::istream& in, MapStage& map);

@@ -20,19 +20,16 @@ using namespace kept;  // NOLINT(google-build-using-namespace)
 
 constexpr const char* kOtherCopy = "Give another copy of the file, or begin a new map; nothing was loaded";
 
-struct ReadBlock {
-  BlockIndex index;
+struct ReadBlock : StoredBlock {
   std::uint8_t sides = 0;
   float drift = 0;
-  VoxelBlock voxels;
-  LabelBlock labels;
 };
 
 /// Takes what a file holds, in its order; this one only lets the reader check it.
 class MapTaker {
  public:
   virtual ~MapTaker() = default;
-  virtual void block(const ReadBlock& /*block*/) {}
+  virtual void block(ReadBlock& /*block*/) {}
   virtual void freeBlock(const BlockIndex& /*block*/, std::uint64_t /*parts*/) {}
   virtual void patch(const SurfacePatch& /*patch*/) {}
 };
@@ -230,6 +227,8 @@ void MapReader::readBlock(MapTaker& taker) {
   block.index = readIndex(from, 0);
   block.sides = from.u8();
   const auto zeros = from.bytes(3);
+  block.free_parts = 0;
+  block.has_labels = head_.labels;
   demand(block.sides <= (BlockHeader::kInFront | BlockHeader::kBehind) &&
              std::ranges::all_of(zeros, [](std::uint8_t b) { return b == 0; }),
          at(kIndexBytes), "sides", "are none");
@@ -319,17 +318,18 @@ class VolumeLoader : public MapTaker {
   VolumeLoader(VoxelVolume& volume, const Eigen::Vector3d& p_map_vehicle, KeptMapReport& report)
       : volume_(volume), vehicle_(p_map_vehicle.cast<float>()), report_(report) {}
 
-  void block(const ReadBlock& block) override {
+  void block(ReadBlock& block) override {
     const bool room = volume_.blockCount() < volume_.blockCapacity();
     const std::uint32_t slot = room ? volume_.obtain(block.index) : VoxelVolume::kNone;
     if (slot == VoxelVolume::kNone) {
-      ++report_.without_room.blocks;
+      withoutRoom(block);
       return;
     }
     volume_.markChanged(slot);
     BlockHeader& header = volume_.changeHeader(slot);
     header.sides = block.sides;
     header.drift = block.drift;
+    header.observed = true;
     volume_.changeVoxels(slot) = block.voxels;
     if (LabelBlock* labels = volume_.changeLabels(slot); labels != nullptr) *labels = block.labels;
   }
@@ -340,6 +340,7 @@ class VolumeLoader : public MapTaker {
   }
 
  protected:
+  virtual void withoutRoom(ReadBlock& /*block*/) { ++report_.without_room.blocks; }
   [[nodiscard]] const Eigen::Vector3f& vehicle() const { return vehicle_; }
   [[nodiscard]] KeptMapReport& report() const { return report_; }
 
@@ -349,23 +350,32 @@ class VolumeLoader : public MapTaker {
   KeptMapReport& report_;
 };
 
-/// The same, and patches into an empty store.
+/// The same, patches into an empty store, and blocks without room to the submaps.
 class Loader final : public VolumeLoader {
  public:
-  Loader(VoxelVolume& volume, SurfaceStore& surface, const Eigen::Vector3d& p_map_vehicle,
-         KeptMapReport& report)
-      : VolumeLoader(volume, p_map_vehicle, report), surface_(surface) {}
+  Loader(VoxelVolume& volume, SurfaceStore& surface, MapSubmaps* submaps,
+         const Eigen::Vector3d& p_map_vehicle, KeptMapReport& report)
+      : VolumeLoader(volume, p_map_vehicle, report), surface_(surface), submaps_(submaps) {}
 
   void patch(const SurfacePatch& patch) override {
     const SurfaceStoreCounters before = surface_.counters();
     surface_.put(patch, vehicle());
     const SurfaceStoreCounters& after = surface_.counters();
-    report().without_room.patches +=
-        static_cast<std::uint32_t>(after.lost + after.spilled - before.lost - before.spilled);
+    report().without_room.patches += static_cast<std::uint32_t>(after.dropped - before.dropped);
+  }
+
+ protected:
+  void withoutRoom(ReadBlock& block) override {
+    if (submaps_ == nullptr) {
+      VolumeLoader::withoutRoom(block);
+    } else {
+      submaps_->store(block);
+    }
   }
 
  private:
   SurfaceStore& surface_;
+  MapSubmaps* submaps_;  ///< null: nobody has room
 };
 
 std::ifstream opened(const std::string& path) {
@@ -383,9 +393,7 @@ VolumeSettings settingsOf(const Head& head) {
   settings.labels = head.labels;
   const std::size_t blocks =
       std::max<std::size_t>(head.counts.blocks, head.counts.free_blocks / VoxelVolume::kFreePerBlock + 1);
-  settings.memory_bytes = blocks * sizeof(VoxelBlock);
-  while (VoxelVolume::blocksFor(settings.memory_bytes, settings.labels) < blocks)
-    settings.memory_bytes += settings.memory_bytes / 8;
+  settings.memory_bytes = VoxelVolume::bytesFor(blocks, settings.labels);
   return settings;
 }
 
@@ -400,22 +408,24 @@ KeptMapReport checkKeptMap(const std::string& name, std::istream& in, const Volu
 }
 
 void loadKeptMap(const std::string& name, std::istream& in, VoxelVolume& volume, SurfaceStore& surface,
-                 KeptMapReport& report) {
+                 MapSubmaps* submaps, KeptMapReport& report) {
   MapReader reader(name, in);
   reader.demandSettings(volume.settings());
   volume.beginChange();
-  Loader loader(volume, surface, reader.head().p_map_vehicle, report);
+  Loader loader(volume, surface, submaps, reader.head().p_map_vehicle, report);
   reader.walk(loader);
 }
 
 KeptMapReport readKeptMap(const std::string& name, std::istream& in, MapStage& map) {
   KeptMapReport report = checkKeptMap(name, in, map.volume().settings());
   try {
-    map.restore(report.epoch, report.p_map_vehicle, [&](VoxelVolume& volume, SurfaceStore& surface) {
-      loadKeptMap(name, in, volume, surface, report);
-    });
+    map.restore(report.epoch, report.p_map_vehicle,
+                [&](VoxelVolume& volume, SurfaceStore& surface, MapSubmaps& submaps) {
+                  loadKeptMap(name, in, volume, surface, &submaps, report);
+                });
   } catch (const InputError&) {
-    map.restore(0, Eigen::Vector3d::Zero(), [](VoxelVolume& /*volume*/, SurfaceStore& /*surface*/) {});
+    map.restore(0, Eigen::Vector3d::Zero(),
+                [](VoxelVolume& /*volume*/, SurfaceStore& /*surface*/, MapSubmaps& /*submaps*/) {});
     throw;
   }
   return report;

@@ -185,14 +185,15 @@ KeptMapCounts writeKeptMap(const std::string& name, std::ostream& out, const Map
   return MapWriter(name, out, map)();
 }
 
-KeptMapCounts writeKeptMapFile(const std::string& path, MapStage& map) {
+KeptMapCounts writeKeptMapFile(const std::string& path, MapStage& map,
+                               const std::function<bool(std::uint32_t epoch)>& wanted) {
   map.drawRest();
+  const VoxelVolume whole = map.wholeVolume(wanted);
   WholeFile file(path);
   IntoWholeFile buffer(file);
   std::ostream out(&buffer);
   out.exceptions(std::ios::badbit);  // lets the file's own error through
-  const KeptMapCounts counts =
-      writeKeptMap(path, out, {map.volume(), map.surface(), map.epoch(), map.vehicle()});
+  const KeptMapCounts counts = writeKeptMap(path, out, {whole, map.surface(), map.epoch(), map.vehicle()});
   file.commit();
   return counts;
 }

@@ -6,6 +6,7 @@
 #include <array>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <vector>
 
 #include "firmware_host/outputs/map_files/map_files.hpp"
@@ -14,8 +15,7 @@ namespace swiftlet {
 namespace {
 
 /// Joins the patches of a surface into one mesh: vertices of neighbouring patches at bit-identical positions
-/// become one. Where a block comes twice (first spilled, later drawn anew) the later patch counts. Memory
-/// grows with the mesh, some 60 bytes a vertex.
+/// become one. Memory grows with the mesh, some 60 bytes a vertex.
 class MapMeshBuilder : public SurfaceSink {
  public:
   void take(const SurfacePatch& patch) override;
@@ -73,8 +73,7 @@ nlohmann::ordered_json toJson(const MapStage& map) {
   const VolumeCounters& blocks = map.volume().counters();
   const SurfaceStoreCounters& store = map.surface().counters();
   const DistanceField& distance = map.distance();
-  const CorrectionCounters& corrections = map.correction().counters();
-  const KeptDepths& kept = map.correction().kept();
+  const MapSubmaps& submaps = map.submaps();
   return {{"taken", stage.taken},
           {"without_depth", stage.without_depth},
           {"wrong_size", stage.wrong_size},
@@ -100,58 +99,57 @@ nlohmann::ordered_json toJson(const MapStage& map) {
             {"out_of_range", blocks.out_of_range},
             {"index_full", blocks.index_full},
             {"left_out", images.blocks_left_out}}},
-          {"corrections",
-           {{"begun", corrections.corrections},
-            {"images_moved", corrections.images_moved},
-            {"images_fused_again", images.again},
-            {"blocks_dropped", corrections.blocks_dropped},
-            {"images_kept", kept.size()},
-            {"capacity", kept.capacity()},
-            {"given_up", kept.given_up()}}},
+          {"submaps",
+           {{"begun", submaps.submaps().size()},
+            {"corrections", submaps.counters().corrections},
+            {"blocks_moved", submaps.counters().blocks_moved},
+            {"blocks_back", submaps.counters().blocks_back},
+            {"blocks_apart", submaps.counters().blocks_apart},
+            {"blocks_stored", submaps.stored().size()},
+            {"blocks_lost", submaps.stored().lost()},
+            {"bytes_stored", submaps.stored().bytesStored()}}},
           {"surface",
            {{"patches", map.surface().patches()},
             {"pages", map.surface().pagesUsed()},
             {"capacity", map.surface().pages()},
             {"drawn", map.surfaceStage().counters().drawn},
-            {"spilled", store.spilled},
-            {"lost", store.lost}}},
+            {"dropped", store.dropped}}},
           {"bytes",
            {{"volume", map.volume().bytes()},
             {"surface", map.surface().bytes()},
             {"distance", distance.bytes()},
-            {"corrections", map.correction().bytes()}}}};
+            {"submaps", submaps.bytes()}}}};
 }
 
 }  // namespace
 
-nlohmann::ordered_json writeMap(const std::string& folder, MapStage& map, SpilledSurface& spilled,
+nlohmann::ordered_json writeMap(const std::string& folder, MapStage& map,
                                 std::span<const std::uint32_t> tied) {
   const std::filesystem::path path(folder);
   const auto isTied = [&](std::uint32_t epoch) {
     return epoch == map.epoch() || std::ranges::find(tied, epoch) != tied.end();
   };
+  nlohmann::ordered_json json = toJson(map);
   MapMeshBuilder builder;
-  nlohmann::ordered_json submaps = nlohmann::ordered_json::array();
-  for (const std::uint32_t epoch : spilled.submaps()) {
-    if (isTied(epoch)) {
-      spilled.visit(epoch, builder);
-      continue;
-    }
-    MapMeshBuilder apart;
-    spilled.visit(epoch, apart);
-    const MapMesh mesh = apart.mesh();
-    const std::string name = fmt::format("map_epoch_{}.ply", epoch);
-    writeMapPly((path / name).string(), mesh);
-    submaps.push_back({{"file", name}, {"faces", mesh.faces.size()}});
-  }
-  map.visitSurface(builder);
+  map.visitWholeSurface(isTied, builder);
   const MapMesh mesh = builder.mesh();
   writeMapPly((path / "map.ply").string(), mesh);
   writeMapGlb((path / "map.glb").string(), mesh);
-  nlohmann::ordered_json json = toJson(map);
   json["mesh"] = {{"vertices", mesh.vertices.size()}, {"faces", mesh.faces.size()}};
-  json["submaps"] = submaps;
-  json["surface"]["spilled_lost"] = spilled.lost();
+  json["epochs_apart"] = nlohmann::ordered_json::array();
+  std::set<std::uint32_t> apart;
+  for (std::size_t i = 0; i < map.submaps().submaps().size(); ++i) {
+    const std::uint32_t epoch = map.submaps().submaps()[i].epoch;
+    if (!isTied(epoch)) apart.insert(epoch);
+  }
+  for (const std::uint32_t epoch : apart) {
+    MapMeshBuilder own;
+    map.visitWholeSurface([&](std::uint32_t e) { return e == epoch; }, own);
+    const MapMesh part = own.mesh();
+    const std::string name = fmt::format("map_epoch_{}.ply", epoch);
+    writeMapPly((path / name).string(), part);
+    json["epochs_apart"].push_back({{"file", name}, {"faces", part.faces.size()}});
+  }
   return json;
 }
 

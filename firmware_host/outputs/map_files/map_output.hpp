@@ -7,14 +7,13 @@
 #include <span>
 #include <string>
 
-#include "firmware_host/outputs/map_files/spilled_surface.hpp"
 #include "mapping/map/map_stage.hpp"
 
 namespace swiftlet {
 
 /// `tied`: earlier epochs that lie in the newest one's map. Gives what summary.json says of the map.
 /// InputError where a file cannot be written.
-nlohmann::ordered_json writeMap(const std::string& folder, MapStage& map, SpilledSurface& spilled,
+nlohmann::ordered_json writeMap(const std::string& folder, MapStage& map,
                                 std::span<const std::uint32_t> tied);
 
 }  // namespace swiftlet

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "drivers/calibration/input_error.hpp"
@@ -30,7 +31,7 @@ std::string valueText(const Event& event) {
 }  // namespace
 
 RunRecorder::RunRecorder(const std::string& folder, const Wanted& wanted, LostFiles& lost)
-    : folder_(folder), wanted_(wanted), lost_(lost), spilled_(folder) {
+    : folder_(folder), wanted_(wanted), lost_(lost), storage_(folder) {
   if (!wanted.keep_map.empty()) kept_.emplace(wanted.keep_map);  // what is asked for is refused in time
   if (folder.empty()) return;
   const std::filesystem::path path(folder);
@@ -123,9 +124,12 @@ void RunRecorder::commitMap() {
 }
 
 void RunRecorder::onMap(MapStage& map, std::span<const std::uint32_t> tied) {
-  if (kept_) attempt([&] { kept_->write(map); });
+  const auto in_map = [&](std::uint32_t epoch) {
+    return epoch == map.epoch() || std::ranges::find(tied, epoch) != tied.end();
+  };
+  if (kept_) attempt([&] { kept_->write(map, in_map); });
   if (folder_.empty()) return;
-  attempt([&] { map_ = writeMap(folder_, map, spilled_, tied); });
+  attempt([&] { map_ = writeMap(folder_, map, tied); });
 }
 
 void RunRecorder::onFinish(const OdometryOutput& output) {

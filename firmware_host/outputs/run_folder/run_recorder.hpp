@@ -11,9 +11,9 @@
 #include "firmware_host/files/line_file.hpp"
 #include "firmware_host/files/lost_files.hpp"
 #include "firmware_host/interfaces/run_listener.hpp"
+#include "firmware_host/outputs/map_files/block_file.hpp"
 #include "firmware_host/outputs/map_files/kept_folder.hpp"
 #include "firmware_host/outputs/map_files/mesh_files.hpp"
-#include "firmware_host/outputs/map_files/spilled_surface.hpp"
 #include "firmware_host/outputs/run_folder/in_map_file.hpp"
 
 namespace swiftlet {
@@ -42,7 +42,7 @@ class RunRecorder : public RunListener {
   void onFinish(const OdometryOutput& output) override;
   void onRemark(Stamp stamp, const std::string& text) override;
   /// For the graph: where surface goes that the map has no room for.
-  [[nodiscard]] SpilledSurface& spilled() { return spilled_; }
+  [[nodiscard]] BlockFile& storage() { return storage_; }
   /// The map that is kept gets its name.
   void commitMap();
   /// Of the map and its surface; null without one.
@@ -71,7 +71,7 @@ class RunRecorder : public RunListener {
   std::optional<InMapFile> in_map_;
   std::optional<KeptFolder> kept_;
   std::optional<MeshSequenceWriter> meshes_;
-  SpilledSurface spilled_;
+  BlockFile storage_;
   nlohmann::ordered_json map_;
 };
 

@@ -1,0 +1,184 @@
+#include "mapping/map/block_blend.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "mapping/volume/block_update.hpp"
+
+namespace swiftlet {
+namespace {
+
+/// A block turned by any angle touches so many along an axis.
+constexpr int kMostAlong = 4;
+
+Eigen::Vector3d firstOf(const BlockIndex& block) {
+  return kBlockSide * Eigen::Vector3d(block.x, block.y, block.z);
+}
+
+std::int16_t rounded(float steps) {
+  const float cut = std::clamp(steps, -kDistanceSteps, kDistanceSteps);
+  const auto whole = static_cast<int>(cut + (cut < 0 ? -0.5F : 0.5F));
+  // What is behind by less than half a step stays behind.
+  return static_cast<std::int16_t>(cut < 0 && whole == 0 ? -1 : whole);
+}
+
+VoxelIndex voxelOf(const BlockIndex& block, std::size_t at) {
+  const auto along = [at](unsigned axis) {
+    return static_cast<std::int32_t>(at >> (kBlockBits * axis)) & kBlockMask;
+  };
+  return {kBlockSide * block.x + along(0), kBlockSide * block.y + along(1), kBlockSide * block.z + along(2)};
+}
+
+/// Along one axis, from the neighbours that are known [steps a voxel].
+float slopeAt(const VoxelBlock& block, std::size_t at, int along, std::size_t stride) {
+  const auto distance = [&](std::size_t i) { return static_cast<float>(block.distance[i]); };
+  const bool before = along > 0 && block.weight[at - stride] > 0;
+  const bool after = along < kBlockSide - 1 && block.weight[at + stride] > 0;
+  if (before && after) return 0.5F * (distance(at + stride) - distance(at - stride));
+  if (after) return distance(at + stride) - distance(at);
+  return before ? distance(at) - distance(at - stride) : 0;
+}
+
+}  // namespace
+
+BlockBlend::BlockBlend(VoxelVolume& volume) : volume_(volume) {
+  wanted_.reserve(std::size_t{kMostAlong} * kMostAlong * kMostAlong);
+}
+
+void BlockBlend::place(const StoredBlock& block, const SE3& motion) {
+  block_ = &block;
+  const double voxel = volume_.settings().voxel_size;
+  const SE3 back = motion.inverse();
+  to_block_ = back.R();
+  // Centres lie half a voxel from the corner that a number names.
+  const Eigen::Vector3d half = Eigen::Vector3d::Constant(0.5);
+  at_block_ = to_block_ * half + back.translation / voxel - half - firstOf(block.index);
+  const Eigen::Vector3d centre =
+      motion.R() * (firstOf(block.index) + Eigen::Vector3d::Constant(0.5 * kBlockSide)) +
+      motion.translation / voxel;
+  const Eigen::Vector3d extent = 0.5 * kBlockSide * motion.R().cwiseAbs().rowwise().sum();
+  const auto blockAt = [](const Eigen::Vector3d& voxels) {
+    const Eigen::Vector3d b = (voxels / kBlockSide).array().floor();
+    return BlockIndex{static_cast<std::int32_t>(b.x()), static_cast<std::int32_t>(b.y()),
+                      static_cast<std::int32_t>(b.z())};
+  };
+  // Half a voxel less: a centre has to fall in.
+  box_ = {blockAt(centre - extent + half), blockAt(centre + extent - half)};
+}
+
+bool BlockBlend::fallsIn(const VoxelIndex& voxel, std::size_t& at, Eigen::Vector3f& rest) const {
+  const Eigen::Vector3d q = to_block_ * Eigen::Vector3d(voxel.x, voxel.y, voxel.z) + at_block_;
+  const Eigen::Vector3d nearest = (q.array() + 0.5).floor();
+  if (!((nearest.array() >= 0).all() && (nearest.array() < kBlockSide).all())) return false;
+  at =
+      offsetOf({static_cast<int>(nearest.x()), static_cast<int>(nearest.y()), static_cast<int>(nearest.z())});
+  rest = (q - nearest).cast<float>();
+  return true;
+}
+
+/// take(place in `to`, sample) for every voxel of `to` whose centre falls into a known one.
+template <typename Take>
+void BlockBlend::fill(const BlockIndex& to, const Take& take) const {
+  const VoxelBlock& from = block_->voxels;
+  Sample sample;
+  Eigen::Vector3f rest;
+  for (std::size_t at = 0; at < kBlockVoxels; ++at) {
+    if (!fallsIn(voxelOf(to, at), sample.at, rest) || from.weight[sample.at] == 0) continue;
+    const auto along = [&](unsigned axis) {
+      return static_cast<int>(sample.at >> (kBlockBits * axis)) & kBlockMask;
+    };
+    const Eigen::Vector3f slope(slopeAt(from, sample.at, along(0), 1),
+                                slopeAt(from, sample.at, along(1), kBlockSide),
+                                slopeAt(from, sample.at, along(2), std::size_t{kBlockSide} * kBlockSide));
+    sample.distance = static_cast<float>(from.distance[sample.at]) + slope.dot(rest);
+    take(at, sample);
+  }
+}
+
+bool BlockBlend::reaches(const BlockIndex& to) const {
+  bool any = false;
+  fill(to, [&](std::size_t /*at*/, const Sample& /*sample*/) { any = true; });
+  return any;
+}
+
+void BlockBlend::finish(std::uint32_t slot) {
+  volume_.changeHeader(slot).sides = sidesOf(*volume_.voxels(slot));
+  volume_.markChanged(slot);
+}
+
+void BlockBlend::add(const StoredBlock& block, const SE3& motion, const BlockRange& within) {
+  place(block, motion);
+  for (int z = std::max(box_.low.z, within.low.z); z <= std::min(box_.high.z, within.high.z); ++z) {
+    for (int y = std::max(box_.low.y, within.low.y); y <= std::min(box_.high.y, within.high.y); ++y) {
+      for (int x = std::max(box_.low.x, within.low.x); x <= std::min(box_.high.x, within.high.x); ++x) {
+        if (block.free_parts != 0) {
+          endWhatStands({x, y, z});
+        } else {
+          addVoxels({x, y, z});
+        }
+      }
+    }
+  }
+}
+
+void BlockBlend::addVoxels(const BlockIndex& index) {
+  if (volume_.find(index) == VoxelVolume::kNone && !reaches(index)) return;
+  const std::uint32_t slot = volume_.obtain(index);
+  if (slot == VoxelVolume::kNone) return;
+  const StoredBlock& block = *block_;
+  VoxelBlock& to = volume_.changeVoxels(slot);
+  LabelBlock* const labels = volume_.changeLabels(slot);
+  const auto most_weight = static_cast<float>(volume_.settings().most_weight);
+  fill(index, [&](std::size_t at, const Sample& sample) {
+    const bool replaces = addVoxel(block.voxels, sample.at, sample.distance, most_weight, to, at);
+    if (labels != nullptr && replaces) labels->counts[at] = {};
+    if (labels != nullptr && block.has_labels) labels->counts[at].add(block.labels.counts[sample.at]);
+  });
+  finish(slot);
+}
+
+void BlockBlend::endWhatStands(const BlockIndex& index) {
+  const std::uint32_t slot = volume_.find(index);
+  if (slot == VoxelVolume::kNone || volume_.voxels(slot) == nullptr) return;
+  VoxelBlock& to = volume_.changeVoxels(slot);
+  std::size_t from = 0;
+  Eigen::Vector3f rest;
+  for (std::size_t at = 0; at < kBlockVoxels; ++at) {
+    if (to.weight[at] == 0 || to.distance[at] >= 0 || !fallsIn(voxelOf(index, at), from, rest)) continue;
+    if ((block_->free_parts & partBitAt(from)) != 0) to.weight[at] = 0;
+  }
+  finish(slot);
+}
+
+void BlockBlend::hint(const StoredBlock& block, const SE3& motion, const Eigen::Vector3f& vehicle) {
+  place(block, motion);
+  wanted_.clear();
+  for (int z = box_.low.z; z <= box_.high.z; ++z) {
+    for (int y = box_.low.y; y <= box_.high.y; ++y) {
+      for (int x = box_.low.x; x <= box_.high.x; ++x) {
+        if (wanted_.size() < wanted_.capacity() && reaches({x, y, z})) wanted_.push_back({x, y, z});
+      }
+    }
+  }
+  wanted_.resize(volume_.makeRoom(vehicle, wanted_));
+  for (const BlockIndex& index : wanted_) {
+    const std::uint32_t known = volume_.find(index);
+    if (known != VoxelVolume::kNone && volume_.header(known).isWhollyFree()) continue;
+    const std::uint32_t slot = volume_.obtain(index);
+    if (slot == VoxelVolume::kNone) continue;
+    VoxelBlock& to = volume_.changeVoxels(slot);
+    bool any = false;
+    fill(index, [&](std::size_t at, const Sample& sample) {
+      if (to.weight[at] > 0) return;
+      to.distance[at] = rounded(sample.distance);
+      to.weight[at] = kHintWeight;
+      to.grey[at] = block.voxels.grey[sample.at];
+      any = true;
+    });
+    if (!any) continue;
+    volume_.changeHeader(slot).hinted = true;
+    finish(slot);
+  }
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,219 @@
+#include "mapping/map/map_submaps.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace swiftlet {
+namespace {
+
+/// Of a voxel: what images of one block may disagree by, and a block be out of place.
+constexpr double kMixedVoxels = 0.1;
+constexpr double kOutOfPlaceVoxels = 0.5;
+/// Blocks come back each time that the vehicle has gone so far [m].
+constexpr double kPassStep = 1;
+/// Records looked at in one step: 1 ms.
+constexpr std::size_t kMostRecords = std::size_t{1} << 16U;
+/// A block reaches so many blocks from the one that its centre is in, turned by any angle; the surface of a
+/// tile takes one more on each side.
+constexpr int kBlockReach = 1, kTileMargin = 1;
+
+struct InTile {
+  std::uint64_t tile = 0;  ///< its key
+  SubmapId submap = 0;     ///< first to last
+  std::uint32_t record = 0;
+  auto operator<=>(const InTile&) const = default;
+};
+
+BlockIndex blockAt(const Eigen::Vector3d& p_map, double block_size) {
+  const Eigen::Vector3d b = (p_map / block_size).array().floor();
+  return {static_cast<std::int32_t>(b.x()), static_cast<std::int32_t>(b.y()),
+          static_cast<std::int32_t>(b.z())};
+}
+
+BlockIndex tileOf(const BlockIndex& block) {
+  const auto along = [](std::int32_t b) {
+    return static_cast<std::int32_t>(std::floor(static_cast<double>(b) / MapSubmaps::kTileSide));
+  };
+  return {along(block.x), along(block.y), along(block.z)};
+}
+
+BlockIndex moved(const BlockIndex& block, int by) { return block + BlockIndex{by, by, by}; }
+
+}  // namespace
+
+MapSubmaps::MapSubmaps(VoxelVolume& volume, BlockStorage* storage, MapPoses poses,
+                       const Eigen::Vector3d& half_box)
+    : volume_(volume),
+      submaps_(poses, kMixedVoxels * volume.settings().voxel_size),
+      stored_(volume.settings(), storage,
+              [this](SubmapId a, SubmapId b, const BlockIndex& block) { return agree(a, b, block); }),
+      hints_(volume),
+      half_box_(half_box) {
+  leaving_.reserve(volume.slots());
+  shown_.reserve(Submaps::kMost);
+  moved_.reserve(Submaps::kMost);
+  static_cast<void>(volume.addListener(this));
+}
+
+std::size_t MapSubmaps::bytes() const {
+  return sizeof(*this) + submaps_.bytes() + stored_.bytes() + leaving_.capacity() * sizeof(std::uint32_t) +
+         Submaps::kMost * (sizeof(SE3) + 1);
+}
+
+Eigen::Vector3d MapSubmaps::placeOf(const StoredBlocks::Record& record) const {
+  const Submap& submap = submaps_[record.submap];
+  const Eigen::Vector3d centre = volume_.centreOf(record.index).cast<double>();
+  return submap.hasMoved() ? submap.motion() * centre : centre;
+}
+
+void MapSubmaps::follow(const Submap& image) {
+  if (submaps_.follow(image)) {
+    volume_.beginSubmap(submaps_.newest(), submaps_.staleBefore(), submaps_.outdated());
+    shown_.push_back(image.T_map_world);
+  }
+  const Eigen::Vector3d p_map_vehicle = image.T_map_world * image.T_world_body.translation;
+  if ((p_map_vehicle - p_map_pass_).norm() <= kPassStep) return;
+  p_map_pass_ = p_map_vehicle;
+  cursor_ = 0;
+}
+
+void MapSubmaps::correct(std::span<const WorldInMap> worlds) {
+  if (!submaps_.correct(worlds)) return;
+  leaving_.clear();
+  const double most = kOutOfPlaceVoxels * volume_.settings().voxel_size;
+  for (std::uint32_t slot = 0; slot < volume_.slots(); ++slot) {
+    const BlockHeader& header = volume_.header(slot);
+    if (header.state == BlockState::kUnused || !submaps_[header.submap].hasMoved()) continue;
+    const Eigen::Vector3d centre = volume_.centreOf(header.index).cast<double>();
+    if ((submaps_[header.submap].motion() * centre - centre).norm() > most) leaving_.push_back(slot);
+  }
+  counters_.blocks_moved += leaving_.size();
+  volume_.remove(leaving_);
+  // What has come back to another place comes back once more.
+  moved_.assign(submaps_.size(), 0);
+  bool any = false;
+  for (std::size_t i = 0; i < submaps_.size(); ++i) {
+    if (Submaps::shift(submaps_[i], shown_[i]) <= most) continue;
+    shown_[i] = submaps_[i].T_map_world;
+    moved_[i] = 1;
+    any = true;
+  }
+  if (!any && leaving_.empty()) return;
+  ++counters_.corrections;
+  for (std::size_t i = 0; i < stored_.size(); ++i) {
+    if (moved_[stored_[i].submap] != 0) stored_.setShown(i, false);
+  }
+  cursor_ = 0;
+}
+
+/// Whether two submaps lie to each other at a block as when they were fused.
+bool MapSubmaps::agree(SubmapId a, SubmapId b, const BlockIndex& block) const {
+  if (submaps_[a].epoch != submaps_[b].epoch) return false;
+  if (!submaps_[a].hasMoved() && !submaps_[b].hasMoved()) return true;
+  const Eigen::Vector3d centre = volume_.centreOf(block).cast<double>();
+  return (submaps_[a].motion() * centre - submaps_[b].motion() * centre).norm() <=
+         kMixedVoxels * volume_.settings().voxel_size;
+}
+
+void MapSubmaps::step(const Eigen::Vector3d& p_map_vehicle, const CorrectionEffort& effort,
+                      CorrectionStep& out) {
+  out = {};
+  volume_.beginChange();
+  const std::size_t end = std::min(cursor_ + kMostRecords, stored_.size());
+  for (; cursor_ < end && out.blocks < effort.blocks; ++cursor_) {
+    const StoredBlocks::Record& record = stored_[cursor_];
+    const Eigen::Vector3d centre = placeOf(record);
+    const Eigen::Array3d away = (centre - p_map_vehicle).array().abs() - half_box_.array();
+    if ((away > half_box_.array()).any()) stored_.setShown(cursor_, false);
+    if ((away > 0).any() || record.shown || record.is_free) continue;
+    stored_.setShown(cursor_, true);
+    if (!stored_.read(cursor_, scratch_)) continue;
+    hints_.hint(scratch_, submaps_[record.submap].motion(), p_map_vehicle.cast<float>());
+    ++out.blocks;
+  }
+  counters_.blocks_back += out.blocks;
+  out.done = !busy();
+}
+
+void MapSubmaps::beforeRemoval(const VoxelVolume& volume, std::span<const std::uint32_t> slots) {
+  for (const std::uint32_t slot : slots) stored_.put(volume, slot);
+}
+
+void MapSubmaps::beforeRenewal(const VoxelVolume& volume, std::uint32_t slot) {
+  const std::size_t before = stored_.size();
+  stored_.put(volume, slot);
+  // It stays where it is, as a hint.
+  if (stored_.size() > before) stored_.setShown(before, true);
+}
+
+void MapSubmaps::take(const BlockIndex& index, const VoxelBlock& voxels, const LabelBlock* labels) {
+  ++counters_.blocks_apart;
+  scratch_.index = index;
+  scratch_.submap = submaps_.newest();
+  scratch_.free_parts = 0;
+  scratch_.voxels = voxels;
+  scratch_.has_labels =
+      labels != nullptr && !std::ranges::all_of(labels->counts, [](const auto& c) { return c.empty(); });
+  if (scratch_.has_labels) scratch_.labels = *labels;
+  stored_.put(scratch_);
+}
+
+void MapSubmaps::storeAll() {
+  for (std::uint32_t slot = 0; slot < volume_.slots(); ++slot) stored_.put(volume_, slot);
+}
+
+void MapSubmaps::visitWhole(
+    const std::function<bool(const Submap&)>& wanted,
+    const std::function<void(const VoxelVolume&, std::span<const std::uint32_t> slots)>& take) {
+  const double block_size = volume_.settings().voxel_size * kBlockSide;
+  std::vector<InTile> parts;
+  for (std::uint32_t i = 0; i < stored_.size(); ++i) {
+    if (!wanted(submaps_[stored_[i].submap])) continue;
+    const BlockIndex at = blockAt(placeOf(stored_[i]), block_size);
+    const BlockIndex low = tileOf(moved(at, -kBlockReach - kTileMargin));
+    const BlockIndex high = tileOf(moved(at, kBlockReach + kTileMargin));
+    for (std::int32_t z = low.z; z <= high.z; ++z) {
+      for (std::int32_t y = low.y; y <= high.y; ++y) {
+        for (std::int32_t x = low.x; x <= high.x; ++x)
+          parts.push_back({keyOf({x, y, z}), stored_[i].submap, i});
+      }
+    }
+  }
+  if (parts.empty()) return;
+  std::sort(parts.begin(), parts.end());
+  VolumeSettings settings = volume_.settings();
+  constexpr std::size_t kSide = kTileSide + 2 * kTileMargin;
+  settings.memory_bytes = VoxelVolume::bytesFor(kSide * kSide * kSide, settings.labels);
+  VoxelVolume tile(settings);
+  BlockBlend blend(tile);
+  std::vector<std::uint32_t> slots;
+  for (auto part = parts.begin(); part != parts.end();) {
+    const BlockIndex index = indexFrom(part->tile);
+    const BlockIndex low{kTileSide * index.x, kTileSide * index.y, kTileSide * index.z};
+    const BlockRange inner{low, moved(low, kTileSide - 1)};
+    const BlockRange outer{moved(inner.low, -kTileMargin), moved(inner.high, kTileMargin)};
+    tile.clear();
+    tile.beginChange();
+    const auto end = std::find_if(part, parts.end(), [&](const InTile& p) { return p.tile != part->tile; });
+    for (auto p = part; p != end; ++p) {
+      if (stored_.read(p->record, scratch_)) blend.add(scratch_, submaps_[p->submap].motion(), outer);
+    }
+    // What is known to be free bounds surface as voxels do.
+    for (; part != end; ++part) {
+      const StoredBlocks::Record& record = stored_[part->record];
+      if (record.is_free && !submaps_[record.submap].hasMoved() && outer.holds(record.index) &&
+          tile.find(record.index) == VoxelVolume::kNone) {
+        tile.addFree(record.index, record.offset, {});
+      }
+    }
+    slots.clear();
+    for (std::uint32_t slot = 0; slot < tile.slots(); ++slot) {
+      const BlockHeader& header = tile.header(slot);
+      if (header.state != BlockState::kUnused && inner.holds(header.index)) slots.push_back(slot);
+    }
+    take(tile, slots);
+  }
+}
+
+}  // namespace swiftlet

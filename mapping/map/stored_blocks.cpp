@@ -1,0 +1,165 @@
+#include "mapping/map/stored_blocks.hpp"
+
+#include <algorithm>
+
+namespace swiftlet {
+namespace {
+
+/// A place may be known as free and, in another submap, by voxels. The top bit of a block's key is always
+/// set.
+std::uint64_t placeKey(const BlockIndex& index, bool is_free) {
+  return keyOf(index) ^ (is_free ? std::uint64_t{1} << 63U : 0);
+}
+
+/// Of the truncation distance: as good as all of it.
+constexpr float kFreeShare = 0.98F;
+/// Of the earlier weight: what says otherwise later counts with this and more. A mismatch has less.
+constexpr float kLaterCounts = 0.25F;
+
+/// Behind a surface, and free up to the truncation distance.
+bool contradict(float a, float b) {
+  return (a < 0 && b >= kFreeShare * kDistanceSteps) || (b < 0 && a >= kFreeShare * kDistanceSteps);
+}
+
+}  // namespace
+
+bool addVoxel(const VoxelBlock& from, std::size_t at, float distance, float most_weight, VoxelBlock& to,
+              std::size_t to_at) {
+  const bool replaces =
+      static_cast<float>(from.weight[at]) >= kLaterCounts * static_cast<float>(to.weight[to_at]) &&
+      to.weight[to_at] > 0 && contradict(static_cast<float>(to.distance[to_at]), distance);
+  if (replaces) {
+    to.weight[to_at] = 0;
+    to.grey[to_at] = 0;
+  }
+  const auto own = static_cast<float>(to.weight[to_at]), other = static_cast<float>(from.weight[at]);
+  const float sum = own + other;
+  const float mean = std::clamp((own * static_cast<float>(to.distance[to_at]) + other * distance) / sum,
+                                -kDistanceSteps, kDistanceSteps);
+  const auto whole = static_cast<int>(mean + (mean < 0 ? -0.5F : 0.5F));
+  // What is behind by less than half a step stays behind.
+  to.distance[to_at] = static_cast<std::int16_t>(mean < 0 && whole == 0 ? -1 : whole);
+  to.weight[to_at] = static_cast<std::uint16_t>(std::min(sum, most_weight * kWeightSteps));
+  // What is free has no grey value.
+  const std::uint8_t grey = from.grey[at];
+  if (grey > 0 && to.grey[to_at] > 0) {
+    to.grey[to_at] = static_cast<std::uint8_t>((own * to.grey[to_at] + other * grey) / sum + 0.5F);
+  } else {
+    to.grey[to_at] = std::max(to.grey[to_at], grey);
+  }
+  return replaces;
+}
+
+StoredBlocks::StoredBlocks(const VolumeSettings& settings, BlockStorage* storage, Agree agree)
+    : most_weight_(static_cast<float>(settings.most_weight)),
+      storage_(storage),
+      agree_(std::move(agree)),
+      newest_(storage != nullptr ? kMost : 1) {
+  if (storage != nullptr) records_.reserve(kMost);
+}
+
+/// Of the place's newest record of this kind, where it may take more; else null.
+StoredBlocks::Record* StoredBlocks::agreeing(const BlockIndex& index, SubmapId submap, bool is_free) {
+  const std::uint32_t at = newest_.find(placeKey(index, is_free));
+  if (at == BlockHash::kNone || !agree_(records_[at].submap, submap, index)) return nullptr;
+  return &records_[at];
+}
+
+StoredBlocks::Record* StoredBlocks::add(const Record& record) {
+  if (records_.size() == records_.capacity()) return nullptr;
+  const std::uint64_t key = placeKey(record.index, record.is_free);
+  static_cast<void>(newest_.erase(key));
+  // Where the table has no place nearby, the next block of the place is a record of its own.
+  static_cast<void>(newest_.insert(key, static_cast<std::uint32_t>(records_.size())));
+  records_.push_back(record);
+  return &records_.back();
+}
+
+void StoredBlocks::putFree(const BlockIndex& index, SubmapId submap, std::uint64_t parts) {
+  if (Record* const record = agreeing(index, submap, true); record != nullptr) {
+    record->offset |= parts;
+    record->submap = submap;
+  } else if (add({index, submap, true, false, false, parts}) == nullptr) {
+    ++lost_;
+  }
+}
+
+void StoredBlocks::put(const VoxelVolume& volume, std::uint32_t slot) {
+  const BlockHeader& header = volume.header(slot);
+  const VoxelBlock* const voxels = volume.voxels(slot);
+  if (header.state == BlockState::kFree) putFree(header.index, header.submap, header.free_parts);
+  if (voxels == nullptr || !header.observed) return;
+  StoredBlock& block = scratch_;
+  block.free_parts = 0;
+  block.index = header.index;
+  block.submap = header.submap;
+  block.voxels = *voxels;
+  if (header.hinted) {
+    for (std::uint16_t& weight : block.voxels.weight) weight = weight <= kHintWeight ? 0 : weight;
+  }
+  const LabelBlock* const labels = volume.labels(slot);
+  block.has_labels =
+      labels != nullptr && !std::ranges::all_of(labels->counts, [](const auto& c) { return c.empty(); });
+  if (block.has_labels) block.labels = *labels;
+  put(block);
+}
+
+void StoredBlocks::put(const StoredBlock& block) {
+  if (block.free_parts != 0) {
+    putFree(block.index, block.submap, block.free_parts);
+    return;
+  }
+  if (std::ranges::all_of(block.voxels.weight, [](std::uint16_t weight) { return weight == 0; })) return;
+  if (Record* const record = agreeing(block.index, block.submap, false); record != nullptr) {
+    lost_ += merge(*record, block) ? 0 : 1;
+    return;
+  }
+  Record* const record = add({block.index, block.submap, false, false, false, end_});
+  if (record != nullptr && write(*record, block)) return;
+  ++lost_;
+  if (record == nullptr) return;
+  static_cast<void>(newest_.erase(placeKey(block.index, false)));
+  records_.pop_back();
+}
+
+bool StoredBlocks::merge(Record& record, const StoredBlock& block) {
+  if (!read(record, merged_)) return false;
+  if (!merged_.has_labels) merged_.labels.counts.fill({});
+  merged_.has_labels = merged_.has_labels || block.has_labels;
+  for (std::size_t at = 0; at < kBlockVoxels; ++at) {
+    if (block.voxels.weight[at] == 0) continue;
+    if (addVoxel(block.voxels, at, static_cast<float>(block.voxels.distance[at]), most_weight_,
+                 merged_.voxels, at)) {
+      merged_.labels.counts[at] = {};
+    }
+    if (block.has_labels) merged_.labels.counts[at].add(block.labels.counts[at]);
+  }
+  // What it is now was seen last by the later.
+  record.submap = block.submap;
+  return write(record, merged_);
+}
+
+/// In its place, or behind all others where it is new or has become longer.
+bool StoredBlocks::write(Record& record, const StoredBlock& block) {
+  if (record.offset == end_ || record.has_labels != block.has_labels) {
+    record.offset = end_;
+    record.has_labels = block.has_labels;
+    end_ += sizeof(VoxelBlock) + (block.has_labels ? sizeof(LabelBlock) : 0);
+  }
+  return storage_->write(record.offset, std::as_bytes(std::span(&block.voxels, 1))) &&
+         (!block.has_labels ||
+          storage_->write(record.offset + sizeof(VoxelBlock), std::as_bytes(std::span(&block.labels, 1))));
+}
+
+bool StoredBlocks::read(const Record& record, StoredBlock& out) {
+  out.index = record.index;
+  out.submap = record.submap;
+  out.has_labels = record.has_labels;
+  out.free_parts = record.is_free ? record.offset : 0;
+  if (record.is_free) return true;
+  return storage_->read(record.offset, std::as_writable_bytes(std::span(&out.voxels, 1))) &&
+         (!record.has_labels || storage_->read(record.offset + sizeof(VoxelBlock),
+                                               std::as_writable_bytes(std::span(&out.labels, 1))));
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,99 @@
+#include "mapping/map/submaps.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace swiftlet {
+namespace {
+
+/// Loops spread what they correct over the flight since: of 30 cm over a minute 1 cm within this.
+constexpr double kSubmapSeconds = 2;
+/// What was not seen for as long is seen with the drift of the way between. A turn of the head is shorter.
+constexpr double kStaleSeconds = 10;
+/// By how far a turn moves what was seen [m/rad].
+constexpr double kSubmapArm = 3;
+
+/// What a body's images show lies so far apart with the one and the other.
+double shiftOf(const SE3& T_map_world_a, const SE3& T_map_world_b, const SE3& T_world_body) {
+  const SE3 a = T_map_world_a * T_world_body, b = T_map_world_b * T_world_body;
+  return (a.translation - b.translation).norm() + kSubmapArm * a.rotation.angularDistance(b.rotation);
+}
+
+static_assert(Submaps::kMost <= std::size_t{std::numeric_limits<SubmapId>::max()} + 1);
+
+/// Where the world of a frame of `epoch` lies, from the keyframes before and after it; false: none is of that
+/// epoch.
+bool worldOf(const Submap& submap, std::span<const WorldInMap> worlds, SE3& T_map_world) {
+  const auto after = std::ranges::lower_bound(worlds, submap.frame, {}, &WorldInMap::frame);
+  const bool has_after = after != worlds.end() && after->epoch == submap.epoch;
+  const bool has_before = after != worlds.begin() && std::prev(after)->epoch == submap.epoch;
+  if (!has_after && !has_before) return false;
+  if (has_after && after->frame == submap.frame) {
+    // It was fused from where the odometry had it first; the smoother has moved it within its world since.
+    T_map_world = after->T_map_body * submap.T_world_body.inverse();
+    return true;
+  }
+  T_map_world = (has_before ? *std::prev(after) : *after).T_map_world();
+  if (!has_before || !has_after) return true;
+  const WorldInMap& before = *std::prev(after);
+  const double part =
+      static_cast<double>(submap.frame - before.frame) / static_cast<double>(after->frame - before.frame);
+  // The map moves the bodies, not the far origin of the world: a body's place is interpolated, lest a turn
+  // about that origin be taken for a shift.
+  const SE3 a = before.T_map_world() * submap.T_world_body, b = after->T_map_world() * submap.T_world_body;
+  SE3 body;
+  body.rotation = a.rotation.slerp(part, b.rotation);
+  body.translation = (1 - part) * a.translation + part * b.translation;
+  T_map_world = body * submap.T_world_body.inverse();
+  return true;
+}
+
+}  // namespace
+
+Submaps::Submaps(MapPoses poses, double tolerance) : poses_(poses), tolerance_(tolerance) {
+  submaps_.reserve(kMost);
+  outdated_.resize(kMost);
+}
+
+std::size_t Submaps::bytes() const {
+  return sizeof(*this) + submaps_.capacity() * sizeof(Submap) + outdated_.size();
+}
+
+double Submaps::shift(const Submap& submap, const SE3& T_map_world) {
+  return shiftOf(submap.T_map_world, T_map_world, submap.T_world_body);
+}
+
+bool Submaps::isDue(const Submap& image) const {
+  if (submaps_.empty()) return true;
+  const Submap& last = submaps_.back();
+  if (last.epoch != image.epoch) return true;
+  if (poses_ == MapPoses::kGiven) return false;
+  return outdated_[newest()] != 0 || (image.stamp - last.stamp).seconds() >= kSubmapSeconds ||
+         shiftOf(image.T_map_world, last.T_map_world_fused, image.T_world_body) > tolerance_;
+}
+
+bool Submaps::follow(const Submap& image) {
+  if (!isDue(image) || submaps_.size() == kMost) return false;
+  submaps_.push_back(image);
+  while (poses_ == MapPoses::kEstimated && stale_before_ < newest() &&
+         (image.stamp - submaps_[stale_before_].stamp).seconds() > kStaleSeconds) {
+    ++stale_before_;
+  }
+  return true;
+}
+
+bool Submaps::correct(std::span<const WorldInMap> worlds) {
+  bool any = false;
+  for (std::size_t i = 0; i < submaps_.size(); ++i) {
+    Submap& submap = submaps_[i];
+    SE3 T_map_world;
+    if (!worldOf(submap, worlds, T_map_world)) continue;
+    any = any || shift(submap, T_map_world) > 0;
+    submap.T_map_world = T_map_world;
+    outdated_[i] = shift(submap, submap.T_map_world_fused) > tolerance_ ? 1 : 0;
+  }
+  return any;
+}
+
+}  // namespace swiftlet
