@@ -57,13 +57,13 @@ void BlockBlend::place(const StoredBlock& block, const SE3& motion) {
       motion.R() * (firstOf(block.index) + Eigen::Vector3d::Constant(0.5 * kBlockSide)) +
       motion.translation / voxel;
   const Eigen::Vector3d extent = 0.5 * kBlockSide * motion.R().cwiseAbs().rowwise().sum();
-  const auto blockAt = [](const Eigen::Vector3d& voxels) {
+  const auto block_at = [](const Eigen::Vector3d& voxels) {
     const Eigen::Vector3d b = (voxels / kBlockSide).array().floor();
     return BlockIndex{static_cast<std::int32_t>(b.x()), static_cast<std::int32_t>(b.y()),
                       static_cast<std::int32_t>(b.z())};
   };
   // Half a voxel less: a centre has to fall in.
-  box_ = {blockAt(centre - extent + half), blockAt(centre + extent - half)};
+  box_ = {block_at(centre - extent + half), block_at(centre + extent - half)};
 }
 
 bool BlockBlend::fallsIn(const VoxelIndex& voxel, std::size_t& at, Eigen::Vector3f& rest) const {

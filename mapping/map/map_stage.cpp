@@ -210,7 +210,6 @@ void MapStage::visitSurface(SurfaceSink& sink) {
 }
 
 VoxelVolume MapStage::wholeVolume(const std::function<bool(std::uint32_t epoch)>& wanted) {
-  if (!std::exchange(all_stored_, true)) submaps_.storeAll();
   const auto visit = [&](const auto& take) {
     submaps_.visitWhole([&](const Submap& submap) { return wanted(submap.epoch); }, take);
   };
@@ -230,7 +229,6 @@ VoxelVolume MapStage::wholeVolume(const std::function<bool(std::uint32_t epoch)>
 }
 
 void MapStage::visitWholeSurface(const std::function<bool(std::uint32_t epoch)>& wanted, SurfaceSink& sink) {
-  if (!std::exchange(all_stored_, true)) submaps_.storeAll();
   const VoxelVolume* drawn = nullptr;
   std::optional<BlockSurface> surface;
   submaps_.visitWhole([&](const Submap& submap) { return wanted(submap.epoch); },

@@ -106,7 +106,7 @@ class MapStage {
   /// Draws all that waits: work without a bound, for the end of a run.
   void drawRest();
   /// The surface of all that was ever mapped in epochs for which `wanted` holds, where it belongs by now; of
-  /// the volume alone where there is no storage. Once, at the end of a run: the volume's blocks are stored.
+  /// the volume alone where there is no storage. Work without a bound, for the end of a run.
   void visitWholeSurface(const std::function<bool(std::uint32_t epoch)>& wanted, SurfaceSink& sink);
   /// The map of `wanted` epochs, all in one volume and as much memory as it takes; else as
   /// visitWholeSurface().
@@ -174,7 +174,6 @@ class MapStage {
   VolumeDistance volume_distance_;
   SurfacePatch patch_, moved_patch_;
   std::uint32_t epoch_ = 0;
-  bool all_stored_ = false;
   Eigen::Vector3d vehicle_ = Eigen::Vector3d::Zero();  ///< last
   Stamp newest_;                                       ///< image in the volume
   MapCounters counters_;

@@ -21,7 +21,8 @@ constexpr int kBlockReach = 1, kTileMargin = 1;
 struct InTile {
   std::uint64_t tile = 0;  ///< its key
   SubmapId submap = 0;     ///< first to last
-  std::uint32_t record = 0;
+  bool in_volume = false;
+  std::uint32_t at = 0;  ///< slot, or record
   auto operator<=>(const InTile&) const = default;
 };
 
@@ -61,9 +62,9 @@ std::size_t MapSubmaps::bytes() const {
          Submaps::kMost * (sizeof(SE3) + 1);
 }
 
-Eigen::Vector3d MapSubmaps::placeOf(const StoredBlocks::Record& record) const {
-  const Submap& submap = submaps_[record.submap];
-  const Eigen::Vector3d centre = volume_.centreOf(record.index).cast<double>();
+Eigen::Vector3d MapSubmaps::placeOf(const BlockIndex& block, SubmapId id) const {
+  const Submap& submap = submaps_[id];
+  const Eigen::Vector3d centre = volume_.centreOf(block).cast<double>();
   return submap.hasMoved() ? submap.motion() * centre : centre;
 }
 
@@ -123,7 +124,7 @@ void MapSubmaps::step(const Eigen::Vector3d& p_map_vehicle, const CorrectionEffo
   const std::size_t end = std::min(cursor_ + kMostRecords, stored_.size());
   for (; cursor_ < end && out.blocks < effort.blocks; ++cursor_) {
     const StoredBlocks::Record& record = stored_[cursor_];
-    const Eigen::Vector3d centre = placeOf(record);
+    const Eigen::Vector3d centre = placeOf(record.index, record.submap);
     const Eigen::Array3d away = (centre - p_map_vehicle).array().abs() - half_box_.array();
     if ((away > half_box_.array()).any()) stored_.setShown(cursor_, false);
     if ((away > 0).any() || record.shown || record.is_free) continue;
@@ -168,17 +169,22 @@ void MapSubmaps::visitWhole(
     const std::function<void(const VoxelVolume&, std::span<const std::uint32_t> slots)>& take) {
   const double block_size = volume_.settings().voxel_size * kBlockSide;
   std::vector<InTile> parts;
-  for (std::uint32_t i = 0; i < stored_.size(); ++i) {
-    if (!wanted(submaps_[stored_[i].submap])) continue;
-    const BlockIndex at = blockAt(placeOf(stored_[i]), block_size);
+  const auto list = [&](const BlockIndex& block, SubmapId submap, bool in_volume, std::uint32_t number) {
+    if (!wanted(submaps_[submap])) return;
+    const BlockIndex at = blockAt(placeOf(block, submap), block_size);
     const BlockIndex low = tileOf(moved(at, -kBlockReach - kTileMargin));
     const BlockIndex high = tileOf(moved(at, kBlockReach + kTileMargin));
     for (std::int32_t z = low.z; z <= high.z; ++z) {
       for (std::int32_t y = low.y; y <= high.y; ++y) {
         for (std::int32_t x = low.x; x <= high.x; ++x)
-          parts.push_back({keyOf({x, y, z}), stored_[i].submap, i});
+          parts.push_back({keyOf({x, y, z}), submap, in_volume, number});
       }
     }
+  };
+  for (std::uint32_t i = 0; i < stored_.size(); ++i) list(stored_[i].index, stored_[i].submap, false, i);
+  for (std::uint32_t slot = 0; slot < volume_.slots(); ++slot) {
+    const BlockHeader& header = volume_.header(slot);
+    if (header.state != BlockState::kUnused) list(header.index, header.submap, true, slot);
   }
   if (parts.empty()) return;
   std::sort(parts.begin(), parts.end());
@@ -196,15 +202,22 @@ void MapSubmaps::visitWhole(
     tile.clear();
     tile.beginChange();
     const auto end = std::find_if(part, parts.end(), [&](const InTile& p) { return p.tile != part->tile; });
+    const auto read = [this](const InTile& p) {
+      return p.in_volume ? StoredBlocks::gather(volume_, p.at, scratch_) : stored_.read(p.at, scratch_);
+    };
     for (auto p = part; p != end; ++p) {
-      if (stored_.read(p->record, scratch_)) blend.add(scratch_, submaps_[p->submap].motion(), outer);
+      if (read(*p)) blend.add(scratch_, submaps_[p->submap].motion(), outer);
     }
     // What is known to be free bounds surface as voxels do.
     for (; part != end; ++part) {
-      const StoredBlocks::Record& record = stored_[part->record];
-      if (record.is_free && !submaps_[record.submap].hasMoved() && outer.holds(record.index) &&
-          tile.find(record.index) == VoxelVolume::kNone) {
-        tile.addFree(record.index, record.offset, {});
+      if ((part->in_volume ? volume_.header(part->at).state != BlockState::kFree
+                           : !stored_[part->at].is_free) ||
+          !read(*part)) {
+        continue;
+      }
+      if (!submaps_[part->submap].hasMoved() && outer.holds(scratch_.index) &&
+          tile.find(scratch_.index) == VoxelVolume::kNone) {
+        tile.addFree(scratch_.index, scratch_.free_parts, {});
       }
     }
     slots.clear();

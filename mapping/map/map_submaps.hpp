@@ -65,7 +65,7 @@ class MapSubmaps : public BlockListener, public BlockOverflow {
   void beforeRemoval(const VoxelVolume& volume, std::span<const std::uint32_t> slots) override;
   void beforeRenewal(const VoxelVolume& volume, std::uint32_t slot) override;
   void take(const BlockIndex& index, const VoxelBlock& voxels, const LabelBlock* labels) override;
-  /// All of the volume's blocks are stored too, once.
+  /// All of the volume's blocks are stored too: an epoch is over.
   void storeAll();
   /// A block of a kept map, into the newest submap, for which the volume has no room.
   void store(StoredBlock& block) {
@@ -73,9 +73,9 @@ class MapSubmaps : public BlockListener, public BlockOverflow {
     stored_.put(block);
   }
 
-  /// Gives the blocks of the submaps for which `wanted` holds, those of the volume stored before
-  /// (storeAll()), as a volume holds them, tile by tile: slots of blocks whose neighbours are there too.
-  /// Memory and cost without a bound on the flight's: for the end of a run.
+  /// Gives the blocks of the submaps for which `wanted` holds, stored ones and the volume's, as a volume
+  /// holds them, tile by tile: slots of blocks whose neighbours are there too. Memory and cost without a
+  /// bound on the flight's: for the end of a run.
   void visitWhole(const std::function<bool(const Submap&)>& wanted,
                   const std::function<void(const VoxelVolume&, std::span<const std::uint32_t> slots)>& take);
 
@@ -86,7 +86,7 @@ class MapSubmaps : public BlockListener, public BlockOverflow {
 
  private:
   [[nodiscard]] bool agree(SubmapId a, SubmapId b, const BlockIndex& block) const;
-  [[nodiscard]] Eigen::Vector3d placeOf(const StoredBlocks::Record& record) const;
+  [[nodiscard]] Eigen::Vector3d placeOf(const BlockIndex& block, SubmapId id) const;
 
   VoxelVolume& volume_;
   Submaps submaps_;

@@ -1,6 +1,7 @@
 #include "mapping/map/stored_blocks.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace swiftlet {
 namespace {
@@ -43,7 +44,7 @@ bool addVoxel(const VoxelBlock& from, std::size_t at, float distance, float most
   // What is free has no grey value.
   const std::uint8_t grey = from.grey[at];
   if (grey > 0 && to.grey[to_at] > 0) {
-    to.grey[to_at] = static_cast<std::uint8_t>((own * to.grey[to_at] + other * grey) / sum + 0.5F);
+    to.grey[to_at] = static_cast<std::uint8_t>(std::lround((own * to.grey[to_at] + other * grey) / sum));
   } else {
     to.grey[to_at] = std::max(to.grey[to_at], grey);
   }
@@ -84,24 +85,23 @@ void StoredBlocks::putFree(const BlockIndex& index, SubmapId submap, std::uint64
   }
 }
 
-void StoredBlocks::put(const VoxelVolume& volume, std::uint32_t slot) {
+bool StoredBlocks::gather(const VoxelVolume& volume, std::uint32_t slot, StoredBlock& out) {
   const BlockHeader& header = volume.header(slot);
+  out.index = header.index;
+  out.submap = header.submap;
+  out.free_parts = header.state == BlockState::kFree ? header.free_parts : 0;
+  out.has_labels = false;
   const VoxelBlock* const voxels = volume.voxels(slot);
-  if (header.state == BlockState::kFree) putFree(header.index, header.submap, header.free_parts);
-  if (voxels == nullptr || !header.observed) return;
-  StoredBlock& block = scratch_;
-  block.free_parts = 0;
-  block.index = header.index;
-  block.submap = header.submap;
-  block.voxels = *voxels;
+  if (voxels == nullptr || !header.observed) return out.free_parts != 0;
+  out.voxels = *voxels;
   if (header.hinted) {
-    for (std::uint16_t& weight : block.voxels.weight) weight = weight <= kHintWeight ? 0 : weight;
+    for (std::uint16_t& weight : out.voxels.weight) weight = weight <= kHintWeight ? 0 : weight;
   }
   const LabelBlock* const labels = volume.labels(slot);
-  block.has_labels =
+  out.has_labels =
       labels != nullptr && !std::ranges::all_of(labels->counts, [](const auto& c) { return c.empty(); });
-  if (block.has_labels) block.labels = *labels;
-  put(block);
+  if (out.has_labels) out.labels = *labels;
+  return true;
 }
 
 void StoredBlocks::put(const StoredBlock& block) {

@@ -62,11 +62,14 @@ class StoredBlocks {
   /// `storage` may be null: every block is lost. It outlives the use.
   StoredBlocks(const VolumeSettings& settings, BlockStorage* storage, Agree agree);
 
-  /// What images showed of the slot's block; nothing where that is nothing. Into the newest record of the
-  /// place where both agree: a place that is seen again and again takes no more room.
-  void put(const VoxelVolume& volume, std::uint32_t slot);
-  /// One that no volume has held.
+  /// What images showed of the slot's block, without hints; false where that is nothing.
+  static bool gather(const VoxelVolume& volume, std::uint32_t slot, StoredBlock& out);
+  /// Into the newest record of the place where both agree: a place that is seen again and again takes no more
+  /// room.
   void put(const StoredBlock& block);
+  void put(const VoxelVolume& volume, std::uint32_t slot) {
+    if (gather(volume, slot, scratch_)) put(scratch_);
+  }
   /// False where it cannot be read.
   bool read(std::size_t i, StoredBlock& out) { return read(records_[i], out); }
 

@@ -204,7 +204,8 @@ TEST_CASE("a new epoch is a world of its own; the surface of the old is drawn ap
   CHECK(both.triangles > before * 3 / 2);
 }
 
-TEST_CASE("the whole surface of a map that nothing moved is that of its volume, bit by bit") {
+TEST_CASE(
+    "the whole surface of a map that nothing moved is that of its volume, bit by bit, without storage too") {
   struct Patches : SurfaceSink {
     void take(const SurfacePatch& patch) override {
       for (const SurfaceVertex& v : patch.vertices) {
@@ -216,8 +217,7 @@ TEST_CASE("the whole surface of a map that nothing moved is that of its volume, 
     std::vector<std::array<float, 5>> vertices;
   } drawn, whole;
   Wall wall;
-  MemoryStorage storage;
-  MapStage map(wall.rig, smallSettings(), &wall.sensor, &storage);
+  MapStage map(wall.rig, smallSettings(), &wall.sensor);
   MapReport report;
   for (int i = 0; i < 5; ++i) REQUIRE(map.step(wall.at(i), {}, report).ok());
   map.drawRest();
