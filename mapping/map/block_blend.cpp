@@ -15,13 +15,6 @@ Eigen::Vector3d firstOf(const BlockIndex& block) {
   return kBlockSide * Eigen::Vector3d(block.x, block.y, block.z);
 }
 
-std::int16_t rounded(float steps) {
-  const float cut = std::clamp(steps, -kDistanceSteps, kDistanceSteps);
-  const auto whole = static_cast<int>(cut + (cut < 0 ? -0.5F : 0.5F));
-  // What is behind by less than half a step stays behind.
-  return static_cast<std::int16_t>(cut < 0 && whole == 0 ? -1 : whole);
-}
-
 VoxelIndex voxelOf(const BlockIndex& block, std::size_t at) {
   const auto along = [at](unsigned axis) {
     return static_cast<std::int32_t>(at >> (kBlockBits * axis)) & kBlockMask;
@@ -170,7 +163,7 @@ void BlockBlend::hint(const StoredBlock& block, const SE3& motion, const Eigen::
     bool any = false;
     fill(index, [&](std::size_t at, const Sample& sample) {
       if (to.weight[at] > 0) return;
-      to.distance[at] = rounded(sample.distance);
+      to.distance[at] = distanceOf(sample.distance);
       to.weight[at] = kHintWeight;
       to.grey[at] = block.voxels.grey[sample.at];
       any = true;

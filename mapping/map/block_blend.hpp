@@ -4,10 +4,10 @@
 // A voxel of the volume whose centre falls into a voxel of the moved block takes that one's distance, carried
 // over the rest of the way by its gradient, with its weight: distances average by weight, as if the images of
 // both had been fused into one block; grey values likewise, label counts add up; what has come or gone is as
-// the later of the two has it (addVoxel()). The block needs no neighbour,
-// and the band around a surface stays as thick as it was. First order: where a surface bends by a radius r,
-// half a voxel of way costs (voxel / 2)^2 / 2 r: 3 mm at 10 cm. A block that has not moved is taken bit by
-// bit. Where memory ends the volume's rule tells who goes (VoxelVolume::makeRoom). Cost: 15 to 40 us a block.
+// the later of the two has it (addVoxel()). The block needs no neighbour, and the band around a surface stays
+// as thick as it was. First order: where a surface bends by a radius r, half a voxel of way costs
+// (voxel / 2)^2 / 2 r: 3 mm at 10 cm. A block that has not moved is taken bit by bit. Where memory ends the
+// volume's rule tells who goes (VoxelVolume::makeRoom). Cost: 15 to 40 us a block.
 
 #include <cstdint>
 #include <vector>

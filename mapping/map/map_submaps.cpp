@@ -1,7 +1,6 @@
 #include "mapping/map/map_submaps.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace swiftlet {
@@ -127,7 +126,7 @@ void MapSubmaps::step(const Eigen::Vector3d& p_map_vehicle, const CorrectionEffo
     const Eigen::Vector3d centre = placeOf(record.index, record.submap);
     const Eigen::Array3d away = (centre - p_map_vehicle).array().abs() - half_box_.array();
     if ((away > half_box_.array()).any()) stored_.setShown(cursor_, false);
-    if ((away > 0).any() || record.shown || record.is_free) continue;
+    if ((away > 0).any() || record.shown || record.is_free || !submaps_.isInMap(record.submap)) continue;
     stored_.setShown(cursor_, true);
     if (!stored_.read(cursor_, scratch_)) continue;
     hints_.hint(scratch_, submaps_[record.submap].motion(), p_map_vehicle.cast<float>());
@@ -154,14 +153,13 @@ void MapSubmaps::take(const BlockIndex& index, const VoxelBlock& voxels, const L
   scratch_.submap = submaps_.newest();
   scratch_.free_parts = 0;
   scratch_.voxels = voxels;
-  scratch_.has_labels =
-      labels != nullptr && !std::ranges::all_of(labels->counts, [](const auto& c) { return c.empty(); });
-  if (scratch_.has_labels) scratch_.labels = *labels;
+  scratch_.setLabels(labels);
   stored_.put(scratch_);
 }
 
 void MapSubmaps::storeAll() {
   for (std::uint32_t slot = 0; slot < volume_.slots(); ++slot) stored_.put(volume_, slot);
+  for (std::size_t i = 0; i < stored_.size(); ++i) stored_.setShown(i, false);
 }
 
 void MapSubmaps::visitWhole(

@@ -4,9 +4,9 @@
 // A block goes to the storage when the volume drops it, when its submap moves by more than half a voxel at
 // the block, or when an image sees it again after a time or after a correction (VoxelVolume::touch): so no
 // block ever mixes images that do not agree. What is stored stays with its submap. Step by step, blocks that
-// lie in the box around the vehicle come back as hints: for the distance field and a depth sensor's surface,
-// until an image says better. visitWhole() lays everything over each other where it belongs by now: the map
-// as if it had been fused from the corrected poses, but for what moved within a submap.
+// lie in the box around the vehicle, and in its frame, come back as hints: for the distance field and a depth
+// sensor's surface, until an image says better. visitWhole() lays everything over each other where it belongs
+// by now: the map as if it had been fused from the corrected poses, but for what moved within a submap.
 //
 // Frames: map, metres. Memory: Submaps, StoredBlocks and 4 bytes a block of the volume, reserved at
 // construction; visitWhole() takes a volume of kTileSide^3 blocks more. Cost: correct(), a pass over the

@@ -24,6 +24,12 @@ bool contradict(float a, float b) {
 
 }  // namespace
 
+void StoredBlock::setLabels(const LabelBlock* seen) {
+  has_labels = seen != nullptr &&
+               !std::ranges::all_of(seen->counts, [](const auto& counts) { return counts.empty(); });
+  if (has_labels) labels = *seen;
+}
+
 bool addVoxel(const VoxelBlock& from, std::size_t at, float distance, float most_weight, VoxelBlock& to,
               std::size_t to_at) {
   const bool replaces =
@@ -35,11 +41,7 @@ bool addVoxel(const VoxelBlock& from, std::size_t at, float distance, float most
   }
   const auto own = static_cast<float>(to.weight[to_at]), other = static_cast<float>(from.weight[at]);
   const float sum = own + other;
-  const float mean = std::clamp((own * static_cast<float>(to.distance[to_at]) + other * distance) / sum,
-                                -kDistanceSteps, kDistanceSteps);
-  const auto whole = static_cast<int>(mean + (mean < 0 ? -0.5F : 0.5F));
-  // What is behind by less than half a step stays behind.
-  to.distance[to_at] = static_cast<std::int16_t>(mean < 0 && whole == 0 ? -1 : whole);
+  to.distance[to_at] = distanceOf((own * static_cast<float>(to.distance[to_at]) + other * distance) / sum);
   to.weight[to_at] = static_cast<std::uint16_t>(std::min(sum, most_weight * kWeightSteps));
   // What is free has no grey value.
   const std::uint8_t grey = from.grey[at];
@@ -97,10 +99,7 @@ bool StoredBlocks::gather(const VoxelVolume& volume, std::uint32_t slot, StoredB
   if (header.hinted) {
     for (std::uint16_t& weight : out.voxels.weight) weight = weight <= kHintWeight ? 0 : weight;
   }
-  const LabelBlock* const labels = volume.labels(slot);
-  out.has_labels =
-      labels != nullptr && !std::ranges::all_of(labels->counts, [](const auto& c) { return c.empty(); });
-  if (out.has_labels) out.labels = *labels;
+  out.setLabels(volume.labels(slot));
   return true;
 }
 

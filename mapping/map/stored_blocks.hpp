@@ -34,6 +34,9 @@ struct StoredBlock {
   bool has_labels = false;
   VoxelBlock voxels;
   LabelBlock labels;
+
+  /// Null, or without any label: it has none.
+  void setLabels(const LabelBlock* seen);
 };
 
 /// A later voxel of `from`, with this distance [steps], into one of `to`: averages by weight. True where it

@@ -75,6 +75,9 @@ bool Submaps::isDue(const Submap& image) const {
 
 bool Submaps::follow(const Submap& image) {
   if (!isDue(image) || submaps_.size() == kMost) return false;
+  if (!submaps_.empty() && submaps_.back().epoch != image.epoch) {
+    for (Submap& submap : submaps_) submap.tied = false;
+  }
   submaps_.push_back(image);
   while (poses_ == MapPoses::kEstimated && stale_before_ < newest() &&
          (image.stamp - submaps_[stale_before_].stamp).seconds() > kStaleSeconds) {
@@ -85,13 +88,20 @@ bool Submaps::follow(const Submap& image) {
 
 bool Submaps::correct(std::span<const WorldInMap> worlds) {
   bool any = false;
+  // They may still be those of an epoch that is over.
+  const bool of_newest = !submaps_.empty() && std::ranges::any_of(worlds, [&](const WorldInMap& world) {
+    return world.epoch == submaps_.back().epoch;
+  });
   for (std::size_t i = 0; i < submaps_.size(); ++i) {
     Submap& submap = submaps_[i];
     SE3 T_map_world;
-    if (!worldOf(submap, worlds, T_map_world)) continue;
+    const bool listed = worldOf(submap, worlds, T_map_world);
+    if (of_newest) submap.tied = listed;
+    if (!listed) continue;
     any = any || shift(submap, T_map_world) > 0;
     submap.T_map_world = T_map_world;
-    outdated_[i] = shift(submap, submap.T_map_world_fused) > tolerance_ ? 1 : 0;
+    // The last that there can be takes all images to come.
+    outdated_[i] = i + 1 < kMost && shift(submap, submap.T_map_world_fused) > tolerance_ ? 1 : 0;
   }
   return any;
 }

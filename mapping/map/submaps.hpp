@@ -36,6 +36,7 @@ struct Submap {
   SE3 T_world_body;       ///< of the anchor
   SE3 T_map_world_fused;  ///< with which its images were fused
   SE3 T_map_world;        ///< as loop closure has it by now
+  bool tied = false;      ///< by loops to the newest epoch, where it is of another
 
   [[nodiscard]] SE3 motion() const { return T_map_world * T_map_world_fused.inverse(); }
   [[nodiscard]] bool hasMoved() const {
@@ -63,6 +64,10 @@ class Submaps {
   [[nodiscard]] std::size_t size() const { return submaps_.size(); }
   [[nodiscard]] const Submap& operator[](std::size_t id) const { return submaps_[id]; }
   [[nodiscard]] SubmapId newest() const { return static_cast<SubmapId>(submaps_.size() - 1); }
+  /// Whether it lies in the same frame as the newest.
+  [[nodiscard]] bool isInMap(std::size_t id) const {
+    return submaps_[id].tied || submaps_[id].epoch == submaps_.back().epoch;
+  }
   /// By how much what its images show would lie elsewhere with another T_map_world [m].
   [[nodiscard]] static double shift(const Submap& submap, const SE3& T_map_world);
   /// What was seen last in one before this was not seen for long.

@@ -20,6 +20,13 @@ inline constexpr float kWeightSteps = 256.0F;
 /// Of what is known from elsewhere than a block's own images, in these steps: any image overrules it.
 inline constexpr std::uint16_t kHintWeight = 1;
 
+/// As a block keeps it, to the nearest step: what is behind by less than half a step stays behind.
+inline std::int16_t distanceOf(float steps) {
+  const float cut = std::clamp(steps, -kDistanceSteps, kDistanceSteps);
+  const auto whole = static_cast<int>(cut + (cut < 0 ? -0.5F : 0.5F));
+  return static_cast<std::int16_t>(cut < 0 && whole == 0 ? -1 : whole);
+}
+
 struct alignas(64) VoxelBlock {
   std::array<std::int16_t, kBlockVoxels> distance;  ///< to the surface, positive in front of it
   std::array<std::uint16_t, kBlockVoxels> weight;   ///< 0: never observed

@@ -280,6 +280,11 @@ TEST_CASE("epochs that nothing ties are drawn each by itself") {
     }
     map.fuse(i, i < kMoved ? SE3{} : kWrong, i < kMoved ? 0 : 1);
   }
+  // Nor do blocks of the one come back into the other, until they are tied.
+  const std::size_t held = map.volume.blockCount();
+  map.settle();
+  CHECK(map.volume.blockCount() == held);
+  CHECK(map.submaps.counters().blocks_back == 0);
   const Whole first = map.whole([](const Submap& submap) { return submap.epoch == 0; });
   CHECK(first.error < 2 * right.whole().error);
   const Whole second = map.whole([](const Submap& submap) { return submap.epoch == 1; });

@@ -124,4 +124,24 @@ TEST_CASE("when there are as many submaps as there can be the last goes on") {
     REQUIRE(submaps.follow(imageAt(2.0 * static_cast<double>(i), i)));
   CHECK_FALSE(submaps.follow(imageAt(1e6, 1'000'000)));
   CHECK(submaps.size() == Submaps::kMost);
+  // Else its blocks would begin anew with every image.
+  submaps.correct(std::vector<WorldInMap>{worldAt(0, 0, shifted(1))});
+  CHECK(submaps.outdated()[0] == 1);
+  CHECK(submaps.outdated()[Submaps::kMost - 1] == 0);
+}
+
+TEST_CASE("a submap of an older epoch lies in the map once loops tie its epoch to the newest") {
+  Submaps submaps(MapPoses::kEstimated, kTolerance);
+  submaps.follow(imageAt(0, 0));
+  submaps.correct(std::vector<WorldInMap>{worldAt(0, 0, shifted(0.1))});
+  submaps.follow(imageAt(2, 10, {}, 1));
+  CHECK_FALSE(submaps.isInMap(0));
+  CHECK(submaps.isInMap(1));
+  // What was said before the new epoch began comes late.
+  submaps.correct(std::vector<WorldInMap>{worldAt(0, 0, shifted(0.2))});
+  CHECK_FALSE(submaps.isInMap(0));
+  submaps.correct(std::vector<WorldInMap>{worldAt(0, 0, shifted(0.2)), worldAt(11, 1, {})});
+  CHECK(submaps.isInMap(0));
+  submaps.correct(std::vector<WorldInMap>{worldAt(11, 1, {})});
+  CHECK_FALSE(submaps.isInMap(0));
 }

@@ -134,13 +134,12 @@ void FuseRun::openKept() {
   if (request_.continued.empty()) return;
   continued_ = readKeptMapFile(request_.continued, *map_);
   const KeptMapCounts& without = continued_->without_room;
-  if (without.blocks + without.free_blocks + without.patches > 0) {
+  if (without.free_blocks + without.patches > 0) {
     log_.warnings().add(fmt::format(
-        "{}: {} of {} blocks, {} of {} free blocks and {} of {} patches have no room and are left "
-        "out, the farthest from where the vehicle was last; map.volume_mib and map.surface_mib "
-        "give more",
-        request_.continued, without.blocks, continued_->held.blocks, without.free_blocks,
-        continued_->held.free_blocks, without.patches, continued_->held.patches));
+        "{}: {} of {} free blocks and {} of {} patches have no room in memory, the farthest from where the "
+        "vehicle was last; map.volume_mib and map.surface_mib give more",
+        request_.continued, without.free_blocks, continued_->held.free_blocks, without.patches,
+        continued_->held.patches));
   }
 }
 
