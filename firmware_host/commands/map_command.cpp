@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "firmware_host/commands/command.hpp"
+#include "firmware_host/lab/modules/map_export_run.hpp"
 #include "firmware_host/lab/modules/map_merge_run.hpp"
 #include "firmware_host/lab/modules/map_slice_run.hpp"
 
@@ -32,7 +33,10 @@ void printSlice(const nlohmann::ordered_json& summary) {
 void addSlice(CLI::App& map, int& exit_code) {
   CLI::App* command = map.add_subcommand("slice", "Draw a kept map's distance field at one height");
   auto request = std::make_shared<MapSliceRequest>();
-  command->add_option("KEPT_MAP", request->map, "File that `swiftlet fuse --keep` wrote")->required();
+  command
+      ->add_option("KEPT_MAP", request->map,
+                   "Folder that --keep-map wrote, or file of `swiftlet fuse --keep`")
+      ->required();
   command
       ->add_option("--out", request->out,
                    "Picture to write, *.png; the distances in millimetres go to *_mm.png beside it")
@@ -49,6 +53,36 @@ void addSlice(CLI::App& map, int& exit_code) {
     const MapSliceResult result = runMapSlice(*request);
     printSlice(result.summary);
     fmt::print("written to {} and {}\n", request->out, result.millimetres);
+    exit_code = kExitDone;
+  });
+}
+
+void addExport(CLI::App& map, int& exit_code) {
+  CLI::App* command = map.add_subcommand("export", "Write a kept map in the formats of other tools");
+  auto request = std::make_shared<MapExportRequest>();
+  command
+      ->add_option("KEPT_MAP", request->map,
+                   "Folder that --keep-map wrote, or file of `swiftlet fuse --keep`")
+      ->required();
+  command->add_option("--out", request->out, "New folder for the files")->required();
+  command->add_option("--z", request->z,
+                      "Height of the slices in the map's frame [m]; default: the middle of the map's height");
+  command
+      ->add_option("--least-weight", request->least_weight,
+                   "Voxels of less weight carry no surface; 0.004 for a map from a depth sensor")
+      ->capture_default_str();
+  command->footer(
+      "surface.ply, surface.glb   the surface, for tools that measure and for viewers\n"
+      "voxels.ply                 each voxel that was seen: distance, weight, grey value, label\n"
+      "occupancy.png, .yaml       a slice for ROS's map_server: free, occupied, unknown\n"
+      "distance.png, .yaml        the same slice: distance to the nearest surface, in percent of 40 voxels\n"
+      "Example:\n  swiftlet map export monday --z 1.2 --out monday_files");
+  command->callback([request, &exit_code] {
+    const nlohmann::ordered_json summary = runMapExport(*request);
+    fmt::print("{} faces, {} voxels; slices of {} x {} pixels at {:.3f} m\nwritten to {}\n",
+               summary["faces"].get<std::size_t>(), summary["voxels"].get<std::size_t>(),
+               summary["pixels"]["width"].get<int>(), summary["pixels"]["height"].get<int>(),
+               summary["z_m"].get<double>(), request->out);
     exit_code = kExitDone;
   });
 }
@@ -87,9 +121,10 @@ void addInfo(CLI::App& map, int& exit_code) {
 }  // namespace
 
 void addMapCommand(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("map", "Look at kept maps and merge them");
+  CLI::App* command = app.add_subcommand("map", "Look at kept maps, merge and export them");
   command->require_subcommand(1);
   command->footer("Example:\n  swiftlet map slice v102.swm --out slice.png");
+  addExport(*command, exit_code);
   addInfo(*command, exit_code);
   addMerge(*command, exit_code);
   addSlice(*command, exit_code);

@@ -7,6 +7,7 @@
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/image_files.hpp"
 #include "firmware_host/files/whole_file.hpp"
+#include "firmware_host/outputs/map_files/kept_folder.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"
 
@@ -125,7 +126,8 @@ MapSliceResult runMapSlice(const MapSliceRequest& request) {
   checkOutput(request, request.out, "--out");
   checkOutput(request, result.millimetres, "--out");
   if (!request.json.empty()) checkOutput(request, request.json, "--json");
-  const MapSlice slice = sliceOf(request.map, readKeptVolumeFile(request.map), request.z);
+  const std::string kept = keptVolumeOf(request.map);
+  const MapSlice slice = sliceOf(kept, readKeptVolumeFile(kept), request.z);
   result.summary = summaryOf(request, slice, result.millimetres);
   write(request, slice, result);
   return result;

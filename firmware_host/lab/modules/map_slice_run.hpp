@@ -13,7 +13,7 @@
 namespace swiftlet {
 
 struct MapSliceRequest {
-  std::string map;          ///< kept map
+  std::string map;          ///< kept map: its folder, or its volume
   std::string out;          ///< picture in colours, *.png; millimetres go to *_mm.png beside it
   std::optional<double> z;  ///< m; none: the middle of the map's height
   std::string json;         ///< file for the figures; empty: none

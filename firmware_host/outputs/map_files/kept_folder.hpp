@@ -1,11 +1,11 @@
 #pragma once
 // A kept map as a folder: graph.swg (kept_graph_file.hpp) and, where a volume was fused, volume.swm
-// (kept_map.hpp). The folder is there as a whole or not at all: it is filled as `<folder>.part` and renamed.
+// (kept_map.hpp). The folder is there as a whole or not at all (new_folder.hpp).
 
-#include <filesystem>
 #include <functional>
 #include <string>
 
+#include "firmware_host/files/new_folder.hpp"
 #include "mapping/loop/kept_graph.hpp"
 #include "mapping/map/map_stage.hpp"
 
@@ -17,11 +17,7 @@ inline constexpr const char* kKeptVolumeFile = "volume.swm";
 class KeptFolder {
  public:
   /// InputError where there is something of that name already, or nothing can be made there.
-  explicit KeptFolder(const std::string& path);
-  KeptFolder(const KeptFolder&) = delete;
-  KeptFolder& operator=(const KeptFolder&) = delete;
-  /// Without commit() before, what was written goes.
-  ~KeptFolder();
+  explicit KeptFolder(const std::string& path) : folder_(path, {kKeptGraphFile, kKeptVolumeFile}) {}
 
   /// InputError where they cannot be written.
   void write(const KeptGraph& graph);
@@ -30,12 +26,14 @@ class KeptFolder {
   void commit();
 
  private:
-  std::filesystem::path path_;
-  std::filesystem::path part_;
+  NewFolder folder_;
   bool has_graph_ = false;
 };
 
 /// InputError where the folder holds no sound graph.
 KeptGraph readKeptFolder(const std::string& path);
+
+/// The volume of a kept map: `path` itself, or in the folder of that name.
+std::string keptVolumeOf(const std::string& path);
 
 }  // namespace swiftlet

@@ -1,0 +1,51 @@
+#include "firmware_host/files/new_folder.hpp"
+
+#include <utility>
+
+#include "drivers/calibration/input_error.hpp"
+
+namespace swiftlet {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// With a slash at its end too.
+fs::path folderOf(const std::string& path) {
+  const fs::path folder = fs::path(path).lexically_normal();
+  return folder.has_filename() ? folder : folder.parent_path();
+}
+
+}  // namespace
+
+NewFolder::NewFolder(const std::string& path, std::vector<std::string> names)
+    : path_(folderOf(path)), part_(path_.string() + ".part"), names_(std::move(names)) {
+  std::error_code error;
+  if (fs::exists(path_, error)) {
+    throw InputError(path, 0, "", "is there already; it is never written over",
+                     "Name another folder, or remove this one");
+  }
+  removeFiles();
+  fs::create_directories(part_, error);
+  if (error) throw InputError(part_.string(), 0, "", error.message(), "Name a folder that can be made");
+}
+
+NewFolder::~NewFolder() {
+  removeFiles();
+  std::error_code error;
+  fs::remove(part_, error);
+}
+
+void NewFolder::removeFiles() const {
+  std::error_code error;
+  for (const std::string& name : names_) fs::remove(part_ / name, error);
+}
+
+void NewFolder::commit() {
+  std::error_code error;
+  fs::rename(part_, path_, error);
+  if (error) {
+    throw InputError(path_.string(), 0, "", error.message(), "Name a folder that is not there yet");
+  }
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,79 @@
+#include "firmware_host/outputs/map_files/voxel_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <type_traits>
+#include <vector>
+
+#include "firmware_host/files/whole_file.hpp"
+
+namespace swiftlet {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "numbers are written as the memory has them");
+
+template <typename T>
+void addValue(std::string& to, T value) {
+  static_assert(std::is_arithmetic_v<T>);
+  to.append(reinterpret_cast<const char*>(&value), sizeof(T));
+}
+
+std::string headOf(std::size_t voxels) {
+  std::string head = "ply\nformat binary_little_endian 1.0\ncomment swiftlet: map axes, z up, metres\n";
+  head += fmt::format("element vertex {}\n", voxels);
+  for (const char* name : {"x", "y", "z", "distance", "weight"})
+    head += fmt::format("property float {}\n", name);
+  for (const char* name : {"red", "green", "blue", "label", "label_probability"})
+    head += fmt::format("property uchar {}\n", name);
+  return head + "end_header\n";
+}
+
+}  // namespace
+
+std::size_t writeVoxelPly(const std::string& path, const VoxelVolume& volume,
+                          const ConfusionModel& confusion) {
+  std::vector<std::uint32_t> slots;
+  std::size_t voxels = 0;
+  for (std::uint32_t slot = 0; slot < volume.slots(); ++slot) {
+    if (volume.header(slot).state != BlockState::kVoxels) continue;
+    slots.push_back(slot);
+    const auto& weights = volume.voxels(slot)->weight;
+    voxels += kBlockVoxels - static_cast<std::size_t>(std::ranges::count(weights, 0));
+  }
+  std::ranges::sort(slots, {}, [&](std::uint32_t slot) { return keyOf(volume.header(slot).index); });
+  WholeFile file(path);
+  file.write(headOf(voxels));
+  std::string points;
+  for (const std::uint32_t slot : slots) {
+    const VoxelBlock& block = *volume.voxels(slot);
+    const LabelBlock* const labels = volume.labels(slot);
+    const BlockIndex& index = volume.header(slot).index;
+    points.clear();
+    for (std::size_t at = 0; at < kBlockVoxels; ++at) {
+      if (block.weight[at] == 0) continue;
+      const auto middle = [&](std::int32_t of_block, unsigned axis) {
+        const int along = static_cast<int>(at >> (kBlockBits * axis)) & kBlockMask;
+        return static_cast<float>((kBlockSide * of_block + along + 0.5) * volume.settings().voxel_size);
+      };
+      addValue(points, middle(index.x, 0));
+      addValue(points, middle(index.y, 1));
+      addValue(points, middle(index.z, 2));
+      addValue(points, volume.distanceStep() * static_cast<float>(block.distance[at]));
+      addValue(points, static_cast<float>(block.weight[at]) / static_cast<float>(kWeightSteps));
+      for (int i = 0; i < 3; ++i) addValue(points, block.grey[at]);
+      const LabelEstimate label =
+          labels != nullptr ? confusion.estimate(labels->counts[at]) : LabelEstimate{};
+      addValue(points, label.label);
+      addValue(points, static_cast<std::uint8_t>(std::lround(255 * label.probability)));
+    }
+    file.write(points);
+  }
+  file.commit();
+  return voxels;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,22 @@
+#pragma once
+// A volume's voxels as points in a PLY file, for tools that do not read kept maps.
+//
+// Binary little-endian, map axes, metres. A vertex for each voxel that was seen, in the order of blocks'
+// keys: x y z of its middle, distance to the surface (positive in front of it, cut off at the truncation
+// distance) and weight (float), red green blue (uchar: the grey value), label and label_probability (uchar,
+// 255: certain). Blocks that were only seen free are left out. Memory: a block. InputError when the file
+// cannot be written.
+
+#include <cstddef>
+#include <string>
+
+#include "mapping/volume/confusion_model.hpp"
+#include "mapping/volume/voxel_volume.hpp"
+
+namespace swiftlet {
+
+/// Gives the number of voxels.
+std::size_t writeVoxelPly(const std::string& path, const VoxelVolume& volume,
+                          const ConfusionModel& confusion);
+
+}  // namespace swiftlet
