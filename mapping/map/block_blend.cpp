@@ -22,6 +22,39 @@ VoxelIndex voxelOf(const BlockIndex& block, std::size_t at) {
   return {kBlockSide * block.x + along(0), kBlockSide * block.y + along(1), kBlockSide * block.z + along(2)};
 }
 
+BlockRange common(const BlockRange& a, const BlockRange& b) {
+  return {{std::max(a.low.x, b.low.x), std::max(a.low.y, b.low.y), std::max(a.low.z, b.low.z)},
+          {std::min(a.high.x, b.high.x), std::min(a.high.y, b.high.y), std::min(a.high.z, b.high.z)}};
+}
+
+template <typename Take>
+void forBlocks(const BlockRange& range, const Take& take) {
+  for (std::int32_t z = range.low.z; z <= range.high.z; ++z) {
+    for (std::int32_t y = range.low.y; y <= range.high.y; ++y) {
+      for (std::int32_t x = range.low.x; x <= range.high.x; ++x) take(BlockIndex{x, y, z});
+    }
+  }
+}
+
+/// Of a block, x fastest.
+std::size_t numberIn(const BlockRange& range, const BlockIndex& block) {
+  const auto along = [](std::int32_t low, std::int32_t at) { return static_cast<std::size_t>(at - low); };
+  const std::size_t wide = along(range.low.x, range.high.x) + 1, deep = along(range.low.y, range.high.y) + 1;
+  return along(range.low.x, block.x) +
+         wide * (along(range.low.y, block.y) + deep * along(range.low.z, block.z));
+}
+
+std::size_t blocksIn(const BlockRange& range) { return numberIn(range, range.high) + 1; }
+
+/// Those of which all voxels are in the set.
+std::uint64_t wholeParts(const std::bitset<kBlockVoxels>& voxels) {
+  std::uint64_t parts = kAllParts;
+  for (std::size_t at = 0; at < kBlockVoxels; ++at) {
+    if (!voxels[at]) parts &= ~partBitAt(at);
+  }
+  return parts;
+}
+
 /// Along one axis, from the neighbours that are known [steps a voxel].
 float slopeAt(const VoxelBlock& block, std::size_t at, int along, std::size_t stride) {
   const auto distance = [&](std::size_t i) { return static_cast<float>(block.distance[i]); };
@@ -101,17 +134,64 @@ void BlockBlend::finish(std::uint32_t slot) {
 
 void BlockBlend::add(const StoredBlock& block, const SE3& motion, const BlockRange& within) {
   place(block, motion);
-  for (int z = std::max(box_.low.z, within.low.z); z <= std::min(box_.high.z, within.high.z); ++z) {
-    for (int y = std::max(box_.low.y, within.low.y); y <= std::min(box_.high.y, within.high.y); ++y) {
-      for (int x = std::max(box_.low.x, within.low.x); x <= std::min(box_.high.x, within.high.x); ++x) {
-        if (block.free_parts != 0) {
-          endWhatStands({x, y, z});
-        } else {
-          addVoxels({x, y, z});
-        }
-      }
+  forBlocks(common(box_, within), [&](const BlockIndex& index) {
+    if (block.free_parts != 0) {
+      endWhatStands(index);
+    } else {
+      addVoxels(index);
     }
+  });
+}
+
+/// take(block of the volume, its voxels whose middles fall into a free part of the moved block)
+template <typename Take>
+void BlockBlend::forFree(const BlockRange& within, const Take& take) const {
+  std::size_t from = 0;
+  Eigen::Vector3f rest;
+  forBlocks(common(box_, within), [&](const BlockIndex& index) {
+    VoxelSet free;
+    for (std::size_t at = 0; at < kBlockVoxels; ++at) {
+      if (fallsIn(voxelOf(index, at), from, rest)) free[at] = (block_->free_parts & partBitAt(from)) != 0;
+    }
+    if (free.any()) take(index, free);
+  });
+}
+
+void BlockBlend::beginFree(const BlockRange& within) {
+  free_range_ = within;
+  free_.assign(blocksIn(within), {});
+}
+
+void BlockBlend::addFree(const StoredBlock& block, const SE3& motion) {
+  place(block, motion);
+  forFree(free_range_, [&](const BlockIndex& index, const VoxelSet& free) {
+    free_[numberIn(free_range_, index)] |= free;
+  });
+}
+
+void BlockBlend::endFree() {
+  forBlocks(free_range_, [&](const BlockIndex& index) {
+    const std::uint64_t parts = wholeParts(free_[numberIn(free_range_, index)]);
+    if (parts == 0) return;
+    const std::uint32_t slot = volume_.find(index);
+    if (slot == VoxelVolume::kNone) {
+      volume_.addFree(index, parts, {});
+    } else if (volume_.voxels(slot) != nullptr) {
+      fillFree(slot, parts);
+    }
+  });
+}
+
+/// As by one image (VoxelVolume::obtain).
+void BlockBlend::fillFree(std::uint32_t slot, std::uint64_t parts) {
+  VoxelBlock& to = volume_.changeVoxels(slot);
+  for (std::size_t at = 0; at < kBlockVoxels; ++at) {
+    if (to.weight[at] > 0 || (parts & partBitAt(at)) == 0) continue;
+    to.distance[at] = static_cast<std::int16_t>(kDistanceSteps);
+    to.weight[at] = static_cast<std::uint16_t>(kWeightSteps);
+    to.grey[at] = 0;
   }
+  finish(slot);
 }
 
 void BlockBlend::addVoxels(const BlockIndex& index) {
@@ -145,14 +225,17 @@ void BlockBlend::endWhatStands(const BlockIndex& index) {
 
 void BlockBlend::hint(const StoredBlock& block, const SE3& motion, const Eigen::Vector3f& vehicle) {
   place(block, motion);
-  wanted_.clear();
-  for (int z = box_.low.z; z <= box_.high.z; ++z) {
-    for (int y = box_.low.y; y <= box_.high.y; ++y) {
-      for (int x = box_.low.x; x <= box_.high.x; ++x) {
-        if (wanted_.size() < wanted_.capacity() && reaches({x, y, z})) wanted_.push_back({x, y, z});
-      }
-    }
+  if (block.free_parts != 0) {
+    forFree(box_, [&](const BlockIndex& index, const VoxelSet& free) {
+      const std::uint64_t parts = wholeParts(free);
+      if (parts != 0) volume_.hintFree(index, parts, vehicle);
+    });
+    return;
   }
+  wanted_.clear();
+  forBlocks(box_, [&](const BlockIndex& index) {
+    if (wanted_.size() < wanted_.capacity() && reaches(index)) wanted_.push_back(index);
+  });
   wanted_.resize(volume_.makeRoom(vehicle, wanted_));
   for (const BlockIndex& index : wanted_) {
     const std::uint32_t known = volume_.find(index);

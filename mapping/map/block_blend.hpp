@@ -9,6 +9,7 @@
 // (voxel / 2)^2 / 2 r: 3 mm at 10 cm. A block that has not moved is taken bit by bit. Where memory ends the
 // volume's rule tells who goes (VoxelVolume::makeRoom). Cost: 15 to 40 us a block.
 
+#include <bitset>
 #include <cstdint>
 #include <vector>
 
@@ -35,8 +36,13 @@ class BlockBlend {
   /// Into blocks of `within`, for which there is room (VoxelVolume::obtain). A free block ends what stands in
   /// its parts, and no more.
   void add(const StoredBlock& block, const SE3& motion, const BlockRange& within);
+  /// After all of these: the free parts of blocks, laid together where no voxel is known. A part is free when
+  /// the middles of all its voxels fall into free parts of any of the blocks.
+  void beginFree(const BlockRange& within);
+  void addFree(const StoredBlock& block, const SE3& motion);
+  void endFree();
   /// Into voxels alone of which nothing is known, with kHintWeight; blocks that are farther from `vehicle`
-  /// than all others are left out when the volume is full.
+  /// than all others are left out when the volume is full. A free block into blocks that no image has seen.
   void hint(const StoredBlock& block, const SE3& motion, const Eigen::Vector3f& vehicle);
 
  private:
@@ -46,7 +52,11 @@ class BlockBlend {
     float distance = 0;  ///< at the centre [steps]
   };
 
+  using VoxelSet = std::bitset<kBlockVoxels>;
+
   void place(const StoredBlock& block, const SE3& motion);
+  template <typename Take>
+  void forFree(const BlockRange& within, const Take& take) const;
   template <typename Take>
   void fill(const BlockIndex& to, const Take& take) const;
   [[nodiscard]] bool reaches(const BlockIndex& to) const;
@@ -54,6 +64,7 @@ class BlockBlend {
   [[nodiscard]] bool fallsIn(const VoxelIndex& voxel, std::size_t& at, Eigen::Vector3f& rest) const;
   void addVoxels(const BlockIndex& to);
   void endWhatStands(const BlockIndex& to);
+  void fillFree(std::uint32_t slot, std::uint64_t parts);
   void finish(std::uint32_t slot);
 
   VoxelVolume& volume_;
@@ -62,6 +73,8 @@ class BlockBlend {
   Eigen::Matrix3d to_block_;  ///< from a voxel's number to the moved block's, in voxels
   Eigen::Vector3d at_block_;
   std::vector<BlockIndex> wanted_;  ///< scratch
+  BlockRange free_range_;
+  std::vector<VoxelSet> free_;  ///< of each block in it, x fastest
 };
 
 }  // namespace swiftlet

@@ -101,10 +101,21 @@ void MapSubmaps::correct(std::span<const WorldInMap> worlds) {
   }
   if (!any && leaving_.empty()) return;
   ++counters_.corrections;
+  removeFreeHints();
   for (std::size_t i = 0; i < stored_.size(); ++i) {
-    if (moved_[stored_[i].submap] != 0) stored_.setShown(i, false);
+    if (moved_[stored_[i].submap] != 0 || stored_[i].is_free) stored_.setShown(i, false);
   }
   cursor_ = 0;
+}
+
+/// They do not tell which submaps they are of: all are laid anew.
+void MapSubmaps::removeFreeHints() {
+  leaving_.clear();
+  for (std::uint32_t slot = 0; slot < volume_.slots(); ++slot) {
+    const BlockHeader& header = volume_.header(slot);
+    if (header.state == BlockState::kFree && header.hinted) leaving_.push_back(slot);
+  }
+  volume_.remove(leaving_);
 }
 
 /// Whether two submaps lie to each other at a block as when they were fused.
@@ -126,7 +137,7 @@ void MapSubmaps::step(const Eigen::Vector3d& p_map_vehicle, const CorrectionEffo
     const Eigen::Vector3d centre = placeOf(record.index, record.submap);
     const Eigen::Array3d away = (centre - p_map_vehicle).array().abs() - half_box_.array();
     if ((away > half_box_.array()).any()) stored_.setShown(cursor_, false);
-    if ((away > 0).any() || record.shown || record.is_free || !submaps_.isInMap(record.submap)) continue;
+    if ((away > 0).any() || record.shown || !submaps_.isInMap(record.submap)) continue;
     stored_.setShown(cursor_, true);
     if (!stored_.read(cursor_, scratch_)) continue;
     hints_.hint(scratch_, submaps_[record.submap].motion(), p_map_vehicle.cast<float>());
@@ -207,17 +218,13 @@ void MapSubmaps::visitWhole(
       if (read(*p)) blend.add(scratch_, submaps_[p->submap].motion(), outer);
     }
     // What is known to be free bounds surface as voxels do.
+    blend.beginFree(outer);
     for (; part != end; ++part) {
-      if ((part->in_volume ? volume_.header(part->at).state != BlockState::kFree
-                           : !stored_[part->at].is_free) ||
-          !read(*part)) {
-        continue;
-      }
-      if (!submaps_[part->submap].hasMoved() && outer.holds(scratch_.index) &&
-          tile.find(scratch_.index) == VoxelVolume::kNone) {
-        tile.addFree(scratch_.index, scratch_.free_parts, {});
-      }
+      const bool is_free =
+          part->in_volume ? volume_.header(part->at).state == BlockState::kFree : stored_[part->at].is_free;
+      if (is_free && read(*part)) blend.addFree(scratch_, submaps_[part->submap].motion());
     }
+    blend.endFree();
     slots.clear();
     for (std::uint32_t slot = 0; slot < tile.slots(); ++slot) {
       const BlockHeader& header = tile.header(slot);

@@ -85,6 +85,7 @@ class MapSubmaps : public BlockListener, public BlockOverflow {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
+  void removeFreeHints();
   [[nodiscard]] bool agree(SubmapId a, SubmapId b, const BlockIndex& block) const;
   [[nodiscard]] Eigen::Vector3d placeOf(const BlockIndex& block, SubmapId id) const;
 

@@ -91,7 +91,7 @@ bool StoredBlocks::gather(const VoxelVolume& volume, std::uint32_t slot, StoredB
   const BlockHeader& header = volume.header(slot);
   out.index = header.index;
   out.submap = header.submap;
-  out.free_parts = header.state == BlockState::kFree ? header.free_parts : 0;
+  out.free_parts = header.state == BlockState::kFree && !header.hinted ? header.free_parts : 0;
   out.has_labels = false;
   const VoxelBlock* const voxels = volume.voxels(slot);
   if (voxels == nullptr || !header.observed) return out.free_parts != 0;

@@ -172,6 +172,7 @@ std::uint32_t VoxelVolume::obtain(const BlockIndex& block) {
   }
   BlockHeader& header = headers_[slot];
   const std::uint64_t free_parts = std::exchange(header.free_parts, 0);
+  const auto weight = header.hinted ? kHintWeight : static_cast<std::uint16_t>(kWeightSteps);
   header.state = BlockState::kVoxels;
   header.data = unused_data_.back();
   header.sides = free_parts != 0 ? BlockHeader::kInFront : std::uint8_t{0};
@@ -182,22 +183,27 @@ std::uint32_t VoxelVolume::obtain(const BlockIndex& block) {
   voxels.distance.fill(static_cast<std::int16_t>(kDistanceSteps));
   // Free by the depth in front of what was measured, which is more than the distance: one observation.
   for (std::size_t at = 0; at < kBlockVoxels; ++at)
-    voxels.weight[at] = (free_parts & partBitAt(at)) != 0 ? static_cast<std::uint16_t>(kWeightSteps) : 0;
+    voxels.weight[at] = (free_parts & partBitAt(at)) != 0 ? weight : 0;
   voxels.grey.fill(0);
   if (!labels_.empty()) labels_[header.data].counts.fill(LabelCounts{});
   return slot;
 }
 
+std::uint32_t VoxelVolume::newFree(const BlockIndex& block, const Eigen::Vector3f& vehicle) {
+  if (free_count_ == freeCapacity()) dropFarFree(vehicle);
+  const std::uint32_t slot = newHeader(block);
+  if (slot == kNone) return kNone;
+  headers_[slot].state = BlockState::kFree;
+  ++free_count_;
+  return slot;
+}
+
 void VoxelVolume::addFree(const BlockIndex& block, std::uint64_t parts, const Eigen::Vector3f& vehicle) {
   std::uint32_t slot = find(block);
-  if (slot == kNone) {
-    if (free_count_ == freeCapacity()) dropFarFree(vehicle);
-    slot = newHeader(block);
-    if (slot == kNone) return;
-    headers_[slot].state = BlockState::kFree;
-    ++free_count_;
-  }
+  if (slot == kNone) slot = newFree(block, vehicle);
+  if (slot == kNone) return;
   BlockHeader& header = headers_[slot];
+  if (std::exchange(header.hinted, false)) header.submap = submap_;
   // What was free long ago is not in doubt for that alone.
   if (outdated_ != nullptr && outdated_[header.submap] != 0) {
     for (std::size_t i = 0; i < listener_count_; ++i) listeners_[i]->beforeRenewal(*this, slot);
@@ -206,6 +212,19 @@ void VoxelVolume::addFree(const BlockIndex& block, std::uint64_t parts, const Ei
   }
   header.touched = submap_;
   if ((parts & ~header.free_parts) == 0) return;
+  header.free_parts |= parts;
+  header.revision = revision_;
+}
+
+void VoxelVolume::hintFree(const BlockIndex& block, std::uint64_t parts, const Eigen::Vector3f& vehicle) {
+  std::uint32_t slot = find(block);
+  if (slot == kNone) {
+    slot = newFree(block, vehicle);
+    if (slot == kNone) return;
+    headers_[slot].hinted = true;
+  }
+  BlockHeader& header = headers_[slot];
+  if (header.state != BlockState::kFree || !header.hinted || (parts & ~header.free_parts) == 0) return;
   header.free_parts |= parts;
   header.revision = revision_;
 }

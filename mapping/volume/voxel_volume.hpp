@@ -44,7 +44,8 @@ struct BlockHeader {
   /// passes between voxels of both sides only.
   std::uint8_t sides = 0;
   bool observed = false;  ///< an image changed it since it became known or began anew
-  bool hinted = false;    ///< it holds voxels of kHintWeight that are not of its own images
+  /// It holds voxels of kHintWeight that are not of its own images; for kFree: all of it is known so.
+  bool hinted = false;
   /// Largest change of a distance since the last that counted as one [steps], summed.
   float drift = 0;
 
@@ -159,6 +160,8 @@ class VoxelVolume {
   std::uint32_t obtain(const BlockIndex& block);
   /// These parts of the block, which has no voxels, were seen free. A full table drops the farthest.
   void addFree(const BlockIndex& block, std::uint64_t parts, const Eigen::Vector3f& vehicle);
+  /// The same for what no image of now has seen, where none has seen the block.
+  void hintFree(const BlockIndex& block, std::uint64_t parts, const Eigen::Vector3f& vehicle);
 
   /// A block of another volume, which is not here yet: as it is there.
   void copy(const VoxelVolume& from, std::uint32_t slot);
@@ -194,6 +197,7 @@ class VoxelVolume {
   [[nodiscard]] bool isOutdated(const BlockHeader& header) const {
     return header.touched < stale_before_ || (outdated_ != nullptr && outdated_[header.submap] != 0);
   }
+  std::uint32_t newFree(const BlockIndex& block, const Eigen::Vector3f& vehicle);
   void renew(std::uint32_t slot);
   void drop(std::uint32_t slot);
   void dropFarFree(const Eigen::Vector3f& vehicle);

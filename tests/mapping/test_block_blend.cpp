@@ -2,6 +2,7 @@
 
 #include "mapping/map/block_blend.hpp"
 
+#include <bit>
 #include <catch2/catch.hpp>
 #include <random>
 
@@ -188,6 +189,62 @@ TEST_CASE("what is free later ends what stood there; a mismatch of little weight
   CHECK(got.weight[0] == 0);
   CHECK(got.weight[2] == 1020);
   CHECK(got.weight[offsetOf({1, 1, 1})] == 0);
+}
+
+TEST_CASE("free parts move with their blocks: those of which every voxel's middle falls into one") {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  const VolumeSettings settings = sceneSettings();
+  for (int round = 0; round < 10; ++round) {
+    SE3 motion{Eigen::Quaterniond(1, unit(random), unit(random), unit(random)).normalized(),
+               {unit(random), unit(random), unit(random)}};
+    if (round == 0) motion = {};
+    // Neighbours, so that parts lie across their border.
+    std::vector<StoredBlock> blocks(4);
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      blocks[i].index = {static_cast<int>(i % 2), static_cast<int>(i / 2), 0};
+      blocks[i].free_parts = i == 0 ? kAllParts : random() | std::uint64_t{random()} << 32U;
+    }
+    VoxelVolume volume(settings);
+    volume.beginChange();
+    // A block with voxels stays one.
+    const BlockIndex taken = blockOf(volume.voxelAt(motion * Eigen::Vector3d::Constant(0.1)));
+    REQUIRE(volume.obtain(taken) != VoxelVolume::kNone);
+    BlockBlend blend(volume);
+    const BlockRange range{{-12, -12, -12}, {12, 12, 12}};
+    blend.beginFree(range);
+    for (const StoredBlock& block : blocks) blend.addFree(block, motion);
+    blend.endFree();
+    const SE3 back = motion.inverse();
+    const auto isFree = [&](const VoxelIndex& voxel) {
+      const Eigen::Vector3d middle =
+          settings.voxel_size * (Eigen::Vector3d(voxel.x, voxel.y, voxel.z).array() + 0.5);
+      const VoxelIndex from = volume.voxelAt(back * middle);
+      for (const StoredBlock& block : blocks) {
+        if (block.index == blockOf(from)) return (block.free_parts & partBitAt(offsetOf(from))) != 0;
+      }
+      return false;
+    };
+    std::size_t wrong = 0, free = 0;
+    for (int z = -12; z <= 12; ++z) {
+      for (int y = -12; y <= 12; ++y) {
+        for (int x = -12; x <= 12; ++x) {
+          const BlockIndex index{x, y, z};
+          std::uint64_t parts = kAllParts;
+          for (int at = 0; at < static_cast<int>(kBlockVoxels); ++at) {
+            const VoxelIndex voxel{8 * x + at % 8, 8 * y + at / 8 % 8, 8 * z + at / 64};
+            if (!isFree(voxel)) parts &= ~partBitAt(static_cast<std::size_t>(at));
+          }
+          const std::uint32_t slot = volume.find(index);
+          const std::uint64_t got = slot == VoxelVolume::kNone ? 0 : volume.header(slot).free_parts;
+          wrong += got != (index == taken ? 0 : parts) ? 1 : 0;
+          free += static_cast<std::size_t>(std::popcount(got));
+        }
+      }
+    }
+    CHECK(wrong == 0);
+    CHECK(free > 10);
+  }
 }
 
 TEST_CASE("only blocks of the range are reached") {

@@ -191,6 +191,66 @@ TEST_CASE("what has left the volume for a correction comes back as hints, which 
   CHECK(away.volume.blockCount() == there);
 }
 
+TEST_CASE("free space moves with its submaps, in the whole and in the volume") {
+  struct Free {
+    std::size_t parts = 0;
+    double nearest = 10;  ///< m, of a part's middle to the ball's
+    void add(const VoxelVolume& volume, std::uint32_t slot) {
+      const BlockHeader& header = volume.header(slot);
+      for (int i = 0; i < 64; ++i) {
+        if ((header.free_parts >> static_cast<unsigned>(i) & 1U) == 0) continue;
+        ++parts;
+        const Eigen::Vector3d part(i % 4, i / 4 % 4, i / 16);
+        const Eigen::Vector3d block(header.index.x, header.index.y, header.index.z);
+        const Eigen::Vector3d p =
+            volume.settings().voxel_size * (8 * block + 2 * part + Eigen::Vector3d::Ones());
+        nearest = std::min(nearest, (p - kBall.centre).norm());
+      }
+    }
+  };
+  const auto freeWhole = [](Map& map) {
+    Free free;
+    map.submaps.visitWhole([](const Submap&) { return true; },
+                           [&](const VoxelVolume& tile, std::span<const std::uint32_t> slots) {
+                             for (const std::uint32_t slot : slots) free.add(tile, slot);
+                           });
+    return free;
+  };
+  const auto freeHeld = [](const Map& map) {
+    Free free;
+    for (std::uint32_t slot = 0; slot < map.volume.slots(); ++slot) free.add(map.volume, slot);
+    return free;
+  };
+  // By whole parts: of others only what is free around them too stays.
+  const SE3 by_parts{Eigen::Quaterniond::Identity(), {0, -0.1, 0}};
+  Map right, wrong;
+  for (std::size_t i = kMoved; i < kViews.size(); ++i) {
+    right.fuse(i);
+    wrong.fuse(i, by_parts);
+  }
+  const Free all = freeWhole(right);
+  REQUIRE(all.parts > 1000);
+  wrong.submaps.correct(rightWorlds());
+  const Free left = freeHeld(wrong), moved = freeWhole(wrong);
+  // Less than all: blocks with voxels of other places have room for them.
+  CHECK(moved.parts > all.parts * 2 / 5);
+  CHECK(moved.nearest > all.nearest - 0.5 * right.volume.settings().voxel_size);
+  wrong.settle();
+  const Free back = freeHeld(wrong);
+  CHECK(left.parts < all.parts / 10);
+  CHECK(back.parts > all.parts * 2 / 5);
+  CHECK(back.nearest > all.nearest - 0.5 * right.volume.settings().voxel_size);
+  // Hints are not stored.
+  wrong.submaps.storeAll();
+  CHECK(freeWhole(wrong).parts == moved.parts);
+  // Those of before go when something moves again.
+  wrong.submaps.correct(rightWorlds({Eigen::Quaterniond::Identity(), {0.1, 0, 0}}));
+  const Free again = freeHeld(wrong);
+  CHECK(again.parts < all.parts / 10);
+  wrong.settle();
+  CHECK(freeHeld(wrong).parts > all.parts * 2 / 5);
+}
+
 TEST_CASE("a second correction ends where both lead") {
   Map right, map;
   right.fuseAll();

@@ -44,8 +44,8 @@ void writeGrid(const NewFolder& out, const std::string& name, const std::vector<
                const MapSlice& slice, const std::string& mode) {
   writePng8(out.file(name + ".png"), pixels.data(), slice.width, slice.height);
   const std::string yaml = fmt::format(
-      "image: {}.png\nresolution: {}\norigin: [{:.9g}, {:.9g}, 0]\nnegate: 0\noccupied_thresh: {}\nfree_thresh: {}\n"
-      "mode: {}\n",
+      "image: {}.png\nresolution: {}\norigin: [{:.9g}, {:.9g}, 0]\nnegate: 0\n"
+      "occupied_thresh: {}\nfree_thresh: {}\nmode: {}\n",
       name, slice.voxel_size, slice.least.x(), slice.least.y(), kOccupiedThreshold, kFreeThreshold, mode);
   writeWholeFile(out.file(name + ".yaml"), yaml);
 }
