@@ -104,7 +104,7 @@ void MapReader::readHead() {
   const auto magic = from.bytes(kMagic.size());
   if (!std::equal(magic.begin(), magic.end(), kMagic.begin())) {
     throw InputError(name_, 0, "byte 0: magic", "this is no map that swiftlet kept",
-                     "Give a file that --keep wrote");
+                     "Give a file that --keep wrote, or a folder that --keep-map wrote with --map");
   }
   constexpr std::size_t kVersionAt = 8, kSizeAt = 12;
   const std::uint32_t version = from.u32();
@@ -380,7 +380,9 @@ class Loader final : public VolumeLoader {
 
 std::ifstream opened(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
-  if (!in) throw InputError(path, 0, "", "cannot be opened", "Give a file that --keep wrote");
+  if (!in)
+    throw InputError(path, 0, "", "cannot be opened",
+                     "Give a file that --keep wrote, or a folder that --keep-map wrote with --map");
   return in;
 }
 
