@@ -30,13 +30,15 @@ void printSlice(const nlohmann::ordered_json& summary) {
              summary["reach_m"].get<double>());
 }
 
+void addKeptMap(CLI::App& command, std::string& path) {
+  command.add_option("KEPT_MAP", path, "Folder that --keep-map wrote, or file of `swiftlet fuse --keep`")
+      ->required();
+}
+
 void addSlice(CLI::App& map, int& exit_code) {
   CLI::App* command = map.add_subcommand("slice", "Draw a kept map's distance field at one height");
   auto request = std::make_shared<MapSliceRequest>();
-  command
-      ->add_option("KEPT_MAP", request->map,
-                   "Folder that --keep-map wrote, or file of `swiftlet fuse --keep`")
-      ->required();
+  addKeptMap(*command, request->map);
   command
       ->add_option("--out", request->out,
                    "Picture to write, *.png; the distances in millimetres go to *_mm.png beside it")
@@ -60,10 +62,7 @@ void addSlice(CLI::App& map, int& exit_code) {
 void addExport(CLI::App& map, int& exit_code) {
   CLI::App* command = map.add_subcommand("export", "Write a kept map in the formats of other tools");
   auto request = std::make_shared<MapExportRequest>();
-  command
-      ->add_option("KEPT_MAP", request->map,
-                   "Folder that --keep-map wrote, or file of `swiftlet fuse --keep`")
-      ->required();
+  addKeptMap(*command, request->map);
   command->add_option("--out", request->out, "New folder for the files")->required();
   command->add_option("--z", request->z,
                       "Height of the slices in the map's frame [m]; default: the middle of the map's height");

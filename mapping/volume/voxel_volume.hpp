@@ -160,7 +160,7 @@ class VoxelVolume {
   std::uint32_t obtain(const BlockIndex& block);
   /// These parts of the block, which has no voxels, were seen free. A full table drops the farthest.
   void addFree(const BlockIndex& block, std::uint64_t parts, const Eigen::Vector3f& vehicle);
-  /// The same for what no image of now has seen, where none has seen the block.
+  /// Parts known from elsewhere to be free. Taken where no image has seen the block; not stored again.
   void hintFree(const BlockIndex& block, std::uint64_t parts, const Eigen::Vector3f& vehicle);
 
   /// A block of another volume, which is not here yet: as it is there.

@@ -9,16 +9,10 @@
 #include <vector>
 
 #include "firmware_host/commands/command.hpp"
+#include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet::test {
-
-inline int run(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "swiftlet");
-  std::vector<char*> pointers;
-  for (std::string& argument : arguments) pointers.push_back(argument.data());
-  return runProgram(static_cast<int>(pointers.size()), pointers.data());
-}
 
 inline std::string textOf(const std::string& path) {
   std::ifstream file(path, std::ios::binary);

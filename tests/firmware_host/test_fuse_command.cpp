@@ -9,6 +9,7 @@
 
 #include "firmware_host/commands/program.hpp"
 #include "firmware_host/outputs/map_files/ply_file.hpp"
+#include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {
@@ -18,12 +19,7 @@ namespace fs = std::filesystem;
 
 const std::string kLog = std::string(SWIFTLET_TEST_DATA) + "/euroc_mh01_4s";
 
-int run(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "swiftlet");
-  std::vector<char*> pointers;
-  for (std::string& argument : arguments) pointers.push_back(argument.data());
-  return runProgram(static_cast<int>(pointers.size()), pointers.data());
-}
+using test::run;
 
 TEST_CASE("a second of a real flight gives a map from stereo, in files that others read", "[fuse_command]") {
   const ScratchFolder folder("fuse");

@@ -21,6 +21,7 @@
 #include "firmware_host/commands/program.hpp"
 #include "firmware_host/lab/modules/map_export_run.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"
+#include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 using namespace swiftlet;  // NOLINT(google-build-using-namespace)
@@ -31,12 +32,7 @@ namespace fs = std::filesystem;
 
 const std::string kLog = std::string(SWIFTLET_TEST_DATA) + "/euroc_mh01_4s";
 
-int run(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "swiftlet");
-  std::vector<char*> pointers;
-  for (std::string& argument : arguments) pointers.push_back(argument.data());
-  return runProgram(static_cast<int>(pointers.size()), pointers.data());
-}
+using swiftlet::test::run;
 
 std::string bytesOf(const std::string& path) {
   std::ifstream in(path, std::ios::binary);

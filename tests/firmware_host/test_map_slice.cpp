@@ -22,6 +22,7 @@
 #include "firmware_host/lab/modules/map_slice_run.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"
 #include "mapping/distance/volume_distance.hpp"
+#include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/mapping/volume_crossings.hpp"
 #include "tests/mapping/volume_scene.hpp"
@@ -69,12 +70,7 @@ void keep(const std::string& path, const VoxelVolume& volume) {
   static_cast<void>(writeKeptMap(path, out, {volume, none, 0, Eigen::Vector3d::Zero()}));
 }
 
-int run(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "swiftlet");
-  std::vector<char*> pointers;
-  for (std::string& argument : arguments) pointers.push_back(argument.data());
-  return runProgram(static_cast<int>(pointers.size()), pointers.data());
-}
+using swiftlet::test::run;
 
 std::vector<std::uint8_t> bytesOf(const std::string& path) {
   std::ifstream in(path, std::ios::binary);

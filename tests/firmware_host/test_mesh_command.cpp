@@ -16,6 +16,7 @@
 #include "firmware_host/files/line_file.hpp"
 #include "firmware_host/lab/modules/mesh_run.hpp"
 #include "firmware_host/outputs/map_files/ply_file.hpp"
+#include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {
@@ -23,12 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-int run(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "swiftlet");
-  std::vector<char*> pointers;
-  for (std::string& argument : arguments) pointers.push_back(argument.data());
-  return runProgram(static_cast<int>(pointers.size()), pointers.data());
-}
+using test::run;
 
 std::string textOf(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);

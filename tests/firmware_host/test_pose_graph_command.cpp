@@ -16,17 +16,13 @@
 #include "firmware_host/lab/modules/g2o_file.hpp"
 #include "firmware_host/lab/modules/pose_graph_run.hpp"
 #include "mapping/pose_graph/pose_error.hpp"
+#include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {
 namespace {
 
-int run(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "swiftlet");
-  std::vector<char*> pointers;
-  for (std::string& argument : arguments) pointers.push_back(argument.data());
-  return runProgram(static_cast<int>(pointers.size()), pointers.data());
-}
+using test::run;
 
 std::string textOf(const std::string& path) {
   std::ifstream file(path, std::ios::binary);

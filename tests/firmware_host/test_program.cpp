@@ -14,17 +14,13 @@
 #include "firmware_host/commands/program.hpp"
 #include "firmware_host/files/line_file.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"
+#include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {
 namespace {
 
-int run(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "swiftlet");
-  std::vector<char*> pointers;
-  for (std::string& argument : arguments) pointers.push_back(argument.data());
-  return runProgram(static_cast<int>(pointers.size()), pointers.data());
-}
+using test::run;
 
 TEST_CASE("exit codes: 0 done, 2 wrong use or bad input") {
   CHECK(run({"--help"}) == kExitDone);

@@ -13,6 +13,7 @@
 #include "firmware_host/inputs/log/track_feeder.hpp"
 #include "firmware_host/lab/evaluation/evaluate_run.hpp"
 #include "firmware_host/runs/replay_run.hpp"
+#include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {
@@ -20,12 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-int run(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "swiftlet");
-  std::vector<char*> pointers;
-  for (std::string& argument : arguments) pointers.push_back(argument.data());
-  return runProgram(static_cast<int>(pointers.size()), pointers.data());
-}
+using test::run;
 
 std::string textOf(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);

@@ -12,6 +12,7 @@
 #include "firmware_host/commands/program.hpp"
 #include "firmware_host/files/line_file.hpp"
 #include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
+#include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {
@@ -19,12 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-int run(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "swiftlet");
-  std::vector<char*> pointers;
-  for (std::string& argument : arguments) pointers.push_back(argument.data());
-  return runProgram(static_cast<int>(pointers.size()), pointers.data());
-}
+using test::run;
 
 std::string recordedLog() { return SWIFTLET_SOURCE_ROOT "/tests/data/euroc_mh01_4s"; }
 
