@@ -14,8 +14,6 @@
 #include <cstdio>
 #include <cstring>
 
-#include "drivers/device/host_clocks.hpp"
-
 namespace swiftlet {
 namespace {
 
@@ -256,10 +254,12 @@ DeviceFault CanBus::next(std::optional<CanFrame>& frame) {
     down_ = false;
     frame = frameOf(raw, fd);
     const HostClocks time = readHostClocks();
+    clocks_ = clocks_ ? betterOf(*clocks_, time) : time;
     frame->arrival = time.monotonic;
-    const Stamp stamped = beside.software.value_or(Stamp{}) - time.realtime_ahead;
-    if (beside.software && stamped <= time.monotonic && time.monotonic - stamped < kOldest) {
-      frame->arrival = stamped;
+    const Stamp stamped = beside.software.value_or(Stamp{}) - clocks_->realtime_ahead;
+    const Duration age = time.monotonic - stamped;
+    if (beside.software && age >= Duration{} - clocks_->error && age < kOldest) {
+      frame->arrival = std::min(stamped, time.monotonic);
     } else {
       ++counters_.without_stamp;
     }

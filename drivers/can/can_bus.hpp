@@ -8,9 +8,8 @@
 //   After kUnplugged or kMissing the socket is closed; reopen() takes the interface up when it is there
 //   again.
 // Stamps: the kernel's software stamp is CLOCK_REALTIME; the offset to CLOCK_MONOTONIC is measured at each
-// receipt,
-//   so that a step of the wall clock moves one frame at most. Hardware stamps are passed on where there are
-//   any.
+//   receipt, so that a step of the wall clock moves one frame at most, and the best measurement since the
+//   last step is used. Hardware stamps are passed on where there are any.
 // Memory: the socket's buffer in the kernel; no allocation. Cost of a frame: one call and three clock
 // readings. Source: the kernel's Documentation/networking/can.rst and timestamping.rst; linux/can/error.h.
 
@@ -21,6 +20,7 @@
 
 #include "drivers/can/can_frame.hpp"
 #include "drivers/device/device_fault.hpp"
+#include "drivers/device/host_clocks.hpp"
 
 namespace swiftlet {
 
@@ -80,6 +80,8 @@ class CanBus {
   [[nodiscard]] const CanBusCounters& counters() const { return counters_; }
   /// Whether FD frames can be sent and received.
   [[nodiscard]] bool takesFd() const { return takes_fd_; }
+  /// Of the newest frame's arrival beside the kernel's stamp, at most.
+  [[nodiscard]] Duration stampError() const { return clocks_ ? clocks_->error : Duration{}; }
   /// Bytes that the kernel set aside; less than asked where net.core.rmem_max is lower.
   [[nodiscard]] int receiveBuffer() const { return receive_buffer_; }
   /// kChanged where that is less than a quarter; says how to raise it.
@@ -101,6 +103,7 @@ class CanBus {
   bool bus_off_ = false;
   int receive_buffer_ = 0;
   std::uint32_t lost_seen_ = 0;
+  std::optional<HostClocks> clocks_;
 };
 
 }  // namespace swiftlet

@@ -1,7 +1,8 @@
 #pragma once
-// The host's two clocks at one moment: CLOCK_MONOTONIC, which stamps are of, and CLOCK_REALTIME, the wall's,
-// which NTP slews and steps. Some 0.3 us.
+// The host's two clocks at one moment: CLOCK_MONOTONIC, which stamps are of, and CLOCK_REALTIME, the wall's.
+// NTP slews both alike and steps the wall's only. Some 0.3 us.
 
+#include <cstdlib>
 #include <ctime>
 
 #include "drivers/device/monotonic_now.hpp"
@@ -29,6 +30,13 @@ struct HostClocks {
     best = {after, {wall_ns - before.ns - (after - before).ns / 2}, error};
   }
   return best;
+}
+
+/// The better known of two readings, unless the wall's clock was stepped between them: then the newer.
+[[nodiscard]] inline HostClocks betterOf(const HostClocks& older, const HostClocks& newer) {
+  const std::int64_t change = std::abs((newer.realtime_ahead - older.realtime_ahead).ns);
+  const bool stepped = change > older.error.ns + newer.error.ns;
+  return stepped || newer.error <= older.error ? newer : older;
 }
 
 }  // namespace swiftlet

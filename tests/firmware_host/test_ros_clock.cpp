@@ -65,6 +65,14 @@ TEST_CASE("an answer finds what was sent, whatever the clock did meanwhile") {
   CHECK(clock.fromRos(clock.toRos({0})) == Stamp{0});
 }
 
+TEST_CASE("the better of two readings is kept until the clock is stepped") {
+  const HostClocks good = at(0, kOffset, 50);
+  // Held up between its two calls; and one that is better.
+  CHECK(betterOf(good, at(1, kOffset + 90, 100)).error == Duration{50});
+  CHECK(betterOf(good, at(1, kOffset + 20, 30)).realtime_ahead == Duration{kOffset + 20});
+  CHECK(betterOf(good, at(1, kOffset - 3'000'000, 100)).realtime_ahead == Duration{kOffset - 3'000'000});
+}
+
 TEST_CASE("this machine's clocks") {
   RosClock clock;
   const HostClocks now = readHostClocks();
