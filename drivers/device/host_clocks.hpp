@@ -32,11 +32,14 @@ struct HostClocks {
   return best;
 }
 
-/// The better known of two readings, unless the wall's clock was stepped between them: then the newer.
+/// Whether the wall's clock was stepped between two readings: by more than their errors.
+[[nodiscard]] inline bool steppedBetween(const HostClocks& older, const HostClocks& newer) {
+  return std::abs((newer.realtime_ahead - older.realtime_ahead).ns) > older.error.ns + newer.error.ns;
+}
+
+/// The better known of two readings, unless the clock was stepped between them: then the newer.
 [[nodiscard]] inline HostClocks betterOf(const HostClocks& older, const HostClocks& newer) {
-  const std::int64_t change = std::abs((newer.realtime_ahead - older.realtime_ahead).ns);
-  const bool stepped = change > older.error.ns + newer.error.ns;
-  return stepped || newer.error <= older.error ? newer : older;
+  return steppedBetween(older, newer) || newer.error <= older.error ? newer : older;
 }
 
 }  // namespace swiftlet

@@ -1,5 +1,5 @@
 #pragma once
-// From the run's clock to that of ROS's other processes, the wall clock, as it is slewed and stepped in
+// From the run's clock to that of ROS's other processes, the wall clock, which NTP may step in
 // flight. Pure: the clocks are read by whoever calls. For one thread.
 
 #include <array>
@@ -15,13 +15,13 @@ class RosClock {
   /// Takes the newest reading of the clocks. Without any, stamps go out as they are.
   void follow(const HostClocks& now);
 
-  [[nodiscard]] Stamp toRos(Stamp stamp) const { return stamp + offset_; }
+  [[nodiscard]] Stamp toRos(Stamp stamp) const { return stamp + offset(); }
   /// Of something that will be answered under its stamp: toRos, remembered.
   Stamp toRosAndBack(Stamp stamp);
   /// The stamp that went out so, whatever the clock did since; of others by the clock as it is.
   [[nodiscard]] Stamp fromRos(Stamp ros) const;
 
-  /// Changes that no slewing explains.
+  /// Of the wall clock, as far as they are larger than the readings' errors.
   [[nodiscard]] std::uint64_t steps() const { return steps_; }
 
  private:
@@ -31,8 +31,9 @@ class RosClock {
     Stamp ros, own;
   };
 
-  Duration offset_;
-  std::optional<HostClocks> last_;
+  [[nodiscard]] Duration offset() const { return clocks_ ? clocks_->realtime_ahead : Duration{}; }
+
+  std::optional<HostClocks> clocks_;
   std::uint64_t steps_ = 0;
   std::array<Sent, kRemembered> sent_{};
   std::uint64_t sent_count_ = 0;
