@@ -99,8 +99,11 @@ MeshAccuracy meshAccuracy(const EvaluateOptions& options, const Subject& subject
     throw InputError(options.run, 0, "", "nothing says which log the meshes belong to",
                      "Give the log with --truth");
   }
-  return evaluateMeshes({options.run, subject.log, options.truth_mesh}, readEstimate(subject.files.front()),
-                        truth.poses, accuracy_options);
+  MeshEvaluationRequest request{options.run, subject.log, options.truth_mesh, {}};
+  const std::filesystem::path in_map = std::filesystem::path(options.run) / "in_map.tum";
+  std::error_code none;
+  if (std::filesystem::file_size(in_map, none) > 0 && !none) request.in_map = readEstimate(in_map);
+  return evaluateMeshes(request, readEstimate(subject.files.front()), truth.poses, accuracy_options);
 }
 
 // map.tum beside odometry.tum at the stamps of both, and how much there was to revisit.

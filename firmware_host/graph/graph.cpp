@@ -36,6 +36,7 @@ Graph::Graph(const Rig& rig, const ImuNoise& noise, const Settings& settings, Ru
   if (settings.mesh.enabled) mesh_ = make<MeshNode>(context_);
   if (settings.loop.enabled) loop_ = make<LoopNode>(context_);
   if (settings.map.enabled) map_ = make<MappingNode>(context_);
+  if (loop_ && map_ && options.kept_volume) options.kept_volume(map_->stage().submaps(), loop_->keptNodes());
   log_ = make<LogNode>(context_, observer);
   if (options.recorder != nullptr) record_ = make<RecordNode>(*options.recorder, *sensors_);
   for (Node* node : std::initializer_list<Node*>{propagate_.get(), track_.get(), smooth_.get(), mesh_.get(),

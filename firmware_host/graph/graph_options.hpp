@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <optional>
+#include <span>
 
 #include "estimator/camera/rig.hpp"
 #include "estimator/imu/imu_noise.hpp"
@@ -31,6 +32,9 @@ struct GraphOptions {
   BlockStorage* storage = nullptr;         ///< of the map; null: what its volume has no room for is lost
   const Vocabulary* vocabulary = nullptr;  ///< of loop closure; null: the shipped one; outlives the graph
   const KeptGraph* kept_map = nullptr;     ///< of settings.loop.in_map; outlives the graph's constructor
+  /// Puts the kept map's volume into that of the map, by where the graph's nodes had it; empty: there is
+  /// none.
+  std::function<void(MapSubmaps&, std::span<const WorldInMap> nodes)> kept_volume;
   /// For which `track` waits, after a frame's arrival, for the samples up to its stamp, on the host's
   /// clock; 0: never, for then whoever feeds the graph hands them over first.
   Duration sample_patience{0};

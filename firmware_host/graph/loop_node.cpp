@@ -1,5 +1,7 @@
 #include "firmware_host/graph/loop_node.hpp"
 
+#include <algorithm>
+
 #include "drivers/calibration/input_error.hpp"
 
 namespace swiftlet {
@@ -12,6 +14,11 @@ LoopLimits limitsBeside(const KeptGraph* kept) {
   limits.nodes += kept->nodes.size();
   limits.loops += kept->loops.size();
   return limits;
+}
+
+WorldInMap worldOf(const LoopStage& stage, std::size_t i) {
+  const MapNode node = stage.node(i);
+  return {node.frame, node.epoch, node.T_map_body, node.T_world_body};
 }
 
 }  // namespace
@@ -65,17 +72,25 @@ void LoopNode::step(const KeyframeMessage& message) {
   steps.send(taken);
 }
 
+std::vector<WorldInMap> LoopNode::keptNodes() const {
+  std::vector<WorldInMap> nodes;
+  for (std::size_t i = 0; i < stage_.keptCount(); ++i) nodes.push_back(worldOf(stage_, i));
+  return nodes;
+}
+
 void LoopNode::publishWorlds() {
   WorldsInMap& out = worlds.draft();
   out.newest = stage_.correction();
   out.keyframes.clear();
   stage_.tiedEpochs(out.newest.epoch, out.tied);
-  for (std::size_t i = 0; i < stage_.nodeCount(); ++i) {
-    const MapNode node = stage_.node(i);
-    if (node.epoch != out.newest.epoch && std::ranges::find(out.tied, node.epoch) == out.tied.end()) continue;
-    static_cast<void>(
-        out.keyframes.tryPushBack({node.frame, node.epoch, node.T_map_body, node.T_world_body}));
-  }
+  const auto add = [&](std::size_t i) {
+    const WorldInMap world = worldOf(stage_, i);
+    if (world.epoch == out.newest.epoch || std::ranges::find(out.tied, world.epoch) != out.tied.end())
+      static_cast<void>(out.keyframes.tryPushBack(world));
+  };
+  const std::size_t kept = stage_.keptCount();
+  for (std::size_t i = kept; i < stage_.nodeCount(); ++i) add(i);
+  for (std::size_t i = 0; i < kept; i += kept / WorldsInMap::kMostKept + 1) add(i);
   worlds.send();
 }
 

@@ -4,6 +4,8 @@
 // When it falls behind: it misses keyframes, or their images, counted; the next link bridges the gap where
 // the window still holds both keyframes.
 
+#include <vector>
+
 #include "firmware_host/graph/graph_options.hpp"
 #include "firmware_host/graph/images.hpp"
 #include "firmware_host/graph/messages.hpp"
@@ -23,6 +25,8 @@ class LoopNode final : public Node {
   Out<LoopStep> steps{*this};
 
   bool turn() override;
+  /// Of the map that it flies in; all of one epoch.
+  [[nodiscard]] std::vector<WorldInMap> keptNodes() const;
   /// Once it is done.
   [[nodiscard]] LoopStage& stage() { return stage_; }
 

@@ -116,8 +116,10 @@ struct MeshResult {
 /// piece.
 struct WorldsInMap {
   MapCorrection newest;
-  FixedVector<WorldInMap, LoopLimits{}.nodes> keyframes;  ///< by frame, which rises with the epoch
-  FixedVector<std::uint32_t, kTiedEpochs> tied;           ///< earlier epochs of the same piece
+  /// Of a kept map's nodes; the map moves evenly between them.
+  static constexpr std::size_t kMostKept = 1000;
+  FixedVector<WorldInMap, LoopLimits{}.nodes + kMostKept> keyframes;  ///< by frame
+  FixedVector<std::uint32_t, kTiedEpochs> tied;                       ///< LoopStage::tiedEpochs()
 };
 
 /// From `map` to `record`: a step, with the depth and labels that it took.

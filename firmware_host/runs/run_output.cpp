@@ -5,6 +5,8 @@
 #include "drivers/calibration/input_error.hpp"
 #include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
+#include "firmware_host/outputs/map_files/kept_folder.hpp"
+#include "firmware_host/outputs/map_files/kept_map.hpp"
 #include "firmware_host/outputs/run_folder/calibration_files.hpp"
 #include "firmware_host/outputs/run_folder/loops_csv.hpp"
 #include "firmware_host/realtime/console.hpp"
@@ -65,6 +67,12 @@ GraphOptions RunOutput::graphOptions() {
   options.vocabulary = vocabulary();
   options.kept_map = kept_map_.get();
   options.storage = &recorder_.storage();
+  if (const std::string volume = keptVolumeOf(settings_.loop.in_map);
+      kept_map_ && std::filesystem::exists(volume)) {
+    options.kept_volume = [volume](MapSubmaps& to, std::span<const WorldInMap> nodes) {
+      readKeptSubmaps(volume, to, nodes);
+    };
+  }
   return options;
 }
 

@@ -139,11 +139,12 @@ std::uint32_t LoopStage::largestPiece() const {
   return best;
 }
 
-void LoopStage::keep(KeptGraph& out) {
+std::vector<std::uint32_t> LoopStage::keep(KeptGraph& out) {
   out = {};
   out.camera = rig_.camera[0];
   out.T_body_cam = rig_.T_body_cam[0];
-  if (map_.size() == 0) return;
+  std::vector<std::uint32_t> epochs;
+  if (map_.size() == 0) return epochs;
   constexpr std::uint32_t kLeftOut = 0xffffffffU;
   const std::uint32_t piece = map_.kept() > 0 ? 0 : largestPiece();
   std::vector<std::uint32_t> number(map_.size(), kLeftOut);
@@ -152,6 +153,8 @@ void LoopStage::keep(KeptGraph& out) {
     if (!map_.joined(piece, k)) continue;
     number[k] = static_cast<std::uint32_t>(out.nodes.size());
     const LoopMap::Node& node = map_.node(k);
+    const std::uint32_t epoch = std::min(node.epoch, kKeptEpochs);
+    if (std::ranges::find(epochs, epoch) == epochs.end()) epochs.push_back(epoch);
     KeptNode& kept = out.nodes.emplace_back();
     kept.stamp = node.stamp;
     kept.T_map_body = map_.pose(k);
@@ -176,6 +179,7 @@ void LoopStage::keep(KeptGraph& out) {
     out.loops.push_back(
         {number[edge.from], number[edge.to], edge.T_from_to, covarianceFromInformation(edge.information)});
   }
+  return epochs;
 }
 
 }  // namespace swiftlet

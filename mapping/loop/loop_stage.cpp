@@ -54,7 +54,7 @@ LoopStage::LoopStage(const Rig& rig, const LoopSettings& settings, const LoopLim
 
 MapNode LoopStage::node(std::size_t i) const {
   const LoopMap::Node& node = map_.node(i);
-  return {node.stamp, node.frame, node.epoch, map_.pose(i), node.T_world_body};
+  return {node.stamp, node.frame, std::min(node.epoch, kKeptEpochs), map_.pose(i), node.T_world_body};
 }
 
 Status LoopStage::step(const LoopInput& input, const LoopEffort& effort, LoopReport& report) {
@@ -350,12 +350,13 @@ void LoopStage::tiedEpochs(std::uint32_t epoch, FixedVector<std::uint32_t, kTied
     for (std::uint32_t i = 0; i < map_.loops(); ++i) {
       if (!map_.selected(i)) continue;
       const RelativePose<SE3>& edge = map_.loopEdge(i);
-      const std::uint32_t a = map_.node(edge.from).epoch, b = map_.node(edge.to).epoch;
+      // What a kept map was made of is one.
+      const std::uint32_t a = std::min(map_.node(edge.from).epoch, kKeptEpochs);
+      const std::uint32_t b = std::min(map_.node(edge.to).epoch, kKeptEpochs);
       if (isTied(a) != isTied(b)) static_cast<void>(out.tryPushBack(isTied(a) ? b : a));
     }
   }
   std::sort(out.begin(), out.end());
-  while (!out.empty() && out.back() >= kKeptEpochs) out.popBack();
 }
 
 MapLoop LoopStage::loop(std::uint32_t i) const {

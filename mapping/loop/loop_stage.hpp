@@ -80,9 +80,9 @@ struct MapLoop {
 struct MapNode {
   Stamp stamp;
   std::uint64_t frame = 0;
-  std::uint32_t epoch = 0;
+  std::uint32_t epoch = 0;  ///< kKeptEpochs: of a kept map
   SE3 T_map_body;
-  SE3 T_world_body;  ///< as the odometry had it when it became a node
+  SE3 T_world_body;  ///< as the odometry, or the kept map, had it when it became a node
 };
 
 class LoopStage {
@@ -99,8 +99,8 @@ class LoopStage {
   /// Errors as takeIn().
   Status flyAgain(const KeptGraph& other, const LoopEffort& effort);
   /// After the flight: what later ones need. Of all that odometry and loops hold together with the kept map,
-  /// or without one with most nodes; allocates.
-  void keep(KeptGraph& out);
+  /// or without one with most nodes. Gives the epochs in it, kKeptEpochs for a kept map. Allocates.
+  std::vector<std::uint32_t> keep(KeptGraph& out);
 
   Status step(const LoopInput& input, const LoopEffort& effort, LoopReport& report);
 
@@ -110,7 +110,7 @@ class LoopStage {
   [[nodiscard]] std::size_t nodeCount() const { return map_.size(); }
   [[nodiscard]] std::size_t keptCount() const { return map_.kept(); }
   [[nodiscard]] MapNode node(std::size_t i) const;
-  /// The epochs before `epoch` whose worlds loops hold in the same map, ascending.
+  /// The other epochs whose worlds loops hold in the same map, ascending; kKeptEpochs: a kept map.
   void tiedEpochs(std::uint32_t epoch, FixedVector<std::uint32_t, kTiedEpochs>& out) const;
   [[nodiscard]] std::uint32_t loopCount() const { return map_.loops(); }
   [[nodiscard]] MapLoop loop(std::uint32_t i) const;

@@ -181,10 +181,11 @@ void MapStage::drawRest() {
 }
 
 void MapStage::resume(std::uint32_t epoch, const Eigen::Vector3d& p_map_vehicle) {
-  surface_.takeAsDrawn();
   integrator_.restart();
   epoch_ = epoch;
   vehicle_ = p_map_vehicle;
+  surface_.drawAll();
+  drawRest();
 }
 
 void MapStage::visitSurface(SurfaceSink& sink) {
@@ -207,25 +208,6 @@ void MapStage::visitSurface(SurfaceSink& sink) {
     SurfacePatch& patch;
   } moved(submaps_.submaps(), sink, moved_patch_);
   store_.visit(moved, patch_);
-}
-
-VoxelVolume MapStage::wholeVolume(const std::function<bool(std::uint32_t epoch)>& wanted) {
-  const auto visit = [&](const auto& take) {
-    submaps_.visitWhole([&](const Submap& submap) { return wanted(submap.epoch); }, take);
-  };
-  std::size_t blocks = 1, free = 0;
-  visit([&](const VoxelVolume& tile, std::span<const std::uint32_t> slots) {
-    for (const std::uint32_t slot : slots) ++(tile.voxels(slot) != nullptr ? blocks : free);
-  });
-  VolumeSettings settings = volume_.settings();
-  settings.memory_bytes =
-      VoxelVolume::bytesFor(std::max(blocks, free / VoxelVolume::kFreePerBlock + 1), settings.labels);
-  VoxelVolume whole(settings);
-  whole.beginChange();
-  visit([&](const VoxelVolume& tile, std::span<const std::uint32_t> slots) {
-    for (const std::uint32_t slot : slots) whole.copy(tile, slot);
-  });
-  return whole;
 }
 
 void MapStage::visitWholeSurface(const std::function<bool(std::uint32_t epoch)>& wanted, SurfaceSink& sink) {

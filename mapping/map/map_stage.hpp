@@ -102,25 +102,26 @@ class MapStage {
     submaps_.step(vehicle_, effort, out);
   }
   [[nodiscard]] const MapSubmaps& submaps() const { return submaps_; }
+  [[nodiscard]] MapSubmaps& submaps() { return submaps_; }
 
   /// Draws all that waits: work without a bound, for the end of a run.
   void drawRest();
   /// The surface of all that was ever mapped in epochs for which `wanted` holds, where it belongs by now; of
   /// the volume alone where there is no storage. Work without a bound, for the end of a run.
   void visitWholeSurface(const std::function<bool(std::uint32_t epoch)>& wanted, SurfaceSink& sink);
-  /// The map of `wanted` epochs, all in one volume and as much memory as it takes; else as
-  /// visitWholeSurface().
-  VoxelVolume wholeVolume(const std::function<bool(std::uint32_t epoch)>& wanted);
-  /// A kept map before the first step: `fill(volume, store, submaps)` puts its blocks and patches into both,
-  /// and blocks that have no room into the submaps. The surface counts as that of the volume; the next pose
-  /// is not judged against the last.
+  /// The same as a volume: MapSubmaps::wholeVolume().
+  VoxelVolume wholeVolume(const std::function<bool(std::uint32_t epoch)>& wanted) {
+    return submaps_.wholeVolume([&](const Submap& submap) { return wanted(submap.epoch); });
+  }
+  /// A kept map before the first step, to be gone on with from where it ended: `fill(volume, submaps)` puts
+  /// its blocks into both. The next pose is not judged against the last.
   template <typename Fill>
   void restore(std::uint32_t epoch, const Eigen::Vector3d& p_map_vehicle, const Fill& fill) {
     volume_.clear();
     store_.clear();
     submaps_.follow({{}, 0, epoch, {}, {}, {}});
     volume_.beginChange();
-    fill(volume_, store_, submaps_);
+    fill(volume_, submaps_);
     resume(epoch, p_map_vehicle);
   }
   [[nodiscard]] std::uint32_t epoch() const { return epoch_; }

@@ -78,6 +78,12 @@ void MapSubmaps::follow(const Submap& image) {
   cursor_ = 0;
 }
 
+bool MapSubmaps::addKept(const Submap& submap) {
+  if (!submaps_.addKept(submap)) return false;
+  shown_.push_back(submap.T_map_world);
+  return true;
+}
+
 void MapSubmaps::correct(std::span<const WorldInMap> worlds) {
   if (!submaps_.correct(worlds)) return;
   leaving_.clear();
@@ -232,6 +238,22 @@ void MapSubmaps::visitWhole(
     }
     take(tile, slots);
   }
+}
+
+VoxelVolume MapSubmaps::wholeVolume(const std::function<bool(const Submap&)>& wanted) {
+  std::size_t blocks = 1, free = 0;
+  visitWhole(wanted, [&](const VoxelVolume& tile, std::span<const std::uint32_t> slots) {
+    for (const std::uint32_t slot : slots) ++(tile.voxels(slot) != nullptr ? blocks : free);
+  });
+  VolumeSettings settings = volume_.settings();
+  settings.memory_bytes =
+      VoxelVolume::bytesFor(std::max(blocks, free / VoxelVolume::kFreePerBlock + 1), settings.labels);
+  VoxelVolume whole(settings);
+  whole.beginChange();
+  visitWhole(wanted, [&](const VoxelVolume& tile, std::span<const std::uint32_t> slots) {
+    for (const std::uint32_t slot : slots) whole.copy(tile, slot);
+  });
+  return whole;
 }
 
 }  // namespace swiftlet

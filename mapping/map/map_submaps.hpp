@@ -67,18 +67,20 @@ class MapSubmaps : public BlockListener, public BlockOverflow {
   void take(const BlockIndex& index, const VoxelBlock& voxels, const LabelBlock* labels) override;
   /// All of the volume's blocks are stored too: an epoch is over.
   void storeAll();
-  /// A block of a kept map, into the newest submap, for which the volume has no room.
-  void store(StoredBlock& block) {
-    block.submap = submaps_.newest();
-    stored_.put(block);
-  }
+  /// Submaps::addKept().
+  bool addKept(const Submap& submap);
+  /// A block of a kept map, of the submap that it names.
+  void store(const StoredBlock& block) { stored_.put(block); }
 
   /// Gives the blocks of the submaps for which `wanted` holds, stored ones and the volume's, as a volume
   /// holds them, tile by tile: slots of blocks whose neighbours are there too. Memory and cost without a
   /// bound on the flight's: for the end of a run.
   void visitWhole(const std::function<bool(const Submap&)>& wanted,
                   const std::function<void(const VoxelVolume&, std::span<const std::uint32_t> slots)>& take);
+  /// The same, all in one volume and as much memory as it takes.
+  VoxelVolume wholeVolume(const std::function<bool(const Submap&)>& wanted);
 
+  [[nodiscard]] const VoxelVolume& volume() const { return volume_; }
   [[nodiscard]] const Submaps& submaps() const { return submaps_; }
   [[nodiscard]] const StoredBlocks& stored() const { return stored_; }
   [[nodiscard]] const SubmapCounters& counters() const { return counters_; }

@@ -73,6 +73,12 @@ bool Submaps::isDue(const Submap& image) const {
          shiftOf(image.T_map_world, last.T_map_world_fused, image.T_world_body) > tolerance_;
 }
 
+bool Submaps::addKept(const Submap& submap) {
+  if (submaps_.size() == kMost / 2) return false;
+  submaps_.push_back(submap);
+  return true;
+}
+
 bool Submaps::follow(const Submap& image) {
   if (!isDue(image) || submaps_.size() == kMost) return false;
   if (!submaps_.empty() && submaps_.back().epoch != image.epoch) {

@@ -55,6 +55,8 @@ class Submaps {
   /// `tolerance` [m]: images whose places in the map disagree by less may share a submap.
   Submaps(MapPoses poses, double tolerance);
 
+  /// Before the first image: of an earlier flight. False: there are too many.
+  bool addKept(const Submap& submap);
   /// An image is to be fused: begins a submap where one is due (true).
   bool follow(const Submap& image);
   /// Ordered by frame; between two of one epoch the map moves evenly with the frames' numbers. Submaps of

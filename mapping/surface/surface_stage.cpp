@@ -28,11 +28,6 @@ void SurfaceStage::drawAll() {
   next_ = 0;
 }
 
-void SurfaceStage::takeAsDrawn() {
-  drawAll();
-  for (std::uint32_t slot = 0; slot < volume_.slots(); ++slot) seen_[slot] = volume_.revision(slot);
-}
-
 void SurfaceStage::findChanges() {
   for (std::uint32_t slot = 0; slot < volume_.slots(); ++slot) {
     const BlockHeader& header = volume_.header(slot);

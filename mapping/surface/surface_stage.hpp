@@ -54,8 +54,6 @@ class SurfaceStage : public BlockListener {
   void beforeRenewal(const VoxelVolume& /*volume*/, std::uint32_t /*slot*/) override {}
   /// Every block is out of date: after the volume was cleared or moved.
   void drawAll();
-  /// No block is: after the volume was loaded and the store with it.
-  void takeAsDrawn();
 
   [[nodiscard]] const SurfaceCounters& counters() const { return counters_; }
   [[nodiscard]] std::size_t bytes() const;

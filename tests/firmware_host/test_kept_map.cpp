@@ -14,7 +14,6 @@
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"
-#include "mapping/surface/surface_stage.hpp"
 #include "tests/mapping/volume_scene.hpp"
 
 using namespace swiftlet;           // NOLINT(google-build-using-namespace)
@@ -52,16 +51,14 @@ void reseal(std::string& bytes) {
 }
 
 struct Place {
-  explicit Place(const VolumeSettings& settings = sceneSettings(), std::size_t surface_bytes = 4 << 20)
-      : volume(settings), surface(surface_bytes, settings.voxel_size * kBlockSide) {}
+  explicit Place(const VolumeSettings& settings = sceneSettings()) : volume(settings) {}
   VoxelVolume volume;
-  SurfaceStore surface;
   std::uint32_t epoch = 0;
   Eigen::Vector3d vehicle = Eigen::Vector3d::Zero();
 
   [[nodiscard]] std::string kept() const {
     std::ostringstream out;
-    (void)writeKeptMap("kept", out, {volume, surface, epoch, vehicle});
+    (void)writeKeptMap("kept", out, {volume, epoch, vehicle});
     return out.str();
   }
 };
@@ -78,10 +75,7 @@ double ballInRoom(const Eigen::Vector3d& origin, const Eigen::Vector3d& ray) {
 Place mapped(int views) {
   Place place;
   VolumeIntegrator integrator(place.volume, kSceneCamera.pixels());
-  const ConfusionModel confusion;
-  SurfaceStage stage(place.volume, confusion, place.surface);
   VolumeStep fused;
-  SurfaceStep drawn;
   const std::vector<SE3> poses = viewsAround(kBall, 1.5);
   for (int i = 0; i < views; ++i) {
     const SE3& pose = poses[static_cast<std::size_t>(i)];
@@ -89,7 +83,6 @@ Place mapped(int views) {
     image.labels.assign(image.depth.size(), static_cast<std::uint8_t>(1 + i % 5));
     image.grey.assign(image.depth.size(), static_cast<std::uint8_t>(50 + i));
     (void)integrator.step(image.view(), pose, {}, fused);
-    REQUIRE(stage.step(pose.translation.cast<float>(), kAllSurface, drawn).ok());
     place.vehicle = pose.translation;
   }
   place.volume.beginChange();
@@ -104,7 +97,7 @@ Place mapped(int views) {
 KeptMapReport load(const std::string& bytes, Place& place) {
   std::istringstream in(bytes);
   KeptMapReport report = checkKeptMap("kept", in, place.volume.settings());
-  loadKeptMap("kept", in, place.volume, place.surface, nullptr, report);
+  loadKeptMap("kept", in, place.volume, nullptr, report);
   place.epoch = report.epoch;
   place.vehicle = report.p_map_vehicle;
   return report;
@@ -136,11 +129,6 @@ std::string smallMap() {
     place.volume.changeHeader(slot).sides = BlockHeader::kInFront | BlockHeader::kBehind;
   }
   for (const std::int32_t x : {4, 5, 6}) place.volume.addFree({x, 0, 0}, kAllParts, Eigen::Vector3f::Zero());
-  const ConfusionModel confusion;
-  SurfaceStage stage(place.volume, confusion, place.surface);
-  SurfaceStep drawn;
-  REQUIRE(stage.step(Eigen::Vector3f::Zero(), {}, drawn).ok());
-  REQUIRE(place.surface.patches() == 2);
   return place.kept();
 }
 
@@ -198,7 +186,7 @@ struct Flight {
   }
   [[nodiscard]] std::string kept() const {
     std::ostringstream out;
-    (void)writeKeptMap("kept", out, {map->volume(), map->surface(), map->epoch(), map->vehicle()});
+    (void)writeKeptMap("kept", out, {map->volume(), map->epoch(), map->vehicle()});
     return out.str();
   }
   Rig rig;
@@ -209,21 +197,19 @@ struct Flight {
 
 }  // namespace
 
-TEST_CASE("a map comes back bit by bit, with its surface", "[kept_map]") {
+TEST_CASE("a map comes back bit by bit", "[kept_map]") {
   const Place place = mapped(12);
   const std::string bytes = place.kept();
   Place again;
   const KeptMapReport report = load(bytes, again);
   CHECK(report.held.blocks == place.volume.blockCount());
   CHECK(report.held.free_blocks == place.volume.freeCount());
-  CHECK(report.held.patches == place.surface.patches());
-  CHECK(report.without_room.blocks + report.without_room.free_blocks + report.without_room.patches == 0);
+  CHECK(report.without_room.blocks + report.without_room.free_blocks == 0);
   REQUIRE(place.volume.freeCount() >= 600);
   CHECK(again.epoch == 3);
   CHECK(again.vehicle == place.vehicle);
   CHECK(again.kept() == bytes);
-  // Said apart from the writer: voxels and triangles.
-  const auto a = std::make_unique<SurfacePatch>(), b = std::make_unique<SurfacePatch>();
+  // Said apart from the writer.
   for (std::uint32_t slot = 0; slot < place.volume.slots(); ++slot) {
     const BlockHeader& header = place.volume.header(slot);
     if (header.state != BlockState::kVoxels) continue;
@@ -234,18 +220,6 @@ TEST_CASE("a map comes back bit by bit, with its surface", "[kept_map]") {
     CHECK(place.volume.voxels(slot)->grey == again.volume.voxels(other)->grey);
     CHECK(std::memcmp(place.volume.labels(slot), again.volume.labels(other), sizeof(LabelBlock)) == 0);
   }
-  for (std::uint32_t entry = 0; entry < place.surface.entries(); ++entry) {
-    if (!place.surface.read(entry, *a)) continue;
-    REQUIRE(again.surface.read(again.surface.find(a->block), *b));
-    REQUIRE(a->vertices.size() == b->vertices.size());
-    for (std::size_t i = 0; i < a->vertices.size(); ++i) {
-      const SurfaceVertex &v = a->vertices[i], &w = b->vertices[i];
-      const bool same = v.p_world == w.p_world && v.normal == w.normal && v.grey == w.grey &&
-                        v.label == w.label && v.probability == w.probability;
-      REQUIRE(same);
-    }
-    REQUIRE(std::equal(a->triangles.begin(), a->triangles.end(), b->triangles.begin(), b->triangles.end()));
-  }
 }
 
 TEST_CASE("a map of version 1 is read, its free blocks as free as a whole", "[kept_map]") {
@@ -253,6 +227,19 @@ TEST_CASE("a map of version 1 is read, its free blocks as free as a whole", "[ke
   CHECK(old.size() == bytes.size() - 3 * 4);
   Place place;
   CHECK(load(old, place).held.free_blocks == 3);
+  CHECK(place.kept() == bytes);
+}
+
+TEST_CASE("a map of version 2 is read, its patches of the surface left out", "[kept_map]") {
+  const std::string bytes = smallMap();
+  std::string old = bytes;
+  old[8] = 2;
+  old[56] = 1;
+  // Kind 3, four bytes of payload, before the end.
+  old.insert(old.size() - kRecord, std::string("\0\0\0\0\3\0\0\0\4\0\0\0abcd", 16));
+  reseal(old);
+  Place place;
+  CHECK(load(old, place).held.blocks == 2);
   CHECK(place.kept() == bytes);
 }
 
@@ -265,8 +252,9 @@ TEST_CASE("a map that was kept and continued is that of an uninterrupted flight"
   CHECK(report.held.blocks > 20);
   CHECK(second.kept() == first.kept());
   second.fly(11, 20);
-  // Blocks, label counts, the drift that decides when a block is drawn, patches: all of it.
+  // Blocks, label counts, the drift that decides when a block is drawn.
   CHECK(second.kept() == whole.kept());
+  CHECK(second.map->surface().patches() == whole.map->surface().patches());
   // The distance field is made anew from the volume, whose blocks lie in another order.
   for (Flight* flight : {&whole, &second}) {
     MapReport done;
@@ -329,8 +317,8 @@ TEST_CASE("with any byte changed a map is refused, and the record named", "[kept
 
 TEST_CASE("what no map holds is refused though its checksums are right", "[kept_map]") {
   const std::string good = smallMap();
-  const std::vector<std::size_t> at = recordsOf(good);  // two blocks, free ones, two patches, end
-  REQUIRE(at.size() == 6);
+  const std::vector<std::size_t> at = recordsOf(good);  // two blocks, free ones, end
+  REQUIRE(at.size() == 4);
   const auto refused = [&](std::size_t place, std::initializer_list<int> bytes, const char* field) {
     std::string changed = good;
     for (const int byte : bytes) changed[place++] = static_cast<char>(byte);
@@ -339,7 +327,8 @@ TEST_CASE("what no map holds is refused though its checksums are right", "[kept_
     CHECK(refusal(changed).find(field) != std::string::npos);
   };
   const std::size_t payload = at[0] + kRecord;
-  refused(8, {3}, "version");
+  refused(8, {4}, "version");
+  refused(56, {1}, "head");
   refused(12, {97}, "head's length");
   refused(22, {0, 0x80}, "settings");
   refused(40, {3}, "flags");
@@ -355,10 +344,6 @@ TEST_CASE("what no map holds is refused though its checksums are right", "[kept_
   refused(payload + 20 + 5 * 512 + 2, {1, 8}, "label counts");
   refused(at[1] + kRecord, {0}, "farther");
   refused(at[2] + kRecord + 12, {0, 0, 0, 0, 0, 0, 0, 0}, "free parts");
-  refused(at[3] + kRecord + 12, {9}, "vertices and triangles");
-  refused(at[3] + kRecord + 16, {0, 0, 0x80, 0x7F}, "vertex");
-  refused(at[3] + kRecord + 16 + 16, {77}, "label");
-  refused(at[5] - 1, {0xFF}, "triangle");
 }
 
 TEST_CASE("a map of other settings is refused with the setting", "[kept_map]") {
@@ -378,13 +363,11 @@ TEST_CASE("a smaller pool takes the nearest and counts the rest", "[kept_map]") 
   const Place place = mapped(20);
   VolumeSettings small = sceneSettings();
   small.memory_bytes = 30 * 8000;
-  Place taken(small, 20 * 3000);
+  Place taken(small);
   const KeptMapReport report = load(place.kept(), taken);
   CHECK(taken.volume.blockCount() == taken.volume.blockCapacity());
   CHECK(report.without_room.blocks == place.volume.blockCount() - taken.volume.blockCount());
-  CHECK(report.without_room.patches == place.surface.patches() - taken.surface.patches());
   REQUIRE(report.without_room.blocks > 10);
-  REQUIRE(report.without_room.patches > 0);
   float farthest = 0, nearest = 1e9F;
   const Eigen::Vector3f vehicle = place.vehicle.cast<float>();
   for (std::uint32_t slot = 0; slot < place.volume.slots(); ++slot) {

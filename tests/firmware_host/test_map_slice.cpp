@@ -65,9 +65,8 @@ void fuseRoom(VoxelVolume& volume) {
 }
 
 void keep(const std::string& path, const VoxelVolume& volume) {
-  const SurfaceStore none(1 << 20, volume.settings().voxel_size * kBlockSide);
   std::ofstream out(path, std::ios::binary);
-  static_cast<void>(writeKeptMap(path, out, {volume, none, 0, Eigen::Vector3d::Zero()}));
+  static_cast<void>(writeKeptMap(path, out, {volume, 0, Eigen::Vector3d::Zero()}));
 }
 
 using swiftlet::test::run;

@@ -270,17 +270,15 @@ struct MapPlace {
     std::istringstream in(bytes);
     KeptMapReport report = checkKeptMap("map", in, volume.settings());
     volume.clear();
-    surface.clear();
-    loadKeptMap("map", in, volume, surface, nullptr, report);
+    loadKeptMap("map", in, volume, nullptr, report);
     return report;
   }
   std::string kept(const KeptMapReport& report) {
     std::ostringstream out;
-    (void)writeKeptMap("map", out, {volume, surface, report.epoch, report.p_map_vehicle});
+    (void)writeKeptMap("map", out, {volume, report.epoch, report.p_map_vehicle});
     return out.str();
   }
   VoxelVolume volume{settings()};
-  SurfaceStore surface{std::size_t{64} << 10U, volume.settings().voxel_size* kBlockSide};
 };
 
 void keptMap(std::string_view text) {

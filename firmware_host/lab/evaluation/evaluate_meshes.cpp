@@ -139,6 +139,7 @@ MeshAccuracy evaluateMeshes(const MeshEvaluationRequest& request, const Trajecto
   const fs::path run(request.run);
   const bool has_sequence = fs::exists(run / "meshes" / "frames.csv");
   const Fit fit = fitOf(estimate, truth, options);
+  const Fit map_fit = request.in_map.empty() ? fit : fitOf(request.in_map, truth, options);
   accuracy.alignment = fit.text;
   if (accuracy.truth.empty()) {
     if (!has_sequence) {
@@ -154,10 +155,11 @@ MeshAccuracy evaluateMeshes(const MeshEvaluationRequest& request, const Trajecto
   const fs::path observed = fs::path(accuracy.truth).parent_path() / "observed.ply";
   const TriangleMesh points = fs::exists(observed) ? readPly(observed) : TriangleMesh();
   const auto judge = [&](const char* name) {
-    const TriangleMesh mesh = moved(readPly(run / name), fit.alignment);
+    const bool is_map = std::string_view(name) == kMapFile;
+    const TriangleMesh mesh = moved(readPly(run / name), (is_map ? map_fit : fit).alignment);
     CompleteMeshAccuracy judged = completeMeshAccuracy(mesh, surface, points.vertices);
     judged.file = name;
-    if (std::string_view(name) == kMapFile) judgeRegistered(mesh, true_mesh, surface, judged);
+    if (is_map) judgeRegistered(mesh, true_mesh, surface, judged);
     return judged;
   };
   for (const char* name : {"complete_mesh.ply", "local_mesh.ply"}) {

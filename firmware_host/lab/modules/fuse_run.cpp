@@ -133,14 +133,6 @@ void FuseRun::openKept() {
   }
   if (request_.continued.empty()) return;
   continued_ = readKeptMapFile(request_.continued, *map_);
-  const KeptMapCounts& without = continued_->without_room;
-  if (without.free_blocks + without.patches > 0) {
-    log_.warnings().add(fmt::format(
-        "{}: {} of {} free blocks and {} of {} patches have no room in memory, the farthest from where the "
-        "vehicle was last; map.volume_mib and map.surface_mib give more",
-        request_.continued, without.free_blocks, continued_->held.free_blocks, without.patches,
-        continued_->held.patches));
-  }
 }
 
 void FuseRun::take(const StereoFrame& frame) {
@@ -209,7 +201,7 @@ void FuseRun::fuse(Stamp stamp, const StereoFrame* frame, const DepthImageView& 
 }
 
 Json countsJson(const KeptMapCounts& counts) {
-  return {{"blocks", counts.blocks}, {"free_blocks", counts.free_blocks}, {"patches", counts.patches}};
+  return {{"blocks", counts.blocks}, {"free_blocks", counts.free_blocks}};
 }
 
 FuseRunResult FuseRun::end() {
@@ -231,9 +223,7 @@ FuseRunResult FuseRun::end() {
                      {"with_labels", labelled_}};
   json["map"] = writeMap(request_.out, *map_, {});
   if (continued_) {
-    json["continued"] = {{"file", request_.continued},
-                         {"held", countsJson(continued_->held)},
-                         {"without_room", countsJson(continued_->without_room)}};
+    json["continued"] = {{"file", request_.continued}, {"held", countsJson(continued_->held)}};
   }
   if (!request_.keep.empty()) {
     json["kept"] = countsJson(writeKeptMapFile(

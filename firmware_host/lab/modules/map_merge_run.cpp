@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <vector>
 
 #include "drivers/calibration/input_error.hpp"
+#include "firmware_host/outputs/map_files/block_file.hpp"
 #include "firmware_host/outputs/map_files/kept_folder.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"
 #include "mapping/loop/loop_stage.hpp"
@@ -41,6 +43,38 @@ void demand(const Status& status, const std::string& folder) {
   if (!status.ok()) throw InputError(folder, 0, "", status.what, "Name another kept map");
 }
 
+/// Each block goes with the nodes of its own map to where they are now.
+void mergeVolumes(const MapMergeRequest& request, const LoopStage& stage,
+                  const std::vector<std::uint32_t>& epochs, KeptFolder& out) {
+  struct Part {
+    std::string path;
+    std::size_t begin, end;  ///< nodes
+  };
+  std::vector<Part> parts{{keptVolumeOf(request.first), 0, stage.keptCount()},
+                          {keptVolumeOf(request.second), stage.keptCount(), stage.nodeCount()}};
+  std::erase_if(parts, [](const Part& part) { return !std::filesystem::exists(part.path); });
+  if (parts.empty()) return;
+  VolumeSettings settings = keptVolumeSettings(parts.front().path);
+  settings.memory_bytes = VoxelVolume::bytesFor(1, settings.labels);
+  VoxelVolume volume(settings);
+  BlockFile storage(out.folder());
+  MapSubmaps submaps(volume, &storage, MapPoses::kEstimated, Eigen::Vector3d::Zero());
+  std::vector<WorldInMap> worlds;
+  for (const Part& part : parts) {
+    std::vector<WorldInMap> nodes;
+    for (std::size_t i = part.begin; i < part.end; ++i) {
+      const MapNode node = stage.node(i);
+      nodes.push_back({node.frame, node.epoch, node.T_map_body, node.T_world_body});
+    }
+    readKeptSubmaps(part.path, submaps, nodes);
+    worlds.insert(worlds.end(), nodes.begin(), nodes.end());
+  }
+  std::ranges::sort(worlds, {}, &WorldInMap::frame);
+  submaps.correct(worlds);
+  out.write(submaps.wholeVolume(
+      [&](const Submap& submap) { return std::ranges::find(epochs, submap.epoch) != epochs.end(); }));
+}
+
 }  // namespace
 
 Json runMapMerge(const MapMergeRequest& request) {
@@ -60,12 +94,13 @@ Json runMapMerge(const MapMergeRequest& request) {
   effort.candidates = kMaxLoopCandidates;  // there is time
   demand(stage->flyAgain(second, effort), request.second);
   KeptGraph merged;
-  stage->keep(merged);
+  const std::vector<std::uint32_t> epochs = stage->keep(merged);
   if (merged.nodes.size() == first.nodes.size()) {
     throw InputError(request.second, 0, "", "no loops tie this map to " + request.first,
                      "Merge maps that show the same places; nothing was written");
   }
   out.write(merged);
+  mergeVolumes(request, *stage, epochs, out);
   out.commit();
   Json json = {{"first", graphJson(first)}, {"second", graphJson(second)}, {"merged", graphJson(merged)}};
   const auto between = [&](const KeptLoop& loop) {

@@ -19,6 +19,10 @@ void KeptFolder::write(MapStage& map, const std::function<bool(std::uint32_t epo
   writeKeptMapFile(folder_.file(kKeptVolumeFile), map, wanted);
 }
 
+void KeptFolder::write(const VoxelVolume& volume) {
+  writeKeptMapFile(folder_.file(kKeptVolumeFile), {volume, 0, Eigen::Vector3d::Zero()});
+}
+
 void KeptFolder::commit() {
   if (!has_graph_) {
     throw InputError(folder_.path(), 0, "", "no map was written: loop closure did not finish",

@@ -22,6 +22,9 @@ class KeptFolder {
   /// InputError where they cannot be written.
   void write(const KeptGraph& graph);
   void write(MapStage& map, const std::function<bool(std::uint32_t epoch)>& wanted);
+  void write(const VoxelVolume& volume);
+  /// For files without a name while it is filled.
+  [[nodiscard]] std::string folder() const { return folder_.file(""); }
   /// Also where no graph was written.
   void commit();
 

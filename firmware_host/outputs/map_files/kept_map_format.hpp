@@ -15,12 +15,15 @@
 
 #include "drivers/recorded/recording_format.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"
+#include "mapping/surface/surface_patch.hpp"
 
 namespace swiftlet::kept {
 
 /// As a recording's (recording_format.hpp), for maps.
 inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'S', 'W', 'M', '\r', '\n', 0x1A, '\n'};
-inline constexpr std::uint32_t kVersion = 2;
+inline constexpr std::uint32_t kVersion = 3;
+/// Before it, patches of the surface followed.
+inline constexpr std::uint32_t kVersionWithPatches = 2;
 /// Blocks were free as a whole or not at all: in place of their parts, the images that saw them so.
 inline constexpr std::uint32_t kVersionOfWholeBlocks = 1;
 inline constexpr std::size_t kHeadBytes = 96;
@@ -39,12 +42,9 @@ inline constexpr std::size_t kLabelBytes = kBlockVoxels * 8;
 inline constexpr std::size_t kFreeBytes = kIndexBytes + 8;
 inline constexpr std::size_t kFreeBytesOfWholeBlocks = kIndexBytes + 4;
 inline constexpr std::size_t kMostFree = 256;  ///< in a record
-/// Index, vertices, triangles.
-inline constexpr std::size_t kPatchBytes = kIndexBytes + 4;
-inline constexpr std::size_t kVertexBytes = 18;
-inline constexpr std::size_t kTriangleBytes = 6;
+/// Of a patch: its index and counts, vertices, triangles.
 inline constexpr std::size_t kMostPayload =
-    kPatchBytes + kMostPatchVertices * kVertexBytes + kMostPatchTriangles * kTriangleBytes;
+    kIndexBytes + 4 + kMostPatchVertices * 18 + kMostPatchTriangles * 6;
 static_assert(kMostPayload >= kBlockBytes + kLabelBytes && kMostPayload >= kMostFree * kFreeBytes);
 
 struct Head {

@@ -12,6 +12,7 @@
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 #include "firmware_host/outputs/map_files/kept_map_format.hpp"
+#include "mapping/map/kept_submaps.hpp"
 
 namespace swiftlet {
 namespace {
@@ -30,8 +31,7 @@ class MapTaker {
  public:
   virtual ~MapTaker() = default;
   virtual void block(ReadBlock& /*block*/) {}
-  virtual void freeBlock(const BlockIndex& /*block*/, std::uint64_t /*parts*/) {}
-  virtual void patch(const SurfacePatch& /*patch*/) {}
+  virtual void freeBlock(ReadBlock& /*block*/) {}
 };
 
 /// One pass over a file: each record is read whole, its checksum and then its values looked at, and given
@@ -63,7 +63,6 @@ class MapReader {
   Kind readRecord();
   void readBlock(MapTaker& taker);
   void readFree(MapTaker& taker);
-  void readPatch(MapTaker& taker);
   /// Of the payload in hand, where a part of it lies in the file.
   [[nodiscard]] std::uint64_t at(std::size_t in_payload) const { return record_ + kRecordBytes + in_payload; }
   BlockIndex readIndex(LittleEndianReader& from, std::size_t in_payload);
@@ -78,14 +77,13 @@ class MapReader {
   std::uint64_t record_ = 0;  ///< first byte of the record in hand
   std::size_t length_ = 0;    ///< of its payload
   std::vector<std::uint8_t> bytes_;
-  bool whole_blocks_ = false;  ///< kVersionOfWholeBlocks
+  std::uint32_t version_ = 0;
   Head head_;
   BlockIndex vehicle_;
   std::uint32_t head_crc_ = 0;
   std::optional<Nearness> last_;  ///< of the kind in hand
   KeptMapCounts found_;
   std::unique_ptr<ReadBlock> block_;
-  SurfacePatch patch_;
 };
 
 void MapReader::fetch(std::size_t at, std::size_t count, const char* field) {
@@ -107,16 +105,15 @@ void MapReader::readHead() {
                      "Give a file that --keep wrote, or a folder that --keep-map wrote with --map");
   }
   constexpr std::size_t kVersionAt = 8, kSizeAt = 12;
-  const std::uint32_t version = from.u32();
+  version_ = from.u32();
   const std::uint32_t bytes = from.u32();
   head_crc_ = crc32c(0, {bytes_.data(), kHeadCrcAt});
   const bool sound = head_crc_ == LittleEndianReader({bytes_.data() + kHeadCrcAt, sizeof(head_crc_)}).u32();
   demand(sound, 0, "head's checksum", "is not that of its bytes: the file is damaged");
-  whole_blocks_ = version == kVersionOfWholeBlocks;
-  if (version != kVersion && !whole_blocks_) {
+  if (version_ < kVersionOfWholeBlocks || version_ > kVersion) {
     throw InputError(
         name_, 0, fmt::format("byte {}: version", kVersionAt),
-        fmt::format("is {}, this program reads {} and {}", version, kVersionOfWholeBlocks, kVersion),
+        fmt::format("is {}, this program reads {} to {}", version_, kVersionOfWholeBlocks, kVersion),
         "Use the program that kept the map, or begin a new one");
   }
   demand(bytes == kHeadBytes, kSizeAt, "head's length", "is not that of this version");
@@ -128,14 +125,17 @@ void MapReader::readHead() {
   head_.epoch = from.u32();
   head_.counts.blocks = from.u32();
   head_.counts.free_blocks = from.u32();
-  head_.counts.patches = from.u32();
+  const std::uint32_t patches = from.u32();
   const std::uint32_t side = from.u32();
   for (int axis = 0; axis < 3; ++axis) head_.p_map_vehicle[axis] = from.f64();
-  constexpr std::size_t kSettingsAt = 16, kFlagsAt = 40, kSideAt = 60, kVehicleAt = 64, kZeroAt = 88;
+  constexpr std::size_t kSettingsAt = 16, kFlagsAt = 40, kPatchesAt = 56, kSideAt = 60, kVehicleAt = 64,
+                        kZeroAt = 88;
   const auto sane = [](double x) { return std::isfinite(x) && x > 0; };
   demand(sane(head_.voxel_size) && sane(head_.truncation) && sane(head_.reference_sigma), kSettingsAt,
          "settings", "are not positive lengths");
   demand((flags & ~kHasLabels) == 0, kFlagsAt, "flags", "has bits that this version does not know");
+  demand(version_ <= kVersionWithPatches || patches == 0, kPatchesAt, "head",
+         "has bytes that this version does not know");
   demand(side == static_cast<std::uint32_t>(kBlockSide), kSideAt, "voxels along a block",
          "are not those of this version");
   demand(head_.p_map_vehicle.allFinite(), kVehicleAt, "vehicle", "is not finite");
@@ -152,7 +152,7 @@ void MapReader::demandSettings(const VolumeSettings& settings) const {
   const auto metres = [](double x) { return fmt::format("{:g} m", x); };
   if (head_.voxel_size != settings.voxel_size) {
     differ("voxel size", metres(head_.voxel_size), metres(settings.voxel_size),
-           fmt::format("Continue it with --set map.voxel_size={:g}", head_.voxel_size));
+           fmt::format("Use --set map.voxel_size={:g}, or a map of the other size", head_.voxel_size));
   }
   if (head_.truncation != settings.truncation) {
     differ("truncation distance", metres(head_.truncation), metres(settings.truncation),
@@ -164,7 +164,7 @@ void MapReader::demandSettings(const VolumeSettings& settings) const {
   }
   if (head_.labels != settings.labels) {
     differ("labels", head_.labels ? "labels" : "no labels", settings.labels ? "labels" : "no labels",
-           fmt::format("Continue it with --set map.labels={}", head_.labels ? "true" : "false"));
+           fmt::format("Use --set map.labels={}, or another map", head_.labels ? "true" : "false"));
   }
 }
 
@@ -182,7 +182,8 @@ Kind MapReader::readRecord() {
   fetch(kRecordBytes, length, "record");
   const std::uint32_t crc = crc32c(head_crc_, {bytes_.data() + kCrc, kRecordBytes - kCrc + length});
   demand(crc == stated, record_, "record's checksum", "is not that of its bytes: the file is damaged");
-  demand(zero == 0 && kind <= static_cast<std::uint16_t>(Kind::kPatch), record_ + kCrc, "record's kind",
+  const Kind last = version_ <= kVersionWithPatches ? Kind::kPatch : Kind::kFree;
+  demand(zero == 0 && kind <= static_cast<std::uint16_t>(last), record_ + kCrc, "record's kind",
          "is none that this version knows");
   length_ = length;
   return static_cast<Kind>(kind);
@@ -209,13 +210,11 @@ void MapReader::walk(MapTaker& taker) {
     before = kind;
     if (kind == Kind::kBlock) readBlock(taker);
     if (kind == Kind::kFree) readFree(taker);
-    if (kind == Kind::kPatch) readPatch(taker);
   }
   demand(length_ == 0, record_, "end's length", "is not zero");
   const KeptMapCounts& held = head_.counts;
-  demand(found_.blocks == held.blocks && found_.free_blocks == held.free_blocks &&
-             found_.patches == held.patches,
-         record_, "end", "comes before or after as many blocks and patches as the head says");
+  demand(found_.blocks == held.blocks && found_.free_blocks == held.free_blocks, record_, "end",
+         "comes before or after as many blocks as the head says");
   demand(next_ == size_, next_, "end", "is followed by more bytes");
 }
 
@@ -228,7 +227,6 @@ void MapReader::readBlock(MapTaker& taker) {
   block.sides = from.u8();
   const auto zeros = from.bytes(3);
   block.free_parts = 0;
-  block.has_labels = head_.labels;
   demand(block.sides <= (BlockHeader::kInFront | BlockHeader::kBehind) &&
              std::ranges::all_of(zeros, [](std::uint8_t b) { return b == 0; }),
          at(kIndexBytes), "sides", "are none");
@@ -248,81 +246,45 @@ void MapReader::readBlock(MapTaker& taker) {
     demand(block.labels.counts[i].setWords(words), at(kBlockBytes + sizeof(words) * i), "label counts",
            "are not by falling count");
   }
+  block.setLabels(head_.labels ? &block.labels : nullptr);
   ++found_.blocks;
   taker.block(block);
 }
 
 void MapReader::readFree(MapTaker& taker) {
-  const std::size_t each = whole_blocks_ ? kFreeBytesOfWholeBlocks : kFreeBytes;
+  const bool whole_blocks = version_ == kVersionOfWholeBlocks;
+  const std::size_t each = whole_blocks ? kFreeBytesOfWholeBlocks : kFreeBytes;
   demand(length_ > 0 && length_ % each == 0, record_, "free blocks' length", "is not that of some");
   LittleEndianReader from = payload();
+  ReadBlock& block = *block_;
+  block.has_labels = false;
   for (std::size_t i = 0; i < length_; i += each) {
-    const BlockIndex block = readIndex(from, i);
-    std::uint64_t parts = kAllParts;
-    if (whole_blocks_) {
+    block.index = readIndex(from, i);
+    block.free_parts = kAllParts;
+    if (whole_blocks) {
       const std::uint16_t images = from.u16();
       demand(images > 0 && from.u16() == 0, at(i + kIndexBytes), "images that saw it free", "are none");
     } else {
-      parts = from.u64();
-      demand(parts != 0, at(i + kIndexBytes), "free parts", "are none");
+      block.free_parts = from.u64();
+      demand(block.free_parts != 0, at(i + kIndexBytes), "free parts", "are none");
     }
     ++found_.free_blocks;
-    taker.freeBlock(block, parts);
+    taker.freeBlock(block);
   }
 }
 
-void MapReader::readPatch(MapTaker& taker) {
-  demand(length_ >= kPatchBytes, record_, "patch's length", "is less than that of one");
-  LittleEndianReader from = payload();
-  patch_.block = readIndex(from, 0);
-  const std::size_t vertices = from.u16();
-  const std::size_t triangles = from.u16();
-  demand(vertices <= kMostPatchVertices && triangles > 0 && triangles <= kMostPatchTriangles &&
-             length_ == kPatchBytes + vertices * kVertexBytes + triangles * kTriangleBytes,
-         at(kIndexBytes), "vertices and triangles", "are not as many as the record has bytes for");
-  patch_.vertices.resize(vertices);
-  patch_.triangles.resize(triangles);
-  // A vertex lies between the block's first voxel and the next block's; one more for rounding.
-  const auto voxel = static_cast<float>(head_.voxel_size);
-  const Eigen::Array3f first =
-      Eigen::Array3f(static_cast<float>(patch_.block.x), static_cast<float>(patch_.block.y),
-                     static_cast<float>(patch_.block.z)) *
-          kBlockSide -
-      1;
-  for (std::size_t i = 0; i < vertices; ++i) {
-    SurfaceVertex& vertex = patch_.vertices[i];
-    for (int axis = 0; axis < 3; ++axis) vertex.p_world[axis] = std::bit_cast<float>(from.u32());
-    const Eigen::Array3f inside = vertex.p_world.array() / voxel - first;
-    demand((inside >= 0).all() && (inside <= kBlockSide + 3).all(), at(kPatchBytes + i * kVertexBytes),
-           "vertex", "does not lie in its block");
-    for (std::int8_t& part : vertex.normal) part = static_cast<std::int8_t>(from.u8());
-    vertex.grey = from.u8();
-    vertex.label = from.u8();
-    vertex.probability = from.u8();
-    demand(vertex.label < kLabelValues, at(kPatchBytes + i * kVertexBytes), "label", "is none");
-  }
-  for (std::size_t i = 0; i < triangles; ++i) {
-    for (std::uint16_t& corner : patch_.triangles[i]) {
-      corner = from.u16();
-      demand(corner < vertices, at(kPatchBytes + vertices * kVertexBytes + i * kTriangleBytes), "triangle",
-             "has a corner that its patch has not");
-    }
-  }
-  ++found_.patches;
-  taker.patch(patch_);
-}
-
-/// Into an empty volume: what comes later lies farther, and is left out where room ends.
-class VolumeLoader : public MapTaker {
+/// Into an empty volume: what comes later lies farther, and where room ends goes to the submaps.
+class Loader final : public MapTaker {
  public:
-  VolumeLoader(VoxelVolume& volume, const Eigen::Vector3d& p_map_vehicle, KeptMapReport& report)
-      : volume_(volume), vehicle_(p_map_vehicle.cast<float>()), report_(report) {}
+  Loader(VoxelVolume& volume, MapSubmaps* submaps, const Eigen::Vector3d& p_map_vehicle,
+         KeptMapReport& report)
+      : volume_(volume), submaps_(submaps), vehicle_(p_map_vehicle.cast<float>()), report_(report) {}
 
   void block(ReadBlock& block) override {
     const bool room = volume_.blockCount() < volume_.blockCapacity();
     const std::uint32_t slot = room ? volume_.obtain(block.index) : VoxelVolume::kNone;
     if (slot == VoxelVolume::kNone) {
-      withoutRoom(block);
+      withoutRoom(block, report_.without_room.blocks);
       return;
     }
     volume_.markChanged(slot);
@@ -333,49 +295,26 @@ class VolumeLoader : public MapTaker {
     volume_.changeVoxels(slot) = block.voxels;
     if (LabelBlock* labels = volume_.changeLabels(slot); labels != nullptr) *labels = block.labels;
   }
-  void freeBlock(const BlockIndex& block, std::uint64_t parts) override {
+  void freeBlock(ReadBlock& block) override {
     const bool room = volume_.freeCount() < volume_.freeCapacity();
-    if (room && volume_.find(block) == VoxelVolume::kNone) volume_.addFree(block, parts, vehicle_);
-    if (volume_.find(block) == VoxelVolume::kNone) ++report_.without_room.free_blocks;
+    if (room) volume_.addFree(block.index, block.free_parts, vehicle_);
+    if (volume_.find(block.index) == VoxelVolume::kNone) withoutRoom(block, report_.without_room.free_blocks);
   }
 
- protected:
-  virtual void withoutRoom(ReadBlock& /*block*/) { ++report_.without_room.blocks; }
-  [[nodiscard]] const Eigen::Vector3f& vehicle() const { return vehicle_; }
-  [[nodiscard]] KeptMapReport& report() const { return report_; }
-
  private:
+  void withoutRoom(StoredBlock& block, std::uint32_t& count) {
+    if (submaps_ == nullptr) {
+      ++count;
+      return;
+    }
+    block.submap = submaps_->submaps().newest();
+    submaps_->store(block);
+  }
+
   VoxelVolume& volume_;
+  MapSubmaps* submaps_;  ///< null: nobody has room
   Eigen::Vector3f vehicle_;
   KeptMapReport& report_;
-};
-
-/// The same, patches into an empty store, and blocks without room to the submaps.
-class Loader final : public VolumeLoader {
- public:
-  Loader(VoxelVolume& volume, SurfaceStore& surface, MapSubmaps* submaps,
-         const Eigen::Vector3d& p_map_vehicle, KeptMapReport& report)
-      : VolumeLoader(volume, p_map_vehicle, report), surface_(surface), submaps_(submaps) {}
-
-  void patch(const SurfacePatch& patch) override {
-    const SurfaceStoreCounters before = surface_.counters();
-    surface_.put(patch, vehicle());
-    const SurfaceStoreCounters& after = surface_.counters();
-    report().without_room.patches += static_cast<std::uint32_t>(after.dropped - before.dropped);
-  }
-
- protected:
-  void withoutRoom(ReadBlock& block) override {
-    if (submaps_ == nullptr) {
-      VolumeLoader::withoutRoom(block);
-    } else {
-      submaps_->store(block);
-    }
-  }
-
- private:
-  SurfaceStore& surface_;
-  MapSubmaps* submaps_;  ///< null: nobody has room
 };
 
 std::ifstream opened(const std::string& path) {
@@ -409,25 +348,23 @@ KeptMapReport checkKeptMap(const std::string& name, std::istream& in, const Volu
   return {reader.head().counts, {}, reader.head().epoch, reader.head().p_map_vehicle};
 }
 
-void loadKeptMap(const std::string& name, std::istream& in, VoxelVolume& volume, SurfaceStore& surface,
-                 MapSubmaps* submaps, KeptMapReport& report) {
+void loadKeptMap(const std::string& name, std::istream& in, VoxelVolume& volume, MapSubmaps* submaps,
+                 KeptMapReport& report) {
   MapReader reader(name, in);
   reader.demandSettings(volume.settings());
   volume.beginChange();
-  Loader loader(volume, surface, submaps, reader.head().p_map_vehicle, report);
+  Loader loader(volume, submaps, reader.head().p_map_vehicle, report);
   reader.walk(loader);
 }
 
 KeptMapReport readKeptMap(const std::string& name, std::istream& in, MapStage& map) {
   KeptMapReport report = checkKeptMap(name, in, map.volume().settings());
   try {
-    map.restore(report.epoch, report.p_map_vehicle,
-                [&](VoxelVolume& volume, SurfaceStore& surface, MapSubmaps& submaps) {
-                  loadKeptMap(name, in, volume, surface, &submaps, report);
-                });
+    map.restore(report.epoch, report.p_map_vehicle, [&](VoxelVolume& volume, MapSubmaps& submaps) {
+      loadKeptMap(name, in, volume, &submaps, report);
+    });
   } catch (const InputError&) {
-    map.restore(0, Eigen::Vector3d::Zero(),
-                [](VoxelVolume& /*volume*/, SurfaceStore& /*surface*/, MapSubmaps& /*submaps*/) {});
+    map.restore(0, Eigen::Vector3d::Zero(), [](VoxelVolume& /*volume*/, MapSubmaps& /*submaps*/) {});
     throw;
   }
   return report;
@@ -436,6 +373,30 @@ KeptMapReport readKeptMap(const std::string& name, std::istream& in, MapStage& m
 KeptMapReport readKeptMapFile(const std::string& path, MapStage& map) {
   std::ifstream in = opened(path);
   return readKeptMap(path, in, map);
+}
+
+void readKeptSubmaps(const std::string& path, MapSubmaps& to, std::span<const WorldInMap> nodes) {
+  struct IntoSubmaps : MapTaker {
+    IntoSubmaps(MapSubmaps& s, std::span<const WorldInMap> n) : submaps(s, n) {}
+    void block(ReadBlock& block) override { submaps.take(block); }
+    void freeBlock(ReadBlock& block) override { submaps.take(block); }
+    KeptSubmaps submaps;
+  };
+  if (nodes.empty()) return;
+  std::ifstream in = opened(path);
+  static_cast<void>(checkKeptMap(path, in, to.volume().settings()));
+  const std::uint64_t lost_before = to.stored().lost();
+  IntoSubmaps taker(to, nodes);
+  MapReader(path, in).walk(taker);
+  if (const std::uint64_t lost = to.stored().lost() - lost_before; lost > 0) {
+    throw InputError(path, 0, "", fmt::format("{} of its blocks cannot be stored beside the run", lost),
+                     "Make room on the disk of the run folder, or fly without --map");
+  }
+}
+
+VolumeSettings keptVolumeSettings(const std::string& path) {
+  std::ifstream in = opened(path);
+  return settingsOf(MapReader(path, in).head());
 }
 
 VoxelVolume readKeptVolumeFile(const std::string& path) {
@@ -447,7 +408,7 @@ VoxelVolume readKeptVolumeFile(const std::string& path) {
   VoxelVolume volume(settingsOf(checker.head()));
   volume.beginChange();
   KeptMapReport report;
-  VolumeLoader loader(volume, reader.head().p_map_vehicle, report);
+  Loader loader(volume, nullptr, reader.head().p_map_vehicle, report);
   reader.walk(loader);
   if (report.without_room.blocks + report.without_room.free_blocks > 0) {
     throw InputError(path, 0, "", "blocks of the map find no place in the volume's index",

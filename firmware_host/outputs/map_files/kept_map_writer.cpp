@@ -31,7 +31,6 @@ class MapWriter {
     writeHead();
     for (const Placed& block : blocks_) writeBlock(block.slot);
     writeFree();
-    for (const Placed& patch : patches_) writePatch(patch.slot);
     finish(Kind::kEnd, payload());
     out_.flush();
     if (!out_) throw InputError(name_, 0, "", "cannot be written", "Check the folder and the space left");
@@ -43,7 +42,6 @@ class MapWriter {
   void writeHead();
   void writeBlock(std::uint32_t slot);
   void writeFree();
-  void writePatch(std::uint32_t entry);
   LittleEndianWriter payload() { return LittleEndianWriter(bytes_.data() + kRecordBytes); }
   void finish(Kind kind, const LittleEndianWriter& payload);
   static void index(LittleEndianWriter& to, const BlockIndex& block) {
@@ -56,8 +54,7 @@ class MapWriter {
   std::ostream& out_;
   MapParts map_;
   Head head_;
-  std::vector<Placed> blocks_, free_, patches_;
-  SurfacePatch patch_;
+  std::vector<Placed> blocks_, free_;
   std::vector<std::uint8_t> bytes_;
   std::uint32_t head_crc_ = 0;
 };
@@ -73,12 +70,8 @@ void MapWriter::place() {
     if (header.state == BlockState::kVoxels) blocks_.push_back({nearness(header.index, vehicle), slot});
     if (header.state == BlockState::kFree) free_.push_back({nearness(header.index, vehicle), slot});
   }
-  for (std::uint32_t entry = 0; entry < map_.surface.entries(); ++entry) {
-    if (map_.surface.read(entry, patch_)) patches_.push_back({nearness(patch_.block, vehicle), entry});
-  }
-  for (auto* list : {&blocks_, &free_, &patches_}) std::sort(list->begin(), list->end());
-  head_.counts = {static_cast<std::uint32_t>(blocks_.size()), static_cast<std::uint32_t>(free_.size()),
-                  static_cast<std::uint32_t>(patches_.size())};
+  for (auto* list : {&blocks_, &free_}) std::sort(list->begin(), list->end());
+  head_.counts = {static_cast<std::uint32_t>(blocks_.size()), static_cast<std::uint32_t>(free_.size())};
 }
 
 void MapWriter::writeHead() {
@@ -93,7 +86,7 @@ void MapWriter::writeHead() {
   to.u32(head_.epoch);
   to.u32(head_.counts.blocks);
   to.u32(head_.counts.free_blocks);
-  to.u32(head_.counts.patches);
+  to.u32(0);
   to.u32(kBlockSide);
   for (int axis = 0; axis < 3; ++axis) to.f64(head_.p_map_vehicle[axis]);
   to.zeros(kHeadCrcAt - to.written());
@@ -146,25 +139,6 @@ void MapWriter::writeFree() {
   }
 }
 
-void MapWriter::writePatch(std::uint32_t entry) {
-  (void)map_.surface.read(entry, patch_);
-  LittleEndianWriter to = payload();
-  index(to, patch_.block);
-  to.u16(static_cast<std::uint16_t>(patch_.vertices.size()));
-  to.u16(static_cast<std::uint16_t>(patch_.triangles.size()));
-  for (const SurfaceVertex& vertex : patch_.vertices) {
-    for (int axis = 0; axis < 3; ++axis) to.u32(std::bit_cast<std::uint32_t>(vertex.p_world[axis]));
-    for (const std::int8_t part : vertex.normal) to.u8(static_cast<std::uint8_t>(part));
-    to.u8(vertex.grey);
-    to.u8(vertex.label);
-    to.u8(vertex.probability);
-  }
-  for (const SurfaceTriangle& triangle : patch_.triangles) {
-    for (const std::uint16_t corner : triangle) to.u16(corner);
-  }
-  finish(Kind::kPatch, to);
-}
-
 class IntoWholeFile : public std::streambuf {
  public:
   explicit IntoWholeFile(WholeFile& file) : file_(file) {}
@@ -187,13 +161,16 @@ KeptMapCounts writeKeptMap(const std::string& name, std::ostream& out, const Map
 
 KeptMapCounts writeKeptMapFile(const std::string& path, MapStage& map,
                                const std::function<bool(std::uint32_t epoch)>& wanted) {
-  map.drawRest();
   const VoxelVolume whole = map.wholeVolume(wanted);
+  return writeKeptMapFile(path, {whole, map.epoch(), map.vehicle()});
+}
+
+KeptMapCounts writeKeptMapFile(const std::string& path, const MapParts& map) {
   WholeFile file(path);
   IntoWholeFile buffer(file);
   std::ostream out(&buffer);
   out.exceptions(std::ios::badbit);  // lets the file's own error through
-  const KeptMapCounts counts = writeKeptMap(path, out, {whole, map.surface(), map.epoch(), map.vehicle()});
+  const KeptMapCounts counts = writeKeptMap(path, out, map);
   file.commit();
   return counts;
 }

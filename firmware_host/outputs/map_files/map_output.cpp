@@ -8,6 +8,7 @@
 
 #include "firmware_host/outputs/map_files/map_files.hpp"
 #include "firmware_host/outputs/map_files/map_mesh_builder.hpp"
+#include "mapping/loop/loop_map.hpp"
 
 namespace swiftlet {
 namespace {
@@ -86,7 +87,7 @@ nlohmann::ordered_json writeMap(const std::string& folder, MapStage& map,
   std::set<std::uint32_t> apart;
   for (std::size_t i = 0; i < map.submaps().submaps().size(); ++i) {
     const std::uint32_t epoch = map.submaps().submaps()[i].epoch;
-    if (!isTied(epoch)) apart.insert(epoch);
+    if (!isTied(epoch) && epoch < kKeptEpochs) apart.insert(epoch);
   }
   for (const std::uint32_t epoch : apart) {
     MapMeshBuilder own;

@@ -115,7 +115,7 @@ void RunRecorder::onPlaces(LoopStage& places) {
   writeTo(in_map_, [](InMapFile& file) { file.finish(); });
   if (!kept_) return;
   KeptGraph graph;
-  places.keep(graph);
+  kept_epochs_ = places.keep(graph);
   attempt([&] { kept_->write(graph); });
 }
 
@@ -124,10 +124,10 @@ void RunRecorder::commitMap() {
 }
 
 void RunRecorder::onMap(MapStage& map, std::span<const std::uint32_t> tied) {
-  const auto in_map = [&](std::uint32_t epoch) {
-    return epoch == map.epoch() || std::ranges::find(tied, epoch) != tied.end();
+  const auto kept = [&](std::uint32_t epoch) {
+    return std::ranges::find(kept_epochs_, epoch) != kept_epochs_.end();
   };
-  if (kept_) attempt([&] { kept_->write(map, in_map); });
+  if (kept_) attempt([&] { kept_->write(map, kept); });
   if (folder_.empty()) return;
   attempt([&] { map_ = writeMap(folder_, map, tied); });
 }

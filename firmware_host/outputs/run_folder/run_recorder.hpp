@@ -70,6 +70,7 @@ class RunRecorder : public RunListener {
   std::optional<LineFile> events_;
   std::optional<InMapFile> in_map_;
   std::optional<KeptFolder> kept_;
+  std::vector<std::uint32_t> kept_epochs_;
   std::optional<MeshSequenceWriter> meshes_;
   BlockFile storage_;
   nlohmann::ordered_json map_;
