@@ -52,13 +52,12 @@ MapSubmaps::MapSubmaps(VoxelVolume& volume, BlockStorage* storage, MapPoses pose
       half_box_(half_box) {
   leaving_.reserve(volume.slots());
   shown_.reserve(Submaps::kMost);
-  moved_.reserve(Submaps::kMost);
   static_cast<void>(volume.addListener(this));
 }
 
 std::size_t MapSubmaps::bytes() const {
   return sizeof(*this) + submaps_.bytes() + stored_.bytes() + leaving_.capacity() * sizeof(std::uint32_t) +
-         Submaps::kMost * (sizeof(SE3) + 1);
+         Submaps::kMost * sizeof(SE3);
 }
 
 Eigen::Vector3d MapSubmaps::placeOf(const BlockIndex& block, SubmapId id) const {
@@ -96,32 +95,26 @@ void MapSubmaps::correct(std::span<const WorldInMap> worlds) {
   }
   counters_.blocks_moved += leaving_.size();
   volume_.remove(leaving_);
-  // What has come back to another place comes back once more.
-  moved_.assign(submaps_.size(), 0);
-  bool any = false;
+  bool any = !leaving_.empty();
   for (std::size_t i = 0; i < submaps_.size(); ++i) {
     if (Submaps::shift(submaps_[i], shown_[i]) <= most) continue;
     shown_[i] = submaps_[i].T_map_world;
-    moved_[i] = 1;
     any = true;
   }
-  if (!any && leaving_.empty()) return;
+  if (!any) return;
   ++counters_.corrections;
-  removeFreeHints();
-  for (std::size_t i = 0; i < stored_.size(); ++i) {
-    if (moved_[stored_[i].submap] != 0 || stored_[i].is_free) stored_.setShown(i, false);
-  }
-  cursor_ = 0;
+  layHintsAnew();
 }
 
-/// They do not tell which submaps they are of: all are laid anew.
-void MapSubmaps::removeFreeHints() {
+/// They do not tell which submaps they are of, and have left with the blocks that they were laid into.
+void MapSubmaps::layHintsAnew() {
   leaving_.clear();
   for (std::uint32_t slot = 0; slot < volume_.slots(); ++slot) {
-    const BlockHeader& header = volume_.header(slot);
-    if (header.state == BlockState::kFree && header.hinted) leaving_.push_back(slot);
+    if (volume_.header(slot).isHint()) leaving_.push_back(slot);
   }
   volume_.remove(leaving_);
+  for (std::size_t i = 0; i < stored_.size(); ++i) stored_.setShown(i, false);
+  cursor_ = 0;
 }
 
 /// Whether two submaps lie to each other at a block as when they were fused.

@@ -87,7 +87,7 @@ class MapSubmaps : public BlockListener, public BlockOverflow {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  void removeFreeHints();
+  void layHintsAnew();
   [[nodiscard]] bool agree(SubmapId a, SubmapId b, const BlockIndex& block) const;
   [[nodiscard]] Eigen::Vector3d placeOf(const BlockIndex& block, SubmapId id) const;
 
@@ -100,7 +100,6 @@ class MapSubmaps : public BlockListener, public BlockOverflow {
   std::size_t cursor_ = 0;  ///< record to be looked at
   Eigen::Vector3d p_map_pass_ = Eigen::Vector3d::Zero();  ///< of the vehicle when the pass began
   std::vector<std::uint32_t> leaving_;                    ///< scratch: slots
-  std::vector<std::uint8_t> moved_;                       ///< scratch: of each submap
   StoredBlock scratch_;
   SubmapCounters counters_;
 };

@@ -53,6 +53,10 @@ struct BlockHeader {
   static constexpr std::uint8_t kBehind = 2;
 
   [[nodiscard]] bool isWhollyFree() const { return free_parts == kAllParts; }
+  /// No image has seen it.
+  [[nodiscard]] bool isHint() const {
+    return hinted && (state == BlockState::kFree || (state == BlockState::kVoxels && !observed));
+  }
 };
 
 class VoxelVolume;

@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 #include <vector>
 
+#include "mapping/map/kept_submaps.hpp"
 #include "mapping/surface/surface_stage.hpp"
 #include "tests/mapping/memory_storage.hpp"
 #include "tests/mapping/volume_scene.hpp"
@@ -401,4 +402,102 @@ TEST_CASE("the same input gives the same bytes in the storage") {
   }
   CHECK(bytes[0].size() > 0);
   CHECK(bytes[0] == bytes[1]);
+}
+
+namespace {
+
+constexpr std::uint64_t kKeptFrame = 1000;
+constexpr std::uint32_t kKeptEpoch = 100;
+
+/// The node of a kept map at a view, as it was and as it is by now.
+WorldInMap keptNode(std::size_t view, const SE3& T_kept_map, const SE3& moved = {}) {
+  const SE3 T_world_body = T_kept_map * kViews[view];
+  return {kKeptFrame + view, kKeptEpoch, moved * T_world_body, T_world_body};
+}
+
+std::vector<WorldInMap> keptNodes(const SE3& T_kept_map, const SE3& moved = {}) {
+  std::vector<WorldInMap> nodes;
+  for (std::size_t i = 0; i < kViews.size(); ++i) nodes.push_back(keptNode(i, T_kept_map, moved));
+  return nodes;
+}
+
+/// All that another flight, out of place by T_kept_map, has mapped.
+void takeKept(Map& map, const SE3& T_kept_map = {}) {
+  Map before;
+  for (std::size_t i = 0; i < kViews.size(); ++i) before.fuse(i, T_kept_map);
+  const VoxelVolume whole = before.submaps.wholeVolume([](const Submap&) { return true; });
+  KeptSubmaps kept(map.submaps, keptNodes(T_kept_map));
+  StoredBlock block;
+  for (std::uint32_t slot = 0; slot < whole.slots(); ++slot) {
+    // As a file has it: whether an image saw it is not said.
+    const BlockHeader& header = whole.header(slot);
+    block.index = header.index;
+    block.free_parts = header.state == BlockState::kFree ? header.free_parts : 0;
+    if (header.state == BlockState::kVoxels) block.voxels = *whole.voxels(slot);
+    block.setLabels(whole.labels(slot));
+    if (header.state != BlockState::kUnused) kept.take(block);
+  }
+  REQUIRE(map.submaps.stored().lost() == 0);
+}
+
+}  // namespace
+
+TEST_CASE("a kept map lies around the vehicle for as long as the flight is located in it") {
+  Map full;
+  full.fuseAll();
+  const std::size_t all = full.volume.blockCount();
+  Map map;
+  takeKept(map);
+  CHECK(map.submaps.submaps().size() == kViews.size());
+  // Nobody knows where this is, least of all that it is 3 m from there.
+  const SE3 elsewhere{Eigen::Quaterniond::Identity(), {3, 0, 0}};
+  map.fuse(0, elsewhere);
+  map.settle();
+  const std::size_t own = map.volume.blockCount();
+  CHECK(own < all / 2);
+
+  const auto located = [&](const SE3& T_map_world) {
+    std::vector<WorldInMap> worlds = keptNodes({});
+    worlds.insert(worlds.begin(), worldAt(0, T_map_world));
+    map.submaps.correct(worlds);
+    map.settle();
+  };
+  located({});
+  CHECK(map.volume.blockCount() > all * 9 / 10);
+  // Hints are in the flight's own blocks, which leave when it moves.
+  located({Eigen::Quaterniond::Identity(), {0.05, 0, 0}});
+  CHECK(map.volume.blockCount() > all * 9 / 10);
+  // Taken back, and found again.
+  map.submaps.correct(std::vector<WorldInMap>{worldAt(0, elsewhere)});
+  map.settle();
+  CHECK(map.volume.blockCount() <= own);
+  located({});
+  CHECK(map.volume.blockCount() > all * 9 / 10);
+}
+
+TEST_CASE("a kept map is moved by the nodes of its graph") {
+  Map right, map;
+  right.fuseAll();
+  takeKept(map, kWrong);
+  map.fuse(0);
+  const auto is_kept = [](const Submap& submap) { return submap.epoch == kKeptEpoch; };
+  CHECK(map.whole(is_kept).error > 5 * right.whole().error);
+  std::vector<WorldInMap> worlds = keptNodes(kWrong, kWrong.inverse());
+  worlds.insert(worlds.begin(), worldAt(0, {}));
+  map.submaps.correct(worlds);
+  const Whole moved = map.whole(is_kept);
+  CHECK(moved.error < kMovedShare * right.whole().error);
+  CHECK(moved.vertices > right.whole().vertices * 95 / 100);
+}
+
+TEST_CASE("a map of more nodes than there can be submaps is taken with some of them") {
+  Map map;
+  std::vector<WorldInMap> nodes;
+  for (std::size_t i = 0; i < 3 * KeptSubmaps::kMost; ++i) {
+    nodes.push_back(keptNode(i % kViews.size(), {}));
+    nodes.back().frame = kKeptFrame + i;
+  }
+  const KeptSubmaps kept(map.submaps, nodes);
+  CHECK(map.submaps.submaps().size() <= KeptSubmaps::kMost);
+  CHECK(map.submaps.submaps().size() > KeptSubmaps::kMost / 2);
 }
