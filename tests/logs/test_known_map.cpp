@@ -10,6 +10,7 @@
 #include "firmware_host/lab/evaluation/association.hpp"
 #include "firmware_host/lab/modules/map_merge_run.hpp"
 #include "firmware_host/outputs/map_files/kept_folder.hpp"
+#include "firmware_host/outputs/map_files/kept_map.hpp"
 #include "firmware_host/runs/replay_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
@@ -30,12 +31,12 @@ Settings quick() {
   return settings;
 }
 
-ReplayResult fly(const std::string& out, const KeptMapRequest& maps) {
+ReplayResult fly(const std::string& out, const KeptMapRequest& maps, const Settings& settings = quick()) {
   ReplayRequest request;
   request.log = shortLog();
   request.out = out;
   request.kept_maps = maps;
-  return runReplay(request, quick());
+  return runReplay(request, settings);
 }
 
 Trajectory read(const std::string& path) { return readWholeTrajectory(path, "Run again"); }
@@ -89,6 +90,76 @@ TEST_CASE("a run is located in the map of another, which stays as it is") {
     CHECK_THROWS_AS(runMapMerge({map, folder.file("damaged"), folder.file("m")}), InputError);
     CHECK_FALSE(std::filesystem::exists(folder.file("m")));
     CHECK_FALSE(std::filesystem::exists(folder.file("m.part")));
+  }
+}
+
+/// Blocks with voxels that both hold bit by bit, of all that `part` holds.
+double shareWithin(const VoxelVolume& part, const VoxelVolume& whole) {
+  std::size_t blocks = 0, same = 0;
+  for (std::uint32_t slot = 0; slot < part.slots(); ++slot) {
+    if (part.voxels(slot) == nullptr) continue;
+    ++blocks;
+    const std::uint32_t other = whole.find(part.header(slot).index);
+    if (other == VoxelVolume::kNone || whole.voxels(other) == nullptr) continue;
+    const VoxelBlock &a = *part.voxels(slot), &b = *whole.voxels(other);
+    same += a.distance == b.distance && a.weight == b.weight ? 1 : 0;
+  }
+  return static_cast<double>(same) / static_cast<double>(blocks);
+}
+
+TEST_CASE("the volume of a kept map is flown in, extended and merged") {
+  const ScratchFolder folder("known_volume");
+  const std::string map = folder.file("map");
+  Settings settings = quick();
+  settings.map.enabled = true;
+  const ReplayResult first = fly(folder.file("first"), {map, "", false}, settings);
+  const auto faces = [](const ReplayResult& run) {
+    return run.summary.at("map").at("mesh").at("faces").get<int>();
+  };
+  const auto blocks = [](const std::string& kept) {
+    return mapInfo(kept).at("volume").at("blocks").get<int>();
+  };
+  REQUIRE(blocks(map) > 100);
+
+  SECTION("located, the map is that of both flights") {
+    const std::string extended = folder.file("extended");
+    const ReplayResult second = fly(folder.file("second"), {extended, map, true}, settings);
+    REQUIRE(second.summary.at("counters").at("in_map").at("located_at_end").get<bool>());
+    // What was seen twice has weight enough for more of the surface.
+    CHECK(faces(second) > faces(first));
+    // The images are the same: out of place they would need twice the blocks.
+    CHECK(blocks(extended) >= blocks(map) * 95 / 100);
+    CHECK(blocks(extended) < blocks(map) * 5 / 4);
+    const std::string merged = folder.file("merged");
+    runMapMerge({map, extended, merged});
+    CHECK(blocks(merged) >= blocks(map) * 95 / 100);
+    CHECK(blocks(merged) < blocks(map) * 5 / 4);
+    // A volume that only one of them has comes along.
+    std::filesystem::remove(map + "/volume.swm");
+    runMapMerge({map, extended, folder.file("merged_with_one")});
+    CHECK(blocks(folder.file("merged_with_one")) >= blocks(extended) * 95 / 100);
+  }
+  SECTION("never located, it is kept as it was, and the flight's own surface is apart from it") {
+    settings.loop_stage.min_similarity = 1e3;
+    const std::string extended = folder.file("extended");
+    const ReplayResult second = fly(folder.file("second"), {extended, map, true}, settings);
+    REQUIRE_FALSE(second.summary.at("counters").at("in_map").at("located_at_end").get<bool>());
+    CHECK(blocks(extended) == blocks(map));
+    const VoxelVolume before = readKeptVolumeFile(map + "/volume.swm");
+    CHECK(shareWithin(before, readKeptVolumeFile(extended + "/volume.swm")) == 1);
+    // The kept graph is solved with the flight's, which moves that by 10 um.
+    CHECK(faces(second) == Approx(faces(first)).epsilon(0.05));
+    CHECK_FALSE(std::filesystem::exists(folder.file("second/map_epoch_2147483648.ply")));
+  }
+  SECTION("what does not fit or is damaged is refused by name") {
+    settings.map_stage.voxel_size = 0.1;
+    CHECK_THROWS_WITH(fly(folder.file("x"), {"", map, false}, settings), Catch::Contains("map.voxel_size"));
+    settings.map_stage.voxel_size = 0.05;
+    std::string damaged = textOf(map + "/volume.swm");
+    damaged[damaged.size() / 2] ^= 1;
+    std::ofstream(map + "/volume.swm", std::ios::binary) << damaged;
+    CHECK_THROWS_WITH(fly(folder.file("y"), {"", map, false}, settings), Catch::Contains("volume.swm"));
+    CHECK_NOTHROW(fly(folder.file("z"), {"", map, false}));
   }
 }
 
