@@ -66,10 +66,6 @@ void addExport(CLI::App& map, int& exit_code) {
   command->add_option("--out", request->out, "New folder for the files")->required();
   command->add_option("--z", request->z,
                       "Height of the slices in the map's frame [m]; default: the middle of the map's height");
-  command
-      ->add_option("--least-weight", request->least_weight,
-                   "Voxels of less weight carry no surface; 0.004 for a map from a depth sensor")
-      ->capture_default_str();
   command->footer(
       "surface.ply, surface.glb   the surface, for tools that measure and for viewers\n"
       "voxels.ply                 each voxel that was seen: distance, weight, grey value, label\n"

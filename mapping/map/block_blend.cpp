@@ -15,13 +15,6 @@ Eigen::Vector3d firstOf(const BlockIndex& block) {
   return kBlockSide * Eigen::Vector3d(block.x, block.y, block.z);
 }
 
-VoxelIndex voxelOf(const BlockIndex& block, std::size_t at) {
-  const auto along = [at](unsigned axis) {
-    return static_cast<std::int32_t>(at >> (kBlockBits * axis)) & kBlockMask;
-  };
-  return {kBlockSide * block.x + along(0), kBlockSide * block.y + along(1), kBlockSide * block.z + along(2)};
-}
-
 BlockRange common(const BlockRange& a, const BlockRange& b) {
   return {{std::max(a.low.x, b.low.x), std::max(a.low.y, b.low.y), std::max(a.low.z, b.low.z)},
           {std::min(a.high.x, b.high.x), std::min(a.high.y, b.high.y), std::min(a.high.z, b.high.z)}};
@@ -110,12 +103,10 @@ void BlockBlend::fill(const BlockIndex& to, const Take& take) const {
   Eigen::Vector3f rest;
   for (std::size_t at = 0; at < kBlockVoxels; ++at) {
     if (!fallsIn(voxelOf(to, at), sample.at, rest) || from.weight[sample.at] == 0) continue;
-    const auto along = [&](unsigned axis) {
-      return static_cast<int>(sample.at >> (kBlockBits * axis)) & kBlockMask;
-    };
-    const Eigen::Vector3f slope(slopeAt(from, sample.at, along(0), 1),
-                                slopeAt(from, sample.at, along(1), kBlockSide),
-                                slopeAt(from, sample.at, along(2), std::size_t{kBlockSide} * kBlockSide));
+    const VoxelIndex within = voxelOf({}, sample.at);
+    const Eigen::Vector3f slope(slopeAt(from, sample.at, within.x, 1),
+                                slopeAt(from, sample.at, within.y, kBlockSide),
+                                slopeAt(from, sample.at, within.z, std::size_t{kBlockSide} * kBlockSide));
     sample.distance = static_cast<float>(from.distance[sample.at]) + slope.dot(rest);
     take(at, sample);
   }

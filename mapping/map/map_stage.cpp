@@ -38,7 +38,7 @@ SensorDepthSettings sensorSettings(const MapSettings& settings) {
   return sensor;
 }
 
-SurfaceSettings surfaceSettings(bool has_sensor) {
+SurfaceSettings surfaceFor(bool has_sensor) {
   SurfaceSettings surface;
   if (has_sensor) surface.least_weight = SurfaceSettings::kLeastSensorWeight;
   return surface;
@@ -91,7 +91,7 @@ MapStage::MapStage(const Rig& rig, const MapSettings& settings, const DepthImage
       pair_(rig.camera_count < 2 ? nullptr : std::make_unique<Pair>(rig, settings)),
       integrator_(volume_, mostPixels(rig, depth_sensor)),
       store_(static_cast<std::size_t>(settings.surface_mib) << 20U, volume_.blockSize()),
-      surface_settings_(surfaceSettings(depth_sensor != nullptr)),
+      surface_settings_(surfaceFor(depth_sensor != nullptr)),
       surface_(volume_, confusion_, store_, surface_settings_),
       distance_(distanceLimits(settings)),
       submaps_(volume_, storage, poses,

@@ -136,6 +136,7 @@ class MapStage {
   [[nodiscard]] const SurfaceStore& surface() const { return store_; }
   /// All patches in memory, ordered by block, each where its submap lies by now.
   void visitSurface(SurfaceSink& sink);
+  [[nodiscard]] const SurfaceSettings& surfaceSettings() const { return surface_settings_; }
   [[nodiscard]] const SurfaceStage& surfaceStage() const { return surface_; }
   [[nodiscard]] const MapCounters& counters() const { return counters_; }
 

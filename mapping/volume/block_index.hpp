@@ -61,6 +61,14 @@ inline std::size_t offsetOf(const VoxelIndex& voxel) {
                                   ((voxel.z & kBlockMask) << (2 * kBlockBits)));
 }
 
+/// The voxel of a block that lies there.
+inline VoxelIndex voxelOf(const BlockIndex& block, std::size_t offset) {
+  const auto along = [offset](unsigned axis) {
+    return static_cast<std::int32_t>(offset >> (kBlockBits * axis)) & kBlockMask;
+  };
+  return {kBlockSide * block.x + along(0), kBlockSide * block.y + along(1), kBlockSide * block.z + along(2)};
+}
+
 /// Of a part of the map whose images move as one: mapping/map/submaps.hpp.
 using SubmapId = std::uint16_t;
 

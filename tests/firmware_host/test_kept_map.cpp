@@ -53,12 +53,13 @@ void reseal(std::string& bytes) {
 struct Place {
   explicit Place(const VolumeSettings& settings = sceneSettings()) : volume(settings) {}
   VoxelVolume volume;
+  double least_weight = SurfaceSettings{}.least_weight;
   std::uint32_t epoch = 0;
   Eigen::Vector3d vehicle = Eigen::Vector3d::Zero();
 
   [[nodiscard]] std::string kept() const {
     std::ostringstream out;
-    (void)writeKeptMap("kept", out, {volume, epoch, vehicle});
+    (void)writeKeptMap("kept", out, {volume, least_weight, epoch, vehicle});
     return out.str();
   }
 };
@@ -186,7 +187,8 @@ struct Flight {
   }
   [[nodiscard]] std::string kept() const {
     std::ostringstream out;
-    (void)writeKeptMap("kept", out, {map->volume(), map->epoch(), map->vehicle()});
+    (void)writeKeptMap("kept", out,
+                       {map->volume(), map->surfaceSettings().least_weight, map->epoch(), map->vehicle()});
     return out.str();
   }
   Rig rig;
@@ -328,7 +330,8 @@ TEST_CASE("what no map holds is refused though its checksums are right", "[kept_
   };
   const std::size_t payload = at[0] + kRecord;
   refused(8, {4}, "version");
-  refused(56, {1}, "head");
+  refused(58, {0x80, 0x7F}, "least weight");
+  refused(56, {0, 0, 0, 0}, "least weight");
   refused(12, {97}, "head's length");
   refused(22, {0, 0x80}, "settings");
   refused(40, {3}, "flags");

@@ -80,15 +80,14 @@ std::string keptFlight(const ScratchFolder& folder) {
 TEST_CASE("an exported map is the run's, in other formats") {
   const ScratchFolder folder("map_export");
   const std::string kept = keptFlight(folder), out = folder.file("files");
-  const nlohmann::json summary = runMapExport({kept, out + "/", {}, SurfaceSettings{}.least_weight});
+  const nlohmann::json summary = runMapExport({kept, out + "/", {}});
   CHECK(bytesOf(out + "/surface.ply") == bytesOf(folder.file("run/map.ply")));
   CHECK(bytesOf(out + "/surface.glb") == bytesOf(folder.file("run/map.glb")));
   CHECK_FALSE(fs::exists(out + ".part"));
   // As the volume of a kept folder.
   fs::create_directory(folder.file("kept"));
   fs::copy_file(kept, folder.file("kept/volume.swm"));
-  const nlohmann::json again =
-      runMapExport({folder.file("kept"), folder.file("same"), {}, SurfaceSettings{}.least_weight});
+  const nlohmann::json again = runMapExport({folder.file("kept"), folder.file("same"), {}});
   CHECK(again == summary);
 
   const VoxelVolume volume = readKeptVolumeFile(kept);
@@ -126,10 +125,22 @@ TEST_CASE("an exported map is the run's, in other formats") {
   CHECK(held == seen.size());
 }
 
+TEST_CASE("an exported surface is drawn as that of the run, with a depth sensor's weights too") {
+  const ScratchFolder folder("map_export_weight");
+  const std::string stereo = keptFlight(folder), sensor = folder.file("sensor.swm");
+  writeKeptMapFile(sensor, {readKeptVolumeFile(stereo), SurfaceSettings::kLeastSensorWeight});
+  CHECK(keptMapSettings(stereo).least_weight == Approx(SurfaceSettings{}.least_weight));
+  CHECK(keptMapSettings(sensor).least_weight == Approx(SurfaceSettings::kLeastSensorWeight));
+  const auto faces = [&](const std::string& map, const char* out) {
+    return runMapExport({map, folder.file(out), {}}).at("faces").get<int>();
+  };
+  CHECK(faces(sensor, "a") > faces(stereo, "b"));
+}
+
 TEST_CASE("slices lie where map_server puts them and say what the volume says") {
   const ScratchFolder folder("map_export_slices");
   const std::string kept = keptFlight(folder), out = folder.file("files");
-  const nlohmann::json summary = runMapExport({kept, out, {}, SurfaceSettings{}.least_weight});
+  const nlohmann::json summary = runMapExport({kept, out, {}});
   const auto occupancy = fieldsOf(out + "/occupancy.yaml"), distance = fieldsOf(out + "/distance.yaml");
   CHECK(occupancy.at("mode") == "trinary");
   CHECK(distance.at("mode") == "raw");
@@ -196,15 +207,14 @@ TEST_CASE("an export that cannot be done leaves no folder") {
     }
     return "nothing";
   };
-  CHECK_THAT(refusal({kept, out, 99, 0.02}), Contains("--z"));
-  CHECK_THAT(refusal({kept, out, {}, 0}), Contains("--least-weight"));
-  CHECK_THAT(refusal({folder.path(), out, {}, 0.02}), Contains("volume.swm"));
-  CHECK_THAT(refusal({kept, folder.file("run"), {}, 0.02}), Contains("is there already"));
+  CHECK_THAT(refusal({kept, out, 99}), Contains("--z"));
+  CHECK_THAT(refusal({folder.path(), out, {}}), Contains("volume.swm"));
+  CHECK_THAT(refusal({kept, folder.file("run"), {}}), Contains("is there already"));
   CHECK(run({"map", "export", kept, "--out", out, "--z", "99"}) == kExitBadInput);
   CHECK_FALSE(fs::exists(out));
   CHECK_FALSE(fs::exists(out + ".part"));
   fs::resize_file(kept, fs::file_size(kept) - 1);
-  CHECK_THAT(refusal({kept, out, {}, 0.02}), Contains("ends at byte"));
+  CHECK_THAT(refusal({kept, out, {}}), Contains("ends at byte"));
   CHECK_FALSE(fs::exists(out));
 }
 

@@ -66,7 +66,7 @@ void fuseRoom(VoxelVolume& volume) {
 
 void keep(const std::string& path, const VoxelVolume& volume) {
   std::ofstream out(path, std::ios::binary);
-  static_cast<void>(writeKeptMap(path, out, {volume, 0, Eigen::Vector3d::Zero()}));
+  static_cast<void>(writeKeptMap(path, out, {volume}));
 }
 
 using swiftlet::test::run;

@@ -275,7 +275,8 @@ struct MapPlace {
   }
   std::string kept(const KeptMapReport& report) {
     std::ostringstream out;
-    (void)writeKeptMap("map", out, {volume, report.epoch, report.p_map_vehicle});
+    (void)writeKeptMap("map", out,
+                       {volume, SurfaceSettings{}.least_weight, report.epoch, report.p_map_vehicle});
     return out.str();
   }
   VoxelVolume volume{settings()};

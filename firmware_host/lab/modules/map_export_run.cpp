@@ -77,17 +77,13 @@ std::vector<std::uint8_t> distancePixels(const MapSlice& slice) {
 }
 
 Json runMapExport(const MapExportRequest& request) {
-  if (!(request.least_weight > 0)) {
-    throw InputError(std::to_string(request.least_weight), 0, "--least-weight", "is not above 0",
-                     "Give a weight such as 0.02");
-  }
   const std::string kept = keptVolumeOf(request.map);
   const VoxelVolume volume = readKeptVolumeFile(kept);
   const MapSlice slice = sliceOf(kept, volume, request.z);
   NewFolder out(request.out, {"surface.ply", "surface.glb", "voxels.ply", "occupancy.png", "occupancy.yaml",
                               "distance.png", "distance.yaml"});
   const ConfusionModel confusion;
-  const MapMesh mesh = meshOf(volume, confusion, request.least_weight);
+  const MapMesh mesh = meshOf(volume, confusion, keptMapSettings(kept).least_weight);
   writeMapPly(out.file("surface.ply"), mesh);
   writeMapGlb(out.file("surface.glb"), mesh);
   const std::size_t voxels = writeVoxelPly(out.file("voxels.ply"), volume, confusion);

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "firmware_host/lab/modules/map_slice.hpp"
-#include "mapping/surface/block_surface.hpp"
 
 namespace swiftlet {
 
@@ -15,7 +14,6 @@ struct MapExportRequest {
   std::string map;          ///< kept map: its folder, or its volume
   std::string out;          ///< new folder
   std::optional<double> z;  ///< m, of the slices; none: the middle of the map's height
-  double least_weight = SurfaceSettings{}.least_weight;  ///< of voxels that carry surface
 };
 
 /// Grey values as ROS's map_server reads them with `mode: trinary`: surface 0, free 254, unknown and behind a

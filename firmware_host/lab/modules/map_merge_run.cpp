@@ -54,13 +54,15 @@ void mergeVolumes(const MapMergeRequest& request, const LoopStage& stage,
                           {keptVolumeOf(request.second), stage.keptCount(), stage.nodeCount()}};
   std::erase_if(parts, [](const Part& part) { return !std::filesystem::exists(part.path); });
   if (parts.empty()) return;
-  VolumeSettings settings = keptVolumeSettings(parts.front().path);
+  VolumeSettings settings = keptMapSettings(parts.front().path).volume;
   settings.memory_bytes = VoxelVolume::bytesFor(1, settings.labels);
   VoxelVolume volume(settings);
   BlockFile storage(out.folder());
   MapSubmaps submaps(volume, &storage, MapPoses::kEstimated, Eigen::Vector3d::Zero());
   std::vector<WorldInMap> worlds;
+  double least_weight = SurfaceSettings{}.least_weight;
   for (const Part& part : parts) {
+    least_weight = std::min(least_weight, keptMapSettings(part.path).least_weight);
     std::vector<WorldInMap> nodes;
     for (std::size_t i = part.begin; i < part.end; ++i) {
       const MapNode node = stage.node(i);
@@ -71,8 +73,10 @@ void mergeVolumes(const MapMergeRequest& request, const LoopStage& stage,
   }
   std::ranges::sort(worlds, {}, &WorldInMap::frame);
   submaps.correct(worlds);
-  out.write(submaps.wholeVolume(
-      [&](const Submap& submap) { return std::ranges::find(epochs, submap.epoch) != epochs.end(); }));
+  const auto is_kept = [&](const Submap& submap) {
+    return std::ranges::find(epochs, submap.epoch) != epochs.end();
+  };
+  out.write(submaps.wholeVolume(is_kept), least_weight);
 }
 
 }  // namespace

@@ -19,8 +19,8 @@ void KeptFolder::write(MapStage& map, const std::function<bool(std::uint32_t epo
   writeKeptMapFile(folder_.file(kKeptVolumeFile), map, wanted);
 }
 
-void KeptFolder::write(const VoxelVolume& volume) {
-  writeKeptMapFile(folder_.file(kKeptVolumeFile), {volume, 0, Eigen::Vector3d::Zero()});
+void KeptFolder::write(const VoxelVolume& volume, double least_weight) {
+  writeKeptMapFile(folder_.file(kKeptVolumeFile), {volume, least_weight});
 }
 
 void KeptFolder::commit() {

@@ -22,7 +22,7 @@ class KeptFolder {
   /// InputError where they cannot be written.
   void write(const KeptGraph& graph);
   void write(MapStage& map, const std::function<bool(std::uint32_t epoch)>& wanted);
-  void write(const VoxelVolume& volume);
+  void write(const VoxelVolume& volume, double least_weight);
   /// For files without a name while it is filled.
   [[nodiscard]] std::string folder() const { return folder_.file(""); }
   /// Also where no graph was written.

@@ -34,6 +34,7 @@ struct KeptMapReport {
 /// What is kept of a map.
 struct MapParts {
   const VoxelVolume& volume;
+  double least_weight = SurfaceSettings{}.least_weight;  ///< of its surface
   std::uint32_t epoch = 0;
   Eigen::Vector3d p_map_vehicle = Eigen::Vector3d::Zero();
 };
@@ -60,11 +61,15 @@ KeptMapReport readKeptMapFile(const std::string& path, MapStage& map);
 /// it; then `to` holds a part.
 void readKeptSubmaps(const std::string& path, MapSubmaps& to, std::span<const WorldInMap> nodes);
 
-/// With which the map was kept, in memory for all of it. Throws for a file that is missing, or whose head is
-/// damaged.
-VolumeSettings keptVolumeSettings(const std::string& path);
-/// The volume of a kept map alone, for who looks at it and does not go on with it: with the settings that it
-/// was kept with, in as much memory as the whole of it takes. Throws for a file that is missing or damaged.
+/// With what the map was kept.
+struct KeptMapSettings {
+  VolumeSettings volume;    ///< in as much memory as the whole of it takes
+  double least_weight = 0;  ///< of the surface
+};
+/// Throws for a file that is missing, or whose head is damaged.
+KeptMapSettings keptMapSettings(const std::string& path);
+/// The volume of a kept map alone, for who looks at it and does not go on with it. Throws for a file that is
+/// missing or damaged.
 VoxelVolume readKeptVolumeFile(const std::string& path);
 
 }  // namespace swiftlet

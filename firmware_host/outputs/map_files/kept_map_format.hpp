@@ -22,7 +22,7 @@ namespace swiftlet::kept {
 /// As a recording's (recording_format.hpp), for maps.
 inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'S', 'W', 'M', '\r', '\n', 0x1A, '\n'};
 inline constexpr std::uint32_t kVersion = 3;
-/// Before it, patches of the surface followed.
+/// Before it, patches of the surface followed, and their number stood in place of its least weight.
 inline constexpr std::uint32_t kVersionWithPatches = 2;
 /// Blocks were free as a whole or not at all: in place of their parts, the images that saw them so.
 inline constexpr std::uint32_t kVersionOfWholeBlocks = 1;
@@ -55,6 +55,7 @@ struct Head {
   std::uint32_t epoch = 0;
   KeptMapCounts counts;
   Eigen::Vector3d p_map_vehicle = Eigen::Vector3d::Zero();
+  double least_weight = SurfaceSettings{}.least_weight;
 };
 
 /// The order of blocks in a file: nearest to the vehicle's block first, ties by key.

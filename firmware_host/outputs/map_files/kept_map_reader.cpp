@@ -125,17 +125,18 @@ void MapReader::readHead() {
   head_.epoch = from.u32();
   head_.counts.blocks = from.u32();
   head_.counts.free_blocks = from.u32();
-  const std::uint32_t patches = from.u32();
+  const auto least_weight = std::bit_cast<float>(from.u32());
+  if (version_ > kVersionWithPatches) head_.least_weight = least_weight;
   const std::uint32_t side = from.u32();
   for (int axis = 0; axis < 3; ++axis) head_.p_map_vehicle[axis] = from.f64();
-  constexpr std::size_t kSettingsAt = 16, kFlagsAt = 40, kPatchesAt = 56, kSideAt = 60, kVehicleAt = 64,
+  constexpr std::size_t kSettingsAt = 16, kFlagsAt = 40, kLeastWeightAt = 56, kSideAt = 60, kVehicleAt = 64,
                         kZeroAt = 88;
   const auto sane = [](double x) { return std::isfinite(x) && x > 0; };
   demand(sane(head_.voxel_size) && sane(head_.truncation) && sane(head_.reference_sigma), kSettingsAt,
          "settings", "are not positive lengths");
   demand((flags & ~kHasLabels) == 0, kFlagsAt, "flags", "has bits that this version does not know");
-  demand(version_ <= kVersionWithPatches || patches == 0, kPatchesAt, "head",
-         "has bytes that this version does not know");
+  demand(std::isfinite(head_.least_weight) && head_.least_weight > 0, kLeastWeightAt, "least weight",
+         "is not positive");
   demand(side == static_cast<std::uint32_t>(kBlockSide), kSideAt, "voxels along a block",
          "are not those of this version");
   demand(head_.p_map_vehicle.allFinite(), kVehicleAt, "vehicle", "is not finite");
@@ -394,9 +395,10 @@ void readKeptSubmaps(const std::string& path, MapSubmaps& to, std::span<const Wo
   }
 }
 
-VolumeSettings keptVolumeSettings(const std::string& path) {
+KeptMapSettings keptMapSettings(const std::string& path) {
   std::ifstream in = opened(path);
-  return settingsOf(MapReader(path, in).head());
+  const MapReader reader(path, in);
+  return {settingsOf(reader.head()), reader.head().least_weight};
 }
 
 VoxelVolume readKeptVolumeFile(const std::string& path) {

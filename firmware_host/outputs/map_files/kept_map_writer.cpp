@@ -63,7 +63,7 @@ void MapWriter::place() {
   const VolumeSettings& settings = map_.volume.settings();
   head_ = {settings.voxel_size, settings.truncation, settings.reference_sigma,
            settings.labels,     map_.epoch,          {},
-           map_.p_map_vehicle};
+           map_.p_map_vehicle,  map_.least_weight};
   const BlockIndex vehicle = vehicleBlock(head_);
   for (std::uint32_t slot = 0; slot < map_.volume.slots(); ++slot) {
     const BlockHeader& header = map_.volume.header(slot);
@@ -86,7 +86,7 @@ void MapWriter::writeHead() {
   to.u32(head_.epoch);
   to.u32(head_.counts.blocks);
   to.u32(head_.counts.free_blocks);
-  to.u32(0);
+  to.u32(std::bit_cast<std::uint32_t>(static_cast<float>(head_.least_weight)));
   to.u32(kBlockSide);
   for (int axis = 0; axis < 3; ++axis) to.f64(head_.p_map_vehicle[axis]);
   to.zeros(kHeadCrcAt - to.written());
@@ -162,7 +162,7 @@ KeptMapCounts writeKeptMap(const std::string& name, std::ostream& out, const Map
 KeptMapCounts writeKeptMapFile(const std::string& path, MapStage& map,
                                const std::function<bool(std::uint32_t epoch)>& wanted) {
   const VoxelVolume whole = map.wholeVolume(wanted);
-  return writeKeptMapFile(path, {whole, map.epoch(), map.vehicle()});
+  return writeKeptMapFile(path, {whole, map.surfaceSettings().least_weight, map.epoch(), map.vehicle()});
 }
 
 KeptMapCounts writeKeptMapFile(const std::string& path, const MapParts& map) {

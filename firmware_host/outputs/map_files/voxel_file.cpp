@@ -55,13 +55,9 @@ std::size_t writeVoxelPly(const std::string& path, const VoxelVolume& volume,
     points.clear();
     for (std::size_t at = 0; at < kBlockVoxels; ++at) {
       if (block.weight[at] == 0) continue;
-      const auto middle = [&](std::int32_t of_block, unsigned axis) {
-        const int along = static_cast<int>(at >> (kBlockBits * axis)) & kBlockMask;
-        return static_cast<float>((kBlockSide * of_block + along + 0.5) * volume.settings().voxel_size);
-      };
-      addValue(points, middle(index.x, 0));
-      addValue(points, middle(index.y, 1));
-      addValue(points, middle(index.z, 2));
+      const VoxelIndex voxel = voxelOf(index, at);
+      for (const std::int32_t along : {voxel.x, voxel.y, voxel.z})
+        addValue(points, static_cast<float>((along + 0.5) * volume.settings().voxel_size));
       addValue(points, volume.distanceStep() * static_cast<float>(block.distance[at]));
       addValue(points, static_cast<float>(block.weight[at]) / static_cast<float>(kWeightSteps));
       for (int i = 0; i < 3; ++i) addValue(points, block.grey[at]);
