@@ -430,6 +430,16 @@ TEST_CASE("evaluate --mesh moves the run's meshes onto the truth") {
   CHECK(again.complete->file == "complete_mesh.ply");
   CHECK(again.complete->observed == 2);
   CHECK(again.complete->covered == 1);
+
+  // A map in the frame of a kept one, in which in_map.tum has the run's poses.
+  Alignment elsewhere;
+  elsewhere.T_to_from = SE3(expSo3({0, 0, 0.5}), {7, 0, 0});
+  writePly(folder.file("map.ply"), moved(box, elsewhere));
+  MeshEvaluationRequest located = request;
+  for (const TrajectoryPoint& point : truth)
+    located.in_map.push_back({point.stamp, elsewhere.T_to_from * point.T_world_body});
+  CHECK(evaluateMeshes(located, estimate, truth, AccuracyOptions()).map->distance.rmse < 1e-4);
+  CHECK(evaluateMeshes(request, estimate, truth, AccuracyOptions()).map->distance.rmse > 0.1);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ struct MeshEvaluationRequest {
   std::string run;         ///< folder with meshes/frames.csv, complete_mesh.ply or local_mesh.ply
   std::string log;         ///< says the cameras; its truth/ holds mesh.ply and observed.ply
   std::string truth_mesh;  ///< in place of the log's truth/mesh.ply; observed.ply is looked for beside it
-  Trajectory in_map;       ///< of a run that was located in a kept map: map.ply lies in that one's frame
+  Trajectory in_map = {};  ///< of a run that was located in a kept map: map.ply lies in that one's frame
 };
 
 /// `estimate` is the run's trajectory, `truth` the log's; meshes are moved as the fit of the one onto the
