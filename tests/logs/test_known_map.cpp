@@ -166,7 +166,9 @@ TEST_CASE("the volume of a kept map is flown in, extended and merged") {
 TEST_CASE("a threaded run in a map is repeated byte for byte") {
   const ScratchFolder folder("known_map_threaded");
   const std::string map = folder.file("map");
-  fly(folder.file("first"), {map, "", false});
+  Settings settings = quick();
+  settings.map.enabled = true;
+  fly(folder.file("first"), {map, "", false}, settings);
   ReplayRequest request;
   request.log = shortLog();
   request.out = folder.file("run");
@@ -174,7 +176,7 @@ TEST_CASE("a threaded run in a map is repeated byte for byte") {
   request.speed = kSanitized ? 0.2 : 2;
   request.record = true;
   request.kept_maps.in = map;
-  const ReplayResult flown = runReplay(request, quick());
+  const ReplayResult flown = runReplay(request, settings);
   REQUIRE(flown.finished);
   REQUIRE(flown.summary.at("counters").at("in_map").at("located_at_end").get<bool>());
   ReplayRequest again;
@@ -183,7 +185,7 @@ TEST_CASE("a threaded run in a map is repeated byte for byte") {
   again.reproduce = true;
   REQUIRE(runReplay(again, Settings{}).finished);
   CHECK_FALSE(textOf(folder.file("run/in_map.tum")).empty());
-  for (const char* file : {"odometry.tum", "in_map.tum", "map.tum"}) {
+  for (const char* file : {"odometry.tum", "in_map.tum", "map.tum", "map.ply"}) {
     CAPTURE(file);
     CHECK(textOf(folder.file("run/") + file) == textOf(folder.file("again/") + file));
   }

@@ -298,7 +298,8 @@ class Loader final : public MapTaker {
   }
   void freeBlock(ReadBlock& block) override {
     const bool room = volume_.freeCount() < volume_.freeCapacity();
-    if (room) volume_.addFree(block.index, block.free_parts, vehicle_);
+    if (room && volume_.find(block.index) == VoxelVolume::kNone)
+      volume_.addFree(block.index, block.free_parts, vehicle_);
     if (volume_.find(block.index) == VoxelVolume::kNone) withoutRoom(block, report_.without_room.free_blocks);
   }
 
