@@ -391,8 +391,8 @@ void readKeptSubmaps(const std::string& path, MapSubmaps& to, std::span<const Wo
   IntoSubmaps taker(to, nodes);
   MapReader(path, in).walk(taker);
   if (const std::uint64_t lost = to.stored().lost() - lost_before; lost > 0) {
-    throw InputError(path, 0, "", fmt::format("{} of its blocks cannot be stored beside the run", lost),
-                     "Make room on the disk of the run folder, or fly without --map");
+    throw InputError(path, 0, "", fmt::format("{} of its blocks cannot be stored in the output folder", lost),
+                     "Make room on its disk; without --map a flight needs none");
   }
 }
 

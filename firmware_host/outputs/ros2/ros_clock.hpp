@@ -1,6 +1,6 @@
 #pragma once
-// From the run's clock to that of ROS's other processes, the wall clock, which NTP may step in
-// flight. Pure: the clocks are read by whoever calls. For one thread.
+// From the run's clock to that of ROS's other processes, the wall clock, which NTP may step in flight. Pure:
+// the clocks are read by whoever calls. For one thread.
 
 #include <array>
 #include <cstdint>
