@@ -1,7 +1,6 @@
 #include "drivers/recorded/image_decoder.hpp"
 
 #include <png.h>
-#include <turbojpeg.h>
 
 #include <algorithm>
 #include <array>
@@ -102,40 +101,10 @@ bool beginsWith(std::span<const std::uint8_t> bytes, const Magic& magic) {
 
 }  // namespace
 
-ImageDecoder::ImageDecoder() : jpeg_(tjInitDecompress()) {}
-ImageDecoder::~ImageDecoder() {
-  if (jpeg_ != nullptr) tjDestroy(jpeg_);
-}
-
-DecodeResult ImageDecoder::decodeJpeg(std::span<const std::uint8_t> bytes, ImageSize expected,
-                                      std::uint8_t* out, ImageSize& found) {
-  int subsampling = 0;
-  int colour_space = 0;
-  DecodeResult result = DecodeResult::kDamaged;
-  // A file cut before the frame header passes as "tables only", with no size.
-  const bool header = jpeg_ != nullptr &&
-                      tjDecompressHeader3(jpeg_, bytes.data(), bytes.size(), &found.width, &found.height,
-                                          &subsampling, &colour_space) == 0 &&
-                      found.width > 0 && found.height > 0;
-  if (header && found != expected) result = DecodeResult::kWrongSize;
-  // A warning (the codec's word for a picture that ends early) counts as damage like an error.
-  if (header && found == expected &&
-      tjDecompress2(jpeg_, bytes.data(), bytes.size(), out, expected.width, expected.width, expected.height,
-                    TJPF_GRAY, 0) == 0) {
-    result = DecodeResult::kOk;
-  }
-  if (result == DecodeResult::kDamaged) {
-    // After an error inside a header the handle keeps the half-read state and would spoil the next picture.
-    if (jpeg_ != nullptr) tjDestroy(jpeg_);
-    jpeg_ = tjInitDecompress();
-  }
-  return result;
-}
-
 DecodeResult ImageDecoder::decode(std::span<const std::uint8_t> bytes, ImageSize expected, std::uint8_t* out,
                                   ImageSize& found) {
   found = {};
-  if (beginsWith(bytes, kJpegMagic)) return decodeJpeg(bytes, expected, out, found);
+  if (beginsWith(bytes, kJpegMagic)) return jpeg_.decode(bytes, expected, out, found);
   if (beginsWith(bytes, kPngMagic)) return decodePng(bytes, expected, Grey::k8, out, found);
   return bytes.empty() ? DecodeResult::kDamaged : DecodeResult::kUnknownFormat;
 }

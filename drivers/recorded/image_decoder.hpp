@@ -10,25 +10,12 @@
 #include <cstdint>
 #include <span>
 
+#include "drivers/image/jpeg_grey.hpp"
+
 namespace swiftlet {
-
-inline constexpr int kMaxImageSide = 16384;  // pixels; a larger one is damage, not a picture
-
-enum class DecodeResult { kOk, kUnknownFormat, kDamaged, kWrongSize };
-
-struct ImageSize {
-  int width = 0;
-  int height = 0;
-  bool operator==(const ImageSize&) const = default;
-};
 
 class ImageDecoder {
  public:
-  ImageDecoder();
-  ~ImageDecoder();
-  ImageDecoder(const ImageDecoder&) = delete;
-  ImageDecoder& operator=(const ImageDecoder&) = delete;
-
   /// Decodes into `out` of expected.width * expected.height bytes, rows packed. `found` gets the
   /// picture's size as soon as its header was read; another size than expected gives kWrongSize.
   DecodeResult decode(std::span<const std::uint8_t> bytes, ImageSize expected, std::uint8_t* out,
@@ -38,9 +25,7 @@ class ImageDecoder {
                                ImageSize& found);
 
  private:
-  DecodeResult decodeJpeg(std::span<const std::uint8_t> bytes, ImageSize expected, std::uint8_t* out,
-                          ImageSize& found);
-  void* jpeg_ = nullptr;  ///< turbojpeg's handle
+  JpegGrey jpeg_;
 };
 
 }  // namespace swiftlet

@@ -16,7 +16,6 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::uint32_t kCapture = V4L2_BUF_TYPE_VIDEO_CAPTURE;
 constexpr std::uint32_t kMinBuffers = 4;   // one being filled, one waiting, two in the pipeline's hands
 constexpr std::size_t kFewestBuffers = 2;  // with one, every second frame would be missed
 // A device that wraps or restarts its count goes back by nearly 2^32: no hole of this size.
@@ -48,54 +47,27 @@ void copyText(const char* text, std::array<char, kSize>& out) {
 void CameraDeviceSettings::setPath(const char* text) { copyText(text, path); }
 void CameraDeviceSettings::setFormat(const char* text) { copyText(text, format); }
 
-CapturedFrame& CapturedFrame::operator=(CapturedFrame&& other) noexcept {
-  if (this == &other) return *this;
-  release();
-  image = other.image;
-  stamp = other.stamp;
-  event = other.event;
-  arrival = other.arrival;
-  sequence = other.sequence;
-  buffer_ = other.buffer_;
-  generation_ = other.generation_;
-  device_ = std::exchange(other.device_, nullptr);
-  return *this;
-}
-
-void CapturedFrame::release() {
-  if (device_ != nullptr) device_->giveBack(*this);
-  device_ = nullptr;
-  image = {};
-}
-
-DeviceFault CameraDevice::open(const CameraDeviceSettings& settings) {
-  close();
-  settings_ = settings;
+DeviceFault CameraDevice::open() {
+  shut();
   warning_count_ = 0;
   facts_ = {};
-  DeviceFault fault = node_.open(settings_.path.data(), kCapture);
+  DeviceFault fault = node_.open(settings_.path.data(), VideoNode::Role::kCapture);
   if (fault.ok()) fault = negotiate();
-  return fault.ok() ? fault : closedBy(fault);
-}
-
-DeviceFault CameraDevice::reopen() {
-  const CameraDeviceSettings same = settings_;
-  DeviceFault fault = open(same);
-  if (fault.ok()) ++counters_.reopened;
+  if (!fault.ok()) return closedBy(fault);
+  if (opened_) ++counters_.reopened;
+  opened_ = true;
   return fault;
 }
 
-void CameraDevice::close() {
+void CameraDevice::shut() {
   node_.close();
-  ++generation_;
+  forgetLent();
   sequence_known_ = false;
 }
 
 DeviceFault CameraDevice::negotiate() {
   describeDevice();
   DeviceFault fault = chooseFormat();
-  if (fault.ok()) fault = setFormat();
-  if (fault.ok()) fault = setRate();
   if (!fault.ok()) return fault;
   if (settings_.exposure) warn(setExposure(node_, *settings_.exposure));
   if (settings_.gain) warn(setGain(node_, *settings_.gain));
@@ -115,66 +87,53 @@ void CameraDevice::describeDevice() {
 }
 
 DeviceFault CameraDevice::chooseFormat() {
-  std::array<char, kOfferBytes> offers = {};
   const std::string_view asked = settings_.format.data();
   const std::optional<PixelFormat> wanted = pixelFormat(asked);
-  if (!asked.empty() && !wanted) {
-    writeOffers(node_, offers.data(), offers.size());
-    return deviceFault(DeviceFaultKind::kUnsupported, 0, "format %s is not taken; offers %s", asked.data(),
-                       offers.data());
+  NodeFormat before;
+  if (node_.readFormat(before) != 0) return VideoNode::callFault(errno, "read the format");
+  DeviceFault first;
+  for (const PixelFormat& candidate : kPixelFormats) {
+    // Two cameras in one image are no camera.
+    const bool fits = wanted ? candidate == *wanted : candidate.layout != PixelLayout::kPairs;
+    if (!fits || !offersFormat(node_, code(candidate.fourcc()))) continue;
+    DeviceFault fault = setFormat(candidate, before);
+    if (fault.ok()) fault = setRate();
+    if (fault.ok()) return fault;
+    if (first.ok()) first = fault;
   }
-  for (const PixelFormat candidate : kPixelFormats) {
-    if (wanted && candidate != *wanted) continue;
-    v4l2_fmtdesc offered = {};
-    offered.type = kCapture;
-    for (; node_.call(VIDIOC_ENUM_FMT, &offered) == 0 && offered.index < UINT8_MAX; ++offered.index) {
-      if (offered.pixelformat != code(fourcc(candidate))) continue;
-      facts_.format = candidate;
-      return {};
-    }
-  }
+  if (!first.ok()) return first;
+  std::array<char, kOfferBytes> offers = {};
   writeOffers(node_, offers.data(), offers.size());
-  return deviceFault(DeviceFaultKind::kUnsupported, 0, "%s; offers %s",
-                     wanted ? settings_.format.data() : "none of GREY Y10 Y16 YUYV UYVY", offers.data());
+  if (asked.empty()) {
+    return deviceFault(DeviceFaultKind::kUnsupported, 0, "no format that is taken; offers %s", offers.data());
+  }
+  return deviceFault(DeviceFaultKind::kUnsupported, 0, "format %s is not %s; offers %s", asked.data(),
+                     wanted ? "offered" : "taken", offers.data());
 }
 
-DeviceFault CameraDevice::setFormat() {
-  v4l2_format format = {};
-  format.type = kCapture;
+DeviceFault CameraDevice::setFormat(const PixelFormat& wanted, const NodeFormat& before) {
   // What is left open stays as the camera has it.
-  if (node_.call(VIDIOC_G_FMT, &format) != 0) return VideoNode::callFault(errno, "read the format");
-  v4l2_pix_format& pix = format.fmt.pix;
-  const std::uint32_t asked = code(fourcc(facts_.format));
-  const int width = settings_.width > 0 ? settings_.width : static_cast<int>(pix.width);
-  const int height = settings_.height > 0 ? settings_.height : static_cast<int>(pix.height);
-  pix.pixelformat = asked;
-  pix.width = static_cast<std::uint32_t>(width);
-  pix.height = static_cast<std::uint32_t>(height);
-  pix.field = V4L2_FIELD_NONE;
-  pix.bytesperline = 0;
-  pix.sizeimage = 0;
-  if (node_.call(VIDIOC_S_FMT, &format) != 0)
-    return VideoNode::callFault(errno, "set the format (VIDIOC_S_FMT)");
-  facts_.width = static_cast<int>(pix.width);
-  facts_.height = static_cast<int>(pix.height);
-  facts_.stride = static_cast<int>(pix.bytesperline);
-  if (pix.pixelformat != asked || facts_.width != width || facts_.height != height) {
+  const int width = settings_.width > 0 ? settings_.width : before.width;
+  const int height = settings_.height > 0 ? settings_.height : before.height;
+  NodeFormat format = {code(wanted.fourcc()), width, height};
+  if (node_.setFormat(format) != 0) return VideoNode::callFault(errno, "set the format (VIDIOC_S_FMT)");
+  if (format.fourcc != code(wanted.fourcc()) || format.width != width || format.height != height) {
     std::array<char, kOfferBytes> offers = {};
     writeOffers(node_, offers.data(), offers.size());
     return deviceFault(DeviceFaultKind::kChanged, 0, "asked %dx%d, set %dx%d; offers %s", width, height,
-                       facts_.width, facts_.height, offers.data());
+                       format.width, format.height, offers.data());
   }
-  // Some drivers leave it open, and mean whole frames.
-  if (pix.field != V4L2_FIELD_NONE && pix.field != V4L2_FIELD_ANY) {
-    return deviceFault(DeviceFaultKind::kUnsupported, 0, "sends interlaced images");
-  }
-  facts_.stride = std::max(facts_.stride, width * bytesPerPixel(facts_.format));
+  if (!format.whole) return deviceFault(DeviceFaultKind::kUnsupported, 0, "sends interlaced images");
+  facts_.format = wanted;
+  facts_.width = width;
+  facts_.height = height;
+  facts_.stride = std::max(format.stride, wanted.rowBytes(width));
   return {};
 }
 
 DeviceFault CameraDevice::setRate() {
   v4l2_streamparm parameters = {};
-  parameters.type = kCapture;
+  parameters.type = node_.type();
   v4l2_captureparm& capture = parameters.parm.capture;
   const bool can =
       node_.call(VIDIOC_G_PARM, &parameters) == 0 && (capture.capability & V4L2_CAP_TIMEPERFRAME) != 0;
@@ -188,7 +147,7 @@ DeviceFault CameraDevice::setRate() {
   facts_.rate = static_cast<double>(capture.timeperframe.denominator) / capture.timeperframe.numerator;
   if (settings_.rate > 0 && std::abs(facts_.rate - settings_.rate) > kRateTolerance * settings_.rate) {
     std::array<char, kOfferBytes> rates = {};
-    writeRates(node_, code(fourcc(facts_.format)), facts_.width, facts_.height, rates.data(), rates.size());
+    writeRates(node_, code(facts_.format.fourcc()), facts_.width, facts_.height, rates.data(), rates.size());
     return deviceFault(DeviceFaultKind::kChanged, 0, "asked %.4g frames a second, set %.4g; offers %s",
                        settings_.rate, facts_.rate, rates.data());
   }
@@ -215,25 +174,13 @@ DeviceFault CameraDevice::setBuffers() {
     warn(fault);
   }
   for (std::uint32_t i = 0; i < facts_.buffers; ++i) {
-    if (!queue(i)) return VideoNode::callFault(errno, "handed a buffer over (VIDIOC_QBUF)");
+    if (!node_.queue(i)) return VideoNode::callFault(errno, "handed a buffer over (VIDIOC_QBUF)");
   }
   return {};
 }
 
-void CameraDevice::warn(const DeviceFault& fault) {
-  if (!fault.ok() && warning_count_ < warnings_.size()) warnings_[warning_count_++] = fault;
-}
-
-bool CameraDevice::queue(std::uint32_t index) {
-  v4l2_buffer buffer = {};
-  buffer.index = index;
-  buffer.type = kCapture;
-  buffer.memory = V4L2_MEMORY_MMAP;
-  return node_.call(VIDIOC_QBUF, &buffer) == 0;
-}
-
-void CameraDevice::giveBack(const CapturedFrame& frame) {
-  if (frame.generation_ == generation_ && isOpen() && !queue(frame.buffer_)) ++counters_.requeue_failed;
+void CameraDevice::giveBack(std::uint32_t buffer) {
+  if (isOpen() && !node_.queue(buffer)) ++counters_.requeue_failed;
 }
 
 void CameraDevice::countSequence(std::uint32_t sequence) {
@@ -249,7 +196,7 @@ void CameraDevice::countSequence(std::uint32_t sequence) {
 }
 
 DeviceFault CameraDevice::closedBy(const DeviceFault& fault) {
-  close();
+  shut();
   return fault;
 }
 
@@ -258,39 +205,35 @@ DeviceFault CameraDevice::next(CapturedFrame& frame) {
   if (!isOpen()) return deviceFault(DeviceFaultKind::kUnplugged, 0, "closed; waiting for it to come back");
   // Each refused buffer goes back to the driver, so that one call cannot be kept busy for ever.
   for (std::size_t attempt = 0; attempt < VideoNode::kMaxBuffers; ++attempt) {
-    v4l2_buffer buffer = {};
-    buffer.type = kCapture;
-    buffer.memory = V4L2_MEMORY_MMAP;
-    if (node_.call(VIDIOC_DQBUF, &buffer) != 0) {
+    FilledBuffer filled;
+    if (!node_.dequeue(filled)) {
       if (errno != EAGAIN) return closedBy(VideoNode::callFault(errno, "took an image (VIDIOC_DQBUF)"));
       // A dead queue answers "nothing yet" for ever.
       if (!node_.inError()) return {};
       return closedBy(deviceFault(DeviceFaultKind::kUnplugged, 0, "the stream ended"));
     }
     const Stamp arrival = monotonicNow();
-    countSequence(buffer.sequence);
+    countSequence(filled.sequence);
+    // Of a compressed picture its decoder knows more.
     const std::size_t needed =
-        static_cast<std::size_t>(facts_.stride) * static_cast<std::size_t>(facts_.height - 1) +
-        static_cast<std::size_t>(facts_.width * bytesPerPixel(facts_.format));
-    const bool damaged = (buffer.flags & V4L2_BUF_FLAG_ERROR) != 0;
-    const bool too_short = buffer.bytesused < needed || node_.buffer(buffer.index).size() < needed;
-    if (damaged || too_short) {
+        facts_.format.layout == PixelLayout::kJpeg
+            ? 1
+            : static_cast<std::size_t>(facts_.stride) * static_cast<std::size_t>(facts_.height - 1) +
+                  static_cast<std::size_t>(facts_.format.rowBytes(facts_.width));
+    const bool damaged = (filled.flags & V4L2_BUF_FLAG_ERROR) != 0;
+    if (damaged || filled.bytes.size() < needed) {
       ++(damaged ? counters_.damaged : counters_.too_short);
-      if (!queue(buffer.index)) ++counters_.requeue_failed;
+      if (!node_.queue(filled.index)) ++counters_.requeue_failed;
       continue;
     }
-    frame.image = {node_.buffer(buffer.index).data(), facts_.width, facts_.height, facts_.stride,
-                   facts_.format};
-    frame.event = eventOf(buffer.flags);
+    frame.image = {filled.bytes.data(), facts_.width, facts_.height, facts_.stride, facts_.format, 0,
+                   filled.bytes.size()};
+    frame.event = eventOf(filled.flags);
     frame.arrival = arrival;
-    frame.stamp = {buffer.timestamp.tv_sec * 1'000'000'000 + buffer.timestamp.tv_usec * 1'000};
-    if (frame.event == StampEvent::kArrival) frame.stamp = arrival;
+    frame.stamp = frame.event == StampEvent::kArrival ? arrival : filled.stamp;
     if (frame.stamp > arrival) ++counters_.stamp_ahead;
     frame.sequence = sequence_;
-    frame.device_ = this;
-    frame.buffer_ = buffer.index;
-    frame.generation_ = generation_;
-    ++counters_.frames;
+    lend(frame, filled.index);
     return {};
   }
   return {};

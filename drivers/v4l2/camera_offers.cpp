@@ -10,7 +10,7 @@
 #include <string_view>
 #include <system_error>
 
-#include "drivers/v4l2/pixel_format.hpp"
+#include "drivers/image/pixel_format.hpp"
 
 namespace swiftlet {
 namespace {
@@ -68,7 +68,7 @@ void forEachFormat(const VideoNode& node, const Visit& visit) {
   for (std::uint32_t i = 0; i < kMaxFormats; ++i) {
     v4l2_fmtdesc format = {};
     format.index = i;
-    format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+    format.type = node.type();
     if (node.call(VIDIOC_ENUM_FMT, &format) != 0) return;
     visit(format.pixelformat);
   }
@@ -98,7 +98,7 @@ CameraListing ask(const std::string& path) {
   CameraListing listing;
   listing.path = path;
   VideoNode node;
-  listing.fault = node.open(path.c_str(), V4L2_BUF_TYPE_VIDEO_CAPTURE);
+  listing.fault = node.open(path.c_str(), VideoNode::Role::kCapture);
   if (!listing.fault.ok()) return listing;
   v4l2_capability capability = {};
   if (node.call(VIDIOC_QUERYCAP, &capability) == 0) {
@@ -118,17 +118,20 @@ CameraListing ask(const std::string& path) {
 
 }  // namespace
 
+bool offersFormat(const VideoNode& node, std::uint32_t fourcc) {
+  bool offered = false;
+  forEachFormat(node, [&](std::uint32_t other) { offered = offered || other == fourcc; });
+  return offered;
+}
+
 void writeOffers(const VideoNode& node, char* out, std::size_t size) {
   Text text(out, size);
   std::array<std::array<char, kSizesBytes>, 2> sizes = {};
   std::size_t latest = 0;
   const char* separator = "";
-  for (const PixelFormat format : kPixelFormats) {
-    const std::string_view name = fourcc(format);
-    const std::uint32_t code = codeOf(name);
-    bool offered = false;
-    forEachFormat(node, [&](std::uint32_t other) { offered = offered || other == code; });
-    if (!offered) continue;
+  for (const PixelFormat& format : kPixelFormats) {
+    const std::uint32_t code = codeOf(format.fourcc());
+    if (!offersFormat(node, code)) continue;
     Text list(sizes[1 - latest].data(), kSizesBytes);
     forEachSize(node, code, [&](const char* word) { list.add(" ", word); });
     // Formats of the same sizes stand together, with the sizes once.

@@ -11,7 +11,8 @@
 
 namespace swiftlet {
 
-/// "GREY YUYV 640x480 752x480, UYVY 640x480, MJPG": formats that are taken first, with their sizes. Cut to
+[[nodiscard]] bool offersFormat(const VideoNode& node, std::uint32_t fourcc);
+/// "GREY YUYV 640x480 752x480, MJPG 640x480, H264": formats that are taken first, with their sizes. Cut to
 /// `size` bytes with the 0. Does not allocate.
 void writeOffers(const VideoNode& node, char* out, std::size_t size);
 /// "10 20 30": the frame rates of one format and size.

@@ -1,6 +1,7 @@
 #pragma once
-// An open video node and its mapped buffers: what capture and output have in common. Closes and unmaps
-// itself.
+// An open video node and its mapped buffers: what capture and output have in common, and nodes whose images
+// are of one plane of memory or of several. Of several the first, which has the luma, is mapped. Closes and
+// unmaps itself.
 
 #include <array>
 #include <cstddef>
@@ -8,8 +9,27 @@
 #include <span>
 
 #include "drivers/device/device_fault.hpp"
+#include "estimator/core/stamp.hpp"
 
 namespace swiftlet {
+
+/// What a node gives or takes, as in v4l2_pix_format.
+struct NodeFormat {
+  std::uint32_t fourcc = 0;
+  int width = 0;      ///< pixels
+  int height = 0;     ///< pixels
+  int stride = 0;     ///< bytes from row to row, as the driver has it
+  bool whole = true;  ///< false: interlaced
+};
+
+/// A buffer that the driver has filled.
+struct FilledBuffer {
+  std::uint32_t index = 0;
+  std::uint32_t flags = 0;
+  std::uint32_t sequence = 0;
+  Stamp stamp;
+  std::span<const std::uint8_t> bytes;
+};
 
 class VideoNode {
  public:
@@ -21,16 +41,25 @@ class VideoNode {
   VideoNode& operator=(const VideoNode&) = delete;
   ~VideoNode() { close(); }
 
-  /// Non-blocking. A node that cannot stream `type` (V4L2_BUF_TYPE_...) is refused with what it is.
-  DeviceFault open(const char* path, std::uint32_t type);
+  enum class Role : std::uint8_t { kCapture, kOutput };
+
+  /// Non-blocking. A node that cannot stream in this role is refused with what it is.
+  DeviceFault open(const char* path, Role role);
   void close();
   [[nodiscard]] int fd() const { return fd_; }
   [[nodiscard]] bool isOpen() const { return fd_ >= 0; }
+  /// V4L2_BUF_TYPE_..., for calls that are not made here.
+  [[nodiscard]] std::uint32_t type() const { return type_; }
 
   /// ioctl, again when a signal came in between; -1 and errno else.
   int call(unsigned long request, void* argument) const;
   /// The fault of the call that just failed: gone, busy, or the kernel's words. `what` names the call.
   [[nodiscard]] static DeviceFault callFault(int error, const char* what);
+
+  /// As the node has it. 0; -1 and errno.
+  int readFormat(NodeFormat& format) const;
+  /// Whole images, no padding asked; afterwards as the driver made it. 0; -1 and errno.
+  int setFormat(NodeFormat& format) const;
 
   /// Asks for and maps `count` buffers; as many as the driver gave afterwards.
   DeviceFault mapBuffers(std::uint32_t count);
@@ -40,14 +69,21 @@ class VideoNode {
   [[nodiscard]] std::uint32_t stampFlags() const { return stamp_flags_; }
 
   DeviceFault start();
+  /// Hands a buffer to the driver. `used`: bytes of an output's image. False, and errno.
+  [[nodiscard]] bool queue(std::uint32_t index, std::size_t used = 0) const;
+  /// The next one that the driver is done with. False, and errno: EAGAIN where there is none.
+  [[nodiscard]] bool dequeue(FilledBuffer& filled) const;
   /// True: poll() reports an error or a hang-up, so that nothing more will come.
   [[nodiscard]] bool inError() const;
 
  private:
+  [[nodiscard]] bool severalPlanes() const;
+
   int fd_ = -1;
   std::uint32_t type_ = 0;
   bool streaming_ = false;
   std::uint32_t stamp_flags_ = 0;
+  std::uint32_t planes_ = 1;
   std::size_t buffer_count_ = 0;
   std::array<std::span<std::uint8_t>, kMaxBuffers> buffers_{};
 };

@@ -75,13 +75,6 @@ void SensorNode::takeImu(const ImuSample& sample, Stamp arrival, const HostTimes
 
 void SensorNode::takeImage(const CameraFrame& image, const HostTimes& host) {
   if (image.image.empty()) return;
-  const auto copy = [](const void* from, std::uint8_t* to) {
-    packedCopy(*static_cast<const ImageView*>(from), to);
-  };
-  takeImage(image, host, {copy, &image.image});
-}
-
-void SensorNode::takeImage(const CameraFrame& image, const HostTimes& host, const PixelWriter& pixels) {
   if (image.camera >= context_.rig.camera_count) return;
   Camera& camera = camera_[image.camera];
   const CameraModel& model = context_.rig.camera[image.camera];
@@ -103,7 +96,7 @@ void SensorNode::takeImage(const CameraFrame& image, const HostTimes& host, cons
   slot.frame.timeline = imu_time.timeline;
   slot.frame.number = ++counters_.images[image.camera];
   slot.host = host;
-  pixels.write(pixels.device, slot.pixels.get());
+  packedCopy(image.image, slot.pixels.get());
   slot.frame.image = {slot.pixels.get(), image.image.width, image.image.height, image.image.width};
   if (camera.record != nullptr) camera.record->hand(handle);
   if (held_out) {

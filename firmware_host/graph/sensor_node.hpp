@@ -45,8 +45,6 @@ class SensorNode final : public Node {
 
   void takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host);
   void takeImage(const CameraFrame& image, const HostTimes& host);
-  /// The same where the pixels are not grey bytes in rows: `image.image` says the size, `pixels` writes them.
-  void takeImage(const CameraFrame& image, const HostTimes& host, const PixelWriter& pixels);
   /// Depth and labels of the image of camera 0 that comes next. Without a map: nothing happens.
   void takeScene(const SceneImages& scene);
   void endInput() { finish(); }

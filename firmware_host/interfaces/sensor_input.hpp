@@ -32,8 +32,6 @@ class SensorSink {
   /// Of the thread of camera 0, before its image.
   virtual void takeScene(const SceneImages& scene) = 0;
   virtual void takeImage(const CameraFrame& image, const HostTimes& host) = 0;
-  /// As SensorNode::takeImage: `image.image` says the size alone.
-  virtual void takeImage(const CameraFrame& image, const HostTimes& host, const PixelWriter& pixels) = 0;
   /// Any thread: the input has come to its end, and its threads return.
   virtual void expectEnd() {}
 };

@@ -143,11 +143,6 @@ class Run : public SensorSink {
     graph_.track().bell().ring();
   }
 
-  void takeImage(const CameraFrame& image, const HostTimes& host, const PixelWriter& pixels) override {
-    graph_.sensors().takeImage(image, host, pixels);
-    graph_.track().bell().ring();
-  }
-
   void expectEnd() override {
     if (options_.expect_end) options_.expect_end();
   }

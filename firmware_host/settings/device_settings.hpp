@@ -25,7 +25,7 @@ struct CamerasGroup {
   std::string device0 = "";
   std::string device1 = "";
   bool side_by_side = false;
-  std::string format = "GREY";
+  std::string format = "any";
   double rate_hz = 20;
   double exposure_ms = 0;  ///< 0: as the camera has it
   int gain = -1;           ///< below 0: as the camera has it

@@ -41,10 +41,14 @@ std::vector<Setting> deviceSettings() {
        TextSetting{member(kCameras, &C::device0), "a node as /dev/video0, or empty"}},
       {"cameras.device1", "", "Video node of camera 1; empty: one camera, or both in one image.",
        TextSetting{member(kCameras, &C::device1), "a node as /dev/video2, or empty"}},
-      {"cameras.side_by_side", "", "device0 gives both cameras in one image, camera 0 in its left half.",
+      {"cameras.side_by_side", "",
+       "device0 gives both cameras in one image, camera 0 in its left half (format Y8I: pixel beside pixel, "
+       "without this).",
        onOff(kCameras, &C::side_by_side)},
-      {"cameras.format", "", "Pixels that the cameras are asked for.",
-       ChoiceSetting{member(kCameras, &C::format), {"GREY", "Y10", "Y16", "YUYV", "UYVY"}}},
+      {"cameras.format", "",
+       "Pixels that the cameras are asked for, by V4L2's four letters, docs/v4l2.md; any: the first that is "
+       "taken and comes in the calibration's size at rate_hz, MJPG last.",
+       TextSetting{member(kCameras, &C::format), "four letters as GREY or MJPG, or any"}},
       {"cameras.rate_hz", "Hz", "Images per second that each camera is asked for.",
        real(kCameras, &C::rate_hz, 1, 500)},
       {"cameras.exposure_ms", "ms",

@@ -33,13 +33,15 @@ RoomTable directNeighbours() {
   for (const char* driver : {"calibration", "recorded", "simulated", "device", "dds"}) {
     table[std::string("drivers/") + driver] = world_and_imu;
   }
-  for (const char* driver : {"v4l2", "serial", "can", "gpio", "timesync", "mavlink"}) {
+  for (const char* driver : {"serial", "can", "gpio", "timesync", "mavlink"}) {
     table[std::string("drivers/") + driver] = {"drivers/device"};
   }
+  table["drivers/image"] = {"drivers/device"};
+  table["drivers/v4l2"] = {"drivers/image"};
   // An autopilot's inertial messages come over a serial port like any sensor's.
   table["drivers/serial"].insert("drivers/mavlink");
   // Calibration as users have it; a simulated flight is written as a recorded one.
-  table["drivers/recorded"].insert("drivers/calibration");
+  table["drivers/recorded"].insert({"drivers/calibration", "drivers/image"});
   table["drivers/simulated"].insert("drivers/recorded");
   return table;
 }

@@ -75,6 +75,7 @@ TEST_CASE("the program's flight path has no locks") {
                                                     "firmware_host/inputs",
                                                     "firmware_host/outputs/autopilot",
                                                     "drivers/device",
+                                                    "drivers/image",
                                                     "drivers/v4l2",
                                                     "drivers/serial",
                                                     "drivers/can",

@@ -55,24 +55,24 @@ TEST_CASE("Silence before a restart is not counted as loss", "[live]") {
 
 struct Picture {
   std::vector<std::uint8_t> pixels = std::vector<std::uint8_t>(640 * 480, 90);
-  [[nodiscard]] RawImage raw() const { return {pixels.data(), 640, 480, 640, PixelFormat::kGrey}; }
+  [[nodiscard]] ImageView view() const { return {pixels.data(), 640, 480, 640}; }
 };
 
 TEST_CASE("An image equal to the one before is a repeated one, a dark one is dark", "[live]") {
   ImageWatch watch;
   Picture picture;
-  CHECK(watch.look(picture.raw()) == ImageWatch::Look::kNew);
-  CHECK(watch.look(picture.raw()) == ImageWatch::Look::kRepeated);
-  CHECK(watch.look(picture.raw()) == ImageWatch::Look::kRepeated);
+  CHECK(watch.look(picture.view()) == ImageWatch::Look::kNew);
+  CHECK(watch.look(picture.view()) == ImageWatch::Look::kRepeated);
+  CHECK(watch.look(picture.view()) == ImageWatch::Look::kRepeated);
   // One level of one pixel in a row that is read.
   picture.pixels[37 * 640 + 5] = 91;
-  CHECK(watch.look(picture.raw()) == ImageWatch::Look::kNew);
+  CHECK(watch.look(picture.view()) == ImageWatch::Look::kNew);
   Picture dark;
   dark.pixels.assign(dark.pixels.size(), 12);
-  CHECK(watch.look(dark.raw()) == ImageWatch::Look::kDark);
-  CHECK(watch.look(dark.raw()) == ImageWatch::Look::kDark);
+  CHECK(watch.look(dark.view()) == ImageWatch::Look::kDark);
+  CHECK(watch.look(dark.view()) == ImageWatch::Look::kDark);
   dark.pixels.assign(dark.pixels.size(), 13);
-  CHECK(watch.look(dark.raw()) == ImageWatch::Look::kNew);
+  CHECK(watch.look(dark.view()) == ImageWatch::Look::kNew);
 }
 
 TEST_CASE("A journal keeps what a working device does badly beside its fault", "[live]") {

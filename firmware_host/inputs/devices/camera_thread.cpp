@@ -21,8 +21,9 @@ FrameEvent frameEvent(StampEvent event) {
 
 }  // namespace
 
-CameraThread::CameraThread(const Setup& setup)
+CameraThread::CameraThread(const Setup& setup, std::unique_ptr<CameraSource> source)
     : setup_(setup),
+      source_(std::move(source)),
       journal_(setup.name),
       longest_silence_(longestSilence(setup.settings.rate_hz)),
       train_(Duration::fromSeconds(1 / setup.settings.rate_hz)),
@@ -33,11 +34,13 @@ CameraThread::CameraThread(const Setup& setup)
 }
 
 DeviceFault CameraThread::open() {
-  const DeviceFault fault = device_.open(setup_.device);
+  const DeviceFault fault = source_->open();
   if (!fault.ok()) return fault;
+  const CameraFacts& facts = source_->facts();
+  reader_.reserve(facts.format, facts.width, facts.height, setup_.settings.side_by_side);
   // As the camera has taken it.
-  if (setup_.settings.exposure_ms > 0) timing_.exposure = device_.facts().exposure.value_or(Duration{});
-  if (setup_.trigger) matcher_.emplace(train_, expectedLag(frameEvent(device_.facts().event), timing_));
+  if (setup_.settings.exposure_ms > 0) timing_.exposure = facts.exposure.value_or(Duration{});
+  if (setup_.trigger) matcher_.emplace(train_, expectedLag(frameEvent(facts.event), timing_));
   return fault;
 }
 
@@ -47,20 +50,20 @@ void CameraThread::run(SensorSink& sink, const RunControl& control) {
   while (!control.stopped()) {
     heart_.beat();
     takeEdges();
-    if (!device_.isOpen()) {
-      if (const DeviceFault fault = device_.reopen(); !fault.ok()) {
+    if (!source_->isOpen()) {
+      if (const DeviceFault fault = source_->open(); !fault.ok()) {
         journal_.fault(hostNow(), fault);
         sleepFor(kReopenPeriod);
         continue;
       }
       newest_ = hostNow();
     }
-    pollfd waiting{device_.fd(), POLLIN, 0};
+    pollfd waiting{source_->fd(), POLLIN, 0};
     poll(&waiting, 1, kPollMilliseconds);
     takeFrames(sink);
     publish();
     const Stamp now = hostNow();
-    if (device_.isOpen() && now - newest_ > longest_silence_) {
+    if (source_->isOpen() && now - newest_ > longest_silence_) {
       journal_.fault(
           now, deviceFault(DeviceFaultKind::kSilent, 0, "no frame for %.1f s", (now - newest_).seconds()));
     }
@@ -70,15 +73,16 @@ void CameraThread::run(SensorSink& sink, const RunControl& control) {
 void CameraThread::discard() {
   for (int i = 0; i < kMostFrames; ++i) {
     CapturedFrame frame;
-    if (!device_.next(frame).ok() || !frame.valid()) break;
+    if (!source_->next(frame).ok() || !frame.valid()) break;
   }
-  before_ = device_.counters();
+  before_ = source_->counters();
 }
 
 void CameraThread::publish() {
-  counted_.counters = device_.counters();
+  counted_.counters = source_->counters();
   counted_.counters.frames -= before_.frames;
   counted_.counters.missed -= before_.missed;
+  counted_.counters.damaged += undecoded_;
   status_.write(counted_);
 }
 
@@ -93,24 +97,22 @@ void CameraThread::takeEdges() {
 void CameraThread::takeFrames(SensorSink& sink) {
   for (int i = 0; i < kMostFrames; ++i) {
     CapturedFrame frame;
-    if (const DeviceFault fault = device_.next(frame); !fault.ok()) {
+    if (const DeviceFault fault = source_->next(frame); !fault.ok()) {
       journal_.fault(hostNow(), fault);
       return;
     }
     if (!frame.valid()) return;
-    newest_ = frame.arrival;
     // The first tells how many went by while nobody fetched any.
-    if (!any_) before_.missed = device_.counters().missed;
+    if (!any_) before_.missed = source_->counters().missed;
     any_ = true;
-    if (watchQuality(frame)) hand(frame, sink);
+    take(frame, sink);
   }
 }
 
-bool CameraThread::watchQuality(const CapturedFrame& frame) {
-  const Stamp now = frame.arrival;
+bool CameraThread::watchQuality(const ImageView& image, Stamp now) {
   const bool returned = journal_.standing() != DeviceFaultKind::kNone;
   journal_.works(now);
-  const ImageWatch::Look look = images_.look(frame.image);
+  const ImageWatch::Look look = images_.look(image);
   odd_images_ = look == ImageWatch::Look::kNew ? 0 : odd_images_ + 1;
   bool counted = false;
   if (returned) {
@@ -147,24 +149,25 @@ Stamp CameraThread::middleOfExposure(const CapturedFrame& frame) {
   return exposureMidpoint(frame.stamp, frameEvent(frame.event), timing_);
 }
 
-void CameraThread::hand(const CapturedFrame& frame, SensorSink& sink) {
-  CameraFrame image;
-  image.stamp = middleOfExposure(frame);
-  image.arrival = frame.arrival;
-  image.clock = Clock::kMonotonic;
-  image.sequence = frame.sequence;
-  const HostTimes host{secondsOf(image.stamp), secondsOf(frame.arrival)};
-  const auto toPlace = [](const void* from, std::uint8_t* to) {
-    const auto& raw = *static_cast<const RawImage*>(from);
-    toGrey(raw, to, raw.width);
-  };
-  const std::array<RawImage, 2> halves = sideBySide(frame.image);
-  const std::uint32_t count = setup_.side_by_side ? 2 : 1;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const RawImage& raw = setup_.side_by_side ? halves[i] : frame.image;
-    image.camera = setup_.first + i;
-    image.image = {nullptr, raw.width, raw.height, raw.width};
-    sink.takeImage(image, host, {toPlace, &raw});
+void CameraThread::take(const CapturedFrame& frame, SensorSink& sink) {
+  const std::span<const ImageView> images = reader_.read(frame.image);
+  if (images.empty()) {
+    ++undecoded_;
+    return;
+  }
+  newest_ = frame.arrival;
+  if (!watchQuality(images[0], frame.arrival)) return;
+  CameraFrame out;
+  out.stamp = middleOfExposure(frame);
+  out.arrival = frame.arrival;
+  out.clock = Clock::kMonotonic;
+  out.sequence = frame.sequence;
+  out.camera = setup_.first;
+  const HostTimes host{secondsOf(out.stamp), secondsOf(frame.arrival)};
+  for (const ImageView& image : images) {
+    out.image = image;
+    sink.takeImage(out, host);
+    ++out.camera;
   }
 }
 

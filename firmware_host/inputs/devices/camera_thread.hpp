@@ -1,19 +1,22 @@
 #pragma once
-// The thread of one video node: frames from the kernel's buffers to the sink, stamped in the middle of their
-// exposure on CLOCK_MONOTONIC. Survives that the node goes and returns.
+// The thread of one camera source: grey images to the sink, stamped in the middle of their exposure on
+// CLOCK_MONOTONIC. Survives that the camera goes and returns.
 //
 // Stamps: the trigger's edge where one is connected and the association is sure, else the driver's stamp
 // (drivers/timesync/exposure_midpoint.hpp says how each is moved to the middle).
 // Threads: open() before the flight, run() on its own thread, journal and status from any.
-// Memory: nothing after open() but what a reopened node maps anew.
+// Memory: nothing after open() but what a reopened source takes anew, and what the codec of compressed
+// pictures takes for each.
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 
+#include "drivers/image/camera_source.hpp"
+#include "drivers/image/grey_reader.hpp"
 #include "drivers/timesync/exposure_midpoint.hpp"
 #include "drivers/timesync/trigger_matcher.hpp"
-#include "drivers/v4l2/camera_device.hpp"
 #include "estimator/core/newest_shared.hpp"
 #include "firmware_host/inputs/devices/edge_message.hpp"
 #include "firmware_host/inputs/devices/image_watch.hpp"
@@ -35,19 +38,17 @@ struct CameraStatus {
 class CameraThread {
  public:
   struct Setup {
-    std::string name;  ///< "camera 0 (/dev/video0)"
-    CameraDeviceSettings device;
-    std::uint32_t first = 0;    ///< the rig's camera that it is, or that its left half is
-    bool side_by_side = false;  ///< its right half is the next one
+    std::string name;         ///< "camera 0 (/dev/video0)"
+    std::uint32_t first = 0;  ///< the rig's camera that it is; where it gives two, the next is the other
     CamerasGroup settings;
     std::optional<TriggerGroup> trigger;
   };
 
-  explicit CameraThread(const Setup& setup);
+  CameraThread(const Setup& setup, std::unique_ptr<CameraSource> source);
 
   DeviceFault open();
   /// What the camera took otherwise than it was asked; after open().
-  [[nodiscard]] std::span<const DeviceFault> warnings() const { return device_.warnings(); }
+  [[nodiscard]] std::span<const DeviceFault> warnings() const { return source_->warnings(); }
   void run(SensorSink& sink, const RunControl& control);
   /// Of run(), at each turn.
   [[nodiscard]] Heartbeat& heart() { return heart_; }
@@ -55,7 +56,7 @@ class CameraThread {
   /// Where the trigger's thread leaves its edges.
   [[nodiscard]] EdgeRing& edges() { return edges_; }
   [[nodiscard]] DeviceJournal& journal() { return journal_; }
-  [[nodiscard]] const CameraFacts& facts() const { return device_.facts(); }
+  [[nodiscard]] const CameraFacts& facts() const { return source_->facts(); }
   [[nodiscard]] CameraStatus status() const {
     CameraStatus status;
     static_cast<void>(status_.read(status));
@@ -70,13 +71,14 @@ class CameraThread {
   void takeEdges();
   void takeFrames(SensorSink& sink);
   void publish();
-  void hand(const CapturedFrame& frame, SensorSink& sink);
+  void take(const CapturedFrame& frame, SensorSink& sink);
   /// False: an image that is none.
-  bool watchQuality(const CapturedFrame& frame);
+  bool watchQuality(const ImageView& image, Stamp arrival);
   [[nodiscard]] Stamp middleOfExposure(const CapturedFrame& frame);
 
   Setup setup_;
-  CameraDevice device_;
+  std::unique_ptr<CameraSource> source_;
+  GreyReader reader_;
   Heartbeat heart_;
   DeviceJournal journal_;
   Duration longest_silence_;
@@ -86,8 +88,9 @@ class CameraThread {
   std::optional<TriggerMatcher> matcher_;  ///< where a trigger is connected
   RateWatch rate_;
   ImageWatch images_;
-  int odd_images_ = 0;     ///< dark or repeated, running
-  Stamp newest_;           ///< arrival of the newest frame, or since when there is none
+  int odd_images_ = 0;  ///< dark or repeated, running
+  Stamp newest_;        ///< arrival of the newest image, or since when there is none
+  std::uint64_t undecoded_ = 0;
   CameraCounters before_;  ///< when the flight began
   bool any_ = false;       ///< a frame was handed over
   CameraStatus counted_;

@@ -71,7 +71,7 @@ void addCameras(MachineReport& report) {
         {"camera",
          fmt::format("{} {} ({}, {}): {}", camera.path, camera.card, camera.driver, camera.bus, offers),
          taken ? MachineVerdict::kGood : MachineVerdict::kPoor,
-         taken ? "" : "it offers no format that is taken: GREY, Y10, Y16, YUYV, UYVY"});
+         taken ? "" : "it offers no format that is taken; docs/v4l2.md lists them"});
   }
   if (any) return;
   report.lines.push_back(

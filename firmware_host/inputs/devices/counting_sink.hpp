@@ -34,9 +34,6 @@ class CountingSink : public SensorSink {
   void takeImage(const CameraFrame& image, const HostTimes& /*host*/) override {
     keep(camera_.at(image.camera), image.stamp);
   }
-  void takeImage(const CameraFrame& image, const HostTimes& host, const PixelWriter& /*pixels*/) override {
-    takeImage(image, host);
-  }
 
   // After the devices' threads have ended.
   [[nodiscard]] const Stream& imu() const { return imu_; }

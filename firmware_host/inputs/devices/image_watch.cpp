@@ -1,7 +1,5 @@
 #include "firmware_host/inputs/devices/image_watch.hpp"
 
-#include <algorithm>
-
 namespace swiftlet {
 namespace {
 
@@ -13,19 +11,18 @@ constexpr std::uint64_t kFactor = 0x100000001b3;
 
 }  // namespace
 
-ImageWatch::Look ImageWatch::look(const RawImage& image) {
-  const int width = std::min(image.width, kWidest);
+ImageWatch::Look ImageWatch::look(const ImageView& image) {
   std::uint64_t signature = kStart;
   std::uint64_t sum = 0;
   std::uint64_t pixels = 0;
   for (int y = 0; y < image.height; y += kRowStep) {
-    toGrey(crop(image, 0, y, width, 1), row_.data(), width);
-    for (int x = 0; x < width; ++x) {
-      const std::uint8_t grey = row_[static_cast<std::size_t>(x)];
+    const std::uint8_t* row = image.row(y);
+    for (int x = 0; x < image.width; ++x) {
+      const std::uint8_t grey = row[x];
       signature = (signature ^ grey) * kFactor;
       sum += grey;
     }
-    pixels += static_cast<std::uint64_t>(width);
+    pixels += static_cast<std::uint64_t>(image.width);
   }
   const bool repeated = signature == signature_;
   signature_ = signature;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "drivers/calibration/input_error.hpp"
+#include "drivers/v4l2/camera_device.hpp"
 #include "estimator/core/units.hpp"
 #include "firmware_host/inputs/devices/can_imu_link.hpp"
 #include "firmware_host/inputs/devices/serial_imu_link.hpp"
@@ -12,6 +13,7 @@ namespace swiftlet {
 namespace {
 
 constexpr const char* kTriggerByImu = "imu";
+constexpr const char* kAnyFormat = "any";
 
 [[noreturn]] void failAt(const char* setting, const std::string& what, const std::string& remedy) {
   throw InputError("settings", 0, setting, what, remedy);
@@ -26,7 +28,7 @@ CameraDeviceSettings deviceSettings(const CamerasGroup& group, const std::string
                                     int height) {
   CameraDeviceSettings device;
   device.setPath(path.c_str());
-  device.setFormat(group.format.c_str());
+  if (group.format != kAnyFormat) device.setFormat(group.format.c_str());
   device.width = width;
   device.height = height;
   device.rate = group.rate_hz;
@@ -35,11 +37,18 @@ CameraDeviceSettings deviceSettings(const CamerasGroup& group, const std::string
   return device;
 }
 
+/// Both cameras come from device0, in the halves of one image or pixel beside pixel.
+bool twoInOne(const CamerasGroup& group) {
+  const std::optional<PixelFormat> format = pixelFormat(group.format);
+  return group.side_by_side || (format && format->layout == PixelLayout::kPairs);
+}
+
 void checkCameras(const CamerasGroup& group, const Rig& rig) {
   if (group.device0.empty()) {
     failAt("cameras.device0", "no camera is named", "Name its video node; `swiftlet doctor` lists them");
   }
-  const bool second = group.side_by_side || !group.device1.empty();
+  const bool two_in_one = twoInOne(group);
+  const bool second = two_in_one || !group.device1.empty();
   if (rig.camera_count == 2 && !second) {
     failAt("cameras.device1", "the calibration has two cameras, the settings name one",
            "Name the second's video node, or set cameras.side_by_side where one node gives both");
@@ -48,18 +57,18 @@ void checkCameras(const CamerasGroup& group, const Rig& rig) {
     failAt("vehicle.calibration", "the settings name two cameras, the calibration has one",
            "Calibrate both, or leave cameras.device1 and cameras.side_by_side out");
   }
-  if (!group.side_by_side && group.device0 == group.device1) {
+  if (!two_in_one && group.device0 == group.device1) {
     failAt("cameras.device1", "the same video node as cameras.device0",
            "Name the other camera's; set cameras.side_by_side where one node gives both");
   }
-  if (group.side_by_side && !group.device1.empty()) {
-    failAt("cameras.device1", "named beside cameras.side_by_side, where device0 gives both cameras",
-           "Leave one of the two out");
+  if (two_in_one && !group.device1.empty()) {
+    failAt("cameras.device1", "named although device0 gives both cameras",
+           group.side_by_side ? "Leave it or cameras.side_by_side out"
+                              : "Leave it out, or choose another cameras.format");
   }
-  if (group.side_by_side &&
+  if (two_in_one &&
       (rig.camera[0].width() != rig.camera[1].width() || rig.camera[0].height() != rig.camera[1].height())) {
-    failAt("cameras.side_by_side",
-           "the calibration's cameras differ in size: they are no halves of one image",
+    failAt("cameras.device0", "gives two cameras of one size, and those of the calibration differ in it",
            "Give the calibration of these cameras");
   }
 }
@@ -86,17 +95,19 @@ LiveInput::LiveInput(const Settings& settings, const Calibration& calibration) {
       fmt::format("IMU ({}, {})", settings.imu_link.device, settings.imu_link.protocol),
       makeImuLink(settings.imu_link), calibration.R_body_imu,
       Duration::fromSeconds(settings.imu_link.delay_ms * kFromMs), calibration.noise.rate_hz);
-  const std::size_t nodes = cameras.side_by_side ? 1 : rig.camera_count;
+  const std::size_t nodes = twoInOne(cameras) ? 1 : rig.camera_count;
   for (std::size_t i = 0; i < nodes; ++i) {
     const std::string& path = i == 0 ? cameras.device0 : cameras.device1;
     CameraThread::Setup setup;
-    setup.name = fmt::format("camera {} ({})", cameras.side_by_side ? "0 and 1" : std::to_string(i), path);
+    setup.name =
+        fmt::format("camera {} ({})", nodes < rig.camera_count ? "0 and 1" : std::to_string(i), path);
     const int halves = cameras.side_by_side ? 2 : 1;
-    setup.device = deviceSettings(cameras, path, halves * rig.camera[i].width(), rig.camera[i].height());
     setup.first = static_cast<std::uint32_t>(i);
     setup.settings = cameras;
     if (!settings.trigger.chip.empty()) setup.trigger = settings.trigger;
-    cameras_.push_back(std::make_unique<CameraThread>(setup));
+    cameras_.push_back(std::make_unique<CameraThread>(
+        setup, std::make_unique<CameraDevice>(
+                   deviceSettings(cameras, path, halves * rig.camera[i].width(), rig.camera[i].height()))));
     edge_rings_.push_back(&cameras_.back()->edges());
   }
   if (settings.trigger.chip == kTriggerByImu) {

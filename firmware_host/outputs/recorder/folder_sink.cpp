@@ -89,14 +89,7 @@ void FolderSink::takeImu(const ImuSample& sample, Stamp /*arrival*/, const HostT
   static_cast<void>(samples_.tryPush(sample));
 }
 
-void FolderSink::takeImage(const CameraFrame& image, const HostTimes& host) {
-  const auto copy = [](const void* from, std::uint8_t* to) {
-    packedCopy(*static_cast<const ImageView*>(from), to);
-  };
-  takeImage(image, host, {copy, &image.image});
-}
-
-void FolderSink::takeImage(const CameraFrame& image, const HostTimes& /*host*/, const PixelWriter& pixels) {
+void FolderSink::takeImage(const CameraFrame& image, const HostTimes& /*host*/) {
   if (image.camera >= cameras_) return;
   Camera& camera = camera_[image.camera];
   if (image.image.width != camera.width || image.image.height != camera.height) return;
@@ -104,7 +97,7 @@ void FolderSink::takeImage(const CameraFrame& image, const HostTimes& /*host*/, 
   Image* slot = camera.images.beginPush();
   if (slot == nullptr) return;
   slot->stamp = image.stamp;
-  pixels.write(pixels.device, slot->pixels.data());
+  packedCopy(image.image, slot->pixels.data());
   camera.images.commitPush();
 }
 

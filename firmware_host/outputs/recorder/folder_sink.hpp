@@ -37,7 +37,6 @@ class FolderSink : public SensorSink {
   void takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host) override;
   void takeScene(const SceneImages& /*scene*/) override {}
   void takeImage(const CameraFrame& image, const HostTimes& host) override;
-  void takeImage(const CameraFrame& image, const HostTimes& host, const PixelWriter& pixels) override;
 
   /// After the devices' threads have ended: writes what waits. What could not be written is thrown.
   void finish();

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "drivers/image/grey_reader.hpp"
 #include "drivers/v4l2/camera_device.hpp"
 
 namespace swiftlet::stream {
@@ -30,8 +31,12 @@ inline DeviceFault wait(CameraDevice& camera, CapturedFrame& frame, int ms = 100
 }
 
 inline std::vector<std::uint8_t> grey(const RawImage& image) {
-  std::vector<std::uint8_t> out(static_cast<std::size_t>(image.width * image.height));
-  toGrey(image, out.data(), image.width);
+  GreyReader reader;
+  reader.reserve(image.format, image.width, image.height, false);
+  std::vector<std::uint8_t> out;
+  for (const ImageView& view : reader.read(image)) {
+    for (int y = 0; y < view.height; ++y) out.insert(out.end(), view.row(y), view.row(y) + view.width);
+  }
   return out;
 }
 

@@ -167,7 +167,7 @@ TEST_CASE("Every format that is taken shows the same picture", "[capture]") {
 TEST_CASE("What is not asked for is chosen: grey before all", "[capture]") {
   CameraDevice camera;
   REQUIRE(camera.open(stream::settings(cameraPath(0), "")).ok());
-  CHECK(camera.facts().format == PixelFormat::kGrey);
+  CHECK(camera.facts().format == kGrey8);
   CHECK(camera.facts().width == 752);
 }
 

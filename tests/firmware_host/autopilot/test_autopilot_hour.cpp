@@ -96,8 +96,6 @@ class Hour : public ImuLink, public SensorSink {
   }
   void takeScene(const SceneImages& /*scene*/) override {}
   void takeImage(const CameraFrame& /*image*/, const HostTimes& /*host*/) override {}
-  void takeImage(const CameraFrame& /*image*/, const HostTimes& /*host*/,
-                 const PixelWriter& /*pixels*/) override {}
 
  private:
   [[nodiscard]] Stamp now() const { return {kBegin.ns + ticks_ * kTick.ns}; }

@@ -29,8 +29,6 @@ class KeepingSink : public SensorSink {
   }
   void takeScene(const SceneImages& /*scene*/) override {}
   void takeImage(const CameraFrame& /*image*/, const HostTimes& /*host*/) override {}
-  void takeImage(const CameraFrame& /*image*/, const HostTimes& /*host*/,
-                 const PixelWriter& /*pixels*/) override {}
 
   [[nodiscard]] std::size_t count() const { return count_.load(std::memory_order_acquire); }
   [[nodiscard]] const Kept& operator[](std::size_t i) const { return kept_.at(i); }

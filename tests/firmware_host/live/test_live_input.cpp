@@ -116,7 +116,6 @@ TEST_CASE("threads look for devices that are gone, end when told, and say once t
     void takeImu(const ImuSample&, Stamp, const HostTimes&) override { ++taken; }
     void takeScene(const SceneImages&) override { ++taken; }
     void takeImage(const CameraFrame&, const HostTimes&) override { ++taken; }
-    void takeImage(const CameraFrame&, const HostTimes&, const PixelWriter&) override { ++taken; }
     std::atomic<int> taken{0};
   } sink;
   {

@@ -1,0 +1,125 @@
+#pragma once
+// One camera, whatever gives its images: frames that are lent out one by one, with their stamps, and what was
+// counted on the way.
+//
+// Threads: one. Nothing waits: poll fd() for POLLIN, then call next() until it gives no frame.
+// Errors: values. A fault of next() closes the camera; open() takes it up when it is there again, with
+//   everything negotiated anew.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "drivers/device/device_fault.hpp"
+#include "drivers/image/raw_image.hpp"
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+/// Which instant a source's stamp marks.
+enum class StampEvent : std::uint8_t {
+  kStartOfExposure,
+  kEndOfFrame,
+  kArrival,  ///< the source's clock is unknown: the host's time when the frame was taken from it
+};
+
+/// As negotiated and read back.
+struct CameraFacts {
+  std::array<char, 17> driver = {};
+  std::array<char, 33> card = {};
+  std::array<char, 33> bus = {};
+  PixelFormat format = kGrey8;
+  int width = 0;
+  int height = 0;
+  int stride = 0;                    ///< bytes
+  double rate = 0;                   ///< frames a second; 0: the source does not say
+  std::optional<Duration> exposure;  ///< empty: it cannot be known in units of time
+  std::optional<std::int32_t> gain;
+  StampEvent event = StampEvent::kEndOfFrame;
+  std::size_t buffers = 0;
+};
+
+/// Since construction, over unplugging.
+struct CameraCounters {
+  std::uint64_t frames = 0;          ///< given out
+  std::uint64_t missed = 0;          ///< holes in `sequence`: no buffer was free, or the driver dropped it
+  std::uint64_t damaged = 0;         ///< flagged by the driver and put back unseen, or not to be decoded
+  std::uint64_t too_short = 0;       ///< fewer bytes than the size; put back unseen
+  std::uint64_t stamp_ahead = 0;     ///< stamps later than their arrival
+  std::uint64_t requeue_failed = 0;  ///< buffers that could not be put back
+  std::uint64_t reopened = 0;
+};
+
+class CameraSource;
+
+/// A frame in the source's memory, which gets it back when this goes out of scope. It must not outlive the
+/// source, and after close() `image` points to nothing.
+class CapturedFrame {
+ public:
+  CapturedFrame() = default;
+  CapturedFrame(CapturedFrame&& other) noexcept { *this = std::move(other); }
+  CapturedFrame& operator=(CapturedFrame&& other) noexcept;
+  ~CapturedFrame() { release(); }
+
+  [[nodiscard]] bool valid() const { return source_ != nullptr; }
+  void release();
+
+  RawImage image;
+  Stamp stamp;                                 ///< the source's, CLOCK_MONOTONIC
+  StampEvent event = StampEvent::kEndOfFrame;  ///< what it marks
+  Stamp arrival;                               ///< CLOCK_MONOTONIC, when it was taken from the source
+  std::uint64_t sequence = 0;                  ///< the source's count, unwrapped; goes on after a reopen
+
+ private:
+  friend class CameraSource;
+  CameraSource* source_ = nullptr;
+  std::uint32_t buffer_ = 0;
+  std::uint32_t generation_ = 0;
+};
+
+class CameraSource {
+ public:
+  CameraSource() = default;
+  CameraSource(const CameraSource&) = delete;
+  CameraSource& operator=(const CameraSource&) = delete;
+  virtual ~CameraSource() = default;
+
+  /// Negotiates and starts. Ok: streaming; what the camera lacks or did otherwise but can be flown with (an
+  /// exposure clamped) stands in warnings(). kMissing as long as it is not there; ask again a few times a
+  /// second.
+  virtual DeviceFault open() = 0;
+  virtual void close() = 0;
+  [[nodiscard]] virtual bool isOpen() const = 0;
+  [[nodiscard]] virtual int fd() const = 0;
+
+  /// The oldest frame that waits. Ok with `frame.valid()` false: none.
+  virtual DeviceFault next(CapturedFrame& frame) = 0;
+
+  [[nodiscard]] const CameraFacts& facts() const { return facts_; }
+  [[nodiscard]] const CameraCounters& counters() const { return counters_; }
+  [[nodiscard]] std::span<const DeviceFault> warnings() const { return {warnings_.data(), warning_count_}; }
+
+ protected:
+  friend class CapturedFrame;
+
+  /// Makes `frame` one of this source, with a number for giveBack().
+  void lend(CapturedFrame& frame, std::uint32_t buffer);
+  /// The buffer of a frame that is let go.
+  virtual void giveBack(std::uint32_t buffer) = 0;
+  /// Of every close: frames lent before are not given back any more.
+  void forgetLent() { ++generation_; }
+  void warn(const DeviceFault& fault);
+
+  CameraFacts facts_;
+  CameraCounters counters_;
+  std::array<DeviceFault, 4> warnings_;  // exposure, gain, buffers, stamps
+  std::size_t warning_count_ = 0;
+
+ private:
+  std::uint32_t generation_ = 0;
+};
+
+}  // namespace swiftlet
