@@ -93,8 +93,8 @@ DeviceFault CameraDevice::chooseFormat() {
   if (node_.readFormat(before) != 0) return VideoNode::callFault(errno, "read the format");
   DeviceFault first;
   for (const PixelFormat& candidate : kPixelFormats) {
-    // Two cameras in one image are no camera.
-    const bool fits = wanted ? candidate == *wanted : candidate.layout != PixelLayout::kPairs;
+    // Two cameras in one image are not what an undecided user has.
+    const bool fits = asked.empty() ? candidate.layout != PixelLayout::kPairs : candidate == wanted;
     if (!fits || !offersFormat(node_, code(candidate.fourcc()))) continue;
     DeviceFault fault = setFormat(candidate, before);
     if (fault.ok()) fault = setRate();
@@ -103,7 +103,7 @@ DeviceFault CameraDevice::chooseFormat() {
   }
   if (!first.ok()) return first;
   std::array<char, kOfferBytes> offers = {};
-  writeOffers(node_, offers.data(), offers.size());
+  writeFormats(node_, offers.data(), offers.size());
   if (asked.empty()) {
     return deviceFault(DeviceFaultKind::kUnsupported, 0, "no format that is taken; offers %s", offers.data());
   }
@@ -119,9 +119,9 @@ DeviceFault CameraDevice::setFormat(const PixelFormat& wanted, const NodeFormat&
   if (node_.setFormat(format) != 0) return VideoNode::callFault(errno, "set the format (VIDIOC_S_FMT)");
   if (format.fourcc != code(wanted.fourcc()) || format.width != width || format.height != height) {
     std::array<char, kOfferBytes> offers = {};
-    writeOffers(node_, offers.data(), offers.size());
-    return deviceFault(DeviceFaultKind::kChanged, 0, "asked %dx%d, set %dx%d; offers %s", width, height,
-                       format.width, format.height, offers.data());
+    writeSizes(node_, code(wanted.fourcc()), offers.data(), offers.size());
+    return deviceFault(DeviceFaultKind::kChanged, 0, "asked %dx%d, set %dx%d; %s offers %s", width, height,
+                       format.width, format.height, wanted.letters.data(), offers.data());
   }
   if (!format.whole) return deviceFault(DeviceFaultKind::kUnsupported, 0, "sends interlaced images");
   facts_.format = wanted;

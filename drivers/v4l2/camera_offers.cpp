@@ -19,21 +19,19 @@ namespace {
 constexpr std::uint32_t kMaxFormats = 128;
 constexpr std::uint32_t kMaxSizes = 64;
 constexpr std::uint32_t kMaxRates = 64;
-constexpr int kMaxNodes = 256;            // V4L2 numbers its nodes with 8 bits
-constexpr std::size_t kWordBytes = 48;    // "16x16 to 65535x65535"
-constexpr std::size_t kSizesBytes = 128;  // more than fits into a fault
+constexpr int kMaxNodes = 256;          // V4L2 numbers its nodes with 8 bits
+constexpr std::size_t kWordBytes = 48;  // "16x16 to 65535x65535"
 
-std::array<char, 5> letters(std::uint32_t code) {
-  std::array<char, 5> text = {};
-  for (unsigned i = 0; i < 4; ++i) text[i] = static_cast<char>((code >> (8 * i)) & 0x7fU);
-  if (text[3] == ' ') text[3] = '\0';
+/// "Y16", and "Y16-BE" for the big-endian one, which the code's top bit marks.
+std::array<char, 8> letters(std::uint32_t code) {
+  std::array<char, 8> text = {};
+  std::size_t length = 0;
+  for (unsigned i = 0; i < 4; ++i) {
+    const char letter = static_cast<char>((code >> (8 * i)) & 0x7fU);
+    if (letter != ' ') text[length++] = letter;
+  }
+  if ((code >> 31U) != 0) std::memcpy(text.data() + length, "-BE", 3);
   return text;
-}
-
-std::uint32_t codeOf(std::string_view name) {
-  std::uint32_t code = 0;
-  for (unsigned i = 0; i < 4; ++i) code |= static_cast<std::uint32_t>(name[i]) << (8 * i);
-  return code;
 }
 
 bool isTaken(std::uint32_t code) { return pixelFormat(letters(code).data()).has_value(); }
@@ -124,29 +122,18 @@ bool offersFormat(const VideoNode& node, std::uint32_t fourcc) {
   return offered;
 }
 
-void writeOffers(const VideoNode& node, char* out, std::size_t size) {
+void writeFormats(const VideoNode& node, char* out, std::size_t size) {
   Text text(out, size);
-  std::array<std::array<char, kSizesBytes>, 2> sizes = {};
-  std::size_t latest = 0;
-  const char* separator = "";
-  for (const PixelFormat& format : kPixelFormats) {
-    const std::uint32_t code = codeOf(format.fourcc());
-    if (!offersFormat(node, code)) continue;
-    Text list(sizes[1 - latest].data(), kSizesBytes);
-    forEachSize(node, code, [&](const char* word) { list.add(" ", word); });
-    // Formats of the same sizes stand together, with the sizes once.
-    if (separator[0] != '\0' && std::strcmp(sizes[0].data(), sizes[1].data()) != 0) {
-      text.add(" ", sizes[latest].data());
-      separator = ", ";
-    }
-    latest = 1 - latest;
-    text.add(separator, letters(code).data());
-    separator = " ";
+  for (const bool taken : {true, false}) {
+    forEachFormat(node, [&](std::uint32_t code) {
+      if (isTaken(code) == taken) text.add(" ", letters(code).data());
+    });
   }
-  if (separator[0] != '\0') text.add(" ", sizes[latest].data());
-  forEachFormat(node, [&](std::uint32_t code) {
-    if (!isTaken(code)) text.add(", ", letters(code).data());
-  });
+}
+
+void writeSizes(const VideoNode& node, std::uint32_t fourcc, char* out, std::size_t size) {
+  Text text(out, size);
+  forEachSize(node, fourcc, [&](const char* word) { text.add(" ", word); });
 }
 
 void writeRates(const VideoNode& node, std::uint32_t fourcc, int width, int height, char* out,

@@ -12,9 +12,11 @@
 namespace swiftlet {
 
 [[nodiscard]] bool offersFormat(const VideoNode& node, std::uint32_t fourcc);
-/// "GREY YUYV 640x480 752x480, MJPG 640x480, H264": formats that are taken first, with their sizes. Cut to
-/// `size` bytes with the 0. Does not allocate.
-void writeOffers(const VideoNode& node, char* out, std::size_t size);
+/// "GREY YUYV MJPG H264": those that are taken first. These three are cut to `size` bytes with the 0, at a
+/// blank, and do not allocate.
+void writeFormats(const VideoNode& node, char* out, std::size_t size);
+/// "640x480 752x480": the sizes of one format.
+void writeSizes(const VideoNode& node, std::uint32_t fourcc, char* out, std::size_t size);
 /// "10 20 30": the frame rates of one format and size.
 void writeRates(const VideoNode& node, std::uint32_t fourcc, int width, int height, char* out,
                 std::size_t size);

@@ -9,6 +9,7 @@
 #   SWIFTLET_SANDBOX_MEMORY   memory as the kernel takes it (512M)
 #   SWIFTLET_SANDBOX_TIME     real | simulated (computing takes no time) | travel (only waiting takes none)
 #   SWIFTLET_SANDBOX_CAMERAS  pattern | loop (capture nodes show what is written to the output nodes)
+#   SWIFTLET_SANDBOX_PLANES   one | several (cameras of the multi-planar kind)
 #   SWIFTLET_SANDBOX_SIZE, SWIFTLET_SANDBOX_RATE   of loop mode: 752x480, 20
 #   SWIFTLET_SANDBOX_INSTANTS frame instants of the two cameras, us after whole periods: 0,0; or off
 #   SWIFTLET_SANDBOX_LOG      file for the kernel's log
@@ -77,7 +78,7 @@ clean_up() {
   rm -rf "$job"
 }
 
-[ $# -gt 0 ] || { sed -n '2,17s/^# \{0,1\}//p' "$0" >&2 && exit 2; }
+[ $# -gt 0 ] || { sed -n '2,18s/^# \{0,1\}//p' "$0" >&2 && exit 2; }
 if [ "$(uname -m)" != x86_64 ]; then skip "the sandbox's kernel runs on x86-64 only" "an x86-64 computer"; fi
 kernel=$(find_kernel) || skip "no kernel for the sandbox (docs/kernel_sandbox.md)" \
   "toolchain/kernel_sandbox/build_kernel.sh, or its file in SWIFTLET_SANDBOX_KERNEL, then toolchain/test.sh --all"
@@ -101,6 +102,11 @@ case $cameras in
   pattern) inputs=(vivid.num_inputs=2,2 vivid.input_types=0xc,0xc) ;; # 0 a webcam, 1 HDMI
   loop) inputs=(vivid.num_inputs=1,1 vivid.input_types=0x3,0x3) ;;    # 0 HDMI
   *) fail 2 "SWIFTLET_SANDBOX_CAMERAS: $cameras is neither pattern nor loop" ;;
+esac
+case ${SWIFTLET_SANDBOX_PLANES:-one} in
+  one) planes=1,1 ;;
+  several) planes=2,2 ;;
+  *) fail 2 "SWIFTLET_SANDBOX_PLANES: $SWIFTLET_SANDBOX_PLANES is neither one nor several" ;;
 esac
 case ${SWIFTLET_SANDBOX_TIME:-real} in
   real) clock=() ;;
@@ -142,6 +148,7 @@ err_pid=$!
     root=/dev/root rootfstype=hostfs rootflags=/ ro "init=$job/guest" panic=-1 oops=panic loglevel=6 \
     con=null con0=null,fd:1 console=tty0 ssl=null ssl1=null,fd:4 ssl2=null,fd:5 \
     vivid.n_devs=2 vivid.node_types=0x101,0x101 vivid.num_outputs=1,1 vivid.output_types=1,1 \
+    "vivid.multiplanar=$planes" \
     vivid.vid_cap_nr=0,1 vivid.vid_out_nr=10,11 "vivid.start_offset_us=$instants" vivid.align_frames=$aligned \
     "${inputs[@]}" ${clock[@]+"${clock[@]}"}
 ) &

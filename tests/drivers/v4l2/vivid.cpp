@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
+#include <cstring>
 #include <fstream>
 
 namespace swiftlet::vivid {
@@ -35,18 +36,31 @@ void write(const std::string& file, const std::string& text) {
   REQUIRE(out.good());
 }
 
+namespace {
+
+/// Whose luma has the limited range where the driver does not say.
+bool withChroma(std::uint32_t code) {
+  for (const char* letters :
+       {"YUYV", "YVYU", "UYVY", "VYUY", "NV12", "NM12", "NV21", "NV16", "YU12", "YM12", "YV12", "422P"}) {
+    if (std::memcmp(letters, &code, sizeof(code)) == 0) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
 bool limitedRange(const std::string& path) {
   const int fd = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
   v4l2_format format = {};
   format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  const bool one = ::ioctl(fd, VIDIOC_G_FMT, &format) == 0;
+  format.type = one ? V4L2_BUF_TYPE_VIDEO_CAPTURE : V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE;
   REQUIRE(::ioctl(fd, VIDIOC_G_FMT, &format) == 0);
   ::close(fd);
-  const v4l2_pix_format& pix = format.fmt.pix;
-  if (pix.quantization != V4L2_QUANTIZATION_DEFAULT) {
-    return pix.quantization == V4L2_QUANTIZATION_LIM_RANGE;
-  }
-  const bool yuv = pix.pixelformat == V4L2_PIX_FMT_YUYV || pix.pixelformat == V4L2_PIX_FMT_UYVY;
-  return yuv;
+  const std::uint32_t range = one ? format.fmt.pix.quantization : format.fmt.pix_mp.quantization;
+  if (range != V4L2_QUANTIZATION_DEFAULT) return range == V4L2_QUANTIZATION_LIM_RANGE;
+  const std::uint32_t code = one ? format.fmt.pix.pixelformat : format.fmt.pix_mp.pixelformat;
+  return withChroma(code);
 }
 
 bool waitForNode(const std::string& path, int ms) {
