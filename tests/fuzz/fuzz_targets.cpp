@@ -27,6 +27,7 @@
 #include "tests/fuzz/fuzz_clocks.hpp"
 #include "tests/fuzz/fuzz_decoders.hpp"
 #include "tests/fuzz/fuzz_faults.hpp"
+#include "tests/fuzz/fuzz_image.hpp"
 #include "tests/fuzz/fuzz_keyframes.hpp"
 #include "tests/fuzz/fuzz_recording.hpp"
 
@@ -293,7 +294,7 @@ void keptMap(std::string_view text) {
   }
 }
 
-constexpr std::array<NamedTarget, 23> kTargets = {{{"imu_csv", &imuCsv},
+constexpr std::array<NamedTarget, 24> kTargets = {{{"imu_csv", &imuCsv},
                                                    {"image_csv", &imageCsv},
                                                    {"trajectory", &trajectory},
                                                    {"tracks", &tracks},
@@ -307,6 +308,7 @@ constexpr std::array<NamedTarget, 23> kTargets = {{{"imu_csv", &imuCsv},
                                                    {"kept_map", &keptMap},
                                                    {"kept_graph", &keptGraph},
                                                    {"keyframes", &keyframes},
+                                                   {"camera_frame", &cameraFrame},
                                                    {"dronecan", &dronecan},
                                                    {"vectornav_stream", &vectornavStream},
                                                    {"xsens_stream", &xsensStream},

@@ -1,0 +1,48 @@
+#include "tests/fuzz/fuzz_image.hpp"
+
+#include <numeric>
+#include <vector>
+
+#include "drivers/image/grey_reader.hpp"
+#include "tests/fuzz/demand.hpp"
+
+namespace swiftlet::fuzz {
+
+void cameraFrame(std::string_view text) {
+  constexpr std::size_t kHead = 5;
+  if (text.size() < kHead) return;
+  const auto head = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
+  const PixelFormat& format = kPixelFormats[head(0) % kPixelFormats.size()];
+  const bool two = head(4) % 2 == 1 && format.layout != PixelLayout::kPairs;
+  RawImage image;
+  image.format = format;
+  image.width = (two ? 2 : 1) + head(1);
+  image.height = 1 + head(2);
+  image.stride = format.rowBytes(image.width) + head(3);
+  // Of its own memory, and no longer: reading beyond is seen.
+  std::vector<std::uint8_t> bytes(text.begin() + kHead, text.end());
+  if (format.layout != PixelLayout::kJpeg) {
+    bytes.resize(static_cast<std::size_t>(image.stride) * static_cast<std::size_t>(image.height - 1) +
+                 static_cast<std::size_t>(format.rowBytes(image.width)));
+  }
+  image.data = bytes.data();
+  image.bytes = bytes.size();
+  GreyReader reader;
+  reader.reserve(format, image.width, image.height, two);
+  unsigned sum = 0;
+  for (int again = 0; again < 2; ++again) {
+    const auto images = reader.read(image);
+    demand(!images.empty() || format.layout == PixelLayout::kJpeg);
+    unsigned seen = 0;
+    for (const ImageView& view : images) {
+      demand(view.height == image.height && view.width == (two ? image.width / 2 : image.width));
+      for (int y = 0; y < view.height; ++y) {
+        seen = std::accumulate(view.row(y), view.row(y) + view.width, seen);
+      }
+    }
+    demand(again == 0 || seen == sum);
+    sum = seen;
+  }
+}
+
+}  // namespace swiftlet::fuzz
