@@ -195,7 +195,8 @@ bool DoctorReport::ready() const {
 DoctorReport examine(const DoctorRequest& request, const Settings& settings) {
   DoctorReport report;
   report.computer = inspectMachine("", settings.realtime.sensor_priority);
-  report.connected = connectedDevices();
+  // Cameras that the settings name are watched at work below.
+  report.connected = connectedDevices("", !namesDevices(settings));
   if (namesDevices(settings)) {
     std::optional<Calibration> calibration;
     try {

@@ -1,6 +1,7 @@
 #include "firmware_host/inputs/devices/connected_devices.hpp"
 
 #include <fmt/format.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -8,6 +9,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "drivers/image/grey_reader.hpp"
+#include "drivers/v4l2/camera_device.hpp"
 #include "drivers/v4l2/camera_offers.hpp"
 
 namespace swiftlet {
@@ -41,37 +44,95 @@ MachineLine node(const std::string& what, const fs::path& path, std::string foun
                       path.string())};
 }
 
-void addCameras(MachineReport& report) {
+/// Whether a camera gives images in this format, in the size that it has.
+DeviceFault tryFormat(const std::string& path, const std::string& fourcc) {
+  constexpr int kPatience = 1000;  // ms; the slowest cameras give five images a second
+  constexpr int kMostBroken = 3;   // the first after a start often is
+  CameraDeviceSettings settings;
+  settings.setPath(path.c_str());
+  settings.setFormat(fourcc.c_str());
+  settings.require_monotonic = false;
+  CameraDevice camera(settings);
+  if (const DeviceFault fault = camera.open(); !fault.ok()) return fault;
+  GreyReader reader;
+  reader.reserve(camera.facts().format, camera.facts().width, camera.facts().height, false);
+  for (int i = 0; i < kMostBroken; ++i) {
+    pollfd waiting{camera.fd(), POLLIN, 0};
+    if (poll(&waiting, 1, kPatience) == 0) {
+      return deviceFault(DeviceFaultKind::kSilent, 0,
+                         "no image in a second; with a trigger it waits for that");
+    }
+    CapturedFrame frame;
+    if (const DeviceFault fault = camera.next(frame); !fault.ok()) return fault;
+    if (frame.valid() && !reader.read(frame.image).empty()) return {};
+  }
+  return deviceFault(DeviceFaultKind::kGarbage, 0, "its images are broken");
+}
+
+/// "YUYV, MJPG 640x480 1280x720; GREY 640x480": formats of the same sizes stand together.
+std::string inGroups(const std::vector<const FormatOffer*>& formats) {
+  std::string text;
+  for (std::size_t i = 0; i < formats.size(); ++i) {
+    text += fmt::format("{}{}",
+                        text.empty()                                          ? ""
+                        : i > 0 && formats[i]->sizes == formats[i - 1]->sizes ? ", "
+                                                                              : "; ",
+                        formats[i]->fourcc);
+    const bool last = i + 1 == formats.size() || formats[i + 1]->sizes != formats[i]->sizes;
+    if (last) text += fmt::format(" {}", fmt::join(formats[i]->sizes, " "));
+  }
+  return text;
+}
+
+void addCamera(const CameraListing& camera, bool try_formats, MachineReport& report) {
+  std::vector<const FormatOffer*> working;
+  std::vector<std::string> others;
+  DeviceFault first;
+  for (const FormatOffer& format : camera.formats) {
+    if (!format.taken) {
+      others.push_back(format.fourcc);
+      continue;
+    }
+    // One that gives no image at all is not waited for in each format.
+    DeviceFault fault;
+    if (first.kind == DeviceFaultKind::kSilent || first.kind == DeviceFaultKind::kBusy) {
+      fault = first;
+    } else if (try_formats) {
+      fault = tryFormat(camera.path, format.fourcc);
+    }
+    if (fault.ok()) {
+      working.push_back(&format);
+    } else {
+      others.push_back(format.fourcc);
+      if (first.ok()) first = fault;
+    }
+  }
+  const std::string name = fmt::format("{} {} ({}, {})", camera.path, camera.card, camera.driver, camera.bus);
+  std::string found = working.empty() ? "no format works" : inGroups(working);
+  if (!others.empty()) found += fmt::format("; not: {}", fmt::join(others, " "));
+  std::string remedy;
+  if (working.empty()) {
+    remedy = first.ok() ? "it offers no format that is taken; docs/v4l2.md lists them"
+                        : describe(first, camera.path);
+  }
+  report.lines.push_back({"camera", fmt::format("{}: {}", name, found),
+                          working.empty() ? MachineVerdict::kPoor : MachineVerdict::kGood, remedy});
+}
+
+void addCameras(bool try_formats, MachineReport& report) {
   bool any = false;
   for (const CameraListing& camera : listCameras()) {
     // Decoders and the second nodes of USB cameras, which give metadata, are no cameras.
     if (camera.fault.kind == DeviceFaultKind::kWrongDevice) continue;
     any = true;
-    if (!camera.fault.ok()) {
+    if (camera.fault.ok()) {
+      addCamera(camera, try_formats, report);
+    } else {
       report.lines.push_back({"camera", describe(camera.fault, camera.path), MachineVerdict::kPoor,
                               camera.fault.kind == DeviceFaultKind::kNoRights
                                   ? "`sudo usermod -aG video $USER`, then log in again"
                                   : ""});
-      continue;
     }
-    // Those that are not taken only where there is no other: they may be dozens.
-    const bool taken = std::ranges::any_of(camera.formats, &FormatOffer::taken);
-    std::string offers;
-    std::size_t others = 0;
-    for (const FormatOffer& format : camera.formats) {
-      if (taken && !format.taken) {
-        ++others;
-        continue;
-      }
-      offers +=
-          fmt::format("{}{} {}", offers.empty() ? "" : "; ", format.fourcc, fmt::join(format.sizes, " "));
-    }
-    if (others > 0) offers += fmt::format("; {} other formats", others);
-    report.lines.push_back(
-        {"camera",
-         fmt::format("{} {} ({}, {}): {}", camera.path, camera.card, camera.driver, camera.bus, offers),
-         taken ? MachineVerdict::kGood : MachineVerdict::kPoor,
-         taken ? "" : "it offers no format that is taken; docs/v4l2.md lists them"});
   }
   if (any) return;
   report.lines.push_back(
@@ -140,10 +201,10 @@ void addGpioChips(const fs::path& root, MachineReport& report) {
 
 }  // namespace
 
-MachineReport connectedDevices(const std::string& root) {
+MachineReport connectedDevices(const std::string& root, bool try_formats) {
   const fs::path base = root.empty() ? fs::path("/") : fs::path(root);
   MachineReport report;
-  addCameras(report);
+  addCameras(try_formats, report);
   addSerialPorts(base, report);
   addCanInterfaces(base, report);
   addGpioChips(base, report);
