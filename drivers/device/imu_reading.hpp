@@ -17,6 +17,7 @@ struct ImuReading {
   std::optional<std::uint64_t> counter;  ///< the sensor's own count, unwrapped; empty: it sends none
   Eigen::Vector3d gyro;                  ///< angular rate [rad/s]
   Eigen::Vector3d accel;                 ///< specific force [m/s^2]: +9.81 along the axis that points up
+  Duration mean_age = {};                ///< by which the values' middle lies before `device`: they are means
 };
 
 }  // namespace swiftlet

@@ -19,6 +19,21 @@ bool read(const MavlinkFrame& frame, HighresImu& message) {
   return true;
 }
 
+bool read(const MavlinkFrame& frame, ScaledImu& message) {
+  const bool raw = frame.message == ScaledImu::kRawId;
+  if (!raw && frame.message != ScaledImu::kScaledId) return false;
+  constexpr std::uint64_t kUsPerMs = 1000;
+  LittleFieldReader from = reader(frame);
+  message.time_usec = raw ? from.u64() : kUsPerMs * from.u32();
+  for (ScaledImu::Vector* vector : {&message.accel, &message.gyro}) {
+    for (int i = 0; i < 3; ++i) (*vector)[i] = from.i16();
+  }
+  constexpr std::size_t kMagnetometer = 3;
+  for (std::size_t i = 0; i < kMagnetometer; ++i) static_cast<void>(from.u16());
+  message.id = raw ? from.u8() : 0;
+  return true;
+}
+
 bool read(const MavlinkFrame& frame, Timesync& message) {
   if (frame.message != Timesync::kId) return false;
   LittleFieldReader from = reader(frame);

@@ -35,6 +35,20 @@ struct HighresImu {
   std::uint8_t id = 0;  ///< which of the sender's sensors; extension
 };
 
+/// SCALED_IMU and RAW_IMU, of sensor 0, as ArduPilot means both: thousandths, forward-right-down axes.
+struct ScaledImu {
+  static constexpr std::uint32_t kScaledId = 26;
+  static constexpr std::uint32_t kRawId = 27;
+  static constexpr double kMetresPerSecond2 = 9.80665e-3;  ///< of a unit of `accel`
+  static constexpr double kRadPerSecond = 1e-3;            ///< of a unit of `gyro`
+  using Vector = Eigen::Matrix<std::int16_t, 3, 1>;
+
+  std::uint64_t time_usec = 0;    ///< [us]; SCALED_IMU has whole milliseconds
+  Vector accel = Vector::Zero();  ///< [mg]
+  Vector gyro = Vector::Zero();   ///< [mrad/s]
+  std::uint8_t id = 0;            ///< of RAW_IMU; extension
+};
+
 /// TIMESYNC: a request has tc1 = 0 and its sender's clock in ts1; the answer mirrors ts1 and puts the
 /// answerer's clock into tc1.
 struct Timesync {
@@ -47,9 +61,11 @@ struct Timesync {
 
 struct Heartbeat {
   static constexpr std::uint32_t kId = 0;
+  static constexpr std::uint8_t kNoAutopilot = 8;  ///< MAV_AUTOPILOT_INVALID
+  static constexpr std::uint8_t kPx4 = 12;         ///< MAV_AUTOPILOT_PX4
   std::uint32_t custom_mode = 0;
-  std::uint8_t type = 18;      ///< MAV_TYPE_ONBOARD_CONTROLLER
-  std::uint8_t autopilot = 8;  ///< MAV_AUTOPILOT_INVALID
+  std::uint8_t type = 18;  ///< MAV_TYPE_ONBOARD_CONTROLLER
+  std::uint8_t autopilot = kNoAutopilot;
   std::uint8_t base_mode = 0;
   std::uint8_t system_status = 4;  ///< MAV_STATE_ACTIVE; 5 is CRITICAL
   std::uint8_t mavlink_version = 3;
@@ -69,6 +85,8 @@ struct CommandLong {
 /// The first three bytes of COMMAND_ACK: which command, and 0 = accepted.
 struct CommandAck {
   static constexpr std::uint32_t kId = 77;
+  static constexpr std::uint8_t kAccepted = 0;    ///< MAV_RESULT_ACCEPTED
+  static constexpr std::uint8_t kInProgress = 5;  ///< MAV_RESULT_IN_PROGRESS
   std::uint16_t command = 0;
   std::uint8_t result = 0;
 };
@@ -80,6 +98,7 @@ struct CameraTrigger {
 };
 
 bool read(const MavlinkFrame& frame, HighresImu& message);
+bool read(const MavlinkFrame& frame, ScaledImu& message);
 bool read(const MavlinkFrame& frame, Timesync& message);
 bool read(const MavlinkFrame& frame, Heartbeat& message);
 bool read(const MavlinkFrame& frame, CommandLong& message);

@@ -33,13 +33,18 @@ SampleGaps::Step SampleGaps::step(std::optional<Stamp> device, std::optional<std
   return found;
 }
 
+std::optional<Duration> SampleGaps::usualStep() const {
+  if (step_count_ < kSteps) return {};
+  std::array<std::int64_t, kSteps> sorted = steps_;
+  std::nth_element(sorted.begin(), sorted.begin() + kSteps / 2, sorted.end());
+  return Duration{sorted[kSteps / 2]};
+}
+
 std::uint64_t SampleGaps::missingByClock(Duration step) {
   std::uint64_t missing = 0;
-  if (step_count_ >= kSteps && step < kLongestGap) {
-    std::array<std::int64_t, kSteps> sorted = steps_;
-    std::nth_element(sorted.begin(), sorted.begin() + kSteps / 2, sorted.end());
-    const std::int64_t median = sorted[kSteps / 2];
-    if (median > 0) missing = static_cast<std::uint64_t>((step.ns + median / 2) / median);
+  const std::optional<Duration> usual = usualStep();
+  if (usual && usual->ns > 0 && step < kLongestGap) {
+    missing = static_cast<std::uint64_t>((step.ns + usual->ns / 2) / usual->ns);
     if (missing > 0) --missing;
   }
   steps_[step_count_ % kSteps] = step.ns;

@@ -63,6 +63,8 @@ class SampleGaps {
     bool went_back = false;  ///< the clock, or a counter by more than half of 16 bits
   };
   Step step(std::optional<Stamp> device, std::optional<std::uint64_t> counter);
+  /// Median of the clock's last nine steps; empty: fewer came, or there is a counter.
+  [[nodiscard]] std::optional<Duration> usualStep() const;
   void forget();
 
  private:

@@ -1,5 +1,6 @@
 #include "drivers/serial/imu_decoder.hpp"
 
+#include <algorithm>
 #include <array>
 
 namespace swiftlet {
@@ -57,7 +58,7 @@ bool ImuDecoder::give(const InertialFrame& content, Stamp arrival, ImuReading& r
   counters_.missing_samples += step.missing;
   if (step.went_back) ++counters_.clock_steps;
   ++counters_.samples;
-  reading = {arrival, content.device, content.counter, *content.gyro, *content.accel};
+  reading = {arrival, content.device, content.counter, *content.gyro, *content.accel, content.mean_age};
   return true;
 }
 
@@ -98,8 +99,18 @@ void ImuDecoder::readMavlink(const StampedFrame& bytes, InertialFrame& content) 
   link_.count(frame, counters_);
   mavlink::CameraTrigger trigger;
   mavlink::Timesync timesync;
+  mavlink::Heartbeat heartbeat;
+  mavlink::CommandAck ack;
+  const auto keep = [&](const auto& message) {
+    if (!received_.push({frame.arrival, frame.system, frame.component, message})) ++counters_.events_refused;
+  };
   if (mavlink::read(frame, timesync)) {
-    if (!timesync_.push({frame.arrival, frame.system, frame.component, timesync})) ++counters_.events_refused;
+    keep(timesync);
+  } else if (mavlink::read(frame, heartbeat)) {
+    if (heartbeat.autopilot == mavlink::Heartbeat::kPx4) px4_ = frame.system;
+    keep(heartbeat);
+  } else if (mavlink::read(frame, ack)) {
+    keep(ack);
   } else if (mavlink::read(frame, trigger)) {
     if (!matches(wanted_.system, frame.system)) return;
     const auto time = stampOf(trigger.time_usec, kNsPerMicrosecond);
@@ -108,8 +119,10 @@ void ImuDecoder::readMavlink(const StampedFrame& bytes, InertialFrame& content) 
     edge.counter = mavlink_triggers_.unwrap(trigger.seq);
     if (time) edge.device = *time;
     if (time) (void)content.edges.tryPushBack(edge);
-  } else if (frame.message == mavlink::HighresImu::kId) {
+  } else if (frame.message == mavlink::HighresImu::kId && frame.message == mavlink_message_) {
     readHighresImu(frame, content);
+  } else if (frame.message == mavlink_message_) {
+    readScaledImu(frame, content);
   } else {
     content.known = false;
   }
@@ -120,15 +133,45 @@ void ImuDecoder::readHighresImu(const MavlinkFrame& frame, InertialFrame& conten
   (void)mavlink::read(frame, imu);
   constexpr unsigned kBoth = mavlink::HighresImu::kAccelUpdated | mavlink::HighresImu::kGyroUpdated;
   if ((imu.fields_updated & kBoth) != kBoth) return;
-  if (!matches(wanted_.system, frame.system) || !matches(wanted_.component, frame.component) ||
-      !matches(wanted_.sensor, imu.id)) {
-    return;
-  }
-  wanted_ = {frame.system, frame.component, imu.id};
+  if (!isOurs(frame, imu.id)) return;
   content.gyro = imu.gyro.cast<double>();
   content.accel = imu.accel.cast<double>();
   content.device = stampOf(imu.time_usec, kNsPerMicrosecond);
   content.in_range = content.device.has_value();
+  if (px4_ == frame.system) content.mean_age = meanAge();
+}
+
+void ImuDecoder::readScaledImu(const MavlinkFrame& frame, InertialFrame& content) {
+  mavlink::ScaledImu imu;
+  if (!mavlink::read(frame, imu) || !isOurs(frame, imu.id)) return;
+  content.gyro = imu.gyro.cast<double>() * mavlink::ScaledImu::kRadPerSecond;
+  content.accel = imu.accel.cast<double>() * mavlink::ScaledImu::kMetresPerSecond2;
+  content.device = stampOf(imu.time_usec, kNsPerMicrosecond);
+  content.in_range = content.device.has_value();
+}
+
+/// The first sender and sensor that the settings allow; it is kept to.
+bool ImuDecoder::isOurs(const MavlinkFrame& frame, std::uint8_t sensor) {
+  if (!matches(wanted_.system, frame.system) || !matches(wanted_.component, frame.component) ||
+      !matches(wanted_.sensor, sensor)) {
+    return false;
+  }
+  wanted_ = {frame.system, frame.component, sensor};
+  return true;
+}
+
+/// PX4's readings are means over 1 / IMU_INTEG_RATE, 5 ms by default, and are stamped at its end. A stream
+/// that leaves means out has longer steps than that, one of a faster rate has shorter ones.
+Duration ImuDecoder::meanAge() const {
+  constexpr Duration kUsualInterval = Duration::fromMilliseconds(5);
+  return {std::min(gaps_.usualStep().value_or(kUsualInterval).ns, kUsualInterval.ns) / 2};
+}
+
+void ImuDecoder::takeMavlink(std::uint32_t message) {
+  if (message == mavlink_message_) return;
+  mavlink_message_ = message;
+  wanted_ = source_;
+  gaps_.forget();
 }
 
 void ImuDecoder::restart() {

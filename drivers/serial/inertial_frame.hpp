@@ -19,6 +19,7 @@ struct InertialFrame {
   std::optional<Eigen::Vector3d> accel;  ///< [m/s^2]
   std::optional<Stamp> device;           ///< the sensor's clock, unwrapped
   std::optional<std::uint64_t> counter;  ///< unwrapped
+  Duration mean_age;                     ///< as ImuReading has it
   FixedVector<TriggerEdge, 3> edges;     ///< arrival still to be filled in
 };
 

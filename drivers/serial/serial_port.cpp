@@ -143,20 +143,27 @@ DeviceFault SerialPort::wait(Duration most) {
   return {};
 }
 
+DeviceFault SerialPort::writeSome(std::span<const std::uint8_t> bytes, std::size_t& taken) {
+  taken = 0;
+  if (descriptor_ < 0) return unplugged(0);
+  const ssize_t sent = ::write(descriptor_, bytes.data(), bytes.size());
+  if (sent >= 0) {
+    taken = static_cast<std::size_t>(sent);
+    return {};
+  }
+  if (errno == EAGAIN || errno == EINTR) return {};
+  if (errno == EIO || errno == ENXIO || errno == ENODEV) return unplugged(errno);
+  return deviceFault(DeviceFaultKind::kFailed, errno, "write");
+}
+
 DeviceFault SerialPort::write(std::span<const std::uint8_t> bytes, Duration most) {
   const Stamp until = now() + most;
   // Each turn sends a byte at least, or waits, or ends: bounded by the bytes and the time.
   while (!bytes.empty()) {
-    if (descriptor_ < 0) return unplugged(0);
-    const ssize_t sent = ::write(descriptor_, bytes.data(), bytes.size());
-    if (sent > 0) {
-      bytes = bytes.subspan(static_cast<std::size_t>(sent));
-      continue;
-    }
-    if (sent < 0 && errno != EAGAIN && errno != EINTR) {
-      if (errno == EIO || errno == ENXIO || errno == ENODEV) return unplugged(errno);
-      return deviceFault(DeviceFaultKind::kFailed, errno, "write");
-    }
+    std::size_t taken = 0;
+    if (const DeviceFault fault = writeSome(bytes, taken); !fault.ok()) return fault;
+    bytes = bytes.subspan(taken);
+    if (taken > 0) continue;
     const Duration left = until - now();
     if (left <= Duration{})
       return deviceFault(DeviceFaultKind::kFailed, 0, "%zu bytes not taken in time", bytes.size());

@@ -7,8 +7,8 @@
 // A port that goes away gives kUnplugged from then on; reopen() takes it up again. Name it by
 // /dev/serial/by-id, not by ttyUSBn: the number changes when it is plugged in again.
 //
-// read(), wait() and write() allocate nothing and do not throw; open() and reopen() may sleep in the kernel.
-// Pseudo-terminals (tests, replay) take everything but low latency and the error counters.
+// read(), wait(), write() and writeSome() allocate nothing and do not throw; open() and reopen() may sleep in
+// the kernel. Pseudo-terminals (tests, replay) take everything but low latency and the error counters.
 // Source: termios(3), tty_ioctl(4), linux/serial.h.
 
 #include <array>
@@ -61,6 +61,8 @@ class SerialPort {
   DeviceFault read(std::span<std::uint8_t> into, std::size_t& count, Stamp& read_at);
   /// Waits until bytes are there, the port is gone (which read() then says), or `most` has passed.
   DeviceFault wait(Duration most);
+  /// Sends what there is room for, without waiting: `taken` may be 0.
+  DeviceFault writeSome(std::span<const std::uint8_t> bytes, std::size_t& taken);
   /// Sends all of `bytes`, waiting at most `most` for the port to take them.
   DeviceFault write(std::span<const std::uint8_t> bytes, Duration most);
 

@@ -52,11 +52,13 @@ Result decode(ImuDecoder& decoder, const Bytes& bytes, Piece&& piece) {
     while (decoder.next(reading)) result.readings.push_back(reading);
     TriggerEdge edge;
     while (decoder.nextEdge(edge)) result.edges.push_back(edge);
-    ReceivedTimesync timesync;
-    while (decoder.nextTimesync(timesync)) {
-      result.timesync.push_back(timesync.message.tc1);
-      result.timesync.push_back(timesync.message.ts1);
-      result.timesync.push_back(timesync.arrival.ns);
+    ReceivedMavlink heard;
+    while (decoder.nextMavlink(heard)) {
+      if (const auto* timesync = std::get_if<mavlink::Timesync>(&heard.message)) {
+        result.timesync.push_back(timesync->tc1);
+        result.timesync.push_back(timesync->ts1);
+      }
+      result.timesync.push_back(heard.arrival.ns);
     }
   }
   result.counters = decoder.counters();

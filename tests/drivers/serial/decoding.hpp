@@ -17,7 +17,7 @@ constexpr ImuProtocol kProtocols[] = {ImuProtocol::kVectorNav, ImuProtocol::kXse
 struct Decoded {
   std::vector<ImuReading> readings;
   std::vector<TriggerEdge> edges;
-  std::vector<ReceivedTimesync> timesync;
+  std::vector<ReceivedMavlink> heard;
 };
 
 /// Byte k of the stream arrives at kFirstByte + k byte times, whatever the pieces (0: whole).
@@ -32,8 +32,8 @@ inline Decoded decode(ImuDecoder& decoder, const Bytes& bytes, std::size_t piece
     while (decoder.next(reading)) out.readings.push_back(reading);
     TriggerEdge edge;
     while (decoder.nextEdge(edge)) out.edges.push_back(edge);
-    ReceivedTimesync timesync;
-    while (decoder.nextTimesync(timesync)) out.timesync.push_back(timesync);
+    ReceivedMavlink heard;
+    while (decoder.nextMavlink(heard)) out.heard.push_back(heard);
   }
   return out;
 }

@@ -244,10 +244,10 @@ TEST_CASE("MAVLink: TIMESYNC and camera triggers come out beside the readings", 
   REQUIRE(got.edges.size() == 1);
   CHECK(got.edges[0].device == Stamp{2'000'000'000});
   CHECK(got.edges[0].counter == 41);
-  REQUIRE(got.timesync.size() == 1);
-  CHECK(got.timesync[0].message.tc1 == 98765432100000);
-  CHECK(got.timesync[0].system == 1);
-  CHECK(got.timesync[0].arrival > got.edges[0].arrival);
+  REQUIRE(got.heard.size() == 1);
+  CHECK(std::get<mavlink::Timesync>(got.heard[0].message).tc1 == 98765432100000);
+  CHECK(got.heard[0].system == 1);
+  CHECK(got.heard[0].arrival > got.edges[0].arrival);
 }
 
 TEST_CASE("VectorNav: an edge is told of once, however many samples repeat it", "[serial]") {
