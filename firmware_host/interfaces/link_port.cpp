@@ -1,4 +1,4 @@
-#include "firmware_host/outputs/autopilot/autopilot_port.hpp"
+#include "firmware_host/interfaces/link_port.hpp"
 
 #include <linux/filter.h>
 #include <netdb.h>
@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <charconv>
@@ -22,11 +23,15 @@ constexpr std::int64_t kNanosecondsPerMillisecond = 1'000'000;
 /// Datagrams of others that one read passes over: some 30 us of work.
 constexpr int kMostForeign = 16;
 
-std::uint16_t portOf(std::string_view text, std::string_view device) {
+/// Where MAVLink frames begin, of version 1 and 2.
+constexpr std::uint8_t kFrameBegin1 = 0xFE;
+constexpr std::uint8_t kFrameBegin2 = 0xFD;
+
+std::uint16_t portOf(std::string_view text, std::string_view device, const char* setting) {
   std::uint16_t port = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
   if (error != std::errc{} || end != text.data() + text.size() || port == 0) {
-    throw InputError("settings", 0, "autopilot.device", std::string(device) + ": no port from 1 to 65535",
+    throw InputError("settings", 0, setting, std::string(device) + ": no port from 1 to 65535",
                      "Write udp:HOST:PORT, as udp:192.168.1.10:14550");
   }
   return port;
@@ -45,54 +50,51 @@ void takeOnlyFrom(int socket, in_addr_t host) {
   static_cast<void>(::setsockopt(socket, SOL_SOCKET, SO_ATTACH_FILTER, &filter, sizeof(filter)));
 }
 
-/// What is not there is said when it is opened. (std::filesystem::equivalent does not compare devices.)
-bool sameNode(const std::string& a, const std::string& b) {
-  struct stat of_a = {}, of_b = {};
-  if (::stat(a.c_str(), &of_a) != 0 || ::stat(b.c_str(), &of_b) != 0) return false;
-  return S_ISCHR(of_a.st_mode) && S_ISCHR(of_b.st_mode) && of_a.st_rdev == of_b.st_rdev;
-}
-
 }  // namespace
 
-std::optional<UdpAddress> udpAddress(std::string_view device) {
+std::optional<UdpAddress> udpAddress(std::string_view device, const char* setting) {
   if (!device.starts_with(kUdp)) return std::nullopt;
   std::string_view rest = device.substr(kUdp.size());
   UdpAddress address;
   if (const auto at = rest.rfind('@'); at != std::string_view::npos) {
-    address.own_port = portOf(rest.substr(at + 1), device);
+    address.own_port = portOf(rest.substr(at + 1), device, setting);
     rest = rest.substr(0, at);
   }
   const auto colon = rest.rfind(':');
-  address.port = portOf(colon == std::string_view::npos ? "" : rest.substr(colon + 1), device);
+  address.port = portOf(colon == std::string_view::npos ? "" : rest.substr(colon + 1), device, setting);
   address.host = rest.substr(0, colon);
   if (address.host.empty()) {
-    throw InputError("settings", 0, "autopilot.device", std::string(device) + ": no host",
+    throw InputError("settings", 0, setting, std::string(device) + ": no host",
                      "Write udp:HOST:PORT, as udp:192.168.1.10:14550");
   }
   return address;
 }
 
-void checkOwnPort(const std::string& device, const std::string& imu_device) {
-  if (device != imu_device && !sameNode(device, imu_device)) return;
-  throw InputError("settings", 0, "autopilot.device", device + " is the IMU's port, imu_link.device",
-                   "Give the autopilot a port of its own (two of its MAVLink ports, or one and UDP)");
+bool samePort(const std::string& a, const std::string& b) {
+  if (a == b) return true;
+  // std::filesystem::equivalent does not compare devices. A port that is not there is reported when it is
+  // opened.
+  struct stat of_a = {}, of_b = {};
+  if (::stat(a.c_str(), &of_a) != 0 || ::stat(b.c_str(), &of_b) != 0) return false;
+  return S_ISCHR(of_a.st_mode) && S_ISCHR(of_b.st_mode) && of_a.st_rdev == of_b.st_rdev;
 }
 
-AutopilotPort::AutopilotPort(const std::string& device, unsigned baud)
-    : udp_(udpAddress(device)), serial_(SerialSettings{device, baud}) {}
+LinkPort::LinkPort(const std::string& device, unsigned baud, const char* setting)
+    : udp_(udpAddress(device, setting)), serial_(SerialSettings{device, baud}) {}
 
-void AutopilotPort::close() {
+void LinkPort::close() {
   serial_.close();
   if (socket_ >= 0) ::close(socket_);
   socket_ = -1;
+  kept_begin_ = kept_end_ = 0;
 }
 
-DeviceFault AutopilotPort::open() {
+DeviceFault LinkPort::open() {
   close();
   return udp_ ? openUdp() : serial_.open();
 }
 
-DeviceFault AutopilotPort::openUdp() {
+DeviceFault LinkPort::openUdp() {
   if (!peer_known_) {
     addrinfo wanted = {};
     wanted.ai_family = AF_INET;
@@ -126,19 +128,19 @@ DeviceFault AutopilotPort::openUdp() {
   return {};
 }
 
-std::uint16_t AutopilotPort::ownPort() const {
+std::uint16_t LinkPort::ownPort() const {
   sockaddr_in own = {};
   socklen_t length = sizeof(own);
   if (::getsockname(socket_, reinterpret_cast<sockaddr*>(&own), &length) != 0) return 0;
   return ntohs(own.sin_port);
 }
 
-void AutopilotPort::wait(Duration most) {
-  pollfd asked = {udp_ ? socket_ : serial_.descriptor(), POLLIN, 0};
+void LinkPort::wait(Duration most) {
+  pollfd asked = {descriptor(), POLLIN, 0};
   static_cast<void>(::poll(&asked, 1, static_cast<int>(most.ns / kNanosecondsPerMillisecond)));
 }
 
-DeviceFault AutopilotPort::read(std::span<std::uint8_t> into, std::size_t& count, Stamp& read_at) {
+DeviceFault LinkPort::read(std::span<std::uint8_t> into, std::size_t& count, Stamp& read_at) {
   if (!udp_) return serial_.read(into, count, read_at);
   count = 0;
   for (int i = 0; i <= kMostForeign; ++i) {
@@ -151,13 +153,39 @@ DeviceFault AutopilotPort::read(std::span<std::uint8_t> into, std::size_t& count
     if (got < 0 && errno != ECONNREFUSED) break;
     if (got <= 0 || sender.sin_addr.s_addr != peer_.sin_addr.s_addr) continue;
     count = static_cast<std::size_t>(got);
+    if (into[0] == kFrameBegin1 || into[0] == kFrameBegin2) peer_.sin_port = sender.sin_port;
     break;
   }
   return {};
 }
 
-DeviceFault AutopilotPort::write(std::span<const std::uint8_t> bytes) {
-  if (!udp_) return serial_.write(bytes, Duration{});
+bool LinkPort::flush() {
+  std::size_t taken = 1;
+  // Each turn sends a byte at least, or is the last.
+  while (kept_begin_ < kept_end_ && taken > 0) {
+    const auto rest = std::span<const std::uint8_t>(kept_).subspan(kept_begin_, kept_end_ - kept_begin_);
+    if (!serial_.writeSome(rest, taken).ok()) return false;
+    kept_begin_ += taken;
+  }
+  return kept_begin_ == kept_end_;
+}
+
+DeviceFault LinkPort::write(std::span<const std::uint8_t> bytes) {
+  if (udp_) return sendDatagram(bytes);
+  if (bytes.size() > kept_.size()) return deviceFault(DeviceFaultKind::kFailed, 0, "too long a write");
+  if (!serial_.isOpen()) return deviceFault(DeviceFaultKind::kUnplugged, 0, "the port is closed");
+  if (!flush()) {
+    if (!serial_.isOpen()) return deviceFault(DeviceFaultKind::kUnplugged, 0, "in a write");
+    return deviceFault(DeviceFaultKind::kFailed, 0, "%zu bytes wait to be taken", kept_end_ - kept_begin_);
+  }
+  std::copy(bytes.begin(), bytes.end(), kept_.begin());
+  kept_begin_ = 0;
+  kept_end_ = bytes.size();
+  static_cast<void>(flush());
+  return serial_.isOpen() ? DeviceFault{} : deviceFault(DeviceFaultKind::kUnplugged, 0, "in a write");
+}
+
+DeviceFault LinkPort::sendDatagram(std::span<const std::uint8_t> bytes) {
   const auto send = [&] {
     return ::sendto(socket_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&peer_),
                     sizeof(peer_));

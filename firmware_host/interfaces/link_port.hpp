@@ -1,14 +1,19 @@
 #pragma once
-// The way to an autopilot as raw bytes: a serial port, or UDP datagrams. Nothing waits but wait().
+// A link as raw bytes: a serial port, or UDP datagrams. Nothing waits but wait().
 //
-// Named as the settings do: `/dev/ttyS1`, `udp:HOST:PORT`, or `udp:HOST:PORT@OWN_PORT` where the autopilot
+// Named as the settings do: `/dev/ttyS1`, `udp:HOST:PORT`, or `udp:HOST:PORT@OWN_PORT` where the other side
 // sends to a port that was agreed on. Datagrams of others than HOST are not read; without OWN_PORT, none of
-// other ports of HOST than PORT either. The kernel drops them: they wake nobody. A serial port that goes
-// away gives kUnplugged until reopen() finds it again; UDP knows no such thing, and what nobody takes is
-// lost.
+// other ports of HOST than PORT either. The kernel drops them: they wake nobody. With OWN_PORT, answers go to
+// the port that the newest MAVLink datagram came from; until one comes, to PORT.
+// Writes are whole: what a serial port has no room for is kept and goes first, and the next write is refused
+// until it has gone, so no frame is cut and none is mixed into another.
+// A serial port that goes away gives kUnplugged until open() finds it again; UDP knows no such thing, and
+// what nobody takes is lost. Threads: one at a time. Memory: 2 kB inside the object, nothing allocated after
+// open().
 
 #include <netinet/in.h>
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -27,45 +32,58 @@ struct UdpAddress {
   std::uint16_t own_port = 0;  ///< 0: any
 };
 
-/// Empty: `device` does not begin with "udp:". InputError naming autopilot.device for one that cannot be
-/// read.
-std::optional<UdpAddress> udpAddress(std::string_view device);
+/// Empty: `device` does not begin with "udp:". InputError naming `setting` for one that cannot be read.
+std::optional<UdpAddress> udpAddress(std::string_view device, const char* setting);
 
-/// InputError where `device` is the IMU's too, by another name as well: who reads takes the other's bytes.
-void checkOwnPort(const std::string& device, const std::string& imu_device);
+/// Whether two settings name one port: by the same words, or by two names of one serial port.
+bool samePort(const std::string& a, const std::string& b);
 
-class AutopilotPort {
+class LinkPort {
  public:
+  /// The longest write.
+  static constexpr std::size_t kMostWritten = 2048;
+
   /// InputError as udpAddress().
-  AutopilotPort(const std::string& device, unsigned baud);
-  ~AutopilotPort() { close(); }
-  AutopilotPort(const AutopilotPort&) = delete;
-  AutopilotPort& operator=(const AutopilotPort&) = delete;
+  LinkPort(const std::string& device, unsigned baud, const char* setting = "autopilot.device");
+  ~LinkPort() { close(); }
+  LinkPort(const LinkPort&) = delete;
+  LinkPort& operator=(const LinkPort&) = delete;
 
   /// Opens, or opens anew. Looks the host up, which may take seconds, the first time only.
   DeviceFault open();
   void close();
+  [[nodiscard]] bool isOpen() const { return descriptor() >= 0; }
+  /// To poll for reading; below 0: closed.
+  [[nodiscard]] int descriptor() const { return udp_ ? socket_ : serial_.descriptor(); }
 
   /// Waits until bytes are there or `most` has passed.
   void wait(Duration most);
   /// What is there; `count` may be 0. Passes over a bounded number of others' datagrams.
   DeviceFault read(std::span<std::uint8_t> into, std::size_t& count, Stamp& read_at);
-  /// All of `bytes`, or a fault: kUnplugged, or kFailed where there is no room, which passes.
+  /// Takes all of `bytes`, at most kMostWritten, or none: kUnplugged, or kFailed where there is no room,
+  /// which passes.
   DeviceFault write(std::span<const std::uint8_t> bytes);
+  /// Sends what is kept of an earlier write. True: nothing is.
+  bool flush();
 
   /// Of UDP, once open: where answers come in.
   [[nodiscard]] std::uint16_t ownPort() const;
   [[nodiscard]] bool isUdp() const { return udp_.has_value(); }
   [[nodiscard]] Duration byteTime() const { return udp_ ? Duration{} : serial_.byteTime(); }
+  [[nodiscard]] std::optional<SerialErrors> errors() const { return udp_ ? std::nullopt : serial_.errors(); }
 
  private:
   DeviceFault openUdp();
+  DeviceFault sendDatagram(std::span<const std::uint8_t> bytes);
 
   std::optional<UdpAddress> udp_;
   SerialPort serial_;
   sockaddr_in peer_ = {};
   bool peer_known_ = false;
   int socket_ = -1;
+  // What the serial port still has to take.
+  std::array<std::uint8_t, kMostWritten> kept_;
+  std::size_t kept_begin_ = 0, kept_end_ = 0;
 };
 
 }  // namespace swiftlet

@@ -122,6 +122,7 @@ class FlightRun {
     flight.record = request_.record;
     flight.trigger = input_.trigger() != nullptr;
     flight.name = "flight";
+    flight.autopilot_outbox = input_.outbox();
     flight.view = request_.view;
     flight.file_problem = [this] { return lost_.problem(); };
     const FlightEnd flown = flyThreaded(calibration_, input_, settings_, output_->observer(), wanted, flight,

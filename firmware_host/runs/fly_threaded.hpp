@@ -10,6 +10,7 @@
 
 #include "drivers/calibration/calibration.hpp"
 #include "firmware_host/graph/graph.hpp"
+#include "firmware_host/interfaces/link_outbox.hpp"
 #include "firmware_host/outputs/view/view_address.hpp"
 #include "firmware_host/schedule/threaded.hpp"
 
@@ -20,11 +21,13 @@ struct FlightRequest {
   bool host_stamps = false;  ///< of CLOCK_MONOTONIC, not of a log
   /// From a log's stamps to CLOCK_MONOTONIC; gives none while that is not known. Any thread.
   std::function<std::optional<Duration>()> to_host;
-  bool announce = false;            ///< print the table of what was reserved, and what is missing
-  bool trigger = false;             ///< a line of its own tells of edges (SensorInput::look)
-  bool record = false;              ///< the flight is to be recorded
-  bool service = false;             ///< tell systemd, where it asks to be told
-  std::string name;                 ///< what is flown, for those who look on
+  bool announce = false;  ///< print the table of what was reserved, and what is missing
+  bool trigger = false;   ///< a line of its own tells of edges (SensorInput::look)
+  bool record = false;    ///< the flight is to be recorded
+  bool service = false;   ///< tell systemd, where it asks to be told
+  std::string name;       ///< what is flown, for those who look on
+  /// Where the autopilot is told over the IMU's link; null: over a port of its own. It outlives the run.
+  LinkOutbox* autopilot_outbox = nullptr;
   std::optional<ViewAddress> view;  ///< serve the live view there
   /// What is wrong with the run's files; null: nothing. Any thread.
   std::function<const char*()> file_problem;

@@ -5,14 +5,12 @@
 #include <cmath>
 
 #include "drivers/calibration/input_error.hpp"
-#include "firmware_host/outputs/autopilot/autopilot_port.hpp"
 #include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {
 namespace {
 
-void checkAutopilot(const Settings& settings, const FlightRequest& request) {
-  checkOwnPort(settings.autopilot.device, settings.imu_link.device);
+void checkAutopilot(const FlightRequest& request) {
   if (request.speed != 1) {
     throw InputError("--speed", 0, "", "an autopilot is told of a flight at its own speed",
                      "Leave --speed out, or autopilot.device empty");
@@ -36,9 +34,10 @@ void checkLabels(const Settings& settings) {
 LiveConsumers::LiveConsumers(const Calibration& calibration, const Settings& settings,
                              const FlightRequest& request) {
   if (!settings.autopilot.device.empty()) {
-    checkAutopilot(settings, request);
+    checkAutopilot(request);
     AutopilotThreadOptions options;
     options.settings = settings.autopilot;
+    options.outbox = request.autopilot_outbox;
     if (!request.host_stamps) options.to_host = request.to_host;
     options.priority = settings.realtime.enabled ? settings.realtime.mesh_priority : 0;
     autopilot_ = std::make_unique<AutopilotThread>(newOutlet(autopilot_outlet_), options);

@@ -1,9 +1,10 @@
 #pragma once
-// The way to an IMU, whatever it is made of: a serial port with a protocol, or a CAN bus.
+// The way to an IMU, whatever it is made of: a serial port or UDP with a protocol, or a CAN bus.
 // Threads: one. Errors: values; a fault that lasts closes the link, and open() takes it up again.
 
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <string>
 
 #include "drivers/device/device_fault.hpp"
 #include "drivers/device/imu_reading.hpp"
@@ -23,10 +24,14 @@ class ImuLink {
   [[nodiscard]] virtual bool isOpen() const = 0;
   /// To poll for reading.
   [[nodiscard]] virtual int fd() const = 0;
+  /// To poll likewise: somebody wants something sent; below 0: nobody ever does.
+  [[nodiscard]] virtual int wakeFd() const { return -1; }
   /// Throws away what waits, where its arrival can be told no more. Bounded.
   virtual void discard() {}
-  /// Reads what waits, and sends what the protocol wants sent.
+  /// Reads what waits.
   virtual DeviceFault receive(Stamp now) = 0;
+  /// Sends what the protocol wants sent, after the readings have been taken. Never waits.
+  virtual DeviceFault send() { return {}; }
   virtual bool next(ImuReading& reading) = 0;
   /// Edges of a trigger that the IMU sees.
   virtual bool nextEdge(TriggerEdge& /*edge*/) { return false; }
@@ -34,6 +39,10 @@ class ImuLink {
   [[nodiscard]] virtual std::uint64_t received() const = 0;
   /// Host stamp by the protocol's own exchange of clocks; empty: none, or not yet sure.
   [[nodiscard]] virtual std::optional<Stamp> toHost(Stamp /*device*/) const { return std::nullopt; }
+  /// What the device made of what it was asked, for the user; until it says false.
+  virtual bool nextRemark(DeviceFault& /*remark*/) { return false; }
+  /// What the device was asked to send and what it answered, in words; empty: nothing was asked.
+  [[nodiscard]] virtual std::string stream() const { return {}; }
   /// What was counted; after the flight.
   [[nodiscard]] virtual nlohmann::ordered_json counters() const = 0;
 };

@@ -2,6 +2,7 @@
 
 #include <poll.h>
 
+#include <array>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
@@ -46,11 +47,13 @@ void ImuThread::run(SensorSink& sink, std::span<EdgeRing* const> edges, const Ru
       }
       hear();
     }
-    pollfd waiting{link_->fd(), POLLIN, 0};
-    poll(&waiting, 1, kPollMilliseconds);
+    std::array<pollfd, 2> waiting = {{{link_->fd(), POLLIN, 0}, {link_->wakeFd(), POLLIN, 0}}};
+    poll(waiting.data(), waiting.size(), kPollMilliseconds);
     const Stamp now = hostNow();
-    const DeviceFault fault = link_->receive(now);
+    DeviceFault fault = link_->receive(now);
     takeReadings(sink, edges);
+    if (fault.ok()) fault = link_->send();
+    for (DeviceFault remark; link_->nextRemark(remark);) journal_.note(now, remark);
     if (fault.ok()) {
       watchSilence(now);
     } else {
@@ -89,7 +92,9 @@ void ImuThread::hear() {
 
 void ImuThread::hand(const ImuReading& reading, SensorSink& sink) {
   ImuSample sample;
-  if (!stampOf(reading, sample.stamp) || sample.stamp <= newest_) {
+  const bool stamped = stampOf(reading, sample.stamp);
+  sample.stamp = sample.stamp - reading.mean_age;
+  if (!stamped || sample.stamp <= newest_) {
     ++counted_.refused;
     return;
   }

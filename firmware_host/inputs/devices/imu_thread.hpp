@@ -8,6 +8,7 @@
 
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "drivers/calibration/calibration.hpp"
 #include "drivers/timesync/clock_map.hpp"
@@ -36,6 +37,12 @@ class ImuThread {
             Duration delay, double rate = 0);
 
   DeviceFault open() { return link_->open(); }
+  /// What the device made of its settings, after open().
+  std::vector<DeviceFault> warnings() {
+    std::vector<DeviceFault> all;
+    for (DeviceFault remark; link_->nextRemark(remark);) all.push_back(remark);
+    return all;
+  }
   /// `edges`: where edges of the trigger go that come through the link.
   void run(SensorSink& sink, std::span<EdgeRing* const> edges, const RunControl& control);
   /// Of run(), at each turn.

@@ -6,7 +6,7 @@
 #include "drivers/v4l2/camera_device.hpp"
 #include "estimator/core/units.hpp"
 #include "firmware_host/inputs/devices/can_imu_link.hpp"
-#include "firmware_host/inputs/devices/serial_imu_link.hpp"
+#include "firmware_host/inputs/devices/port_imu_link.hpp"
 #include "firmware_host/inputs/devices/status_json.hpp"
 
 namespace swiftlet {
@@ -19,9 +19,31 @@ constexpr const char* kAnyFormat = "any";
   throw InputError("settings", 0, setting, what, remedy);
 }
 
-std::unique_ptr<ImuLink> makeImuLink(const ImuLinkGroup& settings) {
+/// Whether autopilot.device names the IMU's port: then they share one link.
+bool sharesLink(const Settings& settings) {
+  const std::string& device = settings.autopilot.device;
+  if (device.empty() || !samePort(device, settings.imu_link.device)) return false;
+  if (settings.imu_link.protocol != "mavlink") {
+    failAt(
+        "autopilot.device", device + " is the port of an IMU that speaks " + settings.imu_link.protocol,
+        "Name the autopilot's own port; one link for both is an autopilot's, with imu_link.protocol mavlink");
+  }
+  if (settings.imu_link.baud != settings.autopilot.baud) {
+    failAt("autopilot.baud",
+           fmt::format("{} baud, imu_link.baud is {}, and both are of {}", settings.autopilot.baud,
+                       settings.imu_link.baud, device),
+           "Set both to the rate of that port");
+  }
+  return true;
+}
+
+std::unique_ptr<ImuLink> makeImuLink(const ImuLinkGroup& settings, double rate, LinkOutbox* outbox) {
   if (settings.protocol == "dronecan") return std::make_unique<CanImuLink>(settings);
-  return std::make_unique<SerialImuLink>(settings);
+  if (settings.protocol != "mavlink" && udpAddress(settings.device, "imu_link.device")) {
+    failAt("imu_link.device", settings.protocol + " comes by a serial port",
+           "Name the port, or set imu_link.protocol to mavlink where an autopilot sends datagrams");
+  }
+  return std::make_unique<PortImuLink>(settings, rate, outbox);
 }
 
 CameraDeviceSettings deviceSettings(const CamerasGroup& group, const std::string& path, int width,
@@ -91,9 +113,10 @@ LiveInput::LiveInput(const Settings& settings, const Calibration& calibration) {
     cameras.readout_ms = rig.readout.seconds() / kFromMs;
   }
   checkCameras(cameras, rig);
+  if (sharesLink(settings)) outbox_ = std::make_unique<LinkOutbox>();
   imu_ = std::make_unique<ImuThread>(
       fmt::format("IMU ({}, {})", settings.imu_link.device, settings.imu_link.protocol),
-      makeImuLink(settings.imu_link), calibration.R_body_imu,
+      makeImuLink(settings.imu_link, calibration.noise.rate_hz, outbox_.get()), calibration.R_body_imu,
       Duration::fromSeconds(settings.imu_link.delay_ms * kFromMs), calibration.noise.rate_hz);
   const std::size_t nodes = twoInOne(cameras) ? 1 : rig.camera_count;
   for (std::size_t i = 0; i < nodes; ++i) {
@@ -125,6 +148,9 @@ LiveInput::Opened LiveInput::open() {
     if (!fault.ok()) opened.faults.push_back(describe(fault, journal.name()));
   };
   note(imu_->open(), imu_->journal());
+  for (const DeviceFault& warning : imu_->warnings()) {
+    opened.warnings.push_back(describe(warning, imu_->journal().name()));
+  }
   for (const auto& camera : cameras_) {
     note(camera->open(), camera->journal());
     for (const DeviceFault& warning : camera->warnings()) {

@@ -16,6 +16,7 @@
 #include "firmware_host/inputs/devices/camera_thread.hpp"
 #include "firmware_host/inputs/devices/imu_thread.hpp"
 #include "firmware_host/inputs/devices/trigger_thread.hpp"
+#include "firmware_host/interfaces/link_outbox.hpp"
 #include "firmware_host/interfaces/sensor_input.hpp"
 #include "firmware_host/settings/settings.hpp"
 
@@ -47,6 +48,8 @@ class LiveInput : public SensorInput {
   /// After the flight: what the devices did.
   [[nodiscard]] nlohmann::ordered_json counters();
 
+  /// Where autopilot.device is the IMU's link: what is to be sent over it. Null: it is not.
+  [[nodiscard]] LinkOutbox* outbox() { return outbox_.get(); }
   [[nodiscard]] ImuThread& imu() { return *imu_; }
   [[nodiscard]] std::span<const std::unique_ptr<CameraThread>> cameras() const { return cameras_; }
   /// Null: no line is connected.
@@ -55,6 +58,7 @@ class LiveInput : public SensorInput {
  private:
   [[nodiscard]] std::vector<DeviceJournal*> journals();
 
+  std::unique_ptr<LinkOutbox> outbox_;
   std::unique_ptr<ImuThread> imu_;
   std::vector<std::unique_ptr<CameraThread>> cameras_;
   std::unique_ptr<TriggerThread> trigger_;

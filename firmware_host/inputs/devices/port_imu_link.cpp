@@ -1,4 +1,6 @@
-#include "firmware_host/inputs/devices/serial_imu_link.hpp"
+#include "firmware_host/inputs/devices/port_imu_link.hpp"
+
+#include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 
@@ -7,78 +9,95 @@
 namespace swiftlet {
 namespace {
 
-/// As PX4 asks: 3 % of a link at 57600 Bd.
-constexpr Duration kAskPeriod = Duration::fromMilliseconds(100);
-/// A port that takes no bytes for longer drops the request; the next one comes.
-constexpr Duration kWriteTime = Duration::fromMilliseconds(2);
-/// Reads that empty the kernel's buffer, of 64 kB at the most.
-constexpr int kMostDiscarded = 64;
-/// Of one round: an autopilot asks ten times a second.
-constexpr int kMostAnswers = 4;
+/// Reads that empty the kernel's buffer: of a serial port 64 kB at the most, of UDP some hundred datagrams.
+constexpr int kMostDiscarded = 1000;
 
 }  // namespace
 
-SerialImuLink::SerialImuLink(const ImuLinkGroup& settings)
-    : port_(SerialSettings{settings.device, static_cast<unsigned>(settings.baud)}),
-      decoder_(imuProtocol(settings.protocol).value_or(ImuProtocol::kBridge)) {}
+PortImuLink::PortImuLink(const ImuLinkGroup& settings, double rate, LinkOutbox* outbox)
+    : port_(settings.device, static_cast<unsigned>(settings.baud), "imu_link.device"),
+      decoder_(imuProtocol(settings.protocol).value_or(ImuProtocol::kBridge)),
+      dialogue_(rate),
+      outbox_(outbox) {}
 
-DeviceFault SerialImuLink::open() {
+DeviceFault PortImuLink::open() {
   decoder_.restart();
-  exchange_ = TwoWayClockMap();
-  return port_.reopen();
+  dialogue_.restart();
+  return port_.open();
 }
 
-void SerialImuLink::discard() {
+void PortImuLink::discard() {
   std::size_t count = 1;
   Stamp read_at;
   for (int i = 0; i < kMostDiscarded && count > 0; ++i) static_cast<void>(port_.read(bytes_, count, read_at));
   decoder_.restart();
 }
 
-DeviceFault SerialImuLink::receive(Stamp now) {
+DeviceFault PortImuLink::close(const DeviceFault& fault) {
+  if (outbox_ != nullptr) outbox_->attend(false);
+  port_.close();
+  return fault;
+}
+
+DeviceFault PortImuLink::receive(Stamp /*now*/) {
   std::size_t count = 0;
   Stamp read_at;
-  if (const DeviceFault fault = port_.read(bytes_, count, read_at); !fault.ok()) {
-    port_.close();
-    return fault;
-  }
+  if (const DeviceFault fault = port_.read(bytes_, count, read_at); !fault.ok()) return close(fault);
   // All of it fits: the decoder has been asked until it had no more.
   static_cast<void>(decoder_.feed(std::span(bytes_).first(count), read_at, port_.byteTime()));
-  return decoder_.protocol() == ImuProtocol::kMavlink ? exchangeClocks(now) : DeviceFault{};
+  return {};
 }
 
-DeviceFault SerialImuLink::exchangeClocks(Stamp now) {
-  ReceivedTimesync received;
-  int answers = 0;
-  while (decoder_.nextTimesync(received)) {
-    const mavlink::Timesync& message = received.message;
-    if (message.tc1 == 0) {
-      if (++answers > kMostAnswers) continue;
-      const mavlink::Timesync answer{hostNow().ns, message.ts1, received.system, received.component};
-      if (const DeviceFault fault = sendTimesync(answer); !fault.ok()) return fault;
-    } else if (message.ts1 == asked_.ns) {
-      static_cast<void>(exchange_.add({asked_, Stamp{message.tc1}, received.arrival}));
-    }
+DeviceFault PortImuLink::judge(const DeviceFault& fault) {
+  if (fault.ok()) return {};
+  ++refused_;
+  // A full port loses what was said and no more.
+  return fault.kind == DeviceFaultKind::kUnplugged ? close(fault) : DeviceFault{};
+}
+
+DeviceFault PortImuLink::send() {
+  if (!isMavlink() || !port_.isOpen()) return {};
+  std::array<std::uint8_t, AutopilotDialogue::kMostBytes> said;
+  const std::size_t length = dialogue_.step(decoder_, hostNow(), said);
+  if (length > 0) {
+    if (const DeviceFault fault = judge(port_.write(std::span(said).first(length))); !fault.ok())
+      return fault;
   }
-  if (now - asked_ < kAskPeriod) return {};
-  asked_ = hostNow();
-  return sendTimesync({0, asked_.ns, 0, 0});
+  if (outbox_ == nullptr) return {};
+  outbox_->hush();
+  if (!outbox_->attended()) {
+    // Of before the link was there.
+    while (outbox_->front() != nullptr) outbox_->pop();
+    outbox_->attend(true);
+  }
+  // As long as the port keeps nothing back: what it has no room for makes the outbox full, which its sender
+  // sees.
+  while (const LinkOutbox::Bytes* bytes = port_.flush() ? outbox_->front() : nullptr) {
+    const DeviceFault fault = judge(port_.write(bytes->used()));
+    outbox_->pop();
+    if (!fault.ok()) return fault;
+    ++sent_;
+  }
+  return {};
 }
 
-DeviceFault SerialImuLink::sendTimesync(const mavlink::Timesync& message) {
-  std::array<std::uint8_t, kLongestMavlinkFrame> frame;
-  const std::size_t length = mavlink::write(sender_, message, frame);
-  const DeviceFault fault = port_.write(std::span(frame).first(length), kWriteTime);
-  // A full port loses a request and no more.
-  return fault.kind == DeviceFaultKind::kUnplugged ? fault : DeviceFault{};
+std::optional<Stamp> PortImuLink::toHost(Stamp device) const { return dialogue_.toHost(device); }
+
+bool PortImuLink::nextRemark(DeviceFault& remark) { return dialogue_.stream().nextRemark(remark); }
+
+std::string PortImuLink::stream() const {
+  const ImuStreamRequest& stream = dialogue_.stream();
+  if (!isMavlink()) return {};
+  if (stream.asked() <= 0) return "no autopilot's HEARTBEAT was heard: nothing was asked";
+  const std::string answer = !stream.result() ? "not answered"
+                             : *stream.result() == mavlink::CommandAck::kAccepted
+                                 ? "accepted"
+                                 : fmt::format("refused with MAV_RESULT {}", *stream.result());
+  return fmt::format("{}: {:.0f} Hz asked, {}, {:.0f} Hz come", stream.messageName(), stream.asked(), answer,
+                     stream.seen());
 }
 
-std::optional<Stamp> SerialImuLink::toHost(Stamp device) const {
-  if (!exchange_.usable()) return std::nullopt;
-  return exchange_.toHost(device);
-}
-
-nlohmann::ordered_json SerialImuLink::counters() const {
+nlohmann::ordered_json PortImuLink::counters() const {
   const StreamCounters& c = decoder_.counters();
   nlohmann::ordered_json json = {{"bytes", c.bytes},
                                  {"skipped_bytes", c.skipped_bytes},
@@ -92,6 +111,15 @@ nlohmann::ordered_json SerialImuLink::counters() const {
     json["overruns"] = errors->overrun + errors->buffer_overrun;
     json["framing_errors"] = errors->framing;
   }
+  if (isMavlink()) {
+    json["message"] = dialogue_.stream().messageName();
+    json["asked_hz"] = dialogue_.stream().asked();
+    json["requests"] = dialogue_.requests();
+    json["lost_messages"] = c.lost_messages;
+    json["timesync_answers"] = dialogue_.answers();
+    json["writes_refused"] = refused_;
+  }
+  if (outbox_ != nullptr) json["sent_for_autopilot"] = sent_;
   return json;
 }
 

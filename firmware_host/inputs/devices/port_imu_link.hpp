@@ -1,43 +1,55 @@
 #pragma once
-// An IMU on a serial port. MAVLink's TIMESYNC is asked and answered on the way.
+// An IMU on a serial port, or an autopilot's on a serial port or UDP, with which TIMESYNC and the readings'
+// rate are settled on the way. What others want sent over the same link goes out here too: one thread reads
+// and writes the port.
 
 #include <array>
+#include <memory>
 #include <optional>
+#include <string>
 
 #include "drivers/serial/imu_decoder.hpp"
-#include "drivers/serial/serial_port.hpp"
-#include "drivers/timesync/two_way_clock_map.hpp"
+#include "firmware_host/inputs/devices/autopilot_dialogue.hpp"
 #include "firmware_host/inputs/devices/imu_link.hpp"
+#include "firmware_host/interfaces/link_outbox.hpp"
+#include "firmware_host/interfaces/link_port.hpp"
 #include "firmware_host/settings/device_settings.hpp"
 
 namespace swiftlet {
 
-class SerialImuLink : public ImuLink {
+class PortImuLink : public ImuLink {
  public:
-  explicit SerialImuLink(const ImuLinkGroup& settings);
+  /// `rate`: readings a second that the device is asked for [Hz]; 0: as they come. `outbox`: of an
+  /// autopilot's outlet on the same link, or null; it outlives this. InputError naming imu_link.device.
+  explicit PortImuLink(const ImuLinkGroup& settings, double rate = 0, LinkOutbox* outbox = nullptr);
 
   DeviceFault open() override;
   [[nodiscard]] bool isOpen() const override { return port_.isOpen(); }
   [[nodiscard]] int fd() const override { return port_.descriptor(); }
+  [[nodiscard]] int wakeFd() const override { return outbox_ != nullptr ? outbox_->descriptor() : -1; }
   void discard() override;
   DeviceFault receive(Stamp now) override;
+  DeviceFault send() override;
   bool next(ImuReading& reading) override { return decoder_.next(reading); }
   bool nextEdge(TriggerEdge& edge) override { return decoder_.nextEdge(edge); }
   [[nodiscard]] std::uint64_t received() const override { return decoder_.counters().bytes; }
   [[nodiscard]] std::optional<Stamp> toHost(Stamp device) const override;
+  bool nextRemark(DeviceFault& remark) override;
+  [[nodiscard]] std::string stream() const override;
   [[nodiscard]] nlohmann::ordered_json counters() const override;
 
  private:
-  DeviceFault exchangeClocks(Stamp now);
-  DeviceFault sendTimesync(const mavlink::Timesync& message);
+  [[nodiscard]] bool isMavlink() const { return decoder_.protocol() == ImuProtocol::kMavlink; }
+  /// What the port said of a write: only its end is the link's.
+  DeviceFault judge(const DeviceFault& fault);
+  DeviceFault close(const DeviceFault& fault);
 
-  SerialPort port_;
+  LinkPort port_;
   ImuDecoder decoder_;
+  AutopilotDialogue dialogue_;
+  LinkOutbox* outbox_;
   std::array<std::uint8_t, ImuDecoder::kMostFed> bytes_;
-  // MAVLink alone.
-  MavlinkSender sender_;
-  TwoWayClockMap exchange_;
-  Stamp asked_;  ///< when the newest request left; its answer names it
+  std::uint64_t sent_ = 0, refused_ = 0;  ///< writes; of the outbox, and of our own that found no room
 };
 
 }  // namespace swiftlet

@@ -14,7 +14,7 @@
 #include "estimator/core/units.hpp"
 #include "estimator/messages/names.hpp"
 #include "firmware_host/interfaces/device_journal.hpp"
-#include "firmware_host/outputs/autopilot/autopilot_port.hpp"
+#include "firmware_host/interfaces/link_port.hpp"
 #include "firmware_host/outputs/autopilot/obstacle_message.hpp"
 #include "firmware_host/realtime/host_sleep.hpp"
 #include "firmware_host/realtime/latency_histogram.hpp"
@@ -67,7 +67,7 @@ class AutopilotThread::Work final : public Follower::Work {
         journal_("autopilot (" + options.settings.device + ")"),
         link_(linkSettings(options.settings)),
         port_(options.settings.device, static_cast<unsigned>(options.settings.baud)) {
-    if (const DeviceFault fault = port_.open(); !fault.ok()) {
+    if (const DeviceFault fault = openOwn(); !fault.ok()) {
       throw InputError("settings", 0, "autopilot.device", describe(fault, options.settings.device),
                        "Or leave it empty: nobody is told then");
     }
@@ -103,8 +103,11 @@ class AutopilotThread::Work final : public Follower::Work {
   }
 
  private:
+  DeviceFault openOwn() { return options_.outbox == nullptr ? port_.open() : DeviceFault{}; }
+
   void run() {
     heard_ = monotonicNow();
+    if (options_.outbox != nullptr) return runOnAnothersLink(*options_.outbox);
     while (thread_.turn()) {
       if (journal_.standing() != DeviceFaultKind::kNone) {
         reopen();
@@ -115,6 +118,15 @@ class AutopilotThread::Work final : public Follower::Work {
       if (!hear()) sleepFor(kFloodPause);
       takeNews();
       tell();
+    }
+  }
+
+  /// Silence, faults and TIMESYNC are the matter of whose link it is.
+  void runOnAnothersLink(const LinkOutbox& outbox) {
+    while (thread_.turn()) {
+      sleepFor(kRound);
+      takeNews();
+      if (outbox.attended()) tell();
     }
   }
 
@@ -272,13 +284,21 @@ class AutopilotThread::Work final : public Follower::Work {
     const std::uint64_t poses = link_.counters().poses;
     const std::size_t count = link_.step(monotonicNow(), number_ > 0 ? &state_ : nullptr, omega_body_, bytes);
     if (count == 0) return;
-    if (const DeviceFault fault = port_.write(std::span(bytes).first(count)); !fault.ok()) {
+    if (const DeviceFault fault = send(std::span(bytes).first(count)); !fault.ok()) {
       ++refused_;
       if (fault.kind == DeviceFaultKind::kUnplugged) return fail(fault);
       noteRefusal(fault);
     } else if (link_.counters().poses > poses) {
       age_.add((monotonicNow() - state_.stamp).seconds());
     }
+  }
+
+  DeviceFault send(std::span<const std::uint8_t> bytes) {
+    static_assert(AutopilotLink::kMostBytes <= LinkOutbox::kMostBytes);
+    static_assert(AutopilotLink::kMostBytes <= LinkPort::kMostWritten);
+    if (options_.outbox == nullptr) return port_.write(bytes);
+    if (options_.outbox->push(bytes)) return {};
+    return deviceFault(DeviceFaultKind::kFailed, 0, "the IMU's link takes no more");
   }
 
   void noteRefusal(const DeviceFault& fault) {
@@ -301,7 +321,7 @@ class AutopilotThread::Work final : public Follower::Work {
   const AutopilotMounting mounting_;
   DeviceJournal journal_;
   AutopilotLink link_;
-  AutopilotPort port_;
+  LinkPort port_;
   NavState state_;  ///< stamp of CLOCK_MONOTONIC
   Eigen::Vector3d omega_body_ = Eigen::Vector3d::Zero();
   std::optional<Duration> to_host_;

@@ -1,5 +1,6 @@
 #pragma once
-// An autopilot told of the estimate while it flies by it: the thread that owns the port, docs/mavlink.md.
+// An autopilot told of the estimate while it flies by it: the thread that owns the port, or sends over that
+// of the IMU, docs/mavlink.md.
 //
 // It reads a LiveOutlet, steps an AutopilotLink and sends what that says; nobody waits for it and it waits
 // for nobody: a port that takes no bytes loses them, counted and noted with the remedy. Its priority is that
@@ -17,6 +18,7 @@
 
 #include "drivers/mavlink/autopilot_link.hpp"
 #include "firmware_host/interfaces/follower_thread.hpp"
+#include "firmware_host/interfaces/link_outbox.hpp"
 #include "firmware_host/interfaces/live_outlet.hpp"
 #include "firmware_host/settings/device_settings.hpp"
 
@@ -24,6 +26,8 @@ namespace swiftlet {
 
 struct AutopilotThreadOptions {
   AutopilotGroup settings;
+  /// Where another thread owns the link: nothing is opened or read here. Null: a port of its own.
+  LinkOutbox* outbox = nullptr;
   int priority = 0;  ///< SCHED_FIFO; 0: none
   /// From the run's stamps to CLOCK_MONOTONIC, once it is known; none: they are of it.
   std::function<std::optional<Duration>()> to_host;

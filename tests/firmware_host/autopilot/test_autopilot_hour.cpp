@@ -139,10 +139,11 @@ class Hour : public ImuLink, public SensorSink {
   }
 
   void exchangeClocks() {
-    ReceivedTimesync received;
-    while (decoder_.nextTimesync(received)) {
-      if (received.message.tc1 == 0 || received.message.ts1 != asked_.ns) continue;
-      static_cast<void>(exchange_.add({asked_, Stamp{received.message.tc1}, received.arrival}));
+    ReceivedMavlink received;
+    while (decoder_.nextMavlink(received)) {
+      const auto* time = std::get_if<mavlink::Timesync>(&received.message);
+      if (time == nullptr || time->tc1 == 0 || time->ts1 != asked_.ns) continue;
+      static_cast<void>(exchange_.add({asked_, Stamp{time->tc1}, received.arrival}));
     }
     if (ticks_ % kAskTicks != 0) return;
     asked_ = now();

@@ -9,7 +9,7 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/serial/pseudo_terminal.hpp"
-#include "firmware_host/outputs/autopilot/autopilot_port.hpp"
+#include "firmware_host/interfaces/link_port.hpp"
 #include "tests/firmware_host/autopilot/scripted_vehicle.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
@@ -115,7 +115,7 @@ TEST_CASE("Over a serial port: poses, reasons, health, clocks; unplugged and bac
 }
 
 TEST_CASE("Over UDP, of a log with a clock of its own, with obstacles; silence is said", "[autopilot]") {
-  AutopilotPort far("udp:127.0.0.1:24582@24581", 0);
+  LinkPort far("udp:127.0.0.1:24582@24581", 0);
   REQUIRE(far.open().ok());
   Vehicle vehicle;
   vehicle.clock = Duration::fromSeconds(1234.5);

@@ -5,7 +5,7 @@
 #include <catch2/catch.hpp>
 #include <cstdint>
 
-#include "firmware_host/outputs/autopilot/autopilot_port.hpp"
+#include "firmware_host/interfaces/link_port.hpp"
 #include "firmware_host/supervisor/supervisor.hpp"
 #include "tests/firmware_host/autopilot/scripted_vehicle.hpp"
 #include "tests/logs/flight_trap.hpp"
@@ -15,7 +15,7 @@ namespace {
 
 TEST_CASE("poses, obstacles, texts and answers cost the autopilot's thread no heap call and no lock",
           "[autopilot]") {
-  AutopilotPort far("udp:127.0.0.1:24592@24591", 0);
+  LinkPort far("udp:127.0.0.1:24592@24591", 0);
   REQUIRE(far.open().ok());
   Vehicle vehicle;
   Heard heard;

@@ -1,4 +1,4 @@
-// Names of ports, and datagrams to and fro.
+// Names of ports, datagrams to and fro, and whole writes.
 
 #include <arpa/inet.h>
 #include <sys/socket.h>
@@ -14,7 +14,7 @@
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/device/monotonic_now.hpp"
 #include "drivers/serial/pseudo_terminal.hpp"
-#include "firmware_host/outputs/autopilot/autopilot_port.hpp"
+#include "firmware_host/interfaces/link_port.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
 namespace swiftlet {
@@ -47,13 +47,13 @@ class ForeignSender {
 namespace {
 
 TEST_CASE("A port's name is read, or refused with a remedy", "[autopilot]") {
-  CHECK_FALSE(udpAddress("/dev/ttyS1"));
-  const auto simple = udpAddress("udp:192.168.1.10:14550");
+  CHECK_FALSE(udpAddress("/dev/ttyS1", "autopilot.device"));
+  const auto simple = udpAddress("udp:192.168.1.10:14550", "autopilot.device");
   REQUIRE(simple);
   CHECK(simple->host == "192.168.1.10");
   CHECK(simple->port == 14550);
   CHECK(simple->own_port == 0);
-  const auto listening = udpAddress("udp:localhost:14580@14540");
+  const auto listening = udpAddress("udp:localhost:14580@14540", "autopilot.device");
   REQUIRE(listening);
   CHECK(listening->host == "localhost");
   CHECK(listening->own_port == 14540);
@@ -61,19 +61,19 @@ TEST_CASE("A port's name is read, or refused with a remedy", "[autopilot]") {
                             "udp:host:14550@", "udp:host:1x", "udp:host:14550@x"}) {
     INFO(wrong);
     try {
-      static_cast<void>(udpAddress(wrong));
+      static_cast<void>(udpAddress(wrong, "imu_link.device"));
       FAIL("was taken");
     } catch (const InputError& error) {
-      CHECK(error.field == "autopilot.device");
+      CHECK(error.field == "imu_link.device");
       CHECK_FALSE(error.remedy.empty());
     }
   }
 }
 
 TEST_CASE("Datagrams arrive whole; of a host that was not named none are read", "[autopilot]") {
-  AutopilotPort a("udp:127.0.0.1:24571@24572", 0);
-  AutopilotPort b("udp:127.0.0.1:24572@24571", 0);
-  AutopilotPort stranger("udp:127.0.0.2:24571@24573", 0);
+  LinkPort a("udp:127.0.0.1:24571@24572", 0);
+  LinkPort b("udp:127.0.0.1:24572@24571", 0);
+  LinkPort stranger("udp:127.0.0.2:24571@24573", 0);
   REQUIRE(a.open().ok());
   // Nobody is there yet.
   const std::vector<std::uint8_t> sent = {1, 2, 3, 253, 0, 7};
@@ -91,7 +91,7 @@ TEST_CASE("Datagrams arrive whole; of a host that was not named none are read", 
   CHECK(std::vector<std::uint8_t>(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count)) == sent);
   CHECK(read_at > Stamp{});
   // It wants 127.0.0.2 and hears 127.0.0.1.
-  AutopilotPort to_stranger("udp:127.0.0.1:24573", 0);
+  LinkPort to_stranger("udp:127.0.0.1:24573", 0);
   REQUIRE(to_stranger.open().ok());
   REQUIRE(to_stranger.write(sent).ok());
   stranger.wait(Duration::fromMilliseconds(1000));
@@ -114,12 +114,12 @@ TEST_CASE("A flood of foreign datagrams neither ends a read nor wakes anybody", 
   for (const Case& one : {Case{"udp:127.0.0.1:24576@24577", "udp:127.0.0.1:24577@24576", "other host"},
                           Case{"udp:127.0.0.1:24576", "", "other port"}}) {
     INFO(one.stranger);
-    AutopilotPort port(one.device, 0);
+    LinkPort port(one.device, 0);
     REQUIRE(port.open().ok());
     const bool agreed = *one.autopilot != 0;
     const int own = agreed ? 24577 : port.ownPort();
     const std::string to_us = "udp:127.0.0.1:" + std::to_string(own);
-    AutopilotPort autopilot(to_us + "@24576", 0);
+    LinkPort autopilot(to_us + "@24576", 0);
     REQUIRE(autopilot.open().ok());
     test::ForeignSender stranger(agreed ? "127.0.0.3" : "127.0.0.1", static_cast<std::uint16_t>(own));
     for (int i = 0; i < 5000; ++i) stranger.send(foreign);
@@ -139,9 +139,9 @@ TEST_CASE("A flood of foreign datagrams neither ends a read nor wakes anybody", 
 }
 
 TEST_CASE("An autopilot that sends from any port to an agreed one is heard", "[autopilot]") {
-  AutopilotPort port("udp:127.0.0.1:24578@24579", 0);
+  LinkPort port("udp:127.0.0.1:24578@24579", 0);
   REQUIRE(port.open().ok());
-  AutopilotPort autopilot("udp:127.0.0.1:24579", 0);  // from a port of the kernel's choice
+  LinkPort autopilot("udp:127.0.0.1:24579", 0);  // from a port of the kernel's choice
   REQUIRE(autopilot.open().ok());
   const std::vector<std::uint8_t> sent = {253, 1, 2, 3};
   REQUIRE(autopilot.write(sent).ok());
@@ -154,7 +154,7 @@ TEST_CASE("An autopilot that sends from any port to an agreed one is heard", "[a
 }
 
 TEST_CASE("Where nobody listens yet, datagrams are lost and no fault", "[autopilot]") {
-  AutopilotPort port("udp:127.0.0.1:24580", 0);
+  LinkPort port("udp:127.0.0.1:24580", 0);
   REQUIRE(port.open().ok());
   const std::vector<std::uint8_t> sent = {253, 1, 2, 3};
   std::array<std::uint8_t, 512> bytes;
@@ -168,38 +168,86 @@ TEST_CASE("Where nobody listens yet, datagrams are lost and no fault", "[autopil
 }
 
 TEST_CASE("A port that another has, and a host that is none, are faults", "[autopilot]") {
-  AutopilotPort a("udp:127.0.0.1:24574@24575", 0);
-  AutopilotPort again("udp:127.0.0.1:24574@24575", 0);
+  LinkPort a("udp:127.0.0.1:24574@24575", 0);
+  LinkPort again("udp:127.0.0.1:24574@24575", 0);
   REQUIRE(a.open().ok());
   CHECK(again.open().kind == DeviceFaultKind::kBusy);
-  AutopilotPort nowhere("udp:no-such-host.invalid:14550", 0);
+  LinkPort nowhere("udp:no-such-host.invalid:14550", 0);
   CHECK(nowhere.open().kind == DeviceFaultKind::kMissing);
-  AutopilotPort serial("/dev/no-such-port", 921'600);
+  LinkPort serial("/dev/no-such-port", 921'600);
   CHECK(serial.open().kind == DeviceFaultKind::kMissing);
 }
 
-TEST_CASE("The IMU's port is refused, by its other name too", "[autopilot]") {
-  const ScratchFolder folder("own_port");
+TEST_CASE("Two settings name one port by the same words or by two names of it", "[autopilot]") {
+  const ScratchFolder folder("same_port");
   PseudoTerminal imu, other;
   REQUIRE(imu.open().ok());
   REQUIRE(other.open().ok());
   const std::string by_id = folder.file("by-id");
   std::filesystem::create_symlink(imu.path(), by_id);
-  CHECK_NOTHROW(checkOwnPort(other.path(), imu.path()));
-  CHECK_NOTHROW(checkOwnPort("udp:127.0.0.1:14550", imu.path()));
-  CHECK_NOTHROW(checkOwnPort(imu.path(), ""));
-  CHECK_NOTHROW(checkOwnPort("/dev/no-such-port", "/dev/no-such-port-either"));
-  for (const std::string& device : {imu.path(), by_id}) {
-    INFO(device);
-    try {
-      checkOwnPort(device, imu.path());
-      FAIL("was taken");
-    } catch (const InputError& error) {
-      CHECK(error.field == "autopilot.device");
-      CHECK(std::string(error.what()).find(device) != std::string::npos);
-      CHECK_FALSE(error.remedy.empty());
+  CHECK(samePort(imu.path(), imu.path()));
+  CHECK(samePort(by_id, imu.path()));
+  CHECK(samePort("udp:127.0.0.1:14580@14540", "udp:127.0.0.1:14580@14540"));
+  CHECK_FALSE(samePort(other.path(), imu.path()));
+  CHECK_FALSE(samePort("udp:127.0.0.1:14550", imu.path()));
+  CHECK_FALSE(samePort("/dev/no-such-port", "/dev/no-such-port-either"));
+}
+
+TEST_CASE("Answers go to the port that the other side sends from", "[autopilot]") {
+  LinkPort ours("udp:127.0.0.1:24585@24586", 0);
+  LinkPort theirs("udp:127.0.0.1:24586", 0);  // from a port of the kernel's choice, not 24585
+  REQUIRE(ours.open().ok());
+  REQUIRE(theirs.open().ok());
+  const std::vector<std::uint8_t> noise = {7, 7, 7}, frame = {253, 1, 2, 3};
+  std::array<std::uint8_t, 512> bytes;
+  std::size_t count = 0;
+  Stamp read_at;
+  const auto hears = [&](const std::vector<std::uint8_t>& sent) {
+    REQUIRE(theirs.write(sent).ok());
+    ours.wait(Duration::fromMilliseconds(1000));
+    REQUIRE(ours.read(bytes, count, read_at).ok());
+    CHECK(count == sent.size());
+    static_cast<void>(ours.write(frame));
+    theirs.wait(Duration::fromMilliseconds(100));
+    REQUIRE(theirs.read(bytes, count, read_at).ok());
+    return count == frame.size();
+  };
+  CHECK_FALSE(hears(noise));
+  CHECK(hears(frame));
+}
+
+TEST_CASE("A serial port that takes little gets whole writes in order, or refuses them", "[autopilot]") {
+  PseudoTerminal terminal;
+  REQUIRE(terminal.open().ok());
+  LinkPort port(terminal.path(), 921'600);
+  REQUIRE(port.open().ok());
+  constexpr std::size_t kLength = 777;
+  std::vector<std::uint8_t> sent, received;
+  std::size_t refused = 0;
+  std::array<std::uint8_t, 512> bytes;
+  for (std::uint8_t i = 0; i < 200; ++i) {
+    const std::vector<std::uint8_t> write(kLength, i);
+    if (port.write(write).ok()) {
+      sent.insert(sent.end(), write.begin(), write.end());
+    } else {
+      ++refused;
     }
+    // A reader that falls behind.
+    std::size_t count = 0;
+    REQUIRE(terminal.receive(std::span(bytes).first(i % 2 == 0 ? 512 : 100), count).ok());
+    received.insert(received.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count));
   }
+  CHECK(refused > 10);
+  CHECK(sent.size() > 10 * kLength);
+  const Stamp begin = monotonicNow();
+  while (received.size() < sent.size() && monotonicNow() - begin < Duration::fromMilliseconds(10'000)) {
+    static_cast<void>(port.flush());
+    std::size_t count = 0;
+    REQUIRE(terminal.receive(bytes, count).ok());
+    received.insert(received.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count));
+  }
+  CHECK(port.flush());
+  CHECK(received == sent);
 }
 
 }  // namespace

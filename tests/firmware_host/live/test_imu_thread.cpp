@@ -10,7 +10,7 @@
 #include "drivers/serial/pseudo_terminal.hpp"
 #include "estimator/core/random.hpp"
 #include "firmware_host/inputs/devices/device_times.hpp"
-#include "firmware_host/inputs/devices/serial_imu_link.hpp"
+#include "firmware_host/inputs/devices/port_imu_link.hpp"
 #include "tests/firmware_host/live/imu_bench.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 
@@ -45,7 +45,7 @@ class FarSensor {
     ImuLinkGroup settings;
     settings.device = port();
     settings.protocol = protocol_;
-    return std::make_unique<SerialImuLink>(settings);
+    return std::make_unique<PortImuLink>(settings);
   }
 
   /// Readings at the sensor's rate, sensed when they are sent.

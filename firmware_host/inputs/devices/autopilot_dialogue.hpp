@@ -1,0 +1,52 @@
+#pragma once
+// What is said to and fro with an autopilot that is the IMU, beside its readings: TIMESYNC asked and
+// answered, and its readings' rate. Events of the decoder and the clock in, bytes out.
+//
+// It speaks as MAV_COMP_ID_ONBOARD_COMPUTER: sequence numbers are counted for each component, and those of
+// the outlet's component (drivers/mavlink/autopilot_link.hpp), which may share the link, are another
+// thread's. Memory: fixed, no allocation. Threads: one.
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "drivers/mavlink/imu_stream_request.hpp"
+#include "drivers/serial/imu_decoder.hpp"
+#include "drivers/timesync/two_way_clock_map.hpp"
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+class AutopilotDialogue {
+ public:
+  /// Answers of one round to TIMESYNC: an autopilot asks ten times a second.
+  static constexpr std::size_t kMostAnswers = 4;
+  /// These, a request and a command.
+  static constexpr std::size_t kMostBytes = (kMostAnswers + 2) * kLongestMavlinkFrame;
+
+  /// `rate`: readings a second that are wanted [Hz]; 0: as they come.
+  explicit AutopilotDialogue(double rate) : stream_(rate) {}
+
+  /// Takes what the decoder has heard, once its readings have been taken, and tells it which message to take.
+  /// What is to be sent at `now` (CLOCK_MONOTONIC): bytes written.
+  std::size_t step(ImuDecoder& decoder, Stamp now, std::span<std::uint8_t, kMostBytes> out);
+  /// After the link was gone.
+  void restart();
+
+  /// The autopilot's clock on the host's; empty: not sure yet.
+  [[nodiscard]] std::optional<Stamp> toHost(Stamp device) const;
+  [[nodiscard]] std::uint64_t answers() const { return answers_; }
+  [[nodiscard]] std::uint64_t requests() const { return requests_; }
+  [[nodiscard]] ImuStreamRequest& stream() { return stream_; }
+  [[nodiscard]] const ImuStreamRequest& stream() const { return stream_; }
+
+ private:
+  MavlinkSender sender_{.system = 1, .component = 191, .sequence = 0};
+  TwoWayClockMap exchange_;
+  ImuStreamRequest stream_;
+  Stamp asked_;                ///< when the newest request left; its answer names it
+  std::uint64_t samples_ = 0;  ///< of the decoder, counted
+  std::uint64_t answers_ = 0, requests_ = 0;
+};
+
+}  // namespace swiftlet

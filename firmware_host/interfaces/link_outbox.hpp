@@ -1,0 +1,76 @@
+#pragma once
+// What one thread wants sent over a link that another thread owns: an autopilot's outlet over the IMU's link.
+//
+// The owner alone reads from and writes to the port, so no frame is cut by another's, and it never waits for
+// the sender: it takes what is there when it is woken. Each push is sent whole or not at all.
+// Full: the push is refused. Unattended (the owner does not run, or its port is gone): the sender should not
+// push; what waits is thrown away when the port is back.
+// Threads: one sender (attended, push), one owner (the others). Memory: 12 kB inside the object.
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "estimator/core/spsc_ring.hpp"
+
+namespace swiftlet {
+
+class LinkOutbox {
+ public:
+  /// The longest push: more than AutopilotLink writes in a step.
+  static constexpr std::size_t kMostBytes = 1500;
+  struct Bytes {
+    std::array<std::uint8_t, kMostBytes> data;
+    std::size_t count = 0;
+    [[nodiscard]] std::span<const std::uint8_t> used() const { return std::span(data).first(count); }
+  };
+
+  LinkOutbox() : wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {}
+  ~LinkOutbox() { ::close(wake_); }
+  LinkOutbox(const LinkOutbox&) = delete;
+  LinkOutbox& operator=(const LinkOutbox&) = delete;
+
+  // Of the sender.
+  [[nodiscard]] bool attended() const { return attended_.load(std::memory_order_acquire); }
+  /// False: there is no room, or it is too long.
+  [[nodiscard]] bool push(std::span<const std::uint8_t> bytes) {
+    if (bytes.size() > kMostBytes) return false;
+    Bytes* slot = ring_.beginPush();
+    if (slot == nullptr) return false;
+    std::copy(bytes.begin(), bytes.end(), slot->data.begin());
+    slot->count = bytes.size();
+    ring_.commitPush();
+    static_cast<void>(eventfd_write(wake_, 1));
+    return true;
+  }
+
+  // Of the owner.
+  void attend(bool attended) { attended_.store(attended, std::memory_order_release); }
+  /// To poll for reading: something waits.
+  [[nodiscard]] int descriptor() const { return wake_; }
+  /// Ends the waking; before what waits is taken.
+  void hush() const {
+    eventfd_t pushes = 0;
+    static_cast<void>(eventfd_read(wake_, &pushes));
+  }
+  /// The oldest that waits, until pop(); null: nothing does.
+  [[nodiscard]] const Bytes* front() { return ring_.front(); }
+  void pop() { ring_.pop(); }
+
+ private:
+  // Two periods of poses at the default rate, with a text and obstacles each: a link that holds more back
+  // than that is too slow, and poses that waited longer are of no use.
+  static constexpr std::size_t kPushes = 8;
+
+  int wake_;
+  std::atomic<bool> attended_{false};
+  SpscRing<Bytes, kPushes> ring_;
+};
+
+}  // namespace swiftlet
