@@ -52,6 +52,7 @@ void ImuStreamRequest::begin() {
 
 std::optional<mavlink::CommandLong> ImuStreamRequest::step(Stamp now) {
   if (rate_ <= 0 || !system_ || now - heartbeat_ >= kGone) return std::nullopt;
+  if (now <= window_) count_ = 0;  // it settles
   if (!ask_ && now - window_ >= kWindow) judge(now);
   if (!ask_) return std::nullopt;
   ask_ = false;

@@ -21,6 +21,11 @@ const u64 = () => (oneIn(8) ? 0n : (BigInt(bits() >>> below(32)) << 31n) | BigIn
 const i64 = () => (oneIn(3) ? -u64() : u64())
 // Exactly a float32, with zeros often, so that trailing ones are cut.
 const f32 = () => (oneIn(4) ? 0 : Math.fround((below(2 ** 24) - 2 ** 23) * 2 ** (below(20) - 26)))
+const i16 = () => u16() - 32768
+const shorts = () => [i16(), i16(), i16()]
+const axes = (v) => ({
+  xacc: v.acc[0], yacc: v.acc[1], zacc: v.acc[2], xgyro: v.gyro[0], ygyro: v.gyro[1], zgyro: v.gyro[2],
+  xmag: v.mag[0], ymag: v.mag[1], zmag: v.mag[2] })
 const vector = () => [f32(), f32(), f32()]
 const many = (n, of) => Array.from({ length: n }, of)
 
@@ -67,6 +72,26 @@ const kinds = {
     const v = { time_usec: u64(), seq: u32() }
     const m = new common.CameraTrigger()
     Object.assign(m, { timeUsec: v.time_usec, seq: v.seq })
+    return [v, m]
+  },
+  SCALED_IMU: () => {
+    const v = { time_boot_ms: u32(), acc: shorts(), gyro: shorts(), mag: shorts(), temperature: i16() }
+    const m = new common.ScaledImu()
+    Object.assign(m, { timeBootMs: v.time_boot_ms, ...axes(v), temperature: v.temperature })
+    return [v, m]
+  },
+  RAW_IMU: () => {
+    const v = { time_usec: u64(), acc: shorts(), gyro: shorts(), mag: shorts(), id: u8(), temperature: i16() }
+    const m = new common.RawImu()
+    Object.assign(m, { timeUsec: v.time_usec, ...axes(v), id: v.id, temperature: v.temperature })
+    return [v, m]
+  },
+  COMMAND_ACK: () => {
+    const v = { command: u16(), result: below(10), progress: u8(), result_param2: bits() | 0, target_system: u8(), target_component: u8() }
+    const m = new common.CommandAck()
+    Object.assign(m, {
+      command: v.command, result: v.result, progress: v.progress, resultParam2: v.result_param2,
+      targetSystem: v.target_system, targetComponent: v.target_component })
     return [v, m]
   },
   // A message that this project does not name.
@@ -121,7 +146,8 @@ const kinds = {
   },
 }
 const of_vision = { ODOMETRY: 80, VISION_POSITION_ESTIMATE: 40, OBSTACLE_DISTANCE: 40, STATUSTEXT: 40 }
-const counts = process.argv[2] === 'vision' ? of_vision : { HIGHRES_IMU: 120, TIMESYNC: 100, HEARTBEAT: 40, COMMAND_LONG: 60, CAMERA_TRIGGER: 40, ATTITUDE: 20 }
+const counts = process.argv[2] === 'vision' ? of_vision : { HIGHRES_IMU: 120, TIMESYNC: 100, HEARTBEAT: 40, COMMAND_LONG: 60, CAMERA_TRIGGER: 40, ATTITUDE: 20,
+  SCALED_IMU: 40, RAW_IMU: 40, COMMAND_ACK: 40 }
 
 const json = (v) => {
   if (typeof v === 'bigint') return v.toString()

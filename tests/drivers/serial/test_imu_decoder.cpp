@@ -230,6 +230,73 @@ TEST_CASE("MAVLink: one sender, one sensor, and only what is fresh", "[serial]")
   CHECK(decode(chosen, bytes).readings.size() == 1);
 }
 
+TEST_CASE("MAVLink: RAW_IMU and SCALED_IMU are read where they are asked for, and then alone", "[serial]") {
+  // Of node-mavlink's frames.
+  const nlohmann::json vectors = protocolVectors("mavlink_vectors.json");
+  Bytes bytes;
+  std::size_t scaled = 0, raw = 0;
+  nlohmann::json first_raw;
+  for (const nlohmann::json& vector : vectors["frames"]) {
+    const std::string kind = vector["message"];
+    // One sender's frames are enough: each is another's.
+    if (kind == "SCALED_IMU" && scaled++ == 0) append(bytes, bytesOf(vector));
+    if (kind == "RAW_IMU" && raw++ == 0) {
+      append(bytes, bytesOf(vector));
+      first_raw = vector["values"];
+    }
+  }
+  REQUIRE(scaled > 0);
+  REQUIRE(raw > 0);
+  ImuDecoder usual(ImuProtocol::kMavlink);
+  CHECK(decode(usual, bytes).readings.empty());
+  ImuDecoder decoder(ImuProtocol::kMavlink);
+  decoder.takeMavlink(mavlink::ScaledImu::kRawId);
+  const Decoded got = decode(decoder, bytes);
+  REQUIRE(got.readings.size() == 1);
+  CHECK(got.readings[0].device->ns == 1000 * first_raw["time_usec"].get<std::int64_t>());
+  for (int i = 0; i < 3; ++i) {
+    const auto axis = static_cast<std::size_t>(i);
+    CHECK(got.readings[0].accel[i] == Approx(first_raw["acc"][axis].get<double>() * 9.80665e-3));
+    CHECK(got.readings[0].gyro[i] == Approx(first_raw["gyro"][axis].get<double>() * 1e-3));
+  }
+  CHECK(got.readings[0].mean_age == Duration{});
+  decoder.takeMavlink(mavlink::ScaledImu::kScaledId);
+  CHECK(decode(decoder, bytes).readings.size() == 1);
+}
+
+TEST_CASE("MAVLink: PX4's means are half an interval old, 2.5 ms at most", "[serial]") {
+  struct Case {
+    std::uint8_t autopilot;
+    std::int64_t step_us;
+    std::int64_t age_us;
+  };
+  constexpr std::uint8_t kArduPilot = 3;
+  for (const Case& one : {Case{mavlink::Heartbeat::kPx4, 20'000, 2500},
+                          {mavlink::Heartbeat::kPx4, 5'000, 2500},
+                          {mavlink::Heartbeat::kPx4, 2'500, 1250},
+                          {kArduPilot, 5'000, 0}}) {
+    INFO(one.step_us);
+    std::array<std::uint8_t, kLongestMavlinkFrame> out = {};
+    MavlinkSender sender = {1, 1, 0};
+    mavlink::Heartbeat beat;
+    beat.autopilot = one.autopilot;
+    Bytes bytes;
+    append(bytes, std::span(out).first(mavlink::write(sender, beat, out)));
+    for (std::int64_t i = 1; i <= 20; ++i) {
+      mavlink::HighresImu imu;
+      imu.time_usec = static_cast<std::uint64_t>(1'000'000 + i * one.step_us);
+      imu.fields_updated = 0x3F;
+      append(bytes, std::span(out).first(mavlink::write(sender, imu, out)));
+    }
+    ImuDecoder decoder(ImuProtocol::kMavlink);
+    const Decoded got = decode(decoder, bytes);
+    REQUIRE(got.readings.size() == 20);
+    CHECK(got.readings.back().mean_age.ns == 1000 * one.age_us);
+    CHECK(got.readings.back().device == Stamp{1000 * (1'000'000 + 20 * one.step_us)});
+    if (one.autopilot == mavlink::Heartbeat::kPx4) CHECK(got.readings.front().mean_age.ns == 2'500'000);
+  }
+}
+
 TEST_CASE("MAVLink: TIMESYNC and camera triggers come out beside the readings", "[serial]") {
   std::array<std::uint8_t, kLongestMavlinkFrame> out = {};
   MavlinkSender sender = {1, 1, 0};
