@@ -69,6 +69,9 @@ class VehicleCheck {
                                                         "imu_link.protocol and imu_link.baud are the device's"
                                                       : "set the device's output rate, or correct rate_hz in "
                                                         "the calibration: its noise depends on it"));
+    if (const std::string asked = input_.imu().link().stream(); !asked.empty()) {
+      report.lines.push_back({"IMU stream", asked, MachineVerdict::kNote, ""});
+    }
     if (stream.stamps.size() < 2) return;
     const Duration typical = stream.medianStep();
     const Duration largest = stream.largestStep();

@@ -11,7 +11,7 @@ struct VehicleGroup {
 };
 
 struct ImuLinkGroup {
-  std::string device = "";  ///< serial port or CAN interface; empty: none
+  std::string device = "";  ///< serial port, CAN interface or udp:HOST:PORT; empty: none
   std::string protocol = "bridge";
   int baud = 921600;
   double delay_ms = 0;
@@ -42,7 +42,7 @@ struct TriggerGroup {
 
 /// Who flies by the estimate, over MAVLink.
 struct AutopilotGroup {
-  std::string device = "";  ///< serial port or udp:HOST:PORT; empty: none
+  std::string device = "";  ///< serial port or udp:HOST:PORT, also imu_link's; empty: none
   int baud = 921600;
   int system = 1;
   double rate_hz = 40;

@@ -47,15 +47,16 @@ double percentile(std::vector<double> values, double share) {
 /// Takes samples as the estimator would, and makes a state of each.
 class StateSink : public SensorSink {
  public:
-  explicit StateSink(std::function<void(const NavState&)> tell) : tell_(std::move(tell)) {}
+  explicit StateSink(std::function<void(const NavState&)> tell, double unit = 1)
+      : unit_(unit), tell_(std::move(tell)) {}
   std::vector<std::pair<int, Stamp>> samples;  ///< number, stamp
 
   void takeImu(const ImuSample& sample, Stamp /*arrival*/, const HostTimes& /*host*/) override {
-    samples.emplace_back(static_cast<int>(std::lround(sample.accel.x())), sample.stamp);
+    samples.emplace_back(static_cast<int>(std::lround(sample.accel.x() / unit_)), sample.stamp);
     NavState state;
     state.stamp = sample.stamp;
     state.health = Health::kGood;
-    state.T_world_body.translation.x() = sample.accel.x() / 1000;
+    state.T_world_body.translation.x() = sample.accel.x() / unit_ / 1000;
     tell_(state);
   }
   void takeScene(const SceneImages& /*scene*/) override {}
@@ -64,6 +65,7 @@ class StateSink : public SensorSink {
                  const PixelWriter& /*pixels*/) override {}
 
  private:
+  double unit_;  ///< of the first acceleration, which numbers the reading
   std::function<void(const NavState&)> tell_;
 };
 
@@ -322,9 +324,10 @@ struct Simulated {
   Stamp begin{90'000'000'000};
   SimulatedLink* link;
   std::unique_ptr<ImuThread> imu;
-  StateSink sink{[this](const NavState& state) { link->state = state; }};
+  StateSink sink;
 
-  explicit Simulated(double seconds, FarAutopilot::Options options = {}) {
+  explicit Simulated(double seconds, FarAutopilot::Options options = {})
+      : sink([this](const NavState& state) { link->state = state; }, options.has_highres ? 1 : 9.80665e-3) {
     auto owned = std::make_unique<SimulatedLink>(begin, static_cast<std::int64_t>(seconds / kTick.seconds()),
                                                  options, stop);
     link = owned.get();
@@ -345,6 +348,42 @@ TEST_CASE("An hour of both ways on one link in simulated time", "[autopilot]") {
   report("an hour", kSeconds, judged, flight.sink, flight.link->far, flight.link->far.pose_times.size());
   check(kSeconds, judged, flight.sink, flight.link->far);
   CHECK(flight.link->far.requests == 1);
+}
+
+TEST_CASE("An autopilot that forgets the rate is asked again within two seconds", "[autopilot]") {
+  constexpr double kSeconds = 60;
+  Simulated flight(kSeconds);
+  std::uint64_t before = 0;
+  Stamp again;
+  flight.link->at_tick = [&](FarAutopilot& far, Stamp now) {
+    if (now - flight.begin == Duration::fromMilliseconds(30'000)) {
+      far.forget();
+      before = far.requests;
+    }
+    if (before > 0 && again == Stamp{} && far.requests > before) again = now;
+  };
+  flight.run();
+  CHECK(flight.link->far.requests == 2);
+  CHECK((again - flight.begin).seconds() < 32);
+  CHECK(judge(flight.sink, flight.link->far, flight.begin).lost == 0);
+  CHECK(static_cast<double>(flight.sink.samples.size()) > kRate * (kSeconds - 4));
+}
+
+TEST_CASE("An autopilot without HIGHRES_IMU gives RAW_IMU, and that is said", "[autopilot]") {
+  FarAutopilot::Options options;
+  options.has_highres = false;
+  Simulated flight(30, options);
+  flight.run();
+  CHECK(flight.link->far.commands == std::vector<std::uint32_t>{105, 27});
+  CHECK(flight.link->dialogue().stream().message() == 27);
+  REQUIRE(flight.link->remarks.size() == 1);
+  CHECK_THAT(flight.link->remarks[0], Catch::Contains("no HIGHRES_IMU comes, RAW_IMU is asked for"));
+  // It was refused: a second and not three.
+  CHECK(static_cast<double>(flight.sink.samples.size()) > kRate * 27);
+  const Judged judged = judge(flight.sink, flight.link->far, flight.begin);
+  report("RAW_IMU", 30, judged, flight.sink, flight.link->far, flight.link->far.pose_times.size());
+  CHECK(judged.lost == 0);
+  CHECK(percentile(judged.errors, 0.99) < kStampLimit);
 }
 
 }  // namespace

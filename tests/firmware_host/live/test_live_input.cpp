@@ -91,6 +91,37 @@ TEST_CASE("each refusal names its setting and what to do") {
   CHECK_THAT(refusal(settings, stereo()), Catch::Contains("trigger.chip") && Catch::Contains("dronecan"));
 }
 
+TEST_CASE("IMU and autopilot share a link where both settings name one port") {
+  const auto outboxOf = [](const Settings& settings) {
+    return LiveInput(settings, stereo()).outbox() != nullptr;
+  };
+  Settings settings = vehicle();
+  CHECK_FALSE(outboxOf(settings));
+  settings.imu_link.protocol = "mavlink";
+  settings.autopilot.device = "/dev/another_port";
+  CHECK_FALSE(outboxOf(settings));
+  for (const char* device : {"/dev/no_such_imu", "udp:127.0.0.1:14580@14540"}) {
+    settings.imu_link.device = settings.autopilot.device = device;
+    CHECK(outboxOf(settings));
+  }
+
+  settings.imu_link.device = settings.autopilot.device = "/dev/no_such_imu";
+  settings.autopilot.baud = 460800;
+  CHECK_THAT(refusal(settings, stereo()),
+             Catch::Contains("autopilot.baud") && Catch::Contains("imu_link.baud is 921600"));
+  settings.autopilot.baud = settings.imu_link.baud;
+  settings.imu_link.protocol = "vectornav";
+  CHECK_THAT(refusal(settings, stereo()), Catch::Contains("autopilot.device") && Catch::Contains("mavlink"));
+
+  settings = vehicle();
+  settings.imu_link.device = "udp:127.0.0.1:14580@14540";
+  CHECK_THAT(refusal(settings, stereo()), Catch::Contains("imu_link.device") && Catch::Contains("mavlink"));
+  settings.imu_link.protocol = "mavlink";
+  CHECK(refusal(settings, stereo()).empty());
+  settings.imu_link.device = "udp:127.0.0.1:many";
+  CHECK_THAT(refusal(settings, stereo()), Catch::Contains("imu_link.device") && Catch::Contains("no port"));
+}
+
 TEST_CASE("all devices that are missing are told at once, each by name and with what to do") {
   Settings settings = vehicle();
   settings.trigger.chip = "/dev/no_such_chip";
