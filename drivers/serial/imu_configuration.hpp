@@ -1,26 +1,50 @@
 #pragma once
-// The bytes that ask a sensor for the output that ImuDecoder reads. To be sent when the user asks for it,
-// never at start by itself; nothing here is kept by the sensor when its power goes.
+// What is asked of a sensor so that it sends what ImuDecoder reads, at a rate: one step after the other, each
+// after the reply to the one before. VectorNav, Xsens, MIP; a bridge sends by itself, an autopilot is asked
+// by ImuStreamRequest (drivers/mavlink).
 //
-// Steps are sent in order, each after the reply of the one before. The rates stand in the bytes: VectorNav
-// and Xsens 400 Hz, MIP the sensor's base rate, MAVLink 250 Hz.
-// Source: the manuals named by each protocol's header; docs/serial.md explains the bytes.
+// Rates: VectorNav divides 800 Hz, MIP its base rate, which it is asked for; Xsens takes a rate or gives
+// another back. The nearest is set, and rate() says which. After a refusal, or without a reply, the last step
+// is still to be sent: it lets the sensor send again. Memory: fixed. Threads: one. Source: the manuals named
+// by each protocol's header; docs/serial.md.
 
+#include <array>
 #include <cstdint>
 #include <span>
 
 #include "drivers/serial/imu_decoder.hpp"
+#include "estimator/core/fixed_vector.hpp"
 
 namespace swiftlet {
 
 struct ConfigurationStep {
-  std::span<const std::uint8_t> bytes;
-  std::span<const std::uint8_t> reply;    ///< bytes that stand in the answer when it was taken; may be empty
-  std::span<const std::uint8_t> refusal;  ///< bytes that stand in the answer when it was not; may be empty
-  const char* what;                       ///< for the log
+  FixedVector<std::uint8_t, 40> bytes;
+  std::span<const std::uint8_t> reply;    ///< bytes that its answer begins with when it was taken
+  std::span<const std::uint8_t> refusal;  ///< the same when it was not; may be empty
+  std::size_t answer_length = 0;          ///< bytes from the reply's first on that answered() wants
+  const char* what = "";                  ///< in words
 };
 
-/// Empty for bridges: they send by themselves.
-std::span<const ConfigurationStep> configurationSteps(ImuProtocol protocol);
+class ImuConfiguration {
+ public:
+  /// `rate`: readings a second [Hz], above 0.
+  ImuConfiguration(ImuProtocol protocol, double rate) : protocol_(protocol), rate_(rate), set_(rate) {}
+
+  [[nodiscard]] std::size_t steps() const;
+  /// The step `index`, which may depend on the answers before.
+  [[nodiscard]] ConfigurationStep step(std::size_t index) const;
+  /// The answer to it, `answer_length` bytes.
+  void answered(std::size_t index, std::span<const std::uint8_t> answer);
+  /// What the sensor sends then [Hz], as far as it is known.
+  [[nodiscard]] double rate() const { return set_; }
+
+ private:
+  void answeredByXsens(std::span<const std::uint8_t> answer);
+
+  ImuProtocol protocol_;
+  double rate_;
+  double set_;
+  double base_rate_ = 0;  ///< of a MIP sensor [Hz]
+};
 
 }  // namespace swiftlet

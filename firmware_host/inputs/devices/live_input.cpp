@@ -113,10 +113,13 @@ LiveInput::LiveInput(const Settings& settings, const Calibration& calibration) {
     cameras.readout_ms = rig.readout.seconds() / kFromMs;
   }
   checkCameras(cameras, rig);
+  // A sensor that is set loses what else it sends, edges too.
+  const bool keeps_edges = settings.trigger.chip == kTriggerByImu && settings.imu_link.protocol != "mavlink";
+  const double asked_rate = keeps_edges ? 0 : calibration.noise.rate_hz;
   if (sharesLink(settings)) outbox_ = std::make_unique<LinkOutbox>();
   imu_ = std::make_unique<ImuThread>(
       fmt::format("IMU ({}, {})", settings.imu_link.device, settings.imu_link.protocol),
-      makeImuLink(settings.imu_link, calibration.noise.rate_hz, outbox_.get()), calibration.R_body_imu,
+      makeImuLink(settings.imu_link, asked_rate, outbox_.get()), calibration.R_body_imu,
       Duration::fromSeconds(settings.imu_link.delay_ms * kFromMs), calibration.noise.rate_hz);
   const std::size_t nodes = twoInOne(cameras) ? 1 : rig.camera_count;
   for (std::size_t i = 0; i < nodes; ++i) {

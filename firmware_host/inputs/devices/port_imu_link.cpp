@@ -18,12 +18,15 @@ PortImuLink::PortImuLink(const ImuLinkGroup& settings, double rate, LinkOutbox* 
     : port_(settings.device, static_cast<unsigned>(settings.baud), "imu_link.device"),
       decoder_(imuProtocol(settings.protocol).value_or(ImuProtocol::kBridge)),
       dialogue_(rate),
+      setup_(rate),
       outbox_(outbox) {}
 
 DeviceFault PortImuLink::open() {
-  decoder_.restart();
   dialogue_.restart();
-  return port_.open();
+  const DeviceFault fault = port_.open();
+  if (fault.ok()) setup_.run(port_, decoder_);
+  decoder_.restart();
+  return fault;
 }
 
 void PortImuLink::discard() {
@@ -83,11 +86,13 @@ DeviceFault PortImuLink::send() {
 
 std::optional<Stamp> PortImuLink::toHost(Stamp device) const { return dialogue_.toHost(device); }
 
-bool PortImuLink::nextRemark(DeviceFault& remark) { return dialogue_.stream().nextRemark(remark); }
+bool PortImuLink::nextRemark(DeviceFault& remark) {
+  return setup_.nextWarning(remark) || dialogue_.stream().nextRemark(remark);
+}
 
 std::string PortImuLink::stream() const {
   const ImuStreamRequest& stream = dialogue_.stream();
-  if (!isMavlink()) return {};
+  if (!isMavlink()) return setup_.text();
   if (stream.asked() <= 0) return "no autopilot's HEARTBEAT was heard: nothing was asked";
   const std::string answer = !stream.result() ? "not answered"
                              : *stream.result() == mavlink::CommandAck::kAccepted

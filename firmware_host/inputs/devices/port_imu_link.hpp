@@ -11,6 +11,7 @@
 #include "drivers/serial/imu_decoder.hpp"
 #include "firmware_host/inputs/devices/autopilot_dialogue.hpp"
 #include "firmware_host/inputs/devices/imu_link.hpp"
+#include "firmware_host/inputs/devices/sensor_setup.hpp"
 #include "firmware_host/interfaces/link_outbox.hpp"
 #include "firmware_host/interfaces/link_port.hpp"
 #include "firmware_host/settings/device_settings.hpp"
@@ -47,6 +48,7 @@ class PortImuLink : public ImuLink {
   LinkPort port_;
   ImuDecoder decoder_;
   AutopilotDialogue dialogue_;
+  SensorSetup setup_;
   LinkOutbox* outbox_;
   std::array<std::uint8_t, ImuDecoder::kMostFed> bytes_;
   std::uint64_t sent_ = 0, refused_ = 0;  ///< writes; of the outbox, and of our own that found no room

@@ -6,7 +6,6 @@
 #include "drivers/device/crc16.hpp"
 #include "drivers/mavlink/mavlink_messages.hpp"
 #include "drivers/serial/device_count.hpp"
-#include "drivers/serial/imu_configuration.hpp"
 #include "estimator/core/random.hpp"
 #include "tests/drivers/serial/decoding.hpp"
 
@@ -392,29 +391,6 @@ TEST_CASE("A gap of hours between readings is an interruption, not lost samples"
   for (std::int64_t i = 0; i < 20; ++i) CHECK(gaps.step(Stamp{i * 5'000'000}, {}).missing == 0);
   CHECK(gaps.step(Stamp{19 * 5'000'000 + 21'000'000}, {}).missing == 3);
   CHECK(gaps.step(Stamp{3'600'000'000'000}, {}).missing == 0);
-}
-
-TEST_CASE("Configuration bytes carry right checksums", "[serial]") {
-  for (const ConfigurationStep& step : configurationSteps(ImuProtocol::kXsens))
-    CHECK(Xsens::check(step.bytes).verdict == FrameVerdict::kWhole);
-  for (const ConfigurationStep& step : configurationSteps(ImuProtocol::kMip))
-    CHECK(Mip::check(step.bytes).verdict == FrameVerdict::kWhole);
-  MavlinkParser parser;
-  const auto& mavlink = configurationSteps(ImuProtocol::kMavlink)[0];
-  REQUIRE(parser.feed(mavlink.bytes, Stamp{}, Duration{}) == mavlink.bytes.size());
-  MavlinkFrame frame;
-  mavlink::CommandLong command;
-  REQUIRE(parser.next(frame));
-  REQUIRE(mavlink::read(frame, command));
-  CHECK(command.command == mavlink::CommandLong::kSetMessageInterval);
-  CHECK(command.param[0] == 105);
-  CHECK(command.param[1] == 4000);
-  const auto vectornav = configurationSteps(ImuProtocol::kVectorNav)[0].bytes;
-  const std::string line(vectornav.begin(), vectornav.end());
-  unsigned sum = 0;
-  for (std::size_t i = 1; line.at(i) != '*'; ++i) sum ^= vectornav[i];
-  CHECK(std::stoul(line.substr(line.find('*') + 1), nullptr, 16) == sum);
-  CHECK(configurationSteps(ImuProtocol::kBridge).empty());
 }
 
 TEST_CASE("Protocols go by the names that settings give them", "[serial]") {
