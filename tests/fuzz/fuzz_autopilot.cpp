@@ -12,6 +12,7 @@
 
 #include "drivers/device/byte_fields.hpp"
 #include "drivers/mavlink/autopilot_link.hpp"
+#include "firmware_host/inputs/devices/autopilot_dialogue.hpp"
 #include "tests/fuzz/demand.hpp"
 
 namespace swiftlet::fuzz {
@@ -97,6 +98,59 @@ void converse(const Bytes& bytes, Piece&& piece) {
   demand(sent.beats >= static_cast<std::size_t>(steps) / 200);
 }
 
+/// What is said to an autopilot that is the IMU: requests of the time at their pace, answers to its own, and
+/// the rate of one of three messages.
+template <typename Piece>
+void converseAsImu(const Bytes& bytes, Piece&& piece) {
+  constexpr double kRate = 200;
+  constexpr int kLeast = 1000;
+  const std::vector<std::int64_t> asked = requestsIn(bytes);
+  ImuDecoder decoder(ImuProtocol::kMavlink);
+  AutopilotDialogue dialogue(kRate);
+  MavlinkParser ours;
+  std::size_t answers = 0, requests = 0, commands = 0;
+  Stamp now = kStart;
+  std::size_t at = 0;
+  int steps = 0;
+  for (; at < bytes.size() || steps < kLeast; ++steps, now = now + kStep) {
+    const std::size_t size = at < bytes.size() ? std::min(piece(at), bytes.size() - at) : 0;
+    demand(decoder.feed(std::span(bytes).subspan(at, size), now, {}) == size);
+    at += size;
+    for (ImuReading reading; decoder.next(reading);) {
+      demand(reading.gyro.allFinite() && reading.accel.allFinite());
+      demand(reading.mean_age >= Duration{} && reading.mean_age <= Duration::fromMilliseconds(3));
+      static_cast<void>(dialogue.toHost(*reading.device));
+    }
+    for (TriggerEdge edge; decoder.nextEdge(edge);) demand(edge.arrival <= now);
+    std::array<std::uint8_t, AutopilotDialogue::kMostBytes> out;
+    const std::size_t count = dialogue.step(decoder, now, out);
+    demand(count <= out.size() && ours.feed(std::span(out).first(count), now, {}) == count);
+    for (MavlinkFrame frame; ours.next(frame);) {
+      mavlink::Timesync time;
+      mavlink::CommandLong command;
+      if (mavlink::read(frame, time) && time.tc1 == 0) {
+        demand(time.ts1 == now.ns);
+        ++requests;
+      } else if (frame.message == mavlink::Timesync::kId) {
+        demand(std::ranges::find(asked, time.ts1) != asked.end());
+        ++answers;
+      } else {
+        demand(mavlink::read(frame, command) && command.command == mavlink::CommandLong::kSetMessageInterval);
+        constexpr float kShortest = 2500, kLongest = 5000;  // us, of twice the rate and of the rate
+        demand(command.param[1] >= kShortest && command.param[1] <= kLongest);
+        demand(command.param[0] == 105 || command.param[0] == 27 || command.param[0] == 26);
+        ++commands;
+      }
+    }
+  }
+  demand(ours.counters().skipped_bytes == 0 && ours.counters().checksum_failures == 0);
+  demand(answers <= asked.size());
+  // One in 95 ms; a command at most each second, and one more for each return of an autopilot, 3 s apart.
+  const auto wanted = static_cast<std::size_t>(steps) / 19;
+  demand(requests >= wanted && requests <= wanted + 2);
+  demand(commands <= 2 + static_cast<std::size_t>(steps) / 150);
+}
+
 Bytes withChecksums(Bytes bytes) {
   for (std::size_t at = 0; at < bytes.size();) {
     const std::span<std::uint8_t> rest = std::span(bytes).subspan(at);
@@ -118,6 +172,8 @@ void converseAll(const Bytes& bytes) {
   converse(bytes, [](std::size_t) { return std::size_t{4096}; });
   converse(bytes, [](std::size_t) { return std::size_t{40}; });
   converse(bytes, [&](std::size_t at) { return std::size_t{1} + bytes[at] % 61U; });
+  converseAsImu(bytes, [](std::size_t) { return std::size_t{4096}; });
+  converseAsImu(bytes, [&](std::size_t at) { return std::size_t{1} + bytes[at] % 61U; });
 }
 
 }  // namespace

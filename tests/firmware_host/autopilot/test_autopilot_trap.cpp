@@ -1,12 +1,18 @@
-// The autopilot's thread and the supervisor's allocate nothing and take no lock once they run: seen from
-// underneath the program and its libraries.
+// The autopilot's thread, the supervisor's, and the IMU's on a link that both use allocate nothing and take
+// no lock once they run: seen from underneath the program and its libraries.
 
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <cstdint>
+#include <memory>
+#include <thread>
 
+#include "drivers/serial/pseudo_terminal.hpp"
+#include "firmware_host/inputs/devices/imu_thread.hpp"
+#include "firmware_host/inputs/devices/port_imu_link.hpp"
 #include "firmware_host/interfaces/link_port.hpp"
 #include "firmware_host/supervisor/supervisor.hpp"
+#include "tests/firmware_host/autopilot/far_autopilot.hpp"
 #include "tests/firmware_host/autopilot/scripted_vehicle.hpp"
 #include "tests/logs/flight_trap.hpp"
 
@@ -81,6 +87,73 @@ TEST_CASE("poses, obstacles, texts and answers cost the autopilot's thread no he
   const TrapCounts counts = trapCounts();
   CHECK(heapCallsOfAll() > all_before);  // the trap works: this thread and the test allocate
   CHECK(counts.waits > before.waits);    // and is armed: the port is read
+  CHECK(counts.heap == before.heap);
+  CHECK(counts.locks == before.locks);
+}
+
+TEST_CASE("one link for IMU and poses costs the IMU's thread no heap call and no lock", "[autopilot]") {
+  PseudoTerminal terminal;
+  REQUIRE(terminal.open().ok());
+  struct ArmingSink : SensorSink {
+    LiveOutlet* outlet = nullptr;
+    std::atomic<int> taken{0};
+    void takeImu(const ImuSample& sample, Stamp /*arrival*/, const HostTimes& /*host*/) override {
+      if (++taken == 3) armTrap("imu");
+      NavState state;
+      state.stamp = sample.stamp;
+      state.health = Health::kGood;
+      outlet->state.write({state, Eigen::Vector3d::Zero()});
+    }
+    void takeScene(const SceneImages& /*scene*/) override {}
+    void takeImage(const CameraFrame& /*image*/, const HostTimes& /*host*/) override {}
+    void takeImage(const CameraFrame& /*image*/, const HostTimes& /*host*/,
+                   const PixelWriter& /*pixels*/) override {}
+  } sink;
+  LiveOutlet outlet;
+  sink.outlet = &outlet;
+  LinkOutbox outbox;
+  ImuLinkGroup settings;
+  settings.device = terminal.path();
+  settings.protocol = "mavlink";
+  ImuThread imu("IMU", std::make_unique<PortImuLink>(settings, 200, &outbox), Eigen::Matrix3d::Identity(), {},
+                200);
+  REQUIRE(imu.open().ok());
+  auto options = optionsOf(terminal.path());
+  options.outbox = &outbox;
+  std::atomic<int> turns{0};
+  options.to_host = [&]() -> std::optional<Duration> {
+    if (++turns < 3) return std::nullopt;
+    armTrap("autopilot");
+    return Duration{};
+  };
+  const TrapCounts before = trapCounts();
+  AutopilotThread autopilot(outlet, options);
+  std::atomic<bool> stop{false};
+  RunControl control;
+  control.stop = &stop;
+  std::thread thread([&] {
+    imu.run(sink, {}, control);
+    disarmTrap();
+  });
+  FarAutopilot far(monotonicNow(), {});
+  FarAutopilot::Bytes out;
+  const auto pump = [&] {
+    std::array<std::uint8_t, 512> bytes;
+    std::size_t count = 0, taken = 0;
+    static_cast<void>(terminal.receive(bytes, count));
+    const Stamp now = monotonicNow();
+    far.receive(now, std::span(bytes).first(count));
+    far.step(
+        now, [](Stamp) { return monotonicNow(); },
+        [&](const FarAutopilot::Bytes& more, Stamp) { out.insert(out.end(), more.begin(), more.end()); });
+    if (!out.empty()) static_cast<void>(terminal.send(out, taken));
+    out.erase(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(taken));
+  };
+  CHECK(until([&] { return far.pose_times.size() > 50 && sink.taken > 300 && far.requests > 0; }, pump));
+  stop.store(true);
+  thread.join();
+  const TrapCounts counts = trapCounts();
+  CHECK(counts.waits > before.waits);
   CHECK(counts.heap == before.heap);
   CHECK(counts.locks == before.locks);
 }
