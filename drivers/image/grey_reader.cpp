@@ -27,35 +27,33 @@ void GreyReader::reserve(const PixelFormat& format, int width, int height, bool 
   upper_end_ = false;
   const auto columns = static_cast<std::size_t>(width);
   const std::size_t cameras = format.layout == PixelLayout::kPairs ? 2 : 1;
-  pixels_.assign(format == kGrey8 ? 0 : cameras * columns * static_cast<std::size_t>(height), 0);
+  const bool as_it_is = format.layout == PixelLayout::kBytes && !format.mosaic;
+  pixels_.assign(as_it_is ? 0 : cameras * columns * static_cast<std::size_t>(height), 0);
   rows_.assign(format.mosaic ? kMosaicRows * columns : 0, 0);
   sums_.assign(format.mosaic ? columns + 2 : 0, 0);
 }
 
 std::span<const ImageView> GreyReader::read(const RawImage& frame) {
   RawImage grey = frame;
+  shift_ = shiftOf(frame);
   if (frame.format.layout == PixelLayout::kJpeg) {
     ImageSize found;
     const ImageSize size{frame.width, frame.height};
     if (jpeg_.decode({frame.data, frame.bytes}, size, pixels_.data(), found) != DecodeResult::kOk) return {};
     grey = {pixels_.data(), frame.width, frame.height, frame.width};
   }
+  std::array<RawImage, 2> cameras = {grey, grey};
   if (frame.format.layout == PixelLayout::kPairs) {
-    std::array<RawImage, 2> cameras = {frame, frame};
     cameras[0].format.layout = PixelLayout::kEvenBytes;
     cameras[1].format.layout = PixelLayout::kOddBytes;
-    images_[0] = convert(cameras[0], pixels_.data());
-    images_[1] = convert(cameras[1], pixels_.data() + pixels_.size() / 2);
-    return images_;
-  }
-  if (!side_by_side_) {
+  } else if (side_by_side_) {
+    cameras = sideBySide(grey);
+  } else {
     images_[0] = convert(grey, pixels_.data());
     return std::span(images_).first(1);
   }
-  const std::array<RawImage, 2> halves = sideBySide(grey);
-  const std::ptrdiff_t half = static_cast<std::ptrdiff_t>(halves[0].width) * frame.height;
-  images_[0] = convert(halves[0], pixels_.data());
-  images_[1] = convert(halves[1], pixels_.data() + half);
+  images_[0] = convert(cameras[0], pixels_.data());
+  images_[1] = convert(cameras[1], pixels_.data() + pixels_.size() / 2);
   return images_;
 }
 
@@ -66,16 +64,14 @@ ImageView GreyReader::convert(const RawImage& image, std::uint8_t* out) {
   if (image.format.mosaic) {
     smoothMosaic(image, out);
   } else {
-    const unsigned shift = shiftOf(image);
     for (int y = 0; y < image.height; ++y) {
-      unpackRow(image, y, shift, out + static_cast<std::ptrdiff_t>(y) * image.width);
+      unpackRow(image, y, shift_, out + static_cast<std::ptrdiff_t>(y) * image.width);
     }
   }
   return {out, image.width, image.height, image.width};
 }
 
 void GreyReader::smoothMosaic(const RawImage& image, std::uint8_t* out) {
-  const unsigned shift = shiftOf(image);
   const int width = image.width;
   const auto rowAt = [&](int y) {
     return rows_.data() + static_cast<std::ptrdiff_t>(y % kMosaicRows) * width;
@@ -83,9 +79,9 @@ void GreyReader::smoothMosaic(const RawImage& image, std::uint8_t* out) {
   const auto mirrored = [&](int y) {
     return std::clamp(y < 0 ? -y : y >= image.height ? 2 * image.height - 2 - y : y, 0, image.height - 1);
   };
-  unpackRow(image, 0, shift, rowAt(0));
+  unpackRow(image, 0, shift_, rowAt(0));
   for (int y = 0; y < image.height; ++y, out += width) {
-    if (y + 1 < image.height) unpackRow(image, y + 1, shift, rowAt(y + 1));
+    if (y + 1 < image.height) unpackRow(image, y + 1, shift_, rowAt(y + 1));
     const std::uint8_t* above = rowAt(mirrored(y - 1));
     const std::uint8_t* here = rowAt(y);
     const std::uint8_t* below = rowAt(mirrored(y + 1));

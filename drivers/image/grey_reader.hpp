@@ -42,6 +42,7 @@ class GreyReader {
 
   bool side_by_side_ = false;
   bool upper_end_ = false;  ///< words stand at the upper end of 16 bits
+  unsigned shift_ = 0;      ///< of the frame's words
   std::vector<std::uint8_t> pixels_;
   std::vector<std::uint8_t> rows_;   ///< three, unpacked
   std::vector<std::uint16_t> sums_;  ///< over three rows, with a pixel more at both ends
