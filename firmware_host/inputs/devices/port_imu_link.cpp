@@ -5,12 +5,17 @@
 #include <nlohmann/json.hpp>
 
 #include "firmware_host/inputs/devices/device_times.hpp"
+#include "firmware_host/realtime/host_sleep.hpp"
 
 namespace swiftlet {
 namespace {
 
 /// Reads that empty the kernel's buffer: of a serial port 64 kB at the most, of UDP some hundred datagrams.
 constexpr int kMostDiscarded = 1000;
+/// Datagrams of a millisecond, some 0.2 ms of work: more is a flood, on which the highest priority is not
+/// spent.
+constexpr int kMostDatagrams = 64;
+constexpr Duration kFloodWindow = Duration::fromMilliseconds(1);
 
 }  // namespace
 
@@ -48,7 +53,16 @@ DeviceFault PortImuLink::receive(Stamp /*now*/) {
   if (const DeviceFault fault = port_.read(bytes_, count, read_at); !fault.ok()) return close(fault);
   // All of it fits: the decoder has been asked until it had no more.
   static_cast<void>(decoder_.feed(std::span(bytes_).first(count), read_at, port_.byteTime()));
+  if (port_.isUdp() && count > 0) pauseInFlood(read_at);
   return {};
+}
+
+void PortImuLink::pauseInFlood(Stamp read_at) {
+  if (read_at - window_ >= kFloodWindow) {
+    window_ = read_at;
+    datagrams_ = 0;
+  }
+  if (++datagrams_ >= kMostDatagrams) sleepFor(kFloodWindow);
 }
 
 DeviceFault PortImuLink::judge(const DeviceFault& fault) {

@@ -44,6 +44,7 @@ class PortImuLink : public ImuLink {
   /// What the port said of a write: only its end is the link's.
   DeviceFault judge(const DeviceFault& fault);
   DeviceFault close(const DeviceFault& fault);
+  void pauseInFlood(Stamp read_at);
 
   LinkPort port_;
   ImuDecoder decoder_;
@@ -51,6 +52,8 @@ class PortImuLink : public ImuLink {
   SensorSetup setup_;
   LinkOutbox* outbox_;
   std::array<std::uint8_t, ImuDecoder::kMostFed> bytes_;
+  Stamp window_;  ///< in which datagrams are counted
+  int datagrams_ = 0;
   std::uint64_t sent_ = 0, refused_ = 0;  ///< writes; of the outbox, and of our own that found no room
 };
 

@@ -339,5 +339,32 @@ TEST_CASE("a clock that stands still is told: its samples are all refused") {
   CHECK(sink.count() <= 1);
 }
 
+TEST_CASE("an autopilot's readings come by UDP, and a flood of datagrams is slowed down") {
+  ImuLinkGroup settings;
+  settings.device = "udp:127.0.0.1:24593@24594";
+  settings.protocol = "mavlink";
+  PortImuLink link(settings);
+  REQUIRE(link.open().ok());
+  LinkPort autopilot("udp:127.0.0.1:24594@24593", 0);
+  REQUIRE(autopilot.open().ok());
+  ImuEncoder encoder(ImuProtocol::kMavlink);
+  constexpr int kReadings = 200;
+  for (int i = 0; i < kReadings; ++i) {
+    ImuReading reading;
+    reading.device = Stamp{(i + 1) * 5'000'000};
+    reading.gyro = reading.accel = Eigen::Vector3d(0.5, 0.25, 0.125);
+    std::array<std::uint8_t, ImuEncoder::kLongestFrame> frame;
+    REQUIRE(autopilot.write(std::span(frame).first(encoder.encode(reading, frame))).ok());
+  }
+  const Stamp begin = hostNow();
+  int readings = 0;
+  REQUIRE(soon([&] {
+    for (int i = 0; i < 50; ++i) CHECK(link.receive(hostNow()).ok());
+    for (ImuReading reading; link.next(reading);) ++readings;
+    return readings == kReadings;
+  }));
+  CHECK(hostNow() - begin >= Duration::fromMilliseconds(kReadings / 64));
+}
+
 }  // namespace
 }  // namespace swiftlet::test
