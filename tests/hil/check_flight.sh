@@ -7,7 +7,7 @@
 #   disk      a disk that is not there, read-only, full, or goes in flight costs files: the flight ends in order,
 #             says so and has its poses
 #   trap      flyer=PROGRAM is trapped_program: no thread of the flight did what it must not, with faults and without
-#   LINK      of guest_flight.sh: serial, can, trigger, protocol=NAME, hangup, flyer=PROGRAM, autopilot
+#   LINK      of guest_flight.sh: serial, can, trigger, protocol=NAME, hangup, flyer=PROGRAM, autopilot, onelink
 # Needs euroc_mh01_20s in the folder SWIFTLET_DATA, or in ../shared/data beside the project. Exit code 77: skipped.
 set -u
 program=$1
@@ -56,6 +56,16 @@ case $what in
     fly flight nomesh "$@"
     case " $* " in
       *' hangup '*) grep 'terminal closed (SIGHUP)' "$out/flight/flight/events.log" || exit 1 ;;
+    esac
+    case " $* " in
+      *' onelink '*)
+        # All but the last second's of 40 poses a second, and nothing that found no room.
+        summary=$out/flight/flight/summary.json
+        sent=$(sed -n 's/.*"sent_for_autopilot": \([0-9]*\).*/\1/p' "$summary")
+        echo "check_flight: $sent messages sent for the autopilot on the IMU's link"
+        [ "${sent:-0}" -ge $(((seconds - 1) * 40)) ] || exit 1
+        [ "$(grep -c '"writes_refused": 0' "$summary")" -eq 2 ] || exit 1
+        ;;
     esac
     # The supervisor gives sensors 10 s for their first message.
     if grep 'since the start' "$out/flight/flight/events.log"; then exit 1; fi

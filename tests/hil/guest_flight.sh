@@ -2,7 +2,7 @@
 # Inside the kernel sandbox, cameras looping: plays a log out through the kernel's devices and flies on them with the
 # unmodified program.
 # usage: guest_flight.sh PROGRAM LOG OUT [serial|can] [trigger] [faults=FILE] [seconds=N] [protocol=NAME] [nomesh]
-#                        [hangup] [flyer=PROGRAM] [realtime] [autopilot] [fly=OPTION...]
+#                        [hangup] [flyer=PROGRAM] [realtime] [autopilot|onelink] [fly=OPTION...]
 #                        [disk=none|readonly|full|gone]
 #   PROGRAM  swiftlet
 #   LOG      EuRoC folder with calibration
@@ -11,6 +11,7 @@
 #   flyer    flies in place of PROGRAM
 #   realtime priorities and locked memory as on a vehicle
 #   autopilot  an autopilot's port that nobody listens at
+#   onelink  the IMU by MAVLink, and the autopilot told on the same port
 #   fly      options of `swiftlet fly`
 #   disk     of the flight, which records: no folder to be had; a read-only one; one of 40 MB; one that goes after 3 s
 # Exit code: 0 when both programs ended well.
@@ -29,6 +30,7 @@ hangup=no
 flyer=$program
 realtime=false
 autopilot=''
+onelink=no
 fly_options=''
 disk=''
 for option in "$@"; do
@@ -43,6 +45,7 @@ for option in "$@"; do
     flyer=*) flyer=${option#flyer=} ;;
     realtime) realtime=true ;;
     autopilot) autopilot=udp:127.0.0.1:14550 ;;
+    onelink) onelink=yes ;;
     disk=*) disk=${option#disk=} ;;
     protocol=*) protocol=${option#protocol=} ;;
     *)
@@ -56,6 +59,10 @@ imu=/run/imu
 if [ "$link" = can ]; then
   imu=$SANDBOX_CAN
   protocol=dronecan
+fi
+if [ $onelink = yes ]; then
+  protocol=mavlink
+  autopilot=$imu
 fi
 cat >"$out/vehicle.yaml" <<END
 vehicle:
