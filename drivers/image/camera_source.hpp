@@ -23,7 +23,7 @@ namespace swiftlet {
 enum class StampEvent : std::uint8_t {
   kStartOfExposure,
   kEndOfFrame,
-  kArrival,  ///< the source's clock is unknown: the host's time when the frame was taken from it
+  kArrival,  ///< the capture's time is unknown: when the frame came to the host
 };
 
 /// As negotiated and read back.
@@ -94,6 +94,9 @@ class CameraSource {
   virtual void close() = 0;
   [[nodiscard]] virtual bool isOpen() const = 0;
   [[nodiscard]] virtual int fd() const = 0;
+  /// True: frames that are taken or given back cost allocations and locks, which a thread of the flight path
+  /// must not have.
+  [[nodiscard]] virtual bool allocates() const { return false; }
 
   /// The oldest frame that waits. Ok with `frame.valid()` false: none.
   virtual DeviceFault next(CapturedFrame& frame) = 0;

@@ -38,6 +38,7 @@ RoomTable directNeighbours() {
   }
   table["drivers/image"] = {"drivers/device"};
   table["drivers/v4l2"] = {"drivers/image"};
+  table["drivers/gstreamer"] = {"drivers/image"};
   // An autopilot's inertial messages come over a serial port like any sensor's.
   table["drivers/serial"].insert("drivers/mavlink");
   // Calibration as users have it; a simulated flight is written as a recorded one.

@@ -89,6 +89,8 @@ set(debian_Threads libc6-dev)
 set(debian_OpenMP libgomp1)
 set(debian_libgpiod "libgpiod-dev;pkg-config")
 set(debian_CycloneDDS cyclonedds-dev)
+set(debian_gstreamer-app-1.0 "libgstreamer-plugins-base1.0-dev;pkg-config")
+set(debian_gstreamer-video-1.0 "libgstreamer-plugins-base1.0-dev;pkg-config")
 set(development_depends "")
 foreach(line IN LISTS dependencies)
   # The last name of the line: libgpiod of find_dependency(PkgConfig), pkg_check_modules(libgpiod ...).
