@@ -28,24 +28,17 @@ std::uint8_t pixel(std::uint32_t camera, int frame, int x, int y) {
                                    static_cast<unsigned>(x) + 3U * static_cast<unsigned>(y));
 }
 
-/// As a camera's thread hands it over: the size, and who writes the pixels.
+/// As a camera's thread hands it over.
 void hand(FolderSink& sink, std::uint32_t camera, int frame, Stamp stamp, int width, int height) {
+  std::vector<std::uint8_t> pixels;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) pixels.push_back(pixel(camera, frame, x, y));
+  }
   CameraFrame image;
   image.camera = camera;
   image.stamp = stamp;
-  image.image = {nullptr, width, height, width};
-  struct Device {
-    std::uint32_t camera;
-    int frame, width, height;
-  };
-  const Device device{camera, frame, width, height};
-  const auto write = [](const void* from, std::uint8_t* to) {
-    const auto& of = *static_cast<const Device*>(from);
-    for (int y = 0; y < of.height; ++y) {
-      for (int x = 0; x < of.width; ++x) *to++ = pixel(of.camera, of.frame, x, y);
-    }
-  };
-  sink.takeImage(image, {}, {write, &device});
+  image.image = {pixels.data(), width, height, width};
+  sink.takeImage(image, {});
 }
 
 ImuSample sampleNumber(int i) {
