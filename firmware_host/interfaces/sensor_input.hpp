@@ -2,7 +2,7 @@
 // What feeds a threaded run: a log let out at its times (log_player.hpp), or devices
 // (firmware_host/inputs/devices).
 //
-// An input brings its own threads, one for each device; the executor starts them, at the priority of sensors,
+// An input brings its own threads, one for each device; the executor starts them, at the level that each has,
 // and ends the run when the last has ended. Each hands its messages to the sink from its own thread: those of
 // the IMU from one, those of a camera from one (a thread may have two cameras).
 
@@ -38,9 +38,15 @@ class SensorSink {
 
 class SensorInput {
  public:
+  /// Where a thread stands.
+  enum class Level : std::uint8_t {
+    kSensor,   ///< a device's, at the priority of sensors
+    kLibrary,  ///< a device's whose library or codec allocates and locks: below the flight path, as maps
+    kAhead,    ///< reads ahead from a file, at no priority
+  };
   struct Thread {
     const char* name = "";
-    bool of_vehicle = true;  ///< false: reads ahead from a file, at no priority
+    Level level = Level::kSensor;
     std::function<void()> run;
     /// Beats at each turn of one that returns only when it is told to; null: nobody watches it.
     Heartbeat* heart = nullptr;

@@ -20,7 +20,8 @@ namespace swiftlet {
 namespace {
 
 bool namesDevices(const Settings& settings) {
-  return !settings.imu_link.device.empty() || !settings.cameras.device0.empty();
+  return !settings.imu_link.device.empty() || !settings.cameras.device0.empty() ||
+         !settings.cameras.pipeline0.empty();
 }
 
 MachineLine line(const std::string& what, std::string found, bool good, std::string remedy) {
@@ -110,6 +111,13 @@ class VehicleCheck {
     const CameraStatus status = camera.status();
     const CountingSink::Stream& stream = sink_.camera(index);
     const std::string name = fmt::format("camera {}", index);
+    const CameraFacts& facts = camera.facts();
+    report.lines.push_back(
+        {name + " images",
+         fmt::format("{}x{} {}, {}, from {} ({})", facts.width, facts.height, facts.format.fourcc(),
+                     facts.rate > 0 ? fmt::format("{:.4g} Hz", facts.rate) : "rate not said",
+                     facts.card.data(), facts.driver.data()),
+         MachineVerdict::kGood, ""});
     const double wanted = settings_.cameras.rate_hz;
     constexpr double kTolerance = 0.02;  // of the rate
     report.lines.push_back(
@@ -126,11 +134,20 @@ class VehicleCheck {
              c.missed + c.damaged + c.too_short == 0,
              "the bus is too slow for these cameras: other USB controllers, shorter cables, or a "
              "lower rate"));
-    report.lines.push_back(line(name + " stamps", stampEventName(camera.facts().event),
-                                camera.facts().event != StampEvent::kArrival && c.stamp_ahead == 0,
+    report.lines.push_back(line(name + " stamps", stampEventName(facts.event),
+                                facts.event != StampEvent::kArrival && c.stamp_ahead == 0,
                                 c.stamp_ahead > 0
                                     ? "the driver stamps frames later than it gives them out"
-                                    : "the driver's clock is unknown: connect the trigger line"));
+                                    : "the time of capture is unknown: connect the trigger line"));
+    if (stream.stamps.size() < 2) return;
+    constexpr double kMost = 0.99;
+    report.lines.push_back(
+        {name + " timing",
+         fmt::format("steps off {:.2f} ms by {:.3f} ms (99 %); from stamp to arrival {:.2f} "
+                     "ms, 99 % below {:.2f} ms",
+                     stream.medianStep().seconds() * kToMs, stream.jitter(kMost).seconds() * kToMs,
+                     stream.latency(0.5).seconds() * kToMs, stream.latency(kMost).seconds() * kToMs),
+         MachineVerdict::kGood, ""});
   }
 
   void addPairs(MachineReport& report) {

@@ -60,18 +60,19 @@ class Run : public SensorSink {
         node->abandon();
       }
     }
-    for (const SensorInput::Thread& sensor : sensors_) sensing_ += sensor.of_vehicle ? 1 : 0;
+    for (const SensorInput::Thread& sensor : sensors_) sensing_ += sensor.level != Level::kAhead ? 1 : 0;
     for (const SensorInput::Thread& sensor : sensors_) {
-      if (!sensor.of_vehicle) continue;
+      if (sensor.level == Level::kAhead) continue;
       // One that could not be created has ended.
-      const Place place = placeOf(Rank::kSensor, options_.realtime);
+      const Rank rank = sensor.level == Level::kSensor ? Rank::kSensor : Rank::kLow;
+      const Place place = placeOf(rank, options_.realtime);
       if (start(sensor.name, place, [this, &sensor] { sense(sensor); })) continue;
       if (sensor.heart != nullptr) sensor.heart->fail("the thread could not be started");
       sensorEnded();
     }
     if (options_.started) options_.started(report_.threads);
     for (const SensorInput::Thread& sensor : sensors_) {
-      if (!sensor.of_vehicle) start(sensor.name, {0, -1}, sensor.run);
+      if (sensor.level == Level::kAhead) start(sensor.name, {0, -1}, sensor.run);
     }
     waitForEnd();
     for (std::size_t i = 0; i < threads_.size(); ++i) join(i);
@@ -81,6 +82,8 @@ class Run : public SensorSink {
   }
 
  private:
+  using Level = SensorInput::Level;
+
   struct Thread {
     std::unique_ptr<FlightThread> thread;
     Node* node = nullptr;  ///< null: of a sensor

@@ -24,6 +24,8 @@ inline constexpr const char* kRolling = "rolling";
 struct CamerasGroup {
   std::string device0 = "";
   std::string device1 = "";
+  std::string pipeline0 = "";  ///< of GStreamer, in place of device0
+  std::string pipeline1 = "";
   bool side_by_side = false;
   std::string format = "any";
   double rate_hz = 20;

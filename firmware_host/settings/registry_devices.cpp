@@ -44,20 +44,29 @@ std::vector<Setting> deviceSettings() {
        TextSetting{member(kCameras, &C::device0), "a node as /dev/video0, or empty"}},
       {"cameras.device1", "", "Video node of camera 1; empty: one camera, or both in one image.",
        TextSetting{member(kCameras, &C::device1), "a node as /dev/video2, or empty"}},
+      {"cameras.pipeline0", "",
+       "GStreamer pipeline of camera 0 in place of device0, as gst-launch-1.0 takes it, without a sink, "
+       "docs/gstreamer.md; for builds with SWIFTLET_WITH_GSTREAMER.",
+       TextSetting{member(kCameras, &C::pipeline0), "a pipeline as \"libcamerasrc\", or empty"}},
+      {"cameras.pipeline1", "", "GStreamer pipeline of camera 1 in place of device1.",
+       TextSetting{member(kCameras, &C::pipeline1), "a pipeline as \"libcamerasrc\", or empty"}},
       {"cameras.side_by_side", "",
-       "device0 gives both cameras in one image, camera 0 in its left half (format Y8I: pixel beside pixel, "
+       "device0 or pipeline0 gives both cameras in one image, camera 0 in its left half (format Y8I: pixel "
+       "beside pixel, "
        "without this).",
        onOff(kCameras, &C::side_by_side)},
       {"cameras.format", "",
-       "Pixels that the cameras are asked for, by V4L2's four letters, docs/v4l2.md; any: the first that is "
+       "Pixels that the video nodes are asked for, by V4L2's four letters, docs/v4l2.md; any: the first that "
+       "is "
        "taken and comes in the calibration's size at rate_hz, MJPG last.",
        TextSetting{member(kCameras, &C::format), "four letters as GREY or MJPG, or any"}},
       {"cameras.rate_hz", "Hz", "Images per second that each camera is asked for.",
        real(kCameras, &C::rate_hz, 1, 500)},
       {"cameras.exposure_ms", "ms",
-       "Exposure that the cameras are set to; 0: as they have it, and stamps are not moved to its middle.",
+       "Exposure that the video nodes are set to, or that pipelines set themselves; 0: not known, and stamps "
+       "are not moved to its middle.",
        real(kCameras, &C::exposure_ms, 0, 1000)},
-      {"cameras.gain", "", "Gain in the cameras' own units; -1: as they have it.",
+      {"cameras.gain", "", "Gain of the video nodes in the cameras' own units; -1: as they have it.",
        integer(kCameras, &C::gain, -1, 65535)},
       {"cameras.shutter", "",
        "Where the calibration does not say it. A rolling shutter's stamp is that of its middle row.",

@@ -38,9 +38,29 @@ DeviceFault CameraThread::open() {
   if (!fault.ok()) return fault;
   const CameraFacts& facts = source_->facts();
   reader_.reserve(facts.format, facts.width, facts.height, setup_.settings.side_by_side);
+  prepared_ = facts;
   // As the camera has taken it.
   if (setup_.settings.exposure_ms > 0) timing_.exposure = facts.exposure.value_or(Duration{});
   if (setup_.trigger) matcher_.emplace(train_, expectedLag(frameEvent(facts.event), timing_));
+  return fault;
+}
+
+SensorInput::Level CameraThread::level() const {
+  const bool library = source_->allocates() || source_->facts().format.layout == PixelLayout::kJpeg;
+  return library ? SensorInput::Level::kLibrary : SensorInput::Level::kSensor;
+}
+
+DeviceFault CameraThread::reopen() {
+  if (prepared_.width == 0) return open();
+  DeviceFault fault = source_->open();
+  const CameraFacts& facts = source_->facts();
+  const bool same =
+      facts.format == prepared_.format && facts.width == prepared_.width && facts.height == prepared_.height;
+  if (!fault.ok() || same) return fault;
+  fault = deviceFault(DeviceFaultKind::kChanged, 0, "came back with %dx%d %s in place of %dx%d %s",
+                      facts.width, facts.height, facts.format.letters.data(), prepared_.width,
+                      prepared_.height, prepared_.format.letters.data());
+  source_->close();
   return fault;
 }
 
@@ -51,7 +71,7 @@ void CameraThread::run(SensorSink& sink, const RunControl& control) {
     heart_.beat();
     takeEdges();
     if (!source_->isOpen()) {
-      if (const DeviceFault fault = source_->open(); !fault.ok()) {
+      if (const DeviceFault fault = reopen(); !fault.ok()) {
         journal_.fault(hostNow(), fault);
         sleepFor(kReopenPeriod);
         continue;

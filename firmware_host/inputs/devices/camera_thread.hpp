@@ -47,6 +47,9 @@ class CameraThread {
   CameraThread(const Setup& setup, std::unique_ptr<CameraSource> source);
 
   DeviceFault open();
+  /// After open(): as it runs. Frames of a library's, and pictures that are decompressed, cost allocations
+  /// and locks.
+  [[nodiscard]] SensorInput::Level level() const;
   /// What the camera took otherwise than it was asked; after open().
   [[nodiscard]] std::span<const DeviceFault> warnings() const { return source_->warnings(); }
   void run(SensorSink& sink, const RunControl& control);
@@ -66,6 +69,8 @@ class CameraThread {
   [[nodiscard]] std::uint64_t taken() const { return status().counters.frames; }
 
  private:
+  /// In flight. Ok: it gives the images that open() prepared for.
+  DeviceFault reopen();
   /// Frames that wait from before the flight.
   void discard();
   void takeEdges();
@@ -79,6 +84,7 @@ class CameraThread {
   Setup setup_;
   std::unique_ptr<CameraSource> source_;
   GreyReader reader_;
+  CameraFacts prepared_;  ///< what reader_ has memory for; of no width before open()
   Heartbeat heart_;
   DeviceJournal journal_;
   Duration longest_silence_;

@@ -1,6 +1,7 @@
 #include "firmware_host/inputs/devices/counting_sink.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace swiftlet {
 namespace {
@@ -14,11 +15,22 @@ std::vector<Duration> steps(const std::vector<Stamp>& stamps) {
 
 Duration distance(Stamp a, Stamp b) { return a < b ? b - a : a - b; }
 
+/// Nearest rank; of none: 0.
+Duration percentile(std::vector<Duration> values, double share) {
+  if (values.empty()) return {};
+  std::ranges::sort(values);
+  const auto rank = static_cast<std::size_t>(share * static_cast<double>(values.size()));
+  return values[std::min(rank, values.size() - 1)];
+}
+
 }  // namespace
 
 CountingSink::CountingSink(std::size_t most) {
   imu_.stamps.reserve(most);
-  for (Stream& camera : camera_) camera.stamps.reserve(most);
+  for (Stream& camera : camera_) {
+    camera.stamps.reserve(most);
+    camera.latencies.reserve(most);
+  }
 }
 
 void CountingSink::keep(Stream& stream, Stamp stamp) {
@@ -44,6 +56,20 @@ Duration CountingSink::Stream::medianStep() const {
   const std::vector<Duration> sorted = steps(stamps);
   return sorted.empty() ? Duration{} : sorted[sorted.size() / 2];
 }
+
+Duration CountingSink::Stream::jitter(double share) const {
+  std::vector<Duration> off = steps(stamps);
+  const Duration typical = medianStep();
+  if (typical <= Duration{}) return {};
+  for (Duration& step : off) {
+    // A step over lost frames counts as well.
+    const std::int64_t over = ((step.ns % typical.ns) + typical.ns) % typical.ns;
+    step.ns = std::min(over, typical.ns - over);
+  }
+  return percentile(std::move(off), share);
+}
+
+Duration CountingSink::Stream::latency(double share) const { return percentile(latencies, share); }
 
 std::vector<Duration> CountingSink::pairDistances() const {
   std::vector<Duration> distances;

@@ -1,6 +1,7 @@
 #pragma once
-// Keeps the stamps of what devices deliver, for a look at them afterwards: rates, gaps, how far apart two
-// cameras are. Memory: as much as is asked for at construction; what goes beyond is counted only.
+// Keeps the stamps of what devices deliver, for a look at them afterwards: rates, gaps, jitter, latency, how
+// far apart two cameras are. Memory: as much as is asked for at construction; what goes beyond is counted
+// only.
 
 #include <array>
 #include <cstdint>
@@ -15,7 +16,8 @@ class CountingSink : public SensorSink {
  public:
   struct Stream {
     std::vector<Stamp> stamps;
-    std::uint64_t beyond = 0;  ///< came after `stamps` was full
+    std::vector<Duration> latencies;  ///< of images: from the stamp to the arrival
+    std::uint64_t beyond = 0;         ///< came after `stamps` was full
 
     /// Per second, of the stamps kept; 0 for less than two.
     [[nodiscard]] double rate() const;
@@ -23,6 +25,10 @@ class CountingSink : public SensorSink {
     [[nodiscard]] Duration largestStep() const;
     /// The steps' median.
     [[nodiscard]] Duration medianStep() const;
+    /// What `share` of the steps are off whole multiples of their median by at most.
+    [[nodiscard]] Duration jitter(double share) const;
+    /// What `share` of the latencies are at most.
+    [[nodiscard]] Duration latency(double share) const;
   };
 
   explicit CountingSink(std::size_t most);
@@ -32,7 +38,11 @@ class CountingSink : public SensorSink {
   }
   void takeScene(const SceneImages& /*scene*/) override {}
   void takeImage(const CameraFrame& image, const HostTimes& /*host*/) override {
-    keep(camera_.at(image.camera), image.stamp);
+    Stream& stream = camera_.at(image.camera);
+    if (stream.latencies.size() < stream.latencies.capacity()) {
+      stream.latencies.push_back(image.arrival - image.stamp);
+    }
+    keep(stream, image.stamp);
   }
 
   // After the devices' threads have ended.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "drivers/calibration/input_error.hpp"
+#include "drivers/gstreamer/pipeline_source.hpp"
 #include "drivers/v4l2/camera_device.hpp"
 #include "estimator/core/units.hpp"
 #include "firmware_host/inputs/devices/can_imu_link.hpp"
@@ -46,6 +47,27 @@ std::unique_ptr<ImuLink> makeImuLink(const ImuLinkGroup& settings, double rate, 
   return std::make_unique<PortImuLink>(settings, rate, outbox);
 }
 
+/// Where camera `index` comes from, as the settings name it.
+struct CameraOrigin {
+  const char* device_key;
+  const char* pipeline_key;
+  const std::string& device;
+  const std::string& pipeline;
+
+  [[nodiscard]] bool named() const { return !device.empty() || !pipeline.empty(); }
+  /// For messages: a pipeline's first words.
+  [[nodiscard]] std::string name() const {
+    constexpr std::size_t kMost = 40;
+    if (pipeline.size() <= kMost) return pipeline.empty() ? device : pipeline;
+    return pipeline.substr(0, kMost) + "...";
+  }
+};
+
+CameraOrigin originOf(const CamerasGroup& group, std::size_t index) {
+  if (index == 0) return {"cameras.device0", "cameras.pipeline0", group.device0, group.pipeline0};
+  return {"cameras.device1", "cameras.pipeline1", group.device1, group.pipeline1};
+}
+
 CameraDeviceSettings deviceSettings(const CamerasGroup& group, const std::string& path, int width,
                                     int height) {
   CameraDeviceSettings device;
@@ -59,32 +81,68 @@ CameraDeviceSettings deviceSettings(const CamerasGroup& group, const std::string
   return device;
 }
 
-/// Both cameras come from device0, in the halves of one image or pixel beside pixel.
+std::unique_ptr<CameraSource> makeSource(const CamerasGroup& group, const CameraOrigin& origin, int width,
+                                         int height) {
+  if (origin.pipeline.empty()) {
+    return std::make_unique<CameraDevice>(deviceSettings(group, origin.device, width, height));
+  }
+  PipelineSettings pipeline{origin.pipeline, width, height, group.rate_hz, {}};
+  if (group.exposure_ms > 0) pipeline.exposure = Duration::fromSeconds(group.exposure_ms * kFromMs);
+  return std::make_unique<PipelineSource>(std::move(pipeline));
+}
+
+/// Both cameras come from device0 or pipeline0, in the halves of one image or pixel beside pixel.
 bool twoInOne(const CamerasGroup& group) {
   const std::optional<PixelFormat> format = pixelFormat(group.format);
   return group.side_by_side || (format && format->layout == PixelLayout::kPairs);
 }
 
-void checkCameras(const CamerasGroup& group, const Rig& rig) {
-  if (group.device0.empty()) {
-    failAt("cameras.device0", "no camera is named", "Name its video node; `swiftlet doctor` lists them");
+/// One origin a camera, and no setting that means nothing to it.
+void checkOrigins(const CamerasGroup& group) {
+  bool any_device = false;
+  for (std::size_t i = 0; i < kMaxCameras; ++i) {
+    const CameraOrigin origin = originOf(group, i);
+    any_device = any_device || !origin.device.empty();
+    if (origin.device.empty() || origin.pipeline.empty()) continue;
+    failAt(origin.pipeline_key,
+           fmt::format("named beside {}, and a camera has one origin", origin.device_key),
+           "Leave one of them out");
   }
+  if (!originOf(group, 0).named()) {
+    failAt("cameras.device0", "no camera is named",
+           "Name its video node (`swiftlet doctor` lists them), or a pipeline in cameras.pipeline0");
+  }
+  if (any_device) return;
+  if (group.format != kAnyFormat) {
+    failAt("cameras.format", "is for video nodes, and the settings name pipelines only",
+           "Write the format into the pipeline, as `! video/x-raw,format=NV12`");
+  }
+  if (group.gain >= 0) {
+    failAt("cameras.gain", "is for video nodes, and the settings name pipelines only",
+           "Set the gain by the pipeline's source element");
+  }
+}
+
+void checkCameras(const CamerasGroup& group, const Rig& rig) {
+  checkOrigins(group);
   const bool two_in_one = twoInOne(group);
-  const bool second = two_in_one || !group.device1.empty();
+  const CameraOrigin other = originOf(group, 1);
+  const bool second = two_in_one || other.named();
   if (rig.camera_count == 2 && !second) {
     failAt("cameras.device1", "the calibration has two cameras, the settings name one",
-           "Name the second's video node, or set cameras.side_by_side where one node gives both");
+           "Name the second's video node or pipeline, or set cameras.side_by_side where one gives both");
   }
   if (rig.camera_count == 1 && second) {
     failAt("vehicle.calibration", "the settings name two cameras, the calibration has one",
-           "Calibrate both, or leave cameras.device1 and cameras.side_by_side out");
+           "Calibrate both, or leave cameras.device1, cameras.pipeline1 and cameras.side_by_side out");
   }
-  if (!two_in_one && group.device0 == group.device1) {
+  if (!two_in_one && !group.device1.empty() && group.device0 == group.device1) {
     failAt("cameras.device1", "the same video node as cameras.device0",
            "Name the other camera's; set cameras.side_by_side where one node gives both");
   }
-  if (two_in_one && !group.device1.empty()) {
-    failAt("cameras.device1", "named although device0 gives both cameras",
+  if (two_in_one && other.named()) {
+    failAt(other.pipeline.empty() ? other.device_key : other.pipeline_key,
+           "named beside the one that gives both cameras",
            group.side_by_side ? "Leave it or cameras.side_by_side out"
                               : "Leave it out, or choose another cameras.format");
   }
@@ -123,17 +181,16 @@ LiveInput::LiveInput(const Settings& settings, const Calibration& calibration) {
       Duration::fromSeconds(settings.imu_link.delay_ms * kFromMs), calibration.noise.rate_hz);
   const std::size_t nodes = twoInOne(cameras) ? 1 : rig.camera_count;
   for (std::size_t i = 0; i < nodes; ++i) {
-    const std::string& path = i == 0 ? cameras.device0 : cameras.device1;
+    const CameraOrigin origin = originOf(cameras, i);
     CameraThread::Setup setup;
-    setup.name =
-        fmt::format("camera {} ({})", nodes < rig.camera_count ? "0 and 1" : std::to_string(i), path);
+    setup.name = fmt::format("camera {} ({})", nodes < rig.camera_count ? "0 and 1" : std::to_string(i),
+                             origin.name());
     const int halves = cameras.side_by_side ? 2 : 1;
     setup.first = static_cast<std::uint32_t>(i);
     setup.settings = cameras;
     if (!settings.trigger.chip.empty()) setup.trigger = settings.trigger;
     cameras_.push_back(std::make_unique<CameraThread>(
-        setup, std::make_unique<CameraDevice>(
-                   deviceSettings(cameras, path, halves * rig.camera[i].width(), rig.camera[i].height()))));
+        setup, makeSource(cameras, origin, halves * rig.camera[i].width(), rig.camera[i].height())));
     edge_rings_.push_back(&cameras_.back()->edges());
   }
   if (settings.trigger.chip == kTriggerByImu) {
@@ -167,7 +224,7 @@ LiveInput::Opened LiveInput::open() {
 std::vector<SensorInput::Thread> LiveInput::threads(SensorSink& sink, const RunControl& control) {
   static constexpr std::array<const char*, kMaxCameras> kCameraThreads = {"camera0", "camera1"};
   std::vector<Thread> threads;
-  threads.push_back({"imu", true,
+  threads.push_back({"imu", Level::kSensor,
                      [this, &sink, &control] {
                        imu_->run(sink,
                                  edges_by_imu_ ? std::span<EdgeRing* const>(edge_rings_)
@@ -176,13 +233,13 @@ std::vector<SensorInput::Thread> LiveInput::threads(SensorSink& sink, const RunC
                      },
                      &imu_->heart()});
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
-    threads.push_back({kCameraThreads[i], true,
+    threads.push_back({kCameraThreads[i], cameras_[i]->level(),
                        [this, i, &sink, &control] { cameras_[i]->run(sink, control); },
                        &cameras_[i]->heart()});
   }
   if (trigger_) {
-    threads.push_back(
-        {"trigger", true, [this, &control] { trigger_->run(edge_rings_, control); }, &trigger_->heart()});
+    threads.push_back({"trigger", Level::kSensor, [this, &control] { trigger_->run(edge_rings_, control); },
+                       &trigger_->heart()});
   }
   return threads;
 }

@@ -1,6 +1,6 @@
 #pragma once
-// The vehicle's devices as the input of a threaded run: one thread each for the IMU, every video node and the
-// trigger line, as the settings name them.
+// The vehicle's devices as the input of a threaded run: one thread each for the IMU, every video node or
+// pipeline and the trigger line, as the settings name them.
 //
 // All devices must be there when the flight begins; in flight each may go and return, fall silent or send
 // garbage, and the others go on. What happens to them goes to the log, by name and with the remedy.
@@ -62,7 +62,7 @@ class LiveInput : public SensorInput {
   std::unique_ptr<ImuThread> imu_;
   std::vector<std::unique_ptr<CameraThread>> cameras_;
   std::unique_ptr<TriggerThread> trigger_;
-  std::vector<EdgeRing*> edge_rings_;  ///< one a video node
+  std::vector<EdgeRing*> edge_rings_;  ///< one a camera's thread
   bool edges_by_imu_ = false;
 };
 

@@ -7,8 +7,11 @@ SensorThreads::SensorThreads(SensorInput& input, SensorSink& sink, const Realtim
   for (const SensorInput::Thread& sensor : input.threads(sink, control_)) {
     ThreadSettings settings;
     settings.name = sensor.name;
-    settings.priority = realtime.enabled ? realtime.sensor_priority : 0;
-    settings.cpu = realtime.enabled ? realtime.sensor_cpu : -1;
+    if (realtime.enabled) {
+      const bool low = sensor.level != SensorInput::Level::kSensor;
+      settings.priority = low ? realtime.low_priority : realtime.sensor_priority;
+      settings.cpu = low ? realtime.low_cpu : realtime.sensor_cpu;
+    }
     const ThreadReport report = threads_.at(started_++).start(settings, sensor.run);
     if (!report.message.empty()) warnings_.push_back("thread " + report.name + ": " + report.message);
   }

@@ -23,9 +23,9 @@ const char* lockName(LockState lock) {
 const char* stampEventName(StampEvent event) {
   switch (event) {
     case StampEvent::kStartOfExposure:
-      return "the driver's, of the start of exposure";
+      return "of the start of exposure";
     case StampEvent::kEndOfFrame:
-      return "the driver's, of the end of the frame";
+      return "of the end of the frame";
     case StampEvent::kArrival:
       return "of the arrival";
   }

@@ -7,8 +7,8 @@
 namespace swiftlet {
 
 std::vector<SensorInput::Thread> LogPlayer::threads(SensorSink& sink, const RunControl& control) {
-  return {{"sensor", true, [this, &sink, &control] { play(sink, control); }},
-          {"source", false, [this, &control] { read(control); }}};
+  return {{"sensor", Level::kSensor, [this, &sink, &control] { play(sink, control); }},
+          {"source", Level::kAhead, [this, &control] { read(control); }}};
 }
 
 void LogPlayer::finish() {

@@ -32,6 +32,25 @@ TEST_CASE("rate, usual and largest step are of the stamps") {
   CHECK(sink.imu().largestStep().ns == 15 * kMillisecond);
 }
 
+TEST_CASE("jitter is off the grid of the usual step, latency from stamp to arrival") {
+  CountingSink sink(1000);
+  for (int i = 0; i < 100; ++i) {
+    if (i == 40 || i == 41) continue;
+    CameraFrame frame;
+    // Each tenth is 2 ms late, in its stamp and on its way.
+    const std::int64_t late = i % 10 == 9 ? 2 * kMillisecond : 0;
+    frame.stamp = {1'000'000'000 + i * 50 * kMillisecond + late};
+    frame.arrival = {frame.stamp.ns + 7 * kMillisecond + late};
+    sink.takeImage(frame, {});
+  }
+  CHECK(sink.camera(0).jitter(0.5).ns == 0);
+  CHECK(sink.camera(0).jitter(0.99).ns == 2 * kMillisecond);
+  CHECK(sink.camera(0).latency(0.5).ns == 7 * kMillisecond);
+  CHECK(sink.camera(0).latency(0.99).ns == 9 * kMillisecond);
+  CHECK(sink.camera(1).jitter(0.99).ns == 0);
+  CHECK(sink.camera(1).latency(0.99).ns == 0);
+}
+
 TEST_CASE("none, one and equal stamps have no rate") {
   CountingSink sink(10);
   CHECK(sink.imu().rate() == 0);

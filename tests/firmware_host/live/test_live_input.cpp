@@ -1,5 +1,8 @@
 // What LiveInput refuses names its setting; devices that are missing are all told.
 
+#include <sched.h>
+
+#include <array>
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <chrono>
@@ -82,7 +85,7 @@ TEST_CASE("each refusal names its setting and what to do") {
   settings.cameras.side_by_side = true;
   Calibration odd = stereo();
   odd.rig.camera[1] = makeRig(RigKind::kForward).rig.camera[1];
-  CHECK_THAT(refusal(settings, odd), Catch::Contains("cameras.side_by_side") && Catch::Contains("size"));
+  CHECK_THAT(refusal(settings, odd), Catch::Contains("cameras.device0") && Catch::Contains("size"));
 
   settings = vehicle();
   settings.imu_link.protocol = "dronecan";
@@ -120,6 +123,82 @@ TEST_CASE("IMU and autopilot share a link where both settings name one port") {
   CHECK(refusal(settings, stereo()).empty());
   settings.imu_link.device = "udp:127.0.0.1:many";
   CHECK_THAT(refusal(settings, stereo()), Catch::Contains("imu_link.device") && Catch::Contains("no port"));
+}
+
+TEST_CASE("a pipeline stands in for a video node, and never beside one") {
+  Settings settings = vehicle();
+  settings.cameras.pipeline0 = "videotestsrc";
+  CHECK_THAT(refusal(settings, stereo()), Catch::Contains("cameras.pipeline0") &&
+                                              Catch::Contains("cameras.device0") &&
+                                              Catch::Contains("Leave one of them out"));
+  settings.cameras.device0.clear();
+  CHECK(refusal(settings, stereo()).empty());
+  settings.cameras.format = "GREY";  // of camera 1's node
+  CHECK(refusal(settings, stereo()).empty());
+  settings.cameras.pipeline1 = "videotestsrc";
+  CHECK_THAT(refusal(settings, stereo()), Catch::Contains("cameras.pipeline1"));
+  settings.cameras.device1.clear();
+  CHECK_THAT(refusal(settings, stereo()),
+             Catch::Contains("cameras.format") && Catch::Contains("video/x-raw"));
+  settings.cameras.format = "any";
+  CHECK(refusal(settings, stereo()).empty());
+  settings.cameras.gain = 3;
+  CHECK_THAT(refusal(settings, stereo()),
+             Catch::Contains("cameras.gain") && Catch::Contains("pipelines only"));
+  settings.cameras.gain = -1;
+  CHECK_THAT(refusal(settings, mono()),
+             Catch::Contains("vehicle.calibration") && Catch::Contains("pipeline1"));
+  settings.cameras.side_by_side = true;
+  CHECK_THAT(refusal(settings, stereo()), Catch::Contains("cameras.pipeline1") && Catch::Contains("beside"));
+  settings.cameras.pipeline1.clear();
+  CHECK(refusal(settings, stereo()).empty());
+  settings.cameras.side_by_side = false;
+  CHECK_THAT(refusal(settings, stereo()), Catch::Contains("cameras.device1") && Catch::Contains("pipeline"));
+  CHECK(refusal(settings, mono()).empty());
+}
+
+TEST_CASE("pipelines run below the flight path, or say that this build has none") {
+  Settings settings = vehicle();
+  settings.cameras.device0.clear();
+  settings.cameras.device1.clear();
+  settings.cameras.pipeline0 = "videotestsrc is-live=true";
+  settings.cameras.pipeline1 = "videotestsrc is-live=true pattern=ball ! video/x-raw,format=NV12";
+  LiveInput input(settings, stereo());
+  const LiveInput::Opened opened = input.open();
+#ifdef SWIFTLET_TEST_GSTREAMER
+  REQUIRE(opened.faults.size() == 1);
+  CHECK_THAT(opened.faults[0], Catch::StartsWith("IMU"));
+  CHECK(opened.warnings.empty());
+  // Where the thread of an image stands.
+  struct PolicySink : SensorSink {
+    void takeImu(const ImuSample&, Stamp, const HostTimes&) override {}
+    void takeScene(const SceneImages&) override {}
+    void takeImage(const CameraFrame& image, const HostTimes&) override {
+      policy[image.camera] = sched_getscheduler(0);
+    }
+    std::array<std::atomic<int>, 2> policy = {-1, -1};
+  } sink;
+  const RunControl control;
+  const auto threads = input.threads(sink, control);
+  REQUIRE(threads.size() == 3);
+  CHECK(threads[0].level == SensorInput::Level::kSensor);
+  CHECK(threads[1].level == SensorInput::Level::kLibrary);
+  CHECK(threads[2].level == SensorInput::Level::kLibrary);
+  SensorThreads running(input, sink, settings.realtime);
+  for (int i = 0; i < 500 && (sink.policy[0] < 0 || sink.policy[1] < 0); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  running.join();
+  CHECK(sink.policy[0] == SCHED_OTHER);
+  CHECK(sink.policy[1] == SCHED_OTHER);
+  const nlohmann::ordered_json counters = input.counters();
+  CHECK(counters["camera0"]["frames"] > 0);
+#else
+  REQUIRE(opened.faults.size() == 3);
+  for (std::size_t i = 1; i < 3; ++i) {
+    CHECK_THAT(opened.faults[i], Catch::Contains("-DSWIFTLET_WITH_GSTREAMER=ON"));
+  }
+#endif
 }
 
 TEST_CASE("all devices that are missing are told at once, each by name and with what to do") {
