@@ -40,13 +40,13 @@ const NormalTable& normalTable() {
 
 }  // namespace
 
-void ExposureControl::start(double mean_radiance) {
+void GainControl::start(double mean_radiance) {
   const double right = settings_.target_mean / (kWhite * settings_.light * std::max(mean_radiance, 1e-4));
   gain_ = std::min(settings_.start_error * right, settings_.max_gain);
   started_ = true;
 }
 
-void ExposureControl::update(double mean, double seconds) {
+void GainControl::update(double mean, double seconds) {
   // A black image asks for no more than eight times the gain at once.
   const double ratio = std::clamp(settings_.target_mean / std::max(mean, 1.0), 0.125, 8.0);
   const double share = 1.0 - std::exp(-seconds / settings_.settle_time);

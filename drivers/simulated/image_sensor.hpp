@@ -26,9 +26,9 @@ struct SensorSettings {
 };
 
 /// Exposure control shared by both cameras.
-class ExposureControl {
+class GainControl {
  public:
-  explicit ExposureControl(const SensorSettings& settings) : settings_(settings) {}
+  explicit GainControl(const SensorSettings& settings) : settings_(settings) {}
   [[nodiscard]] double gain() const { return gain_; }
   /// Before the first image: sets the starting gain from what camera 0 sees.
   void start(double mean_radiance);

@@ -67,7 +67,7 @@ class FlightCameras {
   const SimulatedFlight* flight_;
   std::unique_ptr<TexturedWorld> world_;
   std::vector<CameraRenderer> renderers_;
-  ExposureControl exposure_;
+  GainControl exposure_;
   std::vector<float> radiance_;
 };
 

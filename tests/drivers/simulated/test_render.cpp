@@ -335,7 +335,7 @@ TEST_CASE("sensor noise and vignette follow the model") {
 
 TEST_CASE("exposure settles within a second") {
   SensorSettings settings;
-  ExposureControl control(settings);
+  GainControl control(settings);
   control.start(0.3);
   const auto grey = [&] { return std::min(255.0, 255 * 0.3 * control.gain()); };
   CHECK(grey() == Approx(settings.start_error * settings.target_mean).epsilon(0.01));
