@@ -24,6 +24,10 @@ void CapturedFrame::release() {
   image = {};
 }
 
+DeviceFault CameraSource::setExposure(const ExposureSetting& /*setting*/) {
+  return deviceFault(DeviceFaultKind::kUnsupported, 0, "no exposure time to set");
+}
+
 void CameraSource::lend(CapturedFrame& frame, std::uint32_t buffer) {
   frame.source_ = this;
   frame.buffer_ = buffer;

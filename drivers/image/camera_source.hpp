@@ -15,6 +15,7 @@
 
 #include "drivers/device/device_fault.hpp"
 #include "drivers/image/raw_image.hpp"
+#include "estimator/camera/exposure_control.hpp"
 #include "estimator/core/stamp.hpp"
 
 namespace swiftlet {
@@ -24,6 +25,12 @@ enum class StampEvent : std::uint8_t {
   kStartOfExposure,
   kEndOfFrame,
   kArrival,  ///< the capture's time is unknown: when the frame came to the host
+};
+
+/// Of a camera whose exposure can be set in flight.
+struct ExposureAbility {
+  ExposureRange range;
+  ExposureSetting now;
 };
 
 /// As negotiated and read back.
@@ -100,6 +107,12 @@ class CameraSource {
 
   /// The oldest frame that waits. Ok with `frame.valid()` false: none.
   virtual DeviceFault next(CapturedFrame& frame) = 0;
+
+  /// Of an open source; empty: its exposure cannot be set in flight.
+  [[nodiscard]] virtual std::optional<ExposureAbility> exposureAbility() const { return {}; }
+  /// For the images to come, rounded to what the camera can; the first call ends its automatics. Waits for
+  /// the camera's bus, up to some ms.
+  virtual DeviceFault setExposure(const ExposureSetting& setting);
 
   [[nodiscard]] const CameraFacts& facts() const { return facts_; }
   [[nodiscard]] const CameraCounters& counters() const { return counters_; }

@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "drivers/device/monotonic_now.hpp"
-#include "drivers/v4l2/camera_controls.hpp"
 #include "drivers/v4l2/camera_offers.hpp"
 
 namespace swiftlet {
@@ -60,6 +59,8 @@ DeviceFault CameraDevice::open() {
 }
 
 void CameraDevice::shut() {
+  controls_ = {};
+  sensor_.close();
   node_.close();
   forgetLent();
   sequence_known_ = false;
@@ -69,13 +70,26 @@ DeviceFault CameraDevice::negotiate() {
   describeDevice();
   DeviceFault fault = chooseFormat();
   if (!fault.ok()) return fault;
-  if (settings_.exposure) warn(setExposure(node_, *settings_.exposure));
-  if (settings_.gain) warn(setGain(node_, *settings_.gain));
-  facts_.exposure = readExposure(node_);
-  facts_.gain = readGain(node_);
+  findControls();
+  if (settings_.exposure) warn(controls_.setExposure(*settings_.exposure));
+  if (settings_.gain) warn(controls_.setGain(*settings_.gain));
+  facts_.exposure = controls_.exposure();
+  facts_.gain = controls_.gain();
   fault = setBuffers();
   if (fault.ok()) fault = node_.start();
   return fault;
+}
+
+void CameraDevice::findControls() {
+  controls_ = CameraControls(node_, facts_.width, facts_.card.data());
+  if (controls_.exposes() || !sensor_.openBefore(node_.fd())) return;
+  const CameraControls of_sensor(sensor_, sensor_.width(), sensor_.name());
+  if (of_sensor.exposes()) controls_ = of_sensor;
+}
+
+DeviceFault CameraDevice::setExposure(const ExposureSetting& setting) {
+  if (!isOpen()) return deviceFault(DeviceFaultKind::kUnplugged, 0, "closed; waiting for it to come back");
+  return controls_.set(setting);
 }
 
 void CameraDevice::describeDevice() {
@@ -238,7 +252,5 @@ DeviceFault CameraDevice::next(CapturedFrame& frame) {
   }
   return {};
 }
-
-std::optional<Duration> CameraDevice::exposure() const { return readExposure(node_); }
 
 }  // namespace swiftlet

@@ -9,7 +9,9 @@
 #include <optional>
 
 #include "drivers/image/camera_source.hpp"
+#include "drivers/v4l2/camera_controls.hpp"
 #include "drivers/v4l2/camera_settings.hpp"
+#include "drivers/v4l2/sensor_node.hpp"
 #include "drivers/v4l2/video_node.hpp"
 
 namespace swiftlet {
@@ -33,8 +35,12 @@ class CameraDevice : public CameraSource {
 
   DeviceFault next(CapturedFrame& frame) override;
 
+  [[nodiscard]] std::optional<ExposureAbility> exposureAbility() const override {
+    return isOpen() ? controls_.ability() : std::nullopt;
+  }
+  DeviceFault setExposure(const ExposureSetting& setting) override;
   /// Asked anew, for automatic exposure; empty where the camera does not say.
-  [[nodiscard]] std::optional<Duration> exposure() const;
+  [[nodiscard]] std::optional<Duration> exposure() const { return controls_.exposure(); }
 
  private:
   void giveBack(std::uint32_t buffer) override;
@@ -46,10 +52,14 @@ class CameraDevice : public CameraSource {
   DeviceFault setRate();
   DeviceFault setBuffers();
   void describeDevice();
+  /// The video node's own exposure, or that of the sensor before it.
+  void findControls();
   void countSequence(std::uint32_t sequence);
   DeviceFault closedBy(const DeviceFault& fault);
 
   VideoNode node_;
+  SensorNode sensor_;  ///< open where the exposure is its
+  CameraControls controls_;
   CameraDeviceSettings settings_;
   bool opened_ = false;          // ever
   bool sequence_known_ = false;  // of this stream

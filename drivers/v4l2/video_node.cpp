@@ -95,9 +95,9 @@ void VideoNode::close() {
   buffers_ = {};
 }
 
-int VideoNode::call(unsigned long request, void* argument) const {
+int callNode(int fd, unsigned long request, void* argument) {
   for (int i = 0; i < kMaxInterruptions; ++i) {
-    const int result = ::ioctl(fd_, request, argument);
+    const int result = ::ioctl(fd, request, argument);
     if (result != -1 || errno != EINTR) return result;
   }
   return -1;

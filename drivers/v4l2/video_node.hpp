@@ -9,6 +9,7 @@
 #include <span>
 
 #include "drivers/device/device_fault.hpp"
+#include "drivers/v4l2/control_port.hpp"
 #include "estimator/core/stamp.hpp"
 
 namespace swiftlet {
@@ -31,15 +32,13 @@ struct FilledBuffer {
   std::span<const std::uint8_t> bytes;
 };
 
-class VideoNode {
+class VideoNode : public ControlPort {
  public:
   /// What the room holds; drivers give 2 to 32, more than 8 only delays.
   static constexpr std::size_t kMaxBuffers = 8;
 
   VideoNode() = default;
-  VideoNode(const VideoNode&) = delete;
-  VideoNode& operator=(const VideoNode&) = delete;
-  ~VideoNode() { close(); }
+  ~VideoNode() override { close(); }
 
   enum class Role : std::uint8_t { kCapture, kOutput };
 
@@ -51,8 +50,7 @@ class VideoNode {
   /// V4L2_BUF_TYPE_..., for calls that are not made here.
   [[nodiscard]] std::uint32_t type() const { return type_; }
 
-  /// ioctl, again when a signal came in between; -1 and errno else.
-  int call(unsigned long request, void* argument) const;
+  int call(unsigned long request, void* argument) const override { return callNode(fd_, request, argument); }
   /// The fault of the call that just failed: gone, busy, or the kernel's words. `what` names the call.
   [[nodiscard]] static DeviceFault callFault(int error, const char* what);
 
