@@ -25,7 +25,7 @@ struct SensorSettings {
   std::uint64_t seed = 1;
 };
 
-/// Exposure control shared by both cameras.
+/// The gain for both cameras.
 class GainControl {
  public:
   explicit GainControl(const SensorSettings& settings) : settings_(settings) {}

@@ -31,6 +31,12 @@ Rig turnedRig(const Rig& rig, const SimulationSettings& settings) {
   return turned;
 }
 
+double longestExposure(const SimulationSettings& settings) {
+  const double given = settings.render.exposure;
+  return settings.exposure_mode == ExposureMode::kOdometry ? std::max(given, SimulatedExposure::kLongest)
+                                                           : given;
+}
+
 }  // namespace
 
 SimulatedFlight::SimulatedFlight(const SimulationSettings& settings) : settings_(settings) {
@@ -62,7 +68,7 @@ SimulatedFlight::SimulatedFlight(const SimulationSettings& settings) : settings_
   flyAndBuild();
   imu_ = simulateImu(trajectory_, s.imu, s.start, duration_);
   // Half an exposure of motion must exist after the last row.
-  const double last = duration_ - 0.5 * (s.render.exposure + s.render.readout);
+  const double last = duration_ - 0.5 * (longestExposure(s) + s.render.readout);
   image_count_ =
       std::max(0, static_cast<int>(std::floor((last - s.first_image) * s.camera_rate + kSharpTime)) + 1);
   if (image_count_ == 0) throw std::invalid_argument("flight.duration: too short for an image");
@@ -84,8 +90,14 @@ void SimulatedFlight::checkSettings() const {
   require(settings_.render.readout >= 0 && settings_.render.readout < 1 / settings_.camera_rate,
           "render.readout: must be shorter than a frame");
   require(settings_.jpeg_quality >= 1 && settings_.jpeg_quality <= 100, "jpeg_quality: must lie in [1, 100]");
-  require(settings_.first_image >= 0.5 * (settings_.render.exposure + settings_.render.readout),
+  require(settings_.first_image >= 0.5 * (longestExposure(settings_) + settings_.render.readout),
           "first_image: must leave half an exposure and half a readout");
+  double before = 0;
+  for (const LightChange& change : settings_.light_changes) {
+    require(change.begin >= before, "light_changes: each must begin when the one before has ended");
+    require(change.level > 0, "light_changes: the level must be positive");
+    before = change.begin + kLightRamp;
+  }
   require(settings_.paint.texel > 0 && settings_.paint.max_texels > 0, "paint.texel: must be positive");
   require(settings_.threads >= 1, "threads: at least 1");
 }
@@ -132,7 +144,8 @@ bool SimulatedFlight::hasFault(FaultKind kind, std::size_t camera, double second
 FlightCameras::FlightCameras(const SimulatedFlight& flight)
     : flight_(&flight),
       world_(std::make_unique<TexturedWorld>(flight.world(), flight.settings().paint)),
-      exposure_(flight.settings().sensor) {
+      exposure_(flight.settings().exposure_mode, flight.settings().sensor, flight.settings().render.exposure,
+                flight.settings().camera_rate, flight.trueRig().camera[0].focal()) {
   for (std::size_t c = 0; c < flight.trueRig().camera_count; ++c) {
     renderers_.emplace_back(*world_, flight.trueRig().camera[c], flight.trueRig().T_body_cam[c]);
   }
@@ -143,25 +156,38 @@ void FlightCameras::render(int k, const std::array<std::uint8_t*, kMaxCameras>& 
   const SimulationSettings& settings = flight_->settings();
   const double seconds = flight_->imageTime(k);
   present = {};
-  double mean = -1;  // of camera 0, where it saw something
+  const double light = lightAt(settings.light_changes, seconds);
+  if (exposure_.started()) taken_with_ = exposure_.now();
+  double mean = 0;  // of camera 0
   for (std::size_t c = 0; c < renderers_.size(); ++c) {
     const bool missing = flight_->hasFault(FaultKind::kCameraMissing, c, seconds);
-    // Exposure control needs camera 0's brightness even before the first image that is given.
+    // The first exposure needs camera 0's brightness even before the first image that is given.
     if (missing && (c != 0 || exposure_.started())) continue;
     const CameraModel& camera = renderers_[c].camera();
     const bool dark = flight_->hasFault(FaultKind::kBlackout, c, seconds);
-    renderers_[c].renderImage(flight_->trajectory(), seconds, settings.render, radiance_);
-    if (!exposure_.started()) exposure_.start(meanRadiance(radiance_, camera.width(), camera.height()));
+    const ExposureSetting& setting = taken_with_;
+    RenderSettings render = settings.render;
+    if (exposure_.started()) render.exposure = setting.exposure.seconds();
+    renderers_[c].renderImage(flight_->trajectory(), seconds, render, radiance_);
+    if (!exposure_.started()) {
+      exposure_.start(meanRadiance(radiance_, camera.width(), camera.height()));
+      taken_with_ = exposure_.now();
+    }
     if (missing) continue;
     if (dark) std::fill(radiance_.begin(), radiance_.end(), 0.0F);
+    SensorSettings sensor = settings.sensor;
+    sensor.light *= light * setting.exposure.seconds() / settings.render.exposure;
     const double image_mean =
-        exposeImage(radiance_, camera.width(), camera.height(), settings.sensor, exposure_.gain(),
+        exposeImage(radiance_, camera.width(), camera.height(), sensor, setting.gain,
                     static_cast<std::uint64_t>(k), static_cast<std::uint32_t>(c), settings.threads, grey[c]);
     present[c] = true;
     if (c == 0 && !dark) mean = image_mean;
   }
-  // In a blackout the gain stays: the images that follow are usable at once.
-  if (mean >= 0) exposure_.update(mean, 1.0 / settings.camera_rate);
+  const CameraModel& camera = renderers_[0].camera();
+  ImageView seen;
+  if (present[0]) seen = {grey[0], camera.width(), camera.height(), camera.width()};
+  exposure_.update(static_cast<std::uint64_t>(k), seen, mean,
+                   flight_->trajectory().at(seconds).omega_body.norm());
 }
 
 }  // namespace swiftlet

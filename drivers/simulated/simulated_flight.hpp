@@ -49,13 +49,15 @@ class SimulatedFlight {
   int image_count_ = 0;
 };
 
-/// Renders a flight's images one after the other: exposure control remembers the last one.
+/// Renders a flight's images one after the other: exposure and gain follow from those before.
 class FlightCameras {
  public:
   /// Paints the world (seconds). The flight must outlive this.
   explicit FlightCameras(const SimulatedFlight& flight);
 
   [[nodiscard]] const TexturedWorld& world() const { return *world_; }
+  /// The newest images' exposure and gain.
+  [[nodiscard]] const ExposureSetting& takenWith() const { return taken_with_; }
   [[nodiscard]] std::size_t cameraCount() const { return renderers_.size(); }
 
   /// Image k of every camera, k rising; `grey[c]` holds width x height bytes. An entry whose camera
@@ -67,7 +69,8 @@ class FlightCameras {
   const SimulatedFlight* flight_;
   std::unique_ptr<TexturedWorld> world_;
   std::vector<CameraRenderer> renderers_;
-  GainControl exposure_;
+  SimulatedExposure exposure_;
+  ExposureSetting taken_with_;  ///< the images of the newest frame
   std::vector<float> radiance_;
 };
 

@@ -13,6 +13,7 @@
 #include "drivers/simulated/image_sensor.hpp"
 #include "drivers/simulated/imu_simulator.hpp"
 #include "drivers/simulated/rig_presets.hpp"
+#include "drivers/simulated/simulated_exposure.hpp"
 #include "drivers/simulated/textured_world.hpp"
 #include "drivers/simulated/track_simulator.hpp"
 #include "drivers/simulated/world.hpp"
@@ -56,7 +57,9 @@ struct SimulationSettings {
   ImuSimulationSettings imu;  ///< noise, biases, vibration; its gaps and saturations come from `faults`
   PaintSettings paint;
   RenderSettings render;   ///< samples, exposure time
-  SensorSettings sensor;   ///< light, noise, vignette, exposure control
+  SensorSettings sensor;   ///< light, noise, vignette, control of the gain
+  ExposureMode exposure_mode = ExposureMode::kGain;
+  std::vector<LightChange> light_changes;  ///< in order of their begin
   bool low_light = false;  ///< a dim room: 5 % of the light, 10 ms exposure
   TrackSettings tracks;    ///< where feature tracks take the images' place
 
