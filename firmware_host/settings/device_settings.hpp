@@ -31,6 +31,7 @@ struct CamerasGroup {
   double rate_hz = 20;
   double exposure_ms = 0;  ///< 0: as the camera has it
   int gain = -1;           ///< below 0: as the camera has it
+  bool exposure_control = false;
   std::string shutter = "global";
   double readout_ms = 0;
 };

@@ -68,6 +68,11 @@ std::vector<Setting> deviceSettings() {
        real(kCameras, &C::exposure_ms, 0, 1000)},
       {"cameras.gain", "", "Gain of the video nodes in the cameras' own units; -1: as they have it.",
        integer(kCameras, &C::gain, -1, 65535)},
+      {"cameras.exposure_control", "",
+       "Adjust exposure and gain of all cameras in flight, as odometry needs it: bounded motion blur, steady "
+       "brightness, one setting for both. exposure_ms and gain are where it begins. If false, they stay, and "
+       "without them the cameras' own automatics act. docs/exposure.md.",
+       onOff(kCameras, &C::exposure_control)},
       {"cameras.shutter", "",
        "Where the calibration does not say it. A rolling shutter's stamp is that of its middle row.",
        ChoiceSetting{member(kCameras, &C::shutter), {"global", kRolling}}},

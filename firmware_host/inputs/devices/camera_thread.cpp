@@ -31,16 +31,26 @@ CameraThread::CameraThread(const Setup& setup, std::unique_ptr<CameraSource> sou
   timing_.readout = Duration::fromSeconds(setup_.settings.readout_ms * kFromMs);
   timing_.rolling = setup_.settings.shutter == kRolling;
   if (setup_.trigger) timing_.trigger_latency = Duration::fromSeconds(setup_.trigger->delay_us * kFromUs);
+  if (setup_.exposure) exposure_.emplace(*setup_.exposure);
+}
+
+DeviceFault CameraThread::openSource() {
+  DeviceFault fault = source_->open();
+  if (!fault.ok() || !exposure_) return fault;
+  fault = exposure_->begin(*source_);
+  if (!fault.ok()) source_->close();
+  return fault;
 }
 
 DeviceFault CameraThread::open() {
-  const DeviceFault fault = source_->open();
+  const DeviceFault fault = openSource();
   if (!fault.ok()) return fault;
   const CameraFacts& facts = source_->facts();
   reader_.reserve(facts.format, facts.width, facts.height, setup_.settings.side_by_side);
   prepared_ = facts;
   // As the camera has taken it.
   if (setup_.settings.exposure_ms > 0) timing_.exposure = facts.exposure.value_or(Duration{});
+  if (exposure_) timing_.exposure = exposure_->asked().exposure;
   if (setup_.trigger) matcher_.emplace(train_, expectedLag(frameEvent(facts.event), timing_));
   return fault;
 }
@@ -52,7 +62,7 @@ SensorInput::Level CameraThread::level() const {
 
 DeviceFault CameraThread::reopen() {
   if (prepared_.width == 0) return open();
-  DeviceFault fault = source_->open();
+  DeviceFault fault = openSource();
   const CameraFacts& facts = source_->facts();
   const bool same =
       facts.format == prepared_.format && facts.width == prepared_.width && facts.height == prepared_.height;
@@ -176,7 +186,16 @@ void CameraThread::take(const CapturedFrame& frame, SensorSink& sink) {
     return;
   }
   newest_ = frame.arrival;
-  if (!watchQuality(images[0], frame.arrival)) return;
+  if (exposure_) timing_.exposure = exposure_->inForce(frame.sequence).exposure;
+  if (watchQuality(images[0], frame.arrival)) handOver(frame, images, sink);
+  if (!exposure_) return;
+  // Also of an image that repeats the one before: one that is white all over does.
+  const DeviceFault fault = exposure_->step(frame.sequence, images[0], frame.arrival, *source_);
+  if (!fault.ok()) journal_.defect(frame.arrival, fault);
+  counted_.asked = exposure_->asked();
+}
+
+void CameraThread::handOver(const CapturedFrame& frame, std::span<const ImageView> images, SensorSink& sink) {
   CameraFrame out;
   out.stamp = middleOfExposure(frame);
   out.arrival = frame.arrival;

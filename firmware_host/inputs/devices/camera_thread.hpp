@@ -19,6 +19,7 @@
 #include "drivers/timesync/trigger_matcher.hpp"
 #include "estimator/core/newest_shared.hpp"
 #include "firmware_host/inputs/devices/edge_message.hpp"
+#include "firmware_host/inputs/devices/exposure_loop.hpp"
 #include "firmware_host/inputs/devices/image_watch.hpp"
 #include "firmware_host/inputs/devices/rate_watch.hpp"
 #include "firmware_host/interfaces/device_journal.hpp"
@@ -30,9 +31,10 @@ namespace swiftlet {
 /// What a camera did so far.
 struct CameraStatus {
   CameraCounters counters;
-  std::uint64_t repeated = 0;    ///< frames that showed what the one before showed; left out
-  std::uint64_t by_trigger = 0;  ///< frames whose stamp is of an edge
-  TimesyncStatus trigger;        ///< where one is connected
+  std::uint64_t repeated = 0;            ///< frames that showed what the one before showed; left out
+  std::uint64_t by_trigger = 0;          ///< frames whose stamp is of an edge
+  TimesyncStatus trigger;                ///< where one is connected
+  std::optional<ExposureSetting> asked;  ///< by exposure control
 };
 
 class CameraThread {
@@ -42,6 +44,7 @@ class CameraThread {
     std::uint32_t first = 0;  ///< the rig's camera that it is; where it gives two, the next is the other
     CamerasGroup settings;
     std::optional<TriggerGroup> trigger;
+    std::optional<ExposureLoop::Setup> exposure;  ///< where it is controlled
   };
 
   CameraThread(const Setup& setup, std::unique_ptr<CameraSource> source);
@@ -71,12 +74,15 @@ class CameraThread {
  private:
   /// In flight. Ok: it gives the images that open() prepared for.
   DeviceFault reopen();
+  /// The source with the control of its exposure, at first and when it is there again.
+  DeviceFault openSource();
   /// Frames that wait from before the flight.
   void discard();
   void takeEdges();
   void takeFrames(SensorSink& sink);
   void publish();
   void take(const CapturedFrame& frame, SensorSink& sink);
+  void handOver(const CapturedFrame& frame, std::span<const ImageView> images, SensorSink& sink);
   /// False: an image that is none.
   bool watchQuality(const ImageView& image, Stamp arrival);
   [[nodiscard]] Stamp middleOfExposure(const CapturedFrame& frame);
@@ -88,7 +94,8 @@ class CameraThread {
   Heartbeat heart_;
   DeviceJournal journal_;
   Duration longest_silence_;
-  ExposureTiming timing_;
+  ExposureTiming timing_;  ///< of the image at hand
+  std::optional<ExposureLoop> exposure_;
   EdgeRing edges_;
   EdgeTrain train_;
   std::optional<TriggerMatcher> matcher_;  ///< where a trigger is connected

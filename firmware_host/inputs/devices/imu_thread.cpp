@@ -2,6 +2,7 @@
 
 #include <poll.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
@@ -19,6 +20,9 @@ constexpr Duration kLongestDelay = Duration::fromMilliseconds(100);
 /// nearer, one has heard of a step; where they stay so for kSettling, the link has changed.
 constexpr Duration kTransportChange = Duration::fromMilliseconds(3);
 constexpr Duration kSettling = Duration::fromMilliseconds(10'000);
+
+/// s: motors shake faster than at 15 Hz, and move the image by little.
+constexpr double kTurnSmoothing = 0.01;
 
 Duration magnitude(Duration d) { return {std::abs(d.ns)}; }
 
@@ -98,8 +102,11 @@ void ImuThread::hand(const ImuReading& reading, SensorSink& sink) {
     ++counted_.refused;
     return;
   }
+  const double step = std::min((sample.stamp - newest_).seconds(), kTurnSmoothing);
   newest_ = sample.stamp;
   sample.gyro = R_body_imu_ * reading.gyro;
+  turning_ += step / kTurnSmoothing * (sample.gyro - turning_);
+  turn_rate_.write({turning_.norm(), reading.arrival});
   sample.accel = R_body_imu_ * reading.accel;
   ++counted_.samples;
   sink.takeImu(sample, reading.arrival, {secondsOf(sample.stamp), wallSeconds()});

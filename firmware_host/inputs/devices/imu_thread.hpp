@@ -14,6 +14,7 @@
 #include "drivers/timesync/clock_map.hpp"
 #include "estimator/core/newest_shared.hpp"
 #include "firmware_host/inputs/devices/edge_message.hpp"
+#include "firmware_host/inputs/devices/exposure_loop.hpp"
 #include "firmware_host/inputs/devices/imu_link.hpp"
 #include "firmware_host/inputs/devices/rate_watch.hpp"
 #include "firmware_host/interfaces/device_journal.hpp"
@@ -50,6 +51,8 @@ class ImuThread {
 
   [[nodiscard]] DeviceJournal& journal() { return journal_; }
   [[nodiscard]] const ImuLink& link() const { return *link_; }
+  /// Any thread: without what vibration adds.
+  [[nodiscard]] const NewestShared<TurnRate>& turnRate() const { return turn_rate_; }
   [[nodiscard]] ImuStatus status() const {
     ImuStatus status;
     static_cast<void>(status_.read(status));
@@ -86,6 +89,8 @@ class ImuThread {
   std::uint64_t refused_ = 0;   ///< likewise
   ImuStatus counted_;
   NewestShared<ImuStatus> status_;
+  Eigen::Vector3d turning_ = Eigen::Vector3d::Zero();  ///< rad/s, smoothed
+  NewestShared<TurnRate> turn_rate_;
 };
 
 }  // namespace swiftlet

@@ -189,6 +189,10 @@ LiveInput::LiveInput(const Settings& settings, const Calibration& calibration) {
     setup.first = static_cast<std::uint32_t>(i);
     setup.settings = cameras;
     if (!settings.trigger.chip.empty()) setup.trigger = settings.trigger;
+    if (cameras.exposure_control) {
+      setup.exposure = {i == 0, rig.camera[i].focal(), Duration::fromSeconds(1 / cameras.rate_hz), &asked_,
+                        &imu_->turnRate()};
+    }
     cameras_.push_back(std::make_unique<CameraThread>(
         setup, makeSource(cameras, origin, halves * rig.camera[i].width(), rig.camera[i].height())));
     edge_rings_.push_back(&cameras_.back()->edges());

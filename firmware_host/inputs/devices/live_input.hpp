@@ -59,6 +59,7 @@ class LiveInput : public SensorInput {
   [[nodiscard]] std::vector<DeviceJournal*> journals();
 
   std::unique_ptr<LinkOutbox> outbox_;
+  SharedExposure asked_;
   std::unique_ptr<ImuThread> imu_;
   std::vector<std::unique_ptr<CameraThread>> cameras_;
   std::unique_ptr<TriggerThread> trigger_;

@@ -57,6 +57,10 @@ Json toJson(const CameraStatus& status) {
   Json json = {{"frames", c.frames},         {"missed", c.missed},           {"damaged", c.damaged},
                {"too_short", c.too_short},   {"stamp_ahead", c.stamp_ahead}, {"reopened", c.reopened},
                {"repeated", status.repeated}};
+  if (status.asked) {
+    json["exposure_ms"] = status.asked->exposure.seconds() * kToMs;
+    json["gain"] = status.asked->gain;
+  }
   if (status.trigger.samples + status.trigger.refused > 0) {
     json["by_trigger"] = status.by_trigger;
     json["trigger"] = toJson(status.trigger);

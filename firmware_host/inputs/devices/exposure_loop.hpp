@@ -1,0 +1,65 @@
+#pragma once
+// Exposure control of one camera in flight (estimator/camera/exposure_control.hpp): meters its images, asks
+// its source, and knows what each image was taken with.
+//
+// Two cameras are set alike: camera 0's loop decides and publishes, camera 1's follows. Where camera 0 has
+// been silent for kLeaderSilence, camera 1 decides by its own images, from the last request on. Threads: each
+// loop on its camera's thread; SharedExposure and the turn rate between them. Memory: none but the object's.
+// Cost of an image: 10 us, and some ms of the camera's bus where the setting changes.
+
+#include <cstdint>
+
+#include "drivers/image/camera_source.hpp"
+#include "estimator/camera/exposure_control.hpp"
+#include "estimator/core/image_view.hpp"
+#include "estimator/core/newest_shared.hpp"
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+/// How fast the vehicle turns, of the IMU's thread.
+struct TurnRate {
+  double rate = 0;  ///< rad/s
+  Stamp arrival;
+};
+
+/// What camera 0 asked for, after each of its images.
+struct AskedExposure {
+  ExposureSetting setting;
+  Stamp arrival;
+};
+using SharedExposure = NewestShared<AskedExposure>;
+
+class ExposureLoop {
+ public:
+  /// Of requests of camera 0, after which camera 1 goes on alone.
+  static constexpr Duration kLeaderSilence = Duration::fromMilliseconds(500);
+
+  struct Setup {
+    bool leads = true;  ///< camera 0
+    double focal = 1;   ///< px
+    Duration period;    ///< of images
+    SharedExposure* asked = nullptr;
+    const NewestShared<TurnRate>* turn_rate = nullptr;
+  };
+  explicit ExposureLoop(const Setup& setup) : setup_(setup) {}
+
+  /// Of a source that was just opened, again after each reopen, which begins with the last request.
+  /// kUnsupported: its exposure cannot be set.
+  DeviceFault begin(CameraSource& source);
+  /// After image `frame`, whose view holds; `now`: of its arrival.
+  DeviceFault step(std::uint64_t frame, const ImageView& image, Stamp now, CameraSource& source);
+
+  /// What image `frame` was taken with.
+  [[nodiscard]] ExposureSetting inForce(std::uint64_t frame) const { return control_.inForce(frame); }
+  [[nodiscard]] const ExposureSetting& asked() const { return control_.asked(); }
+
+ private:
+  [[nodiscard]] double turnRate(Stamp now) const;
+
+  Setup setup_;
+  bool begun_ = false;
+  ExposureControl control_;
+};
+
+}  // namespace swiftlet
