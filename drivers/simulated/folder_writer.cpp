@@ -219,6 +219,14 @@ std::string simulationYaml(const SimulatedFlight& flight) {
       s.given_motion.empty() ? "own" : fs::path(s.given_motion).filename().string(), flight.duration(),
       s.flight.speed, s.flight.aggressiveness, s.flight.rest_at_start, s.render.exposure, s.sensor.light,
       s.imu.vibration.accel_amplitude);
+  static constexpr std::array<const char*, 3> kModes{"gain", "odometry", "fixed"};
+  fmt::format_to(std::back_inserter(text), "exposure_control: {}\n",
+                 kModes[static_cast<std::size_t>(s.exposure_mode)]);
+  text += s.light_changes.empty() ? "light_changes: []\n" : "light_changes:\n";
+  for (const LightChange& change : s.light_changes) {
+    fmt::format_to(std::back_inserter(text), "  - {{begin: {:g}, level: {:g}}}\n", change.begin,
+                   change.level);
+  }
   // The true value of t_imu = t_image + shift, in seconds.
   fmt::format_to(std::back_inserter(text), "timeshift_cam_imu: {:g}\n",
                  flight.trueRig().camera_to_imu_shift.seconds());

@@ -2,6 +2,8 @@
 
 #include <filesystem>
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/track_file.hpp"
@@ -23,6 +25,7 @@ struct SimulateOptions {
   std::vector<double> blackout;
   std::vector<double> camera_missing;
   std::vector<double> imu_gap;
+  std::vector<std::pair<double, double>> light;
   bool tracks = false;
   bool png = false;
 };
@@ -56,6 +59,7 @@ int simulate(const SimulateOptions& options) {
   settings.render.readout = options.readout_ms * 1e-3;
   settings.image_stamp_offset = Duration::fromSeconds(options.stamp_offset_ms * 1e-3);
   settings.format = options.png ? ImageFormat::kPng : ImageFormat::kJpeg;
+  for (const auto& [begin, level] : options.light) settings.light_changes.push_back({begin, level});
   addFault(settings.faults, FaultKind::kBlackout, options.blackout, -1);
   addFault(settings.faults, FaultKind::kCameraMissing, options.camera_missing, 1);
   addFault(settings.faults, FaultKind::kImuGap, options.imu_gap, -1);
@@ -123,6 +127,15 @@ void addSimulateCommand(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_flag("--mono", simulation.mono, "Camera 0 alone");
   command->add_flag("--low-light", simulation.low_light, "A dim room: 5 % of the light, longer exposure");
+  addChoice<ExposureMode>(
+      *command, "--exposure-control", simulation.exposure_mode,
+      "Gain that follows the light at once; the control that flies on vehicles, in the loop; or neither",
+      {{"gain", ExposureMode::kGain},
+       {"odometry", ExposureMode::kOdometry},
+       {"fixed", ExposureMode::kFixed}});
+  command->add_option("--light-change", options->light,
+                      "START LEVEL: from START [s] on the light goes to LEVEL times the flight's first, "
+                      "within 2 s; may be repeated");
   command->add_flag("--png", options->png, "PNG images in place of JPEG");
   command->add_flag("--tracks", options->tracks, "Feature tracks in place of images, depth and labels");
   command

@@ -228,7 +228,7 @@ TEST_CASE("a turn bounds the exposure, and without an IMU a turn is supposed") {
   REQUIRE(camera.open().ok());
   ExposureLoop loop({true, 450, kPeriod, &asked, &turn});
   REQUIRE(loop.begin(camera).ok());
-  camera.light = [](std::uint64_t) { return kRight / 8; };
+  camera.light = [](std::uint64_t) { return kRight / 4; };
   std::uint64_t k = 0;
   const auto exposureAfter = [&](double rate) {
     for (int i = 0; i < 80; ++i, ++k) {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <thread>
+#include <vector>
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/recorded/open_log.hpp"
