@@ -207,9 +207,11 @@ std::int32_t CameraControls::codeOf(double times) const {
 
 std::optional<ExposureAbility> CameraControls::ability() const {
   const std::optional<Duration> now = exposure();
-  if (!now) return std::nullopt;
+  const std::int32_t least = std::max(exposure_span_.least, 1);
+  if (!now || exposure_span_.most < least) return std::nullopt;
   ExposureAbility ability;
-  ability.range.shortest = timeOf(std::max(exposure_span_.least, 1));
+  ability.range.step = step_;
+  ability.range.shortest = timeOf(least);
   ability.range.longest = timeOf(exposure_span_.most);
   ability.now.exposure = *now;
   const std::optional<std::int32_t> code = gain();

@@ -29,7 +29,8 @@ constexpr double kTurnMemory = 1.0;  ///< s: a vehicle that turned will turn aga
 /// ln of the exposure's bound, an image. The brightness stays, but some sensors take a gain an image before
 /// the exposure.
 constexpr double kBoundStep = 0.15;
-constexpr double kPeriodShare = 0.9;  ///< of the period that an exposure may take
+constexpr double kStepRounding = 1e-6;  // a multiple of the step is one
+constexpr double kPeriodShare = 0.9;    ///< of the period that an exposure may take
 
 double lightOf(const ExposureSetting& setting) { return setting.exposure.seconds() * setting.gain; }
 
@@ -70,6 +71,7 @@ ExposureControl::ExposureControl(const ExposureRange& range, double focal, Durat
   range_.longest =
       std::clamp(Duration::fromSeconds(kPeriodShare * period.seconds()), range.shortest, range.longest);
   bound_ = range_.longest.seconds();
+  light_ = std::max(lightOf(start), range_.shortest.seconds());
   requests_.fill({0, start});
 }
 
@@ -91,7 +93,9 @@ ExposureSetting ExposureControl::split(double light) const {
   const double shortest = range_.shortest.seconds();
   const double longest = range_.longest.seconds();
   const auto within = [&](double exposure, double bound) {
-    return std::clamp(exposure, shortest, std::clamp(bound, shortest, longest));
+    const double chosen = std::clamp(exposure, shortest, std::clamp(bound, shortest, longest));
+    if (range_.step <= 0) return chosen;
+    return std::max(shortest, std::floor(chosen / range_.step + kStepRounding) * range_.step);
   };
   double exposure = within(light, bound_);
   const double gain = std::clamp(light / exposure, 1.0, range_.most_gain);
@@ -106,22 +110,27 @@ void ExposureControl::remember(std::uint64_t frame, const ExposureSetting& setti
 
 ExposureSetting ExposureControl::update(std::uint64_t frame, double missing, double turn_rate) {
   moveBound(turn_rate);
-  const double last = lightOf(asked());
   const double off = std::log(missing);
+  const double least = range_.shortest.seconds();
   double step = 0;
   if (std::abs(off) > kDeadband) {
     // The light that this image ought to have had, against what was asked for since.
-    const double wanted = off + std::log(lightOf(inForce(frame)) / last);
-    const double most = std::clamp(kStepShare * std::abs(off), kSmallStep, kLargeStep);
-    step = std::clamp(kDamping * wanted, -most, most);
+    const double wanted = off + std::log(std::max(lightOf(inForce(frame)), least) / light_);
+    const double largest = std::clamp(kStepShare * std::abs(off), kSmallStep, kLargeStep);
+    step = std::clamp(kDamping * wanted, -largest, largest);
   }
-  const ExposureSetting next = split(last * std::exp(step));
+  const double most =
+      std::clamp(bound_ * kDarkBlur / kBlur, least, range_.longest.seconds()) * range_.most_gain;
+  light_ = std::clamp(light_ * std::exp(step), least, most);
+  const ExposureSetting next = split(light_);
   if (next != asked()) remember(frame, next);
   return next;
 }
 
 void ExposureControl::follow(std::uint64_t frame, const ExposureSetting& asked) {
-  if (asked != this->asked()) remember(frame, asked);
+  if (asked == this->asked()) return;
+  remember(frame, asked);
+  light_ = lightOf(asked);
 }
 
 }  // namespace swiftlet

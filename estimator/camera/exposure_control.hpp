@@ -8,6 +8,7 @@
 //   where the gain is at its end too the exposure grows, up to kDarkBlur.
 // - A request acts kActingDelay images later. An image is judged by the setting that it was taken with, and
 //   what was asked for since counts: nothing winds up while requests are on their way.
+// - Exposures are asked for in the camera's own steps, and the gain makes up for the rest.
 // - Steps: none within kDeadband, at most 10 % an image near the target, up to 40 % far from it.
 //
 // Units: gain in times of the sensor's least gain; light is exposure times gain [s].
@@ -37,6 +38,7 @@ struct ExposureRange {
   Duration shortest;
   Duration longest;
   double most_gain = 1;  ///< times the least; 1: the gain cannot be set
+  double step = 0;       ///< s, of which exposures are multiples; 0: any
 };
 
 /// By how much brighter the image ought to be: 2 is twice the light, 1 is right. Within 0.1 and 10.
@@ -85,6 +87,7 @@ class ExposureControl {
   double turn_decay_ = 0;  ///< an image
   double turn_rate_ = kLeastTurnRate;
   double bound_ = 0;  ///< s, exposure at kBlur
+  double light_ = 0;  ///< s, that is wanted; what was asked for is less by a part of a step
   std::size_t count_ = 0;
   std::array<Request, kRemembered> requests_{};
 };

@@ -177,6 +177,31 @@ TEST_CASE("noise does not make it pump") {
   CHECK(changes == 0);
 }
 
+TEST_CASE("coarse steps of the exposure do not make it pump") {
+  // A webcam in the sun: multiples of 100 us, without a gain. And one with a gain, which makes up for it.
+  for (const double most_gain : {1.0, 8.0}) {
+    const ExposureRange coarse{Duration{100'000}, Duration::fromMilliseconds(40), most_gain, 1e-4};
+    const ExposureSetting start{Duration{300'000}, 1};
+    ExposureControl control(coarse, kFocal, kPeriod, start);
+    std::deque<ExposureSetting> waiting(ExposureControl::kActingDelay, start);
+    int changes = 0;
+    double grey = 0;
+    for (std::uint64_t k = 0; k < 200; ++k) {
+      const ExposureSetting in_force = waiting.front();
+      waiting.pop_front();
+      const double light = k < 60 ? 1.0 : 0.55;
+      grey = 102 / 0.00025 * light * in_force.exposure.seconds() * in_force.gain;
+      const ExposureSetting before = control.asked();
+      waiting.push_back(control.update(k, meterImage(flat(static_cast<int>(grey)).view()), kSlowTurn));
+      CHECK(std::abs(waiting.back().exposure.ns % 100'000) == 0);
+      changes += k > 100 && control.asked() != before ? 1 : 0;
+    }
+    INFO("gain up to " << most_gain);
+    CHECK(changes == 0);
+    CHECK(grey == Approx(102).epsilon(most_gain > 1 ? 0.13 : 0.34));
+  }
+}
+
 TEST_CASE("near the target no step is larger than a tenth") {
   const Flown flown = fly(2, 2.0, 200, [](int k) { return kRight * (k < 40 ? 1.0 : 1.35); });
   for (std::size_t k = 41; k < flown.asked.size(); ++k) {

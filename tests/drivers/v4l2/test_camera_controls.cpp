@@ -140,6 +140,7 @@ TEST_CASE("gains of known sensors are in times of their least") {
     REQUIRE(ability);
     CHECK(ability->range.most_gain == Approx(256.0 / 24));
     CHECK(milliseconds(ability->range.longest) == Approx(1759 * 0.0189035).epsilon(1e-5));
+    CHECK(ability->range.step == Approx(18.9035e-6).epsilon(1e-5));
     CHECK(ability->now.gain == 1);
     for (const auto& [times, code] :
          std::map<double, int>{{0.5, 0}, {2, 128}, {3, 170}, {4, 192}, {99, 232}}) {
