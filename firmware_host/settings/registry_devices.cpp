@@ -22,14 +22,11 @@ std::vector<Setting> deviceSettings() {
       {"vehicle.imu_calibration", "", "Kalibr's IMU file where it is not beside the camchain.",
        TextSetting{member(kVehicle, &VehicleGroup::imu_calibration), "a file's name, or empty"}},
       {"imu_link.device", "",
-       "Serial port (best by its name under /dev/serial/by-id) or CAN interface that the IMU is on; of an "
-       "autopilot (mavlink) also udp:HOST:PORT or udp:HOST:PORT@OWN_PORT.",
-       TextSetting{member(kLink, &L::device),
-                   "a port as /dev/ttyUSB0, an interface as can0, udp:127.0.0.1:14580@14540, or empty"}},
+       "Serial port (best by its name under /dev/serial/by-id), CAN interface or an autopilot's UDP port.",
+       TextSetting{member(kLink, &L::device), "/dev/ttyUSB0, can0, udp:127.0.0.1:14580@14540, or empty"}},
       {"imu_link.protocol", "",
        "What the IMU speaks; dronecan is on a CAN interface, the others on a serial port, mavlink also on "
-       "UDP. "
-       "bridge: the project's own framing for microcontrollers, docs/serial.md.",
+       "UDP. bridge: the project's own framing for microcontrollers, docs/serial.md.",
        ChoiceSetting{member(kLink, &L::protocol),
                      {"bridge", "vectornav", "xsens", "mip", "mavlink", "dronecan"}}},
       {"imu_link.baud", "Bd", "Rate of the serial port; means nothing on USB that is no adapter.",
@@ -86,11 +83,8 @@ std::vector<Setting> deviceSettings() {
       {"trigger.delay_us", "us", "From the edge to the begin of exposure.",
        real(kTrigger, &T::delay_us, 0, 100'000)},
       {"autopilot.device", "",
-       "Where the autopilot is told of pose, obstacles and health by MAVLink, docs/mavlink.md: a serial "
-       "port, "
-       "or udp:HOST:PORT (udp:HOST:PORT@OWN_PORT to listen on a port of one's own). The same as "
-       "imu_link.device "
-       "where the autopilot is the IMU: one link for both. Empty: nobody is told.",
+       "Where the autopilot is told of pose, obstacles and health: a serial port, udp:HOST:PORT or "
+       "udp:HOST:PORT@OWN_PORT. The same as imu_link.device where the autopilot is the IMU: one link.",
        TextSetting{member(kAutopilot, &A::device), "a port as /dev/ttyS1, udp:127.0.0.1:14580, or empty"}},
       {"autopilot.baud", "Bd",
        "Rate of the autopilot's serial port; 40 poses a second with obstacles want 230400 at least.",

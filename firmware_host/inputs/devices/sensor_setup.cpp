@@ -88,11 +88,11 @@ bool SensorSetup::ask(LinkPort& port, const ConfigurationStep& step) {
     if (!port.read(std::span(heard_).subspan(count_), count, read_at).ok()) return false;
     count_ += count;
     const auto heard = std::span<const std::uint8_t>(heard_).first(count_);
-    const auto begin = std::ranges::search(heard, step.reply).begin();
+    const auto begin = std::search(heard.begin(), heard.end(), step.reply.begin(), step.reply.end());
     reply_ = static_cast<std::size_t>(begin - heard.begin());
     if (count_ - reply_ >= step.answer_length) return true;
     if (step.refusal.empty() || reply_ < count_) continue;
-    const auto refused = std::ranges::search(heard, step.refusal).begin();
+    const auto refused = std::search(heard.begin(), heard.end(), step.refusal.begin(), step.refusal.end());
     // Where a refusal is told from a reply by its last bytes, these must be there.
     if (static_cast<std::size_t>(heard.end() - refused) < std::max(step.refusal.size(), step.reply.size()))
       continue;
