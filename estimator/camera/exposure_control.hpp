@@ -4,8 +4,7 @@
 // - Metering, on every 8th row: the mean grey goes to kTargetMean, unless more than kSaturatedShare of the
 //   pixels would come near white; then those decide.
 // - Motion blur: the exposure is at most kBlur / (focal turn_rate), so that more light comes from the gain.
-// Only
-//   where the gain is at its end too the exposure grows, up to kDarkBlur.
+//   Only where the gain is at its end too the exposure grows, up to kDarkBlur.
 // - A request acts kActingDelay images later. An image is judged by the setting that it was taken with, and
 //   what was asked for since counts: nothing winds up while requests are on their way.
 // - Exposures are asked for in the camera's own steps, and the gain makes up for the rest.
