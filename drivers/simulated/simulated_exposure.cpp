@@ -46,7 +46,7 @@ void SimulatedExposure::update(std::uint64_t frame, const ImageView& image, doub
     // In a blackout the gain stays: the images that follow are usable at once.
     if (!image.empty() && mean > 0) gain_.update(mean, period_);
   } else if (mode_ == ExposureMode::kOdometry) {
-    std::ranges::rotate(coming_, coming_.begin() + 1);
+    std::rotate(coming_.begin(), coming_.begin() + 1, coming_.end());
     coming_.back() = control_.asked();
     if (!image.empty()) coming_.back() = control_.update(frame, meterImage(image), turn_rate);
   }

@@ -56,7 +56,7 @@ void CameraControls::findLineTime(int width) {
 }
 
 void CameraControls::findGain(std::string_view name) {
-  for (const std::uint32_t id : {V4L2_CID_GAIN, V4L2_CID_ANALOGUE_GAIN}) {
+  for (const std::uint32_t id : std::array<std::uint32_t, 2>{V4L2_CID_GAIN, V4L2_CID_ANALOGUE_GAIN}) {
     const std::optional<Span> span = spanOf(id);
     if (!span) continue;
     gain_id_ = id;

@@ -25,7 +25,8 @@ const T* byId(std::span<const T> all, std::uint32_t id) {
 }
 
 bool isInterfaceLink(const media_v2_link& link) {
-  return (link.flags & MEDIA_LNK_FL_LINK_TYPE) == MEDIA_LNK_FL_INTERFACE_LINK;
+  constexpr auto kType = static_cast<std::uint32_t>(MEDIA_LNK_FL_LINK_TYPE);
+  return (link.flags & kType) == MEDIA_LNK_FL_INTERFACE_LINK;
 }
 
 /// The other end of an interface's link, whichever it is; 0: none.

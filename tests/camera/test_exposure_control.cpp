@@ -115,19 +115,19 @@ TEST_CASE("the meter asks for what is missing to the mean") {
 }
 
 TEST_CASE("lamps may be white, large windows may not") {
-  const auto withWhite = [](double share) {
+  const auto with_white = [](double share) {
     Picture picture = flat(60);
     for (int y = 0; y < kHeight; ++y) {
       std::fill_n(picture.grey.begin() + y * kWidth, std::lround(share * kWidth), std::uint8_t{255});
     }
     return meterImage(picture.view());
   };
-  CHECK(withWhite(0.04) > 1.4);
-  CHECK(withWhite(0.08) < 0.95);
+  CHECK(with_white(0.04) > 1.4);
+  CHECK(with_white(0.08) < 0.95);
   // The more white there is, the farther down: no leap on the way.
-  double last = withWhite(0.08);
+  double last = with_white(0.08);
   for (double share = 0.1; share <= 1.0; share += 0.02) {
-    const double now = withWhite(share);
+    const double now = with_white(share);
     CHECK(now <= last + 1e-9);
     CHECK(now >= last - 0.05);
     last = now;

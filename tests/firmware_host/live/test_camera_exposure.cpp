@@ -230,7 +230,7 @@ TEST_CASE("a turn bounds the exposure, and without an IMU a turn is supposed") {
   REQUIRE(loop.begin(camera).ok());
   camera.light = [](std::uint64_t) { return kRight / 4; };
   std::uint64_t k = 0;
-  const auto exposureAfter = [&](double rate) {
+  const auto exposure_after = [&](double rate) {
     for (int i = 0; i < 80; ++i, ++k) {
       CapturedFrame frame;
       REQUIRE(camera.next(frame).ok());
@@ -239,9 +239,9 @@ TEST_CASE("a turn bounds the exposure, and without an IMU a turn is supposed") {
     }
     return loop.asked().exposure.seconds();
   };
-  CHECK(exposureAfter(3.0) == Approx(ExposureControl::kBlur / (450 * 3.0)).epsilon(0.01));
-  CHECK(exposureAfter(0.5) == Approx(ExposureControl::kBlur / (450 * 0.5)).epsilon(0.01));
-  CHECK(exposureAfter(0) == Approx(ExposureControl::kBlur / (450 * 1.0)).epsilon(0.01));
+  CHECK(exposure_after(3.0) == Approx(ExposureControl::kBlur / (450 * 3.0)).epsilon(0.01));
+  CHECK(exposure_after(0.5) == Approx(ExposureControl::kBlur / (450 * 0.5)).epsilon(0.01));
+  CHECK(exposure_after(0) == Approx(ExposureControl::kBlur / (450 * 1.0)).epsilon(0.01));
 }
 
 }  // namespace swiftlet
