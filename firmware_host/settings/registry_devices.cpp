@@ -48,20 +48,18 @@ std::vector<Setting> deviceSettings() {
       {"cameras.pipeline1", "", "GStreamer pipeline of camera 1 in place of device1.",
        TextSetting{member(kCameras, &C::pipeline1), "a pipeline as \"libcamerasrc\", or empty"}},
       {"cameras.side_by_side", "",
-       "device0 or pipeline0 gives both cameras in one image, camera 0 in its left half (format Y8I: pixel "
-       "beside pixel, "
-       "without this).",
+       "device0 or pipeline0 gives both cameras in one image, camera 0 in its left half. Format Y8I, pixel "
+       "beside pixel, needs no such word.",
        onOff(kCameras, &C::side_by_side)},
       {"cameras.format", "",
        "Pixels that the video nodes are asked for, by V4L2's four letters, docs/v4l2.md; any: the first that "
-       "is "
-       "taken and comes in the calibration's size at rate_hz, MJPG last.",
+       "is taken and comes in the calibration's size at rate_hz, MJPG last.",
        TextSetting{member(kCameras, &C::format), "four letters as GREY or MJPG, or any"}},
       {"cameras.rate_hz", "Hz", "Images per second that each camera is asked for.",
        real(kCameras, &C::rate_hz, 1, 500)},
       {"cameras.exposure_ms", "ms",
        "Exposure that the video nodes are set to, or that pipelines set themselves; 0: not known, and stamps "
-       "are not moved to its middle.",
+       "are not moved to its middle unless exposure_control is on.",
        real(kCameras, &C::exposure_ms, 0, 1000)},
       {"cameras.gain", "", "Gain of the video nodes in the cameras' own units; -1: as they have it.",
        integer(kCameras, &C::gain, -1, 65535)},
