@@ -5,7 +5,8 @@
 #   --minutes N  also sanitizers and fuzzers, each only if it is likely to end within N minutes of the start; what is
 #                left out is listed at the end
 # Sets are CTest labels; docs/building.md says which test is in which.
-# The release build has ROS 2's topics (SWIFTLET_WITH_DDS, off by default) where Cyclone DDS is installed.
+# The release build has ROS 2's topics (SWIFTLET_WITH_DDS, off by default) where Cyclone DDS is installed, and
+# pipelines as cameras (SWIFTLET_WITH_GSTREAMER) where GStreamer is.
 # SWIFTLET_DATA names the folder of recorded logs (default ../shared/data); without logs the tests
 # that need them say so and skip. Ends with a table of steps and a count of tests; exit code 0 when
 # all passed, 1 otherwise.
@@ -19,7 +20,7 @@ case ${1:-} in
   --all) all_sets=yes ;;
   --minutes) minutes=${2:?how many} ;;
   *)
-    sed -n '2,12s/^# \{0,1\}//p' "$0"
+    sed -n '2,13s/^# \{0,1\}//p' "$0"
     exit 2
     ;;
 esac
@@ -145,7 +146,11 @@ step "demo: simulate, replay, evaluate" counted toolchain/demo.sh
 # The demo has built what a user gets by default; this adds a few files to it and links the program again.
 dds=OFF
 if dpkg-query -W -f='${db:Status-Abbrev}' cyclonedds-dev cyclonedds-tools 2>/dev/null | grep -q '^ii.ii'; then dds=ON; fi
-step "configure release" configure release -DSWIFTLET_BUILD_TESTS=ON -DSWIFTLET_WITH_DDS=$dds || close
+# A build tree of before the packages keeps its default.
+gstreamer=OFF
+if pkg-config --exists gstreamer-app-1.0 gstreamer-video-1.0 2>/dev/null; then gstreamer=ON; fi
+step "configure release" configure release -DSWIFTLET_BUILD_TESTS=ON -DSWIFTLET_WITH_DDS=$dds \
+  -DSWIFTLET_WITH_GSTREAMER=$gstreamer || close
 step "build release with tests" build release || close
 step "layout of the sources" counted toolchain/lint.sh format
 # The accuracy table is run by itself, so that it is printed when it passes too.

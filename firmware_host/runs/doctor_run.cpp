@@ -112,6 +112,8 @@ class VehicleCheck {
     const CountingSink::Stream& stream = sink_.camera(index);
     const std::string name = fmt::format("camera {}", index);
     const CameraFacts& facts = camera.facts();
+    const auto& cameras = settings_.cameras;
+    const bool pipeline = !(index == 0 ? cameras.pipeline0 : cameras.pipeline1).empty();
     report.lines.push_back(
         {name + " images",
          fmt::format("{}x{} {}, {}, from {} ({})", facts.width, facts.height, facts.format.fourcc(),
@@ -132,13 +134,15 @@ class VehicleCheck {
              fmt::format("{} taken, {} missed, {} damaged, {} too short", c.frames, c.missed, c.damaged,
                          c.too_short),
              c.missed + c.damaged + c.too_short == 0,
-             "the bus is too slow for these cameras: other USB controllers, shorter cables, or a "
-             "lower rate"));
-    report.lines.push_back(line(name + " stamps", stampEventName(facts.event),
-                                facts.event != StampEvent::kArrival && c.stamp_ahead == 0,
-                                c.stamp_ahead > 0
-                                    ? "the driver stamps frames later than it gives them out"
-                                    : "the time of capture is unknown: connect the trigger line"));
+             pipeline ? "the pipeline, or what feeds it, is too slow: fewer conversions, or a lower rate"
+                      : "the bus is too slow for these cameras: other USB controllers, shorter cables, or a "
+                        "lower rate"));
+    report.lines.push_back(
+        line(name + " stamps", stampEventName(facts.event),
+             facts.event != StampEvent::kArrival && c.stamp_ahead == 0,
+             c.stamp_ahead > 0 ? (pipeline ? "the pipeline gives images before their time: add `clocksync`"
+                                           : "the driver stamps frames later than it gives them out")
+                               : "the time of capture is unknown: connect the trigger line"));
     if (stream.stamps.size() < 2) return;
     constexpr double kMost = 0.99;
     report.lines.push_back(

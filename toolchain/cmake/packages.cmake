@@ -139,6 +139,10 @@ set(CPACK_DEBIAN_PROGRAM_PACKAGE_REPLACES ${other_program_package})
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS adduser)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "systemd, udev")
+if(SWIFTLET_WITH_GSTREAMER)
+  # The sink, and videoconvert.
+  string(APPEND CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS ", gstreamer1.0-plugins-base")
+endif()
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS swiftlet-doc)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_CONTROL_EXTRA
     ${packaging}/debian/postinst ${packaging}/debian/prerm ${packaging}/debian/postrm)
