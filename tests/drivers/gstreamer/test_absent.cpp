@@ -9,7 +9,9 @@ namespace swiftlet {
 namespace {
 
 TEST_CASE("A build without GStreamer says how to get one with it", "[gstreamer]") {
-  PipelineSource source({"videotestsrc", 64, 48});
+  PipelineSettings settings;
+  settings.text = "videotestsrc";
+  PipelineSource source(settings);
   const DeviceFault fault = source.open();
   CHECK(fault.kind == DeviceFaultKind::kUnsupported);
   CHECK_THAT(std::string(fault.text()), Catch::Contains("-DSWIFTLET_WITH_GSTREAMER=ON and build again"));
