@@ -106,8 +106,6 @@ TEST_CASE("one link for IMU and poses costs the IMU's thread no heap call and no
     }
     void takeScene(const SceneImages& /*scene*/) override {}
     void takeImage(const CameraFrame& /*image*/, const HostTimes& /*host*/) override {}
-    void takeImage(const CameraFrame& /*image*/, const HostTimes& /*host*/,
-                   const PixelWriter& /*pixels*/) override {}
   } sink;
   LiveOutlet outlet;
   sink.outlet = &outlet;

@@ -61,8 +61,6 @@ class StateSink : public SensorSink {
   }
   void takeScene(const SceneImages& /*scene*/) override {}
   void takeImage(const CameraFrame& /*image*/, const HostTimes& /*host*/) override {}
-  void takeImage(const CameraFrame& /*image*/, const HostTimes& /*host*/,
-                 const PixelWriter& /*pixels*/) override {}
 
  private:
   double unit_;  ///< of the first acceleration, which numbers the reading
