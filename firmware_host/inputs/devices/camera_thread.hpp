@@ -43,8 +43,8 @@ class CameraThread {
     std::string name;         ///< "camera 0 (/dev/video0)"
     std::uint32_t first = 0;  ///< the rig's camera that it is; where it gives two, the next is the other
     CamerasGroup settings;
-    std::optional<TriggerGroup> trigger;
-    std::optional<ExposureLoop::Setup> exposure;  ///< where it is controlled
+    std::optional<TriggerGroup> trigger = {};
+    std::optional<ExposureLoop::Setup> exposure = {};  ///< where it is controlled
   };
 
   CameraThread(const Setup& setup, std::unique_ptr<CameraSource> source);
