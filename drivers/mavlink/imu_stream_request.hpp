@@ -4,8 +4,8 @@
 // Messages and the clock in, COMMAND_LONG (MAV_CMD_SET_MESSAGE_INTERVAL) out.
 // - Asked when the autopilot's HEARTBEAT is heard first, or again after kGone without one: it forgets at a
 //   restart.
-// - Each second the readings are counted. Below kReached of the rate the same is asked again; still below, 1.25
-//   times as much, up to twice: autopilots leave messages out, and round intervals.
+// - Each second the readings are counted. Below kReached of the rate the same is asked again; still below,
+//   1.25 times as much, up to twice: autopilots leave messages out, and round intervals.
 // - HIGHRES_IMU first. Where three seconds bring none, or one does and the autopilot refused it, RAW_IMU is
 //   asked for, then SCALED_IMU, then HIGHRES_IMU again.
 // Memory: no allocation. Cost: O(1). Source: MAVLink common.xml; docs/mavlink.md.

@@ -56,12 +56,12 @@ struct SimulationSettings {
 
   ImuSimulationSettings imu;  ///< noise, biases, vibration; its gaps and saturations come from `faults`
   PaintSettings paint;
-  RenderSettings render;   ///< samples, exposure time
-  SensorSettings sensor;   ///< light, noise, vignette, control of the gain
+  RenderSettings render;  ///< samples, exposure time
+  SensorSettings sensor;  ///< light, noise, vignette, control of the gain
   ExposureMode exposure_mode = ExposureMode::kGain;
   std::vector<LightChange> light_changes;  ///< in order of their begin
-  bool low_light = false;  ///< a dim room: 5 % of the light, 10 ms exposure
-  TrackSettings tracks;    ///< where feature tracks take the images' place
+  bool low_light = false;                  ///< a dim room: 5 % of the light, 10 ms exposure
+  TrackSettings tracks;                    ///< where feature tracks take the images' place
 
   ImageFormat format = ImageFormat::kJpeg;
   int jpeg_quality = 92;
