@@ -4,6 +4,7 @@
 
 #include "drivers/calibration/input_error.hpp"
 #include "drivers/gstreamer/pipeline_source.hpp"
+#include "drivers/image/pixel_format.hpp"
 #include "drivers/v4l2/camera_device.hpp"
 #include "estimator/core/units.hpp"
 #include "firmware_host/inputs/devices/can_imu_link.hpp"
@@ -125,6 +126,10 @@ void checkOrigins(const CamerasGroup& group) {
 
 void checkCameras(const CamerasGroup& group, const Rig& rig) {
   checkOrigins(group);
+  if (group.format != kAnyFormat && !pixelFormat(group.format)) {
+    failAt("cameras.format", group.format + " is no format that is taken",
+           "docs/v4l2.md lists those that are; `any` takes the first that the camera offers");
+  }
   const bool two_in_one = twoInOne(group);
   const CameraOrigin other = originOf(group, 1);
   const bool second = two_in_one || other.named();

@@ -125,6 +125,16 @@ TEST_CASE("IMU and autopilot share a link where both settings name one port") {
   CHECK_THAT(refusal(settings, stereo()), Catch::Contains("imu_link.device") && Catch::Contains("no port"));
 }
 
+TEST_CASE("a pixel format that is not taken is refused, whatever is connected") {
+  Settings settings = vehicle();
+  for (const char* format : {"MJPEG", "RGB3", "grey"}) {
+    settings.cameras.format = format;
+    CHECK_THAT(refusal(settings, stereo()), Catch::Contains("cameras.format") && Catch::Contains(format));
+  }
+  settings.cameras.format = "MJPG";
+  CHECK(refusal(settings, stereo()).empty());
+}
+
 TEST_CASE("a pipeline stands in for a video node, and never beside one") {
   Settings settings = vehicle();
   settings.cameras.pipeline0 = "videotestsrc";
