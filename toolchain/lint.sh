@@ -44,6 +44,7 @@ if [ "$what" != format ]; then
   echo "lint: clang-tidy on $(echo "$known" | wc -w) files"
   # GCC's own warning options stand in the compile commands; clang need not know them.
   echo "$known" | tr ' ' '\n' | sed '/^$/d' |
-    xargs -P "$(nproc)" -n 1 clang-tidy -p build/lint --quiet --extra-arg=-Wno-unknown-warning-option
+    xargs -P "$(nproc)" -n 1 clang-tidy -p build/lint --quiet --extra-arg=-Wno-unknown-warning-option \
+      --extra-arg=-Wno-unused-command-line-argument
 fi
 echo "lint: clean"

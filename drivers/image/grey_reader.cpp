@@ -73,18 +73,18 @@ ImageView GreyReader::convert(const RawImage& image, std::uint8_t* out) {
 
 void GreyReader::smoothMosaic(const RawImage& image, std::uint8_t* out) {
   const int width = image.width;
-  const auto rowAt = [&](int y) {
+  const auto row_at = [&](int y) {
     return rows_.data() + static_cast<std::ptrdiff_t>(y % kMosaicRows) * width;
   };
   const auto mirrored = [&](int y) {
     return std::clamp(y < 0 ? -y : y >= image.height ? 2 * image.height - 2 - y : y, 0, image.height - 1);
   };
-  unpackRow(image, 0, shift_, rowAt(0));
+  unpackRow(image, 0, shift_, row_at(0));
   for (int y = 0; y < image.height; ++y, out += width) {
-    if (y + 1 < image.height) unpackRow(image, y + 1, shift_, rowAt(y + 1));
-    const std::uint8_t* above = rowAt(mirrored(y - 1));
-    const std::uint8_t* here = rowAt(y);
-    const std::uint8_t* below = rowAt(mirrored(y + 1));
+    if (y + 1 < image.height) unpackRow(image, y + 1, shift_, row_at(y + 1));
+    const std::uint8_t* above = row_at(mirrored(y - 1));
+    const std::uint8_t* here = row_at(y);
+    const std::uint8_t* below = row_at(mirrored(y + 1));
     std::uint16_t* sums = sums_.data() + 1;
     for (int x = 0; x < width; ++x) {
       sums[x] = static_cast<std::uint16_t>(above[x] + 2 * here[x] + below[x]);
