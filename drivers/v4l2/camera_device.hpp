@@ -39,8 +39,6 @@ class CameraDevice : public CameraSource {
     return isOpen() ? controls_.ability() : std::nullopt;
   }
   DeviceFault setExposure(const ExposureSetting& setting) override;
-  /// Asked anew, for automatic exposure; empty where the camera does not say.
-  [[nodiscard]] std::optional<Duration> exposure() const { return controls_.exposure(); }
 
  private:
   void giveBack(std::uint32_t buffer) override;

@@ -209,7 +209,7 @@ TEST_CASE("Gain is set by hand and read back; a clamped one is reported, an expo
   REQUIRE(camera.warnings().size() == 1);
   CHECK(camera.warnings()[0].kind == DeviceFaultKind::kUnsupported);
   CHECK(camera.warnings()[0].text().find("exposure") != std::string::npos);
-  CHECK(!camera.exposure());
+  CHECK(!camera.facts().exposure);
   settings.gain = 5000;
   settings.exposure.reset();
   REQUIRE(camera.open(settings).ok());
