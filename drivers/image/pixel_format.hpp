@@ -19,7 +19,11 @@ enum class PixelLayout : std::uint8_t {
   kPacked10,   ///< 4 pixels in 5 bytes: the upper 8 bits of each, then the lower 2 of all
   kPacked12,   ///< 2 pixels in 3 bytes: the upper 8 bits of each, then the lower 4 of both
   kPairs,      ///< two bytes: the left camera's pixel, the right one's
-  kJpeg,       ///< a compressed picture
+  kRgb,        ///< a byte each of red, green, blue
+  kBgr,
+  kRgbx,  ///< with a fourth byte that is not looked at
+  kBgrx,
+  kJpeg,  ///< a compressed picture
 };
 
 struct PixelFormat {
@@ -39,6 +43,12 @@ struct PixelFormat {
         return (width + 3) / 4 * 5;
       case PixelLayout::kPacked12:
         return (width + 1) / 2 * 3;
+      case PixelLayout::kRgb:
+      case PixelLayout::kBgr:
+        return 3 * width;
+      case PixelLayout::kRgbx:
+      case PixelLayout::kBgrx:
+        return 4 * width;
       case PixelLayout::kJpeg:
         return 0;
       default:
@@ -95,12 +105,18 @@ inline constexpr std::array kPixelFormats = {
     PixelFormat{{"GB16"}, PixelLayout::kWords, 16, true},
     PixelFormat{{"GR16"}, PixelLayout::kWords, 16, true},
     PixelFormat{{"RG16"}, PixelLayout::kWords, 16, true},
+    PixelFormat{{"RGB3"}, PixelLayout::kRgb},
+    PixelFormat{{"BGR3"}, PixelLayout::kBgr},
+    PixelFormat{{"AB24"}, PixelLayout::kRgbx},
+    PixelFormat{{"XB24"}, PixelLayout::kRgbx},
+    PixelFormat{{"AR24"}, PixelLayout::kBgrx},
+    PixelFormat{{"XR24"}, PixelLayout::kBgrx},
     PixelFormat{{"Y8I "}, PixelLayout::kPairs},
     PixelFormat{{"MJPG"}, PixelLayout::kJpeg},
     PixelFormat{{"JPEG"}, PixelLayout::kJpeg},
 };
 
-/// Blanks at the end may be left out. Empty: no format that is taken (RGB3, H264, ...).
+/// Blanks at the end may be left out. Empty: no format that is taken (Z16, H264, ...).
 [[nodiscard]] std::optional<PixelFormat> pixelFormat(std::string_view fourcc);
 
 }  // namespace swiftlet

@@ -34,6 +34,19 @@ void packed(const std::uint8_t* row, int left, int width, std::uint8_t* out) {
   for (; x < end; ++x) *out++ = *in++;
 }
 
+/// Luma by ITU-R BT.601, in 14 bits, rounded half up. Pixels of kBytes bytes, red at kRed of them.
+template <int kBytes, int kRed>
+void colours(const std::uint8_t* in, int width, std::uint8_t* out) {
+  constexpr unsigned kShift = 14;
+  constexpr unsigned kRedWeight = 4899;
+  constexpr unsigned kGreenWeight = 9617;
+  constexpr unsigned kBlueWeight = 1868;
+  for (int x = 0; x < width; ++x, in += kBytes) {
+    const unsigned sum = kRedWeight * in[kRed] + kGreenWeight * in[1] + kBlueWeight * in[2 - kRed];
+    out[x] = static_cast<std::uint8_t>((sum + (1U << (kShift - 1U))) >> kShift);
+  }
+}
+
 }  // namespace
 
 std::array<RawImage, 2> sideBySide(const RawImage& image) {
@@ -64,6 +77,18 @@ void unpackRow(const RawImage& image, int y, unsigned shift, std::uint8_t* out) 
       break;
     case PixelLayout::kPacked12:
       packed<2>(row, left, image.width, out);
+      break;
+    case PixelLayout::kRgb:
+      colours<3, 0>(row + 3 * left, image.width, out);
+      break;
+    case PixelLayout::kBgr:
+      colours<3, 2>(row + 3 * left, image.width, out);
+      break;
+    case PixelLayout::kRgbx:
+      colours<4, 0>(row + 4 * left, image.width, out);
+      break;
+    case PixelLayout::kBgrx:
+      colours<4, 2>(row + 4 * left, image.width, out);
       break;
     case PixelLayout::kPairs:  // GreyReader takes them apart
     case PixelLayout::kJpeg:

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "drivers/calibration/depth_sensor.hpp"
-#include "drivers/recorded/image_decoder.hpp"
+#include "drivers/image/image_decoder.hpp"
 #include "drivers/recorded/image_list.hpp"
 #include "drivers/recorded/log_warnings.hpp"
 #include "estimator/messages/depth_image.hpp"

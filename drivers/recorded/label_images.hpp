@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/recorded/image_decoder.hpp"
+#include "drivers/image/image_decoder.hpp"
 #include "drivers/recorded/image_list.hpp"
 #include "drivers/recorded/log_warnings.hpp"
 #include "estimator/core/image_view.hpp"

@@ -1,6 +1,6 @@
 #include "drivers/recorded/recording_header.hpp"
 
-#include "drivers/recorded/image_decoder.hpp"
+#include "drivers/image/image_decoder.hpp"
 #include "drivers/recorded/recording_format.hpp"
 
 namespace swiftlet {

@@ -50,6 +50,7 @@ class RosBag final : public RecordedLog {
   std::vector<std::uint8_t> body_;
   std::uint64_t zero_stamps_ = 0;
   ImageDecoder decoder_;
+  GreyCopier raw_;
 };
 
 RosBag::RosBag(const std::string& path, const LogOptions& options) : RecordedLog(options), path_(path) {
@@ -204,7 +205,7 @@ RecordedLog::Fetched RosBag::fetch(const ImageEntry& entry, ImageSize expected, 
     fetched.result = decoder_.decode(image.data, expected, out, fetched.found);
   } else {
     fetched.found = image.size;
-    fetched.result = toGrey(image, expected, out);
+    fetched.result = raw_.copy(image, expected, out);
   }
   return fetched;
 }

@@ -2,21 +2,15 @@
 
 #include <bit>
 #include <cstring>
+#include <optional>
 
-#include "drivers/recorded/image_decoder.hpp"
+#include "drivers/image/ros_encoding.hpp"
 #include "drivers/recorded/parse_number.hpp"
 
 namespace swiftlet {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "bodies are copied as they are");
-
-// Luma weights of ITU-R BT.601 in 14 bits, rounding half up.
-constexpr std::uint32_t kRed = 4899;
-constexpr std::uint32_t kGreen = 9617;
-constexpr std::uint32_t kBlue = 1868;
-constexpr std::uint32_t kHalf = 1U << 13U;
-constexpr std::uint32_t kShift = 14;
 
 class ByteReader {
  public:
@@ -63,35 +57,6 @@ class ByteReader {
   std::span<const std::uint8_t> rest_;
 };
 
-struct PixelLayout {
-  std::uint32_t bytes = 0;  ///< a pixel; 0 for an encoding that is not read
-  bool wide = false;        ///< 16-bit grey
-  std::uint32_t red = 0;    ///< channel offsets of colour
-  std::uint32_t blue = 0;
-};
-
-PixelLayout layoutOf(std::string_view encoding) {
-  if (encoding == "mono8" || encoding == "8UC1") return {1, false, 0, 0};
-  if (encoding == "mono16" || encoding == "16UC1") return {2, true, 0, 0};
-  if (encoding == "bgr8" || encoding == "8UC3") return {3, false, 2, 0};
-  if (encoding == "rgb8") return {3, false, 0, 2};
-  if (encoding == "bgra8") return {4, false, 2, 0};
-  if (encoding == "rgba8") return {4, false, 0, 2};
-  return {};
-}
-
-std::uint8_t greyOf(const std::uint8_t* pixel, const PixelLayout& layout, bool big_endian) {
-  if (layout.bytes == 1) return *pixel;
-  if (layout.wide) {
-    const std::uint32_t value = big_endian ? (static_cast<std::uint32_t>(pixel[0]) << 8U) + pixel[1]
-                                           : (static_cast<std::uint32_t>(pixel[1]) << 8U) + pixel[0];
-    // value * 255 / 65535, rounded: as libpng scales 16 bits to 8.
-    return static_cast<std::uint8_t>((value * 255U + 32895U) >> 16U);
-  }
-  const std::uint32_t sum = kRed * pixel[layout.red] + kGreen * pixel[1] + kBlue * pixel[layout.blue] + kHalf;
-  return static_cast<std::uint8_t>(sum >> kShift);
-}
-
 }  // namespace
 
 bool readRosStamp(std::span<const std::uint8_t> body, Stamp& stamp) {
@@ -127,23 +92,29 @@ bool readRosCompressedImage(std::span<const std::uint8_t> body, RosImage& image)
   return reader.readHeader(image.stamp) && reader.readString(image.encoding) && reader.readArray(image.data);
 }
 
-DecodeResult toGrey(const RosImage& image, ImageSize expected, std::uint8_t* out) {
-  const PixelLayout layout = layoutOf(image.encoding);
-  if (layout.bytes == 0) return DecodeResult::kUnknownFormat;
+DecodeResult GreyCopier::copy(const RosImage& image, ImageSize expected, std::uint8_t* out) {
+  const std::optional<PixelFormat> format = rosEncoding(image.encoding, image.big_endian);
+  if (!format) return DecodeResult::kUnknownFormat;
   if (image.size != expected) return DecodeResult::kWrongSize;
   const auto width = static_cast<std::size_t>(expected.width);
   const auto height = static_cast<std::size_t>(expected.height);
-  if (image.step < width * layout.bytes || image.data.size() < image.step * height)
+  const auto row = static_cast<std::size_t>(format->rowBytes(expected.width));
+  if (width == 0 || height == 0 || image.step < row || image.data.size() < image.step * (height - 1) + row)
     return DecodeResult::kDamaged;
-  for (std::size_t y = 0; y < height; ++y) {
-    const std::uint8_t* row = image.data.data() + y * image.step;
-    if (layout.bytes == 1) {
-      std::memcpy(out + y * width, row, width);
-      continue;
-    }
-    for (std::size_t x = 0; x < width; ++x) {
-      out[y * width + x] = greyOf(row + x * layout.bytes, layout, image.big_endian);
-    }
+  if (*format != format_ || expected != size_) {
+    format_ = *format;
+    size_ = expected;
+    reader_.reserve(format_, size_.width, size_.height, false);
+  }
+  RawImage raw;
+  raw.data = image.data.data();
+  raw.width = expected.width;
+  raw.height = expected.height;
+  raw.stride = static_cast<int>(image.step);
+  raw.format = *format;
+  const ImageView grey = reader_.read(raw)[0];
+  for (int y = 0; y < grey.height; ++y) {
+    std::memcpy(out + static_cast<std::size_t>(y) * width, grey.row(y), width);
   }
   return DecodeResult::kOk;
 }

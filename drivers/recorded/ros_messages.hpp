@@ -7,7 +7,8 @@
 #include <span>
 #include <string_view>
 
-#include "drivers/recorded/image_decoder.hpp"
+#include "drivers/image/grey_reader.hpp"
+#include "drivers/image/image_decoder.hpp"
 #include "estimator/messages/imu_sample.hpp"
 
 namespace swiftlet {
@@ -27,8 +28,16 @@ bool readRosCompressedImage(std::span<const std::uint8_t> body, RosImage& image)
 /// Only the stamp of the header any message with one begins with.
 bool readRosStamp(std::span<const std::uint8_t> body, Stamp& stamp);
 
-/// Raw pixels to 8-bit grey, rows packed: mono8, 8UC1, mono16, 16UC1 (scaled), bgr8, rgb8, bgra8, rgba8.
-/// kUnknownFormat for other encodings, kDamaged when the data is too short.
-DecodeResult toGrey(const RosImage& image, ImageSize expected, std::uint8_t* out);
+/// Raw pixels to 8-bit grey, rows packed, of all encodings that rosEncoding() knows.
+class GreyCopier {
+ public:
+  /// kUnknownFormat for other encodings, kDamaged when the data are too short.
+  DecodeResult copy(const RosImage& image, ImageSize expected, std::uint8_t* out);
+
+ private:
+  GreyReader reader_;
+  PixelFormat format_;  ///< what reader_ has memory for, with size_
+  ImageSize size_;
+};
 
 }  // namespace swiftlet

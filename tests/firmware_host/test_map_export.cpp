@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "drivers/calibration/input_error.hpp"
-#include "drivers/recorded/image_decoder.hpp"
+#include "drivers/image/image_decoder.hpp"
 #include "firmware_host/commands/program.hpp"
 #include "firmware_host/lab/modules/map_export_run.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"

@@ -142,7 +142,8 @@ void rosMessage(std::string_view text) {
     return;
   std::vector<std::uint8_t> out(static_cast<std::size_t>(image.size.width) *
                                 static_cast<std::size_t>(image.size.height));
-  (void)toGrey(image, image.size, out.data());
+  GreyCopier copier;
+  (void)copier.copy(image, image.size, out.data());
 }
 
 void ply(std::string_view text) {

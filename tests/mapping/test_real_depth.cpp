@@ -9,7 +9,7 @@
 #include <sstream>
 #include <vector>
 
-#include "drivers/recorded/image_decoder.hpp"
+#include "drivers/image/image_decoder.hpp"
 #include "mapping/surface/surface_stage.hpp"
 #include "mapping/volume/volume_integrator.hpp"
 #include "tests/logs/log_data.hpp"

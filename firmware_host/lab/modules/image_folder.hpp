@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/recorded/image_decoder.hpp"
+#include "drivers/image/image_decoder.hpp"
 #include "estimator/core/image_view.hpp"
 
 namespace swiftlet {

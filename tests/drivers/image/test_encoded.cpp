@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "drivers/image/grey_reader.hpp"
+#include "drivers/image/ros_encoding.hpp"
 #include "tests/drivers/image/ffmpeg.hpp"
 
 namespace swiftlet {
@@ -69,6 +70,42 @@ TEST_CASE("FFmpeg's pixels of every layout become the grey of its own conversion
     std::printf("%s from FFmpeg's %s: at most %d levels\n", pair.fourcc, pair.name, worst);
     CHECK(worst <= 1);
   }
+}
+
+TEST_CASE("FFmpeg's colours of every order become their luma, also by ROS's names", "[image]") {
+  const ffmpeg::Picture picture = ffmpeg::picture(kWidth, kHeight);
+  Bytes expected;
+  for (std::size_t i = 0; i < picture.rgb.size(); i += 3) {
+    const double luma = 0.299 * picture.rgb[i] + 0.587 * picture.rgb[i + 1] + 0.114 * picture.rgb[i + 2];
+    expected.push_back(static_cast<std::uint8_t>(std::lround(luma)));
+  }
+  struct Pair {
+    const char* fourcc;
+    const char* ros;
+    const char* name;
+  };
+  for (const Pair& pair :
+       {Pair{"RGB3", "rgb8", "rgb24"}, Pair{"BGR3", "bgr8", "bgr24"}, Pair{"AB24", "rgba8", "rgba"},
+        Pair{"XB24", nullptr, "rgb0"}, Pair{"AR24", "bgra8", "bgra"}, Pair{"XR24", nullptr, "bgr0"}}) {
+    CHECK(farthest(greyOf(pair.fourcc, ffmpeg::as(picture, pair.name)), expected) <= 1);
+    if (pair.ros != nullptr) CHECK(rosEncoding(pair.ros, false) == pixelFormat(pair.fourcc));
+  }
+}
+
+TEST_CASE("Pixels of 16 bits with the high byte first", "[image]") {
+  const ffmpeg::Picture picture = ffmpeg::picture(kWidth, kHeight);
+  const Bytes bytes = ffmpeg::as(picture, "gray16be");
+  RawImage image;
+  image.format = rosEncoding("mono16", true).value();
+  image.width = kWidth;
+  image.height = kHeight;
+  image.stride = image.format.rowBytes(kWidth);
+  image.data = bytes.data();
+  GreyReader reader;
+  reader.reserve(image.format, kWidth, kHeight, false);
+  const ImageView view = reader.read(image)[0];
+  const Bytes grey(view.row(0), view.row(0) + kWidth * kHeight);
+  CHECK(grey == greyOf("Y16", ffmpeg::as(picture, "gray16le")));
 }
 
 /// Writes bits as they come, the highest of a value first.

@@ -9,6 +9,10 @@
 namespace swiftlet {
 namespace {
 
+int luma(int red, int green, int blue) {
+  return (4899 * red + 9617 * green + 1868 * blue + 8192) / 16384;  // BT.601
+}
+
 /// A frame whose bytes end where the image ends: a read beyond them is seen by sanitizers.
 struct Frame {
   Frame(const PixelFormat& format, int width, int height, int padding, Random& random) {
@@ -45,6 +49,14 @@ struct Frame {
         return row[3 * (x / 2) + x % 2];
       case PixelLayout::kPairs:
         return row[2 * x + camera];
+      case PixelLayout::kRgb:
+        return luma(row[3 * x], row[3 * x + 1], row[3 * x + 2]);
+      case PixelLayout::kBgr:
+        return luma(row[3 * x + 2], row[3 * x + 1], row[3 * x]);
+      case PixelLayout::kRgbx:
+        return luma(row[4 * x], row[4 * x + 1], row[4 * x + 2]);
+      case PixelLayout::kBgrx:
+        return luma(row[4 * x + 2], row[4 * x + 1], row[4 * x]);
       case PixelLayout::kJpeg:
         break;
     }
@@ -145,7 +157,7 @@ TEST_CASE("Formats are known by their four letters, and no others are taken", "[
   for (const PixelFormat& format : kPixelFormats) CHECK(pixelFormat(format.fourcc()) == format);
   CHECK(pixelFormat("Y16")->bits == 16);
   CHECK(pixelFormat("Y8I")->layout == PixelLayout::kPairs);
-  for (const char* other : {"RGB3", "H264", "Z16 ", "", "YU", "GREYS", "grey"}) CHECK(!pixelFormat(other));
+  for (const char* other : {"RGB565", "H264", "Z16 ", "", "YU", "GREYS", "grey"}) CHECK(!pixelFormat(other));
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "drivers/recorded/image_decoder.hpp"
+#include "drivers/image/image_decoder.hpp"
 #include "estimator/core/random.hpp"
 #include "tests/drivers/recorded/asl_fixture.hpp"
 

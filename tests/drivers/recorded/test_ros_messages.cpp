@@ -1,4 +1,3 @@
-#include <cmath>
 #include <cstring>
 
 #include "drivers/recorded/ros_messages.hpp"
@@ -28,9 +27,10 @@ TEST_CASE("raw encodings become grey, with padded rows", "[ros]") {
   const ImageSize size{width, height};
   std::vector<std::uint8_t> out(15);
   RosImage image;
+  GreyCopier copier;
   const auto convert = [&](const std::vector<std::uint8_t>& body) {
     REQUIRE(readRosImage(body, image));
-    return toGrey(image, size, out.data());
+    return copier.copy(image, size, out.data());
   };
   SECTION("mono8") {
     const std::vector<std::uint8_t> grey = test::pattern(width, height, 1);
@@ -52,7 +52,7 @@ TEST_CASE("raw encodings become grey, with padded rows", "[ros]") {
       little.insert(little.end(),
                     {static_cast<std::uint8_t>(value & 255), static_cast<std::uint8_t>(value >> 8)});
       big.insert(big.end(), {static_cast<std::uint8_t>(value >> 8), static_cast<std::uint8_t>(value & 255)});
-      truth.push_back(static_cast<std::uint8_t>(std::lround(value * 255.0 / 65535.0)));
+      truth.push_back(static_cast<std::uint8_t>(value >> 8));
     }
     REQUIRE(convert(test::imageBody({7}, width, height, "mono16", 10, little)) == DecodeResult::kOk);
     CHECK(out == truth);
@@ -69,8 +69,7 @@ TEST_CASE("raw encodings become grey, with padded rows", "[ros]") {
   }
   SECTION("faults") {
     const std::vector<std::uint8_t> grey = test::pattern(width, height, 1);
-    CHECK(convert(test::imageBody({7}, width, height, "bayer_rggb8", 5, grey)) ==
-          DecodeResult::kUnknownFormat);
+    CHECK(convert(test::imageBody({7}, width, height, "32FC1", 20, grey)) == DecodeResult::kUnknownFormat);
     CHECK(convert(test::imageBody({7}, height, width, "mono8", 5, grey)) == DecodeResult::kWrongSize);
     CHECK(convert(test::imageBody({7}, width, height, "mono8", 6, grey)) == DecodeResult::kDamaged);
     CHECK(convert(test::imageBody({7}, width, height, "mono8", 4, grey)) == DecodeResult::kDamaged);

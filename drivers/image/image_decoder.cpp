@@ -1,4 +1,4 @@
-#include "drivers/recorded/image_decoder.hpp"
+#include "drivers/image/image_decoder.hpp"
 
 #include <png.h>
 
