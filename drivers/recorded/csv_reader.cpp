@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <fstream>
 
 #include "drivers/recorded/parse_number.hpp"
 
@@ -28,6 +29,27 @@ std::string quoteInput(std::string_view text) {
   std::string out = "`";
   for (const char c : text.substr(0, kMaxQuoted)) out += (c >= ' ' && c < 127) ? c : '?';
   return out + (text.size() > kMaxQuoted ? "...`" : "`");
+}
+
+CsvReader::Separator CsvReader::separatorOfText(std::string_view text) {
+  constexpr std::size_t kProbedBytes = 4096;
+  text = text.substr(0, kProbedBytes);
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::string_view line = text.substr(0, end);
+    const std::size_t first = line.find_first_not_of(" \t\r\xEF\xBB\xBF");
+    const bool data = first != std::string_view::npos && line[first] >= '+' && line[first] <= '9';
+    if (data) return line.find(',') == std::string_view::npos ? Separator::kBlank : Separator::kComma;
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return Separator::kBlank;
+}
+
+CsvReader::Separator CsvReader::separatorOf(const std::string& path) {
+  std::array<char, kMaxLine> head{};
+  std::ifstream probe(path, std::ios::binary);
+  probe.read(head.data(), head.size());
+  return separatorOfText({head.data(), static_cast<std::size_t>(probe.gcount())});
 }
 
 CsvReader::CsvReader(const std::string& path, Separator separator, LogCounters& counters,

@@ -31,6 +31,10 @@ class CsvReader {
 
   enum class Separator { kComma, kBlank };
 
+  /// kComma where the first line of data has a comma.
+  static Separator separatorOf(const std::string& path);
+  static Separator separatorOfText(std::string_view text);
+
   /// Opens `path`; InputError when that is impossible.
   CsvReader(const std::string& path, Separator separator, LogCounters& counters, LogWarnings& warnings);
   /// Reads text in memory, which must outlive the reader. `name` stands for the file in messages.

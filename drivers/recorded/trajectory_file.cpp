@@ -6,7 +6,6 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 
 #include "drivers/recorded/csv_reader.hpp"
 #include "drivers/recorded/order_by_stamp.hpp"
@@ -19,7 +18,6 @@ constexpr double kQuaternionTolerance = 1e-3;
 constexpr double kSecondsBelow = 1e11;
 constexpr double kNanosecondsAbove = 1e14;
 constexpr std::size_t kMotionColumns = 17;
-constexpr std::size_t kProbedBytes = 4096;
 
 constexpr std::array<const char*, 7> kTumNames = {"tx", "ty", "tz", "qx", "qy", "qz", "qw"};
 constexpr std::array<const char*, 7> kCsvNames = {"px", "py", "pz", "qw", "qx", "qy", "qz"};
@@ -78,19 +76,6 @@ bool readCsvRow(CsvReader& csv, TrajectoryPoint& point) {
   return true;
 }
 
-/// A data line with a comma is csv.
-bool looksLikeCsv(std::string_view text) {
-  while (!text.empty()) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    const std::string_view line = text.substr(0, end);
-    const std::size_t first = line.find_first_not_of(" \t\r\xEF\xBB\xBF");
-    const bool data = first != std::string_view::npos && line[first] >= '+' && line[first] <= '9';
-    if (data) return line.find(',') != std::string_view::npos;
-    text.remove_prefix(std::min(end + 1, text.size()));
-  }
-  return false;
-}
-
 Trajectory readRows(CsvReader& csv, bool is_csv, LogCounters& counters, LogWarnings& warnings) {
   Trajectory trajectory;
   StampUnit unit = StampUnit::kUnknown;
@@ -98,24 +83,19 @@ Trajectory readRows(CsvReader& csv, bool is_csv, LogCounters& counters, LogWarni
     TrajectoryPoint point;
     if (is_csv ? readCsvRow(csv, point) : readTumRow(csv, unit, point)) trajectory.push_back(point);
   }
-  csv.finish("poses", "A row is `t tx ty tz qx qy qz qw` (TUM) or `ns, p xyz, q wxyz` (EuRoC csv)");
+  csv.finish("poses",
+             "A row is `t tx ty tz qx qy qz qw` (TUM) or `ns, p xyz, q wxyz` (EuRoC csv); positions alone "
+             "are for `swiftlet evaluate --truth`");
   orderByStamp(trajectory, csv.name(), counters, warnings);
   return trajectory;
-}
-
-CsvReader::Separator separatorFor(bool is_csv) {
-  return is_csv ? CsvReader::Separator::kComma : CsvReader::Separator::kBlank;
 }
 
 }  // namespace
 
 Trajectory readTrajectory(const std::string& path, LogCounters& counters, LogWarnings& warnings) {
-  std::array<char, kProbedBytes> head{};
-  std::ifstream probe(path, std::ios::binary);
-  probe.read(head.data(), head.size());
-  const bool is_csv = looksLikeCsv({head.data(), static_cast<std::size_t>(probe.gcount())});
-  CsvReader csv(path, separatorFor(is_csv), counters, warnings);
-  return readRows(csv, is_csv, counters, warnings);
+  const CsvReader::Separator separator = CsvReader::separatorOf(path);
+  CsvReader csv(path, separator, counters, warnings);
+  return readRows(csv, separator == CsvReader::Separator::kComma, counters, warnings);
 }
 
 Trajectory readWholeTrajectory(const std::string& path, const std::string& remedy) {
@@ -142,9 +122,9 @@ Trajectory readWholeTrajectory(const std::string& path, const std::string& remed
 
 Trajectory readTrajectoryText(const std::string& name, std::string_view text, LogCounters& counters,
                               LogWarnings& warnings) {
-  const bool is_csv = looksLikeCsv(text.substr(0, kProbedBytes));
-  CsvReader csv(name, text, separatorFor(is_csv), counters, warnings);
-  return readRows(csv, is_csv, counters, warnings);
+  const CsvReader::Separator separator = CsvReader::separatorOfText(text);
+  CsvReader csv(name, text, separator, counters, warnings);
+  return readRows(csv, separator == CsvReader::Separator::kComma, counters, warnings);
 }
 
 std::string formatSeconds(Stamp stamp) {

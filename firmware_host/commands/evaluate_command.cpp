@@ -27,6 +27,7 @@ struct EvaluateOptions {
   AlignKind align = AlignKind::kSe3;
   double from = 0;
   double until = -1;
+  double fit_shift = 0;  ///< s; 0: none is fitted
   bool json = false;
   bool mesh = false;
   std::string truth_mesh;
@@ -143,10 +144,55 @@ int evaluateHil(const EvaluateOptions& options) {
   return verdict.passed() ? kExitDone : kExitFailed;
 }
 
+/// Poses before and after are left out.
+void setSection(const EvaluateOptions& options, Stamp zero, AccuracyOptions& accuracy) {
+  if (options.from > 0) accuracy.association.from = zero + Duration::fromSeconds(options.from);
+  if (options.until >= 0) accuracy.association.until = zero + Duration::fromSeconds(options.until);
+}
+
+std::string titleOf(const EvaluateOptions& options, const std::string& file) {
+  return options.from > 0 ? fmt::format("{}, from {:g} s", file, options.from) : file;
+}
+
+int evaluatePositions(const EvaluateOptions& options, const Settings& settings, const Subject& subject) {
+  LogCounters counters;
+  LogWarnings warnings;
+  const std::vector<PositionPoint> truth = readPositions(subject.truth, counters, warnings);
+  for (const std::string& line : warnings.lines()) fmt::print(stderr, "warning: {}\n", line);
+  PositionAccuracyOptions how{accuracyOptions(settings.evaluation, options.align), std::nullopt};
+  if (options.fit_shift > 0) how.reach = Duration::fromSeconds(options.fit_shift);
+  Json json;
+  json["truth"] = subject.truth;
+  if (!options.json) fmt::print("truth: {}, positions alone\n", subject.truth);
+  bool compared = true;
+  for (const std::string& file : subject.files) {
+    const Trajectory estimate = readEstimate(file);
+    setSection(options, subject.first_image.value_or(estimate.front().stamp), how.accuracy);
+    const PositionAccuracy accuracy = positionAccuracy(estimate, truth, how);
+    compared = compared && accuracy.pairs > 0;
+    json[std::filesystem::path(file).filename().string()] = toJson(accuracy);
+    if (!options.json) fmt::print("{}", toText(titleOf(options, file), accuracy));
+  }
+  if (options.json) fmt::print("{}\n", json.dump(2));
+  if (!compared) {
+    fmt::print(stderr,
+               "error: no position of the truth has an estimate at its stamp: is its clock another? "
+               "--fit-shift S tries shifts up to S seconds\n");
+  }
+  return compared ? kExitDone : kExitFailed;
+}
+
 int evaluate(const EvaluateOptions& options) {
   if (!options.hil.empty()) return evaluateHil(options);
   const Settings settings = options.settings.read();
   const Subject subject = subjectOf(options);
+  if (std::filesystem::is_regular_file(subject.truth) && isPositionFile(subject.truth)) {
+    return evaluatePositions(options, settings, subject);
+  }
+  if (options.fit_shift > 0) {
+    throw InputError(subject.truth, 0, "--fit-shift", "is for a truth of positions without attitude",
+                     "Leave it out: poses need stamps of the log's clock");
+  }
   const Truth truth = readTruth(subject.truth, subject.from_tracks);
   AccuracyOptions accuracy_options = accuracyOptions(settings.evaluation, options.align);
   Json json;
@@ -159,13 +205,11 @@ int evaluate(const EvaluateOptions& options) {
     const Stamp zero = subject.first_image ? *subject.first_image
                        : truth.first_image ? *truth.first_image
                                            : estimate.front().stamp;
-    if (options.from > 0) accuracy_options.association.from = zero + Duration::fromSeconds(options.from);
-    if (options.until >= 0) accuracy_options.association.until = zero + Duration::fromSeconds(options.until);
+    setSection(options, zero, accuracy_options);
     const Accuracy accuracy = accuracyOf(estimate, truth.poses, accuracy_options);
     compared = compared && accuracy.pairs > 0;
     json[std::filesystem::path(file).filename().string()] = toJson(accuracy);
-    const std::string section = options.from > 0 ? fmt::format(", from {:g} s", options.from) : "";
-    if (!options.json) fmt::print("{}", toText(file + section, accuracy));
+    if (!options.json) fmt::print("{}", toText(titleOf(options, file), accuracy));
   }
   if (compared) compareMap(options, subject, truth, accuracy_options, settings.evaluation, json);
   if (!subject.states.empty()) {
@@ -195,8 +239,15 @@ void addEvaluateCommand(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("evaluate", "Compare a run or a trajectory file with the truth");
   auto options = std::make_shared<EvaluateOptions>();
   command->add_option("RUN", options->run, "Run folder, or a trajectory (TUM, EuRoC csv)")->required();
-  command->add_option("--truth", options->truth,
-                      "Log or trajectory file with the truth; default: the log the run was made from");
+  command->add_option(
+      "--truth", options->truth,
+      "Log, trajectory file or positions (t, x, y, z) with the truth; default: the log the run "
+      "was made from");
+  command
+      ->add_option(
+          "--fit-shift", options->fit_shift,
+          "Of positions, whose clock is another: fit a shift of their stamps, up to this many seconds")
+      ->check(nonNegative());
   addChoice<AlignKind>(*command, "--align", options->align,
                        "How to align: sim3 with scale, yaw with translation",
                        {{"se3", AlignKind::kSe3}, {"sim3", AlignKind::kSim3}, {"yaw", AlignKind::kYaw}});
@@ -222,6 +273,7 @@ void addEvaluateCommand(CLI::App& app, int& exit_code) {
   command->footer(
       "Example:\n  swiftlet evaluate run_mh01 --from 3\n  swiftlet evaluate run_room --mesh\n"
       "  swiftlet evaluate flight --hil hil --junit flight.xml\n"
+      "  swiftlet evaluate run_field --truth gnss.csv --align yaw --fit-shift 5\n"
       "  swiftlet evaluate trajectory.tum --truth data/euroc_mh01_20s --align yaw");
   command->callback([options, &exit_code] { exit_code = evaluate(*options); });
 }

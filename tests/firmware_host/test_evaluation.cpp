@@ -12,6 +12,7 @@
 #include "firmware_host/lab/evaluation/common_stamps.hpp"
 #include "firmware_host/lab/evaluation/consistency.hpp"
 #include "firmware_host/lab/evaluation/loop_accuracy.hpp"
+#include "firmware_host/lab/evaluation/position_accuracy.hpp"
 #include "firmware_host/lab/evaluation/revisits.hpp"
 #include "firmware_host/outputs/run_folder/loops_csv.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
@@ -378,6 +379,34 @@ TEST_CASE("loops are judged by the truth at both ends, and survive their file") 
   CHECK(accuracy.without_truth == 1);
   CHECK(accuracy.median_distance == Approx(0.05).margin(1e-6));
   CHECK(accuracy.median_degrees == Approx(0.573).margin(1e-3));
+}
+
+TEST_CASE("positions of another clock: the shift and the error that is left", "[evaluation]") {
+  const Trajectory estimate = flight(20);
+  const SE3 T_truth_world(yaw(0.7), {100, -50, 3});
+  std::vector<PositionPoint> truth;
+  Random random(3, 0);
+  constexpr double kSigma = 0.05;
+  for (double t = 1; t < 19; t += 0.27) {
+    const std::optional<SE3> pose = interpolate(estimate, at(t), Duration::fromMilliseconds(60));
+    const Eigen::Vector3d noise(random.normal(), random.normal(), random.normal());
+    truth.push_back({at(t - 2.345), T_truth_world * pose->translation + kSigma * noise});
+  }
+  PositionAccuracyOptions options;
+  options.accuracy.align = AlignKind::kYaw;
+  // As they are: the clocks are far apart, and so are the places.
+  const PositionAccuracy before = positionAccuracy(estimate, truth, options);
+  CHECK(before.shift.ns == 0);
+  CHECK(before.absolute.translation.rmse > 10 * kSigma);
+  options.reach = Duration::fromSeconds(5);
+  const PositionAccuracy found = positionAccuracy(estimate, truth, options);
+  CHECK(found.shift.seconds() == Approx(2.345).margin(0.02));
+  CHECK(found.pairs == truth.size());
+  CHECK(found.absolute.translation.rmse == Approx(std::sqrt(3.0) * kSigma).epsilon(0.15));
+  CHECK(found.absolute.rotation.count == 0);
+  // No shift fits when none is near enough.
+  options.reach = Duration::fromSeconds(0.5);
+  CHECK(positionAccuracy(estimate, truth, options).absolute.translation.rmse > 10 * kSigma);
 }
 
 }  // namespace

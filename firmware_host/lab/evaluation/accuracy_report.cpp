@@ -12,6 +12,18 @@ Json statisticsJson(const ErrorStatistics& s) {
           {"min", s.min},   {"max", s.max},   {"sse", s.sse},       {"count", s.count}};
 }
 
+std::string absoluteText(const TrajectoryError& absolute) {
+  std::string text = fmt::format(
+      "  ATE ({} alignment)  rmse {:.4f} m  mean {:.4f}  median {:.4f}  max {:.4f}  per axis {:.4f} {:.4f} "
+      "{:.4f}\n",
+      alignName(absolute.kind), absolute.translation.rmse, absolute.translation.mean,
+      absolute.translation.median, absolute.translation.max, absolute.axis_rmse.x(), absolute.axis_rmse.y(),
+      absolute.axis_rmse.z());
+  if (!absolute.status.ok()) text += fmt::format("  note: {}\n", absolute.status.what);
+  if (absolute.kind == AlignKind::kSim3) text += fmt::format("  scale {:.5f}\n", absolute.alignment.scale);
+  return text;
+}
+
 }  // namespace
 
 Json toJson(const Accuracy& accuracy) {
@@ -100,14 +112,7 @@ std::string toText(const std::string& title, const Accuracy& accuracy) {
                                  accuracy.estimates, accuracy.max_gap.seconds() * 1e3);
   if (accuracy.pairs == 0) return text + ": nothing to compare\n";
   text += fmt::format(", {:.1f} s, {:.1f} m\n", accuracy.duration, absolute.path_length);
-  text += fmt::format(
-      "  ATE ({} alignment)  rmse {:.4f} m  mean {:.4f}  median {:.4f}  max {:.4f}  per axis {:.4f} {:.4f} "
-      "{:.4f}\n",
-      alignName(absolute.kind), absolute.translation.rmse, absolute.translation.mean,
-      absolute.translation.median, absolute.translation.max, absolute.axis_rmse.x(), absolute.axis_rmse.y(),
-      absolute.axis_rmse.z());
-  if (!absolute.status.ok()) text += fmt::format("  note: {}\n", absolute.status.what);
-  if (absolute.kind == AlignKind::kSim3) text += fmt::format("  scale {:.5f}\n", absolute.alignment.scale);
+  text += absoluteText(absolute);
   text +=
       fmt::format("  rotation  rmse {:.3f} deg  max {:.3f}; tilt, as it is  rmse {:.3f} deg  max {:.3f}\n",
                   absolute.rotation.rmse, absolute.rotation.max, absolute.tilt.rmse, absolute.tilt.max);
@@ -119,6 +124,32 @@ std::string toText(const std::string& title, const Accuracy& accuracy) {
                         error.translation.mean, error.rotation.mean, error.translation.count);
   }
   return text;
+}
+
+Json toJson(const PositionAccuracy& accuracy) {
+  const TrajectoryError& absolute = accuracy.absolute;
+  Json json;
+  json["align"] = alignName(absolute.kind);
+  json["positions"] = accuracy.positions;
+  json["pairs"] = accuracy.pairs;
+  json["shift_s"] = accuracy.shift.seconds();
+  json["duration_s"] = accuracy.duration;
+  json["path_m"] = absolute.path_length;
+  if (!absolute.status.ok()) json["note"] = absolute.status.what;
+  if (accuracy.pairs == 0) return json;
+  json["ate_m"] = statisticsJson(absolute.translation);
+  json["ate_axis_rmse_m"] = {absolute.axis_rmse.x(), absolute.axis_rmse.y(), absolute.axis_rmse.z()};
+  json["scale"] = absolute.alignment.scale;
+  return json;
+}
+
+std::string toText(const std::string& title, const PositionAccuracy& accuracy) {
+  std::string text =
+      fmt::format("{}: {} of {} positions have an estimate", title, accuracy.pairs, accuracy.positions);
+  if (accuracy.shift.ns != 0) text += fmt::format(", shifted by {:+.3f} s", accuracy.shift.seconds());
+  if (accuracy.pairs == 0) return text + ": nothing to compare\n";
+  text += fmt::format(", {:.1f} s, {:.1f} m\n", accuracy.duration, accuracy.absolute.path_length);
+  return text + absoluteText(accuracy.absolute);
 }
 
 std::string toText(const Consistency& consistency) {

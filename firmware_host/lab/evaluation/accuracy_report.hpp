@@ -9,6 +9,7 @@
 #include "firmware_host/lab/evaluation/common_stamps.hpp"
 #include "firmware_host/lab/evaluation/consistency.hpp"
 #include "firmware_host/lab/evaluation/loop_accuracy.hpp"
+#include "firmware_host/lab/evaluation/position_accuracy.hpp"
 #include "firmware_host/lab/evaluation/revisits.hpp"
 
 namespace swiftlet {
@@ -19,9 +20,11 @@ nlohmann::ordered_json toJson(const Consistency& consistency);
 nlohmann::ordered_json toJson(const CommonStamps& map_beside_odometry);
 nlohmann::ordered_json toJson(const Revisits& revisits);
 nlohmann::ordered_json toJson(const LoopAccuracy& loops);
+nlohmann::ordered_json toJson(const PositionAccuracy& accuracy);
 
 /// `title`: which section and file, "odometry.tum, from 3 s".
 std::string toText(const std::string& title, const Accuracy& accuracy);
+std::string toText(const std::string& title, const PositionAccuracy& accuracy);
 std::string toText(const Consistency& consistency);
 std::string toText(const CommonStamps& map_beside_odometry);
 std::string toText(const Revisits& revisits);
