@@ -27,6 +27,7 @@ void addFlyCommand(CLI::App& app, int& exit_code);
 void addRecordCommand(CLI::App& app, int& exit_code);
 void addDoctorCommand(CLI::App& app, int& exit_code);
 void addHilCommand(CLI::App& app, int& exit_code);
+void addImportCommand(CLI::App& app, int& exit_code);
 void addMeshCommand(CLI::App& app, int& exit_code);
 void addFuseCommand(CLI::App& app, int& exit_code);
 void addMapCommand(CLI::App& app, int& exit_code);

@@ -7,6 +7,7 @@ namespace swiftlet {
 
 void addLabCommands(CLI::App& app, int& exit_code) {
   addSimulateCommand(app, exit_code);
+  addImportCommand(app, exit_code);
   addHilCommand(app, exit_code);
   addEvaluateCommand(app, exit_code);
   addExportCommand(app, exit_code);

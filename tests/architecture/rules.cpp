@@ -76,8 +76,9 @@ RoomTable programNeighbours() {
       {"lab/budget", {"lab/evaluation", "runs"}},
       {"lab/report", {"lab/evaluation", "outputs/page"}},
       {"lab/export", {"lab/evaluation", "outputs/ros2"}},
+      {"lab/import", {"files", "interfaces"}},
       {"lab/hil", {"inputs/devices", "lab/budget"}},
-      {"commands", {"lab/export", "lab/hil", "lab/modules", "lab/report", "runs"}},
+      {"commands", {"lab/export", "lab/hil", "lab/import", "lab/modules", "lab/report", "runs"}},
   };
 }
 

@@ -16,6 +16,8 @@
 #include "drivers/recorded/track_file.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
 #include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
+#include "firmware_host/lab/import/gpmf.hpp"
+#include "firmware_host/lab/import/motion_of_video.hpp"
 #include "firmware_host/lab/modules/g2o_file.hpp"
 #include "firmware_host/outputs/map_files/kept_graph_file.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"
@@ -144,6 +146,23 @@ void rosMessage(std::string_view text) {
                                 static_cast<std::size_t>(image.size.height));
   GreyCopier copier;
   (void)copier.copy(image, image.size, out.data());
+}
+
+void gpmf(std::string_view text) {
+  const auto payload = readGpmf({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  if (!payload) return;
+  for (const GpmfChannel* channel : {&payload->accel, &payload->gyro}) {
+    for (const Eigen::Vector3d& value : channel->values) demand(value.allFinite());
+  }
+}
+
+void phoneLog(std::string_view text) {
+  try {
+    const PhoneLog log = readPhoneLog("data.jsonl", text);
+    demand(!log.samples.empty());
+    for (const ImuSample& sample : log.samples) demand(sample.gyro.allFinite() && sample.accel.allFinite());
+  } catch (const InputError&) {
+  }
 }
 
 void ply(std::string_view text) {
@@ -295,7 +314,7 @@ void keptMap(std::string_view text) {
   }
 }
 
-constexpr std::array<NamedTarget, 24> kTargets = {{{"imu_csv", &imuCsv},
+constexpr std::array<NamedTarget, 26> kTargets = {{{"imu_csv", &imuCsv},
                                                    {"image_csv", &imageCsv},
                                                    {"trajectory", &trajectory},
                                                    {"tracks", &tracks},
@@ -303,6 +322,8 @@ constexpr std::array<NamedTarget, 24> kTargets = {{{"imu_csv", &imuCsv},
                                                    {"kalibr_yaml", &kalibrYaml},
                                                    {"ros_message", &rosMessage},
                                                    {"recording", &recording},
+                                                   {"gpmf", &gpmf},
+                                                   {"phone_log", &phoneLog},
                                                    {"g2o", &g2o},
                                                    {"ply", &ply},
                                                    {"vocabulary", &vocabulary},

@@ -1,0 +1,169 @@
+#include "firmware_host/lab/import/motion_of_video.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "drivers/calibration/input_error.hpp"
+#include "firmware_host/lab/import/gpmf.hpp"
+
+namespace swiftlet {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr const char* kPhoneRemedy =
+    "A line is {\"time\": s, \"sensor\": {\"type\": \"gyroscope\", \"values\": [x, y, z]}}";
+constexpr Duration kLongestGap = Duration::fromMilliseconds(100);  // between two samples of an accelerometer
+
+/// Times of samples from how many there were at certain times.
+///
+/// The rate is that of the line of least squares. Counts grow in steps, since a sensor's samples come in
+/// batches, so that line runs late by half a batch on average; but none is counted before it was measured. So
+/// the line is moved to where it reaches each count by its time.
+class CountLine {
+ public:
+  void add(double count, double seconds) { points_.emplace_back(count, seconds); }
+  /// False: too few counts for a line.
+  bool fit() {
+    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+    for (const Eigen::Vector2d& point : points_) mean += point / static_cast<double>(points_.size());
+    Eigen::Vector2d sums = Eigen::Vector2d::Zero();
+    for (const Eigen::Vector2d& point : points_) sums += (point.x() - mean.x()) * (point - mean);
+    if (!(sums.x() > 0)) return false;
+    period_ = sums.y() / sums.x();
+    begin_ = std::numeric_limits<double>::infinity();
+    for (const Eigen::Vector2d& point : points_) begin_ = std::min(begin_, point.y() - period_ * point.x());
+    return period_ > 0;
+  }
+  /// Of the sample with this number [s].
+  [[nodiscard]] double at(double number) const { return begin_ + period_ * number; }
+
+ private:
+  std::vector<Eigen::Vector2d> points_;  ///< count, s
+  double period_ = 0;
+  double begin_ = 0;
+};
+
+std::vector<StampedVector> dated(const std::string& name, const std::vector<MetadataPacket>& packets,
+                                 const std::vector<GpmfPayload>& payloads, GpmfChannel GpmfPayload::*which,
+                                 const char* what, Stamp zero) {
+  CountLine line;
+  std::vector<std::pair<double, Eigen::Vector3d>> counted;
+  double count = 0;
+  for (std::size_t i = 0; i < payloads.size(); ++i) {
+    const GpmfChannel& channel = payloads[i].*which;
+    // Counts go on from a payload before the file's first where it was cut out of a longer recording.
+    if (channel.counted) count = std::max(count, static_cast<double>(channel.before));
+    line.add(count, packets[i].begin.seconds());
+    for (const Eigen::Vector3d& value : channel.values) counted.emplace_back(count++, value);
+    // The last of several is shorter than it says: the recording ended within it.
+    if (payloads.size() == 1) line.add(count, (packets[i].begin + packets[i].length).seconds());
+  }
+  if (counted.empty() || !line.fit()) {
+    throw InputError(name, 0, "", fmt::format("its metadata hold no {}", what),
+                     "Give the IMU's samples in a csv file: `swiftlet import VIDEO IMU.csv`");
+  }
+  std::vector<StampedVector> samples;
+  for (const auto& [n, value] : counted) samples.push_back({zero + Duration::fromSeconds(line.at(n)), value});
+  return samples;
+}
+
+/// Empty: no time that a stamp can hold.
+std::optional<Stamp> stampOf(const Json& json) {
+  constexpr double kLatest = 9e9;  // s
+  const double time = json.at("time").get<double>();
+  if (!(std::abs(time) < kLatest)) return std::nullopt;
+  return Stamp{Duration::fromSeconds(time).ns};
+}
+
+}  // namespace
+
+std::vector<ImuSample> joinImu(const std::vector<StampedVector>& gyro,
+                               const std::vector<StampedVector>& accel) {
+  std::vector<ImuSample> samples;
+  for (const StampedVector& turn : gyro) {
+    const auto after = std::ranges::lower_bound(accel, turn.stamp, {}, &StampedVector::stamp);
+    if (after == accel.end()) break;
+    ImuSample sample;
+    sample.stamp = turn.stamp;
+    sample.gyro = turn.value;
+    sample.accel = after->value;
+    if (after->stamp != turn.stamp) {
+      if (after == accel.begin()) continue;
+      const auto before = std::prev(after);
+      const Duration gap = after->stamp - before->stamp;
+      if (gap > kLongestGap) continue;
+      const double part = (turn.stamp - before->stamp).seconds() / gap.seconds();
+      sample.accel = before->value + part * (after->value - before->value);
+    }
+    samples.push_back(sample);
+  }
+  return samples;
+}
+
+std::vector<ImuSample> goproImu(const std::string& name, const std::vector<MetadataPacket>& packets,
+                                Stamp zero) {
+  std::vector<GpmfPayload> payloads;
+  for (const MetadataPacket& packet : packets) {
+    std::optional<GpmfPayload> payload = readGpmf(packet.bytes);
+    if (!payload) {
+      throw InputError(name, 0, fmt::format("metadata at {:.3f} s", packet.begin.seconds()),
+                       "are damaged or no GPMF", "Copy the file from the camera again");
+    }
+    payloads.push_back(std::move(*payload));
+  }
+  return joinImu(dated(name, packets, payloads, &GpmfPayload::gyro, "gyro", zero),
+                 dated(name, packets, payloads, &GpmfPayload::accel, "accelerometer", zero));
+}
+
+PhoneLog readPhoneLog(const std::string& name, std::string_view text) {
+  PhoneLog log;
+  std::vector<StampedVector> gyro;
+  std::vector<StampedVector> accel;
+  int line = 0;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::string_view row = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    ++line;
+    if (row.find_first_not_of(" \t\r") == std::string_view::npos) continue;
+    try {
+      const Json json = Json::parse(row);
+      if (json.contains("sensor")) {
+        const Json& sensor = json.at("sensor");
+        const std::string type = sensor.at("type").get<std::string>();
+        if (type != "gyroscope" && type != "accelerometer") continue;
+        const auto values = sensor.at("values").get<std::array<double, 3>>();
+        const std::optional<Stamp> stamp = stampOf(json);
+        if (!stamp) throw InputError(name, line, "time", "is no time in seconds", kPhoneRemedy);
+        (type == "gyroscope" ? gyro : accel).push_back({*stamp, {values[0], values[1], values[2]}});
+      } else if (json.contains("frames")) {
+        for (const Json& frame : json.at("frames")) {
+          const std::size_t camera = frame.value("cameraInd", std::size_t{0});
+          const std::optional<Stamp> stamp = stampOf(frame.contains("time") ? frame : json);
+          if (!stamp) throw InputError(name, line, "time", "is no time in seconds", kPhoneRemedy);
+          if (camera < kMaxCameras) log.images[camera].push_back(*stamp);
+        }
+      }
+    } catch (const Json::exception& error) {
+      throw InputError(name, line, "", std::string("is no line of a phone's log: ") + error.what(),
+                       kPhoneRemedy);
+    }
+  }
+  // Phones write each sensor in bursts.
+  std::ranges::stable_sort(gyro, {}, &StampedVector::stamp);
+  std::ranges::stable_sort(accel, {}, &StampedVector::stamp);
+  log.samples = joinImu(gyro, accel);
+  if (log.samples.empty()) {
+    throw InputError(name, 0, "", "holds no gyroscope beside an accelerometer",
+                     "Record both; lines are {\"time\": s, \"sensor\": {...}}");
+  }
+  return log;
+}
+
+}  // namespace swiftlet
