@@ -5,6 +5,7 @@
 
 #include <exception>
 #include <string>
+#include <vector>
 
 namespace swiftlet {
 
@@ -33,6 +34,27 @@ struct InputError : std::exception {
 
  private:
   std::string text_;
+};
+
+/// What is only suspicious, a line each: "file:line: field: what".
+using Warnings = std::vector<std::string>;
+
+/// Where a value stands, for errors and warnings about it.
+struct InputPlace {
+  std::string file;
+  int line = 0;  ///< from 1; 0 when there are no lines
+  std::string field;
+
+  [[nodiscard]] InputError error(const std::string& message, const std::string& remedy) const {
+    return {file, line, field, message, remedy};
+  }
+  /// "file:line: field", without what is not known.
+  [[nodiscard]] std::string where() const {
+    std::string text = file;
+    if (line > 0) text += ":" + std::to_string(line);
+    if (!field.empty()) text += ": " + field;
+    return text;
+  }
 };
 
 }  // namespace swiftlet

@@ -71,27 +71,6 @@ Eigen::Vector4d four(const YamlField& field, std::vector<double> values, const c
   return Eigen::Vector4d(values.data());
 }
 
-void checkIntrinsics(const YamlField& field, const Eigen::Vector4d& k, int width, int height,
-                     Warnings& warnings) {
-  if (k[0] <= 0 || k[1] <= 0) throw field.error("a focal length is not positive", "Order: fu, fv, cu, cv");
-  if (k[2] > width && k[2] <= height) {
-    throw field.error(fmt::format("cu {} lies outside a width of {}", k[2], width),
-                      "`resolution` is swapped: it is [width, height]");
-  }
-  if (k[2] < 0 || k[2] > width || k[3] < 0 || k[3] > height) {
-    throw field.error(
-        fmt::format("the principal point ({}, {}) lies outside the {}x{} image", k[2], k[3], width, height),
-        "Give intrinsics and resolution of the same image size; order: fu, fv, cu, cv");
-  }
-  if (std::abs(k[2] - 0.5 * width) > 0.25 * width || std::abs(k[3] - 0.5 * height) > 0.25 * height) {
-    warnings.push_back(
-        field.where() +
-        fmt::format(": the principal point ({}, {}) is far from the centre of the {}x{} image. "
-                    "Were these intrinsics made at another resolution?",
-                    k[2], k[3], width, height));
-  }
-}
-
 void checkCorners(const YamlField& field, const CameraModel& model, Warnings& warnings) {
   int lost = 0;
   for (const double x : {0.0, model.width() - 1.0}) {
@@ -156,11 +135,39 @@ SE3 readTransform(const YamlField& field, Warnings& warnings) {
   return {nearest, t};
 }
 
+void checkResolution(const InputPlace& place, double width, double height) {
+  for (const double side : {width, height}) {
+    if (side >= kMinImageSide && side <= kMaxImageSide && side == std::floor(side)) continue;
+    throw place.error(fmt::format("{:g} x {:g} is no image size in whole pixels", width, height),
+                      fmt::format("Give width and height, {} to {}", kMinImageSide, kMaxImageSide));
+  }
+}
+
+void checkIntrinsics(const InputPlace& place, const Eigen::Vector4d& k, int width, int height,
+                     Warnings& warnings) {
+  if (k[0] <= 0 || k[1] <= 0) throw place.error("a focal length is not positive", "Order: fu, fv, cu, cv");
+  if (k[2] > width && k[2] <= height) {
+    throw place.error(fmt::format("cu {} lies outside a width of {}", k[2], width),
+                      "`resolution` is swapped: it is [width, height]");
+  }
+  if (k[2] < 0 || k[2] > width || k[3] < 0 || k[3] > height) {
+    throw place.error(
+        fmt::format("the principal point ({}, {}) lies outside the {}x{} image", k[2], k[3], width, height),
+        "Give intrinsics and resolution of the same image size; order: fu, fv, cu, cv");
+  }
+  if (std::abs(k[2] - 0.5 * width) > 0.25 * width || std::abs(k[3] - 0.5 * height) > 0.25 * height) {
+    warnings.push_back(
+        place.where() +
+        fmt::format(": the principal point ({}, {}) is far from the centre of the {}x{} image. "
+                    "Were these intrinsics made at another resolution?",
+                    k[2], k[3], width, height));
+  }
+}
+
 std::array<int, 2> readResolution(const YamlField& field) {
   const std::vector<double> values = field.numbers();
-  bool good = values.size() == 2;
-  for (const double v : values) good = good && v >= kMinImageSide && v <= kMaxImageSide && v == std::floor(v);
-  if (!good) throw field.error("not a [width, height] in whole pixels", "Write it as [752, 480]");
+  if (values.size() != 2) throw field.error("not a [width, height]", "Write it as [752, 480]");
+  checkResolution(field.place(), values[0], values[1]);
   return {static_cast<int>(values[0]), static_cast<int>(values[1])};
 }
 
@@ -173,7 +180,7 @@ CameraModel readLens(const YamlField& camera, const std::string& coefficients_ke
   const auto [width, height] = readResolution(camera.at("resolution", "Write it as [width, height]"));
   const YamlField intrinsics_field = camera.at("intrinsics", "Write it as [fu, fv, cu, cv]");
   const Eigen::Vector4d intrinsics = four(intrinsics_field, intrinsics_field.numbers(), "fu, fv, cu, cv");
-  checkIntrinsics(intrinsics_field, intrinsics, width, height, warnings);
+  checkIntrinsics(intrinsics_field.place(), intrinsics, width, height, warnings);
 
   const YamlField kind_field =
       camera.at("distortion_model", "`radtan`, `radial-tangential` or `equidistant`");

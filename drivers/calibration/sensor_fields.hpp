@@ -11,8 +11,6 @@
 
 namespace swiftlet {
 
-using Warnings = std::vector<std::string>;
-
 struct CameraEntry {
   CameraModel model;
   SE3 T_body_cam;
@@ -32,6 +30,13 @@ SE3 readTransform(const YamlField& field, Warnings& warnings);
 
 /// [width, height] in pixels.
 std::array<int, 2> readResolution(const YamlField& field);
+
+/// Refuses a width and height that no image has.
+void checkResolution(const InputPlace& place, double width, double height);
+
+/// Refuses fx, fy, cx, cy that do not belong to an image of this size; warns where they hardly do.
+void checkIntrinsics(const InputPlace& place, const Eigen::Vector4d& intrinsics, int width, int height,
+                     Warnings& warnings);
 
 /// Lens from its four fields; refuses models swiftlet has no projection for.
 CameraModel readLens(const YamlField& camera, const std::string& coefficients_key, Warnings& warnings);

@@ -106,6 +106,4 @@ InputError YamlField::error(const std::string& message, const std::string& remed
   return {*file_, line(), name_, message, remedy};
 }
 
-std::string YamlField::where() const { return *file_ + ":" + std::to_string(line()) + ": " + name_; }
-
 }  // namespace swiftlet

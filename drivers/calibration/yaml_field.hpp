@@ -36,7 +36,8 @@ class YamlField {
   /// An error at this field.
   [[nodiscard]] InputError error(const std::string& message, const std::string& remedy) const;
   /// "file:line: field", for warnings.
-  [[nodiscard]] std::string where() const;
+  [[nodiscard]] std::string where() const { return place().where(); }
+  [[nodiscard]] InputPlace place() const { return {*file_, line_, name_}; }
 
  private:
   YamlField(std::shared_ptr<const std::string> file, std::string name, YAML::Node node, int line)
