@@ -36,7 +36,10 @@ struct Calibration {
   Rig rig;
   ImuNoise noise;  ///< densities as in the file, not inflated
   Eigen::Matrix3d R_body_imu = Eigen::Matrix3d::Identity();
-  SE3 T_body_filebody;                               ///< translation only
+  SE3 T_body_filebody;  ///< translation only
+  /// How a lens that the estimator does not have was converted (lens_fit.hpp); empty where it is as in the
+  /// file.
+  std::array<std::string, kMaxCameras> conversion;
   std::array<double, kMaxCameras> camera_rate_hz{};  ///< 0 where the file does not say
   /// `rostopic` of the Kalibr files, to find the streams in a bag; empty where not given.
   std::array<std::string, kMaxCameras> camera_topic;

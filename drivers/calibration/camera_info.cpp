@@ -46,25 +46,34 @@ void checkSize(const CameraInfo& info, const std::string& name) {
 
 }  // namespace
 
-CameraModel rawLens(const CameraInfo& info, const std::string& name, Warnings& warnings) {
+LensFit rawLensFit(const CameraInfo& info, const std::string& name, Warnings& warnings) {
   checkSize(info, name);
+  SourceLens lens;
+  lens.name = info.distortion_model;
+  lens.width = info.width;
+  lens.height = info.height;
   const InputPlace place{name, 0, "K"};
-  const Eigen::Vector4d intrinsics = intrinsicsOf(Eigen::Map<const RowMatrix3d>(info.K.data()), place);
-  checkIntrinsics(place, intrinsics, info.width, info.height, warnings);
-  const InputPlace model{name, 0, "distortion_model"};
-  const bool equidistant = info.distortion_model == "equidistant" || info.distortion_model == "fisheye";
-  if (!equidistant && info.distortion_model != "plumb_bob" &&
-      info.distortion_model != "rational_polynomial") {
-    throw model.error("`" + info.distortion_model + "` is not supported",
-                      "Calibrate as plumb_bob, rational_polynomial or equidistant");
+  lens.intrinsics = intrinsicsOf(Eigen::Map<const RowMatrix3d>(info.K.data()), place);
+  const InputPlace distortion{name, 0, "D"};
+  for (const double v : info.D) {
+    if (!std::isfinite(v)) throw distortion.error("a coefficient is not finite", "Calibrate the camera");
   }
-  Eigen::Vector4d distortion = Eigen::Vector4d::Zero();
-  for (std::size_t i = 0; i < info.D.size(); ++i) {
-    if (i < 4) distortion[static_cast<Eigen::Index>(i)] = info.D[i];
-    if (i >= 4 && info.D[i] != 0) throw model.error("more than 4 coefficients", "Calibrate with k3 at zero");
+  const std::string& model = info.distortion_model;
+  if (model == "equidistant" || model == "fisheye") {
+    setEquidistant(distortion, info.D, lens);
+  } else if (model == "plumb_bob" || model == "rational_polynomial" || (model.empty() && info.D.empty())) {
+    setBrown(distortion, info.D, lens);
+  } else {
+    throw InputPlace{name, 0, "distortion_model"}.error(
+        "`" + model + "` is not supported", "Calibrate as plumb_bob, rational_polynomial or equidistant");
   }
-  return {equidistant ? CameraKind::kEquidistant : CameraKind::kPinholeRadtan, info.width, info.height,
-          intrinsics, distortion};
+  return acceptLens(place, lens, warnings);
+}
+
+CameraModel rawLens(const CameraInfo& info, const std::string& name, Warnings& warnings) {
+  const LensFit fit = rawLensFit(info, name, warnings);
+  if (!fit.words.empty()) warnings.push_back(name + ": " + fit.words);
+  return fit.model;
 }
 
 CameraModel rectifiedLens(const CameraInfo& info, const std::string& name, Warnings& warnings) {

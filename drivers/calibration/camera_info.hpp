@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "drivers/calibration/input_error.hpp"
+#include "drivers/calibration/lens_fit.hpp"
 #include "estimator/camera/camera_model.hpp"
 #include "estimator/geometry/se3.hpp"
 
@@ -30,7 +31,10 @@ struct CameraInfo {
   std::array<double, 12> P{};  ///< row by row [px], last column [px m]
 };
 
-/// Lens of the raw images. `name`: the file or topic, for messages.
+/// Lens of the raw images, and how close it is. `name`: the file or topic, for messages.
+[[nodiscard]] LensFit rawLensFit(const CameraInfo& info, const std::string& name, Warnings& warnings);
+
+/// The same; a line of the warnings says how close it is where it is not exact.
 [[nodiscard]] CameraModel rawLens(const CameraInfo& info, const std::string& name, Warnings& warnings);
 
 /// Lens of the rectified images: P, no distortion.

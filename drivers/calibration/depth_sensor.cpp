@@ -21,7 +21,7 @@ DepthSensor readDepthSensor(const std::string& path, std::vector<std::string>& w
   if (!file) throw InputError(path, 0, "", "cannot be read", "Give the depth camera's sensor.yaml");
   const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
   const YamlField root = YamlField::parse(path, text);
-  const CameraModel lens = readLens(root, "distortion_coefficients", warnings);
+  const CameraModel lens = readLens(root, "distortion_coefficients", warnings).model;
   if (lens.kind() != CameraKind::kPinholeRadtan || !lens.distortion().isZero(0)) {
     throw root.at("distortion_coefficients")
         .error("depth images come from a camera without distortion", "Rectify them, and give zeros here");

@@ -20,7 +20,9 @@ std::string nearestAxis(const Eigen::Vector3d& direction) {
                      std::acos(cosine) * kDegrees);
 }
 
-std::string describeCamera(const Rig& rig, std::size_t i, double rate_hz) {
+std::string describeCamera(const Calibration& calibration, std::size_t i) {
+  const Rig& rig = calibration.rig;
+  const double rate_hz = calibration.camera_rate_hz[i];
   const CameraModel& model = rig.camera[i];
   const SE3& T = rig.T_body_cam[i];
   const double fov = 2 * std::atan(0.5 * model.width() / model.intrinsics()[0]) * kDegrees;
@@ -30,6 +32,7 @@ std::string describeCamera(const Rig& rig, std::size_t i, double rate_hz) {
       model.intrinsics()[0], model.intrinsics()[1], model.intrinsics()[2], model.intrinsics()[3]);
   if (model.kind() == CameraKind::kPinholeRadtan) text += fmt::format(", about {:.0f} deg wide", fov);
   if (rate_hz > 0) text += fmt::format(", {:g} Hz", rate_hz);
+  if (!calibration.conversion[i].empty()) text += "\n      converted, " + calibration.conversion[i];
   text += fmt::format(
       "\n      at ({:.4f}, {:.4f}, {:.4f}) m in the body; looks along body {}, its right is body {}\n",
       T.translation.x(), T.translation.y(), T.translation.z(), nearestAxis(T.R().col(2)),
@@ -44,7 +47,7 @@ std::string describe(const Calibration& calibration) {
   std::string text = fmt::format("{} calibration, {} camera{}\n", calibration.form, rig.camera_count,
                                  rig.camera_count == 1 ? "" : "s");
   for (std::size_t i = 0; i < rig.camera_count; ++i) {
-    text += describeCamera(rig, i, calibration.camera_rate_hz[i]);
+    text += describeCamera(calibration, i);
   }
   if (rig.camera_count == 2) {
     const Eigen::Vector3d p_c0_c1 = rig.T_cam1_cam0().inverse().translation;

@@ -11,7 +11,7 @@ CameraEntry readCamera(const YamlField& root, Warnings& warnings) {
   CameraEntry entry;
   const YamlField T_BS = root.at("T_BS", "Give the transform from camera to body");
   entry.T_body_cam = readTransform(T_BS, warnings);
-  entry.model = readLens(root, "distortion_coefficients", warnings);
+  entry.lens = readLens(root, "distortion_coefficients", warnings);
   if (root.has("rate_hz")) entry.rate_hz = root.at("rate_hz").number();
   entry.shift_s = readShift(root, warnings);
   entry.readout_s = readReadout(root);

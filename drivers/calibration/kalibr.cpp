@@ -94,7 +94,7 @@ std::vector<CameraEntry> readChain(const YamlField& root, Warnings& warnings) {
   std::vector<CameraEntry> entries;
   for (const ChainCamera& camera : cameras) {
     CameraEntry entry;
-    entry.model = readLens(camera.fields, "distortion_coeffs", warnings);
+    entry.lens = readLens(camera.fields, "distortion_coeffs", warnings);
     entry.T_body_cam = *camera.T_body_cam;
     entry.shift_s = readShift(camera.fields, warnings);
     entry.readout_s = readReadout(camera.fields);

@@ -92,7 +92,8 @@ void assembleRig(const std::vector<CameraEntry>& cameras, const CalibrationOptio
   Rig& rig = calibration.rig;
   rig.camera_count = std::min(cameras.size(), kMaxCameras);
   for (std::size_t i = 0; i < rig.camera_count; ++i) {
-    rig.camera[i] = cameras[i].model;
+    rig.camera[i] = cameras[i].lens.model;
+    calibration.conversion[i] = cameras[i].lens.words;
     rig.T_body_cam[i] = calibration.T_body_filebody * cameras[i].T_body_cam;
     calibration.camera_rate_hz[i] = cameras[i].rate_hz;
     calibration.camera_topic[i] = cameras[i].topic;

@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <Eigen/SVD>
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 
 #include "estimator/core/units.hpp"
 
@@ -18,6 +21,9 @@ constexpr double kMaxLever = 10;  // m; a rig is smaller, so more means millimet
 constexpr double kShiftWarn_s = 0.1;
 constexpr double kShiftRefuse_s = 1.0;
 constexpr double kReadoutRefuse_s = 0.2;  // the slowest phone takes 61 ms
+// Image side over focal length: fisheyes of 220 degrees have 4, a telescope 0.05.
+constexpr double kWidestView = 12;
+constexpr double kNarrowestView = 0.02;
 constexpr int kMinImageSide = 16;
 constexpr int kMaxImageSide = 16384;
 
@@ -61,17 +67,7 @@ void checkLastRow(const YamlField& field, const Eigen::Matrix4d& T) {
   throw field.error("the last row is not 0 0 0 1", "Write a rigid transform [R t; 0 0 0 1], row by row");
 }
 
-Eigen::Vector4d four(const YamlField& field, std::vector<double> values, const char* meaning) {
-  // Some tools append k3 as a fifth radial coefficient; zero changes nothing.
-  while (values.size() > 4 && values.back() == 0) values.pop_back();
-  if (values.size() != 4) {
-    throw field.error(fmt::format("{} numbers where 4 are expected", values.size()),
-                      fmt::format("Give {}", meaning));
-  }
-  return Eigen::Vector4d(values.data());
-}
-
-void checkCorners(const YamlField& field, const CameraModel& model, Warnings& warnings) {
+void checkCorners(const InputPlace& place, const CameraModel& model, Warnings& warnings) {
   int lost = 0;
   for (const double x : {0.0, model.width() - 1.0}) {
     for (const double y : {0.0, model.height() - 1.0}) {
@@ -81,7 +77,7 @@ void checkCorners(const YamlField& field, const CameraModel& model, Warnings& wa
   }
   // A fisheye's corners are dark; a pinhole's are used.
   if (lost > 0 && model.kind() == CameraKind::kPinholeRadtan) {
-    warnings.push_back(field.where() +
+    warnings.push_back(place.where() +
                        fmt::format(": the lens model has no inverse in {} of the 4 image corners (it folds "
                                    "back); points there are ignored",
                                    lost));
@@ -145,7 +141,13 @@ void checkResolution(const InputPlace& place, double width, double height) {
 
 void checkIntrinsics(const InputPlace& place, const Eigen::Vector4d& k, int width, int height,
                      Warnings& warnings) {
-  if (k[0] <= 0 || k[1] <= 0) throw place.error("a focal length is not positive", "Order: fu, fv, cu, cv");
+  if (!(k[0] > 0 && k[1] > 0)) throw place.error("a focal length is not positive", "Order: fu, fv, cu, cv");
+  const double view = std::max(width, height) / std::min(k[0], k[1]);
+  if (!(view < kWidestView && view > kNarrowestView)) {
+    throw place.error(
+        fmt::format("a focal length of {:g} for an image of {}x{}", std::min(k[0], k[1]), width, height),
+        "Focal lengths are in pixels: is this in millimetres, or a share of the width?");
+  }
   if (k[2] > width && k[2] <= height) {
     throw place.error(fmt::format("cu {} lies outside a width of {}", k[2], width),
                       "`resolution` is swapped: it is [width, height]");
@@ -171,35 +173,91 @@ std::array<int, 2> readResolution(const YamlField& field) {
   return {static_cast<int>(values[0]), static_cast<int>(values[1])};
 }
 
-CameraModel readLens(const YamlField& camera, const std::string& coefficients_key, Warnings& warnings) {
-  const YamlField model_field = camera.at("camera_model", "swiftlet reads `pinhole`");
-  if (const std::string model = model_field.text(); model != "pinhole") {
-    throw model_field.error("camera model `" + model + "` is not supported",
-                            "Calibrate as pinhole-radtan or pinhole-equi (wide lenses)");
+void setBrown(const InputPlace& place, const std::vector<double>& values, SourceLens& lens) {
+  constexpr std::array<std::size_t, 6> kCounts = {0, 4, 5, 8, 12, 14};
+  if (std::find(kCounts.begin(), kCounts.end(), values.size()) == kCounts.end()) {
+    throw place.error(fmt::format("{} numbers where 4, 5, 8, 12 or 14 are expected", values.size()),
+                      "Give k1, k2, p1, p2 and as many of k3, k4..k6, s1..s4, tau_x, tau_y as the model has");
+  }
+  lens.family = LensFamily::kBrown;
+  std::copy(values.begin(), values.end(), lens.distortion.begin());
+}
+
+void setEquidistant(const InputPlace& place, const std::vector<double>& values, SourceLens& lens) {
+  if (values.size() != 4) {
+    throw place.error(fmt::format("{} numbers where 4 are expected", values.size()), "Give k1..k4");
+  }
+  lens.family = LensFamily::kEquidistant;
+  std::copy(values.begin(), values.end(), lens.distortion.begin());
+}
+
+LensFit acceptLens(const InputPlace& place, const SourceLens& lens, Warnings& warnings) {
+  checkIntrinsics(place, lens.intrinsics, lens.width, lens.height, warnings);
+  LensFit fit = convertLens(lens, place, warnings);
+  if (fit.exact) checkCorners(place, fit.model, warnings);
+  return fit;
+}
+
+LensFit readLens(const YamlField& camera, const std::string& coefficients_key, Warnings& warnings) {
+  constexpr const char* kRemedy =
+      "Calibrate as pinhole-radtan, pinhole-equi (wide lenses), omni-radtan, ds-none or eucm-none";
+  SourceLens lens;
+  const YamlField model_field =
+      camera.at("camera_model", "swiftlet reads `pinhole`, `omni`, `ds` and `eucm`");
+  const std::string model = model_field.text();
+  std::size_t shape = 0;  // parameters in front of fu
+  if (model == "omni") {
+    lens.family = LensFamily::kOmni;
+    shape = 1;
+  } else if (model == "ds" || model == "eucm") {
+    lens.family = model == "ds" ? LensFamily::kDoubleSphere : LensFamily::kExtendedUnified;
+    shape = 2;
+  } else if (model != "pinhole") {
+    throw model_field.error("camera model `" + model + "` is not supported", kRemedy);
   }
   const auto [width, height] = readResolution(camera.at("resolution", "Write it as [width, height]"));
-  const YamlField intrinsics_field = camera.at("intrinsics", "Write it as [fu, fv, cu, cv]");
-  const Eigen::Vector4d intrinsics = four(intrinsics_field, intrinsics_field.numbers(), "fu, fv, cu, cv");
-  checkIntrinsics(intrinsics_field.place(), intrinsics, width, height, warnings);
+  lens.width = width;
+  lens.height = height;
+  constexpr std::array<const char*, 3> kOrder = {"fu, fv, cu, cv", "xi, fu, fv, cu, cv",
+                                                 "xi, alpha (ds) or alpha, beta (eucm), fu, fv, cu, cv"};
+  const YamlField intrinsics = camera.at("intrinsics", fmt::format("Write it as [{}]", kOrder[shape]));
+  const std::vector<double> numbers = intrinsics.numbers();
+  if (numbers.size() != shape + 4) {
+    throw intrinsics.error(fmt::format("{} numbers where {} are expected", numbers.size(), shape + 4),
+                           fmt::format("Give {}", kOrder[shape]));
+  }
+  std::copy_n(numbers.begin(), shape, lens.shape.begin());
+  lens.intrinsics = Eigen::Vector4d(numbers.data() + shape);
 
   const YamlField kind_field =
-      camera.at("distortion_model", "`radtan`, `radial-tangential` or `equidistant`");
+      camera.at("distortion_model", "`radtan`, `radial-tangential`, `equidistant`, `fov` or `none`");
   const std::string kind = kind_field.text();
-  CameraKind camera_kind = CameraKind::kPinholeRadtan;
-  Eigen::Vector4d distortion = Eigen::Vector4d::Zero();
-  if (kind == "equidistant") {
-    camera_kind = CameraKind::kEquidistant;
-  } else if (kind != "radtan" && kind != "radial-tangential" && kind != "plumb_bob" && kind != "none") {
-    throw kind_field.error("distortion model `" + kind + "` is not supported",
-                           "Calibrate as pinhole-radtan or pinhole-equi");
+  lens.name = model == "pinhole" ? kind : model + "-" + kind;
+  const bool brown = kind == "radtan" || kind == "radial-tangential" || kind == "plumb_bob";
+  const bool pinhole = model == "pinhole";
+  if (kind != "none" && !(brown && shape < 2) && !(pinhole && (kind == "equidistant" || kind == "fov"))) {
+    throw kind_field.error("distortion model `" + kind + "` is not supported with `" + model + "`", kRemedy);
   }
   if (kind != "none") {
-    const YamlField field = camera.at(coefficients_key, "k1, k2, p1, p2 (radtan) or k1..k4 (equidistant)");
-    distortion = four(field, field.numbers(), "k1, k2, p1, p2 (radtan) or k1..k4 (equidistant)");
+    const YamlField field =
+        camera.at(coefficients_key, "k1, k2, p1, p2 (radtan), k1..k4 (equidistant) or w (fov)");
+    const std::vector<double> values = field.numbers();
+    if (kind == "equidistant") {
+      setEquidistant(field.place(), values, lens);
+    } else if (brown) {
+      const LensFamily family = lens.family;
+      setBrown(field.place(), values, lens);
+      lens.family = family;
+    } else {
+      // Devernay's angle of view; half of it has a tangent.
+      if (values.size() != 1 || !(values[0] > 0 && values[0] < std::numbers::pi)) {
+        throw field.error("not one angle between 0 and pi", "Give w [rad]");
+      }
+      lens.family = LensFamily::kFieldOfView;
+      lens.shape[0] = values[0];
+    }
   }
-  const CameraModel model(camera_kind, width, height, intrinsics, distortion);
-  checkCorners(intrinsics_field, model, warnings);
-  return model;
+  return acceptLens(intrinsics.place(), lens, warnings);
 }
 
 std::optional<double> readShift(const YamlField& camera, Warnings& warnings) {

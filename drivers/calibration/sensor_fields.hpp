@@ -7,12 +7,13 @@
 #include <vector>
 
 #include "drivers/calibration/calibration.hpp"
+#include "drivers/calibration/lens_fit.hpp"
 #include "drivers/calibration/yaml_field.hpp"
 
 namespace swiftlet {
 
 struct CameraEntry {
-  CameraModel model;
+  LensFit lens;
   SE3 T_body_cam;
   double rate_hz = 0;
   std::optional<double> shift_s;  ///< t_imu = t_cam + shift
@@ -38,8 +39,17 @@ void checkResolution(const InputPlace& place, double width, double height);
 void checkIntrinsics(const InputPlace& place, const Eigen::Vector4d& intrinsics, int width, int height,
                      Warnings& warnings);
 
-/// Lens from its four fields; refuses models swiftlet has no projection for.
-CameraModel readLens(const YamlField& camera, const std::string& coefficients_key, Warnings& warnings);
+/// Coefficients in OpenCV's order: 4, 5, 8, 12 or 14 of them, or none.
+void setBrown(const InputPlace& place, const std::vector<double>& values, SourceLens& lens);
+
+/// k1..k4; fewer or more are refused.
+void setEquidistant(const InputPlace& place, const std::vector<double>& values, SourceLens& lens);
+
+/// Converted, after the checks of its intrinsics; warns of a pinhole that has no inverse in a corner.
+LensFit acceptLens(const InputPlace& place, const SourceLens& lens, Warnings& warnings);
+
+/// Lens of EuRoC's and Kalibr's files. InputError names a model that has no projection here.
+LensFit readLens(const YamlField& camera, const std::string& coefficients_key, Warnings& warnings);
 
 /// `timeshift_cam_imu` of a camera [s]; empty where it is not given. Refuses more than a second.
 std::optional<double> readShift(const YamlField& camera, Warnings& warnings);

@@ -1,0 +1,293 @@
+#include "drivers/calibration/lens_fit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <unsupported/Eigen/NonLinearOptimization>
+#include <unsupported/Eigen/NumericalDiff>
+#include <vector>
+
+namespace swiftlet {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+constexpr int kParameters = 8;
+using Parameters = Eigen::VectorXd;  // fx fy cx cy and four coefficients
+
+// Directions and rays in each: the residual is smooth, and between two rays of some 100 x 50 it changes by
+// less than a hundredth of its maximum.
+constexpr int kBorderPoints = 120;
+constexpr int kRays = 48;
+constexpr double kThetaStep = 2e-3;  // rad; a fold is a property of the whole lens, not of a ray
+// Radius over angle, as a share of what it is at the axis: below it a lens is about to fold back, which is
+// the polynomial's doing and no lens', and noise of a pixel means ten times the usual angle.
+constexpr double kLeastGrowth = 0.1;
+constexpr double kBorder = 0.5;  // px; the image ends at the edge of its outermost pixels
+constexpr int kBisections = 40;
+constexpr double kLeastCovered = 0.5;
+constexpr double kToldCovered = 0.995;
+// By which a ray, its pixel and the pixel's ray may differ in a lens that can be inverted there [px].
+constexpr double kInverseTolerance = 1e-3;
+constexpr int kMaxEvaluations = 400;
+// Stands for the distance of a ray that the target does not see, to make the optimizer turn back [px].
+constexpr double kUnseen = 1e3;
+
+struct Ray {
+  Vector3d direction;  ///< unit
+  Vector2d pixel;
+  double weight = 0;  ///< [px^2] of the image
+};
+
+struct Region {
+  std::vector<Ray> rays;
+  double covered = 0;
+};
+
+/// One direction from the optical axis outward.
+class Meridian {
+ public:
+  Meridian(const SourceLens& lens, const Vector2d& border_pixel) : lens_(lens) {
+    const Vector2d out =
+        (border_pixel - lens.intrinsics.tail<2>()).cwiseQuotient(lens.intrinsics.head<2>()).normalized();
+    along_ = {out.x(), out.y(), 0};
+  }
+  [[nodiscard]] Vector3d direction(double theta) const {
+    return std::sin(theta) * along_ + Vector3d(0, 0, std::cos(theta));
+  }
+  /// Pixel at an angle, and its distance from the principal point in focal lengths; false where there is
+  /// none.
+  bool at(double theta, Vector2d& pixel, double& radius) const {
+    if (!lens_.project(direction(theta), pixel)) return false;
+    radius = (pixel - lens_.intrinsics.tail<2>()).cwiseQuotient(lens_.intrinsics.head<2>()).norm();
+    return true;
+  }
+  [[nodiscard]] bool inImage(const Vector2d& pixel) const {
+    return pixel.x() >= -kBorder && pixel.y() >= -kBorder && pixel.x() <= lens_.width - 1 + kBorder &&
+           pixel.y() <= lens_.height - 1 + kBorder;
+  }
+  /// Largest angle at which the image is not left and the radius still grows well.
+  [[nodiscard]] double end(bool& folds) const {
+    double theta = 0;
+    double radius = 0;
+    Vector2d pixel;
+    double next_radius = 0;
+    const double least_step = at(kThetaStep, pixel, next_radius) ? kLeastGrowth * next_radius : 0;
+    for (folds = true; theta + kThetaStep < std::numbers::pi; theta += kThetaStep) {
+      if (!at(theta + kThetaStep, pixel, next_radius) || next_radius - radius <= least_step) return theta;
+      if (!inImage(pixel)) {
+        folds = false;
+        break;
+      }
+      radius = next_radius;
+    }
+    double low = theta;
+    double high = theta + kThetaStep;
+    for (int i = 0; i < kBisections; ++i) {
+      const double middle = 0.5 * (low + high);
+      const bool inside = at(middle, pixel, next_radius) && inImage(pixel);
+      (inside ? low : high) = middle;
+    }
+    return low;
+  }
+
+ private:
+  const SourceLens& lens_;
+  Vector3d along_;
+};
+
+/// Points around the image's border, the four corners among them.
+std::vector<Vector2d> borderPoints(int width, int height) {
+  const double right = width - 1 + kBorder;
+  const double bottom = height - 1 + kBorder;
+  std::vector<Vector2d> points;
+  constexpr int kSide = kBorderPoints / 4;
+  for (int i = 0; i < kSide; ++i) {
+    const double share = static_cast<double>(i) / kSide;
+    const double x = -kBorder + share * (right + kBorder);
+    const double y = -kBorder + share * (bottom + kBorder);
+    points.insert(
+        points.end(),
+        {{x, -kBorder}, {right, y}, {right - kBorder - x, bottom}, {-kBorder, bottom - kBorder - y}});
+  }
+  return points;
+}
+
+Region regionOf(const SourceLens& lens) {
+  Region region;
+  double reached = 0;
+  double wanted = 0;
+  for (const Vector2d& border : borderPoints(lens.width, lens.height)) {
+    const Meridian meridian(lens, border);
+    bool folds = false;
+    const double end = meridian.end(folds);
+    const double border_radius = (border - lens.intrinsics.tail<2>()).norm();
+    double last = 0;
+    for (int i = 1; i <= kRays; ++i) {
+      Ray ray;
+      double radius = 0;
+      const double theta = end * i / kRays;
+      if (!meridian.at(theta, ray.pixel, radius)) break;
+      ray.direction = meridian.direction(theta);
+      const double distance = (ray.pixel - lens.intrinsics.tail<2>()).norm();
+      ray.weight = distance * (distance - last);
+      last = distance;
+      region.rays.push_back(ray);
+    }
+    wanted += border_radius * border_radius;
+    reached +=
+        folds ? std::min(last, border_radius) * std::min(last, border_radius) : border_radius * border_radius;
+  }
+  region.covered = reached / wanted;
+  return region;
+}
+
+CameraModel modelOf(CameraKind kind, const SourceLens& source, const Parameters& p) {
+  return {kind, source.width, source.height, p.head<4>(), p.tail<4>()};
+}
+
+/// What the optimizer asks for: two residuals a ray.
+struct Residuals {
+  using Scalar = double;
+  using InputType = Parameters;
+  using ValueType = Eigen::VectorXd;
+  using JacobianType = Eigen::MatrixXd;
+  enum { InputsAtCompileTime = Eigen::Dynamic, ValuesAtCompileTime = Eigen::Dynamic };
+
+  CameraKind kind = CameraKind::kEquidistant;
+  const SourceLens& source;
+  const Region& region;
+
+  [[nodiscard]] int inputs() const { return kParameters; }
+  [[nodiscard]] int values() const { return 2 * static_cast<int>(region.rays.size()); }
+  int operator()(const InputType& parameters, ValueType& residuals) const {
+    const CameraModel model = modelOf(kind, source, parameters);
+    for (std::size_t i = 0; i < region.rays.size(); ++i) {
+      const Ray& ray = region.rays[i];
+      Vector2d pixel;
+      const bool seen = model.project(ray.direction, pixel);
+      const Vector2d residual = seen ? Vector2d(pixel - ray.pixel) : Vector2d::Constant(kUnseen);
+      residuals.segment<2>(2 * static_cast<Eigen::Index>(i)) = std::sqrt(ray.weight) * residual;
+    }
+    return 0;
+  }
+};
+
+/// RMS and maximum over the region; infinite where the model does not see a ray both ways.
+void measure(const Region& region, LensFit& fit) {
+  fit.rms = fit.max = std::numeric_limits<double>::infinity();
+  double max = 0;
+  double sum = 0;
+  double weights = 0;
+  for (const Ray& ray : region.rays) {
+    Vector2d pixel;
+    Vector3d back;
+    if (!fit.model.project(ray.direction, pixel) || !fit.model.unproject(pixel, back) ||
+        (back - ray.direction).norm() * fit.model.focal() > kInverseTolerance) {
+      return;
+    }
+    const double error = (pixel - ray.pixel).norm();
+    max = std::max(max, error);
+    sum += ray.weight * error * error;
+    weights += ray.weight;
+  }
+  fit.max = max;
+  fit.rms = std::sqrt(sum / weights);
+}
+
+/// Pixels per radian at the axis.
+Vector2d focalAtAxis(const SourceLens& source) {
+  constexpr double kSmall = 1e-4;
+  Vector2d centre;
+  Vector2d x;
+  Vector2d y;
+  if (!source.project({0, 0, 1}, centre) || !source.project({kSmall, 0, 1}, x) ||
+      !source.project({0, kSmall, 1}, y)) {
+    return source.intrinsics.head<2>();
+  }
+  return {(x - centre).x() / kSmall, (y - centre).y() / kSmall};
+}
+
+LensFit fitKind(CameraKind kind, const SourceLens& source, const Region& region) {
+  Parameters parameters = Parameters::Zero(kParameters);
+  parameters.head<2>() = focalAtAxis(source);
+  parameters.segment<2>(2) = source.intrinsics.tail<2>();
+  const Residuals residuals{kind, source, region};
+  Eigen::NumericalDiff<Residuals, Eigen::Central> differentiated(residuals);
+  Eigen::LevenbergMarquardt<decltype(differentiated)> optimizer(differentiated);
+  optimizer.parameters.maxfev = kMaxEvaluations;
+  optimizer.minimize(parameters);
+  LensFit fit;
+  fit.covered = region.covered;
+  fit.rms = fit.max = std::numeric_limits<double>::infinity();
+  if (!parameters.allFinite() || parameters[0] <= 0 || parameters[1] <= 0) return fit;
+  fit.model = modelOf(kind, source, parameters);
+  measure(region, fit);
+  return fit;
+}
+
+/// Whether one of the estimator's models contains the source; then `fit` is it.
+bool exactly(const SourceLens& source, LensFit& fit) {
+  const bool brown = source.family == LensFamily::kBrown;
+  if (!brown && source.family != LensFamily::kEquidistant) return false;
+  const auto& k = source.distortion;
+  if (std::any_of(k.begin() + 4, k.end(), [](double v) { return v != 0; })) return false;
+  fit.exact = true;
+  fit.model = {brown ? CameraKind::kPinholeRadtan : CameraKind::kEquidistant, source.width, source.height,
+               source.intrinsics, Eigen::Vector4d(k.data())};
+  return true;
+}
+
+const char* nameOf(CameraKind kind) {
+  return kind == CameraKind::kEquidistant ? "equidistant" : "pinhole radial-tangential";
+}
+
+std::string wordsOf(const LensFit& fit, const SourceLens& source) {
+  if (!std::isfinite(fit.rms)) {
+    return fmt::format("neither equidistant nor pinhole radial-tangential comes near the {} lens",
+                       source.name);
+  }
+  return fmt::format("{} as {}: {:.3f} px RMS, {:.3f} px at most", source.name, nameOf(fit.model.kind()),
+                     fit.rms, fit.max);
+}
+
+}  // namespace
+
+LensFit fitLens(const SourceLens& source, const InputPlace& place) {
+  LensFit fit;
+  if (exactly(source, fit)) return fit;
+  const Region region = regionOf(source);
+  if (!(region.covered >= kLeastCovered)) {
+    throw place.error(fmt::format("the {} lens has no inverse in {:.0f} % of the image", source.name,
+                                  100 * (1 - region.covered)),
+                      "The coefficients belong to another order, image size or model: compare with the file "
+                      "that the calibration wrote");
+  }
+  const LensFit wide = fitKind(CameraKind::kEquidistant, source, region);
+  const LensFit narrow = fitKind(CameraKind::kPinholeRadtan, source, region);
+  fit = narrow.rms < wide.rms ? narrow : wide;
+  fit.words = wordsOf(fit, source);
+  return fit;
+}
+
+LensFit convertLens(const SourceLens& source, const InputPlace& place, Warnings& warnings) {
+  const LensFit fit = fitLens(source, place);
+  if (!(fit.rms <= kMaxLensRms)) {
+    throw place.error(
+        fmt::format("{}; more than {} px RMS is refused", fit.words, kMaxLensRms),
+        "Calibrate again as pinhole-radtan, or pinhole-equi for a wide lens, over the whole image");
+  }
+  if (fit.covered < kToldCovered) {
+    warnings.push_back(
+        place.where() +
+        fmt::format(": the {} lens folds back in {:.1f} % of the image; points there are of no "
+                    "use",
+                    source.name, 100 * (1 - fit.covered)));
+  }
+  return fit;
+}
+
+}  // namespace swiftlet
