@@ -1,6 +1,7 @@
 #pragma once
-// Calibration files as users have them: EuRoC/ASL `sensor.yaml` (camera and IMU) and Kalibr camchain
-// and IMU YAML, both turned into one Rig and one ImuNoise.
+// Calibration files as users have them: EuRoC/ASL `sensor.yaml` (camera and IMU), Kalibr camchain and IMU
+// YAML, Basalt's JSON, ROS camera_info and OpenCV's FileStorage, all turned into one Rig and one ImuNoise.
+// The last two hold cameras alone: an IMU file as Kalibr's, with `T_imu_cam0`, completes them.
 //
 // Directions (docs/formats.md): EuRoC `T_BS` maps sensor to body and is used as is; Kalibr
 // `T_cam_imu` maps IMU to camera and is inverted; `T_cn_cnm1` maps camera n-1 to camera n and chains;
@@ -32,7 +33,7 @@ struct CalibrationOptions {
 };
 
 struct Calibration {
-  std::string form;  ///< "EuRoC" or "Kalibr"
+  std::string form;  ///< "EuRoC", "Kalibr", "Basalt", "ROS CameraInfo" or "OpenCV"
   Rig rig;
   ImuNoise noise;  ///< densities as in the file, not inflated
   Eigen::Matrix3d R_body_imu = Eigen::Matrix3d::Identity();
@@ -49,8 +50,9 @@ struct Calibration {
   [[nodiscard]] bool turnsImu() const { return !R_body_imu.isIdentity(0); }
 };
 
-/// Reads what `path` leads to: a sequence or its mav0 folder, a folder with one camchain and one IMU
-/// file, or a camchain file (its IMU file beside it, or given as `imu_file`). Decides by content.
+/// Reads what `path` leads to: a sequence or its mav0 folder, a folder with the files of one calibration, or
+/// one of these files (its IMU file beside it, or given as `imu_file`). Decides by content. A camera_info or
+/// OpenCV file stands for what is in it alone; the folder, for the pair.
 Calibration readCalibration(const std::string& path, const std::string& imu_file = {},
                             const CalibrationOptions& options = {});
 
@@ -67,6 +69,14 @@ Calibration parseEurocCalibration(const std::vector<NamedText>& cameras, const N
                                   const CalibrationOptions& options = {});
 Calibration parseKalibrCalibration(const NamedText& camchain, const NamedText& imu,
                                    const CalibrationOptions& options = {});
+
+/// One camera_info a camera; `imu`: noise and T_imu_cam0.
+Calibration parseCameraInfoCalibration(const std::vector<NamedText>& cameras, const NamedText& imu,
+                                       const CalibrationOptions& options = {});
+/// The files of one calibration, such as intrinsics.yml and extrinsics.yml.
+Calibration parseOpenCvCalibration(const std::vector<NamedText>& files, const NamedText& imu,
+                                   const CalibrationOptions& options = {});
+Calibration parseBasaltCalibration(const NamedText& file, const CalibrationOptions& options = {});
 
 /// The rig in words, a line per fact: where each camera sits and looks, the baseline, the lenses, the
 /// noise per sample. Meant to be compared with the hardware on the table.

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <cmath>
 
 #include "drivers/calibration/sensor_fields.hpp"
@@ -13,31 +12,11 @@ namespace {
 using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using RowMatrix34d = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
 
-// A skew bends a right angle of the image by skew / fx; calibration tools give exactly zero [px].
-constexpr double kMaxSkew = 1e-6;
-// Files with few digits are off by 1e-4 or so.
-constexpr double kOrthonormal = 1e-3;
-
-/// fx, fy, cx, cy of a K or of P's left part.
-Eigen::Vector4d intrinsicsOf(const Eigen::Matrix3d& K, const InputPlace& place) {
-  if (!K.allFinite() || K.isZero(0)) {
-    throw place.error("the camera is not calibrated", "Calibrate it; drivers send zeros until then");
-  }
-  if (std::abs(K(0, 1)) > kMaxSkew) {
-    throw place.error(fmt::format("skew of {:g} px", K(0, 1)), "Calibrate with skew held at zero");
-  }
-  if (K(1, 0) != 0 || K(2, 0) != 0 || K(2, 1) != 0 || K(2, 2) != 1) {
-    throw place.error("not a camera matrix", "Write fx 0 cx, 0 fy cy, 0 0 1, row by row");
-  }
-  return {K(0, 0), K(1, 1), K(0, 2), K(1, 2)};
-}
-
-Eigen::Matrix3d rotationOf(const CameraInfo& info, const InputPlace& place) {
-  const Eigen::Matrix3d R = Eigen::Map<const RowMatrix3d>(info.R.data());
-  if (!(R.transpose() * R).isIdentity(kOrthonormal) || R.determinant() < 0) {
-    throw place.error("the rectification is no rotation", "Give all digits of the calibration's result");
-  }
-  return R;
+/// Of the rectified camera seen from the raw one.
+SE3 rectification(const CameraInfo& info, const InputPlace& place) {
+  Warnings rounding;  // a rectification with few digits is made orthonormal
+  return checkedTransform(place, Eigen::Map<const RowMatrix3d>(info.R.data()), Eigen::Vector3d::Zero(),
+                          rounding);
 }
 
 void checkSize(const CameraInfo& info, const std::string& name) {
@@ -53,7 +32,7 @@ LensFit rawLensFit(const CameraInfo& info, const std::string& name, Warnings& wa
   lens.width = info.width;
   lens.height = info.height;
   const InputPlace place{name, 0, "K"};
-  lens.intrinsics = intrinsicsOf(Eigen::Map<const RowMatrix3d>(info.K.data()), place);
+  lens.intrinsics = readIntrinsics(place, Eigen::Map<const RowMatrix3d>(info.K.data()));
   const InputPlace distortion{name, 0, "D"};
   for (const double v : info.D) {
     if (!std::isfinite(v)) throw distortion.error("a coefficient is not finite", "Calibrate the camera");
@@ -80,7 +59,7 @@ CameraModel rectifiedLens(const CameraInfo& info, const std::string& name, Warni
   checkSize(info, name);
   const InputPlace place{name, 0, "P"};
   const RowMatrix34d P = Eigen::Map<const RowMatrix34d>(info.P.data());
-  const Eigen::Vector4d intrinsics = intrinsicsOf(P.leftCols<3>(), place);
+  const Eigen::Vector4d intrinsics = readIntrinsics(place, P.leftCols<3>());
   checkIntrinsics(place, intrinsics, info.width, info.height, warnings);
   return {CameraKind::kPinholeRadtan, info.width, info.height, intrinsics, Eigen::Vector4d::Zero()};
 }
@@ -99,9 +78,7 @@ SE3 rectifiedPair(const CameraInfo& right, const std::string& name) {
 
 SE3 rawPair(const CameraInfo& left, const CameraInfo& right, const std::string& name) {
   const InputPlace place{name, 0, "R"};
-  const SE3 T_rect0_raw0(rotationOf(left, place), Eigen::Vector3d::Zero());
-  const SE3 T_rect1_raw1(rotationOf(right, place), Eigen::Vector3d::Zero());
-  return T_rect1_raw1.inverse() * rectifiedPair(right, name) * T_rect0_raw0;
+  return rectification(right, place).inverse() * rectifiedPair(right, name) * rectification(left, place);
 }
 
 }  // namespace swiftlet

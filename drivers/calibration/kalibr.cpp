@@ -108,6 +108,8 @@ std::vector<CameraEntry> readChain(const YamlField& root, Warnings& warnings) {
   return entries;
 }
 
+}  // namespace
+
 void refuseImuModel(const YamlField& imu, Warnings& warnings) {
   if (imu.has("model")) {
     const YamlField field = imu.at("model");
@@ -149,8 +151,6 @@ void refuseImuModel(const YamlField& imu, Warnings& warnings) {
     }
   }
 }
-
-}  // namespace
 
 Calibration parseKalibrCalibration(const NamedText& camchain, const NamedText& imu,
                                    const CalibrationOptions& options) {

@@ -16,6 +16,7 @@ constexpr double kMaxShiftDifference_s = 0.5e-3;
 constexpr double kMaxReadoutDifference_s = 0.1e-3;  // at 5 rad/s and 450 px, 0.1 px
 constexpr double kMaxAxisAngle = 30.0 * std::numbers::pi / 180.0;
 constexpr double kMinBaseline = 1e-3;  // m
+constexpr double kMaxBaseline = 1;     // m; wider than a drone, and centimetres read as metres have some 7
 
 bool xIsLargest(const Eigen::Vector3d& t) {
   return std::abs(t.x()) > std::abs(t.y()) && std::abs(t.x()) > std::abs(t.z());
@@ -33,6 +34,12 @@ void checkPair(const std::vector<CameraEntry>& cameras, const CalibrationOptions
   if (t.norm() < kMinBaseline) {
     throw InputError(second.file, second.line, second.field, "both cameras sit in the same place",
                      "Give each camera its own transform");
+  }
+  if (t.norm() > kMaxBaseline && !options.accept_unusual_rig) {
+    throw InputError(
+        second.file, second.line, second.field, fmt::format("a baseline of {:.3g} m", t.norm()),
+        "Translations are in metres: is this in millimetres, centimetres (OAK) or squares of the "
+        "board (OpenCV)? A baseline above 1 m needs calibration.accept_unusual_rig");
   }
   if (!xIsLargest(t) && xIsLargest(reversed) && reversed.x() < 0 && !options.accept_unusual_rig) {
     throw InputError(second.file, second.line, second.field,

@@ -16,8 +16,13 @@ namespace {
 // Single-precision copies of a rotation are off by some 1e-7; rounding to 4 digits by 1e-4.
 constexpr double kOrthonormalWarn = 1e-6;
 constexpr double kOrthonormalRefuse = 1e-3;
+// A skew bends a right angle of the image by skew / fx; calibration tools give exactly zero [px].
+constexpr double kMaxSkew = 1e-6;
 constexpr double kLastRowTolerance = 1e-9;
-constexpr double kMaxLever = 10;  // m; a rig is smaller, so more means millimetres
+constexpr double kMaxLever = 10;   // m; a rig is smaller, so more means millimetres
+constexpr double kUsualLever = 1;  // m; OAK's centimetres have some 7
+constexpr const char* kMetres =
+    "Translations are in metres: is this in millimetres, centimetres (OAK) or squares of the board (OpenCV)?";
 constexpr double kShiftWarn_s = 0.1;
 constexpr double kShiftRefuse_s = 1.0;
 constexpr double kReadoutRefuse_s = 0.2;  // the slowest phone takes 61 ms
@@ -34,28 +39,6 @@ constexpr double kAccelDensityLow = 1e-4;
 constexpr double kAccelDensityHigh = 1;
 constexpr double kGyroWalkHigh = 1e-2;
 constexpr double kAccelWalkHigh = 1e-1;
-
-Eigen::Matrix4d readMatrix(const YamlField& field) {
-  std::vector<double> values;
-  if (field.isMap()) {
-    values = field.at("data", "Write the 16 numbers row by row under `data`").numbers();
-  } else {
-    for (const YamlField& row : field.items()) {
-      if (!row.isList()) {
-        values.push_back(row.number());
-        continue;
-      }
-      const std::vector<double> numbers = row.numbers();
-      if (numbers.size() != 4) throw row.error("a row must have 4 numbers", "Write a 4x4 matrix");
-      values.insert(values.end(), numbers.begin(), numbers.end());
-    }
-  }
-  if (values.size() != 16) {
-    throw field.error(fmt::format("{} numbers where a 4x4 matrix has 16", values.size()),
-                      "Write 4 rows of 4 numbers");
-  }
-  return Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
-}
 
 void checkLastRow(const YamlField& field, const Eigen::Matrix4d& T) {
   const Eigen::RowVector4d expected(0, 0, 0, 1);
@@ -105,25 +88,69 @@ void warnOutside(const YamlField& field, double value, double low, double high, 
 
 }  // namespace
 
+std::vector<double> readNumbers(const YamlField& field) {
+  if (field.isMap()) return field.at("data", "Write the numbers row by row under `data`").numbers();
+  std::vector<double> values;
+  for (const YamlField& row : field.items()) {
+    if (!row.isList()) {
+      values.push_back(row.number());
+      continue;
+    }
+    const std::vector<double> part = row.numbers();
+    values.insert(values.end(), part.begin(), part.end());
+  }
+  return values;
+}
+
+std::vector<double> readMatrix(const YamlField& field, std::size_t rows, std::size_t columns) {
+  std::vector<double> values = readNumbers(field);
+  if (values.size() != rows * columns) {
+    throw field.error(
+        fmt::format("{} numbers where a {}x{} matrix has {}", values.size(), rows, columns, rows * columns),
+        fmt::format("Write {} rows of {} numbers", rows, columns));
+  }
+  return values;
+}
+
+Eigen::Vector4d readIntrinsics(const InputPlace& place, const Eigen::Matrix3d& K) {
+  if (!K.allFinite() || K.isZero(0)) {
+    throw place.error("the camera is not calibrated", "Calibrate it; drivers send zeros until then");
+  }
+  if (std::abs(K(0, 1)) > kMaxSkew) {
+    throw place.error(fmt::format("a skew of {:g} px", K(0, 1)), "Calibrate with the skew held at zero");
+  }
+  if (K(1, 0) != 0 || K(2, 0) != 0 || K(2, 1) != 0 || K(2, 2) != 1) {
+    throw place.error("not a camera matrix", "Write fx 0 cx, 0 fy cy, 0 0 1, row by row");
+  }
+  return {K(0, 0), K(1, 1), K(0, 2), K(1, 2)};
+}
+
 SE3 readTransform(const YamlField& field, Warnings& warnings) {
-  const Eigen::Matrix4d T = readMatrix(field);
+  const std::vector<double> values = readMatrix(field, 4, 4);
+  const Eigen::Matrix4d T = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
   checkLastRow(field, T);
-  const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
-  const Eigen::Vector3d t = T.topRightCorner<3, 1>();
+  return checkedTransform(field.place(), T.topLeftCorner<3, 3>(), T.topRightCorner<3, 1>(), warnings);
+}
+
+SE3 checkedTransform(const InputPlace& place, const Eigen::Matrix3d& R, const Eigen::Vector3d& t,
+                     Warnings& warnings) {
   const double defect = (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(defect <= kOrthonormalRefuse)) {
-    throw field.error(fmt::format("the rotation is not orthonormal (off by {:.2g})", defect),
+    throw place.error(fmt::format("the rotation is not orthonormal (off by {:.2g})", defect),
                       "Give all digits of the calibration's result");
   }
   if (R.determinant() < 0) {
-    throw field.error("the rotation is a mirror (determinant -1)", "One axis has the wrong sign");
+    throw place.error("the rotation is a mirror (determinant -1)", "One axis has the wrong sign");
   }
   if (t.cwiseAbs().maxCoeff() > kMaxLever) {
-    throw field.error(fmt::format("the translation is {:.3g} m long", t.norm()),
-                      "Translations are in metres: is this in millimetres?");
+    throw place.error(fmt::format("the translation is {:.3g} m long", t.norm()), kMetres);
+  }
+  if (t.norm() > kUsualLever) {
+    warnings.push_back(place.where() +
+                       fmt::format(": the translation is {:.3g} m long. {}", t.norm(), kMetres));
   }
   if (defect > kOrthonormalWarn) {
-    warnings.push_back(field.where() +
+    warnings.push_back(place.where() +
                        fmt::format(": the rotation is off orthonormal by {:.2g}; made orthonormal", defect));
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -263,15 +290,19 @@ LensFit readLens(const YamlField& camera, const std::string& coefficients_key, W
 std::optional<double> readShift(const YamlField& camera, Warnings& warnings) {
   if (!camera.has("timeshift_cam_imu")) return std::nullopt;
   const YamlField field = camera.at("timeshift_cam_imu");
-  const double shift = field.number();
-  if (std::abs(shift) > kShiftRefuse_s) {
-    throw field.error(fmt::format("a shift of {} s", shift), "The unit is seconds: is this in milliseconds?");
+  return checkedShift(field.place(), field.number(), warnings);
+}
+
+double checkedShift(const InputPlace& place, double shift_s, Warnings& warnings) {
+  if (std::abs(shift_s) > kShiftRefuse_s) {
+    throw place.error(fmt::format("a shift of {} s", shift_s),
+                      "The unit is seconds: is this in milliseconds?");
   }
-  if (std::abs(shift) > kShiftWarn_s) {
-    warnings.push_back(field.where() +
-                       fmt::format(": a shift of {} s is unusually large (unit: seconds)", shift));
+  if (std::abs(shift_s) > kShiftWarn_s) {
+    warnings.push_back(place.where() +
+                       fmt::format(": a shift of {} s is unusually large (unit: seconds)", shift_s));
   }
-  return shift;
+  return shift_s;
 }
 
 double readReadout(const YamlField& camera) {

@@ -24,10 +24,22 @@ struct CameraEntry {
   std::string field;
 };
 
+/// The numbers of a list, of a list of rows, or of {rows, cols, data}.
+std::vector<double> readNumbers(const YamlField& field);
+/// The same, row by row, where a matrix has this size.
+std::vector<double> readMatrix(const YamlField& field, std::size_t rows, std::size_t columns);
+
+/// fx, fy, cx, cy of a camera matrix; refuses a skew and what is no camera matrix.
+Eigen::Vector4d readIntrinsics(const InputPlace& place, const Eigen::Matrix3d& K);
+
 /// A 4x4 rigid transform, written as four lists of four or as {rows, cols, data}. Refuses wrong last
 /// rows, mirrors, millimetres and matrices further than 1e-3 from orthonormal; above 1e-6 it
 /// re-orthonormalises and warns.
 SE3 readTransform(const YamlField& field, Warnings& warnings);
+
+/// The checks of readTransform on what is already numbers.
+SE3 checkedTransform(const InputPlace& place, const Eigen::Matrix3d& R, const Eigen::Vector3d& t,
+                     Warnings& warnings);
 
 /// [width, height] in pixels.
 std::array<int, 2> readResolution(const YamlField& field);
@@ -53,6 +65,12 @@ LensFit readLens(const YamlField& camera, const std::string& coefficients_key, W
 
 /// `timeshift_cam_imu` of a camera [s]; empty where it is not given. Refuses more than a second.
 std::optional<double> readShift(const YamlField& camera, Warnings& warnings);
+
+/// The same check on a number of seconds.
+double checkedShift(const InputPlace& place, double shift_s, Warnings& warnings);
+
+/// Refuses the models and corrections of a Kalibr or OpenVINS IMU file that are not applied here.
+void refuseImuModel(const YamlField& imu, Warnings& warnings);
 
 /// `readout_ms` of a camera whose `shutter` is `rolling` [s]; 0 for a global one, which it is unless said.
 double readReadout(const YamlField& camera);
