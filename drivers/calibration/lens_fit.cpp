@@ -32,7 +32,7 @@ constexpr double kLeastCovered = 0.5;
 constexpr double kToldCovered = 0.995;
 // By which a ray, its pixel and the pixel's ray may differ in a lens that can be inverted there [px].
 constexpr double kInverseTolerance = 1e-3;
-constexpr int kMaxEvaluations = 400;
+constexpr int kMaxEvaluations = 200;
 // Stands for the distance of a ray that the target does not see, to make the optimizer turn back [px].
 constexpr double kUnseen = 1e3;
 

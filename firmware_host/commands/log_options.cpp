@@ -8,8 +8,10 @@ namespace swiftlet {
 
 void LogCommandOptions::addCalibration(CLI::App& command) {
   command
-      .add_option("--calibration", calibration,
-                  "Calibration instead of the log's own: a folder, or Kalibr camchain and IMU files")
+      .add_option(
+          "--calibration", calibration,
+          "Calibration instead of the log's own: a folder, or a file of Kalibr, Basalt, ROS or OpenCV and "
+          "the IMU file where it is not beside it")
       ->expected(1, 2);
 }
 

@@ -26,6 +26,7 @@ int runProgram(int argc, char** argv) {
   addSmoothCommand(app, exit_code);
   addRecordCommand(app, exit_code);
   addDoctorCommand(app, exit_code);
+  addCalibrationCommand(app, exit_code);
   addSettingsCommand(app, exit_code);
   addLabCommands(app, exit_code);
   addManCommand(app, exit_code);

@@ -16,10 +16,11 @@ std::vector<Setting> deviceSettings() {
   constexpr auto kRos2 = &Settings::ros2;
   return {
       {"vehicle.calibration", "",
-       "Calibration of the rig for `fly`, `record` and `doctor`: a folder with EuRoC's sensor.yaml files, or "
-       "Kalibr's camchain.",
+       "Calibration of the rig for `fly`, `record` and `doctor`: a folder, or a file of EuRoC, Kalibr, "
+       "Basalt, "
+       "ROS camera_info or OpenCV.",
        TextSetting{member(kVehicle, &VehicleGroup::calibration), "a file's or folder's name, or empty"}},
-      {"vehicle.imu_calibration", "", "Kalibr's IMU file where it is not beside the camchain.",
+      {"vehicle.imu_calibration", "", "IMU file where it is not beside the cameras' file.",
        TextSetting{member(kVehicle, &VehicleGroup::imu_calibration), "a file's name, or empty"}},
       {"imu_link.device", "",
        "Serial port (best by its name under /dev/serial/by-id), CAN interface or an autopilot's UDP port.",

@@ -132,6 +132,21 @@ void kalibrYaml(std::string_view text) {
   }
 }
 
+/// ROS camera_info, OpenCV and Basalt: whatever the text is, each reader is given it.
+void cameraFiles(std::string_view text) {
+  const auto [camera, imu_text] = twoFiles(text);
+  const std::string imu =
+      std::string(imu_text) + "T_imu_cam0: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
+  for (const int form : {0, 1, 2}) {
+    try {
+      demandSane(form == 0   ? parseCameraInfoCalibration({{"cam0", camera}}, {"imu0", imu})
+                 : form == 1 ? parseOpenCvCalibration({{"cam0", camera}}, {"imu0", imu})
+                             : parseBasaltCalibration({"calibration", camera}));
+    } catch (const InputError&) {
+    }
+  }
+}
+
 void rosMessage(std::string_view text) {
   const std::span<const std::uint8_t> body(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
   ImuSample sample;
@@ -314,12 +329,13 @@ void keptMap(std::string_view text) {
   }
 }
 
-constexpr std::array<NamedTarget, 26> kTargets = {{{"imu_csv", &imuCsv},
+constexpr std::array<NamedTarget, 27> kTargets = {{{"imu_csv", &imuCsv},
                                                    {"image_csv", &imageCsv},
                                                    {"trajectory", &trajectory},
                                                    {"tracks", &tracks},
                                                    {"euroc_yaml", &eurocYaml},
                                                    {"kalibr_yaml", &kalibrYaml},
+                                                   {"camera_files", &cameraFiles},
                                                    {"ros_message", &rosMessage},
                                                    {"recording", &recording},
                                                    {"gpmf", &gpmf},

@@ -37,6 +37,50 @@ void writeSensor(const std::filesystem::path& folder, const std::string& text) {
   writeWholeFile((folder / "sensor.yaml").string(), text);
 }
 
+void writeImu(const std::filesystem::path& root, const Calibration& given) {
+  const SE3 T_filebody_imu(Eigen::Quaterniond(given.R_body_imu), given.T_body_filebody.inverse().translation);
+  writeSensor(root / "imu0", imuYaml(given.noise, "as given", T_filebody_imu));
+}
+
+std::string shiftYaml(Duration shift) { return fmt::format("timeshift_cam_imu: {:.9f}\n", shift.seconds()); }
+
+std::string kalibrCamera(const Calibration& given, std::size_t c) {
+  const CameraModel& lens = given.rig.camera[c];
+  const Eigen::Vector4d& k = lens.intrinsics();
+  const Eigen::Vector4d& d = lens.distortion();
+  const SE3 T_body_imu(Eigen::Quaterniond(given.R_body_imu), Eigen::Vector3d::Zero());
+  const SE3 T_cam_imu = given.rig.T_body_cam[c].inverse() * T_body_imu;
+  const Eigen::Matrix3d R = T_cam_imu.R();
+  std::string text = fmt::format("cam{}:\n  T_cam_imu:\n", c);
+  for (int row = 0; row < 3; ++row) {
+    text += fmt::format("  - [{:.15g}, {:.15g}, {:.15g}, {:.15g}]\n", R(row, 0), R(row, 1), R(row, 2),
+                        T_cam_imu.translation[row]);
+  }
+  text += fmt::format(
+      "  - [0.0, 0.0, 0.0, 1.0]\n  camera_model: pinhole\n  intrinsics: [{:.12g}, {:.12g}, {:.12g}, "
+      "{:.12g}]\n"
+      "  distortion_model: {}\n  distortion_coeffs: [{:.12g}, {:.12g}, {:.12g}, {:.12g}]\n  resolution: [{}, "
+      "{}]\n"
+      "  timeshift_cam_imu: {:.9f}\n",
+      k[0], k[1], k[2], k[3], lens.kind() == CameraKind::kPinholeRadtan ? "radtan" : "equidistant", d[0],
+      d[1], d[2], d[3], lens.width(), lens.height(), given.rig.camera_to_imu_shift.seconds());
+  if (!given.camera_topic[c].empty()) text += fmt::format("  rostopic: {}\n", given.camera_topic[c]);
+  if (given.rig.rolls()) {
+    text += fmt::format("  shutter: rolling\n  readout_ms: {:.9g}\n", kToMs * given.rig.readout.seconds());
+  }
+  return text;
+}
+
+std::string kalibrImu(const Calibration& given) {
+  const ImuNoise& n = given.noise;
+  std::string text = fmt::format(
+      "update_rate: {:g}\ngyroscope_noise_density: {:g}\ngyroscope_random_walk: {:g}\n"
+      "accelerometer_noise_density: {:g}\naccelerometer_random_walk: {:g}\n",
+      n.rate_hz, n.gyro_density, n.gyro_walk, n.accel_density, n.accel_walk);
+  if (!given.imu_topic.empty()) text += fmt::format("rostopic: {}\n", given.imu_topic);
+  return text;
+}
+
 }  // namespace
 
 void writeEstimatedCalibration(const std::string& folder, const Calibration& given,
@@ -44,9 +88,7 @@ void writeEstimatedCalibration(const std::string& folder, const Calibration& giv
   const std::filesystem::path root(folder);
   // The file's body again: the truth of a log may be given in it.
   const SE3 T_filebody_body = given.T_body_filebody.inverse();
-  const std::string times =
-      fmt::format("timeshift_cam_imu: {:.9f}\n", estimate.camera_to_imu_shift.seconds()) +
-      shutterYaml(estimate.readout);
+  const std::string times = shiftYaml(estimate.camera_to_imu_shift) + shutterYaml(estimate.readout);
   for (std::size_t c = 0; c < given.rig.camera_count; ++c) {
     const double rate = given.camera_rate_hz[c] > 0 ? given.camera_rate_hz[c] : rate_hz;
     // A camera that was left out stays as given.
@@ -54,8 +96,25 @@ void writeEstimatedCalibration(const std::string& folder, const Calibration& giv
     writeSensor(root / fmt::format("cam{}", c), cameraYaml(given.rig.camera[c], T_filebody_body * T_body_cam,
                                                            rate, originText(estimate, c), times));
   }
-  const SE3 T_filebody_imu(Eigen::Quaterniond(given.R_body_imu), T_filebody_body.translation);
-  writeSensor(root / "imu0", imuYaml(given.noise, "as given", T_filebody_imu));
+  writeImu(root, given);
+}
+
+void writeCalibration(const std::string& folder, const Calibration& calibration) {
+  const std::filesystem::path root(folder);
+  const Rig& rig = calibration.rig;
+  const std::string times = shiftYaml(rig.camera_to_imu_shift) + shutterYaml(rig.readout);
+  std::string chain;
+  for (std::size_t c = 0; c < rig.camera_count; ++c) {
+    const std::string origin =
+        calibration.conversion[c].empty() ? "as given" : "converted; " + calibration.conversion[c];
+    writeSensor(root / fmt::format("cam{}", c),
+                cameraYaml(rig.camera[c], calibration.T_body_filebody.inverse() * rig.T_body_cam[c],
+                           calibration.camera_rate_hz[c], fmt::format("\"{}\"", origin), times));
+    chain += kalibrCamera(calibration, c);
+  }
+  writeImu(root, calibration);
+  writeWholeFile((root / "camchain-imucam.yaml").string(), chain);
+  writeWholeFile((root / "imu.yaml").string(), kalibrImu(calibration));
 }
 
 }  // namespace swiftlet
