@@ -1,15 +1,16 @@
-// Finding and reading calibration files on disk.
+// Finding and reading the files of a calibration.
 
 #include "drivers/calibration/calibration.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <initializer_list>
-#include <iterator>
+#include <optional>
 #include <utility>
 
 #include "drivers/calibration/yaml_field.hpp"
+#include "drivers/input/file_tree.hpp"
 
 namespace swiftlet {
 namespace {
@@ -21,25 +22,22 @@ constexpr std::size_t kMaxFileBytes = (1U << 20U) + 1U;
 
 enum class FileKind { kOther, kCamchain, kImu, kBasalt, kCameraInfo, kOpenCv, kOpenCvPair };
 
-std::string readText(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) {
-    throw InputError(path.string(), 0, "", "cannot be read",
+std::string readText(FileTree& tree, const std::string& path) {
+  std::vector<std::uint8_t> bytes;
+  if (!tree.read(path, bytes)) {
+    throw InputError(tree.name(path), 0, "", "cannot be read",
                      "The calibration is needed; give it beside the log or with another path");
   }
-  std::string text(kMaxFileBytes, '\0');
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  return text;
+  return {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(std::min(bytes.size(), kMaxFileBytes))};
 }
 
 bool hasAny(const YamlField& root, std::initializer_list<const char*> keys) {
   return std::any_of(keys.begin(), keys.end(), [&](const char* key) { return root.has(key); });
 }
 
-FileKind kindOf(const fs::path& path) {
+FileKind kindOf(FileTree& tree, const std::string& path) {
   try {
-    const YamlField root = YamlField::parse(path.string(), readText(path));
+    const YamlField root = YamlField::parse(tree.name(path), readText(tree, path));
     if (root.has("cam0") && root.at("cam0").isMap()) return FileKind::kCamchain;
     if (root.has("imu0") && root.at("imu0").isMap()) return FileKind::kImu;
     if (root.has("gyroscope_noise_density") && hasAny(root, {"update_rate", "rate_hz"}))
@@ -66,112 +64,115 @@ bool describesCameras(FileKind kind) {
          kind == FileKind::kOpenCv;
 }
 
-std::vector<fs::path> yamlFilesIn(const fs::path& folder) {
-  std::vector<fs::path> files;
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    const std::string extension = entry.path().extension().string();
-    if (entry.is_regular_file(error) &&
-        (extension == ".yaml" || extension == ".yml" || extension == ".json")) {
-      files.push_back(entry.path());
-    }
+std::string within(const std::string& folder, const std::string& name) {
+  return folder.empty() ? name : folder + "/" + name;
+}
+
+std::vector<std::string> textFilesIn(const FileTree& tree, const std::string& folder) {
+  std::vector<std::string> files;
+  for (const std::string& name : tree.list(folder)) {
+    const bool text = name.ends_with(".yaml") || name.ends_with(".yml") || name.ends_with(".json");
+    if (text && tree.isFile(within(folder, name))) files.push_back(within(folder, name));
   }
-  std::sort(files.begin(), files.end());
   return files;
 }
 
-std::vector<fs::path> filesOf(const fs::path& folder, FileKind kind) {
-  std::vector<fs::path> files = yamlFilesIn(folder);
-  std::erase_if(files, [kind](const fs::path& file) { return kindOf(file) != kind; });
+std::vector<std::string> filesOf(FileTree& tree, const std::string& folder, FileKind kind) {
+  std::vector<std::string> files = textFilesIn(tree, folder);
+  std::erase_if(files, [&](const std::string& file) { return kindOf(tree, file) != kind; });
   return files;
 }
 
-void refuseMore(const fs::path& folder, const std::vector<fs::path>& files, std::size_t most,
-                const char* what) {
+void refuseMore(const FileTree& tree, const std::string& folder, const std::vector<std::string>& files,
+                std::size_t most, const char* what) {
   if (files.size() <= most) return;
-  throw InputError(folder.string(), 0, "",
-                   std::string(most == 1 ? "two " : "three ") + what + " files: " +
-                       files[most - 1].filename().string() + " and " + files[most].filename().string(),
+  throw InputError(tree.name(folder), 0, "",
+                   std::string(most == 1 ? "two " : "three ") + what +
+                       " files: " + fs::path(files[most - 1]).filename().string() + " and " +
+                       fs::path(files[most]).filename().string(),
                    "Name the one to use");
 }
 
-/// The IMU file: the given one, or the one of the folder.
-fs::path imuOf(const fs::path& folder, const std::string& imu_file) {
-  if (!imu_file.empty()) return imu_file;
-  const std::vector<fs::path> files = filesOf(folder, FileKind::kImu);
-  refuseMore(folder, files, 1, "IMU");
-  return files.empty() ? fs::path() : files.front();
+/// A calibration's files: a text of its own tree, or the IMU's wherever the user has it.
+struct Text {
+  std::string name;
+  std::string text;
+  [[nodiscard]] NamedText named() const { return {name, text}; }
+};
+
+Text textOf(FileTree& tree, const std::string& path) { return {tree.name(path), readText(tree, path)}; }
+
+/// The IMU file: the given one, on disk, or the one of the folder.
+std::optional<Text> imuOf(FileTree& tree, const std::string& folder, const std::string& imu_file) {
+  if (!imu_file.empty()) {
+    const fs::path path(imu_file);
+    const auto disk = openFolder(path.parent_path().string());
+    return Text{imu_file, readText(*disk, path.filename().string())};
+  }
+  const std::vector<std::string> files = filesOf(tree, folder, FileKind::kImu);
+  refuseMore(tree, folder, files, 1, "IMU");
+  if (files.empty()) return std::nullopt;
+  return textOf(tree, files.front());
 }
 
-Calibration readEuroc(const fs::path& mav0, const CalibrationOptions& options) {
-  std::vector<std::string> names;
-  std::vector<std::string> texts;
+Calibration readEuroc(FileTree& tree, const std::string& mav0, const CalibrationOptions& options) {
+  std::vector<Text> texts;
   for (const char* camera : {"cam0", "cam1"}) {
-    const fs::path file = mav0 / camera / "sensor.yaml";
     // A sequence with one camera has no second folder; a folder without sensor.yaml is a fault.
-    if (!names.empty() && !fs::exists(mav0 / camera)) break;
-    names.push_back(file.string());
-    texts.push_back(readText(file));
+    if (!texts.empty() && !tree.isFolder(within(mav0, camera))) break;
+    texts.push_back(textOf(tree, within(mav0, camera) + "/sensor.yaml"));
   }
   std::vector<NamedText> cameras;
-  for (std::size_t i = 0; i < names.size(); ++i) cameras.push_back({names[i], texts[i]});
-  const fs::path imu_file = mav0 / "imu0" / "sensor.yaml";
-  const std::string imu_text = readText(imu_file);
-  return parseEurocCalibration(cameras, {imu_file.string(), imu_text}, options);
-}
-
-Calibration readKalibr(const fs::path& camchain, const fs::path& imu, const CalibrationOptions& options) {
-  const std::string chain_text = readText(camchain);
-  const std::string imu_text = readText(imu);
-  return parseKalibrCalibration({camchain.string(), chain_text}, {imu.string(), imu_text}, options);
+  for (const Text& text : texts) cameras.push_back(text.named());
+  const Text imu = textOf(tree, within(mav0, "imu0/sensor.yaml"));
+  return parseEurocCalibration(cameras, imu.named(), options);
 }
 
 /// ROS's or OpenCV's files, which hold cameras alone.
-Calibration readBare(FileKind kind, const std::vector<fs::path>& cameras, const fs::path& imu,
-                     const CalibrationOptions& options) {
-  if (imu.empty()) {
+Calibration readBare(FileTree& tree, FileKind kind, const std::vector<std::string>& cameras,
+                     const std::optional<Text>& imu, const CalibrationOptions& options) {
+  if (!imu) {
     throw InputError(
-        cameras.front().string(), 0, "",
+        tree.name(cameras.front()), 0, "",
         "holds cameras alone: the IMU's noise, and its place beside camera 0, are missing",
         "Write imu.yaml beside it with update_rate, gyroscope_noise_density, gyroscope_random_walk, "
         "accelerometer_noise_density, accelerometer_random_walk and T_imu_cam0 (docs/formats.md has "
         "an example)");
   }
-  std::vector<std::string> texts;
-  for (const fs::path& file : cameras) texts.push_back(readText(file));
+  std::vector<Text> texts;
+  for (const std::string& file : cameras) texts.push_back(textOf(tree, file));
   std::vector<NamedText> named;
-  for (std::size_t i = 0; i < cameras.size(); ++i) named.push_back({cameras[i].string(), texts[i]});
-  const std::string imu_text = readText(imu);
-  const NamedText imu_named{imu.string(), imu_text};
-  return kind == FileKind::kCameraInfo ? parseCameraInfoCalibration(named, imu_named, options)
-                                       : parseOpenCvCalibration(named, imu_named, options);
+  for (const Text& text : texts) named.push_back(text.named());
+  return kind == FileKind::kCameraInfo ? parseCameraInfoCalibration(named, imu->named(), options)
+                                       : parseOpenCvCalibration(named, imu->named(), options);
 }
 
-bool hasEuroc(const fs::path& folder) { return fs::exists(folder / "cam0" / "sensor.yaml"); }
+bool hasEuroc(const FileTree& tree, const std::string& folder) {
+  return tree.isFile(within(folder, "cam0/sensor.yaml"));
+}
 
-/// One file, and for Kalibr, ROS and OpenCV the IMU file beside it.
-Calibration readFile(const fs::path& given, const std::string& imu_file, const CalibrationOptions& options) {
-  const fs::path folder = fs::absolute(given).parent_path();
-  if (given.filename() == "sensor.yaml") return readEuroc(folder.parent_path(), options);
-  const FileKind kind = kindOf(given);
-  const std::string text = readText(given);
+/// One file, and for Kalibr, ROS and OpenCV the IMU file beside it in `folder`.
+Calibration readFile(FileTree& tree, const std::string& folder, const std::string& path,
+                     const std::string& imu_file, const CalibrationOptions& options) {
+  const FileKind kind = kindOf(tree, path);
+  const Text text = textOf(tree, path);
   switch (kind) {
     case FileKind::kBasalt:
-      return parseBasaltCalibration({given.string(), text}, options);
+      return parseBasaltCalibration(text.named(), options);
     case FileKind::kCameraInfo:
     case FileKind::kOpenCv:
-      return readBare(kind, {given}, imuOf(folder, imu_file), options);
+      return readBare(tree, kind, {path}, imuOf(tree, folder, imu_file), options);
     case FileKind::kCamchain: {
-      const fs::path imu = imuOf(folder, imu_file);
-      if (imu.empty()) {
-        throw InputError(folder.string(), 0, "", "no Kalibr IMU file",
+      const std::optional<Text> imu = imuOf(tree, folder, imu_file);
+      if (!imu) {
+        throw InputError(tree.name(folder), 0, "", "no Kalibr IMU file",
                          "Give Kalibr's IMU YAML beside the camchain, or name it");
       }
-      return readKalibr(given, imu, options);
+      return parseKalibrCalibration(text.named(), imu->named(), options);
     }
     default:
       // Parsing shows what is wrong with it.
-      throw YamlField::parse(given.string(), text)
+      throw YamlField::parse(text.name, text.text)
           .error(
               "not a calibration of cameras: no Kalibr camchain, Basalt JSON, ROS camera_info or OpenCV file",
               "Give one of these, or a EuRoC folder");
@@ -180,13 +181,44 @@ Calibration readFile(const fs::path& given, const std::string& imu_file, const C
 
 }  // namespace
 
+bool hasCalibration(FileTree& tree, const std::string& folder) {
+  if (hasEuroc(tree, within(folder, "mav0")) || hasEuroc(tree, folder)) return true;
+  return std::ranges::any_of(textFilesIn(tree, folder),
+                             [&](const std::string& file) { return describesCameras(kindOf(tree, file)); });
+}
+
 bool hasCalibration(const std::string& path) {
-  const fs::path given(path);
-  if (!fs::is_directory(given)) return fs::exists(given);
-  if (hasEuroc(given / "mav0") || hasEuroc(given)) return true;
-  const std::vector<fs::path> files = yamlFilesIn(given);
-  return std::any_of(files.begin(), files.end(),
-                     [](const fs::path& f) { return describesCameras(kindOf(f)); });
+  if (!fs::is_directory(path)) return fs::exists(path);
+  return hasCalibration(*openFolder(path), "");
+}
+
+Calibration readCalibration(FileTree& tree, const std::string& folder, const std::string& imu_file,
+                            const CalibrationOptions& options) {
+  for (const std::string& mav0 : {within(folder, "mav0"), folder}) {
+    if (hasEuroc(tree, mav0)) return readEuroc(tree, mav0, options);
+  }
+  for (const auto& [kind, name] : {std::pair{FileKind::kCamchain, "Kalibr camchain"},
+                                   std::pair{FileKind::kBasalt, "Basalt calibration"}}) {
+    const std::vector<std::string> files = filesOf(tree, folder, kind);
+    refuseMore(tree, folder, files, 1, name);
+    if (!files.empty()) return readFile(tree, folder, files.front(), imu_file, options);
+  }
+  std::vector<std::string> cameras = filesOf(tree, folder, FileKind::kCameraInfo);
+  refuseMore(tree, folder, cameras, kMaxCameras, "camera_info");
+  if (!cameras.empty()) {
+    return readBare(tree, FileKind::kCameraInfo, cameras, imuOf(tree, folder, imu_file), options);
+  }
+  cameras = filesOf(tree, folder, FileKind::kOpenCv);
+  refuseMore(tree, folder, cameras, 1, "OpenCV");
+  if (cameras.empty()) {
+    throw InputError(
+        tree.name(folder), 0, "", "no calibration of cameras",
+        "Give EuRoC cam0/sensor.yaml and imu0/sensor.yaml, Kalibr's camchain and IMU YAML, Basalt's "
+        "JSON, or ROS or OpenCV files with imu.yaml");
+  }
+  const std::vector<std::string> pair = filesOf(tree, folder, FileKind::kOpenCvPair);
+  cameras.insert(cameras.end(), pair.begin(), pair.end());
+  return readBare(tree, FileKind::kOpenCv, cameras, imuOf(tree, folder, imu_file), options);
 }
 
 Calibration readCalibration(const std::string& path, const std::string& imu_file,
@@ -195,29 +227,12 @@ Calibration readCalibration(const std::string& path, const std::string& imu_file
   if (!fs::exists(given)) {
     throw InputError(path, 0, "", "does not exist", "Give a calibration file or a folder that has one");
   }
-  if (!fs::is_directory(given)) return readFile(given, imu_file, options);
-  if (hasEuroc(given / "mav0")) return readEuroc(given / "mav0", options);
-  if (hasEuroc(given)) return readEuroc(given, options);
-  for (const auto& [kind, name] : {std::pair{FileKind::kCamchain, "Kalibr camchain"},
-                                   std::pair{FileKind::kBasalt, "Basalt calibration"}}) {
-    const std::vector<fs::path> files = filesOf(given, kind);
-    refuseMore(given, files, 1, name);
-    if (!files.empty()) return readFile(files.front(), imu_file, options);
+  if (fs::is_directory(given)) return readCalibration(*openFolder(path), "", imu_file, options);
+  if (given.filename() == "sensor.yaml") {
+    return readEuroc(*openFolder(fs::absolute(given).parent_path().parent_path().string()), "", options);
   }
-  std::vector<fs::path> cameras = filesOf(given, FileKind::kCameraInfo);
-  refuseMore(given, cameras, kMaxCameras, "camera_info");
-  if (!cameras.empty()) return readBare(FileKind::kCameraInfo, cameras, imuOf(given, imu_file), options);
-  cameras = filesOf(given, FileKind::kOpenCv);
-  refuseMore(given, cameras, 1, "OpenCV");
-  if (cameras.empty()) {
-    throw InputError(
-        path, 0, "", "no calibration of cameras",
-        "Give EuRoC cam0/sensor.yaml and imu0/sensor.yaml, Kalibr's camchain and IMU YAML, Basalt's "
-        "JSON, or ROS or OpenCV files with imu.yaml");
-  }
-  const std::vector<fs::path> pair = filesOf(given, FileKind::kOpenCvPair);
-  cameras.insert(cameras.end(), pair.begin(), pair.end());
-  return readBare(FileKind::kOpenCv, cameras, imuOf(given, imu_file), options);
+  return readFile(*openFolder(given.parent_path().string()), "", given.filename().string(), imu_file,
+                  options);
 }
 
 }  // namespace swiftlet

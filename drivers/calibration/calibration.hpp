@@ -21,11 +21,13 @@
 #include <string_view>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "estimator/camera/rig.hpp"
 #include "estimator/imu/imu_noise.hpp"
 
 namespace swiftlet {
+
+class FileTree;
 
 struct CalibrationOptions {
   /// Take a rig whose geometry looks like a transform read the wrong way round.
@@ -56,8 +58,13 @@ struct Calibration {
 Calibration readCalibration(const std::string& path, const std::string& imu_file = {},
                             const CalibrationOptions& options = {});
 
+/// The same in a tree's folder, "" its root; a given `imu_file` is on disk.
+Calibration readCalibration(FileTree& tree, const std::string& folder, const std::string& imu_file = {},
+                            const CalibrationOptions& options = {});
+
 /// True when the folder or file `path` has a calibration that readCalibration would find (good or bad).
 bool hasCalibration(const std::string& path);
+bool hasCalibration(FileTree& tree, const std::string& folder);
 
 /// The same from text in memory (EuRoC: one text per camera), for tests and embedded rigs. `name`s
 /// stand for the files in messages.

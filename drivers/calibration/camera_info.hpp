@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
 #include "drivers/calibration/lens_fit.hpp"
+#include "drivers/input/input_error.hpp"
 #include "estimator/camera/camera_model.hpp"
 #include "estimator/geometry/se3.hpp"
 

@@ -2,9 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
-#include <iterator>
-
 #include "drivers/calibration/sensor_fields.hpp"
 
 namespace swiftlet {
@@ -16,11 +13,8 @@ constexpr double kMostUnit = 0.1;
 
 }  // namespace
 
-DepthSensor readDepthSensor(const std::string& path, std::vector<std::string>& warnings) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(path, 0, "", "cannot be read", "Give the depth camera's sensor.yaml");
-  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  const YamlField root = YamlField::parse(path, text);
+DepthSensor readDepthSensor(const NamedText& file, std::vector<std::string>& warnings) {
+  const YamlField root = YamlField::parse(file.name, file.text);
   const CameraModel lens = readLens(root, "distortion_coefficients", warnings).model;
   if (lens.kind() != CameraKind::kPinholeRadtan || !lens.distortion().isZero(0)) {
     throw root.at("distortion_coefficients")

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "drivers/calibration/calibration.hpp"
 #include "estimator/messages/depth_image.hpp"
 
 namespace swiftlet {
@@ -16,6 +17,6 @@ struct DepthSensor {
 };
 
 /// Refuses a lens with distortion: depth along the axis of a bent image has no common reading.
-DepthSensor readDepthSensor(const std::string& path, std::vector<std::string>& warnings);
+DepthSensor readDepthSensor(const NamedText& file, std::vector<std::string>& warnings);
 
 }  // namespace swiftlet

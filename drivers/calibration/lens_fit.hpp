@@ -18,8 +18,8 @@
 
 #include <string>
 
-#include "drivers/calibration/input_error.hpp"
 #include "drivers/calibration/source_lens.hpp"
+#include "drivers/input/input_error.hpp"
 #include "estimator/camera/camera_model.hpp"
 
 namespace swiftlet {

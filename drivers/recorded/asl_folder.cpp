@@ -1,14 +1,14 @@
 #include "drivers/recorded/asl_folder.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <filesystem>
-#include <span>
+#include <optional>
 
+#include "drivers/input/file_tree.hpp"
 #include "drivers/recorded/image_list.hpp"
 #include "drivers/recorded/imu_file.hpp"
 #include "drivers/recorded/order_by_stamp.hpp"
@@ -18,187 +18,234 @@
 namespace swiftlet {
 namespace {
 
-namespace fs = std::filesystem;
+// Numbers of pictures; a stamp in ns is above a second.
+constexpr std::int64_t kLargestNumber = 100'000'000;
+constexpr int kAround = 2;  // folders that archives put around a log, at most
 
-// A listed image larger than this is no camera image.
-constexpr std::size_t kMaxImageBytes = 256U << 20U;
+std::string joined(const std::string& folder, const std::string& name) {
+  return folder.empty() ? name : folder + "/" + name;
+}
 
-fs::path dataFolder(const fs::path& path) { return fs::is_directory(path / "mav0") ? path / "mav0" : path; }
+std::string parentOf(const std::string& folder) {
+  const std::size_t slash = folder.rfind('/');
+  return slash == std::string::npos ? std::string() : folder.substr(0, slash);
+}
 
-/// Reads a whole file into `bytes`, reusing its memory; false when it cannot be read.
-bool readBytes(const fs::path& path, std::vector<std::uint8_t>& bytes) {
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return false;
-  struct stat status {};
-  bool good = ::fstat(file, &status) == 0 && S_ISREG(status.st_mode) &&
-              static_cast<std::size_t>(status.st_size) <= kMaxImageBytes;
-  bytes.resize(good ? static_cast<std::size_t>(status.st_size) : 0);
-  std::size_t done = 0;
-  while (good && done < bytes.size()) {
-    const ssize_t got = ::read(file, bytes.data() + done, bytes.size() - done);
-    good = got > 0;
-    if (good) done += static_cast<std::size_t>(got);
+/// The folders that hold imu0 or cam0: `folder` or mav0 in it, else those within, `depth` levels down.
+void findIn(const FileTree& tree, const std::string& folder, int depth, std::vector<std::string>& found) {
+  for (const std::string& place : {joined(folder, "mav0"), folder}) {
+    if (!tree.isFolder(joined(place, "imu0")) && !tree.isFolder(joined(place, "cam0"))) continue;
+    found.push_back(place);
+    return;
   }
-  ::close(file);
-  bytes.resize(done);
-  return good;
+  if (depth == 0) return;
+  for (const std::string& name : tree.list(folder)) {
+    if (tree.isFolder(joined(folder, name))) findIn(tree, joined(folder, name), depth - 1, found);
+  }
 }
 
 class AslFolder final : public RecordedLog {
  public:
-  AslFolder(const std::string& path, const LogOptions& options);
+  AslFolder(AslFiles files, const LogOptions& options);
   [[nodiscard]] Trajectory groundTruth() const override;
-  [[nodiscard]] std::string groundTruthName() const override { return truth_file_; }
+  [[nodiscard]] std::string groundTruthName() const override {
+    return truth_.empty() ? truth_ : name(truth_);
+  }
   [[nodiscard]] std::string trackFile() const override { return track_file_; }
 
  protected:
   Fetched fetch(const ImageEntry& entry, ImageSize expected, std::uint8_t* out) override;
 
  private:
-  void readCalibrationFiles(const fs::path& given);
+  void readCalibrationFiles();
   void readCameras();
   void readCamera(std::uint32_t camera);
-  std::vector<ImageRow> listImages(const fs::path& folder);
+  void stampNumbered(std::uint32_t camera, std::vector<ImageRow>& rows);
+  std::vector<ImageRow> listImages(std::uint32_t camera);
   [[nodiscard]] bool listsImages() const;
   [[nodiscard]] bool locate(std::uint32_t camera, ImageRow& row) const;
   void chooseTruth();
 
-  fs::path folder_;
+  [[nodiscard]] std::string name(const std::string& path) const { return log_.tree->name(log_.at(path)); }
+  [[nodiscard]] bool hasFile(const std::string& path) const { return log_.tree->isFile(log_.at(path)); }
+  [[nodiscard]] bool hasFolder(const std::string& path) const { return log_.tree->isFolder(log_.at(path)); }
+  [[nodiscard]] std::string text(const std::string& path) const { return log_.tree->text(log_.at(path)); }
+
+  AslFiles log_;
   std::array<std::vector<std::string>, kMaxCameras> files_;  ///< relative to camN
   std::vector<std::uint8_t> bytes_;
   ImageDecoder decoder_;
-  std::string truth_file_;
+  std::string truth_;  ///< in folder_; empty: none
   std::string track_file_;
 };
 
-AslFolder::AslFolder(const std::string& path, const LogOptions& options)
-    : RecordedLog(options), folder_(dataFolder(path)) {
-  const fs::path tracks = folder_ / "tracks0" / "data.csv";
-  if (!options_.without_images && !listsImages() && fs::exists(tracks)) track_file_ = tracks.string();
-  readCalibrationFiles(path);
-  const fs::path imu = folder_ / "imu0" / "data.csv";
-  if (!fs::exists(imu)) {
-    throw InputError(imu.string(), 0, "", "does not exist", "A log needs IMU samples: imu0/data.csv");
+AslFolder::AslFolder(AslFiles files, const LogOptions& options)
+    : RecordedLog(options), log_(std::move(files)) {
+  if (!options_.without_images && !listsImages() && hasFile("tracks0/data.csv"))
+    track_file_ = name("tracks0/data.csv");
+  readCalibrationFiles();
+  const std::string imu = name("imu0/data.csv");
+  if (!hasFile("imu0/data.csv")) {
+    throw InputError(imu, 0, "", "does not exist", "A log needs IMU samples: imu0/data.csv");
   }
-  samples_ = readImuFile(imu.string(), counters_, warnings_);
+  samples_ = readImuText(imu, text("imu0/data.csv"), counters_, warnings_);
   if (!options_.without_images && track_file_.empty()) readCameras();
-  prepare(imu.string());
+  prepare(imu);
   if (files_[0].size() != files_[1].size() && !files_[0].empty() && !files_[1].empty()) {
     warnings_.add(fmt::format("{}: cam0 has {} images, cam1 has {}; frames without a partner stay single",
-                              folder_.string(), files_[0].size(), files_[1].size()));
+                              name(""), files_[0].size(), files_[1].size()));
   }
   chooseTruth();
 }
 
-void AslFolder::readCalibrationFiles(const fs::path& given) {
+void AslFolder::readCalibrationFiles() {
   const CalibrationOptions& how = options_.calibration_options;
   if (!options_.calibration.empty()) {
     calibration_ = readCalibration(options_.calibration, options_.imu_calibration, how);
-  } else if (fs::exists(folder_ / "cam0" / "sensor.yaml")) {
-    calibration_ = readCalibration(folder_.string(), {}, how);
+  } else if (hasFile("cam0/sensor.yaml")) {
+    calibration_ = readCalibration(*log_.tree, log_.folder, options_.imu_calibration, how);
   } else {
     // Kalibr's files beside the data: TUM-VI keeps them in dso/.
-    for (const fs::path& place : {given, folder_, given / "dso", folder_ / "dso"}) {
-      if (!hasCalibration(place.string())) continue;
-      calibration_ = readCalibration(place.string(), options_.imu_calibration, how);
+    const std::string above = parentOf(log_.folder);
+    for (const std::string& place : {above, log_.folder, joined(above, "dso"), joined(log_.folder, "dso")}) {
+      if (!hasCalibration(*log_.tree, place)) continue;
+      calibration_ = readCalibration(*log_.tree, place, options_.imu_calibration, how);
       break;
     }
     if (calibration_.rig.camera_count == 0) {
       throw InputError(
-          (folder_ / "cam0" / "sensor.yaml").string(), 0, "", "does not exist",
+          name("cam0/sensor.yaml"), 0, "", "does not exist",
           "A log needs a calibration: EuRoC sensor.yaml, or Kalibr's camchain and IMU YAML given "
           "explicitly");
     }
   }
   // Tracks need no folder for the second camera: they say themselves what it saw.
   const bool images = !options_.without_images && track_file_.empty();
-  const bool no_second = images && !fs::is_directory(folder_ / "cam1");
+  const bool no_second = images && !hasFolder("cam1");
   if (calibration_.rig.camera_count > 1 && (options_.mono || no_second)) {
-    if (!options_.mono) warnings_.add(folder_.string() + ": no cam1, going on with one camera");
+    if (!options_.mono) warnings_.add(name("") + ": no cam1, going on with one camera");
     calibration_.rig.camera_count = 1;
   }
 }
 
 bool AslFolder::listsImages() const {
-  for (const char* camera : {"cam0", "cam1"}) {
-    if (fs::exists(folder_ / camera / "data.csv") || fs::exists(folder_ / camera / "data")) return true;
-  }
-  return false;
+  return std::ranges::any_of(std::array{"cam0", "cam1"}, [this](const std::string& camera) {
+    return hasFile(camera + "/data.csv") || hasFolder(camera + "/data");
+  });
 }
 
 void AslFolder::readCameras() {
   for (std::uint32_t camera = 0; camera < calibration_.rig.camera_count; ++camera) readCamera(camera);
   if (calibration_.rig.camera_count > 1 && files_[1].empty()) {
-    warnings_.add(folder_.string() + ": cam1 has no images, going on with one camera");
+    warnings_.add(name("") + ": cam1 has no images, going on with one camera");
     calibration_.rig.camera_count = 1;
   }
   if (images_.empty()) {
-    throw InputError(folder_.string(), 0, "", "none of the listed images exists",
+    throw InputError(name(""), 0, "", "none of the listed images exists",
                      "Images are looked for in cam0/data and cam1/data, tracks in tracks0/data.csv");
   }
 }
 
 /// Finds the file of a row; the name may be missing, or without its extension.
 bool AslFolder::locate(std::uint32_t camera, ImageRow& row) const {
-  const fs::path folder = folder_ / fmt::format("cam{}", camera);
+  const std::string folder = fmt::format("cam{}", camera);
   const std::string stem = row.file.empty() ? std::to_string(row.stamp.ns) : row.file;
-  std::error_code error;
-  for (const char* extension : {"", ".png", ".jpg", ".jpeg"}) {
-    if (row.file.empty() && *extension == '\0') continue;
-    for (const char* place : {"data", "."}) {
-      const fs::path relative = fs::path(place) / (stem + extension);
-      if (fs::is_regular_file(folder / relative, error)) {
-        row.file = relative.string();
+  const bool whole = stem.rfind('.') != std::string::npos && stem.rfind('.') > 0;
+  for (const std::string extension : {"", ".png", ".jpg", ".jpeg"}) {
+    if (row.file.empty() && extension.empty()) continue;
+    for (const std::string place : {"data/", ""}) {
+      const std::string relative = place + stem + extension;
+      if (hasFile(folder + "/" + relative)) {
+        row.file = relative;
         return true;
       }
     }
-    if (fs::path(stem).has_extension() && *extension == '\0') break;
+    if (whole && extension.empty()) break;
   }
   return false;
 }
 
-std::vector<ImageRow> AslFolder::listImages(const fs::path& folder) {
-  const fs::path csv = folder / "data.csv";
-  if (fs::exists(csv)) return readImageList(csv.string(), counters_, warnings_);
-  std::vector<ImageRow> rows;
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder / "data", error)) {
+/// The number at the end of a picture's name: 12 of frame_000012.jpg.
+std::optional<std::int64_t> numberOf(const std::string& file) {
+  const std::string stem = file.substr(0, file.rfind('.'));
+  std::size_t begin = stem.size();
+  while (begin > 0 && std::isdigit(static_cast<unsigned char>(stem[begin - 1])) != 0) --begin;
+  std::int64_t number = 0;
+  if (!parseInteger(stem.substr(begin), number)) return std::nullopt;
+  return number;
+}
+
+std::vector<ImageRow> AslFolder::listImages(std::uint32_t camera) {
+  const std::string folder = fmt::format("cam{}", camera);
+  const std::string csv = folder + "/data.csv";
+  if (hasFile(csv)) return readImageListText(name(csv), text(csv), counters_, warnings_);
+  std::vector<ImageRow> stamped;
+  std::vector<ImageRow> numbered;
+  for (const std::string& file : log_.tree->list(log_.at(folder + "/data"))) {
     Stamp stamp;
-    if (parseInteger(entry.path().stem().string(), stamp.ns))
-      rows.push_back({stamp, entry.path().filename().string()});
+    if (parseInteger(file.substr(0, file.rfind('.')), stamp.ns) && stamp.ns > kLargestNumber) {
+      stamped.push_back({stamp, file});
+    } else if (const std::optional<std::int64_t> number = numberOf(file)) {
+      numbered.push_back({{*number}, file});
+    }
   }
+  std::vector<ImageRow>& rows = stamped.empty() ? numbered : stamped;
   // A directory has no order of its own, so sorting it is not worth a warning.
-  std::sort(rows.begin(), rows.end(), [](const ImageRow& a, const ImageRow& b) { return a.stamp < b.stamp; });
-  orderByStamp(rows, (folder / "data").string(), counters_, warnings_);
-  warnings_.add(csv.string() + ": does not exist; stamps are taken from the image names");
+  std::ranges::sort(rows, {}, &ImageRow::stamp);
+  orderByStamp(rows, name(folder + "/data"), counters_, warnings_);
+  if (stamped.empty()) {
+    stampNumbered(camera, rows);
+  } else {
+    warnings_.add(name(csv) + ": does not exist; stamps are taken from the image names");
+  }
   return rows;
 }
 
+/// Pictures with numbers for names, as frame grabbers write them, have no stamps: the calibration's rate
+/// gives them, from the first sample on.
+void AslFolder::stampNumbered(std::uint32_t camera, std::vector<ImageRow>& rows) {
+  if (rows.empty()) return;
+  const double rate = calibration_.camera_rate_hz[camera];
+  const std::string csv = name(fmt::format("cam{}/data.csv", camera));
+  if (rate <= 0) {
+    throw InputError(
+        csv, 0, "", fmt::format("does not exist, and names like `{}` are no stamps", rows.front().file),
+        "Write data.csv with lines `stamp [ns], file name`, or the cameras' rate_hz in sensor.yaml");
+  }
+  warnings_.add(
+      fmt::format("{}: does not exist, and names like `{}` are no stamps; images are taken {:g} Hz apart "
+                  "from the first IMU sample on. Write data.csv if that is not right",
+                  csv, rows.front().file, rate));
+  const std::int64_t first = rows.front().stamp.ns;
+  for (ImageRow& row : rows) {
+    row.stamp =
+        samples_.front().stamp + Duration::fromSeconds(static_cast<double>(row.stamp.ns - first) / rate);
+  }
+}
+
 void AslFolder::readCamera(std::uint32_t camera) {
-  const fs::path folder = folder_ / fmt::format("cam{}", camera);
-  std::vector<ImageRow> rows = listImages(folder);
+  const std::string folder = fmt::format("cam{}", camera);
+  std::vector<ImageRow> rows = listImages(camera);
   std::uint64_t missing = 0;
   for (ImageRow& row : rows) {
     if (!locate(camera, row)) {
       ++missing;
       warnings_.addCounted(++counters_.missing_images,
                            fmt::format("{}: image `{}` of stamp {} is missing, skipped",
-                                       (folder / "data").string(), row.file, row.stamp.ns));
+                                       name(folder + "/data"), row.file, row.stamp.ns));
       continue;
     }
     images_.push_back({row.stamp, camera, static_cast<std::uint32_t>(files_[camera].size())});
     files_[camera].push_back(row.file);
   }
-  if (missing > 0 && files_[camera].empty()) {
-    warnings_.add(folder.string() + ": not one listed image exists");
-  }
+  if (missing > 0 && files_[camera].empty()) warnings_.add(name(folder) + ": not one listed image exists");
 }
 
 RecordedLog::Fetched AslFolder::fetch(const ImageEntry& entry, ImageSize expected, std::uint8_t* out) {
-  const fs::path path = folder_ / fmt::format("cam{}", entry.camera) / files_[entry.camera][entry.index];
+  const std::string path = fmt::format("cam{}/{}", entry.camera, files_[entry.camera][entry.index]);
   Fetched fetched;
-  fetched.name = path.string();
-  fetched.missing = !readBytes(path, bytes_);
+  fetched.name = name(path);
+  fetched.missing = !log_.tree->read(log_.at(path), bytes_);
   if (!fetched.missing) fetched.result = decoder_.decode(bytes_, expected, out, fetched.found);
   return fetched;
 }
@@ -213,24 +260,23 @@ std::int64_t coverage(const Trajectory& truth, Stamp first, Stamp last) {
 void AslFolder::chooseTruth() {
   // A truth that is better known comes first and wins a tie.
   std::vector<std::string> candidates;
-  for (const char* name : {"state_groundtruth_openvins", "state_groundtruth_estimate0", "mocap0"}) {
-    const fs::path file = folder_ / name / "data.csv";
-    if (fs::exists(file)) candidates.push_back(file.string());
+  for (const std::string place : {"state_groundtruth_openvins", "state_groundtruth_estimate0", "mocap0"}) {
+    if (hasFile(place + "/data.csv")) candidates.push_back(place + "/data.csv");
   }
-  if (candidates.size() == 1) truth_file_ = candidates.front();
+  if (candidates.size() == 1) truth_ = candidates.front();
   if (candidates.size() <= 1) return;
   std::int64_t best = -1;
   for (const std::string& file : candidates) {
     LogCounters counters;
     LogWarnings warnings;
     try {
-      const Trajectory truth = readTrajectory(file, counters, warnings);
+      const Trajectory truth = readTrajectoryText(name(file), text(file), counters, warnings);
       const std::int64_t covered = images_.empty()
                                        ? coverage(truth, samples_.front().stamp, samples_.back().stamp)
                                        : coverage(truth, images_.front().stamp, images_.back().stamp);
       if (covered <= best) continue;
       best = covered;
-      truth_file_ = file;
+      truth_ = file;
     } catch (const InputError& error) {
       warnings_.add(std::string(error.what()) + " (truth left out)");
     }
@@ -238,10 +284,10 @@ void AslFolder::chooseTruth() {
 }
 
 Trajectory AslFolder::groundTruth() const {
-  if (truth_file_.empty()) return {};
+  if (truth_.empty()) return {};
   LogCounters counters;
   LogWarnings warnings;
-  Trajectory truth = readTrajectory(truth_file_, counters, warnings);
+  Trajectory truth = readTrajectoryText(groundTruthName(), text(truth_), counters, warnings);
   const SE3 T_filebody_body = calibration_.T_body_filebody.inverse();
   // The velocity of another point of the body would need the true rate, which the file does not have.
   const bool moved = T_filebody_body.translation.norm() > 0;
@@ -254,13 +300,36 @@ Trajectory AslFolder::groundTruth() const {
 
 }  // namespace
 
+AslFiles findAslFiles(const std::string& path) {
+  const bool on_disk = std::filesystem::is_directory(path);
+  if (!on_disk && !isArchive(path)) return {};
+  AslFiles files{on_disk ? openFolder(path) : openArchive(path), {}};
+  if (on_disk) {
+    files.folder = files.tree->isFolder("mav0") ? "mav0" : "";
+    return files;
+  }
+  std::vector<std::string> found;
+  findIn(*files.tree, {}, kAround, found);
+  if (found.empty()) {
+    throw InputError(path, 0, "", "holds no folder with imu0 and cam0",
+                     "Give an archive of a EuRoC/ASL folder");
+  }
+  if (found.size() > 1) {
+    throw InputError(path, 0, "", fmt::format("holds {} logs: {}, ...", found.size(), found.front()),
+                     "Unpack it and give one of them");
+  }
+  files.folder = found.front();
+  return files;
+}
+
 bool isAslFolder(const std::string& path) {
-  const fs::path folder = dataFolder(path);
-  return fs::is_directory(folder) && (fs::is_directory(folder / "imu0") || fs::is_directory(folder / "cam0"));
+  if (!std::filesystem::is_directory(path)) return false;
+  const AslFiles files = findAslFiles(path);
+  return files.tree->isFolder(files.at("imu0")) || files.tree->isFolder(files.at("cam0"));
 }
 
 std::unique_ptr<LogSource> openAslFolder(const std::string& path, const LogOptions& options) {
-  return std::make_unique<AslFolder>(path, options);
+  return std::make_unique<AslFolder>(findAslFiles(path), options);
 }
 
 }  // namespace swiftlet

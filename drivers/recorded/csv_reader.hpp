@@ -16,7 +16,7 @@
 #include <string>
 #include <string_view>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/log_warnings.hpp"
 
 namespace swiftlet {

@@ -3,30 +3,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 
 namespace swiftlet {
-namespace {
-
-namespace fs = std::filesystem;
-
-fs::path depthFolder(const fs::path& log) {
-  return (fs::is_directory(log / "mav0") ? log / "mav0" : log) / "depth0";
-}
-
-}  // namespace
 
 DepthImages::DepthImages(const std::string& log, LogWarnings& warnings, const SE3& T_body_filebody)
-    : folder_(depthFolder(log)), warnings_(warnings) {
-  const fs::path list = fs::path(folder_) / "data.csv";
-  if (!fs::exists(list)) return;
+    : files_(findAslFiles(log)), warnings_(warnings) {
+  if (files_.tree == nullptr || !files_.tree->isFile(files_.at("depth0/data.csv"))) return;
   std::vector<std::string> remarks;
-  sensor_ = readDepthSensor((fs::path(folder_) / "sensor.yaml").string(), remarks);
+  const std::string sensor = files_.at("depth0/sensor.yaml");
+  sensor_ = readDepthSensor({files_.tree->name(sensor), files_.tree->text(sensor)}, remarks);
   for (const std::string& remark : remarks) warnings_.add(remark);
   sensor_.T_body_camera = T_body_filebody * sensor_.T_body_camera;
-  rows_ = readImageList(list.string(), counters_, warnings_);
+  const std::string list = files_.at("depth0/data.csv");
+  rows_ = readImageListText(files_.tree->name(list), files_.tree->text(list), counters_, warnings_);
   units_.resize(sensor_.camera.pixels());
   depth_.resize(sensor_.camera.pixels());
 }
@@ -39,13 +28,11 @@ DepthImageView DepthImages::at(Stamp stamp) {
   const auto row = std::ranges::lower_bound(rows_, stamp, {}, &ImageRow::stamp);
   if (row == rows_.end() || row->stamp != stamp) return view;
   const std::string name = row->file.empty() ? std::to_string(stamp.ns) + ".png" : row->file;
-  const fs::path path = fs::path(folder_) / "data" / name;
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
-    warnings_.addCounted(++counters_.missing_images, path.string() + ": missing, depth skipped");
+  const std::string path = files_.at("depth0/data/" + name);
+  if (!files_.tree->read(path, bytes_)) {
+    warnings_.addCounted(++counters_.missing_images, files_.tree->name(path) + ": missing, depth skipped");
     return view;
   }
-  bytes_.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
   const ImageSize size{view.camera.width, view.camera.height};
   ImageSize found;
   const DecodeResult result = decoder_.decode16(bytes_, size, units_.data(), found);
@@ -54,7 +41,8 @@ DepthImageView DepthImages::at(Stamp stamp) {
                                  ? fmt::format("{}x{} pixels, sensor.yaml says {}x{}", found.width,
                                                found.height, size.width, size.height)
                                  : "damaged or no PNG of 16 bits grey";
-    warnings_.addCounted(++counters_.damaged_images, path.string() + ": " + what + ", depth skipped");
+    warnings_.addCounted(++counters_.damaged_images,
+                         files_.tree->name(path) + ": " + what + ", depth skipped");
     return view;
   }
   const auto scale = static_cast<float>(sensor_.metres_per_unit);

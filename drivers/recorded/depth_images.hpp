@@ -10,6 +10,7 @@
 
 #include "drivers/calibration/depth_sensor.hpp"
 #include "drivers/image/image_decoder.hpp"
+#include "drivers/recorded/asl_folder.hpp"
 #include "drivers/recorded/image_list.hpp"
 #include "drivers/recorded/log_warnings.hpp"
 #include "estimator/messages/depth_image.hpp"
@@ -18,8 +19,8 @@ namespace swiftlet {
 
 class DepthImages {
  public:
-  /// `log`: the sequence or its mav0. A log without depth images gives none at any stamp. `T_body_filebody`:
-  /// of the log's calibration, where the IMU is not the file's body.
+  /// `log`: the sequence, its mav0 or an archive. A log without depth images gives none at any stamp.
+  /// `T_body_filebody`: of the log's calibration, where the IMU is not the file's body.
   DepthImages(const std::string& log, LogWarnings& warnings, const SE3& T_body_filebody = {});
 
   /// The image of exactly this stamp, in metres; `depth` null where there is none. Missing, damaged or
@@ -32,7 +33,7 @@ class DepthImages {
   [[nodiscard]] const LogCounters& counters() const { return counters_; }
 
  private:
-  std::string folder_;
+  AslFiles files_;
   LogWarnings& warnings_;
   LogCounters counters_;
   std::vector<ImageRow> rows_;  ///< by stamp

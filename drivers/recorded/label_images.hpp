@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "drivers/image/image_decoder.hpp"
+#include "drivers/recorded/asl_folder.hpp"
 #include "drivers/recorded/image_list.hpp"
 #include "drivers/recorded/log_warnings.hpp"
 #include "estimator/core/image_view.hpp"
@@ -18,7 +19,7 @@ namespace swiftlet {
 
 class LabelImages {
  public:
-  /// `log`: the sequence or its mav0. A log without label images gives none at any stamp.
+  /// `log`: the sequence, its mav0 or an archive. A log without label images gives none at any stamp.
   LabelImages(const std::string& log, ImageSize size, LogWarnings& warnings);
 
   /// The image of exactly this stamp; empty where there is none. Missing, damaged or wrongly sized files are
@@ -29,7 +30,7 @@ class LabelImages {
   [[nodiscard]] const LogCounters& counters() const { return counters_; }
 
  private:
-  std::string folder_;
+  AslFiles files_;
   ImageSize size_;
   LogWarnings& warnings_;
   LogCounters counters_;

@@ -13,7 +13,8 @@ namespace swiftlet {
 namespace {
 
 constexpr const char* kWhatToGive =
-    "Give a EuRoC folder (the sequence or its mav0), a ROS 1 bag, or a run's folder with its recording";
+    "Give a EuRoC folder (the sequence or its mav0) or an archive of one, a ROS 1 bag, or a run's folder "
+    "with its recording";
 
 }  // namespace
 
@@ -30,7 +31,7 @@ std::unique_ptr<LogSource> openLog(const std::string& path, const LogOptions& op
   if (!std::filesystem::exists(path)) {
     throw InputError(path, 0, "", "does not exist", kWhatToGive);
   }
-  if (isAslFolder(path)) return openAslFolder(path, options);
+  if (isAslFolder(path) || isArchive(path)) return openAslFolder(path, options);
   if (!std::filesystem::is_directory(path) && isRosBag(path)) return openRosBag(path, options);
   if (isRecording(path)) return openRecording(path, options);
   throw InputError(path, 0, "",

@@ -8,7 +8,7 @@
 
 namespace swiftlet {
 
-/// A EuRoC/ASL folder, a ROS 1 bag where the build has rosbag-storage, or a flight recording (its folder or
+/// A EuRoC/ASL folder or an archive of one, a ROS 1 bag where the build has rosbag-storage, or a flight recording (its folder or
 /// that of its run). InputError otherwise.
 std::unique_ptr<LogSource> openLog(const std::string& path, const LogOptions& options = {});
 

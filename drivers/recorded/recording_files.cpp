@@ -10,7 +10,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/recording_format.hpp"
 
 namespace swiftlet {

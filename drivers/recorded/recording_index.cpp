@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 
 namespace swiftlet {

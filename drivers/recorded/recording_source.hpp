@@ -22,7 +22,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/log_source.hpp"
 #include "drivers/recorded/recording_index.hpp"
 #include "estimator/messages/scene_images.hpp"

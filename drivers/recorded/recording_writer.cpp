@@ -13,7 +13,7 @@
 #include <filesystem>
 #include <system_error>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 
 namespace swiftlet {

@@ -9,8 +9,8 @@
 #include <sstream>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
-#include "drivers/calibration/unpack_xz.hpp"
+#include "drivers/input/input_error.hpp"
+#include "drivers/input/unpack_xz.hpp"
 #include "estimator/geometry/so3.hpp"
 
 namespace swiftlet {

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/lab/evaluation/evaluate_run.hpp"
 #include "firmware_host/lab/export/run_bag.hpp"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/parse_number.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/lab/import/import_run.hpp"

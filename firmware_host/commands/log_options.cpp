@@ -1,6 +1,6 @@
 #include "firmware_host/commands/log_options.hpp"
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <memory>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/lab/modules/pose_graph_run.hpp"

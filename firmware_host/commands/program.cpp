@@ -4,7 +4,7 @@
 
 #include <exception>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/commands/lab_commands.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"

@@ -81,7 +81,7 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
   auto options = std::make_shared<ReplayOptions>();
   ReplayRequest& request = options->request;
   request.out = "run";
-  command->add_option("LOG", request.log, "EuRoC/ASL folder, a recorded run, or a ROS 1 bag where supported")
+  command->add_option("LOG", request.log, "EuRoC/ASL folder or an archive of one, a recorded run, or a ROS 1 bag where supported")
       ->required();
   command->add_option("--out", request.out, "Run folder to write")->capture_default_str();
   command->add_flag("--replace", request.replace,

@@ -5,7 +5,7 @@
 #include <iterator>
 #include <memory>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "estimator/core/units.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"

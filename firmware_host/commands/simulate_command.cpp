@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/track_file.hpp"
 #include "drivers/simulated/folder_writer.hpp"
 #include "firmware_host/commands/checks.hpp"

@@ -15,7 +15,7 @@
 #include <limits>
 #include <string_view>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/recording_format.hpp"
 #include "firmware_host/files/whole_file.hpp"
 

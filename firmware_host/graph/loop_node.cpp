@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
 namespace {

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/realtime/host_sleep.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
 

@@ -12,8 +12,8 @@
 #include <cerrno>
 #include <charconv>
 
-#include "drivers/calibration/input_error.hpp"
 #include "drivers/device/monotonic_now.hpp"
+#include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
 namespace {

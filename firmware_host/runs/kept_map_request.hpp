@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/settings/settings.hpp"
 
 namespace swiftlet {

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
 #include "firmware_host/outputs/map_files/kept_folder.hpp"

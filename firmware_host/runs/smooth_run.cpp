@@ -6,7 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
 #include "estimator/core/units.hpp"
 #include "firmware_host/files/whole_file.hpp"

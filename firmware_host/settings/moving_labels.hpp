@@ -1,7 +1,7 @@
 #pragma once
 // The check of map.moving_labels that every command with a map makes before it begins.
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "mapping/map/map_stage.hpp"
 
 namespace swiftlet {

@@ -9,7 +9,7 @@
 #include <set>
 #include <sstream>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/settings/registry.hpp"
 
 namespace swiftlet {

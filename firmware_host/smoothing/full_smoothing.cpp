@@ -7,7 +7,7 @@
 #include <fstream>
 #include <optional>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/smoothing/keyframe_reader.hpp"
 
 namespace swiftlet {

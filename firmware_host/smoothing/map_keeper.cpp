@@ -6,7 +6,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 #include "drivers/recorded/recording_format.hpp"
 #include "drivers/recorded/recording_header.hpp"

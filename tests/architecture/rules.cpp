@@ -36,6 +36,8 @@ RoomTable directNeighbours() {
   for (const char* driver : {"serial", "can", "gpio", "timesync", "mavlink"}) {
     table[std::string("drivers/") + driver] = {"drivers/device"};
   }
+  table["drivers/input"] = {};
+  table["drivers/calibration"].insert("drivers/input");
   table["drivers/image"] = {"drivers/device"};
   table["drivers/v4l2"] = {"drivers/image"};
   table["drivers/gstreamer"] = {"drivers/image"};

@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 #include <fstream>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/settings/confusion_file.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <string>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/lab/evaluation/confusion_picture.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 

@@ -6,7 +6,7 @@
 #include <functional>
 #include <sstream>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/lab/export/run_bag.hpp"
 #include "firmware_host/lab/export/tum_files.hpp"

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/imu_file.hpp"
 #include "drivers/recorded/open_log.hpp"
 #include "firmware_host/lab/evaluation/evaluate_run.hpp"

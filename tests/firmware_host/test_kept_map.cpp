@@ -11,7 +11,7 @@
 #include <tuple>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"
 #include "tests/mapping/volume_scene.hpp"

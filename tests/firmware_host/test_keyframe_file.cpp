@@ -9,7 +9,7 @@
 #include <sstream>
 #include <string>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/smoothing/keyframe_reader.hpp"
 #include "firmware_host/smoothing/map_keeper.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"

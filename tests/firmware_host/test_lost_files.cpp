@@ -8,7 +8,7 @@
 #include <string>
 #include <thread>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/files/lost_files.hpp"
 #include "firmware_host/outputs/run_folder/run_recorder.hpp"
 #include "firmware_host/runs/run_output.hpp"

@@ -6,7 +6,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/map_files/map_files.hpp"
 #include "firmware_host/outputs/map_files/ply_file.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/image/image_decoder.hpp"
 #include "firmware_host/commands/program.hpp"
 #include "firmware_host/lab/modules/map_slice_run.hpp"

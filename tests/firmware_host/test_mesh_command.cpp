@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
 #include "firmware_host/commands/program.hpp"
 #include "firmware_host/files/line_file.hpp"

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/commands/program.hpp"

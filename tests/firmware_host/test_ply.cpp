@@ -9,7 +9,7 @@
 #include <limits>
 #include <string>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "estimator/core/random.hpp"
 #include "firmware_host/outputs/map_files/ply_file.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/commands/program.hpp"
 #include "firmware_host/lab/modules/g2o_file.hpp"
 #include "firmware_host/lab/modules/pose_graph_run.hpp"

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/files/line_file.hpp"

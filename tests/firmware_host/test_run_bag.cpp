@@ -11,7 +11,7 @@
 #include <sstream>
 #include <tuple>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/lab/export/bag_messages.hpp"
 #include "firmware_host/lab/export/run_bag.hpp"
 #include "tests/firmware_host/exported_run.hpp"

@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/files/run_claim.hpp"
 #include "firmware_host/runs/fly_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"

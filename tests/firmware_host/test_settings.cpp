@@ -4,7 +4,7 @@
 #include <set>
 #include <string>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/settings/read_settings.hpp"
 #include "firmware_host/settings/registry.hpp"
 

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <sstream>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/lab/modules/g2o_file.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"

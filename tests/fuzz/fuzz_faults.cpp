@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/lab/hil/fault_timeline.hpp"
 
 namespace swiftlet::fuzz {

@@ -4,7 +4,7 @@
 #include <sstream>
 #include <string>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 #include "drivers/recorded/recording_format.hpp"
 #include "estimator/smoother/full_smoother.hpp"

@@ -18,7 +18,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/lab/evaluation/evaluate_run.hpp"
 #include "firmware_host/runs/replay_run.hpp"
 #include "tests/logs/accuracy_rows.hpp"

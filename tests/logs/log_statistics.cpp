@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/open_log.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/interfaces/run_listener.hpp"

@@ -13,7 +13,7 @@
 #include <array>
 #include <filesystem>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/lab/evaluation/evaluate_run.hpp"
 #include "firmware_host/runs/replay_run.hpp"
 

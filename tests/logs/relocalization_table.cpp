@@ -17,7 +17,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/open_log.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
 #include "estimator/core/units.hpp"

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
 #include "firmware_host/lab/evaluation/association.hpp"
 #include "firmware_host/lab/modules/map_merge_run.hpp"

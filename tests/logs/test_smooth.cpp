@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "estimator/odometry/odometry_inputs.hpp"
 #include "firmware_host/runs/replay_run.hpp"
 #include "firmware_host/runs/smooth_run.hpp"

@@ -6,7 +6,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/outputs/map_files/kept_graph_file.hpp"
 #include "tests/mapping/picture_flight.hpp"

@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 #include <memory>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "estimator/core/random.hpp"
 #include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
 #include "mapping/place/hamming.hpp"

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/gstreamer/pipeline_source.hpp"
 #include "drivers/image/pixel_format.hpp"
 #include "drivers/v4l2/camera_device.hpp"

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/files/whole_file.hpp"
 
 namespace swiftlet {

@@ -1,7 +1,7 @@
 #include <array>
 #include <cmath>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/csv_reader.hpp"
 #include "drivers/recorded/parse_number.hpp"
 #include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <optional>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/csv_reader.hpp"
 #include "drivers/recorded/parse_number.hpp"
 #include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/lab/budget/bare_timer_loop.hpp"
 #include "firmware_host/lab/evaluation/evaluate_run.hpp"
 #include "firmware_host/runs/replay_run.hpp"

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/open_log.hpp"
 #include "firmware_host/lab/evaluation/mesh_frames.hpp"
 #include "firmware_host/outputs/map_files/ply_file.hpp"

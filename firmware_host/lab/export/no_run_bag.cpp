@@ -1,6 +1,6 @@
 // Stands in for run_bag.cpp in builds without rosbag-storage and ROS 1 message packages.
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/lab/export/run_bag.hpp"
 
 namespace swiftlet {

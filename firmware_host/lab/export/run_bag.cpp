@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <functional>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "estimator/messages/names.hpp"
 #include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/lab/export/bag_messages.hpp"

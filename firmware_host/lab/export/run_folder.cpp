@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/lab/evaluation/association.hpp"
 #include "firmware_host/outputs/run_folder/events_log.hpp"
 #include "firmware_host/outputs/run_folder/states_csv.hpp"

@@ -9,7 +9,7 @@
 #include <sstream>
 #include <utility>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/parse_number.hpp"
 
 namespace swiftlet {

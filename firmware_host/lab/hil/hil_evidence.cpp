@@ -5,7 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/parse_number.hpp"
 #include "estimator/messages/names.hpp"
 #include "firmware_host/outputs/run_folder/events_log.hpp"

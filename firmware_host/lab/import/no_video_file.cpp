@@ -1,4 +1,4 @@
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/lab/import/video_file.hpp"
 
 namespace swiftlet {

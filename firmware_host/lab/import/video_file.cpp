@@ -12,7 +12,7 @@ extern "C" {
 #include <array>
 #include <cstring>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
 namespace {

@@ -9,8 +9,8 @@
 #include <iterator>
 #include <limits>
 
-#include "drivers/calibration/input_error.hpp"
-#include "drivers/calibration/unpack_xz.hpp"
+#include "drivers/input/input_error.hpp"
+#include "drivers/input/unpack_xz.hpp"
 #include "firmware_host/files/whole_file.hpp"
 
 namespace swiftlet {

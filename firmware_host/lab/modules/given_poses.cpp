@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/lab/evaluation/association.hpp"
 

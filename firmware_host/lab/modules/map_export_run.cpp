@@ -6,7 +6,7 @@
 #include <cmath>
 #include <memory>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/image_files.hpp"
 #include "estimator/core/units.hpp"
 #include "firmware_host/files/new_folder.hpp"

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/map_files/block_file.hpp"
 #include "firmware_host/outputs/map_files/kept_folder.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"

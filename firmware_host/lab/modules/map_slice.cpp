@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "mapping/distance/volume_distance.hpp"
 
 namespace swiftlet {

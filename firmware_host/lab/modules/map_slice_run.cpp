@@ -4,7 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/image_files.hpp"
 #include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/outputs/map_files/kept_folder.hpp"

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/asl_folder.hpp"
 #include "drivers/recorded/parse_number.hpp"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/lab/modules/g2o_file.hpp"
 #include "firmware_host/outputs/run_folder/loops_csv.hpp"

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/lab/report/run_plots.hpp"
 #include "firmware_host/lab/report/scene.hpp"
 #include "firmware_host/lab/report/table.hpp"

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/map_files/ply_file.hpp"
 
 namespace swiftlet {

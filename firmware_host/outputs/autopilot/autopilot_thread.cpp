@@ -9,8 +9,8 @@
 #include <optional>
 #include <utility>
 
-#include "drivers/calibration/input_error.hpp"
 #include "drivers/device/monotonic_now.hpp"
+#include "drivers/input/input_error.hpp"
 #include "estimator/core/units.hpp"
 #include "estimator/messages/names.hpp"
 #include "firmware_host/interfaces/device_journal.hpp"

@@ -1,6 +1,6 @@
 #include "firmware_host/outputs/map_files/kept_folder.hpp"
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/outputs/map_files/kept_graph_file.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"

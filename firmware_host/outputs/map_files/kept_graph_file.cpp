@@ -9,7 +9,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 #include "drivers/recorded/recording_format.hpp"
 #include "drivers/recorded/recording_header.hpp"

@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 #include "firmware_host/outputs/map_files/kept_map_format.hpp"
 #include "mapping/map/kept_submaps.hpp"

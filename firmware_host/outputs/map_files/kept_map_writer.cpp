@@ -5,7 +5,7 @@
 #include <streambuf>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 #include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/outputs/map_files/kept_map_format.hpp"

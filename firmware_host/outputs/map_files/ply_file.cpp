@@ -8,7 +8,7 @@
 #include <limits>
 #include <memory>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/map_files/ply_header.hpp"
 #include "firmware_host/outputs/map_files/ply_values.hpp"
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <optional>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/csv_reader.hpp"
 #include "drivers/recorded/parse_number.hpp"
 

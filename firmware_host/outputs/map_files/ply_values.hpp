@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/map_files/ply_header.hpp"
 
 namespace swiftlet {

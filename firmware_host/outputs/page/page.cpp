@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/map_files/map_files.hpp"
 
 namespace swiftlet {

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/asl_text.hpp"
 #include "drivers/recorded/image_files.hpp"
 #include "firmware_host/interfaces/packed_copy.hpp"

@@ -7,9 +7,9 @@
 #include <optional>
 #include <utility>
 
-#include "drivers/calibration/input_error.hpp"
 #include "drivers/dds/dds_link.hpp"
 #include "drivers/device/monotonic_now.hpp"
+#include "drivers/input/input_error.hpp"
 #include "estimator/messages/names.hpp"
 #include "firmware_host/outputs/map_files/map_files.hpp"
 #include "firmware_host/outputs/ros2/ros_clock.hpp"

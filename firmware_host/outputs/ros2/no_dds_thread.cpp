@@ -1,6 +1,6 @@
 // Stands in for dds_thread.cpp in builds without Cyclone DDS.
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/ros2/dds_thread.hpp"
 
 namespace swiftlet {

@@ -3,7 +3,7 @@
 #include <fstream>
 #include <utility>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/csv_reader.hpp"
 #include "drivers/recorded/parse_number.hpp"
 

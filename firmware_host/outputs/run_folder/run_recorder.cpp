@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
 #include "estimator/messages/names.hpp"
 #include "firmware_host/outputs/map_files/map_output.hpp"

@@ -1,6 +1,6 @@
 // Stands in for view_server.cpp in builds without cpp-httplib.
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/view/view_server.hpp"
 
 namespace swiftlet {

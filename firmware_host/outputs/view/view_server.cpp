@@ -10,7 +10,7 @@
 #include <limits>
 #include <system_error>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/view/connection.hpp"
 #include "firmware_host/outputs/view/low_threads.hpp"
 #include "firmware_host/realtime/flight_thread.hpp"

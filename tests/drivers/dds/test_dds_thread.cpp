@@ -13,8 +13,8 @@
 #include <sstream>
 #include <thread>
 
-#include "drivers/calibration/input_error.hpp"
 #include "drivers/device/monotonic_now.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/map_files/map_files.hpp"
 #include "firmware_host/outputs/ros2/dds_thread.hpp"
 #include "tests/drivers/dds/peer_process.hpp"

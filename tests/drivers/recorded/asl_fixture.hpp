@@ -70,6 +70,16 @@ struct Delivered {
 };
 Delivered readAll(LogSource& log);
 
+/// Kalibr's files for one camera of the fixture's size.
+inline constexpr const char* kKalibrIllustration =
+    "cam0:\n  T_cam_imu:\n  - [1.0, 0.0, 0.0, 0.0]\n  - [0.0, 1.0, 0.0, 0.0]\n  - [0.0, 0.0, 1.0, 0.0]\n"
+    "  - [0.0, 0.0, 0.0, 1.0]\n  camera_model: pinhole\n  distortion_coeffs: [0.01, 0.0, 0.0, 0.0]\n"
+    "  distortion_model: equidistant\n  intrinsics: [40.0, 40.0, 32.0, 24.0]\n  resolution: [64, 48]\n"
+    "  timeshift_cam_imu: 0.002\n";
+inline constexpr const char* kKalibrImu =
+    "update_rate: 200.0\naccelerometer_noise_density: 2.0e-03\naccelerometer_random_walk: 3.0e-03\n"
+    "gyroscope_noise_density: 1.6968e-04\ngyroscope_random_walk: 1.9393e-05\n";
+
 template <typename Call>
 InputError errorOf(const Call& call) {
   try {

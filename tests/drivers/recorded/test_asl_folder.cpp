@@ -9,6 +9,8 @@ using test::anyContains;
 using test::AslFixture;
 using test::Delivered;
 using test::errorOf;
+using test::kKalibrIllustration;
+using test::kKalibrImu;
 using test::readAll;
 
 TEST_CASE("everything comes in the order of time, samples first, camera 0 before 1", "[asl]") {
@@ -107,15 +109,6 @@ TEST_CASE("a folder without data.csv is read by its image names", "[asl]") {
   CHECK(readAll(*source).frames.size() == 6);
   CHECK(anyContains(source->warnings(), "stamps are taken from the image names"));
 }
-
-constexpr const char* kKalibrIllustration =
-    "cam0:\n  T_cam_imu:\n  - [1.0, 0.0, 0.0, 0.0]\n  - [0.0, 1.0, 0.0, 0.0]\n  - [0.0, 0.0, 1.0, 0.0]\n"
-    "  - [0.0, 0.0, 0.0, 1.0]\n  camera_model: pinhole\n  distortion_coeffs: [0.01, 0.0, 0.0, 0.0]\n"
-    "  distortion_model: equidistant\n  intrinsics: [40.0, 40.0, 32.0, 24.0]\n  resolution: [64, 48]\n"
-    "  timeshift_cam_imu: 0.002\n";
-constexpr const char* kKalibrImu =
-    "update_rate: 200.0\naccelerometer_noise_density: 2.0e-03\naccelerometer_random_walk: 3.0e-03\n"
-    "gyroscope_noise_density: 1.6968e-04\ngyroscope_random_walk: 1.9393e-05\n";
 
 TEST_CASE("Kalibr calibration beside the data, or given", "[asl]") {
   const AslFixture log(3);

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/serial/pseudo_terminal.hpp"
 #include "firmware_host/interfaces/link_port.hpp"
 #include "tests/firmware_host/autopilot/scripted_vehicle.hpp"

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
 #include "drivers/device/monotonic_now.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/serial/pseudo_terminal.hpp"
 #include "firmware_host/interfaces/link_port.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"

@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/open_log.hpp"
 #include "drivers/simulated/rig_presets.hpp"
 #include "firmware_host/outputs/recorder/folder_sink.hpp"

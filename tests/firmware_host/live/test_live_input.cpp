@@ -9,7 +9,7 @@
 #include <map>
 #include <thread>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/simulated/rig_presets.hpp"
 #include "firmware_host/inputs/devices/live_input.hpp"
 #include "firmware_host/inputs/devices/sensor_threads.hpp"

@@ -2,7 +2,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/view/view_address.hpp"
 
 namespace swiftlet {

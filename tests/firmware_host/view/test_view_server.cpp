@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/view/view_server.hpp"
 #include "firmware_host/outputs/view/view_thread.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"

@@ -1,11 +1,11 @@
-#include "drivers/calibration/unpack_xz.hpp"
+#include "drivers/input/unpack_xz.hpp"
 
 #include <lzma.h>
 
 #include <array>
 #include <cstdint>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
 namespace {

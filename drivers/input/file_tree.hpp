@@ -1,0 +1,57 @@
+#pragma once
+// The files of a log, in a folder or in an archive that is not unpacked.
+//
+// Archives: zip, tar (also packed by gzip, bzip2, xz, zstd or lz4), 7z and whatever else libarchive tells by
+// content. Opening passes over the archive once and keeps its texts (all that is no picture) in memory. A
+// picture is read when it is asked for, by a reader of its folder's own, so that folders which are read in
+// the archive's order cost one pass each. What a reader passes over is kept, up to kMostKept bytes; asked for
+// after that, it costs another pass. Paths: from the root, with '/' between names; "" is the root. Threads:
+// one. Errors: InputError where a file cannot be opened or is damaged as a whole. Memory: a folder's is
+// nothing; an archive's its texts (kMostText), some 150 bytes a file, and kMostKept.
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace swiftlet {
+
+class FileTree {
+ public:
+  static constexpr std::size_t kMostText = std::size_t{1} << 30U;
+  static constexpr std::size_t kMostKept = std::size_t{256} << 20U;
+  static constexpr std::size_t kLargestFile = std::size_t{256}
+                                              << 20U;  ///< of texts and pictures; more is none
+
+  FileTree(const FileTree&) = delete;
+  FileTree& operator=(const FileTree&) = delete;
+  virtual ~FileTree() = default;
+
+  [[nodiscard]] virtual bool isFile(const std::string& path) const = 0;
+  [[nodiscard]] virtual bool isFolder(const std::string& path) const = 0;
+  /// Names in a folder, sorted; empty where there is none.
+  [[nodiscard]] virtual std::vector<std::string> list(const std::string& folder) const = 0;
+  /// Into `bytes`, whose memory is used again. False: not there, too large or damaged.
+  [[nodiscard]] virtual bool read(const std::string& path, std::vector<std::uint8_t>& bytes) = 0;
+
+  /// As a text; InputError where it cannot be read.
+  [[nodiscard]] std::string text(const std::string& path);
+  /// For messages.
+  [[nodiscard]] std::string name(const std::string& path) const;
+
+ protected:
+  explicit FileTree(std::string root) : root_(std::move(root)) {}
+
+ private:
+  std::string root_;
+};
+
+/// Whether a file is an archive, told by its content.
+[[nodiscard]] bool isArchive(const std::string& path);
+
+[[nodiscard]] std::shared_ptr<FileTree> openArchive(const std::string& path);
+/// "": where the program was called.
+[[nodiscard]] std::shared_ptr<FileTree> openFolder(const std::string& path);
+
+}  // namespace swiftlet
