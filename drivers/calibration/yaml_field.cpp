@@ -39,12 +39,16 @@ YamlField YamlField::parse(const std::string& file, std::string_view text) {
   if (text.size() > kMaxYamlBytes) {
     throw InputError(file, 0, "", "larger than 1 MiB", "This is not a calibration file");
   }
+  if (text.starts_with("<?xml")) {
+    throw InputError(file, 1, "", "an XML file",
+                     "OpenCV writes the same as YAML where the file's name ends in .yml");
+  }
   refuseDeepNesting(file, text);
   try {
     YAML::Node root = YAML::Load(withoutOpenCvHeader(text));
     if (!root.IsMap()) {
       throw InputError(file, 1, "", "not a YAML map of `key: value` lines",
-                       "Give an EuRoC sensor.yaml or a Kalibr YAML file");
+                       "Give a calibration in YAML or JSON");
     }
     return {std::make_shared<const std::string>(file), "", root, 1};
   } catch (const YAML::Exception& error) {

@@ -50,3 +50,41 @@ TEST_CASE("calibration files: what was estimated is read again, what was not sta
   CHECK(read.camera_rate_hz[1] == 20);
   std::filesystem::remove_all(folder);
 }
+
+TEST_CASE("calibration files: both forms read back as what was written", "[calibration_files]") {
+  const auto folder = std::filesystem::temp_directory_path() / "swiftlet_calibration_forms";
+  std::filesystem::remove_all(folder);
+  Calibration given;
+  given.rig = makeRig(GENERATE(RigKind::kEuroc, RigKind::kFisheye)).rig;
+  given.rig.camera_to_imu_shift = Duration::fromSeconds(3.5e-3);
+  given.rig.readout = Duration::fromSeconds(20e-3);
+  given.noise.gyro_walk = 3e-5;
+  given.conversion[0] = "ds as equidistant: 0.001 px RMS, 0.002 px at most";
+  given.camera_topic[0] = "/cam0";
+  // An IMU that is turned in its body and sits beside its origin.
+  given.R_body_imu = expSo3({0.1, -0.7, 1.2}).toRotationMatrix();
+  given.T_body_filebody.translation = {0.03, -0.02, 0.01};
+  writeCalibration(folder.string(), given);
+  const Calibration euroc = readCalibration(folder.string());
+  const Calibration kalibr = readCalibration((folder / "camchain-imucam.yaml").string());
+  CHECK(euroc.R_body_imu.isApprox(given.R_body_imu, 1e-12));
+  CHECK((euroc.T_body_filebody.translation - given.T_body_filebody.translation).norm() < 1e-12);
+  CHECK(kalibr.camera_topic[0] == "/cam0");
+  // Kalibr's body is the IMU, axes and all.
+  const SE3 T_imu_body(Eigen::Quaterniond(given.R_body_imu).conjugate(), Eigen::Vector3d::Zero());
+  for (std::size_t c = 0; c < 2; ++c) {
+    const SE3 in_imu = T_imu_body * given.rig.T_body_cam[c];
+    CHECK((euroc.rig.T_body_cam[c].inverse() * given.rig.T_body_cam[c]).translation.norm() < 1e-12);
+    CHECK((kalibr.rig.T_body_cam[c].inverse() * in_imu).translation.norm() < 1e-12);
+    CHECK(kalibr.rig.T_body_cam[c].R().isApprox(in_imu.R(), 1e-12));
+    for (const Calibration* read : {&euroc, &kalibr}) {
+      CHECK(read->rig.camera[c].kind() == given.rig.camera[c].kind());
+      CHECK(read->rig.camera[c].intrinsics().isApprox(given.rig.camera[c].intrinsics()));
+      CHECK(read->rig.camera[c].distortion().isApprox(given.rig.camera[c].distortion()));
+      CHECK(read->rig.camera_to_imu_shift == given.rig.camera_to_imu_shift);
+      CHECK(read->rig.readout == given.rig.readout);
+      CHECK(read->noise.gyro_walk == given.noise.gyro_walk);
+    }
+  }
+  std::filesystem::remove_all(folder);
+}

@@ -71,5 +71,34 @@ TEST_CASE("absent calibration says what to give", "[calibration]") {
   CHECK(test::contains(errorOf([&] { readCalibration(folder / "nowhere"); }).message, "does not exist"));
 }
 
+TEST_CASE("ROS, OpenCV and Basalt files are found by content, and an IMU file that is missing is asked for",
+          "[calibration]") {
+  const Folder folder;
+  const std::string camera =
+      "image_width: 640\nimage_height: 480\ncamera_matrix: [300, 0, 320, 0, 300, 240, 0, 0, 1]\n"
+      "distortion_coefficients: [0, 0, 0, 0, 0]\n";
+  folder.write("a.yaml", camera + "camera_name: left\n");
+  CHECK(hasCalibration(folder.path()));
+  const InputError missing = errorOf([&] { readCalibration(folder / "a.yaml"); });
+  CHECK(missing.file == (folder / "a.yaml"));
+  CHECK(test::contains(missing.message, "cameras alone"));
+  CHECK(test::contains(missing.remedy, "T_imu_cam0"));
+  folder.write("imu.yaml", test::KalibrTexts().imu +
+                               "T_imu_cam0: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n");
+  CHECK(readCalibration(folder / "a.yaml").form == "ROS CameraInfo");
+  CHECK(readCalibration(folder.path()).rig.camera_count == 1);
+  folder.write("b.yaml", camera + "camera_name: right\n");
+  CHECK(errorOf([&] { readCalibration(folder.path()); }).field == "T_imu_cam1");
+  folder.write("c.yaml", camera + "camera_name: third\n");
+  CHECK(test::contains(errorOf([&] { readCalibration(folder.path()); }).message, "three camera_info files"));
+  for (const char* name : {"a.yaml", "b.yaml", "c.yaml"}) fs::remove(folder / name);
+  CHECK(!hasCalibration(folder.path()));
+  folder.write("camera.yml", camera);
+  CHECK(readCalibration(folder.path()).form == "OpenCV");
+  CHECK(readCalibration(folder / "camera.yml", folder / "imu.yaml").form == "OpenCV");
+  folder.write("basalt.json", "{\"value0\": {\"T_imu_cam\": [], \"intrinsics\": []}}\n");
+  CHECK(errorOf([&] { readCalibration(folder.path()); }).file == (folder / "basalt.json"));
+}
+
 }  // namespace
 }  // namespace swiftlet

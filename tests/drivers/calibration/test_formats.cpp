@@ -221,6 +221,8 @@ TEST_CASE("OpenCV: faults are refused by name", "[calibration]") {
   const InputError size = errorOf([&] { fromOpenCv(edited(lenses, "image_size: [ 752, 480 ]\n", "")); });
   CHECK(contains(size.message, "size of the images is missing"));
   CHECK(contains(size.remedy, "image_size: [width, height]"));
+  CHECK(
+      contains(errorOf([&] { fromOpenCv("<?xml version=\"1.0\"?>\n<opencv_storage/>\n"); }).remedy, ".yml"));
   CHECK(errorOf([&] { fromOpenCv(edited(lenses, "D1:", "D9:")); }).field == "M1");
   CHECK(contains(errorOf([&] { fromOpenCv(edited(lenses, "0.00002, 0. ]", "0.00002, 0., 0. ]")); }).message,
                  "6 numbers where 4, 5, 8, 12 or 14"));

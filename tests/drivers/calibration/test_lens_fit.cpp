@@ -77,23 +77,48 @@ bool closedInverse(const SourceLens& lens, const Vector2d& pixel, Vector3d& ray)
   return true;
 }
 
-/// Whether the oracle's image of the way from the axis to the ray moves outward all along.
-bool monotone(const SourceLens& lens, const Vector3d& ray) {
+// The covered region ends where radius over angle grows by less than 0.1 of what it does at the axis.
+constexpr double kLeastGrowth = 0.101;
+constexpr double kSmall = 1e-4;
+
+double radiusOf(const SourceLens& lens, const Vector2d& pixel) {
+  return (pixel - lens.intrinsics.tail<2>()).cwiseQuotient(lens.intrinsics.head<2>()).norm();
+}
+
+/// Whether the oracle's image of the way from the axis to the ray moves outward well all along.
+bool covered(const SourceLens& lens, const Vector3d& ray) {
   const double theta = std::atan2(ray.head<2>().norm(), ray.z());
   const Vector2d out = ray.head<2>().normalized();
   std::vector<Vector3d> rays;
   constexpr int kSteps = 40;
   for (int i = 0; i <= kSteps; ++i) {
-    const double t = theta * i / kSteps;
-    rays.emplace_back(std::sin(t) * out.x(), std::sin(t) * out.y(), std::cos(t));
+    for (const double t : {theta * i / kSteps, theta * i / kSteps + kSmall}) {
+      rays.emplace_back(std::sin(t) * out.x(), std::sin(t) * out.y(), std::cos(t));
+    }
   }
+  const std::vector<Vector2d> pixels = oraclePixels(lens, rays);
+  const double at_axis = radiusOf(lens, pixels[1]);
   double last = -1;
-  for (const Vector2d& pixel : oraclePixels(lens, rays)) {
-    const double radius = (pixel - lens.intrinsics.tail<2>()).cwiseQuotient(lens.intrinsics.head<2>()).norm();
-    if (!(radius > last)) return false;
+  for (std::size_t i = 0; i < pixels.size(); i += 2) {
+    const double radius = radiusOf(lens, pixels[i]);
+    if (!(radius > last) || !(radiusOf(lens, pixels[i + 1]) - radius > kLeastGrowth * at_axis)) return false;
     last = radius;
   }
   return true;
+}
+
+/// The same of a pixel, for models with a closed inverse, which all bend evenly.
+bool coveredPixel(const SourceLens& lens, const Vector2d& pixel) {
+  const Vector2d centre = lens.intrinsics.tail<2>();
+  const Vector2d out = (pixel - centre).normalized();
+  std::array<Vector3d, 3> rays;
+  if (!closedInverse(lens, centre + out, rays[0]) || !closedInverse(lens, pixel, rays[1]) ||
+      !closedInverse(lens, pixel + out, rays[2])) {
+    return false;
+  }
+  const double at_axis = std::atan2(rays[0].head<2>().norm(), rays[0].z());
+  const double here = std::acos(std::min(1.0, rays[1].dot(rays[2])));
+  return here * kLeastGrowth < at_axis;
 }
 
 /// A ray of the covered region with the oracle's pixel of it, from a random pixel; false where there is none.
@@ -101,9 +126,12 @@ bool randomSight(Random& random, const SourceLens& lens, const LensFit& fit, Vec
   pixel = {random.uniform(0, lens.width - 1), random.uniform(0, lens.height - 1)};
   if (lens.family != LensFamily::kBrown && lens.family != LensFamily::kEquidistant &&
       lens.family != LensFamily::kOmni) {
-    return closedInverse(lens, pixel, ray);
+    return coveredPixel(lens, pixel) && closedInverse(lens, pixel, ray);
   }
-  if (!fit.model.unproject(pixel, ray) || !monotone(lens, ray)) return false;
+  if (!fit.model.unproject(pixel, ray)) return false;
+  // OpenCV's fisheye divides by z.
+  if (lens.family == LensFamily::kEquidistant && !(ray.z() > 0)) return false;
+  if (!covered(lens, ray)) return false;
   pixel = oraclePixels(lens, {ray})[0];
   return fit.model.inImage(pixel);
 }
@@ -171,8 +199,9 @@ SourceLens fourteen(Random& random) {
 
 SourceLens equidistant(Random& random) {
   SourceLens lens =
-      blank(random, "equidistant", LensFamily::kEquidistant, random.uniform(90, 190) * kRadians);
-  for (std::size_t i = 0; i < 4; ++i) lens.distortion[i] = (i < 2 ? 0.02 : 0.004) * random.normal();
+      blank(random, "equidistant", LensFamily::kEquidistant, random.uniform(90, 170) * kRadians);
+  double sigma = 0.02;
+  for (std::size_t i = 0; i < 4; ++i, sigma *= 0.25) lens.distortion[i] = sigma * random.normal();
   return lens;
 }
 
@@ -274,11 +303,14 @@ TEST_CASE("random cameras of every model: the residual is as stated", "[lens_fit
     checkAgainstOracle(random, lens, fit);
   }
   const double accepted = 1 - static_cast<double>(refused) / cameras;
+  const auto below = std::count_if(max.begin(), max.end(), [](double m) { return m <= kMaxLensRms; });
   std::printf(
-      "%-20s %4d cameras, %5.1f %% accepted, %d in part of the image; px RMS %.4f median %.4f 95 %% %.4f "
-      "most; px maximum %.4f median %.4f 95 %% %.4f most\n",
-      model.name, cameras, 100 * accepted, partly, quantile(rms, 0.5), quantile(rms, 0.95), quantile(rms, 1),
-      quantile(max, 0.5), quantile(max, 0.95), quantile(max, 1));
+      "%-20s %4d cameras, %5.1f %% accepted (%5.1f %% also by their maximum), %d in part of the image; px "
+      "RMS %.4f "
+      "median %.4f 95 %% %.4f most; px maximum %.4f median %.4f 95 %% %.4f most\n",
+      model.name, cameras, 100 * accepted, 100 * static_cast<double>(below) / cameras, partly,
+      quantile(rms, 0.5), quantile(rms, 0.95), quantile(rms, 1), quantile(max, 0.5), quantile(max, 0.95),
+      quantile(max, 1));
   CHECK(accepted >= model.least_accepted);
 }
 
