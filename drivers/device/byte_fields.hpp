@@ -40,6 +40,13 @@ class FieldReader {
     at_ += count;
   }
 
+  /// The next `count` bytes; none where fewer are left.
+  std::span<const std::uint8_t> bytes(std::size_t count) {
+    const std::span<const std::uint8_t> taken = count > left() ? bytes_.last(0) : bytes_.subspan(at_, count);
+    skip(count);
+    return taken;
+  }
+
   [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
   /// False when a field lay past the end.
   [[nodiscard]] bool ok() const { return !failed_; }

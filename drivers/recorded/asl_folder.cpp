@@ -52,6 +52,7 @@ class AslFolder final : public RecordedLog {
     return truth_.empty() ? truth_ : name(truth_);
   }
   [[nodiscard]] std::string trackFile() const override { return track_file_; }
+  [[nodiscard]] std::span<const std::uint8_t> picture() const override { return bytes_; }
 
  protected:
   Fetched fetch(const ImageEntry& entry, ImageSize expected, std::uint8_t* out) override;

@@ -9,6 +9,7 @@
 // Host side: opening allocates and throws InputError; next() reuses fixed buffers.
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -48,6 +49,9 @@ class LogSource {
   virtual bool next(SensorMessage& message) = 0;
   /// False where the next message is certainly no image.
   [[nodiscard]] virtual bool imageIsNext() const { return true; }
+  /// The file of the image that next() gave last, PNG or JPEG, until next() is called again; empty where the log
+  /// holds pixels.
+  [[nodiscard]] virtual std::span<const std::uint8_t> picture() const { return {}; }
   /// Images the log lists, all cameras together, for progress.
   [[nodiscard]] virtual std::size_t imageCount() const = 0;
   /// Distinct image stamps the log lists: the most poses a replay can give.

@@ -1,10 +1,19 @@
 #include <fmt/format.h>
 
+#include <functional>
 #include <memory>
+#include <optional>
+#include <utility>
 
+#include "drivers/bag/bag_file.hpp"
 #include "drivers/input/input_error.hpp"
+#include "drivers/recorded/asl_folder.hpp"
+#include "drivers/recorded/open_log.hpp"
 #include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/log_options.hpp"
 #include "firmware_host/lab/evaluation/evaluate_run.hpp"
+#include "firmware_host/lab/export/bag_output.hpp"
+#include "firmware_host/lab/export/log_bag.hpp"
 #include "firmware_host/lab/export/run_bag.hpp"
 #include "firmware_host/lab/export/tum_files.hpp"
 
@@ -12,12 +21,17 @@ namespace swiftlet {
 namespace {
 
 struct ExportOptions {
-  std::string run;
+  std::string from;
   std::string bag;
+  std::string mcap;
+  std::string rosbag2;
   std::string tum;
   std::string truth;
   bool no_truth = false;
   bool no_meshes = false;
+  bool images = false;
+  bool raw_images = false;
+  LogCommandOptions log;
   RosFrames frames;
 };
 
@@ -48,16 +62,59 @@ void checkFrames(const RosFrames& frames) {
   }
 }
 
+/// Each bag that is asked for.
+void writeBags(const ExportOptions& options, const std::function<void(MessageBag&)>& fill) {
+  for (const auto& [form, path] :
+       {std::pair{BagForm::kRos1, options.bag}, std::pair{BagForm::kMcap, options.mcap},
+        std::pair{BagForm::kRosbag2, options.rosbag2}}) {
+    if (path.empty()) continue;
+    for (const auto& [topic, messages] : writeBag(form, path, fill)) {
+      fmt::print("  {:<28}{:>7}\n", topic, messages);
+    }
+    fmt::print("written to {}\n", path);
+  }
+}
+
+std::unique_ptr<LogSource> openAll(const ExportOptions& options, const std::string& path) {
+  LogOptions log;
+  const std::vector<std::string>& calibration = options.log.calibration;
+  if (!calibration.empty()) log.calibration = calibration[0];
+  if (calibration.size() > 1) log.imu_calibration = calibration[1];
+  log.imu_after_last_image = true;
+  return openLog(path, log);
+}
+
+LogBagOptions logOptions(const ExportOptions& options, bool alone) {
+  LogBagOptions log;
+  log.frames = options.frames;
+  log.raw_images = options.raw_images;
+  log.alone = alone;
+  return log;
+}
+
+int exportLog(const ExportOptions& options) {
+  if (!options.tum.empty()) {
+    throw InputError(options.from, 0, "--tum", "a log has no trajectory of ours",
+                     "Replay it, and export the run");
+  }
+  std::vector<std::string> warnings;
+  writeBags(options, [&](MessageBag& bag) {
+    const auto log = openAll(options, options.from);
+    LogBag(*log, logOptions(options, !options.no_truth), bag).writeRest();
+    warnings = log->warnings();
+  });
+  for (const std::string& line : warnings) fmt::print("{}\n", line);
+  return kExitDone;
+}
+
 int exportRun(const ExportOptions& options) {
-  checkFrames(options.frames);
-  const RunFolder run = readRunFolder(options.run);
+  const RunFolder run = readRunFolder(options.from);
   const Trajectory truth = truthOf(options, run);
   if (!options.tum.empty()) {
     for (const std::string& name : writeTumFiles(run, truth, options.tum)) {
       fmt::print("{}/{}\n", options.tum, name);
     }
   }
-  if (options.bag.empty()) return kExitDone;
   const BagTruth beside = truthBeside(run, truth);
   if (!truth.empty() && beside.poses.empty()) {
     fmt::print("without truth: none of its poses is at the time of the run's\n");
@@ -65,37 +122,58 @@ int exportRun(const ExportOptions& options) {
   RunBagOptions bag_options;
   bag_options.frames = options.frames;
   bag_options.meshes = !options.no_meshes;
-  for (const auto& [topic, messages] : writeRunBag(run, beside, bag_options, options.bag)) {
-    fmt::print("  {:<24}{:>7}\n", topic, messages);
+  if (options.images && run.log.empty()) {
+    throw InputError(options.from, 0, "--images", "the run does not say which log it was made from",
+                     "Export the log into a bag of its own");
   }
-  fmt::print("written to {}\n", options.bag);
+  writeBags(options, [&](MessageBag& bag) {
+    const auto log = options.images ? openAll(options, run.log) : nullptr;
+    std::optional<LogBag> images;
+    if (log != nullptr) images.emplace(*log, logOptions(options, false), bag);
+    writeRunBag(run, beside, bag_options, bag, images ? &*images : nullptr);
+  });
   return kExitDone;
+}
+
+int exportAny(const ExportOptions& options) {
+  checkFrames(options.frames);
+  return isAslFolder(options.from) || isBag(options.from) ? exportLog(options) : exportRun(options);
 }
 
 }  // namespace
 
 void addExportCommand(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("export", "A run folder for other programs: a ROS bag, TUM files");
+  CLI::App* command = app.add_subcommand(
+      "export", "A run folder or a log for other programs: MCAP, rosbag2, a ROS 1 bag, TUM files");
   auto options = std::make_shared<ExportOptions>();
-  command->add_option("RUN", options->run, "Run folder")->required();
+  command->add_option("RUN_OR_LOG", options->from, "Run folder, or a log: EuRoC folder or bag")->required();
   auto* wanted = command->add_option_group("formats", "At least one of");
-  wanted->add_option("--bag", options->bag, "ROS 1 bag to write: for Foxglove, PlotJuggler, RViz");
+  wanted->add_option("--mcap", options->mcap,
+                     "MCAP file to write, with ROS 2's messages: for Foxglove, ros2 bag");
+  wanted->add_option("--rosbag2", options->rosbag2,
+                     "rosbag2 folder to write, with an SQLite file: for ros2 bag");
+  wanted->add_option("--bag", options->bag, "ROS 1 bag to write: for PlotJuggler, RViz");
   wanted->add_option("--tum", options->tum, "Folder for trajectories in TUM files: for evo");
-  wanted->require_option(1, 2);
+  wanted->require_option(1, 4);
   CLI::Option* truth = command->add_option(
       "--truth", options->truth,
       "Log or trajectory file with the truth; default: the log the run was made from, where it is there");
   command->add_flag("--no-truth", options->no_truth, "Leave the truth out")->excludes(truth);
   command->add_flag("--no-meshes", options->no_meshes, "Leave the surfaces out of the bag");
+  command->add_flag("--images", options->images, "Of a run: also the images and samples of its log");
+  command->add_flag("--raw-images", options->raw_images,
+                    "Images as pixels (mono8), also where the log holds PNG or JPEG files");
+  options->log.addCalibration(*command);
   command->add_option("--map-frame", options->frames.map, "Frame of the map")->capture_default_str();
   command->add_option("--odom-frame", options->frames.odom, "Frame of the odometry's world")
       ->capture_default_str();
   command->add_option("--body-frame", options->frames.body, "Frame of the body, which is the IMU")
       ->capture_default_str();
   command->footer(
-      "Example:\n  swiftlet export run_mh01 --bag run_mh01.bag\n"
+      "Example:\n  swiftlet export run_mh01 --mcap run_mh01.mcap\n"
+      "  swiftlet export data/euroc_mh01 --rosbag2 mh01\n"
       "  swiftlet export run_mh01 --tum evo && evo_ape tum evo/truth.tum evo/odometry.tum -a");
-  command->callback([options, &exit_code] { exit_code = exportRun(*options); });
+  command->callback([options, &exit_code] { exit_code = exportAny(*options); });
 }
 
 }  // namespace swiftlet

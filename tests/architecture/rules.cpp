@@ -43,8 +43,10 @@ RoomTable directNeighbours() {
   table["drivers/gstreamer"] = {"drivers/image"};
   // An autopilot's inertial messages come over a serial port like any sensor's.
   table["drivers/serial"].insert("drivers/mavlink");
+  // Its errors are those of all files that users give.
+  table["drivers/bag"] = {"drivers/calibration", "drivers/device"};
   // Calibration as users have it; a simulated flight is written as a recorded one.
-  table["drivers/recorded"].insert({"drivers/calibration", "drivers/image"});
+  table["drivers/recorded"].insert({"drivers/bag", "drivers/calibration", "drivers/image"});
   table["drivers/simulated"].insert("drivers/recorded");
   return table;
 }

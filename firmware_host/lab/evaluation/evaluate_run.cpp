@@ -2,6 +2,8 @@
 
 #include <filesystem>
 
+#include "drivers/bag/bag_file.hpp"
+#include "drivers/recorded/bag_topics.hpp"
 #include "drivers/recorded/open_log.hpp"
 #include "firmware_host/lab/evaluation/accuracy_report.hpp"
 #include "firmware_host/outputs/run_folder/loops_csv.hpp"
@@ -37,7 +39,17 @@ AccuracyOptions accuracyOptions(const EvaluationGroup& settings, AlignKind align
 
 Truth readTruth(const std::string& path, bool without_images) {
   Truth truth;
-  if (!std::filesystem::is_directory(path) && std::filesystem::path(path).extension() != ".bag") {
+  constexpr const char* kRemedy = "Give a trajectory file with --truth (TUM, or EuRoC csv)";
+  if (isBag(path)) {
+    // Poses alone need no calibration, which a bag does not hold.
+    const auto bag = openBag(path);
+    const auto topic = chooseTruthTopic(*bag);
+    truth.poses = readBagTruth(*bag, topic);
+    if (truth.poses.empty()) throw InputError(path, 0, "", "no topic of it holds true poses", kRemedy);
+    truth.name = path + " " + bag->topics()[*topic].name;
+    return truth;
+  }
+  if (!std::filesystem::is_directory(path)) {
     truth.poses = readEstimate(path);
     truth.name = path;
     return truth;
@@ -48,8 +60,7 @@ Truth readTruth(const std::string& path, bool without_images) {
   truth.poses = source->groundTruth();
   truth.name = source->groundTruthName();
   if (truth.poses.empty()) {
-    throw InputError(path, 0, "", "the log has no truth",
-                     "Give a trajectory file with --truth (TUM, or EuRoC csv)");
+    throw InputError(path, 0, "", "the log has no truth", kRemedy);
   }
   SensorMessage message;
   while (!without_images && !truth.first_image && source->next(message)) {

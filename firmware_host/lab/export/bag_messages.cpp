@@ -2,7 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <limits>
+#include <algorithm>
+#include <array>
 
 #include "estimator/messages/names.hpp"
 #include "firmware_host/outputs/map_files/map_files.hpp"
@@ -10,7 +11,6 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 constexpr float kFullColour = 255;
 
 template <typename Point>
@@ -28,8 +28,8 @@ void set(Quaternion& to, const Eigen::Quaterniond& from) {
   to.w = from.w();
 }
 
-BagMarker::_color_type colourOf(std::uint8_t red, std::uint8_t green, std::uint8_t blue) {
-  BagMarker::_color_type colour;
+rosmsg::ColorRGBA colourOf(std::uint8_t red, std::uint8_t green, std::uint8_t blue) {
+  rosmsg::ColorRGBA colour;
   colour.r = static_cast<float>(red) / kFullColour;
   colour.g = static_cast<float>(green) / kFullColour;
   colour.b = static_cast<float>(blue) / kFullColour;
@@ -37,68 +37,57 @@ BagMarker::_color_type colourOf(std::uint8_t red, std::uint8_t green, std::uint8
   return colour;
 }
 
-std::int8_t levelOf(const std::string& health) {
-  if (health == healthName(Health::kGood)) return BagStatus::OK;
-  return health == healthName(Health::kFailed) ? BagStatus::ERROR : BagStatus::WARN;
+std::uint8_t levelOf(const std::string& health) {
+  if (health == healthName(Health::kGood)) return rosmsg::DiagnosticStatus::kOk;
+  return health == healthName(Health::kFailed) ? rosmsg::DiagnosticStatus::kError
+                                               : rosmsg::DiagnosticStatus::kWarn;
 }
 
 /// `name` as rqt_robot_monitor groups it: what stands before the slash is one tree.
-BagStatus statusOf(const char* name, std::int8_t level, const std::string& message) {
-  BagStatus status;
+rosmsg::DiagnosticStatus statusOf(const char* name, std::uint8_t level, const std::string& message) {
+  rosmsg::DiagnosticStatus status;
   status.name = name;
   status.hardware_id = "swiftlet";
-  status.level = static_cast<std::int8_t>(level);
-  status.message = message.c_str();
+  status.level = {level};
+  status.message = message;
   return status;
 }
 
-void add(BagStatus& status, const char* key, const std::string& value) {
-  BagStatus::_values_type::value_type pair;
-  pair.key = key;
-  pair.value = value.c_str();
-  status.values.push_back(pair);
+void add(rosmsg::DiagnosticStatus& status, const char* key, const std::string& value) {
+  status.values.push_back({key, value});
 }
 
 }  // namespace
 
-bool bagHolds(Stamp stamp) {
-  return stamp.ns > 0 && stamp.ns / kNsPerSecond < std::numeric_limits<std::uint32_t>::max();
-}
-
-ros::Time bagTime(Stamp stamp) {
-  return {static_cast<std::uint32_t>(stamp.ns / kNsPerSecond),
-          static_cast<std::uint32_t>(stamp.ns % kNsPerSecond)};
-}
-
-BagHeader bagHeader(Stamp stamp, const std::string& frame) {
-  BagHeader header;
-  header.stamp = bagTime(stamp);
-  header.frame_id = frame.c_str();
+rosmsg::Header bagHeader(Stamp stamp, const std::string& frame) {
+  rosmsg::Header header;
+  header.stamp = stamp;
+  header.frame_id = frame;
   return header;
 }
 
-BagPose bagPose(Stamp stamp, const std::string& frame, const SE3& T_frame_body) {
-  BagPose pose;
+rosmsg::PoseStamped bagPose(Stamp stamp, const std::string& frame, const SE3& T_frame_body) {
+  rosmsg::PoseStamped pose;
   pose.header = bagHeader(stamp, frame);
   set(pose.pose.position, T_frame_body.translation);
   set(pose.pose.orientation, T_frame_body.rotation);
   return pose;
 }
 
-BagTransform bagTransform(Stamp stamp, const std::string& frame, const std::string& child,
-                          const SE3& T_frame_child) {
-  BagTransform transform;
+rosmsg::TransformStamped bagTransform(Stamp stamp, const std::string& frame, const std::string& child,
+                                      const SE3& T_frame_child) {
+  rosmsg::TransformStamped transform;
   transform.header = bagHeader(stamp, frame);
-  transform.child_frame_id = child.c_str();
+  transform.child_frame_id = child;
   set(transform.transform.translation, T_frame_child.translation);
   set(transform.transform.rotation, T_frame_child.rotation);
   return transform;
 }
 
-BagOdometry bagOdometry(const NavState& state, const RosFrames& frames) {
-  BagOdometry odometry;
+rosmsg::Odometry bagOdometry(const NavState& state, const RosFrames& frames) {
+  rosmsg::Odometry odometry;
   odometry.header = bagHeader(state.stamp, frames.odom);
-  odometry.child_frame_id = frames.body.c_str();
+  odometry.child_frame_id = frames.body;
   set(odometry.pose.pose.position, state.T_world_body.translation);
   set(odometry.pose.pose.orientation, state.T_world_body.rotation);
   set(odometry.twist.twist.linear, bodyVelocity(state));
@@ -107,8 +96,8 @@ BagOdometry bagOdometry(const NavState& state, const RosFrames& frames) {
   return odometry;
 }
 
-BagPath bagPath(const std::string& frame, const Trajectory& trajectory) {
-  BagPath path;
+rosmsg::Path bagPath(const std::string& frame, const Trajectory& trajectory) {
+  rosmsg::Path path;
   path.header = bagHeader(trajectory.front().stamp, frame);
   path.poses.reserve(trajectory.size());
   for (const TrajectoryPoint& point : trajectory) {
@@ -117,20 +106,20 @@ BagPath bagPath(const std::string& frame, const Trajectory& trajectory) {
   return path;
 }
 
-BagVector bagVector(Stamp stamp, const std::string& frame, const Eigen::Vector3d& vector) {
-  BagVector message;
+rosmsg::Vector3Stamped bagVector(Stamp stamp, const std::string& frame, const Eigen::Vector3d& vector) {
+  rosmsg::Vector3Stamped message;
   message.header = bagHeader(stamp, frame);
   set(message.vector, vector);
   return message;
 }
 
-BagMarker bagMarker(Stamp stamp, const std::string& frame, const std::string& name,
-                    const TriangleMesh& mesh) {
-  BagMarker marker;
+rosmsg::Marker bagMarker(Stamp stamp, const std::string& frame, const std::string& name,
+                         const TriangleMesh& mesh) {
+  rosmsg::Marker marker;
   marker.header = bagHeader(stamp, frame);
-  marker.ns = name.c_str();
-  marker.type = BagMarker::TRIANGLE_LIST;
-  marker.action = mesh.faces.empty() ? BagMarker::DELETE : BagMarker::ADD;
+  marker.ns = name;
+  marker.type = rosmsg::Marker::kTriangleList;
+  marker.action = mesh.faces.empty() ? rosmsg::Marker::kDelete : rosmsg::Marker::kAdd;
   marker.pose.orientation.w = 1;
   marker.scale.x = marker.scale.y = marker.scale.z = 1;
   marker.color = colourOf(128, 128, 128);
@@ -139,7 +128,7 @@ BagMarker bagMarker(Stamp stamp, const std::string& frame, const std::string& na
   for (std::size_t face = 0; face < mesh.faces.size(); ++face) {
     const std::uint8_t label = mesh.labels.empty() ? std::uint8_t{0} : mesh.labels[face];
     for (const std::uint32_t corner : mesh.faces[face]) {
-      BagMarker::_points_type::value_type point;
+      rosmsg::Point point;
       set(point, mesh.vertices[corner].cast<double>());
       marker.points.push_back(point);
       const std::uint8_t grey = mesh.grey.empty() ? std::uint8_t{128} : mesh.grey[corner];
@@ -150,10 +139,10 @@ BagMarker bagMarker(Stamp stamp, const std::string& frame, const std::string& na
   return marker;
 }
 
-BagDiagnostics bagDiagnostics(const KeyframeState& keyframe) {
+rosmsg::DiagnosticArray bagDiagnostics(const KeyframeState& keyframe) {
   const std::string health(healthName(keyframe.state.health));
   const FrameStatistics& figures = keyframe.statistics;
-  BagStatus status = statusOf("swiftlet/keyframe", levelOf(health), health);
+  rosmsg::DiagnosticStatus status = statusOf("swiftlet/keyframe", levelOf(health), health);
   add(status, "epoch", fmt::format("{}", keyframe.state.epoch));
   add(status, "at_rest", figures.at_rest ? "1" : "0");
   add(status, "tracks", fmt::format("{}", figures.tracks));
@@ -164,19 +153,19 @@ BagDiagnostics bagDiagnostics(const KeyframeState& keyframe) {
   add(status, "reprojection_rms", fmt::format("{}", figures.reprojection_rms));
   add(status, "imu_residual", fmt::format("{}", figures.imu_residual));
   add(status, "iterations", fmt::format("{}", figures.iterations));
-  BagDiagnostics diagnostics;
+  rosmsg::DiagnosticArray diagnostics;
   diagnostics.header = bagHeader(keyframe.state.stamp, "");
   diagnostics.status.push_back(status);
   return diagnostics;
 }
 
-BagDiagnostics bagDiagnostics(const EventLine& event, const std::string& health) {
-  BagStatus status = statusOf("swiftlet/health", levelOf(health), health);
-  BagStatus what = statusOf("swiftlet/event", BagStatus::OK,
-                            event.text.empty() ? event.name : event.name + " " + event.text);
+rosmsg::DiagnosticArray bagDiagnostics(const EventLine& event, const std::string& health) {
+  rosmsg::DiagnosticStatus status = statusOf("swiftlet/health", levelOf(health), health);
+  rosmsg::DiagnosticStatus what = statusOf("swiftlet/event", rosmsg::DiagnosticStatus::kOk,
+                                           event.text.empty() ? event.name : event.name + " " + event.text);
   add(what, "event", event.name);
   add(what, "value", event.text);
-  BagDiagnostics diagnostics;
+  rosmsg::DiagnosticArray diagnostics;
   diagnostics.header = bagHeader(event.stamp, "");
   diagnostics.status.push_back(status);
   diagnostics.status.push_back(what);

@@ -1,8 +1,6 @@
 #include "firmware_host/lab/export/run_bag.hpp"
 
 #include <fmt/format.h>
-#include <rosbag/bag.h>
-#include <rosbag/view.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -10,7 +8,6 @@
 
 #include "drivers/input/input_error.hpp"
 #include "estimator/messages/names.hpp"
-#include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/lab/export/bag_messages.hpp"
 #include "firmware_host/outputs/map_files/ply_file.hpp"
 
@@ -25,17 +22,19 @@ constexpr std::size_t kMostFaces = 4'000'000;
 /// Gathers what is to be written, then writes it in the order of the stamps.
 class RunBag {
  public:
-  RunBag(const RunFolder& run, const BagTruth& truth, const RunBagOptions& options, const std::string& file)
-      : run_(run), truth_(truth), frames_(options.frames), meshes_(options.meshes), file_(file) {}
+  RunBag(const RunFolder& run, const BagTruth& truth, const RunBagOptions& options, MessageBag& bag)
+      : run_(run), truth_(truth), frames_(options.frames), meshes_(options.meshes), bag_(bag) {}
 
-  std::map<std::string, std::uint64_t> write() {
+  /// `log`: its messages go between those of the run; null: none.
+  void write(LogBag* log) {
+    log_ = log;
     plan();
     std::ranges::stable_sort(entries_, {}, &Entry::stamp);
-    bag_.open(file_, rosbag::bagmode::Write);
-    for (const Entry& entry : entries_) entry.write();
-    bag_.close();
-    check();
-    return counts_;
+    for (const Entry& entry : entries_) {
+      if (log != nullptr) log->writeUntil(entry.stamp);
+      entry.write();
+    }
+    if (log != nullptr) log->writeRest();
   }
 
  private:
@@ -56,39 +55,25 @@ class RunBag {
   /// `make` gives the message when its turn has come.
   template <typename Make>
   void at(Stamp stamp, const std::string& where, const std::string& topic, Make make, bool latched = false) {
-    if (!bagHolds(stamp)) {
+    if (!bag_.holds(stamp)) {
       throw InputError(where, 0, "stamp", fmt::format("{} ns has no place in a ROS bag", stamp.ns),
-                       "A bag holds times from 1 ns to the year 2106; `--tum` takes the others too");
+                       "A bag holds times from 1 ns to the year 2106 (ROS 1) or 2038 (ROS 2); `--tum` takes "
+                       "the others too");
     }
-    entries_.push_back({stamp, [this, stamp, topic, make, latched] { put(stamp, topic, make(), latched); }});
-  }
-
-  template <typename Message>
-  void put(Stamp stamp, const std::string& topic, Message message, bool latched) {
-    const auto sequence = static_cast<std::uint32_t>(counts_[topic]++);
-    if constexpr (requires { message.header.seq; }) message.header.seq = sequence;
-    boost::shared_ptr<ros::M_string> fields;
-    if (latched) {
-      // What a player needs to repeat the last message to who comes late.
-      fields = boost::make_shared<ros::M_string>();
-      (*fields)["topic"] = topic;
-      (*fields)["type"] = ros::message_traits::datatype(message);
-      (*fields)["md5sum"] = ros::message_traits::md5sum(message);
-      (*fields)["message_definition"] = ros::message_traits::definition(message);
-      (*fields)["latching"] = "1";
-    }
-    bag_.write(topic, bagTime(stamp), message, fields);
+    entries_.push_back(
+        {stamp, [this, stamp, topic, make, latched] { bag_.write(topic, stamp, make(), latched); }});
   }
 
   void planTransforms() {
     const std::string where = pathOf(run_.odometry_file);
     const Stamp first = run_.odometry.front().stamp;
     // One message: a player repeats only the last of a topic.
-    if (run_.map.empty() || !truth_.poses.empty()) {
+    if (run_.map.empty() || !truth_.poses.empty() || log_ != nullptr) {
       at(
           first, where, "/tf_static",
           [this, first] {
-            BagTransforms fixed;
+            rosmsg::TFMessage fixed;
+            if (log_ != nullptr) fixed.transforms = log_->cameraTransforms(first);
             if (run_.map.empty()) fixed.transforms.push_back(mapTransform(first, {}));
             if (!truth_.poses.empty()) {
               fixed.transforms.push_back(
@@ -102,7 +87,8 @@ class RunBag {
     for (std::size_t i = 0; i < run_.odometry.size(); ++i) {
       const TrajectoryPoint& point = run_.odometry[i];
       at(point.stamp, where, "/tf", [this, &point, correction = corrections[i]] {
-        const BagTransform body = bagTransform(point.stamp, frames_.odom, frames_.body, point.T_world_body);
+        const rosmsg::TransformStamped body =
+            bagTransform(point.stamp, frames_.odom, frames_.body, point.T_world_body);
         if (run_.map.empty()) return transforms({body});
         return transforms({mapTransform(point.stamp, correction), body});
       });
@@ -186,57 +172,30 @@ class RunBag {
     });
   }
 
-  [[nodiscard]] BagTransform mapTransform(Stamp stamp, const SE3& T_map_world) const {
+  [[nodiscard]] rosmsg::TransformStamped mapTransform(Stamp stamp, const SE3& T_map_world) const {
     return bagTransform(stamp, frames_.map, frames_.odom, T_map_world);
   }
-  static BagTransforms transforms(std::initializer_list<BagTransform> list) {
-    BagTransforms message;
-    for (const BagTransform& transform : list) message.transforms.push_back(transform);
+  static rosmsg::TFMessage transforms(std::initializer_list<rosmsg::TransformStamped> list) {
+    rosmsg::TFMessage message;
+    for (const rosmsg::TransformStamped& transform : list) message.transforms.push_back(transform);
     return message;
   }
   [[nodiscard]] std::string pathOf(const std::string& name) const { return fs::path(run_.path) / name; }
-
-  /// A full disk shows when the file is closed, and rosbag does not look.
-  void check() const {
-    rosbag::Bag written(file_, rosbag::bagmode::Read);
-    if (rosbag::View(written).size() == entries_.size()) return;
-    throw rosbag::BagIOException("messages are missing in the file written");
-  }
 
   const RunFolder& run_;
   const BagTruth& truth_;
   const RosFrames frames_;
   const bool meshes_;
-  const std::string file_;
+  MessageBag& bag_;
+  LogBag* log_ = nullptr;
   std::vector<Entry> entries_;
-  rosbag::Bag bag_;
-  std::map<std::string, std::uint64_t> counts_;
 };
-
-void removeFile(const std::string& file) {
-  std::error_code ignored;
-  fs::remove(file, ignored);
-}
 
 }  // namespace
 
-std::map<std::string, std::uint64_t> writeRunBag(const RunFolder& run, const BagTruth& truth,
-                                                 const RunBagOptions& options, const std::string& file) {
-  const std::string part = file + ".part";
-  try {
-    const std::map<std::string, std::uint64_t> counts = RunBag(run, truth, options, part).write();
-    commitPart(part, file);
-    return counts;
-  } catch (const rosbag::BagException& error) {
-    removeFile(part);
-    throw InputError(file, 0, "", std::string("cannot be written (") + error.what() + ")",
-                     "Is the folder there and writable, and the disk not full?");
-  } catch (const InputError&) {
-    removeFile(part);
-    throw;
-  }
+void writeRunBag(const RunFolder& run, const BagTruth& truth, const RunBagOptions& options, MessageBag& bag,
+                 LogBag* log) {
+  RunBag(run, truth, options, bag).write(log);
 }
-
-bool canWriteBags() { return true; }
 
 }  // namespace swiftlet

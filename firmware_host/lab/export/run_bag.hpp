@@ -1,14 +1,11 @@
 #pragma once
-// A run folder as a ROS 1 bag (format 2.0, not compressed), for Foxglove, PlotJuggler and RViz.
+// A run folder as messages in a bag, for Foxglove, PlotJuggler and RViz.
 //
 // docs/export.md lists topics, types, frames and what each stamp is. The messages lie in the bag by their
-// stamps; the same run, options and build give the same bytes. Built with Debian's rosbag-storage and message
-// packages; without them writeRunBag() says what to install. Memory: the folder's rows and one mesh.
+// stamps; the same run, options and build give the same bytes. Memory: the folder's rows and one mesh.
 
-#include <cstdint>
-#include <map>
-#include <string>
-
+#include "drivers/bag/message_bag.hpp"
+#include "firmware_host/lab/export/log_bag.hpp"
 #include "firmware_host/lab/export/run_folder.hpp"
 #include "firmware_host/outputs/ros2/ros_state.hpp"
 
@@ -29,12 +26,9 @@ struct BagTruth {
 /// pose where the path is too short for that. No poses where none has the truth beside it.
 BagTruth truthBeside(const RunFolder& run, const Trajectory& truth);
 
-/// Messages by topic. InputError: stamps that a bag cannot hold (before 1 ns or after 2106), damaged meshes,
-/// a file that cannot be written; nothing is left of it then.
-std::map<std::string, std::uint64_t> writeRunBag(const RunFolder& run, const BagTruth& truth,
-                                                 const RunBagOptions& options, const std::string& file);
-
-/// False in builds without rosbag-storage and the message packages.
-bool canWriteBags();
+/// `log`: its messages stand between those of the run; null: none. InputError: stamps that a bag cannot hold,
+/// damaged meshes, a file that cannot be written.
+void writeRunBag(const RunFolder& run, const BagTruth& truth, const RunBagOptions& options, MessageBag& bag,
+                 LogBag* log = nullptr);
 
 }  // namespace swiftlet

@@ -1,0 +1,74 @@
+#include "drivers/bag/bag_file.hpp"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "drivers/bag/bag_kind.hpp"
+#include "drivers/bag/mcap_file.hpp"
+#include "drivers/bag/ros1_file.hpp"
+#include "drivers/bag/rosbag2_folder.hpp"
+#include "drivers/bag/sqlite_bag.hpp"
+#include "drivers/bag/unpack.hpp"
+#include "drivers/calibration/input_error.hpp"
+
+namespace swiftlet {
+namespace {
+
+std::string withoutMsg(std::string_view type) {
+  std::string name(type);
+  const std::size_t at = name.find("/msg/");
+  if (at != std::string::npos) name.erase(at, 4);
+  return name;
+}
+
+}  // namespace
+
+std::uint32_t BagFile::topicOf(std::string_view name, std::string_view type, BagEncoding encoding,
+                               std::string_view definition) {
+  const std::string plain = withoutMsg(type);
+  for (std::size_t i = 0; i < topics_.size(); ++i) {
+    const BagTopic& topic = topics_[i];
+    if (topic.name == name && topic.type == plain && topic.encoding == encoding) {
+      return static_cast<std::uint32_t>(i);
+    }
+  }
+  topics_.push_back({std::string(name), plain, encoding, 0, std::string(definition)});
+  return static_cast<std::uint32_t>(topics_.size() - 1);
+}
+
+void BagFile::orderEntries() {
+  std::stable_sort(entries_.begin(), entries_.end(),
+                   [](const BagEntry& a, const BagEntry& b) { return a.log_time < b.log_time; });
+  for (const BagEntry& entry : entries_) ++topics_[entry.topic].messages;
+}
+
+bool isBag(const std::string& path) {
+  if (std::filesystem::is_directory(path)) return isRosbag2Folder(path);
+  return bagKindOf(path) != BagKind::kNone;
+}
+
+std::unique_ptr<BagFile> openBag(const std::string& path) {
+  if (std::filesystem::is_directory(path)) return openRosbag2Folder(path);
+  BagKind kind = bagKindOf(path);
+  std::string file = path;
+  // Unlinked once it is open: nothing is left whatever happens.
+  std::unique_ptr<UnpackedFile> unpacked;
+  if (kind == BagKind::kZstd) {
+    unpacked = std::make_unique<UnpackedFile>(path);
+    file = unpacked->path();
+    kind = bagKindOf(file);
+  }
+  switch (kind) {
+    case BagKind::kRos1:
+      return openRos1File(file, path);
+    case BagKind::kMcap:
+      return openMcapFile(file, path);
+    case BagKind::kSqlite:
+      return openSqliteBag(file, path);
+    default:
+      throw InputError(path, 0, "byte 0", "begins like no bag",
+                       "Give a rosbag2 folder or its .db3, an MCAP file or a ROS 1 bag; is it empty or cut?");
+  }
+}
+
+}  // namespace swiftlet

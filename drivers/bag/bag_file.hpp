@@ -1,0 +1,78 @@
+#pragma once
+// Files of recorded messages, whatever holds them: rosbag2 folders (SQLite or MCAP), their single files, MCAP
+// files, ROS 1 bags where the build has rosbag-storage. Messages stay bytes here; what they mean is said in
+// drivers/bag/ros_messages.hpp.
+//
+// Order: the time at which the recorder received a message; equal times in the file's order.
+// Errors: InputError with file, byte or row, and the remedy. Every read is bounds-checked, checksums that are
+// there are compared: a damaged file is refused when it is opened or when the damaged message is read. A file
+// that its recorder did not finish gives what is whole, and a warning names the byte where it ends.
+// Memory: 24 bytes a message, and four unpacked chunks of an MCAP file. Threads: one a file. Host side only.
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+enum class BagEncoding : std::uint8_t {
+  kRos1,   ///< packed, little-endian
+  kCdr,    ///< ROS 2: four bytes of header, then aligned CDR
+  kOther,  ///< not read: JSON, Protobuf, ...
+};
+
+struct BagTopic {
+  std::string name;
+  std::string type;  ///< `sensor_msgs/Imu`, of ROS 2 too
+  BagEncoding encoding = BagEncoding::kOther;
+  std::uint64_t messages = 0;
+  std::string definition;  ///< text of the type; empty where the file does not hold it
+};
+
+struct BagEntry {
+  Stamp log_time;
+  std::uint32_t topic = 0;  ///< index into topics()
+  std::uint32_t part = 0;   ///< file or chunk, for the format
+  std::uint64_t at = 0;     ///< place in it, for the format
+};
+
+class BagFile {
+ public:
+  explicit BagFile(std::string path) : path_(std::move(path)) {}
+  BagFile(const BagFile&) = delete;
+  BagFile& operator=(const BagFile&) = delete;
+  virtual ~BagFile() = default;
+
+  [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] const std::vector<BagTopic>& topics() const { return topics_; }
+  [[nodiscard]] const std::vector<BagEntry>& entries() const { return entries_; }
+  [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
+
+  /// The body of a message, valid until the next call.
+  virtual std::span<const std::uint8_t> read(const BagEntry& entry) = 0;
+
+ protected:
+  /// The topic of this name, type and encoding, made where there is none yet.
+  std::uint32_t topicOf(std::string_view name, std::string_view type, BagEncoding encoding,
+                        std::string_view definition);
+  /// Once all entries are there: orders and counts them.
+  void orderEntries();
+
+  std::string path_;
+  std::vector<BagTopic> topics_;
+  std::vector<BagEntry> entries_;
+  std::vector<std::string> warnings_;
+};
+
+/// True for a rosbag2 folder, and for a file that begins like a bag of any kind, packed with zstd too.
+[[nodiscard]] bool isBag(const std::string& path);
+
+/// Told by content. InputError also where the build has no reader for it.
+[[nodiscard]] std::unique_ptr<BagFile> openBag(const std::string& path);
+
+}  // namespace swiftlet

@@ -1,0 +1,25 @@
+#include "drivers/bag/bag_kind.hpp"
+
+#include <array>
+#include <fstream>
+#include <string_view>
+#include <utility>
+
+namespace swiftlet {
+
+BagKind bagKindOf(const std::string& path) {
+  using std::string_view_literals::operator""sv;
+  constexpr std::array kBeginnings = {
+      std::pair{"#ROSBAG V2.0\n"sv, BagKind::kRos1}, std::pair{"\x89MCAP0\r\n"sv, BagKind::kMcap},
+      std::pair{"SQLite format 3\0"sv, BagKind::kSqlite}, std::pair{"\x28\xB5\x2F\xFD"sv, BagKind::kZstd}};
+  std::array<char, 16> head{};
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), head.size());
+  const std::string_view begin(head.data(), static_cast<std::size_t>(file.gcount()));
+  for (const auto& [text, kind] : kBeginnings) {
+    if (begin.starts_with(text)) return kind;
+  }
+  return BagKind::kNone;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,13 @@
+#pragma once
+// What kind of bag a file is, told by its first bytes.
+
+#include <cstdint>
+#include <string>
+
+namespace swiftlet {
+
+enum class BagKind : std::uint8_t { kNone, kRos1, kMcap, kSqlite, kZstd };
+
+[[nodiscard]] BagKind bagKindOf(const std::string& path);
+
+}  // namespace swiftlet

@@ -1,0 +1,55 @@
+#pragma once
+// Writes files of messages: MCAP and rosbag2 for ROS 2, bags for ROS 1.
+//
+// Whatever stops the program leaves a part under the path given: who wants a whole file or none gives a
+// temporary path and renames it after finish().
+// Errors: InputError when the disk takes no more. Memory: a chunk of 1 MiB and 16 bytes a message of it
+// (MCAP); of the libraries. Threads: one a file. Host side only.
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "drivers/bag/bag_file.hpp"
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+struct BagWriterTopic {
+  std::string name;
+  std::string type;        ///< `sensor_msgs/Imu`
+  std::string definition;  ///< text of the type for the writer's encoding
+  std::string md5;         ///< of the type; ROS 1 alone asks for it
+  bool latched = false;    ///< players repeat the last message to who comes late
+};
+
+class BagWriter {
+ public:
+  explicit BagWriter(std::string path) : path_(std::move(path)) {}
+  BagWriter(const BagWriter&) = delete;
+  BagWriter& operator=(const BagWriter&) = delete;
+  virtual ~BagWriter() = default;
+
+  [[nodiscard]] virtual BagEncoding encoding() const = 0;
+  /// The number of the topic for write().
+  virtual std::uint32_t addTopic(const BagWriterTopic& topic) = 0;
+  /// Log times should rise. `sequence` counts the messages of the topic.
+  virtual void write(std::uint32_t topic, Stamp log_time, std::uint32_t sequence,
+                     std::span<const std::uint8_t> body) = 0;
+  /// Nothing may be written after it.
+  virtual void finish() = 0;
+
+ protected:
+  std::string path_;
+};
+
+enum class McapPacking : std::uint8_t { kZstd, kNone };
+
+[[nodiscard]] std::unique_ptr<BagWriter> makeMcapWriter(const std::string& path, McapPacking packing);
+
+/// Makes the folder. `name`: of the file in it, `<name>_0.db3`.
+[[nodiscard]] std::unique_ptr<BagWriter> makeRosbag2Writer(const std::string& folder,
+                                                           const std::string& name);
+
+}  // namespace swiftlet

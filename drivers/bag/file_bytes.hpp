@@ -1,0 +1,41 @@
+#pragma once
+// Bytes of a file by their place, through a small window, so that records one behind the other cost few
+// reads.
+//
+// Errors: InputError where the file cannot be opened or read. What lies past the end is left out of an
+// answer.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace swiftlet {
+
+class FileBytes {
+ public:
+  /// `name` stands for the file in messages.
+  FileBytes(const std::string& path, std::string name);
+  FileBytes(const FileBytes&) = delete;
+  FileBytes& operator=(const FileBytes&) = delete;
+  ~FileBytes();
+
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+  /// At most `length` bytes from `offset`, valid until the next call.
+  std::span<const std::uint8_t> at(std::uint64_t offset, std::size_t length);
+  /// The same without a copy into the window, for what is large.
+  void read(std::uint64_t offset, std::size_t length, std::vector<std::uint8_t>& out) const;
+
+ private:
+  std::size_t readInto(std::uint64_t offset, std::span<std::uint8_t> out) const;
+
+  std::string name_;
+  int file_ = -1;
+  std::uint64_t size_ = 0;
+  std::vector<std::uint8_t> window_;
+  std::uint64_t window_begin_ = 0;
+  std::size_t window_size_ = 0;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,421 @@
+#include "drivers/bag/mcap_file.hpp"
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <map>
+
+#include "drivers/bag/file_bytes.hpp"
+#include "drivers/bag/mcap_records.hpp"
+#include "drivers/bag/unpack.hpp"
+#include "drivers/calibration/input_error.hpp"
+#include "drivers/device/byte_fields.hpp"
+
+namespace swiftlet {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+using mcap::Op;
+
+constexpr std::uint32_t kNoChunk = std::numeric_limits<std::uint32_t>::max();
+constexpr std::uint64_t kMostUnpacked = std::uint64_t{1} << 30U;  // bytes of a chunk; writers make 1 to 4 MiB
+constexpr std::size_t kChunksKept = 4;
+
+std::string_view textOf(Bytes bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
+
+std::string_view readText(LittleFieldReader& reader) { return textOf(reader.bytes(reader.u32())); }
+
+BagEncoding encodingOf(std::string_view message_encoding) {
+  if (message_encoding == "cdr") return BagEncoding::kCdr;
+  return message_encoding == "ros1" ? BagEncoding::kRos1 : BagEncoding::kOther;
+}
+
+std::uint32_t crcOf(std::uint32_t crc, Bytes bytes) {
+  return static_cast<std::uint32_t>(::crc32_z(crc, bytes.data(), bytes.size()));
+}
+
+class McapFile final : public BagFile {
+ public:
+  McapFile(const std::string& path, const std::string& name);
+  Bytes read(const BagEntry& entry) override;
+
+ private:
+  struct Schema {
+    std::string name;
+    std::string definition;
+  };
+  struct Channel {
+    std::uint16_t schema = 0;
+    std::string topic;
+    std::string encoding;
+    std::uint32_t index = 0;  ///< of the topic
+    bool operator==(const Channel&) const = default;
+  };
+  struct Chunk {
+    std::uint64_t record = 0;  ///< byte where its record begins
+    std::uint64_t data = 0;    ///< byte where its packed records begin
+    std::uint64_t packed = 0;
+    std::uint64_t unpacked = 0;
+    std::uint32_t crc = 0;  ///< 0: none
+    Packing packing = Packing::kNone;
+  };
+  struct Unpacked {
+    std::uint32_t chunk = kNoChunk;
+    std::uint64_t used = 0;  ///< number of the last use
+    std::vector<std::uint8_t> bytes;
+  };
+
+  [[noreturn]] void fail(std::uint64_t at, const std::string& what) const;
+  void findEnd();
+  void readSummary();
+  void walk();
+  void endEarly(std::uint64_t at);
+  void checkData(std::uint64_t data_end, std::uint32_t crc);
+  void takeSchema(Bytes content, std::uint64_t place);
+  void takeChannel(Bytes content, std::uint64_t place);
+  void takeStatistics(Bytes content, std::uint64_t place);
+  void takeChunk(std::uint64_t record, std::uint64_t content, std::uint64_t length);
+  void takeIndex(Bytes content, std::uint64_t place);
+  void closeChunk();
+  void scanChunk(std::uint32_t chunk, bool messages);
+  void takeMessage(Bytes head, std::uint32_t part, std::uint64_t at, std::uint64_t place);
+  [[nodiscard]] Stamp stampOf(std::uint64_t ns, std::uint64_t place) const;
+  Bytes unpackedChunk(std::uint32_t chunk);
+
+  FileBytes file_;
+  bool finished_ = false;      ///< footer and magic stand at the end
+  std::uint64_t footer_ = 0;   ///< byte where the footer begins
+  std::uint64_t summary_ = 0;  ///< byte where the summary begins; 0: none
+  bool counted_ = false;       ///< the summary has statistics
+  std::uint64_t count_ = 0;    ///< messages by them
+  bool outside_ = false;       ///< messages stand outside of chunks
+  std::map<std::uint16_t, Schema> schemas_;
+  std::map<std::uint16_t, Channel> channels_;
+  std::vector<Chunk> chunks_;
+  std::size_t before_chunk_ = 0;  ///< entries before those of the newest chunk
+  bool chunk_open_ = false;       ///< indexes of the newest chunk may follow
+  std::array<Unpacked, kChunksKept> kept_;
+  std::uint64_t uses_ = 0;
+  std::vector<std::uint8_t> packed_;
+};
+
+McapFile::McapFile(const std::string& path, const std::string& name) : BagFile(name), file_(path, name) {
+  const Bytes magic = file_.at(0, mcap::kMagic.size());
+  if (!std::equal(magic.begin(), magic.end(), mcap::kMagic.begin(), mcap::kMagic.end())) {
+    fail(0, "begins like no MCAP file");
+  }
+  findEnd();
+  if (summary_ != 0) readSummary();
+  walk();
+  if (counted_ && count_ != entries_.size()) {
+    fail(summary_, fmt::format("its statistics count {} messages, {} are there", count_, entries_.size()));
+  }
+  orderEntries();
+}
+
+void McapFile::fail(std::uint64_t at, const std::string& what) const {
+  throw InputError(path_, 0, fmt::format("byte {}", at), what,
+                   "The file is damaged: copy it again, or let `mcap recover` save what is whole");
+}
+
+void McapFile::findEnd() {
+  const std::uint64_t end_size = mcap::kRecordHead + mcap::kFooterContent + mcap::kMagic.size();
+  if (file_.size() < mcap::kMagic.size() + end_size) return;
+  footer_ = file_.size() - end_size;
+  const Bytes end = file_.at(footer_, end_size);
+  LittleFieldReader reader(end);
+  const bool footer =
+      reader.u8() == static_cast<std::uint8_t>(Op::kFooter) && reader.u64() == mcap::kFooterContent;
+  const Bytes magic = end.last(mcap::kMagic.size());
+  if (!footer || !std::equal(magic.begin(), magic.end(), mcap::kMagic.begin())) return;
+  finished_ = true;
+  summary_ = reader.u64();
+  if (summary_ != 0 && (summary_ < mcap::kMagic.size() || summary_ > footer_)) {
+    fail(footer_, "the footer places the summary outside of the file");
+  }
+}
+
+void McapFile::readSummary() {
+  constexpr std::uint64_t kCrc = 4;
+  const std::uint64_t size = file_.size() - mcap::kMagic.size() - summary_;
+  std::vector<std::uint8_t> bytes;
+  file_.read(summary_, static_cast<std::size_t>(size), bytes);
+  if (bytes.size() != size) fail(summary_, "the file ends early");
+  const Bytes covered = Bytes(bytes).first(bytes.size() - kCrc);
+  const std::uint32_t crc = LittleFieldReader(Bytes(bytes).last(kCrc)).u32();
+  if (crc != 0 && crcOf(0, covered) != crc) fail(summary_, "the summary's checksum is wrong");
+  LittleFieldReader reader(covered.first(static_cast<std::size_t>(footer_ - summary_)));
+  while (reader.left() > 0) {
+    const std::uint64_t place = footer_ - reader.left();
+    const auto op = static_cast<Op>(reader.u8());
+    const Bytes content = reader.bytes(static_cast<std::size_t>(reader.u64()));
+    if (!reader.ok()) fail(place, "a record of the summary ends behind it");
+    if (op == Op::kSchema) takeSchema(content, place);
+    if (op == Op::kChannel) takeChannel(content, place);
+    if (op == Op::kStatistics) takeStatistics(content, place);
+  }
+}
+
+void McapFile::takeSchema(Bytes content, std::uint64_t place) {
+  LittleFieldReader reader(content);
+  const std::uint16_t id = reader.u16();
+  Schema schema{std::string(readText(reader)), {}};
+  const std::string_view encoding = readText(reader);
+  const std::string_view text = readText(reader);
+  if (!reader.ok() || id == 0) fail(place, "a schema is damaged");
+  if (encoding == "ros2msg" || encoding == "ros1msg") schema.definition = text;
+  const auto [known, added] = schemas_.emplace(id, schema);
+  if (!added && known->second.name != schema.name) {
+    fail(place,
+         fmt::format("schema {} is defined twice, as {} and as {}", id, known->second.name, schema.name));
+  }
+}
+
+void McapFile::takeChannel(Bytes content, std::uint64_t place) {
+  LittleFieldReader reader(content);
+  const std::uint16_t id = reader.u16();
+  Channel channel;
+  channel.schema = reader.u16();
+  channel.topic = readText(reader);
+  channel.encoding = readText(reader);
+  if (!reader.ok()) fail(place, "a channel is damaged");
+  if (const auto known = channels_.find(id); known != channels_.end()) {
+    channel.index = known->second.index;
+    if (channel == known->second) return;
+    fail(place, fmt::format("channel {} is defined twice, for {} and for {}", id, known->second.topic,
+                            channel.topic));
+  }
+  const auto schema = schemas_.find(channel.schema);
+  if (schema == schemas_.end() && channel.schema != 0) {
+    fail(place, fmt::format("channel {} names schema {}, which is not there", id, channel.schema));
+  }
+  const Schema& type = schema == schemas_.end() ? Schema{} : schema->second;
+  channel.index = topicOf(channel.topic, type.name, encodingOf(channel.encoding), type.definition);
+  channels_.emplace(id, std::move(channel));
+}
+
+void McapFile::takeStatistics(Bytes content, std::uint64_t place) {
+  LittleFieldReader reader(content);
+  count_ = reader.u64();
+  if (!reader.ok()) fail(place, "the statistics are damaged");
+  counted_ = true;
+}
+
+void McapFile::endEarly(std::uint64_t at) {
+  if (finished_) fail(at, "a record ends behind the data");
+  // What is known of the newest chunk may be half of its indexes.
+  if (chunk_open_) {
+    entries_.resize(before_chunk_);
+    scanChunk(static_cast<std::uint32_t>(chunks_.size() - 1), true);
+  }
+  warnings_.push_back(
+      fmt::format("{}: its recorder did not finish it, or its end is lost: {} messages up to byte "
+                  "{} are whole and are read",
+                  path_, entries_.size(), at));
+}
+
+void McapFile::walk() {
+  std::uint64_t at = mcap::kMagic.size();
+  while (true) {
+    const Bytes head = file_.at(at, mcap::kRecordHead);
+    LittleFieldReader reader(head);
+    const auto op = static_cast<Op>(reader.u8());
+    const std::uint64_t length = reader.u64();
+    const std::uint64_t content = at + mcap::kRecordHead;
+    const std::uint64_t end = finished_ ? footer_ : file_.size();
+    if (!reader.ok() || content > end || length > end - content) return endEarly(at);
+    const auto small = static_cast<std::size_t>(length);
+    if (op != Op::kMessageIndex && chunk_open_) closeChunk();
+    switch (op) {
+      case Op::kSchema:
+        takeSchema(file_.at(content, small), at);
+        break;
+      case Op::kChannel:
+        takeChannel(file_.at(content, small), at);
+        break;
+      case Op::kMessage:
+        outside_ = true;
+        takeMessage(file_.at(content, std::min(small, mcap::kMessageHead)), kNoChunk, at, at);
+        break;
+      case Op::kChunk:
+        takeChunk(at, content, length);
+        break;
+      case Op::kMessageIndex:
+        takeIndex(file_.at(content, small), at);
+        break;
+      case Op::kDataEnd:
+        if (!finished_) return endEarly(at);
+        if (content + length != (summary_ != 0 ? summary_ : footer_)) fail(at, "the data ends too early");
+        return checkData(at, LittleFieldReader(file_.at(content, small)).u32());
+      default:
+        break;  // attachments, metadata, and kinds to come
+    }
+    at = content + length;
+  }
+}
+
+void McapFile::checkData(std::uint64_t data_end, std::uint32_t crc) {
+  if (crc == 0 || !outside_) return;
+  std::uint32_t found = 0;
+  constexpr std::uint64_t kPiece = std::uint64_t{1} << 20U;
+  for (std::uint64_t at = 0; at < data_end; at += kPiece) {
+    file_.read(at, static_cast<std::size_t>(std::min(kPiece, data_end - at)), packed_);
+    found = crcOf(found, packed_);
+  }
+  if (found != crc) fail(data_end, "the checksum of the data is wrong");
+}
+
+void McapFile::takeChunk(std::uint64_t record, std::uint64_t content, std::uint64_t length) {
+  constexpr std::size_t kMostHead = 64;  // bytes; the name of the packing is 4 at most
+  LittleFieldReader reader(
+      file_.at(content, static_cast<std::size_t>(std::min<std::uint64_t>(length, kMostHead))));
+  Chunk chunk;
+  chunk.record = record;
+  reader.skip(2 * sizeof(std::uint64_t));  // first and last time
+  chunk.unpacked = reader.u64();
+  chunk.crc = reader.u32();
+  const std::size_t before = reader.left();
+  const std::string_view packing = readText(reader);
+  chunk.packed = reader.u64();
+  const std::uint64_t head = 2 * sizeof(std::uint64_t) + 12 + (before - reader.left());
+  if (!reader.ok() || length < head || chunk.packed != length - head)
+    fail(record, "a chunk's head is damaged");
+  chunk.data = content + head;
+  if (packing == "zstd") {
+    chunk.packing = Packing::kZstd;
+  } else if (packing == "lz4") {
+    chunk.packing = Packing::kLz4;
+  } else if (!packing.empty()) {
+    fail(record, fmt::format("a chunk is packed with `{}`, which is neither zstd nor lz4", packing));
+  }
+  if (chunk.unpacked > kMostUnpacked)
+    fail(record, fmt::format("a chunk of {} bytes is too large", chunk.unpacked));
+  before_chunk_ = entries_.size();
+  chunk_open_ = true;
+  chunks_.push_back(chunk);
+}
+
+/// Of chunks that no index follows the records are looked at.
+void McapFile::closeChunk() {
+  chunk_open_ = false;
+  if (entries_.size() == before_chunk_) scanChunk(static_cast<std::uint32_t>(chunks_.size() - 1), true);
+}
+
+void McapFile::takeIndex(Bytes content, std::uint64_t place) {
+  LittleFieldReader reader(content);
+  const std::uint16_t channel = reader.u16();
+  const std::uint32_t bytes = reader.u32();
+  constexpr std::size_t kEntry = 16;
+  if (!reader.ok() || !chunk_open_ || bytes != reader.left() || bytes % kEntry != 0) {
+    fail(place, "a message index is damaged");
+  }
+  if (bytes == 0) return;
+  const auto chunk = static_cast<std::uint32_t>(chunks_.size() - 1);
+  if (!channels_.contains(channel)) scanChunk(chunk, false);
+  const auto known = channels_.find(channel);
+  if (known == channels_.end()) {
+    fail(place, fmt::format("a message index names channel {}, which is not there", channel));
+  }
+  while (reader.left() > 0) {
+    const Stamp time = stampOf(reader.u64(), place);
+    const std::uint64_t offset = reader.u64();
+    if (offset >= chunks_[chunk].unpacked) fail(place, "a message index leads out of its chunk");
+    entries_.push_back({time, known->second.index, chunk, offset});
+  }
+}
+
+Stamp McapFile::stampOf(std::uint64_t ns, std::uint64_t place) const {
+  if (ns > static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max())) {
+    fail(place, fmt::format("the time {} ns is far beyond every clock", ns));
+  }
+  return Stamp{static_cast<std::int64_t>(ns)};
+}
+
+void McapFile::takeMessage(Bytes head, std::uint32_t part, std::uint64_t at, std::uint64_t place) {
+  LittleFieldReader reader(head);
+  const std::uint16_t id = reader.u16();
+  reader.skip(sizeof(std::uint32_t));  // sequence
+  const std::uint64_t time = reader.u64();
+  if (!reader.ok()) fail(place, "a message is shorter than its head");
+  const auto channel = channels_.find(id);
+  if (channel == channels_.end()) fail(place, fmt::format("a message of channel {}, which is not there", id));
+  entries_.push_back({stampOf(time, place), channel->second.index, part, at});
+}
+
+void McapFile::scanChunk(std::uint32_t chunk, bool messages) {
+  const Bytes records = unpackedChunk(chunk);
+  const std::uint64_t place = chunks_[chunk].record;
+  LittleFieldReader reader(records);
+  while (reader.left() > 0) {
+    const std::size_t at = records.size() - reader.left();
+    const auto op = static_cast<Op>(reader.u8());
+    const Bytes content = reader.bytes(static_cast<std::size_t>(reader.u64()));
+    if (!reader.ok()) fail(place, fmt::format("the record at {} of this chunk ends behind it", at));
+    if (op == Op::kSchema) takeSchema(content, place);
+    if (op == Op::kChannel) takeChannel(content, place);
+    if (op == Op::kMessage && messages) takeMessage(content, chunk, at, place);
+  }
+}
+
+Bytes McapFile::unpackedChunk(std::uint32_t index) {
+  ++uses_;
+  Unpacked* oldest = kept_.data();
+  for (Unpacked& kept : kept_) {
+    if (kept.chunk == index) {
+      kept.used = uses_;
+      return kept.bytes;
+    }
+    if (kept.used < oldest->used) oldest = &kept;
+  }
+  const Chunk& chunk = chunks_[index];
+  oldest->chunk = kNoChunk;
+  file_.read(chunk.data, static_cast<std::size_t>(chunk.packed), packed_);
+  if (packed_.size() != chunk.packed ||
+      !unpack(chunk.packing, packed_, static_cast<std::size_t>(chunk.unpacked), oldest->bytes)) {
+    fail(chunk.record, "a chunk cannot be unpacked");
+  }
+  if (chunk.crc != 0 && crcOf(0, oldest->bytes) != chunk.crc) {
+    fail(chunk.record, "a chunk's checksum is wrong");
+  }
+  oldest->chunk = index;
+  oldest->used = uses_;
+  return oldest->bytes;
+}
+
+Bytes McapFile::read(const BagEntry& entry) {
+  Bytes record;
+  std::uint64_t place = entry.at;
+  if (entry.part == kNoChunk) {
+    const std::uint64_t length = LittleFieldReader(file_.at(entry.at + 1, sizeof(std::uint64_t))).u64();
+    file_.read(entry.at, static_cast<std::size_t>(mcap::kRecordHead + length), packed_);
+    record = packed_;
+  } else {
+    const Bytes records = unpackedChunk(entry.part);
+    record = records.subspan(static_cast<std::size_t>(std::min<std::uint64_t>(entry.at, records.size())));
+    place = chunks_[entry.part].record;
+  }
+  LittleFieldReader reader(record);
+  const bool message = reader.u8() == static_cast<std::uint8_t>(Op::kMessage);
+  const Bytes content = reader.bytes(static_cast<std::size_t>(reader.u64()));
+  LittleFieldReader head(content);
+  const auto channel = channels_.find(head.u16());
+  head.skip(sizeof(std::uint32_t));  // sequence
+  const std::uint64_t time = head.u64();
+  head.skip(sizeof(std::uint64_t));  // time of publication
+  if (!message || !reader.ok() || !head.ok() || channel == channels_.end() ||
+      channel->second.index != entry.topic || time != static_cast<std::uint64_t>(entry.log_time.ns)) {
+    fail(place, "the message index does not lead to its message");
+  }
+  return head.bytes(head.left());
+}
+
+}  // namespace
+
+std::unique_ptr<BagFile> openMcapFile(const std::string& path, const std::string& name) {
+  return std::make_unique<McapFile>(path, name);
+}
+
+}  // namespace swiftlet

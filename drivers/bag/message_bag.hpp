@@ -1,0 +1,67 @@
+#pragma once
+// Messages by their types into a bag of any kind: topics are made with their definitions when they first
+// come.
+
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "drivers/bag/bag_writer.hpp"
+#include "drivers/bag/message_coder.hpp"
+#include "drivers/bag/message_text.hpp"
+
+namespace swiftlet {
+
+class MessageBag {
+ public:
+  explicit MessageBag(std::unique_ptr<BagWriter> writer) : writer_(std::move(writer)) {}
+
+  /// True for stamps that the bag's messages can hold: from 1 ns to 2106 (ROS 1) or 2038 (ROS 2).
+  [[nodiscard]] bool holds(Stamp stamp) const {
+    const std::int64_t seconds = stamp.ns / rosmsg::kNsPerSecond;
+    return stamp.ns > 0 &&
+           (writer_->encoding() == BagEncoding::kRos1 ? seconds < std::numeric_limits<std::uint32_t>::max()
+                                                      : seconds < std::numeric_limits<std::int32_t>::max());
+  }
+
+  /// In the order of the stamps. A header's `seq` counts the messages of its topic. `latched`: players repeat
+  /// the topic's last message to who comes late.
+  template <rosmsg::Message T>
+  void write(const std::string& name, Stamp stamp, T message, bool latched = false) {
+    const auto [place, is_new] = topics_.try_emplace(name);
+    Topic& topic = place->second;
+    if (is_new) {
+      topic.number =
+          writer_->addTopic({name, T::kType, definitionOf<T>(writer_->encoding()), T::kMd5, latched});
+    }
+    const auto sequence = static_cast<std::uint32_t>(topic.messages++);
+    if constexpr (requires { message.header.seq; }) message.header.seq = sequence;
+    encode(message, writer_->encoding(), body_);
+    writer_->write(topic.number, stamp, sequence, body_);
+  }
+
+  void finish() { writer_->finish(); }
+
+  /// Messages by topic.
+  [[nodiscard]] std::map<std::string, std::uint64_t> counts() const {
+    std::map<std::string, std::uint64_t> counts;
+    for (const auto& [name, topic] : topics_) counts[name] = topic.messages;
+    return counts;
+  }
+
+ private:
+  struct Topic {
+    std::uint32_t number = 0;
+    std::uint64_t messages = 0;
+  };
+
+  std::unique_ptr<BagWriter> writer_;
+  std::map<std::string, Topic> topics_;
+  std::vector<std::uint8_t> body_;
+};
+
+}  // namespace swiftlet

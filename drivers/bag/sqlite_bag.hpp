@@ -1,0 +1,17 @@
+#pragma once
+// One SQLite file of a rosbag2 bag: tables `topics` and `messages`, the same in schema versions 1 to 4.
+//
+// Messages packed one by one with zstd are told by their first bytes. SQLite files have no checksums: a
+// flipped byte inside a message is not noticed here.
+
+#include <memory>
+#include <string>
+
+#include "drivers/bag/bag_file.hpp"
+
+namespace swiftlet {
+
+/// `name` stands for the file in messages.
+[[nodiscard]] std::unique_ptr<BagFile> openSqliteBag(const std::string& path, const std::string& name);
+
+}  // namespace swiftlet

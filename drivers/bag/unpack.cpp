@@ -1,0 +1,173 @@
+#include "drivers/bag/unpack.hpp"
+
+#include <fmt/format.h>
+#include <lz4frame.h>
+#include <unistd.h>
+#include <zstd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+
+#include "drivers/calibration/input_error.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr std::size_t kFirstRoom = std::size_t{1} << 20U;  // bytes; a usual chunk
+// Images hardly shrink: the fastest level packs raw grey to two thirds at some 400 MB/s.
+constexpr int kZstdLevel = 1;
+
+struct FileCloser {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using File = std::unique_ptr<std::FILE, FileCloser>;
+
+using Zstd = std::unique_ptr<ZSTD_DStream, decltype(&ZSTD_freeDStream)>;
+Zstd makeZstd() { return {ZSTD_createDStream(), &ZSTD_freeDStream}; }
+
+/// `step(to, room, written)` unpacks some; false on damage, `done` at the end of the packed bytes.
+template <typename Step>
+bool unpackGrowing(std::size_t most, std::vector<std::uint8_t>& out, Step&& step) {
+  std::size_t size = 0;
+  for (bool done = false; !done;) {
+    // One byte more than allowed shows what is too long.
+    if (size == out.size()) out.resize(std::min(std::max(2 * size, kFirstRoom), most + 1));
+    std::size_t written = 0;
+    if (!step(out.data() + size, out.size() - size, written, done)) return false;
+    size += written;
+    if (size > most) return false;
+  }
+  out.resize(size);
+  return true;
+}
+
+bool unpackZstd(std::span<const std::uint8_t> packed, std::size_t most, std::vector<std::uint8_t>& out) {
+  const Zstd stream = makeZstd();
+  ZSTD_inBuffer in = {packed.data(), packed.size(), 0};
+  std::size_t left = 1;  // of the frame; 0 at its end
+  return unpackGrowing(most, out, [&](std::uint8_t* to, std::size_t room, std::size_t& written, bool& done) {
+    ZSTD_outBuffer target = {to, room, 0};
+    const std::size_t before = in.pos;
+    left = ZSTD_decompressStream(stream.get(), &target, &in);
+    if (ZSTD_isError(left) != 0) return false;
+    written = target.pos;
+    done = left == 0 && in.pos == in.size;
+    return done || written > 0 || in.pos > before;
+  });
+}
+
+bool unpackLz4(std::span<const std::uint8_t> packed, std::size_t most, std::vector<std::uint8_t>& out) {
+  LZ4F_dctx* made = nullptr;
+  if (LZ4F_isError(LZ4F_createDecompressionContext(&made, LZ4F_VERSION)) != 0) return false;
+  const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> context(
+      made, &LZ4F_freeDecompressionContext);
+  std::size_t at = 0;
+  return unpackGrowing(most, out, [&](std::uint8_t* to, std::size_t room, std::size_t& written, bool& done) {
+    std::size_t taken = packed.size() - at;
+    written = room;
+    const std::size_t left =
+        LZ4F_decompress(context.get(), to, &written, packed.data() + at, &taken, nullptr);
+    if (LZ4F_isError(left) != 0) return false;
+    at += taken;
+    done = left == 0 && at == packed.size();
+    return done || written > 0 || taken > 0;
+  });
+}
+
+[[noreturn]] void failToUnpack(const std::string& file, std::size_t at, const char* what) {
+  throw InputError(file, 0, fmt::format("byte {}", at), what,
+                   "Copy it again, or unpack it with `zstd -d` and give the unpacked bag");
+}
+
+void unpackFile(const std::string& packed, const std::string& to) {
+  const File in(std::fopen(packed.c_str(), "rbe"));
+  const File out(std::fopen(to.c_str(), "wbe"));
+  if (!in || !out) {
+    throw InputError(packed, 0, "", "cannot be unpacked to " + to,
+                     "It needs room there: set TMPDIR to a folder with room");
+  }
+  const Zstd stream = makeZstd();
+  std::vector<std::uint8_t> from(ZSTD_DStreamInSize());
+  std::vector<std::uint8_t> room(ZSTD_DStreamOutSize());
+  std::size_t read = 0;
+  std::size_t left = 1;
+  while (const std::size_t got = std::fread(from.data(), 1, from.size(), in.get())) {
+    ZSTD_inBuffer source = {from.data(), got, 0};
+    bool full = true;
+    while (source.pos < source.size || full) {
+      ZSTD_outBuffer target = {room.data(), room.size(), 0};
+      left = ZSTD_decompressStream(stream.get(), &target, &source);
+      if (ZSTD_isError(left) != 0) failToUnpack(packed, read + source.pos, "its zstd data is damaged");
+      if (std::fwrite(room.data(), 1, target.pos, out.get()) != target.pos) {
+        throw InputError(packed, 0, "", "no room to unpack it to " + to,
+                         "Set TMPDIR to a folder with room for the unpacked bag");
+      }
+      full = target.pos == target.size;
+    }
+    read += got;
+  }
+  if (left != 0) failToUnpack(packed, read, "its zstd data ends early");
+  if (std::fflush(out.get()) != 0) failToUnpack(packed, read, "no room to unpack it");
+}
+
+}  // namespace
+
+bool unpack(Packing packing, std::span<const std::uint8_t> packed, std::size_t size,
+            std::vector<std::uint8_t>& out) {
+  switch (packing) {
+    case Packing::kNone:
+      out.assign(packed.begin(), packed.end());
+      break;
+    case Packing::kLz4:
+      if (!unpackLz4(packed, size, out)) return false;
+      break;
+    case Packing::kZstd:
+      if (!unpackZstd(packed, size, out)) return false;
+      break;
+  }
+  return out.size() == size;
+}
+
+bool unpackZstdMessage(std::span<const std::uint8_t> packed, std::size_t most,
+                       std::vector<std::uint8_t>& out) {
+  return unpackZstd(packed, most, out);
+}
+
+bool isZstd(std::span<const std::uint8_t> bytes) {
+  constexpr std::uint8_t kMagic[] = {0x28, 0xB5, 0x2F, 0xFD};
+  return bytes.size() >= sizeof(kMagic) && std::equal(std::begin(kMagic), std::end(kMagic), bytes.begin());
+}
+
+std::vector<std::uint8_t> packZstd(std::span<const std::uint8_t> bytes) {
+  std::vector<std::uint8_t> packed(ZSTD_compressBound(bytes.size()));
+  const std::size_t size =
+      ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), kZstdLevel);
+  if (ZSTD_isError(size) != 0) throw std::runtime_error("zstd: out of memory");
+  packed.resize(size);
+  return packed;
+}
+
+UnpackedFile::UnpackedFile(const std::string& packed) {
+  std::string name = (std::filesystem::temp_directory_path() / "swiftlet_bag_XXXXXX").string();
+  const int made = ::mkstemp(name.data());
+  if (made < 0) {
+    throw InputError(packed, 0, "", "no file can be made for it in " + name,
+                     "Set TMPDIR to a writable folder");
+  }
+  ::close(made);
+  path_ = name;
+  try {
+    unpackFile(packed, path_);
+  } catch (...) {
+    ::unlink(path_.c_str());
+    throw;
+  }
+}
+
+UnpackedFile::~UnpackedFile() { ::unlink(path_.c_str()); }
+
+}  // namespace swiftlet
