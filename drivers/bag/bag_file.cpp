@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <tuple>
 
 #include "drivers/bag/bag_kind.hpp"
 #include "drivers/bag/mcap_file.hpp"
@@ -37,8 +38,9 @@ std::uint32_t BagFile::topicOf(std::string_view name, std::string_view type, Bag
 }
 
 void BagFile::orderEntries() {
-  std::stable_sort(entries_.begin(), entries_.end(),
-                   [](const BagEntry& a, const BagEntry& b) { return a.log_time < b.log_time; });
+  std::sort(entries_.begin(), entries_.end(), [](const BagEntry& a, const BagEntry& b) {
+    return std::tie(a.log_time.ns, a.part, a.at) < std::tie(b.log_time.ns, b.part, b.at);
+  });
   for (const BagEntry& entry : entries_) ++topics_[entry.topic].messages;
 }
 

@@ -5,19 +5,25 @@
 #include <map>
 #include <optional>
 
+#include "drivers/bag/file_bytes.hpp"
 #include "drivers/bag/sqlite_database.hpp"
 #include "drivers/bag/unpack.hpp"
 #include "drivers/calibration/input_error.hpp"
+#include "drivers/device/byte_fields.hpp"
 
 namespace swiftlet {
 namespace {
 
 constexpr std::size_t kMostMessage = std::size_t{1} << 30U;  // bytes; SQLite's own limit for a blob
 
+constexpr const char* kDamaged =
+    "The file is damaged: copy it again, or save what is whole with `sqlite3 FILE .recover | sqlite3 NEW`";
+
 class SqliteBag final : public BagFile {
  public:
   SqliteBag(const std::string& path, const std::string& name)
       : BagFile(name), database_(path, name, SqliteDatabase::Mode::kRead) {
+    checkPages(path);
     for (const char* table : {"topics", "messages"}) {
       if (database_.hasTable(table)) continue;
       throw InputError(
@@ -47,6 +53,17 @@ class SqliteBag final : public BagFile {
         path_, 0, fmt::format("messages, row {}", row), what,
         "The file is damaged: copy it again, or save what is whole with `sqlite3 FILE .recover | "
         "sqlite3 NEW`");
+  }
+
+  /// SQLite itself fills up a last page that was cut with zeros.
+  void checkPages(const std::string& path) const {
+    constexpr std::size_t kPageSizeAt = 16;  // of the file's header; big-endian, 1 stands for 65536
+    FileBytes file(path, path_);
+    BigFieldReader reader(file.at(kPageSizeAt, sizeof(std::uint16_t)));
+    const std::uint16_t stated = reader.u16();
+    const std::uint64_t page = stated == 1 ? 65536 : stated;
+    if (page != 0 && file.size() % page == 0) return;
+    throw InputError(path_, 0, fmt::format("byte {}", file.size()), "the file ends within a page", kDamaged);
   }
 
   void readTopics() {

@@ -69,7 +69,7 @@ BagLog::BagLog(const std::string& path, const LogOptions& options) : RecordedLog
 }
 
 void BagLog::chooseTopics() {
-  imu_ = chooseImuTopics(*bag_, calibration_.imu_topic);
+  imu_ = chooseImuTopics(*bag_, calibration_.imu_topic, warnings_);
   truth_ = chooseTruthTopic(*bag_);
   if (truth_) {
     warnings_.add(

@@ -113,6 +113,9 @@ bool readPose(const BagTopic& topic, std::span<const std::uint8_t> body, Traject
     if (!(std::abs(rotation.norm() - 1) <= kFarFromUnit)) return false;
     point.stamp = header.stamp;
     point.T_world_body = SE3(rotation, Eigen::Vector3d(p.x, p.y, p.z));
+    // One that is of unit norm already keeps its last bits: a bag of a bag is the same bag.
+    constexpr double kOfUnitNorm = 1e-14;
+    if (std::abs(rotation.norm() - 1) < kOfUnitNorm) point.T_world_body.rotation = rotation;
     return point.T_world_body.translation.allFinite();
   };
   if (topic.type == rosmsg::Odometry::kType) {
@@ -132,7 +135,7 @@ bool readPose(const BagTopic& topic, std::span<const std::uint8_t> body, Traject
 
 }  // namespace
 
-BagImuTopics chooseImuTopics(BagFile& bag, const std::string& wanted) {
+BagImuTopics chooseImuTopics(BagFile& bag, const std::string& wanted, LogWarnings& warnings) {
   const std::map<std::uint32_t, Halves> halves = probeImu(bag);
   const auto both = busiest(bag, halves, wanted, true, true);
   const auto gyro = busiest(bag, halves, wanted, true, false);
@@ -140,14 +143,19 @@ BagImuTopics chooseImuTopics(BagFile& bag, const std::string& wanted) {
   const bool apart_wanted = gyro && accel && bag.topics()[*gyro].name == wanted;
   if (both && !apart_wanted) return {*both, std::nullopt};
   if (gyro && accel) return {*gyro, accel};
-  if (gyro || accel) {
-    throw InputError(bag.path(), 0, bag.topics()[gyro ? *gyro : *accel].name,
-                     gyro ? "all accelerations are zero" : "all angular rates are zero",
-                     gyro ? "Record the accelerometer's topic too" : "Record the gyroscope's topic too");
+  if (gyro) {
+    throw InputError(bag.path(), 0, bag.topics()[*gyro].name, "all accelerations are zero",
+                     "Record the accelerometer's topic too");
   }
-  // A sensor that says nothing at all is for the checks of the samples to judge.
-  if (const auto silent = busiest(bag, halves, wanted, false, false)) return {*silent, std::nullopt};
-  throw InputError(bag.path(), 0, "", "no topic of type sensor_msgs/Imu", "Record the IMU too");
+  const auto silent = accel ? accel : busiest(bag, halves, wanted, false, false);
+  if (!silent) {
+    throw InputError(bag.path(), 0, "", "no topic of type sensor_msgs/Imu", "Record the IMU too");
+  }
+  // A simulator at rest gives such rates too.
+  warnings.add(
+      fmt::format("{}: {}: the first {} angular rates are exactly zero: is the gyroscope's topic missing?",
+                  bag.path(), bag.topics()[*silent].name, halves.at(*silent).probed));
+  return {*silent, std::nullopt};
 }
 
 std::array<std::optional<std::uint32_t>, kMaxCameras> chooseImageTopics(BagFile& bag,

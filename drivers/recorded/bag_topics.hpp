@@ -20,7 +20,7 @@ struct BagImuTopics {
 
 /// `wanted`: the calibration's name for it, empty for none. A topic whose accelerations are all exactly zero
 /// is a gyroscope alone, and the other way round. InputError where there is none.
-[[nodiscard]] BagImuTopics chooseImuTopics(BagFile& bag, const std::string& wanted);
+[[nodiscard]] BagImuTopics chooseImuTopics(BagFile& bag, const std::string& wanted, LogWarnings& warnings);
 
 /// One for each camera of the calibration, fewer where the bag has fewer; InputError where it has none.
 [[nodiscard]] std::array<std::optional<std::uint32_t>, kMaxCameras> chooseImageTopics(

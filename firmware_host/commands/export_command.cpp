@@ -84,11 +84,12 @@ std::unique_ptr<LogSource> openAll(const ExportOptions& options, const std::stri
   return openLog(path, log);
 }
 
-LogBagOptions logOptions(const ExportOptions& options, bool alone) {
+LogBagOptions bagOptions(const ExportOptions& options, bool in_run) {
   LogBagOptions log;
   log.frames = options.frames;
   log.raw_images = options.raw_images;
-  log.alone = alone;
+  log.truth = !in_run && !options.no_truth;
+  log.transforms = !in_run;
   return log;
 }
 
@@ -100,7 +101,7 @@ int exportLog(const ExportOptions& options) {
   std::vector<std::string> warnings;
   writeBags(options, [&](MessageBag& bag) {
     const auto log = openAll(options, options.from);
-    LogBag(*log, logOptions(options, !options.no_truth), bag).writeRest();
+    LogBag(*log, bagOptions(options, false), bag).writeRest();
     warnings = log->warnings();
   });
   for (const std::string& line : warnings) fmt::print("{}\n", line);
@@ -129,7 +130,7 @@ int exportRun(const ExportOptions& options) {
   writeBags(options, [&](MessageBag& bag) {
     const auto log = options.images ? openAll(options, run.log) : nullptr;
     std::optional<LogBag> images;
-    if (log != nullptr) images.emplace(*log, logOptions(options, false), bag);
+    if (log != nullptr) images.emplace(*log, bagOptions(options, true), bag);
     writeRunBag(run, beside, bag_options, bag, images ? &*images : nullptr);
   });
   return kExitDone;

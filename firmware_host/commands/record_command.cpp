@@ -14,11 +14,14 @@ namespace {
 
 struct RecordOptions {
   RecordRequest request;
+  std::string mcap;
   SettingsOptions settings;
 };
 
 int record(const RecordOptions& options) {
   RecordRequest request = options.request;
+  request.mcap = !options.mcap.empty();
+  if (request.mcap) request.out = options.mcap;
   request.stop = &stopOnSignal();
   surviveHangUp();
   const RecordResult result = runRecord(request, options.settings.read());
@@ -27,7 +30,7 @@ int record(const RecordOptions& options) {
     warn("nothing was recorded; `swiftlet doctor` looks at all devices and at this computer\n");
     return kExitFailed;
   }
-  const FolderSink::Counters& written = result.written;
+  const RecordSink::Counters& written = result.written;
   std::string text = fmt::format("{} samples", written.samples);
   std::uint64_t lost = written.samples_lost;
   for (std::size_t c = 0; c < result.cameras; ++c) {
@@ -52,12 +55,14 @@ int record(const RecordOptions& options) {
 }  // namespace
 
 void addRecordCommand(CLI::App& app, int& exit_code) {
-  CLI::App* command =
-      app.add_subcommand("record", "Record the vehicle's cameras and IMU as an EuRoC/ASL folder");
+  CLI::App* command = app.add_subcommand(
+      "record", "Record the vehicle's cameras and IMU as an EuRoC/ASL folder or an MCAP file");
   auto options = std::make_shared<RecordOptions>();
   RecordRequest& request = options->request;
   request.out = "recording";
-  command->add_option("--out", request.out, "Folder to write")->capture_default_str();
+  CLI::Option* folder = command->add_option("--out", request.out, "Folder to write")->capture_default_str();
+  command->add_option("--mcap", options->mcap, "MCAP file to write instead, with ROS 2's messages")
+      ->excludes(folder);
   command->add_option("--seconds", request.seconds, "End after this long; without: with SIGINT or SIGTERM")
       ->check(nonNegative());
   options->settings.addTo(*command);

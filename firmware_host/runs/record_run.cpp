@@ -1,13 +1,26 @@
 #include "firmware_host/runs/record_run.hpp"
 
+#include <memory>
+
 #include "firmware_host/inputs/devices/live_input.hpp"
 #include "firmware_host/inputs/devices/sensor_threads.hpp"
+#include "firmware_host/outputs/recorder/folder_sink.hpp"
+#include "firmware_host/outputs/recorder/mcap_sink.hpp"
 #include "firmware_host/realtime/console.hpp"
 #include "firmware_host/realtime/host_sleep.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
 #include "firmware_host/runs/fly_run.hpp"
 
 namespace swiftlet {
+namespace {
+
+std::unique_ptr<RecordSink> makeSink(const RecordRequest& request, const Calibration& calibration,
+                                     const Settings& settings) {
+  if (request.mcap) return std::make_unique<McapSink>(request.out, calibration);
+  return std::make_unique<FolderSink>(request.out, calibration, settings.cameras.rate_hz);
+}
+
+}  // namespace
 
 RecordResult runRecord(const RecordRequest& request, const Settings& settings) {
   const Calibration calibration = vehicleCalibration(settings);
@@ -20,7 +33,8 @@ RecordResult runRecord(const RecordRequest& request, const Settings& settings) {
     result.missing = std::move(opened.faults);
     return result;
   }
-  FolderSink sink(request.out, calibration, settings.cameras.rate_hz);
+  const auto made = makeSink(request, calibration, settings);
+  RecordSink& sink = *made;
   SensorThreads threads(input, sink, settings.realtime);
   for (const std::string& line : threads.warnings()) warn("warning: " + line + "\n");
   const auto print = [&input] {

@@ -5,24 +5,25 @@
 #include <string>
 #include <vector>
 
-#include "firmware_host/outputs/recorder/folder_sink.hpp"
+#include "firmware_host/outputs/recorder/record_sink.hpp"
 #include "firmware_host/settings/settings.hpp"
 
 namespace swiftlet {
 
 struct RecordRequest {
-  std::string out;
+  std::string out;     ///< folder, or file
+  bool mcap = false;   ///< an MCAP file instead of an EuRoC folder
   double seconds = 0;  ///< end after this long; 0: when told to
   const std::atomic<bool>* stop = nullptr;
 };
 
 struct RecordResult {
-  FolderSink::Counters written;
+  RecordSink::Counters written;
   std::size_t cameras = 0;
   std::vector<std::string> missing;  ///< devices that did not open, in words; nothing was recorded then
 };
 
-/// InputError for bad settings or calibration, and where the folder cannot be written.
+/// InputError for bad settings or calibration, and where the recording cannot be written.
 RecordResult runRecord(const RecordRequest& request, const Settings& settings);
 
 }  // namespace swiftlet

@@ -12,9 +12,10 @@
 #include <tuple>
 
 #include "drivers/input/input_error.hpp"
-#include "firmware_host/lab/export/bag_messages.hpp"
+#include "firmware_host/lab/export/bag_output.hpp"
 #include "firmware_host/lab/export/run_bag.hpp"
 #include "tests/firmware_host/exported_run.hpp"
+#include "tests/firmware_host/ros1_messages.hpp"
 #include "tests/support/skip_case.hpp"
 
 namespace swiftlet {
@@ -345,12 +346,34 @@ TEST_CASE("a bag that cannot be written whole is not left behind", "[export]") {
   RunFolder early = folder;
   for (TrajectoryPoint& point : early.odometry) point.stamp.ns -= folder.odometry.front().stamp.ns;
   try {
-    writeRunBag(early, {}, {}, file);
+    writeBag(BagForm::kRos1, file, [&](MessageBag& bag) { writeRunBag(early, {}, {}, bag); });
     FAIL("no InputError");
   } catch (const InputError& error) {
     CHECK(contains(error.file, "odometry.tum"));
     CHECK(error.field == "stamp");
   }
+}
+
+TEST_CASE("a log's messages are those of ROS's own packages", "[export]") {
+  const ScratchFolder folder("ros1_log");
+  const std::string log = std::string(SWIFTLET_TEST_DATA) + "/euroc_mh01_4s";
+  const std::string file = folder.file("log.bag");
+  REQUIRE(run({"export", log, "--bag", file}) == kExitDone);
+  ReadBag bag(file);
+  // instantiate() of REQUIRE in all() compares the sums of the definitions.
+  CHECK(bag.all<sensor_msgs::Imu_<BagAllocator<void>>>("/imu0").size() > 900);
+  CHECK(bag.all<sensor_msgs::CompressedImage_<BagAllocator<void>>>("/cam0/image_raw/compressed").size() ==
+        80);
+  const auto info = bag.all<sensor_msgs::CameraInfo_<BagAllocator<void>>>("/cam1/camera_info");
+  REQUIRE(info.size() == 80);
+  CHECK(info[0].second.distortion_model == "plumb_bob");
+  CHECK(info[0].second.K[0] == Approx(457.587));
+  CHECK(info[0].second.P[2] == Approx(379.999));
+  REQUIRE(run({"export", log, "--bag", file, "--raw-images"}) == kExitDone);
+  ReadBag raw(file);
+  const auto images = raw.all<sensor_msgs::Image_<BagAllocator<void>>>("/cam0/image_raw");
+  REQUIRE(images.size() == 80);
+  CHECK(images[0].second.data.size() == 752U * 480U);
 }
 
 TEST_CASE("ROS's own tools read the bag", "[export]") {

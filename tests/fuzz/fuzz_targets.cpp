@@ -12,7 +12,6 @@
 #include "drivers/recorded/imu_file.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 #include "drivers/recorded/recording_format.hpp"
-#include "drivers/recorded/ros_messages.hpp"
 #include "drivers/recorded/track_file.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
 #include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
@@ -25,6 +24,7 @@
 #include "mapping/pose_graph/pose_graph_optimizer.hpp"
 #include "tests/fuzz/demand.hpp"
 #include "tests/fuzz/fuzz_autopilot.hpp"
+#include "tests/fuzz/fuzz_bag.hpp"
 #include "tests/fuzz/fuzz_can.hpp"
 #include "tests/fuzz/fuzz_clocks.hpp"
 #include "tests/fuzz/fuzz_decoders.hpp"
@@ -145,22 +145,6 @@ void cameraFiles(std::string_view text) {
     } catch (const InputError&) {
     }
   }
-}
-
-void rosMessage(std::string_view text) {
-  const std::span<const std::uint8_t> body(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
-  ImuSample sample;
-  RosImage image;
-  (void)readRosImu(body, sample);
-  (void)readRosCompressedImage(body, image);
-  if (!readRosImage(body, image)) return;
-  constexpr int kMaxPixels = 1 << 16;
-  if (image.size.width <= 0 || image.size.height <= 0 || image.size.width > kMaxPixels / image.size.height)
-    return;
-  std::vector<std::uint8_t> out(static_cast<std::size_t>(image.size.width) *
-                                static_cast<std::size_t>(image.size.height));
-  GreyCopier copier;
-  (void)copier.copy(image, image.size, out.data());
 }
 
 void gpmf(std::string_view text) {
@@ -329,33 +313,35 @@ void keptMap(std::string_view text) {
   }
 }
 
-constexpr std::array<NamedTarget, 27> kTargets = {{{"imu_csv", &imuCsv},
-                                                   {"image_csv", &imageCsv},
-                                                   {"trajectory", &trajectory},
-                                                   {"tracks", &tracks},
-                                                   {"euroc_yaml", &eurocYaml},
-                                                   {"kalibr_yaml", &kalibrYaml},
-                                                   {"camera_files", &cameraFiles},
-                                                   {"ros_message", &rosMessage},
-                                                   {"recording", &recording},
-                                                   {"gpmf", &gpmf},
-                                                   {"phone_log", &phoneLog},
-                                                   {"g2o", &g2o},
-                                                   {"ply", &ply},
-                                                   {"vocabulary", &vocabulary},
-                                                   {"kept_map", &keptMap},
-                                                   {"kept_graph", &keptGraph},
-                                                   {"keyframes", &keyframes},
-                                                   {"camera_frame", &cameraFrame},
-                                                   {"dronecan", &dronecan},
-                                                   {"vectornav_stream", &vectornavStream},
-                                                   {"xsens_stream", &xsensStream},
-                                                   {"mip_stream", &mipStream},
-                                                   {"mavlink_stream", &mavlinkStream},
-                                                   {"autopilot_stream", &autopilotStream},
-                                                   {"bridge_stream", &bridgeStream},
-                                                   {"clocks", &clocks},
-                                                   {"faults", &faults}}};
+constexpr auto kTargets = std::to_array<NamedTarget>({{"imu_csv", &imuCsv},
+                                                      {"image_csv", &imageCsv},
+                                                      {"trajectory", &trajectory},
+                                                      {"tracks", &tracks},
+                                                      {"euroc_yaml", &eurocYaml},
+                                                      {"kalibr_yaml", &kalibrYaml},
+                                                      {"camera_files", &cameraFiles},
+                                                      {"ros_message", &rosMessage},
+                                                      {"mcap", &mcap},
+                                                      {"rosbag2_metadata", &rosbag2Metadata},
+                                                      {"recording", &recording},
+                                                      {"gpmf", &gpmf},
+                                                      {"phone_log", &phoneLog},
+                                                      {"g2o", &g2o},
+                                                      {"ply", &ply},
+                                                      {"vocabulary", &vocabulary},
+                                                      {"kept_map", &keptMap},
+                                                      {"kept_graph", &keptGraph},
+                                                      {"keyframes", &keyframes},
+                                                      {"camera_frame", &cameraFrame},
+                                                      {"dronecan", &dronecan},
+                                                      {"vectornav_stream", &vectornavStream},
+                                                      {"xsens_stream", &xsensStream},
+                                                      {"mip_stream", &mipStream},
+                                                      {"mavlink_stream", &mavlinkStream},
+                                                      {"autopilot_stream", &autopilotStream},
+                                                      {"bridge_stream", &bridgeStream},
+                                                      {"clocks", &clocks},
+                                                      {"faults", &faults}});
 
 }  // namespace
 

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "drivers/calibration/input_error.hpp"
+#include "drivers/recorded/log_messages.hpp"
 #include "firmware_host/lab/export/bag_messages.hpp"
 
 namespace swiftlet {
@@ -14,31 +15,12 @@ constexpr Stamp kNever{std::numeric_limits<std::int64_t>::max()};
 
 std::string cameraName(std::size_t camera) { return fmt::format("cam{}", camera); }
 
-rosmsg::CameraInfo cameraInfo(const CameraModel& model) {
-  rosmsg::CameraInfo info;
-  info.width = static_cast<std::uint32_t>(model.width());
-  info.height = static_cast<std::uint32_t>(model.height());
-  const Eigen::Vector4d& d = model.distortion();
-  info.d.assign(d.data(), d.data() + d.size());
-  info.distortion_model = model.kind() == CameraKind::kEquidistant ? "equidistant" : "plumb_bob";
-  if (model.kind() == CameraKind::kPinholeRadtan) info.d.push_back(0);  // plumb_bob has five
-  const Eigen::Vector4d& f = model.intrinsics();
-  info.k = {f[0], 0, f[2], 0, f[1], f[3], 0, 0, 1};
-  info.p = {f[0], 0, f[2], 0, 0, f[1], f[3], 0, 0, 0, 1, 0};
-  return info;
-}
-
-const char* formatOf(std::span<const std::uint8_t> picture) {
-  constexpr std::uint8_t kPng = 0x89;  // JPEG begins with 0xFF
-  return picture.front() == kPng ? "png" : "jpeg";
-}
-
 }  // namespace
 
 LogBag::LogBag(LogSource& log, const LogBagOptions& options, MessageBag& bag)
     : log_(log), options_(options), bag_(bag) {
-  for (std::size_t c = 0; c < log_.rig().camera_count; ++c) info_[c] = cameraInfo(log_.rig().camera[c]);
-  if (options_.alone) truth_ = log_.groundTruth();
+  for (std::size_t c = 0; c < log_.rig().camera_count; ++c) info_[c] = cameraInfoOf(log_.rig().camera[c]);
+  if (options_.truth) truth_ = log_.groundTruth();
   pending_ = log_.next(message_);
 }
 
@@ -90,50 +72,31 @@ std::vector<rosmsg::TransformStamped> LogBag::cameraTransforms(Stamp stamp) cons
 
 void LogBag::writeSample(const ImuSample& sample) {
   check(sample.stamp);
-  if (options_.alone && !fixed_) {
+  if (options_.transforms && !fixed_) {
     // Once, with the first sample's stamp: they hold for all of the log.
     fixed_ = true;
     bag_.write("/tf_static", sample.stamp, rosmsg::TFMessage{cameraTransforms(sample.stamp)}, true);
   }
   const Calibration& calibration = log_.calibration();
-  Eigen::Vector3d gyro = sample.gyro;
-  Eigen::Vector3d accel = sample.accel;
+  ImuSample sensed = sample;
   if (calibration.turnsImu()) {
-    gyro = calibration.R_body_imu.transpose() * gyro;
-    accel = calibration.R_body_imu.transpose() * accel;
+    sensed.gyro = calibration.R_body_imu.transpose() * sample.gyro;
+    sensed.accel = calibration.R_body_imu.transpose() * sample.accel;
   }
-  rosmsg::Imu imu;
-  imu.header = bagHeader(sample.stamp, "imu0");
-  imu.angular_velocity = {gyro.x(), gyro.y(), gyro.z()};
-  imu.linear_acceleration = {accel.x(), accel.y(), accel.z()};
-  bag_.write("/imu0", sample.stamp, imu);
+  writeImu(bag_, sensed);
 }
 
 void LogBag::writeImage(const CameraFrame& frame) {
   check(frame.stamp);
-  const std::string name = cameraName(frame.camera);
-  const std::string topic = "/" + name + "/image_raw";
-  const rosmsg::Header header = bagHeader(frame.stamp, name);
+  rosmsg::CameraInfo& info = info_[frame.camera];
   const std::span<const std::uint8_t> picture = log_.picture();
   if (!picture.empty() && !options_.raw_images) {
-    rosmsg::CompressedImage image;
-    image.header = header;
-    image.format = formatOf(picture);
-    image.data = picture;
-    bag_.write(topic + "/compressed", frame.stamp, image);
-  } else {
-    rosmsg::Image image;
-    image.header = header;
-    image.width = static_cast<std::uint32_t>(frame.image.width);
-    image.height = static_cast<std::uint32_t>(frame.image.height);
-    image.encoding = "mono8";
-    image.step = image.width;
-    // A log's images have no padding behind their rows.
-    image.data = {frame.image.data, static_cast<std::size_t>(image.width) * image.height};
-    bag_.write(topic, frame.stamp, image);
+    writePicture(bag_, frame.camera, frame.stamp, picture, info);
+    return;
   }
-  info_[frame.camera].header = header;
-  bag_.write("/" + name + "/camera_info", frame.stamp, info_[frame.camera]);
+  // A log's images have no padding behind their rows.
+  const std::size_t bytes = static_cast<std::size_t>(info.width) * info.height;
+  writePixels(bag_, frame.camera, frame.stamp, {frame.image.data, bytes}, info);
 }
 
 void LogBag::writeTruth(const TrajectoryPoint& point) {

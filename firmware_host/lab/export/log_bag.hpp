@@ -18,7 +18,8 @@ namespace swiftlet {
 struct LogBagOptions {
   RosFrames frames;
   bool raw_images = false;  ///< pixels, also where the log has files
-  bool alone = true;        ///< with the truth and the cameras' transforms; a run's bag has its own
+  bool truth = true;
+  bool transforms = true;  ///< from the body to the cameras; a run's bag has its own message of fixed ones
 };
 
 class LogBag {

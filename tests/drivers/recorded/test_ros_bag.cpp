@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstring>
 
-#include "drivers/recorded/ros_bag.hpp"
 #include "tests/drivers/recorded/asl_fixture.hpp"
 #include "tests/drivers/recorded/ros_bodies.hpp"
 

@@ -1,6 +1,7 @@
 #include <cstring>
 
-#include "drivers/recorded/ros_messages.hpp"
+#include "drivers/bag/message_coder.hpp"
+#include "drivers/recorded/grey_copier.hpp"
 #include "tests/drivers/recorded/asl_fixture.hpp"
 #include "tests/drivers/recorded/ros_bodies.hpp"
 
@@ -10,14 +11,16 @@ namespace {
 TEST_CASE("an Imu body gives stamp, gyro and accel; every shorter one nothing", "[ros]") {
   const std::vector<std::uint8_t> body =
       test::imuBody({1403636579763555584}, {0.1, -0.2, 0.3}, {9.7, 0.5, -1.2});
-  ImuSample sample;
-  REQUIRE(readRosImu(body, sample));
-  CHECK(sample.stamp.ns == 1403636579763555584);
-  CHECK(sample.gyro == Eigen::Vector3d(0.1, -0.2, 0.3));
-  CHECK(sample.accel == Eigen::Vector3d(9.7, 0.5, -1.2));
-  constexpr std::size_t kLastCovariance = 72;  // behind everything that is read
-  for (std::size_t n = 0; n < body.size() - kLastCovariance; ++n) {
-    CHECK(!readRosImu(std::span(body).first(n), sample));
+  rosmsg::Imu imu;
+  REQUIRE(decode(body, BagEncoding::kRos1, imu));
+  CHECK(imu.header.seq == 42);
+  CHECK(imu.header.stamp.ns == 1403636579763555584);
+  CHECK(imu.header.frame_id == "frame");
+  CHECK(imu.angular_velocity.y == -0.2);
+  CHECK(imu.linear_acceleration.x == 9.7);
+  CHECK(imu.linear_acceleration.z == -1.2);
+  for (std::size_t n = 0; n < body.size(); ++n) {
+    CHECK(!decode(std::span(body).first(n), BagEncoding::kRos1, imu));
   }
 }
 
@@ -26,11 +29,12 @@ TEST_CASE("raw encodings become grey, with padded rows", "[ros]") {
   const int height = 3;
   const ImageSize size{width, height};
   std::vector<std::uint8_t> out(15);
-  RosImage image;
+  rosmsg::Image image;
   GreyCopier copier;
   const auto convert = [&](const std::vector<std::uint8_t>& body) {
-    REQUIRE(readRosImage(body, image));
-    return copier.copy(image, size, out.data());
+    ImageSize found;
+    REQUIRE(decode(body, BagEncoding::kRos1, image));
+    return copier.copy(image, size, out.data(), found);
   };
   SECTION("mono8") {
     const std::vector<std::uint8_t> grey = test::pattern(width, height, 1);
@@ -41,7 +45,7 @@ TEST_CASE("raw encodings become grey, with padded rows", "[ros]") {
     }
     REQUIRE(convert(test::imageBody({7}, width, height, "mono8", 8, padded)) == DecodeResult::kOk);
     CHECK(out == grey);
-    CHECK(image.stamp.ns == 7);
+    CHECK(image.header.stamp.ns == 7);
   }
   SECTION("mono16, both byte orders") {
     std::vector<std::uint8_t> little;
@@ -74,7 +78,9 @@ TEST_CASE("raw encodings become grey, with padded rows", "[ros]") {
     CHECK(convert(test::imageBody({7}, width, height, "mono8", 6, grey)) == DecodeResult::kDamaged);
     CHECK(convert(test::imageBody({7}, width, height, "mono8", 4, grey)) == DecodeResult::kDamaged);
     std::vector<std::uint8_t> body = test::imageBody({7}, width, height, "mono8", 5, grey);
-    for (std::size_t n = 0; n < body.size(); ++n) CHECK(!readRosImage(std::span(body).first(n), image));
+    for (std::size_t n = 0; n < body.size(); ++n) {
+      CHECK(!decode(std::span(body).first(n), BagEncoding::kRos1, image));
+    }
   }
 }
 

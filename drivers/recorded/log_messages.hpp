@@ -1,0 +1,28 @@
+#pragma once
+// The messages of a log in a bag: topics /imu0, /cam0/image_raw, /cam0/camera_info, ... and what stands in
+// them (docs/export.md).
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "drivers/bag/message_bag.hpp"
+#include "estimator/camera/camera_model.hpp"
+#include "estimator/messages/imu_sample.hpp"
+
+namespace swiftlet {
+
+/// `plumb_bob` or `equidistant`, not rectified.
+[[nodiscard]] rosmsg::CameraInfo cameraInfoOf(const CameraModel& model);
+
+/// The sensor's own axes; rad/s, m/s^2.
+void writeImu(MessageBag& bag, const ImuSample& sample);
+
+/// 8-bit grey without padding behind its rows, with its CameraInfo.
+void writePixels(MessageBag& bag, std::size_t camera, Stamp stamp, std::span<const std::uint8_t> pixels,
+                 rosmsg::CameraInfo& info);
+/// PNG or JPEG.
+void writePicture(MessageBag& bag, std::size_t camera, Stamp stamp, std::span<const std::uint8_t> picture,
+                  rosmsg::CameraInfo& info);
+
+}  // namespace swiftlet

@@ -1,0 +1,94 @@
+#pragma once
+// What every live recording has in common: the devices' threads leave messages in fixed memory, writers of
+// low priority take them from there. What finds no room is counted, never waited for.
+//
+// Memory: kImagesAhead images a camera, kSamplesAhead samples.
+
+#include <array>
+#include <atomic>
+#include <functional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "drivers/calibration/calibration.hpp"
+#include "estimator/core/limits.hpp"
+#include "estimator/core/spsc_ring.hpp"
+#include "firmware_host/interfaces/sensor_input.hpp"
+
+namespace swiftlet {
+
+class RecordSink : public SensorSink {
+ public:
+  struct Counters {
+    std::uint64_t samples = 0;
+    std::uint64_t samples_lost = 0;  ///< the disk was too slow
+    std::array<std::uint64_t, kMaxCameras> images{};
+    std::array<std::uint64_t, kMaxCameras> images_lost{};
+  };
+
+  /// `out`: what is written, for messages.
+  RecordSink(std::string out, const Calibration& calibration);
+
+  void takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host) override;
+  void takeScene(const SceneImages& /*scene*/) override {}
+  void takeImage(const CameraFrame& image, const HostTimes& host) override;
+
+  /// After the devices' threads have ended: writes what waits. What could not be written is thrown.
+  void finish();
+  [[nodiscard]] Counters counters() const;
+  /// Any thread: a writer has ended, a full disk for one; nothing more will be kept.
+  [[nodiscard]] bool failed() const { return failed_.load(std::memory_order_relaxed); }
+
+ protected:
+  struct Image {
+    Stamp stamp;
+    std::vector<std::uint8_t> pixels;
+  };
+
+  /// A thread that calls `step` until it has nothing more to do after the end; step: false where nothing
+  /// waited.
+  void startWriter(std::function<bool()> step);
+  /// Of a destructor: the writers use members of the class that is about to go.
+  void stopWriters();
+  /// Called by finish() once all writers have ended well.
+  virtual void close() {}
+
+  [[nodiscard]] std::size_t cameras() const { return cameras_; }
+  [[nodiscard]] int width(std::size_t camera) const { return camera_[camera].width; }
+  [[nodiscard]] int height(std::size_t camera) const { return camera_[camera].height; }
+  /// The oldest that waits; null: none. One writer a camera.
+  [[nodiscard]] const Image* waitingImage(std::size_t camera) { return camera_[camera].images.front(); }
+  void dropImage(std::size_t camera) { camera_[camera].images.pop(); }
+  [[nodiscard]] bool nextSample(ImuSample& sample) { return samples_.tryPop(sample); }
+
+ private:
+  /// Two seconds at 30 Hz: the longest that an SD card's write took while others went on.
+  static constexpr std::size_t kImagesAhead = 64;
+  static constexpr std::size_t kSamplesAhead = 4096;  // as long, at 2 kHz
+
+  struct Camera {
+    int width = 0;
+    int height = 0;
+    SpscRing<Image, kImagesAhead> images;
+    std::atomic<std::uint64_t> taken{0};
+  };
+  struct Writer {
+    std::string error;  ///< empty: none
+    std::thread thread;
+  };
+
+  void reserve(Camera& camera, const CameraModel& model);
+  void write(const std::function<bool()>& step, std::string& error);
+
+  std::string out_;
+  std::size_t cameras_ = 0;
+  std::array<Camera, kMaxCameras> camera_;
+  SpscRing<ImuSample, kSamplesAhead> samples_;
+  std::atomic<std::uint64_t> samples_taken_{0};
+  std::array<Writer, kMaxCameras + 1> writers_;
+  std::size_t writer_count_ = 0;
+  std::atomic<bool> ended_{false}, failed_{false};
+};
+
+}  // namespace swiftlet

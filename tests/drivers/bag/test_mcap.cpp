@@ -1,0 +1,106 @@
+// MCAP files of our own: round trips, unfinished files, and every cut and flip of a small one. Files of other
+// writers are read by the test bag_peers.
+
+#include <algorithm>
+
+#include "tests/drivers/bag/bag_fixture.hpp"
+
+namespace swiftlet {
+namespace {
+
+using test::BagFolder;
+using test::PlainMessage;
+using test::readBack;
+using test::refusalOf;
+using test::someMessages;
+
+TEST_CASE("an MCAP file gives back what was written, over many chunks", "[mcap]") {
+  const BagFolder folder;
+  const std::string file = folder.file("a.mcap");
+  for (const McapPacking packing : {McapPacking::kNone, McapPacking::kZstd}) {
+    const std::vector<PlainMessage> messages = someMessages(300, 20'000);
+    test::write(*makeMcapWriter(file, packing), messages);
+    const auto bag = openBag(file);
+    CHECK(readBack(*bag) == messages);
+    CHECK(bag->warnings().empty());
+    REQUIRE(bag->topics().size() == 2);
+    CHECK(bag->topics()[0].messages + bag->topics()[1].messages == 300);
+    CHECK(bag->topics()[0].encoding == BagEncoding::kCdr);
+    CHECK(bag->topics()[0].definition == "uint8 x\n");
+  }
+}
+
+TEST_CASE("messages come by their time, whatever their order in the file", "[mcap]") {
+  const BagFolder folder;
+  std::vector<PlainMessage> messages = someMessages(400, 10'000);
+  std::vector<PlainMessage> mixed = messages;
+  std::reverse(mixed.begin(), mixed.end());
+  test::write(*makeMcapWriter(folder.file("a.mcap"), McapPacking::kZstd), mixed);
+  std::stable_sort(mixed.begin(), mixed.end(),
+                   [](const PlainMessage& a, const PlainMessage& b) { return a.time < b.time; });
+  CHECK(readBack(folder.file("a.mcap")) == mixed);
+}
+
+TEST_CASE("an empty MCAP file has no messages", "[mcap]") {
+  const BagFolder folder;
+  test::write(*makeMcapWriter(folder.file("a.mcap"), McapPacking::kZstd), {});
+  CHECK(readBack(folder.file("a.mcap")).empty());
+}
+
+TEST_CASE("a cut MCAP file gives what is whole and names the byte", "[mcap]") {
+  const BagFolder folder;
+  const std::string file = folder.file("a.mcap");
+  const std::vector<PlainMessage> messages = someMessages(40, 100'000);  // four chunks
+  test::write(*makeMcapWriter(file, McapPacking::kNone), messages);
+  const std::size_t whole = std::filesystem::file_size(file);
+  std::size_t most = 0;
+  for (std::size_t size = whole - 1; size > 0;) {
+    std::filesystem::resize_file(file, size);
+    const bool close = size < 2000 || size + 3000 > whole;
+    const std::size_t length = size;
+    size -= close ? 1 : std::min<std::size_t>(size, 9973);
+    if (length < 8) {
+      CHECK(refusalOf([&] { (void)openBag(file); }).field == "byte 0");
+      continue;
+    }
+    const auto bag = openBag(file);
+    const std::vector<PlainMessage> read = readBack(*bag);
+    REQUIRE(read.size() <= messages.size());
+    CHECK(std::equal(read.begin(), read.end(), messages.begin()));
+    REQUIRE(bag->warnings().size() == 1);
+    CHECK(bag->warnings()[0].find("byte ") != std::string::npos);
+    most = std::max(most, read.size());
+  }
+  CHECK(most == messages.size());
+}
+
+TEST_CASE("every flipped byte of an MCAP file is refused with its place, or changes nothing", "[mcap]") {
+  const BagFolder folder;
+  const std::string file = folder.file("a.mcap");
+  for (const McapPacking packing : {McapPacking::kNone, McapPacking::kZstd}) {
+    const std::vector<PlainMessage> messages = someMessages(20, 40);
+    test::write(*makeMcapWriter(file, packing), messages);
+    const std::vector<std::uint8_t> whole = test::bytesOf(file);
+    std::size_t refused = 0;
+    std::size_t same = 0;
+    for (std::size_t at = 0; at < whole.size(); ++at) {
+      const int flip = at % 2 == 0 ? 0xFF : 1 << (at / 2 % 8);
+      std::vector<std::uint8_t> bytes = whole;
+      bytes[at] = static_cast<std::uint8_t>(bytes[at] ^ flip);
+      test::writeBytes(file, bytes);
+      try {
+        const bool equal = readBack(file) == messages;
+        INFO("byte " << at << " with " << flip);
+        CHECK(equal);
+        ++same;
+      } catch (const InputError& error) {
+        CHECK(error.field.starts_with("byte "));
+        ++refused;
+      }
+    }
+    CHECK(refused > same);
+  }
+}
+
+}  // namespace
+}  // namespace swiftlet
