@@ -2,7 +2,7 @@
 // its own definitions over sql.js, and the command lines of sqlite3 and lz4.
 //
 // usage: node bag_peers.mjs SWIFTLET LOG WORK [RUN]
-// LOG is a EuRoC folder; it is exported, read with the others' readers and compared with its files; then written
+// LOG is a EuRoC folder; its beginning is exported, read with the others' readers and compared with its files; then written
 // again with the others' writers in all that the formats allow, and each of these must export to the same bytes.
 // RUN: a run folder, whose messages must all be decoded.
 import { McapIndexedReader, McapStreamReader, McapWriter } from "@mcap/core";
@@ -17,9 +17,32 @@ import { execFileSync } from "node:child_process";
 import fs from "node:fs";
 import path from "node:path";
 
-const [swiftlet, log, work, run] = process.argv.slice(2);
+const [swiftlet, whole, work, run] = process.argv.slice(2);
 fs.mkdirSync(work, { recursive: true });
 const at = (name) => path.join(work, name);
+
+/** The beginning of the log: 1 s of it is written some thirty times. */
+function shortened() {
+  const log = at("log");
+  for (const name of fs.readdirSync(path.join(whole, "mav0"))) {
+    const from = path.join(whole, "mav0", name);
+    const to = path.join(log, "mav0", name);
+    if (!fs.existsSync(path.join(from, "data.csv"))) continue;
+    fs.mkdirSync(path.join(to, "data"), { recursive: true });
+    const yaml = path.join(from, "sensor.yaml");
+    if (fs.existsSync(yaml)) fs.copyFileSync(yaml, path.join(to, "sensor.yaml"));
+    const images = name.startsWith("cam");
+    const rows = fs.readFileSync(path.join(from, "data.csv"), "utf8").trim().split(/\r?\n/).slice(0, images ? 21 : 501);
+    fs.writeFileSync(path.join(to, "data.csv"), rows.join("\n") + "\n");
+    if (!images) continue;
+    for (const row of rows.slice(1)) {
+      const file = row.split(",")[1].trim();
+      fs.copyFileSync(path.join(from, "data", file), path.join(to, "data", file));
+    }
+  }
+  return log;
+}
+const log = shortened();
 const handlers = await loadDecompressHandlers();
 await zstd.isLoaded;
 const program = (...args) => execFileSync(swiftlet, args, { stdio: ["ignore", "ignore", "inherit"] });
@@ -178,7 +201,7 @@ async function writeMcap(file, source, reader, options, packing) {
     lz4: (bytes) => execFileSync("lz4", ["-c", "-"], { input: bytes, maxBuffer: 1 << 28, stdio: ["pipe", "pipe", "ignore"] }),
   };
   const compressChunk = packing && ((bytes) => ({ compression: packing, compressedData: packers[packing](bytes) }));
-  const writer = new McapWriter({ writable, compressChunk, chunkSize: 300000, ...options });
+  const writer = new McapWriter({ writable, compressChunk, chunkSize: 200000, ...options });
   await writer.start({ profile: "ros2", library: "peer" });
   const channels = new Map();
   let sequence = 0;
