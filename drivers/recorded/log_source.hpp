@@ -49,8 +49,8 @@ class LogSource {
   virtual bool next(SensorMessage& message) = 0;
   /// False where the next message is certainly no image.
   [[nodiscard]] virtual bool imageIsNext() const { return true; }
-  /// The file of the image that next() gave last, PNG or JPEG, until next() is called again; empty where the log
-  /// holds pixels.
+  /// The file of the image that next() gave last, PNG or JPEG, until next() is called again; empty where the
+  /// log holds pixels.
   [[nodiscard]] virtual std::span<const std::uint8_t> picture() const { return {}; }
   /// Images the log lists, all cameras together, for progress.
   [[nodiscard]] virtual std::size_t imageCount() const = 0;

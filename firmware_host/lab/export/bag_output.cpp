@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "drivers/bag/ros1_file.hpp"
+#include "drivers/calibration/input_error.hpp"
 #include "firmware_host/files/new_folder.hpp"
 #include "firmware_host/files/whole_file.hpp"
 
@@ -38,10 +39,11 @@ std::map<std::string, std::uint64_t> writeBag(BagForm form, const std::string& p
         form == BagForm::kRos1 ? makeRos1Writer(part) : makeMcapWriter(part, McapPacking::kZstd), fill);
     commitPart(part, path);
     return counts;
-  } catch (...) {
+  } catch (const InputError& error) {
     std::error_code ignored;
     fs::remove(part, ignored);
-    throw;
+    if (error.file != part) throw;
+    throw InputError(path, error.line, error.field, error.message, error.remedy);
   }
 }
 
