@@ -39,7 +39,8 @@ std::span<const ImageView> GreyReader::read(const RawImage& frame) {
   if (frame.format.layout == PixelLayout::kJpeg) {
     ImageSize found;
     const ImageSize size{frame.width, frame.height};
-    if (jpeg_.decode({frame.data, frame.bytes}, size, pixels_.data(), found) != DecodeResult::kOk) return {};
+    if (decoder_.decode({frame.data, frame.bytes}, size, pixels_.data(), found) != DecodeResult::kOk)
+      return {};
     grey = {pixels_.data(), frame.width, frame.height, frame.width};
   }
   std::array<RawImage, 2> cameras = {grey, grey};

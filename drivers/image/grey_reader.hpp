@@ -9,18 +9,18 @@
 // - Words of less than 16 bits stand at the lower end, as V4L2 says, or at the upper one, as the Jetson
 //   Xavier delivers them: an image with more than half of its rows beyond the lower range is of the latter
 //   kind, and so are all that follow.
-// - JPEG: drivers/image/jpeg_grey.hpp.
+// - JPEG, and PNG in its place: drivers/image/image_decoder.hpp.
 //
-// Errors: a damaged picture gives no images. Memory: of the images and of three rows, in reserve(); JPEG's
-// codec allocates, nothing else does. Cost: a load and a store for each pixel, about 15 operations behind a
-// Bayer filter; nothing for 8-bit grey, whose images lie in the camera's own memory.
+// Errors: a damaged picture gives no images. Memory: of the images and of three rows, in reserve(); a
+// picture's codec allocates, nothing else does. Cost: a load and a store for each pixel, about 15 operations
+// behind a Bayer filter; nothing for 8-bit grey, whose images lie in the camera's own memory.
 
 #include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "drivers/image/jpeg_grey.hpp"
+#include "drivers/image/image_decoder.hpp"
 #include "drivers/image/raw_image.hpp"
 #include "estimator/core/image_view.hpp"
 
@@ -46,7 +46,7 @@ class GreyReader {
   std::vector<std::uint8_t> pixels_;
   std::vector<std::uint8_t> rows_;   ///< three, unpacked
   std::vector<std::uint16_t> sums_;  ///< over three rows, with a pixel more at both ends
-  JpegGrey jpeg_;
+  ImageDecoder decoder_;
   std::array<ImageView, 2> images_ = {};
 };
 
