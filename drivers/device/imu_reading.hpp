@@ -18,6 +18,8 @@ struct ImuReading {
   Eigen::Vector3d gyro;                  ///< angular rate [rad/s]
   Eigen::Vector3d accel;                 ///< specific force [m/s^2]: +9.81 along the axis that points up
   Duration mean_age = {};                ///< by which the values' middle lies before `device`: they are means
+  /// Of `device`'s place, CLOCK_MONOTONIC, where the driver maps its clock itself.
+  std::optional<Stamp> host = {};
 };
 
 }  // namespace swiftlet
