@@ -1,8 +1,6 @@
 #include "drivers/dds/dds_link.hpp"
 
 #include <dds/dds.h>
-#include <net/if.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cstring>
@@ -25,55 +23,6 @@ constexpr std::uint8_t kFloat32 = 7;  ///< sensor_msgs/PointField
 constexpr std::uint8_t kUint32 = 6;
 constexpr std::size_t kFieldBytes = 4;
 constexpr std::uint32_t kMaxSide = 16384;
-
-/// Beyond this many unacknowledged bytes the library would hold a writer back: more than it can ever keep.
-constexpr const char* kWatermark = "1 GB";
-
-std::string configuration(const DdsSettings& settings) {
-  const bool loopback = settings.interface == "lo";
-  std::string text = "<General><Interfaces><NetworkInterface name=\"" + settings.interface +
-                     "\"/></Interfaces><AllowMulticast>" + (loopback ? "false" : "spdp") +
-                     "</AllowMulticast></General><Internal><MaxSampleSize>" +
-                     std::to_string(kLargestMessage) + " B</MaxSampleSize><Watermarks><WhcHigh>" +
-                     kWatermark + "</WhcHigh></Watermarks></Internal>";
-  if (loopback) {
-    text +=
-        "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32"
-        "</MaxAutoParticipantIndex><Peers><Peer address=\"127.0.0.1\"/></Peers></Discovery>";
-  }
-  return text;
-}
-
-/// Of all links: the library has one place for what it says.
-struct Complaints {
-  std::atomic<std::uint64_t> lines{0};
-  std::atomic<void (*)(std::string_view)> tell{nullptr};
-};
-Complaints& complaints() {
-  static Complaints all;
-  return all;
-}
-
-/// The first few lines are told: a flood of messages that are too large gives one each.
-void complain(void* to, const dds_log_data_t* data) {
-  constexpr std::uint64_t kTold = 8;
-  auto& all = *static_cast<Complaints*>(to);
-  if (all.lines.fetch_add(1, std::memory_order_relaxed) >= kTold) return;
-  if (auto* const tell = all.tell.load(std::memory_order_relaxed)) tell(data->message);
-}
-
-/// Names of the network interfaces, with commas; `wanted` is set if it is one of them.
-std::string interfaces(const std::string& wanted, bool& found) {
-  std::string names;
-  found = false;
-  struct if_nameindex* const list = if_nameindex();
-  for (const struct if_nameindex* it = list; it != nullptr && it->if_name != nullptr; ++it) {
-    names += (names.empty() ? "" : ", ") + std::string(it->if_name);
-    found = found || wanted == it->if_name;
-  }
-  if (list != nullptr) if_freenameindex(list);
-  return names;
-}
 
 /// The message is read while it is written out and not kept: what C wants without const stays ours.
 char* text(std::string_view view, std::string& keep) {
@@ -141,8 +90,8 @@ bool copyImage(const sensor_msgs_msg_dds__Image_& from, DdsImage& image) {
 }  // namespace
 
 struct DdsLink::Entities {
-  dds_entity_t domain = 0;
-  dds_entity_t participant = 0;
+  std::shared_ptr<DdsDomain> domain;
+  std::vector<dds_entity_t> made;  ///< topics before what writes and reads them
   dds_entity_t odometry = 0;
   dds_entity_t transforms = 0;
   dds_entity_t mesh = 0;
@@ -169,8 +118,7 @@ struct DdsLink::Entities {
   Entities(const Entities&) = delete;
   Entities& operator=(const Entities&) = delete;
   ~Entities() {
-    if (participant > 0) dds_delete(participant);
-    if (domain > 0) dds_delete(domain);
+    for (auto it = made.rbegin(); it != made.rend(); ++it) dds_delete(*it);
   }
 
   template <typename Point>
@@ -180,15 +128,18 @@ struct DdsLink::Entities {
   }
 
   /// ROS's name of a topic begins with a slash, DDS's with rt.
-  [[nodiscard]] dds_entity_t topic(const dds_topic_descriptor_t& type, const std::string& name) const {
-    return dds_create_topic(participant, &type, ("rt" + name).c_str(), nullptr, nullptr);
+  [[nodiscard]] dds_entity_t topic(const dds_topic_descriptor_t& type, const std::string& name) {
+    const dds_entity_t topic =
+        dds_create_topic(domain->participant(), &type, ("rt" + name).c_str(), nullptr, nullptr);
+    if (topic > 0) made.push_back(topic);
+    return topic;
   }
-  [[nodiscard]] dds_entity_t writer(const dds_topic_descriptor_t& type, const std::string& name,
-                                    int kept) const {
+  [[nodiscard]] dds_entity_t writer(const dds_topic_descriptor_t& type, const std::string& name, int kept) {
     dds_qos_t* qos = quality(true, kept);
-    const dds_entity_t made = dds_create_writer(participant, topic(type, name), qos, nullptr);
+    const dds_entity_t writer = dds_create_writer(domain->participant(), topic(type, name), qos, nullptr);
     dds_delete_qos(qos);
-    return made;
+    if (writer > 0) made.push_back(writer);
+    return writer;
   }
   [[nodiscard]] dds_entity_t reader(const dds_topic_descriptor_t& type, const std::string& name) {
     // Best effort meets both kinds of writers, and asks no writer to wait for us.
@@ -197,10 +148,11 @@ struct DdsLink::Entities {
     dds_lset_data_available(listener, [](dds_entity_t, void* came) {
       static_cast<std::atomic<std::uint64_t>*>(came)->fetch_add(1, std::memory_order_relaxed);
     });
-    const dds_entity_t made = dds_create_reader(participant, topic(type, name), qos, listener);
+    const dds_entity_t reader = dds_create_reader(domain->participant(), topic(type, name), qos, listener);
     dds_delete_listener(listener);
     dds_delete_qos(qos);
-    return made;
+    if (reader > 0) made.push_back(reader);
+    return reader;
   }
 };
 
@@ -220,26 +172,10 @@ bool DdsLink::open(const DdsSettings& settings) {
       (!settings.label_topic.empty() && settings.label_topic.front() != '/')) {
     return failed("a topic of ROS begins with /");
   }
-  bool found = false;
-  const std::string names = interfaces(settings.interface, found);
-  if (!found) {
-    return failed("there is no network interface '" + settings.interface + "', only " + names);
-  }
-  complaints().tell.store(settings.complain, std::memory_order_relaxed);
-  dds_set_log_sink(complain, &complaints());
-  e.domain = dds_create_domain(settings.domain, configuration(settings).c_str());
-  if (e.domain < 0) {
-    return failed("DDS domain " + std::to_string(settings.domain) +
-                      " cannot be opened on the network interface " + settings.interface +
-                      ": it has to be up and have an address, and a program opens a domain once",
-                  e.domain);
-  }
-  e.participant = dds_create_participant(settings.domain, nullptr, nullptr);
-  if (e.participant < 0) {
-    return failed("DDS cannot take part in domain " + std::to_string(settings.domain) +
-                      " on the network interface " + settings.interface +
-                      ": 32 programs at most do on one computer",
-                  e.participant);
+  e.domain = DdsDomain::open(settings, error_);
+  if (!e.domain) {
+    entities_.reset();
+    return false;
   }
   e.odometry = e.writer(nav_msgs_msg_dds__Odometry__desc, settings.prefix + "/odometry", kKeptStates);
   e.transforms = e.writer(tf2_msgs_msg_dds__TFMessage__desc, "/tf", kKeptStates);
@@ -447,7 +383,7 @@ int DdsLink::labellers() const {
 
 DdsCounters DdsLink::counters() const {
   DdsCounters counters = counters_;
-  counters.complaints = complaints().lines.load(std::memory_order_relaxed);
+  counters.complaints = DdsDomain::complaints();
   if (entities_) {
     const std::uint64_t came = entities_->images_came.load(std::memory_order_relaxed);
     counters.images_skipped = came - std::min(came, entities_->images_seen);

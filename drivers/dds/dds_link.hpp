@@ -5,11 +5,9 @@
 // Nothing blocks: every writer keeps its last messages only and has no time to wait (max_blocking_time 0),
 // and the library's throttle is out of reach, so that a subscriber that is slow, stopped or killed costs its
 // own messages and nobody else's. What a writer refuses all the same is counted. One thread calls publish and
-// take; the library has threads of its own, which inherit the scheduling of who called open(). Network:
-// loopback and unicast unless DdsSettings::interface names another. Memory: what a subscriber has not yet
-// acknowledged, at most the last kKeptStates odometries and transforms, 16 diagnostics, 4 images, 1 mesh, 1
-// surface, 1 obstacle; kKeptImages label images that were not yet taken; grows to the largest message seen,
-// at most kLargestMessage: larger ones are neither sent nor received. No exceptions.
+// take. Memory: what a subscriber has not yet acknowledged, at most the last kKeptStates odometries and
+// transforms, 16 diagnostics, 4 images, 1 mesh, 1 surface, 1 obstacle; kKeptImages label images that were not
+// yet taken; grows to the largest message seen. No exceptions.
 
 #include <Eigen/Core>
 #include <array>
@@ -22,6 +20,7 @@
 #include <utility>
 #include <vector>
 
+#include "drivers/dds/dds_domain.hpp"
 #include "estimator/core/image_view.hpp"
 #include "estimator/core/stamp.hpp"
 #include "estimator/geometry/se3.hpp"
@@ -31,16 +30,10 @@ namespace swiftlet {
 /// One second at 200 Hz: a reader that gets no CPU for less loses nothing.
 inline constexpr int kKeptStates = 200;
 inline constexpr int kKeptImages = 8;
-inline constexpr std::size_t kLargestMessage = std::size_t{16} * 1024 * 1024;
 
-struct DdsSettings {
-  std::uint32_t domain = 0;          ///< ROS_DOMAIN_ID, 0 to 232
-  std::string interface = "lo";      ///< network interface; "lo": this computer alone
+struct DdsSettings : DdsNetwork {
   std::string prefix = "/swiftlet";  ///< of our topics; /tf and /diagnostics have none
   std::string label_topic;           ///< sensor_msgs/Image to read; empty: none, and no image goes out
-  /// Gets the library's first lines of warnings and errors, from any of its threads; null: nobody does. Of
-  /// the link that was opened last: the library has one place for all.
-  void (*complain)(std::string_view line) = nullptr;
 };
 
 struct DdsOdometry {

@@ -46,6 +46,11 @@ Words words(DeviceFaultKind kind) {
       return {"sends too much", "check the wire's ground, shield and pull resistor"};
     case DeviceFaultKind::kClockJumped:
       return {"its clock jumped", "check its power supply: a sensor that restarts does this"};
+    case DeviceFaultKind::kWrongClock:
+      return {"its stamps are of another clock",
+              "set the clock of the computer that stamps by NTP or PTP; `swiftlet replay` reads bags"};
+    case DeviceFaultKind::kClockSet:
+      return {"the wall clock, by which it stamps, was set", "let NTP set it before the flight"};
     case DeviceFaultKind::kDark:
       return {"sees nothing", "check the lens cap, the light, exposure and gain"};
     case DeviceFaultKind::kFrozen:

@@ -26,6 +26,8 @@ enum class DeviceFaultKind : std::uint8_t {
   kNoisy,        ///< it sends more than it should
   kClockJumped,  ///< its clock went on from another reading
   kDark,         ///< a camera that sees nothing
+  kWrongClock,   ///< its stamps are of another clock than this computer's
+  kClockSet,     ///< this computer's wall clock was set, by which it stamps
   kFrozen,       ///< a camera that sends one image again and again
 };
 

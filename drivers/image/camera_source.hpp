@@ -58,6 +58,11 @@ struct CameraCounters {
   std::uint64_t stamp_ahead = 0;     ///< stamps later than their arrival
   std::uint64_t requeue_failed = 0;  ///< buffers that could not be put back
   std::uint64_t reopened = 0;
+  // Of topics.
+  std::uint64_t stale = 0;        ///< not newer than the one before: late or repeated; left out
+  std::uint64_t wrong_clock = 0;  ///< stamped by another clock than this computer's; left out
+  std::uint64_t lost = 0;         ///< on the way, as far as DDS knows; in `missed` too
+  std::uint64_t overrun = 0;      ///< not taken in time; in `missed` too
 };
 
 class CameraSource;
@@ -104,6 +109,9 @@ class CameraSource {
   /// True: frames that are taken or given back cost allocations and locks, which a thread of the flight path
   /// must not have.
   [[nodiscard]] virtual bool allocates() const { return false; }
+
+  /// What happened to it that is no fault, for the user; until it says false.
+  virtual bool nextRemark(DeviceFault& /*remark*/) { return false; }
 
   /// The oldest frame that waits. Ok with `frame.valid()` false: none.
   virtual DeviceFault next(CapturedFrame& frame) = 0;

@@ -41,6 +41,8 @@ RoomTable directNeighbours() {
   table["drivers/image"] = {"drivers/device"};
   table["drivers/v4l2"] = {"drivers/image"};
   table["drivers/gstreamer"] = {"drivers/image"};
+  // Topics as cameras, with lenses as they tell them.
+  table["drivers/dds"].insert({"drivers/calibration", "drivers/image", "drivers/timesync"});
   // An autopilot's inertial messages come over a serial port like any sensor's.
   table["drivers/serial"].insert("drivers/mavlink");
   // Its errors are those of all files that users give.

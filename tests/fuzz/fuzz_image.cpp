@@ -1,8 +1,13 @@
 #include "tests/fuzz/fuzz_image.hpp"
 
+#include <array>
+#include <cstdint>
+#include <cstring>
 #include <numeric>
+#include <span>
 #include <vector>
 
+#include "drivers/dds/topic_camera.hpp"
 #include "drivers/image/grey_reader.hpp"
 #include "tests/fuzz/demand.hpp"
 
@@ -43,6 +48,42 @@ void cameraFrame(std::string_view text) {
     demand(again == 0 || seen == sum);
     sum = seen;
   }
+}
+
+void topicImage(std::string_view text) {
+  constexpr std::size_t kHead = 16;
+  if (text.size() < kHead) return;
+  const auto head = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
+  std::array<std::uint32_t, 3> sizes{};
+  std::memcpy(sizes.data(), text.data() + 4, sizeof(sizes));
+  TopicImage message;
+  message.compressed = (head(0) & 1U) != 0;
+  message.big_endian = (head(0) & 2U) != 0;
+  message.width = sizes[0];
+  message.height = sizes[1];
+  message.step = sizes[2];
+  message.encoding = text.substr(kHead, head(3));
+  text.remove_prefix(kHead + message.encoding.size());
+  // Of its own memory, and no longer: reading beyond is seen.
+  const std::vector<std::uint8_t> bytes(text.begin(), text.end());
+  message.data = bytes;
+  const int width = 1 + head(1);
+  const int height = 1 + head(2);
+  RawImage image;
+  const DeviceFault fault = rawImageOf(message, width, height, image);
+  demand(fault.ok() == !image.empty());
+  if (!fault.ok()) return;
+  GreyReader reader;
+  reader.reserve(image.format, width, height, false);
+  const std::span<const ImageView> images = reader.read(image);
+  demand(!images.empty() || message.compressed);
+  unsigned sum = 0;
+  for (const ImageView& view : images) {
+    demand(view.width == width && view.height == height);
+    for (int y = 0; y < height; ++y) sum = std::accumulate(view.row(y), view.row(y) + width, sum);
+  }
+  // Looked at, so that the reading stays.
+  demand(sum <= 255U * 256U * 256U);
 }
 
 }  // namespace swiftlet::fuzz

@@ -85,9 +85,9 @@ class Peer {
     if (subscriber_->create_datareader(topic<Type>(name), qos, &listener) == nullptr) std::abort();
   }
   template <typename Type>
-  fast::DataWriter* writer(const std::string& name) {
+  fast::DataWriter* writer(const std::string& name, bool reliable = true) {
     fast::DataWriterQos qos = fast::DATAWRITER_QOS_DEFAULT;
-    qos.reliability().kind = fast::RELIABLE_RELIABILITY_QOS;
+    qos.reliability().kind = reliable ? fast::RELIABLE_RELIABILITY_QOS : fast::BEST_EFFORT_RELIABILITY_QOS;
     qos.history().depth = 10;
     return participant_->create_publisher(fast::PUBLISHER_QOS_DEFAULT)
         ->create_datawriter(topic<Type>(name), qos);

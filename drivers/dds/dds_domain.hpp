@@ -1,0 +1,57 @@
+#pragma once
+// A DDS domain that this program takes part in: one for all that publish and read there.
+//
+// Network: loopback and unicast unless `interface` names another. Messages above kLargestMessage are neither
+// sent nor received. Threads: any. The library has threads of its own, which inherit the scheduling of who
+// opened the domain first. Errors: words for the user. Built without DDS (SWIFTLET_WITH_DDS), open() says so.
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace swiftlet {
+
+inline constexpr std::size_t kLargestMessage = std::size_t{16} * 1024 * 1024;
+
+struct DdsNetwork {
+  std::uint32_t domain = 0;      ///< ROS_DOMAIN_ID, 0 to 232
+  std::string interface = "lo";  ///< network interface; "lo": this computer alone
+  /// Gets the library's first lines of warnings and errors, from any of its threads; null: nobody does. Of
+  /// the domain that was opened last: the library has one place for all.
+  void (*complain)(std::string_view line) = nullptr;
+};
+
+/// A topic that somebody publishes, by ROS's names: "/camera/imu", "sensor_msgs/msg/Imu".
+struct PublishedTopic {
+  std::string name;
+  std::string type;
+  bool operator==(const PublishedTopic&) const = default;
+};
+
+class DdsDomain {
+ public:
+  /// The one that is open already where there is one. Null, with `error`, where it cannot be opened.
+  [[nodiscard]] static std::shared_ptr<DdsDomain> open(const DdsNetwork& network, std::string& error);
+  ~DdsDomain();
+  DdsDomain(const DdsDomain&) = delete;
+  DdsDomain& operator=(const DdsDomain&) = delete;
+
+  /// The library's handle of our participant.
+  [[nodiscard]] std::int32_t participant() const { return participant_; }
+  /// Of other programs, as far as they have been heard, by name.
+  [[nodiscard]] std::vector<PublishedTopic> publishedTopics() const;
+  /// Lines of the library so far; a message that is too large gives one.
+  [[nodiscard]] static std::uint64_t complaints();
+
+ private:
+  DdsDomain() = default;
+
+  std::string interface_;
+  std::int32_t domain_ = 0;
+  std::int32_t participant_ = 0;
+};
+
+}  // namespace swiftlet

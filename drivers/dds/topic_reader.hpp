@@ -1,0 +1,106 @@
+#pragma once
+// Messages of one ROS 2 topic as they come: images, pictures, inertial samples, calibrations.
+//
+// Quality: best effort and volatile, which every publisher of ROS 2 meets; the newest kKeptImages images or
+// kKeptSamples samples wait to be taken. Nothing is believed but that the message has its type: sizes,
+// encodings and numbers are as the publisher wrote them.
+//
+// Threads: one. It allocates and locks: not for a thread of the flight path. Memory: the messages that wait,
+// and one of each largest size seen. Errors: open() says why not. Without DDS in the build it never opens.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "drivers/calibration/camera_info.hpp"
+#include "drivers/dds/dds_domain.hpp"
+#include "estimator/core/stamp.hpp"
+
+namespace swiftlet {
+
+/// sensor_msgs/Image or CompressedImage. It lies in the reader's memory until the next take().
+struct TopicImage {
+  Stamp stamp;                ///< the header's, CLOCK_REALTIME
+  bool compressed = false;    ///< a picture: JPEG or PNG by its first bytes
+  std::string_view encoding;  ///< "mono8"; of a picture its format, "jpeg"
+  bool big_endian = false;
+  std::uint32_t width = 0;   ///< px; of a picture 0, likewise height and step
+  std::uint32_t height = 0;  ///< px
+  std::uint32_t step = 0;    ///< bytes from row to row
+  std::span<const std::uint8_t> data;
+};
+
+/// sensor_msgs/Imu.
+struct TopicImu {
+  Stamp stamp;            ///< the header's, CLOCK_REALTIME
+  Eigen::Vector3d gyro;   ///< rad/s
+  Eigen::Vector3d accel;  ///< m/s^2
+};
+
+enum class TopicType : std::uint8_t { kImage, kCompressedImage, kImu, kCameraInfo };
+
+/// "sensor_msgs/msg/Image".
+[[nodiscard]] const char* rosName(TopicType type);
+
+/// Rings when messages come; one for all readers of a thread.
+class TopicBell {
+ public:
+  TopicBell();
+  ~TopicBell();
+  TopicBell(const TopicBell&) = delete;
+  TopicBell& operator=(const TopicBell&) = delete;
+
+  /// Readable from a ring to the next clear().
+  [[nodiscard]] int fd() const { return fd_; }
+  void ring() const;
+  /// Before the messages are taken: what comes meanwhile rings again.
+  void clear() const;
+  /// Until it rings, at most so long.
+  void wait(Duration longest) const;
+
+ private:
+  int fd_ = -1;
+};
+
+struct TopicCounters {
+  std::uint64_t taken = 0;
+  std::uint64_t overrun = 0;  ///< newer ones had come before they were taken
+  std::uint64_t lost = 0;     ///< on the way, as far as DDS knows
+};
+
+class TopicReader {
+ public:
+  static constexpr int kKeptImages = 4;
+  static constexpr int kKeptSamples = 400;
+
+  TopicReader();
+  ~TopicReader();
+  TopicReader(const TopicReader&) = delete;
+  TopicReader& operator=(const TopicReader&) = delete;
+
+  /// Once; `bell` outlives this. False, with `error`: a name that is none, or the library's words.
+  [[nodiscard]] bool open(std::shared_ptr<DdsDomain> domain, TopicType type, const std::string& name,
+                          const TopicBell& bell, std::string& error);
+  [[nodiscard]] bool isOpen() const { return entities_ != nullptr; }
+
+  /// The oldest message that waits, where the topic is of this type; false: there is none.
+  bool take(TopicImage& image);
+  bool take(TopicImu& sample);
+  bool take(CameraInfo& info);
+
+  /// Publishers of this topic and type that are there now.
+  [[nodiscard]] int publishers() const;
+  [[nodiscard]] TopicCounters counters() const;
+
+ private:
+  struct Entities;
+  /// The next message with data into the reader's memory.
+  bool takeNext();
+
+  std::unique_ptr<Entities> entities_;
+};
+
+}  // namespace swiftlet

@@ -1,0 +1,18 @@
+#pragma once
+// What to tell a user whose topic nobody publishes: who publishes under its name, and which names are near.
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "drivers/dds/dds_domain.hpp"
+
+namespace swiftlet {
+
+/// "no publisher of sensor_msgs/msg/Image on /cam/image; near: /camera/image, ...": at most three names of
+/// that type, the nearest first; or that `name` has another type.
+[[nodiscard]] std::string missingTopic(std::span<const PublishedTopic> published, std::string_view type,
+                                       std::string_view name);
+
+}  // namespace swiftlet
