@@ -9,6 +9,7 @@
 #include "estimator/core/units.hpp"
 #include "firmware_host/inputs/devices/connected_devices.hpp"
 #include "firmware_host/inputs/devices/counting_sink.hpp"
+#include "firmware_host/inputs/devices/input_topics.hpp"
 #include "firmware_host/inputs/devices/live_input.hpp"
 #include "firmware_host/inputs/devices/sensor_threads.hpp"
 #include "firmware_host/inputs/devices/status_json.hpp"
@@ -21,8 +22,13 @@ namespace {
 
 bool namesDevices(const Settings& settings) {
   return !settings.imu_link.device.empty() || !settings.cameras.device0.empty() ||
-         !settings.cameras.pipeline0.empty();
+         !settings.cameras.pipeline0.empty() || inputTopics(settings).any();
 }
+
+constexpr const char* kSlowTopics =
+    "messages are lost on the way: `sysctl net.core.rmem_max` of 10 MB, drivers on this computer, fewer "
+    "other "
+    "subscribers and topics";
 
 MachineLine line(const std::string& what, std::string found, bool good, std::string remedy) {
   return {what, std::move(found), good ? MachineVerdict::kGood : MachineVerdict::kPoor,
@@ -33,7 +39,12 @@ MachineLine line(const std::string& what, std::string found, bool good, std::str
 class VehicleCheck {
  public:
   VehicleCheck(const Settings& settings, const Calibration& calibration, LiveInput& input, double seconds)
-      : settings_(settings), calibration_(calibration), input_(input), seconds_(seconds), sink_(most()) {}
+      : settings_(settings),
+        calibration_(calibration),
+        topics_(inputTopics(settings, calibration.rig.camera_count)),
+        input_(input),
+        seconds_(seconds),
+        sink_(most()) {}
 
   void run(const std::atomic<bool>* stop, MachineReport& report) {
     SensorThreads threads(input_, sink_, settings_.realtime);
@@ -63,26 +74,34 @@ class VehicleCheck {
     const CountingSink::Stream& stream = sink_.imu();
     const double wanted = calibration_.noise.rate_hz;
     constexpr double kTolerance = 0.05;  // of the rate
-    report.lines.push_back(line("IMU rate",
-                                fmt::format("{:.1f} Hz, calibration {:.1f} Hz", stream.rate(), wanted),
-                                std::abs(stream.rate() - wanted) < kTolerance * wanted,
-                                stream.stamps.empty() ? "nothing came: check power and wires, and that "
-                                                        "imu_link.protocol and imu_link.baud are the device's"
-                                                      : "set the device's output rate, or correct rate_hz in "
-                                                        "the calibration: its noise depends on it"));
+    report.lines.push_back(
+        line("IMU rate", fmt::format("{:.1f} Hz, calibration {:.1f} Hz", stream.rate(), wanted),
+             std::abs(stream.rate() - wanted) < kTolerance * wanted,
+             stream.stamps.empty() ? (topics_.imu.empty() ? "nothing came: check power and wires, and that "
+                                                            "imu_link.protocol and imu_link.baud are the "
+                                                            "device's"
+                                                          : "nothing came: look whether its driver runs")
+                                   : "set the device's output rate, or correct rate_hz in "
+                                     "the calibration: its noise depends on it"));
     if (const std::string asked = input_.imu().link().stream(); !asked.empty()) {
       report.lines.push_back({"IMU stream", asked, MachineVerdict::kNote, ""});
     }
     if (stream.stamps.size() < 2) return;
     const Duration typical = stream.medianStep();
     const Duration largest = stream.largestStep();
-    report.lines.push_back(
-        line("IMU gaps",
-             fmt::format("largest step {:.2f} ms, usual {:.2f} ms", largest.seconds() * kToMs,
-                         typical.seconds() * kToMs),
-             largest < typical + typical + typical,
-             "samples are lost on the way: raise the baud rate, or take other outputs off"));
+    report.lines.push_back(line(
+        "IMU gaps",
+        fmt::format("largest step {:.2f} ms, usual {:.2f} ms", largest.seconds() * kToMs,
+                    typical.seconds() * kToMs),
+        largest < typical + typical + typical,
+        topics_.imu.empty() ? "samples are lost on the way: raise the baud rate, or take other outputs off"
+                            : kSlowTopics));
     const ImuStatus status = input_.imu().status();
+    if (status.by_driver > 0) {
+      report.lines.push_back(
+          {"IMU clock", "the wall clock, by the driver's stamps", MachineVerdict::kGood, ""});
+      return;
+    }
     if (status.by_arrival > 0) {
       report.lines.push_back({"IMU clock", "the device sends none: samples are stamped as they arrive",
                               MachineVerdict::kPoor, "switch its time output on"});
@@ -114,11 +133,12 @@ class VehicleCheck {
     const CameraFacts& facts = camera.facts();
     const auto& cameras = settings_.cameras;
     const bool pipeline = !(index == 0 ? cameras.pipeline0 : cameras.pipeline1).empty();
+    const bool topic = !topics_.camera.at(index).empty();
     report.lines.push_back(
         {name + " images",
          fmt::format("{}x{} {}, {}, from {} ({})", facts.width, facts.height, facts.format.fourcc(),
                      facts.rate > 0 ? fmt::format("{:.4g} Hz", facts.rate) : "rate not said",
-                     facts.card.data(), facts.driver.data()),
+                     topic ? topics_.camera.at(index) : facts.card.data(), facts.driver.data()),
          MachineVerdict::kGood, ""});
     const double wanted = settings_.cameras.rate_hz;
     constexpr double kTolerance = 0.02;  // of the rate
@@ -129,20 +149,23 @@ class VehicleCheck {
                  ? "nothing came: a camera with an external trigger waits for it"
                  : "light: a long exposure lowers the rate; or set cameras.rate_hz to what it can"));
     const CameraCounters& c = status.counters;
-    report.lines.push_back(
-        line(name + " frames",
-             fmt::format("{} taken, {} missed, {} damaged, {} too short", c.frames, c.missed, c.damaged,
-                         c.too_short),
-             c.missed + c.damaged + c.too_short == 0,
-             pipeline ? "the pipeline, or what feeds it, is too slow: fewer conversions, or a lower rate"
-                      : "the bus is too slow for these cameras: other USB controllers, shorter cables, or a "
-                        "lower rate"));
-    report.lines.push_back(
-        line(name + " stamps", stampEventName(facts.event),
-             facts.event != StampEvent::kArrival && c.stamp_ahead == 0,
-             c.stamp_ahead > 0 ? (pipeline ? "the pipeline gives images before their time: add `clocksync`"
-                                           : "the driver stamps frames later than it gives them out")
-                               : "the time of capture is unknown: connect the trigger line"));
+    report.lines.push_back(line(
+        name + " frames",
+        fmt::format("{} taken, {} missed, {} damaged, {} too short{}", c.frames, c.missed, c.damaged,
+                    c.too_short,
+                    topic ? fmt::format(", {} stale, {} of another clock", c.stale, c.wrong_clock) : ""),
+        c.missed + c.damaged + c.too_short + c.stale + c.wrong_clock == 0,
+        topic      ? kSlowTopics
+        : pipeline ? "the pipeline, or what feeds it, is too slow: fewer conversions, or a lower rate"
+                   : "the bus is too slow for these cameras: other USB controllers, shorter cables, or a "
+                     "lower rate"));
+    report.lines.push_back(line(
+        name + " stamps", stampEventName(facts.event),
+        facts.event != StampEvent::kArrival && c.stamp_ahead == 0,
+        c.stamp_ahead > 0 ? (topic ? "its stamps lie ahead of this computer's clock: set both by NTP or PTP"
+                             : pipeline ? "the pipeline gives images before their time: add `clocksync`"
+                                        : "the driver stamps frames later than it gives them out")
+                          : "the time of capture is unknown: connect the trigger line"));
     if (stream.stamps.size() < 2) return;
     constexpr double kMost = 0.99;
     report.lines.push_back(
@@ -189,6 +212,7 @@ class VehicleCheck {
 
   const Settings& settings_;
   const Calibration& calibration_;
+  const InputTopics topics_;
   LiveInput& input_;
   double seconds_;
   CountingSink sink_;
@@ -221,10 +245,14 @@ DoctorReport examine(const DoctorRequest& request, const Settings& settings) {
   report.computer = inspectMachine("", settings.realtime.sensor_priority);
   // Cameras that the settings name are watched at work below.
   report.connected = connectedDevices("", !namesDevices(settings));
+  if (inputTopics(settings).any()) addTopics(settings, report.connected);
   if (namesDevices(settings)) {
     std::optional<Calibration> calibration;
     try {
       calibration = vehicleCalibration(settings);
+      for (const std::string& text : calibration->warnings) {
+        report.vehicle.lines.push_back({"calibration", text, MachineVerdict::kNote, ""});
+      }
       LiveInput input(settings, *calibration);
       const LiveInput::Opened opened = input.open();
       for (const std::string& text : opened.faults) {

@@ -10,6 +10,7 @@
 #include "drivers/device/monotonic_now.hpp"
 #include "estimator/core/units.hpp"
 #include "firmware_host/files/run_claim.hpp"
+#include "firmware_host/inputs/devices/input_topics.hpp"
 #include "firmware_host/inputs/devices/live_input.hpp"
 #include "firmware_host/realtime/console.hpp"
 #include "firmware_host/runs/fly_threaded.hpp"
@@ -20,8 +21,6 @@
 namespace swiftlet {
 namespace {
 
-/// Longer than an IMU's samples take over any of the links: their buffers hold 16 ms at the most.
-constexpr Duration kSamplePatience = Duration::fromMilliseconds(25);
 constexpr const char* kHungUp =
     "terminal closed (SIGHUP): the flight goes on; end it with SIGINT or SIGTERM (`pkill -INT swiftlet`)";
 
@@ -67,6 +66,7 @@ Calibration vehicleCalibration(const Settings& settings) {
     }
     calibration.rig.readout = Duration::fromSeconds(cameras.readout_ms * kFromMs);
   }
+  applyCameraInfo(settings, calibration);
   return calibration;
 }
 
@@ -104,7 +104,7 @@ class FlightRun {
     GraphOptions wanted = output_->graphOptions();
     wanted.recorder = recorder_.get();
     wanted.confusion = confusionOf(settings_);
-    wanted.sample_patience = kSamplePatience;
+    wanted.sample_patience = input_.samplePatience();
     wanted.remarks = [this](RunObserver& observer) { return remark(observer); };
     // The schedule asks ten times a second.
     const double begin = wallSeconds();

@@ -25,6 +25,7 @@ std::unique_ptr<RecordSink> makeSink(const RecordRequest& request, const Calibra
 RecordResult runRecord(const RecordRequest& request, const Settings& settings) {
   const Calibration calibration = vehicleCalibration(settings);
   LiveInput input(settings, calibration);
+  for (const std::string& line : calibration.warnings) warn("warning: " + line + "\n");
   LiveInput::Opened opened = input.open();
   for (const std::string& line : opened.warnings) warn("warning: " + line + "\n");
   RecordResult result;

@@ -12,6 +12,8 @@ struct VehicleGroup {
 
 struct ImuLinkGroup {
   std::string device = "";  ///< serial port, CAN interface or udp:HOST:PORT; empty: none
+  std::string topic = "";   ///< of ROS 2, in place of device
+  std::string accel_topic = "";
   std::string protocol = "bridge";
   int baud = 921600;
   double delay_ms = 0;
@@ -21,11 +23,19 @@ struct ImuLinkGroup {
 /// CamerasGroup::shutter of a rolling one.
 inline constexpr const char* kRolling = "rolling";
 
+/// CamerasGroup::camera_info.
+inline constexpr const char* kCameraInfoOff = "off";
+inline constexpr const char* kCameraInfoCheck = "check";
+inline constexpr const char* kCameraInfoUse = "use";
+
 struct CamerasGroup {
   std::string device0 = "";
   std::string device1 = "";
   std::string pipeline0 = "";  ///< of GStreamer, in place of device0
   std::string pipeline1 = "";
+  std::string topic0 = "";  ///< of ROS 2, in place of device0
+  std::string topic1 = "";
+  std::string camera_info = kCameraInfoCheck;
   bool side_by_side = false;
   std::string format = "any";
   double rate_hz = 20;
@@ -64,6 +74,7 @@ struct Ros2Group {
   bool enabled = false;
   int domain = 0;
   std::string interface = "lo";  ///< network interface; lo: this computer alone
+  std::string driver = "none";   ///< whose topics are cameras and IMU
   double odometry_hz = 50;
   double mesh_hz = 5;
   std::string label_topic = "";  ///< label images for the map; empty: none

@@ -25,6 +25,13 @@ std::vector<Setting> deviceSettings() {
       {"imu_link.device", "",
        "Serial port (best by its name under /dev/serial/by-id), CAN interface or an autopilot's UDP port.",
        TextSetting{member(kLink, &L::device), "/dev/ttyUSB0, can0, udp:127.0.0.1:14580@14540, or empty"}},
+      {"imu_link.topic", "",
+       "ROS 2 topic of the IMU (sensor_msgs/Imu) in place of imu_link.device, docs/ros2.md; of the gyroscope "
+       "where accel_topic is named too; for builds with SWIFTLET_WITH_DDS.",
+       TextSetting{member(kLink, &L::topic), "a topic as /camera/imu, or empty"}},
+      {"imu_link.accel_topic", "",
+       "ROS 2 topic of the accelerometer where it is apart: interpolated to the gyroscope's stamps.",
+       TextSetting{member(kLink, &L::accel_topic), "a topic as /camera/accel/sample, or empty"}},
       {"imu_link.protocol", "",
        "What the IMU speaks; dronecan is on a CAN interface, the others on a serial port, mavlink also on "
        "UDP. bridge: the project's own framing for microcontrollers, docs/serial.md.",
@@ -48,8 +55,22 @@ std::vector<Setting> deviceSettings() {
        TextSetting{member(kCameras, &C::pipeline0), "a pipeline as \"libcamerasrc\", or empty"}},
       {"cameras.pipeline1", "", "GStreamer pipeline of camera 1 in place of device1.",
        TextSetting{member(kCameras, &C::pipeline1), "a pipeline as \"libcamerasrc\", or empty"}},
+      {"cameras.topic0", "",
+       "ROS 2 topic of camera 0 in place of device0, docs/ros2.md: sensor_msgs/Image, or CompressedImage "
+       "where "
+       "its name ends with /compressed; for builds with SWIFTLET_WITH_DDS.",
+       TextSetting{member(kCameras, &C::topic0), "a topic as /camera/infra1/image_rect_raw, or empty"}},
+      {"cameras.topic1", "", "ROS 2 topic of camera 1 in place of device1.",
+       TextSetting{member(kCameras, &C::topic1), "a topic as /camera/infra2/image_rect_raw, or empty"}},
+      {"cameras.camera_info", "",
+       "What CameraInfo beside the cameras' topics is for. check: compared with the calibration's lenses, "
+       "more "
+       "than 1 px of difference is a warning; use: taken in their place, for rectified topics its P without "
+       "distortion; off: nothing.",
+       ChoiceSetting{member(kCameras, &C::camera_info), {kCameraInfoOff, kCameraInfoCheck, kCameraInfoUse}}},
       {"cameras.side_by_side", "",
-       "device0 or pipeline0 gives both cameras in one image, camera 0 in its left half. Format Y8I, pixel "
+       "device0, pipeline0 or topic0 gives both cameras in one image, camera 0 in its left half. Format Y8I, "
+       "pixel "
        "beside pixel, needs no such word.",
        onOff(kCameras, &C::side_by_side)},
       {"cameras.format", "",
@@ -116,9 +137,13 @@ std::vector<Setting> deviceSettings() {
        "docs/ros2.md; "
        "for builds with SWIFTLET_WITH_DDS.",
        onOff(kRos2, &Ros2Group::enabled)},
-      {"ros2.domain", "", "The ROS_DOMAIN_ID of those who listen.",
+      {"ros2.domain", "", "The ROS_DOMAIN_ID of those who listen and send.",
        integer(kRos2, &Ros2Group::domain, 0, 232)},
-      {"ros2.interface", "", "Network interface to publish on; lo: this computer alone.",
+      {"ros2.driver", "",
+       "Driver whose topics are the cameras and the IMU where the settings name none of their own, "
+       "docs/ros2.md.",
+       ChoiceSetting{member(kRos2, &Ros2Group::driver), {"none", "realsense", "depthai", "zed"}}},
+      {"ros2.interface", "", "Network interface of the topics; lo: this computer alone.",
        TextSetting{member(kRos2, &Ros2Group::interface), "an interface as lo or eth0"}},
       {"ros2.odometry_hz", "Hz", "Most states per second that are published.",
        real(kRos2, &Ros2Group::odometry_hz, 1, 1000)},

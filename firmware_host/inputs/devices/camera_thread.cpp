@@ -93,6 +93,7 @@ void CameraThread::run(SensorSink& sink, const RunControl& control) {
     takeFrames(sink);
     publish();
     const Stamp now = hostNow();
+    for (DeviceFault remark; source_->nextRemark(remark);) journal_.note(now, remark);
     if (source_->isOpen() && now - newest_ > longest_silence_) {
       journal_.fault(
           now, deviceFault(DeviceFaultKind::kSilent, 0, "no frame for %.1f s", (now - newest_).seconds()));
@@ -112,6 +113,8 @@ void CameraThread::publish() {
   counted_.counters = source_->counters();
   counted_.counters.frames -= before_.frames;
   counted_.counters.missed -= before_.missed;
+  counted_.counters.lost -= before_.lost;
+  counted_.counters.overrun -= before_.overrun;
   counted_.counters.damaged += undecoded_;
   status_.write(counted_);
 }

@@ -1,5 +1,5 @@
 #pragma once
-// The way to an IMU, whatever it is made of: a serial port or UDP with a protocol, or a CAN bus.
+// The way to an IMU, whatever it is made of: a serial port or UDP with a protocol, a CAN bus, or topics.
 // Threads: one. Errors: values; a fault that lasts closes the link, and open() takes it up again.
 
 #include <nlohmann/json_fwd.hpp>
@@ -22,6 +22,8 @@ class ImuLink {
 
   virtual DeviceFault open() = 0;
   [[nodiscard]] virtual bool isOpen() const = 0;
+  /// True: reading costs allocations and locks, which a thread of the flight path must not have.
+  [[nodiscard]] virtual bool allocates() const { return false; }
   /// To poll for reading.
   [[nodiscard]] virtual int fd() const = 0;
   /// To poll likewise: somebody wants something sent; below 0: nobody ever does.

@@ -113,6 +113,11 @@ void ImuThread::hand(const ImuReading& reading, SensorSink& sink) {
 }
 
 bool ImuThread::stampOf(const ImuReading& reading, Stamp& stamp) {
+  if (reading.host) {
+    stamp = *reading.host - delay_;
+    ++counted_.by_driver;
+    return true;
+  }
   if (!reading.device) {
     stamp = reading.arrival - delay_;
     ++counted_.by_arrival;

@@ -3,7 +3,8 @@
 // body's axes. Survives that the device goes and returns, falls silent or restarts its clock.
 //
 // Stamps: of the sensor's own clock where it sends one, by the protocol's exchange of clocks where that is
-// sure, else by the lower envelope of the delays (drivers/timesync/clock_map.hpp); without a clock, arrivals.
+// sure, else by the lower envelope of the delays (drivers/timesync/clock_map.hpp); as the driver maps them
+// where it does; without a clock, arrivals.
 // Threads: open() before the flight, run() on its own thread, journal and status from any.
 
 #include <memory>
@@ -28,6 +29,7 @@ struct ImuStatus {
   std::uint64_t refused = 0;  ///< no stamp, or one that does not rise
   std::uint64_t by_exchange = 0;
   std::uint64_t by_arrival = 0;
+  std::uint64_t by_driver = 0;  ///< the driver says the host's time
   TimesyncStatus clock;
 };
 
@@ -46,6 +48,9 @@ class ImuThread {
   }
   /// `edges`: where edges of the trigger go that come through the link.
   void run(SensorSink& sink, std::span<EdgeRing* const> edges, const RunControl& control);
+  [[nodiscard]] SensorInput::Level level() const {
+    return link_->allocates() ? SensorInput::Level::kLibrary : SensorInput::Level::kSensor;
+  }
   /// Of run(), at each turn.
   [[nodiscard]] Heartbeat& heart() { return heart_; }
 

@@ -2,20 +2,30 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "drivers/input/input_error.hpp"
+#include "drivers/dds/topic_camera.hpp"
 #include "drivers/gstreamer/pipeline_source.hpp"
 #include "drivers/image/pixel_format.hpp"
 #include "drivers/v4l2/camera_device.hpp"
 #include "estimator/core/units.hpp"
 #include "firmware_host/inputs/devices/can_imu_link.hpp"
+#include "firmware_host/inputs/devices/input_topics.hpp"
 #include "firmware_host/inputs/devices/port_imu_link.hpp"
 #include "firmware_host/inputs/devices/status_json.hpp"
+#include "firmware_host/inputs/devices/topic_imu_link.hpp"
 
 namespace swiftlet {
 namespace {
 
 constexpr const char* kTriggerByImu = "imu";
 constexpr const char* kAnyFormat = "any";
+/// Longer than an IMU's samples take over any of the links: their buffers hold 16 ms at the most.
+constexpr Duration kLinkPatience = Duration::fromMilliseconds(25);
+/// Those of topics pass two processes that the kernel runs when it likes, and wait for an accelerometer that
+/// is apart.
+constexpr Duration kTopicPatience = Duration::fromMilliseconds(60);
 
 [[noreturn]] void failAt(const char* setting, const std::string& what, const std::string& remedy) {
   throw InputError("settings", 0, setting, what, remedy);
@@ -39,6 +49,23 @@ bool sharesLink(const Settings& settings) {
   return true;
 }
 
+std::unique_ptr<ImuLink> makeTopicLink(const Settings& settings, const InputTopics& topics, double rate) {
+  if (!settings.imu_link.device.empty()) {
+    failAt("imu_link.topic", "named beside imu_link.device, and an IMU has one origin",
+           "Leave one of them out");
+  }
+  if (topics.imu.empty()) {
+    failAt("imu_link.accel_topic", "the accelerometer's topic alone",
+           "Name the gyroscope's in imu_link.topic; a topic with both needs no accel_topic");
+  }
+  TopicImuSettings link;
+  link.network = inputNetwork(settings);
+  link.topic = topics.imu;
+  link.accel_topic = topics.accel;
+  link.rate = rate;
+  return std::make_unique<TopicImuLink>(std::move(link));
+}
+
 std::unique_ptr<ImuLink> makeImuLink(const ImuLinkGroup& settings, double rate, LinkOutbox* outbox) {
   if (settings.protocol == "dronecan") return std::make_unique<CanImuLink>(settings);
   if (settings.protocol != "mavlink" && udpAddress(settings.device, "imu_link.device")) {
@@ -52,21 +79,33 @@ std::unique_ptr<ImuLink> makeImuLink(const ImuLinkGroup& settings, double rate, 
 struct CameraOrigin {
   const char* device_key;
   const char* pipeline_key;
+  const char* topic_key;
   const std::string& device;
   const std::string& pipeline;
+  const std::string& topic;
 
-  [[nodiscard]] bool named() const { return !device.empty() || !pipeline.empty(); }
+  [[nodiscard]] bool named() const { return !device.empty() || !pipeline.empty() || !topic.empty(); }
+  /// The key that names it.
+  [[nodiscard]] const char* key() const {
+    if (!topic.empty()) return topic_key;
+    return pipeline.empty() ? device_key : pipeline_key;
+  }
   /// For messages: a pipeline's first words.
   [[nodiscard]] std::string name() const {
     constexpr std::size_t kMost = 40;
+    if (!topic.empty()) return topic;
     if (pipeline.size() <= kMost) return pipeline.empty() ? device : pipeline;
     return pipeline.substr(0, kMost) + "...";
   }
 };
 
-CameraOrigin originOf(const CamerasGroup& group, std::size_t index) {
-  if (index == 0) return {"cameras.device0", "cameras.pipeline0", group.device0, group.pipeline0};
-  return {"cameras.device1", "cameras.pipeline1", group.device1, group.pipeline1};
+CameraOrigin originOf(const CamerasGroup& group, const InputTopics& topics, std::size_t index) {
+  if (index == 0) {
+    return {"cameras.device0", "cameras.pipeline0", "cameras.topic0",
+            group.device0,     group.pipeline0,     topics.camera[0]};
+  }
+  return {"cameras.device1", "cameras.pipeline1", "cameras.topic1",
+          group.device1,     group.pipeline1,     topics.camera[1]};
 }
 
 CameraDeviceSettings deviceSettings(const CamerasGroup& group, const std::string& path, int width,
@@ -82,14 +121,26 @@ CameraDeviceSettings deviceSettings(const CamerasGroup& group, const std::string
   return device;
 }
 
-std::unique_ptr<CameraSource> makeSource(const CamerasGroup& group, const CameraOrigin& origin, int width,
+std::unique_ptr<CameraSource> makeSource(const Settings& settings, const CameraOrigin& origin, int width,
                                          int height) {
-  if (origin.pipeline.empty()) {
+  const CamerasGroup& group = settings.cameras;
+  if (!origin.device.empty()) {
     return std::make_unique<CameraDevice>(deviceSettings(group, origin.device, width, height));
   }
-  PipelineSettings pipeline{origin.pipeline, width, height, group.rate_hz, {}};
-  if (group.exposure_ms > 0) pipeline.exposure = Duration::fromSeconds(group.exposure_ms * kFromMs);
-  return std::make_unique<PipelineSource>(std::move(pipeline));
+  std::optional<Duration> exposure;
+  if (group.exposure_ms > 0) exposure = Duration::fromSeconds(group.exposure_ms * kFromMs);
+  if (!origin.topic.empty()) {
+    TopicCameraSettings camera;
+    camera.network = inputNetwork(settings);
+    camera.topic = origin.topic;
+    camera.width = width;
+    camera.height = height;
+    camera.rate = group.rate_hz;
+    camera.exposure = exposure;
+    return std::make_unique<TopicCamera>(std::move(camera));
+  }
+  return std::make_unique<PipelineSource>(
+      PipelineSettings{origin.pipeline, width, height, group.rate_hz, exposure});
 }
 
 /// Both cameras come from device0 or pipeline0, in the halves of one image or pixel beside pixel.
@@ -99,55 +150,61 @@ bool twoInOne(const CamerasGroup& group) {
 }
 
 /// One origin a camera, and no setting that means nothing to it.
-void checkOrigins(const CamerasGroup& group) {
+void checkOrigins(const CamerasGroup& group, const InputTopics& topics) {
   bool any_device = false;
   for (std::size_t i = 0; i < kMaxCameras; ++i) {
-    const CameraOrigin origin = originOf(group, i);
+    const CameraOrigin origin = originOf(group, topics, i);
     any_device = any_device || !origin.device.empty();
-    if (origin.device.empty() || origin.pipeline.empty()) continue;
-    failAt(origin.pipeline_key,
-           fmt::format("named beside {}, and a camera has one origin", origin.device_key),
+    const int origins = static_cast<int>(!origin.device.empty()) +
+                        static_cast<int>(!origin.pipeline.empty()) + static_cast<int>(!origin.topic.empty());
+    if (origins < 2) continue;
+    failAt(origin.key(),
+           fmt::format("named beside {}, and a camera has one origin",
+                       origin.device.empty() ? origin.pipeline_key : origin.device_key),
            "Leave one of them out");
   }
-  if (!originOf(group, 0).named()) {
-    failAt("cameras.device0", "no camera is named",
-           "Name its video node (`swiftlet doctor` lists them), or a pipeline in cameras.pipeline0");
+  if (!originOf(group, topics, 0).named()) {
+    failAt(
+        "cameras.device0", "no camera is named",
+        "Name its video node (`swiftlet doctor` lists them), a pipeline in cameras.pipeline0, or a topic in "
+        "cameras.topic0");
   }
   if (any_device) return;
   if (group.format != kAnyFormat) {
-    failAt("cameras.format", "is for video nodes, and the settings name pipelines only",
-           "Write the format into the pipeline, as `! video/x-raw,format=NV12`");
+    failAt("cameras.format", "is for video nodes, and the settings name none",
+           "Write the format into the pipeline, as `! video/x-raw,format=NV12`; topics say theirs");
   }
   if (group.gain >= 0) {
-    failAt("cameras.gain", "is for video nodes, and the settings name pipelines only",
-           "Set the gain by the pipeline's source element");
+    failAt("cameras.gain", "is for video nodes, and the settings name none",
+           "Set the gain by the pipeline's source element, or by the topic's driver");
   }
 }
 
-void checkCameras(const CamerasGroup& group, const Rig& rig) {
-  checkOrigins(group);
+void checkCameras(const CamerasGroup& group, const InputTopics& topics, const Rig& rig) {
+  checkOrigins(group, topics);
   if (group.format != kAnyFormat && !pixelFormat(group.format)) {
     failAt("cameras.format", group.format + " is no format that is taken",
            "docs/v4l2.md lists those that are; `any` takes the first that the camera offers");
   }
   const bool two_in_one = twoInOne(group);
-  const CameraOrigin other = originOf(group, 1);
+  const CameraOrigin other = originOf(group, topics, 1);
   const bool second = two_in_one || other.named();
   if (rig.camera_count == 2 && !second) {
-    failAt("cameras.device1", "the calibration has two cameras, the settings name one",
-           "Name the second's video node or pipeline, or set cameras.side_by_side where one gives both");
+    failAt(
+        "cameras.device1", "the calibration has two cameras, the settings name one",
+        "Name the second's video node, pipeline or topic, or set cameras.side_by_side where one gives both");
   }
   if (rig.camera_count == 1 && second) {
-    failAt("vehicle.calibration", "the settings name two cameras, the calibration has one",
-           "Calibrate both, or leave cameras.device1, cameras.pipeline1 and cameras.side_by_side out");
+    failAt(
+        "vehicle.calibration", "the settings name two cameras, the calibration has one",
+        fmt::format("Calibrate both, or leave {} out", other.named() ? other.key() : "cameras.side_by_side"));
   }
   if (!two_in_one && !group.device1.empty() && group.device0 == group.device1) {
     failAt("cameras.device1", "the same video node as cameras.device0",
            "Name the other camera's; set cameras.side_by_side where one node gives both");
   }
   if (two_in_one && other.named()) {
-    failAt(other.pipeline.empty() ? other.device_key : other.pipeline_key,
-           "named beside the one that gives both cameras",
+    failAt(other.key(), "named beside the one that gives both cameras",
            group.side_by_side ? "Leave it or cameras.side_by_side out"
                               : "Leave it out, or choose another cameras.format");
   }
@@ -161,12 +218,16 @@ void checkCameras(const CamerasGroup& group, const Rig& rig) {
 }  // namespace
 
 LiveInput::LiveInput(const Settings& settings, const Calibration& calibration) {
-  if (settings.imu_link.device.empty()) {
-    failAt("imu_link.device", "no IMU is named",
-           "Name its serial port or CAN interface; `swiftlet doctor` lists them");
+  const InputTopics topics = inputTopics(settings, calibration.rig.camera_count);
+  const bool imu_topics = !topics.imu.empty() || !topics.accel.empty();
+  topics_ = topics.any();
+  if (settings.imu_link.device.empty() && !imu_topics) {
+    failAt(
+        "imu_link.device", "no IMU is named",
+        "Name its serial port or CAN interface (`swiftlet doctor` lists them), or a topic in imu_link.topic");
   }
-  if (settings.trigger.chip == kTriggerByImu && settings.imu_link.protocol == "dronecan") {
-    failAt("trigger.chip", "dronecan tells of no edges",
+  if (settings.trigger.chip == kTriggerByImu && (imu_topics || settings.imu_link.protocol == "dronecan")) {
+    failAt("trigger.chip", imu_topics ? "topics tell of no edges" : "dronecan tells of no edges",
            "Name the GPIO chip that sees the trigger, or leave trigger.chip out");
   }
   const Rig& rig = calibration.rig;
@@ -175,18 +236,21 @@ LiveInput::LiveInput(const Settings& settings, const Calibration& calibration) {
     cameras.shutter = kRolling;
     cameras.readout_ms = rig.readout.seconds() / kFromMs;
   }
-  checkCameras(cameras, rig);
+  checkCameras(cameras, topics, rig);
   // A sensor that is set loses what else it sends, edges too.
   const bool keeps_edges = settings.trigger.chip == kTriggerByImu && settings.imu_link.protocol != "mavlink";
   const double asked_rate = keeps_edges ? 0 : calibration.noise.rate_hz;
   if (sharesLink(settings)) outbox_ = std::make_unique<LinkOutbox>();
   imu_ = std::make_unique<ImuThread>(
-      fmt::format("IMU ({}, {})", settings.imu_link.device, settings.imu_link.protocol),
-      makeImuLink(settings.imu_link, asked_rate, outbox_.get()), calibration.R_body_imu,
-      Duration::fromSeconds(settings.imu_link.delay_ms * kFromMs), calibration.noise.rate_hz);
+      imu_topics ? fmt::format("IMU ({})", topics.imu)
+                 : fmt::format("IMU ({}, {})", settings.imu_link.device, settings.imu_link.protocol),
+      imu_topics ? makeTopicLink(settings, topics, calibration.noise.rate_hz)
+                 : makeImuLink(settings.imu_link, asked_rate, outbox_.get()),
+      calibration.R_body_imu, Duration::fromSeconds(settings.imu_link.delay_ms * kFromMs),
+      calibration.noise.rate_hz);
   const std::size_t nodes = twoInOne(cameras) ? 1 : rig.camera_count;
   for (std::size_t i = 0; i < nodes; ++i) {
-    const CameraOrigin origin = originOf(cameras, i);
+    const CameraOrigin origin = originOf(cameras, topics, i);
     CameraThread::Setup setup;
     setup.name = fmt::format("camera {} ({})", nodes < rig.camera_count ? "0 and 1" : std::to_string(i),
                              origin.name());
@@ -199,7 +263,7 @@ LiveInput::LiveInput(const Settings& settings, const Calibration& calibration) {
                         &imu_->turnRate()};
     }
     cameras_.push_back(std::make_unique<CameraThread>(
-        setup, makeSource(cameras, origin, halves * rig.camera[i].width(), rig.camera[i].height())));
+        setup, makeSource(settings, origin, halves * rig.camera[i].width(), rig.camera[i].height())));
     edge_rings_.push_back(&cameras_.back()->edges());
   }
   if (settings.trigger.chip == kTriggerByImu) {
@@ -233,7 +297,7 @@ LiveInput::Opened LiveInput::open() {
 std::vector<SensorInput::Thread> LiveInput::threads(SensorSink& sink, const RunControl& control) {
   static constexpr std::array<const char*, kMaxCameras> kCameraThreads = {"camera0", "camera1"};
   std::vector<Thread> threads;
-  threads.push_back({"imu", Level::kSensor,
+  threads.push_back({"imu", imu_->level(),
                      [this, &sink, &control] {
                        imu_->run(sink,
                                  edges_by_imu_ ? std::span<EdgeRing* const>(edge_rings_)
@@ -252,6 +316,8 @@ std::vector<SensorInput::Thread> LiveInput::threads(SensorSink& sink, const RunC
   }
   return threads;
 }
+
+Duration LiveInput::samplePatience() const { return topics_ ? kTopicPatience : kLinkPatience; }
 
 void LiveInput::look(FlightFacts& facts) const {
   if (!trigger_) return;

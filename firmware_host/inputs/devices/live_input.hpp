@@ -1,6 +1,6 @@
 #pragma once
-// The vehicle's devices as the input of a threaded run: one thread each for the IMU, every video node or
-// pipeline and the trigger line, as the settings name them.
+// The vehicle's devices as the input of a threaded run: one thread each for the IMU, every video node,
+// pipeline or topic and the trigger line, as the settings name them.
 //
 // All devices must be there when the flight begins; in flight each may go and return, fall silent or send
 // garbage, and the others go on. What happens to them goes to the log, by name and with the remedy.
@@ -42,6 +42,8 @@ class LiveInput : public SensorInput {
   /// The trigger's edges.
   void look(FlightFacts& facts) const override;
   [[nodiscard]] std::uint64_t taken() const override;
+  /// How long a frame waits for the samples that belong to it.
+  [[nodiscard]] Duration samplePatience() const;
 
   /// Of one thread: what happened to devices since, as lines for the user. True: there was something.
   bool drainEvents(const std::function<void(Stamp, const std::string&)>& take);
@@ -65,6 +67,7 @@ class LiveInput : public SensorInput {
   std::unique_ptr<TriggerThread> trigger_;
   std::vector<EdgeRing*> edge_rings_;  ///< one a camera's thread
   bool edges_by_imu_ = false;
+  bool topics_ = false;  ///< any device is a topic
 };
 
 }  // namespace swiftlet

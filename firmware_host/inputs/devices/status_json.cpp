@@ -45,11 +45,9 @@ Json toJson(const TimesyncStatus& status) {
 }
 
 Json toJson(const ImuStatus& status) {
-  return {{"samples", status.samples},
-          {"refused", status.refused},
-          {"by_exchange", status.by_exchange},
-          {"by_arrival", status.by_arrival},
-          {"clock", toJson(status.clock)}};
+  return {{"samples", status.samples},         {"refused", status.refused},
+          {"by_exchange", status.by_exchange}, {"by_arrival", status.by_arrival},
+          {"by_driver", status.by_driver},     {"clock", toJson(status.clock)}};
 }
 
 Json toJson(const CameraStatus& status) {
@@ -57,6 +55,12 @@ Json toJson(const CameraStatus& status) {
   Json json = {{"frames", c.frames},         {"missed", c.missed},           {"damaged", c.damaged},
                {"too_short", c.too_short},   {"stamp_ahead", c.stamp_ahead}, {"reopened", c.reopened},
                {"repeated", status.repeated}};
+  if (c.stale + c.wrong_clock + c.lost + c.overrun > 0) {
+    json["stale"] = c.stale;
+    json["wrong_clock"] = c.wrong_clock;
+    json["lost_on_the_way"] = c.lost;
+    json["overrun"] = c.overrun;
+  }
   if (status.asked) {
     json["exposure_ms"] = status.asked->exposure.seconds() * kToMs;
     json["gain"] = status.asked->gain;

@@ -1,0 +1,81 @@
+#pragma once
+// An IMU behind ROS 2 topics: one sensor_msgs/Imu, or a gyroscope's and an accelerometer's apart
+// (drivers/timesync/accel_at_gyro.hpp), as cameras with an IMU publish them.
+//
+// Stamps: the headers', CLOCK_REALTIME, on CLOCK_MONOTONIC (drivers/timesync/wall_stamps.hpp). Left out and
+// counted: samples that are not finite, of another clock, or not newer than the one before. Losses: holes of
+// the stamps up to a second, at `rate`. After kMostBad samples running that are of no use the link closes
+// with what is wrong. open() waits for a sample: first for seconds, in flight for a tenth of one. It
+// allocates and locks: not for a thread of the flight path.
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "drivers/dds/topic_reader.hpp"
+#include "drivers/timesync/accel_at_gyro.hpp"
+#include "drivers/timesync/wall_stamps.hpp"
+#include "firmware_host/inputs/devices/imu_link.hpp"
+
+namespace swiftlet {
+
+struct TopicImuSettings {
+  DdsNetwork network;
+  std::string topic;        ///< of the IMU, or of the gyroscope
+  std::string accel_topic;  ///< empty: `topic` has both
+  double rate = 0;          ///< samples a second; 0: losses are not counted
+  /// For the first sample. Discovery takes some tenths of a second, a driver's start longer.
+  Duration patience = Duration::fromMilliseconds(3000);
+  std::function<HostClocks()> read_clocks = readHostClocks;  ///< another one in tests
+};
+
+class TopicImuLink : public ImuLink {
+ public:
+  static constexpr int kMostBad = 20;
+
+  explicit TopicImuLink(TopicImuSettings settings);
+
+  DeviceFault open() override;
+  [[nodiscard]] bool isOpen() const override { return open_; }
+  [[nodiscard]] bool allocates() const override { return true; }
+  [[nodiscard]] int fd() const override { return bell_.fd(); }
+  void discard() override;
+  DeviceFault receive(Stamp now) override;
+  bool next(ImuReading& reading) override;
+  bool nextRemark(DeviceFault& remark) override;
+  [[nodiscard]] std::uint64_t received() const override { return came_; }
+  [[nodiscard]] std::string stream() const override;
+  [[nodiscard]] nlohmann::ordered_json counters() const override;
+
+ private:
+  struct Stream {
+    std::string topic;
+    TopicReader reader;
+    WallStamps stamps;
+  };
+
+  [[nodiscard]] bool apart() const { return !settings_.accel_topic.empty(); }
+  DeviceFault prepare();
+  /// A message of one stream; a fault: it is of no use.
+  DeviceFault takeOne(Stream& stream, const TopicImu& message);
+  [[nodiscard]] DeviceFault judge(const TopicImu& message) const;
+  [[nodiscard]] DeviceFault silent() const;
+  void countHole(Stamp stamp);
+
+  TopicImuSettings settings_;
+  std::shared_ptr<DdsDomain> domain_;
+  TopicBell bell_;
+  Stream imu_;    ///< both, or the gyroscope
+  Stream accel_;  ///< where it is apart
+  AccelAtGyro joined_;
+  std::optional<DeviceFault> remark_;
+  std::optional<Stamp> newest_;  ///< of the gyroscope
+  Stamp now_;
+  int bad_ = 0;  ///< running
+  bool open_ = false;
+  bool opened_ = false;  // ever
+  std::uint64_t came_ = 0, samples_ = 0, missing_ = 0, damaged_ = 0, wrong_clock_ = 0, unsure_ = 0;
+};
+
+}  // namespace swiftlet
