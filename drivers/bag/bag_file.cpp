@@ -10,7 +10,7 @@
 #include "drivers/bag/rosbag2_folder.hpp"
 #include "drivers/bag/sqlite_bag.hpp"
 #include "drivers/bag/unpack.hpp"
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
 namespace {

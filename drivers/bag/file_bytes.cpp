@@ -9,7 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
 namespace {

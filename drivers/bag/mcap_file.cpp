@@ -11,8 +11,8 @@
 #include "drivers/bag/file_bytes.hpp"
 #include "drivers/bag/mcap_records.hpp"
 #include "drivers/bag/unpack.hpp"
-#include "drivers/calibration/input_error.hpp"
 #include "drivers/device/byte_fields.hpp"
+#include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
 namespace {

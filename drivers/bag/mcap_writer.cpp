@@ -15,7 +15,7 @@
 #include "drivers/bag/mcap_records.hpp"
 #include "drivers/bag/qos_text.hpp"
 #include "drivers/bag/unpack.hpp"
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
 namespace {

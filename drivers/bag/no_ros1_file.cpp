@@ -1,7 +1,7 @@
 // Stands in for ros1_file.cpp in builds without rosbag-storage.
 
 #include "drivers/bag/ros1_file.hpp"
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
 

@@ -5,7 +5,7 @@
 
 #include <cstring>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
 namespace {

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
 namespace {

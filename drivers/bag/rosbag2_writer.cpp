@@ -10,7 +10,7 @@
 #include "drivers/bag/bag_writer.hpp"
 #include "drivers/bag/qos_text.hpp"
 #include "drivers/bag/sqlite_database.hpp"
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
 namespace {

@@ -8,8 +8,8 @@
 #include "drivers/bag/file_bytes.hpp"
 #include "drivers/bag/sqlite_database.hpp"
 #include "drivers/bag/unpack.hpp"
-#include "drivers/calibration/input_error.hpp"
 #include "drivers/device/byte_fields.hpp"
+#include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
 namespace {

@@ -12,7 +12,7 @@
 #include <memory>
 #include <stdexcept>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
 namespace {

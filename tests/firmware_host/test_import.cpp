@@ -91,19 +91,6 @@ TEST_CASE("a payload that is cut anywhere is refused", "[import]") {
   for (std::size_t n = 1; n < whole.size(); ++n) CHECK(!readGpmf(std::span(whole).first(n)));
 }
 
-TEST_CASE("an accelerometer is interpolated to the gyro's stamps, never over a gap", "[import]") {
-  const auto at = [](double ms) { return Stamp{Duration::fromSeconds(ms * 1e-3).ns}; };
-  std::vector<StampedVector> gyro, accel;
-  for (int i = 0; i < 40; ++i) gyro.push_back({at(5 * i), {i + 0.0, 0, 0}});
-  for (const double ms : {8.0, 18.0, 28.0, 150.0, 160.0}) accel.push_back({at(ms), {ms, 0, 0}});
-  const std::vector<ImuSample> samples = joinImu(gyro, accel);
-  REQUIRE(samples.size() == 7);  // 10, 15, 20, 25 ms, then 150, 155, 160
-  for (const ImuSample& sample : samples) {
-    CHECK(sample.accel.x() == Approx(1e-6 * static_cast<double>(sample.stamp.ns)));
-    CHECK(sample.gyro.x() == Approx(static_cast<double>(sample.stamp.ns) / 5e6));
-  }
-}
-
 TEST_CASE("a phone's lines are read, and a broken one is named", "[import]") {
   std::string text;
   for (int i = 0; i < 20; ++i) {

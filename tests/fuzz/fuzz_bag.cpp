@@ -9,7 +9,7 @@
 #include "drivers/bag/mcap_file.hpp"
 #include "drivers/bag/message_coder.hpp"
 #include "drivers/bag/rosbag2_folder.hpp"
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/grey_copier.hpp"
 #include "tests/fuzz/demand.hpp"
 

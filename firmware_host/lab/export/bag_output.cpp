@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "drivers/bag/ros1_file.hpp"
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/files/new_folder.hpp"
 #include "firmware_host/files/whole_file.hpp"
 

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/log_messages.hpp"
 #include "firmware_host/lab/export/bag_messages.hpp"
 

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "drivers/input/input_error.hpp"
+#include "drivers/recorded/join_imu.hpp"
 #include "firmware_host/lab/import/gpmf.hpp"
 
 namespace swiftlet {
@@ -18,7 +19,6 @@ using Json = nlohmann::json;
 
 constexpr const char* kPhoneRemedy =
     "A line is {\"time\": s, \"sensor\": {\"type\": \"gyroscope\", \"values\": [x, y, z]}}";
-constexpr Duration kLongestGap = Duration::fromMilliseconds(100);  // between two samples of an accelerometer
 
 /// Times of samples from how many there were at certain times.
 ///
@@ -49,9 +49,18 @@ class CountLine {
   double begin_ = 0;
 };
 
-std::vector<StampedVector> dated(const std::string& name, const std::vector<MetadataPacket>& packets,
-                                 const std::vector<GpmfPayload>& payloads, GpmfChannel GpmfPayload::*which,
-                                 const char* what, Stamp zero) {
+/// Of one sensor: the value stands for the gyro's and the accelerometer's.
+ImuSample both(Stamp stamp, const Eigen::Vector3d& value) {
+  ImuSample sample;
+  sample.stamp = stamp;
+  sample.gyro = value;
+  sample.accel = value;
+  return sample;
+}
+
+std::vector<ImuSample> dated(const std::string& name, const std::vector<MetadataPacket>& packets,
+                             const std::vector<GpmfPayload>& payloads, GpmfChannel GpmfPayload::*which,
+                             const char* what, Stamp zero) {
   CountLine line;
   std::vector<std::pair<double, Eigen::Vector3d>> counted;
   double count = 0;
@@ -68,8 +77,9 @@ std::vector<StampedVector> dated(const std::string& name, const std::vector<Meta
     throw InputError(name, 0, "", fmt::format("its metadata hold no {}", what),
                      "Give the IMU's samples in a csv file: `swiftlet import VIDEO IMU.csv`");
   }
-  std::vector<StampedVector> samples;
-  for (const auto& [n, value] : counted) samples.push_back({zero + Duration::fromSeconds(line.at(n)), value});
+  std::vector<ImuSample> samples;
+  for (const auto& [n, value] : counted)
+    samples.push_back(both(zero + Duration::fromSeconds(line.at(n)), value));
   return samples;
 }
 
@@ -83,29 +93,6 @@ std::optional<Stamp> stampOf(const Json& json) {
 
 }  // namespace
 
-std::vector<ImuSample> joinImu(const std::vector<StampedVector>& gyro,
-                               const std::vector<StampedVector>& accel) {
-  std::vector<ImuSample> samples;
-  for (const StampedVector& turn : gyro) {
-    const auto after = std::ranges::lower_bound(accel, turn.stamp, {}, &StampedVector::stamp);
-    if (after == accel.end()) break;
-    ImuSample sample;
-    sample.stamp = turn.stamp;
-    sample.gyro = turn.value;
-    sample.accel = after->value;
-    if (after->stamp != turn.stamp) {
-      if (after == accel.begin()) continue;
-      const auto before = std::prev(after);
-      const Duration gap = after->stamp - before->stamp;
-      if (gap > kLongestGap) continue;
-      const double part = (turn.stamp - before->stamp).seconds() / gap.seconds();
-      sample.accel = before->value + part * (after->value - before->value);
-    }
-    samples.push_back(sample);
-  }
-  return samples;
-}
-
 std::vector<ImuSample> goproImu(const std::string& name, const std::vector<MetadataPacket>& packets,
                                 Stamp zero) {
   std::vector<GpmfPayload> payloads;
@@ -117,14 +104,15 @@ std::vector<ImuSample> goproImu(const std::string& name, const std::vector<Metad
     }
     payloads.push_back(std::move(*payload));
   }
+  std::uint64_t left_out = 0;
   return joinImu(dated(name, packets, payloads, &GpmfPayload::gyro, "gyro", zero),
-                 dated(name, packets, payloads, &GpmfPayload::accel, "accelerometer", zero));
+                 dated(name, packets, payloads, &GpmfPayload::accel, "accelerometer", zero), left_out);
 }
 
 PhoneLog readPhoneLog(const std::string& name, std::string_view text) {
   PhoneLog log;
-  std::vector<StampedVector> gyro;
-  std::vector<StampedVector> accel;
+  std::vector<ImuSample> gyro;
+  std::vector<ImuSample> accel;
   int line = 0;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
@@ -141,7 +129,7 @@ PhoneLog readPhoneLog(const std::string& name, std::string_view text) {
         const auto values = sensor.at("values").get<std::array<double, 3>>();
         const std::optional<Stamp> stamp = stampOf(json);
         if (!stamp) throw InputError(name, line, "time", "is no time in seconds", kPhoneRemedy);
-        (type == "gyroscope" ? gyro : accel).push_back({*stamp, {values[0], values[1], values[2]}});
+        (type == "gyroscope" ? gyro : accel).push_back(both(*stamp, {values[0], values[1], values[2]}));
       } else if (json.contains("frames")) {
         for (const Json& frame : json.at("frames")) {
           const std::size_t camera = frame.value("cameraInd", std::size_t{0});
@@ -156,9 +144,10 @@ PhoneLog readPhoneLog(const std::string& name, std::string_view text) {
     }
   }
   // Phones write each sensor in bursts.
-  std::ranges::stable_sort(gyro, {}, &StampedVector::stamp);
-  std::ranges::stable_sort(accel, {}, &StampedVector::stamp);
-  log.samples = joinImu(gyro, accel);
+  std::ranges::stable_sort(gyro, {}, &ImuSample::stamp);
+  std::ranges::stable_sort(accel, {}, &ImuSample::stamp);
+  std::uint64_t left_out = 0;
+  log.samples = joinImu(gyro, accel, left_out);
   if (log.samples.empty()) {
     throw InputError(name, 0, "", "holds no gyroscope beside an accelerometer",
                      "Record both; lines are {\"time\": s, \"sensor\": {...}}");

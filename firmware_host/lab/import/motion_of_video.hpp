@@ -18,15 +18,6 @@
 
 namespace swiftlet {
 
-struct StampedVector {
-  Stamp stamp;
-  Eigen::Vector3d value;
-};
-
-/// A sample for each of the gyro's that lies within the accelerometer's. Both in time order.
-std::vector<ImuSample> joinImu(const std::vector<StampedVector>& gyro,
-                               const std::vector<StampedVector>& accel);
-
 /// Stamps: `zero` is the file's time zero. `name` stands for the file in messages.
 std::vector<ImuSample> goproImu(const std::string& name, const std::vector<MetadataPacket>& packets,
                                 Stamp zero);

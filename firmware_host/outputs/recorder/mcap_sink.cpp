@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/log_messages.hpp"
 
 namespace swiftlet {

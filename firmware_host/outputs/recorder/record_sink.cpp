@@ -3,7 +3,7 @@
 #include <exception>
 #include <utility>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/interfaces/packed_copy.hpp"
 #include "firmware_host/realtime/host_sleep.hpp"
 

@@ -10,7 +10,7 @@
 
 #include "drivers/bag/bag_file.hpp"
 #include "drivers/bag/bag_writer.hpp"
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 
 namespace swiftlet::test {
 

@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 #include <string>
 
-#include "drivers/calibration/input_error.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/inputs/devices/input_topics.hpp"
 #include "firmware_host/inputs/devices/live_input.hpp"
 
