@@ -23,10 +23,10 @@ constexpr PixelFormat kPicture = {{"JPEG"}, PixelLayout::kJpeg};
 
 bool isPicture(std::string_view topic) { return topic.ends_with("/compressed"); }
 
-template <std::size_t N>
-void copyInto(std::array<char, N>& to, std::string_view from) {
+template <std::size_t kSize>
+void copyInto(std::array<char, kSize>& to, std::string_view from) {
   to = {};
-  from.copy(to.data(), N - 1);
+  from.copy(to.data(), kSize - 1);
 }
 
 }  // namespace
