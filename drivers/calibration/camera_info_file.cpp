@@ -53,6 +53,7 @@ Calibration parseCameraInfoCalibration(const std::vector<NamedText>& cameras, co
   const YamlField imu_root = parseImu(imu);
   const bool rectified = readsRectified(imu_root);
   std::vector<InfoFile> files;
+  files.reserve(cameras.size());
   for (const NamedText& camera : cameras) files.push_back(readInfo(camera));
   // The camera with a baseline is the second one, whatever the files are called.
   if (files.size() == 2 && files[0].info.P[3] != 0 && files[1].info.P[3] == 0) std::swap(files[0], files[1]);

@@ -77,6 +77,7 @@ LensFit storedLens(const YamlField& K_field, const YamlField& D_field, const std
 Calibration parseOpenCvCalibration(const std::vector<NamedText>& texts, const NamedText& imu,
                                    const CalibrationOptions& options) {
   std::vector<YamlField> files;
+  files.reserve(texts.size());
   for (const NamedText& text : texts) files.push_back(YamlField::parse(text.name, text.text));
   const YamlField imu_root = parseImu(imu);
   BareCameras bare;

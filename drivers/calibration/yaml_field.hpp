@@ -40,8 +40,8 @@ class YamlField {
   [[nodiscard]] InputPlace place() const { return {*file_, line_, name_}; }
 
  private:
-  YamlField(std::shared_ptr<const std::string> file, std::string name, YAML::Node node, int line)
-      : file_(std::move(file)), name_(std::move(name)), node_(std::move(node)), line_(line) {}
+  YamlField(std::shared_ptr<const std::string> file, std::string name, const YAML::Node& node, int line)
+      : file_(std::move(file)), name_(std::move(name)), node_(node), line_(line) {}
 
   std::shared_ptr<const std::string> file_;
   std::string name_;  ///< dotted path from the root
