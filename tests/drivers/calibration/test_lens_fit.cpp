@@ -239,7 +239,7 @@ SourceLens fieldOfView(Random& random) {
 struct ModelCase {
   const char* name;
   SourceLens (*make)(Random&);
-  double least_accepted;  ///< share of the random cameras
+  double least_accepted;  ///< share of a thousand random cameras
 };
 
 double quantile(std::vector<double> values, double share) {
@@ -271,15 +271,16 @@ void checkAgainstOracle(Random& random, const SourceLens& lens, const LensFit& f
   constexpr double kBetweenRays = 1.1;
   constexpr double kRounding = 1e-5;
   CHECK(max <= kBetweenRays * fit.max + kRounding);
-  constexpr double kSampling = 1.5;  // of an RMS that few pixels in the corners make
-  CHECK(std::sqrt(sum / seen) <= kSampling * fit.rms + kRounding);
+  // The pixels are few: one of them may be the worst corner.
+  constexpr double kSampling = 1.5;
+  CHECK(std::sqrt(sum / seen) <= std::hypot(kSampling * fit.rms, fit.max / std::sqrt(seen)) + kRounding);
 }
 
 TEST_CASE("random cameras of every model: the residual is as stated", "[lens_fit][long]") {
   const ModelCase model =
-      GENERATE(ModelCase{"plumb_bob", &plumbBob, 0.5}, ModelCase{"rational_polynomial", &rational, 0.5},
-               ModelCase{"OpenCV 14", &fourteen, 0.5}, ModelCase{"equidistant", &equidistant, 0.99},
-               ModelCase{"omni-radtan", &omni, 0.5}, ModelCase{"ds", &doubleSphere, 0.99},
+      GENERATE(ModelCase{"plumb_bob", &plumbBob, 0.92}, ModelCase{"rational_polynomial", &rational, 0.91},
+               ModelCase{"OpenCV 14", &fourteen, 0.72}, ModelCase{"equidistant", &equidistant, 0.99},
+               ModelCase{"omni-radtan", &omni, 0.93}, ModelCase{"ds", &doubleSphere, 0.99},
                ModelCase{"eucm", &extendedUnified, 0.99}, ModelCase{"fov", &fieldOfView, 0.99});
   Random random(35);
   std::vector<double> rms;
@@ -311,7 +312,8 @@ TEST_CASE("random cameras of every model: the residual is as stated", "[lens_fit
       model.name, cameras, 100 * accepted, 100 * static_cast<double>(below) / cameras, partly,
       quantile(rms, 0.5), quantile(rms, 0.95), quantile(rms, 1), quantile(max, 0.5), quantile(max, 0.95),
       quantile(max, 1));
-  CHECK(accepted >= model.least_accepted);
+  constexpr double kFew = 0.5;  // of a dozen
+  CHECK(accepted >= longOr(model.least_accepted, kFew));
 }
 
 }  // namespace
