@@ -4,7 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
+#include <cstdint>
+#include <initializer_list>
+#include <sstream>
 
 #include "drivers/recorded/order_by_stamp.hpp"
 #include "drivers/recorded/parse_number.hpp"
@@ -15,18 +19,38 @@ namespace {
 constexpr std::array<const char*, 3> kGyroNames = {"gyro x", "gyro y", "gyro z"};
 constexpr std::array<const char*, 3> kAccelNames = {"accel x", "accel y", "accel z"};
 
-// The norm of the specific force has a median near 9.81 on any vehicle that hovers, flies or stands;
-// the bounds leave room for 40 % scale error and sustained manoeuvres.
-constexpr double kGravityLow = 6;
-constexpr double kGravityHigh = 16;
-constexpr double kInG = 2;             // m/s^2; below this the unit is g
 constexpr double kGyroPlausible = 10;  // rad/s, median; above it the unit is deg/s
 constexpr std::size_t kMaxProbed = 4000;
 
+enum class Sensor : std::uint8_t { kOther, kGyro, kAccel };
+
+/// What a column's name says: "w_RS_S_x", "gx", "omega_x", "angular_velocity.x" or "a_RS_S_x", "ax", "acc_x",
+/// "linear_acceleration.x", in any case, with or without a unit.
+Sensor sensorOf(std::string name) {
+  std::erase_if(name, [](unsigned char c) { return std::isspace(c) != 0 || c == '"' || c == '#'; });
+  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const auto begins = [&name](std::initializer_list<const char*> words) {
+    return std::ranges::any_of(words, [&name](const char* word) { return name.starts_with(word); });
+  };
+  if (begins({"w_", "wx", "wy", "wz", "g_", "gx", "gy", "gz", "gyr", "omega", "ang", "rot", "imu_gyr"})) {
+    return Sensor::kGyro;
+  }
+  if (begins({"a_", "ax", "ay", "az", "acc", "lin", "spec", "f_", "imu_acc"})) return Sensor::kAccel;
+  return Sensor::kOther;
+}
+
+/// True where the names of the first three columns after the stamp are the accelerometer's, and the next the
+/// gyro's.
 bool accelFirst(const std::string& header) {
-  const std::size_t accel = std::min(header.find("a_RS"), header.find("acc"));
-  const std::size_t gyro = std::min({header.find("w_RS"), header.find("gyr"), header.find("omega")});
-  return accel != std::string::npos && gyro != std::string::npos && accel < gyro;
+  std::size_t accel = 0;
+  std::size_t gyro = 0;
+  std::size_t column = 0;
+  std::istringstream names(header);
+  for (std::string name; std::getline(names, name, ','); ++column) {
+    if (column >= 1 && column <= 3 && sensorOf(name) == Sensor::kAccel) ++accel;
+    if (column >= 4 && column <= 6 && sensorOf(name) == Sensor::kGyro) ++gyro;
+  }
+  return accel == 3 && gyro == 3;
 }
 
 double medianNorm(const std::vector<ImuSample>& samples, Eigen::Vector3d ImuSample::*quantity) {
@@ -67,22 +91,41 @@ void orderSamples(std::vector<ImuSample>& samples, const std::string& name, LogC
   orderByStamp(samples, name, counters, warnings);
 }
 
+ForceLevel forceLevel(const std::vector<ImuSample>& samples) {
+  // A drone's rotors shake at 50 Hz and above.
+  constexpr Duration kMean = Duration::fromMilliseconds(100);
+  std::vector<double> sizes;
+  for (std::size_t i = 0; i < samples.size();) {
+    const Stamp end = samples[i].stamp + kMean;
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    double count = 0;
+    for (; i < samples.size() && samples[i].stamp < end; ++i, ++count) sum += samples[i].accel;
+    sizes.push_back(sum.norm() / count);
+  }
+  std::ranges::sort(sizes);
+  if (sizes.empty()) return {};
+  return {sizes[sizes.size() / 2], sizes[sizes.size() / 10]};
+}
+
 void checkUnits(const std::vector<ImuSample>& samples, const std::string& name, LogWarnings& warnings) {
   if (samples.empty()) return;
-  const double accel = medianNorm(samples, &ImuSample::accel);
+  const ForceLevel force = forceLevel(samples);
   const double gyro = medianNorm(samples, &ImuSample::gyro);
-  if (accel < kGravityLow && gyro > kGravityLow && gyro < kGravityHigh) {
+  const ForceLevel as_gyro{gyro, gyro};
+  if (force.median < gyro && !force.hasGravity() && as_gyro.hasGravity()) {
     throw InputError(
         name, 0, "",
-        fmt::format("the median gyro reading is {:.2f} and the median accel {:.2f}", gyro, accel),
-        "Gyro and accelerometer columns are swapped: gyro comes first");
+        fmt::format("the median gyro reading is {:.2f} and the median accel {:.2f}", gyro, force.median),
+        "Gyro and accelerometer columns are swapped: gyro comes first, or the header names the columns "
+        "(gyro_x, ..., accel_x, ...)");
   }
-  if (accel < kInG && accel > 0.5) {
-    throw InputError(name, 0, "accel", fmt::format("the median specific force is {:.3f}", accel),
+  if (force.inG()) {
+    throw InputError(name, 0, "accel", fmt::format("the median specific force is {:.3f}", force.median),
                      "The unit is m/s^2: is this in g?");
   }
-  if (accel < kGravityLow || accel > kGravityHigh) {
-    warnings.add(name + fmt::format(": the median specific force is {:.2f} m/s^2, far from 9.81", accel));
+  if (!force.hasGravity()) {
+    warnings.add(name +
+                 fmt::format(": the median specific force is {:.2f} m/s^2, far from 9.81", force.median));
   }
   if (gyro > kGyroPlausible) {
     warnings.add(name + fmt::format(": the median rate is {:.1f} rad/s: is the gyro in deg/s?", gyro));

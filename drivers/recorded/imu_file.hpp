@@ -25,6 +25,19 @@ double medianRate(const std::vector<ImuSample>& samples);
 void orderSamples(std::vector<ImuSample>& samples, const std::string& name, LogCounters& counters,
                   LogWarnings& warnings);
 
+/// Sizes of the specific force, without its vibration. With gravity in them they hold still: `low` is near
+/// `median`, whatever the unit. Linear acceleration goes through zero again and again.
+struct ForceLevel {
+  double median = 0;
+  double low = 0;  ///< below which a tenth of them is
+
+  [[nodiscard]] bool steady() const { return low > 0.7 * median; }
+  [[nodiscard]] bool inG() const { return median > 0.5 && median < 2 && steady(); }
+  /// Room for 40 % of scale error and for sustained manoeuvres.
+  [[nodiscard]] bool hasGravity() const { return median > 6 && median < 16; }
+};
+ForceLevel forceLevel(const std::vector<ImuSample>& samples);
+
 /// Refuses samples whose size shows another unit or swapped sensors.
 void checkUnits(const std::vector<ImuSample>& samples, const std::string& name, LogWarnings& warnings);
 

@@ -131,6 +131,26 @@ TEST_CASE("units and column order are watched", "[imu_file]") {
   const Read named("#timestamp [ns],a_RS_S_x,a_RS_S_y,a_RS_S_z,w_RS_S_x,w_RS_S_y,w_RS_S_z\n" + swapped);
   CHECK(named.samples[0].accel == Eigen::Vector3d(9.7, 0.5, -1.25));
   CHECK(anyContains(named.warnings.lines(), "accelerometer first"));
+  for (const char* header :
+       {"timestamp,ax,ay,az,gx,gy,gz", "# t, Accel_x, Accel_y, Accel_z, Gyro_x, Gyro_y, Gyro_z",
+        "time,linear_acceleration.x,linear_acceleration.y,linear_acceleration.z,"
+        "angular_velocity.x,angular_velocity.y,angular_velocity.z",
+        "stamp [ns],a_x [m/s^2],a_y [m/s^2],a_z [m/s^2],w_x [rad/s],w_y [rad/s],w_z [rad/s]"}) {
+    INFO(header);
+    CHECK(Read(std::string(header) + "\n" + swapped).samples[0].accel == Eigen::Vector3d(9.7, 0.5, -1.25));
+  }
+}
+
+TEST_CASE("linear acceleration is not taken for g", "[imu_file]") {
+  std::string linear;
+  for (int i = 0; i < 2000; ++i) {
+    linear += std::to_string(5000000 * (i + 1)) + ",0.1,-0.2,0.3," +
+              std::to_string(1.5 * std::sin(0.01 * i)) + ",0.05,-0.1\n";
+  }
+  const Read read(linear);
+  CHECK(forceLevel(read.samples).median == Approx(1.05).margin(0.1));
+  CHECK_FALSE(forceLevel(read.samples).inG());
+  CHECK(anyContains(read.warnings.lines(), "far from 9.81"));
 }
 
 TEST_CASE("the rate is the median of the periods", "[imu_file]") {
