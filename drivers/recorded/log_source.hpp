@@ -9,6 +9,7 @@
 // Host side: opening allocates and throws InputError; next() reuses fixed buffers.
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <variant>
@@ -32,6 +33,8 @@ struct LogOptions {
   bool mono = false;                  ///< leave camera 1 out
   bool without_images = false;        ///< neither look for images nor deliver any: tracks take their place
   bool imu_after_last_image = false;  ///< deliver the samples after the last image too
+  /// Asked for each image in turn before it is decoded; false: it is passed over. Empty: all are wanted.
+  std::function<bool(Stamp stamp, std::uint32_t camera)> wants_image;
 };
 
 class LogSource {

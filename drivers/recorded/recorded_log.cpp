@@ -71,7 +71,9 @@ bool RecordedLog::next(SensorMessage& message) {
       ++counters_.imu_samples;
       return true;
     }
-    if (deliverImage(images_[next_image_++], message)) return true;
+    const ImageEntry& entry = images_[next_image_++];
+    if (options_.wants_image && !options_.wants_image(entry.stamp, entry.camera)) continue;
+    if (deliverImage(entry, message)) return true;
   }
 }
 

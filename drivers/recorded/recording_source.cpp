@@ -19,7 +19,7 @@ std::size_t bodyBytes(const RecordedScene& entry) { return paddedSize(entry.leng
 }  // namespace
 
 RecordingSource::RecordingSource(RecordingFiles files, const LogOptions& options, const std::string& folder)
-    : files_(std::move(files)), without_images_(options.without_images) {
+    : files_(std::move(files)), without_images_(options.without_images), wants_image_(options.wants_image) {
   if (!folder.empty()) lock_.emplace(folder);
   index_ = indexRecording(files_);
   chooseCalibration(options);
@@ -145,6 +145,7 @@ bool RecordingSource::next(SensorMessage& message) {
     const std::size_t camera = kind == RecordKind::kImage0 ? 0 : 1;
     const RecordedImage& entry = index_.images[camera][next_image_[camera]++];
     if (!delivers(kind)) continue;
+    if (wants_image_ && !wants_image_(entry.stamp, static_cast<std::uint32_t>(camera))) continue;
     CameraFrame frame;
     read(camera, entry, frame);
     ++counters_.images[camera];

@@ -88,6 +88,7 @@ class RecordingSource final : public LogSource {
   RecordingIndex index_;
   Calibration calibration_;
   bool without_images_ = false;
+  std::function<bool(Stamp, std::uint32_t)> wants_image_;
   std::size_t cameras_ = kMaxCameras;  ///< whose images are delivered
   LogCounters counters_;
   LogWarnings warnings_;

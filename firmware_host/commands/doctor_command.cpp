@@ -1,10 +1,13 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/log_options.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
+#include "firmware_host/realtime/console.hpp"
 #include "firmware_host/runs/doctor_run.hpp"
 
 namespace swiftlet {
@@ -12,10 +15,23 @@ namespace {
 
 struct DoctorOptions {
   DoctorRequest request;
+  LogRequest log;
+  LogCommandOptions of_log;
   SettingsOptions settings;
 };
 
+int doctorOfLog(const DoctorOptions& options) {
+  LogRequest request = options.log;
+  options.of_log.fill(request);
+  const MachineReport report = examineLog(request, options.settings.read());
+  say(report.text(request.log));
+  const bool good = std::ranges::none_of(
+      report.lines, [](const MachineLine& line) { return line.verdict == MachineVerdict::kPoor; });
+  return good ? kExitDone : kExitFailed;
+}
+
 int doctor(const DoctorOptions& options) {
+  if (!options.log.log.empty()) return doctorOfLog(options);
   DoctorRequest request = options.request;
   request.stop = &stopOnSignal();
   const DoctorReport report = examine(request, options.settings.read());
@@ -35,10 +51,15 @@ void addDoctorCommand(CLI::App& app, int& exit_code) {
   command->add_option("--seconds", options->request.seconds, "Watch the vehicle's devices for so long")
       ->check(nonNegative())
       ->capture_default_str();
+  command->add_option("LOG", options->log.log, "A recorded log to examine in place of this computer");
+  options->of_log.addCalibration(*command);
+  options->of_log.addSection(*command, options->log);
+  command->add_flag("--mono", options->log.mono, "Of LOG, camera 0 alone");
   options->settings.addTo(*command);
   command->footer(
-      "Example:\n  swiftlet doctor\n  swiftlet doctor --settings vehicle.yaml\n"
-      "Exit code 0: the vehicle's devices work as the settings want them.");
+      "Example:\n  swiftlet doctor\n  swiftlet doctor --settings vehicle.yaml\n  swiftlet doctor "
+      "data/euroc_mh01_20s\n"
+      "Exit code 0: the vehicle's devices work as the settings want them; of LOG, no mistake was found.");
   command->callback([options, &exit_code] { exit_code = doctor(*options); });
 }
 

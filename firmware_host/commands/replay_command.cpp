@@ -45,6 +45,7 @@ std::string sameStampsLine(const nlohmann::ordered_json& accuracy) {
 int replay(const ReplayOptions& options) {
   ReplayRequest request = options.request;
   options.log.fill(request);
+  request.inspect = true;
   request.accuracy = labAccuracy();
   request.view = options.view.read();
   const ReplayResult result = runReplay(request, options.settings.read());
@@ -81,7 +82,9 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
   auto options = std::make_shared<ReplayOptions>();
   ReplayRequest& request = options->request;
   request.out = "run";
-  command->add_option("LOG", request.log, "EuRoC/ASL folder or an archive of one, a recorded run, or a ROS 1 bag where supported")
+  command
+      ->add_option("LOG", request.log,
+                   "EuRoC/ASL folder or an archive of one, a recorded run, or a ROS 1 bag where supported")
       ->required();
   command->add_option("--out", request.out, "Run folder to write")->capture_default_str();
   command->add_flag("--replace", request.replace,

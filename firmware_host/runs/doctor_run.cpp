@@ -8,14 +8,15 @@
 
 #include "estimator/core/units.hpp"
 #include "firmware_host/inputs/devices/connected_devices.hpp"
-#include "firmware_host/inputs/devices/counting_sink.hpp"
 #include "firmware_host/inputs/devices/input_topics.hpp"
 #include "firmware_host/inputs/devices/live_input.hpp"
 #include "firmware_host/inputs/devices/sensor_threads.hpp"
 #include "firmware_host/inputs/devices/status_json.hpp"
+#include "firmware_host/inspection/inspect_log.hpp"
 #include "firmware_host/realtime/host_sleep.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
 #include "firmware_host/runs/fly_run.hpp"
+#include "firmware_host/runs/keeping_sink.hpp"
 
 namespace swiftlet {
 namespace {
@@ -33,6 +34,15 @@ constexpr const char* kSlowTopics =
 MachineLine line(const std::string& what, std::string found, bool good, std::string remedy) {
   return {what, std::move(found), good ? MachineVerdict::kGood : MachineVerdict::kPoor,
           good ? "" : std::move(remedy)};
+}
+
+void addInspection(const InspectionReport& inspection, MachineReport& report) {
+  for (const Finding& finding : inspection.findings) {
+    report.lines.push_back({finding.what, finding.evidence, MachineVerdict::kPoor, finding.remedy});
+  }
+  for (const Measured& measured : inspection.measured) {
+    report.lines.push_back({measured.what, measured.found, MachineVerdict::kNote, ""});
+  }
 }
 
 /// Watches the opened devices and says what they did.
@@ -61,6 +71,7 @@ class VehicleCheck {
     for (std::size_t i = 0; i < input_.cameras().size(); ++i) addCamera(i, report);
     addPairs(report);
     addTrigger(report);
+    addInspection(sink_.inspect(calibration_), report);
   }
 
  private:
@@ -215,7 +226,7 @@ class VehicleCheck {
   const InputTopics topics_;
   LiveInput& input_;
   double seconds_;
-  CountingSink sink_;
+  KeepingSink sink_;
 };
 
 void addNext(const Settings& settings, DoctorReport& report) {
@@ -238,6 +249,19 @@ bool DoctorReport::ready() const {
   return !vehicle.lines.empty() && std::ranges::none_of(vehicle.lines, [](const MachineLine& line) {
     return line.verdict == MachineVerdict::kPoor;
   });
+}
+
+MachineReport examineLog(const LogRequest& request, const Settings& settings) {
+  constexpr std::size_t kImages = 1200;  // a minute at 20 Hz
+  const InspectionReport inspection = inspectLog(request, settings, kImages);
+  MachineReport report;
+  report.lines.push_back(
+      {"images", fmt::format("{} of camera 0 were looked at", inspection.images), MachineVerdict::kNote, ""});
+  for (const std::string& text : inspection.warnings) {
+    report.lines.push_back({"warning", text, MachineVerdict::kNote, ""});
+  }
+  addInspection(inspection, report);
+  return report;
 }
 
 DoctorReport examine(const DoctorRequest& request, const Settings& settings) {

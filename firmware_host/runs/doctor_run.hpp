@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "firmware_host/inputs/log/log_request.hpp"
 #include "firmware_host/realtime/machine_report.hpp"
 #include "firmware_host/settings/settings.hpp"
 
@@ -28,5 +29,9 @@ struct DoctorReport {
 };
 
 DoctorReport examine(const DoctorRequest& request, const Settings& settings);
+
+/// A minute of motion of a recorded log: mistakes in units, axes, clocks and calibration as poor lines, and
+/// what was measured. InputError where the log cannot be read.
+MachineReport examineLog(const LogRequest& request, const Settings& settings);
 
 }  // namespace swiftlet

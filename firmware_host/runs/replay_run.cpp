@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "drivers/recorded/open_log.hpp"
 #include "drivers/recorded/recording_files.hpp"
@@ -12,6 +14,7 @@
 #include "estimator/core/units.hpp"
 #include "firmware_host/files/run_claim.hpp"
 #include "firmware_host/inputs/log/log_player.hpp"
+#include "firmware_host/inspection/inspect_log.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"
 #include "firmware_host/realtime/console.hpp"
 #include "firmware_host/realtime/progress.hpp"
@@ -35,6 +38,9 @@ TrackFileFacts checkTracks(const std::string& path, const Rig& rig, bool mono) {
   }
   return facts;
 }
+
+// Ten seconds of motion at 20 Hz: half a second of CPU.
+constexpr std::size_t kInspectedImages = 200;
 
 /// What one run is made of, from opening to the summary.
 class ReplayRun {
@@ -83,6 +89,7 @@ class ReplayRun {
     facts_.tracks = request_.tracks.empty() ? source_->trackFile() : request_.tracks;
     steps_ = source_->imageCount();
     openScenes();
+    if (request_.inspect && !request_.reproduce) inspect();
     if (facts_.tracks.empty()) return;
     if (request_.real_time || request_.record) {
       throw InputError(request_.log, 0, "", "a log of feature tracks has no images to let out or record",
@@ -90,6 +97,16 @@ class ReplayRun {
     }
     steps_ = checkTracks(facts_.tracks, source_->rig(), request_.mono).frames;
     tracks_ = std::make_unique<TrackReader>(facts_.tracks);
+  }
+
+  /// On a log opened for that alone: what the run reads and delivers stays the same.
+  void inspect() {
+    if (!facts_.tracks.empty()) return;
+    for (const Finding& finding : inspectLog(request_, settings_, kInspectedImages).findings) {
+      findings_.push_back(finding.line());
+    }
+    warnAll(findings_);
+    memory_.note("inspection");
   }
 
   /// Refuses what cannot be mapped before anything is written.
@@ -219,6 +236,7 @@ class ReplayRun {
     facts_.calibration_form = source_->calibration().form;
     facts_.input["log"] = toJson(source_->counters());
     facts_.warnings = source_->warnings();
+    facts_.warnings.insert(facts_.warnings.end(), findings_.begin(), findings_.end());
     if (tracks_) {
       facts_.warnings.insert(facts_.warnings.end(), tracks_->warnings().begin(), tracks_->warnings().end());
     }
@@ -252,6 +270,7 @@ class ReplayRun {
   std::size_t scene_warnings_ = 0;
   std::optional<ConfusionModel> confusion_;
   std::size_t warned_ = 0;
+  std::vector<std::string> findings_;
   std::size_t steps_ = 0;
   LostFiles lost_;
   std::optional<RunClaim> claim_;

@@ -34,6 +34,7 @@ struct ReplayRequest : LogRequest {
   std::optional<ViewAddress> view;  ///< real_time: serve the live view there
   bool record = false;              ///< write `recording/` into the run folder
   bool reproduce = false;  ///< `log` is a recording: repeat its threaded run step by step, with its settings
+  bool inspect = false;    ///< look for mistakes in units, axes and clocks first (inspection/inspect_log.hpp)
   AccuracyOfRun accuracy;  ///< of a log with truth (lab/evaluation/evaluate_run.hpp); empty: none is made
 };
 

@@ -1,0 +1,115 @@
+#include "firmware_host/inspection/focal_fit.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "estimator/geometry/so3.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr int kSteps = 22;  // each way, to 0.41 and 2.4 times
+constexpr double kStep = 0.04;
+constexpr double kEpipolarNoise =
+    0.5;  // px, of a track's distance from its epipolar line; where errors stop counting
+constexpr std::size_t kMostTurns = 150;
+constexpr int kRounds = 3;
+constexpr std::size_t kFewestOfFocal = 20;
+
+/// Tracks of a turn, and the gyro's rotation of it.
+struct TurnTracks {
+  std::vector<TrackPair> pairs;
+  Eigen::Matrix3d R_cur_prev;
+};
+
+CameraModel scaled(const CameraModel& camera, double ratio) {
+  Eigen::Vector4d intrinsics = camera.intrinsics();
+  intrinsics.head<2>() *= ratio;
+  return {camera.kind(), camera.width(), camera.height(), intrinsics, camera.distortion()};
+}
+
+/// Robust sum of squared distances from epipolar lines, in units of kEpipolarNoise squared, at the best
+/// translation.
+double costOf(const TurnTracks& turn, const CameraModel& camera) {
+  std::vector<Eigen::Vector3d> normals;
+  std::vector<std::array<Eigen::Vector3d, 2>> rays;
+  for (const TrackPair& pair : turn.pairs) {
+    Eigen::Vector3d from;
+    Eigen::Vector3d to;
+    if (!camera.unproject(pair.from, from) || !camera.unproject(pair.to, to)) continue;
+    from = turn.R_cur_prev * from;
+    normals.push_back(from.cross(to));
+    rays.push_back({from, to});
+  }
+  constexpr double kWorst = 6;  // of a pair that the lens cannot have seen
+  double cost = kWorst * static_cast<double>(turn.pairs.size() - normals.size());
+  std::vector<double> weights(normals.size(), 1);
+  double left = 0;
+  for (int round = 0; round < kRounds; ++round) {
+    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+    for (std::size_t i = 0; i < normals.size(); ++i) sum += weights[i] * normals[i] * normals[i].transpose();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(sum);
+    const Eigen::Vector3d t = solver.eigenvectors().col(0);
+    left = 0;
+    for (std::size_t i = 0; i < normals.size(); ++i) {
+      const double gradient = t.cross(rays[i][0]).squaredNorm() + t.cross(rays[i][1]).squaredNorm() + 1e-12;
+      const double distance = t.dot(normals[i]) * camera.focal() / kEpipolarNoise;
+      const double squared = distance * distance / gradient;
+      left += std::log1p(squared);
+      weights[i] = 1 / ((1 + squared) * gradient);
+    }
+  }
+  return cost + left;
+}
+
+}  // namespace
+
+std::optional<FocalFit> fitFocal(const std::vector<TrackedImage>& images,
+                                 const std::vector<CameraTurn>& turns, const GyroIntegral& gyro,
+                                 const MotionFit& fit, const Eigen::Matrix3d& gyro_to_camera,
+                                 const CameraModel& camera) {
+  // The largest turns tell most.
+  std::vector<std::size_t> order;
+  for (std::size_t k = 0; k < turns.size(); ++k) {
+    if (fit.weights[k] > 0.3) order.push_back(k);
+  }
+  std::ranges::sort(order, [&](std::size_t a, std::size_t b) {
+    return turns[a].turn.squaredNorm() > turns[b].turn.squaredNorm();
+  });
+  if (order.size() > kMostTurns) order.resize(kMostTurns);
+  std::vector<TurnTracks> tracks;
+  for (const std::size_t k : order) {
+    const CameraTurn& turn = turns[k];
+    if (!gyro.covers(turn.from + fit.shift, turn.to + fit.shift)) continue;
+    const Eigen::Vector3d turned =
+        gyro_to_camera * (gyro.at(turn.to + fit.shift) - gyro.at(turn.from + fit.shift)) +
+        fit.offset * (turn.to - turn.from);
+    TurnTracks entry{commonTracks(images[turn.first], images[turn.last]), expSo3Matrix(-turned)};
+    if (entry.pairs.size() >= kFewestOfFocal) tracks.push_back(std::move(entry));
+  }
+  const auto total = [&](double ratio) {
+    const CameraModel model = scaled(camera, ratio);
+    double sum = 0;
+    for (const TurnTracks& turn : tracks) sum += costOf(turn, model);
+    return sum;
+  };
+  constexpr std::size_t kFewestTurns = 15;
+  if (tracks.size() < kFewestTurns) return {};
+  // Steps from the calibration's own, so that they are compared at equal ground.
+  std::vector<double> costs;
+  for (int i = -kSteps; i <= kSteps; ++i) costs.push_back(total(std::exp(i * kStep)));
+  const auto best = static_cast<std::size_t>(std::ranges::min_element(costs) - costs.begin());
+  if (best == 0 || best + 1 == costs.size()) return {};
+  const double curvature = costs[best - 1] - 2 * costs[best] + costs[best + 1];
+  if (!(curvature > 0)) return {};
+  const double place = 0.5 * (costs[best - 1] - costs[best + 1]) / curvature;
+  FocalFit result;
+  result.ratio = std::exp(kStep * (static_cast<double>(best) - kSteps + place));
+  result.sigma = kStep / std::sqrt(curvature);
+  result.gain = 0.5 * (costs[kSteps] - costs[best]);
+  return result;
+}
+
+}  // namespace swiftlet

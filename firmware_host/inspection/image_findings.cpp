@@ -1,0 +1,164 @@
+#include "firmware_host/inspection/image_findings.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace swiftlet {
+namespace {
+
+// A step is a gap from here on, in periods.
+constexpr double kGap = 1.5;
+// Images that are missing: below this share tracks go on over them.
+constexpr double kMissingShare = 0.02;
+constexpr std::size_t kFewestMissing = 5;
+// Steps of a camera that runs evenly are within this share of the period; others are triggered by something.
+constexpr double kEven = 0.25;
+constexpr double kEvenShare = 0.7;
+// Doubled: the scene stands still for one step, in motion before and after it.
+constexpr float kStill = 0.05F;  // px
+constexpr float kMoving = 0.7F;  // px
+constexpr std::size_t kFewestTracked = 20;
+constexpr std::size_t kFewestDoubled = 3;
+constexpr double kDoubledShare = 0.01;
+// Control of exposure takes steps of some 10 % (docs/exposure.md).
+constexpr double kJump = 1.25;
+constexpr std::size_t kFewestJumps = 3;
+constexpr std::size_t kFewestOfStretch = 20;
+
+double medianStep(const std::vector<Stamp>& stamps) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < stamps.size(); ++i) steps.push_back((stamps[i] - stamps[i - 1]).seconds());
+  if (steps.empty()) return 0;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+void addMissing(const std::vector<Stamp>& stamps, std::vector<Finding>& findings) {
+  const double period = medianStep(stamps);
+  if (period <= 0) return;
+  std::size_t missing = 0;
+  std::size_t even = 0;
+  std::size_t short_steps = 0;
+  double longest = 0;
+  for (std::size_t i = 1; i < stamps.size(); ++i) {
+    const double step = (stamps[i] - stamps[i - 1]).seconds();
+    if (step < kGap * period) {
+      ++short_steps;
+      even += std::abs(step - period) < kEven * period ? 1 : 0;
+      continue;
+    }
+    missing += static_cast<std::size_t>(std::lround(step / period)) - 1;
+    longest = std::max(longest, step);
+  }
+  const std::size_t whole = stamps.size() + missing;
+  if (static_cast<double>(even) < kEvenShare * static_cast<double>(short_steps)) return;
+  if (missing < kFewestMissing || static_cast<double>(missing) < kMissingShare * static_cast<double>(whole)) {
+    return;
+  }
+  findings.push_back(
+      {"images dropped",
+       fmt::format("{} of {} images of camera 0 are missing between its stamps, every {:.4g} ms one; the "
+                   "longest step is {:.3f} s",
+                   missing, whole, 1e3 * period, longest),
+       "Record with less load: fewer topics, a faster disk, larger queues, or a lower rate"});
+}
+
+void addDoubled(const std::vector<TrackedImage>& images, std::vector<Finding>& findings) {
+  std::size_t doubled = 0;
+  std::size_t moving = 0;
+  for (std::size_t i = 1; i + 1 < images.size(); ++i) {
+    const auto tells = [&](std::size_t k) { return images[k].follows && images[k].kept >= kFewestTracked; };
+    if (!tells(i) || !tells(i + 1)) continue;
+    moving += images[i].flow > kMoving ? 1 : 0;
+    if (images[i].flow > kStill) continue;
+    // As often as the image may have been repeated, the motion goes on before and after.
+    constexpr std::size_t kMostRepeats = 3;
+    std::size_t before = i;
+    while (before > 0 && i - before < kMostRepeats && tells(before) && images[before].flow <= kStill)
+      --before;
+    std::size_t after = i;
+    while (after + 1 < images.size() && after - i < kMostRepeats && tells(after) &&
+           images[after].flow <= kStill) {
+      ++after;
+    }
+    if (tells(before) && tells(after) && images[before].flow > kMoving && images[after].flow > kMoving)
+      ++doubled;
+  }
+  if (doubled < kFewestDoubled ||
+      static_cast<double>(doubled) < kDoubledShare * static_cast<double>(moving + doubled)) {
+    return;
+  }
+  findings.push_back(
+      {"images doubled",
+       fmt::format("{} of {} images of camera 0 show the same as the one before under a new stamp, in "
+                   "the midst of motion",
+                   doubled, moving + doubled),
+       "Take the camera's own images: not from a video or topic converted to a higher rate"});
+}
+
+void addJumps(const std::vector<TrackedImage>& images, std::vector<Finding>& findings) {
+  std::size_t jumps = 0;
+  double largest = 1;
+  std::size_t steps = 0;
+  for (const TrackedImage& image : images) {
+    if (!image.follows || image.kept < kFewestTracked) continue;
+    ++steps;
+    const double ratio = std::max(image.light, 1 / image.light);
+    if (ratio > kJump) ++jumps;
+    largest = std::max(largest, ratio);
+  }
+  if (jumps < kFewestJumps) return;
+  findings.push_back(
+      {"exposure jumps",
+       fmt::format("the same points become brighter or darker by more than {:.0f} % from one image to "
+                   "the next in {} of {} steps, at most {:.2f} times",
+                   100 * (kJump - 1), jumps, steps, largest),
+       "Fix exposure and gain, or use a control of exposure with small steps"});
+}
+
+}  // namespace
+
+std::vector<Finding> imageFindings(const std::vector<Stamp>& stamps,
+                                   const std::vector<TrackedImage>& images) {
+  std::vector<Finding> findings;
+  addMissing(stamps, findings);
+  addDoubled(images, findings);
+  addJumps(images, findings);
+  return findings;
+}
+
+std::vector<Stamp> evenStamps(const std::vector<Stamp>& stamps) {
+  std::vector<Stamp> even = stamps;
+  const double period = medianStep(stamps);
+  for (std::size_t first = 0; first < stamps.size();) {
+    std::size_t end = first + 1;
+    while (end < stamps.size() && (stamps[end] - stamps[end - 1]).seconds() < kGap * period) ++end;
+    const std::size_t count = end - first;
+    if (count >= kFewestOfStretch) {
+      // Least squares on the image's number, which runs from -middle to middle.
+      const double middle = 0.5 * static_cast<double>(count - 1);
+      double mean = 0;
+      double slope = 0;
+      double squares = 0;
+      for (std::size_t i = first; i < end; ++i) {
+        const double seconds = (stamps[i] - stamps[first]).seconds();
+        const double number = static_cast<double>(i - first) - middle;
+        mean += seconds / static_cast<double>(count);
+        slope += number * seconds;
+        squares += number * number;
+      }
+      slope /= squares;
+      for (std::size_t i = first; i < end; ++i) {
+        const double number = static_cast<double>(i - first) - middle;
+        even[i] = stamps[first] + Duration::fromSeconds(mean + slope * number);
+      }
+    }
+    first = end;
+  }
+  return even;
+}
+
+}  // namespace swiftlet

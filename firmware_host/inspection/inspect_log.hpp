@@ -1,0 +1,14 @@
+#pragma once
+// The inspection of a recorded log: opened on its own, so that the run that follows is not touched.
+
+#include <cstddef>
+
+#include "firmware_host/inputs/log/log_request.hpp"
+#include "firmware_host/inspection/inspection.hpp"
+
+namespace swiftlet {
+
+/// Of the section that the request wants. InputError where the log cannot be read.
+InspectionReport inspectLog(const LogRequest& request, const Settings& settings, std::size_t most_images);
+
+}  // namespace swiftlet

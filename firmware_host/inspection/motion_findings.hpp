@@ -1,0 +1,18 @@
+#pragma once
+// What gyro, accelerometer and camera tell of each other: clock, unit, axes, focal length, gravity.
+
+#include <vector>
+
+#include "drivers/calibration/calibration.hpp"
+#include "estimator/messages/imu_sample.hpp"
+#include "firmware_host/inspection/camera_tracks.hpp"
+#include "firmware_host/inspection/finding.hpp"
+
+namespace swiftlet {
+
+/// `even`: what the stamps of `images` are on a clock that ticks evenly. Lines go to `measured`.
+std::vector<Finding> motionFindings(const Calibration& calibration, const std::vector<ImuSample>& samples,
+                                    const std::vector<TrackedImage>& images, const std::vector<Stamp>& even,
+                                    std::vector<Measured>& measured);
+
+}  // namespace swiftlet

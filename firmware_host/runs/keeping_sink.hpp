@@ -1,0 +1,39 @@
+#pragma once
+// Keeps what devices deliver in some seconds, to look for mistakes in it afterwards.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "drivers/calibration/calibration.hpp"
+#include "firmware_host/inputs/devices/counting_sink.hpp"
+#include "firmware_host/inspection/inspection.hpp"
+
+namespace swiftlet {
+
+class KeepingSink final : public CountingSink {
+ public:
+  /// Of each stream, as many stamps as `most`, and samples. Images: at most kMostBytes a camera.
+  explicit KeepingSink(std::size_t most);
+
+  void takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host) override;
+  void takeImage(const CameraFrame& image, const HostTimes& host) override;
+
+  /// After the devices' threads have ended.
+  [[nodiscard]] InspectionReport inspect(const Calibration& calibration) const;
+
+ private:
+  static constexpr std::size_t kMostBytes = 128U << 20U;  // 18 s of 752 x 480 at 20 Hz
+  struct Kept {
+    CameraFrame frame;  ///< its image's memory is in `pixels`
+    std::vector<std::uint8_t> pixels;
+  };
+
+  std::size_t most_;
+  std::vector<ImuSample> samples_;
+  std::array<std::vector<Kept>, kMaxCameras> images_;
+  std::array<std::size_t, kMaxCameras> bytes_{};
+};
+
+}  // namespace swiftlet
