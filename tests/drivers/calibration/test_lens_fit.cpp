@@ -29,6 +29,7 @@ constexpr int kPixels = 200;  // of each camera
 /// OpenCV's pixels of rays.
 std::vector<Vector2d> oraclePixels(const SourceLens& lens, const std::vector<Vector3d>& rays) {
   std::vector<cv::Point3d> points;
+  points.reserve(rays.size());
   for (const Vector3d& ray : rays) points.emplace_back(ray.x(), ray.y(), ray.z());
   const Eigen::Vector4d& k = lens.intrinsics;
   const cv::Matx33d K(k[0], 0, k[2], 0, k[1], k[3], 0, 0, 1);
@@ -44,6 +45,7 @@ std::vector<Vector2d> oraclePixels(const SourceLens& lens, const std::vector<Vec
     cv::omnidir::projectPoints(points, pixels, zero, zero, K, lens.shape[0], four);
   }
   std::vector<Vector2d> out;
+  out.reserve(pixels.size());
   for (const cv::Point2d& p : pixels) out.emplace_back(p.x, p.y);
   return out;
 }
