@@ -201,7 +201,7 @@ class MotionInspector {
                          fmt::format("the log says that {}; the calibration differs by {:.1f} deg "
                                      "(sigma {:.1f} deg)",
                                      directions(fit_.R_cam_imu), degrees, std::min(sigma, 180.0))});
-    if (degrees < std::max(kLeastAngle, kSigmas * sigma)) return;
+    if (sigma > kLeastAngle || degrees < std::max(kLeastAngle, kSigmas * sigma)) return;
     if (!decides(fitter_.gainOverAxes(fit_, R_calibrated_))) return;
     turned_ = true;
     // Calibration files may put the body's axes elsewhere: what counts is what was written down.

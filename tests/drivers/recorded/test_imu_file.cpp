@@ -144,7 +144,7 @@ TEST_CASE("units and column order are watched", "[imu_file]") {
 TEST_CASE("linear acceleration is not taken for g", "[imu_file]") {
   std::string linear;
   for (int i = 0; i < 2000; ++i) {
-    linear += std::to_string(5000000 * (i + 1)) + ",0.1,-0.2,0.3," +
+    linear += std::to_string(5000000LL * (i + 1)) + ",0.1,-0.2,0.3," +
               std::to_string(1.5 * std::sin(0.01 * i)) + ",0.05,-0.1\n";
   }
   const Read read(linear);

@@ -118,7 +118,8 @@ TEST_CASE("gravity and the sign of the accelerometer follow from tracks", "[insp
   const ForceFit negated = fitter.fit(-Eigen::Matrix3d::Identity());
   CHECK(negated.negative * 5 >= negated.windows * 4);
   for (const Eigen::Matrix3d& axes : signedAxes()) {
-    if (axes.isIdentity()) continue;
+    // A rotor's thrust acts along one axis, x of this rig: the two across it are not told apart by a flight.
+    if (axes(0, 0) == 1) continue;
     const ForceFit other = fitter.fit(axes);
     INFO(axesText(axes) << ": " << other.error << " px, " << other.negative << " of " << other.windows);
     CHECK((other.error > 1.2 * fit.error || other.negative * 2 > other.windows));
