@@ -39,7 +39,9 @@ void addHilCommand(CLI::App& app, int& exit_code) {
   auto options = std::make_shared<HilOptions>();
   HilRequest& request = options->request;
   request.out = "hil";
-  command->add_option("LOG", request.log, "EuRoC/ASL folder or an archive of one, a recorded run, or a ROS 1 bag where supported")
+  command
+      ->add_option("LOG", request.log,
+                   "EuRoC/ASL folder or an archive of one, a bag (rosbag2, MCAP, ROS 1), or a recorded run")
       ->required();
   command
       ->add_option("--out", request.out, "Folder for truth.tum (on the host's clock), hil.json, faults.csv")

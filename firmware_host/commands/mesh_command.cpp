@@ -55,7 +55,9 @@ void addMeshCommand(CLI::App& app, int& exit_code) {
   auto options = std::make_shared<MeshOptions>();
   MeshRequest& request = options->request;
   request.out = "mesh";
-  command->add_option("LOG", request.log, "EuRoC/ASL folder or an archive of one, a recorded run, or a ROS 1 bag where supported")
+  command
+      ->add_option("LOG", request.log,
+                   "EuRoC/ASL folder or an archive of one, a bag (rosbag2, MCAP, ROS 1), or a recorded run")
       ->required();
   command->add_option("--trajectory", request.trajectory,
                       "Poses of the body (TUM, EuRoC csv); default: the log's own truth");

@@ -68,7 +68,7 @@ void addPlaceCommand(CLI::App& app, int& exit_code) {
   command
       ->add_option(
           "LOG", request.log,
-          "EuRoC/ASL folder, a recorded run, a ROS 1 bag where supported; or a plain folder of images")
+          "EuRoC/ASL folder or an archive of one, a bag, a recorded run; or a plain folder of images")
       ->required();
   command->add_option("--trajectory", request.trajectory,
                       "Poses of the body (TUM, EuRoC csv); default: the log's own truth");

@@ -84,7 +84,7 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
   request.out = "run";
   command
       ->add_option("LOG", request.log,
-                   "EuRoC/ASL folder or an archive of one, a recorded run, or a ROS 1 bag where supported")
+                   "EuRoC/ASL folder or an archive of one, a bag (rosbag2, MCAP, ROS 1), or a recorded run")
       ->required();
   command->add_option("--out", request.out, "Run folder to write")->capture_default_str();
   command->add_flag("--replace", request.replace,

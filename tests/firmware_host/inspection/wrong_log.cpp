@@ -12,7 +12,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "drivers/recorded/image_decoder.hpp"
+#include "drivers/image/image_decoder.hpp"
 #include "drivers/recorded/image_files.hpp"
 #include "estimator/core/random.hpp"
 
