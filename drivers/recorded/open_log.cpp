@@ -22,8 +22,9 @@ std::unique_ptr<LogSource> openLog(const std::string& path, const LogOptions& op
   }
   if (isAslFolder(path)) return openAslFolder(path, options);
   if (isRecording(path)) return openRecording(path, options);
-  if (isBag(path)) return openBagLog(path, options);
+  // A tar packed by zstd begins as a rosbag2 file that is packed so.
   if (isArchive(path)) return openAslFolder(path, options);
+  if (isBag(path)) return openBagLog(path, options);
   throw InputError(path, 0, "", "not a log: neither a folder with imu0 and cam0 or an archive of one, nor a bag, nor a recording",
                    kWhatToGive);
 }

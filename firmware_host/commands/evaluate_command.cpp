@@ -5,6 +5,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "drivers/bag/bag_file.hpp"
+#include "drivers/input/file_tree.hpp"
 #include "drivers/input/input_error.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
@@ -186,7 +188,9 @@ int evaluate(const EvaluateOptions& options) {
   if (!options.hil.empty()) return evaluateHil(options);
   const Settings settings = options.settings.read();
   const Subject subject = subjectOf(options);
-  if (std::filesystem::is_regular_file(subject.truth) && isPositionFile(subject.truth)) {
+  const bool text =
+      std::filesystem::is_regular_file(subject.truth) && !isArchive(subject.truth) && !isBag(subject.truth);
+  if (text && isPositionFile(subject.truth)) {
     return evaluatePositions(options, settings, subject);
   }
   if (options.fit_shift > 0) {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "drivers/bag/bag_file.hpp"
+#include "drivers/input/file_tree.hpp"
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/asl_folder.hpp"
 #include "drivers/recorded/open_log.hpp"
@@ -138,7 +139,8 @@ int exportRun(const ExportOptions& options) {
 
 int exportAny(const ExportOptions& options) {
   checkFrames(options.frames);
-  return isAslFolder(options.from) || isBag(options.from) ? exportLog(options) : exportRun(options);
+  return isAslFolder(options.from) || isArchive(options.from) || isBag(options.from) ? exportLog(options)
+                                                                                     : exportRun(options);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "drivers/bag/bag_file.hpp"
+#include "drivers/input/file_tree.hpp"
 #include "drivers/recorded/bag_topics.hpp"
 #include "drivers/recorded/open_log.hpp"
 #include "firmware_host/lab/evaluation/accuracy_report.hpp"
@@ -40,7 +41,8 @@ AccuracyOptions accuracyOptions(const EvaluationGroup& settings, AlignKind align
 Truth readTruth(const std::string& path, bool without_images) {
   Truth truth;
   constexpr const char* kRemedy = "Give a trajectory file with --truth (TUM, or EuRoC csv)";
-  if (isBag(path)) {
+  const bool archive = isArchive(path);
+  if (!archive && isBag(path)) {
     // Poses alone need no calibration, which a bag does not hold.
     const auto bag = openBag(path);
     const auto topic = chooseTruthTopic(*bag);
@@ -49,7 +51,7 @@ Truth readTruth(const std::string& path, bool without_images) {
     truth.name = path + " " + bag->topics()[*topic].name;
     return truth;
   }
-  if (!std::filesystem::is_directory(path)) {
+  if (!archive && !std::filesystem::is_directory(path)) {
     truth.poses = readEstimate(path);
     truth.name = path;
     return truth;

@@ -186,7 +186,7 @@ TEST_CASE("All nodes go and come again with the driver", "[faults]") {
 TEST_CASE("Opening, capturing, failing and coming back allocate nothing", "[faults]") {
   CameraDeviceSettings settings = stream::settings(path());
   settings.gain = 5000;  // warned of
-  CameraDeviceSettings refused = stream::settings(path(), "RGB3");
+  CameraDeviceSettings refused = stream::settings(path(), "RGBP");
   CameraDevice camera;
   GreyReader reader;
   reader.reserve(kGrey8, 752, 480, false);
