@@ -11,7 +11,8 @@ namespace swiftlet {
 namespace {
 
 constexpr const char* kWhatToGive =
-    "Give a EuRoC folder (the sequence or its mav0) or an archive of one, a bag (rosbag2, MCAP or ROS 1), or a "
+    "Give a EuRoC folder (the sequence or its mav0) or an archive of one, a bag (rosbag2, MCAP or ROS 1), or "
+    "a "
     "run's folder with its recording";
 
 }  // namespace
@@ -25,8 +26,10 @@ std::unique_ptr<LogSource> openLog(const std::string& path, const LogOptions& op
   // A tar packed by zstd begins as a rosbag2 file that is packed so.
   if (isArchive(path)) return openAslFolder(path, options);
   if (isBag(path)) return openBagLog(path, options);
-  throw InputError(path, 0, "", "not a log: neither a folder with imu0 and cam0 or an archive of one, nor a bag, nor a recording",
-                   kWhatToGive);
+  throw InputError(
+      path, 0, "",
+      "not a log: neither a folder with imu0 and cam0 or an archive of one, nor a bag, nor a recording",
+      kWhatToGive);
 }
 
 }  // namespace swiftlet

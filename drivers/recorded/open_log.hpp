@@ -8,8 +8,8 @@
 
 namespace swiftlet {
 
-/// A EuRoC/ASL folder or an archive of one, a ROS 1 bag where the build has rosbag-storage, or a flight recording (its folder or
-/// that of its run). InputError otherwise.
+/// A EuRoC/ASL folder or an archive of one, a ROS 1 bag where the build has rosbag-storage, or a flight
+/// recording (its folder or that of its run). InputError otherwise.
 std::unique_ptr<LogSource> openLog(const std::string& path, const LogOptions& options = {});
 
 }  // namespace swiftlet

@@ -166,12 +166,12 @@ int evaluatePositions(const EvaluateOptions& options, const Settings& settings, 
   Json json;
   json["truth"] = subject.truth;
   if (!options.json) fmt::print("truth: {}, positions alone\n", subject.truth);
-  bool compared = true;
+  bool compared = false;
   for (const std::string& file : subject.files) {
     const Trajectory estimate = readEstimate(file);
     setSection(options, subject.first_image.value_or(estimate.front().stamp), how.accuracy);
     const PositionAccuracy accuracy = positionAccuracy(estimate, truth, how);
-    compared = compared && accuracy.pairs > 0;
+    compared = compared || accuracy.pairs > 0;
     json[std::filesystem::path(file).filename().string()] = toJson(accuracy);
     if (!options.json) fmt::print("{}", toText(titleOf(options, file), accuracy));
   }

@@ -16,8 +16,8 @@
 #include <string>
 #include <vector>
 
-#include "drivers/input/input_error.hpp"
 #include "drivers/image/image_decoder.hpp"
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/commands/program.hpp"
 #include "firmware_host/lab/modules/map_export_run.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"

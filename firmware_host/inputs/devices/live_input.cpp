@@ -4,10 +4,10 @@
 
 #include <utility>
 
-#include "drivers/input/input_error.hpp"
 #include "drivers/dds/topic_camera.hpp"
 #include "drivers/gstreamer/pipeline_source.hpp"
 #include "drivers/image/pixel_format.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/v4l2/camera_device.hpp"
 #include "estimator/core/units.hpp"
 #include "firmware_host/inputs/devices/can_imu_link.hpp"

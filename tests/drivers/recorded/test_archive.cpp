@@ -135,7 +135,8 @@ TEST_CASE("what is no log or several is named", "[archive]") {
   CHECK(contains(errorOf([&] { (void)openLog(path.string()); }).what(), "holds 2 logs: a/mav0"));
   REQUIRE(std::system(
               ("tar -cf " + path.string() + " -C " + log.mav0().string() + " cam0/data.csv").c_str()) == 0);
-  CHECK(contains(errorOf([&] { (void)openLog(path.string()); }).what(), "two.tar/cam0/sensor.yaml: does not exist"));
+  CHECK(contains(errorOf([&] { (void)openLog(path.string()); }).what(),
+                 "two.tar/cam0/sensor.yaml: does not exist"));
 }
 
 TEST_CASE("an archive that is cut or flipped is refused, or gives no other content", "[archive]") {
