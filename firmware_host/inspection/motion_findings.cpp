@@ -319,6 +319,8 @@ class MotionInspector {
       best = negated;
       axes = opposite;
     }
+    // Where the motion is too slow to fix the sign, it does not tell axes apart either.
+    if (!axes.isApprox(opposite) && !best.beats(force)) return;
     if (axes.isApprox(opposite)) {
       findings_.push_back(
           {"accelerometer negated",
