@@ -1,0 +1,22 @@
+# npm_fetch(<npm> <source> <work> <lost> <fetched>): in a script of the build, fetches what the package-lock.json of
+# `source` names into `work`, once for each lock. Without a network <fetched> is OFF and a warning says what is `lost`.
+function(npm_fetch npm source work lost fetched)
+  file(COPY ${source}/package.json ${source}/package-lock.json DESTINATION ${work})
+  file(SHA256 ${source}/package-lock.json lock)
+  set(known "")
+  if(EXISTS ${work}/fetched)
+    file(READ ${work}/fetched known)
+  endif()
+  set(${fetched} ON PARENT_SCOPE)
+  if(known STREQUAL lock)
+    return()
+  endif()
+  execute_process(COMMAND ${npm} ci --ignore-scripts --no-audit --no-fund --prefer-offline --fetch-retries=1
+                  WORKING_DIRECTORY ${work} RESULT_VARIABLE failed OUTPUT_QUIET ERROR_VARIABLE said)
+  if(failed)
+    message(WARNING "npm could not fetch ${lost}\n${said}")
+    set(${fetched} OFF PARENT_SCOPE)
+    return()
+  endif()
+  file(WRITE ${work}/fetched ${lock})
+endfunction()
