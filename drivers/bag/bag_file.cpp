@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <string_view>
 #include <tuple>
 
 #include "drivers/bag/bag_kind.hpp"
@@ -46,7 +47,10 @@ void BagFile::orderEntries() {
 
 bool isBag(const std::string& path) {
   if (std::filesystem::is_directory(path)) return isRosbag2Folder(path);
-  return bagKindOf(path) != BagKind::kNone;
+  constexpr std::size_t kBegin = 16;  // bytes that tell every kind
+  BagKind kind = bagKindOf(path);
+  if (kind == BagKind::kZstd) kind = bagKindOf(std::string_view(unpackedBegin(path, kBegin)));
+  return kind != BagKind::kNone && kind != BagKind::kZstd;
 }
 
 std::unique_ptr<BagFile> openBag(const std::string& path) {

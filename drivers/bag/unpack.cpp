@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <stdexcept>
 
@@ -149,6 +150,22 @@ std::vector<std::uint8_t> packZstd(std::span<const std::uint8_t> bytes) {
   if (ZSTD_isError(size) != 0) throw std::runtime_error("zstd: out of memory");
   packed.resize(size);
   return packed;
+}
+
+std::string unpackedBegin(const std::string& packed, std::size_t most) {
+  // A frame's first block and its head.
+  std::string from(ZSTD_DStreamInSize(), '\0');
+  std::ifstream file(packed, std::ios::binary);
+  file.read(from.data(), static_cast<std::streamsize>(from.size()));
+  std::string begin(most, '\0');
+  const Zstd stream = makeZstd();
+  ZSTD_inBuffer source = {from.data(), static_cast<std::size_t>(file.gcount()), 0};
+  ZSTD_outBuffer target = {begin.data(), begin.size(), 0};
+  while (target.pos < target.size && source.pos < source.size) {
+    if (ZSTD_isError(ZSTD_decompressStream(stream.get(), &target, &source)) != 0) break;
+  }
+  begin.resize(target.pos);
+  return begin;
 }
 
 UnpackedFile::UnpackedFile(const std::string& packed) {

@@ -27,6 +27,9 @@ enum class Packing : std::uint8_t { kNone, kLz4, kZstd };
 
 [[nodiscard]] std::vector<std::uint8_t> packZstd(std::span<const std::uint8_t> bytes);
 
+/// The first bytes of a file that was packed as a whole with zstd, at most `most`; fewer where it is damaged.
+[[nodiscard]] std::string unpackedBegin(const std::string& packed, std::size_t most);
+
 /// A file that was packed as a whole, unpacked into the system's folder for temporary files and removed with
 /// this object; who has it open may read on. InputError for damage and for a full disk.
 class UnpackedFile {

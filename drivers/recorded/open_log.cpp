@@ -23,7 +23,6 @@ std::unique_ptr<LogSource> openLog(const std::string& path, const LogOptions& op
   }
   if (isAslFolder(path)) return openAslFolder(path, options);
   if (isRecording(path)) return openRecording(path, options);
-  // A tar packed by zstd begins as a rosbag2 file that is packed so.
   if (isArchive(path)) return openAslFolder(path, options);
   if (isBag(path)) return openBagLog(path, options);
   throw InputError(

@@ -41,8 +41,7 @@ AccuracyOptions accuracyOptions(const EvaluationGroup& settings, AlignKind align
 Truth readTruth(const std::string& path, bool without_images) {
   Truth truth;
   constexpr const char* kRemedy = "Give a trajectory file with --truth (TUM, or EuRoC csv)";
-  const bool archive = isArchive(path);
-  if (!archive && isBag(path)) {
+  if (isBag(path)) {
     // Poses alone need no calibration, which a bag does not hold.
     const auto bag = openBag(path);
     const auto topic = chooseTruthTopic(*bag);
@@ -51,7 +50,7 @@ Truth readTruth(const std::string& path, bool without_images) {
     truth.name = path + " " + bag->topics()[*topic].name;
     return truth;
   }
-  if (!archive && !std::filesystem::is_directory(path)) {
+  if (!std::filesystem::is_directory(path) && !isArchive(path)) {
     truth.poses = readEstimate(path);
     truth.name = path;
     return truth;

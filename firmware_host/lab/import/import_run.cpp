@@ -3,10 +3,9 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 
 #include "drivers/calibration/calibration.hpp"
+#include "drivers/input/file_tree.hpp"
 #include "drivers/recorded/asl_text.hpp"
 #include "drivers/recorded/image_files.hpp"
 #include "drivers/recorded/imu_file.hpp"
@@ -30,16 +29,10 @@ struct Recording {
   std::vector<ImuSample> samples;
 };
 
-std::string readText(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(path.string(), 0, "", "cannot be read", "");
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
 Recording phoneRecording(const fs::path& folder) {
-  const fs::path lines = folder / "data.jsonl";
+  const auto files = openFolder(folder.string());
   Recording recording;
-  PhoneLog log = readPhoneLog(lines.string(), readText(lines));
+  PhoneLog log = readPhoneLog(files->name("data.jsonl"), files->text("data.jsonl"));
   recording.samples = std::move(log.samples);
   for (std::size_t camera = 0; camera < kMaxCameras; ++camera) {
     const std::string stem = camera == 0 ? "data" : fmt::format("data{}", camera + 1);
