@@ -6,6 +6,7 @@
 namespace swiftlet {
 
 void addLabCommands(CLI::App& app, int& exit_code) {
+  addCalibrateCommand(app, exit_code);
   addSimulateCommand(app, exit_code);
   addImportCommand(app, exit_code);
   addHilCommand(app, exit_code);

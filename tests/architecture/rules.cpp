@@ -49,7 +49,8 @@ RoomTable directNeighbours() {
   table["drivers/bag"] = {"drivers/calibration", "drivers/device"};
   // Calibration as users have it; a simulated flight is written as a recorded one.
   table["drivers/recorded"].insert({"drivers/bag", "drivers/calibration", "drivers/image"});
-  table["drivers/simulated"].insert("drivers/recorded");
+  table["drivers/target"] = {"drivers/input", "estimator/core"};
+  table["drivers/simulated"].insert({"drivers/recorded", "drivers/target"});
   return table;
 }
 
@@ -85,7 +86,17 @@ RoomTable programNeighbours() {
       {"lab/export", {"lab/evaluation", "outputs/ros2"}},
       {"lab/import", {"files", "interfaces"}},
       {"lab/hil", {"inputs/devices", "lab/budget"}},
-      {"commands", {"lab/export", "lab/hil", "lab/import", "lab/modules", "lab/report", "runs"}},
+      {"lab/calibrate/board", {"files", "inputs/log"}},
+      {"lab/calibrate/cameras", {"lab/calibrate/board"}},
+      {"lab/calibrate/imu_camera", {"lab/calibrate/cameras"}},
+      {"lab/calibrate/imu_noise", {"inputs/log"}},
+      {"lab/calibrate/check", {"lab/evaluation", "runs"}},
+      {"lab/calibrate/page",
+       {"lab/calibrate/check", "lab/calibrate/imu_camera", "lab/calibrate/imu_noise", "lab/report"}},
+      {"lab/calibrate/guidance", {"lab/calibrate/board", "runs"}},
+      {"commands",
+       {"lab/calibrate/guidance", "lab/calibrate/page", "lab/export", "lab/hil", "lab/import", "lab/modules",
+        "lab/report", "runs"}},
   };
 }
 

@@ -128,11 +128,13 @@ std::string SourceFile::room() const {
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   if (folder.empty()) return "";
   const std::string top = *folder.begin();
-  // The tests and the mesher are one room each; of the program, inputs, outputs and lab are groups of rooms.
+  // The tests and the mesher are one room each; of the program, inputs, outputs and lab are groups of rooms,
+  // and in lab calibrate is one.
   std::size_t depth = top == "tests" || top == "mesher" ? 1 : 2;
   if (top == "firmware_host") {
     const std::string group = folder == top ? "" : std::next(folder.begin())->string();
     if (group == "inputs" || group == "outputs" || group == "lab") depth = 3;
+    if (folder.generic_string().starts_with("firmware_host/lab/calibrate")) depth = 4;
   }
   std::filesystem::path room;
   for (const std::filesystem::path& part : folder) {

@@ -38,6 +38,8 @@ TEST_CASE("rooms are folders of the table") {
   CHECK(parseSource("estimator/core/stamp.hpp", "").room() == "estimator/core");
   CHECK(parseSource("firmware_host/commands/replay.cpp", "").room() == "firmware_host/commands");
   CHECK(parseSource("firmware_host/lab/hil/hil_run.cpp", "").room() == "firmware_host/lab/hil");
+  CHECK(parseSource("firmware_host/lab/calibrate/page/a.cpp", "").room() ==
+        "firmware_host/lab/calibrate/page");
   CHECK(parseSource("mesher/plane.hpp", "").room() == "mesher");
   CHECK(parseSource("mapping/volume/block.hpp", "").room() == "mapping/volume");
 }

@@ -1,0 +1,12 @@
+#include "firmware_host/commands/calibrate_commands.hpp"
+#include "firmware_host/commands/command.hpp"
+
+namespace swiftlet {
+
+void addCalibrateCommand(CLI::App& app, int& /*exit_code*/) {
+  CLI::App* command =
+      app.add_subcommand("calibrate", "From a bare rig to a calibration: print a board, move the rig");
+  command->require_subcommand(1);
+}
+
+}  // namespace swiftlet
