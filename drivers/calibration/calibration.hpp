@@ -36,6 +36,8 @@ struct CalibrationOptions {
 
 struct Calibration {
   std::string form;  ///< "EuRoC", "Kalibr", "Basalt", "ROS CameraInfo" or "OpenCV"
+  /// A rig before its calibration: number and size of the cameras and the IMU's rate are right, nothing else.
+  bool bare = false;
   Rig rig;
   ImuNoise noise;  ///< densities as in the file, not inflated
   Eigen::Matrix3d R_body_imu = Eigen::Matrix3d::Identity();

@@ -15,7 +15,7 @@
 #include "firmware_host/inspection/inspect_log.hpp"
 #include "firmware_host/realtime/host_sleep.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
-#include "firmware_host/runs/fly_run.hpp"
+#include "firmware_host/runs/vehicle_calibration.hpp"
 #include "firmware_host/runs/keeping_sink.hpp"
 
 namespace swiftlet {
@@ -71,7 +71,7 @@ class VehicleCheck {
     for (std::size_t i = 0; i < input_.cameras().size(); ++i) addCamera(i, report);
     addPairs(report);
     addTrigger(report);
-    addInspection(sink_.inspect(calibration_), report);
+    if (!calibration_.bare) addInspection(sink_.inspect(calibration_), report);
   }
 
  private:
@@ -273,7 +273,7 @@ DoctorReport examine(const DoctorRequest& request, const Settings& settings) {
   if (namesDevices(settings)) {
     std::optional<Calibration> calibration;
     try {
-      calibration = vehicleCalibration(settings);
+      calibration = calibratedOrBareRig(settings);
       for (const std::string& text : calibration->warnings) {
         report.vehicle.lines.push_back({"calibration", text, MachineVerdict::kNote, ""});
       }

@@ -8,13 +8,12 @@
 #include <optional>
 
 #include "drivers/device/monotonic_now.hpp"
-#include "estimator/core/units.hpp"
 #include "firmware_host/files/run_claim.hpp"
-#include "firmware_host/inputs/devices/input_topics.hpp"
 #include "firmware_host/inputs/devices/live_input.hpp"
 #include "firmware_host/realtime/console.hpp"
 #include "firmware_host/runs/fly_threaded.hpp"
 #include "firmware_host/runs/run_output.hpp"
+#include "firmware_host/runs/vehicle_calibration.hpp"
 #include "firmware_host/settings/confusion_file.hpp"
 #include "firmware_host/settings/moving_labels.hpp"
 
@@ -44,33 +43,6 @@ std::string claimFolder(const FlyRequest& request, const Settings& settings, std
     return {};
   }
 }
-
-}  // namespace
-
-Calibration vehicleCalibration(const Settings& settings) {
-  if (settings.vehicle.calibration.empty()) {
-    throw InputError("settings", 0, "vehicle.calibration",
-                     "the settings do not say how the rig is calibrated",
-                     "Name a folder with EuRoC's sensor.yaml files, or Kalibr's camchain");
-  }
-  CalibrationOptions options;
-  options.accept_unusual_rig = settings.calibration.accept_unusual_rig;
-  Calibration calibration =
-      readCalibration(settings.vehicle.calibration, settings.vehicle.imu_calibration, options);
-  const CamerasGroup& cameras = settings.cameras;
-  if (cameras.shutter == kRolling && !calibration.rig.rolls()) {
-    if (cameras.readout_ms <= 0) {
-      throw InputError("settings", 0, "cameras.readout_ms",
-                       "a rolling shutter's rows are read at their own times",
-                       "Give the milliseconds from the first row to the last, here or in the calibration");
-    }
-    calibration.rig.readout = Duration::fromSeconds(cameras.readout_ms * kFromMs);
-  }
-  applyCameraInfo(settings, calibration);
-  return calibration;
-}
-
-namespace {
 
 /// What a flight is made of. Threads refer to all of it.
 class FlightRun {

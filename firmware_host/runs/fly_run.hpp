@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "drivers/calibration/calibration.hpp"
 #include "firmware_host/outputs/view/view_address.hpp"
 #include "firmware_host/runs/kept_map_request.hpp"
 #include "firmware_host/settings/settings.hpp"
@@ -45,8 +44,5 @@ struct FlyResult {
 /// InputError for bad settings or calibration, and where `out` holds a run. No disk ends or prevents a
 /// flight: what cannot be written is left out and told.
 FlyResult runFlight(const FlyRequest& request, Settings settings);
-
-/// The rig's calibration as the vehicle's settings name it; InputError naming the setting where they do not.
-Calibration vehicleCalibration(const Settings& settings);
 
 }  // namespace swiftlet

@@ -9,7 +9,7 @@
 #include "firmware_host/realtime/console.hpp"
 #include "firmware_host/realtime/host_sleep.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
-#include "firmware_host/runs/fly_run.hpp"
+#include "firmware_host/runs/vehicle_calibration.hpp"
 
 namespace swiftlet {
 namespace {
@@ -23,7 +23,7 @@ std::unique_ptr<RecordSink> makeSink(const RecordRequest& request, const Calibra
 }  // namespace
 
 RecordResult runRecord(const RecordRequest& request, const Settings& settings) {
-  const Calibration calibration = vehicleCalibration(settings);
+  const Calibration calibration = calibratedOrBareRig(settings);
   LiveInput input(settings, calibration);
   for (const std::string& line : calibration.warnings) warn("warning: " + line + "\n");
   LiveInput::Opened opened = input.open();

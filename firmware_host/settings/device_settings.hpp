@@ -16,6 +16,7 @@ struct ImuLinkGroup {
   std::string accel_topic = "";
   std::string protocol = "bridge";
   int baud = 921600;
+  double rate_hz = 200;
   double delay_ms = 0;
   int can_node = 0;  ///< 0: any
 };
@@ -38,6 +39,7 @@ struct CamerasGroup {
   std::string camera_info = kCameraInfoCheck;
   bool side_by_side = false;
   std::string format = "any";
+  std::string resolution = "";  ///< width x height, where no calibration says it
   double rate_hz = 20;
   double exposure_ms = 0;  ///< 0: as the camera has it
   int gain = -1;           ///< below 0: as the camera has it

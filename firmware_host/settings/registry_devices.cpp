@@ -39,6 +39,9 @@ std::vector<Setting> deviceSettings() {
                      {"bridge", "vectornav", "xsens", "mip", "mavlink", "dronecan"}}},
       {"imu_link.baud", "Bd", "Rate of the serial port; means nothing on USB that is no adapter.",
        integer(kLink, &L::baud, 1200, 4'000'000)},
+      {"imu_link.rate_hz", "Hz",
+       "Samples per second of an IMU that has no calibration yet; else its own says it.",
+       real(kLink, &L::rate_hz, 10, 4000)},
       {"imu_link.delay_ms", "ms",
        "Constant part of the way from sensing to arrival, which no clock comparison can see; taken off every "
        "sample's stamp.",
@@ -77,6 +80,10 @@ std::vector<Setting> deviceSettings() {
        "Pixels that the video nodes are asked for, by V4L2's four letters, docs/v4l2.md; any: the first that "
        "is taken and comes in the calibration's size at rate_hz, MJPG last.",
        TextSetting{member(kCameras, &C::format), "four letters as GREY or MJPG, or any"}},
+      {"cameras.resolution", "",
+       "Size of the images of cameras that have no calibration yet, for record and doctor: without "
+       "vehicle.calibration they take the rig as it is.",
+       TextSetting{member(kCameras, &C::resolution), "width and height as 752x480, or empty"}},
       {"cameras.rate_hz", "Hz", "Images per second that each camera is asked for.",
        real(kCameras, &C::rate_hz, 1, 500)},
       {"cameras.exposure_ms", "ms",

@@ -21,6 +21,7 @@
 #include "firmware_host/realtime/host_sleep.hpp"
 #include "firmware_host/runs/doctor_run.hpp"
 #include "firmware_host/runs/fly_run.hpp"
+#include "firmware_host/runs/vehicle_calibration.hpp"
 #include "firmware_host/runs/replay_run.hpp"
 #include "tests/drivers/dds/peer_process.hpp"
 #include "tests/drivers/dds/test_topics.hpp"

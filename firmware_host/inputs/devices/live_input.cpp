@@ -217,6 +217,12 @@ void checkCameras(const CamerasGroup& group, const InputTopics& topics, const Ri
 
 }  // namespace
 
+std::size_t namedCameras(const Settings& settings) {
+  const InputTopics topics = inputTopics(settings, kMaxCameras);
+  const bool second = twoInOne(settings.cameras) || originOf(settings.cameras, topics, 1).named();
+  return second ? 2 : 1;
+}
+
 LiveInput::LiveInput(const Settings& settings, const Calibration& calibration) {
   const InputTopics topics = inputTopics(settings, calibration.rig.camera_count);
   const bool imu_topics = !topics.imu.empty() || !topics.accel.empty();

@@ -22,6 +22,9 @@
 
 namespace swiftlet {
 
+/// One or two: how many cameras the settings name.
+std::size_t namedCameras(const Settings& settings);
+
 class LiveInput : public SensorInput {
  public:
   /// IMU, cameras, trigger.

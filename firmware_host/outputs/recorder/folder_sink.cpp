@@ -40,7 +40,7 @@ void FolderSink::openImu(const Calibration& calibration) {
   const std::filesystem::path folder = std::filesystem::path(folder_) / "mav0" / "imu0";
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  openRows(folder / "sensor.yaml", imuYaml(calibration.noise, kOrigin));
+  if (!calibration.bare) openRows(folder / "sensor.yaml", imuYaml(calibration.noise, kOrigin));
   rows_ = openRows(folder / "data.csv", imuCsvHeader());
 }
 
@@ -49,14 +49,15 @@ void FolderSink::openCamera(std::size_t index, const Calibration& calibration, d
       std::filesystem::path(folder_) / "mav0" / ("cam" + std::to_string(index));
   std::error_code error;
   std::filesystem::create_directories(folder / "data", error);
-  const CameraModel& model = calibration.rig.camera[index];
   Camera& camera = files_[index];
   camera.folder = (folder / "data").string();
-  const std::string times =
-      fmt::format("timeshift_cam_imu: {:.9f}\n", calibration.rig.camera_to_imu_shift.seconds()) +
-      shutterYaml(calibration.rig.readout);
-  openRows(folder / "sensor.yaml",
-           cameraYaml(model, calibration.rig.T_body_cam[index], rate, kOrigin, times));
+  if (!calibration.bare) {
+    const std::string times =
+        fmt::format("timeshift_cam_imu: {:.9f}\n", calibration.rig.camera_to_imu_shift.seconds()) +
+        shutterYaml(calibration.rig.readout);
+    openRows(folder / "sensor.yaml", cameraYaml(calibration.rig.camera[index],
+                                                calibration.rig.T_body_cam[index], rate, kOrigin, times));
+  }
   camera.rows = openRows(folder / "data.csv", "#timestamp [ns],filename\n");
 }
 

@@ -17,7 +17,15 @@ const std::string& unused(const std::string& file) {
 
 McapSink::McapSink(const std::string& file, const Calibration& calibration)
     : RecordSink(file, calibration), bag_(makeMcapWriter(unused(file), McapPacking::kZstd)) {
-  for (std::size_t c = 0; c < cameras(); ++c) info_[c] = cameraInfoOf(calibration.rig.camera[c]);
+  for (std::size_t c = 0; c < cameras(); ++c) {
+    info_[c] = cameraInfoOf(calibration.rig.camera[c]);
+    if (!calibration.bare) continue;
+    // ROS's sign of a camera that is not calibrated: nothing but its size.
+    info_[c].distortion_model.clear();
+    info_[c].d.clear();
+    info_[c].k = {};
+    info_[c].p = {};
+  }
   startWriter([this] { return writeWaiting(); });
 }
 

@@ -150,6 +150,30 @@ TEST_CASE("settings that name no device or no calibration are wrong use, and say
   CHECK_THAT(said.text, Catch::Contains("this vehicle") && Catch::Contains("vehicle.calibration"));
 }
 
+TEST_CASE("a rig without a calibration is recorded by what the settings say of its size") {
+  const ScratchFolder folder("first_hour_bare");
+  const std::string imu = "imu_link.device=" + folder.file("imu");
+  const std::string camera = "cameras.device0=" + folder.file("video0");
+  const auto record = [&](const std::string& resolution) {
+    return run({"record", "--out", folder.file("out"), "--set", imu, "--set", camera, "--set",
+                "cameras.resolution=" + resolution});
+  };
+  const Said said = record("640x400");
+  INFO(said.text);
+  CHECK(said.code == kExitFailed);  // the devices are not there: nothing else is missing
+  CHECK_THAT(lineWith(said.text, "camera 0 ("), Catch::Contains("not there"));
+  CHECK_THAT(said.text, !Catch::Contains("camera 1") && !Catch::Contains("vehicle.calibration"));
+  for (const char* wrong : {"640", "640x", "8x8", "640x400x3", "wide"}) {
+    const Said refused = record(wrong);
+    CHECK(refused.code == kExitBadInput);
+    CHECK_THAT(refused.text, Catch::Contains("cameras.resolution") && Catch::Contains("752x480"));
+  }
+  const Said flight = run({"fly", "--out", folder.file("out"), "--set", imu, "--set", camera, "--set",
+                           "cameras.resolution=640x400"});
+  CHECK(flight.code == kExitBadInput);
+  CHECK_THAT(flight.text, Catch::Contains("vehicle.calibration"));
+}
+
 TEST_CASE("a device of another kind is told as such") {
   const ScratchFolder folder("first_hour_kind");
   const std::string settings = vehicle(folder);

@@ -112,6 +112,23 @@ TEST_CASE("a recorded folder is read back with the same stamps, samples and pixe
   CHECK(frames == std::array{kFrames, kFrames});
 }
 
+TEST_CASE("a rig without a calibration is recorded without sensor files") {
+  const ScratchFolder folder("folder_sink_bare");
+  Calibration given = calibration();
+  given.bare = true;
+  {
+    FolderSink sink(folder.file("log"), given, 20);
+    sink.takeImu(sampleNumber(0), {}, {});
+    hand(sink, 0, 0, sampleNumber(0).stamp, given.rig.camera[0].width(), given.rig.camera[0].height());
+    sink.finish();
+  }
+  for (const char* sensor : {"cam0", "cam1", "imu0"}) {
+    const std::filesystem::path place = std::filesystem::path(folder.file("log")) / "mav0" / sensor;
+    CHECK(std::filesystem::exists(place / "data.csv"));
+    CHECK_FALSE(std::filesystem::exists(place / "sensor.yaml"));
+  }
+}
+
 TEST_CASE("what finds no room is counted, and all that is counted as written is there") {
   const ScratchFolder folder("folder_sink_full");
   const Calibration given = calibration();
