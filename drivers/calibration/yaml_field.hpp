@@ -1,6 +1,6 @@
 #pragma once
 // One value of a YAML file together with where it stands, so that every complaint names file, line
-// and field. Private to this folder.
+// and field. For the readers of drivers/calibration and drivers/target.
 
 #include <yaml-cpp/yaml.h>
 

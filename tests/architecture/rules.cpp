@@ -49,7 +49,7 @@ RoomTable directNeighbours() {
   table["drivers/bag"] = {"drivers/calibration", "drivers/device"};
   // Calibration as users have it; a simulated flight is written as a recorded one.
   table["drivers/recorded"].insert({"drivers/bag", "drivers/calibration", "drivers/image"});
-  table["drivers/target"] = {"drivers/input", "estimator/core"};
+  table["drivers/target"] = {"drivers/calibration"};
   table["drivers/simulated"].insert({"drivers/recorded", "drivers/target"});
   return table;
 }

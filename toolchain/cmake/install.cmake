@@ -26,7 +26,7 @@ install(EXPORT swiftletTargets NAMESPACE swiftlet:: DESTINATION ${CMAKE_INSTALL_
 # What the exported libraries link (a static library's private packages too) has to be found again
 # by the user: one line of the package file for each imported target.
 function(swiftlet_dependency_line target result)
-  if(target MATCHES "^(Eigen3|PNG|JPEG|ZLIB|LibLZMA|LibArchive|BZip2|Threads|OpenMP|fmt|spdlog|yaml-cpp|libjpeg-turbo|CLI11|CycloneDDS)(::|$)")
+  if(target MATCHES "^(Eigen3|PNG|JPEG|ZLIB|LibLZMA|LibArchive|BZip2|Threads|OpenMP|fmt|spdlog|yaml-cpp|libjpeg-turbo|CLI11|CycloneDDS|apriltag)(::|$)")
     set(${result} "find_dependency(${CMAKE_MATCH_1})" PARENT_SCOPE)
   elseif(target MATCHES "^nlohmann_json::")
     set(${result} "find_dependency(nlohmann_json)" PARENT_SCOPE)
