@@ -1,0 +1,41 @@
+#pragma once
+// Tags of Kalibr's boards by libapriltag: tag36h11 with a black border of two cells. Their corners are good
+// to a pixel or two. Threads: one. Private to this folder.
+
+#include <apriltag/apriltag.h>
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "estimator/core/image_view.hpp"
+
+namespace swiftlet {
+
+struct FoundTag {
+  int id = 0;
+  std::array<Eigen::Vector2d, 4> corners;  ///< lower left, lower right, upper right, upper left
+};
+
+class TagFinder {
+ public:
+  TagFinder();
+  TagFinder(const TagFinder&) = delete;
+  TagFinder& operator=(const TagFinder&) = delete;
+  ~TagFinder();
+
+  /// By rising id; ids that are seen twice are left out. `twice`: in the image enlarged by two.
+  [[nodiscard]] std::vector<FoundTag> find(const ImageView& image, bool twice);
+
+  /// The 36 cells of a tag's code, rows from above: 1 white, -1 black.
+  using Code = Eigen::Matrix<double, 36, 1>;
+  [[nodiscard]] Code code(int id) const;
+
+ private:
+  apriltag_family_t* family_ = nullptr;
+  apriltag_detector_t* detector_ = nullptr;
+  std::vector<std::uint8_t> enlarged_, widened_;
+};
+
+}  // namespace swiftlet
