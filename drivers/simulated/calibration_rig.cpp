@@ -158,4 +158,12 @@ CalibrationRig drawCalibrationRig(std::uint64_t seed, CameraKind lens) {
   return drawn;
 }
 
+CalibrationRig makeCalibrationRig(RigKind kind, std::uint64_t seed) {
+  if (kind == RigKind::kRandomPinhole) return drawCalibrationRig(seed, CameraKind::kPinholeRadtan);
+  if (kind == RigKind::kRandomFisheye) return drawCalibrationRig(seed, CameraKind::kEquidistant);
+  CalibrationRig preset;
+  preset.rig = makeRig(kind).rig;
+  return preset;
+}
+
 }  // namespace swiftlet

@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 
+#include "drivers/simulated/rig_presets.hpp"
 #include "estimator/camera/rig.hpp"
 #include "estimator/imu/imu_noise.hpp"
 
@@ -25,5 +26,8 @@ struct CalibrationRig {
 
 /// The same seed gives the same bytes.
 CalibrationRig drawCalibrationRig(std::uint64_t seed, CameraKind lens);
+
+/// The same for a kind of rig: drawn by `seed`, or a preset with an IMU as told.
+CalibrationRig makeCalibrationRig(RigKind kind, std::uint64_t seed);
 
 }  // namespace swiftlet

@@ -49,12 +49,14 @@ MountedRig pairInAirframe(const CameraModel& left, const CameraModel& right, dou
 }  // namespace
 
 const char* rigName(RigKind kind) {
-  static constexpr std::array<const char*, 4> kNames{"euroc", "forward", "wide", "fisheye"};
+  static constexpr std::array<const char*, 6> kNames{"euroc",   "forward",        "wide",
+                                                     "fisheye", "random_pinhole", "random_fisheye"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 
 std::optional<RigKind> rigNamed(const std::string& name) {
-  for (const RigKind kind : {RigKind::kEuroc, RigKind::kForward, RigKind::kWide, RigKind::kFisheye}) {
+  for (const RigKind kind : {RigKind::kEuroc, RigKind::kForward, RigKind::kWide, RigKind::kFisheye,
+                             RigKind::kRandomPinhole, RigKind::kRandomFisheye}) {
     if (name == rigName(kind)) return kind;
   }
   return std::nullopt;
@@ -78,6 +80,8 @@ MountedRig makeRig(RigKind kind) {
           CameraModel(equidistant, 640, 480, {280.6, 280.4, 322.9, 236.8}, {-0.011, 0.003, -0.002, 4e-4}),
           0.10, 10 * pi / 180);
     case RigKind::kFisheye:
+    case RigKind::kRandomPinhole:
+    case RigKind::kRandomFisheye:
       break;
   }
   // 640 pixels over 180 degrees; the image circle just touches the sides.
@@ -86,6 +90,13 @@ MountedRig makeRig(RigKind kind) {
       CameraModel(equidistant, 640, 480, {202.8, 202.9, 318.6, 238.7}, {0.002, -0.001, 4e-4, -8e-5}), 0.10,
       0.0);
   return turnImu(straight, expSo3({0.7, -1.1, 0.4}));
+}
+
+MountedRig mountForward(const Rig& rig) {
+  MountedRig mounted;
+  mounted.rig = rig;
+  mounted.R_flu_body = forwardCamera(0, 0).rotation * rig.T_body_cam[0].rotation.conjugate();
+  return mounted;
 }
 
 MountedRig turnImu(const MountedRig& mounted, const Eigen::Quaterniond& R_flu_body) {

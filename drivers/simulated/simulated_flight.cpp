@@ -5,6 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "drivers/simulated/calibration_rig.hpp"
 #include "drivers/simulated/given_motion.hpp"
 #include "estimator/geometry/so3.hpp"
 
@@ -31,6 +32,17 @@ Rig turnedRig(const Rig& rig, const SimulationSettings& settings) {
   return turned;
 }
 
+MountedRig rigOf(SimulationSettings& settings) {
+  if (!isRandom(settings.rig)) return makeRig(settings.rig);
+  const CalibrationRig drawn = makeCalibrationRig(settings.rig, settings.rig_seed);
+  settings.imu.noise = drawn.noise;
+  settings.imu.gyro_matrix = drawn.gyro_matrix;
+  settings.imu.accel_matrix = drawn.accel_matrix;
+  settings.image_stamp_offset = -drawn.rig.camera_to_imu_shift;
+  settings.render.readout = drawn.rig.readout.seconds();
+  return mountForward(drawn.rig);
+}
+
 double longestExposure(const SimulationSettings& settings) {
   const double given = settings.render.exposure;
   return settings.exposure_mode == ExposureMode::kOdometry ? std::max(given, SimulatedExposure::kLongest)
@@ -41,6 +53,7 @@ double longestExposure(const SimulationSettings& settings) {
 
 SimulatedFlight::SimulatedFlight(const SimulationSettings& settings) : settings_(settings) {
   SimulationSettings& s = settings_;
+  const MountedRig mounted = rigOf(s);
   s.world.seed = s.world_seed != 0 ? s.world_seed : s.seed;
   s.flight.seed = s.imu.seed = s.sensor.seed = s.tracks.seed = s.seed;
   s.paint.threads = s.render.threads = s.threads;
@@ -56,7 +69,6 @@ SimulatedFlight::SimulatedFlight(const SimulationSettings& settings) : settings_
   s.tracks.mono = s.mono;
   checkSettings();
 
-  const MountedRig mounted = makeRig(s.rig);
   s.flight.R_flu_body = mounted.R_flu_body;
   true_rig_ = mounted.rig;
   if (s.mono) true_rig_.camera_count = 1;

@@ -49,10 +49,12 @@ struct SimulationSettings {
   std::vector<std::string> world_for;
   double motion_skip = 0;  ///< s of it left out at the beginning
 
+  /// A random rig comes with its own noise, IMU matrices, time shift and readout in place of those below.
   RigKind rig = RigKind::kEuroc;
-  bool mono = false;         ///< camera 0 alone
-  double camera_rate = 20;   ///< Hz
-  double first_image = 0.1;  ///< s of IMU before the first image
+  std::uint64_t rig_seed = 1;  ///< of a random rig
+  bool mono = false;           ///< camera 0 alone
+  double camera_rate = 20;     ///< Hz
+  double first_image = 0.1;    ///< s of IMU before the first image
 
   ImuSimulationSettings imu;  ///< noise, biases, vibration; its gaps and saturations come from `faults`
   PaintSettings paint;

@@ -8,6 +8,8 @@
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/track_file.hpp"
 #include "drivers/simulated/folder_writer.hpp"
+#include "drivers/simulated/session_folder.hpp"
+#include "drivers/target/target_file.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/realtime/progress.hpp"
@@ -28,6 +30,8 @@ struct SimulateOptions {
   std::vector<std::pair<double, double>> light;
   bool tracks = false;
   bool png = false;
+  std::string board;
+  SessionFolderSettings session;
 };
 
 void addFault(std::vector<Fault>& faults, FaultKind kind, const std::vector<double>& span, int camera) {
@@ -52,6 +56,38 @@ Status simulateTracks(const SimulationSettings& settings, const std::string& fol
   return status;
 }
 
+Status simulateSession(const SimulateOptions& options, const SimulationSettings& flight,
+                       const SimulationProgress& progress, std::string& message) {
+  SessionFolderSettings session = options.session;
+  session.rig = flight.rig;
+  session.rig_seed = flight.rig_seed;
+  session.mono = flight.mono;
+  session.image_stamp_offset = flight.image_stamp_offset;
+  session.readout = Duration::fromSeconds(flight.render.readout);
+  session.session.seed = flight.seed;
+  session.session.duration = flight.flight.duration;
+  session.session.camera_rate = flight.camera_rate;
+  if (flight.flight.rest_at_start > 0) session.session.rests.push_back({0, flight.flight.rest_at_start});
+  session.format = flight.format;
+  session.threads = flight.threads;
+  return simulateSessionToFolder(readTarget(options.board), session, options.out, progress, &message);
+}
+
+void addSessionOptions(CLI::App& command, SimulateOptions& options) {
+  command.add_option(
+      "--board", options.board,
+      "A calibration session in place of a flight: a hand moves the rig in front of this board "
+      "(Kalibr's target YAML)");
+  command.add_flag("--calibrated", options.session.calibrated,
+                   "Of a session: leave the cameras' true calibration in the log");
+  addChoice<Turning>(command, "--turning", options.session.session.turning,
+                     "Of a session: how the hand turns the rig; the last two are mistakes",
+                     {{"all", Turning::kAll}, {"no_roll", Turning::kNoRoll}, {"none", Turning::kNone}});
+  command.add_option("--lens-blur", options.session.lens_blur, "Of a session: of both lenses, 1 sigma [px]")
+      ->check(range(0.0, 20.0))
+      ->capture_default_str();
+}
+
 int simulate(const SimulateOptions& options) {
   static_cast<void>(options.settings.read());  // complains about wrong settings as every command does
   SimulationSettings settings = options.simulation;
@@ -70,8 +106,14 @@ int simulate(const SimulateOptions& options) {
     if (!progress) progress = std::make_unique<Progress>("simulate", static_cast<std::uint64_t>(total));
     progress->update(static_cast<std::uint64_t>(done));
   };
-  const Status status = options.tracks ? simulateTracks(settings, options.out, show, message)
-                                       : simulateToFolder(settings, options.out, show, &message);
+  Status status;
+  if (!options.board.empty()) {
+    status = simulateSession(options, settings, show, message);
+  } else if (options.tracks) {
+    status = simulateTracks(settings, options.out, show, message);
+  } else {
+    status = simulateToFolder(settings, options.out, show, &message);
+  }
   if (progress) progress->finish();
   if (!status.ok()) {
     throw InputError("simulate", 0, "", message.empty() ? status.what : message,
@@ -98,7 +140,13 @@ void addFlightOptions(CLI::App& command, SimulationSettings& s) {
                      {{"euroc", RigKind::kEuroc},
                       {"forward", RigKind::kForward},
                       {"wide", RigKind::kWide},
-                      {"fisheye", RigKind::kFisheye}});
+                      {"fisheye", RigKind::kFisheye},
+                      {"random_pinhole", RigKind::kRandomPinhole},
+                      {"random_fisheye", RigKind::kRandomFisheye}});
+  command
+      .add_option("--rig-seed", s.rig_seed,
+                  "Seed of a random rig: lenses, poses, IMU matrices and noise, time shift, shutter")
+      ->capture_default_str();
   command.add_option("--speed", s.flight.speed, "Mean speed [m/s]")->check(positive())->capture_default_str();
   command.add_option("--aggressiveness", s.flight.aggressiveness, "0 calm, 1 usual, 2 fast")
       ->check(range(0.0, 4.0))
@@ -117,11 +165,13 @@ void addFlightOptions(CLI::App& command, SimulationSettings& s) {
 }  // namespace
 
 void addSimulateCommand(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("simulate", "Make a flight with exact truth, as an EuRoC folder");
+  CLI::App* command = app.add_subcommand(
+      "simulate", "Make a flight, or a calibration session, with exact truth, as an EuRoC folder");
   auto options = std::make_shared<SimulateOptions>();
   SimulationSettings& simulation = options->simulation;
   command->add_option("--out", options->out, "Folder to write")->capture_default_str();
   addFlightOptions(*command, simulation);
+  addSessionOptions(*command, *options);
   command->add_option("--rate", simulation.camera_rate, "Images a second [Hz]")
       ->check(range(1.0, 200.0))
       ->capture_default_str();
@@ -158,7 +208,8 @@ void addSimulateCommand(CLI::App& app, int& exit_code) {
   options->settings.addTo(*command);
   command->footer(
       "Example:\n  swiftlet simulate --duration 20 --seed 7 --out flight\n"
-      "  swiftlet simulate --world hall --rig fisheye --imu-gap 8 1 --out hard_flight");
+      "  swiftlet simulate --world hall --rig fisheye --imu-gap 8 1 --out hard_flight\n"
+      "  swiftlet simulate --board board.yaml --rig random_pinhole --rig-seed 3 --out session");
   command->callback([options, &exit_code] { exit_code = simulate(*options); });
 }
 
