@@ -146,4 +146,56 @@ MotionState SplineTrajectory::at(double seconds) const {
   return state;
 }
 
+MotionState SplineTrajectory::at(double seconds, SplineJacobian& jacobian) const {
+  const Segment segment = segmentOf(seconds);
+  Basis basis = basisAt(segment.u);
+  const double per_second = 1.0 / spacing_;
+  const SE3* control = controls_.data() + segment.first;
+  jacobian.first = segment.first;
+  jacobian.position = basis.value;
+  for (std::size_t l = 0; l < kOrder; ++l) {
+    jacobian.acceleration[l] = basis.second[l] * per_second * per_second;
+  }
+  accumulate(basis.value);
+  accumulate(basis.first);
+
+  // By the steps between controls; those before step l are carried on by each later turn.
+  std::array<Eigen::Matrix3d, kOrder> turn_by_step;
+  std::array<Eigen::Matrix3d, kOrder> rate_by_step;
+  std::array<Eigen::Vector3d, kOrder> steps;
+  std::array<Eigen::Matrix3d, kOrder> between;
+  std::array<Eigen::Matrix3d, kOrder> back;
+  Eigen::Vector3d omega = Eigen::Vector3d::Zero();
+  for (std::size_t l = 1; l < kOrder; ++l) {
+    between[l] = (control[l - 1].rotation.conjugate() * control[l].rotation).toRotationMatrix();
+    steps[l] = logSo3(between[l]);
+    const Eigen::Vector3d turn = basis.value[l] * steps[l];
+    back[l] = expSo3Matrix(-turn);
+    const Eigen::Vector3d carried = back[l] * omega;
+    const double speed = basis.first[l] * per_second;
+    turn_by_step[l] = basis.value[l] * rightJacobianSo3(turn);
+    rate_by_step[l] = hat(carried) * turn_by_step[l] + speed * Eigen::Matrix3d::Identity();
+    omega = carried + speed * steps[l];
+  }
+  Eigen::Matrix3d later = Eigen::Matrix3d::Identity();  // of all turns after step l, back
+  std::array<Eigen::Matrix3d, kOrder>& turns = jacobian.rotation;
+  std::array<Eigen::Matrix3d, kOrder>& rates = jacobian.rate;
+  for (std::size_t l = 0; l < kOrder; ++l) {
+    turns[l].setZero();
+    rates[l].setZero();
+  }
+  for (std::size_t l = kOrder - 1; l > 0; --l) {
+    const Eigen::Matrix3d inverse = rightJacobianInverseSo3(steps[l]);
+    const Eigen::Matrix3d by_turn = later * turn_by_step[l] * inverse;
+    const Eigen::Matrix3d by_rate = later * rate_by_step[l] * inverse;
+    turns[l] += by_turn;
+    rates[l] += by_rate;
+    turns[l - 1] -= by_turn * between[l].transpose();
+    rates[l - 1] -= by_rate * between[l].transpose();
+    later = later * back[l];
+  }
+  turns[0] += later;
+  return at(seconds);
+}
+
 }  // namespace swiftlet

@@ -12,6 +12,7 @@
 // "Efficient Derivative Computation for Cumulative B-Splines on Lie Groups", CVPR 2020, eq. 22-31.
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -27,10 +28,20 @@ struct MotionState {
   Eigen::Vector3d alpha_body = Eigen::Vector3d::Zero();    ///< rad/s^2, body axes
 };
 
+/// How a state depends on the controls that shape it. A control moves as R <- R Exp(phi), p <- p + d.
+struct SplineJacobian {
+  static constexpr std::size_t kOrder = 6;
+  std::size_t first = 0;                         ///< the oldest of kOrder controls
+  std::array<double, kOrder> position{};         ///< d p / d d, times the identity
+  std::array<double, kOrder> acceleration{};     ///< d a / d d [1/s^2]
+  std::array<Eigen::Matrix3d, kOrder> rotation;  ///< d turn / d phi, where R moves as R <- R Exp(turn)
+  std::array<Eigen::Matrix3d, kOrder> rate;      ///< d omega_body / d phi [1/s]
+};
+
 class SplineTrajectory {
  public:
-  static constexpr std::size_t kOrder = 6;         ///< controls that shape one segment
-  static constexpr std::size_t kCentreOffset = 2;  ///< controls before the first instant
+  static constexpr std::size_t kOrder = SplineJacobian::kOrder;  ///< controls that shape one segment
+  static constexpr std::size_t kCentreOffset = 2;                ///< controls before the first instant
 
   SplineTrajectory() = default;
   /// At least kOrder controls, `spacing` seconds apart; the first segment begins at `start`.
@@ -44,10 +55,14 @@ class SplineTrajectory {
   [[nodiscard]] double endTime() const {
     return start_ + spacing_ * static_cast<double>(controls_.size() + 1 - kOrder);
   }
+  [[nodiscard]] double spacing() const { return spacing_; }
   [[nodiscard]] const std::vector<SE3>& controls() const { return controls_; }
+  [[nodiscard]] std::vector<SE3>& controls() { return controls_; }
 
   [[nodiscard]] SE3 pose(double seconds) const;
   [[nodiscard]] MotionState at(double seconds) const;
+  /// The same, with the derivatives by the controls. Some 2 us.
+  [[nodiscard]] MotionState at(double seconds, SplineJacobian& jacobian) const;
 
  private:
   struct Segment {

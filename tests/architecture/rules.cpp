@@ -88,7 +88,7 @@ RoomTable programNeighbours() {
       {"lab/hil", {"inputs/devices", "lab/budget"}},
       {"lab/calibrate/board", {"files", "inputs/log"}},
       {"lab/calibrate/cameras", {"lab/calibrate/board"}},
-      {"lab/calibrate/imu_camera", {"lab/calibrate/cameras"}},
+      {"lab/calibrate/imu_camera", {"inspection", "lab/calibrate/cameras"}},
       {"lab/calibrate/imu_noise", {"inputs/log"}},
       {"lab/calibrate/check", {"lab/evaluation", "runs"}},
       {"lab/calibrate/page",

@@ -1,0 +1,178 @@
+#include "firmware_host/lab/calibrate/imu_camera/calibrate_imu_camera.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "firmware_host/lab/calibrate/imu_camera/batch_start.hpp"
+#include "firmware_host/lab/calibrate/imu_camera/batch_verdict.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr double kFirstSpacing = 0.1;   // s
+constexpr double kReadingsPerKnot = 4;  // at least
+constexpr double kOutlierSigmas = 4;
+constexpr double kRefineSigmas = 5;        // of chi^2 above what as many more unknowns gain from noise
+constexpr double kRollingSigmas = 4;       // of the readout, above zero
+constexpr double kFirstCornerSigma = 0.3;  // px: until the residuals say
+constexpr int kFirstSteps = 15;
+constexpr int kSteps = 12;
+
+/// Corners beyond four sigma, by the median of the residuals. The number of outliers.
+std::size_t markOutliers(const BatchProblem& problem, BatchData& data, double& sigma) {
+  std::vector<double> sizes;
+  for (const SeenView& view : data.views) {
+    for (const SeenCorner& corner : view.corners) {
+      Eigen::Vector2d r;
+      if (!problem.residual(view, corner, r)) continue;
+      sizes.push_back(std::abs(r.x()));
+      sizes.push_back(std::abs(r.y()));
+    }
+  }
+  if (sizes.empty()) return 0;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  constexpr double kMedianOfNormal = 0.6745;
+  sigma = *middle / kMedianOfNormal;
+  std::size_t outliers = 0;
+  for (SeenView& view : data.views) {
+    for (SeenCorner& corner : view.corners) {
+      Eigen::Vector2d r;
+      if (!problem.residual(view, corner, r)) continue;
+      corner.outlier = r.cwiseAbs().maxCoeff() > kOutlierSigmas * sigma;
+      outliers += corner.outlier ? 1 : 0;
+    }
+  }
+  return outliers;
+}
+
+/// Weights from the residuals.
+void weigh(BatchProblem& problem) {
+  BatchNoise noise = problem.noise();
+  const auto factor = [&](Residuals which) {
+    return std::sqrt(problem.cost(which) / std::max(problem.redundancy(which), 1.0));
+  };
+  noise.corner *= factor(Residuals::kCorner);
+  noise.gyro *= factor(Residuals::kGyro);
+  noise.accel *= factor(Residuals::kAccel);
+  problem.setNoise(noise);
+}
+
+/// Sums of squares, each kind over `noise`.
+double costIn(const BatchProblem& problem, const BatchNoise& noise) {
+  const BatchNoise& own = problem.noise();
+  const auto square = [](double x) { return x * x; };
+  return problem.cost(Residuals::kCorner) * square(own.corner / noise.corner) +
+         problem.cost(Residuals::kGyro) * square(own.gyro / noise.gyro) +
+         problem.cost(Residuals::kAccel) * square(own.accel / noise.accel);
+}
+
+/// Finer knots while they explain more than noise. False where the finest still leave motion unexplained.
+bool chooseKnots(BatchProblem& problem, double rate_hz) {
+  while (problem.state().spline.spacing() / 2 >= kReadingsPerKnot / rate_hz) {
+    const BatchProblem coarse = problem;
+    problem.refineSpline();
+    problem.solve(kSteps, false);
+    weigh(problem);
+    // Both in the noise that the finer spline leaves.
+    const double gain = costIn(coarse, problem.noise()) - costIn(problem, problem.noise());
+    const double more = problem.chainSize() - coarse.chainSize();
+    if (gain < more + kRefineSigmas * std::sqrt(2 * more)) return true;
+  }
+  return false;
+}
+
+BatchState halfOf(const BatchState& whole, bool second) {
+  BatchState half = whole;
+  const std::vector<SE3>& controls = whole.spline.controls();
+  const std::size_t segments = controls.size() + 1 - SplineTrajectory::kOrder;
+  const auto every = static_cast<std::size_t>(whole.bias_every);
+  const std::size_t cut = segments / 2 / every * every;
+  const std::size_t from = second ? cut : 0;
+  const std::size_t to = second ? segments : cut;
+  half.spline = SplineTrajectory(
+      whole.spline.startTime() + static_cast<double>(from) * whole.spline.spacing(), whole.spline.spacing(),
+      {controls.begin() + static_cast<std::ptrdiff_t>(from),
+       controls.begin() + static_cast<std::ptrdiff_t>(to + SplineTrajectory::kOrder - 1)});
+  const auto first_bias = static_cast<std::ptrdiff_t>(from / every);
+  half.bias.assign(
+      whole.bias.begin() + first_bias,
+      std::min(whole.bias.end(), whole.bias.begin() + static_cast<std::ptrdiff_t>(to / every) + 2));
+  return half;
+}
+
+}  // namespace
+
+ImuCameraSolution calibrateImuCamera(const ImuCameraInput& input,
+                                     const std::function<void(double)>& progress) {
+  const auto tell = [&](double share) {
+    if (progress) progress(share);
+  };
+  BatchStart start =
+      startBatch(input.target, input.views, input.samples, input.noise, input.cameras, kFirstSpacing);
+  if (!start.reasons.empty()) {
+    ImuCameraSolution failed;
+    failed.reasons = start.reasons;
+    return failed;
+  }
+  tell(0.05);
+  BatchProblem problem(start.data, start.state, {kFirstCornerSigma, 1, 1});
+  if (input.other_cameras) {
+    for (std::size_t c = 0; c < input.cameras.camera_count; ++c) {
+      const SolvedCamera::Covariance& known = input.cameras.camera[c].covariance;
+      if (known.diagonal().minCoeff() > 0) problem.setLensPrior(c, known.inverse());
+    }
+  }
+
+  // Coarse motion first, with what shapes it least held.
+  for (std::size_t c = 0; c < start.state.camera_count; ++c) problem.hold(batch::lens(c), kLensParameters);
+  problem.hold(batch::kReadout, 1);
+  problem.hold(batch::kGyro, 9 + 6);
+  problem.solve(kFirstSteps, true);
+  tell(0.15);
+  for (std::size_t c = 0; c < start.state.camera_count; ++c)
+    problem.hold(batch::lens(c), kLensParameters, false);
+  problem.hold(batch::kReadout, 1, false);
+  problem.hold(batch::kGyro, 9 + 6, false);
+  problem.solve(kFirstSteps, true);
+  tell(0.3);
+  BatchNoise noise = problem.noise();
+  markOutliers(problem, start.data, noise.corner);
+  problem.setNoise(noise);
+  problem.solve(kSteps, false);
+  weigh(problem);
+  BatchVerdict verdict(input, start);
+  verdict.knots_suffice = chooseKnots(problem, input.noise.rate_hz);
+  tell(0.6);
+
+  const double readout_sigma = std::sqrt(problem.covariance()(batch::kReadout, batch::kReadout));
+  verdict.rolling = std::abs(problem.state().readout) > kRollingSigmas * readout_sigma;
+  if (!verdict.rolling) {
+    problem.setReadout(0);
+    problem.hold(batch::kReadout, 1);
+  }
+  noise = problem.noise();
+  verdict.outliers = markOutliers(problem, start.data, noise.corner);
+  verdict.settled = problem.solve(kSteps, false);
+  weigh(problem);
+  verdict.settled = problem.solve(kSteps, false) && verdict.settled;
+  tell(0.75);
+  ImuCameraSolution solution = verdict.solutionOf(problem);
+  tell(0.8);
+
+  for (const bool second : {false, true}) {
+    BatchProblem half(start.data, halfOf(problem.state(), second), problem.noise());
+    if (!verdict.rolling) half.hold(batch::kReadout, 1);
+    half.solve(kSteps, false);
+    verdict.halves[second ? 1 : 0] = half.state();
+    verdict.half_covariances[second ? 1 : 0] = half.covariance();
+    tell(second ? 1.0 : 0.9);
+  }
+  verdict.judge(problem, solution);
+  return solution;
+}
+
+}  // namespace swiftlet
