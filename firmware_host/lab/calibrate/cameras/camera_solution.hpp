@@ -37,7 +37,7 @@ struct SolvedCamera {
   std::string why_this_model;                  ///< in words, with the other model's figure
   double rms = 0;                              ///< px per axis, without outliers
   double other_model_rms = 0;                  ///< px
-  /// The same lens from the first and the second half of the views, each alone.
+  /// The same lens from every other view, and from the rest.
   std::array<CameraModel, 2> halves;
 };
 

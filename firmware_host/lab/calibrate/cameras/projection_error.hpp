@@ -1,0 +1,37 @@
+#pragma once
+// How far a lens projects beside the truth, over its image: from its covariance, or from another lens.
+//
+// A rotation of the camera's frame is taken out, the one that leaves the least squares over the image: no
+// image tells a moved centre from a turned camera, and what a rig is calibrated to afterwards (the other
+// camera, the IMU) turns with it. Lengths are rms of the two axes [px]. Source: mrcal, doc/uncertainty.org
+// (the idea of a projection's uncertainty with the frame's motion removed).
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "estimator/camera/camera_model.hpp"
+
+namespace swiftlet {
+
+/// Points from edge to edge of the image.
+inline constexpr int kImageGridColumns = 25;
+inline constexpr int kImageGridRows = 17;
+
+struct ImagePoint {
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  double error = 0;  ///< px, rms of the two axes
+};
+
+/// 1 sigma; points where the lens has no inverse are left out.
+[[nodiscard]] std::vector<ImagePoint> projectionSigmas(const CameraModel& lens,
+                                                       const Eigen::Matrix<double, 8, 8>& covariance);
+
+/// `other` beside `lens`; left out where one of them has no inverse or does not reach.
+[[nodiscard]] std::vector<ImagePoint> projectionDifference(const CameraModel& lens, const CameraModel& other);
+
+/// Rms over the points.
+[[nodiscard]] double rms(const std::vector<ImagePoint>& points);
+/// What `part` of the points stay below.
+[[nodiscard]] double quantile(const std::vector<ImagePoint>& points, double part);
+
+}  // namespace swiftlet
