@@ -29,7 +29,7 @@ Calibration joinToImu(const BareCameras& bare, const YamlField& imu, Warnings wa
   Calibration calibration;
   calibration.form = bare.form;
   calibration.warnings = std::move(warnings);
-  refuseImuModel(imu, calibration.warnings);
+  readImuModel(imu, calibration);
   calibration.noise = readNoise(imu, imu.has("rate_hz") ? "rate_hz" : "update_rate", calibration.warnings);
   std::vector<CameraEntry> entries = bare.cameras;
   const YamlField first = imu.at("T_imu_cam0", kPlaceRemedy);

@@ -21,6 +21,7 @@
 #include <string_view>
 #include <vector>
 
+#include "drivers/calibration/imu_correction.hpp"
 #include "drivers/input/input_error.hpp"
 #include "estimator/camera/rig.hpp"
 #include "estimator/imu/imu_noise.hpp"
@@ -41,6 +42,10 @@ struct Calibration {
   Rig rig;
   ImuNoise noise;  ///< densities as in the file, not inflated
   Eigen::Matrix3d R_body_imu = Eigen::Matrix3d::Identity();
+  /// Of the sensors, in their own axes (imu_correction.hpp). `scale-misalignment` IMU files have them.
+  Eigen::Matrix3d gyro_matrix = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d gyro_by_force = Eigen::Matrix3d::Zero();  ///< rad/s per m/s^2
+  Eigen::Matrix3d accel_matrix = Eigen::Matrix3d::Identity();
   SE3 T_body_filebody;  ///< translation only
   /// How a lens that the estimator does not have was converted (lens_fit.hpp); empty where it is as in the
   /// file.
@@ -52,6 +57,21 @@ struct Calibration {
   std::vector<std::string> warnings;
 
   [[nodiscard]] bool turnsImu() const { return !R_body_imu.isIdentity(0); }
+  /// The sensors' errors are given and taken out.
+  [[nodiscard]] bool hasImuMatrices() const {
+    return !gyro_matrix.isIdentity(0) || !gyro_by_force.isZero(0) || !accel_matrix.isIdentity(0);
+  }
+  /// From readings to samples in body axes.
+  [[nodiscard]] ImuCorrection imuCorrection() const {
+    return ImuCorrection{gyro_matrix, gyro_by_force, accel_matrix}.inverse().turned(R_body_imu);
+  }
+  /// For samples that are in body axes already, such as a flight recording's.
+  void forgetImuCorrection() {
+    R_body_imu.setIdentity();
+    gyro_matrix.setIdentity();
+    gyro_by_force.setZero();
+    accel_matrix.setIdentity();
+  }
 };
 
 /// Reads what `path` leads to: a sequence or its mav0 folder, a folder with the files of one calibration, or

@@ -74,6 +74,13 @@ std::string describe(const Calibration& calibration) {
         fmt::format("     turned in the body: its x is body {}, its z is body {}\n",
                     nearestAxis(calibration.R_body_imu.col(0)), nearestAxis(calibration.R_body_imu.col(2)));
   }
+  if (calibration.hasImuMatrices()) {
+    const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity();
+    text +=
+        fmt::format("     scale and misalignment taken out: gyro up to {:.2f} %, accelerometer {:.2f} %\n",
+                    100 * (calibration.gyro_matrix - identity).cwiseAbs().maxCoeff(),
+                    100 * (calibration.accel_matrix - identity).cwiseAbs().maxCoeff());
+  }
   return text;
 }
 

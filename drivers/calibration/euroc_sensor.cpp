@@ -26,6 +26,7 @@ void readImu(const YamlField& root, Calibration& calibration) {
     throw root.error("this describes a camera, not an IMU", "Give imu0/sensor.yaml");
   }
   calibration.noise = readNoise(root, "rate_hz", calibration.warnings);
+  readImuModel(root, calibration);
   if (!root.has("T_BS")) return;
   const YamlField field = root.at("T_BS");
   const SE3 T_body_imu = readTransform(field, calibration.warnings);

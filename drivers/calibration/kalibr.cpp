@@ -10,6 +10,10 @@ namespace {
 
 // Two statements of one transform in one file; Kalibr writes 16 digits.
 constexpr double kContradiction = 1e-6;
+// Of an entry, from the identity: MEMS sensors are below 0.05; a matrix read the wrong way or with turned
+// axes is far above.
+constexpr double kMostImuError = 0.2;
+constexpr double kRounding = 1e-12;
 
 double distance(const SE3& a, const SE3& b) {
   const SE3 d = a.inverse() * b;
@@ -110,36 +114,57 @@ std::vector<CameraEntry> readChain(const YamlField& root, Warnings& warnings) {
 
 }  // namespace
 
-void refuseImuModel(const YamlField& imu, Warnings& warnings) {
+void readImuModel(const YamlField& imu, Calibration& calibration) {
+  const auto matrixOf = [](const YamlField& field) {
+    const std::vector<double> values = readMatrix(field, 3, 3);
+    return Eigen::Matrix3d(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(values.data()));
+  };
+  const auto at = [&](const YamlField& parent, const char* key) {
+    return parent.has(key) ? matrixOf(parent.at(key)) : Eigen::Matrix3d::Identity().eval();
+  };
+  const auto refuse = [](const YamlField& field, const Eigen::Matrix3d& M) {
+    if ((M - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kMostImuError) return;
+    throw field.error(fmt::format("an error of the sensor above {:g}", kMostImuError),
+                      "The matrix maps true to measured values and is near the identity");
+  };
   if (imu.has("model")) {
     const YamlField field = imu.at("model");
-    // OpenVINS writes `kalibr` and `rpng` with explicit matrices, checked below.
-    const std::string model = field.text();
-    if (model.starts_with("scale-misalignment")) {
-      throw field.error(
-          "IMU model `" + model + "` has scale and misalignment terms, which swiftlet does not apply",
-          "Calibrate with `--imu-models calibrated`");
+    if (field.text() == "scale-misalignment-size-effect") {
+      throw field.error("places of single accelerometers are not applied",
+                        "Calibrate with `--imu-models scale-misalignment`");
+    }
+    if (field.text() == "rpng" && imu.has("Tw")) {
+      const bool ideal = at(imu, "Tw").isIdentity(kContradiction) && at(imu, "Ta").isIdentity(kContradiction);
+      if (!ideal) throw field.error("matrices of OpenVINS' model `rpng`", "Give those of model `kalibr`");
     }
   }
-  for (const char* key : {"Tw", "Ta", "R_IMUtoGYRO", "R_IMUtoACC", "Tg"}) {
-    if (!imu.has(key)) continue;
-    const YamlField field = imu.at(key);
-    std::vector<double> values;
-    for (const YamlField& row : field.items()) {
-      for (const double v : row.numbers()) values.push_back(v);
-    }
-    const bool zero = std::string(key) == "Tg";
-    if (values.size() != 9) throw field.error("not a 3x3 matrix", "Write three rows of three numbers");
-    for (std::size_t i = 0; i < 9; ++i) {
-      const double expected = (i % 4 == 0 && !zero) ? 1 : 0;
-      if (std::abs(values[i] - expected) > kContradiction) {
-        throw field.error("a correction that swiftlet does not apply", "Apply it to the samples before");
-      }
-    }
+  if (imu.has("accelerometers") && imu.at("accelerometers").isMap()) {
+    const YamlField accel = imu.at("accelerometers");
+    calibration.accel_matrix = at(accel, "M");
+    if (accel.has("M")) refuse(accel.at("M"), calibration.accel_matrix);
   }
+  if (imu.has("gyroscopes") && imu.at("gyroscopes").isMap()) {
+    const YamlField gyro = imu.at("gyroscopes");
+    calibration.gyro_matrix = at(gyro, "M") * at(gyro, "C_gyro_i");
+    if (gyro.has("M")) refuse(gyro.at("M"), calibration.gyro_matrix);
+    if (gyro.has("A")) calibration.gyro_by_force = matrixOf(gyro.at("A"));
+  }
+  // OpenVINS has the same under other names.
+  if (imu.has("Ta") || imu.has("R_IMUtoACC")) {
+    calibration.accel_matrix = at(imu, "Ta") * at(imu, "R_IMUtoACC");
+    refuse(imu.at(imu.has("Ta") ? "Ta" : "R_IMUtoACC"), calibration.accel_matrix);
+  }
+  if (imu.has("Tw") || imu.has("R_IMUtoGYRO")) {
+    calibration.gyro_matrix = at(imu, "Tw") * at(imu, "R_IMUtoGYRO");
+    refuse(imu.at(imu.has("Tw") ? "Tw" : "R_IMUtoGYRO"), calibration.gyro_matrix);
+  }
+  if (imu.has("Tg")) calibration.gyro_by_force = matrixOf(imu.at("Tg"));
+  // A product of identities that is rounded is none.
+  if (calibration.gyro_matrix.isIdentity(kRounding)) calibration.gyro_matrix.setIdentity();
+  if (calibration.accel_matrix.isIdentity(kRounding)) calibration.accel_matrix.setIdentity();
   if (imu.has("T_i_b")) {
     const YamlField field = imu.at("T_i_b");
-    if (distance(readTransform(field, warnings), SE3()) > kContradiction) {
+    if (distance(readTransform(field, calibration.warnings), SE3()) > kContradiction) {
       throw field.error("this IMU is not the body (imu0)",
                         "Give the entry of imu0, whose T_i_b is the identity");
     }
@@ -160,7 +185,7 @@ Calibration parseKalibrCalibration(const NamedText& camchain, const NamedText& i
   const std::vector<CameraEntry> entries = readChain(chain_root, calibration.warnings);
   const YamlField imu_root = YamlField::parse(imu.name, imu.text);
   const YamlField imu_fields = imu_root.has("imu0") ? imu_root.at("imu0") : imu_root;
-  refuseImuModel(imu_fields, calibration.warnings);
+  readImuModel(imu_fields, calibration);
   if (imu_fields.has("rostopic")) calibration.imu_topic = imu_fields.at("rostopic").text();
   calibration.noise = readNoise(imu_fields, "update_rate", calibration.warnings);
   assembleRig(entries, options, calibration);

@@ -69,8 +69,8 @@ std::optional<double> readShift(const YamlField& camera, Warnings& warnings);
 /// The same check on a number of seconds.
 double checkedShift(const InputPlace& place, double shift_s, Warnings& warnings);
 
-/// Refuses the models and corrections of a Kalibr or OpenVINS IMU file that are not applied here.
-void refuseImuModel(const YamlField& imu, Warnings& warnings);
+/// Scale and misalignment of an IMU file in Kalibr's or OpenVINS' words; refuses what is not applied here.
+void readImuModel(const YamlField& imu, Calibration& calibration);
 
 /// `readout_ms` of a camera whose `shutter` is `rolling` [s]; 0 for a global one, which it is unless said.
 double readReadout(const YamlField& camera);

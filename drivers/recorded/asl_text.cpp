@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/QR>
+
 #include <iterator>
 
 namespace swiftlet {
@@ -38,12 +40,38 @@ std::string shutterYaml(Duration readout) {
   return fmt::format("shutter: rolling\nreadout_ms: {:.9g}\n", 1e3 * readout.seconds());
 }
 
-std::string imuYaml(const ImuNoise& noise, std::string_view origin, const SE3& T_body_imu) {
+std::string imuYaml(const ImuNoise& noise, std::string_view origin, const SE3& T_body_imu,
+                    const std::string& extra) {
   return fmt::format(
-      "sensor_type: imu\ncomment: {}\n{}rate_hz: {:g}\ngyroscope_noise_density: {:g}\n"
-      "gyroscope_random_walk: {:g}\naccelerometer_noise_density: {:g}\naccelerometer_random_walk: {:g}\n",
-      origin, transformYaml(T_body_imu), noise.rate_hz, noise.gyro_density, noise.gyro_walk,
-      noise.accel_density, noise.accel_walk);
+             "sensor_type: imu\ncomment: {}\n{}rate_hz: {:g}\ngyroscope_noise_density: {:g}\n"
+             "gyroscope_random_walk: {:g}\naccelerometer_noise_density: {:g}\naccelerometer_random_walk: "
+             "{:g}\n",
+             origin, transformYaml(T_body_imu), noise.rate_hz, noise.gyro_density, noise.gyro_walk,
+             noise.accel_density, noise.accel_walk) +
+         extra;
+}
+
+std::string imuMatricesYaml(const Calibration& calibration) {
+  if (!calibration.hasImuMatrices()) return {};
+  // Kalibr's gyro matrix is a lower triangle after a rotation: the transposed QR decomposition.
+  const Eigen::HouseholderQR<Eigen::Matrix3d> qr(calibration.gyro_matrix.transpose());
+  Eigen::Matrix3d lower = Eigen::Matrix3d(qr.matrixQR().triangularView<Eigen::Upper>()).transpose();
+  Eigen::Matrix3d C_gyro_i = Eigen::Matrix3d(qr.householderQ()).transpose();
+  for (int k = 0; k < 3; ++k) {
+    if (lower(k, k) > 0) continue;
+    lower.col(k) *= -1;
+    C_gyro_i.row(k) *= -1;
+  }
+  const auto rows = [](const char* key, const Eigen::Matrix3d& M) {
+    std::string text = fmt::format("  {}:\n", key);
+    for (int i = 0; i < 3; ++i) {
+      text += fmt::format("  - [{:.15g}, {:.15g}, {:.15g}]\n", M(i, 0), M(i, 1), M(i, 2));
+    }
+    return text;
+  };
+  return "model: scale-misalignment\naccelerometers:\n" + rows("M", calibration.accel_matrix) +
+         "gyroscopes:\n" + rows("A", calibration.gyro_by_force) + rows("C_gyro_i", C_gyro_i) +
+         rows("M", lower);
 }
 
 std::string imuCsvHeader() {

@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "drivers/calibration/calibration.hpp"
 #include "estimator/camera/camera_model.hpp"
 #include "estimator/core/stamp.hpp"
 #include "estimator/geometry/se3.hpp"
@@ -17,7 +18,11 @@ std::string cameraYaml(const CameraModel& camera, const SE3& T_body_cam, double 
                        std::string_view origin, const std::string& extra);
 /// Lines of a camera's sensor.yaml for a rolling shutter; empty for a global one.
 std::string shutterYaml(Duration readout);
-std::string imuYaml(const ImuNoise& noise, std::string_view origin, const SE3& T_body_imu = SE3());
+/// `extra` lines go at its end.
+std::string imuYaml(const ImuNoise& noise, std::string_view origin, const SE3& T_body_imu = SE3(),
+                    const std::string& extra = {});
+/// Scale and misalignment in the words of Kalibr's IMU files, for its and for EuRoC's; empty without any.
+std::string imuMatricesYaml(const Calibration& calibration);
 /// data.csv of an IMU: its first line, and a line for each sample, both with their ends.
 std::string imuCsvHeader();
 std::string imuCsvRow(const ImuSample& sample);

@@ -28,11 +28,9 @@ void RecordedLog::checkRates(const std::string& name) {
 void RecordedLog::prepare(const std::string& name) {
   checkRates(name);
   for (const std::string& line : calibration_.warnings) warnings_.add(line);
-  if (calibration_.turnsImu()) {
-    for (ImuSample& sample : samples_) {
-      sample.gyro = calibration_.R_body_imu * sample.gyro;
-      sample.accel = calibration_.R_body_imu * sample.accel;
-    }
+  const ImuCorrection correction = calibration_.imuCorrection();
+  if (!correction.isIdentity()) {
+    for (ImuSample& sample : samples_) correction.apply(sample);
   }
   std::sort(images_.begin(), images_.end(), [](const ImageEntry& a, const ImageEntry& b) {
     return a.stamp != b.stamp ? a.stamp < b.stamp : a.camera < b.camera;

@@ -40,8 +40,8 @@ class RecordedLog : public LogSource {
   /// Decodes picture `entry` into `out` (expected.width * expected.height bytes).
   virtual Fetched fetch(const ImageEntry& entry, ImageSize expected, std::uint8_t* out) = 0;
 
-  /// To be called once the lists are complete: turns samples into body axes, checks rates against the
-  /// calibration, orders the images, reserves the pool.
+  /// To be called once the lists are complete: corrects samples and turns them into body axes, checks rates
+  /// against the calibration, orders the images, reserves the pool.
   void prepare(const std::string& name);
 
   LogOptions options_;

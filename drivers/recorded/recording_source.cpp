@@ -37,7 +37,7 @@ void RecordingSource::chooseCalibration(const LogOptions& options) {
   } else {
     calibration_ = readCalibration(options.calibration, options.imu_calibration, options.calibration_options);
     for (const std::string& line : calibration_.warnings) warnings_.add(line);
-    calibration_.R_body_imu.setIdentity();
+    calibration_.forgetImuCorrection();
     calibration_.rig.camera_count = std::min(calibration_.rig.camera_count, recorded.camera_count);
     cameras_ = calibration_.rig.camera_count;
     for (std::size_t i = 0; i < calibration_.rig.camera_count; ++i) {

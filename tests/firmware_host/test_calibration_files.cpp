@@ -64,6 +64,12 @@ TEST_CASE("calibration files: both forms read back as what was written", "[calib
   // An IMU that is turned in its body and sits beside its origin.
   given.R_body_imu = expSo3({0.1, -0.7, 1.2}).toRotationMatrix();
   given.T_body_filebody.translation = {0.03, -0.02, 0.01};
+  const bool matrices = GENERATE(false, true);
+  if (matrices) {
+    given.gyro_matrix << 1.01, 0.002, -0.003, 0.004, 0.99, 0.005, -0.006, 0.001, 1.002;
+    given.accel_matrix << 0.995, 0, 0, 0.002, 1.004, 0, -0.003, 0.001, 1.01;
+    given.gyro_by_force(1, 2) = 2e-4;
+  }
   writeCalibration(folder.string(), given);
   const Calibration euroc = readCalibration(folder.string());
   const Calibration kalibr = readCalibration((folder / "camchain-imucam.yaml").string());
@@ -78,6 +84,10 @@ TEST_CASE("calibration files: both forms read back as what was written", "[calib
     CHECK((kalibr.rig.T_body_cam[c].inverse() * in_imu).translation.norm() < 1e-12);
     CHECK(kalibr.rig.T_body_cam[c].R().isApprox(in_imu.R(), 1e-12));
     for (const Calibration* read : {&euroc, &kalibr}) {
+      CHECK(read->hasImuMatrices() == matrices);
+      CHECK(read->gyro_matrix.isApprox(given.gyro_matrix, 1e-13));
+      CHECK(read->gyro_by_force.isApprox(given.gyro_by_force, 1e-13));
+      CHECK(read->accel_matrix.isApprox(given.accel_matrix, 1e-13));
       CHECK(read->rig.camera[c].kind() == given.rig.camera[c].kind());
       CHECK(read->rig.camera[c].intrinsics().isApprox(given.rig.camera[c].intrinsics()));
       CHECK(read->rig.camera[c].distortion().isApprox(given.rig.camera[c].distortion()));

@@ -100,7 +100,7 @@ class PlayedVehicle {
     settings.mesh.enabled = false;
     settings.realtime.lock_memory = false;
     imu_ = std::make_unique<PlayedImu>(makeImuWire(settings.imu_link), *reader_, faults_,
-                                       source_->calibration().R_body_imu, 30);
+                                       source_->calibration().imuCorrection(), 30);
     REQUIRE(imu_->open().ok());
     grid.period = Duration::fromMilliseconds(50);
     grid.first = monotonicNow() + lead;

@@ -28,11 +28,11 @@ Duration magnitude(Duration d) { return {std::abs(d.ns)}; }
 
 }  // namespace
 
-ImuThread::ImuThread(std::string name, std::unique_ptr<ImuLink> link, const Eigen::Matrix3d& R_body_imu,
+ImuThread::ImuThread(std::string name, std::unique_ptr<ImuLink> link, const ImuCorrection& correction,
                      Duration delay, double rate)
     : link_(std::move(link)),
       journal_(std::move(name)),
-      R_body_imu_(R_body_imu),
+      correction_(correction),
       delay_(delay),
       clock_(ClockMapSettings{delay}),
       rate_(rate) {}
@@ -104,10 +104,10 @@ void ImuThread::hand(const ImuReading& reading, SensorSink& sink) {
   }
   const double step = std::min((sample.stamp - newest_).seconds(), kTurnSmoothing);
   newest_ = sample.stamp;
-  sample.gyro = R_body_imu_ * reading.gyro;
+  sample.gyro = correction_.gyroOf(reading.gyro, reading.accel);
   turning_ += step / kTurnSmoothing * (sample.gyro - turning_);
   turn_rate_.write({turning_.norm(), reading.arrival});
-  sample.accel = R_body_imu_ * reading.accel;
+  sample.accel = correction_.accelOf(reading.accel);
   ++counted_.samples;
   sink.takeImu(sample, reading.arrival, {secondsOf(sample.stamp), wallSeconds()});
 }

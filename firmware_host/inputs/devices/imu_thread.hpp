@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "drivers/calibration/calibration.hpp"
+#include "drivers/calibration/imu_correction.hpp"
 #include "drivers/timesync/clock_map.hpp"
 #include "estimator/core/newest_shared.hpp"
 #include "firmware_host/inputs/devices/edge_message.hpp"
@@ -36,8 +37,8 @@ struct ImuStatus {
 class ImuThread {
  public:
   /// `delay`: from sensing to arrival at the least. `rate`: samples a second that are expected; 0: unknown.
-  ImuThread(std::string name, std::unique_ptr<ImuLink> link, const Eigen::Matrix3d& R_body_imu,
-            Duration delay, double rate = 0);
+  ImuThread(std::string name, std::unique_ptr<ImuLink> link, const ImuCorrection& correction, Duration delay,
+            double rate = 0);
 
   DeviceFault open() { return link_->open(); }
   /// What the device made of its settings, after open().
@@ -79,7 +80,7 @@ class ImuThread {
   std::unique_ptr<ImuLink> link_;
   Heartbeat heart_;
   DeviceJournal journal_;
-  Eigen::Matrix3d R_body_imu_;
+  ImuCorrection correction_;
   Duration delay_;
   ClockMap clock_;
   RateWatch rate_;

@@ -252,7 +252,7 @@ LiveInput::LiveInput(const Settings& settings, const Calibration& calibration) {
                  : fmt::format("IMU ({}, {})", settings.imu_link.device, settings.imu_link.protocol),
       imu_topics ? makeTopicLink(settings, topics, calibration.noise.rate_hz)
                  : makeImuLink(settings.imu_link, asked_rate, outbox_.get()),
-      calibration.R_body_imu, Duration::fromSeconds(settings.imu_link.delay_ms * kFromMs),
+      calibration.imuCorrection(), Duration::fromSeconds(settings.imu_link.delay_ms * kFromMs),
       calibration.noise.rate_hz);
   const std::size_t nodes = twoInOne(cameras) ? 1 : rig.camera_count;
   for (std::size_t i = 0; i < nodes; ++i) {

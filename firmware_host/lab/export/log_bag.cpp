@@ -77,11 +77,10 @@ void LogBag::writeSample(const ImuSample& sample) {
     fixed_ = true;
     bag_.write("/tf_static", sample.stamp, rosmsg::TFMessage{cameraTransforms(sample.stamp)}, true);
   }
-  const Calibration& calibration = log_.calibration();
   ImuSample sensed = sample;
-  if (calibration.turnsImu()) {
-    sensed.gyro = calibration.R_body_imu.transpose() * sample.gyro;
-    sensed.accel = calibration.R_body_imu.transpose() * sample.accel;
+  const Calibration& calibration = log_.calibration();
+  if (calibration.turnsImu() || calibration.hasImuMatrices()) {
+    calibration.imuCorrection().inverse().apply(sensed);
   }
   writeImu(bag_, sensed);
 }

@@ -155,7 +155,7 @@ class HilRun {
 
   void openDevices() {
     imu_ = std::make_unique<PlayedImu>(makeImuWire(settings_.imu_link), reader_, request_.faults,
-                                       source_->calibration().R_body_imu, request_.skew_ppm);
+                                       source_->calibration().imuCorrection(), request_.skew_ppm);
     if (!imu_->next()) throw InputError(request_.log, 0, "", "a log without samples cannot be played", "");
     demand(imu_->open(), settings_.imu_link.device, "imu_link.device");
     const std::array<const std::string*, kMaxCameras> outputs = {&settings_.hil.output0,

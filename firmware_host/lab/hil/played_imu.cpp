@@ -12,11 +12,11 @@ constexpr double kMillion = 1e6;
 }  // namespace
 
 PlayedImu::PlayedImu(std::unique_ptr<ImuWire> wire, LogReader& reader, const FaultTimeline& faults,
-                     const Eigen::Matrix3d& R_body_imu, double skew_ppm)
+                     const ImuCorrection& correction, double skew_ppm)
     : wire_(std::move(wire)),
       reader_(reader),
       faults_(faults),
-      R_imu_body_(R_body_imu.transpose()),
+      to_readings_(correction.inverse()),
       rate_(1 + skew_ppm / kMillion),
       next_(reader.sample()) {}
 
@@ -64,8 +64,8 @@ DeviceFault PlayedImu::send(const ImuSample& sample, Duration time) {
   reading.device =
       Stamp{} + kSensorUptime + Duration::fromSeconds(time.seconds() * rate_) + faults_.clockStep(time);
   reading.counter = number;
-  reading.gyro = R_imu_body_ * sample.gyro;
-  reading.accel = R_imu_body_ * sample.accel;
+  reading.gyro = to_readings_.gyroOf(sample.gyro, sample.accel);
+  reading.accel = to_readings_.accelOf(sample.accel);
   ++counters_.sent;
   return wire_->send(reading);
 }

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "drivers/calibration/calibration.hpp"
+#include "drivers/calibration/imu_correction.hpp"
 #include "firmware_host/lab/hil/fault_timeline.hpp"
 #include "firmware_host/lab/hil/imu_wire.hpp"
 #include "firmware_host/lab/hil/log_reader.hpp"
@@ -21,9 +22,9 @@ class PlayedImu {
     std::uint64_t withheld = 0;  ///< by faults
   };
 
-  /// `R_body_imu`: samples of logs are in body axes, a sensor sends its own.
+  /// `correction`: samples of logs are corrected and in body axes, a sensor sends its own readings.
   PlayedImu(std::unique_ptr<ImuWire> wire, LogReader& reader, const FaultTimeline& faults,
-            const Eigen::Matrix3d& R_body_imu, double skew_ppm);
+            const ImuCorrection& correction, double skew_ppm);
 
   DeviceFault open() { return wire_->open(); }
   [[nodiscard]] bool isRead() { return wire_->isRead(); }
@@ -44,7 +45,7 @@ class PlayedImu {
   std::unique_ptr<ImuWire> wire_;
   LogReader& reader_;
   const FaultTimeline& faults_;
-  Eigen::Matrix3d R_imu_body_;
+  ImuCorrection to_readings_;
   double rate_;  ///< of the sensor's clock
   FrameGrid grid_;
   Stamp last_log_;

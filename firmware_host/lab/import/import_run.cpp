@@ -184,7 +184,8 @@ void writeCalibration(const Calibration& calibration, const LogFolder& folder, s
   }
   writeWholeFile((folder.sensor("imu0") / "sensor.yaml").string(),
                  imuYaml(calibration.noise, origin,
-                         SE3(Eigen::Quaterniond(calibration.R_body_imu), Eigen::Vector3d::Zero())));
+                         SE3(Eigen::Quaterniond(calibration.R_body_imu), Eigen::Vector3d::Zero()),
+                         imuMatricesYaml(calibration)));
 }
 
 }  // namespace

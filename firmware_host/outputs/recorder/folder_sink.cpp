@@ -40,7 +40,11 @@ void FolderSink::openImu(const Calibration& calibration) {
   const std::filesystem::path folder = std::filesystem::path(folder_) / "mav0" / "imu0";
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (!calibration.bare) openRows(folder / "sensor.yaml", imuYaml(calibration.noise, kOrigin));
+  if (!calibration.bare) {
+    openRows(folder / "sensor.yaml",
+             imuYaml(calibration.noise, kOrigin, SE3(calibration.R_body_imu, Eigen::Vector3d::Zero()),
+                     imuMatricesYaml(calibration)));
+  }
   rows_ = openRows(folder / "data.csv", imuCsvHeader());
 }
 

@@ -16,7 +16,9 @@ constexpr Duration kPeriod = Duration::fromMilliseconds(5);
 }  // namespace
 
 RecordSink::RecordSink(std::string out, const Calibration& calibration)
-    : out_(std::move(out)), cameras_(calibration.rig.camera_count) {
+    : out_(std::move(out)),
+      cameras_(calibration.rig.camera_count),
+      to_readings_(calibration.imuCorrection().inverse()) {
   for (std::size_t c = 0; c < cameras_; ++c) reserve(camera_[c], calibration.rig.camera[c]);
 }
 

@@ -60,7 +60,12 @@ class RecordSink : public SensorSink {
   /// The oldest that waits; null: none. One writer a camera.
   [[nodiscard]] const Image* waitingImage(std::size_t camera) { return camera_[camera].images.front(); }
   void dropImage(std::size_t camera) { camera_[camera].images.pop(); }
-  [[nodiscard]] bool nextSample(ImuSample& sample) { return samples_.tryPop(sample); }
+  /// The sensor's own reading: not corrected, in its own axes.
+  [[nodiscard]] bool nextSample(ImuSample& sample) {
+    if (!samples_.tryPop(sample)) return false;
+    if (!to_readings_.isIdentity()) to_readings_.apply(sample);
+    return true;
+  }
 
  private:
   /// Two seconds at 30 Hz: the longest that an SD card's write took while others went on.
@@ -83,6 +88,7 @@ class RecordSink : public SensorSink {
 
   std::string out_;
   std::size_t cameras_ = 0;
+  ImuCorrection to_readings_;
   std::array<Camera, kMaxCameras> camera_;
   SpscRing<ImuSample, kSamplesAhead> samples_;
   std::atomic<std::uint64_t> samples_taken_{0};

@@ -39,7 +39,7 @@ void writeSensor(const std::filesystem::path& folder, const std::string& text) {
 
 void writeImu(const std::filesystem::path& root, const Calibration& given) {
   const SE3 T_filebody_imu(Eigen::Quaterniond(given.R_body_imu), given.T_body_filebody.inverse().translation);
-  writeSensor(root / "imu0", imuYaml(given.noise, "as given", T_filebody_imu));
+  writeSensor(root / "imu0", imuYaml(given.noise, "as given", T_filebody_imu, imuMatricesYaml(given)));
 }
 
 std::string shiftYaml(Duration shift) { return fmt::format("timeshift_cam_imu: {:.9f}\n", shift.seconds()); }
@@ -77,6 +77,7 @@ std::string kalibrImu(const Calibration& given) {
       "update_rate: {:g}\ngyroscope_noise_density: {:g}\ngyroscope_random_walk: {:g}\n"
       "accelerometer_noise_density: {:g}\naccelerometer_random_walk: {:g}\n",
       n.rate_hz, n.gyro_density, n.gyro_walk, n.accel_density, n.accel_walk);
+  text += imuMatricesYaml(given);
   if (!given.imu_topic.empty()) text += fmt::format("rostopic: {}\n", given.imu_topic);
   return text;
 }

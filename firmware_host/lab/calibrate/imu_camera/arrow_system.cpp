@@ -6,12 +6,11 @@
 
 namespace swiftlet {
 
-ArrowSystem::ArrowSystem(int chain, int width, int border)
+ArrowSystem::ArrowSystem(int chain, int width, int border, int rights)
     : band_(width + 1, chain),
       border_(border, chain),
       corner_(border, border),
-      chain_gradient_(chain),
-      border_gradient_(border) {
+      gradient_(chain + border, rights) {
   clear();
 }
 
@@ -19,21 +18,16 @@ void ArrowSystem::clear() {
   band_.setZero();
   border_.setZero();
   corner_.setZero();
-  chain_gradient_.setZero();
-  border_gradient_.setZero();
+  gradient_.setZero();
 }
 
 void ArrowSystem::add(std::span<const int> columns, const Eigen::Ref<const Eigen::MatrixXd>& H,
-                      const Eigen::Ref<const Eigen::VectorXd>& g) {
+                      const Eigen::Ref<const Eigen::MatrixXd>& g) {
   const int count = static_cast<int>(columns.size());
   for (int a = 0; a < count; ++a) {
     const int i = columns[static_cast<std::size_t>(a)];
     const bool in_chain = i < chain();
-    if (in_chain) {
-      chain_gradient_[i] += g[a];
-    } else {
-      border_gradient_[i - chain()] += g[a];
-    }
+    gradient_.row(i).head(g.cols()) += g.row(a);
     for (int b = 0; b < count; ++b) {
       const int j = columns[static_cast<std::size_t>(b)];
       if (in_chain) {
@@ -53,8 +47,7 @@ void ArrowSystem::add(const ArrowSystem& other) {
   band_ += other.band_;
   border_ += other.border_;
   corner_ += other.corner_;
-  chain_gradient_ += other.chain_gradient_;
-  border_gradient_ += other.border_gradient_;
+  gradient_.leftCols(other.gradient_.cols()) += other.gradient_;
 }
 
 void ArrowSystem::hold(int border_column) {
@@ -62,19 +55,10 @@ void ArrowSystem::hold(int border_column) {
   corner_.row(border_column).setZero();
   corner_.col(border_column).setZero();
   corner_(border_column, border_column) = 1;
-  border_gradient_[border_column] = 0;
+  gradient_.row(chain() + border_column).setZero();
 }
 
-Eigen::VectorXd ArrowSystem::gradient() const {
-  Eigen::VectorXd all(chain() + border());
-  all << chain_gradient_, border_gradient_;
-  return all;
-}
-
-void ArrowSystem::clearGradient() {
-  chain_gradient_.setZero();
-  border_gradient_.setZero();
-}
+Eigen::VectorXd ArrowSystem::gradient(int right) const { return gradient_.col(right); }
 
 ArrowFactor::ArrowFactor(const ArrowSystem& system, double damping)
     : band_(system.band_), border_(system.border_), corner_(system.corner_) {

@@ -16,7 +16,8 @@ namespace swiftlet {
 
 class ArrowSystem {
  public:
-  ArrowSystem(int chain, int width, int border);
+  /// `rights`: gradients side by side.
+  ArrowSystem(int chain, int width, int border, int rights = 1);
 
   [[nodiscard]] int chain() const { return static_cast<int>(band_.cols()); }
   [[nodiscard]] int border() const { return static_cast<int>(corner_.cols()); }
@@ -24,21 +25,20 @@ class ArrowSystem {
   /// Adds a dense block. `columns`: unknowns of the chain, then chain() + those of the border; two of the
   /// chain are at most width apart.
   void add(std::span<const int> columns, const Eigen::Ref<const Eigen::MatrixXd>& H,
-           const Eigen::Ref<const Eigen::VectorXd>& g);
+           const Eigen::Ref<const Eigen::MatrixXd>& g);
+  /// One with fewer gradients adds to the first.
   void add(const ArrowSystem& other);
   /// Takes an unknown of the border out: its step is zero.
   void hold(int border_column);
 
-  [[nodiscard]] Eigen::VectorXd gradient() const;
-  void clearGradient();
+  [[nodiscard]] Eigen::VectorXd gradient(int right = 0) const;
 
  private:
   friend class ArrowFactor;
   Eigen::MatrixXd band_;    ///< (i - j, j) for i >= j
   Eigen::MatrixXd border_;  ///< a column for each unknown of the chain
   Eigen::MatrixXd corner_;
-  Eigen::VectorXd chain_gradient_;
-  Eigen::VectorXd border_gradient_;
+  Eigen::MatrixXd gradient_;  ///< of the chain, then of the border
 };
 
 class ArrowFactor {

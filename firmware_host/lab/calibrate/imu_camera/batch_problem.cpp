@@ -31,8 +31,6 @@ constexpr double kScaleSpread = 0.3;
 constexpr double kDriftSpread = 0.01;  // s/s
 // Controls that no reading touches move little; 1 m and 1 rad are far above what any control is known to.
 constexpr double kControlInformation = 1;
-constexpr double kSettled =
-    1e-4;  // squared sigmas that a further step would gain: parameters are then at rest
 
 using SplineBlock = Eigen::Matrix<double, 2, kSplineColumns>;
 
@@ -60,27 +58,34 @@ Eigen::Matrix<double, 6, 1> BatchState::biasAt(double time) const {
 }
 
 struct BatchProblem::Sum {
-  Sum(ArrowSystem empty, bool robust_corners, const Residuals* which)
-      : system(std::move(empty)), robust(robust_corners), probe(which) {}
+  Sum(ArrowSystem empty, bool robust_corners, bool with_probes)
+      : system(std::move(empty)), robust(robust_corners), probes(with_probes) {}
 
   ArrowSystem system;
   double cost = 0;
   bool robust;
-  const Residuals* probe;
+  bool probes;  ///< a right side for each kind, of random signs
   Random signs{1, 77};
   std::vector<int> columns;
   Eigen::MatrixXd J;
-  Eigen::VectorXd r;
+  Eigen::MatrixXd r;
 
-  // What takes a residual's place under a probe.
-  double value(Residuals kind, double residual) {
-    if (probe == nullptr) return residual;
-    return *probe != kind ? 0.0 : signs.below(2) == 0 ? -1.0 : 1.0;
+  void reserve(Eigen::Index rows, Eigen::Index unknowns) {
+    J.resize(rows, unknowns);
+    r.setZero(rows, probes ? kResidualKinds : 1);
+  }
+  void setResidual(Eigen::Index row, Residuals kind, double value) {
+    if (!probes) {
+      r(row, 0) = value;
+      return;
+    }
+    r.row(row).setZero();
+    r(row, static_cast<int>(kind)) = signs.below(2) == 0 ? -1 : 1;
   }
   void flush(Eigen::Index rows) {
     const auto top = J.topRows(rows);
-    cost += r.head(rows).squaredNorm();
-    system.add(columns, top.transpose() * top, top.transpose() * r.head(rows));
+    cost += r.topRows(rows).squaredNorm();
+    system.add(columns, top.transpose() * top, top.transpose() * r.topRows(rows));
   }
 };
 
@@ -168,8 +173,7 @@ void BatchProblem::addView(const SeenView& view, Sum& sum) const {
   const CameraModel& lens = state_.camera[c];
   const SE3& T_body_cam = state_.T_body_cam[c];
   const Eigen::Matrix3d R_cam_body = T_body_cam.R().transpose();
-  sum.J.resize(2 * static_cast<Eigen::Index>(view.corners.size()), kViewColumns);
-  sum.r.resize(sum.J.rows());
+  sum.reserve(2 * static_cast<Eigen::Index>(view.corners.size()), kViewColumns);
   Eigen::Index rows = 0;
   std::size_t open = 0;
   double known_time = -1;
@@ -233,8 +237,8 @@ void BatchProblem::addView(const SeenView& view, Sum& sum) const {
     J.col(at + 1) = by_time * state_.row(c, corner.pixel.y());
     J.col(at + 2) = -by_position * corner.point;
     J.col(at + 3) = by_time * (view.time - middle_);
-    sum.r[rows] = sum.value(Residuals::kCorner, factor * left.x());
-    sum.r[rows + 1] = sum.value(Residuals::kCorner, factor * left.y());
+    sum.setResidual(rows, Residuals::kCorner, factor * left.x());
+    sum.setResidual(rows + 1, Residuals::kCorner, factor * left.y());
     rows += 2;
   }
   flush();
@@ -244,8 +248,7 @@ void BatchProblem::addReadings(std::size_t first, std::size_t last, Sum& sum) co
   const double gyro_weight = 1 / (noise_.gyro * data_.noise.gyro_density * std::sqrt(data_.noise.rate_hz));
   const double accel_weight = 1 / (noise_.accel * data_.noise.accel_density * std::sqrt(data_.noise.rate_hz));
   const Eigen::Matrix<double, 3, 2> by_tilt = state_.gravity.norm() * gravityTangent(state_.gravity);
-  sum.J.resize(Eigen::Index{6} * kReadingsAtOnce, kReadingColumns);
-  sum.r.resize(sum.J.rows());
+  sum.reserve(Eigen::Index{6} * kReadingsAtOnce, kReadingColumns);
   Eigen::Index rows = 0;
   std::size_t open = 0;
   const auto every = static_cast<std::size_t>(state_.bias_every);
@@ -304,8 +307,8 @@ void BatchProblem::addReadings(std::size_t first, std::size_t last, Sum& sum) co
     }
     const Eigen::Vector3d gyro = reading.gyro - state_.gyro_matrix * motion.omega_body - bias.head<3>();
     const Eigen::Vector3d accel = reading.accel - state_.accel_matrix * force - bias.tail<3>();
-    for (int k = 0; k < 3; ++k) sum.r[rows + k] = sum.value(Residuals::kGyro, gyro_weight * gyro[k]);
-    for (int k = 0; k < 3; ++k) sum.r[rows + 3 + k] = sum.value(Residuals::kAccel, accel_weight * accel[k]);
+    for (int k = 0; k < 3; ++k) sum.setResidual(rows + k, Residuals::kGyro, gyro_weight * gyro[k]);
+    for (int k = 0; k < 3; ++k) sum.setResidual(rows + 3 + k, Residuals::kAccel, accel_weight * accel[k]);
     rows += 6;
   }
   flush();
@@ -381,9 +384,11 @@ double BatchProblem::addPriors(ArrowSystem& system) const {
   return cost;
 }
 
-double BatchProblem::assemble(ArrowSystem& system, bool robust, const Residuals* probe) const {
+double BatchProblem::assemble(ArrowSystem& system, bool robust, bool probes) const {
   std::vector<Sum> sums;
-  for (int part = 0; part < kParts; ++part) sums.emplace_back(emptySystem(), robust, probe);
+  for (int part = 0; part < kParts; ++part) {
+    sums.emplace_back(emptySystem(probes ? kResidualKinds : 1), robust, probes);
+  }
   const auto work = [&](int part) {
     Sum& sum = sums[static_cast<std::size_t>(part)];
     sum.signs = Random(static_cast<std::uint64_t>(part) + 1, 77);
@@ -399,14 +404,9 @@ double BatchProblem::assemble(ArrowSystem& system, bool robust, const Residuals*
   system = std::move(sums[0].system);
   system.add(sums[1].system);
   double cost = sums[0].cost + sums[1].cost;
-  if (probe == nullptr) {
-    cost += addPriors(system);
-  } else {
-    ArrowSystem priors = emptySystem();
-    addPriors(priors);
-    priors.clearGradient();
-    system.add(priors);
-  }
+  ArrowSystem priors = emptySystem();
+  cost += addPriors(priors);
+  system.add(priors);
   for (int k = 0; k < batch::kColumns; ++k) {
     if (held(k)) system.hold(k);
   }
@@ -443,7 +443,7 @@ BatchState BatchProblem::moved(const Eigen::VectorXd& step) const {
   return next;
 }
 
-bool BatchProblem::solve(int iterations, bool robust) {
+bool BatchProblem::solve(int iterations, bool robust, double settled) {
   constexpr double kLeastDamping = 1e-9;
   constexpr double kMostDamping = 1e6;
   double damping = kLeastDamping;
@@ -459,7 +459,7 @@ bool BatchProblem::solve(int iterations, bool robust) {
     const Eigen::VectorXd gradient = system.gradient();
     const Eigen::VectorXd step = factor.solve(-gradient);
     const double gain = -step.dot(gradient);
-    if (gain < kSettled && damping < 1e-6) {
+    if (gain < settled && damping < 1e-6) {
       state_ = moved(step);
       return true;
     }
@@ -473,7 +473,7 @@ bool BatchProblem::solve(int iterations, bool robust) {
       cost = next_cost;
       system = std::move(next);
       damping = std::max(damping / 100, kLeastDamping);
-      if (gain < kSettled) return true;
+      if (gain < settled) return true;
     } else {
       damping = std::max(damping * 100, 1e-4);
       if (damping > kMostDamping) return false;
@@ -534,11 +534,17 @@ std::size_t BatchProblem::count(Residuals which) const {
   return count;
 }
 
-double BatchProblem::redundancy(Residuals which) const {
-  ArrowSystem system = emptySystem();
-  assemble(system, false, &which);
-  const Eigen::VectorXd probed = system.gradient();
-  return static_cast<double>(count(which)) - probed.dot(ArrowFactor(system, 0).solve(probed));
+std::array<double, kResidualKinds> BatchProblem::redundancies() const {
+  ArrowSystem system = emptySystem(kResidualKinds);
+  assemble(system, false, true);
+  const ArrowFactor factor(system, 0);
+  std::array<double, kResidualKinds> left{};
+  for (int kind = 0; kind < kResidualKinds; ++kind) {
+    const Eigen::VectorXd probed = system.gradient(kind);
+    left[static_cast<std::size_t>(kind)] =
+        static_cast<double>(count(static_cast<Residuals>(kind))) - probed.dot(factor.solve(probed));
+  }
+  return left;
 }
 
 Eigen::MatrixXd BatchProblem::covariance() const {

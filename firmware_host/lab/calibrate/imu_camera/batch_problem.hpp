@@ -16,6 +16,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "drivers/simulated/spline_trajectory.hpp"
@@ -23,7 +24,7 @@
 #include "estimator/camera/rig.hpp"
 #include "estimator/imu/imu_noise.hpp"
 #include "firmware_host/lab/calibrate/imu_camera/arrow_system.hpp"
-#include "firmware_host/lab/calibrate/imu_camera/lens_jacobian.hpp"
+#include "firmware_host/lab/calibrate/cameras/lens_jacobian.hpp"
 
 namespace swiftlet {
 
@@ -94,12 +95,13 @@ struct BatchNoise {
   double accel = 1;     ///< times the density's
 };
 
-enum class Residuals { kCorner, kGyro, kAccel };
+enum class Residuals : std::uint8_t { kCorner, kGyro, kAccel };
+inline constexpr int kResidualKinds = 3;
 
 class BatchProblem {
  public:
   /// `data` and `target` must outlive this. Priors keep what the log does not show near its start: see the
-  /// source. `lens_information`: of camera c from other data, or zero.
+  /// source.
   BatchProblem(const BatchData& data, BatchState state, const BatchNoise& noise);
 
   [[nodiscard]] const BatchState& state() const { return state_; }
@@ -111,17 +113,17 @@ class BatchProblem {
   [[nodiscard]] bool held(int column) const { return held_[static_cast<std::size_t>(column)]; }
   void setReadout(double readout) { state_.readout = readout; }
 
-  /// Iterates until steps are below a hundredth of a sigma. `robust`: Huber's weights on corners.
-  /// False where the steps did not settle.
-  bool solve(int iterations, bool robust);
+  /// Iterates until a further step would gain less than `settled` squared sigmas. `robust`: Huber's weights
+  /// on corners. False where the steps did not settle.
+  bool solve(int iterations, bool robust, double settled);
   /// Half as far apart knots; the motion stays.
   void refineSpline();
 
   /// Sum of squares over the noise.
   [[nodiscard]] double cost(Residuals which) const;
   [[nodiscard]] std::size_t count(Residuals which) const;  ///< of them
-  /// Count minus the unknowns that these residuals determine, by a random probe of the trace.
-  [[nodiscard]] double redundancy(Residuals which) const;
+  /// Counts minus the unknowns that each kind determines, by a random probe of the trace (Hutchinson 1990).
+  [[nodiscard]] std::array<double, kResidualKinds> redundancies() const;
   /// Of the calibration's columns, then of the mean gyro and accelerometer bias. Held ones have variance 1.
   [[nodiscard]] Eigen::MatrixXd covariance() const;
   /// The step that the calibration would take [same units], with what is free now.
@@ -138,10 +140,12 @@ class BatchProblem {
     return time >= state_.spline.startTime() && time < state_.spline.endTime();
   }
 
-  /// Adds everything to `system`; with a probe, random signs of one kind take the residuals' place. The sum
-  /// of weighted squares.
-  double assemble(ArrowSystem& system, bool robust, const Residuals* probe = nullptr) const;
-  [[nodiscard]] ArrowSystem emptySystem() const { return {chain_, width_, batch::kColumns}; }
+  /// Fills `system`, which is emptySystem(); with `probes` random signs of one kind after the other take the
+  /// residuals' place. The sum of weighted squares.
+  double assemble(ArrowSystem& system, bool robust, bool probes = false) const;
+  [[nodiscard]] ArrowSystem emptySystem(int rights = 1) const {
+    return {chain_, width_, batch::kColumns, rights};
+  }
   /// The state after a step of all unknowns.
   [[nodiscard]] BatchState moved(const Eigen::VectorXd& step) const;
 

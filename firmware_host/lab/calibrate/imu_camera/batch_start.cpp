@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "estimator/geometry/so3.hpp"
-#include "firmware_host/lab/calibrate/imu_camera/board_pose.hpp"
+#include "firmware_host/lab/calibrate/cameras/board_pose.hpp"
 
 namespace swiftlet {
 namespace {

@@ -270,12 +270,6 @@ void BatchVerdict::judgeResiduals(const ImuCameraSolution& solution,
   };
   sensor("gyro", solution.gyro_sigma);
   sensor("accelerometer", solution.accel_sigma);
-  if (!knots_suffice) {
-    reasons.push_back(
-        "The IMU sees faster motion than a trajectory with four readings a knot can follow. Move more "
-        "smoothly, "
-        "keep off vibration, or record the IMU at a higher rate.");
-  }
 }
 
 void BatchVerdict::judgeMotion(const BatchProblem& problem, std::vector<std::string>& reasons) const {

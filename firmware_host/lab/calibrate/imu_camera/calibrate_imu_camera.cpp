@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "firmware_host/lab/calibrate/imu_camera/batch_start.hpp"
@@ -20,6 +21,8 @@ constexpr double kRollingSigmas = 4;       // of the readout, above zero
 constexpr double kFirstCornerSigma = 0.3;  // px: until the residuals say
 constexpr int kFirstSteps = 15;
 constexpr int kSteps = 12;
+constexpr double kRoughly = 1;  // squared sigmas that a further step would gain
+constexpr double kSettled = 1e-4;
 
 /// Corners beyond four sigma, by the median of the residuals. The number of outliers.
 std::size_t markOutliers(const BatchProblem& problem, BatchData& data, double& sigma) {
@@ -51,10 +54,11 @@ std::size_t markOutliers(const BatchProblem& problem, BatchData& data, double& s
 
 /// Weights from the residuals.
 void weigh(BatchProblem& problem) {
-  BatchNoise noise = problem.noise();
+  const std::array<double, kResidualKinds> left = problem.redundancies();
   const auto factor = [&](Residuals which) {
-    return std::sqrt(problem.cost(which) / std::max(problem.redundancy(which), 1.0));
+    return std::sqrt(problem.cost(which) / std::max(left[static_cast<std::size_t>(which)], 1.0));
   };
+  BatchNoise noise = problem.noise();
   noise.corner *= factor(Residuals::kCorner);
   noise.gyro *= factor(Residuals::kGyro);
   noise.accel *= factor(Residuals::kAccel);
@@ -75,7 +79,7 @@ bool chooseKnots(BatchProblem& problem, double rate_hz) {
   while (problem.state().spline.spacing() / 2 >= kReadingsPerKnot / rate_hz) {
     const BatchProblem coarse = problem;
     problem.refineSpline();
-    problem.solve(kSteps, false);
+    problem.solve(kSteps, false, kRoughly);
     weigh(problem);
     // Both in the noise that the finer spline leaves.
     const double gain = costIn(coarse, problem.noise()) - costIn(problem, problem.noise());
@@ -131,19 +135,18 @@ ImuCameraSolution calibrateImuCamera(const ImuCameraInput& input,
   for (std::size_t c = 0; c < start.state.camera_count; ++c) problem.hold(batch::lens(c), kLensParameters);
   problem.hold(batch::kReadout, 1);
   problem.hold(batch::kGyro, 9 + 6);
-  problem.solve(kFirstSteps, true);
+  problem.solve(kFirstSteps, true, kRoughly);
   tell(0.15);
   for (std::size_t c = 0; c < start.state.camera_count; ++c)
     problem.hold(batch::lens(c), kLensParameters, false);
   problem.hold(batch::kReadout, 1, false);
   problem.hold(batch::kGyro, 9 + 6, false);
-  problem.solve(kFirstSteps, true);
+  problem.solve(kFirstSteps, true, kRoughly);
   tell(0.3);
   BatchNoise noise = problem.noise();
   markOutliers(problem, start.data, noise.corner);
   problem.setNoise(noise);
-  problem.solve(kSteps, false);
-  weigh(problem);
+  problem.solve(kSteps, false, kRoughly);
   BatchVerdict verdict(input, start);
   verdict.knots_suffice = chooseKnots(problem, input.noise.rate_hz);
   tell(0.6);
@@ -156,9 +159,9 @@ ImuCameraSolution calibrateImuCamera(const ImuCameraInput& input,
   }
   noise = problem.noise();
   verdict.outliers = markOutliers(problem, start.data, noise.corner);
-  verdict.settled = problem.solve(kSteps, false);
+  problem.solve(kSteps, false, kRoughly);
   weigh(problem);
-  verdict.settled = problem.solve(kSteps, false) && verdict.settled;
+  verdict.settled = problem.solve(kSteps, false, kSettled);
   tell(0.75);
   ImuCameraSolution solution = verdict.solutionOf(problem);
   tell(0.8);
@@ -166,7 +169,7 @@ ImuCameraSolution calibrateImuCamera(const ImuCameraInput& input,
   for (const bool second : {false, true}) {
     BatchProblem half(start.data, halfOf(problem.state(), second), problem.noise());
     if (!verdict.rolling) half.hold(batch::kReadout, 1);
-    half.solve(kSteps, false);
+    half.solve(kSteps, false, kSettled);
     verdict.halves[second ? 1 : 0] = half.state();
     verdict.half_covariances[second ? 1 : 0] = half.covariance();
     tell(second ? 1.0 : 0.9);
