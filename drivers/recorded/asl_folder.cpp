@@ -86,10 +86,11 @@ AslFolder::AslFolder(AslFiles files, const LogOptions& options)
     track_file_ = name("tracks0/data.csv");
   readCalibrationFiles();
   const std::string imu = name("imu0/data.csv");
-  if (!hasFile("imu0/data.csv")) {
+  const bool has_imu = hasFile("imu0/data.csv");
+  if (!has_imu && !options_.uncalibrated) {
     throw InputError(imu, 0, "", "does not exist", "A log needs IMU samples: imu0/data.csv");
   }
-  samples_ = readImuText(imu, text("imu0/data.csv"), counters_, warnings_);
+  if (has_imu) samples_ = readImuText(imu, text("imu0/data.csv"), counters_, warnings_);
   if (!options_.without_images && track_file_.empty()) readCameras();
   prepare(imu);
   if (files_[0].size() != files_[1].size() && !files_[0].empty() && !files_[1].empty()) {
@@ -101,7 +102,9 @@ AslFolder::AslFolder(AslFiles files, const LogOptions& options)
 
 void AslFolder::readCalibrationFiles() {
   const CalibrationOptions& how = options_.calibration_options;
-  if (!options_.calibration.empty()) {
+  if (options_.uncalibrated) {
+    calibration_.rig.camera_count = kMaxCameras;
+  } else if (!options_.calibration.empty()) {
     calibration_ = readCalibration(options_.calibration, options_.imu_calibration, how);
   } else if (hasFile("cam0/sensor.yaml")) {
     calibration_ = readCalibration(*log_.tree, log_.folder, options_.imu_calibration, how);
@@ -206,6 +209,10 @@ std::vector<ImageRow> AslFolder::listImages(std::uint32_t camera) {
 /// gives them, from the first sample on.
 void AslFolder::stampNumbered(std::uint32_t camera, std::vector<ImageRow>& rows) {
   if (rows.empty()) return;
+  if (options_.uncalibrated) {
+    for (ImageRow& row : rows) row.stamp = Stamp{} + Duration::fromSeconds(static_cast<double>(row.stamp.ns));
+    return;
+  }
   const double rate = calibration_.camera_rate_hz[camera];
   const std::string csv = name(fmt::format("cam{}/data.csv", camera));
   if (rate <= 0) {

@@ -54,12 +54,15 @@ class BagLog final : public RecordedLog {
 };
 
 BagLog::BagLog(const std::string& path, const LogOptions& options) : RecordedLog(options) {
-  if (options_.calibration.empty()) {
+  if (options_.uncalibrated) {
+    calibration_.rig.camera_count = kMaxCameras;
+  } else if (options_.calibration.empty()) {
     throw InputError(path, 0, "", "a bag holds no calibration",
                      "Name the Kalibr or EuRoC calibration to use");
+  } else {
+    calibration_ =
+        readCalibration(options_.calibration, options_.imu_calibration, options_.calibration_options);
   }
-  calibration_ =
-      readCalibration(options_.calibration, options_.imu_calibration, options_.calibration_options);
   if (options_.mono) calibration_.rig.camera_count = 1;
   bag_ = openBag(path);
   for (const std::string& line : bag_->warnings()) warnings_.add(line);

@@ -173,7 +173,8 @@ std::array<std::optional<std::uint32_t>, kMaxCameras> chooseImageTopics(BagFile&
       for (const std::uint32_t topic : images) {
         if (chosen[c] || std::find(chosen.begin(), chosen.end(), topic) != chosen.end()) continue;
         const ImageSize size = sizeOn(bag, topic);
-        if (fitting && size != ImageSize{} && size != ImageSize{model.width(), model.height()}) continue;
+        const bool any_size = model.width() == 0;
+        if (fitting && !any_size && size != ImageSize{} && size != ImageSize{model.width(), model.height()}) continue;
         if (!fitting && c > 0) continue;
         chosen[c] = topic;
         guessed = true;

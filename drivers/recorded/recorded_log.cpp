@@ -17,11 +17,33 @@ constexpr double kRateTolerance = 0.1;
 void RecordedLog::checkRates(const std::string& name) {
   const double measured = medianRate(samples_);
   const double stated = calibration_.noise.rate_hz;
+  if (options_.uncalibrated) {
+    calibration_.noise.rate_hz = measured;
+    return;
+  }
   if (measured > 0 && std::abs(measured - stated) > kRateTolerance * stated) {
     warnings_.add(
         fmt::format("{}: the IMU runs at {:.1f} Hz, its calibration says {:g} Hz; the measured rate is used",
                     name, measured, stated));
     calibration_.noise.rate_hz = measured;
+  }
+}
+
+/// From each camera's first picture.
+void RecordedLog::takeImageSizes() {
+  for (std::uint32_t camera = 0; camera < calibration_.rig.camera_count; ++camera) {
+    for (const ImageEntry& entry : images_) {
+      if (entry.camera != camera) continue;
+      const Fetched fetched = fetch(entry, {}, nullptr);
+      if (fetched.found.width <= 0 || fetched.found.height <= 0) continue;
+      // A lens of no use but its size.
+      calibration_.rig.camera[camera] =
+          CameraModel(CameraKind::kEquidistant, fetched.found.width, fetched.found.height,
+                      Eigen::Vector4d(fetched.found.width, fetched.found.width, 0.5 * (fetched.found.width - 1),
+                                      0.5 * (fetched.found.height - 1)),
+                      Eigen::Vector4d::Zero());
+      break;
+    }
   }
 }
 
@@ -47,6 +69,7 @@ void RecordedLog::prepare(const std::string& name) {
     if (i == 0 || images_[i].stamp != images_[i - 1].stamp) ++frame_count_;
   }
   if (images_.empty()) return;
+  if (options_.uncalibrated) takeImageSizes();
   for (std::size_t camera = 0; camera < calibration_.rig.camera_count; ++camera) {
     const CameraModel& model = calibration_.rig.camera[camera];
     pools_[camera].memory.resize(kImageSlots * static_cast<std::size_t>(model.width()) *

@@ -59,6 +59,7 @@ class RecordedLog : public LogSource {
 
   bool deliverImage(const ImageEntry& entry, SensorMessage& message);
   void checkRates(const std::string& name);
+  void takeImageSizes();
 
   std::array<Pool, kMaxCameras> pools_;
   std::size_t next_sample_ = 0;

@@ -3,10 +3,12 @@
 
 namespace swiftlet {
 
-void addCalibrateCommand(CLI::App& app, int& /*exit_code*/) {
+void addCalibrateCommand(CLI::App& app, int& exit_code) {
   CLI::App* command =
       app.add_subcommand("calibrate", "From a bare rig to a calibration: print a board, move the rig");
   command->require_subcommand(1);
+  addCalibrateTarget(*command, exit_code);
+  addCalibrateCameras(*command, exit_code);
 }
 
 }  // namespace swiftlet

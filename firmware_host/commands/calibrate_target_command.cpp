@@ -1,0 +1,71 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "drivers/target/target_file.hpp"
+#include "firmware_host/commands/calibrate_commands.hpp"
+#include "firmware_host/commands/program.hpp"
+#include "firmware_host/files/whole_file.hpp"
+#include "firmware_host/lab/calibrate/board/board_pdf.hpp"
+
+namespace swiftlet {
+namespace {
+
+struct TargetOptions {
+  std::string out;
+  std::string kind = "aprilgrid";
+  std::string paper = "A4";
+  BoardLayout layout;
+};
+
+int printTarget(TargetOptions options) {
+  options.layout.kind = options.kind == "checkerboard" ? TargetKind::kCheckerboard : TargetKind::kAprilGrid;
+  const Eigen::Vector2d paper = paperSize(options.paper);
+  const CalibrationTarget target = boardForPaper(options.layout, paper);
+  const std::string yaml = std::filesystem::path(options.out).replace_extension(".yaml").string();
+  writeWholeFile(options.out, boardPdf(target, paper));
+  writeWholeFile(yaml, targetYaml(target));
+  fmt::print(
+      "{}: {}\n{}: the board for --target. Print at 100 %, check both rulers, and write what you measure "
+      "into this file\n",
+      options.out, describe(target), yaml);
+  if (!target.hasTags() && (target.columns + target.rows) % 2 == 0) {
+    fmt::print(
+        "This board looks the same turned by 180 degrees: keep it upright in all images, or take an odd and "
+        "an even number\n");
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+void addCalibrateTarget(CLI::App& calibrate, int& exit_code) {
+  CLI::App* command =
+      calibrate.add_subcommand("target", "A calibration board as a PDF to print, with its description");
+  auto options = std::make_shared<TargetOptions>();
+  command->add_option("--out", options->out, "PDF to write; the board's YAML goes beside it")->required();
+  command
+      ->add_option(
+          "--kind", options->kind,
+          "aprilgrid (Kalibr's layout; may leave the image in part) or checkerboard (all of it must be "
+          "seen)")
+      ->check(CLI::IsMember({"aprilgrid", "checkerboard"}));
+  command->add_option("--paper", options->paper,
+                      "A4, A3, A2, A1, A0, letter, tabloid, or width and height in mm, like 600x400");
+  command
+      ->add_option("--columns", options->layout.columns,
+                   "Tags, or inner corners, side by side; default: as many as fill the paper")
+      ->check(CLI::Range(3, 100));
+  command->add_option("--rows", options->layout.rows, "Tags, or inner corners, one above the other")
+      ->check(CLI::Range(3, 100));
+  command->footer(
+      "Example:\n  swiftlet calibrate target --out board.pdf --paper A3\n"
+      "Tags and squares are made as large as the paper allows. Glue the print to glass or a thick flat "
+      "plate.");
+  command->callback([options, &exit_code] { exit_code = printTarget(*options); });
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,16 @@
+#pragma once
+// What was found about cameras, for people and for other programs.
+
+#include <string>
+
+#include "firmware_host/lab/calibrate/cameras/camera_solution.hpp"
+
+namespace swiftlet {
+
+/// A line per fact, with standard deviations; empty where no lens was found.
+[[nodiscard]] std::string describe(const CameraSolution& solution);
+
+/// Kalibr's camchain.yaml without an IMU: camera_model, distortion_model, intrinsics, resolution, T_cn_cnm1.
+[[nodiscard]] std::string camchainYaml(const CameraSolution& solution);
+
+}  // namespace swiftlet
