@@ -1,7 +1,10 @@
 #include "firmware_host/commands/lab_commands.hpp"
 
+#include "drivers/target/target_file.hpp"
 #include "firmware_host/commands/command.hpp"
+#include "firmware_host/lab/calibrate/guidance/guided_recording.hpp"
 #include "firmware_host/lab/evaluation/evaluate_run.hpp"
+#include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {
 
@@ -23,5 +26,10 @@ void addLabCommands(CLI::App& app, int& exit_code) {
 }
 
 AccuracyOfRun labAccuracy() { return runAccuracyJson; }
+
+std::unique_ptr<RecordWatcher> labGuidance(const std::string& board, const std::optional<ViewAddress>& view) {
+  return std::make_unique<GuidedRecording>(
+      readTarget(board), [](const std::string& line) { say(line + "\n"); }, view);
+}
 
 }  // namespace swiftlet

@@ -5,7 +5,9 @@
 
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/lab_commands.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
+#include "firmware_host/commands/view_option.hpp"
 #include "firmware_host/realtime/console.hpp"
 #include "firmware_host/runs/record_run.hpp"
 
@@ -15,6 +17,8 @@ namespace {
 struct RecordOptions {
   RecordRequest request;
   std::string mcap;
+  std::string board;
+  ViewOption view;
   SettingsOptions settings;
 };
 
@@ -24,6 +28,9 @@ int record(const RecordOptions& options) {
   if (request.mcap) request.out = options.mcap;
   request.stop = &stopOnSignal();
   surviveHangUp();
+  std::unique_ptr<RecordWatcher> guidance;
+  if (!options.board.empty()) guidance = labGuidance(options.board, options.view.read());
+  request.watcher = guidance.get();
   const RecordResult result = runRecord(request, options.settings.read());
   if (!result.missing.empty()) {
     for (const std::string& line : result.missing) warn("error: " + line + "\n");
@@ -65,10 +72,16 @@ void addRecordCommand(CLI::App& app, int& exit_code) {
       ->excludes(folder);
   command->add_option("--seconds", request.seconds, "End after this long; without: with SIGINT or SIGTERM")
       ->check(nonNegative());
+  CLI::Option* calibrate = command->add_option(
+      "--calibrate", options->board,
+      "For calibration in front of this board (Kalibr's target YAML): says what is missing, and ends when "
+      "nothing is");
+  options->view.addTo(*command)->needs(calibrate);
   options->settings.addTo(*command);
   command->footer(
-      "Example, for Kalibr or for swiftlet replay:\n"
-      "  swiftlet record --settings vehicle.yaml --seconds 60 --out calibration_1");
+      "Examples, for Kalibr or for swiftlet replay, and guided:\n"
+      "  swiftlet record --settings vehicle.yaml --seconds 60 --out calibration_1\n"
+      "  swiftlet record --settings vehicle.yaml --out calibration_1 --calibrate board.yaml --view");
   command->callback([options, &exit_code] { exit_code = record(*options); });
 }
 

@@ -20,6 +20,27 @@ std::unique_ptr<RecordSink> makeSink(const RecordRequest& request, const Calibra
   return std::make_unique<FolderSink>(request.out, calibration, settings.cameras.rate_hz);
 }
 
+// What comes goes to the recording, and to who looks at it.
+class WatchedSink final : public SensorSink {
+ public:
+  WatchedSink(RecordSink& record, RecordWatcher* watcher) : record_(record), watcher_(watcher) {}
+
+  void takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host) override {
+    record_.takeImu(sample, arrival, host);
+    if (watcher_ != nullptr) watcher_->takeImu(sample);
+  }
+  void takeScene(const SceneImages& scene) override { record_.takeScene(scene); }
+  void takeImage(const CameraFrame& image, const HostTimes& host) override {
+    record_.takeImage(image, host);
+    if (watcher_ != nullptr) watcher_->takeImage(image);
+  }
+  void expectEnd() override { record_.expectEnd(); }
+
+ private:
+  RecordSink& record_;
+  RecordWatcher* watcher_;
+};
+
 }  // namespace
 
 RecordResult runRecord(const RecordRequest& request, const Settings& settings) {
@@ -36,7 +57,9 @@ RecordResult runRecord(const RecordRequest& request, const Settings& settings) {
   }
   const auto made = makeSink(request, calibration, settings);
   RecordSink& sink = *made;
-  SensorThreads threads(input, sink, settings.realtime);
+  WatchedSink watched(sink, request.watcher);
+  if (request.watcher != nullptr) request.watcher->begin(calibration);
+  SensorThreads threads(input, watched, settings.realtime);
   for (const std::string& line : threads.warnings()) warn("warning: " + line + "\n");
   const auto print = [&input] {
     input.drainEvents([](Stamp /*stamp*/, const std::string& line) { warn(line + "\n"); });
@@ -46,9 +69,11 @@ RecordResult runRecord(const RecordRequest& request, const Settings& settings) {
   while (!sink.failed() && !(request.stop != nullptr && request.stop->load(std::memory_order_relaxed)) &&
          !(request.seconds > 0 && wallSeconds() - begin > request.seconds)) {
     print();
+    if (request.watcher != nullptr && !request.watcher->goOn()) break;
     sleepFor(kPeriod);
   }
   threads.join();
+  if (request.watcher != nullptr) request.watcher->end();
   print();
   sink.finish();
   result.written = sink.counters();

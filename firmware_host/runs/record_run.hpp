@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "firmware_host/outputs/recorder/record_sink.hpp"
+#include "firmware_host/runs/record_watcher.hpp"
 #include "firmware_host/settings/settings.hpp"
 
 namespace swiftlet {
@@ -15,6 +16,7 @@ struct RecordRequest {
   bool mcap = false;   ///< an MCAP file instead of an EuRoC folder
   double seconds = 0;  ///< end after this long; 0: when told to
   const std::atomic<bool>* stop = nullptr;
+  RecordWatcher* watcher = nullptr;  ///< null: nobody
 };
 
 struct RecordResult {

@@ -1,0 +1,218 @@
+#include <algorithm>
+#include <array>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "drivers/calibration/calibration.hpp"
+#include "drivers/simulated/calibration_session.hpp"
+#include "drivers/simulated/image_sensor.hpp"
+#include "drivers/simulated/session_folder.hpp"
+#include "firmware_host/lab/calibrate/guidance/calibration_guide.hpp"
+#include "firmware_host/lab/calibrate/guidance/guided_recording.hpp"
+#include "firmware_host/realtime/host_sleep.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr double kSharpEdge = 1.8;  // px
+constexpr int kLookEvery = 5;       // of 20 images a second
+
+bool mentions(const std::vector<std::string>& lines, const std::string& words) {
+  return std::any_of(lines.begin(), lines.end(),
+                     [&](const std::string& line) { return line.find(words) != std::string::npos; });
+}
+
+// Plays a session to the guide; returns after how many seconds it was enough, or -1.
+double guide(const CalibrationSession& session, CalibrationGuide& guide, double edge_width = kSharpEdge) {
+  const std::vector<ImuSample>& samples = session.imu().samples;
+  std::size_t next = 0;
+  double enough = -1;
+  for (int k = 0; k < session.imageCount(); k += kLookEvery) {
+    const Stamp now = session.imageStamp(k);
+    while (next < samples.size() && samples[next].stamp < now) guide.addImu(samples[next++]);
+    for (const BoardView& view : session.views(k)) {
+      const CameraModel& lens = session.truth().rig.camera[view.camera];
+      guide.addView(view, lens.width(), lens.height(), edge_width);
+    }
+    if (enough < 0 && guide.missing().empty()) enough = session.imageTime(k);
+  }
+  return enough;
+}
+
+TEST_CASE("a good session is enough, and not before the board was everywhere") {
+  int enough = 0;
+  constexpr int kSessions = 12;
+  for (std::uint64_t seed = 61; seed < 61 + kSessions; ++seed) {
+    SessionSettings settings;
+    settings.seed = seed;
+    settings.duration = 90;
+    const CameraKind lens = seed % 2 == 0 ? CameraKind::kPinholeRadtan : CameraKind::kEquidistant;
+    const CalibrationSession session(drawCalibrationRig(seed, lens), CalibrationTarget{}, settings);
+    CalibrationGuide watched(session.target(), 2);
+    CHECK(watched.progress() == 0);
+    const double seconds = guide(session, watched);
+    INFO("seed " << seed << ": " << seconds << " s; "
+                 << (watched.missing().empty() ? "" : watched.missing().front()));
+    CHECK((seconds < 0 || seconds > 10));
+    enough += seconds > 0 ? 1 : 0;
+    if (seconds > 0) CHECK(watched.progress() == Approx(1));
+  }
+  CHECK(enough >= kSessions - 2);
+}
+
+TEST_CASE("what a session lacks is named") {
+  const CalibrationRig rig = drawCalibrationRig(4, CameraKind::kPinholeRadtan);
+  SessionSettings settings;
+  settings.duration = 60;
+
+  SECTION("no turning") {
+    settings.turning = Turning::kNone;
+    CalibrationGuide watched(CalibrationTarget{}, 2);
+    CHECK(guide(CalibrationSession(rig, CalibrationTarget{}, settings), watched) < 0);
+    for (const char* axis : {"x", "y", "z"}) {
+      CHECK(mentions(watched.missing(), std::string("about the IMU's ") + axis + " axis"));
+    }
+  }
+  SECTION("at rest") {
+    settings.rests = {{0, 60}};
+    CalibrationGuide watched(CalibrationTarget{}, 2);
+    CHECK(guide(CalibrationSession(rig, CalibrationTarget{}, settings), watched) < 0);
+    CHECK(mentions(watched.missing(), "along the IMU's"));
+    CHECK(mentions(watched.missing(), "Change the distance"));
+    CHECK(mentions(watched.missing(), "cells covered"));
+  }
+  SECTION("blurred") {
+    CalibrationGuide watched(CalibrationTarget{}, 2);
+    CHECK(guide(CalibrationSession(rig, CalibrationTarget{}, settings), watched, 6.0) < 0);
+    CHECK(mentions(watched.missing(), "blurred"));
+    CHECK(watched.camera(0).covered() == 0);
+  }
+  SECTION("never on the right") {
+    const CalibrationSession session(rig, CalibrationTarget{}, settings);
+    CalibrationGuide watched(session.target(), 2);
+    for (int k = 0; k < session.imageCount(); ++k) {
+      for (BoardView view : session.views(k)) {
+        const CameraModel& lens = rig.rig.camera[view.camera];
+        if (view.camera == 0) {
+          std::erase_if(view.corners, [&](const BoardCorner& c) { return c.pixel.x() > 0.6 * lens.width(); });
+        }
+        watched.addView(view, lens.width(), lens.height(), kSharpEdge);
+      }
+    }
+    CHECK(mentions(watched.missing(), "right of camera 0"));
+    CHECK_FALSE(mentions(watched.missing(), "right of camera 1"));
+  }
+  SECTION("nothing") {
+    const CalibrationGuide watched(CalibrationTarget{}, 2);
+    CHECK(mentions(watched.missing(), "Camera 1 has not seen the board"));
+  }
+}
+
+TEST_CASE("the side from which the board is seen is told") {
+  const CameraModel lens(CameraKind::kPinholeRadtan, 752, 480, {458, 457, 367, 248}, {-0.28, 0.07, 0, 0});
+  const CalibrationTarget target;
+  const Eigen::Vector3d centre = 0.5 * target.corner(target.cornerCount() - 2);
+  // left, right, upper, lower of the viewer whose y is up
+  const std::array<Eigen::Vector3d, 4> from{{{-0.6, 0, 1}, {0.6, 0, 1}, {0, 0.6, 1}, {0, -0.6, 1}}};
+  for (std::size_t side = 0; side < from.size(); ++side) {
+    const Eigen::Vector3d eye = centre + from[side];
+    Eigen::Matrix3d R;  // camera axes in the board's: x right, y down, z ahead
+    R.col(2) = (centre - eye).normalized();
+    R.col(0) = (-Eigen::Vector3d::UnitY()).cross(R.col(2)).normalized();
+    R.col(1) = R.col(2).cross(R.col(0));
+    const SE3 T_cam_board = SE3(R, eye).inverse();
+    BoardView view;
+    for (int id = 0; id < target.cornerCount(); ++id) {
+      Eigen::Vector2d pixel;
+      REQUIRE(lens.project(T_cam_board * target.corner(id), pixel));
+      view.corners.push_back({id, pixel});
+    }
+    CalibrationGuide watched(target, 1);
+    watched.addView(view, lens.width(), lens.height(), kSharpEdge);
+    std::array<int, 4> expected{};
+    expected[side] = 1;
+    CHECK(watched.camera(0).tilted == expected);
+  }
+}
+
+TEST_CASE("edges are as wide as the blur makes them") {
+  // An erf across the image has slope 1 / (sigma sqrt(2 pi)).
+  for (const double sigma : {0.6, 1.2, 2.0}) {
+    constexpr int kSide = 41;
+    std::vector<std::uint8_t> pixels;
+    for (int y = 0; y < kSide; ++y) {
+      for (int x = 0; x < kSide; ++x) {
+        pixels.push_back(static_cast<std::uint8_t>(
+            std::lround(120 + 90 * std::erf((x - 20.3) / (std::sqrt(2.0) * sigma)))));
+      }
+    }
+    const ImageView image{pixels.data(), kSide, kSide, kSide};
+    const double width = edgeWidth(image, {{0, {20, 20}}});
+    CHECK(width > 0.9 * sigma * std::sqrt(2 * 3.14159));
+    CHECK(width < 1.1 * std::hypot(sigma, 0.75) * std::sqrt(2 * 3.14159));
+  }
+  CHECK(edgeWidth({}, {}) == 0);
+}
+
+TEST_CASE("beside a recording the guidance finds the board in the devices' images") {
+  SessionFolderSettings folder;
+  folder.session.duration = 6;
+  CalibrationRig rig;
+  rig.rig = makeRig(RigKind::kEuroc).rig;
+  const CalibrationSession session(rig, CalibrationTarget{}, folder.session);
+  PaintSettings paint;
+  paint.texel = 0.02;
+  const TexturedWorld world(sessionRoom(session), paint);
+  const std::array<SessionCamera, 2> cameras{SessionCamera(session, world, 0, folder),
+                                             SessionCamera(session, world, 1, folder)};
+  Calibration calibration;
+  calibration.rig = rig.rig;
+  std::vector<std::string> lines;
+  GuidedRecording guidance(session.target(), [&](const std::string& line) { lines.push_back(line); });
+  CHECK(guidance.goOn());
+  guidance.begin(calibration);
+  for (const ImuSample& sample : session.imu().samples) guidance.takeImu(sample);
+
+  constexpr int kPairs = 3;
+  std::vector<float> radiance;
+  std::vector<std::uint8_t> grey(752 * 480);
+  for (int pair = 0; pair < kPairs; ++pair) {
+    const int k = 30 * (pair + 1);
+    std::array<std::vector<std::uint8_t>, 2> images;
+    for (std::size_t c = 0; c < 2; ++c) {
+      cameras[c].render(k, radiance);
+      exposeImage(radiance, 752, 480, SensorSettings{}, 0.8, static_cast<std::uint64_t>(k), 0, 2,
+                  grey.data());
+      images[c] = grey;
+    }
+    // As devices do: again and again, until this pair was looked at.
+    for (int round = 0; guidance.looks() <= pair && round < 2000; ++round) {
+      for (std::uint32_t c = 0; c < 2; ++c) {
+        CameraFrame frame;
+        frame.camera = c;
+        frame.stamp = session.imageStamp(k);
+        frame.image = {images[c].data(), 752, 480, 752};
+        guidance.takeImage(frame);
+      }
+      sleepFor(Duration::fromMilliseconds(10));
+    }
+  }
+  CHECK(guidance.looks() >= kPairs);
+  CHECK(guidance.goOn());
+  guidance.end();
+  CHECK(guidance.samplesLost() == 0);
+  CHECK_FALSE(guidance.missing().empty());
+  CHECK_FALSE(mentions(guidance.missing(), "has not seen the board"));
+  CHECK_FALSE(mentions(guidance.missing(), "blurred"));
+  CHECK(mentions(guidance.missing(), "of 20 image pairs"));
+  REQUIRE(lines.size() >= 1);
+  CHECK(lines.front().find("No image yet") != std::string::npos);
+}
+
+}  // namespace
+}  // namespace swiftlet
