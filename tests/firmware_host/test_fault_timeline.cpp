@@ -35,12 +35,12 @@ TEST_CASE("lines are read in any order, with comments, spaces and line ends of a
         "6.000,imu,drop,1.000,0.5\n"
         "8.000,camera1,dark,2.000,40\n");
   CHECK(FaultTimeline::parse("again", timeline.text()).text() == timeline.text());
-  CHECK(timeline.active(FaultDevice::kImu, FaultKind::kStall, at(5.4999)) == nullptr);
-  CHECK(timeline.active(FaultDevice::kImu, FaultKind::kStall, at(5.5)) == timeline.faults().data());
-  CHECK(timeline.active(FaultDevice::kImu, FaultKind::kStall, at(6)) == nullptr);
-  CHECK(timeline.active(FaultDevice::kCamera0, FaultKind::kDark, at(9)) == nullptr);
-  REQUIRE(timeline.active(FaultDevice::kCamera1, FaultKind::kDark, at(9)) != nullptr);
-  CHECK(timeline.active(FaultDevice::kCamera1, FaultKind::kDark, at(9))->value == 40);
+  CHECK(timeline.active(FaultDevice::kImu, PlannedFaultKind::kStall, at(5.4999)) == nullptr);
+  CHECK(timeline.active(FaultDevice::kImu, PlannedFaultKind::kStall, at(5.5)) == timeline.faults().data());
+  CHECK(timeline.active(FaultDevice::kImu, PlannedFaultKind::kStall, at(6)) == nullptr);
+  CHECK(timeline.active(FaultDevice::kCamera0, PlannedFaultKind::kDark, at(9)) == nullptr);
+  REQUIRE(timeline.active(FaultDevice::kCamera1, PlannedFaultKind::kDark, at(9)) != nullptr);
+  CHECK(timeline.active(FaultDevice::kCamera1, PlannedFaultKind::kDark, at(9))->value == 40);
   CHECK(FaultTimeline::parse("none", "").faults().empty());
 }
 

@@ -16,7 +16,7 @@ namespace swiftlet {
 namespace {
 
 struct Known {
-  FaultKind kind;
+  PlannedFaultKind kind;
   std::string_view name;
   bool imu, camera, trigger;
   double value;  ///< where the line gives none
@@ -29,14 +29,14 @@ constexpr double kWhite = 255;
 constexpr std::size_t kMostFaults = 1000;
 
 constexpr std::array<Known, 8> kFaults = {{
-    {FaultKind::kUnplug, "unplug", true, true, false, 0, 0, 0},
-    {FaultKind::kStall, "stall", true, true, false, 0, 0, 0},
-    {FaultKind::kGarbage, "garbage", true, false, false, 0, 0, 0},
-    {FaultKind::kDrop, "drop", true, true, true, 0.5, 0, 1},
-    {FaultKind::kClockStep, "clock_step", true, false, false, 0.25, -kLongestStep, kLongestStep},
-    {FaultKind::kDark, "dark", false, true, false, 0, 0, kWhite},
-    {FaultKind::kFreeze, "freeze", false, true, false, 0, 0, 0},
-    {FaultKind::kGlitch, "glitch", false, false, true, 0, 0, 0},
+    {PlannedFaultKind::kUnplug, "unplug", true, true, false, 0, 0, 0},
+    {PlannedFaultKind::kStall, "stall", true, true, false, 0, 0, 0},
+    {PlannedFaultKind::kGarbage, "garbage", true, false, false, 0, 0, 0},
+    {PlannedFaultKind::kDrop, "drop", true, true, true, 0.5, 0, 1},
+    {PlannedFaultKind::kClockStep, "clock_step", true, false, false, 0.25, -kLongestStep, kLongestStep},
+    {PlannedFaultKind::kDark, "dark", false, true, false, 0, 0, kWhite},
+    {PlannedFaultKind::kFreeze, "freeze", false, true, false, 0, 0, 0},
+    {PlannedFaultKind::kGlitch, "glitch", false, false, true, 0, 0, 0},
 }};
 
 constexpr std::array<std::pair<FaultDevice, std::string_view>, 4> kDevices = {{
@@ -51,7 +51,7 @@ bool has(const Known& fault, FaultDevice device) {
   return device == FaultDevice::kTrigger ? fault.trigger : fault.camera;
 }
 
-const Known& known(FaultKind kind) { return *std::ranges::find(kFaults, kind, &Known::kind); }
+const Known& known(PlannedFaultKind kind) { return *std::ranges::find(kFaults, kind, &Known::kind); }
 
 std::string namesFor(FaultDevice device) {
   std::string names;
@@ -132,7 +132,7 @@ std::string_view name(FaultDevice device) {
   return std::ranges::find(kDevices, device, &std::pair<FaultDevice, std::string_view>::first)->second;
 }
 
-std::string_view name(FaultKind kind) { return known(kind).name; }
+std::string_view name(PlannedFaultKind kind) { return known(kind).name; }
 
 FaultTimeline FaultTimeline::parse(const std::string& name, std::string_view text) {
   FaultTimeline timeline;
@@ -162,7 +162,7 @@ FaultTimeline FaultTimeline::read(const std::string& path) {
   return parse(path, text.str());
 }
 
-const PlannedFault* FaultTimeline::active(FaultDevice device, FaultKind kind, Duration time) const {
+const PlannedFault* FaultTimeline::active(FaultDevice device, PlannedFaultKind kind, Duration time) const {
   for (const PlannedFault& fault : faults_) {
     if (fault.device == device && fault.kind == kind && fault.covers(time)) return &fault;
   }
@@ -178,7 +178,7 @@ bool FaultTimeline::strikes(const PlannedFault& fault, std::uint64_t n) const {
 Duration FaultTimeline::clockStep(Duration time) const {
   Duration sum;
   for (const PlannedFault& fault : faults_) {
-    if (fault.kind == FaultKind::kClockStep && time >= fault.begin) {
+    if (fault.kind == PlannedFaultKind::kClockStep && time >= fault.begin) {
       sum = sum + Duration::fromSeconds(fault.value);
     }
   }

@@ -30,7 +30,7 @@
 namespace swiftlet {
 
 enum class FaultDevice : std::uint8_t { kImu, kCamera0, kCamera1, kTrigger };
-enum class FaultKind : std::uint8_t {
+enum class PlannedFaultKind : std::uint8_t {
   kUnplug,
   kStall,
   kGarbage,
@@ -42,13 +42,13 @@ enum class FaultKind : std::uint8_t {
 };
 
 std::string_view name(FaultDevice device);
-std::string_view name(FaultKind kind);
+std::string_view name(PlannedFaultKind kind);
 
 struct PlannedFault {
   Duration begin;  ///< after the first image
   Duration length;
   FaultDevice device = FaultDevice::kImu;
-  FaultKind kind = FaultKind::kStall;
+  PlannedFaultKind kind = PlannedFaultKind::kStall;
   double value = 0;
 
   [[nodiscard]] bool covers(Duration time) const { return time >= begin && time < begin + length; }
@@ -63,7 +63,7 @@ class FaultTimeline {
 
   [[nodiscard]] const std::vector<PlannedFault>& faults() const { return faults_; }
   /// The fault of this kind that covers `time`, the first of them; null: none.
-  [[nodiscard]] const PlannedFault* active(FaultDevice device, FaultKind kind, Duration time) const;
+  [[nodiscard]] const PlannedFault* active(FaultDevice device, PlannedFaultKind kind, Duration time) const;
   /// Whether chance has it at the n-th occasion, with probability `share`: of the line and n alone.
   [[nodiscard]] bool strikes(const PlannedFault& fault, std::uint64_t n) const;
   /// Sum of the clock's steps that have come by `time`.

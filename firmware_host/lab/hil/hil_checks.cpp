@@ -36,22 +36,22 @@ constexpr Duration kMotion{1'000'000'000};
 constexpr Duration kMostApart{20'000'000};
 
 bool takesAway(const PlannedFault& fault) {
-  return fault.kind == FaultKind::kUnplug || fault.kind == FaultKind::kStall ||
-         (fault.device == FaultDevice::kImu && fault.kind == FaultKind::kGarbage);
+  return fault.kind == PlannedFaultKind::kUnplug || fault.kind == PlannedFaultKind::kStall ||
+         (fault.device == FaultDevice::kImu && fault.kind == PlannedFaultKind::kGarbage);
 }
 
 /// While `other` lasts, its device cannot show `fault`, or shows both in one word.
 bool hides(const PlannedFault& other, const PlannedFault& fault) {
   if (&other == &fault || other.device != fault.device || other.kind == fault.kind) return false;
   switch (fault.kind) {
-    case FaultKind::kUnplug:
+    case PlannedFaultKind::kUnplug:
       return false;
-    case FaultKind::kGlitch:
-      return other.kind == FaultKind::kDrop;
-    case FaultKind::kDrop:
+    case PlannedFaultKind::kGlitch:
+      return other.kind == PlannedFaultKind::kDrop;
+    case PlannedFaultKind::kDrop:
       return true;
-    case FaultKind::kFreeze:
-      return takesAway(other) || other.kind == FaultKind::kDark;
+    case PlannedFaultKind::kFreeze:
+      return takesAway(other) || other.kind == PlannedFaultKind::kDark;
     default:
       return takesAway(other);
   }
@@ -72,7 +72,7 @@ std::string deviceStart(FaultDevice device) {
 }
 
 /// What a user reads of each kind, any of them.
-std::span<const std::string_view> wordsOf(FaultKind kind) {
+std::span<const std::string_view> wordsOf(PlannedFaultKind kind) {
   static constexpr std::array<std::string_view, 3> kGone = {": gone", ": not there", ": down"};
   static constexpr std::array<std::string_view, 2> kNothing = {": sends nothing", ": sends something else"};
   static constexpr std::array<std::string_view, 2> kLost = {": part of it is lost", ": sends nothing"};
@@ -81,20 +81,20 @@ std::span<const std::string_view> wordsOf(FaultKind kind) {
   static constexpr std::array<std::string_view, 1> kSame = {": repeats one image"};
   static constexpr std::array<std::string_view, 1> kMuch = {": sends too much"};
   switch (kind) {
-    case FaultKind::kUnplug:
+    case PlannedFaultKind::kUnplug:
       return kGone;
-    case FaultKind::kStall:
-    case FaultKind::kGarbage:
+    case PlannedFaultKind::kStall:
+    case PlannedFaultKind::kGarbage:
       return kNothing;
-    case FaultKind::kDrop:
+    case PlannedFaultKind::kDrop:
       return kLost;
-    case FaultKind::kClockStep:
+    case PlannedFaultKind::kClockStep:
       return kClock;
-    case FaultKind::kDark:
+    case PlannedFaultKind::kDark:
       return kDark;
-    case FaultKind::kFreeze:
+    case PlannedFaultKind::kFreeze:
       return kSame;
-    case FaultKind::kGlitch:
+    case PlannedFaultKind::kGlitch:
       break;
   }
   return kMuch;
@@ -103,20 +103,20 @@ std::span<const std::string_view> wordsOf(FaultKind kind) {
 /// For how long a fault must show until it must be told; empty: never.
 std::optional<Duration> toldAfter(const PlannedFault& fault) {
   switch (fault.kind) {
-    case FaultKind::kUnplug:
+    case PlannedFaultKind::kUnplug:
       return kUnplugShows;
-    case FaultKind::kStall:
-    case FaultKind::kGarbage:
+    case PlannedFaultKind::kStall:
+    case PlannedFaultKind::kGarbage:
       return kSilenceShows;
-    case FaultKind::kDrop:
+    case PlannedFaultKind::kDrop:
       return fault.value >= kLossShare ? std::optional(kLossShows) : std::nullopt;
-    case FaultKind::kDark:
+    case PlannedFaultKind::kDark:
       return fault.value <= kDarkGrey ? std::optional(kOddImagesShow) : std::nullopt;
-    case FaultKind::kFreeze:
+    case PlannedFaultKind::kFreeze:
       return kOddImagesShow;
-    case FaultKind::kGlitch:
+    case PlannedFaultKind::kGlitch:
       return kLossShows;
-    case FaultKind::kClockStep:
+    case PlannedFaultKind::kClockStep:
       break;
   }
   return std::abs(fault.value) >= kSmallStep ? std::optional(Duration{}) : std::nullopt;
@@ -160,7 +160,7 @@ class Checker {
   [[nodiscard]] Duration calm(std::optional<FaultDevice> device = std::nullopt) const {
     Duration end;
     for (const PlannedFault& fault : e_.faults.faults()) {
-      const Duration length = fault.kind == FaultKind::kClockStep ? Duration{} : fault.length;
+      const Duration length = fault.kind == PlannedFaultKind::kClockStep ? Duration{} : fault.length;
       if (!device || fault.device == *device) end = std::max(end, fault.begin + length);
     }
     return end;
@@ -188,8 +188,9 @@ class Checker {
     const FaultStretch shown = longestVisible(fault, e_.faults);
     Duration until = shown.end + kToldWithin;
     // A step that nobody hears shows when the sensor is heard again.
-    if (fault.kind == FaultKind::kClockStep) until = std::max(shown.begin, calm(fault.device)) + kToldWithin;
-    const bool steps = fault.kind == FaultKind::kClockStep;
+    if (fault.kind == PlannedFaultKind::kClockStep)
+      until = std::max(shown.begin, calm(fault.device)) + kToldWithin;
+    const bool steps = fault.kind == PlannedFaultKind::kClockStep;
     if (!after || (!steps && shown.length() < *after) || until > played()) return;
     const std::string device = deviceStart(fault.device);
     for (const HilEvidence::Line& line : e_.remarks) {
@@ -247,8 +248,8 @@ class Checker {
   }
 
   void checkLowered(const PlannedFault& fault) {
-    const bool unseen =
-        fault.kind == FaultKind::kFreeze || (fault.kind == FaultKind::kDark && fault.value <= kDarkGrey);
+    const bool unseen = fault.kind == PlannedFaultKind::kFreeze ||
+                        (fault.kind == PlannedFaultKind::kDark && fault.value <= kDarkGrey);
     if (fault.device == FaultDevice::kTrigger || (!takesAway(fault) && !unseen)) return;
     const Duration from = fault.begin + kLowered;
     const Duration until = std::min(fault.begin + fault.length, played());
@@ -261,8 +262,8 @@ class Checker {
 
   [[nodiscard]] bool blind(Duration at, FaultDevice camera) const {
     return std::ranges::any_of(e_.faults.faults(), [&](const PlannedFault& fault) {
-      const bool odd =
-          fault.kind == FaultKind::kFreeze || (fault.kind == FaultKind::kDark && fault.value <= kDarkGrey);
+      const bool odd = fault.kind == PlannedFaultKind::kFreeze ||
+                       (fault.kind == PlannedFaultKind::kDark && fault.value <= kDarkGrey);
       return fault.device == camera && (takesAway(fault) || odd) && fault.covers(at);
     });
   }

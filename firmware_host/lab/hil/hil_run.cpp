@@ -94,11 +94,11 @@ class PlayedTrigger {
 
   void raise(Duration time) {
     const auto number = static_cast<std::uint64_t>(slot_++);
-    const PlannedFault* drop = faults_.active(FaultDevice::kTrigger, FaultKind::kDrop, time);
+    const PlannedFault* drop = faults_.active(FaultDevice::kTrigger, PlannedFaultKind::kDrop, time);
     if (drop != nullptr && faults_.strikes(*drop, number)) return;
     ++edges_;
     static_cast<void>(pull(true));
-    const bool glitch = faults_.active(FaultDevice::kTrigger, FaultKind::kGlitch, time) != nullptr;
+    const bool glitch = faults_.active(FaultDevice::kTrigger, PlannedFaultKind::kGlitch, time) != nullptr;
     next_ = glitch ? Next::kGlitchDown : Next::kDown;
   }
   [[nodiscard]] bool pull(bool up) const {

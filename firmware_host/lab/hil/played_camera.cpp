@@ -50,7 +50,7 @@ DeviceFault PlayedCamera::showSlot() {
   while (next_ && grid_.slotOf(next_->stamp) < slot_) next_ = reader_.image(index_);
   const Duration time = grid_.instant(slot_) - grid_.first;
   const bool here = next_ && grid_.slotOf(next_->stamp) == slot_;
-  const bool frozen = faults_.active(device_, FaultKind::kFreeze, time) != nullptr;
+  const bool frozen = faults_.active(device_, PlannedFaultKind::kFreeze, time) != nullptr;
   if (here && !(frozen && shown_)) {
     shown_ = std::move(next_);
   } else if (!here) {
@@ -58,7 +58,7 @@ DeviceFault PlayedCamera::showSlot() {
   }
   if (here) next_ = reader_.image(index_);
   ++counters_.shown;
-  if (const PlannedFault* dark = faults_.active(device_, FaultKind::kDark, time)) {
+  if (const PlannedFault* dark = faults_.active(device_, PlannedFaultKind::kDark, time)) {
     return player_.showDark(static_cast<int>(std::lround(dark->value)));
   }
   if (!shown_) return player_.showDark(0);
@@ -66,7 +66,7 @@ DeviceFault PlayedCamera::showSlot() {
 }
 
 DeviceFault PlayedCamera::followFaults(Duration time) {
-  const bool gone = faults_.active(device_, FaultKind::kUnplug, time) != nullptr;
+  const bool gone = faults_.active(device_, PlannedFaultKind::kUnplug, time) != nullptr;
   if (gone && !unplugged_) {
     unplugged_ = true;
     return player_.unplug();
@@ -77,7 +77,7 @@ DeviceFault PlayedCamera::followFaults(Duration time) {
     unplugged_ = false;
   }
   if (unplugged_) return {};
-  const bool still = faults_.active(device_, FaultKind::kStall, time) != nullptr;
+  const bool still = faults_.active(device_, PlannedFaultKind::kStall, time) != nullptr;
   if (still == stalled_) return {};
   // What waited in the driver is old.
   if (!still && !reopen()) return {};
@@ -98,7 +98,8 @@ DeviceFault PlayedCamera::damageNext(Stamp now) {
   const std::int64_t left = (grid_.instant(next) - now).ns;
   if (next == decided_ || left > grid_.period.ns * 3 / 8 || left < grid_.period.ns / 8) return {};
   decided_ = next;
-  const PlannedFault* drop = faults_.active(device_, FaultKind::kDrop, grid_.instant(next) - grid_.first);
+  const PlannedFault* drop =
+      faults_.active(device_, PlannedFaultKind::kDrop, grid_.instant(next) - grid_.first);
   if (drop == nullptr || !faults_.strikes(*drop, static_cast<std::uint64_t>(next))) return {};
   return player_.damage();
 }

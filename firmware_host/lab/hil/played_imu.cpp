@@ -34,7 +34,7 @@ std::optional<Stamp> PlayedImu::due() const {
 
 DeviceFault PlayedImu::step(Stamp now) {
   const Duration time = now - grid_.first;
-  const bool gone = faults_.active(FaultDevice::kImu, FaultKind::kUnplug, time) != nullptr;
+  const bool gone = faults_.active(FaultDevice::kImu, PlannedFaultKind::kUnplug, time) != nullptr;
   if (gone != unplugged_) {
     const DeviceFault fault = gone ? wire_->unplug() : wire_->open();
     if (!fault.ok()) return fault;
@@ -50,13 +50,13 @@ DeviceFault PlayedImu::step(Stamp now) {
 
 DeviceFault PlayedImu::send(const ImuSample& sample, Duration time) {
   const std::uint64_t number = number_++;
-  const PlannedFault* drop = faults_.active(FaultDevice::kImu, FaultKind::kDrop, time);
+  const PlannedFault* drop = faults_.active(FaultDevice::kImu, PlannedFaultKind::kDrop, time);
   const bool dropped = drop != nullptr && faults_.strikes(*drop, number);
-  if (unplugged_ || dropped || faults_.active(FaultDevice::kImu, FaultKind::kStall, time) != nullptr) {
+  if (unplugged_ || dropped || faults_.active(FaultDevice::kImu, PlannedFaultKind::kStall, time) != nullptr) {
     ++counters_.withheld;
     return {};
   }
-  if (faults_.active(FaultDevice::kImu, FaultKind::kGarbage, time) != nullptr) {
+  if (faults_.active(FaultDevice::kImu, PlannedFaultKind::kGarbage, time) != nullptr) {
     ++counters_.withheld;
     return wire_->sendGarbage(number);
   }
