@@ -24,12 +24,12 @@
 namespace swiftlet {
 
 /// One camera of a log: black images at its pace before the first, then the log's when they are due.
-class LogFeed : public test::Feed {
+class FedCamera : public test::Feed {
  public:
   /// From the exposure to the host: what a sensor's readout and a decoder take.
   static constexpr Duration kTransfer = Duration::fromMilliseconds(4);
 
-  LogFeed(LogReader& reader, std::size_t camera, const FrameGrid& grid)
+  FedCamera(LogReader& reader, std::size_t camera, const FrameGrid& grid)
       : reader_(reader), camera_(camera), grid_(grid), next_(reader.image(camera)) {
     slot_ = (monotonicNow() - grid.first).ns / grid.period.ns;
   }
@@ -96,7 +96,7 @@ class PlayedVehicle {
     grid.first = monotonicNow() + lead;
     grid.first_log = firstImage();
     for (std::size_t i = 0; i < feeds_.size(); ++i) {
-      feeds_[i] = std::make_unique<LogFeed>(*reader_, i, grid);
+      feeds_[i] = std::make_unique<FedCamera>(*reader_, i, grid);
       test::setFeed(static_cast<int>(i), feeds_[i].get());
     }
     const Duration all = Duration{static_cast<std::int64_t>(source_->frameCount()) * grid.period.ns};
@@ -113,7 +113,7 @@ class PlayedVehicle {
 
   /// Set when all has been played.
   [[nodiscard]] const std::atomic<bool>& ended() const { return ended_; }
-  [[nodiscard]] LogFeed& feed(std::size_t camera) { return *feeds_.at(camera); }
+  [[nodiscard]] FedCamera& feed(std::size_t camera) { return *feeds_.at(camera); }
   /// The log's truth on the host's clock.
   [[nodiscard]] Trajectory truth() const {
     Trajectory moved = source_->groundTruth();
@@ -153,7 +153,7 @@ class PlayedVehicle {
   std::unique_ptr<LogSource> source_;
   std::unique_ptr<LogReader> reader_;
   std::unique_ptr<PlayedImu> imu_;
-  std::array<std::unique_ptr<LogFeed>, 2> feeds_;
+  std::array<std::unique_ptr<FedCamera>, 2> feeds_;
   std::atomic<bool> stop_{false};
   std::atomic<bool> ended_{false};
   std::thread player_;
