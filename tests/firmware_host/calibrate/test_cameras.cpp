@@ -9,11 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "drivers/simulated/calibration_rig.hpp"
-#include "drivers/simulated/calibration_session.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/lab/calibrate/cameras/calibrate_cameras.hpp"
 #include "firmware_host/lab/calibrate/cameras/projection_error.hpp"
+#include "tests/firmware_host/calibrate/session_input.hpp"
 #include "tests/support/long_run.hpp"
 
 using namespace swiftlet;
@@ -21,28 +20,6 @@ using namespace swiftlet;
 namespace {
 
 constexpr double kDegree = M_PI / 180;
-
-CalibrationRig rigOf(std::uint64_t seed) {
-  CalibrationRig rig =
-      drawCalibrationRig(seed, seed % 2 == 0 ? CameraKind::kPinholeRadtan : CameraKind::kEquidistant);
-  rig.rig.readout = {};
-  return rig;
-}
-
-CameraInput inputOf(const CalibrationRig& rig, const CalibrationTarget& target,
-                    const SessionSettings& settings) {
-  const CalibrationSession session(rig, target, settings);
-  CameraInput input;
-  input.target = target;
-  input.camera_count = 2;
-  for (std::size_t c = 0; c < 2; ++c) {
-    input.image_size[c] = {rig.rig.camera[c].width(), rig.rig.camera[c].height()};
-  }
-  for (int k = 0; k < session.imageCount(); ++k) {
-    for (BoardView& view : session.views(k)) input.views.push_back(std::move(view));
-  }
-  return input;
-}
 
 Eigen::Matrix<double, 8, 1> parameters(const CameraModel& lens) {
   Eigen::Matrix<double, 8, 1> p;
@@ -74,10 +51,10 @@ TEST_CASE("cameras from simulated corners are right and know how well", "[long]"
   int said_bad = 0;
   for (int i = 0; i < rigs; ++i) {
     const std::uint64_t seed = 400 + static_cast<std::uint64_t>(i);
-    const CalibrationRig rig = rigOf(seed);
+    const CalibrationRig rig = test::globalShutterRig(seed);
     SessionSettings settings;
     settings.seed = seed;
-    const CameraSolution solution = calibrateCameras(inputOf(rig, {}, settings));
+    const CameraSolution solution = calibrateCameras(test::sessionInput(rig, {}, settings));
     CAPTURE(seed);
     for (const std::string& reason : solution.reasons) {
       std::printf("  %lu: %s\n", static_cast<unsigned long>(seed), reason.c_str());
