@@ -52,6 +52,34 @@ CvViews viewsOf(const LogViews& log, const CalibrationTarget& target, std::size_
   return out;
 }
 
+/// Corners that both cameras saw at one moment.
+std::array<CvViews, kMaxCameras> commonViews(const LogViews& log, const CalibrationTarget& target) {
+  std::array<CvViews, kMaxCameras> out;
+  for (const BoardView& first : log.views) {
+    for (const BoardView& second : log.views) {
+      if (first.camera != 0 || second.camera != 1 || first.stamp != second.stamp) continue;
+      std::array<LogViews, kMaxCameras> one;
+      for (const BoardCorner& corner : first.corners) {
+        for (const BoardCorner& other : second.corners) {
+          if (corner.id != other.id) continue;
+          if (one[0].views.empty()) {
+            one[0].views.push_back({first.stamp, 0, {}});
+            one[1].views.push_back({second.stamp, 1, {}});
+          }
+          one[0].views[0].corners.push_back(corner);
+          one[1].views[0].corners.push_back(other);
+        }
+      }
+      for (std::size_t c = 0; c < 2; ++c) {
+        const CvViews view = viewsOf(one[c], target, c, -1);
+        out[c].points.insert(out[c].points.end(), view.points.begin(), view.points.end());
+        out[c].pixels.insert(out[c].pixels.end(), view.pixels.begin(), view.pixels.end());
+      }
+    }
+  }
+  return out;
+}
+
 CvCamera calibrate(const CvViews& views, const Eigen::Vector2i& size) {
   CvCamera camera;
   std::vector<cv::Mat> rotations, translations;
@@ -151,17 +179,19 @@ int main(int argc, char** argv) {
         quantile(projectionDifference(first, second), 0.95),
         rms(projectionDifference(solution.camera[c].model, lens)));
   }
-  if (log.camera_count == 2 && views[0].points.size() == views[1].points.size()) {
-    cv::Mat R, t, E, F;
-    const double found = cv::stereoCalibrate(views[0].points, views[0].pixels, views[1].pixels, cameras[0].K,
-                                             cameras[0].D, cameras[1].K, cameras[1].D,
-                                             cv::Size(log.image_size[0].x(), log.image_size[0].y()), R, t, E,
-                                             F, cv::CALIB_USE_INTRINSIC_GUESS | kFourTerms);
-    fmt::print("OpenCV stereo: rms {:.4f} px per axis, baseline {:.3f} mm\n", found / std::sqrt(2.0),
-               cv::norm(t) * 1e3);
-    for (std::size_t c = 0; c < 2; ++c) {
-      fmt::print("camera {} OpenCV stereo {}\n", c, words(lensOf(cameras[c], log.image_size[c])));
-    }
+  if (log.camera_count < 2) return 0;
+  const std::array<CvViews, kMaxCameras> common = commonViews(log, request.target);
+  cv::Mat R, t, E, F;
+  const double found =
+      cv::stereoCalibrate(common[0].points, common[0].pixels, common[1].pixels, cameras[0].K, cameras[0].D,
+                          cameras[1].K, cameras[1].D, cv::Size(log.image_size[0].x(), log.image_size[0].y()),
+                          R, t, E, F, cv::CALIB_USE_INTRINSIC_GUESS | kFourTerms);
+  fmt::print("OpenCV stereo: {} pairs, rms {:.4f} px per axis, baseline {:.3f} mm\n", common[0].points.size(),
+             found / std::sqrt(2.0), cv::norm(t) * 1e3);
+  for (std::size_t c = 0; c < 2; ++c) {
+    const CameraModel lens = lensOf(cameras[c], log.image_size[c]);
+    fmt::print("camera {} OpenCV stereo {}; beside swiftlet {:.3f} px rms\n", c, words(lens),
+               rms(projectionDifference(solution.camera[c].model, lens)));
   }
   return 0;
 }
