@@ -64,27 +64,33 @@ double medianNorm(const std::vector<ImuSample>& samples, Eigen::Vector3d ImuSamp
 
 std::vector<ImuSample> readImuRows(CsvReader& csv, LogCounters& counters, LogWarnings& warnings) {
   std::vector<ImuSample> samples;
-  bool accel_first = false;
-  while (csv.next(7)) {
-    if (samples.empty()) accel_first = accelFirst(csv.header());
-    ImuSample sample;
-    if (!parseCsvStamp(csv.field(0), sample.stamp)) {
-      csv.reject("timestamp", "`" + std::string(csv.field(0).substr(0, 40)) + "` is not a stamp in ns");
-      continue;
-    }
-    if (csv.numbers(accel_first ? 4 : 1, kGyroNames, sample.gyro.data()) &&
-        csv.numbers(accel_first ? 1 : 4, kAccelNames, sample.accel.data())) {
-      samples.push_back(sample);
-    }
-  }
-  csv.finish("IMU samples", "A row is: stamp [ns], gyro x y z [rad/s], accel x y z [m/s^2]");
-  if (accel_first) warnings.add(csv.name() + ": the header names the accelerometer first; read that way");
+  ImuRows rows(csv, warnings);
+  for (ImuSample sample; rows.next(sample);) samples.push_back(sample);
   orderSamples(samples, csv.name(), counters, warnings);
   checkUnits(samples, csv.name(), warnings);
   return samples;
 }
 
 }  // namespace
+
+bool ImuRows::next(ImuSample& sample) {
+  while (csv_.next(7)) {
+    if (!any_) accel_first_ = accelFirst(csv_.header());
+    if (!parseCsvStamp(csv_.field(0), sample.stamp)) {
+      csv_.reject("timestamp", "`" + std::string(csv_.field(0).substr(0, 40)) + "` is not a stamp in ns");
+      continue;
+    }
+    if (!csv_.numbers(accel_first_ ? 4 : 1, kGyroNames, sample.gyro.data()) ||
+        !csv_.numbers(accel_first_ ? 1 : 4, kAccelNames, sample.accel.data())) {
+      continue;
+    }
+    any_ = true;
+    return true;
+  }
+  csv_.finish("IMU samples", "A row is: stamp [ns], gyro x y z [rad/s], accel x y z [m/s^2]");
+  if (accel_first_) warnings_.add(csv_.name() + ": the header names the accelerometer first; read that way");
+  return false;
+}
 
 void orderSamples(std::vector<ImuSample>& samples, const std::string& name, LogCounters& counters,
                   LogWarnings& warnings) {

@@ -18,6 +18,21 @@ std::vector<ImuSample> readImuFile(const std::string& path, LogCounters& counter
 std::vector<ImuSample> readImuText(const std::string& name, std::string_view text, LogCounters& counters,
                                    LogWarnings& warnings);
 
+/// The rows of such a file one at a time, as they stand there: neither put in order nor checked for units.
+class ImuRows {
+ public:
+  /// Both outlive this.
+  ImuRows(CsvReader& csv, LogWarnings& warnings) : csv_(csv), warnings_(warnings) {}
+  /// False at the end; InputError there where the file holds no samples (CsvReader::finish).
+  bool next(ImuSample& sample);
+
+ private:
+  CsvReader& csv_;
+  LogWarnings& warnings_;
+  bool any_ = false;
+  bool accel_first_ = false;
+};
+
 /// Median sample rate [Hz]; 0 for fewer than two samples.
 double medianRate(const std::vector<ImuSample>& samples);
 

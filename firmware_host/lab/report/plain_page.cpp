@@ -124,19 +124,6 @@ std::string seriesSvg(const Series& whole, const Frame& frame, const char* colou
                      colour, width, columns ? "butt" : "round");
 }
 
-std::string tableHtml(const Table& table) {
-  std::string html = fmt::format("<details{}><summary>{}</summary><table><tr>", table.folded ? "" : " open",
-                                 htmlText(table.title));
-  for (const std::string& column : table.columns) html += "<th>" + htmlText(column) + "</th>";
-  html += "</tr>\n";
-  for (const auto& row : table.rows) {
-    html += "<tr>";
-    for (const std::string& cell : row) html += "<td>" + htmlText(cell) + "</td>";
-    html += "</tr>\n";
-  }
-  return html + "</table></details>\n";
-}
-
 std::string runHtml(const ReportedRun& run) {
   const nlohmann::ordered_json json = runDocument(run);
   std::string html = "<h2>" + htmlText(run.view.files.name) + "</h2>\n";
@@ -168,7 +155,23 @@ std::string runHtml(const ReportedRun& run) {
 
 }  // namespace
 
+std::string tableHtml(const Table& table) {
+  std::string html = fmt::format("<details{}><summary>{}</summary><table><tr>", table.folded ? "" : " open",
+                                 htmlText(table.title));
+  for (const std::string& column : table.columns) html += "<th>" + htmlText(column) + "</th>";
+  html += "</tr>\n";
+  for (const auto& row : table.rows) {
+    html += "<tr>";
+    for (const std::string& cell : row) html += "<td>" + htmlText(cell) + "</td>";
+    html += "</tr>\n";
+  }
+  return html + "</table></details>\n";
+}
+
 std::string svgPlot(const Plot& plot) {
+  if (plot.kind == PlotKind::kDrawing) {
+    return "<figure><figcaption>" + htmlText(plot.title) + "</figcaption>" + plot.svg + "</figure>";
+  }
   const Frame frame(plot);
   const std::string unit = plot.kind == PlotKind::kPlan ? ", up: " + plot.y_label
                            : plot.y_label.empty()       ? ""
@@ -200,23 +203,30 @@ std::string svgPlot(const Plot& plot) {
   return svg;
 }
 
+std::string plainDocument(const std::string& title, const std::string& content) {
+  return "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>" + htmlText(title) +
+         "</title><style>\n"
+         "body{font:14px system-ui,sans-serif;margin:1.5em;max-width:1300px}svg text{font:11px "
+         "system-ui,sans-serif}svg .title{font-weight:600}table{border-collapse:collapse}td,th{padding:2px "
+         "10px;text-align:left;border-bottom:1px solid #ddd}.missing{background:#fff2d8;padding:4px 8px}"
+         ".verdict{font-size:17px;font-weight:600}figure{display:inline-block;margin:0 1em 1em "
+         "0}figure svg{width:600px;height:auto;display:block}figcaption{font-weight:600}"
+         "</style></head><body>\n<h1>" +
+         htmlText(title) +
+         "</h1>\n<p class=\"missing\">This is a plain report: tables and fixed plots, no 3D view. A program "
+         "that "
+         "was built where npm is at hand makes the full one.</p>\n" +
+         content + "<p>" + htmlText(versionText()) + "</p></body></html>\n";
+}
+
 std::string plainPage(const std::vector<ReportedRun>& runs) {
-  std::string html =
-      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>swiftlet "
-      "report</title><style>\n"
-      "body{font:14px system-ui,sans-serif;margin:1.5em;max-width:1300px}svg text{font:11px "
-      "system-ui,sans-serif}svg .title{font-weight:600}table{border-collapse:collapse}td,th{padding:2px "
-      "10px;text-align:left;border-bottom:1px solid #ddd}.missing{background:#fff2d8;padding:4px 8px}"
-      "</style></head><body>\n<h1>swiftlet report</h1>\n"
-      "<p class=\"missing\">This is a plain report: tables and fixed plots, no 3D view. A program that was "
-      "built "
-      "where npm is at hand makes the full one.</p>\n";
+  std::string html;
   if (runs.size() == 2) {
     html += "<h2>Differences</h2>\n";
     for (const Table& table : differencesOf(runs[0].view, runs[1].view)) html += tableHtml(table);
   }
   for (const ReportedRun& run : runs) html += runHtml(run);
-  return html + "<p>" + htmlText(versionText()) + "</p></body></html>\n";
+  return plainDocument("swiftlet report", html);
 }
 
 }  // namespace swiftlet

@@ -15,6 +15,8 @@ const char* kindName(PlotKind kind) {
       return "plan";
     case PlotKind::kHistogram:
       return "histogram";
+    case PlotKind::kDrawing:
+      return "drawing";
     case PlotKind::kTime:
       break;
   }
@@ -43,7 +45,7 @@ std::string column(const std::vector<double>& values) {
 }  // namespace
 
 bool Plot::empty() const {
-  return std::ranges::all_of(series, [](const Series& one) { return one.x.empty(); });
+  return svg.empty() && std::ranges::all_of(series, [](const Series& one) { return one.x.empty(); });
 }
 
 Series decimated(const Series& series, std::size_t most) {
@@ -82,6 +84,7 @@ Json toJson(const Plot& plot) {
                {"title", plot.title},     {"kind", kindName(plot.kind)},
                {"x_label", plot.x_label}, {"y_label", plot.y_label}};
   if (!plot.value_label.empty()) json["value_label"] = plot.value_label;
+  if (!plot.svg.empty()) json["svg"] = plot.svg;
   if (!plot.note.empty()) json["note"] = plot.note;
   if (!plot.markers.empty()) {
     json["markers"] = Json::array();

@@ -3,7 +3,7 @@
 //
 // Numbers are doubles here and 32-bit floats in the document. x of kTime is seconds since the run's first
 // image, rising; of kPlan metres, with the same scale as y; of kHistogram the left edges of columns on a
-// logarithmic axis, [ms].
+// logarithmic axis, [ms]. kDrawing is shown as it is.
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace swiftlet {
 
-enum class PlotKind { kTime, kPlan, kHistogram };
+enum class PlotKind { kTime, kPlan, kHistogram, kDrawing };
 enum class SeriesStyle {
   kLine,
   kPoints,
@@ -43,9 +43,10 @@ struct Plot {
   std::string value_label;
   std::vector<Series> series;
   std::vector<PlotMarker> markers;
-  std::string note;  ///< what it cannot show and why; empty: nothing is missing
+  std::string note;      ///< what it cannot show and why; empty: nothing is missing
+  std::string svg = {};  ///< for kDrawing, in place of series: an element with a viewBox
 
-  [[nodiscard]] bool empty() const;  ///< no series with a point
+  [[nodiscard]] bool empty() const;  ///< no series with a point, no drawing
 };
 
 /// At most this many points of a series go into the document.

@@ -4,6 +4,7 @@
 import 'uplot/dist/uPlot.min.css';
 import './style.css';
 import { sharedBounds } from './columns.js';
+import { Drawing } from './drawing.js';
 import { HistogramPlot } from './histogram_plot.js';
 import { LiveView } from './live.js';
 import { PlanPlot } from './plan_plot.js';
@@ -14,7 +15,7 @@ import { Timeline } from './timeline.js';
 
 const kFormat = 1;
 const kMostEvents = 1000; // of a run that goes on
-const kinds = { time: TimePlot, plan: PlanPlot, histogram: HistogramPlot };
+const kinds = { time: TimePlot, plan: PlanPlot, histogram: HistogramPlot, drawing: Drawing };
 
 class Run {
   constructor(run, width) {
@@ -23,6 +24,7 @@ class Run {
     this.key = `time${run.first_image_ns}`;
     this.plots = new Map();
     this.width = width;
+    this.isFlight = run.first_image_ns != null; // else a calibration
     this.run.health ??= [];
     this.run.events ??= [];
     this.stale = new Set(); // plots that have more than they show
@@ -32,6 +34,12 @@ class Run {
   header(letter) {
     const head = element('div', null, 'run');
     head.append(element('h2', `${letter}${this.run.name}`));
+    if (this.run.verdict) {
+      const verdict = element('p', this.run.verdict.text, 'verdict');
+      verdict.dataset.verdict = this.run.verdict.kind;
+      head.append(verdict);
+    }
+    for (const line of this.run.words ?? []) head.append(element('p', line, 'word'));
     for (const missing of this.run.missing ?? []) {
       head.append(element('p', `${missing.file}: ${missing.what}`, 'missing'));
     }
@@ -57,7 +65,7 @@ class Run {
 
   tables(host) {
     this.tablesHost = host;
-    host.append(eventsTable(this.run));
+    if (this.isFlight) host.append(eventsTable(this.run));
     for (const table of this.run.tables ?? []) host.append(tableElement(table));
   }
 
@@ -179,9 +187,10 @@ const report = {
       if (!json.differences?.length) host.append(element('p', 'None.', 'note'));
       for (const table of json.differences ?? []) host.append(tableElement(table));
     }
-    row('Health and events', (run, cell) => run.timeline(cell));
+    const flights = this.runs.every((run) => run.isFlight);
+    if (flights) row('Health and events', (run, cell) => run.timeline(cell));
     const groups = [...new Set(json.runs.flatMap((run) => run.plots.map((plot) => plot.group)))];
-    const scenes = () => row('3D view', (run, cell) => { cell.className = 'scene'; run.sceneHost = cell; });
+    const scenes = () => json.runs.some((run) => run.scene) && row('3D view', (run, cell) => { cell.className = 'scene'; run.sceneHost = cell; });
     if (!groups.includes('Trajectory')) scenes();
     for (const group of groups) {
       if (beside) {
@@ -216,7 +225,7 @@ const report = {
       requestAnimationFrame(() => setTimeout(() => {
         this.times = { plots: performance.now() };
         for (const run of this.runs) {
-          run.scene(run.sceneHost);
+          if (run.sceneHost) run.scene(run.sceneHost);
           if (before?.touched) run.view?.lookAs(before);
           run.view?.drawNow();
         }

@@ -1,0 +1,53 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "firmware_host/commands/calibrate_commands.hpp"
+#include "firmware_host/commands/program.hpp"
+#include "firmware_host/files/whole_file.hpp"
+#include "firmware_host/lab/calibrate/imu_noise/imu_noise_run.hpp"
+#include "firmware_host/lab/calibrate/page/solution_pages.hpp"
+#include "firmware_host/realtime/console.hpp"
+
+namespace swiftlet {
+namespace {
+
+struct ImuNoiseOptions {
+  std::string log;
+  std::string out;
+};
+
+int calibrateImuNoise(const ImuNoiseOptions& options) {
+  const ImuNoiseResult result = measureImuNoise(options.log);
+  warnAll(result.warnings);
+  fmt::print("{}", imuNoiseText(result));
+  if (!options.out.empty()) {
+    writeWholeFile(options.out, imuNoiseYaml(result));
+    const std::string page = std::filesystem::path(options.out).replace_extension(".html").string();
+    writeCalibrationPage(page, imuNoisePage(result));
+    fmt::print("written to {} and {}\n", options.out, page);
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+void addCalibrateImuNoise(CLI::App& calibrate, int& exit_code) {
+  CLI::App* command =
+      calibrate.add_subcommand("imu-noise", "Noise of an IMU from a log at rest: Allan deviation");
+  auto options = std::make_shared<ImuNoiseOptions>();
+  command
+      ->add_option("LOG", options->log,
+                   "Hours at rest: a EuRoC folder (imu0 is enough), an imu0/data.csv, a bag or a recording")
+      ->required();
+  command->add_option("--out", options->out,
+                      "File for the result, as Kalibr's imu.yaml; its page, with plots, beside it as .html");
+  command->footer(
+      "Example:\n  swiftlet calibrate imu-noise still --out imu.yaml\n"
+      "Two hours at rest give the random walk of most sensors; white noise takes ten minutes.");
+  command->callback([options, &exit_code] { exit_code = calibrateImuNoise(*options); });
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,391 @@
+#include "firmware_host/lab/calibrate/check/check_run.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+
+#include "drivers/input/input_error.hpp"
+#include "firmware_host/realtime/progress.hpp"
+#include "firmware_host/runs/replay_run.hpp"
+#include "firmware_host/smoothing/keyframe_reader.hpp"
+#include "firmware_host/smoothing/map_keeper.hpp"
+
+namespace swiftlet {
+namespace {
+
+namespace fs = std::filesystem;
+using change::kCount;
+
+constexpr std::size_t kLongestPiece = 40;  // keyframes, some 8 s
+constexpr std::size_t kShortestPiece = 15;
+constexpr std::size_t kWantedPieces = 5;
+constexpr std::size_t kMostPieces = 10;
+constexpr std::size_t kFewestPieces = 3;  // whose scatter says something
+constexpr double kMostBetween = 1.0;      // s between neighbouring keyframes
+
+/// A folder for the run that is removed again, unless the user named one.
+class RunPlace {
+ public:
+  explicit RunPlace(const std::string& wanted) : path_(wanted), own_(wanted.empty()) {
+    if (!own_) return;
+    std::string name = (fs::temp_directory_path() / "swiftlet_check_XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) {
+      throw InputError(name, 0, "", "cannot be made", "Give a folder with --out");
+    }
+    path_ = name;
+  }
+  ~RunPlace() {
+    std::error_code ignored;
+    if (own_) fs::remove_all(path_, ignored);
+  }
+  RunPlace(const RunPlace&) = delete;
+  RunPlace& operator=(const RunPlace&) = delete;
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+  bool own_;
+};
+
+using Keyframes = std::vector<FlightKeyframe>;
+
+/// Stretches of keyframes that follow one another.
+std::vector<Keyframes> readStretches(KeyframeReader& reader) {
+  std::vector<Keyframes> stretches;
+  std::vector<ImuSample> samples;
+  for (auto next = reader.next(); next != KeyframeReader::Next::kEnd; next = reader.next()) {
+    if (next == KeyframeReader::Next::kSample) samples.push_back(reader.sample());
+    if (next != KeyframeReader::Next::kKeyframe) continue;
+    FlightKeyframe keyframe{reader.frame(), reader.state(), reader.noiseInUse(), samples};
+    // The next interval begins at this frame, with some samples before it for another clock.
+    const Stamp keep = keyframe.frame.stamp - Duration::fromMilliseconds(100);
+    std::erase_if(samples, [&](const ImuSample& sample) { return sample.stamp < keep; });
+    if (stretches.empty() || stretches.back().back().state.epoch != keyframe.state.epoch ||
+        (keyframe.frame.stamp - stretches.back().back().frame.stamp).seconds() > kMostBetween) {
+      stretches.emplace_back();
+    }
+    stretches.back().push_back(std::move(keyframe));
+  }
+  return stretches;
+}
+
+/// At most kMostPieces of one length, spread over the flight. Short flights have short pieces: their scatter
+/// needs some.
+std::vector<Keyframes> cut(const std::vector<Keyframes>& stretches) {
+  std::size_t total = 0;
+  for (const Keyframes& stretch : stretches) total += stretch.size();
+  const std::size_t length = std::clamp(total / kWantedPieces, kShortestPiece, kLongestPiece);
+  std::vector<Keyframes> pieces;
+  for (const Keyframes& stretch : stretches) {
+    for (std::size_t begin = 0; begin + length <= stretch.size(); begin += length) {
+      const auto from = stretch.begin() + static_cast<std::ptrdiff_t>(begin);
+      pieces.emplace_back(from, from + static_cast<std::ptrdiff_t>(length));
+    }
+  }
+  if (pieces.size() <= kMostPieces) return pieces;
+  std::vector<Keyframes> chosen;
+  for (std::size_t i = 0; i < kMostPieces; ++i) chosen.push_back(pieces[i * pieces.size() / kMostPieces]);
+  return chosen;
+}
+
+/// What is judged: a linear combination of the columns of the change.
+struct Quantity {
+  std::string name;
+  std::string unit;
+  CalibrationChange row = CalibrationChange::Zero();  ///< to `unit`
+  double limit = 0;                                   ///< in `unit`
+  double file = 0;
+  double effect_per_unit = 0;
+  std::string effect_unit = {};
+  bool essential = true;
+};
+
+constexpr std::array<const char*, 3> kAxes = {"x", "y", "z"};
+// Limits: what costs accuracy, or what calibrations of good tools differ by, whichever is larger.
+constexpr double kShiftLimit = 2;  // ms: 2 mrad at 1 rad/s
+constexpr double kTurnLimit =
+    0.15;                          // deg: two good tools differ by up to 0.3 on EuRoC's rig, 0.03 on TUM-VI's
+constexpr double kMoveLimit = 20;  // mm: Kalibr and Basalt differ by 8
+constexpr double kFocalLimit = 0.5;     // %
+constexpr double kRigTurnLimit = 0.05;  // deg: the epipolar gate is 1.5 px, 0.19 deg of a 460 px lens
+constexpr double kBaselineLimit = 1;    // %: of every depth
+constexpr double kToDegrees = 180 / std::numbers::pi;
+constexpr double kToMilli = 1e3;
+constexpr double kPercent = 100;
+// A hundred quantities are judged in ten flights: chance alone must not raise an alarm in any.
+constexpr double kAlarmSigmas = 4;
+constexpr double kKnownSigmas = 2;  // in the limit, for "holds"
+constexpr double kLeastStereoShare = 0.25;
+
+std::vector<Quantity> quantitiesOf(const Rig& rig) {
+  std::vector<Quantity> quantities;
+  const double focal = rig.camera[0].focal();
+  Quantity shift{"time shift of the cameras", "ms"};
+  shift.row[change::kShift] = kToMilli;
+  shift.limit = kShiftLimit;
+  shift.file = kToMilli * rig.camera_to_imu_shift.seconds();
+  shift.effect_per_unit = focal / kToMilli;
+  shift.effect_unit = "px at 1 rad/s";
+  quantities.push_back(shift);
+  // A gyro whose axes lean by `a` reads (I + hat(a)) rate: to the images that is a turn of the camera by
+  // R_cam_body a. The sum of both is what flights see; how it is shared, they hardly do.
+  const Eigen::Matrix3d R_cam_body = rig.T_body_cam[0].R().transpose();
+  for (int axis = 0; axis < 3; ++axis) {
+    Quantity turn{
+        fmt::format("camera 0 against the gyro: turn about its {}", kAxes.at(static_cast<std::size_t>(axis))),
+        "deg"};
+    turn.row[change::kTurn + axis] = kToDegrees;
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3;
+      const int k = (i + 2) % 3;
+      const double half = 0.5 * kToDegrees * R_cam_body(axis, i);
+      turn.row[change::kGyro + 3 * j + k] += half;  // hat(a)(k, j) = a_i
+      turn.row[change::kGyro + 3 * k + j] -= half;
+    }
+    turn.limit = kTurnLimit;
+    turn.effect_per_unit = focal / kToDegrees;
+    turn.effect_unit = "px";
+    quantities.push_back(turn);
+  }
+  for (std::size_t c = 0; c < rig.camera_count; ++c) {
+    Quantity lens{fmt::format("camera {}: focal length", c), "%"};
+    lens.row[change::kFocal + static_cast<int>(c)] = kPercent;
+    lens.limit = kFocalLimit;
+    lens.effect_per_unit = std::hypot(rig.camera[c].width(), rig.camera[c].height()) / 2 / kPercent;
+    lens.effect_unit = "px at the rim";
+    quantities.push_back(lens);
+  }
+  if (rig.camera_count > 1) {
+    for (int axis = 0; axis < 3; ++axis) {
+      Quantity turn{fmt::format("camera 1 against camera 0: turn about its {}",
+                                kAxes.at(static_cast<std::size_t>(axis))),
+                    "deg"};
+      turn.row[change::kRigTurn + axis] = kToDegrees;
+      turn.limit = kRigTurnLimit;
+      turn.effect_per_unit = focal / kToDegrees;
+      turn.effect_unit = "px";
+      quantities.push_back(turn);
+    }
+    const double baseline = rig.baseline();
+    const Eigen::Vector3d along = (rig.T_body_cam[0].inverse() * rig.T_body_cam[1]).translation / baseline;
+    Quantity length{"baseline", "%"};
+    length.row.segment<3>(change::kRigMove) = kPercent / baseline * along;
+    length.limit = kBaselineLimit;
+    length.effect_per_unit = baseline * kToMilli / kPercent;
+    length.effect_unit = "mm";
+    quantities.push_back(length);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    Quantity move{fmt::format("camera 0 on the body: position {}", kAxes.at(static_cast<std::size_t>(axis))),
+                  "mm"};
+    move.row[change::kMove + axis] = kToMilli;
+    move.limit = kMoveLimit;
+    move.file = kToMilli * rig.T_body_cam[0].translation[axis];
+    move.effect_per_unit = 1;
+    move.effect_unit = "mm";
+    move.essential = false;
+    quantities.push_back(move);
+  }
+  return quantities;
+}
+
+struct Sum {
+  CalibrationChange change = CalibrationChange::Zero();
+  ChangeMatrix covariance = ChangeMatrix::Zero();
+};
+
+/// All pieces but one (-1: all).
+Sum together(const std::vector<PieceResult>& pieces, std::ptrdiff_t without) {
+  const ChangeMatrix prior = changePriors().cwiseAbs2().cwiseInverse().asDiagonal();
+  ChangeMatrix information = prior;
+  CalibrationChange weighted = CalibrationChange::Zero();
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    if (static_cast<std::ptrdiff_t>(i) == without) continue;
+    information += pieces[i].information;
+    // A piece's change includes the priors' pull.
+    weighted += (pieces[i].information + prior) * pieces[i].change;
+  }
+  // Columns differ by many powers of ten.
+  const CalibrationChange scale = information.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::LDLT<ChangeMatrix> factor(scale.asDiagonal() * information * scale.asDiagonal());
+  Sum sum;
+  sum.covariance = scale.asDiagonal() * factor.solve(ChangeMatrix::Identity()) * scale.asDiagonal();
+  sum.change = sum.covariance * weighted;
+  return sum;
+}
+
+/// What both halves of the image say, apart.
+struct Parts {
+  std::vector<PieceResult> inner;
+  std::vector<PieceResult> outer;
+};
+
+CheckedValue judge(const Quantity& quantity, const std::vector<PieceResult>& pieces, const Parts& parts) {
+  CheckedValue value;
+  value.name = quantity.name;
+  value.unit = quantity.unit;
+  value.file = quantity.file;
+  value.limit = quantity.limit;
+  value.essential = quantity.essential;
+  const Sum all = together(pieces, -1);
+  value.change = quantity.row.dot(all.change);
+  double variance = quantity.row.dot(all.covariance * quantity.row);
+  // Leaving out each piece in turn: what differs over the flight.
+  const auto count = static_cast<double>(pieces.size());
+  std::vector<double> others;
+  double mean = 0;
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    others.push_back(quantity.row.dot(together(pieces, static_cast<std::ptrdiff_t>(i)).change));
+    mean += others.back() / count;
+  }
+  double scatter = 0;
+  for (const double other : others) scatter += (other - mean) * (other - mean);
+  variance = std::max(variance, scatter * (count - 1) / count);
+  // A lens model that does not fit says one thing in the middle and another at the rim.
+  if (!parts.inner.empty() && !parts.outer.empty()) {
+    const Sum inner = together(parts.inner, -1);
+    const Sum outer = together(parts.outer, -1);
+    const double apart = quantity.row.dot(inner.change - outer.change);
+    const double noise = quantity.row.dot((inner.covariance + outer.covariance) * quantity.row);
+    variance += std::max(0.0, apart * apart - noise) / 4;
+  }
+  value.sigma = std::sqrt(variance);
+  value.effect =
+      fmt::format("{:.2g} {}", std::abs(value.change) * quantity.effect_per_unit, quantity.effect_unit);
+  const double size = std::abs(value.change);
+  if (size > value.limit && size > kAlarmSigmas * value.sigma) {
+    value.verdict = CheckVerdict::kMoved;
+  } else if (size > value.limit || kKnownSigmas * value.sigma > value.limit) {
+    value.verdict = CheckVerdict::kCannotTell;
+  } else {
+    value.verdict = CheckVerdict::kHolds;
+  }
+  return value;
+}
+
+void conclude(CheckResult& result) {
+  bool moved = false;
+  std::string unknown;
+  for (const CheckedValue& value : result.values) {
+    if (value.verdict == CheckVerdict::kMoved) {
+      moved = true;
+      result.because.push_back(fmt::format("{} is off by {:+.3g} {} ({:.1f} sigma, {}): recalibrate.",
+                                           value.name, value.change, value.unit,
+                                           std::abs(value.change) / value.sigma, value.effect));
+    }
+    if (value.verdict == CheckVerdict::kCannotTell && value.essential) {
+      unknown += fmt::format("{}{} ({:+.2g} +- {:.2g} {})", unknown.empty() ? "" : ", ", value.name,
+                             value.change, value.sigma, value.unit);
+    }
+  }
+  const bool two = result.rig.camera_count > 1;
+  const bool few_stereo = two && result.stereo_share < kLeastStereoShare;
+  if (few_stereo) {
+    result.because.push_back(
+        fmt::format("Only {:.0f} % of the points are found by both cameras: they may have turned against "
+                    "each other by more "
+                    "than the search between them allows, or see different things.",
+                    kPercent * result.stereo_share));
+  }
+  if (!unknown.empty()) {
+    result.because.push_back("This flight does not fix: " + unknown +
+                             ". Fly longer, with turns about all axes and quick changes of speed.");
+  }
+  result.verdict = moved                            ? CheckVerdict::kMoved
+                   : few_stereo || !unknown.empty() ? CheckVerdict::kCannotTell
+                                                    : CheckVerdict::kHolds;
+}
+
+}  // namespace
+
+const char* name(CheckVerdict verdict) {
+  switch (verdict) {
+    case CheckVerdict::kHolds:
+      return "holds";
+    case CheckVerdict::kMoved:
+      return "has moved";
+    case CheckVerdict::kCannotTell:
+      break;
+  }
+  return "cannot tell";
+}
+
+CheckResult checkCalibration(const CheckRequest& request, Settings settings) {
+  CheckResult result;
+  result.log = request.log;
+  const RunPlace place(request.out);
+  settings.odometry.estimate_time_offset = true;
+  settings.odometry.estimate_extrinsics = true;
+  ReplayRequest replay;
+  static_cast<LogRequest&>(replay) = request;
+  replay.out = place.path();
+  replay.replace = true;
+  static_cast<void>(runReplay(replay, settings));
+  const std::string path = (fs::path(place.path()) / kKeyframeFile).string();
+  std::ifstream in(path, std::ios::binary);
+  if (!in) {
+    result.because.push_back("The estimator flew nothing of this log: look at it with `swiftlet doctor`.");
+    return result;
+  }
+  KeyframeReader reader(path, in);
+  result.rig = reader.rig();
+  Parts parts;
+  double points = 0;
+  double stereo = 0;
+  const auto add = [&](const Keyframes& keyframes, ImagePart part, std::vector<PieceResult>& to) {
+    PieceResult piece = solvePiece(result.rig, reader.noise(), keyframes, part);
+    if (piece.solved) to.push_back(std::move(piece));
+  };
+  const std::vector<Keyframes> pieces = cut(readStretches(reader));
+  Progress progress("calibration", request.show_progress ? pieces.size() : 0);
+  for (std::size_t i = 0; i < pieces.size() && !request.stopped(); ++i) {
+    add(pieces[i], ImagePart::kAll, result.pieces);
+    add(pieces[i], ImagePart::kInner, parts.inner);
+    add(pieces[i], ImagePart::kOuter, parts.outer);
+    progress.update(i + 1);
+  }
+  progress.finish();
+  if (result.pieces.size() < kFewestPieces) {
+    result.because.push_back(
+        fmt::format("The estimator flew {} pieces of this log well enough, {} are needed: look at it with "
+                    "`swiftlet doctor` and "
+                    "`swiftlet replay`. A calibration that is far off looks like this too.",
+                    result.pieces.size(), kFewestPieces));
+    return result;
+  }
+  for (const PieceResult& piece : result.pieces) {
+    points += static_cast<double>(piece.points);
+    stereo += static_cast<double>(piece.stereo_points);
+  }
+  result.stereo_share = stereo / points;
+  for (const Quantity& quantity : quantitiesOf(result.rig)) {
+    result.values.push_back(judge(quantity, result.pieces, parts));
+  }
+  conclude(result);
+  return result;
+}
+
+std::string checkText(const CheckResult& result) {
+  std::string text = fmt::format("{:<48} {:>10} {:>14} {:>9} {:>8} {:<4}  {:<24} {}\n", "", "file",
+                                 "flight - file", "1 sigma", "limit", "unit", "effect", "verdict");
+  if (result.values.empty()) text.clear();
+  for (const CheckedValue& value : result.values) {
+    text += fmt::format("{:<48} {:>10.4g} {:>+14.3g} {:>9.2g} {:>8.3g} {:<4}  {:<24} {}\n", value.name,
+                        value.file, value.change, value.sigma, value.limit, value.unit, value.effect,
+                        name(value.verdict));
+  }
+  text += fmt::format(
+      "{}: the calibration {}\n", result.log,
+      result.verdict == CheckVerdict::kCannotTell ? "cannot be judged by this flight" : name(result.verdict));
+  for (const std::string& line : result.because) text += "  " + line + "\n";
+  return text;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,222 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "estimator/geometry/so3.hpp"
+#include "firmware_host/lab/calibrate/page/board_evidence.hpp"
+#include "firmware_host/lab/calibrate/page/lens_quality.hpp"
+#include "firmware_host/lab/calibrate/page/page_rules.hpp"
+#include "firmware_host/lab/calibrate/page/solution_pages.hpp"
+
+namespace swiftlet {
+namespace {
+
+constexpr double kToDegrees = 180 / std::numbers::pi;
+constexpr double kToMilli = 1e3;
+
+// A point is seen to 0.45 px of a 460 px lens in flight, 1 mrad (smoother.pixel_sigma). A lens that is known
+// to half of that costs nothing beside it.
+constexpr double kGoodAngle = 0.5e-3;  // rad
+// Two halves of the data differ by twice the sigma where noise is all that is wrong: mrcal's "most important
+// diagnostic". Above twice that the lens model does not fit or something moved.
+constexpr double kHalvesTimes = 2;
+constexpr double kLeastCoverage = 0.7;       // of the cells; a lens is extrapolated elsewhere
+constexpr double kMostCornerSigma = 1.1e-3;  // rad: 0.5 px of a 460 px lens, the upper end of what is usual
+constexpr double kMostBias = 0.3;            // of corner sigma
+constexpr double kStereoAngle = 0.01 / kToDegrees;  // rad, for each 10 cm of baseline
+constexpr double kStereoLength = 1e-3;              // of the baseline: kBaselinePriorSigma's reason
+constexpr double kByChance = 3.5;                   // sigmas of a cell's mean, the largest of 200 cells
+
+double percentile(std::vector<double> values, double part) {
+  std::erase_if(values, [](double value) { return !std::isfinite(value); });
+  if (values.empty()) return std::nan("");
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1));
+  std::ranges::nth_element(values, at);
+  return *at;
+}
+
+/// Largest mean residual of a cell, less what chance makes of it.
+double cellBias(const BoardEvidence& evidence, std::size_t camera) {
+  double most = 0;
+  const std::vector<CellMean> cells = cellMeans(evidence, camera);
+  for (const CellMean& cell : cells) {
+    if (cell.count == 0) continue;
+    const double chance = kByChance * evidence.corner_sigma / std::sqrt(static_cast<double>(cell.count));
+    most = std::max(most, cell.mean.norm() - chance);
+  }
+  return most / evidence.corner_sigma;
+}
+
+/// The other model's half has no lens where there was no second solution.
+bool hasHalves(const SolvedCamera& camera) {
+  return camera.halves[0].width() > 0 && camera.halves[1].width() > 0;
+}
+
+Plot heatPlot(const std::string& id, const std::string& group, const std::string& title,
+              const ImageDrawing& image) {
+  Plot plot;
+  plot.id = id;
+  plot.group = group;
+  plot.title = title;
+  plot.kind = PlotKind::kDrawing;
+  plot.svg = image.svg();
+  return plot;
+}
+
+void addLens(const CameraSolution& solution, const BoardEvidence& evidence, std::size_t c, PageRules& rules,
+             CalibrationPage& page) {
+  const SolvedCamera& camera = solution.camera[c];
+  const CameraModel& model = camera.model;
+  const ImageGrid grid(model.width(), model.height());
+  std::vector<Eigen::Vector2d> pixels;
+  for (const ImageCell& cell : grid.cells()) pixels.push_back(cell.centre);
+  const double focal = model.focal();
+  const double good = kGoodAngle * focal;
+  const std::string who = fmt::format("camera {}", c);
+
+  const std::vector<double> sigmas = projectionSigmas(model, camera.covariance, pixels);
+  ImageDrawing uncertainty(model.width(), model.height());
+  uncertainty.heat(grid, sigmas, 2 * good, "px, 1 sigma");
+  uncertainty.caption(fmt::format("worst {:.3f} px, 95 % below {:.3f} px; best rotation taken out",
+                                  percentile(sigmas, 1), percentile(sigmas, 0.95)));
+  page.plots.push_back(heatPlot(fmt::format("uncertainty{}", c), "Uncertainty and cross-validation",
+                                who + ": uncertainty of a projected pixel", uncertainty));
+  rules.atMost(
+      who + ": uncertainty of a pixel, 95 % of the image", "px", percentile(sigmas, 0.95), good,
+      fmt::format("The lens of camera {} is not known well enough in parts of the image. Record more views "
+                  "there, close and tilted.",
+                  c));
+
+  const Coverage coverage = coverageOf(evidence, c);
+  rules.atLeast(
+      who + ": part of the image with corners", "", coverage.share, kLeastCoverage,
+      fmt::format("Camera {} saw the board in {:.0f} % of its image only, least in the {} part. Move the "
+                  "board there.",
+                  c, 100 * coverage.share, coverage.emptiest));
+  rules.atMost(
+      who + ": largest mean residual of a cell, beyond chance", "corner sigma", cellBias(evidence, c),
+      kMostBias,
+      fmt::format("Residuals of camera {} have a direction in parts of the image: its lens model does not "
+                  "fit there. Look at the vectors.",
+                  c));
+  if (!hasHalves(camera)) return;
+  const auto difference = projectionDifference(camera.halves[0], camera.halves[1], pixels, coverage.cells);
+  std::vector<double> sizes;
+  double squares = 0;
+  double expected = 0;
+  std::vector<double> inside;
+  for (std::size_t k = 0; k < difference.size(); ++k) {
+    sizes.push_back(difference[k].norm());
+    if (!coverage.cells[k] || !difference[k].allFinite() || !std::isfinite(sigmas[k])) continue;
+    inside.push_back(sizes.back());
+    squares += difference[k].squaredNorm();
+    expected += 4 * sigmas[k] * sigmas[k];
+  }
+  ImageDrawing halves(model.width(), model.height());
+  halves.heat(grid, sizes, 4 * good, "px");
+  const double most = percentile(sizes, 0.95);
+  for (std::size_t k = 0; k < difference.size(); ++k) {
+    if (!difference[k].allFinite() || !(most > 0)) continue;
+    const double length = std::min(1.5, sizes[k] / most);
+    if (sizes[k] > 0) halves.arrow(pixels[k], grid.size() * length / sizes[k] * difference[k], "#20262b");
+  }
+  halves.caption(fmt::format("95 % below {:.3f} px in the covered part; arrows show the direction",
+                             percentile(inside, 0.95)));
+  page.plots.push_back(heatPlot(fmt::format("halves{}", c), "Uncertainty and cross-validation",
+                                who + ": two halves of the data, difference after the best rotation",
+                                halves));
+  rules.atMost(
+      who + ": difference of the halves, 95 % of the covered part", "px", percentile(inside, 0.95), 2 * good,
+      fmt::format("Two halves of the data give different lenses for camera {}. Record more views.", c));
+  rules.atMost(
+      who + ": difference of the halves over twice the uncertainty", "", std::sqrt(squares / expected),
+      kHalvesTimes,
+      fmt::format("The halves of camera {} differ by more than noise explains: the board is bent, it moved "
+                  "during the exposure, or the lens model does not fit.",
+                  c));
+}
+
+void addValues(const CameraSolution& solution, CalibrationPage& page) {
+  Table table{"values", "Values", {"what", "value", "1 sigma", "unit"}, {}, false};
+  const auto row = [&](const std::string& what, double value, double sigma, const char* unit) {
+    table.rows.push_back({what, fmt::format("{:.6g}", value), fmt::format("{:.2g}", sigma), unit});
+  };
+  for (std::size_t c = 0; c < solution.camera_count; ++c) {
+    const SolvedCamera& camera = solution.camera[c];
+    const bool radtan = camera.model.kind() == CameraKind::kPinholeRadtan;
+    const std::array<const char*, 8> names = {
+        "fx", "fy", "cx", "cy", "k1", "k2", radtan ? "p1" : "k3", radtan ? "p2" : "k4"};
+    for (int i = 0; i < 8; ++i) {
+      const double value = i < 4 ? camera.model.intrinsics()[i] : camera.model.distortion()[i - 4];
+      row(fmt::format("camera {} {}", c, names.at(static_cast<std::size_t>(i))), value,
+          std::sqrt(camera.covariance(i, i)), i < 4 ? "px" : "");
+    }
+  }
+  if (solution.camera_count > 1) {
+    const Eigen::Vector3d turn = kToDegrees * logSo3(solution.T_cam1_cam0.rotation);
+    constexpr std::array<const char*, 3> kAxes = {"x", "y", "z"};
+    for (int i = 0; i < 3; ++i) {
+      row(fmt::format("T_cam1_cam0 rotation {}", kAxes.at(static_cast<std::size_t>(i))), turn[i],
+          kToDegrees * std::sqrt(solution.stereo_covariance(i, i)), "deg");
+    }
+    for (int i = 0; i < 3; ++i) {
+      row(fmt::format("T_cam1_cam0 translation {}", kAxes.at(static_cast<std::size_t>(i))),
+          kToMilli * solution.T_cam1_cam0.translation[i],
+          kToMilli * std::sqrt(solution.stereo_covariance(3 + i, 3 + i)), "mm");
+    }
+  }
+  page.tables.push_back(table);
+}
+
+}  // namespace
+
+CalibrationPage cameraPage(const CameraSolution& solution, const CalibrationTarget& target,
+                           const std::string& log) {
+  CalibrationPage page;
+  page.name = "Cameras of " + log;
+  BoardEvidence evidence;
+  evidence.camera_count = solution.camera_count;
+  for (std::size_t c = 0; c < solution.camera_count; ++c) evidence.camera[c] = solution.camera[c].model;
+  evidence.T_cam1_cam0 = solution.T_cam1_cam0;
+  evidence.corner_sigma = solution.corner_sigma;
+  evidence.target = target;
+  evidence.views = solution.views;
+  evidence.corners = solution.corners;
+
+  PageRules rules;
+  double focal = 0;
+  for (std::size_t c = 0; c < solution.camera_count; ++c) {
+    focal = std::max(focal, solution.camera[c].model.focal());
+    page.words.push_back(fmt::format("Camera {}: {}", c, solution.camera[c].why_this_model));
+  }
+  rules.atMost("corner sigma", "px per axis", solution.corner_sigma, kMostCornerSigma * focal,
+               "Corners scatter more than usual. Use a shorter exposure, more light and a sharp print.");
+  rules.atMost(
+      "corners left out", "", outlierShare(evidence), kMostOutliers,
+      "Many corners were left out. Look at the outliers: reflections, blur, a bent board or a wrong target.");
+  for (std::size_t c = 0; c < solution.camera_count; ++c) addLens(solution, evidence, c, rules, page);
+  if (solution.camera_count > 1) {
+    const double baseline = solution.T_cam1_cam0.translation.norm();
+    constexpr double kPerBaseline = 0.1;  // m
+    const double turn = std::sqrt(solution.stereo_covariance.diagonal().head<3>().maxCoeff());
+    rules.atMost("camera to camera: rotation, 1 sigma", "deg", kToDegrees * turn,
+                 kToDegrees * kStereoAngle * std::max(1.0, baseline / kPerBaseline),
+                 "The rotation between the cameras is not known well enough. Record views in which both see "
+                 "the board.");
+    const Eigen::Vector3d along = solution.T_cam1_cam0.translation.normalized();
+    const double length = std::sqrt(along.dot(solution.stereo_covariance.bottomRightCorner<3, 3>() * along));
+    rules.atMost(
+        "camera to camera: baseline, 1 sigma", "mm", kToMilli * length, kToMilli * kStereoLength * baseline,
+        "The baseline is not known well enough. Record close views in which both cameras see the board.");
+  }
+  addValues(solution, page);
+  rules.finish(solution.reasons, page);
+  for (Plot& plot : boardPlots(evidence)) page.plots.push_back(std::move(plot));
+  for (Table& table : boardTables(evidence)) page.tables.push_back(std::move(table));
+  page.scene = boardScene(evidence);
+  return page;
+}
+
+}  // namespace swiftlet

@@ -1,0 +1,27 @@
+#pragma once
+// The pages of the parts of `swiftlet calibrate`, with the rules for good, usable and repeat.
+//
+// Repeat: the solution has reasons of its own. Usable: a rule below is broken. Good: none is. Each rule
+// stands in the page's table with what was found. Limits are angles where they are about the image, so that
+// they mean the same for every lens.
+
+#include <string>
+
+#include "drivers/target/calibration_target.hpp"
+#include "firmware_host/lab/calibrate/cameras/camera_solution.hpp"
+#include "firmware_host/lab/calibrate/check/check_run.hpp"
+#include "firmware_host/lab/calibrate/imu_camera/imu_camera_solution.hpp"
+#include "firmware_host/lab/calibrate/imu_noise/imu_noise_run.hpp"
+#include "firmware_host/lab/calibrate/page/calibration_page.hpp"
+
+namespace swiftlet {
+
+/// `log`: for the title.
+CalibrationPage cameraPage(const CameraSolution& solution, const CalibrationTarget& target,
+                           const std::string& log);
+CalibrationPage imuCameraPage(const ImuCameraSolution& solution, const CalibrationTarget& target,
+                              const std::string& log);
+CalibrationPage imuNoisePage(const ImuNoiseResult& result);
+CalibrationPage checkPage(const CheckResult& result);
+
+}  // namespace swiftlet
