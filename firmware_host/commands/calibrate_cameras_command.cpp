@@ -17,6 +17,7 @@
 #include "firmware_host/lab/calibrate/board/log_views.hpp"
 #include "firmware_host/lab/calibrate/cameras/calibrate_cameras.hpp"
 #include "firmware_host/lab/calibrate/cameras/camera_files.hpp"
+#include "firmware_host/lab/calibrate/page/solution_pages.hpp"
 #include "firmware_host/realtime/console.hpp"
 #include "firmware_host/realtime/progress.hpp"
 
@@ -51,13 +52,19 @@ int calibrateLogCameras(CamerasOptions options) {
       input, [&](double part) { progress.update(static_cast<std::uint64_t>(std::lround(part * kParts))); });
   progress.finish();
   fmt::print("{}", describe(solution));
+  if (!options.out.empty()) {
+    // Of a calibration that is not good too: it shows why.
+    std::filesystem::create_directories(options.out);
+    const std::string page = (std::filesystem::path(options.out) / "report.html").string();
+    writeCalibrationPage(page, cameraPage(solution, input.target, options.log.log));
+    fmt::print("page written to {}\n", page);
+  }
   if (!solution.reasons.empty()) {
     for (const std::string& reason : solution.reasons) warn("repeat: " + reason + "\n");
     warn("No calibration is written.\n");
     return kExitFailed;
   }
   if (options.out.empty()) return kExitDone;
-  std::filesystem::create_directories(options.out);
   const std::string file = (std::filesystem::path(options.out) / "camchain.yaml").string();
   writeWholeFile(file, camchainYaml(solution));
   fmt::print("written to {}\n", file);
@@ -78,7 +85,8 @@ void addCalibrateCameras(CLI::App& calibrate, int& exit_code) {
       ->required();
   command->add_option("--target", options->target, "The board: YAML of `swiftlet calibrate target` or Kalibr")
       ->required();
-  command->add_option("--out", options->out, "Folder for camchain.yaml, in Kalibr's form");
+  command->add_option("--out", options->out,
+                      "Folder for camchain.yaml, in Kalibr's form, and the page report.html");
   command
       ->add_option("--baseline", options->baseline_mm,
                    "Distance between the two lenses, measured by hand [mm]: shows a board of the wrong size")

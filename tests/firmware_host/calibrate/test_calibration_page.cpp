@@ -162,6 +162,9 @@ TEST_CASE("A good calibration of cameras is called good, and each fault is named
   refused.reasons = {"Too few views: 4 of 10. Record more."};
   CHECK(cameraPage(refused, {}, "").verdict == PageVerdict::kRepeat);
   CHECK(says(cameraPage(refused, {}, ""), "Too few views"));
+  refused.camera[0].model = {};  // not even a lens
+  CHECK(cameraPage(refused, {}, "").verdict == PageVerdict::kRepeat);
+  CHECK(says(cameraPage(refused, {}, ""), "Too few views"));
 
   CameraSolution one_sided = good;
   std::erase_if(one_sided.corners,

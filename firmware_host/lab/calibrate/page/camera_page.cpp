@@ -186,6 +186,13 @@ CalibrationPage cameraPage(const CameraSolution& solution, const CalibrationTarg
   evidence.corners = solution.corners;
 
   PageRules rules;
+  const bool found = solution.camera_count > 0 && solution.camera[0].model.width() > 0 &&
+                     solution.camera[solution.camera_count - 1].model.width() > 0;
+  if (!found) {
+    rules.finish({"No lens was found."}, page);
+    page.words.insert(page.words.end(), solution.reasons.begin(), solution.reasons.end());
+    return page;
+  }
   double focal = 0;
   for (std::size_t c = 0; c < solution.camera_count; ++c) {
     focal = std::max(focal, solution.camera[c].model.focal());

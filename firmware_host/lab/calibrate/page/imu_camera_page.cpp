@@ -63,6 +63,11 @@ CalibrationPage imuCameraPage(const ImuCameraSolution& solution, const Calibrati
   evidence.corners = solution.corners;
 
   PageRules rules;
+  if (evidence.camera_count == 0 || evidence.camera[0].width() == 0) {
+    rules.finish({"Nothing was found."}, page);
+    page.words.insert(page.words.end(), solution.reasons.begin(), solution.reasons.end());
+    return page;
+  }
   for (const auto& [what, sigma] :
        {std::pair{"gyro", solution.gyro_sigma}, {"accelerometer", solution.accel_sigma}}) {
     rules.atMost(

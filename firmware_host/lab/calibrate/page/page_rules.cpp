@@ -37,7 +37,7 @@ void PageRules::finish(const std::vector<std::string>& reasons, CalibrationPage&
   }
   page.words.insert(page.words.end(), reasons.begin(), reasons.end());
   page.words.insert(page.words.end(), broken.begin(), broken.end());
-  page.tables.insert(page.tables.begin(), table);
+  if (!rules_.empty()) page.tables.insert(page.tables.begin(), table);
 }
 
 }  // namespace swiftlet
