@@ -84,6 +84,16 @@ Calibration readCalibration(const std::string& path, const std::string& imu_file
 Calibration readCalibration(FileTree& tree, const std::string& folder, const std::string& imu_file = {},
                             const CalibrationOptions& options = {});
 
+/// Cameras of a Kalibr camchain; without an IMU the body is camera 0.
+struct CameraChain {
+  Rig rig;
+  bool has_imu = false;
+};
+CameraChain readCameraChain(const std::string& file);
+
+/// Noise and rate of an IMU file, Kalibr's or EuRoC's.
+ImuNoise readImuNoise(const std::string& file);
+
 /// True when the folder or file `path` has a calibration that readCalibration would find (good or bad).
 bool hasCalibration(const std::string& path);
 bool hasCalibration(FileTree& tree, const std::string& folder);

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include "drivers/calibration/bare_cameras.hpp"
 #include "drivers/calibration/sensor_fields.hpp"
+#include "drivers/input/file_tree.hpp"
 #include "estimator/geometry/so3.hpp"
 
 namespace swiftlet {
@@ -81,7 +83,8 @@ void chain(std::vector<ChainCamera>& cameras) {
   }
 }
 
-std::vector<CameraEntry> readChain(const YamlField& root, Warnings& warnings) {
+/// `bare`: a chain without an IMU is one of camera 0.
+std::vector<CameraEntry> readChain(const YamlField& root, bool bare, Warnings& warnings) {
   std::vector<ChainCamera> cameras;
   for (int i = 0; root.has(fmt::format("cam{}", i)); ++i) {
     if (cameras.size() == kMaxCameras) {
@@ -94,6 +97,7 @@ std::vector<CameraEntry> readChain(const YamlField& root, Warnings& warnings) {
     cameras.push_back(readExtrinsics(camera, warnings));
   }
   if (cameras.empty()) throw root.error("no camera `cam0`", "Give a Kalibr camchain file");
+  if (bare && !cameras[0].T_body_cam) cameras[0].T_body_cam = SE3();
   chain(cameras);
   std::vector<CameraEntry> entries;
   for (const ChainCamera& camera : cameras) {
@@ -177,12 +181,33 @@ void readImuModel(const YamlField& imu, Calibration& calibration) {
   }
 }
 
+CameraChain readCameraChain(const std::string& file) {
+  const std::string text = openFolder("")->text(file);
+  const YamlField root = YamlField::parse(file, text);
+  Calibration calibration;
+  CameraChain cameras;
+  const YamlField first = root.at("cam0", "Give a Kalibr camchain file");
+  cameras.has_imu = first.has("T_cam_imu") || first.has("T_imu_cam");
+  CalibrationOptions options;
+  options.accept_unusual_rig = !cameras.has_imu;  // its body is no IMU's
+  assembleRig(readChain(root, !cameras.has_imu, calibration.warnings), options, calibration);
+  cameras.rig = calibration.rig;
+  return cameras;
+}
+
+ImuNoise readImuNoise(const std::string& file) {
+  const std::string text = openFolder("")->text(file);
+  const YamlField imu = parseImu({file, text});
+  Warnings warnings;
+  return readNoise(imu, imu.has("rate_hz") ? "rate_hz" : "update_rate", warnings);
+}
+
 Calibration parseKalibrCalibration(const NamedText& camchain, const NamedText& imu,
                                    const CalibrationOptions& options) {
   Calibration calibration;
   calibration.form = "Kalibr";
   const YamlField chain_root = YamlField::parse(camchain.name, camchain.text);
-  const std::vector<CameraEntry> entries = readChain(chain_root, calibration.warnings);
+  const std::vector<CameraEntry> entries = readChain(chain_root, false, calibration.warnings);
   const YamlField imu_root = YamlField::parse(imu.name, imu.text);
   const YamlField imu_fields = imu_root.has("imu0") ? imu_root.at("imu0") : imu_root;
   readImuModel(imu_fields, calibration);

@@ -9,6 +9,7 @@ void addCalibrateCommand(CLI::App& app, int& exit_code) {
   command->require_subcommand(1);
   addCalibrateTarget(*command, exit_code);
   addCalibrateCameras(*command, exit_code);
+  addCalibrateImuCamera(*command, exit_code);
   addCalibrateImuNoise(*command, exit_code);
   addCalibrateCheck(*command, exit_code);
 }

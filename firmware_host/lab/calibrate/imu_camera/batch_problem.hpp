@@ -23,8 +23,8 @@
 #include "drivers/target/calibration_target.hpp"
 #include "estimator/camera/rig.hpp"
 #include "estimator/imu/imu_noise.hpp"
-#include "firmware_host/lab/calibrate/imu_camera/arrow_system.hpp"
 #include "firmware_host/lab/calibrate/cameras/lens_jacobian.hpp"
+#include "firmware_host/lab/calibrate/imu_camera/arrow_system.hpp"
 
 namespace swiftlet {
 

@@ -28,7 +28,7 @@ constexpr double kMostResidual = 3;        // times the noise that was given
 constexpr double kMostCornerNoise = 2e-3;  // rad
 constexpr double kMostOutliers = 0.05;     // share of the corners
 constexpr double kTestSigmas = 5;          // of one test in a calibration that should never fail by chance
-constexpr double kScaleMatters = 0.002;    // of the board
+constexpr double kScaleMatters = 0.005;    // of the board: gravity anywhere on Earth is within it
 constexpr double kDriftMatters = 5e-6;     // s/s: 0.15 ms from the middle of a minute to its end
 constexpr double kShiftOfOneClock = 0.1;   // s: exposure, transfer and filters stay below
 constexpr double kLeastRate = 0.15;        // rad/s, root mean square about each axis
@@ -260,7 +260,7 @@ void BatchVerdict::judgeResiduals(const ImuCameraSolution& solution,
                     solution.corner_sigma));
   }
   const auto sensor = [&](const char* name, double times) {
-    if (times < kMostResidual) return;
+    if (!input.noise_told || times < kMostResidual) return;
     reasons.push_back(
         fmt::format("The {}'s readings are {:.1f} times as far from the solution as its noise allows. "
                     "Causes: noise figures "

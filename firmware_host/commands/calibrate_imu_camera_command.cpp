@@ -1,0 +1,166 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "drivers/calibration/calibration.hpp"
+#include "drivers/input/input_error.hpp"
+#include "drivers/recorded/imu_file.hpp"
+#include "drivers/target/target_file.hpp"
+#include "firmware_host/commands/calibrate_commands.hpp"
+#include "firmware_host/commands/program.hpp"
+#include "firmware_host/commands/stop_signal.hpp"
+#include "firmware_host/lab/calibrate/board/log_views.hpp"
+#include "firmware_host/lab/calibrate/cameras/calibrate_cameras.hpp"
+#include "firmware_host/lab/calibrate/cameras/camera_files.hpp"
+#include "firmware_host/lab/calibrate/imu_camera/calibrate_imu_camera.hpp"
+#include "firmware_host/lab/calibrate/imu_camera/imu_camera_files.hpp"
+#include "firmware_host/outputs/run_folder/calibration_files.hpp"
+#include "firmware_host/realtime/console.hpp"
+#include "firmware_host/realtime/progress.hpp"
+
+namespace swiftlet {
+namespace {
+
+struct ImuCameraOptions {
+  LogViewsRequest log;
+  std::string target;
+  std::string cameras;
+  std::string imu;
+  std::string out;
+};
+
+constexpr int kProgressParts = 100;
+
+std::function<void(double)> partsOf(Progress& progress) {
+  return [&progress](double part) {
+    progress.update(static_cast<std::uint64_t>(std::lround(part * kProgressParts)));
+  };
+}
+
+/// Lenses from a file: where the batch begins.
+CameraSolution camerasOf(const CameraChain& chain, const LogViews& log, const std::string& file) {
+  CameraSolution solution;
+  solution.camera_count = std::min(chain.rig.camera_count, log.camera_count);
+  for (std::size_t c = 0; c < solution.camera_count; ++c) {
+    const CameraModel& lens = chain.rig.camera[c];
+    const Eigen::Vector2i& size = log.image_size[c];
+    if (lens.width() != size.x() || lens.height() != size.y()) {
+      throw InputError(file, 0, fmt::format("cam{}.resolution", c),
+                       fmt::format("{}x{} pixels, the log's images have {}x{}", lens.width(), lens.height(),
+                                   size.x(), size.y()),
+                       "Give the calibration of this image size, or leave --cameras out");
+    }
+    solution.camera[c].model = lens;
+  }
+  if (solution.camera_count == 2) solution.T_cam1_cam0 = chain.rig.T_cam1_cam0();
+  return solution;
+}
+
+CameraSolution findCameras(const ImuCameraOptions& options, const LogViews& log) {
+  CameraInput input;
+  input.target = options.log.target;
+  input.views = log.views;
+  input.camera_count = log.camera_count;
+  input.image_size = log.image_size;
+  Progress progress("% of the cameras", kProgressParts);
+  const CameraSolution solution = calibrateCameras(input, partsOf(progress));
+  progress.finish();
+  return solution;
+}
+
+int calibrateLogImuCamera(ImuCameraOptions options) {
+  options.log.target = readTarget(options.target);
+  options.log.show_progress = true;
+  options.log.stop = &stopOnSignal();
+  ImuCameraInput input;
+  // What is wrong with the files is said before the images are searched.
+  std::optional<CameraChain> chain;
+  if (!options.cameras.empty()) chain = readCameraChain(options.cameras);
+  if (!options.imu.empty()) input.noise = readImuNoise(options.imu);
+  input.noise_told = !options.imu.empty();
+
+  LogViews log = readLogViews(options.log);
+  warnAll(log.warnings);
+  for (std::size_t c = 0; c < log.camera_count; ++c) {
+    fmt::print("camera {}: the board in {} of {} images\n", c, log.with_board[c], log.images[c]);
+  }
+  if (log.samples.empty()) {
+    throw InputError(options.log.log, 0, "", "has no IMU samples", "Record them with the images");
+  }
+  input.target = options.log.target;
+  input.samples = std::move(log.samples);
+  input.noise.rate_hz = medianRate(input.samples);
+  input.cameras = chain ? camerasOf(*chain, log, options.cameras) : findCameras(options, log);
+  if (chain && chain->has_imu) input.told = chain->rig;
+  input.views = std::move(log.views);
+  const bool lenses = input.cameras.camera_count > 0 && input.cameras.camera[0].model.width() > 0;
+  ImuCameraSolution solution;
+  if (lenses) {
+    Progress progress("% of the IMU", kProgressParts);
+    solution = calibrateImuCamera(input, partsOf(progress));
+    progress.finish();
+  }
+  fmt::print("{}", describe(solution));
+  // Without a model of rolling rows the cameras' own step suspects what the batch explains.
+  const bool cameras_count = !lenses || !solution.rig.rolls();
+  for (const std::string& reason : input.cameras.reasons) {
+    if (cameras_count) {
+      solution.reasons.push_back(reason);
+    } else {
+      fmt::print("cameras alone, without rolling rows: {}\n", reason);
+    }
+  }
+  if (!input.noise_told) {
+    fmt::print(
+        "noise: a typical MEMS IMU's random walks, densities from the residuals (none given by --imu)\n");
+    input.noise.gyro_density *= solution.gyro_sigma;
+    input.noise.accel_density *= solution.accel_sigma;
+  }
+  if (!solution.reasons.empty()) {
+    for (const std::string& reason : solution.reasons) warn("repeat: " + reason + "\n");
+    warn("No calibration is written.\n");
+    return kExitFailed;
+  }
+  writeCalibration(options.out, calibrationOf(solution, input.noise));
+  fmt::print("good; written to {}\n", options.out);
+  return kExitDone;
+}
+
+}  // namespace
+
+void addCalibrateImuCamera(CLI::App& calibrate, int& exit_code) {
+  CLI::App* command = calibrate.add_subcommand(
+      "imu-camera",
+      "Cameras and IMU together: lenses, extrinsics, time offset, readout, scale and misalignment");
+  auto options = std::make_shared<ImuCameraOptions>();
+  command
+      ->add_option(
+          "LOG", options->log.log,
+          "Images of the board and IMU samples: a EuRoC folder or archive, a bag, or a recording. No "
+          "calibration is needed")
+      ->required();
+  command->add_option("--target", options->target, "The board: YAML of `swiftlet calibrate target` or Kalibr")
+      ->required();
+  command->add_option("--cameras", options->cameras,
+                      "Kalibr's camchain to start from, with or without an IMU; without it the cameras are "
+                      "calibrated from the log first");
+  command->add_option(
+      "--imu", options->imu,
+      "The IMU's noise: YAML of `swiftlet calibrate imu-noise`, Kalibr or EuRoC. Without it a "
+      "typical MEMS IMU is assumed");
+  command->add_option("--out", options->out, "Folder for the calibration, in EuRoC's and Kalibr's form")
+      ->required();
+  command->add_flag("--mono", options->log.mono, "Camera 0 alone");
+  command->footer(
+      "Example:\n  swiftlet calibrate imu-camera board_log --target board.yaml --imu imu.yaml --out rig\n"
+      "Move the rig in front of the board for a minute: turn it about all three axes and swing it along all "
+      "three, once or twice a second. Exit code 1: not good enough, with the reasons.");
+  command->callback([options, &exit_code] { exit_code = calibrateLogImuCamera(*options); });
+}
+
+}  // namespace swiftlet
