@@ -45,7 +45,7 @@ struct Consistency {
 
 TEST_CASE("cameras from simulated corners are right and know how well", "[long]") {
   // The page's figures; seeds not used while the limits were chosen.
-  const int rigs = longOr(50, 6);
+  const int rigs = longOr(50, 2);
   Consistency all;
   std::vector<double> worst_pixel;
   int said_bad = 0;
@@ -54,6 +54,7 @@ TEST_CASE("cameras from simulated corners are right and know how well", "[long]"
     const CalibrationRig rig = test::globalShutterRig(seed);
     SessionSettings settings;
     settings.seed = seed;
+    settings.camera_rate = longOr(20, 5);
     const CameraSolution solution = calibrateCameras(test::sessionInput(rig, {}, settings));
     CAPTURE(seed);
     for (const std::string& reason : solution.reasons) {
@@ -94,8 +95,9 @@ TEST_CASE("cameras from simulated corners are right and know how well", "[long]"
   }
   std::printf("nees %.3f of %d, largest %.2f sigma, bad %d\n", all.sum / all.count, all.count, all.largest,
               said_bad);
-  CHECK(all.sum / all.count > 0.7);
-  CHECK(all.sum / all.count < 1.4);
+  // Two rigs are 44 parameters: their mean square is in this range but once in a thousand times.
+  CHECK(all.sum / all.count > longOr(0.7, 0.4));
+  CHECK(all.sum / all.count < longOr(1.4, 1.9));
   CHECK(all.largest < 5);
   CHECK(said_bad == 0);
 }

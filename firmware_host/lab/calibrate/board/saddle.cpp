@@ -22,7 +22,10 @@ constexpr double kMostBlur = 0.7;      ///< of the radius: more leaves no plain 
 constexpr double kMostTurn = 0.6;      ///< rad that an edge may turn from its guess
 constexpr double kLeastContrast = 4;   ///< grey values, half of black to white
 constexpr double kMostResidual = 0.3;  ///< of the contrast
-constexpr double kMostSigma = 0.25;    ///< px
+/// px between fit and window: above a half, so that a corner between two pixels does not move the window
+/// forever.
+constexpr double kMostOffCentre = 0.8;
+constexpr double kMostSigma = 0.25;  ///< px
 
 /// erf(x / sqrt 2) and its slope by table: the fit asks 200 times a step.
 class ErrorFunction {
@@ -54,6 +57,8 @@ struct Window {
   int left = 0;
   int top = 0;
   int size = 0;
+
+  [[nodiscard]] Eigen::Vector2d centre() const { return {left + 0.5 * (size - 1), top + 0.5 * (size - 1)}; }
 };
 
 bool place(const ImageView& image, const Eigen::Vector2d& centre, double radius, Window& window) {
@@ -158,12 +163,10 @@ bool refineSaddle(const ImageView& image, const SaddleGuess& guess, Saddle& sadd
     Vector9d next = p + change;
     next[4] = std::clamp(next[4], std::log(kLeastBlur), std::log(kMostBlur * guess.radius));
     if (!next.allFinite() || (next.head<2>() - guess.pixel).norm() > guess.radius) return false;
-    Window moved;
-    if (!place(image, next.head<2>(), guess.radius, moved)) return false;
-    if (moved.left != window.left || moved.top != window.top) {
+    if ((next.head<2>() - window.centre()).cwiseAbs().maxCoeff() > kMostOffCentre) {
       // Another window has another sum: begin there, its shading about the new centre.
+      if (!place(image, next.head<2>(), guess.radius, window)) return false;
       next[5] += p[6] * change[0] + p[7] * change[1];
-      window = moved;
       p = next;
       cost = evaluate(image, window, p, &H, &g);
       continue;
