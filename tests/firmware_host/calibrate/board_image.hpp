@@ -60,7 +60,7 @@ class PrintedBoard {
 /// `blur` [px] and `noise` [grey values] are 1 sigma.
 inline GreyImage renderBoard(const PrintedBoard& board, const CameraModel& camera, const SE3& T_cam_board,
                              double blur, double noise, Random& random) {
-  constexpr int kSamples = 4;  // per pixel and axis
+  constexpr int kSamples = 3;  // per pixel and axis
   const int width = camera.width();
   const int height = camera.height();
   const SE3 T_board_cam = T_cam_board.inverse();

@@ -91,8 +91,8 @@ TEST_CASE("tags of a board are found, none as another, without bias") {
     double least_found, most_median;
   };
   const std::vector<Scene> scenes = {
-      {"60 px", pinhole(), 60, 0, 0.7, 3, 0.97, 0.03},
-      {"40 px", pinhole(), 40, 0, 0.7, 3, 0.97, 0.03},
+      {"60 px", pinhole(), 60, 0, 0.7, 3, 0.99, 0.03},
+      {"40 px", pinhole(), 40, 0, 0.7, 3, 0.99, 0.03},
       {"20 px", pinhole(), 20, 0, 0.7, 3, 0.9, 0.1},
       {"40 px, 50 degrees", pinhole(), 40, 50 * kDegree, 0.7, 3, 0.95, 0.08},
       {"30 px, 55 degrees", pinhole(), 30, 55 * kDegree, 0.7, 3, 0.85, 0.1},
@@ -105,7 +105,7 @@ TEST_CASE("tags of a board are found, none as another, without bias") {
   Random random(7);
   for (const Scene& scene : scenes) {
     Tally tally;
-    for (int view = 0; view < 4; ++view) {
+    for (int view = 0; view < 2; ++view) {
       const Eigen::Vector2d pixel(random.uniform(250, 500), random.uniform(180, 300));
       const SE3 T = pose(scene.camera, target, pixel, target.size, scene.edge_px, scene.tilt,
                          random.uniform(0, 6.28), random.uniform(-0.5, 0.5));
@@ -129,9 +129,9 @@ TEST_CASE("a checkerboard's corners keep their numbers in every orientation that
   BoardDetector detector(target);
   Random random(11);
   Tally tally;
-  for (int view = 0; view < 12; ++view) {
+  for (int view = 0; view < 6; ++view) {
     const SE3 T = pose(pinhole(), target, {random.uniform(300, 450), random.uniform(200, 280)}, 0.03, 30,
-                       random.uniform(0, 0.7), random.uniform(0, 6.28), view * 30 * kDegree);
+                       random.uniform(0, 0.7), random.uniform(0, 6.28), view * 60 * kDegree);
     const GreyImage image = renderBoard(board, pinhole(), T, 0.7, 3, random);
     count(target, pinhole(), T, detector.detect(image.view()), tally);
   }

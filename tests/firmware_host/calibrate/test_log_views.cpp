@@ -1,14 +1,11 @@
 // A folder of numbered pictures, without IMU or calibration, from the pictures to Kalibr's file.
 #include <catch2/catch.hpp>
 
+#include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 
 #include "drivers/recorded/image_files.hpp"
-#include "drivers/target/target_file.hpp"
-#include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/lab/calibrate/board/log_views.hpp"
 #include "firmware_host/lab/calibrate/cameras/calibrate_cameras.hpp"
 #include "tests/firmware_host/calibrate/board_image.hpp"

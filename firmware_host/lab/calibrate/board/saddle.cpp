@@ -14,7 +14,7 @@ constexpr int kParameters = 9;  // c, angles, log blur, a, g, b
 using Vector9d = Eigen::Matrix<double, kParameters, 1>;
 using Matrix9d = Eigen::Matrix<double, kParameters, kParameters>;
 
-constexpr int kMaxSteps = 15;
+constexpr int kMaxSteps = 25;
 constexpr double kConverged = 2e-3;    ///< px: a fraction of what noise leaves
 constexpr double kFirstBlur = 0.7;     ///< px: a sharp image's pixel and lens
 constexpr double kLeastBlur = 0.3;     ///< px: below it the pixel's own width
@@ -174,7 +174,8 @@ bool refineSaddle(const ImageView& image, const SaddleGuess& guess, Saddle& sadd
     const double next_cost = evaluate(image, window, next, nullptr, nullptr);
     if (next_cost > cost) {
       damping = std::max(10 * damping, 1e-3);
-      done = damping > 1e4;
+      // Noise, or the least blur, keeps the sum from falling: the place is found.
+      done = damping > 1e4 || change.head<2>().norm() < kConverged;
       continue;
     }
     damping *= 0.1;
