@@ -118,7 +118,7 @@ CalibrationTarget boardForPaper(const BoardLayout& layout, const Eigen::Vector2d
 }
 
 std::string boardPdf(const CalibrationTarget& target, const Eigen::Vector2d& paper) {
-  const std::unique_ptr<void, decltype(&HPDF_Free)> document(HPDF_New(failPdf, nullptr), &HPDF_Free);
+  const std::unique_ptr<HPDF_Doc_Rec, decltype(&HPDF_Free)> document(HPDF_New(failPdf, nullptr), &HPDF_Free);
   HPDF_Page page = HPDF_AddPage(document.get());
   HPDF_Page_SetWidth(page, points(paper.x()));
   HPDF_Page_SetHeight(page, points(paper.y()));
