@@ -21,7 +21,9 @@ constexpr std::size_t kStartViews = 30;
 constexpr std::size_t kMostViews = 200;  ///< sigmas fall with the root of them; more cost time and a page
 constexpr std::size_t kFewestPairs = 3;  ///< moments of both cameras that a transform needs
 constexpr double kStrongEvidence = 10;   ///< of the information criterion
-constexpr double kFarOff = 5;            ///< sigmas: a view that is worse than this is another thing
+/// px: corners of one detector share errors of some hundredths that residuals do not show.
+constexpr double kLeastCornerSigma = 0.02;
+constexpr double kFarOff = 5;  ///< sigmas: a view that is worse than this is another thing
 
 struct Choice {
   std::optional<LensFit> fit;
@@ -130,7 +132,8 @@ Eigen::MatrixXd covarianceOf(const CameraBundle& bundle, double sigma) {
   const Eigen::MatrixXd A = bundle.information();
   const Eigen::VectorXd scale = A.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd inverse = (scale.asDiagonal() * A * scale.asDiagonal()).inverse();
-  return sigma * sigma * (scale.asDiagonal() * inverse * scale.asDiagonal());
+  const double noise = std::max(sigma, kLeastCornerSigma);
+  return noise * noise * (scale.asDiagonal() * inverse * scale.asDiagonal());
 }
 
 /// The lenses from every other view. False where the views are too few for it.
