@@ -2,7 +2,9 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cassert>
 #include <cmath>
+#include <cstdlib>
 
 namespace swiftlet {
 
@@ -32,6 +34,7 @@ void ArrowSystem::add(std::span<const int> columns, const Eigen::Ref<const Eigen
       const int j = columns[static_cast<std::size_t>(b)];
       if (in_chain) {
         if (j < chain()) {
+          assert(std::abs(j - i) < band_.rows());
           if (j >= i) band_(j - i, i) += H(b, a);
         } else {
           border_(j - chain(), i) += H(b, a);

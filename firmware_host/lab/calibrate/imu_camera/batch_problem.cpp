@@ -109,7 +109,12 @@ void BatchProblem::layOut() {
   state_.bias.resize(biases,
                      state_.bias.empty() ? Eigen::Matrix<double, 6, 1>::Zero().eval() : state_.bias.back());
   chain_ = 6 * static_cast<int>(state_.spline.controls().size() + biases);
-  width_ = 6 * static_cast<int>(kControls + every + 2);
+  width_ = 0;
+  for (std::size_t k = 0; k < knots; ++k) {
+    const int first = std::min(controlColumn(k), biasColumn(k / every));
+    const int last = std::max(controlColumn(k + kControls - 1), biasColumn(k / every + 1)) + 5;
+    width_ = std::max(width_, last - first);
+  }
 }
 
 void BatchProblem::setLensPrior(std::size_t camera, const Eigen::Matrix<double, 8, 8>& information) {
