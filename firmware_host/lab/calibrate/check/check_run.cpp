@@ -227,17 +227,15 @@ struct Parts {
   std::vector<PieceResult> outer;
 };
 
-CheckedValue judge(const Quantity& quantity, const std::vector<PieceResult>& pieces, const Parts& parts) {
-  CheckedValue value;
-  value.name = quantity.name;
-  value.unit = quantity.unit;
-  value.file = quantity.file;
-  value.limit = quantity.limit;
-  value.essential = quantity.essential;
+struct Estimate {
+  double value = 0;
+  double variance = 0;
+};
+
+/// The larger variance: the formal one, or that of leaving out each piece in turn, which sees what differs
+/// over the flight.
+Estimate estimateOf(const Quantity& quantity, const std::vector<PieceResult>& pieces) {
   const Sum all = together(pieces, -1);
-  value.change = quantity.row.dot(all.change);
-  double variance = quantity.row.dot(all.covariance * quantity.row);
-  // Leaving out each piece in turn: what differs over the flight.
   const auto count = static_cast<double>(pieces.size());
   std::vector<double> others;
   double mean = 0;
@@ -246,15 +244,28 @@ CheckedValue judge(const Quantity& quantity, const std::vector<PieceResult>& pie
     mean += others.back() / count;
   }
   double scatter = 0;
-  for (const double other : others) scatter += (other - mean) * (other - mean);
-  variance = std::max(variance, scatter * (count - 1) / count);
+  for (const double other : others) scatter += (other - mean) * (other - mean) * (count - 1) / count;
+  return {quantity.row.dot(all.change), std::max(quantity.row.dot(all.covariance * quantity.row), scatter)};
+}
+
+/// `disagree` becomes true where the parts of the image keep it from being told.
+CheckedValue judge(const Quantity& quantity, const std::vector<PieceResult>& pieces, const Parts& parts,
+                   bool& disagree) {
+  CheckedValue value;
+  value.name = quantity.name;
+  value.unit = quantity.unit;
+  value.file = quantity.file;
+  value.limit = quantity.limit;
+  value.essential = quantity.essential;
+  const Estimate all = estimateOf(quantity, pieces);
+  value.change = all.value;
+  double variance = all.variance;
   // A lens model that does not fit says one thing in the middle and another at the rim.
-  if (!parts.inner.empty() && !parts.outer.empty()) {
-    const Sum inner = together(parts.inner, -1);
-    const Sum outer = together(parts.outer, -1);
-    const double apart = quantity.row.dot(inner.change - outer.change);
-    const double noise = quantity.row.dot((inner.covariance + outer.covariance) * quantity.row);
-    variance += std::max(0.0, apart * apart - noise) / 4;
+  if (parts.inner.size() >= kFewestPieces && parts.outer.size() >= kFewestPieces) {
+    const Estimate inner = estimateOf(quantity, parts.inner);
+    const Estimate outer = estimateOf(quantity, parts.outer);
+    const double apart = inner.value - outer.value;
+    variance += std::max(0.0, apart * apart - inner.variance - outer.variance) / 4;
   }
   value.sigma = std::sqrt(variance);
   value.effect =
@@ -264,13 +275,14 @@ CheckedValue judge(const Quantity& quantity, const std::vector<PieceResult>& pie
     value.verdict = CheckVerdict::kMoved;
   } else if (size > value.limit || kKnownSigmas * value.sigma > value.limit) {
     value.verdict = CheckVerdict::kCannotTell;
+    disagree |= quantity.essential && variance > 2 * all.variance;
   } else {
     value.verdict = CheckVerdict::kHolds;
   }
   return value;
 }
 
-void conclude(CheckResult& result) {
+void conclude(bool disagree, CheckResult& result) {
   bool moved = false;
   std::string unknown;
   for (const CheckedValue& value : result.values) {
@@ -295,8 +307,13 @@ void conclude(CheckResult& result) {
                     kPercent * result.stereo_share));
   }
   if (!unknown.empty()) {
-    result.because.push_back("This flight does not fix: " + unknown +
-                             ". Fly longer, with turns about all axes and quick changes of speed.");
+    result.because.push_back(
+        "This flight does not fix: " + unknown + ". " +
+        (disagree
+             ? "The middle and the rim of the image disagree by more than noise: the lens model does not fit "
+               "the images. Look at the residuals over the image, and calibrate the cameras again if the "
+               "accuracy is not what it was."
+             : "Fly longer, with turns about all axes and quick changes of speed."));
   }
   result.verdict = moved                            ? CheckVerdict::kMoved
                    : few_stereo || !unknown.empty() ? CheckVerdict::kCannotTell
@@ -365,10 +382,11 @@ CheckResult checkCalibration(const CheckRequest& request, Settings settings) {
     stereo += static_cast<double>(piece.stereo_points);
   }
   result.stereo_share = stereo / points;
+  bool disagree = false;
   for (const Quantity& quantity : quantitiesOf(result.rig)) {
-    result.values.push_back(judge(quantity, result.pieces, parts));
+    result.values.push_back(judge(quantity, result.pieces, parts, disagree));
   }
-  conclude(result);
+  conclude(disagree, result);
   return result;
 }
 

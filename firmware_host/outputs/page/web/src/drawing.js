@@ -7,7 +7,7 @@ export class Drawing {
     this.holder = element('div', null, 'drawing');
     // The program's own markup; text in it is escaped there.
     this.holder.innerHTML = plot.svg;
-    this.holder.style.maxWidth = `${Math.min(width, 720)}px`;
+    this.holder.style.width = `${Math.min(width, 720)}px`;
     host.append(this.holder);
   }
 
