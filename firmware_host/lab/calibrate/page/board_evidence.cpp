@@ -87,7 +87,7 @@ Plot scatterPlot(const BoardEvidence& evidence, std::size_t camera) {
     if (corner.camera == camera) points.push_back(corner.residual);
   }
   return drawing(fmt::format("scatter{}", camera), "Residuals over the image",
-                 fmt::format("camera {}: residuals of all corners, right and down", camera),
+                 fmt::format("camera {}: residuals of all {}, right and down", camera, evidence.seen),
                  scatterDrawing(points, evidence.corner_sigma, "px"));
 }
 
@@ -100,10 +100,10 @@ Plot coveragePlot(const BoardEvidence& evidence, std::size_t camera) {
   ImageDrawing image(evidence.camera[camera].width(), evidence.camera[camera].height());
   image.dots(used, kUsed);
   image.dots(outliers, kLeftOut);
-  image.caption(fmt::format("{} corners used, {} outliers (red), {:.0f} % of the image's cells covered",
-                            used.size(), outliers.size(), 100 * coverageOf(evidence, camera).share));
+  image.caption(fmt::format("{} {} used, {} outliers (red), {:.0f} % of the image's cells covered",
+                            used.size(), evidence.seen, outliers.size(), 100 * coverageOf(evidence, camera).share));
   return drawing(fmt::format("coverage{}", camera), "Coverage",
-                 fmt::format("camera {}: corners seen", camera), image.svg());
+                 fmt::format("camera {}: {} seen", camera, evidence.seen), image.svg());
 }
 
 Plot viewPlot(const BoardEvidence& evidence) {

@@ -19,7 +19,8 @@ struct BoardEvidence {
   std::size_t camera_count = 0;
   std::array<CameraModel, kMaxCameras> camera;
   SE3 T_cam1_cam0;
-  double corner_sigma = 0;  ///< px per axis
+  double corner_sigma = 0;       ///< px per axis
+  std::string seen = "corners";  ///< what is seen: of a flight, points
   CalibrationTarget target;
   std::vector<SolvedView> views;
   std::vector<CornerResidual> corners;

@@ -13,6 +13,7 @@ BoardEvidence evidenceOf(const CheckResult& result) {
   BoardEvidence evidence;
   evidence.camera_count = result.rig.camera_count;
   evidence.camera = result.rig.camera;
+  evidence.seen = "points";
   double squares = 0;
   double count = 0;
   for (const PieceResult& piece : result.pieces) {
