@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -19,6 +20,7 @@
 #include "firmware_host/lab/calibrate/cameras/camera_files.hpp"
 #include "firmware_host/lab/calibrate/imu_camera/calibrate_imu_camera.hpp"
 #include "firmware_host/lab/calibrate/imu_camera/imu_camera_files.hpp"
+#include "firmware_host/lab/calibrate/page/solution_pages.hpp"
 #include "firmware_host/outputs/run_folder/calibration_files.hpp"
 #include "firmware_host/realtime/console.hpp"
 #include "firmware_host/realtime/progress.hpp"
@@ -121,6 +123,10 @@ int calibrateLogImuCamera(ImuCameraOptions options) {
     input.noise.gyro_density *= solution.gyro_sigma;
     input.noise.accel_density *= solution.accel_sigma;
   }
+  std::filesystem::create_directories(options.out);
+  writeCalibrationPage((std::filesystem::path(options.out) / "report.html").string(),
+                       lenses ? imuCameraPage(solution, input.target, options.log.log)
+                              : cameraPage(input.cameras, input.target, options.log.log));
   if (!solution.reasons.empty()) {
     for (const std::string& reason : solution.reasons) warn("repeat: " + reason + "\n");
     warn("No calibration is written.\n");
