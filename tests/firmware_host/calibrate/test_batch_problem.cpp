@@ -127,8 +127,14 @@ TEST_CASE("the batch's gradient is that of finite differences") {
     SessionSettings slow;
     slow.camera_rate = 10;
     const ImuCameraInput input = batchInput(sessionOf(seed, 12, slow));
-    const BatchStart start = startOf(input);
+    BatchStart start = startOf(input);
     REQUIRE(start.reasons.empty());
+    // Some views and readings are enough for a derivative.
+    constexpr std::size_t kEvery = 10;
+    std::vector<SeenView> some;
+    for (std::size_t k = 0; k < start.data.views.size(); k += kEvery) some.push_back(start.data.views[k]);
+    start.data.views = some;
+    start.data.readings.resize(start.data.readings.size() / 4);
     BatchState state = start.state;
     state.readout = 0.01;
     BatchProblem problem(start.data, state, {0.2, 1, 1});
@@ -161,7 +167,9 @@ TEST_CASE("the batch's gradient is that of finite differences") {
 
 TEST_CASE("two rigs are calibrated within what they say of themselves") {
   for (const std::uint64_t seed : {101U, 102U}) {
-    const CalibrationSession session = sessionOf(seed, 20);
+    SessionSettings slow;
+    slow.camera_rate = 10;
+    const CalibrationSession session = sessionOf(seed, 20, slow);
     const ImuCameraSolution solution = calibrateImuCamera(batchInput(session));
     REQUIRE(!solution.values.empty());
     const CalibrationErrors errors = errorsOf(solution, session);
