@@ -1,7 +1,7 @@
 // Simulated rigs through the batch: a line a rig, the errors beside their standard deviations, a table.
 //
-// usage: imu_camera_campaign RESULTS FIRST LAST [NAME]: rigs with seeds FIRST to LAST; those that RESULTS (a
-// CSV) has already are not repeated. NAME prints the errors of each rig too.
+// usage: imu_camera_campaign RESULTS FIRST LAST: rigs with seeds FIRST to LAST; those that RESULTS (a
+// CSV) has already are not repeated. Delete RESULTS after a change of the code.
 
 #include <fmt/format.h>
 
