@@ -3,6 +3,7 @@
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <memory>

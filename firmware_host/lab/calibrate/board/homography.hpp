@@ -2,6 +2,7 @@
 // The projective map of a plane that fits point pairs best.
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <span>
 
 namespace swiftlet {

@@ -25,6 +25,7 @@
 #include <array>
 #include <cstddef>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "drivers/target/board_view.hpp"
