@@ -174,7 +174,8 @@ std::array<std::optional<std::uint32_t>, kMaxCameras> chooseImageTopics(BagFile&
         if (chosen[c] || std::find(chosen.begin(), chosen.end(), topic) != chosen.end()) continue;
         const ImageSize size = sizeOn(bag, topic);
         const bool any_size = model.width() == 0;
-        if (fitting && !any_size && size != ImageSize{} && size != ImageSize{model.width(), model.height()}) continue;
+        if (fitting && !any_size && size != ImageSize{} && size != ImageSize{model.width(), model.height()})
+          continue;
         if (!fitting && c > 0) continue;
         chosen[c] = topic;
         guessed = true;

@@ -30,9 +30,9 @@ struct LogOptions {
   std::string calibration;
   std::string imu_calibration;  ///< the Kalibr IMU file, where it is not beside the camchain
   CalibrationOptions calibration_options;
-  /// For calibrating: no calibration is read. Lenses have the images' sizes alone, cameras are as many as the log
-  /// has, the body has the IMU's own axes, and there may be no IMU. Numbered images are a second apart; equal
-  /// numbers of two cameras are one moment.
+  /// For calibrating: no calibration is read. Lenses have the images' sizes alone, cameras are as many as the
+  /// log has, the body has the IMU's own axes, and there may be no IMU. Numbered images are a second apart;
+  /// equal numbers of two cameras are one moment.
   bool uncalibrated = false;
   bool mono = false;                  ///< leave camera 1 out
   bool without_images = false;        ///< neither look for images nor deliver any: tracks take their place

@@ -39,8 +39,8 @@ void RecordedLog::takeImageSizes() {
       // A lens of no use but its size.
       calibration_.rig.camera[camera] =
           CameraModel(CameraKind::kEquidistant, fetched.found.width, fetched.found.height,
-                      Eigen::Vector4d(fetched.found.width, fetched.found.width, 0.5 * (fetched.found.width - 1),
-                                      0.5 * (fetched.found.height - 1)),
+                      Eigen::Vector4d(fetched.found.width, fetched.found.width,
+                                      0.5 * (fetched.found.width - 1), 0.5 * (fetched.found.height - 1)),
                       Eigen::Vector4d::Zero());
       break;
     }

@@ -10,8 +10,8 @@
 // Frames: world z up; the board stands about upright in it; body = IMU. Time: seconds since the trajectory's
 // zero. Stamps of images are the IMU clock's minus the rig's shift.
 // Bad data is asked for by the settings from `turning` on.
-// Cost: a session of 60 s 20 ms; the views of an image pair 0.2 ms, with a rolling shutter 1.2. Same settings,
-// same bytes.
+// Cost: a session of 60 s 20 ms; the views of an image pair 0.2 ms, with a rolling shutter 1.2. Same
+// settings, same bytes.
 
 #include <Eigen/Core>
 #include <array>

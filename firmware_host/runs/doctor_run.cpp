@@ -15,8 +15,8 @@
 #include "firmware_host/inspection/inspect_log.hpp"
 #include "firmware_host/realtime/host_sleep.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
-#include "firmware_host/runs/vehicle_calibration.hpp"
 #include "firmware_host/runs/keeping_sink.hpp"
+#include "firmware_host/runs/vehicle_calibration.hpp"
 
 namespace swiftlet {
 namespace {

@@ -220,7 +220,7 @@ TEST_CASE("An hour with losses and clock steps: stamps within a millisecond, har
   control.stop = &stop;
   auto owned = std::make_unique<Hour>(stop);
   Hour& hour = *owned;
-  ImuThread imu("IMU", std::move(owned), Eigen::Matrix3d::Identity(), {});
+  ImuThread imu("IMU", std::move(owned), ImuCorrection{}, {});
   imu.run(hour, {}, control);
   const Figures& f = hour.figures;
   std::cout << f.poses << " poses in an hour, worst stamp " << 1e3 * f.worst << " ms off, " << f.wrong

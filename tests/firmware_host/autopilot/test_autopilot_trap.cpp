@@ -113,8 +113,7 @@ TEST_CASE("one link for IMU and poses costs the IMU's thread no heap call and no
   ImuLinkGroup settings;
   settings.device = terminal.path();
   settings.protocol = "mavlink";
-  ImuThread imu("IMU", std::make_unique<PortImuLink>(settings, 200, &outbox), Eigen::Matrix3d::Identity(), {},
-                200);
+  ImuThread imu("IMU", std::make_unique<PortImuLink>(settings, 200, &outbox), ImuCorrection{}, {}, 200);
   REQUIRE(imu.open().ok());
   auto options = optionsOf(terminal.path());
   options.outbox = &outbox;

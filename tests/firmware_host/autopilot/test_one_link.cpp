@@ -140,8 +140,7 @@ void fly(const char* name, const std::string& device, double seconds, FarAutopil
   LinkOutbox outbox;
   LiveOutlet outlet;
   StateSink sink([&](const NavState& state) { outlet.state.write({state, Eigen::Vector3d::Zero()}); });
-  ImuThread imu("IMU", std::make_unique<PortImuLink>(settings, kRate, &outbox), Eigen::Matrix3d::Identity(),
-                {}, kRate);
+  ImuThread imu("IMU", std::make_unique<PortImuLink>(settings, kRate, &outbox), ImuCorrection{}, {}, kRate);
   REQUIRE(imu.open().ok());
   AutopilotThreadOptions options = optionsOf(device);
   options.outbox = &outbox;
@@ -343,7 +342,7 @@ struct Simulated {
     auto owned = std::make_unique<SimulatedLink>(begin, static_cast<std::int64_t>(seconds / kTick.seconds()),
                                                  options, stop);
     link = owned.get();
-    imu = std::make_unique<ImuThread>("IMU", std::move(owned), Eigen::Matrix3d::Identity(), Duration{});
+    imu = std::make_unique<ImuThread>("IMU", std::move(owned), ImuCorrection{}, Duration{});
   }
   void run() {
     RunControl control;

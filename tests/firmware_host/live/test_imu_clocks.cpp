@@ -94,8 +94,7 @@ std::unique_ptr<Flown> fly(std::deque<ScriptedLink::Round> rounds, Duration dela
   std::atomic<bool> stop{false};
   RunControl control;
   control.stop = &stop;
-  ImuThread imu("IMU", std::make_unique<ScriptedLink>(std::move(rounds), stop), Eigen::Matrix3d::Identity(),
-                delay);
+  ImuThread imu("IMU", std::make_unique<ScriptedLink>(std::move(rounds), stop), ImuCorrection{}, delay);
   const std::array<EdgeRing*, 1> edges = {&flown->edges};
   imu.run(flown->sink, edges, control);
   flown->status = imu.status();

@@ -96,7 +96,7 @@ Eigen::Matrix3d quarterTurn() {
 
 ImuThread threadOf(const FarSensor& sensor, const Eigen::Matrix3d& R = Eigen::Matrix3d::Identity(),
                    Duration delay = {}) {
-  return {"IMU (port)", sensor.link(), R, delay};
+  return {"IMU (port)", sensor.link(), ImuCorrection{}.turned(R), delay};
 }
 
 bool rising(const KeepingSink& sink) {

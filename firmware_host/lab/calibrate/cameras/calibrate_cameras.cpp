@@ -21,9 +21,7 @@ constexpr std::size_t kStartViews = 30;
 constexpr std::size_t kMostViews = 200;  ///< sigmas fall with the root of them; more cost time and a page
 constexpr std::size_t kFewestPairs = 3;  ///< moments of both cameras that a transform needs
 constexpr double kStrongEvidence = 10;   ///< of the information criterion
-/// px: corners of one detector share errors of some hundredths that residuals do not show.
-constexpr double kLeastCornerSigma = 0.02;
-constexpr double kFarOff = 5;  ///< sigmas: a view that is worse than this is another thing
+constexpr double kFarOff = 5;            ///< sigmas: a view that is worse than this is another thing
 
 struct Choice {
   std::optional<LensFit> fit;

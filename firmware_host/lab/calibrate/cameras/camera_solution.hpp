@@ -14,6 +14,9 @@
 
 namespace swiftlet {
 
+/// px: corners of one detector share errors of some hundredths that residuals do not show.
+inline constexpr double kLeastCornerSigma = 0.02;
+
 /// A corner that was used, or left out as an outlier.
 struct CornerResidual {
   std::size_t camera = 0;

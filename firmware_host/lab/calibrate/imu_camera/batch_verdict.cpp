@@ -203,9 +203,9 @@ void BatchVerdict::judge(BatchProblem problem, ImuCameraSolution& solution) cons
         "The batch did not settle: its last steps are not small. Record again, slower at first.");
   }
   judgeResiduals(solution, reasons);
-  judgeMotion(problem, reasons);
+  const bool known = judgeSigmas(solution, reasons);
+  judgeMotion(problem, known, reasons);
   judgeMatrices(solution, reasons);
-  judgeSigmas(solution, reasons);
   judgeHalves(problem, reasons);
 
   // Two further unknowns, which a good calibration does not want.
@@ -272,7 +272,8 @@ void BatchVerdict::judgeResiduals(const ImuCameraSolution& solution,
   sensor("accelerometer", solution.accel_sigma);
 }
 
-void BatchVerdict::judgeMotion(const BatchProblem& problem, std::vector<std::string>& reasons) const {
+void BatchVerdict::judgeMotion(const BatchProblem& problem, bool known,
+                               std::vector<std::string>& reasons) const {
   const BatchState& state = problem.state();
   Eigen::Matrix3d rates = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d forces = Eigen::Matrix3d::Zero();
@@ -296,7 +297,8 @@ void BatchVerdict::judgeMotion(const BatchProblem& problem, std::vector<std::str
                     axisOfCamera(turn.direction), kToDeg * turn.rms));
   }
   const Weakest force = weakestOf(forces / count);
-  if (force.rms < kLeastForce) {
+  // Turns alone show much of the accelerometer: gravity changes its direction.
+  if (!known && force.rms < kLeastForce) {
     Eigen::Index axis = 0;
     force.direction.cwiseAbs().maxCoeff(&axis);
     reasons.push_back(
@@ -332,7 +334,7 @@ void BatchVerdict::judgeMatrices(const ImuCameraSolution& solution, std::vector<
   sensor("accelerometer", solution.accel_matrix);
 }
 
-void BatchVerdict::judgeSigmas(const ImuCameraSolution& solution, std::vector<std::string>& reasons) const {
+bool BatchVerdict::judgeSigmas(const ImuCameraSolution& solution, std::vector<std::string>& reasons) const {
   std::string text;
   for (const SolvedValue& value : solution.values) {
     double most = 0;
@@ -344,8 +346,9 @@ void BatchVerdict::judgeSigmas(const ImuCameraSolution& solution, std::vector<st
     if (most == 0 || value.sigma <= most) continue;
     text += fmt::format("{}{} +- {:.3g} {}", text.empty() ? "" : ", ", value.name, value.sigma, value.unit);
   }
-  if (text.empty()) return;
+  if (text.empty()) return true;
   reasons.push_back("Not known well enough: " + text + ". Record longer, with faster turns about all axes.");
+  return false;
 }
 
 void BatchVerdict::judgeHalves(const BatchProblem& problem, std::vector<std::string>& reasons) const {

@@ -27,9 +27,10 @@ struct BatchVerdict {
 
  private:
   void judgeResiduals(const ImuCameraSolution& solution, std::vector<std::string>& reasons) const;
-  void judgeMotion(const BatchProblem& problem, std::vector<std::string>& reasons) const;
+  /// `known`: the standard deviations are small enough.
+  void judgeMotion(const BatchProblem& problem, bool known, std::vector<std::string>& reasons) const;
   void judgeMatrices(const ImuCameraSolution& solution, std::vector<std::string>& reasons) const;
-  void judgeSigmas(const ImuCameraSolution& solution, std::vector<std::string>& reasons) const;
+  bool judgeSigmas(const ImuCameraSolution& solution, std::vector<std::string>& reasons) const;
   void judgeHalves(const BatchProblem& problem, std::vector<std::string>& reasons) const;
 };
 

@@ -59,7 +59,7 @@ void weigh(BatchProblem& problem) {
     return std::sqrt(problem.cost(which) / std::max(left[static_cast<std::size_t>(which)], 1.0));
   };
   BatchNoise noise = problem.noise();
-  noise.corner *= factor(Residuals::kCorner);
+  noise.corner = std::max(noise.corner * factor(Residuals::kCorner), kLeastCornerSigma);
   noise.gyro *= factor(Residuals::kGyro);
   noise.accel *= factor(Residuals::kAccel);
   problem.setNoise(noise);

@@ -101,7 +101,8 @@ Plot coveragePlot(const BoardEvidence& evidence, std::size_t camera) {
   image.dots(used, kUsed);
   image.dots(outliers, kLeftOut);
   image.caption(fmt::format("{} {} used, {} outliers (red), {:.0f} % of the image's cells covered",
-                            used.size(), evidence.seen, outliers.size(), 100 * coverageOf(evidence, camera).share));
+                            used.size(), evidence.seen, outliers.size(),
+                            100 * coverageOf(evidence, camera).share));
   return drawing(fmt::format("coverage{}", camera), "Coverage",
                  fmt::format("camera {}: {} seen", camera, evidence.seen), image.svg());
 }
