@@ -17,6 +17,13 @@ constexpr int kRotationSteps = 10;
 /// px: beyond it two lenses share nothing there, and one such point must not turn all of them.
 constexpr double kFarApart = 50;
 
+/// Of a pixel; by the lens NaN where it has no ray.
+struct PixelDerivatives {
+  Eigen::Matrix<double, 2, 8> by_lens =
+      Eigen::Matrix<double, 2, 8>::Constant(std::numeric_limits<double>::quiet_NaN());
+  Eigen::Matrix<double, 2, 3> by_rotation = Eigen::Matrix<double, 2, 3>::Zero();
+};
+
 struct GridPoint {
   Eigen::Vector2d pixel;
   Eigen::Vector3d bearing;
@@ -37,31 +44,40 @@ std::vector<GridPoint> gridOf(const CameraModel& lens) {
 
 }  // namespace
 
-std::vector<ImagePoint> projectionSigmas(const CameraModel& lens,
-                                         const Eigen::Matrix<double, 8, 8>& covariance) {
-  struct Derivatives {
-    Eigen::Vector2d pixel;
-    Eigen::Matrix<double, 2, 8> by_lens;
-    Eigen::Matrix<double, 2, 3> by_rotation;
-  };
-  std::vector<Derivatives> all;
+std::vector<Eigen::Matrix2d> pixelCovariances(const CameraModel& lens,
+                                              const Eigen::Matrix<double, 8, 8>& covariance,
+                                              const std::vector<Eigen::Vector2d>& pixels) {
+  std::vector<PixelDerivatives> all(pixels.size());
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Matrix<double, 3, 8> mixed = Eigen::Matrix<double, 3, 8>::Zero();
-  for (const GridPoint& point : gridOf(lens)) {
-    Derivatives d;
+  for (std::size_t k = 0; k < pixels.size(); ++k) {
+    Eigen::Vector3d bearing;
+    Eigen::Vector2d pixel;
     Matrix23d by_point;
-    if (!lens.project(point.bearing, d.pixel, &by_point)) continue;
-    d.by_lens = lensJacobian(lens, point.bearing);
-    d.by_rotation = -by_point * hat(point.bearing);
+    if (!lens.unproject(pixels[k], bearing) || !lens.project(bearing, pixel, &by_point)) continue;
+    PixelDerivatives& d = all[k];
+    d.by_lens = lensJacobian(lens, bearing);
+    d.by_rotation = -by_point * hat(bearing);
     normal += d.by_rotation.transpose() * d.by_rotation;
     mixed += d.by_rotation.transpose() * d.by_lens;
-    all.push_back(d);
   }
   const Eigen::Matrix<double, 3, 8> rotation = -normal.ldlt().solve(mixed);
-  std::vector<ImagePoint> points;
-  for (const Derivatives& d : all) {
+  std::vector<Eigen::Matrix2d> covariances;
+  for (const PixelDerivatives& d : all) {
     const Eigen::Matrix<double, 2, 8> J = d.by_lens + d.by_rotation * rotation;
-    points.push_back({d.pixel, std::sqrt(0.5 * (J * covariance * J.transpose()).trace())});
+    covariances.emplace_back(J * covariance * J.transpose());
+  }
+  return covariances;
+}
+
+std::vector<ImagePoint> projectionSigmas(const CameraModel& lens,
+                                         const Eigen::Matrix<double, 8, 8>& covariance) {
+  std::vector<Eigen::Vector2d> pixels;
+  for (const GridPoint& point : gridOf(lens)) pixels.push_back(point.pixel);
+  const std::vector<Eigen::Matrix2d> covariances = pixelCovariances(lens, covariance, pixels);
+  std::vector<ImagePoint> points;
+  for (std::size_t k = 0; k < pixels.size(); ++k) {
+    if (covariances[k].allFinite()) points.push_back({pixels[k], std::sqrt(0.5 * covariances[k].trace())});
   }
   return points;
 }

@@ -22,7 +22,13 @@ struct ImagePoint {
   double error = 0;  ///< px, rms of the two axes
 };
 
-/// 1 sigma; points where the lens has no inverse are left out.
+/// Covariance of the pixel of a far point [px^2] at each pixel given; the rotation is taken out over these.
+/// NaN where the lens has no inverse.
+[[nodiscard]] std::vector<Eigen::Matrix2d> pixelCovariances(const CameraModel& lens,
+                                                            const Eigen::Matrix<double, 8, 8>& covariance,
+                                                            const std::vector<Eigen::Vector2d>& pixels);
+
+/// 1 sigma over the grid; points where the lens has no inverse are left out.
 [[nodiscard]] std::vector<ImagePoint> projectionSigmas(const CameraModel& lens,
                                                        const Eigen::Matrix<double, 8, 8>& covariance);
 

@@ -11,8 +11,6 @@ namespace swiftlet {
 /// Standard deviation of the pixel of a far point in its worst direction [px], at each pixel given. The
 /// rotation that best compensates the lens's error over these pixels is taken out: a calibrated rig that is
 /// turned as a whole sees the same. NaN where the lens has no ray.
-/// Linear: A = J_lens - J_turn (J_turn^T J_turn)^-1 J_turn^T J_lens, covariance A C A^T.
-/// Source: the compensating rotation is mrcal's (D. Kogan, "mrcal: projection uncertainty").
 std::vector<double> projectionSigmas(const CameraModel& model, const Eigen::Matrix<double, 8, 8>& covariance,
                                      const std::vector<Eigen::Vector2d>& pixels);
 
