@@ -1,5 +1,5 @@
 // Prints the errors of the clock maps on simulated links and what the trigger makes of random patterns: the
-// tables of docs/timesync.md. usage: clock_table [SEEDS]
+// tables of docs/experiments/timesync.md. usage: clock_table [SEEDS]
 #include <cstdio>
 #include <cstdlib>
 #include <string>
