@@ -91,8 +91,8 @@ TEST_CASE("tags of a board are found, none as another, without bias") {
     double least_found, most_median;
   };
   const std::vector<Scene> scenes = {
-      {"60 px", pinhole(), 60, 0, 0.7, 3, 0.99, 0.03},
-      {"40 px", pinhole(), 40, 0, 0.7, 3, 0.99, 0.03},
+      {"60 px", pinhole(), 60, 0, 0.7, 3, 0.99, 0.045},
+      {"40 px", pinhole(), 40, 0, 0.7, 3, 0.99, 0.045},
       {"20 px", pinhole(), 20, 0, 0.7, 3, 0.9, 0.1},
       {"40 px, 50 degrees", pinhole(), 40, 50 * kDegree, 0.7, 3, 0.95, 0.08},
       {"30 px, 55 degrees", pinhole(), 30, 55 * kDegree, 0.7, 3, 0.85, 0.1},

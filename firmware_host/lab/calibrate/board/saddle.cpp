@@ -10,9 +10,9 @@
 namespace swiftlet {
 namespace {
 
-constexpr int kParameters = 9;  // c, angles, log blur, a, g, b
-using Vector9d = Eigen::Matrix<double, kParameters, 1>;
-using Matrix9d = Eigen::Matrix<double, kParameters, kParameters>;
+constexpr int kParameters = 11;  // c, angles, log blur, a, g, b, curvatures [1/px]
+using Parameters = Eigen::Matrix<double, kParameters, 1>;
+using Normals = Eigen::Matrix<double, kParameters, kParameters>;
 
 constexpr int kMaxSteps = 25;
 constexpr double kConverged = 2e-3;    ///< px: a fraction of what noise leaves
@@ -72,7 +72,8 @@ bool place(const ImageView& image, const Eigen::Vector2d& centre, double radius,
 }
 
 /// Sum of squared residuals; the normal equations where they are asked for.
-double evaluate(const ImageView& image, const Window& window, const Vector9d& p, Matrix9d* H, Vector9d* g) {
+double evaluate(const ImageView& image, const Window& window, const Parameters& p, Normals* H,
+                Parameters* g) {
   static const ErrorFunction error_function;
   const double blur = std::exp(p[4]);
   const double c1 = std::cos(p[2]);
@@ -89,29 +90,38 @@ double evaluate(const ImageView& image, const Window& window, const Vector9d& p,
     const double y = window.top + row - p[1];
     for (int column = 0; column < window.size; ++column) {
       const double x = window.left + column - p[0];
-      const double t1 = (-s1 * x + c1 * y) / blur;
-      const double t2 = (-s2 * x + c2 * y) / blur;
+      const double along1 = c1 * x + s1 * y;
+      const double along2 = c2 * x + s2 * y;
+      const double bend1 = 0.5 * (along1 * along1 + blur * blur);
+      const double bend2 = 0.5 * (along2 * along2 + blur * blur);
+      const double t1 = (-s1 * x + c1 * y - p[9] * bend1) / blur;
+      const double t2 = (-s2 * x + c2 * y - p[10] * bend2) / blur;
       double e1 = 0;
       double d1 = 0;
       double e2 = 0;
       double d2 = 0;
       error_function(t1, e1, d1);
       error_function(t2, e2, d2);
-      const double residual = grey[column] - (p[5] + p[6] * x + p[7] * y + p[8] * e1 * e2);
+      const double light = 1 + p[6] * x + p[7] * y;
+      const double flat = p[5] + p[8] * e1 * e2;
+      const double residual = grey[column] - light * flat;
       cost += residual * residual;
       if (H == nullptr) continue;
-      const double k1 = p[8] * d1 * e2;
-      const double k2 = p[8] * e1 * d2;
-      Vector9d J;
-      J[0] = (k1 * s1 + k2 * s2) / blur - p[6];
-      J[1] = (-k1 * c1 - k2 * c2) / blur - p[7];
-      J[2] = k1 * (-c1 * x - s1 * y) / blur;
-      J[3] = k2 * (-c2 * x - s2 * y) / blur;
+      const double k1 = light * p[8] * d1 * e2;
+      const double k2 = light * p[8] * e1 * d2;
+      Parameters J;
+      // The curvature's part of the first four is a hundredth of them.
+      J[0] = (k1 * s1 + k2 * s2) / blur - p[6] * flat;
+      J[1] = (-k1 * c1 - k2 * c2) / blur - p[7] * flat;
+      J[2] = -k1 * along1 / blur;
+      J[3] = -k2 * along2 / blur;
       J[4] = -k1 * t1 - k2 * t2;
-      J[5] = 1;
-      J[6] = x;
-      J[7] = y;
-      J[8] = e1 * e2;
+      J[5] = light;
+      J[6] = x * flat;
+      J[7] = y * flat;
+      J[8] = light * e1 * e2;
+      J[9] = -k1 * bend1 / blur;
+      J[10] = -k2 * bend2 / blur;
       H->noalias() += J * J.transpose();
       *g += residual * J;
     }
@@ -120,8 +130,8 @@ double evaluate(const ImageView& image, const Window& window, const Vector9d& p,
 }
 
 /// Shading and contrast from the means of the four areas, the edges as guessed.
-Vector9d begin(const ImageView& image, const Window& window, const SaddleGuess& guess, double angle1,
-               double angle2) {
+Parameters begin(const ImageView& image, const Window& window, const SaddleGuess& guess, double angle1,
+                 double angle2) {
   std::array<double, 2> sum{};
   std::array<int, 2> count{};
   for (int row = 0; row < window.size; ++row) {
@@ -138,8 +148,8 @@ Vector9d begin(const ImageView& image, const Window& window, const SaddleGuess& 
   }
   const double low = sum[0] / std::max(1, count[0]);
   const double high = sum[1] / std::max(1, count[1]);
-  Vector9d p;
-  p << guess.pixel, angle1, angle2, std::log(kFirstBlur), 0.5 * (low + high), 0, 0, 0.5 * (high - low);
+  Parameters p;
+  p << guess.pixel, angle1, angle2, std::log(kFirstBlur), 0.5 * (low + high), 0, 0, 0.5 * (high - low), 0, 0;
   return p;
 }
 
@@ -150,23 +160,25 @@ bool refineSaddle(const ImageView& image, const SaddleGuess& guess, Saddle& sadd
   const double angle2 = std::atan2(guess.edge2.y(), guess.edge2.x());
   Window window;
   if (!place(image, guess.pixel, guess.radius, window)) return false;
-  Vector9d p = begin(image, window, guess, angle1, angle2);
-  Matrix9d H;
-  Vector9d g;
+  Parameters p = begin(image, window, guess, angle1, angle2);
+  Normals H;
+  Parameters g;
   double damping = 1e-3;
   double cost = evaluate(image, window, p, &H, &g);
   bool done = false;
   for (int step = 0; step < kMaxSteps && !done; ++step) {
-    Matrix9d damped = H;
-    damped.diagonal() += damping * H.diagonal() + Vector9d::Constant(1e-9);
-    const Vector9d change = damped.ldlt().solve(g);
-    Vector9d next = p + change;
+    Normals damped = H;
+    damped.diagonal() += damping * H.diagonal() + Parameters::Constant(1e-9);
+    const Parameters change = damped.ldlt().solve(g);
+    Parameters next = p + change;
     next[4] = std::clamp(next[4], std::log(kLeastBlur), std::log(kMostBlur * guess.radius));
     if (!next.allFinite() || (next.head<2>() - guess.pixel).norm() > guess.radius) return false;
     if ((next.head<2>() - window.centre()).cwiseAbs().maxCoeff() > kMostOffCentre) {
       // Another window has another sum: begin there, its shading about the new centre.
       if (!place(image, next.head<2>(), guess.radius, window)) return false;
-      next[5] += p[6] * change[0] + p[7] * change[1];
+      const double light = 1 + p[6] * change[0] + p[7] * change[1];
+      next[5] *= light;
+      next[8] *= light;
       p = next;
       cost = evaluate(image, window, p, &H, &g);
       continue;
