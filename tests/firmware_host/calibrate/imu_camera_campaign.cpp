@@ -1,19 +1,26 @@
 // Simulated rigs through the batch: a line a rig, the errors beside their standard deviations, a table.
 //
-// usage: imu_camera_campaign RESULTS FIRST LAST: rigs with seeds FIRST to LAST; those that RESULTS (a
-// CSV) has already are not repeated. Delete RESULTS after a change of the code.
+// usage: imu_camera_campaign RESULTS FIRST LAST [FOLDER]: rigs with seeds FIRST to LAST; those that RESULTS
+// (a CSV) has already are not repeated. Delete RESULTS after a change of the code. With FOLDER the images are
+// rendered into it and searched for corners, and FOLDER/rig_<seed>/found gets the calibration.
 
 #include <fmt/format.h>
 
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <map>
 #include <set>
 #include <sstream>
 
+#include "drivers/simulated/session_folder.hpp"
+#include "firmware_host/lab/calibrate/board/log_views.hpp"
+#include "firmware_host/lab/calibrate/cameras/calibrate_cameras.hpp"
+#include "firmware_host/lab/calibrate/imu_camera/imu_camera_files.hpp"
+#include "firmware_host/outputs/run_folder/calibration_files.hpp"
 #include "tests/firmware_host/calibrate/simulated_calibration.hpp"
 
 using namespace swiftlet;
@@ -48,15 +55,50 @@ std::map<std::uint64_t, std::vector<Row>> readRows(const std::string& path) {
   return rows;
 }
 
-std::string runRig(std::uint64_t seed) {
+/// The session as images: corners are found, and cameras calibrated, as the command does it.
+ImuCameraInput renderedInput(const CalibrationSession& session, RigKind kind, const std::string& folder) {
+  SessionFolderSettings settings;
+  settings.rig = kind;
+  settings.rig_seed = session.settings().seed;
+  settings.session = session.settings();
+  std::string message;
+  if (!simulateSessionToFolder(session.target(), settings, folder, {}, &message).ok()) {
+    std::cerr << folder << ": " << message << "\n";
+    std::exit(EXIT_FAILURE);
+  }
+  LogViewsRequest request;
+  request.log = folder;
+  request.target = session.target();
+  const LogViews log = readLogViews(request);
+  CameraInput cameras;
+  cameras.target = request.target;
+  cameras.views = log.views;
+  cameras.camera_count = log.camera_count;
+  cameras.image_size = log.image_size;
+  ImuCameraInput input;
+  input.target = request.target;
+  input.views = log.views;
+  input.samples = log.samples;
+  input.noise = session.truth().noise;
+  input.cameras = calibrateCameras(cameras);
+  // The truth stays, the images are large.
+  std::filesystem::remove_all(folder + "/mav0");
+  return input;
+}
+
+std::string runRig(std::uint64_t seed, const std::string& folder) {
   SessionSettings settings;
   settings.seed = seed;
-  const CalibrationRig rig =
-      drawCalibrationRig(seed, seed % 2 == 0 ? CameraKind::kPinholeRadtan : CameraKind::kEquidistant);
-  const CalibrationSession session(rig, CalibrationTarget{}, settings);
-  const ImuCameraInput input = batchInput(session);
+  const RigKind kind = seed % 2 == 0 ? RigKind::kRandomPinhole : RigKind::kRandomFisheye;
+  const CalibrationSession session(makeCalibrationRig(kind, seed), CalibrationTarget{}, settings);
+  const std::string rendered = fmt::format("{}/rig_{}", folder, seed);
+  const ImuCameraInput input = folder.empty() ? batchInput(session) : renderedInput(session, kind, rendered);
   const auto begin = std::chrono::steady_clock::now();
   const ImuCameraSolution solution = calibrateImuCamera(input);
+  if (!folder.empty() && !solution.values.empty()) {
+    std::filesystem::create_directories(rendered + "/found");
+    writeCalibration(rendered + "/found", calibrationOf(solution, input.noise));
+  }
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   std::string text;
   for (const std::string& reason : solution.reasons) std::cerr << "rig " << seed << ": " << reason << "\n";
@@ -78,7 +120,7 @@ std::string runRig(std::uint64_t seed) {
 
 int main(int argc, char** argv) {
   if (argc < 4) {
-    std::cerr << "usage: imu_camera_campaign RESULTS FIRST LAST\n";
+    std::cerr << "usage: imu_camera_campaign RESULTS FIRST LAST [FOLDER]\n";
     return 2;
   }
   const std::string path = argv[1];
@@ -87,7 +129,7 @@ int main(int argc, char** argv) {
   const auto done = readRows(path);
   for (std::uint64_t seed = first; seed <= last; ++seed) {
     if (done.count(seed) != 0) continue;
-    const std::string text = runRig(seed);
+    const std::string text = runRig(seed, argc > 4 ? argv[4] : "");
     std::ofstream(path, std::ios::app) << text;
   }
 
