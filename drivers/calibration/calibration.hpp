@@ -91,8 +91,9 @@ struct CameraChain {
 };
 CameraChain readCameraChain(const std::string& file);
 
-/// Noise and rate of an IMU file, Kalibr's or EuRoC's.
-ImuNoise readImuNoise(const std::string& file);
+/// Noise and rate of an IMU file, Kalibr's or EuRoC's. A random walk that the file does not have, since its
+/// log at rest was short, keeps ImuNoise's typical value; `left_out` gets its key.
+ImuNoise readImuNoise(const std::string& file, std::vector<std::string>& left_out);
 
 /// True when the folder or file `path` has a calibration that readCalibration would find (good or bad).
 bool hasCalibration(const std::string& path);

@@ -195,11 +195,11 @@ CameraChain readCameraChain(const std::string& file) {
   return cameras;
 }
 
-ImuNoise readImuNoise(const std::string& file) {
+ImuNoise readImuNoise(const std::string& file, std::vector<std::string>& left_out) {
   const std::string text = openFolder("")->text(file);
   const YamlField imu = parseImu({file, text});
   Warnings warnings;
-  return readNoise(imu, imu.has("rate_hz") ? "rate_hz" : "update_rate", warnings);
+  return readNoise(imu, imu.has("rate_hz") ? "rate_hz" : "update_rate", warnings, &left_out);
 }
 
 Calibration parseKalibrCalibration(const NamedText& camchain, const NamedText& imu,

@@ -326,21 +326,26 @@ double readReadout(const YamlField& camera) {
   return readout_s;
 }
 
-ImuNoise readNoise(const YamlField& imu, const std::string& rate_key, Warnings& warnings) {
+ImuNoise readNoise(const YamlField& imu, const std::string& rate_key, Warnings& warnings,
+                   std::vector<std::string>* left_out) {
   ImuNoise noise;
   noise.gyro_density = readPositive(imu, "gyroscope_noise_density");
-  noise.gyro_walk = readPositive(imu, "gyroscope_random_walk");
   noise.accel_density = readPositive(imu, "accelerometer_noise_density");
-  noise.accel_walk = readPositive(imu, "accelerometer_random_walk");
   noise.rate_hz = readPositive(imu, rate_key);
   warnOutside(imu.at("gyroscope_noise_density"), noise.gyro_density, kGyroDensityLow, kGyroDensityHigh,
               "rad/s/sqrt(Hz)", warnings);
   warnOutside(imu.at("accelerometer_noise_density"), noise.accel_density, kAccelDensityLow, kAccelDensityHigh,
               "m/s^2/sqrt(Hz)", warnings);
-  warnOutside(imu.at("gyroscope_random_walk"), noise.gyro_walk, 0, kGyroWalkHigh, "rad/s^2/sqrt(Hz)",
-              warnings);
-  warnOutside(imu.at("accelerometer_random_walk"), noise.accel_walk, 0, kAccelWalkHigh, "m/s^3/sqrt(Hz)",
-              warnings);
+  const auto walk = [&](const char* key, double high, const char* unit, double& value) {
+    if (left_out != nullptr && !imu.has(key)) {
+      left_out->emplace_back(key);
+      return;
+    }
+    value = readPositive(imu, key);
+    warnOutside(imu.at(key), value, 0, high, unit, warnings);
+  };
+  walk("gyroscope_random_walk", kGyroWalkHigh, "rad/s^2/sqrt(Hz)", noise.gyro_walk);
+  walk("accelerometer_random_walk", kAccelWalkHigh, "m/s^3/sqrt(Hz)", noise.accel_walk);
   return noise;
 }
 

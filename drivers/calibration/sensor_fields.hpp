@@ -75,8 +75,10 @@ void readImuModel(const YamlField& imu, Calibration& calibration);
 /// `readout_ms` of a camera whose `shutter` is `rolling` [s]; 0 for a global one, which it is unless said.
 double readReadout(const YamlField& camera);
 
-/// The four densities and the rate under EuRoC's and Kalibr's common names.
-ImuNoise readNoise(const YamlField& imu, const std::string& rate_key, Warnings& warnings);
+/// The four densities and the rate under EuRoC's and Kalibr's common names. With `left_out` a random walk may
+/// be missing: its key is added there, and it keeps ImuNoise's value.
+ImuNoise readNoise(const YamlField& imu, const std::string& rate_key, Warnings& warnings,
+                   std::vector<std::string>* left_out = nullptr);
 
 /// Joins the cameras to a rig, after the checks that need all of them.
 void assembleRig(const std::vector<CameraEntry>& cameras, const CalibrationOptions& options,

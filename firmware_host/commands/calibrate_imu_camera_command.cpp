@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "drivers/calibration/calibration.hpp"
 #include "drivers/input/input_error.hpp"
@@ -83,7 +84,8 @@ int calibrateLogImuCamera(ImuCameraOptions options) {
   // What is wrong with the files is said before the images are searched.
   std::optional<CameraChain> chain;
   if (!options.cameras.empty()) chain = readCameraChain(options.cameras);
-  if (!options.imu.empty()) input.noise = readImuNoise(options.imu);
+  std::vector<std::string> left_out;
+  if (!options.imu.empty()) input.noise = readImuNoise(options.imu, left_out);
   input.noise_told = !options.imu.empty();
 
   LogViews log = readLogViews(options.log);
@@ -122,6 +124,9 @@ int calibrateLogImuCamera(ImuCameraOptions options) {
         "noise: a typical MEMS IMU's random walks, densities from the residuals (none given by --imu)\n");
     input.noise.gyro_density *= solution.gyro_sigma;
     input.noise.accel_density *= solution.accel_sigma;
+  }
+  for (const std::string& key : left_out) {
+    fmt::print("{} is not in {}: a typical MEMS IMU's is assumed\n", key, options.imu);
   }
   std::filesystem::create_directories(options.out);
   writeCalibrationPage((std::filesystem::path(options.out) / "report.html").string(),

@@ -5,8 +5,9 @@ usage: follow_guide.py PAGE ROOT PROGRAM [--before COMMAND] [--short OLD NEW]...
   PAGE     the guide (Markdown)
   ROOT     the project's folder: its `build`, `tests` and `toolchain` are those of the guide's commands
   PROGRAM  what `swiftlet` is
-  --before COMMAND   run before each block of commands (it connects the devices of a test)
+  --before COMMAND   run before each block of commands (it connects the devices of a test), which GUIDE_COMMANDS holds
   --short OLD NEW    in commands: a time that a test does not have
+  --interrupt-after SECONDS   when commands that run until Ctrl-C get it (5)
 
 Fenced blocks, from the top of the page:
   sh    commands; all must end with 0, but for a line that ends with `# exit code N`, or
@@ -26,7 +27,6 @@ import subprocess
 import sys
 import tempfile
 
-INTERRUPT_AFTER = 5  # s: the log that is played lasts four
 FILES = ("yaml", "cpp", "cmake", "csv")
 
 
@@ -36,7 +36,7 @@ def blocks(text):
         yield line, match.group(1), match.group(2)
 
 
-def as_script(commands, short):
+def as_script(commands, short, interrupt_after):
     for old, new in short:
         commands = commands.replace(old, new)
     lines = []
@@ -46,7 +46,7 @@ def as_script(commands, short):
             code, other = expected.group(1), expected.group(2) or expected.group(1)
             line = f"code=0; {line[: expected.start()]} || code=$?; [ $code -eq {code} ] || [ $code -eq {other} ]"
         elif line.endswith("# until Ctrl-C"):
-            line = f"timeout --preserve-status --signal=INT {INTERRUPT_AFTER} {line}"
+            line = f"timeout --preserve-status --signal=INT {interrupt_after} {line}"
         lines.append(line)
     return "\n".join(lines)
 
@@ -65,14 +65,17 @@ def first_missing(expected, printed):
     return None
 
 
-def follow(page, root, folder, environment, before, short):
+def follow(given, folder, environment):
     printed = None
+    page = given.page
     for line, kind, body in blocks(page.read_text()):
         where = f"{page.name}:{line}"
         if kind == "sh":
-            if before:
-                subprocess.run(["sh", "-c", before], cwd=folder, env=environment, check=True)
-            done = subprocess.run(["sh", "-eu", "-c", as_script(body, short)], cwd=folder, env=environment,
+            if given.before:
+                subprocess.run(["sh", "-c", given.before], cwd=folder, env=dict(environment, GUIDE_COMMANDS=body),
+                               check=True)
+            script = as_script(body, given.short, given.interrupt_after)
+            done = subprocess.run(["sh", "-eu", "-c", script], cwd=folder, env=environment,
                                   stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
             printed = done.stdout
             print(f"---- {where}\n{body}{printed}", flush=True)
@@ -99,13 +102,14 @@ def main():
     parser.add_argument("program", type=pathlib.Path)
     parser.add_argument("--before")
     parser.add_argument("--short", nargs=2, action="append", default=[])
+    parser.add_argument("--interrupt-after", type=float, default=5)
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         for shown in ("build", "tests", "toolchain"):
             (folder / shown).symlink_to(given.root.resolve() / shown)
         environment = dict(os.environ, PATH=f"{given.program.resolve().parent}:{os.environ['PATH']}")
-        fault = follow(given.page, given.root, folder, environment, given.before, given.short)
+        fault = follow(given, folder, environment)
     if fault:
         sys.exit(f"follow_guide: {fault}")
 
