@@ -2,7 +2,8 @@
 // Fill-reducing orderings of a symmetric pattern of blocks.
 //
 // With CHOLMOD: approximate minimum degree (Amestoy, Davis, Duff, SIAM J. Matrix Anal. 1996) and METIS'
-// nested dissection (Karypis and Kumar, SIAM J. Sci. Comput. 1998). Without it: Eigen's minimum degree alone.
+// nested dissection (Karypis and Kumar, SIAM J. Sci. Comput. 1998). Without CHOLMOD: only Eigen's minimum
+// degree.
 
 #include <cstdint>
 #include <span>
@@ -14,7 +15,7 @@ namespace swiftlet {
 
 enum class BlockOrdering : std::uint8_t { kMinimumDegree, kNestedDissection };
 
-/// order[k]: the block eliminated as number k. False when the ordering is not available or failed.
+/// order[k] is the k-th block to eliminate. False if the ordering is not available or failed.
 bool orderBlocks(BlockOrdering ordering, std::uint32_t blocks, std::span<const BlockPair> pairs,
                  std::vector<std::uint32_t>& order);
 

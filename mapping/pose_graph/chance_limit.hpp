@@ -1,34 +1,35 @@
 #pragma once
-// How small a chance must be to believe a loop that nothing else vouches for, when many are tested.
+// Significance limits for accepting loops by the chance that a random loop would agree as well, when many
+// loops are tested.
 //
-// Of n random loops, each tested for agreeing as well as chance would with probability q, n q agree: the
-// limit for one is what may agree in all over the number tested (Bonferroni). Loops that could not reach the
-// limit if they agreed perfectly (the test is too vague there) do not count: no random one among them is
-// believed either. With p_k the least chance that loop k can reach, the limit is max_false / K with the
-// smallest K that is at least the number of p_k <= max_false / K (Tarone). Loops already believed need not be
-// given (Holm: the limit rises as loops are taken).
+// Of n random loops n q agree at a chance of q or less. Bonferroni's limit for one loop is therefore the
+// number of random loops that may be accepted in total, over the number tested. Loops whose test is too vague
+// to reach the limit even with perfect agreement do not count, because none of them can be accepted by
+// chance. With p_k the least chance that loop k can reach, the limit is max_false / K with the smallest K
+// that is at least the number of p_k <= max_false / K (Tarone). Loops accepted before need not be given
+// (Holm: the limit rises as loops are accepted).
 //
-// Holds whatever joins the tests. Sources: Tarone, "A modified Bonferroni method for discrete data",
-// Biometrics 1990; Holm, "A simple sequentially rejective multiple test procedure", Scand. J. Stat. 1979.
+// Dependent tests are allowed. Sources: Tarone, "A modified Bonferroni method for discrete data", Biometrics
+// 1990; Holm, "A simple sequentially rejective multiple test procedure", Scand. J. Stat. 1979.
 
 #include <cstddef>
 #include <span>
 
 namespace swiftlet {
 
-/// Logarithm of the limit. `least_log_chances`: logarithm of p_k for each loop tested, sorted here.
-/// `max_false`, above 0: random loops believed, as a mean. Without loops that of `max_false`. n log n; no
-/// allocation.
+/// Logarithm of the limit. `least_log_chances`: logarithm of p_k for each loop tested; this function sorts
+/// them. `max_false`, above 0: mean number of random loops accepted. Without loops the limit is `max_false`.
+/// Cost n log n; no allocation.
 double logChanceLimit(double max_false, std::span<double> least_log_chances);
 
-/// Logarithm of the chance at which loops are believed that agree with a solution, or that of 0 when none is.
-/// Where hundreds agree at some chance that random ones would seldom reach, nearly all of them are true; the
-/// same chance says little of one that stands alone. A loop of chance p is believed, and all of less, when of
-/// random loops at most `max_false` times as many would reach p as there are loops between p / 10 and p. So a
-/// random one is believed in `max_false` of all graphs that have no true ones left, and is that share of
-/// those believed elsewhere (Benjamini and Hochberg, who count all below p; here what is proven beyond doubt
-/// does not make up for what is not). `tested`: all loops tested, `log_chances`: those that agree, sorted
-/// here.
+/// Logarithm of the largest chance at which loops that agree with a solution are accepted; minus infinity if
+/// none is. A loop of chance p, and all of smaller chance, are accepted if at most `max_false` times as many
+/// random loops would reach p as there are loops between p / 10 and p. If hundreds agree at a chance that
+/// random loops would seldom reach, nearly all of them are true; a lone loop of the same chance may well be
+/// false. A random loop is thus accepted in a share `max_false` of the graphs without true loops, and makes
+/// up that share of the accepted loops elsewhere. Benjamini and Hochberg count all loops below p; here only
+/// those of similar chance count, so that loops beyond doubt do not admit doubtful ones. `tested`: number of
+/// loops tested. `log_chances`: those that agree; this function sorts them.
 double logDiscoveryLimit(double max_false, std::size_t tested, std::span<double> log_chances);
 
 }  // namespace swiftlet

@@ -1,7 +1,7 @@
 #pragma once
-// Which loops agree with which: a symmetric matrix of bits, one row of 64-bit words a loop.
-// A new loop adds a row and a column, in time linear in the loops. Memory: capacity^2 / 8 bytes, reserved by
-// the constructor (0.5 MiB for 2048 loops); no allocation after it.
+// Which loops agree with each other: a symmetric matrix of bits, one row of 64-bit words per loop.
+// A new loop adds a row and a column in time linear in the loops. Memory: capacity^2 / 8 bytes, reserved by
+// the constructor (0.5 MiB for 2048 loops); no allocation afterwards.
 
 #include <bit>
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace swiftlet {
 
-/// A set of small numbers as bits; all sets of one graph have as many words.
+/// A set of small numbers as bits; all sets of one graph have the same number of words.
 using BitSet = std::span<std::uint64_t>;
 using ConstBitSet = std::span<const std::uint64_t>;
 
@@ -65,7 +65,7 @@ class ConsistencyGraph {
     setBit(mutableRow(a), b);
     setBit(mutableRow(b), a);
   }
-  /// Takes the loop's row and column away.
+  /// Clears the loop's row and column.
   void disconnect(std::uint32_t k) {
     forEachBit(row(k), [&](std::uint32_t other) { clearBit(mutableRow(other), k); });
     for (std::uint64_t& word : mutableRow(k)) {

@@ -1,5 +1,5 @@
 #pragma once
-// The words of one line of g2o text, taken one by one with their names, so that a fault can say which.
+// Reads the words of one line of g2o text one by one, with field names for error messages.
 
 #include <cstdint>
 #include <span>
@@ -10,18 +10,18 @@
 
 namespace swiftlet {
 
-/// A word of a file as it is shown in messages: printable and short.
+/// A word of a file for messages: printable and short.
 std::string shown(std::string_view word);
 
 class G2oFields {
  public:
   void start(std::string_view line, std::size_t number);
 
-  /// The next word; false at the line's end.
+  /// The next word; false at the end of the line.
   bool word(std::string_view& out);
   [[nodiscard]] bool atEnd() const { return rest_.empty(); }
 
-  /// Each false with `fault` when the word is missing or is not what is asked for.
+  /// Each returns false and sets `fault` if the word is missing or of another kind.
   bool id(const char* name, std::int64_t& out, G2oMessage& fault);
   bool number(const char* name, double& out, G2oMessage& fault);
   bool numbers(std::span<const char* const> names, std::span<double> out, G2oMessage& fault);

@@ -1,9 +1,9 @@
 #pragma once
-// Which poses of a graph are unknowns, and which block of the normal equations each edge adds to.
+// Which poses of a graph are unknowns, and to which block of the normal equations each edge contributes.
 //
-// Poses that are held are no unknowns. A piece of the graph (poses joined by edges) in which no pose is held
-// is held by its first pose: its place among the other pieces is not determined. Where a pose of the piece
-// knows the vertical, the first is an unknown as the others, but an anchor: heading and position are held.
+// Held poses are constants. A piece of the graph (poses joined by edges) without a held pose is held by its
+// first pose, because its position relative to other pieces is not determined. If a pose of such a piece
+// knows the vertical, its first pose is an unknown with heading and position anchored.
 
 #include <cstdint>
 #include <span>
@@ -18,17 +18,17 @@ struct GraphLayout {
   static constexpr std::uint32_t kNoPair = 0xffffffffU;
 
   std::vector<std::uint32_t> unknown;    ///< of each pose: number of its block, or kHeld
-  std::vector<std::uint32_t> edge_pair;  ///< of each edge: its pair, kNoPair where an end is held
+  std::vector<std::uint32_t> edge_pair;  ///< of each edge: its pair, kNoPair if an end is held
   std::vector<bool> edge_reversed;       ///< the pair is (to, from)
-  std::vector<BlockPair> pairs;          ///< of unknowns, first < second, rising
+  std::vector<BlockPair> pairs;          ///< of unknowns, first < second, ascending
   std::uint32_t unknowns = 0;
   std::uint32_t pieces = 0;
-  std::vector<std::uint32_t> held;     ///< all held poses, given or chosen, rising
-  std::vector<std::uint32_t> anchors;  ///< first poses of pieces that know the vertical, rising
+  std::vector<std::uint32_t> held;     ///< all held poses, given or chosen, ascending
+  std::vector<std::uint32_t> anchors;  ///< first poses of pieces that know the vertical, ascending
   BlockStructure structure;
 
-  /// Takes one more edge without arranging anew: true where both ends are unknowns that an edge joins
-  /// already.
+  /// Adds an edge without a new arrangement. True if this is possible: both ends are unknowns that another
+  /// edge joins already.
   bool append(const BlockPair& ends);
 
   /// `ends`: (from, to) of each edge. One flag per pose: `given_held`, and whether it knows the vertical.

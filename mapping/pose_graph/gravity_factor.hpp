@@ -1,15 +1,16 @@
 #pragma once
-// What a pose knows of the vertical, as a factor of the pose graph.
+// The tilt of the odometry as a factor of the pose graph.
 //
-// The odometry's tilt does not drift: the accelerometer sees gravity. Its errors last, so poses are no
-// independent witnesses: with P the covariance of the tilt as the odometry has it, and Q that of the relative
-// rotation from the pose before, the relative pose has already said all but
-//   Lambda = P_k^-1 - (P_k-1 + Q_k)^-1      (in the axes of pose k, across the vertical),
-// what the accelerometer added between the two. A filter along the chain then has the covariance P_k at each
-// pose; a pose that learned nothing gets nothing. The first of a component gets P^-1.
+// The odometry's tilt does not drift, because the accelerometer measures gravity. Its errors last for
+// seconds, so poses are not independent measurements. With P the covariance of the odometry's tilt and Q that
+// of the relative rotation from the pose before, which the odometry edge already counts, the factor holds
+// what the accelerometer added between the two:
+//   Lambda = P_k^-1 - (P_k-1 + Q_k)^-1      (in the axes of pose k, across the vertical).
+// A filter along the chain then has the covariance P_k at each pose. A pose without new information gets no
+// factor, the first of a component gets P^-1.
 //
-// Error: e = (R^T z) x up, with R of T_map_body and z = (0, 0, 1): to first order the tilt [rad], whatever
-// the heading. Cost 1/2 e^T Lambda e. de/dphi = -[up]x [R^T z]x for R <- R Exp(phi).
+// Error: e = (R^T z) x up, with R of T_map_body and z = (0, 0, 1); to first order the tilt [rad], independent
+// of the heading. Cost 1/2 e^T Lambda e. de/dphi = -[up]x [R^T z]x for R <- R Exp(phi).
 
 #include <Eigen/Core>
 
@@ -26,12 +27,12 @@ struct Tilt {
   }
 };
 
-/// Of a pose with `tilt`; `previous`, the pose before, is R_previous_this away with covariance Q (rad^2, in
-/// the axes of this pose). Without information where the tilt is not known, not better than from there, or
-/// its covariance is no covariance.
+/// Factor of a pose with `tilt`. The pose before has the tilt `previous` and is R_previous_this away with
+/// covariance Q (rad^2, in the axes of this pose). Zero information if the tilt is unknown, adds nothing to
+/// that of the pose before, or its covariance is invalid.
 GravityFactor gravityFactor(const Tilt& tilt, const Tilt& previous, const Eigen::Matrix3d& R_previous_this,
                             const Eigen::Matrix3d& Q);
-/// Of the first pose of a component.
+/// Factor of the first pose of a component.
 GravityFactor gravityFactor(const Tilt& tilt);
 
 }  // namespace swiftlet

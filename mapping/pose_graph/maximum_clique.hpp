@@ -1,26 +1,26 @@
 #pragma once
 // The largest set of loops that all agree with each other, among given candidates: exact by branch and bound
-// within a number of visited nodes, else the best found, and which of the two is said.
+// within a number of visited nodes, otherwise the best found. The result tells which.
 //
-// 1. Core: a candidate that agrees with too few others to be in a set larger than `at_least` goes, until none
-//    does. Random false loops mostly go here.
-// 2. Candidates that conflict with no other are in the set. The others are numbered anew (ascending) with
-//    their conflicts as rows of bits: a set that agrees is one without a conflict inside.
-// 3. Peeling: the candidate with most conflicts goes (of equals the latest) until no conflict is left; then
-//    every one that fits again comes back, earliest first. This is the heuristic's answer.
-// 4. Branch and bound. A node first takes candidates with no conflict or one (always safe) and drops those
-//    with too many, then bounds what is left by a colouring: groups of which all members conflict can give
-//    one each. Then the candidate with most conflicts (of equals the latest) is dropped, or taken.
+// 1. Core. Repeatedly removes candidates that agree with too few others to be in a set larger than
+//    `at_least`. This removes most random false loops.
+// 2. Candidates without conflicts are in the set. The others are renumbered (ascending), with their conflicts
+//    as rows of bits: a consistent set is one without a conflict inside.
+// 3. Peeling. Removes the candidate with most conflicts (the latest of equals) until no conflict is left,
+//    then adds those that fit again, earliest first. This is the heuristic result.
+// 4. Branch and bound. A node takes candidates with at most one conflict (always safe), drops those with too
+//    many, and bounds the rest by a colouring: a group whose members all conflict contributes at most one.
+//    Then the candidate with most conflicts (the latest of equals) is dropped, or taken.
 //
-// Deterministic: a function of graph, candidates, `at_least` and nodes only. Of sets of equal size the first
-// in the order of this search is the answer.
+// Deterministic: depends only on graph, candidates, `at_least` and `max_nodes`. Among sets of equal size the
+// first found wins.
 // Memory: capacity^2 / 8 bytes for the conflicts, 2 max_depth x capacity / 8 for the nodes, reserved by the
-// constructor; no allocation after it. Cost of the core: some passes of m^2 / 64 words with m candidates; of
-// a node: m'^2 / 64 words with m' candidates that have conflicts; peeling m'^2. Sources: Tomita and Kameda,
-// "An efficient branch-and-bound algorithm for finding a maximum clique with computational experiments", J.
-// Global Optimization 2007 (the colouring bound); San Segundo, Rodriguez-Losada, Jimenez, "An exact
-// bit-parallel algorithm for the maximum clique problem", 2011 (on bits); the search on conflicts with its
-// reductions is that of maximum independent sets (Akiba and Iwata, 2016).
+// constructor; no allocation afterwards. Cost of the core: some passes of m^2 / 64 words with m candidates;
+// of a node: m'^2 / 64 words with m' candidates that have conflicts; peeling m'^2. Sources: Tomita and
+// Kameda, "An efficient branch-and-bound algorithm for finding a maximum clique with computational
+// experiments", J. Global Optimization 2007 (the colouring bound); San Segundo, Rodriguez-Losada, Jimenez,
+// "An exact bit-parallel algorithm for the maximum clique problem", 2011 (on bits); the search on conflicts
+// with its reductions is that of maximum independent sets (Akiba and Iwata, 2016).
 
 #include <cstdint>
 #include <vector>
@@ -31,27 +31,27 @@ namespace swiftlet {
 
 struct CliqueResult {
   std::uint32_t size = 0;   ///< 0: nothing larger than `at_least`
-  bool exact = true;        ///< proven: there is no larger one
+  bool exact = true;        ///< proven to be the largest
   std::uint32_t nodes = 0;  ///< visited
 };
 
 class MaximumClique {
  public:
-  /// `max_depth` bounds the nodes open at once; deeper ones are left out, and the answer is then not exact.
+  /// `max_depth` bounds the open nodes; deeper ones are skipped, and the result is then not exact.
   explicit MaximumClique(std::uint32_t capacity, std::uint32_t max_depth = kDefaultDepth);
 
-  /// Looks for a set larger than `at_least` among `candidates` (words of the graph's rows); `best` is
-  /// overwritten when one is found.
+  /// Searches a set larger than `at_least` among `candidates` (bits as in the graph's rows). `best` is
+  /// overwritten if one is found.
   CliqueResult search(const ConsistencyGraph& graph, ConstBitSet candidates, std::uint32_t at_least,
                       std::uint32_t max_nodes, BitSet best);
 
-  /// More nodes in a row than budgets of a step have.
+  /// Above the number of nodes that a step may visit.
   static constexpr std::uint32_t kDefaultDepth = 512;
 
  private:
   struct Level {
     std::uint32_t size = 0;  ///< taken so far
-    bool take_next = false;  ///< the branch that takes the vertex is still to be done
+    bool take_next = false;  ///< the branch that takes the vertex has not been visited
     std::uint32_t vertex = 0;
   };
 
@@ -78,7 +78,7 @@ class MaximumClique {
   std::uint32_t max_depth_;
   std::uint32_t words_ = 0;                 ///< of the sets of numbered candidates
   std::vector<std::uint64_t> core_;         ///< in the graph's numbers
-  std::vector<std::uint64_t> free_;         ///< of the core those without a conflict
+  std::vector<std::uint64_t> free_;         ///< members of the core without a conflict
   std::vector<std::uint32_t> numbers_;      ///< of the numbered candidates in the graph
   std::vector<std::uint64_t> conflicts_;    ///< rows
   std::vector<std::uint32_t> counts_;       ///< conflicts of each numbered candidate (scratch)

@@ -1,16 +1,16 @@
 #pragma once
-// The odometry as a chain of relative poses with covariances, for the covariance of any relative pose along
-// it in constant time.
+// The odometry as a chain of relative poses, which gives the covariance of any relative pose along it in
+// constant time.
 //
-// Pose k in the frame of the first pose of its component is P_k = T_0_1 T_1_2 ... T_k-1_k, each step
-// T <- T Exp(xi) with covariance Q of xi (rotation, translation; rad, m). Carried to the component's frame a
-// step's error is m_k = Ad(P_k) xi_k, and that of the chain from i to j there is the sum of m_k, i < k <= j:
+// Pose k in the frame of the first pose of its component is P_k = T_0_1 T_1_2 ... T_k-1_k. Each step has an
+// error xi, T <- T Exp(xi), with covariance Q (rotation, translation; rad, m). In the component's frame it is
+// m_k = Ad(P_k) xi_k, and the error of the chain from i to j is the sum of m_k, i < k <= j, with covariance
 //   S_j - S_i,   S_k = sum of Ad(P_l) Q_l Ad(P_l)^T, l <= k;
-// in pose j's own frame Ad(P_j^-1) (S_j - S_i) Ad(P_j^-1)^T. The first order in the errors of each step; the
-// steps' errors are taken as independent. The difference of two sums loses digits as the sum grows: tests
-// show below 1e-6 of the covariance after 20 000 steps and 1 km.
+// in pose j's own frame Ad(P_j^-1) (S_j - S_i) Ad(P_j^-1)^T. First order in the errors of the steps, which
+// are taken as independent. Cancellation costs less than 1e-6 of the covariance after 20 000 steps and 1 km
+// (tested).
 //
-// An epoch of the odometry is a component: between two of them there is no chain.
+// An epoch of the odometry is a component; there is no chain between components.
 // Memory: pose, sum, box and component, 408 (space) or 136 (plane) bytes a pose, reserved by the constructor.
 
 #include <Eigen/StdVector>
@@ -30,10 +30,10 @@ class OdometryChain {
 
   explicit OdometryChain(std::uint32_t max_poses);
 
-  /// A pose that nothing joins to those before: the first of a component.
+  /// The first pose of a new component.
   Status beginComponent();
-  /// The next pose. kInvalidInput when the step is not finite or there is no pose before;
-  /// kCapacityReached when `max_poses` are held. Nothing changes then.
+  /// The next pose. kInvalidInput if the step is not finite or there is no pose before; kCapacityReached if
+  /// `max_poses` are held. Nothing changes then.
   Status append(const Pose& T_previous_this, const Matrix& covariance);
 
   [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(nodes_.size()); }
@@ -52,18 +52,18 @@ class OdometryChain {
   /// Covariance of xi in T_i_j <- T_i_j Exp(xi), i <= j of one component.
   [[nodiscard]] Matrix covariance(std::uint32_t i, std::uint32_t j) const;
 
-  /// Logarithm of the volume [m^3, in the plane m^2] of the box around the component's poses up to k; sides
-  /// are at least kThinnest of the longest.
+  /// Logarithm of the volume [m^3, in the plane m^2] of the box around the component's poses up to k. Sides
+  /// are at least kThinnest times the longest.
   [[nodiscard]] double logBox(std::uint32_t k) const;
-  /// That around all poses of k's component.
+  /// The same around all poses of k's component.
   [[nodiscard]] double logWholeBox(std::uint32_t k) const;
 
-  /// Takes pose k away; those after it move down by one. What lies between the others, and how well it is
-  /// known, stays exactly as it was. Not the last pose. Linear in the poses after k.
+  /// Removes pose k; those after it move down by one. Relative poses and covariances of the others do not
+  /// change. Not for the last pose. Linear in the poses after k.
   void erase(std::uint32_t k) { nodes_.erase(nodes_.begin() + k); }
   void clear() { nodes_.clear(); }
 
-  /// A flight at one height, a way along a line: a false loop may still lie beside it.
+  /// For flights at one height or along a line: false loops may lie beside them.
   static constexpr double kThinnest = 0.1;
 
  private:

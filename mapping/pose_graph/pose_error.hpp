@@ -1,5 +1,5 @@
 #pragma once
-// The error of a relative pose, its exact Jacobians, and the step of a pose.
+// The error of a relative pose, its exact Jacobians, and the perturbation of a pose.
 //
 // Perturbation of a pose: T <- T (Exp(phi), rho), both in the body's frame, rotation first. With X =
 // T_from^-1 T_to and T = T_from_to^-1 X the error is e = (2 vec(q(T)), p(T)) with q.w >= 0; in the plane

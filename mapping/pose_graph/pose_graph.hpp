@@ -3,8 +3,8 @@
 //
 // Cost of a graph, g2o's (chi2 = 2 x cost): 1/2 sum e^T Omega e, with T = T_from_to^-1 (T_from^-1 T_to) and
 //   space:  e = (2 vec(q(T)) with q.w >= 0, p(T)),   plane:  e = (angle(T), p(T)),
-// rotation first as in smoother/state.hpp. The information is in radians and metres; a g2o file holds that of
-// vec(q), translation first (g2o_file.hpp converts, so that costs are equal). docs/pose_graph.md.
+// rotation first as in smoother/state.hpp. The information is in radians and metres. A g2o file holds that of
+// vec(q), translation first; g2o_text.hpp converts it. docs/pose_graph.md.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -41,7 +41,7 @@ struct RelativePose {
   Information information = Information::Identity();  ///< (rotation, translation), 1/rad^2, 1/m^2
 };
 
-/// The vertical as a pose of space knows it (gravity_factor.hpp).
+/// The measured vertical of a pose in space (gravity_factor.hpp).
 struct GravityFactor {
   Eigen::Vector3d up_body = Eigen::Vector3d::UnitZ();     ///< unit
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< 1/rad^2, in the body's axes; 0: no factor

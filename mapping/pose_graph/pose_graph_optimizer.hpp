@@ -1,20 +1,19 @@
 #pragma once
-// Poses that agree best with relative poses: g2o's cost (pose_graph.hpp) minimized over SE(2) or SE(3).
+// Minimizes g2o's cost (pose_graph.hpp) over poses in SE(2) or SE(3).
 //
-// Gauss-Newton inside a trust region (Powell's dogleg in the norm of the normal equations' diagonal) with
-// exact Jacobians; the normal equations are blocks of poses, factored by BlockCholesky. A rejected step costs
-// an evaluation of the cost, not a factorization. start() gives first poses where the present ones are poor.
-// For use along a flight: keep one optimizer, add poses and edges, and call optimize() with what the time
-// allows; it goes on from the present poses, with the ordering and the memory of the last call while no new
-// pair of poses was joined. Frames: T_map_body. Held poses do not move: those given to hold(), and the first
-// pose of every piece of the graph without one (of which only heading and position are held where a pose of
-// the piece knows the vertical). Weights multiply an edge's information: 0 leaves an edge out,
-// between 0 and 1 discounts it (graduated non-convexity). Errors: Status. Memory: poses and edges are
-// reserved at construction; the factor's numbers are reserved too where max_factor_values says how many, and
-// a graph whose factor needs more is refused. Ordering and analysis of a changed graph take scratch memory.
-// Deterministic; no clock. Off the flight path. Sources: Rosen, Kaess, Leonard, "RISE: an incremental
-// trust-region method", T-RO 2014 (dogleg on pose graphs); Nocedal and Wright, "Numerical Optimization",
-// 2006, chapter 4; docs/pose_graph.md.
+// Gauss-Newton in a trust region (Powell's dogleg in the norm of the normal equations' diagonal) with exact
+// Jacobians. The normal equations are blocks of poses, factored by BlockCholesky. A rejected step costs an
+// evaluation of the cost, not a factorization. start() computes initial poses if the present ones are poor.
+// In a flight one optimizer is kept: add poses and edges and call optimize() with the effort that time
+// allows. It continues from the present poses and keeps ordering and memory until a new pair of poses is
+// joined. Frames: T_map_body. Held poses do not move: those given to hold(), and the first pose of every
+// piece of the graph without one (only in heading and position if a pose of the piece knows the vertical).
+// Weights multiply an edge's information: 0 leaves an edge out, between 0 and 1 discounts it (graduated
+// non-convexity). Errors: Status. Memory: poses and edges are reserved at construction, and the factor if
+// max_factor_values is set; a graph whose factor needs more is then refused. Ordering and analysis of a
+// changed graph take scratch memory. Deterministic; no clock. Off the flight path. Sources: Rosen, Kaess,
+// Leonard, "RISE: an incremental trust-region method", T-RO 2014 (dogleg on pose graphs); Nocedal and Wright,
+// "Numerical Optimization", 2006, chapter 4; docs/pose_graph.md.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -33,12 +32,12 @@ namespace swiftlet {
 struct PoseGraphLimits {
   std::size_t max_poses = 0;
   std::size_t max_edges = 0;
-  std::size_t max_factor_values = 0;  ///< doubles, reserved; 0: as many as a graph needs, taken when it does
+  std::size_t max_factor_values = 0;  ///< doubles reserved for the factor; 0: allocated as a graph needs them
 };
 
 struct OptimizeEffort {
   int iterations = 50;       ///< linearizations and factorizations
-  int trials = 10;           ///< steps tried in an iteration
+  int trials = 10;           ///< steps tried per iteration
   double tolerance = 1e-7;   ///< stops when an iteration lowers the cost by a smaller share
   double cost_floor = 1e-9;  ///< stops below this cost
 };
@@ -47,16 +46,16 @@ struct OptimizeReport {
   double initial_cost = 0;  ///< g2o's: 1/2 sum e^T Omega e, with the weights
   double final_cost = 0;
   int iterations = 0;
-  int rejected = 0;        ///< steps tried and not taken
-  bool converged = false;  ///< by the tolerance, the floor, or because no step lowers the cost any more
+  int rejected = 0;        ///< steps tried and rejected
+  bool converged = false;  ///< by the tolerance, the floor, or because no step lowers the cost
 };
 
 enum class StartChoice : std::uint8_t { kGiven, kChordal };
 
 struct StartReport {
   StartChoice choice = StartChoice::kGiven;
-  double given_cost = 0;    ///< at the poses as they were
-  double chordal_cost = 0;  ///< infinite where not needed, or the linear systems have no solution
+  double given_cost = 0;    ///< at the given poses
+  double chordal_cost = 0;  ///< infinite if not computed or the linear systems have no solution
 };
 
 template <typename Pose>
@@ -67,7 +66,7 @@ class PoseGraphOptimizer {
 
   explicit PoseGraphOptimizer(const PoseGraphLimits& limits);
 
-  /// kCapacityReached when the graph is full (nothing is added); kInvalidInput when a number is not finite, a
+  /// kCapacityReached if the graph is full (nothing is added). kInvalidInput if a number is not finite, a
   /// pose does not exist, both ends are one pose, or the information is not symmetric.
   Status addPose(const Pose& T_map_body);
   Status addEdge(const RelativePose<Pose>& edge);
@@ -77,22 +76,22 @@ class PoseGraphOptimizer {
   /// kInvalidInput: no such pose or edge, or a weight below 0 or not finite.
   Status hold(std::size_t pose, bool held);
   Status setWeight(std::size_t edge, double weight);
-  /// What the pose knows of the vertical, in place of what it knew. In space; ignored in the plane.
+  /// Replaces the gravity factor of the pose. Ignored in the plane.
   Status setGravity(std::size_t pose, const GravityFactor& factor);
   Status setPose(std::size_t pose, const Pose& T_map_body);
-  /// Leaves out all edges from number `edges` on, and poses from number `poses` on.
+  /// Removes all edges from index `edges` on, and all poses from index `poses` on.
   Status truncate(std::size_t poses, std::size_t edges);
 
-  /// Compares the present poses with those of ChordalStart and keeps the better (docs/pose_graph.md section
-  /// 3); where `anew`, ChordalStart's whatever they cost. kNumerical when neither can be had.
+  /// Keeps the present poses or those of ChordalStart, whichever cost less (docs/pose_graph.md section 3);
+  /// with `anew` always those of ChordalStart. kNumerical if neither is available.
   Status start(StartReport& report, bool anew = false);
 
-  /// kNotReady without poses; kNumerical when the normal equations cannot be factored even with damping;
-  /// kCapacityReached when the factor needs more than max_factor_values. The poses are then the best so far.
+  /// kNotReady without poses; kNumerical if the normal equations cannot be factored even with damping;
+  /// kCapacityReached if the factor needs more than max_factor_values. The poses are then the best so far.
   Status optimize(const OptimizeEffort& effort, OptimizeReport& report);
 
   /// At the present poses, relative to the held ones, in the pose's own frame (phi, rho): rad, m. Zero for
-  /// held poses. kNumerical where edges do not determine the poses.
+  /// held poses. kNumerical if edges do not determine the poses.
   Status covariance(std::size_t pose, Covariance& out);
   /// Covariance of T_from_to, perturbed on the right: in the frame of `to`.
   Status relativeCovariance(std::size_t from, std::size_t to, Covariance& out);
@@ -122,7 +121,7 @@ class PoseGraphOptimizer {
   std::vector<bool> held_;
   std::vector<GravityFactor> gravity_;  ///< of each pose
   bool arranged_ = false;
-  bool linear_at_poses_ = false;  ///< H and its factor, undamped, belong to the present poses and weights
+  bool linear_at_poses_ = false;  ///< H and its undamped factor belong to the present poses and weights
   double radius_ = 0;             ///< of the trust region, scaled; 0: not known yet
 
   GraphLayout layout_;

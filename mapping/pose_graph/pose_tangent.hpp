@@ -1,6 +1,6 @@
 #pragma once
-// Small motions of poses of the plane and of space, rotation first, then translation (rad, m), on the right:
-// T <- T Exp(xi). What the code of loop selection is templated with.
+// Tangent space of poses in the plane and in space, perturbed on the right: T <- T Exp(xi), rotation first,
+// then translation (rad, m). Loop selection is templated with it.
 //
 // Source: Sola, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics", arXiv 1812.01537,
 // equations 156 (plane) and 175 (space), with rotation and translation exchanged.
@@ -38,13 +38,12 @@ inline PoseMatrix<SE3> poseAdjoint(const SE3& T) {
   return adjoint;
 }
 
-/// xi with T = Exp(xi). On long chains the errors of these coordinates stay close to normal where those of
+/// xi with T = Exp(xi). On long chains errors in these coordinates stay close to normal, while those in
 /// (rotation, translation) bend with the heading (Long, Wolfe, Mashner, Chirikjian, "The banana distribution
-/// is Gaussian", RSS 2012); to first order they are the error that the cost of a graph counts
-/// (pose_graph.hpp).
+/// is Gaussian", RSS 2012). To first order they equal the error of the graph's cost (pose_graph.hpp).
 inline PoseVector<SE2> poseLog(const SE2& T) {
   const double half = 0.5 * T.angle;
-  // Below, the series' next term is under the rounding.
+  // For small angles the next term of the series is below rounding.
   const double along = std::abs(half) < 1e-4 ? 1 - half * half / 3 : half / std::tan(half);
   const Eigen::Vector2d& p = T.translation;
   return {T.angle, along * p.x() + half * p.y(), along * p.y() - half * p.x()};

@@ -1,35 +1,34 @@
 #pragma once
-// A pose graph that grows and some of whose loops are false: which to believe, and the poses that these hold
-// together. In flight (mapping/loop) and for whole files (robust_solution.hpp) it is this class that decides.
+// A growing pose graph with false loops: selects the loops and computes the poses that fit them and the
+// odometry. It serves flights (mapping/loop) and whole files (robust_solution.hpp).
 //
-// 1. Odometry joins each pose to the one before; a pose without begins a component.
-// 2. Selection (loop_selection.hpp): gate, pairs, largest set, support. Anew with every loop.
+// 1. Odometry joins each pose to the one before; a pose without odometry begins a component.
+// 2. Selection (loop_selection.hpp): gate, pairs, largest set, support; updated with every loop.
 // 3. The graph of odometry and selected loops is solved.
-// 4. Graduated non-convexity (graduated_selection.hpp) on these loops, from that solution, where one of them
-//    does not fit it: drops those that agree in pairs but not all together.
-// 5. Loops that were not selected come back when they agree with the solution and chance would not, by one of
-//    two tests: with the loop's own covariance alone; or, for the `max_reconsidered` that contradict fewest
-//    of the others, with that of the relative pose on the solved graph added (a true loop may be far off a
-//    solution without it where that is vague). Then 3 and 4 again, until no loop comes back.
-// 6. Off the flight, settleAnew(): 3 to 5 again from first poses without those that were dropped.
-// How small a chance must be follows from how many loops are tested and how many agree (chance_limit.hpp): in
-// 2 such that `max_false` random loops a graph are believed on the odometry alone, were all random; in 5 such
-// that of those coming back no larger share is random, and a random one comes back to `max_false` of the
-// graphs from which no true loop is missing.
+// 4. If a selected loop does not fit, graduated non-convexity (graduated_selection.hpp) starts from that
+//    solution and drops loops that agree in pairs but not all together.
+// 5. Loops that were not selected are accepted if they agree with the solution and random loops would be
+//    unlikely to. The first test uses the loop's own covariance. The second adds the covariance of the
+//    relative pose on the solved graph, because a true loop may be far off a solution that is vague without
+//    it; it is made for the `max_reconsidered` loops with fewest conflicts. Then 3 and 4 again, until no loop
+//    is accepted.
+// 6. Off the flight, settleAnew(): 3 to 5 again from new initial poses, without the dropped loops.
+// The limit of the chance follows from the number of loops tested (chance_limit.hpp). In 2, `max_false`
+// random loops per graph are accepted on the odometry alone if all loops are random. In 5, at most a share
+// `max_false` of the accepted loops is random.
 //
-// settle() does 3 to 5 in bounded pieces, so that a flight can spread them over its steps; until it is at
-// rest the poses are those of the work in progress. A loop that arrives while 4 is at work waits for its end.
+// settle() does 3 to 5 in bounded pieces, which a flight spreads over its steps. Until it is at rest the
+// poses are intermediate. A loop that arrives during 4 waits for its end.
 //
-// Gravity. A pose may come with the odometry's tilt; what the accelerometer says of it is a factor of the
-// graph (gravity_factor.hpp), so that a loop cannot tilt the map beyond what the odometry knows. Of a piece
-// with such poses the first one is held in heading and position alone. A pose that arrives and leans against
-// its own tilt sets 3 to work also where there is no loop: an odometry that starts in the air finds the
-// vertical some seconds later.
+// Gravity. A pose may have the odometry's tilt, which becomes a factor of the graph (gravity_factor.hpp), so
+// that a loop cannot tilt the map beyond what the odometry knows. The first pose of a piece with such poses
+// is held in heading and position only. A pose that leans against its own tilt starts 3 even without a loop:
+// an odometry that starts in the air finds the vertical some seconds later.
 //
-// Frames: T_map_body; a component's first pose is given, others follow the odometry. Memory: reserved by the
-// constructor but for the optimizer's factor: that of LoopSelection, and 0.9 KiB a loop and pose. Cost:
-// adding a loop, that of the selection; settle(), an iteration of the optimizer or one of its covariances for
-// each of `iterations`. Deterministic; no clock. Errors: Status. Not for several threads. docs/pose_graph.md.
+// Frames: T_map_body; the first pose of a component is given, others follow the odometry. Memory: that of
+// LoopSelection and 0.9 KiB per loop and pose, reserved by the constructor except for the optimizer's factor.
+// Cost: that of the selection to add a loop; an iteration of the optimizer or one of its covariances for each
+// of settle()'s `iterations`. Deterministic; no clock. Errors: Status. Not thread safe. docs/pose_graph.md.
 
 #include <cstdint>
 #include <optional>
@@ -50,24 +49,24 @@ struct RobustGraphLimits {
 };
 
 struct RobustGraphSettings {
-  bool robust = true;  ///< false: every loop is believed, for comparison
+  bool robust = true;  ///< false: every loop is accepted, for comparison only
   LoopSelectionSettings selection;
   GraduatedSettings graduated;
   std::uint32_t max_nodes = 0;         ///< of a search for the largest set
-  std::uint32_t max_reconsidered = 0;  ///< covariances asked for in 5, a round
+  std::uint32_t max_reconsidered = 0;  ///< covariances computed per round of 5
   OptimizeEffort effort;               ///< of a solution
 };
 
-/// The settings used everywhere. A loop stays on the solved graph while its chi-squared is one that a true
-/// loop exceeds with probability 1e-3.
+/// The settings used everywhere. A loop stays accepted on the solved graph while its chi-squared is below the
+/// value that a true loop exceeds with probability 1e-3.
 template <typename Pose>
 RobustGraphSettings robustGraphSettings();
 
 struct RobustGraphCounters {
   std::uint64_t optimizations = 0;        ///< calls of the optimizer
-  std::uint64_t graduated_solutions = 0;  ///< of them, those of 4
-  std::uint64_t reconsidered = 0;         ///< loops compared with a solution, 5
-  std::uint64_t taken_back = 0;           ///< of them, those that came back
+  std::uint64_t graduated_solutions = 0;  ///< of these, in 4
+  std::uint64_t reconsidered = 0;         ///< loops compared with a solution in 5
+  std::uint64_t taken_back = 0;           ///< of these, accepted
 };
 
 template <typename Pose>
@@ -75,9 +74,9 @@ class RobustGraph {
  public:
   RobustGraph(const RobustGraphLimits& limits, const RobustGraphSettings& settings);
 
-  /// A pose that no odometry joins to those before.
+  /// A pose that no odometry joins to those before: the first of a component.
   Status beginComponent(const Pose& T_map_body, const Tilt& tilt = {});
-  /// The next pose: `odometry` joins it, number size(), and the one before, in either direction.
+  /// Adds pose number size(). `odometry` joins it and the one before, in either direction.
   Status addPose(const RelativePose<Pose>& odometry, const Tilt& tilt = {});
   /// The pose does not move.
   Status hold(std::uint32_t pose) {
@@ -85,7 +84,7 @@ class RobustGraph {
     return optimizer_.hold(pose, true);
   }
   [[nodiscard]] bool held(std::uint32_t pose) const { return known_[pose].held; }
-  /// Where the next solution begins.
+  /// Sets the pose from which the next solution starts.
   Status setPose(std::uint32_t pose, const Pose& T_map_body) {
     if (!held(pose)) restart(Phase::kSolve);
     return optimizer_.setPose(pose, T_map_body);
@@ -93,22 +92,22 @@ class RobustGraph {
   /// LoopSelection::removePose(); the odometry's two edges become their product.
   Status removePose(std::uint32_t pose, std::uint32_t onto);
 
-  /// LoopSelection::addLoop(): `id` is the loop's until it is released or gives way to another.
+  /// LoopSelection::addLoop(). `id` identifies the loop until it is released or replaced.
   Status addLoop(const RelativePose<Pose>& loop, std::uint32_t& id);
   /// For many loops at once: LoopSelection::holdLoop() for each, then search() once.
   Status holdLoop(const RelativePose<Pose>& loop, std::uint32_t& id) { return selection_.holdLoop(loop, id); }
   void search();
-  /// Gives the loop up.
+  /// Removes the loop.
   Status release(std::uint32_t id);
 
-  /// First poses from nothing (PoseGraphOptimizer::start), for a graph whose poses mean little yet.
+  /// Initial poses (PoseGraphOptimizer::start), for a graph whose poses are not useful yet.
   Status start(StartReport& report) { return optimizer_.start(report); }
-  /// Works on 3 to 5, at most `iterations` of the optimizer. `moved`: poses may have changed. The
-  /// optimizer's errors; it is then at rest until something changes.
+  /// Works on 3 to 5 for at most `iterations` of the optimizer. `moved`: poses may have changed. Errors are
+  /// the optimizer's; it is then at rest until something changes.
   Status settle(int iterations, bool& moved);
-  /// Off the flight, at rest. Where loops were dropped, false ones may have led the solution into a wrong
-  /// minimum: begins again from first poses out of the believed ones alone, as long as that lowers the cost.
-  /// A loop that is not believed costs as much as one at the limit of 4.
+  /// Off the flight, at rest. If loops were dropped, false ones may have led the solution into a wrong
+  /// minimum. Solves again from initial poses made of the accepted loops only, as long as that lowers the
+  /// cost. A rejected loop costs as much as one at the limit of 4.
   Status settleAnew();
   [[nodiscard]] bool atRest() const { return phase_ == Phase::kRest; }
 
@@ -122,17 +121,17 @@ class RobustGraph {
   /// Whether the odometry joins pose k to the one before.
   [[nodiscard]] bool linked(std::uint32_t k) const { return step_edges_[k] != kNoEdge; }
 
-  /// Loops have the ids 0 to loops() - 1.
+  /// Loop ids are 0 to loops() - 1.
   [[nodiscard]] std::uint32_t loops() const { return selection_.held(); }
   [[nodiscard]] const RelativePose<Pose>& loop(std::uint32_t id) const { return selection_.loop(id); }
   [[nodiscard]] bool believed(std::uint32_t id) const { return members_[id].weight == 1; }
   [[nodiscard]] std::uint32_t believed() const { return believed_; }
   [[nodiscard]] LoopVerdict verdict(std::uint32_t id) const;
-  /// In the optimizer; empty where the loop has no edge there.
+  /// Weight in the optimizer; empty if the loop has no edge there.
   [[nodiscard]] std::optional<double> weight(std::uint32_t id) const;
 
   [[nodiscard]] const LoopSelection<Pose>& selection() const { return selection_; }
-  /// Poses, odometry and the loops that took part in a solution since the graph was last built anew.
+  /// Poses, odometry, and the loops that took part in a solution since the graph was last rebuilt.
   [[nodiscard]] const PoseGraph<Pose>& graph() const { return optimizer_.graph(); }
   [[nodiscard]] const RobustGraphCounters& counters() const { return counters_; }
   /// Of the last solution.
@@ -140,26 +139,26 @@ class RobustGraph {
 
  private:
   static constexpr std::uint32_t kNoEdge = 0xffffffffU;
-  static constexpr std::uint32_t kNoPose = 0xfffffffeU;  ///< and the next number
+  static constexpr std::uint32_t kNoPose = 0xfffffffeU;  ///< kNoPose + 1 is no pose either
   enum class Phase : std::uint8_t { kRest, kSolve, kGraduate, kSolveAgain, kAskOwn, kAskCovariance };
 
-  /// Of a pose, from elsewhere.
+  /// Given with a pose.
   struct Known {
     Tilt tilt;
     bool held = false;
   };
-  /// A loop's part in the solution.
+  /// A loop's role in the solution.
   struct Member {
     std::uint32_t edge = kNoEdge;
-    double weight = 0;   ///< 1: believed; while 4 is at work as before
-    bool taken = false;  ///< selected, or come back; of weight 0 where 4 has dropped it
-    bool back = false;   ///< by 5: stays whatever the selection says
+    double weight = 0;   ///< 1: accepted; unchanged during 4
+    bool taken = false;  ///< selected, or accepted by 5; of weight 0 if 4 dropped it
+    bool back = false;   ///< accepted by 5, independent of the selection
   };
   /// A loop that was not selected.
   struct OpenLoop {
     std::uint32_t id = 0;
     std::uint32_t conflicts = 0;  ///< with the loops of the sets
-    double log_chance = 0;        ///< beside the present solution
+    double log_chance = 0;        ///< of a random loop to agree as well with the present solution
   };
 
   void forget(std::uint32_t id);
@@ -190,22 +189,22 @@ class RobustGraph {
   RobustGraphSettings settings_;
   LoopSelection<Pose> selection_;
   PoseGraphOptimizer<Pose> optimizer_;
-  std::vector<std::uint32_t> step_edges_;  ///< of each pose, to the one before
+  std::vector<std::uint32_t> step_edges_;  ///< edge of each pose to the one before
   std::vector<Known> known_;               ///< of each pose
   std::vector<Member> members_;            ///< by the selection's ids
   std::uint32_t believed_ = 0;
 
   Phase phase_ = Phase::kRest;
-  bool behind_ = false;       ///< the selection has changed while 4 was at work
+  bool behind_ = false;       ///< the selection changed during 4
   int solve_iterations_ = 0;  ///< of the present solution
   OptimizeReport solution_;
   GraduatedSelection graduated_;
   std::vector<std::uint32_t> graduated_ids_;
   std::vector<double> weights_;      ///< of graduated_ids_, in 4
-  std::vector<double> chi_squared_;  ///< likewise
+  std::vector<double> chi_squared_;  ///< of graduated_ids_, in 4
   std::vector<OpenLoop> open_;
   std::size_t next_open_ = 0;
-  std::uint32_t covariances_ = 0;    ///< asked for in this round
+  std::uint32_t covariances_ = 0;    ///< computed in this round
   std::vector<double> log_chances_;  ///< scratch
   std::vector<std::uint64_t> set_;   ///< scratch: bits of the loops in the sets
   PoseGraph<Pose> scratch_;
