@@ -1,10 +1,10 @@
 #pragma once
-// Which pieces of the graph its believed loops join, and where a piece lies that was just joined.
+// Tracks which pieces of the graph the accepted loops join, and aligns a piece that was just joined.
 //
-// A piece is what the odometry alone holds together: a component of the graph. One that begins has a world of
-// its own; the first loops that tie it to others find it anywhere, turned by any angle, from where no
-// optimizer should start. So it is moved as a whole to where the best of these loops puts it, unless one of
-// them fits already. Pieces that are held do not move.
+// A piece is a component of the graph: poses that the odometry alone holds together. A new piece has a world
+// of its own, so the first loops to other pieces may place it anywhere, at any angle, where an optimizer must
+// not start. It is therefore moved as a whole to where the best of these loops puts it, unless one of them
+// fits already. Held pieces do not move.
 // Memory: 9 bytes a component. Cost: loops times pieces. Deterministic; no errors.
 
 #include <cstdint>
@@ -18,10 +18,9 @@ class JoinedPieces {
  public:
   JoinedPieces();
 
-  /// The graph's components and believed loops as they are now. Where that joins other components than before
-  /// they are aligned.
+  /// Updates from the graph's components and accepted loops; aligns components that are newly joined.
   void follow(RobustGraph<SE3>& graph);
-  /// Two components, as follow() found them; a later one is joined to none.
+  /// Whether follow() found the two components joined. A component newer than that is joined to none.
   [[nodiscard]] bool joined(std::uint32_t a, std::uint32_t b) const {
     return a == b || (a < first_.size() && b < first_.size() && first_[a] == first_[b]);
   }
@@ -31,8 +30,8 @@ class JoinedPieces {
   void reach(RobustGraph<SE3>& graph, std::uint32_t from, std::uint32_t to);
 
   double fits_;                        ///< chi-squared up to which a loop fits
-  std::vector<std::uint32_t> first_;   ///< of each component, the first of those that it is joined with
-  std::vector<std::uint32_t> before_;  ///< first_ as it was
+  std::vector<std::uint32_t> first_;   ///< of each component: the first component joined with it
+  std::vector<std::uint32_t> before_;  ///< first_ before the update
   std::vector<bool> placed_;           ///< by align()
   std::vector<std::uint32_t> queue_;
 };

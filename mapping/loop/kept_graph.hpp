@@ -1,10 +1,10 @@
 #pragma once
-// What a later flight needs to know where it is in this one's map: the poses of the graph with what their
-// images showed, the odometry between them and the loops. LoopStage makes it and takes it in; files:
+// The part of a map that a later flight needs to locate itself: poses of the graph with the features of their
+// images, the odometry between them, and the loops. LoopStage writes and reads it; files are in
 // firmware_host/outputs/map_files.
 //
-// Poses are those of the body that flew, in the map's frame (z up). T_body_cam tells where its camera 0 was:
-// a vehicle that carries it elsewhere counts the poses as those of its own body at the same camera.
+// Poses are those of the body that flew, in the map's frame (z up). T_body_cam is the pose of its camera 0. A
+// vehicle with the camera elsewhere converts the poses to those of its own body at the same camera pose.
 // Memory: 100 bytes a feature, some 30 kB a node.
 
 #include <cstdint>
@@ -23,33 +23,33 @@ struct KeptNode {
   Stamp stamp;  ///< of the clock of its own flight
   SE3 T_map_body;
   Tilt tilt;
-  /// By the odometry, to the node before it. Else the first of a piece that loops alone join to the others:
-  /// then of the solved graph. Without meaning for the first node.
+  /// True: the odometry joins the node to the one before. False: the first node of a piece that only loops
+  /// join to the others; T_previous_this is then of the solved graph. Not used for the first node.
   bool linked = false;
   SE3 T_previous_this;
-  PoseMatrix<SE3> covariance = PoseMatrix<SE3>::Zero();  ///< of it, perturbed on the right
-  std::vector<PlaceFeature> features;                    ///< empty: its images were gone
+  PoseMatrix<SE3> covariance = PoseMatrix<SE3>::Zero();  ///< of T_previous_this, perturbed on the right
+  std::vector<PlaceFeature> features;                    ///< empty if its images were not available
 };
 
-/// A loop that was believed.
+/// An accepted loop.
 struct KeptLoop {
-  std::uint32_t from = 0;  ///< nodes, from < to
+  std::uint32_t from = 0;  ///< index of the node; from < to
   std::uint32_t to = 0;
   SE3 T_from_to;
   PoseMatrix<SE3> covariance = PoseMatrix<SE3>::Zero();
 };
 
 struct KeptGraph {
-  CameraModel camera;  ///< camera 0 of the flight, of the first of several
+  CameraModel camera;  ///< camera 0 of the flight, or of the first of several flights
   SE3 T_body_cam;
   std::vector<KeptNode> nodes;
   std::vector<KeptLoop> loops;
 };
 
-/// What a flight does with a kept map.
+/// How a flight uses a kept map.
 enum class KeptUse : std::uint8_t {
-  kLocalize,  ///< its poses stay where they are
-  kExtend,    ///< the flight's nodes and loops become part of it, and move it
+  kLocalize,  ///< the poses of the map are held
+  kExtend,    ///< nodes and loops of the flight become part of the map and move it
 };
 
 }  // namespace swiftlet

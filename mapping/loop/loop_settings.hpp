@@ -1,14 +1,15 @@
 #pragma once
-// What a user may ask of loop closure.
+// User settings of loop closure.
 
 namespace swiftlet {
 
 struct LoopSettings {
-  /// Least similarity of a place looked at for its words, relative to that of the keyframe with the one
-  /// before (DBoW's alpha). Nodes near each other in the map, once a loop is selected, need none.
+  /// Least similarity of a candidate found by words, relative to that of the keyframe with its predecessor
+  /// (DBoW's alpha). Smaller values verify more candidates. Nodes near each other in the map are compared
+  /// without it once a loop is accepted.
   double min_similarity = 0.3;
-  /// Believe loops only where they agree with the odometry and with each other; false: all that geometry
-  /// verifies, for comparison.
+  /// Reject loops that contradict the odometry, other loops or the solved graph. False: every geometrically
+  /// verified loop is used, for comparison only.
   bool consistency = true;
 };
 

@@ -1,31 +1,30 @@
 #pragma once
-// The stage of the thread `loop`: keyframes to a map that places seen again hold together.
+// The stage of the thread `loop`: corrects the drift of the odometry by recognizing places seen before.
 //
-// A keyframe that has moved or turned enough since the last one kept becomes a node: a pose of the graph,
-// tied to the node before by the odometry's relative pose, and, where its images are at hand, a place. Per
-// step: describe the place, ask the database for places alike, verify up to `effort.candidates` of them by
-// geometry, give those that pass to the selection, and optimize the graph (at most `effort.iterations`) while
-// the selected set, or the poses, still change.
+// A keyframe that has moved or turned enough since the last node becomes a node: a pose of the graph, joined
+// to the node before by the odometry and, if its images are available, a place. Per step the stage describes
+// the place, queries the database, verifies up to `effort.candidates` candidates by geometry, gives those
+// that pass to the selection, and optimizes the graph (at most `effort.iterations`) while selection or poses
+// still change.
 //
-// Near nodes. Words find a place that nothing else leads to; once a loop is selected, the map leads too. Each
-// node is then compared, once in its life, with the two nearest of the older nodes of its piece that the map
-// has within 2 m and 45 degrees of it, until one gives a loop. The newest node begins with the nearest and
-// goes on with places alike; where the nearest gave a loop, with those only that lead elsewhere, lest a map
-// gone wrong be asked about itself alone. What a step has left of its candidates goes to older nodes that
-// have no loop yet, the newest first. So how strict the words are asked decides which loop is the first,
-// hardly which come after it. A near candidate is verified and selected as any other.
+// Near nodes. Words find the first revisit; once a loop is accepted, the map predicts further ones. Each node
+// is then compared, once, with the two nearest older nodes of its piece within 2 m and 45 degrees, until one
+// gives a loop. The newest node starts with the nearest and continues with similar places; if the nearest
+// gave a loop, only with places elsewhere, so that a wrong map does not confirm itself. Candidates left in a
+// step go to older nodes without a loop, the newest first. `min_similarity` thus decides about the first loop
+// and hardly about later ones. A near candidate is verified and selected like any other.
 //
-// A kept map (kept_graph.hpp) taken in before the flight is its first piece, and the map's frame that of the
-// kept one. Until loops tie the flight to it, each node asks its candidates further after the first that
-// geometry verifies, at places elsewhere: two that look the same must both be heard (loop_selection.hpp).
-// From then on MapCorrection::located holds, for as long as these loops are believed.
+// A kept map (kept_graph.hpp) taken in before the flight is its first piece, and the map frame is that of the
+// kept map. Until loops join the flight to it, each node also tries candidates at other places after the
+// first verified one, because loops to two similar places must both be known to the selection
+// (loop_selection.hpp). MapCorrection::located holds while these loops are accepted.
 //
-// Every piece that neither odometry nor loops join keeps its own world; an epoch of the odometry begins a
-// piece. Frames: world is the odometry's of an epoch, map that of the first piece. Errors: kInvalidInput (no
-// window, tracks of another frame, a pose that is not finite): nothing changes. Full: a node leaves for each
-// new one (loop_map.hpp), counted.
-// Memory: reserved by the constructor for LoopLimits (38 kB a node). No clock, no randomness but seeds from
-// frame indices: same input, same bytes. docs/pose_graph.md, docs/place.md.
+// A piece that neither odometry nor loops join to others keeps its own world; an epoch of the odometry begins
+// a piece. Frames: world is that of an epoch of the odometry, map that of the first piece. Errors:
+// kInvalidInput (no window, tracks of another frame, a pose that is not finite): nothing changes. When full,
+// each new node replaces one (loop_map.hpp), counted.
+// Memory: reserved by the constructor for LoopLimits (38 kB a node). No clock; random seeds come from frame
+// indices: same input, same bytes. docs/pose_graph.md, docs/place.md.
 
 #include <cstdint>
 #include <memory>
@@ -49,26 +48,26 @@
 namespace swiftlet {
 
 struct LoopEffort {
-  std::size_t candidates = 2;  ///< verified in a step, up to kMaxLoopCandidates
-  double verification = 1;     ///< part of the samples that verification may draw
+  std::size_t candidates = 2;  ///< verified per step, up to kMaxLoopCandidates
+  double verification = 1;     ///< share of the samples that verification may draw
   int iterations = 3;          ///< of the optimizer
 };
 
-/// Older nodes that a node is compared with because the map has them near it.
+/// Number of older nodes near it in the map that a node is compared with.
 inline constexpr std::size_t kMaxNearNodes = 2;
 
 struct LoopInput {
   const TrackedFrame* tracks = nullptr;    ///< of the keyframe
-  const SmoothedWindow* window = nullptr;  ///< whose newest pose is the keyframe's
+  const SmoothedWindow* window = nullptr;  ///< its newest pose is that of the keyframe
   const KeyframeLink* link = nullptr;
   std::array<ImageView, kMaxCameras> image;  ///< raw; empty where missing
 };
 
-/// A verified loop, and what the selection says of it.
+/// A verified loop and its verdict.
 struct MapLoop {
-  Stamp old_stamp;  ///< of the nodes that it joins now: neighbours of those that saw it, when these had to go
+  Stamp old_stamp;  ///< of the nodes that it joins now: neighbours of those that saw it if these were removed
   Stamp new_stamp;
-  bool kept = false;  ///< the old node is of a kept map: its stamp is of another clock
+  bool kept = false;  ///< the old node is of a kept map, its stamp of another clock
   SE3 T_old_new;
   double rotation_sigma = 0;     ///< rad, of the worst direction
   double translation_sigma = 0;  ///< m
@@ -82,7 +81,7 @@ struct MapNode {
   std::uint64_t frame = 0;
   std::uint32_t epoch = 0;  ///< kKeptEpochs: of a kept map
   SE3 T_map_body;
-  SE3 T_world_body;  ///< as the odometry, or the kept map, had it when it became a node
+  SE3 T_world_body;  ///< of the odometry, or of the kept map, when it became a node
 };
 
 class LoopStage {
@@ -91,31 +90,32 @@ class LoopStage {
   LoopStage(const Rig& rig, const LoopSettings& settings, const LoopLimits& limits = {},
             const Vocabulary& vocabulary = Vocabulary::shipped());
 
-  /// Before the first step: an earlier map. Its nodes need room in `limits` beside those of the flight.
-  /// kCapacityReached, kInvalidInput (not finite, loops between nodes that are not there): a part is taken
-  /// in. Allocates nothing but scratch; solves the graph that is extended.
+  /// Loads an earlier map, before the first step. Its nodes need room in `limits` beside those of the flight.
+  /// On kCapacityReached or kInvalidInput (not finite, loops between missing nodes) a part is loaded.
+  /// Allocates only scratch; with KeptUse::kExtend it solves the graph.
   Status takeIn(const KeptGraph& kept, KeptUse use);
-  /// In place of a flight: what another map holds, as if it had been flown now. Its nodes need room too.
-  /// Errors as takeIn().
+  /// Replaces a flight: adds the nodes and loops of another map as if it had been flown now. Its nodes need
+  /// room too. Errors as takeIn().
   Status flyAgain(const KeptGraph& other, const LoopEffort& effort);
-  /// After the flight: what later ones need. Of all that odometry and loops hold together with the kept map,
-  /// or without one with most nodes. Gives the epochs in it, kKeptEpochs for a kept map. Allocates.
+  /// After the flight: writes what later flights need. It covers everything joined to the kept map by
+  /// odometry and loops, or without a kept map the joined pieces with most nodes. Returns its epochs
+  /// (kKeptEpochs for a kept map). Allocates.
   std::vector<std::uint32_t> keep(KeptGraph& out);
 
   Status step(const LoopInput& input, const LoopEffort& effort, LoopReport& report);
 
   [[nodiscard]] const MapCorrection& correction() const { return correction_; }
   [[nodiscard]] LoopCounters counters() const;
-  /// The first keptCount() of them are of a kept map.
+  /// The first keptCount() nodes are of a kept map.
   [[nodiscard]] std::size_t nodeCount() const { return map_.size(); }
   [[nodiscard]] std::size_t keptCount() const { return map_.kept(); }
   [[nodiscard]] MapNode node(std::size_t i) const;
-  /// The other epochs whose worlds loops hold in the same map, ascending; kKeptEpochs: a kept map.
+  /// The other epochs that loops join to this one, ascending; kKeptEpochs stands for a kept map.
   void tiedEpochs(std::uint32_t epoch, FixedVector<std::uint32_t, kTiedEpochs>& out) const;
   [[nodiscard]] std::uint32_t loopCount() const { return map_.loops(); }
   [[nodiscard]] MapLoop loop(std::uint32_t i) const;
-  /// For full smoothing. False where loop i is not selected, or the keyframes that saw it are not in the map
-  /// any more. Allocates: after the flight.
+  /// For full smoothing. False if loop i is not accepted or the keyframes that saw it were removed from the
+  /// map. Allocates: for use after the flight.
   [[nodiscard]] bool revisit(std::uint32_t i, LoopRevisit& out) const;
 
  private:
@@ -127,10 +127,10 @@ class LoopStage {
     Matrix6d covariance = Matrix6d::Zero();
   };
 
-  /// What a node was compared with.
+  /// Comparisons made for a node.
   struct Comparisons {
     FixedVector<std::uint64_t, kMaxLoopCandidates + kMaxNearNodes> frames;
-    std::size_t near_left = kMaxNearNodes;  ///< comparisons with near nodes still to make
+    std::size_t near_left = kMaxNearNodes;  ///< remaining comparisons with near nodes
   };
 
   void extendPending(const LoopInput& input);
@@ -164,8 +164,8 @@ class LoopStage {
   LoopMap map_;
 
   std::vector<PlaceKeyframe> places_;       ///< by the database's slots
-  std::vector<Comparisons> comparisons_;    ///< likewise
-  std::vector<DescriptorMatches> inliers_;  ///< by the map's loops
+  std::vector<Comparisons> comparisons_;    ///< by the database's slots
+  std::vector<DescriptorMatches> inliers_;  ///< by the map's loop ids
   std::uint32_t epoch_ = 0;
   Pending pending_;
   PlaceKeyframe newest_;

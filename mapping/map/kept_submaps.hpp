@@ -1,14 +1,13 @@
 #pragma once
-// A kept map's blocks as submaps, so that loops of a later flight move them.
+// The blocks of a kept map as submaps, so that loops of a later flight move them.
 //
-// A kept volume is one, laid together from the submaps of its flight in the frame of its graph. From there
-// each block goes with the node that is nearest to it: a deformation of space by rigid pieces, which moves
-// the surface as the graph moves and leaves it as it is where the graph stays. Neighbouring nodes move alike,
-// as all that may still move them are loops that are seen anew.
+// A kept volume combines all submaps of its flight in the frame of its graph. In a later flight each block
+// moves with the node nearest to it: space is deformed by rigid pieces, and the surface follows the graph.
+// Neighbouring nodes move alike, because only new loops can still move them.
 //
-// Frames: map, that of the kept graph. Memory: 32 bytes a node. Cost: a block, linear in nodes; at most
-// kMost of them count, evenly chosen. Source of the idea: Whelan et al., Kintinuous and ElasticFusion, whose
-// deformation graphs are laid along the camera's way.
+// Frames: map, that of the kept graph. Memory: 32 bytes a node. Cost of a block: linear in nodes; at most
+// kMost of them are used, evenly chosen. Source of the idea: Whelan et al., Kintinuous and ElasticFusion,
+// whose deformation graphs follow the camera's path.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -23,8 +22,8 @@ class KeptSubmaps {
  public:
   static constexpr std::size_t kMost = 2048;
 
-  /// `nodes` by frame, at least one; T_world_body in the kept map. `to` outlives the use, and has taken no
-  /// image.
+  /// `nodes`: by frame, at least one; T_world_body in the kept map. `to` must outlive this object and have
+  /// taken no image.
   KeptSubmaps(MapSubmaps& to, std::span<const WorldInMap> nodes);
 
   void take(StoredBlock& block);

@@ -1,5 +1,5 @@
 #pragma once
-// What the map is told once.
+// Settings of the map, given at construction.
 
 #include <cstddef>
 #include <cstdint>
@@ -8,13 +8,13 @@
 namespace swiftlet {
 
 struct MapSettings {
-  double voxel_size = 0.05;      ///< m; the truncation distance is three of them
-  int volume_mib = 64;           ///< voxels: some 100 m^2 of labelled surface
-  int surface_mib = 32;          ///< triangles to look at in flight, of what the volume dropped too
-  double most_range = 10;        ///< m; what is measured farther away is left out
-  bool labels = true;            ///< keep labels where a log or a network gives them
+  double voxel_size = 0.05;      ///< m; the truncation distance is three voxels
+  int volume_mib = 64;           ///< memory for voxels, some 100 m^2 of labelled surface
+  int surface_mib = 32;          ///< memory for triangles shown in flight, including dropped blocks
+  double most_range = 10;        ///< m; farther measurements give no surface
+  bool labels = true;            ///< keep labels if a log or a network gives them
   double label_certainty = 0.9;  ///< probability that a pixel's label is right
-  /// Labels of things that move, which are not mapped: numbers with commas.
+  /// Labels of moving things, which are not mapped: numbers separated by commas.
   std::string moving_labels = "";
 };
 

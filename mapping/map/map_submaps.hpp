@@ -1,18 +1,17 @@
 #pragma once
-// Keeps the volume true to the submaps: what loops move leaves it, what lies near the vehicle comes back.
+// Corrects the volume when loop closure moves submaps, and moves blocks between volume and storage.
 //
-// A block goes to the storage when the volume drops it, when its submap moves by more than half a voxel at
-// the block, or when an image sees it again after a time or after a correction (VoxelVolume::touch): so no
-// block ever mixes images that do not agree. What is stored stays with its submap. Step by step, blocks that
-// lie in the box around the vehicle, and in its frame, come back as hints: for the distance field and a depth
-// sensor's surface, until an image says better. visitWhole() lays everything over each other where it belongs
-// by now: the map as if it had been fused from the corrected poses, but for what moved within a submap.
+// A block goes to the storage if the volume drops it, if its submap moves by more than half a voxel at the
+// block, or if an image sees it again after a time or after a correction (VoxelVolume::touch). No block thus
+// mixes images that disagree. Stored blocks belong to their submap. Step by step, blocks in the box around
+// the vehicle and in its frame return as hints, for the distance field and a depth sensor's surface, until an
+// image shows them again. visitWhole() overlays all blocks at their corrected poses: the map as if it had
+// been fused from the corrected poses, except for motion within a submap.
 //
 // Frames: map, metres. Memory: Submaps, StoredBlocks and 4 bytes a block of the volume, reserved at
-// construction; visitWhole() takes a volume of kTileSide^3 blocks more. Cost: correct(), a pass over the
-// volume's blocks and the storing of those that leave (5 us each); a step, that of its blocks. No clock;
-// deterministic. Source of the idea: voxgraph (Reijgwart et al., RA-L 2020), whose submaps are volumes of
-// their own.
+// construction; visitWhole() allocates a volume of kTileSide^3 blocks. Cost: correct() passes over the
+// volume's blocks and stores those that leave (5 us each); a step costs that of its blocks. No clock;
+// deterministic. The idea is voxgraph's (Reijgwart et al., RA-L 2020), whose submaps are separate volumes.
 
 #include <cstdint>
 #include <functional>
@@ -28,56 +27,57 @@
 namespace swiftlet {
 
 struct CorrectionEffort {
-  std::uint32_t blocks = 200;  ///< that come back in one step
+  std::uint32_t blocks = 200;  ///< returned to the volume per step
 
   bool operator==(const CorrectionEffort&) const = default;
 };
 
 struct CorrectionStep {
-  std::uint32_t blocks = 0;  ///< that came back
-  bool done = true;          ///< all that is near is back
+  std::uint32_t blocks = 0;  ///< returned to the volume
+  bool done = true;          ///< all blocks near the vehicle are in the volume
 };
 
 struct SubmapCounters {
-  std::uint64_t corrections = 0;   ///< that moved a submap out of its place
-  std::uint64_t blocks_moved = 0;  ///< that left the volume for it
-  std::uint64_t blocks_back = 0;   ///< that came back as hints
-  std::uint64_t blocks_apart = 0;  ///< of images, for which the volume had no room
+  std::uint64_t corrections = 0;   ///< corrections that moved a submap
+  std::uint64_t blocks_moved = 0;  ///< blocks that left the volume because their submap moved
+  std::uint64_t blocks_back = 0;   ///< blocks that returned as hints
+  std::uint64_t blocks_apart = 0;  ///< blocks of an image stored directly, because the volume had no room
 };
 
 class MapSubmaps : public BlockListener, public BlockOverflow {
  public:
-  /// Along an edge, what visitWhole() looks at at once.
+  /// Edge of a tile of visitWhole(), in blocks.
   static constexpr int kTileSide = 16;
 
-  /// Both outlive it; `storage` may be null (StoredBlocks). Adds itself to the volume's listeners. `half_box`
-  /// [m]: of the box around the vehicle into which blocks come back.
+  /// `volume` and `storage` must outlive this object; `storage` may be null (StoredBlocks). Adds itself to
+  /// the volume's listeners. `half_box` [m]: half extent of the box around the vehicle into which blocks
+  /// return.
   MapSubmaps(VoxelVolume& volume, BlockStorage* storage, MapPoses poses, const Eigen::Vector3d& half_box);
   MapSubmaps(const MapSubmaps&) = delete;
   MapSubmaps& operator=(const MapSubmaps&) = delete;
 
-  /// An image is to be fused; `image` as the anchor of a submap that may begin with it.
+  /// Call before an image is fused. `image` is the anchor of the submap that may begin with it.
   void follow(const Submap& image);
-  /// Submaps::correct(), and the volume with it.
+  /// Submaps::correct(), and corrects the volume.
   void correct(std::span<const WorldInMap> worlds);
   [[nodiscard]] bool busy() const { return cursor_ < stored_.size(); }
   void step(const Eigen::Vector3d& p_map_vehicle, const CorrectionEffort& effort, CorrectionStep& out);
   void beforeRemoval(const VoxelVolume& volume, std::span<const std::uint32_t> slots) override;
   void beforeRenewal(const VoxelVolume& volume, std::uint32_t slot) override;
   void take(const BlockIndex& index, const VoxelBlock& voxels, const LabelBlock* labels) override;
-  /// All of the volume's blocks are stored too: an epoch is over.
+  /// Stores all blocks of the volume, at the end of an epoch.
   void storeAll();
   /// Submaps::addKept().
   bool addKept(const Submap& submap);
-  /// A block of a kept map, of the submap that it names.
+  /// Stores a block of a kept map; the block names its submap.
   void store(const StoredBlock& block) { stored_.put(block); }
 
-  /// Gives the blocks of the submaps for which `wanted` holds, stored ones and the volume's, as a volume
-  /// holds them, tile by tile: slots of blocks whose neighbours are there too. Memory and cost without a
-  /// bound on the flight's: for the end of a run.
+  /// Passes the blocks of the submaps for which `wanted` holds to `take`, stored ones and the volume's, tile
+  /// by tile in a volume. `slots` are the blocks of the tile; their neighbours are in the volume too. Memory
+  /// and cost are not bounded: for the end of a run.
   void visitWhole(const std::function<bool(const Submap&)>& wanted,
                   const std::function<void(const VoxelVolume&, std::span<const std::uint32_t> slots)>& take);
-  /// The same, all in one volume and as much memory as it takes.
+  /// The same in one volume, with as much memory as needed.
   VoxelVolume wholeVolume(const std::function<bool(const Submap&)>& wanted);
 
   [[nodiscard]] const VoxelVolume& volume() const { return volume_; }
@@ -96,8 +96,8 @@ class MapSubmaps : public BlockListener, public BlockOverflow {
   StoredBlocks stored_;
   BlockBlend hints_;
   Eigen::Vector3d half_box_;
-  std::vector<SE3> shown_;  ///< T_map_world of each submap when its blocks came back last
-  std::size_t cursor_ = 0;  ///< record to be looked at
+  std::vector<SE3> shown_;  ///< T_map_world of each submap when its blocks last returned
+  std::size_t cursor_ = 0;  ///< next record to look at
   Eigen::Vector3d p_map_pass_ = Eigen::Vector3d::Zero();  ///< of the vehicle when the pass began
   std::vector<std::uint32_t> leaving_;                    ///< scratch: slots
   StoredBlock scratch_;

@@ -1,12 +1,11 @@
 #pragma once
-// Blocks that left the volume, or began anew in it: every submap's share of the map, on disk, found by
-// number.
+// Blocks that left the volume or began anew in it, on disk: the share of each submap in the map.
 //
-// A record in memory tells which block of which submap lies where in the storage. One place has as many as it
-// was seen in submaps far apart in time; whoever reads lays one over the other (block_blend.hpp). What was
-// seen free without voxels is a record alone. Memory: 24 bytes a block and two blocks of scratch, reserved at
-// construction. Cost: a copy of 2.5 kB, 6.6 kB with labels, to or from the storage. Errors: a block that the
-// storage does not take, or that finds no record, is lost, counted. Not thread safe.
+// A record in memory tells where a block of a submap is in the storage. A block has several records if
+// submaps far apart in time saw it; readers overlay them (block_blend.hpp). A free block without voxels is
+// only a record. Memory: 24 bytes a block and two blocks of scratch, reserved at construction. Cost: a copy
+// of 2.5 kB, 6.6 kB with labels, to or from the storage. Errors: a block that the storage refuses, or for
+// which no record is left, is lost and counted. Not thread safe.
 
 #include <cstddef>
 #include <cstdint>
@@ -18,11 +17,11 @@
 
 namespace swiftlet {
 
-/// Bytes that are not memory's: a file. Of the thread that maps.
+/// Storage outside memory, such as a file. Used only by the thread that maps.
 class BlockStorage {
  public:
   virtual ~BlockStorage() = default;
-  /// Over what was written there before, or behind it. False: nothing of it can be read again.
+  /// Overwrites earlier bytes or appends. False: none of these bytes can be read again.
   virtual bool write(std::uint64_t offset, std::span<const std::byte> bytes) = 0;
   virtual bool read(std::uint64_t offset, std::span<std::byte> bytes) = 0;
 };
@@ -30,18 +29,18 @@ class BlockStorage {
 struct StoredBlock {
   BlockIndex index;
   SubmapId submap = 0;
-  std::uint64_t free_parts = 0;  ///< of a block without voxels; else 0
+  std::uint64_t free_parts = 0;  ///< of a block without voxels; otherwise 0
   bool has_labels = false;
   VoxelBlock voxels;
   LabelBlock labels;
 
-  /// Null, or without any label: it has none.
+  /// Null, or counts without any label: the block has no labels.
   void setLabels(const LabelBlock* seen);
 };
 
-/// A later voxel of `from`, with this distance [steps], into one of `to`: averages by weight. True where it
-/// took its place: the one says behind a surface and the other free up to the truncation distance, so
-/// something has come or gone, and the later counts unless it has far less weight.
+/// Adds a later voxel of `from`, with this distance [steps], to one of `to`; averages by weight. True if the
+/// later voxel replaced the earlier: one is behind a surface and the other free up to the truncation
+/// distance, so the scene changed. The later one wins unless it has far less weight.
 bool addVoxel(const VoxelBlock& from, std::size_t at, float distance, float most_weight, VoxelBlock& to,
               std::size_t to_at);
 
@@ -52,28 +51,28 @@ class StoredBlocks {
     SubmapId submap = 0;
     bool is_free : 1 = false;
     bool has_labels : 1 = false;
-    bool shown : 1 = false;    ///< laid into the volume, for whoever does
-    std::uint64_t offset = 0;  ///< in the storage; of a free block its parts
+    bool shown : 1 = false;    ///< in the volume as a hint; set by the caller
+    std::uint64_t offset = 0;  ///< in the storage; for a free block its free parts
   };
-  /// A map of some 2 000 m^2 seen once, and what is free around it.
+  /// A map of some 2000 m^2 seen once, with the free space around it.
   static constexpr std::size_t kMost = std::size_t{1} << 19U;
 
-  /// Whether the blocks of two submaps lie to each other as they were fused, so that one may go into the
-  /// other.
+  /// Whether two submaps have not moved relative to each other since they were fused, so that their blocks
+  /// may be merged.
   using Agree = std::function<bool(SubmapId, SubmapId, const BlockIndex&)>;
 
-  /// `storage` may be null: every block is lost. It outlives the use.
+  /// `storage` must outlive this object. Null: every block is lost.
   StoredBlocks(const VolumeSettings& settings, BlockStorage* storage, Agree agree);
 
-  /// What images showed of the slot's block, without hints; false where that is nothing.
+  /// The content of the slot's block without hints; false if there is none.
   static bool gather(const VoxelVolume& volume, std::uint32_t slot, StoredBlock& out);
-  /// Into the newest record of the place where both agree: a place that is seen again and again takes no more
-  /// room.
+  /// Merges into the newest record of the block if both agree, so that a place seen repeatedly takes no more
+  /// room; otherwise adds a record.
   void put(const StoredBlock& block);
   void put(const VoxelVolume& volume, std::uint32_t slot) {
     if (gather(volume, slot, scratch_)) put(scratch_);
   }
-  /// False where it cannot be read.
+  /// False if it cannot be read.
   bool read(std::size_t i, StoredBlock& out) { return read(records_[i], out); }
 
   [[nodiscard]] std::size_t size() const { return records_.size(); }
@@ -96,7 +95,7 @@ class StoredBlocks {
   float most_weight_;
   BlockStorage* storage_;
   Agree agree_;
-  BlockHash newest_;  ///< record of each place
+  BlockHash newest_;  ///< newest record of each block index
   std::vector<Record> records_;
   std::uint64_t end_ = 0;
   std::uint64_t lost_ = 0;

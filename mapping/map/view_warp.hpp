@@ -1,12 +1,12 @@
 #pragma once
-// What another camera sees at the pixels of a depth camera: its labels and grey values, brought to the depth.
+// Brings labels and grey values of another camera to the pixels of a depth camera.
 //
-// The depth camera is an ideal pinhole; the other has its own lens and sits elsewhere by `T_other_depth`.
-// Where both look from one point (rectified images, rendered depth) the correspondence is a table; else each
-// pixel goes the way over its depth, and pixels without depth get nothing. Nearest pixel, no interpolation:
-// labels cannot be mixed. What hides behind something nearer for the other camera takes the nearer thing's
-// value: with a few centimetres between the cameras that is a seam of some pixels. Memory: 4 bytes a pixel.
-// Cost: 1 ns a pixel by the table, some 20 ns over the depth.
+// The depth camera is an ideal pinhole; the other has its own lens and the extrinsics `T_other_depth`. If
+// both have one centre (rectified images, rendered depth) the correspondence is a table. Otherwise each pixel
+// is projected at its depth, and pixels without depth get no value. Nearest pixel, because labels cannot be
+// interpolated. Points that the other camera does not see, behind something nearer, take the value of the
+// nearer thing: a seam of some pixels if the cameras are a few centimetres apart. Memory: 4 bytes a pixel.
+// Cost: 1 ns a pixel by the table, some 20 ns by projection.
 
 #include <cstdint>
 #include <vector>
@@ -22,8 +22,8 @@ class ViewWarp {
  public:
   ViewWarp(const PinholeIntrinsics& depth_camera, const CameraModel& other, const SE3& T_other_depth);
 
-  /// One value for each pixel of the depth camera; 0 where the other camera sees nothing. `depth` [m] is read
-  /// where the cameras stand apart. kInvalidInput: `image` is not of the other camera's size.
+  /// One value for each pixel of the depth camera; 0 if the pixel is outside the other image. `depth` [m] is
+  /// read only if the cameras are apart. kInvalidInput: `image` is not of the other camera's size.
   Status apply(const ImageView& image, const float* depth, std::uint8_t* out) const;
 
  private:
@@ -34,7 +34,7 @@ class ViewWarp {
   PinholeIntrinsics camera_;
   CameraModel other_;
   SE3 T_other_depth_;
-  bool together_;                    ///< one centre
+  bool together_;                    ///< both cameras have one centre
   std::vector<std::int32_t> table_;  ///< y * width + x in the other image
 };
 
