@@ -1,6 +1,6 @@
 #pragma once
-// Unsigned bytes, many at a time, for the corner kernel: the compiler's own vectors (GCC, Clang: AVX2, SSE2,
-// NEON alike) and a scalar twin that defines the result. All operations are exact.
+// Vectors of unsigned bytes for the corner kernel: the compiler's vector extensions (GCC, Clang: AVX2, SSE2,
+// NEON) and a scalar version that defines the result. All operations are exact.
 
 #include <array>
 #include <cstddef>

@@ -1,5 +1,5 @@
 #pragma once
-// How much two descriptors differ.
+// Hamming distance of two descriptors.
 
 #include <bit>
 

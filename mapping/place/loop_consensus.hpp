@@ -1,16 +1,16 @@
 #pragma once
-// The motion that most matches of two keyframes agree on, before it is refined: RANSAC on matches with depth.
+// RANSAC on matches of two keyframes: the relative pose that most matches agree on, before refinement.
 //
 //   method       motion known before  sample                                  used when
 //   threePoint   nothing              3 matches with depth in one keyframe    always first
 //   onePoint     rotation             1 match with depth in both              a rotation is given
 //   fivePoint    nothing              5 matches, then 1 for the scale         nothing found, depths rare
 //
-// threePoint takes the points from whichever keyframe knows them and the bearings from the other (P3P), so a
-// match needs one depth only, and errors of depth do not turn the pose; where both are known the sides of the
-// triangle must agree before anything is solved, which discards most false samples for 50 ns. Matches with
-// small descriptor distance are drawn first (as PROSAC; Chum, Matas, CVPR 2005).
-// A hypothesis is scored by the one-way error of each match, both ways where both depths are known:
+// threePoint takes points from whichever keyframe knows their depth and bearings from the other (P3P), so a
+// match needs only one depth, and depth errors do not turn the pose. If both depths are known, the sides of
+// the triangle must agree before anything is solved, which discards most false samples for 50 ns. Matches
+// with small descriptor distance are drawn first (as PROSAC; Chum, Matas, CVPR 2005).
+// A hypothesis is scored by the one-way error of each match, in both directions if both depths are known:
 // chi-square of the bearing with the inverse depth marginalized (estimator/geometry/ransac.hpp), truncated.
 // The best so far is refined on its inliers (Chum et al., DAGM 2003).
 //
@@ -33,8 +33,8 @@ namespace swiftlet {
 
 using MatchedPoints = FixedVector<MatchedPoint, kMaxPlaceFeatures>;
 
-/// Chi-square of where `to` sees a point of direction and inverse depth `from` (bearing noise of both, the
-/// inverse depth marginalized); infinite when behind. p_to = R p_from + t.
+/// Chi-square of the bearing `to` of a point with direction and inverse depth `from` (bearing noise of both,
+/// inverse depth marginalized); infinite if the point is behind. p_to = R p_from + t.
 double oneWayError(const Eigen::Matrix3d& R_to_from, const Eigen::Vector3d& t_to_from, const PointView& from,
                    const PointView& to);
 
@@ -56,15 +56,15 @@ class LoopConsensus {
   explicit LoopConsensus(const ConsensusSettings& settings = {}) : settings_(settings) {}
   void setSettings(const ConsensusSettings& settings) { settings_ = settings; }
 
-  /// `points`: best match first (by descriptor distance). kDegenerate: no motion has min_inliers. The
-  /// inliers' `used` is set, others' cleared.
+  /// `points`: best match first (by descriptor distance). kDegenerate: no motion has min_inliers. Sets `used`
+  /// of the inliers and clears that of the others.
   Status threePoint(std::span<MatchedPoint> points, std::uint64_t seed, ConsensusResult& result);
 
-  /// With the rotation given (from the odometry, the gyroscope).
+  /// With a given rotation, from odometry or gyroscope.
   Status onePoint(std::span<MatchedPoint> points, const Eigen::Quaterniond& R_old_new, std::uint64_t seed,
                   ConsensusResult& result);
 
-  /// Rotation and direction of translation by MonoRansac::fivePoint over the first kMaxFeatures matches, the
+  /// Rotation and direction of translation by MonoRansac::fivePoint over the first kMaxFeatures matches;
   /// scale by the match whose depth most others agree with.
   Status fivePoint(std::span<MatchedPoint> points, std::uint64_t seed, ConsensusResult& result);
 
@@ -86,7 +86,7 @@ class LoopConsensus {
   void addErrors(const Lanes& lanes, const SE3& T_to_from);
   Score score(const SE3& T_old_new);
   void markUsed(std::span<MatchedPoint> points) const;
-  /// True when it became the best.
+  /// True if it became the best.
   bool offer(std::span<MatchedPoint> points, const SE3& T_old_new, ConsensusResult& result);
   [[nodiscard]] Status finish(std::span<MatchedPoint> points, ConsensusResult& result);
 

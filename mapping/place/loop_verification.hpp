@@ -1,19 +1,19 @@
 #pragma once
-// Do two keyframes show the same place, and from where? Geometry's answer to a candidate of place
-// recognition.
+// Geometric verification of a candidate of place recognition: whether two keyframes show the same place, and
+// their relative pose.
 //
-// matches of descriptors -> a motion most agree on (loop_consensus.hpp) -> refinement on all that agree
-// (relative_pose.hpp) -> matches again, where that pose says they must lie -> refinement -> gates.
-// Every candidate ends in one LoopFate; what was reached on the way is reported with it.
+// Descriptor matches -> consensus (loop_consensus.hpp) -> refinement on its inliers (relative_pose.hpp) ->
+// matching again, guided by that pose -> refinement -> gates. Every candidate ends in one LoopFate; the
+// results of the stages that it reached are reported with it.
 //
 // Frames: T_old_new takes coordinates of the body at the new keyframe to the body at the old one. Covariance
 // in the tangent T_old_new <- T_old_new (Exp(phi), delta), rotation first [rad], translation [m] in the axes
 // of the new body: that of an edge in mapping/pose_graph.
 //
-// Needs inverse depths in one keyframe at least (feature_depth.hpp); matches without any still count in the
-// refinement. Errors: candidates never give an error, but kInvalidInput (settings out of range, NaN).
+// At least one keyframe needs inverse depths (feature_depth.hpp); matches without any still count in the
+// refinement. Errors: only kInvalidInput (settings out of range, NaN); a rejected candidate is no error.
 // Deterministic: the seed is made of the keyframes' indices. Bounded: `effort` scales the samples.
-// No allocation; the object holds 243 KiB. Cost and figures: docs/place.md.
+// No allocation; the object holds 243 KiB. Cost: docs/place.md.
 
 #include <array>
 #include <cstdint>
@@ -32,16 +32,16 @@ namespace swiftlet {
 enum class LoopFate : std::uint8_t {
   kAccepted,
   kInvalidInput,    ///< a keyframe holds values that are not finite
-  kTooFewMatches,   ///< descriptors alike: fewer than min_matches
-  kTooFewDepths,    ///< of these with a depth: fewer than min_depths
+  kTooFewMatches,   ///< fewer than min_matches by descriptor
+  kTooFewDepths,    ///< fewer than min_depths of these have a depth
   kNoConsensus,     ///< no motion explains min_consensus of them
-  kTooFewInliers,   ///< after refinement and matching again
-  kLowShare,        ///< most matches by descriptor alone contradict the pose: a repeated structure, chance
-  kPoorSpread,      ///< the inliers stand on a small part of an image, or on a line
+  kTooFewInliers,   ///< after refinement and guided matching
+  kLowShare,        ///< most matches by descriptor contradict the pose: repeated structure or chance
+  kPoorSpread,      ///< inliers cover a small part of an image, or lie on a line
   kPoorFit,         ///< residuals far above their noise
-  kIllConditioned,  ///< rotation or translation not determined well enough
+  kIllConditioned,  ///< rotation or translation poorly determined
   kTooFar,          ///< keyframes farther apart than max_distance
-  kFragile,         ///< without a few matches beside each other the pose would be another
+  kFragile,         ///< the pose depends on a few neighbouring matches
 };
 inline constexpr std::size_t kLoopFates = 12;
 
@@ -52,33 +52,33 @@ struct LoopVerificationSettings {
   DescriptorMatchSettings matching;
   ConsensusSettings consensus;
   RelativePoseSettings refinement;
-  double pixel_sigma = 0.8;            ///< px at octave 0, of a corner found again from elsewhere
-  double octave_scale = kOctaveRatio;  ///< of the pyramid that the features come from: noise grows with it
+  double pixel_sigma = 0.8;            ///< px at octave 0, of a corner seen again from another pose
+  double octave_scale = kOctaveRatio;  ///< of the features' pyramid; noise grows with it per octave
   int guided_distance = 64;            ///< bits
-  float guided_ratio = 0.9F;           ///< best / next, among the places that the pose allows
-  double guided_reach = 60;            ///< px, at most
+  float guided_ratio = 0.9F;           ///< best / next, among the features near the predicted position
+  double guided_reach = 60;            ///< px, largest search radius
   std::size_t min_matches = 12;
   std::size_t min_depths = 8;
   std::size_t min_consensus = 10;
   std::size_t min_inliers = 15;
-  std::size_t min_kept = 15;    ///< of the matches by descriptor alone, in agreement with the final pose
-  double min_kept_share = 0.3;  ///< the same, as a part of them
-  double min_spread = 0.1;      ///< rad, of the inliers' bearings across their narrowest direction
-  double min_spread_of_many = 0.085;  ///< rad, the same where the matches kept are at least
+  std::size_t min_kept = 15;          ///< matches by descriptor alone that agree with the final pose
+  double min_kept_share = 0.3;        ///< the same, as a share of all matches by descriptor
+  double min_spread = 0.1;            ///< rad, of the inliers' bearings across their narrowest direction
+  double min_spread_of_many = 0.085;  ///< rad, the same if at least many_kept matches agree
   std::size_t many_kept = 30;
   double max_chi_squared_per_dof = 4;
   double max_rotation_sigma = 0.03;     ///< rad, largest axis
-  double max_translation_sigma = 0.15;  ///< m, largest axis, or
-  double max_relative_sigma = 0.1;      ///< of the median distance of the inliers, whichever is more
-  double support_reach = 0.1;           ///< rad: matches so near each other may be wrong together
-  double max_rotation_shift = 0.03;     ///< rad, without any of such groups
+  double max_translation_sigma = 0.15;  ///< m, largest axis; the larger of this and max_relative_sigma counts
+  double max_relative_sigma = 0.1;      ///< share of the median distance of the inliers
+  double support_reach = 0.1;           ///< rad: matches closer than this may be wrong together
+  double max_rotation_shift = 0.03;     ///< rad, if one such group is left out
   double max_distance = 10;             ///< m between the two bodies
-  bool five_point = true;  ///< tried where three points found nothing and most matches have no depth
+  bool five_point = true;               ///< used if three points found nothing and most matches have no depth
 
   [[nodiscard]] bool valid() const;
 };
 
-/// What is known before, from the odometry. Used as a first guess, never as a measurement.
+/// Prior from the odometry. Used as initial guess, never as a measurement.
 struct LoopPrior {
   std::optional<Eigen::Quaterniond> R_old_new;  ///< bodies
 };
@@ -86,13 +86,13 @@ struct LoopPrior {
 struct LoopVerification {
   LoopFate fate = LoopFate::kInvalidInput;
   std::uint64_t old_index = 0, new_index = 0;
-  SE3 T_old_new;                           ///< bodies; of the last stage reached, zero before consensus
-  Matrix6d covariance = Matrix6d::Zero();  ///< as above; zero before refinement
+  SE3 T_old_new;                           ///< bodies; of the last stage reached, identity before consensus
+  Matrix6d covariance = Matrix6d::Zero();  ///< tangent as above; zero before refinement
   std::size_t matches = 0;
   std::size_t matches_with_depth = 0;
   std::size_t consensus = 0;  ///< matches that agreed before refinement
   int samples = 0;
-  std::size_t kept = 0;  ///< of the first matches, those that agree with the final pose
+  std::size_t kept = 0;  ///< matches by descriptor alone that agree with the final pose
   double chi_squared_per_dof = 0;
   double spread = 0;  ///< rad, the smaller of both keyframes
   RelativePoseSupport support;
@@ -103,10 +103,10 @@ struct LoopVerification {
 
 class LoopVerifier {
  public:
-  /// `rig`: camera 0 and its place on the body.
+  /// Uses camera 0 of `rig` and its pose on the body.
   explicit LoopVerifier(const Rig& rig, const LoopVerificationSettings& settings = {});
 
-  /// `effort` in (0, 1]: part of the settings' samples that may be spent.
+  /// `effort` in (0, 1]: share of the settings' samples that may be drawn.
   Status verify(const PlaceKeyframe& old_keyframe, const PlaceKeyframe& new_keyframe, const LoopPrior& prior,
                 double effort, LoopVerification& result);
 
@@ -132,7 +132,7 @@ class LoopVerifier {
   MatchedPoints points_;  ///< beside matches_
   SE3 T_cam_;             ///< T_old_new of the cameras
   RelativePoseFit fit_;
-  double noise_scale_ = 1;  ///< variance of the matches over the set one
+  double noise_scale_ = 1;  ///< variance of the matches over the configured one
 
   struct Guided {
     std::uint16_t distance = 0, next = 0, partner = 0;

@@ -1,24 +1,23 @@
 #pragma once
-// Which earlier keyframes look like this one: an inverted index of words with fixed memory.
+// Finds earlier keyframes that look like a new one: an inverted index of words with fixed memory.
 //
-// add() stores a keyframe's bag of words, query() compares one with all that are stored: for each of its
-// words the keyframes that have it are known, so that only common words cost anything. The score is
-// similarity() (bag_of_words.hpp); relative to that of the keyframe with its predecessor it tells a revisit
-// from a texture that looks the same everywhere (Galvez-Lopez, Tardos, "Bags of Binary Words for Fast Place
-// Recognition in Image Sequences", T-RO 2012, sections V.B to V.D). Keyframes near in time that match form an
-// island; an island's score is the sum of its members'. It is consistent with the ones before when the
-// preceding queries found islands beside it.
+// add() stores a keyframe's bag of words, query() compares one with all stored keyframes. The index lists the
+// keyframes of each word, so only common words cost time. The score is similarity() (bag_of_words.hpp).
+// Divided by the score of the keyframe with its predecessor, it distinguishes a revisit from a texture that
+// looks the same everywhere (Galvez-Lopez, Tardos, "Bags of Binary Words for Fast Place Recognition in Image
+// Sequences", T-RO 2012, sections V.B to V.D). Matching keyframes near in time form an island; its score is
+// the sum of its members'. An island is consistent if the preceding queries found islands beside it.
 //
-// Full is a normal state. When keyframes or postings run out, the most redundant keyframe leaves: the one
-// whose lesser similarity to its two neighbours in time is greatest (the oldest of equals). Its neighbours
-// become each other's. Keyframes too recent to be found by a query yet stay. So places where the drone
-// hovered thin out first, and what was seen once stays longest.
+// Full is a normal state. When keyframes or postings run out, the most redundant keyframe is removed: the one
+// whose smaller similarity to its two neighbours in time is greatest (the oldest of equals). Keyframes too
+// recent to be found by a query stay. Places where the drone hovered are thus thinned first, and places seen
+// once stay longest.
 //
-// Slots: add() gives a number below `keyframes` that stays the keyframe's own until it leaves and is given to
-// another; an owner may keep more of each keyframe at the same number.
+// Slots: add() returns an index below `keyframes`, which belongs to the keyframe until it is removed. The
+// caller may keep further data of each keyframe by this index.
 //
 // Memory: about 8 bytes a posting and 4 KiB a keyframe (its bag), 8 bytes a word of the vocabulary, reserved
-// by the constructor; nothing grows after. Deterministic. Cost: see docs/place.md.
+// by the constructor; nothing grows afterwards. Deterministic. Cost: docs/place.md.
 
 #include <array>
 #include <cstdint>
@@ -35,14 +34,14 @@ inline constexpr std::size_t kMaxPlaceCandidates = 32;
 
 struct PlaceDatabaseSettings {
   std::size_t keyframes = 2000;  ///< up to 65 534
-  /// Words of keyframes that can be stored together; 0: 400 for each keyframe.
+  /// Total number of words of all keyframes; 0: 400 for each keyframe.
   std::size_t postings = 0;
-  double exclude = 10.0;        ///< s: keyframes nearer in time (of the same epoch) are no revisit
+  double exclude = 10.0;        ///< s: keyframes of the same epoch nearer in time are no revisit
   float min_relative = 0.3F;    ///< least score relative to that with the predecessor
-  float min_reference = 0.02F;  ///< the predecessor's score counts as at least this,
-  float max_reference = 0.3F;   ///< and at most this: who hovers looks more like before than any revisit does
+  float min_reference = 0.02F;  ///< lower limit of the predecessor's score
+  float max_reference = 0.3F;   ///< upper limit: hovering resembles the last image more than any revisit
   double island_gap = 3.0;      ///< s: keyframes nearer in time than this belong to one island
-  std::size_t per_island = kMaxPlaceCandidates;  ///< candidates of one island at most
+  std::size_t per_island = kMaxPlaceCandidates;  ///< largest number of candidates of one island
   std::size_t candidates = 10;                   ///< at most kMaxPlaceCandidates
   int consistent = 0;  ///< least number of preceding queries with an island beside a candidate's
 };
@@ -56,39 +55,39 @@ struct PlaceCandidate {
   float score = 0;     ///< similarity, 0 to 1
   float relative = 0;  ///< to the similarity of the query with its predecessor, as bounded by the settings
   float island_score = 0;
-  /// Islands of the queries just before, in a row, that lie beside this one's.
+  /// Number of consecutive preceding queries with an island beside this candidate's.
   int consistent = 0;
 };
 
 struct PlaceQuery {
-  /// Best first; those of one island are its best.
+  /// Best first; of each island its best.
   FixedVector<PlaceCandidate, kMaxPlaceCandidates> candidates;
   float reference = 0;       ///< similarity with the predecessor
-  std::size_t compared = 0;  ///< stored keyframes old enough
+  std::size_t compared = 0;  ///< number of stored keyframes that are old enough
 };
 
 struct PlaceDatabaseCounts {
   std::uint64_t added = 0;
-  std::uint64_t removed = 0;  ///< by the policy when full
+  std::uint64_t removed = 0;  ///< because the database was full
 };
 
 class PlaceDatabase {
  public:
   static constexpr std::uint32_t kNoSlot = 0xFFFFFFFFU;
 
-  /// `words`: of the vocabulary whose bags are stored.
+  /// `words`: number of words of the vocabulary.
   PlaceDatabase(std::size_t words, const PlaceDatabaseSettings& settings = {});
 
-  /// The keyframe's candidates, before it is added itself. Remembers islands for the next query: keyframes
-  /// come in the order of time. kNotReady where there is nothing old enough, kInvalidInput for a word beyond
-  /// the vocabulary.
+  /// Candidates of a keyframe; call it before add(). Keyframes must come in order of time, because islands
+  /// are remembered for the next query. kNotReady if no stored keyframe is old enough, kInvalidInput for a
+  /// word beyond the vocabulary.
   [[nodiscard]] Status query(Stamp stamp, std::uint32_t epoch, const BagOfWords& bag, PlaceQuery& result);
-  /// Stores the keyframe. kCapacityReached where another left for it (its slot, or one of those that left,
-  /// is taken over); kInvalidInput for a word beyond the vocabulary, or a keyframe that cannot fit.
+  /// Stores the keyframe. kCapacityReached if others were removed for it; it then reuses a slot of theirs.
+  /// kInvalidInput for a word beyond the vocabulary, or a keyframe that cannot fit.
   [[nodiscard]] Status add(std::uint64_t index, Stamp stamp, std::uint32_t epoch, const BagOfWords& bag,
                            std::uint32_t& slot);
 
-  /// The keyframe of a slot leaves, and the slot is free. False where it holds none.
+  /// Removes the keyframe of a slot. False if the slot is free.
   bool forget(std::uint32_t slot);
 
   [[nodiscard]] std::size_t size() const { return size_; }
@@ -155,9 +154,9 @@ class PlaceDatabase {
   std::size_t size_ = 0;
   std::uint32_t oldest_ = kNoSlot;
   std::uint32_t newest_ = kNoSlot;
-  std::vector<float> scores_;  ///< of the query in hand, by slot
+  std::vector<float> scores_;  ///< of the present query, by slot
   std::vector<Hit> hits_;
-  std::vector<Island> islands_, before_;  ///< of the query in hand, of the one before
+  std::vector<Island> islands_, before_;  ///< of the present query and of the one before
   PlaceDatabaseCounts counts_;
 };
 

@@ -1,18 +1,17 @@
 #pragma once
-// A keyframe's features for place recognition: corners all over the image at several scales, and the
+// Features of a keyframe for place recognition: corners spread over the image at several scales, and the
 // odometry's tracked features, each with a descriptor of 256 bits.
 //
-// Corners: FAST-9/16 scores (fast_score.hpp) that are the maximum of their 3 x 3 pixels, in octaves of
-// ratio 1.2. Each octave gets a share of the features in proportion to its side, and takes them from the
-// cells of a grid in turn, the best of every cell first, so that the image is covered. Tracked features come
-// first: they are described in the octave where they are most of a corner, and keep the odometry's pixel and
-// name.
+// Corners are maxima of the FAST-9/16 score (fast_score.hpp) among 3 x 3 pixels, in octaves of ratio 1.2.
+// Each octave has a share of the features in proportion to its side and takes them from the cells of a grid
+// in turn, the best of every cell first, so that features cover the image. Tracked features come first: they
+// are described in the octave where they are most corner-like, and keep the odometry's pixel and id.
 //
-// Features keep the pixel of the distorted image and the unit bearing of camera 0; those where the camera
-// model has no inverse are left out. inverse_depth stays 0: others fill it in.
+// Features keep the pixel of the distorted image and the unit bearing of camera 0; those for which the camera
+// model has no inverse are left out. inverse_depth stays 0 (feature_depth.hpp sets it).
 //
-// Memory: reserved by the constructor, some 7 bytes a pixel of the image. No allocation after it, no
-// randomness: the same image gives the same bytes. Cost for 752 x 480 and 400 features: see docs/place.md.
+// Memory: reserved by the constructor, some 7 bytes a pixel of the image. No allocation afterwards, no
+// randomness: the same image gives the same bytes. Cost for 752 x 480 and 400 features: docs/place.md.
 
 #include <vector>
 
@@ -28,8 +27,8 @@
 namespace swiftlet {
 
 struct PlaceExtractorSettings {
-  int features = 400;  ///< at most, tracked ones included; up to kMaxPlaceFeatures
-  int tracked = 200;   ///< of these at most the odometry's
+  int features = 400;  ///< largest number, including tracked ones; up to kMaxPlaceFeatures
+  int tracked = 200;   ///< largest number of the odometry's tracked features
   int octaves = 8;     ///< 1 to kMaxOctaves
   int min_score = 7;   ///< grey levels: least contrast of a corner
 };
@@ -38,9 +37,9 @@ class PlaceExtractor {
  public:
   PlaceExtractor(int width, int height, const PlaceExtractorSettings& settings = {});
 
-  /// Fills `keyframe` but for its epoch and the depths. `tracked` gives index, stamp and the odometry's
-  /// features (those that camera 0 sees); without features only corners are described. kInvalidInput (and no
-  /// features) for an image of another size, kDegenerate for an image without any corner.
+  /// Fills `keyframe` except for its epoch and depths. `tracked` gives index, stamp and the odometry's
+  /// features in camera 0; without features only corners are described. kInvalidInput (and no features) for
+  /// an image of another size, kDegenerate for an image without a corner.
   template <typename Lanes = byte_lanes::Native>
   [[nodiscard]] Status extract(const ImageView& image, const CameraModel& camera, const TrackedFrame& tracked,
                                PlaceKeyframe& keyframe);
@@ -80,7 +79,7 @@ class PlaceExtractor {
   std::array<std::vector<std::uint8_t>, kMaxOctaves> scores_;  ///< as the pyramid's levels
   std::vector<std::uint8_t> peaks_;                            ///< of a row
   std::vector<Cell> cells_;
-  std::vector<Spot> spots_;  ///< of the octave in hand, in the order in which they are wanted
+  std::vector<Spot> spots_;  ///< of the present octave, in order of preference
 };
 
 }  // namespace swiftlet

@@ -1,5 +1,5 @@
 #pragma once
-// What place recognition keeps of a keyframe: its features' descriptors, where they were seen, and how far.
+// The data of a keyframe for place recognition: descriptors, pixels, bearings and depths of its features.
 
 #include <Eigen/Core>
 #include <array>
@@ -25,13 +25,13 @@ struct PlaceFeature {
   Eigen::Vector3f bearing = Eigen::Vector3f::UnitZ();  ///< camera 0, unit
   float inverse_depth = 0;                             ///< 1/m along the bearing (1 / distance); 0: unknown
   float inverse_depth_sigma = 0;                       ///< 1/m
-  std::int8_t octave = 0;                              ///< of the image pyramid it was found in
+  std::int8_t octave = 0;                              ///< of the image pyramid
   bool has_landmark = false;
-  TrackId landmark = 0;  ///< the odometry's, where has_landmark
+  TrackId landmark = 0;  ///< the odometry's, if has_landmark
 };
 
 struct PlaceKeyframe {
-  std::uint64_t index = 0;  ///< the frame's
+  std::uint64_t index = 0;  ///< of the frame
   Stamp stamp;
   std::uint32_t epoch = 0;
   FixedVector<PlaceFeature, kMaxPlaceFeatures> features;

@@ -1,9 +1,9 @@
 #pragma once
-// The image at shrinking scales, for features that are found again from nearer or further away.
+// Image pyramid for features that are recognized from nearer or farther away.
 //
-// Level l is the image scaled by kOctaveRatio^-l, each made from the one before by bilinear interpolation in
+// Level l is the image scaled by kOctaveRatio^-l, made from the level before by bilinear interpolation in
 // fixed point. Rows are padded so that kernels may read whole vectors. Memory: some 3.3 bytes a pixel of the
-// image, reserved by the constructor; about 1 ms for 752 x 480.
+// image, reserved by the constructor. About 1 ms for 752 x 480.
 
 #include <Eigen/Core>
 #include <array>
@@ -24,11 +24,11 @@ class PlacePyramid {
   PlacePyramid(int width, int height, int octaves);
 
   [[nodiscard]] int octaves() const { return octaves_; }
-  /// False, and nothing done, for an image of another size.
+  /// False, without effect, for an image of another size.
   template <typename Isa = simd::Native>
   [[nodiscard]] bool build(const ImageView& image);
   [[nodiscard]] ImageView level(int octave) const;
-  /// Between a pixel of a level and the same place in the image, both with (0,0) at a pixel's centre.
+  /// Converts between pixels of a level and of the image; (0,0) is the centre of a pixel in both.
   [[nodiscard]] Eigen::Vector2f toImage(int octave, const Eigen::Vector2f& pixel) const;
   [[nodiscard]] Eigen::Vector2f toLevel(int octave, const Eigen::Vector2f& pixel) const;
 
@@ -39,8 +39,8 @@ class PlacePyramid {
     int stride = 0;
     Eigen::Array2f ratio = Eigen::Array2f::Ones();  ///< pixels of the image per pixel, along x and y
     std::vector<std::uint8_t> pixels;
-    /// Where eight columns in a row come from in the level before: the first, and from there their left
-    /// neighbours and the weights of their right ones.
+    /// Source of eight consecutive columns in the level before: the first column, and from there the left
+    /// neighbours and the weights of the right ones.
     std::vector<std::int32_t> first;
     std::vector<std::int16_t> left, weight;
   };
@@ -50,7 +50,7 @@ class PlacePyramid {
 
   int octaves_;
   std::array<Level, kMaxOctaves> levels_;
-  std::vector<std::uint8_t> row_;  ///< a row of a level, blended of two
+  std::vector<std::uint8_t> row_;  ///< a row blended from two rows of a level
 };
 
 }  // namespace swiftlet

@@ -1,11 +1,11 @@
 #pragma once
-// From a keyframe's image to the earlier keyframes that may show the same place: features, words, query, and
-// then the keyframe joins the database.
+// Finds the earlier keyframes that may show the same place as a keyframe's image: features, words, query;
+// then adds the keyframe to the database.
 //
-// A stage of the low-priority side: memory fixed by the constructor, no clock, no randomness; the same
-// keyframes give the same bytes. Keyframes come in the order of time. The keyframe itself is not kept: who
-// verifies candidates keeps it at `slot`, which is its own until the database gives it to another. Cost: some
-// 4 ms for 752 x 480 and 2 000 keyframes (docs/place.md).
+// A low-priority stage: memory fixed by the constructor, no clock, no randomness; the same keyframes give the
+// same bytes. Keyframes must come in order of time. The stage does not keep the keyframe itself: the caller
+// that verifies candidates keeps it by `slot`, which belongs to the keyframe until the database reuses it.
+// Cost: some 4 ms for 752 x 480 and 2000 keyframes (docs/place.md).
 
 #include "estimator/camera/camera_model.hpp"
 #include "estimator/core/image_view.hpp"
@@ -21,7 +21,7 @@ struct PlaceStep {
   PlaceQuery query;
   BagOfWords bag;
   std::uint32_t slot = PlaceDatabase::kNoSlot;
-  bool forgot = false;  ///< another keyframe left for this one
+  bool forgot = false;  ///< another keyframe was removed for this one
 
   void clear() {
     query = {};
@@ -33,7 +33,7 @@ struct PlaceStep {
 
 class PlaceStage {
  public:
-  /// `vocabulary` outlives the stage.
+  /// `vocabulary` must outlive the stage.
   PlaceStage(const CameraModel& camera, const Vocabulary& vocabulary,
              const PlaceExtractorSettings& extractor = {}, const PlaceDatabaseSettings& database = {})
       : camera_(camera),
@@ -41,16 +41,16 @@ class PlaceStage {
         extractor_(camera.width(), camera.height(), extractor),
         database_(vocabulary.words(), database) {}
 
-  /// `image`: camera 0's; `tracked`: the keyframe's stamp, index and tracks. Not ok where the image gives no
-  /// features or the vocabulary is empty: then nothing was stored. Without candidates it is ok.
+  /// `image`: of camera 0. `tracked`: the keyframe's stamp, index and tracks. Not ok, and nothing stored, if
+  /// the image has no features or the vocabulary is empty. Ok without candidates.
   [[nodiscard]] Status step(const ImageView& image, const TrackedFrame& tracked, std::uint32_t epoch,
                             PlaceKeyframe& keyframe, PlaceStep& out);
 
-  /// The same for a keyframe whose features were extracted before.
+  /// The same for a keyframe whose features are already extracted.
   [[nodiscard]] Status step(const PlaceKeyframe& keyframe, PlaceStep& out);
   /// Stores such a keyframe without a query.
   [[nodiscard]] Status keep(const PlaceKeyframe& keyframe, PlaceStep& out);
-  /// The keyframe of a slot is needed no more.
+  /// Removes the keyframe of a slot.
   void forget(std::uint32_t slot) { static_cast<void>(database_.forget(slot)); }
   [[nodiscard]] const PlaceDatabase& database() const { return database_; }
 

@@ -1,5 +1,5 @@
 #pragma once
-// The bytes of mapping/place/vocabulary.swv, which the build makes part of the library.
+// The bytes of mapping/place/vocabulary.swv, which the build embeds in the library.
 
 #include <cstdint>
 #include <span>

@@ -14,8 +14,8 @@
 
 namespace swiftlet {
 
-/// `points[i]` in frame A, `bearings[i]` unit in camera B: poses T_A_B. Empty when the three points lie on a
-/// line or no distances fit.
+/// `points[i]` in frame A, `bearings[i]` unit in camera B: poses T_A_B. Empty if the points are collinear or
+/// no distances fit.
 FixedVector<SE3, 4> poseFromThreePoints(const std::array<Eigen::Vector3d, 3>& points,
                                         const std::array<Eigen::Vector3d, 3>& bearings);
 

@@ -1,10 +1,10 @@
 #pragma once
-// The words of place recognition: a tree of descriptors. A feature's word is the leaf that it reaches by
-// going to the nearest child (Hamming) from the root on (Nister, Stewenius, CVPR 2006; for binary descriptors
-// Galvez-Lopez, Tardos, "Bags of Binary Words for Fast Place Recognition in Image Sequences", T-RO 2012). A
-// word's weight says how rare it is among images (inverse document frequency).
+// The words of place recognition: a tree of descriptors. The word of a feature is the leaf reached from the
+// root through the nearest children by Hamming distance (Nister, Stewenius, CVPR 2006; for binary descriptors
+// Galvez-Lopez, Tardos, "Bags of Binary Words for Fast Place Recognition in Image Sequences", T-RO 2012). The
+// weight of a word is its inverse document frequency.
 //
-// Memory: 48 bytes a node, allocated where the tree is made (load, assemble); nothing after. Finding a word
+// Memory: 48 bytes a node, allocated by load() and assemble(); nothing afterwards. Finding a word
 // costs depth x branching Hamming distances, some 100 ns for 10 x 4.
 //
 // File ("compact"), little-endian: "SWPLACES", u32 version (1), u32 nodes without the root, u8 children of
@@ -21,7 +21,7 @@
 
 namespace swiftlet {
 
-/// A node as files list them: nodes are numbered from 1 in the order of the list, 0 is the root.
+/// A node in a list: nodes are numbered from 1 in the order of the list, 0 is the root.
 struct VocabularyNode {
   std::uint32_t parent = 0;
   Descriptor descriptor;
@@ -33,18 +33,18 @@ class Vocabulary {
   static constexpr int kMaxDepth = 16;
   static constexpr std::size_t kMaxChildren = 255;
 
-  /// The vocabulary that is part of the program. Made at the first call.
+  /// The vocabulary embedded in the program. Created at the first call.
   static const Vocabulary& shipped();
 
   /// From the compact form. On kInvalidInput the vocabulary is empty.
   [[nodiscard]] Status load(std::span<const std::uint8_t> bytes);
   [[nodiscard]] std::vector<std::uint8_t> compact() const;
-  /// From a list of nodes in any order. kInvalidInput (and an empty vocabulary) where they are no tree: a
-  /// parent that is not there, a cycle, more children or levels than the limits, a weight that is negative or
-  /// not finite.
+  /// From a list of nodes in any order. kInvalidInput, and an empty vocabulary, if they are not a valid tree:
+  /// a missing parent, a cycle, more children or levels than the limits, a weight that is negative or not
+  /// finite.
   [[nodiscard]] Status assemble(std::span<const VocabularyNode> nodes);
 
-  /// New weights, one for each word: finite, not negative; else kInvalidInput and no change.
+  /// Sets the weights, one for each word. kInvalidInput, without effect, if one is negative or not finite.
   [[nodiscard]] Status weigh(std::span<const float> weights);
 
   [[nodiscard]] std::size_t words() const { return words_; }
