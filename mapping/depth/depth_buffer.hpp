@@ -1,5 +1,5 @@
 #pragma once
-// A depth image with its memory: what DepthImageView borrows from. Sized once; a stage fills it in place.
+// A depth image that owns its memory; DepthImageView refers to it. Sized once; a stage fills it in place.
 
 #include <cstdint>
 #include <vector>
@@ -22,7 +22,7 @@ struct DepthBuffer {
   PinholeIntrinsics camera;
   SE3 T_body_camera;
   std::vector<float> depth;  ///< m; 0: none
-  std::vector<float> sigma;  ///< m; where there is a depth
+  std::vector<float> sigma;  ///< m; only valid where there is a depth
   std::vector<std::uint8_t> intensity;
   std::vector<std::uint8_t> labels;
   bool has_intensity = false;

@@ -1,6 +1,6 @@
 #pragma once
-// What follows the choice of disparities: speckles away, outliers smoothed, small holes closed.
-// Fixed memory, taken by the constructor; deterministic.
+// Filters of a disparity image: remove speckles, smooth outliers, fill small holes.
+// Fixed memory, allocated by the constructor; deterministic.
 
 #include <cstdint>
 #include <vector>
@@ -9,21 +9,21 @@
 
 namespace swiftlet {
 
-/// Removes patches of fewer than `least_pixels` connected pixels: 4-neighbours that differ by at most `step`
-/// belong together. Union-find over runs of pixels within rows (He, Chao, Suzuki, IEEE TIP 2008, without
-/// their second scan of pixels). Memory: 16 bytes a pixel (every pixel a run of its own).
+/// Removes patches of fewer than `least_pixels` connected pixels. 4-neighbours that differ by at most `step`
+/// are connected. Union-find over runs of pixels within rows (He, Chao, Suzuki, IEEE TIP 2008, without their
+/// second scan of pixels). Memory: 16 bytes a pixel, for the worst case of one run per pixel.
 class SpeckleFilter {
  public:
   SpeckleFilter(int width, int height);
 
-  /// `image` of the constructor's size. `step`: 1/kDisparitySteps px. Returns the pixels removed.
+  /// `image` has the constructor's size. `step`: 1/kDisparitySteps px. Returns the number of removed pixels.
   std::size_t remove(DisparityImage& image, int least_pixels, int step);
 
  private:
   struct Run {
-    std::uint32_t begin;   ///< pixel, over all rows
-    std::uint32_t parent;  ///< a run before, or itself
-    std::uint32_t pixels;  ///< at a root: of the patch
+    std::uint32_t begin;   ///< index of the first pixel, over all rows
+    std::uint32_t parent;  ///< an earlier run, or itself
+    std::uint32_t pixels;  ///< at a root: size of the patch
   };
 
   [[nodiscard]] std::uint32_t root(std::uint32_t run);
@@ -37,10 +37,10 @@ class SpeckleFilter {
   std::size_t used_ = 0;
 };
 
-/// Median of 3 x 3, and holes closed: a pixel without a disparity takes the median of its neighbours where at
-/// least kHoleNeighbours of the eight have one and these lie within a pixel of each other; its sigma is then
-/// kDisparitySteps (1 px). In the median of a pixel that has a disparity, it stands for neighbours without
-/// one. The image's border keeps its values.
+/// Median of 3 x 3 that also fills holes. A pixel without a disparity takes the median of its neighbours if
+/// at least kHoleNeighbours of the eight have one and these are within a pixel of each other; its sigma is
+/// then kDisparitySteps (1 px). In the median of a pixel with a disparity, its own value replaces those of
+/// neighbours without one. The border of the image keeps its values.
 class MedianFilter {
  public:
   static constexpr int kHoleNeighbours = 5;
@@ -52,7 +52,7 @@ class MedianFilter {
   void filterRow(const std::uint16_t* above, const std::uint16_t* here, const std::uint16_t* below,
                  std::uint16_t* out, std::uint8_t* sigma, int width);
 
-  std::vector<std::uint16_t> rows_;   ///< two rows as they were
+  std::vector<std::uint16_t> rows_;   ///< two unfiltered rows
   std::vector<std::uint16_t> known_;  ///< neighbours that have a disparity
 };
 

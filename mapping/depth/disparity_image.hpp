@@ -1,6 +1,6 @@
 #pragma once
-// Disparities of a rectified pair, in the left image's pixels: x_right = x_left - disparity. Fixed point,
-// with each one's standard deviation.
+// Disparities of a rectified pair for the pixels of the left image, x_right = x_left - disparity, with
+// standard deviations. Fixed point.
 
 #include <cstddef>
 #include <cstdint>
@@ -8,14 +8,14 @@
 
 namespace swiftlet {
 
-/// Steps of a pixel, of disparities and of their standard deviations.
+/// Steps per pixel of disparities and their standard deviations.
 inline constexpr int kDisparitySteps = 64;
 inline constexpr std::uint16_t kNoDisparity = 0xFFFF;
 
 class DisparityImage {
  public:
   DisparityImage() = default;
-  /// Memory for width x height: 3 bytes a pixel. Nothing known yet.
+  /// Memory: 3 bytes a pixel. All disparities are unknown.
   DisparityImage(int width, int height)
       : width_(width),
         height_(height),
@@ -25,7 +25,7 @@ class DisparityImage {
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] std::size_t pixels() const { return disparity_.size(); }
-  /// Row-major, no padding. 1/kDisparitySteps px; kNoDisparity where nothing is known.
+  /// Row-major, no padding. 1/kDisparitySteps px; kNoDisparity where unknown.
   [[nodiscard]] std::uint16_t* disparity() { return disparity_.data(); }
   [[nodiscard]] const std::uint16_t* disparity() const { return disparity_.data(); }
   /// 1/kDisparitySteps px; meaningless where there is no disparity.

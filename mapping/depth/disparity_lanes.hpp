@@ -1,7 +1,7 @@
 #pragma once
-// Thirty-two unsigned bytes, one a disparity (or one a pixel), for the matching kernels: AVX2, NEON (64-bit
-// ARM) and a scalar twin that defines the result. All operations are exact, so all three give the same bits.
-// Kernels are templates over the instruction set; tests run them with both `Native` and `Scalar`.
+// Vectors of 32 unsigned bytes, one per disparity (or pixel), for the matching kernels: AVX2, NEON (64-bit
+// ARM) and a scalar version that defines the result. All operations are exact, so all three give the same
+// bits. Kernels are templates over the instruction set; tests run them with both `Native` and `Scalar`.
 
 #include <bit>
 #include <cstdint>
@@ -77,7 +77,7 @@ struct Scalar {
     for (int i = 0; i < kLanes; ++i) v.lane[i] = mask.lane[i] != 0 ? a.lane[i] : b.lane[i];
     return v;
   }
-  /// Ones among each lane's bits.
+  /// Number of set bits of each lane.
   static Bytes bitCount(const Bytes& a) {
     return each(a, a, [](int x, int) { return std::popcount(static_cast<unsigned>(x)); });
   }
@@ -103,7 +103,7 @@ struct Scalar {
   /// The least of the lanes in every lane.
   static Bytes spreadLeast(const Bytes& v) { return broadcast(least(v)); }
   static std::uint8_t last(const Bytes& v) { return v.lane[kLanes - 1]; }
-  /// Place of the first lane that is set in a mask of 0 and 255; kLanes where there is none.
+  /// Index of the first set lane of a mask of 0 and 255; kLanes if there is none.
   static int firstSet(const Bytes& mask) {
     for (int i = 0; i < kLanes; ++i) {
       if (mask.lane[i] != 0) return i;
@@ -238,7 +238,7 @@ using Native = Scalar;
 
 #endif
 
-/// Where the kernels have to be instantiated for both.
+/// Instantiates the kernels for both.
 #ifdef SWIFTLET_SIMD_NATIVE
 #define SWIFTLET_DISPARITY_LANES_NATIVE
 #endif

@@ -1,11 +1,11 @@
 #pragma once
-// A raw camera's images as an ideal pinhole camera at the same place sees them: bilinear for grey, the
-// nearest pixel for labels.
+// Warps images of a raw camera to those of an ideal pinhole camera with the same centre: bilinear for grey
+// values, nearest pixel for labels.
 //
-// The map is computed once: position in whole pixels and 1/128 px, 6 bytes a pixel; at run time integers
-// only, about 2 ns a pixel. Pixels without a raw one (outside the raw image, or where the model has no
-// inverse) are 0. Errors: kInvalidInput (image missing, or not of the camera's size); the output is untouched
-// then.
+// The map is computed once: position in whole pixels and 1/128 px, 6 bytes a pixel. Warping uses integers
+// only, about 2 ns a pixel. Pixels without a raw pixel (outside the raw image, or where the model has no
+// inverse) are 0. Errors: kInvalidInput (image missing, or not of the camera's size); the output is then
+// unchanged.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -21,24 +21,24 @@ namespace swiftlet {
 
 class ImageWarp {
  public:
-  /// Raw images have at most so many pixels a side: maps hold positions in 16 bits.
+  /// Largest side of a raw image [px], because maps hold positions in 16 bits.
   static constexpr int kMaxSide = 16384;
 
-  /// Maps nothing: every image is refused.
+  /// An empty map, which refuses every image.
   ImageWarp() = default;
-  /// `R_cam_target`: ideal camera to raw camera.
+  /// `R_cam_target`: rotation from ideal camera to raw camera.
   ImageWarp(const CameraModel& camera, const Eigen::Matrix3d& R_cam_target, const PinholeIntrinsics& target);
 
-  /// `out`: the target's pixels, rows packed.
+  /// `out`: pixels of the target, without padding.
   Status warp(const ImageView& raw, std::uint8_t* out) const;
   Status warpLabels(const ImageView& raw, std::uint8_t* out) const;
 
   [[nodiscard]] std::size_t pixels() const { return map_.size(); }
-  /// False where the target's pixel has no raw one.
+  /// False if the target's pixel has no raw pixel.
   [[nodiscard]] bool covered(std::size_t pixel) const { return map_[pixel].x >= 0; }
 
  private:
-  /// Top left of the four raw pixels, and the place between them.
+  /// Top left of the four raw pixels, and the position between them.
   struct Source {
     std::int16_t x = -1;  ///< negative: none
     std::int16_t y = -1;

@@ -1,15 +1,14 @@
 #pragma once
 // Dense disparities of a rectified pair by semi-global matching (Hirschmuller, PAMI 2008): centre-symmetric
 // census, four paths, equiangular sub-pixel, left-right check from the same sums, speckle filter, median.
-// Works in strips of rows: the upward path begins kRowsAhead rows below a strip, so no volume over the image
-// is kept. docs/depth.md has the equations and figures.
+// Works in strips of rows: the upward path begins kRowsAhead rows below a strip, so no cost volume of the
+// whole image is kept. Equations: docs/depth.md.
 //
-// Input: rectified images of the constructor's size, x_right = x_left - disparity along a row, row for row.
-// Output: DisparityImage, in the left image's pixels. Errors: kInvalidInput (an image missing or of another
-// size); the output is untouched then. Memory: fixed by the constructor, 16 bytes a pixel and 98 rows of
+// Input: rectified images of the constructor's size; x_right = x_left - disparity on the same row. Output:
+// DisparityImage for the pixels of the left image. Errors: kInvalidInput (an image missing or of another
+// size); the output is then unchanged. Memory: fixed by the constructor, 16 bytes a pixel and 98 rows of
 // width x disparities bytes (10.5 MB at 752 x 480 and 64 disparities). Time is proportional to pixels x
-// disparities. One thread, no clock, no randomness; the native instruction set and the scalar twin give the
-// same bytes.
+// disparities. One thread, no clock, no randomness; native and scalar instruction sets give the same bytes.
 
 #include <array>
 #include <cstdint>
@@ -24,29 +23,29 @@
 
 namespace swiftlet {
 
-/// Costs are counts of census signs that differ, 0 .. 31. The defaults were chosen together on the pairs with
+/// Costs are numbers of census signs that differ, 0 .. 31. The defaults were chosen jointly on pairs with
 /// true disparity and on rendered flights.
 struct MatcherSettings {
   int disparities = 64;            ///< 0 .. disparities - 1 px: 32, 64, 96 or 128
-  int small_penalty = 12;          ///< disparity changes by one pixel from a pixel to the next
-  int large_penalty = 100;         ///< changes by more, where both have the same grey
-  int large_penalty_falloff = 15;  ///< grey levels of difference that halve the large penalty
+  int small_penalty = 12;          ///< P1: disparity changes by one pixel between neighbours
+  int large_penalty = 100;         ///< P2: disparity changes by more, at equal grey values
+  int large_penalty_falloff = 15;  ///< difference in grey levels that halves the large penalty
   int least_large_penalty = 12;
-  int outside_cost = 10;         ///< matching cost where the other pixel is outside the right image
-  int left_right_tolerance = 1;  ///< px, between the two images' disparities; negative: no check
-  int least_lead = 0;  ///< of the best sum over the next best that is no neighbour of it; less: no disparity
-  int speckle_pixels = 60;  ///< patches smaller than this are removed; 0: none
-  double speckle_step = 1;  ///< px, between neighbours of a patch
-  bool median = true;       ///< of 3 x 3, closing small holes
+  int outside_cost = 10;         ///< matching cost if the other pixel is outside the right image
+  int left_right_tolerance = 1;  ///< px, between disparities of both images; negative: no check
+  int least_lead = 0;            ///< least lead of the best sum over the next best that is not its neighbour
+  int speckle_pixels = 60;       ///< patches smaller than this are removed; 0: none
+  double speckle_step = 1;       ///< px, largest difference between neighbours of a patch
+  bool median = true;            ///< median of 3 x 3, which also fills small holes
 };
 
 class SemiGlobalMatcher {
  public:
-  /// Settings outside their ranges are brought into them.
+  /// Settings outside their ranges are clamped.
   SemiGlobalMatcher(int width, int height, const MatcherSettings& settings = {});
 
-  /// `disparities`: searched in this call, at most the settings' (0: those); less costs less and leaves out
-  /// what is near. `disparity` is of the constructor's size.
+  /// `disparities`: number searched in this call, at most the settings' (0: the settings'); fewer take less
+  /// time and lose near objects. `disparity` has the constructor's size.
   template <typename Lanes = disparity_lanes::Native>
   Status match(const ImageView& left, const ImageView& right, int disparities, DisparityImage& disparity);
 
@@ -55,11 +54,11 @@ class SemiGlobalMatcher {
   [[nodiscard]] const MatcherSettings& settings() const { return settings_; }
 
  private:
-  /// Rows of a strip, and how far below it the upward path begins: at least so many rows, and at most both,
-  /// tell on a pixel from below.
+  /// Rows of a strip, and rows below it where the upward path begins. Between kRowsAhead rows and the sum of
+  /// both influence a pixel from below.
   static constexpr int kStripRows = 48;
   static constexpr int kRowsAhead = 16;
-  /// Kept rows of one image, with margins: the strip, the rows ahead and the census window about them.
+  /// Kept rows of one image, with margins: the strip, the rows ahead and the census window around them.
   static constexpr int kKeptRows = 72;
   static_assert(kStripRows + kRowsAhead + 2 * kCensusRowReach <= kKeptRows);
 
@@ -91,7 +90,7 @@ class SemiGlobalMatcher {
   int height_;
   MatcherSettings settings_;
   PathPenalties penalties_;
-  std::array<std::uint8_t, 64 * 64> sigmas_;  ///< 1/kDisparitySteps px, by lead and rise of sums, in fours
+  std::array<std::uint8_t, 64 * 64> sigmas_;  ///< 1/kDisparitySteps px, by lead / 4 and rise / 4 of sums
   int row_bytes_;                             ///< of a kept row with its margins
   std::vector<std::uint8_t> left_rows_;
   std::vector<std::uint8_t> right_rows_;  ///< mirrored

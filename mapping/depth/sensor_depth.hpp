@@ -1,12 +1,12 @@
 #pragma once
-// A depth sensor's image to a depth image with standard deviations: 16-bit counts (a log's `depth0`) or
-// metres as float.
+// Image of a depth sensor to a depth image with standard deviations: 16-bit counts (a log's `depth0`) or
+// float metres.
 //
-// Depth is along the axis of an ideal pinhole camera. No depth: count 0, NaN or infinite, not positive, out
-// of range; each kind is counted. sigma = floor + square (z - knee)^2 for z > knee, floor below; the defaults
-// are Kinect's (Nguyen, Izadi, Lovell, 3DIMPVT 2012, eq. 2). Grey values and labels of a camera are brought
-// by mapping/map/view_warp.hpp. Errors: kInvalidInput (missing, or of another size): the output is untouched,
-// counted. Deterministic.
+// Depth is along the axis of an ideal pinhole camera. Count 0, NaN, infinite, not positive and out of range
+// are no depth; each kind is counted. sigma = floor + square (z - knee)^2 for z > knee, floor below; the
+// defaults are Kinect's (Nguyen, Izadi, Lovell, 3DIMPVT 2012, eq. 2). mapping/map/view_warp.hpp adds grey
+// values and labels of a camera. Errors: kInvalidInput (missing, or of another size), counted; the output is
+// then unchanged. Deterministic.
 
 #include <cstdint>
 
@@ -27,11 +27,11 @@ struct SensorDepthSettings {
 
 struct SensorDepthCounters {
   std::uint64_t images = 0;
-  std::uint64_t refused = 0;  ///< images of another size, or missing
+  std::uint64_t refused = 0;  ///< images missing or of another size
   std::uint64_t pixels = 0;
   std::uint64_t missing = 0;       ///< count or value 0
   std::uint64_t not_finite = 0;    ///< NaN or infinite
-  std::uint64_t out_of_range = 0;  ///< negative, nearer or farther than asked for
+  std::uint64_t out_of_range = 0;  ///< negative, or outside min_depth to max_depth
 };
 
 class SensorDepth {
@@ -41,7 +41,7 @@ class SensorDepth {
 
   [[nodiscard]] DepthBuffer makeBuffer() const;
 
-  /// `stride`: values from row to row. The output's grey and labels are taken away.
+  /// `stride`: values per row. Clears the output's grey values and labels.
   Status step(const std::uint16_t* counts, int width, int height, int stride, Stamp stamp, DepthBuffer& out);
   Status step(const float* metres, int width, int height, int stride, Stamp stamp, DepthBuffer& out);
 

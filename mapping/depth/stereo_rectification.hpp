@@ -1,11 +1,11 @@
 #pragma once
-// Two raw cameras to one ideal pair: the same pinhole intrinsics, no distortion, rows aligned, so that a
-// point at depth z is seen on one row, x_right = x_left - f b / z.
+// Rectifies two raw cameras to an ideal pair: equal pinhole intrinsics, no distortion, aligned rows, so that
+// a point at depth z is on the same row of both, with x_right = x_left - f b / z.
 //
-// Geometry: the rectified frames' x axis is the baseline (cam0 to cam1); z is the mean of the two optical
-// axes, made perpendicular to it. The image keeps the raw size; focal length and centre are such that every
-// rectified pixel sees both raw images, as large a field as that allows, within kMaxFieldTangent for
-// fisheyes. Source: Fusiello, Trucco, Verri, Machine Vision and Applications 2000.
+// Geometry: the x axis of the rectified frames is the baseline (cam0 to cam1); z is the mean of the two
+// optical axes, made perpendicular to it. The image keeps the raw size. Focal length and centre give the
+// largest field in which every rectified pixel sees both raw images, within kMaxFieldTangent for fisheyes.
+// Source: Fusiello, Trucco, Verri, Machine Vision and Applications 2000.
 
 #include <Eigen/Core>
 #include <array>
@@ -23,11 +23,11 @@ class StereoRectification {
   /// Largest tangent of the angle between a ray and the axis, in x and in y: 56 degrees.
   static constexpr double kMaxFieldTangent = 1.5;
 
-  /// Two cameras of one size. `status()` says what is wrong with others; nothing can be rectified then.
+  /// Needs two cameras of one size. For other rigs `status()` gives the reason and nothing can be rectified.
   explicit StereoRectification(const Rig& rig);
 
   [[nodiscard]] const Status& status() const { return status_; }
-  /// Of both rectified images.
+  /// Intrinsics of both rectified images.
   [[nodiscard]] const PinholeIntrinsics& intrinsics() const { return intrinsics_; }
   [[nodiscard]] double baseline() const { return baseline_; }
   /// Rectified camera 0 to body.
@@ -37,7 +37,7 @@ class StereoRectification {
     return R_cam_rectified_[camera];
   }
 
-  /// Raw images of a camera to the rectified geometry; camera 0's label images too.
+  /// Warps raw images of a camera to the rectified geometry, and label images of camera 0.
   [[nodiscard]] const ImageWarp& warp(std::size_t camera) const { return warps_[camera]; }
 
  private:
@@ -50,7 +50,7 @@ class StereoRectification {
   SE3 T_body_camera_;
   std::array<Eigen::Matrix3d, kMaxCameras> R_cam_rectified_;
   std::array<ImageWarp, kMaxCameras> warps_;
-  Status status_;  ///< last: building fills the others
+  Status status_;  ///< declared last, because its initialization sets the other members
 };
 
 }  // namespace swiftlet

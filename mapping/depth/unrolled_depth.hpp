@@ -1,13 +1,14 @@
 #pragma once
-// A rolling shutter's depth image as all of it would be seen from where the camera was at the middle row.
+// Converts the depth image of a rolling shutter to the camera's pose at the middle row.
 //
-// Each pixel of the result looks for the pixel that shows it: where a point at its depth was when that row
-// was read, found in two rounds; the depth there, moved to the middle row's camera, is its own, with its
-// sigma, grey value and label. Nearest pixel, no interpolation; what the motion uncovers has no depth.
-// Rectified rows are not raw ones: the two cameras read the same rectified row some 0.3 ms apart, in which
-// the image moves by a tenth of a pixel. The disparity is put right by that. Memory: 2 bytes a pixel for the
-// raw rows, and a second depth image beside the first, 10 bytes a pixel, by the constructor. Cost: some 90 ns
-// a pixel, one thread; nothing is allocated. docs/depth.md.
+// Each pixel of the result searches the pixel that shows the same point: a point at its depth, moved to the
+// time when that row was read, found in two rounds. It takes that pixel's depth, transformed to the camera at
+// the middle row, with sigma, grey value and label. Nearest pixel, no interpolation; pixels that the motion
+// uncovers have no depth.
+// The two cameras read the same rectified row some 0.3 ms apart, because rectified rows are not raw rows. The
+// image moves by a tenth of a pixel in that time, and the disparity is corrected for it. Memory: 2 bytes a
+// pixel for the raw rows and 10 bytes a pixel for a second depth image, allocated by the constructor. Cost:
+// some 90 ns a pixel, one thread; no allocation. docs/depth.md.
 
 #include <Eigen/Core>
 #include <array>
@@ -24,14 +25,14 @@ namespace swiftlet {
 
 class UnrolledDepth {
  public:
-  /// `ideal` can rectify; depth images are of its camera 0.
+  /// `ideal` must have an ok status; depth images are of its camera 0.
   UnrolledDepth(const Rig& rig, const StereoRectification& ideal);
 
-  /// In place.
+  /// Works in place.
   void apply(const ScanMotion& motion, DepthBuffer& depth);
 
  private:
-  /// Of the raw image's rows, so many at a time: to 0.1 ms of 20, 0.05 px at 1 rad/s.
+  /// Bands of raw rows that share one pose: accurate to 0.1 ms of 20 ms, 0.05 px at 1 rad/s.
   static constexpr std::size_t kBands = 256;
   struct Band {
     double seconds = 0;  ///< after the middle row

@@ -1,9 +1,9 @@
 #pragma once
-// From a block's key to its slot: open addressing with linear probing in a table of fixed size.
+// Hash table from a block's key to its slot: open addressing with linear probing, fixed size.
 //
-// At most half full, so that a look-up probes few entries; probing ends after kMostProbes, and an entry that
-// would lie farther from its home is refused. Removing moves the followers up: no tombstones, so the table
-// does not age. Not for iteration.
+// The table is at most half full, so that a look-up probes few entries. Probing ends after kMostProbes, and
+// an entry that would be farther from its home is refused. Removal moves the following entries up instead of
+// leaving tombstones, so look-ups do not become slower over time. Not for iteration.
 
 #include <cstddef>
 #include <cstdint>
@@ -11,8 +11,8 @@
 
 namespace swiftlet {
 
-/// The high bits are spread evenly: Fibonacci hashing (Knuth, TAOCP 3, 6.4) after a fold that brings the high
-/// coordinate down.
+/// Fibonacci hashing (Knuth, TAOCP 3, 6.4), whose high bits are evenly spread, after folding the high
+/// coordinate into the low bits.
 inline std::uint64_t mixedKey(std::uint64_t key) { return (key ^ (key >> 31U)) * 0x9E3779B97F4A7C15ULL; }
 
 class BlockHash {
@@ -20,7 +20,7 @@ class BlockHash {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
   static constexpr std::uint32_t kMostProbes = 128;
 
-  /// For `entries` keys; 16 bytes for each of the next power of two of twice as many.
+  /// For `entries` keys. Memory: 16 bytes times twice as many, rounded up to a power of two.
   explicit BlockHash(std::size_t entries);
 
   [[nodiscard]] std::uint32_t find(std::uint64_t key) const {
@@ -33,16 +33,16 @@ class BlockHash {
     }
     return kNone;
   }
-  /// False when there is no place within kMostProbes of the key's home. The key (never 0) is not in the
+  /// False if there is no free entry within kMostProbes of the key's home. The key must not be 0 nor in the
   /// table.
   [[nodiscard]] bool insert(std::uint64_t key, std::uint32_t slot);
-  /// False when it was not there.
+  /// False if the key is not in the table.
   bool erase(std::uint64_t key);
   void clear();
 
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] std::size_t bytes() const { return table_.size() * sizeof(Entry); }
-  /// What a table for `entries` keys takes.
+  /// Memory of a table for `entries` keys.
   static std::size_t bytesFor(std::size_t entries);
 
  private:

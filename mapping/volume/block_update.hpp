@@ -1,13 +1,14 @@
 #pragma once
-// One block against one depth image: every voxel is projected into the image, and the depth it meets there
-// moves its distance (Curless, Levoy, "A Volumetric Method for Building Complex Models from Range Images",
-// SIGGRAPH 1996).
+// Updates one block from one depth image: every voxel is projected into the image, and the depth measured
+// there updates its distance (Curless, Levoy, "A Volumetric Method for Building Complex Models from Range
+// Images", SIGGRAPH 1996).
 //
-// With depth d of the pixel that a voxel's centre falls on, z the centre's own depth and |p| its distance
-// from the camera, the distance along the ray is s = (d - z) |p| / z. Observed are -behind <= s; s is cut at
-// the truncation distance, so that free voxels are carved; the weight falls from one voxel behind the surface
-// to zero at `behind` (Bylow et al., RSS 2013; Oleynikova et al., IROS 2017). Averages run up to most_weight.
-// Eight voxels at a time (lanes.hpp). Cost: docs/volume.md.
+// Let d be the depth of the pixel that a voxel's centre falls on and z the centre's own depth. The voxel's
+// distance s is d - z times the pixel's slope, its distance to the plane that the pixel shows
+// (prepared_image.hpp). Voxels with -behind <= s are observed; s is cut at the truncation distance, so that
+// free voxels are carved. The weight falls from one voxel behind the surface to zero at `behind` (Bylow et
+// al., RSS 2013; Oleynikova et al., IROS 2017). Averages run up to most_weight. Eight voxels at a time
+// (lanes.hpp). Cost: docs/experiments/map.md.
 
 #include <Eigen/Core>
 #include <array>
@@ -21,27 +22,27 @@
 
 namespace swiftlet {
 
-/// On which sides of a surface a block has observed voxels, as in BlockHeader.
+/// The sides of a surface on which a block has observed voxels (BlockHeader::sides).
 std::uint8_t sidesOf(const VoxelBlock& block);
 
-/// What all blocks of an image share.
+/// Holds the data that all blocks of an image share.
 class BlockUpdate {
  public:
   explicit BlockUpdate(const VolumeSettings& settings);
 
-  /// Before the blocks of an image, which outlives them.
+  /// Call before the blocks of an image. The image must outlive their updates.
   void begin(const PreparedImage& image, const SE3& T_camera_world);
 
   struct Result {
     std::uint32_t observed = 0;  ///< voxels
     float largest_change = 0;    ///< of a distance [steps]
-    std::uint8_t sides = 0;      ///< as in BlockHeader, after the update
-    bool news = false;           ///< a first observation, a changed side or most frequent label
+    std::uint8_t sides = 0;      ///< BlockHeader::sides after the update
+    bool news = false;           ///< a first observation, or a side or most frequent label changed
   };
 
-  /// By projection. `labels` may be null.
+  /// Updates by projection. `labels` may be null.
   Result project(const BlockIndex& index, VoxelBlock& block, LabelBlock* labels) const;
-  /// The whole block was seen free.
+  /// Updates a block that was seen free as a whole.
   Result carve(VoxelBlock& block) const;
 
  private:
@@ -56,7 +57,7 @@ class BlockUpdate {
   VolumeSettings settings_;
   const PreparedImage* image_ = nullptr;
   SE3 T_camera_world_;
-  /// From a block's first voxel to each of its voxels, in camera axes.
+  /// Vectors from a block's first voxel to each of its voxels, in camera axes.
   alignas(64) std::array<float, kBlockVoxels> x_{}, y_{}, z_{};
 };
 

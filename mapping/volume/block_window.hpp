@@ -1,5 +1,5 @@
 #pragma once
-// Which blocks around the camera an image has met already: one bit each in a cube of fixed size.
+// Marks the blocks around the camera that an image has already met: one bit each in a cube of fixed size.
 
 #include <algorithm>
 #include <bit>
@@ -12,14 +12,14 @@ namespace swiftlet {
 
 class BlockWindow {
  public:
-  /// Reaches `reach` blocks from the centre in every direction.
+  /// Extends `reach` blocks from the centre in every direction.
   explicit BlockWindow(int reach)
       : side_(static_cast<int>(std::bit_ceil(static_cast<unsigned>(2 * std::max(reach, 1) + 2)))),
         bits_(std::countr_zero(static_cast<unsigned>(side_))),
         met_((std::size_t{1} << (3 * bits_)) / 64 + 1) {}
 
   void clear() { std::fill(met_.begin(), met_.end(), 0); }
-  /// `from_centre` in blocks. False where it was met before or lies outside of the window.
+  /// `from_centre` in blocks. False if the block was met before or is outside the window.
   bool meet(const BlockIndex& from_centre) {
     const auto half = side_ / 2;
     const auto x = static_cast<unsigned>(from_centre.x + half),

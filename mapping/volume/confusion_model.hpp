@@ -1,11 +1,10 @@
 #pragma once
-// From how often which label was seen at a place to the most likely label and its probability.
+// Computes the most likely label of a voxel and its probability from its label counts.
 //
-// The model C(s, t) is the probability that a segmentation says s where t is true. With even priors Bayes'
+// The model C(s, t) is the probability that a segmentation reports s if t is true. With even priors Bayes'
 // rule gives P(t | counts) proportional to the product over s of C(s, t)^count(s) (McCormac et al.,
-// "SemanticFusion", ICRA 2017; Rosinol et al., ICRA 2020), so the counts are all that a voxel has to keep.
-// Label 0 (unknown) and labels that the model does not have are neither true nor counted. A table answers
-// where a place saw one label only.
+// "SemanticFusion", ICRA 2017; Rosinol et al., ICRA 2020), so counts are sufficient. Label 0 (unknown) and
+// labels beyond the model are ignored. Voxels with a single label are looked up in a table.
 
 #include <array>
 #include <cstdint>
@@ -23,15 +22,15 @@ struct LabelEstimate {
 
 class ConfusionModel {
  public:
-  /// Rows: what was said; columns: what is true. Label 0 is left out of both.
+  /// Rows: reported label; columns: true label. Without label 0.
   using Matrix = std::array<std::array<float, kLabelValues>, kLabelValues>;
 
-  /// `labels` values (0 included): right with probability `right`, wrong with all others alike.
+  /// `labels` values including 0: right with probability `right`, all wrong labels equally likely.
   explicit ConfusionModel(int labels = kLabelValues, float right = 0.9F);
 
-  /// kInvalidInput, and nothing is changed, where an entry of the first `labels` labels is no probability or
-  /// a column does not sum to 1 within 1 %. Zeros count as 1e-4: one wrong pixel must not rule out a label
-  /// for ever.
+  /// kInvalidInput, without effect, if an entry of the first `labels` labels is not a probability or a column
+  /// does not sum to 1 within 1 %. Zeros count as 1e-4, because one wrong pixel must not rule out a label
+  /// forever.
   [[nodiscard]] Status set(const Matrix& matrix, int labels);
 
   [[nodiscard]] LabelEstimate estimate(const LabelCounts& counts) const;
@@ -41,7 +40,7 @@ class ConfusionModel {
 
   int labels_ = kLabelValues;
   std::array<std::array<float, kLabelValues>, kLabelValues> log_{};
-  /// Of places that saw one label only, by count; longer runs are as certain as the last entry.
+  /// Estimates of voxels with a single label, by count; larger counts use the last entry.
   static constexpr std::size_t kTable = 16;
   std::array<std::array<LabelEstimate, kTable>, kLabelValues> alone_{};
 };

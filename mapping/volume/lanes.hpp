@@ -1,6 +1,6 @@
 #pragma once
-// Eight numbers side by side, by the vector types that GCC and Clang have for every machine: the same
-// arithmetic lane by lane, rounded alike, on AVX2 and on NEON (two registers there).
+// Vectors of eight numbers by the vector extensions of GCC and Clang: the same arithmetic and rounding per
+// lane on AVX2 and on NEON (two registers there).
 
 #include <array>
 #include <cstdint>

@@ -1,10 +1,9 @@
 #pragma once
-// A depth image made ready for the update: checked pixels, packed attributes, and a pyramid of how far the
-// view is free.
+// A depth image prepared for the update: checked pixels, packed attributes, and a pyramid of free depth.
 //
-// A pixel is one number: above 0 a measured depth; below 0 free up to its absolute value and nothing known
-// beyond (masked labels, depths beyond the range); 0 unmeasured. One pixel more than the image has stands for
-// everything outside of it, unmeasured. Buffers are reserved at construction.
+// A pixel is one number. Above 0: a measured depth. Below 0: free up to its absolute value, unknown beyond
+// (masked labels, depths beyond the range). 0: unmeasured. One additional pixel, unmeasured, stands for
+// everything outside the image. Buffers are reserved at construction.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,46 +18,46 @@ namespace swiftlet {
 struct PixelCounters {
   std::uint64_t unmeasured = 0;  ///< zero, negative, NaN, infinite, or nearer than the range
   std::uint64_t beyond_range = 0;
-  std::uint64_t uncertain = 0;  ///< deviation beyond most_sigma: free up to kSureSigmas before it
+  std::uint64_t uncertain = 0;  ///< sigma above most_sigma: free up to kSureSigmas in front of the depth
   std::uint64_t masked = 0;
-  std::uint64_t bad_label = 0;  ///< out of range: taken as unknown
+  std::uint64_t bad_label = 0;  ///< out of range: treated as unknown
 };
 
 class PreparedImage {
  public:
-  /// Pixels along a tile's edge at the pyramid's finest level.
+  /// Edge of a tile at the finest level of the pyramid [px].
   static constexpr int kTile = 8;
   static constexpr int kMostLevels = 12;
-  /// Nothing nearer than this many deviations before an uncertain measurement.
+  /// An uncertain measurement marks free space up to this many sigmas in front of it.
   static constexpr float kSureSigmas = 3;
-  /// A surface seen at a more glancing angle than 84 degrees counts as seen at that.
+  /// Limits the angle between ray and normal to 84 degrees.
   static constexpr float kLeastSlope = 0.1F;
-  /// A tile in which fewer of the pixels are measured says nothing.
+  /// A tile with fewer measured pixels is unknown.
   static constexpr int kLeastMeasured = kTile * kTile / 2;
 
   explicit PreparedImage(std::size_t most_pixels);
 
-  /// kInvalidInput where the image is empty, has more than `most_pixels`, impossible intrinsics or no depth.
+  /// kInvalidInput if the image is empty, has more than `most_pixels`, impossible intrinsics or no depth.
   [[nodiscard]] Status prepare(const DepthImageView& image, const VolumeSettings& settings,
                                PixelCounters& counters);
 
   [[nodiscard]] const PinholeIntrinsics& camera() const { return camera_; }
   /// width * height + 1 values.
   [[nodiscard]] const float* depth() const { return depth_.data(); }
-  /// What a metre of depth in front of each pixel's surface is in metres from that surface: the cosine
-  /// between ray and normal by the length of the ray for a metre of depth. From differences of inverse depth,
-  /// which is linear in the pixel on a plane; of the two neighbours along an axis the one that is nearer in
-  /// depth, so that the edge of a thing does not turn its normal. 1 where nothing was measured.
+  /// Converts depth in front of a pixel's surface to distance from that surface [m/m]: the cosine between ray
+  /// and normal times the length of the ray per metre of depth. From differences of inverse depth, which is
+  /// linear in the pixel on a plane. Of the two neighbours along an axis the one nearer in depth is used, so
+  /// that the edge of an object does not tilt its normal. 1 where nothing was measured.
   [[nodiscard]] const float* slope() const { return slope_.data(); }
-  /// Weight of each pixel, in kWeightSteps; null where all have evenWeight().
+  /// Weight of each pixel, in kWeightSteps; null if all have evenWeight().
   [[nodiscard]] const float* weight() const { return is_even_ ? nullptr : weight_.data(); }
   [[nodiscard]] float evenWeight() const { return even_weight_; }
-  /// Null where the image has none.
+  /// Null if the image has none.
   [[nodiscard]] const std::uint8_t* grey() const { return grey_; }
   [[nodiscard]] const std::uint8_t* labels() const { return has_labels_ ? label_.data() : nullptr; }
 
   /// A depth [m] up to which all measured pixels of the rectangle (inclusive, within the image) are free; 0
-  /// where too little is measured. Never more than the truth, less by what a coarse level blurs.
+  /// if too few are measured. A lower bound: coarse levels of the pyramid make it smaller, never larger.
   [[nodiscard]] float freeDepth(int left, int top, int right, int bottom) const;
   /// The deepest measured pixel of the tile (column, row at level 0), or 0.
   [[nodiscard]] float deepest(int column, int row) const {
@@ -86,7 +85,7 @@ class PreparedImage {
   std::vector<float> depth_;
   std::vector<float> weight_;
   std::vector<float> slope_;
-  std::vector<float> inverse_;  ///< depth; 0 where nothing was measured
+  std::vector<float> inverse_;  ///< inverse depth; 0 where nothing was measured
   std::vector<std::uint8_t> label_;
   const std::uint8_t* grey_ = nullptr;
   bool has_labels_ = false;

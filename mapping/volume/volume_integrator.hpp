@@ -1,24 +1,22 @@
 #pragma once
 // The stage that fuses depth images into a volume.
 //
-// 1. Band: the blocks within a voxel of a measured surface point are listed, and room is made for the new
-// ones.
-// 2. Bundles: all rays of a tile of 16 x 16 pixels walk as one through the blocks up to the deepest of their
-//    pixels (Amanatides, Woo, 1987); a block that the image has met already is passed over. This is the
-//    "fast" bundled ray casting of Voxblox (Oleynikova et al., IROS 2017) on blocks in place of voxels. A
-//    block that lies in front of everything measured is free as a whole; of others, those with voxels are
-//    updated.
+// 1. Band: lists the blocks within a voxel of a measured surface point and makes room for the new ones.
+// 2. Bundles: all rays of a tile of 16 x 16 pixels walk as one through the blocks up to their deepest pixel
+//    (Amanatides, Woo, 1987), skipping blocks that the image has already met. This is the "fast" bundled ray
+//    casting of Voxblox (Oleynikova et al., IROS 2017) on blocks instead of voxels. A block in front of
+//    everything measured is free as a whole; of the others, those with voxels are updated.
 // 3. Update: block_update.hpp, voxel by voxel.
 //
-// A block near surface for which the volume has no room is fused apart, from this image alone, and given away
-// (BlockOverflow): who keeps blocks elsewhere lays it over what was given before.
+// A block near a surface for which the volume has no room is fused separately, from this image only, and
+// passed to BlockOverflow.
 //
-// `effort` bounds the blocks that are updated: the band's go first, nearest first. Memory fixed at
+// `effort` bounds the number of updated blocks; those of the band go first, nearest first. Memory fixed at
 // construction, no clock, no randomness: the same images give the same bytes.
-// kInvalidInput, with a counter, for images that were refused: wrong size or intrinsics, a pose or an
-// extrinsic that is not finite, a stamp not after the last, a pose jump (VolumeSettings::most_speed,
-// most_turn_rate; the next image is judged against the refused one, so one jump costs one image).
-// kCapacityReached when blocks were refused or left out: the rest was fused.
+// kInvalidInput, counted, for refused images: wrong size or intrinsics, a pose or extrinsic that is not
+// finite, a stamp not after the last, a pose jump (VolumeSettings::most_speed, most_turn_rate). The next
+// image is compared with the refused one, so one jump costs one image. kCapacityReached if blocks were
+// refused or left out; the rest was fused.
 
 #include <cstdint>
 #include <optional>
@@ -33,7 +31,7 @@
 
 namespace swiftlet {
 
-/// Takes what one image shows of a block for which there is no room.
+/// Takes blocks, fused from one image, for which the volume has no room.
 class BlockOverflow {
  public:
   virtual ~BlockOverflow() = default;
@@ -41,26 +39,26 @@ class BlockOverflow {
 };
 
 struct VolumeEffort {
-  std::uint32_t blocks = 1U << 20U;  ///< updated or carved, for one image
+  std::uint32_t blocks = 1U << 20U;  ///< largest number updated or carved per image
 
   bool operator==(const VolumeEffort&) const = default;
 };
 
-/// What one image did.
+/// Result of one image.
 struct VolumeStep {
   std::uint32_t band = 0;      ///< blocks near measured surface
-  std::uint32_t created = 0;   ///< of them, new
-  std::uint32_t updated = 0;   ///< blocks projected, band and others
-  std::uint32_t carved = 0;    ///< blocks with voxels, free as a whole
-  std::uint32_t changed = 0;   ///< blocks that readers have to look at
-  std::uint32_t left_out = 0;  ///< for lack of effort; blocks met behind that are not counted
+  std::uint32_t created = 0;   ///< new blocks among them
+  std::uint32_t updated = 0;   ///< blocks updated by projection, in the band and elsewhere
+  std::uint32_t carved = 0;    ///< blocks with voxels that are free as a whole
+  std::uint32_t changed = 0;   ///< blocks that readers must read again
+  std::uint32_t left_out = 0;  ///< for lack of effort; blocks behind the first of them are not counted
   std::uint32_t no_room = 0;   ///< new blocks refused
-  std::uint32_t apart = 0;     ///< new blocks without room, given away
+  std::uint32_t apart = 0;     ///< new blocks without room, passed to BlockOverflow
 };
 
 struct IntegratorCounters {
-  std::uint64_t images = 0;   ///< fused
-  std::uint64_t refused = 0;  ///< of these three kinds and all others
+  std::uint64_t images = 0;   ///< fused images
+  std::uint64_t refused = 0;  ///< images refused for any reason, the next three among them
   std::uint64_t pose_jumps = 0;
   std::uint64_t bad_poses = 0;
   std::uint64_t bad_stamps = 0;
@@ -70,18 +68,18 @@ struct IntegratorCounters {
 
 class VolumeIntegrator {
  public:
-  /// `volume` outlives it. `most_pixels`: of any image to come.
+  /// `volume` must outlive this object. `most_pixels`: largest image to come.
   VolumeIntegrator(VoxelVolume& volume, std::size_t most_pixels);
-  /// Null: new blocks without room are refused. Outlives the use.
+  /// `overflow` must outlive this object. Null: new blocks without room are refused.
   void setOverflow(BlockOverflow* overflow) { overflow_ = overflow; }
 
   [[nodiscard]] Status step(const DepthImageView& image, const SE3& T_world_body, const VolumeEffort& effort,
                             VolumeStep& out);
-  /// Forgets the last pose and stamp: for a new epoch, or a map that was moved.
+  /// Forgets the last pose and stamp, for a new epoch or a map that was moved.
   void restart() { last_.reset(); }
 
   [[nodiscard]] const IntegratorCounters& counters() const { return counters_; }
-  /// Beside the volume's own.
+  /// Memory, without that of the volume.
   [[nodiscard]] std::size_t bytes() const;
 
  private:
@@ -99,10 +97,10 @@ class VolumeIntegrator {
   void walkBundles(std::uint32_t blocks, VolumeStep& out);
   bool walk(const Eigen::Vector3f& direction, float length, std::uint32_t blocks, VolumeStep& out);
   void meetOnRay(const BlockIndex& block, VolumeStep& out);
-  /// Depth [m] between a cube, `share` as large as a block, and what is measured behind it; negative where
-  /// that is not known. `centre`: in camera axes.
+  /// Depth [m] between a cube, `share` times as large as a block, and the nearest measurement behind it;
+  /// negative if unknown. `centre`: in camera axes.
   [[nodiscard]] float freeBehind(const Eigen::Vector3f& centre, float share) const;
-  /// Those that the image sees free of the block with this centre; `known` ones need not be looked at.
+  /// Parts of the block with this centre that the image sees free; parts in `known` are not tested.
   [[nodiscard]] std::uint64_t freeParts(const Eigen::Vector3f& centre, std::uint64_t known) const;
   void update(std::uint32_t slot, bool carve, VolumeStep& out);
   void fuseApart(const BlockIndex& block, VolumeStep& out);
@@ -113,14 +111,14 @@ class VolumeIntegrator {
   BlockWindow window_;
   std::size_t most_band_;
   std::vector<BlockIndex> band_;
-  std::size_t with_room_ = 0;  ///< of the band, those before
+  std::size_t with_room_ = 0;  ///< the first `with_room_` blocks of the band have room
   BlockOverflow* overflow_ = nullptr;
   VoxelBlock apart_;  ///< scratch
   LabelBlock labels_apart_;
   std::optional<Pose> last_;
   IntegratorCounters counters_;
 
-  // Of the image in hand. Rays and points are in blocks, from the camera's block.
+  // Of the present image. Rays and points are in blocks, relative to the camera's block.
   SE3 T_world_camera_;
   SE3 T_camera_world_;
   Eigen::Vector3f vehicle_ = Eigen::Vector3f::Zero();

@@ -1,7 +1,7 @@
 #pragma once
-// What a block knows of its voxels, each quantity by itself so that the update runs over rows.
+// The voxels of a block, one array per quantity so that the update runs over rows.
 //
-// 5 bytes a voxel (2 560 a block), and 8 more (4 096) where labels are kept.
+// 5 bytes a voxel (2560 a block), and 8 more (4096) with labels.
 
 #include <algorithm>
 #include <array>
@@ -13,14 +13,14 @@
 
 namespace swiftlet {
 
-/// Distances are kept in this many steps from 0 to the truncation distance: 5 um at 15 cm.
+/// Steps of a distance from 0 to the truncation distance: 5 um at 15 cm.
 inline constexpr float kDistanceSteps = 32767.0F;
-/// Weights are kept in 1/256: an observation as good as the reference has weight 1.
+/// Steps of a weight. An observation with the reference sigma has weight 1.
 inline constexpr float kWeightSteps = 256.0F;
-/// Of what is known from elsewhere than a block's own images, in these steps: any image overrules it.
+/// Weight of hints, in these steps: least, so that any image overrules them.
 inline constexpr std::uint16_t kHintWeight = 1;
 
-/// As a block keeps it, to the nearest step: what is behind by less than half a step stays behind.
+/// Rounds a distance to steps. Distances behind a surface by less than half a step stay behind it.
 inline std::int16_t distanceOf(float steps) {
   const float cut = std::clamp(steps, -kDistanceSteps, kDistanceSteps);
   const auto whole = static_cast<int>(cut + (cut < 0 ? -0.5F : 0.5F));
@@ -33,19 +33,19 @@ struct alignas(64) VoxelBlock {
   std::array<std::uint8_t, kBlockVoxels> grey;
 };
 
-/// How often which label was seen at a voxel: four of them, each 5 bits of label and 11 of count. Sufficient
-/// for Bayes' rule with any confusion model as long as a voxel saw at most four labels. Where a fifth comes
-/// the rarest gives way (Misra, Gries, "Finding repeated elements", 1982).
+/// Counts of the labels seen at a voxel: four labels, each 5 bits of label and 11 of count. Sufficient for
+/// Bayes' rule with any confusion model if a voxel saw at most four labels. A fifth label decrements the
+/// rarest and replaces it at 0 (Misra, Gries, "Finding repeated elements", 1982).
 class LabelCounts {
  public:
   static constexpr int kSlots = 4;
   static constexpr std::uint16_t kMostCount = (1U << 11U) - 1;
 
-  /// `label` from 1 to 31. True when the most frequent label is another than before.
+  /// `label` from 1 to 31. True if the most frequent label changed.
   bool add(std::uint8_t label);
-  /// What another voxel saw of the same place: the four most frequent labels of both stay.
+  /// Adds the counts of another voxel of the same place; keeps the four most frequent labels of both.
   void add(const LabelCounts& other);
-  /// By falling count.
+  /// Slots are ordered by descending count.
   [[nodiscard]] std::uint8_t label(int slot) const {
     return static_cast<std::uint8_t>(slots_[static_cast<std::size_t>(slot)] >> 11U);
   }
@@ -54,14 +54,14 @@ class LabelCounts {
   }
   [[nodiscard]] bool empty() const { return slots_[0] == 0; }
 
-  /// As they are kept in files, label << 11 | count each.
+  /// The representation in files, label << 11 | count each.
   using Words = std::array<std::uint16_t, kSlots>;
   [[nodiscard]] const Words& words() const { return slots_; }
-  /// False, and nothing is changed, where the words are none that add() makes.
+  /// False, without effect, if add() cannot produce these words.
   [[nodiscard]] bool setWords(const Words& words);
 
  private:
-  Words slots_{};  ///< filled from the front, by falling count
+  Words slots_{};  ///< filled from the front, by descending count
 };
 
 inline bool LabelCounts::setWords(const Words& words) {
@@ -81,7 +81,7 @@ inline bool LabelCounts::add(std::uint8_t label) {
   std::size_t i = 0;
   while (i < kSlots && slots_[i] != 0 && slots_[i] >> 11U != label) ++i;
   if (i == kSlots) {
-    // All others have been seen: the rarest pays, and gives way when it has nothing left.
+    // All slots are taken: the rarest label is decremented, and replaced when its count is used up.
     i = kSlots - 1;
     if ((slots_[i] & kMostCount) > 1) {
       --slots_[i];
@@ -95,14 +95,14 @@ inline bool LabelCounts::add(std::uint8_t label) {
     return i == 0;
   }
   if ((slots_[i] & kMostCount) == kMostCount) {
-    // Shares stay as they are, and the newest go on to count.
+    // Halving keeps the shares and lets newer labels count on.
     for (std::uint16_t& s : slots_) {
       if (s != 0) s = static_cast<std::uint16_t>((s & ~kMostCount) | (((s & kMostCount) + 1U) / 2U));
     }
   }
   ++slots_[i];
   if (i == 0 || (slots_[i] & kMostCount) <= (slots_[i - 1] & kMostCount)) return false;
-  // Past all that were as frequent.
+  // Move past all labels of equal count.
   for (; i > 0 && (slots_[i] & kMostCount) > (slots_[i - 1] & kMostCount); --i)
     std::swap(slots_[i], slots_[i - 1]);
   return i == 0;
@@ -132,7 +132,7 @@ inline void LabelCounts::add(const LabelCounts& other) {
   std::sort(seen.begin(), seen.begin() + static_cast<std::ptrdiff_t>(size), [](const Seen& a, const Seen& b) {
     return a.count != b.count ? a.count > b.count : a.label < b.label;
   });
-  // Shares stay as they are.
+  // One divisor for all counts keeps their shares.
   const unsigned divisor = seen[0].count / (kMostCount + 1U) + 1U;
   for (std::size_t i = 0; i < kSlots; ++i) {
     const unsigned count = (seen[i].count + divisor - 1) / divisor;

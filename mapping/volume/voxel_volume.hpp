@@ -1,20 +1,20 @@
 #pragma once
-// The volume: blocks of voxels around surfaces, and blocks known to be free, in memory fixed at construction.
+// The volume: blocks of voxels around surfaces, and free blocks, in memory fixed at construction.
 //
-// World axes (of whoever gives the poses), metres. A block is in one of two states: kVoxels, with data from
-// the block pool; kFree, without data, of which some parts were seen free and nothing is known of the others.
-// What is not in the volume is unknown.
+// World axes (those of the given poses), metres. A block has one of two states. kVoxels: it has data in the
+// block pool. kFree: it has no data; some of its parts were seen free, the others are unknown. A block that
+// is not in the volume is unknown.
 //
-// A block belongs to the submap in which it became known: its images moved as one since, where loops moved
-// them (mapping/map/submaps.hpp). touch() comes before every image that changes it.
+// A block belongs to the submap in which it became known, whose images move rigidly when loops move them
+// (mapping/map/submaps.hpp). Call touch() before every image that changes a block.
 //
-// For readers (surface, distance field): slots 0 to slots() - 1 in order are every block, in an order that
-// only the history decides; revision(slot) tells each reader by itself what has changed since it last looked;
-// a BlockListener hears of blocks before they are dropped. Readers hold no references across updates.
+// For readers (surface, distance field): slots 0 to slots() - 1 hold all blocks, in an order that depends on
+// the history. revision(slot) lets each reader find independently what changed since it last looked. A
+// BlockListener is called before blocks are dropped. Readers must not hold references across updates.
 //
-// When it is full, the blocks farthest from the vehicle go (evict); a new block that would itself lie
-// farthest is refused. Both are counted. Memory: VolumeSettings::memory_bytes, all of it reserved and
-// written to by the constructor; nothing is allocated later. Not thread safe.
+// When the volume is full, the blocks farthest from the vehicle are dropped; a new block that would itself be
+// farthest is refused. Both are counted. Memory: VolumeSettings::memory_bytes, reserved and written to by the
+// constructor; nothing is allocated later. Not thread safe.
 
 #include <Eigen/Core>
 #include <array>
@@ -34,26 +34,26 @@ enum class BlockState : std::uint8_t { kUnused, kFree, kVoxels };
 
 struct BlockHeader {
   BlockIndex index;
-  std::uint32_t data = BlockHash::kNone;  ///< in the pool, for kVoxels
-  std::uint32_t revision = 0;             ///< the volume's at the last change
+  std::uint32_t data = BlockHash::kNone;  ///< index in the pool, for kVoxels
+  std::uint32_t revision = 0;             ///< the volume's revision at the last change
   SubmapId submap = 0;                    ///< of its first image
-  SubmapId touched = 0;                   ///< of its last
+  SubmapId touched = 0;                   ///< of its last image
   std::uint64_t free_parts = 0;           ///< for kFree: never 0
   BlockState state = BlockState::kUnused;
-  /// For kVoxels: kInFront and kBehind, where any observed voxel is on that side of a surface. A surface
-  /// passes between voxels of both sides only.
+  /// For kVoxels: kInFront and kBehind, set if any observed voxel is on that side of a surface. A surface
+  /// passes only through blocks with both.
   std::uint8_t sides = 0;
   bool observed = false;  ///< an image changed it since it became known or began anew
-  /// It holds voxels of kHintWeight that are not of its own images; for kFree: all of it is known so.
+  /// Has voxels of kHintWeight that are not from its own images; for kFree: all of it is a hint.
   bool hinted = false;
-  /// Largest change of a distance since the last that counted as one [steps], summed.
+  /// Sum of the largest changes of a distance since the block last counted as changed [steps].
   float drift = 0;
 
   static constexpr std::uint8_t kInFront = 1;
   static constexpr std::uint8_t kBehind = 2;
 
   [[nodiscard]] bool isWhollyFree() const { return free_parts == kAllParts; }
-  /// No image has seen it.
+  /// Whether no image has seen the block.
   [[nodiscard]] bool isHint() const {
     return hinted && (state == BlockState::kFree || (state == BlockState::kVoxels && !observed));
   }
@@ -61,7 +61,7 @@ struct BlockHeader {
 
 class VoxelVolume;
 
-/// Who wants to see blocks before they are dropped or begin anew: the volume is whole when it is called.
+/// Called before blocks are dropped or begin anew; the volume is then still complete.
 class BlockListener {
  public:
   virtual ~BlockListener() = default;
@@ -71,18 +71,18 @@ class BlockListener {
 };
 
 struct VolumeCounters {
-  std::uint64_t evicted = 0;       ///< blocks with voxels, dropped for nearer ones
-  std::uint64_t evicted_free = 0;  ///< free blocks, likewise
-  std::uint64_t refused = 0;       ///< new blocks for which nothing farther could go
+  std::uint64_t evicted = 0;       ///< blocks with voxels dropped for nearer ones
+  std::uint64_t evicted_free = 0;  ///< free blocks dropped for nearer ones
+  std::uint64_t refused = 0;       ///< new blocks refused because none was farther
   std::uint64_t out_of_range = 0;  ///< new blocks beyond kBlockLimit
-  std::uint64_t index_full = 0;    ///< new blocks for which the index had no place nearby
+  std::uint64_t index_full = 0;    ///< new blocks refused by the index (BlockHash::kMostProbes)
 };
 
 class VoxelVolume {
  public:
   static constexpr std::uint32_t kNone = BlockHash::kNone;
   static constexpr std::size_t kMostListeners = 4;
-  /// Free blocks that can be known for each block with voxels.
+  /// Capacity for free blocks per block with voxels.
   static constexpr std::size_t kFreePerBlock = 2;
 
   explicit VoxelVolume(const VolumeSettings& settings);
@@ -96,9 +96,9 @@ class VoxelVolume {
   [[nodiscard]] std::uint32_t slots() const { return static_cast<std::uint32_t>(headers_.size()); }
   [[nodiscard]] const BlockHeader& header(std::uint32_t slot) const { return headers_[slot]; }
   [[nodiscard]] std::uint32_t revision(std::uint32_t slot) const { return headers_[slot].revision; }
-  /// Of the newest change.
+  /// Revision of the newest change.
   [[nodiscard]] std::uint32_t revision() const { return revision_; }
-  /// kNone where the block is unknown.
+  /// kNone if the block is unknown.
   [[nodiscard]] std::uint32_t find(const BlockIndex& block) const { return hash_.find(keyOf(block)); }
   /// Null unless the slot is kVoxels.
   [[nodiscard]] const VoxelBlock* voxels(std::uint32_t slot) const {
@@ -109,11 +109,11 @@ class VoxelVolume {
     const BlockHeader& h = headers_[slot];
     return h.state == BlockState::kVoxels && !labels_.empty() ? &labels_[h.data] : nullptr;
   }
-  /// Metres for one step of VoxelBlock::distance.
+  /// Metres per step of VoxelBlock::distance.
   [[nodiscard]] float distanceStep() const {
     return static_cast<float>(settings_.truncation) / kDistanceSteps;
   }
-  /// Signed distance [m] at a voxel, cut at the truncation distance; false where nothing was observed.
+  /// Signed distance [m] at a voxel, cut at the truncation distance; false if the voxel was not observed.
   [[nodiscard]] bool distanceAt(const VoxelIndex& voxel, float& distance) const;
   [[nodiscard]] VoxelIndex voxelAt(const Eigen::Vector3d& p_world) const;
   [[nodiscard]] Eigen::Vector3f centreOf(const BlockIndex& block) const;
@@ -122,25 +122,25 @@ class VoxelVolume {
   [[nodiscard]] std::size_t blockCount() const { return blocks_.size() - unused_data_.size(); }
   [[nodiscard]] std::size_t freeCount() const { return free_count_; }
   [[nodiscard]] std::size_t freeCapacity() const { return headers_.size() - blocks_.size(); }
-  /// Reserved at construction.
+  /// Memory reserved at construction.
   [[nodiscard]] std::size_t bytes() const;
-  /// Of `memory_bytes`, how many blocks with voxels it makes.
+  /// Number of blocks with voxels that fit into `memory_bytes`.
   static std::size_t blocksFor(std::size_t memory_bytes, bool labels);
-  /// Memory that makes at least so many.
+  /// Memory for at least `blocks` blocks with voxels.
   static std::size_t bytesFor(std::size_t blocks, bool labels);
   [[nodiscard]] const VolumeCounters& counters() const { return counters_; }
 
   // ---- changing ----
 
-  /// At most kMostListeners, which outlive the volume's use; false beyond.
+  /// At most kMostListeners, which must outlive the volume; false beyond.
   bool addListener(BlockListener* listener);
 
-  /// Blocks that become known from now on are of submap `id`. Those touched last in a submap before
-  /// `stale_before`, or of one that is `outdated` (by id; may be null, outlives the volume's use), begin anew
-  /// when they are touched; free blocks in the second case alone.
+  /// Blocks that become known from now on belong to submap `id`. Blocks last touched in a submap before
+  /// `stale_before`, or of an `outdated` submap, begin anew when they are touched; free blocks only in the
+  /// second case. `outdated`: by id; may be null, must outlive the volume.
   void beginSubmap(SubmapId id, SubmapId stale_before, const std::uint8_t* outdated);
-  /// An image is about to change a block with voxels. Where it begins anew the listeners see it
-  /// before, and what it held stays as a hint: with the least weight, for as long as nothing newer is known.
+  /// Call before an image changes a block with voxels. If the block begins anew, the listeners are called
+  /// first, and its content stays as a hint with the least weight until something newer is known.
   void touch(std::uint32_t slot) {
     BlockHeader& header = headers_[slot];
     if (isOutdated(header)) renew(slot);
@@ -148,33 +148,33 @@ class VoxelVolume {
     header.observed = true;
   }
 
-  /// Begins a set of changes and gives its revision.
+  /// Begins a set of changes and returns its revision.
   std::uint32_t beginChange() { return ++revision_; }
   void markChanged(std::uint32_t slot) {
     headers_[slot].revision = revision_;
     headers_[slot].drift = 0;
   }
 
-  /// Makes room for the new ones with voxels among `wanted` beside what stays, farthest from `vehicle` first:
-  /// drops blocks, and moves those of `wanted` that are refused behind the others, which keep their order.
-  /// How many these are. Slots may change hands.
+  /// Makes room for the blocks of `wanted` that are new: drops those farthest from `vehicle`, or refuses
+  /// wanted ones that are farther. Moves refused blocks to the end of `wanted`; the others keep their order.
+  /// Returns the number of the others. Slots may be reused.
   std::size_t makeRoom(const Eigen::Vector3f& vehicle, std::span<BlockIndex> wanted);
-  /// The slot of a block with voxels: the one there is, else a new one, its voxels unobserved (or free,
-  /// by one observation, where they were seen free). kNone when full: makeRoom() first.
+  /// The slot of a block with voxels, existing or new. Voxels of a new block are unobserved, or free by one
+  /// observation if they were seen free. kNone if full: call makeRoom() first.
   std::uint32_t obtain(const BlockIndex& block);
-  /// These parts of the block, which has no voxels, were seen free. A full table drops the farthest.
+  /// Marks parts of a block without voxels as seen free. A full table drops the farthest block.
   void addFree(const BlockIndex& block, std::uint64_t parts, const Eigen::Vector3f& vehicle);
-  /// Parts known from elsewhere to be free. Taken where no image has seen the block; not stored again.
+  /// Marks parts as free by a hint, if no image has seen the block. Hints are not stored again.
   void hintFree(const BlockIndex& block, std::uint64_t parts, const Eigen::Vector3f& vehicle);
 
-  /// A block of another volume, which is not here yet: as it is there.
+  /// Copies a block of another volume, which must not exist here.
   void copy(const VoxelVolume& from, std::uint32_t slot);
 
-  /// Drops blocks after the listeners have seen them.
+  /// Drops blocks after calling the listeners.
   void remove(std::span<const std::uint32_t> slots);
-  /// The same for blocks that turned out wrong: listeners are not asked.
+  /// Drops wrong blocks without calling the listeners.
   void discard(std::span<const std::uint32_t> slots);
-  /// Everything unknown again; listeners are not asked.
+  /// Makes everything unknown without calling the listeners.
   void clear();
 
   [[nodiscard]] VoxelBlock& changeVoxels(std::uint32_t slot) { return blocks_[headers_[slot].data]; }
@@ -189,7 +189,7 @@ class VoxelVolume {
     std::uint64_t key = 0;
     std::uint32_t slot = 0;  ///< kNone: a wanted block
 
-    /// Nearer first; ties by the key, so that the order is the blocks' alone.
+    /// Nearer first; ties by key, so that the order depends only on the blocks.
     bool operator<(const Farness& o) const {
       return squared != o.squared ? squared < o.squared : key < o.key;
     }
