@@ -1,7 +1,7 @@
 #pragma once
 // Convex hull of image points, counter-clockwise in the axes of the input, without points on its sides.
 // Monotone chain (Andrew, "Another efficient algorithm for convex hulls in two dimensions", 1979), O(n log
-// n). Signs in double precision: exact for pixels given to 2^-10.
+// n). Signs in double precision, exact for pixels with a resolution of 2^-10.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace swiftlet {
 
 using HullPoints = FixedVector<Eigen::Vector2f, kMaxFeatures>;
 
-/// Sorts `points`. Fewer than three when they lie on a line.
+/// Sorts `points`. Returns fewer than three if they are collinear.
 inline void convexHull(HullPoints& points, HullPoints& hull) {
   std::sort(points.begin(), points.end(), [](const Eigen::Vector2f& a, const Eigen::Vector2f& b) {
     return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
@@ -25,7 +25,7 @@ inline void convexHull(HullPoints& points, HullPoints& hull) {
     const Eigen::Vector2d ap = p.cast<double>() - a;
     return ab.x() * ap.y() - ab.y() * ap.x() > 0;
   };
-  // Along the lower side, then back along the upper one, which begins where the lower ended.
+  // Along the lower side, then back along the upper side from where the lower ended.
   std::size_t begin = 0;
   const auto add = [&](const Eigen::Vector2f& p) {
     while (hull.size() >= begin + 2 && !turnsLeft(p)) hull.popBack();
@@ -34,7 +34,7 @@ inline void convexHull(HullPoints& points, HullPoints& hull) {
   for (const Eigen::Vector2f& p : points) add(p);
   begin = hull.empty() ? 0 : hull.size() - 1;
   for (std::size_t i = points.size(); i-- > 0;) add(points[i]);
-  if (hull.size() > 1) hull.popBack();  // the first once more
+  if (hull.size() > 1) hull.popBack();  // the first point again
 }
 
 }  // namespace swiftlet

@@ -1,21 +1,22 @@
 #pragma once
 // Delaunay triangulation of image points: incremental, exact, in fixed memory.
 //
-// A point is located by a walk from the triangle of the point before (visibility walk; it ends in every
-// Delaunay triangulation: De Floriani, Falcidieni and Nagy 1991), splits the triangle it falls into, and
-// edges around it are flipped until each is Delaunay (Lawson 1977, "Software for C1 surface interpolation";
-// the same result as the cavities of Bowyer 1981 and Watson 1981; de Berg et al., "Computational Geometry",
-// chapter 9). Outside the hull lie triangles with a vertex at infinity, one to each edge of the hull: hull
-// and inside are treated alike, and no big triangle of invented points falsifies what is close to the hull.
+// A point is located by a visibility walk from the triangle of the previous point, which terminates in every
+// Delaunay triangulation (De Floriani, Falcidieni and Nagy 1991). It splits the triangle that contains it,
+// and edges around it are flipped until each is Delaunay (Lawson 1977, "Software for C1 surface
+// interpolation"; the same result as the cavities of Bowyer 1981 and Watson 1981; de Berg et al.,
+// "Computational Geometry", chapter 9). Outside the hull are triangles with a vertex at infinity, one for
+// each edge of the hull. Hull and interior are thus treated alike, without a large enclosing triangle that
+// distorts results near the hull.
 //
-// Exactness: points are snapped to a grid of 2^-12 px (predicates.hpp), and for the snapped points the result
-// is exactly Delaunay, whatever their position. Four or more points on one circle leave a choice: of two
-// diagonals the one is taken that does not end in the point with the largest x (and then y) of the four,
-// which is a perturbation of the lifted points and hence consistent. So the set of triangles depends on the
-// set of points alone, not on their order; the order of the list is fixed by the input.
+// Exactness: points are snapped to a grid of 2^-12 px (predicates.hpp), and the result is exactly Delaunay
+// for the snapped points. Four or more points on one circle leave a choice of diagonal: the one is taken that
+// does not end in the point with the largest x (then y) of the four. This is a perturbation of the lifted
+// points and hence consistent. The set of triangles depends only on the set of points, not on their order;
+// the order of the list depends on the input.
 //
-// Counter-clockwise means positive area in the axes of the input, from x to y; in an image whose y axis
-// points down it looks clockwise.
+// Counter-clockwise means positive area in the axes of the input, from x to y. In an image with the y axis
+// pointing down it looks clockwise.
 
 #include <Eigen/Core>
 #include <array>
@@ -30,43 +31,43 @@
 
 namespace swiftlet {
 
-/// Points that one triangulation can take.
+/// Capacity for points.
 inline constexpr std::size_t kMaxDelaunayPoints = kMaxMeshVertices;
-/// Triangles without infinite ones: 2 n - 2 - h, and the hull has at least three vertices.
+/// Largest number of finite triangles: 2 n - 2 - h, with at least three vertices on the hull.
 inline constexpr std::size_t kMaxDelaunayTriangles = 2 * kMaxDelaunayPoints - 5;
 
 struct DelaunayTriangle {
-  /// Beyond this edge is the outside.
+  /// No triangle beyond this edge: the outside.
   static constexpr std::uint16_t kNoNeighbour = 0xFFFF;
 
   std::array<std::uint16_t, 3> vertex{};  ///< indices of the points, counter-clockwise
-  /// Triangles beyond the edges from vertex[i] to vertex[(i + 1) % 3].
+  /// The triangles beyond the edges from vertex[i] to vertex[(i + 1) % 3].
   std::array<std::uint16_t, 3> neighbour{};
 };
 
-/// Points that are no vertices.
+/// Points that did not become vertices.
 struct DelaunaySkipped {
   std::uint32_t invalid = 0;        ///< not finite, or beyond kGridRange
-  std::uint32_t duplicate = 0;      ///< on the grid in the place of a vertex that was there before
-  std::uint32_t over_capacity = 0;  ///< after kMaxDelaunayPoints others
+  std::uint32_t duplicate = 0;      ///< on the grid at the position of an earlier vertex
+  std::uint32_t over_capacity = 0;  ///< beyond kMaxDelaunayPoints
 
   [[nodiscard]] std::uint32_t total() const { return invalid + duplicate + over_capacity; }
 };
 
-/// Some 120 kB inside the object; nothing is allocated, nothing thrown. Not for several threads at a time.
+/// Memory: some 120 kB inside the object; no allocation, no exceptions. Not thread safe.
 class Delaunay {
  public:
   Delaunay();
 
-  /// Triangulates `points` [px], of which the triangles name the indices; what was there before is forgotten.
-  /// Of points that fall together the one of the lowest index is kept. kDegenerate: there is no triangle
-  /// (fewer than three points are left, or all are on one line). kCapacityReached: points beyond the capacity
-  /// were skipped. O(n) for image features, O(n^2) at worst.
+  /// Replaces the triangulation by that of `points` [px]; triangles hold indices into `points`. Of coincident
+  /// points the one with the lowest index is kept. kDegenerate: there is no triangle (fewer than three points
+  /// are left, or all are collinear). kCapacityReached: points beyond the capacity were skipped. O(n) for
+  /// image features, O(n^2) at worst.
   Status build(std::span<const Eigen::Vector2f> points);
 
   void clear();
 
-  /// Empty when there is no triangle. Valid until the next change.
+  /// Empty if there is no triangle. Valid until the next change.
   std::span<const DelaunayTriangle> triangles();
   /// The convex hull, counter-clockwise, with the vertices inside its straight sides; empty without
   /// triangles.
@@ -78,15 +79,14 @@ class Delaunay {
  private:
   /// Infinite triangles included: 2 (n + 1) - 4, as on a sphere.
   static constexpr std::size_t kMaxCells = 2 * kMaxDelaunayPoints - 2;
-  /// The vertex at infinity. Its point is not a number: every comparison with it is false, so that the walk
-  /// ends in infinite triangles and the filter of inCircle() leaves them undecided, without a branch for
-  /// them.
+  /// The vertex at infinity. Its coordinates are NaN, so every comparison with it is false. The walk thus
+  /// ends in infinite triangles, and the filter of inCircle() leaves them undecided, without extra branches.
   static constexpr std::uint16_t kInfinite = kMaxDelaunayPoints;
 
-  /// A triangle, infinite ones too, is three directed edges: 4 c, 4 c + 1, 4 c + 2 of cell c,
-  /// counter-clockwise (and 4 c + 3 for nothing, as dividing by 4 is cheap).
+  /// A triangle, finite or infinite, is three directed edges of cell c, counter-clockwise: 4 c, 4 c + 1 and
+  /// 4 c + 2. 4 c + 3 is unused, because dividing by 4 is cheap.
   using Edge = std::uint16_t;
-  // Tables 0 1 2 -> 1 2 0 and 2 0 1 of two bits each: a branch would be mispredicted every third time.
+  // Tables 0 1 2 -> 1 2 0 and 2 0 1 of two bits each; a branch would be mispredicted every third time.
   static constexpr Edge nextOf(Edge edge) { return turned(edge, 0b00'10'01); }
   static constexpr Edge previousOf(Edge edge) { return turned(edge, 0b01'00'10); }
   static constexpr Edge turned(Edge edge, std::uint32_t table) {
@@ -117,7 +117,8 @@ class Delaunay {
     twin_[edge] = twin;
     twin_[twin] = edge;
   }
-  /// The edge of a cell (given by its first) that comes from the infinite vertex; none: cell + 3.
+  /// The edge of a cell (given by its first edge) that starts at the infinite vertex; cell + 3 if there is
+  /// none.
   [[nodiscard]] Edge edgeFromInfinite(Edge cell) const {
     Edge edge = cell;
     while (edge < cell + 3 && origin_[edge] != kInfinite) ++edge;
@@ -128,15 +129,15 @@ class Delaunay {
   std::size_t point_count_ = 0;
   std::size_t vertex_count_ = 0;
   DelaunaySkipped skipped_;
-  std::array<std::uint16_t, 4 * kMaxCells> origin_;  ///< vertex from which an edge goes
+  std::array<std::uint16_t, 4 * kMaxCells> origin_;  ///< vertex where an edge starts
   std::array<Edge, 4 * kMaxCells> twin_;             ///< the same edge in the triangle beyond
-  std::size_t cell_count_ = 0;                       ///< 0 while all vertices are on one line
+  std::size_t cell_count_ = 0;                       ///< 0 while all vertices are collinear
   Edge last_ = 0;                                    ///< first edge of the cell where the next walk begins
-  /// While there is no triangle: the vertices in the order in which they lie on their line.
+  /// While there is no triangle: the vertices in order along their line.
   FixedVector<std::uint16_t, kMaxDelaunayPoints> line_;
-  std::array<std::uint16_t, kMaxDelaunayPoints> order_;  ///< in which build() inserts
+  std::array<std::uint16_t, kMaxDelaunayPoints> order_;  ///< order in which build() inserts
 
-  bool collected_ = false;                     ///< what follows is of the points up to now
+  bool collected_ = false;                     ///< the following members are up to date
   std::array<std::uint16_t, kMaxCells> rank_;  ///< of a cell in triangles_
   FixedVector<DelaunayTriangle, kMaxDelaunayTriangles> triangles_;
   FixedVector<std::uint16_t, kMaxDelaunayPoints> hull_;

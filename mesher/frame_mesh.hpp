@@ -1,16 +1,18 @@
 #pragma once
-// One frame's mesh: the tracked features of camera 0, joined by triangles in the image and lifted to the
-// landmarks' places.
+// The mesh of one frame: tracked features of camera 0, triangulated in the image and lifted to the positions
+// of their landmarks.
 //
-// Delaunay's triangles, whose diagonals are then turned where the others follow the depth better (Dyn, Levin,
+// Delaunay triangulation; then a diagonal is flipped if the other one follows the depth better (Dyn, Levin,
 // Rippa, "Data Dependent Triangulations for Piecewise Linear Interpolation", IMA J. Num. Anal. 1990).
-// Features without a known depth take no part but in the hull. Faces that do not follow a surface are
-// removed, by these rules, none of which knows how large the room is (docs/mesher.md says what each buys):
-//  - unknown: a vertex whose distance is known to less than a tenth (1 sigma);
-//  - thin: the shortest height in the image is below 2 px;
-//  - torn: it reaches far along the line of sight, and those beside it do not lie in its plane (two of them,
-//    or all where it is seen at less than 14 degrees): it hangs between two surfaces.
-// A face has the label that all of seven places in it show; across a border between labels it has none.
+// Features of unknown depth are only used for the hull. Faces that do not follow a surface are removed by the
+// following rules, which do not depend on the size of the scene (docs/mesher.md):
+//  - unknown: the distance of a vertex is uncertain by more than a tenth (1 sigma);
+//  - thin: the smallest height in the image is below 2 px;
+//  - torn: the face extends far along the line of sight, and its neighbours are not in its plane (two of
+//  them,
+//    or all if it is seen at less than 14 degrees), so it spans two surfaces.
+// A face has a label if all of seven samples in it show that label; across a border between labels it has
+// none.
 // Frames: camera 0, metres; raw pixels. Source: Rosinol, Sattler, Pollefeys, Carlone, "Incremental
 // Visual-Inertial 3D Mesh Generation with Structural Regularities", ICRA 2019.
 // Memory: 70 kB and Delaunay's, inside the object. Cost: 0.2 ms for 300 features.
@@ -33,7 +35,7 @@ struct FramePoint {
   TrackId id = 0;
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
   Eigen::Vector3f p_cam = Eigen::Vector3f::Zero();
-  float relative_sigma = 0;  ///< of the distance, over the distance
+  float relative_sigma = 0;  ///< sigma of the distance over the distance
   std::uint8_t grey = 128;
 };
 
@@ -50,12 +52,12 @@ class FrameMesh {
   using Points = FixedVector<FramePoint, kMaxFeatures>;
   using Faces = FixedVector<FrameFace, 2 * kMaxFeatures>;
 
-  /// `points`: finite, ids unique. `labels`: in the features' raw geometry, or empty. No faces with fewer
-  /// than three points, or all of them on a line.
+  /// `points`: finite, ids unique. `labels`: in the features' raw geometry, or empty. Gives no faces with
+  /// fewer than three points or if all are collinear.
   void build(const Points& points, const ImageView& labels);
 
   [[nodiscard]] const Points& points() const { return points_; }
-  /// They cover the convex hull; those to use are kKept.
+  /// The faces cover the convex hull; use those with kKept.
   [[nodiscard]] const Faces& faces() const { return faces_; }
 
  private:

@@ -1,14 +1,14 @@
 #pragma once
-// The mesh over the smoother's horizon: frame meshes fused as landmarks and triplets of them.
+// The mesh over the smoother's horizon: frame meshes fused as landmarks and triplets of landmarks.
 //
-// A vertex is a landmark; its place is the newest window's, always. It leaves with its landmark (or never:
-// `keep_all`, the complete mesh of a flight), or when no face has it. A face stays until one of its vertices
-// leaves, until a newer frame that sees all three joins them otherwise, until a landmark is seen through it,
-// or until its longest edge has grown by half. Frames: world, metres. Sources: Rosinol et al.,
-// ICRA 2019 (vertices and triplets); Lovi, Birkbeck, Cobzas, Jagersand, "Incremental Free-Space Carving for
-// Real-Time 3D Reconstruction", 3DPVT 2010 (what is seen through). Memory: 300 bytes a vertex of the
-// capacity, all reserved by the constructor. Full: new vertices and faces are refused and counted. Cost:
-// faces not wholly tracked times the frame's points; 0.5 ms for a window's worth.
+// A vertex is a landmark at its position in the newest window. It is removed with its landmark (never with
+// `keep_all`, the complete mesh of a flight), or if no face uses it. A face is removed if one of its vertices
+// is, if a newer frame that sees all three vertices triangulates them differently, if a landmark is seen
+// through it, or if its longest edge has grown by half. Frames: world, metres. Sources: Rosinol et al., ICRA
+// 2019 (vertices and triplets); Lovi, Birkbeck, Cobzas, Jagersand, "Incremental Free-Space Carving for
+// Real-Time 3D Reconstruction", 3DPVT 2010 (landmarks seen through faces). Memory: 300 bytes per vertex of
+// the capacity, reserved by the constructor. Full: new vertices and faces are refused and counted. Cost:
+// faces that are not tracked completely times points of the frame; 0.5 ms for a window.
 
 #include <array>
 #include <cstdint>
@@ -27,13 +27,13 @@ namespace swiftlet {
 struct HorizonLimits {
   std::size_t vertices = kMaxMeshVertices;
   std::size_t faces = kMaxMeshFaces;
-  bool keep_all = false;  ///< vertices stay when their landmarks leave the window
+  bool keep_all = false;  ///< keep vertices whose landmarks left the window
 };
 
 struct HorizonCounters {
-  std::uint64_t refused = 0;   ///< vertices and faces, for want of room
-  std::uint64_t refuted = 0;   ///< faces through which a landmark was seen
-  std::uint64_t replaced = 0;  ///< faces whose vertices a newer frame joined otherwise
+  std::uint64_t refused = 0;   ///< vertices and faces refused for lack of room
+  std::uint64_t refuted = 0;   ///< faces removed because a landmark was seen through them
+  std::uint64_t replaced = 0;  ///< faces removed because a newer frame joined their vertices differently
 };
 
 class HorizonMesh {
@@ -41,18 +41,18 @@ class HorizonMesh {
   struct Face {
     std::array<std::uint32_t, 3> vertex{};
     std::uint8_t label = kNoLabel;
-    std::uint8_t votes = 0;  ///< sightings of the label less those of others
-    float edge = 0;          ///< m, its longest when it was first seen
+    std::uint8_t votes = 0;  ///< observations of the label minus those of others
+    float edge = 0;          ///< m, longest edge when the face was first seen
   };
 
   explicit HorizonMesh(const HorizonLimits& limits);
 
-  /// Takes in a frame, seen by `camera` from T_world_cam, and the landmarks' newest places.
+  /// Adds a frame, seen by `camera` from T_world_cam, and updates the landmarks' positions.
   void update(const FrameMesh& frame, const LandmarkLookup& landmarks, const CameraModel& camera,
               const SE3& T_world_cam);
   void clear();
 
-  /// In order of their ids.
+  /// Ordered by id.
   [[nodiscard]] std::span<const MeshVertex> vertices() const { return vertices_; }
   [[nodiscard]] std::span<const Face> faces() const { return faces_; }
   [[nodiscard]] const HorizonCounters& counters() const { return counters_; }
@@ -77,10 +77,10 @@ class HorizonMesh {
   std::vector<MeshVertex> vertices_, merged_;
   std::vector<Face> faces_;
   TripletTable known_;                    ///< faces_ by their vertices
-  std::vector<std::uint32_t> new_index_;  ///< of the old vertices
-  std::vector<std::uint8_t> referenced_;  ///< the vertex is a face's
+  std::vector<std::uint32_t> new_index_;  ///< of each old vertex
+  std::vector<std::uint8_t> referenced_;  ///< of each vertex: 1 if a face uses it
   std::vector<Projected> projected_;
-  // The frame's points.
+  // Of the frame.
   TripletTable joined_;  ///< its triangles, kept or not, by their points
   FixedVector<std::uint16_t, kMaxFeatures> by_id_;
   std::array<bool, kMaxFeatures> in_kept_face_{};

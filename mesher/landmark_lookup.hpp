@@ -1,5 +1,5 @@
 #pragma once
-// The window's landmarks by id.
+// Look-up of the window's landmarks by id.
 
 #include <algorithm>
 
@@ -9,8 +9,8 @@ namespace swiftlet {
 
 class LandmarkLookup {
  public:
-  /// Landmarks with a finite place; of one id the first counts. Refers to `window` until the next fill().
-  /// Returns how many were left out. Cost: a sort of 1 024 ids, 50 us.
+  /// Takes landmarks with a finite position; of equal ids the first. Refers to `window` until the next
+  /// fill(). Returns the number left out. Cost: a sort of 1024 ids, 50 us.
   int fill(const SmoothedWindow& window) {
     entries_.clear();
     int left_out = 0;
@@ -21,7 +21,7 @@ class LandmarkLookup {
         ++left_out;
       }
     }
-    // Addresses break ties: the first of the window.
+    // Addresses break ties, so that the first in the window wins.
     std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
       return a.id != b.id ? a.id < b.id : a.landmark < b.landmark;
     });
@@ -37,7 +37,7 @@ class LandmarkLookup {
     return left_out;
   }
 
-  /// Null where there is none.
+  /// Null if there is none.
   [[nodiscard]] const WindowLandmark* find(TrackId id) const {
     const auto* at = std::lower_bound(entries_.begin(), entries_.end(), id,
                                       [](const Entry& e, TrackId wanted) { return e.id < wanted; });

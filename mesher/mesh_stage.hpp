@@ -1,13 +1,13 @@
 #pragma once
-// The stage of the thread `mesh`: from a solved window and its newest frame to the frame's mesh, the mesh
-// over the horizon and, where they are wanted, the planes in it.
+// The stage of the thread `mesh`: computes the frame mesh and the horizon mesh from a solved window and its
+// newest frame, and optionally the planes in them.
 //
-// Both are brought up to date at every step; an executor in a hurry leaves frames out. Features of camera 0
-// whose landmark is in the window are lifted; all tracked ones span the hull. A new epoch of the window
-// starts a new mesh. Bad input is skipped and counted: landmarks that are not finite or come twice, features
-// that come twice or lie outside the image, frames with fewer than three points, and a pose that jumped.
-// With planes: at keyframes they are looked for in the mesh over the horizon as the landmarks give it; the
-// meshes that are given out are drawn onto those known by then, and folded where two meet.
+// Every step updates both meshes; a schedule that is late skips frames. Features of camera 0 whose landmark
+// is in the window are lifted to 3D; all tracked features span the hull. A new epoch of the window starts a
+// new mesh. Bad input is skipped and counted: landmarks that are not finite or duplicate, features that are
+// duplicate or outside the image, frames with fewer than three points, and pose jumps. With planes: at
+// keyframes planes are searched in the horizon mesh as given by the landmarks. The output meshes are then
+// flattened onto the known planes and folded where two planes meet.
 // Frames: world, body, camera 0; metres; raw pixels.
 // Memory: 0.9 MiB, 0.7 MiB more with planes, all reserved by the constructor. Cost: docs/performance.md.
 
@@ -29,7 +29,7 @@
 namespace swiftlet {
 
 struct MeshInput {
-  const SmoothedWindow* window = nullptr;  ///< after the frame's solve: its newest pose is the frame's
+  const SmoothedWindow* window = nullptr;  ///< solved with the frame; its newest pose is that of the frame
   const TrackedFrame* tracks = nullptr;    ///< of the same frame
   ImageView image;                         ///< camera 0, for grey values; may be empty
   ImageView labels;                        ///< in camera 0's raw geometry; may be empty
@@ -37,36 +37,36 @@ struct MeshInput {
 
 struct MeshPlanes {
   bool enabled = false;
-  double surface_sigma = 0.01;  ///< m, by which a surface is off its plane
+  double surface_sigma = 0.01;  ///< m, standard deviation of a point's distance from its plane
 };
 
 struct MeshCounters {
-  std::uint64_t frames = 0;          ///< that gave a mesh
-  std::uint64_t invalid_frames = 0;  ///< no pose, or window and tracks of different frames
-  std::uint64_t pose_jumps = 0;      ///< frames skipped for it
-  std::uint64_t too_few_points = 0;  ///< frames without three lifted features
-  std::uint64_t bad_landmarks = 0;   ///< not finite, or an id that came before
-  std::uint64_t bad_features = 0;    ///< not finite, outside the image, or an id that came before
-  std::uint64_t epochs = 0;          ///< meshes begun
+  std::uint64_t frames = 0;          ///< frames that gave a mesh
+  std::uint64_t invalid_frames = 0;  ///< without pose, or window and tracks of different frames
+  std::uint64_t pose_jumps = 0;      ///< frames skipped because the pose jumped
+  std::uint64_t too_few_points = 0;  ///< frames with fewer than three lifted features
+  std::uint64_t bad_landmarks = 0;   ///< not finite, or a duplicate id
+  std::uint64_t bad_features = 0;    ///< not finite, outside the image, or a duplicate id
+  std::uint64_t epochs = 0;          ///< meshes started
 };
 
 class MeshStage {
  public:
   MeshStage(const Rig& rig, const HorizonLimits& limits, const MeshPlanes& planes = {});
 
-  /// kInvalidInput: skipped and counted, the meshes are as they were. kDegenerate: no frame mesh, and it is
-  /// empty.
+  /// kInvalidInput: the frame is skipped and counted, the meshes are unchanged. kDegenerate: the frame mesh
+  /// is empty.
   Status step(const MeshInput& input);
   void reset();
 
-  /// As of the last step, world axes.
+  /// The meshes of the last step, world axes.
   void frameMesh(LocalMesh& out) const;
   void horizonMesh(LocalMesh& out) const;
   [[nodiscard]] const FrameMesh& frame() const { return frame_; }
   [[nodiscard]] const HorizonMesh& horizon() const { return horizon_; }
-  /// Of the last step: the tracked features of camera 0, those without a known depth too [px].
+  /// Hull of the tracked features of camera 0 in the last step, including those of unknown depth [px].
   [[nodiscard]] const HullPoints& hull() const { return hull_; }
-  /// The planes that the last step found; null unless it looked for them.
+  /// The planes that the last step found; null if it did not search for them.
   [[nodiscard]] const PlaneReport* newPlanes() const { return looked_ ? &planes_->report : nullptr; }
   /// Null without planes.
   [[nodiscard]] const PlaneCounters* planeCounters() const {
@@ -84,7 +84,7 @@ class MeshStage {
   struct Planes {
     PlaneFinder finder;
     PlaneReport report;
-    LocalMesh frame, horizon;  ///< drawn
+    LocalMesh frame, horizon;  ///< flattened onto planes
   };
 
   Rig rig_;
@@ -95,7 +95,7 @@ class MeshStage {
   FrameMesh frame_;
   HorizonMesh horizon_;
   double surface_sigma_ = 0;
-  std::unique_ptr<Planes> planes_;  ///< null: not wanted
+  std::unique_ptr<Planes> planes_;  ///< null if disabled
   bool looked_ = false;
   bool begun_ = false;
   std::uint32_t epoch_ = 0;

@@ -1,11 +1,11 @@
 #pragma once
-// A mesh drawn flat where planes are known: its vertices on planes are moved towards them by their own noise,
+// Flattens a mesh onto known planes: moves vertices towards their planes according to their noise,
 //   p' = p - S n (n . p - d) / (n^T S n + surface_sigma^2),   S = depth_sigma^2 u u^T + lateral_sigma^2 I,
-// u the line of sight: the likeliest place of a point that is seen in that direction and lies on that plane.
-// What is known well stays where it is, what is known badly takes the plane's word, and moves along its line
-// of sight, so that it stays where it was seen. A landmark that the smoother has tied already hardly moves.
-// The plane is the smoother's where it has one (SmoothedWindow::planes), the mesher's otherwise.
-// Nothing is allocated (40 kB on the stack). Cost: two sorts and a search a vertex, 0.1 ms.
+// with u the line of sight: the most likely position of a point seen in that direction and on that plane.
+// Well-known vertices hardly move. Poorly known ones move onto the plane along their line of sight, so that
+// their position in the image stays. Landmarks that the smoother already tied to the plane hardly move.
+// The plane is the smoother's if it has one (SmoothedWindow::planes), otherwise the mesher's.
+// No allocation (40 kB on the stack). Cost: two sorts, and a search per vertex; 0.1 ms.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -22,13 +22,13 @@ struct KnownPlane {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
   double distance = 0;  ///< m
 };
-/// The smoother's, else the mesher's; none when neither has it.
+/// The smoother's plane, otherwise the mesher's; empty if neither has it.
 std::optional<KnownPlane> knownPlane(std::uint64_t id, const PlaneReport& report,
                                      const SmoothedWindow& window);
 
-/// `surface_sigma` [m] by which a surface is off its plane; zero: all the way onto it. Vertices that the
-/// report does not name, or that are beyond the finder's gate from the plane, stay. Returns how many were
-/// moved.
+/// `surface_sigma` [m]: standard deviation of a point's distance from its plane; 0 moves vertices completely
+/// onto it. Vertices that are not in the report, or beyond the finder's gate from the plane, do not move.
+/// Returns the number of moved vertices.
 int drawOntoPlanes(const PlaneReport& report, const SmoothedWindow& window, double surface_sigma,
                    LocalMesh& mesh);
 

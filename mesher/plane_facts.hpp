@@ -1,8 +1,8 @@
 #pragma once
-// What the plane finder reads off a mesh once a keyframe: vertices with their noise, faces with their
-// normals.
+// The data that the plane finder reads from a mesh once per keyframe: vertices with their noise, faces with
+// their normals.
 //
-// Axes of the world, origin at the viewer: noise, votes and gates are about distances from where one looks.
+// World axes, origin at the viewer, because noise, votes and gates depend on the distance from the viewer.
 
 #include <Eigen/Core>
 #include <array>
@@ -21,13 +21,13 @@ struct VertexFacts {
   Eigen::Vector3f ray = Eigen::Vector3f::Zero();  ///< unit, from the viewer
   float depth_sigma = 0;                          ///< m, along the ray
   bool finite = false;
-  bool measured = false;  ///< a landmark of the window: its sigma is known
+  bool measured = false;  ///< a landmark of the window, so its sigma is known
 };
 
 struct FaceFacts {
-  Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< unit, towards where it was seen from
-  float area = 0;                                    ///< m^2; 0: of no use (not finite, bad index, a line)
-  bool taken = false;                                ///< by a plane of this keyframe
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< unit, towards the viewer
+  float area = 0;                                    ///< m^2; 0: unusable (not finite, bad index, collinear)
+  bool taken = false;                                ///< belongs to a plane of this keyframe
 };
 
 class MeshFacts {
@@ -38,7 +38,7 @@ class MeshFacts {
   FixedVector<VertexFacts, kMaxMeshVertices> vertices;
   FixedVector<FaceFacts, kMaxMeshFaces> faces;
   Eigen::Vector3d viewer = Eigen::Vector3d::Zero();  ///< m, world: the newest pose
-  int refused = 0;  ///< vertices and faces that are not finite or point nowhere
+  int refused = 0;  ///< vertices and faces that are not finite or have invalid indices
 
  private:
   struct Known {

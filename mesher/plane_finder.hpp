@@ -1,18 +1,18 @@
 #pragma once
-// Floors, tables, ceilings and walls in the local mesh, followed over the keyframes: for the smoother to tie
-// landmarks to, and for a mesh to be drawn flat where the world is.
+// Finds floors, tables, ceilings and walls in the local mesh and follows them over keyframes. The smoother
+// ties landmarks to these planes, and meshes are flattened onto them.
 //
-// At each keyframe known planes are fitted again to the faces that they hold; what faces are left vote for
-// new ones (plane_votes.hpp), which are fitted (plane_fit.hpp), compared with the known and otherwise
-// followed until several keyframes agree. A plane is reported only after that: enough area, points and extent
-// in two directions, residuals that its points' noise explains, and a high share of the points around it on
-// it; a cluttered corner has one or the other, not all, and not again and again. A landmark is on a plane
-// when it is within the gate (in sigmas and absolute) and a corner of faces that lie in it, at two keyframes;
-// it is dropped as soon as it is beyond a wider gate. Frames: the mesh's world, z up; metres. A new epoch
-// starts anew. Memory: 0.5 MiB, reserved by the constructor; nothing is allocated after it. Cost: linear in
-// faces times planes; 0.5 ms with the 400 faces of a window. Source: Rosinol,
-// Sattler, Pollefeys, Carlone, "Incremental Visual-Inertial 3D Mesh Generation with Structural Regularities",
-// ICRA 2019, section III-B; the guards against planes that are none are this project's own.
+// At each keyframe known planes are fitted again to their faces. The remaining faces vote for new planes
+// (plane_votes.hpp), which are fitted (plane_fit.hpp), merged with known ones if they match, and otherwise
+// followed until several keyframes agree. Only then is a plane reported: it needs enough area, points and
+// extent in two directions, residuals that the points' noise explains, and a high share of the points around
+// it on it. A cluttered corner may meet some of these conditions, but not all of them at several keyframes. A
+// landmark is on a plane if it is within the gate (in sigmas and absolute) and a corner of faces in the
+// plane, at two keyframes; it is dropped when it is beyond a wider gate. Frames: the mesh's world, z up;
+// metres. A new epoch starts anew. Memory: 0.5 MiB, reserved by the constructor; no allocation afterwards.
+// Cost: linear in faces times planes; 0.5 ms with the 400 faces of a window. Source: Rosinol, Sattler,
+// Pollefeys, Carlone, "Incremental Visual-Inertial 3D Mesh Generation with Structural Regularities", ICRA
+// 2019, section III-B; the tests against false planes are this project's own.
 
 #include <Eigen/Core>
 #include <array>
@@ -33,28 +33,28 @@ namespace swiftlet {
 
 struct PlaneCounters {
   std::uint64_t keyframes = 0;
-  std::uint64_t refused = 0;    ///< vertices and faces: not finite, or pointing nowhere
-  std::uint64_t confirmed = 0;  ///< planes that were ever reported
+  std::uint64_t refused = 0;    ///< vertices and faces that are not finite or have invalid indices
+  std::uint64_t confirmed = 0;  ///< planes reported so far
   std::uint64_t merged = 0;
   std::uint64_t expired = 0;
-  std::uint64_t points_dropped = 0;  ///< landmarks that were on a plane and disagreed later
+  std::uint64_t points_dropped = 0;  ///< landmarks that were on a plane and later disagreed with it
 };
 
 class PlaneFinder {
  public:
   PlaneFinder() = default;
 
-  /// A keyframe's mesh and the window that it was drawn from (its landmarks' sigmas; its newest pose is where
-  /// one looks from). `report` is overwritten. kInvalidInput, with nothing changed but the refused counted
-  /// and an empty report, when the window's newest pose is not finite or of another epoch.
+  /// `mesh`: of a keyframe. `window`: of the same keyframe, for the sigmas of its landmarks and its newest
+  /// pose as the viewer. Overwrites `report`. kInvalidInput if the window's newest pose is not finite or of
+  /// another epoch: `report` is then empty, and nothing else changes except for the counter of refused input.
   Status step(const LocalMesh& mesh, const SmoothedWindow& window, PlaneReport& report);
 
   [[nodiscard]] const PlaneCounters& counters() const { return counters_; }
-  /// Forgets all planes; ids go on.
+  /// Forgets all planes; ids continue.
   void reset();
 
  private:
-  /// More than are reported: those that have to prove themselves.
+  /// More than are reported, because planes are followed before they are reported.
   static constexpr std::size_t kMaxFollowed = 2 * kMaxPlanes;
   static constexpr std::uint8_t kNone = 255;
 
@@ -65,23 +65,23 @@ class PlaneFinder {
     double distance = 0;                               // world
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // of its points when last seen, world
     double turn_variance = 0;                          // rad^2, of a wall's azimuth
-    int supported = 0;                                 // keyframes
+    int supported = 0;                                 // keyframes with support
     int silent = 0;                                    // keyframes since the last support
     bool reported = false;
-    int points = 0;  // now
+    int points = 0;  // at this keyframe
   };
   struct Association {
     TrackId id = 0;
     std::uint64_t plane = 0;
-    int agreed = 0;   // keyframes
-    int without = 0;  // keyframes in a row without a face of the plane
-    float sigma = 0;  // m, of its depth, now
+    int agreed = 0;   // keyframes at which it agreed with the plane
+    int without = 0;  // consecutive keyframes without a face of the plane
+    float sigma = 0;  // m, of its depth, at this keyframe
     bool firm = true;
   };
   struct Owner {
     std::uint8_t plane = kNone;    // index in followed_
     std::uint8_t faces = 0;        // around the vertex
-    std::uint8_t plane_faces = 0;  // of them, in some plane
+    std::uint8_t plane_faces = 0;  // of these, in some plane
   };
   [[nodiscard]] static bool isProven(const Followed& plane);
   [[nodiscard]] bool provesItself();
@@ -104,7 +104,7 @@ class PlaneFinder {
   MeshFacts facts_;
   PlaneVotes votes_;
   PlaneFit fit_;
-  FixedVector<Followed, kMaxFollowed> followed_;  // those followed for longest first
+  FixedVector<Followed, kMaxFollowed> followed_;  // longest followed first
   std::array<Owner, kMaxMeshVertices> owners_{};
   FixedVector<Association, kMaxMeshVertices> associations_;  // by id, each once
   FixedVector<Association, kMaxMeshVertices> associations_before_;

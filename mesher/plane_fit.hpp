@@ -1,9 +1,9 @@
 #pragma once
-// A guessed plane against a mesh: which faces and vertices it has, where they put it, and whether it is one.
+// Fits a guessed plane to a mesh: selects its faces and vertices, refines it, and measures its support.
 //
-// Least squares over the vertices of the faces that lie in the plane, each vertex weighed by its noise along
-// the normal, with the direction held: a horizontal plane has its distance alone, a vertical one azimuth and
-// distance (weighted principal axis of the vertices' plan). Nothing is allocated.
+// Least squares over the vertices of the faces in the plane, each weighted by its noise along the normal. The
+// direction is constrained: a horizontal plane has only a distance, a vertical one azimuth and distance
+// (weighted principal axis of the vertices seen from above). No allocation.
 // Cost: four passes over the faces, one over the vertices.
 
 #include <Eigen/Core>
@@ -16,40 +16,40 @@
 
 namespace swiftlet {
 
-/// A vertex counts as a plane's up to here, whatever its noise.
+/// Largest distance of a vertex from its plane, whatever its noise.
 inline constexpr float kPlaneGate = 0.05F;  // m
-/// What a wall leaves of a plane: posters, skirtings, mats, plaster (1 sigma).
+/// Deviation of real walls from a plane: posters, skirtings, mats, plaster (1 sigma).
 inline constexpr float kSurfaceSigma = 0.008F;  // m
 
-/// A plane's claim in one keyframe.
+/// Support of a plane in one keyframe.
 struct PlaneSupport {
   int points = 0;
-  int known = 0;     ///< of them, known to half of the gate: the others would be in it on a bent surface too
-  float area = 0;    ///< m^2 of its faces
-  float narrow = 0;  ///< m, standard deviation of its points along the narrower direction in the plane
-  float rms = 0;     ///< m, of its points' distances
-  float turn_sigma = 0;   ///< rad, 1 sigma of a vertical plane's azimuth; 0 of a horizontal one
+  int known = 0;          ///< points with a sigma below half of the gate; others would fit a bent surface too
+  float area = 0;         ///< m^2 of its faces
+  float narrow = 0;       ///< m, standard deviation of its points along the narrower direction in the plane
+  float rms = 0;          ///< m, of its points' distances
+  float turn_sigma = 0;   ///< rad, sigma of a vertical plane's azimuth; 0 for a horizontal one
   float chi_squared = 0;  ///< mean of the squared distances in sigmas
-  /// Of the well-known vertices in a slab around it and within its extent, those that are on it.
+  /// Share of the well-known vertices in a slab around the plane, within its extent, that are on it.
   float share = 0;
   Eigen::Vector3f centre = Eigen::Vector3f::Zero();  ///< m, from the viewer
 };
 
-/// m, 1 sigma of a vertex along a normal.
+/// m, standard deviation of a vertex along a normal.
 float normalSigma(const VertexFacts& vertex, const Eigen::Vector3f& normal);
 
 class PlaneFit {
  public:
-  /// Moves the guess to where its vertices are. `known`: from an earlier keyframe, not from votes, and near
-  /// already. False without enough vertices.
+  /// Fits the guess to its vertices. `known`: the guess is from an earlier keyframe instead of votes, so it
+  /// is already near. False without enough vertices.
   [[nodiscard]] bool refine(const LocalMesh& mesh, const MeshFacts& facts, PlaneGuess& plane, bool known);
-  /// After refine(): of the plane that it gave.
+  /// Support of the plane that refine() returned.
   [[nodiscard]] const PlaneSupport& support() const { return support_; }
-  /// m, as `narrow`, of one side alone where the points fall apart into two: what happens to lie in one
-  /// plane, the front of a column and the edge of a shelf beyond, is far apart and says nothing of what is
-  /// between.
+  /// m, as `narrow`, but of the larger part only if the points form two separate parts. Two objects may lie
+  /// in one plane by chance, such as the front of a column and the edge of a shelf behind it; they do not
+  /// support a plane between them.
   [[nodiscard]] float narrowOfLargerPart(const MeshFacts& facts);
-  /// Face f lies in it, and is no other plane's.
+  /// Whether the face lies in the plane and belongs to no other.
   [[nodiscard]] bool holds(std::size_t face) const { return face_in_[face] != 0; }
 
  private:
@@ -63,7 +63,7 @@ class PlaneFit {
   PlaneSupport support_;
   float turn_sigma_ = 0;  // of the last solve
   Eigen::Vector3f narrow_axis_ = Eigen::Vector3f::Zero();
-  std::array<float, kMaxMeshVertices> places_{};  // along it
+  std::array<float, kMaxMeshVertices> places_{};  // positions along narrow_axis_
 };
 
 }  // namespace swiftlet

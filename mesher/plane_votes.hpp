@@ -1,13 +1,13 @@
 #pragma once
-// Where the faces of a mesh agree on a horizontal or a vertical plane: two histograms.
+// Histograms in which the faces of a mesh vote for horizontal and vertical planes.
 //
 //  - horizontal: height of the vertices of faces that look up or down (one histogram each);
-//  - vertical: azimuth and distance. A face votes for all azimuths that its noisy normal may stand for, each
-//    with the distance that its vertices have along it: only on the true azimuth do the faces of a wall meet
-//    in one distance (Hough).
-// A vote weighs as much as the face's area, up to a limit: a few large triangles are no surface.
-// Distances from the viewer. Memory: 250 kB. Cost: 21 additions a vertical face, 6 a horizontal one; a search
-// reads the rows that have changed.
+//  - vertical: azimuth and distance. A face votes for all azimuths within the noise of its normal, each with
+//    the distance of its vertices along that azimuth. Only at the true azimuth do the faces of a wall agree
+//    on one distance (Hough).
+// A vote weighs as much as the area of the face, up to a limit, because a few large triangles are no surface.
+// Distances are from the viewer. Memory: 250 kB. Cost: 21 additions per vertical face, 6 per horizontal one;
+// a search reads the rows that have changed.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -33,22 +33,22 @@ class PlaneVotes {
   PlaneVotes();
 
   void clear();
-  /// Adds a face's vote, or with `sign` -1 takes it back.
+  /// Adds a face's vote; with `sign` -1 removes it.
   void vote(const MeshFace& face, const FaceFacts& facts, const MeshFacts& mesh, float sign);
-  /// The bin with the largest weight, if that is at least `least` [m^2].
+  /// The bin of largest weight, if that is at least `least` [m^2].
   [[nodiscard]] std::optional<PlaneGuess> strongest(float least);
-  /// Empties a guess's bin and its neighbours: it led nowhere.
+  /// Empties the bin of a rejected guess and its neighbours.
   void suppress(const PlaneGuess& guess);
 
  private:
   void spread(std::size_t row, float distance, float weight);
   [[nodiscard]] std::size_t rowOf(const PlaneGuess& guess) const;
 
-  // Rows of kDistanceBins: heights of what looks up, of what looks down, then one for each azimuth.
+  // Rows of kDistanceBins: heights of faces that look up, of faces that look down, then one row per azimuth.
   std::vector<float> bins_;
-  std::vector<float> highest_;             // of each row
-  std::vector<std::uint8_t> stale_;        // the row has changed since
-  std::vector<Eigen::Vector3f> azimuths_;  // unit, of each row's middle
+  std::vector<float> highest_;             // largest bin of each row
+  std::vector<std::uint8_t> stale_;        // of each row: changed since highest_ was computed
+  std::vector<Eigen::Vector3f> azimuths_;  // unit, at the middle of each row
 };
 
 }  // namespace swiftlet

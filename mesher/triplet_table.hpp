@@ -1,6 +1,6 @@
 #pragma once
-// Faces by their three vertices, in any order. Memory: 20 bytes a place, twice as many places as faces, all
-// reserved by the constructor. clear() is O(1).
+// Hash table of faces by their three vertices, in any order. Memory: 20 bytes an entry, twice as many entries
+// as faces, reserved by the constructor. clear() is O(1).
 
 #include <algorithm>
 #include <array>
@@ -25,14 +25,14 @@ class TripletTable {
     size_ = 0;
   }
 
-  /// The value that the triplet came with, or kNone.
+  /// The value of the triplet, or kNone.
   [[nodiscard]] std::uint32_t find(const Triplet& triplet) const {
     const Triplet key = inOrder(triplet);
     const Place& place = places_[placeOf(key)];
     return place.filling == filling_ ? place.value : kNone;
   }
 
-  /// False, and no change, when it is there already or the table is full.
+  /// False, without effect, if the triplet exists or the table is full.
   bool insert(const Triplet& triplet, std::uint32_t value) {
     const Triplet key = inOrder(triplet);
     Place& place = places_[placeOf(key)];
@@ -46,7 +46,7 @@ class TripletTable {
   struct Place {
     Triplet key{};
     std::uint32_t value = 0;
-    std::uint64_t filling = 0;  ///< clear() makes all others free
+    std::uint64_t filling = 0;  ///< entries of earlier fillings are free
   };
 
   static Triplet inOrder(Triplet t) {
@@ -56,10 +56,10 @@ class TripletTable {
     return t;
   }
 
-  /// The triplet's place, or the free one where it belongs: half of them are free at least.
+  /// The triplet's entry, or the free one where it belongs. At least half of the entries are free.
   [[nodiscard]] std::size_t placeOf(const Triplet& key) const {
     std::uint64_t hash = 0;
-    // Multiplication by 2^64 / golden ratio spreads neighbouring numbers (Knuth, TAOCP 3, 6.4).
+    // Multiplication by 2^64 / golden ratio spreads consecutive numbers (Knuth, TAOCP 3, 6.4).
     for (const std::uint32_t k : key) hash = (hash ^ k) * 0x9E3779B97F4A7C15ULL;
     const std::size_t mask = places_.size() - 1;
     std::size_t at = static_cast<std::size_t>(hash >> 32) & mask;

@@ -1,16 +1,16 @@
 #pragma once
-// How far it is to the nearest surface, which way leads from it, and how far all is known: for planners,
-// around the vehicle.
+// Distance to the nearest surface, direction away from it, and radius of known space, for planners, in a
+// window around the vehicle.
 //
-// A window of cells that follows the vehicle, in fixed memory. The writer (the map thread) says which cells
-// the surface passes through, which are free and which unknown; update() finds the nearest surface cell of
-// every cell anew (NearestSeeds: exact), and how far it is to the nearest unknown one. Its cost does not
-// depend on how much changed. Readers on other threads ask without locks or waiting: the window is arrays of
-// 32-bit words, each written and read whole, and each says which of the places that share its slot it is of.
-// A reader beside an update finds old words or new ones; what a word names and is no longer there counts as
-// "at least". Frames: map; metres. Errors: none; what lies outside the window is ignored by the writer and
-// unknown to the reader. Memory: 13 bytes a cell. Cost: an update about 40 ms for the default window; a query
-// below 1 us. docs/distance.md.
+// A window of cells that follows the vehicle, in fixed memory. The writer (the map thread) sets which cells
+// hold surface, are free or unknown. update() finds the nearest surface cell of every cell again (exactly, by
+// NearestSeeds) and the distance to the nearest unknown cell; its cost does not depend on how much changed.
+// Readers on other threads query without locks or waiting. The window is arrays of 32-bit words, each written
+// and read as a whole, and each tells which of the cells that share its slot it belongs to. A query during an
+// update finds old or new words; if the surface that a word refers to has disappeared, the answer is "at
+// least". Frames: map; metres. Errors: none; the writer ignores cells outside the window, and readers find
+// them unknown. Memory: 13 bytes a cell. Cost: an update about 40 ms for the default window, a query about
+// 1 us. docs/distance.md.
 
 #include <Eigen/Core>
 #include <array>
@@ -25,13 +25,13 @@
 
 namespace swiftlet {
 
-/// The cells of the window, and how far surfaces are felt.
+/// Size of the window and reach of distances.
 struct DistanceLimits {
   Eigen::Vector3i cells{200, 200, 96};  ///< each a multiple of kDistanceStep; 10 x 10 x 4.8 m
   double cell_size = 0.05;              ///< m
   int reach = 40;                       ///< cells, at most kMostReach
 };
-/// The window moves in steps of so many cells.
+/// The window moves in steps of this many cells.
 inline constexpr int kDistanceStep = 8;
 static_assert(kDistanceStep == NearestSeeds::kColumns);
 
@@ -41,23 +41,23 @@ class DistanceField {
 
   // For one writer.
 
-  /// The map has an image of this time.
+  /// Sets the stamp of the newest image in the map.
   void announce(Stamp newest) { newest_.store(newest.ns, std::memory_order_relaxed); }
-  /// Keeps `p_map` near the window's middle. What leaves the window is forgotten; what enters is unknown: the
-  /// caller gives it again where it is known. True when the window moved.
+  /// Keeps `p_map` near the middle of the window. Cells that leave are forgotten; cells that enter are
+  /// unknown until the caller sets them. True if the window moved.
   bool follow(const Eigen::Vector3d& p_map);
-  /// Cells without surface in a row along x from `first` on, x a multiple of kDistanceStep: those whose bit
-  /// is set in `cells`.
+  /// Sets cells without surface in a row along x from `first` (x a multiple of kDistanceStep): those whose
+  /// bit is set in `cells`.
   void setSpaces(const Eigen::Vector3i& first, std::uint32_t cells,
                  const std::array<Space, kDistanceStep>& space);
-  /// A cell that the surface passes through.
+  /// Sets a cell that holds surface.
   void setSurface(const Eigen::Vector3i& cell, Space space, const CellSurface& point);
-  /// Brings the distances up to what the cells say, which is all that images up to `up_to` gave.
+  /// Updates the distances from the cells, which contain all images up to `up_to`.
   void update(Stamp up_to);
 
   // For any reader, on any thread.
 
-  /// At a point, interpolated between cells.
+  /// The sample at a point, interpolated between cells.
   [[nodiscard]] DistanceSample query(const Eigen::Vector3d& p_map) const;
 
   [[nodiscard]] const DistanceLimits& limits() const { return limits_; }
@@ -66,7 +66,7 @@ class DistanceField {
   [[nodiscard]] std::size_t bytes() const;
   /// First cell of the window. Writer's thread.
   [[nodiscard]] const Eigen::Vector3i& origin() const { return origin_; }
-  /// A surface passes through the cell, as the writer was told. Writer's thread.
+  /// Whether the cell holds surface. Writer's thread.
   [[nodiscard]] bool holdsSurface(const Eigen::Vector3i& cell) const;
 
  private:
@@ -95,10 +95,10 @@ class DistanceField {
   Eigen::Vector3i origin_;
   std::atomic<std::uint64_t> shown_origin_{0};
   std::atomic<std::int64_t> newest_{0}, up_to_{0};
-  // By slot: for each eight of x, for each two of z, for each y these sixteen cells.
-  std::vector<Word> state_;    ///< the cell's space, and the surface in it
-  std::vector<Word> nearest_;  ///< where its nearest surface is, how far all is known
-  // The writer's: bits of the same slots, and what changed since the last update, by y in the window.
+  // By slot: for each eight of x, each two of z and each y, the sixteen cells in order.
+  std::vector<Word> state_;    ///< the space of the cell, and the surface in it
+  std::vector<Word> nearest_;  ///< its nearest surface, and the radius of known space
+  // Of the writer: bits of the same slots, and changes since the last update, by y in the window.
   std::vector<std::uint8_t> surface_bits_, unknown_bits_;
   std::vector<std::uint8_t> surface_changed_, unknown_changed_;
   bool changed_ = false;

@@ -1,5 +1,5 @@
 #pragma once
-// The two words of a cell of the distance field: bits and how they are read.
+// The two words of a cell of the distance field: layout and access.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -10,11 +10,11 @@
 
 namespace swiftlet {
 
-/// In both: which of the places that share the slot it is of, one bit an axis.
+/// In both words: which of the cells that share the slot the word belongs to, one bit per axis.
 inline constexpr std::uint32_t kTagShift = 29;
 
-/// The surface point inside a cell, 7 bits an axis, +-0.5 cells from its middle, present or not; the
-/// cell's space; the axes along which the cell has surface on both sides; the tag.
+/// The surface point inside a cell, 7 bits per axis, +-0.5 cells from its centre, and whether there is one;
+/// the space of the cell; the axes along which it has surface on both sides; the tag.
 struct StateWord {
   static constexpr float kScale = 126;  // 63 at half a cell
   static constexpr std::uint32_t kPresent = 1U << 21U;
@@ -38,7 +38,8 @@ struct StateWord {
   static bool holds(std::uint32_t word, std::uint32_t tag) {
     return (word & kPresent) != 0 && word >> kTagShift == tag >> kTagShift;
   }
-  /// From a point to the surface of a cell whose middle is at `middle` from it.
+  /// Squared distance from a point to the surface of a cell whose centre is at `middle` relative to the
+  /// point.
   static float squaredTo(std::uint32_t word, const Eigen::Vector3f& middle) {
     float squared = 0;
     for (std::uint32_t i = 0; i < 3; ++i) {
@@ -52,13 +53,14 @@ struct StateWord {
   }
 };
 
-/// Steps to the cell with the nearest surface, 7 bits an axis, biased by 64, or, where none is in reach, how
-/// far there is none for sure [cells]; how far nothing is unknown [cells]; the tag.
+/// Steps to the cell with the nearest surface, 7 bits per axis, biased by 64; if none is in reach, the
+/// distance within which there is certainly none [cells]. The radius of known space [cells]. The tag.
 struct NearestWord {
   static constexpr int kBias = 64;
   static constexpr std::uint32_t kHasSurface = 1U << 21U;
   static constexpr std::uint32_t kKnownShift = 22;
-  /// Surface lies up to so far from the middles of the cells that hold it [cells], rounded up too.
+  /// Upper bound of the distance of surface from the centre of the cell that holds it [cells], and rounded
+  /// up.
   static constexpr float kSpread = 1.5F;
   static constexpr int kSpreadCells = 2;
 

@@ -1,9 +1,10 @@
 #pragma once
-// How far around each cell of a window nothing is unknown: never more than it is.
+// Radius of known space around each cell of a window, as a lower bound.
 //
-// Unknown cells are looked for in coarse cells, two cells a side, that hold one; from face to face, so that
-// the range holds from every point of the cell. What lies outside the window is unknown. Memory: 0.6 bytes a
-// cell. Cost: a tenth of NearestSeeds on the cells themselves. Errors: none. Not thread safe.
+// Distances are measured between coarse cells of two cells a side, to those that contain an unknown cell, and
+// from face to face, so that the radius holds for every point of the cell. Everything outside the window is
+// unknown. Memory: 0.6 bytes a cell. Cost: a tenth of NearestSeeds on the cells themselves. Errors: none. Not
+// thread safe.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -19,17 +20,17 @@ class KnownRange {
   static constexpr int kSide = 2;                                 ///< cells, of a coarse cell
   static constexpr int kAcross = NearestSeeds::kColumns / kSide;  ///< coarse cells along eight cells of x
 
-  /// `cells`: multiples of 8. `reach` in cells, at most kMostReach: farther is not looked.
+  /// `cells`: multiples of 8. `reach` [cells]: search radius, at most kMostReach.
   KnownRange(const Eigen::Vector3i& cells, int reach);
 
-  /// A plane of coarse cells at coarse `y`. `unknownOf(block, z)` gives the bits of eight cells of x, those
-  /// that are unknown in any of the four rows of the coarse cells at coarse z.
+  /// Sets the plane of coarse cells at coarse `y`. `unknownOf(block, z)` returns a bit for each of eight
+  /// cells along x: whether it is unknown in any of the four rows of the coarse cells at coarse z.
   template <typename UnknownOf>
   void setPlane(int y, const UnknownOf& unknownOf);
-  /// To be called once all planes that changed are set.
+  /// Call after all changed planes are set.
   void update();
 
-  /// Ranges [cells] of the cells x to x + 7 (x a multiple of 8) at z: for every coarse y, kAcross of them.
+  /// Radii [cells] of the cells x to x + 7 (x a multiple of 8) at z: kAcross values for every coarse y.
   [[nodiscard]] const std::uint8_t* line(int x, int z) const {
     return &range_[placeOf(x / kSide, z / kSide)];
   }

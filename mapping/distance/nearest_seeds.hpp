@@ -1,15 +1,15 @@
 #pragma once
-// The nearest seed of every cell of a window, within reach: exact, in three passes, one for each axis.
+// The exact nearest seed within reach of every cell of a window, in three passes, one for each axis.
 //
-// A pass along a line gives each cell the least of (squared distance in the axes before + square of the
-// steps along this one); the least of such sums is exact however the axes are ordered (Felzenszwalb,
-// Huttenlocher, "Distance Transforms of Sampled Functions", Theory of Computing 8, 2012). Within a reach no
-// envelope of parabolas is needed: cells ask their line outwards, step by step, until no step can gain, and
-// lines lie side by side in vector lanes. Which seed it is stays in the low bits of the same word, so that
-// the least word names it; of seeds as near the one with the least word is taken. Along x seeds are bits.
-// Used so: for each y the seeds of a plane, transformPlane(y); then transformLines() for all columns. A plane
-// that did not change need not be given again. Errors: none. Memory: 4 bytes a cell. Cost: some 5 ns a cell
-// at a reach of 40. No allocation after the constructor. Not thread safe.
+// A pass along a line gives each cell the least of (squared distance in the axes before + square of the steps
+// along this one), which is exact for any order of axes (Felzenszwalb, Huttenlocher, "Distance Transforms of
+// Sampled Functions", Theory of Computing 8, 2012). Within a limited reach no envelope of parabolas is
+// needed: cells search their line outwards, step by step, until no step can improve the result, and lines are
+// processed side by side in vector lanes. The low bits of the same word identify the seed, so that the least
+// word names it; among equally near seeds the least word wins. Along x seeds are bits.
+// Use: for each y set the seeds of a plane and call transformPlane(y); then call transformLines() for all
+// columns. Unchanged planes need not be set again. Errors: none. Memory: 4 bytes a cell. Cost: some 5 ns a
+// cell at a reach of 40. No allocation after the constructor. Not thread safe.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -21,33 +21,33 @@
 
 namespace swiftlet {
 
-/// Steps to a seed are kept in 7 bits an axis.
+/// Steps to a seed are stored in 7 bits per axis.
 inline constexpr int kMostReach = 60;
 
 class NearestSeeds {
  public:
   static constexpr int kColumns = 8;  ///< cells along x whose lines are transformed together
-  static constexpr int kLayers = 2;   ///< the same along z
-  /// Squared distance, whether the seed lies at a lower y, steps to it along z and x: from high bits to low.
-  /// About kNever where none is in reach.
+  static constexpr int kLayers = 2;   ///< cells along z whose lines are transformed together
+  /// From high bits to low: squared distance, whether the seed is at a lower y, steps to it along z and x.
+  /// About kNever if none is in reach.
   using Word = std::uint32_t;
   static constexpr Word kNever = 1U << 31U;
   struct alignas(32) Columns : std::array<Word, kColumns> {};
   using Block = std::array<Columns, kLayers>;  ///< of one y
 
-  /// `cells`: even along z. `reach` in cells, at most kMostReach. `gap`: cells' own size: that much is taken
-  /// from the steps along each axis before they are squared (1: distance between cells' faces).
+  /// `cells`: even along z. `reach` [cells]: at most kMostReach. `gap`: subtracted from the steps along each
+  /// axis before they are squared (1: distance between the faces of cells).
   NearestSeeds(const Eigen::Vector3i& cells, int reach, int gap = 0);
 
-  /// Row z of the plane in hand: cell x is bit x % 8 of byte x / 8. To be filled by the caller.
+  /// Row z of the present plane, to be filled by the caller: cell x is bit x % 8 of byte x / 8.
   std::span<std::uint8_t> seeds(int z);
-  /// The plane in hand is the one at `y`.
+  /// Transforms the present plane as that at `y`.
   void transformPlane(int y);
-  /// Of the cells x to x + kColumns - 1, z and z + 1, for every y. Valid until the next call.
+  /// Results of the cells x to x + kColumns - 1, z and z + 1, for every y. Valid until the next call.
   std::span<const Block> transformLines(int x, int z);
 
   static int squaredOf(Word word) { return static_cast<int>(word >> kSquareShift); }
-  // Steps to the seed, where one is in reach.
+  // Steps to the seed, if one is in reach.
   static int xOf(Word word) { return static_cast<int>(word & kStepMask) - kBias; }
   static int zOf(Word word) { return static_cast<int>(word >> kZShift & kStepMask) - kBias; }
   static int yOf(Word word) {
@@ -63,7 +63,7 @@ class NearestSeeds {
   static constexpr Word kStepMask = (1U << kZShift) - 1;
   static constexpr int kBias = 64;
 
-  /// What a step along an axis adds to a word, forwards (seed at a higher place) and backwards.
+  /// What a step along an axis adds to a word, forwards (seed at a higher coordinate) and backwards.
   struct Steps {
     std::vector<Word> forward, backward;
   };
@@ -82,15 +82,15 @@ class NearestSeeds {
   Eigen::Vector3i cells_;
   int reach_;
   int gap_;
-  int margin_;  ///< cells that a line is asked for beyond its ends
+  int margin_;  ///< cells searched beyond the ends of a line
   int blocks_;  ///< of kColumns along x
   Steps in_z_, in_y_;
-  std::vector<std::uint8_t> furthest_;  ///< by squared distance: steps that may still gain at the next place
+  std::vector<std::uint8_t> furthest_;          ///< by squared distance: steps that may improve the next cell
   std::vector<Word> after_seed_, before_seed_;  ///< a row's words beside a seed, outwards and inwards
-  std::vector<std::uint8_t> seeds_;             ///< of the plane in hand
+  std::vector<std::uint8_t> seeds_;             ///< of the present plane
   std::vector<Word> row_;
   std::vector<Columns> kept_;  ///< after x and z, by y, block and z
-  Line line_;                  ///< in hand, with room before and after it
+  Line line_;                  ///< the present line, with room before and after it
   Line out_;
 };
 

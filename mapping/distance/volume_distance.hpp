@@ -1,13 +1,12 @@
 #pragma once
-// Keeps a distance field true to a volume: surfaces, free space and the unknown, as blocks change.
+// Updates a distance field from a volume: surfaces, free space and unknown space of changed blocks.
 //
-// Per step: the window follows the vehicle; at most `effort.blocks` blocks that changed since they were last
-// read, or that lie beside one that did, are read, in the order of the volume's slots from where the last
-// step ended; then the field is updated. A voxel holds surface where the signed distance changes sign to a
-// neighbour that lies no nearer; the surface point is where the distance's slope leads to zero (one Newton
-// step), so it is found to a part of a voxel. What the volume dropped becomes unknown. Cells are the volume's
-// voxels. Map axes, metres. Memory: 17 bytes for each of the volume's slots, beside the field's. Not thread
-// safe; the field's readers are free.
+// Per step the window follows the vehicle. Then at most `effort.blocks` blocks are read that changed since
+// they were last read, or are neighbours of such blocks, in the order of the volume's slots from where the
+// last step ended. Then the field is updated. A voxel holds surface if the signed distance changes sign to a
+// neighbour that is not nearer to the surface; the surface point is found by one Newton step along the slope
+// of the distance. Dropped blocks become unknown. Cells are the volume's voxels. Map axes, metres. Memory: 17
+// bytes for each slot of the volume, besides the field. Not thread safe, except for the field's readers.
 
 #include <array>
 #include <vector>
@@ -18,17 +17,17 @@
 namespace swiftlet {
 
 struct DistanceEffort {
-  std::size_t blocks = 1000;  ///< read; 3 us each
+  std::size_t blocks = 1000;  ///< read per step; 3 us each
 };
 
 struct DistanceStep {
   std::size_t blocks = 0;  ///< read
-  bool caught_up = false;  ///< no block waits
+  bool caught_up = false;  ///< no block waits to be read
 };
 
 class VolumeDistance {
  public:
-  /// `limits.cell_size` is the volume's. Both outlive this.
+  /// The field's cell size must be the volume's voxel size. Both must outlive this object.
   VolumeDistance(const VoxelVolume& volume, DistanceField& field);
 
   /// `newest`: stamp of the newest image in the volume.
@@ -52,7 +51,7 @@ class VolumeDistance {
   [[nodiscard]] static CellSurface surfaceAt(const float* own);
 
   static constexpr std::uint32_t kWholeRow = (1U << kBlockSide) - 1;
-  // Of the block in hand and one voxel beyond each face.
+  // Size of the present block with one voxel beyond each face.
   static constexpr int kSide = kBlockSide + 2;
   static constexpr std::array<int, 3> kSteps{1, kSide, kSide* kSide};  ///< to the next along each axis
   [[nodiscard]] static std::size_t placeOf(int x, int y, int z) {
@@ -62,11 +61,11 @@ class VolumeDistance {
   const VoxelVolume& volume_;
   DistanceField& field_;
   std::vector<Seen> seen_;           ///< by slot
-  std::vector<std::uint8_t> waits_;  ///< by slot: to be read
+  std::vector<std::uint8_t> waits_;  ///< by slot: 1 if the block must be read
   std::size_t waiting_ = 0;
   std::uint32_t cursor_ = 0;
   Stamp up_to_;  ///< images up to here are in the field
-  std::array<float, static_cast<std::size_t>(kSide) * kSide * kSide> value_{};  ///< m; not a number: unseen
+  std::array<float, static_cast<std::size_t>(kSide) * kSide * kSide> value_{};  ///< m; NaN: unobserved
 };
 
 }  // namespace swiftlet

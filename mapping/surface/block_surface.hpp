@@ -1,11 +1,11 @@
 #pragma once
 // Marching cubes over one block (Lorensen, Cline, SIGGRAPH 1987; cases: cube_cases.hpp).
 //
-// A block has the cubes whose lowest corner is a voxel of it; their other corners, and the differences that
-// normals come from, reach into the 26 neighbours. A cube gives surface when all its corners were observed.
-// Vertices lie where the distance, linear along an edge, is zero, computed from the lower corner on in
-// numbers of the whole world: neighbours agree to the bit. A vertex takes grey and label from the nearer
-// corner. Cost: docs/volume.md. Not thread safe: scratch memory of its own.
+// A block has the cubes whose lowest corner is one of its voxels; their other corners, and the differences
+// for normals, reach into the 26 neighbours. A cube gives surface if all its corners were observed. Vertices
+// lie where the distance, linear along an edge, is zero. They are computed from the lower corner in world
+// coordinates, so that neighbouring blocks agree to the bit. A vertex takes grey and label from the nearer
+// corner. Cost: docs/experiments/map.md. Not thread safe: has scratch memory.
 
 #include <array>
 #include <cstdint>
@@ -18,14 +18,14 @@
 namespace swiftlet {
 
 struct SurfaceSettings {
-  /// Of a depth sensor, whose errors are those that it says: one measurement is a surface.
+  /// `least_weight` for a depth sensor, whose sigma describes its errors: one measurement gives a surface.
   static constexpr double kLeastSensorWeight = 1.0 / kWeightSteps;
 
-  /// Voxels of less weight count as unobserved. Stereo repeats its mismatches from image to image: it takes
-  /// more than one.
+  /// Voxels of less weight count as unobserved. Larger values need more measurements for a surface; stereo
+  /// needs more than one, because a mismatch may repeat from image to image.
   double least_weight = 0.02;
-  /// No surface passes through a cube in which distances along an edge differ by more voxels than this: such
-  /// a step is the edge of what was seen, between a thing and the free space beside it. 0: no limit.
+  /// A cube has no surface if distances along one of its edges differ by more than this [voxels]. Such a step
+  /// is the border of the observed surface, beside free space. 0: no limit.
   double most_step = 0;
 };
 
@@ -38,14 +38,14 @@ class BlockSurface {
 
  private:
   static constexpr int kBefore = 1;                ///< voxels below the block
-  static constexpr int kPad = kBlockSide + 3;      ///< one below, two above
-  static constexpr int kRow = 3 * kBlockSide;      ///< of them in memory, so that the block's own are aligned
+  static constexpr int kPad = kBlockSide + 3;      ///< one voxel below, two above
+  static constexpr int kRow = 3 * kBlockSide;      ///< row length in memory; aligns the block's own voxels
   static constexpr int kCorners = kBlockSide + 1;  ///< along an edge
   static constexpr std::uint16_t kNoVertex = 0xFFFF;
-  /// Of a voxel that was not observed; no distance is as low.
+  /// Value of an unobserved voxel, below any distance.
   static constexpr std::int16_t kUnknown = -32768;
 
-  /// Of each row of corners along x, bit by bit.
+  /// A bit for each corner of each row along x.
   using Bits = std::array<std::array<std::uint32_t, kCorners>, kCorners>;
 
   [[nodiscard]] static std::size_t padded(int x, int y, int z) {
@@ -68,7 +68,7 @@ class BlockSurface {
   const ConfusionModel& confusion_;
   SurfaceSettings settings_;
   std::uint16_t least_weight_;
-  int most_step_;  ///< in steps of a distance; above any difference when there is no limit
+  int most_step_;  ///< in steps of a distance; above any difference if there is no limit
   BlockIndex block_;
   std::array<std::uint32_t, 27> neighbour_{};
   Bits behind_{};

@@ -1,13 +1,13 @@
 #pragma once
-// How a surface passes through a cube, for each of the 256 ways its corners can lie in front and behind:
-// derived, not tabled.
+// The triangles of a marching cube for each of the 256 cases of corners in front of and behind the surface,
+// derived at compile time.
 //
-// Corner i sits at (i & 1, i >> 1 & 1, i >> 2 & 1); bit i of a case is set where corner i is behind the
-// surface. On every face, walking around it, each run of corners behind is cut off by one line from where the
-// walk goes behind to where it comes back; two opposite corners behind are thus kept apart. Both cubes of a
-// face see the same corners and draw the same lines, so there are no holes, in ambiguous cases neither. The
-// lines join into loops, and each loop is triangulated as a fan, counter-clockwise seen from the front. (The
-// cubes: Lorensen, Cline, SIGGRAPH 1987; the ambiguity: Nielson, Hamann, Visualization 1991.)
+// Corner i is at (i & 1, i >> 1 & 1, i >> 2 & 1); bit i of a case is set if corner i is behind the surface.
+// On a walk around a face, each run of corners behind is cut off by one line, from the edge where the run
+// begins to the edge where it ends; two opposite corners behind are thus separated. Both cubes of a face have
+// the same corners and draw the same lines, so the surface has no holes, in ambiguous cases too. The lines
+// join into loops, and each loop is triangulated as a fan, counter-clockwise seen from the front. (Cubes:
+// Lorensen, Cline, SIGGRAPH 1987; ambiguity: Nielson, Hamann, Visualization 1991.)
 
 #include <array>
 #include <cstddef>
@@ -53,7 +53,7 @@ constexpr std::uint8_t edgeBetween(unsigned a, unsigned b) {
   return 12;
 }
 
-/// The corners of a face, counter-clockwise seen from outside of the cube.
+/// The corners of a face, counter-clockwise seen from outside the cube.
 constexpr std::array<unsigned, 4> faceCorners(unsigned axis, bool high) {
   const unsigned u = 1U << ((axis + 1) % 3), v = 1U << ((axis + 2) % 3);
   const unsigned base = high ? 1U << axis : 0;

@@ -1,14 +1,14 @@
 #pragma once
 // The stage that keeps the surface up to date: marching cubes over changed blocks, into the store.
 //
-// A changed block touches the surface of its 26 neighbours too (cubes at the border, normals). `effort`
-// bounds the blocks of one step; the others wait. They are drawn in passes: all that are out of date when a
-// pass begins, nearest to the vehicle first, over as many steps as it takes; what changes meanwhile is drawn
-// with the pass where its turn comes still, else in the next. So none waits longer than two passes. As the
-// volume's listener it draws what is out of date before blocks are dropped, so that the store has the newest
-// surface of everything the volume ever held. Once a block is gone, a neighbour that changes later is drawn
-// without it: between the two a seam one voxel wide may open. A block that comes back replaces its patch.
-// Memory: fixed at construction, 13 bytes a slot and one patch. Cost: docs/volume.md.
+// A changed block affects the surface of its 26 neighbours too (cubes at the border, normals). `effort`
+// bounds the blocks of one step; the others wait. They are drawn in passes: a pass covers all blocks that are
+// out of date when it begins, nearest to the vehicle first, over several steps. A block that changes during a
+// pass is drawn in it if its turn is still to come, otherwise in the next, so none waits longer than two
+// passes. As the volume's listener the stage draws blocks that are out of date before they are dropped, so
+// that the store has the newest surface of everything the volume ever held. Neighbours of a dropped block are
+// drawn without it, and a seam one voxel wide may open. A block that returns replaces its patch. Memory:
+// fixed at construction, 13 bytes a slot and one patch. Cost: docs/experiments/map.md.
 
 #include <cstdint>
 #include <span>
@@ -21,14 +21,14 @@
 namespace swiftlet {
 
 struct SurfaceEffort {
-  std::uint32_t blocks = 300;  ///< drawn in one step; 6 to 10 us each
+  std::uint32_t blocks = 300;  ///< drawn per step; 6 to 10 us each
 
   bool operator==(const SurfaceEffort&) const = default;
 };
 
 struct SurfaceStep {
   std::uint32_t drawn = 0;
-  std::uint32_t waiting = 0;  ///< out of date still
+  std::uint32_t waiting = 0;  ///< blocks still out of date
 };
 
 struct SurfaceCounters {
@@ -36,23 +36,24 @@ struct SurfaceCounters {
   std::uint64_t drawn_before_removal = 0;
 };
 
-/// For who wants the whole surface now.
+/// Draws the whole surface in one step.
 inline constexpr SurfaceEffort kAllSurface{1U << 20U};
 
 class SurfaceStage : public BlockListener {
  public:
-  /// Both, and `confusion`, outlive it. Adds itself to the volume's listeners.
+  /// All arguments but `settings` must outlive this object. Adds itself to the volume's listeners.
   SurfaceStage(VoxelVolume& volume, const ConfusionModel& confusion, SurfaceStore& store,
                const SurfaceSettings& settings = {});
   SurfaceStage(const SurfaceStage&) = delete;
   SurfaceStage& operator=(const SurfaceStage&) = delete;
 
-  /// `vehicle` in world: what the store keeps when it is full. kCapacityReached while blocks wait.
+  /// `vehicle` in world: when the store is full, it keeps the patches nearest to it. kCapacityReached while
+  /// blocks wait.
   Status step(const Eigen::Vector3f& vehicle, const SurfaceEffort& effort, SurfaceStep& out);
   void beforeRemoval(const VoxelVolume& volume, std::span<const std::uint32_t> slots) override;
-  /// What there is of the block is drawn anew with the changes to come.
+  /// Nothing to do: the block is drawn again with its next change.
   void beforeRenewal(const VoxelVolume& /*volume*/, std::uint32_t /*slot*/) override {}
-  /// Every block is out of date: after the volume was cleared or moved.
+  /// Marks every block as out of date, after the volume was cleared or moved.
   void drawAll();
 
   [[nodiscard]] const SurfaceCounters& counters() const { return counters_; }
@@ -72,10 +73,10 @@ class SurfaceStage : public BlockListener {
   const VoxelVolume& volume_;
   SurfaceStore& store_;
   BlockSurface surface_;
-  std::vector<std::uint32_t> seen_;  ///< of each slot, the revision that was looked at
+  std::vector<std::uint32_t> seen_;  ///< of each slot: last revision read
   std::vector<std::uint8_t> is_old_;
   std::vector<Waiting> pass_;
-  std::size_t next_ = 0;  ///< of the pass
+  std::size_t next_ = 0;  ///< next entry of pass_
   std::uint32_t old_count_ = 0;
   Eigen::Vector3f vehicle_ = Eigen::Vector3f::Zero();
   SurfacePatch patch_;

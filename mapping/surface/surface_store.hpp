@@ -1,11 +1,11 @@
 #pragma once
-// The surface of the map, block by block, in fixed memory: what the volume still holds and what it has
-// dropped.
+// The surface of the map for viewers in flight, block by block in fixed memory: of blocks in the volume and
+// of dropped ones.
 //
-// For who looks at the map in flight. A patch lies in pages of 240 bytes from a pool, found by its block. A
-// new patch of a block takes the place of the one before. When pages or entries run out the patches farthest
-// from the vehicle go, counted; a patch that is itself the farthest goes at once. Cost: a copy; when full, a
-// pass over all entries for every 1/32 of them that goes.
+// A patch is stored in pages of 240 bytes from a pool and found by its block. A new patch of a block replaces
+// the one before. When pages or entries run out, the patches farthest from the vehicle are dropped and
+// counted; a new patch that is itself the farthest is dropped at once. Cost: a copy; when full, a pass over
+// all entries for every 1/32 of them that is dropped.
 
 #include <Eigen/Core>
 #include <array>
@@ -19,7 +19,7 @@
 
 namespace swiftlet {
 
-/// Takes patches one by one.
+/// Receives patches one by one.
 class SurfaceSink {
  public:
   virtual ~SurfaceSink() = default;
@@ -27,28 +27,28 @@ class SurfaceSink {
 };
 
 struct SurfaceStoreCounters {
-  std::uint64_t dropped = 0;  ///< patches that went for lack of room
+  std::uint64_t dropped = 0;  ///< patches dropped for lack of room
 };
 
 class SurfaceStore {
  public:
   static constexpr std::uint32_t kNone = BlockHash::kNone;
 
-  /// `bytes`: everything together. `block_size` [m] gives distances from the vehicle.
+  /// `bytes`: total memory. `block_size` [m]: to compute distances from the vehicle.
   SurfaceStore(std::size_t bytes, double block_size);
 
-  /// An empty patch takes the block's out, as takeOut() does.
+  /// Stores a patch; an empty one removes the block's, as takeOut() does.
   void put(const SurfacePatch& patch, const Eigen::Vector3f& vehicle);
-  /// The block has no surface any more.
+  /// Removes the patch of a block.
   void takeOut(const BlockIndex& block);
   void clear();
 
-  /// For readers: entries 0 to entries() - 1, some unused; an order that only the history decides.
+  /// For readers: entries 0 to entries() - 1, some unused, in an order that depends on the history.
   [[nodiscard]] std::uint32_t entries() const { return static_cast<std::uint32_t>(entries_.size()); }
   [[nodiscard]] std::uint32_t find(const BlockIndex& block) const { return hash_.find(keyOf(block)); }
   /// False for an unused entry.
   bool read(std::uint32_t entry, SurfacePatch& patch) const;
-  /// All patches, ordered by block, through `patch` as scratch.
+  /// Passes all patches, ordered by block, to `sink`; `patch` is scratch.
   void visit(SurfaceSink& sink, SurfacePatch& patch);
 
   [[nodiscard]] std::size_t patches() const { return entries_.size() - unused_entries_.size(); }
@@ -91,7 +91,7 @@ class SurfaceStore {
   std::vector<Entry> entries_;
   std::vector<std::uint32_t> unused_entries_;
   std::vector<Page> page_;
-  std::vector<std::uint32_t> next_;  ///< of each page, in its patch or in the list of free ones
+  std::vector<std::uint32_t> next_;  ///< of each page: the next one of its patch, or of the free list
   std::uint32_t first_free_ = kNone;
   std::size_t free_pages_ = 0;
   std::vector<Farness> far_;  ///< scratch
