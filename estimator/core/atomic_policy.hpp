@@ -1,17 +1,16 @@
 #pragma once
-// What the carriers between threads (SpscRing, DropOldestRing, SlotPool, Newest, NewestShared) are
-// written over: the atomics they use, as a policy, so that the tests can run the very same code on
-// modelled atomics.
+// The atomics of the carriers between threads (SpscRing, DropOldestRing, SlotPool, Newest, NewestShared) as a
+// policy, so that tests can run the same code on modelled atomics.
 //
-// The carriers use acquire, release and relaxed operations only: no sequentially consistent ones and no
-// fences (ThreadSanitizer does not understand fences). They hold no thread, no clock, no lock and no
-// waiting; who sleeps until something arrives does so outside (the host's executor).
+// The carriers use only acquire, release and relaxed operations: no sequentially consistent ones, and no
+// fences, which ThreadSanitizer does not support. They have no thread, clock, lock or waiting; threads sleep
+// in the host's executor.
 //
-// How they are shown right: tests/core runs small cases in every interleaving and with every stale read
-// that release, acquire and relaxed allow, and takes each order and each indivisible step away in turn to
-// see that a case fails without it. That model has no load buffering (a load that reads what a later step
-// of its own thread made possible); there the argument in the header stands alone, with stress on real
-// threads and ThreadSanitizer beside it.
+// Verification: tests/core runs small cases in every interleaving and with every stale read that release,
+// acquire and relaxed allow. It also weakens each memory order and splits each indivisible step in turn, and
+// checks that a case then fails. The model has no load buffering (a load that reads a value made possible by
+// a later step of its own thread); for that the argument in each header stands alone, with stress tests on
+// real threads and ThreadSanitizer.
 
 #include <atomic>
 #include <cassert>
@@ -21,15 +20,15 @@
 namespace swiftlet {
 
 /// Bytes that two threads must not share for writing: the cache line of x86-64 and Cortex-A.
-/// A constant of our own: std::hardware_destructive_interference_size changes with -mtune, and with it
-/// the layout of every type that uses it.
+/// Not std::hardware_destructive_interference_size, which changes with -mtune and would change the layout of
+/// every type that uses it.
 inline constexpr std::size_t kCacheLine = 64;
 
 struct HardwareAtomics {
   template <typename T>
   using Atomic = std::atomic<T>;
 
-  /// A programming error of the caller: assertion in debug builds, nothing in flight.
+  /// Reports a programming error of the caller: an assertion in debug builds, no effect in flight.
   static void require([[maybe_unused]] bool condition, [[maybe_unused]] const char* what) {
     assert(condition && what != nullptr);
   }
@@ -37,8 +36,8 @@ struct HardwareAtomics {
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free &&
               std::atomic<std::uint32_t>::is_always_lock_free);
 
-/// A counter of events for summary.json: one thread counts, any thread may look. No protocol depends on
-/// its order, so it is not among the modelled atomics.
+/// A counter of events for summary.json: one thread counts, any thread may read. No protocol depends on its
+/// order, so it is not among the modelled atomics.
 class EventCount {
  public:
   void add() { value_.store(value() + 1, std::memory_order_relaxed); }

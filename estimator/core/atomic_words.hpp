@@ -1,8 +1,8 @@
 #pragma once
-// A trivially copyable value kept as atomic 64-bit words, so that one thread may overwrite it while
-// another reads it without a data race in the sense of the C++ memory model. What is read while it is
-// overwritten is a mixture of words: the carrier around it finds that out and throws the mixture away
-// (H.-J. Boehm, "Can seqlocks get along with programming language memory models?", MSPC 2012).
+// A trivially copyable value stored as atomic 64-bit words, so that one thread may overwrite it while another
+// reads it without a data race in the sense of the C++ memory model. A value read during an overwrite is a
+// mixture of words; the carrier detects and discards it (H.-J. Boehm, "Can seqlocks get along with
+// programming language memory models?", MSPC 2012).
 //
 // Memory: sizeof(T) rounded up to 8 bytes. Cost: one plain load or store a word on x86-64; on aarch64
 // release and acquire words are stlr and ldar, which keep their order.

@@ -1,27 +1,26 @@
 #pragma once
-// A queue of fixed capacity from one thread to one other whose push always succeeds: when it is full, the
-// oldest waiting value goes, is counted, and is given back to the producer (a slot's handle must be
-// returned to its pool). The queue of frames in front of the tracker: old frames are the ones to lose.
+// A queue of fixed capacity from one thread to one other whose push always succeeds. When it is full, the
+// oldest waiting value is dropped, counted and returned to the producer (a slot's handle must go back to its
+// pool). Used for the frames in front of the tracker, where old frames are the ones to drop.
 //
-// Threads: one producer calls push; one consumer calls tryPop; size() and dropped() are for anyone.
-// Values: small and trivially copyable (handles), kept as atomic words.
+// Threads: one producer calls push, one consumer calls tryPop; any thread may call size() and dropped().
+// Values: small and trivially copyable (handles), stored as atomic words.
 // Memory: kCapacity values inside the object and one cache line a side.
-// Cost: push O(1) and wait-free, one compare-exchange when it finds the ring full. tryPop: one
-//   compare-exchange; it starts again when a push dropped the very value it was taking, at most
-//   kPopAttempts times, each of which costs the producer a whole push.
+// Cost: push is O(1) and wait-free, with one compare-exchange if the ring is full. tryPop takes one
+//   compare-exchange; it starts again if a push dropped the value that it was taking, at most kPopAttempts
+//   times, each of which takes the producer a whole push.
 //
-// Why this and not a shorter way. Letting the consumer skip to the newest N would drop the newest when the
-// consumer is stopped for longer than the ring lasts; an overwriting ring in which the consumer finds
-// torn values leaves open who owns what was overwritten. Here producer and consumer claim the oldest value
-// by the same compare-exchange of `tail` from t to t + 1: exactly one wins, so a value is either taken or
-// dropped, never both, never neither, and values leave in order.
-// Why a taken value is whole: the consumer copies value t first and claims it second. Its cell is written
-// again only after the producer knows a tail beyond t. Either the producer moved the tail itself: the
-// claim fails and the copy is thrown away. Or it saw the consumer's claim: that release, acquired, puts
-// the copying before the overwriting. The cell's words are atomic, so that a copy made for nothing is no
-// data race. (A tail that comes round to the same 64-bit value between copy and claim does not happen.)
-// Capacity 1: between dropping and publishing, the consumer may find the ring empty for some nanoseconds;
-// the value that follows is announced by the producer as any other is.
+// Alternatives. Letting the consumer skip to the newest N would drop the newest if the consumer is stopped
+// for longer than the ring lasts. An overwriting ring in which the consumer finds torn values leaves the
+// ownership of overwritten values open. Here producer and consumer claim the oldest value by the same
+// compare-exchange of `tail` from t to t + 1. Exactly one wins, so a value is either taken or dropped, and
+// values leave in order. Why a taken value is complete: the consumer first copies value t and then claims it.
+// Its cell is overwritten only after the producer knows a tail beyond t. If the producer moved the tail
+// itself, the claim fails and the copy is discarded. If it saw the consumer's claim, that release, acquired,
+// orders the copying before the overwriting. The words of a cell are atomic, so a discarded copy is no data
+// race. (The tail does not wrap around to the same 64-bit value between copy and claim.) Capacity 1: between
+// dropping and publishing, the consumer may find the ring empty for some nanoseconds; the producer announces
+// the following value as usual.
 
 #include <array>
 #include <cstddef>
@@ -38,7 +37,8 @@ class DropOldestRing {
 
  public:
   using value_type = T;
-  /// A pop that was beaten this often has lost as many values as most rings hold: it reports nothing taken.
+  /// After this many failed attempts tryPop reports an empty ring: as many values were dropped as most rings
+  /// hold.
   static constexpr int kPopAttempts = 8;
 
   DropOldestRing() = default;
@@ -47,12 +47,12 @@ class DropOldestRing {
 
   [[nodiscard]] static constexpr std::size_t capacity() { return kCapacity; }
 
-  /// Producer. True when the oldest waiting value had to go; it is then in `dropped`, which is otherwise
-  /// left as it was, and belongs to the producer again: the consumer never had it and never will.
+  /// Producer. True if the oldest waiting value was dropped. It is then in `dropped` (otherwise unchanged)
+  /// and belongs to the producer again; the consumer never gets it.
   [[nodiscard]] bool push(const T& value, T& dropped) {
     const bool drops = producer_.head - producer_.tail_seen == kCapacity && claimOldest();
     if (drops) {
-      dropped = cells_[producer_.head % kCapacity].load(std::memory_order_relaxed);  // our own stores
+      dropped = cells_[producer_.head % kCapacity].load(std::memory_order_relaxed);  // own stores
       producer_.dropped.add();
     }
     cells_[producer_.head % kCapacity].store(value, std::memory_order_relaxed);
@@ -60,9 +60,9 @@ class DropOldestRing {
     return drops;
   }
 
-  /// Consumer. False, and `out` untouched, when empty (or beaten kPopAttempts times).
+  /// Consumer. False, with `out` unchanged, if empty (or after kPopAttempts failed attempts).
   [[nodiscard]] bool tryPop(T& out) {
-    // Acquired, also below: after a tail that the producer moved, the head read next is not behind it.
+    // Acquired, as below, so that the head read next is not behind a tail that the producer moved.
     std::uint64_t tail = tail_.load(std::memory_order_acquire);
     for (int attempt = 0; attempt < kPopAttempts; ++attempt) {
       if (producer_.published.load(std::memory_order_acquire) == tail) return false;
@@ -76,25 +76,25 @@ class DropOldestRing {
     return false;
   }
 
-  /// Values waiting; an estimate for any thread but the producer, for which it is never too small.
+  /// Number of waiting values; an estimate, but never too small for the producer.
   [[nodiscard]] std::size_t size() const {
     const std::uint64_t tail = tail_.load(std::memory_order_acquire);
     const std::uint64_t waiting = producer_.published.load(std::memory_order_relaxed) - tail;
     return waiting < kCapacity ? static_cast<std::size_t>(waiting) : kCapacity;
   }
 
-  /// Values that the consumer was too late for.
+  /// Number of dropped values.
   [[nodiscard]] std::uint64_t dropped() const { return producer_.dropped.value(); }
 
  private:
   struct alignas(kCacheLine) Producer {
-    typename Policy::template Atomic<std::uint64_t> published{0};  ///< head: values handed over so far
+    typename Policy::template Atomic<std::uint64_t> published{0};  ///< head: number of values pushed so far
     std::uint64_t head = 0;                                        ///< the producer's own copy
-    std::uint64_t tail_seen = 0;                                   ///< the newest tail that it knows
+    std::uint64_t tail_seen = 0;                                   ///< the newest tail known to it
     EventCount dropped;
   };
 
-  /// Moves the tail past the oldest value, unless the consumer has already done so. Room for one either way.
+  /// Moves the tail past the oldest value, unless the consumer has done so. Either way there is room for one.
   bool claimOldest() {
     const std::uint64_t oldest = producer_.tail_seen;
     if (tail_.compare_exchange_strong(producer_.tail_seen, oldest + 1, std::memory_order_release,
@@ -107,7 +107,7 @@ class DropOldestRing {
 
   Producer producer_;
   alignas(kCacheLine)
-      typename Policy::template Atomic<std::uint64_t> tail_{0};  ///< the oldest not yet claimed
+      typename Policy::template Atomic<std::uint64_t> tail_{0};  ///< index of the oldest unclaimed value
   alignas(kCacheLine) std::array<AtomicWords<T, Policy>, kCapacity> cells_{};
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-// A vector whose capacity is part of its type: elements live inside the object, nothing is
-// allocated. Full is a normal state: `tryPushBack` says so and the caller applies its policy.
+// A vector whose capacity is part of its type: elements are inside the object, nothing is allocated. Being
+// full is a normal state: `tryPushBack` returns false and the caller applies its policy.
 
 #include <array>
 #include <cassert>
@@ -18,12 +18,12 @@ class FixedVector {
   [[nodiscard]] bool empty() const { return size_ == 0; }
   [[nodiscard]] bool full() const { return size_ == kCapacity; }
 
-  /// Appends where the caller knows that there is room; without any, nothing changes.
+  /// Appends if the caller knows that there is room; without room nothing changes.
   void pushBack(const T& value) {
     assert(!full());
     if (!full()) items_[size_++] = value;
   }
-  /// Appends; false (and no change) when full.
+  /// Appends. False, without effect, if full.
   [[nodiscard]] bool tryPushBack(const T& value) {
     if (full()) return false;
     items_[size_++] = value;
@@ -34,20 +34,20 @@ class FixedVector {
     assert(size_ > 0);
     --size_;
   }
-  /// Keeps the first `size` elements, or grows with the values that the slots hold.
+  /// Keeps the first `size` elements, or grows; new elements have the values left in their slots.
   void resize(std::size_t size) {
     assert(size <= kCapacity);
     size_ = size;
   }
-  /// Inserts before element `index`, keeping the order of the others, where the caller knows that there is
-  /// room. O(size).
+  /// Inserts before element `index` and keeps the order of the others. The caller knows that there is room.
+  /// O(size).
   void insert(std::size_t index, const T& value) {
     assert(!full() && index <= size_);
     if (full()) return;
     for (std::size_t i = size_++; i > index; --i) items_[i] = items_[i - 1];
     items_[index] = value;
   }
-  /// Removes element `index`, keeping the order of the others. O(size).
+  /// Removes element `index` and keeps the order of the others. O(size).
   void erase(std::size_t index) {
     assert(index < size_);
     for (std::size_t i = index + 1; i < size_; ++i) items_[i - 1] = items_[i];

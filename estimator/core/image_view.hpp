@@ -1,5 +1,5 @@
 #pragma once
-// A borrowed 8-bit grey image: row-major, `stride` bytes from row to row. Owns nothing.
+// A view of an 8-bit grey image: row-major, `stride` bytes per row. Does not own the pixels.
 
 #include <cstddef>
 #include <cstdint>

@@ -1,21 +1,21 @@
 #pragma once
-// The newest value from one thread to one other, where only the latest matters: a triple buffer. Wait-free
-// on both sides (one exchange each); neither ever waits for the other or starts again because of it.
+// Passes the newest value from one thread to one other: a triple buffer. Wait-free on both sides (one
+// exchange each); neither waits for the other or retries because of it.
 //
 // Threads: one writer calls draft, publish, write; one reader calls refresh, value, sequence, read.
 //   Several readers: one Newest each, written in turn (small trivially copyable values: NewestShared).
-// Values: anything default-constructible and assignable, Eigen members included; written and read in
-//   place. What the reader never took is overwritten; it sees from the numbers how many there were.
-// Sequence: values count from 1 in the order of publishing; 0 means that nothing was published yet. The
-//   reader keeps the number of what it read, so that a run can be repeated from its record.
-// Memory: three values inside the object, each in lines of its own.
-// Cost: O(1); a refresh without news is one load.
+// Values: anything default-constructible and assignable, including Eigen members; written and read in place.
+//   Values that the reader did not take are overwritten; sequence numbers show how many there were.
+// Sequence: values are numbered from 1 in the order of publishing; 0 means that nothing was published yet.
+//   The reader records the number of each value that it read, so that a run can be repeated.
+// Memory: three values inside the object, each in its own cache lines.
+// Cost: O(1); a refresh without a new value is one load.
 //
-// Why it is right: of three buffers the writer owns one, the reader one, and the third changes hands through
-// `middle_` by exchange, with release (what I did to the buffer that I give) and acquire (what you did to
-// the buffer that I get). So no buffer is ever owned twice, and the one in the middle is the newest
-// published or the one that the reader gave back. (The exchange is one instruction on x86-64 and ARMv8.1;
-// before that a load-linked pair, which the hardware may have to repeat.)
+// Why it is correct: the writer owns one of three buffers, the reader another, and the third changes owner
+// through `middle_` by exchange. Release publishes what a thread did to the buffer that it gives, acquire
+// shows what the other did to the buffer that it gets. No buffer ever has two owners, and the one in the
+// middle is the newest published or the one that the reader returned. (The exchange is one instruction on
+// x86-64 and ARMv8.1; before that a load-linked pair, which the hardware may repeat.)
 
 #include <array>
 #include <cstdint>
@@ -33,9 +33,9 @@ class Newest {
   Newest(const Newest&) = delete;
   Newest& operator=(const Newest&) = delete;
 
-  /// Writer. The value to fill before publish; it holds some older value.
+  /// Writer. The value to fill before publish(); it holds an older value.
   [[nodiscard]] T& draft() { return buffers_[writer_.buffer].value; }
-  /// Writer. Hands the draft over; returns its sequence number.
+  /// Writer. Publishes the draft; returns its sequence number.
   std::uint64_t publish() {
     buffers_[writer_.buffer].sequence = ++writer_.sequence;
     const std::uint32_t before = middle_.exchange(writer_.buffer | kFresh, std::memory_order_acq_rel);
@@ -47,18 +47,17 @@ class Newest {
     return publish();
   }
 
-  /// Reader. Takes the newest value if there is one that it has not got; returns the sequence number of
-  /// value().
+  /// Reader. Takes the newest value if there is a newer one; returns the sequence number of value().
   std::uint64_t refresh() {
     if ((middle_.load(std::memory_order_relaxed) & kFresh) != 0) {
       reader_.buffer = middle_.exchange(reader_.buffer, std::memory_order_acq_rel) & kBufferMask;
     }
     return sequence();
   }
-  /// Reader. What the last refresh took; it stays the same, and the reader's own, until the next.
+  /// Reader. The value taken by the last refresh(); valid and unchanged until the next.
   [[nodiscard]] const T& value() const { return buffers_[reader_.buffer].value; }
   [[nodiscard]] std::uint64_t sequence() const { return buffers_[reader_.buffer].sequence; }
-  /// Reader. A copy of the newest value and its number; 0, and `out` untouched, while there is none.
+  /// Reader. Copies the newest value and returns its number; 0, with `out` unchanged, while there is none.
   [[nodiscard]] std::uint64_t read(T& out) {
     const std::uint64_t taken = refresh();
     if (taken != 0) out = value();
@@ -67,7 +66,7 @@ class Newest {
 
  private:
   static constexpr std::uint32_t kBufferMask = 3;
-  static constexpr std::uint32_t kFresh = 4;  ///< the buffer in the middle was not taken yet
+  static constexpr std::uint32_t kFresh = 4;  ///< the middle buffer was not taken yet
 
   struct alignas(kCacheLine) Buffer {
     T value{};

@@ -1,24 +1,25 @@
 #pragma once
-// The newest value from one thread to any number of others: a seqlock over several cells, so that a writer
-// that is interrupted in the middle of a write holds up no reader.
+// Passes the newest value from one thread to any number of others: a seqlock over several cells, so that a
+// writer interrupted in the middle of a write does not block readers.
 //
 // Threads: one writer calls write; any thread calls read.
-// Values: trivially copyable and small (tens of words); for others, and for values with Eigen members, one
-//   Newest a reader.
-// Sequence: values count from 1; 0 means none. A thread never reads an older value than it read before.
-// Memory: kCells values inside the object.
-// Cost: write is wait-free, one store a word and two; read is one load a word and two.
-// Overtaken: a read is thrown away, and tried again at most kReadAttempts times in all, when the writer
-//   began the kCells-th write after it during its copying. With four cells, the default, this takes a reader
-//   that was stopped between two words for three periods of the writer, each time. It then reports 0, which
-//   is counted, and the reader goes on with what it has.
+// Values: trivially copyable and small (tens of words); for others, and for values with Eigen members, use
+// one
+//   Newest per reader.
+// Sequence: values are numbered from 1; 0 means none. A thread never reads an older value than it read
+// before. Memory: kCells values inside the object. Cost: write is wait-free, one store per word and two more;
+// read is one load per word and two more. Overtaken: a read is discarded if the writer began the kCells-th
+// write after it while it copied. With four
+//   cells, the default, this needs a reader that is stopped between two words for three periods of the
+//   writer. After kReadAttempts attempts the read returns 0, which is counted, and the reader continues with
+//   the value that it has.
 //
 // Source: H.-J. Boehm, "Can seqlocks get along with programming language memory models?", MSPC 2012: atomic
 // words; instead of fences the words are release stores and acquire loads, which order at least as much.
-// Why it is right: write n says `started_ = n`, fills cell n mod kCells with release stores, then says
-// `finished_ = n` by release. A reader that acquired n from `finished_` sees at least write n's words. If
-// it met a word of write n + kCells (or later), that word's acquire makes `started_ >= n + kCells` visible
-// to the load that follows, and the copy is thrown away. With kCells = 1 this is the classic seqlock.
+// Why it is correct: write n stores `started_ = n`, fills cell n mod kCells with release stores, then stores
+// `finished_ = n` with release. A reader that acquired n from `finished_` sees at least the words of write n.
+// If it read a word of write n + kCells or later, that word's acquire makes `started_ >= n + kCells` visible
+// to the following load, and the copy is discarded. With kCells = 1 this is the classic seqlock.
 
 #include <array>
 #include <atomic>
@@ -50,8 +51,8 @@ class NewestShared {
     return sequence;
   }
 
-  /// Any thread. The newest value's sequence number; 0, and `out` untouched, when there is none yet or every
-  /// attempt was overtaken.
+  /// Any thread. Copies the newest value and returns its sequence number; 0, with `out` unchanged, if there
+  /// is none yet or every attempt was overtaken.
   [[nodiscard]] std::uint64_t read(T& out) const {
     for (int attempt = 0; attempt < kReadAttempts; ++attempt) {
       const std::uint64_t sequence = finished_.load(std::memory_order_acquire);
@@ -66,7 +67,7 @@ class NewestShared {
     return 0;
   }
 
-  /// Reads that gave up because the writer overtook every attempt.
+  /// Number of reads of which every attempt was overtaken.
   [[nodiscard]] std::uint64_t overtaken() const { return overtaken_.load(std::memory_order_relaxed); }
 
  private:

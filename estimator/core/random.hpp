@@ -1,7 +1,7 @@
 #pragma once
 // A small deterministic random generator (PCG32, O'Neill 2014, "PCG: A Family of Simple Fast
-// Space-Efficient Statistically Good Algorithms for Random Number Generation"). The standard
-// library's distributions differ between implementations; these do not: same seed, same bytes.
+// Space-Efficient Statistically Good Algorithms for Random Number Generation"). Unlike the standard library's
+// distributions, which differ between implementations, it gives the same bytes for the same seed everywhere.
 
 #include <cmath>
 #include <cstdint>

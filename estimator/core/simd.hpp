@@ -1,13 +1,13 @@
 #pragma once
-// The few vector operations that the image kernels need, behind one wrapper: AVX2, NEON (64-bit ARM)
-// and a scalar twin that defines the result. All three give the same bits: the integer operations are
-// exact, the float ones rounded once each (products are fused with their sums). Kernels are templates over
-// the instruction set, and tests run them with both `simd::Native` and `simd::Scalar`.
+// The vector operations of the image kernels behind one wrapper: AVX2, NEON (64-bit ARM) and a scalar version
+// that defines the result. All three give the same bits: integer operations are exact, float operations are
+// rounded once (products are fused with their sums). Kernels are templates over the instruction set, and
+// tests run them with both `simd::Native` and `simd::Scalar`.
 
 #include <cmath>
 #include <cstdint>
 
-// Where Native is not the scalar twin itself: kernels are then instantiated for both.
+// If Native is not Scalar, kernels are instantiated for both.
 #if defined(__AVX2__) && defined(__FMA__)
 #define SWIFTLET_SIMD_NATIVE
 #include <immintrin.h>
@@ -29,7 +29,7 @@ struct Scalar {
   struct Float32x16 {
     float lane[16];
   };
-  /// Places in two rows of 16 bytes, one for each half of the lanes.
+  /// Indices into two rows of 16 bytes, one row for each half of the lanes.
   struct Places {
     std::int16_t lane[16];
   };
@@ -54,7 +54,7 @@ struct Scalar {
     for (std::int16_t& lane : v.lane) lane = x;
     return v;
   }
-  /// Sums, differences and products wrap around 16 bits: callers keep within them.
+  /// Sums, differences and products wrap around at 16 bits; callers must avoid overflow.
   static Int16x16 add(const Int16x16& a, const Int16x16& b) {
     Int16x16 v;
     for (int i = 0; i < 16; ++i) v.lane[i] = static_cast<std::int16_t>(a.lane[i] + b.lane[i]);
@@ -83,7 +83,7 @@ struct Scalar {
     for (int i = 0; i < 16; ++i) v.lane[i] = static_cast<std::int16_t>(a.lane[i] & b.lane[i]);
     return v;
   }
-  /// sum + products of neighbouring lanes, added in pairs.
+  /// sum + products, where the products of neighbouring lanes are added in pairs.
   static Int32x8 multiplyAdd(Int32x8 sum, const Int16x16& a, const Int16x16& b) {
     for (int i = 0; i < 8; ++i) {
       sum.lane[i] += a.lane[2 * i] * b.lane[2 * i] + a.lane[2 * i + 1] * b.lane[2 * i + 1];
@@ -109,7 +109,7 @@ struct Scalar {
     for (int i = 0; i < 16; ++i) v.lane[i] = static_cast<std::int16_t>(a.lane[i] >> kBits);
     return v;
   }
-  /// Lanes taken as unsigned.
+  /// Interprets lanes as unsigned.
   template <int kBits>
   static Int16x16 shiftRightUnsigned(const Int16x16& a) {
     Int16x16 v;
@@ -118,7 +118,7 @@ struct Scalar {
     }
     return v;
   }
-  /// Of the 32 values of `a` and `b`, those at even and at odd places.
+  /// The values at even and at odd positions of the 32 values of `a` and `b`.
   static Int16x16 even(const Int16x16& a, const Int16x16& b) {
     Int16x16 v;
     for (int i = 0; i < 8; ++i) {
@@ -141,7 +141,7 @@ struct Scalar {
     for (int i = 0; i < 16; ++i) v.lane[i] = key.lane[i] == value ? a.lane[i] : b.lane[i];
     return v;
   }
-  /// Lanes as unsigned bytes, cut at 0 and 255.
+  /// Converts lanes to unsigned bytes, clamped to 0 and 255.
   static void storeBytes(std::uint8_t* to, const Int16x16& v) {
     for (int i = 0; i < 16; ++i) {
       to[i] = static_cast<std::uint8_t>(v.lane[i] < 0 ? 0 : (v.lane[i] > 255 ? 255 : v.lane[i]));
@@ -152,8 +152,8 @@ struct Scalar {
     for (int i = 0; i < 16; ++i) p.lane[i] = v.lane[i];
     return p;
   }
-  /// low[place] for the first eight lanes, high[place] for the others; places are 0 to 15, lanes with others
-  /// hold anything. Reads 16 bytes of each.
+  /// low[place] for the first eight lanes, high[place] for the others. Places are 0 to 15; lanes with other
+  /// places are undefined. Reads 16 bytes of each.
   static Int16x16 pick(const std::uint8_t* low, const std::uint8_t* high, const Places& place) {
     Int16x16 v;
     for (int i = 0; i < 16; ++i) v.lane[i] = (i < 8 ? low : high)[place.lane[i] & 15];
@@ -326,7 +326,7 @@ struct Native {
     int16x8_t low;
     int16x8_t high;
   };
-  /// The order of the eight partial sums differs from the scalar twin; their total does not.
+  /// The order of the eight partial sums differs from the scalar version; their total does not.
   struct Int32x8 {
     int32x4_t low;
     int32x4_t high;

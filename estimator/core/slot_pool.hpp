@@ -1,33 +1,32 @@
 #pragma once
 // A fixed pool of slots for large messages (images): written once by one thread, lent to several readers by
-// handle, free again when the last of them lets go. A reader that is slow may hold its quota and no more,
-// so that it can never take the slots that the others need.
+// handle, and free again when the last reader releases it. A slow reader can hold at most its quota and thus
+// never takes the slots that others need.
 //
 // Threads: one writer calls tryAcquire, fill, tryHand, takeBack, finish; reader r (0 .. kReaders - 1, one
-//   thread each) calls borrow and release; counters are for anyone.
-// Life of a slot: tryAcquire, fill, for each reader tryHand and a push of the handle into that reader's
-//   ring, finish; each reader borrows what it pops, and the loan's end releases it. The ring's release and
-//   acquire carry the order from filling to reading. A handle that its ring refused, or that DropOldestRing
-//   gave back, never reached the reader: the writer takes it back.
-// Quota: slots handed to a reader and not yet released, waiting in its ring or on loan. At the quota
-//   tryHand refuses and counts; the slot goes to the other readers as usual. Behind a DropOldestRing of
-//   capacity C a reader of L loans at a time needs C + L + 1, or new frames are refused before old ones
-//   can be dropped: the newest is handed before the oldest comes back.
+//   thread each) calls borrow and release; any thread may read the counters.
+// Life of a slot: tryAcquire, fill, for each reader tryHand and a push of the handle into that reader's ring,
+//   finish. Each reader borrows what it pops, and the end of the loan releases it. The release and acquire of
+//   the ring order filling before reading. If the ring refuses a handle or DropOldestRing returns it, the
+//   reader never got it and the writer takes it back.
+// Quota: slots handed to a reader and not yet released, waiting in its ring or on loan. At the quota tryHand
+//   refuses and counts; other readers get the slot as usual. Behind a DropOldestRing of capacity C a reader
+//   with L loans at a time needs C + L + 1, because the newest slot is handed before the oldest comes back.
 // Full: with kSlots >= slotsFor(quotas), tryAcquire cannot fail while the writer holds no other slot. With
-//   fewer it may: it then gives an invalid handle and counts.
-// Misuse: a slot has one bit a holder, and a generation that every acquiring raises. So releasing twice,
-//   borrowing what was released and handles from an earlier life of the slot are recognised exactly: an
-//   assertion in debug builds; in flight ignored and counted, never passed on to another's loan. (With 32
-//   bits of generation, a handle must be kept for 2^32 lives of its slot to be taken for a later one.)
-// Memory: kSlots values inside the object, one cache line a slot and a reader.
+//   fewer it may return an invalid handle, which is counted.
+// Misuse: a slot has one bit per holder and a generation that every acquisition increments. Double releases,
+//   borrowing after release and handles of earlier lives of a slot are detected exactly: an assertion in
+//   debug builds; ignored and counted in flight, without effect on other loans. (With 32 bits of generation,
+//   a handle would have to be kept for 2^32 lives of its slot to be mistaken.)
+// Memory: kSlots values inside the object, one cache line per slot and per reader.
 // Cost: tryAcquire O(kSlots) loads, the others O(1) with one atomic read-modify-write. All are wait-free
 //   (before ARMv8.1 up to the hardware's repeats).
 //
-// Why it is right: only the writer turns a slot's bits on, and only while it holds the slot; reader r alone
-// turns bit r off (the writer does so for handles that r never got). A reader's release, acquired by the
-// writer that finds no holder, puts all reading before the next filling; the releases of several readers
-// form one release sequence. A reader's count of releases is stored after its bit is cleared and read
-// before the quota is checked: when the quota lets the writer hand out another slot, it sees that slot free.
+// Why it is correct: only the writer sets a slot's bits, and only while it holds the slot; only reader r
+// clears bit r (the writer does so for handles that r never got). A reader's release, acquired by the writer
+// that finds no holder, orders all reading before the next filling; the releases of several readers form one
+// release sequence. A reader's count of releases is stored after its bit is cleared and read before the quota
+// is checked, so if the quota lets the writer hand out another slot, the writer sees that slot free.
 
 #include <array>
 #include <cstddef>
@@ -37,7 +36,7 @@
 
 namespace swiftlet {
 
-/// Names a slot in one of its lives; trivially copyable, goes through rings. The default names none.
+/// Identifies a slot in one of its lives; trivially copyable, passed through rings. Invalid by default.
 struct SlotHandle {
   static constexpr std::uint32_t kNone = 0xffffffffU;
   std::uint32_t slot = kNone;
@@ -54,7 +53,7 @@ class SlotPool {
  public:
   using Quotas = std::array<std::uint32_t, kReaders>;
 
-  /// A reader's hold on a slot: released when it goes. Empty when the handle was not a valid one.
+  /// A reader's loan of a slot, released by the destructor. Empty if the handle was invalid.
   class Loan {
    public:
     Loan() = default;
@@ -75,7 +74,7 @@ class SlotPool {
     Loan& operator=(const Loan&) = delete;
     ~Loan() { reset(); }
 
-    /// Gives the slot back now.
+    /// Releases the slot now.
     void reset() {
       if (pool_ == nullptr) return;
       pool_->release(handle_, reader_);
@@ -101,24 +100,23 @@ class SlotPool {
   SlotPool& operator=(const SlotPool&) = delete;
 
   [[nodiscard]] static constexpr std::size_t capacity() { return kSlots; }
-  /// Slots with which acquiring never fails: every reader at its quota, and one that the writer fills.
+  /// Number of slots with which acquiring never fails: all quotas, and one that the writer fills.
   [[nodiscard]] static constexpr std::size_t slotsFor(const Quotas& quotas) {
     std::size_t slots = 1;
     for (const std::uint32_t quota : quotas) slots += quota;
     return slots;
   }
-  /// Before the threads start: slot `index`, to reserve what it owns.
+  /// Slot `index`, to reserve its memory before the threads start.
   [[nodiscard]] T& slot(std::size_t index) { return slots_[index]; }
 
-  /// Writer. A slot that nobody holds, now held by the writer; an invalid handle, counted, when there is
-  /// none.
-  /// The first slot that is free: a run that needs few of them stays in few pages, and in the cache.
+  /// Writer. Acquires a free slot; an invalid handle, counted, if there is none. Takes the first free slot,
+  /// so that a run that needs few slots stays in few pages and in the cache.
   [[nodiscard]] SlotHandle tryAcquire() {
     for (std::size_t index = 0; index < kSlots; ++index) {
       const std::uint64_t state = states_[index].word.load(std::memory_order_acquire);
       if (holdersOf(state) != 0) continue;
       const std::uint32_t generation = generationOf(state) + 1;
-      // A plain store: nobody changes the word of a slot that nobody holds.
+      // A plain store, because no other thread changes the word of a free slot.
       states_[index].word.store(pack(generation, kWriterBit), std::memory_order_relaxed);
       return {static_cast<std::uint32_t>(index), generation};
     }
@@ -130,7 +128,7 @@ class SlotPool {
     Policy::require(holds(handle, kWriterBit), "fill of a slot that the writer does not hold");
     return slots_[handle.slot];
   }
-  /// Writer. Lends the slot to `reader`; false, counted, when the reader is at its quota.
+  /// Writer. Lends the slot to `reader`; false, counted, if the reader is at its quota.
   [[nodiscard]] bool tryHand(SlotHandle handle, std::size_t reader) {
     if (!permitted(holds(handle, kWriterBit) && reader < kReaders && !heldBy(handle, reader))) return false;
     if (handed_[reader] - readers_[reader].released.load(std::memory_order_acquire) >= quotas_[reader]) {
@@ -141,54 +139,54 @@ class SlotPool {
     states_[handle.slot].word.fetch_or(bitOf(reader), std::memory_order_relaxed);
     return true;
   }
-  /// Writer. Undoes tryHand for a handle that the reader did not and will not get.
+  /// Writer. Undoes tryHand for a handle that the reader will not get.
   void takeBack(SlotHandle handle, std::size_t reader) {
     if (!permitted(heldBy(handle, reader))) return;
     --handed_[reader];
     states_[handle.slot].word.fetch_and(~std::uint64_t{bitOf(reader)}, std::memory_order_relaxed);
   }
-  /// Writer. Lets go of the slot: it is free when the last reader has released it.
+  /// Writer. Releases its own hold; the slot is free when the last reader has released it.
   void finish(SlotHandle handle) {
     if (!permitted(holds(handle, kWriterBit))) return;
     states_[handle.slot].word.fetch_and(~std::uint64_t{kWriterBit}, std::memory_order_relaxed);
   }
 
-  /// Reader. The slot that a popped handle names, held until the loan ends.
+  /// Reader. Borrows the slot of a popped handle until the loan ends.
   [[nodiscard]] Loan borrow(SlotHandle handle, std::size_t reader) {
     if (!permitted(heldBy(handle, reader))) return {};
     return Loan(*this, handle, reader);
   }
-  /// Reader. Gives a handle back without a loan (a frame that it skips).
+  /// Reader. Releases a handle without a loan, for a skipped frame.
   void release(SlotHandle handle, std::size_t reader) {
     if (!permitted(heldBy(handle, reader))) return;
     states_[handle.slot].word.fetch_and(~std::uint64_t{bitOf(reader)}, std::memory_order_release);
     readers_[reader].released.store(++readers_[reader].count, std::memory_order_release);
   }
 
-  /// Writer, or the reader asked about: whether `reader` holds this life of the slot.
+  /// Writer, or `reader` itself. Whether `reader` holds this life of the slot.
   [[nodiscard]] bool heldBy(SlotHandle handle, std::size_t reader) const {
     return holds(handle, bitOf(reader));
   }
 
-  /// Slots held by anybody, at about this time.
+  /// Approximate number of slots held by anyone.
   [[nodiscard]] std::size_t inUse() const {
     std::size_t count = 0;
     for (const State& state : states_)
       count += holdersOf(state.word.load(std::memory_order_relaxed)) != 0 ? 1U : 0U;
     return count;
   }
-  /// Hands refused because `reader` was at its quota.
+  /// Number of refused tryHand calls because `reader` was at its quota.
   [[nodiscard]] std::uint64_t refused(std::size_t reader) const { return refused_[reader].value(); }
-  /// Acquirings that found no free slot.
+  /// Number of acquisitions that found no free slot.
   [[nodiscard]] std::uint64_t exhausted() const { return exhausted_.value(); }
-  /// Calls with a handle that the caller does not hold: programming errors.
+  /// Number of calls with a handle that the caller does not hold: programming errors.
   [[nodiscard]] std::uint64_t misused() const { return misused_.load(std::memory_order_relaxed); }
 
  private:
   static constexpr std::uint32_t kWriterBit = 1U << kReaders;
 
   struct alignas(kCacheLine) State {
-    typename Policy::template Atomic<std::uint64_t> word{0};  ///< generation above, holders' bits below
+    typename Policy::template Atomic<std::uint64_t> word{0};  ///< high bits: generation; low bits: holders
   };
   struct alignas(kCacheLine) Reader {
     typename Policy::template Atomic<std::uint64_t> released{0};
@@ -204,7 +202,7 @@ class SlotPool {
     return (std::uint64_t{generation} << 32U) | holders;
   }
 
-  /// Exact for the thread that the bit belongs to: nobody else turns its own bit off.
+  /// Exact for the thread that owns the bit, because no other thread clears it.
   bool holds(SlotHandle handle, std::uint32_t bit) const {
     if (handle.slot >= kSlots) return false;
     const std::uint64_t state = states_[handle.slot].word.load(std::memory_order_relaxed);

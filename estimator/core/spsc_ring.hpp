@@ -1,23 +1,22 @@
 #pragma once
 // A queue of fixed capacity from one thread to one other: wait-free on both sides, first in first out.
 //
-// Threads: one producer calls tryPush, beginPush, commitPush; one consumer calls front, pop, tryPop;
-//   size() is for both (for a third thread it is an estimate); refused() is for anyone.
-// Full: the push is refused and counted, nothing waiting is lost: the producer decides what that means
-//   (IMU samples: a fault; recorder: a counted loss). Where the oldest should go instead: DropOldestRing.
-// Memory: kCapacity elements inside the object, in lines of their own, and one cache line a side.
-// Cost: O(1), no read-modify-write; the other side's index is read only when the copy of it that was kept
-//   from last time says full (or empty), so that a burst moves one cache line and not one an element.
-// Elements may be move-only; they need a default constructor and stay constructed for the ring's life.
-// A popped element is not destroyed: what it owns is let go when its slot is written again.
+// Threads: one producer calls tryPush, beginPush, commitPush; one consumer calls front, pop, tryPop. Both may
+//   call size() (an estimate for other threads); any thread may call refused().
+// Full: the push is refused and counted, and no waiting element is lost. The producer decides what that means
+//   (IMU samples: a fault; recorder: a counted loss). To drop the oldest instead, use DropOldestRing.
+// Memory: kCapacity elements inside the object, in cache lines of their own, and one cache line per side.
+// Cost: O(1), no read-modify-write. The other side's index is read only if its cached copy says full (or
+//   empty), so that a burst moves one cache line instead of one per element.
+// Elements may be move-only; they need a default constructor and stay constructed for the life of the ring.
+// A popped element is not destroyed: its resources are released when its slot is written again.
 //
-// Source: L. Lamport, "Specifying concurrent program modules", TOPLAS 1983, with release and acquire in
-// place of sequential consistency; cached indices: Lee, Bu, Chandranmenon, "A lock-free, cache-efficient
-// shared ring buffer", ANCS 2009.
-// Why it is right: each index is written by one side. A slot's content is written before the release
-// store of head that hands it over and read after the acquire load that saw it; it is overwritten only
-// after the acquire load of a tail that was released when the reading was done. Every interleaving and
-// every stale read that the memory model allows is run in tests/core for capacities 1 and 2.
+// Source: L. Lamport, "Specifying concurrent program modules", TOPLAS 1983, with release and acquire instead
+// of sequential consistency; cached indices: Lee, Bu, Chandranmenon, "A lock-free, cache-efficient shared
+// ring buffer", ANCS 2009. Why it is correct: each index is written by one side. The content of a slot is
+// written before the release store of head that hands it over, and read after the acquire load that saw it.
+// It is overwritten only after the acquire load of a tail that was released after reading. tests/core runs
+// every interleaving and every stale read that the memory model allows, for capacities 1 and 2.
 
 #include <array>
 #include <bit>
@@ -31,8 +30,8 @@
 
 namespace swiftlet {
 
-/// `Index` counts elements since the start and may wrap, hence the power of two; 64 bits do not wrap
-/// within a machine's life and allow any capacity.
+/// `Index` counts elements since the start. It may wrap, which needs a power of two as capacity; 64 bits do
+/// not wrap within a machine's life and allow any capacity.
 template <typename T, std::size_t kCapacity, typename Index = std::uint64_t,
           typename Policy = HardwareAtomics>
 class SpscRing {
@@ -49,12 +48,12 @@ class SpscRing {
 
   [[nodiscard]] static constexpr std::size_t capacity() { return kCapacity; }
 
-  /// Producer. False, counted, and nothing changed (an argument to be moved stays whole) when full.
+  /// Producer. False and counted, without effect (an argument to be moved stays valid), if full.
   [[nodiscard]] bool tryPush(const T& value) { return pushWith(value); }
   [[nodiscard]] bool tryPush(T&& value) { return pushWith(std::move(value)); }
 
-  /// Producer, writing in place: the element to fill, which holds what it held before; nullptr, counted,
-  /// when full. Unseen by the consumer until commitPush; beginning again without it gives the same element.
+  /// Producer. The element to fill in place, which still has its old value; nullptr, counted, if full. The
+  /// consumer does not see it until commitPush; a second beginPush without it returns the same element.
   [[nodiscard]] T* beginPush() {
     if (!hasRoom()) {
       producer_.refused.add();
@@ -67,7 +66,7 @@ class SpscRing {
     producer_.published.store(++producer_.head, std::memory_order_release);
   }
 
-  /// Consumer. The oldest element, its own until pop; nullptr when empty.
+  /// Consumer. The oldest element, valid until pop; nullptr if empty.
   [[nodiscard]] T* front() {
     if (consumer_.head_seen == consumer_.tail) {
       consumer_.head_seen = producer_.published.load(std::memory_order_acquire);
@@ -80,7 +79,7 @@ class SpscRing {
     consumer_.published.store(++consumer_.tail, std::memory_order_release);
   }
 
-  /// Consumer. False, and `out` untouched, when empty.
+  /// Consumer. False, with `out` unchanged, if empty.
   [[nodiscard]] bool tryPop(T& out) {
     T* oldest = front();
     if (oldest == nullptr) return false;
@@ -89,31 +88,31 @@ class SpscRing {
     return true;
   }
 
-  /// Elements waiting: never less than there are for the producer, never more for the consumer.
+  /// Number of waiting elements: never too small for the producer, never too large for the consumer.
   [[nodiscard]] std::size_t size() const {
-    // The tail first, and acquired: the head read after it cannot be an older one.
+    // The tail first, with acquire, so that the head read after it is not older.
     const Index tail = consumer_.published.load(std::memory_order_acquire);
     const Index waiting = distance(producer_.published.load(std::memory_order_relaxed), tail);
     return waiting < kCapacity ? waiting : kCapacity;
   }
 
-  /// Pushes that found the ring full.
+  /// Number of refused pushes.
   [[nodiscard]] std::uint64_t refused() const { return producer_.refused.value(); }
 
  private:
   struct alignas(kCacheLine) Producer {
-    typename Policy::template Atomic<Index> published{0};  ///< head: elements handed over so far
+    typename Policy::template Atomic<Index> published{0};  ///< head: number of elements pushed so far
     Index head = 0;                                        ///< the producer's own copy
-    Index tail_seen = 0;                                   ///< what it last read of the consumer's
+    Index tail_seen = 0;                                   ///< the consumer's index when last read
     EventCount refused;
   };
   struct alignas(kCacheLine) Consumer {
-    typename Policy::template Atomic<Index> published{0};  ///< tail: elements taken so far
+    typename Policy::template Atomic<Index> published{0};  ///< tail: number of elements taken so far
     Index tail = 0;
     Index head_seen = 0;
   };
 
-  // Small index types are promoted to int: back to the type that wraps.
+  // Small index types are promoted to int; convert back to the type that wraps.
   static Index distance(Index head, Index tail) { return static_cast<Index>(head - tail); }
 
   bool hasRoom() {

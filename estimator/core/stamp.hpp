@@ -1,9 +1,9 @@
 #pragma once
-// Time as data: integer nanoseconds, never a floating point second since an epoch.
+// Time as data: integer nanoseconds, not floating-point seconds.
 //
-// A `Stamp` is a point on one clock (CLOCK_MONOTONIC live, the log's own clock in replay); a
-// `Duration` is the difference of two. A double of seconds near 1.4e9 resolves 238 ns only, which
-// breaks equality joins; hence the distinct types and the explicit conversions.
+// A `Stamp` is a point on one clock (CLOCK_MONOTONIC live, the log's clock in replay); a `Duration` is the
+// difference of two. A double of seconds near 1.4e9 resolves only 238 ns, which breaks equality of stamps;
+// hence distinct types and explicit conversions.
 
 #include <compare>
 #include <cstdint>

@@ -1,6 +1,6 @@
 #pragma once
-// Faults as values. A stage never throws and never aborts: it returns a `Status`, and the host
-// turns it into a counted event. Copying one costs two words; `what` points to a literal.
+// Faults as values. A stage never throws or aborts: it returns a `Status`, which the host turns into a
+// counted event. A Status is two words; `what` points to a literal.
 
 #include <cstdint>
 
@@ -10,10 +10,10 @@ enum class StatusCode : std::uint8_t {
   kOk,
   kNotReady,         ///< more input is needed (start-up, an empty queue)
   kInvalidInput,     ///< the message was refused: NaN, wrong size, repeated or reversed stamp
-  kCapacityReached,  ///< a fixed capacity was full and its policy was applied
-  kDegenerate,       ///< the data do not determine the answer (no parallax, too few points)
+  kCapacityReached,  ///< a fixed capacity was full; its policy was applied
+  kDegenerate,       ///< the data do not determine the result (no parallax, too few points)
   kNumerical,        ///< a factorization or an iteration failed
-  kFailed,           ///< the stage cannot go on without a reset
+  kFailed,           ///< the stage cannot continue without a reset
 };
 
 struct Status {

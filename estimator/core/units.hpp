@@ -1,5 +1,5 @@
 #pragma once
-// Factors between the SI units of the code and the units that people read: `seconds * kToMs`.
+// Factors from the SI units of the code to the units of outputs: `seconds * kToMs`.
 
 #include <cstddef>
 #include <numbers>
