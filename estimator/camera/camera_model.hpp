@@ -4,7 +4,7 @@
 // Frames: the camera looks along +z, x right, y down; pixel (0,0) is the centre of the top-left
 // pixel. Models (u = fx xd + cx, v = fy yd + cy):
 //  - radial-tangential (Brown; OpenCV's first four coefficients), valid for z > 0 and inside the
-//    radius where the radial polynomial is monotonic: beyond it points fold back into the image.
+//    radius where the radial polynomial is monotonic; beyond it points fold back into the image.
 //  - equidistant (Kannala, Brandt, PAMI 2006): theta_d = theta (1 + k1 theta^2 + ... + k4 theta^8),
 //    (xd, yd) = theta_d (x, y) / |(x, y)|; valid up to `maxTheta()`, which may exceed 90 degrees.
 // Projection costs about 8 ns; unprojection, by Newton's method in at most 20 steps, about 50 ns.
@@ -35,16 +35,16 @@ class CameraModel {
   /// Largest angle from the optical axis [rad] at which the model can be inverted.
   [[nodiscard]] double maxTheta() const { return max_theta_; }
 
-  /// Point in the camera frame [m] to pixel. False outside the model's valid set (behind a
-  /// pinhole, past the fold, NaN); the pixel may lie outside the image. `jacobian`, when given, is
+  /// Projects a point in the camera frame [m] to a pixel, which may be outside the image. False
+  /// outside the model's valid set (behind a pinhole, past the fold, NaN). `jacobian`, if given, is
   /// d pixel / d point.
   [[nodiscard]] bool project(const Eigen::Vector3d& p_cam, Eigen::Vector2d& pixel,
                              Matrix23d* jacobian = nullptr) const;
 
-  /// Pixel to unit bearing in the camera frame. False where the model has no inverse.
+  /// Pixel to unit bearing in the camera frame. False if the model has no inverse there.
   [[nodiscard]] bool unproject(const Eigen::Vector2d& pixel, Eigen::Vector3d& bearing) const;
 
-  /// True when the pixel lies at least `border` pixels inside the image.
+  /// Whether the pixel is at least `border` pixels inside the image.
   [[nodiscard]] bool inImage(const Eigen::Vector2d& pixel, double border = 0) const {
     return pixel.x() >= border && pixel.y() >= border && pixel.x() <= width_ - 1 - border &&
            pixel.y() <= height_ - 1 - border;

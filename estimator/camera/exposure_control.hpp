@@ -1,22 +1,22 @@
 #pragma once
-// Exposure and gain for odometry: what the next images of a rig are to be taken with, from the newest one.
+// Exposure and gain of a rig's next images, from the newest image, for odometry.
 //
-// - Metering, on every 8th row: the mean grey goes to kTargetMean, unless more than kSaturatedShare of the
-//   pixels would come near white; then those decide.
-// - Motion blur: the exposure is at most kBlur / (focal turn_rate), so that more light comes from the gain.
-//   Only where the gain is at its end too the exposure grows, up to kDarkBlur.
-// - A request acts kActingDelay images later. An image is judged by the setting that it was taken with, and
-//   what was asked for since counts: nothing winds up while requests are on their way.
-// - Exposures are asked for in the camera's own steps, and the gain makes up for the rest.
-// - Steps: none within kDeadband, at most 10 % an image near the target, up to 40 % far from it.
+// - Metering, on every 8th row: controls the mean grey value to kTargetMean, unless more than kSaturatedShare
+//   of the pixels would be nearly white; then these decide.
+// - Motion blur: limits the exposure to kBlur / (focal turn_rate); further light comes from the gain. If the
+//   gain is at its limit too, the exposure may grow up to kDarkBlur.
+// - A request takes effect kActingDelay images later. An image is metered with the settings that it was taken
+//   with, and pending requests are taken into account, so the control does not wind up.
+// - Exposures are multiples of the camera's step; the gain compensates the remainder.
+// - Changes: none within kDeadband, at most 10 % per image near the target, up to 40 % far from it.
 //
-// Units: gain in times of the sensor's least gain; light is exposure times gain [s].
+// Units: gain is relative to the sensor's least gain; light is exposure times gain [s].
 // Threads: one. Memory: the object's own, no allocation. Cost: some 10 us at 752 x 480, of meterImage().
-// Sources: blur weighed against noise, and prediction by the light that a setting gives: M.-A. Begin, I.
-// Hunter, "Auto-Exposure Algorithm for Enhanced Mobile Robot Localization in Challenging Light Conditions",
-// Sensors 22 (2022) 835. The mean as the target: Roboception's rc_visard, 0.25 to 0.75 of white. Gradients in
-// place of it: Z. Zhang, C. Forster, D. Scaramuzza, "Active Exposure Control for Robust Visual Odometry in
-// HDR Environments", ICRA 2017; that needs the camera's response, which a driver does not tell.
+// Sources: trade-off of blur and noise, and prediction by light: M.-A. Begin, I. Hunter, "Auto-Exposure
+// Algorithm for Enhanced Mobile Robot Localization in Challenging Light Conditions", Sensors 22 (2022) 835.
+// Mean as target: Roboception's rc_visard, 0.25 to 0.75 of white. Alternative by gradients: Z. Zhang, C.
+// Forster, D. Scaramuzza, "Active Exposure Control for Robust Visual Odometry in HDR Environments", ICRA
+// 2017; it needs the camera's response function, which drivers do not provide.
 
 #include <array>
 #include <cstddef>
@@ -36,43 +36,43 @@ struct ExposureSetting {
 struct ExposureRange {
   Duration shortest;
   Duration longest;
-  double most_gain = 1;  ///< times the least; 1: the gain cannot be set
-  double step = 0;       ///< s, of which exposures are multiples; 0: any
+  double most_gain = 1;  ///< relative to the least gain; 1: the gain cannot be set
+  double step = 0;       ///< s, exposures are multiples of it; 0: any exposure
 };
 
-/// By how much brighter the image ought to be: 2 is twice the light, 1 is right. Within 0.1 and 10.
+/// Factor on the light for a correct image: 2 is twice the light, 1 is correct. Limited to 0.1 to 10.
 [[nodiscard]] double meterImage(const ImageView& image);
 
 class ExposureControl {
  public:
   static constexpr double kTargetMean = 102;       ///< grey, 0.4 of white
   static constexpr double kSaturatedShare = 0.05;  ///< of pixels: lamps and windows
-  static constexpr double kBlur = 1.5;             ///< px; tracking loses little below 2
-  static constexpr double kDarkBlur = 4;           ///< px; blurred is better than black
-  /// rad/s, of a vehicle that does not turn: 1 m/s at 3 m moves pixels as fast.
+  static constexpr double kBlur = 1.5;             ///< px; tracking hardly degrades below 2
+  static constexpr double kDarkBlur = 4;           ///< px; a blurred image is better than a black one
+  /// rad/s, assumed if the vehicle does not turn: 1 m/s at 3 m moves pixels as fast.
   static constexpr double kLeastTurnRate = 0.3;
   static constexpr double kDeadband = 0.1;  ///< of the light
-  /// An image that came when a request went out is followed by one that is being exposed already.
+  /// When a request is sent, the next image is already being exposed.
   static constexpr std::uint64_t kActingDelay = 2;
 
   ExposureControl() = default;
-  /// `focal` [px] of the camera, `period` of its images; `start`: what is in force.
+  /// `focal`: focal length of the camera [px]. `period`: of its images. `start`: the present settings.
   ExposureControl(const ExposureRange& range, double focal, Duration period, const ExposureSetting& start);
 
-  /// After image `frame` (numbers rise, holes may be) with `missing` light, of meterImage(), and the
-  /// vehicle's turn rate [rad/s]: what to ask for.
+  /// The settings to request after image `frame` (numbers ascend, gaps are allowed), with the factor
+  /// `missing` of meterImage() and the vehicle's turn rate [rad/s].
   ExposureSetting update(std::uint64_t frame, double missing, double turn_rate);
-  /// In place of update(): another camera's control decided.
+  /// Instead of update(), if the control of another camera decided.
   void follow(std::uint64_t frame, const ExposureSetting& asked);
 
-  /// What image `frame` was taken with, of the last kRemembered requests.
+  /// The settings that image `frame` was taken with, among the last kRemembered requests.
   [[nodiscard]] ExposureSetting inForce(std::uint64_t frame) const;
   [[nodiscard]] const ExposureSetting& asked() const { return newest().setting; }
 
  private:
   static constexpr std::size_t kRemembered = 8;
   struct Request {
-    std::uint64_t frame = 0;  ///< the first that is taken with it
+    std::uint64_t frame = 0;  ///< the first image taken with it
     ExposureSetting setting;
   };
 
@@ -86,7 +86,7 @@ class ExposureControl {
   double turn_decay_ = 0;  ///< an image
   double turn_rate_ = kLeastTurnRate;
   double bound_ = 0;  ///< s, exposure at kBlur
-  double light_ = 0;  ///< s, that is wanted; what was asked for is less by a part of a step
+  double light_ = 0;  ///< s, wanted light; the requested light is smaller by a part of a step
   std::size_t count_ = 0;
   std::array<Request, kRemembered> requests_{};
 };

@@ -17,14 +17,14 @@ struct Rig {
   std::array<SE3, kMaxCameras> T_body_cam;  ///< camera to body
   /// t_imu = t_image + shift (Kalibr's timeshift_cam_imu), one value for the rig.
   Duration camera_to_imu_shift;
-  /// From the first row to the last of a rolling shutter, the same for both cameras; zero: global shutter.
-  /// An image's stamp is that of its middle row.
+  /// Time from the first to the last row of a rolling shutter, the same for both cameras; zero: global
+  /// shutter. The stamp of an image is that of its middle row.
   Duration readout;
 
   [[nodiscard]] bool rolls() const { return readout.ns != 0; }
-  /// Where the row `v` [px] of camera c is: from -0.5, the first, to 0.5, the last.
+  /// Position of row `v` [px] of camera c, from -0.5 (first row) to 0.5 (last row).
   [[nodiscard]] double row(std::size_t c, double v) const { return v / (camera[c].height() - 1) - 0.5; }
-  /// s from an image's stamp to that row.
+  /// Time from the image's stamp to that row [s].
   [[nodiscard]] double rowTime(std::size_t c, double v) const { return readout.seconds() * row(c, v); }
   [[nodiscard]] SE3 T_cam1_cam0() const { return T_body_cam[1].inverse() * T_body_cam[0]; }
   [[nodiscard]] double baseline() const { return T_cam1_cam0().translation.norm(); }

@@ -1,5 +1,5 @@
 #pragma once
-// The calibration in use: the given one, or its estimate where that is switched on.
+// The calibration in use: the given one, or its estimate if that is enabled.
 
 #include <array>
 
@@ -11,23 +11,23 @@
 namespace swiftlet {
 
 /// Prior standard deviations of the given calibration, used when it is estimated in flight.
-/// A driver that stamps at arrival is 15 ms off, 1.5 sigma.
+/// A driver that stamps images at arrival is off by 15 ms, 1.5 sigma.
 inline constexpr double kTimeOffsetPriorSigma = 10e-3;  ///< s
-/// Line times of drivers and data sheets are right; of other modes, or by other tools, to a few per cent of
-/// 20 to 60 ms.
+/// Line times from drivers and data sheets are exact; those of other modes or from other tools are within a
+/// few per cent of 20 to 60 ms.
 inline constexpr double kReadoutPriorSigma = 2e-3;            ///< s
 inline constexpr double kExtrinsicRotationPriorSigma = 0.01;  ///< rad
-/// Calibrations give positions on the IMU to a few millimetres.
+/// Calibrations give positions relative to the IMU to a few millimetres.
 inline constexpr double kExtrinsicPositionPriorSigma = 2e-3;  ///< m
-/// Calibrations give the baseline's length, the scale of two cameras, to a thousandth of itself.
+/// Calibrations give the length of the baseline, the scale of two cameras, to one part in a thousand.
 inline constexpr double kBaselinePriorSigma = 1e-3;
 
-/// Sigmas: largest over the axes, from the last solve; 0 where the value is not estimated.
+/// Sigmas: largest over the axes, from the last solve; 0 if the value is not estimated.
 struct CalibrationEstimate {
   Duration camera_to_imu_shift;  ///< t_imu = t_image + shift
   Duration readout;              ///< Rig::readout
   std::array<SE3, kMaxCameras> T_body_cam;
-  GyroIntrinsics gyro;                               ///< zero where they are not estimated
+  GyroIntrinsics gyro;                               ///< zero if not estimated
   double shift_sigma = 0;                            ///< s
   double readout_sigma = 0;                          ///< s
   std::array<double, kMaxCameras> rotation_sigma{};  ///< rad

@@ -1,9 +1,10 @@
 #pragma once
-// One camera while a rolling shutter's rows are read: what a row sees, seen from the middle row, and back.
+// Motion of a camera while the rows of a rolling shutter are read: transforms between the camera at a row and
+// at the middle row.
 //
-// Points and rays are in the camera's axes, at the image's stamp (the middle row's time) or `seconds` after
-// it (Rig::rowTime). The velocity is constant while the rows are read, the turn is ScanTurn's. Metres,
-// seconds. Cost: 0.1 us a point. Nothing is allocated.
+// Points and rays are in camera axes, at the image's stamp (the time of the middle row) or `seconds` after it
+// (Rig::rowTime). The velocity is constant while the rows are read; the rotation is that of ScanTurn. Metres,
+// seconds. Cost: 0.1 us a point. No allocation.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -24,14 +25,14 @@ class CameraScan {
   [[nodiscard]] Eigen::Quaterniond turnAt(double seconds) const {
     return R_cam_body_ * turn_.at(seconds) * R_cam_body_.conjugate();
   }
-  /// A point of the middle row's camera in the row's, and back.
+  /// Transforms a point from the camera at the middle row to that at the row, and back.
   [[nodiscard]] Eigen::Vector3d atRow(const Eigen::Vector3d& p, double seconds) const {
     return turnAt(seconds).conjugate() * (p - seconds * velocity_);
   }
   [[nodiscard]] Eigen::Vector3d fromRow(const Eigen::Vector3d& p, double seconds) const {
     return turnAt(seconds) * p + seconds * velocity_;
   }
-  /// m/s: how a point that stands still moves in the camera's axes, on the mean over the rows.
+  /// m/s: velocity of a static point in camera axes, averaged over the rows.
   [[nodiscard]] Eigen::Vector3d flow(const Eigen::Vector3d& p) const {
     return -(R_cam_body_ * turn_.mean()).cross(p) - velocity_;
   }

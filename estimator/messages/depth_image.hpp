@@ -1,9 +1,9 @@
 #pragma once
-// A depth image as an ideal pinhole camera sees it, borrowed: from stereo, from a sensor or from a log.
+// A view of a depth image of an ideal pinhole camera, from stereo, a sensor or a log.
 //
-// Row-major without padding, `camera.width` x `camera.height`. Depth is metres along the optical axis; 0
-// where nothing was measured (a sensor's NaN or negative values are 0 here too). Frames: the camera looks
-// along +z, x right, y down; body is the IMU. Owns nothing.
+// Row-major without padding, `camera.width` x `camera.height`. Depth is in metres along the optical axis; 0
+// where nothing was measured (also for NaN or negative values of a sensor). Frames: the camera looks along
+// +z, x right, y down; body is the IMU. Does not own the data.
 
 #include <cstddef>
 #include <cstdint>
@@ -32,9 +32,9 @@ struct DepthImageView {
   PinholeIntrinsics camera;
   SE3 T_body_camera;
   const float* depth = nullptr;             ///< m; 0: none
-  const float* sigma = nullptr;             ///< m, one standard deviation; null: the reader's own model
+  const float* sigma = nullptr;             ///< m, standard deviation; null: the reader uses its own model
   const std::uint8_t* intensity = nullptr;  ///< grey; null: none
-  const std::uint8_t* labels = nullptr;     ///< classes, 0 (kNoLabel) where unknown; null: none
+  const std::uint8_t* labels = nullptr;     ///< classes, 0 (kNoLabel) if unknown; null: none
 };
 
 }  // namespace swiftlet

@@ -1,5 +1,5 @@
 #pragma once
-// Images on their way in: one camera's frame as a source gives it, and the pair after pairing.
+// Input images: the frame of one camera as a source delivers it, and the pair after pairing.
 
 #include <array>
 #include <cstdint>
@@ -14,13 +14,12 @@ enum class Clock : std::uint8_t { kMonotonic, kLog };
 
 struct CameraFrame {
   Stamp stamp;    ///< mid-exposure
-  Stamp arrival;  ///< when the last byte was there; equals `stamp` where a log does not say
+  Stamp arrival;  ///< when the last byte was received; equals `stamp` if a log does not have it
   Clock clock = Clock::kLog;
   std::uint32_t camera = 0;    ///< 0 left, 1 right
-  std::uint64_t sequence = 0;  ///< the device's own count
-  std::uint64_t number = 0;    ///< of this camera's images that entered the estimator, from 1; 0: not counted
-  std::uint32_t timeline =
-      0;  ///< of the IMU's stamps (estimator/odometry/stamp_guard.hpp), with which it goes
+  std::uint64_t sequence = 0;  ///< sequence number of the device
+  std::uint64_t number = 0;    ///< count of this camera's images in the estimator, from 1; 0: unknown
+  std::uint32_t timeline = 0;  ///< time line of the IMU's stamps (odometry/stamp_guard.hpp)
   ImageView image;
 };
 
@@ -28,8 +27,8 @@ struct CameraFrame {
 struct StereoFrame {
   Stamp stamp;
   std::uint64_t index = 0;
-  std::array<ImageView, kMaxCameras> image;         ///< empty() where that camera is missing
-  std::array<std::uint64_t, kMaxCameras> number{};  ///< CameraFrame::number of each; 0 where missing
+  std::array<ImageView, kMaxCameras> image;         ///< empty() if that camera is missing
+  std::array<std::uint64_t, kMaxCameras> number{};  ///< CameraFrame::number of each; 0 if missing
   std::uint32_t timeline = 0;                       ///< CameraFrame::timeline
 
   [[nodiscard]] bool has(std::size_t camera) const { return !image[camera].empty(); }

@@ -1,5 +1,5 @@
 #pragma once
-// One reading of the IMU in body axes.
+// One IMU sample in body axes.
 
 #include <Eigen/Core>
 

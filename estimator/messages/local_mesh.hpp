@@ -1,7 +1,7 @@
 #pragma once
-// The mesh of the near surroundings: landmarks joined by triangles, for planners and for display.
+// The mesh of the surroundings: triangles over landmarks, for planners and display.
 //
-// World axes, metres. A face is counter-clockwise seen from where it was seen.
+// World axes, metres. Faces are counter-clockwise seen from the side from which they were observed.
 
 #include <Eigen/Core>
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace swiftlet {
 
-/// A label nobody gave; the values of the others are the segmentation's.
+/// No label; other values are defined by the segmentation.
 inline constexpr std::uint8_t kNoLabel = 0;
 
 struct MeshVertex {
@@ -24,14 +24,14 @@ struct MeshVertex {
 };
 
 struct MeshFace {
-  std::array<std::uint32_t, 3> vertex{};  ///< indices of the vertices beside it
+  std::array<std::uint32_t, 3> vertex{};  ///< indices into the mesh's vertices
   std::uint8_t label = kNoLabel;
 };
 
 struct LocalMesh {
   std::uint32_t epoch = 0;
   Stamp stamp;                    ///< of the newest frame in it
-  std::uint64_t frame_index = 0;  ///< that frame's
+  std::uint64_t frame_index = 0;  ///< of that frame
   FixedVector<MeshVertex, kMaxMeshVertices> vertices;
   FixedVector<MeshFace, kMaxMeshFaces> faces;
 };

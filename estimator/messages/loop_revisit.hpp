@@ -1,6 +1,6 @@
 #pragma once
-// A verified loop closure as full smoothing takes it: two keyframes, their measured relative pose, and which
-// features of theirs are the same point.
+// A verified loop closure for full smoothing: two keyframes, their measured relative pose, and the pairs of
+// features that are the same point.
 
 #include <Eigen/Core>
 #include <array>
@@ -12,13 +12,13 @@
 
 namespace swiftlet {
 
-/// A feature of a keyframe: a track of the odometry in that keyframe's epoch, or where the cameras saw it,
-/// or both.
+/// A feature of a keyframe: a track of the odometry in that keyframe's epoch, its pixels in the cameras, or
+/// both.
 struct RevisitFeature {
   bool has_track = false;
   TrackId track = 0;
   std::array<bool, kMaxCameras> seen{};
-  std::array<Eigen::Vector2f, kMaxCameras> pixel{};  ///< distorted, where seen
+  std::array<Eigen::Vector2f, kMaxCameras> pixel{};  ///< distorted, valid where seen
 };
 
 struct RevisitMatch {
@@ -31,7 +31,7 @@ struct LoopRevisit {
   Stamp new_stamp;
   SE3 T_old_new;  ///< m, between the bodies
   Eigen::Matrix<double, 6, 6> information =
-      Eigen::Matrix<double, 6, 6>::Identity();  ///< of it, right perturbation (phi, p), 1/rad^2, 1/m^2
+      Eigen::Matrix<double, 6, 6>::Identity();  ///< of T_old_new, right perturbation (phi, p), 1/rad^2, 1/m^2
   std::vector<RevisitMatch> matches;
 };
 

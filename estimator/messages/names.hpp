@@ -1,5 +1,5 @@
 #pragma once
-// Words for the enumerations of the messages, as they stand in files.
+// Names of the messages' enumerators in files.
 
 #include <optional>
 #include <string_view>
@@ -9,7 +9,7 @@
 namespace swiftlet {
 
 std::string_view healthName(Health health);
-/// None: no word of these.
+/// Empty if the text is none of these names.
 std::optional<Health> healthNamed(std::string_view name);
 std::string_view eventName(EventKind kind);
 std::string_view doubtName(Doubt doubt);

@@ -1,5 +1,5 @@
 #pragma once
-// The estimate as everyone downstream sees it.
+// The estimate as passed to all consumers.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -10,7 +10,7 @@
 namespace swiftlet {
 
 enum class Health : std::uint8_t {
-  kInitializing,  ///< no pose yet, or one whose tilt and velocity are still being found
+  kInitializing,  ///< no pose yet, or tilt and velocity are not settled
   kGood,
   kDegraded,  ///< usable, with less than nominal input: one camera, few tracks, coasting
   kFailed,    ///< do not fly on this
@@ -22,7 +22,7 @@ using Matrix15d = Eigen::Matrix<double, kStateDim, kStateDim>;
 
 struct NavState {
   Stamp stamp;
-  std::uint32_t epoch = 0;  ///< raised by every re-initialization
+  std::uint32_t epoch = 0;  ///< incremented by every re-initialization
   Health health = Health::kInitializing;
   SE3 T_world_body;
   Eigen::Vector3d v_world_body = Eigen::Vector3d::Zero();  ///< m/s, world axes

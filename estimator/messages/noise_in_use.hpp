@@ -1,11 +1,11 @@
 #pragma once
-// The noise that an estimate was made with, where the flight shows more than was told.
+// The noise used for an estimate, which may be larger than configured if the flight shows more.
 
 #include "estimator/messages/track_noise.hpp"
 
 namespace swiftlet {
 
-/// On the densities of the IMU's white noise, inflation included.
+/// Factors on the IMU's white-noise densities, including the configured inflation.
 struct ImuFactors {
   double gyro = 1;
   double accel = 1;

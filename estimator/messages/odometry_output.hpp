@@ -1,5 +1,5 @@
 #pragma once
-// What the odometry says after each frame, beside the newest state.
+// The output of the odometry after each frame, besides the newest state.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -20,26 +20,26 @@ enum class EventKind : std::uint8_t {
   kFrameDropped,     ///< value: frames refused (repeated or reversed stamp, wrong size)
   kCameraLost,       ///< value: camera
   kCameraBack,       ///< value: camera
-  kBlackoutStarted,  ///< value: seconds without an accepted image, more than "good" allows
+  kBlackoutStarted,  ///< value: seconds without an accepted image; longer than health "good" allows
   kBlackoutEnded,    ///< value: seconds it lasted
   kRestStarted,
   kRestEnded,
   kInitialized,      ///< value: seconds since the first image
   kHealthChanged,    ///< value: the new Health
   kReset,            ///< value: the new epoch
-  kCapacityReached,  ///< value: items given up
-  kStampsWentBack,   ///< value: seconds by which the IMU's stamps went back for good; a new epoch begins
-  kDoubt,            ///< value: the Doubt by which health is not good
+  kCapacityReached,  ///< value: items dropped
+  kStampsWentBack,   ///< value: seconds by which the IMU's stamps went back permanently; a new epoch begins
+  kDoubt,            ///< value: the Doubt because of which health is not good
 };
 
-/// Why health is not good: the first condition that holds, in this order.
+/// The reason why health is not good: the first condition in this order that holds.
 enum class Doubt : std::uint8_t {
   kNone,
   kNoImage,         ///< no image accepted for 0.3 s: coasting on the IMU
   kImplausible,     ///< speed or acceleration above the vehicle's limits
-  kTracksDisagree,  ///< many tracks do not fit one motion: calibration, rolling shutter, stamps or a moving
-                    ///< scene
-  kImuDisagrees,    ///< IMU residuals too large: extrinsics, axes, stamps or noise densities
+  kTracksDisagree,  ///< many tracks contradict a single motion: wrong calibration, rolling shutter or stamps,
+                    ///< or a moving scene
+  kImuDisagrees,    ///< IMU residuals too large: wrong extrinsics, axes, stamps or noise densities
   kUncertain,       ///< sigma of velocity or tilt too large
   kScaleDisagrees,  ///< one camera: the accelerometer contradicts the scale
   kScaleUnknown,    ///< one camera: not enough acceleration yet to confirm the scale
@@ -54,27 +54,27 @@ struct Event {
   double value = 0;
 };
 
-/// One frame's figures: what a user looks at first when a run goes wrong.
+/// Figures of one frame, to diagnose a run.
 struct FrameStatistics {
   bool keyframe = false;
   bool at_rest = false;
-  int tracks = 0;                   ///< features handed in
-  int known = 0;                    ///< of these, features whose landmark has earlier sightings in the window
-  int landmarks = 0;                ///< landmarks in the solved window
-  int inliers_mono = 0;             ///< accepted sightings of this frame, by one camera
-  int inliers_stereo = 0;           ///< accepted, by both cameras
-  double track_length = 0;          ///< mean frames a track of this frame has lived
-  double reprojection_rms = 0;      ///< px, accepted sightings of the window
-  NoiseInUse noise;                 ///< for this frame's sightings and the motion to it
-  double pose_variance_factor = 1;  ///< in the covariances, for tracks whose errors last
-  double imu_residual = 0;  ///< whitened IMU residuals of the window, RMS (1: as the noise in use says)
-  /// One camera: true over estimated length, as the accelerometer says, and its sigma (scale_check.hpp).
+  int tracks = 0;               ///< input features
+  int known = 0;                ///< of these, features whose landmark has earlier observations in the window
+  int landmarks = 0;            ///< landmarks in the solved window
+  int inliers_mono = 0;         ///< accepted observations of this frame by one camera
+  int inliers_stereo = 0;       ///< accepted observations of this frame by both cameras
+  double track_length = 0;      ///< mean length of this frame's tracks, in frames
+  double reprojection_rms = 0;  ///< px, over accepted observations of the window
+  NoiseInUse noise;             ///< for this frame's observations and the motion to it
+  double pose_variance_factor = 1;  ///< factor on the covariances for correlated errors of tracks
+  double imu_residual = 0;          ///< RMS of the window's whitened IMU residuals (1: as the noise in use)
+  /// One camera: true over estimated length by the accelerometer, and its sigma (scale_check.hpp).
   double scale = 1;
   double scale_sigma = 0;
   int iterations = 0;
 };
 
-/// A keyframe as it leaves the window (or at the end of the run).
+/// A keyframe when it leaves the window (or at the end of the run).
 struct KeyframeState {
   NavState state;
   FrameStatistics statistics;

@@ -1,7 +1,7 @@
 #pragma once
-// Planes that the mesher found, with the landmarks on them: on its way to the smoother, which ties them.
+// Planes found by the mesher with the landmarks on them, for the smoother, which ties the landmarks to them.
 //
-// A report holds all that is known, not what changed: a reader that skipped some misses nothing.
+// A report holds the complete state, not changes, so a reader may skip reports.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -14,33 +14,33 @@
 namespace swiftlet {
 
 enum class PlaneDirection : std::uint8_t {
-  kHorizontal,  ///< a floor, a ceiling, a table: its normal is along z
-  kVertical,    ///< a wall: its normal is orthogonal to z
+  kHorizontal,  ///< floor, ceiling, table: the normal is along z
+  kVertical,    ///< wall: the normal is orthogonal to z
 };
 
 /// n . p = distance, world.
 struct ReportedPlane {
   std::uint64_t id = 0;  ///< from 1; never reused within an epoch
   PlaneDirection direction = PlaneDirection::kHorizontal;
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit, towards the side that was seen
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit, towards the observed side
   double distance = 0;                                ///< m
 };
 
 struct ReportedPoint {
   TrackId id = 0;
   std::uint64_t plane = 0;  ///< id of the plane that it lies on
-  /// False: amid points of the plane, but known too badly to tell it from something in front: to be drawn on
-  /// it, not to be tied.
+  /// False: among the points of the plane, but too uncertain to be distinguished from something in front.
+  /// Such points are drawn on the plane but not tied to it.
   bool firm = true;
 };
 
 struct PlaneReport {
   std::uint32_t epoch = 0;
-  Stamp stamp;                    ///< of the keyframe that it was found at
-  std::uint64_t frame_index = 0;  ///< that keyframe's
+  Stamp stamp;                    ///< of the keyframe at which it was made
+  std::uint64_t frame_index = 0;  ///< of that keyframe
   FixedVector<ReportedPlane, kMaxPlanes> planes;
   FixedVector<ReportedPoint, kMaxLandmarks>
-      points;  ///< firm ones, best known first; then the others. Each once
+      points;  ///< firm ones first, best known first, then the others; each once
 };
 
 }  // namespace swiftlet

@@ -1,9 +1,9 @@
 #pragma once
-// How the body moved while a rolling shutter's rows were read. Zero: a global shutter, or nothing is known.
+// Motion of the body while the rows of a rolling shutter were read. Zero: global shutter, or unknown.
 //
-// Rows are read at their own times about the image's stamp, that of the middle row (Rig::rowTime). One mean
-// rate for the rows before the middle and one for those after it: what is neglected is the angular
-// acceleration within 10 ms, some 0.05 px at 10 rad/s^2. Frames: body = IMU.
+// Rows are read at their own times around the image's stamp, which is that of the middle row (Rig::rowTime).
+// There is one mean rate for the rows before the middle and one for those after it; the angular acceleration
+// within 10 ms is neglected, some 0.05 px at 10 rad/s^2. Frames: body = IMU.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -16,7 +16,7 @@ struct ScanTurn {
   Eigen::Vector3d before = Eigen::Vector3d::Zero();  ///< rad/s, body axes: rows before the middle
   Eigen::Vector3d after = Eigen::Vector3d::Zero();   ///< rows after it
 
-  /// R_middle_row: from the body's axes at a row, `seconds` after the middle one, to those at the middle one.
+  /// R_middle_row: from body axes at a row, `seconds` after the middle row, to those at the middle row.
   [[nodiscard]] Eigen::Quaterniond at(double seconds) const {
     return expSo3(seconds * (seconds < 0 ? before : after));
   }

@@ -1,6 +1,6 @@
 #pragma once
-// What was seen at one instant beside the cameras' own images, borrowed: the depth image of a sensor, and
-// what a segmentation network makes of camera 0's image. Either may be missing. Owns nothing.
+// Views of further images of one instant: the depth image of a sensor, and the labels that a segmentation
+// network gives to camera 0's image. Either may be missing. Does not own the data.
 
 #include "estimator/core/image_view.hpp"
 #include "estimator/core/stamp.hpp"
@@ -9,7 +9,7 @@
 namespace swiftlet {
 
 struct SceneImages {
-  Stamp stamp;           ///< of camera 0's image that it goes with
+  Stamp stamp;           ///< of the corresponding image of camera 0
   DepthImageView depth;  ///< `depth.depth` null: none
   ImageView labels;      ///< one value a pixel, in camera 0's raw geometry; empty: none
 

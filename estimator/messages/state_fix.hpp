@@ -1,5 +1,5 @@
 #pragma once
-// A solved state on its way to propagation, which starts again from it.
+// A solved state for propagation, which restarts from it.
 
 #include "estimator/core/stamp.hpp"
 #include "estimator/messages/gyro_intrinsics.hpp"
@@ -8,10 +8,10 @@
 namespace swiftlet {
 
 struct StateFix {
-  bool has_state = false;  ///< false: the epoch has begun, its first state has not been found yet
-  NavState state;       ///< at the image's instant on the IMU's clock; its epoch counts without a state too
-  GyroIntrinsics gyro;  ///< that go with its bias
-  Stamp last_accepted;  ///< the newest image whose tracks were accepted; ages the health
+  bool has_state = false;  ///< false: the epoch has begun but has no state yet
+  NavState state;       ///< at the image's instant on the IMU's clock; its epoch is valid without a state too
+  GyroIntrinsics gyro;  ///< estimated together with its bias
+  Stamp last_accepted;  ///< the newest image whose tracks were accepted; health degrades with its age
   std::uint32_t timeline = 0;  ///< TrackedFrame::timeline of the frame it comes from
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// How well a state is known, in one figure each.
+// Standard deviations of a state, one figure per quantity.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -9,12 +9,12 @@
 
 namespace swiftlet {
 
-/// m/s, the largest over the axes.
+/// m/s, largest over the axes.
 inline double velocitySigma(const NavState& state) {
   return std::sqrt(state.covariance.diagonal().segment<3>(6).maxCoeff());
 }
 
-/// rad, the mean of the two horizontal axes: heading is not known, and need not be.
+/// rad, mean of the two horizontal axes; heading is not observable and not included.
 inline double tiltSigma(const NavState& state) {
   const Eigen::Vector3d up = state.T_world_body.rotation.conjugate() * Eigen::Vector3d::UnitZ();
   const Eigen::Matrix3d P = state.covariance.topLeftCorner<3, 3>();

@@ -1,5 +1,5 @@
 #pragma once
-// How well a tracked coordinate is known: the default of every setting that says so.
+// Default standard deviation of a tracked coordinate, shared by all settings for it.
 
 namespace swiftlet {
 

@@ -1,5 +1,5 @@
 #pragma once
-// What the front-end hands to the smoother: where each landmark was seen in this frame.
+// Output of the front-end for the smoother: the pixels of each landmark in this frame.
 
 #include <Eigen/Core>
 #include <array>
@@ -13,7 +13,7 @@ namespace swiftlet {
 
 using TrackId = std::uint64_t;
 
-/// A landmark's sightings in one frame. An id is never reused within an epoch.
+/// Observations of a landmark in one frame. Ids are not reused within an epoch.
 struct TrackedFeature {
   TrackId id = 0;
   std::array<bool, kMaxCameras> seen{};
@@ -26,7 +26,7 @@ struct TrackedFrame {
   std::uint32_t timeline = 0;  ///< StereoFrame::timeline
   std::array<bool, kMaxCameras> camera_present{};
   bool keyframe = false;
-  /// Frames refused since the last tracked one, and the newest refused one's stamp.
+  /// Number of frames refused since the last tracked one, and the stamp of the newest of them.
   int refused_before = 0;
   Stamp refused_stamp;
   FixedVector<TrackedFeature, kMaxFeatures> features;
