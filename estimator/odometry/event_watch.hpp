@@ -1,8 +1,8 @@
 #pragma once
-// Turns what changes from frame to frame into events, and holds events until an output takes them.
+// Turns changes between frames into events and holds events until an output takes them.
 //
-// An output has room for 32 events. Further ones are counted, and the last place then holds
-// kCapacityReached with their number. No other memory; O(1) a frame.
+// An output has room for 32 events. Further ones are counted, and the last entry is then kCapacityReached
+// with their number. No other memory; O(1) per frame.
 
 #include <array>
 
@@ -17,7 +17,7 @@ class EventBuffer {
   void raise(Stamp stamp, EventKind kind, double value);
   /// Moves the events to `output`.
   void flush(OdometryOutput& output);
-  /// All events of a kind become one at the first one's stamp, with the sum of their values.
+  /// All events of a kind become one event with the stamp of the first and the sum of their values.
   void merge(EventKind kind);
 
  private:
@@ -27,7 +27,7 @@ class EventBuffer {
 
 class EventWatch {
  public:
-  /// A new epoch: nothing seen so far. Cameras, rest and darkness go on as they were.
+  /// Starts a new epoch. The states of cameras, rest and darkness are kept.
   void reset();
 
   struct Frame {
@@ -40,23 +40,23 @@ class EventWatch {
     double seconds_without_image = 0;
   };
   void step(const Frame& frame, EventBuffer& events);
-  /// The part of `step` that tells of blackouts, for a frame that begins an epoch because of one.
+  /// The part of `step` for blackouts, for a frame that begins an epoch because of one.
   void watchBlackout(Stamp stamp, double seconds_without_image, EventBuffer& events);
 
  private:
   void watchDoubt(const Frame& frame, EventBuffer& events);
   void watchCameras(const Frame& frame, EventBuffer& events);
 
-  /// One missed image happens on a busy bus; three running are a fault (as in Pairing).
+  /// A busy bus may lose one image; three consecutive ones are a fault (as in Pairing).
   static constexpr int kLostAfter = 3;
   bool any_ = false;
-  Stamp first_;  ///< frame of the epoch
+  Stamp first_;  ///< first frame of the epoch
   bool initialized_ = false;
   bool at_rest_ = false;
   bool dark_ = false;
   Stamp dark_since_;
   Health health_ = Health::kInitializing;
-  Doubt doubt_ = Doubt::kNone;  ///< the last that was told of
+  Doubt doubt_ = Doubt::kNone;  ///< last doubt reported
   Stamp doubt_told_;
   std::array<int, kMaxCameras> missing_{};
 };

@@ -1,18 +1,19 @@
 #pragma once
-// Health: a statement of the estimate's accuracy, made after each solve.
+// Health: the accuracy class of the estimate, updated after each solve.
 //
 //  initializing  until the epoch is good for the first time
-//  good          no doubt now, nor during the settling time (0.45 s of accepted images, 2 s after a
-//                disagreement) before
+//  good          no doubt now, nor during the preceding settling time (0.45 s of accepted images, 2 s after a
+//                disagreement)
 //  degraded      a doubt; or coasting on the IMU for less than 3 s
-//  failed        no accepted image (8 sightings) for 3 s; or, after the epoch was good, figures far outside
+//  failed        no accepted image (8 observations) for 3 s; or, after the epoch was good, figures far
+//  outside
 //                the limits
 // Doubt (odometry_output.hpp) lists the conditions: bounds on the sigmas of velocity and tilt, on the share
 // of inliers, on the IMU residuals relative to the noise model, on speed and acceleration, and with one
 // camera on the disagreement with the accelerometer's scale (scale_check.hpp).
-// tests/odometry/health_statistics.cpp shows what they achieve on good and faulty flights. `lost()` asks for
-// a new epoch: figures far outside the limits for 2 s, or with one camera a contradicted start (1 s) or scale
-// (3 s). After each such loss the settling time doubles. Sightings by both cameras count once. No memory,
+// tests/odometry/health_statistics.cpp measures them on good and faulty flights. `lost()` requests a new
+// epoch: figures far outside the limits for 2 s, or with one camera a contradicted start (1 s) or scale (3
+// s). The settling time doubles after each such loss. Observations by both cameras count once. No memory,
 // O(1).
 
 #include <cstdint>
@@ -27,13 +28,13 @@ namespace swiftlet {
 
 class HealthMonitor {
  public:
-  /// s without an accepted image before "good" ends.
+  /// s without an accepted image after which health is no longer good.
   static constexpr double kGoodAge = 0.3;
-  /// s without an accepted image after which a new epoch begins, unless the image shows what is known.
+  /// s without an accepted image after which a new epoch begins, unless the image shows known landmarks.
   static constexpr double kLongCoast = 1.0;
-  /// A frame with fewer accepted sightings is not accepted.
+  /// Least number of accepted observations of an accepted frame.
   static constexpr int kMinSightings = 8;
-  /// With fewer it is not good.
+  /// Least number of accepted observations for good health.
   static constexpr int kNominalSightings = 25;
 
   HealthMonitor(const OdometrySettings& settings, std::size_t cameras)
@@ -50,26 +51,26 @@ class HealthMonitor {
     const NavState& state;     ///< with its covariance
     bool imu_missing = false;  ///< samples were missing since the last frame
     bool first_of_epoch = false;
-    bool scale_known = false;  ///< one camera: confirmed in this epoch (ScaleCheck)
+    bool scale_known = false;  ///< one camera: scale confirmed in this epoch (ScaleCheck)
   };
-  /// After a solve.
+  /// Updates after a solve.
   Health update(const Evidence& evidence);
 
   /// The health after the last update.
   [[nodiscard]] Health health() const { return health_; }
-  /// Why it is not good.
+  /// Why health is not good.
   [[nodiscard]] Doubt doubt() const { return doubt_; }
-  /// s of good in this epoch.
+  /// s of good health in this epoch.
   [[nodiscard]] double secondsGood() const { return good_; }
-  /// The state should be discarded and started again.
+  /// Whether the state should be discarded and a new epoch started.
   [[nodiscard]] bool lost() const { return lost_; }
-  /// Not far outside the limits: the position may be gone on from.
+  /// Whether the figures are not far outside the limits, so that a new epoch may continue from the position.
   [[nodiscard]] bool useful() const { return beyond_use_ == 0; }
-  /// The health at a later stamp without a new frame: images that stay away degrade it.
+  /// The health at a later stamp without a new frame: missing images degrade it.
   [[nodiscard]] Health at(Stamp stamp) const;
-  /// The same for who has only the last verdict and the stamp of the last accepted image.
+  /// The same from the last health and the stamp of the last accepted image.
   [[nodiscard]] static Health aged(Health health, Stamp last_accepted, Stamp stamp);
-  /// Of the epoch; meaningful after its first update.
+  /// Of the epoch; valid after its first update.
   [[nodiscard]] Stamp lastAccepted() const { return last_accepted_; }
   [[nodiscard]] double secondsWithoutImage(Stamp stamp) const;
 
@@ -84,24 +85,24 @@ class HealthMonitor {
 
   double max_speed_;
   double max_acceleration_;
-  double pixel_sigma_;  // px, as set
+  double pixel_sigma_;  // px, as configured
   std::size_t cameras_;
   Health health_ = Health::kInitializing;
   Doubt doubt_ = Doubt::kSettling;
   bool has_image_ = false;
   Stamp last_accepted_;
-  std::optional<Stamp> last_;  ///< frame of the epoch
+  std::optional<Stamp> last_;  ///< last frame of the epoch
   Eigen::Vector3d last_velocity_ = Eigen::Vector3d::Zero();
   double settled_ = 0;       ///< s of accepted images since the last doubt
-  double share_ = 1;         ///< of a frame's sightings that fit, low pass
-  double imu_square_ = 0;    ///< of the IMU's residual, low pass
+  double share_ = 1;         ///< share of a frame's observations that fit, low pass
+  double imu_square_ = 0;    ///< squared IMU residual, low pass
   double acceleration_ = 0;  ///< m/s^2, low pass
   double beyond_use_ = 0;    ///< s
   double contradicted_ = 0;  ///< s
-  bool disagreed_ = false;   // since it was good
+  bool disagreed_ = false;   // since health was good
   bool was_good_ = false;    ///< in this epoch
   double good_ = 0;          ///< s, in this epoch
-  int losses_ = 0;           ///< epochs given up, not forgiven yet
+  int losses_ = 0;           ///< lost epochs that still extend the settling time
   bool lost_ = false;
 };
 

@@ -6,7 +6,7 @@
 // the elapsed time:
 //  moving     displacement of 3 mrad or more, at least 0.5 px; the current frame becomes the reference
 //  still      d / t below 0.4 mrad/s for 0.25 s: 2 cm/s at a distance of 50 m
-//  in place   shaken on the spot: from 1 s on, d low-passed over 0.5 s drifts by less than that
+//  in place   shaking without moving: after 1 s, d low-passed over 0.5 s drifts by less than 0.4 mrad/s
 //  slow       d / t below 5 mrad/s: 1.5 cm/s at 3 m
 //  uncertain  d / t above that: more time is needed
 //  unknown    too few tracks
@@ -41,12 +41,12 @@ class ImageStillness {
     double now = -1;    ///< px since the reference; negative: unknown
     double drift = -1;  ///< px, low-passed, since a second after the reference; negative: unknown
   };
-  /// In camera `c`.
+  /// Displacement in camera `c`.
   Moved moved(const TrackedFrame& frame, std::size_t c);
 
   Rig rig_;
   Stamp since_;
-  FixedVector<TrackedFeature, kMaxFeatures> reference_;  // by rising id
+  FixedVector<TrackedFeature, kMaxFeatures> reference_;  // by ascending id
   Stamp last_;
   Stamp last_not_still_;
   std::array<Motions, 4> quadrants_;

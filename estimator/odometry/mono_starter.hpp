@@ -1,10 +1,10 @@
 #pragma once
-// The start with one camera: frames are kept until velocity, tilt and scale can be solved for.
+// The start with one camera: keeps frames until velocity, tilt and scale can be solved.
 //
-// One camera shows no scale until the body accelerates; so the first frames wait here, at most
-// `kMonoPatience`. They are then handed to the smoother one after the other from the solved first
-// state, as if they had just arrived. At rest the velocity is known, and nothing has to wait.
-// Memory: 64 frames, 0.9 MiB, reserved by the constructor. Cost: one solve of mono_start.hpp a frame while
+// One camera does not observe scale until the body accelerates, so the first frames wait here, at most
+// `kMonoPatience`. They are then given to the smoother one after the other from the solved first state, as if
+// they had just arrived. At rest the velocity is known, and no frame has to wait.
+// Memory: 64 frames, 0.9 MiB, reserved by the constructor. Cost: one solve of mono_start.hpp per frame while
 // waiting.
 
 #include <Eigen/Core>
@@ -19,7 +19,7 @@
 
 namespace swiftlet {
 
-/// Longest wait for a sure scale; then the best guess is taken.
+/// Longest wait for a certain scale; then the best estimate is used.
 inline constexpr Duration kMonoPatience = Duration::fromMilliseconds(2600);
 
 class MonoStarter {
@@ -28,17 +28,17 @@ class MonoStarter {
 
   void reset();
 
-  /// Keeps a frame; the oldest goes when full.
+  /// Keeps a frame; drops the oldest if full.
   void push(const TrackedFrame& frame);
 
   [[nodiscard]] std::size_t size() const { return count_; }
-  /// Frame k of those kept, oldest first.
+  /// Kept frame k, oldest first.
   [[nodiscard]] const TrackedFrame& frame(std::size_t k) const {
     return frames_[(begin_ + k) % frames_.size()];
   }
 
-  /// Solves from frames first..newest. True when the scale is known well enough, or the patience is
-  /// over; `start` is then the state at frame `first`. `waiting_for` says what is missing otherwise.
+  /// Solves from frames first..newest. True if the scale is known well enough or kMonoPatience is over;
+  /// `start` is then the state at frame `first`. Otherwise `waiting_for` tells what is missing.
   bool trySolve(const ImuBuffer& imu, const StartPrior& prior, double pixel_sigma, StartState& start,
                 const char*& waiting_for);
 

@@ -1,13 +1,12 @@
 #pragma once
-// The odometry: front-end, IMU and smoother joined, with health.
+// The odometry: front-end, IMU and smoother with health, for programs with one thread.
 //
-// Two steps a frame, so that an executor may run them on two threads: `track` (images to tracks)
-// and `smooth` (tracks and IMU to states). IMU samples are handed in as they arrive, each before
-// the first frame whose stamp is not earlier. No clock, no files, no threads; everything is
-// reserved by the constructor, nothing is allocated after it: about 24 MiB at 752 x 480 stereo.
-// Frames: T_world_body, world gravity-aligned with z up, origin and yaw of the epoch's first state.
-// Stamps: those of images on the image clock, of propagated states on the IMU's. Rules of start, health,
-// events and reset: docs/odometry.md.
+// Two steps per frame: `track` (images to tracks) and `smooth` (tracks and IMU to states). IMU samples are
+// added as they arrive, each before the first frame whose stamp is not earlier. No clock, no files, no
+// threads. Memory: about 24 MiB at 752 x 480 stereo, reserved by the constructor; no allocation afterwards.
+// Frames: T_world_body; world is gravity-aligned with z up, with origin and yaw of the epoch's first state.
+// Stamps: frames have the image clock, propagated states the IMU's clock. Rules of start, health, events and
+// reset: docs/odometry.md.
 
 #include <memory>
 
@@ -29,23 +28,23 @@ class Odometry {
   Odometry(const Rig& rig, const ImuNoise& noise, const OdometrySettings& settings);
   ~Odometry();
 
-  /// Takes one sample; gives the state propagated to it when `propagated` is not null and a state
-  /// exists (kNotReady otherwise). kInvalidInput (dropped, event) when it is not finite, or its stamp
-  /// repeats or goes back.
+  /// Takes one sample. Writes the state propagated to it if `propagated` is not null and a state exists
+  /// (otherwise kNotReady). kInvalidInput if it is not finite or its stamp is repeated or reversed; it is
+  /// then dropped, with an event.
   Status addImu(const ImuSample& sample, NavState* propagated = nullptr);
 
-  /// Images to tracks. kInvalidInput for a repeated or reversed stamp (event), for a frame without
-  /// images and for an image of the wrong size.
+  /// Images to tracks. kInvalidInput for a repeated or reversed stamp (with an event), a frame without
+  /// images, or an image of a wrong size.
   Status track(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked);
 
   /// Tracks (from `track`, or from a file) to states. kOk without a state while the start waits
-  /// (`output.waiting_for`). kFailed when the window could not be solved: it has been reset by then.
+  /// (`output.waiting_for`). kFailed if the window could not be solved; it was then reset.
   Status smooth(const TrackedFrame& tracked, const Effort& effort, OdometryOutput& output);
 
-  /// At the end of a run: the keyframes still in the window.
+  /// The keyframes still in the window, at the end of a run.
   void finish(OdometryOutput& output);
 
-  /// Forgets the state and starts again, in flight too; raises the epoch.
+  /// Discards the state and starts a new epoch, in flight too.
   void reset();
 
  private:

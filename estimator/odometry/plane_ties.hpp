@@ -1,17 +1,17 @@
 #pragma once
-// Landmarks tied to the planes that the mesher found: keeps the smoother's planes in step with its reports.
+// Ties landmarks to the planes that the mesher found: keeps the smoother's planes in step with its reports.
 //
-// A report is remembered and worked in before the next step: planes are added with their direction, and of
-// the points on them some are promoted and tied: those that the coming frame sees, that several states saw,
-// that pass a chi-squared test against the plane as the smoother knows it, best known first, apart from each
-// other and spread over the planes. After each solve ties that disagree are taken away: a tied point is
-// pulled onto its plane, so what tells is how far it is held off it against how far its own sightings let it
-// go (disagrees() in plane_ties.cpp). A point that was refused is not tried again on the same plane for some
-// time. Work is bounded by kMaxPlanes and kMaxLandmarks; nothing is allocated; reports of another epoch are
-// ignored. Memory: 0.15 MiB inside the object. Cost: that of the columns; with 40 ties a step takes 2.0 ms in
-// place of 1.3 ms (tests/odometry/plane_statistics.cpp). Source:
-// Rosinol, Sattler, Pollefeys, Carlone, "Incremental Visual-Inertial 3D Mesh Generation with Structural
-// Regularities", ICRA 2019; the tests are this project's own.
+// A report is applied before the next step. Planes are added with their direction, and some of the points on
+// them are promoted and tied: points that the next frame sees, that several states observed, and that pass a
+// chi-squared test against the smoother's plane. Best known points come first, apart from each other and
+// spread over the planes. After each solve ties that disagree are removed. A tied point is pulled onto its
+// plane, so the test compares its remaining distance with what its own observations allow (disagrees() in
+// plane_ties.cpp). A refused point is not tried again on the same plane for some time. Work is bounded by
+// kMaxPlanes and kMaxLandmarks; no allocation; reports of another epoch are ignored. Memory: 0.15 MiB inside
+// the object. Cost: that of the additional columns; with 40 ties a step takes 2.0 ms instead of 1.3 ms
+// (tests/odometry/plane_statistics.cpp). Source: Rosinol, Sattler, Pollefeys, Carlone, "Incremental
+// Visual-Inertial 3D Mesh Generation with Structural Regularities", ICRA 2019; the tests are this project's
+// own.
 
 #include <cstddef>
 #include <cstdint>
@@ -27,30 +27,30 @@
 namespace swiftlet {
 
 struct PlaneTieCounters {
-  std::uint64_t reports = 0;          ///< worked in
+  std::uint64_t reports = 0;          ///< applied
   std::uint64_t reports_ignored = 0;  ///< of another epoch, or not newer than the last
   std::uint64_t planes_added = 0;
-  std::uint64_t planes_refused = 0;  ///< for want of room
+  std::uint64_t planes_refused = 0;  ///< for lack of room
   std::uint64_t points_tied = 0;
-  std::uint64_t points_refused = 0;  ///< by the test before
-  std::uint64_t points_untied = 0;   ///< by the test after, or on the mesher's word
+  std::uint64_t points_refused = 0;  ///< by the test before tying
+  std::uint64_t points_untied = 0;   ///< by the test after a solve, or because the mesher dropped them
 };
 
 class PlaneTies {
  public:
-  /// m, 1 sigma by which a point of a wall is off its plane.
+  /// m, standard deviation of a point's distance from its plane.
   explicit PlaneTies(double point_sigma) : point_sigma_(point_sigma) {}
 
   /// The newest report replaces one that waits.
   void take(const PlaneReport& report);
-  /// Before the smoother's next step, with the frame that it will get: works in the report that waits.
+  /// Applies the waiting report, before the smoother's next step with its frame.
   void apply(Smoother& smoother, const TrackedFrame& coming, std::uint32_t epoch);
-  /// After the smoother's trim: what disagrees with the solve, and what has left with it.
+  /// After the smoother's trim: removes ties that disagree with the solve and those that left the window.
   void review(Smoother& smoother);
   /// The smoother has been reset.
   void reset();
 
-  /// As of the last review.
+  /// State after the last review.
   [[nodiscard]] const FixedVector<WindowPlane, kMaxPlanes>& planes() const { return estimates_; }
   [[nodiscard]] std::size_t size() const { return ties_.size(); }
   /// The reported plane that a landmark is tied to; 0: none.
@@ -68,17 +68,17 @@ class PlaneTies {
   };
   struct Tie {
     TrackId id = 0;
-    std::uint64_t plane = 0;  // the report's
+    std::uint64_t plane = 0;  // id in the report
     double normal_sigma = 0;  // m, of the point along the normal, when it was tied
     Eigen::Vector3d p = Eigen::Vector3d::Zero();
-    int unnamed = 0;  // reports in a row that did not name it
+    int unnamed = 0;  // consecutive reports without it
   };
   struct Refusal {
     TrackId id = 0;
     std::uint64_t plane = 0;
-    int reports = 0;  // to go
+    int reports = 0;  // reports until it may be tried again
   };
-  /// A window's landmark of a report.
+  /// A landmark of the window that is in a report.
   struct Candidate {
     TrackId id = 0;
     std::uint64_t plane = 0;

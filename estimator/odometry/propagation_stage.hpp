@@ -1,10 +1,10 @@
 #pragma once
-// The stage of the thread `propagate`: every IMU sample gives a state at once, from the newest fix on.
+// The stage of the thread `propagate`: a state for every IMU sample at once, propagated from the newest fix.
 //
-// A fix is some frames old when it comes: the samples since its stamp are applied to it again, so that the
-// output jumps by the correction and by nothing else. A fix of a new epoch forgets what was before.
-// Frames, units: NavState's. Stamps: the sample's. Memory: 1024 samples, 60 kB, no allocation.
-// Cost: some 2 us a sample; a fix costs as many samples again as have come since its stamp.
+// A fix is some frames old when it arrives. The samples since its stamp are applied to it again, so that the
+// output jumps only by the correction. A fix of a new epoch replaces everything before.
+// Frames, units: those of NavState. Stamps: of the sample. Memory: 1024 samples, 60 kB, no allocation.
+// Cost: some 2 us per sample; a fix costs that for each sample since its stamp.
 
 #include "estimator/core/status.hpp"
 #include "estimator/imu/propagation.hpp"
@@ -21,22 +21,22 @@ class PropagationStage {
   PropagationStage(const ImuNoise& noise, const OdometrySettings& settings)
       : monitor_(noise), propagator_(inflatedNoise(noise, settings)) {}
 
-  /// kNotReady: taken, but there is no state yet. kInvalidInput: dropped (not finite, stamp repeated or
-  /// reversed). `state` may be null.
+  /// kNotReady: the sample was taken, but there is no state yet. kInvalidInput: it was dropped (not finite,
+  /// stamp repeated or reversed). `state` may be null.
   Status step(const ImuSample& sample, NavState* state);
 
   /// A fix of another time line is ignored.
   void take(const StateFix& fix);
 
-  /// The IMU's stamps went back for good (stamp_guard.hpp): what was before is forgotten; there is no state
-  /// until the first fix of `timeline`.
+  /// Call if the IMU's stamps went back permanently (stamp_guard.hpp): forgets everything before. There is no
+  /// state until the first fix of `timeline`.
   void restart(std::uint32_t timeline, Stamp first);
 
  private:
   SampleMonitor monitor_;
   Propagator propagator_;
   std::uint32_t timeline_ = 0;
-  StateFix fix_;  // the newest; its epoch and health go with every state
+  StateFix fix_;  // the newest; every state has its epoch and health
 };
 
 }  // namespace swiftlet

@@ -1,17 +1,17 @@
 #pragma once
 // Checks the scale of a one-camera estimate against the accelerometer, independently of the smoother's own
-// belief.
+// covariance.
 //
 // A Kalman filter over neighbouring keyframes. The smoother gives their displacement up to an unknown factor
 // s (true length over estimated length); the IMU gives it in metres. States: velocity, s, tilt of the world,
 // accelerometer bias. The model is linear in all of them:
 //   s (p_j - p_i) = v_i t + g t^2 / 2 + R_i alpha(ba),   v_j = v_i + g t + R_i beta(ba).
-// s becomes observable when the body accelerates. Process noise on s forgets old evidence, so a scale that
-// drifts or collapses later is detected too. While a start settles, the smoother corrects the scale of its
-// whole window; until the scale is confirmed such a correction makes the evidence void. Rotations and gyro
-// bias are taken from the smoother: images determine them.
-// Frames: world, body. Memory: 2 kB. Cost: 12 triangular solves of the window's system a keyframe.
-// Source: Martinelli, "Closed-form solution of visual-inertial structure from motion", IJCV 2014 (alignment).
+// s becomes observable when the body accelerates. Process noise on s forgets old evidence, so that later
+// drift or collapse of the scale is detected too. While a start settles, the smoother corrects the scale of
+// its whole window; until the scale is confirmed, such a correction discards the evidence. Rotations and gyro
+// bias are taken from the smoother, because images determine them. Frames: world, body. Memory: 2 kB. Cost:
+// 12 triangular solves of the window's system a keyframe. Source: Martinelli, "Closed-form solution of
+// visual-inertial structure from motion", IJCV 2014 (alignment).
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -26,22 +26,22 @@ class ScaleCheck {
  public:
   /// The scale counts as known below this relative sigma.
   static constexpr double kKnown = 0.08;
-  /// |s - 1| below it, plus two sigmas: the scale agrees.
+  /// The scale agrees if |s - 1| is below this plus two sigmas.
   static constexpr double kAgrees = 0.10;
-  /// |s - 1| above it, plus two sigmas: the estimate has to start again.
+  /// The estimate must be restarted if |s - 1| is above this plus two sigmas.
   static constexpr double kContradicts = 0.15;
 
   explicit ScaleCheck(const ImuNoise& noise) : noise_(noise) { reset(); }
 
-  /// A new epoch: nothing is known.
+  /// Starts a new epoch without evidence.
   void reset();
-  /// After a step's trim: takes the newest keyframe that stays, once.
+  /// After a step's trim: uses the newest keyframe that stays, once.
   void update(Smoother& smoother);
 
   /// True over estimated length.
   [[nodiscard]] double scale() const { return x_[kScale]; }
   [[nodiscard]] double sigma() const;
-  /// It was known and agreed once since reset(): it stays so without further acceleration.
+  /// Whether the scale was known and agreed once since reset(); this remains so without further acceleration.
   [[nodiscard]] bool confirmed() const { return confirmed_; }
 
  private:
@@ -59,14 +59,14 @@ class ScaleCheck {
   Matrix P_ = Matrix::Zero();
   bool any_ = false;
   bool confirmed_ = false;
-  double corrected_ = 1;  // the smoother's factor on its scale since the evidence begins
+  double corrected_ = 1;  // the smoother's factor on its scale since the start of the evidence
   struct Baseline {
     std::uint64_t first;
     std::uint64_t last;
     double distance;
   };
   std::optional<Baseline> old_;  // between two keyframes of the window, at the last call
-  std::uint64_t newest_ = 0;     // frame of the keyframe taken last
+  std::uint64_t newest_ = 0;     // frame of the last keyframe used
 };
 
 }  // namespace swiftlet

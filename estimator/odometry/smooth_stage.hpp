@@ -1,10 +1,9 @@
 #pragma once
 // The stage of the thread `smooth`: tracks and IMU to states, with start, health and events.
 //
-// A step has two parts: `step` gives the state as soon as it stands; `trim` then makes room in the window
-// (marginalization). What others go on from is taken in between and after: the fix for propagation
-// after `step`, the window for tracking after `trim`.
-// Samples come before the first frame whose stamp is not earlier. Memory: the smoother's 14.1 MiB, 0.9 MiB of
+// A step has two parts: `step` outputs the state as early as possible; `trim` then makes room in the window
+// (marginalization). Read the fix for propagation after `step`, and the window for tracking after `trim`.
+// Add samples before the first frame whose stamp is not earlier. Memory: the smoother's 14.1 MiB, 0.9 MiB of
 // waiting frames (one camera), half a MiB of samples; no allocation after the constructor.
 // Rules of start, health, events and reset: docs/odometry.md.
 
@@ -43,33 +42,34 @@ class SmoothStage {
 
   void addImu(const ImuSample& sample);
 
-  /// The mesher's planes: worked in at the beginning of the next step. Without effect unless
+  /// Planes of the mesher, applied at the beginning of the next step. Without effect unless
   /// `regularity_enabled`. Reports of another epoch are ignored.
   void take(const PlaneReport& report);
 
-  /// kOk without a state while the start waits (`output.waiting_for`). kFailed when the window could not be
-  /// solved: it has been reset by then, with a new epoch. kInvalidInput for a frame of another time line than
-  /// the samples': nothing was done with it.
+  /// kOk without a state while the start waits (`output.waiting_for`). kFailed if the window could not be
+  /// solved; it was then reset, with a new epoch. kInvalidInput, without effect, for a frame of another time
+  /// line than the samples.
   Status step(const TrackedFrame& tracked, const Effort& effort, OdometryOutput& output);
-  /// After every step. Keyframes that leave come with the next output.
+  /// Call after every step. Keyframes that leave the window are in the next output.
   void trim();
 
-  /// The newest state, or that there is none, and the epoch; right after `step`.
+  /// The newest state, if there is one, and the epoch; call right after `step`.
   void fix(StateFix& out) const { out = fix_; }
-  /// The newest window; after `trim`.
+  /// The newest window; call after `trim`.
   void window(SmoothedWindow& out) const;
-  /// The newest keyframe's tie to the one before it in `window`, which `window()` has given since `trim`.
+  /// Relative pose of the newest keyframe to the one before it in `window`, which `window()` returned after
+  /// `trim`.
   void link(const SmoothedWindow& window, KeyframeLink& out);
   [[nodiscard]] const PlaneTies& planeTies() const { return ties_; }
 
-  /// At the end of a run: the keyframes still in the window, and events that had not come out yet.
+  /// At the end of a run: the keyframes still in the window and the remaining events.
   void finish(OdometryOutput& output);
 
-  /// Forgets the state and starts again; raises the epoch.
+  /// Discards the state and starts a new epoch.
   void reset();
 
-  /// The IMU's stamps went back for good (stamp_guard.hpp), with `first` as the first sample of the new time
-  /// line: as reset(), and the samples are forgotten too, as an event.
+  /// Call if the IMU's stamps went back permanently (stamp_guard.hpp); `first` is the first sample of the new
+  /// time line. Like reset(), and discards the samples, with an event.
   void restart(std::uint32_t timeline, Stamp first);
 
  private:
@@ -111,10 +111,10 @@ class SmoothStage {
   Stamp last_stamp_;  // of the newest tracked frame
   bool imu_gap_ = false;
   Stamp gap_end_;      // of the last gap in the samples
-  bool lost_ = false;  // samples were missing while no image was accepted: where the body is, nobody knows
-  std::optional<StartState> left_at_;  // from which the next epoch goes on; biases unless their sigma is 0
+  bool lost_ = false;  // samples were missing while no image was accepted: the position is unknown
+  std::optional<StartState> left_at_;  // start of the next epoch; biases are valid unless their sigma is 0
   std::optional<SE3> last_good_;       // T_world_body
-  std::optional<SE3> last_useful_;     // likewise
+  std::optional<SE3> last_useful_;     // T_world_body
   std::optional<Stamp> epoch_began_;   // its first frame
   std::optional<Stamp> last_rest_;     // in this epoch
 };

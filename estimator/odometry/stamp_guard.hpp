@@ -1,17 +1,16 @@
 #pragma once
-// The gate for stamps in front of everything that goes by time: one sample or image stamped far ahead would
-// silence its stream until time catches up with it.
+// Filter for wrong stamps at the input. A single sample or image stamped far ahead would otherwise silence
+// its stream until time catches up with it.
 //
-// IMU (StampGuard): a stamp far ahead of the newest is held out until the next sample confirms that the
-// stream goes on there. Stamps that do not rise pass as kBehind, for the stages to refuse; when so many of
-// them in a row that they last kAgreeSeconds rise among themselves, the stream has gone back for good, and a
-// new time line begins. Samples of two time lines never go together: stages restart between them. Images
-// (ImageGuard): the IMU is the reference. An image far from its camera's newest, or any image after the
-// IMU's stream has jumped, passes only if its stamp is near the IMU's newest.
+// IMU (StampGuard): a stamp far ahead of the newest is held back until the next sample confirms that the
+// stream continues there. Stamps that do not ascend pass as kBehind, and the stages refuse them. If
+// consecutive ones ascend among themselves for kAgreeSeconds, the stream has gone back permanently, and a new
+// time line begins. Samples of two time lines are never combined: stages restart between them. Images
+// (ImageGuard): the IMU is the reference. An image far from its camera's newest, or any image after a jump of
+// the IMU's stream, passes only if its stamp is near the IMU's newest.
 //
-// Regular streams pass untouched, gaps up to kFarAhead included; a longer silence of the IMU costs one
-// sample. No clock, no memory beyond the object; a pure function of the stamps that it was given. Cost: some
-// ns.
+// Regular streams pass unchanged, including gaps up to kFarAhead; a longer silence of the IMU costs one
+// sample. No clock, no memory beyond the object; depends only on the stamps given. Cost: some ns.
 
 #include <cstdint>
 
@@ -21,30 +20,30 @@ namespace swiftlet {
 
 enum class StampVerdict : std::uint8_t {
   kPass,
-  kJumped,     ///< passes: the stream goes on far ahead
-  kRestarted,  ///< passes: the stream goes on at earlier stamps, on a new time line
-  kBehind,     ///< not later than the newest: passes for the stages to refuse and count
+  kJumped,     ///< passes: the stream continues far ahead
+  kRestarted,  ///< passes: the stream continues at earlier stamps, on a new time line
+  kBehind,     ///< not later than the newest: passes, and the stages refuse and count it
   kHeld,       ///< does not pass
 };
 
-/// A step ahead that is no regular one: longer than the slowest camera's period (1 s) with its jitter. A
-/// stamp that is wrong by less silences its stream for no longer than this.
+/// Least step of a stamp that counts as far ahead: longer than the period of the slowest camera (1 s) with
+/// its jitter. A stamp that is wrong by less silences its stream for at most this long.
 inline constexpr Duration kFarAhead{1'500'000'000};
 /// Whether `to` is later than `from` by more than kFarAhead; for any two stamps.
 [[nodiscard]] bool isFarAhead(Stamp from, Stamp to);
 
-/// What a camera's guard needs to know of the IMU's stream.
+/// State of the IMU's stream, for the guards of cameras.
 struct ImuTime {
   bool any = false;            ///< a sample has passed
-  Stamp newest;                ///< of those that passed
-  std::uint32_t timeline = 0;  ///< raised each time that the stream goes back
+  Stamp newest;                ///< newest stamp that passed
+  std::uint32_t timeline = 0;  ///< incremented each time the stream goes back
   std::uint32_t jumps = 0;     ///< confirmed steps far ahead
 };
 
-/// So many refusals in a row, rising among themselves, begin a new time line.
+/// Detects runs of refused stamps that ascend among themselves, which begin a new time line.
 class BackwardRun {
  public:
-  /// True when the run is long enough with `stamp`, which is not later than the stream's newest.
+  /// True if the run is long enough with `stamp`, which is not later than the stream's newest.
   bool note(Stamp stamp, int needed);
   void clear() { length_ = 0; }
 
@@ -63,9 +62,10 @@ class StampGuard {
   [[nodiscard]] std::uint32_t timeline() const { return time_.timeline; }
 
  private:
-  /// Longer than any burst of samples out of order, short against what a flight without an IMU survives.
+  /// Longer than any burst of reordered samples, and short compared with the time that a flight survives
+  /// without an IMU.
   static constexpr double kAgreeSeconds = 0.15;
-  static constexpr int kLeastAgreeing = 10;  ///< where the rate is unknown or low
+  static constexpr int kLeastAgreeing = 10;  ///< if the rate is unknown or low
 
   int needed_;
   ImuTime time_;
@@ -84,7 +84,7 @@ class ImageGuard {
 
   bool any_ = false;
   Stamp newest_;
-  bool fits_ = false;  ///< has been near the IMU's newest since its stream last jumped
+  bool fits_ = false;  ///< was near the IMU's newest since its stream last jumped
   ImuTime seen_;       ///< the IMU's time line and jumps when last looked at
   BackwardRun back_;
 };

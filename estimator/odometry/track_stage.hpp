@@ -1,11 +1,11 @@
 #pragma once
-// The stage of the thread `track`: images to tracks, with where things will be seen worked out from the gyro
-// and from the newest window.
+// The stage of the thread `track`: images to tracks, with pixels predicted from the gyro and the newest
+// window.
 //
-// Samples come before the first frame whose stamp is not earlier; windows when they are there (an older one
-// costs sharpness of prediction, nothing else). A window of a new epoch drops the tracks.
-// Memory: the front-end's 6.5 MiB at 752 x 480 stereo and half a MiB of samples, no allocation after the
-// constructor. Cost, rules and sources: docs/odometry.md, docs/frontend.md.
+// Add samples before the first frame whose stamp is not earlier, and windows when they are available; an
+// older window only makes predictions less accurate. A window of a new epoch drops the tracks. Memory: the
+// front-end's 6.5 MiB at 752 x 480 stereo and half a MiB of samples; no allocation after the constructor.
+// Cost, rules and sources: docs/odometry.md, docs/frontend.md.
 
 #include "estimator/camera/rig.hpp"
 #include "estimator/core/status.hpp"
@@ -30,15 +30,15 @@ class TrackStage {
 
   void addImu(const ImuSample& sample);
 
-  /// Copied; the next frame is predicted from it. A window of another time line is ignored.
+  /// The window is copied, and the next frame is predicted from it. Windows of another time line are ignored.
   void take(const SmoothedWindow& window);
 
-  /// The IMU's stamps went back for good (stamp_guard.hpp): samples, tracks and window are forgotten. The
-  /// calibration stays.
+  /// Call if the IMU's stamps went back permanently (stamp_guard.hpp): discards samples, tracks and window.
+  /// The calibration is kept.
   void restart(std::uint32_t timeline, Stamp first);
 
-  /// kInvalidInput for a repeated or reversed stamp, a frame of another time line or without images, an image
-  /// of the wrong size: then `tracked` stays as it was, and the next tracked frame counts it.
+  /// kInvalidInput for a repeated or reversed stamp, a frame of another time line or without images, or an
+  /// image of a wrong size; `tracked` is then unchanged, and the next tracked frame counts the refusal.
   Status step(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked);
 
  private:
@@ -57,7 +57,7 @@ class TrackStage {
   SmoothedWindow window_;
   FrontendPrediction prediction_;
   std::uint32_t timeline_ = 0;
-  bool restarted_ = false;  // no window of this time line was taken yet
+  bool restarted_ = false;  // no window of this time line yet
   bool imu_gap_ = false;    // since the last tracked frame
   bool has_frame_ = false;
   Stamp last_stamp_;
