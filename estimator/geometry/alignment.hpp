@@ -26,12 +26,12 @@ struct Alignment {
 
 using Points = std::span<const Eigen::Vector3d>;
 
-/// SE(3): at least 3 points, not on one line. kDegenerate (with the best translation and some
-/// rotation that fits) when they are on a line or coincide; kInvalidInput when sizes differ, the
-/// sets are empty or a value is not finite (`result` unchanged).
+/// SE(3): at least 3 points that are not collinear. kDegenerate (with the best translation and one rotation
+/// that fits) if they are collinear or coincide; kInvalidInput if sizes differ, the sets are empty or a value
+/// is not finite (`result` is then unchanged).
 Status alignRigid(Points from, Points to, Alignment& result);
 
-/// Sim(3): as alignRigid, plus scale. kDegenerate also when `from` has no extent.
+/// Sim(3): as alignRigid, plus scale. kDegenerate also if `from` has no extent.
 Status alignSimilarity(Points from, Points to, Alignment& result);
 
 /// Rotation about z and translation: at least 2 points with different x, y.

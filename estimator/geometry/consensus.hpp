@@ -1,5 +1,5 @@
 #pragma once
-// What RANSACs share: samples, and how many of them are enough.
+// Shared by all RANSACs: drawing samples, and the number of samples needed.
 
 #include <algorithm>
 #include <array>
@@ -24,8 +24,8 @@ std::array<std::size_t, kCount> drawSample(Random& random, std::size_t bound) {
   return sample;
 }
 
-/// Samples after which one of `sample_size` true tracks was drawn with probability `confidence`
-/// when `inliers` of `count` are true (Fischler, Bolles 1981), at most `maximum`.
+/// Number of samples after which one of `sample_size` true tracks was drawn with probability `confidence` if
+/// `inliers` of `count` are true (Fischler, Bolles 1981), at most `maximum`.
 inline int samplesNeeded(std::size_t inliers, std::size_t count, int sample_size, double confidence,
                          int maximum) {
   if (count == 0 || inliers == 0) return maximum;

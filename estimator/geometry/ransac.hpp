@@ -5,21 +5,21 @@
 //   MonoRansac::fivePoint   nothing                5 tracks   rotation, direction of translation
 //   MonoRansac::twoPoint    rotation               2 tracks   direction of translation
 //
-// Unit bearings, so any lens will do and angles beyond 90 degrees are ordinary; p_cur = T_cur_prev * p_prev.
+// Unit bearings, so any lens and angles beyond 90 degrees are supported; p_cur = T_cur_prev * p_prev.
 //
-// Gate. Set the noise from the tracker's real errors, tails included: with noise 1.6 times the set one 7 % of
-// the good tracks are lost. `bearing_sigma` is the noise of one bearing [rad, 1 sigma per axis] = pixel sigma
-// / focal. A track is an inlier when its spherical Sampson error is below 3 sigma, its depth is positive in
-// both frames (a parallax against the direction of motion is allowed up to 3 sigma, so far points stay), and
-// it is not nearer than `min_depth_over_baseline` allows.
+// Gate. Set the noise from the tracker's real errors, including their tails: if the real noise is 1.6 times
+// the configured one, 7 % of the good tracks are lost. `bearing_sigma` is the noise of one bearing [rad, 1
+// sigma per axis] = pixel sigma / focal length. A track is an inlier if its spherical Sampson error is below
+// 3 sigma, its depth is positive in both frames (parallax against the direction of motion is allowed up to 3
+// sigma, so that far points are kept), and it is not nearer than `min_depth_over_baseline` allows.
 //
 // Status: kOk; kInvalidInput (sizes differ or above kMaxFeatures, settings not positive); kDegenerate (too
-// few tracks, no consensus, or no parallax to determine the motion). When parallax lacks, `no_parallax` is
-// set and the mask is still valid, that of a rotation alone, with zero translation. Otherwise kDegenerate
-// leaves every track an outlier. Non-finite bearings are outliers.
+// few tracks, no consensus, or not enough parallax). Without parallax `no_parallax` is set, and the mask is
+// valid for a pure rotation with zero translation. Otherwise kDegenerate marks all tracks as outliers.
+// Non-finite bearings are outliers.
 //
-// Deterministic for a given seed (use the frame's index). No allocation: the scratch is a member (22 KiB).
-// One call costs O(iterations * tracks); figures: docs/geometry.md.
+// Deterministic for a given seed (use the frame's index). No allocation: scratch is a member (22 KiB). Cost:
+// O(iterations * tracks) per call; docs/geometry.md.
 //
 // Sources: Nister, PAMI 2004 (5-point); Troiani et al., ICRA 2014 (2-point); Fischler, Bolles 1981;
 // Chum et al., DAGM 2003 (local optimization).
@@ -43,12 +43,12 @@ struct RansacSettings {
   /// Probability that at least one sample is free of false tracks.
   double confidence = 0.9999;
   int max_iterations = 300;
-  /// 1 sigma per axis [rad] of the given rotation (twoPoint): the refinement may turn it
-  /// within this. Zero keeps the rotation as given.
+  /// Standard deviation per axis [rad] of the given rotation (twoPoint), within which the refinement may
+  /// change it. Zero keeps the rotation.
   double rotation_sigma = 1e-3;
-  /// Smallest believable depth over the distance flown between the frames.
+  /// Smallest plausible depth, relative to the distance flown between the frames.
   double min_depth_over_baseline = 0.5;
-  /// Fewer inliers than this are no consensus.
+  /// Least number of inliers of a consensus.
   std::size_t min_inliers = 8;
 
   [[nodiscard]] bool valid() const {
@@ -64,14 +64,14 @@ struct RansacResult {
   FixedVector<bool, kMaxFeatures> inlier;
   std::size_t inlier_count = 0;
   int iterations = 0;
-  /// A rotation alone explains the tracks.
+  /// A pure rotation explains the tracks.
   bool no_parallax = false;
 };
 
 /// A track as unit bearings in the two frames of one camera.
 using Bearings = std::span<const Eigen::Vector3d>;
 
-/// Scratch of MonoRansac: the finite tracks by coordinate, and where they stand in the input.
+/// Scratch of MonoRansac: coordinates of the finite tracks and their indices in the input.
 struct MonoTracks {
   struct Coordinates {
     alignas(64) std::array<double, kMaxFeatures> x, y, z;
@@ -89,7 +89,7 @@ class MonoRansac {
   explicit MonoRansac(const RansacSettings& settings = {}) : settings_(settings) {}
   void setSettings(const RansacSettings& settings) { settings_ = settings; }
 
-  /// Five-point RANSAC: nothing known.
+  /// Five-point RANSAC without prior motion.
   Status fivePoint(Bearings prev, Bearings cur, std::uint64_t seed, RansacResult& result);
 
   /// Two-point RANSAC with the rotation from the gyroscope.

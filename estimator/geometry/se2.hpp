@@ -1,5 +1,5 @@
 #pragma once
-// Rigid transforms of the plane, named and chained as SE3 is: T_A_B takes coordinates in B to coordinates in
+// Rigid transforms in the plane, named and chained like SE3: T_A_B takes coordinates in B to coordinates in
 // A.
 
 #include <Eigen/Core>
@@ -8,7 +8,7 @@
 
 namespace swiftlet {
 
-/// The angle that differs by whole turns and lies in [-pi, pi].
+/// The equivalent angle in [-pi, pi].
 inline double wrapAngle(double angle) { return std::remainder(angle, 2 * M_PI); }
 
 struct SE2 {

@@ -17,7 +17,7 @@ inline Eigen::Matrix3d hat(const Eigen::Vector3d& a) {
   return m;
 }
 
-/// Exp: rotation vector [rad] to unit quaternion. Exact to rounding for every angle.
+/// Exp: rotation vector [rad] to unit quaternion. Exact to rounding at any angle.
 Eigen::Quaterniond expSo3(const Eigen::Vector3d& phi);
 
 /// Exp as a rotation matrix.

@@ -1,11 +1,11 @@
 #pragma once
-// A point from n >= 2 bearings at known poses, with what is needed to judge it.
+// Triangulates a point from n >= 2 bearings at known poses, with figures of its quality.
 //
-// Start: homogeneous DLT on unit bearings, (I - b b^T) (R^T (x - c)) = 0 stacked (Hartley,
-// Zisserman, "Multiple View Geometry", section 12.2, written for bearings), in coordinates centred
-// and scaled by the camera centres; it passes through infinity without a singularity, so a point
-// behind the cameras is told from one far ahead. Then Gauss-Newton on the angular errors.
-// Any lens, any angle. No allocation, no bound on n: O(n) per pass. About 2 us for two views.
+// Initial point: homogeneous DLT on unit bearings, (I - b b^T) (R^T (x - c)) = 0 stacked (Hartley, Zisserman,
+// "Multiple View Geometry", section 12.2, written for bearings), in coordinates centred and scaled by the
+// camera centres. It is not singular at infinity, so points behind the cameras are distinguished from points
+// far ahead. Then Gauss-Newton on the angular errors.
+// Any lens, any angle. No allocation, no bound on n; O(n) per pass. About 2 us for two views.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -18,7 +18,7 @@ namespace swiftlet {
 enum class TriangulationState : std::uint8_t {
   kValid,
   kInvalidInput,  ///< fewer than two views, sizes differ, NaN
-  kNoParallax,    ///< the rays are parallel within their noise: the depth is not determined
+  kNoParallax,    ///< the rays are parallel within their noise; depth is not determined
   kBehind,        ///< in front of one camera and behind another, or behind all
   kTooNear,
   kTooFar,
@@ -26,16 +26,16 @@ enum class TriangulationState : std::uint8_t {
 };
 
 struct TriangulationSettings {
-  double min_parallax = 0.002;  ///< [rad] largest angle between two rays; about 1 px of 450 px focal
+  double min_parallax = 0.002;  ///< [rad] largest angle between two rays; 1 px at 450 px focal length
   double min_depth = 0.1;       ///< [m] distance to the nearest camera
   double max_depth = 200.0;     ///< [m] distance to the first camera
-  double max_error = 0.01;      ///< [rad] largest angular error of one bearing; 4.5 px of 450 px focal
-  double max_condition = 1e7;   ///< of the information matrix; longest axis / shortest = its root
-  int refine_steps = 3;         ///< Gauss-Newton; 0: DLT alone
+  double max_error = 0.01;      ///< [rad] largest error of a bearing; 4.5 px at 450 px focal length
+  double max_condition = 1e7;   ///< of the information matrix; its root is longest axis / shortest
+  int refine_steps = 3;         ///< Gauss-Newton steps; 0: only DLT
 };
 
-/// What is known is filled in for every state but kInvalidInput; `point` is only meaningful for
-/// kValid, kTooNear, kTooFar and kOutlier.
+/// Known values are set for every state except kInvalidInput. `point` is only valid for kValid, kTooNear,
+/// kTooFar and kOutlier.
 struct Triangulation {
   TriangulationState state = TriangulationState::kInvalidInput;
   Eigen::Vector3d point = Eigen::Vector3d::Zero();        ///< world [m]

@@ -1,6 +1,6 @@
 #pragma once
-// The IMU's noise model: continuous densities, as calibration files give them, and one named
-// inflation for what the static figures leave out (vibration, scale, misalignment).
+// The IMU's noise model: continuous densities as in calibration files, and an inflation for errors that
+// calibrations at rest do not include (vibration, scale, misalignment).
 
 #include "estimator/messages/noise_in_use.hpp"
 

@@ -1,10 +1,9 @@
 #pragma once
-// What is known at the first image: tilt from the accelerometer.
+// The state at the first image: tilt from the accelerometer.
 //
-// Convention: `up` is the unit vector in body axes along which a still accelerometer reads
-// +gravity (world z seen from the body). Tilt error phi: R_true = R Exp(phi), up_true = Exp(-phi) up.
-// The start in motion with one camera is in mono_start.hpp.
-// All functions are plain, deterministic and allocate nothing.
+// Convention: `up` is the unit vector in body axes along which an accelerometer at rest reads +gravity (world
+// z in body axes). Tilt error phi: R_true = R Exp(phi), up_true = Exp(-phi) up. The start in motion with one
+// camera is in mono_start.hpp. All functions are deterministic and do not allocate.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -17,7 +16,7 @@
 
 namespace swiftlet {
 
-/// What is known before any data: the biases of MEMS sensors.
+/// Prior before any data: the biases of MEMS sensors.
 struct StartPrior {
   Eigen::Vector3d bias_gyro = Eigen::Vector3d::Zero();   ///< rad/s
   Eigen::Vector3d bias_accel = Eigen::Vector3d::Zero();  ///< m/s^2
@@ -26,18 +25,18 @@ struct StartPrior {
 };
 
 struct TiltEstimate {
-  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< unit, body axes at the asked stamp
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< unit, body axes at the requested stamp
   double sigma = 0;                               ///< rad, per axis
   double duration = 0;                            ///< s of samples used
 };
 
-/// The attitude with world z along `up` that turns least from identity. R_world_body.
+/// R_world_body: the attitude with world z along `up` that is nearest to identity.
 Eigen::Quaterniond gravityAlignedRotation(const Eigen::Vector3d& up);
 
-/// Tilt at `at` from all `samples` up to it: the mean specific force, each reading turned to `at`
-/// by the gyro (less prior.bias_gyro). Sigma from the force's scatter about its mean, bounded to
-/// 2..6 degrees. At most the last second is used. kInvalidInput without a sample,
-/// kDegenerate when the mean force is below half of gravity (free fall).
+/// Tilt at `at` from the `samples` up to it, at most the last second: the mean specific force, each reading
+/// rotated to `at` by the gyro (minus prior.bias_gyro). Sigma is from the scatter of the force, limited
+/// to 2..6 degrees. kInvalidInput without a sample, kDegenerate if the mean force is below half of gravity
+/// (free fall).
 Status estimateTilt(std::span<const ImuSample> samples, Stamp at, const ImuNoise& noise,
                     const StartPrior& prior, TiltEstimate& tilt);
 

@@ -1,9 +1,9 @@
 #pragma once
-// The one integration rule of the IMU, shared by preintegration and propagation.
+// The integration rule of the IMU, shared by preintegration and propagation.
 //
-// A segment is a stretch of time between two stamps with at most one sample on either side:
-// readings are linear between samples and held beyond the last. Its mean rate and mean force move
-// the state; what the data do not cover raises the noise, and a gap is not integrated at all.
+// A segment is an interval between two stamps with at most one sample on either side. Readings are linear
+// between samples and held beyond the last. The mean rate and mean force of a segment move the state. Time
+// not covered by data raises the noise, and a gap is not integrated.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -14,16 +14,16 @@
 
 namespace swiftlet {
 
-/// Up to so many periods between samples count as regular (jitter).
+/// Largest interval between samples that counts as regular (jitter) [periods].
 inline constexpr double kRegularPeriods = 1.5;
-/// Beyond so many periods without a sample the stretch is a gap (50 ms at 200 Hz: the motion in
-/// between is no longer told by its ends).
+/// Longer intervals without a sample are gaps [periods]. 50 ms at 200 Hz: the readings at the ends no longer
+/// describe the motion in between.
 inline constexpr double kGapPeriods = 10.0;
-/// White acceleration that stands for the unknown motion in a gap: 3 m/s after one second, m/s^2/sqrt(Hz).
+/// White acceleration that models unknown motion in a gap: 3 m/s after one second, m/s^2/sqrt(Hz).
 inline constexpr double kGapAccelDensity = 3.0;
-/// Likewise for the rate: half a radian after one second, rad/s/sqrt(Hz).
+/// White rate that models unknown rotation in a gap: half a radian after one second, rad/s/sqrt(Hz).
 inline constexpr double kGapGyroDensity = 0.5;
-/// A saturated reading is only a lower bound: its noise is raised a hundredfold.
+/// Factor on the noise variance of a saturated reading, which is only a lower bound: a hundredfold noise.
 inline constexpr double kSaturatedVarianceFactor = 1e4;
 
 struct ImuSegment {
@@ -32,15 +32,15 @@ struct ImuSegment {
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();
   double gyro_factor = 1;  ///< on the variance
   double accel_factor = 1;
-  bool gap = false;  ///< the means are the readings at the gap's ends; do not trust them
+  bool gap = false;  ///< the means are only those of the readings at the ends of the gap
 };
 
-/// The segment [from, to] between `before` (not after `from`) and `after` (not before `to`), one of
-/// which may be null: then the other's reading is held.
+/// The segment [from, to] between `before` (not after `from`) and `after` (not before `to`). One of them may
+/// be null; the reading of the other is then held.
 ImuSegment makeSegment(const ImuSample* before, const ImuSample* after, Stamp from, Stamp to,
                        const ImuNoise& noise);
 
-/// One step of the rule: attitude at the middle and the end, mean force in the start's axes.
+/// One step of the rule: attitude at middle and end, mean force in the axes of the start.
 struct IntegrationStep {
   Eigen::Quaterniond half;        ///< Exp(gyro dt / 2)
   Eigen::Matrix3d left_jacobian;  ///< Jl(gyro dt): Exp(phi + d) = Exp(Jl d) Exp(phi)

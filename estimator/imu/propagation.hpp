@@ -1,18 +1,17 @@
 #pragma once
 // Propagation at IMU rate from the smoother's newest state.
 //
-// What: keeps the newest NavState, moves it over every sample that follows its stamp, and gives the
-// state at each sample's stamp with its 15x15 covariance (phi, p, v, bg, ba; bias walks included).
-// A fixed ring keeps the last samples, so that a new smoother state, always some frames old, is
-// brought to the present at once. Rule: that of Preintegration::integrate(samples, from, to) for
-// samples, holes and saturated readings; a gap (more than 10 periods without a sample) is not
-// integrated: attitude and velocity are held, their covariance grows (integration_rule.hpp).
-// Frames: NavState's (world with z up, body). Units: SI.
-// Errors: kNotReady before the first state (the sample is kept: the first state comes late); kInvalidInput
-// for a sample not later than the last one or not finite (dropped), and for a state that is not finite;
-// kCapacityReached when a state is so old that the ring no longer holds the samples after it (the hole is
-// bridged). Memory: 1024 samples, 60 kB; nothing is allocated. Cost: about 2 us a sample, covariance and
-// output included.
+// Keeps the newest NavState, moves it over every sample after its stamp, and outputs the state at each
+// sample's stamp with its 15x15 covariance (phi, p, v, bg, ba; bias walks included). A fixed ring keeps the
+// last samples, so that a new state of the smoother, which is some frames old, is propagated to the present
+// at once. Samples, holes and saturated readings are treated as in Preintegration::integrate(samples, from,
+// to). A gap (more than 10 periods without a sample) is not integrated: attitude and velocity are held, and
+// their covariance grows (integration_rule.hpp). Frames: those of NavState (world with z up, body). Units:
+// SI. Errors: kNotReady before the first state (the sample is kept, because the first state is late).
+// kInvalidInput for a sample not later than the last one or not finite (dropped), and for a state that is not
+// finite. kCapacityReached for a state so old that the ring no longer holds the samples after it (the hole is
+// bridged). Memory: 1024 samples, 60 kB; no allocation. Cost: about 2 us per sample, covariance and output
+// included.
 
 #include <array>
 #include <cstddef>
@@ -31,25 +30,24 @@ class Propagator {
  public:
   explicit Propagator(const ImuNoise& noise) : noise_(noise) {}
 
-  /// Takes a (smoothed) state, with the intrinsics that go with its biases, and re-applies the samples after
-  /// its stamp. A state later than the last sample is kept as it is; the next sample starts from it.
+  /// Takes a smoothed state with the intrinsics estimated with its biases, and re-applies the samples after
+  /// its stamp. A state later than the last sample is kept; the next sample starts from it.
   Status setState(const NavState& state, const GyroIntrinsics& intrinsics = {});
 
-  /// Takes one sample. `state` (may be null) gets the state at its stamp.
+  /// Takes one sample. Writes the state at its stamp to `state`, which may be null.
   Status step(const ImuSample& sample, NavState* state = nullptr);
 
-  /// The state moved on from the last sample to `at` by holding its reading (the prediction for an
-  /// image whose last samples have not come yet). Not kept. kInvalidInput when `at` lies before
-  /// the newest state.
+  /// The state at `at`, propagated from the last sample by holding its reading: the prediction for an image
+  /// whose last samples have not arrived. Not stored. kInvalidInput if `at` is before the newest state.
   Status predict(Stamp at, NavState& state) const;
 
   [[nodiscard]] bool hasState() const { return has_state_; }
   /// The newest state, at the later of the last sample's stamp and that of `setState`.
   [[nodiscard]] NavState state() const { return current_.toNavState(); }
-  /// Seconds bridged without samples since the stamp of the state that was last set.
+  /// Seconds bridged without samples since the stamp of the last state set.
   [[nodiscard]] double gapSeconds() const { return current_.gap_seconds; }
 
-  /// Forgets the state; samples stay, for the next one's to start from.
+  /// Forgets the state; samples are kept for the next one.
   void forgetState() { has_state_ = false; }
 
   /// Forgets state and samples.
@@ -68,14 +66,14 @@ class Propagator {
     void advanceMeasured(const ImuSegment& segment, const ImuNoise& noise);
     void advanceGap(double dt, const ImuNoise& noise);
   };
-  // 5 s at 200 Hz, 1 s at 1 kHz: beyond any smoother's delay. A longer delay is reported.
+  // 5 s at 200 Hz, 1 s at 1 kHz: longer than the delay of any smoother. A longer delay is reported.
   static constexpr std::size_t kRing = 1024;
 
   [[nodiscard]] const ImuSample& sampleAt(std::uint64_t index) const { return ring_[index % kRing]; }
 
   ImuNoise noise_;
   std::array<ImuSample, kRing> ring_{};
-  std::uint64_t count_ = 0;  // samples ever taken; the ring holds the last kRing of them
+  std::uint64_t count_ = 0;  // number of samples taken; the ring holds the last kRing
   bool has_state_ = false;
   Current current_;
 };

@@ -1,13 +1,12 @@
 #pragma once
-// Rest: is the body standing still, since when, and what the IMU read meanwhile.
+// Detects rest: whether the body stands still, since when, and the mean IMU readings meanwhile.
 //
-// What: the readings of the last second in two bands. The slow band (scatter of 0.1 s means) tells
-// standing from flying even with idling rotors, whose vibration averages out, while a hovering body
-// is corrected a few times a second. The whole band (scatter of the samples) is bounded loosely,
-// and any sample that jumps out of it ends a rest at once. The slow limits follow the sensor's own
-// noise (the quietest window so far) between fixed bounds, so that they are neither blind to a
-// coarse sensor nor lax on a fine one.
-//   IMU alone:  1 s within the limits, or 0.5 s well within them, where there are no images.
+// Evaluates the readings of the last second in two bands. The slow band (scatter of 0.1 s means)
+// distinguishes standing from flying even with idling rotors: their vibration averages out, while a hovering
+// body is corrected a few times a second. The whole band (scatter of the samples) has loose limits, and a
+// sample that jumps out of it ends a rest at once. The slow limits follow the sensor's own noise (the
+// quietest window so far) between fixed bounds, so that they suit coarse and fine sensors.
+//   IMU alone:  1 s within the limits, or 0.5 s well within them, if there are no images.
 //   Images:     still: a rest begins within wider IMU limits. In place: it begins within the normal limits.
 //               Slow: likewise if the estimated speed is also near zero. Still, in place or slow: a rest in
 //               progress continues within the wider limits. Moving: a rest ends. Otherwise no rest begins,
@@ -15,8 +14,8 @@
 // No rest begins while the estimated speed is significantly above zero, or while the mean rate exceeds any
 // plausible gyro bias.
 // Frames: body axes. Units: SI, pixels.
-// Use: `at_rest` is for a SOFT factor (zero velocity, unchanged pose), never for setting a state.
-// Cost: about 30 ns a sample; fixed memory (3 kB); nothing is allocated.
+// Use `at_rest` only for a soft factor (zero velocity, unchanged pose), never to set a state.
+// Cost: about 30 ns per sample. Memory: fixed, 3 kB; no allocation.
 // Source: stance detection by windowed deviations: Skog, Handel, Nilsson, Rantakokko, "Zero-Velocity
 // Detection", IEEE T-BME 2010; the two bands and the adaptive limits are this project's own.
 
@@ -31,7 +30,7 @@
 
 namespace swiftlet {
 
-/// m/s, 1 sigma of the velocity of a body that is at rest.
+/// m/s, standard deviation of the velocity of a body at rest.
 inline constexpr double kRestVelocitySigma = 0.01;
 
 /// Image motion, as ImageStillness (estimator/odometry) classifies it.
@@ -42,25 +41,24 @@ struct RestState {
   /// Number of the rest, from 1; 0: not at rest. States with the same number have the same pose.
   std::uint32_t number = 0;
   Stamp since;                                           ///< start of the rest (valid at rest)
-  double duration = 0;                                   ///< s of the rest that the means cover
-  Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero();   ///< rad/s over the rest: the gyro bias
+  double duration = 0;                                   ///< s, time covered by the means
+  Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero();   ///< rad/s, over the rest: the gyro bias
   Eigen::Vector3d mean_accel = Eigen::Vector3d::Zero();  ///< m/s^2 over the rest
   double gyro_deviation = 0;   ///< rad/s, samples of the newest 0.5 s, RMS of the axes
-  double accel_deviation = 0;  ///< m/s^2, likewise
+  double accel_deviation = 0;  ///< m/s^2, samples of the newest 0.5 s, RMS of the axes
 };
 
 class RestDetector {
  public:
   explicit RestDetector(const ImuNoise& noise);
 
-  /// Takes one accepted sample (stamps increase). After a silence of more than 50 ms the windows
-  /// start anew.
+  /// Takes one accepted sample (stamps ascend). After a silence of more than 50 ms the windows start anew.
   void addImu(const ImuSample& sample);
 
   void addFrame(Stamp stamp, ImageMotion motion);
 
-  /// Takes what the smoother knows, once it is converged; without it biases up to 0.15 rad/s pass.
-  /// `bias_gyro_sigma`: rad/s. `speed`, `speed_sigma`: m/s; an infinite sigma where the speed is unknown.
+  /// Takes the estimate of a converged smoother; without it biases up to 0.15 rad/s pass. `bias_gyro_sigma`:
+  /// rad/s. `speed`, `speed_sigma`: m/s; infinite sigma if the speed is unknown.
   void setEstimate(const Eigen::Vector3d& bias_gyro, double bias_gyro_sigma, double speed,
                    double speed_sigma);
 
@@ -93,7 +91,7 @@ class RestDetector {
 
   [[nodiscard]] Window window(std::size_t blocks) const;
   [[nodiscard]] ImageMotion images() const;
-  /// Images move, but hardly.
+  /// Images move slowly.
   [[nodiscard]] bool shaken() const;
   [[nodiscard]] bool imagesHold() const;
   [[nodiscard]] bool meansAllow(const Window& w) const;
@@ -114,7 +112,7 @@ class RestDetector {
   RestState state_;
   std::uint32_t rests_ = 0;
   std::array<Block, kLongBlocks> blocks_{};
-  std::size_t block_count_ = 0;  // blocks ever closed since the windows began
+  std::size_t block_count_ = 0;  // blocks closed since the windows began
   Block open_;
   bool has_last_ = false;
   Stamp last_;

@@ -1,10 +1,10 @@
 #pragma once
-// The gate for every IMU sample: what is dropped, what is flagged, what is counted.
+// Checks every IMU sample: drops, flags and counts.
 //
-// What: drops samples that are not finite or whose stamp repeats or goes back; finds gaps; flags
-// saturated samples (a component at or beyond the noise model's limit, or a run of identical
-// extreme readings, which shows a lower limit than the calibration says) and measures the rate.
-// Errors: kInvalidInput in `verdict.status` for a dropped sample. Cost: some 20 ns; no allocation.
+// Drops samples that are not finite or whose stamp is repeated or reversed. Finds gaps, measures the rate,
+// and flags saturated samples: a component at or beyond the noise model's limit, or a run of identical
+// extreme readings, which shows a lower limit than that of the calibration. Errors: kInvalidInput in
+// `verdict.status` for a dropped sample. Cost: some 20 ns; no allocation.
 
 #include <array>
 #include <cstdint>
@@ -18,8 +18,8 @@ namespace swiftlet {
 struct SampleVerdict {
   Status status;           ///< ok: use it; kInvalidInput: drop it
   bool saturated = false;  ///< use it with raised noise
-  bool gap = false;        ///< more than kGapPeriods without a sample lie before it
-  double silence = 0;      ///< s since the sample before, 0 for the first
+  bool gap = false;        ///< more than kGapPeriods without a sample before it
+  double silence = 0;      ///< s since the previous sample, 0 for the first
 };
 
 struct SampleCounters {
@@ -27,7 +27,7 @@ struct SampleCounters {
   std::uint64_t not_finite = 0;
   std::uint64_t repeated = 0;     ///< stamp equal to the last one
   std::uint64_t reversed = 0;     ///< stamp before the last one
-  std::uint64_t short_holes = 0;  ///< more than 1.5 periods, not yet a gap
+  std::uint64_t short_holes = 0;  ///< more than 1.5 periods, but no gap
   std::uint64_t gaps = 0;         ///< more than kGapPeriods
   std::uint64_t saturated = 0;
   double gap_seconds = 0;      ///< sum over the gaps
@@ -41,16 +41,17 @@ class SampleMonitor {
   SampleVerdict check(const ImuSample& sample);
 
   [[nodiscard]] const SampleCounters& counters() const { return counters_; }
-  /// Hz, from the mean interval of accepted samples without holes; 0 before 20 of them.
+  /// Hz, from the mean interval of accepted samples without holes; 0 before 20 samples.
   [[nodiscard]] double measuredRate() const;
-  /// True once the measured rate is known and more than 10 % off the nominal one: the calibration's
-  /// rate is wrong, and gap limits then follow the measured rate.
+  /// True if the measured rate is known and differs from the nominal rate by more than 10 %: the
+  /// calibration's rate is wrong, and gap limits follow the measured rate.
   [[nodiscard]] bool rateMismatch() const;
-  /// The limits in force: the calibration's, or lower where a run of identical extremes showed it.
+  /// The limits in use: the calibration's, or lower ones shown by a run of identical extremes.
   [[nodiscard]] double gyroLimit() const { return gyro_limit_; }
   [[nodiscard]] double accelLimit() const { return accel_limit_; }
 
-  /// The stream goes on at other stamps: the next sample is the first. Counters, rate and limits stay.
+  /// Call if the stream continues at other stamps: the next sample is the first. Counters, rate and limits
+  /// are kept.
   void restart();
   void reset();
 

@@ -1,8 +1,8 @@
 #pragma once
-// The turn of a rolling shutter's rows, from the gyro.
+// The rotation of the body while the rows of a rolling shutter are read, from the gyro.
 //
-// Where samples end at the image's stamp, as in a log whose messages are in the order of their stamps, the
-// rate behind it goes on as it changed before. Cost: about 1 us. Nothing is allocated.
+// If samples end at the image's stamp, as in a log ordered by stamp, the rate after it is extrapolated from
+// the change before. Cost: about 1 us. No allocation.
 
 #include <Eigen/Core>
 #include <span>
@@ -14,8 +14,8 @@
 
 namespace swiftlet {
 
-/// `samples`: those from a readout before the middle to half of one behind it, in order, as far as there are
-/// any; without any there is no turn. The middle's stamp is the IMU clock's.
+/// `samples`: from one readout time before the middle row to half of one after it, in order, as far as
+/// available; without samples the rotation is zero. The stamp of the middle row is on the IMU's clock.
 ScanTurn scanTurn(std::span<const ImuSample> samples, Stamp middle, Duration readout,
                   const Eigen::Vector3d& bias_gyro, const GyroIntrinsics& intrinsics);
 

@@ -1,8 +1,8 @@
 #pragma once
-// The unknowns of a start in motion, and the poses that follow from them.
+// The unknowns of a start in motion, and the poses computed from them.
 //
-// In body axes at image 0: velocity v, tilt (up on the sphere), biases. The IMU then gives the pose
-// of every later instant: p = v t - gravity up t^2 / 2 + alpha(bg, ba), R = dR(bg).
+// In body axes at image 0: velocity v, tilt (up on the sphere), biases. With the IMU they give the pose at
+// every later instant: p = v t - gravity up t^2 / 2 + alpha(bg, ba), R = dR(bg).
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -14,20 +14,20 @@ namespace swiftlet {
 
 using Matrix12d = Eigen::Matrix<double, 12, 12>;
 
-/// The state at image 0. Error order of the covariance: phi, v, bg, ba; phi has no part along `up`
-/// (yaw is gauge).
+/// The state at image 0. Order of the covariance: phi, v, bg, ba; phi has no component along `up`, because
+/// yaw is not observable.
 struct MotionStart {
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();        ///< unit, body axes at image 0
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();   ///< m/s, body axes at image 0
   Eigen::Vector3d bias_gyro = Eigen::Vector3d::Zero();  ///< rad/s
   Eigen::Vector3d bias_accel = Eigen::Vector3d::Zero();
   Matrix12d covariance = Matrix12d::Zero();
-  double tilt_sigma = 0;      ///< rad: the larger principal sigma of phi
-  double velocity_sigma = 0;  ///< m/s: the largest principal sigma
-  double residual_rms = 0;    ///< whitened; about 1 when the model holds
+  double tilt_sigma = 0;      ///< rad, the larger principal sigma of phi
+  double velocity_sigma = 0;  ///< m/s, the largest principal sigma
+  double residual_rms = 0;    ///< whitened; about 1 if the model holds
 };
 
-/// Pose of the body relative to image 0, with derivatives by the unknowns.
+/// Pose of the body relative to image 0, with derivatives with respect to the unknowns.
 struct StartPose {
   Eigen::Vector3d position;
   Eigen::Quaterniond rotation;
@@ -52,7 +52,7 @@ class StartParameters {
   /// Adds the priors on tilt and biases to the normal equations H x = -b.
   void addPrior(const TiltEstimate& tilt, const StartPrior& prior,
                 Eigen::Ref<Matrix, 0, Eigen::OuterStride<>> H, Eigen::Ref<Vector> b) const;
-  /// The priors' share of the cost (sum of whitened squares).
+  /// Cost of the priors (sum of whitened squares).
   [[nodiscard]] double priorCost(const TiltEstimate& tilt, const StartPrior& prior) const;
   void setUp(const Eigen::Vector3d& up) { up_ = up; }
   void retract(const Vector& step);
