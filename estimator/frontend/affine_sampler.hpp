@@ -1,12 +1,11 @@
 #pragma once
-// A square window of pixels sampled through an affine map, a row at a time, bilinear, in fixed point.
+// Samples a square window of pixels through an affine map, one row at a time, bilinear, in fixed point.
 //
-// The pixels under one row of the window lie in a few image rows. Each half of the row lies within 16 columns
-// of its own and starts in an image row of its own: each image row is interpolated along x for all sixteen
-// lanes at once (two byte shuffles), and neighbouring ones are blended along y where a lane needs them.
-// Places are rounded to 1/1024 px; their error is below 1/700 px. Nothing is allocated. Cost: about 5 ns a
-// row while each half stays within two image rows, as it does for turns of a few degrees; 2 ns for each
-// further one.
+// The pixels under one row of the window are in a few image rows. Each half of the row covers 16 columns and
+// starts in its own image row. Each image row is interpolated along x for all sixteen lanes at once (two byte
+// shuffles), and neighbouring rows are blended along y where a lane needs them. Positions are rounded to
+// 1/1024 px, with an error below 1/700 px. No allocation. Cost: about 5 ns a row while each half stays within
+// two image rows, as for rotations of a few degrees; 2 ns for each further image row.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -20,10 +19,10 @@
 
 namespace swiftlet {
 
-/// What the samplers below share.
+/// Shared by the samplers below.
 template <typename Isa>
 struct SamplerParts {
-  /// Samples have this many units per grey: 255 grey is 32640.
+  /// Units of a sample per grey level: grey 255 is 32640.
   static constexpr int kUnitsPerGrey = 128;
 
  protected:
@@ -32,14 +31,14 @@ struct SamplerParts {
   static constexpr int kBits = 10;  // of a place behind the point
   static constexpr std::int16_t kFraction = (1 << kBits) - 1;
   static constexpr float kOne = 1 << kBits;
-  // Seven steps, the fractions of the half's first place and of the row's start (below 1 each) and the
-  // neighbour: 16 columns.
+  // Seven steps, the fractions of the half's first position and of the row's start (below 1 each) and the
+  // neighbour fit into 16 columns.
   static constexpr float kLongestStep = 1.85F;
   static constexpr int kHalf = 8;
 
   static int rounded(float x) { return static_cast<int>(std::lrint(x)); }
 
-  /// The lanes' places along one axis of the image, each half from a whole pixel of its own.
+  /// Positions of the lanes along one axis of the image, each half relative to a whole pixel of its own.
   struct Axis {
     Axis(float step, int reach) {
       constexpr int kFiner = 6;  // bits, so that the last place is rounded no worse than the others
@@ -54,12 +53,12 @@ struct SamplerParts {
       last = std::max(std::max(0, at(kHalf - 1)) - first, std::max(at(kHalf), end) - from);
     }
     alignas(32) std::int16_t place[2 * kHalf];
-    int first;   ///< lowest place of the first half, from the window's first sample [1/1024 px]
-    int second;  ///< from the first half's start to the second's [px]
-    int last;    ///< highest place of the window, from the starts [1/1024 px]
+    int first;   ///< lowest position of the first half, from the window's first sample [1/1024 px]
+    int second;  ///< from the start of the first half to that of the second [px]
+    int last;    ///< highest position of the window, from the starts [1/1024 px]
   };
 
-  /// Places along an image row.
+  /// Positions along an image row.
   struct Row {
     explicit Row(const Lanes& x) {
       const auto column = Isa::template shiftRight<kBits>(x);
@@ -68,10 +67,10 @@ struct SamplerParts {
       u = share(x);
     }
     typename Isa::Places left, right;
-    Lanes u;  ///< share of the right one, in 1/32768
+    Lanes u;  ///< weight of the right neighbour, in 1/32768
   };
 
-  /// Of a place's fraction, in 1/32768.
+  /// Weight of the fraction of a position, in 1/32768.
   static Lanes share(const Lanes& place) {
     return Isa::template shiftLeft<15 - kBits>(Isa::bitAnd(place, Isa::broadcast(kFraction)));
   }
@@ -93,9 +92,8 @@ class AffineSampler : SamplerParts<Isa> {
  public:
   using SamplerParts<Isa>::kUnitsPerGrey;
 
-  /// Window offsets from -reach to reach in both directions, reach at most 7, go through `warp` (offsets in
-  /// the window to offsets in the image). False when neighbours in a row of it are more than 1.85 px apart in
-  /// x or in y.
+  /// Maps window offsets from -reach to reach in both directions, reach at most 7, by `warp` (offsets in the
+  /// window to offsets in the image). False if neighbours in a row are more than 1.85 px apart in x or y.
   [[nodiscard]] bool prepare(const Eigen::Matrix2f& warp, int reach) {
     if (!(std::abs(warp(0, 0)) <= kLongestStep && std::abs(warp(1, 0)) <= kLongestStep)) return false;
     warp_ = warp;
@@ -112,9 +110,9 @@ class AffineSampler : SamplerParts<Isa> {
     return true;
   }
 
-  /// The window's row at offset `row` from its centre, which lies at `centre` in the image; lanes beyond
-  /// the window hold anything. The window must lie in the image, one pixel from its right and lower edge;
-  /// image rows are read 32 px wide, whatever their length.
+  /// The row of the window at offset `row` from its centre, which is at `centre` in the image; lanes beyond
+  /// the window are undefined. The window must be inside the image, one pixel from its right and lower edge.
+  /// Reads image rows 32 px wide, whatever their length.
   [[nodiscard]] auto sample(const ImageView& image, const Eigen::Vector2f& centre, int row) const {
     const Eigen::Vector2f start = centre + warp_ * Eigen::Vector2f(-reach_, static_cast<float>(row));
     const int start_x = rounded(start.x() * kOne) + first_x_;
@@ -156,23 +154,23 @@ class AffineSampler : SamplerParts<Isa> {
   typename Parts::Lanes x_, y_;
 };
 
-/// The whole window at once, for maps that hardly turn it: half the work of AffineSampler. Each image row is
-/// interpolated along x once, where the window's columns cross it, and the window's rows are blended from
-/// those, along their columns.
+/// Samples the whole window at once, for maps with little rotation: half the work of AffineSampler. Each
+/// image row is interpolated along x once, where the window's columns cross it, and the window's rows are
+/// blended from those along their columns.
 template <typename Isa>
 class UprightSampler : SamplerParts<Isa> {
  public:
   /// Rows of sixteen lanes.
   static constexpr int kLanes = 16;
 
-  /// The window at `centre` through `warp`, as AffineSampler gives it, `rows` to 2 reach + 1 rows. False,
-  /// with nothing written, for maps that turn or shear by more than 0.35 or scale beyond 0.5 to 1.85. Up to 3
-  /// px around the window are read, and image rows 32 px wide.
+  /// Samples the window at `centre` through `warp` like AffineSampler, into 2 reach + 1 `rows`. False,
+  /// without effect, for maps that rotate or shear by more than 0.35 or scale beyond 0.5 to 1.85. Reads up to
+  /// 3 px around the window, and image rows 32 px wide.
   [[nodiscard]] bool sample(const ImageView& image, const Eigen::Vector2f& centre,
                             const Eigen::Matrix2f& warp, int reach, std::int16_t* rows) const {
     const float down = warp(1, 1);
     if (!(down >= kShortestStep && down <= kLongestStep)) return false;
-    // Along the window's columns x changes by this from one image row to the next.
+    // Change of x along the window's columns from one image row to the next.
     const float slant = warp(0, 1) / down;
     const float across = warp(0, 0) - slant * warp(1, 0);
     if (!(std::abs(warp(1, 0)) <= kMaxSlant && std::abs(slant) <= kMaxSlant && across >= kShortestStep &&
@@ -183,7 +181,7 @@ class UprightSampler : SamplerParts<Isa> {
     const Eigen::Vector2f start = centre - warp * Eigen::Vector2f(r, r);
     const Axis axis(across, reach);
     const auto x_places = Isa::load(axis.place);
-    // y of the lanes, from the window's corner; all from one whole pixel.
+    // y of the lanes relative to the window's corner, all from one whole pixel.
     alignas(32) std::array<std::int16_t, kLanes> y{};
     const float lowest = std::min(0.0F, 2 * r * warp(1, 0));
     const int step_y = rounded(warp(1, 0) * kOne * 16);

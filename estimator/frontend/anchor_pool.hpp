@@ -1,7 +1,7 @@
 #pragma once
-// The patches by which landmarks are recognized: how each looked to each camera when it was first
-// seen. Tracked features hold a slot; lost ones keep theirs until the pool needs it, the one not
-// seen for longest going first. 1.9 KiB per patch, 3.8 MiB in all, reserved by the constructor.
+// The patches by which landmarks are recognized: their appearance in each camera at the first observation.
+// Tracked features hold a slot; lost ones keep theirs until the pool needs it, and the one not seen for
+// longest is dropped first. 1.9 KiB per patch, 3.8 MiB in all, reserved by the constructor.
 
 #include <Eigen/Core>
 #include <array>
@@ -16,7 +16,7 @@
 
 namespace swiftlet {
 
-/// One camera's view of a landmark at levels 0 and 1, centred on the whole pixel next to it.
+/// A landmark in one camera at levels 0 and 1, centred on the nearest whole pixel.
 class AnchorPatch {
  public:
   static constexpr int kLevels = 2;
@@ -24,18 +24,18 @@ class AnchorPatch {
   /// Copies the surroundings of `pixel`; the warp becomes the identity.
   void take(const Pyramid& image, const Eigen::Vector2f& pixel);
 
-  /// Refines a position in `image` (level 0) found otherwise: aligns the patch there and updates
-  /// the warp. `turn` is the warp that the frame's rotation adds (identity where unknown). False,
-  /// with nothing changed, when the patch does not fit there.
+  /// Refines a known position in `image` (level 0): aligns the patch there and updates the warp. `turn` is
+  /// the warp that the frame's rotation adds (identity if unknown). False, without effect, if the patch does
+  /// not fit.
   [[nodiscard]] bool refine(const ImageView& image, const Eigen::Matrix2f& turn, Eigen::Vector2f& pixel);
 
   [[nodiscard]] ImageView view(int level) const;
-  /// The landmark in the view of `level`.
+  /// Position of the landmark in the view of `level`.
   [[nodiscard]] Eigen::Vector2f centre(int level) const;
 
   bool valid = false;
-  int failures = 0;  ///< frames in a row that refine() failed
-  /// Offsets in the patch to offsets in the newest image, as last estimated.
+  int failures = 0;  ///< consecutive frames in which refine() failed
+  /// Offsets in the patch to offsets in the newest image, by the last estimate.
   Eigen::Matrix2f warp = Eigen::Matrix2f::Identity();
 
  private:
@@ -46,7 +46,7 @@ class AnchorPatch {
   AffineTemplate template_;
   bool has_template_ = false;
   std::array<Eigen::Vector2f, kLevels> centre_{};
-  /// Level 0, level 1, and what reading whole vectors takes behind the last row.
+  /// Level 0, level 1, and the bytes after the last row that reading whole vectors needs.
   std::array<std::uint8_t, kSide0 * kSide0 + kSide1 * kSide1 + 32> pixels_{};
 };
 
@@ -64,9 +64,9 @@ class AnchorPool {
 
   AnchorPool() : anchors_(kCapacity) {}
 
-  /// A slot for a new landmark: a free one, else the lost one not seen for longest.
+  /// A slot for a new landmark: a free one, otherwise that of the lost landmark not seen for longest.
   [[nodiscard]] int acquire(TrackId id);
-  /// The slot of a landmark, -1 when it was given up.
+  /// The slot of a landmark; -1 if it was dropped.
   [[nodiscard]] int find(TrackId id) const;
   void clear();
 
@@ -75,7 +75,7 @@ class AnchorPool {
 
  private:
   std::vector<Anchor> anchors_;
-  std::array<TrackId, kCapacity> ids_{};  ///< apart from the patches, so that a search stays in cache
+  std::array<TrackId, kCapacity> ids_{};  ///< separate from the patches, so that a search stays in cache
 };
 
 }  // namespace swiftlet

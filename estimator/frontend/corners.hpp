@@ -1,13 +1,13 @@
 #pragma once
-// New features: the best Shi-Tomasi corner of every grid cell that has none.
+// Detects new features: the best Shi-Tomasi corner of every grid cell without a feature.
 //
 // Score: smaller eigenvalue of the 2x2 structure tensor of 3x3 Sobel gradients, summed over a 7x7
 // box (Shi, Tomasi, "Good Features to Track", CVPR 1994), in grey^2 / px^2 per pixel. Only cells
 // that need a point are evaluated. A corner must be the maximum of its 3x3 neighbourhood, above an
-// absolute and a relative threshold, and keep a minimum distance from every other feature.
+// absolute and a relative threshold, and have a minimum distance from every other feature.
 //
-// Corners are whole pixels on purpose: a feature is the patch around it (its template is read there
-// without interpolation, patch_template.hpp), and any point of that patch names it equally well.
+// Corners are at whole pixels, because the template around a feature is then read without interpolation
+// (patch_template.hpp), and any point of the patch can represent the feature.
 //
 // Memory is reserved by the constructor; cost about 3 ns per evaluated pixel.
 
@@ -25,7 +25,7 @@ namespace swiftlet {
 struct CornerSettings {
   float min_distance = 14.0F;  ///< px
   float min_score = 4.0F;      ///< grey^2 / px^2
-  float relative = 0.003F;     ///< of the best score seen in this call
+  float relative = 0.003F;     ///< relative to the best score in this call
 };
 
 struct Corner {
@@ -40,8 +40,8 @@ class CornerDetector {
   static constexpr int kMaxCell = 96;  ///< px
 
   /// Corners in empty cells, best first, at most `wanted`. `image` must have the border of a Pyramid level.
-  /// `occupied` are the features that exist; `features_at_most` is the number the whole image should carry:
-  /// it sets the cell size.
+  /// `occupied`: existing features. `features_at_most`: number of features for the whole image, which sets
+  /// the cell size.
   using Pixels = FixedVector<Eigen::Vector2f, kMaxFeatures>;
   template <typename Isa = simd::Native>
   void detect(const ImageView& image, const Pixels& occupied, int features_at_most, int wanted,

@@ -1,22 +1,20 @@
 #pragma once
 // The front-end stage: images in, tracks out.
 //
-// Every frame: each camera's features are followed in that camera from its previous image
-// (prediction by landmark or by the body's rotation, pyramidal Lucas-Kanade with a check back), then
-// aligned with the patch of their first sighting, which keeps long tracks from drifting; tracks that
-// contradict the frame-to-frame motion (RANSAC) or the rig's epipolar geometry are dropped; lost
-// landmarks are looked for where they are predicted. The two cameras are independent: a feature may
-// be seen by either or both, and losing one side does not end the other. At keyframes, and when
-// features are few: new corners in empty cells (left image; right while the left is missing), and
-// matching between the cameras.
+// Every frame: features are tracked in each camera from its previous image (predicted by landmark or by the
+// body's rotation, pyramidal Lucas-Kanade with a backward check), then aligned with the patch of their first
+// observation, which prevents drift of long tracks. Tracks that contradict the frame-to-frame motion (RANSAC)
+// or the rig's epipolar geometry are dropped. Lost landmarks are searched at their predicted positions. The
+// two cameras are independent: a feature may be seen by either or both, and losing it in one does not end it
+// in the other. At keyframes, and if there are few features: new corners in empty cells (left image; right
+// while the left is missing), and matching between the cameras.
 //
-// Full is normal: with `max_features` tracks nothing is detected; the pool of remembered patches
-// gives up the landmark not seen for longest.
+// Full is normal: with `max_features` tracks nothing is detected, and the pool of stored patches drops the
+// landmark not seen for longest.
 //
-// step() returns kInvalidInput, with nothing changed, for a frame without images or with an image
-// of the wrong size. A camera may be missing from a frame; its features are held for a short time
-// and followed when it returns. Nothing is allocated after construction; deterministic. For
-// 752 x 480 stereo the object holds 6.5 MiB.
+// step() returns kInvalidInput, without effect, for a frame without images or with an image of a wrong size.
+// A camera may be missing from a frame; its features are held for a short time and tracked when it returns.
+// No allocation after construction; deterministic. Memory: 6.5 MiB for 752 x 480 stereo.
 
 #include <memory>
 
@@ -29,17 +27,17 @@
 
 namespace swiftlet {
 
-/// What became of the tracks in the last step, summed over the cameras.
+/// Figures of the last step, summed over the cameras.
 struct FrontendStatistics {
-  int tracked = 0;       ///< sightings followed from the previous frame
-  int lost = 0;          ///< sightings lost by Lucas-Kanade or its checks
-  int refined = 0;       ///< sightings corrected by their anchor patch
-  int false_motion = 0;  ///< removed by the motion's epipolar geometry
-  int false_stereo = 0;  ///< removed by the rig's epipolar geometry
-  int found_again = 0;   ///< sightings of landmarks found by projection
+  int tracked = 0;       ///< observations tracked from the previous frame
+  int lost = 0;          ///< observations lost by Lucas-Kanade or its checks
+  int refined = 0;       ///< observations corrected by their anchor patch
+  int false_motion = 0;  ///< removed by the epipolar geometry of the motion
+  int false_stereo = 0;  ///< removed by the epipolar geometry of the rig
+  int found_again = 0;   ///< observations of landmarks found by projection
   int detected = 0;      ///< new features
-  int matched = 0;       ///< sightings added by matching between the cameras
-  int match_failed = 0;  ///< attempts at that without a safe answer
+  int matched = 0;       ///< observations added by matching between the cameras
+  int match_failed = 0;  ///< matching attempts without an unambiguous result
 };
 
 class Frontend {
@@ -49,13 +47,13 @@ class Frontend {
   Frontend(Frontend&&) noexcept;
   Frontend& operator=(Frontend&&) noexcept;
 
-  /// Follows, verifies and replenishes; `out` is overwritten.
+  /// Tracks, verifies and replenishes features; overwrites `out`.
   Status step(const StereoFrame& frame, const FrontendPrediction& prediction, int max_features,
               TrackedFrame& out);
 
   [[nodiscard]] const FrontendStatistics& statistics() const;
 
-  /// Forgets all tracks and patches; ids go on rising.
+  /// Forgets all tracks and patches; ids continue.
   void reset();
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// The front-end's state and steps; private to this folder. Stage and contract: frontend.hpp.
+// State and steps of the front-end; private to this folder. Stage and contract: frontend.hpp.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -23,15 +23,15 @@ struct Track {
   TrackId id = 0;
   int slot = -1;       ///< in the anchor pool
   int age = 0;         ///< frames since detection
-  int unmatched = 0;   ///< attempts in a row to find it in the other camera that failed
-  int match_wait = 0;  ///< keyframes until the next one
+  int unmatched = 0;   ///< consecutive failed attempts to find it in the other camera
+  int match_wait = 0;  ///< keyframes until the next attempt
   int landmark = -1;   ///< index of its prediction in this frame's list
-  /// Has a position in that camera's newest image (which may be an earlier frame's).
+  /// Has a position in that camera's newest image, which may be of an earlier frame.
   std::array<bool, kMaxCameras> live{};
-  std::array<bool, kMaxCameras> had_previous{};  ///< `previous_bearing` holds the frame before
+  std::array<bool, kMaxCameras> had_previous{};  ///< `previous_bearing` is of the frame before
   std::array<Eigen::Vector2f, kMaxCameras> pixel{};
   std::array<Eigen::Vector3d, kMaxCameras> bearing{};
-  /// Seen from a rolling shutter's middle row, were it far away.
+  /// As seen from the middle row of a rolling shutter, for a point at infinity.
   std::array<Eigen::Vector3d, kMaxCameras> previous_bearing{};
   std::array<bool, kMaxCameras> in_keyframe{};
   std::array<Eigen::Vector3d, kMaxCameras> keyframe_bearing{};
@@ -68,7 +68,7 @@ class Frontend::Impl {
   void takeImages(const StereoFrame& frame, const FrontendPrediction& prediction);
   void joinPredictions(const FrontendPrediction& prediction);
   void trackCamera(std::size_t c, const FrontendPrediction& prediction);
-  /// Where a feature is looked for, and from how many levels on.
+  /// Predicted position of a feature, and the number of pyramid levels to search.
   struct Guess {
     Eigen::Vector2f pixel;
     int levels = 0;

@@ -1,5 +1,5 @@
 #pragma once
-// What the rest of the estimator knows about a frame before its images are looked at.
+// Predictions for a frame from the rest of the estimator, before its images are processed.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -24,10 +24,10 @@ struct FrontendPrediction {
   bool has_rotation = false;
   /// Body at this frame to body at the previous one: R_prev_cur (gyro, bias removed).
   Eigen::Quaterniond R_body_prev_body_cur = Eigen::Quaterniond::Identity();
-  /// Of this frame's rows, where they have their own times.
+  /// Motion during this frame's rows, for a rolling shutter.
   ScanTurn scan;
   FixedVector<PredictedLandmark, kMaxLandmarks> landmarks;
-  /// Where extrinsics are estimated: how they stand, and how well one camera is known against the other.
+  /// If extrinsics are estimated: their present values, and the sigma of one camera relative to the other.
   bool has_extrinsics = false;
   std::array<SE3, kMaxCameras> T_body_cam;
   double stereo_rotation_sigma = 0;  ///< rad

@@ -1,5 +1,5 @@
 #pragma once
-// What may be changed about the front-end from outside.
+// Settings of the front-end.
 
 #include "estimator/core/stamp.hpp"
 
@@ -7,15 +7,15 @@ namespace swiftlet {
 
 struct FrontendSettings {
   int pyramid_levels = 4;          ///< 1 to kMaxPyramidLevels
-  bool anchor_refinement = true;   ///< align each track to the patch of its first sighting, too
-  bool find_again = true;          ///< look for lost landmarks where they are predicted
-  float back_check = 0.5F;         ///< px: tracked forward and back must end this close
-  float min_distance = 14.0F;      ///< px between features when new ones are chosen
-  float min_depth = 0.3F;          ///< m: nearest point that stereo matching looks for
+  bool anchor_refinement = true;   ///< also align each track with the patch of its first observation
+  bool find_again = true;          ///< search lost landmarks at their predicted positions
+  float back_check = 0.5F;         ///< px: largest distance after tracking forward and back
+  float min_distance = 14.0F;      ///< px: least distance of new features from others
+  float min_depth = 0.3F;          ///< m: nearest distance searched by stereo matching
   float stereo_gate = 1.5F;        ///< px from the epipolar curve
   float motion_gate = 2.0F;        ///< px from the epipolar plane of the frame-to-frame motion
   float keyframe_parallax = 10.F;  ///< px: median, rotation removed, since the last keyframe
-  float keyframe_survival = 0.8F;  ///< keyframe when fewer of the last one's tracks are left
+  float keyframe_survival = 0.8F;  ///< keyframe if a smaller share of the last keyframe's tracks is left
   Duration min_keyframe_interval = Duration::fromMilliseconds(140);
   Duration max_keyframe_interval = Duration::fromMilliseconds(1000);
 };

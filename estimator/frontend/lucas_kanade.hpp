@@ -1,9 +1,9 @@
 #pragma once
-// Pyramidal Lucas-Kanade: one point from one image to the next, coarse to fine, with a check back.
+// Pyramidal Lucas-Kanade: tracks a point from one image to the next, coarse to fine, with a backward check.
 //
-// Positions are pixels of level 0. A level whose template is flat, or whose alignment is lost, is
-// skipped: the finer ones then start from the guess. Source: Bouguet, "Pyramidal Implementation of
-// the Lucas Kanade Feature Tracker", 2000; the alignment itself: patch_template.hpp.
+// Positions are pixels of level 0. A level with a flat template or a lost alignment is skipped; the finer
+// levels then start from the initial guess. Source: Bouguet, "Pyramidal Implementation of the Lucas Kanade
+// Feature Tracker", 2000. Alignment: patch_template.hpp.
 
 #include <Eigen/Core>
 
@@ -13,23 +13,22 @@
 namespace swiftlet {
 
 struct LucasKanadeSettings {
-  int levels = 4;           ///< coarsest level used is levels - 1
-  float back_check = 0.5F;  ///< px; 0 switches the check off
-  int back_levels = 2;      ///< levels of the way back
+  int levels = 4;           ///< the coarsest level is levels - 1
+  float back_check = 0.5F;  ///< px; 0 disables the check
+  int back_levels = 2;      ///< levels of the backward check
   AlignmentLimits limits;
 };
 
-/// Finds `from_pixel` of `from` in `to`. `to_pixel` holds the guess and receives the answer.
-/// False when lost; `to_pixel` is then unspecified. About 2.3 us over four
-/// levels without the check back.
+/// Finds `from_pixel` of `from` in `to`. `to_pixel` is the initial guess and receives the result. False if
+/// lost; `to_pixel` is then undefined. About 2.3 us over four levels without the backward check.
 [[nodiscard]] bool trackPoint(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Pyramid& to,
                               const LucasKanadeSettings& settings, Eigen::Vector2f& to_pixel);
 
-/// The way back alone: from `to_pixel` to within `back_check` of `from_pixel`.
+/// The backward check: tracks from `to_pixel`; true if the result is within `back_check` of `from_pixel`.
 [[nodiscard]] bool tracksBack(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Pyramid& to,
                               const LucasKanadeSettings& settings, const Eigen::Vector2f& to_pixel);
 
-/// Whole pixels of the patch around `pixel` lie in the image.
+/// Whether the whole patch around `pixel` is in the image.
 [[nodiscard]] bool patchInside(const ImageView& image, const Eigen::Vector2f& pixel);
 
 }  // namespace swiftlet

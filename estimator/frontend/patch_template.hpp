@@ -5,25 +5,26 @@
 // over a kPatchSize x kPatchSize window, inverse compositional (Baker, Matthews, "Lucas-Kanade 20
 // Years On", IJCV 2004): gradients and Hessian come from the template, once.
 //
-// Gain and offset are eliminated in advance: with G the template's gradient images made orthogonal
-// (in the weighted inner product) to T and to 1, the step is
+// Gain and offset are eliminated in advance. With G the template's gradient images made orthogonal to T and
+// to 1 (in the weighted inner product), the step is
 //     dp = -H^-1 sum_x G(x) I(x + p),     H = sum_x w G G^T,
-// without residual image, gain or offset. And because bilinear interpolation is linear in the
-// pixels, such sums inside one pixel cell are the bilinear mix of their values at the cell's four
-// corners: sixteen integer correlations per cell (image gradients, T and 1 at four corners) give
-// every iteration in that cell for nothing.
+// without residual image, gain or offset. Bilinear interpolation is linear in the pixels, so these sums
+// inside a pixel cell are the bilinear mix of their values at the cell's four corners. Sixteen integer
+// correlations per cell (image gradients, T and 1 at four corners) give all iterations in that cell.
 //
-// Two things follow at the finest level (`Finish::kFine`).
-//  - Gain and offset are not free: on shifts under even light the median error with them is 24
-//    to 30 % above that without. Where the offset is no more than noise, the position is found anew with g =
-//    o = 0. The offset decides and not the gain: a change of light moves both, while noise in the template,
-//    interpolation and blur lower the gain alone.
-//  - Bilinear interpolation displaces fine detail, by up to 0.02 px. Its error is measured once, at
-//    the position found, as the difference from cubic convolution (Keys, "Cubic Convolution
-//    Interpolation for Digital Image Processing", 1981), and taken off the sums.
+// Two corrections are made at the finest level (`Finish::kFine`).
+//  - Estimating gain and offset costs accuracy: under constant light the median error is 24 to 30 % larger
+//  than
+//    without. If the offset is within noise, the position is therefore computed again with g = o = 0. The
+//    offset decides, because a change of light changes both, while noise in the template, interpolation and
+//    blur only lower the gain.
+//  - Bilinear interpolation displaces fine detail by up to 0.02 px. Its error is measured once, at the
+//  position
+//    found, as the difference from cubic convolution (Keys, "Cubic Convolution Interpolation for Digital
+//    Image Processing", 1981), and subtracted from the sums.
 //
-// The template is centred on a whole pixel, so that it is read without interpolation; the caller
-// keeps the feature's sub-pixel offset from it. What a track costs: lucas_kanade.hpp.
+// The template is centred on a whole pixel, so that it is read without interpolation; the caller keeps the
+// sub-pixel offset of the feature. Cost of a track: lucas_kanade.hpp.
 
 #include <Eigen/Core>
 #include <array>
@@ -37,25 +38,24 @@
 namespace swiftlet {
 
 struct AlignmentLimits {
-  int cells = 8;                  ///< pixel cells visited at most; the last position then stands
-  float stop = 0.01F;             ///< px: smaller steps end the alignment
-  float max_displacement = 12.F;  ///< px from the guess: further is lost
+  int cells = 8;                  ///< largest number of pixel cells visited; then the last position is used
+  float stop = 0.01F;             ///< px: stops at smaller steps
+  float max_displacement = 12.F;  ///< px: lost if farther from the initial guess
 };
 
 class PatchTemplate {
  public:
-  /// Whether the position is final or the start of a finer level.
+  /// Whether the position is final or the initial guess of a finer level.
   enum class Finish { kCoarse, kFine };
 
-  /// `centre` points to the template's central pixel; kPatchRadius + 1 pixels around it are used
-  /// (rows are read 17 pixels wide).
-  /// False when the window does not fix both directions (flat, or a straight edge).
+  /// `centre` points to the template's central pixel; uses kPatchRadius + 1 pixels around it and reads rows
+  /// 17 pixels wide. False if the window does not determine both directions (flat, or a straight edge).
   template <typename Isa = simd::Native>
   [[nodiscard]] bool build(const std::uint8_t* centre, int stride);
 
-  /// Moves `position` (of the template's centre, in `image` pixels) to the best match. False when
-  /// it leaves the image by more than a few pixels or moves too far; when it has not settled after
-  /// `limits.cells` cells, it stands as it is. Needs the border of a Pyramid level around the image.
+  /// Moves `position` (of the template's centre, in pixels of `image`) to the best match. False if it leaves
+  /// the image by more than a few pixels or moves too far. If it has not converged after `limits.cells`
+  /// cells, the last position is used. Needs the border of a Pyramid level around the image.
   template <typename Isa = simd::Native>
   [[nodiscard]] bool align(const ImageView& image, const AlignmentLimits& limits, Finish finish,
                            Eigen::Vector2f& position) const;
@@ -70,7 +70,7 @@ class PatchTemplate {
   static constexpr int kLanes = kPatchLanes;
   static constexpr int kRows = kPatchSize;
 
-  /// Gain and offset estimated, or none.
+  /// Whether gain and offset are estimated.
   enum class Light { kFree, kFixed };
   /// Sums over the window of an image times w 2G_x, w 2G_y, w (T - 128) and w, w in 1/16.
   using Sums = std::array<std::int32_t, 4>;
@@ -88,12 +88,12 @@ class PatchTemplate {
   void visit(const ImageView& image, Cell& cell) const;
   [[nodiscard]] Eigen::Vector4f projection(const Sums& sums) const;
   [[nodiscard]] Eigen::Vector2f step(const Eigen::Vector4f& e, Light light) const;
-  /// Moves `position` inside the cell. False when it leaves the cell or does not settle.
+  /// Moves `position` inside the cell. False if it leaves the cell or does not converge.
   bool iterate(const Cell& cell, Light light, float stop, Eigen::Vector2f& position) const;
   template <typename Isa>
   bool settle(const ImageView& image, const AlignmentLimits& limits, Light light,
               const Eigen::Vector2f& guess, Cell& cell, Eigen::Vector2f& position) const;
-  /// Measures the interpolation's error at `position` and whether the light has changed.
+  /// Measures the interpolation error at `position` and whether the light has changed.
   [[nodiscard]] Light correct(const ImageView& image, const Eigen::Vector2f& position, Cell& cell) const;
 
   alignas(32) std::int16_t gradient_x_[kRows * kLanes];  ///< w 2G_x, w in 1/16; zero beyond the window
@@ -101,12 +101,12 @@ class PatchTemplate {
   alignas(32) std::int16_t weighted_t_[kRows * kLanes];  ///< w (T - 128)
   Sums own_{};                                           ///< of the template itself
   Eigen::Matrix2f step_free_;                            ///< projections on 2G to steps, with gain and offset
-  Eigen::Matrix2f step_fixed_;                           ///< and without
+  Eigen::Matrix2f step_fixed_;                           ///< the same without gain and offset
   Eigen::Vector2f slope_;                                ///< regression of 2G on T
   Eigen::Vector2f level_;                                ///< mean of 2G
   float mean_ = 0;                                       ///< of T - 128 [grey]
   float variance_ = 0;                                   ///< of T [grey^2]
-  float level_share_ = 0;  ///< what remains of the offset's information with the position free
+  float level_share_ = 0;  ///< share of the offset's information that remains with free position
   float min_eigenvalue_ = 0;
   const std::uint8_t* centre_ = nullptr;
   int stride_ = 0;

@@ -1,9 +1,9 @@
 #pragma once
-// The window of pixels that an alignment looks at, and their weights.
+// The pixel window of an alignment and its weights.
 //
-// Weights: 1 where the pixel's distance from the centre, in a norm of the caller's, is at most the patch's
-// radius, falling linearly to 0 over one more pixel. Stored in rows of kPatchLanes, a whole vector each;
-// the columns beyond the window weigh nothing.
+// Weights are 1 if the pixel's distance from the centre, in a norm given by the caller, is at most the radius
+// of the patch, and fall linearly to 0 over one more pixel. Stored in rows of kPatchLanes, a whole vector
+// each; columns beyond the window have weight 0.
 
 #include <algorithm>
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace swiftlet {
 
-/// Window side in pixels, odd, at most 15: a row and one spare column fill a 16-lane vector.
+/// Window side in pixels, odd, at most 15, so that a row and one spare column fill a 16-lane vector.
 inline constexpr int kPatchSize = 13;
 inline constexpr int kPatchRadius = kPatchSize / 2;
 inline constexpr int kPatchLanes = 16;
@@ -20,7 +20,7 @@ static_assert(kPatchSize % 2 == 1 && kPatchSize < kPatchLanes);
 
 using PatchWindow = std::array<float, static_cast<std::size_t>(kPatchSize) * kPatchLanes>;
 
-/// `norm`: (|x|, |y|) in pixels from the centre to a distance in pixels.
+/// `norm`: maps (|x|, |y|) from the centre to a distance, all in pixels.
 template <typename Norm>
 PatchWindow makePatchWindow(const Norm& norm) {
   PatchWindow window{};

@@ -1,6 +1,6 @@
 #pragma once
-// Whole-pixel matching: zero-mean normalized correlation of a small square with an image, in
-// integers. 25 ns per place on AVX2.
+// Whole-pixel matching: zero-mean normalized correlation of a small square with an image, in integers. 25 ns
+// per position on AVX2.
 
 #include <cstdint>
 
@@ -14,10 +14,10 @@ class SearchPatch {
   static constexpr int kRadius = 5;
   static constexpr int kSide = 2 * kRadius + 1;
 
-  /// `centre` points to the central pixel. False when the patch is flat.
+  /// `centre` points to the central pixel. False if the patch is flat.
   [[nodiscard]] bool build(const std::uint8_t* centre, int stride);
 
-  /// Correlation in [-1, 1] of the patch with the image around (x, y); 0 where the image is flat.
+  /// Correlation in [-1, 1] of the patch with the image around (x, y); 0 if the image is flat.
   /// Reads kRadius + 11 pixels around.
   template <typename Isa = simd::Native>
   [[nodiscard]] float correlation(const ImageView& image, int x, int y) const;

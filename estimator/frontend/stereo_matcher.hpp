@@ -1,12 +1,12 @@
 #pragma once
-// Finds a feature of one camera in the other camera's image of the same instant, without a depth.
+// Finds a feature of one camera in the other camera's image of the same instant, without known depth.
 //
-// The feature's ray is cut at inverse distances from 0 to 1 / min_depth and projected into the
-// other image through its own lens model: the samples follow the epipolar curve of any lens, one
-// pixel of pyramid level 1 apart. At each the patch (warped by the rotation between the cameras) is
-// compared by zero-mean normalized correlation; the best place, and its rival where there is one, is
-// refined by Lucas-Kanade with the warp of its depth and must pass: correlation, distance from the
-// epipolar plane, positive depth, the way back, and being clearly better than the rival.
+// The feature's ray is sampled at inverse distances from 0 to 1 / min_depth and projected into the other
+// image through its lens model. The samples follow the epipolar curve of any lens, one pixel of pyramid level
+// 1 apart. At each sample the patch, warped by the rotation between the cameras, is compared by zero-mean
+// normalized correlation. The best sample, and its rival if there is one, is refined by Lucas-Kanade with the
+// warp of its depth. It must pass tests of correlation, distance from the epipolar plane, positive depth and
+// backward tracking, and be clearly better than the rival.
 //
 // Cost per feature on 752 x 480, 11 cm baseline: about 5 us. No memory beyond the object.
 
@@ -30,11 +30,11 @@ class StereoMatcher {
  public:
   StereoMatcher(const Rig& rig, const StereoMatcherSettings& settings);
 
-  /// Where the cameras are, when that is estimated, and how far beyond the gate [px] a match may be because
-  /// of what is not known of it yet. Searching costs the more the larger that is.
+  /// Sets estimated extrinsics, and by how much a match may exceed the gate [px] because of their
+  /// uncertainty. A larger value makes the search slower.
   void setExtrinsics(const std::array<SE3, kMaxCameras>& T_body_cam, float slack);
 
-  /// Pixel in camera `from` to pixel in the other camera. False when there is no safe match.
+  /// Pixel in camera `from` to pixel in the other camera. False if there is no unambiguous match.
   [[nodiscard]] bool match(const Pyramid& from_image, std::size_t from, const Eigen::Vector2f& from_pixel,
                            const Pyramid& to_image, Eigen::Vector2f& to_pixel) const;
 
@@ -43,7 +43,7 @@ class StereoMatcher {
   [[nodiscard]] double epipolarDistance(const Eigen::Vector3d& bearing0,
                                         const Eigen::Vector3d& bearing1) const;
 
-  /// px from the epipolar curve, what is not known of the cameras included.
+  /// px from the epipolar curve, including the uncertainty of the extrinsics.
   [[nodiscard]] float gate() const { return settings_.epipolar_gate + slack_; }
 
  private:
@@ -62,14 +62,14 @@ class StereoMatcher {
   [[nodiscard]] bool refine(const Pyramid& from_image, std::size_t from, const Eigen::Vector2f& from_pixel,
                             const Eigen::Vector3d& bearing, const Pyramid& to_image,
                             Candidate& candidate) const;
-  /// Offsets in camera `from` to offsets in the other, for a patch facing the ray at that distance.
+  /// Offsets in camera `from` to offsets in the other, for a patch perpendicular to the ray at that distance.
   [[nodiscard]] bool warpAt(std::size_t from, const Eigen::Vector3d& bearing, double inverse_distance,
                             Eigen::Matrix2f& warp) const;
 
   Rig rig_;
   StereoMatcherSettings settings_;
   float slack_ = 0;  // px
-  /// From each camera to the other.
+  /// Transform from each camera to the other.
   std::array<Eigen::Matrix3d, 2> rotation_;
   std::array<Eigen::Vector3d, 2> translation_;
 };

@@ -1,5 +1,5 @@
 #pragma once
-// A square of pixels resampled through an affine map: the look of a feature from another view.
+// A square of pixels resampled through an affine map: the appearance of a feature in another view.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -13,11 +13,10 @@ namespace swiftlet {
 
 class WarpedPatch {
  public:
-  /// Samples `source` at centre + inverse_warp * d for every offset d of a template with its
-  /// gradient border; bilinear, rounded to 8 bits. `inverse_warp` takes offsets in the other view
-  /// to offsets in the source. `border` pixels around the source may be read, too. False when a
-  /// sample would lie outside, and for maps that stretch a row beyond 1.85 times its length. Rows of `source`
-  /// are read 32 px wide. About 0.25 us.
+  /// Samples `source` at centre + inverse_warp * d for every offset d of a template with its gradient border;
+  /// bilinear, rounded to 8 bits. `inverse_warp` takes offsets in the other view to offsets in the source.
+  /// `border` pixels around the source may be read too. False if a sample would be outside, and for maps that
+  /// stretch a row beyond 1.85 times its length. Reads rows of `source` 32 px wide. About 0.25 us.
   template <typename Isa = simd::Native>
   [[nodiscard]] bool sample(const ImageView& source, const Eigen::Vector2f& centre,
                             const Eigen::Matrix2f& inverse_warp, int border = 0);
@@ -28,18 +27,18 @@ class WarpedPatch {
  private:
   static constexpr int kReach = kPatchRadius + 1;
   static constexpr int kSide = 2 * kReach + 1;
-  static constexpr int kStride = 32;  ///< 16-lane loads run past the last column
+  static constexpr int kStride = 32;  ///< 16-lane loads extend beyond the last column
   alignas(32) std::uint8_t pixels_[(kSide + 1) * kStride]{};
 };
 
-/// Offsets in an image to offsets in another that sees the same points in a frame turned by `R`: `before` and
-/// `after` are the projections' Jacobians there, of the points at the same distance in both.
+/// The map from offsets in one image to offsets in another, whose camera is rotated by `R`, for points at
+/// equal distance from both. `before` and `after` are the Jacobians of the projections.
 [[nodiscard]] Eigen::Matrix2f pixelWarp(const Matrix23d& before, const Eigen::Matrix3d& R,
                                         const Matrix23d& after);
 
-/// Aligns the patch around `from_pixel` of `from`, warped by `warp` (offsets in `from` to offsets in
-/// `to`), at levels - 1 down to 0 of `to`, `finish` being that of level 0. `to_pixel` holds the guess and
-/// receives the answer, `correlation` (may be null) the final one at level 0. False when lost.
+/// Aligns the patch around `from_pixel` of `from`, warped by `warp` (offsets in `from` to offsets in `to`),
+/// at levels - 1 down to 0 of `to`; `finish` is that of level 0. `to_pixel` is the initial guess and receives
+/// the result; `correlation` (may be null) receives that at level 0. False if lost.
 [[nodiscard]] bool alignWarped(const Pyramid& from, const Eigen::Vector2f& from_pixel,
                                const Eigen::Matrix2f& warp, const Pyramid& to, int levels,
                                const AlignmentLimits& limits, PatchTemplate::Finish finish,
