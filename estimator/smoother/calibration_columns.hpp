@@ -1,8 +1,8 @@
 #pragma once
-// Columns of the calibration that is being estimated: the images' times (offset, then the readout of a
-// rolling shutter), then phi, p of T_body_cam per camera.
+// Columns of the estimated calibration: image times (offset, then the readout of a rolling shutter), then
+// phi, p of T_body_cam per camera.
 //
-// They come first in every system. A view has the times' and its own camera's (kViewCalibrationDim).
+// They come first in every system. A view has those of the times and of its own camera (kViewCalibrationDim).
 
 #include <Eigen/Core>
 #include <array>
@@ -21,7 +21,7 @@ struct CalibrationLayout {
   bool time_offset = false;
   bool extrinsics = false;
   std::size_t cameras = 0;
-  bool readout = false;  ///< with the time offset
+  bool readout = false;  ///< estimated together with the time offset
 
   [[nodiscard]] int times() const { return int{time_offset} + int{readout}; }
   [[nodiscard]] int dimension() const {
@@ -30,7 +30,7 @@ struct CalibrationLayout {
   [[nodiscard]] int extrinsicOffset(std::size_t camera) const {
     return times() + kExtrinsicDim * static_cast<int>(camera);
   }
-  /// Columns in the system of a view's own: -1 for what is not estimated.
+  /// Columns in the system of a view's columns; -1 if not estimated.
   [[nodiscard]] std::array<int, kViewCalibrationDim> columnsOf(std::size_t camera) const {
     std::array<int, kViewCalibrationDim> columns{};
     columns[0] = time_offset ? 0 : -1;

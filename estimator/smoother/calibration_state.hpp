@@ -1,9 +1,9 @@
 #pragma once
-// The calibration as the window holds it: given, or with columns of its own and estimated.
+// The calibration of the window: given, or estimated with columns of its own.
 //
 // Time offset (t_imu = t_image + offset, s), with it the readout of a rolling shutter (s), and T_body_cam of
-// each camera; error state and columns as in calibration_columns.hpp. The prior's reference is the value of
-// `hold`.
+// each camera; error state and columns as in calibration_columns.hpp. The reference of the prior is the value
+// at `hold`.
 
 #include <Eigen/Core>
 #include <array>
@@ -26,12 +26,12 @@ class CalibrationState {
   [[nodiscard]] double readout() const { return now_.readout; }
   [[nodiscard]] const std::array<SE3, kMaxCameras>& T_body_cam() const { return now_.T_body_cam; }
 
-  /// The values of now become the reference, and H, of a new prior, gets what is known of a calibration
-  /// beforehand.
+  /// Makes the present values the reference, and adds the prior information of a calibration to H of a new
+  /// prior.
   void hold(MatrixMap H);
   /// Values [-] reference, in the first dimension() rows.
   [[nodiscard]] Vector deviation() const;
-  /// By the first dimension() rows of a step.
+  /// Applies the first dimension() rows of a step.
   void retract(const Eigen::Ref<const Eigen::VectorXd>& step);
   void backup() { backup_ = now_; }
   void restore() { now_ = backup_; }

@@ -1,13 +1,12 @@
 #pragma once
-// What eliminating a landmark leaves behind: enough for the point's own step once the states' is known.
+// The data of an eliminated landmark that are needed for its own step once the step of the states is known.
 //
-// With B_i, c and C = L L^T as in landmark_block.hpp, Y_i = B_i L^-T and z = L^-1 c, the step of the whole
-// system has the point's part
+// With B_i, c and C = L L^T as in landmark_block.hpp, Y_i = B_i L^-T and z = L^-1 c, the step of the point is
 //   dp = -C^-1 (c + sum_i B_i^T dx_i) = -L^-T (z + sum_i Y_i^T dx_i)       (back-substitution),
-// i over the states that see it and, where calibration is estimated, its columns. Units: the point's
-// (tangent coordinates of the bearing, inverse depth). Y is kept in single precision: seven digits of a
-// step that the next one corrects. Nothing is allocated.
-// Memory: 2.6 KiB a point. Cost: three multiply-adds of eight lanes a state.
+// with i over the states that see it and, if estimated, the columns of the calibration. Units: those of the
+// point (tangent coordinates of the bearing, inverse depth). Y is in single precision: seven digits of a step
+// that the next one corrects. No allocation.
+// Memory: 2.6 KiB per point. Cost: three multiply-adds of eight lanes per state.
 // Source: Triggs et al., "Bundle Adjustment - A Modern Synthesis", 1999, section 6.1.
 
 #include <Eigen/Core>
@@ -21,12 +20,12 @@
 
 namespace swiftlet {
 
-/// L of C = L L^T, 3 x 3, C with the prior on the inverse depth; the diagonal inverted.
+/// L of C = L L^T, 3 x 3, where C includes the prior on the inverse depth; the diagonal is inverted.
 struct PointFactor {
   double i00, i11, i22;
   double l10, l20, l21;
 
-  /// False when C is not positive definite (or not a number).
+  /// False if C is not positive definite (or NaN).
   [[nodiscard]] bool compute(Eigen::Matrix3d C);
   /// x := L^-1 x, for one vector or one per lane.
   template <typename T>
@@ -45,34 +44,34 @@ struct PointFactor {
 
 class LandmarkBlock;
 
-/// A step of the whole system as back-substitution reads it, once for all points.
+/// A step of the whole system, prepared once for the back-substitution of all points.
 class StepOfStates {
  public:
-  /// `dx`: columns as in `states`, calibration first. Slots that hold no state may have any offset.
+  /// `dx`: columns as in `states`, calibration first. Slots without a state may have any offset.
   StepOfStates(const VectorMap& dx, const std::array<WindowState, kMaxStates>& states, int calibration);
 
  private:
   friend class EliminatedPoint;
-  /// By slot; zero behind the pose.
+  /// By slot; zero after the pose.
   alignas(32) std::array<std::array<float, kPaddedRows>, kMaxStates> pose_{};
   std::array<float, kMaxCalibrationDim> calibration_{};
 };
 
 class EliminatedPoint {
  public:
-  /// Of a landmark just eliminated.
+  /// From a landmark that was just eliminated.
   void keep(const LandmarkBlock& landmark);
 
-  /// 1/m, 1 sigma with the states held.
+  /// 1/m, standard deviation with the states held.
   [[nodiscard]] double inverseDepthSigma() const { return L_.i22; }
 
-  /// The point's step that goes with the states'.
+  /// The step of the point for a step of the states.
   [[nodiscard]] Eigen::Vector3d step(const StepOfStates& states) const;
 
  private:
   struct StateColumns {
     std::uint32_t slot;
-    float Y[3][kPaddedRows];  ///< by columns, zero behind the pose
+    float Y[3][kPaddedRows];  ///< by columns, zero after the pose
   };
 
   PointFactor L_{};

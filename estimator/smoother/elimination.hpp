@@ -1,9 +1,9 @@
 #pragma once
-// Columns leave a quadratic cost by the Schur complement: how states become a prior.
+// Eliminates columns from a quadratic cost by the Schur complement, to turn states into a prior.
 //
-// Shapes: H is n x n with both triangles filled, g is n x 1. What leaves is at most 15 columns, inverted by
-// eigenvalues: those below 1e-12 of the largest (or of 1) are not information.
-// Memory: none of its own. Cost: quadratic in the columns that stay.
+// Shapes: H is n x n with both triangles filled, g is n x 1. At most 15 columns leave; they are inverted by
+// eigenvalues, and those below 1e-12 of the largest (or of 1) carry no information.
+// Memory: none of its own. Cost: quadratic in the remaining columns.
 
 #include <Eigen/Core>
 #include <span>
@@ -18,8 +18,8 @@ struct ColumnRange {
   int count = 0;  ///< at most kStateDim
 };
 
-/// H and g of the columns of `others` become those of the cost with `leaving` minimized out. The columns of
-/// `leaving` lose their meaning. `work` has at least n x kStateDim doubles.
+/// Replaces H and g of the columns `others` by those of the cost minimized over `leaving`. The columns of
+/// `leaving` are undefined afterwards. `work` has at least n x kStateDim doubles.
 void eliminateColumns(MatrixMap H, VectorMap g, ColumnRange leaving, std::span<const ColumnRange> others,
                       std::vector<double>& work);
 

@@ -1,10 +1,9 @@
 #pragma once
-// Explicit landmarks and planes of the window: their slots, the factors that tie them, how they enter and
-// leave.
+// Explicit landmarks and planes of the window: their slots, their factors, how they enter and leave.
 //
-// Slots 0 to kMaxExplicitLandmarks - 1 are landmarks', the others planes'. What leaves is marked, goes into
-// the prior with the next marginalization (marginalization.hpp), and is freed there; what the prior does not
-// know is freed at once. Memory: 45 kB. Cost of each call: linear in slots and factors.
+// Slots 0 to kMaxExplicitLandmarks - 1 are for landmarks, the others for planes. An extra state that leaves
+// is marked, goes into the prior with the next marginalization (marginalization.hpp), and is then freed; if
+// it is not in the prior, it is freed at once. Memory: 45 kB. Cost of each call: linear in slots and factors.
 
 #include <Eigen/Core>
 #include <array>
@@ -19,7 +18,7 @@
 
 namespace swiftlet {
 
-/// Everything that is tied to planes: each explicit landmark to two, each plane with a direction.
+/// Largest number of factors: each explicit landmark on two planes, each plane with a direction.
 inline constexpr std::size_t kMaxExtraFactors = 2 * kMaxExplicitLandmarks + kMaxPlanes;
 
 class ExtraTable {
@@ -28,14 +27,14 @@ class ExtraTable {
 
   void clear();
 
-  // As Smoother says of them.
+  // As in Smoother.
   Status promote(TrackId id);
   [[nodiscard]] bool promoted(TrackId id) const;
   std::optional<PlaneId> addPlane(const Plane& plane);
   Status addPointOnPlane(TrackId id, PlaneId plane, double sigma);
   Status addPlaneDirection(PlaneId plane, PlaneDirection direction, double sigma);
   void removePointOnPlane(TrackId id, PlaneId plane);
-  /// True when the prior knows it: marked as leaving then, gone otherwise.
+  /// True if it is in the prior: it is then marked as leaving; otherwise it was removed.
   bool removePlane(PlaneId plane);
   [[nodiscard]] const ExtraState* findPlane(PlaneId id) const;
   [[nodiscard]] int pointsOn(const ExtraState& plane) const;
@@ -49,12 +48,12 @@ class ExtraTable {
   }
   /// Whitened and weighted.
   void linearize(const ExtraFactor& factor, LinearFactor& linear) const;
-  /// A plane's factors count once its points determine it.
+  /// The factors of a plane count once its points determine it.
   [[nodiscard]] bool counts(const ExtraFactor& factor) const { return extras_[factor.plane].settled; }
-  /// New planes are fitted to their points before they count.
+  /// Fits new planes to their points before they count.
   void settlePlanes();
 
-  /// Gives each its columns; returns the first one behind them. columns(): how many there are.
+  /// Assigns columns; returns the first one after them. columns(): their number.
   int assignOffsets(int first);
   [[nodiscard]] int columns() const { return columns_; }
   void retract(const Eigen::Ref<const Eigen::VectorXd>& step);
@@ -62,15 +61,15 @@ class ExtraTable {
   void restore();
   void moveEstimates(const Eigen::Vector3d& shift);
 
-  /// A landmark fits nowhere: what is in the prior cannot be taken back, the rest goes at once.
+  /// Removes a landmark that does not fit. Its part of the prior cannot be removed; everything else is.
   void discard(Landmark& landmark);
-  /// Explicit landmarks leave as structureless ones do: with a keyframe, once no frame from `oldest_recent`
-  /// on sees them; planes with the last of their points.
+  /// Marks explicit landmarks that leave, like structureless ones, with a keyframe if no frame from
+  /// `oldest_recent` on sees them. Planes leave with their last point.
   void markDepartures(std::uint8_t slot, std::uint64_t oldest_recent);
   [[nodiscard]] bool departs(const ExtraFactor& factor) const;
   void vacate(ExtraState& extra);
-  /// Marks what is left without a sighting or a point, and frees what the prior does not know. True when the
-  /// rest needs a marginalization.
+  /// Marks landmarks without observation and planes without point, and frees those that are not in the prior.
+  /// True if the others need a marginalization.
   bool release();
 
  private:

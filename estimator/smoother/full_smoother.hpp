@@ -1,24 +1,23 @@
 #pragma once
-// Full smoothing: every keyframe of a run, all IMU between them and all landmarks in one sparse
-// Gauss-Newton problem, nothing marginalized. Loop closures, where there are any, tie visits of a place.
+// Full smoothing: all keyframes of a run, the IMU between them and all landmarks in one sparse Gauss-Newton
+// problem without marginalization. Loop closures connect visits of the same place.
 //
-// Keyframes are kept as they come from the odometry (its causal states are the initial values);
-// `solve` then minimizes over the fixed-lag smoother's factors (but rest): preintegrated IMU between
+// Keyframes are stored as they come from the odometry, whose causal states are the initial values. `solve`
+// then minimizes over the factors of the fixed-lag smoother (except rest): preintegrated IMU between
 // neighbours, landmarks eliminated by their Schur complement, Cauchy weights, outliers removed. The
-// calibration is the given one, or an estimate that was made before (setCalibration). The reduced system
-// (15 columns a keyframe) is sparse and factored by CHOLMOD, or by Eigen in a build without it.
-// Revisits: each match of a loop is a further sighting of the old landmark, from the new keyframe, with the
-// noise of a match. The loops' relative poses pull the keyframes together first and are then dropped (they
-// were made of the same matches). Matches that do not fit are not used, and tried again twice; a loop with
-// fewer than six that fit is left out as a whole. A pair of tracks counts once, however many loops name it.
-// Frames: as the odometry's; each epoch keeps its own world, held by its first keyframe; epochs that loops
-// tie share the world of the earliest.
-// Off the flight path: it allocates. Memory is linear in the keyframes, up to `max_keyframes`: some 40 kB
-// each at 200 features and 200 Hz, and the sparse system while it solves; a landmark that is seen for longer
-// than 120 keyframes goes on as another one, so that only loops tie keyframes farther apart. memoryNeeded()
-// says it before the solve. Beyond max_keyframes further ones are refused (kCapacityReached) and the rest of
-// the run is not in the map. A match takes 0.3 kB. Source: Kaess et al., "Square Root SAM", IJRR 2006; the
-// factors are those of docs/smoother.md.
+// calibration is the given one or an earlier estimate (setCalibration). The reduced system (15 columns per
+// keyframe) is sparse and factored by CHOLMOD, or by Eigen in a build without it. Revisits: each match of a
+// loop is a further observation of the old landmark from the new keyframe, with the noise of a match. The
+// relative poses of the loops first pull the keyframes together and are then dropped, because they are made
+// of the same matches. Matches that do not fit are not used, and tried again twice; a loop with fewer than
+// six matches that fit is left out. A pair of tracks counts once, whatever the number of loops. Frames: those
+// of the odometry. Each epoch has its own world, held by its first keyframe; epochs joined by loops share the
+// world of the earliest. Off the flight path: allocates. Memory is linear in keyframes, up to
+// `max_keyframes`: some 40 kB each at 200 features and 200 Hz, and the sparse system while solving;
+// memoryNeeded() computes it before. A landmark seen for longer than 120 keyframes is continued as a new one,
+// so that only loops connect keyframes farther apart. Keyframes beyond max_keyframes are refused
+// (kCapacityReached), and the rest of the run is not in the map. A match takes 0.3 kB. Source: Kaess et al.,
+// "Square Root SAM", IJRR 2006; factors: docs/smoother.md.
 
 #include <atomic>
 #include <cstdint>
@@ -44,17 +43,17 @@
 
 namespace swiftlet {
 
-/// Text of the status of a solve that was stopped.
+/// Status text of a stopped solve.
 inline constexpr const char* kFullSmoothingStopped = "full smoothing was stopped";
 
 struct FullSmootherSettings {
-  double match_sigma = 1.2;          ///< px, of a loop's match, pixel noise included
+  double match_sigma = 1.2;          ///< px, of a match of a loop, including pixel noise
   std::size_t max_keyframes = 4000;  ///< 11 minutes at 6 a second
   std::size_t max_revisits = 4000;
   int max_iterations = 12;
 };
 
-/// Figures of a solve, for the summary. Costs are half sums of whitened squares, robust for sightings.
+/// Figures of a solve, for the summary. Costs are half sums of whitened squares, robust for observations.
 struct FullSmootherReport {
   int iterations = 0;
   double initial_cost = 0;  ///< at the odometry's states
@@ -62,8 +61,8 @@ struct FullSmootherReport {
   std::size_t keyframes = 0;
   std::size_t landmarks = 0;
   std::size_t revisits = 0;       ///< loops given
-  std::size_t revisits_used = 0;  ///< of them, those whose matches were used
-  std::size_t matches = 0;        ///< of the loops given, without repetitions and those that name nothing
+  std::size_t revisits_used = 0;  ///< of these, loops whose matches were used
+  std::size_t matches = 0;  ///< of the loops given, without repetitions and without those of unknown tracks
   std::size_t matches_used = 0;
 };
 
@@ -71,40 +70,40 @@ class FullSmoother {
  public:
   FullSmoother(const Rig& rig, const ImuNoise& noise, const FullSmootherSettings& settings);
 
-  /// Every sample, in order, before the frames that follow it.
+  /// Adds every sample, in order, before the frames that follow it.
   void addImu(const ImuSample& sample) { pending_imu_.push_back(sample); }
 
-  /// A keyframe with the odometry's state for it and the noise that it was estimated with, in order of time.
-  /// A new epoch starts a new, unconnected trajectory. kCapacityReached beyond max_keyframes.
+  /// Adds a keyframe with its state from the odometry and the noise used for it, in order of time. A new
+  /// epoch starts a new, unconnected trajectory. kCapacityReached beyond max_keyframes.
   Status addKeyframe(const TrackedFrame& frame, const NavState& state, const NoiseInUse& noise);
 
-  /// A verified loop between two keyframes added before. kInvalidInput when there is no keyframe at a stamp,
-  /// the old one is not the older, or the pose or its information is not usable; kCapacityReached beyond
-  /// max_revisits. Matches that name no track and no pixel are left out.
+  /// Adds a verified loop between two keyframes added before. kInvalidInput if there is no keyframe at a
+  /// stamp, the old one is not older, or the pose or its information is not usable; kCapacityReached beyond
+  /// max_revisits. Matches without track and pixel are left out.
   Status addRevisit(const LoopRevisit& revisit);
 
-  /// Initial poses in place of the odometry's, one for each keyframe, where the drift is large: those of a
-  /// pose graph. Epochs that loops tie are taken to share a world already. Velocities turn with their poses.
-  /// kInvalidInput when the number is not size() or a pose is not finite.
+  /// Replaces the initial poses, one per keyframe, by those of a pose graph, if the drift is large. Epochs
+  /// joined by loops must share a world already. Velocities rotate with their poses. kInvalidInput if the
+  /// number is not size() or a pose is not finite.
   Status setPoses(std::span<const SE3> T_world_body);
 
-  /// The calibration to solve with in place of the constructor's: the odometry's last estimate. After the
-  /// keyframes. The shift may differ from the constructor's by less than 0.1 s.
+  /// Replaces the constructor's calibration by the odometry's last estimate; call after the keyframes were
+  /// added. The time shift may differ from the constructor's by less than 0.1 s.
   void setCalibration(const CalibrationEstimate& calibration);
 
-  /// Minimizes over everything added so far. kNotReady below three keyframes; kNumerical when the
-  /// system cannot be factored (the states stay as they were). `stop` may be set by any thread meanwhile:
-  /// kFailed with kFullSmoothingStopped as its text within one factorization, and the states are of no use.
+  /// Minimizes over everything added so far. kNotReady below three keyframes. kNumerical if the system cannot
+  /// be factored; the states are then unchanged. Any thread may set `stop`: the solve then returns kFailed
+  /// with the text kFullSmoothingStopped within one factorization, and the states are not valid.
   Status solve(FullSmootherReport& report, const std::atomic<bool>* stop = nullptr);
 
-  /// Bytes that this and solve() take at the most, for what was added so far: what is kept, the system, and
-  /// its factor as large as in the keyframes' own order (the solver's is smaller).
+  /// Upper bound of the memory of this object and solve() for everything added so far [bytes]: stored data,
+  /// the system, and its factor in the keyframes' own order (the solver's is smaller).
   [[nodiscard]] std::size_t memoryNeeded() const;
 
   [[nodiscard]] std::size_t size() const { return keyframes_.size(); }
   /// State of keyframe k, with the image's stamp.
   [[nodiscard]] NavState state(std::size_t k) const;
-  /// The epoch in whose world keyframe k's state is: its own, or the earliest that loops tie it to.
+  /// The epoch in whose world the state of keyframe k is: its own, or the earliest joined to it by loops.
   [[nodiscard]] std::uint32_t world(std::size_t k) const { return worlds_.at(keyframes_[k].epoch); }
 
  private:
@@ -114,17 +113,17 @@ class FullSmoother {
     std::uint32_t epoch = 0;
     BodyState x;
     NoiseInUse noise;
-    bool linked = false;  ///< by IMU to the keyframe before
+    bool linked = false;  ///< by IMU to the previous keyframe
     std::vector<ImuSample> samples;
     Preintegration imu;
-    ScanTurn scan;  ///< of its rows
+    ScanTurn scan;  ///< rotation during the rows of its image
   };
   struct Track {
     std::vector<Sighting> sightings;
     LandmarkPoint point;
     bool in_system = false;
   };
-  /// A further sighting of a track, from a loop.
+  /// A further observation of a track, from a loop.
   struct Match {
     TrackKey track;
     Sighting sighting;
@@ -137,7 +136,7 @@ class FullSmoother {
     Matrix6d root_information;
     std::size_t first_match = 0;  // in matches_
     std::size_t match_count = 0;
-    std::size_t repeated = 0;  // matches that an earlier loop named
+    std::size_t repeated = 0;  // matches that are in an earlier loop
   };
   struct System;
   class Solver;

@@ -1,10 +1,10 @@
 #pragma once
-// The sparse system of full smoothing: internal to FullSmoother's sources.
+// The sparse system of full smoothing; internal to FullSmoother's sources.
 //
-// The lower triangle of the reduced normal equations, kStateDim columns a keyframe: for each keyframe a block
-// of its own and one with the keyframe before it, and a pose block for each pair that something ties. Which
-// pairs there are is said once (tie), before anything is added; contributions are summed as they come.
-// Memory: kKeyframeBytes a keyframe, kPairBytes a pair, values and indices of the matrix included.
+// The lower triangle of the reduced normal equations, kStateDim columns per keyframe: for each keyframe a
+// block of its own and one with the previous keyframe, and a pose block for each tied pair. All pairs must be
+// tied before anything is added; contributions are then summed. Memory: kKeyframeBytes per keyframe,
+// kPairBytes per pair, including values and indices of the matrix.
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
@@ -22,14 +22,14 @@
 namespace swiftlet {
 
 struct FullSmoother::System {
-  /// A block with its column, and its values and indices in the matrix and in the copy that is factored.
+  /// Memory of a block with its column, and its values and indices in the matrix and in the factored copy.
   static constexpr std::size_t kPairBytes = sizeof(PaddedBlock) + sizeof(std::uint32_t) + 2 * 36 * 12;
   static constexpr std::size_t kKeyframeBytes = 2 * (225 * 8 + 2 * 225 * 12) + 128;
 
   Eigen::VectorXd g;
-  LandmarkBlock landmark{kMaxStates};  ///< the one at hand
+  LandmarkBlock landmark{kMaxStates};  ///< scratch for the present landmark
 
-  /// Forgets all pairs but those of neighbours.
+  /// Forgets all pairs except those of neighbours.
   void start(std::size_t keyframes) {
     rows_.assign(keyframes, {});
     own_.resize(keyframes);
@@ -41,7 +41,7 @@ struct FullSmoother::System {
     laid_ = false;
   }
 
-  /// All pairs of these keyframes, which ascend.
+  /// Ties all pairs of these keyframes, which must ascend.
   void tie(std::span<const std::uint32_t> keyframes) {
     for (std::size_t i = 0; i < keyframes.size(); ++i) {
       std::vector<std::uint32_t>& columns = rows_[keyframes[i]].columns;
@@ -54,7 +54,7 @@ struct FullSmoother::System {
     laid_ = false;
   }
 
-  /// Zero, over all pairs tied so far.
+  /// Allocates and clears the system for all pairs tied so far.
   void clear() {
     if (!laid_) lay();
     g.setZero();
@@ -63,8 +63,8 @@ struct FullSmoother::System {
     std::ranges::fill(before_, Matrix15d::Zero());
   }
 
-  /// Of two keyframes that are tied, row not before column. Of a keyframe with itself the lower triangle
-  /// counts.
+  /// Block of two tied keyframes, row not before column. Of a keyframe's own block only the lower triangle is
+  /// used.
   PaddedBlock& poseBlock(std::size_t row, std::size_t column) {
     Row& r = rows_[row];
     const auto at = std::ranges::lower_bound(r.columns, static_cast<std::uint32_t>(column));
@@ -78,14 +78,14 @@ struct FullSmoother::System {
       }
     }
   }
-  /// Of a keyframe with itself, and rows of it with columns of the one before.
+  /// The keyframe's own block, and that of its rows with the columns of the previous keyframe.
   Matrix15d& own(std::size_t keyframe) { return own_[keyframe]; }
   Matrix15d& before(std::size_t keyframe) { return before_[keyframe]; }
 
-  /// True once after lay: the pattern is another than before.
+  /// True once after lay() if the pattern changed.
   [[nodiscard]] bool takeNewPattern() { return std::exchange(new_pattern_, false); }
 
-  /// With the diagonal times 1 + damping.
+  /// The matrix with its diagonal multiplied by 1 + damping.
   [[nodiscard]] const Eigen::SparseMatrix<double>& matrix(double damping) {
     double* value = H_.valuePtr();
     for (std::size_t k = 0; k < rows_.size(); ++k) {
@@ -115,7 +115,7 @@ struct FullSmoother::System {
 
  private:
   struct Row {
-    std::vector<std::uint32_t> columns;  ///< ascending; the last two are the keyframe before and its own
+    std::vector<std::uint32_t> columns;  ///< ascending; the last two are the previous keyframe and its own
     std::vector<PaddedBlock> blocks;
   };
   struct Far {
@@ -127,7 +127,7 @@ struct FullSmoother::System {
     return block(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
   }
 
-  // Memory for all pairs, and the matrix's pattern.
+  // Memory for all pairs, and the pattern of the matrix.
   void lay() {
     const std::size_t n = rows_.size();
     far_.assign(n, {});

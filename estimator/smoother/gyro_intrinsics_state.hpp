@@ -1,10 +1,9 @@
 #pragma once
-// Scale and misalignment of the gyro as the window holds them: zero, or with columns of their own and
-// estimated.
+// Scale and misalignment of the gyro in the window: zero, or estimated with columns of their own.
 //
-// Nine columns, the matrix by columns, behind those of the cameras' calibration. The prior's reference is the
-// value of `hold`. Turns that do not excite an entry leave it at the prior, and the covariance includes what
-// it may be off. While the matrix is held, it adds nothing to the covariance.
+// Nine columns, the matrix by columns, after those of the cameras' calibration. The reference of the prior is
+// the value at `hold`. Entries that no rotation excites stay at the prior, and the covariance includes their
+// uncertainty. While the matrix is held, it adds nothing to the covariance.
 
 #include <Eigen/Core>
 
@@ -23,14 +22,14 @@ class GyroIntrinsicsState {
   GyroIntrinsicsState(bool estimated, int offset) : estimated_(estimated), offset_(offset) {}
 
   [[nodiscard]] bool estimated() const { return estimated_; }
-  /// Active: motion moves the matrix, where it is estimated. Else it is held.
+  /// Active: the matrix is estimated from the motion, if enabled. Otherwise it is held.
   void setActive(bool active) { active_ = active; }
   [[nodiscard]] bool active() const { return estimated_ && active_; }
   [[nodiscard]] int offset() const { return offset_; }
   [[nodiscard]] int dimension() const { return estimated_ ? kGyroMatrixDim : 0; }
   [[nodiscard]] const GyroIntrinsics& now() const { return now_; }
 
-  /// The value of now becomes the reference, and H, of a new prior, gets what is known beforehand.
+  /// Makes the present value the reference, and adds the prior information to H of a new prior.
   void hold(MatrixMap H) {
     reference_ = now_;
     for (int k = 0; k < dimension(); ++k) {
@@ -39,7 +38,7 @@ class GyroIntrinsicsState {
   }
   /// Value minus reference.
   [[nodiscard]] Vector deviation() const { return (now_.matrix - reference_.matrix).reshaped(); }
-  /// By its columns of a system's step.
+  /// Applies its columns of a step.
   void retract(const Eigen::Ref<const Eigen::VectorXd>& step) {
     if (estimated_) now_.matrix.reshaped() += step.segment<kGyroMatrixDim>(offset_);
   }

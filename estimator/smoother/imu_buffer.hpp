@@ -1,8 +1,8 @@
 #pragma once
-// The raw IMU samples of the window, kept so that increments can be integrated again: after a bias
-// moved, or over two intervals when the state between them leaves. Contiguous in time (a sliding
-// array, compacted when its end is reached). Full is normal: the oldest samples go first.
-// Memory: twice `capacity` samples of 56 bytes, reserved by the constructor.
+// The raw IMU samples of the window, kept so that increments can be integrated again after a bias changed, or
+// over two intervals if the state between them leaves. Contiguous in time (a sliding array, compacted when
+// its end is reached). Full is normal: the oldest samples are dropped first. Memory: twice `capacity` samples
+// of 56 bytes, reserved by the constructor.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -20,7 +20,7 @@ class ImuBuffer {
 
   void clear() { begin_ = end_ = 0; }
   [[nodiscard]] bool empty() const { return begin_ == end_; }
-  /// Not on an empty buffer.
+  /// The buffer must not be empty.
   [[nodiscard]] const ImuSample& newest() const { return samples_[end_ - 1]; }
 
   /// Appends; the stamp must be later than the newest's. Amortized O(1).
@@ -35,8 +35,8 @@ class ImuBuffer {
     begin_ = std::max(begin_, end_ > capacity_ ? end_ - capacity_ : 0);
   }
 
-  /// The samples needed to integrate over [from, to]: those inside and one neighbour on each side,
-  /// where they are still kept; empty without any. Valid until the next push. O(log size).
+  /// The samples needed to integrate over [from, to]: those inside and one neighbour on each side, if they
+  /// are still kept. Valid until the next push. O(log size).
   [[nodiscard]] std::span<const ImuSample> around(Stamp from, Stamp to) const {
     const auto first = samples_.begin() + static_cast<std::ptrdiff_t>(begin_);
     const auto last = samples_.begin() + static_cast<std::ptrdiff_t>(end_);
@@ -48,7 +48,8 @@ class ImuBuffer {
     return {&*low, static_cast<std::size_t>(high - low)};
   }
 
-  /// Of the rows of an image whose middle one was read at `middle`, as far as samples go; none without them.
+  /// Rotation during the rows of an image whose middle row was read at `middle`, as far as samples are
+  /// available; zero without samples.
   [[nodiscard]] ScanTurn scanTurnAt(Stamp middle, Duration readout, const Eigen::Vector3d& bias_gyro,
                                     const GyroIntrinsics& intrinsics) const {
     if (empty() || readout.ns == 0) return {};

@@ -1,11 +1,12 @@
 #pragma once
-// By how much the gyro and the accelerometer of a flight err more than their noise model says.
+// Estimates the factor by which the errors of gyro and accelerometer exceed their noise model in a flight.
 //
-// Vibration, g-sensitivity, scale and misalignment are in no data sheet's noise density; weighted as if they
-// were not there, they pull the estimate from the images. How large they are shows in what IMU and images
-// disagree by after smoothing (motionResiduals). Smoothing takes its part: with a noise f times as told, a
-// share f^2 / (f^2 + kImages) of a link's mean square is left, kImages being what the images leave open of
-// it, in variances of the noise as told. The factor only raises the noise, as a low pass. O(1), no memory.
+// Vibration, g-sensitivity, scale and misalignment are not in the noise densities of data sheets; if they are
+// ignored, they pull the estimate away from the images. Their size follows from the disagreement of IMU and
+// images after smoothing (motionResiduals). Smoothing absorbs a part: with noise f times the configured one,
+// a share f^2 / (f^2 + kImages) of a link's mean square remains. kImages is the variance that the images
+// leave undetermined, in units of the configured noise variance. The factor only raises the noise, as a low
+// pass. O(1), no memory.
 
 #include <algorithm>
 #include <cmath>
@@ -17,8 +18,8 @@ namespace swiftlet {
 /// Mean squares of a whitened coordinate.
 struct MotionResiduals {
   double all = 0;    ///< in the noise in use, rest included
-  double gyro = 0;   ///< of rotations over the last seconds in the noise as told; 0 while there are too few
-  double accel = 0;  ///< of velocities, likewise
+  double gyro = 0;   ///< of rotations over the last seconds, configured noise; 0 while there are too few
+  double accel = 0;  ///< of velocities over the last seconds, in the configured noise
 };
 
 class ImuExcess {
@@ -36,7 +37,7 @@ class ImuExcess {
  private:
   static void update(double mean_square, double seconds, double& factor) {
     constexpr double kAverageTime = 2.0;  // s
-    constexpr double kImages = 3.0;  // a quarter is left at f = 1; 0.12 to 0.19 of noise as told were seen
+    constexpr double kImages = 3.0;       // a quarter remains at f = 1; 0.12 to 0.19 measured at f = 1
     const double square = factor * factor;
     const double now = std::clamp(mean_square * (1 + kImages / square), 1.0, kMostRaised * kMostRaised);
     factor = std::sqrt(square + (1 - std::exp(-seconds / kAverageTime)) * (now - square));

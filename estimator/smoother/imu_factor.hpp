@@ -1,13 +1,15 @@
 #pragma once
 // The factors between two consecutive states with motion.
 //
-// Residual, 15 x 1, order phi, p, v, bg, ba, whitened (unit covariance when the model holds):
-//  - imuFactor: preintegrated increments against the states (Forster et al., T-RO 2017, eq. 45), p and
-//    v in the axes of body i, and the random walk of the biases.
-//  - constantVelocityFactor: for an interval with a gap in the samples; p and v in world axes, loosely.
-// Jacobians, 15 x 15, by the error states of i and j, are taken at the `linearization` states, the
-// residual at the current ones. Gravity in world axes is (0, 0, -noise.gravity).
-// Cost: about 3 us each; nothing is allocated.
+// Residual, 15 x 1, order phi, p, v, bg, ba, whitened (unit covariance if the model holds):
+//  - imuFactor: preintegrated increments against the states (Forster et al., T-RO 2017, eq. 45), p and v in
+//  the
+//    axes of body i, and the random walk of the biases.
+//  - constantVelocityFactor: for an interval with a gap in the samples; p and v in world axes, with large
+//  sigma.
+// Jacobians, 15 x 15, with respect to the error states of i and j, are taken at the `linearization` states,
+// the residual at the current ones. Gravity in world axes is (0, 0, -noise.gravity). Cost: about 3 us each;
+// no allocation.
 
 #include <Eigen/Core>
 
@@ -22,12 +24,12 @@ struct MotionFactor {
   Vector15d residual;
   Eigen::Matrix<double, 15, 15> jacobian_i;
   Eigen::Matrix<double, 15, 15> jacobian_j;
-  /// By the gyro's matrix, of the first nine rows; only where it is estimated.
+  /// Jacobian of the first nine rows with respect to the gyro's matrix; only if that is estimated.
   Eigen::Matrix<double, 9, kGyroMatrixDim> jacobian_gyro_matrix;
   bool with_gyro = false;
 };
 
-/// False when the covariance is not positive definite (an interval without duration).
+/// False if the covariance is not positive definite (an interval without duration).
 [[nodiscard]] bool imuFactor(const Preintegration& imu, const ImuNoise& noise, const BodyState& x_i,
                              const BodyState& x_j, const BodyState& linearization_i,
                              const BodyState& linearization_j, MotionFactor& factor,
