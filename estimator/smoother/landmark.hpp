@@ -1,17 +1,16 @@
 #pragma once
-// A landmark of the window: where it was seen, and its point as last triangulated.
+// A landmark of the window: its observations, and its point as last triangulated.
 //
-// The point is held as p = reference + bearing / inverse_depth with a constant reference (a camera
-// centre of the past), so that points at infinity are ordinary (inverse_depth = 0) and no state is
-// its anchor. In camera i its homogeneous ray is
+// The point is stored as p = reference + bearing / inverse_depth with a constant reference (a former camera
+// centre), so that points at infinity are regular (inverse_depth = 0) and no state is its anchor. In camera i
+// its homogeneous ray is
 //   h = R_cam_world (bearing + inverse_depth (reference - center_i)),
-// and the residual of a sighting with measured unit bearing m is
+// and the residual of an observation with measured unit bearing m is
 //   r = W h / (m . h),   W = d pixel / d ray at m, divided by the pixel noise   (2 x 3, W m = 0):
-// the reprojection error in units of sigma, to first order in the error, for any lens, also beyond
-// 90 degrees, without evaluating the lens model in the solver. With a rolling shutter m and W are
-// turned to the axes of the image's middle row (RowMotion), and center_i is where the camera was at the
-// sighting's own row.
-// Memory: 2.3 kB a landmark of the window. Equations and Jacobians: docs/smoother.md.
+// the reprojection error in units of sigma, to first order in the error, for any lens, also beyond 90
+// degrees, without evaluating the lens model in the solver. With a rolling shutter m and W are rotated to the
+// axes of the image's middle row (RowMotion), and center_i is the camera's position at the row of the
+// observation. Memory: 2.3 kB per landmark of the window. Equations and Jacobians: docs/smoother.md.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -27,13 +26,13 @@
 
 namespace swiftlet {
 
-/// In single precision, which places a ray to 1e-4 px: half the memory that a solve reads.
+/// In single precision, accurate to 1e-4 px, which halves the memory that a solve reads.
 struct CameraSighting {
   bool used = false;
   Eigen::Vector3f bearing = Eigen::Vector3f::Zero();  ///< m, unit, camera frame
-  /// W, 1 / (unit ray): pixels per ray over the pixel noise.
+  /// W, 1 / (unit ray): pixels per unit of ray, divided by the pixel noise.
   Eigen::Matrix<float, 2, 3> weight = Eigen::Matrix<float, 2, 3>::Zero();
-  float row = 0;  ///< that saw it: from -0.5, the first, to 0.5, the last
+  float row = 0;  ///< row of the image, from -0.5 (first) to 0.5 (last)
 
   static CameraSighting of(const Eigen::Vector3d& ray, const Matrix23d& whitening) {
     return {true, ray.cast<float>(), whitening.cast<float>()};
@@ -42,7 +41,7 @@ struct CameraSighting {
   [[nodiscard]] Matrix23d whitening() const { return weight.cast<double>(); }
 };
 
-/// What one state saw of a landmark.
+/// Observation of a landmark by one state.
 struct Sighting {
   std::uint32_t slot = 0;  ///< of the state (fixed lag), or index of the keyframe (full smoothing)
   std::array<CameraSighting, kMaxCameras> camera;
@@ -50,7 +49,7 @@ struct Sighting {
   [[nodiscard]] bool any() const { return camera[0].used || camera[1].used; }
 };
 
-/// Where a landmark is, as last triangulated.
+/// Position of a landmark, as last triangulated.
 struct LandmarkPoint {
   bool triangulated = false;
   Eigen::Vector3d reference = Eigen::Vector3d::Zero();  ///< m, world
@@ -58,7 +57,7 @@ struct LandmarkPoint {
   double inverse_depth = 0;                             ///< 1/m, >= 0
   double inverse_depth_sigma = 0;                       ///< 1/m
 
-  /// m, world. Not for a point at infinity (inverse_depth = 0).
+  /// Position [m, world]. Not for a point at infinity (inverse_depth = 0).
   [[nodiscard]] Eigen::Vector3d position() const { return reference + bearing / inverse_depth; }
 };
 
@@ -67,10 +66,10 @@ struct Landmark {
   TrackId id = 0;
   std::uint64_t last_frame = 0;  ///< index of the newest frame that saw it
   int frames_seen = 0;
-  int rejections = 0;             ///< solves in which it did not fit
-  bool in_system = false;         ///< takes part in the solve at hand
+  int rejections = 0;             ///< number of solves in which it did not fit
+  bool in_system = false;         ///< takes part in the present solve
   double mean_square = 0;         ///< of its whitened residuals after the last solve
-  std::uint8_t extra = kNoExtra;  ///< index of its own state; none: structureless
+  std::uint8_t extra = kNoExtra;  ///< index of its extra state; kNoExtra: structureless
   LandmarkPoint point;
   FixedVector<Sighting, kMaxStates> sightings;
 
@@ -78,7 +77,7 @@ struct Landmark {
   [[nodiscard]] bool seenFrom(std::uint32_t slot) const {
     return std::ranges::find(sightings, slot, &Sighting::slot) != sightings.end();
   }
-  /// Sightings, each camera counted.
+  /// Number of observations, each camera counted.
   [[nodiscard]] int viewCount() const {
     int count = 0;
     for (const Sighting& s : sightings) count += int{s.camera[0].used} + int{s.camera[1].used};

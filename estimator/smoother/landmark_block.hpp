@@ -1,6 +1,6 @@
 #pragma once
-// One landmark linearized at the states that see it, and its point eliminated: for the fixed lag, full
-// smoothing and landmarks on planes. The start with one camera (mono_start.cpp) has its own.
+// Linearizes a landmark at the states that see it and eliminates its point: for the fixed lag, full smoothing
+// and landmarks on planes. The start with one camera (mono_start.cpp) has its own code.
 //
 // For state i with Jacobians J_i (pose), P_i (point) and K_i (calibration) of all its views, whitened and
 // weighted, and residuals r_i:
@@ -8,13 +8,13 @@
 //   L^T;   with calibration K = sum K_i^T K_i,  B_k = sum K_i^T P_i,  a_k = sum K_i^T r_i,  A_ik = J_i^T K_i.
 // Eliminating the point leaves, with Y = B L^-T and z = L^-1 c,
 //   A_i - Y_i Y_i^T at state i,  -Y_i Y_j^T between states,  a_i - Y_i z in the gradient,
-// and the same with k in the place of i. The pairs are left to whoever owns their blocks (PairProduct).
-// The point is either a bearing with inverse depth (landmark.hpp) or, for one that keeps its columns, a
-// position. Residuals and robust weights are taken at the current poses, Jacobians at the linearization's.
+// and the same with k instead of i. The owner of the pair blocks computes the pairs (PairProduct).
+// The point is a bearing with inverse depth (landmark.hpp) or, for an explicit landmark, a position.
+// Residuals and robust weights are taken at the current poses, Jacobians at those of the linearization.
 // Frames and Jacobians: vision_factor.hpp. Four states at a time, in vector lanes (view_lanes.hpp); the
-// scalar twin is in tests/smoother/scalar_landmark.hpp. Memory: 1.1 kB a sighting (2.4 kB with calibration),
-// reserved by the constructor. Cost: linear in the views. Source: Triggs et al., "Bundle Adjustment - A
-// Modern Synthesis", 1999, section 6.
+// scalar version is in tests/smoother/scalar_landmark.hpp. Memory: 1.1 kB per observation (2.4 kB with
+// calibration), reserved by the constructor. Cost: linear in the views. Source: Triggs et al., "Bundle
+// Adjustment - A Modern Synthesis", 1999, section 6.
 
 #include <Eigen/Core>
 #include <array>
@@ -39,34 +39,34 @@ class LandmarkBlock {
   using CalibrationPoint = Eigen::Matrix<double, kMaxCalibrationDim, 3>;
   using PoseCalibration = Eigen::Matrix<double, kPoseDim, kMaxCalibrationDim>;
 
-  /// A state that saw it, in the order of the sightings: A, B, a, or what elimination makes of them.
+  /// A state that observed it, in the order of the observations: A, B, a, or their values after elimination.
   struct State {
     std::uint32_t slot = 0;
     PaddedBlock information;                        ///< lower triangle
     alignas(32) double point[3][kPaddedRows] = {};  ///< B or Y, by columns
     alignas(32) double gradient[kPaddedRows] = {};
   };
-  /// The calibration's: K, B_k, a_k, or what elimination makes of them. Columns as in the layout.
+  /// Of the calibration: K, B_k, a_k, or their values after elimination. Columns as in the layout.
   struct Calibration {
     CalibrationMatrix information = CalibrationMatrix::Zero();
     CalibrationPoint point = CalibrationPoint::Zero();
     CalibrationVector gradient = CalibrationVector::Zero();
   };
 
-  /// More sightings than that ask the heap for room.
+  /// More observations than this allocate memory.
   explicit LandmarkBlock(std::size_t max_sightings);
 
-  /// Of a landmark without columns of its own.
+  /// Linearizes a landmark without columns of its own.
   void linearize(const LandmarkViews& views, const LandmarkPoint& point);
-  /// Of a landmark with columns of its own: by its position, world, m. `linearization`: where Jacobians are
-  /// taken.
+  /// Linearizes an explicit landmark with respect to its position (world, m). `linearization`: the point at
+  /// which Jacobians are taken.
   void linearize(const LandmarkViews& views, const Eigen::Vector3d& position,
                  const Eigen::Vector3d& linearization);
 
-  /// After linearize(). False when fewer than two states have the point in front of a camera or its
-  /// information is singular: there is nothing to add then.
+  /// After linearize(). False if fewer than two states have the point in front of a camera or its information
+  /// is singular; there is then nothing to add.
   [[nodiscard]] bool eliminate();
-  /// In place of eliminate(), for a landmark with columns of its own.
+  /// Instead of eliminate(), for an explicit landmark.
   void keepPoint();
 
   [[nodiscard]] std::span<const State> states() const { return {states_.data(), states_.size()}; }
@@ -87,29 +87,29 @@ class LandmarkBlock {
     Eigen::Matrix3d R_body_cam;
     Eigen::Vector3d center;  // body
   };
-  /// Where the point is, and what its three columns are.
+  /// The point and the meaning of its three columns.
   struct At {
     LandmarkPoint now;
     LandmarkPoint linearization;
     PointBasis basis;
     bool position = false;
   };
-  /// Four states.
+  /// Blocks of four states.
   struct PoseGroup {
     lanes::V information[kPoseDim * (kPoseDim + 1) / 2]{};  // lower triangle by columns
     lanes::V point[kPoseDim][3]{};
     lanes::V gradient[kPoseDim]{};
     lanes::Mask valid{};  // in front of a camera of this state
   };
-  /// Of four states and one camera.
+  /// Blocks of four states and one camera.
   using CrossGroup = std::array<std::array<lanes::V, kViewCalibrationDim>, kPoseDim>;
-  /// Of one camera.
+  /// Blocks of one camera.
   struct CalibrationSums {
     lanes::V information[kViewCalibrationDim][kViewCalibrationDim]{};  // lower triangle by columns
     lanes::V point[kViewCalibrationDim][3]{};
     lanes::V gradient[kViewCalibrationDim]{};
   };
-  /// One row of four views: Jacobian and residual, not weighted yet, and the weight.
+  /// One row of four views: unweighted Jacobian and residual, and the weight.
   struct Row {
     lanes::V pose[kPoseDim];
     lanes::V point[3];
@@ -139,13 +139,13 @@ class LandmarkBlock {
   std::vector<State> states_;
   std::vector<std::array<CrossGroup, kMaxCameras>> cross_groups_;
   std::array<CalibrationSums, kMaxCameras> calibration_sums_;
-  lanes::V rates_[6];  // angular rate (body) and velocity (world) of the four states at hand
-  lanes::V rows_{};    // of the views in hand (CameraSighting::row)
+  lanes::V rates_[6];  // angular rate (body) and velocity (world) of the present four states
+  lanes::V rows_{};    // of the present views (CameraSighting::row)
   Calibration calibration_;
   std::vector<PoseCalibration> cross_;
 };
 
-/// -Y_i Y_j^T for one state i and others: its columns stay in registers.
+/// -Y_i Y_j^T for one state i and others; the columns of i stay in registers.
 class PairProduct {
  public:
   explicit PairProduct(const LandmarkBlock::State& i) {

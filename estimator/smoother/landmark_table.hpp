@@ -1,11 +1,11 @@
 #pragma once
 // The landmarks of the window: storage, search by id, admission and removal.
 //
-// Each has a place that it keeps until it is removed; a new one gets the lowest free place, and iteration
-// runs in the order of places, so that sums do not depend on how landmarks came and went. Full is normal
-// (kMaxLandmarks): the landmark lost longest ago makes room; those with columns of their own leave in their
-// own way (extra_table.hpp). Memory: 2.1 MiB, reserved by the constructor. Cost: a search is logarithmic;
-// adding one with an id above all others is O(1) until the table is full.
+// A landmark keeps its index until it is removed; a new one gets the lowest free index, and iteration is in
+// the order of indices, so that sums do not depend on the history. Full is normal (kMaxLandmarks): the
+// landmark lost longest ago is removed; explicit landmarks leave by other rules (extra_table.hpp).
+// Memory: 2.1 MiB, reserved by the constructor. Cost: a search is logarithmic; adding one with an id above
+// all others is O(1) until the table is full.
 
 #include <array>
 #include <bit>
@@ -39,13 +39,13 @@ class LandmarkTable {
   LandmarkTable() : landmarks_(kMaxLandmarks) {}
 
   void clear();
-  /// Null when there is none.
+  /// Null if there is none.
   [[nodiscard]] Landmark* find(TrackId id);
   [[nodiscard]] const Landmark* find(TrackId id) const { return const_cast<LandmarkTable*>(this)->find(id); }
-  /// An empty one; `id` must be new.
+  /// Adds an empty landmark; `id` must be new.
   Landmark& add(TrackId id);
   void remove(Landmark& landmark);
-  /// A state has left: its sightings go, and landmarks without any, but those with columns of their own.
+  /// Removes the observations of a state that left, and landmarks without observations, except explicit ones.
   void removeSightingsOf(std::uint32_t slot);
 
   [[nodiscard]] std::size_t indexOf(const Landmark& landmark) const {
@@ -54,7 +54,7 @@ class LandmarkTable {
   Landmark& operator[](std::size_t index) { return landmarks_[index]; }
   const Landmark& operator[](std::size_t index) const { return landmarks_[index]; }
 
-  /// The one at hand may be removed on the way.
+  /// The present landmark may be removed during the iteration.
   [[nodiscard]] auto begin() { return Iterator<LandmarkTable, Landmark>(*this, usedFrom(0)); }
   [[nodiscard]] auto end() { return Iterator<LandmarkTable, Landmark>(*this, kMaxLandmarks); }
   [[nodiscard]] auto begin() const {

@@ -1,10 +1,10 @@
 #pragma once
-// One small factor, linearized: what the normal equations need of it, whatever its variables are.
+// A small linearized factor over any variables, in the form that the normal equations need.
 //
-// Shapes: `jacobian` has up to kMaxRows rows and a column for each of `columns` columns of the system, which
-// `column` names; `residual` as many rows. Both whitened and multiplied by the root of the robust weight;
-// rows beyond the factor's own are zero. `cost` is half the (robust) square.
-// Memory: 1.3 kB, on the stack. Cost of adding it to a system: quadratic in its columns.
+// Shapes: `jacobian` has up to kMaxRows rows and `columns` columns, whose columns in the system are in
+// `column`; `residual` has as many rows. Both are whitened and multiplied by the root of the robust weight;
+// unused rows are zero. `cost` is half the (robust) square. Memory: 1.3 kB, on the stack. Cost of adding it
+// to a system: quadratic in its columns.
 
 #include <Eigen/Core>
 #include <array>
@@ -17,7 +17,7 @@ namespace swiftlet {
 
 struct LinearFactor {
   static constexpr int kMaxRows = 3;
-  /// Calibration and two whole states.
+  /// Enough for calibration and two whole states.
   static constexpr int kMaxColumns = kMaxCalibrationDim + 2 * kStateDim;
 
   int columns = 0;
@@ -26,7 +26,7 @@ struct LinearFactor {
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();
   double cost = 0;
 
-  /// Appends a variable: its columns in the system start at `offset`. At most kMaxColumns in all.
+  /// Appends a variable whose columns in the system start at `offset`. At most kMaxColumns in total.
   template <typename Derived>
   void addVariable(int offset, const Eigen::MatrixBase<Derived>& J) {
     assert(columns + J.cols() <= kMaxColumns);

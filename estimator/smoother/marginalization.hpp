@@ -1,9 +1,9 @@
 #pragma once
-// What leaves the window goes into the prior: columns of one state, and explicit landmarks and planes.
+// Marginalizes columns of one state, and explicit landmarks and planes, into the prior.
 //
-// The factors that touch what leaves are linearized once more, with first estimates of everything that they
-// touch frozen, expanded at these, and the leaving columns eliminated (elimination.hpp). Equations:
-// docs/smoother.md. Memory: 0.1 MiB, reserved by the constructor. Cost: cubic in the columns touched.
+// The factors of leaving columns are linearized once more at the first estimates of all their variables,
+// which are then frozen, and the leaving columns are eliminated (elimination.hpp). Equations:
+// docs/smoother.md. Memory: 0.1 MiB, reserved by the constructor. Cost: cubic in the columns involved.
 
 #include <array>
 #include <cstdint>
@@ -14,22 +14,22 @@
 
 namespace swiftlet {
 
-/// What goes into the prior at a time: columns [first, first + count) of the state at `position`, and the
-/// extra states marked as leaving.
+/// One marginalization: columns [first, first + count) of the state at `position`, and the extra states
+/// marked as leaving.
 struct Departure {
   std::size_t position = 0;
   int first = 0;
-  int count = 0;                    ///< zero: extra states alone
-  bool with_motion_factor = false;  ///< to the next state
-  bool with_landmarks = false;      ///< that no recent frame sees, and its sightings of explicit ones
+  int count = 0;                    ///< zero: only extra states
+  bool with_motion_factor = false;  ///< with the motion factor to the next state
+  bool with_landmarks = false;      ///< that no recent frame sees, and its observations of explicit ones
 };
 
 class Marginalization {
  public:
   Marginalization();
 
-  /// The state itself, and what it saw that did not leave, is removed by the caller; landmarks that left, and
-  /// leaving extra states, are gone afterwards. Overwrites the system.
+  /// Removes the landmarks and extra states that left. The caller removes the state itself and its
+  /// observations of landmarks that did not leave. Overwrites the system.
   void marginalize(WindowProblem& problem, NormalEquations& system, const Departure& departure);
 
  private:
@@ -44,7 +44,7 @@ class Marginalization {
   [[nodiscard]] bool leaves(const WindowProblem& problem, const Landmark& landmark) const;
 
   std::uint8_t slot_ = kNoSlot;          // of the state that loses columns
-  std::uint8_t landmarks_of_ = kNoSlot;  // the same where its landmarks go too
+  std::uint8_t landmarks_of_ = kNoSlot;  // the same, if its landmarks leave too
   std::array<bool, kMaxStates + kMaxExtraStates> involved_{};
   std::vector<double> work_;
 };

@@ -1,13 +1,13 @@
 #pragma once
 // The reduced normal equations of one Gauss-Newton step: H d = -g over calibration, extra states and body
-// states, with every structureless landmark already eliminated.
+// states, with all structureless landmarks eliminated.
 //
-// Landmarks enter as Schur complements over 6 x 6 pose blocks (padded to 8 rows so that a column is
-// two vector registers), which are scattered into the dense matrix once at the end.
-// Shapes: H is n x n, g is n x 1, n = dimension() <= kMaxSystemDim; of H the lower triangle counts.
-// Columns are the error states of state.hpp and extra_states.hpp. Jacobians at the linearization, residuals
-// at the values. Memory: about 2.9 MiB, reserved by the constructor. Cost of a landmark: linear in its
-// sightings to linearize, quadratic in the states that see it to eliminate; both in vector lanes
+// Landmarks enter as Schur complements over 6 x 6 pose blocks (padded to 8 rows, so that a column fills two
+// vector registers), which are scattered into the dense matrix once at the end.
+// Shapes: H is n x n, g is n x 1, n = dimension() <= kMaxSystemDim; only the lower triangle of H is used.
+// Columns are the error states of state.hpp and extra_states.hpp. Jacobians are taken at the linearization,
+// residuals at the values. Memory: about 2.9 MiB, reserved by the constructor. Cost of a landmark: linear in
+// its observations to linearize, quadratic in the states that see it to eliminate; both in vector lanes
 // (landmark_block.hpp). Source: Triggs et al., "Bundle Adjustment - A Modern Synthesis", 1999, section 6.
 
 #include <Eigen/Core>
@@ -33,42 +33,41 @@ class NormalEquations {
   NormalEquations();
   ~NormalEquations();
 
-  /// Starts a system: calibration first, then whatever has an `offset`.
+  /// Starts a system: calibration first, then all variables with an `offset`.
   void begin(const CalibrationLayout& calibration, int dimension);
 
   [[nodiscard]] int dimension() const { return dimension_; }
-  /// Of the factors added so far: half the sum of whitened squares, robust for sightings. Not the prior's.
+  /// Cost of the factors added so far, without the prior: half the sum of whitened squares, robust for
+  /// observations.
   [[nodiscard]] double cost() const { return cost_; }
   MatrixMap H();
   VectorMap g();
-  /// Gives the matrix's memory away, for other memory of alignedMapSize(kMaxSystemDim): until begin()
-  /// there is no H. A factor is kept in this way without being copied.
+  /// Exchanges the memory of the matrix for other memory of alignedMapSize(kMaxSystemDim), to keep a factor
+  /// without copying it. There is no H until begin().
   void swapMatrix(std::vector<double>& memory) { h_.swap(memory); }
 
-  /// Both states have all 15 columns; those of the intrinsics, where the factor has any, are from
-  /// `gyro_offset` on.
+  /// Both states have all 15 columns. Those of the intrinsics, if the factor has any, start at `gyro_offset`.
   void addMotion(const MotionFactor& factor, const WindowState& i, const WindowState& j, int gyro_offset = 0);
 
-  /// Information 1 / sigma^2 on three columns of one state, from `first` on: `residual` is their value
-  /// minus its reference, in their unit, as is `sigma`.
+  /// Information 1 / sigma^2 on three columns of one state, from `first` on. `residual` is their value minus
+  /// its reference; `residual` and `sigma` have the unit of the columns.
   void addDiagonal(const WindowState& state, int first, const Eigen::Vector3d& residual, double sigma);
 
-  /// Any small factor, over any variables, each column at most once.
+  /// A small factor over any variables, each column at most once.
   void addFactor(const LinearFactor& factor);
 
-  /// Eliminates a landmark; `eliminated`, unless null, gets what its back-substitution needs. False when
-  /// it does not constrain anything (fewer than two states, or not in front of a camera at the
-  /// linearization point).
+  /// Eliminates a landmark; `eliminated`, unless null, receives the data for its back-substitution. False if
+  /// it constrains nothing (fewer than two states, or not in front of a camera at the linearization point).
   bool addLandmark(const LandmarkViews& views, const LandmarkPoint& point,
                    const std::array<WindowState, kMaxStates>& states, EliminatedPoint* eliminated = nullptr);
 
-  /// Views of a landmark that has columns of its own, from `offset` on: by its position, with Jacobians at
-  /// `linearization` (m, world).
+  /// Adds the views of an explicit landmark with columns from `offset` on, with respect to its position;
+  /// Jacobians at `linearization` (m, world).
   void addExplicitLandmark(const LandmarkViews& views, const Eigen::Vector3d& position,
                            const Eigen::Vector3d& linearization, int offset,
                            const std::array<WindowState, kMaxStates>& states);
 
-  /// Scatters the pose blocks; call once after all factors. Fills the lower triangle of H.
+  /// Scatters the pose blocks into the lower triangle of H; call once after all factors.
   void finish(const std::array<WindowState, kMaxStates>& states);
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// A 6 x 6 block of the normal equations by columns, padded to two vectors a column.
+// A 6 x 6 block of the normal equations, by columns, padded to two vectors per column.
 
 #include <cstddef>
 

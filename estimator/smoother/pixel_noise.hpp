@@ -1,12 +1,12 @@
 #pragma once
-// The pixel noise of a run's tracks, from their own residuals.
+// Estimates the pixel noise of the tracks from their residuals.
 //
-// A rolling shutter, stamps that jitter or a poor calibration add errors to every track that no gate removes.
-// Weighted as if they were noise of the size assumed, they outweigh the IMU and the estimate follows them.
-// Median of the squared residuals of a frame's sightings, outliers included, low pass. It begins with the
-// noise that the settings give and stays between kLeast and kMostRaised times of it: errors that last
-// (track_correlation.hpp) hide in the fit, so that residuals alone do not bound them from below.
-// O(1), no memory.
+// A rolling shutter, jitter of stamps or a poor calibration add errors to every track that no gate removes.
+// With the weights of the assumed noise they would outweigh the IMU, and the estimate would follow them. The
+// noise is the median of the squared residuals of a frame's observations, outliers included, low pass. It
+// starts at the configured noise and stays between kLeast and kMostRaised times that value, because
+// correlated errors (track_correlation.hpp) are hidden in the fit and residuals alone would underestimate
+// them. O(1), no memory.
 
 #include <algorithm>
 #include <cmath>
@@ -15,21 +15,22 @@ namespace swiftlet {
 
 class PixelNoise {
  public:
-  /// From 0.45 px, the default: 6.75 px, as motion blur makes it.
+  /// 6.75 px for the default of 0.45 px, as caused by motion blur.
   static constexpr double kMostRaised = 15.0;
-  /// From 0.45 px 0.25 px: by so much and up to 0.29 px are tracks of rendered flights off the truth.
+  /// 0.25 px for the default of 0.45 px. The errors of tracks in rendered flights are 0.25 to 0.29 px.
   static constexpr double kLeast = 1 / 1.8;
-  /// Fewer sightings of a frame say nothing.
+  /// Least number of observations of a frame for an update.
   static constexpr int kFewestSightings = 20;
 
   explicit PixelNoise(double sigma) : usual_(sigma), square_(sigma * sigma) {}
 
-  /// px, 1 sigma of a coordinate.
+  /// px, standard deviation of a coordinate.
   [[nodiscard]] double sigma() const {
     return std::clamp(std::sqrt(square_), kLeast * usual_, kMostRaised * usual_);
   }
 
-  /// `median_square`: of the residuals' squared norms, in the noise in use. `seconds` since the last call.
+  /// `median_square`: median of the squared norms of residuals, in the noise in use. `seconds` since the last
+  /// call.
   void update(double median_square, double seconds) {
     constexpr double kAverageTime = 2.0;      // s
     constexpr double kMedianOfChi2 = 1.3863;  // of two unit variances: 2 ln 2

@@ -1,5 +1,5 @@
 #pragma once
-// The Gauss-Newton system of one landmark's point with the poses held: what triangulation iterates on.
+// The Gauss-Newton system of a landmark's point with the poses held, for triangulation.
 //
 // Shapes: H is 3 x 3, g is 3 x 1, over two tangent coordinates of the bearing and the inverse depth.
 // Views are gathered into vector lanes once and linearized several times.
@@ -17,20 +17,20 @@ namespace swiftlet {
 struct PointSystem {
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
   Eigen::Vector3d g = Eigen::Vector3d::Zero();
-  double cost = 0;       ///< robust, as RobustWeight
-  int views = 0;         ///< in front of their camera
-  bool in_front = true;  ///< all of them
+  double cost = 0;       ///< robust (RobustWeight)
+  int views = 0;         ///< number of views with the point in front of the camera
+  bool in_front = true;  ///< true if in front of all cameras
 };
 
-/// The views of one landmark at the current poses, which must outlive this. Those beyond what a window
-/// holds (full smoothing has no limit) are gathered anew at each linearization.
+/// The views of a landmark at the current poses, which must outlive this object. Views beyond the capacity of
+/// a window (full smoothing has no limit) are gathered again at each linearization.
 class PointViews {
  public:
   PointViews(RigPoses poses, std::span<const Sighting> sightings);
 
   /// Residuals and Jacobians at `point`, whose basis is `basis`.
   [[nodiscard]] PointSystem linearize(const LandmarkPoint& point, const PointBasis& basis) const;
-  /// The cost alone.
+  /// Only the cost.
   [[nodiscard]] double cost(const LandmarkPoint& point) const;
 
  private:

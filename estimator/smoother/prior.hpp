@@ -1,11 +1,11 @@
 #pragma once
-// What marginalized states left behind: a quadratic cost on the states that remain.
+// The prior from marginalized states: a quadratic cost on the remaining states.
 //
 //   cost(d) = 1/2 d^T H d + b^T d,   d = x [-] reference, stacked over the prior's blocks.
-// d is in the error state of state.hpp (rotation on the right; calibration as in CalibrationLayout).
-// For frozen states the reference is their first estimate. The Hessian form is kept in double
-// precision, which the sqrt-form's advantage (float) does not concern.
-// Memory: 2.7 MiB, reserved by the constructor. H is full (both triangles), n x n, n = dimension().
+// d is in the error state of state.hpp (rotation on the right; calibration as in CalibrationLayout). For
+// frozen states the reference is their first estimate. The Hessian form is stored in double precision; the
+// advantage of the square-root form applies to single precision only. Memory: 2.7 MiB, reserved by the
+// constructor. H is full (both triangles), n x n, n = dimension().
 
 #include <Eigen/Core>
 #include <array>
@@ -23,17 +23,17 @@ namespace swiftlet {
 
 inline constexpr int kMaxSystemDim = static_cast<int>(kMaxStates) * kStateDim + kMaxCalibrationDim +
                                      kGyroMatrixDim + static_cast<int>(kMaxExtraStates) * kExtraDim;
-/// Body states, extra states, the calibration and the gyro's intrinsics.
+/// Largest number of blocks: body states, extra states, calibration and gyro intrinsics.
 inline constexpr std::size_t kMaxPriorBlocks = kMaxStates + kMaxExtraStates + 2;
 
-/// Columns of one state, body or extra, or of the calibration in the prior.
+/// Columns in the prior of one body state, one extra state, or the calibration.
 struct PriorBlock {
   static constexpr std::uint8_t kCalibration = 255;
   static constexpr std::uint8_t kGyroIntrinsics = 254;
-  std::uint8_t slot = 0;  ///< of the state, extra ones from kMaxStates on, or one of the above
-  int dimension = 0;      ///< a body state's first 6 or 15 columns, or all of the others
+  std::uint8_t slot = 0;  ///< of a body state, of an extra state from kMaxStates on, or a constant above
+  int dimension = 0;      ///< the first 6 or 15 columns of a body state, or all columns of others
   int offset = 0;         ///< first column in H and b
-  BodyState reference;    ///< of a body state; an extra state and the calibration have theirs with them
+  BodyState reference;    ///< of a body state; extra states and calibration store their own
 
   [[nodiscard]] bool isState() const { return slot < kMaxStates + kMaxExtraStates; }
   [[nodiscard]] bool isExtra() const { return isState() && slot >= kMaxStates; }
@@ -54,9 +54,9 @@ class Prior {
 
   /// Starts a new set of blocks.
   void begin();
-  /// Appends a block behind the others. At most kMaxPriorBlocks.
+  /// Appends a block. At most kMaxPriorBlocks.
   void addBlock(std::uint8_t slot, int dimension, const BodyState& reference);
-  /// After the last block: H and b take their size and are zeroed (in memory that is there already).
+  /// After the last block: sizes H and b and sets them to zero, without allocation.
   void allocate();
 
  private:

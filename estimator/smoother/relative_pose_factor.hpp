@@ -1,12 +1,12 @@
 #pragma once
-// A measured pose of one body state in another: what a loop closure says of two keyframes.
+// A measured relative pose of two body states, from a loop closure of two keyframes.
 //
 // Residual, 6 x 1, order phi, p, whitened by a root A of the information (A^T A = information):
 //   r = A [ Log(R(E)); p(E) ],   E = T_old_new_measured^-1 T_world_old^-1 T_world_new,
 // so the information is that of a right perturbation of the measurement, T <- T (Exp(phi), p), in rad and m.
-// Jacobians, 6 x 6, by the pose parts of both states' errors (state.hpp: R <- R Exp(phi), p adds in the
-// world). Nothing is allocated. Source: docs/smoother.md; Barfoot, "State Estimation for Robotics", 2017,
-// ch. 7.
+// Jacobians, 6 x 6, with respect to the pose parts of both error states (state.hpp: R <- R Exp(phi), p is
+// added in the world). No allocation. Sources: docs/smoother.md; Barfoot, "State Estimation for Robotics",
+// 2017, ch. 7.
 
 #include <Eigen/Core>
 

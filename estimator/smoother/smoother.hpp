@@ -1,24 +1,23 @@
 #pragma once
 // Fixed-lag smoother: Gauss-Newton over a sliding window of body states.
 //
-// Window, in order of time: pose-only keyframes; keyframes with velocity and biases; the newest
-// frames. A frame that is no keyframe leaves by merging its two IMU intervals (nothing is
-// linearized for good); an old keyframe first loses velocity and biases, then its pose, both into
-// the prior, the latter with the landmarks that it saw and no recent frame sees. Landmarks are structureless
-// until they are promoted to columns of their own; planes are further columns (extra_states.hpp). States that
-// the prior touches keep their first estimate as linearization point, moved with the window (window.hpp).
-// The parts: window, landmark_table, extra_table, calibration_state, prior (what there is: window_problem);
-// window_factors, window_solver, window_covariance, window_trim, marginalization (what is done to it).
-// Frames: world (z up, origin and yaw of the first state), body (= IMU), cameras. SI units, pixels.
-// Memory: 14.1 MiB, all reserved by the constructor (table in docs/smoother.md); nothing is allocated
-// after it. Full is normal: the landmark not seen for longest, and the oldest IMU samples, go first.
-// Cost: linear in landmarks, cubic in the window's dimension (at most 192 columns by default, and 3
-// for each explicit landmark and plane).
-// Sources: Leutenegger et al., "Keyframe-based visual-inertial odometry using nonlinear
-// optimization", IJRR 2015 (window); Huang, Mourikis, Roumeliotis, "Observability-based rules for
-// consistent EKF SLAM", IJRR 2010 (first estimates); Usenko et al., "Visual-Inertial Mapping with
-// Non-Linear Factor Recovery", RA-L 2020 (what leaves when); Rosinol, Sattler, Pollefeys, Carlone,
-// "Incremental Visual-Inertial 3D Mesh Generation with Structural Regularities", ICRA 2019 (planes).
+// Window, in order of time: pose-only keyframes; keyframes with velocity and biases; the newest frames. A
+// frame that is no keyframe leaves by merging its two IMU intervals, without a permanent linearization. An
+// old keyframe first loses velocity and biases, then its pose, both into the prior, the latter with the
+// landmarks that it saw and no recent frame sees. Landmarks are structureless until they are promoted to
+// columns of their own; planes are further columns (extra_states.hpp). States in the prior keep their first
+// estimate as linearization point, moved with the window (window.hpp). Data: window, landmark_table,
+// extra_table, calibration_state, prior (together: window_problem). Operations: window_factors,
+// window_solver, window_covariance, window_trim, marginalization. Frames: world (z up, origin and yaw of the
+// first state), body (= IMU), cameras. SI units, pixels. Memory: 14.1 MiB, reserved by the constructor (table
+// in docs/smoother.md); no allocation afterwards. Full is normal: the landmark not seen for longest and the
+// oldest IMU samples are dropped first. Cost: linear in landmarks, cubic in the dimension of the window (at
+// most 192 columns by default, and 3 for each explicit landmark and plane). Sources: Leutenegger et al.,
+// "Keyframe-based visual-inertial odometry using nonlinear optimization", IJRR 2015 (window); Huang,
+// Mourikis, Roumeliotis, "Observability-based rules for consistent EKF SLAM", IJRR 2010 (first estimates);
+// Usenko et al., "Visual-Inertial Mapping with Non-Linear Factor Recovery", RA-L 2020 (what leaves when);
+// Rosinol, Sattler, Pollefeys, Carlone, "Incremental Visual-Inertial 3D Mesh Generation with Structural
+// Regularities", ICRA 2019 (planes).
 
 #include <Eigen/Core>
 #include <array>
@@ -44,96 +43,97 @@
 namespace swiftlet {
 
 struct SmootherSettings {
-  double pixel_sigma = kTrackPixelSigma;  ///< px, to begin with: found in flight (pixel_noise.hpp)
+  double pixel_sigma = kTrackPixelSigma;  ///< px, initial value; estimated in flight (pixel_noise.hpp)
   double horizon = 30.0;                  ///< s
-  int max_recent = 4;                     ///< newest frames, keyframe or not, that stay whole
-  int max_motion_keyframes = 5;           ///< keyframes behind them that keep velocity and biases
-  int max_keyframes = 12;                 ///< these and the pose-only ones; with max_recent below kMaxStates
-  bool estimate_time_offset = false;      ///< camera to IMU clock
-  bool estimate_extrinsics = false;       ///< T_body_cam of each camera
-  bool estimate_gyro = false;             ///< scale and misalignment of the gyro
+  int max_recent = 4;                     ///< newest frames, keyframes or not, that keep all variables
+  int max_motion_keyframes = 5;           ///< keyframes before them that keep velocity and biases
+  int max_keyframes = 12;             ///< these and pose-only ones; max_keyframes + max_recent < kMaxStates
+  bool estimate_time_offset = false;  ///< camera to IMU clock
+  bool estimate_extrinsics = false;   ///< T_body_cam of each camera
+  bool estimate_gyro = false;         ///< scale and misalignment of the gyro
 };
 
 /// A plane of the window.
 struct PlaneEstimate {
   Plane plane;
-  /// Of the last solve, in the plane's three columns; zero for a plane that has not been solved for.
+  /// Covariance of the last solve, in the plane's three columns; zero if the plane was not in a solve.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  int points = 0;  ///< tied to it
+  int points = 0;  ///< number of tied landmarks
 };
 
 class Smoother {
  public:
   Smoother(const Rig& rig, const ImuNoise& noise, const SmootherSettings& settings);
 
-  /// Forgets all states and landmarks; samples and the estimated calibration stay.
+  /// Forgets all states and landmarks; keeps samples and the estimated calibration.
   void reset();
   [[nodiscard]] bool started() const { return !problem_.window.empty(); }
 
-  /// One IMU sample, in order of stamps; those before a frame come before it.
+  /// Adds an IMU sample, in order of stamps. Add the samples before a frame before that frame.
   void addImu(const ImuSample& sample) { problem_.imu.push(sample); }
-  /// After reset(): the samples to come have earlier stamps.
+  /// After reset(), if the following samples have earlier stamps.
   void forgetImu() { problem_.imu.clear(); }
 
-  /// The first state; its frame is the first that `step` gets.
+  /// Sets the first state, which belongs to the first frame given to `step`.
   void start(const StartState& start) { start_ = start; }
 
   struct StepInput {
     const TrackedFrame* frame = nullptr;
     bool imu_gap = false;    ///< samples are missing since the previous frame
     std::uint32_t rest = 0;  ///< number of the rest at the frame (RestState); 0: in motion
-    /// Where they are estimated, the gyro's intrinsics move with this step; else they are held.
+    /// True: the gyro's intrinsics are estimated in this step, if enabled. False: they are held.
     bool move_gyro = true;
-    int iterations = 2;  ///< at most
-    /// m, rad: a step in which no pose moves further is the last. It has changed Jacobians and robust weights
-    /// by less than the noise shows, and the rest of a state enters linearly.
+    int iterations = 2;  ///< largest number
+    /// m, rad: stops after a step in which no pose moves further. Jacobians and robust weights then change by
+    /// less than the noise, and the other parts of a state are linear.
     double pose_tolerance = 1e-3;
-    /// Of the frame's features, taken at most: those with the smallest ids, known for longest; at least 1.
+    /// Largest number of the frame's features used, at least 1: those with the smallest ids, known for
+    /// longest.
     int max_features = static_cast<int>(kMaxFeatures);
-    /// That the window keeps, between 1 and the settings'; further down it comes by two a step.
+    /// Number of keyframes that the window keeps, between 1 and the settings'; it shrinks by two per step.
     int max_keyframes = static_cast<int>(kMaxStates);
   };
 
-  /// Adds a frame and solves: afterwards the newest state, its covariance, the statistics and `window()`
-  /// stand. The window is one frame longer then, and `trim` must follow before the next step.
-  /// kNotReady without a start state; kInvalidInput, with nothing changed, when the window has not been
-  /// trimmed; kFailed when the system cannot be solved: reset. Only after kOk is there something to trim.
+  /// Adds a frame and solves. The newest state, its covariance, the statistics and `window()` are then valid.
+  /// The window is one frame longer, and `trim` must follow before the next step. kNotReady without a start
+  /// state; kInvalidInput, without effect, if the window has not been trimmed; kFailed if the system cannot
+  /// be solved: call reset(). Trim only after kOk.
   Status step(const StepInput& input);
 
-  /// What leaves the window after a step: frames between keyframes, and old keyframes into the prior.
-  /// `left_window` is overwritten with the keyframes that left. Changes no value of the states that stay.
-  /// From here on `window()` is without what left.
+  /// Removes states from the window after a step: frames between keyframes, and old keyframes, which go into
+  /// the prior. Overwrites `left_window` with the keyframes that left. The values of the remaining states do
+  /// not change; `window()` is then without the states that left.
   void trim(FixedVector<KeyframeState, kMaxStates>& left_window);
 
   /// Values and links of all states, in order of time.
   [[nodiscard]] const Window& states() const { return problem_.window; }
-  /// After a trim: of these, the first so many are keyframes that stay.
+  /// After a trim: the number of keyframes that stay; they are the first of these states.
   [[nodiscard]] std::size_t settled() const {
     const auto recent = static_cast<std::size_t>(settings_.max_recent);
     return problem_.window.size() > recent ? problem_.window.size() - recent : 0;
   }
 
-  /// Not before the first step.
+  /// Only after the first step.
   [[nodiscard]] const WindowState& newest() const { return problem_.window.newest(); }
   [[nodiscard]] const FrameStatistics& statistics() const { return statistics_; }
-  /// px, of the next frame's sightings; kept by reset().
+  /// px, noise of the next frame's observations; kept by reset().
   [[nodiscard]] double pixelSigma() const { return pixel_noise_.sigma(); }
   /// Marginal covariance of the newest state, error-state order.
   [[nodiscard]] const Matrix15d& covariance() const { return covariance_.newest(); }
-  /// The verdict on the newest frame, to be recorded with it.
+  /// Sets the health of the newest frame, which is recorded with it.
   void setHealth(Health health) {
     if (started()) problem_.window.newest().health = health;
   }
-  /// As given, or as estimated, with sigmas. Cost with an estimate: up to 13 triangular solves.
+  /// The calibration, given or estimated, with sigmas. Cost with an estimate: up to 13 triangular solves.
   [[nodiscard]] CalibrationEstimate calibration();
-  /// t_imu = t_image + offset: the calibration's, or its estimate.
+  /// Offset in t_imu = t_image + offset: of the calibration, or its estimate.
   [[nodiscard]] Duration timeOffset() const {
     return Duration::fromSeconds(problem_.calibration.timeOffset());
   }
 
   /// Covariance of the motion between two poses of the window, T_i_j = T_world_i^-1 T_world_j, in j's error
-  /// state (phi, p of T_i_j, rotation on the right), from their joint marginal. Positions as in
-  /// `window()`. False for a state that has left since the solve. Cost: 12 triangular solves.
+  /// state (phi, p of T_i_j, rotation on the right), from their joint marginal. Indices as in `window()`.
+  /// False for a state that left since the solve. Cost: 12 triangular solves.
   [[nodiscard]] bool relativeCovariance(std::size_t i, std::size_t j,
                                         Eigen::Matrix<double, 6, 6>& covariance) {
     return covariance_.relative(problem_.window[i], problem_.window[j], covariance);
@@ -142,31 +142,31 @@ class Smoother {
   /// Poses in order of time, and the landmarks of the last solve that are not at infinity.
   void window(SmoothedWindow& out) const;
 
-  // Extra states: after a step's trim, before the next step. All of it is forgotten by reset().
+  // Extra states: call after a step's trim and before the next step. reset() removes them all.
 
-  /// Gives a landmark columns of its own, from its triangulated position on, until no frame sees it any more.
-  /// Refused: kInvalidInput without such a landmark, kNotReady when it took no part in the last solve,
-  /// kDegenerate at infinity or when its depth is known to less than 10 % (1 sigma), kCapacityReached with
-  /// kMaxExplicitLandmarks. One that is promoted already stays so: ok.
+  /// Promotes a landmark to columns of its own, starting at its triangulated position, until no frame sees
+  /// it. Refused: kInvalidInput without such a landmark, kNotReady if it took no part in the last solve,
+  /// kDegenerate at infinity or if its depth is uncertain by more than 10 % (1 sigma), kCapacityReached with
+  /// kMaxExplicitLandmarks. Ok if it is already promoted.
   Status promote(TrackId id) { return problem_.extras.promote(id); }
   [[nodiscard]] bool promoted(TrackId id) const { return problem_.extras.promoted(id); }
 
-  /// A new plane, without any information: `plane` is where to start from. Its factors count from the step on
-  /// at which they determine its normal (extra_table.hpp). It leaves with the next step unless a point is
-  /// tied to it by then, and later when the last point tied to it has left. None when kMaxPlanes are held.
+  /// Adds a plane without information; `plane` is its initial value. Its factors count from the step at which
+  /// they determine its normal (extra_table.hpp). It leaves with the next step unless a point is tied to it
+  /// by then, and later with the last point tied to it. None if kMaxPlanes are held.
   std::optional<PlaneId> addPlane(const Plane& plane) { return problem_.extras.addPlane(plane); }
-  /// Ties a promoted landmark to a plane, `sigma` m. Refused: kInvalidInput without such a landmark or plane,
-  /// or when they are tied already; kCapacityReached with kMaxExtraFactors.
+  /// Ties a promoted landmark to a plane with `sigma` [m]. Refused: kInvalidInput without such a landmark or
+  /// plane, or if they are already tied; kCapacityReached with kMaxExtraFactors.
   Status addPointOnPlane(TrackId id, PlaneId plane, double sigma) {
     return problem_.extras.addPointOnPlane(id, plane, sigma);
   }
-  /// `sigma` rad. Replaces the direction that it has. Refused as above.
+  /// Sets or replaces the direction of a plane, with `sigma` [rad]. Refused as above.
   Status addPlaneDirection(PlaneId plane, PlaneDirection direction, double sigma) {
     return problem_.extras.addPlaneDirection(plane, direction, sigma);
   }
-  /// Unties; what left into the prior with frames of the past stays there. No effect without such a tie.
+  /// Removes a tie; its part of the prior stays. No effect without such a tie.
   void removePointOnPlane(TrackId id, PlaneId plane) { problem_.extras.removePointOnPlane(id, plane); }
-  /// Forgets a plane with its factors; what the prior knows through it stays.
+  /// Removes a plane with its factors; its part of the prior stays.
   void removePlane(PlaneId plane);
   /// Cost: three triangular solves.
   [[nodiscard]] std::optional<PlaneEstimate> plane(PlaneId plane);

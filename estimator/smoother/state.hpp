@@ -1,9 +1,9 @@
 #pragma once
 // The variables of the smoother and their error states.
 //
-// Order of the error state, here and everywhere: phi (0-2), p (3-5), v (6-8), bg (9-11), ba (12-14).
-// Rotation is perturbed on the right, R <- R Exp(phi); the rest adds. A pose-only state (a keyframe
-// whose velocity and biases have been marginalized) has the first six. A slot takes 3.5 kB.
+// Order of the error state everywhere: phi (0-2), p (3-5), v (6-8), bg (9-11), ba (12-14). Rotation is
+// perturbed on the right, R <- R Exp(phi); the others are added. A pose-only state (a keyframe whose velocity
+// and biases have been marginalized) has the first six. A slot takes 3.5 kB.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -21,7 +21,7 @@ namespace swiftlet {
 inline constexpr int kPoseDim = 6;
 using Vector15d = Eigen::Matrix<double, kStateDim, 1>;
 
-/// One body state's values.
+/// Values of a body state.
 struct BodyState {
   SE3 T_world_body;                                        ///< m
   Eigen::Vector3d v_world_body = Eigen::Vector3d::Zero();  ///< m/s, world axes
@@ -30,11 +30,11 @@ struct BodyState {
 
   /// x <- x [+] delta.
   void retract(const Vector15d& delta);
-  /// this [-] reference: the delta that takes `reference` here; rotation part shorter than pi.
+  /// this [-] reference: the delta from `reference` to this; its rotation is shorter than pi.
   [[nodiscard]] Vector15d minus(const BodyState& reference) const;
 };
 
-/// How a state hangs on the state before it.
+/// How a state is connected to the state before it.
 enum class LinkKind : std::uint8_t {
   kNone,              ///< the oldest state with velocity and biases
   kImu,               ///< preintegrated samples
@@ -47,19 +47,19 @@ struct WindowState {
   Stamp stamp;  ///< on the IMU's clock
   std::uint64_t frame_index = 0;
   bool keyframe = false;
-  std::uint32_t rest = 0;  ///< number of the rest that the state is part of; 0: none
-  bool has_motion = true;  ///< velocity and biases are still variables
-  bool frozen = false;     ///< the prior touches it: Jacobians are taken at `moved_estimate`
+  std::uint32_t rest = 0;  ///< number of the rest in which the state is; 0: in motion
+  bool has_motion = true;  ///< velocity and biases are variables
+  bool frozen = false;     ///< part of the prior: Jacobians are taken at `moved_estimate`
   BodyState x;
   BodyState first_estimate;  ///< the prior's reference
   BodyState moved_estimate;  ///< first_estimate, moved with the window (Window::moveEstimates)
   LinkKind link = LinkKind::kNone;
-  Preintegration imu;        ///< from the previous state with motion, when link is kImu
-  ImuFactors imu_factors;    ///< on the noise that imu was integrated with
+  Preintegration imu;        ///< from the previous state with motion, if link is kImu
+  ImuFactors imu_factors;    ///< factors on the noise with which `imu` was integrated
   double link_duration = 0;  ///< s
-  double time_offset = 0;    ///< s, camera-to-IMU offset at which `stamp` was placed on the IMU's clock
+  double time_offset = 0;    ///< s, camera-to-IMU offset with which `stamp` was converted to the IMU's clock
   Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  ///< rad/s at the stamp
-  ScanTurn scan;                                         ///< of the image's rows
+  ScanTurn scan;                                         ///< rotation during the rows of the image
   int offset = -1;                                       ///< first column in the normal equations
   int factor_offset = -1;                                ///< first column in the factor of the last solve
   int factor_dimension = 0;                              ///< columns there
@@ -68,7 +68,7 @@ struct WindowState {
   FrameStatistics statistics;
 
   [[nodiscard]] int dimension() const { return has_motion ? kStateDim : kPoseDim; }
-  /// Where Jacobians are taken (first-estimate Jacobians).
+  /// The linearization point (first-estimate Jacobians).
   [[nodiscard]] const BodyState& linearization() const { return frozen ? moved_estimate : x; }
 };
 

@@ -1,13 +1,14 @@
 #pragma once
-// How much longer than an image the errors of tracks last, from their residuals at neighbouring keyframes.
+// Estimates the temporal correlation of the errors of tracks from their residuals at neighbouring keyframes.
 //
-// A patch that is found beside its place is found there in the next keyframe too: what is averaged over a
-// track's sightings is known less well than their number says. The residuals' correlation r from one keyframe
-// to the next is 0 where errors are independent (a little less: a point is fitted to them) and some 0.3 to
-// 0.5 on images. For a constant seen at equal times the variance is (1 + r) / (1 - r) times that of
-// independent sightings (an autoregressive error of first order); the part that a landmark's point takes up
-// does no harm, so poses get 1 / (1 - r). On eleven rendered flights that makes their NEES 6.
-// The factor is for covariances that are given out; weights stay as they are. O(1), no memory.
+// A patch that is matched beside its true position is matched there in the next keyframe too, so averages
+// over the observations of a track are less accurate than their number suggests. The correlation r of
+// residuals from one keyframe to the next is 0 for independent errors (slightly less, because a point is
+// fitted to them) and some 0.3 to 0.5 on images. For a constant observed at equal intervals the variance is
+// (1 + r) / (1 - r) times that of independent observations (an autoregressive error of first order). The part
+// absorbed by a landmark's point does no harm, so poses get the factor 1 / (1 - r). With it the NEES of
+// eleven rendered flights is 6. The factor applies to covariances in outputs; weights do not change. O(1), no
+// memory.
 
 #include <algorithm>
 #include <cmath>
@@ -16,16 +17,16 @@ namespace swiftlet {
 
 class TrackCorrelation {
  public:
-  static constexpr double kMost = 0.75;  ///< of the correlation: a factor of 4
+  static constexpr double kMost = 0.75;  ///< largest correlation: a factor of 4
 
   [[nodiscard]] double correlation() const {
     return square_ > 0 ? std::clamp(product_ / square_, 0.0, kMost) : 0.0;
   }
-  /// Of a pose's variance.
+  /// Factor on the variance of a pose.
   [[nodiscard]] double varianceFactor() const { return 1.0 / (1.0 - correlation()); }
 
-  /// Residuals of the same points at two keyframes: the sum of their products, and of their mean squares.
-  /// `seconds` since the last call.
+  /// Adds residuals of the same points at two keyframes: the sum of their products, and that of their mean
+  /// squares. `seconds` since the last call.
   void update(double product, double square, double seconds) {
     constexpr double kAverageTime = 5.0;  // s
     const double share = 1 - std::exp(-seconds / kAverageTime);

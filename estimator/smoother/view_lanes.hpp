@@ -1,14 +1,13 @@
 #pragma once
 // Four views of one landmark at once: the reprojection of vision_factor.hpp with one view per vector lane.
 //
-// What an image says of a landmark is a few dozen products of 3-vectors, too small to vectorize one by
-// one and the same for every view. Residuals, Jacobians and weights equal the scalar functions' to
-// rounding (tests/smoother/test_lanes.cpp). Sums run over lanes first, in a fixed order: deterministic.
-// Lanes are the compiler's vector extensions, lowered to whatever registers the target has.
-// Frames, units as in vision_factor.hpp. Shapes: arrays of V, one number of four views each; 3 x 3 and
-// 2 x 3 matrices by columns, as Eigen stores them. V is only passed in memory, so that no interface
-// depends on the instruction set.
-// Cost: about 100 multiply-adds of V a group of four views. Nothing is allocated.
+// A view of a landmark takes a few dozen products of 3-vectors, too small to vectorize one by one but the
+// same for every view. Residuals, Jacobians and weights equal those of the scalar functions to rounding
+// (tests/smoother/test_lanes.cpp). Sums run over lanes first, in a fixed order: deterministic. Lanes are the
+// compiler's vector extensions, compiled to the registers of the target.
+// Frames, units as in vision_factor.hpp. Shapes: arrays of V, one number of four views each; 3 x 3 and 2 x 3
+// matrices by columns, as in Eigen. V is only passed in memory, so that no interface depends on the
+// instruction set. Cost: about 100 multiply-adds of V per group of four views. No allocation.
 
 #include <Eigen/Core>
 #include <cmath>
@@ -17,7 +16,7 @@
 
 #include "estimator/smoother/vision_factor.hpp"
 
-// Before a loop of fixed count over an array of V: only unrolled does the array live in registers.
+// Before a loop of fixed count over an array of V, which is kept in registers only if unrolled.
 #ifdef __clang__
 #define SWIFTLET_UNROLL _Pragma("unroll")
 #else
@@ -28,7 +27,7 @@ namespace swiftlet::lanes {
 
 inline constexpr std::size_t kLanes = 4;
 using V = double __attribute__((vector_size(kLanes * sizeof(double))));
-/// All bits set where true, as comparisons of V give it.
+/// All bits set where true, as returned by comparisons of V.
 using Mask = decltype(V{} < V{});
 
 // Four numbers in memory, aligned or not.
@@ -39,7 +38,7 @@ inline double sum(const V& v) { return (v[0] + v[1]) + (v[2] + v[3]); }
 inline bool any(const Mask& m) { return ((m[0] | m[1]) | (m[2] | m[3])) != 0; }
 inline int count(const Mask& m) { return -static_cast<int>((m[0] + m[1]) + (m[2] + m[3])); }
 
-/// Where the numbers of four views are. Lanes may be set in any order and may stay unset.
+/// Addresses of the numbers of four views. Lanes may be set in any order and may stay unset.
 class ViewPointers {
  public:
   void set(std::size_t lane, const CameraPose& camera, const CameraSighting& view) {
@@ -50,7 +49,7 @@ class ViewPointers {
   }
   [[nodiscard]] bool empty() const { return !any(used_); }
   [[nodiscard]] const Mask& used() const { return used_; }
-  /// Of an unset lane: that of a set one, so that every lane computes with ordinary numbers.
+  /// An unset lane gets the address of a set one, so that every lane computes with regular numbers.
   [[nodiscard]] const CameraPose& camera(std::size_t lane) const { return *camera_[at(lane)]; }
   [[nodiscard]] const CameraSighting& view(std::size_t lane) const { return *view_[at(lane)]; }
 
@@ -63,7 +62,7 @@ class ViewPointers {
   Mask used_{};
 };
 
-/// Four views, and which of them count.
+/// Four views, and which of them are valid.
 struct ViewGroup {
   V R_cam_world[9];
   V center[3];
@@ -72,7 +71,7 @@ struct ViewGroup {
   Mask used;
 
   ViewGroup() = default;
-  /// At least one lane is set.
+  /// At least one lane must be set.
   explicit ViewGroup(const ViewPointers& p) : used(p.used()) {
     const double* R[kLanes];
     const double* c[kLanes];
@@ -128,8 +127,8 @@ inline void ViewGroup::takeRows(const ViewPointers& p) {
   for (std::size_t i = 0; i < 2; ++i) turn(weight[i], weight[i + 2], weight[i + 4]);
 }
 
-/// As reprojectionResidual(). A view that the point is not in front of is given the ray that it measured
-/// instead, whose residual is zero: its numbers stay finite, and the caller gives it weight zero.
+/// Like reprojectionResidual(). If the point is not in front of a view, the measured ray is used instead,
+/// whose residual is zero: its numbers stay finite, and the caller gives it weight zero.
 struct Residuals {
   V arm[3];  ///< reference - centre
   V h[3];    ///< ray, camera axes
@@ -164,7 +163,7 @@ struct Residuals {
   }
 };
 
-/// As reprojectionJacobians(), up to what the pose's columns are made of.
+/// Like reprojectionJacobians(), except for the columns of the pose, which are computed from these.
 struct Jacobians {
   V G[2][3];      ///< d r / d h
   V M[2][3];      ///< d r / d (ray in world axes)
@@ -190,18 +189,18 @@ struct Jacobians {
   }
 };
 
-/// The point's own 3 x 3 system and the cost, summed over views.
+/// The 3 x 3 system of the point and the cost, summed over views.
 class PointSums {
  public:
-  /// Weights of `residuals` as RobustWeight::cauchy(), zero where `counts` is false; adds their cost.
+  /// Weights of `residuals` like RobustWeight::cauchy(), zero where `counts` is false; adds their cost.
   void weigh(const Residuals& residuals, const Mask& counts, V& weight) {
     constexpr double kInverseSquaredScale = 1.0 / (kCauchyScale * kCauchyScale);
     const V* const r = residuals.r;
     const V one{1, 1, 1, 1};
     const V q = counts ? one + kInverseSquaredScale * (r[0] * r[0] + r[1] * r[1]) : one;
     weight = counts ? kInformationScale / q : V{};
-    // log a + log b = log ab: one logarithm for many views. A residual is at most 1 / kMinCosine times
-    // the lens' scale in sigmas, q then below 1e12: no overflow on top of the limit.
+    // log a + log b = log ab: one logarithm for many views. A residual is at most 1 / kMinCosine times the
+    // scale of the lens in sigmas, so q is below 1e12 and the product does not overflow beyond the limit.
     constexpr double kLimit = 1e200;
     product_ *= (q[0] * q[1]) * (q[2] * q[3]);
     if (product_ > kLimit) {

@@ -1,13 +1,13 @@
 #pragma once
-// Reprojection of a landmark into a camera, its Jacobians, and the structureless elimination of the
-// landmark: re-triangulated at the current poses, linearized, and removed by its Schur complement.
+// Reprojection of a landmark into a camera with Jacobians, and triangulation of the landmark at the current
+// poses for its structureless elimination.
 //
-// First-estimate rule: the Jacobian blocks of a sighting (pose and point) are taken at one and the
-// same point with the pose at its linearization value; the residual at the current values. The four
-// unobservable directions (position, yaw) then stay null whatever the point is. For that the linearization
-// of a rolling shutter's camera has turning rows without a velocity: columns of the velocity are left out.
-// Frames: points and centres in the world, rays in the camera. Residuals are in sigmas of the pixel
-// noise. Nothing is allocated; triangulation is linear in sightings and iterations.
+// First-estimate rule: the Jacobian blocks of an observation (pose and point) are taken at the same point
+// with the pose at its linearization value, the residual at the current values. The four unobservable
+// directions (position, yaw) then stay null for any point. For this, the linearization of a rolling-shutter
+// camera includes the rotation of its rows but no velocity; the columns of the velocity are left out. Frames:
+// points and centres in the world, rays in the camera. Residuals are in sigmas of the pixel noise. No
+// allocation; triangulation is linear in observations and iterations.
 // Sources: robust weight: Huber, "Robust Statistics", 1981, section 6.3; first-estimate rule: Huang,
 // Mourikis, Roumeliotis, IJRR 2010; equations: docs/smoother.md.
 
@@ -23,7 +23,7 @@
 
 namespace swiftlet {
 
-/// How a camera moves while a rolling shutter's rows are read. None: a global shutter.
+/// Motion of a camera while the rows of a rolling shutter are read. None: global shutter.
 struct RowMotion {
   double readout = 0;                                  ///< s, from the first row to the last
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of the centre, m/s, world
@@ -35,16 +35,16 @@ struct RowMotion {
   [[nodiscard]] bool none() const { return readout == 0; }
 };
 
-/// A camera placed in the world by a body state.
+/// Pose of a camera in the world, from a body state.
 struct CameraPose {
   Eigen::Matrix3d R_cam_world = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< world; both at the image's stamp
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< world; rotation and centre are at the image's stamp
   RowMotion rows;
 
   static CameraPose of(const SE3& T_world_body, const SE3& T_body_cam);
-  /// World, when the row of a sighting was read.
+  /// Centre in the world when the row of an observation was read.
   [[nodiscard]] Eigen::Vector3d centerAt(const CameraSighting& sighting) const;
-  /// m and W of a sighting in the axes of the middle row.
+  /// m and W of an observation in the axes of the middle row.
   struct Seen {
     Eigen::Vector3d ray;
     Matrix23d whitening;
@@ -52,14 +52,15 @@ struct CameraPose {
   [[nodiscard]] Seen inMiddleRow(const CameraSighting& sighting) const;
 };
 
-/// The rig placed at one state: current values, linearization values.
+/// Poses of the rig at one state: current values and linearization values.
 struct RigPose {
   std::array<CameraPose, kMaxCameras> current;
   std::array<CameraPose, kMaxCameras> linearization;
   Eigen::Vector3d v_world = Eigen::Vector3d::Zero();     ///< m/s, for the time offset and rows
   Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  ///< rad/s, for the time offset and rows
 
-  /// Camera c at the body's pose and, where it differs, at its linearization; `scan`: of a rolling shutter.
+  /// Places camera c at the body's pose and, if different, at its linearization. `scan`: of a rolling
+  /// shutter.
   void place(std::size_t c, const SE3& T_body_cam, const SE3& now, const SE3* then, double readout,
              const ScanTurn& scan);
 };
@@ -67,7 +68,7 @@ struct RigPose {
 /// Indexed by Sighting::slot.
 using RigPoses = std::span<const RigPose>;
 
-/// What a landmark is linearized from: its views, cameras as placed and as mounted. Borrowed, for one call.
+/// Inputs for linearizing a landmark: its views, camera poses and extrinsics. References for one call.
 struct LandmarkViews {
   std::span<const Sighting> sightings;
   RigPoses poses;
@@ -75,7 +76,7 @@ struct LandmarkViews {
   CalibrationLayout calibration;
 };
 
-/// The point's tangent basis at its bearing (world axes, orthonormal), shared by all its sightings.
+/// Tangent basis of the point at its bearing (world axes, orthonormal), shared by all its observations.
 struct PointBasis {
   Eigen::Vector3d b1;
   Eigen::Vector3d b2;
@@ -88,53 +89,52 @@ struct SightingJacobians {
   Eigen::Matrix<double, 2, 6> extrinsic;  ///< phi, p of T_body_cam
 };
 
-/// What the cameras of a state saw at their pixels; `pixel_sigma` px. A camera that has no ray for its pixel
-/// is unused.
+/// Observation from the pixels of a state's cameras; `pixel_sigma` in px. A camera without a ray for its
+/// pixel is unused.
 [[nodiscard]] Sighting makeSighting(const Rig& rig, const std::array<bool, kMaxCameras>& seen,
                                     const std::array<Eigen::Vector2f, kMaxCameras>& pixel, double pixel_sigma,
                                     std::uint32_t slot);
 
-/// Whitened residual, 2 x 1. False when the point is not in front of the measured ray (cosine of the
-/// angle between them at most 0.2).
+/// Whitened residual, 2 x 1. False if the point is not in front of the measured ray (cosine of the angle
+/// between them at most 0.2).
 [[nodiscard]] bool reprojectionResidual(const CameraSighting& sighting, const CameraPose& camera,
                                         const LandmarkPoint& point, Eigen::Vector2d& residual);
 
-/// Jacobians of the whitened residual at `camera`; `extrinsic` is left alone unless asked for. False
-/// as above.
+/// Jacobians of the whitened residual at `camera`; `extrinsic` is only set on request. False as above.
 [[nodiscard]] bool reprojectionJacobians(const CameraSighting& sighting, const CameraPose& camera,
                                          const SE3& T_body_cam, const LandmarkPoint& point,
                                          const PointBasis& basis, bool with_extrinsic,
                                          SightingJacobians& jacobians);
 
-// Points beyond this cosine from the measured ray have no meaningful tangent-plane residual.
+// Points below this cosine to the measured ray have no useful tangent-plane residual.
 inline constexpr double kMinCosine = 0.2;
 // Cauchy scale in sigmas: tracks have heavier tails than a normal distribution.
 inline constexpr double kCauchyScale = 2.0;
-// Makes the weighted Hessian the information of the estimate where the noise is normal (2 dof):
+// Makes the weighted Hessian the information of the estimate if the noise is normal (2 dof):
 // E[psi']^2 / (E[psi^2] E[w]) at the scale above (Huber, "Robust Statistics", 1981, section 6.3).
 inline constexpr double kInformationScale = 1.267;
 // Prior on the inverse depth, sigma 30 / m, for points without parallax: too weak to bias points with it.
 inline constexpr double kInverseDepthInformation = 1.0 / (30.0 * 30.0);  // m^2
 
-/// Robust weight (Cauchy, scale 2 sigma) of a whitened residual's norm, and the cost it stands for,
-/// both scaled so that the weighted Hessian is the information where the noise is normal.
+/// Robust weight (Cauchy, scale 2 sigma) of the norm of a whitened residual, and the corresponding cost, both
+/// scaled so that the weighted Hessian is the information if the noise is normal.
 struct RobustWeight {
   double weight = 1;
   double cost = 0;
-  /// `information_scale` is for two dimensions unless given.
+  /// The default `information_scale` is for two dimensions.
   static RobustWeight cauchy(double squared_norm, double information_scale = kInformationScale);
 };
 
 /// Moves the point by a step of its three coordinates; the inverse depth stays between 0 and 20 / m.
 void movePoint(const Eigen::Vector3d& step, const PointBasis& basis, LandmarkPoint& point);
 
-/// Moves the point by its own Gauss-Newton steps at the current poses; from nothing when it is not
-/// triangulated yet; with no iterations it stays. Sets the point's sigma. False when the point is behind a
-/// camera that saw it, or with fewer than two sightings (each camera counts).
+/// Refines the point by Gauss-Newton steps at the current poses, or triangulates it if it is not triangulated
+/// yet; with 0 iterations it does not move. Sets its sigma. False if the point is behind a camera that
+/// observed it, or with fewer than two observations (each camera counts).
 [[nodiscard]] bool triangulate(RigPoses poses, std::span<const Sighting> sightings, int max_iterations,
                                LandmarkPoint& point);
 
-/// Mean squared whitened residual over the sightings at the current poses; negative without any.
+/// Mean squared whitened residual over the observations at the current poses; negative without observations.
 [[nodiscard]] double meanSquaredResidual(RigPoses poses, std::span<const Sighting> sightings,
                                          const LandmarkPoint& point);
 

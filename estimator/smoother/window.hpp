@@ -1,8 +1,8 @@
 #pragma once
-// The body states of the window: slots, their order in time, their columns, and steps taken and taken back.
+// The body states of the window: slots, order in time, columns, and steps that can be undone.
 //
-// A slot is kept until its state is removed; sightings and the prior name states by slot. At most kMaxStates.
-// Memory: 84 kB. Cost: linear in the states.
+// A state keeps its slot until it is removed; observations and prior refer to states by slot. At most
+// kMaxStates. Memory: 84 kB. Cost: linear in the states.
 
 #include <Eigen/Core>
 #include <array>
@@ -21,7 +21,7 @@ class Window {
   [[nodiscard]] bool empty() const { return order_.empty(); }
   [[nodiscard]] std::size_t size() const { return order_.size(); }
 
-  /// An empty state behind the others. Not on a full window.
+  /// Appends an empty state. Not for a full window.
   std::uint8_t add();
   void remove(std::size_t position);
 
@@ -30,16 +30,16 @@ class Window {
   [[nodiscard]] const std::array<WindowState, kMaxStates>& slots() const { return states_; }
   [[nodiscard]] WindowState& inSlot(std::size_t slot) { return states_[slot]; }
   [[nodiscard]] const WindowState& inSlot(std::size_t slot) const { return states_[slot]; }
-  /// The k-th in time.
+  /// The k-th state in time.
   [[nodiscard]] WindowState& operator[](std::size_t k) { return states_[order_[k]]; }
   [[nodiscard]] const WindowState& operator[](std::size_t k) const { return states_[order_[k]]; }
   [[nodiscard]] WindowState& newest() { return states_[order_.back()]; }
   [[nodiscard]] const WindowState& newest() const { return states_[order_.back()]; }
   [[nodiscard]] std::uint8_t newestSlot() const { return order_.back(); }
 
-  /// The first state with velocity and biases; size() when there is none.
+  /// Index of the first state with velocity and biases; size() if there is none.
   [[nodiscard]] std::size_t motionBegin() const;
-  /// Gives each state its columns, in order of time; returns the first one behind them.
+  /// Assigns columns to the states, in order of time; returns the first one after them.
   int assignOffsets(int first);
 
   /// x <- x [+] step, in the states' columns.
@@ -47,10 +47,10 @@ class Window {
   void backup();
   void restore();
 
-  /// From now on the state's value is its first estimate; nothing when there is one already.
+  /// Makes the state's value its first estimate, unless there is one.
   void freeze(std::uint8_t slot);
-  /// Moves the first estimates by the mean translation of the frozen states since (see smoother.md), and says
-  /// by how much: others that are frozen move along.
+  /// Moves the first estimates by the mean translation of the frozen states since then (docs/smoother.md),
+  /// and returns that translation, by which other frozen variables must move too.
   Eigen::Vector3d moveEstimates();
 
  private:

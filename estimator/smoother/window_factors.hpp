@@ -1,8 +1,7 @@
 #pragma once
-// The factors of the window, put into normal equations: prior, motion, rest, explicit landmarks and planes.
+// Adds the factors of the window to normal equations: prior, motion, rest, explicit landmarks and planes.
 //
-// Structureless landmarks are NormalEquations::addLandmark. Equations: docs/smoother.md. Nothing is
-// allocated.
+// For structureless landmarks see NormalEquations::addLandmark. Equations: docs/smoother.md. No allocation.
 
 #include <cstdint>
 #include <vector>
@@ -13,25 +12,26 @@
 
 namespace swiftlet {
 
-/// Returns the prior's cost, without its constant. `work`: at least as long as the prior's dimension.
+/// Returns the cost of the prior, without its constant. `work`: at least as long as the prior's dimension.
 double addPrior(WindowProblem& problem, NormalEquations& system, std::vector<double>& work);
 
-/// Between the states at `position` - 1 and `position`, where both have motion, with rest where there is.
+/// The factor between the states at `position` - 1 and `position`, if both have motion, and the rest factor,
+/// if they are at rest.
 void addMotion(const WindowProblem& problem, std::size_t position, NormalEquations& system);
 
-/// Of all motion in the window, with the states as they are.
+/// Residuals of all motion in the window at the present states.
 [[nodiscard]] MotionResiduals motionResiduals(const WindowProblem& problem);
 
-/// Explicit landmarks, and planes that count.
+/// Adds explicit landmarks and planes that count.
 void addExtras(const WindowProblem& problem, NormalEquations& system);
-/// After all factors: weak information, and sigmas of explicit landmarks' inverse depths.
+/// After all factors: adds weak information, and sets the sigmas of explicit landmarks' inverse depths.
 void finishExtras(WindowProblem& problem, NormalEquations& system);
-/// All that the leaving extra states take part in, and, unless null, what the state in the slot saw of the
-/// others.
+/// Adds all factors of the leaving extra states and, unless null, the observations of the other explicit
+/// landmarks by the state in the slot.
 void addDepartingExtras(const WindowProblem& problem, const std::uint8_t* slot, NormalEquations& system);
 
-/// What the system's cost and the prior's would be at the states and points as they are, cameras placed;
-/// no landmark is linearized. `work` as above. Cost: less than building the system.
+/// Costs of the system and of the prior at the present states and points, with cameras placed; no landmark is
+/// linearized. `work` as above. Cost: less than building the system.
 struct WindowCost {
   double factors = 0;
   double prior = 0;  ///< without its constant

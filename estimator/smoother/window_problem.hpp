@@ -1,6 +1,6 @@
 #pragma once
-// What the smoother's parts work on: states, landmarks, planes, calibration, prior, and where they stand in
-// the system. One thread; the parts take it by reference and keep nothing of it.
+// The data of the smoother: states, landmarks, planes, calibration, prior, and their columns in the system.
+// One thread; the parts of the smoother take it by reference and keep no reference.
 //
 // Columns of a system: calibration, gyro intrinsics, explicit landmarks and planes, states in order of time.
 
@@ -22,7 +22,7 @@
 
 namespace swiftlet {
 
-/// What the first state of an epoch is known to be. Its position and yaw define the world.
+/// Prior of the first state of an epoch. Its position and yaw define the world.
 struct StartState {
   Stamp stamp;  ///< on the IMU's clock
   BodyState state;
@@ -37,8 +37,8 @@ struct WindowProblem {
                 bool estimate_extrinsics, bool estimate_gyro);
 
   Rig rig;
-  ImuNoise noise;        ///< as told
-  ImuExcess imu_excess;  ///< beyond it
+  ImuNoise noise;        ///< as configured
+  ImuExcess imu_excess;  ///< factors on it, estimated in flight
   ImuBuffer imu;
   Window window;
   LandmarkTable landmarks;
@@ -46,21 +46,21 @@ struct WindowProblem {
   CalibrationState calibration;
   GyroIntrinsicsState intrinsics;
   Prior prior;
-  std::array<RigPose, kMaxStates> rig_poses;  ///< by slot, as last placed
-  std::uint64_t oldest_recent_frame = 0;      ///< a landmark not seen since is out of sight
+  std::array<RigPose, kMaxStates> rig_poses;  ///< by slot, from the last placement
+  std::uint64_t oldest_recent_frame = 0;      ///< landmarks not seen since are out of sight
   int dimension = 0;
 
-  /// Of states, landmarks, planes and prior; samples and calibration stay.
+  /// Clears states, landmarks, planes and prior; keeps samples and calibration.
   void clear();
   void assignOffsets();
-  /// First column of a prior's block (PriorBlock::slot).
+  /// First column in the system of a block of the prior (PriorBlock::slot).
   [[nodiscard]] int offsetOf(std::uint8_t slot) const;
-  /// First estimates move with the window.
+  /// Moves the first estimates with the window.
   void moveEstimates();
-  /// Cameras at the states, with the calibration as it is.
+  /// Places cameras at the states, with the present calibration.
   void placeCameras();
   [[nodiscard]] LandmarkViews viewsOf(std::span<const Sighting> sightings) const;
-  /// The prior of the first state alone, and of the calibration.
+  /// Sets the prior to that of the first state and the calibration.
   void startPrior(const StartState& start);
 
   void retract(const Eigen::Ref<const Eigen::VectorXd>& step);

@@ -1,9 +1,10 @@
 #pragma once
-// Gauss-Newton over the window: all factors linearized, landmarks eliminated, one step, until it is small.
+// Gauss-Newton over the window: linearizes all factors, eliminates landmarks, and steps until the step is
+// small.
 //
-// Points move with the step (back-substitution); a step that raises the cost is taken back; sightings and
-// landmarks that do not fit are left out by named limits. Nothing is allocated after the constructor. Memory:
-// 2.6 MiB. Cost: docs/smoother.md.
+// Points move with the step (back-substitution); a step that raises the cost is undone; observations and
+// landmarks that do not fit are removed by named limits. No allocation after the constructor. Memory: 2.6
+// MiB. Cost: docs/smoother.md.
 
 #include <vector>
 
@@ -19,19 +20,19 @@ class WindowSolver {
  public:
   WindowSolver();
 
-  /// `pose_tolerance`: m, rad; a step in which no pose moves further is the last. `statistics` gets
-  /// iterations and the IMU's residual. kFailed when the system cannot be solved.
+  /// `pose_tolerance`: m, rad; stops after a step in which no pose moves further. `statistics` receives
+  /// iterations and the IMU residual. kFailed if the system cannot be solved.
   Status solve(WindowProblem& problem, NormalEquations& system, WindowCovariance& covariance, int iterations,
                double pose_tolerance, FrameStatistics& statistics);
 
-  /// Of the last solve: median of the squared norms of the newest state's residuals, in sigmas, before any
-  /// was rejected; 0: too few.
+  /// Median of the squared norms of the newest state's residuals in the last solve, in sigmas, before
+  /// rejections; 0 if there are too few.
   [[nodiscard]] double medianSquare() const { return median_square_; }
 
  private:
   void reintegrate(WindowProblem& problem) const;
   void triangulateAll(WindowProblem& problem, int iterations) const;
-  /// `first` of a solve: points get their sigmas, with the states where the last solve left them.
+  /// `first` step of a solve: sets the sigmas of points, with the states from the last solve.
   void build(WindowProblem& problem, NormalEquations& system, bool first);
   void substitutePoints(WindowProblem& problem, const VectorMap& step) const;
   void takeBack(WindowProblem& problem) const;
@@ -41,13 +42,13 @@ class WindowSolver {
   std::vector<double> squares_;              // scratch of medianOfNewest()
   double median_square_ = 0;
   std::vector<double> step_;
-  WindowCost cost_;  // where the system was last built
+  WindowCost cost_;  // at the point where the system was last built
 };
 
-/// Takes out sightings of the newest state that are further than `sigmas` off; a landmark that loses them
-/// kMaxRejections times goes.
+/// Removes observations of the newest state with residuals above `sigmas`; a landmark that loses them
+/// kMaxRejections times is removed.
 void rejectNewestSightings(WindowProblem& problem, double sigmas);
-/// Takes out landmarks whose sightings are further than `sigmas` off on the mean, kMaxRejections times.
+/// Removes landmarks whose mean residual was above `sigmas` kMaxRejections times.
 void rejectLandmarks(WindowProblem& problem, double sigmas);
 
 }  // namespace swiftlet

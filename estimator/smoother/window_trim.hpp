@@ -1,9 +1,10 @@
 #pragma once
-// Which states leave the window, when, and how.
+// Removes states from the window.
 //
-// A frame between two keyframes gives up its vision and merges its two IMU intervals; an old keyframe loses
-// velocity and biases, later its pose, into the prior (marginalization.hpp). Which keyframe:
-// keyframe_choice.hpp. Sources: Leutenegger et al., IJRR 2015; Usenko et al., RA-L 2020. Lives for one call.
+// A frame between two keyframes loses its observations, and its two IMU intervals are merged. An old keyframe
+// loses velocity and biases, later its pose, into the prior (marginalization.hpp). keyframe_choice.hpp
+// chooses the keyframe. Sources: Leutenegger et al., IJRR 2015; Usenko et al., RA-L 2020. Exists for one
+// call.
 
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/smoother/marginalization.hpp"
@@ -12,9 +13,9 @@
 namespace swiftlet {
 
 struct TrimLimits {
-  std::size_t recent = 0;            ///< newest frames that stay whole
-  std::size_t motion_keyframes = 0;  ///< behind them with velocity and biases
-  std::size_t keyframes = 0;         ///< these and the pose-only ones
+  std::size_t recent = 0;            ///< newest frames that keep all variables
+  std::size_t motion_keyframes = 0;  ///< states before them with velocity and biases
+  std::size_t keyframes = 0;         ///< these and pose-only ones
   double horizon = 0;                ///< s
 };
 
@@ -24,7 +25,7 @@ class WindowTrim {
              Marginalization& marginalization)
       : problem_(problem), system_(system), covariance_(covariance), marginalization_(marginalization) {}
 
-  /// Keyframes that left are appended.
+  /// Appends the keyframes that left.
   void trim(const TrimLimits& limits, FixedVector<KeyframeState, kMaxStates>& left_window);
 
  private:
