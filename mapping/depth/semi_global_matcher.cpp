@@ -129,7 +129,7 @@ MatchingRow SemiGlobalMatcher::matchingRow(int y, int y_before) {
 
 // How far disparities are from true ones, from the least sum's lead over the next best that is no neighbour,
 // and from how steeply sums rise beside it. Fitted to errors below 3 px on the pairs with true disparity and
-// on rendered flights; docs/depth.md has the shares within one, two and three sigma.
+// on rendered flights; docs/experiments/depth.md has the shares within one, two and three sigma.
 std::array<std::uint8_t, 64 * 64> SemiGlobalMatcher::makeSigmas() {
   constexpr double kFloor = 0.22;  // px, where all is clear
   constexpr double kDoubt = 0.85;  // px, added where another disparity is as good

@@ -9,7 +9,7 @@
 namespace swiftlet {
 namespace {
 
-/// docs/pose_graph.md has the figures behind these.
+/// docs/experiments/pose_graph.md has the figures behind these.
 constexpr double kPlaneChance = 1e-4;
 constexpr double kSpaceChance = 1e-2;
 
