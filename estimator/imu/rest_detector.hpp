@@ -8,8 +8,8 @@
 // quietest window so far) between fixed bounds, so that they suit coarse and fine sensors.
 //   IMU alone:  1 s within the limits, or 0.5 s well within them, if there are no images.
 //   Images:     still: a rest begins within wider IMU limits. In place: it begins within the normal limits.
-//               Slow: as in place, if the estimated speed is also near zero. Still, in place or slow: a rest in
-//               progress continues within the wider limits. Moving: a rest ends. Otherwise no rest begins,
+//               Slow: as In place, if the estimated speed is near zero too. Still, in place or slow: a rest
+//               in progress continues within the wider limits. Moving: a rest ends. Otherwise no rest begins,
 //               and one in progress continues within the normal limits.
 // No rest begins while the estimated speed is significantly above zero, or while the mean rate exceeds any
 // plausible gyro bias.
