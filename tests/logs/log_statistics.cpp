@@ -2,7 +2,8 @@
 //   log_statistics LOG...
 // Consistency: 6-dof pose NEES of the causal estimate, position and yaw relative to the first pose, at
 // 10 s, 30 s and at the log's end. Starts: a new run every two seconds of the log, its tilt and velocity
-// errors half a second after its first image, where the vehicle is in motion. docs/accuracy.md quotes them.
+// errors half a second after its first image, where the vehicle is in motion.
+// docs/experiments/accuracy_flights.md quotes them.
 
 #include <fmt/format.h>
 

@@ -1,4 +1,5 @@
-// What loops buy on flights that revisit (toolchain/revisit_flights.sh), as rows of docs/accuracy.md.
+// What loops buy on flights that revisit (toolchain/revisit_flights.sh), as rows of
+// docs/experiments/accuracy_loops.md.
 //
 //   loop_table FLIGHT...               causal odometry, full smoothing, full smoothing with loops
 //   loop_table --thresholds FLIGHT...  the pose graph alone over thresholds of similarity, with the selection

@@ -1,4 +1,4 @@
-// Cold starts in a kept map, as rows of docs/accuracy.md.
+// Cold starts in a kept map, as rows of docs/experiments/accuracy_loops.md.
 //
 //   relocalization_table FLIGHT...               each flight's first half is the map, starts every 2 s of the
 //   rest relocalization_table --map FLIGHT FLIGHT...  the whole of one is the map; the others fly in the same

@@ -165,8 +165,8 @@ def threads(path):
         d.arrow([(20, y + 22 + 24 * k), (70, y + 22 + 24 * k)], color, width=2)
         d.text(80, y + 26 + 24 * k, name, size=12, anchor="start", bold=True, color=color)
         d.text(250, y + 26 + 24 * k, words, size=12, anchor="start")
-    d.text(20, y + 100, "Blue and grey boxes are the flight path: no lock, no allocation, and they never wait for a green or yellow box.", size=12, anchor="start")
-    d.text(20, y + 117, "Not drawn: images of camera 0 to mesh, depth and labels to map, and what each step took to record.", size=12, anchor="start")
+    d.text(20, y + 100, "The sensor and the blue boxes are the flight path: no lock, no allocation, no wait for a green or yellow box.", size=12, anchor="start")
+    d.text(20, y + 117, "Not drawn: images of camera 0 to mesh; copies of images, depth and labels to map; what each step took to record.", size=12, anchor="start")
     d.save(path)
 
 

@@ -40,7 +40,7 @@ def table(page, first_header):
     for line in lines[begin + 2:]:
         if not line.startswith("|"):
             break
-        rows.append([cell.strip().strip("`*") for cell in line.strip("|").split("|")])
+        rows.append([re.sub("[`*]", "", cell).strip() for cell in line.strip("|").split("|")])
     return rows
 
 
