@@ -45,7 +45,7 @@ swiftlet_package_texts(libswiftlet-dev development)
 swiftlet_package_texts(swiftlet-doc documentation)
 install(FILES README.md DESTINATION share/doc/swiftlet COMPONENT documentation)
 install(DIRECTORY docs DESTINATION share/doc/swiftlet COMPONENT documentation
-        FILES_MATCHING PATTERN "*.md" PATTERN "*.svg" PATTERN "*.png")
+        FILES_MATCHING PATTERN "*.md" PATTERN "*.svg" PATTERN "*.jpg")
 
 if(SWIFTLET_BUILD_PROGRAM)
   swiftlet_package_texts(${program_package} program)

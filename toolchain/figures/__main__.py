@@ -1,6 +1,7 @@
 """Makes the figures under docs/figures; see toolchain/figures.sh."""
 
 import filecmp
+import glob
 import os
 import sys
 
@@ -43,12 +44,19 @@ NOT_REPEATED = ("view.jpg",)
 
 
 def check():
-    """Makes all figures anew; 1 when one differs from the committed one, or is one too many there."""
+    """Makes all figures anew; 1 when one differs from the committed one, is unknown here or on no page."""
     committed, out = os.path.join(runs.ROOT, "docs/figures"), os.path.join(runs.WORK, "check")
     os.makedirs(out, exist_ok=True)
     bad = sorted(set(os.listdir(committed)) - set(FIGURES))
     for name in bad:
         print(f"{name}: no figure of this script")
+    pages = [os.path.join(runs.ROOT, "README.md")]
+    pages += glob.glob(os.path.join(runs.ROOT, "docs/**/*.md"), recursive=True)
+    text = "".join(open(page).read() for page in pages)
+    for name in FIGURES:
+        if f"figures/{name})" not in text:
+            print(f"{name}: on no page")
+            bad.append(name)
     for name, make in FIGURES.items():
         if name in NOT_REPEATED:
             continue
@@ -57,7 +65,7 @@ def check():
         if not os.path.exists(old) or not filecmp.cmp(old, os.path.join(out, name), shallow=False):
             print(f"{name}: differs from {os.path.join(out, name)}")
             bad.append(name)
-    print(f"figures: {len(FIGURES) - len(NOT_REPEATED)} made anew, {len(bad)} differ")
+    print(f"figures: {len(FIGURES) - len(NOT_REPEATED)} made anew, {len(bad)} faults")
     return 1 if bad else 0
 
 

@@ -20,8 +20,10 @@ class Drawing:
     def text(self, x, y, words, size=13, anchor="middle", color=BLACK, bold=False, italic=False):
         style = (' font-weight="bold"' if bold else "") + (' font-style="italic"' if italic else "")
         for k, line in enumerate(words.split("\n")):
-            self.add(f'<text x="{x:g}" y="{y + k * (size + 3):g}" font-size="{size}" text-anchor="{anchor}" fill="{color}"{style}>'
-                     f"{escape(line)}</text>")
+            self.add(
+                f'<text x="{x:g}" y="{y + k * (size + 3):g}" font-size="{size}" text-anchor="{anchor}" fill="{color}"{style}>'
+                f"{escape(line)}</text>"
+            )
 
     def box(self, x, y, w, h, title, words="", fill=FLIGHT, dashed=False, size=13):
         dash = ' stroke-dasharray="5 4"' if dashed else ""
@@ -58,9 +60,11 @@ class Drawing:
 
     def save(self, path):
         with open(path, "w") as file:
-            file.write(f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width} {self.height}" width="{self.width}" '
-                       f'height="{self.height}" font-family="DejaVu Sans, Helvetica, Arial, sans-serif">\n'
-                       f'<rect width="{self.width}" height="{self.height}" fill="white"/>\n')
+            file.write(
+                f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width} {self.height}" width="{self.width}" '
+                f'height="{self.height}" font-family="DejaVu Sans, Helvetica, Arial, sans-serif">\n'
+                f'<rect width="{self.width}" height="{self.height}" fill="white"/>\n'
+            )
             file.write("\n".join(self.parts) + "\n</svg>\n")
 
 
@@ -93,7 +97,9 @@ def architecture(path):
     d.box(655, 40, 120, 62, "autopilot", "MAVLink: pose,\nobstacles", OUTPUT)
     d.box(655, 120, 120, 46, "ROS 2", "topics", OUTPUT)
     d.box(655, 184, 120, 46, "live view", "browser", OUTPUT)
-    d.box(655, 312, 120, 90, "run folder", "trajectory, states,\nevents, map;\nrecording, which\nrepeats the run", OUTPUT)
+    d.box(
+        655, 312, 120, 90, "run folder", "trajectory, states,\nevents, map;\nrecording, which\nrepeats the run", OUTPUT
+    )
 
     d.arrow([(145, 71), (200, 71)], BLUE, "images", (173, 64))
     d.arrow([(145, 148), (350, 148)], ORANGE, "samples", (250, 142))
@@ -155,18 +161,43 @@ def threads(path):
     d.arrow([(325, 306), (325, 350)], newest, "corrections", (331, 334), anchor="start")
     d.arrow([(495, 186), (495, 228), (440, 228), (440, 378), (400, 378)], ring, "frames", (446, 372), anchor="start")
     d.arrow([(620, 168), (640, 168), (640, 388), (655, 388)], newest, "newest state", (634, 340), anchor="end")
-    d.arrow([(60, 130), (60, 232), (10, 232), (10, 378), (20, 378)], slots, "all that enters", (64, 215), anchor="start")
+    d.arrow(
+        [(60, 130), (60, 232), (10, 232), (10, 378), (20, 378)], slots, "all that enters", (64, 215), anchor="start"
+    )
     y = 450
-    d.text(20, y, "how an arrow carries, and what happens when the reader is late", size=12, anchor="start", color=GREY, italic=True)
-    for k, (color, name, words) in enumerate((
+    d.text(
+        20,
+        y,
+        "how an arrow carries, and what happens when the reader is late",
+        size=12,
+        anchor="start",
+        color=GREY,
+        italic=True,
+    )
+    for k, (color, name, words) in enumerate(
+        (
             (ring, "ring", "every value in order; a full ring refuses the value and counts it"),
             (newest, "newest value", "overwritten by the next; numbers show the gap; the reader never waits"),
-            (slots, "slots of a fixed pool", "the oldest waiting image goes back to the writer, counted"))):
+            (slots, "slots of a fixed pool", "the oldest waiting image goes back to the writer, counted"),
+        )
+    ):
         d.arrow([(20, y + 22 + 24 * k), (70, y + 22 + 24 * k)], color, width=2)
         d.text(80, y + 26 + 24 * k, name, size=12, anchor="start", bold=True, color=color)
         d.text(250, y + 26 + 24 * k, words, size=12, anchor="start")
-    d.text(20, y + 100, "The sensor and the blue boxes are the flight path: no lock, no allocation, no wait for a green or yellow box.", size=12, anchor="start")
-    d.text(20, y + 117, "Not drawn: images of camera 0 to mesh; copies of images, depth and labels to map; what each step took to record.", size=12, anchor="start")
+    d.text(
+        20,
+        y + 100,
+        "The sensor and the blue boxes are the flight path: no lock, no allocation, no wait for a green or yellow box.",
+        size=12,
+        anchor="start",
+    )
+    d.text(
+        20,
+        y + 117,
+        "Not drawn: images of camera 0 to mesh; copies of images, depth and labels to map; what each step took to record.",
+        size=12,
+        anchor="start",
+    )
     d.save(path)
 
 
@@ -200,7 +231,12 @@ def frames(path):
     d.text(375, 56, "what the odometry estimates", size=11, color=GREY)
     d.arrow([(535, 92), (590, 45), (678, 52)], BLUE, "T_body_cam0", (585, 36))
     d.arrow([(540, 115), (610, 195), (678, 191)], BLUE, "T_body_cam1", (605, 214))
-    d.text(400, 312, "T_A_B takes coordinates in B to coordinates in A:  p_map = T_map_world T_world_body T_body_cam0 p_cam0", size=12)
+    d.text(
+        400,
+        312,
+        "T_A_B takes coordinates in B to coordinates in A:  p_map = T_map_world T_world_body T_body_cam0 p_cam0",
+        size=12,
+    )
     d.save(path)
 
 
@@ -220,12 +256,20 @@ def window(path):
     d.text(675, 294, "4 newest frames:", size=12)
     d.text(675, 309, "the same", size=12)
     # Landmarks and what sees them.
-    landmarks = ((150, (0, 1, 2, 3)), (275, (2, 3, 4, 5, 6)), (400, (5, 6, 7, 8, 9)), (540, (8, 9, 10, 11, 12, 13)), (670, (11, 12, 13, 14, 15)))
+    landmarks = (
+        (150, (0, 1, 2, 3)),
+        (275, (2, 3, 4, 5, 6)),
+        (400, (5, 6, 7, 8, 9)),
+        (540, (8, 9, 10, 11, 12, 13)),
+        (670, (11, 12, 13, 14, 15)),
+    )
     for x, seen in landmarks:
         for k in seen:
             d.line([(x, 118), (xs[k], y - 14)], "#9a9a9a", 0.9)
     for x, _ in landmarks:
-        d.add(f'<rect x="{x - 9}" y="104" width="18" height="18" fill="{PINK}" stroke="{GREY}" transform="rotate(45 {x} 113)"/>')
+        d.add(
+            f'<rect x="{x - 9}" y="104" width="18" height="18" fill="{PINK}" stroke="{GREY}" transform="rotate(45 {x} 113)"/>'
+        )
     d.text(400, 82, "landmarks: eliminated while the system is built (Schur complement)", size=12)
     for k in range(7, 15):
         d.line([(xs[k] + 14, y), (xs[k + 1] - 14, y)], ORANGE, 2)
@@ -243,7 +287,19 @@ def window(path):
     d.text(400, y + 112, "prior: what the marginalized states and their landmarks said of those that stay", size=12)
     d.text(400, 24, "time: oldest left, newest right", size=12, color=GREY, italic=True)
     d.arrow([(300, 34), (500, 34)], GREY)
-    d.text(20, y + 146, "Leave: a keyframe's velocity and biases when it gets older than the 9 newest states with motion, and one pose-only", size=11.5, anchor="start")
-    d.text(20, y + 163, "keyframe when there are more than 7: both are marginalized into the prior. A frame that is no keyframe is dropped", size=11.5, anchor="start")
+    d.text(
+        20,
+        y + 146,
+        "Leave: a keyframe's velocity and biases when it gets older than the 9 newest states with motion, and one pose-only",
+        size=11.5,
+        anchor="start",
+    )
+    d.text(
+        20,
+        y + 163,
+        "keyframe when there are more than 7: both are marginalized into the prior. A frame that is no keyframe is dropped",
+        size=11.5,
+        anchor="start",
+    )
     d.text(20, y + 180, "behind the 4 newest; its two IMU intervals become one.", size=11.5, anchor="start")
     d.save(path)

@@ -37,7 +37,7 @@ def tracks(path):
     keyframes = runs.keyframes(runs.v102())
     last = keyframe_index(keyframes)
     past = {}
-    for _, features in keyframes[:last + 1]:
+    for _, features in keyframes[: last + 1]:
         for track, pixel, _ in features:
             if pixel:
                 past.setdefault(track, []).append(pixel)
@@ -54,7 +54,9 @@ def tracks(path):
         axis.plot(*pixel, "o", color=color, markersize=3.6, markeredgecolor="white", markeredgewidth=0.4)
     bar = figure.colorbar(ScalarMappable(norm, colors), ax=axis, shrink=0.85, pad=0.01)
     bar.set_label("keyframes that have seen the feature (12: or more)")
-    axis.set_title(f"{len(features)} features of one keyframe; lines: where the {shown - 1} keyframes before it saw them")
+    axis.set_title(
+        f"{len(features)} features of one keyframe; lines: where the {shown - 1} keyframes before it saw them"
+    )
     save_jpeg(picture_of(figure), path)
 
 
@@ -80,7 +82,16 @@ def stereo_matches(path):
     figure, axes = panels(1, 2, 3.0)
     for camera, (axis, pixels) in enumerate(zip(axes, (a, b))):
         shown_image(axis, runs.image(log, stamp, camera))
-        axis.scatter(pixels[:, 0], pixels[:, 1], c=np.clip(z, 1, 8), cmap=colors, norm=norm, s=13, edgecolors="white", linewidths=0.4)
+        axis.scatter(
+            pixels[:, 0],
+            pixels[:, 1],
+            c=np.clip(z, 1, 8),
+            cmap=colors,
+            norm=norm,
+            s=13,
+            edgecolors="white",
+            linewidths=0.4,
+        )
         axis.set_title(f"camera {camera}")
     # Where the same point lies in the other image: the shift is what tells its distance.
     for (u, v), (u0, v0), distance in zip(b, a, z):
@@ -117,7 +128,9 @@ def mesh_over_image(path):
             continue
         corners = pixels[face]
         color = colors(norm(np.clip(z[face].mean(), 1, 8)))
-        axis.fill(corners[:, 0], corners[:, 1], facecolor=(*color[:3], 0.22), edgecolor=(*color[:3], 0.95), linewidth=0.8)
+        axis.fill(
+            corners[:, 0], corners[:, 1], facecolor=(*color[:3], 0.22), edgecolor=(*color[:3], 0.95), linewidth=0.8
+        )
     bar = figure.colorbar(ScalarMappable(norm, colors), ax=axis, shrink=0.85, pad=0.01, ticks=[1, 2, 4, 8])
     bar.ax.set_yticklabels(["1", "2", "4", "8"])
     bar.minorticks_off()
@@ -191,8 +204,14 @@ def labelled_map(path):
     used = [k for k in range(1, len(LABELS)) if (labels == k).any()]
     handles = [plt.Rectangle((0, 0), 1, 1, color=LABEL_COLORS[k]) for k in used]
     handles.append(plt.Line2D([], [], color="black", linewidth=2))
-    axis.legend(handles, [LABELS[k] for k in used] + ["trajectory"], loc="upper center", bbox_to_anchor=(0.5, 0), ncols=5,
-                fontsize=9)
+    axis.legend(
+        handles,
+        [LABELS[k] for k in used] + ["trajectory"],
+        loc="upper center",
+        bbox_to_anchor=(0.5, 0),
+        ncols=5,
+        fontsize=9,
+    )
     save_jpeg(picture_of(figure), path)
 
 
@@ -213,7 +232,9 @@ def distance_slice(path):
     frame = [*extent["x"], *extent["y"]]
     figure, axis = plt.subplots(figsize=(6.2, 6), layout="constrained")
     axis.imshow(shown, extent=frame, interpolation="nearest")
-    field = axis.imshow(np.where(metres > 0, metres, np.nan), extent=frame, interpolation="nearest", cmap="viridis", vmin=0)
+    field = axis.imshow(
+        np.where(metres > 0, metres, np.nan), extent=frame, interpolation="nearest", cmap="viridis", vmin=0
+    )
     # The program takes the surface's voxels for distance 0 or a few millimetres: black, as the walls they are.
     surface = (kinds == (0, 0, 0)).all(axis=2)
     axis.imshow(np.where(surface[..., None], [0, 0, 0, 1.0], [0, 0, 0, 0]), extent=frame, interpolation="nearest")
@@ -225,6 +246,12 @@ def distance_slice(path):
     bar.set_label("distance [m]")
     handles = [plt.Rectangle((0, 0), 1, 1, color=c) for c in ("black", PINK, LIGHT)]
     handles.append(plt.Line2D([], [], color=GREY, linewidth=1.4))
-    axis.legend(handles, ["surface", "behind a surface", "unknown", "trajectory (white)"], loc="upper center",
-                bbox_to_anchor=(0.5, -0.1), ncols=4, fontsize=9)
+    axis.legend(
+        handles,
+        ["surface", "behind a surface", "unknown", "trajectory (white)"],
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.1),
+        ncols=4,
+        fontsize=9,
+    )
     save_jpeg(picture_of(figure), path)

@@ -37,7 +37,7 @@ def table(page, first_header):
         lines = file.read().splitlines()
     begin = next(i for i, line in enumerate(lines) if line.startswith(f"| {first_header} |"))
     rows = []
-    for line in lines[begin + 2:]:
+    for line in lines[begin + 2 :]:
         if not line.startswith("|"):
             break
         rows.append([re.sub("[`*]", "", cell).strip() for cell in line.strip("|").split("|")])
@@ -69,7 +69,10 @@ def error_over_time(path):
     for axis, log in zip(axes, runs.DRAWN_LOGS):
         run, true = runs.default_run(log), runs.truth(runs.log_folder(log))
         start = runs.tum(run).stamps[0]
-        for name, color, label in (("odometry.tum", BLUE, "odometry, as flown"), ("map.tum", ORANGE, "after full smoothing")):
+        for name, color, label in (
+            ("odometry.tum", BLUE, "odometry, as flown"),
+            ("map.tum", ORANGE, "after full smoothing"),
+        ):
             estimate, there = runs.fitted(runs.tum(run, name), true)
             axis.plot(seconds(estimate, start), distance_mm(estimate, there), color=color, label=label)
         axis.set(ylabel="position error [mm]", ylim=(0, None))
@@ -84,8 +87,11 @@ def consistency(path):
     run = runs.twin_without_loops()
     true = runs.truth(runs.twin_flight())
     s = runs.states(run)
-    estimate = runs.Trajectory(s["timestamp"], np.stack([s[f"p_{k}"] for k in "xyz"], axis=1),
-                               runs.rotation(s["q_w"], s["q_x"], s["q_y"], s["q_z"]))
+    estimate = runs.Trajectory(
+        s["timestamp"],
+        np.stack([s[f"p_{k}"] for k in "xyz"], axis=1),
+        runs.rotation(s["q_w"], s["q_x"], s["q_y"], s["q_z"]),
+    )
     there, inside = runs.at_stamps(true, estimate.stamps)
     estimate = estimate.pick(inside)
     # Position and yaw are free: those of the first keyframe are made equal, and tilt stays an error.
@@ -98,11 +104,17 @@ def consistency(path):
     figure, axes = panels(3, 2, 5.6, sharex=True)
     inside_band = []
     for column, (error, variance, factor, unit) in enumerate(
-            ((position, "var_p_", 1e3, "position {} [mm]"), (attitude, "var_phi_", np.degrees(1), "attitude about {} [deg]"))):
+        (
+            (position, "var_p_", 1e3, "position {} [mm]"),
+            (attitude, "var_phi_", np.degrees(1), "attitude about {} [deg]"),
+        )
+    ):
         for row, name in enumerate("xyz"):
             band = 3 * factor * np.sqrt(s[variance + name][inside])
             axis = axes[row, column]
-            axis.fill_between(seconds(estimate), -band, band, color=SKY, alpha=0.35, linewidth=0, label="3 sigma of the estimate")
+            axis.fill_between(
+                seconds(estimate), -band, band, color=SKY, alpha=0.35, linewidth=0, label="3 sigma of the estimate"
+            )
             axis.plot(seconds(estimate), error[:, row], color=BLACK, linewidth=1.1, label="error")
             axis.set_ylabel(unit.format(name))
             inside_band.append(np.abs(error[1:, row]) <= band[1:])
@@ -115,9 +127,11 @@ def consistency(path):
 
 def loop_closure(path):
     true = runs.truth(runs.twin_flight())
-    runs_shown = ((runs.tum(runs.twin_without_loops()), GREY, "odometry, as flown"),
-                  (runs.tum(runs.twin_without_loops(), "map.tum"), ORANGE, "full smoothing, no loops"),
-                  (runs.tum(runs.twin(), "map.tum"), BLUE, "full smoothing with loops"))
+    runs_shown = (
+        (runs.tum(runs.twin_without_loops()), GREY, "odometry, as flown"),
+        (runs.tum(runs.twin_without_loops(), "map.tum"), ORANGE, "full smoothing, no loops"),
+        (runs.tum(runs.twin(), "map.tum"), BLUE, "full smoothing with loops"),
+    )
     start = runs_shown[0][0].stamps[0]
     magnified = 50
     figure, (above, error) = panels(2, 1, 6.4, height_ratios=[1.15, 1])
@@ -126,10 +140,19 @@ def loop_closure(path):
         if label != "odometry, as flown":
             drawn = there.p + magnified * (estimate.p - there.p)
             above.plot(drawn[:, 0], drawn[:, 1], color=color, linewidth=1.1)
-        error.plot(seconds(estimate, start), distance_mm(estimate, there), color=color,
-                   label=f"{label}: {1e3 * runs.ate(estimate, there):.1f} mm RMSE")
+        error.plot(
+            seconds(estimate, start),
+            distance_mm(estimate, there),
+            color=color,
+            label=f"{label}: {1e3 * runs.ate(estimate, there):.1f} mm RMSE",
+        )
     above.plot(true.p[:, 0], true.p[:, 1], color=BLACK, linewidth=0.8, linestyle=":")
-    above.set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title=f"from above, errors drawn {magnified} times larger; dotted: truth")
+    above.set(
+        aspect="equal",
+        xlabel="x [m]",
+        ylabel="y [m]",
+        title=f"from above, errors drawn {magnified} times larger; dotted: truth",
+    )
     error.set(xlabel="time since the first image [s]", ylabel="position error [mm]", ylim=(0, None))
     error.legend(loc="upper left", fontsize=9)
     error.set_ylim(0, 30)
@@ -145,19 +168,36 @@ def loops_selected(path):
     shown = set()
     rejected = [loop for loop in found if loop[2] != "selected"]
     selected = [loop for loop in found if loop[2] == "selected"]
-    for loops, color, style, label in ((rejected, RED, "--", f"{len(rejected)} rejected"),
-                                       (selected, BLUE, "-", f"{len(selected)} accepted")):
+    for loops, color, style, label in (
+        (rejected, RED, "--", f"{len(rejected)} rejected"),
+        (selected, BLUE, "-", f"{len(selected)} accepted"),
+    ):
         for old, new, _ in loops:
             ends, _ = runs.at_stamps(true, [old, new])
-            above.plot(ends.p[:, 0], ends.p[:, 1], color=color, linestyle=style, linewidth=0.9,
-                       label=None if label in shown else label, marker="o", markersize=2.5)
+            above.plot(
+                ends.p[:, 0],
+                ends.p[:, 1],
+                color=color,
+                linestyle=style,
+                linewidth=0.9,
+                label=None if label in shown else label,
+                marker="o",
+                markersize=2.5,
+            )
             shown.add(label)
-        time.plot([(old - start) * 1e-9 for old, _, _ in loops], [(new - start) * 1e-9 for _, new, _ in loops],
-                  "o" if color == BLUE else "x", color=color, markersize=5, label=label)
+        time.plot(
+            [(old - start) * 1e-9 for old, _, _ in loops],
+            [(new - start) * 1e-9 for _, new, _ in loops],
+            "o" if color == BLUE else "x",
+            color=color,
+            markersize=5,
+            label=label,
+        )
     above.set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title="two rooms that look the same, from above")
     above.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=3, fontsize=9)
-    time.set(xlabel="time of the older keyframe [s]", ylabel="time of the newer keyframe [s]",
-             title="each verified loop")
+    time.set(
+        xlabel="time of the older keyframe [s]", ylabel="time of the newer keyframe [s]", title="each verified loop"
+    )
     time.legend(loc="best", fontsize=9)
     save_svg(figure, path)
 
@@ -167,7 +207,9 @@ def projected_uncertainty(path):
     with open(os.path.join(runs.calibrated(), "report.html")) as file:
         document = re.search(r'id="report-document">(.*?)</script>', file.read(), re.S).group(1)
     drawings = {plot["id"]: plot["svg"] for plot in json.loads(document)["runs"][0]["plots"] if "svg" in plot}
-    cell = re.compile(r'<rect x="([\d.]+)" y="([\d.]+)" width="([\d.]+)" height="([\d.]+)" fill="[^"]*"><title>([\d.e-]+) px')
+    cell = re.compile(
+        r'<rect x="([\d.]+)" y="([\d.]+)" width="([\d.]+)" height="([\d.]+)" fill="[^"]*"><title>([\d.e-]+) px'
+    )
     figure, axes = panels(1, 2, 3.2)
     cells = [[[float(v) for v in found] for found in cell.findall(drawings[f"uncertainty{c}"])] for c in (0, 1)]
     norm = Normalize(0, 1e3 * max(value for of_camera in cells for *_, value in of_camera))
@@ -231,11 +273,26 @@ def draws(path):
         for k, log in enumerate(runs.DRAWN_LOGS):
             values = [1e3 * float(row["ate_m"]) for row in rows if row["log"] == log and row["cameras"] == cameras]
             spread = np.linspace(-0.18, 0.18, len(values))
-            axis.plot(k + spread, values, "o", color=SKY, markeredgecolor=BLUE, markersize=5,
-                      label="one draw" if k == 0 else None)
-            axis.plot([k - 0.25, k + 0.25], [np.mean(values)] * 2, color=BLACK, label="mean of eight" if k == 0 else None)
-            axis.plot(k, 1e3 * float(ours[(log, int(cameras), "odometry")]["from_3s_m"]), "D", color=ORANGE, markersize=6,
-                      label="default settings" if k == 0 else None)
+            axis.plot(
+                k + spread,
+                values,
+                "o",
+                color=SKY,
+                markeredgecolor=BLUE,
+                markersize=5,
+                label="one draw" if k == 0 else None,
+            )
+            axis.plot(
+                [k - 0.25, k + 0.25], [np.mean(values)] * 2, color=BLACK, label="mean of eight" if k == 0 else None
+            )
+            axis.plot(
+                k,
+                1e3 * float(ours[(log, int(cameras), "odometry")]["from_3s_m"]),
+                "D",
+                color=ORANGE,
+                markersize=6,
+                label="default settings" if k == 0 else None,
+            )
         axis.set_xticks(range(len(runs.DRAWN_LOGS)), runs.DRAWN_LOGS)
         axis.set(title=title, ylim=(0, None), xlim=(-0.5, 2.5))
         axis.grid(axis="x", visible=False)
@@ -255,7 +312,9 @@ def full_smoothing_seeds(path):
     axis.axvline(1, color=RED, linestyle="--", linewidth=1.2)
     axis.text(1.005, y[0] + 0.3, "no gain", color=RED, fontsize=9)
     axis.set_yticks(y, names)
-    axis.set(xlabel="ATE after full smoothing / ATE of the odometry (mean, least and largest of five seeds)", xlim=(0, 1.1))
+    axis.set(
+        xlabel="ATE after full smoothing / ATE of the odometry (mean, least and largest of five seeds)", xlim=(0, 1.1)
+    )
     save_svg(figure, path)
 
 
@@ -267,9 +326,17 @@ def latency(path):
         chosen = [row for row in rows if row["kind"] == kind]
         lower = np.array([float(row["from_ms"]) for row in chosen])
         counts = np.array([int(row["count"]) for row in chosen])
-        width = lower * (10 ** 0.05 - 1)  # bins of the program: twenty to a decade
-        axis.bar(lower, counts / counts.sum() * 100, width, align="edge", color=color, alpha=0.65,
-                 edgecolor=color, label=f"{counts.sum()} {'keyframes' if kind == 'keyframes' else 'other frames'}")
+        width = lower * (10**0.05 - 1)  # bins of the program: twenty to a decade
+        axis.bar(
+            lower,
+            counts / counts.sum() * 100,
+            width,
+            align="edge",
+            color=color,
+            alpha=0.65,
+            edgecolor=color,
+            label=f"{counts.sum()} {'keyframes' if kind == 'keyframes' else 'other frames'}",
+        )
     for limit, text in ((6, "median's\nbudget"), (15, "budget of 99 %")):
         axis.axvline(limit, color=RED, linestyle="--", linewidth=1.2)
         axis.text(limit * 1.01, axis.get_ylim()[1] * 0.99, f"{text}, {limit} ms", color=RED, fontsize=9, va="top")
@@ -284,9 +351,10 @@ def loop_selection(path):
     figure, axis = panels(1, 1, 4.0)
     held = [float(row["loops_held"]) for row in rows]
     for column, factor, color, marker, label in (
-            ("us_per_new_loop", 1, BLUE, "o", "new loop, mean since the point before"),
-            ("us_worst", 1, ORANGE, "s", "new loop, worst"),
-            ("ms_one_search", 1e3, GREEN, "^", "one search over all loops")):
+        ("us_per_new_loop", 1, BLUE, "o", "new loop, mean since the point before"),
+        ("us_worst", 1, ORANGE, "s", "new loop, worst"),
+        ("ms_one_search", 1e3, GREEN, "^", "one search over all loops"),
+    ):
         axis.plot(held, [factor * float(row[column]) for row in rows], marker=marker, color=color, label=label)
     axis.set(xscale="log", yscale="log", xlabel="loops held", ylabel="time [us]")
     axis.legend(loc="upper left")

@@ -66,10 +66,16 @@ def v102():
 
 def twin_flight():
     """60 s through two rooms that look the same, rendered (toolchain/revisit_flights.sh)."""
+
     def make(part):
         environment = dict(os.environ, SWIFTLET=SWIFTLET, SWIFTLET_DATA=DATA)
-        subprocess.run([os.path.join(ROOT, "toolchain/revisit_flights.sh"), part, "twin_60"], env=environment, check=True,
-                       stdout=subprocess.DEVNULL)
+        subprocess.run(
+            [os.path.join(ROOT, "toolchain/revisit_flights.sh"), part, "twin_60"],
+            env=environment,
+            check=True,
+            stdout=subprocess.DEVNULL,
+        )
+
     return os.path.join(made("flights", make), "twin_60")
 
 
@@ -83,8 +89,10 @@ def twin_without_loops():
 
 def kept_map():
     """The map of vil_v102 with true poses, in one file."""
+
     def make(part):
         swiftlet("fuse", log_folder("vil_v102"), "--out", part, "--keep", os.path.join(WORK, "v102.swm"))
+
     made("fused", make)
     return os.path.join(WORK, "v102.swm")
 
@@ -139,15 +147,25 @@ def rotation(w, x, y, z):
     q = np.stack([w, x, y, z], axis=-1).astype(float)
     q /= np.linalg.norm(q, axis=-1, keepdims=True)
     w, x, y, z = np.moveaxis(q, -1, 0)
-    rows = [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
-            2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-            2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]
+    rows = [
+        1 - 2 * (y * y + z * z),
+        2 * (x * y - w * z),
+        2 * (x * z + w * y),
+        2 * (x * y + w * z),
+        1 - 2 * (x * x + z * z),
+        2 * (y * z - w * x),
+        2 * (x * z - w * y),
+        2 * (y * z + w * x),
+        1 - 2 * (x * x + y * y),
+    ]
     return np.stack(rows, axis=-1).reshape(q.shape[:-1] + (3, 3))
 
 
 def rotation_vector(R):
     """Of small rotations, to well below a degree."""
-    return 0.5 * np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1)
+    return 0.5 * np.stack(
+        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1
+    )
 
 
 def tum(run, name="odometry.tum"):
@@ -202,7 +220,9 @@ def at_stamps(trajectory, stamps):
     inside = (stamps >= t[0]) & (stamps <= t[-1])
     s = stamps[inside]
     # Relative to the first stamp a double holds nanoseconds.
-    p = np.stack([np.interp((s - t[0]).astype(float), (t - t[0]).astype(float), trajectory.p[:, k]) for k in range(3)], axis=1)
+    p = np.stack(
+        [np.interp((s - t[0]).astype(float), (t - t[0]).astype(float), trajectory.p[:, k]) for k in range(3)], axis=1
+    )
     after = np.clip(np.searchsorted(t, s), 1, len(t) - 1)
     nearest = np.where(s - t[after - 1] < t[after] - s, after - 1, after)
     return Trajectory(s, p, trajectory.R[nearest]), inside
@@ -275,8 +295,10 @@ class Camera:
     def distorted(self, x, y):
         r2 = x * x + y * y
         radial = 1 + self.k1 * r2 + self.k2 * r2 * r2
-        return (x * radial + 2 * self.p1 * x * y + self.p2 * (r2 + 2 * x * x),
-                y * radial + 2 * self.p2 * x * y + self.p1 * (r2 + 2 * y * y))
+        return (
+            x * radial + 2 * self.p1 * x * y + self.p2 * (r2 + 2 * x * x),
+            y * radial + 2 * self.p2 * x * y + self.p1 * (r2 + 2 * y * y),
+        )
 
     def project(self, points):
         """Points in the camera's axes to pixels; the lens's polynomial holds near the image only."""

@@ -34,9 +34,23 @@ class Browser:
             os.dup2(theirs[1], 4)
 
         self.process = subprocess.Popen(
-            [program, "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-             "--hide-scrollbars", f"--user-data-dir={profile}", "--remote-debugging-pipe", "about:blank"],
-            close_fds=False, preexec_fn=place, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            [
+                program,
+                "--headless",
+                "--no-sandbox",
+                "--use-gl=angle",
+                "--use-angle=swiftshader",
+                "--enable-unsafe-swiftshader",
+                "--hide-scrollbars",
+                f"--user-data-dir={profile}",
+                "--remote-debugging-pipe",
+                "about:blank",
+            ],
+            close_fds=False,
+            preexec_fn=place,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
         for end in (read3, write4, *theirs):
             os.close(end)
         self.to, self.answers = os.fdopen(write3, "wb"), os.fdopen(read4, "rb")
@@ -64,6 +78,14 @@ class Browser:
                     raise SystemExit(f"figures: chromium: {answer['error']}")
                 return answer["result"]
 
+    def wait_for(self, expression, most_s=120):
+        for _ in range(int(most_s / 0.5)):
+            answer = self.call("Runtime.evaluate", expression=expression)
+            if answer["result"].get("value") is True:
+                return
+            time.sleep(0.5)
+        raise SystemExit(f"figures: the page does not come to {expression}")
+
     def picture(self):
         png = base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
         return Image.open(io.BytesIO(png)).convert("RGB")
@@ -79,7 +101,8 @@ def report(path):
     browser = Browser(1480)
     try:
         browser.call("Page.navigate", url="file://" + page)
-        time.sleep(6)  # for the surfaces to be drawn
+        browser.wait_for("document.body.innerText.includes('grid 1 m')")  # the legend of the 3D view
+        time.sleep(3)  # for the surfaces to be drawn
         save_jpeg(browser.picture(), path)
     finally:
         browser.close()
@@ -91,8 +114,21 @@ def view(path):
     words = os.path.join(runs.WORK, "view.log")
     browser = Browser(1480)
     with open(words, "w") as log:
-        run = subprocess.Popen([runs.SWIFTLET, "replay", runs.log_folder("vil_v102"), "--real-time", "--map", "--out",
-                                os.path.join(runs.WORK, "view_run"), "--view", "127.0.0.1:0"], stdout=log, stderr=log)
+        run = subprocess.Popen(
+            [
+                runs.SWIFTLET,
+                "replay",
+                runs.log_folder("vil_v102"),
+                "--real-time",
+                "--map",
+                "--out",
+                os.path.join(runs.WORK, "view_run"),
+                "--view",
+                "127.0.0.1:0",
+            ],
+            stdout=log,
+            stderr=log,
+        )
     try:
         address = None
         while address is None:
@@ -102,7 +138,8 @@ def view(path):
             with open(words) as log:
                 address = next((word for word in log.read().split() if word.startswith("http://")), None)
         browser.call("Page.navigate", url=address)
-        time.sleep(moment_s)
+        # The bar at the top tells the time of the newest state.
+        browser.wait_for(rf"parseFloat((document.body.innerText.match(/(\d+\.\d) s/) || [0, 0])[1]) >= {moment_s}")
         save_jpeg(browser.picture(), path)
     finally:
         browser.close()

@@ -11,31 +11,41 @@ import matplotlib.pyplot as plt  # noqa: E402
 
 # Okabe and Ito's palette (2008).
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, RED, PINK = (
-    "#000000", "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7")
+    "#000000",
+    "#e69f00",
+    "#56b4e9",
+    "#009e73",
+    "#f0e442",
+    "#0072b2",
+    "#d55e00",
+    "#cc79a7",
+)
 GREY, LIGHT = "#666666", "#d9d9d9"
 
 WIDTH_INCHES = 8.0  # at 100 dpi the 800 px of a page
 MOST_BYTES = 150_000  # of one figure; all of them stay below 3 MB
 
-plt.rcParams.update({
-    "svg.hashsalt": "swiftlet",
-    "svg.fonttype": "none",
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
-    "font.size": 10,
-    "axes.titlesize": 10.5,
-    "axes.grid": True,
-    "grid.color": LIGHT,
-    "grid.linewidth": 0.6,
-    "axes.axisbelow": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-    "lines.linewidth": 1.5,
-    "figure.facecolor": "white",
-    "path.simplify": True,
-    "path.simplify_threshold": 0.3,
-})
+plt.rcParams.update(
+    {
+        "svg.hashsalt": "swiftlet",
+        "svg.fonttype": "none",
+        "font.family": "sans-serif",
+        "font.sans-serif": ["DejaVu Sans"],
+        "font.size": 10,
+        "axes.titlesize": 10.5,
+        "axes.grid": True,
+        "grid.color": LIGHT,
+        "grid.linewidth": 0.6,
+        "axes.axisbelow": True,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "legend.frameon": False,
+        "lines.linewidth": 1.5,
+        "figure.facecolor": "white",
+        "path.simplify": True,
+        "path.simplify_threshold": 0.3,
+    }
+)
 
 
 def panels(rows, columns, height, **options):
