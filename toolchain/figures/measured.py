@@ -25,7 +25,7 @@ def draws():
 
 
 def latency():
-    """CPU time from images to pose of the default runs, pooled. Measure on a quiet machine."""
+    """CPU time from images to pose of the default runs, pooled. Other work on the machine makes it longer."""
     counts = {}
     for log in runs.DRAWN_LOGS:
         for kind, times in runs.summary(runs.default_run(log))["timing"]["image_to_pose"].items():

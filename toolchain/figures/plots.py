@@ -294,7 +294,7 @@ def draws(path):
                 label="default settings" if k == 0 else None,
             )
         axis.set_xticks(range(len(runs.DRAWN_LOGS)), runs.DRAWN_LOGS)
-        axis.set(title=title, ylim=(0, None), xlim=(-0.5, 2.5))
+        axis.set(title=title, ylim=(0, 1.15 * axis.get_ylim()[1]), xlim=(-0.5, 2.5))
         axis.grid(axis="x", visible=False)
     axes[0].set_ylabel("ATE RMSE from 3 s on [mm]")
     axes[1].legend(loc="upper left", fontsize=9)
@@ -337,10 +337,11 @@ def latency(path):
             edgecolor=color,
             label=f"{counts.sum()} {'keyframes' if kind == 'keyframes' else 'other frames'}",
         )
-    for limit, text in ((6, "median's\nbudget"), (15, "budget of 99 %")):
+    axis.set_ylim(0, 34)
+    for limit, text in ((6, "budget of\nthe median"), (15, "budget of\n99 of 100 frames")):
         axis.axvline(limit, color=RED, linestyle="--", linewidth=1.2)
-        axis.text(limit * 1.01, axis.get_ylim()[1] * 0.99, f"{text}, {limit} ms", color=RED, fontsize=9, va="top")
-    axis.set(xlabel="CPU time from a frame's images to its pose [ms]", ylabel="share of the frames [%]", xlim=(0, 18))
+        axis.text(limit + 0.15, 33.5, f"{text}: {limit} ms", color=RED, fontsize=9, va="top")
+    axis.set(xlabel="CPU time from a frame's images to its pose [ms]", ylabel="share of the frames [%]", xlim=(0, 20))
     axis.legend(loc="center right")
     save_svg(figure, path)
 
