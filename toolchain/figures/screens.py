@@ -120,6 +120,8 @@ def view(path):
                 "replay",
                 runs.log_folder("vil_v102"),
                 "--real-time",
+                "--speed",
+                "0.5",  # so that a browser that renders in software keeps up
                 "--map",
                 "--out",
                 os.path.join(runs.WORK, "view_run"),
