@@ -110,9 +110,9 @@ def report(path):
 
 def view(path):
     """The live view of a log that is replayed in real time, of which the moment is not the same each time."""
-    moment_s = 14
+    moment_s = 12
     words = os.path.join(runs.WORK, "view.log")
-    browser = Browser(1480)
+    browser = Browser(1860)  # down to the end of the 3D view
     with open(words, "w") as log:
         run = subprocess.Popen(
             [
@@ -121,7 +121,7 @@ def view(path):
                 runs.log_folder("vil_v102"),
                 "--real-time",
                 "--speed",
-                "0.5",  # so that a browser that renders in software keeps up
+                "0.25",  # so that a browser that renders in software keeps up
                 "--map",
                 "--out",
                 os.path.join(runs.WORK, "view_run"),
@@ -140,8 +140,9 @@ def view(path):
             with open(words) as log:
                 address = next((word for word in log.read().split() if word.startswith("http://")), None)
         browser.call("Page.navigate", url=address)
-        # The bar at the top tells the time of the newest state.
-        browser.wait_for(rf"parseFloat((document.body.innerText.match(/(\d+\.\d) s/) || [0, 0])[1]) >= {moment_s}")
+        # The bar at the top tells the time of the newest state; other times on the page are shorter.
+        times = r"[...document.body.innerText.matchAll(/(\d+\.\d) s/g)].map(found => parseFloat(found[1]))"
+        browser.wait_for(f"Math.max(0, ...{times}) >= {moment_s}")
         save_jpeg(browser.picture(), path)
     finally:
         browser.close()
