@@ -3,6 +3,7 @@
 import filecmp
 import glob
 import os
+import signal
 import sys
 
 import diagrams
@@ -95,4 +96,6 @@ def main(arguments):
 
 
 if __name__ == "__main__":
+    # An exception, so that programs that were started are ended too.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     sys.exit(main(sys.argv[1:]))
