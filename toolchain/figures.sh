@@ -9,7 +9,7 @@
 # SWIFTLET_DATA  folder of recorded logs (default ../shared/data)
 # FIGURES_WORK   where runs are kept (default build/figures); a run that is there is not made again
 # Same program and logs, same bytes; not so the screenshot view.jpg, which shows a moment of a run in real time.
-# From nothing ten minutes on two cores, most of it for rendered flights. Needs packages_optional.txt; screenshots chromium.
+# Most of the time goes into two rendered flights. Needs packages_optional.txt; screenshots chromium.
 # Exit code 0 when all are made, or equal; 1 when one differs or failed; 2 wrong use.
 set -eu
 case ${1:-} in
