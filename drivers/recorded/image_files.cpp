@@ -84,7 +84,7 @@ void writePngRgb8(const std::string& path, const std::uint8_t* rgb, int width, i
   writePng(path, rgb, 3 * static_cast<std::ptrdiff_t>(width), width, height, 8, PNG_COLOR_TYPE_RGB);
 }
 
-void writeJpeg(const std::string& path, const std::uint8_t* grey, int width, int height, int quality) {
+std::vector<std::uint8_t> encodeJpeg(const std::uint8_t* grey, int width, int height, int quality) {
   const std::unique_ptr<void, int (*)(tjhandle)> encoder(tjInitCompress(), tjDestroy);
   unsigned char* data = nullptr;
   unsigned long size = 0;
@@ -92,8 +92,13 @@ void writeJpeg(const std::string& path, const std::uint8_t* grey, int width, int
                                         : tjCompress2(encoder.get(), grey, width, width, height, TJPF_GRAY,
                                                       &data, &size, TJSAMP_GRAY, quality, TJFLAG_ACCURATEDCT);
   const std::unique_ptr<unsigned char, void (*)(unsigned char*)> owner(data, tjFree);
-  if (result != 0) throw std::runtime_error(path + ": the JPEG encoder failed");
-  writeAll(path, data, size);
+  if (result != 0) throw std::runtime_error("the JPEG encoder failed");
+  return {data, data + size};
+}
+
+void writeJpeg(const std::string& path, const std::uint8_t* grey, int width, int height, int quality) {
+  const std::vector<std::uint8_t> bytes = encodeJpeg(grey, width, height, quality);
+  writeAll(path, bytes.data(), bytes.size());
 }
 
 }  // namespace swiftlet

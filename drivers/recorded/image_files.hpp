@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace swiftlet {
 
@@ -11,6 +12,8 @@ void writePng8(const std::string& path, const std::uint8_t* grey, int width, int
 void writePng16(const std::string& path, const std::uint16_t* grey, int width, int height);
 /// `rgb`: red, green, blue of each pixel.
 void writePngRgb8(const std::string& path, const std::uint8_t* rgb, int width, int height);
+/// A JPEG file's bytes; the same for the same pixels. std::runtime_error where there is no memory.
+std::vector<std::uint8_t> encodeJpeg(const std::uint8_t* grey, int width, int height, int quality);
 void writeJpeg(const std::string& path, const std::uint8_t* grey, int width, int height, int quality);
 
 }  // namespace swiftlet

@@ -32,6 +32,7 @@ struct ExportOptions {
   bool no_meshes = false;
   bool images = false;
   bool raw_images = false;
+  int jpeg_quality = 0;
   LogCommandOptions log;
   RosFrames frames;
 };
@@ -89,6 +90,7 @@ LogBagOptions bagOptions(const ExportOptions& options, bool in_run) {
   LogBagOptions log;
   log.frames = options.frames;
   log.raw_images = options.raw_images;
+  log.jpeg_quality = options.jpeg_quality;
   log.truth = !in_run && !options.no_truth;
   log.transforms = !in_run;
   return log;
@@ -164,8 +166,15 @@ void addExportCommand(CLI::App& app, int& exit_code) {
   command->add_flag("--no-truth", options->no_truth, "Leave the truth out")->excludes(truth);
   command->add_flag("--no-meshes", options->no_meshes, "Leave the surfaces out of the bag");
   command->add_flag("--images", options->images, "Of a run: also the images and samples of its log");
-  command->add_flag("--raw-images", options->raw_images,
-                    "Images as pixels (mono8), also where the log holds PNG or JPEG files");
+  CLI::Option* raw =
+      command->add_flag("--raw-images", options->raw_images,
+                        "Images as pixels (mono8), also where the log holds PNG or JPEG files");
+  command
+      ->add_option("--jpeg", options->jpeg_quality,
+                   "Encode all images as JPEG of this quality, 1 to 100. Lower values make smaller files and "
+                   "coarser images. Default: the log's own files or pixels")
+      ->check(CLI::Range(1, 100))
+      ->excludes(raw);
   options->log.addCalibration(*command);
   command->add_option("--map-frame", options->frames.map, "Frame of the map")->capture_default_str();
   command->add_option("--odom-frame", options->frames.odom, "Frame of the odometry's world")

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "drivers/input/input_error.hpp"
+#include "drivers/recorded/image_files.hpp"
 #include "drivers/recorded/log_messages.hpp"
 #include "firmware_host/lab/export/bag_messages.hpp"
 
@@ -88,6 +89,12 @@ void LogBag::writeSample(const ImuSample& sample) {
 void LogBag::writeImage(const CameraFrame& frame) {
   check(frame.stamp);
   rosmsg::CameraInfo& info = info_[frame.camera];
+  if (options_.jpeg_quality > 0) {
+    const std::vector<std::uint8_t> jpeg = encodeJpeg(frame.image.data, static_cast<int>(info.width),
+                                                      static_cast<int>(info.height), options_.jpeg_quality);
+    writePicture(bag_, frame.camera, frame.stamp, jpeg, info);
+    return;
+  }
   const std::span<const std::uint8_t> picture = log_.picture();
   if (!picture.empty() && !options_.raw_images) {
     writePicture(bag_, frame.camera, frame.stamp, picture, info);

@@ -2,8 +2,9 @@
 // The messages of a log in a bag: what cameras and IMU sent, the calibration as CameraInfo and transforms,
 // the truth. docs/export.md lists the topics.
 //
-// Images are the log's own files (CompressedImage) where it has files, pixels otherwise. Samples are those of
-// the sensor: a log that is turned into body axes is turned back. Memory: the truth, and an image.
+// Images are the log's own files (CompressedImage) where it has files, pixels otherwise; or JPEG throughout.
+// Samples are those of the sensor: a log that is turned into body axes is turned back. Memory: the truth, and
+// an image.
 
 #include <array>
 #include <cstddef>
@@ -18,6 +19,7 @@ namespace swiftlet {
 struct LogBagOptions {
   RosFrames frames;
   bool raw_images = false;  ///< pixels, also where the log has files
+  int jpeg_quality = 0;     ///< 1 to 100: all images encoded as JPEG, in place of files and pixels; 0: not
   bool truth = true;
   bool transforms = true;  ///< from the body to the cameras; a run's bag has its own message of fixed ones
 };
