@@ -180,6 +180,9 @@ class MessageWriter {
   void operator()(const char* name, const std::array<T, kCount>& values) {
     for (const T& value : values) (*this)(name, value);
   }
+  void operator()(const char* name, const std::vector<std::uint8_t>& bytes) {
+    (*this)(name, std::span<const std::uint8_t>(bytes));
+  }
   template <typename T>
   void operator()(const char* name, const std::vector<T>& values) {
     (*this)(name, static_cast<std::uint32_t>(values.size()));

@@ -328,6 +328,68 @@ struct CameraInfo {
   }
 };
 
+struct Float64 {
+  static constexpr const char* kType = "std_msgs/Float64";
+  static constexpr const char* kMd5 = "fdb28210bfa9d7c91146260178d9a584";
+  double data = 0;
+
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit& visit) {
+    visit("data", self.data);
+  }
+};
+
+struct PointField {
+  static constexpr const char* kType = "sensor_msgs/PointField";
+  static constexpr std::uint8_t kUint32 = 6, kFloat32 = 7;
+  std::string name;
+  std::uint32_t offset = 0;  ///< bytes from the beginning of a point
+  std::uint8_t datatype = 0;
+  std::uint32_t count = 1;
+
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit& visit) {
+    visit("name", self.name);
+    visit("offset", self.offset);
+    visit("datatype", self.datatype);
+    visit("count", self.count);
+  }
+  template <typename Visit>
+  static void constants(Visit& visit) {
+    int value = 1;
+    for (const char* name : {"INT8", "UINT8", "INT16", "UINT16", "INT32", "UINT32", "FLOAT32", "FLOAT64"}) {
+      visit.constant("uint8", name, value++);
+    }
+  }
+};
+
+struct PointCloud2 {
+  static constexpr const char* kType = "sensor_msgs/PointCloud2";
+  static constexpr const char* kMd5 = "1158d486dd51d683ce2f1be655c3c181";
+  Header header;
+  std::uint32_t height = 1;
+  std::uint32_t width = 0;
+  std::vector<PointField> point_fields;
+  bool is_bigendian = false;
+  std::uint32_t point_step = 0;  ///< bytes of a point
+  std::uint32_t row_step = 0;
+  std::vector<std::uint8_t> data;
+  bool is_dense = true;
+
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit& visit) {
+    visit("header", self.header);
+    visit("height", self.height);
+    visit("width", self.width);
+    visit("fields", self.point_fields);
+    visit("is_bigendian", self.is_bigendian);
+    visit("point_step", self.point_step);
+    visit("row_step", self.row_step);
+    visit("data", self.data);
+    visit("is_dense", self.is_dense);
+  }
+};
+
 struct ColorRGBA {
   static constexpr const char* kType = "std_msgs/ColorRGBA";
   float r = 0, g = 0, b = 0, a = 0;

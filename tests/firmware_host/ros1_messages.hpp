@@ -13,6 +13,8 @@
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/Imu.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <std_msgs/Float64.h>
 #include <tf2_msgs/TFMessage.h>
 #include <visualization_msgs/Marker.h>
 
@@ -33,10 +35,13 @@ struct BagAllocator : std::allocator<T> {
 
 using BagStatus = diagnostic_msgs::DiagnosticStatus_<BagAllocator<void>>;
 using BagDiagnostics = diagnostic_msgs::DiagnosticArray_<BagAllocator<void>>;
+using BagField = sensor_msgs::PointField_<BagAllocator<void>>;
 using BagHeader = std_msgs::Header_<BagAllocator<void>>;
 using BagMarker = visualization_msgs::Marker_<BagAllocator<void>>;
+using BagNumber = std_msgs::Float64_<BagAllocator<void>>;
 using BagOdometry = nav_msgs::Odometry_<BagAllocator<void>>;
 using BagPath = nav_msgs::Path_<BagAllocator<void>>;
+using BagPoints = sensor_msgs::PointCloud2_<BagAllocator<void>>;
 using BagPose = geometry_msgs::PoseStamped_<BagAllocator<void>>;
 using BagTransform = geometry_msgs::TransformStamped_<BagAllocator<void>>;
 using BagTransforms = tf2_msgs::TFMessage_<BagAllocator<void>>;

@@ -100,7 +100,7 @@ TEST_CASE("a run's bag of ROS 2 has what its bag of ROS 1 has", "[export]") {
           kExitDone);
   const auto counts = countsOf(mcap);
   CHECK(counts == countsOf(exported.folder.file("rosbag2")));
-  CHECK(counts.size() == 14);
+  CHECK(counts.size() == 23);
   CHECK(counts.at("/tf_static") == 1);
   CHECK(counts.at("/swiftlet/pose") > 90);
   const auto bag = openBag(mcap);

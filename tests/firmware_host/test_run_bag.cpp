@@ -4,16 +4,22 @@
 #include <rosbag/view.h>
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <iomanip>
 #include <map>
 #include <set>
 #include <sstream>
 #include <tuple>
 
+#include "drivers/image/image_decoder.hpp"
 #include "drivers/input/input_error.hpp"
+#include "firmware_host/lab/export/bag_messages.hpp"
 #include "firmware_host/lab/export/bag_output.hpp"
 #include "firmware_host/lab/export/run_bag.hpp"
+#include "firmware_host/outputs/map_files/map_files.hpp"
 #include "tests/firmware_host/exported_run.hpp"
 #include "tests/firmware_host/ros1_messages.hpp"
 #include "tests/support/skip_case.hpp"
@@ -122,12 +128,21 @@ TEST_CASE("every pose of the run is in the bag with its stamp and frame", "[expo
                                          "/swiftlet/bias_accel",
                                          "/swiftlet/bias_gyro",
                                          "/swiftlet/frame_mesh",
+                                         "/swiftlet/health",
                                          "/swiftlet/imu_rate",
+                                         "/swiftlet/imu_residual",
                                          "/swiftlet/local_mesh",
+                                         "/swiftlet/local_points",
                                          "/swiftlet/map_path",
                                          "/swiftlet/odometry",
                                          "/swiftlet/path",
                                          "/swiftlet/pose",
+                                         "/swiftlet/reprojection_rms",
+                                         "/swiftlet/sigma_attitude",
+                                         "/swiftlet/sigma_position",
+                                         "/swiftlet/sigma_velocity",
+                                         "/swiftlet/tracks",
+                                         "/swiftlet/velocity",
                                          "/tf",
                                          "/tf_static",
                                          "/truth/path",
@@ -261,6 +276,73 @@ TEST_CASE("keyframes are in the bag with velocity, covariance and biases", "[exp
   }
 }
 
+TEST_CASE("what is plotted of a keyframe stands in fields of its own", "[export]") {
+  const Fixture exported;
+  ReadBag bag(exported.bag);
+  const RunFolder folder = readRunFolder(exported.run);
+  const auto velocity = bag.all<BagVector>("/swiftlet/velocity");
+  const auto attitude = bag.all<BagVector>("/swiftlet/sigma_attitude");
+  const auto position = bag.all<BagVector>("/swiftlet/sigma_position");
+  const auto speed = bag.all<BagVector>("/swiftlet/sigma_velocity");
+  const auto health = bag.all<BagNumber>("/swiftlet/health");
+  const auto tracks = bag.all<BagNumber>("/swiftlet/tracks");
+  REQUIRE(velocity.size() == folder.keyframes.size());
+  REQUIRE(health.size() == folder.keyframes.size());
+  std::vector<Row> rows = rowsOf(exported.run + "/states.csv");
+  std::ranges::sort(rows, {}, &Row::stamp);
+  const auto vector = [](const BagVector& v) { return Eigen::Vector3d(v.vector.x, v.vector.y, v.vector.z); };
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const std::vector<double>& v = rows[i].v;
+    checkHeader(velocity[i], pointed(rows[i].stamp), "odom", i);
+    checkHeader(attitude[i], pointed(rows[i].stamp), "base_link", i);
+    CHECK(vector(velocity[i].second) == Eigen::Vector3d(v[7], v[8], v[9]));
+    // Variances begin at column 16: phi, p, v.
+    for (int k = 0; k < 3; ++k) {
+      const auto at = static_cast<std::size_t>(16 + k);
+      CHECK(vector(attitude[i].second)[k] == Approx(std::sqrt(v[at])));
+      CHECK(vector(position[i].second)[k] == Approx(std::sqrt(v[at + 3])));
+      CHECK(vector(speed[i].second)[k] == Approx(std::sqrt(v[at + 6])));
+    }
+    CHECK(health[i].first == pointed(rows[i].stamp));
+    CHECK(health[i].second.data == (folder.keyframes[i].state.health == Health::kGood ? 0 : 1));
+    CHECK(tracks[i].second.data == folder.keyframes[i].statistics.tracks);
+  }
+}
+
+TEST_CASE("the corners of a mesh are points with their label's colour", "[export]") {
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 2}};
+  mesh.grey = {10, 20, 30, 40};
+  mesh.faces = {{0, 1, 2}, {1, 3, 2}};
+  mesh.labels = {0, 7};
+  const rosmsg::PointCloud2 cloud = bagPoints(Stamp{5}, "map", mesh);
+  REQUIRE(cloud.width == 4);
+  REQUIRE(cloud.data.size() == 4 * cloud.point_step);
+  const auto word = [&cloud](std::size_t point, std::size_t field) {
+    std::uint32_t value = 0;
+    std::memcpy(&value, cloud.data.data() + point * cloud.point_step + cloud.point_fields[field].offset, 4);
+    return value;
+  };
+  const auto [r, g, b] = labelColour(7);
+  const std::uint32_t labelled = std::uint32_t{r} << 16U | std::uint32_t{g} << 8U | b;
+  CHECK(word(0, 3) == 0x0A0A0A);
+  CHECK(word(0, 4) == 0);
+  CHECK(word(1, 3) == labelled);
+  CHECK(word(1, 4) == 7);
+  CHECK(word(3, 3) == labelled);
+  CHECK(std::bit_cast<float>(word(3, 2)) == 2);
+  // ROS 1's own packages read it.
+  const ScratchFolder folder("points");
+  const std::string file = folder.file("points.bag");
+  writeBag(BagForm::kRos1, file, [&](MessageBag& bag) { bag.write("/points", Stamp{5}, cloud); });
+  ReadBag bag(file);
+  const auto read = bag.all<BagPoints>("/points");
+  REQUIRE(read.size() == 1);
+  CHECK(read[0].second.fields.size() == 5);
+  CHECK(read[0].second.fields[4].datatype == BagField::UINT32);
+  CHECK(std::ranges::equal(read[0].second.data, cloud.data));
+}
+
 TEST_CASE("meshes are triangle lists, events and health are diagnostics", "[export]") {
   const Fixture exported;
   ReadBag bag(exported.bag);
@@ -374,6 +456,21 @@ TEST_CASE("a log's messages are those of ROS's own packages", "[export]") {
   const auto images = raw.all<sensor_msgs::Image_<BagAllocator<void>>>("/cam0/image_raw");
   REQUIRE(images.size() == 80);
   CHECK(images[0].second.data.size() == 752U * 480U);
+  REQUIRE(run({"export", log, "--bag", file, "--jpeg", "50"}) == kExitDone);
+  ReadBag packed(file);
+  const auto jpeg =
+      packed.all<sensor_msgs::CompressedImage_<BagAllocator<void>>>("/cam0/image_raw/compressed");
+  REQUIRE(jpeg.size() == 80);
+  CHECK(jpeg[0].second.format == "jpeg");
+  ImageDecoder decoder;
+  std::vector<std::uint8_t> grey(752U * 480U);
+  ImageSize found;
+  REQUIRE(decoder.decode(jpeg[0].second.data, {752, 480}, grey.data(), found) == DecodeResult::kOk);
+  double difference = 0;
+  for (std::size_t i = 0; i < grey.size(); ++i) {
+    difference += std::abs(static_cast<double>(grey[i]) - images[0].second.data[i]);
+  }
+  CHECK(difference / static_cast<double>(grey.size()) < 5);
 }
 
 TEST_CASE("ROS's own tools read the bag", "[export]") {

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
+#include <vector>
 
 #include "estimator/messages/names.hpp"
 #include "firmware_host/outputs/map_files/map_files.hpp"
@@ -12,6 +14,7 @@ namespace swiftlet {
 namespace {
 
 constexpr float kFullColour = 255;
+constexpr std::uint8_t kMiddleGrey = 128;  // of vertices that no image has seen
 
 template <typename Point>
 void set(Point& to, const Eigen::Vector3d& from) {
@@ -35,6 +38,15 @@ rosmsg::ColorRGBA colourOf(std::uint8_t red, std::uint8_t green, std::uint8_t bl
   colour.b = static_cast<float>(blue) / kFullColour;
   colour.a = 1;
   return colour;
+}
+
+using Colour = std::array<std::uint8_t, 3>;
+
+/// The label's colour; of what has none its grey value.
+Colour surfaceColour(const TriangleMesh& mesh, std::uint32_t vertex, std::uint8_t label) {
+  if (label != 0) return labelColour(label);
+  const std::uint8_t grey = mesh.grey.empty() ? kMiddleGrey : mesh.grey[vertex];
+  return {grey, grey, grey};
 }
 
 std::uint8_t levelOf(const std::string& health) {
@@ -122,7 +134,7 @@ rosmsg::Marker bagMarker(Stamp stamp, const std::string& frame, const std::strin
   marker.action = mesh.faces.empty() ? rosmsg::Marker::kDelete : rosmsg::Marker::kAdd;
   marker.pose.orientation.w = 1;
   marker.scale.x = marker.scale.y = marker.scale.z = 1;
-  marker.color = colourOf(128, 128, 128);
+  marker.color = colourOf(kMiddleGrey, kMiddleGrey, kMiddleGrey);
   marker.points.reserve(3 * mesh.faces.size());
   marker.colors.reserve(3 * mesh.faces.size());
   for (std::size_t face = 0; face < mesh.faces.size(); ++face) {
@@ -131,12 +143,55 @@ rosmsg::Marker bagMarker(Stamp stamp, const std::string& frame, const std::strin
       rosmsg::Point point;
       set(point, mesh.vertices[corner].cast<double>());
       marker.points.push_back(point);
-      const std::uint8_t grey = mesh.grey.empty() ? std::uint8_t{128} : mesh.grey[corner];
-      const auto [r, g, b] = label == 0 ? std::array{grey, grey, grey} : labelColour(label);
+      const auto [r, g, b] = surfaceColour(mesh, corner, label);
       marker.colors.push_back(colourOf(r, g, b));
     }
   }
   return marker;
+}
+
+rosmsg::PointCloud2 bagPoints(Stamp stamp, const std::string& frame, const TriangleMesh& mesh) {
+  struct Point {
+    float x = 0, y = 0, z = 0;
+    std::uint32_t rgb = 0;
+    std::uint32_t label = 0;
+  };
+  constexpr std::array<const char*, 5> kFields = {"x", "y", "z", "rgb", "label"};
+  static_assert(sizeof(Point) == kFields.size() * sizeof(float));
+  std::vector<std::uint8_t> labels(mesh.vertices.size(), 0);
+  for (std::size_t face = 0; face < mesh.labels.size(); ++face) {
+    for (const std::uint32_t corner : mesh.faces[face]) {
+      if (labels[corner] == 0) labels[corner] = mesh.labels[face];
+    }
+  }
+  rosmsg::PointCloud2 cloud;
+  cloud.header = bagHeader(stamp, frame);
+  for (std::uint32_t i = 0; i < kFields.size(); ++i) {
+    rosmsg::PointField field;
+    field.name = kFields[i];
+    field.offset = i * static_cast<std::uint32_t>(sizeof(float));
+    field.datatype = i + 1 < kFields.size() ? rosmsg::PointField::kFloat32 : rosmsg::PointField::kUint32;
+    cloud.point_fields.push_back(field);
+  }
+  cloud.width = static_cast<std::uint32_t>(mesh.vertices.size());
+  cloud.point_step = sizeof(Point);
+  cloud.row_step = cloud.width * cloud.point_step;
+  cloud.data.resize(cloud.row_step);
+  for (std::uint32_t i = 0; i < cloud.width; ++i) {
+    const Eigen::Vector3f& p = mesh.vertices[i];
+    const auto [r, g, b] = surfaceColour(mesh, i, labels[i]);
+    const Point point{p.x(), p.y(), p.z(), std::uint32_t{r} << 16U | std::uint32_t{g} << 8U | b, labels[i]};
+    std::memcpy(cloud.data.data() + i * sizeof(Point), &point, sizeof(Point));
+  }
+  return cloud;
+}
+
+Eigen::Vector3d bagSigma(const NavState& state, int first) {
+  return state.covariance.diagonal().segment<3>(first).cwiseMax(0).cwiseSqrt();
+}
+
+rosmsg::Float64 bagLevel(Health health) {
+  return {static_cast<double>(levelOf(std::string(healthName(health))))};
 }
 
 rosmsg::DiagnosticArray bagDiagnostics(const KeyframeState& keyframe) {

@@ -22,6 +22,14 @@ rosmsg::Vector3Stamped bagVector(Stamp stamp, const std::string& frame, const Ei
 /// takes the marker away.
 rosmsg::Marker bagMarker(Stamp stamp, const std::string& frame, const std::string& name,
                          const TriangleMesh& mesh);
+/// The mesh's vertices: x y z [m], rgb (0x00RRGGBB in a float's bits, as viewers look for it) and label, as
+/// docs/ros2.md has them. A vertex has the label of the first labelled face that it is a corner of.
+rosmsg::PointCloud2 bagPoints(Stamp stamp, const std::string& frame, const TriangleMesh& mesh);
+/// Standard deviations of three variances in a row on the diagonal of the state's covariance, from `first`
+/// on.
+Eigen::Vector3d bagSigma(const NavState& state, int first);
+/// 0: good; 1: initializing or degraded; 2: failed.
+rosmsg::Float64 bagLevel(Health health);
 rosmsg::DiagnosticArray bagDiagnostics(const KeyframeState& keyframe);
 /// The event, and the health as it then is.
 rosmsg::DiagnosticArray bagDiagnostics(const EventLine& event, const std::string& health);

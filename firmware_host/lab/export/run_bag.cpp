@@ -19,6 +19,11 @@ namespace fs = std::filesystem;
 // A record's size is a u32 and viewers hold a marker several times over: 120 bytes a face.
 constexpr std::size_t kMostFaces = 4'000'000;
 
+// Where the error states begin, as the order in nav_state.hpp has it.
+constexpr int kAttitude = 0;
+constexpr int kPosition = 3;
+constexpr int kVelocity = 6;
+
 /// Gathers what is to be written, then writes it in the order of the stamps.
 class RunBag {
  public:
@@ -111,8 +116,28 @@ class RunBag {
          [this, &state] { return bagVector(state.stamp, frames_.body, state.bias_gyro); });
       at(state.stamp, where, "/swiftlet/bias_accel",
          [this, &state] { return bagVector(state.stamp, frames_.body, state.bias_accel); });
+      planFigures(keyframe, where);
       at(state.stamp, where, "/diagnostics", [&keyframe] { return bagDiagnostics(keyframe); });
     }
+  }
+
+  /// What viewers plot: a number a field, without a formula.
+  void planFigures(const KeyframeState& keyframe, const std::string& where) {
+    const NavState& state = keyframe.state;
+    const auto vector = [&](const char* topic, const std::string& frame, const Eigen::Vector3d& value) {
+      at(state.stamp, where, topic, [&state, &frame, value] { return bagVector(state.stamp, frame, value); });
+    };
+    vector("/swiftlet/velocity", frames_.odom, state.v_world_body);
+    vector("/swiftlet/sigma_attitude", frames_.body, bagSigma(state, kAttitude));
+    vector("/swiftlet/sigma_position", frames_.odom, bagSigma(state, kPosition));
+    vector("/swiftlet/sigma_velocity", frames_.odom, bagSigma(state, kVelocity));
+    const auto number = [&](const char* topic, rosmsg::Float64 value) {
+      at(state.stamp, where, topic, [value] { return value; });
+    };
+    number("/swiftlet/health", bagLevel(state.health));
+    number("/swiftlet/tracks", {static_cast<double>(keyframe.statistics.tracks)});
+    number("/swiftlet/reprojection_rms", {keyframe.statistics.reprojection_rms});
+    number("/swiftlet/imu_residual", {keyframe.statistics.imu_residual});
   }
 
   void planEvents() {
@@ -134,10 +159,13 @@ class RunBag {
     for (const MeshFrame& frame : run_.meshes) {
       planMesh("/swiftlet/frame_mesh", frames_.odom, frame.stamp, frame.frame_mesh, where);
       planMesh("/swiftlet/local_mesh", frames_.odom, frame.stamp, frame.horizon_mesh, where);
+      planPoints("/swiftlet/local_points", frames_.odom, frame.stamp, frame.horizon_mesh, where);
     }
     const std::string odometry = pathOf(run_.odometry_file);
     planMesh("/swiftlet/local_mesh", frames_.odom, run_.odometry.back().stamp, run_.local_mesh, odometry);
+    planPoints("/swiftlet/local_points", frames_.odom, run_.odometry.back().stamp, run_.local_mesh, odometry);
     planMesh("/swiftlet/map_mesh", frames_.map, run_.odometry.front().stamp, run_.map_mesh, odometry);
+    planPoints("/swiftlet/map_points", frames_.map, run_.odometry.front().stamp, run_.map_mesh, odometry);
   }
 
   void planPoses(const std::string& topic, const std::string& frame, const Trajectory& trajectory,
@@ -161,15 +189,25 @@ class RunBag {
                 const std::string& where) {
     if (mesh_file.empty()) return;
     const std::string name = topic.substr(topic.rfind('/') + 1);
-    at(stamp, where, topic, [&frame, stamp, mesh_file, name] {
-      const TriangleMesh mesh = readPly(mesh_file);
-      if (mesh.faces.size() > kMostFaces) {
-        throw InputError(mesh_file, 0, "",
-                         fmt::format("{} faces are too many for one message", mesh.faces.size()),
-                         "Export with --no-meshes and open map.glb beside the bag");
-      }
-      return bagMarker(stamp, frame, name, mesh);
-    });
+    at(stamp, where, topic,
+       [&frame, stamp, mesh_file, name] { return bagMarker(stamp, frame, name, readMesh(mesh_file)); });
+  }
+
+  /// The same surface for viewers that know no triangles.
+  void planPoints(const std::string& topic, const std::string& frame, Stamp stamp,
+                  const std::string& mesh_file, const std::string& where) {
+    if (mesh_file.empty()) return;
+    at(stamp, where, topic,
+       [&frame, stamp, mesh_file] { return bagPoints(stamp, frame, readMesh(mesh_file)); });
+  }
+
+  static TriangleMesh readMesh(const std::string& file) {
+    TriangleMesh mesh = readPly(file);
+    if (mesh.faces.size() > kMostFaces) {
+      throw InputError(file, 0, "", fmt::format("{} faces are too many for one message", mesh.faces.size()),
+                       "Export with --no-meshes and open map.glb beside the bag");
+    }
+    return mesh;
   }
 
   [[nodiscard]] rosmsg::TransformStamped mapTransform(Stamp stamp, const SE3& T_map_world) const {
