@@ -44,7 +44,7 @@ has() { # component, file...
   done
 }
 has program bin/swiftlet lib/systemd/system/swiftlet.service lib/udev/rules.d/60-swiftlet.rules \
-  share/man/man1/swiftlet.1.gz share/doc/swiftlet/copyright share/doc/swiftlet/changelog.gz
+  share/man/man1/swiftlet.1.gz share/swiftlet/foxglove_layout.json share/doc/swiftlet/copyright share/doc/swiftlet/changelog.gz
 has development include/swiftlet/estimator/odometry/odometry.hpp share/doc/libswiftlet-dev/copyright
 has documentation share/doc/swiftlet/docs/packages.md share/doc/swiftlet/README.md share/doc/swiftlet-doc/copyright
 [ -n "$(find "$root/development" -name swiftletConfig.cmake)" ] || fail "no swiftletConfig.cmake"
