@@ -5,10 +5,7 @@
 // LOG is a EuRoC folder; its beginning is exported, read with the others' readers and compared with its files; then written
 // again with the others' writers in all that the formats allow, and each of these must export to the same bytes.
 // RUN: a run folder, whose messages must all be decoded.
-import { McapIndexedReader, McapStreamReader, McapWriter } from "@mcap/core";
-import { loadDecompressHandlers } from "@mcap/support";
-import rosmsg from "@foxglove/rosmsg";
-import rosmsg2 from "@foxglove/rosmsg2-serialization";
+import { McapWriter } from "@mcap/core";
 import rosbag2 from "@foxglove/rosbag2";
 import zstd from "@foxglove/wasm-zstd";
 import initSql from "sql.js";
@@ -16,6 +13,7 @@ import assert from "node:assert";
 import { execFileSync } from "node:child_process";
 import fs from "node:fs";
 import path from "node:path";
+import { nanoseconds, readMcap, streamMcap } from "./mcap_reader.mjs";
 
 const [swiftlet, whole, work, run] = process.argv.slice(2);
 fs.mkdirSync(work, { recursive: true });
@@ -43,64 +41,9 @@ function shortened() {
   return log;
 }
 const log = shortened();
-const handlers = await loadDecompressHandlers();
 await zstd.isLoaded;
 const program = (...args) => execFileSync(swiftlet, args, { stdio: ["ignore", "ignore", "inherit"] });
 const bytesOf = (file) => fs.readFileSync(file);
-const nanoseconds = ({ sec, nsec, nanosec }) => BigInt(sec) * 1000000000n + BigInt(nsec ?? nanosec);
-
-class Readable {
-  constructor(bytes) {
-    this.bytes = bytes;
-  }
-  async size() {
-    return BigInt(this.bytes.length);
-  }
-  async read(offset, length) {
-    assert(offset + length <= BigInt(this.bytes.length), "a reader asks for bytes behind the end");
-    return new Uint8Array(this.bytes.subarray(Number(offset), Number(offset + length)));
-  }
-}
-
-/** Every message with its decoded value, by the index of the file. */
-async function readMcap(file) {
-  const reader = await McapIndexedReader.Initialize({ readable: new Readable(bytesOf(file)), decompressHandlers: handlers });
-  const readers = new Map();
-  const messages = [];
-  for await (const message of reader.readMessages({ validateCrcs: true })) {
-    const channel = reader.channelsById.get(message.channelId);
-    const schema = reader.schemasById.get(channel.schemaId);
-    assert.equal(channel.messageEncoding, "cdr");
-    assert.equal(schema.encoding, "ros2msg");
-    if (!readers.has(schema.id)) {
-      const definitions = rosmsg.parse(new TextDecoder().decode(schema.data), { ros2: true });
-      readers.set(schema.id, new rosmsg2.MessageReader(definitions));
-    }
-    messages.push({
-      topic: channel.topic,
-      type: schema.name,
-      time: message.logTime,
-      data: message.data,
-      value: readers.get(schema.id).readMessage(message.data),
-    });
-  }
-  assert.equal(BigInt(messages.length), reader.statistics.messageCount, "the statistics count the messages");
-  for (const [id, count] of reader.statistics.channelMessageCounts) {
-    const topic = reader.channelsById.get(id).topic;
-    assert.equal(BigInt(messages.filter((m) => m.topic === topic).length), count, topic);
-  }
-  return { messages, reader };
-}
-
-/** The same from front to back, without the index. */
-function streamMcap(file) {
-  const reader = new McapStreamReader({ decompressHandlers: handlers, validateCrcs: true });
-  reader.append(bytesOf(file));
-  let messages = 0;
-  for (let record; (record = reader.nextRecord()); ) messages += record.type === "Message" ? 1 : 0;
-  assert(reader.done(), "the stream reader has seen the end");
-  return messages;
-}
 
 /** What @foxglove/rosbag2 wants of a database. */
 class Database {

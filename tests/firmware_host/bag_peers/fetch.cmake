@@ -2,7 +2,7 @@
 # STAMP.
 include(${CMAKE_CURRENT_LIST_DIR}/../../../toolchain/cmake/npm_fetch.cmake)
 file(MAKE_DIRECTORY ${WORK})
-file(COPY ${SOURCE}/bag_peers.mjs DESTINATION ${WORK})
+file(COPY ${SOURCE}/bag_peers.mjs ${SOURCE}/foxglove_run.mjs ${SOURCE}/mcap_reader.mjs DESTINATION ${WORK})
 npm_fetch(${NPM} ${SOURCE} ${WORK} "other readers of bags: the test bag_peers is skipped." fetched)
 if(fetched)
   file(TOUCH ${STAMP})
