@@ -154,7 +154,7 @@ void addExportCommand(CLI::App& app, int& exit_code) {
   command->add_option("RUN_OR_LOG", options->from, "Run folder, or a log: EuRoC folder or bag")->required();
   auto* wanted = command->add_option_group("formats", "At least one of");
   wanted->add_option("--mcap", options->mcap,
-                     "MCAP file to write, with ROS 2's messages: for Foxglove, ros2 bag");
+                     "MCAP file to write, with ROS 2's messages: for Foxglove, Rerun, ros2 bag");
   wanted->add_option("--rosbag2", options->rosbag2,
                      "rosbag2 folder to write, with an SQLite file: for ros2 bag");
   wanted->add_option("--bag", options->bag, "ROS 1 bag to write: for PlotJuggler, RViz");
