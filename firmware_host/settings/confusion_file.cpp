@@ -15,7 +15,7 @@ namespace swiftlet {
 namespace {
 
 constexpr double kSumTolerance = 0.01;
-constexpr const char* kForm = "Write true,said,probability, as 3,4,0.05";
+constexpr const char* kForm = "Write true,said,probability, for example 3,4,0.05";
 
 /// One line's fields; throws where they are not three numbers in range.
 struct ConfusionLine {
@@ -34,7 +34,7 @@ struct ConfusionLine {
           is_last != (comma == line.size())) {
         throw InputError(
             path, number, names[i],
-            fmt::format("\"{}\" is no {}", field, is_label ? "label from 1 to 31" : "probability"), kForm);
+            fmt::format("\"{}\" is not a {}", field, is_label ? "label from 1 to 31" : "probability"), kForm);
       }
       value_[i] = value;
       line.remove_prefix(std::min(comma + 1, line.size()));
@@ -53,7 +53,8 @@ struct ConfusionLine {
 ConfusionModel readConfusion(const std::string& path, float right) {
   std::ifstream file(path);
   if (!file) {
-    throw InputError(path, 0, "", "cannot be read", "Give a file of confusion with map.confusion, or none");
+    throw InputError(path, 0, "", "cannot be opened",
+                     "Set map.confusion to a readable file, or leave it empty");
   }
   ConfusionModel::Matrix matrix{};
   std::array<double, kLabelValues> sum{};
@@ -66,7 +67,7 @@ ConfusionModel readConfusion(const std::string& path, float right) {
     const ConfusionLine line(path, number, text);
     if (given[line.said()][line.real()]) {
       throw InputError(path, number, "said",
-                       fmt::format("what label {} is said to be is given twice", line.real()), kForm);
+                       fmt::format("this pair of labels appears twice (true label {})", line.real()), kForm);
     }
     given[line.said()][line.real()] = true;
     matrix[line.said()][line.real()] = static_cast<float>(line.probability());
@@ -80,8 +81,8 @@ ConfusionModel readConfusion(const std::string& path, float right) {
       }
     } else if (std::abs(sum[real] - 1) > kSumTolerance) {
       throw InputError(path, first_line[real], "probability",
-                       fmt::format("those of true label {} sum to {:g}", real, sum[real]),
-                       "Make what one true label is said to be sum to 1");
+                       fmt::format("the probabilities of true label {} sum to {:g}", real, sum[real]),
+                       "Make the probabilities of each true label sum to 1");
     }
   }
   ConfusionModel model;

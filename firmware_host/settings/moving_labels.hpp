@@ -9,8 +9,8 @@ namespace swiftlet {
 /// InputError where the text is no list of labels.
 inline void checkMovingLabels(const MapSettings& settings) {
   if (labelMask(settings.moving_labels)) return;
-  throw InputError("map.moving_labels", 0, "", "\"" + settings.moving_labels + "\" is no list of labels",
-                   "Write numbers from 1 to 31 with commas, as 10,12");
+  throw InputError("map.moving_labels", 0, "", "\"" + settings.moving_labels + "\" is not a list of labels",
+                   "Write numbers from 1 to 31 separated by commas, for example 10,12");
 }
 
 }  // namespace swiftlet

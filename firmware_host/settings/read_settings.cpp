@@ -15,7 +15,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr const char* kListThem = "`swiftlet settings` prints all keys with their ranges";
+constexpr const char* kListThem = "`swiftlet settings` prints all keys and their ranges";
 
 /// Where a value came from.
 struct Place {
@@ -39,8 +39,9 @@ template <typename Value>
 Value parsed(const Place& place, const Setting& setting, const YAML::Node& node) {
   Value value{};
   if (!node.IsScalar() || !YAML::convert<Value>::decode(node, value)) {
-    const std::string found = node.IsScalar() ? fmt::format("`{}`", node.Scalar()) : "a list, map or nothing";
-    failAt(place, setting.key, fmt::format("{} is not a value this setting takes", found),
+    const std::string found =
+        node.IsScalar() ? fmt::format("`{}`", node.Scalar()) : "a list, a map or an empty value";
+    failAt(place, setting.key, fmt::format("{} is not a valid value for this setting", found),
            "Allowed: " + rangeText(setting));
   }
   return value;
@@ -58,7 +59,7 @@ void assign(const Place& place, const Setting& setting, const YAML::Node& node, 
   if (const auto* choice = std::get_if<ChoiceSetting>(&setting.kind)) {
     const auto word = parsed<std::string>(place, setting, node);
     if (std::ranges::find(choice->words, word) == choice->words.end()) {
-      failAt(place, setting.key, fmt::format("`{}` is not a value this setting takes", word),
+      failAt(place, setting.key, fmt::format("`{}` is not a valid value for this setting", word),
              "Allowed: " + rangeText(setting));
     }
     choice->value(settings) = word;
@@ -95,7 +96,7 @@ void readGroup(const std::string& file, const YAML::Node& node, const std::strin
   for (const auto& entry : node) {
     const Place place{file, entry.first.Mark().line + 1};
     const std::string key = prefix + entry.first.Scalar();
-    if (!seen.insert(key).second) failAt(place, key, "given twice", "Remove one of the two lines");
+    if (!seen.insert(key).second) failAt(place, key, "appears twice", "Remove one of the two lines");
     if (entry.second.IsMap()) {
       readGroup(file, entry.second, key + ".", settings);
     } else if (entry.second.IsNull() && findSetting(key) == nullptr) {
@@ -116,12 +117,12 @@ void readSettingsText(const std::string& name, std::string_view text, Settings& 
     root = YAML::Load(std::string(text));
   } catch (const YAML::Exception& error) {
     throw InputError(name, error.mark.line + 1, "", "not valid YAML (" + error.msg + ")",
-                     "Compare with what `swiftlet settings` prints");
+                     "Compare it with the output of `swiftlet settings`");
   }
   if (root.IsNull()) return;
   if (!root.IsMap()) {
-    throw InputError(name, 1, "", "the file is not a tree of `group:` and `name: value` lines",
-                     "Compare with what `swiftlet settings` prints");
+    throw InputError(name, 1, "", "the file does not consist of `group:` and `name: value` lines",
+                     "Compare it with the output of `swiftlet settings`");
   }
   Settings changed = settings;
   readGroup(name, root, "", changed);
@@ -132,7 +133,7 @@ void readSettingsFile(const std::string& path, Settings& settings) {
   std::ifstream file(path);
   if (!file) {
     throw InputError(path, 0, "", "the settings file cannot be opened",
-                     "Write one with `swiftlet settings > settings.yaml`");
+                     "Write a settings file with `swiftlet settings > settings.yaml`");
   }
   std::ostringstream text;
   text << file.rdbuf();
@@ -143,7 +144,7 @@ void overrideSetting(std::string_view assignment, Settings& settings) {
   const std::size_t equals = assignment.find('=');
   const Place place{fmt::format("--set {}", assignment), 0};
   if (equals == std::string_view::npos) {
-    failAt(place, "", "no `=` in it", "Write --set group.name=value");
+    failAt(place, "", "`=` is missing", "Write --set group.name=value");
   }
   const std::string_view key = assignment.substr(0, equals);
   const YAML::Node value(std::string(assignment.substr(equals + 1)));
