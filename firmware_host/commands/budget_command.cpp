@@ -22,7 +22,7 @@ struct BudgetOptions {
 void printWorstCase(const Settings& settings) {
   const WorstCase worst =
       measureWorstCase(settings, [](const char* what) { fmt::print(stderr, "{}\n", what); });
-  fmt::print("inputs that fill the limits: {} of {} features rendered, {} simulated, {} of {} landmarks\n",
+  fmt::print("worst-case inputs: {} of {} features rendered, {} simulated, {} of {} landmarks\n",
              worst.features, kMaxFeatures, worst.tracks, worst.landmarks, kMaxLandmarks);
   fmt::print("{:<12}{:>8}{:>12}{:>12}{:>12}\n", "CPU [ms]", "count", "p50", "p99", "max");
   for (const StageId stage : {StageId::kImu, StageId::kTrack, StageId::kSmooth, StageId::kTrim}) {
@@ -45,7 +45,7 @@ int budget(const BudgetOptions& options) {
   request.show_progress = true;
   const BudgetResult result = runBudget(request, settings);
   fmt::print("{}", result.report.text());
-  fmt::print("{} frames; dropped {}, lost between threads {}, changes of effort {}\n", result.frames,
+  fmt::print("{} frames; {} dropped, {} lost between threads, {} changes of effort\n", result.frames,
              result.dropped, result.losses, result.effort_changes);
   const std::filesystem::path out(request.out);
   writeJson(out / "budget.json", result.json);
@@ -57,26 +57,30 @@ int budget(const BudgetOptions& options) {
 }  // namespace
 
 void addBudgetCommand(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("budget", "Replay in real time against the latency budgets");
+  CLI::App* command =
+      app.add_subcommand("budget", "Replay logs in real time and compare the latency with its budgets");
   auto options = std::make_shared<BudgetOptions>();
   BudgetRequest& request = options->request;
   request.out = "budget";
   CLI::Option* logs =
-      command->add_option("LOG", request.logs, "One or more recorded logs; figures are pooled");
+      command->add_option("LOG", request.logs, "One or more recorded logs; results are pooled");
   command->add_option("--out", request.out, "Folder for budget.json, budget.xml (JUnit) and the runs")
       ->capture_default_str();
-  command->add_option("--passes", request.passes, "Over all logs")
+  command->add_option("--passes", request.passes, "Number of times all logs are replayed")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
-  command->add_flag("--mono", request.mono, "Camera 0 alone");
+  command->add_flag("--mono", request.mono, "Use camera 0 only");
   CLI::Option* load =
-      command->add_flag("--load", request.load, "Beside programs that burn CPU time and memory");
-  command->add_option("--load-workers", request.load_settings.cpu_workers, "Of these, how many burn CPU time")
+      command->add_flag("--load", request.load, "Run beside programs that load CPU and memory");
+  command
+      ->add_option("--load-workers", request.load_settings.cpu_workers,
+                   "Number of load programs that use CPU time")
       ->check(CLI::Range(1, 256))
       ->capture_default_str()
       ->needs(load);
-  CLI::Option* worst = command->add_flag("--worst-case", options->worst_case,
-                                         "No log: fill every stage to its limits and print the maximum");
+  CLI::Option* worst =
+      command->add_flag("--worst-case", options->worst_case,
+                        "Without a log: fill every stage to its limits and print the maximum latency");
   worst->excludes(logs);
   options->settings.addTo(*command);
   command->footer(

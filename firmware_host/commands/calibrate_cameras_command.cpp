@@ -38,7 +38,7 @@ int calibrateLogCameras(CamerasOptions options) {
   const LogViews log = readLogViews(options.log);
   warnAll(log.warnings);
   for (std::size_t c = 0; c < log.camera_count; ++c) {
-    fmt::print("camera {}: the board in {} of {} images\n", c, log.with_board[c], log.images[c]);
+    fmt::print("camera {}: board found in {} of {} images\n", c, log.with_board[c], log.images[c]);
   }
   CameraInput input;
   input.target = options.log.target;
@@ -75,28 +75,30 @@ int calibrateLogCameras(CamerasOptions options) {
 
 void addCalibrateCameras(CLI::App& calibrate, int& exit_code) {
   CLI::App* command = calibrate.add_subcommand(
-      "cameras", "Lenses of one or two cameras and the transform between them, from images of a board");
+      "cameras", "Calibrate the lenses of one or two cameras and their relative pose from images of a board");
   auto options = std::make_shared<CamerasOptions>();
   command
-      ->add_option(
-          "LOG", options->log.log,
-          "Images of the board: a EuRoC folder (cam0 and cam1, with or without IMU; pictures may have "
-          "numbers for names), an archive of one, a bag, or a recording. No calibration is needed")
+      ->add_option("LOG", options->log.log,
+                   "Images of the board: a EuRoC folder (cam0 and cam1, IMU not needed; image names may be "
+                   "numbers), an archive of one, a bag, or a recording. No calibration is needed")
       ->required();
-  command->add_option("--target", options->target, "The board: YAML of `swiftlet calibrate target` or Kalibr")
+  command
+      ->add_option("--target", options->target,
+                   "Board description: YAML from `swiftlet calibrate target` or Kalibr")
       ->required();
   command->add_option("--out", options->out,
-                      "Folder for camchain.yaml, in Kalibr's form, and the page report.html");
+                      "Folder for camchain.yaml in Kalibr's format and the page report.html");
   command
-      ->add_option("--baseline", options->baseline_mm,
-                   "Distance between the two lenses, measured by hand [mm]: shows a board of the wrong size")
+      ->add_option(
+          "--baseline", options->baseline_mm,
+          "Distance between the two lenses [mm], measured by hand: reveals a board of the wrong size")
       ->check(nonNegative());
-  command->add_flag("--mono", options->log.mono, "Camera 0 alone");
+  command->add_flag("--mono", options->log.mono, "Use camera 0 only");
   command->footer(
-      "Example:\n  swiftlet calibrate cameras board_log --target board.yaml --out rig\n"
+      "Example:\n"
+      "  swiftlet calibrate cameras board_log --target board.yaml --out rig\n"
       "Show the board close, in every corner of both images, and tilted by 45 degrees to all sides. Exit "
-      "code 1: "
-      "not good enough, with the reasons.");
+      "code 1: the calibration is not good enough; the reasons are printed.");
   command->callback([options, &exit_code] { exit_code = calibrateLogCameras(*options); });
 }
 

@@ -34,19 +34,23 @@ int calibrateCheck(CheckOptions options) {
 }  // namespace
 
 void addCalibrateCheck(CLI::App& calibrate, int& exit_code) {
-  CLI::App* command =
-      calibrate.add_subcommand("check", "Does a calibration still hold? From a flight without a board");
+  CLI::App* command = calibrate.add_subcommand(
+      "check", "Check from a flight without a board whether a calibration still holds");
   auto options = std::make_shared<CheckOptions>();
-  command->add_option("LOG", options->request.log, "A flight with turns about all axes and changes of speed")
+  command
+      ->add_option("LOG", options->request.log,
+                   "Log of a flight with turns about all axes and changes of speed")
       ->required();
   options->of_log.addCalibration(*command);
   options->of_log.addSection(*command, options->request);
-  command->add_flag("--mono", options->request.mono, "Camera 0 alone");
-  command->add_option("--out", options->request.out, "Folder to keep the run and the page in");
+  command->add_flag("--mono", options->request.mono, "Use camera 0 only");
+  command->add_option("--out", options->request.out, "Folder for the run and the page");
   options->settings.addTo(*command);
   command->footer(
-      "Example:\n  swiftlet calibrate check data/euroc_mh01_20s --out check\n"
-      "Exit code 0: it holds, or the flight cannot tell, which the text says; 1: it has moved.");
+      "Example:\n"
+      "  swiftlet calibrate check data/euroc_mh01_20s --out check\n"
+      "Exit code 0: the calibration holds, or the flight cannot decide it (the text says which); 1: the "
+      "calibration has changed.");
   command->callback([options, &exit_code] { exit_code = calibrateCheck(*options); });
 }
 

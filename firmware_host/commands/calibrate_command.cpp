@@ -5,7 +5,7 @@ namespace swiftlet {
 
 void addCalibrateCommand(CLI::App& app, int& exit_code) {
   CLI::App* command =
-      app.add_subcommand("calibrate", "From a bare rig to a calibration: print a board, move the rig");
+      app.add_subcommand("calibrate", "Calibrate a new rig: print a board, then move the rig in front of it");
   command->require_subcommand(1);
   addCalibrateTarget(*command, exit_code);
   addCalibrateCameras(*command, exit_code);

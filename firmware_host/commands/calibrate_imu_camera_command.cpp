@@ -54,9 +54,9 @@ CameraSolution camerasOf(const CameraChain& chain, const LogViews& log, const st
     const Eigen::Vector2i& size = log.image_size[c];
     if (lens.width() != size.x() || lens.height() != size.y()) {
       throw InputError(file, 0, fmt::format("cam{}.resolution", c),
-                       fmt::format("{}x{} pixels, the log's images have {}x{}", lens.width(), lens.height(),
-                                   size.x(), size.y()),
-                       "Give the calibration of this image size, or leave --cameras out");
+                       fmt::format("is for {}x{} pixels, but the log's images have {}x{}", lens.width(),
+                                   lens.height(), size.x(), size.y()),
+                       "Give the calibration of this image size, or omit --cameras");
     }
     solution.camera[c].model = lens;
   }
@@ -91,7 +91,7 @@ int calibrateLogImuCamera(ImuCameraOptions options) {
   LogViews log = readLogViews(options.log);
   warnAll(log.warnings);
   for (std::size_t c = 0; c < log.camera_count; ++c) {
-    fmt::print("camera {}: the board in {} of {} images\n", c, log.with_board[c], log.images[c]);
+    fmt::print("camera {}: board found in {} of {} images\n", c, log.with_board[c], log.images[c]);
   }
   if (log.samples.empty()) {
     throw InputError(options.log.log, 0, "", "has no IMU samples", "Record them with the images");
@@ -116,12 +116,11 @@ int calibrateLogImuCamera(ImuCameraOptions options) {
     if (cameras_count) {
       solution.reasons.push_back(reason);
     } else {
-      fmt::print("cameras alone, without rolling rows: {}\n", reason);
+      fmt::print("cameras only, without rolling shutter: {}\n", reason);
     }
   }
   if (!input.noise_told) {
-    fmt::print(
-        "noise: a typical MEMS IMU's random walks, densities from the residuals (none given by --imu)\n");
+    fmt::print("noise: random walks of a typical MEMS IMU, densities from the residuals (no --imu given)\n");
     input.noise.gyro_density *= solution.gyro_sigma;
     input.noise.accel_density *= solution.accel_sigma;
   }
@@ -145,9 +144,9 @@ int calibrateLogImuCamera(ImuCameraOptions options) {
 }  // namespace
 
 void addCalibrateImuCamera(CLI::App& calibrate, int& exit_code) {
-  CLI::App* command = calibrate.add_subcommand(
-      "imu-camera",
-      "Cameras and IMU together: lenses, extrinsics, time offset, readout, scale and misalignment");
+  CLI::App* command = calibrate.add_subcommand("imu-camera",
+                                               "Calibrate cameras and IMU together: lenses, extrinsics, time "
+                                               "offset, readout time, scale and misalignment");
   auto options = std::make_shared<ImuCameraOptions>();
   command
       ->add_option(
@@ -155,22 +154,25 @@ void addCalibrateImuCamera(CLI::App& calibrate, int& exit_code) {
           "Images of the board and IMU samples: a EuRoC folder or archive, a bag, or a recording. No "
           "calibration is needed")
       ->required();
-  command->add_option("--target", options->target, "The board: YAML of `swiftlet calibrate target` or Kalibr")
+  command
+      ->add_option("--target", options->target,
+                   "Board description: YAML from `swiftlet calibrate target` or Kalibr")
       ->required();
   command->add_option("--cameras", options->cameras,
-                      "Kalibr's camchain to start from, with or without an IMU; without it the cameras are "
+                      "Kalibr camchain to start from, with or without an IMU. Default: the cameras are "
                       "calibrated from the log first");
-  command->add_option(
-      "--imu", options->imu,
-      "The IMU's noise: YAML of `swiftlet calibrate imu-noise`, Kalibr or EuRoC. Without it a "
-      "typical MEMS IMU is assumed");
-  command->add_option("--out", options->out, "Folder for the calibration, in EuRoC's and Kalibr's form")
+  command->add_option("--imu", options->imu,
+                      "Noise of the IMU: YAML from `swiftlet calibrate imu-noise`, Kalibr or EuRoC. Default: "
+                      "a typical MEMS IMU");
+  command->add_option("--out", options->out, "Folder for the calibration in EuRoC's and Kalibr's formats")
       ->required();
-  command->add_flag("--mono", options->log.mono, "Camera 0 alone");
+  command->add_flag("--mono", options->log.mono, "Use camera 0 only");
   command->footer(
-      "Example:\n  swiftlet calibrate imu-camera board_log --target board.yaml --imu imu.yaml --out rig\n"
-      "Move the rig in front of the board for a minute: turn it about all three axes and swing it along all "
-      "three, once or twice a second. Exit code 1: not good enough, with the reasons.");
+      "Example:\n"
+      "  swiftlet calibrate imu-camera board_log --target board.yaml --imu imu.yaml --out rig\n"
+      "Move the rig in front of the board for a minute: rotate it about all three axes and swing it along "
+      "all three, once or twice a second. Exit code 1: the calibration is not good enough; the reasons are "
+      "printed.");
   command->callback([options, &exit_code] { exit_code = calibrateLogImuCamera(*options); });
 }
 

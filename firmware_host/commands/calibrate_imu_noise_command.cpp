@@ -35,18 +35,21 @@ int calibrateImuNoise(const ImuNoiseOptions& options) {
 }  // namespace
 
 void addCalibrateImuNoise(CLI::App& calibrate, int& exit_code) {
-  CLI::App* command =
-      calibrate.add_subcommand("imu-noise", "Noise of an IMU from a log at rest: Allan deviation");
+  CLI::App* command = calibrate.add_subcommand(
+      "imu-noise", "Estimate the noise of an IMU from a log at rest (Allan deviation)");
   auto options = std::make_shared<ImuNoiseOptions>();
   command
       ->add_option("LOG", options->log,
-                   "Hours at rest: a EuRoC folder (imu0 is enough), an imu0/data.csv, a bag or a recording")
+                   "Log at rest, best for hours: a EuRoC folder (imu0 is enough), an imu0/data.csv, a bag or "
+                   "a recording")
       ->required();
   command->add_option("--out", options->out,
-                      "File for the result, as Kalibr's imu.yaml; its page, with plots, beside it as .html");
+                      "File for the result in the format of Kalibr's imu.yaml; a page with plots is written "
+                      "beside it as .html");
   command->footer(
-      "Example:\n  swiftlet calibrate imu-noise still --out imu.yaml\n"
-      "Two hours at rest give the random walk of most sensors; white noise takes ten minutes.");
+      "Example:\n"
+      "  swiftlet calibrate imu-noise still --out imu.yaml\n"
+      "Two hours at rest give the random walks of most sensors; ten minutes give the white noise.");
   command->callback([options, &exit_code] { exit_code = calibrateImuNoise(*options); });
 }
 

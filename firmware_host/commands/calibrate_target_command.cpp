@@ -29,13 +29,14 @@ int printTarget(TargetOptions options) {
   writeWholeFile(options.out, boardPdf(target, paper));
   writeWholeFile(yaml, targetYaml(target));
   fmt::print(
-      "{}: {}\n{}: the board for --target. Print at 100 %, check both rulers, and write what you measure "
+      "{}: {}\n"
+      "{}: board description for --target. Print at 100 %, measure both rulers, and write the measured size "
       "into this file\n",
       options.out, describe(target), yaml);
   if (!target.hasTags() && (target.columns + target.rows) % 2 == 0) {
     fmt::print(
-        "This board looks the same turned by 180 degrees: keep it upright in all images, or take an odd and "
-        "an even number\n");
+        "This board looks the same after a turn of 180 degrees: keep it upright in all images, or choose one "
+        "odd and one even number\n");
   }
   return kExitDone;
 }
@@ -44,27 +45,27 @@ int printTarget(TargetOptions options) {
 
 void addCalibrateTarget(CLI::App& calibrate, int& exit_code) {
   CLI::App* command =
-      calibrate.add_subcommand("target", "A calibration board as a PDF to print, with its description");
+      calibrate.add_subcommand("target", "Write a calibration board as a printable PDF with its description");
   auto options = std::make_shared<TargetOptions>();
-  command->add_option("--out", options->out, "PDF to write; the board's YAML goes beside it")->required();
+  command->add_option("--out", options->out, "PDF to write; the board's YAML is written beside it")
+      ->required();
   command
-      ->add_option(
-          "--kind", options->kind,
-          "aprilgrid (Kalibr's layout; may leave the image in part) or checkerboard (all of it must be "
-          "seen)")
+      ->add_option("--kind", options->kind,
+                   "aprilgrid (Kalibr's layout; may be partly outside the image) or checkerboard (must be "
+                   "completely visible)")
       ->check(CLI::IsMember({"aprilgrid", "checkerboard"}));
   command->add_option("--paper", options->paper,
-                      "A4, A3, A2, A1, A0, letter, tabloid, or width and height in mm, like 600x400");
+                      "A4, A3, A2, A1, A0, letter, tabloid, or width and height in mm, for example 600x400");
   command
       ->add_option("--columns", options->layout.columns,
-                   "Tags, or inner corners, side by side; default: as many as fill the paper")
+                   "Tags or inner corners per row. Default: as many as fit the paper")
       ->check(CLI::Range(3, 100));
-  command->add_option("--rows", options->layout.rows, "Tags, or inner corners, one above the other")
+  command->add_option("--rows", options->layout.rows, "Tags or inner corners per column")
       ->check(CLI::Range(3, 100));
   command->footer(
-      "Example:\n  swiftlet calibrate target --out board.pdf --paper A3\n"
-      "Tags and squares are made as large as the paper allows. Glue the print to glass or a thick flat "
-      "plate.");
+      "Example:\n"
+      "  swiftlet calibrate target --out board.pdf --paper A3\n"
+      "Tags and squares are as large as the paper allows. Glue the print to glass or a thick flat plate.");
   command->callback([options, &exit_code] { exit_code = printTarget(*options); });
 }
 

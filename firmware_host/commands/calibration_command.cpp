@@ -33,21 +33,21 @@ int showCalibration(const CalibrationCommand& options) {
 
 void addCalibrationCommand(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand(
-      "calibration", "Show a calibration of any format, and write it as EuRoC's and Kalibr's files");
+      "calibration", "Show a calibration of any format and convert it to EuRoC's and Kalibr's formats");
   auto options = std::make_shared<CalibrationCommand>();
   command
-      ->add_option(
-          "files", options->files,
-          "A folder, or one file of EuRoC, Kalibr, Basalt, ROS camera_info or OpenCV, and the IMU file where "
-          "it is not beside it")
+      ->add_option("files", options->files,
+                   "A folder, or a file from EuRoC, Kalibr, Basalt, ROS camera_info or OpenCV, with the IMU "
+                   "file if it is elsewhere")
       ->required()
       ->expected(1, 2);
-  command->add_option("--out", options->out, "Folder for the calibration in the two forms that flights read");
+  command->add_option("--out", options->out, "Folder for the calibration in EuRoC's and Kalibr's formats");
   options->settings.addTo(*command);
   command->footer(
-      "Example:\n  swiftlet calibration basalt_calib.json --out rig\n"
+      "Example:\n"
+      "  swiftlet calibration basalt_calib.json --out rig\n"
       "  swiftlet calibration left_right_and_imu_yaml/\n"
-      "Lenses that the estimator does not have are converted; the residual is shown in pixels.");
+      "Lens models that the estimator does not support are converted; the residual is shown in pixels.");
   command->callback([options, &exit_code] { exit_code = showCalibration(*options); });
 }
 

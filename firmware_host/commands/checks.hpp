@@ -57,7 +57,7 @@ void addChoice(CLI::App& command, const std::string& option, Enum& value, const 
       value = kind;
       return;
     }
-    throw CLI::ValidationError(option, "`" + text + "` is none of " + names);
+    throw CLI::ValidationError(option, "`" + text + "` is not one of " + names);
   };
   command.add_option_function<std::string>(option, set, help)->type_name(names)->default_str(chosen);
 }

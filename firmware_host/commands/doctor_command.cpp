@@ -46,20 +46,22 @@ int doctor(const DoctorOptions& options) {
 
 void addDoctorCommand(CLI::App& app, int& exit_code) {
   CLI::App* command =
-      app.add_subcommand("doctor", "Look at this computer, the connected devices and the vehicle's settings");
+      app.add_subcommand("doctor", "Check this computer, the connected devices and the vehicle's settings");
   auto options = std::make_shared<DoctorOptions>();
-  command->add_option("--seconds", options->request.seconds, "Watch the vehicle's devices for so long")
+  command->add_option("--seconds", options->request.seconds, "Seconds to watch the vehicle's devices")
       ->check(nonNegative())
       ->capture_default_str();
-  command->add_option("LOG", options->log.log, "A recorded log to examine in place of this computer");
+  command->add_option("LOG", options->log.log, "Recorded log to check instead of this computer");
   options->of_log.addCalibration(*command);
   options->of_log.addSection(*command, options->log);
-  command->add_flag("--mono", options->log.mono, "Of LOG, camera 0 alone");
+  command->add_flag("--mono", options->log.mono, "With LOG: use camera 0 only");
   options->settings.addTo(*command);
   command->footer(
-      "Example:\n  swiftlet doctor\n  swiftlet doctor --settings vehicle.yaml\n  swiftlet doctor "
-      "data/euroc_mh01_20s\n"
-      "Exit code 0: the vehicle's devices work as the settings want them; of LOG, no mistake was found.");
+      "Example:\n"
+      "  swiftlet doctor\n"
+      "  swiftlet doctor --settings vehicle.yaml\n"
+      "  swiftlet doctor data/euroc_mh01_20s\n"
+      "Exit code 0: the vehicle's devices work as configured, or no error was found in LOG.");
   command->callback([options, &exit_code] { exit_code = doctor(*options); });
 }
 

@@ -73,8 +73,7 @@ Subject subjectOf(const EvaluateOptions& options) {
       if (std::filesystem::exists(path / name)) subject.files.push_back(path / name);
     }
     if (subject.files.empty()) {
-      throw InputError(options.run, 0, "", "no odometry.tum in this folder",
-                       "Give a folder that replay wrote");
+      throw InputError(options.run, 0, "", "has no odometry.tum", "Give a folder written by replay");
     }
     if (std::filesystem::exists(path / "states.csv")) subject.states = path / "states.csv";
     const Json summary = readSummary(path / "summary.json");
@@ -90,7 +89,7 @@ Subject subjectOf(const EvaluateOptions& options) {
   }
   if (std::filesystem::is_directory(subject.truth)) subject.log = subject.truth;
   if (subject.truth.empty()) {
-    throw InputError(options.run, 0, "", "nothing to compare with",
+    throw InputError(options.run, 0, "", "there is no truth to compare with",
                      "Give a log or a trajectory with --truth");
   }
   return subject;
@@ -99,8 +98,7 @@ Subject subjectOf(const EvaluateOptions& options) {
 MeshAccuracy meshAccuracy(const EvaluateOptions& options, const Subject& subject, const Truth& truth,
                           const AccuracyOptions& accuracy_options) {
   if (subject.log.empty()) {
-    throw InputError(options.run, 0, "", "nothing says which log the meshes belong to",
-                     "Give the log with --truth");
+    throw InputError(options.run, 0, "", "the log of this run is unknown", "Give the log with --truth");
   }
   MeshEvaluationRequest request{options.run, subject.log, options.truth_mesh, {}};
   const std::filesystem::path in_map = std::filesystem::path(options.run) / "in_map.tum";
@@ -165,7 +163,7 @@ int evaluatePositions(const EvaluateOptions& options, const Settings& settings, 
   if (options.fit_shift > 0) how.reach = Duration::fromSeconds(options.fit_shift);
   Json json;
   json["truth"] = subject.truth;
-  if (!options.json) fmt::print("truth: {}, positions alone\n", subject.truth);
+  if (!options.json) fmt::print("truth: {}, positions only\n", subject.truth);
   bool compared = false;
   for (const std::string& file : subject.files) {
     const Trajectory estimate = readEstimate(file);
@@ -178,8 +176,8 @@ int evaluatePositions(const EvaluateOptions& options, const Settings& settings, 
   if (options.json) fmt::print("{}\n", json.dump(2));
   if (!compared) {
     fmt::print(stderr,
-               "error: no position of the truth has an estimate at its stamp: is its clock another? "
-               "--fit-shift S tries shifts up to S seconds\n");
+               "error: no position of the truth has an estimate at its stamp. If its clock differs, try "
+               "shifts up to S seconds with --fit-shift S\n");
   }
   return compared ? kExitDone : kExitFailed;
 }
@@ -194,8 +192,8 @@ int evaluate(const EvaluateOptions& options) {
     return evaluatePositions(options, settings, subject);
   }
   if (options.fit_shift > 0) {
-    throw InputError(subject.truth, 0, "--fit-shift", "is for a truth of positions without attitude",
-                     "Leave it out: poses need stamps of the log's clock");
+    throw InputError(subject.truth, 0, "--fit-shift", "applies only to a truth of positions without attitude",
+                     "Omit it: poses must have stamps of the log's clock");
   }
   const Truth truth = readTruth(subject.truth, subject.from_tracks);
   AccuracyOptions accuracy_options = accuracyOptions(settings.evaluation, options.align);
@@ -233,7 +231,7 @@ int evaluate(const EvaluateOptions& options) {
     }
   }
   if (options.json) fmt::print("{}\n", json.dump(2));
-  if (!compared) fmt::print(stderr, "error: no pose of the estimate has truth at its stamp\n");
+  if (!compared) fmt::print(stderr, "error: no pose of the estimate has a truth pose at its stamp\n");
   return compared ? kExitDone : kExitFailed;
 }
 
@@ -242,36 +240,34 @@ int evaluate(const EvaluateOptions& options) {
 void addEvaluateCommand(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("evaluate", "Compare a run or a trajectory file with the truth");
   auto options = std::make_shared<EvaluateOptions>();
-  command->add_option("RUN", options->run, "Run folder, or a trajectory (TUM, EuRoC csv)")->required();
+  command->add_option("RUN", options->run, "Run folder or trajectory file (TUM, EuRoC csv)")->required();
   command->add_option(
       "--truth", options->truth,
-      "Log, trajectory file or positions (t, x, y, z) with the truth; default: the log the run "
-      "was made from");
+      "Log, trajectory file or positions (t, x, y, z) with the truth. Default: the log of the run");
   command
-      ->add_option(
-          "--fit-shift", options->fit_shift,
-          "Of positions, whose clock is another: fit a shift of their stamps, up to this many seconds")
+      ->add_option("--fit-shift", options->fit_shift,
+                   "For positions with a different clock: fit a time shift of at most this many seconds")
       ->check(nonNegative());
   addChoice<AlignKind>(*command, "--align", options->align,
-                       "How to align: sim3 with scale, yaw with translation",
+                       "Alignment to the truth: sim3 includes scale; yaw aligns yaw and translation",
                        {{"se3", AlignKind::kSe3}, {"sim3", AlignKind::kSim3}, {"yaw", AlignKind::kYaw}});
   command
-      ->add_option("--from", options->from, "Leave out poses before this many seconds after the first image")
+      ->add_option("--from", options->from, "Omit poses earlier than this many seconds after the first image")
       ->check(nonNegative());
   command
-      ->add_option("--until", options->until, "Leave out poses after this many seconds after the first image")
+      ->add_option("--until", options->until, "Omit poses later than this many seconds after the first image")
       ->check(nonNegative());
-  command->add_flag("--json", options->json, "Print JSON, and nothing else, on stdout");
-  CLI::Option* mesh =
-      command->add_flag("--mesh", options->mesh,
-                        "Also judge the run's meshes by the true surface; draws label_confusion.svg there");
+  command->add_flag("--json", options->json, "Print only JSON on stdout");
+  CLI::Option* mesh = command->add_flag(
+      "--mesh", options->mesh,
+      "Also compare the run's meshes with the true surface; writes label_confusion.svg to the run folder");
   command
       ->add_option("--truth-mesh", options->truth_mesh,
-                   "True surface, a PLY file; default: truth/mesh.ply of the log")
+                   "True surface as PLY file. Default: truth/mesh.ply of the log")
       ->needs(mesh);
   CLI::Option* hil = command->add_option(
       "--hil", options->hil,
-      "Check a flight on a hardware-in-the-loop replay instead: the folder that `swiftlet hil` wrote");
+      "Check a flight on a hardware-in-the-loop replay instead; give the folder written by `swiftlet hil`");
   command->add_option("--junit", options->junit, "Also write the checks as JUnit XML")->needs(hil);
   options->settings.addTo(*command);
   command->footer(

@@ -46,7 +46,7 @@ Trajectory truthOf(const ExportOptions& options, const RunFolder& run) {
   try {
     return readTruth(run.log, true).poses;
   } catch (const InputError& error) {
-    fmt::print("without truth: {}\n", error.what());
+    fmt::print("truth omitted: {}\n", error.what());
     return {};
   }
 }
@@ -56,10 +56,10 @@ void checkFrames(const RosFrames& frames) {
   for (std::size_t i = 0; i < names.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
       if (names[i] != names[j]) continue;
-      throw InputError("frames", 0, names[i], "names two frames", "Give each frame a name of its own");
+      throw InputError("frames", 0, names[i], "names two frames", "Give each frame its own name");
     }
     if (names[i].empty() || names[i].front() == '/') {
-      throw InputError("frames", 0, names[i], "is no frame of tf2", "Give a name that does not begin with /");
+      throw InputError("frames", 0, names[i], "is not a valid tf2 frame name", "Remove the leading /");
     }
   }
 }
@@ -98,8 +98,8 @@ LogBagOptions bagOptions(const ExportOptions& options, bool in_run) {
 
 int exportLog(const ExportOptions& options) {
   if (!options.tum.empty()) {
-    throw InputError(options.from, 0, "--tum", "a log has no trajectory of ours",
-                     "Replay it, and export the run");
+    throw InputError(options.from, 0, "--tum", "a log has no estimated trajectory",
+                     "Replay it and export the run");
   }
   std::vector<std::string> warnings;
   writeBags(options, [&](MessageBag& bag) {
@@ -121,14 +121,14 @@ int exportRun(const ExportOptions& options) {
   }
   const BagTruth beside = truthBeside(run, truth);
   if (!truth.empty() && beside.poses.empty()) {
-    fmt::print("without truth: none of its poses is at the time of the run's\n");
+    fmt::print("truth omitted: none of its poses is within the run's time\n");
   }
   RunBagOptions bag_options;
   bag_options.frames = options.frames;
   bag_options.meshes = !options.no_meshes;
   if (options.images && run.log.empty()) {
     throw InputError(options.from, 0, "--images", "the run does not say which log it was made from",
-                     "Export the log into a bag of its own");
+                     "Export the log into its own bag");
   }
   writeBags(options, [&](MessageBag& bag) {
     const auto log = options.images ? openAll(options, run.log) : nullptr;
@@ -149,26 +149,26 @@ int exportAny(const ExportOptions& options) {
 
 void addExportCommand(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand(
-      "export", "A run folder or a log for other programs: MCAP, rosbag2, a ROS 1 bag, TUM files");
+      "export", "Export a run or a log for other programs: MCAP, rosbag2, ROS 1 bag, TUM files");
   auto options = std::make_shared<ExportOptions>();
-  command->add_option("RUN_OR_LOG", options->from, "Run folder, or a log: EuRoC folder or bag")->required();
+  command->add_option("RUN_OR_LOG", options->from, "Run folder or log (EuRoC folder or bag)")->required();
   auto* wanted = command->add_option_group("formats", "At least one of");
   wanted->add_option("--mcap", options->mcap,
-                     "MCAP file to write, with ROS 2's messages: for Foxglove, Rerun, ros2 bag");
+                     "MCAP file to write, with ROS 2 messages: for Foxglove, Rerun and ros2 bag");
   wanted->add_option("--rosbag2", options->rosbag2,
                      "rosbag2 folder to write, with an SQLite file: for ros2 bag");
-  wanted->add_option("--bag", options->bag, "ROS 1 bag to write: for PlotJuggler, RViz");
-  wanted->add_option("--tum", options->tum, "Folder for trajectories in TUM files: for evo");
+  wanted->add_option("--bag", options->bag, "ROS 1 bag to write: for PlotJuggler and RViz");
+  wanted->add_option("--tum", options->tum, "Folder for trajectories as TUM files: for evo");
   wanted->require_option(1, 4);
-  CLI::Option* truth = command->add_option(
-      "--truth", options->truth,
-      "Log or trajectory file with the truth; default: the log the run was made from, where it is there");
-  command->add_flag("--no-truth", options->no_truth, "Leave the truth out")->excludes(truth);
-  command->add_flag("--no-meshes", options->no_meshes, "Leave the surfaces out of the bag");
-  command->add_flag("--images", options->images, "Of a run: also the images and samples of its log");
+  CLI::Option* truth =
+      command->add_option("--truth", options->truth,
+                          "Log or trajectory file with the truth. Default: the log of the run, if available");
+  command->add_flag("--no-truth", options->no_truth, "Omit the truth")->excludes(truth);
+  command->add_flag("--no-meshes", options->no_meshes, "Omit the surfaces");
+  command->add_flag("--images", options->images, "For a run: include the images and IMU samples of its log");
   CLI::Option* raw =
       command->add_flag("--raw-images", options->raw_images,
-                        "Images as pixels (mono8), also where the log holds PNG or JPEG files");
+                        "Write images as raw pixels (mono8) even if the log holds PNG or JPEG files");
   command
       ->add_option("--jpeg", options->jpeg_quality,
                    "Encode all images as JPEG of this quality, 1 to 100. Lower values make smaller files and "
@@ -176,10 +176,10 @@ void addExportCommand(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(1, 100))
       ->excludes(raw);
   options->log.addCalibration(*command);
-  command->add_option("--map-frame", options->frames.map, "Frame of the map")->capture_default_str();
-  command->add_option("--odom-frame", options->frames.odom, "Frame of the odometry's world")
+  command->add_option("--map-frame", options->frames.map, "Name of the map frame")->capture_default_str();
+  command->add_option("--odom-frame", options->frames.odom, "Name of the odometry frame")
       ->capture_default_str();
-  command->add_option("--body-frame", options->frames.body, "Frame of the body, which is the IMU")
+  command->add_option("--body-frame", options->frames.body, "Name of the body frame, which is the IMU")
       ->capture_default_str();
   command->footer(
       "Example:\n  swiftlet export run_mh01 --mcap run_mh01.mcap\n"

@@ -32,22 +32,23 @@ int fly(const FlyOptions& options) {
   const FlyResult result = runFlight(request, options.settings.read());
   if (!result.missing.empty()) {
     for (const std::string& line : result.missing) warn("error: " + line + "\n");
-    warn("nothing was flown; `swiftlet doctor` looks at all devices and at this computer\n");
+    warn("no flight took place; `swiftlet doctor` checks all devices and this computer\n");
     return kExitFailed;
   }
   say(summaryText(result.summary));
   if (!result.out.empty()) say(fmt::format("written to {}\n", result.out));
   if (!result.lost.empty()) {
-    warn(fmt::format("warning: files of this flight are missing or end early, the first: {}\n", result.lost));
+    warn(fmt::format("warning: files of this flight are missing or incomplete; the first one: {}\n",
+                     result.lost));
   }
   if (!result.faultless) {
-    warn("error: a thread of the flight was lost; executor.thread_faults in summary.json says which\n");
+    warn("error: a thread of the flight failed; see executor.thread_faults in summary.json\n");
     return kExitFailed;
   }
   if (!result.has_pose) {
     const std::string events =
-        result.out.empty() ? "" : "; " + result.out + "/events.log says what the start waited for";
-    warn(fmt::format("error: no pose in the whole flight{}\n", events));
+        result.out.empty() ? "" : "; " + result.out + "/events.log shows what the start waited for";
+    warn(fmt::format("error: no pose during the whole flight{}\n", events));
     return kExitFailed;
   }
   return verdictOf(result.summary);
@@ -60,17 +61,19 @@ void addFlyCommand(CLI::App& app, int& exit_code) {
   auto options = std::make_shared<FlyOptions>();
   FlyRequest& request = options->request;
   command->add_option("--out", request.out,
-                      "Run folder to write; without: a new one for each flight in flights.folder");
-  command->add_flag("--replace", request.replace, "The folder of --out may hold a run, which is replaced");
-  command->add_option("--seconds", request.seconds, "End after this long; without: with SIGINT or SIGTERM")
+                      "Run folder to write. Default: a new folder in flights.folder for each flight");
+  command->add_flag("--replace", request.replace, "Replace the run in the folder of --out");
+  command
+      ->add_option("--seconds", request.seconds,
+                   "Stop after this many seconds. Default: stop on SIGINT or SIGTERM")
       ->check(nonNegative());
   command->add_flag("--imu-rate", request.imu_rate, "Also write imu_rate.tum, the state at every IMU sample");
   command->add_flag("--loop-closure", request.loop_closure,
-                    "Recognize places seen before; they hold map.tum together");
+                    "Detect revisited places and correct drift in map.tum");
   addKeptMapOptions(*command, request.kept_maps);
   command->add_flag("--map", request.map, "Fuse depth into a labelled map: map.ply, map.glb");
   command->add_flag("--record", request.record,
-                    "Write what enters the estimator to recording/ in the run folder");
+                    "Record the estimator's inputs to recording/ in the run folder");
   options->view.addTo(*command);
   options->settings.addTo(*command);
   command->footer(

@@ -19,7 +19,7 @@ struct FuseOptions {
 void printFusion(const nlohmann::ordered_json& summary) {
   const auto& moments = summary["moments"];
   const auto& map = summary["map"];
-  fmt::print("{} depth images fused ({} with labels), {} without a pose, {} refused; {} triangles\n",
+  fmt::print("{} depth images fused ({} with labels), {} without a pose, {} rejected; {} triangles\n",
              moments["fused"].get<std::uint64_t>(), moments["with_labels"].get<std::uint64_t>(),
              moments["without_pose"].get<std::uint64_t>(), moments["refused"].get<std::uint64_t>(),
              map["mesh"]["faces"].get<std::uint64_t>());
@@ -38,11 +38,11 @@ int fuse(const FuseOptions& options) {
   printFusion(result.summary);
   fmt::print("written to {}\n", request.out);
   if (!result.finished) {
-    fmt::print(stderr, "stopped before the end; the folder holds what was done\n");
+    fmt::print(stderr, "stopped early; the folder holds the results so far\n");
     return kExitFailed;
   }
   if (!result.has_surface) {
-    fmt::print(stderr, "error: {}: no surface; summary.json says what became of the depth images\n",
+    fmt::print(stderr, "error: {}: no surface; see the counts of depth images in summary.json\n",
                request.log);
     return kExitFailed;
   }
@@ -52,33 +52,31 @@ int fuse(const FuseOptions& options) {
 }  // namespace
 
 void addFuseCommand(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("fuse", "Make the labelled map of a log with given poses");
+  CLI::App* command = app.add_subcommand("fuse", "Build the labelled map of a log from given poses");
   auto options = std::make_shared<FuseOptions>();
   FuseRequest& request = options->request;
   request.out = "fuse";
   command
       ->add_option("LOG", request.log,
-                   "EuRoC/ASL folder with depth0 or two cameras, and labels0 where there are labels")
+                   "EuRoC/ASL folder with depth0 or two cameras; labels0 is used if present")
       ->required();
   command->add_option("--trajectory", request.trajectory,
-                      "Poses of the body (TUM, EuRoC csv); default: the log's own truth");
+                      "Body poses (TUM, EuRoC csv). Default: the log's truth");
   command->add_option("--out", request.out, "Folder to write")->capture_default_str();
-  command->add_option("--keep", request.keep, "File to keep the map in, to be continued later");
+  command->add_option("--keep", request.keep, "File in which the map is kept, to continue it later");
   command
       ->add_option("--continue", request.continued,
-                   "Begin with this kept map; the poses have to be in its frame")
+                   "Start from this kept map; the poses must be in its frame")
       ->check(CLI::ExistingFile);
   addChoice<DepthSource>(
-      *command, "--depth", request.depth, "Where depth comes from: sensor is the log's depth0",
+      *command, "--depth", request.depth, "Source of depth; sensor is depth0 of the log",
       {{"any", DepthSource::kAny}, {"sensor", DepthSource::kSensor}, {"stereo", DepthSource::kStereo}});
   command
       ->add_option("--interval", request.interval,
-                   "Seconds between pairs that are matched for stereo depth; pairs with labels always are")
+                   "Seconds between matched stereo pairs; pairs with labels are always matched")
       ->check(positive())
       ->capture_default_str();
-  command
-      ->add_option("--max-gap", request.max_gap,
-                   "Poses are interpolated between neighbours at most this far apart [s]")
+  command->add_option("--max-gap", request.max_gap, "Largest gap between poses that are interpolated [s]")
       ->check(positive())
       ->capture_default_str();
   options->log.addCalibration(*command);

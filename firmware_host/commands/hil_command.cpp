@@ -24,7 +24,7 @@ int hil(const HilOptions& options) {
   const HilResult result = runHil(request, options.settings.read());
   say(fmt::format("{}\nwritten to {}\n", result.report.dump(2), request.out));
   if (!result.complete) {
-    warn("error: not everything was played when it was due; hil.json says what\n");
+    warn("error: some messages were not played in time; see hil.json\n");
     return kExitFailed;
   }
   return kExitDone;
@@ -34,8 +34,7 @@ int hil(const HilOptions& options) {
 
 void addHilCommand(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand(
-      "hil",
-      "Play a recorded flight out through the kernel's devices, for `swiftlet fly` to read as hardware");
+      "hil", "Play a recorded flight through the kernel's devices, which `swiftlet fly` reads like hardware");
   auto options = std::make_shared<HilOptions>();
   HilRequest& request = options->request;
   request.out = "hil";
@@ -44,19 +43,21 @@ void addHilCommand(CLI::App& app, int& exit_code) {
                    "EuRoC/ASL folder or an archive of one, a bag (rosbag2, MCAP, ROS 1), or a recorded run")
       ->required();
   command
-      ->add_option("--out", request.out, "Folder for truth.tum (on the host's clock), hil.json, faults.csv")
+      ->add_option("--out", request.out,
+                   "Folder for truth.tum (on the host's clock), hil.json and faults.csv")
       ->capture_default_str();
   command->add_option("--faults", options->faults,
-                      "What goes wrong when: lines of seconds,device,fault,for seconds[,value]");
-  command->add_option("--seconds", request.seconds, "Of the log, from its first image; 0: all")
+                      "Faults to inject: CSV lines of seconds,device,fault,for seconds[,value]");
+  command
+      ->add_option("--seconds", request.seconds, "Seconds of the log to play, from its first image; 0: all")
       ->check(nonNegative());
-  command->add_option("--skew-ppm", request.skew_ppm, "By which the IMU's clock is fast")
+  command->add_option("--skew-ppm", request.skew_ppm, "Amount by which the IMU's clock runs fast [ppm]")
       ->check(CLI::Range(-1000.0, 1000.0))
       ->capture_default_str();
   command->add_option("--patience", request.patience, "Seconds to wait for a reader of the IMU")
       ->check(nonNegative())
       ->capture_default_str();
-  command->add_option("--lead", request.lead, "Seconds from the reader's coming to the first image")
+  command->add_option("--lead", request.lead, "Seconds from the reader's connection to the first image")
       ->check(nonNegative())
       ->capture_default_str();
   options->settings.addTo(*command);

@@ -4,7 +4,7 @@ namespace swiftlet {
 
 void addKeptMapOptions(CLI::App& command, KeptMapRequest& request) {
   command.add_option("--keep-map", request.keep,
-                     "Write a map for later runs to this new folder; enables loop closure");
+                     "Keep the map in this new folder for later runs; enables loop closure");
   CLI::Option* in = command.add_option(
       "--in-map", request.in, "Localize in the map of this folder; write poses in its frame to in_map.tum");
   command.add_flag("--extend", request.extend, "Add this run's keyframes to the map of --in-map")->needs(in);

@@ -8,10 +8,9 @@ namespace swiftlet {
 
 void LogCommandOptions::addCalibration(CLI::App& command) {
   command
-      .add_option(
-          "--calibration", calibration,
-          "Calibration instead of the log's own: a folder, or a file of Kalibr, Basalt, ROS or OpenCV and "
-          "the IMU file where it is not beside it")
+      .add_option("--calibration", calibration,
+                  "Calibration to use instead of the log's: a folder, or a file from Kalibr, Basalt, ROS or "
+                  "OpenCV, with the IMU file if it is elsewhere")
       ->expected(1, 2);
 }
 
@@ -28,7 +27,7 @@ void LogCommandOptions::fill(LogRequest& request) const {
   if (!calibration.empty()) request.calibration = calibration[0];
   if (calibration.size() > 1) request.imu_calibration = calibration[1];
   if (request.until && *request.until < request.from) {
-    throw InputError("--until", 0, "", "the section ends before it begins", "Give an --until after --from");
+    throw InputError("--until", 0, "", "the section ends before it starts", "Set --until after --from");
   }
 }
 

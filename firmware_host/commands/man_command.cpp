@@ -24,7 +24,7 @@ std::string dateOfPage() {
 }  // namespace
 
 void addManCommand(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("man", "Print the manual page, as man(1) reads it");
+  CLI::App* command = app.add_subcommand("man", "Print the manual page in the format of man(1)");
   command->group("");  // for the build: users have `man swiftlet`
   command->footer("Example:\n  swiftlet man > swiftlet.1 && man ./swiftlet.1");
   command->callback([&app, &exit_code] {

@@ -11,15 +11,24 @@ namespace {
 
 constexpr const char* kExitStatus =
     ".SH EXIT STATUS\n"
-    ".TP\n.B 0\nDone; \\fBdoctor\\fR: the devices work as the settings want them.\n"
-    ".TP\n.B 1\nThe run or the check failed: devices are missing, no pose was found, a figure is off.\n"
-    ".TP\n.B 2\nWrong use or bad input; the message names file, line, field and remedy.\n";
+    ".TP\n"
+    ".B 0\n"
+    "Success; \\fBdoctor\\fR: the devices work as configured.\n"
+    ".TP\n"
+    ".B 1\n"
+    "The run or the check failed: missing devices, no pose, a result out of its limits.\n"
+    ".TP\n"
+    ".B 2\n"
+    "Wrong usage or invalid input; the message names file, line, field and remedy.\n";
 constexpr const char* kFiles =
     ".SH FILES\n"
-    ".TP\n.I /etc/swiftlet/vehicle.yaml\n"
+    ".TP\n"
+    ".I /etc/swiftlet/vehicle.yaml\n"
     "Settings of this vehicle, read by the service \\fBswiftlet.service\\fR; an example is in\n"
     ".IR /usr/share/swiftlet/examples/vehicle .\n"
-    ".TP\n.I /var/lib/swiftlet\nRun folders that the service writes.\n";
+    ".TP\n"
+    ".I /var/lib/swiftlet\n"
+    "Run folders written by the service.\n";
 constexpr const char* kSeeAlso =
     ".SH SEE ALSO\n"
     "The package \\fBswiftlet\\-doc\\fR has a page for each part in\n"
@@ -84,8 +93,8 @@ void addCommand(const std::string& before, const CLI::App& command, std::string&
 void addSettings(std::string& page) {
   page +=
       ".SH SETTINGS\n"
-      "YAML, in groups: what stands before the dot is the group's name.\n"
-      "\\fBswiftlet settings\\fR prints all of them as a file, with these explanations.\n";
+      "YAML, in groups: the part before the dot is the group's name.\n"
+      "\\fBswiftlet settings\\fR prints all of them as a file with these explanations.\n";
   const Settings defaults;
   for (const Setting& setting : settingsRegistry()) {
     page += fmt::format(".TP\n.B {}\n{}\nRange: {}; default {}.\n", escapeRoff(std::string(setting.key)),

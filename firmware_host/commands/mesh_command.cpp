@@ -36,12 +36,12 @@ int mesh(const MeshOptions& options) {
   printMeshing(result.summary);
   fmt::print("written to {}\n", request.out);
   if (!result.finished) {
-    fmt::print(stderr, "stopped before the end; the folder holds what was done\n");
+    fmt::print(stderr, "stopped early; the folder holds the results so far\n");
     return kExitFailed;
   }
   if (!result.has_mesh) {
     fmt::print(stderr,
-               "error: {}: no frame has a mesh; summary.json says what became of frames and landmarks\n",
+               "error: {}: no frame has a mesh; see the counts of frames and landmarks in summary.json\n",
                request.log);
     return kExitFailed;
   }
@@ -51,7 +51,7 @@ int mesh(const MeshOptions& options) {
 }  // namespace
 
 void addMeshCommand(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("mesh", "Mesh a log's surroundings with given poses");
+  CLI::App* command = app.add_subcommand("mesh", "Build the mesh of a log from given poses");
   auto options = std::make_shared<MeshOptions>();
   MeshRequest& request = options->request;
   request.out = "mesh";
@@ -60,16 +60,14 @@ void addMeshCommand(CLI::App& app, int& exit_code) {
                    "EuRoC/ASL folder or an archive of one, a bag (rosbag2, MCAP, ROS 1), or a recorded run")
       ->required();
   command->add_option("--trajectory", request.trajectory,
-                      "Poses of the body (TUM, EuRoC csv); default: the log's own truth");
+                      "Body poses (TUM, EuRoC csv). Default: the log's truth");
   command->add_option("--out", request.out, "Folder to write")->capture_default_str();
   command->add_flag("--complete", request.complete,
-                    "Also complete_mesh.ply: the mesh with a horizon over the whole flight");
-  command
-      ->add_option("--max-gap", request.max_gap,
-                   "Poses are interpolated between neighbours at most this far apart [s]")
+                    "Also write complete_mesh.ply: the mesh with its horizon extended over the whole flight");
+  command->add_option("--max-gap", request.max_gap, "Largest gap between poses that are interpolated [s]")
       ->check(positive())
       ->capture_default_str();
-  command->add_flag("--mono", request.mono, "Camera 0 alone");
+  command->add_flag("--mono", request.mono, "Use camera 0 only");
   options->log.addCalibration(*command);
   options->log.addSection(*command, request);
   options->settings.addTo(*command);

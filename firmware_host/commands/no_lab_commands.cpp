@@ -10,8 +10,8 @@ AccuracyOfRun labAccuracy() { return {}; }
 
 std::unique_ptr<RecordWatcher> labGuidance(const std::string& /*board*/,
                                            const std::optional<ViewAddress>& /*view*/) {
-  throw InputError("record", 0, "--calibrate", "this build has no search for calibration boards",
-                   "Record without it, or build with SWIFTLET_BUILD_LAB=ON");
+  throw InputError("record", 0, "--calibrate", "this build has no detector for calibration boards",
+                   "Record without --calibrate, or build with SWIFTLET_BUILD_LAB=ON");
 }
 
 }  // namespace swiftlet

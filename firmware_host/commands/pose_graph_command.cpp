@@ -16,9 +16,8 @@ constexpr std::size_t kWarningsShown = 10;
 
 void printLoops(const char* name, const LoopCount& count) {
   fmt::print(
-      "{:<14} {} selected, {} rejected: {} against the odometry, {} inconsistent, {} unsupported, {} against "
-      "the "
-      "solution\n",
+      "{:<14} {} selected, {} rejected: {} contradict the odometry, {} inconsistent, {} unsupported, {} "
+      "contradict the solution\n",
       name, count.of(LoopVerdict::kSelected), count.rejected(), count.of(LoopVerdict::kAgainstOdometry),
       count.of(LoopVerdict::kInconsistent), count.of(LoopVerdict::kUnsupported),
       count.of(LoopVerdict::kAgainstSolution));
@@ -40,7 +39,7 @@ void print(const PoseGraphRequest& request, const PoseGraphResult& result) {
     }
     printLoops(result.outliers > 0 ? "own loops" : "loops", result.loops);
     if (result.outliers > 0) printLoops("injected", result.false_loops);
-    if (!result.robust.exact) fmt::print("{:<14} the best found, not proven the largest\n", "set");
+    if (!result.robust.exact) fmt::print("{:<14} the largest found; a larger one may exist\n", "set");
   }
   fmt::print("{:<14} {:.8g}\n", "cost given", result.start.given_cost);
   if (request.start == StartRule::kAuto && std::isfinite(result.start.chordal_cost))
@@ -49,7 +48,7 @@ void print(const PoseGraphRequest& request, const PoseGraphResult& result) {
   fmt::print("{:<14} {:.8g} (g2o's: 1/2 sum e^T Omega e; chi2 = {:.8g})\n", "cost final",
              result.solve.final_cost, 2 * result.solve.final_cost);
   fmt::print("{:<14} {}{}\n", "iterations", result.solve.iterations,
-             result.solve.converged ? "" : ", not converged: --iterations allows more");
+             result.solve.converged ? "" : ", not converged: raise --iterations");
   fmt::print("{:<14} {:.3f}\n", "seconds", result.seconds);
 }
 
@@ -59,44 +58,43 @@ int poseGraph(const PoseGraphRequest& request) {
   if (!request.loops.empty() && result.factored) fmt::print("loops written to {}\n", request.loops);
   if (!request.out.empty()) fmt::print("written to {}\n", request.out);
   if (result.factored) return kExitDone;
-  fmt::print(stderr, "error: {}: {}; the poses are the best that were found\n", request.file, result.failure);
+  fmt::print(stderr, "error: {}: {}; the poses are the best found\n", request.file, result.failure);
   return kExitFailed;
 }
 
 }  // namespace
 
 void addPoseGraphCommand(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("pose-graph", "Optimize a pose graph of a g2o file");
+  CLI::App* command = app.add_subcommand("pose-graph", "Optimize a pose graph from a g2o file");
   auto request = std::make_shared<PoseGraphRequest>();
-  command->add_option("FILE", request->file, "Pose graph: .g2o, or packed as .g2o.xz")->required();
-  command->add_option("--out", request->out, "The graph with the poses found, as g2o text");
-  command->add_option("--json", request->json, "The figures as JSON");
-  addChoice<StartRule>(
-      *command, "--start", request->start,
-      "First poses: auto takes the file's (or the odometry's where it has none) or the chordal "
-      "ones, whichever cost less",
-      {{"auto", StartRule::kAuto}, {"given", StartRule::kGiven}});
-  command->add_option("--iterations", request->iterations, "At most so many")
+  command->add_option("FILE", request->file, "Pose graph: .g2o or .g2o.xz")->required();
+  command->add_option("--out", request->out, "Optimized graph to write, as g2o text");
+  command->add_option("--json", request->json, "File for the results as JSON");
+  addChoice<StartRule>(*command, "--start", request->start,
+                       "Initial poses: auto uses those with the lower cost: those of the file (of the "
+                       "odometry if it has none) or chordal ones",
+                       {{"auto", StartRule::kAuto}, {"given", StartRule::kGiven}});
+  command->add_option("--iterations", request->iterations, "Maximum number of iterations")
       ->check(CLI::Range(0, 100000))
       ->capture_default_str();
   command
       ->add_option("--inject-outliers", request->outliers,
-                   "Add so many false loops before solving; --out has them too, after the file's edges (with "
-                   "--robust those that stay)")
+                   "Number of false loops to add before solving. --out includes them after the file's edges "
+                   "(with --robust only those selected)")
       ->check(CLI::Range(0U, 10000000U))
       ->capture_default_str();
-  command->add_option("--seed", request->seed, "Of the false loops")->capture_default_str();
+  command->add_option("--seed", request->seed, "Seed of the false loops")->capture_default_str();
   command->add_flag("--robust", request->robust,
-                    "Choose the loops that agree with the odometry, with each other and with the solution; "
-                    "the others are left out, in --out too");
-  command->add_option("--loops", request->loops, "With --robust: every loop and what became of it, as CSV");
+                    "Select the loops that agree with the odometry, each other and the solution. The others "
+                    "are not used and not written to --out");
+  command->add_option("--loops", request->loops, "With --robust: CSV of every loop and its verdict");
   command->footer(
-      "Costs are g2o's: 1/2 sum e^T Omega e with e = (translation, vec(q)) of T_i_j^-1 T_i^-1 T_j, in the "
-      "plane\n"
-      "(translation, angle); the chi2 that g2o prints is twice that. Other programs count the rotation of "
-      "space\n"
-      "with a factor of 4.\n"
-      "Example:\n  swiftlet pose-graph sphere2500.g2o --out solved.g2o\n"
+      "Costs are g2o's: 1/2 sum e^T Omega e with e = (translation, vec(q)) of T_i_j^-1 T_i^-1 T_j, in 2D\n"
+      "(translation, angle). The chi2 that g2o prints is twice the cost. Other programs weigh the 3D "
+      "rotation\n"
+      "by a factor of 4.\n"
+      "Example:\n"
+      "  swiftlet pose-graph sphere2500.g2o --out solved.g2o\n"
       "  swiftlet pose-graph torus3D.g2o.xz --out solved.g2o --json solved.json\n"
       "  swiftlet pose-graph intel.g2o --inject-outliers 100 --seed 7 --iterations 0 --out spoiled.g2o\n"
       "  swiftlet pose-graph spoiled.g2o --robust --loops loops.csv --out solved.g2o");

@@ -34,7 +34,7 @@ int record(const RecordOptions& options) {
   const RecordResult result = runRecord(request, options.settings.read());
   if (!result.missing.empty()) {
     for (const std::string& line : result.missing) warn("error: " + line + "\n");
-    warn("nothing was recorded; `swiftlet doctor` looks at all devices and at this computer\n");
+    warn("nothing was recorded; `swiftlet doctor` checks all devices and this computer\n");
     return kExitFailed;
   }
   const RecordSink::Counters& written = result.written;
@@ -47,13 +47,14 @@ int record(const RecordOptions& options) {
   const auto images_end = written.images.begin() + static_cast<std::ptrdiff_t>(result.cameras);
   say(fmt::format("{}\nwritten to {}\n", text, request.out));
   if (written.samples == 0 || std::count(written.images.begin(), images_end, 0U) > 0) {
-    warn("error: a device gave nothing; `swiftlet doctor` with the same settings says which and why\n");
+    warn(
+        "error: a device delivered no data; `swiftlet doctor` with the same settings names it and the "
+        "reason\n");
     return kExitFailed;
   }
   if (lost > 0) {
-    warn(
-        fmt::format("error: {} samples and {} images found no room: the disk is too slow for these cameras\n",
-                    written.samples_lost, lost - written.samples_lost));
+    warn(fmt::format("error: {} samples and {} images dropped: the disk is too slow for these cameras\n",
+                     written.samples_lost, lost - written.samples_lost));
     return kExitFailed;
   }
   return kExitDone;
@@ -68,18 +69,20 @@ void addRecordCommand(CLI::App& app, int& exit_code) {
   RecordRequest& request = options->request;
   request.out = "recording";
   CLI::Option* folder = command->add_option("--out", request.out, "Folder to write")->capture_default_str();
-  command->add_option("--mcap", options->mcap, "MCAP file to write instead, with ROS 2's messages")
+  command->add_option("--mcap", options->mcap, "MCAP file to write instead, with ROS 2 messages")
       ->excludes(folder);
-  command->add_option("--seconds", request.seconds, "End after this long; without: with SIGINT or SIGTERM")
+  command
+      ->add_option("--seconds", request.seconds,
+                   "Stop after this many seconds. Default: stop on SIGINT or SIGTERM")
       ->check(nonNegative());
-  CLI::Option* calibrate = command->add_option(
-      "--calibrate", options->board,
-      "For calibration in front of this board (Kalibr's target YAML): says what is missing, and ends when "
-      "nothing is");
+  CLI::Option* calibrate =
+      command->add_option("--calibrate", options->board,
+                          "Guide a calibration recording in front of this board (Kalibr's target YAML): "
+                          "prints what is missing and stops when it is complete");
   options->view.addTo(*command)->needs(calibrate);
   options->settings.addTo(*command);
   command->footer(
-      "Examples, for Kalibr or for swiftlet replay, and guided:\n"
+      "Examples: a plain recording for Kalibr or swiftlet replay, and a guided one:\n"
       "  swiftlet record --settings vehicle.yaml --seconds 60 --out calibration_1\n"
       "  swiftlet record --settings vehicle.yaml --out calibration_1 --calibrate board.yaml --view");
   command->callback([options, &exit_code] { exit_code = record(*options); });

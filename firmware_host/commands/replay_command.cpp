@@ -37,7 +37,7 @@ std::string accuracyLine(const nlohmann::ordered_json& summary, const char* file
 std::string sameStampsLine(const nlohmann::ordered_json& accuracy) {
   if (!accuracy.contains("map_beside_odometry")) return "";
   const auto& figures = accuracy["map_beside_odometry"]["all"];
-  return fmt::format("  map at the same stamps: {:.4f} m beside odometry's {:.4f} m, {:.2f} times\n",
+  return fmt::format("  map at the same stamps: {:.4f} m, odometry {:.4f} m, ratio {:.2f}\n",
                      figures["map_ate_rmse_m"].get<double>(), figures["odometry_ate_rmse_m"].get<double>(),
                      figures["ratio"].get<double>());
 }
@@ -60,15 +60,15 @@ int replay(const ReplayOptions& options) {
   }
   say(fmt::format("written to {}\n", request.out));
   if (!result.finished) {
-    warn("stopped before the end; the run folder holds what was done\n");
+    warn("stopped early; the run folder holds the results so far\n");
     return kExitFailed;
   }
   if (!result.lost.empty()) {
-    warn(fmt::format("error: {}; the run folder is not complete\n", result.lost));
+    warn(fmt::format("error: {}; the run folder is incomplete\n", result.lost));
     return kExitFailed;
   }
   if (!result.has_pose) {
-    warn(fmt::format("error: {}: no pose in the whole log; events.log says what the start waited for\n",
+    warn(fmt::format("error: {}: no pose in the whole log; events.log shows what the start waited for\n",
                      request.log));
     return kExitFailed;
   }
@@ -88,29 +88,29 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
       ->required();
   command->add_option("--out", request.out, "Run folder to write")->capture_default_str();
   command->add_flag("--replace", request.replace,
-                    "Replace a flight's files, or files that no run wrote, in the folder of --out");
-  command->add_flag("--mono", request.mono, "Camera 0 alone");
+                    "Replace files in --out even if they belong to a flight or were not written by swiftlet");
+  command->add_flag("--mono", request.mono, "Use camera 0 only");
   options->log.addCalibration(*command);
-  command->add_option("--tracks", request.tracks, "File of feature tracks in place of the log's images");
+  command->add_option("--tracks", request.tracks, "File of feature tracks to use instead of images");
   options->log.addSection(*command, request);
   command->add_flag("--imu-rate", request.imu_rate, "Also write imu_rate.tum, the state at every IMU sample");
   command->add_flag("--mesh-sequence", request.mesh_sequence,
-                    "Also write meshes/, the mesh of every frame and that over the horizon at keyframes");
+                    "Also write meshes/: the mesh of every frame, and the horizon mesh at keyframes");
   CLI::Option* real_time = command->add_flag("--real-time", request.real_time,
-                                             "On threads, with the log's messages let out at their times");
-  command->add_option("--speed", request.speed, "Times faster than recorded (with --real-time)")
+                                             "Run on threads and feed the log at its recorded times");
+  command->add_option("--speed", request.speed, "Speed relative to the recording (with --real-time)")
       ->check(CLI::Range(0.01, 100.0))
       ->needs(real_time);
   options->view.addTo(*command)->needs(real_time);
   command->add_flag("--loop-closure", request.loop_closure,
-                    "Recognize places seen before; they hold map.tum together");
+                    "Detect revisited places and correct drift in map.tum");
   addKeptMapOptions(*command, request.kept_maps);
   command->add_flag("--map", request.map, "Fuse depth into a labelled map: map.ply, map.glb");
   command->add_flag("--record", request.record,
-                    "Write what enters the estimator to recording/ in the run folder");
+                    "Record the estimator's inputs to recording/ in the run folder");
   command
       ->add_flag("--reproduce", request.reproduce,
-                 "LOG is a recording: repeat its threaded run byte for byte, with its settings")
+                 "LOG is a recording: repeat its threaded run byte for byte with its settings")
       ->excludes(real_time);
   options->settings.addTo(*command);
   command->footer(

@@ -59,7 +59,8 @@ ReportedRun readRun(const std::string& folder, const std::string& given_truth, c
 
 int report(const ReportOptions& options) {
   if (!options.truth.empty() && options.truth.size() != 1 && options.truth.size() != options.runs.size()) {
-    throw InputError("--truth", 0, "", "more truths than runs", "Give one for all runs, or one for each");
+    throw InputError("--truth", 0, "", "more truths than runs",
+                     "Give one truth for all runs, or one for each");
   }
   const Settings settings = options.settings.read();
   std::vector<ReportedRun> runs;
@@ -75,9 +76,7 @@ int report(const ReportOptions& options) {
   std::string html;
   if (page.empty()) {
     if (!options.plain) {
-      fmt::print(
-          stderr,
-          "note: the program was built without npm: the report has tables and fixed plots, no 3D view\n");
+      fmt::print(stderr, "note: built without npm: the report has tables and static plots but no 3D view\n");
     }
     html = plainPage(runs);
   } else {
@@ -94,17 +93,18 @@ int report(const ReportOptions& options) {
 }  // namespace
 
 void addReportCommand(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("report", "Show a run, or two beside each other, as one HTML file");
+  CLI::App* command = app.add_subcommand("report", "Show one run, or compare two, in an HTML file");
   auto options = std::make_shared<ReportOptions>();
-  command->add_option("RUN", options->runs, "Run folder; two are compared")->required()->expected(1, 2);
-  command->add_option("--out", options->out, "File to write; default: report.html in the (first) run folder");
-  command
-      ->add_option(
-          "--truth", options->truth,
-          "Log or trajectory file with the truth, one for all runs or one for each; default: the log "
-          "the run was made from")
+  command->add_option("RUN", options->runs, "Run folder; give two to compare them")
+      ->required()
       ->expected(1, 2);
-  command->add_flag("--plain", options->plain, "Tables and fixed plots, which need no script");
+  command->add_option("--out", options->out, "File to write. Default: report.html in the first run folder");
+  command
+      ->add_option("--truth", options->truth,
+                   "Log or trajectory file with the truth: one for all runs or one for each. Default: the "
+                   "log of the run")
+      ->expected(1, 2);
+  command->add_flag("--plain", options->plain, "Write only tables and static plots, without scripts");
   options->settings.addTo(*command);
   command->footer(
       "Example:\n  swiftlet report run_mh01\n"

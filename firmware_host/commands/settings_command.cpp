@@ -9,7 +9,7 @@ namespace swiftlet {
 
 void SettingsOptions::addTo(CLI::App& command) {
   command.add_option("--settings", file, "YAML file of settings (see `swiftlet settings`)");
-  command.add_option("--set", overrides, "One setting, as group.name=value; may be given again")
+  command.add_option("--set", overrides, "One setting as group.name=value; may be repeated")
       ->allow_extra_args(false);
 }
 
@@ -21,11 +21,11 @@ Settings SettingsOptions::read() const {
 }
 
 void addSettingsCommand(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("settings", "Print the settings tree as YAML, with explanations");
+  CLI::App* command = app.add_subcommand("settings", "Print all settings as YAML with explanations");
   auto options = std::make_shared<SettingsOptions>();
   auto brief = std::make_shared<bool>(false);
   options->addTo(*command);
-  command->add_flag("--brief", *brief, "Values alone");
+  command->add_flag("--brief", *brief, "Print values without explanations");
   command->footer(
       "Example:\n  swiftlet settings > settings.yaml\n"
       "  swiftlet replay LOG --settings settings.yaml --set smoother.horizon=3");

@@ -74,16 +74,17 @@ Status simulateSession(const SimulateOptions& options, const SimulationSettings&
 }
 
 void addSessionOptions(CLI::App& command, SimulateOptions& options) {
-  command.add_option(
-      "--board", options.board,
-      "A calibration session in place of a flight: a hand moves the rig in front of this board "
-      "(Kalibr's target YAML)");
+  command.add_option("--board", options.board,
+                     "Simulate a calibration session instead of a flight: a hand moves the rig in front of "
+                     "this board (Kalibr's target YAML)");
   command.add_flag("--calibrated", options.session.calibrated,
-                   "Of a session: leave the cameras' true calibration in the log");
+                   "Session: write the cameras' true calibration to the log");
   addChoice<Turning>(command, "--turning", options.session.session.turning,
-                     "Of a session: how the hand turns the rig; the last two are mistakes",
+                     "Session: motion of the rig; the last two are typical mistakes",
                      {{"all", Turning::kAll}, {"no_roll", Turning::kNoRoll}, {"none", Turning::kNone}});
-  command.add_option("--lens-blur", options.session.lens_blur, "Of a session: of both lenses, 1 sigma [px]")
+  command
+      .add_option("--lens-blur", options.session.lens_blur,
+                  "Session: blur of both lenses, standard deviation [px]")
       ->check(range(0.0, 20.0))
       ->capture_default_str();
 }
@@ -117,7 +118,7 @@ int simulate(const SimulateOptions& options) {
   if (progress) progress->finish();
   if (!status.ok()) {
     throw InputError("simulate", 0, "", message.empty() ? status.what : message,
-                     "`swiftlet simulate --help` lists what can be asked for");
+                     "`swiftlet simulate --help` lists the choices");
   }
   fmt::print("written to {}\n", options.out);
   return kExitDone;
@@ -127,10 +128,11 @@ void addFlightOptions(CLI::App& command, SimulationSettings& s) {
   command.add_option("--duration", s.flight.duration, "Length of the flight [s]")
       ->check(positive())
       ->capture_default_str();
-  command.add_option("--seed", s.seed, "Of everything random: same seed, same bytes")->capture_default_str();
+  command.add_option("--seed", s.seed, "Seed of everything random; the same seed gives the same bytes")
+      ->capture_default_str();
   command.add_option("--world-seed", s.world_seed,
-                     "Seed of the world alone, for several flights in one world. 0: same as --seed");
-  addChoice<WorldKind>(command, "--world", s.world.kind, "Where to fly",
+                     "Seed of the world, to fly several times in one world. 0: same as --seed");
+  addChoice<WorldKind>(command, "--world", s.world.kind, "World to fly in",
                        {{"room", WorldKind::kRoom},
                         {"hall", WorldKind::kHall},
                         {"cluttered", WorldKind::kCluttered},
@@ -145,64 +147,69 @@ void addFlightOptions(CLI::App& command, SimulationSettings& s) {
                       {"random_fisheye", RigKind::kRandomFisheye}});
   command
       .add_option("--rig-seed", s.rig_seed,
-                  "Seed of a random rig: lenses, poses, IMU matrices and noise, time shift, shutter")
+                  "Seed of a random rig: lenses, poses, IMU matrices and noise, time offset, shutter")
       ->capture_default_str();
   command.add_option("--speed", s.flight.speed, "Mean speed [m/s]")->check(positive())->capture_default_str();
-  command.add_option("--aggressiveness", s.flight.aggressiveness, "0 calm, 1 usual, 2 fast")
+  command
+      .add_option("--aggressiveness", s.flight.aggressiveness,
+                  "Aggressiveness of the motion: 0 calm, 1 usual, 2 fast")
       ->check(range(0.0, 4.0))
       ->capture_default_str();
-  command.add_option("--rest-at-start", s.flight.rest_at_start, "At rest before the flight [s]")
+  command.add_option("--rest-at-start", s.flight.rest_at_start, "Time at rest before the flight [s]")
       ->check(nonNegative())
       ->capture_default_str();
   command.add_option("--motion", s.given_motion, "EuRoC ground truth to fly (data.csv or data.csv.xz)");
-  command.add_option(
-      "--world-for", s.world_for,
-      "Motions that the world is made to fit, instead of this flight's own. Flights in one world "
-      "need the same list and the same --world-seed");
-  command.add_option("--motion-skip", s.motion_skip, "Leave out its first seconds [s]")->check(nonNegative());
+  command.add_option("--world-for", s.world_for,
+                     "Motion files that the world must fit, instead of this flight's own motion. Flights in "
+                     "one world need the same list and the same --world-seed");
+  command.add_option("--motion-skip", s.motion_skip, "Seconds to skip at the start of --motion [s]")
+      ->check(nonNegative());
 }
 
 }  // namespace
 
 void addSimulateCommand(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand(
-      "simulate", "Make a flight, or a calibration session, with exact truth, as an EuRoC folder");
+      "simulate", "Simulate a flight or a calibration session with exact truth, as a EuRoC folder");
   auto options = std::make_shared<SimulateOptions>();
   SimulationSettings& simulation = options->simulation;
   command->add_option("--out", options->out, "Folder to write")->capture_default_str();
   addFlightOptions(*command, simulation);
   addSessionOptions(*command, *options);
-  command->add_option("--rate", simulation.camera_rate, "Images a second [Hz]")
+  command->add_option("--rate", simulation.camera_rate, "Frame rate [Hz]")
       ->check(range(1.0, 200.0))
       ->capture_default_str();
-  command->add_flag("--mono", simulation.mono, "Camera 0 alone");
-  command->add_flag("--low-light", simulation.low_light, "A dim room: 5 % of the light, longer exposure");
-  addChoice<ExposureMode>(
-      *command, "--exposure-control", simulation.exposure_mode,
-      "Gain that follows the light at once; the control that flies on vehicles, in the loop; or neither",
-      {{"gain", ExposureMode::kGain},
-       {"odometry", ExposureMode::kOdometry},
-       {"fixed", ExposureMode::kFixed}});
+  command->add_flag("--mono", simulation.mono, "Write camera 0 only");
+  command->add_flag("--low-light", simulation.low_light, "Dark room: 5 % of the light, longer exposure");
+  addChoice<ExposureMode>(*command, "--exposure-control", simulation.exposure_mode,
+                          "Exposure control: instant gain, the control that vehicles use, or none",
+                          {{"gain", ExposureMode::kGain},
+                           {"odometry", ExposureMode::kOdometry},
+                           {"fixed", ExposureMode::kFixed}});
   command->add_option("--light-change", options->light,
-                      "START LEVEL: from START [s] on the light goes to LEVEL times the flight's first, "
+                      "START LEVEL: from START [s] on, the light changes to LEVEL times its first value, "
                       "within 2 s; may be repeated");
-  command->add_flag("--png", options->png, "PNG images in place of JPEG");
-  command->add_flag("--tracks", options->tracks, "Feature tracks in place of images, depth and labels");
+  command->add_flag("--png", options->png, "Write PNG images instead of JPEG");
+  command->add_flag("--tracks", options->tracks, "Write feature tracks instead of images, depth and labels");
   command
-      ->add_option("--depth-every", simulation.depth_every, "Depth and labels at every n-th image; 0: none")
+      ->add_option("--depth-every", simulation.depth_every,
+                   "Write depth and labels for every n-th image; 0: none")
       ->check(nonNegative())
       ->capture_default_str();
-  command->add_option("--vibration", options->vibration, "Motor vibration, 80 to 150 Hz [m/s^2]")
+  command
+      ->add_option("--vibration", options->vibration,
+                   "Amplitude of the motor vibration, 80 to 150 Hz [m/s^2]")
       ->check(nonNegative());
   command
-      ->add_option("--readout", options->readout_ms, "Rolling shutter: from the first row to the last [ms]")
+      ->add_option("--readout", options->readout_ms,
+                   "Readout time of a rolling shutter, first to last row [ms]")
       ->check(range(0.0, 100.0));
-  command->add_option("--stamp-offset", options->stamp_offset_ms, "Added to the image stamps [ms]");
-  command->add_option("--blackout", options->blackout, "Dark images: START SECONDS")->expected(2);
-  command->add_option("--camera-missing", options->camera_missing, "No images of camera 1: START SECONDS")
+  command->add_option("--stamp-offset", options->stamp_offset_ms, "Offset added to the image stamps [ms]");
+  command->add_option("--blackout", options->blackout, "Blackout of the images: START SECONDS")->expected(2);
+  command->add_option("--camera-missing", options->camera_missing, "Dropout of camera 1: START SECONDS")
       ->expected(2);
-  command->add_option("--imu-gap", options->imu_gap, "No IMU samples: START SECONDS")->expected(2);
-  command->add_option("--threads", simulation.threads, "Threads that render")
+  command->add_option("--imu-gap", options->imu_gap, "Dropout of the IMU: START SECONDS")->expected(2);
+  command->add_option("--threads", simulation.threads, "Number of rendering threads")
       ->check(range(1, 64))
       ->capture_default_str();
   options->settings.addTo(*command);

@@ -21,12 +21,12 @@ int smooth(const SmoothOptions& options) {
   request.announce = true;
   const FullSmoothing found = runSmooth(request, options.settings.read());
   if (!found.cut.empty()) {
-    warn(
-        fmt::format("warning: {}/keyframes.swk: {}; what came before is smoothed\n", request.run, found.cut));
+    warn(fmt::format("warning: {}/keyframes.swk: {}; the keyframes before it are smoothed\n", request.run,
+                     found.cut));
   }
   for (const auto& row : found.faults.rows()) warn(fmt::format("warning: {} ({})\n", row.text, row.count));
   if (found.poses.empty()) {
-    warn(fmt::format("error: {}: {}; the folder is as it was\n", request.run, found.problem));
+    warn(fmt::format("error: {}: {}; the folder is unchanged\n", request.run, found.problem));
     return kExitFailed;
   }
   say(fmt::format("{} keyframes, {} landmarks, {} of {} loops used, {} iterations in {:.1f} s\n",
@@ -40,7 +40,7 @@ int smooth(const SmoothOptions& options) {
 
 void addSmoothCommand(CLI::App& app, int& exit_code) {
   CLI::App* command =
-      app.add_subcommand("smooth", "Smooth all keyframes of a run together, after it: map.tum");
+      app.add_subcommand("smooth", "Smooth all keyframes of a finished run together: map.tum");
   auto options = std::make_shared<SmoothOptions>();
   command->add_option("RUN", options->request.run, "Run folder with keyframes.swk")->required();
   options->settings.addTo(*command);

@@ -15,10 +15,10 @@ inline int verdictOf(const nlohmann::ordered_json& summary) {
   constexpr double kMost = 0.5;
   const double share = summary["verdict"]["share_good"].get<double>();
   if (share >= kMost) return kExitDone;
-  warn(fmt::format(
-      "error: the estimate was good for only {:.0f} % of the run; the lines under \"health\" above, and "
-      "events.log, say why\n",
-      100 * share));
+  warn(
+      fmt::format("error: the health was good for only {:.0f} % of the run; see the lines under \"health\" "
+                  "above and events.log\n",
+                  100 * share));
   return kExitFailed;
 }
 

@@ -5,13 +5,14 @@
 namespace swiftlet {
 
 CLI::Option* ViewOption::addTo(CLI::App& command) {
-  option = command
-               .add_option("--view", text,
-                           fmt::format("Serve a page that shows the run as it goes on, at {} unless told "
-                                       "otherwise; port 0: any that is free",
-                                       ViewAddress{}.text()))
-               ->type_name("[ADDRESS:PORT]")
-               ->expected(0, 1);
+  option =
+      command
+          .add_option(
+              "--view", text,
+              fmt::format("Serve a page that shows the run live, by default at {}; port 0: any free port",
+                          ViewAddress{}.text()))
+          ->type_name("[ADDRESS:PORT]")
+          ->expected(0, 1);
   return option;
 }
 

@@ -45,27 +45,28 @@ int vocabulary(const VocabularyOptions& options) {
 
 void addVocabularyCommand(CLI::App& app, int& exit_code) {
   CLI::App* command =
-      app.add_subcommand("vocabulary", "Train, convert or describe the words of place recognition");
+      app.add_subcommand("vocabulary", "Train, convert or describe a vocabulary for place recognition");
   auto options = std::make_shared<VocabularyOptions>();
   auto* train =
       command->add_option("--train", options->train, "Folders of images to train a vocabulary from");
   command->add_option("--read", options->read, "A vocabulary: compact, ORBvoc.txt, or DBoW2 YAML (.gz)")
       ->excludes(train);
-  command->add_option("--out", options->out, "File to write, in the compact form");
-  command->add_option("--branching", options->training.branching, "Children of a node")
+  command->add_option("--out", options->out, "File to write, in compact form");
+  command->add_option("--branching", options->training.branching, "Children per node")
       ->check(CLI::Range(2, static_cast<int>(Vocabulary::kMaxChildren)))
       ->capture_default_str();
   command->add_option("--levels", options->training.depth, "Levels of the tree")
       ->check(CLI::Range(1, Vocabulary::kMaxDepth))
       ->capture_default_str();
-  command->add_option("--seed", options->training.seed, "Of the clustering's start")->capture_default_str();
-  command->add_option("--every", options->every, "Only every n-th image of a folder")
+  command->add_option("--seed", options->training.seed, "Seed of the clustering")->capture_default_str();
+  command->add_option("--every", options->every, "Use only every n-th image of a folder")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->footer(
-      "Without --train or --read it describes the vocabulary that is part of the program.\n"
-      "Example:\n  swiftlet vocabulary --train data/flight_a/mav0/cam0 data/flight_b/mav0/cam0 --every 5 "
-      "--out places.swv\n"
+      "Without --train or --read, the built-in vocabulary is described.\n"
+      "Example:\n"
+      "  swiftlet vocabulary --train data/flight_a/mav0/cam0 data/flight_b/mav0/cam0 --every 5 --out "
+      "places.swv\n"
       "  swiftlet vocabulary --read ORBvoc.txt --out orbvoc.swv");
   command->callback([options, &exit_code] { exit_code = vocabulary(*options); });
 }

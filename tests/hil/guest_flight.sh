@@ -133,7 +133,7 @@ flown=$?
 if [ "$disk" = full ]; then ls -l $place/flights/*/ $place/flights/*/recording >"$out/files.txt"; fi
 # With faults the verdict may be that most of the flight was not good; no other error is accepted.
 if [ -n "$faults" ] && [ $flown -eq 1 ] && [ "$(grep -c '^error: ' "$out/fly.txt")" -eq 1 ] &&
-  grep -q '^error: the estimate was good for only ' "$out/fly.txt"; then
+  grep -q '^error: the health was good for only ' "$out/fly.txt"; then
   flown=0
 fi
 echo "guest_flight: hil $played, fly $flown"

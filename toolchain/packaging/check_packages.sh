@@ -134,7 +134,7 @@ check "the service's start line, with the example's settings, ends for want of d
   setpriv --reuid swiftlet --regid swiftlet --init-groups \
     sh -c "eval \"\$1\"" sh "$start" >/opt/start.log 2>&1 || code=$?
   cat /opt/start.log
-  [ $code -eq 1 ] && grep -q "nothing was flown" /opt/start.log && ! grep -qi "exception\|settings:" /opt/start.log'
+  [ $code -eq 1 ] && grep -q "no flight took place" /opt/start.log && ! grep -qi "exception\|settings:" /opt/start.log'
 
 echo "== service, rules, manual page"
 check "systemd, udev and man are installed beside it" apt install systemd udev man-db
