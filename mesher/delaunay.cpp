@@ -70,9 +70,9 @@ Status Delaunay::build(std::span<const Eigen::Vector2f> points) {
   for (std::size_t i = 0; i < valid; ++i) static_cast<void>(place(order_[i]));  // what it skips is counted
   if (points.size() > count) {
     return {StatusCode::kCapacityReached,
-            "more points than a triangulation holds: the last ones are skipped"};
+            "more points than the triangulation can hold: the last ones are skipped"};
   }
-  if (cell_count_ == 0) return {StatusCode::kDegenerate, "fewer than three points that are not on one line"};
+  if (cell_count_ == 0) return {StatusCode::kDegenerate, "fewer than three points that are not collinear"};
   return okStatus();
 }
 
@@ -123,7 +123,7 @@ Status Delaunay::placeOnLine(std::uint16_t index) {
   const auto at =
       static_cast<std::size_t>(std::lower_bound(line_.begin(), line_.end(), p, before) - line_.begin());
   if (at < line_.size() && point_[line_[at]] == p) {
-    return {StatusCode::kInvalidInput, "the point falls together with another: it is skipped"};
+    return {StatusCode::kInvalidInput, "the point coincides with another: it is skipped"};
   }
   if (line_.size() >= 2 && orientation(point_[line_[0]], point_[line_[1]], p) != 0) {
     startWith(line_[0], line_[1], index);
@@ -158,9 +158,10 @@ void Delaunay::startWith(std::uint16_t a, std::uint16_t b, std::uint16_t c) {
 Status Delaunay::placeInPlane(std::uint16_t index) {
   const GridPoint& p = point_[index];
   Edge cell = 0;
-  if (!locate(p, cell)) return {StatusCode::kNumerical, "the walk to the point did not end: it is skipped"};
+  if (!locate(p, cell))
+    return {StatusCode::kNumerical, "the search for the point's triangle did not end: the point is skipped"};
   if (point_[origin_[cell]] == p || point_[origin_[cell + 1U]] == p || point_[origin_[cell + 2U]] == p) {
-    return {StatusCode::kInvalidInput, "the point falls together with another: it is skipped"};
+    return {StatusCode::kInvalidInput, "the point coincides with another: it is skipped"};
   }
   split(cell, index);
   flipAround(cell, index);

@@ -55,7 +55,7 @@ Status MeshStage::check(const MeshInput& input) {
   if (window == nullptr || input.tracks == nullptr || !window->started || window->poses.empty() ||
       window->poses.back().frame_index != input.tracks->index) {
     ++counters_.invalid_frames;
-    return {StatusCode::kInvalidInput, "window and tracks are not of one frame: no mesh"};
+    return {StatusCode::kInvalidInput, "window and tracks are from different frames: no mesh"};
   }
   const WindowPose& pose = window->poses.back();
   if (!pose.T_world_body.translation.allFinite() || !pose.T_world_body.rotation.coeffs().allFinite()) {

@@ -77,7 +77,7 @@ Status PlaneFinder::step(const LocalMesh& mesh, const SmoothedWindow& window, Pl
   report.points.clear();
   if (window.epoch != mesh.epoch || window.poses.empty() ||
       !window.poses.back().T_world_body.translation.allFinite()) {
-    return {StatusCode::kInvalidInput, "the window has no pose to look from, or is not the mesh's"};
+    return {StatusCode::kInvalidInput, "the window has no pose, or is not the mesh's window"};
   }
   if (mesh.epoch != epoch_) reset();
   epoch_ = mesh.epoch;

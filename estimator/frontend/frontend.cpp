@@ -57,10 +57,10 @@ Status Frontend::Impl::check(const StereoFrame& frame) const {
     const ImageView& image = frame.image[c];
     if (image.width != rig_.camera[c].width() || image.height != rig_.camera[c].height() ||
         image.stride < image.width) {
-      return {StatusCode::kInvalidInput, "image size differs from the calibration's: frame refused"};
+      return {StatusCode::kInvalidInput, "image size differs from the calibration's: frame rejected"};
     }
   }
-  if (!any) return {StatusCode::kInvalidInput, "frame without images refused"};
+  if (!any) return {StatusCode::kInvalidInput, "frame without images rejected"};
   return okStatus();
 }
 

@@ -169,7 +169,7 @@ Status Propagator::step(const ImuSample& sample, NavState* state) {
 
 Status Propagator::predict(Stamp at, NavState& state) const {
   if (!has_state_ || count_ == 0) return {StatusCode::kNotReady, "no state or no sample to predict from"};
-  if (at < current_.nav.stamp) return {StatusCode::kInvalidInput, "prediction asked for the past"};
+  if (at < current_.nav.stamp) return {StatusCode::kInvalidInput, "a prediction was requested for the past"};
   Current moved = current_;
   if (at > moved.nav.stamp) moved.advance(&sampleAt(count_ - 1), nullptr, at, noise_);
   state = moved.toNavState();

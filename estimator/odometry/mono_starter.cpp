@@ -72,7 +72,7 @@ std::size_t MonoStarter::gatherTracks(std::span<const std::size_t> chosen, const
 
 bool MonoStarter::trySolve(const ImuBuffer& imu, const StartPrior& prior, double pixel_sigma,
                            StartState& start, const char*& waiting_for) {
-  waiting_for = "more frames (one camera: the scale is found from motion)";
+  waiting_for = "more frames (with one camera the scale comes from motion)";
   if (count_ < kMinFrames) return false;
   const Duration waited = frame(count_ - 1).stamp - frame(0).stamp;
   if (waited < kShortestWindow) return false;
@@ -100,7 +100,7 @@ bool MonoStarter::trySolve(const ImuBuffer& imu, const StartPrior& prior, double
   const Status status =
       solveMonoStart(std::span(from_first_).first(n - 1), std::span(tracks_).first(tracks),
                      rig_.T_body_cam[0], pixel_sigma / rig_.camera[0].focal(), tilt, noise_, prior, mono);
-  waiting_for = status.ok() ? "acceleration that shows the scale" : "parallax";
+  waiting_for = status.ok() ? "acceleration, to observe the scale" : "parallax";
   const bool solved = status.ok() && mono.scale_sigma < (impatient ? kScaleSigmaAccepted : kScaleSigmaWanted);
   if (!solved && !impatient) return false;
   start.stamp = first;

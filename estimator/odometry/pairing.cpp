@@ -102,7 +102,7 @@ Status Pairing::push(const CameraFrame& frame, StereoFrame& paired) {
   if (settings_.cameras == 1) return giveSingle(frame, paired);
   // A late partner of what went out is as useless as a reversed stamp.
   if (any_given_ && frame.stamp <= last_given_ + (came_back ? settings_.tolerance : tolerance)) {
-    return refuse(camera, "frame came after its instant was given out");
+    return refuse(camera, "frame arrived after its pair was processed");
   }
   if (!waiting_) return waitOrGive(frame, paired);
 

@@ -72,7 +72,7 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
   output.waiting_for = "";
   if (tracked.timeline != timeline_) {
     deliver(output);
-    output.waiting_for = "frame of another time line: dropped";
+    output.waiting_for = "frame from before the clock was restarted: dropped";
     return {StatusCode::kInvalidInput, output.waiting_for};
   }
   last_stamp_ = tracked.stamp;

@@ -102,11 +102,12 @@ Status TrackStage::step(const StereoFrame& frame, const Effort& effort, TrackedF
 }
 
 Status TrackStage::process(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked) {
-  if (frame.timeline != timeline_) return {StatusCode::kInvalidInput, "frame of another time line: dropped"};
+  if (frame.timeline != timeline_)
+    return {StatusCode::kInvalidInput, "frame from before the clock was restarted: dropped"};
   // No late frame: those before it, from when there was no IMU to go by, were stamped far ahead.
   if (has_frame_ && isFarAhead(frame.stamp, last_stamp_)) forgetTracks();
   if (has_frame_ && frame.stamp <= last_stamp_) {
-    return {StatusCode::kInvalidInput, "the frame's stamp repeats or goes back: frame dropped"};
+    return {StatusCode::kInvalidInput, "the frame's stamp repeats or goes backwards: frame dropped"};
   }
   predict(frame.stamp);
   tracked.timeline = timeline_;

@@ -75,7 +75,8 @@ FullSmoother::FullSmoother(const Rig& rig, const ImuNoise& noise, const FullSmoo
 
 Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& state, const NoiseInUse& noise) {
   if (keyframes_.size() >= settings_.max_keyframes) {
-    return {StatusCode::kCapacityReached, "full smoothing holds no more keyframes; the rest is left out"};
+    return {StatusCode::kCapacityReached,
+            "full smoothing is at its limit of keyframes; the rest is not used"};
   }
   Keyframe keyframe;
   keyframe.stamp = frame.stamp;

@@ -38,7 +38,7 @@ bool FullSmoother::findKeyframe(Stamp stamp, std::size_t& k) const {
 
 Status FullSmoother::addRevisit(const LoopRevisit& loop) {
   if (revisits_.size() >= settings_.max_revisits) {
-    return {StatusCode::kCapacityReached, "full smoothing holds no more loops; the rest is left out"};
+    return {StatusCode::kCapacityReached, "full smoothing is at its limit of loops; the rest is not used"};
   }
   Revisit revisit;
   if (!findKeyframe(loop.old_stamp, revisit.old_keyframe) ||

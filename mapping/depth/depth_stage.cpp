@@ -32,7 +32,8 @@ Status DepthStage::step(const ImageView& left, const ImageView& right, Stamp sta
                         DepthBuffer& out) {
   Status status = rectification_.status();
   if (status.ok() && !fits(out, left_.size()))
-    status = {StatusCode::kInvalidInput, "depth: the output is not of the stage's size; use makeBuffer()"};
+    status = {StatusCode::kInvalidInput,
+              "depth: the output does not have the stage's size; use makeBuffer()"};
   if (status.ok()) status = rectification_.warp(0).warp(left, left_.data());
   if (status.ok()) status = rectification_.warp(1).warp(right, right_.data());
   const PinholeIntrinsics& camera = rectification_.intrinsics();
@@ -86,7 +87,8 @@ void DepthStage::fillDepth(DepthBuffer& out) {
 Status DepthStage::addLabels(const ImageView& labels, DepthBuffer& out) {
   Status status = rectification_.status();
   if (status.ok() && !fits(out, left_.size()))
-    status = {StatusCode::kInvalidInput, "depth: the output is not of the stage's size; use makeBuffer()"};
+    status = {StatusCode::kInvalidInput,
+              "depth: the output does not have the stage's size; use makeBuffer()"};
   if (status.ok()) status = rectification_.warp(0).warpLabels(labels, out.labels.data());
   if (!status.ok()) {
     ++counters_.labels_refused;

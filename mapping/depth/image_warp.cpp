@@ -43,7 +43,7 @@ ImageWarp::ImageWarp(const CameraModel& camera, const Eigen::Matrix3d& R_cam_tar
 Status ImageWarp::check(const ImageView& raw) const {
   if (raw.empty()) return {StatusCode::kInvalidInput, "depth: an image is missing"};
   if (raw.width != width_ || raw.height != height_ || raw.stride < raw.width)
-    return {StatusCode::kInvalidInput, "depth: an image's size is not the camera's"};
+    return {StatusCode::kInvalidInput, "depth: an image does not have the camera's size"};
   return okStatus();
 }
 

@@ -212,10 +212,10 @@ Status SemiGlobalMatcher::match(const ImageView& left, const ImageView& right, i
   for (const ImageView& image : {left, right}) {
     if (image.empty()) return {StatusCode::kInvalidInput, "depth: an image of the pair is missing"};
     if (image.width != width_ || image.height != height_ || image.stride < width_)
-      return {StatusCode::kInvalidInput, "depth: an image's size is not the matcher's"};
+      return {StatusCode::kInvalidInput, "depth: an image does not have the matcher's size"};
   }
   if (disparity.width() != width_ || disparity.height() != height_)
-    return {StatusCode::kInvalidInput, "depth: the disparity image's size is not the matcher's"};
+    return {StatusCode::kInvalidInput, "depth: the disparity image does not have the matcher's size"};
   const int wanted = disparities > 0 ? std::min(disparities, settings_.disparities) : settings_.disparities;
   switch (roundUp(wanted, kLanes) / kLanes) {
     case 1:

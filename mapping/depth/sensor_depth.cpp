@@ -37,7 +37,8 @@ Status SensorDepth::take(const Value* values, int width, int height, int stride,
   if (values == nullptr || width != sensor_.width || height != sensor_.height || stride < width ||
       out.depth.size() != pixels || out.sigma.size() != pixels) {
     ++counters_.refused;
-    return {StatusCode::kInvalidInput, "depth: the sensor's image is missing or not of its camera's size"};
+    return {StatusCode::kInvalidInput,
+            "depth: the sensor's image is missing or does not have its camera's size"};
   }
   const double scale = std::is_integral_v<Value> ? settings_.metres_per_count : 1.0;
   std::size_t i = 0;

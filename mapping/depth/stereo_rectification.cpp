@@ -56,7 +56,7 @@ Status StereoRectification::build(const Rig& rig) {
   if (width < 2 || height < 2 || width > ImageWarp::kMaxSide || height > ImageWarp::kMaxSide)
     return refuse("rectification: the cameras' size is not between 2 and 16384 pixels");
   baseline_ = rig.baseline();
-  if (!(baseline_ > kLeastBaseline)) return refuse("rectification: the cameras are at one place");
+  if (!(baseline_ > kLeastBaseline)) return refuse("rectification: the cameras have the same position");
   chooseRotations(rig);
   const auto looks_ahead = [](const Eigen::Matrix3d& R) { return R.allFinite() && R(2, 2) > kLeastCosine; };
   if (!looks_ahead(R_cam_rectified_[0]) || !looks_ahead(R_cam_rectified_[1]) || !chooseIntrinsics(rig))

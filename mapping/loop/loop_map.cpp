@@ -57,10 +57,10 @@ bool LoopMap::find(std::uint64_t frame, std::uint32_t epoch, std::uint32_t& k) c
 }
 
 Status LoopMap::add(const Node& node, const Link* link) {
-  if (full()) return {StatusCode::kCapacityReached, "the map has no room for another node"};
+  if (full()) return {StatusCode::kCapacityReached, "the map is full: the node is not added"};
   const bool finite = link == nullptr || (allFinite(link->T_previous_this) && link->covariance.allFinite());
   if (!allFinite(node.T_world_body) || !finite) {
-    return {StatusCode::kInvalidInput, "a node that is not finite"};
+    return {StatusCode::kInvalidInput, "the node is not finite"};
   }
   Status status;
   if (link != nullptr && !nodes_.empty()) {

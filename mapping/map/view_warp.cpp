@@ -41,7 +41,7 @@ std::int32_t ViewWarp::pixelOf(const Eigen::Vector3d& p_depth) const {
 
 Status ViewWarp::apply(const ImageView& image, const float* depth, std::uint8_t* out) const {
   if (image.empty() || image.width != other_.width() || image.height != other_.height()) {
-    return {StatusCode::kInvalidInput, "image of another size than its camera"};
+    return {StatusCode::kInvalidInput, "the image does not have its camera's size"};
   }
   std::size_t i = 0;
   for (int y = 0; y < camera_.height; ++y) {

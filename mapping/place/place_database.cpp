@@ -265,7 +265,8 @@ Status PlaceDatabase::add(std::uint64_t index, Stamp stamp, std::uint32_t epoch,
   ++size_;
   ++counts_.added;
   if (counts_.removed == removed) return okStatus();
-  return {StatusCode::kCapacityReached, "the place database is full: its most redundant keyframe left"};
+  return {StatusCode::kCapacityReached,
+          "the place database is full: its most redundant keyframe was removed"};
 }
 
 }  // namespace swiftlet

@@ -236,7 +236,7 @@ Status PlaceExtractor::extract(const ImageView& image, const CameraModel& camera
   keyframe.index = tracked.index;
   keyframe.stamp = tracked.stamp;
   if (!pyramid_.build<typename Lanes::Isa>(image))
-    return {StatusCode::kInvalidInput, "place recognition got an image of another size"};
+    return {StatusCode::kInvalidInput, "place recognition received an image of another size"};
   for (int l = 0; l < pyramid_.octaves(); ++l) score<Lanes>(l);
   addTracked(camera, tracked, keyframe);
   const int corners = settings_.features - static_cast<int>(keyframe.features.size());

@@ -300,7 +300,7 @@ Status StereoDepth::fill(const ImageView& image0, const ImageView& image1, Place
   for (std::size_t c = 0; c < 2; ++c) {
     if (images[c]->empty() || images[c]->width != rig_.camera[c].width() ||
         images[c]->height != rig_.camera[c].height()) {
-      return {StatusCode::kInvalidInput, "stereo depth: an image has not the size of its camera"};
+      return {StatusCode::kInvalidInput, "stereo depth: an image does not have its camera's size"};
     }
     halve(*images[c], half_[c].pixels.data(), half_[c].width, half_[c].height);
   }

@@ -75,8 +75,8 @@ Status Vocabulary::number() {
       leaf_of_.push_back(static_cast<std::uint32_t>(n));
     }
   }
-  if (words_ == 0) return refused("a vocabulary without words");
-  if (depth_ > kMaxDepth) return refused("a vocabulary of too many levels");
+  if (words_ == 0) return refused("the vocabulary has no words");
+  if (depth_ > kMaxDepth) return refused("the vocabulary has too many levels");
   return okStatus();
 }
 
@@ -84,18 +84,18 @@ Status Vocabulary::load(std::span<const std::uint8_t> bytes) {
   clear();
   if (bytes.size() < kHeader + kChecksumBytes ||
       std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0) {
-    return refused("not a vocabulary of places");
+    return refused("not a vocabulary for place recognition");
   }
   if (littleEndian<std::uint32_t>(bytes.data() + 8) != kVersion) {
-    return refused("a vocabulary of another version: train or convert it again");
+    return refused("the vocabulary has another version: train or convert it again");
   }
   const std::size_t count = littleEndian<std::uint32_t>(bytes.data() + 12);
   const std::span<const std::uint8_t> content = bytes.first(bytes.size() - kChecksumBytes);
   if (littleEndian<std::uint64_t>(bytes.data() + content.size()) != fnv1a(content)) {
-    return refused("the vocabulary is damaged: its checksum does not fit");
+    return refused("the vocabulary is damaged: its checksum does not match");
   }
   if (count == 0 || (content.size() - kHeader) / kNodeBytes < count)
-    return refused("the vocabulary ends early");
+    return refused("the vocabulary is truncated");
   nodes_.resize(count + 1);
   nodes_[0].children = bytes[16];
   const std::uint8_t* at = bytes.data() + kHeader;
@@ -111,7 +111,7 @@ Status Vocabulary::load(std::span<const std::uint8_t> bytes) {
   for (std::size_t n = 0; n <= count; ++n) {
     if (n >= next) {
       clear();
-      return refused("the vocabulary's nodes are no tree");
+      return refused("the vocabulary's nodes are not a tree");
     }
     nodes_[n].first_child = static_cast<std::uint32_t>(next);
     next += nodes_[n].children;
@@ -119,7 +119,7 @@ Status Vocabulary::load(std::span<const std::uint8_t> bytes) {
   }
   if (next != count + 1 || static_cast<std::size_t>(bytes.data() + content.size() - at) != leaves * 4) {
     clear();
-    return refused("the vocabulary's nodes are no tree");
+    return refused("the vocabulary's nodes are not a tree");
   }
   for (Node& node : nodes_) {
     if (node.children > 0) continue;
@@ -148,11 +148,11 @@ std::vector<std::uint8_t> Vocabulary::compact() const {
 
 Status Vocabulary::assemble(std::span<const VocabularyNode> list) {
   clear();
-  if (list.empty()) return refused("a vocabulary without nodes");
+  if (list.empty()) return refused("the vocabulary has no nodes");
   // Children of each node: counted, then listed one after the other in the order of the list.
   std::vector<std::uint32_t> first(list.size() + 2, 0);
   for (const VocabularyNode& node : list) {
-    if (node.parent > list.size()) return refused("a node's parent is not there");
+    if (node.parent > list.size()) return refused("a node's parent does not exist");
     ++first[node.parent + 1];
   }
   if (*std::max_element(first.begin(), first.end()) > kMaxChildren)
@@ -182,7 +182,7 @@ Status Vocabulary::assemble(std::span<const VocabularyNode> list) {
 }
 
 Status Vocabulary::weigh(std::span<const float> weights) {
-  if (weights.size() != words_) return refused("as many weights as words are needed");
+  if (weights.size() != words_) return refused("the numbers of weights and words differ");
   for (const float w : weights) {
     if (!std::isfinite(w) || w < 0) return refused("a word's weight is negative or not finite");
   }

@@ -54,7 +54,7 @@ bool G2oFields::id(const char* name, std::int64_t& out, G2oMessage& fault) {
   std::string_view text;
   if (!word(text)) return missing(name, fault);
   if (parse(text, out)) return true;
-  fault = {line_, name, "`" + shown(text) + "` is no vertex number", "Give a whole number"};
+  fault = {line_, name, "`" + shown(text) + "` is not a vertex number", "Give a whole number"};
   return false;
 }
 
@@ -62,7 +62,7 @@ bool G2oFields::number(const char* name, double& out, G2oMessage& fault) {
   std::string_view text;
   if (!word(text)) return missing(name, fault);
   if (parse(text, out) && std::isfinite(out)) return true;
-  fault = {line_, name, "`" + shown(text) + "` is no finite number", "Give a number such as -1.5e-3"};
+  fault = {line_, name, "`" + shown(text) + "` is not a finite number", "Give a number such as -1.5e-3"};
   return false;
 }
 
@@ -79,7 +79,7 @@ bool G2oFields::end(G2oMessage& fault) {
   const std::size_t taken = words_;
   word(text);
   fault = {line_, "word " + std::to_string(taken + 1), "`" + shown(text) + "` is more than " + kind_ + " has",
-           "Remove it; a comment begins with #"};
+           "Remove it; a comment starts with #"};
   return false;
 }
 

@@ -114,8 +114,8 @@ bool Reader::refuse(std::string field, std::string text, std::string remedy) {
 
 bool Reader::chooseGeometry(bool planar) {
   if (geometry_known_ && graph_.planar != planar) {
-    return refuse("record kind", "records of the plane (SE2) and of space (SE3) in one file",
-                  "Split the file, or give all poses in one of the two");
+    return refuse("record kind", "2D (SE2) and 3D (SE3) records in one file",
+                  "Split the file, or give all poses in 2D or in 3D");
   }
   graph_.planar = planar;
   geometry_known_ = true;
@@ -137,8 +137,8 @@ bool Reader::readPose(SE3& pose, std::span<const char* const> names) {
   pose.rotation = Eigen::Quaterniond(v[6], v[3], v[4], v[5]);
   const double length = pose.rotation.coeffs().stableNorm();
   if (!(length > kNoDirection) || !std::isfinite(length)) {
-    return refuse("qx qy qz qw", "a quaternion without length is no rotation",
-                  "Give a unit quaternion; no rotation is 0 0 0 1");
+    return refuse("qx qy qz qw", "a quaternion of zero length is not a rotation",
+                  "Give a unit quaternion; the identity is 0 0 0 1");
   }
   const double off = std::abs(length * length - 1);
   if (off > kUnitTolerance && report_.normalized_quaternions++ == 0) first_normalized_ = line_;
@@ -191,7 +191,7 @@ bool Reader::readEdge(PoseGraph<Pose>& graph) {
   const auto values = eigen.eigenvalues();
   const double largest = values.cwiseAbs().maxCoeff();
   if (!(values.maxCoeff() > kNegative * largest) || !std::isfinite(largest)) {
-    return refuse("information", "has no positive eigenvalue, so the edge says nothing",
+    return refuse("information", "has no positive eigenvalue, so the edge carries no information",
                   "Give a positive definite matrix (upper triangle, row by row), or remove the line");
   }
   if (values.minCoeff() < -kNegative * largest) {
@@ -227,8 +227,8 @@ bool Reader::readLine(std::string_view line) {
   const bool letter =
       (kind[0] >= 'A' && kind[0] <= 'Z') || (kind[0] >= 'a' && kind[0] <= 'z') || kind[0] == '_';
   if (!letter) {
-    return refuse("record kind", "`" + shown(kind) + "` is no record kind",
-                  "A line begins with VERTEX_SE2, EDGE_SE2, VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX or #");
+    return refuse("record kind", "`" + shown(kind) + "` is not a record kind",
+                  "Start each line with VERTEX_SE2, EDGE_SE2, VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX or #");
   }
   if (report_.records_left_out++ == 0) {
     first_left_out_ = line_;
@@ -268,9 +268,9 @@ void Reader::warnOfPieces(const PoseGraph<Pose>& graph) {
   static_cast<void>(graphPieces(graph.poses.size(), ends, report_.pieces));
   if (report_.pieces > 1) {
     report_.warnings.push_back({0, "edges",
-                                "the graph is in " + std::to_string(report_.pieces) +
-                                    " pieces; each is held by its first pose (or its FIX), their places "
-                                    "relative to each other mean nothing",
+                                "the graph has " + std::to_string(report_.pieces) +
+                                    " pieces; each is fixed by its first pose (or its FIX), so their "
+                                    "relative positions are arbitrary",
                                 "Add edges between the pieces, or solve them one by one"});
   }
 }
@@ -280,20 +280,21 @@ void Reader::warnOfRepairs() {
     report_.warnings.push_back(
         {first_left_out_, kind_left_out_,
          std::to_string(report_.records_left_out) +
-             " records of kinds that are no pose, edge or FIX are left out, this the first",
+             " records that are not a pose, edge or FIX are ignored; this is the first",
          ""});
   }
   if (report_.clamped_information > 0) {
     report_.warnings.push_back({first_clamped_, "information",
                                 "negative eigenvalues of " + std::to_string(report_.clamped_information) +
-                                    " edges are set to 0, this the first",
+                                    " edges are set to 0; this is the first",
                                 "Write positive definite matrices"});
   }
   if (report_.normalized_quaternions > 0) {
-    report_.warnings.push_back({first_normalized_, "qx qy qz qw",
-                                std::to_string(report_.normalized_quaternions) +
-                                    " quaternions are not of unit length and were normalized, this the first",
-                                ""});
+    report_.warnings.push_back(
+        {first_normalized_, "qx qy qz qw",
+         std::to_string(report_.normalized_quaternions) +
+             " quaternions are not of unit length and were normalized; this is the first",
+         ""});
   }
 }
 
@@ -304,7 +305,7 @@ bool Reader::finish(PoseGraph<Pose>& graph) {
     if (pose_of_id_[k].first != pose_of_id_[k - 1].first) continue;
     line_ = vertices_[pose_of_id_[k].second].line;
     return refuse("id",
-                  "vertex " + std::to_string(pose_of_id_[k].first) + " is given again, first in line " +
+                  "vertex " + std::to_string(pose_of_id_[k].first) + " is defined again, first in line " +
                       std::to_string(vertices_[pose_of_id_[k - 1].second].line),
                   "Keep one of the two lines");
   }
@@ -314,7 +315,7 @@ bool Reader::finish(PoseGraph<Pose>& graph) {
     if (!has_from || !findPose(ends_[e].to, graph.edges[e].to)) {
       return refuse(
           has_from ? "to" : "from",
-          "no line gives vertex " + std::to_string(has_from ? ends_[e].to : ends_[e].from),
+          "no line defines vertex " + std::to_string(has_from ? ends_[e].to : ends_[e].from),
           "Add its VERTEX line, remove the edge, or remove all VERTEX lines to start from the edges");
     }
   }
@@ -322,7 +323,7 @@ bool Reader::finish(PoseGraph<Pose>& graph) {
     std::uint32_t pose = 0;
     line_ = fix.line;
     if (!findPose(fix.id, pose)) {
-      return refuse("id", "FIX names vertex " + std::to_string(fix.id) + ", which is not there",
+      return refuse("id", "FIX names vertex " + std::to_string(fix.id) + ", which does not exist",
                     "Add its VERTEX line, or remove the FIX");
     }
     if (std::find(graph_.fixed.begin(), graph_.fixed.end(), pose) == graph_.fixed.end()) {
@@ -347,11 +348,12 @@ bool Reader::read(std::string_view text) {
   }
   if (vertices_.empty() && ends_.empty()) {
     line_ = 0;
-    return refuse("",
-                  report_.records_left_out > 0
-                      ? "no pose and no edge among the records (the first is `" + kind_left_out_ + "`)"
-                      : "no pose and no edge",
-                  "Is this a g2o pose graph (VERTEX_SE2, EDGE_SE2, VERTEX_SE3:QUAT, EDGE_SE3:QUAT)?");
+    return refuse(
+        "",
+        report_.records_left_out > 0
+            ? "no pose and no edge among the records (the first is `" + kind_left_out_ + "`)"
+            : "no pose and no edge",
+        "Check that this is a g2o pose graph (VERTEX_SE2, EDGE_SE2, VERTEX_SE3:QUAT, EDGE_SE3:QUAT)");
   }
   return graph_.planar ? finish(graph_.plane) : finish(graph_.space);
 }

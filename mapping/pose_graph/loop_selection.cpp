@@ -85,20 +85,20 @@ Status LoopSelection<Pose>::place(const RelativePose<Pose>& loop, std::uint32_t&
   const bool known = loop.from < chain_.size() && loop.to < chain_.size() && loop.from != loop.to;
   if (!known || !allFinite(loop.T_from_to) || !loop.information.allFinite()) {
     ++counters_.refused;
-    return {StatusCode::kInvalidInput, "loop that is not finite or names no two poses of the odometry"};
+    return {StatusCode::kInvalidInput, "a loop is not finite or does not connect two poses of the odometry"};
   }
   Held held;
   held.loop = loop;
   held.chained = chainLoop(chain_, loop);
   if (!held.chained.covariance.allFinite()) {
     ++counters_.refused;
-    return {StatusCode::kInvalidInput, "loop without information"};
+    return {StatusCode::kInvalidInput, "a loop has no information"};
   }
   id = this->held();
   if (id == limits_.max_loops) {
     if (!findLeast(id)) {
       ++counters_.refused;
-      return {StatusCode::kCapacityReached, "as many loops as are held, and all agree"};
+      return {StatusCode::kCapacityReached, "the limit of loops is reached, and all of them agree"};
     }
     ++counters_.replaced;
     leave(id);
@@ -350,7 +350,8 @@ template <typename Pose>
 Status LoopSelection<Pose>::removePose(std::uint32_t pose, std::uint32_t onto) {
   const bool known = pose + 1 < chain_.size() && onto < chain_.size();
   if (!known || chain_.component(pose) != chain_.component(onto)) {
-    return {StatusCode::kInvalidInput, "no such pose to remove, or none beside it to carry its loops to"};
+    return {StatusCode::kInvalidInput,
+            "no such pose to remove, or no neighbour that can take over its loops"};
   }
   carried_.clear();
   for (std::uint32_t k = 0; k < held(); ++k) {

@@ -22,7 +22,7 @@ Status OdometryChain<Pose>::beginComponent() {
 template <typename Pose>
 Status OdometryChain<Pose>::append(const Pose& T_previous_this, const Matrix& covariance) {
   if (nodes_.empty() || !allFinite(T_previous_this) || !covariance.allFinite()) {
-    return {StatusCode::kInvalidInput, "odometry step without a pose before it or not finite"};
+    return {StatusCode::kInvalidInput, "an odometry step is not finite or has no pose before it"};
   }
   if (size() == capacity_) {
     return {StatusCode::kCapacityReached, "odometry chain is full"};

@@ -46,7 +46,7 @@ PoseGraphOptimizer<Pose>::PoseGraphOptimizer(const PoseGraphLimits& limits) : li
 template <typename Pose>
 Status PoseGraphOptimizer<Pose>::addPose(const Pose& T_map_body) {
   if (graph_.poses.size() >= limits_.max_poses)
-    return {StatusCode::kCapacityReached, "the graph has no room for a pose"};
+    return {StatusCode::kCapacityReached, "the graph is full: no more poses"};
   if (!finite(T_map_body)) return {StatusCode::kInvalidInput, "a pose is not finite"};
   graph_.poses.push_back(T_map_body);
   held_.push_back(false);
@@ -58,11 +58,11 @@ Status PoseGraphOptimizer<Pose>::addPose(const Pose& T_map_body) {
 template <typename Pose>
 Status PoseGraphOptimizer<Pose>::addEdge(const RelativePose<Pose>& edge) {
   if (graph_.edges.size() >= limits_.max_edges)
-    return {StatusCode::kCapacityReached, "the graph has no room for an edge"};
+    return {StatusCode::kCapacityReached, "the graph is full: no more edges"};
   if (edge.from >= graph_.poses.size() || edge.to >= graph_.poses.size()) {
     return {StatusCode::kInvalidInput, "an edge's pose does not exist"};
   }
-  if (edge.from == edge.to) return {StatusCode::kInvalidInput, "an edge joins a pose to itself"};
+  if (edge.from == edge.to) return {StatusCode::kInvalidInput, "an edge connects a pose to itself"};
   if (!finite(edge.T_from_to) || !edge.information.allFinite()) {
     return {StatusCode::kInvalidInput, "an edge is not finite"};
   }

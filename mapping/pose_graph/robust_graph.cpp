@@ -74,7 +74,7 @@ RobustGraph<Pose>::RobustGraph(const RobustGraphLimits& limits, const RobustGrap
 
 template <typename Pose>
 Status RobustGraph<Pose>::beginComponent(const Pose& T_map_body, const Tilt& tilt) {
-  if (size() == limits_.poses) return {StatusCode::kCapacityReached, "the graph has no room for a pose"};
+  if (size() == limits_.poses) return {StatusCode::kCapacityReached, "the graph is full: no more poses"};
   Status status = optimizer_.addPose(T_map_body);
   if (status.ok()) status = selection_.odometry().beginComponent();
   if (!status.ok()) return status;
@@ -86,10 +86,10 @@ Status RobustGraph<Pose>::beginComponent(const Pose& T_map_body, const Tilt& til
 template <typename Pose>
 Status RobustGraph<Pose>::addPose(const RelativePose<Pose>& odometry, const Tilt& tilt) {
   const std::uint32_t k = size();
-  if (k == limits_.poses) return {StatusCode::kCapacityReached, "the graph has no room for a pose"};
+  if (k == limits_.poses) return {StatusCode::kCapacityReached, "the graph is full: no more poses"};
   const bool forward = odometry.to == k && odometry.from + 1 == k;
   if (!forward && !(odometry.from == k && odometry.to + 1 == k)) {
-    return {StatusCode::kInvalidInput, "odometry that does not join the next pose to the last"};
+    return {StatusCode::kInvalidInput, "the odometry does not connect the next pose to the last"};
   }
   Pose T_previous_this = odometry.T_from_to;
   PoseMatrix<Pose> covariance = covarianceFromInformation(odometry.information);
@@ -206,7 +206,8 @@ template <typename Pose>
 Status RobustGraph<Pose>::removePose(std::uint32_t pose, std::uint32_t onto) {
   const bool known = pose + 1 < size() && onto < size();
   if (!known || odometry().component(pose) != odometry().component(onto)) {
-    return {StatusCode::kInvalidInput, "no such pose to remove, or none beside it to carry its loops to"};
+    return {StatusCode::kInvalidInput,
+            "no such pose to remove, or no neighbour that can take over its loops"};
   }
   bool bent = false;
   for (std::uint32_t id = 0; id < loops(); ++id) {

@@ -47,7 +47,7 @@ Status solveRobustly(const RobustGraphSettings& settings, std::span<const std::u
   solution = {};
   for (const auto& edge : graph.edges) {
     if (edge.from >= graph.poses.size() || edge.to >= graph.poses.size()) {
-      return {StatusCode::kInvalidInput, "an edge names a pose that is not there"};
+      return {StatusCode::kInvalidInput, "an edge names a pose that does not exist"};
     }
   }
   const std::vector<std::uint32_t> steps = odometryEdges(graph);

@@ -33,7 +33,7 @@ Status ConfusionModel::set(const Matrix& matrix, int labels) {
     for (std::size_t said = 1; said < count; ++said) {
       const float p = matrix[said][real];
       if (!(p >= 0 && p <= 1))
-        return {StatusCode::kInvalidInput, "confusion model: an entry is no probability"};
+        return {StatusCode::kInvalidInput, "confusion model: an entry is not a probability"};
       sum += p;
     }
     if (!(std::abs(sum - 1) <= kSumTolerance)) {

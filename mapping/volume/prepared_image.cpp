@@ -48,7 +48,7 @@ Status PreparedImage::prepare(const DepthImageView& image, const VolumeSettings&
   if (!possible(image.camera))
     return {StatusCode::kInvalidInput, "depth image: impossible intrinsics or size"};
   if (image.camera.pixels() > most_pixels_) {
-    return {StatusCode::kInvalidInput, "depth image: more pixels than were reserved"};
+    return {StatusCode::kInvalidInput, "depth image: more pixels than reserved"};
   }
   if (image.depth == nullptr) return {StatusCode::kInvalidInput, "depth image: no depth"};
   camera_ = image.camera;

@@ -73,7 +73,7 @@ Status VolumeIntegrator::checkPose(const DepthImageView& image, const SE3& T_wor
   const std::optional<Pose> before = last_;
   if (before && image.stamp <= before->stamp) {
     ++counters_.bad_stamps;
-    return {StatusCode::kInvalidInput, "depth image: the stamp is not after the last"};
+    return {StatusCode::kInvalidInput, "depth image: the stamp is not later than the last one"};
   }
   last_ = Pose{image.stamp, T_world_body};
   if (!before) return okStatus();

@@ -208,16 +208,16 @@ TEST_CASE("numbers missing, too many, malformed or not finite") {
   checkRefused(kSpace + "\nEDGE_SE3:QUAT 0 1 1 0 0 0 0\n", 5, "qz", "missing");
   checkRefused(kPlane + "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1 9\n", 4, "word 13", "more than EDGE_SE2 has");
   checkRefused("VERTEX_SE2 0 0 0 0 0\n", 1, "word 6", "more");
-  checkRefused("VERTEX_SE2 1.5 0 0 0\n", 1, "id", "no vertex number");
-  checkRefused("VERTEX_SE2 99999999999999999999 0 0 0\n", 1, "id", "no vertex number");
-  checkRefused("VERTEX_SE2 0 nan 0 0\n", 1, "x", "no finite number");
-  checkRefused("VERTEX_SE2 0 0 -inf 0\n", 1, "y", "no finite number");
-  checkRefused("VERTEX_SE2 0 0 0 1e999\n", 1, "theta", "no finite number");
+  checkRefused("VERTEX_SE2 1.5 0 0 0\n", 1, "id", "not a vertex number");
+  checkRefused("VERTEX_SE2 99999999999999999999 0 0 0\n", 1, "id", "not a vertex number");
+  checkRefused("VERTEX_SE2 0 nan 0 0\n", 1, "x", "not a finite number");
+  checkRefused("VERTEX_SE2 0 0 -inf 0\n", 1, "y", "not a finite number");
+  checkRefused("VERTEX_SE2 0 0 0 1e999\n", 1, "theta", "not a finite number");
   checkRefused("VERTEX_SE2 0 0 0,1 0\n", 1, "y", "`0,1`");
-  checkRefused(kPlane + "EDGE_SE2 0 1 1 0 0 1 0 0 NaN 0 1\n", 4, "I22", "no finite number");
-  checkRefused(kSpace + "EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 inf" + kUnit21, 4, "qw", "no finite number");
+  checkRefused(kPlane + "EDGE_SE2 0 1 1 0 0 1 0 0 NaN 0 1\n", 4, "I22", "not a finite number");
+  checkRefused(kSpace + "EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 inf" + kUnit21, 4, "qw", "not a finite number");
   checkRefused(kPlane + "FIX\n", 4, "id", "missing");
-  checkRefused(kPlane + "FIX 0 x\n", 4, "id", "no vertex number");
+  checkRefused(kPlane + "FIX 0 x\n", 4, "id", "not a vertex number");
 }
 
 TEST_CASE("graphs that cannot be") {
@@ -228,10 +228,10 @@ TEST_CASE("graphs that cannot be") {
   checkRefused(kPlane + "EDGE_SE2 8 0 1 0 0 1 0 0 1 0 1\n", 4, "from", "vertex 8");
   checkRefused(kPlane + "VERTEX_SE2 0 5 5 5\n", 4, "id", "first in line 1");
   checkRefused(kPlane + "FIX 3\n", 4, "id", "vertex 3");
-  checkRefused(kPlane + kSpace, 4, "record kind", "plane");
-  checkRefused(kSpace + kPlane, 4, "record kind", "plane");
-  checkRefused("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 0\n", 1, "qx qy qz qw", "without length");
-  checkRefused("VERTEX_SE3:QUAT 0 0 0 0 1e308 1e308 1e308 1e308\n", 1, "qx qy qz qw", "without length");
+  checkRefused(kPlane + kSpace, 4, "record kind", "SE3");
+  checkRefused(kSpace + kPlane, 4, "record kind", "SE3");
+  checkRefused("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 0\n", 1, "qx qy qz qw", "zero length");
+  checkRefused("VERTEX_SE3:QUAT 0 0 0 0 1e308 1e308 1e308 1e308\n", 1, "qx qy qz qw", "zero length");
   checkRefused("", 0, "", "no pose");
   checkRefused("\n# nothing\n", 0, "", "no pose");
   checkRefused("VERTEX2 0 0 0 0\nEDGE2 0 1 1 0 0 1 0 1 1 0 0\n", 0, "", "VERTEX2");

@@ -164,10 +164,10 @@ TEST_CASE("Bad vocabulary texts are refused with line and field") {
   CHECK_THAT(refusal(good + "2 1 1\n"), Catch::Contains("is a leaf"));
   CHECK_THAT(refusal(good + "1 1 1 256\n"), Catch::Contains("voc.txt:7: descriptor"));
   CHECK_THAT(refusal(good.substr(0, good.find("1.25")) + "nan\n"), Catch::Contains("voc.txt:4: weight"));
-  CHECK_THAT(refusal("2 2 0 0\n"), Catch::Contains("without nodes"));
+  CHECK_THAT(refusal("2 2 0 0\n"), Catch::Contains("has no nodes"));
   std::string no_leaf = good;
   no_leaf[no_leaf.find("0 1 255") + 2] = '0';
-  CHECK_THAT(refusal(no_leaf), Catch::Contains("no leaf and has no children"));
+  CHECK_THAT(refusal(no_leaf), Catch::Contains("is not a leaf and has no children"));
 }
 
 TEST_CASE("DBoW2's YAML is read, in any order") {
@@ -199,7 +199,7 @@ TEST_CASE("DBoW2's YAML is read, in any order") {
   bad.replace(bad.find("parentId:0"), 10, "parentId:2");
   CHECK_THROWS_WITH(readVocabularyBytes("voc.yml", bad), refused("words"));
   CHECK_THROWS_WITH(readVocabularyBytes("voc.yml.gz", std::string("\x1f\x8b\x08") + text),
-                    refused("does not unpack"));
+                    refused("cannot be decompressed"));
 }
 
 TEST_CASE("Compressed YAML and the compact form are read from files") {
