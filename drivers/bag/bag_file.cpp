@@ -72,8 +72,9 @@ std::unique_ptr<BagFile> openBag(const std::string& path) {
     case BagKind::kSqlite:
       return openSqliteBag(file, path);
     default:
-      throw InputError(path, 0, "byte 0", "begins like no bag",
-                       "Give a rosbag2 folder or its .db3, an MCAP file or a ROS 1 bag; is it empty or cut?");
+      throw InputError(path, 0, "byte 0", "is not a bag",
+                       "Give a rosbag2 folder or its .db3, an MCAP file or a ROS 1 bag. Check that the file "
+                       "is not empty or truncated");
   }
 }
 

@@ -25,7 +25,7 @@ FileBytes::FileBytes(const std::string& path, std::string name) : name_(std::mov
     const int error = errno;
     if (file_ >= 0) ::close(file_);
     throw InputError(name_, 0, "", std::string("cannot be read: ") + std::strerror(error),
-                     "Is it there, and may this user read it?");
+                     "Check that it exists and this user can read it");
   }
   size_ = static_cast<std::uint64_t>(status.st_size);
 }
@@ -40,7 +40,8 @@ std::size_t FileBytes::readInto(std::uint64_t offset, std::span<std::uint8_t> ou
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) {
       throw InputError(name_, 0, fmt::format("byte {}", offset + done),
-                       std::string("cannot be read: ") + std::strerror(errno), "Copy it to a sound disk");
+                       std::string("cannot be read: ") + std::strerror(errno),
+                       "Copy the file to a working disk");
     }
     if (got == 0) break;
     done += static_cast<std::size_t>(got);

@@ -105,20 +105,20 @@ class McapFile final : public BagFile {
 McapFile::McapFile(const std::string& path, const std::string& name) : BagFile(name), file_(path, name) {
   const Bytes magic = file_.at(0, mcap::kMagic.size());
   if (!std::equal(magic.begin(), magic.end(), mcap::kMagic.begin(), mcap::kMagic.end())) {
-    fail(0, "begins like no MCAP file");
+    fail(0, "is not an MCAP file");
   }
   findEnd();
   if (summary_ != 0) readSummary();
   walk();
   if (counted_ && count_ != entries_.size()) {
-    fail(summary_, fmt::format("its statistics count {} messages, {} are there", count_, entries_.size()));
+    fail(summary_, fmt::format("its statistics count {} messages, but it holds {}", count_, entries_.size()));
   }
   orderEntries();
 }
 
 void McapFile::fail(std::uint64_t at, const std::string& what) const {
   throw InputError(path_, 0, fmt::format("byte {}", at), what,
-                   "The file is damaged: copy it again, or let `mcap recover` save what is whole");
+                   "The file is damaged: copy it again, or recover the intact part with `mcap recover`");
 }
 
 void McapFile::findEnd() {
@@ -134,7 +134,7 @@ void McapFile::findEnd() {
   finished_ = true;
   summary_ = reader.u64();
   if (summary_ != 0 && (summary_ < mcap::kMagic.size() || summary_ > footer_)) {
-    fail(footer_, "the footer places the summary outside of the file");
+    fail(footer_, "the footer places the summary outside the file");
   }
 }
 
@@ -143,7 +143,7 @@ void McapFile::readSummary() {
   const std::uint64_t size = file_.size() - mcap::kMagic.size() - summary_;
   std::vector<std::uint8_t> bytes;
   file_.read(summary_, static_cast<std::size_t>(size), bytes);
-  if (bytes.size() != size) fail(summary_, "the file ends early");
+  if (bytes.size() != size) fail(summary_, "the file is truncated");
   const Bytes covered = Bytes(bytes).first(bytes.size() - kCrc);
   const std::uint32_t crc = LittleFieldReader(Bytes(bytes).last(kCrc)).u32();
   if (crc != 0 && crcOf(0, covered) != crc) fail(summary_, "the summary's checksum is wrong");
@@ -152,7 +152,7 @@ void McapFile::readSummary() {
     const std::uint64_t place = footer_ - reader.left();
     const auto op = static_cast<Op>(reader.u8());
     const Bytes content = reader.bytes(static_cast<std::size_t>(reader.u64()));
-    if (!reader.ok()) fail(place, "a record of the summary ends behind it");
+    if (!reader.ok()) fail(place, "a record of the summary extends past its end");
     if (op == Op::kSchema) takeSchema(content, place);
     if (op == Op::kChannel) takeChannel(content, place);
     if (op == Op::kStatistics) takeStatistics(content, place);
@@ -190,7 +190,7 @@ void McapFile::takeChannel(Bytes content, std::uint64_t place) {
   }
   const auto schema = schemas_.find(channel.schema);
   if (schema == schemas_.end() && channel.schema != 0) {
-    fail(place, fmt::format("channel {} names schema {}, which is not there", id, channel.schema));
+    fail(place, fmt::format("channel {} names schema {}, which does not exist", id, channel.schema));
   }
   const Schema& type = schema == schemas_.end() ? Schema{} : schema->second;
   channel.index = topicOf(channel.topic, type.name, encodingOf(channel.encoding), type.definition);
@@ -205,16 +205,15 @@ void McapFile::takeStatistics(Bytes content, std::uint64_t place) {
 }
 
 void McapFile::endEarly(std::uint64_t at) {
-  if (finished_) fail(at, "a record ends behind the data");
+  if (finished_) fail(at, "a record extends past the data");
   // What is known of the newest chunk may be half of its indexes.
   if (chunk_open_) {
     entries_.resize(before_chunk_);
     scanChunk(static_cast<std::uint32_t>(chunks_.size() - 1), true);
   }
-  warnings_.push_back(
-      fmt::format("{}: its recorder did not finish it, or its end is lost: {} messages up to byte "
-                  "{} are whole and are read",
-                  path_, entries_.size(), at));
+  warnings_.push_back(fmt::format(
+      "{}: not closed by its recorder, or truncated: {} messages up to byte {} are intact and are read",
+      path_, entries_.size(), at));
 }
 
 void McapFile::walk() {
@@ -248,7 +247,7 @@ void McapFile::walk() {
         break;
       case Op::kDataEnd:
         if (!finished_) return endEarly(at);
-        if (content + length != (summary_ != 0 ? summary_ : footer_)) fail(at, "the data ends too early");
+        if (content + length != (summary_ != 0 ? summary_ : footer_)) fail(at, "the data is truncated");
         return checkData(at, LittleFieldReader(file_.at(content, small)).u32());
       default:
         break;  // attachments, metadata, and kinds to come
@@ -289,7 +288,7 @@ void McapFile::takeChunk(std::uint64_t record, std::uint64_t content, std::uint6
   } else if (packing == "lz4") {
     chunk.packing = Packing::kLz4;
   } else if (!packing.empty()) {
-    fail(record, fmt::format("a chunk is packed with `{}`, which is neither zstd nor lz4", packing));
+    fail(record, fmt::format("a chunk is compressed with `{}`, which is neither zstd nor lz4", packing));
   }
   if (chunk.unpacked > kMostUnpacked)
     fail(record, fmt::format("a chunk of {} bytes is too large", chunk.unpacked));
@@ -317,19 +316,19 @@ void McapFile::takeIndex(Bytes content, std::uint64_t place) {
   if (!channels_.contains(channel)) scanChunk(chunk, false);
   const auto known = channels_.find(channel);
   if (known == channels_.end()) {
-    fail(place, fmt::format("a message index names channel {}, which is not there", channel));
+    fail(place, fmt::format("a message index names channel {}, which does not exist", channel));
   }
   while (reader.left() > 0) {
     const Stamp time = stampOf(reader.u64(), place);
     const std::uint64_t offset = reader.u64();
-    if (offset >= chunks_[chunk].unpacked) fail(place, "a message index leads out of its chunk");
+    if (offset >= chunks_[chunk].unpacked) fail(place, "a message index points outside its chunk");
     entries_.push_back({time, known->second.index, chunk, offset});
   }
 }
 
 Stamp McapFile::stampOf(std::uint64_t ns, std::uint64_t place) const {
   if (ns > static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max())) {
-    fail(place, fmt::format("the time {} ns is far beyond every clock", ns));
+    fail(place, fmt::format("the time {} ns is out of range", ns));
   }
   return Stamp{static_cast<std::int64_t>(ns)};
 }
@@ -341,7 +340,8 @@ void McapFile::takeMessage(Bytes head, std::uint32_t part, std::uint64_t at, std
   const std::uint64_t time = reader.u64();
   if (!reader.ok()) fail(place, "a message is shorter than its head");
   const auto channel = channels_.find(id);
-  if (channel == channels_.end()) fail(place, fmt::format("a message of channel {}, which is not there", id));
+  if (channel == channels_.end())
+    fail(place, fmt::format("a message of channel {}, which does not exist", id));
   entries_.push_back({stampOf(time, place), channel->second.index, part, at});
 }
 
@@ -353,7 +353,7 @@ void McapFile::scanChunk(std::uint32_t chunk, bool messages) {
     const std::size_t at = records.size() - reader.left();
     const auto op = static_cast<Op>(reader.u8());
     const Bytes content = reader.bytes(static_cast<std::size_t>(reader.u64()));
-    if (!reader.ok()) fail(place, fmt::format("the record at {} of this chunk ends behind it", at));
+    if (!reader.ok()) fail(place, fmt::format("the record at {} extends past the end of this chunk", at));
     if (op == Op::kSchema) takeSchema(content, place);
     if (op == Op::kChannel) takeChannel(content, place);
     if (op == Op::kMessage && messages) takeMessage(content, chunk, at, place);
@@ -375,7 +375,7 @@ Bytes McapFile::unpackedChunk(std::uint32_t index) {
   file_.read(chunk.data, static_cast<std::size_t>(chunk.packed), packed_);
   if (packed_.size() != chunk.packed ||
       !unpack(chunk.packing, packed_, static_cast<std::size_t>(chunk.unpacked), oldest->bytes)) {
-    fail(chunk.record, "a chunk cannot be unpacked");
+    fail(chunk.record, "a chunk cannot be decompressed");
   }
   if (chunk.crc != 0 && crcOf(0, oldest->bytes) != chunk.crc) {
     fail(chunk.record, "a chunk's checksum is wrong");
@@ -407,7 +407,7 @@ Bytes McapFile::read(const BagEntry& entry) {
   head.skip(sizeof(std::uint64_t));  // time of publication
   if (!message || !reader.ok() || !head.ok() || channel == channels_.end() ||
       channel->second.index != entry.topic || time != static_cast<std::uint64_t>(entry.log_time.ns)) {
-    fail(place, "the message index does not lead to its message");
+    fail(place, "the message index does not point to its message");
   }
   return head.bytes(head.left());
 }

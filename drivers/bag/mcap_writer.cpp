@@ -134,7 +134,7 @@ class McapWriter final : public BagWriter {
 
   [[noreturn]] void fail() const {
     throw InputError(path_, 0, "", std::string("cannot be written: ") + std::strerror(errno),
-                     "Is the folder there and writable, and the disk not full?");
+                     "Check that the folder exists and is writable and the disk is not full");
   }
 
   void write(Bytes bytes) {

@@ -86,7 +86,7 @@ class Ros1File final : public BagFile {
       call();
     } catch (const rosbag::BagException& error) {
       throw InputError(path_, 0, "", std::string("not a readable bag (") + error.what() + ")",
-                       "`rosbag reindex` repairs a bag whose recording was cut");
+                       "`rosbag reindex` repairs an interrupted recording");
     }
   }
 
@@ -134,7 +134,7 @@ class Ros1Writer final : public BagWriter {
       // A full disk shows when the file is closed, and rosbag does not look.
       rosbag::Bag written(path_, rosbag::bagmode::Read);
       if (rosbag::View(written).size() != messages_) {
-        throw rosbag::BagIOException("messages are missing in the file written");
+        throw rosbag::BagIOException("messages are missing in the written file");
       }
     });
   }
@@ -151,7 +151,7 @@ class Ros1Writer final : public BagWriter {
       call();
     } catch (const rosbag::BagException& error) {
       throw InputError(path_, 0, "", std::string("cannot be written (") + error.what() + ")",
-                       "Is the folder there and writable, and the disk not full?");
+                       "Check that the folder exists and is writable and the disk is not full");
     }
   }
 

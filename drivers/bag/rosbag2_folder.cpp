@@ -61,12 +61,12 @@ class Rosbag2Folder final : public BagFile {
     } else {
       listed.files = storageIn(path);
       warnings_.push_back(
-          fmt::format("{}: no metadata.yaml, its recorder did not finish: its {} files are read", path,
+          fmt::format("{}: no metadata.yaml (its recorder did not finish): its {} files are read", path,
                       listed.files.size()));
     }
     for (const std::string& file : listed.files) add(file);
     if (fs::exists(metadata) && listed.messages != entries_.size()) {
-      warnings_.push_back(fmt::format("{}: it counts {} messages, {} are there", metadata.string(),
+      warnings_.push_back(fmt::format("{}: counts {} messages, but holds {}", metadata.string(),
                                       listed.messages, entries_.size()));
     }
     orderEntries();
@@ -83,7 +83,7 @@ class Rosbag2Folder final : public BagFile {
     // Older recorders put the folder's name before the file's.
     if (!fs::exists(file)) file = fs::path(path_) / fs::path(name).filename();
     if (!fs::exists(file)) {
-      throw InputError(file.string(), 0, "", "is missing, and metadata.yaml lists it",
+      throw InputError(file.string(), 0, "", "is listed in metadata.yaml but does not exist",
                        "Copy it beside metadata.yaml");
     }
     const auto part = static_cast<std::uint32_t>(files_.size());
@@ -107,19 +107,19 @@ class Rosbag2Folder final : public BagFile {
 
 Rosbag2Metadata parseRosbag2Metadata(const std::string& name, std::string_view text) {
   constexpr const char* kRemedy =
-      "`ros2 bag reindex` writes it anew; without it the folder's files are read too";
+      "Rebuild it with `ros2 bag reindex`, or remove it: the folder's files can be read without it";
   Rosbag2Metadata metadata;
   try {
     const YAML::Node root = YAML::Load(std::string(text));
     const YAML::Node bag = root["rosbag2_bagfile_information"];
     if (!bag || !bag.IsMap()) {
       throw InputError(name, 1, "rosbag2_bagfile_information", "is missing",
-                       "This is no metadata of rosbag2");
+                       "Check that this is the metadata of a rosbag2");
     }
     const int version = bag["version"].as<int>();
     if (version < 1 || version > kNewestVersion) {
       throw InputError(name, bag["version"].Mark().line + 1, "version",
-                       fmt::format("is {}, known are 1 to {}", version, kNewestVersion),
+                       fmt::format("is {}, supported are 1 to {}", version, kNewestVersion),
                        "Convert the bag with `ros2 bag convert`, or give its files one by one");
     }
     metadata.messages = bag["message_count"].as<std::uint64_t>();
@@ -128,12 +128,12 @@ Rosbag2Metadata parseRosbag2Metadata(const std::string& name, std::string_view t
   } catch (const YAML::Exception& error) {
     throw InputError(name, error.mark.line + 1, "", error.msg, kRemedy);
   }
-  if (metadata.files.empty()) throw InputError(name, 0, "relative_file_paths", "lists no file", kRemedy);
+  if (metadata.files.empty()) throw InputError(name, 0, "relative_file_paths", "lists no files", kRemedy);
   for (const std::string& file : metadata.files) {
     const fs::path path(file);
     const bool outside = path.is_absolute() || std::find(path.begin(), path.end(), "..") != path.end();
     if (outside)
-      throw InputError(name, 0, "relative_file_paths", "leads out of the folder: " + file, kRemedy);
+      throw InputError(name, 0, "relative_file_paths", "points outside the folder: " + file, kRemedy);
   }
   return metadata;
 }

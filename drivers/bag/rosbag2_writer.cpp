@@ -80,7 +80,7 @@ class Rosbag2Writer final : public BagWriter {
     file << metadataText();
     file.close();
     if (!file) {
-      throw InputError(metadata.string(), 0, "", "cannot be written", "Is the disk full?");
+      throw InputError(metadata.string(), 0, "", "cannot be written", "Check that the disk is not full");
     }
   }
 

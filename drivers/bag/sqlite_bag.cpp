@@ -17,7 +17,8 @@ namespace {
 constexpr std::size_t kMostMessage = std::size_t{1} << 30U;  // bytes; SQLite's own limit for a blob
 
 constexpr const char* kDamaged =
-    "The file is damaged: copy it again, or save what is whole with `sqlite3 FILE .recover | sqlite3 NEW`";
+    "The file is damaged: copy it again, or recover the intact part with `sqlite3 FILE .recover | sqlite3 "
+    "NEW`";
 
 class SqliteBag final : public BagFile {
  public:
@@ -28,7 +29,7 @@ class SqliteBag final : public BagFile {
       if (database_.hasTable(table)) continue;
       throw InputError(
           path_, 0, std::string("table ") + table, "is missing",
-          "Is this a bag of rosbag2? Its recorder may have been killed before the first message");
+          "Check that it is a rosbag2 bag. Its recorder may have been killed before the first message");
     }
     readTopics();
     readEntries();
@@ -39,8 +40,8 @@ class SqliteBag final : public BagFile {
     const auto row = static_cast<std::int64_t>(entry.at);
     body_->reset();
     body_->bind(1, row);
-    if (!body_->step("messages, row", row)) failRow(row, "is gone");
-    if (!body_->isBlob(0)) failRow(row, "`data` is no blob");
+    if (!body_->step("messages, row", row)) failRow(row, "no longer exists");
+    if (!body_->isBlob(0)) failRow(row, "`data` is not a blob");
     const std::span<const std::uint8_t> body = body_->blob(0);
     if (!isZstd(body)) return body;
     if (!unpackZstdMessage(body, kMostMessage, unpacked_)) failRow(row, "its zstd data is damaged");
@@ -49,10 +50,9 @@ class SqliteBag final : public BagFile {
 
  private:
   [[noreturn]] void failRow(std::int64_t row, const char* what) const {
-    throw InputError(
-        path_, 0, fmt::format("messages, row {}", row), what,
-        "The file is damaged: copy it again, or save what is whole with `sqlite3 FILE .recover | "
-        "sqlite3 NEW`");
+    throw InputError(path_, 0, fmt::format("messages, row {}", row), what,
+                     "The file is damaged: copy it again, or recover the intact part with `sqlite3 FILE "
+                     ".recover | sqlite3 NEW`");
   }
 
   /// SQLite itself fills up a last page that was cut with zeros.
@@ -63,7 +63,8 @@ class SqliteBag final : public BagFile {
     const std::uint16_t stated = reader.u16();
     const std::uint64_t page = stated == 1 ? 65536 : stated;
     if (page != 0 && file.size() % page == 0) return;
-    throw InputError(path_, 0, fmt::format("byte {}", file.size()), "the file ends within a page", kDamaged);
+    throw InputError(path_, 0, fmt::format("byte {}", file.size()), "the file is truncated within a page",
+                     kDamaged);
   }
 
   void readTopics() {

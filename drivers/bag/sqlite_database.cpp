@@ -13,11 +13,11 @@ namespace {
   const int code = sqlite3_errcode(database) & 0xFF;
   const bool damaged = code == SQLITE_CORRUPT || code == SQLITE_NOTADB;
   const bool full = code == SQLITE_FULL || code == SQLITE_IOERR;
-  throw InputError(name, 0, place, std::string("SQLite says: ") + sqlite3_errmsg(database),
-                   damaged ? "The file is damaged: copy it again, or save what is whole with `sqlite3 FILE "
-                             ".recover | sqlite3 NEW`"
-                   : full  ? "Is the disk full?"
-                           : "Is it there, and may this user read it and write beside it?");
+  throw InputError(name, 0, place, std::string("SQLite error: ") + sqlite3_errmsg(database),
+                   damaged ? "The file is damaged: copy it again, or recover the intact part with `sqlite3 "
+                             "FILE .recover | sqlite3 NEW`"
+                   : full  ? "Check that the disk is not full"
+                           : "Check that it exists and that this user can read it and write beside it");
 }
 
 /// As a URI, where some characters mean something.

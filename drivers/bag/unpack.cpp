@@ -81,15 +81,15 @@ bool unpackLz4(std::span<const std::uint8_t> packed, std::size_t most, std::vect
 
 [[noreturn]] void failToUnpack(const std::string& file, std::size_t at, const char* what) {
   throw InputError(file, 0, fmt::format("byte {}", at), what,
-                   "Copy it again, or unpack it with `zstd -d` and give the unpacked bag");
+                   "Copy it again, or decompress it with `zstd -d` and give the decompressed bag");
 }
 
 void unpackFile(const std::string& packed, const std::string& to) {
   const File in(std::fopen(packed.c_str(), "rbe"));
   const File out(std::fopen(to.c_str(), "wbe"));
   if (!in || !out) {
-    throw InputError(packed, 0, "", "cannot be unpacked to " + to,
-                     "It needs room there: set TMPDIR to a folder with room");
+    throw InputError(packed, 0, "", "cannot be decompressed to " + to,
+                     "Set TMPDIR to a folder with enough free space");
   }
   const Zstd stream = makeZstd();
   std::vector<std::uint8_t> from(ZSTD_DStreamInSize());
@@ -104,15 +104,15 @@ void unpackFile(const std::string& packed, const std::string& to) {
       left = ZSTD_decompressStream(stream.get(), &target, &source);
       if (ZSTD_isError(left) != 0) failToUnpack(packed, read + source.pos, "its zstd data is damaged");
       if (std::fwrite(room.data(), 1, target.pos, out.get()) != target.pos) {
-        throw InputError(packed, 0, "", "no room to unpack it to " + to,
-                         "Set TMPDIR to a folder with room for the unpacked bag");
+        throw InputError(packed, 0, "", "not enough space to decompress it to " + to,
+                         "Set TMPDIR to a folder with space for the decompressed bag");
       }
       full = target.pos == target.size;
     }
     read += got;
   }
-  if (left != 0) failToUnpack(packed, read, "its zstd data ends early");
-  if (std::fflush(out.get()) != 0) failToUnpack(packed, read, "no room to unpack it");
+  if (left != 0) failToUnpack(packed, read, "its zstd data is truncated");
+  if (std::fflush(out.get()) != 0) failToUnpack(packed, read, "not enough space to decompress it");
 }
 
 }  // namespace
@@ -172,7 +172,7 @@ UnpackedFile::UnpackedFile(const std::string& packed) {
   std::string name = (std::filesystem::temp_directory_path() / "swiftlet_bag_XXXXXX").string();
   const int made = ::mkstemp(name.data());
   if (made < 0) {
-    throw InputError(packed, 0, "", "no file can be made for it in " + name,
+    throw InputError(packed, 0, "", "cannot create a file for it in " + name,
                      "Set TMPDIR to a writable folder");
   }
   ::close(made);

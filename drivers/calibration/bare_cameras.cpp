@@ -4,8 +4,7 @@ namespace swiftlet {
 namespace {
 
 constexpr const char* kPlaceRemedy =
-    "Write it as four rows of four numbers: the transform that takes camera coordinates to the IMU's, in "
-    "metres";
+    "Write it as four rows of four numbers: the transform from camera to IMU coordinates, in metres";
 
 }  // namespace
 
@@ -19,7 +18,7 @@ bool readsRectified(const YamlField& imu) {
   const YamlField field = imu.at("images");
   const std::string images = field.text();
   if (images != "raw" && images != "rectified") {
-    throw field.error("`" + images + "` are no images of a pair", "Write raw or rectified");
+    throw field.error("`" + images + "` is not a type of image pair", "Write raw or rectified");
   }
   return images == "rectified";
 }
@@ -36,7 +35,7 @@ Calibration joinToImu(const BareCameras& bare, const YamlField& imu, Warnings wa
   entries[0].T_body_cam = readTransform(first, calibration.warnings);
   if (entries.size() > 1 && bare.T_cam1_cam0) {
     if (imu.has("T_imu_cam1")) {
-      throw imu.at("T_imu_cam1").error("the calibration of the pair has it already", "Remove one of the two");
+      throw imu.at("T_imu_cam1").error("the calibration of the pair already has it", "Remove one of the two");
     }
     entries[1].T_body_cam = entries[0].T_body_cam * bare.T_cam1_cam0->inverse();
   } else if (entries.size() > 1) {

@@ -18,7 +18,7 @@ constexpr double kQuaternionTolerance = 1e-3;
 constexpr double kFromNs = 1e-9;
 
 double numberAt(const YamlField& map, const char* key) {
-  return map.at(key, "Give the file as Basalt wrote it").number();
+  return map.at(key, "Give the file as written by Basalt").number();
 }
 
 SE3 poseOf(const YamlField& pose, Warnings& warnings) {

@@ -26,7 +26,7 @@ std::string readText(FileTree& tree, const std::string& path) {
   std::vector<std::uint8_t> bytes;
   if (!tree.read(path, bytes)) {
     throw InputError(tree.name(path), 0, "", "cannot be read",
-                     "The calibration is needed; give it beside the log or with another path");
+                     "A calibration is required: place it beside the log, or give another path");
   }
   return {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(std::min(bytes.size(), kMaxFileBytes))};
 }
@@ -90,7 +90,7 @@ void refuseMore(const FileTree& tree, const std::string& folder, const std::vect
                    std::string(most == 1 ? "two " : "three ") + what +
                        " files: " + fs::path(files[most - 1]).filename().string() + " and " +
                        fs::path(files[most]).filename().string(),
-                   "Name the one to use");
+                   "Specify the one to use");
 }
 
 /// A calibration's files: a text of its own tree, or the IMU's wherever the user has it.
@@ -134,7 +134,7 @@ Calibration readBare(FileTree& tree, FileKind kind, const std::vector<std::strin
   if (!imu) {
     throw InputError(
         tree.name(cameras.front()), 0, "",
-        "holds cameras alone: the IMU's noise, and its place beside camera 0, are missing",
+        "holds only cameras: the IMU's noise and its pose relative to camera 0 are missing",
         "Write imu.yaml beside it with update_rate, gyroscope_noise_density, gyroscope_random_walk, "
         "accelerometer_noise_density, accelerometer_random_walk and T_imu_cam0 (docs/formats.md has "
         "an example)");
@@ -166,7 +166,7 @@ Calibration readFile(FileTree& tree, const std::string& folder, const std::strin
       const std::optional<Text> imu = imuOf(tree, folder, imu_file);
       if (!imu) {
         throw InputError(tree.name(folder), 0, "", "no Kalibr IMU file",
-                         "Give Kalibr's IMU YAML beside the camchain, or name it");
+                         "Give Kalibr's IMU YAML beside the camchain, or its path");
       }
       return parseKalibrCalibration(text.named(), imu->named(), options);
     }
@@ -174,7 +174,7 @@ Calibration readFile(FileTree& tree, const std::string& folder, const std::strin
       // Parsing shows what is wrong with it.
       throw YamlField::parse(text.name, text.text)
           .error(
-              "not a calibration of cameras: no Kalibr camchain, Basalt JSON, ROS camera_info or OpenCV file",
+              "not a camera calibration: not a Kalibr camchain, Basalt JSON, ROS camera_info or OpenCV file",
               "Give one of these, or a EuRoC folder");
   }
 }
@@ -212,7 +212,7 @@ Calibration readCalibration(FileTree& tree, const std::string& folder, const std
   refuseMore(tree, folder, cameras, 1, "OpenCV");
   if (cameras.empty()) {
     throw InputError(
-        tree.name(folder), 0, "", "no calibration of cameras",
+        tree.name(folder), 0, "", "no camera calibration",
         "Give EuRoC cam0/sensor.yaml and imu0/sensor.yaml, Kalibr's camchain and IMU YAML, Basalt's "
         "JSON, or ROS or OpenCV files with imu.yaml");
   }
@@ -225,7 +225,7 @@ Calibration readCalibration(const std::string& path, const std::string& imu_file
                             const CalibrationOptions& options) {
   const fs::path given(path);
   if (!fs::exists(given)) {
-    throw InputError(path, 0, "", "does not exist", "Give a calibration file or a folder that has one");
+    throw InputError(path, 0, "", "does not exist", "Give a calibration file or a folder with one");
   }
   if (fs::is_directory(given)) return readCalibration(*openFolder(path), "", imu_file, options);
   if (given.filename() == "sensor.yaml") {

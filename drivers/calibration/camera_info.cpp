@@ -68,7 +68,8 @@ SE3 rectifiedPair(const CameraInfo& right, const std::string& name) {
   const double fx = right.P[0];
   const double offset = right.P[3];
   if (!(fx > 0) || offset == 0 || !std::isfinite(offset)) {
-    throw InputError(name, 0, "P", "no baseline: P(0,3) of the second camera is -fx times the baseline",
+    throw InputError(name, 0, "P",
+                     "the baseline is missing: P(0,3) of the second camera is -fx times the baseline",
                      "Calibrate both cameras as a stereo pair");
   }
   SE3 T_cam1_cam0;

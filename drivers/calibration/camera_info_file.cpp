@@ -11,7 +11,7 @@ namespace swiftlet {
 namespace {
 
 void readArray(const YamlField& root, const std::string& key, std::size_t columns, std::span<double> out) {
-  const YamlField field = root.at(key, "Give the file as camera_calibration wrote it");
+  const YamlField field = root.at(key, "Give the file as written by camera_calibration");
   const std::vector<double> values = readMatrix(field, out.size() / columns, columns);
   std::copy(values.begin(), values.end(), out.begin());
 }
@@ -27,7 +27,7 @@ InfoFile readInfo(const NamedText& text) {
   InfoFile out;
   out.file = text.name;
   CameraInfo& info = out.info;
-  const char* const size_remedy = "Give the size in pixels of the images that were calibrated";
+  const char* const size_remedy = "Give the size in pixels of the calibrated images";
   const YamlField width = root.at("image_width", size_remedy);
   const double height = root.at("image_height", size_remedy).number();
   checkResolution(width.place(), width.number(), height);

@@ -18,7 +18,8 @@ DepthSensor readDepthSensor(const NamedText& file, std::vector<std::string>& war
   const CameraModel lens = readLens(root, "distortion_coefficients", warnings).model;
   if (lens.kind() != CameraKind::kPinholeRadtan || !lens.distortion().isZero(0)) {
     throw root.at("distortion_coefficients")
-        .error("depth images come from a camera without distortion", "Rectify them, and give zeros here");
+        .error("depth images must come from a camera without distortion",
+               "Rectify them, and give zeros here");
   }
   DepthSensor sensor;
   const Eigen::Vector4d& k = lens.intrinsics();
@@ -29,7 +30,7 @@ DepthSensor readDepthSensor(const NamedText& file, std::vector<std::string>& war
     const YamlField unit = root.at("depth_unit_m");
     sensor.metres_per_unit = unit.number();
     if (!(sensor.metres_per_unit >= kLeastUnit && sensor.metres_per_unit <= kMostUnit)) {
-      throw unit.error(fmt::format("{:g} m for one unit of depth", sensor.metres_per_unit),
+      throw unit.error(fmt::format("{:g} m per unit of depth", sensor.metres_per_unit),
                        fmt::format("Give metres per unit, {:g} to {:g}", kLeastUnit, kMostUnit));
     }
   }

@@ -34,7 +34,9 @@ std::string describeCamera(const Calibration& calibration, std::size_t i) {
   if (rate_hz > 0) text += fmt::format(", {:g} Hz", rate_hz);
   if (!calibration.conversion[i].empty()) text += "\n      converted, " + calibration.conversion[i];
   text += fmt::format(
-      "\n      at ({:.4f}, {:.4f}, {:.4f}) m in the body; looks along body {}, its right is body {}\n",
+      "\n"
+      "      at ({:.4f}, {:.4f}, {:.4f}) m in the body; optical axis along body {}, its right along body "
+      "{}\n",
       T.translation.x(), T.translation.y(), T.translation.z(), nearestAxis(T.R().col(2)),
       nearestAxis(T.R().col(0)));
   return text;
@@ -52,32 +54,33 @@ std::string describe(const Calibration& calibration) {
   if (rig.camera_count == 2) {
     const Eigen::Vector3d p_c0_c1 = rig.T_cam1_cam0().inverse().translation;
     text +=
-        fmt::format("pair: baseline {:.4f} m; cam1 sits {} of cam0, at ({:.4f}, {:.4f}, {:.4f}) m in cam0\n",
+        fmt::format("pair: baseline {:.4f} m; cam1 is {} of cam0, at ({:.4f}, {:.4f}, {:.4f}) m in cam0\n",
                     rig.baseline(), p_c0_c1.x() > 0 ? "to the right" : "to the left", p_c0_c1.x(),
                     p_c0_c1.y(), p_c0_c1.z());
   }
   const double shift_ms = 1e3 * rig.camera_to_imu_shift.seconds();
   text += fmt::format("time: {:+.3f} ms from image stamp to IMU clock\n", shift_ms);
   if (rig.rolls()) {
-    text += fmt::format("rows: read over {:.3f} ms (rolling shutter), stamps are the middle row's\n",
+    text += fmt::format("rolling shutter: {:.3f} ms readout, stamps are of the middle row\n",
                         1e3 * rig.readout.seconds());
   }
   const ImuNoise& n = calibration.noise;
   const double root = std::sqrt(n.rate_hz);
   text += fmt::format(
       "IMU: {:g} Hz; gyro {:.3g} rad/s/sqrt(Hz) ({:.3g} rad/s per sample), accel {:.3g} m/s^2/sqrt(Hz) "
-      "({:.3g} m/s^2 per sample)\n     walks {:.3g} rad/s^2/sqrt(Hz), {:.3g} m/s^3/sqrt(Hz)\n",
+      "({:.3g} m/s^2 per sample)\n"
+      "     random walks {:.3g} rad/s^2/sqrt(Hz), {:.3g} m/s^3/sqrt(Hz)\n",
       n.rate_hz, n.gyro_density, n.gyro_density * root, n.accel_density, n.accel_density * root, n.gyro_walk,
       n.accel_walk);
   if (calibration.turnsImu()) {
     text +=
-        fmt::format("     turned in the body: its x is body {}, its z is body {}\n",
+        fmt::format("     rotated in the body: its x is body {}, its z is body {}\n",
                     nearestAxis(calibration.R_body_imu.col(0)), nearestAxis(calibration.R_body_imu.col(2)));
   }
   if (calibration.hasImuMatrices()) {
     const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity();
     text +=
-        fmt::format("     scale and misalignment taken out: gyro up to {:.2f} %, accelerometer {:.2f} %\n",
+        fmt::format("     scale and misalignment corrected: gyro up to {:.2f} %, accelerometer {:.2f} %\n",
                     100 * (calibration.gyro_matrix - identity).cwiseAbs().maxCoeff(),
                     100 * (calibration.accel_matrix - identity).cwiseAbs().maxCoeff());
   }

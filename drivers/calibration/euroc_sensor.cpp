@@ -34,14 +34,14 @@ void readImu(const YamlField& root, Calibration& calibration) {
   if (!R.isIdentity(1e-9)) {
     calibration.R_body_imu = R;
     calibration.warnings.push_back(field.where() +
-                                   ": the IMU is turned in the body; its samples are turned into body axes");
+                                   ": the IMU is rotated in the body; its samples are rotated to body axes");
   }
   calibration.T_body_filebody.translation = -T_body_imu.translation;
   if (T_body_imu.translation.norm() > 0) {
     calibration.warnings.push_back(
-        field.where() + fmt::format(": the IMU sits {:.4f} m from the body's origin; the trajectory is the "
-                                    "IMU's, in body axes",
-                                    T_body_imu.translation.norm()));
+        field.where() +
+        fmt::format(": the IMU is {:.4f} m from the body's origin; the trajectory is the IMU's, in body axes",
+                    T_body_imu.translation.norm()));
   }
 }
 

@@ -39,7 +39,7 @@ ChainCamera readExtrinsics(const YamlField& camera, Warnings& warnings) {
     const YamlField field = camera.at("T_imu_cam");
     const SE3 T = readTransform(field, warnings);
     if (out.T_body_cam && distance(T, *out.T_body_cam) > kContradiction) {
-      throw field.error("contradicts T_cam_imu of the same camera", "Remove the wrong one of the two");
+      throw field.error("contradicts T_cam_imu of the same camera", "Remove the wrong one");
     }
     out.extrinsics_key = "T_imu_cam";
     out.T_body_cam = T;
@@ -60,7 +60,7 @@ void refuseContradiction(const ChainCamera& previous, const ChainCamera& camera)
       .error(fmt::format("contradicts {} and {} by {:.3g} (m, rad)",
                          previous.fields.name() + "." + previous.extrinsics_key,
                          camera.fields.name() + "." + camera.extrinsics_key, gap),
-             "T_cn_cnm1 maps camera n-1 to camera n; keep the one that the calibration wrote");
+             "T_cn_cnm1 maps camera n-1 to camera n; keep the transform that the calibration tool wrote");
 }
 
 void chain(std::vector<ChainCamera>& cameras) {
@@ -78,7 +78,7 @@ void chain(std::vector<ChainCamera>& cameras) {
   for (const ChainCamera& camera : cameras) {
     if (camera.T_body_cam) continue;
     throw camera.fields.error(
-        "neither T_cam_imu nor T_imu_cam, nor a chain of T_cn_cnm1 to a camera that has it",
+        "neither T_cam_imu nor T_imu_cam, nor a chain of T_cn_cnm1 to a camera with one",
         "Run the camera-IMU step of the calibration and give its camchain-imucam file");
   }
 }
@@ -93,7 +93,7 @@ std::vector<CameraEntry> readChain(const YamlField& root, bool bare, Warnings& w
     }
     const YamlField camera = root.at(fmt::format("cam{}", i));
     if (!camera.isMap())
-      throw camera.error("a map of the camera's fields is expected", "Give a Kalibr camchain");
+      throw camera.error("expected a map of the camera's fields", "Give a Kalibr camchain");
     cameras.push_back(readExtrinsics(camera, warnings));
   }
   if (cameras.empty()) throw root.error("no camera `cam0`", "Give a Kalibr camchain file");
@@ -128,18 +128,20 @@ void readImuModel(const YamlField& imu, Calibration& calibration) {
   };
   const auto refuse = [](const YamlField& field, const Eigen::Matrix3d& M) {
     if ((M - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kMostImuError) return;
-    throw field.error(fmt::format("an error of the sensor above {:g}", kMostImuError),
-                      "The matrix maps true to measured values and is near the identity");
+    throw field.error(fmt::format("a sensor error above {:g}", kMostImuError),
+                      "The matrix maps true to measured values and is close to the identity");
   };
   if (imu.has("model")) {
     const YamlField field = imu.at("model");
     if (field.text() == "scale-misalignment-size-effect") {
-      throw field.error("places of single accelerometers are not applied",
+      throw field.error("positions of single accelerometers are not supported",
                         "Calibrate with `--imu-models scale-misalignment`");
     }
     if (field.text() == "rpng" && imu.has("Tw")) {
       const bool ideal = at(imu, "Tw").isIdentity(kContradiction) && at(imu, "Ta").isIdentity(kContradiction);
-      if (!ideal) throw field.error("matrices of OpenVINS' model `rpng`", "Give those of model `kalibr`");
+      if (!ideal)
+        throw field.error("matrices of OpenVINS' model `rpng` are not supported",
+                          "Give those of model `kalibr`");
     }
   }
   if (imu.has("accelerometers") && imu.at("accelerometers").isMap()) {
@@ -176,7 +178,7 @@ void readImuModel(const YamlField& imu, Calibration& calibration) {
   if (imu.has("time_offset")) {
     const YamlField field = imu.at("time_offset");
     if (std::abs(field.number()) > kContradiction) {
-      throw field.error("an offset between IMUs, which swiftlet does not apply", "Give the entry of imu0");
+      throw field.error("an offset between IMUs is not supported", "Give the entry of imu0");
     }
   }
 }

@@ -251,7 +251,7 @@ std::string wordsOf(const LensFit& fit, const SourceLens& source) {
     return fmt::format("neither equidistant nor pinhole radial-tangential comes near the {} lens",
                        source.name);
   }
-  return fmt::format("{} as {}: {:.3f} px RMS, {:.3f} px at most", source.name, nameOf(fit.model.kind()),
+  return fmt::format("{} as {}: {:.3f} px RMS, maximum {:.3f} px", source.name, nameOf(fit.model.kind()),
                      fit.rms, fit.max);
 }
 
@@ -264,8 +264,8 @@ LensFit fitLens(const SourceLens& source, const InputPlace& place) {
   if (!(region.covered >= kLeastCovered)) {
     throw place.error(fmt::format("the {} lens has no inverse in {:.0f} % of the image", source.name,
                                   100 * (1 - region.covered)),
-                      "The coefficients belong to another order, image size or model: compare with the file "
-                      "that the calibration wrote");
+                      "The coefficients are for another order, image size or model: compare with the file "
+                      "written by the calibration tool");
   }
   const LensFit wide = fitKind(CameraKind::kEquidistant, source, region);
   const LensFit narrow = fitKind(CameraKind::kPinholeRadtan, source, region);
@@ -278,14 +278,13 @@ LensFit convertLens(const SourceLens& source, const InputPlace& place, Warnings&
   LensFit fit = fitLens(source, place);
   if (!(fit.rms <= kMaxLensRms)) {
     throw place.error(
-        fmt::format("{}; more than {} px RMS is refused", fit.words, kMaxLensRms),
-        "Calibrate again as pinhole-radtan, or pinhole-equi for a wide lens, over the whole image");
+        fmt::format("{}; above {} px RMS it is rejected", fit.words, kMaxLensRms),
+        "Calibrate again as pinhole-radtan, or as pinhole-equi for a wide lens, over the whole image");
   }
   if (fit.covered < kToldCovered) {
     warnings.push_back(
         place.where() +
-        fmt::format(": the {} lens folds back in {:.1f} % of the image; points there are of no "
-                    "use",
+        fmt::format(": the {} lens folds back in {:.1f} % of the image; points there are not usable",
                     source.name, 100 * (1 - fit.covered)));
   }
   return fit;

@@ -35,8 +35,9 @@ std::array<int, 2> sizeOf(const std::vector<YamlField>& files) {
   const auto width = find(files, std::array{"image_width", "image_Width"}, "");
   const auto height = find(files, std::array{"image_height", "image_Height"}, "");
   if (!width || !height) {
-    throw files.front().error("the size of the images is missing",
-                              "Add a line `image_size: [width, height]` with the size that was calibrated");
+    throw files.front().error(
+        "the image size is missing",
+        "Add a line `image_size: [width, height]` with the size of the calibrated images");
   }
   checkResolution(width->place(), width->number(), height->number());
   return {static_cast<int>(width->number()), static_cast<int>(height->number())};
@@ -63,10 +64,9 @@ LensFit storedLens(const YamlField& K_field, const YamlField& D_field, const std
     lens.name = "OpenCV";
     setBrown(D_field.place(), D, lens);
     if (D.size() == 4 && !find(files, std::array{"fisheye_model", "fisheye"}, "")) {
-      warnings.push_back(
-          D_field.where() +
-          ": four coefficients are taken as k1, k2, p1, p2; where cv::fisheye made them, add a line "
-          "`fisheye_model: 1`");
+      warnings.push_back(D_field.where() +
+                         ": four coefficients are read as k1, k2, p1, p2; if they come from cv::fisheye, add "
+                         "a line `fisheye_model: 1`");
     }
   }
   return acceptLens(K_field.place(), lens, warnings);
@@ -86,7 +86,8 @@ Calibration parseOpenCvCalibration(const std::vector<NamedText>& texts, const Na
   const auto add = [&](const std::optional<YamlField>& K, const std::optional<YamlField>& D) {
     if (!K) return;
     if (!D)
-      throw K->error("a camera matrix without distortion coefficients", "Give both, zeros for no distortion");
+      throw K->error("camera matrix without distortion coefficients",
+                     "Give both; use zeros for no distortion");
     CameraEntry entry;
     entry.lens = storedLens(*K, *D, files, warnings);
     entry.file = K->file();

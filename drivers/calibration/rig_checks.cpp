@@ -28,32 +28,30 @@ void checkPair(const std::vector<CameraEntry>& cameras, const CalibrationOptions
   const SE3 T_c1_c0_reversed = cameras[1].T_body_cam * cameras[0].T_body_cam.inverse();
   const Eigen::Vector3d& t = T_c1_c0.translation;
   const Eigen::Vector3d& reversed = T_c1_c0_reversed.translation;
-  const std::string place =
-      fmt::format("cam0 seen from cam1 at ({:.4f}, {:.4f}, {:.4f}) m", t.x(), t.y(), t.z());
+  const std::string place = fmt::format("cam0 at ({:.4f}, {:.4f}, {:.4f}) m in cam1", t.x(), t.y(), t.z());
   const CameraEntry& second = cameras[1];
   if (t.norm() < kMinBaseline) {
-    throw InputError(second.file, second.line, second.field, "both cameras sit in the same place",
+    throw InputError(second.file, second.line, second.field, "both cameras have the same position",
                      "Give each camera its own transform");
   }
   if (t.norm() > kMaxBaseline && !options.accept_unusual_rig) {
-    throw InputError(
-        second.file, second.line, second.field, fmt::format("a baseline of {:.3g} m", t.norm()),
-        "Translations are in metres: is this in millimetres, centimetres (OAK) or squares of the "
-        "board (OpenCV)? A baseline above 1 m needs calibration.accept_unusual_rig");
+    throw InputError(second.file, second.line, second.field, fmt::format("a baseline of {:.3g} m", t.norm()),
+                     "Translations are in metres: is this in millimetres, centimetres (OAK) or board squares "
+                     "(OpenCV)? A baseline above 1 m needs calibration.accept_unusual_rig");
   }
   if (!xIsLargest(t) && xIsLargest(reversed) && reversed.x() < 0 && !options.accept_unusual_rig) {
-    throw InputError(second.file, second.line, second.field,
-                     "looks like a transform written the wrong way round: as written, " + place +
-                         "; inverted, the cameras sit side by side",
-                     "EuRoC T_BS maps camera to body, Kalibr T_cam_imu maps IMU to camera: invert both "
-                     "matrices, or accept the unusual rig explicitly");
+    throw InputError(
+        second.file, second.line, second.field,
+        "looks like an inverted transform: as written, " + place + "; inverted, the cameras are side by side",
+        "EuRoC T_BS maps camera to body, Kalibr T_cam_imu maps IMU to camera: invert both matrices, or set "
+        "calibration.accept_unusual_rig");
   }
   const std::string where = fmt::format("{}:{}: {}", second.file, second.line, second.field);
   if (!xIsLargest(t)) {
-    warnings.push_back(where + ": the cameras do not sit side by side (" + place + ")");
+    warnings.push_back(where + ": the cameras are not side by side (" + place + ")");
   } else if (t.x() > 0) {
-    warnings.push_back(where + ": cam1 sits to the left of cam0 (" + place +
-                       "): swapped cameras, or a transform written the wrong way round?");
+    warnings.push_back(where + ": cam1 is to the left of cam0 (" + place +
+                       "): swapped cameras, or an inverted transform?");
   }
   const double angle = std::acos(std::clamp(T_c1_c0.R()(2, 2), -1.0, 1.0));
   if (angle > kMaxAxisAngle) {
@@ -73,8 +71,8 @@ void joinShifts(const std::vector<CameraEntry>& cameras, Calibration& calibratio
   if (count > 0) calibration.rig.camera_to_imu_shift = Duration::fromSeconds(sum / count);
   if (count == 2 && std::abs(*cameras[0].shift_s - *cameras[1].shift_s) > kMaxShiftDifference_s) {
     calibration.warnings.push_back(
-        fmt::format("{}: timeshift_cam_imu of the cameras differs by {:.3f} ms; their mean is used. Are they "
-                    "triggered together?",
+        fmt::format("{}: timeshift_cam_imu of the cameras differs by {:.3f} ms; the mean is used. Check that "
+                    "they are triggered together",
                     cameras[1].file, 1e3 * std::abs(*cameras[0].shift_s - *cameras[1].shift_s)));
   }
 }
@@ -85,10 +83,10 @@ void joinReadouts(const std::vector<CameraEntry>& cameras, Rig& rig) {
   if (rig.camera_count < 2) return;
   const double difference = std::abs(cameras[0].readout_s - cameras[1].readout_s);
   if (difference <= kMaxReadoutDifference_s) return;
-  throw InputError(
-      cameras[1].file, 0, "readout_ms",
-      fmt::format("{:g} ms, camera 0 has {:g} ms", 1e3 * cameras[1].readout_s, 1e3 * cameras[0].readout_s),
-      "Both cameras must read their rows alike: the same shutter and readout_ms");
+  throw InputError(cameras[1].file, 0, "readout_ms",
+                   fmt::format("{:g} ms, but {:g} ms for camera 0", 1e3 * cameras[1].readout_s,
+                               1e3 * cameras[0].readout_s),
+                   "Use the same shutter and readout_ms for both cameras");
 }
 
 }  // namespace

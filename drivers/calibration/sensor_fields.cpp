@@ -22,7 +22,7 @@ constexpr double kLastRowTolerance = 1e-9;
 constexpr double kMaxLever = 10;   // m; a rig is smaller, so more means millimetres
 constexpr double kUsualLever = 1;  // m; OAK's centimetres have some 7
 constexpr const char* kMetres =
-    "Translations are in metres: is this in millimetres, centimetres (OAK) or squares of the board (OpenCV)?";
+    "Translations are in metres: is this in millimetres, centimetres (OAK) or board squares (OpenCV)?";
 constexpr double kShiftWarn_s = 0.1;
 constexpr double kShiftRefuse_s = 1.0;
 constexpr double kReadoutRefuse_s = 0.2;  // the slowest phone takes 61 ms
@@ -44,7 +44,7 @@ void checkLastRow(const YamlField& field, const Eigen::Matrix4d& T) {
   const Eigen::RowVector4d expected(0, 0, 0, 1);
   if ((T.row(3) - expected).cwiseAbs().maxCoeff() <= kLastRowTolerance) return;
   if ((T.col(3) - expected.transpose()).cwiseAbs().maxCoeff() <= kLastRowTolerance) {
-    throw field.error("the last column is 0 0 0 1: the matrix is written column by column",
+    throw field.error("the last column is 0 0 0 1: the matrix is stored by columns",
                       "Transpose it: rows first, translation in the last column");
   }
   throw field.error("the last row is not 0 0 0 1", "Write a rigid transform [R t; 0 0 0 1], row by row");
@@ -73,7 +73,7 @@ double readPositive(const YamlField& imu, const std::string& key) {
   if (value <= 0) {
     throw field.error(
         fmt::format("{} is not positive", value),
-        "A noise figure of zero makes the filter trust the IMU without limit; give the real one");
+        "A noise density of zero makes the filter trust the IMU without limit; give the actual one");
   }
   return value;
 }
@@ -81,9 +81,10 @@ double readPositive(const YamlField& imu, const std::string& key) {
 void warnOutside(const YamlField& field, double value, double low, double high, const char* unit,
                  Warnings& warnings) {
   if (value >= low && value <= high) return;
-  warnings.push_back(field.where() + fmt::format(": {} {} is outside {}..{}: is it in another unit, or per "
-                                                 "sample instead of per sqrt(Hz)?",
-                                                 value, unit, low, high));
+  warnings.push_back(
+      field.where() +
+      fmt::format(": {} {} is outside {}..{}: is it in another unit, or per sample instead of per sqrt(Hz)?",
+                  value, unit, low, high));
 }
 
 }  // namespace
@@ -106,7 +107,7 @@ std::vector<double> readMatrix(const YamlField& field, std::size_t rows, std::si
   std::vector<double> values = readNumbers(field);
   if (values.size() != rows * columns) {
     throw field.error(
-        fmt::format("{} numbers where a {}x{} matrix has {}", values.size(), rows, columns, rows * columns),
+        fmt::format("{} numbers, but a {}x{} matrix has {}", values.size(), rows, columns, rows * columns),
         fmt::format("Write {} rows of {} numbers", rows, columns));
   }
   return values;
@@ -117,7 +118,7 @@ Eigen::Vector4d readIntrinsics(const InputPlace& place, const Eigen::Matrix3d& K
     throw place.error("the camera is not calibrated", "Calibrate it; drivers send zeros until then");
   }
   if (std::abs(K(0, 1)) > kMaxSkew) {
-    throw place.error(fmt::format("a skew of {:g} px", K(0, 1)), "Calibrate with the skew held at zero");
+    throw place.error(fmt::format("a skew of {:g} px", K(0, 1)), "Calibrate with zero skew");
   }
   if (K(1, 0) != 0 || K(2, 0) != 0 || K(2, 1) != 0 || K(2, 2) != 1) {
     throw place.error("not a camera matrix", "Write fx 0 cx, 0 fy cy, 0 0 1, row by row");
@@ -136,11 +137,12 @@ SE3 checkedTransform(const InputPlace& place, const Eigen::Matrix3d& R, const Ei
                      Warnings& warnings) {
   const double defect = (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(defect <= kOrthonormalRefuse)) {
-    throw place.error(fmt::format("the rotation is not orthonormal (off by {:.2g})", defect),
+    throw place.error(fmt::format("the rotation is not orthonormal (deviation {:.2g})", defect),
                       "Give all digits of the calibration's result");
   }
   if (R.determinant() < 0) {
-    throw place.error("the rotation is a mirror (determinant -1)", "One axis has the wrong sign");
+    throw place.error("the rotation is a reflection (determinant -1)",
+                      "Correct the axis with the wrong sign");
   }
   if (t.cwiseAbs().maxCoeff() > kMaxLever) {
     throw place.error(fmt::format("the translation is {:.3g} m long", t.norm()), kMetres);
@@ -150,8 +152,9 @@ SE3 checkedTransform(const InputPlace& place, const Eigen::Matrix3d& R, const Ei
                        fmt::format(": the translation is {:.3g} m long. {}", t.norm(), kMetres));
   }
   if (defect > kOrthonormalWarn) {
-    warnings.push_back(place.where() +
-                       fmt::format(": the rotation is off orthonormal by {:.2g}; made orthonormal", defect));
+    warnings.push_back(
+        place.where() +
+        fmt::format(": the rotation deviates from orthonormal by {:.2g}; it was made orthonormal", defect));
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Eigen::Matrix3d nearest = svd.matrixU() * svd.matrixV().transpose();
@@ -161,23 +164,24 @@ SE3 checkedTransform(const InputPlace& place, const Eigen::Matrix3d& R, const Ei
 void checkResolution(const InputPlace& place, double width, double height) {
   for (const double side : {width, height}) {
     if (side >= kMinImageSide && side <= kMaxImageSide && side == std::floor(side)) continue;
-    throw place.error(fmt::format("{:g} x {:g} is no image size in whole pixels", width, height),
+    throw place.error(fmt::format("{:g} x {:g} is not an image size in whole pixels", width, height),
                       fmt::format("Give width and height, {} to {}", kMinImageSide, kMaxImageSide));
   }
 }
 
 void checkIntrinsics(const InputPlace& place, const Eigen::Vector4d& k, int width, int height,
                      Warnings& warnings) {
-  if (!(k[0] > 0 && k[1] > 0)) throw place.error("a focal length is not positive", "Order: fu, fv, cu, cv");
+  if (!(k[0] > 0 && k[1] > 0))
+    throw place.error("a focal length is not positive", "Use the order fu, fv, cu, cv");
   const double view = std::max(width, height) / std::min(k[0], k[1]);
   if (!(view < kWidestView && view > kNarrowestView)) {
     throw place.error(
         fmt::format("a focal length of {:g} for an image of {}x{}", std::min(k[0], k[1]), width, height),
-        "Focal lengths are in pixels: is this in millimetres, or a share of the width?");
+        "Focal lengths are in pixels: is this in millimetres, or a fraction of the width?");
   }
   if (k[2] > width && k[2] <= height) {
     throw place.error(fmt::format("cu {} lies outside a width of {}", k[2], width),
-                      "`resolution` is swapped: it is [width, height]");
+                      "`resolution` is swapped: write [width, height]");
   }
   if (k[2] < 0 || k[2] > width || k[3] < 0 || k[3] > height) {
     throw place.error(
@@ -185,17 +189,16 @@ void checkIntrinsics(const InputPlace& place, const Eigen::Vector4d& k, int widt
         "Give intrinsics and resolution of the same image size; order: fu, fv, cu, cv");
   }
   if (std::abs(k[2] - 0.5 * width) > 0.25 * width || std::abs(k[3] - 0.5 * height) > 0.25 * height) {
-    warnings.push_back(
-        place.where() +
-        fmt::format(": the principal point ({}, {}) is far from the centre of the {}x{} image. "
-                    "Were these intrinsics made at another resolution?",
-                    k[2], k[3], width, height));
+    warnings.push_back(place.where() +
+                       fmt::format(": the principal point ({}, {}) is far from the centre of the {}x{} "
+                                   "image. Check that the intrinsics are for this resolution",
+                                   k[2], k[3], width, height));
   }
 }
 
 std::array<int, 2> readResolution(const YamlField& field) {
   const std::vector<double> values = field.numbers();
-  if (values.size() != 2) throw field.error("not a [width, height]", "Write it as [752, 480]");
+  if (values.size() != 2) throw field.error("not of the form [width, height]", "Write it as [752, 480]");
   checkResolution(field.place(), values[0], values[1]);
   return {static_cast<int>(values[0]), static_cast<int>(values[1])};
 }
@@ -203,8 +206,9 @@ std::array<int, 2> readResolution(const YamlField& field) {
 void setBrown(const InputPlace& place, const std::vector<double>& values, SourceLens& lens) {
   constexpr std::array<std::size_t, 6> kCounts = {0, 4, 5, 8, 12, 14};
   if (std::find(kCounts.begin(), kCounts.end(), values.size()) == kCounts.end()) {
-    throw place.error(fmt::format("{} numbers where 4, 5, 8, 12 or 14 are expected", values.size()),
-                      "Give k1, k2, p1, p2 and as many of k3, k4..k6, s1..s4, tau_x, tau_y as the model has");
+    throw place.error(
+        fmt::format("{} numbers, expected 4, 5, 8, 12 or 14", values.size()),
+        "Give k1, k2, p1, p2 and the model's further coefficients k3, k4..k6, s1..s4, tau_x, tau_y");
   }
   lens.family = LensFamily::kBrown;
   std::copy(values.begin(), values.end(), lens.distortion.begin());
@@ -212,7 +216,7 @@ void setBrown(const InputPlace& place, const std::vector<double>& values, Source
 
 void setEquidistant(const InputPlace& place, const std::vector<double>& values, SourceLens& lens) {
   if (values.size() != 4) {
-    throw place.error(fmt::format("{} numbers where 4 are expected", values.size()), "Give k1..k4");
+    throw place.error(fmt::format("{} numbers, expected 4", values.size()), "Give k1..k4");
   }
   lens.family = LensFamily::kEquidistant;
   std::copy(values.begin(), values.end(), lens.distortion.begin());
@@ -250,7 +254,7 @@ LensFit readLens(const YamlField& camera, const std::string& coefficients_key, W
   const YamlField intrinsics = camera.at("intrinsics", fmt::format("Write it as [{}]", kOrder[shape]));
   const std::vector<double> numbers = intrinsics.numbers();
   if (numbers.size() != shape + 4) {
-    throw intrinsics.error(fmt::format("{} numbers where {} are expected", numbers.size(), shape + 4),
+    throw intrinsics.error(fmt::format("{} numbers, expected {}", numbers.size(), shape + 4),
                            fmt::format("Give {}", kOrder[shape]));
   }
   std::copy_n(numbers.begin(), shape, lens.shape.begin());
@@ -311,7 +315,7 @@ double readReadout(const YamlField& camera) {
     const YamlField field = camera.at("shutter");
     const std::string shutter = field.text();
     if (shutter != "global" && shutter != "rolling") {
-      throw field.error("`" + shutter + "` is no shutter", "Write global or rolling");
+      throw field.error("`" + shutter + "` is not a shutter type", "Write global or rolling");
     }
     rolls = shutter == "rolling";
   }
@@ -321,7 +325,7 @@ double readReadout(const YamlField& camera) {
   const double readout_s = kFromMs * field.number();
   if (!(readout_s > 0 && readout_s <= kReadoutRefuse_s)) {
     throw field.error(fmt::format("a readout of {} ms", field.number()),
-                      "Give the milliseconds from the first row to the last: 5 to 60 are usual");
+                      "Give the milliseconds from the first row to the last, usually 5 to 60");
   }
   return readout_s;
 }

@@ -28,7 +28,7 @@ void refuseDeepNesting(const std::string& file, std::string_view text) {
     if (c == '[' || c == '{') ++depth;
     if (c == ']' || c == '}') depth = std::max(0, depth - 1);
     if (depth > kMaxNesting) {
-      throw InputError(file, line, "", "brackets nested too deep", "This is not a calibration file");
+      throw InputError(file, line, "", "brackets are nested too deep", "This is not a calibration file");
     }
   }
 }
@@ -40,8 +40,8 @@ YamlField YamlField::parse(const std::string& file, std::string_view text) {
     throw InputError(file, 0, "", "larger than 1 MiB", "This is not a calibration file");
   }
   if (text.starts_with("<?xml")) {
-    throw InputError(file, 1, "", "an XML file",
-                     "OpenCV writes the same as YAML where the file's name ends in .yml");
+    throw InputError(file, 1, "", "is an XML file",
+                     "Save it with OpenCV under a name that ends in .yml, which writes YAML");
   }
   refuseDeepNesting(file, text);
   try {
@@ -53,7 +53,7 @@ YamlField YamlField::parse(const std::string& file, std::string_view text) {
     return {std::make_shared<const std::string>(file), "", root, 1};
   } catch (const YAML::Exception& error) {
     throw InputError(file, lineOf(error.mark), "", "not valid YAML (" + error.msg + ")",
-                     "Compare the line with a file that the calibration tool wrote");
+                     "Compare the line with a file written by the calibration tool");
   }
 }
 
@@ -71,7 +71,7 @@ YamlField YamlField::at(const std::string& key, const std::string& remedy) const
 }
 
 std::vector<YamlField> YamlField::items() const {
-  if (!node_.IsSequence()) throw error("a list is expected here", "Write it as [a, b, ...]");
+  if (!node_.IsSequence()) throw error("expected a list", "Write it as [a, b, ...]");
   std::vector<YamlField> out;
   out.reserve(node_.size());
   for (std::size_t i = 0; i < node_.size(); ++i) {
@@ -83,7 +83,7 @@ std::vector<YamlField> YamlField::items() const {
 }
 
 std::string YamlField::text() const {
-  if (!node_.IsScalar()) throw error("one word is expected here", "Write it as `key: value`");
+  if (!node_.IsScalar()) throw error("expected a single word", "Write it as `key: value`");
   return node_.Scalar();
 }
 
@@ -95,7 +95,7 @@ double YamlField::number() const {
   double value = 0;
   const auto [end, code] = std::from_chars(first, last, value);
   if (code != std::errc{} || end != last || !std::isfinite(value)) {
-    throw error("`" + scalar + "` is not a finite number", "Write a decimal number, like 1.5e-3");
+    throw error("`" + scalar + "` is not a finite number", "Write a decimal number, for example 1.5e-3");
   }
   return value;
 }

@@ -84,7 +84,7 @@ DeviceFault CanBus::interfaceFault(int error) const {
   switch (error) {
     case ENODEV:
       return deviceFault(DeviceFaultKind::kMissing, 0,
-                         "no network interface %s: `ip -br link` lists what there is", name);
+                         "no network interface %s: `ip -br link` lists the available ones", name);
     case ENETDOWN:
       return deviceFault(DeviceFaultKind::kDown, 0, "`ip link set %s up%s`", name,
                          virtual_bus ? "" : " type can bitrate 1000000 restart-ms 100");
@@ -139,8 +139,8 @@ DeviceFault CanBus::setUp() {
   takes_fd_ = ::ioctl(fd_, SIOCGIFMTU, &request) == 0 && request.ifr_mtu >= static_cast<int>(CANFD_MTU);
   if (settings_.fd && !takes_fd_) {
     return deviceFault(DeviceFaultKind::kUnsupported, 0,
-                       "classic frames only: `ip link set %s down`, then `ip link set %s up type can bitrate "
-                       "1000000 dbitrate 4000000 fd on restart-ms 100`",
+                       "supports classic frames only: `ip link set %s down`, then `ip link set %s up type "
+                       "can bitrate 1000000 dbitrate 4000000 fd on restart-ms 100`",
                        settings_.interface.data(), settings_.interface.data());
   }
 
@@ -171,7 +171,7 @@ DeviceFault CanBus::setUp() {
   ::getsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &receive_buffer_, &size);
   if (receive_buffer_ < settings_.receive_buffer / 4) {
     warning_ = deviceFault(DeviceFaultKind::kChanged, 0,
-                           "receive buffer: asked %d KiB, given %d KiB; `sysctl -w net.core.rmem_max=%d`",
+                           "receive buffer: requested %d KiB, got %d KiB; `sysctl -w net.core.rmem_max=%d`",
                            settings_.receive_buffer >> 10, receive_buffer_ >> 10, settings_.receive_buffer);
   }
   if (::bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
@@ -213,7 +213,8 @@ DeviceFault CanBus::standing() {
 
 DeviceFault CanBus::next(std::optional<CanFrame>& frame) {
   frame.reset();
-  if (!isOpen()) return deviceFault(DeviceFaultKind::kUnplugged, 0, "closed; waiting for it to come back");
+  if (!isOpen())
+    return deviceFault(DeviceFaultKind::kUnplugged, 0, "closed; waiting for the device to return");
   for (int i = 0; i < kErrorFramesPerCall; ++i) {
     canfd_frame raw = {};
     iovec place = {&raw, sizeof(raw)};
@@ -279,8 +280,9 @@ DeviceFault CanBus::send(const CanFrame& frame) {
   raw.len = frame.size;
   raw.flags = frame.fast_data ? CANFD_BRS : 0;
   if (frame.size > (frame.fd ? CANFD_MAX_DLEN : CAN_MAX_DLEN) || (frame.fd && !takes_fd_)) {
-    return deviceFault(DeviceFaultKind::kUnsupported, 0, "%s frames of %u bytes cannot be sent here",
-                       frame.fd ? "FD" : "classic", frame.size);
+    return deviceFault(DeviceFaultKind::kUnsupported, 0,
+                       "%s frames of %u bytes cannot be sent on this interface", frame.fd ? "FD" : "classic",
+                       frame.size);
   }
   std::copy_n(frame.data.begin(), frame.size, raw.data);
   // Both kinds begin alike; the length tells them apart.

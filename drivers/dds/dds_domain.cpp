@@ -121,13 +121,13 @@ std::shared_ptr<DdsDomain> DdsDomain::open(const DdsNetwork& network, std::strin
   made->domain_ = dds_create_domain(network.domain, configuration(network).c_str());
   if (made->domain_ < 0) {
     return failed("DDS domain " + number + " cannot be opened on the network interface " + network.interface +
-                      ": it has to be up and have an address",
+                      ": it must be up and have an address",
                   made->domain_);
   }
   made->participant_ = dds_create_participant(network.domain, nullptr, nullptr);
   if (made->participant_ < 0) {
     return failed("DDS cannot take part in domain " + number + " on the network interface " +
-                      network.interface + ": 32 programs at most do on one computer",
+                      network.interface + ": at most 32 programs per computer are supported",
                   made->participant_);
   }
   place = made;

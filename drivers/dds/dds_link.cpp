@@ -170,7 +170,7 @@ bool DdsLink::open(const DdsSettings& settings) {
   };
   if (settings.prefix.empty() || settings.prefix.front() != '/' ||
       (!settings.label_topic.empty() && settings.label_topic.front() != '/')) {
-    return failed("a topic of ROS begins with /");
+    return failed("a ROS topic name starts with /");
   }
   e.domain = DdsDomain::open(settings, error_);
   if (!e.domain) {
@@ -189,7 +189,7 @@ bool DdsLink::open(const DdsSettings& settings) {
   }
   for (const dds_entity_t made :
        {e.odometry, e.transforms, e.mesh, e.cloud, e.obstacle, e.diagnostics, e.labels, e.image}) {
-    if (made < 0) return failed("a DDS topic cannot be made", made);
+    if (made < 0) return failed("cannot create a DDS topic", made);
   }
   return true;
 }

@@ -33,29 +33,30 @@ void copyInto(std::array<char, kSize>& to, std::string_view from) {
 
 DeviceFault rawImageOf(const TopicImage& message, int width, int height, RawImage& image) {
   if (message.compressed) {
-    if (message.data.empty()) return deviceFault(DeviceFaultKind::kGarbage, 0, "its pictures are empty");
+    if (message.data.empty()) return deviceFault(DeviceFaultKind::kGarbage, 0, "its images are empty");
     image = {message.data.data(), width, height, 0, kPicture, 0, message.data.size()};
     return {};
   }
   const int length = static_cast<int>(std::min<std::size_t>(message.encoding.size(), 32));
   const std::optional<PixelFormat> format = rosEncoding(message.encoding, message.big_endian);
   if (!format) {
-    return deviceFault(DeviceFaultKind::kUnsupported, 0, "its encoding is `%.*s`; docs/ros2.md lists others",
-                       length, message.encoding.data());
+    return deviceFault(DeviceFaultKind::kUnsupported, 0,
+                       "its encoding is `%.*s`; docs/ros2.md lists the supported ones", length,
+                       message.encoding.data());
   }
   if (message.width != static_cast<std::uint32_t>(width) ||
       message.height != static_cast<std::uint32_t>(height)) {
-    return deviceFault(DeviceFaultKind::kUnsupported, 0, "%ux%u, and the calibration is of %dx%d",
+    return deviceFault(DeviceFaultKind::kUnsupported, 0, "%ux%u, but the calibration is for %dx%d",
                        message.width, message.height, width, height);
   }
   const auto row = static_cast<std::uint32_t>(format->rowBytes(width));
   if (message.step < row || message.step > static_cast<std::uint32_t>(kLargestMessage)) {
-    return deviceFault(DeviceFaultKind::kGarbage, 0, "a step of %u bytes, a row of `%.*s` has %u",
+    return deviceFault(DeviceFaultKind::kGarbage, 0, "a step of %u bytes, but a row of `%.*s` has %u",
                        message.step, length, message.encoding.data(), row);
   }
   const std::uint64_t needed = static_cast<std::uint64_t>(message.step) * (message.height - 1) + row;
   if (message.data.size() < needed) {
-    return deviceFault(DeviceFaultKind::kLossy, 0, "%zu bytes of data, %llu wanted", message.data.size(),
+    return deviceFault(DeviceFaultKind::kLossy, 0, "%zu bytes of data, expected %llu", message.data.size(),
                        static_cast<unsigned long long>(needed));
   }
   image = {message.data.data(), width, height, static_cast<int>(message.step), *format};
@@ -120,7 +121,7 @@ DeviceFault TopicCamera::waitForImage(Duration patience) {
   if (!last.ok()) return last;
   const int publishers = reader_.publishers();
   if (publishers > 0) {
-    return deviceFault(DeviceFaultKind::kSilent, 0, "%d publishers of %s, and no image", publishers,
+    return deviceFault(DeviceFaultKind::kSilent, 0, "%d publishers of %s, but no image", publishers,
                        settings_.topic.c_str());
   }
   return deviceFault(DeviceFaultKind::kMissing, 0, "%s",
@@ -136,14 +137,14 @@ DeviceFault TopicCamera::checkPicture(const RawImage& image) const {
     case DecodeResult::kOk:
       return {};
     case DecodeResult::kUnknownFormat:
-      return deviceFault(DeviceFaultKind::kUnsupported, 0, "its pictures are neither JPEG nor PNG");
+      return deviceFault(DeviceFaultKind::kUnsupported, 0, "its images are neither JPEG nor PNG");
     case DecodeResult::kWrongSize:
-      return deviceFault(DeviceFaultKind::kUnsupported, 0, "%dx%d, and the calibration is of %dx%d",
+      return deviceFault(DeviceFaultKind::kUnsupported, 0, "%dx%d, but the calibration is for %dx%d",
                          found.width, found.height, image.width, image.height);
     case DecodeResult::kDamaged:
       break;
   }
-  return deviceFault(DeviceFaultKind::kGarbage, 0, "its pictures are damaged");
+  return deviceFault(DeviceFaultKind::kGarbage, 0, "its images are damaged");
 }
 
 void TopicCamera::close() {
@@ -172,7 +173,7 @@ bool TopicCamera::takeMessage(RawImage& image, Stamp& stamp, Stamp& arrival, Dev
         continue;
       case WallStamps::Result::kWrongClock:
         ++counters_.wrong_clock;
-        fault = deviceFault(DeviceFaultKind::kWrongClock, 0, "stamps %.3f s before their arrival",
+        fault = deviceFault(DeviceFaultKind::kWrongClock, 0, "stamps are %.3f s before their arrival",
                             stamps_.farBy().seconds());
         return true;
     }
@@ -195,14 +196,14 @@ bool TopicCamera::takeMessage(RawImage& image, Stamp& stamp, Stamp& arrival, Dev
 
 DeviceFault TopicCamera::next(CapturedFrame& frame) {
   frame.release();
-  if (!open_) return deviceFault(DeviceFaultKind::kUnplugged, 0, "closed; waiting for it to come back");
+  if (!open_) return deviceFault(DeviceFaultKind::kUnplugged, 0, "closed; waiting for the device to return");
   if (lent_) return {};
   DeviceFault fault;
   for (int i = 0; i < kMostLeftOut; ++i) {
     if (!takeMessage(frame.image, frame.stamp, frame.arrival, fault)) break;
     if (fault.ok() &&
         !(frame.image.format == facts_.format && frame.image.format.layout == facts_.format.layout)) {
-      fault = deviceFault(DeviceFaultKind::kChanged, 0, "its images came as %s and come as %s",
+      fault = deviceFault(DeviceFaultKind::kChanged, 0, "its images changed from %s to %s",
                           facts_.format.letters.data(), frame.image.format.letters.data());
       bad_ = kMostBad;
     }

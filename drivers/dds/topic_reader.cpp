@@ -95,7 +95,7 @@ TopicReader::~TopicReader() = default;
 bool TopicReader::open(std::shared_ptr<DdsDomain> domain, TopicType type, const std::string& name,
                        const TopicBell& bell, std::string& error) {
   if (name.empty() || name.front() != '/') {
-    error = "a topic of ROS begins with /, not as '" + name + "'";
+    error = "a ROS topic name starts with /, unlike '" + name + "'";
     return false;
   }
   auto made = std::make_unique<Entities>();

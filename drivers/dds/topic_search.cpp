@@ -29,7 +29,7 @@ std::string missingTopic(std::span<const PublishedTopic> published, std::string_
   std::vector<std::pair<std::size_t, std::string_view>> near;
   for (const PublishedTopic& topic : published) {
     if (topic.name == name) {
-      return std::string(name) + " is a " + topic.type + ", wanted is a " + std::string(type);
+      return std::string(name) + " is a " + topic.type + ", expected a " + std::string(type);
     }
     if (topic.type == type) near.emplace_back(editDistance(topic.name, name), topic.name);
   }

@@ -20,37 +20,37 @@ Words words(DeviceFaultKind kind) {
     case DeviceFaultKind::kMissing:
       return {"not there", "connect it, or correct its name in the vehicle settings"};
     case DeviceFaultKind::kNoRights:
-      return {"this user may not open it",
-              "join the group that owns it (`ls -l` on its node says which), then log in again"};
+      return {"no permission to open it",
+              "join the group that owns it (`ls -l` on its node shows it), then log in again"};
     case DeviceFaultKind::kBusy:
-      return {"held by another program", "end that program: `fuser -v` on its node names it"};
+      return {"held by another program", "close that program: `fuser -v` on its node names it"};
     case DeviceFaultKind::kWrongDevice:
-      return {"not the device that the settings take it for", "correct its name in the vehicle settings"};
+      return {"not the kind of device that the settings expect", "correct its name in the vehicle settings"};
     case DeviceFaultKind::kUnsupported:
-      return {"does not offer what is asked", "ask for something that it offers"};
+      return {"does not support the requested setting", "request a supported value"};
     case DeviceFaultKind::kChanged:
-      return {"made something else of a setting", "set what it can do in the vehicle settings"};
+      return {"changed a requested setting", "use a supported value in the vehicle settings"};
     case DeviceFaultKind::kDown:
       return {"down", "bring it up"};
     case DeviceFaultKind::kUnplugged:
-      return {"gone", "connect it again: it is taken up by itself"};
+      return {"gone", "connect it again: it is reopened automatically"};
     case DeviceFaultKind::kSilent:
-      return {"sends nothing", "check its power, its wires and that its output is switched on"};
+      return {"sends nothing", "check its power, its wires and that its output is enabled"};
     case DeviceFaultKind::kGarbage:
-      return {"sends something else", "check the baud rate and the protocol in the vehicle settings"};
+      return {"sends unexpected data", "check the baud rate and the protocol in the vehicle settings"};
     case DeviceFaultKind::kFailed:
-      return {"failed", "unplug it and plug it in again; the kernel's log (`dmesg`) may say more"};
+      return {"failed", "unplug it and plug it in again; the kernel log (`dmesg`) may show the reason"};
     case DeviceFaultKind::kLossy:
-      return {"part of it is lost", "check its cable, and the load of its bus and of this computer"};
+      return {"loses data", "check its cable, and the load of its bus and of this computer"};
     case DeviceFaultKind::kNoisy:
       return {"sends too much", "check the wire's ground, shield and pull resistor"};
     case DeviceFaultKind::kClockJumped:
-      return {"its clock jumped", "check its power supply: a sensor that restarts does this"};
+      return {"its clock jumped", "check its power supply: a restart of the sensor causes this"};
     case DeviceFaultKind::kWrongClock:
-      return {"its stamps are of another clock",
-              "set the clock of the computer that stamps by NTP or PTP; `swiftlet replay` reads bags"};
+      return {"its stamps come from another clock",
+              "synchronize the clock of the stamping computer by NTP or PTP; `swiftlet replay` reads bags"};
     case DeviceFaultKind::kClockSet:
-      return {"the wall clock, by which it stamps, was set", "let NTP set it before the flight"};
+      return {"the wall clock of its stamps was set", "let NTP set it before the flight"};
     case DeviceFaultKind::kDark:
       return {"sees nothing", "check the lens cap, the light, exposure and gain"};
     case DeviceFaultKind::kFrozen:

@@ -22,11 +22,11 @@ constexpr const char* kConsumer = "swiftlet";
 DeviceFault requestFault(int error, const GpioLine& line) {
   if (error == EBUSY) {
     return deviceFault(DeviceFaultKind::kBusy, error, "line %u is held by %s", line.offset,
-                       line.consumer.empty() ? "someone unnamed" : line.consumer.c_str());
+                       line.consumer.empty() ? "an unnamed user" : line.consumer.c_str());
   }
   if (error == ENXIO || error == EOPNOTSUPP) {
-    return deviceFault(DeviceFaultKind::kUnsupported, error, "line %u cannot interrupt: take another",
-                       line.offset);
+    return deviceFault(DeviceFaultKind::kUnsupported, error,
+                       "line %u does not support interrupts: use another line", line.offset);
   }
   if (error == ENODEV) return deviceFault(DeviceFaultKind::kUnplugged, error, "line %u", line.offset);
   return openFault(error, "asking for the edges of line " + std::to_string(line.offset));
@@ -85,7 +85,7 @@ DeviceFault EdgeSource::openKernel(int chip, std::uint32_t offset, const EdgeSou
   if (flags < 0 || fcntl(fd_, F_SETFL, flags | O_NONBLOCK) != 0) {
     const int error = errno;
     close();
-    return deviceFault(DeviceFaultKind::kFailed, error, "making the line's events not wait");
+    return deviceFault(DeviceFaultKind::kFailed, error, "making the line's events non-blocking");
   }
   return {};
 }
@@ -94,7 +94,7 @@ DeviceFault EdgeSource::gone() const {
   // Nothing to read, and nothing ever again: older kernels say so here only.
   pollfd p{fd_, POLLIN, 0};
   if (poll(&p, 1, 0) > 0 && (p.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) {
-    return deviceFault(DeviceFaultKind::kUnplugged, ENODEV, "the GPIO chip went");
+    return deviceFault(DeviceFaultKind::kUnplugged, ENODEV, "the GPIO chip was removed");
   }
   return {};
 }

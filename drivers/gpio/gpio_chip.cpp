@@ -54,7 +54,7 @@ DeviceFault GpioChip::openPath(const std::string& path) {
     const int error = errno;
     close();
     if (error == ENODEV) return deviceFault(DeviceFaultKind::kUnplugged, error, "%s", path.c_str());
-    return deviceFault(DeviceFaultKind::kWrongDevice, error, "%s is no GPIO chip", path.c_str());
+    return deviceFault(DeviceFaultKind::kWrongDevice, error, "%s is not a GPIO chip", path.c_str());
   }
   path_ = path;
   name_ = fieldText(info.name);
@@ -77,7 +77,7 @@ DeviceFault GpioChip::open(const std::string& which) {
   close();
   // The one that is meant may be among those that this user may not open.
   if (!refused.ok()) return refused;
-  return deviceFault(DeviceFaultKind::kMissing, 0, "no GPIO chip is named '%s'; there are: %s", which.c_str(),
+  return deviceFault(DeviceFaultKind::kMissing, 0, "no GPIO chip is named '%s'; available: %s", which.c_str(),
                      offers.empty() ? "none" : offers.c_str());
 }
 
@@ -108,8 +108,7 @@ DeviceFault GpioChip::findLine(const std::string& which, GpioLine& out) const {
     if (!fault.ok()) return fault;
     if (!which.empty() && out.name == which) return {};
   }
-  return deviceFault(DeviceFaultKind::kMissing, 0, "no line of %s is named '%s'", name_.c_str(),
-                     which.c_str());
+  return deviceFault(DeviceFaultKind::kMissing, 0, "%s has no line named '%s'", name_.c_str(), which.c_str());
 }
 
 std::vector<GpioChipListing> listGpioChips() {

@@ -75,7 +75,7 @@ DeviceFault EdgeSource::readLibgpiod(std::span<EdgeEvent> out, std::size_t& coun
       const Stamp stamp = {nanoseconds(e.ts)};
       if (inRealtime(stamp)) {
         return deviceFault(DeviceFaultKind::kUnsupported, 0,
-                           "this kernel stamps edges in real time: 5.7 or newer");
+                           "this kernel stamps edges in real time: use 5.7 or newer");
       }
       out[count++] = {stamp, e.event_type == GPIOD_LINE_EVENT_RISING_EDGE, std::nullopt};
     }

@@ -79,17 +79,18 @@ DeviceFault PipelineSource::Pipeline::readCaps(GstSample* sample, const Pipeline
   if (given == caps) return {};
   gst_caps_replace(&caps, given);
   if (given == nullptr || gst_video_info_from_caps(&info, given) == FALSE) {
-    return deviceFault(DeviceFaultKind::kUnsupported, 0, "its buffers do not say what they hold");
+    return deviceFault(DeviceFaultKind::kUnsupported, 0, "its buffers do not specify their content");
   }
   const char* name = gst_video_format_to_string(GST_VIDEO_INFO_FORMAT(&info));
   const std::optional<PixelFormat> taken = pixelFormatOf(GST_VIDEO_INFO_FORMAT(&info));
   if (!taken) {
-    return deviceFault(DeviceFaultKind::kUnsupported, 0, "%s is not taken: end it with `videoconvert`", name);
+    return deviceFault(DeviceFaultKind::kUnsupported, 0,
+                       "%s is not supported: end the pipeline with `videoconvert`", name);
   }
   format = *taken;
   if (GST_VIDEO_INFO_WIDTH(&info) != settings.width || GST_VIDEO_INFO_HEIGHT(&info) != settings.height) {
     return deviceFault(DeviceFaultKind::kChanged, 0,
-                       "the calibration has %dx%d, the pipeline gives %dx%d %s: calibrate at that size",
+                       "the calibration is for %dx%d, the pipeline delivers %dx%d %s: calibrate at that size",
                        settings.width, settings.height, GST_VIDEO_INFO_WIDTH(&info),
                        GST_VIDEO_INFO_HEIGHT(&info), name);
   }
@@ -98,8 +99,8 @@ DeviceFault PipelineSource::Pipeline::readCaps(GstSample* sample, const Pipeline
   }
   const double rate = info.fps_n > 0 ? static_cast<double>(info.fps_n) / info.fps_d : 0;
   if (rate > 0 && settings.rate > 0 && std::abs(rate - settings.rate) > kRateTolerance * settings.rate) {
-    return deviceFault(DeviceFaultKind::kChanged, 0, "asked %.4g frames a second, the pipeline gives %.4g",
-                       settings.rate, rate);
+    return deviceFault(DeviceFaultKind::kChanged, 0,
+                       "requested %.4g frames per second, the pipeline delivers %.4g", settings.rate, rate);
   }
   return {};
 }
@@ -148,7 +149,7 @@ DeviceFault PipelineSource::open() {
   if (!captured) {
     warn(deviceFault(
         DeviceFaultKind::kUnsupported, 0,
-        "its images have no times of capture: their times of arrival are used, which jitter and are late"));
+        "its images have no capture times: their arrival times are used, which are late and jitter"));
   }
   if (opened_) ++counters_.reopened;
   opened_ = true;
@@ -171,7 +172,7 @@ DeviceFault PipelineSource::closedBy(const DeviceFault& fault) {
 
 DeviceFault PipelineSource::next(CapturedFrame& frame) {
   frame.release();
-  if (!open_) return deviceFault(DeviceFaultKind::kUnplugged, 0, "closed; waiting for it to come back");
+  if (!open_) return deviceFault(DeviceFaultKind::kUnplugged, 0, "closed; waiting for the device to return");
   Pipeline& p = *pipeline_;
   auto* const free = std::ranges::find(p.lent, nullptr, &Pipeline::Lent::sample);
   if (free == p.lent.end()) return {};

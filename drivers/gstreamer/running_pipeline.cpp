@@ -99,7 +99,7 @@ void RunningPipeline::dispose(std::unique_ptr<RunningPipeline> pipeline) {
 DeviceFault RunningPipeline::start(Duration patience) {
   if (!startKeeper()) return deviceFault(DeviceFaultKind::kFailed, errno, "to make a thread");
   if (!awaitEndOf(Phase::kStopping, patience)) {
-    return deviceFault(DeviceFaultKind::kBusy, 0, "the pipeline of before does not stop");
+    return deviceFault(DeviceFaultKind::kBusy, 0, "the previous pipeline does not stop");
   }
   if (phase_.load() == Phase::kIdle) tellKeeper(Phase::kStarting);
   if (!awaitEndOf(Phase::kStarting, patience)) {
@@ -318,8 +318,9 @@ DeviceFault RunningPipeline::faultOf(GstMessage* message) const {
     GstPad* pad = gst_element_get_static_pad(sink_, "sink");
     GstCaps* given = gst_pad_peer_query_caps(pad, nullptr);
     char* text = given == nullptr ? nullptr : gst_caps_to_string(given);
-    fault = deviceFault(DeviceFaultKind::kUnsupported, 0, "end it with `videoconvert`; it gives %.*s",
-                        kOfferBytes, text == nullptr ? "nothing" : text);
+    fault = deviceFault(DeviceFaultKind::kUnsupported, 0,
+                        "end the pipeline with `videoconvert`; it delivers %.*s", kOfferBytes,
+                        text == nullptr ? "nothing" : text);
     g_free(text);
     gst_clear_caps(&given);
     gst_object_unref(pad);

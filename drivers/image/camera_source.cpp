@@ -25,7 +25,7 @@ void CapturedFrame::release() {
 }
 
 DeviceFault CameraSource::setExposure(const ExposureSetting& /*setting*/) {
-  return deviceFault(DeviceFaultKind::kUnsupported, 0, "no exposure time to set");
+  return deviceFault(DeviceFaultKind::kUnsupported, 0, "the exposure time cannot be set");
 }
 
 void CameraSource::lend(CapturedFrame& frame, std::uint32_t buffer) {

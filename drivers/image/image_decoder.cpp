@@ -24,7 +24,7 @@ struct PngInput {
 
 void readPngBytes(png_structp png, png_bytep out, png_size_t count) {
   auto* input = static_cast<PngInput*>(png_get_io_ptr(png));
-  if (count > input->left) png_error(png, "ends early");
+  if (count > input->left) png_error(png, "is truncated");
   std::memcpy(out, input->next, count);
   input->next += count;
   input->left -= count;

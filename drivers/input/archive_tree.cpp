@@ -83,7 +83,8 @@ ArchiveTree::ArchiveTree(const std::string& path) : FileTree(path), path_(path) 
 ArchiveTree::Handle ArchiveTree::open() const {
   Handle handle(newReader());
   if (archive_read_open_filename(handle.get(), path_.c_str(), kBlock) < ARCHIVE_WARN) {
-    throw InputError(path_, 0, "", std::string("is no archive: ") + archive_error_string(handle.get()), "");
+    throw InputError(path_, 0, "", std::string("is not an archive: ") + archive_error_string(handle.get()),
+                     "");
   }
   return handle;
 }
@@ -110,7 +111,7 @@ void ArchiveTree::index() {
       throw InputError(
           path_, 0, "",
           "is damaged after " + std::to_string(number) + " entries: " + archive_error_string(handle.get()),
-          "Fetch it again, or unpack what is left of it and give the folder");
+          "Download it again, or unpack what is left of it and give the folder");
     }
     const std::string path = plainPath(pathOf(entry));
     if (path.empty() || archive_entry_filetype(entry) != AE_IFREG) continue;
@@ -124,11 +125,11 @@ void ArchiveTree::index() {
       const char* reason = archive_error_string(handle.get());
       throw InputError(name(path), 0, "",
                        std::string("cannot be unpacked: ") + (reason == nullptr ? "too large" : reason),
-                       "Fetch the archive again; one with a password has to be unpacked first");
+                       "Download the archive again; unpack it first if it has a password");
     }
     text += bytes.size();
     if (text > kMostText) {
-      throw InputError(path_, 0, "", "holds more than 1 GiB beside its pictures",
+      throw InputError(path_, 0, "", "holds more than 1 GiB besides its images",
                        "Unpack it and give the folder");
     }
     texts_.emplace(number, std::move(bytes));

@@ -51,11 +51,11 @@ std::string unpackXz(const std::string& name, std::string_view packed, std::size
     text.append(buffer.data(), buffer.size() - stream.avail_out);
     if (text.size() > most) {
       throw InputError(name, 0, "", "unpacks to more than " + std::to_string(most >> 20U) + " MiB",
-                       "Is it the file that was meant?");
+                       "Check that this is the right file");
     }
   }
   if (result != LZMA_STREAM_END) {
-    throw InputError(name, 0, "", "not a whole xz file", "Was the copy cut short? Try xz -t");
+    throw InputError(name, 0, "", "not a complete xz file", "The copy may be truncated: check it with xz -t");
   }
   return text;
 }

@@ -89,8 +89,9 @@ void ImuStreamRequest::judge(Stamp now) {
   factor_ = std::min(kMore * factor_, kMost);
   if (!at_most || told_) return;
   told_ = true;
-  remark_ = deviceFault(DeviceFaultKind::kChanged, 0, "%s: %.0f a second asked, %.0f come, %.0f are wanted",
-                        messageName(), asked_, seen_, rate_);
+  remark_ =
+      deviceFault(DeviceFaultKind::kChanged, 0, "%s: %.0f per second requested, %.0f received, %.0f required",
+                  messageName(), asked_, seen_, rate_);
 }
 
 void ImuStreamRequest::takeNextMessage() {
@@ -98,7 +99,7 @@ void ImuStreamRequest::takeNextMessage() {
   choice_ = (choice_ + 1) % kChoices.size();
   factor_ = 1;
   misses_ = 0;
-  remark_ = deviceFault(DeviceFaultKind::kChanged, 0, "no %s comes, %s is asked for", before, messageName());
+  remark_ = deviceFault(DeviceFaultKind::kChanged, 0, "no %s received, requesting %s", before, messageName());
 }
 
 bool ImuStreamRequest::nextRemark(DeviceFault& remark) {

@@ -88,13 +88,13 @@ AslFolder::AslFolder(AslFiles files, const LogOptions& options)
   const std::string imu = name("imu0/data.csv");
   const bool has_imu = hasFile("imu0/data.csv");
   if (!has_imu && !options_.uncalibrated) {
-    throw InputError(imu, 0, "", "does not exist", "A log needs IMU samples: imu0/data.csv");
+    throw InputError(imu, 0, "", "does not exist", "Give a log with IMU samples in imu0/data.csv");
   }
   if (has_imu) samples_ = readImuText(imu, text("imu0/data.csv"), counters_, warnings_);
   if (!options_.without_images && track_file_.empty()) readCameras();
   prepare(imu);
   if (files_[0].size() != files_[1].size() && !files_[0].empty() && !files_[1].empty()) {
-    warnings_.add(fmt::format("{}: cam0 has {} images, cam1 has {}; frames without a partner stay single",
+    warnings_.add(fmt::format("{}: cam0 has {} images, cam1 has {}; frames without a partner are used alone",
                               name(""), files_[0].size(), files_[1].size()));
   }
   chooseTruth();
@@ -119,15 +119,14 @@ void AslFolder::readCalibrationFiles() {
     if (calibration_.rig.camera_count == 0) {
       throw InputError(
           name("cam0/sensor.yaml"), 0, "", "does not exist",
-          "A log needs a calibration: EuRoC sensor.yaml, or Kalibr's camchain and IMU YAML given "
-          "explicitly");
+          "Give a log with a calibration: EuRoC sensor.yaml, or pass Kalibr's camchain and IMU YAML");
     }
   }
   // Tracks need no folder for the second camera: they say themselves what it saw.
   const bool images = !options_.without_images && track_file_.empty();
   const bool no_second = images && !hasFolder("cam1");
   if (calibration_.rig.camera_count > 1 && (options_.mono || no_second)) {
-    if (!options_.mono) warnings_.add(name("") + ": no cam1, going on with one camera");
+    if (!options_.mono) warnings_.add(name("") + ": no cam1, continuing with one camera");
     calibration_.rig.camera_count = 1;
   }
 }
@@ -141,12 +140,12 @@ bool AslFolder::listsImages() const {
 void AslFolder::readCameras() {
   for (std::uint32_t camera = 0; camera < calibration_.rig.camera_count; ++camera) readCamera(camera);
   if (calibration_.rig.camera_count > 1 && files_[1].empty()) {
-    warnings_.add(name("") + ": cam1 has no images, going on with one camera");
+    warnings_.add(name("") + ": cam1 has no images, continuing with one camera");
     calibration_.rig.camera_count = 1;
   }
   if (images_.empty()) {
     throw InputError(name(""), 0, "", "none of the listed images exists",
-                     "Images are looked for in cam0/data and cam1/data, tracks in tracks0/data.csv");
+                     "Images are expected in cam0/data and cam1/data, tracks in tracks0/data.csv");
   }
 }
 
@@ -217,12 +216,12 @@ void AslFolder::stampNumbered(std::uint32_t camera, std::vector<ImageRow>& rows)
   const std::string csv = name(fmt::format("cam{}/data.csv", camera));
   if (rate <= 0) {
     throw InputError(
-        csv, 0, "", fmt::format("does not exist, and names like `{}` are no stamps", rows.front().file),
+        csv, 0, "", fmt::format("does not exist, and names like `{}` are not stamps", rows.front().file),
         "Write data.csv with lines `stamp [ns], file name`, or the cameras' rate_hz in sensor.yaml");
   }
   warnings_.add(
-      fmt::format("{}: does not exist, and names like `{}` are no stamps; images are taken {:g} Hz apart "
-                  "from the first IMU sample on. Write data.csv if that is not right",
+      fmt::format("{}: does not exist, and names like `{}` are not stamps; images are stamped at {:g} Hz "
+                  "from the first IMU sample on. Write data.csv if this is wrong",
                   csv, rows.front().file, rate));
   const std::int64_t first = rows.front().stamp.ns;
   for (ImageRow& row : rows) {
@@ -239,14 +238,15 @@ void AslFolder::readCamera(std::uint32_t camera) {
     if (!locate(camera, row)) {
       ++missing;
       warnings_.addCounted(++counters_.missing_images,
-                           fmt::format("{}: image `{}` of stamp {} is missing, skipped",
+                           fmt::format("{}: image `{}` with stamp {} is missing, skipped",
                                        name(folder + "/data"), row.file, row.stamp.ns));
       continue;
     }
     images_.push_back({row.stamp, camera, static_cast<std::uint32_t>(files_[camera].size())});
     files_[camera].push_back(row.file);
   }
-  if (missing > 0 && files_[camera].empty()) warnings_.add(name(folder) + ": not one listed image exists");
+  if (missing > 0 && files_[camera].empty())
+    warnings_.add(name(folder) + ": none of the listed images exists");
 }
 
 RecordedLog::Fetched AslFolder::fetch(const ImageEntry& entry, ImageSize expected, std::uint8_t* out) {
@@ -286,7 +286,7 @@ void AslFolder::chooseTruth() {
       best = covered;
       truth_ = file;
     } catch (const InputError& error) {
-      warnings_.add(std::string(error.what()) + " (truth left out)");
+      warnings_.add(std::string(error.what()) + " (truth omitted)");
     }
   }
 }

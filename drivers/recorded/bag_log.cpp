@@ -57,8 +57,8 @@ BagLog::BagLog(const std::string& path, const LogOptions& options) : RecordedLog
   if (options_.uncalibrated) {
     calibration_.rig.camera_count = kMaxCameras;
   } else if (options_.calibration.empty()) {
-    throw InputError(path, 0, "", "a bag holds no calibration",
-                     "Name the Kalibr or EuRoC calibration to use");
+    throw InputError(path, 0, "", "a bag contains no calibration",
+                     "Give the Kalibr or EuRoC calibration to use");
   } else {
     calibration_ =
         readCalibration(options_.calibration, options_.imu_calibration, options_.calibration_options);
@@ -75,13 +75,13 @@ void BagLog::chooseTopics() {
   imu_ = chooseImuTopics(*bag_, calibration_.imu_topic, warnings_);
   truth_ = chooseTruthTopic(*bag_);
   if (truth_) {
-    warnings_.add(
-        fmt::format("{}: truth from {}, whose body is taken for the IMU", bag_->path(), topic(*truth_).name));
+    warnings_.add(fmt::format("{}: truth from {}, whose body frame is assumed to be the IMU", bag_->path(),
+                              topic(*truth_).name));
   }
   if (options_.without_images) return;
   camera_ = chooseImageTopics(*bag_, calibration_, warnings_);
   if (calibration_.rig.camera_count > 1 && !camera_[1]) {
-    warnings_.add(bag_->path() + ": one image topic only, going on with one camera");
+    warnings_.add(bag_->path() + ": only one image topic, continuing with one camera");
     calibration_.rig.camera_count = 1;
   }
 }
@@ -96,9 +96,10 @@ void BagLog::repairZeroStamp(const BagEntry& entry, Stamp& stamp) {
 }
 
 void BagLog::countShort(const BagEntry& entry) {
-  warnings_.addCounted(++counters_.bad_rows,
-                       fmt::format("{}: {}: the message received at {} is no whole {}, skipped", bag_->path(),
-                                   topic(entry.topic).name, entry.log_time.ns, topic(entry.topic).type));
+  warnings_.addCounted(
+      ++counters_.bad_rows,
+      fmt::format("{}: {}: the message received at {} is not a complete {}, skipped", bag_->path(),
+                  topic(entry.topic).name, entry.log_time.ns, topic(entry.topic).type));
 }
 
 void BagLog::addImu(const BagEntry& entry, std::vector<ImuSample>& samples) {
@@ -138,7 +139,8 @@ void BagLog::scan() {
     }
   }
   const std::string name = bag_->path() + " " + topic(imu_.gyro).name;
-  if (samples_.empty()) throw InputError(name, 0, "", "no usable IMU message", "Is the bag whole?");
+  if (samples_.empty())
+    throw InputError(name, 0, "", "no usable IMU message", "Check that the bag is complete");
   orderSamples(samples_, name, counters_, warnings_);
   if (imu_.accel) joinTopics();
   checkUnits(samples_, name, warnings_);
@@ -157,11 +159,11 @@ void BagLog::joinTopics() {
   std::uint64_t left_out = 0;
   samples_ = joinImu(samples_, accel_, left_out);
   warnings_.add(
-      fmt::format("{}: the accelerometer stands in {}; it is interpolated to the gyroscope's stamps, and {} "
-                  "of its samples have none on both sides",
+      fmt::format("{}: the accelerometer is in {}; it is interpolated to the gyroscope's stamps, and {} of "
+                  "its samples have no neighbour on one side",
                   bag_->path(), topic(*imu_.accel).name, left_out));
   if (samples_.empty()) {
-    throw InputError(name, 0, "timestamp", "no sample of the gyroscope lies between two of the accelerometer",
+    throw InputError(name, 0, "timestamp", "no gyroscope sample lies between two accelerometer samples",
                      "Both need stamps of one clock");
   }
   accel_ = {};

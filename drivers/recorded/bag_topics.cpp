@@ -145,11 +145,11 @@ BagImuTopics chooseImuTopics(BagFile& bag, const std::string& wanted, LogWarning
   if (gyro && accel) return {*gyro, accel};
   if (gyro) {
     throw InputError(bag.path(), 0, bag.topics()[*gyro].name, "all accelerations are zero",
-                     "Record the accelerometer's topic too");
+                     "Also record the accelerometer's topic");
   }
   const auto silent = accel ? accel : busiest(bag, halves, wanted, false, false);
   if (!silent) {
-    throw InputError(bag.path(), 0, "", "no topic of type sensor_msgs/Imu", "Record the IMU too");
+    throw InputError(bag.path(), 0, "", "no topic of type sensor_msgs/Imu", "Also record the IMU");
   }
   // A simulator at rest gives such rates too.
   warnings.add(
@@ -184,13 +184,13 @@ std::array<std::optional<std::uint32_t>, kMaxCameras> chooseImageTopics(BagFile&
   }
   if (!chosen[0]) {
     throw InputError(bag.path(), 0, "", "no topic of type sensor_msgs/Image or CompressedImage",
-                     "Record the cameras too");
+                     "Also record the cameras");
   }
   if (guessed && images.size() > cameras) {
     std::string text = bag.topics()[*chosen[0]].name;
     if (cameras > 1 && chosen[1]) text += " and " + bag.topics()[*chosen[1]].name;
     warnings.add(
-        fmt::format("{}: of {} image topics {} are taken; `rostopic` in the calibration names others",
+        fmt::format("{}: of {} image topics {} are used; `rostopic` in the calibration selects others",
                     bag.path(), images.size(), text));
   }
   return chosen;

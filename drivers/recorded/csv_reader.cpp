@@ -176,7 +176,7 @@ void CsvReader::finish(const char* what, const char* remedy) const {
   if (!first_bad_) throw InputError(name_, 0, "", std::string("holds no ") + what, remedy);
   throw InputError(name_, first_bad_->line, first_bad_->field,
                    first_bad_->message + "; " + std::to_string(bad_ + nan_) + " of " + std::to_string(rows_) +
-                       " rows are no " + what,
+                       " rows are not " + what,
                    remedy);
 }
 

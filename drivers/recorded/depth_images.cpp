@@ -38,9 +38,9 @@ DepthImageView DepthImages::at(Stamp stamp) {
   const DecodeResult result = decoder_.decode16(bytes_, size, units_.data(), found);
   if (result != DecodeResult::kOk) {
     const std::string what = result == DecodeResult::kWrongSize
-                                 ? fmt::format("{}x{} pixels, sensor.yaml says {}x{}", found.width,
+                                 ? fmt::format("{}x{} pixels, but sensor.yaml specifies {}x{}", found.width,
                                                found.height, size.width, size.height)
-                                 : "damaged or no PNG of 16 bits grey";
+                                 : "damaged or not a 16-bit grey PNG";
     warnings_.addCounted(++counters_.damaged_images,
                          files_.tree->name(path) + ": " + what + ", depth skipped");
     return view;

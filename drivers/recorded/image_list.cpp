@@ -17,7 +17,7 @@ std::vector<ImageRow> readImageRows(CsvReader& csv, LogCounters& counters, LogWa
     row.file = csv.field(1);
     rows.push_back(std::move(row));
   }
-  csv.finish("images", "A row is: stamp [ns], file name");
+  csv.finish("images", "Write each row as: stamp [ns], file name");
   orderByStamp(rows, csv.name(), counters, warnings);
   return rows;
 }

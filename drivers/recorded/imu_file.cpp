@@ -87,8 +87,10 @@ bool ImuRows::next(ImuSample& sample) {
     any_ = true;
     return true;
   }
-  csv_.finish("IMU samples", "A row is: stamp [ns], gyro x y z [rad/s], accel x y z [m/s^2]");
-  if (accel_first_) warnings_.add(csv_.name() + ": the header names the accelerometer first; read that way");
+  csv_.finish("IMU samples", "Write each row as: stamp [ns], gyro x y z [rad/s], accel x y z [m/s^2]");
+  if (accel_first_)
+    warnings_.add(csv_.name() +
+                  ": the header lists the accelerometer first; the columns are read in that order");
   return false;
 }
 
@@ -122,7 +124,7 @@ void checkUnits(const std::vector<ImuSample>& samples, const std::string& name, 
     throw InputError(
         name, 0, "",
         fmt::format("the median gyro reading is {:.2f} and the median accel {:.2f}", gyro, force.median),
-        "Gyro and accelerometer columns are swapped: gyro comes first, or the header names the columns "
+        "Gyro and accelerometer columns are swapped: put the gyro first, or name the columns in the header "
         "(gyro_x, ..., accel_x, ...)");
   }
   if (force.inG()) {

@@ -27,9 +27,9 @@ ImageView LabelImages::at(Stamp stamp) {
   const DecodeResult result = decoder_.decode(bytes_, size_, pixels_.data(), found);
   if (result != DecodeResult::kOk) {
     const std::string what = result == DecodeResult::kWrongSize
-                                 ? fmt::format("{}x{} pixels, camera 0 has {}x{}", found.width, found.height,
-                                               size_.width, size_.height)
-                                 : "damaged or no PNG";
+                                 ? fmt::format("{}x{} pixels, but camera 0 has {}x{}", found.width,
+                                               found.height, size_.width, size_.height)
+                                 : "damaged or not a PNG";
     warnings_.addCounted(++counters_.damaged_images,
                          files_.tree->name(path) + ": " + what + ", labels skipped");
     return {};

@@ -12,8 +12,7 @@ namespace {
 
 constexpr const char* kWhatToGive =
     "Give a EuRoC folder (the sequence or its mav0) or an archive of one, a bag (rosbag2, MCAP or ROS 1), or "
-    "a "
-    "run's folder with its recording";
+    "a run folder with a recording";
 
 }  // namespace
 
@@ -27,7 +26,7 @@ std::unique_ptr<LogSource> openLog(const std::string& path, const LogOptions& op
   if (isBag(path)) return openBagLog(path, options);
   throw InputError(
       path, 0, "",
-      "not a log: neither a folder with imu0 and cam0 or an archive of one, nor a bag, nor a recording",
+      "is not a log: neither a folder with imu0 and cam0 or an archive of one, nor a bag, nor a recording",
       kWhatToGive);
 }
 

@@ -31,7 +31,8 @@ void orderByStamp(std::vector<Row>& rows, const std::string& name, LogCounters& 
   if (end != rows.end()) {
     const auto repeated = static_cast<std::size_t>(rows.end() - end);
     counters.repeated_stamps += repeated;
-    warnings.add(name + ": " + std::to_string(repeated) + " rows repeat a stamp, the first of each is used");
+    warnings.add(name + ": " + std::to_string(repeated) +
+                 " rows repeat a stamp, only the first of each is used");
     rows.erase(end, rows.end());
   }
 }

@@ -92,7 +92,7 @@ std::vector<PositionPoint> readRows(CsvReader& csv, LogCounters& counters, LogWa
         columns->geodetic ? std::array{"latitude", "longitude", "height"} : std::array{"x", "y", "z"};
     PositionPoint point;
     bool good = csv.size() >= columns->fields();
-    if (!good) csv.reject("row", "fewer columns than a stamp and a position have");
+    if (!good) csv.reject("row", "has fewer columns than a stamp and a position need");
     good = good && readStamp(csv, point.stamp);
     for (int i = 0; good && i < 3; ++i) {
       const auto axis = static_cast<std::size_t>(i);
@@ -110,7 +110,8 @@ std::vector<PositionPoint> readRows(CsvReader& csv, LogCounters& counters, LogWa
     }
     points.push_back(point);
   }
-  csv.finish("positions", "A row is `t, x, y, z` in s (or ns) and m, or has lat, lon and alt in its header");
+  csv.finish("positions",
+             "Write each row as `t, x, y, z` in s (or ns) and m, or name lat, lon and alt in the header");
   orderByStamp(points, csv.name(), counters, warnings);
   return points;
 }

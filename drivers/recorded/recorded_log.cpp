@@ -22,9 +22,9 @@ void RecordedLog::checkRates(const std::string& name) {
     return;
   }
   if (measured > 0 && std::abs(measured - stated) > kRateTolerance * stated) {
-    warnings_.add(
-        fmt::format("{}: the IMU runs at {:.1f} Hz, its calibration says {:g} Hz; the measured rate is used",
-                    name, measured, stated));
+    warnings_.add(fmt::format(
+        "{}: the IMU runs at {:.1f} Hz, its calibration specifies {:g} Hz; the measured rate is used", name,
+        measured, stated));
     calibration_.noise.rate_hz = measured;
   }
 }
@@ -63,7 +63,7 @@ void RecordedLog::prepare(const std::string& name) {
                      fmt::format("the samples ({} to {}) and the images ({} to {}) do not overlap in time",
                                  samples_.front().stamp.ns, samples_.back().stamp.ns,
                                  images_.front().stamp.ns, images_.back().stamp.ns),
-                     "Both need stamps of one clock, in nanoseconds");
+                     "Use stamps of one clock, in nanoseconds");
   }
   for (std::size_t i = 0; i < images_.size(); ++i) {
     if (i == 0 || images_[i].stamp != images_[i - 1].stamp) ++frame_count_;
@@ -113,13 +113,13 @@ bool RecordedLog::deliverImage(const ImageEntry& entry, SensorMessage& message) 
   if (fetched.result == DecodeResult::kWrongSize && counters_.images[entry.camera] == 0) {
     throw InputError(
         fetched.name, 0, "",
-        fmt::format("the image has {}x{} pixels, the calibration of cam{} is for {}x{}", fetched.found.width,
-                    fetched.found.height, entry.camera, expected.width, expected.height),
+        fmt::format("the image has {}x{} pixels, but the calibration of cam{} is for {}x{}",
+                    fetched.found.width, fetched.found.height, entry.camera, expected.width, expected.height),
         "Give the calibration of this image size");
   }
   if (fetched.result != DecodeResult::kOk) {
     const char* what = fetched.result == DecodeResult::kUnknownFormat ? "neither PNG nor JPEG"
-                       : fetched.result == DecodeResult::kWrongSize   ? "another size than the images before"
+                       : fetched.result == DecodeResult::kWrongSize   ? "not the size of the previous images"
                                                                       : "damaged or truncated";
     warnings_.addCounted(++counters_.damaged_images, fetched.name + ": " + what + ", image skipped");
     return false;

@@ -52,10 +52,9 @@ class SegmentOnDisk final : public RecordingFile {
 
  private:
   [[noreturn]] void refuse(std::uint64_t offset) const {
-    throw InputError(name_, 0, fmt::format("byte {}", offset),
-                     fmt::format("cannot be read: {}", std::strerror(errno)),
-                     "Copy the recording to a sound disk, or remove this and the later segments to replay up "
-                     "to here");
+    throw InputError(
+        name_, 0, fmt::format("byte {}", offset), fmt::format("cannot be read: {}", std::strerror(errno)),
+        "Copy the recording to a working disk, or remove this and the later segments to replay up to here");
   }
 
   std::string name_;
@@ -95,14 +94,14 @@ RecordingFiles listRecordingFiles(const std::string& folder) {
     const fs::path path = fs::path(folder) / segmentName(number).data();
     if (number != expected) {
       throw InputError((fs::path(folder) / segmentName(expected).data()).string(), 0, "",
-                       fmt::format("this segment is missing, {} is there", path.filename().string()),
-                       expected == 0 ? "Bring it back: it says what the recording was made with"
-                                     : "Bring it back, or remove the later segments to replay up to it");
+                       fmt::format("this segment is missing, but {} exists", path.filename().string()),
+                       expected == 0 ? "Restore it: it holds the header of the recording"
+                                     : "Restore it, or remove the later segments to replay up to it");
     }
     const std::uintmax_t size = fs::file_size(path, error);
     if (error) {
       throw InputError(path.string(), 0, "", "cannot be read: " + error.message(),
-                       "A segment is an ordinary file");
+                       "A segment must be a regular file");
     }
     files.segments.push_back(std::make_unique<SegmentOnDisk>(path, size));
   }

@@ -12,7 +12,7 @@ namespace swiftlet {
 namespace {
 
 constexpr std::size_t kLargestSmallPayload = kMapStepHeadBytes;
-constexpr const char* kReplayBefore = "Remove this and the later segments to replay what is before it";
+constexpr const char* kReplayBefore = "Remove this and the later segments to replay the part before it";
 
 [[noreturn]] void refuse(const RecordingFile& file, std::uint64_t offset, const std::string& what,
                          const std::string& remedy) {
@@ -25,7 +25,7 @@ class Indexer {
 
   RecordingIndex run() {
     if (files_.segments.empty()) {
-      throw InputError(files_.folder, 0, "", "no segment of a recording",
+      throw InputError(files_.folder, 0, "", "contains no segment of a recording",
                        "Give a folder with recording_*.swr");
     }
     for (segment_ = 0; segment_ < files_.segments.size() && index_.cut.reason == nullptr; ++segment_) {
@@ -89,7 +89,7 @@ bool Indexer::takeSegmentHeader(RecordingWindow& window) {
   const std::span<const std::uint8_t> bytes = window.exactly(0, kSegmentHeaderBytes);
   const bool first = segment_ == 0;
   if (bytes.size() < kSegmentHeaderBytes || allZero(bytes)) {
-    if (first) refuse(file, 0, "the file's header is not there: nothing was recorded", "Record again");
+    if (first) refuse(file, 0, "the file's header is missing: nothing was recorded", "Record again");
     cutAt(0, "the segment's header is incomplete");
     return false;
   }
@@ -98,8 +98,8 @@ bool Indexer::takeSegmentHeader(RecordingWindow& window) {
     case SegmentHeaderState::kGood:
       break;
     case SegmentHeaderState::kForeign:
-      refuse(file, 0, "not a segment of a flight recording: it begins otherwise",
-             first ? "Give a folder whose recording_*.swr this program wrote" : kReplayBefore);
+      refuse(file, 0, "is not a segment of a flight recording: it starts differently",
+             first ? "Give a folder with recording_*.swr written by this program" : kReplayBefore);
     case SegmentHeaderState::kOtherVersion:
       refuse(
           file, kSegmentMagic.size(),
@@ -108,7 +108,7 @@ bool Indexer::takeSegmentHeader(RecordingWindow& window) {
     case SegmentHeaderState::kDamaged:
       if (first) {
         refuse(file, 0, "the file's header is damaged (checksum)",
-               "Without it no record can be checked; bring back a copy");
+               "Without it no record can be checked; restore a copy");
       }
       cutAt(0, "the segment's header is damaged (checksum)");
       return false;
@@ -122,15 +122,16 @@ bool Indexer::belongs(const RecordingFile& file, const SegmentHeader& header) {
     index_.run_checksum = runChecksum(run_);
   }
   if (header.run != run_) {
-    refuse(file, kSegmentMagic.size() + 8, "a segment of another recording than the first one",
+    refuse(file, kSegmentMagic.size() + 8, "belongs to another recording than the first segment",
            kReplayBefore);
   }
   if (header.segment != segment_) {
-    refuse(file, kSegmentMagic.size() + 4, fmt::format("this is segment {}, renamed", header.segment),
-           "Give the segments the names that they had");
+    refuse(file, kSegmentMagic.size() + 4,
+           fmt::format("this is segment {} under another name", header.segment),
+           "Restore the original names of the segments");
   }
   if (header.first_sequence == sequence_ && !index_.ended) return true;
-  cutAt(0, index_.ended ? "it goes on behind the end mark" : "records before this segment are missing");
+  cutAt(0, index_.ended ? "data follows the end mark" : "records before this segment are missing");
   return false;
 }
 
@@ -139,14 +140,14 @@ void Indexer::takeRecords(RecordingWindow& window) {
   while (offset < window.file().size()) {
     if (!takeRecord(window, offset)) return;
   }
-  if (sequence_ == 0) refuse(window.file(), offset, "the run's header is not there", "Record again");
+  if (sequence_ == 0) refuse(window.file(), offset, "the run's header is missing", "Record again");
 }
 
 /// Null when a sound record begins at `offset`, else why it is none.
 const char* Indexer::faultAt(RecordingWindow& window, std::uint64_t offset, RecordHeader& header) const {
-  if (index_.ended) return "it goes on behind the end mark";
+  if (index_.ended) return "data follows the end mark";
   const std::span<const std::uint8_t> bytes = window.exactly(offset, kRecordHeaderBytes);
-  if (allZero(bytes)) return "only zeros were written here";
+  if (allZero(bytes)) return "only zeros are written here";
   const bool header_there = bytes.size() == kRecordHeaderBytes;
   if (header_there) {
     if (!decode(bytes.first<kRecordHeaderBytes>(), index_.run_checksum, header)) {
@@ -168,8 +169,8 @@ bool Indexer::takeRecord(RecordingWindow& window, std::uint64_t& offset) {
   RecordHeader header;
   if (const char* fault = faultAt(window, offset, header)) {
     if (sequence_ == 0) {
-      refuse(window.file(), offset, std::string("the run's header is not whole: ") + fault,
-             "Without it nothing can be replayed; bring back a copy");
+      refuse(window.file(), offset, std::string("the run's header is incomplete: ") + fault,
+             "Without it nothing can be replayed; restore a copy");
     }
     cutAt(offset, fault);
     return false;
@@ -215,8 +216,7 @@ void Indexer::take(const RecordHeader& header, RecordingWindow& window, std::uin
   const RecordingFile& file = window.file();
   const RecordKind kind = header.kind;
   if (static_cast<std::size_t>(kind) >= kRecordKinds || (kind == RecordKind::kRun) != (sequence_ == 0)) {
-    refuse(file, offset,
-           fmt::format("record kind {} is not known or not allowed here", static_cast<int>(kind)),
+    refuse(file, offset, fmt::format("record kind {} is unknown or not allowed here", static_cast<int>(kind)),
            "Replay it with the program that recorded it");
   }
   if (kind == RecordKind::kRun) return takeRun(header, window, offset);
@@ -272,13 +272,13 @@ void Indexer::takeRun(const RecordHeader& header, RecordingWindow& window, std::
   std::uint64_t at = offset + kRecordHeaderBytes;
   while (payload.size() < header.length) {
     std::span<const std::uint8_t> part = window.some(at);
-    if (part.empty()) refuse(window.file(), at, "the file became shorter while it was read", "Read a copy");
+    if (part.empty()) refuse(window.file(), at, "the file was truncated while it was read", "Read a copy");
     part = part.first(std::min(part.size(), header.length - payload.size()));
     payload.insert(payload.end(), part.begin(), part.end());
     at += part.size();
   }
   if (const char* field = decodeRecordingHeader(payload, index_.header)) {
-    refuse(window.file(), offset, fmt::format("the run's header is sound but its {} makes no sense", field),
+    refuse(window.file(), offset, fmt::format("the run's header is intact but its {} is invalid", field),
            "Replay it with the program that recorded it");
   }
 }

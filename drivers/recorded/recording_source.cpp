@@ -45,7 +45,7 @@ void RecordingSource::chooseCalibration(const LogOptions& options) {
       const CameraModel& used = recorded.camera[i];
       if (given.width() == used.width() && given.height() == used.height()) continue;
       throw InputError(options.calibration, 0, "",
-                       fmt::format("cam{} has {}x{} pixels, the recording was made with {}x{}", i,
+                       fmt::format("cam{} has {}x{} pixels, but the recording was made with {}x{}", i,
                                    given.width(), given.height(), used.width(), used.height()),
                        "Give the calibration of this image size");
     }
@@ -90,16 +90,16 @@ void RecordingSource::warn() {
   const RecordingCut& cut = index_.cut;
   const std::string& last_file = files_.segments.back()->name();
   if (cut.reason != nullptr) {
-    std::string line = fmt::format("{}: byte {}: {}; the recording ends here, {} bytes are left out",
+    std::string line = fmt::format("{}: byte {}: {}; the recording ends here, {} bytes are skipped",
                                    files_.segments[cut.segment]->name(), cut.offset, cut.reason, cut.bytes);
     if (cut.sound_records > 0) {
       line +=
-          fmt::format(", among them {} sound records that cannot be used after the gap", cut.sound_records);
+          fmt::format(", among them {} intact records that cannot be used after the gap", cut.sound_records);
     }
     warnings_.add(line);
   } else if (!index_.ended) {
     warnings_.add(
-        fmt::format("{}: byte {}: no end mark: the recording was broken off; it is whole up to here",
+        fmt::format("{}: byte {}: no end mark: the recording was interrupted; it is complete up to here",
                     last_file, files_.segments.back()->size()));
   }
   std::array<std::uint64_t, kRecordKinds> events{};
@@ -113,7 +113,7 @@ void RecordingSource::warn() {
   }
   for (std::size_t kind = 0; kind < kRecordKinds; ++kind) {
     if (events[kind] <= LogWarnings::kPerKind) continue;
-    warnings_.add(fmt::format("{}: in all {} {} were lost while recording", files_.folder, lost[kind],
+    warnings_.add(fmt::format("{}: {} {} in total were lost while recording", files_.folder, lost[kind],
                               pluralName(static_cast<RecordKind>(kind))));
   }
 }
@@ -130,8 +130,7 @@ std::optional<InputError> RecordingSource::firstLoss() const {
   if (loss.newest_sample.ns != 0) what += fmt::format(", at stamp {}", loss.newest_sample.ns);
   if (index_.losses.size() > 1) what += fmt::format(" (the first of {} losses)", index_.losses.size());
   return InputError(files_.segments[loss.segment]->name(), 0, fmt::format("byte {}", loss.offset),
-                    what + ": the run cannot be repeated",
-                    "Leave --reproduce out to replay what was recorded");
+                    what + ": the run cannot be reproduced", "Omit --reproduce to replay what was recorded");
 }
 
 bool RecordingSource::next(SensorMessage& message) {
@@ -257,8 +256,8 @@ void RecordingSource::readSound(const Entry& entry, std::span<std::uint8_t> head
 template <typename Entry>
 void RecordingSource::refuseChanged(const Entry& entry) const {
   throw InputError(files_.segments[entry.segment]->name(), 0, fmt::format("byte {}", entry.offset),
-                   "this record was sound when the recording was opened and is not any more",
-                   "The file was changed meanwhile or the disk fails; open it again to see what is left");
+                   "this record was intact when the recording was opened and is damaged now",
+                   "The file was changed or the disk is failing; open it again to see what is left");
 }
 
 bool isRecording(const std::string& path) { return !findRecordingFolder(path).empty(); }
@@ -266,8 +265,9 @@ bool isRecording(const std::string& path) { return !findRecordingFolder(path).em
 std::unique_ptr<RecordingSource> openRecording(const std::string& path, const LogOptions& options) {
   const std::string folder = findRecordingFolder(path);
   if (folder.empty()) {
-    throw InputError(path, 0, "", "no recording: neither here nor in `recording` are recording_*.swr files",
-                     "Give a run's folder or its recording");
+    throw InputError(path, 0, "",
+                     "contains no recording: recording_*.swr files are neither here nor in `recording`",
+                     "Give a run folder or its recording");
   }
   return std::make_unique<RecordingSource>(listRecordingFiles(folder), options, folder);
 }

@@ -29,17 +29,17 @@ constexpr std::size_t kPiecesPerCall = 64;
 constexpr mode_t kFileMode = 0644;
 constexpr std::array<std::uint8_t, kRecordAlignment> kPadding{};
 
-constexpr Status kEnded{StatusCode::kInvalidInput, "the recording was ended"};
+constexpr Status kEnded{StatusCode::kInvalidInput, "the recording has ended"};
 
 Status statusOf(int error) {
   switch (error) {
     case ENOSPC:
     case EDQUOT:
-      return {StatusCode::kFailed, "the disk is full: recording stopped; make room before the next run"};
+      return {StatusCode::kFailed, "the disk is full: recording stopped; free space before the next run"};
     case EFBIG:
-      return {StatusCode::kFailed, "a file became larger than allowed: recording stopped; see ulimit -f"};
+      return {StatusCode::kFailed, "a file exceeded the allowed size: recording stopped; see ulimit -f"};
     default:
-      return {StatusCode::kFailed, "the disk does not take data any more: recording stopped; see dmesg"};
+      return {StatusCode::kFailed, "the disk accepts no more data: recording stopped; see dmesg"};
   }
 }
 
@@ -66,13 +66,13 @@ RecordingWriter::RecordingWriter(const std::string& folder, const RecordingHeade
     const std::vector<std::uint8_t> run = encodeRecordingHeader(header);
     RecordingHeader read_back;
     if (const char* field = decodeRecordingHeader(run, read_back)) {
-      throw InputError(folder, 0, field, "not fit for a recording", "Check the calibration");
+      throw InputError(folder, 0, field, "cannot be recorded", "Check the calibration");
     }
     if (kRecordHeaderBytes + paddedSize(run.size()) > buffer_.size()) buffer_.resize(2 * run.size());
     openFolder(folder);
     removeEarlierRun(folder);
     if (::getrandom(run_.data(), run_.size(), 0) != static_cast<ssize_t>(run_.size())) {
-      throw InputError(folder, 0, "", "the system gives no random numbers for the run's id",
+      throw InputError(folder, 0, "", "the system provides no random numbers for the run's id",
                        "See getrandom(2)");
     }
     run_checksum_ = runChecksum(run_);
@@ -84,8 +84,8 @@ RecordingWriter::RecordingWriter(const std::string& folder, const RecordingHeade
     }
     if (error != 0) {
       const char* what = status_.ok() ? std::strerror(error) : status_.what;
-      throw InputError(folder, 0, "", std::string("no recording can be written here: ") + what,
-                       "Give a folder on a disk with room and the right to write");
+      throw InputError(folder, 0, "", std::string("cannot write a recording here: ") + what,
+                       "Give a writable folder on a disk with free space");
     }
     // The new folder's own entry; a file system that cannot sync folders is none of the user's concern.
     const int parent = ::openat(folder_, "..", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -110,13 +110,13 @@ void RecordingWriter::openFolder(const std::string& folder) {
   folder_ = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder_ < 0) {
     throw InputError(folder, 0, "",
-                     std::string("no recording can be written here: ") +
+                     std::string("cannot write a recording here: ") +
                          (error ? error.message() : std::string(std::strerror(errno))),
-                     "Give a folder, or the name of a new one, with the right to write");
+                     "Give a writable folder or the name of a new one");
   }
   if (::flock(folder_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
-    throw InputError(folder, 0, "", "this recording is being written or read by another program",
-                     "Give another folder, or wait until that program has ended");
+    throw InputError(folder, 0, "", "another program is writing or reading this recording",
+                     "Give another folder, or wait until that program ends");
   }
 }
 
@@ -198,7 +198,7 @@ Status RecordingWriter::image(const CameraFrame& frame) {
   const RecordKind kind = imageKind(frame.camera);
   if (frame.camera >= kMaxCameras || kImageHeadBytes + pixels.bytes() > kMaxPayloadBytes) {
     ++statistics_.lost[static_cast<std::size_t>(kind)];
-    return {StatusCode::kInvalidInput, "an image of no camera of the rig, or too large to record"};
+    return {StatusCode::kInvalidInput, "an image of a camera that is not in the rig, or too large to record"};
   }
   std::array<std::uint8_t, kImageHeadBytes> head{};
   LittleEndianWriter to(head.data());

@@ -24,10 +24,10 @@ constexpr std::array<ColumnText, 6> kColumns = {{{"timestamp", "timestamp [ns]"}
                                                  {"keyframe", "keyframe"}}};
 constexpr const char* kHeader = "#timestamp [ns],id,camera,u [px],v [px],keyframe";
 constexpr const char* kHeaderRemedy =
-    "The first line has to be `#timestamp [ns],id,camera,u [px],v [px],keyframe` (keyframe may be left out)";
+    "Start the file with `#timestamp [ns],id,camera,u [px],v [px],keyframe` (keyframe is optional)";
 constexpr const char* kRowRemedy =
-    "A line is: stamp [ns], id, camera (0 or 1), u, v and, where the header says so, keyframe (0 or 1)";
-constexpr const char* kDiskRemedy = "Is the disk full?";
+    "Write each line as: stamp [ns], id, camera (0 or 1), u, v and, if the header has it, keyframe (0 or 1)";
+constexpr const char* kDiskRemedy = "Check that the disk is not full";
 // Far outside any image: a number like this is damage.
 constexpr double kMaxPixel = 1e5;
 
@@ -78,7 +78,7 @@ void TrackReader::checkHeader() {
     complain(fmt::format("column {} is {}, not `{}`", i + 1, quoteInput(names[i]), kColumns[i].with_unit));
   }
   if (names.size() < kKeyframe || names.size() > kColumnCount) {
-    complain(fmt::format("names {} columns, not 5 or 6", names.size()));
+    complain(fmt::format("has {} columns, not 5 or 6", names.size()));
   }
   columns_ = names.size();
 }
@@ -113,14 +113,14 @@ std::int64_t TrackReader::integer(Column column, std::int64_t most) {
 void TrackReader::parseRow() {
   constexpr std::int64_t kAny = std::numeric_limits<std::int64_t>::max();
   if (csv_.size() != columns_) {
-    throw csv_.error("row", fmt::format("{} columns where the header names {}", csv_.size(), columns_),
+    throw csv_.error("row", fmt::format("{} columns, but the header has {}", csv_.size(), columns_),
                      kRowRemedy);
   }
   const Stamp before = row_.stamp;
   row_ = {};
   row_.stamp.ns = integer(kStamp, kAny);
   if (any_ && row_.stamp < before) {
-    refuse(kStamp, fmt::format("{} is earlier than {} in the line before", row_.stamp.ns, before.ns),
+    refuse(kStamp, fmt::format("{} is earlier than {} in the previous line", row_.stamp.ns, before.ns),
            "Sort the lines by stamp");
   }
   any_ = true;
@@ -150,7 +150,8 @@ bool TrackReader::next(TrackedFrame& frame) {
   const std::uint64_t surplus_before = surplus_;
   while (more_ && row_.stamp == frame.stamp) {
     if (row_.keyframe != frame.keyframe) {
-      refuse(kKeyframe, "differs from the frame's first line", "All lines of one stamp need the same value");
+      refuse(kKeyframe, "differs from the frame's first line",
+             "Use the same value in all lines with the same stamp");
     }
     if (row_.sighting) addSighting(frame);
     more_ = readRow();
@@ -178,8 +179,8 @@ void TrackReader::addSighting(TrackedFrame& frame) {
   if (slot->second == kMaxFeatures) return;
   TrackedFeature& feature = frame.features[slot->second];
   if (feature.seen[row_.camera]) {
-    refuse(kId, fmt::format("{} is twice in camera {} at one stamp", row_.id, row_.camera),
-           "A landmark has one sighting per camera and frame");
+    refuse(kId, fmt::format("{} appears twice in camera {} at one stamp", row_.id, row_.camera),
+           "Give each landmark once per camera and frame");
   }
   feature.seen[row_.camera] = true;
   feature.pixel[row_.camera] = row_.pixel;

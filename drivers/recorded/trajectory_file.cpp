@@ -84,8 +84,8 @@ Trajectory readRows(CsvReader& csv, bool is_csv, LogCounters& counters, LogWarni
     if (is_csv ? readCsvRow(csv, point) : readTumRow(csv, unit, point)) trajectory.push_back(point);
   }
   csv.finish("poses",
-             "A row is `t tx ty tz qx qy qz qw` (TUM) or `ns, p xyz, q wxyz` (EuRoC csv); positions alone "
-             "are for `swiftlet evaluate --truth`");
+             "Write each row as `t tx ty tz qx qy qz qw` (TUM) or `ns, p xyz, q wxyz` (EuRoC csv); a file of "
+             "positions only can be used with `swiftlet evaluate --truth`");
   orderByStamp(trajectory, csv.name(), counters, warnings);
   return trajectory;
 }
@@ -108,7 +108,7 @@ Trajectory readWholeTrajectory(const std::string& path, const std::string& remed
     TrajectoryPoint point;
     if (!readTumRow(csv, unit, point)) break;
     if (!trajectory.empty() && point.stamp <= trajectory.back().stamp) {
-      throw csv.error("timestamp", "not after the one before", remedy);
+      throw csv.error("timestamp", "is not later than the previous one", remedy);
     }
     trajectory.push_back(point);
   }
@@ -157,7 +157,7 @@ void TumWriter::write(Stamp stamp, const SE3& T_world_body) {
   const std::string line = formatTum(stamp, T_world_body) + "\n";
   if (std::fwrite(line.data(), 1, line.size(), file_) != line.size()) {
     throw InputError(path_, 0, "", std::string("cannot be written: ") + std::strerror(errno),
-                     "Is the disk full?");
+                     "Check that the disk is not full");
   }
 }
 
@@ -166,7 +166,7 @@ void TumWriter::close() {
   file_ = nullptr;
   if (file != nullptr && std::fclose(file) != 0) {
     throw InputError(path_, 0, "", std::string("cannot be written: ") + std::strerror(errno),
-                     "Is the disk full?");
+                     "Check that the disk is not full");
   }
 }
 

@@ -45,8 +45,8 @@ bool baudMeansSomething(const char* path) {
 DeviceFault SerialPort::open() {
   close();
   if (settings_.baud == 0 || settings_.baud > kHighestBaud) {
-    return deviceFault(DeviceFaultKind::kUnsupported, 0, "%u baud asked, 1 to %u possible", settings_.baud,
-                       kHighestBaud);
+    return deviceFault(DeviceFaultKind::kUnsupported, 0, "%u baud requested, 1 to %u possible",
+                       settings_.baud, kHighestBaud);
   }
   descriptor_ = ::open(settings_.path.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor_ < 0) return openFault(errno, "open");
@@ -58,7 +58,7 @@ DeviceFault SerialPort::open() {
 DeviceFault SerialPort::configure() {
   termios settings = {};
   if (tcgetattr(descriptor_, &settings) != 0) {
-    if (errno == ENOTTY) return deviceFault(DeviceFaultKind::kWrongDevice, 0, "no serial port");
+    if (errno == ENOTTY) return deviceFault(DeviceFaultKind::kWrongDevice, 0, "not a serial port");
     return deviceFault(DeviceFaultKind::kFailed, errno, "tcgetattr");
   }
   if (ioctl(descriptor_, TIOCEXCL) != 0) return deviceFault(DeviceFaultKind::kFailed, errno, "TIOCEXCL");
@@ -77,7 +77,7 @@ DeviceFault SerialPort::configure() {
   constexpr unsigned kAllowedPercent = 2;
   const unsigned off = baud_ > settings_.baud ? baud_ - settings_.baud : settings_.baud - baud_;
   if (off > settings_.baud / 100 * kAllowedPercent + settings_.baud % 100 * kAllowedPercent / 100)
-    return deviceFault(DeviceFaultKind::kChanged, 0, "%u baud asked, %u set", settings_.baud, baud_);
+    return deviceFault(DeviceFaultKind::kChanged, 0, "%u baud requested, %u set", settings_.baud, baud_);
 
   askLowLatency();
   constexpr std::int64_t kBitsPerByte = 10;
@@ -166,7 +166,7 @@ DeviceFault SerialPort::write(std::span<const std::uint8_t> bytes, Duration most
     if (taken > 0) continue;
     const Duration left = until - now();
     if (left <= Duration{})
-      return deviceFault(DeviceFaultKind::kFailed, 0, "%zu bytes not taken in time", bytes.size());
+      return deviceFault(DeviceFaultKind::kFailed, 0, "%zu bytes not accepted in time", bytes.size());
     pollfd asked = {descriptor_, POLLOUT, 0};
     if (::poll(&asked, 1, pollMilliseconds(left)) > 0 && (asked.revents & POLLHUP) != 0) return unplugged(0);
   }

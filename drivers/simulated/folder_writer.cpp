@@ -277,7 +277,7 @@ Status simulateWith(const SimulationSettings& settings, const fs::path& folder, 
     return {StatusCode::kInvalidInput, "a simulation setting is out of range"};
   } catch (const std::exception& error) {
     if (message != nullptr) *message = error.what();
-    return {StatusCode::kFailed, "the simulated flight could not be made or written"};
+    return {StatusCode::kFailed, "the simulated flight could not be generated or written"};
   }
 }
 
@@ -294,8 +294,8 @@ Status simulateTracksToFolder(const SimulationSettings& settings, const std::str
                               std::string* message) {
   const std::string images = imageListIn(folder);
   if (!images.empty()) {
-    if (message != nullptr) *message = images + ": the folder holds the images of another flight";
-    return {StatusCode::kFailed, "the folder holds the images of another flight"};
+    if (message != nullptr) *message = images + ": the folder already holds the images of another flight";
+    return {StatusCode::kFailed, "the folder already holds the images of another flight"};
   }
   return simulateWith(settings, folder, message,
                       [&](const SimulatedFlight& flight) { makeTracks(flight, sink, progress); });

@@ -56,7 +56,7 @@ std::vector<Row> parseRows(const std::string& text, const std::string& path) {
     row.pose =
         SE3(Eigen::Quaterniond(value[3], value[4], value[5], value[6]), {value[0], value[1], value[2]});
     if (!rows.empty() && (row.t <= rows.back().t || row.t > rows.back().t + kMaxGap)) {
-      throw InputError(path, number, "stamp", "must rise by at most 0.5 s a row", "");
+      throw InputError(path, number, "stamp", "must increase by at most 0.5 s per row", "");
     }
     rows.push_back(row);
   }
@@ -70,7 +70,7 @@ SplineTrajectory readGivenMotion(const std::string& path, double skip, double du
   const double last = rows.empty() ? 0.0 : rows.back().t;
   const double end = duration > 0 ? std::min(last, skip + duration) : last;
   const auto count = static_cast<std::int64_t>(std::floor((end - skip) / kGivenMotionSpacing));
-  if (skip < 0 || count < 1) throw InputError(path, 0, "", "has no motion in the span asked for", "");
+  if (skip < 0 || count < 1) throw InputError(path, 0, "", "has no motion in the selected span", "");
   std::vector<SE3> samples;
   std::size_t row = 1;
   for (std::int64_t k = 0; k <= count; ++k) {

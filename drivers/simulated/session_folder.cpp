@@ -230,7 +230,7 @@ Status simulateSessionToFolder(const CalibrationTarget& target, const SessionFol
     return {StatusCode::kInvalidInput, "a simulation setting is out of range"};
   } catch (const std::exception& error) {
     if (message != nullptr) *message = error.what();
-    return {StatusCode::kFailed, "the calibration session could not be made or written"};
+    return {StatusCode::kFailed, "the calibration session could not be generated or written"};
   }
 }
 

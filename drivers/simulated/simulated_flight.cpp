@@ -106,7 +106,7 @@ void SimulatedFlight::checkSettings() const {
           "first_image: must leave half an exposure and half a readout");
   double before = 0;
   for (const LightChange& change : settings_.light_changes) {
-    require(change.begin >= before, "light_changes: each must begin when the one before has ended");
+    require(change.begin >= before, "light_changes: each must begin after the previous one has ended");
     require(change.level > 0, "light_changes: the level must be positive");
     before = change.begin + kLightRamp;
   }

@@ -32,7 +32,7 @@ double length(const YamlField& field) {
   const double value = field.number();
   if (value < kShortest || value > kLongest) {
     throw field.error(fmt::format("{:g} m is not between {:g} and {:g} m", value, kShortest, kLongest),
-                      "Measure the print and give the edge in metres");
+                      "Measure the print and give the edge length in metres");
   }
   return value;
 }
@@ -43,7 +43,7 @@ CalibrationTarget readAprilGrid(const YamlField& root) {
   target.rows = count(root.at("tagRows", kWhatIsWritten), kTagCount / kFewest);
   if (target.columns * target.rows > kTagCount) {
     throw root.at("tagCols").error(
-        fmt::format("{} x {} tags are more than the {} of tag36h11", target.columns, target.rows, kTagCount),
+        fmt::format("{} x {} tags exceed the {} tags of tag36h11", target.columns, target.rows, kTagCount),
         "Count the columns and rows of tags");
   }
   target.size = length(root.at("tagSize", kWhatIsWritten));
@@ -76,7 +76,7 @@ CalibrationTarget parseTarget(const std::string& name, std::string_view text) {
   if (type.text() == "aprilgrid") return readAprilGrid(root);
   if (type.text() == "checkerboard") return readCheckerboard(root);
   if (type.text() == "circlegrid") {
-    throw type.error("circle grids are not read: the centres of their circles are biased under tilt",
+    throw type.error("circle grids are not supported: their circle centres are biased under tilt",
                      "Print an aprilgrid with `swiftlet calibrate target`");
   }
   throw type.error("`" + type.text() + "` is neither aprilgrid nor checkerboard", kWhatIsWritten);

@@ -83,7 +83,7 @@ Status ClockMap::suspect(Stamp device, Stamp arrival, std::int64_t delayed, Stam
   const bool agree = apart <= static_cast<double>(kConfirmSlack) + static_cast<double>(on_device) / 2;
   if (c.count < kConfirm || on_device < kConfirmSpan || !agree) {
     ++refused_;
-    return {StatusCode::kInvalidInput, "device stamp off the clock: refused until it lasts"};
+    return {StatusCode::kInvalidInput, "device stamp far from the clock: rejected until it persists"};
   }
   envelope_.restart();
   envelope_.add(c.lowest_device, c.lowest);
@@ -110,7 +110,7 @@ Status ClockMap::handOut(Stamp device, Stamp arrival, Stamp& host) {
   delays_.add(arrival, latest - mapped);
   if (!rising_.next(std::min(mapped, latest), step_, host)) {
     ++refused_;
-    return {StatusCode::kInvalidInput, "stamp would go back"};
+    return {StatusCode::kInvalidInput, "stamp would go backwards"};
   }
   ++samples_;
   return okStatus();

@@ -74,7 +74,7 @@ Status TriggerMatcher::match(const FrameMark& frame, TriggerMatch& out) {
   const std::int64_t steps = advance(sequence_, frame.sequence);
   if (steps == 0) {
     ++unmatched_;
-    return {StatusCode::kInvalidInput, "frame's number repeated"};
+    return {StatusCode::kInvalidInput, "frame number repeated"};
   }
   if (steps < 0 || steps > kMostDropped) {
     giveUp();
@@ -95,7 +95,7 @@ Status TriggerMatcher::match(const FrameMark& frame, TriggerMatch& out) {
   if (!caused || std::abs(off) > verified(period)) {
     ++unmatched_;
     if (++disputes_ >= kDisputes) giveUp();
-    return {StatusCode::kInvalidInput, "frame's number and stamp do not agree on an edge"};
+    return {StatusCode::kInvalidInput, "frame number and stamp belong to different edges"};
   }
   disputes_ = 0;
   lag_ += kLagGain * off;
@@ -107,7 +107,7 @@ Status TriggerMatcher::match(const FrameMark& frame, TriggerMatch& out) {
 }
 
 Status TriggerMatcher::collect(const FrameMark& frame, TriggerMatch& out) {
-  constexpr Status kNotYet = {StatusCode::kNotReady, "trigger not locked: use the driver's stamp"};
+  constexpr Status kNotYet = {StatusCode::kNotReady, "trigger not locked: the driver's stamp is used"};
   const std::int64_t steps = count_ == 0 ? 0 : advance(sequence_, frame.sequence);
   if (count_ == 0 || steps <= 0 || steps > kMostDropped) {
     begin(frame);

@@ -66,7 +66,7 @@ Status TwoWayClockMap::suspect(const ClockExchange& exchange) {
   suspect_newest_ = exchange.remote;
   if (suspects_ < kConfirm) {
     ++refused_;
-    return {StatusCode::kInvalidInput, "remote stamp off the clock: refused until it lasts"};
+    return {StatusCode::kInvalidInput, "remote stamp far from the clock: rejected until it persists"};
   }
   back_.restart();
   forth_.restart();

@@ -133,8 +133,8 @@ DeviceFault CameraControls::setExposure(Duration exposure) {
   if (!exposes()) {
     return deviceFault(
         DeviceFaultKind::kUnsupported, 0,
-        "no exposure time to set%s; set it by the camera's own means, and remove it here",
-        port_ != nullptr && spanOf(V4L2_CID_EXPOSURE) ? " (an exposure in lines of unknown length)" : "");
+        "the exposure time cannot be set%s; set it with the camera's own tools, and remove it here",
+        port_ != nullptr && spanOf(V4L2_CID_EXPOSURE) ? " (its exposure is in lines of unknown length)" : "");
   }
   automaticExposureOff();
   const std::int64_t steps = stepsOf(exposure);
@@ -143,20 +143,20 @@ DeviceFault CameraControls::setExposure(Duration exposure) {
   if (error != 0) return VideoNode::callFault(error, "set the exposure time");
   const std::optional<Duration> set = this->exposure();
   if (!set || std::abs((*set - exposure).seconds()) > step_) {
-    return deviceFault(DeviceFaultKind::kChanged, 0, "exposure: asked %.1f ms, set %.1f ms",
+    return deviceFault(DeviceFaultKind::kChanged, 0, "exposure: requested %.1f ms, set %.1f ms",
                        exposure.seconds() * kToMs, set.value_or(Duration{}).seconds() * kToMs);
   }
   return {};
 }
 
 DeviceFault CameraControls::setGain(std::int32_t gain) {
-  if (gain_id_ == 0) return deviceFault(DeviceFaultKind::kUnsupported, 0, "no gain to set");
+  if (gain_id_ == 0) return deviceFault(DeviceFaultKind::kUnsupported, 0, "the gain cannot be set");
   automaticGainOff();
   const int error = write(gain_id_, gain);
   if (error != 0) return VideoNode::callFault(error, "set the gain");
   const std::optional<std::int32_t> set = this->gain();
   if (set != gain) {
-    return deviceFault(DeviceFaultKind::kChanged, 0, "gain: asked %d, set %d", gain, set.value_or(0));
+    return deviceFault(DeviceFaultKind::kChanged, 0, "gain: requested %d, set %d", gain, set.value_or(0));
   }
   return {};
 }
@@ -223,7 +223,7 @@ std::optional<ExposureAbility> CameraControls::ability() const {
 }
 
 DeviceFault CameraControls::set(const ExposureSetting& setting) {
-  if (!exposes()) return deviceFault(DeviceFaultKind::kUnsupported, 0, "no exposure time to set");
+  if (!exposes()) return deviceFault(DeviceFaultKind::kUnsupported, 0, "the exposure time cannot be set");
   if (!manual_) {
     automaticExposureOff();
     if (gain_law_ != GainLaw::kUnknown) automaticGainOff();

@@ -88,7 +88,8 @@ void CameraDevice::findControls() {
 }
 
 DeviceFault CameraDevice::setExposure(const ExposureSetting& setting) {
-  if (!isOpen()) return deviceFault(DeviceFaultKind::kUnplugged, 0, "closed; waiting for it to come back");
+  if (!isOpen())
+    return deviceFault(DeviceFaultKind::kUnplugged, 0, "closed; waiting for the device to return");
   return controls_.set(setting);
 }
 
@@ -119,10 +120,10 @@ DeviceFault CameraDevice::chooseFormat() {
   std::array<char, kOfferBytes> offers = {};
   writeFormats(node_, offers.data(), offers.size());
   if (asked.empty()) {
-    return deviceFault(DeviceFaultKind::kUnsupported, 0, "no format that is taken; offers %s", offers.data());
+    return deviceFault(DeviceFaultKind::kUnsupported, 0, "no supported format; offers %s", offers.data());
   }
   return deviceFault(DeviceFaultKind::kUnsupported, 0, "format %s is not %s; offers %s", asked.data(),
-                     wanted ? "offered" : "taken", offers.data());
+                     wanted ? "offered" : "supported", offers.data());
 }
 
 DeviceFault CameraDevice::setFormat(const PixelFormat& wanted, const NodeFormat& before) {
@@ -134,8 +135,8 @@ DeviceFault CameraDevice::setFormat(const PixelFormat& wanted, const NodeFormat&
   if (format.fourcc != code(wanted.fourcc()) || format.width != width || format.height != height) {
     std::array<char, kOfferBytes> offers = {};
     writeSizes(node_, code(wanted.fourcc()), offers.data(), offers.size());
-    return deviceFault(DeviceFaultKind::kChanged, 0, "asked %dx%d, set %dx%d; %s offers %s", width, height,
-                       format.width, format.height, wanted.letters.data(), offers.data());
+    return deviceFault(DeviceFaultKind::kChanged, 0, "requested %dx%d, set %dx%d; %s offers %s", width,
+                       height, format.width, format.height, wanted.letters.data(), offers.data());
   }
   if (!format.whole) return deviceFault(DeviceFaultKind::kUnsupported, 0, "sends interlaced images");
   facts_.format = wanted;
@@ -162,7 +163,7 @@ DeviceFault CameraDevice::setRate() {
   if (settings_.rate > 0 && std::abs(facts_.rate - settings_.rate) > kRateTolerance * settings_.rate) {
     std::array<char, kOfferBytes> rates = {};
     writeRates(node_, code(facts_.format.fourcc()), facts_.width, facts_.height, rates.data(), rates.size());
-    return deviceFault(DeviceFaultKind::kChanged, 0, "asked %.4g frames a second, set %.4g; offers %s",
+    return deviceFault(DeviceFaultKind::kChanged, 0, "requested %.4g frames per second, set %.4g; offers %s",
                        settings_.rate, facts_.rate, rates.data());
   }
   return {};
@@ -173,17 +174,17 @@ DeviceFault CameraDevice::setBuffers() {
   if (!fault.ok()) return fault;
   facts_.buffers = node_.bufferCount();
   if (facts_.buffers < kFewestBuffers) {
-    return deviceFault(DeviceFaultKind::kUnsupported, 0, "gave %zu buffers, at least %zu are needed",
+    return deviceFault(DeviceFaultKind::kUnsupported, 0, "gave %zu buffers, at least %zu are required",
                        facts_.buffers, kFewestBuffers);
   }
   if (facts_.buffers < kMinBuffers) {
-    warn(deviceFault(DeviceFaultKind::kChanged, 0, "asked %u buffers, given %zu: frames may be missed",
+    warn(deviceFault(DeviceFaultKind::kChanged, 0, "requested %u buffers, got %zu: frames may be missed",
                      settings_.buffers, facts_.buffers));
   }
   facts_.event = eventOf(node_.stampFlags());
   if (facts_.event == StampEvent::kArrival) {
     fault = deviceFault(DeviceFaultKind::kUnsupported, 0,
-                        "stamps its images with another clock than CLOCK_MONOTONIC");
+                        "stamps its images with a clock other than CLOCK_MONOTONIC");
     if (settings_.require_monotonic) return fault;
     warn(fault);
   }
@@ -216,7 +217,8 @@ DeviceFault CameraDevice::closedBy(const DeviceFault& fault) {
 
 DeviceFault CameraDevice::next(CapturedFrame& frame) {
   frame.release();
-  if (!isOpen()) return deviceFault(DeviceFaultKind::kUnplugged, 0, "closed; waiting for it to come back");
+  if (!isOpen())
+    return deviceFault(DeviceFaultKind::kUnplugged, 0, "closed; waiting for the device to return");
   // Each refused buffer goes back to the driver, so that one call cannot be kept busy for ever.
   for (std::size_t attempt = 0; attempt < VideoNode::kMaxBuffers; ++attempt) {
     FilledBuffer filled;

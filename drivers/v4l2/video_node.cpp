@@ -61,7 +61,7 @@ DeviceFault VideoNode::open(const char* path, Role role) {
     const bool gone = errno == ENODEV;
     close();
     return gone ? openFault(ENODEV, path)
-                : deviceFault(DeviceFaultKind::kWrongDevice, 0, "%s is no video node", path);
+                : deviceFault(DeviceFaultKind::kWrongDevice, 0, "%s is not a video node", path);
   }
   const std::uint32_t offered = (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0
                                     ? capability.device_caps
@@ -217,9 +217,11 @@ bool VideoNode::dequeue(FilledBuffer& filled) const {
 DeviceFault VideoNode::start() {
   if (call(VIDIOC_STREAMON, &type_) != 0) {
     const bool unlinked = errno == ENOLINK || errno == EPIPE;
-    return callFault(errno, unlinked ? "started streaming: this camera's parts are not linked, or differ in "
-                                       "format; `media-ctl -p` shows them"
-                                     : "started streaming (VIDIOC_STREAMON)");
+    return callFault(
+        errno,
+        unlinked
+            ? "started streaming: this camera's parts are not linked, or differ in format; see `media-ctl -p`"
+            : "started streaming (VIDIOC_STREAMON)");
   }
   streaming_ = true;
   return {};

@@ -24,7 +24,7 @@ DeviceFault VideoOutput::open(const char* path, int width, int height) {
   if (node_.setFormat(format) != 0) fault = VideoNode::callFault(errno, "set the format");
   if (fault.ok() &&
       (format.fourcc != V4L2_PIX_FMT_GREY || format.width != width || format.height != height)) {
-    fault = deviceFault(DeviceFaultKind::kChanged, 0, "asked %dx%d GREY, set %dx%d", width, height,
+    fault = deviceFault(DeviceFaultKind::kChanged, 0, "requested %dx%d GREY, set %dx%d", width, height,
                         format.width, format.height);
   }
   width_ = width;
@@ -63,7 +63,7 @@ DeviceFault VideoOutput::write(const ImageView& image) {
     return deviceFault(DeviceFaultKind::kUnsupported, 0, "an image of %dx%d on a node set to %dx%d",
                        image.width, image.height, width_, height_);
   }
-  if (!canWrite()) return deviceFault(DeviceFaultKind::kBusy, 0, "all buffers wait to be shown");
+  if (!canWrite()) return deviceFault(DeviceFaultKind::kBusy, 0, "all buffers are waiting to be shown");
   const auto index = static_cast<std::uint32_t>(std::countr_zero(free_));
   std::uint8_t* out = node_.buffer(index).data();
   for (int y = 0; y < height_; ++y, out += stride_) {

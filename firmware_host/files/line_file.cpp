@@ -10,7 +10,7 @@ namespace {
 
 [[noreturn]] void failToWrite(const std::string& path) {
   throw InputError(path, 0, "", std::string("cannot be written: ") + std::strerror(errno),
-                   "Is the folder writable and the disk not full?");
+                   "Check that the folder is writable and the disk is not full");
 }
 
 }  // namespace

@@ -8,7 +8,7 @@ namespace swiftlet {
 void LostFiles::add(std::string_view what) {
   count_.fetch_add(1, std::memory_order_relaxed);
   // A terminal that is gone is no reason to fail either: the result is not looked at.
-  std::fprintf(stderr, "warning: %.*s (the run goes on without it)\n", static_cast<int>(what.size()),
+  std::fprintf(stderr, "warning: %.*s (the run continues without it)\n", static_cast<int>(what.size()),
                what.data());
   if (claimed_.exchange(true, std::memory_order_relaxed)) return;
   const std::size_t size = std::min(what.size(), text_.size() - 1);

@@ -21,12 +21,12 @@ NewFolder::NewFolder(const std::string& path, std::vector<std::string> names)
     : path_(folderOf(path)), part_(path_.string() + ".part"), names_(std::move(names)) {
   std::error_code error;
   if (fs::exists(path_, error)) {
-    throw InputError(path, 0, "", "is there already; it is never written over",
-                     "Name another folder, or remove this one");
+    throw InputError(path, 0, "", "already exists and is never overwritten",
+                     "Choose another folder or remove this one");
   }
   removeFiles();
   fs::create_directories(part_, error);
-  if (error) throw InputError(part_.string(), 0, "", error.message(), "Name a folder that can be made");
+  if (error) throw InputError(part_.string(), 0, "", error.message(), "Choose a folder that can be created");
 }
 
 NewFolder::~NewFolder() {
@@ -44,7 +44,7 @@ void NewFolder::commit() {
   std::error_code error;
   fs::rename(part_, path_, error);
   if (error) {
-    throw InputError(path_.string(), 0, "", error.message(), "Name a folder that is not there yet");
+    throw InputError(path_.string(), 0, "", error.message(), "Choose a folder that does not exist yet");
   }
 }
 

@@ -34,7 +34,7 @@ constexpr std::uint32_t kLargestNumber = 999'999;
 /// A board without a battery starts in 1970, or at the date of its image: 2020 and later is taken for set.
 constexpr int kFirstSetYear = 2020;
 constexpr int kTriesForName = 1000;
-constexpr const char* kFlightsRemedy = "Make flights.folder writable, or name another one";
+constexpr const char* kFlightsRemedy = "Make flights.folder writable, or choose another one";
 
 constexpr const char* word(RunKind kind) { return kind == RunKind::kFlight ? "flight" : "replay"; }
 
@@ -75,7 +75,7 @@ void removeFiles(const fs::path& folder, const Ours& ours) {
   for (const fs::path& path : found) {
     if (::unlink(path.c_str()) == 0 || errno == ENOENT) continue;
     throw InputError(path.string(), 0, "",
-                     std::string("of an earlier run, cannot be removed: ") + std::strerror(errno),
+                     std::string("from an earlier run cannot be removed: ") + std::strerror(errno),
                      "Give another folder with --out");
   }
 }
@@ -98,8 +98,8 @@ void removeRecording(const fs::path& folder) {
   }
   ::close(lock);
   if (in_use) {
-    throw InputError(folder.string(), 0, "", "this recording is being written or read by another program",
-                     "Give another folder with --out, or wait until that program has ended");
+    throw InputError(folder.string(), 0, "", "another program is writing or reading this recording",
+                     "Give another folder with --out, or wait until that program ends");
   }
   ::rmdir(folder.c_str());  // stays where something else is in it
 }
@@ -125,20 +125,20 @@ void makeFolders(const std::string& folder, const char* remedy) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) {
-    throw InputError(folder, 0, "", "this folder cannot be made: " + error.message(), remedy);
+    throw InputError(folder, 0, "", "cannot create this folder: " + error.message(), remedy);
   }
 }
 
 void refuseOthers(const std::string& folder, RunKind kind) {
-  constexpr const char* kRemedy = "Give another folder with --out, or --replace to have these files replaced";
+  constexpr const char* kRemedy = "Give another folder with --out, or --replace to overwrite these files";
   const std::optional<RunKind> held = runKindOf(folder);
   if (held == RunKind::kFlight || (held && kind == RunKind::kFlight)) {
-    throw InputError(folder, 0, "", fmt::format("holds a {} already", word(*held)), kRemedy);
+    throw InputError(folder, 0, "", fmt::format("already holds a {}", word(*held)), kRemedy);
   }
   if (held) return;
   const std::string file = firstRunFile(folder);
   if (file.empty()) return;
-  throw InputError(folder, 0, "", fmt::format("holds {} and no mark of a replay ({})", file, kRunMark),
+  throw InputError(folder, 0, "", fmt::format("holds {} but no mark of a replay ({})", file, kRunMark),
                    kRemedy);
 }
 
@@ -240,12 +240,11 @@ std::string makeFlightFolder(const std::string& parent, std::time_t now) {
     if (::mkdir(folder.c_str(), 0755) == 0) return folder;
     if (errno != EEXIST) {
       throw InputError(folder, 0, "",
-                       std::string("the flight's folder cannot be made: ") + std::strerror(errno),
+                       std::string("cannot create the flight's folder: ") + std::strerror(errno),
                        kFlightsRemedy);
     }
   }
-  throw InputError(parent, 0, "", "no number is left for a flight",
-                   "Name another folder with flights.folder");
+  throw InputError(parent, 0, "", "all flight numbers are used", "Set flights.folder to another folder");
 }
 
 std::vector<std::string> freeOldFlights(const std::string& parent, std::uint64_t bytes,
@@ -262,13 +261,12 @@ std::vector<std::string> freeOldFlights(const std::string& parent, std::uint64_t
     fs::remove_all(folder, error);
     available = freeBytes(parent);
     lines.push_back(
-        error ? fmt::format("{}: cannot be deleted to free space: {}", folder.string(), error.message())
-              : fmt::format("{}: deleted to free space (flights.keep_free_mib)", folder.string()));
+        error ? fmt::format("{}: cannot be deleted to free disk space: {}", folder.string(), error.message())
+              : fmt::format("{}: deleted to free disk space (flights.keep_free_mib)", folder.string()));
   }
   if (available && *available < bytes) {
     lines.push_back(
-        fmt::format("{}: {} MiB are free, {} are asked for by flights.keep_free_mib, and no older "
-                    "flight can be deleted",
+        fmt::format("{}: {} MiB free, flights.keep_free_mib requires {}, and no older flight can be deleted",
                     parent, *available / kMebibyte, bytes / kMebibyte));
   }
   return lines;

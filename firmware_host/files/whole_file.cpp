@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 [[noreturn]] void failToWrite(const std::string& path, int error) {
   throw InputError(path, 0, "", std::string("cannot be written: ") + std::strerror(error),
-                   "Is the folder there and writable, the disk not full?");
+                   "Check that the folder exists and is writable and the disk is not full");
 }
 
 /// The file behind a link; the path itself where there is none, or where the link leads nowhere.

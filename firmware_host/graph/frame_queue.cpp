@@ -49,7 +49,8 @@ bool FrameQueue::takeHead(std::size_t camera) {
 
 Status FrameQueue::pair(const CameraFrame& image) {
   // Handed over while the other camera's first image of the new time line was on its way.
-  if (image.timeline < timeline_) return {StatusCode::kInvalidInput, "image of a time line that has ended"};
+  if (image.timeline < timeline_)
+    return {StatusCode::kInvalidInput, "image from before the clock was restarted"};
   if (image.timeline > timeline_) {
     timeline_ = image.timeline;
     pairing_.restart();

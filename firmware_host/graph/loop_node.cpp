@@ -32,7 +32,7 @@ LoopNode::LoopNode(GraphContext& context)
   const KeptUse use = context.settings.loop.extend_map ? KeptUse::kExtend : KeptUse::kLocalize;
   const Status status = stage_.takeIn(*context.options.kept_map, use);
   if (status.ok()) return;
-  throw InputError(context.settings.loop.in_map, 0, "", status.what, "Name another kept map");
+  throw InputError(context.settings.loop.in_map, 0, "", status.what, "Choose another kept map");
 }
 
 bool LoopNode::turn() {

@@ -8,7 +8,7 @@ void RunObserver::onResult(const FrameResult& result) {
   const Stamp stamp = result.track_step.stamp;
   if (result.dropped > 0) {
     listener_.onRemark(
-        stamp, fmt::format("{} frame(s) before this one dropped: tracking was behind", result.dropped));
+        stamp, fmt::format("{} frame(s) before this one dropped: tracking is overloaded", result.dropped));
   }
   switch (result.kind) {
     case TrackMessage::Kind::kFrame:
@@ -18,10 +18,10 @@ void RunObserver::onResult(const FrameResult& result) {
       ++statistics_.frames;
       ++statistics_.frames_refused;
       ++statistics_.faults[result.track_status.what];
-      listener_.onRemark(stamp, std::string("frame refused: ") + result.track_status.what);
+      listener_.onRemark(stamp, std::string("frame rejected: ") + result.track_status.what);
       break;
     case TrackMessage::Kind::kImageRefused:
-      listener_.onRemark(stamp, std::string("image refused: ") + result.track_status.what);
+      listener_.onRemark(stamp, std::string("image rejected: ") + result.track_status.what);
       break;
     case TrackMessage::Kind::kEnd:
       noteEvents(result.output);
@@ -33,7 +33,7 @@ void RunObserver::onResult(const FrameResult& result) {
 void RunObserver::restart(std::uint32_t timeline, Stamp /*first*/) {
   timeline_ = timeline;
   keeper_->restart();
-  ++statistics_.faults["stamps went back: the map leaves out what was before"];
+  ++statistics_.faults["stamps went backwards: earlier keyframes are removed from the map"];
 }
 
 void RunObserver::onLoop(const LoopReport& report) {
@@ -133,7 +133,7 @@ void RunObserver::noteHealth(Stamp stamp, const OdometryOutput& output) {
     ++statistics_.poses;
   } else if (*output.waiting_for != '\0' && waiting_for_ != output.waiting_for) {
     waiting_for_ = output.waiting_for;
-    listener_.onRemark(stamp, "no pose yet, waiting for " + waiting_for_);
+    listener_.onRemark(stamp, "no pose yet: waiting for " + waiting_for_);
   }
   if (statistics_.first_pose) ++statistics_.frames_since_first_pose;
   const HealthChange now{stamp, output.state.health, output.state.epoch};

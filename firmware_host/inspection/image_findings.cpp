@@ -60,10 +60,10 @@ void addMissing(const std::vector<Stamp>& stamps, std::vector<Finding>& findings
   }
   findings.push_back(
       {"images dropped",
-       fmt::format("{} of {} images of camera 0 are missing between its stamps, every {:.4g} ms one; the "
-                   "longest step is {:.3f} s",
+       fmt::format("{} of {} images of camera 0 are missing, judged by their stamps (one every {:.4g} ms); "
+                   "the longest step is {:.3f} s",
                    missing, whole, 1e3 * period, longest),
-       "Record with less load: fewer topics, a faster disk, larger queues, or a lower rate"});
+       "Reduce the load while recording: fewer topics, a faster disk, larger queues, or a lower rate"});
 }
 
 void addDoubled(const std::vector<TrackedImage>& images, std::vector<Finding>& findings) {
@@ -93,10 +93,9 @@ void addDoubled(const std::vector<TrackedImage>& images, std::vector<Finding>& f
   }
   findings.push_back(
       {"images doubled",
-       fmt::format("{} of {} images of camera 0 show the same as the one before under a new stamp, in "
-                   "the midst of motion",
+       fmt::format("{} of {} images of camera 0 repeat the previous image under a new stamp during motion",
                    doubled, moving + doubled),
-       "Take the camera's own images: not from a video or topic converted to a higher rate"});
+       "Use the camera's own images, not a video or topic that was converted to a higher rate"});
 }
 
 void addJumps(const std::vector<TrackedImage>& images, std::vector<Finding>& findings) {
@@ -111,12 +110,11 @@ void addJumps(const std::vector<TrackedImage>& images, std::vector<Finding>& fin
     largest = std::max(largest, ratio);
   }
   if (jumps < kFewestJumps) return;
-  findings.push_back(
-      {"exposure jumps",
-       fmt::format("the same points become brighter or darker by more than {:.0f} % from one image to "
-                   "the next in {} of {} steps, at most {:.2f} times",
-                   100 * (kJump - 1), jumps, steps, largest),
-       "Fix exposure and gain, or use a control of exposure with small steps"});
+  findings.push_back({"exposure jumps",
+                      fmt::format("the brightness of the same points changes by more than {:.0f} % from one "
+                                  "image to the next in {} of {} steps, by up to {:.2f} times",
+                                  100 * (kJump - 1), jumps, steps, largest),
+                      "Fix exposure and gain, or use an exposure control with small steps"});
 }
 
 }  // namespace

@@ -76,14 +76,15 @@ class MotionInspector {
     const double calibrated_shift = calibration_.rig.camera_to_imu_shift.seconds();
     const std::optional<MotionFit> fit = fitter_.fit(calibrated_shift);
     if (!fit) {
-      measured_.push_back({"gyro beside images",
-                           fmt::format("too little motion to tell ({} turns of the camera)", turns_.size())});
+      measured_.push_back(
+          {"gyro beside images",
+           fmt::format("too little motion to decide ({} rotations of the camera)", turns_.size())});
       return findings_;
     }
     fit_ = *fit;
-    measured_.push_back(
-        {"gyro beside images", fmt::format("{} turns of {:.2f} deg rms, of which the gyro explains {:.1f} %",
-                                           fit_.turns, fit_.turned_deg, 100 * fit_.explained)});
+    measured_.push_back({"gyro beside images",
+                         fmt::format("{} rotations of {:.2f} deg rms; the gyro explains {:.1f} % of them",
+                                     fit_.turns, fit_.turned_deg, 100 * fit_.explained)});
     if (fit_.explained < kExplained) {
       addUnrelated();
       return findings_;
@@ -103,10 +104,10 @@ class MotionInspector {
     if (fit_.explained > kUnrelated || fit_.turned_deg < kLeastTurned || fit_.turns < kManyTurns) return;
     findings_.push_back(
         {"images and IMU do not belong together",
-         fmt::format("the camera turns by {:.2f} deg rms in {} steps, of which the gyro explains {:.0f} % at "
-                     "the best shift within {:g} s and with the best axes",
+         fmt::format("the camera rotates by {:.2f} deg rms in {} steps; the gyro explains {:.0f} % of it at "
+                     "the best time shift within {:g} s and with the best axes",
                      fit_.turned_deg, fit_.turns, 100 * fit_.explained, kMaxShift),
-         "Give stamps of one clock to images and samples, of the same flight"});
+         "Use images and samples of the same flight, stamped with one clock"});
   }
 
   /// Whether the accelerometer's readings have the size that gravity gives them.
@@ -116,18 +117,19 @@ class MotionInspector {
     if (force.inG()) {
       findings_.push_back(
           {"accelerometer in g",
-           fmt::format("the median of its readings is {:.3f}, and they hold still", force.median),
+           fmt::format("the median of its readings is {:.3f}, and the sensor is at rest", force.median),
            "Multiply the accelerometer's readings by 9.80665: swiftlet reads m/s^2"});
     } else if (force.median < kGravity) {
       findings_.push_back(
           {"accelerometer without gravity",
            fmt::format("the median of its readings is {:.2f} m/s^2, a tenth is below {:.2f}", force.median,
                        force.low),
-           "Give the raw readings: not linear acceleration, from which gravity was taken off"});
+           "Provide raw readings, not linear acceleration, from which gravity was subtracted"});
     } else {
-      findings_.push_back({"accelerometer of another unit or range",
-                           fmt::format("the median of its readings is {:.4g} m/s^2", force.median),
-                           "Give m/s^2, with the scale of the range that the accelerometer is set to"});
+      findings_.push_back(
+          {"accelerometer of another unit or range",
+           fmt::format("the median of its readings is {:.4g} m/s^2", force.median),
+           "Provide m/s^2, scaled for the measurement range that the accelerometer is set to"});
     }
     return false;
   }
@@ -139,15 +141,15 @@ class MotionInspector {
   void addShift(double calibrated) {
     const double off = fit_.shift - calibrated;
     measured_.push_back(
-        {"time shift", fmt::format("the log says {:+.1f} ms (sigma {:.1f} ms), the calibration {:+.1f} ms",
-                                   1e3 * fit_.shift, 1e3 * fit_.shift_sigma, 1e3 * calibrated)});
+        {"time shift",
+         fmt::format("estimated from the log {:+.1f} ms (sigma {:.1f} ms), calibration {:+.1f} ms",
+                     1e3 * fit_.shift, 1e3 * fit_.shift_sigma, 1e3 * calibrated)});
     if (std::abs(off) < std::max(kLeastShift, kSigmas * fit_.shift_sigma)) return;
     if (!decides(fitter_.gainOverShift(fit_, calibrated))) return;
     findings_.push_back(
         {std::abs(off) < 0.2 ? "image stamps shifted" : "image stamps of another clock",
-         fmt::format("the gyro shows the images' turns {:.4g} ms {} than their stamps say (sigma {:.1f} ms); "
-                     "the calibration "
-                     "says {:.4g} ms",
+         fmt::format("the gyro shows the images' rotations {:.4g} ms {} than their stamps (sigma {:.1f} ms); "
+                     "the calibration gives {:.4g} ms",
                      1e3 * std::abs(fit_.shift), fit_.shift > 0 ? "later" : "earlier", 1e3 * fit_.shift_sigma,
                      1e3 * calibrated),
          fmt::format("Stamp images and samples with one clock, or set timeshift_cam_imu to {:.4f} s",
@@ -156,22 +158,22 @@ class MotionInspector {
 
   void addScale() {
     measured_.push_back(
-        {"gyro", fmt::format("{:.4g} times its readings are the camera's turns", fit_.scale)});
+        {"gyro", fmt::format("{:.4g} times its readings are the camera's rotations", fit_.scale)});
     if (fit_.scale < kWrongScale && fit_.scale > 1 / kWrongScale) return;
     unit_ = fit_.scale;
     const double in_degrees = fit_.scale * kDegrees;
     if (in_degrees < kWrongScale && in_degrees > 1 / kWrongScale) {
       findings_.push_back(
           {"gyro in deg/s",
-           fmt::format("the camera turns by {:.4f} times the gyro's readings; pi / 180 is 0.0175",
+           fmt::format("the camera rotates by {:.4f} times the gyro's readings; pi / 180 is 0.0175",
                        fit_.scale),
            "Multiply the gyro's readings by pi / 180: swiftlet reads rad/s"});
       unit_ = 1 / kDegrees;
       return;
     }
     findings_.push_back({"gyro of another unit or range",
-                         fmt::format("the camera turns by {:.4g} times the gyro's readings", fit_.scale),
-                         "Give rad/s, with the scale of the range that the gyro is set to"});
+                         fmt::format("the camera rotates by {:.4g} times the gyro's readings", fit_.scale),
+                         "Provide rad/s, scaled for the measurement range that the gyro is set to"});
   }
 
   bool addMirrored() {
@@ -180,12 +182,12 @@ class MotionInspector {
     const Eigen::Matrix3d axes = nearestSignedAxes(fit_.mirrored.transpose() * R_calibrated_, angle);
     findings_.push_back(
         {"IMU axes left-handed",
-         fmt::format("the gyro's turns are those of the camera in a mirror{}",
+         fmt::format("the gyro's rotations are mirrored relative to the camera's{}",
                      angle * kDegrees < kSameAxes
-                         ? fmt::format("; beside the calibration it gives {}", axesText(axes))
+                         ? fmt::format("; relative to the calibration it gives {}", axesText(axes))
                          : std::string()),
-         "Exchange or negate axes of gyro and accelerometer so that x, y, z are right-handed as the sensor's "
-         "data sheet has them"});
+         "Swap or negate axes of gyro and accelerometer so that x, y, z are right-handed as in the sensor's "
+         "data sheet"});
     return true;
   }
 
@@ -197,22 +199,20 @@ class MotionInspector {
     const double sigma =
         both ? std::sqrt(off.normalized().dot(fit_.information.inverse() * off.normalized())) * kDegrees
              : 180;
-    measured_.push_back({"camera 0 in the IMU's axes",
-                         fmt::format("the log says that {}; the calibration differs by {:.1f} deg "
-                                     "(sigma {:.1f} deg)",
-                                     directions(fit_.R_cam_imu), degrees, std::min(sigma, 180.0))});
+    measured_.push_back(
+        {"camera 0 in the IMU's axes",
+         fmt::format("estimated from the log: {}; the calibration differs by {:.1f} deg (sigma {:.1f} deg)",
+                     directions(fit_.R_cam_imu), degrees, std::min(sigma, 180.0))});
     if (sigma > kLeastAngle || degrees < std::max(kLeastAngle, kSigmas * sigma)) return;
     if (!decides(fitter_.gainOverAxes(fit_, R_calibrated_))) return;
     turned_ = true;
     // Calibration files may put the body's axes elsewhere: what counts is what was written down.
     if (R_calibrated_.isIdentity(1e-6)) {
-      findings_.push_back(
-          {"camera and IMU with identity extrinsics",
-           fmt::format(
-               "the calibration's rotation between them is the identity; by the gyro, camera 0 is turned by "
-               "{:.0f} deg: in the IMU's axes {}",
-               degrees, directions(fit_.R_cam_imu)),
-           "Calibrate the rig and fill T_BS or T_cam_imu in"});
+      findings_.push_back({"camera and IMU with identity extrinsics",
+                           fmt::format("the calibrated rotation between them is the identity; according to "
+                                       "the gyro, camera 0 is rotated by {:.0f} deg: in the IMU's axes {}",
+                                       degrees, directions(fit_.R_cam_imu)),
+                           "Calibrate the rig and set T_BS or T_cam_imu"});
       return;
     }
     double angle = 0;
@@ -220,19 +220,17 @@ class MotionInspector {
     if (angle * kDegrees < kSameAxes && !axes.isIdentity(1e-6)) {
       findings_.push_back(
           {"IMU axes exchanged or negated",
-           fmt::format(
-               "beside the calibration, the gyro gives {}; camera 0 is turned by {:.0f} deg from where the "
-               "calibration has it",
-               axesText(axes), degrees),
-           "Give the IMU's axes as they were when the rig was calibrated, or calibrate again"});
+           fmt::format("relative to the calibration, the gyro gives {}; camera 0 is rotated by {:.0f} deg "
+                       "from its calibrated orientation",
+                       axesText(axes), degrees),
+           "Provide the IMU's axes as they were when the rig was calibrated, or calibrate again"});
       return;
     }
     findings_.push_back({"camera turned against its calibration",
-                         fmt::format("by the gyro, camera 0 is turned by {:.1f} deg (sigma {:.1f} deg) from "
-                                     "where the calibration has "
-                                     "it: in the IMU's axes {}",
+                         fmt::format("according to the gyro, camera 0 is rotated by {:.1f} deg (sigma {:.1f} "
+                                     "deg) from its calibrated orientation: in the IMU's axes {}",
                                      degrees, sigma, directions(fit_.R_cam_imu)),
-                         "Calibrate the rig again, or give the calibration of this rig"});
+                         "Calibrate the rig again, or use the calibration of this rig"});
   }
 
   /// Angle by which the camera is turned from where the calibration has it.
@@ -247,17 +245,16 @@ class MotionInspector {
     if (!focal) return false;
     measured_.push_back(
         {"focal length",
-         fmt::format("the log says {:.1f} px (sigma {:.1f} px), the calibration {:.1f} px",
+         fmt::format("estimated from the log {:.1f} px (sigma {:.1f} px), calibration {:.1f} px",
                      focal->ratio * camera_.focal(), focal->sigma * camera_.focal(), camera_.focal())});
     if (std::abs(std::log(focal->ratio)) < std::max(kLeastFocal, kSigmas * focal->sigma) ||
         focal->gain < kDecides)
       return false;
-    findings_.push_back(
-        {"wrong focal length",
-         fmt::format(
-             "turns of the gyro fit the images with {:.1f} px, {:.2f} times the {:.1f} px of the calibration",
-             focal->ratio * camera_.focal(), focal->ratio, camera_.focal()),
-         "Give the calibration of this camera at this image size"});
+    findings_.push_back({"wrong focal length",
+                         fmt::format("the gyro's rotations fit the images with {:.1f} px, {:.2f} times the "
+                                     "{:.1f} px of the calibration",
+                                     focal->ratio * camera_.focal(), focal->ratio, camera_.focal()),
+                         "Use the calibration of this camera at this image size"});
     return true;
   }
 
@@ -273,20 +270,17 @@ class MotionInspector {
     if (rms < kLeastJitter) return;
     const MotionFitter::Evenness evenness = fitter_.evenness(fit_, times);
     measured_.push_back(
-        {"image stamps",
-         fmt::format("{:.1f} ms rms off an even clock, of which the camera's turns say {:.0f} % "
-                     "(sigma {:.0f} %) are the stamps' error",
-                     1e3 * rms, 100 * evenness.share, 100 * evenness.sigma)});
+        {"image stamps", fmt::format("{:.1f} ms rms from an even clock; the camera's rotations attribute "
+                                     "{:.0f} % (sigma {:.0f} %) of it to the stamps",
+                                     1e3 * rms, 100 * evenness.share, 100 * evenness.sigma)});
     // Half of it at least, beyond doubt.
     if (evenness.share - 2 * evenness.sigma < 0.5 || evenness.share < kSigmas * evenness.sigma) return;
     findings_.push_back(
         {"image stamps jitter",
-         fmt::format(
-             "they are {:.1f} ms rms off an even clock, and the gyro shows that the images were taken evenly "
-             "({:.0f} % of it, sigma {:.0f} %)",
-             1e3 * rms, 100 * evenness.share, 100 * evenness.sigma),
-         "Stamp images when they are taken, not when they arrive: the driver's hardware stamps, or a trigger "
-         "line"});
+         fmt::format("they deviate {:.1f} ms rms from an even clock, and the gyro shows that the images were "
+                     "taken evenly ({:.0f} % of the deviation is in the stamps, sigma {:.0f} %)",
+                     1e3 * rms, 100 * evenness.share, 100 * evenness.sigma),
+         "Stamp images at capture, not at arrival: use the driver's hardware stamps or a trigger line"});
   }
 
   void addForce() {
@@ -300,7 +294,7 @@ class MotionInspector {
     const ForceFit force = fitter.fit(Eigen::Matrix3d::Identity());
     if (force.windows < kFewestWindows) return;
     measured_.push_back({"gravity by images and accelerometer",
-                         fmt::format("{:.2f} m/s^2 in {} stretches of motion, error {:.2f} px", force.gravity,
+                         fmt::format("{:.2f} m/s^2 from {} motion segments, error {:.2f} px", force.gravity,
                                      force.windows, force.error)});
     ForceFit best = force;
     Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
@@ -324,20 +318,18 @@ class MotionInspector {
     if (axes.isApprox(opposite)) {
       findings_.push_back(
           {"accelerometer negated",
-           fmt::format(
-               "in {} of {} stretches of motion the images accelerate against its readings; negated, they "
-               "fit, with gravity of {:.2f} m/s^2",
-               force.negative, force.windows, best.gravity),
+           fmt::format("in {} of {} motion segments the images accelerate against its readings; negated, the "
+                       "readings fit, with gravity of {:.2f} m/s^2",
+                       force.negative, force.windows, best.gravity),
            "Negate the accelerometer: at rest it reads +9.81 m/s^2 along the axis that points up"});
       return;
     }
     findings_.push_back(
         {"accelerometer axes exchanged or negated",
-         fmt::format(
-             "beside the gyro and the images it gives {}: put right, the images fit to {:.2f} px with "
-             "gravity of {:.2f} m/s^2; as it is, to {:.2f} px with {:.2f} m/s^2",
-             axesText(axes.transpose()), best.error, best.gravity, force.error, force.gravity),
-         "Give the accelerometer in the gyro's axes"});
+         fmt::format("relative to the gyro and the images it gives {}: corrected, the images fit to {:.2f} "
+                     "px with gravity of {:.2f} m/s^2; uncorrected, to {:.2f} px with {:.2f} m/s^2",
+                     axesText(axes.transpose()), best.error, best.gravity, force.error, force.gravity),
+         "Provide the accelerometer in the gyro's axes"});
   }
 
   /// Nearly all windows have the sign that is given, and gravity has its size.

@@ -35,12 +35,11 @@ void StereoOrder::add(const Pyramid& image0, const TrackedImage& points, const I
 
 std::optional<Finding> StereoOrder::finding() const {
   if (exchanged_ < kFewestMatches || exchanged_ < kTimesAsMany * as_given_) return {};
-  return Finding{
-      "cameras swapped",
-      fmt::format("of {} points of camera 0, {} are found in camera 1 as the calibration has it, and {} "
-                  "with the images exchanged",
-                  points_, as_given_, exchanged_),
-      "Exchange cam0 and cam1: the images, topics or devices, or both cameras' calibrations"};
+  return Finding{"cameras swapped",
+                 fmt::format("of {} points of camera 0, {} are found in camera 1 with the calibration as "
+                             "given, and {} with the images swapped",
+                             points_, as_given_, exchanged_),
+                 "Swap cam0 and cam1: the images, topics or devices, or both cameras' calibrations"};
 }
 
 }  // namespace swiftlet

@@ -35,9 +35,8 @@ bool FollowerThread::end(Duration limit) {
     return true;
   }
   abandoned_ = true;
-  fault_ =
-      fmt::format("thread {} did not end within {:.1f} s and was left behind{}{}", name_, limit.seconds(),
-                  *heart_.read().doing == '\0' ? "" : ", last seen at: ", heart_.read().doing);
+  fault_ = fmt::format("thread {} did not end within {:.1f} s and was abandoned{}{}", name_, limit.seconds(),
+                       *heart_.read().doing == '\0' ? "" : ", last seen at: ", heart_.read().doing);
   thread_.abandon();
   return false;
 }

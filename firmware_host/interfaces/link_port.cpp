@@ -31,8 +31,8 @@ std::uint16_t portOf(std::string_view text, std::string_view device, const char*
   std::uint16_t port = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
   if (error != std::errc{} || end != text.data() + text.size() || port == 0) {
-    throw InputError("settings", 0, setting, std::string(device) + ": no port from 1 to 65535",
-                     "Write udp:HOST:PORT, as udp:192.168.1.10:14550");
+    throw InputError("settings", 0, setting, std::string(device) + ": the port is not from 1 to 65535",
+                     "Write udp:HOST:PORT, for example udp:192.168.1.10:14550");
   }
   return port;
 }
@@ -64,8 +64,8 @@ std::optional<UdpAddress> udpAddress(std::string_view device, const char* settin
   address.port = portOf(colon == std::string_view::npos ? "" : rest.substr(colon + 1), device, setting);
   address.host = rest.substr(0, colon);
   if (address.host.empty()) {
-    throw InputError("settings", 0, setting, std::string(device) + ": no host",
-                     "Write udp:HOST:PORT, as udp:192.168.1.10:14550");
+    throw InputError("settings", 0, setting, std::string(device) + ": the host is missing",
+                     "Write udp:HOST:PORT, for example udp:192.168.1.10:14550");
   }
   return address;
 }
@@ -172,11 +172,12 @@ bool LinkPort::flush() {
 
 DeviceFault LinkPort::write(std::span<const std::uint8_t> bytes) {
   if (udp_) return sendDatagram(bytes);
-  if (bytes.size() > kept_.size()) return deviceFault(DeviceFaultKind::kFailed, 0, "too long a write");
+  if (bytes.size() > kept_.size()) return deviceFault(DeviceFaultKind::kFailed, 0, "the message is too long");
   if (!serial_.isOpen()) return deviceFault(DeviceFaultKind::kUnplugged, 0, "the port is closed");
   if (!flush()) {
     if (!serial_.isOpen()) return deviceFault(DeviceFaultKind::kUnplugged, 0, "in a write");
-    return deviceFault(DeviceFaultKind::kFailed, 0, "%zu bytes wait to be taken", kept_end_ - kept_begin_);
+    return deviceFault(DeviceFaultKind::kFailed, 0, "%zu bytes are waiting to be sent",
+                       kept_end_ - kept_begin_);
   }
   std::copy(bytes.begin(), bytes.end(), kept_.begin());
   kept_begin_ = 0;
@@ -194,7 +195,7 @@ DeviceFault LinkPort::sendDatagram(std::span<const std::uint8_t> bytes) {
   // The answer to an earlier datagram: nobody was there. This one has not been tried yet.
   if (sent < 0 && errno == ECONNREFUSED) sent = send();
   if (sent == static_cast<ssize_t>(bytes.size()) || errno == ECONNREFUSED) return {};
-  return deviceFault(DeviceFaultKind::kFailed, errno, "datagram not taken");
+  return deviceFault(DeviceFaultKind::kFailed, errno, "the datagram was not accepted");
 }
 
 }  // namespace swiftlet

@@ -26,25 +26,25 @@ constexpr double kBentGyro = 0.01;      // of a reading: two sigmas of a sensor 
 const char* remedy(Doubt doubt) {
   switch (doubt) {
     case Doubt::kNoImage:
-      return "no images, or dark ones: cables, exposure, light";
+      return "no images or dark images: check cables, exposure, light";
     case Doubt::kImplausible:
-      return "beyond health.max_speed or health.max_acceleration: calibration, axes, stamps";
+      return "above health.max_speed or health.max_acceleration: check calibration, axes, stamps";
     case Doubt::kTracksDisagree:
-      return "tracks do not fit one motion: calibration, rolling shutter, stamps, or a moving scene";
+      return "tracks do not fit one motion: check calibration, rolling shutter, stamps; or the scene moves";
     case Doubt::kImuDisagrees:
-      return "IMU and images disagree: T_body_cam, the IMU's axes, stamps, noise figures";
+      return "IMU and images disagree: check T_body_cam, the IMU's axes, stamps, noise densities";
     case Doubt::kUncertain:
-      return "velocity or tilt is known badly: few or far features, noise figures";
+      return "velocity or tilt is uncertain: few or distant features; check noise densities";
     case Doubt::kScaleDisagrees:
-      return "the accelerometer says another scale: focal length, T_body_cam, stamps";
+      return "the accelerometer contradicts the scale: check focal length, T_body_cam, stamps";
     case Doubt::kScaleUnknown:
-      return "one camera: the scale shows only when the body accelerates";
+      return "one camera: the scale is observable only while the body accelerates";
     case Doubt::kSettling:
-      return "starts and interruptions: missing images or samples, resets";
+      return "start or interruption: check for missing images, missing samples, resets";
     case Doubt::kCameraMissing:
       return "images of one camera are missing";
     case Doubt::kFewSightings:
-      return "few features: texture, light, motion blur, focus";
+      return "few features: check texture, light, motion blur, focus";
     case Doubt::kNone:
       break;
   }
@@ -154,22 +154,22 @@ std::vector<std::string> RunVerdict::words() const {
   std::vector<std::string> words{first};
   if (mean(pixel_sigma_s_) > kNoisyTracks * first_pixel_sigma_) {
     words.push_back(
-        fmt::format("  tracks fit to {:.1f} px on average, smoother.pixel_sigma is {:.2f}: "
-                    "calibration, rolling shutter, stamps or motion blur",
+        fmt::format("  track residuals average {:.1f} px, smoother.pixel_sigma is {:.2f}: check calibration, "
+                    "rolling shutter, stamps, motion blur",
                     mean(pixel_sigma_s_), first_pixel_sigma_));
   }
   for (const auto& [sensor, sum] : {std::pair("gyro", gyro_factor_s_), std::pair("accel", accel_factor_s_)}) {
     if (mean(sum) < kNoisyImu) continue;
-    words.push_back(fmt::format(
-        "  the {} errs {:.1f} times as much as its density and imu.{}_inflation say: vibration, or a "
-        "density too small",
-        sensor, mean(sum), sensor));
+    words.push_back(
+        fmt::format("  errors of the {} are {:.1f} times its noise density with imu.{}_inflation: vibration, "
+                    "or the density is too small",
+                    sensor, mean(sum), sensor));
   }
   const double bent = calibration_ ? calibration_->gyro.matrix.cwiseAbs().maxCoeff() : 0;
   if (bent > kBentGyro) {
     words.push_back(
-        fmt::format("  the gyro's scale or axes are off by up to {:.1f} %, as estimated: its "
-                    "calibration, or that of the cameras",
+        fmt::format("  the gyro's scale or axes are off by up to {:.1f} % (estimated): check its calibration "
+                    "and that of the cameras",
                     100 * bent));
   }
   for (const auto& [doubt, seconds] : by_doubt_) {

@@ -22,8 +22,8 @@ namespace {
 
 constexpr std::size_t kKernelNameLength = 15;
 constexpr const char* kPriorityRemedy =
-    "give the program the right: `setcap cap_sys_nice+ep` on it, `LimitRTPRIO=99` in its systemd unit, or "
-    "`ulimit -r 99` (rtprio in /etc/security/limits.conf); in a control group of version 1 also "
+    "grant the permission: `setcap cap_sys_nice+ep` on the program, `LimitRTPRIO=99` in its systemd unit, or "
+    "`ulimit -r 99` (rtprio in /etc/security/limits.conf); in a version 1 control group also "
     "cpu.rt_runtime_us above 0";
 
 ThreadPolicy policyOf(int kernel_policy) {
@@ -164,12 +164,13 @@ ThreadReport FlightThread::start(const ThreadSettings& settings, std::function<v
     return report;
   }
   if (settings.priority < 0 || settings.priority > sched_get_priority_max(SCHED_FIFO)) {
-    say(fmt::format("priority {} does not exist: 1 to {}, or 0 for SCHED_OTHER", settings.priority,
+    say(fmt::format("priority {} is invalid: 1 to {}, or 0 for SCHED_OTHER", settings.priority,
                     sched_get_priority_max(SCHED_FIFO)));
     return report;
   }
   bool pinned = settings.cpu >= 0 && settings.cpu < CPU_SETSIZE;
-  if (settings.cpu >= CPU_SETSIZE) say(fmt::format("there is no CPU {}: it runs on any", settings.cpu));
+  if (settings.cpu >= CPU_SETSIZE)
+    say(fmt::format("CPU {} does not exist: the thread may run on any", settings.cpu));
   core_ = std::make_unique<Core>();
   if (!core_->stack.reserve(settings.stack_bytes)) {
     say(fmt::format("no memory for a stack of {} bytes ({}): lower it or raise RLIMIT_MEMLOCK (`ulimit -l`)",
@@ -184,18 +185,18 @@ ThreadReport FlightThread::start(const ThreadSettings& settings, std::function<v
   // One wish after the other is given up, whichever the kernel refuses first.
   while ((error == EINVAL && pinned) || (error == EPERM && fifo)) {
     if (error == EINVAL) {
-      say(fmt::format("CPU {} does not exist or is not allowed to this process: it runs on any",
+      say(fmt::format("CPU {} does not exist or is not allowed for this process: the thread may run on any",
                       settings.cpu));
       pinned = false;
     } else {
-      say(fmt::format("no right to SCHED_FIFO {}, it runs under SCHED_OTHER: {}", settings.priority,
+      say(fmt::format("no permission for SCHED_FIFO {}, runs under SCHED_OTHER: {}", settings.priority,
                       kPriorityRemedy));
       fifo = false;
     }
     error = create(settings, fifo, pinned);
   }
   if (error != 0) {
-    say(fmt::format("the thread cannot be made ({})", errorText(error)));
+    say(fmt::format("cannot create the thread ({})", errorText(error)));
     core_.reset();
     return report;
   }
@@ -233,9 +234,9 @@ void FlightThread::begin(Core& core) {
   try {
     core.entry();
   } catch (const std::exception& error) {
-    core.fault = *error.what() == '\0' ? "an exception without text" : error.what();
+    core.fault = *error.what() == '\0' ? "exception without text" : error.what();
   } catch (...) {
-    core.fault = "something that is no std::exception was thrown";
+    core.fault = "an object that is not a std::exception was thrown";
   }
   core.faults = ownFaults() - core.faults_before;
   if (watch != nullptr) watch(core.name.c_str(), false);

@@ -28,7 +28,7 @@ MachineLine idleStates(const Machine& machine) {
     name = machine.text(path + "/name").value_or("unnamed");
   }
   if (slowest < 0) return unknown(what);
-  std::string found = fmt::format("deepest {}, which takes {} us to leave", name, slowest);
+  std::string found = fmt::format("deepest {}, wake-up takes {} us", name, slowest);
   if (slowest <= kQuick) return {what, std::move(found), MachineVerdict::kGood, ""};
   return {what, std::move(found), MachineVerdict::kPoor,
           fmt::format("`cpupower idle-set -D {}`, or processor.max_cstate=1 in the kernel's command line",
@@ -61,15 +61,16 @@ MachineLine interrupts(const Machine& machine) {
   const std::int64_t all = std::accumulate(counts.begin(), counts.end(), std::int64_t{0});
   const auto busiest = std::ranges::max_element(counts);
   constexpr std::int64_t kPercent = 100;
-  std::string found = fmt::format("CPU {} takes {} % of the devices'", busiest - counts.begin(),
+  std::string found = fmt::format("CPU {} handles {} % of the devices'", busiest - counts.begin(),
                                   all > 0 ? *busiest * kPercent / all : 0);
   // A camera's and an IMU's own are some hundred.
   constexpr double kMany = 5000;  // a second
   const double rate = uptime > 0 ? static_cast<double>(all) / uptime : kMany;
   if (uptime > 0) found += fmt::format(", {:.0f} a second since boot", rate);
   if (rate < kMany) return {what, std::move(found), MachineVerdict::kGood, ""};
-  return {what, std::move(found), MachineVerdict::kNote,
-          "keep realtime.*_cpu off that CPU, or move them by /proc/irq/<number>/smp_affinity_list"};
+  return {
+      what, std::move(found), MachineVerdict::kNote,
+      "keep realtime.*_cpu off that CPU, or move the interrupts with /proc/irq/<number>/smp_affinity_list"};
 }
 
 }  // namespace swiftlet

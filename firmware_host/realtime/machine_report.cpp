@@ -44,13 +44,13 @@ MachineLine throttling(const Machine& machine) {
   const auto period = machine.number("/proc/sys/kernel/sched_rt_period_us");
   if (!runtime || !period || *period <= 0) return unknown(what);
   if (*runtime < 0) {
-    return {what, "off: a real-time thread that never sleeps would hold its CPU for good",
+    return {what, "off: a real-time thread that never sleeps would occupy its CPU forever",
             MachineVerdict::kNote, ""};
   }
   const double share = kPercent * static_cast<double>(*runtime) / static_cast<double>(*period);
   std::string found = fmt::format("on: real-time threads get {:.1f} % of {:.3f} s", share,
                                   static_cast<double>(*period) * 1e-6);
-  if (hasFairServer(machine)) found += ", the rest only when other threads starve";
+  if (hasFairServer(machine)) found += ", the rest only if other threads starve";
   // The flight threads sleep more than half of the time: a share below this is a setting gone wrong.
   constexpr double kLeastShare = 90;
   if (share >= kLeastShare) return {what, found, MachineVerdict::kGood, ""};
@@ -135,7 +135,7 @@ MachineLine cpus(const Machine& machine) {
   std::string found = fmt::format("{} ({}), isolated: {}", *count, *online, isolated ? apart : "unknown");
   // Tracking and smoothing run at the same time.
   if (*count < 2)
-    return {what, std::move(found), MachineVerdict::kPoor, "tracking and smoothing want one each"};
+    return {what, std::move(found), MachineVerdict::kPoor, "tracking and smoothing need one each"};
   const bool some = isolated && !isolated->empty();
   return {what, std::move(found), some ? MachineVerdict::kGood : MachineVerdict::kNote,
           some ? "" : "isolcpus= in the kernel's command line and realtime.*_cpu keep other work away"};
@@ -157,7 +157,7 @@ MachineLine governor(const Machine& machine) {
   }
   return {
       what, fmt::format("{}", fmt::join(seen, ", ")), MachineVerdict::kPoor,
-      "`cpupower frequency-set -g performance`: clocks that rise only under load make the first frames slow"};
+      "`cpupower frequency-set -g performance`: a clock that rises only under load slows the first frames"};
 }
 
 /// This process's control group in the hierarchy whose controllers include `controller` ("" is version 2).
@@ -238,8 +238,8 @@ MachineLine quotaLine(const Machine& machine) {
   if (!quota.found) return unknown(what);
   if (quota.cpus <= 0) return {what, "none", MachineVerdict::kGood, ""};
   return {what, fmt::format("{:.2f} CPUs' worth of time", quota.cpus), MachineVerdict::kPoor,
-          "take the quota off the control group (docker --cpus, systemd CPUQuota=): once it is used up "
-          "everything stops until the next period"};
+          "remove the quota of the control group (docker --cpus, systemd CPUQuota=): once it is used up, all "
+          "threads stop until the next period"};
 }
 
 MachineLine realtimeQuota(const Machine& machine) {
@@ -271,10 +271,9 @@ MachineLine clockLine(const Machine& machine) {
   // Those that are read without entering the kernel.
   const bool fast = *source == "tsc" || *source == "kvm-clock" || *source == "arch_sys_counter" ||
                     *source == "hyperv_clocksource_tsc_page";
-  return {what, *source, fast ? MachineVerdict::kGood : MachineVerdict::kNote,
-          fast
-              ? ""
-              : "each reading of the clock enters the kernel: see clocksource= of the kernel's command line"};
+  return {
+      what, *source, fast ? MachineVerdict::kGood : MachineVerdict::kNote,
+      fast ? "" : "each clock reading enters the kernel: check clocksource= in the kernel's command line"};
 }
 
 }  // namespace

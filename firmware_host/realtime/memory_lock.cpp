@@ -26,7 +26,7 @@ namespace swiftlet {
 namespace {
 
 constexpr const char* kLockRemedy =
-    "give the program the right: `setcap cap_ipc_lock+ep` on it, `LimitMEMLOCK=infinity` in its systemd "
+    "grant the permission: `setcap cap_ipc_lock+ep` on the program, `LimitMEMLOCK=infinity` in its systemd "
     "unit, or `ulimit -l unlimited` (memlock in /etc/security/limits.conf)";
 
 std::size_t pageBytes() { return static_cast<std::size_t>(sysconf(_SC_PAGESIZE)); }
@@ -83,7 +83,7 @@ MemoryLockReport lockMemory() {
     report.future = !limited;
     if (limited) {
       report.message = fmt::format(
-          "memory that is mapped from now on is not locked, RLIMIT_MEMLOCK of {} bytes might refuse it: {}",
+          "memory mapped from now on is not locked; RLIMIT_MEMLOCK of {} bytes might refuse it: {}",
           report.limit_bytes, kLockRemedy);
     }
     return report;
@@ -92,8 +92,7 @@ MemoryLockReport lockMemory() {
   report.message =
       limited
           ? fmt::format(
-                "memory is not locked ({}): {:.1f} MiB are mapped, RLIMIT_MEMLOCK allows {:.1f} "
-                "MiB; {}",
+                "memory is not locked ({}): {:.1f} MiB are mapped, RLIMIT_MEMLOCK allows {:.1f} MiB; {}",
                 std::generic_category().message(error), static_cast<double>(report.mapped_bytes) / kMebibyte,
                 static_cast<double>(report.limit_bytes) / kMebibyte, kLockRemedy)
           : fmt::format("memory is not locked ({}): {}", std::generic_category().message(error), kLockRemedy);
@@ -150,7 +149,7 @@ void reserveHeap(std::size_t bytes) {
   for (void* block : blocks) std::free(block);
 }
 #else
-std::string confineMalloc() { return "this C library's malloc cannot be confined: nothing was done"; }
+std::string confineMalloc() { return "this C library's malloc cannot be confined: unchanged"; }
 void reserveHeap(std::size_t) {}
 #endif
 
@@ -166,8 +165,8 @@ LibraryReport confineLibraries() {
     names += (names.empty() ? "" : ", ") + std::string(entry.library);
   }
   report.threads = threadsOfProcess();
-  report.message = names.empty() ? std::string("no library that runs threads of its own is linked")
-                                 : "held to one thread: " + names;
+  report.message = names.empty() ? std::string("no library with its own threads is linked")
+                                 : "limited to one thread: " + names;
   return report;
 }
 

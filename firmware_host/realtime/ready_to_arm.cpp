@@ -24,16 +24,16 @@ __attribute__((format(printf, 4, 5))) void lack(ArmingVerdict& verdict, ArmingCo
 
 void checkThreads(const ArmingFacts& facts, ArmingVerdict& verdict) {
   if (facts.flight_threads <= 0) {
-    lack(verdict, ArmingCondition::kRights, "start the executor", "no flight thread runs");
+    lack(verdict, ArmingCondition::kRights, "start the executor", "no flight thread is running");
   } else if (facts.threads_without_priority > 0) {
     lack(verdict, ArmingCondition::kRights,
-         "set realtime.enabled and give the right to SCHED_FIFO (the thread table at the start says how)",
-         "%d of %d flight threads are without their priority, the first: %s", facts.threads_without_priority,
+         "set realtime.enabled and grant SCHED_FIFO (see the thread table at the start)",
+         "%d of %d flight threads have no real-time priority, first: %s", facts.threads_without_priority,
          facts.flight_threads, facts.first_without_priority);
   }
   if (!facts.memory_locked) {
     lack(verdict, ArmingCondition::kMemoryLocked,
-         "set realtime.lock_memory and give the right to lock memory (`ulimit -l unlimited`, CAP_IPC_LOCK)",
+         "set realtime.lock_memory and grant memory locking (`ulimit -l unlimited`, CAP_IPC_LOCK)",
          "memory is not locked");
   }
 }
@@ -41,18 +41,18 @@ void checkThreads(const ArmingFacts& facts, ArmingVerdict& verdict) {
 void checkClocks(const ArmingFacts& facts, const ArmingSettings& settings, ArmingVerdict& verdict) {
   if (facts.reversed_stamps > 0) {
     lack(verdict, ArmingCondition::kClocks,
-         "look for two drivers on one device, or a clock that is being set", "%llu stamps did not advance",
+         "check for two drivers on one device, or a clock that is being set", "%llu stamps did not advance",
          static_cast<unsigned long long>(facts.reversed_stamps));
   }
   if (!facts.has_sample || !facts.has_image) {
-    lack(verdict, ArmingCondition::kClocks, "wait for the sensors, or look at their cables",
+    lack(verdict, ArmingCondition::kClocks, "wait for the sensors, or check their cables",
          "no %s yet: clocks cannot be compared", facts.has_sample ? "image" : "IMU sample");
     return;
   }
   const Duration offset = facts.newest_sample - facts.newest_image;
   if (offset > settings.sensor_offset || offset < -settings.sensor_offset) {
-    lack(verdict, ArmingCondition::kClocks, "look at the time synchronization of camera and IMU",
-         "the newest IMU sample is %.1f ms after the newest image, at most %.1f ms either way are allowed",
+    lack(verdict, ArmingCondition::kClocks, "check the time synchronization of camera and IMU",
+         "the newest IMU sample is %.1f ms after the newest image; allowed are %.1f ms either way",
          offset.seconds() * kToMs, settings.sensor_offset.seconds() * kToMs);
   }
 }
@@ -63,41 +63,41 @@ void checkSensors(const ArmingFacts& facts, const ArmingSettings& settings, Armi
   const bool at_rate =
       facts.imu_rate_expected > 0 && std::abs(facts.imu_rate - facts.imu_rate_expected) <= allowed;
   if (facts.has_sample && facts.sample_age > settings.sample_age) {
-    lack(verdict, ArmingCondition::kSensors, "look at the IMU's cable, its bus and its power",
-         "the IMU has delivered nothing for %.1f ms", facts.sample_age.seconds() * kToMs);
+    lack(verdict, ArmingCondition::kSensors, "check the IMU's cable, bus and power",
+         "no IMU sample for %.1f ms", facts.sample_age.seconds() * kToMs);
   } else if (!at_rate) {
     lack(verdict, ArmingCondition::kSensors,
-         "look at the IMU's rate in its calibration (update_rate), its settings and its bus",
-         "the IMU delivers at %.1f Hz, expected are %.1f Hz within %.0f %%", facts.imu_rate,
-         facts.imu_rate_expected, settings.imu_rate_tolerance * kPercent);
+         "check the IMU's rate in its calibration (update_rate), its settings and its bus",
+         "the IMU rate is %.1f Hz, expected %.1f Hz within %.0f %%", facts.imu_rate, facts.imu_rate_expected,
+         settings.imu_rate_tolerance * kPercent);
   }
   const int cameras = std::min(facts.cameras, static_cast<int>(kMaxCameras));
   if (cameras <= 0) {
-    lack(verdict, ArmingCondition::kSensors, "give a calibration with a camera", "the rig has no camera");
+    lack(verdict, ArmingCondition::kSensors, "use a calibration with a camera", "the rig has no camera");
   }
   for (int i = 0; i < cameras; ++i) {
     const auto camera = static_cast<std::size_t>(i);
     if (!facts.has_image_of[camera]) {
-      lack(verdict, ArmingCondition::kSensors, "look at its cable and driver",
-           "camera %d has delivered nothing", i);
+      lack(verdict, ArmingCondition::kSensors, "check its cable and driver", "no image from camera %d", i);
     } else if (facts.image_age[camera] > settings.image_age) {
-      lack(verdict, ArmingCondition::kSensors, "look at its cable and driver",
-           "camera %d has delivered nothing for %.1f ms", i, facts.image_age[camera].seconds() * kToMs);
+      lack(verdict, ArmingCondition::kSensors, "check its cable and driver",
+           "no image from camera %d for %.1f ms", i, facts.image_age[camera].seconds() * kToMs);
     }
   }
 }
 
 void checkInitialized(const ArmingFacts& facts, const ArmingSettings& settings, ArmingVerdict& verdict) {
   if (!facts.health_good) {
-    lack(verdict, ArmingCondition::kInitialized, "hold still, then move gently where there is texture",
+    lack(verdict, ArmingCondition::kInitialized, "hold still, then move gently in view of texture",
          "the estimator's health is not good");
   } else if (facts.health_good_for < settings.steady) {
-    lack(verdict, ArmingCondition::kInitialized, "wait", "health has been good for %.1f s, %.1f s are wanted",
-         facts.health_good_for.seconds(), settings.steady.seconds());
+    lack(verdict, ArmingCondition::kInitialized, "wait",
+         "health has been good for %.1f s, %.1f s are required", facts.health_good_for.seconds(),
+         settings.steady.seconds());
   }
   if (facts.epoch_steady_for < settings.steady) {
     lack(verdict, ArmingCondition::kInitialized, "wait",
-         "the last initialization is %.1f s old, %.1f s are wanted", facts.epoch_steady_for.seconds(),
+         "the last initialization is %.1f s old, %.1f s are required", facts.epoch_steady_for.seconds(),
          settings.steady.seconds());
   }
 }
@@ -105,10 +105,10 @@ void checkInitialized(const ArmingFacts& facts, const ArmingSettings& settings, 
 void checkRecorder(const ArmingFacts& facts, ArmingVerdict& verdict) {
   if (!facts.recorder_wanted) return;
   if (!facts.recorder_running) {
-    lack(verdict, ArmingCondition::kRecorder, "look at the recording's folder and the space left there",
-         "the flight recorder does not run");
+    lack(verdict, ArmingCondition::kRecorder, "check the recording's folder and its free space",
+         "the flight recorder is not running");
   } else if (facts.recorder_lost > 0) {
-    lack(verdict, ArmingCondition::kRecorder, "record to a faster disk, or begin a new recording",
+    lack(verdict, ArmingCondition::kRecorder, "record to a faster disk, or start a new recording",
          "the flight recorder has lost %llu records", static_cast<unsigned long long>(facts.recorder_lost));
   }
 }
@@ -116,16 +116,16 @@ void checkRecorder(const ArmingFacts& facts, ArmingVerdict& verdict) {
 void checkEffort(const ArmingFacts& facts, ArmingVerdict& verdict) {
   if (facts.track_level == 0 && facts.smooth_level == 0) return;
   lack(verdict, ArmingCondition::kEffort,
-       "take load off the machine, or lower frontend.max_features and effort.iterations",
-       "stages work below full effort: tracking by %d levels, smoothing by %d", facts.track_level,
+       "reduce the load of this computer, or lower frontend.max_features and effort.iterations",
+       "stages run below full effort: tracking by %d levels, smoothing by %d", facts.track_level,
        facts.smooth_level);
 }
 
 void checkMembers(const ArmingFacts& facts, ArmingVerdict& verdict) {
   if (facts.members_unwell == 0) return;
   lack(verdict, ArmingCondition::kMembers,
-       "wait if it is late; if it is lost, look into events.log and start the program again",
-       "%s is %s: %s%s", facts.first_unwell, facts.first_unwell_is, facts.first_unwell_text,
+       "wait if it is late; if it is lost, see events.log and restart the program", "%s is %s: %s%s",
+       facts.first_unwell, facts.first_unwell_is, facts.first_unwell_text,
        facts.members_unwell > 1 ? ", and others" : "");
 }
 

@@ -76,7 +76,7 @@ struct ArmingFacts {
   int members_unwell = 0;              ///< by the supervisor's table
   const char* first_unwell = "";       ///< its name
   const char* first_unwell_is = "";    ///< "late", "lost"
-  const char* first_unwell_text = "";  ///< "no turn for 0.4 s"
+  const char* first_unwell_text = "";  ///< "no progress for 0.4 s"
 };
 
 struct ArmingSettings {

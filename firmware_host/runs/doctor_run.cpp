@@ -27,9 +27,8 @@ bool namesDevices(const Settings& settings) {
 }
 
 constexpr const char* kSlowTopics =
-    "messages are lost on the way: `sysctl net.core.rmem_max` of 10 MB, drivers on this computer, fewer "
-    "other "
-    "subscribers and topics";
+    "messages are lost in transit: set `sysctl net.core.rmem_max` to 10 MB, run drivers on this computer, "
+    "use fewer subscribers and topics";
 
 MachineLine line(const std::string& what, std::string found, bool good, std::string remedy) {
   return {what, std::move(found), good ? MachineVerdict::kGood : MachineVerdict::kPoor,
@@ -85,15 +84,14 @@ class VehicleCheck {
     const CountingSink::Stream& stream = sink_.imu();
     const double wanted = calibration_.noise.rate_hz;
     constexpr double kTolerance = 0.05;  // of the rate
-    report.lines.push_back(
-        line("IMU rate", fmt::format("{:.1f} Hz, calibration {:.1f} Hz", stream.rate(), wanted),
-             std::abs(stream.rate() - wanted) < kTolerance * wanted,
-             stream.stamps.empty() ? (topics_.imu.empty() ? "nothing came: check power and wires, and that "
-                                                            "imu_link.protocol and imu_link.baud are the "
-                                                            "device's"
-                                                          : "nothing came: look whether its driver runs")
-                                   : "set the device's output rate, or correct rate_hz in "
-                                     "the calibration: its noise depends on it"));
+    report.lines.push_back(line(
+        "IMU rate", fmt::format("{:.1f} Hz, calibration {:.1f} Hz", stream.rate(), wanted),
+        std::abs(stream.rate() - wanted) < kTolerance * wanted,
+        stream.stamps.empty() ? (topics_.imu.empty() ? "no samples: check power and wires, and that "
+                                                       "imu_link.protocol and imu_link.baud match the device"
+                                                     : "no samples: check that the driver is running")
+                              : "set the device's output rate, or correct rate_hz in the calibration: the "
+                                "noise depends on it"));
     if (const std::string asked = input_.imu().link().stream(); !asked.empty()) {
       report.lines.push_back({"IMU stream", asked, MachineVerdict::kNote, ""});
     }
@@ -102,38 +100,37 @@ class VehicleCheck {
     const Duration largest = stream.largestStep();
     report.lines.push_back(line(
         "IMU gaps",
-        fmt::format("largest step {:.2f} ms, usual {:.2f} ms", largest.seconds() * kToMs,
+        fmt::format("largest step {:.2f} ms, median {:.2f} ms", largest.seconds() * kToMs,
                     typical.seconds() * kToMs),
         largest < typical + typical + typical,
-        topics_.imu.empty() ? "samples are lost on the way: raise the baud rate, or take other outputs off"
+        topics_.imu.empty() ? "samples are lost in transit: raise the baud rate, or disable other outputs"
                             : kSlowTopics));
     const ImuStatus status = input_.imu().status();
     if (status.by_driver > 0) {
       report.lines.push_back(
-          {"IMU clock", "the wall clock, by the driver's stamps", MachineVerdict::kGood, ""});
+          {"IMU clock", "wall clock, from the driver's stamps", MachineVerdict::kGood, ""});
       return;
     }
     if (status.by_arrival > 0) {
-      report.lines.push_back({"IMU clock", "the device sends none: samples are stamped as they arrive",
-                              MachineVerdict::kPoor, "switch its time output on"});
+      report.lines.push_back({"IMU clock", "the device sends no clock: samples are stamped at arrival",
+                              MachineVerdict::kPoor, "enable its time output"});
       return;
     }
     const std::string found = fmt::format(
-        "{}, skew {:.1f} ppm, delay above the smallest: half below {:.2f} ms, 99 % below {:.2f} ms, "
-        "steps {}",
+        "{}, skew {:.1f} ppm, delay above the minimum: median {:.2f} ms, 99 % below {:.2f} ms, steps {}",
         lockName(status.clock.lock), status.clock.skew_ppm, status.clock.residual_p50.seconds() * kToMs,
         status.clock.residual_p99.seconds() * kToMs, status.clock.resets);
     // drivers/timesync/clock_map.cpp: four seconds, and what opening and the first sample take.
     constexpr double kLockTime = 6;  // s
     if (status.clock.resets == 0 && status.clock.lock == LockState::kLocking && seconds_ < kLockTime) {
       report.lines.push_back(
-          {"IMU clock", found, MachineVerdict::kNote, "`--seconds 10` shows whether it locks"});
+          {"IMU clock", found, MachineVerdict::kNote, "run with `--seconds 10` to see whether it locks"});
       return;
     }
     report.lines.push_back(line(
         "IMU clock", found, status.clock.lock == LockState::kLocked && status.clock.resets == 0,
         status.clock.resets > 0 ? "the device restarts, or its clock is set while it runs"
-                                : "the link is overloaded: raise the baud rate, or take other outputs off"));
+                                : "the link is overloaded: raise the baud rate, or disable other outputs"));
   }
 
   void addCamera(std::size_t index, MachineReport& report) {
@@ -148,41 +145,42 @@ class VehicleCheck {
     report.lines.push_back(
         {name + " images",
          fmt::format("{}x{} {}, {}, from {} ({})", facts.width, facts.height, facts.format.fourcc(),
-                     facts.rate > 0 ? fmt::format("{:.4g} Hz", facts.rate) : "rate not said",
+                     facts.rate > 0 ? fmt::format("{:.4g} Hz", facts.rate) : "rate unknown",
                      topic ? topics_.camera.at(index) : facts.card.data(), facts.driver.data()),
          MachineVerdict::kGood, ""});
     const double wanted = settings_.cameras.rate_hz;
     constexpr double kTolerance = 0.02;  // of the rate
     report.lines.push_back(
-        line(name + " rate", fmt::format("{:.2f} Hz, asked {:.2f} Hz", stream.rate(), wanted),
+        line(name + " rate", fmt::format("{:.2f} Hz, requested {:.2f} Hz", stream.rate(), wanted),
              std::abs(stream.rate() - wanted) < kTolerance * wanted,
-             stream.stamps.empty()
-                 ? "nothing came: a camera with an external trigger waits for it"
-                 : "light: a long exposure lowers the rate; or set cameras.rate_hz to what it can"));
+             stream.stamps.empty() ? "no images: a camera with an external trigger waits for it"
+                                   : "check the light: a long exposure lowers the rate; or set "
+                                     "cameras.rate_hz to a rate that the camera reaches"));
     const CameraCounters& c = status.counters;
     report.lines.push_back(line(
         name + " frames",
-        fmt::format("{} taken, {} missed, {} damaged, {} too short{}", c.frames, c.missed, c.damaged,
+        fmt::format("{} received, {} missed, {} damaged, {} too short{}", c.frames, c.missed, c.damaged,
                     c.too_short,
-                    topic ? fmt::format(", {} stale, {} of another clock", c.stale, c.wrong_clock) : ""),
+                    topic ? fmt::format(", {} stale, {} with another clock", c.stale, c.wrong_clock) : ""),
         c.missed + c.damaged + c.too_short + c.stale + c.wrong_clock == 0,
         topic      ? kSlowTopics
-        : pipeline ? "the pipeline, or what feeds it, is too slow: fewer conversions, or a lower rate"
-                   : "the bus is too slow for these cameras: other USB controllers, shorter cables, or a "
+        : pipeline ? "the pipeline or its source is too slow: use fewer conversions or a lower rate"
+                   : "the bus is too slow for these cameras: use other USB controllers, shorter cables, or a "
                      "lower rate"));
-    report.lines.push_back(line(
-        name + " stamps", stampEventName(facts.event),
-        facts.event != StampEvent::kArrival && c.stamp_ahead == 0,
-        c.stamp_ahead > 0 ? (topic ? "its stamps lie ahead of this computer's clock: set both by NTP or PTP"
-                             : pipeline ? "the pipeline gives images before their time: add `clocksync`"
-                                        : "the driver stamps frames later than it gives them out")
-                          : "the time of capture is unknown: connect the trigger line"));
+    report.lines.push_back(
+        line(name + " stamps", stampEventName(facts.event),
+             facts.event != StampEvent::kArrival && c.stamp_ahead == 0,
+             c.stamp_ahead > 0
+                 ? (topic ? "its stamps are ahead of this computer's clock: synchronize both by NTP or PTP"
+                    : pipeline ? "the pipeline delivers images before their time: add `clocksync`"
+                               : "the driver stamps frames later than it delivers them")
+                 : "the time of capture is unknown: connect the trigger line"));
     if (stream.stamps.size() < 2) return;
     constexpr double kMost = 0.99;
     report.lines.push_back(
         {name + " timing",
-         fmt::format("steps off {:.2f} ms by {:.3f} ms (99 %); from stamp to arrival {:.2f} "
-                     "ms, 99 % below {:.2f} ms",
+         fmt::format("steps deviate from {:.2f} ms by {:.3f} ms (99 %); from stamp to arrival {:.2f} ms, 99 "
+                     "% below {:.2f} ms",
                      stream.medianStep().seconds() * kToMs, stream.jitter(kMost).seconds() * kToMs,
                      stream.latency(0.5).seconds() * kToMs, stream.latency(kMost).seconds() * kToMs),
          MachineVerdict::kGood, ""});
@@ -196,7 +194,7 @@ class VehicleCheck {
     // Half a pixel at 400 px of focal length and 6 rad/s; docs/timesync.md.
     constexpr double kGood = 0.2;  // ms
     report.lines.push_back(
-        line("stereo pairs", fmt::format("apart by {:.3f} ms, at most {:.3f} ms", median, largest),
+        line("stereo pairs", fmt::format("{:.3f} ms apart, at most {:.3f} ms", median, largest),
              median < kGood, "free-running cameras drift apart: trigger both from one line"));
   }
 
@@ -207,8 +205,8 @@ class VehicleCheck {
       report.lines.push_back(line(
           "trigger edges", fmt::format("{} in {:.1f} s, {} missed", status.edges, seconds_, status.missed),
           status.edges > 0 && status.missed == 0,
-          status.edges == 0 ? "no edge: check trigger.line, and that the source is on"
-                            : "another interrupt holds the CPU: move it by smp_affinity"));
+          status.edges == 0 ? "no edge: check trigger.line and the signal's source"
+                            : "another interrupt blocks the CPU: move it with smp_affinity"));
     }
     for (std::size_t i = 0; i < input_.cameras().size(); ++i) {
       const CameraStatus status = input_.cameras()[i]->status();
@@ -217,7 +215,7 @@ class VehicleCheck {
           fmt::format("{}, frame after edge {:.3f} ms, 99 % within {:.1f} us", lockName(status.trigger.lock),
                       status.trigger.offset.seconds() * kToMs, status.trigger.residual_p99.seconds() * kToUs),
           status.trigger.lock == LockState::kLocked,
-          "edges and frames do not go together: this camera is not triggered by that line"));
+          "edges and frames do not match: this camera is not triggered by that line"));
     }
   }
 
@@ -231,13 +229,14 @@ class VehicleCheck {
 
 void addNext(const Settings& settings, DoctorReport& report) {
   if (!namesDevices(settings)) {
-    report.next = {"connect cameras and IMU; `swiftlet doctor` lists them then",
-                   "`swiftlet settings > vehicle.yaml`; fill in vehicle, imu_link and cameras",
-                   "`swiftlet doctor --settings vehicle.yaml` watches them at work"};
+    report.next = {"connect cameras and IMU; then `swiftlet doctor` lists them",
+                   "`swiftlet settings > vehicle.yaml`; set vehicle, imu_link and cameras",
+                   "`swiftlet doctor --settings vehicle.yaml` checks them at work"};
     return;
   }
   if (!report.ready()) {
-    report.next = {"mend what is poor above under \"this vehicle\", first line first, and run this again"};
+    report.next = {
+        "fix what is poor above under \"this vehicle\", starting with the first line, and run this again"};
     return;
   }
   report.next = {"`swiftlet fly` with the same settings"};
@@ -256,7 +255,7 @@ MachineReport examineLog(const LogRequest& request, const Settings& settings) {
   const InspectionReport inspection = inspectLog(request, settings, kImages);
   MachineReport report;
   report.lines.push_back(
-      {"images", fmt::format("{} of camera 0 were looked at", inspection.images), MachineVerdict::kNote, ""});
+      {"images", fmt::format("{} of camera 0 checked", inspection.images), MachineVerdict::kNote, ""});
   for (const std::string& text : inspection.warnings) {
     report.lines.push_back({"warning", text, MachineVerdict::kNote, ""});
   }

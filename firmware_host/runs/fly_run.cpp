@@ -21,7 +21,7 @@ namespace swiftlet {
 namespace {
 
 constexpr const char* kHungUp =
-    "terminal closed (SIGHUP): the flight goes on; end it with SIGINT or SIGTERM (`pkill -INT swiftlet`)";
+    "terminal closed (SIGHUP): the flight continues; stop it with SIGINT or SIGTERM (`pkill -INT swiftlet`)";
 
 /// The run folder; empty where there is none to be had.
 std::string claimFolder(const FlyRequest& request, const Settings& settings, std::optional<RunClaim>& claim,
@@ -39,7 +39,7 @@ std::string claimFolder(const FlyRequest& request, const Settings& settings, std
     claim.emplace(out, RunKind::kFlight, true);
     return out;
   } catch (const InputError& error) {
-    lost.add(fmt::format("{}: no folder for this flight", error.what()));
+    lost.add(fmt::format("{}: this flight has no folder", error.what()));
     return {};
   }
 }

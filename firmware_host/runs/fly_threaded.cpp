@@ -121,7 +121,7 @@ FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const 
   if (settings.realtime.lock_memory && settings.realtime.enabled) {
     lock = lockMemory();
   } else {
-    lock.message = "switched off by realtime.lock_memory or realtime.enabled";
+    lock.message = "disabled by realtime.lock_memory or realtime.enabled";
   }
   if (request.announce) {
     say(reserved.text());

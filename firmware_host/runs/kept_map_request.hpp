@@ -18,8 +18,8 @@ struct KeptMapRequest {
     if (!in.empty()) settings.loop.in_map = in;
     if (extend) settings.loop.extend_map = true;
     if (!keep.empty() && !settings.loop.in_map.empty() && !settings.loop.extend_map) {
-      throw InputError(keep, 0, "--keep-map", "--in-map without --extend is localization only",
-                       "Add --extend to go on with it in a new folder, or leave --keep-map out");
+      throw InputError(keep, 0, "--keep-map", "--in-map without --extend only localizes",
+                       "Add --extend to continue the map in a new folder, or omit --keep-map");
     }
     if (!keep.empty() || !settings.loop.in_map.empty()) settings.loop.enabled = true;
   }

@@ -12,20 +12,20 @@ namespace {
 
 void checkAutopilot(const FlightRequest& request) {
   if (request.speed != 1) {
-    throw InputError("--speed", 0, "", "an autopilot is told of a flight at its own speed",
-                     "Leave --speed out, or autopilot.device empty");
+    throw InputError("--speed", 0, "", "an autopilot needs a flight at its own speed",
+                     "Omit --speed, or leave autopilot.device empty");
   }
 }
 
 void checkLabels(const Settings& settings) {
   const std::string& topic = settings.ros2.label_topic;
   if (topic.front() != '/') {
-    throw InputError("settings", 0, "ros2.label_topic", "'" + topic + "' is no topic's name",
-                     "Begin it with a slash, as /segmentation/labels");
+    throw InputError("settings", 0, "ros2.label_topic", "'" + topic + "' is not a topic name",
+                     "Start it with a slash, for example /segmentation/labels");
   }
   if (!settings.map.enabled || !settings.map_stage.labels) {
-    throw InputError("settings", 0, "ros2.label_topic", "labels go into the map, and none is made of them",
-                     "Switch map.enabled and map.labels on (--map), or leave ros2.label_topic empty");
+    throw InputError("settings", 0, "ros2.label_topic", "labels are stored in the map, but no map is built",
+                     "Enable map.enabled and map.labels (--map), or leave ros2.label_topic empty");
   }
 }
 

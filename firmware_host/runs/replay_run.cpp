@@ -33,8 +33,8 @@ namespace {
 TrackFileFacts checkTracks(const std::string& path, const Rig& rig, bool mono) {
   const TrackFileFacts facts = surveyTrackFile(path);
   if (!mono && facts.cameras > rig.camera_count) {
-    throw InputError(path, 0, "camera", "has sightings of camera 1, the calibration has camera 0 only",
-                     "Give the calibration of both with --calibration, or leave camera 1 out with --mono");
+    throw InputError(path, 0, "camera", "has features of camera 1, but the calibration has only camera 0",
+                     "Give the calibration of both cameras with --calibration, or omit camera 1 with --mono");
   }
   return facts;
 }
@@ -92,8 +92,8 @@ class ReplayRun {
     if (request_.inspect && !request_.reproduce) inspect();
     if (facts_.tracks.empty()) return;
     if (request_.real_time || request_.record) {
-      throw InputError(request_.log, 0, "", "a log of feature tracks has no images to let out or record",
-                       "Leave --real-time and --record out");
+      throw InputError(request_.log, 0, "", "a log of feature tracks has no images to feed or record",
+                       "Omit --real-time and --record");
     }
     steps_ = checkTracks(facts_.tracks, source_->rig(), request_.mono).frames;
     tracks_ = std::make_unique<TrackReader>(facts_.tracks);
@@ -115,8 +115,7 @@ class ReplayRun {
     checkMovingLabels(settings_.map_stage);
     confusion_ = confusionOf(settings_);
     if (!facts_.tracks.empty()) {
-      throw InputError(request_.log, 0, "", "a log of feature tracks has no images to map",
-                       "Leave --map out");
+      throw InputError(request_.log, 0, "", "a log of feature tracks has no images to map", "Omit --map");
     }
     scenes_.emplace(request_.log, source_->calibration(),
                     SceneReader::Wanted{settings_.map.depth_sensor, settings_.map_stage.labels});
@@ -124,8 +123,8 @@ class ReplayRun {
     scene_warnings_ = scenes_->warnings().size();
     if (scenes_->depthSensor() == nullptr &&
         (source_->rig().camera_count < 2 || !settings_.odometry.use_stereo)) {
-      throw InputError(request_.log, 0, "", "one camera and no depth images: nothing gives depth for --map",
-                       "Give a log with two cameras or with mav0/depth0, or leave --map out");
+      throw InputError(request_.log, 0, "", "one camera and no depth images: --map has no source of depth",
+                       "Give a log with two cameras or with mav0/depth0, or omit --map");
     }
   }
 
@@ -137,7 +136,7 @@ class ReplayRun {
     const std::filesystem::path out(request_.out);
     for (const auto& folder : {out, out / "recording"}) {
       if (!std::filesystem::equivalent(folder, recording, error)) continue;
-      throw InputError(request_.out, 0, "", "is the folder of the recording that is replayed",
+      throw InputError(request_.out, 0, "", "is the folder of the recording being replayed",
                        "Give another folder with --out");
     }
   }
@@ -170,7 +169,7 @@ class ReplayRun {
     facts_.executor["kind"] = "reproduced";
     if (report.stopped_early.empty()) return;
     facts_.executor["stopped_early"] = report.stopped_early;
-    warn(fmt::format("warning: {}: the run was repeated for {} frames: {}\n", request_.log, report.frames,
+    warn(fmt::format("warning: {}: the run was reproduced for {} frames: {}\n", request_.log, report.frames,
                      report.stopped_early));
   }
 

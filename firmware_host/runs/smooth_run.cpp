@@ -33,7 +33,7 @@ void addToSummary(const fs::path& path, const FullSmoothing& found) {
     summary.at("timing").update(timingJson(times));
   } catch (const Json::exception&) {
     throw InputError(path, 0, "",
-                     "is damaged: the figures of full smoothing are not added; map.tum is written",
+                     "is damaged: the results of full smoothing are not added; map.tum is written",
                      "Delete it, or replay the log again");
   }
   writeJson(path, summary);
@@ -46,7 +46,7 @@ FullSmoothingOptions smoothingOptions(const Settings& settings, bool announce) {
   options.most_bytes = static_cast<std::size_t>(settings.full_memory_mib) * kMebibyte;
   if (announce) {
     options.begins = [](std::size_t keyframes, std::size_t bytes) {
-      warn(fmt::format("smoothing {} keyframes, in up to {} MiB of memory\n", keyframes,
+      warn(fmt::format("smoothing {} keyframes with up to {} MiB of memory\n", keyframes,
                        bytes / kMebibyte + 1));
     };
   }

@@ -24,8 +24,8 @@ CameraModel unknownLens(const std::string& resolution) {
   if (std::sscanf(resolution.c_str(), "%dx%d%c", &size[0], &size[1], &rest) != 2 || size[0] < 16 ||
       size[1] < 16 || size[0] > 16384 || size[1] > 16384) {
     throw InputError(
-        "settings", 0, "cameras.resolution", "'" + resolution + "' is no size of an image",
-        "Give width and height in pixels as 752x480; `swiftlet doctor` lists what cameras offer");
+        "settings", 0, "cameras.resolution", "'" + resolution + "' is not an image size",
+        "Give width and height in pixels, for example 752x480; `swiftlet doctor` lists what cameras offer");
   }
   const double focal = kUnknownFocal * size[0];
   return {CameraKind::kPinholeRadtan, size[0], size[1],
@@ -47,10 +47,9 @@ Calibration bareRig(const Settings& settings) {
 
 Calibration vehicleCalibration(const Settings& settings) {
   if (settings.vehicle.calibration.empty()) {
-    throw InputError(
-        "settings", 0, "vehicle.calibration", "the settings do not say how the rig is calibrated",
-        "Name a folder with EuRoC's sensor.yaml files, or Kalibr's camchain. A rig that has none yet: "
-        "docs/guides/bare_rig_to_flight.md");
+    throw InputError("settings", 0, "vehicle.calibration", "no calibration is set",
+                     "Set a folder with EuRoC's sensor.yaml files, or Kalibr's camchain. For a rig without "
+                     "calibration see docs/guides/bare_rig_to_flight.md");
   }
   CalibrationOptions options;
   options.accept_unusual_rig = settings.calibration.accept_unusual_rig;
@@ -60,8 +59,8 @@ Calibration vehicleCalibration(const Settings& settings) {
   if (cameras.shutter == kRolling && !calibration.rig.rolls()) {
     if (cameras.readout_ms <= 0) {
       throw InputError("settings", 0, "cameras.readout_ms",
-                       "a rolling shutter's rows are read at their own times",
-                       "Give the milliseconds from the first row to the last, here or in the calibration");
+                       "the readout time of the rolling shutter is missing",
+                       "Set the milliseconds from the first row to the last, here or in the calibration");
     }
     calibration.rig.readout = Duration::fromSeconds(cameras.readout_ms * kFromMs);
   }

@@ -34,10 +34,10 @@ class Repeat {
       if (control.progress) control.progress(2 * report_.frames);
     }
     if (why_.empty() && track_ < steps_.track.size()) {
-      stop(fmt::format("what frame {} was tracked with is not in the recording", steps_.track[track_].frame));
+      stop(fmt::format("the tracking input of frame {} is not in the recording", steps_.track[track_].frame));
     }
     if (why_.empty() && smooth_ < steps_.smooth.size()) {
-      stop(fmt::format("what frame {} was smoothed with is not in the recording",
+      stop(fmt::format("the smoothing input of frame {} is not in the recording",
                        steps_.smooth[smooth_].frame));
     }
     end();
@@ -187,7 +187,7 @@ class Repeat {
     }
     const LoopStep& step = steps_.loop[loop_];
     if (message->window_number != step.window) {
-      return stop(fmt::format("keyframe {} is missing, which loop closure took", step.frame));
+      return stop(fmt::format("keyframe {}, which loop closure used, is missing", step.frame));
     }
     keyframe_.frame = step.frame;
     keyframe_.number = step.image;
@@ -210,7 +210,7 @@ class Repeat {
     }
     const MapStep& step = steps_.map[map_];
     if (message->frame != step.frame) {
-      return stop(fmt::format("frame {} is missing, which the map took", step.frame));
+      return stop(fmt::format("frame {}, which the map used, is missing", step.frame));
     }
     if (!node->worlds.expect(step.correction)) return false;
     for (; spare_turns_ < step.spare_turns; ++spare_turns_) node->spareTurn();

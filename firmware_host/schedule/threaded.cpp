@@ -56,7 +56,7 @@ class Run : public SensorSink {
       const Place place = placeOf(node->rank(), options_.realtime);
       if (!start(
               node->name(), place, [this, node] { step(*node); }, node)) {
-        node->heart().fail("the thread could not be started");
+        node->heart().fail("cannot start the thread");
         node->abandon();
       }
     }
@@ -67,7 +67,7 @@ class Run : public SensorSink {
       const Rank rank = sensor.level == Level::kSensor ? Rank::kSensor : Rank::kLow;
       const Place place = placeOf(rank, options_.realtime);
       if (start(sensor.name, place, [this, &sensor] { sense(sensor); })) continue;
-      if (sensor.heart != nullptr) sensor.heart->fail("the thread could not be started");
+      if (sensor.heart != nullptr) sensor.heart->fail("cannot start the thread");
       sensorEnded();
     }
     if (options_.started) options_.started(report_.threads);
@@ -116,7 +116,7 @@ class Run : public SensorSink {
       thread.join();
     } else if (!thread.joinWithin(stopped_at_ + kLongestEnd - monotonicNow())) {
       report_.left_behind = true;
-      report_.faults.push_back(fmt::format("{}: did not end within {:.0f} s and was left behind", report.name,
+      report_.faults.push_back(fmt::format("{}: did not end within {:.0f} s and was abandoned", report.name,
                                            kLongestEnd.seconds()));
       if (threads_[i].node != nullptr) threads_[i].node->leaveBehind();
       thread.abandon();
@@ -127,7 +127,7 @@ class Run : public SensorSink {
     if (!thread.fault().empty()) {
       report_.faults.push_back(report.name + ": " + thread.fault());
     } else if (report.started && node != nullptr && node->wasAbandoned()) {
-      report_.faults.push_back(report.name + ": ended before its work was done");
+      report_.faults.push_back(report.name + ": ended before its work was finished");
     }
   }
 

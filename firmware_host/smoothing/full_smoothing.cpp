@@ -53,9 +53,8 @@ void solve(FullSmoother& smoother, const FullSmoothingOptions& options, FullSmoo
   const std::size_t bytes = smoother.memoryNeeded();
   if (bytes > options.most_bytes) {
     result.problem = fmt::format(
-        "full smoothing of {} keyframes takes up to {} MiB, above smoother.full_memory_mib ({}). Raise it on "
-        "a "
-        "computer with as much memory, with `swiftlet smooth RUN --set smoother.full_memory_mib={}`",
+        "full smoothing of {} keyframes needs up to {} MiB, above smoother.full_memory_mib ({}). Raise it on "
+        "a computer with enough memory: `swiftlet smooth RUN --set smoother.full_memory_mib={}`",
         smoother.size(), bytes / kMebibyte + 1, options.most_bytes / kMebibyte, bytes / kMebibyte + 1);
     return;
   }

@@ -68,7 +68,7 @@ KeyframeReader::KeyframeReader(std::string name, std::istream& in)
   };
   if (read(bytes_.data(), kPrefixBytes) < kPrefixBytes ||
       !std::equal(kMagic.begin(), kMagic.end(), bytes_.begin())) {
-    refuse("is no file of keyframes: it does not begin with their magic bytes", kRemedy);
+    refuse("is not a file of keyframes: it does not start with their magic bytes", kRemedy);
   }
   LittleEndianReader prefix({bytes_.data() + kMagic.size(), kPrefixBytes - kMagic.size()});
   const std::uint32_t version = prefix.u32();
@@ -77,8 +77,8 @@ KeyframeReader::KeyframeReader(std::string name, std::istream& in)
                      "Use the program that made the run; its summary.json names it");
   }
   const std::size_t length = prefix.u32();
-  constexpr const char* kDamaged = "the head is damaged or cut off";
-  constexpr const char* kLost = "Nothing can be smoothed without it; copy the file again if this is a copy";
+  constexpr const char* kDamaged = "the head is damaged or truncated";
+  constexpr const char* kLost = "Nothing can be smoothed without it; if this is a copy, copy the file again";
   if (length < kCrcBytes || length > kMostHead - kPrefixBytes ||
       read(bytes_.data() + kPrefixBytes, length) < length) {
     refuse(kDamaged, kLost);
@@ -116,14 +116,14 @@ KeyframeReader::Next KeyframeReader::endAt(const char* what) {
 KeyframeReader::Next KeyframeReader::next() {
   if (ended_) return Next::kEnd;
   const std::size_t got = read(bytes_.data(), kRecordBytes);
-  if (got < kRecordBytes) return endAt(got == 0 ? "not ended in order, cut off" : "cut off");
+  if (got < kRecordBytes) return endAt(got == 0 ? "not closed properly, truncated" : "truncated");
   LittleEndianReader from({bytes_.data(), kRecordBytes});
   const std::uint32_t stated = from.u32();
   const std::uint16_t kind = from.u16();
   const std::uint16_t zero = from.u16();
   payload_ = from.u32();
   if (zero != 0 || payload_ > kMostPayload) return endAt("damaged");
-  if (read(bytes_.data() + kRecordBytes, payload_) < payload_) return endAt("cut off");
+  if (read(bytes_.data() + kRecordBytes, payload_) < payload_) return endAt("truncated");
   const std::size_t covered = kRecordBytes - kCrcBytes + payload_;
   if (crc32c(head_crc_, {bytes_.data() + kCrcBytes, covered}) != stated) return endAt("damaged");
   Next next = Next::kEnd;

@@ -51,7 +51,7 @@ MapKeeper::MapKeeper(const std::string& folder, const Rig& rig, const ImuNoise& 
       file_(std::fopen(path_.c_str(), "wbe")) {
   if (!file_) {
     throw InputError(path_, 0, "", std::string("cannot be written: ") + std::strerror(errno),
-                     "Give a folder that can be written with --out, or --set smoother.horizon=30");
+                     "Give a writable folder with --out, or --set smoother.horizon=30");
   }
   std::setvbuf(file_.get(), buffer_.data(), _IOFBF, buffer_.size());
   writeHead(rigInUse(rig, settings), inflatedNoise(noise, settings));
@@ -77,7 +77,7 @@ void MapKeeper::writeHead(const Rig& rig, const ImuNoise& noise) {
 
 void MapKeeper::check(bool written) {
   if (written) return;
-  lost_.add(path_ + ": cannot be written: " + std::strerror(errno) + "; it ends here");
+  lost_.add(path_ + ": cannot be written: " + std::strerror(errno) + "; the file ends here");
   file_.reset();
 }
 

@@ -23,7 +23,7 @@
 namespace swiftlet {
 
 /// Of a thread that ended before it was told to.
-inline constexpr const char* kReturnedEarly = "the thread returned although the run goes on";
+inline constexpr const char* kReturnedEarly = "the thread returned although the run continues";
 
 enum class Life : std::uint32_t {
   kNotBegun,
@@ -114,7 +114,7 @@ void runBeating(Heartbeat& heart, Entry&& entry) {
     heart.fail(error.what());
     throw;
   } catch (...) {
-    heart.fail("something that is no std::exception was thrown");
+    heart.fail("an object that is not a std::exception was thrown");
     throw;
   }
   heart.end();

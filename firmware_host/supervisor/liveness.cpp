@@ -164,7 +164,7 @@ void Liveness::judgeThread(Row& row, const Beat& beat, bool ending, Stamp now) {
     found.condition = silent > row.rule.lost.seconds() ? Condition::kLost : Condition::kLate;
     found.cause = Cause::kNoTurn;
     const bool told = *beat.doing != '\0';
-    print(found.text, "{} for {:.1f} s{}{}", beat.turns > 0 ? "no turn" : "not begun", silent,
+    print(found.text, "{} for {:.1f} s{}{}", beat.turns > 0 ? "no progress" : "not started", silent,
           told ? ", last seen at: " : "", beat.doing);
   }
   const bool lost = found.condition == Condition::kLost;
@@ -232,7 +232,7 @@ void Liveness::judgeValues(const FlightFacts& facts, Stamp now) {
     found.cause = Cause::kStuckValues;
     found.effect = Health::kFailed;
     found.blocks_arming = true;
-    print(found.text, "{} equal samples in a row", facts.equal_samples);
+    print(found.text, "{} identical samples in a row", facts.equal_samples);
   }
   settle(other(kImuValues), found);
 }
@@ -264,7 +264,7 @@ void Liveness::settle(Row& row, const Trouble& found) {
   row.trouble.cause = Cause::kFlapping;
   row.trouble.since = before.since;
   row.trouble.blocks_arming = true;
-  print(row.trouble.text, "went bad {} times in this run", row.times_bad);
+  print(row.trouble.text, "failed {} times in this run", row.times_bad);
 }
 
 }  // namespace swiftlet

@@ -52,7 +52,7 @@ struct Trouble {
   Health effect = Health::kDegraded;    ///< the health is at best this
   bool blocks_arming = false;           ///< as condition `members`
   Stamp since;                          ///< CLOCK_MONOTONIC: the last sign of life, or the end
-  std::array<char, kTextBytes> text{};  ///< "no turn for 0.4 s"; ends with a zero
+  std::array<char, kTextBytes> text{};  ///< "no progress for 0.4 s"; ends with a zero
 
   [[nodiscard]] const char* name() const { return member.data(); }
   /// The same trouble, whatever the figures in its text: a changed figure alone is no news.

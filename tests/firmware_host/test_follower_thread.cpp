@@ -59,8 +59,7 @@ TEST_CASE("a follower that stands is left behind by name, within the time given"
   CHECK_FALSE(thread.end(Duration::fromMilliseconds(50)));
   CHECK(monotonicNow() - begin >= Duration::fromMilliseconds(50));
   CHECK_FALSE(thread.end());  // known: nobody waits again
-  CHECK(thread.fault() ==
-        "thread autopilot did not end within 0.1 s and was left behind, last seen at: write");
+  CHECK(thread.fault() == "thread autopilot did not end within 0.1 s and was abandoned, last seen at: write");
   // It goes on when it can, in memory that is still its own.
   go = true;
   CHECK(until([&] { return thread.heart().read().life == Life::kEnded; }));

@@ -235,7 +235,7 @@ TEST_CASE("what cannot be imported is named, and nothing is left", "[import]") {
     (void)importVideo(request);
     FAIL("a log was written over");
   } catch (const InputError& error) {
-    CHECK(std::string(error.what()).find("holds a log already") != std::string::npos);
+    CHECK(std::string(error.what()).find("already holds a log") != std::string::npos);
   }
 }
 

@@ -293,7 +293,7 @@ TEST_CASE("cut short at any length a map is refused with the place", "[kept_map]
     const std::string message = refusal(bytes.substr(0, length));
     REQUIRE(message.find("the file ends at byte " + std::to_string(length)) != std::string::npos);
     REQUIRE(message.starts_with("kept.swm: byte "));
-    REQUIRE(message.find("nothing was loaded") != std::string::npos);
+    REQUIRE(message.find("Nothing was loaded") != std::string::npos);
   }
   CHECK(refusal(bytes + "x").find("byte " + std::to_string(bytes.size())) != std::string::npos);
 }

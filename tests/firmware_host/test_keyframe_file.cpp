@@ -272,7 +272,7 @@ TEST_CASE("a run that was killed keeps its keyframes, and says that it was cut o
   const ScratchFolder folder("keyframes");
   const Counts counts = countsIn(kept(folder.path(), false));
   CHECK(counts.keyframes == kKeyframes);
-  CHECK_THAT(counts.cut, Catch::Contains("cut off"));
+  CHECK_THAT(counts.cut, Catch::Contains("truncated"));
 }
 
 TEST_CASE("no damaged byte passes", "[files]") {
@@ -294,9 +294,9 @@ TEST_CASE("no damaged byte passes", "[files]") {
 TEST_CASE("foreign files and other versions are refused with the reason", "[files]") {
   const ScratchFolder folder("keyframes");
   const std::string bytes = kept(folder.path());
-  CHECK_THROWS_WITH(countsIn(""), Catch::Contains("is no file of keyframes"));
+  CHECK_THROWS_WITH(countsIn(""), Catch::Contains("is not a file of keyframes"));
   CHECK_THROWS_WITH(countsIn("a text of somebody else's, long enough"),
-                    Catch::Contains("is no file of keyframes"));
+                    Catch::Contains("is not a file of keyframes"));
   std::string later = bytes;
   later[8] = 3;
   CHECK_THROWS_WITH(countsIn(later), Catch::Contains("version: is 3, this program reads 2"));

@@ -209,7 +209,7 @@ TEST_CASE("an export that cannot be done leaves no folder") {
   };
   CHECK_THAT(refusal({kept, out, 99}), Contains("--z"));
   CHECK_THAT(refusal({folder.path(), out, {}}), Contains("volume.swm"));
-  CHECK_THAT(refusal({kept, folder.file("run"), {}}), Contains("is there already"));
+  CHECK_THAT(refusal({kept, folder.file("run"), {}}), Contains("already exists"));
   CHECK(run({"map", "export", kept, "--out", out, "--z", "99"}) == kExitBadInput);
   CHECK_FALSE(fs::exists(out));
   CHECK_FALSE(fs::exists(out + ".part"));

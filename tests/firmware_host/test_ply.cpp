@@ -116,25 +116,25 @@ TEST_CASE("PLY: other properties and elements are passed over, colours become gr
 TEST_CASE("PLY: damage is named with line, field and remedy") {
   const std::string whole = kHeader + kBody;
   REQUIRE(complaint(whole).empty());
-  CHECK(complaint("") == "m.ply:1: the header does not end. Is it a PLY file, and whole?");
+  CHECK(complaint("") == "m.ply:1: the header has no end. Check that it is a complete PLY file");
   CHECK(contains(complaint("solid\n"), "does not begin with `ply`"));
   CHECK(contains(complaint(replaced(whole, "ascii", "binary_big_endian")), "m.ply:2: format: `binary_big"));
   CHECK(contains(complaint(replaced(whole, "float y", "half y")), "m.ply:6: property: `half`"));
-  CHECK(contains(complaint(replaced(whole, "float y", "float x")), "stands twice"));
+  CHECK(contains(complaint(replaced(whole, "float y", "float x")), "appears twice"));
   CHECK(contains(complaint(replaced(whole, "float z", "float w")), "vertex z: no such property"));
   CHECK(contains(complaint(replaced(whole, "vertex_indices", "corners")), "vertex_indices: no such list"));
   CHECK(contains(complaint(replaced(whole, "vertex 3", "vertex -3")), "m.ply:4: element"));
   CHECK(contains(complaint(replaced(whole, "1 0 0", "1 nan 0")),
-                 "m.ply:13: `vertex` 1 `y`: is not finite. Leave"));
+                 "m.ply:13: `vertex` 1 `y`: is not finite. Remove"));
   CHECK(contains(complaint(replaced(whole, "1 0 0", "1 1e39 0")), "is not finite"));
   CHECK(contains(complaint(replaced(whole, "1 0 0", "1 oops 0")), "`oops` is not a number"));
   CHECK(contains(complaint(replaced(whole, "1 0 0", "1 0")), "m.ply:13: `vertex` 1 `z`: missing"));
-  CHECK(contains(complaint(replaced(whole, "1 0 0", "1 0 0 0")), "more than the header says"));
+  CHECK(contains(complaint(replaced(whole, "1 0 0", "1 0 0 0")), "more than the header declares"));
   CHECK(contains(complaint(replaced(whole, "0 1 2 7", "0 1 3 7")), "m.ply:15: `face` 0 `vertex_indices`"));
   CHECK(contains(complaint(replaced(whole, "0 1 2 7", "0 1 -1 7")), "not among the 3"));
   CHECK(contains(complaint(replaced(whole, "3 0 1 2 7", "4 0 1 2 1 7")), "4 corners instead of 3"));
   CHECK(contains(complaint(replaced(whole, "0 1 2 7", "0 1 2 256")), "does not fit its type"));
-  CHECK(contains(complaint(whole + "1 2 3\n"), "behind the last element"));
+  CHECK(contains(complaint(whole + "1 2 3\n"), "after the last element"));
 }
 
 TEST_CASE("PLY: a file cut anywhere is refused, and a header's count alone reserves nothing") {
@@ -145,7 +145,7 @@ TEST_CASE("PLY: a file cut anywhere is refused, and a header's count alone reser
   REQUIRE(complaint(binary).empty());
   for (std::size_t size = 0; size < binary.size(); ++size)
     CHECK_FALSE(complaint(binary.substr(0, size)).empty());
-  CHECK(contains(complaint(binary + "x"), "1 bytes behind the last element"));
+  CHECK(contains(complaint(binary + "x"), "1 bytes after the last element"));
   const std::string ascii = kHeader + kBody;
   // The last cut takes the line end alone, the one before it the label.
   for (std::size_t size = 0; size + 1 < ascii.size(); ++size) {

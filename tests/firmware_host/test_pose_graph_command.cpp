@@ -199,7 +199,7 @@ TEST_CASE("--robust leaves false loops out, says which, and writes the graph wit
   PoseGraphRequest request;
   request.file = in;
   request.loops = csv;
-  CHECK(complaint(request).find("--loops: no loop is rejected. Give --robust") != std::string::npos);
+  CHECK(complaint(request).find("--loops: no loop is rejected. Add --robust") != std::string::npos);
   request.robust = true;
   request.start = StartRule::kGiven;
   CHECK(complaint(request).find("--start") != std::string::npos);
@@ -214,13 +214,13 @@ TEST_CASE("bad graphs are named by file, line, field and remedy, and leave nothi
   request.file = folder.file("bad.g2o");
   request.out = folder.file("out.g2o");
   write(request.file, squareWalk(2) + "EDGE_SE2 3 6 1 nan 0 1 0 0 1 0 1\n");
-  CHECK(complaint(request).find("bad.g2o:9: dy: `nan` is no finite number. Give") != std::string::npos);
+  CHECK(complaint(request).find("bad.g2o:9: dy: `nan` is not a finite number. Give") != std::string::npos);
   CHECK(run({"pose-graph", request.file, "--out", request.out}) == kExitBadInput);
   CHECK_FALSE(std::filesystem::exists(request.out));
 
   const std::string whole = packed(squareWalk(10));
   write(request.file, whole.substr(0, whole.size() / 2));
-  CHECK(complaint(request).find("not a whole xz file") != std::string::npos);
+  CHECK(complaint(request).find("not a complete xz file") != std::string::npos);
 
   request.file = folder.file("nowhere.g2o");
   CHECK(complaint(request).find("cannot be read") != std::string::npos);

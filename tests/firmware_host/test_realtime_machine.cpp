@@ -164,12 +164,12 @@ TEST_CASE("preemption, CPUs, governor and clock") {
 TEST_CASE("idle states that wake slowly and CPUs full of interrupts are named") {
   const Files deep = {{kIdle + "2/latency", "133\n"}, {kIdle + "2/name", "C6\n"}};
   CHECK(lineWith("idle states", deep).verdict == MachineVerdict::kPoor);
-  CHECK(contains(lineWith("idle states", deep).found, "C6, which takes 133 us"));
+  CHECK(contains(lineWith("idle states", deep).found, "C6, wake-up takes 133 us"));
   Files off = deep;
   off[kIdle + "2/disable"] = "1\n";
   CHECK(lineWith("idle states", off).verdict == MachineVerdict::kGood);
-  CHECK(
-      contains(lineWith("interrupts", {}).found, "CPU 0 takes 75 % of the devices', 40 a second since boot"));
+  CHECK(contains(lineWith("interrupts", {}).found,
+                 "CPU 0 handles 75 % of the devices', 40 a second since boot"));
   CHECK(lineWith("interrupts", {{"/proc/uptime", "0.1 0.1\n"}}).verdict == MachineVerdict::kNote);
   CHECK(lineWith("interrupts", {{"/proc/interrupts", "nothing\n"}}).verdict == MachineVerdict::kUnknown);
 }

@@ -111,7 +111,7 @@ TEST_CASE("a flight is replaced by nothing that was not told to", "[files]") {
   { const RunClaim flight(folder.path(), RunKind::kFlight, false); }
   write(folder.file("odometry.tum"), "the flight");
   for (const RunKind kind : {RunKind::kReplay, RunKind::kFlight}) {
-    CHECK_THROWS_WITH((RunClaim(folder.path(), kind, false)), Catch::Contains("holds a flight already"));
+    CHECK_THROWS_WITH((RunClaim(folder.path(), kind, false)), Catch::Contains("already holds a flight"));
   }
   CHECK(fs::exists(folder.file("odometry.tum")));
   const RunClaim told(folder.path(), RunKind::kReplay, true);
@@ -126,7 +126,7 @@ TEST_CASE("fly refuses a folder with a run before it looks at anything else, unl
   { const RunClaim earlier(folder.path(), RunKind::kReplay, false); }
   FlyRequest request;
   request.out = folder.path();
-  CHECK_THROWS_WITH(runFlight(request, Settings{}), Catch::Contains("holds a replay already"));
+  CHECK_THROWS_WITH(runFlight(request, Settings{}), Catch::Contains("already holds a replay"));
   request.replace = true;
   CHECK_THROWS_WITH(runFlight(request, Settings{}), Catch::Contains("vehicle.calibration"));
 }

@@ -42,7 +42,7 @@ TEST_CASE("run verdict: shares of time, doubts, sigmas and the estimated calibra
   const auto words = json["in_words"].get<std::vector<std::string>>();
   CHECK(json["mean_pixel_sigma_px"].get<double>() == Approx((6 * 0.5 + 3 * 2.5) / 9));
   REQUIRE(words.size() == 4);
-  CHECK(words[1].find("tracks fit to 1.2 px on average, smoother.pixel_sigma is 0.50") != std::string::npos);
+  CHECK(words[1].find("track residuals average 1.2 px, smoother.pixel_sigma is 0.50") != std::string::npos);
   CHECK(words[0].find("good 60.0 %") != std::string::npos);
   CHECK(words[2].find("3.0 s tracks_disagree: ") != std::string::npos);
 }
@@ -68,5 +68,5 @@ TEST_CASE("run verdict: what is found of sensors and tracks", "[verdict]") {
   CHECK(json["estimated_calibration"]["readout_sigma_s"].get<double>() == Approx(5e-5));
   const auto words = json["in_words"].get<std::vector<std::string>>();
   REQUIRE(words.size() == 2);
-  CHECK(words[1].find("the gyro errs 3.1 times as much") != std::string::npos);
+  CHECK(words[1].find("errors of the gyro are 3.1 times") != std::string::npos);
 }

@@ -117,9 +117,9 @@ case $what in
     for disk in none readonly full gone; do
       fly $disk "$@" disk=$disk
       said=$out/$disk/fly.txt
-      echo "check_flight: disk $disk: $(grep -c '(the run goes on without it)' "$said") losses, the first:"
-      grep -m 1 '(the run goes on without it)' "$said" || { cat "$said"; exit 1; }
-      grep -q 'warning: files of this flight are missing or end early' "$said" || { cat "$said"; exit 1; }
+      echo "check_flight: disk $disk: $(grep -c '(the run continues without it)' "$said") losses, the first:"
+      grep -m 1 '(the run continues without it)' "$said" || { cat "$said"; exit 1; }
+      grep -q 'warning: files of this flight are missing or incomplete' "$said" || { cat "$said"; exit 1; }
       poses=$(sed -n 's/.* keyframes, \([0-9]*\) poses.*/\1/p' "$said")
       [ "${poses:-0}" -ge $((seconds * 15)) ] || { cat "$said"; exit 1; }
     done

@@ -101,9 +101,9 @@ TEST_CASE("Each check fails on what it is for", "[hil]") {
   }
   SECTION("a defect that stays") {
     HilEvidence evidence = stalled();
-    evidence.remarks.push_back({at(7), "IMU (/run/imu, bridge): part of it is lost (100 of 200); check"});
+    evidence.remarks.push_back({at(7), "IMU (/run/imu, bridge): loses data (100 of 200); check"});
     CHECK(fails(evidence, "returned: imu"));
-    evidence.remarks.push_back({at(8), "IMU (/run/imu, bridge): sound again"});
+    evidence.remarks.push_back({at(8), "IMU (/run/imu, bridge): normal again"});
     CHECK(checkHil(evidence).passed());
   }
   SECTION("good without an IMU") {

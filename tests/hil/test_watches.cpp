@@ -89,10 +89,10 @@ TEST_CASE("A journal keeps what a working device does badly beside its fault", "
   DeviceEvent event;
   while (journal.next(event)) lines.push_back(journal.text(event));
   REQUIRE(lines.size() == 4);
-  CHECK(lines[0].starts_with("IMU (x): part of it is lost (1 of 2); "));
+  CHECK(lines[0].starts_with("IMU (x): loses data (1 of 2); "));
   CHECK(lines[1].starts_with("IMU (x): sends nothing (nothing); "));
   CHECK(lines[2] == "IMU (x): works again");
-  CHECK(lines[3] == "IMU (x): sound again");
+  CHECK(lines[3] == "IMU (x): normal again");
   CHECK(journal.faults() == 2);
 }
 

@@ -77,7 +77,7 @@ play 2
 "$program" doctor --settings one_camera.yaml --seconds 1 >one.txt 2>&1
 check "doctor with one camera missing: not ready" test $? = 1
 check "doctor says which and what to do" grep -q 'camera 1 (/dev/video7): not there.*connect it, or correct its name' one.txt
-check "doctor says what next" grep -q 'mend what is poor' one.txt
+check "doctor says what next" grep -q 'fix what is poor' one.txt
 kill -INT $player
 wait $player
 

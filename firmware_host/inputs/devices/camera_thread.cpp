@@ -67,9 +67,9 @@ DeviceFault CameraThread::reopen() {
   const bool same =
       facts.format == prepared_.format && facts.width == prepared_.width && facts.height == prepared_.height;
   if (!fault.ok() || same) return fault;
-  fault = deviceFault(DeviceFaultKind::kChanged, 0, "came back with %dx%d %s in place of %dx%d %s",
-                      facts.width, facts.height, facts.format.letters.data(), prepared_.width,
-                      prepared_.height, prepared_.format.letters.data());
+  fault = deviceFault(DeviceFaultKind::kChanged, 0, "reopened with %dx%d %s instead of %dx%d %s", facts.width,
+                      facts.height, facts.format.letters.data(), prepared_.width, prepared_.height,
+                      prepared_.format.letters.data());
   source_->close();
   return fault;
 }
@@ -156,9 +156,9 @@ bool CameraThread::watchQuality(const ImageView& image, Stamp now) {
   if (odd_images_ >= kOddImages) {
     const bool dark = look == ImageWatch::Look::kDark;
     journal_.defect(now, deviceFault(dark ? DeviceFaultKind::kDark : DeviceFaultKind::kFrozen, 0,
-                                     "%d images running", odd_images_));
+                                     "%d images in a row", odd_images_));
   } else if (counted && rate_.tooFew()) {
-    journal_.defect(now, deviceFault(DeviceFaultKind::kLossy, 0, "%.0f of %.0f frames in a second",
+    journal_.defect(now, deviceFault(DeviceFaultKind::kLossy, 0, "%.0f of %.0f expected frames in a second",
                                      rate_.seen(), rate_.expected()));
   } else if (counted && odd_images_ == 0) {
     journal_.sound(now);

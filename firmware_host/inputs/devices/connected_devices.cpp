@@ -39,8 +39,8 @@ std::string firstLine(const fs::path& path) {
 MachineLine node(const std::string& what, const fs::path& path, std::string found) {
   if (access(path.c_str(), R_OK | W_OK) == 0) return {what, std::move(found), MachineVerdict::kGood, ""};
   const std::string group = what == "serial port" ? "dialout" : "gpio";
-  return {what, found + ": this user may not open it", MachineVerdict::kPoor,
-          fmt::format("`sudo usermod -aG {} $USER`, then log in again; `ls -l {}` says whose it is", group,
+  return {what, found + ": no permission to open it", MachineVerdict::kPoor,
+          fmt::format("`sudo usermod -aG {} $USER`, then log in again; `ls -l {}` shows the owner", group,
                       path.string())};
 }
 
@@ -60,13 +60,13 @@ DeviceFault tryFormat(const std::string& path, const std::string& fourcc) {
     pollfd waiting{camera.fd(), POLLIN, 0};
     if (poll(&waiting, 1, kPatience) == 0) {
       return deviceFault(DeviceFaultKind::kSilent, 0,
-                         "no image in a second; with a trigger it waits for that");
+                         "no image within a second; a camera with an external trigger waits for it");
     }
     CapturedFrame frame;
     if (const DeviceFault fault = camera.next(frame); !fault.ok()) return fault;
     if (frame.valid() && !reader.read(frame.image).empty()) return {};
   }
-  return deviceFault(DeviceFaultKind::kGarbage, 0, "its images are broken");
+  return deviceFault(DeviceFaultKind::kGarbage, 0, "its images are damaged");
 }
 
 /// "YUYV, MJPG 640x480 1280x720; GREY 640x480": formats of the same sizes stand together.
@@ -108,12 +108,12 @@ void addCamera(const CameraListing& camera, bool try_formats, MachineReport& rep
     }
   }
   const std::string name = fmt::format("{} {} ({}, {})", camera.path, camera.card, camera.driver, camera.bus);
-  std::string found = working.empty() ? "no format works" : inGroups(working);
+  std::string found = working.empty() ? "no usable format" : inGroups(working);
   if (!others.empty()) found += fmt::format("; not: {}", fmt::join(others, " "));
   std::string remedy;
   if (working.empty()) {
-    remedy = first.ok() ? "it offers no format that is taken; docs/v4l2.md lists them"
-                        : describe(first, camera.path);
+    remedy =
+        first.ok() ? "it offers no supported format; docs/v4l2.md lists them" : describe(first, camera.path);
   }
   report.lines.push_back({"camera", fmt::format("{}: {}", name, found),
                           working.empty() ? MachineVerdict::kPoor : MachineVerdict::kGood, remedy});
@@ -135,10 +135,9 @@ void addCameras(bool try_formats, MachineReport& report) {
     }
   }
   if (any) return;
-  report.lines.push_back(
-      {"camera", "none", MachineVerdict::kNote,
-       "connect one; a CSI camera also needs its overlay in the boot settings, and `dmesg` "
-       "says whether its sensor answered"});
+  report.lines.push_back({"camera", "none", MachineVerdict::kNote,
+                          "connect a camera; a CSI camera also needs its overlay in the boot settings, and "
+                          "`dmesg` shows whether its sensor responded"});
 }
 
 void addSerialPorts(const fs::path& root, MachineReport& report) {
@@ -162,7 +161,7 @@ void addSerialPorts(const fs::path& root, MachineReport& report) {
   }
   if (any) return;
   report.lines.push_back({"serial port", "none", MachineVerdict::kNote,
-                          "connect the IMU, or switch the board's UART on in its boot settings"});
+                          "connect the IMU, or enable the board's UART in its boot settings"});
 }
 
 void addCanInterfaces(const fs::path& root, MachineReport& report) {
@@ -184,7 +183,7 @@ void addCanInterfaces(const fs::path& root, MachineReport& report) {
   }
   if (any) return;
   report.lines.push_back(
-      {"CAN interface", "none", MachineVerdict::kNote, "wanted only where the IMU is on a CAN bus"});
+      {"CAN interface", "none", MachineVerdict::kNote, "only needed for an IMU on a CAN bus"});
 }
 
 void addGpioChips(const fs::path& root, MachineReport& report) {
@@ -196,7 +195,7 @@ void addGpioChips(const fs::path& root, MachineReport& report) {
   }
   if (any) return;
   report.lines.push_back(
-      {"GPIO chip", "none", MachineVerdict::kNote, "wanted only where a line sees the cameras' trigger"});
+      {"GPIO chip", "none", MachineVerdict::kNote, "only needed for a line with the cameras' trigger"});
 }
 
 }  // namespace

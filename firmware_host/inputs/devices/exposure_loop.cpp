@@ -13,7 +13,7 @@ DeviceFault ExposureLoop::begin(CameraSource& source) {
   const std::optional<ExposureAbility> ability = source.exposureAbility();
   if (!ability) {
     return deviceFault(DeviceFaultKind::kUnsupported, 0,
-                       "no exposure to set in flight: set cameras.exposure_control to false");
+                       "the exposure cannot be set in flight: set cameras.exposure_control to false");
   }
   const ExposureSetting start = begun_ ? control_.asked() : ability->now;
   // Also where it is in force already: the camera's automatics end.

@@ -170,8 +170,9 @@ void ImuThread::watchQuality(std::size_t readings) {
     rate_.restart(heard_);
   } else if (rate_.add(heard_, readings)) {
     if (rate_.tooFew()) {
-      journal_.defect(heard_, deviceFault(DeviceFaultKind::kLossy, 0, "%.0f of %.0f samples in a second",
-                                          rate_.seen(), rate_.expected()));
+      journal_.defect(heard_,
+                      deviceFault(DeviceFaultKind::kLossy, 0, "%.0f of %.0f expected samples in a second",
+                                  rate_.seen(), rate_.expected()));
     } else {
       journal_.sound(heard_);
     }
@@ -184,16 +185,16 @@ void ImuThread::watchSilence(Stamp now) {
   const auto received = static_cast<unsigned long long>(link_->received() - received_);
   const auto refused = static_cast<unsigned long long>(counted_.refused - refused_);
   if (received == 0) {
-    journal_.fault(now, deviceFault(DeviceFaultKind::kSilent, 0, "nothing came for %.1f s", silent));
+    journal_.fault(now, deviceFault(DeviceFaultKind::kSilent, 0, "no data for %.1f s", silent));
   } else if (refused == 0) {
-    journal_.fault(now,
-                   deviceFault(DeviceFaultKind::kGarbage, 0,
-                               "%llu bytes or frames in %.1f s, and no reading in them", received, silent));
+    journal_.fault(
+        now, deviceFault(DeviceFaultKind::kGarbage, 0, "%llu bytes or frames in %.1f s without an IMU sample",
+                         received, silent));
   } else {
     journal_.fault(
         now, deviceFault(DeviceFaultKind::kFailed, 0,
-                         "%llu readings in %.1f s, and the sensor's clock stands still or goes back", refused,
-                         silent));
+                         "%llu samples in %.1f s, but the sensor's clock stands still or goes backwards",
+                         refused, silent));
   }
 }
 

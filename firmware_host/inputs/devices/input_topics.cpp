@@ -106,8 +106,8 @@ void addTopics(const Settings& settings, MachineReport& report) {
   report.lines.push_back(
       {"topic", fmt::format("none in domain {} on {}", settings.ros2.domain, settings.ros2.interface),
        MachineVerdict::kNote,
-       "start the driver; on lo it has to stay on this computer too (ROS_LOCALHOST_ONLY=1), and "
-       "ROS_DOMAIN_ID is ros2.domain"});
+       "start the driver; on lo it must run on this computer (ROS_LOCALHOST_ONLY=1) with ROS_DOMAIN_ID equal "
+       "to ros2.domain"});
 }
 
 std::string cameraInfoTopic(std::string_view image_topic) {
@@ -158,12 +158,12 @@ void applyCameraInfo(const Settings& settings, Calibration& calibration) {
     const std::string topic = cameraInfoTopic(image);
     const auto failed = [&](const std::string& why, const std::string& remedy) {
       if (uses) throw InputError("settings", 0, "cameras.camera_info", why, remedy);
-      calibration.warnings.push_back(fmt::format("camera {}: its lens was not checked: {}", i, why));
+      calibration.warnings.push_back(fmt::format("camera {}: lens not checked: {}", i, why));
     };
     std::string why;
     const std::optional<CameraInfo> info = receiveInfo(settings, topic, why);
     if (!info) {
-      failed(why, "Let the driver publish it, or set cameras.camera_info to off");
+      failed(why, "Enable CameraInfo in the driver, or set cameras.camera_info to off");
       continue;
     }
     CameraModel told;
@@ -177,7 +177,7 @@ void applyCameraInfo(const Settings& settings, Calibration& calibration) {
     }
     CameraModel& lens = rig.camera.at(i);
     if (told.width() != lens.width() || told.height() != lens.height()) {
-      failed(fmt::format("{} is of {}x{}, the calibration of {}x{}", topic, told.width(), told.height(),
+      failed(fmt::format("{} is for {}x{}, the calibration for {}x{}", topic, told.width(), told.height(),
                          lens.width(), lens.height()),
              "Give the calibration of these images");
       continue;
@@ -186,10 +186,10 @@ void applyCameraInfo(const Settings& settings, Calibration& calibration) {
     if (uses) {
       lens = told;
     } else if (apart > kMostApart) {
-      calibration.warnings.push_back(fmt::format(
-          "camera {}: the calibration's lens and {} differ by up to {:.1f} px{}; calibrate anew, or set "
-          "cameras.camera_info to use",
-          i, topic, apart, isRectified(image) ? " (the images are rectified)" : ""));
+      calibration.warnings.push_back(
+          fmt::format("camera {}: the calibration's lens and {} differ by up to {:.1f} px{}; recalibrate, or "
+                      "set cameras.camera_info to use",
+                      i, topic, apart, isRectified(image) ? " (the images are rectified)" : ""));
     }
   }
 }

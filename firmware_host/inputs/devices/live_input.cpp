@@ -37,26 +37,25 @@ bool sharesLink(const Settings& settings) {
   if (device.empty() || !samePort(device, settings.imu_link.device)) return false;
   if (settings.imu_link.protocol != "mavlink") {
     failAt(
-        "autopilot.device", device + " is the port of an IMU that speaks " + settings.imu_link.protocol,
-        "Name the autopilot's own port; one link for both is an autopilot's, with imu_link.protocol mavlink");
+        "autopilot.device", device + " is the port of an IMU with the protocol " + settings.imu_link.protocol,
+        "Set the autopilot's own port. Only an autopilot can share the link, with imu_link.protocol mavlink");
   }
   if (settings.imu_link.baud != settings.autopilot.baud) {
     failAt("autopilot.baud",
-           fmt::format("{} baud, imu_link.baud is {}, and both are of {}", settings.autopilot.baud,
+           fmt::format("is {} baud and imu_link.baud is {}, but both use {}", settings.autopilot.baud,
                        settings.imu_link.baud, device),
-           "Set both to the rate of that port");
+           "Set both to the baud rate of that port");
   }
   return true;
 }
 
 std::unique_ptr<ImuLink> makeTopicLink(const Settings& settings, const InputTopics& topics, double rate) {
   if (!settings.imu_link.device.empty()) {
-    failAt("imu_link.topic", "named beside imu_link.device, and an IMU has one origin",
-           "Leave one of them out");
+    failAt("imu_link.topic", "cannot be combined with imu_link.device", "Remove one of them");
   }
   if (topics.imu.empty()) {
-    failAt("imu_link.accel_topic", "the accelerometer's topic alone",
-           "Name the gyroscope's in imu_link.topic; a topic with both needs no accel_topic");
+    failAt("imu_link.accel_topic", "is set without a topic for the gyroscope",
+           "Set imu_link.topic to the gyroscope's topic; a topic with both sensors needs no accel_topic");
   }
   TopicImuSettings link;
   link.network = inputNetwork(settings);
@@ -69,8 +68,8 @@ std::unique_ptr<ImuLink> makeTopicLink(const Settings& settings, const InputTopi
 std::unique_ptr<ImuLink> makeImuLink(const ImuLinkGroup& settings, double rate, LinkOutbox* outbox) {
   if (settings.protocol == "dronecan") return std::make_unique<CanImuLink>(settings);
   if (settings.protocol != "mavlink" && udpAddress(settings.device, "imu_link.device")) {
-    failAt("imu_link.device", settings.protocol + " comes by a serial port",
-           "Name the port, or set imu_link.protocol to mavlink where an autopilot sends datagrams");
+    failAt("imu_link.device", settings.protocol + " needs a serial port",
+           "Set the serial port, or set imu_link.protocol to mavlink for an autopilot on UDP");
   }
   return std::make_unique<PortImuLink>(settings, rate, outbox);
 }
@@ -159,58 +158,58 @@ void checkOrigins(const CamerasGroup& group, const InputTopics& topics) {
                         static_cast<int>(!origin.pipeline.empty()) + static_cast<int>(!origin.topic.empty());
     if (origins < 2) continue;
     failAt(origin.key(),
-           fmt::format("named beside {}, and a camera has one origin",
+           fmt::format("cannot be combined with {}",
                        origin.device.empty() ? origin.pipeline_key : origin.device_key),
-           "Leave one of them out");
+           "Remove one of them");
   }
   if (!originOf(group, topics, 0).named()) {
-    failAt(
-        "cameras.device0", "no camera is named",
-        "Name its video node (`swiftlet doctor` lists them), a pipeline in cameras.pipeline0, or a topic in "
-        "cameras.topic0");
+    failAt("cameras.device0", "no camera is set",
+           "Set its video node (`swiftlet doctor` lists them), a pipeline in cameras.pipeline0, or a topic "
+           "in cameras.topic0");
   }
   if (any_device) return;
   if (group.format != kAnyFormat) {
-    failAt("cameras.format", "is for video nodes, and the settings name none",
-           "Write the format into the pipeline, as `! video/x-raw,format=NV12`; topics say theirs");
+    failAt(
+        "cameras.format", "applies only to video nodes, and none is set",
+        "Set the format in the pipeline, for example `! video/x-raw,format=NV12`; topics carry their format");
   }
   if (group.gain >= 0) {
-    failAt("cameras.gain", "is for video nodes, and the settings name none",
-           "Set the gain by the pipeline's source element, or by the topic's driver");
+    failAt("cameras.gain", "applies only to video nodes, and none is set",
+           "Set the gain in the pipeline's source element or in the topic's driver");
   }
 }
 
 void checkCameras(const CamerasGroup& group, const InputTopics& topics, const Rig& rig) {
   checkOrigins(group, topics);
   if (group.format != kAnyFormat && !pixelFormat(group.format)) {
-    failAt("cameras.format", group.format + " is no format that is taken",
-           "docs/v4l2.md lists those that are; `any` takes the first that the camera offers");
+    failAt("cameras.format", group.format + " is not a supported format",
+           "See docs/v4l2.md for the supported formats; `any` uses the first that the camera offers");
   }
   const bool two_in_one = twoInOne(group);
   const CameraOrigin other = originOf(group, topics, 1);
   const bool second = two_in_one || other.named();
   if (rig.camera_count == 2 && !second) {
-    failAt(
-        "cameras.device1", "the calibration has two cameras, the settings name one",
-        "Name the second's video node, pipeline or topic, or set cameras.side_by_side where one gives both");
+    failAt("cameras.device1", "the calibration has two cameras, the settings have one",
+           "Set the second camera's video node, pipeline or topic, or cameras.side_by_side if one image "
+           "holds both cameras");
   }
   if (rig.camera_count == 1 && second) {
-    failAt(
-        "vehicle.calibration", "the settings name two cameras, the calibration has one",
-        fmt::format("Calibrate both, or leave {} out", other.named() ? other.key() : "cameras.side_by_side"));
+    failAt("vehicle.calibration", "the settings have two cameras, the calibration has one",
+           fmt::format("Calibrate both, or remove {}", other.named() ? other.key() : "cameras.side_by_side"));
   }
   if (!two_in_one && !group.device1.empty() && group.device0 == group.device1) {
-    failAt("cameras.device1", "the same video node as cameras.device0",
-           "Name the other camera's; set cameras.side_by_side where one node gives both");
+    failAt("cameras.device1", "is the same video node as cameras.device0",
+           "Set the other camera's node; set cameras.side_by_side if one node delivers both cameras");
   }
   if (two_in_one && other.named()) {
-    failAt(other.key(), "named beside the one that gives both cameras",
-           group.side_by_side ? "Leave it or cameras.side_by_side out"
-                              : "Leave it out, or choose another cameras.format");
+    failAt(other.key(), "is set, but one image already holds both cameras",
+           group.side_by_side ? "Remove it or cameras.side_by_side"
+                              : "Remove it, or choose another cameras.format");
   }
   if (two_in_one &&
       (rig.camera[0].width() != rig.camera[1].width() || rig.camera[0].height() != rig.camera[1].height())) {
-    failAt("cameras.device0", "gives two cameras of one size, and those of the calibration differ in it",
+    failAt("cameras.device0",
+           "delivers two cameras of the same size, but the calibration has two different sizes",
            "Give the calibration of these cameras");
   }
 }
@@ -229,12 +228,13 @@ LiveInput::LiveInput(const Settings& settings, const Calibration& calibration) {
   topics_ = topics.any();
   if (settings.imu_link.device.empty() && !imu_topics) {
     failAt(
-        "imu_link.device", "no IMU is named",
-        "Name its serial port or CAN interface (`swiftlet doctor` lists them), or a topic in imu_link.topic");
+        "imu_link.device", "no IMU is set",
+        "Set its serial port or CAN interface (`swiftlet doctor` lists them), or a topic in imu_link.topic");
   }
   if (settings.trigger.chip == kTriggerByImu && (imu_topics || settings.imu_link.protocol == "dronecan")) {
-    failAt("trigger.chip", imu_topics ? "topics tell of no edges" : "dronecan tells of no edges",
-           "Name the GPIO chip that sees the trigger, or leave trigger.chip out");
+    failAt("trigger.chip",
+           imu_topics ? "ROS 2 topics do not carry trigger edges" : "dronecan does not carry trigger edges",
+           "Set the GPIO chip that receives the trigger, or remove trigger.chip");
   }
   const Rig& rig = calibration.rig;
   CamerasGroup cameras = settings.cameras;

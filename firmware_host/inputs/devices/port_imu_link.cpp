@@ -107,13 +107,13 @@ bool PortImuLink::nextRemark(DeviceFault& remark) {
 std::string PortImuLink::stream() const {
   const ImuStreamRequest& stream = dialogue_.stream();
   if (!isMavlink()) return setup_.text();
-  if (stream.asked() <= 0) return "no autopilot's HEARTBEAT was heard: nothing was asked";
-  const std::string answer = !stream.result() ? "not answered"
+  if (stream.asked() <= 0) return "no HEARTBEAT from an autopilot: no stream requested";
+  const std::string answer = !stream.result() ? "no answer"
                              : *stream.result() == mavlink::CommandAck::kAccepted
                                  ? "accepted"
                                  : fmt::format("refused with MAV_RESULT {}", *stream.result());
-  return fmt::format("{}: {:.0f} Hz asked, {}, {:.0f} Hz come", stream.messageName(), stream.asked(), answer,
-                     stream.seen());
+  return fmt::format("{}: {:.0f} Hz requested, {}, {:.0f} Hz received", stream.messageName(), stream.asked(),
+                     answer, stream.seen());
 }
 
 nlohmann::ordered_json PortImuLink::counters() const {

@@ -39,16 +39,17 @@ void SensorSetup::run(LinkPort& port, ImuDecoder& decoder) {
       configuration.answered(i, std::span(heard_).subspan(reply_, step.answer_length));
       continue;
     }
-    warning_ = deviceFault(DeviceFaultKind::kUnsupported, 0,
-                           "%.0f Hz asked, and to \"%s\" it gave %s: set its output by its maker's program",
-                           rate_, step.what, reply_ < count_ ? "a refusal" : "no reply");
+    warning_ =
+        deviceFault(DeviceFaultKind::kUnsupported, 0,
+                    "%.0f Hz requested, but \"%s\" got %s: set the output rate with the maker's program",
+                    rate_, step.what, reply_ < count_ ? "a refusal" : "no reply");
     // So that it sends again what it did.
     static_cast<void>(ask(port, configuration.step(configuration.steps() - 1)));
     return;
   }
   set_ = configuration.rate();
   if (std::abs(*set_ - rate_) > kTolerance * rate_) {
-    warning_ = deviceFault(DeviceFaultKind::kChanged, 0, "%.0f Hz asked, %.1f Hz set", rate_, *set_);
+    warning_ = deviceFault(DeviceFaultKind::kChanged, 0, "%.0f Hz requested, %.1f Hz set", rate_, *set_);
   }
 }
 
@@ -112,9 +113,9 @@ bool SensorSetup::nextWarning(DeviceFault& warning) {
 
 std::string SensorSetup::text() const {
   if (!listened_) return {};
-  if (!asks_) return fmt::format("sends at {:.0f} Hz: left as it is", found_);
+  if (!asks_) return fmt::format("sends at {:.0f} Hz: unchanged", found_);
   if (set_) return fmt::format("sent at {:.0f} Hz, set to {:.1f} Hz", found_, *set_);
-  return fmt::format("sends at {:.0f} Hz, and could not be set to {:.0f} Hz", found_, rate_);
+  return fmt::format("sends at {:.0f} Hz and could not be set to {:.0f} Hz", found_, rate_);
 }
 
 }  // namespace swiftlet

@@ -64,7 +64,7 @@ DeviceFault TopicImuLink::silent() const {
   }
   const AccelAtGyro::Counters& joined = joined_.counters();
   return deviceFault(
-      DeviceFaultKind::kSilent, 0, "%llu messages came, %llu of the gyro without accelerometer",
+      DeviceFaultKind::kSilent, 0, "%llu messages received, %llu gyroscope samples without accelerometer",
       static_cast<unsigned long long>(came_), static_cast<unsigned long long>(joined.unpaired));
 }
 
@@ -77,12 +77,12 @@ void TopicImuLink::discard() {
 
 DeviceFault TopicImuLink::judge(const TopicImu& message) const {
   if (!message.gyro.allFinite() || !message.accel.allFinite()) {
-    return deviceFault(DeviceFaultKind::kGarbage, 0, "values that are no numbers");
+    return deviceFault(DeviceFaultKind::kGarbage, 0, "values that are not finite");
   }
   // Exactly zero, as drivers fill in what a message does not have.
   if (!apart() && message.accel.isZero(0)) {
     return deviceFault(DeviceFaultKind::kUnsupported, 0,
-                       "no acceleration in %s: name the accelerometer's topic in imu_link.accel_topic",
+                       "no acceleration in %s: set imu_link.accel_topic to the accelerometer's topic",
                        settings_.topic.c_str());
   }
   return {};
@@ -107,7 +107,7 @@ DeviceFault TopicImuLink::takeOne(Stream& stream, const TopicImu& message) {
       return {};
     case WallStamps::Result::kWrongClock:
       ++wrong_clock_;
-      return deviceFault(DeviceFaultKind::kWrongClock, 0, "stamps %.3f s before their arrival",
+      return deviceFault(DeviceFaultKind::kWrongClock, 0, "stamps are %.3f s before their arrival",
                          stream.stamps.farBy().seconds());
   }
   if (&stream == &imu_) {
@@ -162,7 +162,7 @@ bool TopicImuLink::nextRemark(DeviceFault& remark) {
 }
 
 std::string TopicImuLink::stream() const {
-  return apart() ? "gyroscope and accelerometer apart, the latter interpolated" : "";
+  return apart() ? "separate gyroscope and accelerometer, the latter interpolated" : "";
 }
 
 nlohmann::ordered_json TopicImuLink::counters() const {

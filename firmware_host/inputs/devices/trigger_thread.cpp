@@ -65,7 +65,7 @@ void TriggerThread::watchQuality(std::size_t edges) {
     if (rate_.tooFew() || rate_.tooMany()) {
       journal_.defect(heard_,
                       deviceFault(rate_.tooFew() ? DeviceFaultKind::kLossy : DeviceFaultKind::kNoisy, 0,
-                                  "%.0f edges in a second in place of %.0f", rate_.seen(), rate_.expected()));
+                                  "%.0f edges in a second, expected %.0f", rate_.seen(), rate_.expected()));
     } else {
       journal_.sound(heard_);
     }

@@ -34,8 +34,8 @@ std::string unpacked(const std::string& name, std::string_view bytes) {
   }
   inflateEnd(&stream);
   if (result != Z_STREAM_END) {
-    throw InputError(name, 0, "", "damaged: it does not unpack",
-                     "Fetch the file again, or unpack it with gzip -d");
+    throw InputError(name, 0, "", "damaged: it cannot be decompressed",
+                     "Download the file again, or decompress it with gzip -d");
   }
   return text;
 }
@@ -53,14 +53,15 @@ Vocabulary assembled(const std::string& name, const std::vector<VocabularyNode>&
 Vocabulary readVocabularyBytes(const std::string& name, std::string_view bytes) {
   if (bytes.starts_with("\x1f\x8b")) {
     const std::string text = unpacked(name, bytes);
-    if (text.starts_with("\x1f\x8b")) throw InputError(name, 0, "", "compressed twice", "Unpack it once");
+    if (text.starts_with("\x1f\x8b")) throw InputError(name, 0, "", "compressed twice", "Decompress it once");
     return readVocabularyBytes(name, text);
   }
   if (bytes.starts_with("SWPLACES")) {
     Vocabulary vocabulary;
     const Status status =
         vocabulary.load({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
-    if (!status.ok()) throw InputError(name, 0, "", status.what, "Make it again with `swiftlet vocabulary`");
+    if (!status.ok())
+      throw InputError(name, 0, "", status.what, "Create it again with `swiftlet vocabulary`");
     return vocabulary;
   }
   if (bytes.starts_with("%YAML") || bytes.substr(0, 256).find("vocabulary:") != std::string_view::npos) {
@@ -71,7 +72,7 @@ Vocabulary readVocabularyBytes(const std::string& name, std::string_view bytes) 
 
 Vocabulary readVocabulary(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
-  if (!in) throw InputError(path, 0, "", "cannot be opened", "Give a vocabulary's file");
+  if (!in) throw InputError(path, 0, "", "cannot be opened", "Give the file of a vocabulary");
   const std::string bytes(std::istreambuf_iterator<char>(in), {});
   return readVocabularyBytes(path, bytes);
 }

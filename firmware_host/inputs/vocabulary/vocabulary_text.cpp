@@ -9,7 +9,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr const char* kTextRemedy = "Give a vocabulary as DBoW2 or ORB-SLAM write it (ORBvoc.txt)";
+constexpr const char* kTextRemedy = "Give a vocabulary in the format of DBoW2 or ORB-SLAM (ORBvoc.txt)";
 constexpr std::int64_t kMaxBranching = 20, kMaxLevels = 10;  // as their loaders check
 
 /// Blank-separated words of a text, line by line.
@@ -42,7 +42,7 @@ class Words {
     std::int64_t value = 0;
     if (word.empty()) throw error(field, "missing");
     if (!parseInteger(word, value) || value < low || value > high) {
-      throw error(field, quoteInput(word) + " is no integer from " + std::to_string(low) + " to " +
+      throw error(field, quoteInput(word) + " is not an integer from " + std::to_string(low) + " to " +
                              std::to_string(high));
     }
     return value;
@@ -52,7 +52,7 @@ class Words {
     double value = 0;
     if (word.empty()) throw error("weight", "missing");
     if (!parseDouble(word, value) || !std::isfinite(value) || value < 0) {
-      throw error("weight", quoteInput(word) + " is no number from 0 on");
+      throw error("weight", quoteInput(word) + " is not a non-negative number");
     }
     return value;
   }
@@ -91,15 +91,15 @@ std::vector<VocabularyNode> readVocabularyText(const std::string& name, std::str
       node.descriptor.words[i / 8] |= byte << (8 * (i % 8));
     }
     node.weight = static_cast<float>(words.weight());
-    if (!words.next().empty()) throw words.error("weight", "more follows on its line");
+    if (!words.next().empty()) throw words.error("weight", "its line has extra fields");
     nodes.push_back(node);
   }
   std::vector<bool> parent(nodes.size() + 1, false);
   for (const VocabularyNode& node : nodes) parent[node.parent] = true;
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     if (!leaf[i] && !parent[i + 1]) {
-      throw InputError(name, 0, "isLeaf", "node " + std::to_string(i + 1) + " is no leaf and has no children",
-                       kTextRemedy);
+      throw InputError(name, 0, "isLeaf",
+                       "node " + std::to_string(i + 1) + " is not a leaf and has no children", kTextRemedy);
     }
   }
   return nodes;

@@ -12,7 +12,7 @@ namespace {
 
 // OpenCV's FileStorage writes "key:value" without a blank, which general YAML parsers do not take for a key,
 // and a large vocabulary would be a million nodes of theirs: the one form that these files have is read here.
-constexpr const char* kYamlRemedy = "Give a vocabulary as DBoW2 saves it";
+constexpr const char* kYamlRemedy = "Give a vocabulary saved by DBoW2";
 constexpr std::string_view kBlank = " \t\r\n";
 constexpr std::int64_t kMaxNodes = 16'000'000;
 
@@ -64,14 +64,14 @@ struct Item {
   [[nodiscard]] std::size_t id(const char* key, std::int64_t low) const {
     std::int64_t number = 0;
     if (!parseInteger(value(key), number) || number < low || number > kMaxNodes) {
-      throw error(key, quoteInput(value(key)) + " is no node's number");
+      throw error(key, quoteInput(value(key)) + " is not a node number");
     }
     return static_cast<std::size_t>(number);
   }
   [[nodiscard]] float weight() const {
     double number = 0;
     if (!parseDouble(value("weight"), number) || !std::isfinite(number) || number < 0) {
-      throw error("weight", quoteInput(value("weight")) + " is no number from 0 on");
+      throw error("weight", quoteInput(value("weight")) + " is not a non-negative number");
     }
     return static_cast<float>(number);
   }
@@ -136,7 +136,7 @@ std::vector<VocabularyNode> readVocabularyYaml(const std::string& name, std::str
       throw InputError(name, 0, "nodeId", "nodes are not numbered 1, 2, ... without gaps", kYamlRemedy);
     }
     if (node.parent > listed.size()) {
-      throw InputError(name, 0, "parentId", "node " + std::to_string(id) + "'s parent is not there",
+      throw InputError(name, 0, "parentId", "node " + std::to_string(id) + "'s parent does not exist",
                        kYamlRemedy);
     }
     parent[node.parent] = true;
@@ -144,7 +144,7 @@ std::vector<VocabularyNode> readVocabularyYaml(const std::string& name, std::str
   }
   for (const std::size_t leaf : leaves) {
     if (leaf > nodes.size() || parent[leaf]) {
-      throw InputError(name, 0, "words", "node " + std::to_string(leaf) + " is no leaf", kYamlRemedy);
+      throw InputError(name, 0, "words", "node " + std::to_string(leaf) + " is not a leaf", kYamlRemedy);
     }
   }
   return nodes;

@@ -93,7 +93,9 @@ std::string junitCase(const BudgetRow& row, const BudgetFigure& figure) {
                   xmlText(row.name + " " + figure.name), scaleOf(figure) == 1 ? 0.0 : figure.measured);
   if (row.measured.count() == 0) {
     return start +
-           ">\n      <failure type=\"not measured\" message=\"nothing was measured\"/>\n    </testcase>\n";
+           ">\n"
+           "      <failure type=\"not measured\" message=\"nothing was measured\"/>\n"
+           "    </testcase>\n";
   }
   if (!figure.missed()) return start + "/>\n";
   const std::string message =

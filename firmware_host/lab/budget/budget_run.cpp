@@ -28,7 +28,7 @@ class Load {
     if (!request.load) return;
     const std::string failed = generator_.start(request.load_settings);
     if (!failed.empty()) {
-      throw InputError("--load", 0, "", "the load cannot be made: " + failed, "Ask for fewer workers");
+      throw InputError("--load", 0, "", "cannot create the load: " + failed, "Use fewer workers");
     }
   }
 

@@ -78,7 +78,8 @@ std::string LoadGenerator::start(const LoadSettings& settings) {
     if (child < 0) {
       const std::string reason = std::generic_category().message(errno);
       stop();
-      return fmt::format("{} of {} load processes could be made ({}): see `ulimit -u`", i, wanted, reason);
+      return fmt::format("only {} of {} load processes could be created ({}): see `ulimit -u`", i, wanted,
+                         reason);
     }
     workers_.push_back(child);
   }

@@ -94,15 +94,16 @@ Json toJson(const LoopAccuracy& loops) {
 
 std::string toText(const LoopAccuracy& loops) {
   return fmt::format(
-      "  {} of {} verified are right (within {:g} m and {:g} deg), {} of {} selected; median error {:.4f} m, "
-      "{:.3f} deg\n",
+      "  {} of {} verified are correct (within {:g} m and {:g} deg), {} of {} selected; median error {:.4f} "
+      "m, {:.3f} deg\n",
       loops.verified_right, loops.verified, kFalseLoopDistance, kFalseLoopDegrees, loops.selected_right,
       loops.selected, loops.median_distance, loops.median_degrees);
 }
 
 std::string toText(const Revisits& revisits) {
   return fmt::format(
-      "  {} of {} places (one every 0.5 s) are within 1 m and 30 degrees of one more than 20 s before\n",
+      "  {} of {} places (one every 0.5 s) are within 1 m and 30 degrees of one visited more than 20 s "
+      "earlier\n",
       revisits.revisiting, revisits.samples);
 }
 
@@ -114,7 +115,7 @@ std::string toText(const std::string& title, const Accuracy& accuracy) {
   text += fmt::format(", {:.1f} s, {:.1f} m\n", accuracy.duration, absolute.path_length);
   text += absoluteText(absolute);
   text +=
-      fmt::format("  rotation  rmse {:.3f} deg  max {:.3f}; tilt, as it is  rmse {:.3f} deg  max {:.3f}\n",
+      fmt::format("  rotation  rmse {:.3f} deg  max {:.3f}; tilt, unaligned  rmse {:.3f} deg  max {:.3f}\n",
                   absolute.rotation.rmse, absolute.rotation.max, absolute.tilt.rmse, absolute.tilt.max);
   text += fmt::format("  RPE over {:g} s  rmse {:.4f} m  {:.3f} deg  ({} intervals)\n",
                       accuracy.over_time.interval, accuracy.over_time.translation.rmse,

@@ -58,8 +58,8 @@ std::map<int, std::string> readLabelNames(const std::string& log) {
     const std::size_t comma = std::min(line.find(','), line.size());
     const auto [end, error] = std::from_chars(line.data(), line.data() + comma, label);
     if (error != std::errc() || end != line.data() + comma || label < 0 || comma + 1 >= line.size()) {
-      throw InputError(path.string(), number, "id,name", "\"" + line + "\" is no label with its name",
-                       "Write a number and a name with a comma between, as 3,wall");
+      throw InputError(path.string(), number, "id,name", "\"" + line + "\" is not a label with a name",
+                       "Write a number and a name separated by a comma, for example 3,wall");
     }
     names[label] = line.substr(comma + 1);
   }

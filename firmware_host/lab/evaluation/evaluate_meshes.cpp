@@ -143,7 +143,7 @@ MeshAccuracy evaluateMeshes(const MeshEvaluationRequest& request, const Trajecto
   accuracy.alignment = fit.text;
   if (accuracy.truth.empty()) {
     if (!has_sequence) {
-      throw InputError(request.log, 0, "", "has no truth/mesh.ply to judge meshes by",
+      throw InputError(request.log, 0, "", "has no truth/mesh.ply to compare meshes with",
                        "Give the true surface with --truth-mesh");
     }
     SequenceJudge(request, truth, options, fit.alignment, nullptr)(accuracy);
@@ -167,9 +167,9 @@ MeshAccuracy evaluateMeshes(const MeshEvaluationRequest& request, const Trajecto
   }
   if (fs::exists(run / kMapFile)) accuracy.map = judge(kMapFile);
   if (!has_sequence && !accuracy.complete && !accuracy.map) {
-    throw InputError(
-        request.run, 0, "", "no meshes in this folder",
-        "Replay with --mesh-sequence or --map, or give what `swiftlet mesh` or `swiftlet fuse` wrote");
+    throw InputError(request.run, 0, "", "no meshes in this folder",
+                     "Replay with --mesh-sequence or --map, or give a folder written by `swiftlet mesh` or "
+                     "`swiftlet fuse`");
   }
   return accuracy;
 }

@@ -46,7 +46,7 @@ Truth readTruth(const std::string& path, bool without_images) {
     const auto bag = openBag(path);
     const auto topic = chooseTruthTopic(*bag);
     truth.poses = readBagTruth(*bag, topic);
-    if (truth.poses.empty()) throw InputError(path, 0, "", "no topic of it holds true poses", kRemedy);
+    if (truth.poses.empty()) throw InputError(path, 0, "", "none of its topics has true poses", kRemedy);
     truth.name = path + " " + bag->topics()[*topic].name;
     return truth;
   }

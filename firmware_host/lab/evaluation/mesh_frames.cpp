@@ -54,10 +54,10 @@ std::vector<MeshFrame> readMeshFrames(const std::string& folder) {
     frame.frame_mesh = fileOf(3);
     frame.horizon_mesh = fileOf(4);
     if (!readHull(csv.field(kColumns), frame.hull)) {
-      throw csv.error("hull", "not pairs of numbers with blanks between", kRemedy);
+      throw csv.error("hull", "is not a list of number pairs separated by blanks", kRemedy);
     }
     if (!frames.empty() && frame.stamp <= frames.back().stamp) {
-      throw csv.error("stamp", "not after the one before", kRemedy);
+      throw csv.error("stamp", "is not later than the previous one", kRemedy);
     }
     frames.push_back(std::move(frame));
   }

@@ -103,11 +103,13 @@ std::string completeText(const CompleteMeshAccuracy& complete) {
                         complete.observed, kCovered);
   }
   if (complete.distance.count > 0 && complete.unlabelled_share < 1) {
-    text += fmt::format("; labels right {:.1f} % of the labelled", 100 * complete.label_share);
+    text += fmt::format("; labels correct {:.1f} % of the labelled", 100 * complete.label_share);
   }
   if (complete.registration) {
-    text += fmt::format("\n    laid on the truth: rmse {:.4f}  median {:.4f}", complete.registered.rmse,
-                        complete.registered.median);
+    text += fmt::format(
+        "\n"
+        "    aligned with the truth: rmse {:.4f}  median {:.4f}",
+        complete.registered.rmse, complete.registered.median);
   }
   if (complete.labels.places() > 0 && complete.unlabelled_share < 1) {
     text += fmt::format(
@@ -138,12 +140,11 @@ Json toJson(const MeshAccuracy& accuracy) {
 std::string toText(const MeshAccuracy& accuracy) {
   std::string text =
       fmt::format("meshes against {}, moved by {}\n",
-                  accuracy.truth.empty() ? "no true surface: only what is drawn counts" : accuracy.truth,
+                  accuracy.truth.empty() ? "no true surface: only coverage is evaluated" : accuracy.truth,
                   accuracy.alignment);
   if (accuracy.frame || accuracy.horizon) {
     text += fmt::format("  {} frames", accuracy.frames);
-    if (accuracy.without_truth > 0)
-      text += fmt::format(", {} without truth left out", accuracy.without_truth);
+    if (accuracy.without_truth > 0) text += fmt::format(", {} omitted without truth", accuracy.without_truth);
     if (accuracy.keyframes_bare > 0)
       text += fmt::format(", {} keyframes without mesh", accuracy.keyframes_bare);
     text += fmt::format(

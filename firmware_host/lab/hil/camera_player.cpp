@@ -40,7 +40,7 @@ DeviceFault CameraPlayer::setControl(const char* name, int value) {
   v4l2_queryctrl query{};
   query.id = V4L2_CTRL_FLAG_NEXT_CTRL;
   DeviceFault fault = deviceFault(DeviceFaultKind::kUnsupported, 0,
-                                  "no control called \"%s\": only vivid's cameras can be broken so", name);
+                                  "no control called \"%s\": only vivid's cameras support this fault", name);
   while (ioctl(fd, VIDIOC_QUERYCTRL, &query) == 0) {
     if (std::strcmp(reinterpret_cast<const char*>(query.name), name) == 0) {
       v4l2_control control{query.id, value};

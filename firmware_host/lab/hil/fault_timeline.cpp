@@ -94,13 +94,13 @@ class Row {
     const auto device =
         std::ranges::find(kDevices, fields_[1], &std::pair<FaultDevice, std::string_view>::second);
     if (device == kDevices.end()) {
-      fail("device", "`" + fields_[1] + "` is no device", "Devices: imu, camera0, camera1, trigger");
+      fail("device", "`" + fields_[1] + "` is not a device", "Devices: imu, camera0, camera1, trigger");
     }
     fault.device = device->first;
     const auto kind = std::ranges::find(kFaults, fields_[2], &Known::name);
     if (kind == kFaults.end() || !has(*kind, fault.device)) {
-      fail("fault", fmt::format("`{}` is no fault of {}", fields_[2], fields_[1]),
-           "Faults of it: " + namesFor(fault.device));
+      fail("fault", fmt::format("`{}` is not a fault of {}", fields_[2], fields_[1]),
+           "Its faults: " + namesFor(fault.device));
     }
     fault.kind = kind->kind;
     fault.length = Duration::fromSeconds(number(3, "for seconds", 0, kLongestStep));
@@ -146,7 +146,7 @@ FaultTimeline FaultTimeline::parse(const std::string& name, std::string_view tex
     if (trimmed(line).empty()) continue;
     if (timeline.faults_.size() == kMostFaults) {
       throw InputError(name, number, "", fmt::format("more than {} faults", kMostFaults),
-                       "Give the rest to another flight");
+                       "Use a second flight for the rest");
     }
     timeline.faults_.push_back(Row(name, number, fieldsOf(line)).read());
   }
@@ -156,7 +156,7 @@ FaultTimeline FaultTimeline::parse(const std::string& name, std::string_view tex
 
 FaultTimeline FaultTimeline::read(const std::string& path) {
   std::ifstream file(path);
-  if (!file) throw InputError(path, 0, "", "the timeline of faults cannot be opened", "Check its name");
+  if (!file) throw InputError(path, 0, "", "cannot open the fault timeline", "Check the file name");
   std::ostringstream text;
   text << file.rdbuf();
   return parse(path, text.str());

@@ -74,8 +74,8 @@ std::string deviceStart(FaultDevice device) {
 /// What a user reads of each kind, any of them.
 std::span<const std::string_view> wordsOf(PlannedFaultKind kind) {
   static constexpr std::array<std::string_view, 3> kGone = {": gone", ": not there", ": down"};
-  static constexpr std::array<std::string_view, 2> kNothing = {": sends nothing", ": sends something else"};
-  static constexpr std::array<std::string_view, 2> kLost = {": part of it is lost", ": sends nothing"};
+  static constexpr std::array<std::string_view, 2> kNothing = {": sends nothing", ": sends unexpected data"};
+  static constexpr std::array<std::string_view, 2> kLost = {": loses data", ": sends nothing"};
   static constexpr std::array<std::string_view, 1> kClock = {": its clock jumped"};
   static constexpr std::array<std::string_view, 1> kDark = {": sees nothing"};
   static constexpr std::array<std::string_view, 1> kSame = {": repeats one image"};
@@ -131,10 +131,9 @@ class Checker {
   explicit Checker(const HilEvidence& evidence) : e_(evidence) {}
 
   std::vector<HilCheck> operator()() {
-    add("played", e_.complete, "all of it, each image when it was due",
-        "not all of it, or images at another time than they were due");
-    add("ended", e_.finished, "the flight ended when told to",
-        "the flight has no summary, or was not finished");
+    add("played", e_.complete, "complete, each image in time", "incomplete, or some images late");
+    add("ended", e_.finished, "the flight ended as requested",
+        "the flight has no summary, or did not finish");
     std::array<bool, 4> seen{};
     for (const PlannedFault& fault : e_.faults.faults()) {
       checkTold(fault);
@@ -205,7 +204,7 @@ class Checker {
     }
     add("told: " + faultName(fault), false, "",
         fmt::format(
-            "no line of events.log from {:.2f} to {:.2f} s names the device, what it does and the remedy",
+            "no line of events.log from {:.2f} to {:.2f} s names the device, the fault and the remedy",
             from.seconds(), until.seconds()));
   }
 
@@ -221,10 +220,10 @@ class Checker {
       const auto has = [&](std::string_view word) { return line.text.find(word) != std::string::npos; };
       if (has(": its clock jumped")) continue;
       const bool of_working =
-          has(": part of it") || has(": sees nothing") || has(": repeats") || has(": sends too");
+          has(": loses data") || has(": sees nothing") || has(": repeats") || has(": sends too");
       if (has(": works again")) {
         fault.clear();
-      } else if (has(": sound again")) {
+      } else if (has(": normal again")) {
         defect.clear();
       } else {
         (of_working ? defect : fault) = line.text;
@@ -232,8 +231,8 @@ class Checker {
     }
     const std::string& stands = fault.empty() ? defect : fault;
     add(fmt::format("returned: {}", name(device)), stands.empty(),
-        fmt::format("nothing stands against it {:.0f} s after its last fault", kRecovered.seconds()),
-        fmt::format("still stands at {:.2f} s: {}", until.seconds(), stands));
+        fmt::format("no fault reported {:.0f} s after its last fault", kRecovered.seconds()),
+        fmt::format("still reported at {:.2f} s: {}", until.seconds(), stands));
   }
 
   [[nodiscard]] const HilEvidence::Judged* firstOf(Duration from, Duration until, Health health,

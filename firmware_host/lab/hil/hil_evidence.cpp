@@ -92,7 +92,7 @@ HilEvidence readHilEvidence(const std::string& run, const std::string& hil) {
   const Json report = readJson(played / "hil.json");
   if (!report.is_object() || !report.contains("last_image_ns")) {
     throw InputError((played / "hil.json").string(), 0, "", "no report of a replay",
-                     "Give the folder that `swiftlet hil` wrote");
+                     "Give the folder written by `swiftlet hil`");
   }
   HilEvidence evidence;
   evidence.faults = FaultTimeline::read((played / "faults.csv").string());

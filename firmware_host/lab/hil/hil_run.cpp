@@ -40,7 +40,7 @@ class PlayedTrigger {
   PlayedTrigger(std::string file, const FaultTimeline& faults) : file_(std::move(file)), faults_(faults) {
     if (!file_.empty() && !pull(false)) {
       throw InputError("", 0, "hil.trigger_pull", file_ + ": cannot be written",
-                       "Name the `pull` file of a gpio-sim line, and run as its owner");
+                       "Set the `pull` file of a gpio-sim line, and run as its owner");
     }
   }
 
@@ -127,16 +127,15 @@ class HilRun {
 
   HilResult operator()() {
     if (settings_.imu_link.device.empty()) {
-      throw InputError(
-          "", 0, "imu_link.device", "the settings do not say where the IMU is",
-          "Name a serial port that is not there (its name is linked to a pseudo-terminal), or a CAN "
-          "interface");
+      throw InputError("", 0, "imu_link.device", "no IMU is set",
+                       "Set a serial port that does not exist (its name is linked to a pseudo-terminal), or "
+                       "a CAN interface");
     }
     std::filesystem::create_directories(request_.out);
     writeWholeFile(std::filesystem::path(request_.out) / "faults.csv", request_.faults.text() + "\n");
     openDevices();
     if (!waitForReader()) {
-      warn(fmt::format("error: nobody opened {} within {:.0f} s\n", settings_.imu_link.device,
+      warn(fmt::format("error: no program opened {} within {:.0f} s\n", settings_.imu_link.device,
                        request_.patience));
       return end(false);
     }
@@ -166,7 +165,7 @@ class HilRun {
     for (std::size_t c = 0; c < source_->rig().camera_count; ++c) {
       if (outputs[c]->empty()) {
         throw InputError("", 0, kSettings[c], fmt::format("no output node for camera {}", c),
-                         "Name the node whose images it shows");
+                         "Set the node that feeds the camera");
       }
       const CameraModel& model = source_->rig().camera[c];
       cameras_.push_back(std::make_unique<PlayedCamera>(c, reader_, request_.faults));
@@ -195,8 +194,8 @@ class HilRun {
     for (const auto& camera : cameras_) {
       const Stamp first = camera->next()->stamp;
       if (grid_.offGrid(first) > kOffGrid) {
-        throw InputError(request_.log, 0, "", "the cameras did not take their images at the same time",
-                         "Play a log of synchronised cameras");
+        throw InputError(request_.log, 0, "", "the cameras' images were not taken at the same time",
+                         "Play a log of synchronized cameras");
       }
     }
     const Stamp earliest = hostNow() + Duration::fromSeconds(request_.lead + 2 * grid_.period.seconds());

@@ -33,7 +33,7 @@ class SerialWire : public ImuWire {
     const bool taken = fs::exists(fs::symlink_status(link_, error)) && !fs::is_symlink(link_, error);
     if (taken) {
       return deviceFault(DeviceFaultKind::kBusy, 0,
-                         "a real device has this name: name another imu_link.device");
+                         "is the name of a real device: set another imu_link.device");
     }
     if (const DeviceFault fault = terminal_.open(); !fault.ok()) return fault;
     removeLink();

@@ -75,17 +75,17 @@ class LogFolder {
  public:
   explicit LogFolder(const std::string& out) : out_(out), part_(out + ".part") {
     if (fs::exists(fs::path(out) / "mav0")) {
-      throw InputError(out, 0, "", "holds a log already", "Give another --out, or move it away");
+      throw InputError(out, 0, "", "already holds a log", "Give another --out, or move the log away");
     }
     std::error_code error;
     if (fs::exists(part_)) {
-      throw InputError(part_.string(), 0, "", "is there already, left by an import that was stopped",
+      throw InputError(part_.string(), 0, "", "already exists, left by an interrupted import",
                        "Remove it, or give another --out");
     }
     fs::create_directories(part_ / "mav0", error);
     if (error) {
       throw InputError(out, 0, "", "cannot be written: " + error.message(),
-                       "Give an --out that this user may write to");
+                       "Give an --out that this user can write to");
     }
   }
   ~LogFolder() {
@@ -129,8 +129,8 @@ std::vector<Stamp> writeCamera(const ImportRequest& request, const Recording& re
   Progress progress(fmt::format("images of camera {}", camera), video.pictures());
   for (std::size_t i = 0; video.nextFrame(frame); ++i) {
     if (frame.image.width != video.width() || frame.image.height != video.height()) {
-      throw InputError(recording.videos[camera], 0, "", fmt::format("picture {} has another size", i),
-                       "Cut the video where its size changes");
+      throw InputError(recording.videos[camera], 0, "", fmt::format("image {} has another size", i),
+                       "Split the video where its size changes");
     }
     more = !given.empty() && i >= given.size();
     if (more) break;
@@ -148,11 +148,11 @@ std::vector<Stamp> writeCamera(const ImportRequest& request, const Recording& re
   progress.finish();
   result.images += stamps.size();
   if (stamps.empty()) {
-    throw InputError(recording.videos[camera], 0, "", "holds no picture that can be decoded", "");
+    throw InputError(recording.videos[camera], 0, "", "holds no image that can be decoded", "");
   }
   if (more || (!given.empty() && stamps.size() != given.size())) {
     result.warnings.push_back(
-        fmt::format("{}: {} pictures, but its log has stamps for {}; the first of each go together",
+        fmt::format("{}: {} images, but its log has stamps for {}; they are matched from the start",
                     recording.videos[camera], more ? "more" : std::to_string(stamps.size()), given.size()));
   }
   result.damaged += video.damaged();
@@ -169,7 +169,7 @@ void checkOverlap(const ImportRequest& request, const std::vector<ImuSample>& sa
           "the samples ({:.3f} to {:.3f} s) and the images ({:.3f} to {:.3f} s) do not overlap in time",
           Duration{samples.front().stamp.ns}.seconds(), Duration{samples.back().stamp.ns}.seconds(),
           Duration{images.front().ns}.seconds(), Duration{images.back().ns}.seconds()),
-      "Say with --first-image which time of the samples' clock the first image has");
+      "Set --first-image to the time of the first image on the samples' clock");
 }
 
 void writeCalibration(const Calibration& calibration, const LogFolder& folder, std::size_t cameras,
@@ -205,7 +205,7 @@ ImportResult importVideo(const ImportRequest& request) {
       throw InputError(request.calibration, 0, "resolution",
                        fmt::format("is {}x{}, the video has {}x{}", camera.width(), camera.height(),
                                    first.width(), first.height()),
-                       "Give the calibration of this video's size");
+                       "Give the calibration for this video size");
     }
   }
   LogFolder folder(request.out);

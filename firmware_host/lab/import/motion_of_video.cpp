@@ -74,7 +74,7 @@ std::vector<ImuSample> dated(const std::string& name, const std::vector<Metadata
     if (payloads.size() == 1) line.add(count, (packets[i].begin + packets[i].length).seconds());
   }
   if (counted.empty() || !line.fit()) {
-    throw InputError(name, 0, "", fmt::format("its metadata hold no {}", what),
+    throw InputError(name, 0, "", fmt::format("its metadata contains no {}", what),
                      "Give the IMU's samples in a csv file: `swiftlet import VIDEO IMU.csv`");
   }
   std::vector<ImuSample> samples;
@@ -100,7 +100,7 @@ std::vector<ImuSample> goproImu(const std::string& name, const std::vector<Metad
     std::optional<GpmfPayload> payload = readGpmf(packet.bytes);
     if (!payload) {
       throw InputError(name, 0, fmt::format("metadata at {:.3f} s", packet.begin.seconds()),
-                       "are damaged or no GPMF", "Copy the file from the camera again");
+                       "is damaged or not GPMF", "Copy the file from the camera again");
     }
     payloads.push_back(std::move(*payload));
   }
@@ -128,18 +128,18 @@ PhoneLog readPhoneLog(const std::string& name, std::string_view text) {
         if (type != "gyroscope" && type != "accelerometer") continue;
         const auto values = sensor.at("values").get<std::array<double, 3>>();
         const std::optional<Stamp> stamp = stampOf(json);
-        if (!stamp) throw InputError(name, line, "time", "is no time in seconds", kPhoneRemedy);
+        if (!stamp) throw InputError(name, line, "time", "is not a time in seconds", kPhoneRemedy);
         (type == "gyroscope" ? gyro : accel).push_back(both(*stamp, {values[0], values[1], values[2]}));
       } else if (json.contains("frames")) {
         for (const Json& frame : json.at("frames")) {
           const std::size_t camera = frame.value("cameraInd", std::size_t{0});
           const std::optional<Stamp> stamp = stampOf(frame.contains("time") ? frame : json);
-          if (!stamp) throw InputError(name, line, "time", "is no time in seconds", kPhoneRemedy);
+          if (!stamp) throw InputError(name, line, "time", "is not a time in seconds", kPhoneRemedy);
           if (camera < kMaxCameras) log.images[camera].push_back(*stamp);
         }
       }
     } catch (const Json::exception& error) {
-      throw InputError(name, line, "", std::string("is no line of a phone's log: ") + error.what(),
+      throw InputError(name, line, "", std::string("is not a line of a phone log: ") + error.what(),
                        kPhoneRemedy);
     }
   }
@@ -149,7 +149,7 @@ PhoneLog readPhoneLog(const std::string& name, std::string_view text) {
   std::uint64_t left_out = 0;
   log.samples = joinImu(gyro, accel, left_out);
   if (log.samples.empty()) {
-    throw InputError(name, 0, "", "holds no gyroscope beside an accelerometer",
+    throw InputError(name, 0, "", "holds no pair of gyroscope and accelerometer",
                      "Record both; lines are {\"time\": s, \"sensor\": {...}}");
   }
   return log;

@@ -62,13 +62,12 @@ VideoFile::VideoFile(const std::string& path) : path_(path), codec_(std::make_un
   if (result == 0) result = avformat_find_stream_info(opened, nullptr);
   if (result < 0) {
     throw InputError(path, 0, "", "cannot be read as a video: " + reason(result),
-                     "Give a video file that is whole; a recording that was cut off has no index");
+                     "Give a complete video file; an interrupted recording has no index");
   }
   const AVCodec* codec = nullptr;
   const int index = av_find_best_stream(opened, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
   if (index < 0 || codec == nullptr) {
-    throw InputError(path, 0, "", "holds no video that FFmpeg's libraries decode",
-                     "`ffprobe` says what it holds");
+    throw InputError(path, 0, "", "holds no video that FFmpeg can decode", "`ffprobe` shows its contents");
   }
   for (unsigned i = 0; i < opened->nb_streams; ++i) {
     AVStream* stream = opened->streams[i];

@@ -100,14 +100,14 @@ class FuseRun {
 void FuseRun::begin() {
   checkMovingLabels(settings_.map_stage);
   const std::optional<ConfusionModel> confusion = confusionOf(settings_);
-  log_.poses().warnOfJumps("the map begins anew after each", log_.warnings());
+  log_.poses().warnOfJumps("the map starts anew after each", log_.warnings());
   sensor_ =
       request_.depth == DepthSource::kSensor || (request_.depth == DepthSource::kAny && !depth_.empty());
   if (sensor_ && depth_.empty()) {
     throw InputError(request_.log, 0, "", "has no depth images (mav0/depth0)", "Use --depth stereo");
   }
   if (!sensor_ && rig_.camera_count < 2) {
-    throw InputError(request_.log, 0, "", "one camera and no depth images: nothing gives depth",
+    throw InputError(request_.log, 0, "", "one camera and no depth images: no source of depth",
                      "Give a log with two cameras or with mav0/depth0");
   }
   if (sensor_) {
@@ -128,7 +128,7 @@ void FuseRun::openKept() {
     const std::filesystem::path folder = std::filesystem::absolute(request_.keep).parent_path();
     if (!std::filesystem::is_directory(folder) || std::filesystem::is_directory(request_.keep)) {
       throw InputError(request_.keep, 0, "--keep", "is not a file in a folder that exists",
-                       "Make the folder first, or give another file");
+                       "Create the folder first, or give another file");
     }
   }
   if (request_.continued.empty()) return;

@@ -46,7 +46,7 @@ G2oFile readG2oFile(const std::string& path) {
   if (!file) throw InputError(path, 0, "", std::string("cannot be read: ") + std::strerror(errno), "");
   std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
   if (bytes.size() > kMaxG2oText) {
-    throw InputError(path, 0, "", "is larger than 1 GiB", "Is it a pose graph?");
+    throw InputError(path, 0, "", "is larger than 1 GiB", "Check that it is a pose graph");
   }
   return readG2oBytes(path, bytes);
 }

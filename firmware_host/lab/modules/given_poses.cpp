@@ -58,10 +58,10 @@ void GivenPoses::warnOfJumps(const char* what, LogWarnings& warnings) const {
 void GivenPoses::failWithout(const char* what, Stamp first, Stamp last) const {
   throw InputError(
       name_, 0, "timestamp",
-      fmt::format("no {} has a pose: the poses go from {} to {}, the images from {} to {}", what,
+      fmt::format("no {} has a pose: the poses span {} to {}, the images {} to {}", what,
                   formatSeconds(trajectory_.front().stamp), formatSeconds(trajectory_.back().stamp),
                   formatSeconds(first), formatSeconds(last)),
-      fmt::format("Both need stamps of one clock, and poses at most --max-gap={:g} s apart",
+      fmt::format("Both need stamps of one clock, and gaps between poses of at most --max-gap={:g} s",
                   max_gap_.seconds()));
 }
 

@@ -40,7 +40,7 @@ Json graphJson(const KeptGraph& graph) {
 }
 
 void demand(const Status& status, const std::string& folder) {
-  if (!status.ok()) throw InputError(folder, 0, "", status.what, "Name another kept map");
+  if (!status.ok()) throw InputError(folder, 0, "", status.what, "Choose another kept map");
 }
 
 /// Each block goes with the nodes of its own map to where they are now.
@@ -100,8 +100,8 @@ Json runMapMerge(const MapMergeRequest& request) {
   KeptGraph merged;
   const std::vector<std::uint32_t> epochs = stage->keep(merged);
   if (merged.nodes.size() == first.nodes.size()) {
-    throw InputError(request.second, 0, "", "no loops tie this map to " + request.first,
-                     "Merge maps that show the same places; nothing was written");
+    throw InputError(request.second, 0, "", "no loops connect this map to " + request.first,
+                     "Merge maps that show the same places. Nothing was written");
   }
   out.write(merged);
   mergeVolumes(request, *stage, epochs, out);

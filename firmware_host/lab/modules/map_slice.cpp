@@ -126,7 +126,7 @@ double MapSlice::largestDistance() const {
 
 MapSlice sliceOf(const std::string& name, const VoxelVolume& volume, std::optional<double> z) {
   if (!hasSurface(volume)) {
-    throw InputError(name, 0, "", "the map has no surface", "Keep a map of a log whose depth was fused");
+    throw InputError(name, 0, "", "the map has no surface", "Keep a map from a log with fused depth");
   }
   const double voxel_size = volume.settings().voxel_size;
   std::vector<Eigen::Vector3i> blocks = knownBlocks(volume);

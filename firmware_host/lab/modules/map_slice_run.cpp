@@ -53,7 +53,7 @@ void checkOutput(const MapSliceRequest& request, const std::string& path, const 
   std::error_code none;
   if (!fs::is_directory(fs::absolute(path).parent_path(), none) || fs::is_directory(path, none)) {
     throw InputError(path, 0, option, "is not a file in a folder that exists",
-                     "Make the folder first, or give another file");
+                     "Create the folder first, or give another file");
   }
   if (fs::equivalent(path, request.map, none))
     throw InputError(path, 0, option, "is the map itself", "Give another file");
@@ -120,7 +120,8 @@ std::vector<std::uint16_t> sliceMillimetres(const MapSlice& slice) {
 MapSliceResult runMapSlice(const MapSliceRequest& request) {
   const fs::path out(request.out);
   if (out.extension() != ".png")
-    throw InputError(request.out, 0, "--out", "is no name of a PNG file", "Give one that ends in .png");
+    throw InputError(request.out, 0, "--out", "is not the name of a PNG file",
+                     "Give a name that ends in .png");
   MapSliceResult result;
   result.millimetres = out.parent_path() / (out.stem().string() + "_mm.png");
   checkOutput(request, request.out, "--out");

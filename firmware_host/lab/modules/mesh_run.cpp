@@ -139,7 +139,7 @@ class MeshRun {
 };
 
 void MeshRun::begin() {
-  log_.poses().warnOfJumps("a new mesh begins after each", log_.warnings());
+  log_.poses().warnOfJumps("a new mesh starts after each", log_.warnings());
   if (!log_.hasTracks()) frontend_ = std::make_unique<Frontend>(rig_, FrontendSettings{});
   labels_.emplace(request_.log, ImageSize{rig_.camera[0].width(), rig_.camera[0].height()}, log_.warnings());
   local_ = std::make_unique<Mesher>(

@@ -47,9 +47,9 @@ std::vector<PlaceImage> stampedImages(const std::string& folder, const Trajector
   if (files.size() != trajectory.size()) {
     throw InputError(
         folder, 0, "",
-        fmt::format("the names of its {} images are no stamps of the trajectory, which has {} poses",
+        fmt::format("the names of its {} images do not match the trajectory's stamps, and it has {} poses",
                     files.size(), trajectory.size()),
-        "Name images by their stamps [ns], or give one pose for each image in their order");
+        "Name images by their stamps [ns], or give one pose for each image in order");
   }
   for (std::size_t i = 0; i < files.size(); ++i) images[i] = {files[i], trajectory[i].stamp};
   return images;

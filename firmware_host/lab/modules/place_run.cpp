@@ -110,8 +110,8 @@ void PlaceRun::runFolder() {
     throw InputError(request_.log, 0, "", "a folder of images has no poses", "Give them with --trajectory");
   }
   if (!request_.calibration.empty()) {
-    throw InputError("--calibration", 0, "", "a plain folder of images gives no depths to verify with",
-                     "Leave the calibration out (retrieval only), or give a log with two cameras");
+    throw InputError("--calibration", 0, "", "a plain folder of images has no depth for verification",
+                     "Omit the calibration (retrieval only), or give a log with two cameras");
   }
   LogCounters counters;
   LogWarnings warnings;
@@ -140,7 +140,7 @@ void PlaceRun::runFolder() {
       throw InputError(files[i].path, 0, "",
                        fmt::format("{} x {} pixels, the first image has {} x {}", found.width, found.height,
                                    size->width, size->height),
-                       "All images of a folder must have one size");
+                       "Use images of one size");
     }
     size = found;
     take(frame, rig, true);
@@ -153,8 +153,8 @@ void PlaceRun::runLog() {
   request.mono = !settings_.odometry.use_stereo;
   PosedLog log(request, settings_);
   if (log.hasTracks()) {
-    throw InputError(request_.log, 0, "", "the log holds feature tracks, no images",
-                     "Places are recognized by images");
+    throw InputError(request_.log, 0, "", "the log holds feature tracks but no images",
+                     "Give a log with images");
   }
   verifies_ = log.rig().camera_count > 1;
   takePoses(log.poses(), log.warnings());

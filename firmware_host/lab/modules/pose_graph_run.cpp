@@ -104,11 +104,11 @@ nlohmann::ordered_json toJson(const LoopCount& count) {
 
 PoseGraphResult runPoseGraph(const PoseGraphRequest& request) {
   if (request.robust && request.start == StartRule::kGiven) {
-    throw InputError(request.file, 0, "--start", "given poses may be those of the false loops",
-                     "Leave --start out with --robust");
+    throw InputError(request.file, 0, "--start", "the given poses may contain the false loops",
+                     "Omit --start with --robust");
   }
   if (!request.robust && !request.loops.empty()) {
-    throw InputError(request.file, 0, "--loops", "no loop is rejected", "Give --robust as well");
+    throw InputError(request.file, 0, "--loops", "no loop is rejected", "Add --robust");
   }
   G2oFile file = readG2oFile(request.file);
   PoseGraphResult result;

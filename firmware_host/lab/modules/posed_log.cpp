@@ -60,8 +60,7 @@ void PosedLog::give(const Handlers& handlers, const StereoFrame& frame) {
 
 void PosedLog::failWithoutPose(const char* what, bool any) const {
   if (!first_ || !any) {
-    throw InputError(request_.log, 0, "",
-                     fmt::format("no {} in the part of the log that was asked for", what),
+    throw InputError(request_.log, 0, "", fmt::format("no {} in the selected part of the log", what),
                      "Give another --from or --until");
   }
   poses_.failWithout(what, *first_, *last_);

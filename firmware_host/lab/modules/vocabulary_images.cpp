@@ -28,7 +28,7 @@ TrainingImages describeImages(const std::vector<std::string>& folders, int every
   for (std::size_t i = 0; i < files.size(); ++i) {
     progress.update(i);
     if (!image.read(files[i])) {
-      fmt::print(stderr, "warning: {}: not a readable image, left out\n", files[i]);
+      fmt::print(stderr, "warning: {}: not a readable image, skipped\n", files[i]);
       continue;
     }
     const ImageView view = image.view();

@@ -69,7 +69,7 @@ class AutopilotThread::Work final : public Follower::Work {
         port_(options.settings.device, static_cast<unsigned>(options.settings.baud)) {
     if (const DeviceFault fault = openOwn(); !fault.ok()) {
       throw InputError("settings", 0, "autopilot.device", describe(fault, options.settings.device),
-                       "Or leave it empty: nobody is told then");
+                       "Or leave it empty to disable the output");
     }
     ThreadSettings thread;
     thread.name = "autopilot";
@@ -203,9 +203,9 @@ class AutopilotThread::Work final : public Follower::Work {
     if (supervised != supervised_) {
       supervised_ = supervised;
       if (supervised) {
-        say(Severity::kInfo, "swiftlet: the supervisor is back");
+        say(Severity::kInfo, "swiftlet: supervisor is running again");
       } else {
-        say(Severity::kCritical, "swiftlet: the supervisor has stopped: health unknown");
+        say(Severity::kCritical, "swiftlet: supervisor stopped, health unknown");
       }
     }
     if (!supervised) {
@@ -260,7 +260,7 @@ class AutopilotThread::Work final : public Follower::Work {
     if (stopped) {
       say(Severity::kCritical, "swiftlet: no new state for {:.1f} s", AutopilotLink::kSilence.seconds());
     } else {
-      say(Severity::kInfo, "swiftlet: states come again");
+      say(Severity::kInfo, "swiftlet: states are arriving again");
     }
   }
 
@@ -298,18 +298,17 @@ class AutopilotThread::Work final : public Follower::Work {
     static_assert(AutopilotLink::kMostBytes <= LinkPort::kMostWritten);
     if (options_.outbox == nullptr) return port_.write(bytes);
     if (options_.outbox->push(bytes)) return {};
-    return deviceFault(DeviceFaultKind::kFailed, 0, "the IMU's link takes no more");
+    return deviceFault(DeviceFaultKind::kFailed, 0, "the IMU's link accepts no more data");
   }
 
   void noteRefusal(const DeviceFault& fault) {
     const Stamp now = monotonicNow();
     if (now < next_refusal_) return;
     next_refusal_ = now + options_.repeat;
-    const char* remedy = port_.isUdp() ? "is the network up, and the host on it?"
+    const char* remedy = port_.isUdp() ? "check that the network is up and the host is reachable"
                                        : "raise autopilot.baud, or lower autopilot.rate_hz";
-    journal_.note(
-        now, deviceFault(DeviceFaultKind::kLossy, fault.error, "%llu writes were not taken until now: %s",
-                         static_cast<unsigned long long>(refused_), remedy));
+    journal_.note(now, deviceFault(DeviceFaultKind::kLossy, fault.error, "%llu writes rejected so far: %s",
+                                   static_cast<unsigned long long>(refused_), remedy));
   }
 
   [[nodiscard]] Stamp onHost(Stamp stamp) const { return stamp + to_host_.value_or(Duration{}); }

@@ -99,8 +99,8 @@ class GraphReader {
   KeptGraph operator()(std::span<const std::uint8_t> bytes) {
     const auto magic = from_.bytes(kGraphMagic.size());
     if (!std::equal(magic.begin(), magic.end(), kGraphMagic.begin(), kGraphMagic.end())) {
-      throw InputError(name_, 0, "byte 0: magic", "this is no graph that swiftlet kept",
-                       "Name a folder that --keep-map wrote");
+      throw InputError(name_, 0, "byte 0: magic", "this is not a graph kept by swiftlet",
+                       "Give a folder written by --keep-map");
     }
     const std::uint32_t version = from_.u32();
     if (version != kGraphVersion) {
@@ -108,20 +108,20 @@ class GraphReader {
                        fmt::format("is {}, this program reads {}", version, kGraphVersion),
                        "Use the program that kept the map, or keep a new one");
     }
-    demand(bytes.size() >= kGraphHeadBytes + kGraphCrcBytes, "head", "the file ends within it");
+    demand(bytes.size() >= kGraphHeadBytes + kGraphCrcBytes, "head", "is incomplete: the file ends early");
     const std::span<const std::uint8_t> covered = bytes.first(bytes.size() - kGraphCrcBytes);
     LittleEndianReader crc(bytes.subspan(covered.size()));
-    demand(crc.u32() == crc32c(0, covered), "checksum", "is not that of the bytes: the file is damaged");
+    demand(crc.u32() == crc32c(0, covered), "checksum", "does not match the data: the file is damaged");
     const std::uint32_t nodes = from_.u32();
     const std::uint32_t loops = from_.u32();
-    demand(nodes <= from_.left() / kGraphNodeBytes, "nodes", "are more than the file has room for");
+    demand(nodes <= from_.left() / kGraphNodeBytes, "nodes", "are too many for the size of the file");
     KeptGraph graph;
-    demand(decodeCamera(from_, graph.camera, graph.T_body_cam), "camera", "is none");
+    demand(decodeCamera(from_, graph.camera, graph.T_body_cam), "camera", "is invalid");
     demandPose(graph.T_body_cam, "T_body_cam");
     graph.nodes.resize(nodes);
     for (KeptNode& it : graph.nodes) node(it);
     demand(from_.left() == loops * kGraphLoopBytes + kGraphCrcBytes, "loops",
-           "do not fill the rest of the file");
+           "do not match the rest of the file");
     for (std::uint32_t i = 0; i < loops; ++i) {
       KeptLoop& loop = graph.loops.emplace_back();
       loop.from = from_.u32();
@@ -137,7 +137,7 @@ class GraphReader {
   void demand(bool holds, const char* field, const char* message) const {
     if (holds) return;
     throw InputError(name_, 0, fmt::format("byte {}: {}", size_ - from_.left(), field), message,
-                     "Give another copy of the map, or keep a new one; nothing was loaded");
+                     "Use another copy of the map, or keep a new one. Nothing was loaded");
   }
   float f32() { return std::bit_cast<float>(from_.u32()); }
   template <int kSize>
@@ -154,7 +154,7 @@ class GraphReader {
     return T;
   }
   void demandPose(const SE3& T, const char* field) const {
-    demand(T.translation.allFinite() && T.translation.norm() < kFar, field, "is not a place");
+    demand(T.translation.allFinite() && T.translation.norm() < kFar, field, "is not a position");
     demand(std::abs(T.rotation.norm() - 1) < kUnitTolerance, field, "is not a rotation");
   }
   template <int kSize>
@@ -163,24 +163,25 @@ class GraphReader {
     for (int r = 0; r < kSize; ++r) {
       for (int c = r; c < kSize; ++c) m(r, c) = m(c, r) = from_.f64();
     }
-    demand(m.allFinite() && m.diagonal().minCoeff() >= 0, field, "is no covariance");
+    demand(m.allFinite() && m.diagonal().minCoeff() >= 0, field, "is not a covariance");
     return m;
   }
   void node(KeptNode& node) {
-    demand(from_.left() >= kGraphNodeBytes, "node", "the file ends within it");
+    demand(from_.left() >= kGraphNodeBytes, "node", "is incomplete: the file ends early");
     node.stamp.ns = from_.i64();
     node.T_map_body = pose("pose of a node");
     node.tilt.up_body = vector<3>();
-    demand(std::abs(node.tilt.up_body.norm() - 1) < kUnitTolerance, "vertical of a node", "is not unit");
+    demand(std::abs(node.tilt.up_body.norm() - 1) < kUnitTolerance, "vertical of a node",
+           "is not a unit vector");
     node.tilt.covariance = symmetric<3>("covariance of a tilt");
     const std::uint32_t flags = from_.u32();
-    demand(flags <= kGraphLinked, "flags of a node", "are not of this version");
+    demand(flags <= kGraphLinked, "flags of a node", "are unknown to this version");
     node.linked = flags == kGraphLinked;
     node.T_previous_this = pose("relative pose of a node");
     node.covariance = symmetric<6>("covariance of a node");
     const std::uint32_t features = from_.u32();
     demand(features <= kMaxPlaceFeatures && features <= from_.left() / kGraphFeatureBytes,
-           "features of a node", "are more than a place has");
+           "features of a node", "are more than a place can have");
     node.features.resize(features);
     for (PlaceFeature& it : node.features) feature(it);
   }
@@ -193,11 +194,11 @@ class GraphReader {
     const std::uint32_t octave = from_.u32();
     demand(feature.pixel.allFinite(), "pixel of a feature", "is not finite");
     demand(std::abs(feature.bearing.norm() - 1) < static_cast<float>(kUnitTolerance), "bearing of a feature",
-           "is not unit");
+           "is not a unit vector");
     demand(std::isfinite(feature.inverse_depth) && std::isfinite(feature.inverse_depth_sigma) &&
                feature.inverse_depth_sigma >= 0,
-           "depth of a feature", "is none");
-    demand(octave < kMostOctaves, "octave of a feature", "is none");
+           "depth of a feature", "is invalid");
+    demand(octave < kMostOctaves, "octave of a feature", "is invalid");
     feature.octave = static_cast<std::int8_t>(octave);
   }
 
@@ -222,7 +223,7 @@ KeptGraph readKeptGraph(const std::string& name, std::span<const std::uint8_t> b
 KeptGraph readKeptGraphFile(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) {
-    throw InputError(path, 0, "", "cannot be opened", "Name a folder that --keep-map wrote");
+    throw InputError(path, 0, "", "cannot be opened", "Give a folder written by --keep-map");
   }
   const std::vector<char> bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   return readKeptGraph(path, {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});

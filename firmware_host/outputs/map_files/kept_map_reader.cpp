@@ -19,7 +19,7 @@ namespace {
 
 using namespace kept;  // NOLINT(google-build-using-namespace)
 
-constexpr const char* kOtherCopy = "Give another copy of the file, or begin a new map; nothing was loaded";
+constexpr const char* kOtherCopy = "Use another copy of the file, or start a new map. Nothing was loaded";
 
 struct ReadBlock : StoredBlock {
   std::uint8_t sides = 0;
@@ -89,7 +89,8 @@ class MapReader {
 void MapReader::fetch(std::size_t at, std::size_t count, const char* field) {
   if (count > size_ - next_) {
     refuse(record_, field,
-           fmt::format("the file ends at byte {}, {} are needed from byte {} on", size_, count, next_));
+           fmt::format("the file ends at byte {}, but {} bytes are needed from byte {} on", size_, count,
+                       next_));
   }
   in_.read(reinterpret_cast<char*>(bytes_.data() + at), static_cast<std::streamsize>(count));
   if (!in_) refuse(record_, field, "cannot be read");
@@ -101,22 +102,22 @@ void MapReader::readHead() {
   LittleEndianReader from({bytes_.data(), kHeadBytes});
   const auto magic = from.bytes(kMagic.size());
   if (!std::equal(magic.begin(), magic.end(), kMagic.begin())) {
-    throw InputError(name_, 0, "byte 0: magic", "this is no map that swiftlet kept",
-                     "Give a file that --keep wrote, or a folder that --keep-map wrote with --map");
+    throw InputError(name_, 0, "byte 0: magic", "this is not a map kept by swiftlet",
+                     "Give a file written by --keep, or a folder written by --keep-map with --map");
   }
   constexpr std::size_t kVersionAt = 8, kSizeAt = 12;
   version_ = from.u32();
   const std::uint32_t bytes = from.u32();
   head_crc_ = crc32c(0, {bytes_.data(), kHeadCrcAt});
   const bool sound = head_crc_ == LittleEndianReader({bytes_.data() + kHeadCrcAt, sizeof(head_crc_)}).u32();
-  demand(sound, 0, "head's checksum", "is not that of its bytes: the file is damaged");
+  demand(sound, 0, "head's checksum", "does not match the data: the file is damaged");
   if (version_ < kVersionOfWholeBlocks || version_ > kVersion) {
     throw InputError(
         name_, 0, fmt::format("byte {}: version", kVersionAt),
         fmt::format("is {}, this program reads {} to {}", version_, kVersionOfWholeBlocks, kVersion),
-        "Use the program that kept the map, or begin a new one");
+        "Use the program that kept the map, or start a new one");
   }
-  demand(bytes == kHeadBytes, kSizeAt, "head's length", "is not that of this version");
+  demand(bytes == kHeadBytes, kSizeAt, "head's length", "does not fit this version");
   head_.voxel_size = from.f64();
   head_.truncation = from.f64();
   head_.reference_sigma = from.f64();
@@ -133,14 +134,14 @@ void MapReader::readHead() {
                         kZeroAt = 88;
   const auto sane = [](double x) { return std::isfinite(x) && x > 0; };
   demand(sane(head_.voxel_size) && sane(head_.truncation) && sane(head_.reference_sigma), kSettingsAt,
-         "settings", "are not positive lengths");
-  demand((flags & ~kHasLabels) == 0, kFlagsAt, "flags", "has bits that this version does not know");
+         "settings", "are not positive");
+  demand((flags & ~kHasLabels) == 0, kFlagsAt, "flags", "has bits unknown to this version");
   demand(std::isfinite(head_.least_weight) && head_.least_weight > 0, kLeastWeightAt, "least weight",
          "is not positive");
   demand(side == static_cast<std::uint32_t>(kBlockSide), kSideAt, "voxels along a block",
-         "are not those of this version");
+         "do not fit this version");
   demand(head_.p_map_vehicle.allFinite(), kVehicleAt, "vehicle", "is not finite");
-  demand(from.u32() == 0, kZeroAt, "head", "has bytes that this version does not know");
+  demand(from.u32() == 0, kZeroAt, "head", "has bytes unknown to this version");
   vehicle_ = vehicleBlock(head_);
 }
 
@@ -148,20 +149,20 @@ void MapReader::demandSettings(const VolumeSettings& settings) const {
   const auto differ = [&](const char* what, const std::string& kept, const std::string& wanted,
                           const std::string& remedy) {
     throw InputError(name_, 0, what,
-                     fmt::format("the map was kept with {}, the settings say {}", kept, wanted), remedy);
+                     fmt::format("the map was kept with {}, the settings have {}", kept, wanted), remedy);
   };
   const auto metres = [](double x) { return fmt::format("{:g} m", x); };
   if (head_.voxel_size != settings.voxel_size) {
     differ("voxel size", metres(head_.voxel_size), metres(settings.voxel_size),
-           fmt::format("Use --set map.voxel_size={:g}, or a map of the other size", head_.voxel_size));
+           fmt::format("Use --set map.voxel_size={:g}, or a map with that voxel size", head_.voxel_size));
   }
   if (head_.truncation != settings.truncation) {
     differ("truncation distance", metres(head_.truncation), metres(settings.truncation),
-           "Use the program that kept the map, or begin a new one");
+           "Use the program that kept the map, or start a new one");
   }
   if (head_.reference_sigma != settings.reference_sigma) {
     differ("deviation of weight 1", metres(head_.reference_sigma), metres(settings.reference_sigma),
-           "Use the program that kept the map, or begin a new one");
+           "Use the program that kept the map, or start a new one");
   }
   if (head_.labels != settings.labels) {
     differ("labels", head_.labels ? "labels" : "no labels", settings.labels ? "labels" : "no labels",
@@ -178,14 +179,13 @@ Kind MapReader::readRecord() {
   const std::uint16_t kind = from.u16();
   const std::uint16_t zero = from.u16();
   const std::uint32_t length = from.u32();
-  demand(length <= kMostPayload, record_ + kLengthAt, "record's length",
-         "is more than any record has: the file is damaged");
+  demand(length <= kMostPayload, record_ + kLengthAt, "record's length", "is too large: the file is damaged");
   fetch(kRecordBytes, length, "record");
   const std::uint32_t crc = crc32c(head_crc_, {bytes_.data() + kCrc, kRecordBytes - kCrc + length});
-  demand(crc == stated, record_, "record's checksum", "is not that of its bytes: the file is damaged");
+  demand(crc == stated, record_, "record's checksum", "does not match the data: the file is damaged");
   const Kind last = version_ <= kVersionWithPatches ? Kind::kPatch : Kind::kFree;
   demand(zero == 0 && kind <= static_cast<std::uint16_t>(last), record_ + kCrc, "record's kind",
-         "is none that this version knows");
+         "is unknown to this version");
   length_ = length;
   return static_cast<Kind>(kind);
 }
@@ -195,9 +195,10 @@ BlockIndex MapReader::readIndex(LittleEndianReader& from, std::size_t in_payload
   index.x = from.i32();
   index.y = from.i32();
   index.z = from.i32();
-  demand(index.inRange(), at(in_payload), "block", "lies outside of what a map holds");
+  demand(index.inRange(), at(in_payload), "block", "lies outside a map's range");
   const Nearness now = nearness(index, vehicle_);
-  demand(!last_ || *last_ < now, at(in_payload), "block", "is not farther from the vehicle than that before");
+  demand(!last_ || *last_ < now, at(in_payload), "block",
+         "is not farther from the vehicle than the block before it");
   last_ = now;
   return index;
 }
@@ -206,7 +207,7 @@ void MapReader::walk(MapTaker& taker) {
   const auto order = [](Kind kind) { return kind == Kind::kEnd ? 4 : static_cast<int>(kind); };
   Kind before = Kind::kBlock;
   for (Kind kind = readRecord(); kind != Kind::kEnd; kind = readRecord()) {
-    demand(order(kind) >= order(before), record_, "record's kind", "comes after those that follow it");
+    demand(order(kind) >= order(before), record_, "record's kind", "is out of order");
     if (kind != before) last_.reset();
     before = kind;
     if (kind == Kind::kBlock) readBlock(taker);
@@ -215,13 +216,13 @@ void MapReader::walk(MapTaker& taker) {
   demand(length_ == 0, record_, "end's length", "is not zero");
   const KeptMapCounts& held = head_.counts;
   demand(found_.blocks == held.blocks && found_.free_blocks == held.free_blocks, record_, "end",
-         "comes before or after as many blocks as the head says");
-  demand(next_ == size_, next_, "end", "is followed by more bytes");
+         "is at the wrong place for the number of blocks in the head");
+  demand(next_ == size_, next_, "end", "is followed by extra bytes");
 }
 
 void MapReader::readBlock(MapTaker& taker) {
   demand(length_ == kBlockBytes + (head_.labels ? kLabelBytes : 0), record_, "block's length",
-         "is not that of a block");
+         "does not match a block");
   LittleEndianReader from = payload();
   ReadBlock& block = *block_;
   block.index = readIndex(from, 0);
@@ -230,9 +231,9 @@ void MapReader::readBlock(MapTaker& taker) {
   block.free_parts = 0;
   demand(block.sides <= (BlockHeader::kInFront | BlockHeader::kBehind) &&
              std::ranges::all_of(zeros, [](std::uint8_t b) { return b == 0; }),
-         at(kIndexBytes), "sides", "are none");
+         at(kIndexBytes), "sides", "are invalid");
   block.drift = std::bit_cast<float>(from.u32());
-  demand(std::isfinite(block.drift) && block.drift >= 0, at(kIndexBytes + 4), "drift", "is no length");
+  demand(std::isfinite(block.drift) && block.drift >= 0, at(kIndexBytes + 4), "drift", "is not a length");
   constexpr std::size_t kDistancesAt = kIndexBytes + 8;
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {
     block.voxels.distance[i] = static_cast<std::int16_t>(from.u16());
@@ -245,7 +246,7 @@ void MapReader::readBlock(MapTaker& taker) {
     LabelCounts::Words words{};
     for (std::uint16_t& word : words) word = from.u16();
     demand(block.labels.counts[i].setWords(words), at(kBlockBytes + sizeof(words) * i), "label counts",
-           "are not by falling count");
+           "are not in descending order");
   }
   block.setLabels(head_.labels ? &block.labels : nullptr);
   ++found_.blocks;
@@ -255,7 +256,7 @@ void MapReader::readBlock(MapTaker& taker) {
 void MapReader::readFree(MapTaker& taker) {
   const bool whole_blocks = version_ == kVersionOfWholeBlocks;
   const std::size_t each = whole_blocks ? kFreeBytesOfWholeBlocks : kFreeBytes;
-  demand(length_ > 0 && length_ % each == 0, record_, "free blocks' length", "is not that of some");
+  demand(length_ > 0 && length_ % each == 0, record_, "free blocks' length", "does not match its content");
   LittleEndianReader from = payload();
   ReadBlock& block = *block_;
   block.has_labels = false;
@@ -264,10 +265,10 @@ void MapReader::readFree(MapTaker& taker) {
     block.free_parts = kAllParts;
     if (whole_blocks) {
       const std::uint16_t images = from.u16();
-      demand(images > 0 && from.u16() == 0, at(i + kIndexBytes), "images that saw it free", "are none");
+      demand(images > 0 && from.u16() == 0, at(i + kIndexBytes), "images that saw it free", "are invalid");
     } else {
       block.free_parts = from.u64();
-      demand(block.free_parts != 0, at(i + kIndexBytes), "free parts", "are none");
+      demand(block.free_parts != 0, at(i + kIndexBytes), "free parts", "are invalid");
     }
     ++found_.free_blocks;
     taker.freeBlock(block);
@@ -323,7 +324,7 @@ std::ifstream opened(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in)
     throw InputError(path, 0, "", "cannot be opened",
-                     "Give a file that --keep wrote, or a folder that --keep-map wrote with --map");
+                     "Give a file written by --keep, or a folder written by --keep-map with --map");
   return in;
 }
 
@@ -392,7 +393,7 @@ void readKeptSubmaps(const std::string& path, MapSubmaps& to, std::span<const Wo
   MapReader(path, in).walk(taker);
   if (const std::uint64_t lost = to.stored().lost() - lost_before; lost > 0) {
     throw InputError(path, 0, "", fmt::format("{} of its blocks cannot be stored in the output folder", lost),
-                     "Make room on its disk; without --map a flight needs none");
+                     "Free space on its disk, or fly without --map");
   }
 }
 
@@ -414,8 +415,8 @@ VoxelVolume readKeptVolumeFile(const std::string& path) {
   Loader loader(volume, nullptr, reader.head().p_map_vehicle, report);
   reader.walk(loader);
   if (report.without_room.blocks + report.without_room.free_blocks > 0) {
-    throw InputError(path, 0, "", "blocks of the map find no place in the volume's index",
-                     "Keep the map anew");
+    throw InputError(path, 0, "", "blocks of the map do not fit into the volume's index",
+                     "Keep the map again");
   }
   return volume;
 }

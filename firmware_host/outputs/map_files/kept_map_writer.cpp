@@ -33,7 +33,9 @@ class MapWriter {
     writeFree();
     finish(Kind::kEnd, payload());
     out_.flush();
-    if (!out_) throw InputError(name_, 0, "", "cannot be written", "Check the folder and the space left");
+    if (!out_)
+      throw InputError(name_, 0, "", "cannot be written",
+                       "Check that the folder is writable and the disk is not full");
     return head_.counts;
   }
 

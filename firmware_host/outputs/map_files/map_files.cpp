@@ -96,7 +96,7 @@ class GlbBuilder {
     constexpr std::size_t kHeaders = 12 + 8 + 8;
     const std::size_t total = kHeaders + text.size() + binary_.size();
     if (total > std::numeric_limits<std::uint32_t>::max()) {
-      throw InputError(path, 0, "", "the map is larger than the 4 GiB of a .glb file", "Use map.ply");
+      throw InputError(path, 0, "", "the map exceeds the 4 GiB of a .glb file", "Use map.ply");
     }
     Bytes head;
     for (const std::uint32_t word : {kGlbMagic, kGlbVersion, static_cast<std::uint32_t>(total),

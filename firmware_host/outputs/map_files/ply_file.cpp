@@ -91,7 +91,7 @@ class MeshReader {
   float coordinate(const PlyProperty& property) {
     const double value = values_.next(property.type, property.name);
     if (!(std::abs(value) <= std::numeric_limits<float>::max())) {
-      throw values_.error(property.name, "is not finite", "Leave the vertex and its faces out");
+      throw values_.error(property.name, "is not finite", "Remove the vertex and its faces");
     }
     return static_cast<float>(value);
   }
@@ -140,8 +140,8 @@ class MeshReader {
       const double index = values_.next(property.type, property.name);
       if (!(index >= 0 && index < static_cast<double>(vertex_count_) && index == std::floor(index))) {
         throw values_.error(property.name,
-                            "names a vertex that is not among the " + std::to_string(vertex_count_),
-                            "Indices count from 0; write the file again");
+                            "refers to a vertex that is not among the " + std::to_string(vertex_count_),
+                            "Indices start at 0; write the file again");
       }
       corner = static_cast<std::uint32_t>(index);
     }
@@ -172,19 +172,21 @@ class MeshReader {
 
 void checkWritable(const std::string& path, const TriangleMesh& mesh) {
   const auto refuse = [&](const std::string& field, const std::string& message) {
-    throw InputError(path, 0, field, message, "The mesh handed over is at fault; nothing was written");
+    throw InputError(path, 0, field, message,
+                     "The mesh passed to the writer is invalid; nothing was written");
   };
   const std::size_t vertices = mesh.vertices.size();
-  if (!mesh.grey.empty() && mesh.grey.size() != vertices) refuse("grey", "not one value for each vertex");
+  if (!mesh.grey.empty() && mesh.grey.size() != vertices)
+    refuse("grey", "does not have one value per vertex");
   if (!mesh.labels.empty() && mesh.labels.size() != mesh.faces.size()) {
-    refuse("label", "not one value for each face");
+    refuse("label", "does not have one value per face");
   }
   for (std::size_t i = 0; i < vertices; ++i) {
     if (!mesh.vertices[i].allFinite()) refuse("vertex " + std::to_string(i), "is not finite");
   }
   for (std::size_t i = 0; i < mesh.faces.size(); ++i) {
     if (std::ranges::any_of(mesh.faces[i], [&](std::uint32_t v) { return v >= vertices; })) {
-      refuse("face " + std::to_string(i), "names a vertex that does not exist");
+      refuse("face " + std::to_string(i), "refers to a vertex that does not exist");
     }
   }
 }

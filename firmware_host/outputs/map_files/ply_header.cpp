@@ -14,7 +14,7 @@ namespace {
 // Above what any program writes; they bound the work that a header alone can ask for.
 constexpr int kMaxHeaderLines = 1000;
 constexpr std::size_t kMaxProperties = 64;  ///< of one element
-constexpr const char* kBadHeader = "Is it a PLY file, and whole?";
+constexpr const char* kBadHeader = "Check that it is a complete PLY file";
 
 struct TypeName {
   std::string_view name;
@@ -65,7 +65,7 @@ class HeaderReader {
     ++header_.lines;
     const std::size_t end = rest_.find('\n');
     if (end == std::string_view::npos || header_.lines > kMaxHeaderLines) {
-      fail("", "the header does not end", kBadHeader);
+      fail("", "the header has no end", kBadHeader);
     }
     std::string_view line = rest_.substr(0, end);
     rest_.remove_prefix(end + 1);
@@ -91,7 +91,7 @@ class HeaderReader {
     if (shaped && word[1] == "ascii") return;
     header_.binary = shaped && word[1] == "binary_little_endian";
     if (header_.binary) return;
-    fail("format", shaped ? quoteInput(word[1]) + " is not read" : "missing or not of version 1.0",
+    fail("format", shaped ? quoteInput(word[1]) + " is not supported" : "is missing or not version 1.0",
          "Save it as ASCII or binary little-endian PLY 1.0");
   }
 
@@ -103,7 +103,7 @@ class HeaderReader {
     } else if (word[0] == "property") {
       readProperty(word);
     } else {
-      fail("", quoteInput(line) + " is no line of a PLY header", kBadHeader);
+      fail("", quoteInput(line) + " is not a valid line of a PLY header", kBadHeader);
     }
   }
 
@@ -116,14 +116,14 @@ class HeaderReader {
     element.name = word[1];
     element.count = static_cast<std::uint64_t>(count);
     if (std::ranges::count(header_.elements, element.name, &PlyElement::name) > 0) {
-      fail("element", quoteInput(word[1]) + " stands twice", kBadHeader);
+      fail("element", quoteInput(word[1]) + " appears twice", kBadHeader);
     }
     header_.elements.push_back(element);
   }
 
   PlyType type(std::string_view word) const {
     const auto* const found = std::ranges::find(kTypeNames, word, &TypeName::name);
-    if (found == kTypeNames.end()) fail("property", quoteInput(word) + " is no type of PLY", kBadHeader);
+    if (found == kTypeNames.end()) fail("property", quoteInput(word) + " is not a PLY type", kBadHeader);
     return found->type;
   }
 
@@ -135,15 +135,15 @@ class HeaderReader {
     }
     if (property.is_list) property.count_type = type(word[2]);
     if (property.count_type == PlyType::kFloat || property.count_type == PlyType::kDouble) {
-      fail("property", "a list's length is not a whole number", kBadHeader);
+      fail("property", "the length of a list is not an integer", kBadHeader);
     }
     property.type = type(word[word.size() - 2]);
     property.name = word.back();
     auto& properties = header_.elements.back().properties;
     if (std::ranges::count(properties, property.name, &PlyProperty::name) > 0) {
-      fail("property", quoteInput(property.name) + " stands twice", kBadHeader);
+      fail("property", quoteInput(property.name) + " appears twice", kBadHeader);
     }
-    if (properties.size() == kMaxProperties) fail("property", "too many of one element", kBadHeader);
+    if (properties.size() == kMaxProperties) fail("property", "too many in one element", kBadHeader);
     properties.push_back(property);
   }
 
@@ -169,8 +169,8 @@ class HeaderReader {
       if (element.count > left / least) {
         throw InputError(name_, 0, field,
                          std::to_string(element.count) + " of them need more than the " +
-                             std::to_string(rest_.size()) + " bytes behind the header",
-                         "The file is cut short or its count is wrong: write it again");
+                             std::to_string(rest_.size()) + " bytes after the header",
+                         "The file is truncated or its count is wrong: write it again");
       }
       left -= element.count * least;
     }

@@ -16,7 +16,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "binary PLY is copied as it lies in memory");
 
 constexpr const char* kBlanks = " \t\r";
-constexpr const char* kCutShort = "The file is cut short: write it again";
+constexpr const char* kCutShort = "The file is truncated: write it again";
 
 double decode(PlyType type, const char* bytes) {
   return withNumber(type, [bytes](auto number) {
@@ -49,7 +49,7 @@ void PlyValues::beginRow(const PlyElement& element, std::uint64_t index) {
   if (binary_) return;
   do {
     if (at_ >= bytes_.size()) {
-      throw error("", "the file ends before it", kCutShort);
+      throw error("", "is missing: the file ends early", kCutShort);
     }
     const std::size_t end = std::min(bytes_.find('\n', at_), bytes_.size());
     row_ = bytes_.substr(at_, end - at_);
@@ -62,7 +62,7 @@ void PlyValues::endRow() {
   if (binary_) return;
   const std::string_view word = takeWord();
   if (!word.empty()) {
-    throw error("", quoteInput(word) + " is more than the header says", "Write the file again");
+    throw error("", quoteInput(word) + " is more than the header declares", "Write the file again");
   }
 }
 
@@ -88,7 +88,7 @@ double PlyValues::nextText(PlyType type, std::string_view property) {
 double PlyValues::nextBinary(PlyType type, std::string_view property) {
   from_ = at_;
   const std::size_t size = sizeOf(type);
-  if (bytes_.size() - at_ < size) throw error(property, "the file ends before it", kCutShort);
+  if (bytes_.size() - at_ < size) throw error(property, "is missing: the file ends early", kCutShort);
   at_ += size;
   return decode(type, bytes_.data() + from_);
 }
@@ -110,8 +110,8 @@ void PlyValues::finish() {
   if (!binary_ && rest.find_first_not_of(" \t\r\n") == std::string_view::npos) return;
   from_ = at_;
   ++line_;
-  throw error("", std::to_string(rest.size()) + " bytes behind the last element",
-              "A count of the header is wrong, or the file was written over: write it again");
+  throw error("", std::to_string(rest.size()) + " bytes after the last element",
+              "A count in the header is wrong, or the file was overwritten: write it again");
 }
 
 InputError PlyValues::error(std::string_view property, const std::string& message,

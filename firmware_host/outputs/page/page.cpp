@@ -31,7 +31,7 @@ std::string filled(const std::string& page, const std::string& name, std::string
   const std::size_t at = page.find(kPlace);
   if (at == std::string::npos) {
     throw InputError(name, 0, "", "has no place for a report's document",
-                     "Build and install the program anew");
+                     "Build and install the program again");
   }
   std::string whole;
   whole.reserve(page.size() + text.size());

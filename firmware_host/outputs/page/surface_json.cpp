@@ -137,8 +137,8 @@ Json surfaceJson(const char* id, const char* name, const TriangleMesh& whole, co
     json["error_most"] = kMost;
   }
   if (cell > 0) {
-    json["note"] = fmt::format("{} of {} triangles: corners drawn together on a grid of {:.3f} m",
-                               mesh.faces.size(), whole.faces.size(), cell);
+    json["note"] = fmt::format("{} of {} triangles: vertices merged on a grid of {:.3f} m", mesh.faces.size(),
+                               whole.faces.size(), cell);
   }
   return json;
 }

@@ -18,7 +18,7 @@ std::ofstream openRows(const std::filesystem::path& path, const std::string& hea
   std::ofstream file(path, std::ios::binary);
   file << header;
   if (!file) {
-    throw InputError(path.string(), 0, "", "cannot be written", "Give an --out that this user may write to");
+    throw InputError(path.string(), 0, "", "cannot be written", "Give an --out that this user can write to");
   }
   return file;
 }
@@ -28,7 +28,8 @@ std::ofstream openRows(const std::filesystem::path& path, const std::string& hea
 FolderSink::FolderSink(const std::string& folder, const Calibration& calibration, double camera_rate)
     : RecordSink(folder, calibration), folder_(folder) {
   if (std::filesystem::exists(std::filesystem::path(folder) / "mav0")) {
-    throw InputError(folder, 0, "", "holds a recording already", "Give another --out, or move it away");
+    throw InputError(folder, 0, "", "already holds a recording",
+                     "Give another --out, or move the recording away");
   }
   openImu(calibration);
   for (std::size_t c = 0; c < cameras(); ++c) openCamera(c, calibration, camera_rate);

@@ -10,7 +10,7 @@ namespace {
 
 const std::string& unused(const std::string& file) {
   if (!std::filesystem::exists(file)) return file;
-  throw InputError(file, 0, "", "is there already", "Give another name, or move it away");
+  throw InputError(file, 0, "", "already exists", "Give another name, or move the file away");
 }
 
 }  // namespace

@@ -84,8 +84,8 @@ void RecordSink::finish() {
     if (error.empty()) error = writer.error;
   }
   if (!error.empty()) {
-    throw InputError(out_, 0, "", "writing ended before the recording did: " + error,
-                     "Make room on the disk, or give an --out elsewhere");
+    throw InputError(out_, 0, "", "writing stopped before the recording ended: " + error,
+                     "Free space on the disk, or give an --out on another disk");
   }
   close();
 }

@@ -82,7 +82,7 @@ class DdsThread::Work final : public Follower::Work {
     if (options.labels != nullptr) settings.label_topic = options.settings.label_topic;
     if (!link_.open(settings)) {
       throw InputError("settings", 0, "ros2.interface, ros2.domain", link_.error(),
-                       "Or switch it off with ros2.enabled: false");
+                       "Or disable it with ros2.enabled: false");
     }
     ThreadSettings thread;
     thread.name = "dds";
@@ -181,8 +181,7 @@ class DdsThread::Work final : public Follower::Work {
     DdsStatus status;
     status.name = "swiftlet/health";
     status.level = stale ? kStaleLevel : levelOf(told.health);
-    status.message =
-        stale ? "the supervisor has stopped: health unknown" : std::string(healthName(told.health));
+    status.message = stale ? "supervisor stopped, health unknown" : std::string(healthName(told.health));
     if (!news.has_state)
       status.message += std::string(", waits for ") + (any_frame ? news.waiting_for : "images");
     if (judged && !stale) {

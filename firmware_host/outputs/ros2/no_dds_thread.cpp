@@ -6,8 +6,9 @@
 namespace swiftlet {
 
 DdsThread::DdsThread(LiveOutlet&, const DdsThreadOptions&) : Follower(nullptr) {
-  throw InputError("settings", 0, "ros2.enabled", "this build has no DDS",
-                   "Install cyclonedds-dev and configure with -DSWIFTLET_WITH_DDS=ON, or switch it off");
+  throw InputError(
+      "settings", 0, "ros2.enabled", "this build has no DDS",
+      "Install cyclonedds-dev and configure with -DSWIFTLET_WITH_DDS=ON, or disable ros2.enabled");
 }
 
 }  // namespace swiftlet

@@ -27,7 +27,7 @@ std::string originText(const CalibrationEstimate& estimate, std::size_t camera) 
   if (estimate.readout_sigma > 0) {
     text += fmt::format(" sigma of readout_ms {:.3f};", kToMs * estimate.readout_sigma);
   }
-  text += " the rest as given";
+  text += " the rest unchanged";
   return text;
 }
 

@@ -10,7 +10,7 @@
 namespace swiftlet {
 
 std::vector<EventLine> readEvents(const std::string& path, std::size_t* skipped) {
-  constexpr const char* kRemedy = "A line is `seconds event text`. Replay again, or delete the line";
+  constexpr const char* kRemedy = "Each line is `seconds event text`. Replay again, or delete the line";
   std::ifstream file(path, std::ios::binary);
   if (!file) throw InputError(path, 0, "", "cannot be read", "Give the folder of a run");
   std::vector<EventLine> events;
@@ -31,7 +31,7 @@ std::vector<EventLine> readEvents(const std::string& path, std::size_t* skipped)
     } else if (!has_stamp) {
       throw InputError(path, number, "stamp", quoteInput(stamp) + " is not a time in seconds", kRemedy);
     } else {
-      throw InputError(path, number, "event", "missing behind the stamp", kRemedy);
+      throw InputError(path, number, "event", "is missing after the stamp", kRemedy);
     }
   }
   return events;

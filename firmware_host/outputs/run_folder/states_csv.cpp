@@ -147,7 +147,7 @@ std::vector<StoredState> readStates(const std::string& path) {
     if (state.has_figures) state.figures = keyframe.statistics;
     states.push_back(state);
   }
-  csv.finish("states", "Give a states.csv that `swiftlet replay` wrote");
+  csv.finish("states", "Give a states.csv written by `swiftlet replay`");
   std::ranges::stable_sort(states, {}, &StoredState::stamp);
   return states;
 }
@@ -163,7 +163,7 @@ std::vector<KeyframeState> readKeyframes(const std::string& path) {
     if (!readState(csv, keyframe.state, norm)) break;
     if (const std::size_t wrong = readFigures(csv, keyframe); wrong < kFigures) {
       const std::string text = quoteInput(csv.field(kNumbers + wrong));
-      csv.reject(kFigureNames[wrong], text + (wrong == 0 ? " is no health" : " is not a finite number"));
+      csv.reject(kFigureNames[wrong], text + (wrong == 0 ? " is not a health" : " is not a finite number"));
       break;
     }
     if (!(std::abs(norm - 1) < kUnit)) {
@@ -175,7 +175,7 @@ std::vector<KeyframeState> readKeyframes(const std::string& path) {
   if (csv.firstBad()) {
     const InputError& bad = *csv.firstBad();
     throw InputError(bad.file, bad.line, bad.field, bad.message,
-                     "Replay again, or delete the row if a run that ended badly cut it short");
+                     "Replay again, or delete the row if an interrupted run truncated it");
   }
   return keyframes;
 }

@@ -207,7 +207,8 @@ TEST_CASE("rosbag2 bags that are damaged or not whole are refused with the place
   }
   CHECK(refusalOf([&] { (void)openBag(file); }).field == "table messages");
   writeText(folder.file("metadata.yaml"), metadata(5, {"gone.db3"}, 1));
-  CHECK(refusalOf([&] { (void)openBag(folder.file(".")); }).message.find("missing") != std::string::npos);
+  CHECK(refusalOf([&] { (void)openBag(folder.file(".")); }).message.find("does not exist") !=
+        std::string::npos);
   const auto refusedText = [](const std::string& text) {
     return refusalOf([&] { (void)parseRosbag2Metadata("metadata.yaml", text); });
   };

@@ -81,7 +81,7 @@ TEST_CASE("a sensor.yaml may say that the shutter rolls", "[calibration]") {
   CHECK(rolling.rig.readout.ns == 20'000'000);
   CHECK(rolling.rig.rowTime(0, 0) == Approx(-0.010));
   CHECK(rolling.rig.rowTime(1, 479) == Approx(0.010));
-  CHECK(test::contains(describe(rolling), "20.000 ms (rolling shutter)"));
+  CHECK(test::contains(describe(rolling), "20.000 ms readout"));
 
   const auto error = [&] { return errorOf([&] { static_cast<void>(texts.parse()); }); };
   with("shutter: rolling\n", "shutter: rolling\n");
@@ -91,7 +91,7 @@ TEST_CASE("a sensor.yaml may say that the shutter rolls", "[calibration]") {
   with("readout_ms: 20000\n", "readout_ms: 20000\n");
   CHECK(error().field == "readout_ms");
   with("readout_ms: 20\n", "readout_ms: 30\n");
-  CHECK(test::contains(error().remedy, "alike"));
+  CHECK(test::contains(error().remedy, "same shutter"));
 }
 
 TEST_CASE("an equidistant lens is read as one", "[calibration]") {
@@ -131,7 +131,7 @@ TEST_CASE("an IMU turned and moved in the body keeps what the camera and the IMU
     CHECK((T_filebody_cam.translation - plain.rig.T_body_cam[i].translation).norm() < 1e-12);
   }
   CHECK(moved.rig.baseline() == Approx(plain.rig.baseline()).epsilon(1e-12));
-  CHECK(test::anyContains(moved.warnings, "turned into body axes"));
+  CHECK(test::anyContains(moved.warnings, "rotated to body axes"));
   CHECK(test::anyContains(moved.warnings, "0.3742 m"));
 }
 

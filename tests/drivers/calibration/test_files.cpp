@@ -56,7 +56,7 @@ TEST_CASE("Kalibr files are found by content, whatever their names", "[calibrati
   CHECK(readCalibration(folder / "b.yaml").form == "Kalibr");
   CHECK(readCalibration(folder / "b.yaml", folder / "a.yaml").form == "Kalibr");
   CHECK(test::contains(errorOf([&] { readCalibration(folder / "target.yaml"); }).message,
-                       "not a calibration of cameras"));
+                       "not a camera calibration"));
   folder.write("c.yaml", texts.imu);
   CHECK(test::contains(errorOf([&] { readCalibration(folder.path()); }).message, "a.yaml and c.yaml"));
   fs::remove(folder / "a.yaml");
@@ -81,7 +81,7 @@ TEST_CASE("ROS, OpenCV and Basalt files are found by content, and an IMU file th
   CHECK(hasCalibration(folder.path()));
   const InputError missing = errorOf([&] { readCalibration(folder / "a.yaml"); });
   CHECK(missing.file == (folder / "a.yaml"));
-  CHECK(test::contains(missing.message, "cameras alone"));
+  CHECK(test::contains(missing.message, "only cameras"));
   CHECK(test::contains(missing.remedy, "T_imu_cam0"));
   folder.write("imu.yaml", test::KalibrTexts().imu +
                                "T_imu_cam0: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n");

@@ -99,7 +99,7 @@ TEST_CASE("camera_info: lenses with k3 or a denominator are converted, and the l
   oak = edited(oak, "458.0, 0.0, 367.0, 0.0, 457.0, 248.0",
                "196.50531005859375, 0.0, 126.86713409423828, 0.0, 196.50531005859375, 125.84786987304688");
   const InputError error = errorOf([&] { fromRos({oak}); });
-  CHECK(contains(error.message, "more than 0.3 px RMS is refused"));
+  CHECK(contains(error.message, "above 0.3 px RMS it is rejected"));
   CHECK(contains(error.remedy, "pinhole-radtan"));
 }
 
@@ -219,19 +219,19 @@ TEST_CASE("OpenCV's files of a pair, of one camera and of a fisheye", "[calibrat
 TEST_CASE("OpenCV: faults are refused by name", "[calibration]") {
   const std::string lenses(kOpenCvLenses);
   const InputError size = errorOf([&] { fromOpenCv(edited(lenses, "image_size: [ 752, 480 ]\n", "")); });
-  CHECK(contains(size.message, "size of the images is missing"));
+  CHECK(contains(size.message, "image size is missing"));
   CHECK(contains(size.remedy, "image_size: [width, height]"));
   CHECK(
       contains(errorOf([&] { fromOpenCv("<?xml version=\"1.0\"?>\n<opencv_storage/>\n"); }).remedy, ".yml"));
   CHECK(errorOf([&] { fromOpenCv(edited(lenses, "D1:", "D9:")); }).field == "M1");
   CHECK(contains(errorOf([&] { fromOpenCv(edited(lenses, "0.00002, 0. ]", "0.00002, 0., 0. ]")); }).message,
-                 "6 numbers where 4, 5, 8, 12 or 14"));
-  // Millimetres, and squares of the board.
+                 "6 numbers, expected 4, 5, 8, 12 or 14"));
+  // Millimetres, and board squares.
   CHECK(contains(errorOf([&] { fromOpenCv(lenses, edited(kOpenCvPair, "-0.11, 0.001", "-110, 1")); }).remedy,
                  "millimetres"));
   CHECK(contains(
       errorOf([&] { fromOpenCv(lenses, edited(kOpenCvPair, "-0.11, 0.001", "-3.34, 0.01")); }).remedy,
-      "squares of the board"));
+      "board squares"));
   CHECK(contains(errorOf([&] { fromOpenCv(lenses, edited(kOpenCvPair, "[ 1., 0.", "[ 1.1, 0.")); }).message,
                  "not orthonormal"));
   CHECK(errorOf([&] { fromOpenCv(lenses, edited(kOpenCvPair, "R:", "Q:")); }).field == "T_imu_cam1");

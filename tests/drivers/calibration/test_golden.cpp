@@ -83,8 +83,8 @@ TEST_CASE("both forms agree to 1e-10", "[calibration]") {
 
 TEST_CASE("the description says where the cameras sit and look", "[calibration]") {
   const std::string text = describe(test::EurocTexts().parse());
-  CHECK(test::contains(text, "looks along body +z"));
-  CHECK(test::contains(text, "baseline 0.1101 m; cam1 sits to the right of cam0"));
+  CHECK(test::contains(text, "optical axis along body +z"));
+  CHECK(test::contains(text, "baseline 0.1101 m; cam1 is to the right of cam0"));
   CHECK(test::contains(text, "0.0024 rad/s per sample"));
 }
 

@@ -67,7 +67,7 @@ TEST_CASE("the chain's inverse puts cam1 on the wrong side, which is said", "[ca
                             chainCamera(1, "  T_cn_cnm1:\n" + flowRows(c.rig.T_cam1_cam0().inverse()));
   const Calibration calibration =
       parseKalibrCalibration({"chain.yaml", chain}, {"imu.yaml", KalibrTexts().imu});
-  CHECK(test::anyContains(calibration.warnings, "cam1 sits to the left of cam0"));
+  CHECK(test::anyContains(calibration.warnings, "cam1 is to the left of cam0"));
 }
 
 TEST_CASE("extrinsics that are nowhere are asked for", "[calibration]") {

@@ -38,10 +38,10 @@ TEST_CASE("both matrices inverted: refused, naming the line; accepted on demand"
   CHECK(error.file == "cam1.yaml");
   CHECK(error.line == 4);
   CHECK(error.field == "T_BS");
-  CHECK(contains(error.message, "wrong way round"));
+  CHECK(contains(error.message, "inverted transform"));
   CalibrationOptions accept;
   accept.accept_unusual_rig = true;
-  CHECK(anyContains(texts.parse(accept).warnings, "do not sit side by side"));
+  CHECK(anyContains(texts.parse(accept).warnings, "are not side by side"));
 }
 
 TEST_CASE("Kalibr's matrices inverted are refused as well", "[calibration]") {
@@ -55,7 +55,7 @@ TEST_CASE("Kalibr's matrices inverted are refused as well", "[calibration]") {
     parseKalibrCalibration({"chain.yaml", chain}, {"imu.yaml", KalibrTexts().imu});
   });
   CHECK(error.field == "cam1.T_cam_imu");
-  CHECK(contains(error.message, "wrong way round"));
+  CHECK(contains(error.message, "inverted transform"));
 }
 
 TEST_CASE("a rig whose axes are the body's, inverted: said", "[calibration]") {
@@ -68,20 +68,20 @@ TEST_CASE("a rig whose axes are the body's, inverted: said", "[calibration]") {
 TEST_CASE("a real vertical pair is taken with a warning", "[calibration]") {
   const SE3 top(Eigen::Quaterniond::Identity(), {0, -0.05, 0});
   const SE3 bottom(Eigen::Quaterniond::Identity(), {0, 0.05, 0});
-  CHECK(anyContains(withTransforms(top, bottom).parse().warnings, "do not sit side by side"));
+  CHECK(anyContains(withTransforms(top, bottom).parse().warnings, "are not side by side"));
 }
 
 TEST_CASE("both cameras in one place are refused", "[calibration]") {
   EurocTexts texts;
   texts.cam1 = texts.cam0;
-  CHECK(contains(errorOf([&] { (void)texts.parse(); }).message, "same place"));
+  CHECK(contains(errorOf([&] { (void)texts.parse(); }).message, "same position"));
 }
 
 TEST_CASE("a rotation of few digits is repaired and said, a worse one refused", "[calibration]") {
   EurocTexts texts;
   texts.cam0 = edited(texts.cam0, "-0.999880929698", "-0.99988");
   const Calibration calibration = texts.parse();
-  CHECK(anyContains(calibration.warnings, "cam0.yaml:4: T_BS: the rotation is off orthonormal"));
+  CHECK(anyContains(calibration.warnings, "cam0.yaml:4: T_BS: the rotation deviates from orthonormal"));
   const Eigen::Matrix3d R = calibration.rig.T_body_cam[0].R();
   CHECK((R.transpose() * R).isIdentity(1e-12));
   texts.cam0 = edited(EurocTexts().cam0, "-0.999880929698", "-0.99");
@@ -92,7 +92,7 @@ TEST_CASE("a mirror is refused", "[calibration]") {
   EurocTexts texts;
   texts.cam0 = edited(texts.cam0, "0.0148655429818, -0.999880929698, 0.00414029679422,",
                       "-0.0148655429818, 0.999880929698, -0.00414029679422,");
-  CHECK(contains(errorOf([&] { (void)texts.parse(); }).message, "mirror"));
+  CHECK(contains(errorOf([&] { (void)texts.parse(); }).message, "reflection"));
 }
 
 TEST_CASE("a matrix written by columns is refused as that", "[calibration]") {
@@ -109,7 +109,7 @@ TEST_CASE("a matrix written by columns is refused as that", "[calibration]") {
   }
   texts.cam0 = edited(texts.cam0, "\n0.004", "\n         0.004");
   const InputError error = errorOf([&] { (void)texts.parse(); });
-  CHECK(contains(error.message, "column by column"));
+  CHECK(contains(error.message, "stored by columns"));
   CHECK(error.line == 4);
 }
 
@@ -142,7 +142,7 @@ TEST_CASE("a swapped resolution is refused as that", "[calibration]") {
 TEST_CASE("intrinsics of another resolution are suspected", "[calibration]") {
   EurocTexts texts;
   texts.cam0 = edited(texts.cam0, "[458.654, 457.296, 367.215, 248.375]", "[229.327, 228.648, 183.6, 124.2]");
-  CHECK(anyContains(texts.parse().warnings, "made at another resolution"));
+  CHECK(anyContains(texts.parse().warnings, "for this resolution"));
   texts.cam0 = edited(EurocTexts().cam0, "367.215", "1367.215");
   CHECK(contains(errorOf([&] { (void)texts.parse(); }).message, "outside the 752x480 image"));
 }
@@ -168,7 +168,8 @@ TEST_CASE("text, NaN and missing fields name their line", "[calibration]") {
     texts.cam0 = edited(texts.cam0, "457.296", "four");
     const InputError error = errorOf([&] { (void)texts.parse(); });
     CHECK(std::string(error.what()) ==
-          "cam0.yaml:14: intrinsics[1]: `four` is not a finite number. Write a decimal number, like 1.5e-3");
+          "cam0.yaml:14: intrinsics[1]: `four` is not a finite number. Write a decimal number, for example "
+          "1.5e-3");
   }
   SECTION("NaN") {
     texts.cam0 = edited(texts.cam0, "457.296", "nan");

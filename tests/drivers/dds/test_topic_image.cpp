@@ -91,11 +91,11 @@ TEST_CASE("malformed images are refused by name") {
   for (const std::uint32_t side : {0U, 5U, 7U, 0xffffffffU}) {
     message = messageOf(mono, bytes);
     message.width = side;
-    CHECK_THAT(refused(message), Catch::Contains("calibration is of 6x4"));
+    CHECK_THAT(refused(message), Catch::Contains("calibration is for 6x4"));
   }
   message = messageOf(mono, bytes);
   message.data = message.data.first(32);  // a pixel less than the last row's end
-  CHECK_THAT(refused(message), Catch::Contains("32 bytes of data, 33 wanted"));
+  CHECK_THAT(refused(message), Catch::Contains("32 bytes of data, expected 33"));
   // The gap after the last row may be left out.
   message.data = std::span(bytes).first(33);
   RawImage image;

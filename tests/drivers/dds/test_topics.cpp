@@ -234,7 +234,7 @@ TEST_CASE("what is wrong with a topic is said by name") {
   fault = refusal(mistyped);
   CHECK_THAT(std::string(fault.text()), Catch::Contains("is a sensor_msgs/msg/Imu"));
   TopicCamera unrooted(cameraSettings("camera/image"));
-  CHECK_THAT(std::string(refusal(unrooted).text()), Catch::Contains("begins with /"));
+  CHECK_THAT(std::string(refusal(unrooted).text()), Catch::Contains("starts with /"));
   TopicCameraSettings elsewhere = cameraSettings(test::kTopicCameras[0]);
   elsewhere.network.domain = 231;
   elsewhere.network.interface = "nosuch0";
@@ -249,7 +249,7 @@ TEST_CASE("a camera of another size is refused, and the wall clock may be set in
   TopicCamera smaller(small);
   const DeviceFault fault = smaller.open();
   std::cout << "dds_topics: " << describe(fault, "camera 1") << '\n';
-  CHECK_THAT(std::string(fault.text()), Catch::Contains("640x480, and the calibration is of 320x480"));
+  CHECK_THAT(std::string(fault.text()), Catch::Contains("640x480, but the calibration is for 320x480"));
 
   // Its driver does not follow the step.
   bool stepped = false;

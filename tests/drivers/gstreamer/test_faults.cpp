@@ -67,7 +67,7 @@ TEST_CASE("Another size or rate is refused with what the pipeline gives", "[gstr
   CHECK_THAT(said.text, Catch::Contains("64x48") && Catch::Contains("80x60 NV12"));
   said = refusal("videotestsrc ! video/x-raw,framerate=30/1");
   CHECK(said.kind == DeviceFaultKind::kChanged);
-  CHECK_THAT(said.text, Catch::Contains("asked 50") && Catch::Contains("gives 30"));
+  CHECK_THAT(said.text, Catch::Contains("requested 50") && Catch::Contains("delivers 30"));
   said = refusal("videotestsrc ! video/x-raw,interlace-mode=interleaved");
   CHECK(said.kind == DeviceFaultKind::kUnsupported);
   CHECK_THAT(said.text, Catch::Contains("interlaced"));

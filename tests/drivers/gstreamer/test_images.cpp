@@ -224,7 +224,7 @@ TEST_CASE("Without times of capture the arrival is the stamp, and a warning says
     REQUIRE(source.open().ok());
     CHECK(source.facts().event == StampEvent::kArrival);
     REQUIRE(source.warnings().size() == 1);
-    CHECK_THAT(std::string(source.warnings()[0].text()), Catch::Contains("no times of capture"));
+    CHECK_THAT(std::string(source.warnings()[0].text()), Catch::Contains("no capture times"));
     const CapturedFrame frame = awaitFrame(source);
     REQUIRE(frame.valid());
     CHECK(frame.event == StampEvent::kArrival);

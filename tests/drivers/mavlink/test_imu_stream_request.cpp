@@ -86,7 +86,8 @@ TEST_CASE("A rate that is not reached is asked for higher, twice at most, and sa
   for (const mavlink::CommandLong& command : script.asked) CHECK(command.param[1] >= 2500);
   CHECK(script.asked.back().param[1] == 2500);
   REQUIRE(script.remarks.size() == 1);
-  CHECK_THAT(script.remarks[0], Catch::Contains("HIGHRES_IMU: 400 a second asked, 170 come, 200 are wanted"));
+  CHECK_THAT(script.remarks[0],
+             Catch::Contains("HIGHRES_IMU: 400 per second requested, 170 received, 200 required"));
   script.pass(20, 200);
   const std::size_t before = script.asked.size();
   script.pass(20, 200);
@@ -103,7 +104,7 @@ TEST_CASE("Where HIGHRES_IMU does not come, RAW_IMU is taken, and after it SCALE
   CHECK(silent.asked.back().param[0] == 26);
   silent.pass(60, 200);
   CHECK(silent.stream.message() == 26);
-  CHECK_THAT(silent.remarks.at(0), Catch::Contains("no HIGHRES_IMU comes, RAW_IMU is asked for"));
+  CHECK_THAT(silent.remarks.at(0), Catch::Contains("no HIGHRES_IMU received, requesting RAW_IMU"));
   CHECK(silent.remarks.size() == 2);
 
   Script refusing;

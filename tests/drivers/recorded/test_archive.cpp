@@ -190,7 +190,7 @@ TEST_CASE("pictures that are numbered take the calibration's rate, and it is sai
   const std::int64_t first = got.samples.front().stamp.ns;
   CHECK(got.frames[0].stamp.ns == first);
   CHECK(got.frames[7].stamp.ns == first + 3 * AslFixture::kImagePeriod);
-  CHECK(test::anyContains(source->warnings(), "20 Hz apart from the first IMU sample on"));
+  CHECK(test::anyContains(source->warnings(), "20 Hz from the first IMU sample on"));
   // Without a rate there is nothing to go by.
   for (const char* camera : {"cam0", "cam1"}) {
     const fs::path yaml = log.mav0() / camera / "sensor.yaml";
@@ -200,7 +200,7 @@ TEST_CASE("pictures that are numbered take the calibration's rate, and it is sai
     test::writeText(yaml, text);
   }
   CHECK(contains(errorOf([&] { (void)openLog(log.folder.path().string()); }).what(),
-                 "names like `frame_000001.png` are no stamps"));
+                 "names like `frame_000001.png` are not stamps"));
 }
 
 }  // namespace

@@ -51,7 +51,7 @@ TEST_CASE("truncated, empty and foreign pictures are counted and skipped", "[asl
     CHECK(source->counters().damaged_images == 5);
     CHECK(anyContains(source->warnings(), "damaged or truncated"));
     CHECK(anyContains(source->warnings(), "neither PNG nor JPEG"));
-    CHECK(anyContains(source->warnings(), "another size"));
+    CHECK(anyContains(source->warnings(), "not the size"));
     for (const CameraFrame& frame : got.frames) CHECK(frame.image.width == 64);
   }
 }
@@ -62,7 +62,7 @@ TEST_CASE("pictures of another size than the calibration are refused", "[asl_dam
     test::writeBytes(log.image(0, i), test::encodePng(test::pattern(48, 64, 1), 48, 64));
   const auto source = openLog(log.folder.path().string());
   const InputError error = errorOf([&] { readAll(*source); });
-  CHECK(contains(error.message, "48x64 pixels, the calibration of cam0 is for 64x48"));
+  CHECK(contains(error.message, "48x64 pixels, but the calibration of cam0 is for 64x48"));
   CHECK(error.file == log.image(0, 0).string());
 }
 
@@ -160,7 +160,7 @@ TEST_CASE("absent and foreign folders and files say what is missing", "[asl_dama
   CHECK(errorOf([&] { openLog(log.folder.path().string()); }).file ==
         (log.mav0() / "imu0" / "sensor.yaml").string());
   fs::remove(log.mav0() / "cam0" / "sensor.yaml");
-  CHECK(contains(errorOf([&] { openLog(log.folder.path().string()); }).remedy, "needs a calibration"));
+  CHECK(contains(errorOf([&] { openLog(log.folder.path().string()); }).remedy, "with a calibration"));
 }
 
 TEST_CASE("clocks that have nothing in common are refused", "[asl_damage]") {
@@ -178,7 +178,7 @@ TEST_CASE("a rate that differs from the calibration is said and corrected", "[as
   test::writeText(log.mav0() / "imu0" / "sensor.yaml", yaml);
   const auto source = openLog(log.folder.path().string());
   CHECK(source->imuNoise().rate_hz == Approx(200));
-  CHECK(anyContains(source->warnings(), "runs at 200.0 Hz, its calibration says 400 Hz"));
+  CHECK(anyContains(source->warnings(), "runs at 200.0 Hz, its calibration specifies 400 Hz"));
 }
 
 }  // namespace

@@ -150,7 +150,7 @@ TEST_CASE("the truth that covers more of the images is taken, OpenVINS' on a tie
   test::writeText(theirs, "#h\nnonsense\n");
   const auto damaged = openLog(log.folder.path().string());
   CHECK(damaged->groundTruthName() == ours.string());
-  CHECK(anyContains(damaged->warnings(), "truth left out"));
+  CHECK(anyContains(damaged->warnings(), "truth omitted"));
 }
 
 TEST_CASE("an IMU turned and moved in the body: samples, rig and truth agree", "[asl]") {

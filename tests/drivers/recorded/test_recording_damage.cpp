@@ -193,7 +193,7 @@ TEST_CASE("a flipped bit ends the recording where it is, and the records behind 
       // The damaged record itself is none of them; a damaged segment header damages no record.
       const std::size_t behind = recorded.ends.size() - whole - (in_header[at] ? 0 : 1);
       if (source.cut().sound_records != behind) found += " other count of sound records";
-      if (behind > 0 && !anyContains(source.warnings(), std::to_string(behind) + " sound records")) {
+      if (behind > 0 && !anyContains(source.warnings(), std::to_string(behind) + " intact records")) {
         found += " count not said";
       }
     } catch (const InputError& error) {
@@ -286,7 +286,7 @@ TEST_CASE("files that do not belong together are refused with name, place and re
   }
   SECTION("an empty first file") {
     segments[0].clear();
-    refuses("recording_000000.swr", "not there");
+    refuses("recording_000000.swr", "header is missing");
   }
 }
 
@@ -342,7 +342,7 @@ TEST_CASE("a missing segment and a folder without any are named") {
     writeText(folder.path() / segmentName(number).data(), "x");
   };
   CHECK_FALSE(isRecording(folder.path().string()));
-  CHECK(contains(errorOf([&] { openRecording(folder.path().string()); }).message, "no recording"));
+  CHECK(contains(errorOf([&] { openRecording(folder.path().string()); }).message, "contains no"));
   write(0);
   write(2);
   CHECK(isRecording(folder.path().string()));
@@ -372,7 +372,7 @@ TEST_CASE("an image that changes on the disk after opening is refused, never del
   text[text.find(std::string(64, '\7')) + 10] = '\6';
   writeText(file, text);
   const InputError error = errorOf([&] { source->image(0, 1, frame); });
-  CHECK(contains(error.message, "not any more"));
+  CHECK(contains(error.message, "damaged now"));
 }
 
 }  // namespace swiftlet::test

@@ -204,7 +204,8 @@ TEST_CASE("a recording is not read while it is written, nor replaced while it is
   const RecordingHeader header = wildHeader(RecordOrder::kAsWritten);
   {
     RecordingWriter writer(path, header);
-    CHECK(contains(errorOf([&] { RecordingWriter(path, header); }).message, "being written or read"));
+    CHECK(contains(errorOf([&] { RecordingWriter(path, header); }).message,
+                   "writing or reading this recording"));
     CHECK(contains(errorOf([&] { openRecording(path); }).message, "still being written"));
     REQUIRE(writer.imu({}, {}).ok());
     REQUIRE(writer.end().ok());
@@ -215,7 +216,8 @@ TEST_CASE("a recording is not read while it is written, nor replaced while it is
   {
     const auto source = openRecording(path);
     const auto beside = openRecording(path);
-    CHECK(contains(errorOf([&] { RecordingWriter(path, header); }).message, "being written or read"));
+    CHECK(contains(errorOf([&] { RecordingWriter(path, header); }).message,
+                   "writing or reading this recording"));
     CHECK(source->imuCount() == 1);
   }
   RecordingWriter writer(path, header);
@@ -228,7 +230,7 @@ TEST_CASE("a place that cannot be written is refused with a remedy") {
   const RecordingHeader header = wildHeader(RecordOrder::kAsWritten);
   for (const char* place : {"file", "file/recording"}) {
     const InputError error = errorOf([&] { RecordingWriter((folder.path() / place).string(), header); });
-    CHECK(contains(error.message, "no recording can be written here"));
+    CHECK(contains(error.message, "cannot write a recording here"));
     CHECK_FALSE(error.remedy.empty());
   }
   CHECK(contains(errorOf([&] { RecordingWriter("/proc/recording", header); }).file, "/proc/recording"));

@@ -122,8 +122,8 @@ TEST_CASE("what is malformed is refused with line, field and remedy", "[track_fi
       {"100,1,0,1,2,1\n200,1,0,1,left,1\n", 3, "v", "`left` is not a number"},
       {"100,1,0,1,,1\n", 2, "v", "`` is not a number"},
       {"100,1,0,1e6,1,1\n", 2, "u", "far outside any image"},
-      {"100,1,0,1,2\n", 2, "row", "5 columns where the header names 6"},
-      {"100,1,0,1,2,1,9\n", 2, "row", "7 columns where the header names 6"},
+      {"100,1,0,1,2\n", 2, "row", "5 columns, but the header has 6"},
+      {"100,1,0,1,2,1,9\n", 2, "row", "7 columns, but the header has 6"},
       {"1.5,1,0,1,2,1\n", 2, "timestamp", "`1.5` is not a whole number"},
       {"-5,1,0,1,2,1\n", 2, "timestamp", "-5 is not within 0"},
       {"200,1,0,1,2,1\n\n100,1,0,1,2,1\n", 4, "timestamp", "100 is earlier than 200"},
@@ -133,7 +133,7 @@ TEST_CASE("what is malformed is refused with line, field and remedy", "[track_fi
       {"100,1,0,1,2,\n", 2, "keyframe", "`` is not a whole number"},
       {"100,1,0,1,2,7\n", 2, "keyframe", "7 is not within 0 and 1"},
       {"100,1,0,1,2,1\n100,2,0,1,2,0\n", 3, "keyframe", "differs"},
-      {"100,1,0,1,2,1\n100,1,0,3,4,1\n", 3, "id", "1 is twice in camera 0"},
+      {"100,1,0,1,2,1\n100,1,0,3,4,1\n", 3, "id", "1 appears twice in camera 0"},
       {"", 0, "", "holds no tracks"},
   };
   for (const Case& bad : cases) {
@@ -162,8 +162,8 @@ TEST_CASE("another header, or none, is refused", "[track_file]") {
   CHECK(contains(headerError("\n#timestamp [ns],track,u0 [px],v0 [px],u1 [px],v1 [px]\n").message,
                  "column 2 is `track`, not `id`"));
   CHECK(headerError("\n#timestamp [ns],track\n").line == 2);
-  CHECK(contains(headerError("#timestamp,id,camera,u\n1,1,0,1\n").message, "names 4 columns"));
-  CHECK(contains(headerError("#timestamp,id,camera,u,v,keyframe,w\n").message, "names 7 columns"));
+  CHECK(contains(headerError("#timestamp,id,camera,u\n1,1,0,1\n").message, "has 4 columns"));
+  CHECK(contains(headerError("#timestamp,id,camera,u,v,keyframe,w\n").message, "has 7 columns"));
   CHECK(headerError("").field == "header");
   CHECK_THROWS_AS(TrackReader("no/such/tracks.csv"), InputError);
 }

@@ -216,14 +216,14 @@ TEST_CASE("Gain is set by hand and read back; a clamped one is reported, an expo
   CHECK(camera.facts().gain == 255);
   REQUIRE(camera.warnings().size() == 1);
   CHECK(camera.warnings()[0].kind == DeviceFaultKind::kChanged);
-  CHECK(camera.warnings()[0].text() == "gain: asked 5000, set 255");
+  CHECK(camera.warnings()[0].text() == "gain: requested 5000, set 255");
 }
 
 TEST_CASE("A format, a size and a rate that it lacks are refused with what it offers", "[capture]") {
   const std::string path = cameraPath(0);
   CameraDevice camera;
   for (const auto& [letters, why] :
-       {std::pair("MJPG", "is not offered"), std::pair("RGBP", "is not taken")}) {
+       {std::pair("MJPG", "is not offered"), std::pair("RGBP", "is not supported")}) {
     const DeviceFault format = camera.open(stream::settings(path, letters));
     std::printf("%s\n", describe(format, "camera 0 (" + path + ")").c_str());
     CHECK(format.kind == DeviceFaultKind::kUnsupported);
@@ -234,13 +234,13 @@ TEST_CASE("A format, a size and a rate that it lacks are refused with what it of
   const DeviceFault size = camera.open(stream::settings(path, "GREY", 700, 500));
   std::printf("%s\n", describe(size, "camera 0 (" + path + ")").c_str());
   CHECK(size.kind == DeviceFaultKind::kChanged);
-  CHECK(size.text().find("asked 700x500") != std::string::npos);
+  CHECK(size.text().find("requested 700x500") != std::string::npos);
   CHECK(size.text().find("GREY offers 320x180") != std::string::npos);
   CHECK(size.text().find(" 752x480") != std::string::npos);
   const DeviceFault rate = camera.open(stream::settings(path, "GREY", 752, 480, 21));
   std::printf("%s\n", describe(rate, "camera 0 (" + path + ")").c_str());
   CHECK(rate.kind == DeviceFaultKind::kChanged);
-  CHECK(rate.text().find("asked 21") != std::string::npos);
+  CHECK(rate.text().find("requested 21") != std::string::npos);
   CHECK(rate.text().find(" 20 ") != std::string::npos);
   CHECK(!camera.isOpen());
 }

@@ -28,7 +28,7 @@ TEST_CASE("A camera that is not there, and things that are none, are told apart"
   CHECK(missing.text().find("/dev/no_such_camera") != std::string::npos);
   const DeviceFault other = faultOf("/dev/null");
   CHECK(other.kind == DeviceFaultKind::kWrongDevice);
-  CHECK(other.text().find("no video node") != std::string::npos);
+  CHECK(other.text().find("not a video node") != std::string::npos);
   CHECK(faultOf("").kind == DeviceFaultKind::kMissing);
 }
 

@@ -125,7 +125,7 @@ TEST_CASE("Who is late or lost, that states stop, and that the supervisor does, 
     plug.listen();
   };
   untilSaid("swiftlet: no new state for 0.3 s", stand);
-  untilSaid("swiftlet: states come again", fly);
+  untilSaid("swiftlet: states are arriving again", fly);
 
   const auto unsupervised = [&] {
     NavState state;
@@ -134,11 +134,11 @@ TEST_CASE("Who is late or lost, that states stop, and that the supervisor does, 
     vehicle.outlet.state.write({state, Eigen::Vector3d::Zero()});
     plug.listen();
   };
-  untilSaid("swiftlet: the supervisor has stopped: health unknown", unsupervised);
+  untilSaid("swiftlet: supervisor stopped, health unknown", unsupervised);
   const std::size_t since = plug.heard.poses.size();
   REQUIRE(until([&] { return plug.heard.poses.size() > since + 5; }, unsupervised));
   CHECK(plug.heard.poses.back().quality == 40);
-  untilSaid("swiftlet: the supervisor is back", fly);
+  untilSaid("swiftlet: supervisor is running again", fly);
 
   // The end of a run is none of these.
   vehicle.verdict.ending = true;
@@ -225,7 +225,7 @@ TEST_CASE("A port that takes nothing loses what is sent, counted and noted, and 
   // Nobody reads: the kernel's buffer fills.
   REQUIRE(until([&] { return !lines.empty(); }, fly));
   CHECK(lines[0].find("autopilot (" + plug.terminal.path() + ")") == 0);
-  CHECK(lines[0].find("not taken") != std::string::npos);
+  CHECK(lines[0].find("writes rejected") != std::string::npos);
   CHECK(lines[0].find("autopilot.baud") != std::string::npos);
   // Then it is read again: the newest comes through whole.
   const Stamp read_again = monotonicNow();

@@ -79,7 +79,7 @@ TEST_CASE("poses, obstacles, texts and answers cost the autopilot's thread no he
   REQUIRE(until(
       [&] {
         return std::ranges::any_of(heard.texts, [](const std::string& text) {
-          return text == "swiftlet: the supervisor has stopped: health unknown";
+          return text == "swiftlet: supervisor stopped, health unknown";
         });
       },
       listen));

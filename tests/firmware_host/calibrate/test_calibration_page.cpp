@@ -170,7 +170,7 @@ TEST_CASE("A good calibration of cameras is called good, and each fault is named
   std::erase_if(one_sided.corners,
                 [](const CornerResidual& c) { return c.camera == 0 && c.pixel.x() > 350; });
   CHECK(cameraPage(one_sided, {}, "").verdict == PageVerdict::kUsable);
-  CHECK(says(cameraPage(one_sided, {}, ""), "Camera 0 saw the board in"));
+  CHECK(says(cameraPage(one_sided, {}, ""), "Camera 0 saw the board only in"));
   CHECK(says(cameraPage(one_sided, {}, ""), "right"));
 
   CameraSolution bent = good;
@@ -181,13 +181,13 @@ TEST_CASE("A good calibration of cameras is called good, and each fault is named
 
   CameraSolution unsure = good;
   unsure.camera[0].covariance *= 400;
-  CHECK(says(cameraPage(unsure, {}, ""), "lens of camera 0 is not known well enough"));
+  CHECK(says(cameraPage(unsure, {}, ""), "lens of camera 0 is not determined well enough"));
 
   CameraSolution skewed = good;
   for (CornerResidual& corner : skewed.corners) {
     if (corner.camera == 1 && corner.pixel.x() > 600) corner.residual.x() += 0.2;
   }
-  CHECK(says(cameraPage(skewed, {}, ""), "Residuals of camera 1 have a direction"));
+  CHECK(says(cameraPage(skewed, {}, ""), "Residuals of camera 1 have a systematic direction"));
 }
 
 TEST_CASE("The page of cameras and IMU judges residuals and sigmas") {
@@ -231,7 +231,7 @@ TEST_CASE("The page of cameras and IMU judges residuals and sigmas") {
 TEST_CASE("The file needs nothing else, with the page's program and plain") {
   const CalibrationPage page = cameraPage(goodSolution(4), {}, "a <b>log</b>");
   const std::string plain = calibrationHtml(page, "", "");
-  CHECK(plain.find("Good: every rule is kept.") != std::string::npos);
+  CHECK(plain.find("Good: all rules are met.") != std::string::npos);
   CHECK(plain.find("<svg") != std::string::npos);
   CHECK(plain.find("<b>log") == std::string::npos);
   CHECK(plain.find("src=") == std::string::npos);

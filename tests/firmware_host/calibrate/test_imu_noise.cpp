@@ -216,8 +216,7 @@ TEST_CASE("Motion, holes and jitter in a log at rest") {
       csv.add(reading);
     }
   }
-  CHECK_THROWS_WITH(measureImuNoise(path),
-                    Catch::Contains("does not stand still") && Catch::Contains("gyro"));
+  CHECK_THROWS_WITH(measureImuNoise(path), Catch::Contains("is not at rest") && Catch::Contains("gyro"));
   CHECK_THROWS_AS(measureImuNoise(folder.file("none.csv")), InputError);
 }
 

@@ -86,7 +86,7 @@ TEST_CASE("a camera that comes back with other pixels is refused until it has th
   };
   camera.format = "YUYV";
   camera.goes = true;
-  CHECK(soon([&] { return said("came back with 64x48 YUYV in place of 64x48 GREY"); }));
+  CHECK(soon([&] { return said("reopened with 64x48 YUYV instead of 64x48 GREY"); }));
   camera.format = "GREY";
   CHECK(soon([&] { return !camera.goes.load() && camera.facts().format == kGrey8; }));
   stop.store(true);

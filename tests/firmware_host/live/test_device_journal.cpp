@@ -23,7 +23,7 @@ TEST_CASE("a fault that stands is told once, and so is its end") {
   CHECK(
       journal.text(event) ==
       "IMU (/dev/ttyUSB0, bridge): sends nothing (nothing came for 2 s); check its power, its wires and that "
-      "its output is switched on");
+      "its output is enabled");
   REQUIRE(journal.next(event));
   CHECK(event.stamp == at(10));
   CHECK(journal.text(event) == "IMU (/dev/ttyUSB0, bridge): works again");

@@ -110,7 +110,7 @@ TEST_CASE("a device that this user may not open is told from one that is not the
   for (const char* device : {"IMU (", "camera 0 ("}) {
     const std::string line = lineWith(said.text, device);
     INFO(said.text);
-    CHECK_THAT(line, Catch::Contains("this user may not open it") && Catch::Contains("join the group"));
+    CHECK_THAT(line, Catch::Contains("no permission to open it") && Catch::Contains("join the group"));
   }
   CHECK_THAT(lineWith(said.text, "camera 1 ("), Catch::Contains("not there"));
 }
@@ -182,7 +182,8 @@ TEST_CASE("a device of another kind is told as such") {
   INFO(said.text);
   CHECK(said.code == kExitFailed);
   for (const char* device : {"IMU (", "camera 0 (", "camera 1 ("})
-    CHECK_THAT(lineWith(said.text, device), Catch::Contains("not the device that the settings take it for"));
+    CHECK_THAT(lineWith(said.text, device),
+               Catch::Contains("not the kind of device that the settings expect"));
 }
 
 }  // namespace

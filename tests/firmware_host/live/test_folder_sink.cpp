@@ -171,7 +171,7 @@ TEST_CASE("a folder with a recording is refused and not touched") {
   std::filesystem::create_directories(folder.file("mav0/imu0"));
   std::ofstream(folder.file("mav0/imu0/data.csv")) << "old";
   CHECK_THROWS_WITH(FolderSink(folder.path(), calibration(), 20),
-                    Catch::Contains("holds a recording already") && Catch::Contains("--out"));
+                    Catch::Contains("already holds a recording") && Catch::Contains("--out"));
   std::ifstream file(folder.file("mav0/imu0/data.csv"));
   std::string text;
   std::getline(file, text);
@@ -200,8 +200,8 @@ TEST_CASE("a disk that goes ends the recording with the reason, and the devices 
   CHECK(sink.failed());
   hand(sink, 0, 301, {2'000}, width, height);
   hand(sink, 1, 0, {2'000}, width, height);
-  CHECK_THROWS_WITH(sink.finish(), Catch::Contains("writing ended before the recording did") &&
-                                       Catch::Contains("Make room"));
+  CHECK_THROWS_WITH(sink.finish(), Catch::Contains("writing stopped before the recording ended") &&
+                                       Catch::Contains("Free space"));
 }
 
 }  // namespace

@@ -224,7 +224,7 @@ TEST_CASE("a sensor that is unplugged is told gone once, and taken up when it re
   REQUIRE(soon([&] { return running.linesWith("gone") > 0; }));
   std::this_thread::sleep_for(std::chrono::milliseconds(450));  // two more looks for it
   CHECK(running.linesWith("gone") == 1);
-  CHECK(running.linesWith("connect it again: it is taken up by itself") == 1);
+  CHECK(running.linesWith("connect it again: it is reopened automatically") == 1);
   CHECK(running.linesWith("not there") == 0);
   CHECK(running.linesWith("works again") == 0);
 
@@ -253,7 +253,7 @@ TEST_CASE("silence is told once, and its end once") {
     sensor.send(1);
     return sink.count() > 10;
   }));
-  REQUIRE(soon([&] { return running.linesWith("sends nothing (nothing came for 1.") > 0; }));
+  REQUIRE(soon([&] { return running.linesWith("sends nothing (no data for 1.") > 0; }));
   std::this_thread::sleep_for(std::chrono::milliseconds(250));
   CHECK(running.linesWith("sends nothing") == 1);
   CHECK(running.linesWith("works again") == 0);
@@ -281,7 +281,7 @@ TEST_CASE("garbage is told apart from silence, and readings between it still com
   };
   REQUIRE(soon([&] {
     garbage();
-    return running.linesWith("no reading in them") > 0;
+    return running.linesWith("without an IMU sample") > 0;
   }));
   CHECK(running.linesWith("check the baud rate and the protocol") == 1);
   CHECK(sink.count() == 0);

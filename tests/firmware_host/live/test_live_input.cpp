@@ -74,7 +74,8 @@ TEST_CASE("each refusal names its setting and what to do") {
 
   settings = vehicle();
   settings.cameras.side_by_side = true;
-  CHECK_THAT(refusal(settings, stereo()), Catch::Contains("cameras.device1") && Catch::Contains("beside"));
+  CHECK_THAT(refusal(settings, stereo()),
+             Catch::Contains("cameras.device1") && Catch::Contains("holds both"));
 
   settings = vehicle();
   settings.cameras.device1 = settings.cameras.device0;
@@ -122,7 +123,8 @@ TEST_CASE("IMU and autopilot share a link where both settings name one port") {
   settings.imu_link.protocol = "mavlink";
   CHECK(refusal(settings, stereo()).empty());
   settings.imu_link.device = "udp:127.0.0.1:many";
-  CHECK_THAT(refusal(settings, stereo()), Catch::Contains("imu_link.device") && Catch::Contains("no port"));
+  CHECK_THAT(refusal(settings, stereo()),
+             Catch::Contains("imu_link.device") && Catch::Contains("the port is not"));
 }
 
 TEST_CASE("a pixel format that is not taken is refused, whatever is connected") {
@@ -140,7 +142,7 @@ TEST_CASE("a pipeline stands in for a video node, and never beside one") {
   settings.cameras.pipeline0 = "videotestsrc";
   CHECK_THAT(refusal(settings, stereo()), Catch::Contains("cameras.pipeline0") &&
                                               Catch::Contains("cameras.device0") &&
-                                              Catch::Contains("Leave one of them out"));
+                                              Catch::Contains("Remove one of them"));
   settings.cameras.device0.clear();
   CHECK(refusal(settings, stereo()).empty());
   settings.cameras.format = "GREY";  // of camera 1's node
@@ -154,12 +156,13 @@ TEST_CASE("a pipeline stands in for a video node, and never beside one") {
   CHECK(refusal(settings, stereo()).empty());
   settings.cameras.gain = 3;
   CHECK_THAT(refusal(settings, stereo()),
-             Catch::Contains("cameras.gain") && Catch::Contains("settings name none"));
+             Catch::Contains("cameras.gain") && Catch::Contains("only to video nodes"));
   settings.cameras.gain = -1;
   CHECK_THAT(refusal(settings, mono()),
              Catch::Contains("vehicle.calibration") && Catch::Contains("pipeline1"));
   settings.cameras.side_by_side = true;
-  CHECK_THAT(refusal(settings, stereo()), Catch::Contains("cameras.pipeline1") && Catch::Contains("beside"));
+  CHECK_THAT(refusal(settings, stereo()),
+             Catch::Contains("cameras.pipeline1") && Catch::Contains("holds both"));
   settings.cameras.pipeline1.clear();
   CHECK(refusal(settings, stereo()).empty());
   settings.cameras.side_by_side = false;

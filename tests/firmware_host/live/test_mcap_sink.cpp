@@ -74,8 +74,8 @@ TEST_CASE("a recording as MCAP is read back with the same stamps and pixels", "[
   std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
   const auto cut = openLog(file, options);
   CHECK(cut->imageCount() > 10);
-  CHECK(cut->warnings()[0].find("did not finish") != std::string::npos);
-  CHECK_THROWS_WITH(McapSink(file, cut->calibration()), Catch::Contains("is there already"));
+  CHECK(cut->warnings()[0].find("not closed by its recorder") != std::string::npos);
+  CHECK_THROWS_WITH(McapSink(file, cut->calibration()), Catch::Contains("already exists"));
   CHECK_THROWS_WITH(McapSink(folder.file("none/a.mcap"), cut->calibration()),
                     Catch::Contains("cannot be written"));
 }

@@ -156,7 +156,7 @@ TEST_CASE("sensors that send at another rate are set") {
                                  {text({0x75, 0x65, 0x01, 0x02, 0x02, 0x06}), mip(0x06), 500.0 / 3}});
     const Opened opened = open(sensor, "mip", 200);
     REQUIRE(opened.warnings.size() == 1);  // 500 / 3 is not 200
-    CHECK_THAT(opened.warnings[0], Catch::Contains("200 Hz asked, 166.7 Hz set"));
+    CHECK_THAT(opened.warnings[0], Catch::Contains("200 Hz requested, 166.7 Hz set"));
     CHECK(sensor.commands() == 5);
   }
 }
@@ -166,7 +166,7 @@ TEST_CASE("a refusal and silence are warnings, and the sensor goes on") {
     const ScriptedSensor sensor(ImuProtocol::kVectorNav, 40, {{"$VNWRG", bytesOf("$VNERR,03*72\r\n")}});
     const Opened opened = open(sensor, "vectornav", 200);
     REQUIRE(opened.warnings.size() == 1);
-    CHECK_THAT(opened.warnings[0], Catch::Contains("200 Hz asked") && Catch::Contains("a refusal"));
+    CHECK_THAT(opened.warnings[0], Catch::Contains("200 Hz requested") && Catch::Contains("a refusal"));
   }
   {
     // Its output is refused when it has stopped measuring.
@@ -184,7 +184,7 @@ TEST_CASE("a refusal and silence are warnings, and the sensor goes on") {
     const Opened opened = open(sensor, "mip", 200);
     REQUIRE(opened.warnings.size() == 1);
     CHECK_THAT(opened.warnings[0], Catch::Contains("\"idle\"") && Catch::Contains("no reply"));
-    CHECK(opened.text == "sends at 100 Hz, and could not be set to 200 Hz");
+    CHECK(opened.text == "sends at 100 Hz and could not be set to 200 Hz");
   }
 }
 

@@ -135,7 +135,7 @@ TEST_CASE("an IMU that repeats one reading fails the health", "[supervisor]") {
   flight.facts.equal_samples = 100;
   flight.pass(0.2);
   CHECK(flight.verdict.health == Health::kFailed);
-  CHECK(flight.times("imu is lost: 100 equal samples in a row") == 1);
+  CHECK(flight.times("imu is lost: 100 identical samples in a row") == 1);
   CHECK_FALSE(flight.verdict.arming.ready());
   flight.facts.equal_samples = 1;
   flight.pass(0.2);

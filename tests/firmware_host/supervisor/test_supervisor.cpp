@@ -91,7 +91,7 @@ TEST_CASE("a stall of 2 s degrades and recovers", "[supervisor]") {
     const double said = flight.until([&] { return flight.trouble(name, Cause::kNoTurn) != nullptr; });
     CHECK(said > silence - kTurn);
     CHECK(said < silence + kSaidWithin);
-    CHECK(flight.times(std::string(name) + " is late: no turn for") == 1);
+    CHECK(flight.times(std::string(name) + " is late: no progress for") == 1);
     CHECK(flight.verdict.health == Health::kDegraded);
     const bool side = memberRule(name).kind == MemberKind::kSide;
     CHECK(flight.verdict.arming.lacks(ArmingCondition::kMembers) == !side);
@@ -120,7 +120,7 @@ TEST_CASE("a stall for good is a loss", "[supervisor]") {
     const double said = flight.until(lost);
     CHECK(said > limit - kTurn);
     CHECK(said < limit + kSaidWithin);
-    CHECK(flight.times(std::string(name) + " is lost: no turn for") == 1);
+    CHECK(flight.times(std::string(name) + " is lost: no progress for") == 1);
     CHECK(std::string(flight.trouble(name, Cause::kNoTurn)->text.data()).find("last seen at: sort") !=
           std::string::npos);
     CHECK(flight.verdict.run_failed == isFlight(name));
@@ -145,7 +145,7 @@ TEST_CASE("a thread that never begins is told", "[supervisor]") {
   bool found = false;
   for (const Trouble& trouble : verdict.troubles) {
     found = found || (trouble.cause == Cause::kNoTurn &&
-                      std::string(trouble.text.data()).find("not begun") != std::string::npos);
+                      std::string(trouble.text.data()).find("not started") != std::string::npos);
   }
   CHECK(found);
 }

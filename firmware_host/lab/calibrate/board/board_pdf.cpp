@@ -73,13 +73,15 @@ Eigen::Vector2d paperSize(const std::string& name) {
   double height = 0;
   char rest = 0;
   if (std::sscanf(name.c_str(), "%lfx%lf%c", &width, &height, &rest) != 2) {
-    throw InputError("--paper", 0, "", "`" + name + "` is no paper size",
-                     "Give A4, A3, A2, A1, A0, letter, tabloid, or width and height in mm, like 600x400");
+    throw InputError(
+        "--paper", 0, "", "`" + name + "` is not a paper size",
+        "Give A4, A3, A2, A1, A0, letter, tabloid, or width and height in mm, for example 600x400");
   }
   const Eigen::Vector2d size = Eigen::Vector2d(std::max(width, height), std::min(width, height)) * 1e-3;
   if (!(size.minCoeff() >= kSmallestPaper && size.maxCoeff() <= kLargestPaper)) {
-    throw InputError("--paper", 0, "", fmt::format("{:g} x {:g} mm is outside 80 to 5000 mm", width, height),
-                     "Width and height are in mm");
+    throw InputError("--paper", 0, "",
+                     fmt::format("{:g} x {:g} mm is out of range: 80 to 5000 mm", width, height),
+                     "Give width and height in mm");
   }
   return size;
 }
@@ -110,9 +112,9 @@ CalibrationTarget boardForPaper(const BoardLayout& layout, const Eigen::Vector2d
   target.square_height = target.size;
   if (target.size < kSmallest) {
     throw InputError("--columns", 0, "",
-                     fmt::format("tags or squares would be {:.1f} mm wide, {:g} mm is the least",
+                     fmt::format("tags or squares would be {:.1f} mm wide, the minimum is {:g} mm",
                                  target.size * 1e3, kSmallest * 1e3),
-                     "Take fewer columns and rows, or a larger paper");
+                     "Use fewer columns and rows, or larger paper");
   }
   return target;
 }

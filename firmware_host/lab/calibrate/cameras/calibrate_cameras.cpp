@@ -68,8 +68,7 @@ Choice chooseModel(const CameraInput& input, const std::vector<Moment>& moments,
   choice.other_rms = std::sqrt(takes_wide ? pinhole_square : wide_square);
   choice.why = fmt::format(
       "{}: rms {:.3f} px on {} views, {} {:.3f} px; information criterion {:+.0f} in favour of "
-      "Kannala-Brandt, "
-      "which is taken above {:.0f}",
+      "Kannala-Brandt, which is chosen above {:.0f}",
       takes_wide ? "Kannala-Brandt" : "radial-tangential",
       std::sqrt(takes_wide ? wide_square : pinhole_square), start.size(),
       takes_wide ? "radial-tangential" : "Kannala-Brandt", choice.other_rms, evidence, kStrongEvidence);
@@ -172,9 +171,8 @@ CameraSolution calibrateCameras(const CameraInput& input, const std::function<vo
     const Choice choice = chooseModel(input, moments.all, c);
     if (!choice.fit) {
       solution.reasons.push_back(
-          fmt::format("Camera {}: no lens fits its {} views of the board. Check the board's file (kind, "
-                      "columns, rows), and "
-                      "record it from many sides, tilted and close",
+          fmt::format("Camera {}: no lens model fits its {} views of the board. Check the board file (kind, "
+                      "columns, rows), and record the board from many sides, tilted and close",
                       c, seenBy(moments.all, c).size()));
       continue;
     }
@@ -191,11 +189,10 @@ CameraSolution calibrateCameras(const CameraInput& input, const std::function<vo
     if (!T) {
       solution.reasons.push_back(
           moments.stamp_difference > 0
-              ? fmt::format(
-                    "The cameras' images are {:.1f} ms apart: no moment shows the board to both. Trigger "
-                    "the cameras together, or repair their stamps",
-                    moments.stamp_difference * 1e3)
-              : "No moment shows the board to both cameras. Hold it where their images overlap");
+              ? fmt::format("The cameras' images are {:.1f} ms apart, so no pair shows the board at one "
+                            "time. Trigger the cameras together, or correct their stamps",
+                            moments.stamp_difference * 1e3)
+              : "No image pair shows the board to both cameras. Hold it where their images overlap");
       return solution;
     }
     bundle.T_cam1_cam0 = *T;
@@ -205,9 +202,8 @@ CameraSolution calibrateCameras(const CameraInput& input, const std::function<vo
   say(0.5);
   if (!bundle.solveWithoutOutliers(solution.corner_sigma)) {
     solution.reasons.emplace_back(
-        "The views do not agree on one solution. Check that the board is the one of its file, flat, and that "
-        "the "
-        "cameras are fixed to each other");
+        "The views do not agree on one solution. Check that the board matches its file and is flat, and that "
+        "the cameras are fixed to each other");
     return solution;
   }
   say(0.8);

@@ -32,8 +32,8 @@ std::string describe(const CameraSolution& solution) {
         "  focal length {:.3f} {:.3f} px (1 sigma {:.3f} {:.3f}), centre {:.3f} {:.3f} px ({:.3f} {:.3f})\n",
         f[0], f[1], sigma[0], sigma[1], f[2], f[3], sigma[2], sigma[3]);
     text += fmt::format(
-        "  corners rms {:.3f} px per axis; a pixel is uncertain by {:.3f} px (1 sigma, in {:.0f} % of the "
-        "image); halves of the views differ by {:.3f} px rms\n",
+        "  corners rms {:.3f} px per axis; a projected pixel is uncertain by {:.3f} px (1 sigma, in {:.0f} % "
+        "of the image); solutions from halves of the views differ by {:.3f} px rms\n",
         camera.rms, quantile(projectionSigmas(camera.model, camera.covariance), kShownPart), kShownPart * 100,
         rms(projectionDifference(camera.halves[0], camera.halves[1])));
   }
@@ -48,7 +48,7 @@ std::string describe(const CameraSolution& solution) {
   if (!solution.corners.empty()) {
     const auto outliers = std::count_if(solution.corners.begin(), solution.corners.end(),
                                         [](const CornerResidual& corner) { return corner.outlier; });
-    text += fmt::format("{} views, {} corners, {} of them left out as outliers\n", solution.views.size(),
+    text += fmt::format("{} views, {} corners, {} of them rejected as outliers\n", solution.views.size(),
                         solution.corners.size(), outliers);
   }
   return text;
@@ -56,7 +56,7 @@ std::string describe(const CameraSolution& solution) {
 
 std::string camchainYaml(const CameraSolution& solution) {
   std::string text =
-      "# Written by swiftlet calibrate cameras. No IMU: swiftlet calibrate imu-camera adds it.\n";
+      "# Written by swiftlet calibrate cameras. It has no IMU: add it with swiftlet calibrate imu-camera.\n";
   for (std::size_t c = 0; c < solution.camera_count; ++c) {
     const CameraModel& lens = solution.camera[c].model;
     text += fmt::format("cam{}:\n  camera_model: pinhole\n  distortion_model: {}\n", c,

@@ -74,11 +74,10 @@ void judgeBoard(const CameraSolution& solution, const CameraEvidence& evidence,
   const Stretch height = stretchOf(*evidence.bundle, solution.corner_sigma,
                                    [](BundleCorner& corner, double part) { corner.point.y() *= 1 + part; });
   if (isLarge(height)) {
-    reasons.push_back(
-        fmt::format("The board's height is {:+.1f} % beside its width, from what its file says: measure the "
-                    "print in both "
-                    "directions and correct the file, or print it again without fitting to the page",
-                    height.value * 100));
+    reasons.push_back(fmt::format(
+        "The board's height is {:+.1f} % off relative to its width, compared with its file: measure the "
+        "print in both directions and correct the file, or print it again without fitting to the page",
+        height.value * 100));
   }
   if (!target.hasTags()) return;
   const Stretch gap =
@@ -90,9 +89,8 @@ void judgeBoard(const CameraSolution& solution, const CameraEvidence& evidence,
   // Of the gap alone a part is less than the same part of the board.
   if (std::abs(gap.value) * target.gap > kMostStretch && std::abs(gap.value) > kStretchSigmas * gap.sigma) {
     reasons.push_back(
-        fmt::format("The gap between the tags is {:.3f} tag edges, the board's file says {:.3f}: measure "
-                    "tags and gaps and "
-                    "correct tagSpacing",
+        fmt::format("The gap between the tags is {:.3f} tag edges, but {:.3f} in the board file: measure "
+                    "tags and gaps and correct tagSpacing",
                     target.gap * (1 + gap.value), target.gap));
   }
 }
@@ -108,32 +106,30 @@ void judgeCamera(std::size_t c, const CameraSolution& solution, const CameraEvid
   const auto views = static_cast<std::size_t>(std::count(seen.begin(), seen.end(), true));
   if (views < kFewestGoodViews) {
     reasons.push_back(fmt::format(
-        "Camera {}: {} usable views of the board, {} are needed. Record it longer, from more sides", c, views,
+        "Camera {}: {} usable views of the board, {} are required. Record longer, from more sides", c, views,
         kFewestGoodViews));
   }
   const double sigma = quantile(projectionSigmas(camera.model, camera.covariance), kImagePart);
   if (!(sigma < kMostProjectionSigma * focal)) {
-    reasons.push_back(fmt::format(
-        "Camera {}: a pixel is uncertain by up to {:.2f} px (1 sigma, in {:.0f} % of the image), above "
-        "{:.2f} px. "
-        "Bring the board close and into every corner of the image, and tilt it by 45 degrees to all sides",
-        c, sigma, kImagePart * 100, kMostProjectionSigma * focal));
+    reasons.push_back(
+        fmt::format("Camera {}: a projected pixel is uncertain by up to {:.2f} px (1 sigma, in {:.0f} % of "
+                    "the image), above {:.2f} px. Bring the board close and into every corner of the image, "
+                    "and tilt it by 45 degrees to all sides",
+                    c, sigma, kImagePart * 100, kMostProjectionSigma * focal));
   }
   if (camera.rms > kMostCornerSigma * focal) {
-    reasons.push_back(
-        fmt::format("Camera {}: corners are {:.2f} px off, above {:.2f} px. Check that the image is sharp, "
-                    "the board flat and "
-                    "as its file says, and hold a camera with rolling shutter still for each image",
-                    c, camera.rms, kMostCornerSigma * focal));
+    reasons.push_back(fmt::format(
+        "Camera {}: corner residuals are {:.2f} px, above {:.2f} px. Check that the image is sharp and that "
+        "the board is flat and matches its file; hold a rolling shutter camera still for each image",
+        c, camera.rms, kMostCornerSigma * focal));
   }
   const std::vector<ImagePoint> difference = projectionDifference(camera.halves[0], camera.halves[1]);
   const double expected = rms(projectionSigmas(camera.model, evidence.half_covariance[c]));
   if (rms(difference) > kMostHalfRatio * expected && rms(difference) > kLeastHalfDifference * focal) {
-    reasons.push_back(
-        fmt::format("Camera {}: two halves of the views give lenses that differ by {:.2f} px rms, {:.1f} "
-                    "times what noise "
-                    "explains. The lens moved or refocused, the board is bent, or the shutter rolls",
-                    c, rms(difference), rms(difference) / expected));
+    reasons.push_back(fmt::format(
+        "Camera {}: two halves of the views give lenses that differ by {:.2f} px rms, {:.1f} times what "
+        "noise explains. The lens moved or refocused, the board is bent, or the shutter is rolling",
+        c, rms(difference), rms(difference) / expected));
   }
 }
 
@@ -142,16 +138,15 @@ void judgePair(const CameraSolution& solution, const CameraEvidence& evidence,
   const auto [low, high] = std::minmax(evidence.alone_sigma[0], evidence.alone_sigma[1]);
   if (high > kMostSigmaRatio * low) {
     const int blurred = evidence.alone_sigma[0] > evidence.alone_sigma[1] ? 0 : 1;
-    reasons.push_back(fmt::format(
-        "Camera {}: its corners are {:.1f} times as noisy as the other camera's. Focus it, clean its "
-        "lens, or shorten its exposure",
-        blurred, high / low));
+    reasons.push_back(
+        fmt::format("Camera {}: its corners are {:.1f} times as noisy as the other camera's. Focus it, clean "
+                    "its lens, or shorten its exposure",
+                    blurred, high / low));
   }
   if (solution.corner_sigma > kMostJointRatio * high) {
     reasons.push_back(
-        fmt::format("The two cameras fit the board to {:.2f} px each but only to {:.2f} px together: they "
-                    "are loose, or their "
-                    "images are not of the same moment",
+        fmt::format("The two cameras fit the board to {:.2f} px separately but only to {:.2f} px together: "
+                    "they are loose, or their images are not taken at the same time",
                     high, solution.corner_sigma));
   }
   if (evidence.stamp_difference > kMostStampDifference) {
@@ -163,8 +158,8 @@ void judgePair(const CameraSolution& solution, const CameraEvidence& evidence,
   const double found = solution.T_cam1_cam0.translation.norm();
   if (told > 0 && std::abs(found - told) > std::max(kMostBaselineError * told, kLeastBaselineError)) {
     reasons.push_back(fmt::format(
-        "The cameras are {:.1f} mm apart, measured were {:.1f} mm: the board is {:.3f} times as large "
-        "as its file says, or the baseline is not the one between the lenses",
+        "The calibrated baseline is {:.1f} mm, but {:.1f} mm was measured: the board is {:.3f} times as "
+        "large as its file says, or the measured baseline is not the one between the lenses",
         found * 1e3, told * 1e3, told / found));
   }
 }
@@ -180,10 +175,10 @@ std::vector<std::string> cameraReasons(const CameraSolution& solution, const Cam
   const double part =
       static_cast<double>(outliers) / static_cast<double>(std::max<std::size_t>(1, solution.corners.size()));
   if (part > kMostOutliers) {
-    reasons.push_back(fmt::format(
-        "{:.1f} % of the corners do not fit and were left out, above {:.0f} %. Look for reflections, a "
-        "second board, and motion blur",
-        part * 100, kMostOutliers * 100));
+    reasons.push_back(
+        fmt::format("{:.1f} % of the corners were rejected as outliers, above {:.0f} %. Check for "
+                    "reflections, a second board and motion blur",
+                    part * 100, kMostOutliers * 100));
   }
   judgeBoard(solution, evidence, reasons);
   return reasons;

@@ -37,7 +37,7 @@ class RunPlace {
     if (!own_) return;
     std::string name = (fs::temp_directory_path() / "swiftlet_check_XXXXXX").string();
     if (mkdtemp(name.data()) == nullptr) {
-      throw InputError(name, 0, "", "cannot be made", "Give a folder with --out");
+      throw InputError(name, 0, "", "cannot be created", "Give a folder with --out");
     }
     path_ = name;
   }
@@ -293,7 +293,7 @@ void conclude(bool disagree, CheckResult& result) {
   for (const CheckedValue& value : result.values) {
     if (value.verdict == CheckVerdict::kMoved) {
       moved = true;
-      result.because.push_back(fmt::format("{} is off by {:+.3g} {} ({:.1f} sigma, {}): recalibrate.",
+      result.because.push_back(fmt::format("{} has changed by {:+.3g} {} ({:.1f} sigma, {}): recalibrate.",
                                            value.name, value.change, value.unit,
                                            std::abs(value.change) / value.sigma, value.effect));
     }
@@ -306,19 +306,17 @@ void conclude(bool disagree, CheckResult& result) {
   const bool few_stereo = two && result.stereo_share < kLeastStereoShare;
   if (few_stereo) {
     result.because.push_back(
-        fmt::format("Only {:.0f} % of the points are found by both cameras: they may have turned against "
-                    "each other by more "
-                    "than the search between them allows, or see different things.",
+        fmt::format("Only {:.0f} % of the points are found by both cameras: the cameras may have rotated "
+                    "relative to each other beyond the search range, or see different scenes.",
                     kPercent * result.stereo_share));
   }
   if (!unknown.empty()) {
-    result.because.push_back(
-        "This flight does not fix: " + unknown + ". " +
-        (disagree
-             ? "The middle and the rim of the image disagree by more than noise: the lens model does not fit "
-               "the images. Look at the residuals over the image, and calibrate the cameras again if the "
-               "accuracy is not what it was."
-             : "Fly longer, with turns about all axes and quick changes of speed."));
+    result.because.push_back("This flight does not determine: " + unknown + ". " +
+                             (disagree
+                                  ? "The centre and the rim of the image disagree by more than noise: the "
+                                    "lens model does not fit the images. Check the residuals over the image, "
+                                    "and recalibrate the cameras if the accuracy has become worse."
+                                  : "Fly longer, with rotations about all axes and quick changes of speed."));
   }
   result.verdict = moved                            ? CheckVerdict::kMoved
                    : few_stereo || !unknown.empty() ? CheckVerdict::kCannotTell
@@ -353,7 +351,8 @@ CheckResult checkCalibration(const CheckRequest& request, Settings settings) {
   const std::string path = (fs::path(place.path()) / kKeyframeFile).string();
   std::ifstream in(path, std::ios::binary);
   if (!in) {
-    result.because.push_back("The estimator flew nothing of this log: look at it with `swiftlet doctor`.");
+    result.because.push_back(
+        "The estimator produced no usable flight from this log: check it with `swiftlet doctor`.");
     return result;
   }
   KeyframeReader reader(path, in);
@@ -375,11 +374,10 @@ CheckResult checkCalibration(const CheckRequest& request, Settings settings) {
   }
   progress.finish();
   if (result.pieces.size() < kFewestPieces) {
-    result.because.push_back(
-        fmt::format("The estimator flew {} pieces of this log well enough, {} are needed: look at it with "
-                    "`swiftlet doctor` and "
-                    "`swiftlet replay`. A calibration that is far off looks like this too.",
-                    result.pieces.size(), kFewestPieces));
+    result.because.push_back(fmt::format(
+        "The estimator ran {} pieces of this log well enough, {} are required: check it with `swiftlet "
+        "doctor` and `swiftlet replay`. A calibration that is far off can also cause this.",
+        result.pieces.size(), kFewestPieces));
     return result;
   }
   for (const PieceResult& piece : result.pieces) {
@@ -404,9 +402,9 @@ std::string checkText(const CheckResult& result) {
                         value.file, value.change, value.sigma, value.limit, value.unit, value.effect,
                         name(value.verdict));
   }
-  text += fmt::format(
-      "{}: the calibration {}\n", result.log,
-      result.verdict == CheckVerdict::kCannotTell ? "cannot be judged by this flight" : name(result.verdict));
+  text += fmt::format("{}: the calibration {}\n", result.log,
+                      result.verdict == CheckVerdict::kCannotTell ? "cannot be checked with this flight"
+                                                                  : name(result.verdict));
   for (const std::string& line : result.because) text += "  " + line + "\n";
   return text;
 }

@@ -153,9 +153,8 @@ void CalibrationGuide::missingOf(std::size_t index, std::vector<std::string>& mi
   }
   if (camera.blurred > camera.with_board / 2) {
     missing.push_back(
-        fmt::format("Camera {} sees the board blurred (edges {:.1f} px wide, limit {:.1f}): move slower, "
-                    "give more light, "
-                    "or focus the lens.",
+        fmt::format("Camera {} sees the board blurred (edges {:.1f} px wide, limit {:.1f}): move slower, add "
+                    "light, or focus the lens.",
                     index, camera.edge_width, kWidestEdge));
   }
   if (camera.covered() < kColumns * kRows - kMostEmpty) {
@@ -178,8 +177,8 @@ void CalibrationGuide::missingOf(std::size_t index, std::vector<std::string>& mi
   }
   if (camera.largest_scale < kScaleRange * camera.smallest_scale) {
     missing.push_back(
-        fmt::format("Change the distance to the board: nearest and farthest of camera {} differ by "
-                    "a factor of {:.1f}, {:.1f} is asked for.",
+        fmt::format("Change the distance to the board: the nearest and farthest views of camera {} differ by "
+                    "a factor of {:.1f}, {:.1f} is required.",
                     index, camera.largest_scale / std::max(camera.smallest_scale, 1e-9), kScaleRange));
   }
   static constexpr std::array<const char*, 4> kSides{"left", "right", "upper", "lower"};
@@ -205,12 +204,13 @@ std::vector<std::string> CalibrationGuide::missing() const {
   constexpr std::array<char, 3> kAxes{'x', 'y', 'z'};
   for (int axis = 0; axis < 3; ++axis) {
     if (turned_[axis] >= kTurnedSeconds) continue;
-    missing.push_back(fmt::format("Turn the rig to and fro about the IMU's {} axis: {:.0f} of {:.0f} s.",
-                                  kAxes[static_cast<std::size_t>(axis)], turned_[axis], kTurnedSeconds));
+    missing.push_back(
+        fmt::format("Rotate the rig back and forth about the IMU's {} axis: {:.0f} of {:.0f} s.",
+                    kAxes[static_cast<std::size_t>(axis)], turned_[axis], kTurnedSeconds));
   }
   for (int axis = 0; axis < 3; ++axis) {
     if (pushed_[axis] >= kPushedSeconds) continue;
-    missing.push_back(fmt::format("Move the rig to and fro along the IMU's {} axis: {:.0f} of {:.0f} s.",
+    missing.push_back(fmt::format("Move the rig back and forth along the IMU's {} axis: {:.0f} of {:.0f} s.",
                                   kAxes[static_cast<std::size_t>(axis)], pushed_[axis], kPushedSeconds));
   }
   return missing;

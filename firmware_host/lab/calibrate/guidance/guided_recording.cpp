@@ -172,7 +172,7 @@ bool GuidedRecording::goOn() {
   {
     const std::lock_guard lock(mutex_);
     enough = missing_.empty();
-    line = enough ? "enough for a calibration: the recording ends"
+    line = enough ? "recording complete: enough data for a calibration"
                   : fmt::format("{:3.0f} %  {}", 100 * progress_, missing_.front());
   }
   const double now = wallSeconds();

@@ -77,27 +77,26 @@ void judgeFit(const MotionFit& fit, std::vector<std::string>& reasons) {
   if (fit.explained < kLeastExplained) {
     if (fit.turned_deg < kLeastTurn) {
       reasons.push_back(
-          fmt::format("The rig hardly turned: {:.2f} deg from image to image. Turn it about all "
-                      "three axes by 30 deg and more, once or twice a second.",
+          fmt::format("The rig hardly rotated: {:.2f} deg from image to image. Rotate it about all three "
+                      "axes by 30 deg and more, once or twice a second.",
                       fit.turned_deg));
       return;
     }
     reasons.push_back(fmt::format(
-        "No time shift within {:g} s makes the gyro follow the cameras: it explains {:.0f} % of their turns. "
-        "Stamps of images and samples must come from one clock, and both must be of the same rig.",
+        "At no time offset within {:g} s does the gyro follow the cameras: it explains {:.0f} % of their "
+        "rotation. Stamps of images and samples must come from one clock, and both from the same rig.",
         kMaxShift, 100 * std::max(fit.explained, 0.0)));
     return;
   }
   if (fit.mirror_gain > 0.5 * kMirrorSigmas * kMirrorSigmas) {
     reasons.push_back(
-        "The gyro's axes are left-handed: no rotation takes them to the camera's, a mirror does. Two axes "
-        "are "
-        "exchanged or one has the wrong sign; correct the driver's axes.");
+        "The gyro's axes are left-handed: they match the camera's only mirrored. Two axes are swapped or one "
+        "has the wrong sign; correct the driver's axes.");
   }
   if (fit.scale < 0.8 || fit.scale > 1.25) {
     reasons.push_back(
-        fmt::format("The camera turns {:.3g} times as fast as the gyro says. Give the gyro in "
-                    "rad/s; degrees would be {:.3g} times.",
+        fmt::format("The camera rotates {:.3g} times as fast as the gyro measures. Provide the gyro in "
+                    "rad/s; degrees would give a factor of {:.3g}.",
                     fit.scale, 1 / kDegrees));
   }
 }
@@ -121,7 +120,7 @@ BatchStart startBatch(const CalibrationTarget& target, const std::vector<BoardVi
   start.posed_views = poses.size();
   if (poses.size() < kFewestPoses) {
     start.reasons.push_back(fmt::format(
-        "Only {} images show enough of the board, {} are needed. Keep the board in view for half a minute.",
+        "Only {} images show enough of the board, {} are required. Keep the board in view for half a minute.",
         poses.size(), kFewestPoses));
     return start;
   }

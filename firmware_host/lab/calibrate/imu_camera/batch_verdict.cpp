@@ -200,7 +200,7 @@ void BatchVerdict::judge(BatchProblem problem, ImuCameraSolution& solution) cons
   std::vector<std::string>& reasons = solution.reasons;
   if (!settled) {
     reasons.push_back(
-        "The batch did not settle: its last steps are not small. Record again, slower at first.");
+        "The optimization did not converge: its last steps are not small. Record again, starting slower.");
   }
   judgeResiduals(solution, reasons);
   const bool known = judgeSigmas(solution, reasons);
@@ -216,28 +216,25 @@ void BatchVerdict::judge(BatchProblem problem, ImuCameraSolution& solution) cons
   const auto sigmaOf = [&](int column) { return std::sqrt(covariance(column, column)); };
   const double scale = step[batch::kScale];
   if (std::abs(scale) > std::max(kTestSigmas * sigmaOf(batch::kScale), kScaleMatters)) {
-    reasons.push_back(
-        fmt::format("The accelerometer says that the board is {:.2f} +- {:.2f} % {} than told. Measure the "
-                    "board; if it is "
-                    "right, the accelerometer's readings do not fit gravity of {:.3f} m/s^2.",
-                    kToPercent * std::abs(scale), kToPercent * sigmaOf(batch::kScale),
-                    scale > 0 ? "larger" : "smaller", problem.state().gravity.norm()));
+    reasons.push_back(fmt::format(
+        "According to the accelerometer the board is {:.2f} +- {:.2f} % {} than in its file. Measure the "
+        "board; if it is right, the accelerometer does not match gravity of {:.3f} m/s^2.",
+        kToPercent * std::abs(scale), kToPercent * sigmaOf(batch::kScale), scale > 0 ? "larger" : "smaller",
+        problem.state().gravity.norm()));
   }
   const double drift = step[batch::kDrift];
   if (std::abs(drift) > std::max(kTestSigmas * sigmaOf(batch::kDrift), kDriftMatters)) {
     reasons.push_back(
-        fmt::format("The time offset between cameras and IMU grows by {:.1f} +- {:.1f} us each second: their "
-                    "stamps are of "
-                    "two clocks. Stamp both by one, or map one clock to the other.",
+        fmt::format("The time offset between cameras and IMU drifts by {:.1f} +- {:.1f} us per second: their "
+                    "stamps come from two clocks. Stamp both with one clock, or map one clock to the other.",
                     1e6 * drift, 1e6 * sigmaOf(batch::kDrift)));
   }
   const double shift = problem.state().shift;
   if (std::abs(shift) > kShiftOfOneClock) {
-    reasons.push_back(
-        fmt::format("Images and samples are {:.3f} s apart: their stamps are hardly of one clock. Find out "
-                    "which is wrong; "
-                    "an offset that differs at each start cannot be calibrated.",
-                    shift));
+    reasons.push_back(fmt::format(
+        "Images and samples are {:.3f} s apart: their stamps probably do not come from one clock. Find out "
+        "which is wrong; an offset that differs at each start cannot be calibrated.",
+        shift));
   }
 }
 
@@ -246,27 +243,23 @@ void BatchVerdict::judgeResiduals(const ImuCameraSolution& solution,
   const double corners = static_cast<double>(solution.corners.size());
   if (static_cast<double>(outliers) > kMostOutliers * corners) {
     reasons.push_back(
-        fmt::format("{:.1f} % of the corners are outliers. Look at the residuals over the image: a wrong "
-                    "lens model, a bent "
-                    "board or a board that moved.",
+        fmt::format("{:.1f} % of the corners are outliers. Check the residuals over the image: the lens "
+                    "model is wrong, or the board is bent or moved.",
                     kToPercent * static_cast<double>(outliers) / corners));
   }
   const double noise = solution.corner_sigma / solution.rig.camera[0].focal();
   if (noise > kMostCornerNoise) {
     reasons.push_back(
-        fmt::format("Corners are {:.2f} px from where the solution has them. Less blur (shorter exposure, "
-                    "slower motion), a "
-                    "flat board, and the right kind of shutter help.",
+        fmt::format("Corner residuals are {:.2f} px. Reduce blur (shorter exposure, slower motion), use a "
+                    "flat board, and set the right kind of shutter.",
                     solution.corner_sigma));
   }
   const auto sensor = [&](const char* name, double times) {
     if (!input.noise_told || times < kMostResidual) return;
-    reasons.push_back(
-        fmt::format("The {}'s readings are {:.1f} times as far from the solution as its noise allows. "
-                    "Causes: noise figures "
-                    "of a datasheet (measure them with `calibrate imu-noise`), jittering stamps, shocks, a "
-                    "board that moved.",
-                    name, times));
+    reasons.push_back(fmt::format(
+        "The {}'s residuals are {:.1f} times its noise. Possible causes: noise densities from a datasheet "
+        "(measure them with `calibrate imu-noise`), stamp jitter, shocks, a board that moved.",
+        name, times));
   };
   sensor("gyro", solution.gyro_sigma);
   sensor("accelerometer", solution.accel_sigma);
@@ -292,8 +285,8 @@ void BatchVerdict::judgeMotion(const BatchProblem& problem, bool known,
   const Weakest turn = weakestOf(rates / count);
   if (turn.rms < kLeastRate) {
     reasons.push_back(
-        fmt::format("The rig hardly turned about camera 0's axis {}: {:.1f} deg/s. Turn it to and "
-                    "fro about this axis by 30 deg and more.",
+        fmt::format("The rig hardly rotated about camera 0's axis {}: {:.1f} deg/s. Rotate it back and forth "
+                    "about this axis by 30 deg and more.",
                     axisOfCamera(turn.direction), kToDeg * turn.rms));
   }
   const Weakest force = weakestOf(forces / count);
@@ -302,8 +295,8 @@ void BatchVerdict::judgeMotion(const BatchProblem& problem, bool known,
     Eigen::Index axis = 0;
     force.direction.cwiseAbs().maxCoeff(&axis);
     reasons.push_back(
-        fmt::format("The rig hardly accelerated along camera 0's {} axis: {:.2f} m/s^2. Swing it to "
-                    "and fro along this axis.",
+        fmt::format("The rig hardly accelerated along camera 0's {} axis: {:.2f} m/s^2. Swing it back and "
+                    "forth along this axis.",
                     kAxes[static_cast<std::size_t>(axis)], force.rms));
   }
   if (!input.told) return;
@@ -311,9 +304,8 @@ void BatchVerdict::judgeMotion(const BatchProblem& problem, bool known,
   const double turned = kToDeg * logSo3(told.rotation.conjugate() * state.T_body_cam[0].rotation).norm();
   if (turned > kToldTurn) {
     reasons.push_back(
-        fmt::format("Camera 0 is turned by {:.0f} deg from where the given calibration has it in the IMU's "
-                    "axes. Exchanged "
-                    "IMU axes do this; if the IMU was mounted anew, leave the old calibration out.",
+        fmt::format("In the IMU's axes, camera 0 is rotated by {:.0f} deg from the given calibration. "
+                    "Swapped IMU axes cause this; if the IMU was remounted, omit the old calibration.",
                     turned));
   }
 }
@@ -325,9 +317,8 @@ void BatchVerdict::judgeMatrices(const ImuCameraSolution& solution, std::vector<
     const double most = (M - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff(&i, &j);
     if (most < kMostMatrix) return;
     reasons.push_back(
-        fmt::format("The {}'s axes do not fit: its {} reading has {:.2f} times the true {}. Exchanged or "
-                    "reversed axes of one "
-                    "of the two sensors, a wrong unit, or too little motion.",
+        fmt::format("The {}'s axes do not fit: its {} reading has {:.2f} times the true {}. Possible causes: "
+                    "swapped or reversed axes of one sensor, a wrong unit, or too little motion.",
                     name, kAxes[static_cast<std::size_t>(i)], M(i, j), kAxes[static_cast<std::size_t>(j)]));
   };
   sensor("gyro", solution.gyro_matrix);
@@ -347,7 +338,8 @@ bool BatchVerdict::judgeSigmas(const ImuCameraSolution& solution, std::vector<st
     text += fmt::format("{}{} +- {:.3g} {}", text.empty() ? "" : ", ", value.name, value.sigma, value.unit);
   }
   if (text.empty()) return true;
-  reasons.push_back("Not known well enough: " + text + ". Record longer, with faster turns about all axes.");
+  reasons.push_back("Not determined well enough: " + text +
+                    ". Record longer, with faster rotations about all axes.");
   return false;
 }
 
@@ -381,8 +373,7 @@ void BatchVerdict::judgeHalves(const BatchProblem& problem, std::vector<std::str
   }
   reasons.push_back(
       fmt::format("The first and the second half of the log disagree: chi^2 {:.0f} of {} values, most in "
-                  "`{}` ({:.1f} sigma). "
-                  "Something moved, a clock wandered, or a model does not fit.",
+                  "`{}` ({:.1f} sigma). Something moved, a clock drifted, or a model does not fit.",
                   chi2, count, name, std::abs(difference[worst]) / sigmas[worst]));
 }
 

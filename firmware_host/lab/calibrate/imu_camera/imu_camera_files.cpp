@@ -15,7 +15,7 @@ std::string describe(const ImuCameraSolution& solution) {
   const auto outliers = std::count_if(solution.corners.begin(), solution.corners.end(),
                                       [](const CornerResidual& corner) { return corner.outlier; });
   text += fmt::format(
-      "corners {:.3f} px per axis, {} of {} left out; gyro {:.2f} and accelerometer {:.2f} times their "
+      "corners {:.3f} px per axis, {} of {} rejected; gyro {:.2f} and accelerometer {:.2f} times their "
       "noise\n",
       solution.corner_sigma, outliers, solution.corners.size(), solution.gyro_sigma, solution.accel_sigma);
   return text;

@@ -69,11 +69,10 @@ void addRemarks(ImuNoiseResult& result) {
   const auto at = [&](int i) -> const AxisNoise& { return axis[static_cast<std::size_t>(i)]; };
   const auto short_for = axesWhere([&](int i) { return !at(i).walk; });
   if (!short_for.empty()) {
-    result.remarks.push_back(
-        fmt::format("The log is too short for the random walk of {}: {:.0f} s at rest do not fix it to "
-                    "{:.0f} %. White noise "
-                    "alone is given for these. Record longer, two hours at least, at an even temperature",
-                    axesText(short_for), result.used_seconds, 100 * kMostRelativeSigma));
+    result.remarks.push_back(fmt::format(
+        "The log is too short for the random walk of {}: {:.0f} s at rest do not determine it to {:.0f} %. "
+        "Only white noise is given for these. Record at least two hours at an even temperature",
+        axesText(short_for), result.used_seconds, 100 * kMostRelativeSigma));
   }
   const double nyquist = 2 / result.rate_hz;
   const auto quantized = axesWhere([&](int i) {
@@ -82,21 +81,21 @@ void addRemarks(ImuNoiseResult& result) {
            3 * std::pow(at(i).quantization / nyquist, 2) > std::pow(at(i).density.value, 2) / nyquist;
   });
   if (!quantized.empty()) {
-    result.remarks.push_back("Quantization exceeds white noise at short times on " + axesText(quantized) +
-                             ". Choose a smaller range of the sensor if the vehicle's motion allows it");
+    result.remarks.push_back(
+        "Quantization exceeds white noise at short times on " + axesText(quantized) +
+        ". Choose a smaller measurement range of the sensor if the vehicle's motion allows it");
   }
   const auto misfit = axesWhere([&](int i) { return at(i).misfit > 2; });
   if (!misfit.empty()) {
     result.remarks.push_back("The deviation of " + axesText(misfit) +
-                             " is not that of white noise, bias instability and random walk: vibration of "
-                             "the place, or a change of "
-                             "temperature. The standard deviations include the misfit. Record again on a "
-                             "heavy table, after warming up");
+                             " does not match white noise, bias instability and random walk: the place "
+                             "vibrates, or the temperature changes. The standard deviations include the "
+                             "misfit. Record again on a heavy table after the sensor has warmed up");
   }
   const auto filtered = axesWhere([&](int i) { return at(i).from_tau > result.points.front().tau; });
   if (!filtered.empty()) {
     result.remarks.push_back(
-        fmt::format("Times below {:.3g} s are left out for {}: the readings are not white there, as behind a "
+        fmt::format("Times below {:.3g} s are excluded for {}: the readings are not white there, as behind a "
                     "low-pass filter",
                     at(filtered.front()).from_tau, axesText(filtered)));
   }
@@ -116,7 +115,7 @@ std::string walkLine(const ImuNoiseResult& result, const char* key, int first) {
                        largest(result, first, [](const AxisNoise& a) { return a.walk->value; }));
   }
   return fmt::format(
-      "# {}: not measured, the log is too short. Below {:.2g} (2 sigma); take the data sheet's.\n", key,
+      "# {}: not measured, the log is too short. Below {:.2g} (2 sigma); use the data sheet's value.\n", key,
       largest(result, first, [](const AxisNoise& a) { return a.walk ? a.walk->value : a.walk_limit; }));
 }
 
@@ -147,8 +146,8 @@ ImuNoiseResult measureImuNoise(const std::string& log) {
   if (!restless.empty() || still < kLeastRest || spans.movingSeconds() > kMostMotion * result.seconds) {
     throw InputError(log, 0, "",
                      !restless.empty()
-                         ? "does not stand still: " + restless
-                         : fmt::format("stands still for {:.0f} of {:.0f} s{}{}", still, result.seconds,
+                         ? "is not at rest: " + restless
+                         : fmt::format("is at rest for {:.0f} of {:.0f} s{}{}", still, result.seconds,
                                        result.motions.empty() ? "" : "; it moves from ",
                                        result.motions.empty() ? "" : result.motions.front()),
                      "Record the IMU at rest on a heavy table, motors off, for two hours or more");
@@ -183,7 +182,7 @@ ImuNoiseResult measureImuNoise(const std::string& log) {
 std::string imuNoiseYaml(const ImuNoiseResult& result) {
   std::string text = fmt::format(
       "# Noise at rest, {:.0f} s, of the noisiest axis. swiftlet multiplies the densities itself in flight\n"
-      "# (imu.gyro_inflation, imu.accel_inflation), so do not raise them here. Other estimators want "
+      "# (imu.gyro_inflation, imu.accel_inflation), so do not raise them here. Other estimators need "
       "densities\n"
       "# 10 to 20 times as large.\n",
       result.used_seconds);
@@ -198,9 +197,9 @@ std::string imuNoiseYaml(const ImuNoiseResult& result) {
 }
 
 std::string imuNoiseText(const ImuNoiseResult& result) {
-  std::string text = fmt::format("{}: {:.0f} s at {:.1f} Hz, {:.0f} s of it at rest, {} holes\n", result.log,
+  std::string text = fmt::format("{}: {:.0f} s at {:.1f} Hz, {:.0f} s of it at rest, {} gaps\n", result.log,
                                  result.seconds, result.rate_hz, result.used_seconds, result.holes);
-  for (const std::string& motion : result.motions) text += "  moves, left out: " + motion + "\n";
+  for (const std::string& motion : result.motions) text += "  moves, excluded: " + motion + "\n";
   text += "axis      white noise density        random walk                bias instability\n";
   for (std::size_t i = 0; i < result.axis.size(); ++i) {
     const AxisNoise& a = result.axis[i];

@@ -73,8 +73,8 @@ void readBag(const std::string& path, LogWarnings& warnings, const Take& take) {
     std::uint64_t left_out = 0;
     samples = joinImu(samples, accel, left_out);
     warnings.add(path +
-                 ": gyroscope and accelerometer have topics of their own. The accelerometer is interpolated, "
-                 "which makes its white noise too small by up to a third: give a log of one topic for it");
+                 ": gyroscope and accelerometer have separate topics. The accelerometer is interpolated, "
+                 "which lowers its white noise by up to a third: give a log with a single IMU topic");
   }
   for (const ImuSample& sample : samples) take(sample);
 }
@@ -125,7 +125,7 @@ void eachImuSample(const std::string& log, const std::function<void(const ImuSam
     readRecording(log, lines, rising);
   }
   if (late > 0)
-    lines.add(fmt::format("{}: {} samples are not later than the one before, left out", log, late));
+    lines.add(fmt::format("{}: {} samples are not later than the previous one and are dropped", log, late));
   warnings.insert(warnings.end(), lines.lines().begin(), lines.lines().end());
 }
 

@@ -140,7 +140,7 @@ std::vector<std::string> StillSpans::motions(std::size_t most) const {
       ++further;
     } else {
       const Block& block = blocks_[worst];
-      lines.push_back(fmt::format("{} to {} s: {}, {:.3g} times what rest allows", i, end,
+      lines.push_back(fmt::format("{} to {} s: {}, {:.3g} times the limit for rest", i, end,
                                   kAxes[static_cast<std::size_t>(std::max(block.axis, 0))], block.times));
     }
     i = end;

@@ -76,7 +76,7 @@ Plot vectorPlot(const BoardEvidence& evidence, std::size_t camera) {
     const CellMean& mean = cells[cell.index];
     if (mean.count >= kFewestInCell) image.arrow(cell.centre, scale * mean.mean, kUsed);
   }
-  image.caption(fmt::format("mean of each cell, seen - predicted; the longest is {:.3f} px", most));
+  image.caption(fmt::format("mean of each cell, measured - predicted; the longest is {:.3f} px", most));
   return drawing(fmt::format("vectors{}", camera), "Residuals over the image",
                  fmt::format("camera {}: direction of the residuals", camera), image.svg());
 }

@@ -83,24 +83,21 @@ void addLens(const CameraSolution& solution, const BoardEvidence& evidence, std:
                                   percentile(sigmas, 1), percentile(sigmas, 0.95)));
   page.plots.push_back(heatPlot(fmt::format("uncertainty{}", c), "Uncertainty and cross-validation",
                                 who + ": uncertainty of a projected pixel", uncertainty));
-  rules.atMost(
-      who + ": uncertainty of a pixel, 95 % of the image", "px", percentile(sigmas, 0.95), good,
-      fmt::format("The lens of camera {} is not known well enough in parts of the image. Record more views "
-                  "there, close and tilted.",
-                  c));
+  rules.atMost(who + ": uncertainty of a pixel, 95 % of the image", "px", percentile(sigmas, 0.95), good,
+               fmt::format("The lens of camera {} is not determined well enough in parts of the image. "
+                           "Record more views there, close and tilted.",
+                           c));
 
   const Coverage coverage = coverageOf(evidence, c);
-  rules.atLeast(
-      who + ": part of the image with corners", "", coverage.share, kLeastCoverage,
-      fmt::format("Camera {} saw the board in {:.0f} % of its image only, least in the {} part. Move the "
-                  "board there.",
-                  c, 100 * coverage.share, coverage.emptiest));
-  rules.atMost(
-      who + ": largest mean residual of a cell, beyond chance", "corner sigma", cellBias(evidence, c),
-      kMostBias,
-      fmt::format("Residuals of camera {} have a direction in parts of the image: its lens model does not "
-                  "fit there. Look at the vectors.",
-                  c));
+  rules.atLeast(who + ": part of the image with corners", "", coverage.share, kLeastCoverage,
+                fmt::format("Camera {} saw the board only in {:.0f} % of its image, least in the {} part. "
+                            "Move the board there.",
+                            c, 100 * coverage.share, coverage.emptiest));
+  rules.atMost(who + ": largest mean residual of a cell, beyond chance", "corner sigma",
+               cellBias(evidence, c), kMostBias,
+               fmt::format("Residuals of camera {} have a systematic direction in parts of the image: its "
+                           "lens model does not fit there. See the vectors.",
+                           c));
   if (!hasHalves(camera)) return;
   const auto difference = projectionDifference(camera.halves[0], camera.halves[1], pixels, coverage.cells);
   std::vector<double> sizes;
@@ -199,10 +196,10 @@ CalibrationPage cameraPage(const CameraSolution& solution, const CalibrationTarg
     page.words.push_back(fmt::format("Camera {}: {}", c, solution.camera[c].why_this_model));
   }
   rules.atMost("corner sigma", "px per axis", solution.corner_sigma, kMostCornerSigma * focal,
-               "Corners scatter more than usual. Use a shorter exposure, more light and a sharp print.");
+               "The corner noise is high. Use a shorter exposure, more light and a sharp print.");
   rules.atMost(
-      "corners left out", "", outlierShare(evidence), kMostOutliers,
-      "Many corners were left out. Look at the outliers: reflections, blur, a bent board or a wrong target.");
+      "corners rejected", "", outlierShare(evidence), kMostOutliers,
+      "Many corners were rejected. Check the outliers: reflections, blur, a bent board or a wrong target.");
   for (std::size_t c = 0; c < solution.camera_count; ++c) addLens(solution, evidence, c, rules, page);
   if (solution.camera_count > 1) {
     const double baseline = solution.T_cam1_cam0.translation.norm();
@@ -210,13 +207,14 @@ CalibrationPage cameraPage(const CameraSolution& solution, const CalibrationTarg
     const double turn = std::sqrt(solution.stereo_covariance.diagonal().head<3>().maxCoeff());
     rules.atMost("camera to camera: rotation, 1 sigma", "deg", kToDegrees * turn,
                  kToDegrees * kStereoAngle * std::max(1.0, baseline / kPerBaseline),
-                 "The rotation between the cameras is not known well enough. Record views in which both see "
-                 "the board.");
+                 "The rotation between the cameras is not determined well enough. Record views in which both "
+                 "see the board.");
     const Eigen::Vector3d along = solution.T_cam1_cam0.translation.normalized();
     const double length = std::sqrt(along.dot(solution.stereo_covariance.bottomRightCorner<3, 3>() * along));
-    rules.atMost(
-        "camera to camera: baseline, 1 sigma", "mm", kToMilli * length, kToMilli * kStereoLength * baseline,
-        "The baseline is not known well enough. Record close views in which both cameras see the board.");
+    rules.atMost("camera to camera: baseline, 1 sigma", "mm", kToMilli * length,
+                 kToMilli * kStereoLength * baseline,
+                 "The baseline is not determined well enough. Record close views in which both cameras see "
+                 "the board.");
   }
   addValues(solution, page);
   rules.finish(solution.reasons, page);

@@ -46,11 +46,11 @@ CalibrationPage checkPage(const CheckResult& result) {
                  : result.verdict == CheckVerdict::kMoved ? PageVerdict::kRepeat
                                                           : PageVerdict::kUsable;
   page.verdict_text = fmt::format("The calibration {}.", result.verdict == CheckVerdict::kCannotTell
-                                                             ? "cannot be judged by this flight"
+                                                             ? "cannot be checked with this flight"
                                                              : name(result.verdict));
   page.words = result.because;
   Table values{"values",
-               "What the flight says",
+               "Results of the flight",
                {"what", "file", "flight - file", "1 sigma", "limit", "unit", "effect", "verdict"},
                {},
                false};

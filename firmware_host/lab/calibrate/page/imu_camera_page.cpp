@@ -30,8 +30,8 @@ double largestSigma(const ImuCameraSolution& solution, const std::string& part, 
 Plot residualPlot(const ImuCameraSolution& solution, bool gyro) {
   Plot plot;
   plot.id = gyro ? "gyro_residual" : "accel_residual";
-  plot.group = "Residuals of the IMU";
-  plot.title = gyro ? "Gyro less spline" : "Accelerometer less spline";
+  plot.group = "IMU residuals";
+  plot.title = gyro ? "Gyro minus spline" : "Accelerometer minus spline";
   plot.x_label = "s";
   plot.y_label = gyro ? "rad/s" : "m/s^2";
   constexpr std::array<const char*, 3> kAxes = {"x", "y", "z"};
@@ -64,37 +64,36 @@ CalibrationPage imuCameraPage(const ImuCameraSolution& solution, const Calibrati
 
   PageRules rules;
   if (evidence.camera_count == 0 || evidence.camera[0].width() == 0) {
-    rules.finish({"Nothing was found."}, page);
+    rules.finish({"No solution was found."}, page);
     page.words.insert(page.words.end(), solution.reasons.begin(), solution.reasons.end());
     return page;
   }
   for (const auto& [what, sigma] :
        {std::pair{"gyro", solution.gyro_sigma}, {"accelerometer", solution.accel_sigma}}) {
-    rules.atMost(
-        fmt::format("{} residual over its noise", what), "", sigma, kMostImuSigma,
-        fmt::format("The {} fits the motion worse than its noise says: vibration, a wrong noise density, a "
-                    "loose mount or stamps that jitter. Look at its residuals over time.",
-                    what));
+    rules.atMost(fmt::format("{} residual relative to its noise", what), "", sigma, kMostImuSigma,
+                 fmt::format("The {} fits the motion worse than its noise density allows: vibration, a wrong "
+                             "noise density, a loose mount or stamp jitter. Check its residuals over time.",
+                             what));
     rules.atLeast(
-        fmt::format("{} residual over its noise", what), "", sigma, kLeastImuSigma,
-        fmt::format("The {} is quieter than the noise given for it: its densities are too large, and the "
-                    "sigmas here with them. Measure them with `swiftlet calibrate imu-noise`.",
+        fmt::format("{} residual relative to its noise", what), "", sigma, kLeastImuSigma,
+        fmt::format("The {} is quieter than its given noise density: the densities, and with them the sigmas "
+                    "here, are too large. Measure them with `swiftlet calibrate imu-noise`.",
                     what));
   }
   rules.atMost(
-      "corners left out", "", outlierShare(evidence), kMostOutliers,
-      "Many corners were left out. Look at the outliers: reflections, blur, a bent board or a wrong target.");
+      "corners rejected", "", outlierShare(evidence), kMostOutliers,
+      "Many corners were rejected. Check the outliers: reflections, blur, a bent board or a wrong target.");
   rules.atMost("camera to IMU: rotation, 1 sigma", "deg", largestSigma(solution, "rotation", "deg"),
                kRotationSigma,
-               "The rotation from the cameras to the IMU is not known well enough. Turn the rig faster about "
-               "all axes.");
+               "The rotation from the cameras to the IMU is not determined well enough. Rotate the rig "
+               "faster about all axes.");
   rules.atMost("camera to IMU: position, 1 sigma", "mm", largestSigma(solution, "T_body_cam", "mm"),
                kPositionSigma,
-               "The position of the cameras on the IMU is not known well enough. Turn the rig faster about "
-               "all axes, near "
-               "the board.");
-  rules.atMost("time offset, 1 sigma", "ms", largestSigma(solution, "", "ms"), kTimeSigma,
-               "The time offset is not known well enough. Move the rig with quick changes of direction.");
+               "The position of the cameras on the IMU is not determined well enough. Rotate the rig faster "
+               "about all axes, near the board.");
+  rules.atMost(
+      "time offset, 1 sigma", "ms", largestSigma(solution, "", "ms"), kTimeSigma,
+      "The time offset is not determined well enough. Move the rig with quick changes of direction.");
   Table values{"values", "Values", {"what", "value", "1 sigma", "unit"}, {}, false};
   for (const SolvedValue& value : solution.values) {
     values.rows.push_back(

@@ -43,11 +43,12 @@ CalibrationPage imuNoisePage(const ImuNoiseResult& result) {
   CalibrationPage page;
   page.name = "Noise of the IMU of " + result.log;
   page.verdict = result.remarks.empty() ? PageVerdict::kGood : PageVerdict::kUsable;
-  page.verdict_text = result.remarks.empty() ? "Good: white noise and random walk of every axis are known."
-                                             : "Usable, with limits:";
+  page.verdict_text = result.remarks.empty()
+                          ? "Good: white noise and random walk are determined for every axis."
+                          : "Usable, with limits:";
   for (const std::string& remark : result.remarks) page.words.push_back(remark + ".");
   for (const std::string& motion : result.motions)
-    page.words.push_back("It moves and is left out: " + motion + ".");
+    page.words.push_back("Moving parts of the log are excluded: " + motion + ".");
   page.plots = {deviationPlot(result, 0), deviationPlot(result, 3)};
   Table table{"noise",
               "Noise",

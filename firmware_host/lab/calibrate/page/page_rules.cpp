@@ -33,7 +33,7 @@ void PageRules::finish(const std::vector<std::string>& reasons, CalibrationPage&
     page.verdict_text = "Usable, but it can be better.";
   } else {
     page.verdict = PageVerdict::kGood;
-    page.verdict_text = "Good: every rule is kept.";
+    page.verdict_text = "Good: all rules are met.";
   }
   page.words.insert(page.words.end(), reasons.begin(), reasons.end());
   page.words.insert(page.words.end(), broken.begin(), broken.end());
