@@ -1,5 +1,5 @@
 #pragma once
-// What a run could not write: said once on stderr, kept for who asks. The run goes on.
+// Files that a run could not write: reported once on stderr and kept for later queries. The run continues.
 //
 // Threads: add() any, problem() and count() any, also while add() runs. Fixed memory, no lock.
 

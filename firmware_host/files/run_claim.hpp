@@ -1,11 +1,10 @@
 #pragma once
-// Whose a run folder is, and what may be removed from it.
+// Ownership of a run folder, and which files may be removed from it.
 //
-// A run that begins writes `swiftlet_run.txt` into its folder, with the one word "replay" or "flight". Files
-// of an earlier replay are replaced by a later one. Never without being told to: those of a flight, and files
-// under a run's names in a folder without that mark. Only files of the names that a run writes are ever
-// removed, whatever else lies beside them.
-// Errors: InputError with the folder or file, the reason and the remedy. Host side.
+// A run writes `swiftlet_run.txt` into its folder, with the word "replay" or "flight". A later replay
+// replaces the files of an earlier one. Files of a flight, and files with a run's names in a folder without
+// that mark, are replaced only on request. Only files with the names of a run's files are ever removed; other
+// files in the folder stay. Errors: InputError with the folder or file, the reason and the remedy. Host side.
 
 #include <cstdint>
 #include <ctime>

@@ -51,7 +51,7 @@ class FrameQueue {
   [[nodiscard]] bool awaitsSamples();
   /// Gives the front frame's images back, and those before them.
   void pop();
-  /// The same where nobody took it, counted.
+  /// The same for a frame that was not taken; counted.
   void drop();
   /// The input has ended: what waits for a partner comes to the queue alone. False: nothing waited.
   bool flush();

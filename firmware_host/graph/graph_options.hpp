@@ -35,8 +35,8 @@ struct GraphOptions {
   /// Puts the kept map's volume into that of the map, by where the graph's nodes had it; empty: there is
   /// none.
   std::function<void(MapSubmaps&, std::span<const WorldInMap> nodes)> kept_volume;
-  /// For which `track` waits, after a frame's arrival, for the samples up to its stamp, on the host's
-  /// clock; 0: never, for then whoever feeds the graph hands them over first.
+  /// Longest wait of `track` after a frame's arrival for the samples up to its stamp, on the host's clock. 0:
+  /// no wait, the caller feeds the samples first.
   Duration sample_patience{0};
   LiveOutlets outlets;  ///< each gets the newest of everything; they outlive the graph
   /// Over which labels come after their image; the map holds frames for them. Null: it does not wait.

@@ -1,9 +1,8 @@
 #pragma once
-// Frames that the map holds back until their labels come over a LabelExchange, in their order: the oldest is
-// mapped when its labels are there, when they have not come in time, when nobody is there who could send
-// them, or when there is no room to wait. All of it is the map thread's; images, depth and labels are copies,
-// so that nothing of the flight path's is held. Memory: LabelExchange::kPlaces images of camera 1, labels and
-// depth images.
+// Frames that the map holds until their labels arrive over a LabelExchange, in order. The oldest is mapped
+// when its labels arrive, when they are late, when no labeller is connected, or when there is no room to
+// wait. Used by the map's thread only; images, depth and labels are copies, so no memory of the flight path
+// is held. Memory: LabelExchange::kPlaces images of camera 1, labels and depth images.
 
 #include <cstdint>
 #include <vector>

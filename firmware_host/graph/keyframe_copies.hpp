@@ -20,10 +20,10 @@ class KeyframeCopies {
   /// `pixels`: of each camera's image.
   void to(LoopImagesIn& in, const std::array<std::size_t, kMaxCameras>& pixels) { lend(in, loop_, pixels); }
   void to(MapImagesIn& in, const std::array<std::size_t, kMaxCameras>& pixels) { lend(in, map_, pixels); }
-  /// Whether the map gets them; where nobody is connected, nothing happens.
+  /// Returns whether the map receives the images; does nothing if no reader is connected.
   bool send(const StereoFrame& frame, bool to_loop, bool to_map);
-  /// Recorded schedule: images are at hand wherever they are asked for, so none is copied; whether the map
-  /// gets those of the next frame.
+  /// Recorded schedule: images are available on request, so none is copied. Whether the map receives those of
+  /// the next frame.
   void tell(bool mapped) { told_ = mapped; }
 
  private:

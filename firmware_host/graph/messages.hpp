@@ -60,7 +60,7 @@ struct TrackMessage {
   bool mapped = false;   ///< its images have gone to the map
 };
 
-/// What `smooth` publishes: for the log, and whoever else follows the estimate.
+/// Output of `smooth`, for the log and for all that follow the estimate.
 struct FrameResult {
   TrackMessage::Kind kind = TrackMessage::Kind::kFrame;
   Status track_status;

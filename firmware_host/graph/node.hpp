@@ -1,11 +1,11 @@
 #pragma once
-// What every node of the graph is: a stage with the ends of its arrows, stepped by a schedule.
+// A node of the graph: a stage with the ends of its arrows, stepped by a schedule.
 //
-// A node takes what waits on its arrows in turn(), at most one frame, and says whether it did anything. It
-// has ended (done) when the nodes before it have and nothing waits. A schedule calls turn from one thread:
-// all nodes from the same (lockstep, recorded), or each from its own (threaded).
+// In turn() a node takes what is queued on its arrows, at most one frame, and returns whether it did
+// anything. It is done when the nodes before it are done and nothing is queued. A schedule calls turn() from
+// one thread: all nodes from the same thread (lockstep, recorded), or each from its own (threaded).
 //
-// A new node: a class in a file of its own, its arrows in graph.cpp, its file in the CMake list.
+// A new node needs a class in its own file, its arrows in graph.cpp, and its file in the CMake list.
 
 #include <atomic>
 #include <cstdint>
@@ -22,7 +22,7 @@ namespace swiftlet {
 
 struct RunStatistics;
 
-/// Which real-time priority a node gets on a thread of its own.
+/// Real-time priority of a node that runs on its own thread.
 enum class Rank : std::uint8_t { kSensor, kPropagate, kTrack, kSmooth, kMesh, kLow };
 
 class Node {
@@ -43,14 +43,14 @@ class Node {
   /// What its arrows lost, by counter; at the end.
   virtual void addLosses(std::map<std::string, std::uint64_t>& losses) const;
 
-  /// Any thread: it does nothing any more, and nobody waits for it.
+  /// Any thread: the node does nothing from now on, and no other node waits for it.
   [[nodiscard]] bool done() const { return done_.load(std::memory_order_acquire); }
   /// Any thread: its thread has ended before its time, or stands still. Those behind it end as if it had.
   void abandon() {
     abandoned_.store(true, std::memory_order_relaxed);
     finish();
   }
-  /// Any thread, once done: not by itself.
+  /// Any thread, when done: the node was abandoned before it had finished.
   [[nodiscard]] bool wasAbandoned() const { return abandoned_.load(std::memory_order_relaxed); }
   /// Of the schedule, at the end: its thread is stuck and may go on at any time, so that nothing of it is
   /// read.

@@ -174,8 +174,8 @@ class SlotIn final : public In {
     loan = pool_->borrow(handle, kReader);
     return true;
   }
-  /// Reader. The slot of this key, held until find is asked for a later one or clear; older ones go back,
-  /// newer ones stay for later. Null where it is not there.
+  /// Reader. The slot with this key, held until find is called for a later one or clear is called; older
+  /// slots are returned, newer ones are kept. Null if it is not there.
   template <typename Key, typename KeyOf>
   const Slot* find(const Key& wanted, KeyOf&& keyOf) {
     if (told_) return *told_ != nullptr && keyOf(**told_) == wanted ? *told_ : nullptr;
@@ -228,7 +228,7 @@ class Out {
     return true;
   }
 
-  /// Nobody reads any more.
+  /// The reader has ended.
   [[nodiscard]] bool readersDone() const {
     for (const InOf<T>* in : readers_) {
       if (!in->reader().done()) return false;

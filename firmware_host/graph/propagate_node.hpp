@@ -27,8 +27,8 @@ class PropagateNode final : public Node {
   bool turn() override;
   /// Any thread: states so far.
   [[nodiscard]] std::uint64_t stateCount() const { return states_given_.value(); }
-  /// One thread: the health of the newest state when this was last called, or of a later one. Where nobody
-  /// gets the states, this has the next one made.
+  /// One thread: the health of the newest state at the last call, or of a later one. If no reader receives
+  /// the states, this call requests the next one.
   [[nodiscard]] Health askHealth() {
     health_wanted_.store(true, std::memory_order_relaxed);
     return health_.load(std::memory_order_relaxed);

@@ -1,8 +1,9 @@
 #pragma once
-// The node `record`: everything that entered the estimator, and what each stage took for a step, to the
-// flight recorder, in the order of arrival.
+// The node `record`: writes everything that entered the estimator, and what each stage used for a step, to
+// the flight recorder, in order of arrival.
 //
-// When it falls behind: records are lost, counted, and the recording says where. Nobody waits for it.
+// When it falls behind, records are lost and counted, and the recording notes the position. No thread waits
+// for it.
 
 #include <array>
 

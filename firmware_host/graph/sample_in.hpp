@@ -50,7 +50,7 @@ class SampleIn final : public QueueIn<ImuArrival, kImuRing> {
   /// Of the newest sample taken.
   [[nodiscard]] std::uint32_t timeline() const { return timeline_; }
 
-  /// Recorded schedule: takeUntil takes samples up to this number, whatever their stamps.
+  /// Recorded schedule: takeUntil takes samples up to this number regardless of their stamps.
   void limit(std::uint64_t number) { limit_ = number; }
   static constexpr std::uint64_t kNoLimit = ~std::uint64_t{0};
 

@@ -59,7 +59,7 @@ class SensorNode final : public Node {
 
   /// Once the sensors have ended.
   struct Counters {
-    std::uint64_t samples = 0;           ///< those held out included; of images likewise
+    std::uint64_t samples = 0;           ///< including those held out; the same for images
     std::uint64_t samples_held_out = 0;  ///< stamps far ahead
     std::array<std::uint64_t, kMaxCameras> images{};
     std::array<std::uint64_t, kMaxCameras> images_held_out{};  ///< stamps far from the IMU's

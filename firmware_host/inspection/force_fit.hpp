@@ -25,7 +25,7 @@ struct ForceFit {
   double error = 0;            ///< px, geometric mean over the windows of the points' root mean square errors
   std::vector<double> errors;  ///< px, of each window
 
-  /// Whether nearly every window has a smaller error than in the other fit, whatever it is in sum.
+  /// Whether nearly every window has a smaller error than in the other fit, regardless of the sum.
   [[nodiscard]] bool beats(const ForceFit& other) const;
 };
 

@@ -8,7 +8,7 @@
 
 namespace swiftlet {
 
-/// Of the section that the request wants. InputError where the log cannot be read.
+/// Inspects the requested section. InputError if the log cannot be read.
 InspectionReport inspectLog(const LogRequest& request, const Settings& settings, std::size_t most_images);
 
 }  // namespace swiftlet

@@ -1,10 +1,10 @@
 #pragma once
-// Finds mistakes in units, axes, clocks and calibration by what samples and images say of each other.
+// Finds mistakes in units, axes, clocks and calibration by comparing samples and images.
 //
-// Takes the messages of a log or of devices in the order of their stamps, and says at the end what does not
-// fit together. Nothing is said where the motion does not tell: at rest, or without enough turns.
-// Methods and thresholds: docs/inspection.md.
-// Memory: 56 bytes a sample, 2 KB an image. Cost: some 3 ms an image that is taken.
+// Takes the messages of a log or of devices in the order of their stamps and reports at the end what does not
+// fit together. Nothing is reported if the motion does not allow a decision: at rest, or with too little
+// rotation. Methods and thresholds: docs/inspection.md. Memory: 56 bytes per sample, 2 KB per image. Cost:
+// some 3 ms per image used.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -35,8 +35,8 @@ class Inspection {
   Inspection(const Calibration& calibration, std::size_t most_images);
 
   void add(const ImuSample& sample);
-  /// To be asked once for each image, before it is decoded: whether add() wants it. Images of camera 0 are
-  /// wanted in the first two seconds and where the gyro moves, those of camera 1 now and then.
+  /// Call once for each image before decoding it: whether add() needs it. Images of camera 0 are needed in
+  /// the first two seconds and while the gyro moves, those of camera 1 now and then.
   bool wants(Stamp stamp, std::uint32_t camera);
   void add(const CameraFrame& frame);
   /// Nothing more is needed.

@@ -1,10 +1,10 @@
 #pragma once
-// The gyro beside the camera: which time shift, axes and unit make one's turns the other's.
+// The gyro compared with the camera: the time shift, axes and unit that map one's rotations to the other's.
 //
 // Model: turn_k = Q s (G(t_k + shift) - G(t_k-1 + shift)) + b (t_k - t_k-1), with an orthogonal Q, a scale s
-// and an offset b; G is the gyro's integral. The shift is found by a scan over all of +-kMaxShift with a free
-// 3 x 3 matrix in place of Q s, so that no mistake in axes or unit hides it. Weights are robust (Cauchy).
-// Q: Kabsch, once with determinant 1 and once with -1, which only left-handed axes want.
+// and an offset b; G is the gyro's integral. The shift is found by a scan over +-kMaxShift with a free 3 x 3
+// matrix instead of Q s, so that no mistake in axes or unit hides it. Weights are robust (Cauchy). Q: Kabsch,
+// once with determinant 1 and once with -1, which only left-handed axes need.
 
 #include <Eigen/Core>
 #include <cmath>

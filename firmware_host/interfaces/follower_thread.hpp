@@ -1,8 +1,8 @@
 #pragma once
-// A thread beside a run that follows it at its own pace: who reads a LiveOutlet. It beats at each turn.
+// A thread that follows a run at its own pace by reading a LiveOutlet. It beats at each turn.
 //
-// To be declared after all that its entry uses. Whoever owns it calls end(); where that gives the thread up,
-// all that the entry uses has to stay for good, this object included: the owner leaks it on purpose.
+// Declare it after everything that its entry uses. The owner calls end(). If end() abandons the thread,
+// everything that the entry uses must stay alive, this object included: the owner leaks it on purpose.
 
 #include <atomic>
 #include <functional>
@@ -26,7 +26,8 @@ class FollowerThread {
   FollowerThread(const FollowerThread&) = delete;
   FollowerThread& operator=(const FollowerThread&) = delete;
 
-  /// InputError of `file` and `field`, which asked for it, where there is no thread.
+  /// Throws InputError with `file` and `field`, the setting that requested it, if the thread cannot be
+  /// started.
   void start(const ThreadSettings& settings, const std::string& file, const std::string& field,
              std::function<void()> entry);
   /// Waits for the entry to return, which looks at ending(). False: it did not within `limit` and is given
@@ -47,8 +48,8 @@ class FollowerThread {
   /// came late does not hurry after.
   void repeat(double period, const std::function<void(double now)>& work);
 
-  /// For tests, which throw and stall there: called on each follower's thread at each turn; false: it returns
-  /// early. Null: nobody is.
+  /// For tests that throw or stall inside the thread: called on each follower's thread at each turn;
+  /// returning false ends the thread early. Null: not called.
   static void watchTurns(bool (*watch)(const char* thread));
 
  private:

@@ -1,13 +1,13 @@
 #pragma once
-// Images that the map waits to see labelled: they go out to whoever labels them, labels come back by stamp.
+// Exchange of images and labels: the map's images go to a labelling network, labels return by stamp.
 //
-// Two threads. The map's opens a place for each frame that it holds and closes it when it maps the frame; the
-// other side (ROS 2's) shows the image of each open place once and offers labels. Labels are copied straight
-// into the place that waits for their stamp, exactly; nobody else's can push them out. Labels that are ahead
-// of the map's frames (of one who watches the camera himself) wait at the other side's: the last kEarly of
-// them. All others are counted and dropped. Neither side ever waits for the other: a place that the other
-// side works on is not closed now, and the map comes again. Memory: kPlaces images and labels, kEarly labels,
-// of camera 0's size. Cost: of an offer that nobody waits for a comparison a place, else a copy.
+// Two threads. The map's thread opens a place for each frame that it holds and closes it when it maps the
+// frame; the other side (ROS 2) shows the image of each open place once and offers labels. Labels are copied
+// into the place with exactly their stamp; labels of other stamps cannot replace them. Labels ahead of the
+// map's frames (from a network that reads the camera itself) are kept on the other side, the last kEarly of
+// them. All others are counted and dropped. Neither side waits for the other: a place that the other side is
+// using is not closed, and the map tries again later. Memory: kPlaces images and labels, kEarly labels, of
+// camera 0's size. Cost of an offer: one comparison per place if no place matches, else a copy.
 
 #include <array>
 #include <atomic>
@@ -90,7 +90,7 @@ class LabelExchange {
   };
   struct Place {
     std::atomic<State> state{State::kFree};
-    Stamp stamp;               ///< of whoever has the place: the map's, the other side's while kBusy
+    Stamp stamp;  ///< owned by the side that holds the place: the map, or the other side while kBusy
     std::uint64_t number = 0;  ///< from 1, in the order of opening
     bool labelled = false;
     std::vector<std::uint8_t> image, labels;

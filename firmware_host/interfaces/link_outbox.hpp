@@ -1,11 +1,12 @@
 #pragma once
-// What one thread wants sent over a link that another thread owns: an autopilot's outlet over the IMU's link.
+// Messages that one thread sends over a link owned by another thread: an autopilot's outlet over the IMU's
+// link.
 //
-// The owner alone reads from and writes to the port, so no frame is cut by another's, and it never waits for
-// the sender: it takes what is there when it is woken. Each push is sent whole or not at all.
-// Full: the push is refused. Unattended (the owner does not run, or its port is gone): the sender should not
-// push; what waits is thrown away when the port is back.
-// Threads: one sender (attended, push), one owner (the others). Memory: 12 kB inside the object.
+// Only the owner reads and writes the port, so frames are never mixed. The owner never waits for the sender:
+// it takes what is queued when it wakes. Each push is sent completely or not at all. Full: the push is
+// refused. Unattended (the owner is not running, or its port is gone): the sender should not push; queued
+// messages are dropped when the port returns. Threads: one sender (attended, push), one owner (the others).
+// Memory: 12 kB inside the object.
 
 #include <sys/eventfd.h>
 #include <unistd.h>

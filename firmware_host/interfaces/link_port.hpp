@@ -1,15 +1,14 @@
 #pragma once
-// A link as raw bytes: a serial port, or UDP datagrams. Nothing waits but wait().
+// A link as raw bytes: a serial port or UDP datagrams. Only wait() blocks.
 //
-// Named as the settings do: `/dev/ttyS1`, `udp:HOST:PORT`, or `udp:HOST:PORT@OWN_PORT` where the other side
-// sends to a port that was agreed on. Datagrams of others than HOST are not read; without OWN_PORT, none of
-// other ports of HOST than PORT either. The kernel drops them: they wake nobody. With OWN_PORT, answers go to
-// the port that the newest MAVLink datagram came from; until one comes, to PORT.
-// Writes are whole: what a serial port has no room for is kept and goes first, and the next write is refused
-// until it has gone, so no frame is cut and none is mixed into another.
-// A serial port that goes away gives kUnplugged until open() finds it again; UDP knows no such thing, and
-// what nobody takes is lost. Threads: one at a time. Memory: 2 kB inside the object, nothing allocated after
-// open().
+// Names are those of the settings: `/dev/ttyS1`, `udp:HOST:PORT`, or `udp:HOST:PORT@OWN_PORT` if the other
+// side sends to an agreed port. Datagrams from other hosts are not read; without OWN_PORT, datagrams from
+// other ports of HOST are not read either. The kernel drops them, so they wake no thread. With OWN_PORT,
+// answers go to the port of the newest MAVLink datagram, before the first one to PORT. Writes are complete:
+// bytes that a serial port has no room for are kept and sent first, and the next write is refused until they
+// are sent, so frames are neither cut nor mixed. A serial port that disappears gives kUnplugged until open()
+// finds it again. UDP cannot detect this: datagrams without a receiver are lost. Threads: one at a time.
+// Memory: 2 kB inside the object, no allocation after open().
 
 #include <netinet/in.h>
 
@@ -49,7 +48,7 @@ class LinkPort {
   LinkPort(const LinkPort&) = delete;
   LinkPort& operator=(const LinkPort&) = delete;
 
-  /// Opens, or opens anew. Looks the host up, which may take seconds, the first time only.
+  /// Opens or reopens the port. The first call resolves the host name, which may take seconds.
   DeviceFault open();
   void close();
   [[nodiscard]] bool isOpen() const { return descriptor() >= 0; }

@@ -1,6 +1,6 @@
 #pragma once
-// The newest of what a run finds, for one thread outside of the graph (ROS 2's topics, an autopilot, the
-// live view): it takes what is newest at its own pace and nobody waits for it. Memory: three of each value.
+// The newest results of a run for one thread outside the graph (ROS 2 topics, an autopilot, the live view).
+// The reader takes them at its own pace; writers never wait for it. Memory: three of each value.
 
 #include <atomic>
 #include <cstdint>
@@ -54,7 +54,7 @@ struct LiveOutlet {
   Newest<SurfaceNews> surface;       ///< of `map`, each time that surface_wanted is set
   std::atomic<bool> surface_wanted{false};
   Newest<ObstacleNews> obstacle;  ///< of `map`: with every frame that is mapped
-  Newest<Verdict> verdict;        ///< of the supervisor, ten times a second: who reads it asks for its age
+  Newest<Verdict> verdict;        ///< of the supervisor, ten times a second: readers check its age
 };
 
 /// One for each thread that listens.

@@ -1,5 +1,5 @@
 #pragma once
-// What whoever waits for a run may want of it.
+// How a caller stops a run and follows its progress.
 
 #include <atomic>
 #include <cstdint>

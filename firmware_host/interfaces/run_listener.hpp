@@ -77,7 +77,7 @@ struct HeldFrameCounters {
   std::uint64_t labelled = 0;    ///< frames mapped with labels that came in time
   std::uint64_t late = 0;        ///< without: they did not come in time
   std::uint64_t no_room = 0;     ///< without: too many others waited behind it
-  std::uint64_t nobody = 0;      ///< without: nobody was there to label it
+  std::uint64_t nobody = 0;      ///< mapped without labels: no labeller was connected
   std::uint64_t longest_ms = 0;  ///< that a frame was held
 };
 

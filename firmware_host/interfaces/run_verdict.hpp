@@ -1,8 +1,7 @@
 #pragma once
-// What is said of a whole run in the end: how long it was trusted, and what to look at first where it was
-// not.
+// Verdict over a whole run: how long the estimate was good, and what to check first if it was not.
 //
-// Added to frame by frame; constant memory.
+// Frames are added one by one; constant memory.
 
 #include <array>
 #include <map>
@@ -40,7 +39,7 @@ class RunVerdict {
   std::uint32_t resets_ = 0;
   double state_seconds_ = 0;
   double pixel_sigma_s_ = 0;                                    ///< px s, over the time with a state
-  double gyro_factor_s_ = 0, accel_factor_s_ = 0;               ///< s, likewise
+  double gyro_factor_s_ = 0, accel_factor_s_ = 0;               ///< s, over the time with a state
   double first_pixel_sigma_ = 0;                                ///< as set
   double pose_variance_factor_s_ = 0;                           ///< s, over the time with a state
   double top_speed_ = 0;                                        ///< m/s

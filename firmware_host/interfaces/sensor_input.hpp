@@ -1,10 +1,10 @@
 #pragma once
-// What feeds a threaded run: a log let out at its times (log_player.hpp), or devices
+// Input of a threaded run: a log played at its recorded times (log_player.hpp), or devices
 // (firmware_host/inputs/devices).
 //
-// An input brings its own threads, one for each device; the executor starts them, at the level that each has,
-// and ends the run when the last has ended. Each hands its messages to the sink from its own thread: those of
-// the IMU from one, those of a camera from one (a thread may have two cameras).
+// An input has one thread per device. The executor starts the threads at their levels and ends the run when
+// the last one has ended. Each thread hands its messages to the sink: all IMU messages from one thread, all
+// messages of a camera from one thread (a thread may serve two cameras).
 
 #include <cstdint>
 #include <functional>
@@ -48,7 +48,7 @@ class SensorInput {
     const char* name = "";
     Level level = Level::kSensor;
     std::function<void()> run;
-    /// Beats at each turn of one that returns only when it is told to; null: nobody watches it.
+    /// Beats at each turn of a thread that runs until it is stopped; null: not supervised.
     Heartbeat* heart = nullptr;
   };
 

@@ -37,8 +37,8 @@ namespace swiftlet {
 inline constexpr std::size_t kMaxEffortLevels = 16;
 using EffortLadder = FixedVector<Effort, kMaxEffortLevels>;
 
-/// Features fall by a quarter a level, to 40 (the pose of a frame is well determined by fewer, but not
-/// through the turnover of a fast turn), or not at all if `full` has no more.
+/// Features decrease by a quarter per level, down to 40 (fewer would determine a frame's pose, but not
+/// survive the turnover of a fast rotation), or not at all if `full` has fewer.
 EffortLadder trackerLadder(const Effort& full);
 /// Iterations by halves to 1, then features by a quarter three times (at least 40), then keyframes by
 /// a quarter to 5.

@@ -1,17 +1,18 @@
 #pragma once
-// A thread as the flight path needs it: a name, a real-time priority, a CPU and a stack that is fixed and
-// touched in advance. What it got is a value; a missing right is no error.
+// A thread for the flight path: name, real-time priority, CPU, and a fixed stack that is touched in advance.
+// The result is reported as a value; a missing permission is not an error.
 //
-// Where the right to SCHED_FIFO is missing the thread runs under SCHED_OTHER, where the CPU does not exist
-// or may not be used it runs on any, and the report says what is missing and how to get it. Whether that is
-// good enough is not decided here (ready_to_arm.hpp).
+// Without permission for SCHED_FIFO the thread runs under SCHED_OTHER; if the CPU does not exist or is not
+// allowed it runs on any CPU. The report says what is missing and how to get it. ready_to_arm.hpp decides
+// whether that is good enough.
 //
-// Memory: the stack is a mapping of its own with a guard page below, written before the thread begins: every
-//   page is resident then.
-// Exceptions: what escapes from `entry` ends the thread and is kept as text (fault()); nothing crosses.
-// Sleeps are exact: the thread's timer slack is 1 ns (SCHED_OTHER would have 50 us).
-// Stuck: joinWithin() waits for a bounded time, and abandon() leaves the thread to itself. Its stack and
-//   entry stay for good. What the entry refers to has to stay as well; that is the owner's matter.
+// - Memory: the stack is a separate mapping with a guard page below it. It is written before the thread
+//   starts, so every page is resident.
+// - Exceptions: an exception that escapes `entry` ends the thread and is kept as text (fault()); it does not
+//   reach the caller.
+// - Sleeps are exact: the thread's timer slack is 1 ns (50 us by default under SCHED_OTHER).
+// - Stuck threads: joinWithin() waits for a bounded time, abandon() gives the thread up. Its stack and entry
+//   then stay allocated. The owner must keep everything that the entry uses.
 
 #include <pthread.h>
 #include <sys/types.h>
@@ -36,7 +37,7 @@ inline constexpr std::size_t kFlightStackBytes = std::size_t{2} * 1024 * 1024;
 
 enum class ThreadPolicy {
   kOther,  ///< SCHED_OTHER: shares time with everything else
-  kFifo,   ///< SCHED_FIFO: runs until it sleeps or a higher priority wants the CPU
+  kFifo,   ///< SCHED_FIFO: runs until it sleeps or a higher priority needs the CPU
 };
 
 /// "SCHED_OTHER", "SCHED_FIFO".
@@ -67,7 +68,7 @@ struct ThreadReport {
   std::size_t stack_bytes = 0;
   bool started = false;
   std::string message;  ///< what is missing and the remedy, one sentence each; empty: all as wanted
-  PageFaults faults;    ///< of its entry; whoever ends the thread fills them in
+  PageFaults faults;    ///< of its entry; filled in when the thread is ended
 
   /// It runs, with the policy and priority that it was to have.
   [[nodiscard]] bool hasPriority() const {
@@ -83,7 +84,7 @@ std::string describe(const ThreadReport& report);
 class FlightThread {
  public:
   FlightThread() = default;
-  /// Joins, unless it was abandoned: whoever owns the thread has told it to end before.
+  /// Joins unless the thread was abandoned. The owner must have asked it to end before.
   ~FlightThread();
   FlightThread(const FlightThread&) = delete;
   FlightThread& operator=(const FlightThread&) = delete;
@@ -105,8 +106,8 @@ class FlightThread {
   /// all. Opens a file: not for the flight path.
   [[nodiscard]] PageFaults pageFaults() const;
 
-  /// For tests, which arm their traps: called on each thread of the program as its entry begins and ends.
-  /// Null: nobody is.
+  /// For tests that arm allocation traps: called on each thread of the program when its entry begins and
+  /// ends. Null: not called.
   static void watchAll(void (*watch)(const char* thread, bool begins));
 
  private:

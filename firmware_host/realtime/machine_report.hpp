@@ -11,7 +11,7 @@ namespace swiftlet {
 
 enum class MachineVerdict {
   kGood,
-  kNote,     ///< no harm by itself; worth knowing when figures surprise
+  kNote,     ///< harmless; useful if measurements surprise
   kPoor,     ///< costs latency: see the remedy
   kUnknown,  ///< the machine does not say
 };
@@ -37,9 +37,9 @@ struct MachineReport {
 };
 
 /// Lines: "real-time throttling", "real-time priority", "locked memory", "preemption", "CPUs", "CPU
-/// governor", "idle states", "interrupts", "CPU quota", "real-time quota" (control groups of version 1),
-/// "clock". `root` stands in front of every path that is read ("" is this machine, a folder with the same
-/// files a test's). `priority` is the highest that the flight threads want.
+/// governor", "idle states", "interrupts", "CPU quota", "real-time quota" (version 1 control groups),
+/// "clock". `root` is the prefix of every path that is read ("" for this computer, a folder with the same
+/// files in tests). `priority` is the highest priority of the flight threads.
 MachineReport inspectMachine(const std::string& root = "", int priority = 45);
 
 }  // namespace swiftlet

@@ -29,22 +29,24 @@ nlohmann::ordered_json toJson(const MemoryLockReport& report);
 /// thread may write there meanwhile.
 void touchPages(void* memory, std::size_t bytes);
 
-/// Holds malloc to memory that neither shrinks nor spreads. Once, before other threads exist.
-/// - One arena (M_ARENA_MAX 1): by default each thread gets one of its own, and what one thread frees the
-///   others cannot use. Threads then share a lock; those of the flight path never take it since they
-///   allocate nothing.
-/// - The heap is never trimmed (M_TRIM_THRESHOLD): giving pages back costs page faults when they are
-///   wanted again, and the lock on the address space that every thread's page faults wait for.
+/// Keeps malloc in memory that neither shrinks nor spreads. Call it once, before other threads exist.
+/// - One arena (M_ARENA_MAX 1): by default each thread gets its own arena, and other threads cannot reuse
+///   memory that it frees. Threads then share a lock; flight threads never take it since they do not
+///   allocate.
+/// - The heap is never trimmed (M_TRIM_THRESHOLD): returned pages cost page faults when they are needed
+///   again, and the address space lock on which every thread's page faults wait.
 /// - Blocks below 4 MiB come from the heap (M_MMAP_THRESHOLD; glibc starts at 128 KiB, less than an image,
-///   and moves with use): a mapping of its own for each image would be made, faulted in and undone at
-///   every frame. Larger ones are rare, live at start and end, and would leave holes that nothing fills.
-/// Returns what was refused; empty: all of it holds. Without glibc: says that nothing was done.
+///   and adapts it): otherwise each image would be mapped, faulted in and unmapped at every frame. Larger
+///   blocks are rare, exist from start to end, and would leave holes.
+///
+/// Returns the settings that were refused; empty: all are set. Without glibc it returns that nothing was
+/// done.
 std::string confineMalloc();
 /// Grows the heap by `bytes`, makes it resident and gives it back to malloc, so that the low-priority
 /// threads find their memory there and ask the kernel for none. After confineMalloc, which keeps it.
 void reserveHeap(std::size_t bytes);
 
-/// One numerical library that could run threads of its own.
+/// A numerical library that could run its own threads.
 struct LibraryThreads {
   std::string library;
   bool linked = false;  ///< found in this process, and told to use one thread

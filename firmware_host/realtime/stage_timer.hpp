@@ -33,8 +33,7 @@ enum class StageId : std::size_t {
 /// In snake case: "source", "image_to_pose", ...
 std::string_view stageName(StageId stage);
 
-/// Wall time is what a reader waits; CPU time is what the stage itself takes, whatever else the
-/// machine does.
+/// Wall time is the latency for a reader. CPU time is the stage's own time, independent of other load.
 struct StageTimes {
   LatencyHistogram wall_frames;  ///< frames that are no keyframes, and what belongs to no frame
   LatencyHistogram wall_keyframes;

@@ -22,11 +22,12 @@ struct FlightRequest {
   /// From a log's stamps to CLOCK_MONOTONIC; gives none while that is not known. Any thread.
   std::function<std::optional<Duration>()> to_host;
   bool announce = false;  ///< print the table of what was reserved, and what is missing
-  bool trigger = false;   ///< a line of its own tells of edges (SensorInput::look)
+  bool trigger = false;   ///< a separate line reports edges (SensorInput::look)
   bool record = false;    ///< the flight is to be recorded
-  bool service = false;   ///< tell systemd, where it asks to be told
+  bool service = false;   ///< notify systemd if it requests it
   std::string name;       ///< what is flown, for those who look on
-  /// Where the autopilot is told over the IMU's link; null: over a port of its own. It outlives the run.
+  /// Outbox of the IMU's link if the autopilot shares it; null: the autopilot has its own port. It outlives
+  /// the run.
   LinkOutbox* autopilot_outbox = nullptr;
   std::optional<ViewAddress> view;  ///< serve the live view there
   /// What is wrong with the run's files; null: nothing. Any thread.

@@ -1,5 +1,5 @@
 #pragma once
-// What a run is asked of kept maps.
+// Options of a run for kept maps.
 
 #include <string>
 

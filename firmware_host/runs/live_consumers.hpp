@@ -1,7 +1,6 @@
 #pragma once
-// Who follows a run while it goes on, each from a thread of its own: an autopilot, ROS 2's topics and labels
-// by them, the live view. Opened before the graph is built, ended after the executor. An executor that is
-// not real-time has none.
+// Consumers that follow a running run, each on its own thread: an autopilot, ROS 2 topics and their labels,
+// the live view. Opened before the graph is built, ended after the executor. Only for real-time executors.
 
 #include <array>
 #include <memory>
@@ -32,8 +31,8 @@ class LiveConsumers {
   bool drainRemarks(RunObserver& observer);
   /// Before its begin(): puts them under supervision, and lets them have its verdicts.
   void addTo(Supervisor& supervisor);
-  /// Ends them; `report` gets what each counted under its own name, `faults` what ended one before its time.
-  /// False: one may be stuck, and uses its outlet for good.
+  /// Ends them. `report` receives each consumer's counters under its name, `faults` the reason if one ended
+  /// early. Returns false if one may be stuck; it then uses its outlet forever.
   bool finish(nlohmann::ordered_json& report, std::vector<std::string>& faults);
 
  private:

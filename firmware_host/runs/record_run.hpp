@@ -16,7 +16,7 @@ struct RecordRequest {
   bool mcap = false;   ///< an MCAP file instead of an EuRoC folder
   double seconds = 0;  ///< end after this long; 0: when told to
   const std::atomic<bool>* stop = nullptr;
-  RecordWatcher* watcher = nullptr;  ///< null: nobody
+  RecordWatcher* watcher = nullptr;  ///< null: none
 };
 
 struct RecordResult {

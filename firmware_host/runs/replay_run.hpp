@@ -29,7 +29,7 @@ struct ReplayRequest : LogRequest {
   bool loop_closure = false;   ///< recognize places; sets loop.enabled
   KeptMapRequest kept_maps;
   bool map = false;                 ///< fuse depth into a map; sets map.enabled
-  bool real_time = false;           ///< on threads, messages let out at their times
+  bool real_time = false;           ///< on threads, messages played at their times
   double speed = 1;                 ///< real_time: times faster than recorded
   std::optional<ViewAddress> view;  ///< real_time: serve the live view there
   bool record = false;              ///< write `recording/` into the run folder

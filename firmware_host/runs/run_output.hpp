@@ -1,9 +1,9 @@
 #pragma once
-// The run folder while a run writes it, whatever the run is fed by: what its threads log into, the recorder,
-// and at the end the loops, the summary and, smoothed, the trajectory of the map.
+// The run folder while a run writes it, for any kind of input: log files of the threads, the recorder, and at
+// the end the loops, the summary and the smoothed trajectory of the map.
 //
-// With Wanted::fly_on nothing that the disk does ends the run: what cannot be written is in lost(), the rest
-// goes on. Else InputError where a file cannot be made.
+// With Wanted::fly_on the disk cannot end the run: lost() lists what could not be written, and the run
+// continues. Otherwise InputError if a file cannot be created.
 
 #include <atomic>
 #include <filesystem>

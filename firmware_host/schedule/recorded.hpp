@@ -1,10 +1,10 @@
 #pragma once
-// The recorded schedule: repeats a threaded run from its recording, on one thread. Before its turn each node
-// is told what it took then (samples, images, the window or fix that was newest for it, the effort), so that
-// every output has the same bytes however the threads had run.
+// The recorded schedule: repeats a threaded run from its recording on one thread. Before its turn each node
+// receives what it used in the recorded run (samples, images, the newest window or fix, the effort), so every
+// output has the same bytes regardless of how the threads ran.
 //
-// A node's turn waits until what it took is there: windows, fixes and plane reports are kept by number until
-// the step that took them. What a node missed then it passes by.
+// A node's turn waits until its inputs exist: windows, fixes and plane reports are kept by number until the
+// step that used them. A node skips what it missed in the recorded run.
 
 #include <cstdint>
 #include <string>

@@ -1,13 +1,13 @@
 #pragma once
-// The threaded schedule: every node on a thread of its own, fed by devices or by a log that is let out as
-// devices would.
+// The threaded schedule: every node on its own thread, fed by devices or by a log that is played like
+// devices.
 //
 // Threads: the input's, `propagate`, `track`, `smooth` and `mesh` are the flight path; `loop`, `map`, `log`
-// and `record` follow at the lowest priority. Each sleeps on its node's doorbell with a bounded wait; nobody
-// on the flight path rings `log` and `record`, which look every few milliseconds, so that it never calls the
-// kernel for them. A thread that does not get its priority or CPU runs without; the reports say so. Faults: a
-// node whose thread could not start, threw or was told to end early is abandoned: those behind it go
-//   on to the end of what there is. What that means for the flight is not decided here.
+// and `record` follow at the lowest priority. Each sleeps on its node's doorbell with a bounded wait. The
+// flight path does not ring `log` and `record`, which check every few milliseconds, so it makes no system
+// call for them. A thread that does not get its priority or CPU runs without it; the reports say so. Faults:
+// a node whose thread could not start, threw or was ended early is abandoned; the nodes behind it process
+// what is left. The supervisor decides what that means for the flight.
 
 #include <functional>
 #include <string>

@@ -9,9 +9,10 @@
 
 namespace swiftlet {
 
-/// Lines `true,said,probability` (`#` begins a remark), labels from 1 to 31. The probabilities of one true
-/// label sum to 1; what is not listed of it is never said. A true label that is not listed at all is said
-/// with probability `right`, the others alike in its place. InputError with line, field and remedy.
+/// Lines `true,said,probability` (`#` starts a comment), labels from 1 to 31. The probabilities of one true
+/// label sum to 1; pairs that are not listed have probability 0. A true label without any line is recognized
+/// with probability `right`, and the other labels share the rest equally. InputError with line, field and
+/// remedy.
 ConfusionModel readConfusion(const std::string& path, float right);
 
 /// Of the file that map.confusion names; empty where it names none.

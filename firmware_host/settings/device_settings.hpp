@@ -1,5 +1,5 @@
 #pragma once
-// The vehicle's devices, and whom it talks to, as `fly`, `record`, `doctor` and `hil` want to know them.
+// The vehicle's devices and its outputs to other programs, for `fly`, `record`, `doctor` and `hil`.
 
 #include <string>
 
@@ -55,7 +55,7 @@ struct TriggerGroup {
   double delay_us = 0;
 };
 
-/// Who flies by the estimate, over MAVLink.
+/// The autopilot that uses the estimate, over MAVLink.
 struct AutopilotGroup {
   std::string device = "";  ///< serial port or udp:HOST:PORT, also imu_link's; empty: none
   int baud = 921600;

@@ -20,8 +20,8 @@ void readSettingsText(const std::string& name, std::string_view text, Settings& 
 /// Applies one `group.name=value`.
 void overrideSetting(std::string_view assignment, Settings& settings);
 
-/// The whole tree as YAML. With `explain`, each setting's explanation, unit, range and default stand in
-/// a comment above it.
+/// The whole tree as YAML. With `explain`, a comment above each setting gives its explanation, unit, range
+/// and default.
 std::string printSettings(const Settings& settings, bool explain);
 
 }  // namespace swiftlet

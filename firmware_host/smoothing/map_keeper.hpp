@@ -37,7 +37,7 @@ class MapKeeper {
 
   /// Every sample, in order; those that the odometry refuses are left out here too.
   void addImu(const ImuSample& sample);
-  /// The stamps went back for good: what was kept is given up, and the map covers what comes.
+  /// The stamps went backwards permanently: kept keyframes are discarded, and the map covers what follows.
   void restart();
   void addKeyframe(const TrackedFrame& frame, const NavState& state, const NoiseInUse& noise);
   /// Before the keyframe that it was estimated with; without effect unless the settings ask for an estimate.

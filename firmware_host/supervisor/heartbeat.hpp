@@ -37,7 +37,7 @@ struct Beat {
   Life life = Life::kNotBegun;
   Stamp last;               ///< CLOCK_MONOTONIC, of the newest turn, or of the end
   std::uint64_t turns = 0;  ///< since the beginning
-  const char* doing = "";   ///< literal; what the thread said last of its work
+  const char* doing = "";   ///< literal; the thread's last report of its work
   std::string_view fault;   ///< of a failure; lives as long as the heartbeat
 };
 
@@ -104,7 +104,7 @@ class alignas(kCacheLine) Heartbeat {
   std::size_t fault_size_ = 0;
 };
 
-/// Runs a thread's function between begin and end; an exception becomes fail() and goes on to the caller.
+/// Runs a thread's function between begin and end; an exception becomes fail() and is rethrown.
 template <typename Entry>
 void runBeating(Heartbeat& heart, Entry&& entry) {
   heart.begin();

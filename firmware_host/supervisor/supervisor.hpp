@@ -1,13 +1,12 @@
 #pragma once
-// Owns the question "is everything alive?": looks ten times a second at every member's heartbeat and at what
-// the sensors and the estimate bring, and gives the one verdict (verdict.hpp) to everybody who asks.
+// Decides whether everything is alive: checks every member's heartbeat and the data of sensors and estimate
+// ten times a second, and publishes one verdict (verdict.hpp) to all readers.
 //
 // Use: add every member, begin(), start(); or, without a thread, step() at times of the caller's choice.
-// Threads: a thread of its own (ThreadSettings: below `track`, above `mesh`, so that work of low priority
-//   cannot silence it), which calls `facts` and the sinks; verdict() and expectEnd() from any thread;
-//   drainEvents from one. step() only where there is no thread.
-// Errors: none in flight; a thread that cannot be started is in start()'s report.
-// Memory: 130 kB, fixed; nothing allocates or locks after begin(). Cost: 10 us a turn.
+// Threads: its own thread (ThreadSettings: below `track`, above `mesh`, so that low-priority work cannot
+// silence it), which calls `facts` and the sinks; verdict() and expectEnd() from any thread; drainEvents from
+// one thread. step() only without its own thread. Errors: none in flight; start() reports a thread that
+// cannot be started. Memory: 130 kB, fixed; no allocation or lock after begin(). Cost: 10 us a turn.
 
 #include <array>
 #include <atomic>
@@ -48,7 +47,7 @@ class Supervisor {
   /// Before begin(). `heart` outlives the supervisor. False: the table is full.
   [[nodiscard]] bool add(std::string_view name, const Heartbeat& heart);
   [[nodiscard]] bool addSink(Sink sink) { return sinks_.tryPushBack(std::move(sink)); }
-  /// `facts` fills in what it knows; both `facts` and `systemd` (null: nobody) outlive the supervisor.
+  /// `facts` fills in what it knows. `facts` and `systemd` (may be null) must outlive the supervisor.
   void begin(const FlightGround& ground, Facts facts, SystemdNotify* systemd = nullptr);
 
   ThreadReport start(const ThreadSettings& settings);

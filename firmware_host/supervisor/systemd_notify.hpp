@@ -22,7 +22,7 @@ class SystemdNotify {
   SystemdNotify& operator=(const SystemdNotify&) = delete;
 
   [[nodiscard]] bool wanted() const { return socket_ >= 0; }
-  /// Between two feeds of the watchdog; empty: systemd watches nobody.
+  /// Interval between two feeds of the watchdog; empty: systemd's watchdog is off.
   [[nodiscard]] const std::optional<Duration>& watchdogPeriod() const { return watchdog_period_; }
 
   void ready();

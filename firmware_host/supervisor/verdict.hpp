@@ -32,7 +32,7 @@ enum class Cause : std::uint8_t {
   kNone,
   kNoTurn,       ///< the thread's loop stands
   kThrew,        ///< an exception ended the thread
-  kEndedEarly,   ///< the thread returned although the run goes on
+  kEndedEarly,   ///< the thread returned although the run continues
   kNoData,       ///< the sensor delivers nothing
   kStuckValues,  ///< the IMU repeats one reading
   kNoProduct,    ///< the stage turns and is given input, but nothing comes out
@@ -55,7 +55,7 @@ struct Trouble {
   std::array<char, kTextBytes> text{};  ///< "no progress for 0.4 s"; ends with a zero
 
   [[nodiscard]] const char* name() const { return member.data(); }
-  /// The same trouble, whatever the figures in its text: a changed figure alone is no news.
+  /// The same trouble regardless of the numbers in its text: a changed number alone is not news.
   [[nodiscard]] bool sameAs(const Trouble& other) const;
 };
 

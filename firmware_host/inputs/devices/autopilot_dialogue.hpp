@@ -1,10 +1,10 @@
 #pragma once
-// What is said to and fro with an autopilot that is the IMU, beside its readings: TIMESYNC asked and
-// answered, and its readings' rate. Events of the decoder and the clock in, bytes out.
+// Dialogue with an autopilot that is the IMU, besides its samples: TIMESYNC in both directions, and requests
+// for the sample rate. Inputs: events of the decoder and the clock. Output: bytes.
 //
-// It speaks as MAV_COMP_ID_ONBOARD_COMPUTER: sequence numbers are counted for each component, and those of
-// the outlet's component (drivers/mavlink/autopilot_link.hpp), which may share the link, are another
-// thread's. Memory: fixed, no allocation. Threads: one.
+// It sends as MAV_COMP_ID_ONBOARD_COMPUTER. Sequence numbers are counted per component; those of the outlet's
+// component (drivers/mavlink/autopilot_link.hpp), which may share the link, belong to another thread. Memory:
+// fixed, no allocation. Threads: one.
 
 #include <cstdint>
 #include <optional>

@@ -1,12 +1,11 @@
 #pragma once
-// The thread of one camera source: grey images to the sink, stamped in the middle of their exposure on
-// CLOCK_MONOTONIC. Survives that the camera goes and returns.
+// The thread of one camera source: passes grey images to the sink, stamped at mid-exposure on
+// CLOCK_MONOTONIC. The camera may be unplugged and return.
 //
-// Stamps: the trigger's edge where one is connected and the association is sure, else the driver's stamp
-// (drivers/timesync/exposure_midpoint.hpp says how each is moved to the middle).
-// Threads: open() before the flight, run() on its own thread, journal and status from any.
-// Memory: nothing after open() but what a reopened source takes anew, and what the codec of compressed
-// pictures takes for each.
+// Stamps: the trigger's edge if one is connected and the association is certain, otherwise the driver's stamp
+// (drivers/timesync/exposure_midpoint.hpp explains how each is moved to mid-exposure). Threads: open() before
+// the flight, run() on its own thread, journal and status from any. Memory: no allocation after open(),
+// except by a source that is reopened and by the decoder of compressed images.
 
 #include <cstdint>
 #include <memory>

@@ -8,9 +8,9 @@
 
 namespace swiftlet {
 
-/// A line for each device, or one for each kind of which there is none. `root` stands in front of every path
-/// but cameras'. `try_formats`: every format of every camera is tried for an image, which takes tens of
-/// milliseconds each, and a second for a camera that gives none.
+/// One line per device, or one per kind without a device. `root` is the prefix of every path except the
+/// cameras'. `try_formats`: every format of every camera is tried for an image, which takes tens of
+/// milliseconds each, and a second for a camera that delivers none.
 MachineReport connectedDevices(const std::string& root = "", bool try_formats = false);
 
 }  // namespace swiftlet

@@ -1,7 +1,6 @@
 #pragma once
-// Keeps the stamps of what devices deliver, for a look at them afterwards: rates, gaps, jitter, latency, how
-// far apart two cameras are. Memory: as much as is asked for at construction; what goes beyond is counted
-// only.
+// Keeps the stamps of what devices deliver, to compute rates, gaps, jitter, latency and the distance between
+// two cameras afterwards. Memory: fixed at construction; further messages are only counted.
 
 #include <array>
 #include <cstdint>

@@ -23,7 +23,7 @@ struct TurnRate {
   Stamp arrival;
 };
 
-/// What camera 0 asked for, after each of its images.
+/// The exposure that camera 0 requested after each of its images.
 struct AskedExposure {
   ExposureSetting setting;
   Stamp arrival;
@@ -32,7 +32,7 @@ using SharedExposure = NewestShared<AskedExposure>;
 
 class ExposureLoop {
  public:
-  /// Of requests of camera 0, after which camera 1 goes on alone.
+  /// Silence of camera 0's requests after which camera 1 continues alone.
   static constexpr Duration kLeaderSilence = Duration::fromMilliseconds(500);
 
   struct Setup {

@@ -1,6 +1,6 @@
 #pragma once
-// The way to an IMU, whatever it is made of: a serial port or UDP with a protocol, a CAN bus, or topics.
-// Threads: one. Errors: values; a fault that lasts closes the link, and open() takes it up again.
+// The link to an IMU: a serial port or UDP with a protocol, a CAN bus, or topics. Threads: one. Errors:
+// values; a lasting fault closes the link, and open() reopens it.
 
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -26,18 +26,18 @@ class ImuLink {
   [[nodiscard]] virtual bool allocates() const { return false; }
   /// To poll for reading.
   [[nodiscard]] virtual int fd() const = 0;
-  /// To poll likewise: somebody wants something sent; below 0: nobody ever does.
+  /// Also to be polled: becomes readable when another thread has a message to send; below 0: never.
   [[nodiscard]] virtual int wakeFd() const { return -1; }
-  /// Throws away what waits, where its arrival can be told no more. Bounded.
+  /// Discards queued samples whose arrival time is no longer known. Bounded.
   virtual void discard() {}
   /// Reads what waits.
   virtual DeviceFault receive(Stamp now) = 0;
-  /// Sends what the protocol wants sent, after the readings have been taken. Never waits.
+  /// Sends what the protocol requires, after the samples have been taken. Never waits.
   virtual DeviceFault send() { return {}; }
   virtual bool next(ImuReading& reading) = 0;
   /// Edges of a trigger that the IMU sees.
   virtual bool nextEdge(TriggerEdge& /*edge*/) { return false; }
-  /// Bytes or frames so far, whatever they were: growing without readings, it is the wrong protocol.
+  /// Bytes or frames received so far, of any kind. If they grow without samples, the protocol is wrong.
   [[nodiscard]] virtual std::uint64_t received() const = 0;
   /// Host stamp by the protocol's own exchange of clocks; empty: none, or not yet sure.
   [[nodiscard]] virtual std::optional<Stamp> toHost(Stamp /*device*/) const { return std::nullopt; }

@@ -84,15 +84,15 @@ class ImuThread {
   Duration delay_;
   ClockMap clock_;
   RateWatch rate_;
-  /// What the one-way map holds and the exchange does not, when both were last believed, at `agreed_`: after
-  /// a step of the clock it goes on to be taken off until the exchange is sure again.
+  /// Difference between the one-way clock map and the two-way exchange when both were last trusted, at
+  /// `agreed_`. After a clock step it is subtracted until the exchange is certain again.
   std::optional<Duration> transport_;
   Stamp agreed_;
   Stamp arrival_;               ///< of the newest reading with a clock
   Stamp newest_;                ///< handed over
   Stamp heard_;                 ///< when the newest sample was handed over, or since when there is none
   std::uint64_t received_ = 0;  ///< at `heard_`
-  std::uint64_t refused_ = 0;   ///< likewise
+  std::uint64_t refused_ = 0;   ///< at `heard_`
   ImuStatus counted_;
   NewestShared<ImuStatus> status_;
   Eigen::Vector3d turning_ = Eigen::Vector3d::Zero();  ///< rad/s, smoothed

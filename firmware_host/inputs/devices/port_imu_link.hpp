@@ -1,6 +1,6 @@
 #pragma once
-// An IMU on a serial port, or an autopilot's on a serial port or UDP, with which TIMESYNC and the readings'
-// rate are settled on the way. What others want sent over the same link goes out here too: one thread reads
+// An IMU on a serial port, or an autopilot's IMU on a serial port or UDP, for which TIMESYNC and the sample
+// rate are also negotiated. Messages of other threads over the same link are sent here too: one thread reads
 // and writes the port.
 
 #include <array>
@@ -20,8 +20,8 @@ namespace swiftlet {
 
 class PortImuLink : public ImuLink {
  public:
-  /// `rate`: readings a second that the device is asked for [Hz]; 0: as they come. `outbox`: of an
-  /// autopilot's outlet on the same link, or null; it outlives this. InputError naming imu_link.device.
+  /// `rate`: sample rate requested from the device [Hz]; 0: not requested. `outbox`: of an autopilot's outlet
+  /// on the same link, or null; it must outlive this. InputError naming imu_link.device.
   explicit PortImuLink(const ImuLinkGroup& settings, double rate = 0, LinkOutbox* outbox = nullptr);
 
   DeviceFault open() override;
@@ -41,7 +41,7 @@ class PortImuLink : public ImuLink {
 
  private:
   [[nodiscard]] bool isMavlink() const { return decoder_.protocol() == ImuProtocol::kMavlink; }
-  /// What the port said of a write: only its end is the link's.
+  /// Result of a write to the port. Only a lost port ends the link.
   DeviceFault judge(const DeviceFault& fault);
   DeviceFault close(const DeviceFault& fault);
   void pauseInFlood(Stamp read_at);

@@ -1,6 +1,6 @@
 #pragma once
-// Whether a device that works sends as often as it should: messages of a second beside those expected.
-// Silence is not its matter: whoever sees a device return restarts it. O(1).
+// Whether a working device sends at the expected rate: messages per second against those expected. It does
+// not detect silence; restart it when a device returns. O(1).
 
 #include <cstddef>
 

@@ -1,10 +1,10 @@
 #pragma once
-// A sensor on a serial port brought to the rate that its calibration says, when its port is opened.
+// Sets a sensor on a serial port to the rate in its calibration when its port is opened.
 //
-// A sensor that already sends at that rate is left as its owner set it. Else it is asked, a step and its
-// reply at a time, which takes 2.5 s at most; what it refuses or makes otherwise is a warning. It keeps
-// nothing of it without power, so it is asked again each time that the port is opened, without listening
-// first. Threads: one. Memory: 4 kB inside the object, nothing allocated.
+// A sensor that already sends at that rate is not changed. Otherwise it is configured step by step, each
+// followed by its reply, in at most 2.5 s; refused or changed steps give a warning. The sensor does not store
+// the configuration, so it is sent again each time the port is opened, then without listening first. Threads:
+// one. Memory: 4 kB inside the object, no allocation.
 
 #include <array>
 #include <optional>
@@ -18,10 +18,10 @@ namespace swiftlet {
 
 class SensorSetup {
  public:
-  /// `rate`: readings a second [Hz]; 0: nothing is asked.
+  /// `rate`: sample rate [Hz]; 0: not configured.
   explicit SensorSetup(double rate) : rate_(rate) {}
 
-  /// With the port open; `decoder` is started anew afterwards.
+  /// Call with the port open; `decoder` is restarted afterwards.
   void run(LinkPort& port, ImuDecoder& decoder);
   /// Until it says false.
   bool nextWarning(DeviceFault& warning);

@@ -1,5 +1,5 @@
 #pragma once
-// The part of a log that a run wants, message by message: what both executors take their input from.
+// The selected part of a log, message by message: the input of both executors.
 
 #include <cstdint>
 #include <functional>
@@ -26,7 +26,7 @@ class LogFeed {
   LogFeed(LogSource& source, const LogSection& section, TrackReader* tracks, SceneReader* scenes = nullptr);
 
   enum class Next : std::uint8_t { kSample, kImage, kTracks, kEnd };
-  /// The next message that the section wants. Images are valid as LogSource says, tracks until the next call.
+  /// The next message of the section. Images are valid as LogSource documents, tracks until the next call.
   Next next();
   [[nodiscard]] const ImuSample& sample() const { return std::get<ImuSample>(message_); }
   [[nodiscard]] const CameraFrame& image() const { return std::get<CameraFrame>(message_); }

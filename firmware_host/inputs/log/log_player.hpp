@@ -1,6 +1,6 @@
 #pragma once
-// A log's messages let out at the times of their arrival, as sensors would. Two threads: `source` reads and
-// decodes ahead (it is not of the vehicle), `sensor` hands over.
+// Plays a log's messages at their arrival times, as sensors would deliver them. Two threads: `source` reads
+// and decodes ahead (a vehicle does not have it), `sensor` hands the messages over.
 
 #include <atomic>
 #include <exception>

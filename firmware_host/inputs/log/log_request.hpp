@@ -1,6 +1,5 @@
 #pragma once
-// What a run that reads a log is asked: which log, whose calibration, which part of it. The base of the
-// requests of the commands.
+// Request for a run on a log: log, calibration and section. Base of the commands' requests.
 
 #include <atomic>
 #include <optional>

@@ -1,16 +1,16 @@
 #pragma once
-// An autopilot told of the estimate while it flies by it: the thread that owns the port, or sends over that
-// of the IMU, docs/mavlink.md.
+// Sends the estimate to an autopilot that flies by it: the thread that owns the autopilot's port, or sends
+// over the IMU's port, docs/mavlink.md.
 //
-// It reads a LiveOutlet, steps an AutopilotLink and sends what that says; nobody waits for it and it waits
-// for nobody: a port that takes no bytes loses them, counted and noted with the remedy. Its priority is that
-// of the mesh: below the flight path, above all that may take long, so that a pose does not age while a
-// planner computes. Beside poses go obstacles (10 Hz), and texts of the supervisor's verdict: each reason not
-// to arm when it comes and every 30 s, that all is ready, every change of health, who is late or lost and
-// recovers; and, of its own, that states stop and that the supervisor does. From its second turn on it
-// allocates nothing and takes no lock. A serial port that is unplugged is looked for five times a second; it
-// and an autopilot that says nothing for 3 s are told to the log, with the remedy. Clock: CLOCK_MONOTONIC.
-// Stamps of a log are moved there by the one difference that its player knows.
+// It reads a LiveOutlet, steps an AutopilotLink and sends the link's output. It waits for no thread and no
+// thread waits for it: bytes that the port does not accept are lost, counted, and logged with the remedy. Its
+// priority is that of the mesh: below the flight path, above everything slow, so that a pose does not age
+// while a planner computes. Besides poses it sends obstacles (10 Hz) and texts of the supervisor's verdict:
+// each reason not to arm when it appears and every 30 s, readiness to arm, every change of health, members
+// that are late, lost or recovered, and missing states or a stopped supervisor. From its second turn on it
+// neither allocates nor takes a lock. It looks for an unplugged serial port five times a second; an unplugged
+// port and an autopilot that is silent for 3 s are logged with the remedy. Clock: CLOCK_MONOTONIC. Stamps of
+// a log are converted by the constant offset of its player.
 
 #include <functional>
 #include <optional>
@@ -26,12 +26,12 @@ namespace swiftlet {
 
 struct AutopilotThreadOptions {
   AutopilotGroup settings;
-  /// Where another thread owns the link: nothing is opened or read here. Null: a port of its own.
+  /// Outbox if another thread owns the link: nothing is opened or read here. Null: its own port.
   LinkOutbox* outbox = nullptr;
   int priority = 0;  ///< SCHED_FIFO; 0: none
   /// From the run's stamps to CLOCK_MONOTONIC, once it is known; none: they are of it.
   std::function<std::optional<Duration>()> to_host;
-  /// After which reasons not to arm that still stand are said again, and writes that are refused noted again.
+  /// Interval after which standing reasons not to arm are sent again, and rejected writes are logged again.
   Duration repeat = Duration::fromMilliseconds(30'000);
 };
 

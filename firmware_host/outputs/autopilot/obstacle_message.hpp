@@ -1,11 +1,11 @@
 #pragma once
-// What stands around the vehicle, from the local mesh, as autopilots take it.
+// Obstacles around the vehicle from the local mesh, in the form that autopilots accept.
 //
-// 72 sectors of 5 degrees, clockwise from the vehicle's heading (MAV_FRAME_BODY_FRD: turned with the
-// vehicle's yaw, level), distances from its reference point to what lies within half a metre below and above
-// it. A sector in which the mesh has nothing is unknown, not free; one in which the nearest that it has lies
-// beyond kObstacleReach is told as free up to there. Pure; cost as nearestBySector, some 0.1 ms.
-// Source: MAVLink common.xml, OBSTACLE_DISTANCE; docs/mavlink.md.
+// 72 sectors of 5 degrees, clockwise from the vehicle's heading (MAV_FRAME_BODY_FRD: rotated with the
+// vehicle's yaw, level). Distances are from the vehicle's reference point to the nearest mesh within half a
+// metre above and below it. A sector without any mesh is unknown, not free; a sector whose nearest mesh is
+// beyond kObstacleReach is reported as free up to that distance. Pure; costs what nearestBySector costs, some
+// 0.1 ms. Source: MAVLink common.xml, OBSTACLE_DISTANCE; docs/mavlink.md.
 
 #include <optional>
 

@@ -1,9 +1,9 @@
 #pragma once
-// The map's blocks on disk while a run goes on: a file of the run folder without a name (it is unlinked as it
-// is opened), so nothing is left behind.
+// The map's blocks on disk during a run: a file in the run folder without a name (it is unlinked when
+// opened), so nothing is left behind.
 //
-// Host side, of the thread `map`, then of whoever writes the map. Errors: a file that cannot be made, or
-// takes no more, refuses the block, which StoredBlocks counts; the flight goes on.
+// Host side; used by the thread `map`, then by the writer of the map. Errors: if the file cannot be created
+// or is full, the block is refused and counted by StoredBlocks; the flight continues.
 
 #include <string>
 

@@ -1,10 +1,10 @@
 #pragma once
-// The meshes of a run in its folder: `local_mesh.ply`, and one by one in `meshes/` where that is asked for.
+// The meshes of a run in its folder: `local_mesh.ply`, and on request every mesh in `meshes/`.
 //
-// meshes/frames.csv has one row for each frame: index, stamp [ns], keyframe (0 or 1), the files of its frame
-// mesh and its horizon mesh (in the same folder; empty when there is none, or it has no face), and the convex
-// hull of the frame's features in raw pixels of camera 0, `u v u v ...`. Files are as writePly() makes them,
-// in world axes. InputError when something cannot be written.
+// meshes/frames.csv has one row per frame: index, stamp [ns], keyframe (0 or 1), the files of its frame mesh
+// and its horizon mesh (in the same folder; empty if there is none or it has no face), and the convex hull of
+// the frame's features in raw pixels of camera 0, `u v u v ...`. Files are written by writePly(), in world
+// axes. InputError if a file cannot be written.
 
 #include <Eigen/Core>
 #include <span>

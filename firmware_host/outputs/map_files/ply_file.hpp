@@ -21,8 +21,8 @@
 
 namespace swiftlet {
 
-/// Grey 128 and label 0 stand in for empty `grey` and `labels`. InputError when the file cannot be
-/// written, or when readPly() would refuse what was given (nothing is written then).
+/// Empty `grey` and `labels` are written as grey 128 and label 0. InputError if the file cannot be written,
+/// or if readPly() would reject the mesh (nothing is written then).
 void writePly(const std::string& path, const TriangleMesh& mesh,
               WholeFile::Sync sync = WholeFile::Sync::kYes);
 

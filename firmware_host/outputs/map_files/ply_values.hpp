@@ -1,5 +1,5 @@
 #pragma once
-// The numbers behind a PLY header, one after the other, whatever they are encoded in.
+// The numbers after a PLY header, one by one, in any encoding.
 
 #include <string>
 #include <string_view>

@@ -1,9 +1,9 @@
 #pragma once
-// A triangle mesh as files hold it: any size, on the host side only.
+// A triangle mesh as in files: any size, host side only.
 //
-// Metres, in the world of whoever made it. A face is counter-clockwise seen from outside (true
-// surfaces) or from where it was seen (the mesher's). `grey` has one value for each vertex and `labels`
-// one for each face, or they are empty where nobody gave any.
+// Metres, in the world frame of its source. A face is counter-clockwise seen from outside (true surfaces) or
+// from the side it was observed from (the mesher's). `grey` has one value per vertex and `labels` one per
+// face, or they are empty if there are none.
 
 #include <Eigen/Core>
 #include <array>

@@ -21,10 +21,10 @@ std::string findReportPage();
 std::string pageWith(const std::string& page, const std::string& name,
                      const nlohmann::ordered_json& document);
 
-/// The same page for a run that goes on: it takes its document from the address `stream` beside it.
+/// The same page for a running run: it loads its document from the address `stream` beside it.
 std::string livePage(const std::string& page, const std::string& name);
 
-/// Text as it may stand in HTML.
+/// Escapes text for HTML.
 std::string htmlText(const std::string& text);
 
 /// The scene's "labels": name and colour of each; those without a name get one.

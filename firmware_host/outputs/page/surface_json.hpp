@@ -16,8 +16,8 @@ namespace swiftlet {
 inline constexpr std::size_t kMostVertices = 65535;
 inline constexpr std::size_t kMostFaces = 120'000;
 
-/// A surface with at most that many corners and triangles; as it was where it has no more. `cell` becomes the
-/// grid's width [m], 0 where nothing was thinned. O(triangles log triangles).
+/// The surface reduced to at most this many vertices and triangles; unchanged if it has no more. `cell`
+/// receives the width of the grid [m], 0 if the surface was not reduced. O(triangles log triangles).
 TriangleMesh thinned(const TriangleMesh& mesh, std::size_t vertices, std::size_t faces, double& cell);
 
 /// Adds "low", "size" and "points": each coordinate of at least one point in 16 bits between the lowest and

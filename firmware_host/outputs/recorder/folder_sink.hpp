@@ -1,9 +1,9 @@
 #pragma once
 // A live recording as an EuRoC/ASL folder: mav0/imu0, cam0, cam1 with data.csv and sensor.yaml, images as
-// PNG. `swiftlet replay` reads it, and so does everybody's tool.
+// PNG. `swiftlet replay` and other tools read it.
 //
-// One writer a camera compresses and writes its images, one writes the samples. A row stands in data.csv once
-// its image is on the disk.
+// One writer thread per camera compresses and writes images, one writes the samples. A row is added to
+// data.csv after its image is on the disk.
 
 #include <array>
 #include <fstream>

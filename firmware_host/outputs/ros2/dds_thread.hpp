@@ -1,7 +1,7 @@
 #pragma once
-// The newest of a run as ROS 2's topics, from a low thread of its own at its own pace (docs/ros2.md). It
-// reads a LiveOutlet; nobody waits for it. Label images for the map come in by it (LabelExchange), at most
-// kKeptImages a turn. In builds without SWIFTLET_WITH_DDS the constructor says so.
+// The newest results of a run as ROS 2 topics, from its own low-priority thread (docs/ros2.md). It reads a
+// LiveOutlet; no thread waits for it. It also receives label images for the map (LabelExchange), at most
+// kKeptImages per turn. In builds without SWIFTLET_WITH_DDS the constructor throws an error that says so.
 
 #include <functional>
 

@@ -1,6 +1,6 @@
 #pragma once
-// From the run's clock to that of ROS's other processes, the wall clock, which NTP may step in flight. Pure:
-// the clocks are read by whoever calls. For one thread.
+// Converts the run's clock to the wall clock that other ROS processes use and that NTP may step in flight.
+// Pure: the caller reads the clocks. For one thread.
 
 #include <array>
 #include <cstdint>
@@ -18,7 +18,8 @@ class RosClock {
   [[nodiscard]] Stamp toRos(Stamp stamp) const { return stamp + offset(); }
   /// Of something that will be answered under its stamp: toRos, remembered.
   Stamp toRosAndBack(Stamp stamp);
-  /// The stamp that went out so, whatever the clock did since; of others by the clock as it is.
+  /// The run's stamp of a published stamp, unaffected by later clock steps; other stamps use the current
+  /// offset.
   [[nodiscard]] Stamp fromRos(Stamp ros) const;
 
   /// Of the wall clock, as far as they are larger than the readings' errors.

@@ -1,13 +1,13 @@
 #pragma once
-// The estimate in the conventions of ROS messages (REP 103, REP 105), whatever carries them.
+// The estimate in the conventions of ROS messages (REP 103, REP 105), independent of the transport.
 //
-// Frames: `map` and `odom` as in REP 105 are our map and world; `base_link` stands for the body, which is the
-// IMU. A vehicle whose base_link is elsewhere renames it (RosFrames) and adds the transform of its own.
+// Frames: `map` and `odom` of REP 105 are swiftlet's map and world; `base_link` is the body, which is the
+// IMU. A vehicle with another base_link renames it (RosFrames) and adds its own transform.
 // geometry_msgs/PoseWithCovariance: order x y z and rotations about the fixed axes of the header's frame;
-// ours is phi, p with phi about the body's axes (R <- R Exp(phi)). geometry_msgs/TwistWithCovariance of
-// nav_msgs/Odometry: in the child frame, so the velocity is turned into the body's axes. Angular velocity is
-// no part of the state: zero with kUnknownVariance where the state stands alone; of a state at an IMU sample
-// it is that sample's, without bias.
+// swiftlet's is phi, p with phi about the body's axes (R <- R Exp(phi)). geometry_msgs/TwistWithCovariance of
+// nav_msgs/Odometry is in the child frame, so the velocity is rotated to the body's axes. Angular velocity is
+// not part of the state: zero with kUnknownVariance for a state without a sample; for a state at an IMU
+// sample it is the sample's, without bias.
 
 #include <Eigen/Core>
 #include <string>

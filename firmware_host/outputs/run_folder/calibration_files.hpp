@@ -9,13 +9,13 @@
 
 namespace swiftlet {
 
-/// `given` with the estimated values in place of its own; each file says their sigmas. `folder` is made;
-/// InputError where a file cannot be. `rate_hz`: of the cameras, where the calibration does not say.
+/// Writes `given` with the estimated values; each file states their sigmas. Creates `folder`; InputError if a
+/// file cannot be written. `rate_hz`: of the cameras, if the calibration does not give it.
 void writeEstimatedCalibration(const std::string& folder, const Calibration& given,
                                const CalibrationEstimate& estimate, double rate_hz);
 
-/// `calibration` as it is, whatever it was read from: EuRoC's files, and Kalibr's camchain-imucam.yaml and
-/// imu.yaml for other tools. `folder` is made; InputError where a file cannot be.
+/// Writes `calibration`, of any source format, as EuRoC's files and as Kalibr's camchain-imucam.yaml and
+/// imu.yaml for other tools. Creates `folder`; InputError if a file cannot be written.
 void writeCalibration(const std::string& folder, const Calibration& calibration);
 
 }  // namespace swiftlet

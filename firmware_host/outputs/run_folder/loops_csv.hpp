@@ -1,7 +1,7 @@
 #pragma once
-// loops.csv of a run folder: one row for each loop that geometry verified, in the order in which they were
-// found, with what the selection said of it at the end. Stamps [ns] of the keyframes' images; T_old_new
-// between the bodies, quaternion xyzw; 1 sigma of the worst direction of rotation [rad] and translation [m].
+// loops.csv of a run folder: one row per geometrically verified loop, in the order of detection, with the
+// final verdict of the selection. Stamps [ns] of the keyframes' images; T_old_new between the bodies,
+// quaternion xyzw; 1 sigma of the worst direction of rotation [rad] and translation [m].
 
 #include <span>
 #include <string>

@@ -1,8 +1,9 @@
 #pragma once
-// Writes the files of a run folder that grow while the run goes on: odometry.tum; on request imu_rate.tum
-// with imu_rate_health.csv (a line where health or epoch of those states changes) and meshes/; states.csv,
-// events.log; and local_mesh.ply, map.ply and map.glb at its end. Lines go out as they come, in constant
-// memory. A file that cannot be written any more ends there, said once by its name; the others go on.
+// Writes the files of a run folder that grow during the run: odometry.tum; on request imu_rate.tum with
+// imu_rate_health.csv (a line when health or epoch of those states changes) and meshes/; states.csv,
+// events.log; and local_mesh.ply, map.ply and map.glb at the end. Lines are written as they arrive, in
+// constant memory. A file that can no longer be written ends there and is reported once by name; the others
+// continue.
 
 #include <nlohmann/json.hpp>
 #include <optional>
