@@ -1,13 +1,14 @@
 #pragma once
-// Files of recorded messages, whatever holds them: rosbag2 folders (SQLite or MCAP), their single files, MCAP
-// files, ROS 1 bags where the build has rosbag-storage. Messages stay bytes here; what they mean is said in
-// drivers/bag/ros_messages.hpp.
+// Reads files of recorded messages: rosbag2 folders (SQLite or MCAP), their single files, MCAP files, and ROS
+// 1 bags if the build has rosbag-storage. Messages stay bytes here; drivers/bag/ros_messages.hpp decodes
+// them.
 //
-// Order: the time at which the recorder received a message; equal times in the file's order.
-// Errors: InputError with file, byte or row, and the remedy. Every read is bounds-checked, checksums that are
-// there are compared: a damaged file is refused when it is opened or when the damaged message is read. A file
-// that its recorder did not finish gives what is whole, and a warning names the byte where it ends.
-// Memory: 24 bytes a message, and four unpacked chunks of an MCAP file. Threads: one a file. Host side only.
+// Order: the time at which the recorder received a message; messages with equal times in the file's order.
+// Errors: InputError with file, byte or row, and the remedy. Every read is bounds-checked and existing
+// checksums are compared: a damaged file is rejected when it is opened or when the damaged message is read. A
+// file that its recorder did not close gives its intact part, and a warning names the byte where it ends.
+// Memory: 24 bytes per message, and four decompressed chunks of an MCAP file. Threads: one per file. Host
+// side only.
 
 #include <cstdint>
 #include <memory>

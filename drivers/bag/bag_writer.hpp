@@ -1,10 +1,10 @@
 #pragma once
 // Writes files of messages: MCAP and rosbag2 for ROS 2, bags for ROS 1.
 //
-// Whatever stops the program leaves a part under the path given: who wants a whole file or none gives a
-// temporary path and renames it after finish().
-// Errors: InputError when the disk takes no more. Memory: a chunk of 1 MiB and 16 bytes a message of it
-// (MCAP); of the libraries. Threads: one a file. Host side only.
+// An interrupted program leaves a partial file under the given path. To get a complete file or none, give a
+// temporary path and rename it after finish(). Errors: InputError when the disk accepts no more data. Memory:
+// a chunk of 1 MiB and 16 bytes per message in it (MCAP), and the libraries'. Threads: one per file. Host
+// side only.
 
 #include <cstdint>
 #include <memory>
@@ -21,7 +21,7 @@ struct BagWriterTopic {
   std::string type;        ///< `sensor_msgs/Imu`
   std::string definition;  ///< text of the type for the writer's encoding
   std::string md5;         ///< of the type; ROS 1 alone asks for it
-  bool latched = false;    ///< players repeat the last message to who comes late
+  bool latched = false;    ///< players repeat the last message to late subscribers
 };
 
 class BagWriter {

@@ -29,7 +29,7 @@ class MessageBag {
   }
 
   /// In the order of the stamps. A header's `seq` counts the messages of its topic. `latched`: players repeat
-  /// the topic's last message to who comes late.
+  /// the topic's last message to late subscribers.
   template <rosmsg::Message T>
   void write(const std::string& name, Stamp stamp, T message, bool latched = false) {
     const auto [place, is_new] = topics_.try_emplace(name);

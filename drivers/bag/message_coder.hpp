@@ -28,7 +28,7 @@ namespace swiftlet {
 template <typename T>
 concept RosNumber = std::is_arithmetic_v<T>;
 
-/// Words of the bytes of one message, whatever the encoding of lengths.
+/// Reads the bytes of one message in any encoding of lengths.
 template <bool kIsRos1>
 class MessageReader {
  public:

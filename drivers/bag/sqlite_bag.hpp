@@ -1,8 +1,8 @@
 #pragma once
 // One SQLite file of a rosbag2 bag: tables `topics` and `messages`, the same in schema versions 1 to 4.
 //
-// Messages packed one by one with zstd are told by their first bytes. SQLite files have no checksums: a
-// flipped byte inside a message is not noticed here.
+// Messages compressed individually with zstd are recognized by their first bytes. SQLite files have no
+// checksums: a flipped byte inside a message is not detected here.
 
 #include <memory>
 #include <string>

@@ -72,7 +72,7 @@ double checkedShift(const InputPlace& place, double shift_s, Warnings& warnings)
 /// Scale and misalignment of an IMU file in Kalibr's or OpenVINS' words; refuses what is not applied here.
 void readImuModel(const YamlField& imu, Calibration& calibration);
 
-/// `readout_ms` of a camera whose `shutter` is `rolling` [s]; 0 for a global one, which it is unless said.
+/// `readout_ms` of a camera with `shutter: rolling` [s]; 0 for a global shutter, which is the default.
 double readReadout(const YamlField& camera);
 
 /// The four densities and the rate under EuRoC's and Kalibr's common names. With `left_out` a random walk may

@@ -46,7 +46,7 @@ struct CanBusCounters {
   std::uint64_t frames = 0;
   std::uint64_t fd_frames = 0;  ///< of those
   std::uint64_t sent = 0;
-  std::uint64_t lost_in_socket = 0;  ///< by the kernel, for want of room in the socket
+  std::uint64_t lost_in_socket = 0;  ///< by the kernel, because the socket was full
   std::uint64_t error_frames = 0;
   std::uint64_t bus_off = 0;
   std::uint64_t restarts = 0;  ///< of the controller after bus-off

@@ -2,11 +2,11 @@
 // DroneCAN transfers: frames to payloads and back, for one kind of message from any number of nodes.
 //
 // A frame's last byte, the tail, carries start (0x80), end (0x40), toggle (0x20) and a transfer id of 5 bits.
-// A transfer of several frames begins with CRC-16/CCITT-FALSE over the type's signature and the payload.
-// Rules: a start frame begins anew; a frame that repeats the last one is ignored; any other that does not
-// follow ends the transfer; so do 2 s of silence, a failed checksum and a change between classic and FD.
-// Memory: 132 bytes of payload for each of 127 nodes, inside the object (22 KiB). O(frame) a frame.
-// Source: DroneCAN specification 4.1 (CAN bus transport layer) and 4.4 (CAN FD).
+// A transfer of several frames starts with CRC-16/CCITT-FALSE over the type's signature and the payload.
+// Rules: a start frame restarts a transfer; a frame that repeats the last one is ignored; any other frame out
+// of sequence ends the transfer, as do 2 s of silence, a failed checksum and a change between classic and FD.
+// Memory: 132 bytes of payload for each of 127 nodes, inside the object (22 KiB). O(frame) per frame. Source:
+// DroneCAN specification 4.1 (CAN bus transport layer) and 4.4 (CAN FD).
 
 #include <array>
 #include <cstdint>

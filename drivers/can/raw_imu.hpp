@@ -56,9 +56,9 @@ class RawImuDecoder {
   /// `node` 1 to 127; 0: the first whose reading is good, and no other from then on.
   explicit RawImuDecoder(std::uint8_t node = 0) : node_(node) {}
 
-  /// True: `out` holds a reading. Rate and force are the means over the interval where the node gives one,
-  /// which are finer than its newest values in 16 bits. `counter` goes on with the transfer id by the
-  /// smallest step: 32 lost in a row go unnoticed in it.
+  /// True: `out` holds a sample. Rate and force are the means over the interval if the node provides one;
+  /// they are finer than its newest values in 16 bits. `counter` follows the transfer id by the smallest
+  /// step: 32 samples lost in a row are not noticed in it.
   bool take(const CanFrame& frame, ImuReading& out);
 
   [[nodiscard]] std::uint8_t node() const { return node_; }

@@ -1,9 +1,10 @@
 #pragma once
-// A DDS domain that this program takes part in: one for all that publish and read there.
+// A DDS domain that this program joins, shared by all its publishers and subscribers there.
 //
 // Network: loopback and unicast unless `interface` names another. Messages above kLargestMessage are neither
-// sent nor received. Threads: any. The library has threads of its own, which inherit the scheduling of who
-// opened the domain first. Errors: words for the user. Built without DDS (SWIFTLET_WITH_DDS), open() says so.
+// sent nor received. Threads: any. The library has its own threads, which inherit the scheduling of the
+// thread that first opened the domain. Errors: text for the user. In builds without SWIFTLET_WITH_DDS, open()
+// returns an error that says so.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,8 +20,8 @@ inline constexpr std::size_t kLargestMessage = std::size_t{16} * 1024 * 1024;
 struct DdsNetwork {
   std::uint32_t domain = 0;      ///< ROS_DOMAIN_ID, 0 to 232
   std::string interface = "lo";  ///< network interface; "lo": this computer alone
-  /// Gets the library's first lines of warnings and errors, from any of its threads; null: nobody does. Of
-  /// the domain that was opened last: the library has one place for all.
+  /// Receives the first lines of the library's warnings and errors, from any of its threads; null: none.
+  /// Applies to the domain that was opened last: the library has one sink for all.
   void (*complain)(std::string_view line) = nullptr;
 };
 

@@ -1,13 +1,13 @@
 #pragma once
-// Messages of ROS 2 to and from other processes, without ROS here: topics `rt/...`, types `...::dds_::..._`,
-// plain CDR, over Eclipse Cyclone DDS. docs/ros2.md lists topics, types, frames and qualities of service.
+// Messages of ROS 2 to and from other processes, without ROS: topics `rt/...`, types `...::dds_::..._`, plain
+// CDR, over Eclipse Cyclone DDS. docs/ros2.md lists topics, types, frames and qualities of service.
 //
-// Nothing blocks: every writer keeps its last messages only and has no time to wait (max_blocking_time 0),
-// and the library's throttle is out of reach, so that a subscriber that is slow, stopped or killed costs its
-// own messages and nobody else's. What a writer refuses all the same is counted. One thread calls publish and
-// take. Memory: what a subscriber has not yet acknowledged, at most the last kKeptStates odometries and
-// transforms, 16 diagnostics, 4 images, 1 mesh, 1 surface, 1 obstacle; kKeptImages label images that were not
-// yet taken; grows to the largest message seen. No exceptions.
+// Nothing blocks: every writer keeps only its last messages and never waits (max_blocking_time 0), and the
+// library's throttle is out of reach, so a slow, stopped or killed subscriber loses only its own messages.
+// Messages that a writer rejects are counted. One thread calls publish and take. Memory: messages not yet
+// acknowledged by subscribers, at most the last kKeptStates odometries and transforms, 16 diagnostics, 4
+// images, 1 mesh, 1 surface, 1 obstacle; kKeptImages label images not yet taken; grows to the largest message
+// seen. No exceptions.
 
 #include <Eigen/Core>
 #include <array>
@@ -142,8 +142,7 @@ class DdsLink {
   bool publish(Stamp stamp, std::span<const DdsStatus> statuses);
   /// Camera 0's, for who labels it. Only where there is a label topic.
   bool publish(const DdsImageView& image);
-  /// The oldest label image that was not taken yet; looks at kKeptImages at most, whatever they are. False
-  /// where there is none.
+  /// The oldest label image not yet taken; examines at most kKeptImages images. False if there is none.
   bool takeLabels(DdsImage& image);
   /// Writers of the label topic that are there now.
   [[nodiscard]] int labellers() const;

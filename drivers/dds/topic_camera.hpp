@@ -1,18 +1,18 @@
 #pragma once
-// A camera behind a ROS 2 topic: sensor_msgs/Image, or CompressedImage where the topic's name ends with
-// "/compressed". Its images are lent out as they lie in the reader's memory.
+// A camera behind a ROS 2 topic: sensor_msgs/Image, or CompressedImage if the topic's name ends with
+// "/compressed". Its images are lent from the reader's memory without a copy.
 //
-// Encodings: those of drivers/image/ros_encoding.hpp, whose grey is taken as it is; JPEG and PNG. The size
-// must be the one asked for. Stamps: the header's, CLOCK_REALTIME, on CLOCK_MONOTONIC
-// (drivers/timesync/wall_stamps.hpp). What moment they mark no message says: it is taken for the start of the
-// exposure. Losses: holes of the stamps up to a second, at the rate asked for, what DDS knows to be lost, and
-// what was overrun because it was not taken in time; the first contains the others. Left out and counted:
-// messages that are damaged (unknown encoding, step or data too short, another size, `damaged` and
-// `too_short`), of another clock (`wrong_clock`), and not newer than the one before (`stale`). Errors:
-// values. After kMostBad messages running that are damaged or of another clock the camera closes with what is
-// wrong. open() waits for an image: first for seconds, in flight for a tenth of one. Threads: one. It
-// allocates and locks: not for a thread of the flight path. Memory: TopicReader's, of which one image is lent
-// out at a time.
+// Encodings: those of drivers/image/ros_encoding.hpp, with grey unchanged; JPEG and PNG. The size must be the
+// requested one. Stamps: the header's, CLOCK_REALTIME, converted to CLOCK_MONOTONIC
+// (drivers/timesync/wall_stamps.hpp). Messages do not say which moment they mark: it is assumed to be the
+// start of the exposure. Losses: gaps of the stamps up to a second at the requested rate, losses reported by
+// DDS, and images overrun because they were not taken in time; the first includes the others. Skipped and
+// counted: damaged messages (unknown encoding, step or data too short, another size: `damaged` and
+// `too_short`), messages with another clock (`wrong_clock`), and messages not newer than the previous one
+// (`stale`). Errors: values. After kMostBad consecutive messages that are damaged or of another clock the
+// camera closes with the reason. open() waits for an image: the first call for seconds, in flight for a tenth
+// of one. Threads: one. It allocates and locks: not for a thread of the flight path. Memory: TopicReader's,
+// of which one image is lent at a time.
 
 #include <functional>
 #include <memory>

@@ -27,7 +27,7 @@ struct TopicImage {
   bool compressed = false;    ///< a picture: JPEG or PNG by its first bytes
   std::string_view encoding;  ///< "mono8"; of a picture its format, "jpeg"
   bool big_endian = false;
-  std::uint32_t width = 0;   ///< px; of a picture 0, likewise height and step
+  std::uint32_t width = 0;   ///< px; 0 for a compressed image, as are height and step
   std::uint32_t height = 0;  ///< px
   std::uint32_t step = 0;    ///< bytes from row to row
   std::span<const std::uint8_t> data;

@@ -1,5 +1,5 @@
 #pragma once
-// What to tell a user whose topic nobody publishes: who publishes under its name, and which names are near.
+// Text for a user whose topic has no publisher: what is published under its name, and which names are close.
 
 #include <span>
 #include <string>

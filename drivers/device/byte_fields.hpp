@@ -1,8 +1,8 @@
 #pragma once
 // Numbers in messages, field by field, in either byte order, on machines of either byte order.
 //
-// Both sides are safe on any length: reading past the end gives zeros, writing past it writes nothing, and
-// ok() says so afterwards. No allocation; the bytes belong to the caller.
+// Both sides are safe for any length: reading past the end gives zeros, writing past it writes nothing, and
+// ok() is false afterwards. No allocation; the bytes belong to the caller.
 
 #include <Eigen/Core>
 

@@ -1,14 +1,16 @@
 #pragma once
-// Cuts a byte stream into frames. A protocol says, from the bytes at one place, whether a frame begins there;
-// this holds the bytes, finds the next place after a refusal, and knows when each byte arrived.
+// Cuts a byte stream into frames. A protocol decides from the bytes at one position whether a frame starts
+// there; this class holds the bytes, finds the next position after a rejection, and knows when each byte
+// arrived.
 //
-// - Results depend on the bytes alone, not on how they were cut into reads.
-// - After any refusal the search goes on one byte later, never after the refused length: a stray sync byte
+// - Results depend only on the bytes, not on how reads divided them.
+// - After a rejection the search continues one byte later, never after the rejected length: a stray sync byte
 //   costs no frame.
-// - The arrival of a byte is the time of the read minus the bytes behind it times the time of one byte on the
-//   wire; 0 for links whose baud rate means nothing (USB CDC).
-// Memory: nine bytes for each byte it can hold, inside the object. Cost: O(1) a byte, plus what the check
-// costs at places that look like a frame.
+// - The arrival of a byte is the time of the read minus the number of bytes after it times the time of one
+//   byte on the wire; that time is 0 for links without a real baud rate (USB CDC).
+//
+// Memory: nine bytes for each byte of capacity, inside the object. Cost: O(1) per byte, plus the protocol's
+// check at positions that look like a frame.
 
 #include <algorithm>
 #include <array>
@@ -42,11 +44,12 @@ struct StampedFrame {
 template <std::size_t kLongestFrame>
 class FrameBuffer {
  public:
-  /// What feed() takes for sure once next() has said false: more than a serial port's buffer in the kernel.
+  /// Bytes that feed() accepts for certain after next() has returned false: more than a serial port's kernel
+  /// buffer.
   static constexpr std::size_t kMostFed = 4096;
 
-  /// Takes from the front of `bytes` what there is room for and says how many; all of kMostFed bytes once
-  /// next() has said false.
+  /// Accepts as many bytes from the front of `bytes` as fit and returns their number; all of kMostFed bytes
+  /// after next() has returned false.
   [[nodiscard]] std::size_t feed(std::span<const std::uint8_t> bytes, Stamp read_at, Duration byte_time,
                                  StreamCounters& counters) {
     if (bytes.size() > bytes_.size() - end_) moveToFront();

@@ -23,7 +23,7 @@ struct StreamCounters {
   std::uint64_t events_refused = 0;     ///< edges and TIMESYNC messages that found their queue full
   std::uint64_t lost_messages = 0;      ///< MAVLink: gaps of the sequence numbers, over all sources
   std::uint64_t signed_messages = 0;    ///< MAVLink: signature passed over, not checked
-  std::uint64_t unknown_flags = 0;      ///< MAVLink: headers with incompatibility flags that nobody knows
+  std::uint64_t unknown_flags = 0;      ///< MAVLink: headers with unknown incompatibility flags
 
   bool operator==(const StreamCounters&) const = default;
 };

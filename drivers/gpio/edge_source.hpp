@@ -48,7 +48,7 @@ class EdgeSource {
   /// kKernel or kLibgpiod, once open.
   [[nodiscard]] EdgeInterface interface() const { return interface_; }
 
-  /// Takes what waits, at most `out.size()`; `count` may be 0. A fault closes nothing: open() anew.
+  /// Takes waiting edges, at most `out.size()`; `count` may be 0. After a fault, reopen with open().
   DeviceFault read(std::span<EdgeEvent> out, std::size_t& count);
 
   /// Since the first open().

@@ -13,7 +13,7 @@ namespace swiftlet {
 struct GpioLine {
   std::uint32_t offset = 0;
   std::string name;      ///< often empty
-  std::string consumer;  ///< who holds it; empty: nobody, or nobody who says so
+  std::string consumer;  ///< name of the program that holds it; empty: free or unnamed
   bool used = false;
   bool output = false;
 };

@@ -38,7 +38,7 @@ struct PipelineSettings {
 
 class PipelineSource : public CameraSource {
  public:
-  /// Frames that may be lent out at a time; next() gives none beyond.
+  /// Maximum number of frames lent at a time; next() gives none beyond.
   static constexpr std::size_t kMostLent = 2;
 
   explicit PipelineSource(PipelineSettings settings);

@@ -1,11 +1,11 @@
 #pragma once
-// A user's pipeline at work: built, started and stopped by a thread of its own, and what it gives.
+// A running pipeline of the user: built, started and stopped by its own thread, and its output.
 //
-// Threads: `keeper`, which builds, starts and stops pipelines, is made by the first start() under SCHED_OTHER
-// whatever its maker has, and GStreamer's threads, which it makes, inherit that. GStreamer's streaming thread
-// fills the ring. All other calls are of one thread, which waits for the others a bounded time only.
-// Memory: kMostWaiting samples wait, what comes on top is let go at once; the messages that are kept are
-// errors and the end of the stream.
+// Threads: `keeper`, which builds, starts and stops pipelines, is created by the first start() under
+// SCHED_OTHER regardless of the caller's scheduling; GStreamer's threads, which it creates, inherit that.
+// GStreamer's streaming thread fills the ring. All other calls are from one thread, which waits for the
+// others only for a bounded time. Memory: kMostWaiting samples wait, further ones are dropped at once; errors
+// and the end of the stream are the only messages kept.
 
 #include <gst/app/gstappsink.h>
 #include <gst/gst.h>

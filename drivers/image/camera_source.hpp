@@ -1,10 +1,9 @@
 #pragma once
-// One camera, whatever gives its images: frames that are lent out one by one, with their stamps, and what was
-// counted on the way.
+// A camera of any kind: frames lent one by one with their stamps, and counters.
 //
-// Threads: one. Nothing waits: poll fd() for POLLIN, then call next() until it gives no frame.
-// Errors: values. A fault of next() closes the camera; open() takes it up when it is there again, with
-//   everything negotiated anew.
+// Threads: one. Nothing blocks: poll fd() for POLLIN, then call next() until it gives no frame. Errors:
+// values. A fault of next() closes the camera; open() reopens it when it is back and negotiates everything
+// again.
 
 #include <array>
 #include <cstddef>
@@ -51,7 +50,7 @@ struct CameraFacts {
 
 /// Since construction, over unplugging.
 struct CameraCounters {
-  std::uint64_t frames = 0;          ///< given out
+  std::uint64_t frames = 0;          ///< delivered
   std::uint64_t missed = 0;          ///< holes in `sequence`: no buffer was free, or the driver dropped it
   std::uint64_t damaged = 0;         ///< flagged by the driver and put back unseen, or not to be decoded
   std::uint64_t too_short = 0;       ///< fewer bytes than the size; put back unseen
@@ -83,7 +82,7 @@ class CapturedFrame {
   Stamp stamp;                                 ///< the source's, CLOCK_MONOTONIC
   StampEvent event = StampEvent::kEndOfFrame;  ///< what it marks
   Stamp arrival;                               ///< CLOCK_MONOTONIC, when it was taken from the source
-  std::uint64_t sequence = 0;                  ///< the source's count, unwrapped; goes on after a reopen
+  std::uint64_t sequence = 0;                  ///< the source's count, unwrapped; continues after a reopen
 
  private:
   friend class CameraSource;
@@ -99,9 +98,8 @@ class CameraSource {
   CameraSource& operator=(const CameraSource&) = delete;
   virtual ~CameraSource() = default;
 
-  /// Negotiates and starts. Ok: streaming; what the camera lacks or did otherwise but can be flown with (an
-  /// exposure clamped) stands in warnings(). kMissing as long as it is not there; ask again a few times a
-  /// second.
+  /// Negotiates and starts. Ok: streaming; warnings() lists deviations that do not prevent flying (a clamped
+  /// exposure). kMissing while the camera is absent; call again a few times a second.
   virtual DeviceFault open() = 0;
   virtual void close() = 0;
   [[nodiscard]] virtual bool isOpen() const = 0;

@@ -1,19 +1,18 @@
 #pragma once
-// The 8-bit grey images of a camera's frames, one or two of each, whatever the format.
+// Converts the frames of a camera to 8-bit grey, one or two images per frame, from any format.
 //
-// - Luma as it is: its range, 16 to 235 as a rule, is not stretched. Deeper pixels: their upper 8 bits.
-// - A sensor behind a Bayer filter: at each pixel the binomial mean of 3x3, (1 2 1)' (1 2 1) / 16, mirrored
-//   at the border. Whatever the colour of the pixel, red, green and blue have the weights 1/4, 1/2, 1/4 in
-//   it: no pattern is left, and the four orders of colours need not be told apart. It costs what a blur of
-//   0.7 px costs.
-// - Words of less than 16 bits stand at the lower end, as V4L2 says, or at the upper one, as the Jetson
-//   Xavier delivers them: an image with more than half of its rows beyond the lower range is of the latter
-//   kind, and so are all that follow.
-// - JPEG, and PNG in its place: drivers/image/image_decoder.hpp.
+// - Luma is used unchanged: its range, usually 16 to 235, is not stretched. Deeper pixels: the upper 8 bits.
+// - Sensors with a Bayer filter: at each pixel the binomial mean of 3x3, (1 2 1)' (1 2 1) / 16, mirrored at
+//   the border. Red, green and blue have the weights 1/4, 1/2, 1/4 in it for a pixel of any colour: no
+//   pattern is left, and the four orders of colours need not be distinguished. The cost is a blur of 0.7 px.
+// - Words of less than 16 bits are stored at the lower end, as V4L2 specifies, or at the upper end, as the
+//   Jetson Xavier delivers them: an image with more than half of its rows beyond the lower range is of the
+//   latter kind, and so are all that follow.
+// - JPEG, and PNG instead of it: drivers/image/image_decoder.hpp.
 //
-// Errors: a damaged picture gives no images. Memory: of the images and of three rows, in reserve(); a
-// picture's codec allocates, nothing else does. Cost: a load and a store for each pixel, about 15 operations
-// behind a Bayer filter; nothing for 8-bit grey, whose images lie in the camera's own memory.
+// Errors: a damaged image gives no output. Memory: the images and three rows, in reserve(); only the decoder
+// of compressed images allocates. Cost: a load and a store per pixel, about 15 operations with a Bayer
+// filter; none for 8-bit grey, which is read in the camera's own memory.
 
 #include <array>
 #include <cstdint>

@@ -1,11 +1,11 @@
 #pragma once
-// JPEG and PNG bytes to 8-bit grey, straight into memory the caller owns.
+// Decodes JPEG and PNG to 8-bit grey, directly into the caller's memory.
 //
-// JPEG: the luma plane, through libjpeg-turbo with its exact integer transform. PNG: grey of any depth
-// (16 bits scaled to 8, rounded), colour by luma weights, alpha ignored, interlaced too. The kind is
-// told from the first bytes, not from a file's name. A picture that ends early is damaged, even where
-// the codec could fill in the rest.
-// Memory: the codecs' own (some 100 KiB while decoding). Not thread safe; one decoder per thread.
+// JPEG: the luma plane, through libjpeg-turbo with its exact integer transform. PNG: grey of any depth (16
+// bits scaled to 8, rounded), colour by luma weights, alpha ignored, interlaced images too. The format is
+// detected from the first bytes, not from the file name. A truncated image is damaged, even if the decoder
+// could fill in the rest. Memory: the decoders' own (some 100 KiB while decoding). Not thread safe; one
+// decoder per thread.
 
 #include <cstdint>
 #include <span>

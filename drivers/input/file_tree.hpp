@@ -1,13 +1,14 @@
 #pragma once
 // The files of a log, in a folder or in an archive that is not unpacked.
 //
-// Archives: zip, tar (also packed by gzip, bzip2, xz, zstd or lz4), 7z and whatever else libarchive tells by
-// content. Opening passes over the archive once and keeps its texts (all that is no picture) in memory. A
-// picture is read when it is asked for, by a reader of its folder's own, so that folders which are read in
-// the archive's order cost one pass each. What a reader passes over is kept, up to kMostKept bytes; asked for
-// after that, it costs another pass. Paths: from the root, with '/' between names; "" is the root. Threads:
-// one. Errors: InputError where a file cannot be opened or is damaged as a whole. Memory: a folder's is
-// nothing; an archive's its texts (kMostText), some 150 bytes a file, and kMostKept.
+// Archives: zip, tar (also compressed by gzip, bzip2, xz, zstd or lz4), 7z and everything else that
+// libarchive recognizes by content. Opening reads through the archive once and keeps its texts (all files
+// that are not images) in memory. An image is read on request, by a separate reader for each folder, so
+// folders that are read in the archive's order cost one pass each. Images that a reader passes are kept, up
+// to kMostKept bytes; beyond that, a later request costs another pass. Paths: from the root, with '/' between
+// names; "" is the root. Threads: one. Errors: InputError if a file cannot be opened or is damaged as a
+// whole. Memory: none for a folder; for an archive its texts (kMostText), some 150 bytes per file, and
+// kMostKept.
 
 #include <cstddef>
 #include <cstdint>

@@ -56,10 +56,10 @@ class AutopilotLink {
 
   /// What the autopilot sent; as MavlinkParser::feed.
   void receive(std::span<const std::uint8_t> bytes, Stamp read_at, Duration byte_time);
-  /// To be told once, in chunks of 50 characters, cut to kMostText; the oldest of more than kTexts go.
+  /// Sent once, in chunks of 50 characters, cut to kMostText; beyond kTexts the oldest are dropped.
   void say(mavlink::StatusText::Severity severity, std::string_view text);
 
-  /// To be told once, by the next step.
+  /// Sent once, by the next step.
   void show(const mavlink::ObstacleDistance& obstacles) { obstacles_ = obstacles; }
 
   /// What is to be sent at `now`: bytes written, none for the most part. `state`: the newest, or null.

@@ -1,13 +1,15 @@
 #pragma once
-// Keeps an autopilot sending inertial readings at a rate: what is asked of it, and when.
+// Keeps an autopilot sending inertial samples at a rate: decides what to request and when.
 //
-// Messages and the clock in, COMMAND_LONG (MAV_CMD_SET_MESSAGE_INTERVAL) out.
-// - Asked when the autopilot's HEARTBEAT is heard first, or again after kGone without one: it forgets at a
-//   restart.
-// - Each second the readings are counted. Below kReached of the rate the same is asked again; still below,
-//   1.25 times as much, up to twice: autopilots leave messages out, and round intervals.
-// - HIGHRES_IMU first. Where three seconds bring none, or one does and the autopilot refused it, RAW_IMU is
-//   asked for, then SCALED_IMU, then HIGHRES_IMU again.
+// Inputs: messages and the clock. Output: COMMAND_LONG (MAV_CMD_SET_MESSAGE_INTERVAL).
+// - Requests start with the autopilot's first HEARTBEAT, and again after kGone without one: an autopilot
+//   forgets them at a restart.
+// - The samples of each second are counted. Below kReached of the rate the request is repeated; if the rate
+//   is still too low, 1.25 times as much is requested, up to twice: autopilots drop messages and round
+//   intervals.
+// - HIGHRES_IMU first. After three seconds without any, or one second if the autopilot refused it, RAW_IMU is
+//   requested, then SCALED_IMU, then HIGHRES_IMU again.
+//
 // Memory: no allocation. Cost: O(1). Source: MAVLink common.xml; docs/mavlink.md.
 
 #include <cstdint>
@@ -38,7 +40,7 @@ class ImuStreamRequest {
   /// The message that readings are to be taken from.
   [[nodiscard]] std::uint32_t message() const;
   [[nodiscard]] const char* messageName() const;
-  /// Last asked for, 0 before; and what came in the last whole second [Hz].
+  /// Rate last requested, 0 before; and rate received in the last full second [Hz].
   [[nodiscard]] double asked() const { return asked_; }
   [[nodiscard]] double seen() const { return seen_; }
   /// The answer to the last question; empty: none yet.

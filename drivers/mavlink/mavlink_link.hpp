@@ -1,14 +1,15 @@
 #pragma once
-// What a receiver remembers of a MAVLink link: message numbers that it was not told about, and how far each
-// sender has counted. MavlinkParser joins it with a buffer for whoever reads a link for its messages.
+// State of a MAVLink receiver: CRC_EXTRA of unknown messages, and the sequence number of each sender.
+// MavlinkParser combines it with a buffer for readers of messages.
 //
-// A frame of an unknown message cannot be checked, for its CRC_EXTRA is unknown. But one of 256 values must
-// make its checksum right: the value that does is remembered, and from the second frame on that needs the
-// same one the message passes as a frame of unknown kind. So sequence gaps are right on links that carry any
-// dialect, and no byte is believed without a checksum of 16 bits. The first frame of each such message
-// counts as skipped bytes.
+// A frame of an unknown message cannot be checked because its CRC_EXTRA is unknown. But one of 256 values
+// must make its checksum right: that value is stored, and from the second frame that needs the same value the
+// message counts as a frame of unknown kind. So sequence gaps are correct on links that carry any dialect,
+// and no byte is accepted without a checksum of 16 bits. The first frame of each such message counts as
+// skipped bytes.
 //
-// Memory: fixed, under 1 kB without the buffer. Cost: O(1) a frame; 256 CRC steps more for unknown messages.
+// Memory: fixed, under 1 kB without the buffer. Cost: O(1) per frame; 256 CRC steps more for unknown
+// messages.
 
 #include <array>
 #include <cstddef>

@@ -22,7 +22,7 @@ using Covariance21 = std::array<float, 21>;
 enum class Frame : std::uint8_t {
   kLocalNed = 1,
   kBodyFrd = 12,
-  kLocalFrd = 20,  ///< as NED with a heading that nobody referred to north
+  kLocalFrd = 20,  ///< like NED, but with a heading not referenced to north
 };
 
 /// ODOMETRY.

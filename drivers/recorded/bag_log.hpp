@@ -1,12 +1,12 @@
 #pragma once
-// A log out of a bag of any kind (drivers/bag): rosbag2, MCAP, ROS 1.
+// A log from a bag of any kind (drivers/bag): rosbag2, MCAP, ROS 1.
 //
-// Streams are found by type: sensor_msgs/Imu, Image, CompressedImage. Where the calibration names topics,
-// those are taken; else the IMU topic with the most messages, and the first image topics by name whose
-// pictures have the calibration's size. A gyroscope and an accelerometer on two topics are joined
-// (join_imu.hpp). Stamps are the header's. A bag holds no calibration: LogOptions::calibration must name one.
-// Truth: a topic of poses whose name says so; its body is taken for the IMU. Opening reads the bag once;
-// memory 56 bytes a sample and about 100 a message.
+// Streams are found by type: sensor_msgs/Imu, Image, CompressedImage. If the calibration names topics, those
+// are used; otherwise the IMU topic with the most messages, and the first image topics by name whose images
+// have the calibration's size. A gyroscope and an accelerometer on two topics are joined (join_imu.hpp).
+// Stamps are the header's. A bag holds no calibration: LogOptions::calibration must name one. Truth: a topic
+// of poses whose name indicates it; its body frame is assumed to be the IMU. Opening reads the bag once;
+// memory 56 bytes per sample and about 100 per message.
 
 #include <memory>
 #include <string>

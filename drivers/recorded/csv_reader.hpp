@@ -1,11 +1,11 @@
 #pragma once
 // Rows of a comma- or blank-separated text file, one at a time, in constant memory.
 //
-// Blank lines and lines that begin with '#' are skipped, and a first line whose first field is no
-// number (a header without '#'). CR, surrounding blanks and a byte order mark are removed. A caller
-// that cannot use a row rejects it: the row is counted and named, and reading goes on; a file of which
-// more than a tenth (and more than three rows) is rejected, or that gives no row at all, is refused by
-// finish() with an InputError that names the first bad row.
+// Blank lines, lines that start with '#', and a first line whose first field is not a number (a header
+// without '#') are skipped. CR, surrounding blanks and a byte order mark are removed. A caller that cannot
+// use a row rejects it: the row is counted and named, and reading continues. finish() throws an InputError
+// that names the first bad row if more than a tenth of the rows (and more than three) are rejected, or if no
+// row is valid.
 
 #include <array>
 #include <cstdint>

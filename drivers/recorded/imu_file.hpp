@@ -40,8 +40,8 @@ double medianRate(const std::vector<ImuSample>& samples);
 void orderSamples(std::vector<ImuSample>& samples, const std::string& name, LogCounters& counters,
                   LogWarnings& warnings);
 
-/// Sizes of the specific force, without its vibration. With gravity in them they hold still: `low` is near
-/// `median`, whatever the unit. Linear acceleration goes through zero again and again.
+/// Norms of the specific force without vibration. If gravity is included they are steady: `low` is close to
+/// `median` in any unit. Linear acceleration repeatedly passes through zero.
 struct ForceLevel {
   double median = 0;
   double low = 0;  ///< below which a tenth of them is

@@ -1,6 +1,6 @@
 #pragma once
-// One stream of samples from a gyroscope and an accelerometer that were recorded apart, each with a rate and
-// stamps of its own, as RealSense cameras send them.
+// One stream of samples from a gyroscope and an accelerometer that were recorded separately, each with its
+// own rate and stamps, as RealSense cameras send them.
 
 #include <cstdint>
 #include <vector>

@@ -1,6 +1,6 @@
 #pragma once
-// The messages of a log in a bag: topics /imu0, /cam0/image_raw, /cam0/camera_info, ... and what stands in
-// them (docs/export.md).
+// The messages of a log in a bag: topics /imu0, /cam0/image_raw, /cam0/camera_info, ... and their content
+// (docs/export.md).
 
 #include <cstddef>
 #include <cstdint>

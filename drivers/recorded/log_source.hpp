@@ -1,12 +1,12 @@
 #pragma once
-// What a replay needs from a log, whatever it is stored in: calibration, one time-ordered stream of
-// IMU samples and single-camera images, and the truth when the log has one.
+// What a replay needs from a log of any format: calibration, one time-ordered stream of IMU samples and
+// single-camera images, and the truth if the log has one.
 //
-// Order: by stamp; at equal stamps the IMU sample first, then camera 0, then camera 1. So every sample
-// with a stamp not later than an image's comes before that image. The stream ends with the last image
-// (a log without images: with the last sample) unless LogOptions::imu_after_last_image says otherwise.
-// Frames: samples in body axes (an IMU turned in the body is turned back), raw (distorted) images.
-// Host side: opening allocates and throws InputError; next() reuses fixed buffers.
+// Order: by stamp; at equal stamps the IMU sample first, then camera 0, then camera 1. So every sample with a
+// stamp not later than an image's comes before that image. The stream ends with the last image (in a log
+// without images with the last sample) unless LogOptions::imu_after_last_image is set. Frames: samples in
+// body axes (samples of an IMU that is rotated in the body are rotated to it), raw (distorted) images. Host
+// side: opening allocates and throws InputError; next() reuses fixed buffers.
 
 #include <cstdint>
 #include <functional>

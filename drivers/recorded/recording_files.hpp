@@ -47,7 +47,7 @@ class RecordingReadLock {
   int folder_ = -1;
 };
 
-/// Bytes of one file through a window, so that records can be looked at whatever their size.
+/// Bytes of one file through a window, so that records of any size can be read.
 class RecordingWindow {
  public:
   explicit RecordingWindow(const RecordingFile& file);

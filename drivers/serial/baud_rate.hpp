@@ -1,5 +1,5 @@
 #pragma once
-// Any baud rate, by the kernel's termios2: in a source of its own, because its header and <termios.h> define
+// Sets any baud rate with the kernel's termios2. A separate source, because its header and <termios.h> define
 // the same names differently.
 
 namespace swiftlet {

@@ -11,8 +11,8 @@
 
 namespace swiftlet {
 
-/// A clock: a step of more than half the range forward is one back, so that the device's start anew shows.
-/// Cost: O(1). `T` is unsigned.
+/// Unwraps a clock: a step of more than half the range forward is a step back, so that a restart of the
+/// device is detected. Cost: O(1). `T` is unsigned.
 template <typename T>
 class WrappingClock {
  public:

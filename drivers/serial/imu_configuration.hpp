@@ -1,12 +1,12 @@
 #pragma once
-// What is asked of a sensor so that it sends what ImuDecoder reads, at a rate: one step after the other, each
-// after the reply to the one before. VectorNav, Xsens, MIP; a bridge sends by itself, an autopilot is asked
-// by ImuStreamRequest (drivers/mavlink).
+// Configures a sensor to send what ImuDecoder reads, at a rate: step by step, each after the reply to the
+// previous one. VectorNav, Xsens, MIP; a bridge needs none, and ImuStreamRequest (drivers/mavlink) configures
+// an autopilot.
 //
-// Rates: VectorNav divides 800 Hz, MIP its base rate, which it is asked for; Xsens takes a rate or gives
-// another back. The nearest is set, and rate() says which. After a refusal, or without a reply, the last step
-// is still to be sent: it lets the sensor send again. Memory: fixed. Threads: one. Source: the manuals named
-// by each protocol's header; docs/serial.md.
+// Rates: VectorNav divides 800 Hz, MIP its base rate, which is queried; Xsens accepts a rate or returns
+// another. The nearest is set, and rate() returns it. After a refusal or without a reply the last step must
+// still be sent: it lets the sensor send again. Memory: fixed. Threads: one. Source: the manuals named in
+// each protocol's header; docs/serial.md.
 
 #include <array>
 #include <cstdint>
@@ -21,7 +21,7 @@ struct ConfigurationStep {
   FixedVector<std::uint8_t, 40> bytes;
   std::span<const std::uint8_t> reply;    ///< bytes that its answer begins with when it was taken
   std::span<const std::uint8_t> refusal;  ///< the same when it was not; may be empty
-  std::size_t answer_length = 0;          ///< bytes from the reply's first on that answered() wants
+  std::size_t answer_length = 0;          ///< bytes that answered() needs, from the reply's first on
   const char* what = "";                  ///< in words
 };
 

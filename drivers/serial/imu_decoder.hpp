@@ -1,18 +1,19 @@
 #pragma once
-// Inertial readings out of the bytes of a serial link: one type for all protocols.
+// Decodes inertial samples from the bytes of a serial link: one type for all protocols.
 //
-// Use: feed() what a read gave, then next() until it says false, then nextEdge() and nextMavlink().
-// - Readings are in SI units and the sensor's own axes, with the sensor's clock unwrapped to 64 bits and the
-//   arrival of the frame's first byte. They do not depend on how the bytes were cut into reads.
-// - Nothing passes without its checksum; after garbage the search goes on byte by byte.
-// - A reading with NaN or infinity, or with a clock out of range, is dropped and counted.
-// Which messages each protocol reads: the headers of VectorNav, Xsens, Mip and Bridge. MAVLink gives one
-// inertial message, of one sender and one of its sensors: HIGHRES_IMU whose accelerations and rates are both
-// fresh, or, as takeMavlink() says, RAW_IMU or SCALED_IMU; and CAMERA_TRIGGER as edges. TIMESYNC, HEARTBEAT
-// and COMMAND_ACK come out through nextMavlink().
+// Use: feed() the bytes of a read, then next() until it returns false, then nextEdge() and nextMavlink().
+// - Samples are in SI units and the sensor's own axes, with the sensor's clock unwrapped to 64 bits and the
+//   arrival of the frame's first byte. They do not depend on how reads divided the bytes.
+// - Every frame must have a valid checksum; after garbage the search continues byte by byte.
+// - A sample with NaN or infinity, or with a clock out of range, is dropped and counted.
 //
-// Memory: about 93 kB inside the object, nothing allocated. Cost: 0.2 to 0.4 us a frame; garbage made to cost
-// the most, 0.25 us a byte.
+// The headers of VectorNav, Xsens, Mip and Bridge list the messages that each protocol reads. MAVLink gives
+// one inertial message of one sender and one of its sensors: HIGHRES_IMU whose accelerations and rates are
+// both new, or RAW_IMU or SCALED_IMU (takeMavlink()); and CAMERA_TRIGGER as edges. nextMavlink() gives
+// TIMESYNC, HEARTBEAT and COMMAND_ACK.
+//
+// Memory: about 93 kB inside the object, no allocation. Cost: 0.2 to 0.4 us per frame; at most, for
+// adversarial garbage, 0.25 us per byte.
 
 #include <cstddef>
 #include <cstdint>
@@ -61,15 +62,16 @@ struct ReceivedMavlink {
 class ImuDecoder {
  public:
   static constexpr std::size_t kMostFed = FrameBuffer<Xsens::kLongestFrame>::kMostFed;
-  /// Edges, and messages of nextMavlink(), that can wait: more than the frames that hold one in all bytes
-  /// that feed() takes, so that none is refused where they are asked for after each read.
+  /// Capacity for edges and for messages of nextMavlink(): more than the frames with one of them in all bytes
+  /// that feed() accepts, so none is lost if both are read after each read.
   static constexpr std::size_t kMostEvents = 512;
 
   explicit ImuDecoder(ImuProtocol protocol, MavlinkImuSource source = {})
       : protocol_(protocol), source_(source), wanted_(source) {}
 
-  /// Takes bytes that a read returned at `read_at` (CLOCK_MONOTONIC); `byte_time` is what one byte takes on
-  /// the wire, 0 on USB CDC. Says how many it took: all of kMostFed bytes once next() has said false.
+  /// Accepts bytes that a read returned at `read_at` (CLOCK_MONOTONIC); `byte_time` is the time of one byte
+  /// on the wire, 0 on USB CDC. Returns how many were accepted: all of kMostFed bytes after next() has
+  /// returned false.
   [[nodiscard]] std::size_t feed(std::span<const std::uint8_t> bytes, Stamp read_at, Duration byte_time) {
     return buffer_.feed(bytes, read_at, byte_time, counters_);
   }

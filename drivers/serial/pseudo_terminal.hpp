@@ -1,8 +1,8 @@
 #pragma once
-// The other end of a serial port made of nothing: for tests and for replay into an unmodified program.
+// The other end of a virtual serial port, for tests and for replay into an unmodified program.
 //
-// What is sent here comes out of the port at path(), and the other way round. hangUp() is the plug pulled.
-// The kernel holds some 4 kB that nobody read; more is refused, so that a replay sees its reader fall back.
+// Bytes sent here arrive at the port at path(), and the other way round. hangUp() unplugs it. The kernel
+// holds some 4 kB of unread bytes; more is refused, so a replay notices that its reader falls behind.
 
 #include <cstddef>
 #include <cstdint>
@@ -30,7 +30,7 @@ class PseudoTerminal {
   DeviceFault send(std::span<const std::uint8_t> bytes, std::size_t& taken);
   /// What the program wrote, without waiting; `count` may be 0.
   DeviceFault receive(std::span<std::uint8_t> into, std::size_t& count);
-  /// Bytes that were sent and that nobody has read.
+  /// Bytes sent and not yet read.
   [[nodiscard]] std::size_t unread() const;
 
  private:

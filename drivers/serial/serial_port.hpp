@@ -37,7 +37,7 @@ struct SerialErrors {
   std::uint32_t overrun = 0;  ///< bytes that the chip lost
   std::uint32_t framing = 0;  ///< a stop bit that was none: wrong baud rate, or noise
   std::uint32_t parity = 0;
-  std::uint32_t buffer_overrun = 0;  ///< bytes that the kernel lost: nobody read in time
+  std::uint32_t buffer_overrun = 0;  ///< bytes that the kernel lost: not read in time
 };
 
 class SerialPort {

@@ -9,9 +9,9 @@
 namespace swiftlet {
 
 struct TriggerEdge {
-  Stamp arrival;              ///< CLOCK_MONOTONIC, of the first byte of the message that told of it
+  Stamp arrival;              ///< CLOCK_MONOTONIC, of the first byte of the message that reported it
   Stamp device;               ///< of the edge, in the sensor's clock: comparable with ImuReading::device
-  std::uint64_t counter = 0;  ///< of edges, unwrapped: a jump shows edges that were not told of
+  std::uint64_t counter = 0;  ///< of edges, unwrapped: a jump reveals edges that were not reported
   std::uint8_t line = 0;      ///< which input, where there are several
   bool rising = true;
 

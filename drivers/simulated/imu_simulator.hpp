@@ -23,7 +23,7 @@ namespace swiftlet {
 /// Motor vibration as a sum of sines with random phases, constant amplitude, in a band.
 struct Vibration {
   double accel_amplitude = 0;  ///< m/s^2: a sine of this amplitude on each axis has the same power
-  double gyro_amplitude = 0;   ///< rad/s, likewise
+  double gyro_amplitude = 0;   ///< rad/s: the same for the gyro
   double low_hz = 80;
   double high_hz = 150;
 };

@@ -20,7 +20,7 @@ class SimulatedFlight {
   [[nodiscard]] const SplineTrajectory& trajectory() const { return trajectory_; }
   [[nodiscard]] const World& world() const { return world_; }
   [[nodiscard]] const Rig& trueRig() const { return true_rig_; }
-  /// What the estimator is told: extrinsics turned, time shift zero, as the settings ask.
+  /// The calibration given to the estimator: extrinsics rotated, time offset zero, as configured.
   [[nodiscard]] const Rig& givenRig() const { return given_rig_; }
   [[nodiscard]] const SimulatedImu& imu() const { return imu_; }
   [[nodiscard]] double duration() const { return duration_; }  ///< s of IMU data
@@ -60,8 +60,8 @@ class FlightCameras {
   [[nodiscard]] const ExposureSetting& takenWith() const { return taken_with_; }
   [[nodiscard]] std::size_t cameraCount() const { return renderers_.size(); }
 
-  /// Image k of every camera, k rising; `grey[c]` holds width x height bytes. An entry whose camera
-  /// is missing then is left as it was and `present` says so.
+  /// Image k of every camera, k increasing; `grey[c]` holds width x height bytes. An entry whose camera is
+  /// missing at that time is unchanged, and `present` is false.
   void render(int k, const std::array<std::uint8_t*, kMaxCameras>& grey,
               std::array<bool, kMaxCameras>& present);
 

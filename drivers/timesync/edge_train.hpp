@@ -1,13 +1,14 @@
 #pragma once
-// The edges of a periodic trigger, numbered as the pulses that made them: also where edges were missed, and
-// although others came that were no pulse.
+// The edges of a periodic trigger, numbered like the pulses that made them, despite missed edges and
+// additional glitches.
 //
-// The number comes from the time: an edge lies on the grid of the tracked period or it is a glitch. Cameras
-// of one trigger share one train, so equal numbers are equal exposures.
+// The number follows from the time: an edge is on the grid of the tracked period, or it is a glitch. Cameras
+// with one trigger share one train, so equal numbers are equal exposures.
 //
-// - On the grid: within 0.1 periods. Of two edges on one place the one closer to the grid counts.
+// - On the grid: within 0.1 periods. Of two edges at one position the one closer to the grid counts.
 // - Gaps of up to 16 periods are bridged. After a longer one, or when four edges in a row agree on another
-//   grid, numbering starts anew and `epoch` rises.
+//   grid, numbering restarts and `epoch` increases.
+//
 // Cost: O(1). Memory: 256 edges, 4 KiB. Any stamps; nothing overflows.
 
 #include <array>

@@ -1,21 +1,22 @@
 #pragma once
-// Stamps of CLOCK_REALTIME, as ROS's drivers give them, on CLOCK_MONOTONIC: by one difference of the two
-// clocks, read at the start.
+// Converts stamps of CLOCK_REALTIME, which ROS drivers use, to CLOCK_MONOTONIC with one offset between the
+// two clocks, read at the start.
 //
-// NTP slews both clocks alike, so the difference stays; a step moves the wall clock alone. Some drivers
-// follow it (they read the wall clock for each message), others do not (they read it once and go on by the
-// device's clock), and messages of both are on their way when it happens. Which difference is right is seen
-// from the delay from stamp to arrival, whose usual value is the smallest of the last seconds:
-// - set ahead: a message of a driver that follows has a delay below the usual one, which no lateness makes.
-//   The new difference is taken at once.
-// - set back: it has a delay above the usual one, as a late message has. Three in a row are believed; the
-//   first two of them get no stamp.
-// The choice stays open for kOpen after a step, and after a silence, in which a driver may have started anew.
+// NTP slews both clocks alike, so the offset stays; a step changes only the wall clock. Some drivers follow a
+// step (they read the wall clock for each message), others do not (they read it once and continue with the
+// device's clock), and messages of both are in transit when it happens. The right offset shows in the delay
+// from stamp to arrival, whose usual value is the smallest of the last seconds:
+// - Set ahead: a message of a driver that follows has a delay below the usual one, which lateness cannot
+//   cause. The new offset is used at once.
+// - Set back: the delay is above the usual one, as for a late message. Three in a row are accepted; the first
+//   two get no stamp.
 //
-// A stamp farther than kFarthest from its arrival is of another clock and is refused: arrival is never taken
-// in its place.
+// The choice stays open for kOpen after a step, and after a silence, in which a driver may have restarted.
 //
-// Errors: values. Threads: one. O(1), nothing allocated. Pure: clocks are read by who calls.
+// A stamp farther than kFarthest from its arrival is from another clock and is rejected; the arrival is never
+// used instead.
+//
+// Errors: values. Threads: one. O(1), no allocation. Pure: the caller reads the clocks.
 
 #include <cstdint>
 #include <optional>

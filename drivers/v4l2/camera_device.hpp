@@ -1,8 +1,8 @@
 #pragma once
-// One camera behind a V4L2 capture node: negotiated, streaming into the kernel's buffers, which are lent out
-// one by one and go back when they are let go. No copy here: GreyReader makes the only one.
+// A camera behind a V4L2 capture node: negotiated, streaming into the kernel's buffers, which are lent one by
+// one and return when they are released. No copy here: GreyReader makes the only one.
 //
-// Memory: the kernel's buffers (`buffers` images), mapped at open; no allocation. Cost of a frame: two calls.
+// Memory: the kernel's buffers (`buffers` images), mapped at open; no allocation. Cost per frame: two calls.
 // Source: linux/videodev2.h; the kernel's Documentation/userspace-api/media/v4l.
 
 #include <cstdint>
@@ -44,7 +44,7 @@ class CameraDevice : public CameraSource {
   void giveBack(std::uint32_t buffer) override;
   void shut();
   DeviceFault negotiate();
-  /// The first format that is asked for, or taken, and comes with the size and rate asked for.
+  /// The first requested or supported format that comes with the requested size and rate.
   DeviceFault chooseFormat();
   DeviceFault setFormat(const PixelFormat& format, const NodeFormat& before);
   DeviceFault setRate();

@@ -1,5 +1,5 @@
 #pragma once
-// What a V4L2 camera is asked for.
+// Requested settings of a V4L2 camera.
 
 #include <array>
 #include <cstddef>

@@ -9,7 +9,7 @@
 
 namespace swiftlet {
 
-/// `date` as YYYY-MM-DD stands in the page's foot.
+/// `date` (YYYY-MM-DD) is printed in the page's footer.
 std::string manPage(const CLI::App& app, const std::string& version, const std::string& date);
 
 /// Plain text as roff takes it: no character of it is a command, a hyphen stays one when copied.

@@ -5,12 +5,12 @@
 
 namespace swiftlet {
 
-/// Clears the flag; from now on SIGINT and SIGTERM set it, and end the program no more. Nor do writes to a
-/// pipe that nobody reads (SIGPIPE) or to a terminal that belongs to another program (SIGTTOU).
+/// Clears the flag. From now on SIGINT and SIGTERM set it instead of ending the program. Writes to a closed
+/// pipe (SIGPIPE) or to a terminal that belongs to another program (SIGTTOU) do not end it either.
 const std::atomic<bool>& stopOnSignal();
 
-/// Clears the flag; from now on SIGHUP, the terminal's end, sets it and does not end the program. A program
-/// started with SIGHUP ignored (nohup) goes on ignoring it.
+/// Clears the flag. From now on SIGHUP, the terminal's end, sets it instead of ending the program. A program
+/// started with SIGHUP ignored (nohup) keeps ignoring it.
 std::atomic<bool>& surviveHangUp();
 
 }  // namespace swiftlet

@@ -10,7 +10,7 @@
 
 namespace swiftlet {
 
-/// kExitFailed, with a line that says so, when the estimate was good for less than half of the run.
+/// Returns kExitFailed and prints the reason if the estimate was good for less than half of the run.
 inline int verdictOf(const nlohmann::ordered_json& summary) {
   constexpr double kMost = 0.5;
   const double share = summary["verdict"]["share_good"].get<double>();

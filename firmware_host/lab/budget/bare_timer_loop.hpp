@@ -24,14 +24,14 @@ class BareTimerLoop {
   BareTimerLoop(const BareTimerLoop&) = delete;
   BareTimerLoop& operator=(const BareTimerLoop&) = delete;
 
-  /// Begins anew with empty figures; nothing but the report when it is running already.
+  /// Restarts with empty figures; only reports if it is already running.
   ThreadReport start(const ThreadSettings& settings, Duration period = kPeriod);
   void stop();
 
   /// s, one entry a wake-up.
   [[nodiscard]] const LatencyHistogram& lateness() const { return lateness_; }
-  /// Periods that were over before the thread woke for them; each is part of the lateness of the wake-up
-  /// before and counts in no entry of its own.
+  /// Periods that had passed before the thread woke for them; each is part of the lateness of the previous
+  /// wake-up and has no entry of its own.
   [[nodiscard]] std::uint64_t skipped() const { return skipped_; }
 
  private:

@@ -1,10 +1,10 @@
 #pragma once
-// Two estimates of one flight compared where both have a pose: a map's keyframes beside the causal poses of
-// the same images. Errors over different stamps are not comparable (a start that only one of them has, more
-// keyframes where the flight was quick).
+// Compares two estimates of one flight where both have a pose: a map's keyframes against the causal poses of
+// the same images. Errors over different stamps are not comparable (one estimate may include the start or
+// have more keyframes in fast parts).
 //
-// Both are restricted to the stamps that they share (equal to the nanosecond) and that have truth, and each
-// is aligned by itself. In time order. Cost O(poses log truths).
+// Both are restricted to common stamps (equal to the nanosecond) that have truth, and each is aligned
+// separately. In time order. Cost O(poses log truths).
 
 #include "firmware_host/lab/evaluation/accuracy.hpp"
 

@@ -29,9 +29,9 @@ struct Truth {
 /// `without_images`: a log is read as one of tracks, which need not hold images.
 Truth readTruth(const std::string& path, bool without_images = false);
 
-/// What summary.json holds under "accuracy": odometry.tum over all and from kCommonStart, SE(3) and yaw
-/// alignment; states.csv with its consistency; map.tum when it exists, by itself and beside odometry.tum at
-/// the same stamps; how much of the flight revisits.
+/// Content of "accuracy" in summary.json: odometry.tum over all and from kCommonStart, SE(3) and yaw
+/// alignment; states.csv with its consistency; map.tum if it exists, alone and compared with odometry.tum at
+/// the same stamps; the share of the flight that revisits places.
 nlohmann::ordered_json runAccuracyJson(const std::string& folder, const Trajectory& truth,
                                        const std::string& truth_name, Stamp first_image,
                                        const EvaluationGroup& settings);

@@ -20,7 +20,7 @@ struct LoopAccuracy {
   std::size_t selected_right = 0;
   std::size_t without_truth = 0;
   double median_distance = 0;  ///< m, of the right ones
-  double median_degrees = 0;   ///< likewise, of rotation
+  double median_degrees = 0;   ///< rotation, of the right ones
 };
 
 LoopAccuracy loopAccuracy(std::span<const MapLoop> loops, const Trajectory& truth, Duration max_gap);

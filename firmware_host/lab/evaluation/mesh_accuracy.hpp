@@ -1,8 +1,8 @@
 #pragma once
-// The figures of a run's meshes: those of its frames, pooled, and that of the whole flight.
+// Accuracy of a run's meshes: those of its frames, pooled, and that of the whole flight.
 //
-// Pooled: all samples of all meshes at one density, so that every square metre of mesh weighs the same;
-// all seen pixels of all frames. Medians: over the meshes, each by itself.
+// Pooled: all samples of all meshes at one density, so that every square metre of mesh weighs the same; all
+// seen pixels of all frames. Medians: over the meshes, each evaluated alone.
 
 #include <optional>
 #include <string>
@@ -33,8 +33,8 @@ struct MeshSequenceAccuracy {
   double unlabelled_share = 0;
 };
 
-/// Gathers the meshes of a sequence; each in the true surface's axes, with what its frame saw. Without a true
-/// surface (null) only what is drawn of the hull can be said.
+/// Collects the meshes of a sequence, each in the true surface's axes, with what its frame saw. Without a
+/// true surface (null) only the coverage of the hull is evaluated.
 class MeshSequence {
  public:
   MeshSequence(const TrueSurface* truth, double density) : truth_(truth), density_(density) {}
@@ -64,7 +64,7 @@ struct CompleteMeshAccuracy {
   DistanceStatistics distance;
   double label_share = 0;
   double unlabelled_share = 0;
-  std::size_t observed = 0;  ///< points of the true surface that were seen; 0: nobody says which
+  std::size_t observed = 0;  ///< observed points of the true surface; 0: unknown
   std::size_t covered = 0;   ///< of them, with mesh within kCovered
   LabelConfusion labels;     ///< of the samples
   /// Of a map: the same once it lies on the true surface as well as it can.
@@ -85,7 +85,7 @@ CompleteMeshAccuracy completeMeshAccuracy(const TriangleMesh& mesh, const TrueSu
 struct MeshAccuracy {
   std::string truth;               ///< file of the true surface
   std::string alignment;           ///< how the run was moved onto the truth
-  std::size_t frames = 0;          ///< listed in the section asked for
+  std::size_t frames = 0;          ///< listed in the selected section
   std::size_t without_truth = 0;   ///< of them, without a true pose: left out
   std::size_t keyframes_bare = 0;  ///< of the rest, keyframes with no frame mesh
   std::optional<MeshSequenceAccuracy> frame;

@@ -36,8 +36,8 @@ class CameraPlayer {
 
   /// The driver's "Disconnect": readers get ENODEV, and the node returns when they have closed it.
   DeviceFault unplug();
-  /// The driver's "Percentage of Dropped Buffers", all or none. Its output stands still too: what waited is
-  /// old when it goes on.
+  /// The driver's "Percentage of Dropped Buffers", all or none. Its output also stops: waiting images are old
+  /// when it continues.
   DeviceFault stall(bool on);
   /// The next frame comes as a damaged one. Between an output's instant, half a period after the camera's,
   /// and the camera's next: the driver damages what comes first.

@@ -15,7 +15,7 @@ struct HilEvidence {
     Stamp stamp;
     std::string text;
   };
-  /// A pose and what the estimator said of it.
+  /// A pose and its health.
   struct Judged {
     Stamp stamp;
     SE3 T_world_body;
@@ -26,7 +26,7 @@ struct HilEvidence {
   FaultTimeline faults;
   Stamp first_image, last_image;  ///< CLOCK_MONOTONIC, as all stamps here
   bool complete = false;          ///< played to the end, every image when it was due
-  bool finished = false;          ///< the flight ended by itself
+  bool finished = false;          ///< the flight finished normally
   std::vector<Line> remarks;      ///< of events.log
   std::vector<Judged> frames;     ///< odometry.tum
   std::vector<Judged> states;     ///< imu_rate.tum; empty where the flight did not write it

@@ -20,7 +20,7 @@ class ImuWire {
   virtual DeviceFault open() = 0;
   /// Takes the device away, as if unplugged; open() brings it back.
   virtual DeviceFault unplug() = 0;
-  /// Somebody reads; of a bus nobody can tell: true.
+  /// A reader is connected; on a bus this is unknown: true.
   [[nodiscard]] virtual bool isRead() = 0;
   /// Sends a reading; what comes the other way is thrown away.
   virtual DeviceFault send(const ImuReading& reading) = 0;

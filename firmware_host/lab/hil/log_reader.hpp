@@ -1,6 +1,6 @@
 #pragma once
-// Reads and decodes a log ahead on a thread of its own, so that who plays it is not held up: samples, and
-// images of each camera, in order. Host side: it locks and allocates.
+// Reads and decodes a log ahead on its own thread, so that playing is not delayed: samples, and images of
+// each camera, in order. Host side: it locks and allocates.
 
 #include <array>
 #include <condition_variable>

@@ -27,8 +27,8 @@ struct GivenPoseSettings {
   double horizon = 30.0;                  ///< s: no state older than this stays
   int max_recent = 4;
   int max_keyframes = 12;
-  /// Sightings in keyframes stay for good, so that a landmark found again is known by all of them. Memory
-  /// grows with the flight.
+  /// Sightings in keyframes are kept permanently, so that a landmark found again is known by all of them.
+  /// Memory grows with the flight.
   bool keep_sightings = false;
 };
 

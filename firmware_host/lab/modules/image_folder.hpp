@@ -16,7 +16,7 @@ namespace swiftlet {
 /// cannot be read or holds none.
 std::vector<std::string> imagesUnder(const std::string& folder);
 
-/// One picture, decoded to 8-bit grey whatever size it has. Keeps its memory for the next.
+/// One image of any size, decoded to 8-bit grey. Its memory is reused for the next.
 class ImageFile {
  public:
   /// False for what cannot be decoded.

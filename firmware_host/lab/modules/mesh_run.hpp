@@ -23,8 +23,8 @@ struct MeshRunResult {
   bool has_mesh = false;           ///< some frame had a face
 };
 
-/// Writes meshes/, local_mesh.ply, trajectory.tum (the poses used), summary.json and, where asked for,
-/// complete_mesh.ply. InputError for bad input; nothing is written before the first frame that has a pose.
+/// Writes meshes/, local_mesh.ply, trajectory.tum (the poses used), summary.json and, on request,
+/// complete_mesh.ply. InputError for bad input; nothing is written before the first frame with a pose.
 MeshRunResult runMesh(const MeshRequest& request, const Settings& settings);
 
 }  // namespace swiftlet

@@ -1,10 +1,10 @@
 #pragma once
-// All images of a log searched for a board.
+// Searches all images of a log for a board.
 //
-// The log needs no calibration: none is read (LogOptions::uncalibrated). Images are decoded one after the
-// other and searched by as many threads as the machine has, in batches, each thread with a detector of its
-// own; the result does not depend on their number. Memory: 16 images and a detector a thread, beside the
-// views. Cost: 20 to 50 ms for an image of 752 x 480, by one thread.
+// The log needs no calibration: none is read (LogOptions::uncalibrated). Images are decoded one by one and
+// searched in batches by as many threads as the machine has, each with its own detector; the result does not
+// depend on their number. Memory: 16 images and a detector per thread, plus the views. Cost: 20 to 50 ms per
+// image of 752 x 480 on one thread.
 
 #include <Eigen/Core>
 #include <array>

@@ -1,10 +1,11 @@
 #pragma once
-// Whether a calibration still holds, from a flight without a board: what `swiftlet calibrate check` calls.
+// Checks from a flight without a board whether a calibration still holds: implements `swiftlet calibrate
+// check`.
 //
-// The estimator flies the log, with its own refinement of the calibration on. Its keyframes are cut into
-// pieces, each of which finds the calibration that it wants (flight_piece.hpp). The pieces' information is
-// added; their scatter, by leaving each out in turn, tells how far the sum is to be trusted.
-// Method, limits and their reasons: docs/calibration.md. Off the flight path.
+// The estimator runs on the log with its own refinement of the calibration enabled. Its keyframes are cut
+// into pieces, and each piece estimates the calibration (flight_piece.hpp). The information of the pieces is
+// added; their scatter, from leaving each out in turn, gives the uncertainty of the sum. Method, limits and
+// their reasons: docs/calibration.md. Off the flight path.
 
 #include <array>
 #include <string>

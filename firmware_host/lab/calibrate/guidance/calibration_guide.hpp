@@ -78,7 +78,7 @@ class CalibrationGuide {
 
   /// What to do next, the most urgent first, a sentence each; empty: enough.
   [[nodiscard]] std::vector<std::string> missing() const;
-  /// Share of what is asked for that is there, 0 to 1.
+  /// Share of the required data that has been recorded, 0 to 1.
   [[nodiscard]] double progress() const;
 
  private:

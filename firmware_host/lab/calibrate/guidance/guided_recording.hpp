@@ -1,11 +1,11 @@
 #pragma once
-// Guidance beside a recording for calibration (docs/calibration.md): takes some images a second of each
-// camera and all IMU samples, finds the board, and says what is missing, on the console and in the live view.
-// The recording ends once nothing is missing.
+// Guidance during a recording for calibration (docs/calibration.md): takes some images per second of each
+// camera and all IMU samples, finds the board, and reports what is missing on the console and in the live
+// view. The recording ends when nothing is missing.
 //
-// Threads: the devices' copy an image into memory that waits for it, and samples into a ring, and wait for
-// nobody; one of low priority finds corners and serves the view. Memory: an image a camera, and the board
-// detector's. Cost: some 100 ms of the low thread a pair, kLooks times a second at most.
+// Threads: the devices' threads copy an image into waiting memory and samples into a ring, and never wait; a
+// low-priority thread finds corners and serves the view. Memory: an image per camera, and the board
+// detector's. Cost: some 100 ms of the low-priority thread per pair, at most kLooks times a second.
 
 #include <array>
 #include <atomic>

@@ -1,9 +1,9 @@
 #pragma once
 // The pages of the parts of `swiftlet calibrate`, with the rules for good, usable and repeat.
 //
-// Repeat: the solution has reasons of its own. Usable: a rule below is broken. Good: none is. Each rule
-// stands in the page's table with what was found. Limits are angles where they are about the image, so that
-// they mean the same for every lens.
+// Repeat: the solution gives reasons against it. Usable: a rule below is violated. Good: none is. The page's
+// table lists each rule with the value found. Limits about the image are angles, so they mean the same for
+// every lens.
 
 #include <string>
 
