@@ -161,7 +161,7 @@ DeviceFault CanBus::setUp() {
     ok = ok && set(SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), settings_.filter_count * sizeof(can_filter));
   }
   if (takes_fd_) ok = ok && set(SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof(on));
-  if (!ok) return deviceFault(DeviceFaultKind::kFailed, errno, "set up the socket");
+  if (!ok) return deviceFault(DeviceFaultKind::kFailed, errno, "setting up the socket");
 
   // Beyond net.core.rmem_max where the right is there; the kernel doubles and answers with the doubled.
   if (!set(SOL_SOCKET, SO_RCVBUFFORCE, &settings_.receive_buffer, sizeof(int))) {
@@ -237,7 +237,7 @@ DeviceFault CanBus::next(std::optional<CanFrame>& frame) {
       close();
       if (error == ENODEV)
         return deviceFault(DeviceFaultKind::kUnplugged, error, "the interface was removed");
-      return deviceFault(DeviceFaultKind::kFailed, error, "received from the socket");
+      return deviceFault(DeviceFaultKind::kFailed, error, "reading the socket");
     }
     const bool fd = size == static_cast<ssize_t>(CANFD_MTU);
     if (!fd && size != static_cast<ssize_t>(CAN_MTU)) continue;
@@ -293,7 +293,7 @@ DeviceFault CanBus::send(const CanFrame& frame) {
   if (errno == ENOBUFS || errno == EAGAIN)
     return deviceFault(DeviceFaultKind::kBusy, errno, "its queue is full");
   if (errno == ENETDOWN) return interfaceFault(ENETDOWN);
-  return deviceFault(DeviceFaultKind::kFailed, errno, "sent a frame");
+  return deviceFault(DeviceFaultKind::kFailed, errno, "sending a frame");
 }
 
 }  // namespace swiftlet

@@ -29,7 +29,7 @@ DeviceFault requestFault(int error, const GpioLine& line) {
                        "line %u does not support interrupts: use another line", line.offset);
   }
   if (error == ENODEV) return deviceFault(DeviceFaultKind::kUnplugged, error, "line %u", line.offset);
-  return openFault(error, "asking for the edges of line " + std::to_string(line.offset));
+  return openFault(error, "requesting the edges of line " + std::to_string(line.offset));
 }
 
 }  // namespace

@@ -87,7 +87,7 @@ DeviceFault GpioChip::line(std::uint32_t offset, GpioLine& out) const {
   info.line_offset = offset;
   if (ioctl(fd_, GPIO_GET_LINEINFO_IOCTL, &info) != 0) {
     const DeviceFaultKind kind = errno == ENODEV ? DeviceFaultKind::kUnplugged : DeviceFaultKind::kFailed;
-    return deviceFault(kind, errno, "asking for line %u", offset);
+    return deviceFault(kind, errno, "requesting line %u", offset);
   }
   out = {offset, fieldText(info.name), fieldText(info.consumer), (info.flags & GPIOLINE_FLAG_KERNEL) != 0,
          (info.flags & GPIOLINE_FLAG_IS_OUT) != 0};

@@ -33,7 +33,7 @@ bool EdgeSource::hasLibgpiod() { return true; }
 
 DeviceFault EdgeSource::openLibgpiod(const std::string& path, std::uint32_t offset, EdgeKind edges) {
   chip_ = gpiod_chip_open(path.c_str());
-  if (chip_ == nullptr) return deviceFault(DeviceFaultKind::kFailed, errno, "opening by libgpiod");
+  if (chip_ == nullptr) return deviceFault(DeviceFaultKind::kFailed, errno, "opening with libgpiod");
   interface_ = EdgeInterface::kLibgpiod;
   line_ = gpiod_chip_get_line(chip_, offset);
   int result = -1;

@@ -97,7 +97,7 @@ void RunningPipeline::dispose(std::unique_ptr<RunningPipeline> pipeline) {
 }
 
 DeviceFault RunningPipeline::start(Duration patience) {
-  if (!startKeeper()) return deviceFault(DeviceFaultKind::kFailed, errno, "to make a thread");
+  if (!startKeeper()) return deviceFault(DeviceFaultKind::kFailed, errno, "creating a thread");
   if (!awaitEndOf(Phase::kStopping, patience)) {
     return deviceFault(DeviceFaultKind::kBusy, 0, "the previous pipeline does not stop");
   }

@@ -140,7 +140,7 @@ DeviceFault CameraControls::setExposure(Duration exposure) {
   const std::int64_t steps = stepsOf(exposure);
   if (exposure_id_ == V4L2_CID_EXPOSURE) lengthenFrame(steps);
   const int error = write(exposure_id_, steps);
-  if (error != 0) return VideoNode::callFault(error, "set the exposure time");
+  if (error != 0) return VideoNode::callFault(error, "setting the exposure time");
   const std::optional<Duration> set = this->exposure();
   if (!set || std::abs((*set - exposure).seconds()) > step_) {
     return deviceFault(DeviceFaultKind::kChanged, 0, "exposure: requested %.1f ms, set %.1f ms",
@@ -153,7 +153,7 @@ DeviceFault CameraControls::setGain(std::int32_t gain) {
   if (gain_id_ == 0) return deviceFault(DeviceFaultKind::kUnsupported, 0, "the gain cannot be set");
   automaticGainOff();
   const int error = write(gain_id_, gain);
-  if (error != 0) return VideoNode::callFault(error, "set the gain");
+  if (error != 0) return VideoNode::callFault(error, "setting the gain");
   const std::optional<std::int32_t> set = this->gain();
   if (set != gain) {
     return deviceFault(DeviceFaultKind::kChanged, 0, "gain: requested %d, set %d", gain, set.value_or(0));
@@ -243,7 +243,7 @@ DeviceFault CameraControls::set(const ExposureSetting& setting) {
     controls.count = 2;
   }
   if (port_->call(VIDIOC_S_EXT_CTRLS, &controls) == 0) return {};
-  return VideoNode::callFault(errno, "set exposure and gain");
+  return VideoNode::callFault(errno, "setting exposure and gain");
 }
 
 }  // namespace swiftlet

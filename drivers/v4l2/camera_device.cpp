@@ -105,7 +105,7 @@ DeviceFault CameraDevice::chooseFormat() {
   const std::string_view asked = settings_.format.data();
   const std::optional<PixelFormat> wanted = pixelFormat(asked);
   NodeFormat before;
-  if (node_.readFormat(before) != 0) return VideoNode::callFault(errno, "read the format");
+  if (node_.readFormat(before) != 0) return VideoNode::callFault(errno, "reading the format");
   DeviceFault first;
   for (const PixelFormat& candidate : kPixelFormats) {
     // Two cameras in one image are not what an undecided user has.
@@ -131,7 +131,7 @@ DeviceFault CameraDevice::setFormat(const PixelFormat& wanted, const NodeFormat&
   const int width = settings_.width > 0 ? settings_.width : before.width;
   const int height = settings_.height > 0 ? settings_.height : before.height;
   NodeFormat format = {code(wanted.fourcc()), width, height};
-  if (node_.setFormat(format) != 0) return VideoNode::callFault(errno, "set the format (VIDIOC_S_FMT)");
+  if (node_.setFormat(format) != 0) return VideoNode::callFault(errno, "setting the format (VIDIOC_S_FMT)");
   if (format.fourcc != code(wanted.fourcc()) || format.width != width || format.height != height) {
     std::array<char, kOfferBytes> offers = {};
     writeSizes(node_, code(wanted.fourcc()), offers.data(), offers.size());
@@ -156,7 +156,8 @@ DeviceFault CameraDevice::setRate() {
   if (settings_.rate > 0) {
     capture.timeperframe = {kRateNumerator,
                             static_cast<std::uint32_t>(std::lround(settings_.rate * kRateNumerator))};
-    if (node_.call(VIDIOC_S_PARM, &parameters) != 0) return VideoNode::callFault(errno, "set the frame rate");
+    if (node_.call(VIDIOC_S_PARM, &parameters) != 0)
+      return VideoNode::callFault(errno, "setting the frame rate");
   }
   if (capture.timeperframe.numerator == 0) return {};
   facts_.rate = static_cast<double>(capture.timeperframe.denominator) / capture.timeperframe.numerator;
@@ -189,7 +190,7 @@ DeviceFault CameraDevice::setBuffers() {
     warn(fault);
   }
   for (std::uint32_t i = 0; i < facts_.buffers; ++i) {
-    if (!node_.queue(i)) return VideoNode::callFault(errno, "handed a buffer over (VIDIOC_QBUF)");
+    if (!node_.queue(i)) return VideoNode::callFault(errno, "queuing a buffer (VIDIOC_QBUF)");
   }
   return {};
 }
@@ -223,7 +224,7 @@ DeviceFault CameraDevice::next(CapturedFrame& frame) {
   for (std::size_t attempt = 0; attempt < VideoNode::kMaxBuffers; ++attempt) {
     FilledBuffer filled;
     if (!node_.dequeue(filled)) {
-      if (errno != EAGAIN) return closedBy(VideoNode::callFault(errno, "took an image (VIDIOC_DQBUF)"));
+      if (errno != EAGAIN) return closedBy(VideoNode::callFault(errno, "taking an image (VIDIOC_DQBUF)"));
       // A dead queue answers "nothing yet" for ever.
       if (!node_.inError()) return {};
       return closedBy(deviceFault(DeviceFaultKind::kUnplugged, 0, "the stream ended"));

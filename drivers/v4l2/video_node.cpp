@@ -159,19 +159,19 @@ DeviceFault VideoNode::mapBuffers(std::uint32_t count) {
   request.count = std::min<std::uint32_t>(count, kMaxBuffers);
   request.type = type_;
   request.memory = V4L2_MEMORY_MMAP;
-  if (call(VIDIOC_REQBUFS, &request) != 0) return callFault(errno, "asked for buffers (VIDIOC_REQBUFS)");
+  if (call(VIDIOC_REQBUFS, &request) != 0) return callFault(errno, "requesting buffers (VIDIOC_REQBUFS)");
   // Some drivers give more than they are asked for.
   const std::size_t given = std::min<std::size_t>(request.count, kMaxBuffers);
   for (std::size_t i = 0; i < given; ++i) {
     Request asked(type_, severalPlanes());
     asked.buffer.index = static_cast<std::uint32_t>(i);
     if (call(VIDIOC_QUERYBUF, &asked.buffer) != 0) {
-      return callFault(errno, "asked for a buffer (VIDIOC_QUERYBUF)");
+      return callFault(errno, "querying a buffer (VIDIOC_QUERYBUF)");
     }
     const std::size_t length = severalPlanes() ? asked.planes[0].length : asked.buffer.length;
     const std::uint32_t offset = severalPlanes() ? asked.planes[0].m.mem_offset : asked.buffer.m.offset;
     void* bytes = ::mmap(nullptr, length, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, fd_, offset);
-    if (bytes == MAP_FAILED) return callFault(errno, "mapped a buffer (mmap)");
+    if (bytes == MAP_FAILED) return callFault(errno, "mapping a buffer (mmap)");
     buffers_[buffer_count_++] = {static_cast<std::uint8_t*>(bytes), length};
     planes_ = severalPlanes() ? asked.buffer.length : 1;
     stamp_flags_ = asked.buffer.flags & (V4L2_BUF_FLAG_TIMESTAMP_MASK | V4L2_BUF_FLAG_TSTAMP_SRC_MASK);
@@ -217,11 +217,9 @@ bool VideoNode::dequeue(FilledBuffer& filled) const {
 DeviceFault VideoNode::start() {
   if (call(VIDIOC_STREAMON, &type_) != 0) {
     const bool unlinked = errno == ENOLINK || errno == EPIPE;
-    return callFault(
-        errno,
-        unlinked
-            ? "started streaming: this camera's parts are not linked, or differ in format; see `media-ctl -p`"
-            : "started streaming (VIDIOC_STREAMON)");
+    return callFault(errno, unlinked ? "starting the stream: this camera's parts are not linked, or differ "
+                                       "in format; see `media-ctl -p`"
+                                     : "starting the stream (VIDIOC_STREAMON)");
   }
   streaming_ = true;
   return {};

@@ -21,7 +21,7 @@ DeviceFault VideoOutput::open(const char* path, int width, int height) {
   DeviceFault fault = node_.open(path, VideoNode::Role::kOutput);
   if (!fault.ok()) return fault;
   NodeFormat format = {V4L2_PIX_FMT_GREY, width, height};
-  if (node_.setFormat(format) != 0) fault = VideoNode::callFault(errno, "set the format");
+  if (node_.setFormat(format) != 0) fault = VideoNode::callFault(errno, "setting the format");
   if (fault.ok() &&
       (format.fourcc != V4L2_PIX_FMT_GREY || format.width != width || format.height != height)) {
     fault = deviceFault(DeviceFaultKind::kChanged, 0, "requested %dx%d GREY, set %dx%d", width, height,
@@ -70,7 +70,7 @@ DeviceFault VideoOutput::write(const ImageView& image) {
     std::memcpy(out, image.row(y), static_cast<std::size_t>(width_));
   }
   if (!node_.queue(index, static_cast<std::size_t>(stride_) * static_cast<std::size_t>(height_))) {
-    return VideoNode::callFault(errno, "handed an image over (VIDIOC_QBUF)");
+    return VideoNode::callFault(errno, "queuing an image (VIDIOC_QBUF)");
   }
   free_ &= ~(1U << index);
   if (++queued_ < kStartWith || started_) return {};

@@ -175,7 +175,7 @@ DeviceFault LinkPort::write(std::span<const std::uint8_t> bytes) {
   if (bytes.size() > kept_.size()) return deviceFault(DeviceFaultKind::kFailed, 0, "the message is too long");
   if (!serial_.isOpen()) return deviceFault(DeviceFaultKind::kUnplugged, 0, "the port is closed");
   if (!flush()) {
-    if (!serial_.isOpen()) return deviceFault(DeviceFaultKind::kUnplugged, 0, "in a write");
+    if (!serial_.isOpen()) return deviceFault(DeviceFaultKind::kUnplugged, 0, "during a write");
     return deviceFault(DeviceFaultKind::kFailed, 0, "%zu bytes are waiting to be sent",
                        kept_end_ - kept_begin_);
   }
@@ -183,7 +183,7 @@ DeviceFault LinkPort::write(std::span<const std::uint8_t> bytes) {
   kept_begin_ = 0;
   kept_end_ = bytes.size();
   static_cast<void>(flush());
-  return serial_.isOpen() ? DeviceFault{} : deviceFault(DeviceFaultKind::kUnplugged, 0, "in a write");
+  return serial_.isOpen() ? DeviceFault{} : deviceFault(DeviceFaultKind::kUnplugged, 0, "during a write");
 }
 
 DeviceFault LinkPort::sendDatagram(std::span<const std::uint8_t> bytes) {

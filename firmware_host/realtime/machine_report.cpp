@@ -67,7 +67,7 @@ MachineLine priorityRight(const Machine& machine, int wanted) {
   }
   if (!limit) return unknown(what);
   const auto highest = Machine::toNumber(*limit);
-  std::string found = fmt::format("RLIMIT_RTPRIO {}, wanted {}", *limit, wanted);
+  std::string found = fmt::format("RLIMIT_RTPRIO {}, required {}", *limit, wanted);
   if (*limit == "unlimited" || highest.value_or(0) >= wanted) {
     return {what, std::move(found), MachineVerdict::kGood, ""};
   }

@@ -36,7 +36,7 @@ DeviceFault CameraPlayer::damage() { return setControl("Inject V4L2_BUF_FLAG_ERR
 
 DeviceFault CameraPlayer::setControl(const char* name, int value) {
   const int fd = ::open(capture_.c_str(), O_RDWR | O_CLOEXEC | O_NONBLOCK);
-  if (fd < 0) return openFault(errno, "to break it");
+  if (fd < 0) return openFault(errno, "injecting a fault");
   v4l2_queryctrl query{};
   query.id = V4L2_CTRL_FLAG_NEXT_CTRL;
   DeviceFault fault = deviceFault(DeviceFaultKind::kUnsupported, 0,

@@ -38,7 +38,7 @@ class SerialWire : public ImuWire {
     if (const DeviceFault fault = terminal_.open(); !fault.ok()) return fault;
     removeLink();
     fs::create_symlink(terminal_.path(), link_, error);
-    if (error) return openFault(error.value(), "to link the port's name to a pseudo-terminal");
+    if (error) return openFault(error.value(), "linking the port's name to a pseudo-terminal");
     probed_ = false;
     return {};
   }
@@ -143,12 +143,12 @@ class CanWire : public ImuWire {
     ifreq request{};
     std::strncpy(request.ifr_name, name_.c_str(), IFNAMSIZ - 1);
     DeviceFault fault;
-    if (ioctl(fd, SIOCGIFFLAGS, &request) != 0) fault = openFault(errno, "to read its flags");
+    if (ioctl(fd, SIOCGIFFLAGS, &request) != 0) fault = openFault(errno, "reading its flags");
     const bool is_up = (request.ifr_flags & IFF_UP) != 0;
     if (fault.ok() && is_up != up) {
       request.ifr_flags = static_cast<short>(up ? request.ifr_flags | IFF_UP : request.ifr_flags & ~IFF_UP);
       if (ioctl(fd, SIOCSIFFLAGS, &request) != 0)
-        fault = openFault(errno, up ? "to bring it up" : "to take it down");
+        fault = openFault(errno, up ? "bringing it up" : "taking it down");
     }
     ::close(fd);
     return fault;
