@@ -39,11 +39,11 @@ void RunObserver::restart(std::uint32_t timeline, Stamp /*first*/) {
 void RunObserver::onLoop(const LoopReport& report) {
   for (const LoopCandidate& candidate : report.candidates) {
     const double ago = (candidate.new_stamp - candidate.old_stamp).seconds();
-    listener_.onRemark(
-        report.stamp,
-        fmt::format("{} of {}: {}, {} matches, {} agree", candidate.near ? "near node" : "place",
-                    candidate.kept ? "the kept map" : fmt::format("{:.1f} s before", ago),
-                    describe(candidate.fate), candidate.matches, candidate.inliers));
+    listener_.onRemark(report.stamp,
+                       fmt::format("loop candidate {} ({}): {}; {} of {} matches agree on a relative pose",
+                                   candidate.kept ? "in the kept map" : fmt::format("{:.1f} s ago", ago),
+                                   candidate.near ? "by position" : "by appearance", describe(candidate.fate),
+                                   candidate.inliers, candidate.matches));
   }
   if (statistics_.located) noteLocated(report);
   listener_.onLoop(report);

@@ -31,7 +31,7 @@ std::uint16_t portOf(std::string_view text, std::string_view device, const char*
   std::uint16_t port = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
   if (error != std::errc{} || end != text.data() + text.size() || port == 0) {
-    throw InputError("settings", 0, setting, std::string(device) + ": the port is not from 1 to 65535",
+    throw InputError("settings", 0, setting, std::string(device) + ": the port must be 1 to 65535",
                      "Write udp:HOST:PORT, for example udp:192.168.1.10:14550");
   }
   return port;

@@ -124,7 +124,7 @@ TEST_CASE("IMU and autopilot share a link where both settings name one port") {
   CHECK(refusal(settings, stereo()).empty());
   settings.imu_link.device = "udp:127.0.0.1:many";
   CHECK_THAT(refusal(settings, stereo()),
-             Catch::Contains("imu_link.device") && Catch::Contains("the port is not"));
+             Catch::Contains("imu_link.device") && Catch::Contains("the port must be"));
 }
 
 TEST_CASE("a pixel format that is not taken is refused, whatever is connected") {
