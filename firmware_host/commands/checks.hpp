@@ -13,7 +13,7 @@
 
 namespace swiftlet {
 
-/// `holds` decides on the number; `what` says which numbers are taken, in help and messages.
+/// `holds` accepts or rejects the number; `what` describes the accepted numbers in help and messages.
 inline CLI::Validator numberCheck(const std::string& what, std::function<bool(double)> holds) {
   const auto check = [what, holds = std::move(holds)](std::string& text) {
     double value = 0;
@@ -37,8 +37,8 @@ inline CLI::Validator range(double least, double most) {
                      [least, most](double value) { return value >= least && value <= most; });
 }
 
-/// An option whose value is one of the given names, upper or lower case; help lists the names and the
-/// default, which is what `value` holds.
+/// An option with a fixed list of values, in upper or lower case; help lists the values and the default, the
+/// initial content of `value`.
 template <typename Enum>
 void addChoice(CLI::App& command, const std::string& option, Enum& value, const std::string& help,
                const std::vector<std::pair<std::string, Enum>>& choices) {

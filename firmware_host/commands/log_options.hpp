@@ -1,5 +1,5 @@
 #pragma once
-// The options of the commands that read a log: whose calibration, which part.
+// Options of the commands that read a log: calibration and section.
 
 #include <CLI/CLI.hpp>
 #include <string>

@@ -1,8 +1,8 @@
 #pragma once
-// The manual page, made from the same options that `--help` prints, and from the settings' explanations.
+// The manual page, generated from the options that `--help` prints and from the settings' descriptions.
 //
-// Text in the macros of man(7), as `man`, mandoc and Debian take it. help2man would do for one command; it
-// runs the lines of the examples together and knows no commands of a program.
+// Text in the macros of man(7), for `man`, mandoc and Debian. help2man is not used: it joins the lines of the
+// examples and does not know subcommands.
 
 #include <CLI/CLI.hpp>
 #include <string>

@@ -22,7 +22,7 @@ class WholeFile {
   explicit WholeFile(const std::string& path, Sync sync = Sync::kYes);
   WholeFile(const WholeFile&) = delete;
   WholeFile& operator=(const WholeFile&) = delete;
-  /// Without commit() before, what was written goes and the older file stays.
+  /// Without a previous commit() the new content is discarded and the old file stays.
   ~WholeFile();
 
   void write(std::string_view bytes);

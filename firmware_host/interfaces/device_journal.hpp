@@ -1,7 +1,7 @@
 #pragma once
-// What happened to one device in flight, from its thread to the log: each fault once, when it comes, and its
-// end once; beside it what a device that works does badly, a defect. Fixed memory; a full journal counts what
-// it loses.
+// Faults of one device in flight, from its thread to the log: each fault is noted once when it appears and
+// once when it ends. A working device can also have a defect, for example lost data. Fixed memory; a full
+// journal counts what it loses.
 
 #include <atomic>
 #include <cstdint>
@@ -35,20 +35,20 @@ class DeviceJournal {
     faults_.fetch_add(1, std::memory_order_relaxed);
     static_cast<void>(events_.tryPush({now, fault, false}));
   }
-  /// Ends the fault that stands, if any.
+  /// Ends the current fault, if any.
   void works(Stamp now) {
     if (standing_ == DeviceFaultKind::kNone) return;
     standing_ = DeviceFaultKind::kNone;
     static_cast<void>(events_.tryPush({now, {}, false}));
   }
-  /// Of a device that works: noted where it is another defect than the one that stands.
+  /// For a working device: noted if the defect differs from the current one.
   void defect(Stamp now, const DeviceFault& what) {
     if (defect_ == what.kind) return;
     defect_ = what.kind;
     faults_.fetch_add(1, std::memory_order_relaxed);
     static_cast<void>(events_.tryPush({now, what, true}));
   }
-  /// Ends the defect that stands, if any.
+  /// Ends the current defect, if any.
   void sound(Stamp now) {
     if (defect_ == DeviceFaultKind::kNone) return;
     defect_ = DeviceFaultKind::kNone;

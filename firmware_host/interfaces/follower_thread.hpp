@@ -41,7 +41,7 @@ class FollowerThread {
   /// Of the entry, which may say what it does; of the supervisor.
   [[nodiscard]] Heartbeat& heart() { return heart_; }
   [[nodiscard]] const Heartbeat& heart() const { return heart_; }
-  /// After end(): why it ended before it was told to, or that it was given up; empty: all in order.
+  /// After end(): why it ended early or was abandoned; empty: it ended normally.
   [[nodiscard]] const std::string& fault() const { return fault_; }
 
   /// For the entry: `work(now)` every `period` seconds of the host's clock, until it is to end. A thread that
@@ -62,8 +62,8 @@ class FollowerThread {
   FlightThread thread_;
 };
 
-/// What follows a run, as the run sees it. Each kind of follower derives its own Work, whose last step of
-/// construction is to start the thread.
+/// A follower of a run, as the run sees it. Each kind of follower derives its own Work, which starts the
+/// thread as the last step of its construction.
 class Follower {
  public:
   Follower(const Follower&) = delete;
@@ -73,7 +73,7 @@ class Follower {
   [[nodiscard]] const Heartbeat& heart() const { return work_->thread_.heart(); }
   /// Tells it to end, and waits for nothing: so that several end at the same time.
   void tellEnd() { work_->thread_.tellEnd(); }
-  /// Ends it, and gives what it counted, for the summary; `fault`: why it ended before, or that it is stuck.
+  /// Ends it and returns its counters for the summary; `fault`: why it ended early, or that it is stuck.
   nlohmann::ordered_json finish();
 
  protected:
@@ -86,7 +86,7 @@ class Follower {
 
     /// False: the thread is stuck and was left behind, with all of this.
     [[nodiscard]] virtual bool end() { return thread_.end(); }
-    /// What it counted, once it has ended.
+    /// Its counters, after it has ended.
     [[nodiscard]] virtual nlohmann::ordered_json json() const = 0;
 
    protected:

@@ -25,7 +25,7 @@ class LabelExchange {
   static constexpr std::size_t kPlaces = 8;
   static constexpr std::size_t kEarly = 4;
 
-  /// Of the other side; for others once it has ended.
+  /// For the other side's thread; for other threads after it has ended.
   struct Counters {
     std::uint64_t shown = 0;       ///< images
     std::uint64_t offered = 0;     ///< labels
@@ -51,10 +51,10 @@ class LabelExchange {
   }
   /// From then on the other side leaves it alone. False: it is at it right now.
   [[nodiscard]] bool tryClose(int place);
-  /// Of a closed place; empty where none came.
+  /// Labels of a closed place; empty if none arrived.
   [[nodiscard]] ImageView labels(int place) const;
   void free(int place);
-  /// Whether there is anybody whose labels could come.
+  /// Whether a labeller is connected.
   [[nodiscard]] bool hasLabeller() const { return has_labeller_.load(std::memory_order_relaxed); }
 
   // The other side's thread.
@@ -76,7 +76,7 @@ class LabelExchange {
   }
   /// Labels of the image of `stamp`; copied where somebody waits for them.
   void offer(Stamp stamp, const ImageView& labels);
-  /// Now and then: offers again what came early.
+  /// Call periodically: offers early labels again.
   void retryEarly();
   [[nodiscard]] const Counters& counters() const { return counters_; }
 

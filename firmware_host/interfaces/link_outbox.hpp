@@ -55,7 +55,7 @@ class LinkOutbox {
   void attend(bool attended) { attended_.store(attended, std::memory_order_release); }
   /// To poll for reading: something waits.
   [[nodiscard]] int descriptor() const { return wake_; }
-  /// Ends the waking; before what waits is taken.
+  /// Resets the wake-up; call before taking queued messages.
   void hush() const {
     eventfd_t pushes = 0;
     static_cast<void>(eventfd_read(wake_, &pushes));

@@ -31,7 +31,7 @@ struct UdpAddress {
   std::uint16_t own_port = 0;  ///< 0: any
 };
 
-/// Empty: `device` does not begin with "udp:". InputError naming `setting` for one that cannot be read.
+/// Empty if `device` does not start with "udp:". InputError naming `setting` if it is malformed.
 std::optional<UdpAddress> udpAddress(std::string_view device, const char* setting);
 
 /// Whether two settings name one port: by the same words, or by two names of one serial port.
@@ -59,13 +59,12 @@ class LinkPort {
   void wait(Duration most);
   /// What is there; `count` may be 0. Passes over a bounded number of others' datagrams.
   DeviceFault read(std::span<std::uint8_t> into, std::size_t& count, Stamp& read_at);
-  /// Takes all of `bytes`, at most kMostWritten, or none: kUnplugged, or kFailed where there is no room,
-  /// which passes.
+  /// Accepts all of `bytes`, at most kMostWritten, or none: kUnplugged, or kFailed while there is no room.
   DeviceFault write(std::span<const std::uint8_t> bytes);
-  /// Sends what is kept of an earlier write. True: nothing is.
+  /// Sends bytes kept from an earlier write. True: none are left.
   bool flush();
 
-  /// Of UDP, once open: where answers come in.
+  /// UDP, when open: the port on which answers arrive.
   [[nodiscard]] std::uint16_t ownPort() const;
   [[nodiscard]] bool isUdp() const { return udp_.has_value(); }
   [[nodiscard]] Duration byteTime() const { return udp_ ? Duration{} : serial_.byteTime(); }

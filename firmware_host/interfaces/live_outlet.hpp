@@ -39,7 +39,7 @@ struct SurfaceNews {
   std::vector<SurfaceVertex> vertices;
 };
 
-/// What the map's distance field says of the place where the vehicle was mapped last.
+/// Values of the map's distance field at the vehicle's last mapped position.
 struct ObstacleNews {
   Stamp stamp;  ///< of that frame
   SE3 T_map_body;

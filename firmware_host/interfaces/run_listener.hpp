@@ -1,5 +1,5 @@
 #pragma once
-// What a run tells its recorder, and what it sums up on the way.
+// Notifications of a run to its recorder, and the statistics it collects.
 
 #include <cstdint>
 #include <map>
@@ -35,19 +35,19 @@ class RunListener {
   virtual void onFrame(const TrackedFrame& tracked, const OdometryOutput& output) = 0;
   /// The state propagated to an IMU sample, when there is one.
   virtual void onImuState(const NavState& state) = 0;
-  /// The meshes of a frame, where GraphOptions ask for them; `horizon` is null between keyframes, `hull`
-  /// that of the frame's features in raw pixels of camera 0.
+  /// The meshes of a frame, if GraphOptions request them; `horizon` is null between keyframes, `hull` is that
+  /// of the frame's features in raw pixels of camera 0.
   virtual void onMesh(bool /*keyframe*/, const LocalMesh& /*frame*/, const LocalMesh* /*horizon*/,
                       std::span<const Eigen::Vector2f> /*hull*/) {}
   /// At the end: the newest mesh over the horizon, when there is one.
   virtual void onLocalMesh(const LocalMesh& /*mesh*/) {}
   /// After each keyframe that loop closure has looked at.
   virtual void onLoop(const LoopReport& /*report*/) {}
-  /// At the end: places and graph, when there are any; no report comes after it.
+  /// At the end: places and graph, if there are any; no report follows.
   virtual void onPlaces(LoopStage& /*places*/) {}
   /// At the end: the map, when there is one; `tied`: earlier epochs that lie in it, by loop closure.
   virtual void onMap(MapStage& /*map*/, std::span<const std::uint32_t> /*tied*/) {}
-  /// At the end: keyframes and events that had not come out yet.
+  /// At the end: keyframes and events not reported before.
   virtual void onFinish(const OdometryOutput& output) = 0;
   /// A remark of the schedule or the supervisor, for events.log.
   virtual void onRemark(Stamp stamp, const std::string& text) = 0;
@@ -75,17 +75,17 @@ struct MeshStatistics {
 /// What became of the frames that waited for labels from outside.
 struct HeldFrameCounters {
   std::uint64_t labelled = 0;    ///< frames mapped with labels that came in time
-  std::uint64_t late = 0;        ///< without: they did not come in time
+  std::uint64_t late = 0;        ///< mapped without labels: they were late
   std::uint64_t no_room = 0;     ///< without: too many others waited behind it
   std::uint64_t nobody = 0;      ///< mapped without labels: no labeller was connected
   std::uint64_t longest_ms = 0;  ///< that a frame was held
 };
 
-/// What the thread `map` counted beside its stage.
+/// Counters of the thread `map` besides its stage's.
 struct MapThreadStatistics {
   std::uint64_t frames = 0;         ///< that were to be mapped
   std::uint64_t without_image = 0;  ///< of them, skipped: others came before they were looked at
-  std::uint64_t without_scene = 0;  ///< of them, whose depth or labels were gone
+  std::uint64_t without_scene = 0;  ///< of them, those whose depth or labels were gone
   std::uint64_t refused = 0;        ///< by the stage
   /// Where labels come after their images.
   std::optional<HeldFrameCounters> held;

@@ -23,13 +23,13 @@ class RunVerdict {
   [[nodiscard]] double shareGood() const;
   /// The newest, where something of it is estimated.
   [[nodiscard]] const CalibrationEstimate* estimatedCalibration() const;
-  /// For summary.json: shares, doubts, sigmas, the estimated calibration where there is one, and `words`.
+  /// For summary.json: shares, doubts, sigmas, the estimated calibration if there is one, and `words`.
   [[nodiscard]] nlohmann::ordered_json json() const;
 
  private:
   /// Lines for a person.
   [[nodiscard]] std::vector<std::string> words() const;
-  /// Of what was summed over the time with a state; 0 without one.
+  /// Mean of a sum over the time with a state; 0 without a state.
   [[nodiscard]] double mean(double sum) const { return state_seconds_ > 0 ? sum / state_seconds_ : 0; }
 
   std::optional<Stamp> last_;

@@ -32,16 +32,16 @@ class SensorSink {
   /// Of the thread of camera 0, before its image.
   virtual void takeScene(const SceneImages& scene) = 0;
   virtual void takeImage(const CameraFrame& image, const HostTimes& host) = 0;
-  /// Any thread: the input has come to its end, and its threads return.
+  /// Any thread: the input has ended, and its threads return.
   virtual void expectEnd() {}
 };
 
 class SensorInput {
  public:
-  /// Where a thread stands.
+  /// Priority level of a thread.
   enum class Level : std::uint8_t {
     kSensor,   ///< a device's, at the priority of sensors
-    kLibrary,  ///< a device's whose library or codec allocates and locks: below the flight path, as maps
+    kLibrary,  ///< of a device whose library or decoder allocates and locks: below the flight path, like maps
     kAhead,    ///< reads ahead from a file, at no priority
   };
   struct Thread {
@@ -57,14 +57,14 @@ class SensorInput {
   SensorInput& operator=(const SensorInput&) = delete;
   virtual ~SensorInput() = default;
 
-  /// The threads, of which each ends when its input has, or soon after `control` says stop. Both outlive
+  /// The threads. Each ends when its input has ended, or soon after `control` requests a stop. Both outlive
   /// them.
   virtual std::vector<Thread> threads(SensorSink& sink, const RunControl& control) = 0;
   /// Any thread: images gone by so far.
   [[nodiscard]] virtual std::uint64_t taken() const = 0;
-  /// Any thread: what it knows of its sensors that does not pass the sink.
+  /// Any thread: facts about its sensors that do not pass through the sink.
   virtual void look(FlightFacts& /*facts*/) const {}
-  /// After the threads have ended; throws what ended the input before its time.
+  /// After the threads have ended; throws the error that ended the input early.
   virtual void finish() {}
 };
 

@@ -1,10 +1,9 @@
 #pragma once
-// Messages of a run for people, on stdout and stderr. A terminal that is closed, a pipe without a reader, a
-// full disk behind a redirection or a reader that stands still costs messages, never the run: nothing here
-// throws, raises a signal, or waits longer than 0.1 s for a reader that stands still, and then not again
-// until it reads.
+// Messages of a run on stdout and stderr. A closed terminal, a pipe without a reader, a full disk behind a
+// redirection or a stalled reader costs messages, never the run: nothing here throws, raises a signal, or
+// waits longer than 0.1 s for a stalled reader, and then not again until it reads.
 //
-// Threads: any but those of the flight path. A message goes out whole where the reader takes it.
+// Threads: any except those of the flight path. A message is written completely if the reader accepts it.
 
 #include <cstddef>
 #include <span>

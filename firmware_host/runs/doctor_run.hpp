@@ -1,6 +1,6 @@
 #pragma once
-// What `swiftlet doctor` finds: this computer, the devices that are connected, and the vehicle's own devices
-// at work for some seconds. Every line that is not good says what to do.
+// The report of `swiftlet doctor`: this computer, the connected devices, and the vehicle's own devices
+// observed for some seconds. Every line that is not good gives a remedy.
 
 #include <atomic>
 #include <string>
@@ -30,8 +30,8 @@ struct DoctorReport {
 
 DoctorReport examine(const DoctorRequest& request, const Settings& settings);
 
-/// A minute of motion of a recorded log: mistakes in units, axes, clocks and calibration as poor lines, and
-/// what was measured. InputError where the log cannot be read.
+/// Inspects a minute of motion of a recorded log: mistakes in units, axes, clocks and calibration as poor
+/// lines, and the measured values. InputError if the log cannot be read.
 MachineReport examineLog(const LogRequest& request, const Settings& settings);
 
 }  // namespace swiftlet

@@ -23,26 +23,27 @@ struct FlyRequest {
   bool map = false;                 ///< sets map.enabled
   bool record = false;              ///< write `recording/` into the run folder
   std::optional<ViewAddress> view;  ///< serve the live view there
-  double seconds = 0;               ///< end after this long; 0: when told to
+  double seconds = 0;               ///< stop after this long; 0: only on request
   const std::atomic<bool>* stop = nullptr;
   std::atomic<bool>* hung_up = nullptr;  ///< set: the terminal has closed; noted as an event, and cleared
-  /// After the flight, before full smoothing (flights.smooth): what ends that, since `stop` ended the flight.
+  /// After the flight, before full smoothing (flights.smooth): returns the flag that stops smoothing, since
+  /// `stop` ended the flight.
   std::function<const std::atomic<bool>*()> renew_stop;
   bool show_progress = false;
 };
 
 struct FlyResult {
   nlohmann::ordered_json summary;  ///< as written to summary.json
-  std::string out;                 ///< the run folder; empty: it could not be made
+  std::string out;                 ///< the run folder; empty: it could not be created
   std::string lost;                ///< the first file that could not be written; empty: all were
-  bool faultless = true;           ///< false: a thread ended before its time; the summary says which
-  bool left_behind = false;        ///< a thread was stuck at the end, and what it uses stays in memory
+  bool faultless = true;           ///< false: a thread ended early; see the summary
+  bool left_behind = false;        ///< a thread was stuck at the end; its memory is kept
   bool has_pose = false;
-  std::vector<std::string> missing;  ///< devices that did not open, in words; nothing was flown then
+  std::vector<std::string> missing;  ///< devices that did not open, as text; no flight took place then
 };
 
-/// InputError for bad settings or calibration, and where `out` holds a run. No disk ends or prevents a
-/// flight: what cannot be written is left out and told.
+/// InputError for bad settings or calibration, and if `out` holds a run. A disk error neither ends nor
+/// prevents a flight: files that cannot be written are skipped and reported.
 FlyResult runFlight(const FlyRequest& request, Settings settings);
 
 }  // namespace swiftlet

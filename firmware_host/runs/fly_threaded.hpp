@@ -1,7 +1,6 @@
 #pragma once
-// A run on threads with all that belongs around it: memory reserved, shown and locked, libraries confined,
-// what the machine says, effort governed by the budgets, those who follow the run, and the supervisor of them
-// all.
+// A threaded run with its environment: memory reserved, reported and locked, libraries confined, the machine
+// report, effort governed by the budgets, the consumers of the run, and the supervisor.
 
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -21,11 +20,11 @@ struct FlightRequest {
   bool host_stamps = false;  ///< of CLOCK_MONOTONIC, not of a log
   /// From a log's stamps to CLOCK_MONOTONIC; gives none while that is not known. Any thread.
   std::function<std::optional<Duration>()> to_host;
-  bool announce = false;  ///< print the table of what was reserved, and what is missing
+  bool announce = false;  ///< print the table of reserved and missing resources
   bool trigger = false;   ///< a separate line reports edges (SensorInput::look)
   bool record = false;    ///< the flight is to be recorded
   bool service = false;   ///< notify systemd if it requests it
-  std::string name;       ///< what is flown, for those who look on
+  std::string name;       ///< name of the flight for viewers
   /// Outbox of the IMU's link if the autopilot shares it; null: the autopilot has its own port. It outlives
   /// the run.
   LinkOutbox* autopilot_outbox = nullptr;
@@ -38,11 +37,11 @@ struct FlightRequest {
 
 struct FlightEnd {
   bool finished = true;      ///< false: stopped
-  bool faultless = true;     ///< no thread ended before its time
-  bool left_behind = false;  ///< a thread is stuck: what it uses must stay (ThreadedReport::left_behind)
+  bool faultless = true;     ///< no thread ended early
+  bool left_behind = false;  ///< a thread is stuck: its memory must stay (ThreadedReport::left_behind)
 };
 
-/// `report` gets what the summary says of the executor.
+/// `report` receives the executor's part of the summary.
 FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const Settings& settings,
                       RunObserver& observer, GraphOptions wanted, const FlightRequest& request,
                       const RunControl& control, nlohmann::ordered_json& report);

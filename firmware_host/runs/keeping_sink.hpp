@@ -20,7 +20,7 @@ class KeepingSink final : public CountingSink {
   void takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host) override;
   void takeImage(const CameraFrame& image, const HostTimes& host) override;
 
-  /// After the devices' threads have ended.
+  /// Call after the devices' threads have ended.
   [[nodiscard]] InspectionReport inspect(const Calibration& calibration) const;
 
  private:

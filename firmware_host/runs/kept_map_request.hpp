@@ -11,7 +11,7 @@ namespace swiftlet {
 struct KeptMapRequest {
   std::string keep;     ///< new folder for this run's places, graph and volume; empty: none; closes loops
   std::string in;       ///< folder of a kept map to be located in; sets loop.in_map
-  bool extend = false;  ///< go on with it; sets loop.extend_map
+  bool extend = false;  ///< continue the map; sets loop.extend_map
 
   /// InputError where a map is to be kept that is not to be extended.
   void apply(Settings& settings) const {

@@ -27,9 +27,9 @@ class LiveConsumers {
   [[nodiscard]] const LiveOutlets& outlets() const { return outlets_; }
   /// Likewise; null where nobody brings labels.
   [[nodiscard]] LabelExchange* labels() const { return labels_.get(); }
-  /// What they have to say of themselves since the last call, to the log. True: there was something.
+  /// Writes the consumers' messages since the last call to the log. True: there were some.
   bool drainRemarks(RunObserver& observer);
-  /// Before its begin(): puts them under supervision, and lets them have its verdicts.
+  /// Call before the supervisor's begin(): adds the consumers to it and gives them its verdicts.
   void addTo(Supervisor& supervisor);
   /// Ends them. `report` receives each consumer's counters under its name, `faults` the reason if one ended
   /// early. Returns false if one may be stuck; it then uses its outlet forever.

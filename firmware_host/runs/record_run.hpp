@@ -14,7 +14,7 @@ namespace swiftlet {
 struct RecordRequest {
   std::string out;     ///< folder, or file
   bool mcap = false;   ///< an MCAP file instead of an EuRoC folder
-  double seconds = 0;  ///< end after this long; 0: when told to
+  double seconds = 0;  ///< stop after this long; 0: only on request
   const std::atomic<bool>* stop = nullptr;
   RecordWatcher* watcher = nullptr;  ///< null: none
 };

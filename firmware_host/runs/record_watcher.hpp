@@ -1,6 +1,5 @@
 #pragma once
-// Who looks at a recording while it is made, and may end it: guidance for calibration. It does not change
-// what is recorded.
+// Observes a running recording and may end it: guidance for calibration. It does not change what is recorded.
 
 #include "drivers/calibration/calibration.hpp"
 #include "estimator/messages/frames.hpp"
@@ -22,7 +21,7 @@ class RecordWatcher {
   virtual void takeImage(const CameraFrame& image) = 0;
   /// Twenty times a second, of the thread that waits for the end. False: the recording is to end.
   [[nodiscard]] virtual bool goOn() = 0;
-  /// After the devices' threads have ended.
+  /// Call after the devices' threads have ended.
   virtual void end() = 0;
 };
 

@@ -15,7 +15,7 @@
 
 namespace swiftlet {
 
-/// The files of a run folder beside the truth, for the summary.
+/// Compares the files of a run folder with the truth, for the summary.
 using AccuracyOfRun = std::function<nlohmann::ordered_json(const std::string& folder, const Trajectory& truth,
                                                            const std::string& truth_name, Stamp first_image,
                                                            const EvaluationGroup& settings)>;
@@ -35,7 +35,7 @@ struct ReplayRequest : LogRequest {
   bool record = false;              ///< write `recording/` into the run folder
   bool reproduce = false;  ///< `log` is a recording: repeat its threaded run step by step, with its settings
   bool inspect = false;    ///< look for mistakes in units, axes and clocks first (inspection/inspect_log.hpp)
-  AccuracyOfRun accuracy;  ///< of a log with truth (lab/evaluation/evaluate_run.hpp); empty: none is made
+  AccuracyOfRun accuracy;  ///< for a log with truth (lab/evaluation/evaluate_run.hpp); empty: not computed
 };
 
 /// Tests slow stages down with these.
@@ -47,8 +47,8 @@ struct ReplayHooks {
 
 struct ReplayResult {
   nlohmann::ordered_json summary;  ///< as written to summary.json
-  bool finished = true;            ///< false: stopped, or a thread ended before its time
-  bool left_behind = false;        ///< a thread was stuck at the end, and what it uses stays in memory
+  bool finished = true;            ///< false: stopped, or a thread ended early
+  bool left_behind = false;        ///< a thread was stuck at the end; its memory is kept
   bool has_pose = false;
   std::string lost;  ///< the first file that could not be written to its end; empty: all were
   RunStatistics statistics;

@@ -43,8 +43,8 @@ class RunOutput {
   [[nodiscard]] std::unique_ptr<FlightRecorder> startRecorder(
       RecordOrder order, const DepthImageView* depth_sensor = nullptr) const;
 
-  /// After the run: loops.csv, estimated_calibration/ where one is, the keyframes closed, map.tum of the pose
-  /// graph where there is one. Fills the facts' peak of memory.
+  /// After the run: writes loops.csv, estimated_calibration/ if there is an estimate, closes the keyframes,
+  /// and writes map.tum of the pose graph if there is one. Sets the facts' peak memory.
   void close(RunFacts& facts);
   /// Whether smooth() has something to do.
   [[nodiscard]] bool canSmooth() const { return keeps_keyframes_; }
@@ -52,7 +52,7 @@ class RunOutput {
   /// it without one.
   void smooth(const std::atomic<bool>* stop, bool announce);
 
-  /// What is to be the summary, of what was done so far.
+  /// The summary of the work so far.
   [[nodiscard]] nlohmann::ordered_json summary(const RunFacts& facts);
   void writeSummary(const nlohmann::ordered_json& summary) const;
 
@@ -73,7 +73,7 @@ class RunOutput {
   RunObserver observer_;
 };
 
-/// Memory as it grew: what each part made resident.
+/// Growth of memory: what each part made resident.
 class MemoryTrack {
  public:
   MemoryTrack() : last_(residentBytes()) { rows_.push_back({"program_at_start", last_}); }

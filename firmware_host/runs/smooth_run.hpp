@@ -1,6 +1,6 @@
 #pragma once
-// Full smoothing of a run folder, later, as a function. What `swiftlet smooth` calls, and what it shares with
-// the end of a run.
+// Full smoothing of a finished run folder: implements `swiftlet smooth`, and shares its steps with the end of
+// a run.
 
 #include <atomic>
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace swiftlet {
 
-/// As the settings say; `announce`: say on stderr what it will take before it begins.
+/// Options from the settings; `announce`: print the expected memory on stderr first.
 FullSmoothingOptions smoothingOptions(const Settings& settings, bool announce);
 
 /// map.tum. InputError.
@@ -23,8 +23,8 @@ struct SmoothRequest {
   bool announce = false;
 };
 
-/// Writes map.tum, then its figures into summary.json where there is one. Where nothing came out the folder
-/// is as it was, and the result says why. InputError for bad input and where a file cannot be written.
+/// Writes map.tum, then its results into summary.json if there is one. On failure the folder is unchanged and
+/// the result gives the reason. InputError for bad input and if a file cannot be written.
 FullSmoothing runSmooth(const SmoothRequest& request, const Settings& settings);
 
 }  // namespace swiftlet

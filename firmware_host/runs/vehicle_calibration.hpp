@@ -6,11 +6,11 @@
 
 namespace swiftlet {
 
-/// Its calibration; InputError naming the setting where they say none.
+/// The vehicle's calibration; InputError naming the setting if none is set.
 Calibration vehicleCalibration(const Settings& settings);
 
-/// For what needs sizes and rates alone: the same, or without vehicle.calibration a bare rig
-/// (Calibration::bare) as cameras.resolution and imu_link.rate_hz say.
+/// For commands that need only sizes and rates: the same, or without vehicle.calibration a bare rig
+/// (Calibration::bare) from cameras.resolution and imu_link.rate_hz.
 Calibration calibratedOrBareRig(const Settings& settings);
 
 }  // namespace swiftlet

@@ -39,7 +39,7 @@ struct CamerasGroup {
   std::string camera_info = kCameraInfoCheck;
   bool side_by_side = false;
   std::string format = "any";
-  std::string resolution = "";  ///< width x height, where no calibration says it
+  std::string resolution = "";  ///< width x height, without a calibration
   double rate_hz = 20;
   double exposure_ms = 0;  ///< 0: as the camera has it
   int gain = -1;           ///< below 0: as the camera has it
@@ -76,7 +76,7 @@ struct Ros2Group {
   bool enabled = false;
   int domain = 0;
   std::string interface = "lo";  ///< network interface; lo: this computer alone
-  std::string driver = "none";   ///< whose topics are cameras and IMU
+  std::string driver = "none";   ///< driver whose topics are cameras and IMU
   double odometry_hz = 50;
   double mesh_hz = 5;
   std::string label_topic = "";  ///< label images for the map; empty: none

@@ -1,5 +1,5 @@
 #pragma once
-// The check of map.moving_labels that every command with a map makes before it begins.
+// Checks map.moving_labels; every command with a map calls it first.
 
 #include "drivers/input/input_error.hpp"
 #include "mapping/map/map_stage.hpp"

@@ -1,8 +1,8 @@
 #pragma once
-// The settings tree of the program: one typed value, defaults as its members say.
+// The settings tree of the program: one typed value with the defaults.
 //
-// Each setting is declared once more, in registry.cpp, with key, unit, bounds and explanation; the
-// reader, the printer and the checks work from that table alone.
+// registry.cpp declares each setting once more with key, unit, bounds and description; the reader, the
+// printer and the checks use only that table.
 
 #include <string>
 
@@ -52,7 +52,7 @@ struct LoopGroup {
   bool enabled = false;
   std::string vocabulary = "";  ///< file; empty: the shipped one
   std::string in_map = "";      ///< folder of a kept map to be located in; empty: none
-  bool extend_map = false;      ///< go on with it
+  bool extend_map = false;      ///< add keyframes to it
 };
 
 struct MapGroup {
@@ -80,7 +80,7 @@ struct RealtimeGroup {
   int low_cpu = -1;
 };
 
-/// Milliseconds of the thread's CPU time, except where the name says wall.
+/// Milliseconds of the thread's CPU time; wall time if the name contains wall.
 struct BudgetsGroup {
   double propagate_p50_ms = 0.02;
   double propagate_p99_ms = 0.05;

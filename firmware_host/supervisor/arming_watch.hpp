@@ -1,6 +1,6 @@
 #pragma once
-// The facts for ReadyToArm, collected at the supervisor's pace: they age although no frame and no sample
-// comes.
+// The facts for ReadyToArm, collected at the supervisor's pace: they age even if no frame and no sample
+// arrives.
 //
 // Pure: facts and the time in, verdict out; no clock, no heap.
 

@@ -1,6 +1,6 @@
 #pragma once
-// What the supervisor asks of a flight: plain values that its schedule collects for it ten times a second.
-// Times of the host are CLOCK_MONOTONIC; other stamps are of the run's clock (the log's in a replay).
+// Facts that the supervisor needs about a flight: plain values that the schedule collects ten times a second.
+// Host times are CLOCK_MONOTONIC; other stamps use the run's clock (the log's in a replay).
 
 #include <array>
 #include <cstddef>
@@ -13,7 +13,7 @@
 
 namespace swiftlet {
 
-/// What stands before the first message and does not change.
+/// Known before the first message and constant.
 struct FlightGround {
   int flight_threads = 0;
   int threads_without_priority = 0;

@@ -1,11 +1,10 @@
 #pragma once
 // The sign of life of one thread, read by the supervisor.
 //
-// Threads: the thread itself calls begin, beat, doing, end and fail; any thread calls read.
-// A heartbeat serves one life: what follows end() or fail() is ignored, so that the text of a failure never
-// changes once it can be seen.
-// Errors: none. Memory: three cache lines, fixed. Cost of beat(): one clock read and two relaxed stores,
-// under 0.1 us. Nothing here locks, allocates or calls the kernel.
+// Threads: the thread itself calls begin, beat, doing, end and fail; any thread calls read. A heartbeat
+// serves one life: calls after end() or fail() are ignored, so that the text of a failure never changes once
+// it is visible. Errors: none. Memory: three cache lines, fixed. Cost of beat(): one clock read and two
+// relaxed stores, under 0.1 us. Nothing here locks, allocates or calls the kernel.
 
 #include <algorithm>
 #include <array>
@@ -22,7 +21,7 @@
 
 namespace swiftlet {
 
-/// Of a thread that ended before it was told to.
+/// For a thread that ended early.
 inline constexpr const char* kReturnedEarly = "the thread returned although the run continues";
 
 enum class Life : std::uint32_t {

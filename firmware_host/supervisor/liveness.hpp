@@ -51,7 +51,7 @@ class Liveness {
 
   using Troubles = FixedVector<Trouble, Verdict::kMostTroubles>;
 
-  /// Before the first judge(); beats come in the order of adding. False: the table is full.
+  /// Call before the first judge(); beats are in the order of adding. False: the table is full.
   [[nodiscard]] bool add(std::string_view name);
   void begin(const FlightGround& ground) { ground_ = ground; }
 
@@ -81,7 +81,7 @@ class Liveness {
     Trouble trouble;  ///< of the last judgement
     int times_bad = 0;
   };
-  /// Whether something comes out while something goes in.
+  /// Whether output is produced while input arrives.
   struct Progress {
     std::uint64_t in = 0, out = 0;
     Stamp in_at;                         ///< of the newest input

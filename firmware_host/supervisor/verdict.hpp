@@ -30,12 +30,12 @@ const char* conditionName(Condition condition);
 
 enum class Cause : std::uint8_t {
   kNone,
-  kNoTurn,       ///< the thread's loop stands
+  kNoTurn,       ///< the thread's loop makes no progress
   kThrew,        ///< an exception ended the thread
   kEndedEarly,   ///< the thread returned although the run continues
   kNoData,       ///< the sensor delivers nothing
   kStuckValues,  ///< the IMU repeats one reading
-  kNoProduct,    ///< the stage turns and is given input, but nothing comes out
+  kNoProduct,    ///< the stage runs and receives input but produces no output
   kFiles,        ///< files are not written
   kFlapping,     ///< went bad too often
 };
@@ -65,7 +65,7 @@ struct Verdict {
 
   Stamp evaluated;  ///< CLOCK_MONOTONIC
   Health health = Health::kInitializing;
-  bool run_failed = false;  ///< the run is to end with exit code 1; never goes back to false
+  bool run_failed = false;  ///< the run must end with exit code 1; never becomes false again
   bool ending = false;      ///< the run is ending in order
   ArmingVerdict arming;
   FixedVector<Trouble, kMostTroubles> troubles;

@@ -19,16 +19,16 @@ namespace swiftlet {
 
 class AutopilotDialogue {
  public:
-  /// Answers of one round to TIMESYNC: an autopilot asks ten times a second.
+  /// TIMESYNC answers per round: an autopilot sends ten requests a second.
   static constexpr std::size_t kMostAnswers = 4;
   /// These, a request and a command.
   static constexpr std::size_t kMostBytes = (kMostAnswers + 2) * kLongestMavlinkFrame;
 
-  /// `rate`: readings a second that are wanted [Hz]; 0: as they come.
+  /// `rate`: required sample rate [Hz]; 0: not requested.
   explicit AutopilotDialogue(double rate) : stream_(rate) {}
 
-  /// Takes what the decoder has heard, once its readings have been taken, and tells it which message to take.
-  /// What is to be sent at `now` (CLOCK_MONOTONIC): bytes written.
+  /// Takes what the decoder has received, after its samples have been taken, and sets which message it
+  /// decodes. Writes the bytes to send at `now` (CLOCK_MONOTONIC) and returns their number.
   std::size_t step(ImuDecoder& decoder, Stamp now, std::span<std::uint8_t, kMostBytes> out);
   /// After the link was gone.
   void restart();

@@ -30,8 +30,8 @@ namespace swiftlet {
 /// What a camera did so far.
 struct CameraStatus {
   CameraCounters counters;
-  std::uint64_t repeated = 0;            ///< frames that showed what the one before showed; left out
-  std::uint64_t by_trigger = 0;          ///< frames whose stamp is of an edge
+  std::uint64_t repeated = 0;            ///< frames equal to the previous one; dropped
+  std::uint64_t by_trigger = 0;          ///< frames stamped by a trigger edge
   TimesyncStatus trigger;                ///< where one is connected
   std::optional<ExposureSetting> asked;  ///< by exposure control
 };

@@ -44,7 +44,7 @@ class CountingSink : public SensorSink {
     keep(stream, image.stamp);
   }
 
-  // After the devices' threads have ended.
+  // Call after the devices' threads have ended.
   [[nodiscard]] const Stream& imu() const { return imu_; }
   [[nodiscard]] const Stream& camera(std::size_t index) const { return camera_.at(index); }
   /// From each image of camera 1 to the nearest of camera 0, smallest first; empty without both.

@@ -11,7 +11,7 @@ namespace swiftlet {
 
 /// How often a device that is gone is looked for.
 inline constexpr Duration kReopenPeriod = Duration::fromMilliseconds(200);
-/// The longest that a device's thread waits before it looks whether the flight has ended.
+/// Longest wait of a device's thread before it checks whether the flight has ended.
 inline constexpr int kPollMilliseconds = 100;
 /// Longer than any pause of a sound device: drops on a busy bus take some periods of it.
 inline constexpr Duration kLongestSilence = Duration::fromMilliseconds(1000);

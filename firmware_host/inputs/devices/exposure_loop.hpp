@@ -1,11 +1,11 @@
 #pragma once
-// Exposure control of one camera in flight (estimator/camera/exposure_control.hpp): meters its images, asks
-// its source, and knows what each image was taken with.
+// Exposure control of one camera in flight (estimator/camera/exposure_control.hpp): meters its images, sets
+// its source, and knows the exposure of each image.
 //
-// Two cameras are set alike: camera 0's loop decides and publishes, camera 1's follows. Where camera 0 has
-// been silent for kLeaderSilence, camera 1 decides by its own images, from the last request on. Threads: each
-// loop on its camera's thread; SharedExposure and the turn rate between them. Memory: none but the object's.
-// Cost of an image: 10 us, and some ms of the camera's bus where the setting changes.
+// Two cameras get the same setting: camera 0's loop decides and publishes, camera 1's follows. If camera 0 is
+// silent for kLeaderSilence, camera 1 decides from its own images, starting at the last request. Threads:
+// each loop on its camera's thread; SharedExposure and the rotation rate between them. Memory: only the
+// object. Cost per image: 10 us, and some ms of the camera's bus when the setting changes.
 
 #include <cstdint>
 
@@ -44,10 +44,10 @@ class ExposureLoop {
   };
   explicit ExposureLoop(const Setup& setup) : setup_(setup) {}
 
-  /// Of a source that was just opened, again after each reopen, which begins with the last request.
+  /// Call after the source is opened or reopened; a reopened source starts with the last request.
   /// kUnsupported: its exposure cannot be set.
   DeviceFault begin(CameraSource& source);
-  /// After image `frame`, whose view holds; `now`: of its arrival.
+  /// Call after image `frame`, whose view is still valid; `now`: its arrival.
   DeviceFault step(std::uint64_t frame, const ImageView& image, Stamp now, CameraSource& source);
 
   /// What image `frame` was taken with.

@@ -1,8 +1,8 @@
 #pragma once
-// Whether a camera's images show anything, and anything new, by some of their rows.
+// Detects dark and repeated images of a camera from some of their rows.
 //
-// An image equal to the one before in all of them is no new image: no sensor is without noise. It would show
-// a vehicle at rest that flies. Cost: of reading every 37th row. Memory: none.
+// An image equal to the previous one in all of these rows is not a new image: no sensor is free of noise.
+// Used as a new image it would show a flying vehicle at rest. Cost: reading every 37th row. Memory: none.
 
 #include <cstdint>
 

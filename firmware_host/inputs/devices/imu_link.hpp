@@ -30,7 +30,7 @@ class ImuLink {
   [[nodiscard]] virtual int wakeFd() const { return -1; }
   /// Discards queued samples whose arrival time is no longer known. Bounded.
   virtual void discard() {}
-  /// Reads what waits.
+  /// Reads waiting bytes or messages.
   virtual DeviceFault receive(Stamp now) = 0;
   /// Sends what the protocol requires, after the samples have been taken. Never waits.
   virtual DeviceFault send() { return {}; }
@@ -41,9 +41,9 @@ class ImuLink {
   [[nodiscard]] virtual std::uint64_t received() const = 0;
   /// Host stamp by the protocol's own exchange of clocks; empty: none, or not yet sure.
   [[nodiscard]] virtual std::optional<Stamp> toHost(Stamp /*device*/) const { return std::nullopt; }
-  /// What the device made of what it was asked, for the user; until it says false.
+  /// Deviations of the device from what was requested, for the user; call until it returns false.
   virtual bool nextRemark(DeviceFault& /*remark*/) { return false; }
-  /// What the device was asked to send and what it answered, in words; empty: nothing was asked.
+  /// What was requested from the device and its answer, as text; empty: nothing was requested.
   [[nodiscard]] virtual std::string stream() const { return {}; }
   /// What was counted; after the flight.
   [[nodiscard]] virtual nlohmann::ordered_json counters() const = 0;

@@ -1,11 +1,11 @@
 #pragma once
-// The thread of the IMU: readings from its link to the sink, stamped on CLOCK_MONOTONIC and turned into the
-// body's axes. Survives that the device goes and returns, falls silent or restarts its clock.
+// The thread of the IMU: passes samples from its link to the sink, stamped on CLOCK_MONOTONIC and rotated to
+// body axes. The device may be unplugged and return, fall silent or restart its clock.
 //
-// Stamps: of the sensor's own clock where it sends one, by the protocol's exchange of clocks where that is
-// sure, else by the lower envelope of the delays (drivers/timesync/clock_map.hpp); as the driver maps them
-// where it does; without a clock, arrivals.
-// Threads: open() before the flight, run() on its own thread, journal and status from any.
+// Stamps: the sensor's own clock if it sends one, mapped by the protocol's clock exchange when that is
+// certain, otherwise by the lower envelope of the delays (drivers/timesync/clock_map.hpp); stamps mapped by a
+// driver are used as they are; without a clock, arrival times. Threads: open() before the flight, run() on
+// its own thread, journal and status from any.
 
 #include <memory>
 #include <span>
@@ -30,7 +30,7 @@ struct ImuStatus {
   std::uint64_t refused = 0;  ///< no stamp, or one that does not rise
   std::uint64_t by_exchange = 0;
   std::uint64_t by_arrival = 0;
-  std::uint64_t by_driver = 0;  ///< the driver says the host's time
+  std::uint64_t by_driver = 0;  ///< the driver provides the host's time
   TimesyncStatus clock;
 };
 
@@ -41,13 +41,13 @@ class ImuThread {
             double rate = 0);
 
   DeviceFault open() { return link_->open(); }
-  /// What the device made of its settings, after open().
+  /// Deviations of the device from its settings, after open().
   std::vector<DeviceFault> warnings() {
     std::vector<DeviceFault> all;
     for (DeviceFault remark; link_->nextRemark(remark);) all.push_back(remark);
     return all;
   }
-  /// `edges`: where edges of the trigger go that come through the link.
+  /// `edges`: receives trigger edges that arrive over the link.
   void run(SensorSink& sink, std::span<EdgeRing* const> edges, const RunControl& control);
   [[nodiscard]] SensorInput::Level level() const {
     return link_->allocates() ? SensorInput::Level::kLibrary : SensorInput::Level::kSensor;

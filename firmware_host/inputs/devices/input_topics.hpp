@@ -1,6 +1,6 @@
 #pragma once
-// Which ROS 2 topics the settings name as cameras and IMU, those of a driver's preset among them, and what
-// topics say of the lenses.
+// The ROS 2 topics that the settings name as cameras and IMU, including a driver's preset, and the lenses
+// published with them.
 
 #include <array>
 #include <string>
@@ -42,9 +42,9 @@ void addTopics(const Settings& settings, MachineReport& report);
 /// Largest distance between the two images of one bearing [px], over all that `a` sees.
 [[nodiscard]] double largestDifference(const CameraModel& a, const CameraModel& b);
 
-/// Of cameras behind topics, as cameras.camera_info asks: compares the calibration's lenses with those that
-/// CameraInfo says, a warning for more than a pixel; or takes the latter. Waits for them up to some seconds.
-/// InputError naming cameras.camera_info where lenses are to be taken and do not come.
+/// For cameras behind topics, according to cameras.camera_info: compares the calibration's lenses with those
+/// in CameraInfo and warns above one pixel, or uses the latter. Waits for CameraInfo for up to some seconds.
+/// InputError naming cameras.camera_info if lenses are to be used but do not arrive.
 void applyCameraInfo(const Settings& settings, Calibration& calibration);
 
 }  // namespace swiftlet

@@ -1,9 +1,9 @@
 #pragma once
 // The vehicle's devices as the input of a threaded run: one thread each for the IMU, every video node,
-// pipeline or topic and the trigger line, as the settings name them.
+// pipeline or topic, and the trigger line, as set in the settings.
 //
-// All devices must be there when the flight begins; in flight each may go and return, fall silent or send
-// garbage, and the others go on. What happens to them goes to the log, by name and with the remedy.
+// All devices must be present when the flight starts. In flight each may be unplugged and return, fall silent
+// or send garbage while the others continue. Faults are logged with the device's name and the remedy.
 
 #include <functional>
 #include <memory>
@@ -50,10 +50,10 @@ class LiveInput : public SensorInput {
 
   /// Of one thread: what happened to devices since, as lines for the user. True: there was something.
   bool drainEvents(const std::function<void(Stamp, const std::string&)>& take);
-  /// After the flight: what the devices did.
+  /// After the flight: the devices' statistics.
   [[nodiscard]] nlohmann::ordered_json counters();
 
-  /// Where autopilot.device is the IMU's link: what is to be sent over it. Null: it is not.
+  /// Outbox of the IMU's link if autopilot.device is that link; null otherwise.
   [[nodiscard]] LinkOutbox* outbox() { return outbox_.get(); }
   [[nodiscard]] ImuThread& imu() { return *imu_; }
   [[nodiscard]] std::span<const std::unique_ptr<CameraThread>> cameras() const { return cameras_; }

@@ -18,13 +18,13 @@ class RateWatch {
   /// Per second; 0: unknown, and nothing is ever wrong.
   explicit RateWatch(double expected) : expected_(expected) {}
 
-  /// Counting begins after the message that came at `now`.
+  /// Counting starts after the message that arrived at `now`.
   void restart(Stamp now) {
     begin_ = now;
     count_ = 0;
     begun_ = true;
   }
-  /// `count` messages have come by `now`. True once a second: seen() is new.
+  /// `count` messages have arrived by `now`. True once a second: seen() is new.
   bool add(Stamp now, std::size_t count) {
     if (!begun_) {
       restart(now);

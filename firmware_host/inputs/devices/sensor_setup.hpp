@@ -23,7 +23,7 @@ class SensorSetup {
 
   /// Call with the port open; `decoder` is restarted afterwards.
   void run(LinkPort& port, ImuDecoder& decoder);
-  /// Until it says false.
+  /// Call until it returns false.
   bool nextWarning(DeviceFault& warning);
   /// What was found and asked, in words; empty: nothing was.
   [[nodiscard]] std::string text() const;

@@ -1,12 +1,12 @@
 #pragma once
-// An IMU behind ROS 2 topics: one sensor_msgs/Imu, or a gyroscope's and an accelerometer's apart
+// An IMU behind ROS 2 topics: one sensor_msgs/Imu, or separate gyroscope and accelerometer topics
 // (drivers/timesync/accel_at_gyro.hpp), as cameras with an IMU publish them.
 //
-// Stamps: the headers', CLOCK_REALTIME, on CLOCK_MONOTONIC (drivers/timesync/wall_stamps.hpp). Left out and
-// counted: samples that are not finite, of another clock, or not newer than the one before. Losses: holes of
-// the stamps up to a second, at `rate`. After kMostBad samples running that are of no use the link closes
-// with what is wrong. open() waits for a sample: first for seconds, in flight for a tenth of one. It
-// allocates and locks: not for a thread of the flight path.
+// Stamps: the headers', CLOCK_REALTIME, converted to CLOCK_MONOTONIC (drivers/timesync/wall_stamps.hpp).
+// Dropped and counted: samples that are not finite, of another clock, or not newer than the previous one.
+// Losses: gaps of the stamps up to a second at `rate`. After kMostBad unusable samples in a row the link
+// closes with the reason. open() waits for a sample: the first call for seconds, in flight for a tenth of
+// one. It allocates and locks: not for a thread of the flight path.
 
 #include <functional>
 #include <memory>

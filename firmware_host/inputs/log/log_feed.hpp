@@ -21,8 +21,8 @@ struct LogSection {
 
 class LogFeed {
  public:
-  /// `tracks` (may be null) takes the place of images, which the source must not deliver then. `scenes` (may
-  /// be null): depth and labels beside the images of camera 0.
+  /// `tracks` (may be null) replaces images, which the source must not deliver then. `scenes` (may be null):
+  /// depth and labels for the images of camera 0.
   LogFeed(LogSource& source, const LogSection& section, TrackReader* tracks, SceneReader* scenes = nullptr);
 
   enum class Next : std::uint8_t { kSample, kImage, kTracks, kEnd };
@@ -30,7 +30,7 @@ class LogFeed {
   Next next();
   [[nodiscard]] const ImuSample& sample() const { return std::get<ImuSample>(message_); }
   [[nodiscard]] const CameraFrame& image() const { return std::get<CameraFrame>(message_); }
-  /// What goes with image(); may be empty.
+  /// Depth and labels of image(); may be empty.
   [[nodiscard]] const SceneImages& scene() const { return scene_; }
   [[nodiscard]] const TrackedFrame& tracks() const { return *tracked_; }
 

@@ -28,7 +28,7 @@ class LogPlayer : public SensorInput {
     const std::int64_t ns = to_host_ns_.load(std::memory_order_relaxed);
     return ns == kNotYet ? std::nullopt : std::optional(Duration{ns});
   }
-  /// Of the thread `sensor` behind the log's times; once it has ended.
+  /// Lateness of the thread `sensor` against the log's times; after it has ended.
   [[nodiscard]] const LatencyHistogram& lateness() const { return lateness_; }
 
  private:
@@ -52,7 +52,7 @@ class LogPlayer : public SensorInput {
   LogFeed& feed_;
   double speed_;
   SpscRing<Ahead, kReadAhead> ahead_;
-  std::atomic<std::uint64_t> images_out_{0};  ///< images whose memory the source may use again
+  std::atomic<std::uint64_t> images_out_{0};  ///< images whose memory the source may reuse
   std::atomic<std::uint64_t> taken_{0};
   std::atomic<bool> read_done_{false};
   static constexpr std::int64_t kNotYet = std::numeric_limits<std::int64_t>::min();

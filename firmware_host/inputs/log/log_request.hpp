@@ -14,7 +14,7 @@ namespace swiftlet {
 struct LogRequest {
   std::string log;
   std::string calibration;          ///< instead of the log's own; empty: the log's
-  std::string imu_calibration;      ///< Kalibr's IMU file where it is not beside the camchain
+  std::string imu_calibration;      ///< Kalibr's IMU file if it is not beside the camchain
   bool mono = false;                ///< camera 0 alone
   double from = 0;                  ///< s after the first image
   std::optional<double> until;      ///< s after the first image

@@ -29,10 +29,10 @@ class SceneReader {
 
   SceneReader(const std::string& log, const Calibration& calibration, const Wanted& wanted);
 
-  /// Camera and extrinsics of the log's depth sensor, without an image; null where there is none, or none is
-  /// wanted.
+  /// Camera and extrinsics of the log's depth sensor, without an image; null if there is none or it is not
+  /// used.
   [[nodiscard]] const DepthImageView* depthSensor() const { return sensor_ ? &*sensor_ : nullptr; }
-  /// Of exactly this stamp; empty where there is neither. Valid for kSlots - 1 further calls.
+  /// Depth and labels with exactly this stamp; empty if there are none. Valid for kSlots - 1 further calls.
   SceneImages at(Stamp stamp);
 
   /// Lines for the user; grows while images are read.

@@ -1,10 +1,10 @@
 #pragma once
-// Feature tracks from a file as the front-end would hand them over: with keyframes chosen where the file
-// does not say which frames they are, and the median motion since the previous frame.
+// Feature tracks from a file in the form of the front-end's output: selects keyframes if the file does not
+// mark them, and computes the median motion since the previous frame.
 //
-// Keyframe rule (the front-end's, on raw pixels): the first frame; then, not before 0.14 s, when less
-// than 0.7 of the last keyframe's tracks are left or their median motion passes 20 px (rotation is not
-// removed here, so the bar is higher); at the latest after 1 s.
+// Keyframe rule (the front-end's, on raw pixels): the first frame; then, not before 0.14 s, when less than
+// 0.7 of the last keyframe's tracks are left or their median motion exceeds 20 px (rotation is not
+// compensated here, so the threshold is higher); at the latest after 1 s.
 
 #include <map>
 

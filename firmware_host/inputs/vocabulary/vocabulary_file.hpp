@@ -1,9 +1,9 @@
 #pragma once
-// Vocabularies in files: the project's compact form (mapping/place/vocabulary.hpp), ORB-SLAM's text
-// (ORBvoc.txt) and DBoW2's YAML, plain or compressed by gzip; told apart by their content.
+// Vocabulary files: the project's compact form (mapping/place/vocabulary.hpp), ORB-SLAM's text (ORBvoc.txt)
+// and DBoW2's YAML, plain or compressed by gzip, recognized by content.
 //
-// Weights are taken as the file has them. The bits of descriptors mean what the comparisons say that made
-// them: a vocabulary of ORB's descriptors divides ours into words too, but without having learnt them.
+// Weights are used as in the file. The bits of a descriptor depend on the comparisons that produced it: a
+// vocabulary of ORB descriptors also divides swiftlet's descriptors into words, but was not trained on them.
 //
 // Host side: allocates, throws InputError that names file, line and field.
 
