@@ -32,7 +32,7 @@ struct BagTopic {
   std::string type;  ///< `sensor_msgs/Imu`, of ROS 2 too
   BagEncoding encoding = BagEncoding::kOther;
   std::uint64_t messages = 0;
-  std::string definition;  ///< text of the type; empty where the file does not hold it
+  std::string definition;  ///< text of the type; empty if the file does not hold it
 };
 
 struct BagEntry {
@@ -58,7 +58,7 @@ class BagFile {
   virtual std::span<const std::uint8_t> read(const BagEntry& entry) = 0;
 
  protected:
-  /// The topic of this name, type and encoding, made where there is none yet.
+  /// The topic with this name, type and encoding; added if there is none.
   std::uint32_t topicOf(std::string_view name, std::string_view type, BagEncoding encoding,
                         std::string_view definition);
   /// Once all entries are there: orders and counts them.
@@ -70,7 +70,7 @@ class BagFile {
   std::vector<std::string> warnings_;
 };
 
-/// True for a rosbag2 folder, and for a file that begins like a bag of any kind, packed with zstd too.
+/// True for a rosbag2 folder, and for a file that starts like a bag of any kind, also compressed with zstd.
 [[nodiscard]] bool isBag(const std::string& path);
 
 /// Told by content. InputError also where the build has no reader for it.

@@ -20,7 +20,7 @@ struct BagWriterTopic {
   std::string name;
   std::string type;        ///< `sensor_msgs/Imu`
   std::string definition;  ///< text of the type for the writer's encoding
-  std::string md5;         ///< of the type; ROS 1 alone asks for it
+  std::string md5;         ///< of the type; needed only by ROS 1
   bool latched = false;    ///< players repeat the last message to late subscribers
 };
 

@@ -2,7 +2,7 @@
 // Bytes of a file by their place, through a small window, so that records one behind the other cost few
 // reads.
 //
-// Errors: InputError where the file cannot be opened or read. What lies past the end is left out of an
+// Errors: InputError if the file cannot be opened or read. What lies past the end is left out of an
 // answer.
 
 #include <cstddef>
@@ -15,7 +15,7 @@ namespace swiftlet {
 
 class FileBytes {
  public:
-  /// `name` stands for the file in messages.
+  /// `name` names the file in messages.
   FileBytes(const std::string& path, std::string name);
   FileBytes(const FileBytes&) = delete;
   FileBytes& operator=(const FileBytes&) = delete;
@@ -24,7 +24,7 @@ class FileBytes {
   [[nodiscard]] std::uint64_t size() const { return size_; }
   /// At most `length` bytes from `offset`, valid until the next call.
   std::span<const std::uint8_t> at(std::uint64_t offset, std::size_t length);
-  /// The same without a copy into the window, for what is large.
+  /// The same without a copy into the window, for large reads.
   void read(std::uint64_t offset, std::size_t length, std::vector<std::uint8_t>& out) const;
 
  private:

@@ -13,7 +13,7 @@
 
 namespace swiftlet {
 
-/// `name` stands for the file in messages.
+/// `name` names the file in messages.
 [[nodiscard]] std::unique_ptr<BagFile> openMcapFile(const std::string& path, const std::string& name);
 
 }  // namespace swiftlet

@@ -127,7 +127,8 @@ class MessageReader {
   bool good_ = true;
 };
 
-/// False where the body is no whole message of this type. Of `Header`: that any message with one begins with.
+/// False if the body is not a complete message of this type. For `Header`: of any message that starts with
+/// one.
 template <rosmsg::Message T>
 [[nodiscard]] bool decode(std::span<const std::uint8_t> body, BagEncoding encoding, T& message) {
   const auto read = [&](auto reader) {

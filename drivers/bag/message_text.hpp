@@ -88,7 +88,7 @@ class DefinitionWriter {
     }
   }
 
-  /// What a field is made of has to be described too, once.
+  /// Types of nested fields must be described too, once.
   template <typename T>
   void note() {
     if constexpr (Array<T>::value) {

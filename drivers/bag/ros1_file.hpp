@@ -9,7 +9,7 @@
 
 namespace swiftlet {
 
-/// `name` stands for the file in messages. InputError in builds without rosbag-storage.
+/// `name` names the file in messages. InputError in builds without rosbag-storage.
 [[nodiscard]] std::unique_ptr<BagFile> openRos1File(const std::string& path, const std::string& name);
 
 /// Not compressed.

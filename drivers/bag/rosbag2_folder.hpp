@@ -19,7 +19,7 @@ struct Rosbag2Metadata {
   std::uint64_t messages = 0;      ///< by the recorder's count
 };
 
-/// `name` stands for the file in messages. InputError for what is no such text.
+/// `name` names the file in messages. InputError for what is no such text.
 [[nodiscard]] Rosbag2Metadata parseRosbag2Metadata(const std::string& name, std::string_view text);
 
 [[nodiscard]] bool isRosbag2Folder(const std::string& path);

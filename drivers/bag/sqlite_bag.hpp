@@ -11,7 +11,7 @@
 
 namespace swiftlet {
 
-/// `name` stands for the file in messages.
+/// `name` names the file in messages.
 [[nodiscard]] std::unique_ptr<BagFile> openSqliteBag(const std::string& path, const std::string& name);
 
 }  // namespace swiftlet

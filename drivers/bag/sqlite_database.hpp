@@ -36,7 +36,7 @@ class SqliteStatement {
 class SqliteDatabase {
  public:
   enum class Mode : std::uint8_t { kRead, kCreate };
-  /// kRead: a log of changes beside the file (`-wal`) belongs to it. `name` stands for the file in messages.
+  /// kRead: a write-ahead log beside the file (`-wal`) is part of it. `name` names the file in messages.
   SqliteDatabase(const std::string& path, std::string name, Mode mode);
 
   [[nodiscard]] SqliteStatement prepare(std::string_view text) const;

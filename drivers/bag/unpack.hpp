@@ -22,7 +22,7 @@ enum class Packing : std::uint8_t { kNone, kLz4, kZstd };
 [[nodiscard]] bool unpackZstdMessage(std::span<const std::uint8_t> packed, std::size_t most,
                                      std::vector<std::uint8_t>& out);
 
-/// True where the bytes begin like a zstd frame.
+/// True if the bytes begin like a zstd frame.
 [[nodiscard]] bool isZstd(std::span<const std::uint8_t> bytes);
 
 [[nodiscard]] std::vector<std::uint8_t> packZstd(std::span<const std::uint8_t> bytes);

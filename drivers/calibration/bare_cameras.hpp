@@ -15,7 +15,7 @@ struct BareCameras {
 /// The fields of an IMU file, flat or nested under `imu0` as Kalibr writes it.
 [[nodiscard]] YamlField parseImu(const NamedText& imu);
 
-/// Whether an IMU file says that the images of the log are the rectified ones.
+/// Whether an IMU file states that the images of the log are rectified.
 [[nodiscard]] bool readsRectified(const YamlField& imu);
 
 /// InputError names what of the IMU file is missing and how to write it.

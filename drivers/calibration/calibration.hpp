@@ -31,7 +31,7 @@ namespace swiftlet {
 class FileTree;
 
 struct CalibrationOptions {
-  /// Take a rig whose geometry looks like a transform read the wrong way round.
+  /// Accept a rig whose geometry suggests an inverted transform.
   bool accept_unusual_rig = false;
 };
 
@@ -47,11 +47,11 @@ struct Calibration {
   Eigen::Matrix3d gyro_by_force = Eigen::Matrix3d::Zero();  ///< rad/s per m/s^2
   Eigen::Matrix3d accel_matrix = Eigen::Matrix3d::Identity();
   SE3 T_body_filebody;  ///< translation only
-  /// How a lens that the estimator does not have was converted (lens_fit.hpp); empty where it is as in the
+  /// How a lens that the estimator does not have was converted (lens_fit.hpp); empty if it is as in the
   /// file.
   std::array<std::string, kMaxCameras> conversion;
-  std::array<double, kMaxCameras> camera_rate_hz{};  ///< 0 where the file does not say
-  /// `rostopic` of the Kalibr files, to find the streams in a bag; empty where not given.
+  std::array<double, kMaxCameras> camera_rate_hz{};  ///< 0 if the file does not give it
+  /// `rostopic` of the Kalibr files, to find the streams in a bag; empty if not given.
   std::array<std::string, kMaxCameras> camera_topic;
   std::string imu_topic;
   std::vector<std::string> warnings;
@@ -74,9 +74,9 @@ struct Calibration {
   }
 };
 
-/// Reads what `path` leads to: a sequence or its mav0 folder, a folder with the files of one calibration, or
-/// one of these files (its IMU file beside it, or given as `imu_file`). Decides by content. A camera_info or
-/// OpenCV file stands for what is in it alone; the folder, for the pair.
+/// Reads the calibration at `path`: a sequence or its mav0 folder, a folder with the files of one
+/// calibration, or one of these files (its IMU file beside it, or given as `imu_file`). The format is
+/// detected by content. A camera_info or OpenCV file gives only its own content; its folder gives the pair.
 Calibration readCalibration(const std::string& path, const std::string& imu_file = {},
                             const CalibrationOptions& options = {});
 
@@ -99,8 +99,8 @@ ImuNoise readImuNoise(const std::string& file, std::vector<std::string>& left_ou
 bool hasCalibration(const std::string& path);
 bool hasCalibration(FileTree& tree, const std::string& folder);
 
-/// The same from text in memory (EuRoC: one text per camera), for tests and embedded rigs. `name`s
-/// stand for the files in messages.
+/// The same from text in memory (EuRoC: one text per camera), for tests and embedded rigs. `name`s name the
+/// files in messages.
 struct NamedText {
   std::string name;
   std::string_view text;

@@ -34,7 +34,7 @@ struct CameraInfo {
 /// Lens of the raw images, and how close it is. `name`: the file or topic, for messages.
 [[nodiscard]] LensFit rawLensFit(const CameraInfo& info, const std::string& name, Warnings& warnings);
 
-/// The same; a line of the warnings says how close it is where it is not exact.
+/// The same; if the conversion is not exact, a warning states its error.
 [[nodiscard]] CameraModel rawLens(const CameraInfo& info, const std::string& name, Warnings& warnings);
 
 /// Lens of the rectified images: P, no distortion.

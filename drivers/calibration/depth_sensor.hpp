@@ -13,7 +13,7 @@ namespace swiftlet {
 struct DepthSensor {
   PinholeIntrinsics camera;
   SE3 T_body_camera;              ///< body: as the file has it
-  double metres_per_unit = 1e-3;  ///< `depth_unit_m`; millimetres where the file does not say
+  double metres_per_unit = 1e-3;  ///< `depth_unit_m`; millimetres by default
 };
 
 /// Refuses a lens with distortion: depth along the axis of a bent image has no common reading.

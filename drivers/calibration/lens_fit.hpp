@@ -33,7 +33,7 @@ struct LensFit {
   double rms = 0;      ///< [px] over the covered region
   double max = 0;      ///< [px] over the covered region
   double covered = 1;  ///< share of the image in which the source can be inverted
-  /// "ds as equidistant: 0.012 px RMS, 0.04 px at most"; empty where exact.
+  /// "ds as equidistant: 0.012 px RMS, 0.04 px at most"; empty if exact.
   std::string words;
 };
 

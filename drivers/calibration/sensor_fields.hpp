@@ -19,7 +19,7 @@ struct CameraEntry {
   std::optional<double> shift_s;  ///< t_imu = t_cam + shift
   double readout_s = 0;           ///< of a rolling shutter
   std::string topic;
-  std::string file;  ///< where the extrinsics stand, for the checks across cameras
+  std::string file;  ///< file of the extrinsics, for the checks across cameras
   int line = 0;
   std::string field;
 };
@@ -29,7 +29,7 @@ std::vector<double> readNumbers(const YamlField& field);
 /// The same, row by row, where a matrix has this size.
 std::vector<double> readMatrix(const YamlField& field, std::size_t rows, std::size_t columns);
 
-/// fx, fy, cx, cy of a camera matrix; refuses a skew and what is no camera matrix.
+/// fx, fy, cx, cy of a camera matrix; rejects a skew and other matrices.
 Eigen::Vector4d readIntrinsics(const InputPlace& place, const Eigen::Matrix3d& K);
 
 /// A 4x4 rigid transform, written as four lists of four or as {rows, cols, data}. Refuses wrong last
@@ -37,7 +37,7 @@ Eigen::Vector4d readIntrinsics(const InputPlace& place, const Eigen::Matrix3d& K
 /// re-orthonormalises and warns.
 SE3 readTransform(const YamlField& field, Warnings& warnings);
 
-/// The checks of readTransform on what is already numbers.
+/// The checks of readTransform for numbers already read.
 SE3 checkedTransform(const InputPlace& place, const Eigen::Matrix3d& R, const Eigen::Vector3d& t,
                      Warnings& warnings);
 
@@ -63,13 +63,14 @@ LensFit acceptLens(const InputPlace& place, const SourceLens& lens, Warnings& wa
 /// Lens of EuRoC's and Kalibr's files. InputError names a model that has no projection here.
 LensFit readLens(const YamlField& camera, const std::string& coefficients_key, Warnings& warnings);
 
-/// `timeshift_cam_imu` of a camera [s]; empty where it is not given. Refuses more than a second.
+/// `timeshift_cam_imu` of a camera [s]; empty if not given. Rejects more than a second.
 std::optional<double> readShift(const YamlField& camera, Warnings& warnings);
 
 /// The same check on a number of seconds.
 double checkedShift(const InputPlace& place, double shift_s, Warnings& warnings);
 
-/// Scale and misalignment of an IMU file in Kalibr's or OpenVINS' words; refuses what is not applied here.
+/// Scale and misalignment of an IMU file in Kalibr's or OpenVINS' form; rejects models that are not
+/// supported.
 void readImuModel(const YamlField& imu, Calibration& calibration);
 
 /// `readout_ms` of a camera with `shutter: rolling` [s]; 0 for a global shutter, which is the default.

@@ -33,8 +33,8 @@ struct SourceLens {
   std::array<double, 14> distortion{};  ///< in the order above; zero where the model has fewer
   double max_radius = 0;                ///< Brown: largest r that was calibrated; 0: not known
 
-  /// Point in the camera's frame to pixel. False where the formula has no value: a pinhole's back, a zero
-  /// denominator. Points past a fold have a pixel; see lens_fit.hpp for the region in front of it.
+  /// Projects a point in the camera's frame to a pixel. False if the formula has no value: behind a pinhole,
+  /// a zero denominator. Points past a fold have a pixel; lens_fit.hpp finds the region before it.
   [[nodiscard]] bool project(const Eigen::Vector3d& p_cam, Eigen::Vector2d& pixel) const;
 };
 

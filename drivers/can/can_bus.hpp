@@ -80,11 +80,11 @@ class CanBus {
   [[nodiscard]] const CanBusCounters& counters() const { return counters_; }
   /// Whether FD frames can be sent and received.
   [[nodiscard]] bool takesFd() const { return takes_fd_; }
-  /// Of the newest frame's arrival beside the kernel's stamp, at most.
+  /// Maximum error of the newest frame's arrival, converted from the kernel's stamp.
   [[nodiscard]] Duration stampError() const { return clocks_ ? clocks_->error : Duration{}; }
   /// Bytes that the kernel set aside; less than asked where net.core.rmem_max is lower.
   [[nodiscard]] int receiveBuffer() const { return receive_buffer_; }
-  /// kChanged where that is less than a quarter; says how to raise it.
+  /// kChanged if that is less than a quarter; the text says how to raise it.
   [[nodiscard]] const DeviceFault& warning() const { return warning_; }
 
  private:

@@ -23,7 +23,7 @@ struct CanFrame {
 
   /// CLOCK_MONOTONIC: when the kernel had it.
   Stamp arrival;
-  /// The controller's own clock, whose zero means nothing; empty: it stamps nothing.
+  /// The controller's own clock, with an arbitrary zero; empty: it does not stamp.
   std::optional<Stamp> hardware;
 
   [[nodiscard]] std::span<const std::uint8_t> bytes() const { return {data.data(), size}; }

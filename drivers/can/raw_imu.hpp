@@ -53,7 +53,7 @@ struct RawImuCounters {
 /// One node's readings. Memory: 22 KiB inside the object.
 class RawImuDecoder {
  public:
-  /// `node` 1 to 127; 0: the first whose reading is good, and no other from then on.
+  /// `node` 1 to 127; 0: the first node with a valid sample, and only that one from then on.
   explicit RawImuDecoder(std::uint8_t node = 0) : node_(node) {}
 
   /// True: `out` holds a sample. Rate and force are the means over the interval if the node provides one;

@@ -34,7 +34,7 @@ struct PublishedTopic {
 
 class DdsDomain {
  public:
-  /// The one that is open already where there is one. Null, with `error`, where it cannot be opened.
+  /// Returns the open domain if there is one. Null, with `error`, if it cannot be opened.
   [[nodiscard]] static std::shared_ptr<DdsDomain> open(const DdsNetwork& network, std::string& error);
   ~DdsDomain();
   DdsDomain(const DdsDomain&) = delete;

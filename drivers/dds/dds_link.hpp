@@ -33,7 +33,7 @@ inline constexpr int kKeptImages = 8;
 
 struct DdsSettings : DdsNetwork {
   std::string prefix = "/swiftlet";  ///< of our topics; /tf and /diagnostics have none
-  std::string label_topic;           ///< sensor_msgs/Image to read; empty: none, and no image goes out
+  std::string label_topic;           ///< sensor_msgs/Image to read; empty: none, and no image is sent
 };
 
 struct DdsOdometry {
@@ -76,7 +76,7 @@ struct DdsCloud {
 
 /// The nearest obstacle, as a cloud of one point.
 struct DdsObstacle {
-  /// As it goes over the wire, in this order.
+  /// In the order of the wire format.
   struct Point {
     Eigen::Vector3f p = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());  ///< m; NaN: none
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< unit, away from the surface; zero without a point
@@ -118,8 +118,8 @@ struct DdsCounters {
   std::uint64_t refused = 0;         ///< by the library: it would have had to wait
   std::uint64_t complaints = 0;      ///< lines of the library; a message that is too large gives one
   std::uint64_t images = 0;          ///< taken
-  std::uint64_t images_refused = 0;  ///< not 8 bits, or smaller than they say
-  std::uint64_t images_skipped = 0;  ///< kKeptImages newer ones had come before they were looked at
+  std::uint64_t images_refused = 0;  ///< not 8 bits, or smaller than declared
+  std::uint64_t images_skipped = 0;  ///< overrun by kKeptImages newer ones before they were read
 };
 
 class DdsLink {
@@ -140,7 +140,7 @@ class DdsLink {
   bool publish(const DdsCloud& cloud);
   bool publish(const DdsObstacle& obstacle);
   bool publish(Stamp stamp, std::span<const DdsStatus> statuses);
-  /// Camera 0's, for who labels it. Only where there is a label topic.
+  /// Camera 0's image for the labeller. Only if there is a label topic.
   bool publish(const DdsImageView& image);
   /// The oldest label image not yet taken; examines at most kKeptImages images. False if there is none.
   bool takeLabels(DdsImage& image);

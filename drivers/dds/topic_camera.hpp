@@ -58,9 +58,9 @@ class TopicCamera : public CameraSource {
   void giveBack(std::uint32_t /*buffer*/) override { lent_ = false; }
   DeviceFault prepare();
   DeviceFault waitForImage(Duration patience);
-  /// The next message in order whose stamp can be used; false: none. `fault`: why its image cannot be.
+  /// The next message in order with a usable stamp; false: none. `fault`: why its image is not usable.
   bool takeMessage(RawImage& image, Stamp& stamp, Stamp& arrival, DeviceFault& fault);
-  /// Of the first picture: the size that its header says.
+  /// Checks the size in the header of the first compressed image.
   [[nodiscard]] DeviceFault checkPicture(const RawImage& image) const;
 
   TopicCameraSettings settings_;

@@ -45,7 +45,7 @@ enum class TopicType : std::uint8_t { kImage, kCompressedImage, kImu, kCameraInf
 /// "sensor_msgs/msg/Image".
 [[nodiscard]] const char* rosName(TopicType type);
 
-/// Rings when messages come; one for all readers of a thread.
+/// Rings when messages arrive; one for all readers of a thread.
 class TopicBell {
  public:
   TopicBell();
@@ -56,7 +56,7 @@ class TopicBell {
   /// Readable from a ring to the next clear().
   [[nodiscard]] int fd() const { return fd_; }
   void ring() const;
-  /// Before the messages are taken: what comes meanwhile rings again.
+  /// Call before taking the messages: later arrivals ring again.
   void clear() const;
   /// Until it rings, at most so long.
   void wait(Duration longest) const;
@@ -67,7 +67,7 @@ class TopicBell {
 
 struct TopicCounters {
   std::uint64_t taken = 0;
-  std::uint64_t overrun = 0;  ///< newer ones had come before they were taken
+  std::uint64_t overrun = 0;  ///< overwritten by newer ones before they were taken
   std::uint64_t lost = 0;     ///< on the way, as far as DDS knows
 };
 

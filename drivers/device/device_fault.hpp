@@ -14,15 +14,15 @@ enum class DeviceFaultKind : std::uint8_t {
   kMissing,      ///< no such node, interface or line
   kNoRights,     ///< it is there and this user may not open it
   kBusy,         ///< another program holds it
-  kWrongDevice,  ///< it is there and is not what the settings take it for
-  kUnsupported,  ///< it does not offer what the settings ask for
-  kChanged,      ///< it took a setting and made another of it
+  kWrongDevice,  ///< it exists but is not the kind of device that the settings expect
+  kUnsupported,  ///< it does not support what the settings request
+  kChanged,      ///< it changed a requested setting
   kDown,         ///< a network interface that is not up, a bus that is off
   kUnplugged,    ///< it was there, and went
-  kSilent,       ///< it is open and nothing comes
-  kGarbage,      ///< something comes and it is not the protocol
+  kSilent,       ///< it is open and sends nothing
+  kGarbage,      ///< it sends data that do not match the protocol
   kFailed,       ///< the kernel refused a call: see `error`
-  kLossy,        ///< it works, and part of what it should send does not come
+  kLossy,        ///< it works, but part of its data is lost
   kNoisy,        ///< it sends more than it should
   kClockJumped,  ///< its clock went on from another reading
   kDark,         ///< a camera that sees nothing
@@ -34,7 +34,7 @@ enum class DeviceFaultKind : std::uint8_t {
 struct DeviceFault {
   DeviceFaultKind kind = DeviceFaultKind::kNone;
   int error = 0;                      ///< errno where a call failed
-  std::array<char, 184> detail = {};  ///< what was asked, what the device offers; ends with 0
+  std::array<char, 184> detail = {};  ///< what was requested, what the device offers; ends with 0
 
   [[nodiscard]] bool ok() const { return kind == DeviceFaultKind::kNone; }
   [[nodiscard]] std::string_view text() const { return detail.data(); }

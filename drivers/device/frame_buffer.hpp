@@ -64,9 +64,9 @@ class FrameBuffer {
     return count;
   }
 
-  /// The next whole frame, if it is there. `check(std::span<const std::uint8_t>) -> FrameCheck` looks at the
-  /// bytes from one place on; what it says of a place must not change when more bytes come, but for
-  /// kIncomplete.
+  /// The next complete frame, if there is one. `check(std::span<const std::uint8_t>) -> FrameCheck` examines
+  /// the bytes from one position on; except for kIncomplete its result for a position must not change when
+  /// more bytes arrive.
   template <typename Check>
   bool next(Check&& check, StampedFrame& frame, StreamCounters& counters) {
     while (begin_ < end_) {

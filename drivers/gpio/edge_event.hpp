@@ -13,10 +13,10 @@ enum class EdgeKind : std::uint8_t { kRising, kFalling, kBoth };
 struct EdgeEvent {
   Stamp stamp;  ///< CLOCK_MONOTONIC, taken in the interrupt handler: 2 to 20 us late, more under load
   bool rising = true;
-  std::optional<std::uint32_t> sequence;  ///< of this line's events; empty where the kernel has none
+  std::optional<std::uint32_t> sequence;  ///< of this line's events; empty if the kernel has none
 };
 
-/// Counts missed edges: by sequence where there is one, else by time when the period is known. O(1).
+/// Counts missed edges: by sequence number if there is one, otherwise by time if the period is known. O(1).
 class EdgeGaps {
  public:
   /// `period` between edges of the kind that is read; zero: not known.
@@ -30,7 +30,7 @@ class EdgeGaps {
   Duration period_;
   bool any_ = false;
   Stamp newest_;
-  std::uint32_t sequence_ = 0;  ///< the kernel's count begins at 1: a first edge of 3 has two before it
+  std::uint32_t sequence_ = 0;  ///< the kernel's count starts at 1: before a first edge of 3 two were missed
   std::uint64_t missed_ = 0;
 };
 

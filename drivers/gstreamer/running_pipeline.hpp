@@ -51,9 +51,9 @@ class RunningPipeline {
   /// Stops it and ends the keeper. One that does not return from GStreamer is left behind with all it uses.
   static void dispose(std::unique_ptr<RunningPipeline> pipeline);
 
-  /// Starts the pipeline unless it is starting, and waits until two samples have come, at most
-  /// `patience`. The first one's stamp may be none. Ok: streaming. While it starts: the last fault, or that
-  /// it starts.
+  /// Starts the pipeline unless it is starting, and waits until two samples have arrived, at most `patience`.
+  /// The first one may have no stamp. Ok: streaming. While it is starting: the last fault, or that it is
+  /// starting.
   DeviceFault start(Duration patience);
   /// Tells the keeper to stop it; does not wait.
   void stop();
@@ -62,7 +62,7 @@ class RunningPipeline {
   [[nodiscard]] int fd() const { return ready_; }
   /// While streaming: the oldest sample; false: none.
   [[nodiscard]] bool take(PipelineSample& out);
-  /// While streaming: what ended the pipeline; ok: nothing did.
+  /// While streaming: the fault that ended the pipeline; ok: none.
   [[nodiscard]] DeviceFault look() const;
   /// While streaming: a source stamps buffers when they arrive: a network's, or one with `do-timestamp`.
   [[nodiscard]] bool stampsArrivals() const { return stamps_arrivals_; }

@@ -12,9 +12,9 @@ namespace swiftlet {
 /// Empty: not taken (RGB, Bayer, ...). The user's pipeline converts such, by `videoconvert`.
 [[nodiscard]] std::optional<PixelFormat> pixelFormatOf(GstVideoFormat format);
 
-/// What the sink takes, to be unreferenced: the formats in the order of kPixelFormats, first at this size and
-/// rate (0: any), then at this size, then at any, so that a source which has a choice makes the right one and
-/// one which has none says what it gives.
+/// Caps of the sink, to be unreferenced: the formats in the order of kPixelFormats, first at this size and
+/// rate (0: any), then at this size, then at any. A source with a choice selects the right one; a source
+/// without a choice reveals what it delivers.
 [[nodiscard]] GstCaps* acceptedCaps(int width, int height, double rate);
 
 }  // namespace swiftlet

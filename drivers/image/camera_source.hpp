@@ -26,7 +26,7 @@ enum class StampEvent : std::uint8_t {
   kArrival,  ///< the capture's time is unknown: when the frame came to the host
 };
 
-/// Of a camera whose exposure can be set in flight.
+/// Exposure that can be set in flight: its range and the current setting.
 struct ExposureAbility {
   ExposureRange range;
   ExposureSetting now;
@@ -41,7 +41,7 @@ struct CameraFacts {
   int width = 0;
   int height = 0;
   int stride = 0;                    ///< bytes
-  double rate = 0;                   ///< frames a second; 0: the source does not say
+  double rate = 0;                   ///< frames per second; 0: unknown
   std::optional<Duration> exposure;  ///< empty: it cannot be known in units of time
   std::optional<std::int32_t> gain;
   StampEvent event = StampEvent::kEndOfFrame;
@@ -66,8 +66,8 @@ struct CameraCounters {
 
 class CameraSource;
 
-/// A frame in the source's memory, which gets it back when this goes out of scope. It must not outlive the
-/// source, and after close() `image` points to nothing.
+/// A frame in the source's memory, returned when this object is destroyed. It must not outlive the source,
+/// and after close() `image` is invalid.
 class CapturedFrame {
  public:
   CapturedFrame() = default;
@@ -104,11 +104,10 @@ class CameraSource {
   virtual void close() = 0;
   [[nodiscard]] virtual bool isOpen() const = 0;
   [[nodiscard]] virtual int fd() const = 0;
-  /// True: frames that are taken or given back cost allocations and locks, which a thread of the flight path
-  /// must not have.
+  /// True: taking or returning frames allocates and locks, which a thread of the flight path must not do.
   [[nodiscard]] virtual bool allocates() const { return false; }
 
-  /// What happened to it that is no fault, for the user; until it says false.
+  /// Remarks about the camera that are not faults, for the user; call until it returns false.
   virtual bool nextRemark(DeviceFault& /*remark*/) { return false; }
 
   /// The oldest frame that waits. Ok with `frame.valid()` false: none.
@@ -116,8 +115,8 @@ class CameraSource {
 
   /// Of an open source; empty: its exposure cannot be set in flight.
   [[nodiscard]] virtual std::optional<ExposureAbility> exposureAbility() const { return {}; }
-  /// For the images to come, rounded to what the camera can; the first call ends its automatics. Waits for
-  /// the camera's bus, up to some ms.
+  /// For the images that follow, rounded to what the camera supports; the first call disables its automatic
+  /// control. Waits for the camera's bus, up to some ms.
   virtual DeviceFault setExposure(const ExposureSetting& setting);
 
   [[nodiscard]] const CameraFacts& facts() const { return facts_; }
@@ -131,7 +130,7 @@ class CameraSource {
   void lend(CapturedFrame& frame, std::uint32_t buffer);
   /// The buffer of a frame that is let go.
   virtual void giveBack(std::uint32_t buffer) = 0;
-  /// Of every close: frames lent before are not given back any more.
+  /// Called by every close: frames lent before are no longer returned.
   void forgetLent() { ++generation_; }
   void warn(const DeviceFault& fault);
 

@@ -30,8 +30,8 @@ class GreyReader {
   /// For frames of this size and format. `side_by_side`: two cameras in the halves of each.
   void reserve(const PixelFormat& format, int width, int height, bool side_by_side);
 
-  /// Views of one image or two; none: the picture is damaged. They hold until the next call, and no longer
-  /// than the frame that they are made of.
+  /// Views of one or two images; none: the image is damaged. They are valid until the next call, and no
+  /// longer than the frame that they were made from.
   [[nodiscard]] std::span<const ImageView> read(const RawImage& frame);
 
  private:
@@ -40,7 +40,7 @@ class GreyReader {
   [[nodiscard]] unsigned shiftOf(const RawImage& image);
 
   bool side_by_side_ = false;
-  bool upper_end_ = false;  ///< words stand at the upper end of 16 bits
+  bool upper_end_ = false;  ///< words are stored at the upper end of 16 bits
   unsigned shift_ = 0;      ///< of the frame's words
   std::vector<std::uint8_t> pixels_;
   std::vector<std::uint8_t> rows_;   ///< three, unpacked

@@ -27,16 +27,16 @@ class ArchiveTree final : public FileTree {
   using Handle = std::unique_ptr<archive, Closer>;
   using Bytes = std::vector<std::uint8_t>;
 
-  /// Passes over the archive from its begin.
+  /// A reader of the archive, from its start.
   struct Reader {
     Handle handle;
-    std::size_t next = 0;  ///< number of the entry that it comes to
+    std::size_t next = 0;  ///< number of its next entry
   };
 
   [[nodiscard]] Handle open() const;
   void index();
   void add(const std::string& path, std::size_t number);
-  /// Leads `reader` to the entry and reads it; keeps what it passes over of the same folder.
+  /// Moves `reader` to the entry and reads it; keeps passed entries of the same folder.
   bool readAt(Reader& reader, const std::string& folder, std::size_t number, Bytes& bytes);
   void keep(std::size_t number, Bytes bytes);
 

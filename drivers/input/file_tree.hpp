@@ -31,12 +31,12 @@ class FileTree {
 
   [[nodiscard]] virtual bool isFile(const std::string& path) const = 0;
   [[nodiscard]] virtual bool isFolder(const std::string& path) const = 0;
-  /// Names in a folder, sorted; empty where there is none.
+  /// Names in a folder, sorted; empty if there is none.
   [[nodiscard]] virtual std::vector<std::string> list(const std::string& folder) const = 0;
-  /// Into `bytes`, whose memory is used again. False: not there, too large or damaged.
+  /// Reads into `bytes`, whose memory is reused. False: missing, too large or damaged.
   [[nodiscard]] virtual bool read(const std::string& path, std::vector<std::uint8_t>& bytes) = 0;
 
-  /// As a text; InputError where it cannot be read.
+  /// As a text; InputError if it cannot be read.
   [[nodiscard]] std::string text(const std::string& path);
   /// For messages.
   [[nodiscard]] std::string name(const std::string& path) const;
@@ -48,7 +48,7 @@ class FileTree {
   std::string root_;
 };
 
-/// Whether a file is an archive, told by its content.
+/// Whether a file is an archive, detected by content.
 [[nodiscard]] bool isArchive(const std::string& path);
 
 [[nodiscard]] std::shared_ptr<FileTree> openArchive(const std::string& path);

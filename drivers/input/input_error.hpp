@@ -39,7 +39,7 @@ struct InputError : std::exception {
 /// What is only suspicious, a line each: "file:line: field: what".
 using Warnings = std::vector<std::string>;
 
-/// Where a value stands, for errors and warnings about it.
+/// The location of a value, for errors and warnings about it.
 struct InputPlace {
   std::string file;
   int line = 0;  ///< from 1; 0 when there are no lines
@@ -48,7 +48,7 @@ struct InputPlace {
   [[nodiscard]] InputError error(const std::string& message, const std::string& remedy) const {
     return {file, line, field, message, remedy};
   }
-  /// "file:line: field", without what is not known.
+  /// "file:line: field", without unknown parts.
   [[nodiscard]] std::string where() const {
     std::string text = file;
     if (line > 0) text += ":" + std::to_string(line);

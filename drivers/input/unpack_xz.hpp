@@ -7,11 +7,10 @@
 
 namespace swiftlet {
 
-/// Unpacked bytes above this are refused: what a packed file of a few kilobytes can be made to grow to would
-/// fill the memory.
+/// Limit of decompressed bytes: a compressed file of a few kilobytes could otherwise fill the memory.
 inline constexpr std::size_t kMaxUnpacked = std::size_t{1} << 30U;
 
-/// Whether bytes are packed by xz, told by their first six.
+/// Whether bytes are compressed by xz, detected from the first six.
 [[nodiscard]] bool isXz(std::string_view bytes);
 
 /// Unpacks streams that follow one another. InputError, naming `name`: not a whole xz file, more than

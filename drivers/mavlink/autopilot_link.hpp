@@ -26,7 +26,7 @@
 namespace swiftlet {
 
 struct AutopilotLinkSettings {
-  double rate = 40;                ///< Hz of poses; autopilots ask for 30 to 50
+  double rate = 40;                ///< Hz of poses; autopilots expect 30 to 50
   bool position_estimate = false;  ///< VISION_POSITION_ESTIMATE in place of ODOMETRY
   AutopilotMounting mounting;
   std::uint8_t system = 1;  ///< the vehicle's

@@ -32,7 +32,7 @@ class ImuStreamRequest {
 
   void hear(const mavlink::Heartbeat& heartbeat, std::uint8_t system, std::uint8_t component, Stamp now);
   void hear(const mavlink::CommandAck& ack, std::uint8_t system);
-  /// `readings` more have come of message().
+  /// `readings` more samples of message() have arrived.
   void count(std::uint64_t readings) { count_ += readings; }
   /// What is to be sent now, if anything.
   std::optional<mavlink::CommandLong> step(Stamp now);

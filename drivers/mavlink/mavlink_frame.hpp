@@ -33,7 +33,7 @@ struct MavlinkFrame {
   std::array<std::uint8_t, kLongestMavlinkPayload> payload = {};  ///< zeros from `length` on
 };
 
-/// What a header announces; nothing when no frame can begin with these bytes.
+/// Content of a header; empty if no frame can start with these bytes.
 struct MavlinkHeader {
   enum class Verdict : std::uint8_t { kNotHere, kIncomplete, kUnknownFlags, kRead };
   Verdict verdict = Verdict::kNotHere;
@@ -61,7 +61,7 @@ std::uint16_t mavlinkChecksum(std::span<const std::uint8_t> frame, const Mavlink
 /// The checksum that it carries.
 std::uint16_t carriedChecksum(std::span<const std::uint8_t> frame, const MavlinkHeader& header);
 
-/// Unpacks a whole frame whose checksum was found right.
+/// Unpacks a complete frame with a valid checksum.
 void unpackMavlink(const StampedFrame& bytes, MavlinkFrame& frame);
 
 /// Who we are on a link. The sequence number rises with every frame written.

@@ -24,7 +24,7 @@ namespace swiftlet {
 
 class MavlinkLink {
  public:
-  /// Does a frame begin here? To be asked once for each place and answer, by a FrameBuffer.
+  /// Whether a frame starts here. Called by a FrameBuffer once per position and result.
   FrameCheck check(std::span<const std::uint8_t> bytes, StreamCounters& counters);
   /// Counts signatures and lost messages; for each whole frame, in order.
   void count(const MavlinkFrame& frame, StreamCounters& counters);

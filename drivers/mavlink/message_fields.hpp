@@ -12,7 +12,7 @@ namespace swiftlet::mavlink {
 
 inline LittleFieldReader reader(const MavlinkFrame& frame) { return LittleFieldReader(frame.payload); }
 
-/// Room for the longest payload; `finish` sends what was written.
+/// Buffer for the longest payload; `finish` sends the content.
 class Payload {
  public:
   std::size_t finish(MavlinkSender& sender, std::uint32_t message, std::span<std::uint8_t> out) {

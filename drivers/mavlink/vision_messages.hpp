@@ -72,7 +72,8 @@ struct ObstacleDistance {
   Frame frame = Frame::kBodyFrd;
 };
 
-/// STATUSTEXT. A text longer than kMostText goes in chunks of one id; the first with less is the last.
+/// STATUSTEXT. A text longer than kMostText is sent in chunks with one id; the first shorter chunk is the
+/// last.
 struct StatusText {
   static constexpr std::uint32_t kId = 253;
   static constexpr std::size_t kMostText = 50;

@@ -13,7 +13,7 @@
 
 namespace swiftlet {
 
-/// sensor.yaml of a camera; `origin` says where the data come from, `extra` lines go at its end.
+/// sensor.yaml of a camera; `origin` states the source of the data, `extra` lines are appended.
 std::string cameraYaml(const CameraModel& camera, const SE3& T_body_cam, double rate_hz,
                        std::string_view origin, const std::string& extra);
 /// Lines of a camera's sensor.yaml for a rolling shutter; empty for a global one.

@@ -18,11 +18,11 @@ struct BagImuTopics {
   std::optional<std::uint32_t> accel;  ///< where the accelerometer has a topic of its own
 };
 
-/// `wanted`: the calibration's name for it, empty for none. A topic whose accelerations are all exactly zero
-/// is a gyroscope alone, and the other way round. InputError where there is none.
+/// `wanted`: the calibration's topic name, empty for none. A topic whose accelerations are all exactly zero
+/// is a gyroscope only, and the other way round. InputError if there is none.
 [[nodiscard]] BagImuTopics chooseImuTopics(BagFile& bag, const std::string& wanted, LogWarnings& warnings);
 
-/// One for each camera of the calibration, fewer where the bag has fewer; InputError where it has none.
+/// One for each camera of the calibration, fewer where the bag has fewer; InputError if it has none.
 [[nodiscard]] std::array<std::optional<std::uint32_t>, kMaxCameras> chooseImageTopics(
     BagFile& bag, const Calibration& calibration, LogWarnings& warnings);
 

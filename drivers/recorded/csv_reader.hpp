@@ -27,7 +27,7 @@ std::string quoteInput(std::string_view text);
 class CsvReader {
  public:
   static constexpr std::size_t kMaxFields = 64;
-  static constexpr std::size_t kMaxLine = 4096;  ///< bytes; no format here comes near
+  static constexpr std::size_t kMaxLine = 4096;  ///< bytes; far above any format here
 
   enum class Separator { kComma, kBlank };
 
@@ -37,7 +37,7 @@ class CsvReader {
 
   /// Opens `path`; InputError when that is impossible.
   CsvReader(const std::string& path, Separator separator, LogCounters& counters, LogWarnings& warnings);
-  /// Reads text in memory, which must outlive the reader. `name` stands for the file in messages.
+  /// Reads text in memory, which must outlive the reader. `name` names the file in messages.
   CsvReader(const std::string& name, std::string_view text, Separator separator, LogCounters& counters,
             LogWarnings& warnings);
 

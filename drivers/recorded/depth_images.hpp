@@ -23,8 +23,8 @@ class DepthImages {
   /// `T_body_filebody`: of the log's calibration, where the IMU is not the file's body.
   DepthImages(const std::string& log, LogWarnings& warnings, const SE3& T_body_filebody = {});
 
-  /// The image of exactly this stamp, in metres; `depth` null where there is none. Missing, damaged or
-  /// wrongly sized files are warned of, counted and left out.
+  /// The image with exactly this stamp, in metres; `depth` is null if there is none. Missing, damaged or
+  /// wrongly sized files are reported, counted and skipped.
   DepthImageView at(Stamp stamp);
 
   [[nodiscard]] bool empty() const { return rows_.empty(); }

@@ -18,7 +18,7 @@ std::vector<ImuSample> readImuFile(const std::string& path, LogCounters& counter
 std::vector<ImuSample> readImuText(const std::string& name, std::string_view text, LogCounters& counters,
                                    LogWarnings& warnings);
 
-/// The rows of such a file one at a time, as they stand there: neither put in order nor checked for units.
+/// The rows of such a file one at a time and unchanged: neither sorted nor checked for units.
 class ImuRows {
  public:
   /// Both outlive this.
@@ -53,7 +53,7 @@ struct ForceLevel {
 };
 ForceLevel forceLevel(const std::vector<ImuSample>& samples);
 
-/// Refuses samples whose size shows another unit or swapped sensors.
+/// Rejects samples whose norm reveals another unit or swapped sensors.
 void checkUnits(const std::vector<ImuSample>& samples, const std::string& name, LogWarnings& warnings);
 
 }  // namespace swiftlet

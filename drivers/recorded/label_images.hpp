@@ -22,8 +22,8 @@ class LabelImages {
   /// `log`: the sequence, its mav0 or an archive. A log without label images gives none at any stamp.
   LabelImages(const std::string& log, ImageSize size, LogWarnings& warnings);
 
-  /// The image of exactly this stamp; empty where there is none. Missing, damaged or wrongly sized files are
-  /// warned of, counted and left out.
+  /// The image with exactly this stamp; empty if there is none. Missing, damaged or wrongly sized files are
+  /// reported, counted and skipped.
   ImageView at(Stamp stamp);
 
   [[nodiscard]] std::size_t listed() const { return rows_.size(); }

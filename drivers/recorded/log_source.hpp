@@ -28,7 +28,7 @@ using SensorMessage = std::variant<ImuSample, CameraFrame>;
 struct LogOptions {
   /// Read this calibration instead of the log's own (file or folder, see readCalibration).
   std::string calibration;
-  std::string imu_calibration;  ///< the Kalibr IMU file, where it is not beside the camchain
+  std::string imu_calibration;  ///< the Kalibr IMU file, if it is not beside the camchain
   CalibrationOptions calibration_options;
   /// For calibrating: no calibration is read. Lenses have the images' sizes alone, cameras are as many as the
   /// log has, the body has the IMU's own axes, and there may be no IMU. Numbered images are a second apart;
@@ -54,9 +54,9 @@ class LogSource {
   [[nodiscard]] virtual const Calibration& calibration() const = 0;
   /// The next message; false at the end. Images that cannot be used are skipped and counted.
   virtual bool next(SensorMessage& message) = 0;
-  /// False where the next message is certainly no image.
+  /// False if the next message is certainly no image.
   [[nodiscard]] virtual bool imageIsNext() const { return true; }
-  /// The file of the image that next() gave last, PNG or JPEG, until next() is called again; empty where the
+  /// The file of the image that next() gave last, PNG or JPEG, until next() is called again; empty if the
   /// log holds pixels.
   [[nodiscard]] virtual std::span<const std::uint8_t> picture() const { return {}; }
   /// Images the log lists, all cameras together, for progress.
@@ -70,7 +70,7 @@ class LogSource {
   [[nodiscard]] virtual std::string trackFile() const { return {}; }
   /// The truth of the estimator's body, in time order; empty when the log has none. Read on demand.
   [[nodiscard]] virtual Trajectory groundTruth() const { return {}; }
-  /// Where the truth comes from, for the summary; empty without one.
+  /// Source of the truth, for the summary; empty without one.
   [[nodiscard]] virtual std::string groundTruthName() const { return {}; }
 
   [[nodiscard]] const Rig& rig() const { return calibration().rig; }

@@ -14,8 +14,8 @@ namespace swiftlet {
 struct LogCounters {
   std::uint64_t imu_samples = 0;                    ///< delivered
   std::array<std::uint64_t, kMaxCameras> images{};  ///< delivered
-  std::uint64_t bad_rows = 0;         ///< rows that are not what the file's kind asks for, skipped
-  std::uint64_t nan_rows = 0;         ///< rows with NaN or infinity, skipped
+  std::uint64_t bad_rows = 0;                       ///< rows that do not match the file's format, skipped
+  std::uint64_t nan_rows = 0;                       ///< rows with NaN or infinity, skipped
   std::uint64_t out_of_order = 0;     ///< rows or messages earlier than one before them, put in order
   std::uint64_t repeated_stamps = 0;  ///< rows with the stamp of another, skipped
   std::uint64_t missing_images = 0;   ///< listed files that do not exist, skipped

@@ -1,7 +1,7 @@
 #pragma once
 // CRC-32C (Castagnoli, polynomial 0x1EDC6F41, reflected), the checksum of flight recordings: finds every
 // burst of up to 32 bits, and both SSE 4.2 and Armv8 have an instruction for it.
-// Cost: about 6 GB/s with the instruction; the table twin, used where there is none, about 1.8 GB/s.
+// Cost: about 6 GB/s with the instruction; the table twin, used if there is none, about 1.8 GB/s.
 
 #include <cstdint>
 #include <span>

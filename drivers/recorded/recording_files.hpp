@@ -19,7 +19,7 @@ class RecordingFile {
 
   [[nodiscard]] virtual const std::string& name() const = 0;  ///< for messages
   [[nodiscard]] virtual std::uint64_t size() const = 0;       ///< bytes, as found at opening
-  /// Reads up to out.size() bytes from `offset` on; fewer only at the end. InputError where the disk fails.
+  /// Reads up to out.size() bytes from `offset` on; fewer only at the end. InputError if the disk fails.
   virtual std::size_t read(std::uint64_t offset, std::span<std::uint8_t> out) const = 0;
 };
 
@@ -35,7 +35,7 @@ std::string findRecordingFolder(const std::string& path);
 /// InputError when a segment is missing between others.
 RecordingFiles listRecordingFiles(const std::string& folder);
 
-/// While it lives no writer can begin a new recording in the folder. InputError when one is being written.
+/// While it exists no writer can start a new recording in the folder. InputError if one is being written.
 class RecordingReadLock {
  public:
   explicit RecordingReadLock(const std::string& folder);

@@ -24,7 +24,7 @@
 namespace swiftlet {
 
 enum class RecordKind : std::uint16_t {
-  kRun = 0,  ///< what the run was made with; always the first record
+  kRun = 0,  ///< the run's header; always the first record
   kImu = 1,
   kImage0 = 2,
   kImage1 = 3,
@@ -32,14 +32,14 @@ enum class RecordKind : std::uint16_t {
   kTrackStep = 5,
   kSmoothStep = 6,
   kLoss = 7,  ///< records of another kind were lost here
-  kEnd = 8,   ///< the recording was ended in order
+  kEnd = 8,   ///< the recording was closed properly
   kMeshStep = 9,
   kLoopStep = 10,
   kMapStep = 11,
 };
 inline constexpr std::size_t kRecordKinds = 12;
 
-/// Messages and steps: what may be lost in front of the recorder.
+/// Messages and steps: the records that may be lost before the recorder.
 constexpr bool canBeLost(RecordKind kind) {
   return (kind >= RecordKind::kImu && kind <= RecordKind::kSmoothStep) ||
          (kind >= RecordKind::kMeshStep && kind <= RecordKind::kMapStep);
@@ -72,7 +72,7 @@ inline constexpr std::size_t kSmoothStepBytes = 40;
 inline constexpr std::size_t kSmoothStepBytesBeforePlanes = 32;  ///< as written by programs without a mesh
 inline constexpr std::size_t kMeshStepBytes = 24;
 inline constexpr std::size_t kLoopStepBytes = 32;
-inline constexpr std::size_t kMapStepHeadBytes = 80;  ///< then depth and labels, where there are any
+inline constexpr std::size_t kMapStepHeadBytes = 80;  ///< then depth and labels, if there are any
 inline constexpr std::size_t kMapStepSceneAt = 48;    ///< of the scene's stamp within it
 inline constexpr std::size_t kLossBytes = 16;
 inline constexpr std::size_t kEndBytes = 8;
@@ -112,7 +112,7 @@ void encode(const RecordHeader& header, std::uint32_t run_checksum,
 
 enum class SegmentHeaderState : std::uint8_t {
   kGood,
-  kForeign,       ///< does not begin with the magic bytes
+  kForeign,       ///< does not start with the magic bytes
   kDamaged,       ///< the checksum is wrong
   kOtherVersion,  ///< `version` is not kRecordingVersion (its checksum is right)
 };

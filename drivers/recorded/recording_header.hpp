@@ -32,20 +32,20 @@ struct RecordingHeader {
   std::string settings;          ///< the settings in force, as YAML text
   std::string program_version;
   RecordOrder order = RecordOrder::kByArrival;
-  /// Camera and extrinsics of the sensor whose depth images the map took (without an image); none: no sensor.
+  /// Camera and extrinsics of the sensor whose depth images the map used (without an image); none: no sensor.
   std::optional<DepthImageView> depth_sensor;
 };
 
 /// A camera and its place on the body, in kCameraBytes.
 inline constexpr std::size_t kCameraBytes = 3 * 4 + 8 * 8 + 7 * 8;
 void encodeCamera(LittleEndianWriter& to, const CameraModel& camera, const SE3& T_body_cam);
-/// False where it is none.
+/// False if it is none.
 bool decodeCamera(LittleEndianReader& from, CameraModel& camera, SE3& T_body_cam);
 
 /// The payload of the first record.
 std::vector<std::uint8_t> encodeRecordingHeader(const RecordingHeader& header);
 
-/// Null when it was read, else what is wrong: the name of the field, literal text.
+/// Null if it was read, otherwise the name of the invalid field, literal text.
 const char* decodeRecordingHeader(std::span<const std::uint8_t> payload, RecordingHeader& header);
 
 }  // namespace swiftlet

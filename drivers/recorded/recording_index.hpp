@@ -60,7 +60,7 @@ struct RecordingLoss {
   std::uint64_t after = 0;
   std::uint64_t count = 0;
   Stamp newest_sample;        ///< stamp of the IMU sample recorded before; 0: none was
-  std::uint32_t segment = 0;  ///< where the recording tells of it
+  std::uint32_t segment = 0;  ///< position of the record that reports it
   std::uint64_t offset = 0;   ///< byte within that segment
 };
 
@@ -77,7 +77,7 @@ struct RecordingIndex {
   std::uint32_t run_checksum = 0;
   std::vector<RecordedImu> imu;
   std::array<std::vector<RecordedImage>, kMaxCameras> images;
-  /// kImu, kImage0 or kImage1: whose turn it is, by RecordingHeader::order.
+  /// kImu, kImage0 or kImage1: the kind of the next message, by RecordingHeader::order.
   std::vector<std::uint8_t> turns;
   RecordedSteps steps;
   std::vector<RecordedScene> scenes;  ///< of each mapping step

@@ -62,7 +62,7 @@ class RecordingSource final : public LogSource {
   /// Image `number` (from 1, as TrackStep::image) of a camera; false when the recording does not have it. Its
   /// pixels stay valid until kImageSlots further images of that camera, those of next() counted.
   bool image(std::size_t camera, std::uint64_t number, CameraFrame& frame);
-  /// Depth and labels that steps().map[i] took; false where it took none. Valid until the next call.
+  /// Depth and labels that steps().map[i] took; false if it took none. Valid until the next call.
   bool mapScene(std::size_t i, SceneImages& scene);
 
  private:
@@ -89,7 +89,7 @@ class RecordingSource final : public LogSource {
   Calibration calibration_;
   bool without_images_ = false;
   std::function<bool(Stamp, std::uint32_t)> wants_image_;
-  std::size_t cameras_ = kMaxCameras;  ///< whose images are delivered
+  std::size_t cameras_ = kMaxCameras;  ///< number of cameras whose images are delivered
   LogCounters counters_;
   LogWarnings warnings_;
   std::array<Pool, kMaxCameras> pools_;
@@ -104,7 +104,7 @@ class RecordingSource final : public LogSource {
 /// True when `path` is the folder of a recording, or a run's folder that holds one in `recording/`.
 bool isRecording(const std::string& path);
 
-/// Opens it. InputError where nothing can be replayed.
+/// Opens it. InputError if nothing can be replayed.
 std::unique_ptr<RecordingSource> openRecording(const std::string& path, const LogOptions& options = {});
 
 }  // namespace swiftlet

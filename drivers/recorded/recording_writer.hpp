@@ -75,9 +75,9 @@ class RecordingWriter {
   Status smoothStep(const SmoothStep& step);
   Status meshStep(const MeshStep& step);
   Status loopStep(const LoopStep& step);
-  /// `scene`: what the map took with the frame, may be empty; only the metres of its depth image and its
-  /// labels are kept. kInvalidInput (counted as lost) for a depth image of another size than the header's
-  /// sensor, and for more than 256 MiB.
+  /// `scene`: depth and labels that the map used with the frame, may be empty; only the metres of its depth
+  /// image and its labels are stored. kInvalidInput (counted as lost) for a depth image of another size than
+  /// the header's sensor, and for more than 256 MiB.
   Status mapStep(const MapStep& step, const SceneImages& scene);
   /// `count` records of `kind` never came here because a buffer before the writer was full; they would have
   /// followed the last record of that kind.
@@ -85,7 +85,7 @@ class RecordingWriter {
 
   Status flush();
   Status sync();
-  /// Marks the end, syncs and closes. Whatever comes later is refused and counted as lost.
+  /// Writes the end mark, syncs and closes. Later records are refused and counted as lost.
   Status end();
 
   [[nodiscard]] Status status() const { return status_; }

@@ -33,7 +33,7 @@ class TrackReader {
  public:
   /// InputError when the file cannot be read, has another header or holds no line.
   explicit TrackReader(const std::string& path);
-  /// Reads text in memory, which must outlive the reader; `name` stands for the file in messages.
+  /// Reads text in memory, which must outlive the reader; `name` names the file in messages.
   TrackReader(const std::string& name, std::string_view text);
   TrackReader(const TrackReader&) = delete;
   TrackReader& operator=(const TrackReader&) = delete;
@@ -42,7 +42,7 @@ class TrackReader {
   /// counts as present when it saw something.
   bool next(TrackedFrame& frame);
 
-  /// The file says which frames are keyframes.
+  /// The file marks which frames are keyframes.
   [[nodiscard]] bool hasKeyframes() const { return columns_ > kKeyframe; }
   /// One more than the highest camera number so far.
   [[nodiscard]] std::size_t cameras() const { return cameras_; }
@@ -85,7 +85,7 @@ class TrackReader {
   std::uint64_t crowded_ = 0;  ///< frames with surplus
 };
 
-/// What a whole file holds. Reading it through before a run refuses a bad file before anything is made.
+/// Summary of a whole file. Reading it before a run rejects a bad file before any output is created.
 struct TrackFileFacts {
   std::uint64_t frames = 0;
   std::size_t cameras = 0;

@@ -30,13 +30,13 @@ struct TrajectoryPoint {
 
 using Trajectory = std::vector<TrajectoryPoint>;
 
-/// In time order. InputError names file and line; `counters` and `warnings` get what was skipped.
+/// In time order. InputError names file and line; `counters` and `warnings` receive what was skipped.
 Trajectory readTrajectory(const std::string& path, LogCounters& counters, LogWarnings& warnings);
 Trajectory readTrajectoryText(const std::string& name, std::string_view text, LogCounters& counters,
                               LogWarnings& warnings);
 
-/// For files that a program of ours wrote: the first row that is bad, repeated or out of order is an
-/// InputError with its line, and nothing is skipped. `remedy` ends the message.
+/// For files written by swiftlet: the first row that is bad, repeated or out of order is an InputError with
+/// its line; no row is skipped. `remedy` ends the message.
 Trajectory readWholeTrajectory(const std::string& path, const std::string& remedy);
 
 /// "sec.nnnnnnnnn", exact.

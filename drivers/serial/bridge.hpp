@@ -34,8 +34,8 @@ class Bridge {
   WrappingCounter<std::uint32_t> edges_;
 };
 
-/// 42 bytes, 46 with the temperature [degC]. The device clock, or the arrival where there is none; the
-/// counter's low 32 bits. Returns the length; 0 when `out` is too short.
+/// 42 bytes, 46 with the temperature [degC]. Uses the device clock, or the arrival if there is none, and the
+/// counter's low 32 bits. Returns the length; 0 if `out` is too short.
 std::size_t encodeBridge(const ImuReading& reading, std::optional<float> temperature,
                          std::span<std::uint8_t> out);
 /// 20 bytes.

@@ -21,7 +21,7 @@ class WrappingClock {
     last_ = value;
     return total_;
   }
-  /// A value close to the last one, without moving on: of an event told about next to a sample.
+  /// Unwraps a value close to the last one without advancing: for an event reported next to a sample.
   [[nodiscard]] std::int64_t near(T value) const {
     return last_ ? total_ + difference(value, *last_) : static_cast<std::int64_t>(value);
   }
@@ -38,7 +38,7 @@ class WrappingClock {
   std::int64_t total_ = 0;
 };
 
-/// A counter: never goes back, since a number that was used should not come again.
+/// Unwraps a counter: never goes backwards, so that no number is used twice.
 template <typename T>
 class WrappingCounter {
  public:
@@ -54,7 +54,7 @@ class WrappingCounter {
   std::uint64_t total_ = 0;
 };
 
-/// How many samples are missing in front of each: from the counter where there is one, else from the
+/// Number of samples missing before each sample: from the counter if there is one, otherwise from the
 /// device's clock and the median of its last steps. Memory: nine steps. Cost: O(1).
 class SampleGaps {
  public:

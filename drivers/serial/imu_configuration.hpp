@@ -19,7 +19,7 @@ namespace swiftlet {
 
 struct ConfigurationStep {
   FixedVector<std::uint8_t, 40> bytes;
-  std::span<const std::uint8_t> reply;    ///< bytes that its answer begins with when it was taken
+  std::span<const std::uint8_t> reply;    ///< first bytes of its answer if it was accepted
   std::span<const std::uint8_t> refusal;  ///< the same when it was not; may be empty
   std::size_t answer_length = 0;          ///< bytes that answered() needs, from the reply's first on
   const char* what = "";                  ///< in words

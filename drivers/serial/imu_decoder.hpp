@@ -51,7 +51,7 @@ struct MavlinkImuSource {
   std::optional<std::uint8_t> sensor;  ///< the message's id field
 };
 
-/// A message of an autopilot that came in beside the readings: TIMESYNC, request or answer, and two more.
+/// A message of an autopilot received besides the samples: TIMESYNC request or answer, and two more.
 struct ReceivedMavlink {
   Stamp arrival;  ///< of the first byte
   std::uint8_t system = 0;
@@ -82,8 +82,8 @@ class ImuDecoder {
   /// Which message readings are taken from: HighresImu::kId at first, ScaledImu::kRawId or kScaledId.
   void takeMavlink(std::uint32_t message);
 
-  /// After the device was gone: forgets half a frame and where its clock and counters stood. What was counted
-  /// stays, and so does what waits.
+  /// After the device was gone: discards a partial frame and the state of its clock and counters. Statistics
+  /// and waiting messages are kept.
   void restart();
 
   [[nodiscard]] ImuProtocol protocol() const { return protocol_; }
@@ -112,7 +112,7 @@ class ImuDecoder {
   MavlinkLink link_;
   WrappingCounter<std::uint32_t> mavlink_triggers_;
   std::uint32_t mavlink_message_ = mavlink::HighresImu::kId;
-  std::optional<std::uint8_t> px4_;  ///< the system whose autopilot says that it is PX4
+  std::optional<std::uint8_t> px4_;  ///< the system whose autopilot reports to be PX4
   SampleGaps gaps_;
   EventQueue<TriggerEdge, kMostEvents> edges_;
   EventQueue<ReceivedMavlink, kMostEvents> received_;

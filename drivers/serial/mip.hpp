@@ -41,8 +41,8 @@ class MipWriter {
   bool fits_ = true;
 };
 
-/// Reference time, scaled acceleration, scaled rate, 44 bytes. The device clock, or the arrival where there
-/// is none. Returns the length; 0 when `out` is too short.
+/// Reference time, scaled acceleration, scaled rate, 44 bytes. Uses the device clock, or the arrival if there
+/// is none. Returns the length; 0 if `out` is too short.
 std::size_t encodeMip(const ImuReading& reading, std::span<std::uint8_t> out);
 
 }  // namespace swiftlet

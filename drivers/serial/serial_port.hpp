@@ -32,7 +32,7 @@ struct SerialSettings {
 
 enum class LowLatency : std::uint8_t { kNotAsked, kOn, kNotOffered };
 
-/// What the kernel's driver counted since the port was made; empty where it counts nothing (USB CDC, pty).
+/// Counters of the kernel's driver since the port was created; empty if it has none (USB CDC, pty).
 struct SerialErrors {
   std::uint32_t overrun = 0;  ///< bytes that the chip lost
   std::uint32_t framing = 0;  ///< a stop bit that was none: wrong baud rate, or noise
@@ -59,7 +59,7 @@ class SerialPort {
 
   /// What is there, without waiting: `count` may be 0. `read_at`: CLOCK_MONOTONIC when the read returned.
   DeviceFault read(std::span<std::uint8_t> into, std::size_t& count, Stamp& read_at);
-  /// Waits until bytes are there, the port is gone (which read() then says), or `most` has passed.
+  /// Waits until bytes arrive, the port is gone (read() then reports it), or `most` has passed.
   DeviceFault wait(Duration most);
   /// Sends what there is room for, without waiting: `taken` may be 0.
   DeviceFault writeSome(std::span<const std::uint8_t> bytes, std::size_t& taken);
@@ -72,7 +72,8 @@ class SerialPort {
   /// What the port runs at, as read back.
   [[nodiscard]] unsigned baud() const { return baud_; }
   [[nodiscard]] LowLatency lowLatency() const { return low_latency_; }
-  /// One byte on the wire: ten bits. Zero for USB CDC and pseudo-terminals, whose baud rate means nothing.
+  /// Time of one byte on the wire: ten bits. Zero for USB CDC and pseudo-terminals, which have no real baud
+  /// rate.
   [[nodiscard]] Duration byteTime() const { return byte_time_; }
   [[nodiscard]] std::optional<SerialErrors> errors() const;
 

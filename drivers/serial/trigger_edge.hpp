@@ -12,7 +12,7 @@ struct TriggerEdge {
   Stamp arrival;              ///< CLOCK_MONOTONIC, of the first byte of the message that reported it
   Stamp device;               ///< of the edge, in the sensor's clock: comparable with ImuReading::device
   std::uint64_t counter = 0;  ///< of edges, unwrapped: a jump reveals edges that were not reported
-  std::uint8_t line = 0;      ///< which input, where there are several
+  std::uint8_t line = 0;      ///< input number, if there are several
   bool rising = true;
 
   bool operator==(const TriggerEdge&) const = default;

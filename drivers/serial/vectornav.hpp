@@ -32,8 +32,8 @@ class VectorNav {
   WrappingCounter<std::uint32_t> sync_counter_;
 };
 
-/// TimeStartup and Imu of the Common group, 38 bytes. The device clock, or the arrival where there is none.
-/// Returns the length; 0 when `out` is too short.
+/// TimeStartup and Imu of the Common group, 38 bytes. Uses the device clock, or the arrival if there is none.
+/// Returns the length; 0 if `out` is too short.
 std::size_t encodeVectorNav(const ImuReading& reading, std::span<std::uint8_t> out);
 
 }  // namespace swiftlet

@@ -27,7 +27,7 @@ struct CalibrationRig {
 /// The same seed gives the same bytes.
 CalibrationRig drawCalibrationRig(std::uint64_t seed, CameraKind lens);
 
-/// The same for a kind of rig: drawn by `seed`, or a preset with an IMU as told.
+/// The same for a kind of rig: drawn by `seed`, or a preset with the given IMU.
 CalibrationRig makeCalibrationRig(RigKind kind, std::uint64_t seed);
 
 }  // namespace swiftlet

@@ -44,7 +44,7 @@ struct SessionSettings {
   Turning turning = Turning::kAll;
   /// Readings of both sensors are turned by it: exchanged axes, of which a determinant of -1 is left-handed.
   Eigen::Matrix3d imu_axes = Eigen::Matrix3d::Identity();
-  /// Errors of the images' clock beside the rig's shift: constant, growing with time, and at random.
+  /// Errors of the images' clock in addition to the rig's offset: constant, growing with time, and random.
   Duration clock_offset;
   double clock_drift = 0;   ///< s/s
   double stamp_jitter = 0;  ///< s, sigma; the two cameras' stamps stay equal

@@ -18,14 +18,14 @@ namespace swiftlet {
 
 enum class ExposureMode : std::uint8_t { kGain, kOdometry, kFixed };
 
-/// From `begin` on the scene's light goes to `level` times the flight's first within kLightRamp, by the same
-/// ratio in each moment.
+/// From `begin` on the scene's light changes to `level` times its first value within kLightRamp, at a
+/// constant ratio.
 struct LightChange {
   double begin = 0;  ///< s
   double level = 1;
 };
 inline constexpr double kLightRamp = 2.0;  // s
-/// At `seconds`, after changes in order of their begin: times the flight's first light.
+/// Light at `seconds` relative to the flight's first light, after changes in order of their start.
 [[nodiscard]] double lightAt(const std::vector<LightChange>& changes, double seconds);
 
 class SimulatedExposure {

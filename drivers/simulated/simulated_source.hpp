@@ -28,7 +28,7 @@ class SimulatedSource {
 
   [[nodiscard]] const SimulatedFlight& flight() const { return flight_; }
 
-  /// The next item: fills `sample` or `frame` as the answer says.
+  /// The next item: fills `sample` or `frame`; the return value says which.
   Item next(ImuSample& sample, CameraFrame& frame);
 
  private:

@@ -22,8 +22,8 @@
 namespace swiftlet {
 
 enum class FaultKind : std::uint8_t {
-  kBlackout,       ///< images come, but dark
-  kCameraMissing,  ///< images do not come
+  kBlackout,       ///< images arrive, but dark
+  kCameraMissing,  ///< images are missing
   kImuGap,         ///< no IMU samples
   kImuSaturation,  ///< the IMU clips at imu.low_gyro_limit and imu.low_accel_limit
 };
@@ -49,7 +49,7 @@ struct SimulationSettings {
   std::vector<std::string> world_for;
   double motion_skip = 0;  ///< s of it left out at the beginning
 
-  /// A random rig comes with its own noise, IMU matrices, time shift and readout in place of those below.
+  /// A random rig has its own noise, IMU matrices, time offset and readout instead of those below.
   RigKind rig = RigKind::kEuroc;
   std::uint64_t rig_seed = 1;  ///< of a random rig
   bool mono = false;           ///< camera 0 alone
@@ -61,7 +61,7 @@ struct SimulationSettings {
   RenderSettings render;  ///< samples, exposure time
   SensorSettings sensor;  ///< light, noise, vignette, control of the gain
   ExposureMode exposure_mode = ExposureMode::kGain;
-  std::vector<LightChange> light_changes;  ///< in order of their begin
+  std::vector<LightChange> light_changes;  ///< in order of their start
   bool low_light = false;                  ///< a dim room: 5 % of the light, 10 ms exposure
   TrackSettings tracks;                    ///< where feature tracks take the images' place
 
@@ -71,8 +71,7 @@ struct SimulationSettings {
   Stamp start{1'700'000'000'000'000'000};  ///< stamp of the trajectory's time zero
 
   std::vector<Fault> faults;
-  /// Added to the image stamps that are given: what the estimator has to find is
-  /// t_imu = t_image - image_stamp_offset.
+  /// Added to the image stamps in the log: the estimator has to find t_imu = t_image - image_stamp_offset.
   Duration image_stamp_offset;
   /// The calibration given is turned: by a rotation vector [deg, body axes] about camera 0's centre
   /// for the whole rig, and about each camera's own centre.

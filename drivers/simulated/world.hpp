@@ -130,8 +130,8 @@ class World {
   /// Nearest visible side hit beyond `nearest` and before `farthest` lengths of the direction.
   [[nodiscard]] std::optional<RayHit> castRay(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                               double nearest, double farthest) const;
-  /// True when nothing stands between the two points; surfaces count from both sides. `slack` [m]
-  /// is left out at both ends.
+  /// True if nothing is between the two points; surfaces count from both sides. `slack` [m] is ignored at
+  /// both ends.
   [[nodiscard]] bool sees(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double slack = 0.01) const;
 
   /// A point drawn evenly by area.

@@ -14,7 +14,7 @@
 namespace swiftlet {
 
 [[nodiscard]] CalibrationTarget readTarget(const std::string& file);
-/// `name` stands for the file in messages.
+/// `name` names the file in messages.
 [[nodiscard]] CalibrationTarget parseTarget(const std::string& name, std::string_view text);
 /// The file that Kalibr and readTarget read; lengths to a micrometre.
 [[nodiscard]] std::string targetYaml(const CalibrationTarget& target);

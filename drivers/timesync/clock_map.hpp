@@ -49,7 +49,7 @@ class ClockMap {
   [[nodiscard]] TimesyncStatus status() const;
 
  private:
-  /// Stamps that do not fit: a new clock, when they go on and agree with each other.
+  /// Stamps that do not fit: a new clock if they continue and agree with each other.
   struct Candidate {
     int count = 0;
     Stamp first_device, first_arrival, newest_device;

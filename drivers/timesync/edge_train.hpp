@@ -25,15 +25,15 @@ class EdgeTrain {
   /// `period`: nominal, right to 2 %; positive.
   explicit EdgeTrain(Duration period);
 
-  /// One edge as it was read, in order. `sequence`: of the kernel's events on this line; says whether pulses
-  /// that lack were missed or not there.
+  /// One edge in reading order. `sequence`: of the kernel's events on this line; it shows whether absent
+  /// pulses were missed or did not exist.
   void add(Stamp edge, std::optional<std::uint32_t> sequence = std::nullopt);
 
   struct Edge {
     Stamp stamp;
     bool measured = false;  ///< false: not read (or not yet); from its neighbours and the period
   };
-  /// The edge of pulse `index` of this epoch; empty where no edge is near.
+  /// The edge of pulse `index` of this epoch; empty if no edge is near.
   [[nodiscard]] std::optional<Edge> at(std::int64_t index) const;
   /// The number of the pulse nearest to `stamp`; empty without edges.
   [[nodiscard]] std::optional<std::int64_t> nearest(Stamp stamp) const;
@@ -42,7 +42,7 @@ class EdgeTrain {
   [[nodiscard]] Duration period() const { return {static_cast<std::int64_t>(period_)}; }
   [[nodiscard]] std::uint64_t edges() const { return edges_; }
   [[nodiscard]] std::uint64_t missed() const { return missed_; }  ///< pulses without an edge
-  [[nodiscard]] std::uint64_t absent() const { return absent_; }  ///< places where there was no pulse
+  [[nodiscard]] std::uint64_t absent() const { return absent_; }  ///< grid positions without a pulse
   [[nodiscard]] std::uint64_t glitches() const { return glitches_; }
 
  private:

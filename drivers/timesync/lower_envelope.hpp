@@ -52,7 +52,8 @@ class LowerEnvelope {
   /// Mean change [ns] of that height from bin to bin: as large as the mean for jitter of even density, and
   /// blind to a step of all the later bins.
   [[nodiscard]] double roughness() const { return roughness_; }
-  /// Estimated error [ns] of the line at `time`: of the fit, and what a clock may wander until then.
+  /// Estimated error [ns] of the line at `time`: error of the fit, plus the possible drift of a clock until
+  /// then.
   [[nodiscard]] double uncertainty(Stamp time) const;
   /// Whether the line has risen for good: true when in the newest n >= `fewest` closed bins no point came
   /// within h of the line, with n (h - tolerance - the fit's own error) >= surprise x roughness. By chance

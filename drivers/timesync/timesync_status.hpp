@@ -9,7 +9,7 @@ namespace swiftlet {
 
 enum class LockState : std::uint8_t {
   kUnlocked,  ///< nothing to go by: use the arrival's or the driver's own stamp
-  kLocking,   ///< stamps come, and may still be off by the delay's jitter
+  kLocking,   ///< stamps are available, but may be off by the delay's jitter
   kLocked,    ///< uncertainty within its limit
 };
 

@@ -36,7 +36,7 @@ struct TriggerMatch {
   std::int64_t pulse = 0;  ///< EdgeTrain's number, in `epoch`: equal for the cameras of one exposure
   std::uint32_t epoch = 0;
   Stamp edge;
-  bool measured = false;  ///< false: the edge was missed, its stamp comes from its neighbours
+  bool measured = false;  ///< false: the edge was missed, its stamp is computed from its neighbours
 };
 
 class TriggerMatcher {
@@ -47,8 +47,8 @@ class TriggerMatcher {
   TriggerMatcher(const EdgeTrain& train, std::optional<Duration> expected_lag)
       : train_(&train), expected_(expected_lag) {}
 
-  /// The caller knows that the camera streamed before the trigger began: the train's first edge of this epoch
-  /// made frame `sequence`. Used where no lag is expected; where one is, both must agree.
+  /// The caller knows that the camera streamed before the trigger started: the train's first edge of this
+  /// epoch made frame `sequence`. Used if no lag is expected; if one is, both must agree.
   void pairFirst(std::uint32_t sequence);
 
   Status match(const FrameMark& frame, TriggerMatch& out);

@@ -40,7 +40,8 @@ class TwoWayClockMap {
   explicit TwoWayClockMap(double max_skew_ppm = 150);
 
   Status add(const ClockExchange& exchange);
-  /// Host stamp of a remote stamp; not made to rise (RisingStamps does). Empty before the first exchange.
+  /// Host stamp of a remote stamp; not made monotonic (RisingStamps does that). Empty before the first
+  /// exchange.
   [[nodiscard]] std::optional<Stamp> toHost(Stamp remote) const;
 
   [[nodiscard]] LockState lock() const;

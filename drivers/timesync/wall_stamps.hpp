@@ -35,7 +35,7 @@ class WallStamps {
 
   enum class Result : std::uint8_t { kMapped, kWrongClock, kUnsure };
 
-  /// Before the messages that have come are mapped. True: the wall clock was set since the last call, by
+  /// Call before mapping the messages that have arrived. True: the wall clock was set since the last call, by
   /// step().
   bool follow(const HostClocks& now);
   /// `host` is written where the result is kMapped. follow() came before.

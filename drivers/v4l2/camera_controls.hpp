@@ -41,13 +41,14 @@ class CameraControls {
   /// Automatic gain off, then the gain in the driver's own units.
   DeviceFault setGain(std::int32_t gain);
 
-  /// Empty: the camera does not say.
+  /// Empty: unknown to the camera.
   [[nodiscard]] std::optional<Duration> exposure() const;
   [[nodiscard]] std::optional<std::int32_t> gain() const;
 
-  /// What can be set in flight within the frame as it is, and what is set; empty without exposures.
+  /// What can be set in flight within the current frame rate, and the current values; empty without
+  /// exposures.
   [[nodiscard]] std::optional<ExposureAbility> ability() const;
-  /// Exposure and gain, clamped, in one call. kFailed: as the kernel says.
+  /// Sets exposure and gain, clamped, in one call. kFailed: the kernel's error.
   DeviceFault set(const ExposureSetting& setting);
 
  private:

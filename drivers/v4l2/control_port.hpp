@@ -14,7 +14,7 @@ class ControlPort {
   virtual int call(unsigned long request, void* argument) const = 0;
 };
 
-/// ioctl on a descriptor, again when a signal comes in between.
+/// ioctl on a descriptor, repeated if a signal interrupts it.
 int callNode(int fd, unsigned long request, void* argument);
 
 }  // namespace swiftlet

@@ -36,7 +36,7 @@ struct FoundSensor {
   NodeNumber node;
 };
 
-/// The sensor whose images reach `video` by enabled links; empty: none, or one without a node.
+/// The sensor whose images reach `video` over enabled links; empty: none, or one without a node.
 [[nodiscard]] std::optional<FoundSensor> sensorBefore(const MediaGraph& graph, NodeNumber video);
 
 class SensorNode : public ControlPort {

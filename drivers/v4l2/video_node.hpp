@@ -42,12 +42,12 @@ class VideoNode : public ControlPort {
 
   enum class Role : std::uint8_t { kCapture, kOutput };
 
-  /// Non-blocking. A node that cannot stream in this role is refused with what it is.
+  /// Non-blocking. A node that cannot stream in this role is rejected, and the fault says what it is.
   DeviceFault open(const char* path, Role role);
   void close();
   [[nodiscard]] int fd() const { return fd_; }
   [[nodiscard]] bool isOpen() const { return fd_ >= 0; }
-  /// V4L2_BUF_TYPE_..., for calls that are not made here.
+  /// V4L2_BUF_TYPE_..., for calls made elsewhere.
   [[nodiscard]] std::uint32_t type() const { return type_; }
 
   int call(unsigned long request, void* argument) const override { return callNode(fd_, request, argument); }
@@ -56,7 +56,7 @@ class VideoNode : public ControlPort {
 
   /// As the node has it. 0; -1 and errno.
   int readFormat(NodeFormat& format) const;
-  /// Whole images, no padding asked; afterwards as the driver made it. 0; -1 and errno.
+  /// Requests complete images without padding; afterwards the driver's choice. Returns 0, or -1 and errno.
   int setFormat(NodeFormat& format) const;
 
   /// Asks for and maps `count` buffers; as many as the driver gave afterwards.
@@ -69,9 +69,9 @@ class VideoNode : public ControlPort {
   DeviceFault start();
   /// Hands a buffer to the driver. `used`: bytes of an output's image. False, and errno.
   [[nodiscard]] bool queue(std::uint32_t index, std::size_t used = 0) const;
-  /// The next one that the driver is done with. False, and errno: EAGAIN where there is none.
+  /// The next buffer that the driver has finished. False, and errno: EAGAIN if there is none.
   [[nodiscard]] bool dequeue(FilledBuffer& filled) const;
-  /// True: poll() reports an error or a hang-up, so that nothing more will come.
+  /// True: poll() reports an error or a hang-up; no more images will arrive.
   [[nodiscard]] bool inError() const;
 
  private:

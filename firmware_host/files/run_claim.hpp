@@ -21,7 +21,7 @@ inline constexpr const char* kRunMark = "swiftlet_run.txt";
 /// The mark in a folder; none: not a run of this program, or one from before there was a mark.
 std::optional<RunKind> runKindOf(const std::string& folder);
 
-/// InputError where the folder holds a run's mark or files of a run's names. Nothing is made or changed.
+/// InputError if the folder holds a run's mark or files of a run's names. Nothing is made or changed.
 void refuseRunIn(const std::string& folder);
 
 /// A folder that belongs to one run until this goes: a flight's is not deleted to free space meanwhile.

@@ -46,24 +46,24 @@ class FrameQueue {
   }
   /// Of the front frame's image that came last.
   [[nodiscard]] HostTimes hostTimes() const;
-  /// Whether samples up to the front frame's stamp are still to come. A sample less than one period before
+  /// Whether samples up to the front frame's stamp are still expected. A sample less than one period before
   /// the frame is its last.
   [[nodiscard]] bool awaitsSamples();
   /// Gives the front frame's images back, and those before them.
   void pop();
   /// The same for a frame that was not taken; counted.
   void drop();
-  /// The input has ended: what waits for a partner comes to the queue alone. False: nothing waited.
+  /// The input has ended: frames waiting for a partner are queued alone. False: none waited.
   bool flush();
 
   /// Frames that wait, that in work included.
   [[nodiscard]] int size() const { return static_cast<int>(waiting_.size() + images[0].size()); }
-  /// The IMU's thread, after its sample: `track` may go on.
+  /// Called by the IMU's thread after its sample: `track` may continue.
   [[nodiscard]] bool awaitedSampleCame() const;
 
   struct Counters {
     std::uint64_t dropped = 0;          ///< frames that went by while others were in work
-    std::uint64_t without_samples = 0;  ///< frames that went on although their samples had not come
+    std::uint64_t without_samples = 0;  ///< frames processed although their samples had not arrived
   };
   [[nodiscard]] const Counters& counters() const { return counters_; }
   [[nodiscard]] const PairingCounters& pairing() const { return pairing_.counters(); }
@@ -98,7 +98,8 @@ class FrameQueue {
   StereoFrame paired_;
   FixedVector<StereoFrame, kWaitingFrames> waiting_;
   std::optional<StereoFrame> told_;
-  /// Once the newest sample is there `track` may go on; the latest stamp of all while it does not wait.
+  /// `track` may continue once the newest sample has arrived; the latest possible stamp while it does not
+  /// wait.
   std::atomic<std::int64_t> awaited_imu_{std::numeric_limits<std::int64_t>::max()};
   Counters counters_;
 };

@@ -57,7 +57,7 @@ class Graph {
   [[nodiscard]] TrackNode& track() { return *track_; }
   [[nodiscard]] SmoothNode& smooth() { return *smooth_; }
   [[nodiscard]] LogNode& log() { return *log_; }
-  /// Null where switched off.
+  /// Null if switched off.
   [[nodiscard]] MeshNode* mesh() { return mesh_.get(); }
   [[nodiscard]] LoopNode* loop() { return loop_.get(); }
   [[nodiscard]] MappingNode* map() { return map_.get(); }

@@ -22,7 +22,7 @@ class HeldFrames {
     bool has_images = false;
     std::array<std::uint64_t, kMaxCameras> number{};  ///< of each camera's image
     std::array<ImageView, kMaxCameras> image;
-    SceneImages scene;  ///< empty where there is none
+    SceneImages scene;  ///< empty if there is none
 
     // Of HeldFrames.
     int place = -1;    ///< of the exchange; -1: waits for nothing

@@ -39,7 +39,7 @@ inline constexpr std::size_t kImageSlots = 1 + kTrackQuota + kMeshQuota + kRecor
 using ImagePool = SlotPool<ImageSlot, kImageSlots, kImageReaders>;
 
 /// Images of a keyframe, copied by `track`: the threads that look at keyframes are slow, and would otherwise
-/// hold the cameras' slots. `image` shows `pixels`; empty where missing.
+/// hold the cameras' slots. `image` shows `pixels`; empty if missing.
 struct KeyframeImages {
   std::uint64_t frame = 0;  ///< StereoFrame::index
   std::array<std::uint64_t, kMaxCameras> number{};

@@ -71,7 +71,7 @@ class MappingNode final : public Node {
 
   GraphContext& context_;
   MapStage stage_;
-  std::unique_ptr<HeldFrames> held_;  ///< null where no labels are waited for
+  std::unique_ptr<HeldFrames> held_;  ///< null if no labels are waited for
   std::uint64_t worlds_ = 0;
   std::uint64_t spare_turns_ = 0;  ///< since the last frame
   CorrectionStep corrected_;

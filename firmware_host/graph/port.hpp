@@ -43,7 +43,7 @@ enum class Arrow : std::uint8_t {
 
 class In {
  public:
-  /// `counter`: name of what was lost here, in summary.json; literal text, null where nothing can be.
+  /// `counter`: name of what was lost here, in summary.json; literal text, null if nothing can be.
   In(Node& reader, const char* counter, Arrow arrow);
   In(const In&) = delete;
   In& operator=(const In&) = delete;
@@ -167,7 +167,7 @@ class SlotIn final : public In {
   void miss() { lost_.add(); }
   [[nodiscard]] std::uint64_t lost() const override { return lost_.value(); }
 
-  /// Reader. False where nothing waits.
+  /// Reader. False if nothing waits.
   bool tryPop(Loan& loan) {
     SlotHandle handle;
     if (!ring_.tryPop(handle)) return false;

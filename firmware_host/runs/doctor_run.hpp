@@ -20,7 +20,7 @@ struct DoctorRequest {
 struct DoctorReport {
   MachineReport computer;
   MachineReport connected;
-  MachineReport vehicle;          ///< empty where the settings name no device
+  MachineReport vehicle;          ///< empty if the settings name no device
   std::vector<std::string> next;  ///< what to do, in order; empty: fly
 
   /// Neither a device of the vehicle nor one that is missing for it is poor. The computer's own poor lines

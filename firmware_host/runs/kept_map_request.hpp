@@ -13,7 +13,7 @@ struct KeptMapRequest {
   std::string in;       ///< folder of a kept map to be located in; sets loop.in_map
   bool extend = false;  ///< continue the map; sets loop.extend_map
 
-  /// InputError where a map is to be kept that is not to be extended.
+  /// InputError if a map is to be kept that is not to be extended.
   void apply(Settings& settings) const {
     if (!in.empty()) settings.loop.in_map = in;
     if (extend) settings.loop.extend_map = true;

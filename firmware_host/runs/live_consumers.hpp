@@ -25,7 +25,7 @@ class LiveConsumers {
 
   /// For GraphOptions; they live as long as this.
   [[nodiscard]] const LiveOutlets& outlets() const { return outlets_; }
-  /// Likewise; null where nobody brings labels.
+  /// Likewise; null if nobody brings labels.
   [[nodiscard]] LabelExchange* labels() const { return labels_.get(); }
   /// Writes the consumers' messages since the last call to the log. True: there were some.
   bool drainRemarks(RunObserver& observer);

@@ -39,7 +39,7 @@ class RunOutput {
   [[nodiscard]] const Vocabulary* vocabulary();
   /// What the graph is to know of this folder.
   [[nodiscard]] GraphOptions graphOptions();
-  /// Writes `recording/`. `depth_sensor`: of the map; null: none. Null where it cannot (fly_on).
+  /// Writes `recording/`. `depth_sensor`: of the map; null: none. Null if it cannot (fly_on).
   [[nodiscard]] std::unique_ptr<FlightRecorder> startRecorder(
       RecordOrder order, const DepthImageView* depth_sensor = nullptr) const;
 

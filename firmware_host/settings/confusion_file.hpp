@@ -15,7 +15,7 @@ namespace swiftlet {
 /// remedy.
 ConfusionModel readConfusion(const std::string& path, float right);
 
-/// Of the file that map.confusion names; empty where it names none.
+/// Of the file that map.confusion names; empty if it names none.
 std::optional<ConfusionModel> confusionOf(const Settings& settings);
 
 }  // namespace swiftlet

@@ -6,7 +6,7 @@
 
 namespace swiftlet {
 
-/// InputError where the text is no list of labels.
+/// InputError if the text is no list of labels.
 inline void checkMovingLabels(const MapSettings& settings) {
   if (labelMask(settings.moving_labels)) return;
   throw InputError("map.moving_labels", 0, "", "\"" + settings.moving_labels + "\" is not a list of labels",

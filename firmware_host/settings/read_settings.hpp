@@ -14,7 +14,7 @@ namespace swiftlet {
 /// Applies a YAML file on top of `settings` (unchanged when it throws).
 void readSettingsFile(const std::string& path, Settings& settings);
 
-/// The same from text; `name` stands for the file in messages.
+/// The same from text; `name` names the file in messages.
 void readSettingsText(const std::string& name, std::string_view text, Settings& settings);
 
 /// Applies one `group.name=value`.

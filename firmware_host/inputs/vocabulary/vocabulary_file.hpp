@@ -17,7 +17,7 @@
 namespace swiftlet {
 
 Vocabulary readVocabulary(const std::string& path);
-/// `name` stands for the file in messages; `bytes` as they are in the file.
+/// `name` names the file in messages; `bytes` as they are in the file.
 Vocabulary readVocabularyBytes(const std::string& name, std::string_view bytes);
 
 /// The compact form.

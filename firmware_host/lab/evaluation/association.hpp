@@ -35,7 +35,7 @@ struct Association {
 /// Both in time order.
 Association associate(const Trajectory& estimate, const Trajectory& truth, const AssociationOptions& options);
 
-/// The truth at `stamp`; empty where it does not reach or the gap is too long.
+/// The truth at `stamp`; empty if it does not reach or the gap is too long.
 std::optional<SE3> interpolate(const Trajectory& truth, Stamp stamp, Duration max_gap);
 
 }  // namespace swiftlet

@@ -10,7 +10,7 @@
 
 namespace swiftlet {
 
-/// Names by label, of a log's labels.csv (`#id,name`, then a line each). Empty where there is no such file;
+/// Names by label, of a log's labels.csv (`#id,name`, then a line each). Empty if there is no such file;
 /// InputError with the line where one is not of that form.
 std::map<int, std::string> readLabelNames(const std::string& log);
 

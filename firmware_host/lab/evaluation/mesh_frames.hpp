@@ -2,8 +2,8 @@
 // meshes/frames.csv of a run folder: which mesh files belong to which frame, and the hull of its features.
 //
 // Header `frame,stamp [ns],keyframe,frame_mesh,horizon_mesh,hull [px: u v ...]`; file names within the
-// folder, empty where there is none; the hull is a convex polygon in camera 0's raw pixels, its numbers
-// separated by blanks, empty where a frame had none.
+// folder, empty if there is none; the hull is a convex polygon in camera 0's raw pixels, its numbers
+// separated by blanks, empty if a frame had none.
 
 #include <Eigen/Core>
 #include <cstdint>

@@ -57,7 +57,7 @@ struct PlannedFault {
 class FaultTimeline {
  public:
   FaultTimeline() = default;
-  /// InputError with line and field. `name` stands for the file in messages.
+  /// InputError with line and field. `name` names the file in messages.
   static FaultTimeline parse(const std::string& name, std::string_view text);
   static FaultTimeline read(const std::string& path);
 

@@ -29,11 +29,11 @@ struct HilEvidence {
   bool finished = false;          ///< the flight finished normally
   std::vector<Line> remarks;      ///< of events.log
   std::vector<Judged> frames;     ///< odometry.tum
-  std::vector<Judged> states;     ///< imu_rate.tum; empty where the flight did not write it
+  std::vector<Judged> states;     ///< imu_rate.tum; empty if the flight did not write it
   Trajectory truth;               ///< empty: the log has none
 };
 
-/// `run`: of `swiftlet fly`; `hil`: of `swiftlet hil`. InputError where hil.json, faults.csv or events.log
+/// `run`: of `swiftlet fly`; `hil`: of `swiftlet hil`. InputError if hil.json, faults.csv or events.log
 /// cannot be read; what a broken flight did not write is empty.
 HilEvidence readHilEvidence(const std::string& run, const std::string& hil);
 

@@ -18,7 +18,7 @@
 
 namespace swiftlet {
 
-/// Stamps: `zero` is the file's time zero. `name` stands for the file in messages.
+/// Stamps: `zero` is the file's time zero. `name` names the file in messages.
 std::vector<ImuSample> goproImu(const std::string& name, const std::vector<MetadataPacket>& packets,
                                 Stamp zero);
 

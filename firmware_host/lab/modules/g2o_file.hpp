@@ -20,7 +20,7 @@ struct G2oFile {
 };
 
 G2oFile readG2oFile(const std::string& path);
-/// `name` stands for the file in messages; `bytes` may be packed.
+/// `name` names the file in messages; `bytes` may be packed.
 G2oFile readG2oBytes(const std::string& name, std::string_view bytes);
 
 /// Plain text. The file appears whole or not at all.

@@ -22,7 +22,7 @@ struct NamedTrajectory {
   Trajectory poses;
 };
 
-/// Those of `file` (TUM, EuRoC csv), or where it is empty the log's own truth. InputError where there are
+/// Those of `file` (TUM, EuRoC csv), or where it is empty the log's own truth. InputError if there are
 /// none.
 NamedTrajectory openTrajectory(const std::string& file, const std::string& log, const LogSource& source,
                                LogWarnings& warnings);

@@ -31,7 +31,7 @@ inline constexpr std::array<const char*, kSliceKinds> kSliceKindNames{"unknown",
 /// Red, green, blue: surface black, behind it dark violet, "at least" blue, unknown grey; distances from dark
 /// red through orange to light yellow at the reach.
 std::vector<std::uint8_t> sliceColours(const MapSlice& slice);
-/// Distances [mm] from 1 to 65535, rounded; 0 where none is known, and on and behind a surface.
+/// Distances [mm] from 1 to 65535, rounded; 0 if none is known, and on and behind a surface.
 std::vector<std::uint16_t> sliceMillimetres(const MapSlice& slice);
 
 /// Reads the map, draws and writes. InputError for bad input, with file, option and remedy; nothing is

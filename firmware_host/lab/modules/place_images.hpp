@@ -20,7 +20,7 @@ bool isPlainImageFolder(const std::string& path);
 
 /// In the order of time. Names that are numbers are stamps: nanoseconds, or seconds where they have a point.
 /// Where a name is none, or no stamp lies within the trajectory, each picture takes the stamp of one pose, in
-/// order; InputError where there are not as many of both.
+/// order; InputError if there are not as many of both.
 std::vector<PlaceImage> stampedImages(const std::string& folder, const Trajectory& trajectory);
 
 /// One camera without distortion: bearings that nothing is computed from.

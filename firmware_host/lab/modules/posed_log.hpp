@@ -21,7 +21,7 @@ struct PosedLogRequest : LogRequest {
 
 class PosedLog {
  public:
-  /// InputError where the log or the poses cannot be read, or a log has neither truth nor a trajectory.
+  /// InputError if the log or the poses cannot be read, or a log has neither truth nor a trajectory.
   PosedLog(const PosedLogRequest& request, const Settings& settings);
 
   [[nodiscard]] LogSource& source() { return *source_; }

@@ -16,10 +16,10 @@ inline constexpr const char* kKeptVolumeFile = "volume.swm";
 
 class KeptFolder {
  public:
-  /// InputError where there is something of that name already, or nothing can be made there.
+  /// InputError if there is something of that name already, or nothing can be made there.
   explicit KeptFolder(const std::string& path) : folder_(path, {kKeptGraphFile, kKeptVolumeFile}) {}
 
-  /// InputError where they cannot be written.
+  /// InputError if they cannot be written.
   void write(const KeptGraph& graph);
   void write(MapStage& map, const std::function<bool(std::uint32_t epoch)>& wanted);
   void write(const VoxelVolume& volume, double least_weight);
@@ -33,7 +33,7 @@ class KeptFolder {
   bool has_graph_ = false;
 };
 
-/// InputError where the folder holds no sound graph.
+/// InputError if the folder holds no sound graph.
 KeptGraph readKeptFolder(const std::string& path);
 
 /// The volume of a kept map: `path` itself, or in the folder of that name.

@@ -52,7 +52,7 @@ KeptMapReport checkKeptMap(const std::string& name, std::istream& in, const Volu
 /// Where it throws (the file changed since) both hold a part.
 void loadKeptMap(const std::string& name, std::istream& in, VoxelVolume& volume, MapSubmaps* submaps,
                  KeptMapReport& report);
-/// In place of what `map` holds. Where it throws the map is as it was; empty where the file changed
+/// In place of what `map` holds. Where it throws the map is as it was; empty if the file changed
 /// meanwhile.
 KeptMapReport readKeptMap(const std::string& name, std::istream& in, MapStage& map);
 KeptMapReport readKeptMapFile(const std::string& path, MapStage& map);

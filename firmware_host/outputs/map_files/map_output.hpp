@@ -12,7 +12,7 @@
 namespace swiftlet {
 
 /// `tied`: earlier epochs that lie in the newest one's map. Gives what summary.json says of the map.
-/// InputError where a file cannot be written.
+/// InputError if a file cannot be written.
 nlohmann::ordered_json writeMap(const std::string& folder, MapStage& map,
                                 std::span<const std::uint32_t> tied);
 

@@ -27,7 +27,7 @@ void writePly(const std::string& path, const TriangleMesh& mesh,
               WholeFile::Sync sync = WholeFile::Sync::kYes);
 
 TriangleMesh readPly(const std::string& path);
-/// `name` stands for the file in messages.
+/// `name` names the file in messages.
 TriangleMesh readPlyText(const std::string& name, std::string_view bytes);
 
 }  // namespace swiftlet

@@ -15,7 +15,7 @@ namespace swiftlet {
 
 class FolderSink final : public RecordSink {
  public:
-  /// Creates the folder and starts the writers. InputError where it exists with data or cannot be written.
+  /// Creates the folder and starts the writers. InputError if it exists with data or cannot be written.
   FolderSink(const std::string& folder, const Calibration& calibration, double camera_rate);
   ~FolderSink() override { stopWriters(); }
 

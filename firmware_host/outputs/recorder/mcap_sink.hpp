@@ -15,7 +15,7 @@ namespace swiftlet {
 
 class McapSink final : public RecordSink {
  public:
-  /// InputError where the file is there already or cannot be written.
+  /// InputError if the file is there already or cannot be written.
   McapSink(const std::string& file, const Calibration& calibration);
   ~McapSink() override { stopWriters(); }
 

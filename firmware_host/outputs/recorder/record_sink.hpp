@@ -46,7 +46,7 @@ class RecordSink : public SensorSink {
     std::vector<std::uint8_t> pixels;
   };
 
-  /// A thread that calls `step` until it has nothing more to do after the end; step: false where nothing
+  /// A thread that calls `step` until it has nothing more to do after the end; step: false if nothing
   /// waited.
   void startWriter(std::function<bool()> step);
   /// Of a destructor: the writers use members of the class that is about to go.

@@ -38,7 +38,7 @@ class BoardDetector {
   BoardDetector& operator=(const BoardDetector&) = delete;
   ~BoardDetector();
 
-  /// Corners by rising id; empty where the board is not seen.
+  /// Corners by rising id; empty if the board is not seen.
   [[nodiscard]] std::vector<BoardCorner> detect(const ImageView& image);
 
  private:

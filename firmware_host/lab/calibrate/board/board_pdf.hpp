@@ -24,7 +24,7 @@ struct BoardLayout {
 };
 
 /// The board that fills the paper: margins for the printer, the white frame and the rulers stay free. Tags
-/// and squares are whole multiples of 0.5 mm. InputError where they would be smaller than 5 mm.
+/// and squares are whole multiples of 0.5 mm. InputError if they would be smaller than 5 mm.
 [[nodiscard]] CalibrationTarget boardForPaper(const BoardLayout& layout, const Eigen::Vector2d& paper);
 
 /// The file's bytes; the same board gives the same.

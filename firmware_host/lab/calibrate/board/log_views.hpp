@@ -38,7 +38,7 @@ struct LogViews {
   std::vector<std::string> warnings;                  ///< of the log, for the user
 };
 
-/// InputError where the log cannot be read.
+/// InputError if the log cannot be read.
 [[nodiscard]] LogViews readLogViews(const LogViewsRequest& request);
 
 }  // namespace swiftlet

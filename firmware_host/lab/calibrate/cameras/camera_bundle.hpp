@@ -58,9 +58,9 @@ class CameraBundle {
   /// Until it no longer changes. `robust_scale` [px]: Cauchy's; zero: plain squares. False: no minimum found.
   bool solve(Terms terms, double robust_scale);
 
-  /// seen - predicted; false where the lens does not reach the point.
+  /// seen - predicted; false if the lens does not reach the point.
   [[nodiscard]] bool residual(const BundleView& view, const BundleCorner& corner, Eigen::Vector2d& r) const;
-  /// Lengths of all residuals, used or not; infinite where there is none.
+  /// Lengths of all residuals, used or not; infinite if there is none.
   [[nodiscard]] std::vector<double> residualNorms() const;
   /// Of the globals, the board's pose eliminated, for corners of 1 px sigma.
   [[nodiscard]] Information information(const BundleView& view) const;

@@ -7,7 +7,7 @@
 
 namespace swiftlet {
 
-/// A line per fact, with standard deviations; empty where no lens was found.
+/// A line per fact, with standard deviations; empty if no lens was found.
 [[nodiscard]] std::string describe(const CameraSolution& solution);
 
 /// Kalibr's camchain.yaml without an IMU: camera_model, distortion_model, intrinsics, resolution, T_cn_cnm1.

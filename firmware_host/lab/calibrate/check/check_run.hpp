@@ -46,7 +46,7 @@ struct CheckRequest : LogRequest {
   std::string out;  ///< folder for the run; empty: one that is removed afterwards
 };
 
-/// InputError where the log or its calibration cannot be read.
+/// InputError if the log or its calibration cannot be read.
 CheckResult checkCalibration(const CheckRequest& request, Settings settings);
 
 std::string checkText(const CheckResult& result);

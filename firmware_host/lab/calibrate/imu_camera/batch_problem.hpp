@@ -114,7 +114,7 @@ class BatchProblem {
   void setReadout(double readout) { state_.readout = readout; }
 
   /// Iterates until a further step would gain less than `settled` squared sigmas. `robust`: Huber's weights
-  /// on corners. False where the steps did not settle.
+  /// on corners. False if the steps did not settle.
   bool solve(int iterations, bool robust, double settled);
   /// Half as far apart knots; the motion stays.
   void refineSpline();
@@ -132,7 +132,7 @@ class BatchProblem {
   [[nodiscard]] Eigen::Matrix<double, 6, 1> meanBias() const;
 
   [[nodiscard]] double seconds(const SeenView& view, const SeenCorner& corner) const;
-  /// False where the corner has no pixel.
+  /// False if the corner has no pixel.
   bool residual(const SeenView& view, const SeenCorner& corner, Eigen::Vector2d& pixels) const;
   /// Reading - model.
   [[nodiscard]] Eigen::Matrix<double, 6, 1> residual(const TimedReading& reading) const;

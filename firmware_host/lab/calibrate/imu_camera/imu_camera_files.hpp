@@ -8,7 +8,7 @@
 
 namespace swiftlet {
 
-/// A line per value with its standard deviation; empty where nothing was found.
+/// A line per value with its standard deviation; empty if nothing was found.
 [[nodiscard]] std::string describe(const ImuCameraSolution& solution);
 
 /// As flights read it: lenses, extrinsics, time offset, readout, the IMU's matrices. `noise`: densities as

@@ -29,7 +29,7 @@ struct ImuNoiseResult {
   std::vector<std::string> warnings;
 };
 
-/// InputError where the log cannot be read, or has no rest of ten seconds.
+/// InputError if the log cannot be read, or has no rest of ten seconds.
 ImuNoiseResult measureImuNoise(const std::string& log);
 
 /// Kalibr's imu.yaml: of each kind the largest axis. A random walk that is not known is a comment.

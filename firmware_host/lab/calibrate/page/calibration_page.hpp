@@ -22,7 +22,7 @@ struct CalibrationPage {
   nlohmann::ordered_json scene;  ///< null: no 3D view
 };
 
-/// With the page's program where it is installed, else plain. InputError where the file cannot be written.
+/// With the page's program where it is installed, else plain. InputError if the file cannot be written.
 void writeCalibrationPage(const std::string& path, const CalibrationPage& page);
 
 /// The same as text: `program` is the page of findReportPage(), empty: plain.
