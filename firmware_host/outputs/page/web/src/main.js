@@ -6,6 +6,7 @@ import './style.css';
 import { sharedBounds } from './columns.js';
 import { Drawing } from './drawing.js';
 import { HistogramPlot } from './histogram_plot.js';
+import { ImagePanel } from './image_panel.js';
 import { LiveView } from './live.js';
 import { PlanPlot } from './plan_plot.js';
 import { SceneView } from './scene.js';
@@ -61,6 +62,11 @@ class Run {
     this.plots.set(plot.id, made);
     figure.plotId = plot.id;
     (this.figures ??= []).push(figure);
+  }
+
+  images(host) {
+    const { cameras } = this.run;
+    if (cameras?.length) this.panel = new ImagePanel(host, this.width, cameras);
   }
 
   tables(host) {
@@ -146,6 +152,7 @@ class Run {
     this.line?.dispose();
     for (const plot of this.plots.values()) plot.dispose();
     this.view?.dispose();
+    this.panel?.dispose();
     forget(this.key);
   }
 }
@@ -189,6 +196,7 @@ const report = {
     }
     const flights = this.runs.every((run) => run.isFlight);
     if (flights) row('Health and events', (run, cell) => run.timeline(cell));
+    if (json.runs.some((run) => run.cameras?.length)) row('Cameras', (run, cell) => run.images(cell));
     const groups = [...new Set(json.runs.flatMap((run) => run.plots.map((plot) => plot.group)))];
     const scenes = () => json.runs.some((run) => run.scene) && row('3D view', (run, cell) => { cell.className = 'scene'; run.sceneHost = cell; });
     if (!groups.includes('Trajectory')) scenes();
@@ -242,6 +250,11 @@ const report = {
     this.runs[patch.run ?? 0]?.append(patch);
   },
 
+  /** The cameras' images of one instant (image_panel.js). */
+  showImages(message) {
+    this.runs[message.run ?? 0]?.panel?.show(message);
+  },
+
   /** What a test asks for: how much each plot shows. */
   figures() {
     return this.runs.map((run) => ({
@@ -249,6 +262,7 @@ const report = {
       timeline: run.line?.count() ?? 0,
       plots: Object.fromEntries([...run.plots].map(([id, plot]) => [id, plot.count()])),
       sceneColours: run.view ? run.view.colours() : 0,
+      images: run.panel ? { shown: run.panel.shown, ...run.panel.count() } : null,
     }));
   },
 };
