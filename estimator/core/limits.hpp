@@ -30,9 +30,6 @@ inline constexpr std::size_t kRecordedImages = 16;
 /// IMU rate: 1 s at 1 kHz.
 inline constexpr std::size_t kResultRing = 32;
 inline constexpr std::size_t kStateRing = 1024;
-/// Images of one camera that the live view may hold while it is watched: 0.3 s at 20 Hz until their tracks are
-/// there, and two in work.
-inline constexpr std::size_t kViewedImages = 8;
 /// Steps of one stage on their way to the recorder.
 inline constexpr std::size_t kStepRing = 256;
 /// States in the smoother's window, keyframes and recent frames together.

@@ -22,8 +22,6 @@ struct CameraFrame {
   std::uint32_t timeline =
       0;  ///< of the IMU's stamps (estimator/odometry/stamp_guard.hpp), with which it goes
   ImageView image;
-  Duration exposure{0};  ///< 0: unknown
-  float gain = 0;        ///< times the camera's least; 0: unknown
 };
 
 /// One or two images of the same instant. The index counts pairs since the start.

@@ -26,7 +26,6 @@ struct WindowLandmark {
   Eigen::Vector3d p_world = Eigen::Vector3d::Zero();  ///< m
   double inverse_depth_sigma = 0;                     ///< 1/m, along the first sighting's ray
   int sightings = 0;                                  ///< states of the window that see it
-  bool in_newest = false;                             ///< the newest state is one of them
 };
 
 /// A plane that landmarks of the window are tied to: n . p = distance, world.

@@ -213,10 +213,8 @@ void Smoother::window(SmoothedWindow& out) const {
   }
   for (const Landmark& landmark : problem_.landmarks) {
     if (!landmark.in_system || landmark.point.inverse_depth <= 0) continue;
-    const bool in_newest =
-        !landmark.sightings.empty() && landmark.sightings.back().slot == problem_.window.newestSlot();
     out.landmarks.pushBack({landmark.id, landmark.point.position(), landmark.point.inverse_depth_sigma,
-                            static_cast<int>(landmark.sightings.size()), in_newest});
+                            static_cast<int>(landmark.sightings.size())});
   }
 }
 

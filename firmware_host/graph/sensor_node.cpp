@@ -111,7 +111,7 @@ void SensorNode::takeImage(const CameraFrame& image, const HostTimes& host) {
   } else {
     if (camera.track != nullptr) camera.track->hand(handle);
     if (camera.mesh != nullptr) camera.mesh->hand(handle);
-    if (view_ != nullptr) view_->hand(image.camera, handle);
+    if (view_ != nullptr) view_->hand(image.camera, handle, image.stamp);
   }
   camera.pool->finish(handle);
   note(camera.sensed, image.stamp, host.arrival, held_out);

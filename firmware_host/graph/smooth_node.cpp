@@ -88,7 +88,8 @@ void SmoothNode::publishWindow(const TrackMessage& message) {
   ++windows_;  // about to be sent
   if (keyframes.connected() && message.tracked.keyframe && smoothed.started) sendKeyframe(message, smoothed);
   if (mapped.connected() && message.mapped && smoothed.started) sendMapped(message, smoothed);
-  if (view_ != nullptr && view_->wanted.load(std::memory_order_relaxed)) sendSight(message, smoothed);
+  if (view_ != nullptr && view_->wanted.load(std::memory_order_relaxed) && shown_.take(message.tracked.stamp))
+    sendSight(message, smoothed);
   window.send();
 }
 
@@ -103,9 +104,7 @@ void SmoothNode::sendSight(const TrackMessage& message, const SmoothedWindow& sm
   out.has_pose = smoothed.started && !smoothed.poses.empty();
   out.landmarks.clear();
   if (out.has_pose) {
-    for (const WindowLandmark& landmark : smoothed.landmarks) {
-      out.landmarks.pushBack({landmark.id, landmark.in_newest});
-    }
+    for (const WindowLandmark& landmark : smoothed.landmarks) out.landmarks.pushBack(landmark.id);
   }
   out.epoch = smoothed.epoch;
   for (std::size_t c = 0; out.has_pose && c < kMaxCameras; ++c) {

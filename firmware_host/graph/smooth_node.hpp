@@ -60,6 +60,7 @@ class SmoothNode final : public Node {
   ConstantEffort full_effort_;
   EffortSource* effort_;
   ImageFeed* const view_;  ///< null: nobody shows images
+  ShownInstants shown_;
   SmoothStage stage_;
   std::uint64_t planes_ = 0;
   std::uint64_t windows_ = 0;  ///< published

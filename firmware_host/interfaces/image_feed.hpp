@@ -2,10 +2,10 @@
 // Images of a run, and what was found in them, for one thread outside of the graph that shows them.
 //
 // The cameras' threads lend it the slots in which their images lie, without a copy, up to kViewQuota of each
-// camera; `smooth` adds the tracks of each frame, `loop` the matches of each loop. All of it only while
-// `wanted`: otherwise a camera's thread reads one flag and goes on.
-// Threads: hand() from the camera's own, wanted and tryPop() for the reader; sight and loop as Newest says.
-// Memory: three of each value; the slots are the graph's, and live as long as this.
+// camera and 30 a second; `smooth` adds the tracks of these frames, `loop` the matches of each loop. All of
+// it only while `wanted`: otherwise each thread reads one flag and goes on. Threads: hand() from the camera's
+// own, wanted and tryPop() for the reader; sight and loop as Newest says. Memory: three of each value; the
+// slots are the graph's, and live as long as this.
 
 #include <Eigen/Core>
 #include <array>
@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <utility>
 
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/limits.hpp"
@@ -35,11 +36,7 @@ struct SightNews {
   FixedVector<TrackedFeature, kMaxFeatures> features;
   LostSightings lost;
   bool has_pose = false;
-  struct Landmark {
-    TrackId id = 0;
-    bool in_newest = false;  ///< the smoother uses its sighting in this frame
-  };
-  FixedVector<Landmark, kMaxLandmarks> landmarks;  ///< of the window, in no order; where has_pose
+  FixedVector<TrackId, kMaxLandmarks> landmarks;  ///< of the window, in no order; where has_pose
   std::uint32_t epoch = 0;
   std::array<SE3, kMaxCameras> T_world_cam;  ///< where has_pose
 };
@@ -58,12 +55,27 @@ struct LoopNews {
   FixedVector<Match, kMost> matches;
 };
 
+/// Of a fast camera the first image in each period: the same ones for all who ask with the same stamps.
+class ShownInstants {
+ public:
+  static constexpr std::int64_t kPeriod = 33'333'333;  ///< ns: images of 30 Hz and slower pass
+
+  bool take(Stamp stamp) {
+    const std::int64_t period = stamp.ns / kPeriod;
+    return std::exchange(last_, period) != period;
+  }
+
+ private:
+  std::int64_t last_ = -1;
+};
+
 struct ImageFeed {
   using Ring = SpscRing<SlotHandle, kViewQuota>;
 
   /// Of the camera's thread: lends the image that it holds.
-  void hand(std::size_t camera, SlotHandle handle) {
-    if (!wanted.load(std::memory_order_relaxed) || !pool[camera]->tryHand(handle, kViewReads)) return;
+  void hand(std::size_t camera, SlotHandle handle, Stamp stamp) {
+    if (!wanted.load(std::memory_order_relaxed) || !instants[camera].take(stamp)) return;
+    if (!pool[camera]->tryHand(handle, kViewReads)) return;
     if (!handles[camera].tryPush(handle)) pool[camera]->takeBack(handle, kViewReads);
   }
   /// Of the reader. False: nothing waits.
@@ -77,6 +89,7 @@ struct ImageFeed {
   std::atomic<bool> wanted{false};
   std::array<std::shared_ptr<ImagePool>, kMaxCameras> pool;  ///< of the graph, before its first image
   std::array<Ring, kMaxCameras> handles;
+  std::array<ShownInstants, kMaxCameras> instants;  ///< each of its camera's thread
   Newest<SightNews> sight;
   Newest<LoopNews> loop;
 };

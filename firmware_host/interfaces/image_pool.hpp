@@ -31,8 +31,8 @@ inline constexpr std::uint32_t kTrackQuota = kImageRing + kWaitingFrames + 4;
 /// Waiting in the ring, the one at its head, and one more that lets the newest in before the oldest goes.
 inline constexpr std::uint32_t kMeshQuota = kMeshImages + 2;
 inline constexpr std::uint32_t kRecordQuota = kRecordedImages;
-/// Until their tracks are there: 0.3 s at 20 Hz, and one being encoded.
-inline constexpr std::uint32_t kViewQuota = kViewedImages;
+/// While somebody looks: 0.2 s at 30 Hz until their tracks are there, and two in work.
+inline constexpr std::uint32_t kViewQuota = 8;
 inline constexpr std::size_t kImageSlots = 1 + kTrackQuota + kMeshQuota + kRecordQuota + kViewQuota;
 using ImagePool = SlotPool<ImageSlot, kImageSlots, kImageReaders>;
 

@@ -1,7 +1,8 @@
 #pragma once
 // The live view's web server: the page, and the stream of a ViewHub as Server-Sent Events (docs/view.md).
 //
-// GET / is the page, /stream the events, /text the newest figures as text; all else is refused. A connection
+// GET / is the page, /stream the events, /text the newest figures as text; all else is refused, and beyond
+// loopback these too without the token. A connection
 // has one request of at most some kilobytes, which has to be there within seconds, and ends with its answer.
 // Every write gives up on a reader that takes nothing for kPatience; the end of the server waits for nobody.
 //
@@ -40,6 +41,8 @@ class ViewServer {
 
   /// With the port that it has got.
   [[nodiscard]] const ViewAddress& address() const;
+  /// Of the page, with the token where one is needed (view_token.hpp).
+  [[nodiscard]] std::string url() const;
 
   class Work;
 

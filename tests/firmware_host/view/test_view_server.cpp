@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -13,6 +14,7 @@
 #include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/view/view_server.hpp"
 #include "firmware_host/outputs/view/view_thread.hpp"
+#include "firmware_host/outputs/view/view_token.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
 #include "tests/support/view_client.hpp"
 
@@ -29,8 +31,9 @@ struct Served {
   ViewHub hub;
   std::unique_ptr<ViewServer> server;
 
-  Served() {
+  explicit Served(const std::string& host = "127.0.0.1") {
     ViewAddress address;
+    address.host = host;
     address.port = 0;
     const ViewPages pages{[] { return std::string("<p>page</p>"); }, [] { return std::string("figures\n"); }};
     server = std::make_unique<ViewServer>(hub, address, pages);
@@ -69,6 +72,52 @@ TEST_CASE("the page, the figures, and nothing else") {
   REQUIRE(post.connect());
   REQUIRE(post.send("POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 3\r\n\r\nabc"));
   CHECK(post.readAll().starts_with("HTTP/1.1 405"));
+}
+
+TEST_CASE("beyond loopback nothing is served without the token") {
+  unsetenv(kViewTokenVariable);
+  Served served("0.0.0.0");
+  const std::string url = served.server->url();
+  const std::size_t at = url.find("/?token=");
+  REQUIRE(at != std::string::npos);
+  const std::string token = url.substr(at + 8);
+  CHECK(token.size() == 32);
+  std::string wrong = token;
+  wrong.back() = wrong.back() == '0' ? '1' : '0';
+  for (const char* name : {"/", "/text", "/stream", "/other"}) {
+    const std::string path = name;
+    CAPTURE(path);
+    CHECK(served.get(path).starts_with("HTTP/1.1 403"));
+    CHECK(served.get(path + "?token=").starts_with("HTTP/1.1 403"));
+    CHECK(served.get(path + "?token=" + wrong).starts_with("HTTP/1.1 403"));
+    CHECK(served.get(path + "?token=" + token + "0").starts_with("HTTP/1.1 403"));
+  }
+  CHECK(served.hub.counters().viewers == 0);
+  CHECK(served.get("/?token=" + token).find("<p>page</p>") != std::string::npos);
+  CHECK(served.get("/text?token=" + token).find("figures") != std::string::npos);
+  ViewClient viewer(served.port());
+  REQUIRE(viewer.connectAndAsk("/stream?token=" + token));
+  served.waitForViewers(1);
+  // Another server has another.
+  CHECK(Served("0.0.0.0").server->url().find(token) == std::string::npos);
+}
+
+TEST_CASE("a service has a token of its own, if it is a usable one") {
+  setenv(kViewTokenVariable, "my-own_token-0123", 1);
+  CHECK(Served("0.0.0.0").server->url().ends_with("/?token=my-own_token-0123"));
+  CHECK(Served().server->url().ends_with("/"));
+  for (const char* unusable : {"", "short", "has a space in it", "has&an=ampersand"}) {
+    setenv(kViewTokenVariable, unusable, 1);
+    CAPTURE(unusable);
+    CHECK_THROWS_AS(Served("0.0.0.0"), InputError);
+  }
+  unsetenv(kViewTokenVariable);
+}
+
+TEST_CASE("tokens are the same only as a whole") {
+  CHECK(sameToken("abcd", "abcd"));
+  for (const char* other : {"", "abc", "abcde", "abcdabcd", "xbcd", "abcx"})
+    CHECK_FALSE(sameToken("abcd", other));
 }
 
 TEST_CASE("requests that are too long or none at all end without an answer, and the server goes on") {

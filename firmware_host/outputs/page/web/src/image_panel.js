@@ -5,8 +5,8 @@ import { element } from './tables.js';
 
 const kTail = 0.5; // s of a track's earlier pixels
 
-// Fill or stroke of each layer; tracks by kind: followed, landmark, rejected by the smoother.
-const kTrackColours = ['#ffd84a', '#4fe06a', '#ff9a3c'];
+// Fill or stroke of each layer; tracks by kind: followed, landmark of the window.
+const kTrackColours = ['#ffd84a', '#4fe06a'];
 const kLayers = [
   ['tracks', 'tracks', kTrackColours[1]],
   ['tails', 'tails', kTrackColours[0]],

@@ -271,4 +271,4 @@ window.swiftletReport = report;
 const embedded = document.getElementById('report-document');
 if (embedded) report.load(JSON.parse(embedded.textContent));
 const live = document.getElementById('swiftlet-live');
-if (live) report.live = new LiveView(report, live.content);
+if (live) report.live = new LiveView(report, live.content + location.search);
