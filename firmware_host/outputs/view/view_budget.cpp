@@ -6,6 +6,7 @@ namespace swiftlet {
 namespace {
 
 constexpr double kLeastTaken = 0.5;
+constexpr int kLeftOutOf = 3;  // a map's surface, every 3 s, pushes some out at any level
 
 }  // namespace
 
@@ -22,8 +23,9 @@ void ViewBudget::spendOnImages(std::size_t bytes) {
 bool ViewBudget::mayShow(double now) {
   if (filled_ >= 0) account_ = std::min(kBurst, account_ + kRate * (now - filled_));
   filled_ = now;
+  ++offered_;
   if (account_ > 0) return true;
-  left_out_ = true;
+  ++left_out_;
   return false;
 }
 
@@ -31,7 +33,7 @@ void ViewBudget::look(double now, double taken) {
   const double seconds = now - looked_;
   const double others = static_cast<double>(spent_ - on_images_) / seconds;
   const double images = static_cast<double>(on_images_) / seconds;
-  if (left_out_ || taken < kLeastTaken) {
+  if ((left_out_ > 0 && left_out_ * kLeftOutOf >= offered_) || taken < kLeastTaken) {
     level_ = std::min(level_ + 1, kLevels.size() - 1);
     up_from_ = now + kPause;
   } else if (level_ > 0 && on_images_ > 0 && now >= up_from_ && others + kGrowth * images < kRate) {
@@ -39,7 +41,7 @@ void ViewBudget::look(double now, double taken) {
   }
   looked_ = now;
   spent_ = on_images_ = 0;
-  left_out_ = false;
+  offered_ = left_out_ = 0;
 }
 
 }  // namespace swiftlet

@@ -4,7 +4,7 @@
 // At most kMostBytes a second go to a viewer: what is sent is taken from an account that grows by kRate and
 // never holds more than kBurst. Patches are always sent; images only while the account is not overdrawn. So
 // the rate of images falls at once when bytes are short, and their size and quality follow: once a second,
-// one level down where an image had to be left out or where the quickest viewer took less than half of them,
+// one level down where a third of them had to be left out or the quickest viewer took less than half of them,
 // one level up where the next would fit. A level that was too much is not tried again for kPause.
 // One thread. Cost: O(1).
 
@@ -19,7 +19,7 @@ class ViewBudget {
  public:
   static constexpr double kMostBytes = 3e6;  ///< a second and viewer, of all that is sent
   /// Bytes a second. Below kMostBytes by a burst, a map's surface (0.45 MB) and one pair of images.
-  static constexpr double kRate = 2.2e6;
+  static constexpr double kRate = 2e6;
   static constexpr double kBurst = 0.2e6;  ///< bytes
   static constexpr double kPause = 10;     ///< s
   /// The best first. A picture of one level has about kGrowth times the bytes of the next.
@@ -46,13 +46,13 @@ class ViewBudget {
  private:
   void look(double now, double taken);
 
-  double account_ = 0;
+  double account_ = kBurst;
   double filled_ = -1;  ///< when; negative: never
   double looked_ = 0;
   double up_from_ = 0;  ///< no level up before
   std::size_t level_ = 1;
   std::size_t spent_ = 0, on_images_ = 0;  ///< since looked_
-  bool left_out_ = false;
+  int offered_ = 0, left_out_ = 0;         ///< instants, since looked_
 };
 
 }  // namespace swiftlet

@@ -1,5 +1,6 @@
 // Images of the live view and what is drawn over them: from slots as the cameras' threads lend them.
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -99,7 +100,7 @@ TEST_CASE("an instant has the pictures of a frame with its tracks, and gives the
   REQUIRE(json["cameras"].size() == 2);
   const Json& left = json["cameras"][0];
   CHECK(left["src"].get<std::string>().starts_with("data:image/jpeg;base64,/9j/"));
-  CHECK(left["exposure_ms"] == Approx(4));
+  CHECK(left["exposure_ms"].get<double>() == Approx(4));
   CHECK(left["tracks"] == Json({7, 10.0, 20.0, 0, 9, 30.3, 40.0, 1}));
   CHECK(left["rejected"].empty());
   const Json& right = json["cameras"][1];
@@ -112,6 +113,7 @@ TEST_CASE("an instant has the pictures of a frame with its tracks, and gives the
 
 TEST_CASE("without tracks for half a second images come alone") {
   Flight flight;
+  flight.sample();
   flight.pair(at(1));
   flight.sight(at(1));
   REQUIRE(flight.sample());
