@@ -257,7 +257,7 @@ TEST_CASE("a run is followed from an outlet to a viewer") {
   const auto outlet = std::make_unique<LiveOutlet>();
   ViewAddress address;
   address.port = 0;
-  ViewThread view(*outlet, address, "a run");
+  ViewThread view(*outlet, address, "a run", Rig{});
   CHECK(view.url().starts_with("http://127.0.0.1:"));
   const int port = std::stoi(view.url().substr(view.url().rfind(':') + 1));
   ViewClient client(port);
