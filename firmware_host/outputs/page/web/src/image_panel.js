@@ -32,6 +32,12 @@ export class ImagePanel {
     host.append(this.toggles());
     const row = element('div', null, 'images');
     host.append(row);
+    this.inSight = true;
+    this.sight = new IntersectionObserver(([entry]) => {
+      this.inSight = entry.isIntersecting;
+      this.work();
+    });
+    this.sight.observe(row);
     const gap = 10;
     const each = Math.floor((width - gap * (cameras.length - 1)) / cameras.length);
     this.views = cameras.map((camera, i) => {
@@ -72,12 +78,16 @@ export class ImagePanel {
     return bar;
   }
 
-  /** Shows an instant. While its pictures are decoded only the newest of those that come waits. */
-  async show(message) {
+  /** Shows an instant. While pictures are decoded, or the panel is out of sight, only the newest that comes waits. */
+  show(message) {
     this.waiting = message;
+    return this.work();
+  }
+
+  async work() {
     if (this.busy) return;
     this.busy = true;
-    while (this.waiting) {
+    while (this.waiting && this.inSight) {
       const next = this.waiting;
       this.waiting = null;
       const images = await Promise.all(next.cameras.map((camera) => camera && decoded(camera.src)));
@@ -181,6 +191,7 @@ export class ImagePanel {
 
   dispose() {
     this.disposed = true;
+    this.sight.disconnect();
   }
 }
 
