@@ -1,6 +1,7 @@
 #pragma once
 // The secret that a viewer has to know where the live view is served beyond loopback.
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 
