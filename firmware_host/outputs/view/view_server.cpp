@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <limits>
 #include <system_error>
 
@@ -165,9 +166,21 @@ class ViewServer::Work : public httplib::Server {
       response.set_content(pages_.text(), "text/plain; charset=utf-8");
     } else if (request.path == "/stream") {
       stream(response);
+    } else if (request.path == "/moment") {
+      moment(request.get_param_value("i"), response);
     } else {
       say(response, 404, "there is /, /stream and /text\n");
     }
+  }
+
+  void moment(const std::string& index, httplib::Response& response) {
+    std::size_t i = 0;
+    const char* end = index.data() + index.size();
+    const auto [rest, error] = std::from_chars(index.data(), end, i);
+    const bool good = pages_.moment && error == std::errc() && rest == end;
+    const std::string json = good ? pages_.moment(i) : std::string();
+    if (json.empty()) return say(response, 404, "there is no such moment\n");
+    response.set_content(json, "application/json");
   }
 
   static void say(httplib::Response& response, int status, const char* text) {

@@ -120,6 +120,34 @@ TEST_CASE("tokens are the same only as a whole") {
     CHECK_FALSE(sameToken("abcd", other));
 }
 
+TEST_CASE("moments of a run that is over are asked for by number") {
+  ViewHub hub;
+  ViewAddress address;
+  address.port = 0;
+  ViewPages pages{[] { return std::string("page"); }, [] { return std::string("text"); }};
+  pages.moment = [](std::size_t i) {
+    return i < 3 ? "{\"frame\":" + std::to_string(i) + "}" : std::string();
+  };
+  const ViewServer server(hub, address, pages);
+  const auto get = [&](const std::string& path, const std::string& headers = "Host: 127.0.0.1\r\n") {
+    ViewClient client(server.address().port);
+    REQUIRE(client.connectAndAsk(path, headers));
+    return client.readAll();
+  };
+  const std::string answer = get("/moment?i=2");
+  CHECK(answer.starts_with("HTTP/1.1 200"));
+  CHECK(answer.find("application/json") != std::string::npos);
+  CHECK(answer.find("\r\n\r\n{\"frame\":2}") != std::string::npos);
+  for (const char* path : {"/moment?i=3", "/moment?i=-1", "/moment?i=1x", "/moment?i=99999999999999999999999",
+                           "/moment?i=", "/moment", "/moment/1"}) {
+    INFO(path);
+    CHECK(get(path).starts_with("HTTP/1.1 404"));
+  }
+  CHECK(get("/moment?i=1", "Host: evil.example\r\n").starts_with("HTTP/1.1 403"));
+  // A live view has none.
+  CHECK(Served().get("/moment?i=1").starts_with("HTTP/1.1 404"));
+}
+
 TEST_CASE("requests that are too long or none at all end without an answer, and the server goes on") {
   Served served;
   for (const std::string& text : {std::string("GET /") + std::string(4000, 'a') + " HTTP/1.1\r\n\r\n",
