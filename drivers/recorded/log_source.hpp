@@ -72,6 +72,8 @@ class LogSource {
   [[nodiscard]] virtual Trajectory groundTruth() const { return {}; }
   /// Source of the truth, for the summary; empty without one.
   [[nodiscard]] virtual std::string groundTruthName() const { return {}; }
+  /// next() goes on with the first message that is not before `stamp`. Reads nothing.
+  virtual void seek(Stamp stamp) = 0;
 
   [[nodiscard]] const Rig& rig() const { return calibration().rig; }
   [[nodiscard]] const ImuNoise& imuNoise() const { return calibration().noise; }

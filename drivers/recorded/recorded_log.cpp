@@ -98,6 +98,16 @@ bool RecordedLog::next(SensorMessage& message) {
   }
 }
 
+void RecordedLog::seek(Stamp stamp) {
+  const auto first = [stamp](const auto& list) {
+    const auto found = std::lower_bound(list.begin(), list.end(), stamp,
+                                        [](const auto& entry, Stamp wanted) { return entry.stamp < wanted; });
+    return static_cast<std::size_t>(found - list.begin());
+  };
+  next_sample_ = first(samples_);
+  next_image_ = first(images_);
+}
+
 bool RecordedLog::deliverImage(const ImageEntry& entry, SensorMessage& message) {
   const CameraModel& model = calibration_.rig.camera[entry.camera];
   const ImageSize expected{model.width(), model.height()};

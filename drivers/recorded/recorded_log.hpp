@@ -16,6 +16,7 @@ class RecordedLog : public LogSource {
  public:
   [[nodiscard]] const Calibration& calibration() const override { return calibration_; }
   bool next(SensorMessage& message) override;
+  void seek(Stamp stamp) override;
   [[nodiscard]] bool imageIsNext() const override;
   [[nodiscard]] std::size_t imageCount() const override { return images_.size(); }
   [[nodiscard]] std::size_t frameCount() const override { return frame_count_; }

@@ -154,6 +154,23 @@ bool RecordingSource::next(SensorMessage& message) {
   return false;
 }
 
+void RecordingSource::seek(Stamp stamp) {
+  turn_ = 0;
+  next_imu_ = 0;
+  next_image_ = {};
+  for (; turn_ < index_.turns.size(); ++turn_) {
+    const auto kind = static_cast<RecordKind>(index_.turns[turn_]);
+    if (kind == RecordKind::kImu) {
+      if (index_.imu[next_imu_].sample.stamp >= stamp) return;
+      ++next_imu_;
+      continue;
+    }
+    const std::size_t camera = kind == RecordKind::kImage0 ? 0 : 1;
+    if (index_.images[camera][next_image_[camera]].stamp >= stamp) return;
+    ++next_image_[camera];
+  }
+}
+
 std::uint64_t RecordingSource::imuNumber(std::size_t i) const {
   std::uint64_t number = i + 1;
   for (const RecordingLoss& loss : index_.losses) {

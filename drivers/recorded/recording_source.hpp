@@ -36,6 +36,7 @@ class RecordingSource final : public LogSource {
 
   [[nodiscard]] const Calibration& calibration() const override { return calibration_; }
   bool next(SensorMessage& message) override;
+  void seek(Stamp stamp) override;
   [[nodiscard]] std::size_t imageCount() const override { return image_count_; }
   [[nodiscard]] std::size_t frameCount() const override { return frame_count_; }
   [[nodiscard]] const LogCounters& counters() const override { return counters_; }

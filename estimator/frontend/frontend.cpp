@@ -228,6 +228,7 @@ Status Frontend::Impl::step(const StereoFrame& frame, const FrontendPrediction& 
   if (const Status status = check(frame); !status.ok()) return status;
   const int limit = std::clamp(max_features, 0, static_cast<int>(kMaxFeatures));
   statistics_ = {};
+  lost_.clear();
   takeExtrinsics(prediction);
   takeImages(frame, prediction);
   joinPredictions(prediction);
@@ -266,6 +267,7 @@ Status Frontend::step(const StereoFrame& frame, const FrontendPrediction& predic
   return impl_->step(frame, prediction, max_features, out);
 }
 const FrontendStatistics& Frontend::statistics() const { return impl_->statistics(); }
+const LostSightings& Frontend::lost() const { return impl_->lost(); }
 void Frontend::reset() { impl_->reset(); }
 
 }  // namespace swiftlet

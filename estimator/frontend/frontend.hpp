@@ -16,9 +16,13 @@
 // A camera may be missing from a frame; its features are held for a short time and tracked when it returns.
 // No allocation after construction; deterministic. Memory: 6.5 MiB for 752 x 480 stereo.
 
+#include <Eigen/Core>
+#include <cstdint>
 #include <memory>
 
 #include "estimator/camera/rig.hpp"
+#include "estimator/core/fixed_vector.hpp"
+#include "estimator/core/limits.hpp"
 #include "estimator/core/status.hpp"
 #include "estimator/frontend/frontend_prediction.hpp"
 #include "estimator/frontend/frontend_settings.hpp"
@@ -40,6 +44,20 @@ struct FrontendStatistics {
   int match_failed = 0;  ///< matching attempts without an unambiguous result
 };
 
+enum class SightingLoss : std::uint8_t {
+  kNotFound,  ///< by Lucas-Kanade and its checks
+  kMotion,    ///< contradicts the camera's motion
+  kStereo,    ///< contradicts the other camera
+};
+
+/// A sighting that the last step gave up.
+struct LostSighting {
+  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  ///< where not found: in the image before
+  std::uint8_t camera = 0;
+  SightingLoss loss = SightingLoss::kNotFound;
+};
+using LostSightings = FixedVector<LostSighting, kMaxCameras * kMaxFeatures>;
+
 class Frontend {
  public:
   Frontend(const Rig& rig, const FrontendSettings& settings);
@@ -52,6 +70,8 @@ class Frontend {
               TrackedFrame& out);
 
   [[nodiscard]] const FrontendStatistics& statistics() const;
+  /// Of the last step.
+  [[nodiscard]] const LostSightings& lost() const;
 
   /// Forgets all tracks and patches; ids continue.
   void reset();

@@ -45,6 +45,7 @@ class Frontend::Impl {
               TrackedFrame& out);
   void reset();
   [[nodiscard]] const FrontendStatistics& statistics() const { return statistics_; }
+  [[nodiscard]] const LostSightings& lost() const { return lost_; }
 
  private:
   struct Camera {
@@ -93,6 +94,7 @@ class Frontend::Impl {
   void markKeyframe(Stamp stamp);
   void write(const StereoFrame& frame, bool keyframe, TrackedFrame& out);
   void darkImages();
+  void lose(const Track& track, std::size_t c, SightingLoss loss);
   bool place(Track& track, std::size_t c, const Eigen::Vector2f& pixel);
   [[nodiscard]] bool usesStereo() const { return rig_.camera_count > 1; }
 
@@ -122,6 +124,7 @@ class Frontend::Impl {
   bool keyframe_rotation_known_ = false;
   Eigen::Quaterniond R_keyframe_cur_ = Eigen::Quaterniond::Identity();  ///< body axes
   FrontendStatistics statistics_;
+  LostSightings lost_;
 };
 
 }  // namespace swiftlet

@@ -28,6 +28,11 @@ constexpr int kMaxSearches = 240;
 
 }  // namespace
 
+void Frontend::Impl::lose(const Track& track, std::size_t c, SightingLoss loss) {
+  // Room for every sighting: a track loses each of its own once in a step.
+  lost_.pushBack({track.pixel[c], static_cast<std::uint8_t>(c), loss});
+}
+
 Frontend::Impl::Guess Frontend::Impl::predict(const Track& track, std::size_t c,
                                               const FrontendPrediction& prediction) const {
   if (track.landmark >= 0) {
@@ -110,12 +115,9 @@ void Frontend::Impl::trackCamera(std::size_t c, const FrontendPrediction& predic
     if (!camera.has_history) continue;
     const Eigen::Vector3d from_bearing = inMiddleRow(c, camera.scan_before, track.pixel[c], track.bearing[c]);
     Eigen::Vector2f pixel;
-    if (!follow(track, c, predict(track, c, prediction), pixel)) {
+    if (!follow(track, c, predict(track, c, prediction), pixel) || !place(track, c, pixel)) {
       ++statistics_.lost;
-      continue;
-    }
-    if (!place(track, c, pixel)) {
-      ++statistics_.lost;
+      lose(track, c, SightingLoss::kNotFound);
       continue;
     }
     track.previous_bearing[c] = from_bearing;
@@ -175,6 +177,7 @@ void Frontend::Impl::verifyMotion(std::size_t c, std::uint64_t seed) {
     if (ransac_result_.inlier[k]) continue;
     tracks_[owners_[k]].live[c] = false;
     ++statistics_.false_motion;
+    lose(tracks_[owners_[k]], c, SightingLoss::kMotion);
   }
 }
 
@@ -186,6 +189,7 @@ void Frontend::Impl::verifyStereo() {
         static_cast<double>(matcher_.gate())) {
       track.live[1] = false;
       ++statistics_.false_stereo;
+      lose(track, 1, SightingLoss::kStereo);
     }
   }
 }

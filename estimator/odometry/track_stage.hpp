@@ -41,6 +41,9 @@ class TrackStage {
   /// image of a wrong size; `tracked` is then unchanged, and the next tracked frame counts the refusal.
   Status step(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked);
 
+  /// What the front-end gave up in the last step that was ok.
+  [[nodiscard]] const LostSightings& lost() const { return frontend_.lost(); }
+
  private:
   Status process(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked);
   void forgetTracks();

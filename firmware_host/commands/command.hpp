@@ -40,6 +40,7 @@ void addEvaluateCommand(CLI::App& app, int& exit_code);
 void addReportCommand(CLI::App& app, int& exit_code);
 void addSimulateCommand(CLI::App& app, int& exit_code);
 void addSmoothCommand(CLI::App& app, int& exit_code);
+void addViewCommand(CLI::App& app, int& exit_code);
 void addVocabularyCommand(CLI::App& app, int& exit_code);
 void addSettingsCommand(CLI::App& app, int& exit_code);
 /// Needs all others in `app` when it runs; not in the help.

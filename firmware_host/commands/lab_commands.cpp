@@ -16,6 +16,7 @@ void addLabCommands(CLI::App& app, int& exit_code) {
   addEvaluateCommand(app, exit_code);
   addExportCommand(app, exit_code);
   addReportCommand(app, exit_code);
+  addViewCommand(app, exit_code);
   addMeshCommand(app, exit_code);
   addFuseCommand(app, exit_code);
   addMapCommand(app, exit_code);

@@ -9,10 +9,10 @@
 #include "estimator/core/units.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
+#include "firmware_host/commands/reported_run.hpp"
 #include "firmware_host/files/whole_file.hpp"
-#include "firmware_host/lab/evaluation/confusion_picture.hpp"
-#include "firmware_host/lab/evaluation/evaluate_run.hpp"
 #include "firmware_host/lab/report/plain_page.hpp"
+#include "firmware_host/lab/report/run_moments.hpp"
 #include "firmware_host/outputs/page/page.hpp"
 
 namespace swiftlet {
@@ -20,42 +20,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::size_t kMostImageBytes = std::size_t{512} * 1024;  // of all images of a report
+
 struct ReportOptions {
   std::vector<std::string> runs;
   std::vector<std::string> truth;
   std::string out;
   bool plain = false;
+  bool no_images = false;
   SettingsOptions settings;
 };
-
-ReportedRun readRun(const std::string& folder, const std::string& given_truth, const Settings& settings) {
-  RunFiles files = readRunFiles(folder);
-  const std::string log = files.text("run/log");
-  const std::string source = given_truth.empty() ? log : given_truth;
-  Truth truth;
-  if (!source.empty()) {
-    try {
-      truth = readTruth(source, true);
-    } catch (const InputError& error) {
-      // That a log has no truth is no fault of the run; a truth that was asked for has to be there.
-      if (!given_truth.empty()) throw;
-      files.missing.push_back({"truth", error.what()});
-    }
-  }
-  ReportedRun run;
-  const fs::path world = fs::is_directory(source) ? fs::path(source) : fs::path(log);
-  try {
-    if (!world.empty() && fs::exists(world / "truth" / "mesh.ply")) {
-      run.true_surface = (world / "truth" / "mesh.ply").string();
-    }
-    if (!world.empty()) run.labels = readLabelNames(world.string());
-  } catch (const InputError& error) {
-    files.missing.push_back({"labels.csv", error.what()});
-  }
-  run.view = viewOf(std::move(files), truth.poses, truth.name,
-                    accuracyOptions(settings.evaluation, AlignKind::kYaw));
-  return run;
-}
 
 int report(const ReportOptions& options) {
   if (!options.truth.empty() && options.truth.size() != 1 && options.truth.size() != options.runs.size()) {
@@ -67,9 +41,13 @@ int report(const ReportOptions& options) {
   for (std::size_t i = 0; i < options.runs.size(); ++i) {
     const std::string truth =
         options.truth.empty() ? "" : options.truth[std::min(i, options.truth.size() - 1)];
-    runs.push_back(readRun(options.runs[i], truth, settings));
+    runs.push_back(readReportedRun(options.runs[i], truth, settings));
     for (const MissingFile& missing : runs.back().view.files.missing) {
       fmt::print(stderr, "note: {}: {}: {}\n", options.runs[i], missing.file, missing.what);
+    }
+    if (!options.plain && !options.no_images) {
+      RunMoments moments(runs.back().view.files, "");
+      runs.back().moments = embeddedMoments(moments, kMostImageBytes / options.runs.size());
     }
   }
   const std::string page = options.plain ? "" : findReportPage();
@@ -105,6 +83,7 @@ void addReportCommand(CLI::App& app, int& exit_code) {
                    "log of the run")
       ->expected(1, 2);
   command->add_flag("--plain", options->plain, "Write only tables and static plots, without scripts");
+  command->add_flag("--no-images", options->no_images, "Omit the images of the run's log");
   options->settings.addTo(*command);
   command->footer(
       "Example:\n  swiftlet report run_mh01\n"

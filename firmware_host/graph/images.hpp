@@ -1,10 +1,8 @@
 #pragma once
-// Images between nodes: slots of fixed pools, lent by handle with a quota for each reader, so that no reader
-// can hold another's. Capacities: estimator/core/limits.hpp.
+// Images between nodes, lent by handle; the cameras' own: firmware_host/interfaces/image_pool.hpp.
 
 #include <array>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "estimator/camera/rig.hpp"
@@ -13,30 +11,9 @@
 #include "estimator/messages/frames.hpp"
 #include "estimator/messages/scene_images.hpp"
 #include "firmware_host/graph/port.hpp"
-#include "firmware_host/interfaces/host_times.hpp"
+#include "firmware_host/interfaces/image_pool.hpp"
 
 namespace swiftlet {
-
-/// An image in its slot; `frame.image` shows `pixels`.
-struct ImageSlot {
-  CameraFrame frame;
-  HostTimes host;
-  /// Reserved for the camera's size before the flight, and not zeroed: a run in one thread uses few slots,
-  /// and the pages of the others stay untouched.
-  std::unique_ptr<std::uint8_t[]> pixels;
-};
-
-/// Readers of images, each with its quota.
-enum ImageReader : std::size_t { kTrackReads, kMeshReads, kRecordReads, kImageReaders };
-
-/// Waiting in the ring, one at its head, one waiting for its partner, those of waiting frames, those in
-/// work, and one more that lets the newest in before the oldest goes.
-inline constexpr std::uint32_t kTrackQuota = kImageRing + kWaitingFrames + 4;
-/// Waiting in the ring, the one at its head, and one more that lets the newest in before the oldest goes.
-inline constexpr std::uint32_t kMeshQuota = kMeshImages + 2;
-inline constexpr std::uint32_t kRecordQuota = kRecordedImages;
-inline constexpr std::size_t kImageSlots = 1 + kTrackQuota + kMeshQuota + kRecordQuota;
-using ImagePool = SlotPool<ImageSlot, kImageSlots, kImageReaders>;
 
 /// Images of a keyframe, copied by `track`: the threads that look at keyframes are slow, and would otherwise
 /// hold the cameras' slots. `image` shows `pixels`; empty if missing.

@@ -26,6 +26,7 @@ WorldInMap worldOf(const LoopStage& stage, std::size_t i) {
 LoopNode::LoopNode(GraphContext& context)
     : Node("loop", Rank::kLow),
       context_(context),
+      view_(imageFeedOf(context.options.outlets)),
       stage_(context.rig, context.settings.loop_stage, limitsBeside(context.options.kept_map),
              context.options.vocabulary != nullptr ? *context.options.vocabulary : Vocabulary::shipped()) {
   if (context.options.kept_map == nullptr) return;
@@ -68,8 +69,27 @@ void LoopNode::step(const KeyframeMessage& message) {
     for (LiveOutlet* outlet : context_.options.outlets) outlet->correction.write(stage_.correction());
     reports.send();
   });
+  if (view_ != nullptr && view_->wanted.load(std::memory_order_relaxed)) sendLoop(message.tracked.stamp);
   context_.count(StageId::kLoop, spent);
   steps.send(taken);
+}
+
+void LoopNode::sendLoop(Stamp keyframe) {
+  const std::uint32_t count = stage_.loopCount();
+  for (std::uint32_t i = shown_loops_; i < count; ++i) {
+    if (stage_.loop(i).new_stamp != keyframe || !stage_.revisit(i, revisit_)) continue;
+    LoopNews& out = view_->loop.draft();
+    out.stamp = keyframe;
+    out.old_stamp = revisit_.old_stamp;
+    out.inliers = revisit_.matches.size();
+    out.matches.clear();
+    for (const RevisitMatch& match : revisit_.matches) {
+      if (!out.matches.tryPushBack({match.new_feature.pixel[0], match.old_feature.pixel[0]})) break;
+    }
+    view_->loop.publish();
+    break;
+  }
+  shown_loops_ = count;
 }
 
 std::vector<WorldInMap> LoopNode::keptNodes() const {

@@ -33,9 +33,14 @@ class LoopNode final : public Node {
  private:
   void step(const KeyframeMessage& message);
   void publishWorlds();
+  /// The loop that this keyframe has closed, for who shows images.
+  void sendLoop(Stamp keyframe);
 
   GraphContext& context_;
+  ImageFeed* const view_;  ///< null: nobody shows images
   LoopStage stage_;
+  std::uint32_t shown_loops_ = 0;
+  LoopRevisit revisit_;
 };
 
 }  // namespace swiftlet

@@ -9,6 +9,7 @@
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/limits.hpp"
 #include "estimator/core/status.hpp"
+#include "estimator/frontend/frontend.hpp"
 #include "estimator/messages/frames.hpp"
 #include "estimator/messages/imu_sample.hpp"
 #include "estimator/messages/keyframe_link.hpp"
@@ -58,6 +59,7 @@ struct TrackMessage {
   int dropped = 0;       ///< frames that went by untracked since the message before
   int effort_level = 0;  ///< steps below full effort
   bool mapped = false;   ///< its images have gone to the map
+  LostSightings lost;    ///< by the front-end, while somebody looks; else empty
 };
 
 /// Output of `smooth`, for the log and for all that follow the estimate.

@@ -23,10 +23,16 @@ void note(SensorNews& news, Stamp stamp, double host_arrival, bool held_out) {
 }  // namespace
 
 SensorNode::SensorNode(const GraphContext& context)
-    : Node("sensor", Rank::kSensor), context_(context), imu_guard_(context.noise.rate_hz) {
+    : Node("sensor", Rank::kSensor),
+      context_(context),
+      view_(imageFeedOf(context.options.outlets)),
+      quotas_{kTrackQuota, kMeshQuota, kRecordQuota, view_ != nullptr ? kViewQuota : 0},
+      imu_guard_(context.noise.rate_hz) {
   for (std::size_t c = 0; c < context.rig.camera_count; ++c) {
-    for (std::size_t i = 0; i < kImageSlots; ++i) {
-      camera_[c].pool.slot(i).pixels =
+    camera_[c].pool = std::make_shared<ImagePool>(quotas_);
+    if (view_ != nullptr) view_->pool[c] = camera_[c].pool;
+    for (std::size_t i = 0; i < ImagePool::slotsFor(quotas_); ++i) {
+      camera_[c].pool->slot(i).pixels =
           std::make_unique_for_overwrite<std::uint8_t[]>(pixelsOf(context.rig)[c]);
     }
   }
@@ -35,7 +41,8 @@ SensorNode::SensorNode(const GraphContext& context)
 void SensorNode::touchImages() {
   const std::array<std::size_t, kMaxCameras> pixels = pixelsOf(context_.rig);
   for (std::size_t c = 0; c < context_.rig.camera_count; ++c) {
-    for (std::size_t i = 0; i < kImageSlots; ++i) touchPages(camera_[c].pool.slot(i).pixels.get(), pixels[c]);
+    for (std::size_t i = 0; i < ImagePool::slotsFor(quotas_); ++i)
+      touchPages(camera_[c].pool->slot(i).pixels.get(), pixels[c]);
   }
 }
 
@@ -82,7 +89,7 @@ void SensorNode::takeImage(const CameraFrame& image, const HostTimes& host) {
     ++counters_.images_wrong_size[image.camera];
     return;
   }
-  const SlotHandle handle = camera.pool.tryAcquire();
+  const SlotHandle handle = camera.pool->tryAcquire();
   if (!handle.valid()) {
     ++counters_.images_lost[image.camera];
     return;
@@ -91,7 +98,7 @@ void SensorNode::takeImage(const CameraFrame& image, const HostTimes& host) {
   static_cast<void>(imu_time_.read(imu_time));
   const bool held_out =
       camera.guard.check(image.stamp + context_.rig.camera_to_imu_shift, imu_time) == StampVerdict::kHeld;
-  ImageSlot& slot = camera.pool.fill(handle);
+  ImageSlot& slot = camera.pool->fill(handle);
   slot.frame = image;
   slot.frame.timeline = imu_time.timeline;
   slot.frame.number = ++counters_.images[image.camera];
@@ -104,8 +111,9 @@ void SensorNode::takeImage(const CameraFrame& image, const HostTimes& host) {
   } else {
     if (camera.track != nullptr) camera.track->hand(handle);
     if (camera.mesh != nullptr) camera.mesh->hand(handle);
+    if (view_ != nullptr) view_->hand(image.camera, handle, image.stamp);
   }
-  camera.pool.finish(handle);
+  camera.pool->finish(handle);
   note(camera.sensed, image.stamp, host.arrival, held_out);
   camera.news.write(camera.sensed);
 }

@@ -74,7 +74,7 @@ class SensorNode final : public Node {
 
  private:
   struct Camera {
-    ImagePool pool{ImagePool::Quotas{kTrackQuota, kMeshQuota, kRecordQuota}};
+    std::shared_ptr<ImagePool> pool;
     ImageIn* track = nullptr;
     MeshImageIn* mesh = nullptr;
     RecordedImageIn* record = nullptr;
@@ -86,13 +86,15 @@ class SensorNode final : public Node {
 
   template <typename Reader>
   void lend(std::size_t camera, Reader& in, Reader*& kept) {
-    in.lendFrom(camera_[camera].pool);
+    in.lendFrom(*camera_[camera].pool);
     kept = &in;
     connect(*this, in);
   }
   void fillScene(const SceneImages& from, SceneSlot& slot);
 
   const GraphContext& context_;
+  ImageFeed* const view_;  ///< null: nobody shows images
+  const ImagePool::Quotas quotas_;
   std::array<Camera, kMaxCameras> camera_;
   std::unique_ptr<ScenePool> scenes_;  ///< null without a map
   SceneIn* scene_in_ = nullptr;

@@ -7,6 +7,7 @@ SmoothNode::SmoothNode(GraphContext& context)
       context_(context),
       full_effort_(context.settings.effort),
       effort_(context.options.smooth_effort != nullptr ? context.options.smooth_effort : &full_effort_),
+      view_(imageFeedOf(context.options.outlets)),
       stage_(context.rig, context.noise, context.settings.odometry) {}
 
 bool SmoothNode::turn() {
@@ -87,7 +88,29 @@ void SmoothNode::publishWindow(const TrackMessage& message) {
   ++windows_;  // about to be sent
   if (keyframes.connected() && message.tracked.keyframe && smoothed.started) sendKeyframe(message, smoothed);
   if (mapped.connected() && message.mapped && smoothed.started) sendMapped(message, smoothed);
+  if (view_ != nullptr && view_->wanted.load(std::memory_order_relaxed) && shown_.take(message.tracked.stamp))
+    sendSight(message, smoothed);
   window.send();
+}
+
+void SmoothNode::sendSight(const TrackMessage& message, const SmoothedWindow& smoothed) {
+  SightNews& out = view_->sight.draft();
+  out.stamp = message.tracked.stamp;
+  out.frame = message.tracked.index;
+  out.keyframe = message.tracked.keyframe;
+  out.image = message.step.image;
+  out.features = message.tracked.features;
+  out.lost = message.lost;
+  out.has_pose = smoothed.started && !smoothed.poses.empty();
+  out.landmarks.clear();
+  if (out.has_pose) {
+    for (const WindowLandmark& landmark : smoothed.landmarks) out.landmarks.pushBack(landmark.id);
+  }
+  out.epoch = smoothed.epoch;
+  for (std::size_t c = 0; out.has_pose && c < kMaxCameras; ++c) {
+    out.T_world_cam[c] = smoothed.poses.back().T_world_body * smoothed.calibration.T_body_cam[c];
+  }
+  view_->sight.publish();
 }
 
 void SmoothNode::sendKeyframe(const TrackMessage& message, const SmoothedWindow& smoothed) {

@@ -52,11 +52,15 @@ class SmoothNode final : public Node {
   void publishWindow(const TrackMessage& message);
   void sendKeyframe(const TrackMessage& message, const SmoothedWindow& smoothed);
   void sendMapped(const TrackMessage& message, const SmoothedWindow& smoothed);
+  /// For who shows images.
+  void sendSight(const TrackMessage& message, const SmoothedWindow& smoothed);
   void end();
 
   GraphContext& context_;
   ConstantEffort full_effort_;
   EffortSource* effort_;
+  ImageFeed* const view_;  ///< null: nobody shows images
+  ShownInstants shown_;
   SmoothStage stage_;
   std::uint64_t planes_ = 0;
   std::uint64_t windows_ = 0;  ///< published

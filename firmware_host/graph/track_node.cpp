@@ -12,6 +12,7 @@ TrackNode::TrackNode(GraphContext& context, const SensorNode& sensors)
       context_(context),
       full_effort_(context.settings.effort),
       effort_(context.options.track_effort != nullptr ? context.options.track_effort : &full_effort_),
+      view_(imageFeedOf(context.options.outlets)),
       stage_(context.rig, context.noise, context.settings.odometry) {}
 
 bool TrackNode::turn() {
@@ -66,6 +67,8 @@ void TrackNode::trackFrame() {
   const bool ok = message.status.ok();
   const bool keyframe = ok && message.tracked.keyframe;
   if (!ok) message.kind = TrackMessage::Kind::kFrameRefused;
+  message.lost.clear();
+  if (ok && view_ != nullptr && view_->wanted.load(std::memory_order_relaxed)) message.lost = stage_.lost();
   message.dropped = static_cast<int>(frame.index - next_frame_);
   next_frame_ = frame.index + 1;
   context_.count(StageId::kTrack, message.spent, keyframe);

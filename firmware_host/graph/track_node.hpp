@@ -44,6 +44,7 @@ class TrackNode final : public Node {
   GraphContext& context_;
   ConstantEffort full_effort_;
   EffortSource* effort_;
+  ImageFeed* const view_;  ///< null: nobody shows images
   TrackStage stage_;
   std::uint64_t window_ = 0;
   std::uint64_t next_frame_ = 0;

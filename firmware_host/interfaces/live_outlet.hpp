@@ -4,12 +4,14 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/newest.hpp"
 #include "estimator/messages/local_mesh.hpp"
 #include "estimator/messages/odometry_output.hpp"
+#include "firmware_host/interfaces/image_feed.hpp"
 #include "firmware_host/interfaces/state_news.hpp"
 #include "firmware_host/supervisor/verdict.hpp"
 #include "mapping/distance/distance_sample.hpp"
@@ -53,11 +55,20 @@ struct LiveOutlet {
   Newest<MapCorrection> correction;  ///< of `loop`
   Newest<SurfaceNews> surface;       ///< of `map`, each time that surface_wanted is set
   std::atomic<bool> surface_wanted{false};
-  Newest<ObstacleNews> obstacle;  ///< of `map`: with every frame that is mapped
-  Newest<Verdict> verdict;        ///< of the supervisor, ten times a second: readers check its age
+  Newest<ObstacleNews> obstacle;      ///< of `map`: with every frame that is mapped
+  Newest<Verdict> verdict;            ///< of the supervisor, ten times a second: readers check its age
+  std::unique_ptr<ImageFeed> images;  ///< null: its reader shows none
 };
 
 /// One for each thread that listens.
 using LiveOutlets = FixedVector<LiveOutlet*, 4>;
+
+/// The one among them whose reader shows images; null: there is none.
+inline ImageFeed* imageFeedOf(const LiveOutlets& outlets) {
+  for (LiveOutlet* outlet : outlets) {
+    if (outlet->images) return outlet->images.get();
+  }
+  return nullptr;
+}
 
 }  // namespace swiftlet

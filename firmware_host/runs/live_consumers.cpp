@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "drivers/input/input_error.hpp"
+#include "estimator/odometry/odometry_inputs.hpp"
 #include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {
@@ -44,7 +45,10 @@ LiveConsumers::LiveConsumers(const Calibration& calibration, const Settings& set
   }
   if (settings.ros2.enabled) openRos2(calibration, settings, request);
   if (request.view) {
-    view_ = std::make_unique<ViewThread>(newOutlet(view_outlet_), *request.view, request.name);
+    LiveOutlet& outlet = newOutlet(view_outlet_);
+    outlet.images = std::make_unique<ImageFeed>();
+    view_ = std::make_unique<ViewThread>(outlet, *request.view, request.name,
+                                         rigInUse(calibration.rig, settings.odometry));
     say(fmt::format("live view: {}\n", view_->url()));
   }
 }

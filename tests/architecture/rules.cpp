@@ -82,7 +82,8 @@ RoomTable programNeighbours() {
       {"lab/evaluation", {"outputs/run_folder"}},
       {"lab/modules", {"inputs/log", "inputs/vocabulary", "lab/evaluation"}},
       {"lab/budget", {"lab/evaluation", "runs"}},
-      {"lab/report", {"lab/evaluation", "outputs/page"}},
+      {"lab/report", {"lab/evaluation", "outputs/view", "smoothing"}},
+      {"lab/playback", {"lab/report"}},
       {"lab/export", {"lab/evaluation", "outputs/ros2"}},
       {"lab/import", {"files", "interfaces"}},
       {"lab/hil", {"inputs/devices", "lab/budget"}},
@@ -96,7 +97,7 @@ RoomTable programNeighbours() {
       {"lab/calibrate/guidance", {"lab/calibrate/board", "runs"}},
       {"commands",
        {"lab/calibrate/guidance", "lab/calibrate/page", "lab/export", "lab/hil", "lab/import", "lab/modules",
-        "lab/report", "runs"}},
+        "lab/playback", "runs"}},
   };
 }
 

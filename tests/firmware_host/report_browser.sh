@@ -10,10 +10,16 @@ find_browser "$page"
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-"$swiftlet" replay "$log" --out "$work/stereo" >"$work/replay.log"
+"$swiftlet" replay "$log" --set smoother.horizon=full --out "$work/stereo" >"$work/replay.log"
 "$swiftlet" replay "$log" --mono --imu-rate --out "$work/mono" >>"$work/replay.log"
 "$swiftlet" report "$work/stereo" --out "$work/one.html"
 "$swiftlet" report "$work/stereo" "$work/mono" --out "$work/two.html"
+"$swiftlet" report "$work/stereo" --no-images --out "$work/bare.html"
+grep -q '"playback":' "$work/one.html"
+if grep -q '"playback":' "$work/bare.html"; then
+  echo "--no-images leaves images in"
+  exit 1
+fi
 # What is missing is said on the page, and the rest of it works.
 rm "$work/mono/summary.json"
 "$swiftlet" report "$work/mono" --out "$work/damaged.html" 2>"$work/notes"

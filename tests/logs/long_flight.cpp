@@ -55,6 +55,7 @@ class RepeatedLog : public LogSource {
     if (auto* image = std::get_if<CameraFrame>(&message)) image->arrival = image->arrival + offset_;
     return true;
   }
+  void seek(Stamp stamp) override { log_->seek(stamp - offset_); }
 
  private:
   std::string path_;

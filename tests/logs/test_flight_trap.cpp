@@ -156,7 +156,9 @@ TEST_CASE(
   viewers.join();
   CHECK(summary["executor"]["view"]["viewers"] == 4);
   CHECK(summary["executor"]["view"]["delivered"] > 10);
+  CHECK(summary["executor"]["view"]["images_delivered"] > 10);
   CHECK(stream.find("event: patch") != std::string::npos);
+  CHECK(stream.find("event: images") != std::string::npos);
   CHECK(stream.find("event: end") != std::string::npos);
 }
 #else

@@ -205,7 +205,9 @@ void CameraThread::handOver(const CapturedFrame& frame, std::span<const ImageVie
   out.clock = Clock::kMonotonic;
   out.sequence = frame.sequence;
   out.camera = setup_.first;
-  const HostTimes host{secondsOf(out.stamp), secondsOf(frame.arrival)};
+  HostTimes host{secondsOf(out.stamp), secondsOf(frame.arrival)};
+  host.open = timing_.exposure.seconds();
+  if (exposure_) host.gain = exposure_->inForce(frame.sequence).gain;
   for (const ImageView& image : images) {
     out.image = image;
     sink.takeImage(out, host);

@@ -84,15 +84,17 @@ Json runDocument(const ReportedRun& run) {
   scene["labels"] = labelsJson(run.labels);
   Json faults = Json::array();
   for (const MissingFile& one : missing) faults.push_back({{"file", one.file}, {"what", one.what}});
-  return {{"name", view.files.name},
-          {"first_image_ns", std::to_string(view.files.first_image.ns)},
-          {"duration", view.files.seconds(view.files.last_image)},
-          {"missing", faults},
-          {"health", healthJson(view)},
-          {"events", eventsJson(view)},
-          {"plots", plots},
-          {"tables", tables},
-          {"scene", scene}};
+  Json document = {{"name", view.files.name},
+                   {"first_image_ns", std::to_string(view.files.first_image.ns)},
+                   {"duration", view.files.seconds(view.files.last_image)},
+                   {"missing", faults},
+                   {"health", healthJson(view)},
+                   {"events", eventsJson(view)},
+                   {"plots", plots},
+                   {"tables", tables},
+                   {"scene", scene}};
+  if (run.moments.is_object()) document.update(run.moments);
+  return document;
 }
 
 Json reportDocument(const std::vector<ReportedRun>& runs) {

@@ -15,6 +15,7 @@ struct ReportedRun {
   RunView view;
   std::string true_surface;           ///< PLY file in the truth's axes; empty: none
   std::map<int, std::string> labels;  ///< names of the map's labels; may be empty
+  nlohmann::ordered_json moments;     ///< as servedMoments() or embeddedMoments() makes them; null: none
 };
 
 /// One run of the document. A surface that cannot be read is noted as missing.

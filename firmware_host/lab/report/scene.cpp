@@ -9,12 +9,15 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json trajectoryJson(const std::string& name, const char* style, const Trajectory& poses,
-                    const std::vector<double>& value, const std::string& value_label) {
+Json trajectoryJson(const RunFiles& files, const std::string& name, const char* style,
+                    const Trajectory& poses, const std::vector<double>& value,
+                    const std::string& value_label) {
   const std::size_t step = poses.size() / kMostPoints + 1;
   std::vector<float> points;
+  std::vector<float> t;
   std::vector<float> values;
   for (std::size_t i = 0; i < poses.size(); i += step) {
+    t.push_back(static_cast<float>(files.seconds(poses[i].stamp)));
     for (int axis = 0; axis < 3; ++axis) {
       points.push_back(static_cast<float>(poses[i].T_world_body.translation[axis]));
     }
@@ -23,7 +26,8 @@ Json trajectoryJson(const std::string& name, const char* style, const Trajectory
   Json json = {{"name", name},
                {"style", style},
                {"count", points.size() / 3},
-               {"points", base64Of(std::span<const float>(points))}};
+               {"points", base64Of(std::span<const float>(points))},
+               {"t", base64Of(std::span<const float>(t))}};
   if (!values.empty()) {
     json["value"] = base64Of(std::span<const float>(values));
     json["value_label"] = value_label;
@@ -38,7 +42,7 @@ Json sceneOf(const RunView& view, const MeshDistance* truth) {
   const auto add = [&](const char* name, const char* style, const Trajectory& poses,
                        const std::vector<double>& value = {}, const std::string& label = "") {
     if (poses.empty()) return;
-    scene["trajectories"].push_back(trajectoryJson(name, style, poses, value, label));
+    scene["trajectories"].push_back(trajectoryJson(view.files, name, style, poses, value, label));
   };
   add("truth", "truth", view.truth);
   add("map.tum", "points", view.files.map);

@@ -29,7 +29,7 @@ class EventPage::Work {
     const std::lock_guard lock(mutex_);
     text_ = text;
   }
-  [[nodiscard]] std::string url() const { return "http://" + server_->address().text() + "/"; }
+  [[nodiscard]] std::string url() const { return server_->url(); }
   [[nodiscard]] bool watched() const { return hub_.viewers() > 0; }
 
  private:

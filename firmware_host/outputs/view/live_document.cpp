@@ -67,8 +67,9 @@ Json table(const char* id, const char* title, Json columns, Json rows) {
 
 }  // namespace
 
-LiveDocument::LiveDocument(std::string name)
+LiveDocument::LiveDocument(std::string name, Json cameras)
     : name_(std::move(name)),
+      cameras_(std::move(cameras)),
       states_(kStateColumns),
       frames_(kFrameColumns),
       state_intervals_(2, 1),
@@ -480,10 +481,15 @@ Json LiveDocument::document() const {
                 {"labels", labelsJson({})}};
   if (!mesh_.is_null()) scene["surfaces"].push_back(mesh_);
   if (!cloud_.is_null()) scene["clouds"].push_back(cloud_);
-  Json run = {{"name", name_},         {"first_image_ns", std::to_string(first_.ns)},
-              {"duration", duration_}, {"missing", Json::array()},
-              {"health", spans_},      {"events", events_},
-              {"plots", plots},        {"tables", tablesJson()},
+  Json run = {{"name", name_},
+              {"first_image_ns", std::to_string(first_.ns)},
+              {"duration", duration_},
+              {"cameras", cameras_},
+              {"missing", Json::array()},
+              {"health", spans_},
+              {"events", events_},
+              {"plots", plots},
+              {"tables", tablesJson()},
               {"scene", scene}};
   return {{"format", kReportFormat},
           {"program", versionText()},

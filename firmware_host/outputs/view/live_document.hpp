@@ -25,7 +25,8 @@ class LiveDocument {
   static constexpr std::size_t kMostSpans = 100;          ///< of health
   static constexpr std::size_t kMostCloudPoints = 40000;  ///< of the map's surface, of equal steps through it
 
-  explicit LiveDocument(std::string name);
+  /// `cameras`: of the document's run (image_panel.js); empty: no images are shown.
+  explicit LiveDocument(std::string name, nlohmann::ordered_json cameras = nlohmann::ordered_json::array());
 
   /// Takes what is new. `now`: the host's clock [s]. `watched`: somebody looks, so that surfaces are worth
   /// their work.
@@ -35,6 +36,11 @@ class LiveDocument {
   [[nodiscard]] nlohmann::ordered_json document() const;
   /// The newest figures in lines of text.
   [[nodiscard]] std::string text() const;
+  /// On the page's time axis [s]; before the first frame its origin.
+  [[nodiscard]] double timeOf(Stamp stamp) {
+    begin(stamp);
+    return seconds(stamp);
+  }
   /// Whose summary tells how the view itself fares.
   void setViewers(const nlohmann::ordered_json& counters) { viewers_ = counters; }
 
@@ -74,6 +80,7 @@ class LiveDocument {
   [[nodiscard]] Json poseJson() const;
 
   std::string name_;
+  Json cameras_;
   LiveTable states_, frames_, state_intervals_, frame_intervals_, latencies_, obstacles_;
   std::vector<PlotPlan> plans_;
   bool begun_ = false;

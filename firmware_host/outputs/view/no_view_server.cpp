@@ -17,5 +17,6 @@ ViewServer::ViewServer(ViewHub& /*hub*/, const ViewAddress& /*address*/, ViewPag
 ViewServer::~ViewServer() = default;
 
 const ViewAddress& ViewServer::address() const { return work_->address; }
+std::string ViewServer::url() const { return ""; }
 
 }  // namespace swiftlet

@@ -64,6 +64,14 @@ std::string ViewAddress::text() const {
   return (six ? "[" + host + "]" : host) + ":" + std::to_string(port);
 }
 
+bool ViewAddress::isLoopback() const {
+  in_addr four{};
+  if (inet_pton(AF_INET, host.c_str(), &four) == 1) return (ntohl(four.s_addr) >> 24U) == IN_LOOPBACKNET;
+  in6_addr six{};
+  if (inet_pton(AF_INET6, host.c_str(), &six) == 1) return IN6_IS_ADDR_LOOPBACK(&six);
+  return host == "localhost";
+}
+
 ViewAddress parseViewAddress(const std::string& text) {
   ViewAddress address;
   if (text.empty()) return address;

@@ -14,6 +14,8 @@ struct ViewAddress {
 
   /// "127.0.0.1:8320", "[::1]:8320".
   [[nodiscard]] std::string text() const;
+  /// Only this host reaches it.
+  [[nodiscard]] bool isLoopback() const;
 };
 
 /// "ADDRESS:PORT", "ADDRESS", "PORT", ":PORT", "[IPV6]:PORT"; empty: loopback and kViewPort. InputError

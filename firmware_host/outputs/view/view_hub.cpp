@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 namespace swiftlet {
 
@@ -20,10 +21,39 @@ void ViewHub::publish(const Text& patch) {
       counters_.dropped += 1 + place.waiting.size() - place.documents_waiting;
       place.waiting.clear();
       place.documents_waiting = 0;
+      if (std::exchange(place.images, nullptr)) ++counters_.images_dropped;
       place.wish = Wish::kLost;
     }
   }
   news_.notify_all();
+}
+
+void ViewHub::publishImages(const Text& images) {
+  {
+    const std::lock_guard lock(mutex_);
+    ++counters_.images;
+    for (Place& place : places_) {
+      if (!place.taken || place.wish != Wish::kPatches) continue;
+      if (place.images) ++counters_.images_dropped;
+      place.images = images;
+      ++place.images_offered;
+    }
+  }
+  news_.notify_all();
+}
+
+double ViewHub::imagesTaken() {
+  const std::lock_guard lock(mutex_);
+  double most = 0;
+  bool any = false;
+  for (Place& place : places_) {
+    if (!place.taken || place.images_offered == 0) continue;
+    any = true;
+    most =
+        std::max(most, static_cast<double>(place.images_taken) / static_cast<double>(place.images_offered));
+    place.images_offered = place.images_taken = 0;
+  }
+  return any ? most : 1;
 }
 
 bool ViewHub::documentWanted() const {
@@ -80,10 +110,18 @@ ViewHub::Next ViewHub::next(int place, double seconds, Text& out) {
   Place& mine = places_[static_cast<std::size_t>(place)];
   if (mine.wish == Wish::kLost) mine.wish = Wish::kDocument;
   news_.wait_for(lock, std::chrono::duration<double>(seconds),
-                 [&] { return ended_ || !mine.waiting.empty(); });
+                 [&] { return ended_ || !mine.waiting.empty() || mine.images; });
+  if (mine.waiting.empty() && mine.images) {
+    out = std::exchange(mine.images, nullptr);
+    ++mine.images_taken;
+    ++counters_.images_delivered;
+    counters_.bytes += out->size();
+    return Next::kMessage;
+  }
   if (mine.waiting.empty()) return ended_ ? Next::kEnded : Next::kNothing;
   out = std::move(mine.waiting.front());
   mine.waiting.pop_front();
+  counters_.bytes += out->size();
   if (mine.documents_waiting > 0) {
     mine.documents_waiting = 0;
   } else {
@@ -104,10 +142,18 @@ ViewHub::Counters ViewHub::counters() const {
 }
 
 nlohmann::ordered_json toJson(const ViewHub::Counters& counters) {
-  return {{"viewers", counters.viewers},     {"most_viewers", counters.most_viewers},
-          {"refused", counters.refused},     {"patches", counters.patches},
-          {"documents", counters.documents}, {"delivered", counters.delivered},
-          {"dropped", counters.dropped},     {"given_up", counters.given_up}};
+  return {{"viewers", counters.viewers},
+          {"most_viewers", counters.most_viewers},
+          {"refused", counters.refused},
+          {"patches", counters.patches},
+          {"documents", counters.documents},
+          {"delivered", counters.delivered},
+          {"dropped", counters.dropped},
+          {"given_up", counters.given_up},
+          {"images", counters.images},
+          {"images_delivered", counters.images_delivered},
+          {"images_dropped", counters.images_dropped},
+          {"bytes", counters.bytes}};
 }
 
 }  // namespace swiftlet

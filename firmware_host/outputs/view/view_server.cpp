@@ -7,12 +7,14 @@
 
 #include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <limits>
 #include <system_error>
 
 #include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/view/connection.hpp"
 #include "firmware_host/outputs/view/low_threads.hpp"
+#include "firmware_host/outputs/view/view_token.hpp"
 #include "firmware_host/realtime/flight_thread.hpp"
 #include "firmware_host/realtime/host_sleep.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
@@ -62,7 +64,7 @@ thread_local Connection* answering = nullptr;
 class ViewServer::Work : public httplib::Server {
  public:
   Work(ViewHub& hub, ViewAddress address, ViewPages pages)
-      : hub_(hub), address_(std::move(address)), pages_(std::move(pages)) {
+      : hub_(hub), address_(std::move(address)), token_(viewToken(address_)), pages_(std::move(pages)) {
     set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
       answer(request, response);
       return HandlerResponse::Handled;
@@ -88,6 +90,9 @@ class ViewServer::Work : public httplib::Server {
   Work& operator=(const Work&) = delete;
 
   [[nodiscard]] const ViewAddress& address() const { return address_; }
+  [[nodiscard]] std::string url() const {
+    return "http://" + address_.text() + (token_.empty() ? "/" : "/?token=" + token_);
+  }
 
  private:
   void listen() {
@@ -141,21 +146,41 @@ class ViewServer::Work : public httplib::Server {
     response.set_header("Cache-Control", "no-store");
     response.set_header("X-Content-Type-Options", "nosniff");
     response.set_header("X-Frame-Options", "DENY");
+    response.set_header("Referrer-Policy", "no-referrer");
     if (!viewMayAnswer(address_, request.get_header_value("Host"), request.get_header_value("Origin"))) {
       return say(response, 403, "ask for this host by its address, or from a page of this server\n");
     }
     if (request.method != "GET") return say(response, 405, "GET is all that there is\n");
+    // Browsers ask for it without the page's query.
+    if (request.path == "/favicon.ico") {
+      response.status = 204;
+      return;
+    }
+    if (!token_.empty() && !sameToken(token_, request.get_param_value("token"))) {
+      return say(response, 403,
+                 "the token is missing or wrong: use the address printed when the view began\n");
+    }
     if (request.path == "/") {
       response.set_content(pages_.page(), kHtml);
     } else if (request.path == "/text") {
       response.set_content(pages_.text(), "text/plain; charset=utf-8");
     } else if (request.path == "/stream") {
       stream(response);
-    } else if (request.path == "/favicon.ico") {
-      response.status = 204;
+    } else if (request.path == "/moment") {
+      moment(request.get_param_value("i"), response);
     } else {
       say(response, 404, "there is /, /stream and /text\n");
     }
+  }
+
+  void moment(const std::string& index, httplib::Response& response) {
+    std::size_t i = 0;
+    const char* end = index.data() + index.size();
+    const auto [rest, error] = std::from_chars(index.data(), end, i);
+    const bool good = pages_.moment && error == std::errc() && rest == end;
+    const std::string json = good ? pages_.moment(i) : std::string();
+    if (json.empty()) return say(response, 404, "there is no such moment\n");
+    response.set_content(json, "application/json");
   }
 
   static void say(httplib::Response& response, int status, const char* text) {
@@ -197,6 +222,7 @@ class ViewServer::Work : public httplib::Server {
 
   ViewHub& hub_;
   ViewAddress address_;
+  const std::string token_;  ///< empty: none is needed
   ViewPages pages_;
   std::atomic<double> deadline_{std::numeric_limits<double>::infinity()};
   FlightThread thread_;
@@ -207,5 +233,6 @@ ViewServer::ViewServer(ViewHub& hub, const ViewAddress& address, ViewPages pages
 ViewServer::~ViewServer() = default;
 
 const ViewAddress& ViewServer::address() const { return work_->address(); }
+std::string ViewServer::url() const { return work_->url(); }
 
 }  // namespace swiftlet

@@ -8,7 +8,9 @@
 
 #include "firmware_host/outputs/page/page.hpp"
 #include "firmware_host/outputs/view/live_document.hpp"
+#include "firmware_host/outputs/view/live_images.hpp"
 #include "firmware_host/outputs/view/low_threads.hpp"
+#include "firmware_host/outputs/view/view_budget.hpp"
 #include "firmware_host/outputs/view/view_server.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
 
@@ -51,8 +53,8 @@ ViewHub::Text message(const char* event, const nlohmann::ordered_json& data) {
 
 class ViewThread::Work final : public Follower::Work {
  public:
-  Work(LiveOutlet& outlet, const ViewAddress& address, const std::string& name)
-      : outlet_(outlet), document_(name), page_(livePageText()) {
+  Work(LiveOutlet& outlet, const ViewAddress& address, const std::string& name, const Rig& rig)
+      : outlet_(outlet), images_(rig), document_(name, images_.cameras()), page_(livePageText()) {
     text_ = document_.text();
     const auto text = [this] {
       const std::lock_guard lock(mutex_);
@@ -61,6 +63,7 @@ class ViewThread::Work final : public Follower::Work {
     ViewPages pages{[this, text] { return page_.empty() ? plainLivePage(text()) : page_; }, text};
     server_ = std::make_unique<ViewServer>(hub_, address, std::move(pages));
     address_ = server_->address();
+    url_ = server_->url();
     ThreadSettings settings;
     settings.name = "view";
     thread_.start(settings, "--view", "", [this] { run(); });
@@ -71,7 +74,7 @@ class ViewThread::Work final : public Follower::Work {
     server_.reset();
     return true;
   }
-  [[nodiscard]] const ViewAddress& address() const { return address_; }
+  [[nodiscard]] const std::string& url() const { return url_; }
   [[nodiscard]] nlohmann::ordered_json json() const override {
     nlohmann::ordered_json json = {{"address", address_.text()}};
     json.update(toJson(hub_.counters()));
@@ -83,20 +86,35 @@ class ViewThread::Work final : public Follower::Work {
     yieldToOthers();
     int sample = 0;
     thread_.repeat(kSamplePeriod, [&](double now) {
-      document_.sample(outlet_, now, hub_.viewers() > 0);
+      const bool watched = hub_.viewers() > 0;
+      document_.sample(outlet_, now, watched);
+      if (images_.sample(outlet_, now, watched)) publishImages(now);
+      budget_.adapt(now, [this] { return hub_.imagesTaken(); });
       if (sample++ % kSamplesPerPatch == 0) publish(now);
     });
     document_.sample(outlet_, wallSeconds(), hub_.viewers() > 0);
     publish(wallSeconds());
   }
 
+  void publishImages(double now) {
+    if (!budget_.mayShow(now)) return images_.skip();
+    const double t = document_.timeOf(images_.stamp());
+    const ViewHub::Text images = message("images", images_.take(outlet_, t, budget_.pictures()));
+    hub_.publishImages(images);
+    budget_.spendOnImages(images->size());
+  }
+
   void publish(double now) {
     document_.setViewers(toJson(hub_.counters()));
     // Made in any case: what came is counted as sent by it.
-    hub_.publish(message("patch", document_.patch()));
+    const ViewHub::Text patch = message("patch", document_.patch());
+    hub_.publish(patch);
+    budget_.spend(patch->size());
     if (hub_.documentWanted() && now - document_made_ >= kDocumentPeriod) {
       document_made_ = now;
-      hub_.offer(message("document", document_.document()));
+      const ViewHub::Text document = message("document", document_.document());
+      hub_.offer(document);
+      budget_.spend(document->size());
     }
     std::string text = document_.text();
     const std::lock_guard lock(mutex_);
@@ -105,6 +123,8 @@ class ViewThread::Work final : public Follower::Work {
 
   LiveOutlet& outlet_;
   ViewHub hub_;
+  LiveImages images_;
+  ViewBudget budget_;
   LiveDocument document_;
   const std::string page_;  ///< empty: this installation has none
   double document_made_ = 0;
@@ -112,13 +132,13 @@ class ViewThread::Work final : public Follower::Work {
   std::string text_;
   std::unique_ptr<ViewServer> server_;
   ViewAddress address_;
+  std::string url_;
 };
 
-ViewThread::ViewThread(LiveOutlet& outlet, const ViewAddress& address, const std::string& name)
-    : Follower(std::make_unique<Work>(outlet, address, name)) {}
+ViewThread::ViewThread(LiveOutlet& outlet, const ViewAddress& address, const std::string& name,
+                       const Rig& rig)
+    : Follower(std::make_unique<Work>(outlet, address, name, rig)) {}
 
-std::string ViewThread::url() const {
-  return "http://" + static_cast<const Work&>(*work_).address().text() + "/";
-}
+std::string ViewThread::url() const { return static_cast<const Work&>(*work_).url(); }
 
 }  // namespace swiftlet

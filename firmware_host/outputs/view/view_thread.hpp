@@ -5,6 +5,7 @@
 
 #include <string>
 
+#include "estimator/camera/rig.hpp"
 #include "firmware_host/interfaces/follower_thread.hpp"
 #include "firmware_host/interfaces/live_outlet.hpp"
 #include "firmware_host/outputs/view/view_address.hpp"
@@ -15,9 +16,10 @@ class ViewThread : public Follower {
  public:
   /// Listens and begins. InputError naming --view where the address cannot be had. `outlet` outlives it.
   /// `name`: what the page calls the run. Its end tells the viewers, and takes a second at most.
-  ViewThread(LiveOutlet& outlet, const ViewAddress& address, const std::string& name);
+  /// `rig`: the cameras in use, whose images are shown where the outlet has them.
+  ViewThread(LiveOutlet& outlet, const ViewAddress& address, const std::string& name, const Rig& rig);
 
-  /// "http://127.0.0.1:8320/", with the port that it has got.
+  /// "http://127.0.0.1:8320/", with the port that it has got, and the token where one is needed.
   [[nodiscard]] std::string url() const;
 
  private:

@@ -47,6 +47,24 @@ TEST_CASE("everything comes in the order of time, samples first, camera 0 before
   }
 }
 
+TEST_CASE("a log goes on from any moment, forth and back", "[asl]") {
+  const AslFixture log(5);
+  const auto source = openLog(log.folder.path().string());
+  for (const int first : {3, 1, 4, 0}) {
+    CAPTURE(first);
+    source->seek({log.stamp(first)});
+    const Delivered got = readAll(*source);
+    REQUIRE(got.frames.size() == static_cast<std::size_t>(2 * (5 - first)));
+    CHECK(got.frames[0].stamp.ns == log.stamp(first));
+    CHECK(got.pictures[0] == test::pattern(64, 48, 2 * first));
+    // The sample of the same moment comes before the image.
+    CHECK(got.samples.size() == static_cast<std::size_t>(1 + 10 * (4 - first)));
+  }
+  source->seek({log.stamp(4) + 1});
+  SensorMessage message;
+  CHECK_FALSE(source->next(message));
+}
+
 TEST_CASE("samples after the last image come on request", "[asl]") {
   const AslFixture log(5);
   LogOptions options;

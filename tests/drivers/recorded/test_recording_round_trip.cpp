@@ -171,6 +171,20 @@ TEST_CASE("a recording of a real log is that log, whatever order its recorder dr
   CHECK(count == log->counters().imu_samples + log->counters().images[0] + log->counters().images[1]);
   CHECK(recording->counters().imu_samples == log->counters().imu_samples);
   CHECK(recording->counters().images == log->counters().images);
+  // From any moment on, forth and back.
+  log->seek({});
+  SensorMessage message;
+  REQUIRE(log->next(message));
+  const Stamp first = std::get<ImuSample>(message).stamp;
+  for (const double seconds : {2.0, 0.5, 0.0}) {
+    CAPTURE(seconds);
+    const Stamp from = first + Duration::fromSeconds(seconds);
+    log->seek(from);
+    recording->seek(from);
+    const std::size_t rest = countSame(*log, *recording);
+    CHECK(rest > 400);
+    CHECK((rest == count) == (from == first));
+  }
 }
 
 TEST_CASE("mono, no images and another calibration for a recording") {

@@ -34,6 +34,13 @@ TEST_CASE("what is no address is refused with the option's name and a remedy") {
   }
 }
 
+TEST_CASE("only this host reaches loopback") {
+  for (const char* host : {"127.0.0.1", "127.1.2.3", "::1", "localhost"})
+    CHECK(ViewAddress{host}.isLoopback());
+  for (const char* host : {"0.0.0.0", "::", "192.168.1.7", "128.0.0.1", "::ffff:10.0.0.1"})
+    CHECK_FALSE(ViewAddress{host}.isLoopback());
+}
+
 TEST_CASE("pages from elsewhere get no answer") {
   const ViewAddress address;
   CHECK(viewMayAnswer(address, "127.0.0.1:8320", ""));

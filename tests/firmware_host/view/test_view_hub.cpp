@@ -44,6 +44,32 @@ TEST_CASE("a viewer gets a document, then the patches after it, then the end") {
   CHECK(hub.counters().dropped == 0);
 }
 
+TEST_CASE("of images the newest waits alone, behind the patches") {
+  ViewHub hub;
+  const int place = hub.admit();
+  hub.publishImages(text("images 0"));  // it has no document yet
+  hub.offer(text("document"));
+  CHECK(next(hub, place) == "document");
+  CHECK(next(hub, place) == "nothing");
+  for (int i = 1; i <= 4; ++i) hub.publishImages(text("images " + std::to_string(i)));
+  hub.publish(text("patch"));
+  CHECK(next(hub, place) == "patch");
+  CHECK(next(hub, place) == "images 4");
+  CHECK(next(hub, place) == "nothing");
+  CHECK(hub.counters().images == 5);
+  CHECK(hub.counters().images_delivered == 1);
+  CHECK(hub.counters().images_dropped == 3);
+  CHECK(hub.counters().bytes == 8 + 5 + 8);
+  CHECK(hub.imagesTaken() == 0.25);
+  CHECK(hub.imagesTaken() == 1);  // none came since
+  // Of several viewers the quickest counts.
+  static_cast<void>(hub.admit());
+  hub.offer(text("document"));
+  hub.publishImages(text("images 5"));
+  CHECK(next(hub, place) == "images 5");
+  CHECK(hub.imagesTaken() == 1);
+}
+
 TEST_CASE("a viewer that is slow loses patches, counted, and gets a fresh document") {
   ViewHub hub;
   const int slow = hub.admit();

@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -13,6 +14,7 @@
 #include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/view/view_server.hpp"
 #include "firmware_host/outputs/view/view_thread.hpp"
+#include "firmware_host/outputs/view/view_token.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
 #include "tests/support/view_client.hpp"
 
@@ -29,8 +31,9 @@ struct Served {
   ViewHub hub;
   std::unique_ptr<ViewServer> server;
 
-  Served() {
+  explicit Served(const std::string& host = "127.0.0.1") {
     ViewAddress address;
+    address.host = host;
     address.port = 0;
     const ViewPages pages{[] { return std::string("<p>page</p>"); }, [] { return std::string("figures\n"); }};
     server = std::make_unique<ViewServer>(hub, address, pages);
@@ -69,6 +72,80 @@ TEST_CASE("the page, the figures, and nothing else") {
   REQUIRE(post.connect());
   REQUIRE(post.send("POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 3\r\n\r\nabc"));
   CHECK(post.readAll().starts_with("HTTP/1.1 405"));
+}
+
+TEST_CASE("beyond loopback nothing is served without the token") {
+  unsetenv(kViewTokenVariable);
+  Served served("0.0.0.0");
+  const std::string url = served.server->url();
+  const std::size_t at = url.find("/?token=");
+  REQUIRE(at != std::string::npos);
+  const std::string token = url.substr(at + 8);
+  CHECK(token.size() == 32);
+  std::string wrong = token;
+  wrong.back() = wrong.back() == '0' ? '1' : '0';
+  for (const char* name : {"/", "/text", "/stream", "/other"}) {
+    const std::string path = name;
+    CAPTURE(path);
+    CHECK(served.get(path).starts_with("HTTP/1.1 403"));
+    CHECK(served.get(path + "?token=").starts_with("HTTP/1.1 403"));
+    CHECK(served.get(path + "?token=" + wrong).starts_with("HTTP/1.1 403"));
+    CHECK(served.get(path + "?token=" + token + "0").starts_with("HTTP/1.1 403"));
+  }
+  CHECK(served.hub.counters().viewers == 0);
+  CHECK(served.get("/?token=" + token).find("<p>page</p>") != std::string::npos);
+  CHECK(served.get("/text?token=" + token).find("figures") != std::string::npos);
+  ViewClient viewer(served.port());
+  REQUIRE(viewer.connectAndAsk("/stream?token=" + token));
+  served.waitForViewers(1);
+  // Another server has another.
+  CHECK(Served("0.0.0.0").server->url().find(token) == std::string::npos);
+}
+
+TEST_CASE("a service has a token of its own, if it is a usable one") {
+  setenv(kViewTokenVariable, "my-own_token-0123", 1);
+  CHECK(Served("0.0.0.0").server->url().ends_with("/?token=my-own_token-0123"));
+  CHECK(Served().server->url().ends_with("/"));
+  for (const char* unusable : {"", "short", "has a space in it", "has&an=ampersand"}) {
+    setenv(kViewTokenVariable, unusable, 1);
+    CAPTURE(unusable);
+    CHECK_THROWS_AS(Served("0.0.0.0"), InputError);
+  }
+  unsetenv(kViewTokenVariable);
+}
+
+TEST_CASE("tokens are the same only as a whole") {
+  CHECK(sameToken("abcd", "abcd"));
+  for (const char* other : {"", "abc", "abcde", "abcdabcd", "xbcd", "abcx"})
+    CHECK_FALSE(sameToken("abcd", other));
+}
+
+TEST_CASE("moments of a run that is over are asked for by number") {
+  ViewHub hub;
+  ViewAddress address;
+  address.port = 0;
+  ViewPages pages{[] { return std::string("page"); }, [] { return std::string("text"); }};
+  pages.moment = [](std::size_t i) {
+    return i < 3 ? "{\"frame\":" + std::to_string(i) + "}" : std::string();
+  };
+  const ViewServer server(hub, address, pages);
+  const auto get = [&](const std::string& path, const std::string& headers = "Host: 127.0.0.1\r\n") {
+    ViewClient client(server.address().port);
+    REQUIRE(client.connectAndAsk(path, headers));
+    return client.readAll();
+  };
+  const std::string answer = get("/moment?i=2");
+  CHECK(answer.starts_with("HTTP/1.1 200"));
+  CHECK(answer.find("application/json") != std::string::npos);
+  CHECK(answer.find("\r\n\r\n{\"frame\":2}") != std::string::npos);
+  for (const char* path : {"/moment?i=3", "/moment?i=-1", "/moment?i=1x", "/moment?i=99999999999999999999999",
+                           "/moment?i=", "/moment", "/moment/1"}) {
+    INFO(path);
+    CHECK(get(path).starts_with("HTTP/1.1 404"));
+  }
+  CHECK(get("/moment?i=1", "Host: evil.example\r\n").starts_with("HTTP/1.1 403"));
+  // A live view has none.
+  CHECK(Served().get("/moment?i=1").starts_with("HTTP/1.1 404"));
 }
 
 TEST_CASE("requests that are too long or none at all end without an answer, and the server goes on") {
@@ -208,7 +285,7 @@ TEST_CASE("a run is followed from an outlet to a viewer") {
   const auto outlet = std::make_unique<LiveOutlet>();
   ViewAddress address;
   address.port = 0;
-  ViewThread view(*outlet, address, "a run");
+  ViewThread view(*outlet, address, "a run", Rig{});
   CHECK(view.url().starts_with("http://127.0.0.1:"));
   const int port = std::stoi(view.url().substr(view.url().rfind(':') + 1));
   ViewClient client(port);

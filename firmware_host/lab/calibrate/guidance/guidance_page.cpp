@@ -85,7 +85,7 @@ function show(state) {
   byId("axes").replaceChildren(axisRow("turned about", state.turned), axisRow("moved along", state.pushed));
   state.cameras.forEach((camera, index) => drawCamera(camera, index, state));
 }
-const source = new EventSource("stream");
+const source = new EventSource("stream" + location.search);
 source.addEventListener("state", (event) => show(JSON.parse(event.data)));
 source.addEventListener("end", () => { byId("next").textContent = "The recording has ended."; source.close(); });
 </script></body></html>

@@ -1,7 +1,6 @@
 #include "firmware_host/lab/calibrate/guidance/guided_recording.hpp"
 
 #include <fmt/format.h>
-#include <turbojpeg.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +8,6 @@
 #include <utility>
 
 #include "firmware_host/interfaces/packed_copy.hpp"
-#include "firmware_host/outputs/page/base64.hpp"
 #include "firmware_host/outputs/view/low_threads.hpp"
 #include "firmware_host/realtime/host_sleep.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
@@ -18,38 +16,6 @@ namespace swiftlet {
 namespace {
 
 constexpr int kPictureQuality = 70;  // of JPEG
-
-// The image reduced by a whole number, so that it is at most `most` px wide: means of squares.
-std::vector<std::uint8_t> reduced(const ImageView& image, int most, int& width, int& height) {
-  const int n = std::max(1, (image.width + most - 1) / most);
-  width = image.width / n;
-  height = image.height / n;
-  std::vector<std::uint8_t> small(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      int sum = 0;
-      for (int j = 0; j < n; ++j) {
-        for (int i = 0; i < n; ++i) sum += image.row(y * n + j)[x * n + i];
-      }
-      small[static_cast<std::size_t>(y * width + x)] = static_cast<std::uint8_t>(sum / (n * n));
-    }
-  }
-  return small;
-}
-
-std::string jpegText(const ImageView& image, int most) {
-  int width = 0;
-  int height = 0;
-  const std::vector<std::uint8_t> small = reduced(image, most, width, height);
-  const std::unique_ptr<void, int (*)(tjhandle)> coder(tjInitCompress(), &tjDestroy);
-  unsigned char* bytes = nullptr;
-  unsigned long size = 0;  // NOLINT(google-runtime-int): the library's type
-  const bool good = coder != nullptr && tjCompress2(coder.get(), small.data(), width, 0, height, TJPF_GRAY,
-                                                    &bytes, &size, TJSAMP_GRAY, kPictureQuality, 0) == 0;
-  const std::unique_ptr<unsigned char, void (*)(unsigned char*)> owner(bytes, &tjFree);
-  if (!good) return {};
-  return "data:image/jpeg;base64," + base64(std::vector<std::uint8_t>(bytes, bytes + size));
-}
 
 }  // namespace
 
@@ -151,7 +117,7 @@ void GuidedRecording::publish() {
     nlohmann::ordered_json state = toJson(*guide_);
     for (std::size_t c = 0; c < cameras_; ++c) {
       if (picture_[c].slot.load(std::memory_order_acquire) == Slot::kFilled) {
-        state["cameras"][c]["picture"] = jpegText(picture_[c].image, kPictureWidth);
+        state["cameras"][c]["picture"] = coder_.encode(picture_[c].image, {kPictureWidth, kPictureQuality});
       }
     }
     page_->publish(state, missing.empty() ? "enough\n" : missing.front() + "\n");

@@ -25,6 +25,7 @@
 #include "firmware_host/lab/calibrate/board/board_detector.hpp"
 #include "firmware_host/lab/calibrate/guidance/calibration_guide.hpp"
 #include "firmware_host/outputs/view/event_page.hpp"
+#include "firmware_host/outputs/view/picture_coder.hpp"
 #include "firmware_host/outputs/view/view_address.hpp"
 #include "firmware_host/runs/record_watcher.hpp"
 
@@ -81,6 +82,7 @@ class GuidedRecording final : public RecordWatcher {
   // Of the low thread.
   std::optional<CalibrationGuide> guide_;
   std::unique_ptr<BoardDetector> detector_;
+  PictureCoder coder_;
 
   // Between the low thread and the one that waits for the end.
   mutable std::mutex mutex_;

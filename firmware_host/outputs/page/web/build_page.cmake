@@ -3,6 +3,7 @@
 include(${CMAKE_CURRENT_LIST_DIR}/../../../../toolchain/cmake/npm_fetch.cmake)
 file(MAKE_DIRECTORY ${WORK})
 file(COPY ${SOURCE}/build.mjs ${SOURCE}/src ${SOURCE}/browser.mjs ${SOURCE}/check_page.mjs ${SOURCE}/check_live.mjs
+          ${SOURCE}/check_playback.mjs
      DESTINATION ${WORK})
 npm_fetch(${NPM} ${SOURCE} ${WORK} "the report page's libraries: `swiftlet report` makes plain reports." fetched)
 if(NOT fetched)

@@ -1,6 +1,7 @@
 // Opens a live view in headless Chromium and stays until the run ends: node check_live.mjs CHROMIUM URL [SCREENSHOT.png]
 // Exit code 1 when the console shows an error, anything but the server is asked, a plot has no data, does not grow or
-// is blank, the 3D view does not draw, or the page does not say that the run has ended.
+// is blank, images or their layers are not drawn, the 3D view does not draw, or the page does not say that the run has
+// ended.
 import { findBlankPlots, inBrowser, watch } from './browser.mjs';
 
 const [executablePath, url, screenshot] = process.argv.slice(2);
@@ -29,6 +30,28 @@ await inBrowser(executablePath, async (context, faults) => {
   });
   const late = await figures(page);
   await findBlankPlots(page, faults);
+  const { images } = late;
+  if (!(images?.shown > 5)) faults.push(`images are not shown: ${JSON.stringify(images)}`);
+  if (!(images?.tracks > 20 && images?.tails > 20)) faults.push(`tracks are not drawn: ${JSON.stringify(images)}`);
+  // Every layer is drawn on request, but a loop's, which has to be found first.
+  const layers = await page.evaluate(async () => {
+    for (const box of document.querySelectorAll('.layer input')) if (!box.checked) box.click();
+    const { panel } = window.swiftletReport.runs[0];
+    const most = {};
+    for (let i = 0; i < 40; i += 1) {
+      for (const [layer, count] of Object.entries(panel.count())) most[layer] = Math.max(most[layer] ?? 0, count);
+      await new Promise((resolve) => setTimeout(resolve, 50));
+    }
+    return most;
+  });
+  for (const layer of ['stereo', 'rejected', 'mesh']) {
+    if (!(layers[layer] > 0)) faults.push(`layer ${layer} is not drawn: ${JSON.stringify(layers)}`);
+  }
+  const greys = await page.evaluate(() => [...document.querySelectorAll('.images canvas')].map((canvas) => {
+    const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+    return new Set(data.filter((_, i) => i % 4 === 0)).size;
+  }));
+  if (greys.length !== 2 || !greys.every((count) => count > 30)) faults.push(`the images show ${greys} greys`);
   const ids = Object.keys(late.plots);
   if (ids.length < 10) faults.push(`only ${ids.length} plots`);
   for (const id of ids) {
@@ -67,5 +90,5 @@ await inBrowser(executablePath, async (context, faults) => {
   if (String(replaced.counts) !== '9,3' || replaced.points !== 6) faults.push(`replaced series have ${JSON.stringify(replaced)}`);
   if (replaced.again < 8 || replaced.canvases !== 1) faults.push(`after a second document: ${JSON.stringify(replaced)}`);
   const total = Object.values(late.plots).reduce((sum, n) => sum + n, 0);
-  console.log(`${ids.length} plots with ${total} points, ${late.sceneColours} colours in 3D, ${patches} patches until the end`);
+  console.log(`${ids.length} plots with ${total} points, ${late.sceneColours} colours in 3D, ${images?.shown} instants of images, ${patches} patches until the end`);
 });

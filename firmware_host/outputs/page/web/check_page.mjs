@@ -15,10 +15,16 @@ async function check(page, report, faults) {
   await page.goto(pathToFileURL(resolve(report)).href);
   await page.waitForFunction(() => window.swiftletReport?.ready, null, { timeout: 60000 });
   const loaded = (Date.now() - begin) / 1000;
+  // Images are drawn in sight only.
+  await page.evaluate(() => document.querySelector('.images')?.scrollIntoView());
+  await page.waitForFunction(() => window.swiftletReport.runs.every((run) => !run.panel || run.panel.shown > 0), null,
+    { timeout: 20000 });
+  await page.evaluate(() => window.scrollTo(0, 0));
   const times = await page.evaluate(() => window.swiftletReport.times);
   const runs = await page.evaluate(() => window.swiftletReport.figures().map((one, i) => {
     const { first_image_ns: first, scene } = window.swiftletReport.document.runs[i];
-    return { ...one, flight: first != null, hasScene: scene != null };
+    const features = Boolean(window.swiftletReport.runs[i].panel?.message?.cameras[0]?.tracks);
+    return { ...one, flight: first != null, hasScene: scene != null, features };
   }));
   await findBlankPlots(page, faults);
   for (const run of runs) {
@@ -27,7 +33,8 @@ async function check(page, report, faults) {
     for (const id of ids) if (!(run.plots[id] > 0)) faults.push(`plot ${id} of ${run.name} has no data`);
     if (run.flight && !(run.timeline > 0)) faults.push(`${run.name} has an empty timeline`);
     if (run.hasScene && run.sceneColours < 8) faults.push(`the 3D view of ${run.name} does not draw (${run.sceneColours} colours)`);
-    console.log(`${run.name}: ${ids.length} plots, ${run.timeline} on the timeline, ${run.sceneColours} colours in 3D`);
+    if (run.features && !(run.images.tracks > 50)) faults.push(`over the image of ${run.name} are ${run.images.tracks} features`);
+    console.log(`${run.name}: ${ids.length} plots, ${run.moments} images, ${run.timeline} on the timeline, ${run.sceneColours} colours in 3D`);
   }
   if (screenshot) {
     const where = focus ? page.locator(focus).first() : page;

@@ -65,6 +65,7 @@ export class LiveView {
     });
     take('document', (json) => this.takeDocument(json));
     take('patch', (patch) => this.takePatch(patch));
+    take('images', (images) => this.sequence != null && this.report.showImages(images));
     take('end', () => {
       source.close();
       this.say('ended');

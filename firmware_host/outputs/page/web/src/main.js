@@ -6,8 +6,10 @@ import './style.css';
 import { sharedBounds } from './columns.js';
 import { Drawing } from './drawing.js';
 import { HistogramPlot } from './histogram_plot.js';
+import { ImagePanel } from './image_panel.js';
 import { LiveView } from './live.js';
 import { PlanPlot } from './plan_plot.js';
+import { Playback } from './playback.js';
 import { SceneView } from './scene.js';
 import { element, eventsTable, tableElement } from './tables.js';
 import { TimePlot, forget, setEnd } from './time_plot.js';
@@ -63,6 +65,48 @@ class Run {
     (this.figures ??= []).push(figure);
   }
 
+  images(host, width = this.width) {
+    const { cameras } = this.run;
+    if (cameras?.length) this.panel = new ImagePanel(host, width, cameras);
+  }
+
+  /** Images beside the 3D view, under the slider that chooses their moment. */
+  moments(host) {
+    if (!this.run.playback?.count) {
+      host.className = 'scene';
+      this.sceneHost = host;
+      return;
+    }
+    // Of one run on top of the page, where it stays in sight.
+    this.playback = new Playback(this);
+    if (report.runs.length > 1) host.append(this.playback.bar);
+    else document.getElementById('report').prepend(this.playback.bar);
+    const pair = element('div', null, 'moment');
+    const images = element('div');
+    this.sceneHost = element('div', null, 'scene');
+    const beside = this.run.cameras?.length > 0 && this.width > 900;
+    const imageWidth = Math.floor(this.width * (beside ? 0.6 : 1));
+    this.sceneWidth = beside ? this.width - imageWidth - 24 : this.width;
+    if (beside) images.style.width = `${imageWidth}px`;
+    this.sceneHost.style.width = `${this.sceneWidth}px`;
+    this.images(images, imageWidth);
+    pair.append(images, this.sceneHost);
+    host.append(pair);
+  }
+
+  /** On all plots and in the 3D view; `pose`: null where there is none. */
+  showMoment(t, pose) {
+    this.line?.moment(t);
+    for (const plot of this.plots.values()) plot.moment?.(t, pose);
+    this.view?.showMoment(t, pose);
+  }
+
+  /** A click on a plot over time chooses the moment there. */
+  followClicks() {
+    const plots = [this.line, ...this.plots.values()].filter((one) => one?.atClick);
+    for (const plot of plots) plot.atClick((t) => this.playback.goTo(t));
+  }
+
   tables(host) {
     this.tablesHost = host;
     if (this.isFlight) host.append(eventsTable(this.run));
@@ -79,7 +123,8 @@ class Run {
       host.append(element('p', 'This browser gives no WebGL: the 3D view is left out.', 'note'));
       return;
     }
-    this.view = new SceneView(data, host, this.width, Math.min(560, Math.round(this.width * 0.6)));
+    const width = this.sceneWidth ?? this.width;
+    this.view = new SceneView(data, host, width, Math.min(560, Math.round(width * 0.6)));
   }
 
   append(patch) {
@@ -146,6 +191,8 @@ class Run {
     this.line?.dispose();
     for (const plot of this.plots.values()) plot.dispose();
     this.view?.dispose();
+    this.panel?.dispose();
+    this.playback?.dispose();
     forget(this.key);
   }
 }
@@ -187,10 +234,13 @@ const report = {
       if (!json.differences?.length) host.append(element('p', 'None.', 'note'));
       for (const table of json.differences ?? []) host.append(tableElement(table));
     }
+    const playing = json.runs.some((run) => run.playback?.count);
+    if (playing) row('Moments', (run, cell) => run.moments(cell));
     const flights = this.runs.every((run) => run.isFlight);
     if (flights) row('Health and events', (run, cell) => run.timeline(cell));
+    if (!playing && json.runs.some((run) => run.cameras?.length)) row('Cameras', (run, cell) => run.images(cell));
     const groups = [...new Set(json.runs.flatMap((run) => run.plots.map((plot) => plot.group)))];
-    const scenes = () => json.runs.some((run) => run.scene) && row('3D view', (run, cell) => { cell.className = 'scene'; run.sceneHost = cell; });
+    const scenes = () => !playing && json.runs.some((run) => run.scene) && row('3D view', (run, cell) => { cell.className = 'scene'; run.sceneHost = cell; });
     if (!groups.includes('Trajectory')) scenes();
     for (const group of groups) {
       if (beside) {
@@ -228,6 +278,10 @@ const report = {
           if (run.sceneHost) run.scene(run.sceneHost);
           if (before?.touched) run.view?.lookAs(before);
           run.view?.drawNow();
+          if (run.playback) {
+            run.followClicks();
+            run.playback.go(0);
+          }
         }
         this.times.scene = performance.now();
         this.ready = true;
@@ -242,6 +296,11 @@ const report = {
     this.runs[patch.run ?? 0]?.append(patch);
   },
 
+  /** The cameras' images of one instant (image_panel.js). */
+  showImages(message) {
+    this.runs[message.run ?? 0]?.panel?.show(message);
+  },
+
   /** What a test asks for: how much each plot shows. */
   figures() {
     return this.runs.map((run) => ({
@@ -249,6 +308,8 @@ const report = {
       timeline: run.line?.count() ?? 0,
       plots: Object.fromEntries([...run.plots].map(([id, plot]) => [id, plot.count()])),
       sceneColours: run.view ? run.view.colours() : 0,
+      images: run.panel ? { shown: run.panel.shown, ...run.panel.count() } : null,
+      moments: run.playback?.t.length ?? 0,
     }));
   },
 };
@@ -257,4 +318,4 @@ window.swiftletReport = report;
 const embedded = document.getElementById('report-document');
 if (embedded) report.load(JSON.parse(embedded.textContent));
 const live = document.getElementById('swiftlet-live');
-if (live) report.live = new LiveView(report, live.content);
+if (live) report.live = new LiveView(report, live.content + location.search);

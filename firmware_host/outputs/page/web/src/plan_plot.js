@@ -3,6 +3,7 @@
 import uPlot from 'uplot';
 import * as colours from './colours.js';
 import { bounds, floats, grown } from './columns.js';
+import { Moment } from './moment.js';
 
 export class PlanPlot {
   constructor(plot, host, width, height) {
@@ -11,6 +12,7 @@ export class PlanPlot {
     }));
     this.legend = document.createElement('div');
     this.label = plot.value_label ?? '';
+    this.axes = [plot.x_label, plot.y_label].map((label) => 'xyz'.indexOf(label[0])); // "x [m]"
     const font = { font: '11px system-ui', labelFont: '11px system-ui', labelSize: 18 };
     this.plot = new uPlot(
       {
@@ -122,6 +124,12 @@ export class PlanPlot {
     }
     ctx.restore();
     return null;
+  }
+
+  /** A dot where the vehicle is. */
+  moment(_, pose) {
+    const [across, up] = this.axes;
+    (this.mark ??= new Moment(this.plot, 'moment-dot')).show(pose?.[across], pose?.[up]);
   }
 
   count() {

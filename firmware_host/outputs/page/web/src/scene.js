@@ -77,6 +77,7 @@ class Trajectory {
     this.data = data;
     this.points = floats(data.points);
     this.value = floats(data.value);
+    this.t = floats(data.t);
     this.object = data.style === 'points' ? this.makePoints() : this.makeLine();
   }
 
@@ -109,6 +110,15 @@ class Trajectory {
       geometry.setColors(rgb);
     }
     return geometry;
+  }
+
+  /** What was flown until then. */
+  until(t) {
+    if (!this.t.length) return;
+    let count = this.t.findIndex((one) => one > t);
+    if (count < 0) count = this.t.length;
+    if (this.line) this.line.geometry.instanceCount = Math.max(0, count - 1);
+    else this.object.geometry.setDrawRange(0, count);
   }
 
   append(points, value, replace) {
@@ -175,6 +185,18 @@ export class SceneView {
     }
     this.vehicle.position.set(x, y, z);
     this.vehicle.quaternion.set(qx, qy, qz, qw);
+  }
+
+  /** A moment of a run that is over. */
+  showMoment(t, pose) {
+    for (const trajectory of this.trajectories) trajectory.until(t);
+    if (pose) {
+      const first = !this.vehicle;
+      this.move(pose);
+      if (first) this.addGrid();
+    }
+    if (this.vehicle) this.vehicle.visible = pose != null;
+    this.draw();
   }
 
   dispose() {

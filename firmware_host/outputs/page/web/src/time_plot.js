@@ -3,6 +3,7 @@
 import uPlot from 'uplot';
 import * as colours from './colours.js';
 import { floats, grown } from './columns.js';
+import { Moment } from './moment.js';
 
 const following = new Map(); // sync key -> plots
 
@@ -90,6 +91,18 @@ export function zoomBy() {
 }
 
 const shown = (value) => (value == null ? '' : Number(value).toPrecision(4));
+
+const kClick = 3; // px that the pointer may move in a click
+
+/** Calls take(t) where somebody clicks. */
+export function takeClicks(plot, take) {
+  let from = 0;
+  plot.over.addEventListener('mousedown', (event) => { from = event.clientX; });
+  plot.over.addEventListener('click', (event) => {
+    if (Math.abs(event.clientX - from) > kClick) return; // a zoom
+    take(plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, 'x'));
+  });
+}
 
 /** Around what there is; what differs by less than a thousandth of itself is a straight line. */
 function range(_, low, high) {
@@ -184,6 +197,14 @@ export class TimePlot {
   /** Shows what was appended. */
   refresh() {
     setDataOf(this.plot, this.key, this.data());
+  }
+
+  moment(t) {
+    (this.mark ??= new Moment(this.plot, 'moment-line')).show(t);
+  }
+
+  atClick(take) {
+    takeClicks(this.plot, take);
   }
 
   dispose() {

@@ -2,7 +2,8 @@
 
 import uPlot from 'uplot';
 import * as colours from './colours.js';
-import { follow, setDataOf, spreadZoom, unfollow, zoomBy } from './time_plot.js';
+import { Moment } from './moment.js';
+import { follow, setDataOf, spreadZoom, takeClicks, unfollow, zoomBy } from './time_plot.js';
 
 const kLane = 20; // px
 
@@ -103,6 +104,14 @@ export class Timeline {
     this.tip.style.display = 'block';
     this.tip.style.left = `${Math.min(left + 8, u.over.clientWidth - 260)}px`;
     this.tip.style.top = `${top + 12}px`;
+  }
+
+  moment(t) {
+    (this.mark ??= new Moment(this.plot, 'moment-line')).show(t);
+  }
+
+  atClick(take) {
+    takeClicks(this.plot, take);
   }
 
   count() {

@@ -1,0 +1,43 @@
+#include "firmware_host/commands/reported_run.hpp"
+
+#include <filesystem>
+#include <utility>
+
+#include "drivers/input/input_error.hpp"
+#include "firmware_host/lab/evaluation/confusion_picture.hpp"
+#include "firmware_host/lab/evaluation/evaluate_run.hpp"
+
+namespace swiftlet {
+
+ReportedRun readReportedRun(const std::string& folder, const std::string& given_truth,
+                            const Settings& settings) {
+  namespace fs = std::filesystem;
+  RunFiles files = readRunFiles(folder);
+  const std::string log = files.text("run/log");
+  const std::string source = given_truth.empty() ? log : given_truth;
+  Truth truth;
+  if (!source.empty()) {
+    try {
+      truth = readTruth(source, true);
+    } catch (const InputError& error) {
+      // That a log has no truth is no fault of the run; a truth that was asked for has to be there.
+      if (!given_truth.empty()) throw;
+      files.missing.push_back({"truth", error.what()});
+    }
+  }
+  ReportedRun run;
+  const fs::path world = fs::is_directory(source) ? fs::path(source) : fs::path(log);
+  try {
+    if (!world.empty() && fs::exists(world / "truth" / "mesh.ply")) {
+      run.true_surface = (world / "truth" / "mesh.ply").string();
+    }
+    if (!world.empty()) run.labels = readLabelNames(world.string());
+  } catch (const InputError& error) {
+    files.missing.push_back({"labels.csv", error.what()});
+  }
+  run.view = viewOf(std::move(files), truth.poses, truth.name,
+                    accuracyOptions(settings.evaluation, AlignKind::kYaw));
+  return run;
+}
+
+}  // namespace swiftlet
