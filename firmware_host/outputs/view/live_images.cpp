@@ -38,12 +38,14 @@ bool LiveImages::sample(LiveOutlet& outlet, double now, bool watched) {
   ImageFeed& feed = *outlet.images;
   feed.wanted.store(watched, std::memory_order_relaxed);
   receive(feed);
-  if (!watched || shown_ < 0) shown_ = now;
   if (!watched) {
     for (Camera& camera : camera_) camera.held.clear();
+    waiting_ = -1;
     skip();
     return false;
   }
+  const bool waits = std::ranges::any_of(camera_, [](const Camera& camera) { return !camera.held.empty(); });
+  if (waits && waiting_ < 0) waiting_ = now;
   choose(feed, now);
   return fresh_;
 }
@@ -88,7 +90,7 @@ void LiveImages::choose(ImageFeed& feed, double now) {
       found = true;
     }
     if (found) stamp_ = sight.stamp;
-  } else if (now - shown_ > kPatience) {
+  } else if (waiting_ >= 0 && now - waiting_ > kPatience) {
     for (Camera& camera : camera_) {
       if (camera.held.empty()) continue;
       camera.shown = std::move(camera.held.back());
@@ -97,10 +99,10 @@ void LiveImages::choose(ImageFeed& feed, double now) {
       found = true;
     }
   }
+  if (news || found) waiting_ = -1;
   if (!found) return;
   fresh_ = true;
   has_sight_ = news;
-  shown_ = now;
 }
 
 void LiveImages::skip() {

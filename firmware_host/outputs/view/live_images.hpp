@@ -62,7 +62,7 @@ class LiveImages {
   bool has_sight_ = false;  ///< the instant is the feed's newest sight
   bool fresh_ = false;      ///< an instant waits to be shown
   Stamp stamp_;
-  double shown_ = -1;  ///< host's clock, when an instant came last or nobody looked; negative: not yet
+  double waiting_ = -1;  ///< host's clock, since when images wait for tracks; negative: none do
   PictureCoder coder_;
   std::vector<TrackId> landmarks_;  ///< of the window at the instant, sorted
 };

@@ -131,6 +131,19 @@ TEST_CASE("without tracks for half a second images come alone") {
   CHECK(shown <= 2);
 }
 
+TEST_CASE("images of a slow camera wait for their tracks") {
+  Flight flight;
+  flight.sample();
+  for (int i = 1; i <= 5; ++i) {
+    flight.now += 2;
+    flight.pair(at(2 * i));
+    CHECK_FALSE(flight.sample());
+    flight.sight(at(2 * i));
+    REQUIRE(flight.sample());
+    CHECK(flight.images.take(*flight.outlet, 0, {320, 70})["cameras"][0].contains("tracks"));
+  }
+}
+
 TEST_CASE("while nobody looks no slot is held and nothing is lent") {
   Flight flight;
   flight.sample(false);
