@@ -1,5 +1,5 @@
 #!/bin/sh
-# Opens the live view of a slowed-down replay in headless Chromium and stays until it ends.
+# Opens the live view of a slowed-down replay in headless Chromium, which interrupts it when it has seen enough.
 # usage: live_browser.sh SWIFTLET PAGE_FOLDER LOG [SCREENSHOT.png]
 set -eu
 swiftlet=$1
@@ -12,8 +12,8 @@ find_browser "$page"
 work=$(mktemp -d)
 replay=
 trap '[ -z "$replay" ] || kill "$replay" 2>/dev/null || true; rm -rf "$work"' EXIT
-# Long enough for a browser to start on a busy machine.
-"$swiftlet" replay "$log" --real-time --speed 0.12 --map --view 127.0.0.1:0 --out "$work/run" >"$work/replay.log" 2>&1 &
+# Long enough for a browser on a busy machine, were it not interrupted.
+"$swiftlet" replay "$log" --real-time --speed 0.05 --map --view 127.0.0.1:0 --out "$work/run" >"$work/replay.log" 2>&1 &
 replay=$!
 url=
 for _ in $(seq 100); do
@@ -22,7 +22,7 @@ for _ in $(seq 100); do
   sleep 0.1
 done
 [ -n "$url" ] || { cat "$work/replay.log"; exit 1; }
-if ! node "$page/check_live.mjs" "$browser" "$url" $screenshot; then
+if ! node "$page/check_live.mjs" "$browser" "$url" "$replay" $screenshot; then
   cat "$work/replay.log"
   exit 1
 fi

@@ -1,10 +1,11 @@
-// Opens a live view in headless Chromium and stays until the run ends: node check_live.mjs CHROMIUM URL [SCREENSHOT.png]
+// Opens the live view of a replay in headless Chromium, then interrupts the replay and sees it end:
+// node check_live.mjs CHROMIUM URL PID [SCREENSHOT.png]
 // Exit code 1 when the console shows an error, anything but the server is asked, a plot has no data, does not grow or
 // is blank, images or their layers are not drawn, the 3D view does not draw, or the page does not say that the run has
 // ended.
 import { findBlankPlots, inBrowser, watch } from './browser.mjs';
 
-const [executablePath, url, screenshot] = process.argv.slice(2);
+const [executablePath, url, replay, screenshot] = process.argv.slice(2);
 const figures = (page) => page.evaluate(() => window.swiftletReport.figures()[0]);
 
 await inBrowser(executablePath, async (context, faults) => {
@@ -64,6 +65,7 @@ await inBrowser(executablePath, async (context, faults) => {
   const bar = await page.locator('.live').innerText();
   if (!/live/.test(bar) || !/arm/.test(bar)) faults.push(`the bar says: ${bar}`);
   if (screenshot) await page.screenshot({ path: screenshot, fullPage: true });
+  process.kill(Number(replay), 'SIGINT');
   await page.waitForFunction(() => window.swiftletReport.live.state === 'ended', null, { timeout: 120000 });
   ended = true;
   const { documents, patches } = await page.evaluate(() => {
