@@ -62,7 +62,7 @@ class DeviceJournal {
   [[nodiscard]] bool next(DeviceEvent& event) { return events_.tryPop(event); }
   [[nodiscard]] std::string text(const DeviceEvent& event) const {
     if (!event.fault.ok()) return describe(event.fault, name_);
-    return name_ + (event.defect ? ": data is complete again" : ": works again");
+    return name_ + (event.defect ? ": normal again" : ": works again");
   }
 
   // Of any.

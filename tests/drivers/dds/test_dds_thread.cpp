@@ -429,7 +429,7 @@ TEST_CASE("diagnostics tell the verdict at once, and go on while no frame comes"
   until("degraded;_mesh_is_lost", 1, supervise);
   CHECK(heard("lost/mesh no_memory;_since") > 0);
   CHECK(heard("ready_to_arm 1") > 0);
-  until("the_supervisor_has_stopped", 2, [] {});
+  until("supervisor_stopped", 2, [] {});
   verdict.troubles.clear();
   ++verdict.trouble_changes;
   until("degraded swiftlet", 1, supervise);

@@ -162,7 +162,7 @@ TEST_CASE("what goes bad four times stays degraded", "[supervisor]") {
     CHECK(flight.verdict.health == (time < 4 ? Health::kGood : Health::kDegraded));
   }
   REQUIRE(flight.trouble("mesh", Cause::kFlapping) != nullptr);
-  CHECK(flight.times("mesh is unsteady: went bad 4 times") == 1);
+  CHECK(flight.times("mesh is unsteady: failed 4 times") == 1);
   CHECK_FALSE(flight.verdict.arming.ready());
   flight.pass(10.0);
   CHECK(flight.verdict.health == Health::kDegraded);

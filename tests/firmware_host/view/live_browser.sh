@@ -13,7 +13,7 @@ work=$(mktemp -d)
 replay=
 trap '[ -z "$replay" ] || kill "$replay" 2>/dev/null || true; rm -rf "$work"' EXIT
 # Long enough for a browser on a busy machine, were it not interrupted.
-"$swiftlet" replay "$log" --real-time --speed 0.035 --map --view 127.0.0.1:0 --out "$work/run" >"$work/replay.log" 2>&1 &
+"$swiftlet" replay "$log" --real-time --speed 0.04 --map --view 127.0.0.1:0 --out "$work/run" >"$work/replay.log" 2>&1 &
 replay=$!
 url=
 for _ in $(seq 100); do

@@ -19,8 +19,10 @@ await inBrowser(executablePath, async (context, faults) => {
     // Before the first pose there is nothing to plot.
     && Object.values(window.swiftletReport.figures()[0].plots).every((points) => points > 0), null, { timeout: 60000 });
   const early = await figures(page);
-  const begun = await page.evaluate(() => window.swiftletReport.live.patches);
-  await page.waitForFunction((n) => window.swiftletReport.live.patches > n + 8, begun, { timeout: 60000 });
+  await page.waitForFunction((before) => {
+    const { plots } = window.swiftletReport.figures()[0];
+    return Object.keys(plots).every((id) => plots[id] > (before[id] ?? 0));
+  }, early.plots, { timeout: 60000 }).catch(() => {});  // those that did not grow are named below
   // What is out of sight is drawn when it comes into sight.
   await page.evaluate(async () => {
     for (const figure of document.querySelectorAll('figure, .scene')) {
