@@ -215,7 +215,8 @@ TEST_CASE("what is wrong with a topic is said by name") {
   TopicCamera of_the_future(cameraSettings(test::kTopicCameras[0]));
   DeviceFault fault = refusal(of_the_future);
   CHECK(fault.kind == DeviceFaultKind::kWrongClock);
-  CHECK_THAT(std::string(fault.text()), Catch::Contains("stamps are -4.9") || Catch::Contains("stamps are -5.0"));
+  CHECK_THAT(std::string(fault.text()),
+             Catch::Contains("stamps are -4.9") || Catch::Contains("stamps are -5.0"));
   TopicImuLink imu(imuSettings(test::kTopicImu));
   CHECK(imu.open().kind == DeviceFaultKind::kWrongClock);
   CHECK_FALSE(imu.isOpen());
