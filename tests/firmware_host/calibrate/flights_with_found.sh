@@ -25,7 +25,7 @@ for seed in $(seq "$first" "$last"); do
   "$program" simulate --rig $rig --rig-seed "$seed" --seed "$seed" --duration 20 --depth-every 0 --out "$folder/flight" \
     >"$folder/flight.txt"
   found=$(error_of "$folder/flight" "$folder/rig_$seed/found")
-  true=$(error_of "$folder/flight" "$folder/rig_$seed/truth/calibration")
+  true=$(error_of "$folder/flight" "$folder/rig_$seed/true")
   echo "$seed,$found,$true" >>"$flights"
   rm -rf "$folder/flight" "$folder/run"
 done

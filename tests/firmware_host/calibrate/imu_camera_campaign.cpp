@@ -2,7 +2,7 @@
 //
 // usage: imu_camera_campaign RESULTS FIRST LAST [FOLDER]: rigs with seeds FIRST to LAST; those that RESULTS
 // (a CSV) has already are not repeated. Delete RESULTS after a change of the code. With FOLDER the images are
-// rendered into it and searched for corners, and FOLDER/rig_<seed>/found gets the calibration.
+// rendered into it and searched for corners, and FOLDER/rig_<seed> gets the calibration, found and true.
 
 #include <fmt/format.h>
 
@@ -96,8 +96,14 @@ std::string runRig(std::uint64_t seed, const std::string& folder) {
   const auto begin = std::chrono::steady_clock::now();
   const ImuCameraSolution solution = calibrateImuCamera(input);
   if (!folder.empty() && !solution.values.empty()) {
-    std::filesystem::create_directories(rendered + "/found");
-    writeCalibration(rendered + "/found", calibrationOf(solution, input.noise));
+    Calibration calibration = calibrationOf(solution, input.noise);
+    for (const char* name : {"/found", "/true"}) {
+      std::filesystem::create_directories(rendered + name);
+      writeCalibration(rendered + name, calibration);
+      calibration.rig = session.truth().rig;
+      calibration.gyro_matrix = session.truth().gyro_matrix;
+      calibration.accel_matrix = session.truth().accel_matrix;
+    }
   }
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   std::string text;
