@@ -1,8 +1,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <memory>
 
 #include "drivers/input/input_error.hpp"
@@ -50,16 +48,15 @@ int report(const ReportOptions& options) {
       runs.back().moments = embeddedMoments(moments, kMostImageBytes / options.runs.size());
     }
   }
-  const std::string page = options.plain ? "" : findReportPage();
+  const ReportProgram page = options.plain ? ReportProgram{} : readReportProgram();
   std::string html;
-  if (page.empty()) {
+  if (page.name.empty()) {
     if (!options.plain) {
       fmt::print(stderr, "note: built without npm: the report has tables and static plots but no 3D view\n");
     }
     html = plainPage(runs);
   } else {
-    std::ifstream file(page, std::ios::binary);
-    html = pageWith(std::string(std::istreambuf_iterator<char>(file), {}), page, reportDocument(runs));
+    html = pageWith(page.text, page.name, reportDocument(runs));
   }
   const std::string out =
       options.out.empty() ? (fs::path(options.runs.front()) / "report.html").string() : options.out;

@@ -1,7 +1,5 @@
 #include "firmware_host/lab/playback/run_player.hpp"
 
-#include <fstream>
-#include <iterator>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -16,14 +14,12 @@ namespace swiftlet {
 namespace {
 
 std::string pageOf(const ReportedRun& run) {
-  const std::string name = findReportPage();
-  if (name.empty()) {
+  const ReportProgram program = readReportProgram();
+  if (program.name.empty()) {
     throw InputError("view", 0, "", "this installation has no page (share/swiftlet/report_page.html)",
                      "Build swiftlet where npm is installed, or use `swiftlet report --plain`");
   }
-  std::ifstream file(name, std::ios::binary);
-  const std::string page{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  return pageWith(page, name, reportDocument({run}));
+  return pageWith(program.text, program.name, reportDocument({run}));
 }
 
 }  // namespace

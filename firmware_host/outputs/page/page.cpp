@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 
 #include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/map_files/map_files.hpp"
@@ -15,13 +17,15 @@ constexpr std::string_view kPlace = "<!--swiftlet-report-document-->";
 
 }  // namespace
 
-std::string findReportPage() {
+ReportProgram readReportProgram() {
   std::error_code error;
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
-  if (error) return "";
+  if (error) return {};
   const std::filesystem::path page =
       program.parent_path().parent_path() / "share" / "swiftlet" / "report_page.html";
-  return std::filesystem::exists(page, error) ? page.string() : "";
+  std::ifstream file(page, std::ios::binary);
+  if (!file) return {};
+  return {page.string(), {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()}};
 }
 
 namespace {

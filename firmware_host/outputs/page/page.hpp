@@ -14,10 +14,14 @@ namespace swiftlet {
 /// Raised when a page of an earlier program could not read the document.
 inline constexpr int kReportFormat = 1;
 
-/// Where the page's program is: beside the running program. Empty when it is not there.
-std::string findReportPage();
+/// The page's program, of the installation that the running program belongs to.
+struct ReportProgram {
+  std::string name;  ///< of its file; empty: the installation has none
+  std::string text;
+};
+ReportProgram readReportProgram();
 
-/// `page`: the HTML of findReportPage(). InputError names `name` when it is no page of this format.
+/// `page`: ReportProgram's text. InputError names `name` when it is no page of this format.
 std::string pageWith(const std::string& page, const std::string& name,
                      const nlohmann::ordered_json& document);
 

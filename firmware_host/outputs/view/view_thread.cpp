@@ -1,7 +1,5 @@
 #include "firmware_host/outputs/view/view_thread.hpp"
 
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -22,11 +20,8 @@ constexpr int kSamplesPerPatch = 4;
 constexpr double kDocumentPeriod = 0.25;  // s: at most so often
 
 std::string livePageText() {
-  const std::string name = findReportPage();
-  if (name.empty()) return "";
-  std::ifstream file(name, std::ios::binary);
-  const std::string page{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  return livePage(page, name);
+  const ReportProgram program = readReportProgram();
+  return program.name.empty() ? "" : livePage(program.text, program.name);
 }
 
 /// Without the page's program: figures as text, asked for again every second.

@@ -1,8 +1,5 @@
 #include "firmware_host/lab/calibrate/page/calibration_page.hpp"
 
-#include <fstream>
-#include <iterator>
-
 #include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/lab/report/plain_page.hpp"
 #include "firmware_host/outputs/page/page.hpp"
@@ -59,13 +56,8 @@ std::string calibrationHtml(const CalibrationPage& page, const std::string& prog
 }
 
 void writeCalibrationPage(const std::string& path, const CalibrationPage& page) {
-  const std::string name = findReportPage();
-  std::string program;
-  if (!name.empty()) {
-    std::ifstream file(name, std::ios::binary);
-    program.assign(std::istreambuf_iterator<char>(file), {});
-  }
-  writeWholeFile(path, calibrationHtml(page, program, name) + "\n");
+  const ReportProgram program = readReportProgram();
+  writeWholeFile(path, calibrationHtml(page, program.text, program.name) + "\n");
 }
 
 }  // namespace swiftlet

@@ -25,7 +25,7 @@ struct CalibrationPage {
 /// With the page's program where it is installed, else plain. InputError if the file cannot be written.
 void writeCalibrationPage(const std::string& path, const CalibrationPage& page);
 
-/// The same as text: `program` is the page of findReportPage(), empty: plain.
+/// The same as text: `program` is the page of readReportProgram(), empty: plain.
 std::string calibrationHtml(const CalibrationPage& page, const std::string& program,
                             const std::string& program_name);
 
