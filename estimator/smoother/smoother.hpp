@@ -9,8 +9,8 @@
 // estimate as linearization point, moved with the window (window.hpp). Data: window, landmark_table,
 // extra_table, calibration_state, prior (together: window_problem). Operations: window_factors,
 // window_solver, window_covariance, window_trim, marginalization. Frames: world (z up, origin and yaw of the
-// first state), body (= IMU), cameras. SI units, pixels. Memory: 14.1 MiB, reserved by the constructor (table
-// in docs/smoother.md); no allocation afterwards. Full is normal: the landmark not seen for longest and the
+// first state), body (= IMU), cameras. SI units, pixels. Memory: 16.6 MiB, reserved by the constructor; no
+// allocation afterwards. Full is normal: the landmark not seen for longest and the
 // oldest IMU samples are dropped first. Cost: linear in landmarks, cubic in the dimension of the window (at
 // most 192 columns by default, and 3 for each explicit landmark and plane). Sources: Leutenegger et al.,
 // "Keyframe-based visual-inertial odometry using nonlinear optimization", IJRR 2015 (window); Huang,
