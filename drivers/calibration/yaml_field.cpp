@@ -82,6 +82,16 @@ std::vector<YamlField> YamlField::items() const {
   return out;
 }
 
+std::vector<std::string> YamlField::keys() const {
+  std::vector<std::string> out;
+  if (!isMap()) return out;
+  for (const auto& pair : node_) {
+    if (!pair.first.IsScalar()) throw error("a key is no single word", "Write lines of `key: value`");
+    out.push_back(pair.first.Scalar());
+  }
+  return out;
+}
+
 std::string YamlField::text() const {
   if (!node_.IsScalar()) throw error("expected a single word", "Write it as `key: value`");
   return node_.Scalar();

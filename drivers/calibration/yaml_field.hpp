@@ -1,6 +1,7 @@
 #pragma once
 // One value of a YAML file together with where it stands, so that every complaint names file, line
-// and field. For the readers of drivers/calibration and drivers/target.
+// and field. For the readers of drivers/calibration and drivers/target, and of the lists of logs of a
+// campaign.
 
 #include <yaml-cpp/yaml.h>
 
@@ -25,6 +26,8 @@ class YamlField {
   /// The value under `key`; InputError when absent.
   [[nodiscard]] YamlField at(const std::string& key, const std::string& remedy = {}) const;
   [[nodiscard]] std::vector<YamlField> items() const;
+  /// Of a map; empty otherwise.
+  [[nodiscard]] std::vector<std::string> keys() const;
 
   [[nodiscard]] std::string text() const;
   [[nodiscard]] double number() const;

@@ -24,6 +24,7 @@ struct SettingsOptions {
 void addBudgetCommand(CLI::App& app, int& exit_code);
 void addCalibrateCommand(CLI::App& app, int& exit_code);
 void addCalibrationCommand(CLI::App& app, int& exit_code);
+void addCampaignCommand(CLI::App& app, int& exit_code);
 void addReplayCommand(CLI::App& app, int& exit_code);
 void addFlyCommand(CLI::App& app, int& exit_code);
 void addRecordCommand(CLI::App& app, int& exit_code);

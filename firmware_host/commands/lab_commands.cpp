@@ -14,6 +14,7 @@ void addLabCommands(CLI::App& app, int& exit_code) {
   addImportCommand(app, exit_code);
   addHilCommand(app, exit_code);
   addEvaluateCommand(app, exit_code);
+  addCampaignCommand(app, exit_code);
   addExportCommand(app, exit_code);
   addReportCommand(app, exit_code);
   addViewCommand(app, exit_code);

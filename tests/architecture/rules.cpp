@@ -84,6 +84,7 @@ RoomTable programNeighbours() {
       {"lab/budget", {"lab/evaluation", "runs"}},
       {"lab/report", {"lab/evaluation", "outputs/view", "smoothing"}},
       {"lab/playback", {"lab/report"}},
+      {"lab/campaign", {"lab/report"}},
       {"lab/export", {"lab/evaluation", "outputs/ros2"}},
       {"lab/import", {"files", "interfaces"}},
       {"lab/hil", {"inputs/devices", "lab/budget"}},
@@ -96,8 +97,8 @@ RoomTable programNeighbours() {
        {"lab/calibrate/check", "lab/calibrate/imu_camera", "lab/calibrate/imu_noise", "lab/report"}},
       {"lab/calibrate/guidance", {"lab/calibrate/board", "runs"}},
       {"commands",
-       {"lab/calibrate/guidance", "lab/calibrate/page", "lab/export", "lab/hil", "lab/import", "lab/modules",
-        "lab/playback", "runs"}},
+       {"lab/calibrate/guidance", "lab/calibrate/page", "lab/campaign", "lab/export", "lab/hil", "lab/import",
+        "lab/modules", "lab/playback", "runs"}},
   };
 }
 

@@ -203,7 +203,7 @@ std::string svgPlot(const Plot& plot) {
   return svg;
 }
 
-std::string plainDocument(const std::string& title, const std::string& content) {
+std::string htmlDocument(const std::string& title, const std::string& content) {
   return "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>" + htmlText(title) +
          "</title><style>\n"
          "body{font:14px system-ui,sans-serif;margin:1.5em;max-width:1300px}svg text{font:11px "
@@ -212,11 +212,15 @@ std::string plainDocument(const std::string& title, const std::string& content) 
          ".verdict{font-size:17px;font-weight:600}figure{display:inline-block;margin:0 1em 1em "
          "0}figure svg{width:600px;height:auto;display:block}figcaption{font-weight:600}"
          "</style></head><body>\n<h1>" +
-         htmlText(title) +
-         "</h1>\n<p class=\"missing\">This is a plain report: tables and fixed plots, no 3D view. A program "
-         "that "
-         "was built where npm is at hand makes the full one.</p>\n" +
-         content + "<p>" + htmlText(versionText()) + "</p></body></html>\n";
+         htmlText(title) + "</h1>\n" + content + "<p>" + htmlText(versionText()) + "</p></body></html>\n";
+}
+
+std::string plainDocument(const std::string& title, const std::string& content) {
+  return htmlDocument(
+      title,
+      "<p class=\"missing\">This is a plain report: tables and fixed plots, no 3D view. A program "
+      "built with npm installed makes the full one.</p>\n" +
+          content);
 }
 
 std::string plainPage(const std::vector<ReportedRun>& runs) {

@@ -12,7 +12,9 @@ namespace swiftlet {
 
 std::string plainPage(const std::vector<ReportedRun>& runs);
 
-/// The page around its content.
+/// An HTML file around its content: title, style, version.
+std::string htmlDocument(const std::string& title, const std::string& content);
+/// The same with a remark that the full report is missing.
 std::string plainDocument(const std::string& title, const std::string& content);
 std::string tableHtml(const Table& table);
 

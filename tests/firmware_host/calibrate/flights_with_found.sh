@@ -1,15 +1,17 @@
 #!/bin/bash
 # Flights of random rigs with the calibration that was found, beside the same with the true one.
-# usage: flights_with_found.sh PROGRAM CAMPAIGN RESULTS FIRST LAST FOLDER
-#   CAMPAIGN  imu_camera_campaign: renders, and calibrates, the rigs FIRST to LAST that FOLDER does not have
+# usage: flights_with_found.sh PROGRAM CAMPAIGN RESULTS FIRST LAST FOLDER [--corners]
+#   CAMPAIGN  imu_camera_campaign: calibrates the rigs FIRST to LAST that FOLDER does not have, from rendered images
+#             or, with --corners, from simulated corners
 #   RESULTS   its CSV; FLIGHTS, beside it, gets a line a rig: seed, position error [m] with the found and the true one
 # Resumable. Exit code 0: with what was found the error is at most 1.1 times as large, as geometric mean over the rigs:
 # one flight is a matter of chance.
 set -eu
-program=$1 campaign=$2 results=$3 first=$4 last=$5 folder=$6
+program=$1 campaign=$2 results=$3 first=$4 last=$5 folder=$6 corners=${7:-}
 flights=${results%.csv}_flights.csv
 mkdir -p "$folder"
-"$campaign" "$results" "$first" "$last" "$folder"
+# shellcheck disable=SC2086 # nothing, or one word
+"$campaign" "$results" "$first" "$last" "$folder" $corners
 touch "$flights"
 
 error_of() { # log, calibration

@@ -1,8 +1,10 @@
 // Simulated rigs through the batch: a line a rig, the errors beside their standard deviations, a table.
 //
-// usage: imu_camera_campaign RESULTS FIRST LAST [FOLDER]: rigs with seeds FIRST to LAST; those that RESULTS
-// (a CSV) has already are not repeated. Delete RESULTS after a change of the code. With FOLDER the images are
-// rendered into it and searched for corners, and FOLDER/rig_<seed> gets the calibration, found and true.
+// usage: imu_camera_campaign RESULTS FIRST LAST [FOLDER [--corners]]
+//
+// Calibrates the rigs with seeds FIRST to LAST that RESULTS (a CSV) does not have. Delete RESULTS after a
+// change of the code. FOLDER/rig_<seed> gets the calibration, found and true; the session's images are
+// rendered there and searched for corners. With --corners, as without FOLDER, corners are simulated instead.
 
 #include <fmt/format.h>
 
@@ -86,13 +88,13 @@ ImuCameraInput renderedInput(const CalibrationSession& session, RigKind kind, co
   return input;
 }
 
-std::string runRig(std::uint64_t seed, const std::string& folder) {
+std::string runRig(std::uint64_t seed, const std::string& folder, bool rendered_images) {
   SessionSettings settings;
   settings.seed = seed;
   const RigKind kind = seed % 2 == 0 ? RigKind::kRandomPinhole : RigKind::kRandomFisheye;
   const CalibrationSession session(makeCalibrationRig(kind, seed), CalibrationTarget{}, settings);
   const std::string rendered = fmt::format("{}/rig_{}", folder, seed);
-  const ImuCameraInput input = folder.empty() ? batchInput(session) : renderedInput(session, kind, rendered);
+  const ImuCameraInput input = rendered_images ? renderedInput(session, kind, rendered) : batchInput(session);
   const auto begin = std::chrono::steady_clock::now();
   const ImuCameraSolution solution = calibrateImuCamera(input);
   if (!folder.empty() && !solution.values.empty()) {
@@ -126,16 +128,18 @@ std::string runRig(std::uint64_t seed, const std::string& folder) {
 
 int main(int argc, char** argv) {
   if (argc < 4) {
-    std::cerr << "usage: imu_camera_campaign RESULTS FIRST LAST [FOLDER]\n";
+    std::cerr << "usage: imu_camera_campaign RESULTS FIRST LAST [FOLDER [--corners]]\n";
     return 2;
   }
   const std::string path = argv[1];
   const std::uint64_t first = std::stoull(argv[2]);
   const std::uint64_t last = std::stoull(argv[3]);
+  const std::string folder = argc > 4 ? argv[4] : "";
+  const bool rendered_images = !folder.empty() && argc < 6;
   const auto done = readRows(path);
   for (std::uint64_t seed = first; seed <= last; ++seed) {
     if (done.count(seed) != 0) continue;
-    const std::string text = runRig(seed, argc > 4 ? argv[4] : "");
+    const std::string text = runRig(seed, folder, rendered_images);
     std::ofstream(path, std::ios::app) << text;
   }
 

@@ -1,0 +1,265 @@
+#include "firmware_host/lab/campaign/campaign_run.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+#include <yaml-cpp/yaml.h>
+#include <zlib.h>
+
+#include <cstring>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <mutex>
+#include <thread>
+
+#include "drivers/input/input_error.hpp"
+#include "firmware_host/files/whole_file.hpp"
+#include "firmware_host/lab/campaign/child_process.hpp"
+#include "firmware_host/lab/evaluation/evaluate_run.hpp"
+#include "firmware_host/settings/settings.hpp"
+
+namespace swiftlet {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr int kFeaturesPerRepeat = 2;  // of 300: 292 to 306 in eight repeats, as docs/accuracy.md has them
+
+std::string textOf(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+/// The line of a program's output that says what went wrong, or its last.
+std::string complaint(const fs::path& output) {
+  std::ifstream file(output);
+  std::string said;
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with("error: ")) return line.substr(std::strlen("error: "));
+    if (!line.empty()) said = line;
+  }
+  return said;
+}
+
+std::string saysOf(const ChildEnd& end, const fs::path& output) {
+  if (end.errno_of_start != 0) return std::strerror(end.errno_of_start);
+  if (end.signal != 0) return fmt::format("ended by signal {} ({})", end.signal, strsignal(end.signal));
+  if (end.exit_code == 0) return "";
+  const std::string said = complaint(output);
+  return said.empty() ? fmt::format("exit code {}", end.exit_code) : said;
+}
+
+class Job {
+ public:
+  Job(const Campaign& campaign, const CampaignRequest& request, const CampaignLog& log,
+      const std::atomic<bool>& stop)
+      : campaign_(campaign), request_(request), log_(log), stop_(stop), out_(fs::absolute(request.out)) {}
+
+  bool run() {
+    std::vector<int> missing;
+    for (int repeat = 0; repeat < campaign_.repeats; ++repeat) {
+      if (!isDone(repeat)) missing.push_back(repeat);
+    }
+    if (missing.empty()) return true;
+    for (const char* folder : {"rows", "runs", "logs"}) fs::create_directories(out_ / folder);
+    const std::string no_log = log_.path.empty() ? render() : "";
+    bool whole = true;
+    for (const int repeat : missing) {
+      whole = no_log.empty() ? replay(repeat) : refuse(repeat, no_log);
+      if (!whole) break;
+    }
+    if (log_.path.empty()) removeRendered();
+    return whole;
+  }
+
+  [[nodiscard]] std::vector<std::string> command(int repeat) const {
+    std::vector<std::string> words = {"replay", log_.path.empty() ? log_.name : log_.path};
+    words.insert(words.end(), log_.options.begin(), log_.options.end());
+    if (!log_.truth.empty()) words.insert(words.end(), {"truth:", log_.truth});
+    if (log_.path.empty()) {
+      words.emplace_back("of simulate");
+      words.insert(words.end(), log_.simulate.begin(), log_.simulate.end());
+    }
+    if (repeat > 0) words.push_back(fmt::format("repeat {}", repeat));
+    return words;
+  }
+
+ private:
+  [[nodiscard]] std::string rowFile(int repeat) const { return campaignRowFile(out_, log_.name, repeat); }
+  [[nodiscard]] fs::path runFolder(int repeat) const {
+    return out_ / "runs" / fmt::format("{}.{}", log_.name, repeat);
+  }
+  [[nodiscard]] fs::path rendered() const { return out_ / "logs" / log_.name; }
+
+  [[nodiscard]] bool isDone(int repeat) const {
+    return fs::exists(rowFile(repeat)) &&
+           readCampaignRow(rowFile(repeat)).outcome != CampaignOutcome::kAborted;
+  }
+
+  void removeRendered() const {
+    std::error_code ignored;
+    fs::remove_all(rendered(), ignored);
+  }
+
+  /// Why there is no log; empty: there is, or it was stopped.
+  std::string render() {
+    removeRendered();  // what a campaign that was killed left
+    std::vector<std::string> words = {request_.program, "simulate", "--out", rendered()};
+    words.insert(words.end(), log_.simulate.begin(), log_.simulate.end());
+    const fs::path output = rendered().string() + ".txt";
+    const ChildEnd end = runChild(words, campaign_.folder, output, stop_);
+    const std::string says = saysOf(end, output);
+    if (says.empty()) fs::remove(output);
+    return stop_ ? "" : says;
+  }
+
+  [[nodiscard]] CampaignRow emptyRow(int repeat) const {
+    CampaignRow row;
+    row.log = log_.name;
+    row.repeat = repeat;
+    row.command = command(repeat);
+    row.program = request_.version;
+    return row;
+  }
+
+  bool refuse(int repeat, const std::string& says) const {
+    CampaignRow row = emptyRow(repeat);
+    row.says = "simulate: " + says;
+    write(row);
+    return true;
+  }
+
+  /// The option that makes repeat k differ; empty: none is needed, or the settings of repeat 0 are not known.
+  [[nodiscard]] std::string repeatOption(int repeat) const {
+    if (repeat == 0) return "";
+    const fs::path settings = runFolder(0) / "settings.yaml";
+    if (!fs::exists(settings)) return "";
+    const YAML::Node features = YAML::LoadFile(settings)["frontend"]["max_features"];
+    const int step = kFeaturesPerRepeat * ((repeat + 1) / 2);
+    return fmt::format("frontend.max_features={}", features.as<int>() + (repeat % 2 == 1 ? -step : step));
+  }
+
+  bool replay(int repeat) const {
+    std::vector<std::string> words = {request_.program, "replay",
+                                      log_.path.empty() ? rendered().string() : log_.path, "--out",
+                                      runFolder(repeat)};
+    words.insert(words.end(), log_.options.begin(), log_.options.end());
+    if (const std::string option = repeatOption(repeat); !option.empty()) {
+      words.insert(words.end(), {"--set", option});
+    }
+    const fs::path output = runFolder(repeat).string() + ".txt";
+    const ChildEnd end = runChild(words, campaign_.folder, output, stop_);
+    if (stop_) return false;
+    CampaignRow row = emptyRow(repeat);
+    row.says = saysOf(end, output);
+    const Json summary = Json::parse(textOf(runFolder(repeat) / "summary.json"), nullptr, false);
+    const bool to_its_end = (end.exit_code == 0 || end.exit_code == 1) && summary.is_object() &&
+                            summary.value("/run/finished"_json_pointer, false);
+    if (to_its_end) {
+      row.outcome = end.exit_code == 0 ? CampaignOutcome::kDone : CampaignOutcome::kFailed;
+      row.costs = figuresOf(summary, costFigures());
+      addAccuracy(repeat, summary, row);
+    }
+    write(row);
+    return true;
+  }
+
+  void addAccuracy(int repeat, Json summary, CampaignRow& row) const {
+    if (!log_.truth.empty()) {
+      try {
+        const Truth truth = readTruth(log_.truth);
+        summary["accuracy"] = runAccuracyJson(runFolder(repeat), truth.poses, truth.name,
+                                              Stamp{summary["run"]["first_image_ns"].get<std::int64_t>()},
+                                              Settings{}.evaluation);
+      } catch (const std::exception& error) {
+        row.outcome = CampaignOutcome::kAborted;
+        row.says = error.what();
+      }
+    }
+    row.accuracy = figuresOf(summary, accuracyFigures());
+  }
+
+  void write(const CampaignRow& row) const {
+    writeWholeFile(rowFile(row.repeat), toJson(row).dump(2) + "\n");
+  }
+
+  const Campaign& campaign_;
+  const CampaignRequest& request_;
+  const CampaignLog& log_;
+  const std::atomic<bool>& stop_;
+  fs::path out_;
+};
+
+const std::atomic<bool> kNeverStopped{false};
+
+}  // namespace
+
+std::string programVersion(const std::string& program) {
+  const std::string output = fs::temp_directory_path() / fmt::format("swiftlet_version_{}", getpid());
+  const ChildEnd end = runChild({program, "--version"}, "/", output, kNeverStopped);
+  const std::string said = textOf(output);
+  fs::remove(output);
+  if (end.exit_code != 0 || said.empty()) {
+    throw InputError(program, 0, "", "does not run: " + saysOf(end, output), "Give a swiftlet as --program");
+  }
+  const std::string bytes = textOf(program);
+  const auto sum = crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
+  return fmt::format("{} crc32 {:08x}", said.substr(0, said.find('\n')), sum);
+}
+
+std::vector<CampaignRow> campaignRows(const Campaign& campaign, const CampaignRequest& request) {
+  std::vector<CampaignRow> rows;
+  for (const CampaignLog& log : campaign.logs) {
+    for (int repeat = 0; repeat < campaign.repeats; ++repeat) {
+      const std::string file = campaignRowFile(request.out, log.name, repeat);
+      if (!fs::exists(file)) continue;
+      CampaignRow row = readCampaignRow(file);
+      if (row.program != request.version) {
+        throw InputError(file, 0, "program", "was run by " + row.program + ", not by " + request.version,
+                         "Give another --out folder, and this one with --beside to compare both");
+      }
+      if (row.command != Job(campaign, request, log, kNeverStopped).command(repeat)) {
+        throw InputError(file, 0, "command", "was run with other options",
+                         "Give another --out folder, and this one with --beside to compare both");
+      }
+      rows.push_back(std::move(row));
+    }
+  }
+  return rows;
+}
+
+bool runCampaignJob(const Campaign& campaign, const CampaignRequest& request, const CampaignLog& log,
+                    const std::atomic<bool>& stop) {
+  return Job(campaign, request, log, stop).run();
+}
+
+bool runCampaign(const Campaign& campaign, const CampaignRequest& request, const std::atomic<bool>& stop,
+                 const std::function<void(const CampaignLog& log)>& ended) {
+  std::atomic<std::size_t> next{0};
+  std::atomic<bool> end{false};
+  std::exception_ptr error;
+  std::mutex mutex;
+  const auto work = [&] {
+    while (!end) {
+      const std::size_t i = next++;
+      if (i >= campaign.logs.size()) return;
+      try {
+        if (!runCampaignJob(campaign, request, campaign.logs[i], stop)) end = true;
+        const std::lock_guard lock(mutex);
+        if (!end) ended(campaign.logs[i]);
+      } catch (...) {
+        const std::lock_guard lock(mutex);
+        if (!error) error = std::current_exception();
+        end = true;
+      }
+    }
+  };
+  std::vector<std::thread> workers;
+  for (int i = 0; i < request.jobs; ++i) workers.emplace_back(work);
+  for (std::thread& worker : workers) worker.join();
+  if (error) std::rethrow_exception(error);
+  return !end;
+}
+
+}  // namespace swiftlet
