@@ -23,6 +23,7 @@
 #include "firmware_host/interfaces/host_times.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
 #include "mapping/loop/loop_report.hpp"
+#include "mapping/loop/loop_settings.hpp"
 #include "mapping/map/submaps.hpp"
 
 namespace swiftlet {

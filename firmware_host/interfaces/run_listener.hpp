@@ -16,12 +16,12 @@
 #include "firmware_host/interfaces/run_verdict.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
 #include "mapping/loop/loop_report.hpp"
-#include "mapping/map/map_stage.hpp"
 #include "mesher/mesh_stage.hpp"
 
 namespace swiftlet {
 
 class LoopStage;
+class MapStage;
 
 /// Called on the thread `log`, in the order of the stream.
 class RunListener {

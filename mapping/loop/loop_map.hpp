@@ -33,15 +33,11 @@
 #include "estimator/core/stamp.hpp"
 #include "estimator/core/status.hpp"
 #include "mapping/loop/joined_pieces.hpp"
+#include "mapping/loop/loop_map_counters.hpp"
 #include "mapping/loop/loop_settings.hpp"
 #include "mapping/pose_graph/robust_graph.hpp"
 
 namespace swiftlet {
-
-struct LoopLimits {
-  std::size_t nodes = 1000;  ///< at three nodes a second, five minutes before nodes are removed
-  std::size_t loops = 1000;
-};
 
 // A keyframe becomes a node if it is beyond one of these from the last node.
 inline constexpr double kNodeDistance = 0.25;  // m
@@ -51,13 +47,6 @@ inline constexpr double kNodeSeconds = 2;
 /// Frame indices and epochs of kept nodes start here; those of a flight stay below.
 inline constexpr std::uint64_t kKeptFrames = std::uint64_t{1} << 63U;
 inline constexpr std::uint32_t kKeptEpochs = std::uint32_t{1} << 31U;
-
-struct LoopMapCounters {
-  std::uint64_t nodes_removed = 0;   ///< for room
-  std::uint64_t loops_carried = 0;   ///< to the neighbour of a removed node
-  std::uint64_t loops_released = 0;  ///< removed for room
-  RobustGraphCounters graph;
-};
 
 class LoopMap {
  public:

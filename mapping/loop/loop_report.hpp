@@ -7,7 +7,7 @@
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/stamp.hpp"
 #include "estimator/geometry/se3.hpp"
-#include "mapping/loop/loop_map.hpp"
+#include "mapping/loop/loop_map_counters.hpp"
 #include "mapping/place/loop_verification.hpp"
 
 namespace swiftlet {

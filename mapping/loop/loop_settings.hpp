@@ -1,5 +1,7 @@
 #pragma once
-// User settings of loop closure.
+// User settings of loop closure, and the limits of its map.
+
+#include <cstddef>
 
 namespace swiftlet {
 
@@ -11,6 +13,11 @@ struct LoopSettings {
   /// Reject loops that contradict the odometry, other loops or the solved graph. False: every geometrically
   /// verified loop is used, for comparison only.
   bool consistency = true;
+};
+
+struct LoopLimits {
+  std::size_t nodes = 1000;  ///< at three nodes a second, five minutes before nodes are removed
+  std::size_t loops = 1000;
 };
 
 }  // namespace swiftlet

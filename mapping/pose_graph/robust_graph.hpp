@@ -40,6 +40,7 @@
 #include "mapping/pose_graph/gravity_factor.hpp"
 #include "mapping/pose_graph/loop_selection.hpp"
 #include "mapping/pose_graph/pose_graph_optimizer.hpp"
+#include "mapping/pose_graph/robust_graph_counters.hpp"
 
 namespace swiftlet {
 
@@ -61,13 +62,6 @@ struct RobustGraphSettings {
 /// value that a true loop exceeds with probability 1e-3.
 template <typename Pose>
 RobustGraphSettings robustGraphSettings();
-
-struct RobustGraphCounters {
-  std::uint64_t optimizations = 0;        ///< calls of the optimizer
-  std::uint64_t graduated_solutions = 0;  ///< of these, in 4
-  std::uint64_t reconsidered = 0;         ///< loops compared with a solution in 5
-  std::uint64_t taken_back = 0;           ///< of these, accepted
-};
 
 template <typename Pose>
 class RobustGraph {
