@@ -66,7 +66,7 @@ class Job {
     const std::string no_log = log_.path.empty() ? render() : "";
     bool whole = true;
     for (const int repeat : missing) {
-      whole = no_log.empty() ? replay(repeat) : refuse(repeat, no_log);
+      whole = no_log.empty() ? replay(repeat) : refuse(repeat, "simulate: " + no_log);
       if (!whole) break;
     }
     if (log_.path.empty()) removeRendered();
@@ -125,29 +125,27 @@ class Job {
 
   bool refuse(int repeat, const std::string& says) const {
     CampaignRow row = emptyRow(repeat);
-    row.says = "simulate: " + says;
+    row.says = says;
     write(row);
     return true;
   }
 
-  /// The option that makes repeat k differ; empty: none is needed, or the settings of repeat 0 are not known.
-  [[nodiscard]] std::string repeatOption(int repeat) const {
-    if (repeat == 0) return "";
-    const fs::path settings = runFolder(0) / "settings.yaml";
-    if (!fs::exists(settings)) return "";
-    const YAML::Node features = YAML::LoadFile(settings)["frontend"]["max_features"];
+  [[nodiscard]] fs::path firstSettings() const { return runFolder(0) / "settings.yaml"; }
+
+  /// The setting that makes a repeat above 0 differ.
+  [[nodiscard]] std::string changedSetting(int repeat) const {
+    const YAML::Node features = YAML::LoadFile(firstSettings())["frontend"]["max_features"];
     const int step = kFeaturesPerRepeat * ((repeat + 1) / 2);
     return fmt::format("frontend.max_features={}", features.as<int>() + (repeat % 2 == 1 ? -step : step));
   }
 
   bool replay(int repeat) const {
+    if (repeat > 0 && !fs::exists(firstSettings())) return refuse(repeat, "repeat 0 left no settings");
     std::vector<std::string> words = {request_.program, "replay",
                                       log_.path.empty() ? rendered().string() : log_.path, "--out",
                                       runFolder(repeat)};
     words.insert(words.end(), log_.options.begin(), log_.options.end());
-    if (const std::string option = repeatOption(repeat); !option.empty()) {
-      words.insert(words.end(), {"--set", option});
-    }
+    if (repeat > 0) words.insert(words.end(), {"--set", changedSetting(repeat)});
     const fs::path output = runFolder(repeat).string() + ".txt";
     const ChildEnd end = runChild(words, campaign_.folder, output, stop_);
     if (stop_) return false;

@@ -243,6 +243,74 @@ TEST_CASE("rows of other options or of another program are refused") {
                     Contains("was run by swiftlet, not by swiftlet 2"));
 }
 
+/// In place of swiftlet: the log's name says how a run of it ends. Runs are listed in `calls`.
+std::string standIn(const fs::path& folder) {
+  const fs::path program = folder / "swiftlet";
+  writeWholeFile(program, R"(#!/bin/sh
+if [ "$1" = --version ]; then echo 'swiftlet 1'; exit 0; fi
+echo "$*" | sed "s,$(pwd)/,,g" >>calls
+case $2 in *crash*) kill -SEGV $$ ;; *absent*) echo 'error: no such log'; exit 2 ;; esac
+mkdir -p "$4"
+printf 'frontend:\n  max_features: 120\n' >"$4/settings.yaml"
+finished=true
+case $2 in *stopped*) finished=false ;; esac
+echo "{\"run\": {\"finished\": $finished}, \"verdict\": {\"share_good\": 0.5},
+  \"accuracy\": {\"odometry\": {\"all\": {\"se3\": {\"ate_m\": {\"rmse\": 0.25}}}}}}" >"$4/summary.json"
+case $2 in *good*) exit 0 ;; esac
+echo 'error: health was good too seldom'
+exit 1
+)");
+  fs::permissions(program, fs::perms::owner_all);
+  return program;
+}
+
+std::size_t callsOf(const fs::path& folder, const std::string& log) {
+  const std::string calls = textOf(folder / "calls");
+  std::size_t count = 0;
+  for (std::size_t at = 0; (at = calls.find("replay " + log + " ", at)) != std::string::npos; ++at) ++count;
+  return count;
+}
+
+TEST_CASE("a campaign repeats what was aborted, and nothing else") {
+  const Logs logs;
+  const fs::path folder = logs.folder();
+  const std::vector<std::string> names = {"good", "poor", "stopped", "crash", "absent"};
+  Campaign campaign = campaignOf(names, 3);
+  campaign.folder = folder;
+  CampaignRequest request{folder / "out", standIn(folder), "", 2};
+  request.version = programVersion(request.program);
+  CHECK_THAT(request.version, Catch::Matchers::StartsWith("swiftlet 1 crc32 "));
+  const std::atomic<bool> never{false};
+  std::vector<std::string> ended;
+  const auto note = [&ended](const CampaignLog& log) { ended.push_back(log.name); };
+  CHECK(runCampaign(campaign, request, never, note));
+  CHECK(ended.size() == names.size());
+  CampaignTable table = campaignTable(campaign, campaignRows(campaign, request));
+  CHECK(table.lines[0].done == 3);
+  CHECK(table.lines[0].accuracy.front().mean == 0.25);
+  CHECK(table.lines[1].failed == 3);
+  CHECK(table.lines[1].says == std::vector<std::string>{"health was good too seldom"});
+  for (const std::size_t aborted : {2U, 3U, 4U}) CHECK(table.lines[aborted].aborted == 3);
+  CHECK_THAT(table.lines[3].says.front(), Contains("ended by signal 11"));
+  CHECK(table.lines[4].says == std::vector<std::string>{"no such log", "repeat 0 left no settings"});
+  const std::string calls = textOf(folder / "calls");
+  CHECK_THAT(calls, Contains("replay good --out out/runs/good.0\n") &&
+                        Contains("good.1 --set frontend.max_features=118\n") &&
+                        Contains("good.2 --set frontend.max_features=122\n"));
+
+  CHECK(runCampaign(campaign, request, never, note));
+  CHECK(callsOf(folder, "good") == 3);
+  CHECK(callsOf(folder, "poor") == 3);
+  CHECK(callsOf(folder, "stopped") == 6);
+  CHECK(callsOf(folder, "crash") == 2);
+
+  // Another program, or this one built anew, does not go on where the first stopped.
+  writeWholeFile(request.program, textOf(request.program) + "# changed\n");
+  request.version = programVersion(request.program);
+  CHECK_THROWS_WITH(campaignRows(campaign, request), Contains("was run by swiftlet 1 crc32"));
+  CHECK_THROWS_WITH(programVersion("/nowhere/swiftlet"), Contains("does not run: No such file"));
+}
+
 TEST_CASE("a program beside this one: its end, its output, its stop") {
   const Logs logs;
   const std::string output = logs.folder() / "said.txt";
