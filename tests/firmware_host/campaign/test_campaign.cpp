@@ -305,7 +305,7 @@ TEST_CASE("a campaign repeats what was aborted, and nothing else") {
   CHECK(callsOf(folder, "crash") == 2);
 
   // Another program, or this one built anew, does not go on where the first stopped.
-  writeWholeFile(request.program, textOf(request.program) + "# changed\n");
+  std::ofstream(request.program, std::ios::app) << "# changed\n";
   request.version = programVersion(request.program);
   CHECK_THROWS_WITH(campaignRows(campaign, request), Contains("was run by swiftlet 1 crc32"));
   CHECK_THROWS_WITH(programVersion("/nowhere/swiftlet"), Contains("does not run: No such file"));
