@@ -54,6 +54,10 @@ target_compile_options(swiftlet_flags INTERFACE
   $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=1000000>)
 target_compile_definitions(swiftlet_flags INTERFACE
   $<$<CONFIG:Debug>:EIGEN_RUNTIME_NO_MALLOC EIGEN_INITIALIZE_MATRICES_BY_NAN>)
+# An older processor is refused by the dynamic linker, with a message, before it meets an unknown instruction.
+if(SWIFTLET_CPU MATCHES "^x86-64-v[234]$")
+  target_link_options(swiftlet_flags INTERFACE -Wl,-z,${SWIFTLET_CPU})
+endif()
 if(SWIFTLET_SANITIZE)
   target_compile_options(swiftlet_flags INTERFACE -fsanitize=${SWIFTLET_SANITIZE} -fno-omit-frame-pointer)
   if(SWIFTLET_SANITIZE MATCHES "address,undefined")
