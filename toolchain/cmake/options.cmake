@@ -1,6 +1,7 @@
 # Build options and the one set of compile flags that every target of the project shares.
 option(SWIFTLET_BUILD_PROGRAM "Build the program and the drivers (needs yaml-cpp, fmt, CLI11, codecs)" ON)
 option(SWIFTLET_BUILD_LAB "Commands for away from the vehicle: simulate, evaluate, mesh, fuse, report, export, hil ..." ON)
+option(SWIFTLET_BUILD_VEHICLE_PROGRAM "Also install swiftlet_vehicle: the program without SWIFTLET_BUILD_LAB's commands" OFF)
 option(SWIFTLET_WITH_CHOLMOD "Full smoothing with SuiteSparse's CHOLMOD (GPL, see docs/licences.md)" ON)
 option(SWIFTLET_BUILD_TESTS "Build the tests (needs Catch2, OpenCV)" ON)
 option(SWIFTLET_BUILD_BENCHMARKS "Build the benchmarks (needs Google Benchmark, OpenCV, Ceres, OpenGV)" OFF)
