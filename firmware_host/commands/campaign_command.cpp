@@ -43,28 +43,16 @@ const CampaignLog& logOf(const Campaign& campaign, const CampaignOptions& option
   return campaign.logs[number - 1];
 }
 
-/// The rows of another campaign's folder, for the same logs.
-std::vector<CampaignRow> rowsIn(const std::string& folder, const Campaign& campaign) {
-  std::vector<CampaignRow> rows;
-  for (const CampaignLog& log : campaign.logs) {
-    for (int repeat = 0; repeat < campaign.repeats; ++repeat) {
-      const std::string file = campaignRowFile(folder, log.name, repeat);
-      if (std::filesystem::exists(file)) rows.push_back(readCampaignRow(file));
-    }
-  }
-  if (rows.empty()) {
-    throw InputError(folder, 0, "", "has no run of these logs",
-                     "Give the --out folder of an earlier campaign");
-  }
-  return rows;
-}
-
 int writeTable(const Campaign& campaign, const CampaignOptions& options) {
   CampaignReport report;
   report.rows = campaignRows(campaign, options.request);
   report.table = campaignTable(campaign, report.rows);
   if (!options.beside.empty()) {
-    const std::vector<CampaignRow> before = rowsIn(options.beside, campaign);
+    const std::vector<CampaignRow> before = storedRows(campaign, options.beside);
+    if (before.empty()) {
+      throw InputError(options.beside, 0, "", "has no run of these logs",
+                       "Give the --out folder of an earlier campaign");
+    }
     report.comparison = compareCampaigns(campaignTable(campaign, before), report.table);
   }
   writeCampaign(report, options.request.out);

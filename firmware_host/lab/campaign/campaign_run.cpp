@@ -5,6 +5,7 @@
 #include <yaml-cpp/yaml.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <cstring>
 #include <exception>
 #include <filesystem>
@@ -206,22 +207,31 @@ std::string programVersion(const std::string& program) {
   return fmt::format("{} crc32 {:08x}", said.substr(0, said.find('\n')), sum);
 }
 
-std::vector<CampaignRow> campaignRows(const Campaign& campaign, const CampaignRequest& request) {
+std::vector<CampaignRow> storedRows(const Campaign& campaign, const std::string& out) {
   std::vector<CampaignRow> rows;
   for (const CampaignLog& log : campaign.logs) {
     for (int repeat = 0; repeat < campaign.repeats; ++repeat) {
-      const std::string file = campaignRowFile(request.out, log.name, repeat);
-      if (!fs::exists(file)) continue;
-      CampaignRow row = readCampaignRow(file);
-      if (row.program != request.version) {
-        throw InputError(file, 0, "program", "was run by " + row.program + ", not by " + request.version,
-                         "Give another --out folder, and this one with --beside to compare both");
-      }
-      if (row.command != Job(campaign, request, log, kNeverStopped).command(repeat)) {
-        throw InputError(file, 0, "command", "was run with other options",
-                         "Give another --out folder, and this one with --beside to compare both");
-      }
-      rows.push_back(std::move(row));
+      const std::string file = campaignRowFile(out, log.name, repeat);
+      if (fs::exists(file)) rows.push_back(readCampaignRow(file));
+    }
+  }
+  return rows;
+}
+
+std::vector<CampaignRow> campaignRows(const Campaign& campaign, const CampaignRequest& request) {
+  constexpr const char* kRemedy = "Give another --out folder, and this one with --beside to compare both";
+  std::vector<CampaignRow> rows = storedRows(campaign, request.out);
+  for (const CampaignRow& row : rows) {
+    const std::string file = campaignRowFile(request.out, row.log, row.repeat);
+    if (row.program != request.version) {
+      throw InputError(file, 0, "program", "was run by " + row.program + ", not by " + request.version,
+                       kRemedy);
+    }
+    const auto log = std::find_if(campaign.logs.begin(), campaign.logs.end(),
+                                  [&row](const CampaignLog& one) { return one.name == row.log; });
+    if (log == campaign.logs.end() ||
+        row.command != Job(campaign, request, *log, kNeverStopped).command(row.repeat)) {
+      throw InputError(file, 0, "command", "was run with other options", kRemedy);
     }
   }
   return rows;

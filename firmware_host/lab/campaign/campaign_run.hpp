@@ -26,8 +26,10 @@ struct CampaignRequest {
 /// What `program` says of its version, and a checksum of its file. InputError when it cannot be run.
 std::string programVersion(const std::string& program);
 
-/// The rows that are there, in the order of the campaign's logs and repeats; aborted ones too. InputError for
-/// one that is not of this campaign: other options, another program.
+/// The rows of the campaign's logs in the folder `out`, in the order of logs and repeats; aborted ones too.
+std::vector<CampaignRow> storedRows(const Campaign& campaign, const std::string& out);
+
+/// storedRows() of request.out. InputError for a row of other options or of another program.
 std::vector<CampaignRow> campaignRows(const Campaign& campaign, const CampaignRequest& request);
 
 /// Runs what is missing of one log. False: stopped.
