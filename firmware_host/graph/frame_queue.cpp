@@ -1,5 +1,7 @@
 #include "firmware_host/graph/frame_queue.hpp"
 
+#include <algorithm>
+
 #include "firmware_host/graph/sensor_node.hpp"
 
 namespace swiftlet {
@@ -78,6 +80,7 @@ void FrameQueue::pop() {
   if (told_) return told_.reset();
   release(waiting_.front());
   waiting_.erase(0);
+  excused_ = std::max(excused_ - 1, 0);
 }
 
 void FrameQueue::drop() {
@@ -110,17 +113,27 @@ HostTimes FrameQueue::hostTimes() const {
 
 bool FrameQueue::awaitsSamples() {
   if (sample_patience_.ns == 0 || told_) return false;
+  constexpr std::int64_t kNoWait = std::numeric_limits<std::int64_t>::max();
   // Written before the newest sample is read, as the IMU's thread reads it after its write: one of the two
   // sees the other.
-  awaited_imu_.store((waiting_.front().stamp - sample_period_).ns + 1);
+  const bool waited = awaited_imu_.exchange((waiting_.front().stamp - sample_period_).ns + 1) != kNoWait;
   bool waits = newestSample().ns < awaited_imu_.load();
   if (waits && wallSeconds() - hostTimes().arrival > sample_patience_.seconds()) {
     ++counters_.without_samples;
     waits = false;
   }
-  if (!waits) awaited_imu_.store(std::numeric_limits<std::int64_t>::max());
-  return waits;
+  if (waits) return true;
+  awaited_imu_.store(kNoWait);
+  if (waited) {
+    wait_ended_ = wallSeconds();
+    excused_ = size();
+  }
+  return false;
 }
+
+double FrameQueue::readySince() const { return std::max(hostTimes().arrival, wait_ended_); }
+
+int FrameQueue::backlog() const { return size() - std::max(excused_, 1); }
 
 bool FrameQueue::awaitedSampleCame() const { return newestSample().ns >= awaited_imu_.load(); }
 

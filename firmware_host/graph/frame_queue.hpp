@@ -49,6 +49,11 @@ class FrameQueue {
   /// Whether samples up to the front frame's stamp are still expected. A sample less than one period before
   /// the frame is its last.
   [[nodiscard]] bool awaitsSamples();
+  /// Host time since when the front frame could have been worked on: its arrival, or the end of the last wait
+  /// for samples, which less effort would not have made shorter.
+  [[nodiscard]] double readySince() const;
+  /// Frames that wait behind the one in work, but for those that came while it waited for its samples.
+  [[nodiscard]] int backlog() const;
   /// Gives the front frame's images back, and those before them.
   void pop();
   /// The same for a frame that was not taken; counted.
@@ -56,8 +61,6 @@ class FrameQueue {
   /// The input has ended: frames waiting for a partner are queued alone. False: none waited.
   bool flush();
 
-  /// Frames that wait, that in work included.
-  [[nodiscard]] int size() const { return static_cast<int>(waiting_.size() + images[0].size()); }
   /// Called by the IMU's thread after its sample: `track` may continue.
   [[nodiscard]] bool awaitedSampleCame() const;
 
@@ -86,6 +89,8 @@ class FrameQueue {
   bool takeHead(std::size_t camera);
   Status pair(const CameraFrame& image);
   void push(const StereoFrame& frame);
+  /// Frames that wait, that in work included.
+  [[nodiscard]] int size() const { return static_cast<int>(waiting_.size() + images[0].size()); }
   void release(const StereoFrame& frame);
 
   const SensorNode& sensors_;
@@ -101,6 +106,8 @@ class FrameQueue {
   /// `track` may continue once the newest sample has arrived; the latest possible stamp while it does not
   /// wait.
   std::atomic<std::int64_t> awaited_imu_{std::numeric_limits<std::int64_t>::max()};
+  double wait_ended_ = 0;  ///< host time of the last frame's that awaited samples [s]
+  int excused_ = 0;        ///< frames left of those that were there then
   Counters counters_;
 };
 

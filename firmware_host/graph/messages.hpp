@@ -56,6 +56,7 @@ struct TrackMessage {
   TrackStep step;
   TrackedFrame tracked;
   HostTimes host;        ///< of the later image
+  double ready = 0;      ///< host time since when `track` had image and samples [s]
   Spent spent;           ///< by `track`
   int dropped = 0;       ///< frames that went by untracked since the message before
   int effort_level = 0;  ///< steps below full effort

@@ -64,7 +64,7 @@ void SmoothNode::smoothFrame(const TrackMessage& message, FrameResult& out) {
                            output.state.epoch, output.statistics, wallSeconds() - message.host.arrival});
     }
   });
-  effort_->took({spent.wall, static_cast<int>(tracked.size()) - 1, begin - message.host.arrival});
+  effort_->took({spent.wall, static_cast<int>(tracked.size()) - 1, begin - message.ready});
   out.tracked = message.tracked;
   out.spent += spent;
   const NavState& state = out.output.state;

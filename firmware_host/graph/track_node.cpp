@@ -50,7 +50,8 @@ void TrackNode::trackFrame() {
   step.frame = frame.index;
   step.stamp = frame.stamp;
   step.image = frame.number;
-  const double age = wallSeconds() - message.host.arrival;
+  message.ready = frames.readySince();
+  const double age = wallSeconds() - message.ready;
   step.effort = effort_->give();
   message.effort_level = effort_->level();
   message.spent = context_.timed(StageId::kTrack, [&] {
@@ -63,7 +64,7 @@ void TrackNode::trackFrame() {
     step.samples = samples.taken();
     message.status = stage_.step(frame, step.effort, message.tracked);
   });
-  effort_->took({message.spent.wall, frames.size() - 1, age});
+  effort_->took({message.spent.wall, frames.backlog(), age});
   const bool ok = message.status.ok();
   const bool keyframe = ok && message.tracked.keyframe;
   if (!ok) message.kind = TrackMessage::Kind::kFrameRefused;
@@ -120,7 +121,7 @@ bool TrackNode::takeTracks(const TrackedFrame& frame, std::uint32_t timeline) {
   message.step.stamp = frame.stamp;
   message.tracked = frame;
   message.tracked.timeline = timeline;
-  message.host.arrival = message.host.exposure = wallSeconds();
+  message.host.arrival = message.host.exposure = message.ready = wallSeconds();
   tracked.send();
   return true;
 }

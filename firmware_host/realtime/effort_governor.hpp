@@ -13,7 +13,9 @@
 //     system made slow is not. Straight after a step down it is the longest, however few there were: more of
 //     the same evidence;
 //   - two or more frames wait behind the step and no fewer than behind the one before: at once;
-//   - three steps on end would end later after their frame's arrival than allowed.
+//   - three steps on end would end later after their frame was ready than allowed. A frame that waits for
+//     its IMU samples is not ready, and frames that come meanwhile are no backlog: less effort would not
+//     bring the samples sooner.
 // Up, one level, after `good_steps` steps on end with a prediction below 0.7 of the budget (steps between
 //   0.7 and 0.9 count a quarter), none late and nothing piling up. A step up that does not hold for as long
 //   as it was waited for doubles the next wait, up to eight-fold; one that holds halves it. When twice the
@@ -46,7 +48,7 @@ EffortLadder smootherLadder(const Effort& full);
 
 struct GovernorSettings {
   double step_budget = 0.020;  ///< s, wall time of a step
-  /// s, from the frame's arrival to the end of the step: image-to-pose less what later stages need.
+  /// s, from when the frame was ready to the end of the step: image-to-pose less what later stages need.
   double age_budget = 0.050;
   int good_steps = 10;  ///< before a level is given back; half a second of frames
 };
@@ -55,13 +57,13 @@ struct GovernorSettings {
 struct StepTiming {
   double wall = 0;  ///< s, that the step took
   int waiting = 0;  ///< frames waiting behind it when it ended
-  double age = 0;   ///< s, from the frame's arrival to the step's start
+  double age = 0;   ///< s, from when the frame was ready to the step's start
 };
 
 enum class EffortReason {
   kPredictedMiss,  ///< steps take more than their budget
   kBacklog,        ///< frames pile up
-  kLate,           ///< frames are finished too long after their arrival
+  kLate,           ///< frames are finished too long after they were ready
   kRecovered,      ///< there is room again
 };
 /// "predicted_miss", "backlog", "late", "recovered".
