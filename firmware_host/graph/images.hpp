@@ -24,7 +24,7 @@ struct KeyframeImages {
   std::array<std::vector<std::uint8_t>, kMaxCameras> pixels;
 };
 
-enum KeyframeReader : std::size_t { kLoopReads, kMapReads, kKeyframeReaders };
+enum KeyframeImageReader : std::size_t { kLoopReads, kMapReads, kKeyframeReaders };
 
 /// Frames that wait for the map: as kLoopKeyframes.
 inline constexpr std::size_t kMapFrames = 4;
