@@ -3,25 +3,15 @@
 
 #include <catch2/catch.hpp>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
 #include "firmware_host/commands/command.hpp"
 #include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet::test {
-
-inline std::string textOf(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
-inline bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
 
 /// Made once a program, copied for each test.
 struct ExportedRun {

@@ -9,13 +9,12 @@
 #include "firmware_host/lab/budget/budget_report.hpp"
 #include "firmware_host/lab/budget/xml_text.hpp"
 #include "tests/firmware_host/xml_reader.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
+using test::contains;
 
 /// 1 to `count` milliseconds, each once.
 LatencyHistogram ramp(int count) {

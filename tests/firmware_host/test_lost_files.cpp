@@ -4,7 +4,6 @@
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <string>
 #include <thread>
 
@@ -15,16 +14,14 @@
 #include "firmware_host/smoothing/map_keeper.hpp"
 #include "tests/firmware_host/file_size_limit.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string contents(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
+using test::textOf;
 
 NavState stateAt(std::int64_t ns) {
   NavState state;
@@ -87,9 +84,9 @@ TEST_CASE("a stream that cannot be written ends with its name; the others go on"
   }
   REQUIRE(lost.count() == 1);
   CHECK_THAT(lost.problem(), Catch::Contains("states.csv") && Catch::Contains("File too large"));
-  const std::string poses = contents(folder.file("odometry.tum"));
+  const std::string poses = textOf(folder.file("odometry.tum"));
   CHECK(std::count(poses.begin(), poses.end(), '\n') == kFrames);
-  CHECK_THAT(contents(folder.file("events.log")), Catch::Contains("still there"));
+  CHECK_THAT(textOf(folder.file("events.log")), Catch::Contains("still there"));
   CHECK(fs::file_size(folder.file("states.csv")) <= kLimit);
 }
 

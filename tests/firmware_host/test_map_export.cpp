@@ -6,8 +6,6 @@
 #include <catch2/catch.hpp>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -23,6 +21,7 @@
 #include "firmware_host/outputs/map_files/kept_map.hpp"
 #include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/text.hpp"
 
 using namespace swiftlet;  // NOLINT(google-build-using-namespace)
 
@@ -30,19 +29,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using test::textOf;
+
 const std::string kLog = std::string(SWIFTLET_TEST_DATA) + "/euroc_mh01_4s";
 
 using swiftlet::test::run;
 
-std::string bytesOf(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 /// Lines of `key: value`, as a reader of another kind than ours takes them.
 std::map<std::string, std::string> fieldsOf(const std::string& path) {
   std::map<std::string, std::string> fields;
-  std::istringstream lines(bytesOf(path));
+  std::istringstream lines(textOf(path));
   for (std::string line; std::getline(lines, line);) {
     const std::size_t colon = line.find(": ");
     REQUIRE(colon != std::string::npos);
@@ -61,7 +57,7 @@ Picture pictureOf(const std::string& path, const nlohmann::json& size) {
   picture.width = size["width"];
   picture.height = size["height"];
   picture.pixels.resize(static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height));
-  const std::string bytes = bytesOf(path);
+  const std::string bytes = textOf(path);
   ImageSize found;
   ImageDecoder decoder;
   REQUIRE(decoder.decode({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()},
@@ -81,8 +77,8 @@ TEST_CASE("an exported map is the run's, in other formats") {
   const ScratchFolder folder("map_export");
   const std::string kept = keptFlight(folder), out = folder.file("files");
   const nlohmann::json summary = runMapExport({kept, out + "/", {}});
-  CHECK(bytesOf(out + "/surface.ply") == bytesOf(folder.file("run/map.ply")));
-  CHECK(bytesOf(out + "/surface.glb") == bytesOf(folder.file("run/map.glb")));
+  CHECK(textOf(out + "/surface.ply") == textOf(folder.file("run/map.ply")));
+  CHECK(textOf(out + "/surface.glb") == textOf(folder.file("run/map.glb")));
   CHECK_FALSE(fs::exists(out + ".part"));
   // As the volume of a kept folder.
   fs::create_directory(folder.file("kept"));
@@ -91,7 +87,7 @@ TEST_CASE("an exported map is the run's, in other formats") {
   CHECK(again == summary);
 
   const VoxelVolume volume = readKeptVolumeFile(kept);
-  const std::string voxels = bytesOf(out + "/voxels.ply");
+  const std::string voxels = textOf(out + "/voxels.ply");
   const std::string end = "end_header\n";
   std::size_t at = voxels.find(end);
   REQUIRE(at != std::string::npos);

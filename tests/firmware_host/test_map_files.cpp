@@ -2,17 +2,18 @@
 
 #include <catch2/catch.hpp>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/map_files/map_files.hpp"
 #include "firmware_host/outputs/map_files/ply_file.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
+
+using test::textOf;
 
 MapMesh tetrahedron() {
   MapMesh mesh;
@@ -24,11 +25,6 @@ MapMesh tetrahedron() {
   mesh.probabilities = {255, 128, 0, 60};
   mesh.faces = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
   return mesh;
-}
-
-std::string bytesOf(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
 template <typename T>
@@ -96,7 +92,7 @@ TEST_CASE("the glTF file keeps to the format, accessor by accessor", "[map_files
   const std::string path = folder.file("map.glb");
   const MapMesh mesh = tetrahedron();
   writeMapGlb(path, mesh);
-  const Glb glb = takeApart(bytesOf(path));
+  const Glb glb = takeApart(textOf(path));
   CHECK(glb.json["asset"]["version"] == "2.0");
   CHECK(glb.json["buffers"][0]["byteLength"] == glb.binary.size());
   for (const auto& accessor : glb.json["accessors"]) {
@@ -131,7 +127,7 @@ TEST_CASE("the glTF file keeps to the format, accessor by accessor", "[map_files
 TEST_CASE("an empty map is an empty scene and an empty mesh, not a broken file", "[map_files]") {
   const ScratchFolder folder("map_files");
   writeMapGlb(folder.file("map.glb"), {});
-  CHECK(takeApart(bytesOf(folder.file("map.glb"))).json["scene"] == 0);
+  CHECK(takeApart(textOf(folder.file("map.glb"))).json["scene"] == 0);
   writeMapPly(folder.file("map.ply"), {});
   CHECK(readPly(folder.file("map.ply")).vertices.empty());
 }

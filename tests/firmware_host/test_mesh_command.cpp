@@ -4,7 +4,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
@@ -17,7 +16,9 @@
 #include "firmware_host/lab/modules/mesh_run.hpp"
 #include "firmware_host/outputs/map_files/ply_file.hpp"
 #include "tests/firmware_host/run_program.hpp"
+#include "tests/firmware_host/run_summary.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
@@ -25,15 +26,8 @@ namespace {
 namespace fs = std::filesystem;
 
 using test::run;
-
-std::string textOf(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
-nlohmann::json summaryIn(const std::string& folder) {
-  return nlohmann::json::parse(textOf(fs::path(folder) / "summary.json"));
-}
+using test::summaryIn;
+using test::textOf;
 
 Trajectory poses(const std::string& file) {
   LogCounters counters;

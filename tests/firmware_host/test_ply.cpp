@@ -4,8 +4,6 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <string>
 
@@ -13,9 +11,13 @@
 #include "estimator/core/random.hpp"
 #include "firmware_host/outputs/map_files/ply_file.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
+
+using test::contains;
+using test::textOf;
 
 TriangleMesh randomMesh(std::uint32_t vertices, std::uint32_t faces) {
   Random random(vertices, faces);
@@ -29,11 +31,6 @@ TriangleMesh randomMesh(std::uint32_t vertices, std::uint32_t faces) {
     mesh.labels.push_back(static_cast<std::uint8_t>(random.below(256)));
   }
   return mesh;
-}
-
-std::string bytesOf(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
 }
 
 const std::string kHeader =
@@ -56,10 +53,6 @@ std::string replaced(std::string text, const std::string& from, const std::strin
   const std::size_t at = text.find(from);
   REQUIRE(at != std::string::npos);
   return text.replace(at, from.size(), to);
-}
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
 }
 
 TEST_CASE("PLY: what is written is read again, to the bit") {
@@ -141,7 +134,7 @@ TEST_CASE("PLY: a file cut anywhere is refused, and a header's count alone reser
   const ScratchFolder folder("ply_cut");
   const std::string path = folder.file("mesh.ply");
   writePly(path, randomMesh(5, 4));
-  const std::string binary = bytesOf(path);
+  const std::string binary = textOf(path);
   REQUIRE(complaint(binary).empty());
   for (std::size_t size = 0; size < binary.size(); ++size)
     CHECK_FALSE(complaint(binary.substr(0, size)).empty());

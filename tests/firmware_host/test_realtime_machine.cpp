@@ -9,9 +9,12 @@
 
 #include "firmware_host/realtime/machine_report.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
+
+using test::contains;
 
 using Files = std::map<std::string, std::string>;
 
@@ -68,10 +71,6 @@ MachineLine lineWith(const std::string& what, const Files& changes) {
   const MachineReport report = reportOf(files);
   REQUIRE(report.find(what) != nullptr);
   return *report.find(what);
-}
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
 }
 
 TEST_CASE("a machine set up for flight is good in every line") {

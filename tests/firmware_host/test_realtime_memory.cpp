@@ -20,13 +20,12 @@
 #include "tests/firmware_host/without_rights.hpp"
 #include "tests/sanitized.hpp"
 #include "tests/support/skip_case.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
+using test::contains;
 
 /// In KiB; what the kernel says of this process.
 long lockedKib() {

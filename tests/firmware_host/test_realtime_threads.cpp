@@ -20,15 +20,14 @@
 #include "firmware_host/realtime/flight_thread.hpp"
 #include "tests/firmware_host/without_rights.hpp"
 #include "tests/support/skip_case.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
 
-constexpr std::size_t kStack = std::size_t{1024} * 1024;
+using test::contains;
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
+constexpr std::size_t kStack = std::size_t{1024} * 1024;
 
 int aCpuOfOurs() {
   cpu_set_t set;

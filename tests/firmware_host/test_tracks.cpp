@@ -3,7 +3,6 @@
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -14,7 +13,9 @@
 #include "firmware_host/lab/evaluation/evaluate_run.hpp"
 #include "firmware_host/runs/replay_run.hpp"
 #include "tests/firmware_host/run_program.hpp"
+#include "tests/firmware_host/run_summary.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
@@ -22,15 +23,8 @@ namespace {
 namespace fs = std::filesystem;
 
 using test::run;
-
-std::string textOf(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
-nlohmann::json summaryIn(const std::string& folder) {
-  return nlohmann::json::parse(textOf(fs::path(folder) / "summary.json"));
-}
+using test::summaryIn;
+using test::textOf;
 
 TEST_CASE("simulated tracks replay and evaluate from end to end") {
   const ScratchFolder folder("tracks");

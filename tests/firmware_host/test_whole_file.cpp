@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <iterator>
 #include <memory>
 #include <string>
 #include <vector>
@@ -21,19 +20,17 @@
 #include "firmware_host/outputs/run_folder/summary.hpp"
 #include "tests/firmware_host/file_size_limit.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
 
 namespace fs = std::filesystem;
 
+using test::textOf;
+
 constexpr rlim_t kLimit = 64;             // bytes; the smallest file, an empty map's, is larger
 constexpr std::size_t kElements = 20000;  // of the others: more than any buffer holds
-
-std::string contents(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 std::vector<std::string> names(const std::string& folder) {
   std::vector<std::string> found;
@@ -120,7 +117,7 @@ TEST_CASE("a writer that fails in the middle leaves the older file and nothing b
       }
     }
     CHECK_THAT(message, Catch::Contains(path) && Catch::Contains("File too large"));
-    CHECK(contents(path) == "the older file");
+    CHECK(textOf(path) == "the older file");
     CHECK(names(folder.path()) == std::vector<std::string>{"file"});
     write(path);
     CHECK(fs::file_size(path) > kLimit);
@@ -136,7 +133,7 @@ TEST_CASE("a file that is given up leaves the older one", "[files]") {
     WholeFile file(path);
     file.write("half of the new one");
   }
-  CHECK(contents(path) == "the older file");
+  CHECK(textOf(path) == "the older file");
   CHECK(names(folder.path()) == std::vector<std::string>{"file"});
 }
 
@@ -146,9 +143,9 @@ TEST_CASE("until the new file has its name the older one can be read", "[files]"
   std::ofstream(path) << "the older file";
   WholeFile file(path);
   file.write("the new one");
-  CHECK(contents(path) == "the older file");
+  CHECK(textOf(path) == "the older file");
   file.commit();
-  CHECK(contents(path) == "the new one");
+  CHECK(textOf(path) == "the new one");
 }
 
 TEST_CASE("a link stays and what it leads to is replaced; devices are written as they are", "[files]") {
@@ -157,7 +154,7 @@ TEST_CASE("a link stays and what it leads to is replaced; devices are written as
   fs::create_symlink("file", folder.file("link"));
   writeWholeFile(folder.file("link"), "the new one");
   CHECK(fs::is_symlink(folder.file("link")));
-  CHECK(contents(folder.file("file")) == "the new one");
+  CHECK(textOf(folder.file("file")) == "the new one");
 
   fs::create_symlink("/dev/full", folder.file("full"));
   CHECK_THROWS_WITH(writeWholeFile(folder.file("full"), "no room"),
@@ -185,7 +182,7 @@ TEST_CASE("a part that a library wrote gets its name, or goes", "[files]") {
   std::ofstream(folder.file("bag.part")) << "new";
   std::ofstream(folder.file("bag")) << "old";
   commitPart(folder.file("bag.part"), folder.file("bag"));
-  CHECK(contents(folder.file("bag")) == "new");
+  CHECK(textOf(folder.file("bag")) == "new");
   CHECK(names(folder.path()) == std::vector<std::string>{"bag"});
   fs::create_directories(folder.file("in_the_way/full"));
   std::ofstream(folder.file("other.part")) << "new";

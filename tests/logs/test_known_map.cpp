@@ -3,7 +3,6 @@
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
@@ -15,14 +14,12 @@
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
 #include "tests/sanitized.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
 
-std::string textOf(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
+using test::textOf;
 
 Settings quick() {
   Settings settings;

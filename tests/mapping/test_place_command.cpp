@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
@@ -13,7 +12,9 @@
 #include "firmware_host/files/line_file.hpp"
 #include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
 #include "tests/firmware_host/run_program.hpp"
+#include "tests/firmware_host/run_summary.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
@@ -21,17 +22,10 @@ namespace {
 namespace fs = std::filesystem;
 
 using test::run;
+using test::summaryIn;
+using test::textOf;
 
 std::string recordedLog() { return SWIFTLET_SOURCE_ROOT "/tests/data/euroc_mh01_4s"; }
-
-std::string textOf(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
-nlohmann::json summaryIn(const std::string& folder) {
-  return nlohmann::json::parse(textOf(fs::path(folder) / "summary.json"));
-}
 
 std::size_t rowsIn(const std::string& folder) {
   const std::string text = textOf(fs::path(folder) / "places.csv");

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "drivers/recorded/open_log.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace fs = std::filesystem;
@@ -89,10 +90,6 @@ InputError errorOf(const Call& call) {
   }
   FAIL("no InputError");
   return {"", 0, "", "", ""};
-}
-
-inline bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
 }
 
 inline bool anyContains(const std::vector<std::string>& lines, const std::string& part) {

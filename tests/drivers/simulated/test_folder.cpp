@@ -3,16 +3,18 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <sstream>
 
 #include "drivers/simulated/folder_writer.hpp"
 #include "drivers/simulated/simulated_source.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
 
 namespace fs = std::filesystem;
+
+using test::textOf;
 
 class TemporaryFolder {
  public:
@@ -29,13 +31,8 @@ class TemporaryFolder {
   fs::path path_;
 };
 
-std::string read(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
 std::vector<std::string> rowsOf(const fs::path& path) {
-  std::istringstream text(read(path));
+  std::istringstream text(textOf(path));
   std::vector<std::string> rows;
   for (std::string line; std::getline(text, line);) {
     if (!line.empty() && line[0] != '#') rows.push_back(line);
@@ -71,7 +68,7 @@ TEST_CASE("the folder holds a whole EuRoC log, the same on any number of threads
     ++files;
     const fs::path relative = fs::relative(entry.path(), a.path());
     INFO(relative.string());
-    CHECK(read(entry.path()) == read(b.path() / relative));
+    CHECK(textOf(entry.path()) == textOf(b.path() / relative));
   }
   const std::size_t images = 22;
   const std::size_t cameras = 4;
@@ -92,10 +89,10 @@ TEST_CASE("the folder holds a whole EuRoC log, the same on any number of threads
   REQUIRE(truth.size() == 123);
   CHECK(std::count(truth[0].begin(), truth[0].end(), ',') == 16);
   CHECK(rowsOf(mav / "depth0/data.csv").size() == 3);
-  CHECK(read(mav / "cam0/sensor.yaml").find("distortion_model: radial-tangential") != std::string::npos);
+  CHECK(textOf(mav / "cam0/sensor.yaml").find("distortion_model: radial-tangential") != std::string::npos);
   CHECK(rowsOf(mav / "labels0/labels.csv").size() == kLabelCount);
-  CHECK(read(a.path() / "truth/mesh.ply").starts_with("ply\nformat ascii 1.0\n"));
-  CHECK(read(mav / "cam0/sensor.yaml") == read(a.path() / "truth/cam0.yaml"));
+  CHECK(textOf(a.path() / "truth/mesh.ply").starts_with("ply\nformat ascii 1.0\n"));
+  CHECK(textOf(mav / "cam0/sensor.yaml") == textOf(a.path() / "truth/cam0.yaml"));
 }
 
 TEST_CASE("faults, offsets and turned extrinsics are written as asked") {
@@ -115,9 +112,10 @@ TEST_CASE("faults, offsets and turned extrinsics are written as asked") {
   CHECK(rowsOf(mav / "cam1/data.csv").size() == 8);
   CHECK(rowsOf(mav / "imu0/data.csv").size() == 123 - 40);
   CHECK(rowsOf(mav / "state_groundtruth_estimate0/data.csv").size() == 123);
-  CHECK(read(mav / "cam0/sensor.yaml") != read(folder.path() / "truth/cam0.yaml"));
-  CHECK(read(mav / "cam1/sensor.yaml") == read(folder.path() / "truth/cam1.yaml"));
-  CHECK(read(folder.path() / "truth/simulation.yaml").find("timeshift_cam_imu: -0.005") != std::string::npos);
+  CHECK(textOf(mav / "cam0/sensor.yaml") != textOf(folder.path() / "truth/cam0.yaml"));
+  CHECK(textOf(mav / "cam1/sensor.yaml") == textOf(folder.path() / "truth/cam1.yaml"));
+  CHECK(textOf(folder.path() / "truth/simulation.yaml").find("timeshift_cam_imu: -0.005") !=
+        std::string::npos);
 
   const SimulatedFlight flight(settings);
   const Eigen::AngleAxisd turn(flight.givenRig().T_body_cam[0].rotation *

@@ -2,24 +2,20 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 
 #include "drivers/calibration/calibration.hpp"
 #include "drivers/simulated/session_folder.hpp"
 #include "drivers/simulated/simulated_flight.hpp"
 #include "drivers/target/target_file.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string bytesOf(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
+using test::textOf;
 
 TEST_CASE("a session's folder is that of a bare rig, with the truth beside it") {
   const fs::path folder = fs::temp_directory_path() / "swiftlet_session_folder";
@@ -47,17 +43,17 @@ TEST_CASE("a session's folder is that of a bare rig, with the truth beside it") 
   CHECK(std::abs((truth.rig.camera_to_imu_shift - drawn.rig.camera_to_imu_shift).ns) <= 1);
   CHECK(std::abs((truth.rig.readout - drawn.rig.readout).ns) <= 1000);
   CHECK(readTarget((folder / "truth/board.yaml").string()).columns == 5);
-  const std::string list = bytesOf(folder / "mav0/cam1/data.csv");
+  const std::string list = textOf(folder / "mav0/cam1/data.csv");
   CHECK(std::count(list.begin(), list.end(), '\n') == 1 + 4);  // at 0.1, 0.15, 0.2 and 0.25 s
   const std::string image = list.substr(list.rfind(',') + 1, list.size() - list.rfind(',') - 2);
-  const std::string bytes = bytesOf(folder / "mav0/cam1/data" / image);
+  const std::string bytes = textOf(folder / "mav0/cam1/data" / image);
   CHECK(bytes.size() > 5000);
 
   // The same bytes on one thread.
   settings.threads = 1;
   settings.calibrated = true;
   REQUIRE(simulateSessionToFolder(target, settings, folder.string(), {}, &message).ok());
-  CHECK(bytesOf(folder / "mav0/cam1/data" / image) == bytes);
+  CHECK(textOf(folder / "mav0/cam1/data" / image) == bytes);
   CHECK(fs::exists(folder / "mav0/cam0/sensor.yaml"));
 
   settings.exposure = 0.2;

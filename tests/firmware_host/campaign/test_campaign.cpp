@@ -5,7 +5,6 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <thread>
 
 #include "drivers/input/input_error.hpp"
@@ -14,17 +13,15 @@
 #include "firmware_host/lab/campaign/campaign_run.hpp"
 #include "firmware_host/lab/campaign/child_process.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
 
 namespace fs = std::filesystem;
-using Catch::Matchers::Contains;
+using test::textOf;
 
-std::string textOf(const fs::path& file) {
-  std::ifstream stream(file);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
+using Catch::Matchers::Contains;
 
 class Logs {
  public:

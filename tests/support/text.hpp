@@ -1,0 +1,21 @@
+#pragma once
+// What stands in a file, and in a line.
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+namespace swiftlet::test {
+
+/// All bytes of a file; empty if it cannot be read.
+inline std::string textOf(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+inline bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+}  // namespace swiftlet::test
