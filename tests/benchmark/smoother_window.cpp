@@ -16,7 +16,6 @@ namespace {
 constexpr std::size_t kPoses = 6;  // as SmootherSettings' defaults make them
 constexpr std::size_t kMotionKeyframes = 4;
 constexpr std::size_t kRecent = 4;
-constexpr double kPixelSigma = 0.6;  // px
 // As in Smoother::solve.
 constexpr int kTriangulationStart = 6;
 constexpr double kRelativeDamping = 1e-10;

@@ -22,11 +22,11 @@ namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 
-Stamp at(double seconds) { return {Duration::fromSeconds(seconds).ns}; }
+Stamp sinceStart(double seconds) { return {Duration::fromSeconds(seconds).ns}; }
 
 TrajectoryPoint point(double seconds, const SE3& pose) {
   TrajectoryPoint result;
-  result.stamp = at(seconds);
+  result.stamp = sinceStart(seconds);
   result.T_world_body = pose;
   return result;
 }
@@ -77,19 +77,19 @@ TEST_CASE("truth is interpolated within the gap, never extrapolated") {
   Trajectory truth = {point(0, SE3(yaw(0), {0, 0, 0})), point(0.01, SE3(yaw(0.2), {1, 2, 3})),
                       point(0.1, SE3(yaw(0.3), {2, 2, 2}))};
   const Duration gap = Duration::fromMilliseconds(20);
-  const auto middle = interpolate(truth, at(0.0025), gap);
+  const auto middle = interpolate(truth, sinceStart(0.0025), gap);
   REQUIRE(middle);
   CHECK((middle->translation - Eigen::Vector3d(0.25, 0.5, 0.75)).norm() < 1e-12);
   CHECK(logSo3(middle->rotation).z() == Approx(0.05));
-  CHECK(interpolate(truth, at(0.1), gap));           // an exact stamp needs no neighbour
-  CHECK_FALSE(interpolate(truth, at(0.05), gap));    // within a gap of 90 ms
-  CHECK_FALSE(interpolate(truth, at(-0.001), gap));  // before
-  CHECK_FALSE(interpolate(truth, at(0.101), gap));   // after
-  CHECK_FALSE(interpolate({}, at(0), gap));
+  CHECK(interpolate(truth, sinceStart(0.1), gap));           // an exact stamp needs no neighbour
+  CHECK_FALSE(interpolate(truth, sinceStart(0.05), gap));    // within a gap of 90 ms
+  CHECK_FALSE(interpolate(truth, sinceStart(-0.001), gap));  // before
+  CHECK_FALSE(interpolate(truth, sinceStart(0.101), gap));   // after
+  CHECK_FALSE(interpolate({}, sinceStart(0), gap));
 
   // Opposite signs of one rotation are one rotation.
   truth[1].T_world_body.rotation.coeffs() *= -1;
-  CHECK(logSo3(interpolate(truth, at(0.0025), gap)->rotation).z() == Approx(0.05));
+  CHECK(logSo3(interpolate(truth, sinceStart(0.0025), gap)->rotation).z() == Approx(0.05));
 }
 
 TEST_CASE("association counts what it leaves out") {
@@ -100,8 +100,8 @@ TEST_CASE("association counts what it leaves out") {
   CHECK(all.estimates == 81);
   CHECK(all.without_truth == 20);
   CHECK(all.pairs.size() == 61);
-  options.from = at(3);
-  options.until = at(3.5);
+  options.from = sinceStart(3);
+  options.until = sinceStart(3.5);
   const Association part = associate(estimate, truth, options);
   CHECK(part.pairs.size() == 11);
   CHECK(part.pairs.front().estimate_index == 60);
@@ -137,7 +137,7 @@ TEST_CASE("ATE by hand: one point off in a symmetric cross") {
   for (std::size_t i = 0; i < cross.size(); ++i) {
     const double z = i % 2 == 0 ? kHeight : -kHeight;
     const SE3 estimate(Eigen::Quaterniond::Identity(), cross[i] + Eigen::Vector3d(0, 0, z));
-    pairs.push_back({at(static_cast<double>(i)), estimate, SE3(yaw(0.1), cross[i]), i});
+    pairs.push_back({sinceStart(static_cast<double>(i)), estimate, SE3(yaw(0.1), cross[i]), i});
   }
   const TrajectoryError error = trajectoryError(pairs, AlignKind::kSe3);
   CHECK(error.translation.rmse == Approx(kHeight).epsilon(1e-9));
@@ -190,11 +190,11 @@ TEST_CASE("the section from 3 s is aligned over itself alone") {
   const Trajectory truth = flight(10);
   Trajectory estimate = truth;
   for (TrajectoryPoint& p : estimate) {
-    if (p.stamp < at(3)) p.T_world_body.translation.x() += 5;  // a bad start
+    if (p.stamp < sinceStart(3)) p.T_world_body.translation.x() += 5;  // a bad start
   }
   AccuracyOptions options;
   CHECK(accuracyOf(estimate, truth, options).absolute.translation.rmse > 0.1);
-  options.association.from = at(3);
+  options.association.from = sinceStart(3);
   const Accuracy later = accuracyOf(estimate, truth, options);
   CHECK(later.absolute.translation.rmse < 1e-9);
   CHECK(later.pairs == 141);
@@ -207,7 +207,7 @@ std::vector<PosePair> driftingPairs(double scale, double yaw_rate) {
     const double t = 0.05 * static_cast<double>(i);
     const SE3 truth(Eigen::Quaterniond::Identity(), {t, 0, 0});
     const SE3 estimate(yaw(yaw_rate * t), {scale * t, 0, 0});
-    pairs.push_back({at(t), estimate, truth, i});
+    pairs.push_back({sinceStart(t), estimate, truth, i});
   }
   return pairs;
 }
@@ -321,7 +321,7 @@ TEST_CASE("a flight there and back revisits, one way does not") {
   CHECK(found.revisiting == 22);
   Trajectory turned = back;
   for (TrajectoryPoint& p : turned) {
-    if (p.stamp > at(20)) p.T_world_body.rotation = yaw(std::numbers::pi);
+    if (p.stamp > sinceStart(20)) p.T_world_body.rotation = yaw(std::numbers::pi);
   }
   CHECK(countRevisits(turned).revisiting == 0);
 }
@@ -388,9 +388,9 @@ TEST_CASE("positions of another clock: the shift and the error that is left", "[
   Random random(3, 0);
   constexpr double kSigma = 0.05;
   for (double t = 1; t < 19; t += 0.27) {
-    const std::optional<SE3> pose = interpolate(estimate, at(t), Duration::fromMilliseconds(60));
+    const std::optional<SE3> pose = interpolate(estimate, sinceStart(t), Duration::fromMilliseconds(60));
     const Eigen::Vector3d noise(random.normal(), random.normal(), random.normal());
-    truth.push_back({at(t - 2.345), T_truth_world * pose->translation + kSigma * noise});
+    truth.push_back({sinceStart(t - 2.345), T_truth_world * pose->translation + kSigma * noise});
   }
   PositionAccuracyOptions options;
   options.accuracy.align = AlignKind::kYaw;

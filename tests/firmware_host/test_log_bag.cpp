@@ -18,7 +18,7 @@ using test::textOf;
 
 const std::string kLog = std::string(SWIFTLET_TEST_DATA) + "/euroc_mh01_4s";
 
-std::string textOf(std::span<const std::uint8_t> bytes) { return {bytes.begin(), bytes.end()}; }
+std::string lettersOf(std::span<const std::uint8_t> bytes) { return {bytes.begin(), bytes.end()}; }
 
 std::map<std::string, std::uint64_t> countsOf(const std::string& path) {
   const auto bag = openBag(path);
@@ -63,7 +63,7 @@ TEST_CASE("a log's bag holds its image files and its numbers", "[export]") {
         const std::string camera = topic.name.substr(0, topic.name.find('/', 1));
         const std::string file =
             kLog + "/mav0" + camera + "/data/" + std::to_string(image.header.stamp.ns) + ".jpg";
-        CHECK(textOf(image.data) == textOf(file));
+        CHECK(lettersOf(image.data) == textOf(file));
         CHECK(image.format == "jpeg");
         CHECK(image.header.stamp == entry.log_time);
         ++images;

@@ -40,7 +40,7 @@ struct ModelSleep {
   static void wake(model::Atomic<std::uint32_t>&) { woken = woken || asleep; }
 };
 
-constexpr Duration kLong = Duration::fromMilliseconds(1000);
+constexpr Duration kModelWait = Duration::fromMilliseconds(1000);
 
 struct State {
   State() { ModelSleep::asleep = ModelSleep::woken = false; }
@@ -71,7 +71,7 @@ void takeBoth(State& s) {
       for (; taken < ticket; ++taken) read(taken);
       if (taken == 2) break;
       s.slept_with = ticket;
-      check(s.bell.wait(ticket, kLong), "gave up early");
+      check(s.bell.wait(ticket, kModelWait), "gave up early");
       // A ring beyond the ticket: its item is there without another look at the bell.
       read(taken++);
     }
@@ -95,7 +95,7 @@ void takeFlags(State& s) {
       check(seen >= static_cast<int>(ticket), "not published");
       if (seen == 2) break;
       s.slept_with = ticket;
-      check(s.bell.wait(ticket, kLong), "gave up early");
+      check(s.bell.wait(ticket, kModelWait), "gave up early");
     }
   } catch (const Asleep&) {
   }
@@ -142,7 +142,7 @@ void ticketTooLate(State& s) {
   try {
     const bool there = s.flags[0].load(std::memory_order_relaxed) == 1;
     s.slept_with = 0;
-    if (!there) s.bell.wait(s.bell.ticket(), kLong);
+    if (!there) s.bell.wait(s.bell.ticket(), kModelWait);
   } catch (const Asleep&) {
   }
 }

@@ -53,7 +53,7 @@ std::vector<Row> rowsOf(const std::string& file) {
   return rows;
 }
 
-std::string textOf(const ros::Time& time) {
+std::string secondsOf(const ros::Time& time) {
   std::ostringstream text;
   text << time.sec << '.' << std::setw(9) << std::setfill('0') << time.nsec;
   return text.str();
@@ -82,7 +82,7 @@ class ReadBag {
     for (const rosbag::MessageInstance& instance : by_topic_[topic]) {
       const auto message = instance.instantiate<Message>();
       REQUIRE(message);
-      messages.emplace_back(textOf(instance.getTime()), *message);
+      messages.emplace_back(secondsOf(instance.getTime()), *message);
     }
     return messages;
   }
@@ -97,7 +97,7 @@ template <typename Message>
 void checkHeader(const std::pair<std::string, Message>& message, const std::string& stamp,
                  const std::string& frame, std::size_t sequence) {
   REQUIRE(message.first == stamp);
-  REQUIRE(textOf(message.second.header.stamp) == stamp);
+  REQUIRE(secondsOf(message.second.header.stamp) == stamp);
   REQUIRE(message.second.header.frame_id == frame.c_str());
   REQUIRE(message.second.header.seq == sequence);
 }
@@ -167,7 +167,7 @@ TEST_CASE("every pose of the run is in the bag with its stamp and frame", "[expo
     REQUIRE(paths[0].second.poses.size() == rows.size());
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const BagPose& pose = paths[0].second.poses[i];
-      REQUIRE(textOf(pose.header.stamp) == rows[i].stamp);
+      REQUIRE(secondsOf(pose.header.stamp) == rows[i].stamp);
       REQUIRE(pose.header.frame_id == frame);
       checkPose(pose.pose, rows[i].v);
     }
@@ -186,8 +186,8 @@ TEST_CASE("the tree of frames gives the odometry and, at its keyframes, the map"
     const BagTransform& map = tf[i].second.transforms[0];
     const BagTransform& body = tf[i].second.transforms[1];
     REQUIRE(tf[i].first == rows[i].stamp);
-    REQUIRE(textOf(map.header.stamp) == rows[i].stamp);
-    REQUIRE(textOf(body.header.stamp) == rows[i].stamp);
+    REQUIRE(secondsOf(map.header.stamp) == rows[i].stamp);
+    REQUIRE(secondsOf(body.header.stamp) == rows[i].stamp);
     CHECK(map.header.frame_id == "map");
     CHECK(map.child_frame_id == "odom");
     CHECK(body.header.frame_id == "odom");
@@ -353,7 +353,7 @@ TEST_CASE("meshes are triangle lists, events and health are diagnostics", "[expo
   REQUIRE(meshes.size() == expected);
   std::size_t triangles = 0;
   for (const auto& [stamp, marker] : meshes) {
-    REQUIRE(textOf(marker.header.stamp) == stamp);
+    REQUIRE(secondsOf(marker.header.stamp) == stamp);
     CHECK(marker.header.frame_id == "odom");
     CHECK(marker.type == BagMarker::TRIANGLE_LIST);
     CHECK(marker.points.size() % 3 == 0);
@@ -367,7 +367,7 @@ TEST_CASE("meshes are triangle lists, events and health are diagnostics", "[expo
   std::size_t keyframes = 0;
   bool good = false;
   for (const auto& [stamp, diagnostics] : bag.all<BagDiagnostics>("/diagnostics")) {
-    REQUIRE(textOf(diagnostics.header.stamp) == stamp);
+    REQUIRE(secondsOf(diagnostics.header.stamp) == stamp);
     if (diagnostics.status[0].name == "swiftlet/keyframe") ++keyframes;
     if (diagnostics.status[0].name != "swiftlet/health") continue;
     ++events;

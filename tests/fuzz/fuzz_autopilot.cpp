@@ -20,7 +20,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr Stamp kStart{1'000'000'000'000};
+constexpr Stamp kLinkStart{1'000'000'000'000};
 constexpr Duration kStep = Duration::fromMilliseconds(5);
 
 struct Sent {
@@ -76,7 +76,7 @@ void converse(const Bytes& bytes, Piece&& piece) {
   NavState state;
   state.health = Health::kGood;
   constexpr int kLeast = 200;
-  Stamp now = kStart;
+  Stamp now = kLinkStart;
   std::size_t at = 0;
   int steps = 0;
   for (; at < bytes.size() || steps < kLeast; ++steps, now = now + kStep) {
@@ -109,7 +109,7 @@ void converseAsImu(const Bytes& bytes, Piece&& piece) {
   AutopilotDialogue dialogue(kRate);
   MavlinkParser ours;
   std::size_t answers = 0, requests = 0, commands = 0;
-  Stamp now = kStart;
+  Stamp now = kLinkStart;
   std::size_t at = 0;
   int steps = 0;
   for (; at < bytes.size() || steps < kLeast; ++steps, now = now + kStep) {

@@ -11,9 +11,9 @@
 namespace swiftlet::fuzz {
 namespace {
 
-class Bytes {
+class ByteReader {
  public:
-  explicit Bytes(std::string_view text) : text_(text) {}
+  explicit ByteReader(std::string_view text) : text_(text) {}
   [[nodiscard]] bool more() const { return at_ < text_.size(); }
   std::uint8_t byte() { return more() ? static_cast<std::uint8_t>(text_[at_++]) : 0; }
   std::int64_t any() {
@@ -39,7 +39,7 @@ std::int64_t sum(std::int64_t a, std::int64_t b) {
 }
 
 struct World {
-  explicit World(Bytes& bytes)
+  explicit World(ByteReader& bytes)
       : train({bytes.step()}),
         matcher(train, bytes.byte() % 4 == 0 ? std::nullopt : std::optional(Duration{bytes.step()})) {}
 
@@ -68,7 +68,7 @@ struct World {
 }  // namespace
 
 void clocks(std::string_view text) {
-  Bytes bytes(text);
+  ByteReader bytes(text);
   World world(bytes);
   std::int64_t device = 0, host = 0;
   std::uint32_t sequence = 0;

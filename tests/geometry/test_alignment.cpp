@@ -2,14 +2,12 @@
 #include <limits>
 #include <vector>
 
-#include "estimator/core/random.hpp"
 #include "estimator/geometry/alignment.hpp"
 #include "estimator/geometry/so3.hpp"
+#include "tests/geometry/random_vectors.hpp"
 
 namespace swiftlet::test {
 namespace {
-
-Eigen::Vector3d normalVector(Random& random) { return {random.normal(), random.normal(), random.normal()}; }
 
 std::vector<Eigen::Vector3d> cloud(Random& random, std::size_t count) {
   std::vector<Eigen::Vector3d> points(count);

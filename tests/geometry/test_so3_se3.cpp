@@ -2,17 +2,13 @@
 #include <cmath>
 #include <numbers>
 
-#include "estimator/core/random.hpp"
+#include "tests/geometry/random_vectors.hpp"
 #include "tests/support/numeric_jacobian.hpp"
 
 namespace swiftlet::test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-
-Eigen::Vector3d unitVector(Random& random) {
-  return Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
-}
 
 // Angles where the formulas switch or lose digits.
 constexpr double kAngles[] = {0.0, 1e-300, 1e-12, 1e-8, 0.99e-4,    1.01e-4,    1e-3,       0.1,

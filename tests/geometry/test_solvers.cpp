@@ -3,10 +3,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "estimator/core/random.hpp"
 #include "estimator/geometry/minimal_solvers.hpp"
 #include "estimator/geometry/real_roots.hpp"
 #include "estimator/geometry/so3.hpp"
+#include "tests/geometry/random_vectors.hpp"
 
 namespace swiftlet::test {
 namespace {
@@ -16,10 +16,6 @@ struct Pairs {
   Eigen::Vector3d t;  // unit
   std::array<Eigen::Vector3d, 5> prev, cur;
 };
-
-Eigen::Vector3d unitVector(Random& random) {
-  return Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
-}
 
 // Points all around (bearings of any angle), 2 to 10 translations away.
 Pairs randomPairs(Random& random, bool planar = false) {

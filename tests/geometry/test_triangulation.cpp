@@ -3,9 +3,9 @@
 #include <limits>
 #include <vector>
 
-#include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "estimator/geometry/triangulation.hpp"
+#include "tests/geometry/random_vectors.hpp"
 
 namespace swiftlet::test {
 namespace {
@@ -19,8 +19,6 @@ struct Views {
     bearings.push_back((T_world_cam.inverse() * point).normalized());
   }
 };
-
-Eigen::Vector3d normalVector(Random& random) { return {random.normal(), random.normal(), random.normal()}; }
 
 Views randomViews(Random& random, std::size_t count, const Eigen::Vector3d& point) {
   Views views;

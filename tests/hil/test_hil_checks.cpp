@@ -12,7 +12,7 @@ namespace {
 constexpr std::int64_t kStart = 5'000'000'000;
 constexpr double kFlight = 10;  // s
 
-Stamp at(double seconds) { return Stamp{kStart} + Duration::fromSeconds(seconds); }
+Stamp inFlight(double seconds) { return Stamp{kStart} + Duration::fromSeconds(seconds); }
 
 SE3 poseAt(double t) { return SE3(Eigen::Quaterniond::Identity(), {std::sin(t), std::cos(t), 0.1 * t}); }
 
@@ -20,15 +20,15 @@ SE3 poseAt(double t) { return SE3(Eigen::Quaterniond::Identity(), {std::sin(t), 
 HilEvidence flight(const std::string& faults, double low_begin = 0, double low_end = 0) {
   HilEvidence evidence;
   evidence.faults = FaultTimeline::parse("faults", faults);
-  evidence.first_image = at(0);
-  evidence.last_image = at(kFlight);
+  evidence.first_image = inFlight(0);
+  evidence.last_image = inFlight(kFlight);
   evidence.complete = true;
   evidence.finished = true;
-  for (int i = 0; i <= 2000; ++i) evidence.truth.push_back({at(i * 0.005), poseAt(i * 0.005)});
+  for (int i = 0; i <= 2000; ++i) evidence.truth.push_back({inFlight(i * 0.005), poseAt(i * 0.005)});
   for (int i = 0; i <= 200; ++i) {
     const double t = i * 0.05;
     const bool low = t >= low_begin && t < low_end;
-    evidence.frames.push_back({at(t), poseAt(t), low ? Health::kDegraded : Health::kGood, 0});
+    evidence.frames.push_back({inFlight(t), poseAt(t), low ? Health::kDegraded : Health::kGood, 0});
   }
   return evidence;
 }
@@ -48,8 +48,9 @@ bool fails(const HilEvidence& evidence, const std::string& name) {
   return !check->passed && !verdict.passed();
 }
 
-const HilEvidence::Line kSilent{at(5), "IMU (/run/imu, bridge): sends nothing (1.0 s); check its power"};
-const HilEvidence::Line kBack{at(6.01), "IMU (/run/imu, bridge): works again"};
+const HilEvidence::Line kSilent{inFlight(5),
+                                "IMU (/run/imu, bridge): sends nothing (1.0 s); check its power"};
+const HilEvidence::Line kBack{inFlight(6.01), "IMU (/run/imu, bridge): works again"};
 
 HilEvidence stalled() {
   HilEvidence evidence = flight("4,imu,stall,2\n", 4, 6.6);
@@ -101,9 +102,9 @@ TEST_CASE("Each check fails on what it is for", "[hil]") {
   }
   SECTION("a defect that stays") {
     HilEvidence evidence = stalled();
-    evidence.remarks.push_back({at(7), "IMU (/run/imu, bridge): loses data (100 of 200); check"});
+    evidence.remarks.push_back({inFlight(7), "IMU (/run/imu, bridge): loses data (100 of 200); check"});
     CHECK(fails(evidence, "returned: imu"));
-    evidence.remarks.push_back({at(8), "IMU (/run/imu, bridge): normal again"});
+    evidence.remarks.push_back({inFlight(8), "IMU (/run/imu, bridge): normal again"});
     CHECK(checkHil(evidence).passed());
   }
   SECTION("good without an IMU") {
@@ -113,7 +114,7 @@ TEST_CASE("Each check fails on what it is for", "[hil]") {
   }
   SECTION("good at IMU rate without an IMU") {
     HilEvidence evidence = stalled();
-    evidence.states = {{at(5), poseAt(5), Health::kGood, 0}};
+    evidence.states = {{inFlight(5), poseAt(5), Health::kGood, 0}};
     CHECK(fails(evidence, "lowered: imu stall"));
   }
   SECTION("never good again") {
@@ -143,7 +144,7 @@ TEST_CASE("Each check fails on what it is for", "[hil]") {
     HilEvidence evidence = flight("2,camera0,dark,5\n2.1,camera1,stall,5\n", 2, 7.6);
     CHECK(fails(evidence, "failed while blind"));
     for (HilEvidence::Judged& pose : evidence.frames) {
-      if (pose.stamp > at(5.1) && pose.stamp < at(7.1)) pose.health = Health::kFailed;
+      if (pose.stamp > inFlight(5.1) && pose.stamp < inFlight(7.1)) pose.health = Health::kFailed;
     }
     CHECK(find(checkHil(evidence), "failed while blind") == nullptr);
   }
@@ -170,7 +171,7 @@ TEST_CASE("What a device cannot show need not be told", "[hil]") {
 
 TEST_CASE("Faults of one kind that run into each other are told once", "[hil]") {
   HilEvidence evidence = flight("3,imu,unplug,1.5\n4,imu,unplug,2\n", 3, 6.6);
-  evidence.remarks = {{at(3.01), "IMU (/run/imu, bridge): gone; connect it again"}, kBack};
+  evidence.remarks = {{inFlight(3.01), "IMU (/run/imu, bridge): gone; connect it again"}, kBack};
   CHECK_FALSE(fails(evidence, "told: imu unplug at 4.000 s"));
   // With a pause between them the second is another.
   evidence.faults = FaultTimeline::parse("faults", "3,imu,unplug,0.5\n4,imu,unplug,2\n");

@@ -17,8 +17,8 @@ using namespace swiftlet::test;
 
 namespace {
 
-const Eigen::Vector3d kBiasGyro(0.01, -0.02, 0.05);
-const Eigen::Vector3d kBiasAccel(0.05, -0.08, 0.03);
+const Eigen::Vector3d kStartBiasGyro(0.01, -0.02, 0.05);
+const Eigen::Vector3d kStartBiasAccel(0.05, -0.08, 0.03);
 
 struct Window {
   std::vector<ImuSample> samples;
@@ -31,7 +31,7 @@ struct Window {
 Window makeWindow(const AnalyticTrajectory& path, int frames, double interval, const ImuNoise& noise,
                   const StartPrior& prior, Random& random) {
   Window w;
-  w.samples = path.samples(0.5, 1.005 + frames * interval, noise, kBiasGyro, kBiasAccel, &random);
+  w.samples = path.samples(0.5, 1.005 + frames * interval, noise, kStartBiasGyro, kStartBiasAccel, &random);
   REQUIRE(estimateTilt(w.samples, stampOf(1), noise, prior, w.tilt).ok());
   for (int k = 1; k <= frames; ++k) {
     w.from_first.emplace_back(noise, prior.bias_gyro, prior.bias_accel);
@@ -134,9 +134,9 @@ TEST_CASE("Mono start on simulated flights: scale sigma is honest", "[figures]")
     Eigen::Vector3d bias;
     double bias_sigma = 0;
     REQUIRE(solveGyroBias(w.from_first, tracks, T_body_cam, sigma, prior, bias, bias_sigma).ok());
-    bias_error += (bias - kBiasGyro).norm() / runs;
-    bias_inside += (bias - kBiasGyro).norm() < 5 * bias_sigma ? 1 : 0;
-    worst_bias = std::max(worst_bias, (bias - kBiasGyro).norm());
+    bias_error += (bias - kStartBiasGyro).norm() / runs;
+    bias_inside += (bias - kStartBiasGyro).norm() < 5 * bias_sigma ? 1 : 0;
+    worst_bias = std::max(worst_bias, (bias - kStartBiasGyro).norm());
     MonoStart start;
     const auto begin = std::chrono::steady_clock::now();
     const Status status =

@@ -16,8 +16,8 @@ namespace swiftlet {
 namespace {
 
 constexpr Duration kFramePeriod = Duration::fromMilliseconds(50);
-constexpr Duration kPatience = Duration::fromMilliseconds(60);
-/// No step takes as long; the governor's allowance for a frame's age is shorter than kPatience.
+constexpr Duration kSamplePatience = Duration::fromMilliseconds(60);
+/// No step takes as long; the governor's allowance for a frame's age is shorter than kSamplePatience.
 constexpr double kStepBudget = 10, kAgeBudget = 0.05;  // s
 
 class NoListener : public RunListener {
@@ -90,7 +90,7 @@ class LateSamples {
   RunObserver observer_{listener_};
   GraphOptions options_ = [this] {
     GraphOptions options;
-    options.sample_patience = kPatience;
+    options.sample_patience = kSamplePatience;
     options.track_effort = &track;
     options.smooth_effort = &smooth;
     return options;
@@ -104,7 +104,7 @@ TEST_CASE("an IMU that has not begun does not lower the effort") {
   for (int i = 0; i < 5; ++i) {
     flight->image();
     flight->run();
-    sleepFor(kPatience + Duration::fromMilliseconds(5));
+    sleepFor(kSamplePatience + Duration::fromMilliseconds(5));
     flight->run();
   }
   CHECK(flight->track.steps.size() == 5);
@@ -135,12 +135,12 @@ TEST_CASE("frames that had their samples are a backlog") {
   flight->run();
   for (int i = 0; i < 3; ++i) flight->image();
   flight->samples();
-  sleepFor(kPatience);
+  sleepFor(kSamplePatience);
   flight->run();
   REQUIRE(flight->track.steps.size() == 4);
   CHECK(flight->track.steps[0].waiting == 0);
   CHECK(flight->track.steps[1].waiting == 2);
-  CHECK(flight->track.steps[1].age > kPatience.seconds());
+  CHECK(flight->track.steps[1].age > kSamplePatience.seconds());
   CHECK(flight->track.wouldFall());
   CHECK(flight->smooth.wouldFall());
 }

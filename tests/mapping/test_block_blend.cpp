@@ -15,7 +15,6 @@ using namespace swiftlet::testing;
 
 namespace {
 
-const Ball kBall{{0.03, -0.02, 0.01}, 1.0};
 constexpr BlockRange kAll{{-100, -100, -100}, {100, 100, 100}};
 
 /// The true signed distance around the ball in every voxel nearer to its surface than `band` voxels.
@@ -27,7 +26,7 @@ StoredBlock ballBlock(const BlockIndex& index, const VolumeSettings& settings, d
     const Eigen::Vector3d voxel(8.0 * index.x + static_cast<double>(at & 7U) + 0.5,
                                 8.0 * index.y + static_cast<double>(at >> 3U & 7U) + 0.5,
                                 8.0 * index.z + static_cast<double>(at >> 6U) + 0.5);
-    const double d = (settings.voxel_size * voxel - kBall.centre).norm() - kBall.radius;
+    const double d = (settings.voxel_size * voxel - kOffGridBall.centre).norm() - kOffGridBall.radius;
     block.voxels.distance[at] = static_cast<std::int16_t>(
         std::lround(std::clamp(d / settings.truncation, -1.0, 1.0) * kDistanceSteps));
     block.voxels.weight[at] = std::abs(d) < band * settings.voxel_size ? 512 : 0;
@@ -97,9 +96,9 @@ TEST_CASE("a ball moved by any motion is the moved ball, to its bend") {
       blend.add(block, motion, kAll);
       weight_before += weightOf(block.voxels);
     }
-    const Eigen::Vector3d centre = motion * kBall.centre;
+    const Eigen::Vector3d centre = motion * kOffGridBall.centre;
     // Half a diagonal of way over a surface of the least radius that is looked at.
-    const double bend = 0.75 * settings.voxel_size * settings.voxel_size / (2 * 0.9 * kBall.radius);
+    const double bend = 0.75 * settings.voxel_size * settings.voxel_size / (2 * 0.9 * kOffGridBall.radius);
     double weight = 0, squares = 0;
     std::size_t count = 0, off = 0;
     for (std::uint32_t slot = 0; slot < volume.slots(); ++slot) {
@@ -115,7 +114,7 @@ TEST_CASE("a ball moved by any motion is the moved ball, to its bend") {
             settings.voxel_size * Eigen::Vector3d(8.0 * index.x + static_cast<double>(at & 7U) + 0.5,
                                                   8.0 * index.y + static_cast<double>(at >> 3U & 7U) + 0.5,
                                                   8.0 * index.z + static_cast<double>(at >> 6U) + 0.5);
-        const double d = (p - centre).norm() - kBall.radius;
+        const double d = (p - centre).norm() - kOffGridBall.radius;
         if (std::abs(d) > 0.6 * settings.truncation) continue;  // cut within its neighbourhood
         const double error = std::abs(static_cast<double>(volume.distanceStep()) * block->distance[at] - d);
         squares += error * error;

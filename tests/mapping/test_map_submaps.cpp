@@ -16,8 +16,7 @@ using namespace swiftlet::testing;
 
 namespace {
 
-const Ball kBall{{0.03, -0.02, 0.01}, 1.0};
-const std::vector<SE3> kViews = viewsAround(kBall, 2.5);
+const std::vector<SE3> kViews = viewsAround(kOffGridBall, 2.5);
 /// The first frame of the half that is out of place, and by how much.
 constexpr std::size_t kMoved = 13;
 const SE3 kWrong{Eigen::Quaterniond::Identity(), {0.15, -0.1, 0.05}};
@@ -47,7 +46,8 @@ struct Map {
 
   void fuse(std::size_t i, const SE3& T_map_world = {}, std::uint32_t epoch = 0) {
     // The second half comes back a while after the first.
-    const SceneImage image = render(kViews[i], 0.1 * static_cast<double>(i) + (i < kMoved ? 1 : 21), kBall);
+    const SceneImage image =
+        render(kViews[i], 0.1 * static_cast<double>(i) + (i < kMoved ? 1 : 21), kOffGridBall);
     VolumeStep step;
     integrator.restart();  // views are far apart
     submaps.follow({image.stamp, i, epoch, kViews[i], T_map_world, T_map_world});
@@ -74,7 +74,8 @@ struct Map {
       for (const std::uint32_t slot : slots) {
         surface.extract(slot, patch);
         for (const SurfaceVertex& vertex : patch.vertices) {
-          out.error += std::abs((vertex.p_world.cast<double>() - kBall.centre).norm() - kBall.radius);
+          out.error +=
+              std::abs((vertex.p_world.cast<double>() - kOffGridBall.centre).norm() - kOffGridBall.radius);
           ++out.vertices;
         }
         const VoxelBlock* const block = tile.voxels(slot);
@@ -95,14 +96,14 @@ struct Map {
   MapSubmaps submaps;
 };
 
-WorldInMap worldAt(std::size_t view, const SE3& T_map_world) {
+WorldInMap worldOfView(std::size_t view, const SE3& T_map_world) {
   return {view, 0, T_map_world * kViews[view], kViews[view]};
 }
 
 /// What loop closure says: the second half is in place after all.
 std::vector<WorldInMap> rightWorlds(const SE3& second_half = {}) {
-  return {worldAt(0, {}), worldAt(kMoved - 1, {}), worldAt(kMoved, second_half),
-          worldAt(kViews.size() - 1, second_half)};
+  return {worldOfView(0, {}), worldOfView(kMoved - 1, {}), worldOfView(kMoved, second_half),
+          worldOfView(kViews.size() - 1, second_half)};
 }
 
 }  // namespace
@@ -130,7 +131,7 @@ TEST_CASE("a volume with room for one thing of six loses none of them") {
     for (int thing = 0; thing < 6; ++thing) {
       const Eigen::Vector3d at(6.0 * thing, 0, 0);
       for (std::size_t i = 0; i < kViews.size(); ++i) {
-        SceneImage image = render(kViews[i], 10.0 * thing + 0.1 * static_cast<double>(i + 1), kBall);
+        SceneImage image = render(kViews[i], 10.0 * thing + 0.1 * static_cast<double>(i + 1), kOffGridBall);
         VolumeStep step;
         SE3 pose = kViews[i];
         pose.translation += at;
@@ -152,7 +153,7 @@ TEST_CASE("a volume smaller than what one image shows loses none of its surface"
   Map large, tiny(std::size_t{200} << 10U);
   for (Map* map : {&large, &tiny}) {
     for (std::size_t i = 0; i < kViews.size(); ++i) {
-      const SceneImage image = render(kViews[i], 0.1 * static_cast<double>(i) + 1, kBall);
+      const SceneImage image = render(kViews[i], 0.1 * static_cast<double>(i) + 1, kOffGridBall);
       VolumeStep step;
       map->integrator.restart();
       map->submaps.follow({image.stamp, i, 0, kViews[i], {}, {}});
@@ -205,7 +206,7 @@ TEST_CASE("free space moves with its submaps, in the whole and in the volume") {
         const Eigen::Vector3d block(header.index.x, header.index.y, header.index.z);
         const Eigen::Vector3d p =
             volume.settings().voxel_size * (8 * block + 2 * part + Eigen::Vector3d::Ones());
-        nearest = std::min(nearest, (p - kBall.centre).norm());
+        nearest = std::min(nearest, (p - kOffGridBall.centre).norm());
       }
     }
   };
@@ -270,11 +271,11 @@ TEST_CASE("less than half a voxel leaves the volume as it is, and still counts i
   right.fuseAll();
   const double voxel = sceneSettings().voxel_size;
   const SE3 little(Eigen::Quaterniond::Identity(), {0.4 * voxel, 0, 0});
-  map.submaps.correct(std::vector<WorldInMap>{worldAt(0, little)});
+  map.submaps.correct(std::vector<WorldInMap>{worldOfView(0, little)});
   CHECK(map.submaps.counters().blocks_moved == 0);
   const double before = right.whole().error;
   CHECK(map.whole().error > before + 0.1 * voxel);
-  map.submaps.correct(std::vector<WorldInMap>{worldAt(0, {})});
+  map.submaps.correct(std::vector<WorldInMap>{worldOfView(0, {})});
   CHECK(map.whole().error < kMovedShare * before);
 }
 
@@ -283,7 +284,7 @@ TEST_CASE("images from before and after a correction do not share a block") {
   map.fuse(0, kWrong);
   REQUIRE(map.submaps.stored().size() == 0);
   map.submaps.correct(
-      std::vector<WorldInMap>{worldAt(0, SE3(Eigen::Quaterniond::Identity(), {0.14, -0.1, 0.05}))});
+      std::vector<WorldInMap>{worldOfView(0, SE3(Eigen::Quaterniond::Identity(), {0.14, -0.1, 0.05}))});
   CHECK(map.submaps.counters().blocks_moved == 0);  // 1 cm
   // The same view, better placed.
   map.fuse(1, SE3(Eigen::Quaterniond::Identity(), {0.14, -0.1, 0.05}));
@@ -313,12 +314,12 @@ TEST_CASE("what vanishes while nobody looks leaves no ghost once its place is se
                              for (const std::uint32_t slot : slots) {
                                surface.extract(slot, patch);
                                for (const SurfaceVertex& v : patch.vertices)
-                                 count += v.p_world.cast<double>().norm() < kBall.radius + 0.1 ? 1 : 0;
+                                 count += v.p_world.cast<double>().norm() < kOffGridBall.radius + 0.1 ? 1 : 0;
                              }
                            });
     return count;
   };
-  for (const SE3& pose : viewsAround(kBall, 1.5)) see(pose, kBall);
+  for (const SE3& pose : viewsAround(kOffGridBall, 1.5)) see(pose, kOffGridBall);
   for (int i = 4; i < 40; ++i) wall(1.5, 0.25 * i);
   REQUIRE(map.volume.counters().evicted > 20);
   REQUIRE(ghosts() > 500);  // the ball, which nobody has missed yet
@@ -374,7 +375,7 @@ TEST_CASE("a place that is seen again and again takes no more room, and gathers 
   for (int round = 0; round < 5; ++round) {
     for (Map* map : {&once, &often}) {
       if (map == &once && round > 0) continue;
-      SceneImage image = render(kViews[0], 20.0 * round + 1, kBall);
+      SceneImage image = render(kViews[0], 20.0 * round + 1, kOffGridBall);
       VolumeStep step;
       map->integrator.restart();
       map->submaps.follow({image.stamp, static_cast<std::uint64_t>(round), 0, kViews[0], {}, {}});
@@ -458,7 +459,7 @@ TEST_CASE("a kept map lies around the vehicle for as long as the flight is locat
 
   const auto located = [&](const SE3& T_map_world) {
     std::vector<WorldInMap> worlds = keptNodes({});
-    worlds.insert(worlds.begin(), worldAt(0, T_map_world));
+    worlds.insert(worlds.begin(), worldOfView(0, T_map_world));
     map.submaps.correct(worlds);
     map.settle();
   };
@@ -468,7 +469,7 @@ TEST_CASE("a kept map lies around the vehicle for as long as the flight is locat
   located({Eigen::Quaterniond::Identity(), {0.05, 0, 0}});
   CHECK(map.volume.blockCount() > all * 9 / 10);
   // Taken back, and found again.
-  map.submaps.correct(std::vector<WorldInMap>{worldAt(0, elsewhere)});
+  map.submaps.correct(std::vector<WorldInMap>{worldOfView(0, elsewhere)});
   map.settle();
   CHECK(map.volume.blockCount() <= own);
   located({});
@@ -483,7 +484,7 @@ TEST_CASE("a kept map is moved by the nodes of its graph") {
   const auto is_kept = [](const Submap& submap) { return submap.epoch == kKeptEpoch; };
   CHECK(map.whole(is_kept).error > 5 * right.whole().error);
   std::vector<WorldInMap> worlds = keptNodes(kWrong, kWrong.inverse());
-  worlds.insert(worlds.begin(), worldAt(0, {}));
+  worlds.insert(worlds.begin(), worldOfView(0, {}));
   map.submaps.correct(worlds);
   const Whole moved = map.whole(is_kept);
   CHECK(moved.error < kMovedShare * right.whole().error);

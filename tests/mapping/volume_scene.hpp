@@ -67,6 +67,8 @@ struct Ball {
     return root >= 0 ? (-b - std::sqrt(root)) / a : 0;
   }
 };
+/// Its centre is no corner of a voxel.
+inline const Ball kOffGridBall{{0.03, -0.02, 0.01}, 1.0};
 
 /// A camera at `from` that looks at `to`.
 inline SE3 lookAt(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {

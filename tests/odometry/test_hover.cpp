@@ -14,9 +14,9 @@ using namespace swiftlet;
 
 namespace {
 
-constexpr double kTrackNoise = 0.15;  // px
-constexpr double kDrift = 0.05;       // m/s
-constexpr int kGrid = 12;             // points along each side of the ground in view
+constexpr double kHoverTrackNoise = 0.15;  // px
+constexpr double kDrift = 0.05;            // m/s
+constexpr int kGrid = 12;                  // points along each side of the ground in view
 
 struct Hover {
   RigKind rig = RigKind::kEuroc;
@@ -73,7 +73,7 @@ Outcome hover(const Hover& flown, double seconds) {
         feature.seen[c] =
             rig.camera[c].project((T_world_body * rig.T_body_cam[c]).inverse() * point, pixel) &&
             rig.camera[c].inImage(pixel);
-        for (int axis = 0; axis < 2; ++axis) pixel[axis] += kTrackNoise * random.normal();
+        for (int axis = 0; axis < 2; ++axis) pixel[axis] += kHoverTrackNoise * random.normal();
         feature.pixel[c] = pixel.cast<float>();
       }
       if (feature.seen[0] || feature.seen[1]) frame->features.pushBack(feature);

@@ -14,6 +14,7 @@
 #include "tests/support/numeric_jacobian.hpp"
 
 using namespace swiftlet;
+using test::kPixelSigma;
 using test::numericJacobian;
 using test::randomVector;
 using test::relativeDifference;
@@ -221,8 +222,6 @@ TEST_CASE("The robust weight of one dimension has the information of the estimat
 }
 
 namespace {
-
-constexpr double kPixelSigma = 0.6;
 
 Eigen::Vector2d sightingResidual(const CameraSighting& view, const BodyState& x, const SE3& T_body_cam,
                                  const Eigen::Vector3d& p) {

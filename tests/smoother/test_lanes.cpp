@@ -17,15 +17,15 @@
 #include "tests/support/numeric_jacobian.hpp"
 
 using namespace swiftlet;
+using test::kPixelSigma;
 using test::randomVector;
 
 namespace {
 
 constexpr double kTwin = 1e-9;  // relative
-constexpr double kPixelSigma = 0.6;
 
 // As many states as asked for, poses and whole ones in mixed order of slots.
-struct Window {
+struct LaneWindow {
   Rig rig = makeRig(RigKind::kEuroc).rig;
   std::array<RigPose, kMaxStates> poses{};
   std::vector<std::uint32_t> slots;  // by time
@@ -33,7 +33,7 @@ struct Window {
   test::WindowScene scene;
 
   // Every other one with a rolling shutter.
-  Window(std::size_t count, double share_frozen, Random& random) {
+  LaneWindow(std::size_t count, double share_frozen, Random& random) {
     const double readout = random.uniform(0, 1) < 0.5 ? 0.02 : 0;
     scene = test::sceneAround(rig, count, 0.4, random);
     for (std::size_t k = 0; k < count; ++k) {
@@ -93,7 +93,8 @@ struct Reduced {
   double cost = 0;
 
   // Slots have their columns in order of time, behind the calibration's.
-  static std::array<Eigen::Index, kMaxStates> columns(const Window& window, const CalibrationLayout& layout) {
+  static std::array<Eigen::Index, kMaxStates> columns(const LaneWindow& window,
+                                                      const CalibrationLayout& layout) {
     std::array<Eigen::Index, kMaxStates> at{};
     Eigen::Index next = layout.dimension();
     for (const std::uint32_t slot : window.slots) {
@@ -103,7 +104,7 @@ struct Reduced {
     return at;
   }
 
-  static Reduced lanes(const Window& window, const Landmark& landmark, const CalibrationLayout& layout) {
+  static Reduced lanes(const LaneWindow& window, const Landmark& landmark, const CalibrationLayout& layout) {
     std::array<WindowState, kMaxStates> states{};
     const auto at = columns(window, layout);
     for (const std::uint32_t slot : window.slots) {
@@ -123,7 +124,7 @@ struct Reduced {
     return result;
   }
 
-  static Reduced scalar(const Window& window, const Landmark& landmark, const CalibrationLayout& layout) {
+  static Reduced scalar(const LaneWindow& window, const Landmark& landmark, const CalibrationLayout& layout) {
     const Eigen::Index n = layout.dimension() + kPoseDim * static_cast<Eigen::Index>(window.slots.size());
     test::ScalarLandmark twin(n + 3);
     const auto at = columns(window, layout);
@@ -203,7 +204,7 @@ TEST_CASE("Lanes: a landmark eliminated in fours equals the scalar elimination",
   int unused = 0;
   for (std::size_t count = 1; count <= kMaxStates; ++count) {
     for (const double frozen : {0.0, 0.4, 1.0}) {
-      const Window window(count, frozen, random);
+      const LaneWindow window(count, frozen, random);
       for (int trial = 0; trial < 4; ++trial) {
         INFO(count << " states, share frozen " << frozen << ", trial " << trial);
         const Landmark landmark = window.landmark(random);
@@ -227,7 +228,7 @@ TEST_CASE("Lanes: a landmark eliminated in fours equals the scalar elimination",
 TEST_CASE("Lanes: a landmark that keeps its columns equals the scalar sum", "[smoother][lanes]") {
   Random random(34);
   for (std::size_t count = 1; count <= kMaxStates; ++count) {
-    const Window window(count, 0.4, random);
+    const LaneWindow window(count, 0.4, random);
     for (int trial = 0; trial < 4; ++trial) {
       INFO(count << " states, trial " << trial);
       const CalibrationLayout layout{trial % 2 == 1, trial >= 2, window.rig.camera_count, trial == 3};
@@ -270,7 +271,7 @@ TEST_CASE("Lanes: a landmark that keeps its columns equals the scalar sum", "[sm
 TEST_CASE("Lanes: a point's system equals the scalar sum", "[smoother][lanes]") {
   Random random(32);
   for (std::size_t count = 1; count <= kMaxStates; ++count) {
-    const Window window(count, 0.4, random);
+    const LaneWindow window(count, 0.4, random);
     for (int trial = 0; trial < 4; ++trial) {
       INFO(count << " states, trial " << trial);
       const Landmark landmark = window.landmark(random);
@@ -281,7 +282,7 @@ TEST_CASE("Lanes: a point's system equals the scalar sum", "[smoother][lanes]") 
 
 TEST_CASE("Lanes: a point seen more often than a window holds, as in full smoothing", "[smoother][lanes]") {
   Random random(33);
-  const Window window(kMaxStates, 0, random);
+  const LaneWindow window(kMaxStates, 0, random);
   for (const std::size_t count : {kMaxStates + 1, 3 * kMaxStates + 2, std::size_t{400}}) {
     const LandmarkPoint point = window.landmark(random).point;
     std::vector<Sighting> sightings;

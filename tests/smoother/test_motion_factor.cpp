@@ -5,24 +5,21 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "estimator/smoother/gyro_intrinsics_state.hpp"
 #include "estimator/smoother/imu_factor.hpp"
+#include "tests/smoother/window_scene.hpp"
 #include "tests/support/numeric_jacobian.hpp"
 
 using namespace swiftlet;
 using test::numericJacobian;
+using test::randomVector;
 using test::relativeDifference;
 
 namespace {
 
 using Matrix15 = Eigen::Matrix<double, kStateDim, kStateDim>;
-constexpr double kJacobianTolerance = 1e-6;  // relative: the residuals are scaled by up to 1e5
-
-Eigen::Vector3d randomVector(Random& random, double scale) {
-  return scale * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
-}
+constexpr double kMotionTolerance = 1e-6;  // relative: the residuals are scaled by up to 1e5
 
 BodyState randomState(Random& random) {
   BodyState x;
@@ -83,7 +80,7 @@ Vector15d unobservable(const BodyState& x, int axis) {
 }
 
 template <typename Evaluate>
-void checkJacobians(const Evaluate& evaluate, const BodyState& x_i, const BodyState& x_j) {
+void checkMotionJacobians(const Evaluate& evaluate, const BodyState& x_i, const BodyState& x_j) {
   MotionFactor factor;
   REQUIRE(evaluate(x_i, x_j, factor));
   const auto plus = [](const BodyState& x, const Vector15d& d) { return retracted(x, d); };
@@ -103,8 +100,8 @@ void checkJacobians(const Evaluate& evaluate, const BodyState& x_i, const BodySt
   // Row by row: a whitened rotation row is 1e3 times a bias row.
   for (int row = 0; row < kStateDim; ++row) {
     INFO("row " << row);
-    CHECK(relativeDifference(factor.jacobian_i.row(row), J_i.row(row)) < kJacobianTolerance);
-    CHECK(relativeDifference(factor.jacobian_j.row(row), J_j.row(row)) < kJacobianTolerance);
+    CHECK(relativeDifference(factor.jacobian_i.row(row), J_i.row(row)) < kMotionTolerance);
+    CHECK(relativeDifference(factor.jacobian_j.row(row), J_j.row(row)) < kMotionTolerance);
   }
 }
 
@@ -131,9 +128,9 @@ TEST_CASE("IMU factor: Jacobians in every block, biases off the increment's", "[
                                                x_i.bias_accel + randomVector(random, 0.1), random);
     // Half of the trials near the solution, half with a large residual (0.3 rad, 0.3 m).
     const BodyState x_j = reached(x_i, imu, noise, random, trial % 2 == 0 ? 1e-3 : 0.3);
-    checkJacobians([&](const BodyState& a, const BodyState& b,
-                       MotionFactor& f) { return imuFactor(imu, noise, a, b, a, b, f); },
-                   x_i, x_j);
+    checkMotionJacobians([&](const BodyState& a, const BodyState& b,
+                             MotionFactor& f) { return imuFactor(imu, noise, a, b, a, b, f); },
+                         x_i, x_j);
   }
 }
 
@@ -164,7 +161,7 @@ TEST_CASE("IMU factor: Jacobian by the gyro's matrix", "[smoother][imu_factor]")
     REQUIRE(imuFactor(imu, noise, x_i, x_j, x_i, x_j, factor, at));
     REQUIRE(factor.with_gyro);
     const auto J = numericJacobian<9, kGyroMatrixDim>(residual, at, plus, minus);
-    CHECK(relativeDifference(factor.jacobian_gyro_matrix, J) < kJacobianTolerance);
+    CHECK(relativeDifference(factor.jacobian_gyro_matrix, J) < kMotionTolerance);
   }
 }
 
@@ -261,9 +258,11 @@ TEST_CASE("Constant velocity factor: Jacobians and a zero", "[smoother][imu_fact
       INFO("duration " << duration << ", trial " << trial);
       const BodyState x_i = randomState(random);
       const BodyState x_j = reached(x_i, Preintegration(), noise, random, 0.3);
-      checkJacobians([&](const BodyState& a, const BodyState& b,
-                         MotionFactor& f) { return constantVelocityFactor(duration, noise, a, b, a, b, f); },
-                     x_i, x_j);
+      checkMotionJacobians(
+          [&](const BodyState& a, const BodyState& b, MotionFactor& f) {
+            return constantVelocityFactor(duration, noise, a, b, a, b, f);
+          },
+          x_i, x_j);
     }
     const BodyState x = randomState(random);
     BodyState coasted = x;

@@ -12,12 +12,12 @@
 #include "tests/support/numeric_jacobian.hpp"
 
 using namespace swiftlet;
+using test::kPixelSigma;
 using test::numericJacobian;
 using test::randomVector;
 
 namespace {
 
-constexpr double kPixelSigma = 0.6;
 // Of the elimination, written here once more: weak information on the inverse depth, relative damping.
 constexpr double kDepthInformation = 1.0 / (30.0 * 30.0);
 constexpr double kPointDamping = 1e-9;
@@ -25,7 +25,7 @@ constexpr double kPointDamping = 1e-9;
 constexpr std::array<std::uint8_t, 6> kSlots{5, 0, 17, 3, 23, 9};
 constexpr std::size_t kPoseOnly = 2;  // states that are poses only
 
-struct Window {
+struct SystemWindow {
   Rig rig = makeRig(RigKind::kEuroc).rig;
   CalibrationLayout calibration;
   std::array<WindowState, kMaxStates> states{};
@@ -36,7 +36,7 @@ struct Window {
   int dimension = 0;
 
   // Linearization poses differ from the current ones by `moved` [m, rad].
-  Window(bool time_offset, bool extrinsics, double moved, Random& random) {
+  SystemWindow(bool time_offset, bool extrinsics, double moved, Random& random) {
     calibration = {time_offset, extrinsics, rig.camera_count};
     const test::WindowScene scene = test::sceneAround(rig, kSlots.size(), 0.4, random);
     dimension = calibration.dimension();
@@ -94,7 +94,7 @@ struct Dense {
 };
 
 // Residual of one sighting with the image's stamp off by `shift` [s] and the linearization pose.
-Eigen::Vector2d shifted(const Window& w, const CameraSighting& view, std::size_t k, std::size_t c,
+Eigen::Vector2d shifted(const SystemWindow& w, const CameraSighting& view, std::size_t k, std::size_t c,
                         const LandmarkPoint& point, double shift) {
   const RigPose& rig = w.poses[kSlots[k]];
   const SE3 T(w.T_lin[k].rotation * expSo3(shift * rig.omega_body),
@@ -105,7 +105,7 @@ Eigen::Vector2d shifted(const Window& w, const CameraSighting& view, std::size_t
 }
 
 // Jacobian of one sighting over calibration, states and its landmark's three columns.
-Eigen::MatrixXd denseRow(const Window& w, const CameraSighting& view, std::uint32_t slot, std::size_t c,
+Eigen::MatrixXd denseRow(const SystemWindow& w, const CameraSighting& view, std::uint32_t slot, std::size_t c,
                          const LandmarkPoint& point, const PointBasis& basis, Eigen::Index landmark_column,
                          Eigen::Index columns) {
   const std::size_t k = w.timeOf(slot);
@@ -123,7 +123,7 @@ Eigen::MatrixXd denseRow(const Window& w, const CameraSighting& view, std::uint3
   return row;
 }
 
-Dense denseSystem(const Window& w) {
+Dense denseSystem(const SystemWindow& w) {
   const Eigen::Index n = w.dimension + 3 * static_cast<Eigen::Index>(w.landmarks.size());
   Dense dense{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n), 0};
   for (std::size_t m = 0; m < w.landmarks.size(); ++m) {
@@ -152,7 +152,7 @@ Dense denseSystem(const Window& w) {
 // Information that makes the system regular, as prior and IMU factors would.
 double regularization(Eigen::Index column) { return 10.0 + static_cast<double>(column % 7); }
 
-void checkAgainstDense(const Window& w) {
+void checkAgainstDense(const SystemWindow& w) {
   auto system = std::make_unique<NormalEquations>();
   system->begin(w.calibration, w.dimension);
   std::vector<EliminatedPoint> eliminated(w.landmarks.size());
@@ -204,8 +204,8 @@ TEST_CASE("Eliminating landmarks leaves the solution of the whole system", "[smo
   Random random(21);
   for (int trial = 0; trial < 3; ++trial) {
     INFO("trial " << trial);
-    checkAgainstDense(Window(false, false, 0, random));
-    checkAgainstDense(Window(false, false, 0.02, random));
+    checkAgainstDense(SystemWindow(false, false, 0, random));
+    checkAgainstDense(SystemWindow(false, false, 0.02, random));
   }
 }
 
@@ -213,15 +213,15 @@ TEST_CASE("Eliminating landmarks with calibration columns", "[smoother][normal_e
   Random random(22);
   for (const double moved : {0.0, 0.02}) {
     INFO("linearization moved by " << moved);
-    checkAgainstDense(Window(true, false, moved, random));
-    checkAgainstDense(Window(false, true, moved, random));
-    checkAgainstDense(Window(true, true, moved, random));
+    checkAgainstDense(SystemWindow(true, false, moved, random));
+    checkAgainstDense(SystemWindow(false, true, moved, random));
+    checkAgainstDense(SystemWindow(true, true, moved, random));
   }
 }
 
 TEST_CASE("A landmark needs two states", "[smoother][normal_equations]") {
   Random random(23);
-  Window w(false, false, 0, random);
+  SystemWindow w(false, false, 0, random);
   auto system = std::make_unique<NormalEquations>();
   system->begin(w.calibration, w.dimension);
   Landmark landmark = w.landmarks[0];
@@ -237,7 +237,7 @@ TEST_CASE("A landmark needs two states", "[smoother][normal_equations]") {
 
 TEST_CASE("Motion and diagonal factors land in their columns", "[smoother][normal_equations]") {
   Random random(24);
-  Window w(true, false, 0, random);
+  SystemWindow w(true, false, 0, random);
   auto system = std::make_unique<NormalEquations>();
   const WindowState& i = w.states[kSlots[3]];
   const WindowState& j = w.states[kSlots[4]];
@@ -284,7 +284,7 @@ TEST_CASE("Eliminated landmarks do not see position and yaw, wherever the states
   Random random(25);
   for (const double moved : {0.0, 0.05}) {
     INFO("current poses off the linearization by " << moved);
-    const Window w(false, false, moved, random);
+    const SystemWindow w(false, false, moved, random);
     auto system = std::make_unique<NormalEquations>();
     system->begin(w.calibration, w.dimension);
     for (const Landmark& landmark : w.landmarks) {

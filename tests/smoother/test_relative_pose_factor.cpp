@@ -7,17 +7,15 @@
 
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
+#include "tests/smoother/window_scene.hpp"
 #include "tests/support/numeric_jacobian.hpp"
 
 using namespace swiftlet;
 using test::numericJacobian;
+using test::randomVector;
 using test::relativeDifference;
 
 namespace {
-
-Eigen::Vector3d randomVector(Random& random, double scale) {
-  return scale * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
-}
 
 SE3 randomPose(Random& random) { return {expSo3(randomVector(random, 1)), randomVector(random, 3)}; }
 

@@ -15,6 +15,7 @@
 
 using namespace swiftlet;
 using test::boxPlus;
+using test::kPixelSigma;
 using test::numericJacobian;
 using test::randomVector;
 using test::relativeDifference;
@@ -22,8 +23,7 @@ using test::sightingOf;
 
 namespace {
 
-constexpr double kPixelSigma = 0.6;  // px
-constexpr double kJacobianTolerance = 1e-7;
+constexpr double kSightingTolerance = 1e-7;
 
 LandmarkPoint pointAt(const Eigen::Vector3d& reference, const Eigen::Vector3d& position) {
   LandmarkPoint point;
@@ -70,7 +70,7 @@ Case randomCase(const CameraModel& camera, double angle, Random& random) {
   return c;
 }
 
-void checkJacobians(const Case& c) {
+void checkSightingJacobians(const Case& c) {
   const CameraPose camera = placed(c, c.T_world_body, c.T_body_cam);
   const PointBasis basis = PointBasis::of(c.point.bearing);
   SightingJacobians J;
@@ -89,9 +89,9 @@ void checkJacobians(const Case& c) {
         return residual(c.T_world_body, c.T_body_cam, movedPoint(c.point, basis, d));
       },
       Eigen::Vector3d(Eigen::Vector3d::Zero()));
-  CHECK(relativeDifference(J.pose, of_pose) < kJacobianTolerance);
-  CHECK(relativeDifference(J.extrinsic, of_extrinsic) < kJacobianTolerance);
-  CHECK(relativeDifference(J.point, of_point) < kJacobianTolerance);
+  CHECK(relativeDifference(J.pose, of_pose) < kSightingTolerance);
+  CHECK(relativeDifference(J.extrinsic, of_extrinsic) < kSightingTolerance);
+  CHECK(relativeDifference(J.point, of_point) < kSightingTolerance);
 }
 
 }  // namespace
@@ -102,14 +102,14 @@ TEST_CASE("Reprojection Jacobians: pose, point and extrinsics", "[smoother][visi
   const CameraModel fisheye = test::wideFisheye();
   for (int trial = 0; trial < 60; ++trial) {
     INFO("trial " << trial);
-    checkJacobians(randomCase(pinhole, random.uniform(0, 0.6), random));
-    checkJacobians(randomCase(fisheye, random.uniform(0, 1.5), random));
+    checkSightingJacobians(randomCase(pinhole, random.uniform(0, 0.6), random));
+    checkSightingJacobians(randomCase(fisheye, random.uniform(0, 1.5), random));
     // Beyond 90 degrees, where z is negative.
-    checkJacobians(randomCase(fisheye, random.uniform(1.6, 1.9), random));
+    checkSightingJacobians(randomCase(fisheye, random.uniform(1.6, 1.9), random));
     Case rolling = randomCase(pinhole, random.uniform(0, 0.6), random);
     rolling.sighting.row = static_cast<float>(random.uniform(-0.5, 0.5));
     rolling.rows = {0.02, randomVector(random, 2), randomVector(random, 1), randomVector(random, 1)};
-    checkJacobians(rolling);
+    checkSightingJacobians(rolling);
   }
 }
 
@@ -163,7 +163,7 @@ TEST_CASE("Reprojection Jacobians at a point without depth", "[smoother][vision_
   const Eigen::Vector3d ray = (c.T_world_body * c.T_body_cam).rotation * c.sighting.ray();
   c.point.bearing = ray;
   c.point.inverse_depth = 0;
-  checkJacobians(c);
+  checkSightingJacobians(c);
   SightingJacobians J;
   REQUIRE(reprojectionJacobians(c.sighting, CameraPose::of(c.T_world_body, c.T_body_cam), c.T_body_cam,
                                 c.point, PointBasis::of(c.point.bearing), true, J));

@@ -13,6 +13,8 @@
 
 namespace swiftlet::test {
 
+inline constexpr double kPixelSigma = 0.6;  // of sightings, px
+
 inline Eigen::Vector3d randomVector(Random& random, double scale) {
   return scale * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
 }

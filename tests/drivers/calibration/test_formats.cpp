@@ -295,14 +295,14 @@ TEST_CASE("Basalt: other lenses, the time offset's sign, scale and misalignment"
   CHECK(anyContains(calibration.warnings, "calib_accel_bias: scale and misalignment of up to 1.6 %"));
 
   const auto lens = [](const std::string& type, const std::string& last) {
-    std::string json(kBasaltEuroc);
+    std::string basalt(kBasaltEuroc);
     for (int i = 0; i < 2; ++i)
-      json = edited(json, "\"camera_type\": \"ds\"", "\"camera_type\": \"" + type + "\"");
-    json = edited(json, "\"xi\": -0.2409573942178872, \"alpha\": 0.566996899163044", last);
-    json = edited(json, "\"xi\": -0.21300835384809328, \"alpha\": 0.5767008625037023", last);
-    json = edited(edited(json, "349.756", "459.756"), "348.724", "458.724");
-    json = edited(edited(json, "361.671", "459.671"), "360.585", "458.585");
-    return parseBasaltCalibration({"basalt.json", json});
+      basalt = edited(basalt, "\"camera_type\": \"ds\"", "\"camera_type\": \"" + type + "\"");
+    basalt = edited(basalt, "\"xi\": -0.2409573942178872, \"alpha\": 0.566996899163044", last);
+    basalt = edited(basalt, "\"xi\": -0.21300835384809328, \"alpha\": 0.5767008625037023", last);
+    basalt = edited(edited(basalt, "349.756", "459.756"), "348.724", "458.724");
+    basalt = edited(edited(basalt, "361.671", "459.671"), "360.585", "458.585");
+    return parseBasaltCalibration({"basalt.json", basalt});
   };
   CHECK(contains(lens("eucm", R"("alpha": 0.59, "beta": 1.127)").conversion[0],
                  "eucm as equidistant: 0.000 px"));

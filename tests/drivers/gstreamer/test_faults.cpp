@@ -111,7 +111,8 @@ class BreakableFeed : public test::Feed {
   bool startHangs() override { return hangs.load(); }
 };
 
-constexpr const char* kFed = "feedsrc feed=0 ! video/x-raw,format=GRAY8,width=64,height=48,framerate=50/1";
+constexpr const char* kBreakableFeed =
+    "feedsrc feed=0 ! video/x-raw,format=GRAY8,width=64,height=48,framerate=50/1";
 
 /// A feed that is known for as long as this lives, and longer than the source that a case makes after it.
 struct Fed {
@@ -142,7 +143,7 @@ int reopen(PipelineSource& source, double& longest) {
 
 TEST_CASE("A pipeline that dies or ends says so and comes back", "[gstreamer]") {
   Fed fed;
-  PipelineSource source(pipeline(kFed, 64, 48, 50));
+  PipelineSource source(pipeline(kBreakableFeed, 64, 48, 50));
   REQUIRE(source.open().ok());
   CapturedFrame held = awaitFrame(source);
   REQUIRE(held.valid());
@@ -176,7 +177,7 @@ TEST_CASE("A pipeline that dies or ends says so and comes back", "[gstreamer]") 
 
 TEST_CASE("A pipeline that hangs as it starts again does not hold its thread up", "[gstreamer]") {
   Fed fed;
-  PipelineSource source(pipeline(kFed, 64, 48, 50));
+  PipelineSource source(pipeline(kBreakableFeed, 64, 48, 50));
   REQUIRE(source.open().ok());
   fed.feed.dies.store(true);
   static_cast<void>(faultOf(source));
@@ -196,7 +197,7 @@ TEST_CASE("A pipeline that hangs as it starts again does not hold its thread up"
 
 TEST_CASE("Damaged and short buffers are counted and left out", "[gstreamer]") {
   Fed fed;
-  PipelineSource source(pipeline(kFed, 64, 48, 50));
+  PipelineSource source(pipeline(kBreakableFeed, 64, 48, 50));
   REQUIRE(source.open().ok());
   const auto countIs = [&](const std::uint64_t& count) {
     for (int i = 0; i < 500 && count == 0; ++i) {
@@ -217,7 +218,7 @@ TEST_CASE("Damaged and short buffers are counted and left out", "[gstreamer]") {
 
 TEST_CASE("Two frames are lent out at most, and none outlives its source's close", "[gstreamer]") {
   Fed fed;
-  PipelineSource source(pipeline(kFed, 64, 48, 50));
+  PipelineSource source(pipeline(kBreakableFeed, 64, 48, 50));
   REQUIRE(source.open().ok());
   CapturedFrame first = awaitFrame(source);
   CapturedFrame second = awaitFrame(source);
@@ -246,7 +247,7 @@ TEST_CASE("GStreamer's threads do not run at the priority of who opens", "[gstre
     priority.sched_priority = 5;
     pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority);
     of_opener = sched_getscheduler(0);
-    PipelineSource source(pipeline(kFed, 64, 48, 50));
+    PipelineSource source(pipeline(kBreakableFeed, 64, 48, 50));
     opened = source.open().ok();
   });
   opener.join();

@@ -193,14 +193,15 @@ class TimedFeed : public test::Feed {
   Stamp due_;
 };
 
-constexpr const char* kFed = "feedsrc feed=0 ! video/x-raw,format=GRAY8,width=64,height=48,framerate=100/1";
+constexpr const char* kTimedFeed =
+    "feedsrc feed=0 ! video/x-raw,format=GRAY8,width=64,height=48,framerate=100/1";
 
 TEST_CASE("A stamp is the moment of capture that the source gives, to the nanosecond", "[gstreamer]") {
   TimedFeed feed;
   feed.numbered = true;
   test::setFeed(0, &feed);
   {
-    PipelineSource source(pipeline(kFed, 64, 48, 100));
+    PipelineSource source(pipeline(kTimedFeed, 64, 48, 100));
     REQUIRE(source.open().ok());
     for (int i = 0; i < 50; ++i) {
       const CapturedFrame frame = awaitFrame(source);
@@ -218,8 +219,8 @@ TEST_CASE("Without times of capture the arrival is the stamp, and a warning says
   feed.timed = false;
   test::setFeed(0, &feed);
   for (const std::string& text :
-       {std::string(kFed), std::string("videotestsrc is-live=true do-timestamp=true ! "
-                                       "video/x-raw,width=64,height=48,framerate=100/1")}) {
+       {std::string(kTimedFeed), std::string("videotestsrc is-live=true do-timestamp=true ! "
+                                             "video/x-raw,width=64,height=48,framerate=100/1")}) {
     PipelineSource source(pipeline(text, 64, 48, 100));
     REQUIRE(source.open().ok());
     CHECK(source.facts().event == StampEvent::kArrival);
@@ -268,7 +269,7 @@ TEST_CASE("Frames that lack are counted: dropped in the pipeline, and not fetche
   TimedFeed feed;
   test::setFeed(0, &feed);
   {
-    PipelineSource fed(pipeline(kFed, 64, 48, 100));
+    PipelineSource fed(pipeline(kTimedFeed, 64, 48, 100));
     REQUIRE(fed.open().ok());
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     feed.paused.store(true);

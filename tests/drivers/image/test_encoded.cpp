@@ -23,27 +23,27 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr int kWidth = 324;  // libv4l wants whole groups of four
-constexpr int kHeight = 46;
+constexpr int kEncodedWidth = 324;  // libv4l wants whole groups of four
+constexpr int kEncodedHeight = 46;
 
-Bytes greyOf(const char* fourcc, const Bytes& bytes, int width = kWidth) {
+Bytes greyOf(const char* fourcc, const Bytes& bytes, int width = kEncodedWidth) {
   RawImage image;
   image.format = *pixelFormat(fourcc);
   image.width = width;
-  image.height = kHeight;
+  image.height = kEncodedHeight;
   image.stride = image.format.rowBytes(width);
   image.data = bytes.data();
-  REQUIRE(bytes.size() >= static_cast<std::size_t>(image.stride * kHeight));
+  REQUIRE(bytes.size() >= static_cast<std::size_t>(image.stride * kEncodedHeight));
   GreyReader reader;
-  reader.reserve(image.format, width, kHeight, false);
+  reader.reserve(image.format, width, kEncodedHeight, false);
   Bytes out;
   for (const ImageView& view : reader.read(image)) {
-    for (int y = 0; y < kHeight; ++y) out.insert(out.end(), view.row(y), view.row(y) + width);
+    for (int y = 0; y < kEncodedHeight; ++y) out.insert(out.end(), view.row(y), view.row(y) + width);
   }
   return out;
 }
 
-int farthest(const Bytes& a, const Bytes& b) {
+int largestDifference(const Bytes& a, const Bytes& b) {
   REQUIRE(a.size() == b.size());
   int worst = 0;
   for (std::size_t i = 0; i < a.size(); ++i) worst = std::max(worst, std::abs(a[i] - b[i]));
@@ -51,9 +51,9 @@ int farthest(const Bytes& a, const Bytes& b) {
 }
 
 TEST_CASE("FFmpeg's pixels of every layout become the grey of its own conversion", "[image]") {
-  const ffmpeg::Picture picture = ffmpeg::picture(kWidth, kHeight);
+  const ffmpeg::Picture picture = ffmpeg::picture(kEncodedWidth, kEncodedHeight);
   Bytes luma = ffmpeg::as(picture, "yuv444p");
-  luma.resize(static_cast<std::size_t>(kWidth * kHeight));
+  luma.resize(static_cast<std::size_t>(kEncodedWidth * kEncodedHeight));
   const Bytes grey = ffmpeg::as(picture, "gray");
   struct Pair {
     const char* fourcc;
@@ -66,14 +66,14 @@ TEST_CASE("FFmpeg's pixels of every layout become the grey of its own conversion
                         {"YM12", "yuv420p", luma}, {"YV12", "yuv420p", luma}, {"422P", "yuv422p", luma},
                         {"YUYV", "yuyv422", luma}, {"YVYU", "yvyu422", luma}, {"UYVY", "uyvy422", luma}};
   for (const Pair& pair : pairs) {
-    const int worst = farthest(greyOf(pair.fourcc, ffmpeg::as(picture, pair.name)), pair.reference);
+    const int worst = largestDifference(greyOf(pair.fourcc, ffmpeg::as(picture, pair.name)), pair.reference);
     std::printf("%s from FFmpeg's %s: at most %d levels\n", pair.fourcc, pair.name, worst);
     CHECK(worst <= 1);
   }
 }
 
 TEST_CASE("FFmpeg's colours of every order become their luma, also by ROS's names", "[image]") {
-  const ffmpeg::Picture picture = ffmpeg::picture(kWidth, kHeight);
+  const ffmpeg::Picture picture = ffmpeg::picture(kEncodedWidth, kEncodedHeight);
   Bytes expected;
   for (std::size_t i = 0; i < picture.rgb.size(); i += 3) {
     const double luma = 0.299 * picture.rgb[i] + 0.587 * picture.rgb[i + 1] + 0.114 * picture.rgb[i + 2];
@@ -87,24 +87,24 @@ TEST_CASE("FFmpeg's colours of every order become their luma, also by ROS's name
   for (const Pair& pair :
        {Pair{"RGB3", "rgb8", "rgb24"}, Pair{"BGR3", "bgr8", "bgr24"}, Pair{"AB24", "rgba8", "rgba"},
         Pair{"XB24", nullptr, "rgb0"}, Pair{"AR24", "bgra8", "bgra"}, Pair{"XR24", nullptr, "bgr0"}}) {
-    CHECK(farthest(greyOf(pair.fourcc, ffmpeg::as(picture, pair.name)), expected) <= 1);
+    CHECK(largestDifference(greyOf(pair.fourcc, ffmpeg::as(picture, pair.name)), expected) <= 1);
     if (pair.ros != nullptr) CHECK(rosEncoding(pair.ros, false) == pixelFormat(pair.fourcc));
   }
 }
 
 TEST_CASE("Pixels of 16 bits with the high byte first", "[image]") {
-  const ffmpeg::Picture picture = ffmpeg::picture(kWidth, kHeight);
+  const ffmpeg::Picture picture = ffmpeg::picture(kEncodedWidth, kEncodedHeight);
   const Bytes bytes = ffmpeg::as(picture, "gray16be");
   RawImage image;
   image.format = rosEncoding("mono16", true).value();
-  image.width = kWidth;
-  image.height = kHeight;
-  image.stride = image.format.rowBytes(kWidth);
+  image.width = kEncodedWidth;
+  image.height = kEncodedHeight;
+  image.stride = image.format.rowBytes(kEncodedWidth);
   image.data = bytes.data();
   GreyReader reader;
-  reader.reserve(image.format, kWidth, kHeight, false);
+  reader.reserve(image.format, kEncodedWidth, kEncodedHeight, false);
   const ImageView view = reader.read(image)[0];
-  const Bytes grey(view.row(0), view.row(0) + kWidth * kHeight);
+  const Bytes grey(view.row(0), view.row(0) + kEncodedWidth * kEncodedHeight);
   CHECK(grey == greyOf("Y16", ffmpeg::as(picture, "gray16le")));
 }
 
@@ -129,10 +129,10 @@ class Bits {
 Bytes packed(const std::vector<unsigned>& pixels, unsigned bits) {
   const std::size_t group = bits == 10 ? 4 : 2;
   Bits out;
-  for (int y = 0; y < kHeight; ++y) {
-    for (std::size_t x = 0; x < kWidth; x += group) {
+  for (int y = 0; y < kEncodedHeight; ++y) {
+    for (std::size_t x = 0; x < kEncodedWidth; x += group) {
       const auto at = [&](std::size_t i) {
-        return x + i < kWidth ? pixels[static_cast<std::size_t>(y) * kWidth + x + i] : 0U;
+        return x + i < kEncodedWidth ? pixels[static_cast<std::size_t>(y) * kEncodedWidth + x + i] : 0U;
       };
       for (std::size_t i = 0; i < group; ++i) out.put(at(i) >> (bits - 8), 8);
       for (std::size_t i = group; i-- > 0;) out.put(at(i) & ((1U << (bits - 8)) - 1), bits - 8);
@@ -152,14 +152,14 @@ std::vector<unsigned> deep(const ffmpeg::Picture& picture, unsigned bits) {
 }
 
 TEST_CASE("Packed grey of a packer that goes bit by bit", "[image]") {
-  const ffmpeg::Picture picture = ffmpeg::picture(kWidth, kHeight);
+  const ffmpeg::Picture picture = ffmpeg::picture(kEncodedWidth, kEncodedHeight);
   const Bytes grey = ffmpeg::as(picture, "gray");
-  CHECK(farthest(greyOf("Y10P", packed(deep(picture, 10), 10)), grey) <= 1);
-  CHECK(farthest(greyOf("Y12P", packed(deep(picture, 12), 12)), grey) <= 1);
+  CHECK(largestDifference(greyOf("Y10P", packed(deep(picture, 10), 10)), grey) <= 1);
+  CHECK(largestDifference(greyOf("Y12P", packed(deep(picture, 12), 12)), grey) <= 1);
 }
 
 TEST_CASE("Two cameras pixel beside pixel", "[image]") {
-  ffmpeg::Picture picture = ffmpeg::picture(kWidth, kHeight);
+  ffmpeg::Picture picture = ffmpeg::picture(kEncodedWidth, kEncodedHeight);
   const Bytes left = ffmpeg::as(picture, "gray");
   std::ranges::reverse(picture.rgb);
   const Bytes right = ffmpeg::as(picture, "gray");
@@ -176,11 +176,11 @@ TEST_CASE("Two cameras pixel beside pixel", "[image]") {
 /// The sensor's pixels behind a filter of this order ("RGGB": red at the top left).
 std::vector<unsigned> filtered(const ffmpeg::Picture& picture, const std::string& order, unsigned bits) {
   std::vector<unsigned> pixels;
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
+  for (int y = 0; y < kEncodedHeight; ++y) {
+    for (int x = 0; x < kEncodedWidth; ++x) {
       const char colour = order[static_cast<std::size_t>(2 * (y % 2) + x % 2)];
       const std::size_t channel = colour == 'R' ? 0 : colour == 'G' ? 1 : 2;
-      pixels.push_back(unsigned{picture.rgb[3 * static_cast<std::size_t>(y * kWidth + x) + channel]}
+      pixels.push_back(unsigned{picture.rgb[3 * static_cast<std::size_t>(y * kEncodedWidth + x) + channel]}
                        << (bits - 8));
     }
   }
@@ -200,15 +200,15 @@ Bytes byLibv4l(std::uint32_t format, const Bytes& bytes, int stride) {
   REQUIRE(converter);
   v4l2_format from = {};
   from.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  from.fmt.pix.width = kWidth;
-  from.fmt.pix.height = kHeight;
+  from.fmt.pix.width = kEncodedWidth;
+  from.fmt.pix.height = kEncodedHeight;
   from.fmt.pix.pixelformat = format;
   from.fmt.pix.bytesperline = static_cast<std::uint32_t>(stride);
   from.fmt.pix.sizeimage = static_cast<std::uint32_t>(bytes.size());
   v4l2_format to = from;
   to.fmt.pix.pixelformat = V4L2_PIX_FMT_RGB24;
-  to.fmt.pix.bytesperline = 3 * kWidth;
-  to.fmt.pix.sizeimage = 3 * kWidth * kHeight;
+  to.fmt.pix.bytesperline = 3 * kEncodedWidth;
+  to.fmt.pix.sizeimage = 3 * kEncodedWidth * kEncodedHeight;
   Bytes source = bytes;
   Bytes rgb(to.fmt.pix.sizeimage);
   const int written =
@@ -224,7 +224,7 @@ Bytes byLibv4l(std::uint32_t format, const Bytes& bytes, int stride) {
 }
 
 TEST_CASE("Pixels behind a Bayer filter become the grey of libv4l's colours", "[image]") {
-  const ffmpeg::Picture picture = ffmpeg::picture(kWidth, kHeight);
+  const ffmpeg::Picture picture = ffmpeg::picture(kEncodedWidth, kEncodedHeight);
   struct Order {
     const char* order;
     const char* bytes;
@@ -246,12 +246,12 @@ TEST_CASE("Pixels behind a Bayer filter become the grey of libv4l's colours", "[
     const Bytes grey = greyOf(order.bytes, eight);
     const Bytes ten = packed(filtered(picture, order.order, 10), 10);
     int worst = 0;
-    for (const Bytes& reference :
-         {byLibv4l(code(order.bytes), eight, kWidth), byLibv4l(code(order.packed10), ten, 5 * kWidth / 4)}) {
+    for (const Bytes& reference : {byLibv4l(code(order.bytes), eight, kEncodedWidth),
+                                   byLibv4l(code(order.packed10), ten, 5 * kEncodedWidth / 4)}) {
       // libv4l copies pixels at the border instead of mirroring them.
-      for (int y = 2; y < kHeight - 2; ++y) {
-        for (int x = 2; x < kWidth - 2; ++x) {
-          const auto i = static_cast<std::size_t>(y * kWidth + x);
+      for (int y = 2; y < kEncodedHeight - 2; ++y) {
+        for (int x = 2; x < kEncodedWidth - 2; ++x) {
+          const auto i = static_cast<std::size_t>(y * kEncodedWidth + x);
           worst = std::max(worst, std::abs(grey[i] - reference[i]));
         }
       }
@@ -259,14 +259,15 @@ TEST_CASE("Pixels behind a Bayer filter become the grey of libv4l's colours", "[
     std::printf("%s and %s beside libv4l: at most %d levels\n", order.bytes, order.packed10, worst);
     CHECK(worst <= 1);
     // The same pixels packed, and in words.
-    CHECK(farthest(greyOf(order.packed10, ten), grey) <= 1);
-    CHECK(farthest(greyOf(order.packed12, packed(filtered(picture, order.order, 12), 12)), grey) <= 1);
+    CHECK(largestDifference(greyOf(order.packed10, ten), grey) <= 1);
+    CHECK(largestDifference(greyOf(order.packed12, packed(filtered(picture, order.order, 12), 12)), grey) <=
+          1);
     Bytes words;
     for (const unsigned pixel : filtered(picture, order.order, 10)) {
       words.push_back(static_cast<std::uint8_t>(pixel & 0xFFU));
       words.push_back(static_cast<std::uint8_t>(pixel >> 8U));
     }
-    CHECK(farthest(greyOf(order.words, words), grey) <= 1);
+    CHECK(largestDifference(greyOf(order.words, words), grey) <= 1);
   }
 }
 

@@ -11,7 +11,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr Duration kStep = Duration::fromMilliseconds(1);
+constexpr Duration kLinkStep = Duration::fromMilliseconds(1);
 constexpr Stamp kBegin{50'000'000'000};
 
 /// The autopilot's side: everything that it heard.
@@ -64,7 +64,7 @@ class Flight {
   bool states_come = true;
 
   void fly(Duration time) {
-    for (const Stamp end = now + time; now < end; now = now + kStep) {
+    for (const Stamp end = now + time; now < end; now = now + kLinkStep) {
       constexpr std::int64_t kStatePeriod = 5'000'000;
       if (states_come && (now - kBegin).ns % kStatePeriod == 0) {
         state_.stamp = now - Duration::fromMilliseconds(3);
@@ -149,7 +149,7 @@ TEST_CASE("A state that comes late is not sent as new", "[mavlink]") {
   AutopilotLink link({});
   NavState state;
   state.health = Health::kGood;
-  state.stamp = kBegin - AutopilotLink::kOldest - kStep;
+  state.stamp = kBegin - AutopilotLink::kOldest - kLinkStep;
   std::array<std::uint8_t, AutopilotLink::kMostBytes> bytes;
   static_cast<void>(link.step(kBegin, &state, Eigen::Vector3d::Zero(), bytes));
   CHECK(link.counters().poses == 0);
@@ -167,7 +167,7 @@ TEST_CASE("TIMESYNC is answered with our clock and the asker's stamp, at once", 
   const std::size_t length = mavlink::write(asker, request, bytes);
   flight.link.receive(std::span(bytes).first(length), flight.now, Duration{});
   const Stamp asked = flight.now;
-  flight.fly(kStep);
+  flight.fly(kLinkStep);
   REQUIRE(flight.autopilot.answers.size() == 1);
   const mavlink::Timesync& answer = flight.autopilot.answers[0];
   CHECK(answer.ts1 == request.ts1);
@@ -177,7 +177,7 @@ TEST_CASE("TIMESYNC is answered with our clock and the asker's stamp, at once", 
   // An answer is no request.
   const mavlink::Timesync other{55, 66, 0, 0};
   flight.link.receive(std::span(bytes).first(mavlink::write(asker, other, bytes)), flight.now, Duration{});
-  flight.fly(kStep);
+  flight.fly(kLinkStep);
   CHECK(flight.autopilot.answers.size() == 1);
 }
 

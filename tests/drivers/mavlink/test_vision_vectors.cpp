@@ -55,8 +55,8 @@ mavlink::ObstacleDistance obstaclesOf(const json& v) {
   return m;
 }
 
-std::size_t writeFrom(const std::string& kind, const json& v, MavlinkSender& sender,
-                      std::span<std::uint8_t> out) {
+std::size_t writeVision(const std::string& kind, const json& v, MavlinkSender& sender,
+                        std::span<std::uint8_t> out) {
   if (kind == "ODOMETRY") return mavlink::write(sender, odometryOf(v), out);
   if (kind == "VISION_POSITION_ESTIMATE") return mavlink::write(sender, estimateOf(v), out);
   if (kind == "OBSTACLE_DISTANCE") return mavlink::write(sender, obstaclesOf(v), out);
@@ -89,7 +89,7 @@ TEST_CASE("What an autopilot is told is written as node-mavlink writes it, and r
     const MavlinkSender fresh = {vector["system"], vector["component"], vector["sequence"]};
     MavlinkSender sender = fresh;
     std::array<std::uint8_t, kLongestMavlinkFrame> out = {};
-    CHECK(hexOf(std::span(out).first(writeFrom(kind, vector["values"], sender, out))) == hex);
+    CHECK(hexOf(std::span(out).first(writeVision(kind, vector["values"], sender, out))) == hex);
     MavlinkParser parser;
     const auto frames = parse(parser, bytesOf(vector));
     REQUIRE(frames.size() == 1);

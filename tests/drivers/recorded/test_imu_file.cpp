@@ -8,7 +8,7 @@ using test::anyContains;
 using test::contains;
 using test::errorOf;
 
-constexpr const char* kHeader =
+constexpr const char* kImuHeader =
     "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y "
     "[m "
     "s^-2],a_RS_S_z [m s^-2]\n";
@@ -20,16 +20,16 @@ std::string rows(int first, int last) {
   return text;
 }
 
-struct Read {
+struct ReadImu {
   LogCounters counters;
   LogWarnings warnings;
   std::vector<ImuSample> samples;
-  explicit Read(const std::string& text) { samples = readImuText("imu.csv", text, counters, warnings); }
+  explicit ReadImu(const std::string& text) { samples = readImuText("imu.csv", text, counters, warnings); }
 };
 
 TEST_CASE("gyro comes first; stamps are exact", "[imu_file]") {
-  const Read read(std::string(kHeader) +
-                  "1403636579758555392,-0.0992,0.1473,0.0293,8.1447,-0.3759,-2.4026\n");
+  const ReadImu read(std::string(kImuHeader) +
+                     "1403636579758555392,-0.0992,0.1473,0.0293,8.1447,-0.3759,-2.4026\n");
   REQUIRE(read.samples.size() == 1);
   CHECK(read.samples[0].stamp.ns == 1403636579758555392);
   CHECK(read.samples[0].gyro == Eigen::Vector3d(-0.0992, 0.1473, 0.0293));
@@ -38,10 +38,10 @@ TEST_CASE("gyro comes first; stamps are exact", "[imu_file]") {
 }
 
 TEST_CASE("copies that vary in blanks, line ends and headers read the same", "[imu_file]") {
-  const Read reference(kHeader + rows(0, 20));
-  std::string text = kHeader + rows(0, 20);
+  const ReadImu reference(kImuHeader + rows(0, 20));
+  std::string text = kImuHeader + rows(0, 20);
   SECTION("no header") { text = rows(0, 20); }
-  SECTION("header without #") { text = std::string(kHeader).substr(1) + rows(0, 20); }
+  SECTION("header without #") { text = std::string(kImuHeader).substr(1) + rows(0, 20); }
   SECTION("byte order mark") { text = "\xEF\xBB\xBF" + text; }
   SECTION("no end of line at the end") { text.pop_back(); }
   SECTION("blank lines and comments") { text = "\n# a comment\n" + text + "\n\n# end\n"; }
@@ -55,7 +55,7 @@ TEST_CASE("copies that vary in blanks, line ends and headers read the same", "[i
     for (const char c : text) other += c == '\n' ? ",25.0\n" : std::string(1, c);
     text = other;
   }
-  const Read read(text);
+  const ReadImu read(text);
   REQUIRE(read.samples.size() == 20);
   for (std::size_t i = 0; i < 20; ++i) {
     CHECK(read.samples[i].stamp == reference.samples[i].stamp);
@@ -65,7 +65,7 @@ TEST_CASE("copies that vary in blanks, line ends and headers read the same", "[i
 }
 
 TEST_CASE("rows out of order are sorted, repeated stamps dropped, both counted", "[imu_file]") {
-  const Read read(kHeader + rows(0, 5) + rows(7, 10) + rows(5, 7) + rows(9, 20));
+  const ReadImu read(kImuHeader + rows(0, 5) + rows(7, 10) + rows(5, 7) + rows(9, 20));
   REQUIRE(read.samples.size() == 20);
   for (std::size_t i = 1; i < 20; ++i) CHECK(read.samples[i - 1].stamp < read.samples[i].stamp);
   CHECK(read.counters.out_of_order == 2);
@@ -75,7 +75,7 @@ TEST_CASE("rows out of order are sorted, repeated stamps dropped, both counted",
 }
 
 TEST_CASE("a row with text is skipped, counted and named", "[imu_file]") {
-  const Read read(kHeader + rows(0, 3) + "1015000000,0.1,oops,0.3,9.7,0.5,-1.25\n" + rows(4, 20));
+  const ReadImu read(kImuHeader + rows(0, 3) + "1015000000,0.1,oops,0.3,9.7,0.5,-1.25\n" + rows(4, 20));
   CHECK(read.samples.size() == 19);
   CHECK(read.counters.bad_rows == 1);
   REQUIRE(read.warnings.lines().size() == 1);
@@ -84,8 +84,9 @@ TEST_CASE("a row with text is skipped, counted and named", "[imu_file]") {
 
 TEST_CASE("NaN, short, long and binary rows are skipped and counted", "[imu_file]") {
   const std::string binary("\x00\x01\xff,1,2,3,4,5,6\n", 16);
-  const Read read(kHeader + rows(0, 30) + "1150000000,0.1,nan,0.3,9.7,0.5,-1.25\n" + "1155000000,0.1,0.2\n" +
-                  "1160000000," + std::string(5000, '1') + "\n" + binary + rows(34, 60));
+  const ReadImu read(kImuHeader + rows(0, 30) + "1150000000,0.1,nan,0.3,9.7,0.5,-1.25\n" +
+                     "1155000000,0.1,0.2\n" + "1160000000," + std::string(5000, '1') + "\n" + binary +
+                     rows(34, 60));
   CHECK(read.samples.size() == 56);
   CHECK(read.counters.nan_rows == 1);
   CHECK(read.counters.bad_rows == 3);
@@ -95,23 +96,23 @@ TEST_CASE("NaN, short, long and binary rows are skipped and counted", "[imu_file
 }
 
 TEST_CASE("many bad rows show only the first few lines", "[imu_file]") {
-  std::string text = kHeader + rows(0, 200);
+  std::string text = kImuHeader + rows(0, 200);
   for (int i = 0; i < 15; ++i) text += "x\n";
-  const Read read(text);
+  const ReadImu read(text);
   CHECK(read.counters.bad_rows == 15);
   CHECK(read.warnings.lines().size() == LogWarnings::kPerKind);
   CHECK(contains(read.warnings.lines().back(), "of this kind are only counted"));
 }
 
 TEST_CASE("a file of another kind is refused with its first bad line", "[imu_file]") {
-  const InputError mixed = errorOf([] { Read(kHeader + rows(0, 5) + "a,b\nc,d\ne,f\ng,h\n"); });
+  const InputError mixed = errorOf([] { ReadImu(kImuHeader + rows(0, 5) + "a,b\nc,d\ne,f\ng,h\n"); });
   CHECK(mixed.line == 7);
   CHECK(contains(mixed.message, "4 of 9 rows"));
-  CHECK(contains(errorOf([] { Read(""); }).message, "no IMU samples"));
-  CHECK(contains(errorOf([] { Read{kHeader}; }).message, "no IMU samples"));
-  const InputError trajectory = errorOf([] { Read("1.0 0 0 0 0 0 0 1\n2.0 0 0 0 0 0 0 1\n"); });
+  CHECK(contains(errorOf([] { ReadImu(""); }).message, "no IMU samples"));
+  CHECK(contains(errorOf([] { ReadImu{kImuHeader}; }).message, "no IMU samples"));
+  const InputError trajectory = errorOf([] { ReadImu("1.0 0 0 0 0 0 0 1\n2.0 0 0 0 0 0 0 1\n"); });
   CHECK(trajectory.line == 1);
-  CHECK(contains(errorOf([] { Read("1,nan,0,0,0,0,9.8\n"); }).message, "not finite"));
+  CHECK(contains(errorOf([] { ReadImu("1,nan,0,0,0,0,9.8\n"); }).message, "not finite"));
 }
 
 TEST_CASE("units and column order are watched", "[imu_file]") {
@@ -124,11 +125,11 @@ TEST_CASE("units and column order are watched", "[imu_file]") {
     in_g += stamp + ",0.1,-0.2,0.3,0.99,0.05,-0.1\n";
     degrees += stamp + ",30,-20,40,9.7,0.5,-1.25\n";
   }
-  CHECK(contains(errorOf([&] { Read{swapped}; }).remedy, "swapped"));
-  CHECK(contains(errorOf([&] { Read{in_g}; }).remedy, "in g"));
-  CHECK(anyContains(Read(degrees).warnings.lines(), "deg/s"));
+  CHECK(contains(errorOf([&] { ReadImu{swapped}; }).remedy, "swapped"));
+  CHECK(contains(errorOf([&] { ReadImu{in_g}; }).remedy, "in g"));
+  CHECK(anyContains(ReadImu(degrees).warnings.lines(), "deg/s"));
   // A header that says so makes the order legal.
-  const Read named("#timestamp [ns],a_RS_S_x,a_RS_S_y,a_RS_S_z,w_RS_S_x,w_RS_S_y,w_RS_S_z\n" + swapped);
+  const ReadImu named("#timestamp [ns],a_RS_S_x,a_RS_S_y,a_RS_S_z,w_RS_S_x,w_RS_S_y,w_RS_S_z\n" + swapped);
   CHECK(named.samples[0].accel == Eigen::Vector3d(9.7, 0.5, -1.25));
   CHECK(anyContains(named.warnings.lines(), "accelerometer first"));
   for (const char* header :
@@ -137,7 +138,7 @@ TEST_CASE("units and column order are watched", "[imu_file]") {
         "angular_velocity.x,angular_velocity.y,angular_velocity.z",
         "stamp [ns],a_x [m/s^2],a_y [m/s^2],a_z [m/s^2],w_x [rad/s],w_y [rad/s],w_z [rad/s]"}) {
     INFO(header);
-    CHECK(Read(std::string(header) + "\n" + swapped).samples[0].accel == Eigen::Vector3d(9.7, 0.5, -1.25));
+    CHECK(ReadImu(std::string(header) + "\n" + swapped).samples[0].accel == Eigen::Vector3d(9.7, 0.5, -1.25));
   }
 }
 
@@ -147,14 +148,14 @@ TEST_CASE("linear acceleration is not taken for g", "[imu_file]") {
     linear += std::to_string(5000000LL * (i + 1)) + ",0.1,-0.2,0.3," +
               std::to_string(1.5 * std::sin(0.01 * i)) + ",0.05,-0.1\n";
   }
-  const Read read(linear);
+  const ReadImu read(linear);
   CHECK(forceLevel(read.samples).median == Approx(1.05).margin(0.1));
   CHECK_FALSE(forceLevel(read.samples).inG());
   CHECK(anyContains(read.warnings.lines(), "far from 9.81"));
 }
 
 TEST_CASE("the rate is the median of the periods", "[imu_file]") {
-  const Read read(rows(0, 100) + rows(400, 420));
+  const ReadImu read(rows(0, 100) + rows(400, 420));
   CHECK(medianRate(read.samples) == Approx(200));
   CHECK(medianRate({}) == 0);
 }

@@ -8,7 +8,7 @@ namespace {
 using test::anyContains;
 using test::contains;
 
-constexpr const char* kHeader = "#timestamp [ns],id,camera,u [px],v [px],keyframe\n";
+constexpr const char* kTrackHeader = "#timestamp [ns],id,camera,u [px],v [px],keyframe\n";
 
 std::vector<TrackedFrame> readAllTracks(TrackReader& reader) {
   std::vector<TrackedFrame> frames;
@@ -83,7 +83,7 @@ TEST_CASE("tracks out and in again are the same to the bit", "[track_file]") {
 }
 
 TEST_CASE("both cameras' sightings of a landmark are one feature, in any order of lines", "[track_file]") {
-  const auto frames = readTracksText(std::string(kHeader) +
+  const auto frames = readTracksText(std::string(kTrackHeader) +
                                      "100,7,1,30,40,1\n100,8,0,1,2,1\n100,7,0,31,41,1\n"
                                      "200,,,,,0\n"
                                      "300,8,0,3,4,0\n");
@@ -138,14 +138,14 @@ TEST_CASE("what is malformed is refused with line, field and remedy", "[track_fi
   };
   for (const Case& bad : cases) {
     INFO(bad.rows);
-    const InputError error = test::errorOf([&] { readTracksText(std::string(kHeader) + bad.rows); });
+    const InputError error = test::errorOf([&] { readTracksText(std::string(kTrackHeader) + bad.rows); });
     CHECK(error.line == bad.line);
     CHECK(error.field == bad.field);
     CHECK(contains(error.message, bad.message));
     CHECK_FALSE(error.remedy.empty());
     CHECK(contains(error.what(), "tracks.csv"));
   }
-  const std::string overlong = std::string(kHeader) + "100,1,0,1," + std::string(5000, '1') + ",1\n";
+  const std::string overlong = std::string(kTrackHeader) + "100,1,0,1," + std::string(5000, '1') + ",1\n";
   CHECK(test::errorOf([&] { readTracksText(overlong); }).line == 2);
 }
 
@@ -169,7 +169,7 @@ TEST_CASE("another header, or none, is refused", "[track_file]") {
 }
 
 TEST_CASE("tracks beyond what a frame holds are counted and told", "[track_file]") {
-  std::string text = kHeader;
+  std::string text = kTrackHeader;
   for (const int stamp : {100, 200}) {
     for (std::size_t i = 0; i < kMaxFeatures + 3; ++i) {
       for (const char* camera : {"0", "1"}) {
@@ -190,7 +190,7 @@ TEST_CASE("a folder without images is read with its tracks", "[track_file]") {
   const test::AslFixture fixture(4);
   fs::create_directories(fixture.mav0() / "tracks0");
   const fs::path tracks = fixture.mav0() / "tracks0" / "data.csv";
-  test::writeText(tracks, std::string(kHeader) + std::to_string(fixture.stamp(0)) + ",1,0,1,2,1\n");
+  test::writeText(tracks, std::string(kTrackHeader) + std::to_string(fixture.stamp(0)) + ",1,0,1,2,1\n");
   CHECK(openLog(fixture.folder.path().string())->trackFile().empty());  // images come first
   LogOptions without;
   without.without_images = true;

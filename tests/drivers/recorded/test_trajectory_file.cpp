@@ -10,11 +10,13 @@ using test::anyContains;
 using test::contains;
 using test::errorOf;
 
-struct Read {
+struct ReadTrajectory {
   LogCounters counters;
   LogWarnings warnings;
   Trajectory poses;
-  explicit Read(const std::string& text) { poses = readTrajectoryText("file", text, counters, warnings); }
+  explicit ReadTrajectory(const std::string& text) {
+    poses = readTrajectoryText("file", text, counters, warnings);
+  }
 };
 
 TEST_CASE("TUM out and in again: exact stamps, poses to 1e-9", "[trajectory]") {
@@ -55,11 +57,11 @@ TEST_CASE("a TUM line has exactly 8 columns, qw is not negative", "[trajectory]"
 
 TEST_CASE("stamps of TUM files: seconds or nanoseconds by size, between is refused", "[trajectory]") {
   const std::string pose = " 1 2 3 0 0 0 1\n";
-  CHECK(Read("12.5" + pose).poses[0].stamp.ns == 12'500'000'000);
-  CHECK(Read("# comment\n1403636579.763555584" + pose).poses[0].stamp.ns == 1403636579763555584);
-  CHECK(Read("1403636579763555584.000000" + pose).poses[0].stamp.ns == 1403636579763555584);
-  CHECK(Read("1403636579763555584" + pose).poses[0].stamp.ns == 1403636579763555584);
-  const InputError error = errorOf([&] { Read("# c\n1403636579763" + pose); });
+  CHECK(ReadTrajectory("12.5" + pose).poses[0].stamp.ns == 12'500'000'000);
+  CHECK(ReadTrajectory("# comment\n1403636579.763555584" + pose).poses[0].stamp.ns == 1403636579763555584);
+  CHECK(ReadTrajectory("1403636579763555584.000000" + pose).poses[0].stamp.ns == 1403636579763555584);
+  CHECK(ReadTrajectory("1403636579763555584" + pose).poses[0].stamp.ns == 1403636579763555584);
+  const InputError error = errorOf([&] { ReadTrajectory("# c\n1403636579763" + pose); });
   CHECK(error.line == 2);
   CHECK(error.field == "timestamp");
 }
@@ -71,7 +73,7 @@ TEST_CASE("both headers of EuRoC ground truth, quaternion wxyz", "[trajectory]")
       "-0.002145,-0.002229,0.020700,0.076350,-0.012492,0.547666,0.069073\n";
   for (const char* header : {"#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x []\n",
                              "#time(ns),px,py,pz,qw,qx,qy,qz,vx,vy,vz,bwx,bwy,bwz,bax,bay,baz\n", ""}) {
-    const Read read(header + row);
+    const ReadTrajectory read(header + row);
     REQUIRE(read.poses.size() == 1);
     const TrajectoryPoint& p = read.poses[0];
     CHECK(p.stamp.ns == 1403715274302142976);
@@ -83,19 +85,21 @@ TEST_CASE("both headers of EuRoC ground truth, quaternion wxyz", "[trajectory]")
     CHECK(p.bias_gyro == Eigen::Vector3d(-0.002229, 0.0207, 0.07635));
     CHECK(p.bias_accel == Eigen::Vector3d(-0.012492, 0.547666, 0.069073));
   }
-  CHECK(!Read("2235500000,0.094145,-0.561754,1.224272,0.9999092,0.0048240,-0.0061674,-0.0109673,0\n")
-             .poses[0]
-             .has_motion);
+  CHECK(
+      !ReadTrajectory("2235500000,0.094145,-0.561754,1.224272,0.9999092,0.0048240,-0.0061674,-0.0109673,0\n")
+           .poses[0]
+           .has_motion);
 }
 
 TEST_CASE("bad rows of trajectories name file, line and field", "[trajectory]") {
-  const Read read("1.0 0 0 0 0 0 0 1\n2.0 0 zero 0 0 0 0 1\n3.0 0 0 0 0 0 0 0.9\n4.0 0 0 0 0 0 0 1\n");
+  const ReadTrajectory read(
+      "1.0 0 0 0 0 0 0 1\n2.0 0 zero 0 0 0 0 1\n3.0 0 0 0 0 0 0 0.9\n4.0 0 0 0 0 0 0 1\n");
   CHECK(read.poses.size() == 2);
   CHECK(read.counters.bad_rows == 2);
   CHECK(anyContains(read.warnings.lines(), "file:2: ty: `zero`"));
   CHECK(anyContains(read.warnings.lines(), "file:3: quaternion: its norm is 0.9"));
-  CHECK(errorOf([] { Read("1.0 0 0 0 0 0 0 0\n"); }).line == 1);
-  CHECK(contains(errorOf([] { Read("# nothing\n"); }).message, "no poses"));
+  CHECK(errorOf([] { ReadTrajectory("1.0 0 0 0 0 0 0 0\n"); }).line == 1);
+  CHECK(contains(errorOf([] { ReadTrajectory("# nothing\n"); }).message, "no poses"));
   LogCounters counters;
   LogWarnings warnings;
   CHECK(contains(errorOf([&] { readTrajectory("/nonexistent/file", counters, warnings); }).message,

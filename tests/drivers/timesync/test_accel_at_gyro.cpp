@@ -5,11 +5,12 @@
 #include <vector>
 
 #include "drivers/timesync/accel_at_gyro.hpp"
+#include "tests/drivers/timesync/units.hpp"
 
 namespace swiftlet {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 
 /// Linear in time, so that interpolation is exact.
 Eigen::Vector3d accelAt(Stamp stamp) {

@@ -6,14 +6,14 @@
 
 #include "drivers/timesync/stamp_limit.hpp"
 #include "tests/drivers/timesync/simulated_trigger.hpp"
+#include "tests/drivers/timesync/units.hpp"
 
 namespace swiftlet {
 namespace {
 
+using test::kMs;
 using test::TriggerPattern;
 using test::TriggerResult;
-
-constexpr std::int64_t kMs = 1'000'000;
 
 TEST_CASE("Association never slips in 10 000 random patterns", "[timesync][trigger]") {
   TriggerResult all;

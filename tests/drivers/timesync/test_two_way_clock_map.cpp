@@ -10,8 +10,8 @@ namespace {
 using test::Jitter;
 using test::LinkSettings;
 
-constexpr double kLimit = 0.2;  // ms beyond half the asymmetry
-constexpr int kSeeds = 8;
+constexpr double kTwoWayLimit = 0.2;  // ms beyond half the asymmetry
+constexpr int kTwoWaySeeds = 8;
 
 TEST_CASE("Two-way map: beyond half the asymmetry", "[timesync]") {
   for (const Jitter jitter : {Jitter::kUniform, Jitter::kExponential}) {
@@ -23,14 +23,14 @@ TEST_CASE("Two-way map: beyond half the asymmetry", "[timesync]") {
         link.step_every = step_every;
         link.seconds = step_every > 0 ? 200 : 60;
         test::ClockErrors errors;
-        for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+        for (std::uint64_t seed = 1; seed <= kTwoWaySeeds; ++seed) {
           test::runTwoWay(link, 1, seed, errors);
           CHECK(errors.locked_share > 0.99);
           CHECK(errors.status.skew_ppm == Approx(skew).margin(8));
           // The constant delays: 3 ms and 1 ms.
           CHECK(errors.status.error_bound.seconds() == Approx(2e-3).margin(2e-4));
         }
-        CHECK(test::quantile(errors.settled, 0.99) < kLimit);
+        CHECK(test::quantile(errors.settled, 0.99) < kTwoWayLimit);
         CHECK(errors.beyond_bound == 0);
       }
     }
@@ -42,7 +42,7 @@ TEST_CASE("Two-way map: far better than the filter of round trips at TIMESYNC's 
   link.rate = 10;
   test::ClockErrors errors;
   std::vector<double> filter;
-  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+  for (std::uint64_t seed = 1; seed <= kTwoWaySeeds; ++seed) {
     test::runTwoWay(link, 1, seed, errors);
     const auto some = test::runRoundTripFilter(link, 1, seed);
     filter.insert(filter.end(), some.begin(), some.end());

@@ -9,11 +9,13 @@
 
 #include "drivers/timesync/wall_stamps.hpp"
 #include "estimator/core/random.hpp"
+#include "tests/drivers/timesync/units.hpp"
 
 namespace swiftlet {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
+
 constexpr std::int64_t kAhead = 1'700'000'000'000'000'000;  // ns, of the wall clock at the start
 constexpr std::int64_t kPeriod = 5 * kMs;
 constexpr Duration kReadingError{200};

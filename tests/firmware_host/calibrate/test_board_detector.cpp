@@ -14,7 +14,7 @@ using namespace swiftlet::test;
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kRadPerDegree = std::numbers::pi / 180;
 
 CameraModel pinhole() {
   return {CameraKind::kPinholeRadtan, 752, 480, {458, 457, 367, 248}, {-0.28, 0.07, 0.0002, 0.00002}};
@@ -94,10 +94,10 @@ TEST_CASE("tags of a board are found, none as another, without bias") {
       {"60 px", pinhole(), 60, 0, 0.7, 3, 0.99, 0.045},
       {"40 px", pinhole(), 40, 0, 0.7, 3, 0.99, 0.045},
       {"20 px", pinhole(), 20, 0, 0.7, 3, 0.9, 0.1},
-      {"40 px, 50 degrees", pinhole(), 40, 50 * kDegree, 0.7, 3, 0.95, 0.08},
-      {"30 px, 55 degrees", pinhole(), 30, 55 * kDegree, 0.7, 3, 0.85, 0.1},
-      {"40 px, blurred", pinhole(), 40, 20 * kDegree, 1.6, 6, 0.8, 0.2},
-      {"190 degrees, 40 px", wide(), 40, 30 * kDegree, 0.7, 3, 0.9, 0.08},
+      {"40 px, 50 degrees", pinhole(), 40, 50 * kRadPerDegree, 0.7, 3, 0.95, 0.08},
+      {"30 px, 55 degrees", pinhole(), 30, 55 * kRadPerDegree, 0.7, 3, 0.85, 0.1},
+      {"40 px, blurred", pinhole(), 40, 20 * kRadPerDegree, 1.6, 6, 0.8, 0.2},
+      {"190 degrees, 40 px", wide(), 40, 30 * kRadPerDegree, 0.7, 3, 0.9, 0.08},
   };
   const CalibrationTarget target;
   const PrintedBoard board(target, target.size / 10);
@@ -131,7 +131,7 @@ TEST_CASE("a checkerboard's corners keep their numbers in every orientation that
   Tally tally;
   for (int view = 0; view < 6; ++view) {
     const SE3 T = pose(pinhole(), target, {random.uniform(300, 450), random.uniform(200, 280)}, 0.03, 30,
-                       random.uniform(0, 0.7), random.uniform(0, 6.28), view * 60 * kDegree);
+                       random.uniform(0, 0.7), random.uniform(0, 6.28), view * 60 * kRadPerDegree);
     const GreyImage image = renderBoard(board, pinhole(), T, 0.7, 3, random);
     count(target, pinhole(), T, detector.detect(image.view()), tally);
   }

@@ -28,7 +28,7 @@ Eigen::Matrix<double, 8, 1> parameters(const CameraModel& lens) {
 }
 
 /// Squared error in sigmas, and the largest of single parameters.
-struct Consistency {
+struct SquaredErrors {
   double sum = 0;
   int count = 0;
   double largest = 0;
@@ -46,7 +46,7 @@ struct Consistency {
 TEST_CASE("cameras from simulated corners are right and know how well", "[long]") {
   // The page's figures; seeds not used while the limits were chosen.
   const int rigs = longOr(50, 2);
-  Consistency all;
+  SquaredErrors all;
   std::vector<double> worst_pixel;
   int said_bad = 0;
   for (int i = 0; i < rigs; ++i) {

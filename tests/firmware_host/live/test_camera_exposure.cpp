@@ -25,7 +25,7 @@ namespace {
 
 constexpr int kWidth = 160;
 constexpr int kHeight = 120;
-constexpr Duration kPeriod = Duration::fromMilliseconds(50);
+constexpr Duration kFramePeriod = Duration::fromMilliseconds(50);
 const ExposureSetting kStart{Duration::fromMilliseconds(4), 1};
 /// White in the room at which kStart is right: the scene is grey 102.
 constexpr double kRight = 102 / 0.004;
@@ -76,7 +76,7 @@ class RoomCamera : public CameraSource {
     frame.image = {pixels_.data(), kWidth, kHeight, kWidth};
     frame.event = StampEvent::kStartOfExposure;
     frame.stamp = startOf(number_);
-    frame.arrival = frame.stamp + kPeriod;
+    frame.arrival = frame.stamp + kFramePeriod;
     frame.sequence = number_++;
     lend(frame, 0);
     return {};
@@ -92,7 +92,9 @@ class RoomCamera : public CameraSource {
   }
   void more(std::uint64_t images) { left_ += images; }
 
-  static Stamp startOf(std::uint64_t number) { return {static_cast<std::int64_t>(number + 1) * kPeriod.ns}; }
+  static Stamp startOf(std::uint64_t number) {
+    return {static_cast<std::int64_t>(number + 1) * kFramePeriod.ns};
+  }
 
  protected:
   void giveBack(std::uint32_t /*buffer*/) override {}
@@ -124,7 +126,7 @@ class StampSink : public SensorSink {
 CameraThread::Setup setup(const std::optional<ExposureLoop::Setup>& exposure) {
   CameraThread::Setup result;
   result.name = "camera";
-  result.settings.rate_hz = 1 / kPeriod.seconds();
+  result.settings.rate_hz = 1 / kFramePeriod.seconds();
   result.exposure = exposure;
   return result;
 }
@@ -141,7 +143,7 @@ TEST_CASE("stamps are in the middle of the exposure that was in force") {
     return kRight * (k < 40 ? 1.0 : k < 100 ? 0.05 : 2.0);
   };
   SharedExposure asked;
-  CameraThread thread(setup(ExposureLoop::Setup{true, 450, kPeriod, &asked, nullptr}), std::move(owned));
+  CameraThread thread(setup(ExposureLoop::Setup{true, 450, kFramePeriod, &asked, nullptr}), std::move(owned));
   REQUIRE(thread.open().ok());
   StampSink sink;
   std::atomic<bool> stop{false};
@@ -176,7 +178,7 @@ TEST_CASE("a camera whose exposure cannot be set is refused when its control is 
   auto owned = std::make_unique<RoomCamera>(0);
   owned->able = false;
   SharedExposure asked;
-  CameraThread thread(setup(ExposureLoop::Setup{true, 450, kPeriod, &asked, nullptr}), std::move(owned));
+  CameraThread thread(setup(ExposureLoop::Setup{true, 450, kFramePeriod, &asked, nullptr}), std::move(owned));
   const DeviceFault fault = thread.open();
   CHECK(fault.kind == DeviceFaultKind::kUnsupported);
   CHECK(fault.text().find("cameras.exposure_control") != std::string_view::npos);
@@ -185,8 +187,8 @@ TEST_CASE("a camera whose exposure cannot be set is refused when its control is 
 
 TEST_CASE("two cameras are set alike, and the second goes on when the first is silent") {
   SharedExposure asked;
-  std::array<ExposureLoop, 2> loops = {ExposureLoop({true, 450, kPeriod, &asked, nullptr}),
-                                       ExposureLoop({false, 450, kPeriod, &asked, nullptr})};
+  std::array<ExposureLoop, 2> loops = {ExposureLoop({true, 450, kFramePeriod, &asked, nullptr}),
+                                       ExposureLoop({false, 450, kFramePeriod, &asked, nullptr})};
   std::array<RoomCamera, 2> cameras = {RoomCamera(1000), RoomCamera(1000)};
   for (std::size_t c = 0; c < 2; ++c) {
     REQUIRE(cameras[c].open().ok());
@@ -226,7 +228,7 @@ TEST_CASE("a turn bounds the exposure, and without an IMU a turn is supposed") {
   SharedExposure asked;
   RoomCamera camera(1000);
   REQUIRE(camera.open().ok());
-  ExposureLoop loop({true, 450, kPeriod, &asked, &turn});
+  ExposureLoop loop({true, 450, kFramePeriod, &asked, &turn});
   REQUIRE(loop.begin(camera).ok());
   camera.light = [](std::uint64_t) { return kRight / 4; };
   std::uint64_t k = 0;

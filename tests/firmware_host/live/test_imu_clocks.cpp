@@ -83,14 +83,14 @@ ScriptedLink::Round roundNumber(int i, std::optional<Duration> exchanged, Durati
   return round;
 }
 
-struct Flown {
+struct ScriptedFlight {
   KeepingSink sink;
   ImuStatus status;
   EdgeRing edges;
 };
 
-std::unique_ptr<Flown> fly(std::deque<ScriptedLink::Round> rounds, Duration delay = {}) {
-  auto flown = std::make_unique<Flown>();
+std::unique_ptr<ScriptedFlight> flyScript(std::deque<ScriptedLink::Round> rounds, Duration delay = {}) {
+  auto flown = std::make_unique<ScriptedFlight>();
   std::atomic<bool> stop{false};
   RunControl control;
   control.stop = &stop;
@@ -105,7 +105,7 @@ TEST_CASE("one way alone, stamps hold the transport; by an exchange of clocks th
   std::deque<ScriptedLink::Round> rounds;
   for (int i = 0; i < 40; ++i) rounds.push_back(roundNumber(i, std::nullopt));
   for (int i = 40; i < 80; ++i) rounds.push_back(roundNumber(i, kBehind));
-  const auto flown = fly(rounds);
+  const auto flown = flyScript(rounds);
   REQUIRE(flown->sink.count() == 80);
   for (int i = 0; i < 40; ++i)
     CHECK(flown->sink[static_cast<std::size_t>(i)].sample.stamp == sensed(i) + kTransport);
@@ -120,7 +120,7 @@ TEST_CASE("an exchange that says a stamp of the future, or one far off, does not
     std::deque<ScriptedLink::Round> rounds;
     for (int i = 0; i < 20; ++i)
       rounds.push_back(roundNumber(i, kBehind + Duration::fromMilliseconds(wrong_ms)));
-    const auto flown = fly(rounds);
+    const auto flown = flyScript(rounds);
     CHECK(flown->sink.count() == 20);
     CHECK(flown->status.by_exchange == 0);
   }
@@ -132,7 +132,7 @@ TEST_CASE("a step of the clock that the exchange has not heard of shuts no later
   // An hour ahead; the exchange says so 60 samples later.
   const Duration step = Duration::fromMilliseconds(3'600'000);
   for (int i = 40; i < 200; ++i) rounds.push_back(roundNumber(i, i < 100 ? kBehind : kBehind - step, step));
-  const auto flown = fly(rounds);
+  const auto flown = flyScript(rounds);
   REQUIRE(flown->sink.count() > 180);
   for (std::size_t i = 0; i < flown->sink.count(); ++i)
     CHECK(flown->sink[i].sample.stamp <= flown->sink[i].arrival);
@@ -152,7 +152,7 @@ TEST_CASE("edges that the sensor tells of are mapped as its samples are") {
   };
   rounds[10].edge = edgeAt(10);
   rounds[50].edge = edgeAt(50);
-  const auto flown = fly(rounds, kDelay);
+  const auto flown = flyScript(rounds, kDelay);
   EdgeMessage edge;
   for (const int i : {10, 50}) {
     REQUIRE(flown->edges.tryPop(edge));
@@ -170,7 +170,7 @@ TEST_CASE("a sensor without a clock is stamped by arrival, less the delay") {
     rounds.back().reading.device.reset();
   }
   rounds[5].reading.arrival = rounds[4].reading.arrival;  // two in one read: the second would not rise
-  const auto flown = fly(rounds, kDelay);
+  const auto flown = flyScript(rounds, kDelay);
   CHECK(flown->sink.count() == 9);
   CHECK(flown->status.refused == 1);
   CHECK(flown->status.by_arrival == 10);

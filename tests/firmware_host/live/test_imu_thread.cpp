@@ -17,7 +17,7 @@
 namespace swiftlet::test {
 namespace {
 
-constexpr Duration kPeriod = Duration::fromMilliseconds(2);
+constexpr Duration kReadingPeriod = Duration::fromMilliseconds(2);
 constexpr Duration kUptime = Duration::fromMilliseconds(-1'000'000);  ///< device - host
 
 /// A reading's rate about z tells its number, exactly in f32.
@@ -52,7 +52,7 @@ class FarSensor {
   void send(int count) {
     for (int i = 0; i < count; ++i) {
       sendOne(hostNow() + offset);
-      std::this_thread::sleep_for(std::chrono::nanoseconds(kPeriod.ns));
+      std::this_thread::sleep_for(std::chrono::nanoseconds(kReadingPeriod.ns));
     }
   }
   void sendOne(Stamp device) {

@@ -20,7 +20,7 @@ Settings topicSettings() {
   return settings;
 }
 
-std::string refusal(const Settings& settings) {
+std::string topicRefusal(const Settings& settings) {
   try {
     LiveInput input(settings, euroc());
   } catch (const InputError& error) {
@@ -52,30 +52,32 @@ TEST_CASE("a driver's preset names what the settings do not") {
 }
 
 TEST_CASE("topics that contradict other settings are refused by name") {
-  CHECK(refusal(topicSettings()).empty());
+  CHECK(topicRefusal(topicSettings()).empty());
   Settings settings = topicSettings();
   settings.cameras.device0 = "/dev/video0";
-  CHECK_THAT(refusal(settings), Catch::Contains("cameras.topic0") && Catch::Contains("cameras.device0"));
+  CHECK_THAT(topicRefusal(settings), Catch::Contains("cameras.topic0") && Catch::Contains("cameras.device0"));
   settings = topicSettings();
   settings.cameras.pipeline1 = "libcamerasrc";
-  CHECK_THAT(refusal(settings), Catch::Contains("cameras.topic1") && Catch::Contains("cameras.pipeline1"));
+  CHECK_THAT(topicRefusal(settings),
+             Catch::Contains("cameras.topic1") && Catch::Contains("cameras.pipeline1"));
   settings = topicSettings();
   settings.cameras.topic1 = "";
-  CHECK_THAT(refusal(settings), Catch::Contains("two cameras, the settings have one"));
+  CHECK_THAT(topicRefusal(settings), Catch::Contains("two cameras, the settings have one"));
   settings = topicSettings();
   settings.imu_link.device = "/dev/ttyS1";
-  CHECK_THAT(refusal(settings), Catch::Contains("imu_link.topic") && Catch::Contains("cannot be combined"));
+  CHECK_THAT(topicRefusal(settings),
+             Catch::Contains("imu_link.topic") && Catch::Contains("cannot be combined"));
   settings = topicSettings();
   settings.imu_link.topic = "";
-  CHECK_THAT(refusal(settings), Catch::Contains("no IMU is set"));
+  CHECK_THAT(topicRefusal(settings), Catch::Contains("no IMU is set"));
   settings.imu_link.accel_topic = "/accel";
-  CHECK_THAT(refusal(settings), Catch::Contains("imu_link.accel_topic"));
+  CHECK_THAT(topicRefusal(settings), Catch::Contains("imu_link.accel_topic"));
   settings = topicSettings();
   settings.trigger.chip = "imu";
-  CHECK_THAT(refusal(settings), Catch::Contains("topics do not carry trigger edges"));
+  CHECK_THAT(topicRefusal(settings), Catch::Contains("topics do not carry trigger edges"));
   settings = topicSettings();
   settings.cameras.gain = 3;
-  CHECK_THAT(refusal(settings), Catch::Contains("cameras.gain"));
+  CHECK_THAT(topicRefusal(settings), Catch::Contains("cameras.gain"));
 }
 
 TEST_CASE("CameraInfo stands beside the images, which say by their name what they are") {

@@ -19,6 +19,9 @@ inline constexpr std::array<const char*, 15> kMembers = {
     "imu",  "camera0", "camera1", "trigger", "propagate", "track", "smooth", "mesh",
     "loop", "map",     "log",     "record",  "autopilot", "view",  "dds"};
 
+/// All outlets are to say so within this time after the longest silence; the supervisor has a fifth of it.
+inline constexpr double kSaidWithin = 0.5;  // s
+
 struct SimulatedFlight {
   struct Told {
     double at;  ///< s since the start

@@ -10,9 +10,8 @@
 namespace swiftlet {
 namespace {
 
+using test::kSaidWithin;
 using test::SimulatedFlight;
-
-constexpr double kSaidWithin = 0.5;
 
 TEST_CASE("a silent IMU fails the health until it is back", "[supervisor]") {
   SimulatedFlight flight;

@@ -14,10 +14,9 @@ namespace swiftlet {
 namespace {
 
 using test::kMembers;
+using test::kSaidWithin;
 using test::SimulatedFlight;
 
-/// All outlets are to say so within this time after the longest silence; the supervisor has a fifth of it.
-constexpr double kSaidWithin = 0.5;
 constexpr double kTurn = 0.11;  // s: one look, and the simulation's own step
 
 bool isFlight(const char* name) { return memberRule(name).kind == MemberKind::kFlight; }
