@@ -7,7 +7,7 @@ option(SWIFTLET_BUILD_TESTS "Build the tests (needs Catch2, OpenCV)" ON)
 option(SWIFTLET_BUILD_BENCHMARKS "Build the benchmarks (needs Google Benchmark, OpenCV, Ceres, OpenGV)" OFF)
 option(SWIFTLET_BUILD_FUZZERS "Build the libFuzzer targets (needs clang)" OFF)
 option(SWIFTLET_PRECOMPILED_HEADERS "Parse Eigen and the standard library once, not in each unit" ON)
-option(SWIFTLET_JOINED_UNITS "Compile the short files of a room of the program together" ON)
+option(SWIFTLET_JOINED_UNITS "Compile files of a library of the program, or of a test program, together" ON)
 option(SWIFTLET_WARNINGS_AS_ERRORS "Treat warnings as errors" ON)
 set(SWIFTLET_SANITIZE "" CACHE STRING "Sanitizers, as -fsanitize takes them: address,undefined or thread")
 

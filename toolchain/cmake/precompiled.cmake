@@ -27,11 +27,18 @@ function(swiftlet_use_headers target name)
   endif()
 endfunction()
 
-# The rooms of logs and program are many short files that include the same headers: joined, they are parsed once
-# in twenty. The estimator's files stay alone: what is inlined where could change the last bit of a result.
+# swiftlet_join_units(<target> [<alone>...]): the rooms of logs, program and tests are many short files that include the
+# same headers; joined, they are parsed once in twenty, of tests, which are longer, once in eight: no unit takes much
+# more than a minute. The estimator's files stay alone: what is inlined where could change the last bit of a result.
+# So do the files <alone>.
 function(swiftlet_join_units target)
   file(RELATIVE_PATH room ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
-  if(SWIFTLET_JOINED_UNITS AND room MATCHES "^(drivers/(calibration|recorded|simulated)|firmware_host/)")
-    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 20)
+  if(SWIFTLET_JOINED_UNITS AND room MATCHES "^(drivers/(calibration|recorded|simulated)|firmware_host|tests)/")
+    set(batch 20)
+    if(room MATCHES "^tests/")
+      set(batch 8)
+    endif()
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${batch})
+    set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   endif()
 endfunction()
