@@ -106,8 +106,8 @@ class FrameQueue {
   /// `track` may continue once the newest sample has arrived; the latest possible stamp while it does not
   /// wait.
   std::atomic<std::int64_t> awaited_imu_{std::numeric_limits<std::int64_t>::max()};
-  double wait_ended_ = 0;  ///< host time of the last frame's that awaited samples [s]
-  int excused_ = 0;        ///< frames left of those that were there then
+  double wait_ended_ = 0;  ///< host time of the end of the last wait for samples [s]
+  int excused_ = 0;        ///< frames still here of those that had come by then
   Counters counters_;
 };
 

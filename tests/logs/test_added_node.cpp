@@ -9,6 +9,7 @@
 #include "firmware_host/schedule/lockstep.hpp"
 #include "firmware_host/schedule/threaded.hpp"
 #include "tests/logs/log_data.hpp"
+#include "tests/logs/silent_listener.hpp"
 #include "tests/sanitized.hpp"
 
 namespace swiftlet {
@@ -46,17 +47,9 @@ KeyframeCountNode& addKeyframeCount(Graph& graph) {
   return node;
 }
 
-class NoListener : public RunListener {
- public:
-  void onFrame(const TrackedFrame& /*tracked*/, const OdometryOutput& /*output*/) override {}
-  void onImuState(const NavState& /*state*/) override {}
-  void onFinish(const OdometryOutput& /*output*/) override {}
-  void onRemark(Stamp /*stamp*/, const std::string& /*text*/) override {}
-};
-
 struct Run {
   std::unique_ptr<LogSource> source = openLog(shortLog());
-  NoListener listener;
+  test::SilentListener listener;
   RunObserver observer{listener};
   Settings settings;
   Graph graph{source->rig(), source->imuNoise(), settings, observer, GraphOptions{}};

@@ -16,6 +16,7 @@
 #include "firmware_host/realtime/host_sleep.hpp"
 #include "firmware_host/schedule/threaded.hpp"
 #include "tests/logs/log_data.hpp"
+#include "tests/logs/silent_listener.hpp"
 #include "tests/sanitized.hpp"
 
 namespace swiftlet {
@@ -311,17 +312,9 @@ class Network {
   std::thread thread_;
 };
 
-class Ignoring : public RunListener {
- public:
-  void onFrame(const TrackedFrame& /*tracked*/, const OdometryOutput& /*output*/) override {}
-  void onImuState(const NavState& /*state*/) override {}
-  void onFinish(const OdometryOutput& /*output*/) override {}
-  void onRemark(Stamp /*stamp*/, const std::string& /*text*/) override {}
-};
-
 TEST_CASE("the images of a frame that the front-end refuses do not wait for the map, nor push others out") {
   const auto source = openLog(shortLog());
-  Ignoring listener;
+  test::SilentListener listener;
   RunObserver observer(listener);
   Settings settings;
   settings.map.enabled = settings.map_stage.labels = true;
@@ -362,7 +355,7 @@ struct Flown {
 /// The short log on threads, so many seconds of it, with a map and this network.
 Flown fly(const Network::Behaviour& behaviour, Duration patience, double until) {
   const auto source = openLog(shortLog());
-  Ignoring listener;
+  test::SilentListener listener;
   RunObserver observer(listener);
   LogFeed feed(*source, {0, until, {}}, nullptr);
   Settings settings;

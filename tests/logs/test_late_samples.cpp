@@ -11,6 +11,7 @@
 #include "firmware_host/realtime/host_sleep.hpp"
 #include "firmware_host/schedule/lockstep.hpp"
 #include "tests/logs/log_data.hpp"
+#include "tests/logs/silent_listener.hpp"
 
 namespace swiftlet {
 namespace {
@@ -19,14 +20,6 @@ constexpr Duration kFramePeriod = Duration::fromMilliseconds(50);
 constexpr Duration kSamplePatience = Duration::fromMilliseconds(60);
 /// No step takes as long; the governor's allowance for a frame's age is shorter than kSamplePatience.
 constexpr double kStepBudget = 10, kAgeBudget = 0.05;  // s
-
-class NoListener : public RunListener {
- public:
-  void onFrame(const TrackedFrame& /*tracked*/, const OdometryOutput& /*output*/) override {}
-  void onImuState(const NavState& /*state*/) override {}
-  void onFinish(const OdometryOutput& /*output*/) override {}
-  void onRemark(Stamp /*stamp*/, const std::string& /*text*/) override {}
-};
 
 /// Full effort, and what a stage said of its steps.
 class NotedSteps : public EffortSource {
@@ -86,7 +79,7 @@ class LateSamples {
   static constexpr Duration kSamplePeriod = Duration::fromMilliseconds(5);
 
   std::unique_ptr<LogSource> source_ = openLog(shortLog());
-  NoListener listener_;
+  test::SilentListener listener_;
   RunObserver observer_{listener_};
   GraphOptions options_ = [this] {
     GraphOptions options;
