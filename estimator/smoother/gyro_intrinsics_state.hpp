@@ -4,6 +4,10 @@
 // Nine columns, the matrix by columns, after those of the cameras' calibration. The reference of the prior is
 // the value at `hold`. Entries that no rotation excites stay at the prior, and the covariance includes their
 // uncertainty. While the matrix is held, it adds nothing to the covariance.
+//
+// A turn of the whole gyro, the antisymmetric part, is seen as a turn of all cameras against the IMU. Where
+// the cameras' rotations are estimated as well, only gravity tells the two apart, and weakly: the gyro's axes
+// then are the body's.
 
 #include <Eigen/Core>
 
@@ -18,8 +22,11 @@ class GyroIntrinsicsState {
  public:
   using Vector = Eigen::Matrix<double, kGyroMatrixDim, 1>;
 
-  /// `offset`: its first column in every system.
-  GyroIntrinsicsState(bool estimated, int offset) : estimated_(estimated), offset_(offset) {}
+  /// `offset`: its first column in every system. `body_axes`: the gyro is not turned against the body.
+  GyroIntrinsicsState(bool estimated, int offset, bool body_axes = false)
+      : estimated_(estimated),
+        offset_(offset),
+        turn_sigma_(body_axes ? kFixedSigma : kGyroMatrixPriorSigma) {}
 
   [[nodiscard]] bool estimated() const { return estimated_; }
   /// Active: the matrix is estimated from the motion, if enabled. Otherwise it is held.
@@ -32,8 +39,17 @@ class GyroIntrinsicsState {
   /// Makes the present value the reference, and adds the prior information to H of a new prior.
   void hold(MatrixMap H) {
     reference_ = now_;
-    for (int k = 0; k < dimension(); ++k) {
-      H(offset_ + k, offset_ + k) = 1.0 / (kGyroMatrixPriorSigma * kGyroMatrixPriorSigma);
+    if (!estimated_) return;
+    // Of the sum of two opposite entries, and of their difference, each over the square root of 2.
+    const double sum = 1.0 / (kGyroMatrixPriorSigma * kGyroMatrixPriorSigma);
+    const double turn = 1.0 / (turn_sigma_ * turn_sigma_);
+    for (int column = 0; column < 3; ++column) {
+      for (int row = 0; row < 3; ++row) {
+        const int here = offset_ + row + 3 * column;
+        const int opposite = offset_ + column + 3 * row;
+        H(here, here) = row == column ? sum : (sum + turn) / 2;
+        if (row != column) H(here, opposite) = (sum - turn) / 2;
+      }
     }
   }
   /// Value minus reference.
@@ -46,9 +62,12 @@ class GyroIntrinsicsState {
   void restore() { now_ = backup_; }
 
  private:
+  static constexpr double kFixedSigma = 1e-4;  ///< rad, below what cameras can tell
+
   bool estimated_;
   bool active_ = true;
   int offset_;
+  double turn_sigma_;
   GyroIntrinsics now_;
   GyroIntrinsics reference_;
   GyroIntrinsics backup_;

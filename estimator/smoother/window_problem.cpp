@@ -18,7 +18,7 @@ WindowProblem::WindowProblem(const Rig& given_rig, const ImuNoise& imu_noise, bo
       imu(kImuCapacity),
       extras(landmarks),
       calibration(given_rig, estimate_time_offset, estimate_extrinsics),
-      intrinsics(estimate_gyro, calibration.dimension()) {}
+      intrinsics(estimate_gyro, calibration.dimension(), estimate_extrinsics) {}
 
 void WindowProblem::clear() {
   window.clear();
