@@ -61,12 +61,11 @@ bool consistency(bool stereo) {
   forEach(kFlights, [&](int i) {
     const TrackFlight flight(test::roomFlight(60.2, seedOf(i)));
     const OdometryRun run = test::runOdometry(flight, test::settingsFor(flight, stereo));
-    const RunFrame* first = firstPose(run);
-    if (first == nullptr) return;
-    const SE3 T = test::worldFromTruth(*first);
     for (std::size_t k = 0; k < kTimes.size(); ++k) {
       const RunFrame& frame = frameAt(run, kTimes[k]);
-      const auto error = test::poseError(frame, T);
+      const auto T = test::worldFromTruth(run, frame);
+      if (!T) return;
+      const auto error = test::poseError(frame, *T);
       const Eigen::Matrix<double, 6, 6> P = frame.state.covariance.topLeftCorner<6, 6>();
       const auto at = static_cast<std::size_t>(i);
       nees[k][at] = error.dot(P.llt().solve(error));

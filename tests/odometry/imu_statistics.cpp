@@ -93,11 +93,12 @@ Outcome fly(int index, const Row& row, bool stereo) {
   const auto first = std::ranges::find(run.frames, true, &RunFrame::has_state);
   if (first == run.frames.end()) return outcome;
   outcome.ate = test::ate(run.frames, kFrom);
-  const SE3 T = test::worldFromTruth(*first);
   for (std::size_t k = 0; k < kTimes.size(); ++k) {
     const auto frame = std::ranges::find_if(
         run.frames, [&](const RunFrame& f) { return f.seconds >= std::min(kTimes[k], kDuration - 0.4); });
-    const auto error = test::poseError(*frame, T);
+    const auto T = test::worldFromTruth(run, *frame);
+    if (!T) continue;
+    const auto error = test::poseError(*frame, *T);
     const Eigen::Matrix<double, 6, 6> P = frame->state.covariance.topLeftCorner<6, 6>();
     outcome.nees[k] = error.dot(P.llt().solve(error));
   }

@@ -50,6 +50,7 @@ inline void take(const OdometryOutput& output, RunFrame& frame) {
 struct OdometryRun {
   std::vector<RunFrame> frames;
   std::vector<Event> events;
+  std::optional<RunFrame> first_left;  ///< keyframe of the first epoch, as it left the window
 };
 
 /// `first`: frames and IMU samples before that frame are left out, but for `imu_before` seconds. `told`: the
@@ -74,6 +75,13 @@ inline OdometryRun runOdometry(const TrackFlight& flight, const OdometrySettings
         frame.truth = flight.truth(k);
         take(*output, frame);
         run.frames.push_back(frame);
+        if (!run.first_left && !output->left_window.empty()) {
+          const NavState& left = output->left_window[0].state;
+          const auto seen = std::ranges::find(flight.frames(), left.stamp, &TrackedFrame::stamp);
+          run.first_left.emplace();
+          run.first_left->state = left;
+          run.first_left->truth = flight.truth(static_cast<std::size_t>(seen - flight.frames().begin()));
+        }
         run.events.insert(run.events.end(), output->events.begin(), output->events.end());
       });
   return run;
@@ -96,6 +104,15 @@ inline SE3 worldFromTruth(const RunFrame& first) {
     turn = expSo3(Eigen::Vector3d(0, 0, error.z())) * turn;
   }
   return {turn, estimate.translation - turn * truth.translation};
+}
+
+/// The same for the first epoch of a run that began at the flight's first frame, the world's origin. The first
+/// pose will not do with one camera: it comes up to 2.6 s later, and its scale is hardly known. The heading is
+/// that of the first keyframe that left the window.
+inline std::optional<SE3> worldFromTruth(const OdometryRun& run, const RunFrame& frame) {
+  if (!frame.has_state || frame.state.epoch != 0 || !run.first_left) return {};
+  const Eigen::Quaterniond turn = worldFromTruth(*run.first_left).rotation;
+  return SE3(turn, -(turn * run.frames.front().truth.T_world_body.translation));
 }
 
 /// Error of a frame's pose, in the order and frames of its covariance (phi body, p world).
