@@ -10,7 +10,7 @@
 
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
-#include "firmware_host/lab/calibrate/page/lens_quality.hpp"
+#include "firmware_host/lab/calibrate/cameras/projection_error.hpp"
 #include "firmware_host/lab/calibrate/page/solution_pages.hpp"
 
 namespace swiftlet {
@@ -43,7 +43,7 @@ TEST_CASE("Uncertainty of a pixel is that of sampled lenses after the best rotat
   const Vector8d sigma = 0.2 * lensSigmas();
   const std::vector<Eigen::Vector2d> pixels = somePixels();
   const std::vector<double> told =
-      projectionSigmas(lens(), sigma.cwiseAbs2().asDiagonal().toDenseMatrix(), pixels);
+      worstSigmas(lens(), sigma.cwiseAbs2().asDiagonal().toDenseMatrix(), pixels);
   std::vector<Eigen::Matrix2d> sums(pixels.size(), Eigen::Matrix2d::Zero());
   Random random(17);
   constexpr int kSamples = 500;

@@ -13,33 +13,25 @@
 namespace swiftlet {
 namespace {
 
-constexpr int kRotationSteps = 10;
-/// px: beyond it two lenses share nothing there, and one such point must not turn all of them.
-constexpr double kFarApart = 50;
+constexpr int kRotationSteps = 12;
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 /// Of a pixel; by the lens NaN where it has no ray.
 struct PixelDerivatives {
-  Eigen::Matrix<double, 2, 8> by_lens =
-      Eigen::Matrix<double, 2, 8>::Constant(std::numeric_limits<double>::quiet_NaN());
+  Eigen::Matrix<double, 2, 8> by_lens = Eigen::Matrix<double, 2, 8>::Constant(kNone);
   Eigen::Matrix<double, 2, 3> by_rotation = Eigen::Matrix<double, 2, 3>::Zero();
 };
 
-struct GridPoint {
-  Eigen::Vector2d pixel;
-  Eigen::Vector3d bearing;
-};
-
-std::vector<GridPoint> gridOf(const CameraModel& lens) {
-  std::vector<GridPoint> points;
+/// Pixels of the grid.
+std::vector<Eigen::Vector2d> gridOf(const CameraModel& lens) {
+  std::vector<Eigen::Vector2d> pixels;
   for (int row = 0; row < kImageGridRows; ++row) {
     for (int column = 0; column < kImageGridColumns; ++column) {
-      GridPoint point;
-      point.pixel = {(lens.width() - 1.0) * column / (kImageGridColumns - 1),
-                     (lens.height() - 1.0) * row / (kImageGridRows - 1)};
-      if (lens.unproject(point.pixel, point.bearing)) points.push_back(point);
+      pixels.emplace_back((lens.width() - 1.0) * column / (kImageGridColumns - 1),
+                          (lens.height() - 1.0) * row / (kImageGridRows - 1));
     }
   }
-  return points;
+  return pixels;
 }
 
 }  // namespace
@@ -70,10 +62,19 @@ std::vector<Eigen::Matrix2d> pixelCovariances(const CameraModel& lens,
   return covariances;
 }
 
+std::vector<double> worstSigmas(const CameraModel& lens, const Eigen::Matrix<double, 8, 8>& covariance,
+                                const std::vector<Eigen::Vector2d>& pixels) {
+  std::vector<double> sigmas;
+  for (const Eigen::Matrix2d& C : pixelCovariances(lens, covariance, pixels)) {
+    const double off = std::hypot((C(0, 0) - C(1, 1)) / 2, C(0, 1));
+    sigmas.push_back(C.allFinite() ? std::sqrt(C.trace() / 2 + off) : kNone);
+  }
+  return sigmas;
+}
+
 std::vector<ImagePoint> projectionSigmas(const CameraModel& lens,
                                          const Eigen::Matrix<double, 8, 8>& covariance) {
-  std::vector<Eigen::Vector2d> pixels;
-  for (const GridPoint& point : gridOf(lens)) pixels.push_back(point.pixel);
+  const std::vector<Eigen::Vector2d> pixels = gridOf(lens);
   const std::vector<Eigen::Matrix2d> covariances = pixelCovariances(lens, covariance, pixels);
   std::vector<ImagePoint> points;
   for (std::size_t k = 0; k < pixels.size(); ++k) {
@@ -82,27 +83,48 @@ std::vector<ImagePoint> projectionSigmas(const CameraModel& lens,
   return points;
 }
 
-std::vector<ImagePoint> projectionDifference(const CameraModel& lens, const CameraModel& other) {
-  const std::vector<GridPoint> grid = gridOf(lens);
+std::vector<Eigen::Vector2d> projectionDifference(const CameraModel& lens, const CameraModel& other,
+                                                  const std::vector<Eigen::Vector2d>& pixels,
+                                                  const std::vector<bool>& fit) {
+  std::vector<Eigen::Vector3d> rays(pixels.size(), Eigen::Vector3d::Constant(kNone));
+  for (std::size_t k = 0; k < pixels.size(); ++k) {
+    Eigen::Vector3d ray;
+    if (lens.unproject(pixels[k], ray)) rays[k] = ray;
+  }
   Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
-  std::vector<ImagePoint> points;
-  for (int step = 0; step <= kRotationSteps; ++step) {
-    points.clear();
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-    for (const GridPoint& point : grid) {
+  for (int step = 0; step < kRotationSteps; ++step) {
+    Eigen::Matrix3d H = 1e-9 * Eigen::Matrix3d::Identity();
+    Eigen::Vector3d g = Eigen::Vector3d::Zero();
+    for (std::size_t k = 0; k < pixels.size(); ++k) {
+      if (!fit[k] || !rays[k].allFinite()) continue;
       Eigen::Vector2d pixel;
       Matrix23d by_point;
-      if (!other.project(turn * point.bearing, pixel, &by_point)) continue;
-      const Eigen::Vector2d r = point.pixel - pixel;
-      points.push_back({point.pixel, std::sqrt(0.5 * r.squaredNorm())});
-      if (r.norm() > kFarApart) continue;
-      const Eigen::Matrix<double, 2, 3> J = -by_point * turn.toRotationMatrix() * hat(point.bearing);
-      normal += J.transpose() * J;
-      gradient += J.transpose() * r;
+      if (!other.project(turn * rays[k], pixel, &by_point)) continue;
+      const Matrix23d J = -by_point * turn.toRotationMatrix() * hat(rays[k]);
+      const Eigen::Vector2d off = pixel - pixels[k];
+      const double weight = 1 / (1 + off.squaredNorm());
+      H += weight * J.transpose() * J;
+      g -= weight * J.transpose() * off;
     }
-    const Eigen::Vector3d change = normal.ldlt().solve(gradient);
-    if (step < kRotationSteps && change.allFinite()) turn = (turn * expSo3(change)).normalized();
+    turn = (turn * expSo3(H.ldlt().solve(g))).normalized();
+  }
+  std::vector<Eigen::Vector2d> difference;
+  for (std::size_t k = 0; k < pixels.size(); ++k) {
+    Eigen::Vector2d pixel;
+    const bool good = rays[k].allFinite() && other.project(turn * rays[k], pixel);
+    difference.push_back(good ? Eigen::Vector2d(pixel - pixels[k]) : Eigen::Vector2d::Constant(kNone));
+  }
+  return difference;
+}
+
+std::vector<ImagePoint> projectionDifference(const CameraModel& lens, const CameraModel& other) {
+  const std::vector<Eigen::Vector2d> pixels = gridOf(lens);
+  const std::vector<Eigen::Vector2d> difference =
+      projectionDifference(lens, other, pixels, std::vector<bool>(pixels.size(), true));
+  std::vector<ImagePoint> points;
+  for (std::size_t k = 0; k < pixels.size(); ++k) {
+    if (difference[k].allFinite())
+      points.push_back({pixels[k], std::sqrt(0.5 * difference[k].squaredNorm())});
   }
   return points;
 }

@@ -1,10 +1,10 @@
 #pragma once
 // How far a lens projects beside the truth, over its image: from its covariance, or from another lens.
 //
-// A rotation of the camera's frame is taken out, the one that leaves the least squares over the image: no
+// A rotation of the camera's frame is taken out, the one that leaves the least error over the pixels: no
 // image tells a moved centre from a turned camera, and what a rig is calibrated to afterwards (the other
-// camera, the IMU) turns with it. Lengths are rms of the two axes [px]. Source: mrcal, doc/uncertainty.org
-// (the idea of a projection's uncertainty with the frame's motion removed).
+// camera, the IMU) turns with it. Source: mrcal, doc/uncertainty.org (the idea of a projection's uncertainty
+// with the frame's motion removed).
 
 #include <Eigen/Core>
 #include <vector>
@@ -28,11 +28,23 @@ struct ImagePoint {
                                                             const Eigen::Matrix<double, 8, 8>& covariance,
                                                             const std::vector<Eigen::Vector2d>& pixels);
 
+/// 1 sigma of a pixel in its worst direction [px], at each pixel given. NaN where the lens has no inverse.
+[[nodiscard]] std::vector<double> worstSigmas(const CameraModel& lens,
+                                              const Eigen::Matrix<double, 8, 8>& covariance,
+                                              const std::vector<Eigen::Vector2d>& pixels);
+
 /// 1 sigma over the grid; points where the lens has no inverse are left out.
 [[nodiscard]] std::vector<ImagePoint> projectionSigmas(const CameraModel& lens,
                                                        const Eigen::Matrix<double, 8, 8>& covariance);
 
-/// `other` beside `lens`; left out where one of them has no inverse or does not reach.
+/// Where `other` sees what `lens` sees at the pixels, less these [px], after the rotation that makes them
+/// agree best (Cauchy weights, 1 px) at the pixels marked `fit`. NaN where one of them has no ray.
+[[nodiscard]] std::vector<Eigen::Vector2d> projectionDifference(const CameraModel& lens,
+                                                                const CameraModel& other,
+                                                                const std::vector<Eigen::Vector2d>& pixels,
+                                                                const std::vector<bool>& fit);
+
+/// The same over the grid, fitted at all of it; left out where one of them has no ray.
 [[nodiscard]] std::vector<ImagePoint> projectionDifference(const CameraModel& lens, const CameraModel& other);
 
 /// Rms over the points.

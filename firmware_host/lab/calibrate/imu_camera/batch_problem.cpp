@@ -92,7 +92,6 @@ struct BatchProblem::Sum {
 BatchProblem::BatchProblem(const BatchData& data, BatchState state, const BatchNoise& noise)
     : data_(data), state_(std::move(state)), noise_(noise) {
   for (std::size_t c = 0; c < kMaxCameras; ++c) {
-    lens_information_[c].setZero();
     lens_start_[c] << state_.camera[c].intrinsics(), state_.camera[c].distortion();
     if (c >= state_.camera_count) hold(batch::lens(c), batch::kPerCamera);
   }
@@ -115,10 +114,6 @@ void BatchProblem::layOut() {
     const int last = std::max(controlColumn(k + kControls - 1), biasColumn(k / every + 1)) + 5;
     width_ = std::max(width_, last - first);
   }
-}
-
-void BatchProblem::setLensPrior(std::size_t camera, const Eigen::Matrix<double, 8, 8>& information) {
-  lens_information_[camera] = information;
 }
 
 void BatchProblem::hold(int first, int count, bool held) { std::fill_n(held_.begin() + first, count, held); }
@@ -333,12 +328,6 @@ double BatchProblem::addPriors(ArrowSystem& system) const {
     step -= lens_start_[c];
     for (int k = 0; k < 8; ++k) {
       add(batch::lens(c) + k, step[k], k < 4 ? kLensSpread * state_.camera[c].focal() : kDistortionSpread);
-    }
-    if (!lens_information_[c].isZero()) {
-      std::array<int, 8> columns{};
-      for (int k = 0; k < 8; ++k) columns[static_cast<std::size_t>(k)] = chain_ + batch::lens(c) + k;
-      system.add(columns, lens_information_[c], lens_information_[c] * step);
-      cost += step.dot(lens_information_[c] * step);
     }
     for (int k = 0; k < 3; ++k) {
       add(batch::rotation(c) + k, 0, kTurnSpread);

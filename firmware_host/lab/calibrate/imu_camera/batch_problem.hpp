@@ -107,7 +107,6 @@ class BatchProblem {
   [[nodiscard]] const BatchState& state() const { return state_; }
   [[nodiscard]] const BatchNoise& noise() const { return noise_; }
   void setNoise(const BatchNoise& noise) { noise_ = noise; }
-  void setLensPrior(std::size_t camera, const Eigen::Matrix<double, 8, 8>& information);
   /// Columns from `first` on, `count` of them, keep their values.
   void hold(int first, int count, bool held = true);
   [[nodiscard]] bool held(int column) const { return held_[static_cast<std::size_t>(column)]; }
@@ -164,7 +163,6 @@ class BatchProblem {
   BatchNoise noise_;
   double middle_ = 0;  ///< s: where a drift of the clock does nothing
   std::array<bool, batch::kColumns> held_{};
-  std::array<Eigen::Matrix<double, 8, 8>, kMaxCameras> lens_information_;
   std::array<Eigen::Matrix<double, 8, 1>, kMaxCameras> lens_start_;
   int chain_ = 0;
   int width_ = 0;

@@ -124,12 +124,6 @@ ImuCameraSolution calibrateImuCamera(const ImuCameraInput& input,
   }
   tell(0.05);
   BatchProblem problem(start.data, start.state, {kFirstCornerSigma, 1, 1});
-  if (input.other_cameras) {
-    for (std::size_t c = 0; c < input.cameras.camera_count; ++c) {
-      const SolvedCamera::Covariance& known = input.cameras.camera[c].covariance;
-      if (known.diagonal().minCoeff() > 0) problem.setLensPrior(c, known.inverse());
-    }
-  }
 
   // Coarse motion first, with what shapes it least held.
   for (std::size_t c = 0; c < start.state.camera_count; ++c) problem.hold(batch::lens(c), kLensParameters);

@@ -32,10 +32,9 @@ struct ImuCameraInput {
   std::vector<BoardView> views;  ///< of all images that show the board, any order
   std::vector<ImuSample> samples;
   ImuNoise noise;
-  bool noise_told = true;      ///< false: assumed, so that residuals above it are no fault
-  CameraSolution cameras;      ///< lenses and stereo transform: the start
-  bool other_cameras = false;  ///< `cameras` is from other images: its covariance is a prior for the lenses
-  std::optional<Rig> told;     ///< where the IMU was thought to be: compared only
+  bool noise_told = true;   ///< false: assumed, so that residuals above it are no fault
+  CameraSolution cameras;   ///< lenses and stereo transform: the start
+  std::optional<Rig> told;  ///< where the IMU was thought to be: compared only
 };
 
 /// `progress`: called with the share that is done, 0 to 1.

@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "estimator/geometry/so3.hpp"
+#include "firmware_host/lab/calibrate/cameras/projection_error.hpp"
 #include "firmware_host/lab/calibrate/page/board_evidence.hpp"
-#include "firmware_host/lab/calibrate/page/lens_quality.hpp"
 #include "firmware_host/lab/calibrate/page/page_rules.hpp"
 #include "firmware_host/lab/calibrate/page/solution_pages.hpp"
 
@@ -76,7 +76,7 @@ void addLens(const CameraSolution& solution, const BoardEvidence& evidence, std:
   const double good = kGoodAngle * focal;
   const std::string who = fmt::format("camera {}", c);
 
-  const std::vector<double> sigmas = projectionSigmas(model, camera.covariance, pixels);
+  const std::vector<double> sigmas = worstSigmas(model, camera.covariance, pixels);
   ImageDrawing uncertainty(model.width(), model.height());
   uncertainty.heat(grid, sigmas, 2 * good, "px, 1 sigma");
   uncertainty.caption(fmt::format("worst {:.3f} px, 95 % below {:.3f} px; best rotation taken out",
