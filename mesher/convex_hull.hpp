@@ -19,7 +19,7 @@ inline void convexHull(HullPoints& points, HullPoints& hull) {
     return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
   });
   hull.clear();
-  const auto turnsLeft = [&hull](const Eigen::Vector2f& p) {
+  const auto turns_left = [&hull](const Eigen::Vector2f& p) {
     const Eigen::Vector2d a = hull[hull.size() - 2].cast<double>();
     const Eigen::Vector2d ab = hull.back().cast<double>() - a;
     const Eigen::Vector2d ap = p.cast<double>() - a;
@@ -28,7 +28,7 @@ inline void convexHull(HullPoints& points, HullPoints& hull) {
   // Along the lower side, then back along the upper side from where the lower ended.
   std::size_t begin = 0;
   const auto add = [&](const Eigen::Vector2f& p) {
-    while (hull.size() >= begin + 2 && !turnsLeft(p)) hull.popBack();
+    while (hull.size() >= begin + 2 && !turns_left(p)) hull.popBack();
     static_cast<void>(hull.tryPushBack(p));
   };
   for (const Eigen::Vector2f& p : points) add(p);

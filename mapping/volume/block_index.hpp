@@ -57,8 +57,10 @@ inline BlockIndex blockOf(const VoxelIndex& voxel) {
 
 /// Index of a voxel within its block.
 inline std::size_t offsetOf(const VoxelIndex& voxel) {
-  return static_cast<std::size_t>((voxel.x & kBlockMask) + ((voxel.y & kBlockMask) << kBlockBits) +
-                                  ((voxel.z & kBlockMask) << (2 * kBlockBits)));
+  const auto part = [](std::int32_t along, unsigned axis) {
+    return static_cast<std::size_t>(along & kBlockMask) << (kBlockBits * axis);
+  };
+  return part(voxel.x, 0) + part(voxel.y, 1) + part(voxel.z, 2);
 }
 
 /// The voxel at this index of a block.
