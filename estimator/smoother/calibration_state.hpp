@@ -26,8 +26,9 @@ class CalibrationState {
   [[nodiscard]] double readout() const { return now_.readout; }
   [[nodiscard]] const std::array<SE3, kMaxCameras>& T_body_cam() const { return now_.T_body_cam; }
 
-  /// Makes the present values the reference, and adds the prior information of a calibration to H of a new
-  /// prior.
+  /// Makes the present values the reference.
+  void setReference() { reference_ = now_; }
+  /// The same, and adds the prior information of a calibration to H of a new prior.
   void hold(MatrixMap H);
   /// Values [-] reference, in the first dimension() rows.
   [[nodiscard]] Vector deviation() const;

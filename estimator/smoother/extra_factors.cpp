@@ -23,10 +23,10 @@ void linearize(const ExtraFactor& factor, const ExtraState& plane, const ExtraSt
   linear.columns = 0;
   linear.residual.setZero();
   const double scale = 1.0 / factor.sigma;
-  const Plane& at = plane.linearization().plane;
+  const Plane& at = plane.x.plane;
   const Eigen::Matrix<double, 3, 2> basis = at.basis();
   if (factor.tiesPoint()) {
-    const Eigen::Vector3d& p = landmark.linearization().point;
+    const Eigen::Vector3d& p = landmark.x.point;
     linear.residual[0] = scale * plane.x.plane.height(landmark.x.point);
     linear.addVariable(landmark.offset, scale * at.normal().transpose());
     Eigen::RowVector3d J;

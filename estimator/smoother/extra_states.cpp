@@ -40,22 +40,12 @@ void ExtraState::retract(const Eigen::Vector3d& delta) {
 }
 
 Eigen::Vector3d ExtraState::deviation() const {
-  return isLandmark() ? Eigen::Vector3d(x.point - first_estimate.point) : x.plane.minus(first_estimate.plane);
+  return isLandmark() ? Eigen::Vector3d(x.point - reference.point) : x.plane.minus(reference.plane);
 }
 
-void ExtraState::freeze() {
-  if (frozen) return;
-  frozen = true;
-  first_estimate = x;
-  moved_estimate = x;
-}
-
-void ExtraState::translateEstimate(const Eigen::Vector3d& shift) {
-  if (isLandmark()) {
-    moved_estimate.point += shift;
-  } else {
-    moved_estimate.plane.translate(shift);
-  }
+void ExtraState::enterPrior() {
+  in_prior = true;
+  reference = x;
 }
 
 }  // namespace swiftlet

@@ -56,8 +56,6 @@ class Plane {
   /// this [-] reference, in the basis of `reference`: the delta from `reference` to this. Normals are at most
   /// pi apart; between opposite ones the direction is that of the first basis vector.
   [[nodiscard]] Eigen::Vector3d minus(const Plane& reference) const;
-  /// Applies a translation of the world.
-  void translate(const Eigen::Vector3d& shift) { distance_ += normal().dot(shift); }
 
  private:
   Eigen::Quaterniond rotation_ = Eigen::Quaterniond::Identity();  // its z axis is the normal
@@ -74,30 +72,25 @@ struct ExtraValue {
 
 struct ExtraState {
   ExtraKind kind = ExtraKind::kNone;
-  bool frozen = false;         ///< part of the prior now or before: Jacobians at `moved_estimate`
+  bool in_prior = false;       ///< now or before
   bool leaving = false;        ///< leaves with the next marginalization
   bool settled = false;        ///< a plane determined by its points, so that its factors count
   std::uint32_t landmark = 0;  ///< index of its landmark
   PlaneId id = 0;              ///< of a plane
   ExtraValue x;
-  ExtraValue first_estimate;  ///< the prior's reference
-  ExtraValue moved_estimate;  ///< first_estimate, moved with the window
+  ExtraValue reference;  ///< of the prior
   ExtraValue backup;
   int offset = -1;         ///< first column in the normal equations
   int factor_offset = -1;  ///< first column in the factor of the last solve
 
   [[nodiscard]] bool isLandmark() const { return kind == ExtraKind::kLandmark; }
   [[nodiscard]] bool isPlane() const { return kind == ExtraKind::kPlane; }
-  /// The linearization point of Jacobians.
-  [[nodiscard]] const ExtraValue& linearization() const { return frozen ? moved_estimate : x; }
 
   void retract(const Eigen::Vector3d& delta);
-  /// x [-] first_estimate.
+  /// x [-] reference.
   [[nodiscard]] Eigen::Vector3d deviation() const;
-  /// Makes x the first estimate, unless there is one.
-  void freeze();
-  /// Moves the linearization point, not the prior's reference.
-  void translateEstimate(const Eigen::Vector3d& shift);
+  /// Makes x the reference of the prior, which includes it from now on.
+  void enterPrior();
 };
 
 }  // namespace swiftlet

@@ -126,7 +126,7 @@ bool ExtraTable::removePlane(PlaneId plane) {
   ExtraState* const extra = findPlaneToChange(plane);
   if (extra == nullptr) return false;
   dropFactorsOf(indexOf(*extra));
-  if (extra->frozen) {
+  if (extra->in_prior) {
     extra->leaving = true;
     return true;
   }
@@ -236,12 +236,6 @@ void ExtraTable::restore() {
   }
 }
 
-void ExtraTable::moveEstimates(const Eigen::Vector3d& shift) {
-  for (ExtraState& extra : extras_) {
-    if (extra.frozen) extra.translateEstimate(shift);
-  }
-}
-
 void ExtraTable::discard(Landmark& landmark) {
   if (landmark.extra == kNoExtra) {
     landmarks_.remove(landmark);
@@ -296,12 +290,12 @@ bool ExtraTable::release() {
   for (ExtraState& extra : extras_) {
     if (!extra.isLandmark()) continue;
     extra.leaving = landmarks_[extra.landmark].sightings.empty();
-    if (extra.leaving && !extra.frozen) vacate(extra);
+    if (extra.leaving && !extra.in_prior) vacate(extra);
   }
   markBarePlanes();
   bool any = false;
   for (ExtraState& extra : extras_) {
-    if (extra.leaving && !extra.frozen) vacate(extra);
+    if (extra.leaving && !extra.in_prior) vacate(extra);
     any = any || extra.leaving;
   }
   return any;

@@ -59,7 +59,6 @@ class ExtraTable {
   void retract(const Eigen::Ref<const Eigen::VectorXd>& step);
   void backup();
   void restore();
-  void moveEstimates(const Eigen::Vector3d& shift);
 
   /// Removes a landmark that does not fit. Its part of the prior cannot be removed; everything else is.
   void discard(Landmark& landmark);

@@ -150,8 +150,7 @@ void FullSmoother::placeCameras() {
     const Keyframe& keyframe = keyframes_[k];
     poses_[k].v_world = keyframe.x.v_world_body;
     for (std::size_t c = 0; c < rig_.camera_count; ++c) {
-      poses_[k].place(c, rig_.T_body_cam[c], keyframe.x.T_world_body, nullptr, rig_.readout.seconds(),
-                      keyframe.scan);
+      poses_[k].place(c, rig_.T_body_cam[c], keyframe.x.T_world_body, rig_.readout.seconds(), keyframe.scan);
     }
   }
 }

@@ -36,9 +36,11 @@ class GyroIntrinsicsState {
   [[nodiscard]] int dimension() const { return estimated_ ? kGyroMatrixDim : 0; }
   [[nodiscard]] const GyroIntrinsics& now() const { return now_; }
 
-  /// Makes the present value the reference, and adds the prior information to H of a new prior.
+  /// Makes the present value the reference.
+  void setReference() { reference_ = now_; }
+  /// The same, and adds the prior information to H of a new prior.
   void hold(MatrixMap H) {
-    reference_ = now_;
+    setReference();
     if (!estimated_) return;
     // Of the sum of two opposite entries, and of their difference, each over the square root of 2.
     const double sum = 1.0 / (kGyroMatrixPriorSigma * kGyroMatrixPriorSigma);

@@ -18,7 +18,6 @@ void Marginalization::marginalize(WindowProblem& problem, NormalEquations& syste
   problem.assignOffsets();
   involve(problem, checked);
   build(problem, system, checked);
-  expandAtReferences(problem, system);
   eliminate(problem, system, checked);
   writePrior(problem, system, checked);
   for (ExtraState& extra : problem.extras.states()) {
@@ -32,8 +31,7 @@ bool Marginalization::leaves(const WindowProblem& problem, const Landmark& landm
          landmark.sightings.size() >= 2 && landmark.seenFrom(landmarks_of_);
 }
 
-// Everything that the prior or a leaving factor touches is frozen: the old prior is re-expanded at the
-// current values of states that were not frozen so far.
+// What the prior or a leaving factor touches.
 void Marginalization::involve(WindowProblem& problem, const Departure& departure) {
   involved_.fill(false);
   if (slot_ != kNoSlot) involved_[slot_] = true;
@@ -48,13 +46,6 @@ void Marginalization::involve(WindowProblem& problem, const Departure& departure
     }
   }
   involveExtras(problem);
-  problem.moveEstimates();
-  for (const std::uint8_t slot : problem.window.order()) {
-    if (involved_[slot]) problem.window.freeze(slot);
-  }
-  for (std::size_t e = 0; e < kMaxExtraStates; ++e) {
-    if (involved_[kMaxStates + e]) problem.extras.states()[e].freeze();
-  }
 }
 
 void Marginalization::involveExtras(const WindowProblem& problem) {
@@ -95,36 +86,9 @@ void Marginalization::build(WindowProblem& problem, NormalEquations& system, con
   }
   addDepartingExtras(problem, landmarks_of_ != kNoSlot ? &landmarks_of_ : nullptr, system);
   system.finish(problem.window.slots());
-}
-
-// Both triangles, and b at the references: g = b + H d.
-void Marginalization::expandAtReferences(const WindowProblem& problem, NormalEquations& system) {
   MatrixMap H = system.H();
-  VectorMap g = system.g();
-  const int n = problem.dimension;
-  for (int c = 0; c < n; ++c) {
-    for (int r = c + 1; r < n; ++r) H(c, r) = H(r, c);
-  }
-  VectorMap d(work_.data(), n);
-  d.setZero();
-  const int calibration = problem.calibration.dimension();
-  d.head(calibration) = problem.calibration.deviation().head(calibration);
-  if (problem.intrinsics.estimated()) {
-    d.segment<kGyroMatrixDim>(problem.intrinsics.offset()) = problem.intrinsics.deviation();
-  }
-  for (std::size_t e = 0; e < kMaxExtraStates; ++e) {
-    const ExtraState& extra = problem.extras.states()[e];
-    if (involved_[kMaxStates + e]) d.segment<kExtraDim>(extra.offset) = extra.deviation();
-  }
-  for (const std::uint8_t slot : problem.window.order()) {
-    if (!involved_[slot]) continue;
-    const WindowState& state = problem.window.inSlot(slot);
-    d.segment(state.offset, state.dimension()) = state.x.minus(state.first_estimate).head(state.dimension());
-  }
-  for (int r = 0; r < n; ++r) {
-    double sum = 0;
-    for (int c = 0; c < n; ++c) sum += H(c, r) * d[c];
-    g[r] -= sum;
+  for (int c = 0; c < problem.dimension; ++c) {
+    for (int r = c + 1; r < problem.dimension; ++r) H(c, r) = H(r, c);
   }
 }
 
@@ -161,24 +125,27 @@ void Marginalization::eliminate(const WindowProblem& problem, NormalEquations& s
   if (state_leaves) eliminateRange(body, others.size() - 1);
 }
 
-// The old prior is in the system: its memory takes the new one.
+// The old prior is in the system: its memory takes the new one, whose reference are the current values.
 void Marginalization::writePrior(WindowProblem& problem, NormalEquations& system,
                                  const Departure& departure) const {
   Prior& prior = problem.prior;
   prior.begin();
+  problem.calibration.setReference();
+  problem.intrinsics.setReference();
   if (problem.calibration.dimension() > 0) {
     prior.addBlock(PriorBlock::kCalibration, problem.calibration.dimension(), {});
   }
   if (problem.intrinsics.estimated()) prior.addBlock(PriorBlock::kGyroIntrinsics, kGyroMatrixDim, {});
   for (std::size_t e = 0; e < kMaxExtraStates; ++e) {
     if (!involved_[kMaxStates + e] || problem.extras.states()[e].leaving) continue;
+    problem.extras.states()[e].enterPrior();
     prior.addBlock(static_cast<std::uint8_t>(kMaxStates + e), kExtraDim, {});
   }
   for (const std::uint8_t slot : problem.window.order()) {
     if (!involved_[slot]) continue;
     const WindowState& state = problem.window.inSlot(slot);
     const int dimension = state.dimension() - (slot == slot_ ? departure.count : 0);
-    if (dimension > 0) prior.addBlock(slot, dimension, state.first_estimate);
+    if (dimension > 0) prior.addBlock(slot, dimension, state.x);
   }
   prior.allocate();
   const MatrixMap H = system.H();

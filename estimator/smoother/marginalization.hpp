@@ -1,9 +1,9 @@
 #pragma once
 // Marginalizes columns of one state, and explicit landmarks and planes, into the prior.
 //
-// The factors of leaving columns are linearized once more at the first estimates of all their variables,
-// which are then frozen, and the leaving columns are eliminated (elimination.hpp). Equations:
-// docs/smoother.md. Memory: 0.1 MiB, reserved by the constructor. Cost: cubic in the columns involved.
+// The factors of leaving columns are linearized once more at the current values, which become the prior's
+// reference, and the leaving columns are eliminated (elimination.hpp). Equations: docs/smoother.md. Memory:
+// 0.1 MiB, reserved by the constructor. Cost: cubic in the columns involved.
 
 #include <array>
 #include <cstdint>
@@ -38,7 +38,6 @@ class Marginalization {
   void involve(WindowProblem& problem, const Departure& departure);
   void involveExtras(const WindowProblem& problem);
   void build(WindowProblem& problem, NormalEquations& system, const Departure& departure);
-  void expandAtReferences(const WindowProblem& problem, NormalEquations& system);
   void eliminate(const WindowProblem& problem, NormalEquations& system, const Departure& departure);
   void writePrior(WindowProblem& problem, NormalEquations& system, const Departure& departure) const;
   [[nodiscard]] bool leaves(const WindowProblem& problem, const Landmark& landmark) const;

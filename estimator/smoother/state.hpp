@@ -49,10 +49,7 @@ struct WindowState {
   bool keyframe = false;
   std::uint32_t rest = 0;  ///< number of the rest in which the state is; 0: in motion
   bool has_motion = true;  ///< velocity and biases are variables
-  bool frozen = false;     ///< part of the prior: Jacobians are taken at `moved_estimate`
   BodyState x;
-  BodyState first_estimate;  ///< the prior's reference
-  BodyState moved_estimate;  ///< first_estimate, moved with the window (Window::moveEstimates)
   LinkKind link = LinkKind::kNone;
   Preintegration imu;        ///< from the previous state with motion, if link is kImu
   ImuFactors imu_factors;    ///< factors on the noise with which `imu` was integrated
@@ -68,8 +65,6 @@ struct WindowState {
   FrameStatistics statistics;
 
   [[nodiscard]] int dimension() const { return has_motion ? kStateDim : kPoseDim; }
-  /// The linearization point (first-estimate Jacobians).
-  [[nodiscard]] const BodyState& linearization() const { return frozen ? moved_estimate : x; }
 };
 
 }  // namespace swiftlet

@@ -69,10 +69,10 @@ CameraPose::Seen CameraPose::inMiddleRow(const CameraSighting& sighting) const {
   return {R * sighting.ray(), sighting.whitening() * R.transpose()};
 }
 
-void RigPose::place(std::size_t c, const SE3& T_body_cam, const SE3& now, const SE3* then, double readout,
+void RigPose::place(std::size_t c, const SE3& T_body_cam, const SE3& now, double readout,
                     const ScanTurn& scan) {
   current[c] = CameraPose::of(now, T_body_cam);
-  linearization[c] = then != nullptr ? CameraPose::of(*then, T_body_cam) : current[c];
+  linearization[c] = current[c];
   if (readout == 0) return;
   linearization[c].rows = current[c].rows = RowMotion::of(readout, scan, T_body_cam, now, v_world);
   linearization[c].rows.velocity.setZero();

@@ -59,10 +59,8 @@ struct RigPose {
   Eigen::Vector3d v_world = Eigen::Vector3d::Zero();     ///< m/s, for the time offset and rows
   Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  ///< rad/s, for the time offset and rows
 
-  /// Places camera c at the body's pose and, if different, at its linearization. `scan`: of a rolling
-  /// shutter.
-  void place(std::size_t c, const SE3& T_body_cam, const SE3& now, const SE3* then, double readout,
-             const ScanTurn& scan);
+  /// Places camera c at the body's pose `now`. `scan`: of a rolling shutter.
+  void place(std::size_t c, const SE3& T_body_cam, const SE3& now, double readout, const ScanTurn& scan);
 };
 
 /// Indexed by Sighting::slot.

@@ -47,12 +47,6 @@ class Window {
   void backup();
   void restore();
 
-  /// Makes the state's value its first estimate, unless there is one.
-  void freeze(std::uint8_t slot);
-  /// Moves the first estimates by the mean translation of the frozen states since then (docs/smoother.md),
-  /// and returns that translation, by which other frozen variables must move too.
-  Eigen::Vector3d moveEstimates();
-
  private:
   std::array<WindowState, kMaxStates> states_;
   FixedVector<std::uint8_t, kMaxStates> order_;

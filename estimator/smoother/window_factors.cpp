@@ -21,10 +21,9 @@ bool motionFactor(const WindowProblem& problem, std::size_t position, MotionFact
   const WindowState& i = problem.window[position - 1];
   const WindowState& j = problem.window[position];
   if (!i.has_motion || !j.has_motion || j.link == LinkKind::kNone) return false;
-  return j.link == LinkKind::kImu ? imuFactor(j.imu, problem.noise, i.x, j.x, i.linearization(),
-                                              j.linearization(), factor, problem.intrinsics)
-                                  : constantVelocityFactor(j.link_duration, problem.noise, i.x, j.x,
-                                                           i.linearization(), j.linearization(), factor);
+  return j.link == LinkKind::kImu
+             ? imuFactor(j.imu, problem.noise, i.x, j.x, i.x, j.x, factor, problem.intrinsics)
+             : constantVelocityFactor(j.link_duration, problem.noise, i.x, j.x, i.x, j.x, factor);
 }
 
 // Residuals of one sensor, from newest to oldest. Errors that last show in sums over a second.
@@ -107,8 +106,8 @@ VectorMap priorDeviation(WindowProblem& problem, std::vector<double>& work) {
 
 void addSightings(const WindowProblem& problem, const ExtraState& extra, std::span<const Sighting> sightings,
                   NormalEquations& system) {
-  system.addExplicitLandmark(problem.viewsOf(sightings), extra.x.point, extra.linearization().point,
-                             extra.offset, problem.window.slots());
+  system.addExplicitLandmark(problem.viewsOf(sightings), extra.x.point, extra.x.point, extra.offset,
+                             problem.window.slots());
 }
 
 void addFactor(const WindowProblem& problem, const ExtraFactor& factor, NormalEquations& system) {

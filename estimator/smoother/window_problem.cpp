@@ -37,8 +37,6 @@ int WindowProblem::offsetOf(std::uint8_t slot) const {
   return slot < kMaxStates ? window.inSlot(slot).offset : extras.states()[slot - kMaxStates].offset;
 }
 
-void WindowProblem::moveEstimates() { extras.moveEstimates(window.moveEstimates()); }
-
 void WindowProblem::placeCameras() {
   const std::array<SE3, kMaxCameras>& T_body_cam = calibration.T_body_cam();
   for (const std::uint8_t slot : window.order()) {
@@ -52,9 +50,8 @@ void WindowProblem::placeCameras() {
       T.rotation = (T.rotation * expSo3(shift * state.omega_body)).normalized();
       T.translation += shift * state.x.v_world_body;
     }
-    const SE3* const then = state.frozen ? &state.moved_estimate.T_world_body : nullptr;
     for (std::size_t c = 0; c < rig.camera_count; ++c) {
-      placed.place(c, T_body_cam[c], T, then, calibration.readout(), state.scan);
+      placed.place(c, T_body_cam[c], T, calibration.readout(), state.scan);
     }
   }
 }

@@ -55,8 +55,6 @@ struct WindowProblem {
   void assignOffsets();
   /// First column in the system of a block of the prior (PriorBlock::slot).
   [[nodiscard]] int offsetOf(std::uint8_t slot) const;
-  /// Moves the first estimates with the window.
-  void moveEstimates();
   /// Places cameras at the states, with the present calibration.
   void placeCameras();
   [[nodiscard]] LandmarkViews viewsOf(std::span<const Sighting> sightings) const;

@@ -163,7 +163,6 @@ Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, Wind
   const int times = problem.calibration.layout().times();
   bool unchecked = false;
   for (int iteration = 0; iteration < iterations; ++iteration) {
-    problem.moveEstimates();
     problem.placeCameras();
     if (iteration == 0) triangulateAll(problem, 0);
     if (iteration == 1) {

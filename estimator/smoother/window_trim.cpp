@@ -57,7 +57,7 @@ void WindowTrim::dropFrame(std::size_t position) {
   WindowState& state = window[position];
   problem_.landmarks.removeSightingsOf(window.order()[position]);
   const bool linked = position > 0 && window[position - 1].has_motion && position + 1 < window.size();
-  if (!linked || state.frozen) {
+  if (!linked || problem_.prior.touches(window.order()[position])) {
     marginalization_.marginalize(problem_, system_, {position, 0, kStateDim, true, false});
     window.remove(position);
     return;

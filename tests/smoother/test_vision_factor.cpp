@@ -131,7 +131,7 @@ TEST_CASE("A rolling shutter's residual is that of the camera when the row was r
     const Eigen::Vector3d at_middle(random.uniform(-1, 1), random.uniform(-0.7, 0.7), random.uniform(2, 10));
     const Eigen::Vector3d p = T * rig.T_body_cam[0] * at_middle;
     for (std::size_t c = 0; c < kMaxCameras; ++c) {
-      rig_pose.place(c, rig.T_body_cam[c], T, nullptr, rig.readout.seconds(), {omega, omega});
+      rig_pose.place(c, rig.T_body_cam[c], T, rig.readout.seconds(), {omega, omega});
       Eigen::Vector2d at(0, 240);
       for (int round = 0; round < 8; ++round) {
         const double t = rig.rowTime(c, at.y());
