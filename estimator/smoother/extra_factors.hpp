@@ -1,8 +1,8 @@
 #pragma once
 // Factors on extra states: point on a plane, direction of a plane. Observations: landmark_block.hpp.
 //
-// Residuals r at the current values, Jacobians at the linearization (first estimates if frozen), with respect
-// to the error states of state.hpp and extra_states.hpp; world axes, z up:
+// Residuals r and Jacobians at the current values, with respect to the error states of state.hpp and
+// extra_states.hpp; world axes, z up:
 //  - point on plane: r = (n . p - d) / sigma; d r = (n^T dp + p^T dn - dd) / sigma.
 //  - direction: horizontal (a floor, n along z) r = (n_x, n_y) / sigma; vertical (a wall) r = n_z / sigma.
 // Robust, Cauchy at 2 sigma, like observations, so that points of another surface do not bend the window.

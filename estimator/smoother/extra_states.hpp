@@ -7,11 +7,9 @@
 //  - plane n . p = d: two tangent coordinates of the unit normal n (rad), and d (m), world. n moves along the
 //    geodesic; the step of d is added.
 // The tangent basis belongs to the plane and moves with its normal (a rotation whose z axis is n). A basis
-// computed from n would be discontinuous somewhere, and the prior is expressed in the basis of the first
-// estimate.
+// computed from n would be discontinuous somewhere, and the prior is expressed in the basis of its reference.
 // Where body states are numbered too (prior, involved variables), slots are numbered from kMaxStates: first
-// the landmarks, then the planes. First estimates as for body states (docs/smoother.md). Memory: 0.5 kB a
-// slot.
+// the landmarks, then the planes. Memory: 0.4 kB a slot.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>

@@ -12,7 +12,7 @@ namespace {
 // the square of this.
 constexpr double kMaxRelativeDepthSigma = 0.1;
 // A plane takes part once its normal is known to this: with two points, or three nearly on a line, it would
-// turn as it likes and be frozen there.
+// turn as it likes and enter the prior there.
 constexpr double kMaxNormalSigma = 0.05;  // rad
 constexpr int kFitIterations = 5;
 

@@ -241,9 +241,8 @@ void FullSmoother::linearizeMotion(System& system, double& cost) const {
     MotionFactor factor;
     const BodyState& x_i = keyframes_[k - 1].x;
     const double dt = (keyframe.stamp - keyframes_[k - 1].stamp).seconds();
-    const bool valid = keyframe.linked
-                           ? imuFactor(keyframe.imu, noise_, x_i, keyframe.x, x_i, keyframe.x, factor)
-                           : constantVelocityFactor(dt, noise_, x_i, keyframe.x, x_i, keyframe.x, factor);
+    const bool valid = keyframe.linked ? imuFactor(keyframe.imu, noise_, x_i, keyframe.x, factor)
+                                       : constantVelocityFactor(dt, noise_, x_i, keyframe.x, factor);
     if (!valid) continue;
     cost += 0.5 * factor.residual.squaredNorm();
     system.own(k - 1) += factor.jacobian_i.transpose() * factor.jacobian_i;

@@ -30,41 +30,30 @@ Eigen::Vector3d gravityVector(const ImuNoise& noise) { return {0, 0, -noise.grav
 }  // namespace
 
 bool imuFactor(const Preintegration& imu, const ImuNoise& noise, const BodyState& x_i, const BodyState& x_j,
-               const BodyState& lin_i, const BodyState& lin_j, MotionFactor& factor,
-               const GyroIntrinsicsState& intrinsics) {
+               MotionFactor& factor, const GyroIntrinsicsState& intrinsics) {
   const double dt = imu.duration();
   if (!(dt > 0)) return false;
   const Eigen::Vector3d bias_gyro = imu.biasFor(intrinsics.now(), x_i.bias_gyro);
-  const Eigen::Vector3d lin_bias_gyro = imu.biasFor(intrinsics.now(), lin_i.bias_gyro);
   const Eigen::Vector3d g = gravityVector(noise);
 
-  const auto residual = [&](const BodyState& a, const BodyState& b) {
-    const Eigen::Quaterniond R_b_w = a.T_world_body.rotation.conjugate();
-    Vector9d r;
-    r << logSo3(imu.deltaRotation(bias_gyro).conjugate() * R_b_w * b.T_world_body.rotation),
-        R_b_w * (b.T_world_body.translation - a.T_world_body.translation - a.v_world_body * dt -
-                 0.5 * dt * dt * g) -
-            imu.deltaPosition(bias_gyro, a.bias_accel),
-        R_b_w * (b.v_world_body - a.v_world_body - g * dt) - imu.deltaVelocity(bias_gyro, a.bias_accel);
-    return r;
-  };
-  const Vector9d r = residual(x_i, x_j);
-
-  const Eigen::Matrix3d R_i_t = lin_i.T_world_body.R().transpose();
-  const Eigen::Matrix3d R_j = lin_j.T_world_body.R();
-  const Eigen::Vector3d r_phi = logSo3(imu.deltaRotation(lin_bias_gyro).conjugate() *
-                                       lin_i.T_world_body.rotation.conjugate() * lin_j.T_world_body.rotation);
+  const Eigen::Matrix3d R_i_t = x_i.T_world_body.R().transpose();
+  const Eigen::Matrix3d R_j = x_j.T_world_body.R();
+  const Eigen::Vector3d r_phi = logSo3(imu.deltaRotation(bias_gyro).conjugate() *
+                                       x_i.T_world_body.rotation.conjugate() * x_j.T_world_body.rotation);
   const Eigen::Matrix3d jr_inverse = rightJacobianInverseSo3(r_phi);
-  const Eigen::Vector3d moved = R_i_t * (lin_j.T_world_body.translation - lin_i.T_world_body.translation -
-                                         lin_i.v_world_body * dt - 0.5 * dt * dt * g);
-  const Eigen::Vector3d gained = R_i_t * (lin_j.v_world_body - lin_i.v_world_body - g * dt);
+  const Eigen::Vector3d moved = R_i_t * (x_j.T_world_body.translation - x_i.T_world_body.translation -
+                                         x_i.v_world_body * dt - 0.5 * dt * dt * g);
+  const Eigen::Vector3d gained = R_i_t * (x_j.v_world_body - x_i.v_world_body - g * dt);
+  Vector9d r;
+  r << r_phi, moved - imu.deltaPosition(bias_gyro, x_i.bias_accel),
+      gained - imu.deltaVelocity(bias_gyro, x_i.bias_accel);
 
   Eigen::Matrix<double, 9, 15> J_i = Eigen::Matrix<double, 9, 15>::Zero();
   Eigen::Matrix<double, 9, 15> J_j = Eigen::Matrix<double, 9, 15>::Zero();
   J_i.block<3, 3>(0, 0) = -jr_inverse * R_j.transpose() * R_i_t.transpose();
   const Eigen::Matrix3d gyro_to_phi = imu.jacobianGyro().topRows<3>();
   J_i.block<3, 3>(0, 9) = -jr_inverse * expSo3Matrix(r_phi).transpose() *
-                          rightJacobianSo3(gyro_to_phi * (lin_bias_gyro - imu.biasGyro())) * gyro_to_phi;
+                          rightJacobianSo3(gyro_to_phi * (bias_gyro - imu.biasGyro())) * gyro_to_phi;
   J_j.block<3, 3>(0, 0) = jr_inverse;
   J_i.block<3, 3>(3, 0) = hat(moved);
   J_i.block<3, 3>(3, 3) = -R_i_t;
@@ -97,20 +86,18 @@ bool imuFactor(const Preintegration& imu, const ImuNoise& noise, const BodyState
 }
 
 bool constantVelocityFactor(double duration, const ImuNoise& noise, const BodyState& x_i,
-                            const BodyState& x_j, const BodyState& lin_i, const BodyState& lin_j,
-                            MotionFactor& factor) {
+                            const BodyState& x_j, MotionFactor& factor) {
   if (!(duration > 0)) return false;
   const double phi = 1.0 / (kGapRate * duration);
   const double v = 1.0 / (kGapAcceleration * duration);
   const double p = 2.0 / (kGapAcceleration * duration * duration);
   factor.jacobian_i.setZero();
   factor.jacobian_j.setZero();
-  factor.residual.segment<3>(0) =
-      phi * logSo3(x_i.T_world_body.rotation.conjugate() * x_j.T_world_body.rotation);
+  const Eigen::Vector3d turn = logSo3(x_i.T_world_body.rotation.conjugate() * x_j.T_world_body.rotation);
+  factor.residual.segment<3>(0) = phi * turn;
   factor.residual.segment<3>(3) = p * (x_j.T_world_body.translation - x_i.T_world_body.translation -
                                        0.5 * duration * (x_i.v_world_body + x_j.v_world_body));
   factor.residual.segment<3>(6) = v * (x_j.v_world_body - x_i.v_world_body);
-  const Eigen::Vector3d turn = logSo3(lin_i.T_world_body.rotation.conjugate() * lin_j.T_world_body.rotation);
   const Eigen::Matrix3d jr_inverse = rightJacobianInverseSo3(turn);
   factor.jacobian_j.block<3, 3>(0, 0) = phi * jr_inverse;
   factor.jacobian_i.block<3, 3>(0, 0) = -phi * jr_inverse * expSo3Matrix(turn).transpose();

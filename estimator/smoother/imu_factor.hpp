@@ -3,13 +3,11 @@
 //
 // Residual, 15 x 1, order phi, p, v, bg, ba, whitened (unit covariance if the model holds):
 //  - imuFactor: preintegrated increments against the states (Forster et al., T-RO 2017, eq. 45), p and v in
-//  the
-//    axes of body i, and the random walk of the biases.
-//  - constantVelocityFactor: for an interval with a gap in the samples; p and v in world axes, with large
-//  sigma.
-// Jacobians, 15 x 15, with respect to the error states of i and j, are taken at the `linearization` states,
-// the residual at the current ones. Gravity in world axes is (0, 0, -noise.gravity). Cost: about 3 us each;
-// no allocation.
+//    the axes of body i, and the random walk of the biases.
+//  - constantVelocityFactor: for an interval with a gap in the samples; p and v in world axes, with a large
+//    sigma.
+// Jacobians are 15 x 15, with respect to the error states of i and j. Gravity in world axes is
+// (0, 0, -noise.gravity). Cost: about 3 us each; no allocation.
 
 #include <Eigen/Core>
 
@@ -31,13 +29,11 @@ struct MotionFactor {
 
 /// False if the covariance is not positive definite (an interval without duration).
 [[nodiscard]] bool imuFactor(const Preintegration& imu, const ImuNoise& noise, const BodyState& x_i,
-                             const BodyState& x_j, const BodyState& linearization_i,
-                             const BodyState& linearization_j, MotionFactor& factor,
+                             const BodyState& x_j, MotionFactor& factor,
                              const GyroIntrinsicsState& intrinsics = {false, 0});
 
 /// `duration`: s between the states. False unless positive.
 [[nodiscard]] bool constantVelocityFactor(double duration, const ImuNoise& noise, const BodyState& x_i,
-                                          const BodyState& x_j, const BodyState& linearization_i,
-                                          const BodyState& linearization_j, MotionFactor& factor);
+                                          const BodyState& x_j, MotionFactor& factor);
 
 }  // namespace swiftlet

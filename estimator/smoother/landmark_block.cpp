@@ -82,7 +82,7 @@ void LandmarkBlock::linearizeAll(const LandmarkViews& views, const At& at) {
   }
 }
 
-// One camera of four states. Where nothing is frozen one reprojection serves for residuals and Jacobians.
+// One camera of four states. With a global shutter one reprojection serves for residuals and Jacobians.
 void LandmarkBlock::addViews(std::size_t c, const Camera& camera, std::span<const Sighting> four,
                              RigPoses poses, const At& at, std::size_t group) {
   lanes::ViewPointers current;

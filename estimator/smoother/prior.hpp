@@ -2,8 +2,8 @@
 // The prior from marginalized states: a quadratic cost on the remaining states.
 //
 //   cost(d) = 1/2 d^T H d + b^T d,   d = x [-] reference, stacked over the prior's blocks.
-// d is in the error state of state.hpp (rotation on the right; calibration as in CalibrationLayout). For
-// frozen states the reference is their first estimate. The Hessian form is stored in double precision; the
+// d is in the error state of state.hpp (rotation on the right; calibration as in CalibrationLayout). The
+// reference are the values at the last marginalization. The Hessian form is stored in double precision; the
 // advantage of the square-root form applies to single precision only. Memory: 2.7 MiB, reserved by the
 // constructor. H is full (both triangles), n x n, n = dimension().
 

@@ -5,16 +5,14 @@
 // frame that is no keyframe leaves by merging its two IMU intervals, without a permanent linearization. An
 // old keyframe first loses velocity and biases, then its pose, both into the prior, the latter with the
 // landmarks that it saw and no recent frame sees. Landmarks are structureless until they are promoted to
-// columns of their own; planes are further columns (extra_states.hpp). States in the prior keep their first
-// estimate as linearization point, moved with the window (window.hpp). Data: window, landmark_table,
+// columns of their own; planes are further columns (extra_states.hpp). Data: window, landmark_table,
 // extra_table, calibration_state, prior (together: window_problem). Operations: window_factors,
 // window_solver, window_covariance, window_trim, marginalization. Frames: world (z up, origin and yaw of the
 // first state), body (= IMU), cameras. SI units, pixels. Memory: 16.6 MiB, reserved by the constructor; no
-// allocation afterwards. Full is normal: the landmark not seen for longest and the
-// oldest IMU samples are dropped first. Cost: linear in landmarks, cubic in the dimension of the window (at
+// allocation afterwards. Full is normal: the landmark not seen for longest and the oldest IMU samples are
+// dropped first. Cost: linear in landmarks, cubic in the dimension of the window (at
 // most 192 columns by default, and 3 for each explicit landmark and plane). Sources: Leutenegger et al.,
-// "Keyframe-based visual-inertial odometry using nonlinear optimization", IJRR 2015 (window); Huang,
-// Mourikis, Roumeliotis, "Observability-based rules for consistent EKF SLAM", IJRR 2010 (first estimates);
+// "Keyframe-based visual-inertial odometry using nonlinear optimization", IJRR 2015 (window);
 // Usenko et al., "Visual-Inertial Mapping with Non-Linear Factor Recovery", RA-L 2020 (what leaves when);
 // Rosinol, Sattler, Pollefeys, Carlone, "Incremental Visual-Inertial 3D Mesh Generation with Structural
 // Regularities", ICRA 2019 (planes).

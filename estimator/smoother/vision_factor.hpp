@@ -2,14 +2,12 @@
 // Reprojection of a landmark into a camera with Jacobians, and triangulation of the landmark at the current
 // poses for its structureless elimination.
 //
-// First-estimate rule: the Jacobian blocks of an observation (pose and point) are taken at the same point
-// with the pose at its linearization value, the residual at the current values. The four unobservable
-// directions (position, yaw) then stay null for any point. For this, the linearization of a rolling-shutter
+// The Jacobian blocks of an observation (pose and point) are taken at the same pose and point. The four
+// unobservable directions (position, yaw) then are null. For this, the linearization of a rolling-shutter
 // camera includes the rotation of its rows but no velocity; the columns of the velocity are left out. Frames:
 // points and centres in the world, rays in the camera. Residuals are in sigmas of the pixel noise. No
 // allocation; triangulation is linear in observations and iterations.
-// Sources: robust weight: Huber, "Robust Statistics", 1981, section 6.3; first-estimate rule: Huang,
-// Mourikis, Roumeliotis, IJRR 2010; equations: docs/smoother.md.
+// Sources: robust weight: Huber, "Robust Statistics", 1981, section 6.3. Equations: docs/smoother.md.
 
 #include <Eigen/Core>
 #include <array>

@@ -115,7 +115,7 @@ class ImuCost : public ceres::SizedCostFunction<kStateDim, kPoseSize, kMotionSiz
     const BodyState i = stateOf(parameters[0], parameters[1]);
     const BodyState j = stateOf(parameters[2], parameters[3]);
     MotionFactor factor;
-    if (!imuFactor(imu_, noise_, i, j, i, j, factor)) return false;
+    if (!imuFactor(imu_, noise_, i, j, factor)) return false;
     Eigen::Map<Vector15d>{residuals} = factor.residual;
     if (jacobians == nullptr) return true;
     for (std::size_t block = 0; block < 4; ++block) {

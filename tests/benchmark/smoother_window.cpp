@@ -175,7 +175,7 @@ void BenchmarkWindow::placeCameras() {
 bool BenchmarkWindow::motionFactor(std::size_t position, MotionFactor& factor) const {
   const BodyState& i = states[order[position - 1]].x;
   const BodyState& j = states[order[position]].x;
-  return imuFactor(states[order[position]].imu, noise, i, j, i, j, factor);
+  return imuFactor(states[order[position]].imu, noise, i, j, factor);
 }
 
 Eigen::VectorXd BenchmarkWindow::priorDeviation() const {

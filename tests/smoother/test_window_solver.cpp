@@ -91,8 +91,7 @@ struct Scene {
     const Window& window = problem->window;
     for (std::size_t k = 1; k < window.size(); ++k) {
       MotionFactor factor;
-      REQUIRE(constantVelocityFactor(kInterval, problem->noise, window[k - 1].x, window[k].x, window[k - 1].x,
-                                     window[k].x, factor));
+      REQUIRE(constantVelocityFactor(kInterval, problem->noise, window[k - 1].x, window[k].x, factor));
       sum += 0.5 * factor.residual.squaredNorm();
     }
     const Vector15d d = window[0].x.minus(problem->prior.blocks()[0].reference);
