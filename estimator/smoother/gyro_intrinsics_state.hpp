@@ -2,8 +2,8 @@
 // Scale and misalignment of the gyro in the window: zero, or estimated with columns of their own.
 //
 // Nine columns, the matrix by columns, after those of the cameras' calibration. The reference of the prior is
-// the value at `hold`. Entries that no rotation excites stay at the prior, and the covariance includes their
-// uncertainty. While the matrix is held, it adds nothing to the covariance.
+// that of the last marginalization. Entries that no rotation excites stay at it, and the covariance includes
+// their uncertainty. While the matrix is held, it adds nothing to the covariance.
 //
 // A turn of the whole gyro, the antisymmetric part, is seen as a turn of all cameras against the IMU. Where
 // the cameras' rotations are estimated as well, only gravity tells the two apart, and weakly: the gyro's axes

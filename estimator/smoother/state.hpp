@@ -3,7 +3,7 @@
 //
 // Order of the error state everywhere: phi (0-2), p (3-5), v (6-8), bg (9-11), ba (12-14). Rotation is
 // perturbed on the right, R <- R Exp(phi); the others are added. A pose-only state (a keyframe whose velocity
-// and biases have been marginalized) has the first six. A slot takes 3.5 kB.
+// and biases have been marginalized) has the first six. A slot takes 3.4 kB.
 
 #include <Eigen/Core>
 #include <cstdint>

@@ -77,10 +77,13 @@ inline OdometryRun runOdometry(const TrackFlight& flight, const OdometrySettings
         run.frames.push_back(frame);
         if (!run.first_left && !output->left_window.empty()) {
           const NavState& left = output->left_window[0].state;
-          const auto seen = std::ranges::find(flight.frames(), left.stamp, &TrackedFrame::stamp);
-          run.first_left.emplace();
-          run.first_left->state = left;
-          run.first_left->truth = flight.truth(static_cast<std::size_t>(seen - flight.frames().begin()));
+          const auto& frames = flight.frames();
+          const auto seen = std::ranges::find(frames, left.stamp, &TrackedFrame::stamp);
+          if (seen != frames.end()) {
+            run.first_left.emplace();
+            run.first_left->state = left;
+            run.first_left->truth = flight.truth(static_cast<std::size_t>(seen - frames.begin()));
+          }
         }
         run.events.insert(run.events.end(), output->events.begin(), output->events.end());
       });
@@ -106,9 +109,9 @@ inline SE3 worldFromTruth(const RunFrame& first) {
   return {turn, estimate.translation - turn * truth.translation};
 }
 
-/// The same for the first epoch of a run that began at the flight's first frame, the world's origin. The first
-/// pose will not do with one camera: it comes up to 2.6 s later, and its scale is hardly known. The heading is
-/// that of the first keyframe that left the window.
+/// The same for the first epoch of a run that began at the flight's first frame, the world's origin. The
+/// first pose will not do with one camera: it comes up to 2.6 s later, and its scale is hardly known. The
+/// heading is that of the first keyframe that left the window.
 inline std::optional<SE3> worldFromTruth(const OdometryRun& run, const RunFrame& frame) {
   if (!frame.has_state || frame.state.epoch != 0 || !run.first_left) return {};
   const Eigen::Quaterniond turn = worldFromTruth(*run.first_left).rotation;
