@@ -27,18 +27,18 @@ void linearize(const ExtraFactor& factor, const ExtraState& plane, const ExtraSt
   const Eigen::Matrix<double, 3, 2> basis = at.basis();
   if (factor.tiesPoint()) {
     const Eigen::Vector3d& p = landmark.x.point;
-    linear.residual[0] = scale * plane.x.plane.height(landmark.x.point);
+    linear.residual[0] = scale * at.height(p);
     linear.addVariable(landmark.offset, scale * at.normal().transpose());
     Eigen::RowVector3d J;
     J << p.transpose() * basis, -1;
     linear.addVariable(plane.offset, scale * J);
     weigh(kInformationScale1, linear);
   } else if (factor.kind == ExtraFactorKind::kHorizontalPlane) {
-    linear.residual.head<2>() = scale * plane.x.plane.normal().head<2>();
+    linear.residual.head<2>() = scale * at.normal().head<2>();
     linear.addVariable(plane.offset, scale * basis.topRows<2>());
     weigh(kInformationScale, linear);
   } else {
-    linear.residual[0] = scale * plane.x.plane.normal().z();
+    linear.residual[0] = scale * at.normal().z();
     linear.addVariable(plane.offset, scale * basis.row(2));
     weigh(kInformationScale1, linear);
   }
