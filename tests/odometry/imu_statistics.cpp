@@ -33,7 +33,8 @@ constexpr std::array kTimes{10.0, 30.0, 60.0};
 
 struct Outcome {
   double ate = std::nan("");  ///< m
-  std::array<double, 3> nees{};
+  /// Negative: no state, or not of the first epoch, whose origin is the world's.
+  std::array<double, 3> nees{-1, -1, -1};
   double share_good = 0;
 };
 
@@ -133,7 +134,9 @@ int main(int argc, char** argv) {
       for (const Outcome& o : outcomes) {
         error.push_back(o.ate);
         good.push_back(o.share_good);
-        for (std::size_t k = 0; k < nees.size(); ++k) nees[k].push_back(o.nees[k]);
+        for (std::size_t k = 0; k < nees.size(); ++k) {
+          if (o.nees[k] >= 0) nees[k].push_back(o.nees[k]);
+        }
       }
       // One flight that starts wrong would be the mean.
       const double typical = test::quantile(error, 0.5);
