@@ -42,12 +42,11 @@ LandmarkBlock::LandmarkBlock(std::size_t max_sightings) {
 }
 
 void LandmarkBlock::linearize(const LandmarkViews& views, const LandmarkPoint& point) {
-  linearizeAll(views, {point, point, PointBasis::of(point.bearing), false});
+  linearizeAll(views, {point, PointBasis::of(point.bearing), false});
 }
 
-void LandmarkBlock::linearize(const LandmarkViews& views, const Eigen::Vector3d& position,
-                              const Eigen::Vector3d& linearization) {
-  linearizeAll(views, {pointAt(position), pointAt(linearization), {}, true});
+void LandmarkBlock::linearize(const LandmarkViews& views, const Eigen::Vector3d& position) {
+  linearizeAll(views, {pointAt(position), {}, true});
 }
 
 void LandmarkBlock::linearizeAll(const LandmarkViews& views, const At& at) {
@@ -87,7 +86,7 @@ void LandmarkBlock::addViews(std::size_t c, const Camera& camera, std::span<cons
                              RigPoses poses, const At& at, std::size_t group) {
   lanes::ViewPointers current;
   lanes::ViewPointers linearization;
-  bool moved = at.position;
+  bool moved = false;
   for (std::size_t l = 0; l < four.size(); ++l) {
     const CameraSighting& view = four[l].camera[c];
     if (!view.used) continue;
@@ -99,10 +98,10 @@ void LandmarkBlock::addViews(std::size_t c, const Camera& camera, std::span<cons
   }
   if (current.empty()) return;
   const lanes::ViewGroup now_views(current);
-  const lanes::Residuals now(now_views, at.now);
+  const lanes::Residuals now(now_views, at.point);
   if (moved) {
     const lanes::ViewGroup views(linearization);
-    addRows(c, camera, views, now, lanes::Residuals(views, at.linearization), at, group);
+    addRows(c, camera, views, now, lanes::Residuals(views, at.point), at, group);
   } else {
     addRows(c, camera, now_views, now, now, at, group);
   }
@@ -117,7 +116,7 @@ void LandmarkBlock::addRows(std::size_t c, const Camera& camera, const lanes::Vi
   Row row;
   sums_.weigh(now, counts, row.weight);
   const lanes::Jacobians J(views, linearization, at.basis);
-  const double inverse_depth = at.linearization.inverse_depth;
+  const double inverse_depth = at.point.inverse_depth;
   V ray[3];  // body axes
   transform(camera.R_body_cam, linearization.h, inverse_depth * camera.center, ray);
   SWIFTLET_UNROLL

@@ -10,7 +10,7 @@
 //   A_i - Y_i Y_i^T at state i,  -Y_i Y_j^T between states,  a_i - Y_i z in the gradient,
 // and the same with k instead of i. The owner of the pair blocks computes the pairs (PairProduct).
 // The point is a bearing with inverse depth (landmark.hpp) or, for an explicit landmark, a position.
-// Residuals and robust weights are taken at the current poses, Jacobians at those of the linearization.
+// Residuals and robust weights are taken at the current poses, Jacobians at RigPose::linearization.
 // Frames and Jacobians: vision_factor.hpp. Four states at a time, in vector lanes (view_lanes.hpp); the
 // scalar version is in tests/smoother/scalar_landmark.hpp. Memory: 1.1 kB per observation (2.4 kB with
 // calibration), reserved by the constructor. Cost: linear in the views. Source: Triggs et al., "Bundle
@@ -58,10 +58,8 @@ class LandmarkBlock {
 
   /// Linearizes a landmark without columns of its own.
   void linearize(const LandmarkViews& views, const LandmarkPoint& point);
-  /// Linearizes an explicit landmark with respect to its position (world, m). `linearization`: the point at
-  /// which Jacobians are taken.
-  void linearize(const LandmarkViews& views, const Eigen::Vector3d& position,
-                 const Eigen::Vector3d& linearization);
+  /// Linearizes an explicit landmark with respect to its position (world, m).
+  void linearize(const LandmarkViews& views, const Eigen::Vector3d& position);
 
   /// After linearize(). False if fewer than two states have the point in front of a camera or its information
   /// is singular; there is then nothing to add.
@@ -89,8 +87,7 @@ class LandmarkBlock {
   };
   /// The point and the meaning of its three columns.
   struct At {
-    LandmarkPoint now;
-    LandmarkPoint linearization;
+    LandmarkPoint point;
     PointBasis basis;
     bool position = false;
   };

@@ -104,9 +104,8 @@ bool NormalEquations::addLandmark(const LandmarkViews& views, const LandmarkPoin
 }
 
 void NormalEquations::addExplicitLandmark(const LandmarkViews& views, const Eigen::Vector3d& position,
-                                          const Eigen::Vector3d& linearization, int offset,
-                                          const std::array<WindowState, kMaxStates>& states) {
-  landmark_->linearize(views, position, linearization);
+                                          int offset, const std::array<WindowState, kMaxStates>& states) {
+  landmark_->linearize(views, position);
   landmark_->keepPoint();
   addStates(states);
   MatrixMap h = H();

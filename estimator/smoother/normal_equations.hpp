@@ -5,10 +5,11 @@
 // Landmarks enter as Schur complements over 6 x 6 pose blocks (padded to 8 rows, so that a column fills two
 // vector registers), which are scattered into the dense matrix once at the end.
 // Shapes: H is n x n, g is n x 1, n = dimension() <= kMaxSystemDim; only the lower triangle of H is used.
-// Columns are the error states of state.hpp and extra_states.hpp. Jacobians are taken at the linearization,
-// residuals at the values. Memory: about 2.9 MiB, reserved by the constructor. Cost of a landmark: linear in
-// its observations to linearize, quadratic in the states that see it to eliminate; both in vector lanes
-// (landmark_block.hpp). Source: Triggs et al., "Bundle Adjustment - A Modern Synthesis", 1999, section 6.
+// Columns are the error states of state.hpp and extra_states.hpp. Jacobians are taken at
+// RigPose::linearization, residuals at the values. Memory: about 2.9 MiB, reserved by the constructor. Cost
+// of a landmark: linear in its observations to linearize, quadratic in the states that see it to eliminate;
+// both in vector lanes (landmark_block.hpp). Source: Triggs et al., "Bundle Adjustment - A Modern Synthesis",
+// 1999, section 6.
 
 #include <Eigen/Core>
 #include <array>
@@ -57,14 +58,13 @@ class NormalEquations {
   void addFactor(const LinearFactor& factor);
 
   /// Eliminates a landmark; `eliminated`, unless null, receives the data for its back-substitution. False if
-  /// it constrains nothing (fewer than two states, or not in front of a camera at the linearization point).
+  /// it constrains nothing (fewer than two states, or not in front of a camera).
   bool addLandmark(const LandmarkViews& views, const LandmarkPoint& point,
                    const std::array<WindowState, kMaxStates>& states, EliminatedPoint* eliminated = nullptr);
 
-  /// Adds the views of an explicit landmark with columns from `offset` on, with respect to its position;
-  /// Jacobians at `linearization` (m, world).
-  void addExplicitLandmark(const LandmarkViews& views, const Eigen::Vector3d& position,
-                           const Eigen::Vector3d& linearization, int offset,
+  /// Adds the views of an explicit landmark with columns from `offset` on, with respect to its position (m,
+  /// world).
+  void addExplicitLandmark(const LandmarkViews& views, const Eigen::Vector3d& position, int offset,
                            const std::array<WindowState, kMaxStates>& states);
 
   /// Scatters the pose blocks into the lower triangle of H; call once after all factors.

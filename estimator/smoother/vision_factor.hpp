@@ -50,7 +50,8 @@ struct CameraPose {
   [[nodiscard]] Seen inMiddleRow(const CameraSighting& sighting) const;
 };
 
-/// Poses of the rig at one state: current values and linearization values.
+/// Poses of the rig at one state. Jacobians are taken at `linearization`: the same, but for the velocity of
+/// rows.
 struct RigPose {
   std::array<CameraPose, kMaxCameras> current;
   std::array<CameraPose, kMaxCameras> linearization;

@@ -105,8 +105,7 @@ VectorMap priorDeviation(WindowProblem& problem, std::vector<double>& work) {
 
 void addSightings(const WindowProblem& problem, const ExtraState& extra, std::span<const Sighting> sightings,
                   NormalEquations& system) {
-  system.addExplicitLandmark(problem.viewsOf(sightings), extra.x.point, extra.x.point, extra.offset,
-                             problem.window.slots());
+  system.addExplicitLandmark(problem.viewsOf(sightings), extra.x.point, extra.offset, problem.window.slots());
 }
 
 void addFactor(const WindowProblem& problem, const ExtraFactor& factor, NormalEquations& system) {

@@ -24,9 +24,9 @@ struct ScalarLandmark {
   ScalarLandmark(Eigen::Index columns)
       : H(Eigen::MatrixXd::Zero(columns, columns)), g(Eigen::VectorXd::Zero(columns)) {}
 
-  /// `basis` unused for a position. Points: where residuals are taken, and Jacobians.
-  void add(const LandmarkViews& views, const LandmarkPoint& now, const LandmarkPoint& linearization,
-           const PointBasis& basis, bool position, std::span<const Eigen::Index> pose_column) {
+  /// `basis` unused for a position.
+  void add(const LandmarkViews& views, const LandmarkPoint& point, const PointBasis& basis, bool position,
+           std::span<const Eigen::Index> pose_column) {
     for (const Sighting& sighting : views.sightings) {
       bool valid = false;
       for (std::size_t c = 0; c < kMaxCameras; ++c) {
@@ -34,9 +34,8 @@ struct ScalarLandmark {
         const RigPose& rig = views.poses[sighting.slot];
         Eigen::Vector2d r;
         SightingJacobians J;
-        if (!view.used || !reprojectionResidual(view, rig.current[c], now, r) ||
-            !reprojectionJacobians(view, rig.linearization[c], views.T_body_cam[c], linearization, basis,
-                                   true, J)) {
+        if (!view.used || !reprojectionResidual(view, rig.current[c], point, r) ||
+            !reprojectionJacobians(view, rig.linearization[c], views.T_body_cam[c], point, basis, true, J)) {
           continue;
         }
         Eigen::MatrixXd row = Eigen::MatrixXd::Zero(2, H.cols());

@@ -256,7 +256,7 @@ TEST_CASE("Sightings of an explicit landmark: information and gradient numerical
     states[0].offset = pose_offset;
     system->begin(calibration, dimension);
     system->addExplicitLandmark({seen, {&pose, 1}, rig.T_body_cam, calibration}, landmark.x.point,
-                                landmark.x.point, point_offset, states);
+                                point_offset, states);
     system->finish(states);
     const Eigen::MatrixXd lower = H.triangularView<Eigen::Lower>();
     const Eigen::MatrixXd built = Eigen::MatrixXd(system->H()).triangularView<Eigen::Lower>();
@@ -280,7 +280,7 @@ TEST_CASE("A point behind the camera gives no factor", "[smoother][extra]") {
   for (const bool behind : {false, true}) {
     const Eigen::Vector3d at = behind ? Eigen::Vector3d(2 * centre - p) : p;
     system->begin({}, kExtraDim + kPoseDim);
-    system->addExplicitLandmark({seen, scene.poses, rig.T_body_cam, {}}, at, at, 0, states);
+    system->addExplicitLandmark({seen, scene.poses, rig.T_body_cam, {}}, at, 0, states);
     system->finish(states);
     const Eigen::MatrixXd lower = Eigen::MatrixXd(system->H()).triangularView<Eigen::Lower>();
     CHECK((lower.cwiseAbs().maxCoeff() == 0) == behind);
@@ -357,7 +357,7 @@ struct Bundle {
         continue;
       }
       const Eigen::Vector3d& p = extras[m].x.point;
-      system.addExplicitLandmark({landmarks[m].views(), poses, rig.T_body_cam, {}}, p, p, extras[m].offset,
+      system.addExplicitLandmark({landmarks[m].views(), poses, rig.T_body_cam, {}}, p, extras[m].offset,
                                  states);
     }
     system.finish(states);
@@ -424,7 +424,7 @@ TEST_CASE("Columns of explicit landmarks, eliminated, are the structureless syst
     const LandmarkViews views{landmark.views(), bundle.poses, bundle.rig.T_body_cam, {}};
     REQUIRE(structureless->addLandmark(views, landmark.point, bundle.states));
     const Eigen::Vector3d p = landmark.point.position();
-    with_columns->addExplicitLandmark(views, p, p, kExtraDim * static_cast<int>(m), copy.states);
+    with_columns->addExplicitLandmark(views, p, kExtraDim * static_cast<int>(m), copy.states);
   }
   structureless->finish(bundle.states);
   with_columns->finish(copy.states);

@@ -131,8 +131,8 @@ struct Reduced {
     const Eigen::Index n = layout.dimension() + kPoseDim * static_cast<Eigen::Index>(window.slots.size());
     test::ScalarLandmark twin(n + 3);
     const auto at = columns(window, layout);
-    twin.add(window.views(landmark, layout), landmark.point, landmark.point,
-             PointBasis::of(landmark.point.bearing), false, at);
+    twin.add(window.views(landmark, layout), landmark.point, PointBasis::of(landmark.point.bearing), false,
+             at);
     Reduced result;
     result.used = twin.eliminate();
     if (!result.used) {
@@ -237,7 +237,6 @@ TEST_CASE("Lanes: a landmark that keeps its columns equals the scalar sum", "[sm
       const CalibrationLayout layout{trial % 2 == 1, trial >= 2, window.rig.camera_count, trial == 3};
       const Landmark landmark = window.landmark(random);
       const Eigen::Vector3d p = landmark.point.reference + 3 * landmark.point.bearing;
-      const Eigen::Vector3d p_lin = p + randomVector(random, 0.02);
       // The point's columns stand before the poses.
       std::array<WindowState, kMaxStates> states{};
       std::array<Eigen::Index, kMaxStates> at = Reduced::columns(window, layout);
@@ -245,17 +244,14 @@ TEST_CASE("Lanes: a landmark that keeps its columns equals the scalar sum", "[sm
       for (const std::uint32_t slot : window.slots) states[slot].offset = static_cast<int>(at[slot]) + 3;
       const auto system = std::make_unique<NormalEquations>();
       system->begin(layout, dimension);
-      system->addExplicitLandmark(window.views(landmark, layout), p, p_lin, layout.dimension(), states);
+      system->addExplicitLandmark(window.views(landmark, layout), p, layout.dimension(), states);
       system->finish(states);
       test::ScalarLandmark twin(dimension);
-      const auto pointAt = [](const Eigen::Vector3d& x) {
-        LandmarkPoint point;
-        point.bearing = Eigen::Vector3d::UnitX();
-        point.inverse_depth = 0.5;
-        point.reference = x - 2 * point.bearing;
-        return point;
-      };
-      twin.add(window.views(landmark, layout), pointAt(p), pointAt(p_lin), {}, true, at);
+      LandmarkPoint point;
+      point.bearing = Eigen::Vector3d::UnitX();
+      point.inverse_depth = 0.5;
+      point.reference = p - 2 * point.bearing;
+      twin.add(window.views(landmark, layout), point, {}, true, at);
       const Eigen::Index k = layout.dimension();
       const Eigen::Index n = dimension - 3 - k;
       Eigen::VectorXi order(dimension);  // twin's columns, in the system's order
