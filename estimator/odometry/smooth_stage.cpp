@@ -11,7 +11,7 @@ namespace {
 constexpr double kStartTime = 1.0;    // s
 constexpr double kStampSlack = 1e-3;  // s: stamps of frames a period apart are so to rounding
 constexpr int kStartIterations = 8;
-// Of good health before an estimate corrects the gyro: a start that is wrong would take its errors for the
+// Of good health before the gyro's matrix is estimated: a start that is wrong would take its errors for the
 // gyro's.
 constexpr double kTrustedTime = 2.0;  // s
 // What a flying body may be doing at its first image, in each axis.
@@ -103,8 +103,8 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
   input.frame = &tracked;
   input.imu_gap = imu_gap;
   input.rest = rest_.state().number;
-  input.move_gyro = health_.health() == Health::kGood && health_.secondsGood() > kTrustedTime;
   if (!epoch_began_) epoch_began_ = tracked.stamp;
+  input.estimate_gyro = health_.health() == Health::kGood && health_.secondsGood() > kTrustedTime;
   input.iterations =
       starting(tracked.stamp) ? std::max(kStartIterations, effort.iterations) : effort.iterations;
   input.max_features = effort.features;
@@ -332,6 +332,7 @@ Status SmoothStage::restartFromCoast(const Smoother::StepInput& input) {
 /// Gives the smoother the frames that waited for the start, all but the newest.
 Status SmoothStage::catchUp() {
   Smoother::StepInput input;
+  input.estimate_gyro = false;
   input.iterations = kStartIterations;
   for (std::size_t k = 0; k + 1 < mono_starter_.size(); ++k) {
     input.frame = &mono_starter_.frame(k);

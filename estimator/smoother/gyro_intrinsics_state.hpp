@@ -3,7 +3,7 @@
 //
 // Nine columns, the matrix by columns, after those of the cameras' calibration. The reference of the prior is
 // that of the last marginalization. Entries that no rotation excites stay at it, and the covariance includes
-// their uncertainty. While the matrix is held, it adds nothing to the covariance.
+// their uncertainty.
 //
 // A turn of the whole gyro, the antisymmetric part, is seen as a turn of all cameras against the IMU. Where
 // the cameras' rotations are estimated as well, only gravity tells the two apart, and weakly: the gyro's axes
@@ -29,9 +29,11 @@ class GyroIntrinsicsState {
         turn_sigma_(body_axes ? kFixedSigma : kGyroMatrixPriorSigma) {}
 
   [[nodiscard]] bool estimated() const { return estimated_; }
-  /// Active: the matrix is estimated from the motion, if enabled. Otherwise it is held.
-  void setActive(bool active) { active_ = active; }
-  [[nodiscard]] bool active() const { return estimated_ && active_; }
+  /// Held: no step moves the matrix, and it adds nothing to the covariance. What the motion says of it is
+  /// kept in the prior.
+  void setHeld(bool held) { held_ = held; }
+  /// Added to the diagonal of its columns before a system is solved.
+  [[nodiscard]] double heldInformation() const { return held_ ? 1.0 / (kHeldSigma * kHeldSigma) : 0; }
   [[nodiscard]] int offset() const { return offset_; }
   [[nodiscard]] int dimension() const { return estimated_ ? kGyroMatrixDim : 0; }
   [[nodiscard]] const GyroIntrinsics& now() const { return now_; }
@@ -65,9 +67,10 @@ class GyroIntrinsicsState {
 
  private:
   static constexpr double kFixedSigma = 1e-4;  ///< rad, below what cameras can tell
+  static constexpr double kHeldSigma = 1e-7;   ///< nothing seen in a window outweighs it
 
   bool estimated_;
-  bool active_ = true;
+  bool held_ = false;
   int offset_;
   double turn_sigma_;
   GyroIntrinsics now_;

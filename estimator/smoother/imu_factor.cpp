@@ -74,7 +74,7 @@ bool imuFactor(const Preintegration& imu, const ImuNoise& noise, const BodyState
   factor.residual.head<9>() = llt.matrixL().solve(r);
   factor.jacobian_i.topRows<9>() = llt.matrixL().solve(J_i);
   factor.jacobian_j.topRows<9>() = llt.matrixL().solve(J_j);
-  factor.with_gyro = intrinsics.active();
+  factor.with_gyro = intrinsics.estimated();
   if (factor.with_gyro) {
     for (int c = 0; c < 3; ++c) {
       factor.jacobian_gyro_matrix.middleCols<3>(3 * c) =

@@ -30,8 +30,8 @@ void Smoother::reset() {
 Status Smoother::step(const StepInput& input) {
   if (!started() && !start_) return {StatusCode::kNotReady, "no start state"};
   if (trim_due_) return {StatusCode::kInvalidInput, "the window has not been trimmed since the last step"};
-  problem_.intrinsics.setActive(input.move_gyro);
   addState(input);
+  problem_.intrinsics.setHeld(!input.estimate_gyro);
   addSightings(*input.frame, input.max_features);
   const Status status =
       solver_.solve(problem_, system_, covariance_, input.iterations, input.pose_tolerance, statistics_);

@@ -79,8 +79,8 @@ class Smoother {
     const TrackedFrame* frame = nullptr;
     bool imu_gap = false;    ///< samples are missing since the previous frame
     std::uint32_t rest = 0;  ///< number of the rest at the frame (RestState); 0: in motion
-    /// True: the gyro's intrinsics are estimated in this step, if enabled. False: they are held.
-    bool move_gyro = true;
+    /// False: the gyro's intrinsics are held in this step.
+    bool estimate_gyro = true;
     int iterations = 2;  ///< largest number
     /// m, rad: stops after a step in which no pose moves further. Jacobians and robust weights then change by
     /// less than the noise, and the other parts of a state are linear.

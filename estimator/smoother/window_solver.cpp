@@ -179,6 +179,10 @@ Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, Wind
     }
     MatrixMap H = system.H();
     for (int k = 0; k < problem.dimension; ++k) H(k, k) *= 1.0 + kRelativeDamping;
+    for (int k = 0; k < problem.intrinsics.dimension(); ++k) {
+      const int column = problem.intrinsics.offset() + k;
+      H(column, column) += problem.intrinsics.heldInformation();
+    }
     if (!choleskyInPlace(H)) {
       if (iteration == 0) return {StatusCode::kFailed, "the window's normal equations are singular; reset"};
       break;

@@ -1,5 +1,6 @@
 // An IMU that errs otherwise than its calibration says: what it errs by is found, and weighted.
 
+#include <Eigen/Cholesky>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdio>
@@ -53,6 +54,23 @@ TEST_CASE("Odometry: a gyro ten times as noisy as told is found to be so", "[odo
   const OdometryRun noisy = fly([](ImuSimulationSettings& imu) { imu.noise.gyro_density *= 10; });
   CHECK(noisy.frames.back().statistics.noise.imu.gyro == Approx(10).epsilon(0.4));
   CHECK(noisy.frames.back().state.health == Health::kGood);
+}
+
+// A steady turn looks the same with another bias and another matrix: only their priors tell the two apart.
+TEST_CASE("Odometry: gyro bias and matrix do not drift apart", "[odometry]") {
+  for (const std::uint64_t seed : {101, 124}) {
+    CAPTURE(seed);
+    const TrackFlight flight(test::roomFlight(6, seed));
+    const OdometryRun run = test::runOdometry(flight, test::settingsFor(flight, false));
+    REQUIRE(run.frames.back().has_state);
+    for (const RunFrame& frame : run.frames) {
+      if (!frame.has_state) continue;
+      const Eigen::Vector3d error = frame.state.bias_gyro - frame.truth.bias_gyro;
+      const Eigen::Matrix3d P = frame.state.covariance.block<3, 3>(9, 9);
+      CAPTURE(frame.seconds);
+      CHECK(error.dot(P.llt().solve(error)) < 30);  // chi-squared, 3 degrees: 2e-6 are beyond
+    }
+  }
 }
 
 TEST_CASE("Odometry: a gyro's scale and misalignment are found", "[odometry]") {
