@@ -50,8 +50,8 @@ bool isDisagreement(Doubt doubt) {
   return doubt == Doubt::kTracksDisagree || doubt == Doubt::kImuDisagrees || doubt == Doubt::kScaleDisagrees;
 }
 
-bool scaleOffBy(double bound, const FrameStatistics& statistics) {
-  return std::abs(statistics.scale - 1) > bound + 2 * statistics.scale_sigma;
+bool scaleOffBy(double bound, double sigmas, const FrameStatistics& statistics) {
+  return std::abs(statistics.scale - 1) > bound + sigmas * statistics.scale_sigma;
 }
 
 }  // namespace
@@ -99,7 +99,8 @@ Doubt HealthMonitor::inputDoubt(const Evidence& evidence) const {
 
 Doubt HealthMonitor::scaleDoubt(const Evidence& evidence) const {
   if (cameras_ != 1) return Doubt::kNone;
-  if (scaleOffBy(ScaleCheck::kAgrees, evidence.statistics)) return Doubt::kScaleDisagrees;
+  if (scaleOffBy(ScaleCheck::kAgrees, ScaleCheck::kAgreesSigmas, evidence.statistics))
+    return Doubt::kScaleDisagrees;
   return evidence.scale_known ? Doubt::kNone : Doubt::kScaleUnknown;
 }
 
@@ -117,7 +118,7 @@ Doubt HealthMonitor::accuracyDoubt(const Evidence& evidence) const {
 // One camera only: with two, a new start from the same data would end the same way.
 bool HealthMonitor::contradicted(const FrameStatistics& statistics) const {
   if (cameras_ != 1) return false;
-  if (scaleOffBy(ScaleCheck::kContradicts, statistics)) return true;
+  if (scaleOffBy(ScaleCheck::kContradicts, ScaleCheck::kContradictsSigmas, statistics)) return true;
   return !was_good_ && (imu_square_ > kImuResidual * kImuResidual || share_ < kFitShare);
 }
 

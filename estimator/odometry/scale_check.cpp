@@ -7,7 +7,7 @@ namespace swiftlet {
 namespace {
 
 // What is known before the first keyframe.
-constexpr double kVelocitySigma = 5.0;    // m/s
+constexpr double kVelocitySigma = 5.0;    // m/s, about the estimate's times the scale
 constexpr double kScaleSigma = 1.0;       // relative
 constexpr double kTiltSigma = 0.1;        // rad: a start in motion may be off by 6 degrees
 constexpr double kAccelBiasSigma = 0.15;  // m/s^2
@@ -34,11 +34,20 @@ void ScaleCheck::forget() {
   x_.setZero();
   x_[kScale] = 1;
   P_.setZero();
-  P_.diagonal().segment<3>(kVelocity).setConstant(kVelocitySigma * kVelocitySigma);
   P_(kScale, kScale) = kScaleSigma * kScaleSigma;
   P_.diagonal().segment<2>(kTilt).setConstant(kTiltSigma * kTiltSigma);
   P_.diagonal().segment<3>(kBias).setConstant(kAccelBiasSigma * kAccelBiasSigma);
   corrected_ = 1;
+}
+
+// About zero it would take a fast vehicle's path for a long one.
+void ScaleCheck::forgetVelocity(const WindowState& state) {
+  const Eigen::Vector3d v = state.has_motion ? state.x.v_world_body : Eigen::Vector3d::Zero();
+  x_.segment<3>(kVelocity) = scale() * v;
+  P_.topRows<3>() = v * P_.row(kScale);
+  P_.leftCols<3>() = P_.topRows<3>().transpose();
+  P_.topLeftCorner<3, 3>() =
+      P_(kScale, kScale) * v * v.transpose() + kVelocitySigma * kVelocitySigma * Eigen::Matrix3d::Identity();
 }
 
 double ScaleCheck::sigma() const { return std::sqrt(P_(kScale, kScale)); }
@@ -56,10 +65,7 @@ void ScaleCheck::update(Smoother& smoother) {
   if (!confirmed_) watchCorrections(window, settled);
   if (!follows || j.link != LinkKind::kImu || !i.has_motion || !j.has_motion) {
     // No IMU link from the last keyframe taken: its velocity is unknown here.
-    P_.topRows<3>().setZero();
-    P_.leftCols<3>().setZero();
-    P_.diagonal().segment<3>(kVelocity).setConstant(kVelocitySigma * kVelocitySigma);
-    x_.segment<3>(kVelocity).setZero();
+    forgetVelocity(j);
     if (!follows) return;
   }
   Eigen::Matrix<double, 6, 6> covariance;
@@ -87,7 +93,10 @@ void ScaleCheck::watchCorrections(const Window& window, std::size_t settled) {
       corrected_ *= (window[b].x.T_world_body.translation - window[a].x.T_world_body.translation).norm() /
                     old_->distance;
     }
-    if (std::abs(std::log(corrected_)) > kCorrected) forget();
+    if (std::abs(std::log(corrected_)) > kCorrected) {
+      forget();
+      forgetVelocity(window[settled - 2]);
+    }
   }
   // The oldest keyframe may leave before the next call.
   const WindowState& first = window[1];

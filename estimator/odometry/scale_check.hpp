@@ -26,10 +26,13 @@ class ScaleCheck {
  public:
   /// The scale counts as known below this relative sigma.
   static constexpr double kKnown = 0.08;
-  /// The scale agrees if |s - 1| is below this plus two sigmas.
+  /// The scale agrees if |s - 1| is below this plus so many sigmas.
   static constexpr double kAgrees = 0.10;
-  /// The estimate must be restarted if |s - 1| is above this plus two sigmas.
+  static constexpr double kAgreesSigmas = 2;
+  /// The estimate must be restarted if |s - 1| is above this plus so many sigmas: a right one that is thrown
+  /// away is worse than one that is doubted.
   static constexpr double kContradicts = 0.15;
+  static constexpr double kContradictsSigmas = 3;
 
   explicit ScaleCheck(const ImuNoise& noise) : noise_(noise) { reset(); }
 
@@ -50,6 +53,8 @@ class ScaleCheck {
   using Matrix = Eigen::Matrix<double, kAll, kAll>;
 
   void forget();
+  /// The velocity becomes that of the estimate times the scale, with a large sigma.
+  void forgetVelocity(const WindowState& state);
   void watchCorrections(const Window& window, std::size_t settled);
   void propagate(const WindowState& i, const Preintegration& imu);
   void measure(const Eigen::Vector3d& displacement, double variance);
