@@ -30,10 +30,11 @@ Eigen::Vector3d gravityVector(const ImuNoise& noise) { return {0, 0, -noise.grav
 }  // namespace
 
 bool imuFactor(const Preintegration& imu, const ImuNoise& noise, const BodyState& x_i, const BodyState& x_j,
-               MotionFactor& factor, const GyroIntrinsicsState& intrinsics) {
+               MotionFactor& factor, const GyroIntrinsicsState* intrinsics) {
   const double dt = imu.duration();
   if (!(dt > 0)) return false;
-  const Eigen::Vector3d bias_gyro = imu.biasFor(intrinsics.now(), x_i.bias_gyro);
+  const Eigen::Vector3d bias_gyro =
+      intrinsics == nullptr ? x_i.bias_gyro : imu.biasFor(intrinsics->now(), x_i.bias_gyro);
   const Eigen::Vector3d g = gravityVector(noise);
 
   const Eigen::Matrix3d R_i_t = x_i.T_world_body.R().transpose();
@@ -74,7 +75,7 @@ bool imuFactor(const Preintegration& imu, const ImuNoise& noise, const BodyState
   factor.residual.head<9>() = llt.matrixL().solve(r);
   factor.jacobian_i.topRows<9>() = llt.matrixL().solve(J_i);
   factor.jacobian_j.topRows<9>() = llt.matrixL().solve(J_j);
-  factor.with_gyro = intrinsics.estimated();
+  factor.with_gyro = intrinsics != nullptr && intrinsics->estimated();
   if (factor.with_gyro) {
     for (int c = 0; c < 3; ++c) {
       factor.jacobian_gyro_matrix.middleCols<3>(3 * c) =

@@ -27,10 +27,11 @@ struct MotionFactor {
   bool with_gyro = false;
 };
 
-/// False if the covariance is not positive definite (an interval without duration).
+/// `intrinsics`: the gyro's; null: those with which `imu` was integrated. False if the covariance is not
+/// positive definite (an interval without duration).
 [[nodiscard]] bool imuFactor(const Preintegration& imu, const ImuNoise& noise, const BodyState& x_i,
                              const BodyState& x_j, MotionFactor& factor,
-                             const GyroIntrinsicsState& intrinsics = {false, 0});
+                             const GyroIntrinsicsState* intrinsics = nullptr);
 
 /// `duration`: s between the states. False unless positive.
 [[nodiscard]] bool constantVelocityFactor(double duration, const ImuNoise& noise, const BodyState& x_i,

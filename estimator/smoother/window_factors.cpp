@@ -21,7 +21,7 @@ bool motionFactor(const WindowProblem& problem, std::size_t position, MotionFact
   const WindowState& i = problem.window[position - 1];
   const WindowState& j = problem.window[position];
   if (!i.has_motion || !j.has_motion || j.link == LinkKind::kNone) return false;
-  return j.link == LinkKind::kImu ? imuFactor(j.imu, problem.noise, i.x, j.x, factor, problem.intrinsics)
+  return j.link == LinkKind::kImu ? imuFactor(j.imu, problem.noise, i.x, j.x, factor, &problem.intrinsics)
                                   : constantVelocityFactor(j.link_duration, problem.noise, i.x, j.x, factor);
 }
 

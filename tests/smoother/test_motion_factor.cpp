@@ -151,14 +151,14 @@ TEST_CASE("IMU factor: Jacobian by the gyro's matrix", "[smoother][imu_factor]")
     const BodyState x_j = reached(x_i, imu, noise, random, 0.01);
     const auto residual = [&](const GyroIntrinsicsState& matrix) {
       MotionFactor f;
-      REQUIRE(imuFactor(imu, noise, x_i, x_j, f, matrix));
+      REQUIRE(imuFactor(imu, noise, x_i, x_j, f, &matrix));
       return Vector9d(f.residual.head<9>());
     };
     Matrix step;
     for (int k = 0; k < kGyroMatrixDim; ++k) step[k] = 5e-3 * random.normal();
     const GyroIntrinsicsState at = plus(GyroIntrinsicsState(true, 0), step);
     MotionFactor factor;
-    REQUIRE(imuFactor(imu, noise, x_i, x_j, factor, at));
+    REQUIRE(imuFactor(imu, noise, x_i, x_j, factor, &at));
     REQUIRE(factor.with_gyro);
     const auto J = numericJacobian<9, kGyroMatrixDim>(residual, at, plus, minus);
     CHECK(relativeDifference(factor.jacobian_gyro_matrix, J) < kMotionTolerance);

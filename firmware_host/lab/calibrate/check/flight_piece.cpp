@@ -362,7 +362,7 @@ class Piece {
     GyroIntrinsicsState gyro(true, change::kGyro);
     gyro.retract(at.change);
     MotionFactor factor;
-    if (!imuFactor(link.imu, link.noise, from, at.states[k], factor, gyro)) return 0;
+    if (!imuFactor(link.imu, link.noise, from, at.states[k], factor, &gyro)) return 0;
     // The walk of the bias knows nothing of the scale.
     factor.residual.tail<3>() += factor.jacobian_j(12, 12) * by_scale;
     const double cost = 0.5 * factor.residual.squaredNorm();
