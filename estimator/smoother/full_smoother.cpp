@@ -31,7 +31,9 @@ constexpr int kTriangulationIterations = 5;
 constexpr double kKeptAhead = 0.1;    // s of samples kept across a keyframe, for interpolation
 constexpr double kLongestLink = 5.0;  // s; beyond, an increment's covariance means little
 constexpr double kDampingUp = 10.0;
-constexpr double kDampingStart = 1e-6;
+// Of the diagonal, for rounding only: the images hold a pose far more firmly than the IMU holds one camera's
+// scale, and with 1e-6 of that the scale needs a hundred iterations.
+constexpr double kDampingStart = 1e-10;
 constexpr double kFirstMatchGate = 30;  // sigmas: what the loops' relative poses leave, and no more
 constexpr int kPullIterations = 10;
 constexpr std::size_t kMostSightings = 120;  // of a landmark: 20 s at 6 keyframes a second
@@ -302,7 +304,7 @@ Status FullSmoother::solve(FullSmootherReport& report, const std::atomic<bool>* 
   Eigen::VectorXd step;
   double damping = kDampingStart;
   double cost = 0;
-  for (int iteration = 0; iteration < settings_.max_iterations; ++iteration) {
+  for (int iteration = 0;; ++iteration) {
     integrateLinks();
     placeCameras();
     triangulateAll();
@@ -319,14 +321,16 @@ Status FullSmoother::solve(FullSmootherReport& report, const std::atomic<bool>* 
     if (iteration == 0) report.initial_cost = new_cost;
     if (comparable && new_cost > cost) {
       for (std::size_t k = 0; k < keyframes_.size(); ++k) keyframes_[k].x = before[k];
+      if (iteration == settings_.max_iterations || new_cost - cost < kRelativeConvergence * cost) break;
       damping *= kDampingUp;
       placeCameras();
       triangulateAll();
       linearize(system);
       if (stopped()) return kStopped;
     } else {
-      if (comparable && cost - new_cost < kRelativeConvergence * cost) break;
+      const bool converged = comparable && cost - new_cost < kRelativeConvergence * cost;
       cost = new_cost;
+      if (converged || iteration == settings_.max_iterations) break;
     }
     report.iterations = iteration + 1;
     const Status solved = solver.solve(system, damping, step);

@@ -92,8 +92,8 @@ class FullSmoother {
   void setCalibration(const CalibrationEstimate& calibration);
 
   /// Minimizes over everything added so far. kNotReady below three keyframes. kNumerical if the system cannot
-  /// be factored; the states are then unchanged. Any thread may set `stop`: the solve then returns kFailed
-  /// with the text kFullSmoothingStopped within one factorization, and the states are not valid.
+  /// be factored. Any thread may set `stop`: the solve then returns kFailed with the text
+  /// kFullSmoothingStopped within one factorization. After an error the states are not valid.
   Status solve(FullSmootherReport& report, const std::atomic<bool>* stop = nullptr);
 
   /// Upper bound of the memory of this object and solve() for everything added so far [bytes]: stored data,

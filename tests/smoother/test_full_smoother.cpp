@@ -29,7 +29,8 @@ std::vector<NavState> statesOf(const FullSmoother& full) {
   return states;
 }
 
-FullRun runFull(const TrackFlight& flight, const SmootherSettings& causal_settings) {
+/// `scale`: by how much the states are too large that full smoothing starts from.
+FullRun runFull(const TrackFlight& flight, const SmootherSettings& causal_settings, double scale = 1) {
   FullRun run;
   FullSmoother full(flight.rig(), flight.noise(), {});
   test::SmootherRun causal(flight, causal_settings);
@@ -46,14 +47,16 @@ FullRun runFull(const TrackFlight& flight, const SmootherSettings& causal_settin
         state.stamp = frame.stamp;
         const BodyState& x = causal.smoother().newest().x;
         state.T_world_body = x.T_world_body;
-        state.v_world_body = x.v_world_body;
+        state.T_world_body.translation *= scale;
+        state.v_world_body = scale * x.v_world_body;
         state.bias_gyro = x.bias_gyro;
         state.bias_accel = x.bias_accel;
         REQUIRE(full.addKeyframe(frame, state, causal.smoother().newest().statistics.noise).ok());
         run.causal.push_back(state);
         run.truth.push_back(flight.truth(k));
       });
-  if (causal_settings.estimate_time_offset || causal_settings.estimate_extrinsics) {
+  if (causal_settings.estimate_time_offset || causal_settings.estimate_extrinsics ||
+      causal_settings.estimate_gyro) {
     FullSmoother given = full;
     REQUIRE(given.solve(run.report).ok());
     run.full_given = statesOf(given);
@@ -67,11 +70,12 @@ FullRun runFull(const TrackFlight& flight, const SmootherSettings& causal_settin
 FullRun runFull(const TrackFlight& flight) { return runFull(flight, test::settingsFor(flight)); }
 
 // As the flight says whose calibration was given wrongly.
-void checkEstimateUsed(const SimulationSettings& flown, bool time_offset, bool extrinsics) {
+void checkEstimateUsed(const SimulationSettings& flown, bool time_offset, bool extrinsics, bool gyro) {
   const TrackFlight flight(flown);
   SmootherSettings settings = test::settingsFor(flight);
   settings.estimate_time_offset = time_offset;
   settings.estimate_extrinsics = extrinsics;
+  settings.estimate_gyro = gyro;
   const FullRun run = runFull(flight, settings);
   REQUIRE(run.status.ok());
   const double causal = test::positionError(run.causal, run.truth);
@@ -112,11 +116,37 @@ TEST_CASE("Full smoothing goes on from the estimated calibration", "[smoother][f
   for (const double sign : {1.0, -1.0}) {
     SimulationSettings late = flown;
     late.image_stamp_offset = Duration::fromSeconds(sign * 5e-3);
-    checkEstimateUsed(late, true, false);
+    checkEstimateUsed(late, true, false, false);
   }
   SimulationSettings bent = flown;
   bent.rig_turn_deg = 0.5 * Eigen::Vector3d(1, -1, 1).normalized();
-  checkEstimateUsed(bent, false, true);
+  checkEstimateUsed(bent, false, true, false);
+  SimulationSettings scaled = flown;
+  scaled.imu.gyro_matrix *= 1.03;
+  checkEstimateUsed(scaled, false, false, true);
+}
+
+TEST_CASE("Full smoothing finds one camera's scale again", "[smoother][full_smoother]") {
+  SimulationSettings flown = test::roomFlight(40, 7);
+  flown.world.kind = WorldKind::kHall;
+  flown.mono = true;
+  const TrackFlight flight(flown);
+  const SmootherSettings settings = test::settingsFor(flight);
+  const FullRun right = runFull(flight, settings);
+  const FullRun wrong = runFull(flight, settings, 1.1);
+  REQUIRE(right.status.ok());
+  REQUIRE(wrong.status.ok());
+  std::printf("one camera, scale 10 %% off at the start: cost %.1f, from the causal scale %.1f\n",
+              wrong.report.final_cost, right.report.final_cost);
+  CHECK(std::abs(wrong.report.final_cost / right.report.final_cost - 1) < 1e-3);
+  // The first keyframe stays where it was put.
+  const auto moved = [](const FullRun& run, std::size_t k) {
+    return Eigen::Vector3d(run.full[k].T_world_body.translation - run.full[0].T_world_body.translation);
+  };
+  for (std::size_t k = 0; k < right.full.size(); ++k) {
+    INFO("keyframe " << k);
+    REQUIRE((moved(wrong, k) - moved(right, k)).norm() < 0.01);
+  }
 }
 
 TEST_CASE("Full smoothing of a rolling shutter", "[smoother][full_smoother]") {
