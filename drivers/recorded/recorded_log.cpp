@@ -79,7 +79,8 @@ void RecordedLog::prepare(const std::string& name) {
 
 bool RecordedLog::imageIsNext() const {
   if (next_image_ == images_.size()) return false;
-  return next_sample_ == samples_.size() || samples_[next_sample_].stamp > images_[next_image_].stamp;
+  return next_sample_ == samples_.size() ||
+         samples_[next_sample_].stamp > images_[next_image_].stamp + calibration_.rig.sampleLead();
 }
 
 bool RecordedLog::next(SensorMessage& message) {

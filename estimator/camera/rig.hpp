@@ -1,6 +1,7 @@
 #pragma once
 // One or two cameras rigidly mounted to the body (= IMU).
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 
@@ -17,6 +18,8 @@ struct Rig {
   std::array<SE3, kMaxCameras> T_body_cam;  ///< camera to body
   /// t_imu = t_image + shift (Kalibr's timeshift_cam_imu), one value for the rig.
   Duration camera_to_imu_shift;
+  /// How far behind the stamp of an image its samples reach.
+  [[nodiscard]] Duration sampleLead() const { return std::max(camera_to_imu_shift, Duration{}); }
   /// Time from the first to the last row of a rolling shutter, the same for both cameras; zero: global
   /// shutter. The stamp of an image is that of its middle row.
   Duration readout;

@@ -11,7 +11,8 @@ FrameQueue::FrameQueue(Node& track, const GraphContext& context, const SensorNod
       sensors_(sensors),
       cameras_(context.rig.camera_count),
       sample_patience_(context.options.sample_patience),
-      sample_period_(Duration::fromSeconds(context.noise.rate_hz > 0 ? 1 / context.noise.rate_hz : 0)),
+      last_sample_(context.rig.sampleLead() -
+                   Duration::fromSeconds(context.noise.rate_hz > 0 ? 1 / context.noise.rate_hz : 0)),
       pairing_(context.settings.pairing.of(context.rig.camera_count)) {}
 
 Stamp FrameQueue::newestSample() const { return sensors_.newestSample(); }
@@ -116,7 +117,7 @@ bool FrameQueue::awaitsSamples() {
   constexpr std::int64_t kNoWait = std::numeric_limits<std::int64_t>::max();
   // Written before the newest sample is read, as the IMU's thread reads it after its write: one of the two
   // sees the other.
-  const bool waited = awaited_imu_.exchange((waiting_.front().stamp - sample_period_).ns + 1) != kNoWait;
+  const bool waited = awaited_imu_.exchange((waiting_.front().stamp + last_sample_).ns + 1) != kNoWait;
   bool waits = newestSample().ns < awaited_imu_.load();
   if (waits && wallSeconds() - hostTimes().arrival > sample_patience_.seconds()) {
     ++counters_.without_samples;

@@ -46,8 +46,8 @@ class FrameQueue {
   }
   /// Of the front frame's image that came last.
   [[nodiscard]] HostTimes hostTimes() const;
-  /// Whether samples up to the front frame's stamp are still expected. A sample less than one period before
-  /// the frame is its last.
+  /// Whether samples up to the front frame's stamp, on the IMU's clock, are still expected. A sample less
+  /// than one period before it is its last.
   [[nodiscard]] bool awaitsSamples();
   /// Host time since when the front frame could have been worked on: its arrival, or the end of the last wait
   /// for samples, which less effort would not have made shorter.
@@ -96,7 +96,7 @@ class FrameQueue {
   const SensorNode& sensors_;
   std::size_t cameras_;
   Duration sample_patience_;
-  Duration sample_period_;
+  Duration last_sample_;  ///< from a frame's stamp to the earliest that its last sample can have
   Pairing pairing_;
   std::uint32_t timeline_ = 0;  ///< of the newest image that went to pairing
   std::array<Held, kMaxCameras> held_;

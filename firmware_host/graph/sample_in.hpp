@@ -23,7 +23,7 @@ class SampleIn final : public QueueIn<ImuArrival, kImuRing> {
     timeline_ = front()->timeline;
     pop();
   }
-  /// Hands samples to `taker`, in order: of a frame's time line those not later than its stamp, and the first
+  /// Hands samples to `taker`, in order: of a frame's time line those not later than `until`, and the first
   /// in any case, by which a repetition of the run knows that it has begun; all of time lines before it.
   template <typename Taker>
   void takeUntil(Stamp until, std::uint32_t timeline, Taker& taker) {

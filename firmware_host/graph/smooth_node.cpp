@@ -48,7 +48,7 @@ void SmoothNode::smoothFrame(const TrackMessage& message, FrameResult& out) {
   out.step.effort = effort_->give();
   out.smooth_level = effort_->level();
   const Spent spent = context_.timed(StageId::kSmooth, [&] {
-    samples.takeUntil(message.tracked.stamp, message.tracked.timeline, stage_);
+    samples.takeUntil(message.tracked.stamp + context_.rig.sampleLead(), message.tracked.timeline, stage_);
     out.step.samples = samples.taken();
     out.step.planes = planes.refresh();
     if (out.step.planes != planes_) {

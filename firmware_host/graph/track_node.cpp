@@ -60,7 +60,7 @@ void TrackNode::trackFrame() {
       window_ = step.window;
       stage_.take(window.value());
     }
-    samples.takeUntil(frame.stamp, frame.timeline, stage_);
+    samples.takeUntil(frame.stamp + context_.rig.sampleLead(), frame.timeline, stage_);
     step.samples = samples.taken();
     message.status = stage_.step(frame, step.effort, message.tracked);
   });

@@ -1,13 +1,16 @@
 // The real seconds in the repository: a whole run with two cameras and with one, on any machine.
 
 #include <catch2/catch.hpp>
+#include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <string>
 
 #include "firmware_host/lab/evaluation/evaluate_run.hpp"
 #include "firmware_host/runs/replay_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
@@ -56,6 +59,33 @@ TEST_CASE("four real seconds with two cameras: a pose from the first image on, w
 
 TEST_CASE("four real seconds with one camera: a pose within a second, within a centimetre") {
   checkRun({true, 1.0});
+}
+
+// The images' clock 40 ms behind the IMU's, eight of its periods, and a calibration that says so.
+TEST_CASE("images stamped long before their samples: an IMU between all of them") {
+  constexpr std::int64_t kBehind = 40'000'000;  // ns
+  const ScratchFolder folder("short_log_behind");
+  const std::string log = folder.file("log");
+  std::filesystem::copy(shortLog(), log, std::filesystem::copy_options::recursive);
+  for (const std::string camera : {"/mav0/cam0/", "/mav0/cam1/"}) {
+    std::ofstream(log + camera + "sensor.yaml", std::ios::app) << "timeshift_cam_imu: 0.04\n";
+    std::string rows = "#timestamp [ns],filename\n";
+    std::istringstream given(test::textOf(log + camera + "data.csv"));
+    for (std::string line; std::getline(given, line);) {
+      if (line.front() == '#') continue;
+      const std::size_t comma = line.find(',');
+      rows += std::to_string(std::stoll(line.substr(0, comma)) - kBehind) + line.substr(comma) + '\n';
+    }
+    std::ofstream(log + camera + "data.csv") << rows;
+  }
+  ReplayRequest request;
+  request.accuracy = runAccuracyJson;
+  request.log = log;
+  request.out = folder.file("run");
+  const ReplayResult result = runReplay(request, Settings{});
+  REQUIRE(result.finished);
+  CHECK(result.summary["health"].back()["health"] == "good");
+  CHECK(result.summary["accuracy"]["odometry"]["all"]["se3"]["ate_m"]["rmse"].get<double>() < kLargestError);
 }
 
 }  // namespace

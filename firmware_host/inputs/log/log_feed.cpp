@@ -58,7 +58,7 @@ LogFeed::Next LogFeed::next() {
     }
     if (const auto* sample = std::get_if<ImuSample>(&message_)) {
       if (isPast(sample->stamp)) break;
-      if (nextTracks(sample->stamp)) return Next::kTracks;
+      if (nextTracks(sample->stamp - source_.calibration().rig.sampleLead())) return Next::kTracks;
       has_message_ = false;
       if (wantsImu(sample->stamp)) return Next::kSample;
       continue;
