@@ -29,6 +29,7 @@ MonoStarter::MonoStarter(const Rig& rig, const ImuNoise& noise)
 void MonoStarter::reset() { begin_ = count_ = 0; }
 
 void MonoStarter::push(const TrackedFrame& frame) {
+  if (count_ == 0) waits_since_ = frame.stamp;
   if (count_ == frames_.size()) {
     begin_ = (begin_ + 1) % frames_.size();
     --count_;
@@ -70,13 +71,13 @@ std::size_t MonoStarter::gatherTracks(std::span<const std::size_t> chosen, const
   return kept;
 }
 
-bool MonoStarter::trySolve(const ImuBuffer& imu, const StartPrior& prior, double pixel_sigma,
+bool MonoStarter::trySolve(const ImuBuffer& imu, Stamp earliest, const StartPrior& prior, double pixel_sigma,
                            StartState& start, const char*& waiting_for) {
   waiting_for = "more frames (with one camera the scale comes from motion)";
   if (count_ < kMinFrames) return false;
-  const Duration waited = frame(count_ - 1).stamp - frame(0).stamp;
-  if (waited < kShortestWindow) return false;
-  const bool impatient = waited >= kMonoPatience;
+  const Stamp newest = frame(count_ - 1).stamp;
+  if (newest - frame(0).stamp < kShortestWindow) return false;
+  const bool impatient = newest - waits_since_ >= kMonoPatience;
   const Duration shift = rig_.camera_to_imu_shift;
 
   std::array<std::size_t, kMaxMonoFrames> chosen{};
@@ -86,7 +87,7 @@ bool MonoStarter::trySolve(const ImuBuffer& imu, const StartPrior& prior, double
 
   const Stamp first = frame(0).stamp + shift;
   TiltEstimate tilt;
-  const Stamp history = first - Duration::fromSeconds(1.0);
+  const Stamp history = std::max(first - Duration::fromSeconds(1.0), earliest);
   if (!estimateTilt(imu.around(history, first), first, noise_, prior, tilt).ok()) {
     waiting_for = "IMU samples before the first image";
     return false;

@@ -37,10 +37,11 @@ class MonoStarter {
     return frames_[(begin_ + k) % frames_.size()];
   }
 
-  /// Solves from frames first..newest. True if the scale is known well enough or kMonoPatience is over;
-  /// `start` is then the state at frame `first`. Otherwise `waiting_for` tells what is missing.
-  bool trySolve(const ImuBuffer& imu, const StartPrior& prior, double pixel_sigma, StartState& start,
-                const char*& waiting_for);
+  /// Solves from the kept frames, without samples before `earliest`. True if the scale is known well enough
+  /// or kMonoPatience is over since the first frame after reset(); `start` is then the state at the oldest.
+  /// Otherwise `waiting_for` tells what is missing.
+  bool trySolve(const ImuBuffer& imu, Stamp earliest, const StartPrior& prior, double pixel_sigma,
+                StartState& start, const char*& waiting_for);
 
  private:
   [[nodiscard]] std::size_t gatherTracks(std::span<const std::size_t> chosen, const ImuBuffer& imu,
@@ -49,6 +50,7 @@ class MonoStarter {
   Rig rig_;
   ImuNoise noise_;
   std::vector<TrackedFrame> frames_;
+  Stamp waits_since_;
   std::size_t begin_ = 0;
   std::size_t count_ = 0;
   std::vector<BearingTrack> tracks_;

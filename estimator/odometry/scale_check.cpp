@@ -18,7 +18,8 @@ constexpr double kTiltWalk = 1e-3;   // rad/sqrt(s)
 constexpr double kCorrected = 0.10;
 // Keyframes closer together than this do not show a correction of the scale.
 constexpr double kLeastDistance = 0.2;  // m
-// Errors of a track are correlated in time, which the smoother's covariance does not include.
+// Beside the smoother's own factor for errors that last (track_correlation.hpp): the limits for a restart
+// were found with both.
 constexpr double kVisionInflation = 4.0;  // on the variance
 
 }  // namespace
@@ -45,7 +46,7 @@ void ScaleCheck::forgetVelocity(const WindowState& state) {
   const Eigen::Vector3d v = state.has_motion ? state.x.v_world_body : Eigen::Vector3d::Zero();
   x_.segment<3>(kVelocity) = scale() * v;
   P_.topRows<3>() = v * P_.row(kScale);
-  P_.leftCols<3>() = P_.topRows<3>().transpose();
+  P_.leftCols<3>() = P_.topRows<3>().transpose().eval();
   P_.topLeftCorner<3, 3>() =
       P_(kScale, kScale) * v * v.transpose() + kVelocitySigma * kVelocitySigma * Eigen::Matrix3d::Identity();
 }

@@ -79,7 +79,7 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
   if (tracked.refused_before > 0) {
     events_.raise(tracked.refused_stamp, EventKind::kFrameDropped, tracked.refused_before);
   }
-  rest_.addFrame(tracked.stamp, stillness_.update(tracked));
+  rest_.addFrame(tracked.stamp + smoother_.timeOffset(), stillness_.update(tracked));
   const bool imu_gap = imu_gap_ || isSilent(imu_, noise_, tracked.stamp + smoother_.timeOffset());
   double blind = health_.secondsWithoutImage(tracked.stamp);
   const bool sees = static_cast<int>(tracked.features.size()) >= HealthMonitor::kMinSightings;
@@ -90,7 +90,10 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
     blind = 0;
   }
   if (health_.lost()) giveUp();
+  // A start does not reach across missing samples: it begins anew with this frame.
+  if (imu_gap) mono_starter_.reset();
   if (!smoother_.started() && !start(tracked, output)) {
+    imu_gap_ = false;
     deliver(output);
     return okStatus();
   }
@@ -149,6 +152,13 @@ void SmoothStage::finish(OdometryOutput& output) {
 }
 
 void SmoothStage::reset() {
+  endEpoch();
+  // Of another world.
+  last_good_.reset();
+  last_useful_.reset();
+}
+
+void SmoothStage::endEpoch() {
   trim();
   if (smoother_.started()) {
     smoother_.flush(left_step_);
@@ -174,6 +184,7 @@ void SmoothStage::reset() {
 
 void SmoothStage::restart(std::uint32_t timeline, Stamp first) {
   const double back = imu_.empty() ? 0 : (imu_.newest().stamp - first).seconds();
+  watch_.watchBlackout(last_stamp_, 0, events_);
   timeline_ = timeline;
   last_stamp_ = first;
   // One a sample, they would leave no room for what follows.
@@ -241,9 +252,16 @@ bool SmoothStage::start(const TrackedFrame& tracked, OdometryOutput& output) {
   StartPrior prior;
   prior.bias_gyro_sigma = kStartGyroBiasSigma;
   prior.bias_accel_sigma = kStartAccelBiasSigma;
+  if (left_at_ && left_at_->gyro_bias_sigma > 0) {
+    prior.bias_gyro = left_at_->state.bias_gyro;
+    prior.bias_accel = left_at_->state.bias_accel;
+    prior.bias_gyro_sigma = std::min(prior.bias_gyro_sigma, kCarriedBias * left_at_->gyro_bias_sigma);
+    prior.bias_accel_sigma = std::min(prior.bias_accel_sigma, kCarriedBias * left_at_->accel_bias_sigma);
+  }
   TiltEstimate tilt;
   const Stamp history = std::max(stamp - Duration::fromSeconds(2.0), gap_end_);
-  if (imu_.empty() || !estimateTilt(imu_.around(history, stamp), stamp, noise_, prior, tilt).ok()) {
+  if (isSilent(imu_, noise_, stamp) ||
+      !estimateTilt(imu_.around(history, stamp), stamp, noise_, prior, tilt).ok()) {
     output.waiting_for = "IMU samples before the first image";
     return false;
   }
@@ -252,20 +270,17 @@ bool SmoothStage::start(const TrackedFrame& tracked, OdometryOutput& output) {
   const bool at_rest = rest_.state().at_rest;
   if (rig_.camera_count == 1 && !at_rest) {
     mono_starter_.push(tracked);
-    if (!mono_starter_.trySolve(imu_, prior, smoother_.pixelSigma(), start, output.waiting_for)) return false;
+    if (!mono_starter_.trySolve(imu_, gap_end_, prior, smoother_.pixelSigma(), start, output.waiting_for))
+      return false;
   } else {
     mono_starter_.reset();
     start.stamp = stamp;
     start.state.T_world_body.rotation = gravityAlignedRotation(tilt.up);
     start.tilt_sigma = tilt.sigma;
-    start.gyro_bias_sigma = kStartGyroBiasSigma;
-    start.accel_bias_sigma = kStartAccelBiasSigma;
-    if (left_at_ && left_at_->gyro_bias_sigma > 0) {
-      start.state.bias_gyro = left_at_->state.bias_gyro;
-      start.state.bias_accel = left_at_->state.bias_accel;
-      start.gyro_bias_sigma = std::min(start.gyro_bias_sigma, kCarriedBias * left_at_->gyro_bias_sigma);
-      start.accel_bias_sigma = std::min(start.accel_bias_sigma, kCarriedBias * left_at_->accel_bias_sigma);
-    }
+    start.state.bias_gyro = prior.bias_gyro;
+    start.state.bias_accel = prior.bias_accel;
+    start.gyro_bias_sigma = prior.bias_gyro_sigma;
+    start.accel_bias_sigma = prior.bias_accel_sigma;
     if (at_rest) start.velocity_sigma = kRestVelocitySigma;
   }
   if (left_at_) goOnFrom(left_at_->state.T_world_body, start.state);
@@ -275,7 +290,7 @@ bool SmoothStage::start(const TrackedFrame& tracked, OdometryOutput& output) {
 
 /// Ends the epoch; the next one goes on from there.
 void SmoothStage::leave(const StartState& at) {
-  reset();
+  endEpoch();
   left_at_ = at;
 }
 
@@ -321,7 +336,9 @@ StartState SmoothStage::newestAsStart() const {
 /// the first of a new epoch instead, known as well as the step says.
 Status SmoothStage::restartFromCoast(const Smoother::StepInput& input) {
   const StartState start = newestAsStart();
-  reset();
+  const bool keyframe = smoother_.newest().keyframe;
+  endEpoch();
+  if (keyframe && !left_.empty()) left_.popBack();  // the new epoch delivers it
   smoother_.start(start);
   epoch_began_ = input.frame->stamp;
   const Status status = smoother_.step(input);
@@ -384,7 +401,7 @@ void SmoothStage::publish(const TrackedFrame& tracked, bool imu_missing, Odometr
   fix_.has_state = true;
   fix_.state = state;
   fix_.gyro = calibration_.gyro;
-  fix_.last_accepted = health_.lastAccepted();
+  fix_.last_accepted = health_.lastAccepted() + smoother_.timeOffset();
   if (!starting(tracked.stamp)) {
     if (rest_.state().at_rest) last_rest_ = tracked.stamp;
     // One camera that has hardly moved takes the first guess of the distances for a measurement.

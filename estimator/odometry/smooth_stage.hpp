@@ -74,6 +74,8 @@ class SmoothStage {
 
  private:
   bool start(const TrackedFrame& tracked, OdometryOutput& output);
+  /// Discards the estimate, with the next one in the same world where `leave` puts it.
+  void endEpoch();
   void leave(const StartState& at);
   void giveUp();
   static void goOnFrom(const SE3& place, BodyState& state);

@@ -4,7 +4,13 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <memory>
+#include <optional>
+#include <set>
+#include <vector>
 
+#include "estimator/odometry/mono_starter.hpp"
+#include "estimator/odometry/odometry_inputs.hpp"
 #include "tests/odometry/odometry_run.hpp"
 
 using namespace swiftlet;
@@ -74,6 +80,71 @@ TEST_CASE("Odometry: after blackness with the IMU a new epoch knows velocity, ti
   // The pose goes on where the body was thought to be.
   const double step = (first.state.T_world_body.translation - before.state.T_world_body.translation).norm();
   CHECK(step < 0.2);
+}
+
+TEST_CASE("Odometry: with one camera a new epoch keeps the gyro's bias", "[odometry][fault]") {
+  for (const std::uint64_t seed : {34U, 38U}) {
+    INFO("seed " << seed);
+    SimulationSettings settings = withFault(test::roomFlight(16, seed), {FaultKind::kBlackout, {9, 10}, -1});
+    settings.mono = true;
+    const TrackFlight flight(withFault(settings, {FaultKind::kImuGap, {9, 10}, -1}));
+    OdometrySettings one;
+    one.use_stereo = false;
+    const OdometryRun run = test::runOdometry(flight, one);
+    const RunFrame& first = firstOfEpoch(run, 1);
+    const auto before = std::find_if(run.frames.rbegin(), run.frames.rend(),
+                                     [](const RunFrame& f) { return f.has_state && f.state.epoch == 0; });
+    REQUIRE(before != run.frames.rend());
+    CHECK((first.state.bias_gyro - before->state.bias_gyro).norm() < 5e-3);
+  }
+}
+
+TEST_CASE("Odometry: after seconds without frames each keyframe is delivered once", "[odometry][fault]") {
+  const TrackFlight flight(test::roomFlight(12, 39));
+  Odometry odometry(flight.rig(), flight.noise(), OdometrySettings{});
+  auto output = std::make_unique<OdometryOutput>();
+  std::vector<std::int64_t> delivered;
+  std::uint32_t epoch = 0;
+  const auto take = [&] {
+    for (const KeyframeState& keyframe : output->left_window) delivered.push_back(keyframe.state.stamp.ns);
+  };
+  flight.play([&](const ImuSample& sample) { static_cast<void>(odometry.addImu(sample)); },
+              [&](std::size_t k) {
+                if (flight.seconds(k) > 6 && flight.seconds(k) < 8) return;
+                TrackedFrame frame = flight.frames()[k];
+                if (flight.seconds(k) >= 8) {
+                  // Nothing is recognized.
+                  for (TrackedFeature& feature : frame.features) feature.id += 1'000'000;
+                }
+                REQUIRE(odometry.smooth(frame, Effort{}, *output).ok());
+                epoch = output->state.epoch;
+                take();
+              });
+  odometry.finish(*output);
+  take();
+  CHECK(epoch == 1);
+  CHECK(std::set<std::int64_t>(delivered.begin(), delivered.end()).size() == delivered.size());
+}
+
+TEST_CASE("MonoStarter: its patience ends at every frame rate", "[odometry]") {
+  const TrackFlight flight(test::roomFlight(5, 40));
+  ImuBuffer imu(kImuHistory);
+  flight.play([&](const ImuSample& sample) { imu.push(sample); }, [](std::size_t) {});
+  for (const double rate : {20.0, 30.0, 60.0}) {
+    INFO(rate << " Hz");
+    MonoStarter starter(flight.rig(), flight.noise());
+    std::optional<double> waited;
+    for (int k = 0; k < 4 * rate && !waited; ++k) {
+      TrackedFrame frame;  // without tracks
+      frame.stamp = flight.frames()[0].stamp + Duration::fromSeconds(k / rate);
+      starter.push(frame);
+      StartState start;
+      const char* why = "";
+      if (starter.trySolve(imu, Stamp{}, StartPrior{}, 0.45, start, why)) waited = k / rate;
+    }
+    REQUIRE(waited);
+    CHECK(*waited == Approx(kMonoPatience.seconds()).margin(1.01 / rate));
+  }
 }
 
 TEST_CASE("Odometry: neither images nor samples for a while begin a new epoch", "[odometry][fault]") {
