@@ -189,10 +189,13 @@ void Supervisor::tellArming() {
 void Supervisor::tellSystemd(Stamp now) {
   if (systemd_ == nullptr) return;
   if (!std::exchange(ready_sent_, true)) systemd_->ready();
-  // A lost flight thread ends the run. Should that hang, the watchdog ends the process: it sleeps after
-  // STOPPING.
-  if (verdict_.ending && !verdict_.run_failed && !std::exchange(stopping_sent_, true)) systemd_->stopping();
-  systemd_->watchdog(!verdict_.run_failed, now);
+  if (verdict_.run_failed) {
+    // No STOPPING: it would disarm the watchdog, which has to kill a program that hangs at its end.
+    if (!end_told_) end_told_ = systemd_->limitWatchdog(kLongestFailedEnd);
+  } else {
+    if (verdict_.ending && !std::exchange(end_told_, true)) systemd_->stopping();
+    systemd_->watchdog(now);
+  }
   std::array<char, 256> line;
   Text text(line);
   text.add("{}, {}", healthName(verdict_.health),

@@ -35,6 +35,9 @@ class Supervisor {
  public:
   static constexpr Duration kPeriod = Duration::fromMilliseconds(100);
   static constexpr std::size_t kMostSinks = 8;
+  /// From the failure of a run to systemd's watchdog, should the program not have ended by then: 4 s to give
+  /// up threads and followers that are stuck, the rest to write files to a slow disk.
+  static constexpr Duration kLongestFailedEnd = Duration::fromMilliseconds(30'000);
 
   using Facts = std::function<void(FlightFacts&)>;
   using Sink = std::function<void(const Verdict&)>;
@@ -103,7 +106,7 @@ class Supervisor {
   std::optional<ArmingVerdict> last_arming_;
   std::optional<Stamp> run_clock_;  ///< now, on the run's clock
   std::optional<Stamp> first_ready_;
-  bool ready_sent_ = false, stopping_sent_ = false;
+  bool ready_sent_ = false, end_told_ = false;
 
   SpscRing<Event, 32> events_;
   NewestShared<Verdict> newest_;

@@ -65,9 +65,8 @@ SystemdNotify::~SystemdNotify() {
   if (socket_ >= 0) ::close(socket_);
 }
 
-void SystemdNotify::send(std::string_view message) const {
-  if (socket_ < 0) return;
-  static_cast<void>(::send(socket_, message.data(), message.size(), MSG_DONTWAIT | MSG_NOSIGNAL));
+bool SystemdNotify::send(std::string_view message) const {
+  return socket_ < 0 || ::send(socket_, message.data(), message.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0;
 }
 
 void SystemdNotify::ready() { send("READY=1"); }
@@ -82,10 +81,18 @@ void SystemdNotify::status(std::string_view line) {
   send({message.data(), std::min(end.size, message.size())});
 }
 
-void SystemdNotify::watchdog(bool alive, Stamp now) {
-  if (!alive || !watchdog_period_ || (next_feed_ && now < *next_feed_)) return;
+void SystemdNotify::watchdog(Stamp now) {
+  if (!watchdog_period_ || (next_feed_ && now < *next_feed_)) return;
   next_feed_ = now + *watchdog_period_;
   send("WATCHDOG=1");
+}
+
+bool SystemdNotify::limitWatchdog(Duration limit) const {
+  if (!watchdog_period_) return true;  // it would be switched on
+  std::array<char, kMessageBytes> message;
+  const auto end = fmt::format_to_n(message.data(), message.size(), "WATCHDOG_USEC={}",
+                                    limit.ns / kNanosecondsPerMicrosecond);
+  return send({message.data(), end.size});
 }
 
 }  // namespace swiftlet

@@ -29,11 +29,14 @@ class SystemdNotify {
   void stopping();
   /// One line for `systemctl status`; sent when it differs from the one before.
   void status(std::string_view line);
-  /// Feeds the watchdog where it is due; `alive` false: not.
-  void watchdog(bool alive, Stamp now);
+  /// Feeds the watchdog where it is due.
+  void watchdog(Stamp now);
+  /// The watchdog kills the process `limit` from now if nothing feeds it. False: not sent, to be called
+  /// again.
+  [[nodiscard]] bool limitWatchdog(Duration limit) const;
 
  private:
-  void send(std::string_view message) const;
+  bool send(std::string_view message) const;
 
   int socket_ = -1;
   std::optional<Duration> watchdog_period_;

@@ -9,6 +9,8 @@
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
+#include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -66,6 +68,42 @@ std::vector<std::string> heardIn(SimulatedFlight& flight, const Listener& listen
   return all;
 }
 
+/// The watchdog of systemd's side, as src/core/service.c has it: WATCHDOG=1 and WATCHDOG_USEC arm it in every
+/// state, STOPPING=1 disarms it only where systemd has not asked for the stop itself.
+class Watchdog {
+ public:
+  explicit Watchdog(const Listener& listener) : listener_(listener) {}
+
+  void follow(SimulatedFlight& flight, double seconds) {
+    for (const Stamp end = flight.now + Duration::fromSeconds(seconds); flight.now < end;) {
+      flight.pass(0.1);
+      hear(flight.now);
+    }
+  }
+  void hear(Stamp now) {
+    killed = killed || (ends && now > *ends);
+    for (const std::string& message : listener_.hear()) {
+      std::istringstream lines(message);
+      for (std::string line; std::getline(lines, line);) take(line, now);
+    }
+  }
+
+  bool killed = false;
+  std::optional<Stamp> ends;  ///< when it kills the process; empty: it is disarmed
+
+ private:
+  void take(const std::string& line, Stamp now) {
+    const std::string limit = "WATCHDOG_USEC=";
+    if (line.starts_with(limit)) limit_ = Duration{std::stoll(line.substr(limit.size())) * 1000};
+    if (line.starts_with(limit) || line == "READY=1" || line == "WATCHDOG=1") {
+      ends = limit_.ns > 0 ? std::optional(now + limit_) : std::nullopt;
+    }
+  }
+
+  const Listener& listener_;
+  Duration limit_ = Duration::fromMilliseconds(2000);
+};
+
 int count(const std::vector<std::string>& heard, const std::string& what) {
   return static_cast<int>(std::count(heard.begin(), heard.end(), what));
 }
@@ -76,7 +114,7 @@ TEST_CASE("without systemd nothing is sent", "[systemd]") {
   CHECK_FALSE(notify.wanted());
   notify.ready();
   notify.status("nobody listens");
-  notify.watchdog(true, Stamp{1});
+  notify.watchdog(Stamp{1});
   CHECK_FALSE(notify.watchdogPeriod());
 }
 
@@ -131,10 +169,41 @@ TEST_CASE("the watchdog is fed until a flight thread stands for good", "[systemd
       continue;
     }
     CHECK(count(heard, "STATUS=failed, not ready to arm; " + std::string(name) + " lost") == 1);
-    // The run ends, and hangs: systemd's watchdog sleeps after STOPPING, and is not to.
+    CHECK(count(heard, "WATCHDOG_USEC=30000000") == 1);
+    // STOPPING would disarm the watchdog.
     flight.supervisor.expectEnd();
     CHECK(heardIn(flight, listener, 10.0).empty());
   }
+}
+
+TEST_CASE("a failed run has time to write its files, and is killed if it hangs", "[systemd]") {
+  const Listener listener("2000000");
+  SystemdNotify notify;
+  SimulatedFlight flight(true, 1, &notify);
+  Watchdog watchdog(listener);
+  watchdog.follow(flight, 10.0);
+  flight.stall("smooth");
+  while (!flight.verdict.run_failed) watchdog.follow(flight, 0.1);
+  flight.supervisor.expectEnd();
+  // The stuck thread has 2 s, stuck followers have 2 s; then the supervisor ends and files are written.
+  watchdog.follow(flight, 4.0);
+  flight.supervisor.stop();
+  watchdog.hear(flight.now);
+  CHECK_FALSE(watchdog.killed);
+  REQUIRE(watchdog.ends);
+  CHECK((*watchdog.ends - flight.now).seconds() > 20);
+  CHECK((*watchdog.ends - flight.now).seconds() < 30);
+}
+
+TEST_CASE("a watchdog that is off stays off when a run fails", "[systemd]") {
+  const Listener listener(nullptr);
+  SystemdNotify notify;
+  SimulatedFlight flight(true, 1, &notify);
+  heardIn(flight, listener, 5.0);
+  flight.heart("smooth").fail("no memory", flight.now);
+  const std::vector<std::string> heard = heardIn(flight, listener, 1.0);
+  CHECK(count(heard, "STATUS=failed, not ready to arm; smooth lost") == 1);
+  CHECK(heard.size() == 1);
 }
 
 TEST_CASE("the end is told", "[systemd]") {
