@@ -93,6 +93,7 @@ FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const 
     std::unique_ptr<Graph> graph;
     Supervisor supervisor;
   };
+  SystemdNotify systemd;  // the supervisor's end uses it
   auto flight = std::make_unique<Flight>(settings);
   Supervisor& supervisor = flight->supervisor;
   wanted.track_effort = &flight->governors.track;
@@ -128,7 +129,6 @@ FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const 
     if (!lock.message.empty()) warn(fmt::format("warning: memory not locked: {}\n", lock.message));
   }
 
-  SystemdNotify systemd;
   consumers.addTo(supervisor);
   if (request.verdict) static_cast<void>(supervisor.addSink(request.verdict));
   ThreadedOptions options;

@@ -71,6 +71,7 @@ void Supervisor::stop() {
   stopping_.store(true, std::memory_order_release);
   bell_.ring();
   thread_.join();
+  tellEnd();
 }
 
 void Supervisor::run() {
@@ -189,11 +190,9 @@ void Supervisor::tellArming() {
 void Supervisor::tellSystemd(Stamp now) {
   if (systemd_ == nullptr) return;
   if (!std::exchange(ready_sent_, true)) systemd_->ready();
-  if (verdict_.run_failed) {
-    // No STOPPING: it would disarm the watchdog, which has to kill a program that hangs at its end.
-    if (!end_told_) end_told_ = systemd_->limitWatchdog(kLongestFailedEnd);
+  if (verdict_.run_failed || verdict_.ending) {
+    tellEnd();
   } else {
-    if (verdict_.ending && !std::exchange(end_told_, true)) systemd_->stopping();
     systemd_->watchdog(now);
   }
   std::array<char, 256> line;
@@ -204,6 +203,13 @@ void Supervisor::tellSystemd(Stamp now) {
     text.add("; {} {}", trouble.name(), conditionName(trouble.condition));
   }
   systemd_->status({line.data(), text.size()});
+}
+
+/// Once; again if systemd did not take it.
+void Supervisor::tellEnd() {
+  if (systemd_ == nullptr || end_told_) return;
+  // STOPPING disarms the watchdog, which has to kill a failed run that hangs at its end.
+  end_told_ = verdict_.run_failed ? systemd_->limitWatchdog(kLongestFailedEnd) : systemd_->stopping();
 }
 
 Verdict Supervisor::verdict() const {

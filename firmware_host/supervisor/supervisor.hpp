@@ -54,7 +54,7 @@ class Supervisor {
   void begin(const FlightGround& ground, Facts facts, SystemdNotify* systemd = nullptr);
 
   ThreadReport start(const ThreadSettings& settings);
-  /// Waits for the thread, at most a turn.
+  /// Waits for the thread, at most a turn. Tells systemd that the run ends if no turn did.
   void stop();
   /// The run ends in order from here on: to be called before the first thread returns because of it.
   void expectEnd() { ending_.store(true, std::memory_order_release); }
@@ -89,6 +89,7 @@ class Supervisor {
   void tellTroubles(Stamp now);
   void tellArming();
   void tellSystemd(Stamp now);
+  void tellEnd();
   template <typename Write>
   void event(Write&& write);
 

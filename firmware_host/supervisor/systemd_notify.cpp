@@ -70,7 +70,11 @@ bool SystemdNotify::send(std::string_view message) const {
 }
 
 void SystemdNotify::ready() { send("READY=1"); }
-void SystemdNotify::stopping() { send("STOPPING=1"); }
+
+bool SystemdNotify::stopping() const {
+  // If systemd requested the stop, STOPPING does not disarm a watchdog that was fed since.
+  return send(watchdog_period_ ? "STOPPING=1\nWATCHDOG_USEC=0" : "STOPPING=1");
+}
 
 void SystemdNotify::status(std::string_view line) {
   const std::uint64_t hash = std::hash<std::string_view>{}(line);

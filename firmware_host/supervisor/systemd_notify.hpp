@@ -26,7 +26,9 @@ class SystemdNotify {
   [[nodiscard]] const std::optional<Duration>& watchdogPeriod() const { return watchdog_period_; }
 
   void ready();
-  void stopping();
+  /// From here on TimeoutStopSec limits the end, and nothing may feed the watchdog: that would arm it again.
+  /// False: not sent, to be called again.
+  [[nodiscard]] bool stopping() const;
   /// One line for `systemctl status`; sent when it differs from the one before.
   void status(std::string_view line);
   /// Feeds the watchdog where it is due.

@@ -88,11 +88,18 @@ class Watchdog {
     }
   }
 
+  /// `systemctl stop`.
+  void requestStop() {
+    running_ = false;
+    ends.reset();
+  }
+
   bool killed = false;
   std::optional<Stamp> ends;  ///< when it kills the process; empty: it is disarmed
 
  private:
   void take(const std::string& line, Stamp now) {
+    if (line == "STOPPING=1" && running_) requestStop();
     const std::string limit = "WATCHDOG_USEC=";
     if (line.starts_with(limit)) limit_ = Duration{std::stoll(line.substr(limit.size())) * 1000};
     if (line.starts_with(limit) || line == "READY=1" || line == "WATCHDOG=1") {
@@ -102,6 +109,7 @@ class Watchdog {
 
   const Listener& listener_;
   Duration limit_ = Duration::fromMilliseconds(2000);
+  bool running_ = true;
 };
 
 int count(const std::vector<std::string>& heard, const std::string& what) {
@@ -127,9 +135,9 @@ TEST_CASE("messages are those of sd_notify", "[systemd]") {
   notify.status("good");
   notify.status("good");
   notify.status("degraded");
-  notify.stopping();
+  CHECK(notify.stopping());
   CHECK(listener.hear() ==
-        std::vector<std::string>{"READY=1", "STATUS=good", "STATUS=degraded", "STOPPING=1"});
+        std::vector<std::string>{"READY=1", "STATUS=good", "STATUS=degraded", "STOPPING=1\nWATCHDOG_USEC=0"});
 }
 
 TEST_CASE("the watchdog of another process is not ours", "[systemd]") {
@@ -195,6 +203,25 @@ TEST_CASE("a failed run has time to write its files, and is killed if it hangs",
   CHECK((*watchdog.ends - flight.now).seconds() < 30);
 }
 
+TEST_CASE("the watchdog does not end a run that ends in order while files are written", "[systemd]") {
+  const bool by_systemd = GENERATE(false, true);
+  const double last_look = GENERATE(0.0, 1.0);  // s after the end began
+  CAPTURE(by_systemd, last_look);
+  const Listener listener("2000000");
+  SystemdNotify notify;
+  SimulatedFlight flight(true, 1, &notify);
+  Watchdog watchdog(listener);
+  watchdog.follow(flight, 10.0);
+  if (by_systemd) watchdog.requestStop();
+  watchdog.follow(flight, 0.6);  // the watchdog is fed before the program notices the request
+  flight.supervisor.expectEnd();
+  watchdog.follow(flight, last_look);
+  flight.supervisor.stop();
+  watchdog.hear(flight.now);
+  CHECK_FALSE(watchdog.killed);
+  CHECK_FALSE(watchdog.ends);
+}
+
 TEST_CASE("a watchdog that is off stays off when a run fails", "[systemd]") {
   const Listener listener(nullptr);
   SystemdNotify notify;
@@ -215,6 +242,18 @@ TEST_CASE("the end is told", "[systemd]") {
   const std::vector<std::string> heard = heardIn(flight, listener, 5.0);
   CHECK(count(heard, "STOPPING=1") == 1);
   CHECK(count(heard, "WATCHDOG=1") == 0);
+  flight.supervisor.stop();
+  CHECK(listener.hear().empty());
+}
+
+TEST_CASE("an end between two looks is told", "[systemd]") {
+  const Listener listener(nullptr);
+  SystemdNotify notify;
+  SimulatedFlight flight(true, 1, &notify);
+  heardIn(flight, listener, 5.0);
+  flight.supervisor.expectEnd();
+  flight.supervisor.stop();
+  CHECK(listener.hear() == std::vector<std::string>{"STOPPING=1"});
 }
 
 }  // namespace
