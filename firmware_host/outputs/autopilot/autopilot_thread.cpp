@@ -197,6 +197,7 @@ class AutopilotThread::Work final : public Follower::Work {
   }
 
   void takeVerdict(Stamp now) {
+    state_.health = worse(own_health_, Health::kDegraded);  // unless a supervisor knows more
     if (outlet_.verdict.refresh() == 0) return;
     const Verdict& verdict = outlet_.verdict.value();
     const bool supervised = !verdict.stale(now) || verdict.ending;
@@ -208,10 +209,7 @@ class AutopilotThread::Work final : public Follower::Work {
         say(Severity::kCritical, "swiftlet: supervisor stopped, health unknown");
       }
     }
-    if (!supervised) {
-      state_.health = worse(own_health_, Health::kDegraded);
-      return;
-    }
+    if (!supervised) return;
     // An initialization is over when a state says so: the verdict is up to a period older.
     const bool worsens = verdict.health == Health::kDegraded || verdict.health == Health::kFailed;
     state_.health = worsens ? worse(own_health_, verdict.health) : own_health_;

@@ -54,13 +54,16 @@ struct Vehicle {
   Duration clock{};  ///< of the run's stamps before CLOCK_MONOTONIC
 
   void move(Health health = Health::kGood) {
+    moveUnsupervised(health);
+    supervise();
+  }
+  void moveUnsupervised(Health health = Health::kGood) {
     NavState state;
     const Stamp now = monotonicNow();
     state.stamp = now - clock;
     state.health = health;
     state.T_world_body.translation.x() = (now - begin).seconds();
     outlet.state.write({state, Eigen::Vector3d::Zero()});
-    supervise();
   }
   /// The verdict as it was, of now.
   void supervise() {

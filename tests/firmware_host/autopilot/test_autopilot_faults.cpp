@@ -128,10 +128,7 @@ TEST_CASE("Who is late or lost, that states stop, and that the supervisor does, 
   untilSaid("swiftlet: states are arriving again", fly);
 
   const auto unsupervised = [&] {
-    NavState state;
-    state.stamp = monotonicNow();
-    state.health = Health::kGood;
-    vehicle.outlet.state.write({state, Eigen::Vector3d::Zero()});
+    vehicle.moveUnsupervised();
     plug.listen();
   };
   untilSaid("swiftlet: supervisor stopped, health unknown", unsupervised);
@@ -146,6 +143,26 @@ TEST_CASE("Who is late or lost, that states stop, and that the supervisor does, 
   const std::size_t texts = plug.heard.texts.size();
   pass(0.8, [&] { plug.listen(); });
   CHECK(plug.heard.texts.size() == texts);
+}
+
+TEST_CASE("Poses are degraded until a supervisor has judged them", "[autopilot]") {
+  Plug plug;
+  Vehicle vehicle;
+  AutopilotThread autopilot(vehicle.outlet, optionsOf(plug.terminal.path()));
+  const auto& poses = plug.heard.poses;
+  REQUIRE(until([&] { return poses.size() > 5; },
+                [&] {
+                  vehicle.moveUnsupervised();
+                  plug.listen();
+                }));
+  for (const mavlink::Odometry& pose : poses) CHECK(pose.quality == 40);
+  CHECK(plug.heard.texts.empty());
+  vehicle.tellHealth(Health::kGood);
+  REQUIRE(until([&] { return poses.back().quality == 100; },
+                [&] {
+                  vehicle.move();
+                  plug.listen();
+                }));
 }
 
 TEST_CASE("Reasons that stand are said again after the period, readiness once", "[autopilot]") {
