@@ -138,7 +138,8 @@ FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const 
     static_cast<void>(supervisor.add(name, heart));
   };
   options.expect_end = [&] { supervisor.expectEnd(); };
-  options.failed = [&] { return supervisor.runFailed(); };
+  std::string unsupervised;  // why; empty: there is a supervisor
+  options.failed = [&] { return !unsupervised.empty() || supervisor.runFailed(); };
   options.started = [&](const std::vector<ThreadReport>& threads) {
     FlightGround ground = groundOf(threads, calibration, settings, request);
     ground.memory_locked = lock.current;
@@ -156,11 +157,12 @@ FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const 
     };
     supervisor.begin(ground, facts, request.service ? &systemd : nullptr);
     const ThreadReport own = supervisor.start(supervisorThread(settings.realtime));
-    if (!own.started) warn(fmt::format("error: thread {}: {}\n", own.name, own.message));
+    if (!own.started) unsupervised = fmt::format("{}: {}; the run was stopped", own.name, own.message);
   };
   const ThreadedReport threads = runThreaded(input, graph, options, control);
   FlightEnd end{threads.finished, threads.faults.empty(), threads.left_behind};
   std::vector<std::string> faults = threads.faults;
+  if (!unsupervised.empty()) faults.push_back(unsupervised);
   end.left_behind = !consumers.finish(report, faults) || end.left_behind;
   supervisor.stop();
   if (lock.current) unlockMemory();

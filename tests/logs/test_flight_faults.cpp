@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <catch2/catch.hpp>
@@ -218,6 +219,25 @@ TEST_CASE(
   }
   check("smooth", Fault::kStuck);
   check("track", Fault::kStuck);
+}
+
+TEST_CASE("a flight whose supervisor cannot start ends, and says so") {
+  const ScratchFolder folder("unsupervised");
+  ReplayRequest request;
+  request.log = shortLog();
+  request.out = folder.file("run");
+  request.real_time = true;
+  Settings settings;
+  settings.full_smoothing = false;
+  // No priority of the kernel's, nor is the supervisor's, which lies between those of `track` and `mesh`.
+  settings.realtime.mesh_priority = 1000;
+  const ReplayResult result = runReplay(request, settings);
+  CHECK_FALSE(result.finished);
+  CHECK(result.statistics.frames < 20);  // of 80
+  const nlohmann::ordered_json faults = result.summary["executor"]["thread_faults"];
+  CHECK(std::ranges::any_of(faults, [](const auto& fault) {
+    return fault.template get<std::string>().starts_with("supervisor: priority ");
+  }));
 }
 
 }  // namespace
