@@ -68,10 +68,6 @@ class MeshStage {
   [[nodiscard]] const HullPoints& hull() const { return hull_; }
   /// The planes that the last step found; null if it did not search for them.
   [[nodiscard]] const PlaneReport* newPlanes() const { return looked_ ? &planes_->report : nullptr; }
-  /// Null without planes.
-  [[nodiscard]] const PlaneCounters* planeCounters() const {
-    return planes_ ? &planes_->finder.counters() : nullptr;
-  }
   [[nodiscard]] const MeshCounters& counters() const { return counters_; }
 
  private:

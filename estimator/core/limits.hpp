@@ -9,8 +9,6 @@ namespace swiftlet {
 inline constexpr std::size_t kMaxCameras = 2;
 /// Tracked features per frame; observations of a landmark by both cameras count once.
 inline constexpr std::size_t kMaxFeatures = 400;
-/// IMU samples between two frames for the smoother: 2.5 s at 400 Hz, 1 s at 1 kHz.
-inline constexpr std::size_t kMaxImuPerFrame = 1024;
 /// IMU samples queued from a sensor to one reader: 10 s at 200 Hz, 2 s at 1 kHz.
 inline constexpr std::size_t kImuRing = 2048;
 /// Images of one camera queued for tracking, and frames that wait there: some 0.2 s at 20 Hz, the longest

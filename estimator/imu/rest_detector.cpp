@@ -199,8 +199,6 @@ void RestDetector::closeBlock() {
     return;
   }
   const Window short_window = window(kShortBlocks);
-  state_.gyro_deviation = short_window.gyro;
-  state_.accel_deviation = short_window.accel;
   const double gyro_count = short_window.sum.count;
   window_gyro_ = short_window.sum.gyro / gyro_count;
   window_accel_ = short_window.sum.accel / gyro_count;

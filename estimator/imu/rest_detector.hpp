@@ -44,8 +44,6 @@ struct RestState {
   double duration = 0;                                   ///< s, time covered by the means
   Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero();   ///< rad/s, over the rest: the gyro bias
   Eigen::Vector3d mean_accel = Eigen::Vector3d::Zero();  ///< m/s^2 over the rest
-  double gyro_deviation = 0;   ///< rad/s, samples of the newest 0.5 s, RMS of the axes
-  double accel_deviation = 0;  ///< m/s^2, samples of the newest 0.5 s, RMS of the axes
 };
 
 class RestDetector {

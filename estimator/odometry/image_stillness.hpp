@@ -27,7 +27,6 @@ class ImageStillness {
  public:
   explicit ImageStillness(const Rig& rig) : rig_(rig) {}
 
-  void reset() { reference_.clear(); }
   ImageMotion update(const TrackedFrame& frame);
 
  private:

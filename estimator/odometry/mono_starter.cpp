@@ -104,7 +104,6 @@ bool MonoStarter::trySolve(const ImuBuffer& imu, Stamp earliest, const StartPrio
   waiting_for = status.ok() ? "acceleration, to observe the scale" : "parallax";
   const bool solved = status.ok() && mono.scale_sigma < (impatient ? kScaleSigmaAccepted : kScaleSigmaWanted);
   if (!solved && !impatient) return false;
-  start.stamp = first;
   start.state = BodyState{};
   start.state.T_world_body.rotation = gravityAlignedRotation(solved ? mono.motion.up : tilt.up);
   if (solved) {

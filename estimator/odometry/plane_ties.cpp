@@ -18,7 +18,7 @@ constexpr double kApart = 0.25;           // m
 constexpr double kMaxResidual = 0.05;     // m, whatever the sigmas say: the mesher's gate
 constexpr double kMaxNormalSigma = 0.05;  // m: a point known worse is on any plane
 constexpr double kChiSquared = 6.63;      // 99 % of one degree of freedom
-// A plane that counts in the solve is known better (kMaxNormalSigma of smoother_extra.cpp, in both
+// A plane that counts in the solve is known better (kMaxNormalSigma of extra_table.cpp, in both
 // directions).
 constexpr double kSettledSigma = 0.1;  // rad
 // Ties are tested at every frame: what fails here is not one in a hundred of a day's.
@@ -200,7 +200,6 @@ void PlaneTies::tieCandidates(Smoother& smoother, std::size_t most_per_plane, do
   for (Candidate& candidate : candidates_) {
     if (ties_.size() >= kMostTies) return;
     HeldPlane* plane = held(candidate.plane);
-    if (candidate.id == 0 && candidate.plane == 0) continue;  // dealt with
     if (plane == nullptr || static_cast<std::size_t>(plane->ties) >= most_per_plane) continue;
     if (!isApart(candidate, apart)) continue;
     if (!fits(candidate, *plane)) {

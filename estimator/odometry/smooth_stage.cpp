@@ -274,7 +274,6 @@ bool SmoothStage::start(const TrackedFrame& tracked, OdometryOutput& output) {
       return false;
   } else {
     mono_starter_.reset();
-    start.stamp = stamp;
     start.state.T_world_body.rotation = gravityAlignedRotation(tilt.up);
     start.tilt_sigma = tilt.sigma;
     start.state.bias_gyro = prior.bias_gyro;
@@ -322,7 +321,6 @@ StartState SmoothStage::newestAsStart() const {
   const Eigen::Vector3d up = newest.x.T_world_body.rotation.conjugate() * Eigen::Vector3d::UnitZ();
   const Eigen::Matrix3d level = Eigen::Matrix3d::Identity() - up * up.transpose();
   StartState start;
-  start.stamp = newest.stamp;
   start.state = newest.x;
   start.tilt_sigma = std::sqrt((level * P.topLeftCorner<3, 3>() * level).trace());
   start.velocity_sigma = sigma(6);

@@ -24,7 +24,6 @@ namespace swiftlet {
 
 /// Prior of the first state of an epoch. Its position and yaw define the world.
 struct StartState {
-  Stamp stamp;  ///< on the IMU's clock
   BodyState state;
   double tilt_sigma = 0.05;        ///< rad
   double velocity_sigma = 1.0;     ///< m/s

@@ -373,7 +373,7 @@ TEST_CASE("with planes the meshes are drawn flat, as far as the landmarks' noise
   };
   MeshStage plain(rig, {});
   CHECK(fly(plain) == 0);
-  CHECK(plain.planeCounters() == nullptr);
+  CHECK(plain.newPlanes() == nullptr);
   MeshStage drawn(rig, {}, {.enabled = true, .surface_sigma = 0.003});
   CHECK(fly(drawn) == 8);
   REQUIRE(drawn.newPlanes()->planes.size() == 1);

@@ -58,7 +58,6 @@ class SmootherRun {
     };
     StartState start;
     start.state = flight_.truth(k);
-    start.stamp = flight_.frames()[k].stamp;
     start.tilt_sigma = 0.02;
     start.velocity_sigma = 0.1;
     start.gyro_bias_sigma = 0.02;
