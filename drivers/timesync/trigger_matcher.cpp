@@ -25,18 +25,20 @@ constexpr int kDisputes = 3;
 constexpr int kEdgeless = 16;  // frames: EdgeTrain bridges no longer gap either
 constexpr double kLagGain = 1.0 / 64;
 constexpr std::int64_t kMostDropped = 1000;  // frames; more is another stream
-// With the count given, lags of this many periods are believed: exposure, readout and delivery.
-constexpr double kLongestLag = 3;
+constexpr double kMostPeriods = 3;           // by which the count is corrected at most
+// [ns] By which an edge may seem to be later than the arrival of its frame: edges in an IMU's clock keep the
+// constant delay of its link.
+constexpr double kClockError = 2e6;
 
 double apart(Stamp from, Stamp to) { return static_cast<double>(to.ns - from.ns); }
 double ns(Duration duration) { return static_cast<double>(duration.ns); }
+
+double clockError(double period) { return std::min(kClockError, kAmbiguous * period); }
 
 /// From one sequence number to the next, over the wrap; negative: the stream began again.
 std::int64_t advance(std::uint32_t from, std::uint32_t to) { return static_cast<std::int32_t>(to - from); }
 
 }  // namespace
-
-void TriggerMatcher::pairFirst(std::uint32_t sequence) { first_ = {sequence, train_->epoch()}; }
 
 void TriggerMatcher::giveUp() {
   if (lock_ == LockState::kLocked) ++resets_;
@@ -48,7 +50,7 @@ void TriggerMatcher::giveUp() {
 
 void TriggerMatcher::begin(const FrameMark& frame) {
   count_ = 0;
-  const double guess = lag_known_ ? lag_ : expected_ ? ns(*expected_) : 0;
+  const double guess = lag_known_ ? lag_ : ns(expected_);
   const auto pulse = train_->nearest({frame.stamp.ns - std::llround(guess)});
   if (!pulse) return;
   pulse_ = *pulse;
@@ -56,6 +58,7 @@ void TriggerMatcher::begin(const FrameMark& frame) {
   sum_ = 0;
   least_ = 1e18;
   most_ = -1e18;
+  soonest_ = 1e18;
 }
 
 double TriggerMatcher::verified(double period) const {
@@ -91,7 +94,7 @@ Status TriggerMatcher::match(const FrameMark& frame, TriggerMatch& out) {
   }
   edgeless_ = 0;
   const double off = apart(edge->stamp, frame.stamp) - lag_;
-  const bool caused = apart(edge->stamp, frame.arrival) > -kAmbiguous * period;
+  const bool caused = apart(edge->stamp, frame.arrival) > -clockError(period);
   if (!caused || std::abs(off) > verified(period)) {
     ++unmatched_;
     if (++disputes_ >= kDisputes) giveUp();
@@ -127,6 +130,7 @@ Status TriggerMatcher::collect(const FrameMark& frame, TriggerMatch& out) {
   sum_ += d;
   least_ = std::min(least_, d);
   most_ = std::max(most_, d);
+  soonest_ = std::min(soonest_, apart(edge->stamp, frame.arrival));
   if (most_ - least_ > kWidest * ns(train_->period())) {
     giveUp();
     return kNotYet;
@@ -150,33 +154,20 @@ Status TriggerMatcher::collect(const FrameMark& frame, TriggerMatch& out) {
 bool TriggerMatcher::decide() {
   const double period = ns(train_->period());
   const double mean = sum_ / count_;
-  const bool counted = first_ && first_->epoch == epoch_;
-  double lag = 0;
-  std::int64_t shift = 0;  // pulses to add
-  if (lag_known_ || expected_) {
-    const double expected = lag_known_ ? lag_ : ns(*expected_);
-    const double periods = std::round((mean - expected) / period);
-    lag = mean - periods * period;
-    const double limit = lag_known_ ? kMoved : kAmbiguous;
-    if (!(std::abs(lag - expected) <= limit * period) || std::abs(periods) > kLongestLag) return false;
-    // The mean of a few frames is worse than what is known.
-    if (lag_known_) lag = lag_;
-    shift = static_cast<std::int64_t>(periods);
-    if (counted && pulse_ + shift != advance(first_->sequence, sequence_)) return false;
-  } else {
-    if (!counted) return false;
-    shift = advance(first_->sequence, sequence_) - pulse_;
-    lag = mean - static_cast<double>(shift) * period;
-    if (lag < -kAmbiguous * period || lag > kLongestLag * period) return false;
-  }
-  const double centre = lag + static_cast<double>(shift) * period;
+  const double expected = lag_known_ ? lag_ : ns(expected_);
+  const double periods = std::round((mean - expected) / period);  // pulses to add
+  double lag = mean - periods * period;
+  const double limit = lag_known_ ? kMoved : kAmbiguous;
+  if (!(std::abs(lag - expected) <= limit * period) || std::abs(periods) > kMostPeriods) return false;
+  if (soonest_ - periods * period < -clockError(period)) return false;
+  // The mean of a few frames is worse than what is known.
+  if (lag_known_) lag = lag_;
+  const double centre = lag + periods * period;
   const double spread = std::max(most_ - centre, centre - least_);
   if (spread > kVerified * period) return false;
-  pulse_ += shift;
+  pulse_ += static_cast<std::int64_t>(periods);
   lag_ = lag;
   spread_ = std::max(spread_, spread);
-  // The count holds for the stream that it was given for, and the lag carries on.
-  first_.reset();
   return true;
 }
 

@@ -9,14 +9,13 @@
 // association, and it is sought again.
 //
 // A wrong edge is worse than none. There is none (kInvalidInput; use the driver's stamp) while locking; for
-// frames whose stamp contradicts the count; when the mean lag is farther than 0.3 periods from the expected
-// one, and so too near to the next edge to tell. Sound for frame stamps that scatter by up to 0.4 periods
-// around their lag. The lag follows a changing exposure.
+// frames whose stamp contradicts the count; for an edge later than the frame's arrival; when the mean lag is
+// farther than 0.3 periods from the expected one, and so too near to the next edge to tell. Sound for frame
+// stamps that scatter by up to 0.4 periods around their lag. The lag follows a changing exposure.
 //
 // Read edges before frames. Cost: O(1). Memory: 1 KiB. Nothing allocated; any stamps, nothing overflows.
 
 #include <cstdint>
-#include <optional>
 
 #include "drivers/timesync/delay_histogram.hpp"
 #include "drivers/timesync/edge_train.hpp"
@@ -43,13 +42,8 @@ class TriggerMatcher {
  public:
   /// `train` outlives the matcher; both cameras of a pair take the same. `expected_lag`: from the edge to the
   /// frame's stamp, right to 0.3 periods: for stamps at the start of exposure the trigger's latency, at the
-  /// end of the frame exposure and readout more. Empty: only pairFirst() can tell.
-  TriggerMatcher(const EdgeTrain& train, std::optional<Duration> expected_lag)
-      : train_(&train), expected_(expected_lag) {}
-
-  /// The caller knows that the camera streamed before the trigger started: the train's first edge of this
-  /// epoch made frame `sequence`. Used if no lag is expected; if one is, both must agree.
-  void pairFirst(std::uint32_t sequence);
+  /// end of the frame exposure and readout more. Where it is not known, frames cannot be matched.
+  TriggerMatcher(const EdgeTrain& train, Duration expected_lag) : train_(&train), expected_(expected_lag) {}
 
   Status match(const FrameMark& frame, TriggerMatch& out);
 
@@ -64,7 +58,7 @@ class TriggerMatcher {
   [[nodiscard]] double verified(double period) const;
 
   const EdgeTrain* train_;
-  std::optional<Duration> expected_;
+  Duration expected_;
   LockState lock_ = LockState::kUnlocked;
   std::uint32_t epoch_ = 0;
   std::uint32_t sequence_ = 0;  ///< of the newest frame
@@ -77,11 +71,7 @@ class TriggerMatcher {
   // While locking.
   int count_ = 0;
   double sum_ = 0, least_ = 0, most_ = 0;  ///< of D [ns]
-  struct First {
-    std::uint32_t sequence = 0;
-    std::uint32_t epoch = 0;
-  };
-  std::optional<First> first_;
+  double soonest_ = 0;                     ///< [ns] least from an edge to the arrival of its frame
   DelayHistogram residuals_;
   std::uint64_t matched_ = 0;
   std::uint64_t resets_ = 0;

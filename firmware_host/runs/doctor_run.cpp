@@ -167,14 +167,14 @@ class VehicleCheck {
         : pipeline ? "the pipeline or its source is too slow: use fewer conversions or a lower rate"
                    : "the bus is too slow for these cameras: use other USB controllers, shorter cables, or a "
                      "lower rate"));
-    report.lines.push_back(
-        line(name + " stamps", stampEventName(facts.event),
-             facts.event != StampEvent::kArrival && c.stamp_ahead == 0,
-             c.stamp_ahead > 0
-                 ? (topic ? "its stamps are ahead of this computer's clock: synchronize both by NTP or PTP"
-                    : pipeline ? "the pipeline delivers images before their time: add `clocksync`"
-                               : "the driver stamps frames later than it delivers them")
-                 : "the time of capture is unknown: connect the trigger line"));
+    report.lines.push_back(line(
+        name + " stamps", stampEventName(facts.event),
+        facts.event != StampEvent::kArrival && c.stamp_ahead == 0,
+        c.stamp_ahead > 0
+            ? (topic      ? "its stamps are ahead of this computer's clock: synchronize both by NTP or PTP"
+               : pipeline ? "the pipeline delivers images before their time: add `clocksync`"
+                          : "the driver stamps frames later than it delivers them")
+            : "the time of capture is unknown: use a driver or pipeline that stamps the start of exposure"));
     if (stream.stamps.size() < 2) return;
     constexpr double kMost = 0.99;
     report.lines.push_back(
@@ -209,9 +209,14 @@ class VehicleCheck {
                             : "another interrupt blocks the CPU: move it with smp_affinity"));
     }
     for (std::size_t i = 0; i < input_.cameras().size(); ++i) {
+      const std::string name = fmt::format("camera {} trigger", i);
+      if (const std::string warning = input_.cameras()[i]->triggerWarning(); !warning.empty()) {
+        report.lines.push_back({name, "not used", MachineVerdict::kPoor, warning});
+        continue;
+      }
       const CameraStatus status = input_.cameras()[i]->status();
       report.lines.push_back(line(
-          fmt::format("camera {} trigger", i),
+          name,
           fmt::format("{}, frame after edge {:.3f} ms, 99 % within {:.1f} us", lockName(status.trigger.lock),
                       status.trigger.offset.seconds() * kToMs, status.trigger.residual_p99.seconds() * kToUs),
           status.trigger.lock == LockState::kLocked,

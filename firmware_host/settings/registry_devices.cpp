@@ -101,7 +101,9 @@ std::vector<Setting> deviceSettings() {
        "Shutter type, if the calibration does not give it. With a rolling shutter the stamp is that of the "
        "middle row.",
        ChoiceSetting{member(kCameras, &C::shutter), {"global", kRolling}}},
-      {"cameras.readout_ms", "ms", "Readout time of a rolling shutter, from the first row to the last.",
+      {"cameras.readout_ms", "ms",
+       "Readout time from the first row to the last: of a rolling shutter, and of any camera whose driver "
+       "stamps the end of the frame. 0: unknown.",
        real(kCameras, &C::readout_ms, 0, 100)},
       {"trigger.chip", "",
        "GPIO chip that receives the cameras' trigger signal; empty: the cameras' own stamps are used.",

@@ -39,9 +39,7 @@ std::int64_t sum(std::int64_t a, std::int64_t b) {
 }
 
 struct World {
-  explicit World(ByteReader& bytes)
-      : train({bytes.step()}),
-        matcher(train, bytes.byte() % 4 == 0 ? std::nullopt : std::optional(Duration{bytes.step()})) {}
+  explicit World(ByteReader& bytes) : train({bytes.step()}), matcher(train, Duration{bytes.step()}) {}
 
   void sample(Stamp device, Stamp arrival) {
     Stamp out;
@@ -93,9 +91,6 @@ void clocks(std::string_view text) {
         break;
       case 5:
         world.train.add({bytes.any()}, sequence);
-        break;
-      case 6:
-        world.matcher.pairFirst(sequence);
         break;
       case 8:
         (void)world.two_way.add({{bytes.any()}, {device}, {bytes.any()}});

@@ -19,6 +19,12 @@ FrameEvent frameEvent(StampEvent event) {
   return event == StampEvent::kEndOfFrame ? FrameEvent::kEndOfFrame : FrameEvent::kStartOfExposure;
 }
 
+/// A lag that is guessed may be a period off, and so would be every edge.
+bool lagKnown(StampEvent event, const ExposureTiming& timing) {
+  return event == StampEvent::kStartOfExposure ||
+         (event == StampEvent::kEndOfFrame && timing.exposure.ns > 0 && timing.readout.ns > 0);
+}
+
 }  // namespace
 
 CameraThread::CameraThread(const Setup& setup, std::unique_ptr<CameraSource> source)
@@ -51,8 +57,19 @@ DeviceFault CameraThread::open() {
   // As the camera has taken it.
   if (setup_.settings.exposure_ms > 0) timing_.exposure = facts.exposure.value_or(Duration{});
   if (exposure_) timing_.exposure = exposure_->asked().exposure;
-  if (setup_.trigger) matcher_.emplace(train_, expectedLag(frameEvent(facts.event), timing_));
+  if (setup_.trigger && lagKnown(facts.event, timing_)) {
+    matcher_.emplace(train_, expectedLag(frameEvent(facts.event), timing_));
+  }
   return fault;
+}
+
+std::string CameraThread::triggerWarning() const {
+  if (!setup_.trigger || matcher_ || prepared_.width == 0) return {};
+  return prepared_.event == StampEvent::kArrival
+             ? "trigger edges are not used, because its stamps are arrival times; use a driver or "
+               "pipeline that stamps the start of exposure"
+             : "trigger edges are not used, because its driver stamps the end of the frame and exposure or "
+               "readout is unknown; set cameras.exposure_ms and cameras.readout_ms";
 }
 
 SensorInput::Level CameraThread::level() const {
@@ -168,7 +185,7 @@ bool CameraThread::watchQuality(const ImageView& image, Stamp now) {
 }
 
 Stamp CameraThread::middleOfExposure(const CapturedFrame& frame) {
-  if (matcher_) {
+  if (matcher_ && frame.event == prepared_.event) {
     takeEdges();
     TriggerMatch match;
     const FrameMark mark{frame.stamp, static_cast<std::uint32_t>(frame.sequence), frame.arrival};

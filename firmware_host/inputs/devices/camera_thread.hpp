@@ -2,10 +2,11 @@
 // The thread of one camera source: passes grey images to the sink, stamped at mid-exposure on
 // CLOCK_MONOTONIC. The camera may be unplugged and return.
 //
-// Stamps: the trigger's edge if one is connected and the association is certain, otherwise the driver's stamp
-// (drivers/timesync/exposure_midpoint.hpp explains how each is moved to mid-exposure). Threads: open() before
-// the flight, run() on its own thread, journal and status from any. Memory: no allocation after open(),
-// except by a source that is reopened and by the decoder of compressed images.
+// Stamps: the trigger's edge if one is connected, the delay from it to the driver's stamps is known and the
+// association is certain; otherwise the driver's stamp (drivers/timesync/exposure_midpoint.hpp explains how
+// each is moved to mid-exposure). Threads: open() before the flight, run() on its own thread, journal and
+// status from any. Memory: no allocation after open(), except by a source that is reopened and by the decoder
+// of compressed images.
 
 #include <cstdint>
 #include <memory>
@@ -54,6 +55,8 @@ class CameraThread {
   [[nodiscard]] SensorInput::Level level() const;
   /// What the camera took otherwise than it was asked; after open().
   [[nodiscard]] std::span<const DeviceFault> warnings() const { return source_->warnings(); }
+  /// After open(): why trigger edges are not used, and what to do; empty: they are used, or there are none.
+  [[nodiscard]] std::string triggerWarning() const;
   void run(SensorSink& sink, const RunControl& control);
   /// Of run(), at each turn.
   [[nodiscard]] Heartbeat& heart() { return heart_; }
@@ -97,7 +100,7 @@ class CameraThread {
   std::optional<ExposureLoop> exposure_;
   EdgeRing edges_;
   EdgeTrain train_;
-  std::optional<TriggerMatcher> matcher_;  ///< where a trigger is connected
+  std::optional<TriggerMatcher> matcher_;  ///< where a trigger is connected and the stamps' delay is known
   RateWatch rate_;
   ImageWatch images_;
   int odd_images_ = 0;  ///< dark or repeated, running

@@ -295,6 +295,9 @@ LiveInput::Opened LiveInput::open() {
     for (const DeviceFault& warning : camera->warnings()) {
       opened.warnings.push_back(describe(warning, camera->journal().name()));
     }
+    if (const std::string warning = camera->triggerWarning(); !warning.empty()) {
+      opened.warnings.push_back(camera->journal().name() + ": " + warning);
+    }
   }
   if (trigger_) note(trigger_->open(), trigger_->journal());
   return opened;

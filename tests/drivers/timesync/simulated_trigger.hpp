@@ -17,6 +17,7 @@ struct TriggerPattern {
   double lag = 0.4;         ///< of a period, edge to frame stamp
   double stamp_jitter = 0;  ///< of a period, evenly to both sides, or to one
   bool one_sided = false;
+  double arrival = 0.1;       ///< of a period, after the frame's stamp and its edge
   double edge_jitter = 1e-3;  ///< of a period
   double edge_drop = 0, frame_drop = 0, glitch = 0;
   double burst = 0;    ///< odds that a burst of losses of up to 30 begins at a pulse
@@ -89,7 +90,7 @@ inline std::vector<TriggerEvent> simulateTrigger(const TriggerPattern& p, Random
     const double late = random.uniform() < p.late ? random.uniform(0.3, 2) : 0;
     const double at = edge + (p.lag + scatter + late) * period;
     frame.stamp = stamp(at);
-    frame.arrival = stamp(std::max(at, edge) + 0.1 * period);
+    frame.arrival = stamp(std::max(at, edge) + p.arrival * period);
     events.push_back({frame.arrival, frame, stamp(edge)});
   }
   std::stable_sort(events.begin(), events.end(),

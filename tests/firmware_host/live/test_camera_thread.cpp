@@ -1,8 +1,10 @@
-// A camera's thread: where it runs, and a camera that comes back as another.
+// A camera's thread: where it runs, a camera that comes back as another, and edges of a trigger.
 
+#include <array>
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -91,6 +93,132 @@ TEST_CASE("a camera that comes back with other pixels is refused until it has th
   CHECK(soon([&] { return !camera.goes.load() && camera.facts().format == kGrey8; }));
   stop.store(true);
   runner.join();
+}
+
+constexpr Duration kTriggerPeriod = Duration::fromMilliseconds(50);
+constexpr int kTriggered = 100;  ///< edges, and frames that they made
+
+Stamp edgeOf(std::uint64_t number) { return {static_cast<std::int64_t>(number + 1) * kTriggerPeriod.ns}; }
+
+/// Each frame is stamped, and arrives, `lag` after its edge.
+class TriggeredCamera : public CameraSource {
+ public:
+  TriggeredCamera(StampEvent event, Duration lag) : event_(event), lag_(lag) {}
+  std::optional<Duration> exposure;
+  std::atomic<bool> runs{false};
+
+  DeviceFault open() override {
+    facts_ = {};
+    facts_.width = facts_.stride = kSide;
+    facts_.height = kSide;
+    facts_.event = event_;
+    facts_.exposure = exposure;
+    return {};
+  }
+  void close() override { forgetLent(); }
+  [[nodiscard]] bool isOpen() const override { return true; }
+  [[nodiscard]] int fd() const override { return -1; }
+  DeviceFault next(CapturedFrame& frame) override {
+    frame.release();
+    if (!runs.load() || number_ == kTriggered) return {};
+    pixels_.fill(static_cast<std::uint8_t>(50 + number_));
+    frame.image = {pixels_.data(), kSide, kSide, kSide};
+    frame.event = event_;
+    frame.stamp = frame.arrival = edgeOf(number_) + lag_;
+    frame.sequence = number_++;
+    lend(frame, 0);
+    return {};
+  }
+
+ private:
+  static constexpr int kSide = 32;
+  void giveBack(std::uint32_t /*buffer*/) override {}
+  StampEvent event_;
+  Duration lag_;
+  std::uint64_t number_ = 0;
+  std::array<std::uint8_t, static_cast<std::size_t>(kSide* kSide)> pixels_{};
+};
+
+class TriggerSink : public SensorSink {
+ public:
+  void takeImu(const ImuSample& /*sample*/, Stamp /*arrival*/, const HostTimes& /*host*/) override {}
+  void takeScene(const SceneImages& /*scene*/) override {}
+  void takeImage(const CameraFrame& image, const HostTimes& /*host*/) override {
+    if (image.stamp > image.arrival) ++of_future;
+    last.store(image.sequence);
+  }
+  int of_future = 0;
+  std::atomic<std::uint64_t> last{0};
+};
+
+struct Triggered {
+  std::string warning;
+  std::uint64_t by_trigger = 0;
+  LockState lock = LockState::kUnlocked;
+};
+
+Triggered fly(std::unique_ptr<TriggeredCamera> owned, const CamerasGroup& settings) {
+  TriggeredCamera& camera = *owned;
+  CameraThread thread({"camera 0", 0, settings, TriggerGroup{"gpiochip0"}}, std::move(owned));
+  REQUIRE(thread.open().ok());
+  for (std::uint64_t i = 0; i < kTriggered; ++i) {
+    REQUIRE(thread.edges().tryPush({edgeOf(i), i}));
+  }
+  std::atomic<bool> stop{false};
+  RunControl control;
+  control.stop = &stop;
+  TriggerSink sink;
+  camera.runs = true;
+  std::thread runner([&] { thread.run(sink, control); });
+  CHECK(soon([&] { return sink.last.load() == kTriggered - 1; }));
+  stop.store(true);
+  runner.join();
+  CHECK(sink.of_future == 0);
+  Triggered result;
+  result.warning = thread.triggerWarning();
+  result.by_trigger = thread.status().by_trigger;
+  result.lock = thread.status().trigger.lock;
+  return result;
+}
+
+TEST_CASE("edges are matched to frames only where the delay to the stamps is known") {
+  const Duration exposure = Duration::fromMilliseconds(5);
+  const Duration readout = Duration::fromMilliseconds(35);
+  CamerasGroup settings;
+  settings.rate_hz = 20;
+  const auto camera = [&](StampEvent event) {
+    const bool start = event == StampEvent::kStartOfExposure;
+    auto made = std::make_unique<TriggeredCamera>(event, start ? Duration{} : exposure + readout);
+    made->exposure = exposure;
+    return made;
+  };
+  SECTION("start of exposure") {
+    const Triggered found = fly(camera(StampEvent::kStartOfExposure), settings);
+    CHECK(found.warning.empty());
+    CHECK(found.by_trigger > 50);
+    CHECK(found.lock == LockState::kLocked);
+  }
+  SECTION("arrival") {
+    const Triggered found = fly(camera(StampEvent::kArrival), settings);
+    CHECK_THAT(found.warning, Catch::Contains("arrival"));
+    CHECK(found.by_trigger == 0);
+    CHECK(found.lock == LockState::kUnlocked);
+  }
+  SECTION("end of the frame, exposure and readout unknown") {
+    const Triggered found = fly(camera(StampEvent::kEndOfFrame), settings);
+    CHECK_THAT(found.warning,
+               Catch::Contains("cameras.exposure_ms") && Catch::Contains("cameras.readout_ms"));
+    CHECK(found.by_trigger == 0);
+    CHECK(found.lock == LockState::kUnlocked);
+  }
+  SECTION("end of the frame, both known") {
+    settings.exposure_ms = 5;
+    settings.readout_ms = 35;
+    const Triggered found = fly(camera(StampEvent::kEndOfFrame), settings);
+    CHECK(found.warning.empty());
+    CHECK(found.by_trigger > 50);
+    CHECK(found.lock == LockState::kLocked);
+  }
 }
 
 }  // namespace
