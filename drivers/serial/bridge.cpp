@@ -86,7 +86,7 @@ std::size_t encodeBridge(const TriggerEdge& edge, std::span<std::uint8_t> out) {
   to.i64(edge.device.ns);
   to.u32(static_cast<std::uint32_t>(edge.counter & 0xFFFFFFFFU));
   to.u8(edge.line);
-  to.u8(edge.rising ? 1 : 0);
+  to.u8(edge.rising.value_or(true) ? 1 : 0);
   return finish(to);
 }
 

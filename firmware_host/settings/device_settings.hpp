@@ -50,7 +50,7 @@ struct CamerasGroup {
 
 struct TriggerGroup {
   std::string chip = "";  ///< empty: no trigger line
-  std::string line = "0";
+  std::string line = "";  ///< empty: line 0 of a GPIO chip, all inputs of an IMU
   std::string edge = "rising";
   double delay_us = 0;
 };

@@ -106,10 +106,15 @@ std::vector<Setting> deviceSettings() {
        "stamps the end of the frame. 0: unknown.",
        real(kCameras, &C::readout_ms, 0, 100)},
       {"trigger.chip", "",
-       "GPIO chip that receives the cameras' trigger signal; empty: the cameras' own stamps are used.",
-       TextSetting{member(kTrigger, &T::chip), "a chip such as gpiochip0, or empty"}},
-      {"trigger.line", "", "Line of trigger.chip that carries the trigger signal.",
-       TextSetting{member(kTrigger, &T::line), "a line number or name"}},
+       "GPIO chip that receives the cameras' trigger signal; imu: the IMU reports its edges; empty: the "
+       "cameras' "
+       "own stamps are used.",
+       TextSetting{member(kTrigger, &T::chip), "a chip such as gpiochip0, imu, or empty"}},
+      {"trigger.line", "",
+       "Line of trigger.chip that carries the trigger signal. Empty: line 0 of a GPIO chip; with chip `imu`, "
+       "all "
+       "inputs of the IMU.",
+       TextSetting{member(kTrigger, &T::line), "a line number or name, or empty"}},
       {"trigger.edge", "", "Edge of the trigger signal at which exposure starts.",
        ChoiceSetting{member(kTrigger, &T::edge), {"rising", "falling"}}},
       {"trigger.delay_us", "us", "Delay from the edge to the start of exposure.",

@@ -37,7 +37,7 @@ ImuThread::ImuThread(std::string name, std::unique_ptr<ImuLink> link, const ImuC
       clock_(ClockMapSettings{delay}),
       rate_(rate) {}
 
-void ImuThread::run(SensorSink& sink, std::span<EdgeRing* const> edges, const RunControl& control) {
+void ImuThread::run(SensorSink& sink, const ImuEdges& edges, const RunControl& control) {
   // What came before the flight has lost its time of arrival.
   link_->discard();
   hear();
@@ -66,7 +66,7 @@ void ImuThread::run(SensorSink& sink, std::span<EdgeRing* const> edges, const Ru
   }
 }
 
-void ImuThread::takeReadings(SensorSink& sink, std::span<EdgeRing* const> edges) {
+void ImuThread::takeReadings(SensorSink& sink, const ImuEdges& edges) {
   const std::uint64_t handed = counted_.samples;
   ImuReading reading;
   std::size_t readings = 0;
@@ -76,9 +76,12 @@ void ImuThread::takeReadings(SensorSink& sink, std::span<EdgeRing* const> edges)
   }
   TriggerEdge edge;
   while (link_->nextEdge(edge)) {
+    if (edge.rising.value_or(edges.rising) != edges.rising || edge.line != edges.line.value_or(edge.line)) {
+      continue;
+    }
     const std::optional<Stamp> stamp = hostOf(edge.device);
     if (!stamp) continue;
-    for (EdgeRing* ring : edges) static_cast<void>(ring->tryPush({*stamp, edge.counter}));
+    for (EdgeRing* ring : edges.cameras) static_cast<void>(ring->tryPush({*stamp, edge.counter}));
   }
   if (readings == 0) return;
   if (counted_.samples > handed) {

@@ -34,6 +34,13 @@ struct ImuStatus {
   TimesyncStatus clock;
 };
 
+/// Where trigger edges that arrive over the link go, and which of them.
+struct ImuEdges {
+  std::span<EdgeRing* const> cameras = {};
+  bool rising = true;
+  std::optional<std::uint8_t> line = {};  ///< empty: all lines
+};
+
 class ImuThread {
  public:
   /// `delay`: from sensing to arrival at the least. `rate`: samples a second that are expected; 0: unknown.
@@ -47,8 +54,7 @@ class ImuThread {
     for (DeviceFault remark; link_->nextRemark(remark);) all.push_back(remark);
     return all;
   }
-  /// `edges`: receives trigger edges that arrive over the link.
-  void run(SensorSink& sink, std::span<EdgeRing* const> edges, const RunControl& control);
+  void run(SensorSink& sink, const ImuEdges& edges, const RunControl& control);
   [[nodiscard]] SensorInput::Level level() const {
     return link_->allocates() ? SensorInput::Level::kLibrary : SensorInput::Level::kSensor;
   }
@@ -66,7 +72,7 @@ class ImuThread {
   }
 
  private:
-  void takeReadings(SensorSink& sink, std::span<EdgeRing* const> edges);
+  void takeReadings(SensorSink& sink, const ImuEdges& edges);
   void hand(const ImuReading& reading, SensorSink& sink);
   [[nodiscard]] bool stampOf(const ImuReading& reading, Stamp& stamp);
   /// By the protocol's exchange of clocks, where it is sure and the arrivals do not contradict it.

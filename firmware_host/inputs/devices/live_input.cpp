@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <utility>
 
 #include "drivers/dds/topic_camera.hpp"
@@ -72,6 +73,18 @@ std::unique_ptr<ImuLink> makeImuLink(const ImuLinkGroup& settings, double rate, 
            "Set the serial port, or set imu_link.protocol to mavlink for an autopilot on UDP");
   }
   return std::make_unique<PortImuLink>(settings, rate, outbox);
+}
+
+/// The IMU's input that trigger.line names; empty: all.
+std::optional<std::uint8_t> imuLine(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  std::uint8_t line = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), line);
+  if (error != std::errc{} || end != text.data() + text.size()) {
+    failAt("trigger.line", text + " is not an input of an IMU",
+           "Set the input's number, or leave it empty for all inputs");
+  }
+  return line;
 }
 
 /// Where camera `index` comes from, as the settings name it.
@@ -273,7 +286,7 @@ LiveInput::LiveInput(const Settings& settings, const Calibration& calibration) {
     edge_rings_.push_back(&cameras_.back()->edges());
   }
   if (settings.trigger.chip == kTriggerByImu) {
-    edges_by_imu_ = true;
+    imu_edges_ = {edge_rings_, settings.trigger.edge == "rising", imuLine(settings.trigger.line)};
   } else if (!settings.trigger.chip.empty()) {
     trigger_ = std::make_unique<TriggerThread>(settings.trigger, cameras.rate_hz);
   }
@@ -306,13 +319,7 @@ LiveInput::Opened LiveInput::open() {
 std::vector<SensorInput::Thread> LiveInput::threads(SensorSink& sink, const RunControl& control) {
   static constexpr std::array<const char*, kMaxCameras> kCameraThreads = {"camera0", "camera1"};
   std::vector<Thread> threads;
-  threads.push_back({"imu", imu_->level(),
-                     [this, &sink, &control] {
-                       imu_->run(sink,
-                                 edges_by_imu_ ? std::span<EdgeRing* const>(edge_rings_)
-                                               : std::span<EdgeRing* const>(),
-                                 control);
-                     },
+  threads.push_back({"imu", imu_->level(), [this, &sink, &control] { imu_->run(sink, imu_edges_, control); },
                      &imu_->heart()});
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     threads.push_back({kCameraThreads[i], cameras_[i]->level(),

@@ -69,8 +69,8 @@ class LiveInput : public SensorInput {
   std::vector<std::unique_ptr<CameraThread>> cameras_;
   std::unique_ptr<TriggerThread> trigger_;
   std::vector<EdgeRing*> edge_rings_;  ///< one a camera's thread
-  bool edges_by_imu_ = false;
-  bool topics_ = false;  ///< any device is a topic
+  ImuEdges imu_edges_;                 ///< to no camera unless the trigger is the IMU's
+  bool topics_ = false;                ///< any device is a topic
 };
 
 }  // namespace swiftlet

@@ -8,11 +8,16 @@
 #include "firmware_host/realtime/host_sleep.hpp"
 
 namespace swiftlet {
+namespace {
+
+std::string lineOf(const TriggerGroup& settings) { return settings.line.empty() ? "0" : settings.line; }
+
+}  // namespace
 
 TriggerThread::TriggerThread(const TriggerGroup& settings, double rate)
-    : journal_("trigger (" + settings.chip + ", line " + settings.line + ")"), rate_(rate) {
+    : journal_("trigger (" + settings.chip + ", line " + lineOf(settings) + ")"), rate_(rate) {
   settings_.chip = settings.chip;
-  settings_.line = settings.line;
+  settings_.line = lineOf(settings);
   settings_.edges = settings.edge == "falling" ? EdgeKind::kFalling : EdgeKind::kRising;
   settings_.period = Duration::fromSeconds(1 / rate);
   longest_silence_ = longestSilence(rate);

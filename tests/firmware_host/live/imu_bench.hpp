@@ -41,9 +41,9 @@ class KeepingSink : public SensorSink {
 /// Runs the thread until it goes.
 class RunningImu {
  public:
-  RunningImu(ImuThread& imu, SensorSink& sink, std::span<EdgeRing* const> edges = {}) : imu_(imu) {
+  RunningImu(ImuThread& imu, SensorSink& sink) : imu_(imu) {
     control_.stop = &stop_;
-    thread_ = std::thread([this, &sink, edges] { imu_.run(sink, edges, control_); });
+    thread_ = std::thread([this, &sink] { imu_.run(sink, {}, control_); });
   }
   ~RunningImu() { end(); }
   void end() {

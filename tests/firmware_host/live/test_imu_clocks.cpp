@@ -89,14 +89,17 @@ struct ScriptedFlight {
   EdgeRing edges;
 };
 
-std::unique_ptr<ScriptedFlight> flyScript(std::deque<ScriptedLink::Round> rounds, Duration delay = {}) {
+std::unique_ptr<ScriptedFlight> flyScript(std::deque<ScriptedLink::Round> rounds, Duration delay = {},
+                                          const ImuEdges& wanted = {}) {
   auto flown = std::make_unique<ScriptedFlight>();
   std::atomic<bool> stop{false};
   RunControl control;
   control.stop = &stop;
   ImuThread imu("IMU", std::make_unique<ScriptedLink>(std::move(rounds), stop), ImuCorrection{}, delay);
   const std::array<EdgeRing*, 1> edges = {&flown->edges};
-  imu.run(flown->sink, edges, control);
+  ImuEdges choice = wanted;
+  choice.cameras = edges;
+  imu.run(flown->sink, choice, control);
   flown->status = imu.status();
   return flown;
 }
@@ -160,6 +163,28 @@ TEST_CASE("edges that the sensor tells of are mapped as its samples are") {
     CHECK(edge.stamp == flown->sink[static_cast<std::size_t>(i)].sample.stamp);
   }
   CHECK_FALSE(flown->edges.tryPop(edge));
+}
+
+TEST_CASE("edges of the other polarity and of other lines do not reach the cameras") {
+  const auto edgesOf = [](std::optional<bool> rising, const ImuEdges& wanted) {
+    std::deque<ScriptedLink::Round> rounds;
+    for (int i = 0; i < 60; ++i) rounds.push_back(roundNumber(i, kBehind));
+    TriggerEdge edge;
+    edge.device = sensed(50) - kBehind;
+    edge.line = 2;
+    edge.rising = rising;
+    rounds[50].edge = edge;
+    EdgeMessage found;
+    return flyScript(rounds, {}, wanted)->edges.tryPop(found);
+  };
+  CHECK(edgesOf(true, {.rising = true}));
+  CHECK_FALSE(edgesOf(false, {.rising = true}));
+  CHECK_FALSE(edgesOf(true, {.rising = false}));
+  CHECK(edgesOf(false, {.rising = false}));
+  // A protocol that does not report the polarity: the sensor's own settings chose it.
+  CHECK(edgesOf(std::nullopt, {.rising = false}));
+  CHECK(edgesOf(true, {.line = 2}));
+  CHECK_FALSE(edgesOf(true, {.line = 1}));
 }
 
 TEST_CASE("a sensor without a clock is stamped by arrival, less the delay") {

@@ -93,6 +93,14 @@ TEST_CASE("each refusal names its setting and what to do") {
   CHECK(refusal(settings, stereo()).empty());
   settings.trigger.chip = "imu";
   CHECK_THAT(refusal(settings, stereo()), Catch::Contains("trigger.chip") && Catch::Contains("dronecan"));
+  settings.imu_link.protocol = "xsens";
+  CHECK(refusal(settings, stereo()).empty());
+  settings.trigger.line = "2";
+  CHECK(refusal(settings, stereo()).empty());
+  for (const char* line : {"TriggerIn2", "-1", "256", "2 "}) {
+    settings.trigger.line = line;
+    CHECK_THAT(refusal(settings, stereo()), Catch::Contains("trigger.line") && Catch::Contains(line));
+  }
 }
 
 TEST_CASE("IMU and autopilot share a link where both settings name one port") {
