@@ -81,6 +81,8 @@ class ImuDecoder {
   bool nextMavlink(ReceivedMavlink& message) { return received_.pop(message); }
   /// Which message readings are taken from: HighresImu::kId at first, ScaledImu::kRawId or kScaledId.
   void takeMavlink(std::uint32_t message);
+  /// Who sends the readings; empty before the first.
+  [[nodiscard]] const MavlinkImuSource& mavlinkSource() const { return wanted_; }
 
   /// After the device was gone: discards a partial frame and the state of its clock and counters. Statistics
   /// and waiting messages are kept.

@@ -14,6 +14,12 @@ std::size_t AutopilotDialogue::step(ImuDecoder& decoder, Stamp now, std::span<st
   const auto send = [&](const auto& message) {
     length += mavlink::write(sender_, message, out.subspan(length));
   };
+  // Readings are in their sender's clock: on a link with several systems no other may be asked for it.
+  if (const MavlinkImuSource& source = decoder.mavlinkSource(); source.system && source.component) {
+    if (source.system != system_ || source.component != component_) exchange_ = TwoWayClockMap();
+    system_ = *source.system;
+    component_ = *source.component;
+  }
   std::size_t answers = 0;
   for (ReceivedMavlink received; decoder.nextMavlink(received);) {
     if (const auto* heartbeat = std::get_if<mavlink::Heartbeat>(&received.message)) {
@@ -24,7 +30,8 @@ std::size_t AutopilotDialogue::step(ImuDecoder& decoder, Stamp now, std::span<st
       if (time->tc1 == 0 && answers < kMostAnswers) {
         ++answers;
         send(mavlink::Timesync{now.ns, time->ts1, received.system, received.component});
-      } else if (time->tc1 != 0 && time->ts1 == asked_.ns) {
+      } else if (time->tc1 != 0 && time->ts1 == asked_.ns && received.system == system_ &&
+                 received.component == component_) {
         static_cast<void>(exchange_.add({asked_, Stamp{time->tc1}, received.arrival}));
       }
     }
@@ -40,7 +47,7 @@ std::size_t AutopilotDialogue::step(ImuDecoder& decoder, Stamp now, std::span<st
   sender_.system = stream_.system().value_or(sender_.system);
   if (now - asked_ >= kAskPeriod) {
     asked_ = now;
-    send(mavlink::Timesync{0, asked_.ns, 0, 0});
+    send(mavlink::Timesync{0, asked_.ns, system_, component_});
   }
   return length;
 }

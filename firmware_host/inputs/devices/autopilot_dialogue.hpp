@@ -43,6 +43,7 @@ class AutopilotDialogue {
  private:
   MavlinkSender sender_{.system = 1, .component = 191, .sequence = 0};
   TwoWayClockMap exchange_;
+  std::uint8_t system_ = 0, component_ = 0;  ///< whose clock it is: the sender of the readings; 0: not known
   ImuStreamRequest stream_;
   Stamp asked_;                ///< when the newest request left; its answer names it
   std::uint64_t samples_ = 0;  ///< of the decoder, counted

@@ -351,6 +351,45 @@ struct Simulated {
   }
 };
 
+TEST_CASE("Only the sender of the samples is asked for its clock and answers for it", "[autopilot]") {
+  constexpr Duration kOther = Duration::fromMilliseconds(5);  ///< of another system's clock
+  ImuDecoder decoder(ImuProtocol::kMavlink);
+  AutopilotDialogue dialogue(0);
+  MavlinkSender autopilot{.system = 1, .component = 1, .sequence = 0};
+  MavlinkSender other{.system = 2, .component = 1, .sequence = 0};
+  MavlinkSender camera{.system = 1, .component = 100, .sequence = 0};
+  std::array<std::uint8_t, kLongestMavlinkFrame> frame;
+  const auto feed = [&](MavlinkSender& sender, const auto& message, Stamp at) {
+    const auto bytes = std::span(frame).first(mavlink::write(sender, message, frame));
+    REQUIRE(decoder.feed(bytes, at, {}) == bytes.size());
+    for (ImuReading reading; decoder.next(reading);) continue;
+  };
+  MavlinkParser parser;
+  Stamp now{100'000'000'000};
+  for (int i = 0; i < 50; ++i, now = now + Duration::fromMilliseconds(100)) {
+    mavlink::HighresImu imu;
+    imu.time_usec = static_cast<std::uint64_t>(now.ns / 1000);
+    imu.fields_updated = mavlink::HighresImu::kAccelUpdated | mavlink::HighresImu::kGyroUpdated;
+    feed(autopilot, imu, now);
+    std::array<std::uint8_t, AutopilotDialogue::kMostBytes> said;
+    const std::size_t length = dialogue.step(decoder, now, said);
+    REQUIRE(parser.feed(std::span(said).first(length), now, {}) == length);
+    for (MavlinkFrame heard; parser.next(heard);) {
+      mavlink::Timesync request;
+      REQUIRE((mavlink::read(heard, request) && request.tc1 == 0));
+      CHECK(request.target_system == autopilot.system);
+      CHECK(request.target_component == autopilot.component);
+      const Stamp at = now + Duration::fromMilliseconds(1);
+      feed(other, mavlink::Timesync{(at + kOther).ns, request.ts1, 0, 0}, at);
+      feed(camera, mavlink::Timesync{(at + kOther).ns, request.ts1, 0, 0}, at);
+      feed(autopilot, mavlink::Timesync{at.ns, request.ts1, 0, 0}, at + Duration::fromMilliseconds(1));
+    }
+  }
+  const std::optional<Stamp> host = dialogue.toHost(now);
+  REQUIRE(host);
+  CHECK(std::abs((*host - now).seconds()) < 1e-4);
+}
+
 TEST_CASE("An hour of both ways on one link in simulated time", "[autopilot]") {
   constexpr double kSeconds = 3600;
   Simulated flight(kSeconds);
