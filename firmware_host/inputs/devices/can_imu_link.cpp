@@ -3,20 +3,19 @@
 #include <nlohmann/json.hpp>
 
 namespace swiftlet {
-namespace {
-
-// RawIMU broadcasts of any node.
-constexpr CanFilter kRawImu{0x0003EB00, 0x00FFFF80};
-
-}  // namespace
 
 CanImuLink::CanImuLink(const ImuLinkGroup& settings)
     : decoder_(static_cast<std::uint8_t>(settings.can_node)) {
   settings_.setInterface(settings.device.c_str());
-  settings_.addFilter(kRawImu);
+  RawImuDecoder::addFilters(settings_);
 }
 
-DeviceFault CanImuLink::open() { return bus_.open(settings_); }
+DeviceFault CanImuLink::open() {
+  if (opened_) return bus_.reopen();
+  const DeviceFault fault = bus_.open(settings_);
+  opened_ = fault.ok();
+  return fault;
+}
 
 DeviceFault CanImuLink::receive(Stamp /*now*/) {
   first_ = count_ = 0;
@@ -37,6 +36,13 @@ bool CanImuLink::next(ImuReading& reading) {
   return true;
 }
 
+bool CanImuLink::nextRemark(DeviceFault& remark) {
+  if (warned_ || bus_.warning().ok()) return false;
+  warned_ = true;
+  remark = bus_.warning();
+  return true;
+}
+
 nlohmann::ordered_json CanImuLink::counters() const {
   const CanBusCounters& bus = bus_.counters();
   const DroneCanCounters& transfers = decoder_.transfers();
@@ -53,7 +59,8 @@ nlohmann::ordered_json CanImuLink::counters() const {
           {"readings", readings.readings},
           {"malformed", readings.malformed},
           {"not_finite", readings.not_finite},
-          {"other_nodes", readings.other_nodes}};
+          {"other_nodes", readings.other_nodes},
+          {"time_syncs", readings.time_syncs}};
 }
 
 }  // namespace swiftlet

@@ -20,6 +20,7 @@ class CanImuLink : public ImuLink {
   DeviceFault receive(Stamp now) override;
   bool next(ImuReading& reading) override;
   [[nodiscard]] std::uint64_t received() const override { return bus_.counters().frames; }
+  bool nextRemark(DeviceFault& remark) override;
   [[nodiscard]] nlohmann::ordered_json counters() const override;
 
  private:
@@ -28,6 +29,8 @@ class CanImuLink : public ImuLink {
 
   CanBusSettings settings_;
   CanBus bus_;
+  bool opened_ = false;
+  bool warned_ = false;  ///< of the bus's receive buffer
   RawImuDecoder decoder_;
   std::array<ImuReading, kMostReadings> readings_;
   std::size_t first_ = 0;
