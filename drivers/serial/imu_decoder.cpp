@@ -10,10 +10,6 @@ constexpr std::array<std::string_view, kImuProtocolCount> kNames = {"vectornav",
                                                                     "bridge"};
 constexpr std::uint64_t kNsPerMicrosecond = 1'000;
 
-bool matches(const std::optional<std::uint8_t>& wanted, std::uint8_t value) {
-  return !wanted || *wanted == value;
-}
-
 }  // namespace
 
 std::string_view name(ImuProtocol protocol) { return kNames[static_cast<std::size_t>(protocol)]; }
@@ -112,7 +108,7 @@ void ImuDecoder::readMavlink(const StampedFrame& bytes, InertialFrame& content) 
   } else if (mavlink::read(frame, ack)) {
     keep(ack);
   } else if (mavlink::read(frame, trigger)) {
-    if (!matches(wanted_.system, frame.system)) return;
+    if (source_ && source_->system != frame.system) return;
     const auto time = stampOf(trigger.time_usec, kNsPerMicrosecond);
     content.in_range = time.has_value();
     TriggerEdge edge;
@@ -150,14 +146,11 @@ void ImuDecoder::readScaledImu(const MavlinkFrame& frame, InertialFrame& content
   content.in_range = content.device.has_value();
 }
 
-/// The first sender and sensor that the settings allow; it is kept to.
+/// The first sender and sensor is kept to.
 bool ImuDecoder::isOurs(const MavlinkFrame& frame, std::uint8_t sensor) {
-  if (!matches(wanted_.system, frame.system) || !matches(wanted_.component, frame.component) ||
-      !matches(wanted_.sensor, sensor)) {
-    return false;
-  }
-  wanted_ = {frame.system, frame.component, sensor};
-  return true;
+  const MavlinkImuSource sender{frame.system, frame.component, sensor};
+  if (!source_) source_ = sender;
+  return source_ == sender;
 }
 
 /// PX4's readings are means over 1 / IMU_INTEG_RATE, 5 ms by default, and are stamped at its end. A stream
@@ -170,7 +163,7 @@ Duration ImuDecoder::meanAge() const {
 void ImuDecoder::takeMavlink(std::uint32_t message) {
   if (message == mavlink_message_) return;
   mavlink_message_ = message;
-  wanted_ = source_;
+  source_.reset();
   gaps_.forget();
 }
 
@@ -182,7 +175,7 @@ void ImuDecoder::restart() {
   link_.forgetSenders();
   mavlink_triggers_.forget();
   gaps_.forget();
-  wanted_ = source_;
+  source_.reset();
 }
 
 }  // namespace swiftlet

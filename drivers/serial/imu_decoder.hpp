@@ -44,11 +44,13 @@ constexpr std::size_t kImuProtocolCount = 5;
 std::string_view name(ImuProtocol protocol);
 std::optional<ImuProtocol> imuProtocol(std::string_view name);
 
-/// Whose MAVLink messages count. Empty: the first that sends a complete HIGHRES_IMU, from then on.
+/// Who sends MAVLink readings.
 struct MavlinkImuSource {
-  std::optional<std::uint8_t> system;
-  std::optional<std::uint8_t> component;
-  std::optional<std::uint8_t> sensor;  ///< the message's id field
+  std::uint8_t system = 0;
+  std::uint8_t component = 0;
+  std::uint8_t sensor = 0;  ///< the message's id field
+
+  bool operator==(const MavlinkImuSource&) const = default;
 };
 
 /// A message of an autopilot received besides the samples: TIMESYNC request or answer, and two more.
@@ -66,8 +68,7 @@ class ImuDecoder {
   /// that feed() accepts, so none is lost if both are read after each read.
   static constexpr std::size_t kMostEvents = 512;
 
-  explicit ImuDecoder(ImuProtocol protocol, MavlinkImuSource source = {})
-      : protocol_(protocol), source_(source), wanted_(source) {}
+  explicit ImuDecoder(ImuProtocol protocol) : protocol_(protocol) {}
 
   /// Accepts bytes that a read returned at `read_at` (CLOCK_MONOTONIC); `byte_time` is the time of one byte
   /// on the wire, 0 on USB CDC. Returns how many were accepted: all of kMostFed bytes after next() has
@@ -81,8 +82,8 @@ class ImuDecoder {
   bool nextMavlink(ReceivedMavlink& message) { return received_.pop(message); }
   /// Which message readings are taken from: HighresImu::kId at first, ScaledImu::kRawId or kScaledId.
   void takeMavlink(std::uint32_t message);
-  /// Who sends the readings; empty before the first.
-  [[nodiscard]] const MavlinkImuSource& mavlinkSource() const { return wanted_; }
+  /// Whose MAVLink readings are taken: the first that sends a complete one; empty before.
+  [[nodiscard]] const std::optional<MavlinkImuSource>& mavlinkSource() const { return source_; }
 
   /// After the device was gone: discards a partial frame and the state of its clock and counters. Statistics
   /// and waiting messages are kept.
@@ -104,8 +105,7 @@ class ImuDecoder {
   bool give(const InertialFrame& content, Stamp arrival, ImuReading& reading);
 
   ImuProtocol protocol_;
-  MavlinkImuSource source_;
-  MavlinkImuSource wanted_;
+  std::optional<MavlinkImuSource> source_;
   FrameBuffer<Xsens::kLongestFrame> buffer_;
   StreamCounters counters_;
   VectorNav vectornav_;

@@ -15,10 +15,10 @@ std::size_t AutopilotDialogue::step(ImuDecoder& decoder, Stamp now, std::span<st
     length += mavlink::write(sender_, message, out.subspan(length));
   };
   // Readings are in their sender's clock: on a link with several systems no other may be asked for it.
-  if (const MavlinkImuSource& source = decoder.mavlinkSource(); source.system && source.component) {
-    if (source.system != system_ || source.component != component_) exchange_ = TwoWayClockMap();
-    system_ = *source.system;
-    component_ = *source.component;
+  if (const auto& source = decoder.mavlinkSource()) {
+    if (source->system != system_ || source->component != component_) exchange_ = TwoWayClockMap();
+    system_ = source->system;
+    component_ = source->component;
   }
   std::size_t answers = 0;
   for (ReceivedMavlink received; decoder.nextMavlink(received);) {
