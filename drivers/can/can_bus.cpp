@@ -28,7 +28,6 @@ Stamp stampOf(const timespec& time) { return {time.tv_sec * 1'000'000'000 + time
 /// What came beside a frame.
 struct Beside {
   std::optional<Stamp> software;  ///< CLOCK_REALTIME
-  std::optional<Stamp> hardware;
   std::optional<std::uint32_t> lost;
 };
 
@@ -41,7 +40,6 @@ Beside readControl(msghdr& message) {
       std::array<timespec, 3> stamps = {};
       std::memcpy(stamps.data(), CMSG_DATA(part), sizeof(stamps));
       if (stampOf(stamps[0]).ns != 0) beside.software = stampOf(stamps[0]);
-      if (stampOf(stamps[2]).ns != 0) beside.hardware = stampOf(stamps[2]);
     } else if (part->cmsg_type == SO_RXQ_OVFL) {
       std::uint32_t lost = 0;
       std::memcpy(&lost, CMSG_DATA(part), sizeof(lost));
@@ -152,8 +150,7 @@ DeviceFault CanBus::setUp() {
     return ::setsockopt(fd_, level, option, value, static_cast<socklen_t>(size)) == 0;
   };
   const int on = 1;
-  const int stamps = SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE | SOF_TIMESTAMPING_RX_HARDWARE |
-                     SOF_TIMESTAMPING_RAW_HARDWARE;
+  const int stamps = SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE;
   bool ok = set(SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &kErrors, sizeof(kErrors)) &&
             set(SOL_SOCKET, SO_TIMESTAMPING, &stamps, sizeof(stamps)) &&
             set(SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof(on));
@@ -167,12 +164,13 @@ DeviceFault CanBus::setUp() {
   if (!set(SOL_SOCKET, SO_RCVBUFFORCE, &settings_.receive_buffer, sizeof(int))) {
     set(SOL_SOCKET, SO_RCVBUF, &settings_.receive_buffer, sizeof(int));
   }
-  socklen_t size = sizeof(receive_buffer_);
-  ::getsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &receive_buffer_, &size);
-  if (receive_buffer_ < settings_.receive_buffer / 4) {
+  int given = 0;
+  socklen_t size = sizeof(given);
+  ::getsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &given, &size);
+  if (given < settings_.receive_buffer / 4) {
     warning_ = deviceFault(DeviceFaultKind::kChanged, 0,
                            "receive buffer: requested %d KiB, got %d KiB; `sysctl -w net.core.rmem_max=%d`",
-                           settings_.receive_buffer >> 10, receive_buffer_ >> 10, settings_.receive_buffer);
+                           settings_.receive_buffer >> 10, given >> 10, settings_.receive_buffer);
   }
   if (::bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
     return interfaceFault(errno);
@@ -264,8 +262,6 @@ DeviceFault CanBus::next(std::optional<CanFrame>& frame) {
     } else {
       ++counters_.without_stamp;
     }
-    frame->hardware = beside.hardware;
-    if (beside.hardware) ++counters_.hardware_stamps;
     ++counters_.frames;
     counters_.fd_frames += fd ? 1 : 0;
     return {};

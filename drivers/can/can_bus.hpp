@@ -9,7 +9,7 @@
 //   again.
 // Stamps: the kernel's software stamp is CLOCK_REALTIME; the offset to CLOCK_MONOTONIC is measured at each
 //   receipt, so that a step of the wall clock moves one frame at most, and the best measurement since the
-//   last step is used. Hardware stamps are passed on where there are any.
+//   last step is used.
 // Memory: the socket's buffer in the kernel; no allocation. Cost of a frame: one call and three clock
 // readings. Source: the kernel's Documentation/networking/can.rst and timestamping.rst; linux/can/error.h.
 
@@ -53,7 +53,6 @@ struct CanBusCounters {
   std::uint64_t controller_overflows = 0;
   std::uint64_t error_passive = 0;
   std::uint64_t went_down = 0;
-  std::uint64_t hardware_stamps = 0;
   std::uint64_t without_stamp = 0;  ///< arrival is the time of the reading
   std::uint64_t reopened = 0;
 };
@@ -78,13 +77,10 @@ class CanBus {
   DeviceFault send(const CanFrame& frame);
 
   [[nodiscard]] const CanBusCounters& counters() const { return counters_; }
-  /// Whether FD frames can be sent and received.
-  [[nodiscard]] bool takesFd() const { return takes_fd_; }
   /// Maximum error of the newest frame's arrival, converted from the kernel's stamp.
   [[nodiscard]] Duration stampError() const { return clocks_ ? clocks_->error : Duration{}; }
-  /// Bytes that the kernel set aside; less than asked where net.core.rmem_max is lower.
-  [[nodiscard]] int receiveBuffer() const { return receive_buffer_; }
-  /// kChanged if that is less than a quarter; the text says how to raise it.
+  /// kChanged if the receive buffer is less than a quarter of the requested one, as net.core.rmem_max is
+  /// lower; the text says how to raise it.
   [[nodiscard]] const DeviceFault& warning() const { return warning_; }
 
  private:
@@ -98,10 +94,9 @@ class CanBus {
   CanBusSettings settings_;
   CanBusCounters counters_;
   DeviceFault warning_;
-  bool takes_fd_ = false;
+  bool takes_fd_ = false;  ///< FD frames can be sent and received
   bool down_ = false;
   bool bus_off_ = false;
-  int receive_buffer_ = 0;
   std::uint32_t lost_seen_ = 0;
   std::optional<HostClocks> clocks_;
 };

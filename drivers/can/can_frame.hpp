@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <span>
 
 #include "estimator/core/stamp.hpp"
@@ -23,8 +22,6 @@ struct CanFrame {
 
   /// CLOCK_MONOTONIC: when the kernel had it.
   Stamp arrival;
-  /// The controller's own clock, with an arbitrary zero; empty: it does not stamp.
-  std::optional<Stamp> hardware;
 
   [[nodiscard]] std::span<const std::uint8_t> bytes() const { return {data.data(), size}; }
 };

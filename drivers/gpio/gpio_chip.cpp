@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
+#include <vector>
 
 namespace swiftlet {
 namespace {
@@ -109,26 +110,6 @@ DeviceFault GpioChip::findLine(const std::string& which, GpioLine& out) const {
     if (!which.empty() && out.name == which) return {};
   }
   return deviceFault(DeviceFaultKind::kMissing, 0, "%s has no line named '%s'", name_.c_str(), which.c_str());
-}
-
-std::vector<GpioChipListing> listGpioChips() {
-  std::vector<GpioChipListing> all;
-  for (const std::string& path : chipPaths()) {
-    GpioChipListing listing;
-    listing.path = path;
-    GpioChip chip;
-    listing.fault = chip.open(path);
-    if (listing.fault.ok()) {
-      listing.name = chip.name();
-      listing.label = chip.label();
-      for (std::uint32_t i = 0; i < chip.lines(); ++i) {
-        GpioLine line;
-        if (chip.line(i, line).ok()) listing.lines.push_back(line);
-      }
-    }
-    all.push_back(std::move(listing));
-  }
-  return all;
 }
 
 }  // namespace swiftlet

@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <string>
-#include <vector>
 
 #include "drivers/device/device_fault.hpp"
 
@@ -46,14 +45,5 @@ class GpioChip {
   std::string path_, name_, label_;
   std::uint32_t lines_ = 0;
 };
-
-struct GpioChipListing {
-  std::string path, name, label;
-  std::vector<GpioLine> lines;
-  DeviceFault fault;  ///< when it could not be opened: then only the path is known
-};
-
-/// All chips of this computer, in the order of their numbers.
-std::vector<GpioChipListing> listGpioChips();
 
 }  // namespace swiftlet

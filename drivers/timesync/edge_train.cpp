@@ -78,7 +78,7 @@ void EdgeTrain::add(Stamp edge, std::optional<std::uint32_t> sequence) {
   const auto steps = static_cast<std::int64_t>(place);
   // Events that the kernel numbered one after the other: nothing was lost between them.
   const bool none_lost = before && sequence && *sequence - *before == 1;
-  (none_lost ? absent_ : missed_) += static_cast<std::uint64_t>(steps - 1);
+  if (!none_lost) missed_ += static_cast<std::uint64_t>(steps - 1);
   newest_ += steps;
   slots_[static_cast<std::size_t>(newest_) % kKept] = {newest_, edge};
   grid_.ns += std::llround(place * period_ + kPhaseGain * off);

@@ -42,7 +42,6 @@ class EdgeTrain {
   [[nodiscard]] Duration period() const { return {static_cast<std::int64_t>(period_)}; }
   [[nodiscard]] std::uint64_t edges() const { return edges_; }
   [[nodiscard]] std::uint64_t missed() const { return missed_; }  ///< pulses without an edge
-  [[nodiscard]] std::uint64_t absent() const { return absent_; }  ///< grid positions without a pulse
   [[nodiscard]] std::uint64_t glitches() const { return glitches_; }
 
  private:
@@ -67,7 +66,6 @@ class EdgeTrain {
   std::uint32_t epoch_ = 0;
   std::uint64_t edges_ = 0;
   std::uint64_t missed_ = 0;
-  std::uint64_t absent_ = 0;
   std::uint64_t glitches_ = 0;
 };
 

@@ -41,17 +41,10 @@ class LowerEnvelope {
   [[nodiscard]] std::size_t bins() const { return count_; }
   [[nodiscard]] Duration span() const;
   [[nodiscard]] double slope() const { return slope_; }
-  /// False until points ever spanned enough time.
-  [[nodiscard]] bool slopeKnown() const { return slope_known_; }
   /// The line [ns]; not when empty. Saturates far from the points.
   [[nodiscard]] std::int64_t at(Stamp time) const;
   /// Height [ns] of a point over the line; not when empty.
   [[nodiscard]] double heightOf(Stamp time, std::int64_t value_ns) const;
-  /// Mean height [ns] of the bins' lowest points over the line.
-  [[nodiscard]] double meanExcess() const { return mean_excess_; }
-  /// Mean change [ns] of that height from bin to bin: as large as the mean for jitter of even density, and
-  /// blind to a step of all the later bins.
-  [[nodiscard]] double roughness() const { return roughness_; }
   /// Estimated error [ns] of the line at `time`: error of the fit, plus the possible drift of a clock until
   /// then.
   [[nodiscard]] double uncertainty(Stamp time) const;

@@ -138,8 +138,6 @@ TEST_CASE("A frame arrives as it was sent, with the stamp of its receipt", "[bus
   CanBus receiver;
   REQUIRE(sender.open(settings()).ok());
   REQUIRE(receiver.open(settings()).ok());
-  CHECK(receiver.takesFd());
-  CHECK(receiver.receiveBuffer() >= 1 << 20);
   CHECK(receiver.warning().ok());
   CanFrame sent;
   sent.id = 0x123;
@@ -159,7 +157,6 @@ TEST_CASE("A frame arrives as it was sent, with the stamp of its receipt", "[bus
   CHECK(frame->fast_data);
   CHECK(frame->size == 64);
   CHECK(frame->data == sent.data);
-  CHECK(!frame->hardware);
   CHECK(frame->arrival.ns >= before.ns - 1000);
   CHECK(frame->arrival <= monotonicNow());
 }
@@ -299,7 +296,6 @@ TEST_CASE("An interface that is removed is reported, and taken up when it is the
   seventh.setInterface("vcan7");
   CanBus bus;
   REQUIRE(bus.open(seventh).ok());
-  CHECK(!bus.takesFd());
   seventh.fd = true;
   CanBus fd;
   const DeviceFault classic = fd.open(seventh);
