@@ -77,9 +77,10 @@ Table complaintsTable(const CampaignTable& table) {
 
 std::string comparisonTitle(const CampaignComparison& comparison) {
   const std::size_t logs = comparison.logs.size();
-  std::string text =
-      fmt::format("Beside the earlier campaign: {}; {:.3f} times the ATE over {} logs, smaller on {}",
-                  comparison.verdict(), comparison.mean_ratio, logs, comparison.smaller);
+  std::string text = fmt::format("Beside the earlier campaign: {}; ", comparison.verdict());
+  if (logs == 0) return text + "no log has an ATE in both";
+  text += fmt::format("{:.3f} times the ATE over {} logs, smaller on {}", comparison.mean_ratio, logs,
+                      comparison.smaller);
   if (comparison.low > 0) {
     text += fmt::format("; 95 % interval {:.3f} to {:.3f}", comparison.low, comparison.high);
   }
@@ -215,8 +216,8 @@ Json comparisonJson(const CampaignComparison& comparison) {
                     {"beyond_spread", log.beyond_spread ? Json(*log.beyond_spread) : Json(nullptr)}});
   }
   return {{"verdict", comparison.verdict()},
-          {"mean_ratio", comparison.mean_ratio},
-          {"interval_95", {comparison.low, comparison.high}},
+          {"mean_ratio", comparison.logs.empty() ? Json(nullptr) : Json(comparison.mean_ratio)},
+          {"interval_95", comparison.low > 0 ? Json{comparison.low, comparison.high} : Json(nullptr)},
           {"smaller", comparison.smaller},
           {"logs", logs},
           {"lost", comparison.lost},

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <random>
 
 namespace swiftlet {
@@ -47,17 +46,19 @@ CampaignLine lineOf(const CampaignLog& log, int repeats, std::span<const Campaig
   line.log = log.name;
   line.asked = repeats;
   std::vector<const CampaignRow*> own;
+  std::vector<const CampaignRow*> done;
   for (const CampaignRow& row : rows) {
     if (row.log != log.name) continue;
     own.push_back(&row);
-    if (row.outcome == CampaignOutcome::kDone) ++line.done;
+    if (row.outcome == CampaignOutcome::kDone) done.push_back(&row);
     if (row.outcome == CampaignOutcome::kFailed) ++line.failed;
     if (row.outcome == CampaignOutcome::kAborted) ++line.aborted;
     if (!row.says.empty() && std::find(line.says.begin(), line.says.end(), row.says) == line.says.end()) {
       line.says.push_back(row.says);
     }
   }
-  line.accuracy = overRuns(own, &CampaignRow::accuracy, accuracyFigures().size());
+  line.done = static_cast<int>(done.size());
+  line.accuracy = overRuns(done, &CampaignRow::accuracy, accuracyFigures().size());
   line.costs = overRuns(own, &CampaignRow::costs, costFigures().size());
   return line;
 }
@@ -78,8 +79,6 @@ void addInterval(CampaignComparison& comparison) {
   double sum = 0;
   for (const double one : logs) sum += one;
   comparison.mean_ratio = std::exp(sum / count);
-  comparison.low = 0;
-  comparison.high = std::numeric_limits<double>::infinity();
   if (logs.size() < kFewestForInterval) return;
   std::mt19937_64 random(1);  // the same rows give the same interval
   std::vector<double> means;
@@ -109,11 +108,7 @@ CampaignTable campaignTable(const Campaign& campaign, std::span<const CampaignRo
 }
 
 std::string CampaignComparison::verdict() const {
-  if (!lost.empty() || !won.empty()) {
-    if (won.empty()) return "worse";
-    if (lost.empty() && low <= 1) return "better";
-    return "no difference shown";
-  }
+  if (!lost.empty()) return "worse";
   if (high < 1) return "better";
   return low > 1 ? "worse" : "no difference shown";
 }

@@ -3,6 +3,7 @@
 // compared.
 
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -20,8 +21,8 @@ struct CampaignLine {
   int done = 0;
   int failed = 0;
   int aborted = 0;
-  std::vector<ErrorStatistics> accuracy;  ///< over the repeats that have it, of each of accuracyFigures()
-  std::vector<ErrorStatistics> costs;     ///< likewise
+  std::vector<ErrorStatistics> accuracy;  ///< over the done runs that have it, of each of accuracyFigures()
+  std::vector<ErrorStatistics> costs;     ///< over all runs that have it, of each of costFigures()
   std::vector<std::string> says;          ///< of failed and aborted runs, each once
 
   [[nodiscard]] int missing() const { return asked - done - failed - aborted; }
@@ -56,10 +57,11 @@ struct CampaignComparison {
   std::vector<std::string> won;   ///< that have one now only
   std::size_t smaller = 0;        ///< logs with a smaller ATE now
   double mean_ratio = 1;          ///< geometric mean over the logs
-  double low = 1;                 ///< 95 % interval of mean_ratio, by bootstrap over the logs
-  double high = 1;
+  /// 95 % interval of mean_ratio, by bootstrap over the logs; 0 to infinity: too few logs.
+  double low = 0;
+  double high = std::numeric_limits<double>::infinity();
 
-  /// "better", "worse" or "no difference shown": by the interval, and by logs lost or won.
+  /// "better", "worse" or "no difference shown": by the interval; with a lost log "worse".
   [[nodiscard]] std::string verdict() const;
 };
 

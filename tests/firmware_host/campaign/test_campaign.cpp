@@ -159,6 +159,27 @@ TEST_CASE("a log's line has the spread over its repeats, what failed and what is
   CHECK_FALSE(table.isWhole());
 }
 
+TEST_CASE("figures are those of done runs: a campaign that fails on every log is worse") {
+  const CampaignTable before = tableOf({0.010, 0.020, 0.030});
+  std::vector<CampaignRow> failed;
+  for (const char* log : {"a", "b", "c"}) {
+    failed.push_back(row(log, 0, 0.001));
+    failed.back().outcome = CampaignOutcome::kFailed;
+  }
+  const CampaignTable now = campaignTable(campaignOf({"a", "b", "c"}, 1), failed);
+  CHECK(now.accuracy.front().count == 0);
+  const CampaignComparison comparison = compareCampaigns(before, now);
+  CHECK(comparison.lost == std::vector<std::string>{"a", "b", "c"});
+  CHECK(comparison.verdict() == "worse");
+  const Logs logs;
+  writeCampaign({now, failed, comparison}, logs.folder());
+  CHECK_THAT(textOf(logs.folder() / "table.md"),
+             Contains("Beside the earlier campaign: worse; no log has an ATE in both\n"));
+  const auto json = nlohmann::json::parse(textOf(logs.folder() / "table.json"))["comparison"];
+  CHECK(json["mean_ratio"].is_null());
+  CHECK(json["interval_95"].is_null());
+}
+
 TEST_CASE("two campaigns: better, worse, or no difference shown") {
   const CampaignTable before = tableOf({0.010, 0.020, 0.030, 0.040, 0.050});
   const CampaignComparison same = compareCampaigns(before, before);
@@ -185,7 +206,15 @@ TEST_CASE("a log that has no figure any more makes a campaign worse") {
   CHECK(comparison.lost == std::vector<std::string>{"d"});
   CHECK(comparison.mean_ratio == Approx(0.5));
   CHECK(comparison.verdict() == "worse");
-  CHECK(compareCampaigns(now, before).won == std::vector<std::string>{"d"});
+  // Logs that were won do not outweigh one that was lost.
+  CHECK(compareCampaigns(tableOf({0.010, 0.020, 0.030, 0.040, std::nullopt}),
+                         tableOf({0.010, 0.020, std::nullopt, std::nullopt, 0.010}))
+            .verdict() == "worse");
+  // Those that were won alone do not show that the version is better: the interval decides.
+  const CampaignComparison won = compareCampaigns(now, before);
+  CHECK(won.won == std::vector<std::string>{"d"});
+  CHECK(won.verdict() == "worse");
+  CHECK(compareCampaigns(now, tableOf({0.005, 0.010, 0.015, 0.040})).verdict() == "no difference shown");
 }
 
 TEST_CASE("a difference within the spread of the repeats is said to be") {
@@ -306,6 +335,43 @@ TEST_CASE("a campaign repeats what was aborted, and nothing else") {
   request.version = programVersion(request.program);
   CHECK_THROWS_WITH(campaignRows(campaign, request), Contains("was run by swiftlet 1 crc32"));
   CHECK_THROWS_WITH(programVersion("/nowhere/swiftlet"), Contains("does not run: No such file"));
+}
+
+TEST_CASE("a run without a pose has failed, also where the list names the truth") {
+  const Logs logs;
+  Campaign campaign = campaignOf({"poor"}, 1);
+  campaign.folder = logs.folder();
+  campaign.logs.front().truth = logs.folder() / "truth.tum";
+  writeWholeFile(campaign.logs.front().truth, "0 0 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n");
+  CampaignRequest request{logs.folder() / "out", standIn(logs.folder()), "swiftlet", 1};
+  const std::atomic<bool> never{false};
+  for (int i = 0; i < 2; ++i) CHECK(runCampaignJob(campaign, request, campaign.logs.front(), never));
+  CHECK(callsOf(logs.folder(), "poor") == 1);
+  const CampaignTable table = campaignTable(campaign, campaignRows(campaign, request));
+  CHECK(table.lines.front().failed == 1);
+  CHECK(table.lines.front().says == std::vector<std::string>{"health was good too seldom"});
+}
+
+TEST_CASE("repeats keep max_features in its range") {
+  const Logs logs;
+  Campaign campaign = campaignOf({"good_most"}, 6);
+  campaign.folder = logs.folder();
+  CampaignRequest request{logs.folder() / "out", standIn(logs.folder()), "swiftlet", 1};
+  CHECK(runCampaignJob(campaign, request, campaign.logs.front(), {}));
+  const std::string calls = textOf(logs.folder() / "calls");
+  const std::vector<int> features = {395, 399, 393, 391, 389};
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    CHECK_THAT(calls, Contains("good_most." + std::to_string(i + 1) +
+                               " --set frontend.max_features=" + std::to_string(features[i])));
+  }
+}
+
+TEST_CASE("a program that cannot tell its version says why") {
+  const Logs logs;
+  const fs::path program = logs.folder() / "broken";
+  writeWholeFile(program, "#!/bin/sh\necho 'error: libfoo.so is missing'\nexit 2\n");
+  fs::permissions(program, fs::perms::owner_all);
+  CHECK_THROWS_WITH(programVersion(program), Contains("does not run: libfoo.so is missing"));
 }
 
 TEST_CASE("a program beside this one: its end, its output, its stop") {
