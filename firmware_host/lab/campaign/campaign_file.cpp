@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMostRepeats = 1000;
+constexpr int kMostRepeats = 190;  // as many values of frontend.max_features are two apart in its range
 constexpr int kMostSeeds = 100000;
 
 int wholeNumber(const YamlField& field, int least, int most) {

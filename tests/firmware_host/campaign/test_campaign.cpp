@@ -103,6 +103,7 @@ TEST_CASE("a mistake in a campaign's file is named with its line and field") {
   const std::string file = (logs.folder() / "logs.yaml").string();
   const auto [text, said] = GENERATE(table<std::string, std::string>({
       {"repeats: 0\nlogs: [a]\n", ":1: repeats: 0 is not a whole number from 1 to"},
+      {"repeats: 191\nlogs: [a]\n", ":1: repeats: 191 is not a whole number from 1 to 190"},
       {"logs: [a]\nrepeat: 2\n", ":2: repeat: is not known. Known here: repeats, options, logs"},
       {"repeats: 2\n", ":1: logs: missing"},
       {"logs: a\n", ":1: logs: is not a list"},
@@ -277,10 +278,14 @@ if [ "$1" = --version ]; then echo 'swiftlet 1'; exit 0; fi
 echo "$*" | sed "s,$(pwd)/,,g" >>calls
 case $2 in *crash*) kill -SEGV $$ ;; *absent*) echo 'error: no such log'; exit 2 ;; esac
 mkdir -p "$4"
-printf 'frontend:\n  max_features: 120\n' >"$4/settings.yaml"
+features=120
+case $2 in *most*) features=397 ;; esac
+printf 'frontend:\n  max_features: %d\n' $features >"$4/settings.yaml"
+: >"$4/odometry.tum"
 finished=true
 case $2 in *stopped*) finished=false ;; esac
-echo "{\"run\": {\"finished\": $finished}, \"verdict\": {\"share_good\": 0.5},
+echo "{\"run\": {\"finished\": $finished, \"first_image_ns\": 0, \"first_pose_ns\": null},
+  \"verdict\": {\"share_good\": 0.5},
   \"accuracy\": {\"odometry\": {\"all\": {\"se3\": {\"ate_m\": {\"rmse\": 0.25}}}}}}" >"$4/summary.json"
 case $2 in *good*) exit 0 ;; esac
 echo 'error: health was good too seldom'
@@ -315,6 +320,7 @@ TEST_CASE("a campaign repeats what was aborted, and nothing else") {
   CHECK(table.lines[0].done == 3);
   CHECK(table.lines[0].accuracy.front().mean == 0.25);
   CHECK(table.lines[1].failed == 3);
+  CHECK(table.lines[1].accuracy.front().count == 0);
   CHECK(table.lines[1].says == std::vector<std::string>{"health was good too seldom"});
   for (const std::size_t aborted : {2U, 3U, 4U}) CHECK(table.lines[aborted].aborted == 3);
   CHECK_THAT(table.lines[3].says.front(), Contains("ended by signal 11"));
