@@ -37,6 +37,7 @@ std::string accuracyLine(const nlohmann::ordered_json& summary, const char* file
 std::string sameStampsLine(const nlohmann::ordered_json& accuracy) {
   if (!accuracy.contains("map_beside_odometry")) return "";
   const auto& figures = accuracy["map_beside_odometry"]["all"];
+  if (figures["ratio"].is_null()) return "";
   return fmt::format("  map at the same stamps: {:.4f} m, odometry {:.4f} m, ratio {:.2f}\n",
                      figures["map_ate_rmse_m"].get<double>(), figures["odometry_ate_rmse_m"].get<double>(),
                      figures["ratio"].get<double>());

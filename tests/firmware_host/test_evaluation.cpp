@@ -9,6 +9,7 @@
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/lab/evaluation/accuracy.hpp"
+#include "firmware_host/lab/evaluation/accuracy_report.hpp"
 #include "firmware_host/lab/evaluation/common_stamps.hpp"
 #include "firmware_host/lab/evaluation/consistency.hpp"
 #include "firmware_host/lab/evaluation/loop_accuracy.hpp"
@@ -332,6 +333,25 @@ TEST_CASE("no truth at all gives no figures and a status") {
   CHECK(none.pairs == 0);
   CHECK(none.coverage() == 0);
   CHECK(none.absolute.status.code == StatusCode::kInvalidInput);
+}
+
+TEST_CASE("a figure of nothing is not written as 0") {
+  const Trajectory truth = flight(4);
+  for (const std::size_t poses : {1U, 2U}) {
+    const Trajectory few(truth.begin(), truth.begin() + static_cast<long>(poses));
+    const Accuracy accuracy = accuracyOf(few, truth, {});
+    CHECK(accuracy.pairs == poses);
+    CHECK_FALSE(toJson(accuracy).contains("ate_m"));
+    CHECK_THAT(toText("few", accuracy), Catch::Matchers::Contains("fewer than 3 pairs"));
+    CHECK(toJson(compareAtCommonStamps(few, few, truth, {}))["ratio"].is_null());
+  }
+  // Half a second has no interval of one second.
+  const auto json = toJson(accuracyOf(flight(0.5), truth, {}));
+  CHECK(json["ate_m"]["rmse"].get<double>() < 1e-9);
+  CHECK(json["rpe_time"]["translation_m"]["count"] == 0);
+  CHECK(json["rpe_time"]["translation_m"]["rmse"].is_null());
+  CHECK(toJson(Consistency{})["nees_pose_6dof"].is_null());
+  CHECK(toJson(Consistency{})["states"] == 0);
 }
 
 TEST_CASE("loops are judged by the truth at both ends, and survive their file") {

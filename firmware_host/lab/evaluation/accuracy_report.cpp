@@ -8,6 +8,11 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json statisticsJson(const ErrorStatistics& s) {
+  if (s.count == 0) {
+    Json none = {{"count", 0}};
+    for (const char* figure : {"rmse", "mean", "median", "std", "min", "max", "sse"}) none[figure] = nullptr;
+    return none;
+  }
   return {{"rmse", s.rmse}, {"mean", s.mean}, {"median", s.median}, {"std", s.deviation},
           {"min", s.min},   {"max", s.max},   {"sse", s.sse},       {"count", s.count}};
 }
@@ -37,7 +42,7 @@ Json toJson(const Accuracy& accuracy) {
   json["duration_s"] = accuracy.duration;
   json["path_m"] = absolute.path_length;
   if (!absolute.status.ok()) json["note"] = absolute.status.what;
-  if (accuracy.pairs == 0) return json;
+  if (absolute.translation.count == 0) return json;
   json["ate_m"] = statisticsJson(absolute.translation);
   json["ate_axis_rmse_m"] = {absolute.axis_rmse.x(), absolute.axis_rmse.y(), absolute.axis_rmse.z()};
   json["rotation_deg"] = statisticsJson(absolute.rotation);
@@ -57,19 +62,23 @@ Json toJson(const Accuracy& accuracy) {
 }
 
 Json toJson(const Consistency& consistency) {
+  const auto figure = [&](double value) { return consistency.count > 0 ? Json(value) : Json(nullptr); };
   return {{"states", consistency.count},
           {"without_covariance", consistency.without_covariance},
-          {"nees_pose_6dof", consistency.nees_pose},
-          {"nees_rotation_3dof", consistency.nees_rotation},
-          {"nees_position_3dof", consistency.nees_position},
-          {"inside_3_sigma", consistency.inside_3_sigma}};
+          {"nees_pose_6dof", figure(consistency.nees_pose)},
+          {"nees_rotation_3dof", figure(consistency.nees_rotation)},
+          {"nees_position_3dof", figure(consistency.nees_position)},
+          {"inside_3_sigma", figure(consistency.inside_3_sigma)}};
 }
 
 Json toJson(const CommonStamps& map_beside_odometry) {
+  const auto figure = [&](double value) {
+    return map_beside_odometry.pairs < kFewestPairs ? Json(nullptr) : Json(value);
+  };
   return {{"pairs", map_beside_odometry.pairs},
-          {"odometry_ate_rmse_m", map_beside_odometry.reference_rmse},
-          {"map_ate_rmse_m", map_beside_odometry.other_rmse},
-          {"ratio", map_beside_odometry.ratio()}};
+          {"odometry_ate_rmse_m", figure(map_beside_odometry.reference_rmse)},
+          {"map_ate_rmse_m", figure(map_beside_odometry.other_rmse)},
+          {"ratio", figure(map_beside_odometry.ratio())}};
 }
 
 Json toJson(const Revisits& revisits) {
@@ -77,6 +86,7 @@ Json toJson(const Revisits& revisits) {
 }
 
 std::string toText(const CommonStamps& map_beside_odometry) {
+  if (map_beside_odometry.pairs < kFewestPairs) return "  fewer than 3 pairs leave no error to measure\n";
   return fmt::format("  ATE rmse of odometry.tum {:.4f} m, of map.tum {:.4f} m: {:.2f} times  ({} poses)\n",
                      map_beside_odometry.reference_rmse, map_beside_odometry.other_rmse,
                      map_beside_odometry.ratio(), map_beside_odometry.pairs);
@@ -112,14 +122,17 @@ std::string toText(const std::string& title, const Accuracy& accuracy) {
   std::string text = fmt::format("{}: {} of {} poses have truth (gap at most {:g} ms)", title, accuracy.pairs,
                                  accuracy.estimates, accuracy.max_gap.seconds() * 1e3);
   if (accuracy.pairs == 0) return text + ": nothing to compare\n";
+  if (accuracy.pairs < kFewestPairs) return text + ": fewer than 3 pairs leave no error to measure\n";
   text += fmt::format(", {:.1f} s, {:.1f} m\n", accuracy.duration, absolute.path_length);
   text += absoluteText(absolute);
   text +=
       fmt::format("  rotation  rmse {:.3f} deg  max {:.3f}; tilt, unaligned  rmse {:.3f} deg  max {:.3f}\n",
                   absolute.rotation.rmse, absolute.rotation.max, absolute.tilt.rmse, absolute.tilt.max);
-  text += fmt::format("  RPE over {:g} s  rmse {:.4f} m  {:.3f} deg  ({} intervals)\n",
-                      accuracy.over_time.interval, accuracy.over_time.translation.rmse,
-                      accuracy.over_time.rotation.rmse, accuracy.over_time.translation.count);
+  if (accuracy.over_time.translation.count > 0) {
+    text += fmt::format("  RPE over {:g} s  rmse {:.4f} m  {:.3f} deg  ({} intervals)\n",
+                        accuracy.over_time.interval, accuracy.over_time.translation.rmse,
+                        accuracy.over_time.rotation.rmse, accuracy.over_time.translation.count);
+  }
   for (const RelativeError& error : accuracy.over_distance) {
     text += fmt::format("  RPE over {:g} m  mean {:.3f} %  {:.4f} deg/m  ({} segments)\n", error.interval,
                         error.translation.mean, error.rotation.mean, error.translation.count);
@@ -137,7 +150,7 @@ Json toJson(const PositionAccuracy& accuracy) {
   json["duration_s"] = accuracy.duration;
   json["path_m"] = absolute.path_length;
   if (!absolute.status.ok()) json["note"] = absolute.status.what;
-  if (accuracy.pairs == 0) return json;
+  if (absolute.translation.count == 0) return json;
   json["ate_m"] = statisticsJson(absolute.translation);
   json["ate_axis_rmse_m"] = {absolute.axis_rmse.x(), absolute.axis_rmse.y(), absolute.axis_rmse.z()};
   json["scale"] = absolute.alignment.scale;
@@ -149,6 +162,7 @@ std::string toText(const std::string& title, const PositionAccuracy& accuracy) {
       fmt::format("{}: {} of {} positions have an estimate", title, accuracy.pairs, accuracy.positions);
   if (accuracy.shift.ns != 0) text += fmt::format(", shifted by {:+.3f} s", accuracy.shift.seconds());
   if (accuracy.pairs == 0) return text + ": nothing to compare\n";
+  if (accuracy.pairs < kFewestPairs) return text + ": fewer than 3 pairs leave no error to measure\n";
   text += fmt::format(", {:.1f} s, {:.1f} m\n", accuracy.duration, accuracy.absolute.path_length);
   return text + absoluteText(accuracy.absolute);
 }

@@ -31,8 +31,9 @@ Duration fittedShift(const Trajectory& estimate, std::span<const PositionPoint> 
   const AssociationOptions& association = options.accuracy.association;
   const auto rmse = [&](double shift, std::size_t least) {
     const auto pairs = pairsOf(estimate, truth, Duration::fromSeconds(shift), association);
-    if (pairs.empty() || pairs.size() < least) return std::numeric_limits<double>::infinity();
-    return trajectoryError(pairs, options.accuracy.align).translation.rmse;
+    if (pairs.size() < least) return std::numeric_limits<double>::infinity();
+    const ErrorStatistics found = trajectoryError(pairs, options.accuracy.align).translation;
+    return found.count == 0 ? std::numeric_limits<double>::infinity() : found.rmse;
   };
   const int steps = static_cast<int>(std::ceil(options.reach->seconds() / kStep));
   std::size_t most = 0;

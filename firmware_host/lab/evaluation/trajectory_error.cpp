@@ -80,6 +80,10 @@ TrajectoryError trajectoryError(std::span<const PosePair> pairs, AlignKind kind)
   }
   result.status = align(estimate, truth, kind, result.alignment);
   if (result.status.code == StatusCode::kInvalidInput) return result;
+  if (pairs.size() < kFewestPairs) {
+    result.status = {StatusCode::kDegenerate, "alignment: fewer than 3 pairs leave no error to measure"};
+    return result;
+  }
 
   std::vector<double> translation;
   Eigen::Vector3d axis_sum = Eigen::Vector3d::Zero();

@@ -15,6 +15,7 @@
 // gravity's direction, which a visual-inertial estimate knows.
 // Sources: Sturm et al., IROS 2012; Umeyama, PAMI 1991; Zhang, Scaramuzza, IROS 2018.
 
+#include <cstddef>
 #include <span>
 #include <string_view>
 
@@ -42,7 +43,10 @@ struct TrajectoryError {
   double path_length = 0;                               ///< m, of the truth over the pairs
 };
 
-/// kInvalidInput (in `status`) without pairs.
+/// Fewer are always aligned with next to no error: they have no figures.
+constexpr std::size_t kFewestPairs = 3;
+
+/// kInvalidInput (in `status`) without pairs; with fewer than kFewestPairs the alignment alone.
 TrajectoryError trajectoryError(std::span<const PosePair> pairs, AlignKind kind);
 
 }  // namespace swiftlet

@@ -74,6 +74,7 @@ Table accuracyTable(const RunView& view) {
   };
   table.rows = {{"poses", std::to_string(accuracy.estimates)},
                 {"poses with truth", std::to_string(accuracy.pairs)}};
+  if (absolute.translation.count == 0) return table;
   add("path [m]", absolute.path_length);
   add("ATE rmse [m]", absolute.translation.rmse);
   add("ATE median [m]", absolute.translation.median);
@@ -82,8 +83,10 @@ Table accuracyTable(const RunView& view) {
     add(fmt::format("ATE rmse, {} [m]", "xyz"[axis]), absolute.axis_rmse[axis]);
   add("attitude rmse [deg]", absolute.attitude.rmse);
   add("attitude max [deg]", absolute.attitude.max);
-  add(fmt::format("RPE over {:g} s [m]", accuracy.over_time.interval), accuracy.over_time.translation.rmse);
-  add(fmt::format("RPE over {:g} s [deg]", accuracy.over_time.interval), accuracy.over_time.rotation.rmse);
+  if (accuracy.over_time.translation.count > 0) {
+    add(fmt::format("RPE over {:g} s [m]", accuracy.over_time.interval), accuracy.over_time.translation.rmse);
+    add(fmt::format("RPE over {:g} s [deg]", accuracy.over_time.interval), accuracy.over_time.rotation.rmse);
+  }
   for (const RelativeError& error : accuracy.over_distance) {
     add(fmt::format("RPE over {:g} m [%]", error.interval), error.translation.mean);
     add(fmt::format("RPE over {:g} m [deg/m]", error.interval), error.rotation.mean);
