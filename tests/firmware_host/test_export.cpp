@@ -141,6 +141,23 @@ TEST_CASE("TUM files have eight columns and the run's rows", "[export]") {
   CHECK_FALSE(std::filesystem::exists(tum + "/truth.tum"));
 }
 
+TEST_CASE("TUM files are not written over another run, and old ones stay until all are written", "[export]") {
+  const ExportedRun exported;
+  const std::string other = exported.folder.file("other");
+  std::filesystem::create_directories(other);
+  for (const char* mark : {"/swiftlet_run.txt", "/summary.json"}) {
+    std::ofstream(other + "/map.tum") << "theirs";
+    std::ofstream(other + mark) << "";
+    CHECK(run({"export", exported.run, "--tum", other}) == kExitBadInput);
+    CHECK(textOf(other + "/map.tum") == "theirs");
+    std::filesystem::remove(other + mark);
+  }
+  std::ofstream(other + "/truth.tum") << "theirs";
+  std::filesystem::create_directories(other + "/keyframes.tum/in_the_way");
+  CHECK(run({"export", exported.run, "--tum", other, "--no-truth"}) == kExitBadInput);
+  CHECK(std::filesystem::exists(other + "/truth.tum"));
+}
+
 TEST_CASE("damaged and missing files of a run are named", "[export]") {
   const ExportedRun exported;
   const std::string tum = exported.folder.file("tum");

@@ -1,5 +1,6 @@
 #include "firmware_host/lab/export/tum_files.hpp"
 
+#include <algorithm>
 #include <filesystem>
 
 #include "drivers/input/input_error.hpp"
@@ -20,6 +21,11 @@ void makeFolder(const fs::path& folder, const fs::path& run) {
   if (fs::equivalent(folder, run, error)) {
     throw InputError(folder, 0, "", "is the run folder itself", "Give another folder with --tum");
   }
+  for (const char* mark : {"swiftlet_run.txt", "summary.json"}) {
+    if (!fs::exists(folder / mark)) continue;
+    throw InputError(folder, 0, mark, "belongs to another run, whose trajectories would be overwritten",
+                     "Give another folder with --tum");
+  }
 }
 
 }  // namespace
@@ -30,10 +36,6 @@ std::vector<std::string> writeTumFiles(const RunFolder& run, const Trajectory& t
   const fs::path to(folder);
   makeFolder(to, from);
   std::error_code error;
-  for (const char* name :
-       {"odometry.tum", "trajectory.tum", "imu_rate.tum", "map.tum", "keyframes.tum", "truth.tum"}) {
-    fs::remove(to / name, error);
-  }
   std::vector<std::string> written;
   const auto copy = [&](const std::string& name, const Trajectory& read) {
     if (read.empty()) return;
@@ -66,6 +68,10 @@ std::vector<std::string> writeTumFiles(const RunFolder& run, const Trajectory& t
     }
     file.commit();
     written.emplace_back("truth.tum");
+  }
+  for (const char* name :
+       {"odometry.tum", "trajectory.tum", "imu_rate.tum", "map.tum", "keyframes.tum", "truth.tum"}) {
+    if (std::ranges::find(written, name) == written.end()) fs::remove(to / name, error);
   }
   return written;
 }

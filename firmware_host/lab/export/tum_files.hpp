@@ -10,8 +10,8 @@ namespace swiftlet {
 
 /// Writes into `folder`, which is made: the run's own TUM files byte for byte (odometry.tum or
 /// trajectory.tum, map.tum, imu_rate.tum), keyframes.tum from states.csv, truth.tum from `truth` (none where
-/// it is empty). Files of these names that the run has no part for are removed. Gives the names written.
-/// InputError where a file cannot be written, and for a folder that is the run itself.
+/// it is empty). Files of these names that the run has no part for are removed once all are written. Gives
+/// the names written. InputError where a file cannot be written, and for a folder that is a run.
 std::vector<std::string> writeTumFiles(const RunFolder& run, const Trajectory& truth,
                                        const std::string& folder);
 
