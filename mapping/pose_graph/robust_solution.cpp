@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 
 namespace swiftlet {
 namespace {
@@ -12,7 +13,22 @@ Status copyPoses(const PoseGraph<Pose>& graph, const std::vector<std::uint32_t>&
   for (std::size_t k = 0; k < graph.poses.size(); ++k) {
     if (const Status status = addNextPose(graph, steps, robust); !status.ok()) return status;
   }
+  // A component lies where its first fixed pose is; each further one is where the graph has it.
+  std::vector<std::optional<Pose>> T_graph_component(robust.odometry().components());
   for (const std::uint32_t pose : fixed) {
+    if (pose >= robust.size()) return {StatusCode::kInvalidInput, "no such pose to hold"};
+    auto& T = T_graph_component[robust.odometry().component(pose)];
+    if (!T) T = graph.poses[pose] * robust.pose(pose).inverse();
+  }
+  for (std::uint32_t k = 0; k < robust.size(); ++k) {
+    const auto& T = T_graph_component[robust.odometry().component(k)];
+    // Also begins a solution where no loop does.
+    if (const Status status = robust.setPose(k, T ? *T * robust.pose(k) : robust.pose(k)); !status.ok()) {
+      return status;
+    }
+  }
+  for (const std::uint32_t pose : fixed) {
+    if (const Status status = robust.setPose(pose, graph.poses[pose]); !status.ok()) return status;
     if (const Status status = robust.hold(pose); !status.ok()) return status;
   }
   return okStatus();

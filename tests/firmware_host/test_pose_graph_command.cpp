@@ -235,6 +235,37 @@ TEST_CASE("bad graphs are named by file, line, field and remedy, and leave nothi
   CHECK(run({"pose-graph", request.file, "--start", "elsewhere"}) == kExitBadInput);
 }
 
+TEST_CASE("--robust keeps fixed poses where the file has them") {
+  const ScratchFolder folder("pose_graph_fixed");
+  PoseGraphRequest request;
+  request.file = folder.file("in.g2o");
+  request.out = folder.file("out.g2o");
+  request.robust = true;
+  std::string walk;
+  for (int k = 0; k < 10; ++k) {
+    walk += "VERTEX_SE2 " + std::to_string(k) + " 5 " + std::to_string(k) + " 1.5\n";
+    if (k > 0) {
+      walk += "EDGE_SE2 " + std::to_string(k - 1) + " " + std::to_string(k) + " 1.1 0 0 100 0 0 100 0 1000\n";
+    }
+  }
+  write(request.file, walk + "FIX 4\nFIX 9\n");
+  const PoseGraphResult result = runPoseGraph(request);
+  CHECK(result.solve.converged);
+  const PoseGraph<SE2> solved = readG2oFile(request.out).graph.plane;
+  for (const std::size_t fixed : {4U, 9U}) {
+    CHECK(solved.poses[fixed].translation.x() == 5);
+    CHECK(solved.poses[fixed].translation.y() == static_cast<double>(fixed));
+  }
+  // The rest of the piece follows: backwards from the first fixed pose, spread between both.
+  CHECK(std::abs(solved.poses[0].translation.y() - (4 - 4.4 * std::sin(1.5))) < 0.3);
+  CHECK(solved.poses[6].translation.y() == Approx(6).margin(0.1));
+
+  write(request.file, walk);
+  const PoseGraphResult none = runPoseGraph(request);
+  CHECK(none.solve.converged);
+  CHECK(none.solve.final_cost < 1e-12);
+}
+
 TEST_CASE("a graph in pieces is solved piece by piece, with a warning") {
   const ScratchFolder folder("pose_graph_pieces");
   PoseGraphRequest request;
