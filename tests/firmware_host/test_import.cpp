@@ -200,6 +200,28 @@ TEST_CASE("a phone's folder becomes a log with the stamps of its lines", "[impor
   CHECK(fs::exists(request.out + "/mav0/imu0/data.csv"));
 }
 
+TEST_CASE("a phone's log without times of its images is refused", "[import]") {
+  const ScratchFolder scratch("import_no_frames");
+  fs::create_directories(scratch.file("phone"));
+  std::ofstream(scratch.file("phone") + "/data.mp4") << "";
+  std::ofstream lines(scratch.file("phone") + "/data.jsonl");
+  for (int i = 0; i < 30; ++i) {
+    lines << R"({"sensor":{"type":"gyroscope","values":[0.1,0.2,0.3]},"time":)" << i << "}\n"
+          << R"({"sensor":{"type":"accelerometer","values":[0,0,9.8]},"time":)" << i << "}\n";
+  }
+  lines.close();
+  ImportRequest request;
+  request.video = scratch.file("phone");
+  request.out = scratch.file("log");
+  try {
+    (void)importVideo(request);
+    FAIL("images without times were imported");
+  } catch (const InputError& error) {
+    CHECK(std::string(error.what()).find("data.jsonl: frames: has no times of the images of data.mp4") !=
+          std::string::npos);
+  }
+}
+
 TEST_CASE("what cannot be imported is named, and nothing is left", "[import]") {
   const std::optional<std::string> video = karmaFile("karma.mp4");
   if (!video) return;

@@ -39,6 +39,12 @@ Recording phoneRecording(const fs::path& folder) {
     for (const char* extension : {".mp4", ".mov", ".avi", ".mkv"}) {
       const fs::path video = folder / (stem + extension);
       if (!fs::exists(video) || recording.videos.size() != camera) continue;
+      if (log.images[camera].empty()) {
+        throw InputError(files->name("data.jsonl"), 0, "frames",
+                         "has no times of the images of " + video.filename().string(),
+                         "Record again with an app that logs `frames` lines, or give the samples as csv: "
+                         "`swiftlet import VIDEO IMU.csv`");
+      }
       recording.videos.push_back(video.string());
       recording.stamps[camera] = log.images[camera];
     }
