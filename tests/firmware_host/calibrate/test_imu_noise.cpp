@@ -220,5 +220,46 @@ TEST_CASE("Motion, holes and jitter in a log at rest") {
   CHECK_THROWS_AS(measureImuNoise(folder.file("none.csv")), InputError);
 }
 
+TEST_CASE("A hole at the start of a log does not change its rate") {
+  const ScratchFolder folder("imu_noise_hole");
+  {
+    CsvLog csv(folder.file("still.csv"), 200);
+    SixAxes axis(11, 200, kConsumer);
+    for (int i = 0; i < 200 * 60; ++i) {
+      if (i == 1000) csv.skip(200 * 100);
+      csv.add(axis.next());
+    }
+  }
+  const ImuNoiseResult result = measureImuNoise(folder.file("still.csv"));
+  CHECK(result.rate_hz == Approx(200).epsilon(1e-6));
+  CHECK(result.holes == 1);
+}
+
+TEST_CASE("Wrong stamps and dead axes are refused") {
+  const ScratchFolder folder("imu_noise_faults");
+  const std::string path = folder.file("still.csv");
+  const auto complaint = [&path](bool jump, bool dead) {
+    {
+      CsvLog csv(path, 200);
+      SixAxes axis(11, 200, kConsumer);
+      for (int i = 0; i < 200 * 60; ++i) {
+        if (jump && i == 5) csv.skip(200 * 86400 * 11);
+        ImuSix reading = axis.next();
+        if (dead) reading[1] = 0.001;
+        csv.add(reading);
+      }
+    }
+    try {
+      static_cast<void>(measureImuNoise(path));
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  CHECK_THAT(complaint(true, false),
+             Catch::Contains(path + ": timestamp: jumps from 1000000000.020 to 1000950400.025 s"));
+  CHECK_THAT(complaint(false, true), Catch::Contains(path + ": gyro y: never changes"));
+}
+
 }  // namespace
 }  // namespace swiftlet

@@ -17,8 +17,9 @@ namespace {
 
 constexpr std::size_t kProbed = 4000;  // samples that tell rate and units
 constexpr double kHolePeriods = 10;
-constexpr double kLeastRest = 10;    // s: clusters of 1 s are seen ten times
-constexpr double kMostMotion = 0.5;  // of the log
+constexpr double kLongestLog = 10 * 86400;  // s
+constexpr double kLeastRest = 10;           // s: clusters of 1 s are seen ten times
+constexpr double kMostMotion = 0.5;         // of the log
 constexpr std::size_t kMotionLines = 8;
 constexpr std::array<const char*, 6> kNames = {"gyro x", "gyro y", "gyro z", "accel x", "accel y", "accel z"};
 
@@ -28,26 +29,50 @@ ImuSix six(const ImuSample& sample) {
   return reading;
 }
 
-/// Mean time between samples, without holes: jitter cancels.
+/// Mean time between samples, without holes: jitter cancels. The median of the first says what a hole is.
 class Periods {
  public:
   void add(Stamp stamp) {
-    if (last_) {
-      const double dt = (stamp - *last_).seconds();
-      if (count_ < kProbed || dt < kHolePeriods * mean()) {
-        sum_ += dt;
-        ++count_;
-      }
-    }
+    if (last_) waiting_.push_back((stamp - *last_).seconds());
     last_ = stamp;
+    if (waiting_.size() == kProbed) count();
   }
-  [[nodiscard]] double mean() const { return sum_ / static_cast<double>(std::max<std::size_t>(count_, 1)); }
+  double mean() {
+    count();
+    return sum_ / static_cast<double>(std::max<std::size_t>(count_, 1));
+  }
 
  private:
+  void count() {
+    if (median_ == 0 && !waiting_.empty()) {
+      const auto middle = waiting_.begin() + static_cast<std::ptrdiff_t>(waiting_.size() / 2);
+      std::ranges::nth_element(waiting_, middle);
+      median_ = *middle;
+    }
+    for (const double dt : waiting_) {
+      if (dt >= kHolePeriods * median_) continue;
+      sum_ += dt;
+      ++count_;
+    }
+    waiting_.clear();
+  }
+
   std::optional<Stamp> last_;
+  std::vector<double> waiting_;
+  double median_ = 0;
   double sum_ = 0;
   std::size_t count_ = 0;
 };
+
+/// Blocks of a span that no log has would fill the memory.
+void checkSpan(const std::string& log, const std::vector<ImuSample>& probe, Stamp last, Stamp stamp) {
+  if ((stamp - probe.front().stamp).seconds() < kLongestLog) return;
+  throw InputError(
+      log, 0, "timestamp",
+      fmt::format("jumps from {:.3f} to {:.3f} s; a log is shorter than {:.0f} days",
+                  Duration{last.ns}.seconds(), Duration{stamp.ns}.seconds(), kLongestLog / 86400),
+      "Remove the rows with the wrong stamps");
+}
 
 std::string axesText(const std::vector<int>& axes) {
   std::string text;
@@ -127,10 +152,13 @@ ImuNoiseResult measureImuNoise(const std::string& log) {
   StillSpans spans;
   Periods periods;
   std::vector<ImuSample> probe;
+  Stamp newest;
   eachImuSample(
       log,
       [&](const ImuSample& sample) {
         if (probe.size() < kProbed) probe.push_back(sample);
+        checkSpan(log, probe, newest, sample.stamp);
+        newest = sample.stamp;
         periods.add(sample.stamp);
         spans.add(sample.stamp, six(sample));
       },
@@ -174,6 +202,12 @@ ImuNoiseResult measureImuNoise(const std::string& log) {
   result.points = variance.points();
   for (int axis = 0; axis < 6; ++axis) {
     result.axis[static_cast<std::size_t>(axis)] = fitNoise(result.points, axis);
+  }
+  const auto dead =
+      axesWhere([&result](int i) { return !(result.axis[static_cast<std::size_t>(i)].density.value > 0); });
+  if (!dead.empty()) {
+    throw InputError(log, 0, axesText(dead), "never changes at rest: noise cannot be measured",
+                     "Check the sensor and its driver, or choose a smaller measurement range");
   }
   addRemarks(result);
   return result;
