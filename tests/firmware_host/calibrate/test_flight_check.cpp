@@ -4,15 +4,19 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <string>
 
 #include "drivers/calibration/calibration.hpp"
+#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/track_file.hpp"
 #include "drivers/simulated/folder_writer.hpp"
 #include "estimator/geometry/so3.hpp"
+#include "firmware_host/files/run_claim.hpp"
 #include "firmware_host/lab/calibrate/check/check_run.hpp"
 #include "firmware_host/outputs/run_folder/calibration_files.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
@@ -43,6 +47,19 @@ const CheckedValue& valueOf(const CheckResult& result, const std::string& name) 
   }
   FAIL("no value " << name);
   return result.values.front();
+}
+
+TEST_CASE("The run of a check does not replace a flight") {
+  const ScratchFolder scratch("check_of_flight");
+  CheckRequest request;
+  request.log = scratch.file("log");
+  fly(request.log, 2, 77);
+  request.out = scratch.file("flight");
+  { const RunClaim flown(request.out, RunKind::kFlight, false); }
+  const std::string states = request.out + "/states.csv";
+  std::ofstream(states) << "of the flight";
+  CHECK_THROWS_WITH(checkCalibration(request, Settings{}), Catch::Contains("already holds a flight"));
+  CHECK(test::textOf(states) == "of the flight");
 }
 
 TEST_CASE("A flight says what a calibration is off by") {

@@ -346,7 +346,6 @@ CheckResult checkCalibration(const CheckRequest& request, Settings settings) {
   ReplayRequest replay;
   static_cast<LogRequest&>(replay) = request;
   replay.out = place.path();
-  replay.replace = true;
   static_cast<void>(runReplay(replay, settings));
   const std::string path = (fs::path(place.path()) / kKeyframeFile).string();
   std::ifstream in(path, std::ios::binary);
