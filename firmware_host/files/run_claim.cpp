@@ -29,6 +29,9 @@ constexpr std::array kRunFiles = {"odometry.tum", "states.csv",    "events.log",
                                   "in_map.tum",   "loops.csv",     "local_mesh.ply",      "map.ply",
                                   "map.glb",      "keyframes.swk", "report.html"};
 constexpr std::array kRunFolders = {"meshes", "recording", "estimated_calibration"};
+constexpr std::array kMeshFiles = {"complete_mesh.ply", "local_mesh.ply", "summary.json", "trajectory.tum"};
+constexpr std::array kMapFiles = {"map.glb", "map.ply", "summary.json", "trajectory.tum"};
+constexpr std::array kPlaceFiles = {"places.csv", "summary.json"};
 constexpr std::size_t kNumberDigits = 6;
 constexpr std::uint32_t kLargestNumber = 999'999;
 /// A board without a battery starts in 1970, or at the date of its image: 2020 and later is taken for set.
@@ -36,7 +39,13 @@ constexpr int kFirstSetYear = 2020;
 constexpr int kTriesForName = 1000;
 constexpr const char* kFlightsRemedy = "Make flights.folder writable, or choose another one";
 
-constexpr const char* word(RunKind kind) { return kind == RunKind::kFlight ? "flight" : "replay"; }
+/// As in the mark; by RunKind.
+constexpr std::array kWords = {"replay", "flight", "mesh", "map", "place_list"};
+
+constexpr const char* word(RunKind kind) { return kWords[static_cast<std::size_t>(kind)]; }
+
+/// With all that the estimator writes.
+constexpr bool isWhole(RunKind kind) { return kind == RunKind::kReplay || kind == RunKind::kFlight; }
 
 bool allDigits(std::string_view text) {
   return !text.empty() && std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });
@@ -48,17 +57,21 @@ bool isNumbered(std::string_view name, std::string_view prefix, std::string_view
          allDigits(name.substr(prefix.size(), name.size() - prefix.size() - suffix.size()));
 }
 
-bool isRunFile(const std::string& name) {
-  return std::ranges::find(kRunFiles, name) != kRunFiles.end() || isNumbered(name, "map_epoch_", ".ply");
+bool isRunFile(const std::string& name, RunKind kind) {
+  const auto in = [&name](const auto& names) { return std::ranges::find(names, name) != names.end(); };
+  if (kind == RunKind::kMesh) return in(kMeshFiles);
+  if (kind == RunKind::kPlaceList) return in(kPlaceFiles);
+  return (kind == RunKind::kMap ? in(kMapFiles) : in(kRunFiles)) || isNumbered(name, "map_epoch_", ".ply");
 }
 
 /// The first thing of a run's names; empty: none.
-std::string firstRunFile(const fs::path& folder) {
+std::string firstRunFile(const fs::path& folder, RunKind kind) {
   std::string first;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
-    const bool of_run = isRunFile(name) || std::ranges::find(kRunFolders, name) != kRunFolders.end();
+    const bool of_run = isRunFile(name, kind) || (kind == RunKind::kMesh && name == "meshes") ||
+                        (isWhole(kind) && std::ranges::find(kRunFolders, name) != kRunFolders.end());
     if (of_run && (first.empty() || name < first)) first = name;
   }
   return first;
@@ -113,12 +126,14 @@ void removeCalibration(const fs::path& folder) {
   ::rmdir(folder.c_str());
 }
 
-void removeEarlierRun(const fs::path& folder) {
-  removeRecording(folder / "recording");
-  removeMeshes((folder / "meshes").string());
-  ::rmdir((folder / "meshes").c_str());
-  removeCalibration(folder / "estimated_calibration");
-  removeFiles(folder, isRunFile);
+void removeEarlierRun(const fs::path& folder, RunKind kind) {
+  if (isWhole(kind)) {
+    removeRecording(folder / "recording");
+    removeMeshes((folder / "meshes").string());
+    ::rmdir((folder / "meshes").c_str());
+    removeCalibration(folder / "estimated_calibration");
+  }
+  removeFiles(folder, [kind](const std::string& name) { return isRunFile(name, kind); });
 }
 
 void makeFolders(const std::string& folder, const char* remedy) {
@@ -130,16 +145,17 @@ void makeFolders(const std::string& folder, const char* remedy) {
 }
 
 void refuseOthers(const std::string& folder, RunKind kind) {
-  constexpr const char* kRemedy = "Give another folder with --out, or --replace to overwrite these files";
+  constexpr const char* kRemedy =
+      "Give another folder with --out; `replay` and `fly` overwrite these files with --replace";
   const std::optional<RunKind> held = runKindOf(folder);
-  if (held == RunKind::kFlight || (held && kind == RunKind::kFlight)) {
+  if (held && (*held != kind || kind == RunKind::kFlight)) {
     throw InputError(folder, 0, "", fmt::format("already holds a {}", word(*held)), kRemedy);
   }
   if (held) return;
-  const std::string file = firstRunFile(folder);
+  const std::string file = firstRunFile(folder, kind);
   if (file.empty()) return;
-  throw InputError(folder, 0, "", fmt::format("holds {} but no mark of a replay ({})", file, kRunMark),
-                   kRemedy);
+  throw InputError(folder, 0, "",
+                   fmt::format("holds {} but no mark of a {} ({})", file, word(kind), kRunMark), kRemedy);
 }
 
 /// Number of a flight's folder name; none for any other name.
@@ -197,17 +213,19 @@ std::optional<RunKind> runKindOf(const std::string& folder) {
   std::ifstream file(fs::path(folder) / kRunMark);
   std::string held;
   file >> held;
-  if (held == word(RunKind::kFlight)) return RunKind::kFlight;
-  if (held == word(RunKind::kReplay)) return RunKind::kReplay;
-  return std::nullopt;
+  const auto* const found = std::ranges::find(kWords, held);
+  if (found == kWords.end()) return std::nullopt;
+  return static_cast<RunKind>(found - kWords.begin());
 }
 
-void refuseRunIn(const std::string& folder) { refuseOthers(folder, RunKind::kFlight); }
+void refuseRunIn(const std::string& folder, RunKind kind) {
+  refuseOthers(folder, kind);
+}
 
 RunClaim::RunClaim(const std::string& folder, RunKind kind, bool replace) {
   makeFolders(folder, "Give another folder with --out");
   if (!replace) refuseOthers(folder, kind);
-  removeEarlierRun(folder);
+  removeEarlierRun(folder, kind);
   const std::string mark = fs::path(folder) / kRunMark;
   writeWholeFile(mark, fmt::format("{}\n", word(kind)));
   mark_ = ::open(mark.c_str(), O_RDONLY | O_CLOEXEC);

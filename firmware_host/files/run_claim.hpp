@@ -1,10 +1,11 @@
 #pragma once
 // Ownership of a run folder, and which files may be removed from it.
 //
-// A run writes `swiftlet_run.txt` into its folder, with the word "replay" or "flight". A later replay
-// replaces the files of an earlier one. Files of a flight, and files with a run's names in a folder without
-// that mark, are replaced only on request. Only files with the names of a run's files are ever removed; other
-// files in the folder stay. Errors: InputError with the folder or file, the reason and the remedy. Host side.
+// A run writes `swiftlet_run.txt` into its folder, with the kind of the run as a word. A later run replaces
+// the files of an earlier one of its kind. Files of a flight or of another kind, and files with a run's names
+// in a folder without that mark, are replaced only on request. Only files with
+// the names of a run's files are ever removed; other files in the folder stay. Errors: InputError with the
+// folder or file, the reason and the remedy. Host side.
 
 #include <cstdint>
 #include <ctime>
@@ -14,21 +15,23 @@
 
 namespace swiftlet {
 
-enum class RunKind { kReplay, kFlight };
+/// The last three are of `swiftlet mesh`, `fuse` and `place`.
+enum class RunKind { kReplay, kFlight, kMesh, kMap, kPlaceList };
 
 inline constexpr const char* kRunMark = "swiftlet_run.txt";
 
 /// The mark in a folder; none: not a run of this program, or one from before there was a mark.
 std::optional<RunKind> runKindOf(const std::string& folder);
 
-/// InputError if the folder holds a run's mark or files of a run's names. Nothing is made or changed.
-void refuseRunIn(const std::string& folder);
+/// InputError if a run of this kind must not be written to the folder. Nothing is made or changed.
+void refuseRunIn(const std::string& folder, RunKind kind = RunKind::kFlight);
 
 /// A folder that belongs to one run until this goes: a flight's is not deleted to free space meanwhile.
 class RunClaim {
  public:
   /// Makes the folder (its parents too) and removes what an earlier run left. A flight refuses a folder with
-  /// a run in it, a replay one with a flight or with foreign files of a run's names, unless `replace`.
+  /// a run in it, other kinds one with a run of another kind or with foreign files of their names, unless
+  /// `replace`.
   RunClaim(const std::string& folder, RunKind kind, bool replace);
   RunClaim(const RunClaim&) = delete;
   RunClaim& operator=(const RunClaim&) = delete;

@@ -137,6 +137,22 @@ TEST_CASE("mesh writes what the run folder promises, from real images") {
   }
 }
 
+TEST_CASE("mesh, fuse and place overwrite their own files only") {
+  const ScratchFolder folder("modules");
+  const std::string summary = folder.file("summary.json");
+  std::ofstream(summary) << "not theirs";
+  for (const char* command : {"mesh", "fuse", "place"}) {
+    INFO(command);
+    CHECK(run({command, recordedLog(), "--out", folder.path()}) == kExitBadInput);
+    CHECK(textOf(summary) == "not theirs");
+    fs::create_directories(folder.file("flight"));
+    std::ofstream(folder.file("flight/swiftlet_run.txt")) << "flight\n";
+    CHECK(run({command, recordedLog(), "--out", folder.file("flight")}) == kExitBadInput);
+    CHECK_FALSE(fs::exists(folder.file("flight/summary.json")));
+    CHECK(textOf(folder.file("flight/swiftlet_run.txt")) == "flight\n");
+  }
+}
+
 TEST_CASE("replay leaves its newest mesh in the run folder, and all of them on request") {
   const ScratchFolder folder("replay_meshes");
   const std::string out = folder.file("run");

@@ -10,6 +10,7 @@
 #include "drivers/recorded/label_images.hpp"
 #include "estimator/core/units.hpp"
 #include "firmware_host/files/line_file.hpp"
+#include "firmware_host/files/run_claim.hpp"
 #include "firmware_host/outputs/map_files/block_file.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"
 #include "firmware_host/outputs/map_files/map_output.hpp"
@@ -85,6 +86,7 @@ class FuseRun {
   LabelImages labels_;
   BlockFile storage_{request_.out};
   std::unique_ptr<MapStage> map_;
+  std::optional<RunClaim> claim_;
   std::optional<TumWriter> poses_out_;
   std::optional<KeptMapReport> continued_;
   MapReport report_;
@@ -98,6 +100,7 @@ class FuseRun {
 };
 
 void FuseRun::begin() {
+  refuseRunIn(request_.out, RunKind::kMap);
   checkMovingLabels(settings_.map_stage);
   const std::optional<ConfusionModel> confusion = confusionOf(settings_);
   log_.poses().warnOfJumps("the map starts anew after each", log_.warnings());
@@ -170,7 +173,7 @@ void FuseRun::fuse(Stamp stamp, const StereoFrame* frame, const DepthImageView& 
     return;
   }
   if (!poses_out_) {
-    std::filesystem::create_directories(request_.out);
+    claim_.emplace(request_.out, RunKind::kMap, false);
     poses_out_.emplace(file("trajectory.tum"));
   }
   poses_out_->write(stamp, pose->T_world_body);

@@ -7,6 +7,7 @@
 #include "estimator/core/units.hpp"
 #include "estimator/frontend/frontend.hpp"
 #include "firmware_host/files/line_file.hpp"
+#include "firmware_host/files/run_claim.hpp"
 #include "firmware_host/lab/modules/given_pose_window.hpp"
 #include "firmware_host/outputs/map_files/mesh_files.hpp"
 #include "firmware_host/outputs/map_files/ply_file.hpp"
@@ -97,13 +98,10 @@ class MeshRun {
   /// Files that come into being with the first frame that has a pose.
   struct Output {
     explicit Output(const std::filesystem::path& folder)
-        : meshes(folder.string()), poses((folder / "trajectory.tum").string()) {
-      // What an earlier run left and this one does not write would be taken for this one's.
-      std::error_code ignored;
-      for (const char* name : {"local_mesh.ply", "complete_mesh.ply", "summary.json"}) {
-        std::filesystem::remove(folder / name, ignored);
-      }
-    }
+        : claim(folder.string(), RunKind::kMesh, false),
+          meshes(folder.string()),
+          poses((folder / "trajectory.tum").string()) {}
+    RunClaim claim;
     MeshSequenceWriter meshes;
     TumWriter poses;
   };
@@ -139,6 +137,7 @@ class MeshRun {
 };
 
 void MeshRun::begin() {
+  refuseRunIn(request_.out, RunKind::kMesh);
   log_.poses().warnOfJumps("a new mesh starts after each", log_.warnings());
   if (!log_.hasTracks()) frontend_ = std::make_unique<Frontend>(rig_, FrontendSettings{});
   labels_.emplace(request_.log, ImageSize{rig_.camera[0].width(), rig_.camera[0].height()}, log_.warnings());

@@ -8,6 +8,7 @@
 #include "estimator/core/units.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/files/line_file.hpp"
+#include "firmware_host/files/run_claim.hpp"
 #include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
 #include "firmware_host/lab/modules/place_images.hpp"
 #include "firmware_host/lab/modules/place_tally.hpp"
@@ -65,6 +66,7 @@ class PlaceRun {
       : request_(request), settings_(settings), vocabulary_(vocabularyOf(request, settings)) {}
 
   PlaceRunResult operator()() {
+    refuseRunIn(request_.out, RunKind::kPlaceList);
     if (isPlainImageFolder(request_.log)) {
       runFolder();
     } else {
@@ -91,6 +93,7 @@ class PlaceRun {
   Json warnings_ = Json::array();
   std::optional<GivenPoses> poses_;
   std::unique_ptr<Stages> stages_;
+  std::optional<RunClaim> claim_;
   std::optional<LineFile> rows_;
   std::optional<GivenPoses::Pose> last_;
   Stamp last_stamp_, first_image_, last_image_;
@@ -188,7 +191,7 @@ void PlaceRun::see(const StereoFrame& frame, const GivenPoses::Pose& pose, const
     stages_ = std::make_unique<Stages>(rig, vocabulary_, databaseSettings(request_, settings_), verifies_);
   }
   if (!rows_) {
-    std::filesystem::create_directories(request_.out);
+    claim_.emplace(request_.out, RunKind::kPlaceList, false);
     rows_.emplace((std::filesystem::path(request_.out) / "places.csv").string());
     rows_->write(placeColumns());
   }
