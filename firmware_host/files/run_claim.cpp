@@ -144,6 +144,15 @@ void makeFolders(const std::string& folder, const char* remedy) {
   }
 }
 
+void refuseLog(const fs::path& folder) {
+  const fs::path path = fs::absolute(folder).lexically_normal();
+  std::error_code error;
+  const bool inside = std::ranges::any_of(path, [](const fs::path& part) { return part == "mav0"; });
+  if (!inside && !fs::exists(path / "mav0", error) && !fs::exists(path / "imu0", error)) return;
+  throw InputError(folder.string(), 0, "", "is a log, and no run is written into one",
+                   "Give another folder with --out");
+}
+
 void refuseOthers(const std::string& folder, RunKind kind) {
   constexpr const char* kRemedy =
       "Give another folder with --out; `replay` and `fly` overwrite these files with --replace";
@@ -219,10 +228,12 @@ std::optional<RunKind> runKindOf(const std::string& folder) {
 }
 
 void refuseRunIn(const std::string& folder, RunKind kind) {
+  refuseLog(folder);
   refuseOthers(folder, kind);
 }
 
 RunClaim::RunClaim(const std::string& folder, RunKind kind, bool replace) {
+  refuseLog(folder);
   makeFolders(folder, "Give another folder with --out");
   if (!replace) refuseOthers(folder, kind);
   removeEarlierRun(folder, kind);

@@ -3,7 +3,7 @@
 //
 // A run writes `swiftlet_run.txt` into its folder, with the kind of the run as a word. A later run replaces
 // the files of an earlier one of its kind. Files of a flight or of another kind, and files with a run's names
-// in a folder without that mark, are replaced only on request. Only files with
+// in a folder without that mark, are replaced only on request. No run is written into a log. Only files with
 // the names of a run's files are ever removed; other files in the folder stay. Errors: InputError with the
 // folder or file, the reason and the remedy. Host side.
 

@@ -120,6 +120,20 @@ TEST_CASE("a flight is replaced by nothing that was not told to", "[files]") {
   CHECK_THROWS_AS(refuseRunIn(folder.path()), InputError);  // a flight spares a replay too
 }
 
+TEST_CASE("no run is written into a log", "[files]") {
+  const ScratchFolder folder("claim");
+  write(folder.file("mav0/imu0/data.csv"));
+  for (const char* place : {".", "mav0", "mav0/", "mav0/imu0"}) {
+    INFO(place);
+    for (const bool replace : {false, true}) {
+      CHECK_THROWS_WITH((RunClaim(folder.file(place), RunKind::kReplay, replace)),
+                        Catch::Contains("is a log"));
+    }
+    CHECK_THROWS_WITH(refuseRunIn(folder.file(place)), Catch::Contains("is a log"));
+  }
+  CHECK(namesIn(folder.path()) == std::set<std::string>{"mav0/imu0/data.csv"});
+}
+
 TEST_CASE("fly refuses a folder with a run before it looks at anything else, unless told to replace it",
           "[files]") {
   const ScratchFolder folder("claim");
