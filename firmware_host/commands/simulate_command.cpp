@@ -89,8 +89,17 @@ void addSessionOptions(CLI::App& command, SimulateOptions& options) {
       ->capture_default_str();
 }
 
+void refuseRealLog(const std::filesystem::path& folder) {
+  using std::filesystem::exists;
+  const bool simulated = exists(folder / "truth/simulation.yaml") || exists(folder / "truth/session.yaml");
+  if (simulated || !exists(folder / "mav0")) return;
+  throw InputError(folder.string(), 0, "--out", "already holds a log that was not simulated",
+                   "Give another --out, or move the log away");
+}
+
 int simulate(const SimulateOptions& options) {
   static_cast<void>(options.settings.read());  // complains about wrong settings as every command does
+  refuseRealLog(options.out);
   SimulationSettings settings = options.simulation;
   settings.imu.vibration.accel_amplitude = options.vibration;
   settings.render.readout = options.readout_ms * 1e-3;

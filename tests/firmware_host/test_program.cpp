@@ -16,6 +16,7 @@
 #include "firmware_host/outputs/run_folder/summary.hpp"
 #include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
@@ -37,6 +38,28 @@ TEST_CASE("exit codes: 0 done, 2 wrong use or bad input") {
   CHECK(run({"settings", "--settings", "no/such/file.yaml"}) == kExitBadInput);
   CHECK(run({"evaluate", "no/such/run"}) == kExitBadInput);
   CHECK(run({"evaluate", "x", "--align", "best"}) == kExitBadInput);
+}
+
+TEST_CASE("simulate overwrites simulated logs only") {
+  const ScratchFolder folder("simulate_over");
+  const std::string real = folder.file("real");
+  std::filesystem::create_directories(real + "/mav0/imu0");
+  const std::string samples = real + "/mav0/imu0/data.csv";
+  std::ofstream(samples) << "of a flight";
+  const std::string board = folder.file("board.yaml");
+  std::ofstream(board) << "target_type: aprilgrid\ntagCols: 6\ntagRows: 6\ntagSize: 0.088\ntagSpacing: 0.3\n";
+  const std::vector<std::vector<std::string>> kinds = {
+      {"--tracks"}, {"--depth-every", "0"}, {"--board", board}};
+  for (const std::vector<std::string>& kind : kinds) {
+    INFO(kind[0]);
+    std::vector<std::string> words = {"simulate", "--duration", "0.3", "--out", real};
+    words.insert(words.end(), kind.begin(), kind.end());
+    CHECK(run(words) == kExitBadInput);
+    CHECK(test::textOf(samples) == "of a flight");
+    words[4] = folder.file(kind[0].substr(2));
+    CHECK(run(words) == kExitDone);
+    CHECK(run(words) == kExitDone);
+  }
 }
 
 TEST_CASE("evaluate compares two files; without common stamps it fails") {
