@@ -125,7 +125,6 @@ class RecordingWriter {
   [[nodiscard]] bool fitsBuffer(std::size_t bytes) const { return filled_ + bytes <= buffer_.size(); }
   WriteResult writeAll(iovec* pieces, std::size_t count) const;
   bool flushBuffer();
-  void takeWritten(std::size_t bytes);
   void loseBuffer(std::size_t written);
   void fail(int error);
   Status refuse(RecordKind kind);

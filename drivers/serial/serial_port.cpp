@@ -88,18 +88,12 @@ DeviceFault SerialPort::configure() {
   return {};
 }
 
-void SerialPort::askLowLatency() {
-  low_latency_ = LowLatency::kNotAsked;
-  if (!settings_.low_latency) return;
-  low_latency_ = LowLatency::kNotOffered;
+/// Not all drivers have it: the port works without.
+void SerialPort::askLowLatency() const {
   serial_struct serial = {};
   if (ioctl(descriptor_, TIOCGSERIAL, &serial) != 0) return;
-  constexpr int kFlag = static_cast<int>(ASYNC_LOW_LATENCY);
-  serial.flags |= kFlag;
-  if (ioctl(descriptor_, TIOCSSERIAL, &serial) != 0) return;
-  serial = {};
-  if (ioctl(descriptor_, TIOCGSERIAL, &serial) == 0 && (serial.flags & kFlag) != 0)
-    low_latency_ = LowLatency::kOn;
+  serial.flags |= static_cast<int>(ASYNC_LOW_LATENCY);
+  (void)ioctl(descriptor_, TIOCSSERIAL, &serial);
 }
 
 void SerialPort::close() {

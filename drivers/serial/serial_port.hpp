@@ -27,10 +27,7 @@ namespace swiftlet {
 struct SerialSettings {
   std::string path;
   unsigned baud = 921'600;
-  bool low_latency = true;
 };
-
-enum class LowLatency : std::uint8_t { kNotAsked, kOn, kNotOffered };
 
 /// Counters of the kernel's driver since the port was created; empty if it has none (USB CDC, pty).
 struct SerialErrors {
@@ -51,11 +48,6 @@ class SerialPort {
 
   DeviceFault open();
   void close();
-  /// close(), open(): while it is not there, kMissing.
-  DeviceFault reopen() {
-    close();
-    return open();
-  }
 
   /// What is there, without waiting: `count` may be 0. `read_at`: CLOCK_MONOTONIC when the read returned.
   DeviceFault read(std::span<std::uint8_t> into, std::size_t& count, Stamp& read_at);
@@ -71,7 +63,6 @@ class SerialPort {
   [[nodiscard]] const SerialSettings& settings() const { return settings_; }
   /// What the port runs at, as read back.
   [[nodiscard]] unsigned baud() const { return baud_; }
-  [[nodiscard]] LowLatency lowLatency() const { return low_latency_; }
   /// Time of one byte on the wire: ten bits. Zero for USB CDC and pseudo-terminals, which have no real baud
   /// rate.
   [[nodiscard]] Duration byteTime() const { return byte_time_; }
@@ -79,13 +70,12 @@ class SerialPort {
 
  private:
   DeviceFault configure();
-  void askLowLatency();
+  void askLowLatency() const;
   DeviceFault unplugged(int error);
 
   SerialSettings settings_;
   int descriptor_ = -1;
   unsigned baud_ = 0;
-  LowLatency low_latency_ = LowLatency::kNotAsked;
   Duration byte_time_;
 };
 

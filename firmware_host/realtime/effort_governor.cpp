@@ -72,20 +72,6 @@ EffortLadder smootherLadder(const Effort& full) {
   return ladder;
 }
 
-std::string_view reasonName(EffortReason reason) {
-  switch (reason) {
-    case EffortReason::kPredictedMiss:
-      return "predicted_miss";
-    case EffortReason::kBacklog:
-      return "backlog";
-    case EffortReason::kLate:
-      return "late";
-    case EffortReason::kRecovered:
-      return "recovered";
-  }
-  return "unknown";
-}
-
 EffortGovernor::EffortGovernor(const EffortLadder& ladder, const GovernorSettings& settings)
     : ladder_(ladder.empty() ? ladderFrom(Effort{}) : ladder), settings_(settings) {
   settings_.good_steps = std::max(settings_.good_steps, 1);

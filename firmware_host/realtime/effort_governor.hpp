@@ -28,7 +28,6 @@
 #include <array>
 #include <cstddef>
 #include <optional>
-#include <string_view>
 
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/messages/effort.hpp"
@@ -66,8 +65,6 @@ enum class EffortReason {
   kLate,           ///< frames are finished too long after they were ready
   kRecovered,      ///< there is room again
 };
-/// "predicted_miss", "backlog", "late", "recovered".
-std::string_view reasonName(EffortReason reason);
 
 struct EffortChange {
   int from = 0;  ///< level before

@@ -74,7 +74,6 @@ struct ThreadReport {
   [[nodiscard]] bool hasPriority() const {
     return started && actual_policy == wanted_policy && actual_priority == wanted_priority;
   }
-  [[nodiscard]] bool asWanted() const { return hasPriority() && message.empty(); }
 };
 
 nlohmann::ordered_json toJson(const ThreadReport& report);

@@ -22,8 +22,6 @@ class SystemdNotify {
   SystemdNotify& operator=(const SystemdNotify&) = delete;
 
   [[nodiscard]] bool wanted() const { return socket_ >= 0; }
-  /// Interval between two feeds of the watchdog; empty: systemd's watchdog is off.
-  [[nodiscard]] const std::optional<Duration>& watchdogPeriod() const { return watchdog_period_; }
 
   void ready();
   /// From here on TimeoutStopSec limits the end, and nothing may feed the watchdog: that would arm it again.
@@ -41,7 +39,7 @@ class SystemdNotify {
   bool send(std::string_view message) const;
 
   int socket_ = -1;
-  std::optional<Duration> watchdog_period_;
+  std::optional<Duration> watchdog_period_;  ///< between two feeds; empty: systemd's watchdog is off
   std::optional<Stamp> next_feed_;
   std::uint64_t status_hash_ = 0;
 };

@@ -156,15 +156,11 @@ TEST_CASE("Rates up to 4 Mbaud are set and read back", "[serial][port]") {
     // A pseudo-terminal's baud rate means nothing.
     CHECK(port.byteTime() == Duration{});
     CHECK_FALSE(port.errors().has_value());
-    CHECK(port.lowLatency() == LowLatency::kNotOffered);
   }
   SerialPort fast({terminal.path(), 4'000'001});
   CHECK(fast.open().kind == DeviceFaultKind::kUnsupported);
   SerialPort none({terminal.path(), 0});
   CHECK(none.open().kind == DeviceFaultKind::kUnsupported);
-  SerialPort slow({terminal.path(), 115'200, false});
-  REQUIRE(slow.open().ok());
-  CHECK(slow.lowLatency() == LowLatency::kNotAsked);
 }
 
 TEST_CASE("A port that goes away is a fault, and can be taken up again", "[serial][port]") {
@@ -188,10 +184,10 @@ TEST_CASE("A port that goes away is a fault, and can be taken up again", "[seria
   CHECK(port.wait(Duration{}).kind == DeviceFaultKind::kUnplugged);
   CHECK(port.write(into, Duration{}).kind == DeviceFaultKind::kUnplugged);
   std::filesystem::remove(link);
-  CHECK(port.reopen().kind == DeviceFaultKind::kMissing);
+  CHECK(port.open().kind == DeviceFaultKind::kMissing);
   REQUIRE(terminal.open().ok());
   std::filesystem::create_symlink(terminal.path(), link);
-  CHECK(port.reopen().ok());
+  CHECK(port.open().ok());
   REQUIRE(terminal.send(into, count).ok());
   REQUIRE(port.wait(Duration::fromMilliseconds(1000)).ok());
   REQUIRE(port.read(into, count, read_at).ok());
