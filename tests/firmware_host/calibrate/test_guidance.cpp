@@ -251,6 +251,36 @@ TEST_CASE("a rendered session's corners are found where they are") {
   CHECK(worst < 0.7);
 }
 
+TEST_CASE("images that the calibration does not pair are no pairs for the guidance") {
+  const CalibrationRig rig = drawCalibrationRig(4, CameraKind::kPinholeRadtan);
+  SessionSettings settings;
+  settings.duration = 60;
+  const CalibrationSession session(rig, CalibrationTarget{}, settings);
+  CalibrationGuide watched(session.target(), 2);
+  for (int k = 0; k < session.imageCount(); ++k) {
+    for (BoardView view : session.views(k)) {
+      const CameraModel& lens = rig.rig.camera[view.camera];
+      if (view.camera == 1) view.stamp = view.stamp + Duration::fromMilliseconds(3);
+      watched.addView(view, lens.width(), lens.height(), kSharpEdge);
+    }
+  }
+  CHECK(mentions(watched.missing(), "both cameras at once: 0 of"));
+}
+
+TEST_CASE("IMU samples that the guidance misses are said") {
+  const CalibrationRig rig = drawCalibrationRig(4, CameraKind::kPinholeRadtan);
+  Calibration calibration;
+  calibration.rig = rig.rig;
+  std::vector<std::string> lines;
+  GuidedRecording guidance(CalibrationTarget{}, [&](const std::string& line) { lines.push_back(line); });
+  guidance.begin(calibration);
+  for (int i = 0; i < 100000; ++i) guidance.takeImu({});
+  CHECK(guidance.goOn());
+  guidance.end();
+  REQUIRE(guidance.samplesLost() > 0);
+  CHECK_THAT(lines.back(), Catch::Matchers::Contains("IMU samples"));
+}
+
 TEST_CASE("beside a recording the guidance finds the board and shows it in the view") {
   const RenderedSession rendered;
   Calibration calibration;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "firmware_host/lab/calibrate/board/same_moment.hpp"
 #include "firmware_host/lab/calibrate/cameras/board_pose.hpp"
 
 namespace swiftlet {
@@ -15,8 +16,6 @@ namespace {
 
 /// Two boards' tags at least, or a small checkerboard.
 constexpr std::size_t kFewestInView = 8;
-/// s: what triggered cameras' stamps differ by at most. At 1 m/s and 1 m it moves a corner by 0.5 px of 500.
-constexpr double kSameMoment = 1e-3;
 
 /// Centre, extent and slant of what is seen, in image widths, for both cameras; a camera without the board is
 /// far from all that have it.

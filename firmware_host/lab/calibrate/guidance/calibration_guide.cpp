@@ -7,11 +7,11 @@
 #include <cmath>
 
 #include "firmware_host/lab/calibrate/board/homography.hpp"
+#include "firmware_host/lab/calibrate/board/same_moment.hpp"
 
 namespace swiftlet {
 namespace {
 
-constexpr double kSamePair = 0.005;   // s between the stamps of two cameras that are exposed together
 constexpr double kMeanTime = 1.0;     // s, of the mean force that gravity is taken out with
 constexpr double kLongestStep = 0.1;  // s between samples that counts as motion
 constexpr std::size_t kLeastCorners = 8;
@@ -95,7 +95,7 @@ void CalibrationGuide::addView(const BoardView& view, int width, int height, dou
   measureTilt(view, camera);
   board_seen_[view.camera] = view.stamp;
   const Duration apart = board_seen_[0] - board_seen_[1];
-  if (cameras_ == 2 && std::abs(apart.seconds()) < kSamePair) ++shared_;
+  if (cameras_ == 2 && std::abs(apart.seconds()) <= kSameMoment) ++shared_;
 }
 
 void CalibrationGuide::measureTilt(const BoardView& view, Camera& camera) const {

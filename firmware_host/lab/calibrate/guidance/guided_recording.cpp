@@ -141,6 +141,9 @@ bool GuidedRecording::goOn() {
     line = enough ? "recording complete: enough data for a calibration"
                   : fmt::format("{:3.0f} %  {}", 100 * progress_, missing_.front());
   }
+  if (samplesLost() > 0) {
+    line += fmt::format(" (the guidance missed {} IMU samples: close other programs)", samplesLost());
+  }
   const double now = wallSeconds();
   if (enough || now - line_said_ >= kLinePeriod) {
     line_said_ = now;
