@@ -2,6 +2,7 @@
 // the file holds.
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -188,6 +189,30 @@ TEST_CASE("A good calibration of cameras is called good, and each fault is named
     if (corner.camera == 1 && corner.pixel.x() > 600) corner.residual.x() += 0.2;
   }
   CHECK(says(cameraPage(skewed, {}, ""), "Residuals of camera 1 have a systematic direction"));
+}
+
+TEST_CASE("Halves that differ by their uncertainty differ by once what is expected") {
+  CameraSolution solution = goodSolution(1);
+  Random random(3);
+  double squares = 0;
+  constexpr int kDraws = 60;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    // Each half has twice the covariance of the whole; small, as the fit of the rotation weighs down.
+    for (CameraModel& half : solution.camera[0].halves) {
+      Vector8d off;
+      for (int i = 0; i < 8; ++i) off[i] = std::sqrt(2) * 0.1 * lensSigmas()[i] * random.normal();
+      half = lens(off);
+    }
+    const CalibrationPage page = cameraPage(solution, {}, "");
+    const auto rules = std::ranges::find(page.tables, "rules", &Table::id);
+    REQUIRE(rules != page.tables.end());
+    const auto row = std::ranges::find_if(rules->rows, [](const std::vector<std::string>& cells) {
+      return cells.front() == "camera 0: difference of the halves over twice the uncertainty";
+    });
+    REQUIRE(row != rules->rows.end());
+    squares += std::pow(std::stod(row->at(1)), 2) / kDraws;
+  }
+  CHECK(std::sqrt(squares) == Approx(1).epsilon(0.1));
 }
 
 TEST_CASE("The page of cameras and IMU judges residuals and sigmas") {

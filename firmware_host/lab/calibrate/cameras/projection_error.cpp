@@ -72,13 +72,22 @@ std::vector<double> worstSigmas(const CameraModel& lens, const Eigen::Matrix<dou
   return sigmas;
 }
 
+std::vector<double> rmsSigmas(const CameraModel& lens, const Eigen::Matrix<double, 8, 8>& covariance,
+                              const std::vector<Eigen::Vector2d>& pixels) {
+  std::vector<double> sigmas;
+  for (const Eigen::Matrix2d& C : pixelCovariances(lens, covariance, pixels)) {
+    sigmas.push_back(std::sqrt(0.5 * C.trace()));
+  }
+  return sigmas;
+}
+
 std::vector<ImagePoint> projectionSigmas(const CameraModel& lens,
                                          const Eigen::Matrix<double, 8, 8>& covariance) {
   const std::vector<Eigen::Vector2d> pixels = gridOf(lens);
-  const std::vector<Eigen::Matrix2d> covariances = pixelCovariances(lens, covariance, pixels);
+  const std::vector<double> sigmas = rmsSigmas(lens, covariance, pixels);
   std::vector<ImagePoint> points;
   for (std::size_t k = 0; k < pixels.size(); ++k) {
-    if (covariances[k].allFinite()) points.push_back({pixels[k], std::sqrt(0.5 * covariances[k].trace())});
+    if (std::isfinite(sigmas[k])) points.push_back({pixels[k], sigmas[k]});
   }
   return points;
 }

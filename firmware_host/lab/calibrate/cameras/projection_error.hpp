@@ -33,6 +33,11 @@ struct ImagePoint {
                                               const Eigen::Matrix<double, 8, 8>& covariance,
                                               const std::vector<Eigen::Vector2d>& pixels);
 
+/// 1 sigma of a pixel [px], rms of the two axes, at each pixel given. NaN where the lens has no inverse.
+[[nodiscard]] std::vector<double> rmsSigmas(const CameraModel& lens,
+                                            const Eigen::Matrix<double, 8, 8>& covariance,
+                                            const std::vector<Eigen::Vector2d>& pixels);
+
 /// 1 sigma over the grid; points where the lens has no inverse are left out.
 [[nodiscard]] std::vector<ImagePoint> projectionSigmas(const CameraModel& lens,
                                                        const Eigen::Matrix<double, 8, 8>& covariance);

@@ -100,16 +100,17 @@ void addLens(const CameraSolution& solution, const BoardEvidence& evidence, std:
                            c));
   if (!hasHalves(camera)) return;
   const auto difference = projectionDifference(camera.halves[0], camera.halves[1], pixels, coverage.cells);
+  const std::vector<double> rms_sigmas = rmsSigmas(model, camera.covariance, pixels);
   std::vector<double> sizes;
   double squares = 0;
   double expected = 0;
   std::vector<double> inside;
   for (std::size_t k = 0; k < difference.size(); ++k) {
     sizes.push_back(difference[k].norm());
-    if (!coverage.cells[k] || !difference[k].allFinite() || !std::isfinite(sigmas[k])) continue;
+    if (!coverage.cells[k] || !difference[k].allFinite() || !std::isfinite(rms_sigmas[k])) continue;
     inside.push_back(sizes.back());
-    squares += difference[k].squaredNorm();
-    expected += 4 * sigmas[k] * sigmas[k];
+    squares += 0.5 * difference[k].squaredNorm();  // of an axis
+    expected += 4 * rms_sigmas[k] * rms_sigmas[k];
   }
   ImageDrawing halves(model.width(), model.height());
   halves.heat(grid, sizes, 4 * good, "px");
