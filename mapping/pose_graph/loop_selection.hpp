@@ -9,8 +9,8 @@
 //    set after a loop arrives must contain it, so only its neighbours are searched. Among sets of equal size
 //    the first found stays. The set depends only on the loops in order of arrival and on `max_nodes` of each.
 // 4. Support. If the odometry is vague, nearly any loop agrees with nearly all others, and agreement proves
-//    nothing. A loop of the set is selected if a random loop would be unlikely to pass its gate (chance at
-//    most gateChanceLimit()), or if at least `min_support` selected loops agree with it in pair tests that a
+//    nothing. A loop of the set is selected if a random loop would be unlikely to pass its gate (a limit for
+//    the loops held now), or if at least `min_support` selected loops agree with it in pair tests that a
 //    random loop would be unlikely to pass. Between two components there is no gate. With n supported loops
 //    and m in the largest set that contradicts them (two places that look the same), the n are selected if
 //    (n - m)^2 >= min_between (n + m), so `min_between` are enough if none contradicts them; two sets whose
@@ -121,8 +121,6 @@ class LoopSelection {
   /// Prepared for the tests against the odometry.
   [[nodiscard]] const ChainedLoop<Pose>& chained(std::uint32_t id) const { return held_[id].chained; }
   [[nodiscard]] std::uint32_t held() const { return static_cast<std::uint32_t>(held_.size()); }
-  /// Logarithm of the chance up to which the gate alone selects a loop, with the loops held now.
-  [[nodiscard]] double gateChanceLimit() const { return log_gate_limit_; }
   /// All sets are proven to be the largest.
   [[nodiscard]] bool exact() const;
   [[nodiscard]] const LoopSelectionCounters& counters() const { return counters_; }

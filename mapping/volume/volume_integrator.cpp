@@ -192,9 +192,7 @@ void VolumeIntegrator::listBand(std::uint32_t blocks, VolumeStep& out) {
     band_.resize(blocks);
   }
   out.band = static_cast<std::uint32_t>(band_.size());
-  const std::size_t before = volume_.blockCount();
   with_room_ = volume_.makeRoom(vehicle_, band_);
-  out.created = static_cast<std::uint32_t>(before);
 }
 
 void VolumeIntegrator::update(std::uint32_t slot, bool carve, VolumeStep& out) {

@@ -47,7 +47,6 @@ struct VolumeEffort {
 /// Result of one image.
 struct VolumeStep {
   std::uint32_t band = 0;      ///< blocks near measured surface
-  std::uint32_t created = 0;   ///< new blocks among them
   std::uint32_t updated = 0;   ///< blocks updated by projection, in the band and elsewhere
   std::uint32_t carved = 0;    ///< blocks with voxels that are free as a whole
   std::uint32_t changed = 0;   ///< blocks that readers must read again

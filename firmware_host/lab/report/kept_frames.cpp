@@ -39,11 +39,6 @@ void readKeyframes(const std::string& path, KeptFrames& kept, std::vector<Missin
 
 const KeptKeyframe* KeptFrames::keyframeAt(Stamp stamp) const { return entryAt(keyframes, stamp); }
 
-const KeptKeyframe* KeptFrames::keyframeBefore(Stamp stamp) const {
-  const auto found = std::ranges::lower_bound(keyframes, stamp, {}, &KeptKeyframe::stamp);
-  return found == keyframes.begin() ? nullptr : &*std::prev(found);
-}
-
 const LoopRevisit* KeptFrames::loopAt(Stamp stamp) const {
   const auto found = std::ranges::find(loops, stamp, &LoopRevisit::new_stamp);
   return found == loops.end() ? nullptr : &*found;

@@ -32,7 +32,6 @@ struct KeptFrames {
 
   /// Null where the image was no keyframe.
   [[nodiscard]] const KeptKeyframe* keyframeAt(Stamp stamp) const;
-  [[nodiscard]] const KeptKeyframe* keyframeBefore(Stamp stamp) const;
   /// Of a loop closure found at this image; null: none.
   [[nodiscard]] const LoopRevisit* loopAt(Stamp stamp) const;
   /// The mesh of this image; empty: none was written. InputError where it is damaged.

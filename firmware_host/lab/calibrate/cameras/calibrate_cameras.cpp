@@ -25,7 +25,6 @@ constexpr double kFarOff = 5;            ///< sigmas: a view that is worse than 
 
 struct Choice {
   std::optional<LensFit> fit;
-  double other_rms = std::numeric_limits<double>::infinity();
   std::string why;
 };
 
@@ -65,13 +64,13 @@ Choice chooseModel(const CameraInput& input, const std::vector<Moment>& moments,
   const double evidence = residuals * std::log(pinhole_square / wide_square);
   const bool takes_wide = evidence > kStrongEvidence;
   choice.fit = takes_wide ? wide : pinhole;
-  choice.other_rms = std::sqrt(takes_wide ? pinhole_square : wide_square);
+  const double other_rms = std::sqrt(takes_wide ? pinhole_square : wide_square);
   choice.why = fmt::format(
       "{}: rms {:.3f} px on {} views, {} {:.3f} px; information criterion {:+.0f} in favour of "
       "Kannala-Brandt, which is chosen above {:.0f}",
       takes_wide ? "Kannala-Brandt" : "radial-tangential",
       std::sqrt(takes_wide ? wide_square : pinhole_square), start.size(),
-      takes_wide ? "radial-tangential" : "Kannala-Brandt", choice.other_rms, evidence, kStrongEvidence);
+      takes_wide ? "radial-tangential" : "Kannala-Brandt", other_rms, evidence, kStrongEvidence);
   return choice;
 }
 
@@ -178,7 +177,6 @@ CameraSolution calibrateCameras(const CameraInput& input, const std::function<vo
     }
     bundle.lens[c] = choice.fit->lens;
     evidence.alone_sigma[c] = choice.fit->sigma;
-    solution.camera[c].other_model_rms = choice.other_rms;
     solution.camera[c].why_this_model = choice.why;
     say(0.3 * static_cast<double>(c + 1) / static_cast<double>(input.camera_count));
   }

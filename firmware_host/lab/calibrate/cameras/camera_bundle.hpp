@@ -72,7 +72,6 @@ class CameraBundle {
 
  private:
   struct Block;
-  struct Change;
 
   void addCorner(const BundleView& view, const BundleCorner& corner, double robust_scale, Block& block) const;
   [[nodiscard]] Block blockOf(const BundleView& view, double robust_scale) const;

@@ -39,7 +39,6 @@ struct SolvedCamera {
   Covariance covariance = Covariance::Zero();  ///< fx fy cx cy [px], then the four of the distortion
   std::string why_this_model;                  ///< in words, with the other model's figure
   double rms = 0;                              ///< px per axis, without outliers
-  double other_model_rms = 0;                  ///< px
   /// The same lens from every other view, and from the rest.
   std::array<CameraModel, 2> halves;
 };

@@ -74,7 +74,6 @@ class CalibrationGuide {
   [[nodiscard]] std::size_t cameras() const { return cameras_; }
   [[nodiscard]] const Eigen::Vector3d& turnedSeconds() const { return turned_; }
   [[nodiscard]] const Eigen::Vector3d& pushedSeconds() const { return pushed_; }
-  [[nodiscard]] int sharedViews() const { return shared_; }
 
   /// What to do next, the most urgent first, a sentence each; empty: enough.
   [[nodiscard]] std::vector<std::string> missing() const;

@@ -117,7 +117,6 @@ BatchStart startBatch(const CalibrationTarget& target, const std::vector<BoardVi
   });
   start.origin = std::min(ordered.front().stamp, samples.front().stamp);
   const std::vector<TimedPose> poses = posesOf(target, ordered, cameras, start.origin);
-  start.posed_views = poses.size();
   if (poses.size() < kFewestPoses) {
     start.reasons.push_back(fmt::format(
         "Only {} images show enough of the board, {} are required. Keep the board in view for half a minute.",

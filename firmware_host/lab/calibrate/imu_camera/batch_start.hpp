@@ -19,9 +19,7 @@ struct BatchStart {
   BatchState state;
   Stamp origin;
   MotionFit fit;
-  std::size_t posed_views = 0;          ///< of camera 0 or, through the stereo transform, camera 1
-  std::vector<std::string> reasons;     ///< what makes the batch pointless; not empty: `state` is not set
-  std::vector<std::string> suspicions;  ///< the batch decides
+  std::vector<std::string> reasons;  ///< what makes the batch pointless; not empty: `state` is not set
 };
 
 /// `spacing` [s]: of the spline's knots. A board that the lens of `cameras` does not fit to within some

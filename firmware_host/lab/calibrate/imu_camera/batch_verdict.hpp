@@ -13,7 +13,6 @@ struct BatchVerdict {
 
   const ImuCameraInput& input;
   const BatchStart& start;
-  bool knots_suffice = true;
   bool rolling = false;
   bool settled = true;
   std::size_t outliers = 0;

@@ -74,8 +74,8 @@ double costIn(const BatchProblem& problem, const BatchNoise& noise) {
          problem.cost(Residuals::kAccel) * square(own.accel / noise.accel);
 }
 
-/// Finer knots while they explain more than noise. False where the finest still leave motion unexplained.
-bool chooseKnots(BatchProblem& problem, double rate_hz) {
+/// Finer knots while they explain more than noise.
+void chooseKnots(BatchProblem& problem, double rate_hz) {
   while (problem.state().spline.spacing() / 2 >= kReadingsPerKnot / rate_hz) {
     const BatchProblem coarse = problem;
     problem.refineSpline();
@@ -84,9 +84,8 @@ bool chooseKnots(BatchProblem& problem, double rate_hz) {
     // Both in the noise that the finer spline leaves.
     const double gain = costIn(coarse, problem.noise()) - costIn(problem, problem.noise());
     const double more = problem.chainSize() - coarse.chainSize();
-    if (gain < more + kRefineSigmas * std::sqrt(2 * more)) return true;
+    if (gain < more + kRefineSigmas * std::sqrt(2 * more)) return;
   }
-  return false;
 }
 
 BatchState halfOf(const BatchState& whole, bool second) {
@@ -142,7 +141,7 @@ ImuCameraSolution calibrateImuCamera(const ImuCameraInput& input,
   problem.setNoise(noise);
   problem.solve(kSteps, false, kRoughly);
   BatchVerdict verdict(input, start);
-  verdict.knots_suffice = chooseKnots(problem, input.noise.rate_hz);
+  chooseKnots(problem, input.noise.rate_hz);
   tell(0.6);
 
   const double readout_sigma = std::sqrt(problem.covariance()(batch::kReadout, batch::kReadout));
