@@ -99,7 +99,17 @@ class Ros1File final : public BagFile {
 class Ros1Writer final : public BagWriter {
  public:
   explicit Ros1Writer(const std::string& path) : BagWriter(path) {
-    translated([&] { bag_.open(path_, rosbag::bagmode::Write); });
+    translated([&] { bag_->open(path_, rosbag::bagmode::Write); });
+  }
+  Ros1Writer(const Ros1Writer&) = delete;
+  Ros1Writer& operator=(const Ros1Writer&) = delete;
+  ~Ros1Writer() override {
+    try {
+      bag_->close();
+    } catch (const rosbag::BagException&) {
+      // Leaked on purpose: its destructor would close it again, and throw.
+      static_cast<void>(bag_.release());
+    }
   }
 
   [[nodiscard]] BagEncoding encoding() const override { return BagEncoding::kRos1; }
@@ -124,13 +134,13 @@ class Ros1Writer final : public BagWriter {
     const Topic& to = topics_[topic];
     ros::Time time;
     time.fromNSec(static_cast<std::uint64_t>(log_time.ns));
-    translated([&] { bag_.write(to.about.name, time, RawMessage{&to.about, body}, to.fields); });
+    translated([&] { bag_->write(to.about.name, time, RawMessage{&to.about, body}, to.fields); });
     ++messages_;
   }
 
   void finish() override {
     translated([&] {
-      bag_.close();
+      bag_->close();
       // A full disk shows when the file is closed, and rosbag does not look.
       rosbag::Bag written(path_, rosbag::bagmode::Read);
       if (rosbag::View(written).size() != messages_) {
@@ -155,7 +165,7 @@ class Ros1Writer final : public BagWriter {
     }
   }
 
-  rosbag::Bag bag_;
+  std::unique_ptr<rosbag::Bag> bag_ = std::make_unique<rosbag::Bag>();
   std::vector<Topic> topics_;
   std::uint64_t messages_ = 0;
 };

@@ -13,6 +13,7 @@
 #include "firmware_host/lab/export/tum_files.hpp"
 #include "firmware_host/outputs/run_folder/states_csv.hpp"
 #include "tests/firmware_host/exported_run.hpp"
+#include "tests/firmware_host/file_size_limit.hpp"
 #include "tests/support/skip_case.hpp"
 
 namespace swiftlet {
@@ -240,6 +241,20 @@ TEST_CASE("a run as a ROS 1 bag", "[export]") {
            "toolchain/install.sh optional, then toolchain/test.sh");
 }
 #endif
+
+TEST_CASE("a full disk leaves no part of a bag", "[export]") {
+  const ExportedRun exported;
+  for (const char* form : {"--bag", "--mcap"}) {
+    INFO(form);
+    const std::string file = exported.folder.file("full");
+    {
+      const FileSizeLimit limit(60'000);
+      CHECK(run({"export", exported.run, form, file}) == kExitBadInput);
+    }
+    CHECK_FALSE(std::filesystem::exists(file));
+    CHECK_FALSE(std::filesystem::exists(file + ".part"));
+  }
+}
 
 }  // namespace
 }  // namespace swiftlet
