@@ -104,10 +104,10 @@ ForceLevel forceLevel(const std::vector<ImuSample>& samples) {
   constexpr Duration kMean = Duration::fromMilliseconds(100);
   std::vector<double> sizes;
   for (std::size_t i = 0; i < samples.size();) {
-    const Stamp end = samples[i].stamp + kMean;
+    const Stamp begin = samples[i].stamp;
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     double count = 0;
-    for (; i < samples.size() && samples[i].stamp < end; ++i, ++count) sum += samples[i].accel;
+    for (; i < samples.size() && samples[i].stamp - begin < kMean; ++i, ++count) sum += samples[i].accel;
     sizes.push_back(sum.norm() / count);
   }
   std::ranges::sort(sizes);

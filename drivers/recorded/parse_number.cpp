@@ -1,10 +1,12 @@
 #include "drivers/recorded/parse_number.hpp"
 
 #include <charconv>
-#include <limits>
 
 namespace swiftlet {
 namespace {
+
+/// ns, the year 2096: the difference of two stamps, and a stamp and seconds, do not overflow.
+constexpr std::int64_t kLargestStamp = 4'000'000'000'000'000'000;
 
 bool allDigits(std::string_view text) {
   for (const char c : text) {
@@ -33,7 +35,7 @@ bool parseSeconds(std::string_view text, Stamp& stamp) {
   std::string_view fraction = point == std::string_view::npos ? std::string_view{} : text.substr(point + 1);
   std::int64_t seconds = 0;
   if (!parseInteger(whole, seconds) || !allDigits(fraction)) return false;
-  constexpr std::int64_t kMaxSeconds = std::numeric_limits<std::int64_t>::max() / kNsPerSecond - 1;
+  constexpr std::int64_t kMaxSeconds = kLargestStamp / kNsPerSecond - 1;
   if (seconds > kMaxSeconds || seconds < -kMaxSeconds) return false;
   fraction = fraction.substr(0, 9);
   std::int64_t ns = 0;
@@ -45,12 +47,12 @@ bool parseSeconds(std::string_view text, Stamp& stamp) {
 bool parseNanoseconds(std::string_view text, Stamp& stamp) {
   const std::size_t point = text.find('.');
   if (point != std::string_view::npos && !allDigits(text.substr(point + 1))) return false;
-  return parseInteger(text.substr(0, point), stamp.ns);
+  return parseInteger(text.substr(0, point), stamp.ns) && stamp.ns <= kLargestStamp &&
+         stamp.ns >= -kLargestStamp;
 }
 
 bool parseCsvStamp(std::string_view text, Stamp& stamp) {
-  if (text.find('.') == std::string_view::npos) return parseInteger(text, stamp.ns);
-  return parseSeconds(text, stamp);
+  return text.find('.') == std::string_view::npos ? parseNanoseconds(text, stamp) : parseSeconds(text, stamp);
 }
 
 }  // namespace swiftlet

@@ -1,5 +1,6 @@
 #pragma once
-// Numbers and stamps from text, without locale, allocation or loss: stamps never pass through double.
+// Numbers and stamps from text, without locale, allocation or loss: stamps never pass through double. Stamps
+// beyond 4e18 ns (the year 2096) are refused.
 
 #include <cstdint>
 #include <string_view>

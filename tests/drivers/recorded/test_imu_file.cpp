@@ -1,3 +1,5 @@
+#include <limits>
+
 #include "drivers/recorded/imu_file.hpp"
 #include "tests/drivers/recorded/asl_fixture.hpp"
 
@@ -113,6 +115,18 @@ TEST_CASE("a file of another kind is refused with its first bad line", "[imu_fil
   const InputError trajectory = errorOf([] { ReadImu("1.0 0 0 0 0 0 0 1\n2.0 0 0 0 0 0 0 1\n"); });
   CHECK(trajectory.line == 1);
   CHECK(contains(errorOf([] { ReadImu("1,nan,0,0,0,0,9.8\n"); }).message, "not finite"));
+}
+
+TEST_CASE("a stamp at the end of the range is a bad row", "[imu_file]") {
+  const ReadImu read(kImuHeader + rows(0, 20) + "9223372036854775807,0.1,-0.2,0.3,9.7,0.5,-1.25\n" +
+                     "-9223372036854775808,0.1,-0.2,0.3,9.7,0.5,-1.25\n" + rows(20, 40));
+  CHECK(read.samples.size() == 40);
+  CHECK(read.counters.bad_rows == 2);
+  // Of live samples too.
+  std::vector<ImuSample> samples(3);
+  for (ImuSample& sample : samples) sample.accel = {0, 0, 9.81};
+  samples[2].stamp.ns = std::numeric_limits<std::int64_t>::max();
+  CHECK(forceLevel(samples).median == Approx(9.81));
 }
 
 TEST_CASE("units and column order are watched", "[imu_file]") {
