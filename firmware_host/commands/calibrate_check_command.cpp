@@ -9,6 +9,7 @@
 #include "firmware_host/commands/log_options.hpp"
 #include "firmware_host/lab/calibrate/check/check_run.hpp"
 #include "firmware_host/lab/calibrate/page/solution_pages.hpp"
+#include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {
 namespace {
@@ -22,6 +23,10 @@ struct CheckOptions {
 int calibrateCheck(CheckOptions options) {
   options.of_log.fill(options.request);
   const CheckResult result = checkCalibration(options.request, options.settings.read());
+  if (options.request.stopped()) {
+    warn("stopped early; the calibration was not checked\n");
+    return kExitFailed;
+  }
   fmt::print("{}", checkText(result));
   if (!options.request.out.empty()) {
     const std::string page = (std::filesystem::path(options.request.out) / "report.html").string();
@@ -50,7 +55,7 @@ void addCalibrateCheck(CLI::App& calibrate, int& exit_code) {
       "Example:\n"
       "  swiftlet calibrate check data/euroc_mh01_20s --out check\n"
       "Exit code 0: the calibration holds, or the flight cannot decide it (the text says which); 1: the "
-      "calibration has changed.");
+      "calibration has changed, or the check was stopped.");
   command->callback([options, &exit_code] { exit_code = calibrateCheck(*options); });
 }
 

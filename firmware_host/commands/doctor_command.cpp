@@ -25,6 +25,10 @@ int doctorOfLog(const DoctorOptions& options) {
   options.of_log.fill(request);
   const MachineReport report = examineLog(request, options.settings.read());
   say(report.text(request.log));
+  if (request.stopped()) {
+    warn("stopped early; the log was not checked to its end\n");
+    return kExitFailed;
+  }
   const bool good = std::ranges::none_of(
       report.lines, [](const MachineLine& line) { return line.verdict == MachineVerdict::kPoor; });
   return good ? kExitDone : kExitFailed;

@@ -1,13 +1,18 @@
 // The program's contract: exit codes, messages, and the shape of summary.json.
 
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "drivers/recorded/trajectory_file.hpp"
@@ -59,6 +64,25 @@ TEST_CASE("simulate overwrites simulated logs only") {
     words[4] = folder.file(kind[0].substr(2));
     CHECK(run(words) == kExitDone);
     CHECK(run(words) == kExitDone);
+  }
+}
+
+TEST_CASE("a check of a log that a signal ends is not passed") {
+  const ScratchFolder folder("stopped_check");
+  const std::string settings = folder.file("settings.yaml");
+  REQUIRE(::mkfifo(settings.c_str(), 0600) == 0);
+  const std::string log = std::string(SWIFTLET_TEST_DATA) + "/euroc_mh01_4s";
+  const std::vector<std::vector<std::string>> checks = {{"doctor", log, "--settings", settings},
+                                                        {"calibrate", "check", log, "--settings", settings}};
+  for (const std::vector<std::string>& words : checks) {
+    INFO(words[0]);
+    // The settings are read after the handler of signals is there, and before the log.
+    std::thread signal([&] {
+      const std::ofstream pipe(settings);
+      ::kill(::getpid(), SIGINT);
+    });
+    CHECK(run(words) == kExitFailed);
+    signal.join();
   }
 }
 
