@@ -109,11 +109,16 @@ void addReplayCommand(CLI::App& app, int& exit_code) {
   command->add_flag("--map", request.map, "Fuse depth into a labelled map: map.ply, map.glb");
   command->add_flag("--record", request.record,
                     "Record the estimator's inputs to recording/ in the run folder");
-  command
-      ->add_flag("--reproduce", request.reproduce,
-                 "LOG is a recording: repeat its threaded run byte for byte with its settings")
-      ->excludes(real_time);
+  CLI::Option* reproduce =
+      command->add_flag("--reproduce", request.reproduce,
+                        "LOG is a recording: repeat its threaded run byte for byte with its settings");
   options->settings.addTo(*command);
+  // The recording has its own calibration, settings and section.
+  for (const char* name :
+       {"--mono", "--calibration", "--tracks", "--from", "--until", "--real-time", "--loop-closure",
+        "--keep-map", "--in-map", "--extend", "--map", "--record", "--settings", "--set"}) {
+    reproduce->excludes(command->get_option(name));
+  }
   command->footer(
       "Example:\n  swiftlet replay data/euroc_mh01_20s --out run_mh01\n"
       "  swiftlet replay data/vil_v102 --mono --set mesh.enabled=false\n"
