@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "drivers/bag/bag_file.hpp"
@@ -51,17 +53,31 @@ Trajectory truthOf(const ExportOptions& options, const RunFolder& run) {
   }
 }
 
+/// Of `things`; empty names do not count.
+void refuseRepeated(const std::vector<std::string>& names, const std::string& things) {
+  std::set<std::string> seen;
+  for (const std::string& name : names) {
+    if (name.empty() || seen.insert(name).second) continue;
+    throw InputError(things, 0, name, "names two " + things, "Give each its own name");
+  }
+}
+
 void checkFrames(const RosFrames& frames) {
   const std::vector<std::string> names = {frames.map, frames.odom, frames.body, frames.truth};
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    for (std::size_t j = 0; j < i; ++j) {
-      if (names[i] != names[j]) continue;
-      throw InputError("frames", 0, names[i], "names two frames", "Give each frame its own name");
-    }
-    if (names[i].empty() || names[i].front() == '/') {
-      throw InputError("frames", 0, names[i], "is not a valid tf2 frame name", "Remove the leading /");
+  refuseRepeated(names, "frames");
+  for (const std::string& name : names) {
+    if (name.empty() || name.front() == '/') {
+      throw InputError("frames", 0, name, "is not a valid tf2 frame name", "Remove the leading /");
     }
   }
+}
+
+void checkFiles(const ExportOptions& options) {
+  std::vector<std::string> names;
+  for (const std::string& name : {options.mcap, options.rosbag2, options.bag, options.tum}) {
+    names.push_back(std::filesystem::path(name).lexically_normal().string());
+  }
+  refuseRepeated(names, "files");
 }
 
 /// Each bag that is asked for.
@@ -101,6 +117,10 @@ int exportLog(const ExportOptions& options) {
     throw InputError(options.from, 0, "--tum", "a log has no estimated trajectory",
                      "Replay it and export the run");
   }
+  if (!options.truth.empty()) {
+    throw InputError(options.from, 0, "--truth", "a log is exported with its own truth",
+                     "Omit --truth, or replay the log and export the run");
+  }
   std::vector<std::string> warnings;
   writeBags(options, [&](MessageBag& bag) {
     const auto log = openAll(options, options.from);
@@ -112,6 +132,11 @@ int exportLog(const ExportOptions& options) {
 }
 
 int exportRun(const ExportOptions& options) {
+  if (!options.log.calibration.empty() && !options.images) {
+    throw InputError(options.from, 0, "--calibration",
+                     "a run without --images is exported without calibration",
+                     "Omit --calibration, or add --images");
+  }
   const RunFolder run = readRunFolder(options.from);
   const Trajectory truth = truthOf(options, run);
   if (!options.tum.empty()) {
@@ -141,6 +166,7 @@ int exportRun(const ExportOptions& options) {
 
 int exportAny(const ExportOptions& options) {
   checkFrames(options.frames);
+  checkFiles(options);
   return isAslFolder(options.from) || isArchive(options.from) || isBag(options.from) ? exportLog(options)
                                                                                      : exportRun(options);
 }

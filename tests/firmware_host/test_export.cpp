@@ -242,6 +242,18 @@ TEST_CASE("a run as a ROS 1 bag", "[export]") {
 }
 #endif
 
+TEST_CASE("what an export would ignore is refused", "[export]") {
+  const ExportedRun exported;
+  const std::string log = exported.folder.file("log");
+  REQUIRE(run({"simulate", "--tracks", "--duration", "0.3", "--out", log}) == kExitDone);
+  const std::string file = exported.folder.file("out.mcap");
+  CHECK(run({"export", log, "--truth", "nothere", "--mcap", file}) == kExitBadInput);
+  CHECK(run({"export", exported.run, "--calibration", "nothere", "--mcap", file}) == kExitBadInput);
+  CHECK(run({"export", exported.run, "--mcap", file, "--bag", exported.folder.file("./out.mcap")}) ==
+        kExitBadInput);
+  CHECK_FALSE(std::filesystem::exists(file));
+}
+
 TEST_CASE("a full disk leaves no part of a bag", "[export]") {
   const ExportedRun exported;
   for (const char* form : {"--bag", "--mcap"}) {
