@@ -182,6 +182,7 @@ void addSimulateCommand(CLI::App& app, int& exit_code) {
       "simulate", "Simulate a flight or a calibration session with exact truth, as a EuRoC folder");
   auto options = std::make_shared<SimulateOptions>();
   SimulationSettings& simulation = options->simulation;
+  const CLI::Validator seconds = range(0.0, 86400.0);
   command->add_option("--out", options->out, "Folder to write")->capture_default_str();
   addFlightOptions(*command, simulation);
   addSessionOptions(*command, *options);
@@ -199,7 +200,8 @@ void addSimulateCommand(CLI::App& app, int& exit_code) {
                       "START LEVEL: from START [s] on, the light changes to LEVEL times its first value, "
                       "within 2 s; may be repeated");
   command->add_flag("--png", options->png, "Write PNG images instead of JPEG");
-  command->add_flag("--tracks", options->tracks, "Write feature tracks instead of images, depth and labels");
+  command->add_flag("--tracks", options->tracks, "Write feature tracks instead of images, depth and labels")
+      ->excludes(command->get_option("--board"));
   command
       ->add_option("--depth-every", simulation.depth_every,
                    "Write depth and labels for every n-th image; 0: none")
@@ -213,11 +215,17 @@ void addSimulateCommand(CLI::App& app, int& exit_code) {
       ->add_option("--readout", options->readout_ms,
                    "Readout time of a rolling shutter, first to last row [ms]")
       ->check(range(0.0, 100.0));
-  command->add_option("--stamp-offset", options->stamp_offset_ms, "Offset added to the image stamps [ms]");
-  command->add_option("--blackout", options->blackout, "Blackout of the images: START SECONDS")->expected(2);
+  command->add_option("--stamp-offset", options->stamp_offset_ms, "Offset added to the image stamps [ms]")
+      ->check(range(-1000.0, 1000.0));
+  command->add_option("--blackout", options->blackout, "Blackout of the images: START SECONDS")
+      ->expected(2)
+      ->check(seconds);
   command->add_option("--camera-missing", options->camera_missing, "Dropout of camera 1: START SECONDS")
-      ->expected(2);
-  command->add_option("--imu-gap", options->imu_gap, "Dropout of the IMU: START SECONDS")->expected(2);
+      ->expected(2)
+      ->check(seconds);
+  command->add_option("--imu-gap", options->imu_gap, "Dropout of the IMU: START SECONDS")
+      ->expected(2)
+      ->check(seconds);
   command->add_option("--threads", simulation.threads, "Number of rendering threads")
       ->check(range(1, 64))
       ->capture_default_str();
