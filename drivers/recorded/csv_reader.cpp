@@ -170,12 +170,13 @@ void CsvReader::reject(const char* field_name, const std::string& message) {
 }
 
 void CsvReader::finish(const char* what, const char* remedy) const {
-  const bool none = rows_ == bad_ + nan_;
-  const bool too_many = bad_ > kToleratedBadRows && bad_ * kToleratedBadShare > rows_;
+  const std::uint64_t unusable = bad_ + nan_;
+  const bool none = rows_ == unusable;
+  const bool too_many = unusable > kToleratedBadRows && unusable * kToleratedBadShare > rows_;
   if (!none && !too_many) return;
   if (!first_bad_) throw InputError(name_, 0, "", std::string("holds no ") + what, remedy);
   throw InputError(name_, first_bad_->line, first_bad_->field,
-                   first_bad_->message + "; " + std::to_string(bad_ + nan_) + " of " + std::to_string(rows_) +
+                   first_bad_->message + "; " + std::to_string(unusable) + " of " + std::to_string(rows_) +
                        " rows are not " + what,
                    remedy);
 }

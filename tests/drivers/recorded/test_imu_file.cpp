@@ -117,6 +117,14 @@ TEST_CASE("a file of another kind is refused with its first bad line", "[imu_fil
   CHECK(contains(errorOf([] { ReadImu("1,nan,0,0,0,0,9.8\n"); }).message, "not finite"));
 }
 
+TEST_CASE("more than a tenth of NaN rows is refused", "[imu_file]") {
+  std::string text = kImuHeader + rows(0, 30);
+  for (int i = 30; i < 34; ++i) text += std::to_string(1000 + 5 * i) + "000000,0.1,nan,0.3,9.7,0.5,-1.25\n";
+  const InputError error = errorOf([&] { ReadImu{text}; });
+  CHECK(error.line == 32);
+  CHECK(contains(error.message, "4 of 34 rows"));
+}
+
 TEST_CASE("a stamp at the end of the range is a bad row", "[imu_file]") {
   const ReadImu read(kImuHeader + rows(0, 20) + "9223372036854775807,0.1,-0.2,0.3,9.7,0.5,-1.25\n" +
                      "-9223372036854775808,0.1,-0.2,0.3,9.7,0.5,-1.25\n" + rows(20, 40));
