@@ -8,6 +8,7 @@
 #include <fstream>
 #include <set>
 #include <sstream>
+#include <vector>
 
 #include "drivers/input/input_error.hpp"
 #include "firmware_host/settings/registry.hpp"
@@ -114,7 +115,14 @@ std::string groupOf(std::string_view key) { return std::string(key.substr(0, key
 void readSettingsText(const std::string& name, std::string_view text, Settings& settings) {
   YAML::Node root;
   try {
-    root = YAML::Load(std::string(text));
+    const std::vector<YAML::Node> documents = YAML::LoadAll(std::string(text));
+    for (std::size_t i = 1; i < documents.size(); ++i) {
+      if (documents[i].IsNull()) continue;
+      throw InputError(name, documents[i].Mark().line + 1, "",
+                       "a second YAML document begins before this line",
+                       "Remove the line `---` between the settings");
+    }
+    if (!documents.empty()) root = documents.front();
   } catch (const YAML::Exception& error) {
     throw InputError(name, error.mark.line + 1, "", "not valid YAML (" + error.msg + ")",
                      "Compare it with the output of `swiftlet settings`");

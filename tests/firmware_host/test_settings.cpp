@@ -140,6 +140,20 @@ TEST_CASE("a file with one error changes nothing") {
   CHECK(settings.odometry.horizon == OdometrySettings{}.horizon);
 }
 
+TEST_CASE("a second document in a settings file is refused with its line") {
+  Settings settings;
+  try {
+    readSettingsText("two.yaml", "smoother:\n  pixel_sigma: 0.5\n---\nmesh:\n  enabled: false\n", settings);
+    FAIL("no error");
+  } catch (const InputError& error) {
+    CHECK(error.line == 4);
+    CHECK(error.remedy.find("---") != std::string::npos);
+  }
+  readSettingsText("one.yaml", "---\nsmoother:\n  pixel_sigma: 0.5\n---\n", settings);
+  readSettingsText("empty.yaml", "", settings);
+  CHECK(settings.odometry.pixel_sigma == 0.5);
+}
+
 TEST_CASE("overrides from the command line") {
   Settings settings;
   overrideSetting("smoother.horizon=3", settings);
