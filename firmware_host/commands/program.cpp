@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <exception>
+#include <filesystem>
 
 #include "drivers/input/input_error.hpp"
 #include "firmware_host/commands/command.hpp"
@@ -11,7 +12,6 @@
 #include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {
-
 int runProgram(int argc, char** argv) {
   holdStandardStreams();
   CLI::App app("swiftlet: stereo-inertial state estimation for drones");
@@ -36,6 +36,10 @@ int runProgram(int argc, char** argv) {
     return app.exit(error) == 0 ? kExitDone : kExitBadInput;
   } catch (const InputError& error) {
     warn(fmt::format("error: {}\n", error.what()));
+    return kExitBadInput;
+  } catch (const std::filesystem::filesystem_error& error) {
+    warn(fmt::format("error: {}: {}. Check that this path exists and that you may read and write it\n",
+                     error.path1().string(), error.code().message()));
     return kExitBadInput;
   } catch (const std::exception& error) {
     warn(fmt::format("error: {}\n", error.what()));
