@@ -1,4 +1,8 @@
 #include "firmware_host/commands/calibrate_commands.hpp"
+
+#include <filesystem>
+
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/commands/command.hpp"
 
 namespace swiftlet {
@@ -12,6 +16,13 @@ void addCalibrateCommand(CLI::App& app, int& exit_code) {
   addCalibrateImuCamera(*command, exit_code);
   addCalibrateImuNoise(*command, exit_code);
   addCalibrateCheck(*command, exit_code);
+}
+
+std::string fileBeside(const std::string& out, const char* extension) {
+  std::string beside = std::filesystem::path(out).replace_extension(extension).string();
+  if (beside != out) return beside;
+  throw InputError(out, 0, "--out", std::string("the file written beside it has the extension ") + extension,
+                   "Give another extension");
 }
 
 }  // namespace swiftlet

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -20,12 +19,12 @@ struct ImuNoiseOptions {
 };
 
 int calibrateImuNoise(const ImuNoiseOptions& options) {
+  const std::string page = options.out.empty() ? "" : fileBeside(options.out, ".html");
   const ImuNoiseResult result = measureImuNoise(options.log);
   warnAll(result.warnings);
   fmt::print("{}", imuNoiseText(result));
   if (!options.out.empty()) {
     writeWholeFile(options.out, imuNoiseYaml(result));
-    const std::string page = std::filesystem::path(options.out).replace_extension(".html").string();
     writeCalibrationPage(page, imuNoisePage(result));
     fmt::print("written to {} and {}\n", options.out, page);
   }

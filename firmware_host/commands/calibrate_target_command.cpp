@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <string>
@@ -25,7 +24,7 @@ int printTarget(TargetOptions options) {
   options.layout.kind = options.kind == "checkerboard" ? TargetKind::kCheckerboard : TargetKind::kAprilGrid;
   const Eigen::Vector2d paper = paperSize(options.paper);
   const CalibrationTarget target = boardForPaper(options.layout, paper);
-  const std::string yaml = std::filesystem::path(options.out).replace_extension(".yaml").string();
+  const std::string yaml = fileBeside(options.out, ".yaml");
   writeWholeFile(options.out, boardPdf(target, paper));
   writeWholeFile(yaml, targetYaml(target));
   fmt::print(

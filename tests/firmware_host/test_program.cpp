@@ -67,6 +67,16 @@ TEST_CASE("simulate overwrites simulated logs only") {
   }
 }
 
+TEST_CASE("the file beside --out is another one") {
+  const ScratchFolder folder("beside");
+  const std::string board = folder.file("board.yaml");
+  CHECK(run({"calibrate", "target", "--out", board}) == kExitBadInput);
+  CHECK_FALSE(std::filesystem::exists(board));
+  CHECK(run({"calibrate", "target", "--out", folder.file("board.pdf")}) == kExitDone);
+  CHECK(test::textOf(board).starts_with("target_type"));
+  CHECK(run({"calibrate", "imu-noise", folder.path(), "--out", folder.file("x.html")}) == kExitBadInput);
+}
+
 TEST_CASE("a check of a log that a signal ends is not passed") {
   const ScratchFolder folder("stopped_check");
   const std::string settings = folder.file("settings.yaml");
