@@ -248,14 +248,25 @@ class ReplayRun {
     result.summary = output_->summary(facts_);
     result.statistics = output_->observer().statistics();
     result.has_pose = result.statistics.first_pose.has_value();
-    const Trajectory truth = source_->groundTruth();
-    if (request_.accuracy && !truth.empty() && result.has_pose) {
-      result.summary["accuracy"] = request_.accuracy(request_.out, truth, source_->groundTruthName(),
-                                                     *result.statistics.first_image, settings_.evaluation);
-    }
+    addAccuracy(result);
     output_->writeSummary(result.summary);
     if (const char* problem = lost_.problem()) result.lost = problem;
     return result;
+  }
+
+  /// The run is worth something without it.
+  void addAccuracy(ReplayResult& result) {
+    if (!request_.accuracy || !result.has_pose) return;
+    try {
+      const Trajectory truth = source_->groundTruth();
+      if (truth.empty()) return;
+      result.summary["accuracy"] = request_.accuracy(request_.out, truth, source_->groundTruthName(),
+                                                     *result.statistics.first_image, settings_.evaluation);
+    } catch (const InputError& error) {
+      const std::string line = fmt::format("accuracy left out: {}", error.what());
+      warn("warning: " + line + "\n");
+      result.summary["warnings"].push_back(line);
+    }
   }
 
   const ReplayRequest request_;

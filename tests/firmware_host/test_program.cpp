@@ -20,6 +20,7 @@
 #include "firmware_host/files/line_file.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"
 #include "tests/firmware_host/run_program.hpp"
+#include "tests/firmware_host/run_summary.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/support/text.hpp"
 
@@ -94,6 +95,18 @@ TEST_CASE("a check of a log that a signal ends is not passed") {
     CHECK(run(words) == kExitFailed);
     signal.join();
   }
+}
+
+TEST_CASE("a replay is complete without a truth that can be read") {
+  const ScratchFolder folder("bad_truth");
+  const std::string flight = folder.file("flight");
+  const std::string out = folder.file("run");
+  REQUIRE(run({"simulate", "--tracks", "--duration", "3", "--seed", "7", "--out", flight}) == kExitDone);
+  std::ofstream(flight + "/mav0/state_groundtruth_estimate0/data.csv") << "1,a\n2,b\n3,c\n4,d\n";
+  CHECK(run({"replay", flight, "--out", out}) == kExitDone);
+  const auto summary = test::summaryIn(out);
+  CHECK_FALSE(summary.contains("accuracy"));
+  CHECK(summary["warnings"].dump().find("state_groundtruth_estimate0/data.csv") != std::string::npos);
 }
 
 TEST_CASE("evaluate compares two files; without common stamps it fails") {
