@@ -12,6 +12,22 @@
 #include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {
+namespace {
+
+/// An empty name would be that of the current folder.
+void refuseEmptyOut(CLI::App& app) {
+  for (CLI::App* command : app.get_subcommands({})) {
+    if (CLI::Option* out = command->get_option_no_throw("--out")) {
+      out->check([](const std::string& name) {
+        return name.empty() ? std::string("the name is empty. Give a file or folder") : std::string();
+      });
+    }
+    refuseEmptyOut(*command);
+  }
+}
+
+}  // namespace
+
 int runProgram(int argc, char** argv) {
   holdStandardStreams();
   CLI::App app("swiftlet: stereo-inertial state estimation for drones");
@@ -30,6 +46,7 @@ int runProgram(int argc, char** argv) {
   addSettingsCommand(app, exit_code);
   addLabCommands(app, exit_code);
   addManCommand(app, exit_code);
+  refuseEmptyOut(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

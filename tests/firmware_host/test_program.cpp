@@ -68,6 +68,37 @@ TEST_CASE("simulate overwrites simulated logs only") {
   }
 }
 
+TEST_CASE("names and numbers that mean nothing are refused") {
+  const ScratchFolder folder("bad_options");
+  const std::string flight = folder.file("flight");
+  const std::vector<std::string> simulate = {"simulate", "--tracks", "--duration", "0.3", "--out", flight};
+  const std::vector<std::vector<std::string>> bad = {
+      {"--stamp-offset", "nan"},         {"--stamp-offset", "1e30"}, {"--blackout", "nan", "1"},
+      {"--camera-missing", "-1", "-5"},  {"--imu-gap", "inf", "1"},  {"--imu-gap", "1e30", "1"},
+      {"--board", folder.file("b.yaml")}};
+  for (const std::vector<std::string>& option : bad) {
+    INFO(option[0] << " " << option[1]);
+    std::vector<std::string> words = simulate;
+    words.insert(words.end(), option.begin(), option.end());
+    CHECK(run(words) == kExitBadInput);
+    CHECK_FALSE(std::filesystem::exists(flight));
+  }
+  REQUIRE(run(simulate) == kExitDone);
+  for (const char* command : {"replay", "mesh", "place", "fuse"}) {
+    INFO(command);
+    CHECK(run({command, flight, "--out", ""}) == kExitBadInput);
+  }
+  // A folder below a file.
+  std::ofstream(folder.file("file")) << "x";
+  const std::string log = std::string(SWIFTLET_TEST_DATA) + "/euroc_mh01_4s";
+  CHECK(run({"place", log, "--out", folder.file("file/out")}) == kExitBadInput);
+  CHECK(run({"budget", flight, "--out", folder.file("file/out")}) == kExitBadInput);
+  for (const char* option : {"--mono", "--map", "--record", "--loop-closure"}) {
+    INFO(option);
+    CHECK(run({"replay", flight, "--reproduce", option, "--out", folder.file("run")}) == kExitBadInput);
+  }
+}
+
 TEST_CASE("the file beside --out is another one") {
   const ScratchFolder folder("beside");
   const std::string board = folder.file("board.yaml");

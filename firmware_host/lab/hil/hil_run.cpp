@@ -127,7 +127,7 @@ class HilRun {
 
   HilResult operator()() {
     if (settings_.imu_link.device.empty()) {
-      throw InputError("", 0, "imu_link.device", "no IMU is set",
+      throw InputError("settings", 0, "imu_link.device", "no IMU is set",
                        "Set a serial port that does not exist (its name is linked to a pseudo-terminal), or "
                        "a CAN interface");
     }
