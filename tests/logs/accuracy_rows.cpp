@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <istream>
 #include <ostream>
 #include <sstream>
@@ -17,6 +18,17 @@ const AccuracyRow* findCase(const std::vector<AccuracyRow>& rows, const Accuracy
   const auto found = std::ranges::find_if(rows, [&](const AccuracyRow& r) { return r.sameCase(wanted); });
   return found == rows.end() ? nullptr : &*found;
 }
+
+// An empty field is a log too short for the figure.
+bool readFigure(std::istream& fields, double& figure) {
+  std::string text;
+  std::getline(fields, text, ',');
+  figure = std::nan("");
+  std::istringstream number(text);
+  return text.empty() || (number >> figure && number.eof());
+}
+
+std::string figureText(double figure) { return std::isnan(figure) ? "" : fmt::format("{:.4f}", figure); }
 
 std::string nameOf(const AccuracyRow& row) {
   return fmt::format("{}, {} camera{}, {}", row.log, row.cameras, row.cameras == 1 ? "" : "s",
@@ -33,7 +45,7 @@ std::vector<std::string> findWorse(const std::vector<AccuracyRow>& now,
                                    const std::vector<AccuracyRow>& before) {
   std::vector<std::string> lines;
   const auto compare = [&](const AccuracyRow& row, const char* section, double value, double committed) {
-    if (!isWorse(value, committed)) return;
+    if (std::isnan(committed) || !isWorse(value, committed)) return;
     lines.push_back(
         fmt::format("{}, {}: {:.4f} m, committed {:.4f} m", nameOf(row), section, value, committed));
   };
@@ -80,8 +92,9 @@ std::vector<AccuracyRow> readAccuracyRows(std::istream& in) {
     std::istringstream fields(line);
     AccuracyRow row;
     char comma = 0;
-    const bool read = std::getline(fields, row.log, ',') && fields >> row.cameras >> comma &&
-                      std::getline(fields, row.trajectory, ',') && fields >> row.all >> comma >> row.from_3s;
+    const bool read = std::ranges::count(line, ',') == 4 && std::getline(fields, row.log, ',') &&
+                      fields >> row.cameras >> comma && std::getline(fields, row.trajectory, ',') &&
+                      readFigure(fields, row.all) && readFigure(fields, row.from_3s);
     if (!read) throw std::runtime_error(fmt::format("line {}: not `{}`", number, kHeader));
     rows.push_back(row);
   }
@@ -91,8 +104,8 @@ std::vector<AccuracyRow> readAccuracyRows(std::istream& in) {
 void writeAccuracyRows(std::ostream& out, const std::vector<AccuracyRow>& rows) {
   out << kHeader << '\n';
   for (const AccuracyRow& row : rows) {
-    out << fmt::format("{},{},{},{:.4f},{:.4f}\n", row.log, row.cameras, row.trajectory, row.all,
-                       row.from_3s);
+    out << fmt::format("{},{},{},{},{}\n", row.log, row.cameras, row.trajectory, figureText(row.all),
+                       figureText(row.from_3s));
   }
 }
 
@@ -103,11 +116,11 @@ std::string accuracyMarkdown(const std::vector<AccuracyRow>& now, const std::vec
   for (const AccuracyRow& row : now) {
     const AccuracyRow* committed = findCase(before, row);
     const auto cell = [&](double AccuracyRow::*value) {
-      return committed == nullptr ? std::string("new") : fmt::format("{:.4f}", committed->*value);
+      return committed == nullptr ? std::string("new") : figureText(committed->*value);
     };
-    text +=
-        fmt::format("| `{}` | {} | {} | {:.4f} | {} | {:.4f} | {} |\n", row.log, row.cameras, row.trajectory,
-                    row.all, cell(&AccuracyRow::all), row.from_3s, cell(&AccuracyRow::from_3s));
+    text += fmt::format("| `{}` | {} | {} | {} | {} | {} | {} |\n", row.log, row.cameras, row.trajectory,
+                        figureText(row.all), cell(&AccuracyRow::all), figureText(row.from_3s),
+                        cell(&AccuracyRow::from_3s));
   }
   return text;
 }

@@ -26,7 +26,8 @@ inline constexpr double kAllowedMetres = 0.0003;
 /// True when `now` exceeds `before` by more than what is allowed, or is no number.
 bool isWorse(double now, double before);
 
-/// What got worse, a line each: "log, 2 cameras, odometry, all: 0.0120 m, committed 0.0070 m".
+/// What got worse than a committed number, a line each: "log, 2 cameras, odometry, all: 0.0120 m, committed
+/// 0.0070 m".
 std::vector<std::string> findWorse(const std::vector<AccuracyRow>& now,
                                    const std::vector<AccuracyRow>& before);
 
@@ -38,7 +39,8 @@ std::vector<std::string> findLost(const std::vector<AccuracyRow>& now,
 /// goes, rows of other logs stay.
 std::vector<AccuracyRow> updatedRows(const std::vector<AccuracyRow>& now, std::vector<AccuracyRow> before);
 
-/// `log,cameras,trajectory,all_m,from_3s_m`, 4 decimals. Throws std::runtime_error naming the line.
+/// `log,cameras,trajectory,all_m,from_3s_m`, 4 decimals; no number is an empty field. Throws
+/// std::runtime_error naming the line.
 std::vector<AccuracyRow> readAccuracyRows(std::istream& in);
 void writeAccuracyRows(std::ostream& out, const std::vector<AccuracyRow>& rows);
 

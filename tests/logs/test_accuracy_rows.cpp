@@ -36,6 +36,21 @@ TEST_CASE("rows are compared with their own case, in both sections") {
   CHECK(findWorse({{"b", 2, "odometry", 9, 9}}, before).empty());  // not committed yet
 }
 
+TEST_CASE("a log too short for a figure has an empty field, and cannot get worse") {
+  std::istringstream given("log,cameras,trajectory,all_m,from_3s_m\na,2,map,0.0050,\n");
+  const std::vector<AccuracyRow> before = readAccuracyRows(given);
+  REQUIRE(before.size() == 1);
+  CHECK(before[0].all == 0.005);
+  CHECK(std::isnan(before[0].from_3s));
+  CHECK(findWorse(before, before).empty());
+  CHECK(findWorse({{"a", 2, "map", 0.009, 0.1}}, before).size() == 1);
+  std::ostringstream written;
+  writeAccuracyRows(written, before);
+  CHECK(written.str() == given.str());
+  std::istringstream cut("a,2,map,0.0050\n");
+  CHECK_THROWS_AS(readAccuracyRows(cut), std::runtime_error);
+}
+
 TEST_CASE("committed rows that are no longer produced are named") {
   const std::vector<AccuracyRow> before = {
       {"a", 2, "odometry", 1, 1}, {"a", 1, "map", 1, 1}, {"b", 2, "map", 1, 1}};

@@ -61,22 +61,28 @@ TEST_CASE("four real seconds with one camera: a pose within a second, within a c
   checkRun({true, 1.0});
 }
 
-// The images' clock 40 ms behind the IMU's, eight of its periods, and a calibration that says so.
+// The images' clock 40 ms behind the IMU's, eight of its periods, and a calibration that says so. Poses and
+// the truth have the images' stamps.
 TEST_CASE("images stamped long before their samples: an IMU between all of them") {
   constexpr std::int64_t kBehind = 40'000'000;  // ns
   const ScratchFolder folder("short_log_behind");
   const std::string log = folder.file("log");
   std::filesystem::copy(shortLog(), log, std::filesystem::copy_options::recursive);
-  for (const std::string camera : {"/mav0/cam0/", "/mav0/cam1/"}) {
-    std::ofstream(log + camera + "sensor.yaml", std::ios::app) << "timeshift_cam_imu: 0.04\n";
-    std::string rows = "#timestamp [ns],filename\n";
-    std::istringstream given(test::textOf(log + camera + "data.csv"));
+  for (const std::string part : {"cam0", "cam1", "state_groundtruth_estimate0"}) {
+    const std::string file = log + "/mav0/" + part + "/data.csv";
+    std::istringstream given(test::textOf(file));
+    std::string rows;
     for (std::string line; std::getline(given, line);) {
-      if (line.front() == '#') continue;
       const std::size_t comma = line.find(',');
-      rows += std::to_string(std::stoll(line.substr(0, comma)) - kBehind) + line.substr(comma) + '\n';
+      rows += line.front() == '#'
+                  ? line
+                  : std::to_string(std::stoll(line.substr(0, comma)) - kBehind) + line.substr(comma);
+      rows += '\n';
     }
-    std::ofstream(log + camera + "data.csv") << rows;
+    std::ofstream(file) << rows;
+  }
+  for (const std::string camera : {"cam0", "cam1"}) {
+    std::ofstream(log + "/mav0/" + camera + "/sensor.yaml", std::ios::app) << "timeshift_cam_imu: 0.04\n";
   }
   ReplayRequest request;
   request.accuracy = runAccuracyJson;
