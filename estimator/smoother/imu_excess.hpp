@@ -17,7 +17,7 @@ namespace swiftlet {
 
 /// Mean squares of a whitened coordinate.
 struct MotionResiduals {
-  double all = 0;    ///< in the noise in use, rest included
+  double all = 0;    ///< in the noise in use
   double gyro = 0;   ///< of rotations over the last seconds, configured noise; 0 while there are too few
   double accel = 0;  ///< of velocities over the last seconds, in the configured noise
 };
