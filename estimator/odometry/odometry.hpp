@@ -2,11 +2,11 @@
 // The odometry: front-end, IMU and smoother with health, for programs with one thread.
 //
 // Two steps per frame: `track` (images to tracks) and `smooth` (tracks and IMU to states). IMU samples are
-// added as they arrive, each before the first frame whose stamp is not earlier. No clock, no files, no
-// threads. Memory: about 24 MiB at 752 x 480 stereo, reserved by the constructor; no allocation afterwards.
-// Frames: T_world_body; world is gravity-aligned with z up, with origin and yaw of the epoch's first state.
-// Stamps: frames have the image clock, propagated states the IMU's clock. Rules of start, health, events and
-// reset: docs/odometry.md.
+// added as they arrive, each before the first frame that is not earlier on the IMU's clock (its stamp
+// and Rig::sampleLead). No clock, no files, no threads. Memory: about 24 MiB at 752 x 480 stereo, reserved by
+// the constructor; no allocation afterwards. Frames: T_world_body; world is gravity-aligned with z up, with
+// origin and yaw of the epoch's first state. Stamps: frames have the image clock, propagated states the IMU's
+// clock. Rules of start, health, events and reset: docs/odometry.md.
 
 #include <memory>
 

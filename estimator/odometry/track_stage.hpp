@@ -2,10 +2,10 @@
 // The stage of the thread `track`: images to tracks, with pixels predicted from the gyro and the newest
 // window.
 //
-// Add samples before the first frame whose stamp is not earlier, and windows when they are available; an
-// older window only makes predictions less accurate. A window of a new epoch drops the tracks. Memory: the
-// front-end's 6.5 MiB at 752 x 480 stereo and half a MiB of samples; no allocation after the constructor.
-// Cost, rules and sources: docs/odometry.md, docs/frontend.md.
+// Add samples before the first frame that is not earlier on the IMU's clock (Rig::sampleLead), and windows
+// when they are available; an older window only makes predictions less accurate. A window of a new epoch
+// drops the tracks. Memory: the front-end's 6.5 MiB at 752 x 480 stereo and half a MiB of samples; no
+// allocation after the constructor. Cost, rules and sources: docs/odometry.md, docs/frontend.md.
 
 #include "estimator/camera/rig.hpp"
 #include "estimator/core/status.hpp"
