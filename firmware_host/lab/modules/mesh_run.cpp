@@ -152,7 +152,7 @@ void MeshRun::begin() {
 
 std::optional<GivenPoses::Pose> MeshRun::poseAt(Stamp stamp) {
   ++frames_;
-  const auto pose = log_.poses().at(stamp);
+  auto pose = log_.poses().at(stamp);
   if (!pose) ++without_pose_;
   return pose;
 }
