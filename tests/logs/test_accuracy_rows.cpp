@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iterator>
 #include <sstream>
+#include <stdexcept>
 
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/accuracy_rows.hpp"
