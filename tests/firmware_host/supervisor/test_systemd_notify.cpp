@@ -238,27 +238,22 @@ TEST_CASE("a watchdog that is off stays off when a run fails", "[systemd]") {
   CHECK(heard.size() == 1);
 }
 
-TEST_CASE("the end is told", "[systemd]") {
-  const Listener listener(nullptr);
-  SystemdNotify notify;
-  SimulatedFlight flight(true, 1, &notify);
-  heardIn(flight, listener, 5.0);
-  flight.supervisor.expectEnd();
-  const std::vector<std::string> heard = heardIn(flight, listener, 5.0);
-  CHECK(count(heard, "STOPPING=1") == 1);
-  CHECK(count(heard, "WATCHDOG=1") == 0);
-  flight.supervisor.stop();
-  CHECK(listener.hear().empty());
-}
-
-TEST_CASE("an end between two looks is told", "[systemd]") {
-  const Listener listener(nullptr);
-  SystemdNotify notify;
-  SimulatedFlight flight(true, 1, &notify);
-  heardIn(flight, listener, 5.0);
-  flight.supervisor.expectEnd();
-  flight.supervisor.stop();
-  CHECK(listener.hear() == std::vector<std::string>{"STOPPING=1"});
+TEST_CASE("the end is told once, whether or not the supervisor looks again", "[systemd]") {
+  for (const bool looks : {true, false}) {
+    INFO("looks " << looks);
+    const Listener listener(nullptr);
+    SystemdNotify notify;
+    SimulatedFlight flight(true, 1, &notify);
+    heardIn(flight, listener, 5.0);
+    flight.supervisor.expectEnd();
+    if (looks) {
+      const std::vector<std::string> heard = heardIn(flight, listener, 5.0);
+      CHECK(count(heard, "STOPPING=1") == 1);
+      CHECK(count(heard, "WATCHDOG=1") == 0);
+    }
+    flight.supervisor.stop();
+    CHECK(listener.hear() == (looks ? std::vector<std::string>{} : std::vector<std::string>{"STOPPING=1"}));
+  }
 }
 
 }  // namespace
