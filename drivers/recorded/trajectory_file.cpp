@@ -127,6 +127,11 @@ Trajectory readTrajectoryText(const std::string& name, std::string_view text, Lo
   return readRows(csv, separator == CsvReader::Separator::kComma, counters, warnings);
 }
 
+Trajectory onImageClock(Trajectory poses, Duration camera_to_imu_shift) {
+  for (TrajectoryPoint& point : poses) point.stamp = point.stamp - camera_to_imu_shift;
+  return poses;
+}
+
 std::string formatSeconds(Stamp stamp) {
   const bool negative = stamp.ns < 0;
   const auto ns = static_cast<std::uint64_t>(stamp.ns);

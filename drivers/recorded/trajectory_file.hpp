@@ -39,6 +39,10 @@ Trajectory readTrajectoryText(const std::string& name, std::string_view text, Lo
 /// its line; no row is skipped. `remedy` ends the message.
 Trajectory readWholeTrajectory(const std::string& path, const std::string& remedy);
 
+/// Poses with stamps of the IMU's clock, as a log's truth has them, with those of the images' clock:
+/// t_image = t_imu - `camera_to_imu_shift`.
+Trajectory onImageClock(Trajectory poses, Duration camera_to_imu_shift);
+
 /// "sec.nnnnnnnnn", exact.
 std::string formatSeconds(Stamp stamp);
 

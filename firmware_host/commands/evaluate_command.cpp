@@ -8,6 +8,7 @@
 #include "drivers/bag/bag_file.hpp"
 #include "drivers/input/file_tree.hpp"
 #include "drivers/input/input_error.hpp"
+#include "estimator/core/units.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/command.hpp"
 #include "firmware_host/files/whole_file.hpp"
@@ -17,6 +18,7 @@
 #include "firmware_host/lab/evaluation/evaluate_run.hpp"
 #include "firmware_host/lab/evaluation/mesh_report.hpp"
 #include "firmware_host/lab/hil/hil_checks.hpp"
+#include "firmware_host/outputs/run_folder/summary.hpp"
 
 namespace swiftlet {
 namespace {
@@ -45,6 +47,7 @@ struct Subject {
   std::string truth;
   std::string log;  ///< that the run was made from, or that holds the truth; empty: none known
   std::optional<Stamp> first_image;
+  Duration shift;            ///< from the clock of the files to that of the truth
   bool from_tracks = false;  ///< the log need not hold images
 };
 
@@ -81,6 +84,7 @@ Subject subjectOf(const EvaluateOptions& options) {
     if (run.contains("first_image_ns") && run["first_image_ns"].is_number_integer()) {
       subject.first_image = Stamp{run["first_image_ns"].get<std::int64_t>()};
     }
+    subject.shift = cameraToImuShift(summary);
     if (run.contains("log")) subject.log = run["log"].get<std::string>();
     if (subject.truth.empty() && run.contains("log")) {
       subject.truth = subject.log;
@@ -157,7 +161,8 @@ std::string titleOf(const EvaluateOptions& options, const std::string& file) {
 int evaluatePositions(const EvaluateOptions& options, const Settings& settings, const Subject& subject) {
   LogCounters counters;
   LogWarnings warnings;
-  const std::vector<PositionPoint> truth = readPositions(subject.truth, counters, warnings);
+  std::vector<PositionPoint> truth = readPositions(subject.truth, counters, warnings);
+  for (PositionPoint& point : truth) point.stamp = point.stamp - subject.shift;
   for (const std::string& line : warnings.lines()) fmt::print(stderr, "warning: {}\n", line);
   PositionAccuracyOptions how{accuracyOptions(settings.evaluation, options.align), std::nullopt};
   if (options.fit_shift > 0) how.reach = Duration::fromSeconds(options.fit_shift);
@@ -195,11 +200,17 @@ int evaluate(const EvaluateOptions& options) {
     throw InputError(subject.truth, 0, "--fit-shift", "applies only to a truth of positions without attitude",
                      "Omit it: poses must have stamps of the log's clock");
   }
-  const Truth truth = readTruth(subject.truth, subject.from_tracks);
+  Truth truth = readTruth(subject.truth, subject.from_tracks);
+  truth.poses = onImageClock(std::move(truth.poses), subject.shift);
   AccuracyOptions accuracy_options = accuracyOptions(settings.evaluation, options.align);
   Json json;
   json["truth"] = truth.name;
-  if (!options.json) fmt::print("truth: {}\n", truth.name);
+  if (!options.json) {
+    fmt::print("truth: {}{}\n", truth.name,
+               subject.shift.ns == 0 ? ""
+                                     : fmt::format(", at image stamps + {:.3f} ms (clock of the IMU)",
+                                                   kToMs * subject.shift.seconds()));
+  }
   bool compared = true;
   for (const std::string& file : subject.files) {
     const Trajectory estimate = readEstimate(file);

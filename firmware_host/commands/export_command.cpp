@@ -43,10 +43,10 @@ struct ExportOptions {
 /// be there.
 Trajectory truthOf(const ExportOptions& options, const RunFolder& run) {
   if (options.no_truth) return {};
-  if (!options.truth.empty()) return readTruth(options.truth, run.from_tracks).poses;
+  if (!options.truth.empty()) return onImageClock(readTruth(options.truth, run.from_tracks).poses, run.shift);
   if (run.log.empty()) return {};
   try {
-    return readTruth(run.log, true).poses;
+    return onImageClock(readTruth(run.log, true).poses, run.shift);
   } catch (const InputError& error) {
     fmt::print("truth omitted: {}\n", error.what());
     return {};

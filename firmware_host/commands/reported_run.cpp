@@ -6,6 +6,7 @@
 #include "drivers/input/input_error.hpp"
 #include "firmware_host/lab/evaluation/confusion_picture.hpp"
 #include "firmware_host/lab/evaluation/evaluate_run.hpp"
+#include "firmware_host/outputs/run_folder/summary.hpp"
 
 namespace swiftlet {
 
@@ -19,6 +20,7 @@ ReportedRun readReportedRun(const std::string& folder, const std::string& given_
   if (!source.empty()) {
     try {
       truth = readTruth(source, true);
+      truth.poses = onImageClock(std::move(truth.poses), cameraToImuShift(files.summary));
     } catch (const InputError& error) {
       // That a log has no truth is no fault of the run; a truth that was asked for has to be there.
       if (!given_truth.empty()) throw;

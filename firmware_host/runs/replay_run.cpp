@@ -258,7 +258,7 @@ class ReplayRun {
   void addAccuracy(ReplayResult& result) {
     if (!request_.accuracy || !result.has_pose) return;
     try {
-      const Trajectory truth = source_->groundTruth();
+      const Trajectory truth = onImageClock(source_->groundTruth(), cameraToImuShift(result.summary));
       if (truth.empty()) return;
       result.summary["accuracy"] = request_.accuracy(request_.out, truth, source_->groundTruthName(),
                                                      *result.statistics.first_image, settings_.evaluation);

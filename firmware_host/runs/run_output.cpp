@@ -132,6 +132,10 @@ void RunOutput::smooth(const std::atomic<bool>* stop, bool announce) {
 nlohmann::ordered_json RunOutput::summary(const RunFacts& facts) {
   const RunStatistics& statistics = observer_.statistics();
   nlohmann::ordered_json summary = summaryOf(facts, settings_, statistics);
+  const CalibrationEstimate* estimate = statistics.verdict.estimatedCalibration();
+  const bool estimated = estimate != nullptr && estimate->shift_sigma > 0;
+  summary["run"]["t_imu_minus_t_image_ns"] =
+      (estimated ? estimate->camera_to_imu_shift : calibration_.rig.camera_to_imu_shift).ns;
   if (const char* problem = lost_.problem()) {
     summary["executor"]["files"] = {{"lost", lost_.count()}, {"first", problem}};
   }

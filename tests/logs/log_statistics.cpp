@@ -117,7 +117,8 @@ void addLog(const std::string& log, Totals& totals) {
   constexpr double kStartEvery = 2.0;  // s
   constexpr double kStartAfter = 0.5;  // s, when a start is judged
   constexpr double kMinSpeed = 0.05;   // m/s: at rest there is nothing to find
-  const Trajectory truth = openLog(log, LogOptions{})->groundTruth();
+  const auto source = openLog(log, LogOptions{});
+  const Trajectory truth = onImageClock(source->groundTruth(), source->rig().camera_to_imu_shift);
   const Run whole = runLog(log, 0, kNotAsked);
   if (truth.empty() || whole.states.empty()) {
     fmt::print("  {}: no truth, or no pose\n", log);

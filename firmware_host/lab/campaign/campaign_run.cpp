@@ -17,6 +17,7 @@
 #include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/lab/campaign/child_process.hpp"
 #include "firmware_host/lab/evaluation/evaluate_run.hpp"
+#include "firmware_host/outputs/run_folder/summary.hpp"
 #include "firmware_host/settings/registry.hpp"
 #include "firmware_host/settings/settings.hpp"
 
@@ -180,7 +181,8 @@ class Job {
     if (!log_.truth.empty() && summary["run"]["first_pose_ns"].is_number()) {
       try {
         const Truth truth = readTruth(log_.truth);
-        summary["accuracy"] = runAccuracyJson(runFolder(repeat), truth.poses, truth.name,
+        const Trajectory poses = onImageClock(truth.poses, cameraToImuShift(summary));
+        summary["accuracy"] = runAccuracyJson(runFolder(repeat), poses, truth.name,
                                               Stamp{summary["run"]["first_image_ns"].get<std::int64_t>()},
                                               Settings{}.evaluation);
       } catch (const std::exception& error) {

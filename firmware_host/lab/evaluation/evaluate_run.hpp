@@ -20,7 +20,8 @@ inline constexpr double kCommonStart = 3.0;
 
 AccuracyOptions accuracyOptions(const EvaluationGroup& settings, AlignKind align);
 
-/// A truth file's or a log's truth, in the estimator's body.
+/// A truth file's or a log's truth, in the estimator's body, on the IMU's clock. Everything below takes a
+/// truth on the images' clock (onImageClock), as a run's poses are.
 struct Truth {
   Trajectory poses;
   std::string name;

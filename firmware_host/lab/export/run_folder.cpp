@@ -10,6 +10,7 @@
 #include "firmware_host/lab/evaluation/association.hpp"
 #include "firmware_host/outputs/run_folder/events_log.hpp"
 #include "firmware_host/outputs/run_folder/states_csv.hpp"
+#include "firmware_host/outputs/run_folder/summary.hpp"
 
 namespace swiftlet {
 namespace {
@@ -35,11 +36,12 @@ void requireFile(const fs::path& path) {
 void readSummary(const fs::path& path, RunFolder& run) {
   if (!fs::exists(path)) return;
   std::ifstream file(path);
-  const nlohmann::json summary = nlohmann::json::parse(file, nullptr, false);
+  const auto summary = nlohmann::ordered_json::parse(file, nullptr, false);
   if (summary.is_discarded() || !summary.is_object()) {
     throw InputError(path, 0, "", "not valid JSON",
                      "Replay again, or remove the file: it names the log only");
   }
+  run.shift = cameraToImuShift(summary);
   const auto facts = summary.find("run");
   if (facts == summary.end() || !facts->is_object()) return;
   const auto log = facts->find("log");

@@ -30,6 +30,7 @@ struct RunFolder {
   std::string map_mesh;                  ///< path; empty: none
   std::string log;                       ///< that the run was made from; empty: not known
   bool from_tracks = false;              ///< the log need not hold images
+  Duration shift;                        ///< from its poses' clock to the truth's
 };
 
 RunFolder readRunFolder(const std::string& path);

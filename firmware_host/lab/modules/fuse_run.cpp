@@ -218,7 +218,8 @@ FuseRunResult FuseRun::end() {
                  {"depth", sensor_ ? "sensor" : "stereo"},
                  {"finished", finished_},
                  {"first_image_ns", log_.first()->ns},
-                 {"last_image_ns", log_.last()->ns}};
+                 {"last_image_ns", log_.last()->ns},
+                 {"t_imu_minus_t_image_ns", log_.rig().camera_to_imu_shift.ns}};
   json["moments"] = {{"with_depth", moments_},
                      {"without_pose", without_pose_},
                      {"refused", refused_},

@@ -232,7 +232,8 @@ MeshRunResult MeshRun::end() {
                  {"cameras", rig_.camera_count},
                  {"finished", finished_},
                  {"first_image_ns", log_.first()->ns},
-                 {"last_image_ns", log_.last()->ns}};
+                 {"last_image_ns", log_.last()->ns},
+                 {"t_imu_minus_t_image_ns", log_.rig().camera_to_imu_shift.ns}};
   json["frames"] = {{"images", frames_},       {"without_pose", without_pose_}, {"refused", refused_},
                     {"meshed", meshed_},       {"keyframes", keyframes_},       {"jumps", jumps_},
                     {"with_labels", labelled_}};

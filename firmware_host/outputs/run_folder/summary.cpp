@@ -185,6 +185,12 @@ std::string versionText() {
                      SWIFTLET_BUILD_CPU, __VERSION__);
 }
 
+Duration cameraToImuShift(const Json& summary) {
+  const Json::json_pointer pointer("/run/t_imu_minus_t_image_ns");
+  if (!summary.contains(pointer) || !summary.at(pointer).is_number_integer()) return {};
+  return Duration{summary.at(pointer).get<std::int64_t>()};
+}
+
 Json toJson(const LogCounters& log) {
   return {{"imu_samples", log.imu_samples},
           {"images", log.images},

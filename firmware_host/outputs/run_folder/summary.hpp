@@ -47,6 +47,10 @@ struct RunFacts {
 nlohmann::ordered_json summaryOf(const RunFacts& facts, const Settings& settings,
                                  const RunStatistics& statistics);
 
+/// From the images' clock, which the poses of a run have, to that of the IMU and the truth: as estimated at
+/// the run's end, or as calibrated. Zero where a summary does not say.
+Duration cameraToImuShift(const nlohmann::ordered_json& summary);
+
 nlohmann::ordered_json toJson(const LogCounters& log);
 /// Of full smoothing, under "full_smoothing" in the counters.
 nlohmann::ordered_json toJson(const FullSmootherReport& map);
