@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
+#include <map>
 
 #include "estimator/geometry/so3.hpp"
 
@@ -12,8 +14,9 @@ namespace {
 
 constexpr int kSteps = 22;  // each way, to 0.41 and 2.4 times
 constexpr double kStep = 0.04;
-constexpr double kEpipolarNoise =
-    0.5;  // px, of a track's distance from its epipolar line; where errors stop counting
+constexpr int kStride = 4;  // steps at first; the minimum is wider
+// px, of a track's distance from its epipolar line; where errors stop counting
+constexpr double kEpipolarNoise = 0.5;
 constexpr std::size_t kMostTurns = 150;
 constexpr int kRounds = 3;
 constexpr std::size_t kFewestOfFocal = 20;
@@ -44,21 +47,20 @@ double costOf(const TurnTracks& turn, const CameraModel& camera) {
     rays.push_back({from, to});
   }
   constexpr double kWorst = 6;  // of a pair that the lens cannot have seen
-  double cost = kWorst * static_cast<double>(turn.pairs.size() - normals.size());
+  const double cost = kWorst * static_cast<double>(turn.pairs.size() - normals.size());
   std::vector<double> weights(normals.size(), 1);
   double left = 0;
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 1; round <= kRounds; ++round) {
     Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
     for (std::size_t i = 0; i < normals.size(); ++i) sum += weights[i] * normals[i] * normals[i].transpose();
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(sum);
     const Eigen::Vector3d t = solver.eigenvectors().col(0);
-    left = 0;
     for (std::size_t i = 0; i < normals.size(); ++i) {
       const double gradient = t.cross(rays[i][0]).squaredNorm() + t.cross(rays[i][1]).squaredNorm() + 1e-12;
       const double distance = t.dot(normals[i]) * camera.focal() / kEpipolarNoise;
       const double squared = distance * distance / gradient;
-      left += std::log1p(squared);
       weights[i] = 1 / ((1 + squared) * gradient);
+      if (round == kRounds) left += std::log1p(squared);
     }
   }
   return cost + left;
@@ -98,17 +100,28 @@ std::optional<FocalFit> fitFocal(const std::vector<TrackedImage>& images,
   constexpr std::size_t kFewestTurns = 15;
   if (tracks.size() < kFewestTurns) return {};
   // Steps from the calibration's own, so that they are compared at equal ground.
-  std::vector<double> costs;
-  for (int i = -kSteps; i <= kSteps; ++i) costs.push_back(total(std::exp(i * kStep)));
-  const auto best = static_cast<std::size_t>(std::ranges::min_element(costs) - costs.begin());
-  if (best == 0 || best + 1 == costs.size()) return {};
-  const double curvature = costs[best - 1] - 2 * costs[best] + costs[best + 1];
+  std::map<int, double> costs;
+  const auto at = [&](int step) {
+    const auto [entry, fresh] = costs.try_emplace(step, 0.0);
+    if (fresh) entry->second = total(std::exp(step * kStep));
+    return entry->second;
+  };
+  int best = 0;
+  const auto look = [&](int from, int to, int stride) {
+    for (int step = from; step <= to; step += stride) {
+      if (at(step) < at(best)) best = step;
+    }
+  };
+  look(-kSteps / kStride * kStride, kSteps, kStride);
+  look(std::max(best - kStride + 1, -kSteps), std::min(best + kStride - 1, kSteps), 1);
+  if (std::abs(best) == kSteps) return {};
+  const double curvature = at(best - 1) - 2 * at(best) + at(best + 1);
   if (!(curvature > 0)) return {};
-  const double place = 0.5 * (costs[best - 1] - costs[best + 1]) / curvature;
+  const double place = 0.5 * (at(best - 1) - at(best + 1)) / curvature;
   FocalFit result;
-  result.ratio = std::exp(kStep * (static_cast<double>(best) - kSteps + place));
+  result.ratio = std::exp(kStep * (best + place));
   result.sigma = kStep / std::sqrt(curvature);
-  result.gain = 0.5 * (costs[kSteps] - costs[best]);
+  result.gain = 0.5 * (at(0) - at(best));
   return result;
 }
 
