@@ -71,6 +71,9 @@ void Preintegration::propagateCovariance(double dt, const Eigen::Vector3d& force
   const Eigen::Matrix3d p_sum = cov_.p_v + p_vnew;  // cov(p, v + v')
   cov_.p_p +=
       h * (p_sum + p_sum.transpose()) + (h * h) * (cov_.v_v + v_vnew + v_vnew.transpose() + vnew_vnew);
+  // White acceleration within the step: int t^2 = dt^3 / 3, of which the trapezoid rule has dt^3 / 4. Without
+  // it the covariance of a single step is singular.
+  cov_.p_p.diagonal().array() += accel_variance * dt * dt / 12.0;
   cov_.p_v = p_vnew + h * (v_vnew + vnew_vnew);
   cov_.v_v = vnew_vnew;
   cov_.v_theta = v_theta;

@@ -40,12 +40,13 @@ Matrix15d transition(const Transition& t, const Matrix15d& x) {
   return out;
 }
 
+// Over a step: int t = dt^2 / 2 and int t^2 = dt^3 / 3.
 void addWhiteAcceleration(Matrix15d& P, double variance, double dt) {
   for (int i = 0; i < 3; ++i) {
     P(kVelocity + i, kVelocity + i) += variance;
     P(kPosition + i, kVelocity + i) += 0.5 * dt * variance;
     P(kVelocity + i, kPosition + i) += 0.5 * dt * variance;
-    P(kPosition + i, kPosition + i) += 0.25 * dt * dt * variance;
+    P(kPosition + i, kPosition + i) += dt * dt / 3.0 * variance;
   }
 }
 
@@ -123,10 +124,7 @@ void Propagator::Current::advanceGap(double dt, const ImuNoise& noise) {
                      Eigen::Matrix3d::Zero()};
   P = transition(t, transition(t, P).transpose());
   P.diagonal().segment<3>(kTheta).array() += kGapGyroDensity * kGapGyroDensity * dt;
-  // White acceleration over a long step: int t^2 = dt^3 / 3, not the midpoint rule's dt^3 / 4.
-  const double variance = kGapAccelDensity * kGapAccelDensity * dt;
-  addWhiteAcceleration(P, variance, dt);
-  P.diagonal().segment<3>(kPosition).array() += variance * dt * dt / 12.0;
+  addWhiteAcceleration(P, kGapAccelDensity * kGapAccelDensity * dt, dt);
   addWalks(P, noise, dt);
   nav.T_world_body.translation += nav.v_world_body * dt;
   gap_seconds += dt;
@@ -134,19 +132,30 @@ void Propagator::Current::advanceGap(double dt, const ImuNoise& noise) {
 
 Status Propagator::setState(const NavState& state, const GyroIntrinsics& intrinsics) {
   if (!finite(state)) return {StatusCode::kInvalidInput, "state to propagate from is not finite"};
-  current_.set(state, intrinsics);
+  given_.set(state, intrinsics);
+  current_ = given_;
   has_state_ = true;
-  const std::uint64_t kept = std::min<std::uint64_t>(count_, kRing);
-  const std::uint64_t oldest = count_ - kept;
-  std::uint64_t next = count_;
-  while (next > oldest && sampleAt(next - 1).stamp > state.stamp) --next;
-  const bool hole = next == oldest && oldest > 0;
-  for (; next < count_; ++next) {
-    const ImuSample* before = next > oldest ? &sampleAt(next - 1) : nullptr;
-    current_.advance(before, &sampleAt(next), sampleAt(next).stamp, noise_);
+  const std::uint64_t oldest = oldestKept();
+  const std::uint64_t next = firstAfter(state.stamp);
+  if (next < count_) advance(current_, sampleAt(count_ - 1).stamp);
+  if (next == oldest && oldest > 0) {
+    return {StatusCode::kCapacityReached, "state older than the kept IMU samples"};
   }
-  if (hole) return {StatusCode::kCapacityReached, "state older than the kept IMU samples"};
   return okStatus();
+}
+
+std::uint64_t Propagator::firstAfter(Stamp stamp) const {
+  std::uint64_t next = count_;
+  while (next > oldestKept() && sampleAt(next - 1).stamp > stamp) --next;
+  return next;
+}
+
+void Propagator::advance(Current& state, Stamp to) const {
+  for (std::uint64_t next = firstAfter(state.nav.stamp); state.nav.stamp < to; ++next) {
+    const ImuSample* before = next > oldestKept() ? &sampleAt(next - 1) : nullptr;
+    const ImuSample* after = next < count_ ? &sampleAt(next) : nullptr;
+    state.advance(before, after, after != nullptr ? std::min(to, after->stamp) : to, noise_);
+  }
 }
 
 Status Propagator::step(const ImuSample& sample, NavState* state) {
@@ -169,9 +178,11 @@ Status Propagator::step(const ImuSample& sample, NavState* state) {
 
 Status Propagator::predict(Stamp at, NavState& state) const {
   if (!has_state_ || count_ == 0) return {StatusCode::kNotReady, "no state or no sample to predict from"};
-  if (at < current_.nav.stamp) return {StatusCode::kInvalidInput, "a prediction was requested for the past"};
-  Current moved = current_;
-  if (at > moved.nav.stamp) moved.advance(&sampleAt(count_ - 1), nullptr, at, noise_);
+  if (at < given_.nav.stamp) {
+    return {StatusCode::kInvalidInput, "a prediction was requested for before the newest state set"};
+  }
+  Current moved = at < current_.nav.stamp ? given_ : current_;
+  advance(moved, at);
   state = moved.toNavState();
   return okStatus();
 }
@@ -179,7 +190,7 @@ Status Propagator::predict(Stamp at, NavState& state) const {
 void Propagator::reset() {
   has_state_ = false;
   count_ = 0;
-  current_ = Current{};
+  given_ = current_ = Current{};
 }
 
 }  // namespace swiftlet

@@ -13,6 +13,7 @@
 // bridged). Memory: 1024 samples, 60 kB; no allocation. Cost: about 2 us per sample, covariance and output
 // included.
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -37,8 +38,8 @@ class Propagator {
   /// Takes one sample. Writes the state at its stamp to `state`, which may be null.
   Status step(const ImuSample& sample, NavState* state = nullptr);
 
-  /// The state at `at`, propagated from the last sample by holding its reading: the prediction for an image
-  /// whose last samples have not arrived. Not stored. kInvalidInput if `at` is before the newest state.
+  /// The state at `at`, not stored: the prediction for an image. After the last sample by holding its reading,
+  /// before it from the state set on. kInvalidInput if `at` is before the state set.
   Status predict(Stamp at, NavState& state) const;
 
   [[nodiscard]] bool hasState() const { return has_state_; }
@@ -46,6 +47,9 @@ class Propagator {
   [[nodiscard]] NavState state() const { return current_.toNavState(); }
   /// Seconds bridged without samples since the stamp of the last state set.
   [[nodiscard]] double gapSeconds() const { return current_.gap_seconds; }
+
+  /// For the samples from now on, and for those after the next state set.
+  void setNoise(const ImuNoise& noise) { noise_ = noise; }
 
   /// Forgets the state; samples are kept for the next one.
   void forgetState() { has_state_ = false; }
@@ -69,13 +73,19 @@ class Propagator {
   // 5 s at 200 Hz, 1 s at 1 kHz: longer than the delay of any smoother. A longer delay is reported.
   static constexpr std::size_t kRing = 1024;
 
+  [[nodiscard]] std::uint64_t oldestKept() const { return count_ - std::min<std::uint64_t>(count_, kRing); }
+  /// Index of the first kept sample after `stamp`; count_ if there is none.
+  [[nodiscard]] std::uint64_t firstAfter(Stamp stamp) const;
+  /// Over the samples after the state, then holding the last one.
+  void advance(Current& state, Stamp to) const;
   [[nodiscard]] const ImuSample& sampleAt(std::uint64_t index) const { return ring_[index % kRing]; }
 
   ImuNoise noise_;
   std::array<ImuSample, kRing> ring_{};
   std::uint64_t count_ = 0;  // number of samples taken; the ring holds the last kRing
   bool has_state_ = false;
-  Current current_;
+  Current given_;    // as set
+  Current current_;  // moved over the samples since
 };
 
 }  // namespace swiftlet

@@ -52,6 +52,8 @@ struct DenseTwin {
                   noise.gyro_density * noise.gyro_density / dt * B_gyro * B_gyro.transpose() +
                   noise.accel_density * noise.accel_density / dt * B_accel * B_accel.transpose())
                      .eval();
+    covariance.diagonal().segment<3>(3).array() +=
+        noise.accel_density * noise.accel_density * dt * dt * dt / 12;
     J_gyro = (A * J_gyro + B_gyro).eval();
     J_accel = (A * J_accel + B_accel).eval();
     position += velocity * dt + 0.5 * dt * dt * force;
@@ -106,6 +108,20 @@ TEST_CASE("Preintegration equals its dense twin") {
     CHECK(relative(imu.jacobianAccel(), twin.J_accel) < 1e-9);
     // The twin rotates isotropic noise by Jr, which is orthogonal only to second order in the step.
     CHECK(correlationError(imu.covariance(), twin.covariance) < 2e-3);
+  }
+}
+
+TEST_CASE("The covariance of an interval between two samples is that of white noise, and not singular") {
+  const ImuNoise noise;
+  const AnalyticTrajectory path(3);
+  const auto samples = path.samples(0, 0.1, noise, kBiasGyro, kBiasAccel, nullptr);
+  for (const double to : {0.0005, 0.002, 0.0049}) {
+    Preintegration imu(noise, kBiasGyro, kBiasAccel);
+    REQUIRE(imu.integrate(samples, stampOf(0), stampOf(to)).ok());
+    CHECK(Eigen::LLT<Matrix9d>(imu.covariance()).info() == Eigen::Success);
+    const double density = noise.accel_density * noise.accel_density;
+    CHECK(imu.covariance()(3, 3) == Approx(density * to * to * to / 3).epsilon(1e-3));
+    CHECK(imu.covariance()(3, 6) == Approx(density * to * to / 2).epsilon(1e-3));
   }
 }
 

@@ -113,6 +113,27 @@ TEST_CASE("Propagating equals preintegrating, before and after the state is set"
   CHECK((got - expected).norm() / expected.norm() < 1e-9);
 }
 
+TEST_CASE("A prediction for before the last sample does without those after it") {
+  const ImuNoise noise;
+  const AnalyticTrajectory path(3);
+  const NavState start = truthAt(path, 0.2021);
+  const auto samples = path.samples(0, 1, noise, start.bias_gyro, start.bias_accel, nullptr);
+  Propagator propagator(noise);
+  for (const ImuSample& sample : samples) (void)propagator.step(sample);
+  REQUIRE(propagator.setState(start).ok());
+  for (const double at : {0.2021, 0.2049, 0.205, 0.7013, 0.997}) {
+    INFO("at " << at << " s");
+    NavState predicted;
+    REQUIRE(propagator.predict(stampOf(at), predicted).ok());
+    CHECK(predicted.stamp == stampOf(at));
+    const NavState truth = truthAt(path, at);
+    CHECK(difference(predicted, truth).head<9>().norm() < 2e-3);
+  }
+  NavState unused;
+  CHECK(propagator.predict(stampOf(0.2), unused).code == StatusCode::kInvalidInput);
+  CHECK(propagator.state().stamp == samples.back().stamp);
+}
+
 TEST_CASE("The covariance's transition agrees with numeric derivatives") {
   ImuNoise noise;
   noise.gyro_density = noise.accel_density = 1e-12;
@@ -224,7 +245,7 @@ TEST_CASE("The propagator refuses bad input and reports an overrun ring") {
   REQUIRE(propagator.predict(stampOf(6.004), predicted).ok());
   CHECK((predicted.T_world_body.translation - path.position(6.004)).norm() < 1e-3);
   CHECK(propagator.state().stamp == stampOf(6));
-  CHECK(propagator.predict(stampOf(5.9), predicted).code == StatusCode::kInvalidInput);
+  CHECK(propagator.predict(stampOf(4.9), predicted).code == StatusCode::kInvalidInput);
   propagator.reset();
   CHECK_FALSE(propagator.hasState());
 }
