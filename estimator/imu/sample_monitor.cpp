@@ -8,8 +8,6 @@
 namespace swiftlet {
 namespace {
 
-// Intervals before the measured rate is believed.
-constexpr std::uint64_t kMinIntervals = 20;
 // Relative difference from the nominal rate that counts as a wrong calibration.
 constexpr double kRateTolerance = 0.1;
 // The interval's mean follows the newest this many intervals (clock drift, temperature).
@@ -24,67 +22,60 @@ constexpr double kExtremeAccel = 19.0;  // m/s^2
 
 }  // namespace
 
-SampleMonitor::SampleMonitor(const ImuNoise& noise)
-    : noise_(noise), gyro_limit_(noise.gyro_saturation), accel_limit_(noise.accel_saturation) {}
-
-double SampleMonitor::period() const { return rateMismatch() ? 1.0 / measuredRate() : 1.0 / noise_.rate_hz; }
-
-double SampleMonitor::measuredRate() const {
-  if (interval_count_ < kMinIntervals || interval_sum_ <= 0) return 0;
-  return static_cast<double>(interval_count_) / interval_sum_;
-}
-
-bool SampleMonitor::rateMismatch() const {
-  const double rate = measuredRate();
-  return rate > 0 && std::abs(rate - noise_.rate_hz) > kRateTolerance * noise_.rate_hz;
-}
+SampleMonitor::SampleMonitor(const ImuNoise& noise) : noise_(noise) {}
 
 SampleVerdict SampleMonitor::check(const ImuSample& sample) {
   SampleVerdict verdict;
   if (!sample.gyro.allFinite() || !sample.accel.allFinite()) {
-    ++counters_.not_finite;
     verdict.status = {StatusCode::kInvalidInput, "IMU sample is not finite"};
     return verdict;
   }
   if (has_last_ && sample.stamp <= last_) {
-    ++(sample.stamp == last_ ? counters_.repeated : counters_.reversed);
     verdict.status = {StatusCode::kInvalidInput, "IMU stamp repeated or reversed"};
     return verdict;
   }
+  learned_ = false;
   if (has_last_) {
     verdict.silence = (sample.stamp - last_).seconds();
-    const double periods = verdict.silence / period();
-    verdict.gap = periods > kGapPeriods;
-    counters_.longest_silence = std::max(counters_.longest_silence, verdict.silence);
-    if (verdict.gap) {
-      ++counters_.gaps;
-      counters_.gap_seconds += verdict.silence;
-    } else if (periods > kRegularPeriods) {
-      ++counters_.short_holes;
-    }
-    // While the rate is unknown every interval teaches it: the nominal rate may be wrong.
-    if (periods <= kRegularPeriods || interval_count_ < kMinIntervals) {
-      interval_sum_ += verdict.silence;
-      if (++interval_count_ > kIntervalMemory) {
-        interval_sum_ *= 0.5;
-        interval_count_ /= 2;
-      }
-    }
+    verdict.gap = verdict.silence * noise_.rate_hz > kGapPeriods;
+    learnRate(verdict.silence);
   }
   verdict.saturated = checkSaturation(sample);
-  if (verdict.saturated) ++counters_.saturated;
-  ++counters_.accepted;
+  verdict.learned = learned_;
   has_last_ = true;
   last_ = sample.stamp;
   return verdict;
+}
+
+void SampleMonitor::learnRate(double interval) {
+  if (interval_count_ < kFirstIntervals) {
+    first_[interval_count_++] = interval;
+    if (interval_count_ < kFirstIntervals) return;
+    // There may be holes among them, and the nominal rate does not tell.
+    const auto middle = first_.begin() + kFirstIntervals / 2;
+    std::nth_element(first_.begin(), middle, first_.end());
+    interval_sum_ = *middle * kFirstIntervals;
+  } else {
+    const double mean = interval_sum_ / static_cast<double>(interval_count_);
+    if (interval > kRegularPeriods * mean) return;
+    interval_sum_ += interval;
+    if (++interval_count_ > kIntervalMemory) {
+      interval_sum_ *= 0.5;
+      interval_count_ /= 2;
+    }
+  }
+  const double rate = static_cast<double>(interval_count_) / interval_sum_;
+  if (std::abs(rate - noise_.rate_hz) <= kRateTolerance * noise_.rate_hz) return;
+  noise_.rate_hz = rate;
+  learned_ = true;
 }
 
 bool SampleMonitor::checkSaturation(const ImuSample& sample) {
   bool saturated = false;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
-    saturated |= checkAxis(sample.gyro[axis], kExtremeGyro, runs_[i], gyro_limit_);
-    saturated |= checkAxis(sample.accel[axis], kExtremeAccel, runs_[i + 3], accel_limit_);
+    saturated |= checkAxis(sample.gyro[axis], kExtremeGyro, runs_[i], noise_.gyro_saturation);
+    saturated |= checkAxis(sample.accel[axis], kExtremeAccel, runs_[i + 3], noise_.accel_saturation);
   }
   return saturated;
 }
@@ -92,7 +83,10 @@ bool SampleMonitor::checkSaturation(const ImuSample& sample) {
 bool SampleMonitor::checkAxis(double value, double floor, Run& run, double& limit) {
   run.length = value == run.value ? run.length + 1 : 1;
   run.value = value;
-  if (run.length >= kClippedRun && std::abs(value) > floor) limit = std::min(limit, std::abs(value));
+  if (run.length >= kClippedRun && std::abs(value) > floor && std::abs(value) < limit) {
+    limit = std::abs(value);
+    learned_ = true;
+  }
   return std::abs(value) >= limit;
 }
 
@@ -100,7 +94,5 @@ void SampleMonitor::restart() {
   has_last_ = false;
   runs_ = {};
 }
-
-void SampleMonitor::reset() { *this = SampleMonitor(noise_); }
 
 }  // namespace swiftlet

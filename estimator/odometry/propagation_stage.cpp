@@ -7,6 +7,7 @@ namespace swiftlet {
 Status PropagationStage::step(const ImuSample& sample, NavState* state) {
   const SampleVerdict verdict = monitor_.check(sample);
   if (!verdict.status.ok()) return verdict.status;
+  if (verdict.learned) propagator_.setNoise(monitor_.noise().times(fix_.imu));
   const Status status = propagator_.step(sample, state);
   if (status.ok() && state != nullptr) {
     state->epoch = fix_.state.epoch;
@@ -25,6 +26,7 @@ void PropagationStage::take(const StateFix& fix) {
   if (fix.timeline != timeline_) return;
   if (fix.state.epoch != fix_.state.epoch) propagator_.forgetState();
   fix_ = fix;
+  propagator_.setNoise(monitor_.noise().times(fix.imu));
   // A state that is not finite never leaves the smoother; a bridged hole is in the covariance.
   if (fix.has_state) static_cast<void>(propagator_.setState(fix.state, fix.gyro));
 }

@@ -19,7 +19,7 @@ namespace swiftlet {
 class PropagationStage {
  public:
   PropagationStage(const ImuNoise& noise, const OdometrySettings& settings)
-      : monitor_(noise), propagator_(inflatedNoise(noise, settings)) {}
+      : monitor_(inflatedNoise(noise, settings)), propagator_(monitor_.noise()) {}
 
   /// kNotReady: the sample was taken, but there is no state yet. kInvalidInput: it was dropped (not finite,
   /// stamp repeated or reversed). `state` may be null.

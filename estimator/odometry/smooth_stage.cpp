@@ -61,6 +61,10 @@ void SmoothStage::addImu(const ImuSample& sample) {
     events_.raise(sample.stamp, EventKind::kImuGap, verdict.silence);
   }
   if (verdict.saturated) events_.raise(sample.stamp, EventKind::kImuSaturated, 1);
+  if (verdict.learned) {
+    noise_ = monitor_.noise();
+    smoother_.setNoise(noise_);
+  }
   imu_.push(sample);
   smoother_.addImu(sample);
   rest_.addImu(sample);
@@ -399,6 +403,7 @@ void SmoothStage::publish(const TrackedFrame& tracked, bool imu_missing, Odometr
   fix_.has_state = true;
   fix_.state = state;
   fix_.gyro = calibration_.gyro;
+  fix_.imu = output.statistics.noise.imu;
   fix_.last_accepted = health_.lastAccepted() + smoother_.timeOffset();
   if (!starting(tracked.stamp)) {
     if (rest_.state().at_rest) last_rest_ = tracked.stamp;

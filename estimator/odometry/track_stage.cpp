@@ -52,6 +52,10 @@ void TrackStage::addImu(const ImuSample& sample) {
   const SampleVerdict verdict = monitor_.check(sample);
   if (!verdict.status.ok()) return;
   imu_gap_ = imu_gap_ || verdict.gap;
+  if (verdict.learned) {
+    noise_ = monitor_.noise();
+    propagator_.setNoise(noise_);
+  }
   imu_.push(sample);
   static_cast<void>(propagator_.step(sample));  // kept, where there is no state yet
 }

@@ -72,8 +72,14 @@ class FullSmoother::Solver {
 FullSmoother::FullSmoother(const Rig& rig, const ImuNoise& noise, const FullSmootherSettings& settings)
     : rig_(rig),
       noise_(noise),
+      monitor_(noise),
       settings_(settings),
       next_revisit_track_(std::numeric_limits<TrackId>::max()) {}
+
+void FullSmoother::addImu(const ImuSample& sample) {
+  if (monitor_.check(sample).learned) noise_ = monitor_.noise();
+  pending_imu_.push_back(sample);
+}
 
 Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& state, const NoiseInUse& noise) {
   if (keyframes_.size() >= settings_.max_keyframes) {

@@ -30,6 +30,7 @@
 #include "estimator/camera/rig.hpp"
 #include "estimator/core/status.hpp"
 #include "estimator/imu/imu_noise.hpp"
+#include "estimator/imu/sample_monitor.hpp"
 #include "estimator/messages/calibration_estimate.hpp"
 #include "estimator/messages/gyro_intrinsics.hpp"
 #include "estimator/messages/loop_revisit.hpp"
@@ -71,7 +72,7 @@ class FullSmoother {
   FullSmoother(const Rig& rig, const ImuNoise& noise, const FullSmootherSettings& settings);
 
   /// Adds every sample, in order, before the frames that follow it.
-  void addImu(const ImuSample& sample) { pending_imu_.push_back(sample); }
+  void addImu(const ImuSample& sample);
 
   /// Adds a keyframe with its state from the odometry and the noise used for it, in order of time. A new
   /// epoch starts a new, unconnected trajectory. kCapacityReached beyond max_keyframes.
@@ -170,6 +171,7 @@ class FullSmoother {
 
   Rig rig_;
   ImuNoise noise_;
+  SampleMonitor monitor_;
   GyroIntrinsics intrinsics_;
   FullSmootherSettings settings_;
   std::vector<Keyframe> keyframes_;

@@ -69,6 +69,8 @@ class Smoother {
 
   /// Adds an IMU sample, in order of stamps. Add the samples before a frame before that frame.
   void addImu(const ImuSample& sample) { problem_.imu.push(sample); }
+  /// For what is integrated from now on.
+  void setNoise(const ImuNoise& noise) { problem_.noise = noise; }
   /// After reset(), if the following samples have earlier stamps.
   void forgetImu() { problem_.imu.clear(); }
 
