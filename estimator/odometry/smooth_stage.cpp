@@ -365,8 +365,16 @@ Status SmoothStage::catchUp() {
   return okStatus();
 }
 
+/// There is no solution. The next epoch goes on where the estimate was last of use; nothing else is kept.
 Status SmoothStage::fail(const Status& status, OdometryOutput& output) {
-  reset();
+  if (last_useful_) {
+    StartState at;
+    at.state.T_world_body = *last_useful_;
+    at.gyro_bias_sigma = 0;
+    leave(at);
+  } else {
+    reset();
+  }
   deliver(output);
   output.waiting_for = status.what;
   return status;
