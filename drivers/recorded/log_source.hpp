@@ -37,6 +37,7 @@ struct LogOptions {
   bool mono = false;                  ///< leave camera 1 out
   bool without_images = false;        ///< neither look for images nor deliver any: tracks take their place
   bool imu_after_last_image = false;  ///< deliver the samples after the last image too
+  Duration shift_margin;              ///< Rig::shift_margin
   /// Asked for each image in turn before it is decoded; false: it is passed over. Empty: all are wanted.
   std::function<bool(Stamp stamp, std::uint32_t camera)> wants_image;
 };

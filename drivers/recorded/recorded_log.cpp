@@ -49,6 +49,7 @@ void RecordedLog::takeImageSizes() {
 
 void RecordedLog::prepare(const std::string& name) {
   checkRates(name);
+  calibration_.rig.shift_margin = options_.shift_margin;
   for (const std::string& line : calibration_.warnings) warnings_.add(line);
   const ImuCorrection correction = calibration_.imuCorrection();
   if (!correction.isIdentity()) {

@@ -18,12 +18,16 @@ struct Rig {
   std::array<SE3, kMaxCameras> T_body_cam;  ///< camera to body
   /// t_imu = t_image + shift (Kalibr's timeshift_cam_imu), one value for the rig.
   Duration camera_to_imu_shift;
+  /// How much larger the shift may be found in flight; zero where it is not estimated.
+  Duration shift_margin;
   /// Time from the first to the last row of a rolling shutter, the same for both cameras; zero: global
   /// shutter. The stamp of an image is that of its middle row.
   Duration readout;
 
   /// How far beyond the stamp of an image, read as one of the IMU's, its samples reach.
-  [[nodiscard]] Duration sampleLead() const { return std::max(camera_to_imu_shift, Duration{}); }
+  [[nodiscard]] Duration sampleLead() const {
+    return std::max(camera_to_imu_shift + shift_margin, Duration{});
+  }
   [[nodiscard]] bool rolls() const { return readout.ns != 0; }
   /// Position of row `v` [px] of camera c, from -0.5 (first row) to 0.5 (last row).
   [[nodiscard]] double row(std::size_t c, double v) const { return v / (camera[c].height() - 1) - 0.5; }

@@ -6,6 +6,7 @@
 
 #include "estimator/camera/rig.hpp"
 #include "estimator/imu/imu_noise.hpp"
+#include "estimator/messages/calibration_estimate.hpp"
 #include "estimator/odometry/odometry_settings.hpp"
 #include "estimator/smoother/imu_buffer.hpp"
 
@@ -14,9 +15,16 @@ namespace swiftlet {
 /// Samples that a stage keeps before and between frames: 20 s at 200 Hz.
 inline constexpr std::size_t kImuHistory = 4096;
 
-/// The rig with the cameras selected by the settings.
+/// Beyond the calibrated shift, where the settings have it estimated.
+inline Duration shiftMargin(const OdometrySettings& settings) {
+  constexpr double kSigmas = 3.0;
+  return Duration::fromSeconds(settings.estimate_time_offset ? kSigmas * kTimeOffsetPriorSigma : 0.0);
+}
+
+/// The rig with the cameras selected by the settings, and with what they estimate.
 inline Rig rigInUse(Rig rig, const OdometrySettings& settings) {
   if (!settings.use_stereo) rig.camera_count = std::min<std::size_t>(rig.camera_count, 1);
+  rig.shift_margin = shiftMargin(settings);
   return rig;
 }
 

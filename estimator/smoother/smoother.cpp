@@ -47,6 +47,12 @@ void Smoother::addState(const StepInput& input) {
   const bool first = window.empty();
   WindowState& state = window.inSlot(window.add());  // trim() leaves a free slot
   state.time_offset = problem_.calibration.timeOffset();
+  if (!first) {
+    // A correction by more than a frame's interval must not turn the order of two frames around.
+    const WindowState& before = window[window.size() - 2];
+    const double interval = (input.frame->stamp - before.stamp).seconds() + before.time_offset;
+    state.time_offset = std::max(state.time_offset, before.time_offset - 0.5 * interval);
+  }
   state.stamp = input.frame->stamp + Duration::fromSeconds(state.time_offset);
   state.frame_index = input.frame->index;
   state.keyframe = input.frame->keyframe || first;

@@ -165,7 +165,7 @@ std::vector<Setting> estimationSettings() {
        real(kOdometry, &O::pixel_sigma, 0.05, 10)},
       {"smoother.estimate_time_offset", "",
        "Estimate in flight the time offset between camera and IMU, and the readout time of a rolling "
-       "shutter.",
+       "shutter. Each image waits for samples up to 30 ms after its stamp.",
        onOff(kOdometry, &O::estimate_time_offset)},
       {"smoother.estimate_extrinsics", "", "Estimate in flight the pose of each camera relative to the IMU.",
        onOff(kOdometry, &O::estimate_extrinsics)},

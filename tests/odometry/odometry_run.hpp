@@ -86,7 +86,8 @@ inline OdometryRun runOdometry(const TrackFlight& flight, const OdometrySettings
           }
         }
         run.events.insert(run.events.end(), output->events.begin(), output->events.end());
-      });
+      },
+      rigInUse(rig.value_or(flight.rig()), settings).sampleLead());
   return run;
 }
 

@@ -131,6 +131,31 @@ TEST_CASE("Odometry: a reset in flight starts a new epoch and loses no keyframe"
   CHECK(delivered.size() == keyframes);
 }
 
+TEST_CASE("Odometry: where there is no solution the next epoch goes on at the same place", "[odometry]") {
+  const TrackFlight flight(test::roomFlight(12, 23));
+  Odometry odometry(flight.rig(), flight.noise(), OdometrySettings{});
+  auto output = std::make_unique<OdometryOutput>();
+  int failed = 0;
+  Eigen::Vector3d last = Eigen::Vector3d::Zero();
+  flight.play(
+      [&](const ImuSample& given) {
+        ImuSample sample = given;
+        if (sample.stamp == flight.frames()[120].stamp) sample.accel.setConstant(1e200);  // breaks all sums
+        static_cast<void>(odometry.addImu(sample));
+      },
+      [&](std::size_t k) {
+        const Status status = odometry.smooth(flight.frames()[k], Effort{}, *output);
+        failed += status.ok() ? 0 : 1;
+        if (!output->has_state) return;
+        if (k > 0) CHECK((output->state.T_world_body.translation - last).norm() < 0.3);
+        last = output->state.T_world_body.translation;
+      });
+  CHECK(failed > 0);
+  CHECK(output->state.epoch > 0);
+  CHECK(output->state.health == Health::kGood);
+  CHECK(last.norm() > 1);
+}
+
 TEST_CASE("Odometry: one camera lost is degraded, not reset, and taken back", "[odometry][fault]") {
   for (const int camera : {0, 1}) {
     INFO("camera " << camera);
@@ -216,4 +241,26 @@ TEST_CASE("Odometry: finds a time offset, none, a small one and one of two prior
     const OdometryRun run = test::runOdometry(flight, with);
     CHECK(run.frames.back().calibration.camera_to_imu_shift.seconds() == Approx(-offset).margin(3e-4));
   }
+}
+
+TEST_CASE("Odometry: finds a time offset of many of the IMU's periods", "[odometry][calibration]") {
+  SimulationSettings settings = test::roomFlight(15, 28);
+  settings.imu.noise.rate_hz = 1000;
+  settings.image_stamp_offset = Duration::fromSeconds(-12e-3);
+  const TrackFlight flight(settings);
+  OdometrySettings with = test::settingsFor(flight);
+  with.estimate_time_offset = true;
+  const OdometryRun run = test::runOdometry(flight, with);
+  CHECK(run.frames.back().calibration.camera_to_imu_shift.seconds() == Approx(12e-3).margin(5e-4));
+  CHECK(run.frames.back().state.health == Health::kGood);
+}
+
+// 45 ms without samples from between two of them to between two images: one segment.
+TEST_CASE("Odometry: an interval without a sample inside is no end of the estimate", "[odometry]") {
+  SimulationSettings settings = test::roomFlight(12, 28);
+  settings.faults.push_back({FaultKind::kImuGap, {6.001, 6.047}, -1});
+  const TrackFlight flight(settings);
+  const OdometryRun run = test::runOdometry(flight, test::settingsFor(flight));
+  CHECK(run.frames.back().state.epoch == 0);
+  CHECK(run.frames.back().state.health == Health::kGood);
 }

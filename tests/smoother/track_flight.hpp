@@ -31,13 +31,13 @@ class TrackFlight {
   [[nodiscard]] const Eigen::Vector3d& landmark(TrackId id) const { return landmarks_.at(id); }
 
   /// Calls `imu(sample)` and `frame(k)` in the order in which they would arrive: samples up to and
-  /// including a frame's stamp first.
+  /// including a frame's stamp and `lead` first.
   template <typename OnImu, typename OnFrame>
-  void play(const OnImu& imu, const OnFrame& frame) const {
+  void play(const OnImu& imu, const OnFrame& frame, Duration lead = {}) const {
     std::size_t next = 0;
     const std::vector<ImuSample>& samples = flight_.imu().samples;
     for (std::size_t k = 0; k < frames_.size(); ++k) {
-      while (next < samples.size() && samples[next].stamp <= frames_[k].stamp) imu(samples[next++]);
+      while (next < samples.size() && samples[next].stamp <= frames_[k].stamp + lead) imu(samples[next++]);
       frame(k);
     }
   }

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "drivers/recorded/log_source.hpp"
+#include "estimator/odometry/odometry_inputs.hpp"
 #include "firmware_host/inputs/log/log_feed.hpp"
 #include "firmware_host/settings/settings.hpp"
 
@@ -28,6 +29,7 @@ struct LogRequest {
     options.imu_calibration = imu_calibration;
     options.calibration_options.accept_unusual_rig = settings.calibration.accept_unusual_rig;
     options.mono = mono;
+    options.shift_margin = shiftMargin(settings.odometry);
     return options;
   }
   [[nodiscard]] LogSection section() const { return {from, until, last_stamp}; }
