@@ -6,7 +6,8 @@
 // space. Cost: n^3 / 6 multiply-adds (about 0.1 ms at n = 170). No memory.
 
 #include <Eigen/Core>
-#include <cstdint>
+#include <cstddef>
+#include <memory>
 #include <vector>
 
 namespace swiftlet {
@@ -19,9 +20,11 @@ constexpr std::size_t alignedMapSize(std::size_t n) { return n * ((n + 3) / 4 * 
 
 /// An n x n matrix in storage reserved by `alignedMapSize`; columns start on 32-byte boundaries.
 inline MatrixMap alignedMap(std::vector<double>& storage, Eigen::Index n) {
-  auto address = reinterpret_cast<std::uintptr_t>(storage.data());
-  address = (address + 31U) & ~std::uintptr_t{31U};
-  return {reinterpret_cast<double*>(address), n, n, Eigen::OuterStride<>((n + 3) / 4 * 4)};
+  const Eigen::Index stride = (n + 3) / 4 * 4;
+  void* start = storage.data();
+  std::size_t space = storage.size() * sizeof(double);
+  std::align(32, static_cast<std::size_t>(n * stride) * sizeof(double), start, space);
+  return {static_cast<double*>(start), n, n, Eigen::OuterStride<>(stride)};
 }
 
 /// A = L L^T; L overwrites the lower triangle, the upper is not read. False if a pivot is not positive or not
