@@ -156,8 +156,12 @@ Status MapStage::integrate(const MapInput& input, const VolumeEffort& effort, Ma
   if (measured_ == nullptr) return report.status = {StatusCode::kInvalidInput, "nothing was measured"};
   if (input.epoch != epoch_) beginEpoch(input.epoch);
   const SE3 T_world_body = input.T_map_world.inverse() * input.T_map_body;
-  submaps_.follow(
-      {input.stamp, input.frame, input.epoch, T_world_body, input.T_map_world, input.T_map_world});
+  if (!submaps_.follow(
+          {input.stamp, input.frame, input.epoch, T_world_body, input.T_map_world, input.T_map_world})) {
+    ++counters_.without_submap;
+    return report.status = {StatusCode::kInvalidInput,
+                            "the map is full: frames of this epoch are not mapped"};
+  }
   report.status = integrator_.step(measured_->view(), input.T_map_body, effort, report.volume);
   if (report.status.code == StatusCode::kInvalidInput) return report.status;
   ++counters_.taken;

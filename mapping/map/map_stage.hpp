@@ -8,9 +8,9 @@
 // call correct(); stepCorrection() then returns blocks near the vehicle in bounded pieces (MapSubmaps).
 // Blocks for which the volume has no room, and all blocks of past epochs, are in the storage, if there is
 // one. Errors: kInvalidInput, counted, if nothing was mapped: no depth and no pair of images, a wrong size, a
-// pose that is not finite or jumped (VolumeIntegrator). kCapacityReached: mapped in part. Frames: map (or the
-// world of the given poses), body, metres. Memory: reserved by the constructor; nothing is allocated later.
-// No clock, no randomness: same input, same bytes.
+// pose that is not finite or jumped (VolumeIntegrator), an epoch for which no submap is left.
+// kCapacityReached: mapped in part. Frames: map (or the world of the given poses), body, metres. Memory:
+// reserved by the constructor; nothing is allocated later. No clock, no randomness: same input, same bytes.
 
 #include <array>
 #include <memory>
@@ -67,6 +67,7 @@ struct MapCounters {
   std::uint64_t without_depth = 0;  ///< neither a depth image nor a pair of the right size
   std::uint64_t wrong_size = 0;     ///< labels or grey values of a wrong size: dropped, the depth is used
   std::uint64_t epochs = 0;
+  std::uint64_t without_submap = 0;  ///< frames of an epoch that began when all submaps were used
 };
 
 /// The set of labels that a text such as "10,12" names, as bits. Empty if the text is not a list of labels

@@ -66,15 +66,17 @@ Eigen::Vector3d MapSubmaps::placeOf(const BlockIndex& block, SubmapId id) const 
   return submap.hasMoved() ? submap.motion() * centre : centre;
 }
 
-void MapSubmaps::follow(const Submap& image) {
+bool MapSubmaps::follow(const Submap& image) {
   if (submaps_.follow(image)) {
     volume_.beginSubmap(submaps_.newest(), submaps_.staleBefore(), submaps_.outdated());
     shown_.push_back(image.T_map_world);
   }
   const Eigen::Vector3d p_map_vehicle = image.T_map_world * image.T_world_body.translation;
-  if ((p_map_vehicle - p_map_pass_).norm() <= kPassStep) return;
-  p_map_pass_ = p_map_vehicle;
-  cursor_ = 0;
+  if ((p_map_vehicle - p_map_pass_).norm() > kPassStep) {
+    p_map_pass_ = p_map_vehicle;
+    cursor_ = 0;
+  }
+  return submaps_.takes(image.epoch);
 }
 
 bool MapSubmaps::addKept(const Submap& submap) {

@@ -56,8 +56,9 @@ class MapSubmaps : public BlockListener, public BlockOverflow {
   MapSubmaps(const MapSubmaps&) = delete;
   MapSubmaps& operator=(const MapSubmaps&) = delete;
 
-  /// Call before an image is fused. `image` is the anchor of the submap that may begin with it.
-  void follow(const Submap& image);
+  /// Call before an image is fused. `image` is the anchor of the submap that may begin with it. False: the
+  /// image must not be fused (Submaps::takes()).
+  bool follow(const Submap& image);
   /// Submaps::correct(), and corrects the volume.
   void correct(std::span<const WorldInMap> worlds);
   [[nodiscard]] bool busy() const { return cursor_ < stored_.size(); }

@@ -76,14 +76,16 @@ bool Submaps::isDue(const Submap& image) const {
 bool Submaps::addKept(const Submap& submap) {
   if (submaps_.size() == kMost / 2) return false;
   submaps_.push_back(submap);
+  epoch_ = submap.epoch;
   return true;
 }
 
 bool Submaps::follow(const Submap& image) {
-  if (!isDue(image) || submaps_.size() == kMost) return false;
-  if (!submaps_.empty() && submaps_.back().epoch != image.epoch) {
+  if (epoch_ != image.epoch) {
     for (Submap& submap : submaps_) submap.tied = false;
   }
+  epoch_ = image.epoch;
+  if (!isDue(image) || submaps_.size() == kMost) return false;
   submaps_.push_back(image);
   while (poses_ == MapPoses::kEstimated && stale_before_ < newest() &&
          (image.stamp - submaps_[stale_before_].stamp).seconds() > kStaleSeconds) {
@@ -95,9 +97,8 @@ bool Submaps::follow(const Submap& image) {
 bool Submaps::correct(std::span<const WorldInMap> worlds) {
   bool any = false;
   // They may still be those of an epoch that is over.
-  const bool of_newest = !submaps_.empty() && std::ranges::any_of(worlds, [&](const WorldInMap& world) {
-    return world.epoch == submaps_.back().epoch;
-  });
+  const bool of_newest =
+      std::ranges::any_of(worlds, [&](const WorldInMap& world) { return world.epoch == epoch_; });
   for (std::size_t i = 0; i < submaps_.size(); ++i) {
     Submap& submap = submaps_[i];
     SE3 T_map_world;

@@ -7,7 +7,8 @@
 // of one pose per submap.
 //
 // Frames: map; world is that of an epoch of the odometry. Memory: kMost entries, reserved at construction;
-// when they are used up, the last submap continues. No clock, no randomness. Not thread safe.
+// when they are used up, the last submap takes all further images of its epoch and none of another (takes()).
+// No clock, no randomness. Not thread safe.
 
 #include <cstdint>
 #include <span>
@@ -36,7 +37,7 @@ struct Submap {
   SE3 T_world_body;       ///< of the anchor
   SE3 T_map_world_fused;  ///< when its images were fused
   SE3 T_map_world;        ///< corrected by loop closure
-  bool tied = false;      ///< of an earlier epoch that loops join to the newest
+  bool tied = false;      ///< of an earlier epoch that loops join to the newest image's
 
   [[nodiscard]] SE3 motion() const { return T_map_world * T_map_world_fused.inverse(); }
   [[nodiscard]] bool hasMoved() const {
@@ -59,6 +60,10 @@ class Submaps {
   bool addKept(const Submap& submap);
   /// Call before an image is fused. True if the image begins a new submap.
   bool follow(const Submap& image);
+  /// False if all submaps are used and the last is of another epoch: images of `epoch` must not be fused.
+  [[nodiscard]] bool takes(std::uint32_t epoch) const {
+    return submaps_.size() < kMost || submaps_.back().epoch == epoch;
+  }
   /// Updates the poses of the submaps. `worlds` are ordered by frame; between two of one epoch the correction
   /// is interpolated by frame number. Submaps of other epochs do not move. True if one moved.
   bool correct(std::span<const WorldInMap> worlds);
@@ -66,9 +71,9 @@ class Submaps {
   [[nodiscard]] std::size_t size() const { return submaps_.size(); }
   [[nodiscard]] const Submap& operator[](std::size_t id) const { return submaps_[id]; }
   [[nodiscard]] SubmapId newest() const { return static_cast<SubmapId>(submaps_.size() - 1); }
-  /// Whether the submap is in the same frame as the newest.
+  /// Whether the submap is in the same frame as the newest image.
   [[nodiscard]] bool isInMap(std::size_t id) const {
-    return submaps_[id].tied || submaps_[id].epoch == submaps_.back().epoch;
+    return submaps_[id].tied || submaps_[id].epoch == epoch_;
   }
   /// How far the surface of its images would move with another T_map_world [m].
   [[nodiscard]] static double shift(const Submap& submap, const SE3& T_map_world);
@@ -86,6 +91,7 @@ class Submaps {
   std::vector<Submap> submaps_;
   std::vector<std::uint8_t> outdated_;
   SubmapId stale_before_ = 0;
+  std::uint32_t epoch_ = 0;  ///< of the newest image
 };
 
 }  // namespace swiftlet

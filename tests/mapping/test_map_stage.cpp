@@ -5,6 +5,7 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <string_view>
 #include <vector>
 
 #include "tests/mapping/memory_storage.hpp"
@@ -202,6 +203,40 @@ TEST_CASE("a new epoch is a world of its own; the surface of the old is drawn ap
   Count both;
   map.visitWholeSurface([](std::uint32_t /*epoch*/) { return true; }, both);
   CHECK(both.triangles > before * 3 / 2);
+}
+
+TEST_CASE("a map without a submap left refuses the frames of a new epoch, and mixes them into no other") {
+  Wall wall;
+  MemoryStorage storage;
+  MapStage map(wall.rig, smallSettings(), &wall.sensor, &storage);
+  MapReport report;
+  REQUIRE(map.step(wall.at(0), {}, report).ok());
+  Submap later;
+  for (std::uint64_t i = 1; i < Submaps::kMost; ++i) {
+    later.stamp = wall.at(0).stamp + Duration::fromSeconds(3.0 * static_cast<double>(i));
+    later.frame = i;
+    map.submaps().follow(later);
+  }
+  REQUIRE(map.submaps().submaps().size() == Submaps::kMost);
+  Count before;
+  map.visitWholeSurface([](std::uint32_t /*epoch*/) { return true; }, before);
+  REQUIRE(before.triangles > 0);
+  for (int i = 1; i < 3; ++i) {
+    MapInput next = wall.at(i);
+    next.epoch = 1;
+    next.T_map_body.translation.x() = -20;
+    CHECK(map.step(next, {}, report).code == StatusCode::kInvalidInput);
+    CHECK(std::string_view(report.status.what) == "the map is full: frames of this epoch are not mapped");
+  }
+  CHECK(map.counters().taken == 1);
+  CHECK(map.counters().without_submap == 2);
+  // Nor does surface of the old world stay around the vehicle.
+  CHECK(map.volume().blockCount() == 0);
+  CHECK(countOf(map).triangles == 0);
+  Count after;
+  map.visitWholeSurface([](std::uint32_t epoch) { return epoch == 0; }, after);
+  CHECK(after.triangles == before.triangles);
+  CHECK(after.worst < 0.005F);
 }
 
 TEST_CASE(

@@ -130,6 +130,23 @@ TEST_CASE("when there are as many submaps as there can be the last goes on") {
   CHECK(submaps.outdated()[Submaps::kMost - 1] == 0);
 }
 
+TEST_CASE("when there are as many submaps as there can be, the last takes no image of another epoch") {
+  Submaps submaps(MapPoses::kEstimated, kTolerance);
+  for (std::size_t i = 0; i < Submaps::kMost; ++i) {
+    CHECK(submaps.takes(i < 10 ? 0 : 1));
+    submaps.follow(imageAt(2.0 * static_cast<double>(i), i, {}, 1));
+  }
+  CHECK(submaps.takes(1));
+  CHECK_FALSE(submaps.takes(2));
+  CHECK(submaps.isInMap(0));
+  CHECK_FALSE(submaps.follow(imageAt(1e6, 1'000'000, {}, 2)));
+  // The vehicle is in another world by now.
+  CHECK_FALSE(submaps.isInMap(0));
+  CHECK_FALSE(submaps.isInMap(Submaps::kMost - 1));
+  submaps.correct(std::vector<WorldInMap>{worldAt(5, 1, shifted(1)), worldAt(1'000'000, 2, {})});
+  CHECK(submaps.isInMap(0));
+}
+
 TEST_CASE("a submap of an older epoch lies in the map once loops tie its epoch to the newest") {
   Submaps submaps(MapPoses::kEstimated, kTolerance);
   submaps.follow(imageAt(0, 0));

@@ -25,6 +25,7 @@ nlohmann::ordered_json toJson(const MapStage& map) {
           {"without_depth", stage.without_depth},
           {"wrong_size", stage.wrong_size},
           {"epochs", stage.epochs},
+          {"without_submap", stage.without_submap},
           {"refused",
            {{"all", images.refused},
             {"pose_jumps", images.pose_jumps},
