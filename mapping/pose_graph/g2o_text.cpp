@@ -319,6 +319,7 @@ bool Reader::finish(PoseGraph<Pose>& graph) {
           "Add its VERTEX line, remove the edge, or remove all VERTEX lines to start from the edges");
     }
   }
+  std::vector<bool> is_fixed(graph_.ids.size(), false);
   for (const IdAt& fix : fixed_) {
     std::uint32_t pose = 0;
     line_ = fix.line;
@@ -326,9 +327,8 @@ bool Reader::finish(PoseGraph<Pose>& graph) {
       return refuse("id", "FIX names vertex " + std::to_string(fix.id) + ", which does not exist",
                     "Add its VERTEX line, or remove the FIX");
     }
-    if (std::find(graph_.fixed.begin(), graph_.fixed.end(), pose) == graph_.fixed.end()) {
-      graph_.fixed.push_back(pose);
-    }
+    if (!is_fixed[pose]) graph_.fixed.push_back(pose);
+    is_fixed[pose] = true;
   }
   if (!graph_.has_poses) {
     graph.poses.resize(graph_.ids.size());
