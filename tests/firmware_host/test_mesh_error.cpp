@@ -438,8 +438,19 @@ TEST_CASE("evaluate --mesh moves the run's meshes onto the truth") {
   MeshEvaluationRequest located = request;
   for (const TrajectoryPoint& point : truth)
     located.in_map.push_back({point.stamp, elsewhere.T_to_from * point.T_world_body});
-  CHECK(evaluateMeshes(located, estimate, truth, AccuracyOptions()).map->distance.rmse < 1e-4);
+  const MeshAccuracy in_map = evaluateMeshes(located, estimate, truth, AccuracyOptions());
+  CHECK(in_map.map->distance.rmse < 1e-4);
+  CHECK(in_map.alignment == "se3 alignment");
   CHECK(evaluateMeshes(request, estimate, truth, AccuracyOptions()).map->distance.rmse > 0.1);
+
+  // No pose can be compared: the mesh is judged where it is.
+  Trajectory late = located.in_map;
+  for (TrajectoryPoint& point : late) point.stamp.ns += 1'000'000'000'000;
+  const std::string nothing = "nothing (no pose has a true pose at its stamp)";
+  CHECK(evaluateMeshes(request, late, truth, AccuracyOptions()).alignment == nothing);
+  located.in_map = late;
+  CHECK(evaluateMeshes(located, estimate, truth, AccuracyOptions()).alignment ==
+        "se3 alignment; the map by " + nothing);
 }
 
 }  // namespace

@@ -23,9 +23,13 @@ Fit fitOf(const Trajectory& estimate, const Trajectory& truth, const AccuracyOpt
   const Association association = associate(estimate, truth, options.association);
   const TrajectoryError error = trajectoryError(association.pairs, options.align);
   Fit fit;
+  if (association.pairs.empty()) {
+    fit.text = "nothing (no pose has a true pose at its stamp)";
+    return fit;
+  }
   fit.alignment = error.alignment;
   fit.text = std::string(alignName(options.align)) + " alignment";
-  if (!error.status.ok() && !association.pairs.empty()) {
+  if (!error.status.ok()) {
     const PosePair& middle = association.pairs[association.pairs.size() / 2];
     fit.alignment = Alignment();
     fit.alignment.T_to_from = middle.truth * middle.estimate.inverse();
@@ -165,7 +169,10 @@ MeshAccuracy evaluateMeshes(const MeshEvaluationRequest& request, const Trajecto
   for (const char* name : {"complete_mesh.ply", "local_mesh.ply"}) {
     if (!accuracy.complete && fs::exists(run / name)) accuracy.complete = judge(name);
   }
-  if (fs::exists(run / kMapFile)) accuracy.map = judge(kMapFile);
+  if (fs::exists(run / kMapFile)) {
+    accuracy.map = judge(kMapFile);
+    if (map_fit.text != fit.text) accuracy.alignment += "; the map by " + map_fit.text;
+  }
   if (!has_sequence && !accuracy.complete && !accuracy.map) {
     throw InputError(request.run, 0, "", "no meshes in this folder",
                      "Replay with --mesh-sequence or --map, or give a folder written by `swiftlet mesh` or "

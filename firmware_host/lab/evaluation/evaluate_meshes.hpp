@@ -16,10 +16,11 @@ struct MeshEvaluationRequest {
 };
 
 /// `estimate` is the run's trajectory, `truth` the log's; meshes are moved as the fit of the one onto the
-/// other says. Where the path is too short or straight for a fit of positions, by the pose in the middle.
-/// Frames outside the section of `options` or without a true pose are left out. Without a true surface only
-/// the share of the hull that the meshes of a sequence draw is judged. InputError when there is nothing to
-/// judge or to judge by.
+/// other says. Where the path is too short or straight for a fit of positions, by the pose in the middle;
+/// without a pair of poses they are judged where they are, and MeshAccuracy::alignment says so. Frames
+/// outside the section of `options` or without a true pose are left out. Without a true surface only the
+/// share of the hull that the meshes of a sequence draw is judged. InputError when there is nothing to judge
+/// or to judge by.
 MeshAccuracy evaluateMeshes(const MeshEvaluationRequest& request, const Trajectory& estimate,
                             const Trajectory& truth, const AccuracyOptions& options);
 
