@@ -109,11 +109,12 @@ void StoredBlocks::put(const StoredBlock& block) {
     return;
   }
   if (std::ranges::all_of(block.voxels.weight, [](std::uint16_t weight) { return weight == 0; })) return;
-  if (Record* const record = agreeing(block.index, block.submap, false); record != nullptr) {
-    lost_ += merge(*record, block) ? 0 : 1;
+  Record* const earlier = agreeing(block.index, block.submap, false);
+  if (earlier != nullptr && read(*earlier, merged_)) {
+    lost_ += merge(*earlier, block) ? 0 : 1;
     return;
   }
-  Record* const record = add({block.index, block.submap, false, false, false, end_});
+  Record* const record = add({block.index, block.submap, false, block.has_labels, false, end_});
   if (record != nullptr && write(*record, block)) return;
   ++lost_;
   if (record == nullptr) return;
@@ -121,8 +122,8 @@ void StoredBlocks::put(const StoredBlock& block) {
   records_.pop_back();
 }
 
+/// Into what merged_ holds, the content of `record`.
 bool StoredBlocks::merge(Record& record, const StoredBlock& block) {
-  if (!read(record, merged_)) return false;
   if (!merged_.has_labels) merged_.labels.counts.fill({});
   merged_.has_labels = merged_.has_labels || block.has_labels;
   for (std::size_t at = 0; at < kBlockVoxels; ++at) {
@@ -133,21 +134,26 @@ bool StoredBlocks::merge(Record& record, const StoredBlock& block) {
     }
     if (block.has_labels) merged_.labels.counts[at].add(block.labels.counts[at]);
   }
+  Record next = record;
   // What it is now was seen last by the later.
-  record.submap = block.submap;
-  return write(record, merged_);
+  next.submap = block.submap;
+  if (next.has_labels != merged_.has_labels) {
+    // It has become longer.
+    next.has_labels = merged_.has_labels;
+    next.offset = end_;
+  }
+  if (!write(next, merged_)) return false;
+  record = next;
+  return true;
 }
 
-/// In its place, or behind all others where it is new or has become longer.
-bool StoredBlocks::write(Record& record, const StoredBlock& block) {
-  if (record.offset == end_ || record.has_labels != block.has_labels) {
-    record.offset = end_;
-    record.has_labels = block.has_labels;
-    end_ += sizeof(VoxelBlock) + (block.has_labels ? sizeof(LabelBlock) : 0);
-  }
-  return storage_->write(record.offset, std::as_bytes(std::span(&block.voxels, 1))) &&
-         (!block.has_labels ||
-          storage_->write(record.offset + sizeof(VoxelBlock), std::as_bytes(std::span(&block.labels, 1))));
+bool StoredBlocks::write(const Record& record, const StoredBlock& block) {
+  const std::uint64_t labels_at = record.offset + sizeof(VoxelBlock);
+  if (!storage_->write(record.offset, std::as_bytes(std::span(&block.voxels, 1)))) return false;
+  if (record.has_labels && !storage_->write(labels_at, std::as_bytes(std::span(&block.labels, 1))))
+    return false;
+  end_ = std::max(end_, labels_at + (record.has_labels ? sizeof(LabelBlock) : 0));
+  return true;
 }
 
 bool StoredBlocks::read(const Record& record, StoredBlock& out) {
@@ -156,9 +162,11 @@ bool StoredBlocks::read(const Record& record, StoredBlock& out) {
   out.has_labels = record.has_labels;
   out.free_parts = record.is_free ? record.offset : 0;
   if (record.is_free) return true;
-  return storage_->read(record.offset, std::as_writable_bytes(std::span(&out.voxels, 1))) &&
-         (!record.has_labels || storage_->read(record.offset + sizeof(VoxelBlock),
-                                               std::as_writable_bytes(std::span(&out.labels, 1))));
+  const bool done = storage_->read(record.offset, std::as_writable_bytes(std::span(&out.voxels, 1))) &&
+                    (!record.has_labels || storage_->read(record.offset + sizeof(VoxelBlock),
+                                                          std::as_writable_bytes(std::span(&out.labels, 1))));
+  reads_failed_ += done ? 0 : 1;
+  return done;
 }
 
 }  // namespace swiftlet

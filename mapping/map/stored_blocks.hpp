@@ -5,7 +5,7 @@
 // submaps far apart in time saw it; readers overlay them (block_blend.hpp). A free block without voxels is
 // only a record. Memory: 24 bytes a block and two blocks of scratch, reserved at construction. Cost: a copy
 // of 2.5 kB, 6.6 kB with labels, to or from the storage. Errors: a block that the storage refuses, or for
-// which no record is left, is lost and counted. Not thread safe.
+// which no record is left, is lost and counted; so are reads that fail. Not thread safe.
 
 #include <cstddef>
 #include <cstdint>
@@ -79,6 +79,8 @@ class StoredBlocks {
   [[nodiscard]] const Record& operator[](std::size_t i) const { return records_[i]; }
   void setShown(std::size_t i, bool shown) { records_[i].shown = shown; }
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
+  /// Reads that the storage failed: the blocks are missing from what they were read for.
+  [[nodiscard]] std::uint64_t readsFailed() const { return reads_failed_; }
   [[nodiscard]] std::uint64_t bytesStored() const { return end_; }
   [[nodiscard]] std::size_t bytes() const {
     return sizeof(*this) + records_.capacity() * sizeof(Record) + newest_.bytes();
@@ -89,7 +91,7 @@ class StoredBlocks {
   Record* add(const Record& record);
   void putFree(const BlockIndex& index, SubmapId submap, std::uint64_t parts);
   bool merge(Record& record, const StoredBlock& block);
-  bool write(Record& record, const StoredBlock& block);
+  bool write(const Record& record, const StoredBlock& block);
   [[nodiscard]] bool read(const Record& record, StoredBlock& out);
 
   float most_weight_;
@@ -99,6 +101,7 @@ class StoredBlocks {
   std::vector<Record> records_;
   std::uint64_t end_ = 0;
   std::uint64_t lost_ = 0;
+  std::uint64_t reads_failed_ = 0;
   StoredBlock scratch_, merged_;
 };
 

@@ -14,6 +14,7 @@
 #include "firmware_host/smoothing/map_keeper.hpp"
 #include "tests/firmware_host/file_size_limit.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/mapping/memory_storage.hpp"
 #include "tests/support/text.hpp"
 
 namespace swiftlet {
@@ -88,6 +89,29 @@ TEST_CASE("a stream that cannot be written ends with its name; the others go on"
   CHECK(std::count(poses.begin(), poses.end(), '\n') == kFrames);
   CHECK_THAT(textOf(folder.file("events.log")), Catch::Contains("still there"));
   CHECK(fs::file_size(folder.file("states.csv")) <= kLimit);
+}
+
+TEST_CASE("a map whose blocks do not come back from disk is reported with its holes", "[files]") {
+  const ScratchFolder folder("lost");
+  testing::MemoryStorage storage;
+  MapSettings settings;
+  settings.volume_mib = 8;
+  settings.surface_mib = 1;
+  MapStage map(oneCamera(), settings, nullptr, &storage);
+  map.submaps().follow({});
+  StoredBlock block{};
+  block.voxels.weight.fill(1);
+  map.submaps().store(block);
+  for (const bool readable : {true, false}) {
+    storage.readable = readable;
+    LostFiles lost;
+    RunRecorder recorder(folder.path(), {}, lost);
+    recorder.onMap(map, {});
+    const std::uint64_t failed = recorder.map()["submaps"]["reads_failed"];
+    CHECK((failed > 0) == !readable);
+    REQUIRE((lost.problem() == nullptr) == readable);
+    if (!readable) CHECK_THAT(lost.problem(), Catch::Contains("could not be read back from disk"));
+  }
 }
 
 TEST_CASE("without a folder a run writes nothing and goes on", "[files]") {

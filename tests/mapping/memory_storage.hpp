@@ -1,5 +1,5 @@
 #pragma once
-// What a file does for the map's blocks, in memory; it can be told to be full.
+// What a file does for the map's blocks, in memory; it can be told to be full or unreadable.
 
 #include <algorithm>
 #include <cstring>
@@ -17,12 +17,13 @@ struct MemoryStorage : BlockStorage {
     return true;
   }
   bool read(std::uint64_t offset, std::span<std::byte> out) override {
-    if (offset + out.size() > bytes.size()) return false;
+    if (!readable || offset + out.size() > bytes.size()) return false;
     std::memcpy(out.data(), bytes.data() + offset, out.size());
     return true;
   }
   std::vector<std::byte> bytes;
   std::size_t most = std::size_t{1} << 30U;
+  bool readable = true;
 };
 
 }  // namespace swiftlet::testing

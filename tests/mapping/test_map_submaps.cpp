@@ -370,6 +370,46 @@ TEST_CASE("a storage that is full or missing costs blocks, counted, and nothing 
   CHECK(nowhere.lost() == 1);
 }
 
+TEST_CASE("blocks that cannot be read are counted; what comes after them is stored") {
+  Map map;
+  map.fuse(0);
+  map.submaps.storeAll();
+  const std::size_t stored = map.storedVoxels();
+  REQUIRE(stored > 0);
+  map.volume.clear();
+  map.storage.readable = false;
+  map.settle();
+  CHECK(map.submaps.stored().readsFailed() == stored);
+  // It would be merged with what is there.
+  map.fuse(1);
+  map.submaps.storeAll();
+  CHECK(map.submaps.stored().readsFailed() > stored);
+  CHECK(map.submaps.stored().lost() == 0);
+  map.storage.readable = true;
+  CHECK(map.whole().error < 0.01);
+}
+
+TEST_CASE("a block that finds no room for its labels leaves what was stored before") {
+  MemoryStorage storage;
+  StoredBlocks stored(sceneSettings(), &storage, [](auto...) { return true; });
+  StoredBlock block{}, read{};
+  block.index = {1, 2, 3};
+  block.submap = 4;
+  block.voxels.weight.fill(7);
+  stored.put(block);
+  storage.most = storage.bytes.size();
+  block.submap = 5;
+  block.has_labels = true;
+  stored.put(block);
+  CHECK(stored.lost() == 1);
+  REQUIRE(stored.size() == 1);
+  REQUIRE(stored.read(0, read));
+  CHECK(read.submap == 4);
+  CHECK_FALSE(read.has_labels);
+  CHECK(read.voxels.weight == block.voxels.weight);
+  CHECK(stored.bytesStored() == storage.bytes.size());
+}
+
 TEST_CASE("a place that is seen again and again takes no more room, and gathers weight") {
   Map once, often;
   for (int round = 0; round < 5; ++round) {

@@ -76,7 +76,12 @@ void mergeVolumes(const MapMergeRequest& request, const LoopStage& stage,
   const auto is_kept = [&](const Submap& submap) {
     return std::ranges::find(epochs, submap.epoch) != epochs.end();
   };
-  out.write(submaps.wholeVolume(is_kept), least_weight);
+  const VoxelVolume whole = submaps.wholeVolume(is_kept);
+  if (submaps.stored().readsFailed() > 0) {
+    throw InputError(out.folder(), 0, "", "blocks of the maps could not be read back from this disk",
+                     "Check the disk, or write to another one. No map was written");
+  }
+  out.write(whole, least_weight);
 }
 
 }  // namespace

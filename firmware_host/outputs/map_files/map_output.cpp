@@ -55,6 +55,7 @@ nlohmann::ordered_json toJson(const MapStage& map) {
             {"blocks_apart", submaps.counters().blocks_apart},
             {"blocks_stored", submaps.stored().size()},
             {"blocks_lost", submaps.stored().lost()},
+            {"reads_failed", submaps.stored().readsFailed()},
             {"bytes_stored", submaps.stored().bytesStored()}}},
           {"surface",
            {{"patches", map.surface().patches()},
@@ -98,7 +99,16 @@ nlohmann::ordered_json writeMap(const std::string& folder, MapStage& map,
     writeMapPly((path / name).string(), part);
     json["epochs_apart"].push_back({{"file", name}, {"faces", part.faces.size()}});
   }
+  json["submaps"]["reads_failed"] = map.submaps().stored().readsFailed();  // those above too
   return json;
+}
+
+std::string unreadProblem(const std::string& folder, const MapSubmaps& submaps) {
+  const std::uint64_t count = submaps.stored().readsFailed();
+  if (count == 0) return {};
+  return fmt::format(
+      "{}: blocks of the map could not be read back from disk ({} reads failed): the map has holes", folder,
+      count);
 }
 
 }  // namespace swiftlet

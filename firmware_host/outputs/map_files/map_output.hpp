@@ -16,4 +16,7 @@ namespace swiftlet {
 nlohmann::ordered_json writeMap(const std::string& folder, MapStage& map,
                                 std::span<const std::uint32_t> tied);
 
+/// After all that is written of a map: what failed reads of its stored blocks cost; empty: none failed.
+std::string unreadProblem(const std::string& folder, const MapSubmaps& submaps);
+
 }  // namespace swiftlet

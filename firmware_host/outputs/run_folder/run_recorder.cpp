@@ -130,6 +130,7 @@ void RunRecorder::onMap(MapStage& map, std::span<const std::uint32_t> tied) {
   if (kept_) attempt([&] { kept_->write(map, kept); });
   if (folder_.empty()) return;
   attempt([&] { map_ = writeMap(folder_, map, tied); });
+  if (const std::string problem = unreadProblem(folder_, map.submaps()); !problem.empty()) lost_.add(problem);
 }
 
 void RunRecorder::onFinish(const OdometryOutput& output) {
