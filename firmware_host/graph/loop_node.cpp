@@ -65,7 +65,10 @@ void LoopNode::step(const KeyframeMessage& message) {
   }
   const Spent spent = context_.timed(StageId::kLoop, [&] {
     static_cast<void>(stage_.step(input, LoopEffort{}, reports.draft()));
-    if (worlds.connected()) publishWorlds();
+    if (worlds.connected()) {
+      listWorlds(stage_, worlds.draft());
+      worlds.send();
+    }
     for (LiveOutlet* outlet : context_.options.outlets) outlet->correction.write(stage_.correction());
     reports.send();
   });
@@ -98,20 +101,26 @@ std::vector<WorldInMap> LoopNode::keptNodes() const {
   return nodes;
 }
 
-void LoopNode::publishWorlds() {
-  WorldsInMap& out = worlds.draft();
-  out.newest = stage_.correction();
+void listWorlds(const LoopStage& stage, WorldsInMap& out) {
+  out.newest = stage.correction();
   out.keyframes.clear();
-  stage_.tiedEpochs(out.newest.epoch, out.tied);
-  const auto add = [&](std::size_t i) {
-    const WorldInMap world = worldOf(stage_, i);
-    if (world.epoch == out.newest.epoch || std::ranges::find(out.tied, world.epoch) != out.tied.end())
-      static_cast<void>(out.keyframes.tryPushBack(world));
+  stage.tiedEpochs(out.newest.epoch, out.tied);
+  const auto isListed = [&](std::size_t i) {
+    const std::uint32_t epoch = stage.node(i).epoch;
+    return epoch == out.newest.epoch || std::ranges::find(out.tied, epoch) != out.tied.end();
   };
-  const std::size_t kept = stage_.keptCount();
-  for (std::size_t i = kept; i < stage_.nodeCount(); ++i) add(i);
-  for (std::size_t i = 0; i < kept; i += kept / WorldsInMap::kMostKept + 1) add(i);
-  worlds.send();
+  const std::size_t kept = stage.keptCount(), kept_step = kept / WorldsInMap::kMostKept + 1;
+  std::size_t room = out.keyframes.capacity(), flown = 0;
+  for (std::size_t i = 0; i < kept; i += kept_step) room -= isListed(i) ? 1 : 0;
+  for (std::size_t i = kept; i < stage.nodeCount(); ++i) flown += isListed(i) ? 1 : 0;
+  // More than fit, once nodes of the flight have taken the room of kept ones.
+  const std::size_t step = (flown + room - 1) / room;
+  for (std::size_t i = kept; i < stage.nodeCount(); ++i) {
+    if (isListed(i) && --flown % step == 0) static_cast<void>(out.keyframes.tryPushBack(worldOf(stage, i)));
+  }
+  for (std::size_t i = 0; i < kept; i += kept_step) {
+    if (isListed(i)) static_cast<void>(out.keyframes.tryPushBack(worldOf(stage, i)));
+  }
 }
 
 }  // namespace swiftlet

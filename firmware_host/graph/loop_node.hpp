@@ -14,6 +14,10 @@
 
 namespace swiftlet {
 
+/// How the world of the newest epoch lies in the map. Nodes beyond the room of `out` are left out evenly, of
+/// the kept map and of the flight; the newest is always listed.
+void listWorlds(const LoopStage& stage, WorldsInMap& out);
+
 class LoopNode final : public Node {
  public:
   explicit LoopNode(GraphContext& context);
@@ -32,7 +36,6 @@ class LoopNode final : public Node {
 
  private:
   void step(const KeyframeMessage& message);
-  void publishWorlds();
   /// The loop that this keyframe has closed, for who shows images.
   void sendLoop(Stamp keyframe);
 

@@ -116,8 +116,8 @@ struct MeshResult {
   FixedVector<Eigen::Vector2f, kMaxFeatures> hull;  ///< of the frame's features, raw pixels of camera 0
 };
 
-/// How the odometry's world lies in the map, now and at each keyframe that is a node of the newest one's
-/// piece.
+/// How the odometry's world lies in the map, now and at the keyframes that are nodes of the newest one's
+/// piece (listWorlds()).
 struct WorldsInMap {
   MapCorrection newest;
   /// Of a kept map's nodes; the map moves evenly between them.
