@@ -46,6 +46,10 @@ int fuse(const FuseOptions& options) {
                request.log);
     return kExitFailed;
   }
+  if (!result.problem.empty()) {
+    fmt::print(stderr, "error: {}\n", result.problem);
+    return kExitFailed;
+  }
   return kExitDone;
 }
 

@@ -234,12 +234,12 @@ FuseRunResult FuseRun::end() {
         request_.keep, *map_, [this](std::uint32_t epoch) { return epoch == map_->epoch(); }));
     json["kept"]["file"] = request_.keep;
   }
-  if (const std::string problem = unreadProblem(request_.out, map_->submaps()); !problem.empty())
-    log_.warnings().add(problem);
+  const std::string problem = unreadProblem(request_.out, map_->submaps());
+  if (!problem.empty()) log_.warnings().add(problem);
   json["timing"] = timingJson(times_);
   json["warnings"] = log_.warningsJson();
   writeJson(file("summary.json"), json);
-  return {json, finished_, json["map"]["mesh"]["faces"].get<std::size_t>() > 0};
+  return {json, finished_, json["map"]["mesh"]["faces"].get<std::size_t>() > 0, problem};
 }
 
 }  // namespace

@@ -31,6 +31,7 @@ struct FuseRunResult {
   nlohmann::ordered_json summary;  ///< as written to summary.json
   bool finished = true;            ///< false: stopped
   bool has_surface = false;
+  std::string problem;  ///< what the map lacks (unreadProblem()); empty: nothing
 };
 
 /// Writes map.ply, map.glb, the kept map, trajectory.tum (the poses used) and summary.json. InputError for
