@@ -155,6 +155,8 @@ Status MapStage::measureByPair(const MapInput& input, const DepthEffort& effort)
 Status MapStage::integrate(const MapInput& input, const VolumeEffort& effort, MapReport& report) {
   if (measured_ == nullptr) return report.status = {StatusCode::kInvalidInput, "nothing was measured"};
   if (input.epoch != epoch_) beginEpoch(input.epoch);
+  report.status = integrator_.accept(measured_->view(), input.T_map_body);
+  if (!report.status.ok()) return report.status;
   const SE3 T_world_body = input.T_map_world.inverse() * input.T_map_body;
   if (!submaps_.follow(
           {input.stamp, input.frame, input.epoch, T_world_body, input.T_map_world, input.T_map_world})) {
@@ -162,7 +164,7 @@ Status MapStage::integrate(const MapInput& input, const VolumeEffort& effort, Ma
     return report.status = {StatusCode::kInvalidInput,
                             "the map is full: frames of this epoch are not mapped"};
   }
-  report.status = integrator_.step(measured_->view(), input.T_map_body, effort, report.volume);
+  report.status = integrator_.fuse(measured_->view(), input.T_map_body, effort, report.volume);
   if (report.status.code == StatusCode::kInvalidInput) return report.status;
   ++counters_.taken;
   newest_ = input.stamp;

@@ -91,21 +91,26 @@ Status VolumeIntegrator::checkPose(const DepthImageView& image, const SE3& T_wor
 Status VolumeIntegrator::step(const DepthImageView& image, const SE3& T_world_body,
                               const VolumeEffort& effort, VolumeStep& out) {
   out = {};
-  Status status = checkPose(image, T_world_body);
-  if (status.ok()) {
-    const SE3 T_world_camera = T_world_body * image.T_body_camera;
-    vehicle_ = T_world_camera.translation.cast<float>();
-    status = fuse(image, T_world_camera, effort, out);
-  }
-  ++(status.code == StatusCode::kInvalidInput ? counters_.refused : counters_.images);
+  const Status status = accept(image, T_world_body);
+  return status.ok() ? fuse(image, T_world_body, effort, out) : status;
+}
+
+Status VolumeIntegrator::accept(const DepthImageView& image, const SE3& T_world_body) {
+  const Status status = checkPose(image, T_world_body);
+  counters_.refused += status.ok() ? 0 : 1;
   return status;
 }
 
-Status VolumeIntegrator::fuse(const DepthImageView& image, const SE3& T_world_camera,
+Status VolumeIntegrator::fuse(const DepthImageView& image, const SE3& T_world_body,
                               const VolumeEffort& effort, VolumeStep& out) {
+  out = {};
+  const SE3 T_world_camera = T_world_body * image.T_body_camera;
+  vehicle_ = T_world_camera.translation.cast<float>();
   if (const Status status = image_.prepare(image, volume_.settings(), counters_.pixels); !status.ok()) {
+    ++counters_.refused;
     return status;
   }
+  ++counters_.images;
   begin(T_world_camera);
   listBand(effort.blocks, out);
   for (std::size_t i = 0; i < band_.size(); ++i) {

@@ -72,7 +72,13 @@ class VolumeIntegrator {
   /// `overflow` must outlive this object. Null: new blocks without room are refused.
   void setOverflow(BlockOverflow* overflow) { overflow_ = overflow; }
 
+  /// Calls accept() and fuse().
   [[nodiscard]] Status step(const DepthImageView& image, const SE3& T_world_body, const VolumeEffort& effort,
+                            VolumeStep& out);
+  /// Compares pose and stamp with those of the image before. kInvalidInput: the image must not be fused.
+  [[nodiscard]] Status accept(const DepthImageView& image, const SE3& T_world_body);
+  /// Fuses an image that was accepted.
+  [[nodiscard]] Status fuse(const DepthImageView& image, const SE3& T_world_body, const VolumeEffort& effort,
                             VolumeStep& out);
   /// Forgets the last pose and stamp, for a new epoch or a map that was moved.
   void restart() { last_.reset(); }
@@ -87,8 +93,6 @@ class VolumeIntegrator {
     SE3 T_world_body;
   };
 
-  Status fuse(const DepthImageView& image, const SE3& T_world_camera, const VolumeEffort& effort,
-              VolumeStep& out);
   Status checkPose(const DepthImageView& image, const SE3& T_world_body);
   void begin(const SE3& T_world_camera);
   void listBand(std::uint32_t blocks, VolumeStep& out);

@@ -5,6 +5,7 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <limits>
 #include <string_view>
 #include <vector>
 
@@ -280,6 +281,33 @@ TEST_CASE("surface that is shown moves with its submap") {
   const Count moved = countOf(map);
   CHECK(moved.triangles == triangles);
   CHECK(moved.worst == Approx(0.3F).margin(0.005));
+}
+
+TEST_CASE("a frame that is not mapped is no anchor of what is mapped after it") {
+  Wall wall;
+  MemoryStorage storage;
+  MapStage map(wall.rig, smallSettings(), &wall.sensor, &storage);
+  MapReport report;
+  const auto bad = GENERATE(std::numeric_limits<double>::quiet_NaN(), 500.0);
+  REQUIRE(map.step(wall.at(0), {}, report).ok());
+  for (int i = 30; i < 35; ++i) {
+    MapInput input = wall.at(i);
+    input.frame = static_cast<std::uint64_t>(i);
+    input.T_map_body.translation.y() = -20;  // another part of the wall
+    if (i == 30) input.T_map_body.translation.x() = bad;
+    const bool refused = map.step(input, {}, report).code == StatusCode::kInvalidInput;
+    CHECK((refused || i > 30));
+  }
+  REQUIRE(map.counters().taken >= 3);
+  // The smoother has found where that frame was.
+  const SE3 found{Eigen::Quaterniond::Identity(), {0, -20, 0}};
+  map.correct(std::vector<WorldInMap>{{0, 0, {}, {}}, {30, 0, found, found}});
+  const Submaps& submaps = map.submaps().submaps();
+  for (std::size_t i = 0; i < submaps.size(); ++i) CHECK(submaps[i].T_map_world.translation.allFinite());
+  Count whole;
+  map.visitWholeSurface([](std::uint32_t /*epoch*/) { return true; }, whole);
+  CHECK(whole.triangles > 1000);
+  CHECK(whole.worst < 0.005F);
 }
 
 TEST_CASE("the same input gives the same bytes") {
