@@ -137,6 +137,8 @@ bool LoopStage::movedEnough(Stamp now) const {
 
 Status LoopStage::addNode(const SmoothedWindow& window) {
   const WindowPose& pose = window.poses.back();
+  // Without this a link that is not finite would spoil all that are composed with it.
+  pending_.linked = pending_.linked && allFinite(pending_.T_node_this) && pending_.covariance.allFinite();
   LoopMap::Node left;
   if (map_.full() && map_.makeRoom(left) && place_.database().holds(left.place, left.frame, left.epoch)) {
     place_.forget(left.place);

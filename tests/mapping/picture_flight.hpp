@@ -85,6 +85,7 @@ class Flight {
     const double elapsed = seconds - seconds_before_;
     link.covariance.diagonal() << Eigen::Vector3d::Constant(elapsed * 1e-4),
         Eigen::Vector3d::Constant(elapsed * 4e-4);
+    link.covariance *= covariance_factor;
     LoopInput input{tracks_.get(), window_.get(), &link, {}};
     if (with_images) input.image = picture.image;
     LoopReport report;
@@ -110,6 +111,7 @@ class Flight {
 
   std::unique_ptr<LoopStage> stage;
   Status status;
+  double covariance_factor = 1;  ///< of the odometry's links
 
  private:
   std::unique_ptr<SmoothedWindow> window_;

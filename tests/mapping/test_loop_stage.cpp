@@ -4,6 +4,7 @@
 #include "mapping/loop/loop_stage.hpp"
 
 #include <catch2/catch.hpp>
+#include <limits>
 
 #include "estimator/geometry/so3.hpp"
 #include "mapping/pose_graph/pose_tangent.hpp"
@@ -233,4 +234,16 @@ TEST_CASE("without images, without room and without a pose the map goes on as it
     CHECK(flight.status.code == StatusCode::kInvalidInput);
     CHECK(flight.stage->nodeCount() == 0);
   }
+}
+
+TEST_CASE("odometry that is not finite costs its link, not the nodes after it") {
+  Flight flight;
+  double seconds = 0;
+  for (int i = 0; i < 6; ++i) {
+    flight.covariance_factor = i == 3 ? std::numeric_limits<double>::quiet_NaN() : 1;
+    flight.see(pictures().all[0], seconds += kSpacing, SE3(), false);
+    CHECK(flight.status.ok());
+  }
+  CHECK(flight.stage->nodeCount() == 6);
+  CHECK(flight.stage->counters().components == 2);
 }
