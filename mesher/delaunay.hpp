@@ -73,7 +73,6 @@ class Delaunay {
   /// triangles.
   std::span<const std::uint16_t> hull();
 
-  [[nodiscard]] std::size_t vertexCount() const { return vertex_count_; }
   [[nodiscard]] const DelaunaySkipped& skipped() const { return skipped_; }
 
  private:
