@@ -12,6 +12,7 @@
 #include "estimator/geometry/alignment.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "estimator/odometry/odometry.hpp"
+#include "estimator/odometry/odometry_inputs.hpp"
 #include "tests/smoother/track_flight.hpp"
 
 namespace swiftlet::test {
