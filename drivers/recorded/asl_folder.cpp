@@ -47,7 +47,8 @@ void findIn(const FileTree& tree, const std::string& folder, int depth, std::vec
 class AslFolder final : public RecordedLog {
  public:
   AslFolder(AslFiles files, const LogOptions& options);
-  [[nodiscard]] Trajectory groundTruth() const override;
+  using LogSource::groundTruth;
+  [[nodiscard]] Trajectory groundTruth(LogWarnings& warnings) const override;
   [[nodiscard]] std::string groundTruthName() const override {
     return truth_.empty() ? truth_ : name(truth_);
   }
@@ -291,10 +292,9 @@ void AslFolder::chooseTruth() {
   }
 }
 
-Trajectory AslFolder::groundTruth() const {
+Trajectory AslFolder::groundTruth(LogWarnings& warnings) const {
   if (truth_.empty()) return {};
   LogCounters counters;
-  LogWarnings warnings;
   Trajectory truth = readTrajectoryText(groundTruthName(), text(truth_), counters, warnings);
   const SE3 T_filebody_body = calibration_.T_body_filebody.inverse();
   // The velocity of another point of the body would need the true rate, which the file does not have.

@@ -22,7 +22,9 @@ namespace {
 class BagLog final : public RecordedLog {
  public:
   BagLog(const std::string& path, const LogOptions& options);
-  [[nodiscard]] Trajectory groundTruth() const override { return readBagTruth(*bag_, truth_); }
+  [[nodiscard]] Trajectory groundTruth(LogWarnings& warnings) const override {
+    return readBagTruth(*bag_, truth_, warnings);
+  }
   [[nodiscard]] std::string groundTruthName() const override {
     return truth_ ? bag_->path() + " " + bag_->topics()[*truth_].name : std::string();
   }

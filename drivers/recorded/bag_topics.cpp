@@ -210,17 +210,23 @@ std::optional<std::uint32_t> chooseTruthTopic(const BagFile& bag) {
   return std::nullopt;
 }
 
-Trajectory readBagTruth(BagFile& bag, std::optional<std::uint32_t> topic) {
+Trajectory readBagTruth(BagFile& bag, std::optional<std::uint32_t> topic, LogWarnings& warnings) {
   Trajectory truth;
   if (!topic) return truth;
-  for (const BagEntry& entry : bag.entries()) {
-    TrajectoryPoint point;
-    if (entry.topic == *topic && readPose(bag.topics()[*topic], bag.read(entry), point))
-      truth.push_back(point);
-  }
+  const std::string name = bag.path() + " " + bag.topics()[*topic].name;
   LogCounters counters;
-  LogWarnings warnings;
-  orderByStamp(truth, "", counters, warnings);
+  for (const BagEntry& entry : bag.entries()) {
+    if (entry.topic != *topic) continue;
+    TrajectoryPoint point;
+    if (readPose(bag.topics()[*topic], bag.read(entry), point)) {
+      truth.push_back(point);
+    } else {
+      warnings.addCounted(
+          ++counters.bad_rows,
+          fmt::format("{}: the message received at {} is not a pose, skipped", name, entry.log_time.ns));
+    }
+  }
+  orderByStamp(truth, name, counters, warnings);
   return truth;
 }
 

@@ -30,7 +30,8 @@ struct BagImuTopics {
 /// its name.
 [[nodiscard]] std::optional<std::uint32_t> chooseTruthTopic(const BagFile& bag);
 
-/// Poses in time order; those that are no poses are left out.
-[[nodiscard]] Trajectory readBagTruth(BagFile& bag, std::optional<std::uint32_t> topic);
+/// Poses in time order; those that are no poses are left out, which `warnings` says.
+[[nodiscard]] Trajectory readBagTruth(BagFile& bag, std::optional<std::uint32_t> topic,
+                                      LogWarnings& warnings);
 
 }  // namespace swiftlet

@@ -70,7 +70,12 @@ class LogSource {
   /// Feature tracks (track_file.hpp) that the log holds in place of images; empty when it has images.
   [[nodiscard]] virtual std::string trackFile() const { return {}; }
   /// The truth of the estimator's body, in time order; empty when the log has none. Read on demand.
-  [[nodiscard]] virtual Trajectory groundTruth() const { return {}; }
+  /// `warnings` receives what was left out.
+  [[nodiscard]] virtual Trajectory groundTruth(LogWarnings& /*warnings*/) const { return {}; }
+  [[nodiscard]] Trajectory groundTruth() const {
+    LogWarnings unused;
+    return groundTruth(unused);
+  }
   /// Source of the truth, for the summary; empty without one.
   [[nodiscard]] virtual std::string groundTruthName() const { return {}; }
   /// next() goes on with the first message that is not before `stamp`. Reads nothing.

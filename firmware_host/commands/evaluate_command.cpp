@@ -19,6 +19,7 @@
 #include "firmware_host/lab/evaluation/mesh_report.hpp"
 #include "firmware_host/lab/hil/hil_checks.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"
+#include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {
 namespace {
@@ -163,7 +164,8 @@ int evaluatePositions(const EvaluateOptions& options, const Settings& settings, 
   LogWarnings warnings;
   std::vector<PositionPoint> truth = readPositions(subject.truth, counters, warnings);
   for (PositionPoint& point : truth) point.stamp = point.stamp - subject.shift;
-  for (const std::string& line : warnings.lines()) fmt::print(stderr, "warning: {}\n", line);
+  warnOfRows(subject.truth, counters, warnings);
+  warnAll(warnings.lines());
   PositionAccuracyOptions how{accuracyOptions(settings.evaluation, options.align), std::nullopt};
   if (options.fit_shift > 0) how.reach = Duration::fromSeconds(options.fit_shift);
   Json json;
@@ -171,7 +173,9 @@ int evaluatePositions(const EvaluateOptions& options, const Settings& settings, 
   if (!options.json) fmt::print("truth: {}, positions only\n", subject.truth);
   bool compared = false;
   for (const std::string& file : subject.files) {
-    const Trajectory estimate = readEstimate(file);
+    LogWarnings left_out;
+    const Trajectory estimate = readEstimate(file, left_out);
+    warnAll(left_out.lines());
     setSection(options, subject.first_image.value_or(estimate.front().stamp), how.accuracy);
     const PositionAccuracy accuracy = positionAccuracy(estimate, truth, how);
     compared = compared || accuracy.pairs > 0;
@@ -201,6 +205,7 @@ int evaluate(const EvaluateOptions& options) {
                      "Omit it: poses must have stamps of the log's clock");
   }
   Truth truth = readTruth(subject.truth, subject.from_tracks);
+  warnAll(truth.warnings.lines());
   truth.poses = onImageClock(std::move(truth.poses), subject.shift);
   AccuracyOptions accuracy_options = accuracyOptions(settings.evaluation, options.align);
   Json json;
@@ -213,7 +218,9 @@ int evaluate(const EvaluateOptions& options) {
   }
   bool compared = true;
   for (const std::string& file : subject.files) {
-    const Trajectory estimate = readEstimate(file);
+    LogWarnings left_out;
+    const Trajectory estimate = readEstimate(file, left_out);
+    warnAll(left_out.lines());
     // Without a log the zero of time is the estimate's own first pose.
     const Stamp zero = subject.first_image ? *subject.first_image
                        : truth.first_image ? *truth.first_image

@@ -258,7 +258,10 @@ class ReplayRun {
   void addAccuracy(ReplayResult& result) {
     if (!request_.accuracy || !result.has_pose) return;
     try {
-      const Trajectory truth = onImageClock(source_->groundTruth(), cameraToImuShift(result.summary));
+      LogWarnings left_out;
+      const Trajectory truth = onImageClock(source_->groundTruth(left_out), cameraToImuShift(result.summary));
+      warnAll(left_out.lines());
+      for (const std::string& line : left_out.lines()) result.summary["warnings"].push_back(line);
       if (truth.empty()) return;
       result.summary["accuracy"] = request_.accuracy(request_.out, truth, source_->groundTruthName(),
                                                      *result.statistics.first_image, settings_.evaluation);

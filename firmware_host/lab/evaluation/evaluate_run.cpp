@@ -1,5 +1,7 @@
 #include "firmware_host/lab/evaluation/evaluate_run.hpp"
 
+#include <fmt/format.h>
+
 #include <filesystem>
 
 #include "drivers/bag/bag_file.hpp"
@@ -45,20 +47,20 @@ Truth readTruth(const std::string& path, bool without_images) {
     // Poses alone need no calibration, which a bag does not hold.
     const auto bag = openBag(path);
     const auto topic = chooseTruthTopic(*bag);
-    truth.poses = readBagTruth(*bag, topic);
+    truth.poses = readBagTruth(*bag, topic, truth.warnings);
     if (truth.poses.empty()) throw InputError(path, 0, "", "none of its topics has true poses", kRemedy);
     truth.name = path + " " + bag->topics()[*topic].name;
     return truth;
   }
   if (!std::filesystem::is_directory(path) && !isArchive(path)) {
-    truth.poses = readEstimate(path);
+    truth.poses = readEstimate(path, truth.warnings);
     truth.name = path;
     return truth;
   }
   LogOptions options;
   options.without_images = without_images;
   const auto source = openLog(path, options);
-  truth.poses = source->groundTruth();
+  truth.poses = source->groundTruth(truth.warnings);
   truth.name = source->groundTruthName();
   if (truth.poses.empty()) {
     throw InputError(path, 0, "", "the log has no truth", kRemedy);
@@ -70,10 +72,21 @@ Truth readTruth(const std::string& path, bool without_images) {
   return truth;
 }
 
-Trajectory readEstimate(const std::string& path) {
+Trajectory readEstimate(const std::string& path, LogWarnings& warnings) {
   LogCounters counters;
-  LogWarnings warnings;
-  return readTrajectory(path, counters, warnings);
+  Trajectory trajectory = readTrajectory(path, counters, warnings);
+  warnOfRows(path, counters, warnings);
+  return trajectory;
+}
+
+Trajectory readEstimate(const std::string& path) {
+  LogWarnings unused;
+  return readEstimate(path, unused);
+}
+
+void warnOfRows(const std::string& file, const LogCounters& counters, LogWarnings& warnings) {
+  const std::uint64_t rows = counters.bad_rows + counters.nan_rows + counters.repeated_stamps;
+  if (rows > 0) warnings.add(fmt::format("{}: {} rows are left out of the comparison", file, rows));
 }
 
 Consistency consistencyOf(const std::string& states_file, const Trajectory& truth, Duration max_gap) {

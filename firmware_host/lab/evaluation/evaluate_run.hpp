@@ -26,6 +26,7 @@ struct Truth {
   Trajectory poses;
   std::string name;
   std::optional<Stamp> first_image;  ///< where a log says
+  LogWarnings warnings;              ///< what was left out of the poses
 };
 /// `without_images`: a log is read as one of tracks, which need not hold images.
 Truth readTruth(const std::string& path, bool without_images = false);
@@ -43,8 +44,13 @@ LoopAccuracy loopsOf(const std::string& loops_file, const Trajectory& truth, con
 /// Over the part of the truth that `estimate` (not empty) covers.
 Revisits revisitsOf(const Trajectory& estimate, const Trajectory& truth);
 
-/// A trajectory file of any kind readTrajectory() takes; InputError when it has no pose.
+/// A trajectory file of any kind readTrajectory() takes; InputError when it has no pose. `warnings` receives
+/// what was left out.
+Trajectory readEstimate(const std::string& path, LogWarnings& warnings);
 Trajectory readEstimate(const std::string& path);
+
+/// How many rows were left out of `file`; the other warnings name the first of each kind.
+void warnOfRows(const std::string& file, const LogCounters& counters, LogWarnings& warnings);
 
 /// NEES of a run's keyframes. Keyframes without truth are left out.
 Consistency consistencyOf(const std::string& states_file, const Trajectory& truth, Duration max_gap);

@@ -35,7 +35,7 @@ NamedTrajectory openTrajectory(const std::string& file, const std::string& log, 
     return {file, readTrajectory(file, counters, warnings)};
   }
   NamedTrajectory truth{source.groundTruthName(),
-                        onImageClock(source.groundTruth(), source.rig().camera_to_imu_shift)};
+                        onImageClock(source.groundTruth(warnings), source.rig().camera_to_imu_shift)};
   if (truth.poses.empty()) {
     throw InputError(log, 0, "", "the log has no truth to take poses from",
                      "Give a trajectory file with --trajectory (TUM, or EuRoC csv)");
