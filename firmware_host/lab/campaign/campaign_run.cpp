@@ -35,13 +35,14 @@ std::string textOf(const fs::path& file) {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
-/// The line of a program's output that says what went wrong, or its last.
+/// The line of a program's output that says what went wrong, or its last. An option that is refused is named
+/// in front of a hint at --help.
 std::string complaint(const fs::path& output) {
   std::ifstream file(output);
   std::string said;
   for (std::string line; std::getline(file, line);) {
     if (line.starts_with("error: ")) return line.substr(std::strlen("error: "));
-    if (!line.empty()) said = line;
+    if (!line.empty() && !line.starts_with("Run with --help")) said = line;
   }
   return said;
 }

@@ -372,6 +372,25 @@ TEST_CASE("repeats keep max_features in its range") {
   }
 }
 
+TEST_CASE("a run that is refused for an option shows the option, not the hint at --help") {
+  const Logs logs;
+  const fs::path program = logs.folder() / "refusing";
+  writeWholeFile(program,
+                 "#!/bin/sh\nif [ \"$1\" = --version ]; then echo 'swiftlet 1'; exit 0; fi\n"
+                 "echo 'The following argument was not expected: --bad'\n"
+                 "echo 'Run with --help for more information.'\nexit 2\n");
+  fs::permissions(program, fs::perms::owner_all);
+  Campaign campaign = campaignOf({"a"}, 1);
+  campaign.folder = logs.folder();
+  CampaignRequest request{logs.folder() / "out", program, "", 1};
+  request.version = programVersion(program);
+  CHECK(runCampaignJob(campaign, request, campaign.logs.front(), {}));
+  const std::vector<CampaignRow> rows = campaignRows(campaign, request);
+  REQUIRE(rows.size() == 1);
+  CHECK(rows[0].outcome == CampaignOutcome::kAborted);
+  CHECK(rows[0].says == "The following argument was not expected: --bad");
+}
+
 TEST_CASE("a program that cannot tell its version says why") {
   const Logs logs;
   const fs::path program = logs.folder() / "broken";
