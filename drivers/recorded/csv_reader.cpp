@@ -70,7 +70,10 @@ bool CsvReader::readLine() {
   overlong_ = false;
   std::size_t length = 0;
   if (file_) {
-    if (std::fgets(buffer_.data(), static_cast<int>(buffer_.size()), file_.get()) == nullptr) return false;
+    if (std::fgets(buffer_.data(), static_cast<int>(buffer_.size()), file_.get()) == nullptr) {
+      if (std::ferror(file_.get()) == 0) return false;
+      throw InputError(name_, 0, "", std::string("cannot be read: ") + std::strerror(errno), "");
+    }
     length = ::strnlen(buffer_.data(), buffer_.size());
     if (length + 1 == buffer_.size() && buffer_[length - 1] != '\n') {
       overlong_ = true;
@@ -86,6 +89,10 @@ bool CsvReader::readLine() {
   }
   ++line_;
   if (line_ == 1 && text_.starts_with("\xEF\xBB\xBF")) text_.remove_prefix(3);
+  if (line_ == 1 && (text_.starts_with("\xFF\xFE") || text_.starts_with("\xFE\xFF"))) {
+    throw InputError(name_, 0, "", "is UTF-16 text",
+                     "Save it as UTF-8: `iconv -f UTF-16 -t UTF-8`, or choose UTF-8 where the file is saved");
+  }
   text_ = trim(text_);
   return true;
 }

@@ -11,7 +11,7 @@ std::vector<ImageRow> readImageRows(CsvReader& csv, LogCounters& counters, LogWa
   while (csv.next(1)) {
     ImageRow row;
     if (!parseCsvStamp(csv.field(0), row.stamp)) {
-      csv.reject("timestamp", "`" + std::string(csv.field(0).substr(0, 40)) + "` is not a stamp in ns");
+      csv.reject("timestamp", quoteInput(csv.field(0)) + " is not a stamp in ns");
       continue;
     }
     row.file = csv.field(1);

@@ -77,7 +77,7 @@ bool ImuRows::next(ImuSample& sample) {
   while (csv_.next(7)) {
     if (!any_) accel_first_ = accelFirst(csv_.header());
     if (!parseCsvStamp(csv_.field(0), sample.stamp)) {
-      csv_.reject("timestamp", "`" + std::string(csv_.field(0).substr(0, 40)) + "` is not a stamp in ns");
+      csv_.reject("timestamp", quoteInput(csv_.field(0)) + " is not a stamp in ns");
       continue;
     }
     if (!csv_.numbers(accel_first_ ? 4 : 1, kGyroNames, sample.gyro.data()) ||

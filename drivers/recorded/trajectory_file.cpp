@@ -50,7 +50,7 @@ bool readTumRow(CsvReader& csv, StampUnit& unit, TrajectoryPoint& point) {
   const bool good = unit == StampUnit::kSeconds ? parseSeconds(csv.field(0), point.stamp)
                                                 : parseNanoseconds(csv.field(0), point.stamp);
   if (!good || unit == StampUnit::kUnknown) {
-    csv.reject("timestamp", "`" + std::string(csv.field(0).substr(0, 40)) + "` is not a plain decimal stamp");
+    csv.reject("timestamp", quoteInput(csv.field(0)) + " is not a plain decimal stamp");
     return false;
   }
   std::array<double, 7> v{};
@@ -60,7 +60,7 @@ bool readTumRow(CsvReader& csv, StampUnit& unit, TrajectoryPoint& point) {
 
 bool readCsvRow(CsvReader& csv, TrajectoryPoint& point) {
   if (!parseCsvStamp(csv.field(0), point.stamp)) {
-    csv.reject("timestamp", "`" + std::string(csv.field(0).substr(0, 40)) + "` is not a stamp in ns");
+    csv.reject("timestamp", quoteInput(csv.field(0)) + " is not a stamp in ns");
     return false;
   }
   std::array<double, 7> v{};

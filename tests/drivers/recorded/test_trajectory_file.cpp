@@ -107,5 +107,30 @@ TEST_CASE("bad rows of trajectories name file, line and field", "[trajectory]") 
   CHECK(contains(errorOf([] { TumWriter writer("/nonexistent/file"); }).message, "cannot be written"));
 }
 
+TEST_CASE("UTF-16 is named, a byte order mark of UTF-8 is read", "[trajectory]") {
+  const std::string rows = "1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n";
+  CHECK(ReadTrajectory("\xEF\xBB\xBF" + rows).poses.size() == 2);
+  std::string wide("\xFF\xFE", 2);
+  for (const char c : rows) wide += {c, '\0'};
+  std::string big("\xFE\xFF", 2);
+  for (const char c : rows) big += {'\0', c};
+  for (const std::string& text : {wide, big}) {
+    const InputError error = errorOf([&] { ReadTrajectory{text}; });
+    CHECK(contains(error.message, "UTF-16"));
+    CHECK(contains(error.remedy, "UTF-8"));
+  }
+  const test::TempFolder folder;
+  const std::string file = (folder.path() / "wide.tum").string();
+  test::writeText(file, wide);
+  LogCounters counters;
+  LogWarnings warnings;
+  CHECK(errorOf([&] { readTrajectory(file, counters, warnings); }).file == file);
+}
+
+TEST_CASE("a bad stamp is repeated without what steers a terminal", "[trajectory]") {
+  const ReadTrajectory read("1 0 0 0 0 0 0 1\n\x1b[2J 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n");
+  CHECK(anyContains(read.warnings.lines(), "file:2: timestamp: `?[2J` is not a plain decimal stamp"));
+}
+
 }  // namespace
 }  // namespace swiftlet
