@@ -1,5 +1,7 @@
 #include "drivers/bag/bag_file.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <string_view>
@@ -12,6 +14,7 @@
 #include "drivers/bag/sqlite_bag.hpp"
 #include "drivers/bag/unpack.hpp"
 #include "drivers/input/input_error.hpp"
+#include "drivers/input/stamp_range.hpp"
 
 namespace swiftlet {
 namespace {
@@ -42,7 +45,17 @@ void BagFile::orderEntries() {
   std::sort(entries_.begin(), entries_.end(), [](const BagEntry& a, const BagEntry& b) {
     return std::tie(a.log_time.ns, a.part, a.at) < std::tie(b.log_time.ns, b.part, b.at);
   });
-  for (const BagEntry& entry : entries_) ++topics_[entry.topic].messages;
+  for (const BagEntry& entry : entries_) {
+    ++topics_[entry.topic].messages;
+    checkStamp(entry.topic, entry.log_time);
+  }
+}
+
+void BagFile::checkStamp(std::uint32_t topic, Stamp stamp) const {
+  if (isStampInRange(stamp.ns)) return;
+  throw InputError(path_ + " " + topics_[topic].name, 0, "timestamp",
+                   fmt::format("{} ns is beyond the year 2096", stamp.ns),
+                   "Record the bag with a clock that is set, or leave this topic out of it");
 }
 
 bool isBag(const std::string& path) {

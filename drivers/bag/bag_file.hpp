@@ -57,6 +57,9 @@ class BagFile {
   /// The body of a message, valid until the next call.
   virtual std::span<const std::uint8_t> read(const BagEntry& entry) = 0;
 
+  /// InputError where a stamp of this topic is out of range (stamp_range.hpp).
+  void checkStamp(std::uint32_t topic, Stamp stamp) const;
+
  protected:
   /// The topic with this name, type and encoding; added if there is none.
   std::uint32_t topicOf(std::string_view name, std::string_view type, BagEncoding encoding,

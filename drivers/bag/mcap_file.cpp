@@ -13,6 +13,7 @@
 #include "drivers/bag/unpack.hpp"
 #include "drivers/device/byte_fields.hpp"
 #include "drivers/input/input_error.hpp"
+#include "drivers/input/stamp_range.hpp"
 
 namespace swiftlet {
 namespace {
@@ -82,7 +83,7 @@ class McapFile final : public BagFile {
   void closeChunk();
   void scanChunk(std::uint32_t chunk, bool messages);
   void takeMessage(Bytes head, std::uint32_t part, std::uint64_t at, std::uint64_t place);
-  [[nodiscard]] Stamp stampOf(std::uint64_t ns, std::uint64_t place) const;
+  [[nodiscard]] Stamp stampOf(std::uint64_t ns, std::uint32_t topic, std::uint64_t place) const;
   Bytes unpackedChunk(std::uint32_t chunk);
 
   FileBytes file_;
@@ -319,16 +320,16 @@ void McapFile::takeIndex(Bytes content, std::uint64_t place) {
     fail(place, fmt::format("a message index names channel {}, which does not exist", channel));
   }
   while (reader.left() > 0) {
-    const Stamp time = stampOf(reader.u64(), place);
+    const Stamp time = stampOf(reader.u64(), known->second.index, place);
     const std::uint64_t offset = reader.u64();
     if (offset >= chunks_[chunk].unpacked) fail(place, "a message index points outside its chunk");
     entries_.push_back({time, known->second.index, chunk, offset});
   }
 }
 
-Stamp McapFile::stampOf(std::uint64_t ns, std::uint64_t place) const {
-  if (ns > static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max())) {
-    fail(place, fmt::format("the time {} ns is out of range", ns));
+Stamp McapFile::stampOf(std::uint64_t ns, std::uint32_t topic, std::uint64_t place) const {
+  if (ns > static_cast<std::uint64_t>(kLargestStamp)) {
+    fail(place, fmt::format("{}: the time {} ns is beyond the year 2096", topics_[topic].name, ns));
   }
   return Stamp{static_cast<std::int64_t>(ns)};
 }
@@ -342,7 +343,7 @@ void McapFile::takeMessage(Bytes head, std::uint32_t part, std::uint64_t at, std
   const auto channel = channels_.find(id);
   if (channel == channels_.end())
     fail(place, fmt::format("a message of channel {}, which does not exist", id));
-  entries_.push_back({stampOf(time, place), channel->second.index, part, at});
+  entries_.push_back({stampOf(time, channel->second.index, place), channel->second.index, part, at});
 }
 
 void McapFile::scanChunk(std::uint32_t chunk, bool messages) {

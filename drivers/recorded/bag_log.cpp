@@ -39,7 +39,8 @@ class BagLog final : public RecordedLog {
   void addImu(const BagEntry& entry, std::vector<ImuSample>& samples);
   void addImage(std::size_t camera, std::size_t entry);
   void joinTopics();
-  void repairZeroStamp(const BagEntry& entry, Stamp& stamp);
+  /// In range, and not zero: then the receive time takes its place.
+  void checkStamp(const BagEntry& entry, Stamp& stamp);
   void countShort(const BagEntry& entry);
   [[nodiscard]] const BagTopic& topic(std::uint32_t index) const { return bag_->topics()[index]; }
 
@@ -88,7 +89,8 @@ void BagLog::chooseTopics() {
   }
 }
 
-void BagLog::repairZeroStamp(const BagEntry& entry, Stamp& stamp) {
+void BagLog::checkStamp(const BagEntry& entry, Stamp& stamp) {
+  bag_->checkStamp(entry.topic, stamp);
   if (stamp.ns != 0) return;
   stamp = entry.log_time;
   if (++zero_stamps_ == 1) {
@@ -111,7 +113,7 @@ void BagLog::addImu(const BagEntry& entry, std::vector<ImuSample>& samples) {
   sample.stamp = imu.header.stamp;
   sample.gyro = {imu.angular_velocity.x, imu.angular_velocity.y, imu.angular_velocity.z};
   sample.accel = {imu.linear_acceleration.x, imu.linear_acceleration.y, imu.linear_acceleration.z};
-  repairZeroStamp(entry, sample.stamp);
+  checkStamp(entry, sample.stamp);
   if (!sample.gyro.allFinite() || !sample.accel.allFinite()) {
     warnings_.addCounted(++counters_.nan_rows, fmt::format("{}: {}: not finite at {}, skipped", bag_->path(),
                                                            topic(entry.topic).name, sample.stamp.ns));
@@ -124,7 +126,7 @@ void BagLog::addImage(std::size_t camera, std::size_t index) {
   const BagEntry& entry = bag_->entries()[index];
   rosmsg::Header header;
   if (!decode(bag_->read(entry), topic(entry.topic).encoding, header)) return countShort(entry);
-  repairZeroStamp(entry, header.stamp);
+  checkStamp(entry, header.stamp);
   images_.push_back({header.stamp, static_cast<std::uint32_t>(camera),
                      static_cast<std::uint32_t>(pictures_[camera].size())});
   pictures_[camera].push_back(index);

@@ -219,6 +219,7 @@ Trajectory readBagTruth(BagFile& bag, std::optional<std::uint32_t> topic, LogWar
     if (entry.topic != *topic) continue;
     TrajectoryPoint point;
     if (readPose(bag.topics()[*topic], bag.read(entry), point)) {
+      bag.checkStamp(*topic, point.stamp);
       truth.push_back(point);
     } else {
       warnings.addCounted(

@@ -2,11 +2,10 @@
 
 #include <charconv>
 
+#include "drivers/input/stamp_range.hpp"
+
 namespace swiftlet {
 namespace {
-
-/// ns, the year 2096: the difference of two stamps, and a stamp and seconds, do not overflow.
-constexpr std::int64_t kLargestStamp = 4'000'000'000'000'000'000;
 
 bool allDigits(std::string_view text) {
   for (const char c : text) {
@@ -47,8 +46,7 @@ bool parseSeconds(std::string_view text, Stamp& stamp) {
 bool parseNanoseconds(std::string_view text, Stamp& stamp) {
   const std::size_t point = text.find('.');
   if (point != std::string_view::npos && !allDigits(text.substr(point + 1))) return false;
-  return parseInteger(text.substr(0, point), stamp.ns) && stamp.ns <= kLargestStamp &&
-         stamp.ns >= -kLargestStamp;
+  return parseInteger(text.substr(0, point), stamp.ns) && isStampInRange(stamp.ns);
 }
 
 bool parseCsvStamp(std::string_view text, Stamp& stamp) {

@@ -192,11 +192,30 @@ TEST_CASE("poses on a topic of true poses are the truth", "[bag_log]") {
     bag.write("/truth/pose", Stamp{fixture.asl.stamp(3)}, broken);
   });
   const auto log = openLog(fixture.path(), fixture.options());
-  const Trajectory truth = log->groundTruth();
+  LogWarnings warnings;
+  const Trajectory truth = log->groundTruth(warnings);
+  CHECK(anyContains(warnings.lines(), "/truth/pose: the message received at"));
+  CHECK(anyContains(warnings.lines(), "is not a pose, skipped"));
   REQUIRE(truth.size() == 6);
   CHECK(truth[4].stamp.ns == fixture.asl.stamp(4));
   CHECK(truth[4].T_world_body.translation == Eigen::Vector3d(4, 2, 3));
   CHECK(contains(log->groundTruthName(), "/truth/pose"));
+}
+
+TEST_CASE("a stamp beyond the range of stamps is refused with file, topic and stamp", "[bag_log]") {
+  const bool mcap = GENERATE(true, false);
+  const BagFixture fixture;
+  fixture.write(
+      [&](MessageBag& bag) {
+        fixture.putImages(bag, false);
+        fixture.putImu(bag);
+        bag.write("/imu0", Stamp{5'000'000'000'000'000'000}, imuAt(fixture.asl.stamp(3), {}, {0, 0, 9.8}));
+      },
+      mcap);
+  const InputError error = errorOf([&] { openLog(fixture.path(), fixture.options()); });
+  CHECK(contains(error.file, fixture.path()));
+  CHECK(contains(error.what(), "/imu0: "));
+  CHECK(contains(error.message, "5000000000000000000 ns"));
 }
 
 TEST_CASE("bags of ROS 2 with less than a log needs are refused", "[bag_log]") {

@@ -149,6 +149,17 @@ TEST_CASE("bags with less than a log needs are refused", "[ros_bag]") {
   CHECK(contains(errorOf([&] { openLog(still.path(), still.options()); }).message, "sensor_msgs/Imu"));
 }
 
+TEST_CASE("a header's stamp beyond the range of stamps is refused with topic and stamp", "[ros_bag]") {
+  BagFixture fixture;
+  fixture.putAll(false);
+  const Stamp late{4'200'000'000'000'000'000};
+  fixture.put("/imu0", "sensor_msgs/Imu", fixture.asl.stamp(3), test::imuBody(late, {}, {0, 0, 9.8}));
+  fixture.close();
+  const InputError error = errorOf([&] { openLog(fixture.path(), fixture.options()); });
+  CHECK(error.file == fixture.path() + " /imu0");
+  CHECK(contains(error.message, "4200000000000000000 ns"));
+}
+
 TEST_CASE("damaged messages and cut bags are said", "[ros_bag]") {
   BagFixture bag;
   bag.putAll(false);
