@@ -10,8 +10,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -64,6 +66,8 @@ class LogSource {
   [[nodiscard]] virtual std::size_t imageCount() const = 0;
   /// Distinct image stamps the log lists: the most poses a replay can give.
   [[nodiscard]] virtual std::size_t frameCount() const = 0;
+  /// Stamps of the first and the last IMU sample; nothing where the log does not list them.
+  [[nodiscard]] virtual std::optional<std::pair<Stamp, Stamp>> sampleSpan() const { return std::nullopt; }
   [[nodiscard]] virtual const LogCounters& counters() const = 0;
   /// Lines for the user; grows while the log is read.
   [[nodiscard]] virtual const std::vector<std::string>& warnings() const = 0;

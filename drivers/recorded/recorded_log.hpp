@@ -20,6 +20,10 @@ class RecordedLog : public LogSource {
   [[nodiscard]] bool imageIsNext() const override;
   [[nodiscard]] std::size_t imageCount() const override { return images_.size(); }
   [[nodiscard]] std::size_t frameCount() const override { return frame_count_; }
+  [[nodiscard]] std::optional<std::pair<Stamp, Stamp>> sampleSpan() const override {
+    if (samples_.empty()) return std::nullopt;
+    return std::pair(samples_.front().stamp, samples_.back().stamp);
+  }
   [[nodiscard]] const LogCounters& counters() const override { return counters_; }
   [[nodiscard]] const std::vector<std::string>& warnings() const override { return warnings_.lines(); }
 

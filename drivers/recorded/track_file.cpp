@@ -190,7 +190,10 @@ TrackFileFacts surveyTrackFile(const std::string& path) {
   TrackReader reader(path);
   TrackFileFacts facts;
   const auto frame = std::make_unique<TrackedFrame>();
-  while (reader.next(*frame)) ++facts.frames;
+  while (reader.next(*frame)) {
+    if (facts.frames++ == 0) facts.first = frame->stamp;
+    facts.last = frame->stamp;
+  }
   facts.cameras = reader.cameras();
   return facts;
 }

@@ -89,6 +89,8 @@ class TrackReader {
 struct TrackFileFacts {
   std::uint64_t frames = 0;
   std::size_t cameras = 0;
+  Stamp first;
+  Stamp last;
 };
 TrackFileFacts surveyTrackFile(const std::string& path);
 

@@ -30,9 +30,17 @@ namespace swiftlet {
 namespace {
 
 /// Reads the whole file once, so that a bad one is refused before anything is written.
-TrackFileFacts checkTracks(const std::string& path, const Rig& rig, bool mono) {
+TrackFileFacts checkTracks(const std::string& path, const LogSource& log, bool mono) {
   const TrackFileFacts facts = surveyTrackFile(path);
-  if (!mono && facts.cameras > rig.camera_count) {
+  const auto samples = log.sampleSpan();
+  if (samples && (samples->second < facts.first || samples->first > facts.last)) {
+    throw InputError(
+        path, 0, "timestamp",
+        fmt::format("the log's samples ({} to {}) and the tracks ({} to {}) do not overlap in time",
+                    samples->first.ns, samples->second.ns, facts.first.ns, facts.last.ns),
+        "Use stamps of one clock, in nanoseconds");
+  }
+  if (!mono && facts.cameras > log.rig().camera_count) {
     throw InputError(path, 0, "camera", "has features of camera 1, but the calibration has only camera 0",
                      "Give the calibration of both cameras with --calibration, or omit camera 1 with --mono");
   }
@@ -95,7 +103,7 @@ class ReplayRun {
       throw InputError(request_.log, 0, "", "a log of feature tracks has no images to feed or record",
                        "Omit --real-time and --record");
     }
-    steps_ = checkTracks(facts_.tracks, source_->rig(), request_.mono).frames;
+    steps_ = checkTracks(facts_.tracks, *source_, request_.mono).frames;
     tracks_ = std::make_unique<TrackReader>(facts_.tracks);
   }
 

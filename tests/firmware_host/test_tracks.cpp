@@ -14,6 +14,7 @@
 #include "firmware_host/runs/replay_run.hpp"
 #include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/run_summary.hpp"
+#include "tests/firmware_host/said.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/support/text.hpp"
 
@@ -58,6 +59,18 @@ TEST_CASE("simulated tracks replay and evaluate from end to end") {
     const std::string mono = folder.file("mono");
     REQUIRE(run({"replay", flight, "--mono", "--out", mono}) == kExitDone);
     CHECK(summaryIn(mono)["run"]["cameras"] == 1);
+  }
+  SECTION("tracks of another clock than the samples are refused, with the file and both spans") {
+    const fs::path file = fs::path(flight) / "mav0/tracks0/data.csv";
+    std::ofstream(file) << "#timestamp [ns],id,camera,u [px],v [px]\n5000000000,1,0,10,10\n"
+                        << "5050000000,1,0,11,10\n";
+    const test::Said said = test::say({"replay", flight, "--out", folder.file("none")});
+    CHECK(said.code == kExitBadInput);
+    CHECK_THAT(
+        said.text,
+        Catch::Contains(file.string() + ": timestamp: the log's samples (") &&
+            Catch::Contains("the tracks (5000000000 to 5050000000) do not overlap in time. Use stamps"));
+    CHECK_FALSE(fs::exists(folder.file("none")));
   }
   SECTION("a bad file is refused before a run folder is made") {
     std::ofstream(fs::path(flight) / "mav0/tracks0/data.csv", std::ios::app) << "oops\n";
