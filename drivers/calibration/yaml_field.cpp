@@ -47,8 +47,7 @@ YamlField YamlField::parse(const std::string& file, std::string_view text) {
   try {
     YAML::Node root = YAML::Load(withoutOpenCvHeader(text));
     if (!root.IsMap()) {
-      throw InputError(file, 1, "", "not a YAML map of `key: value` lines",
-                       "Give a calibration in YAML or JSON");
+      throw InputError(file, 1, "", "not a YAML map of `key: value` lines", "Give a file in YAML or JSON");
     }
     return {std::make_shared<const std::string>(file), "", root, 1};
   } catch (const YAML::Exception& error) {

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
-#include <fstream>
 #include <sstream>
 #include <vector>
 
 #include "drivers/input/input_error.hpp"
+#include "drivers/input/read_file.hpp"
 #include "drivers/input/unpack_xz.hpp"
 #include "estimator/geometry/so3.hpp"
 
@@ -24,11 +24,8 @@ struct Row {
 };
 
 std::string readText(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(path, 0, "", "cannot be opened", "");
-  std::ostringstream text;
-  text << file.rdbuf();
-  return isXz(text.view()) ? unpackXz(path, text.view()) : text.str();
+  std::string text = readFile(path, "");
+  return isXz(text) ? unpackXz(path, text) : text;
 }
 
 std::vector<Row> parseRows(const std::string& text, const std::string& path) {

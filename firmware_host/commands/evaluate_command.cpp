@@ -86,8 +86,9 @@ Subject subjectOf(const EvaluateOptions& options) {
       subject.first_image = Stamp{run["first_image_ns"].get<std::int64_t>()};
     }
     subject.shift = cameraToImuShift(summary);
-    if (run.contains("log")) subject.log = run["log"].get<std::string>();
-    if (subject.truth.empty() && run.contains("log")) {
+    const bool names_log = run.contains("log") && run["log"].is_string();
+    if (names_log) subject.log = run["log"].get<std::string>();
+    if (subject.truth.empty() && names_log) {
       subject.truth = subject.log;
       subject.from_tracks = run.contains("tracks");
     }

@@ -6,10 +6,11 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <fstream>
+#include <sstream>
 #include <string_view>
 
 #include "drivers/input/input_error.hpp"
+#include "drivers/input/read_file.hpp"
 
 namespace swiftlet {
 namespace {
@@ -51,11 +52,7 @@ struct ConfusionLine {
 }  // namespace
 
 ConfusionModel readConfusion(const std::string& path, float right) {
-  std::ifstream file(path);
-  if (!file) {
-    throw InputError(path, 0, "", "cannot be opened",
-                     "Set map.confusion to a readable file, or leave it empty");
-  }
+  std::istringstream file(readFile(path, "Set map.confusion to a readable file, or leave it empty"));
   ConfusionModel::Matrix matrix{};
   std::array<double, kLabelValues> sum{};
   std::array<int, kLabelValues> first_line{};

@@ -5,12 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <set>
-#include <sstream>
 #include <vector>
 
 #include "drivers/input/input_error.hpp"
+#include "drivers/input/read_file.hpp"
 #include "firmware_host/settings/registry.hpp"
 
 namespace swiftlet {
@@ -138,14 +137,8 @@ void readSettingsText(const std::string& name, std::string_view text, Settings& 
 }
 
 void readSettingsFile(const std::string& path, Settings& settings) {
-  std::ifstream file(path);
-  if (!file) {
-    throw InputError(path, 0, "", "the settings file cannot be opened",
-                     "Write a settings file with `swiftlet settings > settings.yaml`");
-  }
-  std::ostringstream text;
-  text << file.rdbuf();
-  readSettingsText(path, text.str(), settings);
+  readSettingsText(path, readFile(path, "Write a settings file with `swiftlet settings > settings.yaml`"),
+                   settings);
 }
 
 void overrideSetting(std::string_view assignment, Settings& settings) {

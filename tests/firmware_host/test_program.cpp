@@ -21,6 +21,7 @@
 #include "firmware_host/outputs/run_folder/summary.hpp"
 #include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/run_summary.hpp"
+#include "tests/firmware_host/said.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/support/text.hpp"
 
@@ -97,6 +98,37 @@ TEST_CASE("names and numbers that mean nothing are refused") {
     INFO(option);
     CHECK(run({"replay", flight, "--reproduce", option, "--out", folder.file("run")}) == kExitBadInput);
   }
+}
+
+TEST_CASE("a folder in the place of a file is refused, not taken for an empty file") {
+  const ScratchFolder folder("folder_as_file");
+  const std::string log = std::string(SWIFTLET_TEST_DATA) + "/euroc_mh01_4s";
+  const std::string place = folder.file("place");
+  std::filesystem::create_directories(place);
+  const std::vector<std::vector<std::string>> calls = {
+      {"settings", "--settings", place},
+      {"hil", log, "--faults", place},
+      {"vocabulary", "--read", place},
+      {"replay", log, "--map", "--set", "map.confusion=" + place, "--out", folder.file("run")},
+      {"replay", log, "--tracks", place, "--out", folder.file("run")},
+      {"fuse", log, "--trajectory", place, "--out", folder.file("run")},
+      {"simulate", "--motion", place, "--duration", "1", "--out", folder.file("flight")}};
+  for (const std::vector<std::string>& call : calls) {
+    const test::Said said = test::say(call);
+    INFO(call[0] << ": " << said.text);
+    CHECK(said.code == kExitBadInput);
+    CHECK_THAT(said.text, Catch::Contains(place + ": cannot be read: Is a directory"));
+  }
+  CHECK_FALSE(std::filesystem::exists(folder.file("run")));
+}
+
+TEST_CASE("a summary that names no log by a text is one without a log") {
+  const ScratchFolder folder("summary_log");
+  std::ofstream(folder.file("odometry.tum")) << "1 0 0 0 0 0 0 1\n";
+  std::ofstream(folder.file("summary.json")) << R"({"run": {"log": 5}})";
+  const test::Said said = test::say({"evaluate", folder.path()});
+  CHECK(said.code == kExitBadInput);
+  CHECK_THAT(said.text, Catch::Contains("there is no truth to compare with"));
 }
 
 TEST_CASE("the file beside --out is another one") {

@@ -4,10 +4,9 @@
 
 #include <array>
 #include <cstdio>
-#include <fstream>
-#include <iterator>
 
 #include "drivers/input/input_error.hpp"
+#include "drivers/input/read_file.hpp"
 #include "firmware_host/files/whole_file.hpp"
 
 namespace swiftlet {
@@ -71,10 +70,7 @@ Vocabulary readVocabularyBytes(const std::string& name, std::string_view bytes) 
 }
 
 Vocabulary readVocabulary(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw InputError(path, 0, "", "cannot be opened", "Give the file of a vocabulary");
-  const std::string bytes(std::istreambuf_iterator<char>(in), {});
-  return readVocabularyBytes(path, bytes);
+  return readVocabularyBytes(path, readFile(path, "Give the file of a vocabulary"));
 }
 
 void writeVocabulary(const std::string& path, const Vocabulary& vocabulary) {

@@ -5,11 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
-#include <sstream>
 #include <utility>
 
 #include "drivers/input/input_error.hpp"
+#include "drivers/input/read_file.hpp"
 #include "drivers/recorded/parse_number.hpp"
 
 namespace swiftlet {
@@ -155,11 +154,7 @@ FaultTimeline FaultTimeline::parse(const std::string& name, std::string_view tex
 }
 
 FaultTimeline FaultTimeline::read(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) throw InputError(path, 0, "", "cannot open the fault timeline", "Check the file name");
-  std::ostringstream text;
-  text << file.rdbuf();
-  return parse(path, text.str());
+  return parse(path, readFile(path, "Give a file of faults with --faults (docs/hil.md)"));
 }
 
 const PlannedFault* FaultTimeline::active(FaultDevice device, PlannedFaultKind kind, Duration time) const {
