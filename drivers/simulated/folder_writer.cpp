@@ -275,6 +275,9 @@ Status simulateWith(const SimulationSettings& settings, const fs::path& folder, 
   } catch (const std::invalid_argument& error) {
     if (message != nullptr) *message = error.what();
     return {StatusCode::kInvalidInput, "a simulation setting is out of range"};
+  } catch (const fs::filesystem_error& error) {
+    if (message != nullptr) *message = error.path1().string() + ": " + error.code().message();
+    return {StatusCode::kFailed, "a folder could not be created"};
   } catch (const std::exception& error) {
     if (message != nullptr) *message = error.what();
     return {StatusCode::kFailed, "the simulated flight could not be generated or written"};

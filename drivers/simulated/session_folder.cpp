@@ -228,6 +228,9 @@ Status simulateSessionToFolder(const CalibrationTarget& target, const SessionFol
   } catch (const std::invalid_argument& error) {
     if (message != nullptr) *message = error.what();
     return {StatusCode::kInvalidInput, "a simulation setting is out of range"};
+  } catch (const fs::filesystem_error& error) {
+    if (message != nullptr) *message = error.path1().string() + ": " + error.code().message();
+    return {StatusCode::kFailed, "a folder could not be created"};
   } catch (const std::exception& error) {
     if (message != nullptr) *message = error.what();
     return {StatusCode::kFailed, "the calibration session could not be generated or written"};

@@ -126,8 +126,11 @@ int simulate(const SimulateOptions& options) {
   }
   if (progress) progress->finish();
   if (!status.ok()) {
-    throw InputError("simulate", 0, "", message.empty() ? status.what : message,
-                     "`swiftlet simulate --help` lists the choices");
+    const char* remedy =
+        status.code == StatusCode::kInvalidInput
+            ? "`swiftlet simulate --help` lists the choices"
+            : "Check that this path can be read or written and the disk is not full, or give another --out";
+    throw InputError("simulate", 0, "", message.empty() ? status.what : message, remedy);
   }
   fmt::print("written to {}\n", options.out);
   return kExitDone;

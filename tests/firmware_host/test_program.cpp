@@ -93,6 +93,21 @@ TEST_CASE("names and numbers that mean nothing are refused") {
   std::ofstream(folder.file("file")) << "x";
   const std::string log = std::string(SWIFTLET_TEST_DATA) + "/euroc_mh01_4s";
   CHECK(run({"place", log, "--out", folder.file("file/out")}) == kExitBadInput);
+  for (const char* kind : {"--tracks", "--png"}) {
+    const test::Said said =
+        test::say({"simulate", kind, "--duration", "0.3", "--out", folder.file("file/out")});
+    CHECK(said.code == kExitBadInput);
+    CHECK_THAT(said.text, Catch::Contains(folder.file("file/out") + "/mav0/") &&
+                              Catch::Contains(": Not a directory. Check that this path can be"));
+  }
+  // What hil lacks is named as a setting.
+  const std::string port = "imu_link.device=" + folder.file("port");
+  CHECK_THAT(test::say({"hil", log, "--set", port, "--out", folder.file("hil")}).text,
+             Catch::Contains("error: settings: hil.output0: no output node for camera 0. Set the output"));
+  CHECK_THAT(test::say({"hil", log, "--faults", folder.file("none.csv")}).text,
+             Catch::Contains(folder.file("none.csv") + ": cannot be read: No such file or directory. Give"));
+  CHECK_THAT(test::say({"hil", log, "--set", port, "--out", folder.file("file/out")}).text,
+             Catch::Contains(folder.file("file/out") + ": Not a directory. Check that"));
   CHECK(run({"budget", flight, "--out", folder.file("file/out")}) == kExitBadInput);
   for (const char* option : {"--mono", "--map", "--record", "--loop-closure"}) {
     INFO(option);

@@ -31,7 +31,7 @@ constexpr Duration kLook = Duration{500'000};
 constexpr std::int64_t kSlotsBehind = 6;
 
 void demand(const DeviceFault& fault, const std::string& device, const char* setting) {
-  if (!fault.ok()) throw InputError("", 0, setting, describe(fault, device), "");
+  if (!fault.ok()) throw InputError("settings", 0, setting, describe(fault, device), "");
 }
 
 /// Pulls the trigger's line.
@@ -39,7 +39,7 @@ class PlayedTrigger {
  public:
   PlayedTrigger(std::string file, const FaultTimeline& faults) : file_(std::move(file)), faults_(faults) {
     if (!file_.empty() && !pull(false)) {
-      throw InputError("", 0, "hil.trigger_pull", file_ + ": cannot be written",
+      throw InputError("settings", 0, "hil.trigger_pull", file_ + ": cannot be written",
                        "Set the `pull` file of a gpio-sim line, and run as its owner");
     }
   }
@@ -155,7 +155,8 @@ class HilRun {
   void openDevices() {
     imu_ = std::make_unique<PlayedImu>(makeImuWire(settings_.imu_link), reader_, request_.faults,
                                        source_->calibration().imuCorrection(), request_.skew_ppm);
-    if (!imu_->next()) throw InputError(request_.log, 0, "", "a log without samples cannot be played", "");
+    if (!imu_->next())
+      throw InputError(request_.log, 0, "", "has no IMU samples to play", "Give a log with IMU samples");
     demand(imu_->open(), settings_.imu_link.device, "imu_link.device");
     const std::array<const std::string*, kMaxCameras> outputs = {&settings_.hil.output0,
                                                                  &settings_.hil.output1};
@@ -164,8 +165,8 @@ class HilRun {
     static constexpr std::array<const char*, kMaxCameras> kSettings = {"hil.output0", "hil.output1"};
     for (std::size_t c = 0; c < source_->rig().camera_count; ++c) {
       if (outputs[c]->empty()) {
-        throw InputError("", 0, kSettings[c], fmt::format("no output node for camera {}", c),
-                         "Set the node that feeds the camera");
+        throw InputError("settings", 0, kSettings[c], fmt::format("no output node for camera {}", c),
+                         "Set the output node of the vivid driver that feeds this camera (docs/hil.md)");
       }
       const CameraModel& model = source_->rig().camera[c];
       cameras_.push_back(std::make_unique<PlayedCamera>(c, reader_, request_.faults));

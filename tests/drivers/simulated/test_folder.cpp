@@ -171,6 +171,7 @@ TEST_CASE("bad settings and unwritable folders are said by name") {
   CHECK(simulateToFolder(settings, "unused", {}, &message).code == StatusCode::kFailed);
   CHECK(message.find("no_such_motion.csv") != std::string::npos);
   CHECK(simulateToFolder(shortFlight(), "/proc/no_folder", {}, &message).code == StatusCode::kFailed);
+  CHECK(message.find("/proc/no_folder/mav0/imu0: ") == 0);
 }
 
 TEST_CASE("the stream gives samples and frames in time order") {
