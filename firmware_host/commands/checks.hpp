@@ -23,12 +23,13 @@ inline CLI::Validator numberCheck(const std::string& what, std::function<bool(do
   return CLI::Validator(check, what);
 }
 
+/// Most options are seconds: a stamp and 30 years of nanoseconds do not overflow.
 inline CLI::Validator nonNegative() {
-  return numberCheck("from 0", [](double value) { return value >= 0; });
+  return numberCheck("from 0 to 1e9", [](double value) { return value >= 0 && value <= 1e9; });
 }
 
 inline CLI::Validator positive() {
-  return numberCheck("above 0", [](double value) { return value > 0; });
+  return numberCheck("above 0 to 1e9", [](double value) { return value > 0 && value <= 1e9; });
 }
 
 inline CLI::Validator range(double least, double most) {

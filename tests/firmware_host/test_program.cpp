@@ -85,6 +85,11 @@ TEST_CASE("names and numbers that mean nothing are refused") {
     CHECK_FALSE(std::filesystem::exists(flight));
   }
   REQUIRE(run(simulate) == kExitDone);
+  // More than a stamp can be moved by.
+  CHECK(run({"replay", flight, "--from", "1e10", "--out", folder.file("run")}) == kExitBadInput);
+  CHECK(run({"evaluate", flight, "--until", "1e30"}) == kExitBadInput);
+  CHECK_THAT(test::say({"mesh", flight, "--max-gap", "1e30", "--out", folder.file("run")}).text,
+             Catch::Contains("--max-gap: `1e30` is not a number above 0 to 1e9"));
   for (const char* command : {"replay", "mesh", "place", "fuse"}) {
     INFO(command);
     CHECK(run({command, flight, "--out", ""}) == kExitBadInput);
