@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "drivers/input/input_error.hpp"
+#include "drivers/input/stamp_range.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 #include "drivers/recorded/recording_format.hpp"
 #include "drivers/recorded/recording_header.hpp"
@@ -20,13 +21,12 @@ constexpr const char* kRemedy = "Give the folder of a run with smoother.horizon:
 constexpr double kLargestSigma = 1000;   // px; the setting allows 10, a flight raises it 15 times
 constexpr double kLargestFactor = 1000;  // a flight shows 30
 constexpr double kLargestGyroMatrix = 1;
-/// Beyond these, differences of stamps would not fit; calibrations with a shift above 1 s are refused.
-constexpr std::int64_t kMostStamp = std::int64_t{1} << 61U;  // ns, 73 years
+/// Calibrations with a shift above 1 s are refused.
 constexpr Duration kMostShift = Duration::fromSeconds(10);
 
 bool sane(Duration shift) { return shift <= kMostShift && shift >= -kMostShift; }
 
-bool sane(Stamp stamp) { return stamp.ns > -kMostStamp && stamp.ns < kMostStamp; }
+bool sane(Stamp stamp) { return isStampInRange(stamp.ns); }
 
 Eigen::Vector3d getVector(LittleEndianReader& from) {
   Eigen::Vector3d vector;

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "drivers/input/input_error.hpp"
+#include "drivers/input/stamp_range.hpp"
 #include "firmware_host/smoothing/keyframe_reader.hpp"
 #include "firmware_host/smoothing/map_keeper.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
@@ -195,6 +196,26 @@ TEST_CASE("keyframes, samples and loops come back bit for bit", "[files]") {
   CHECK(reader.next() == KeyframeReader::Next::kEnd);
   CHECK(reader.cut().empty());
   CHECK(reader.next() == KeyframeReader::Next::kEnd);
+}
+
+TEST_CASE("a run with the largest stamps of a log is read whole", "[files]") {
+  const ScratchFolder folder("keyframes");
+  LostFiles lost;
+  ImuNoise noise;
+  noise.rate_hz = 200;
+  {
+    MapKeeper keeper(folder.path(), twoCameras(), noise, givenCalibration(), lost);
+    for (int i = 0; i < kSamplesEach; ++i) keeper.addImu(sampleAt(kLargestStamp - kSecond + 5'000'000 * i));
+    TrackedFrame frame = frameOf(0);
+    frame.stamp.ns = kLargestStamp;
+    keeper.addKeyframe(frame, stateOf(0), noiseOf(0));
+    keeper.finish();
+  }
+  std::ifstream file(folder.file(kKeyframeFile), std::ios::binary);
+  const Counts counts = countsIn({std::istreambuf_iterator<char>(file), {}});
+  CHECK(counts.cut.empty());
+  CHECK(counts.samples == kSamplesEach);
+  CHECK(counts.keyframes == 1);
 }
 
 TEST_CASE("the calibration's estimate comes back with each keyframe where there is one", "[files]") {
