@@ -11,6 +11,12 @@ void addCalibrateCommand(CLI::App& app, int& exit_code) {
   CLI::App* command =
       app.add_subcommand("calibrate", "Calibrate a new rig: print a board, then move the rig in front of it");
   command->require_subcommand(1);
+  command->footer(
+      "Example:\n"
+      "  swiftlet calibrate target --out board.pdf --paper A3\n"
+      "  swiftlet record --settings vehicle.yaml --out board_log --calibrate board.yaml\n"
+      "  swiftlet calibrate imu-camera board_log --target board.yaml --imu imu.yaml --out rig\n"
+      "`swiftlet calibrate <command> --help` explains each command.");
   addCalibrateTarget(*command, exit_code);
   addCalibrateCameras(*command, exit_code);
   addCalibrateImuCamera(*command, exit_code);
