@@ -37,7 +37,8 @@ class CornerDetector {
  public:
   CornerDetector(int width, int height);
 
-  static constexpr int kMaxCell = 96;  ///< px
+  /// px: kMaxCells of these cover 67 megapixels.
+  static constexpr int kMaxCell = 256;
 
   /// Corners in empty cells, best first, at most `wanted`. `image` must have the border of a Pyramid level.
   /// `occupied`: existing features. `features_at_most`: number of features for the whole image, which sets

@@ -1,6 +1,7 @@
 // Pyramid, corners, alignment and search: against their definition, the scalar twin and OpenCV.
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -142,6 +143,37 @@ TEST_CASE("no corner is weaker than both thresholds allow, however faint the ima
     CHECK_FALSE(corners->empty());
     for (const Corner& corner : *corners) CHECK(corner.score >= middle);
   }
+}
+
+TEST_CASE("corners come from the whole of a large image") {
+  constexpr int kWidth = 4096;
+  constexpr int kHeight = 3000;
+  // One tile, repeated, with noise, so that no two scores are the same: drawing 12 megapixels takes seconds.
+  Random random(3);
+  const Canvas tile = draw(Texture(5), 256, 250);
+  Canvas image{kWidth, kHeight, std::vector<std::uint8_t>(std::size_t{kWidth} * kHeight)};
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const int grey = tile.pixels[static_cast<std::size_t>(y % 250 * 256 + x % 256)] / 2;
+      image.pixels[static_cast<std::size_t>(y * kWidth + x)] =
+          static_cast<std::uint8_t>(grey + static_cast<int>(random.below(16)));
+    }
+  }
+  Pyramid pyramid(kWidth, kHeight, 1);
+  pyramid.build(image.view());
+  CornerDetector detector(kWidth, kHeight);
+  auto corners = std::make_unique<FixedVector<Corner, kMaxFeatures>>();
+  detector.detect(pyramid.level(0), {}, 200, 200, {}, *corners);
+  auto scalar = std::make_unique<FixedVector<Corner, kMaxFeatures>>();
+  detector.detect<simd::Scalar>(pyramid.level(0), {}, 200, 200, {}, *scalar);
+  REQUIRE(corners->size() == 200);
+  REQUIRE(scalar->size() == corners->size());
+  std::array<int, 3> in_third{};
+  for (std::size_t i = 0; i < corners->size(); ++i) {
+    CHECK((*scalar)[i].pixel == (*corners)[i].pixel);
+    ++in_third[static_cast<std::size_t>((*corners)[i].pixel.y() / (kHeight / 3.0F))];
+  }
+  for (const int count : in_third) CHECK(count > 40);
 }
 
 TEST_CASE("no corners on a flat image or along a straight edge") {
