@@ -78,7 +78,7 @@ FullSmoother::FullSmoother(const Rig& rig, const ImuNoise& noise, const FullSmoo
 
 void FullSmoother::addImu(const ImuSample& sample) {
   if (monitor_.check(sample).learned) noise_ = monitor_.noise();
-  pending_imu_.push_back(sample);
+  if (keyframes_.size() < settings_.max_keyframes) pending_imu_.push_back(sample);
 }
 
 Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& state, const NoiseInUse& noise) {

@@ -71,7 +71,7 @@ class FullSmoother {
  public:
   FullSmoother(const Rig& rig, const ImuNoise& noise, const FullSmootherSettings& settings);
 
-  /// Adds every sample, in order, before the frames that follow it.
+  /// Adds every sample, in order, before the frames that follow it. None is needed after the last keyframe.
   void addImu(const ImuSample& sample);
 
   /// Adds a keyframe with its state from the odometry and the noise used for it, in order of time. A new

@@ -214,6 +214,24 @@ TEST_CASE("full smoothing's memory is linear in the keyframes, at rest too") {
   CHECK(needed(1600) < 4.4 * few);
 }
 
+TEST_CASE("at its limit of keyframes full smoothing keeps no more samples") {
+  FullSmoother full(TrackFlight(test::roomFlight(1, 1)).rig(), {}, {.max_keyframes = 2});
+  TrackedFrame frame;
+  const auto fly = [&](int seconds) {
+    for (int i = 0; i < seconds * 200; ++i) {
+      ImuSample sample;
+      frame.stamp = frame.stamp + Duration::fromMilliseconds(5);
+      sample.stamp = frame.stamp;
+      full.addImu(sample);
+      if (i % 100 == 99) static_cast<void>(full.addKeyframe(frame, NavState{}, {}));
+    }
+    return full.memoryNeeded();
+  };
+  const std::size_t at_limit = fly(2);
+  REQUIRE(full.size() == 2);
+  CHECK(fly(600) == at_limit);
+}
+
 TEST_CASE("a full smoother that is told to stop ends between two landmarks") {
   const TrackFlight flight(test::roomFlight(4, 1));
   FullSmoother full(flight.rig(), flight.noise(), {});
