@@ -9,7 +9,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::size_t kKeptFrames = 64;  // 3.2 s at 20 Hz
+constexpr std::size_t kKeptFrames = 64;  // the whole patience at 20 Hz, every 8th frame of it at 200 Hz
 constexpr std::size_t kMinFrames = 8;
 constexpr Duration kShortestWindow = Duration::fromMilliseconds(400);
 constexpr double kScaleSigmaWanted = 0.10;    // relative
@@ -29,7 +29,14 @@ MonoStarter::MonoStarter(const Rig& rig, const ImuNoise& noise)
 void MonoStarter::reset() { begin_ = count_ = 0; }
 
 void MonoStarter::push(const TrackedFrame& frame) {
-  if (count_ == 0) waits_since_ = frame.stamp;
+  if (count_ == 0) {
+    waits_since_ = frame.stamp;
+    stride_ = 1;
+  }
+  newest_kept_ = count_ == 0 || frame.keyframe || ++since_kept_ >= stride_;
+  if (!newest_kept_) return;
+  since_kept_ = 0;
+  if (count_ == frames_.size() && frame.stamp - waits_since_ < kMonoPatience) thinOut();
   if (count_ == frames_.size()) {
     begin_ = (begin_ + 1) % frames_.size();
     --count_;
@@ -37,13 +44,24 @@ void MonoStarter::push(const TrackedFrame& frame) {
   frames_[(begin_ + count_++) % frames_.size()] = frame;
 }
 
+void MonoStarter::thinOut() {
+  stride_ *= 2;
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < count_; ++k) {
+    if (k % 2 != 0 && !frame(k).keyframe) continue;
+    if (kept != k) frames_[(begin_ + kept) % frames_.size()] = frame(k);
+    ++kept;
+  }
+  count_ = kept;
+}
+
 // Tracks of the chosen frames with enough sightings, moved to the front of `tracks_`.
 std::size_t MonoStarter::gatherTracks(std::span<const std::size_t> chosen, const ImuBuffer& imu,
-                                      const Eigen::Vector3d& bias_gyro) {
+                                      const Eigen::Vector3d& bias_gyro, const GyroIntrinsics& gyro) {
   std::size_t count = 0;
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     const Stamp stamp = frame(chosen[k]).stamp + rig_.camera_to_imu_shift;
-    const ScanTurn turn = imu.scanTurnAt(stamp, rig_.readout, bias_gyro, {});
+    const ScanTurn turn = imu.scanTurnAt(stamp, rig_.readout, bias_gyro, gyro);
     const CameraScan scan(rig_.T_body_cam[0], {turn, Eigen::Vector3d::Zero()});
     for (const TrackedFeature& feature : frame(chosen[k]).features) {
       Eigen::Vector3d bearing;
@@ -71,19 +89,23 @@ std::size_t MonoStarter::gatherTracks(std::span<const std::size_t> chosen, const
   return kept;
 }
 
-bool MonoStarter::trySolve(const ImuBuffer& imu, Stamp earliest, const StartPrior& prior, double pixel_sigma,
-                           StartState& start, const char*& waiting_for) {
+bool MonoStarter::trySolve(const ImuBuffer& imu, Stamp earliest, const StartPrior& prior,
+                           const CalibrationEstimate& calibration, double pixel_sigma, StartState& start,
+                           const char*& waiting_for) {
+
   waiting_for = "more frames (with one camera the scale comes from motion)";
-  if (count_ < kMinFrames) return false;
+  if (!newest_kept_ || count_ < kMinFrames) return false;
   const Stamp newest = frame(count_ - 1).stamp;
   if (newest - frame(0).stamp < kShortestWindow) return false;
   const bool impatient = newest - waits_since_ >= kMonoPatience;
-  const Duration shift = rig_.camera_to_imu_shift;
+  const Duration shift = rig_.camera_to_imu_shift = calibration.camera_to_imu_shift;
+  rig_.readout = calibration.readout;
+  rig_.T_body_cam = calibration.T_body_cam;
 
   std::array<std::size_t, kMaxMonoFrames> chosen{};
   const std::size_t n = std::min(count_, kMaxMonoFrames);
   for (std::size_t k = 0; k < n; ++k) chosen[k] = k * (count_ - 1) / (n - 1);
-  const std::size_t tracks = gatherTracks(std::span(chosen).first(n), imu, prior.bias_gyro);
+  const std::size_t tracks = gatherTracks(std::span(chosen).first(n), imu, prior.bias_gyro, calibration.gyro);
 
   const Stamp first = frame(0).stamp + shift;
   TiltEstimate tilt;
@@ -94,7 +116,7 @@ bool MonoStarter::trySolve(const ImuBuffer& imu, Stamp earliest, const StartPrio
   }
   for (std::size_t k = 1; k < n; ++k) {
     const Stamp at = frame(chosen[k]).stamp + shift;
-    from_first_[k - 1] = Preintegration(noise_, prior.bias_gyro, prior.bias_accel);
+    from_first_[k - 1] = Preintegration(noise_, prior.bias_gyro, prior.bias_accel, calibration.gyro);
     if (!from_first_[k - 1].integrate(imu.around(first, at), first, at).ok()) return false;
   }
   MonoStart mono;

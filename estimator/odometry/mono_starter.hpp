@@ -4,8 +4,9 @@
 // One camera does not observe scale until the body accelerates, so the first frames wait here, at most
 // `kMonoPatience`. They are then given to the smoother one after the other from the solved first state, as if
 // they had just arrived. At rest the velocity is known, and no frame has to wait.
-// Memory: 64 frames, 0.9 MiB, reserved by the constructor. Cost: one solve of mono_start.hpp per frame while
-// waiting.
+// Memory: 64 frames, 0.9 MiB, reserved by the constructor. If they are full before the patience is over, every
+// second one goes, but no keyframe, and of the later frames every second one is kept: the frames span the
+// whole wait at any frame rate. Cost: one solve of mono_start.hpp per kept frame while waiting.
 
 #include <Eigen/Core>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "estimator/camera/rig.hpp"
 #include "estimator/imu/initialization.hpp"
 #include "estimator/imu/mono_start.hpp"
+#include "estimator/messages/calibration_estimate.hpp"
 #include "estimator/messages/tracked_frame.hpp"
 #include "estimator/smoother/imu_buffer.hpp"
 #include "estimator/smoother/smoother.hpp"
@@ -28,7 +30,7 @@ class MonoStarter {
 
   void reset();
 
-  /// Keeps a frame; drops the oldest if full.
+  /// Keeps a frame, unless it lies between those kept of a fast camera. Drops the oldest if full.
   void push(const TrackedFrame& frame);
 
   [[nodiscard]] std::size_t size() const { return count_; }
@@ -37,22 +39,29 @@ class MonoStarter {
     return frames_[(begin_ + k) % frames_.size()];
   }
 
-  /// Solves from the kept frames, without samples before `earliest`. True if the scale is known well enough
+  /// Solves from the kept frames, without samples before `earliest`, with the calibration as estimated so
+  /// far. Call after each push. True if the scale is known well enough
   /// or kMonoPatience is over since the first frame after reset(); `start` is then the state at the oldest.
   /// Otherwise `waiting_for` tells what is missing.
-  bool trySolve(const ImuBuffer& imu, Stamp earliest, const StartPrior& prior, double pixel_sigma,
-                StartState& start, const char*& waiting_for);
+  bool trySolve(const ImuBuffer& imu, Stamp earliest, const StartPrior& prior,
+                const CalibrationEstimate& calibration, double pixel_sigma, StartState& start,
+                const char*& waiting_for);
 
  private:
   [[nodiscard]] std::size_t gatherTracks(std::span<const std::size_t> chosen, const ImuBuffer& imu,
-                                         const Eigen::Vector3d& bias_gyro);
+                                         const Eigen::Vector3d& bias_gyro, const GyroIntrinsics& gyro);
 
-  Rig rig_;
+  void thinOut();
+
+  Rig rig_;  ///< with the calibration of the last trySolve()
   ImuNoise noise_;
   std::vector<TrackedFrame> frames_;
   Stamp waits_since_;
   std::size_t begin_ = 0;
   std::size_t count_ = 0;
+  std::size_t stride_ = 1;      ///< every n-th frame is kept
+  std::size_t since_kept_ = 0;  ///< frames since the last kept one
+  bool newest_kept_ = false;    ///< the last frame pushed is the newest kept one
   std::vector<BearingTrack> tracks_;
   std::vector<TrackId> track_ids_;
   std::vector<Preintegration> from_first_;

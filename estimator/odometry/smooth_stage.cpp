@@ -274,7 +274,8 @@ bool SmoothStage::start(const TrackedFrame& tracked, OdometryOutput& output) {
   const bool at_rest = rest_.state().at_rest;
   if (rig_.camera_count == 1 && !at_rest) {
     mono_starter_.push(tracked);
-    if (!mono_starter_.trySolve(imu_, gap_end_, prior, smoother_.pixelSigma(), start, output.waiting_for))
+    if (!mono_starter_.trySolve(imu_, gap_end_, prior, smoother_.calibration(), smoother_.pixelSigma(), start,
+                                output.waiting_for))
       return false;
   } else {
     mono_starter_.reset();

@@ -5,12 +5,9 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <memory>
-#include <optional>
 #include <set>
 #include <vector>
 
-#include "estimator/odometry/mono_starter.hpp"
-#include "estimator/odometry/odometry_inputs.hpp"
 #include "tests/odometry/odometry_run.hpp"
 
 using namespace swiftlet;
@@ -124,27 +121,6 @@ TEST_CASE("Odometry: after seconds without frames each keyframe is delivered onc
   take();
   CHECK(epoch == 1);
   CHECK(std::set<std::int64_t>(delivered.begin(), delivered.end()).size() == delivered.size());
-}
-
-TEST_CASE("MonoStarter: its patience ends at every frame rate", "[odometry]") {
-  const TrackFlight flight(test::roomFlight(5, 40));
-  ImuBuffer imu(kImuHistory);
-  flight.play([&](const ImuSample& sample) { imu.push(sample); }, [](std::size_t) {});
-  for (const double rate : {20.0, 30.0, 60.0}) {
-    INFO(rate << " Hz");
-    MonoStarter starter(flight.rig(), flight.noise());
-    std::optional<double> waited;
-    for (int k = 0; k < 4 * rate && !waited; ++k) {
-      TrackedFrame frame;  // without tracks
-      frame.stamp = flight.frames()[0].stamp + Duration::fromSeconds(k / rate);
-      starter.push(frame);
-      StartState start;
-      const char* why = "";
-      if (starter.trySolve(imu, Stamp{}, StartPrior{}, 0.45, start, why)) waited = k / rate;
-    }
-    REQUIRE(waited);
-    CHECK(*waited == Approx(kMonoPatience.seconds()).margin(1.01 / rate));
-  }
 }
 
 TEST_CASE("Odometry: neither images nor samples for a while begin a new epoch", "[odometry][fault]") {
