@@ -47,7 +47,7 @@ struct LogOptions {
 class LogSource {
  public:
   /// A delivered image's memory stays valid until this many further images of the same camera.
-  static constexpr std::size_t kImageSlots = 4;
+  static constexpr std::size_t kImageSlots = 6;
 
   LogSource() = default;
   LogSource(const LogSource&) = delete;

@@ -18,7 +18,7 @@ namespace swiftlet {
 
 class SimulatedSource {
  public:
-  static constexpr std::size_t kBuffersPerCamera = 4;
+  static constexpr std::size_t kBuffersPerCamera = 6;
   enum class Item : std::uint8_t { kImu, kFrame, kEnd };
 
   /// Paints the world (seconds). Throws as SimulatedFlight does.

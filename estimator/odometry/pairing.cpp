@@ -9,8 +9,6 @@ namespace {
 
 Duration absolute(Duration d) { return d.ns < 0 ? -d : d; }
 
-std::size_t otherCamera(std::size_t camera) { return 1 - camera; }
-
 }  // namespace
 
 Status Pairing::refuse(std::size_t camera, const char* why) {
@@ -24,48 +22,61 @@ Duration Pairing::toleranceFor(const CameraFrame& frame) const {
   return std::min(settings_.tolerance, quarter);
 }
 
-Status Pairing::giveSingle(const CameraFrame& frame, StereoFrame& paired) {
-  paired = StereoFrame{};
-  paired.stamp = frame.stamp;
-  paired.timeline = frame.timeline;
-  paired.index = next_index_++;
-  paired.image[frame.camera] = frame.image;
-  paired.number[frame.camera] = frame.number;
-  any_given_ = true;
-  last_given_ = frame.stamp;
-  if (settings_.cameras > 1) {
-    ++counters_.unpaired[frame.camera];
-    int& missing = missing_running_[otherCamera(frame.camera)];
-    missing = std::min(missing + 1, kLostAfter);
+void Pairing::join(const CameraFrame& frame, Duration tolerance) {
+  const std::size_t camera = frame.camera;
+  Waiting* at = std::ranges::find_if(waiting_, [&](const Waiting& waiting) {
+    return !waiting.frame.has(camera) && absolute(frame.stamp - waiting.newest) <= tolerance;
+  });
+  if (at == waiting_.end()) {
+    const auto behind = std::ranges::find_if(
+        waiting_, [&](const Waiting& waiting) { return waiting.frame.stamp > frame.stamp; });
+    const auto index = static_cast<std::size_t>(behind - waiting_.begin());
+    waiting_.insert(index, {});
+    at = &waiting_[index];
+    at->frame.stamp = at->newest = frame.stamp;
   }
-  return okStatus();
+  at->frame.image[camera] = frame.image;
+  at->frame.number[camera] = frame.number;
+  at->frame.timeline = frame.timeline;
+  at->newest = std::max(at->newest, frame.stamp);
+  if (camera == 0) at->frame.stamp = frame.stamp;
 }
 
-Status Pairing::givePair(const CameraFrame& a, const CameraFrame& b, StereoFrame& paired) {
-  paired = StereoFrame{};
-  paired.stamp = a.camera == 0 ? a.stamp : b.stamp;
-  paired.timeline = b.timeline;
+bool Pairing::ready(const Waiting& waiting) const {
+  if (settings_.cameras == 1 || (waiting.frame.has(0) && waiting.frame.has(1))) return true;
+  const std::size_t missing = waiting.frame.has(0) ? 1 : 0;
+  const bool missed = any_seen_[missing] && last_seen_[missing] > waiting.newest;
+  return missed || isLost(missing) || waiting_.size() > kPairingFrames ||
+         now_ - waiting.newest > settings_.patience;
+}
+
+Status Pairing::give(StereoFrame& paired) {
+  const Waiting given = waiting_.front();
+  waiting_.erase(0);
+  paired = given.frame;
   paired.index = next_index_++;
-  paired.image[a.camera] = a.image;
-  paired.image[b.camera] = b.image;
-  paired.number[a.camera] = a.number;
-  paired.number[b.camera] = b.number;
   any_given_ = true;
-  last_given_ = std::max(a.stamp, b.stamp);
-  missing_running_ = {};
-  ++counters_.pairs;
+  last_given_ = given.newest;
+  if (settings_.cameras == 1) return okStatus();
+  if (paired.has(0) && paired.has(1)) {
+    missing_running_ = {};
+    ++counters_.pairs;
+    return okStatus();
+  }
+  const std::size_t camera = paired.has(0) ? 0 : 1;
+  ++counters_.unpaired[camera];
+  int& missing = missing_running_[1 - camera];
+  missing = std::min(missing + 1, kLostAfter);
   return okStatus();
 }
 
-Status Pairing::waitOrGive(const CameraFrame& frame, StereoFrame& paired) {
-  if (isLost(otherCamera(frame.camera))) return giveSingle(frame, paired);
-  pending_ = frame;
-  waiting_ = true;
+Status Pairing::giveReady(StereoFrame& paired) {
+  if (!waiting_.empty() && ready(waiting_.front())) return give(paired);
   return {StatusCode::kNotReady, "waits for the other camera's frame"};
 }
 
 void Pairing::restart() {
-  waiting_ = false;
+  waiting_.clear();
   any_given_ = false;
   any_seen_ = {};
   missing_running_ = {};
@@ -77,9 +88,11 @@ void Pairing::forgetAheadOf(const CameraFrame& frame) {
     if (any_seen_[c] && isFarAhead(frame.stamp, last_seen_[c])) any_seen_[c] = false;
   }
   if (any_given_ && isFarAhead(frame.stamp, last_given_)) any_given_ = false;
-  if (waiting_ && isFarAhead(frame.stamp, pending_.stamp)) {
-    waiting_ = false;
-    ++counters_.refused[pending_.camera];
+  while (!waiting_.empty() && isFarAhead(frame.stamp, waiting_.back().frame.stamp)) {
+    for (std::size_t c = 0; c < kMaxCameras; ++c) {
+      if (waiting_.back().frame.has(c)) ++counters_.refused[c];
+    }
+    waiting_.popBack();
   }
 }
 
@@ -99,38 +112,24 @@ Status Pairing::push(const CameraFrame& frame, StereoFrame& paired) {
   const bool came_back = isLost(camera);
   missing_running_[camera] = 0;
 
-  if (settings_.cameras == 1) return giveSingle(frame, paired);
+  now_ = frame.stamp;
   // A late partner of what went out is as useless as a reversed stamp.
-  if (any_given_ && frame.stamp <= last_given_ + (came_back ? settings_.tolerance : tolerance)) {
+  if (settings_.cameras > 1 && any_given_ &&
+      frame.stamp <= last_given_ + (came_back ? settings_.tolerance : tolerance)) {
     return refuse(camera, "frame arrived after its pair was processed");
   }
-  if (!waiting_) return waitOrGive(frame, paired);
-
-  if (pending_.camera != frame.camera && absolute(frame.stamp - pending_.stamp) <= tolerance) {
-    waiting_ = false;
-    return givePair(pending_, frame, paired);
-  }
-  if (frame.stamp < pending_.stamp) return giveSingle(frame, paired);  // its partner cannot come any more
-  const CameraFrame overdue = pending_;
-  const Status given = giveSingle(overdue, paired);
-  pending_ = frame;  // waits even when its partner counts as lost: one frame goes out a call
-  return given;
+  join(frame, tolerance);
+  return giveReady(paired);
 }
 
 Status Pairing::expire(Stamp now, StereoFrame& paired) {
-  if (!waiting_) return {StatusCode::kNotReady, "no frame waits"};
-  // While its partner counts as lost a frame need not wait for it.
-  const bool alone = isLost(otherCamera(pending_.camera));
-  if (now - pending_.stamp <= (alone ? Duration{0} : settings_.patience)) {
-    return {StatusCode::kNotReady, "no frame is overdue"};
-  }
-  return flush(paired);
+  now_ = now;
+  return giveReady(paired);
 }
 
 Status Pairing::flush(StereoFrame& paired) {
-  if (!waiting_) return {StatusCode::kNotReady, "no frame waits"};
-  waiting_ = false;
-  return giveSingle(pending_, paired);
+  if (waiting_.empty()) return {StatusCode::kNotReady, "no frame waits"};
+  return give(paired);
 }
 
 }  // namespace swiftlet

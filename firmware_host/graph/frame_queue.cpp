@@ -37,7 +37,7 @@ std::optional<FrameQueue::Refusal> FrameQueue::takeArrivals(Stamp newest_sample)
   }
   // Before the first sample nothing says how late it is.
   const bool any_sample = newest_sample.ns != std::numeric_limits<std::int64_t>::min();
-  if (any_sample && pairing_.expire(newest_sample, paired_).ok()) push(paired_);
+  while (any_sample && !waiting_.full() && pairing_.expire(newest_sample, paired_).ok()) push(paired_);
   return std::nullopt;
 }
 

@@ -9,6 +9,7 @@
 #include "estimator/core/limits.hpp"
 #include "estimator/core/slot_pool.hpp"
 #include "estimator/messages/frames.hpp"
+#include "estimator/odometry/pairing.hpp"
 #include "firmware_host/interfaces/host_times.hpp"
 
 namespace swiftlet {
@@ -25,9 +26,9 @@ struct ImageSlot {
 /// Readers of images, each with its quota.
 enum ImageReader : std::size_t { kTrackReads, kMeshReads, kRecordReads, kViewReads, kImageReaders };
 
-/// Waiting in the ring, one at its head, one waiting for its partner, those of waiting frames, those in
+/// Waiting in the ring, one at its head, those waiting for their partners, those of waiting frames, those in
 /// work, and one more that lets the newest in before the oldest goes.
-inline constexpr std::uint32_t kTrackQuota = kImageRing + kWaitingFrames + 4;
+inline constexpr std::uint32_t kTrackQuota = kImageRing + kWaitingFrames + kPairingFrames + 3;
 /// Waiting in the ring, the one at its head, and one more that lets the newest in before the oldest goes.
 inline constexpr std::uint32_t kMeshQuota = kMeshImages + 2;
 inline constexpr std::uint32_t kRecordQuota = kRecordedImages;

@@ -1,6 +1,7 @@
 // Pairing against the rules of its header: on cases by hand, and on random drops against a model that
 // sees the whole stream at once.
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <map>
 #include <vector>
@@ -41,7 +42,7 @@ std::vector<Given> runAll(Pairing& pairing, const std::vector<CameraFrame>& fram
   for (const CameraFrame& frame : frames) {
     if (pairing.push(frame, paired).ok()) result.push_back(givenBy(paired));
   }
-  if (pairing.flush(paired).ok()) result.push_back(givenBy(paired));
+  while (pairing.flush(paired).ok()) result.push_back(givenBy(paired));
   return result;
 }
 
@@ -87,13 +88,13 @@ TEST_CASE("repeated, reversed, late and empty frames are refused and counted") {
   CHECK(pairing.push(frameAt(0, 100 * kMs), paired).code == StatusCode::kNotReady);
   CHECK(pairing.push(frameAt(0, 100 * kMs), paired).code == StatusCode::kInvalidInput);
   CHECK(pairing.push(frameAt(0, 90 * kMs), paired).code == StatusCode::kInvalidInput);
-  REQUIRE(pairing.push(frameAt(0, 150 * kMs), paired).ok());  // 100 goes alone
+  REQUIRE(pairing.push(frameAt(0, 160 * kMs), paired).ok());  // 100 goes alone: overdue
   CHECK(pairing.push(frameAt(1, 100 * kMs), paired).code == StatusCode::kInvalidInput);
-  CameraFrame empty = frameAt(1, 150 * kMs);
+  CameraFrame empty = frameAt(1, 160 * kMs);
   empty.image = {};
   CHECK(pairing.push(empty, paired).code == StatusCode::kInvalidInput);
-  REQUIRE(pairing.push(frameAt(1, 150 * kMs), paired).ok());
-  CHECK(givenBy(paired) == Given{150 * kMs, true, true});
+  REQUIRE(pairing.push(frameAt(1, 160 * kMs), paired).ok());
+  CHECK(givenBy(paired) == Given{160 * kMs, true, true});
   CHECK(pairing.counters().refused[0] == 2);
   CHECK(pairing.counters().refused[1] == 2);
 }
@@ -115,6 +116,45 @@ TEST_CASE("an overdue frame is let go by the stamps of other messages") {
   REQUIRE(pairing.expire({151 * kMs}, paired).ok());
   CHECK(givenBy(paired) == Given{100 * kMs, false, true});
   CHECK(pairing.expire({200 * kMs}, paired).code == StatusCode::kNotReady);
+}
+
+TEST_CASE("frames pair if one camera's arrive several intervals later") {
+  struct Case {
+    int hz;
+    std::int64_t late_ms;
+  };
+  for (const Case c : {Case{20, 40}, {60, 20}, {120, 12}, {120, 30}, {200, 6}, {200, 18}}) {
+    INFO(c.hz << " Hz, camera 1 " << c.late_ms << " ms later");
+    Pairing pairing{PairingSettings{}};
+    std::vector<CameraFrame> frames;
+    for (int i = 0; i < 200; ++i) {
+      const std::int64_t stamp = 1'000'000'000LL * i / c.hz;
+      for (const std::uint32_t camera : {0U, 1U}) {
+        frames.push_back(frameAt(camera, stamp));
+        frames.back().arrival = {stamp + camera * c.late_ms * kMs};
+      }
+    }
+    std::ranges::stable_sort(frames, {}, [](const CameraFrame& f) { return f.arrival.ns; });
+    const auto given = runAll(pairing, frames);
+    CHECK(pairing.counters().pairs == 200);
+    CHECK(std::ranges::is_sorted(given, {}, &Given::ns));
+  }
+}
+
+TEST_CASE("only so many frames wait, whatever the patience") {
+  PairingSettings settings;
+  settings.patience = {1'000 * kMs};
+  Pairing pairing{settings};
+  StereoFrame paired;
+  int given = 0;
+  for (int i = 0; i < 6; ++i) given += pairing.push(frameAt(0, i * 5 * kMs), paired).ok() ? 1 : 0;
+  CHECK(given == 6 - static_cast<int>(kPairingFrames));
+  // A later frame of the other camera shows that those before are alone.
+  given += pairing.push(frameAt(1, 25 * kMs), paired).ok() ? 1 : 0;
+  while (pairing.expire({25 * kMs}, paired).ok()) ++given;
+  CHECK(given == 6);
+  CHECK(givenBy(paired) == Given{25 * kMs, true, true});
+  CHECK_FALSE(pairing.holdsImage());
 }
 
 TEST_CASE("a lost camera does not delay the other, and comes back") {

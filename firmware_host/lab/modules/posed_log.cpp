@@ -42,12 +42,12 @@ bool PosedLog::run(const char* what, const Handlers& handlers) {
       handlers.tracks(feed.tracks());
     } else if (next == LogFeed::Next::kImage) {
       if (pairing.push(feed.image(), frame).ok()) give(handlers, frame);
-    } else if (pairing.expire(feed.sample().stamp, frame).ok()) {
-      give(handlers, frame);
+    } else {
+      while (pairing.expire(feed.sample().stamp, frame).ok()) give(handlers, frame);
     }
     progress.update(feed.taken());
   }
-  if (pairing.flush(frame).ok()) give(handlers, frame);
+  while (pairing.flush(frame).ok()) give(handlers, frame);
   progress.finish();
   return true;
 }
