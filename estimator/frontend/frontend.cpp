@@ -8,9 +8,12 @@
 namespace swiftlet {
 namespace {
 
-// Features of a camera whose image is missing are held this long: at 1 rad/s and 450 px the view
-// moves by a fifth of the image in it, and beyond that little is found again by tracking.
-constexpr Duration kMaxHold = Duration::fromMilliseconds(250);
+// Features of a camera whose image is missing are held this long, or longer if a slow camera loses one image
+// and the next comes late by half an interval. At 1 rad/s and 450 px the view moves by a fifth of the image
+// in 250 ms. Features that left the view are lost one by one; the limit only saves searches of a view that
+// has changed.
+constexpr Duration kMinHold = Duration::fromMilliseconds(250);
+constexpr double kHeldIntervals = 2.5;
 // Sigmas of the estimated extrinsics by which stereo matches may miss the epipolar curve.
 constexpr double kExtrinsicSigmas = 3.0;
 // Below this share of the wanted features new ones are detected without waiting for a keyframe.
@@ -46,6 +49,7 @@ void Frontend::Impl::reset() {
   for (Camera& camera : camera_) {
     camera.has_history = false;
     camera.present = false;
+    camera.seen = false;
   }
 }
 
@@ -87,7 +91,9 @@ void Frontend::Impl::takeImages(const StereoFrame& frame, const FrontendPredicti
       camera.R_cur_prev = camera.R_prev_cur.conjugate().toRotationMatrix();
     }
     camera.present = frame.has(c);
-    if (camera.has_history && frame.stamp - camera.last > kMaxHold) {
+    const Duration hold =
+        std::max(kMinHold, Duration::fromSeconds(kHeldIntervals * camera.interval.get().seconds()));
+    if (camera.has_history && frame.stamp - camera.last > hold) {
       camera.has_history = false;
       for (Track& track : tracks_) track.live[c] = false;
     }
@@ -96,6 +102,8 @@ void Frontend::Impl::takeImages(const StereoFrame& frame, const FrontendPredicti
     camera.scan_before = camera.scan;
     camera.scan = prediction.scan;
     camera.pyramid[camera.newest].build(frame.image[c]);
+    if (camera.seen) camera.interval.add(frame.stamp - camera.last);
+    camera.seen = true;
     camera.last = frame.stamp;
   }
   if (prediction.has_rotation) {

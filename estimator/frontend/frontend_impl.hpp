@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "estimator/core/fixed_vector.hpp"
+#include "estimator/core/usual_interval.hpp"
 #include "estimator/frontend/anchor_pool.hpp"
 #include "estimator/frontend/corners.hpp"
 #include "estimator/frontend/frontend.hpp"
@@ -53,7 +54,9 @@ class Frontend::Impl {
     std::size_t newest = 0;
     bool present = false;      ///< has an image in this frame
     bool has_history = false;  ///< the other pyramid holds its last image
+    bool seen = false;         ///< since the last reset: `last` is valid
     Stamp last;                ///< stamp of its newest image
+    UsualInterval interval;    ///< between its images
     bool rotation_known = false;
     Eigen::Quaterniond R_prev_cur = Eigen::Quaterniond::Identity();  ///< camera axes, since `last`
     Eigen::Matrix3d R_cur_prev = Eigen::Matrix3d::Identity();        ///< its inverse

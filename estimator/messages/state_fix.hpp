@@ -14,6 +14,7 @@ struct StateFix {
   GyroIntrinsics gyro;  ///< estimated together with its bias
   ImuFactors imu;       ///< on the noise, as found in flight
   Stamp last_accepted;  ///< the newest image whose tracks were accepted; health degrades with its age
+  double good_age = 0;  ///< s: age beyond which health is not good
   std::uint32_t timeline = 0;  ///< TrackedFrame::timeline of the frame it comes from
 };
 

@@ -1,6 +1,5 @@
 #include "estimator/odometry/event_watch.hpp"
 
-#include "estimator/odometry/health_monitor.hpp"
 
 namespace swiftlet {
 
@@ -57,6 +56,7 @@ void EventWatch::step(const Frame& frame, EventBuffer& events) {
   }
   at_rest_ = frame.at_rest;
   watchCameras(frame, events);
+  good_age_ = frame.good_age;
   watchBlackout(frame.stamp, frame.seconds_without_image, events);
 }
 
@@ -84,7 +84,7 @@ void EventWatch::watchCameras(const Frame& frame, EventBuffer& events) {
 }
 
 void EventWatch::watchBlackout(Stamp stamp, double seconds_without_image, EventBuffer& events) {
-  const bool dark = seconds_without_image > HealthMonitor::kGoodAge;
+  const bool dark = seconds_without_image > good_age_;
   if (dark && !dark_) {
     dark_since_ = stamp - Duration::fromSeconds(seconds_without_image);
     events.raise(stamp, EventKind::kBlackoutStarted, seconds_without_image);

@@ -9,6 +9,7 @@
 #include "estimator/messages/nav_state.hpp"
 #include "estimator/messages/odometry_output.hpp"
 #include "estimator/messages/tracked_frame.hpp"
+#include "estimator/odometry/health_monitor.hpp"
 
 namespace swiftlet {
 
@@ -38,6 +39,7 @@ class EventWatch {
     Health health = Health::kInitializing;
     Doubt doubt = Doubt::kSettling;
     double seconds_without_image = 0;
+    double good_age = HealthMonitor::kGoodAge;  ///< HealthMonitor::goodAge()
   };
   void step(const Frame& frame, EventBuffer& events);
   /// The part of `step` for blackouts, for a frame that begins an epoch because of one.
@@ -55,6 +57,7 @@ class EventWatch {
   bool at_rest_ = false;
   bool dark_ = false;
   Stamp dark_since_;
+  double good_age_ = HealthMonitor::kGoodAge;  ///< of the last frame
   Health health_ = Health::kInitializing;
   Doubt doubt_ = Doubt::kNone;  ///< last doubt reported
   Stamp doubt_told_;

@@ -136,6 +136,7 @@ Health HealthMonitor::update(const Evidence& evidence) {
   const TrackedFrame& frame = evidence.frame;
   const FrameStatistics& statistics = evidence.statistics;
   const double seconds = last_ ? (frame.stamp - *last_).seconds() : 0;
+  if (last_) interval_.add(frame.stamp - *last_);
   const double without_image = secondsWithoutImage(frame.stamp);
   const bool accepted =
       evidence.first_of_epoch || statistics.inliers_mono + statistics.inliers_stereo >= kMinSightings;
@@ -144,12 +145,12 @@ Health HealthMonitor::update(const Evidence& evidence) {
   last_velocity_ = evidence.state.v_world_body;
   if (accepted) {
     // Time without images does not count as settling.
-    if (without_image <= kGoodAge) settled_ += seconds;
+    if (without_image <= goodAge()) settled_ += seconds;
     last_accepted_ = frame.stamp;
     has_image_ = true;
   }
   const Doubt accuracy = accuracyDoubt(evidence);
-  if (accuracy != Doubt::kNone || evidence.imu_missing || without_image > kGoodAge) settled_ = 0;
+  if (accuracy != Doubt::kNone || evidence.imu_missing || without_image > goodAge()) settled_ = 0;
   // What coasts is not judged by figures of images, but no vehicle is faster than the limit.
   if (accepted || evidence.state.v_world_body.norm() > max_speed_) {
     beyond_use_ = beyondUse(evidence.state) ? beyond_use_ + seconds : 0;
@@ -162,7 +163,7 @@ Health HealthMonitor::update(const Evidence& evidence) {
   lost_ = beyond_use_ > kLostTime || contradicted_ > (was_good_ ? kWrongScaleTime : kWrongStartTime);
   if (lost_ && !lost_before) losses_ = std::min(losses_ + 1, kMostLosses);
   const Doubt input = inputDoubt(evidence);
-  doubt_ = without_image > kGoodAge && !accepted     ? Doubt::kNoImage
+  doubt_ = without_image > goodAge() && !accepted    ? Doubt::kNoImage
            : accuracy != Doubt::kNone                ? accuracy
            : settled_ < settlingTime() - kStampSlack ? Doubt::kSettling
                                                      : input;
@@ -186,13 +187,13 @@ double HealthMonitor::secondsWithoutImage(Stamp stamp) const {
 }
 
 Health HealthMonitor::at(Stamp stamp) const {
-  return has_image_ ? aged(health_, last_accepted_, stamp) : health_;
+  return has_image_ ? aged(health_, last_accepted_, goodAge(), stamp) : health_;
 }
 
-Health HealthMonitor::aged(Health health, Stamp last_accepted, Stamp stamp) {
+Health HealthMonitor::aged(Health health, Stamp last_accepted, double good_age, Stamp stamp) {
   const double age = (stamp - last_accepted).seconds();
   if (age > kCoastLimit) return Health::kFailed;
-  if (age > kGoodAge && health == Health::kGood) return Health::kDegraded;
+  if (age > good_age && health == Health::kGood) return Health::kDegraded;
   return health;
 }
 

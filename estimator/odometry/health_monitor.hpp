@@ -16,9 +16,11 @@
 // s). The settling time doubles after each such loss. Observations by both cameras count once. No memory,
 // O(1).
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 
+#include "estimator/core/usual_interval.hpp"
 #include "estimator/messages/nav_state.hpp"
 #include "estimator/messages/odometry_output.hpp"
 #include "estimator/messages/tracked_frame.hpp"
@@ -28,8 +30,10 @@ namespace swiftlet {
 
 class HealthMonitor {
  public:
-  /// s without an accepted image after which health is no longer good.
+  /// s without an accepted image after which health is no longer good, for cameras of 20 Hz and faster.
   static constexpr double kGoodAge = 0.3;
+  /// The same for slower ones: s by which the image may come later than usual.
+  static constexpr double kGoodDelay = 0.25;
   /// s without an accepted image after which a new epoch begins, unless the image shows known landmarks.
   static constexpr double kLongCoast = 1.0;
   /// Least number of accepted observations of an accepted frame.
@@ -68,8 +72,10 @@ class HealthMonitor {
   [[nodiscard]] bool useful() const { return beyond_use_ == 0; }
   /// The health at a later stamp without a new frame: missing images degrade it.
   [[nodiscard]] Health at(Stamp stamp) const;
-  /// The same from the last health and the stamp of the last accepted image.
-  [[nodiscard]] static Health aged(Health health, Stamp last_accepted, Stamp stamp);
+  /// The same from the last health, the stamp of the last accepted image and goodAge().
+  [[nodiscard]] static Health aged(Health health, Stamp last_accepted, double good_age, Stamp stamp);
+  /// s without an accepted image after which health is no longer good, by the usual interval of the images.
+  [[nodiscard]] double goodAge() const { return std::max(kGoodAge, interval_.get().seconds() + kGoodDelay); }
   /// Of the epoch; valid after its first update.
   [[nodiscard]] Stamp lastAccepted() const { return last_accepted_; }
   [[nodiscard]] double secondsWithoutImage(Stamp stamp) const;
@@ -92,6 +98,7 @@ class HealthMonitor {
   bool has_image_ = false;
   Stamp last_accepted_;
   std::optional<Stamp> last_;  ///< last frame of the epoch
+  UsualInterval interval_;     ///< between frames, of all epochs
   Eigen::Vector3d last_velocity_ = Eigen::Vector3d::Zero();
   double settled_ = 0;       ///< s of accepted images since the last doubt
   double share_ = 1;         ///< share of a frame's observations that fit, low pass

@@ -11,7 +11,7 @@ Status PropagationStage::step(const ImuSample& sample, NavState* state) {
   const Status status = propagator_.step(sample, state);
   if (status.ok() && state != nullptr) {
     state->epoch = fix_.state.epoch;
-    state->health = HealthMonitor::aged(fix_.state.health, fix_.last_accepted, sample.stamp);
+    state->health = HealthMonitor::aged(fix_.state.health, fix_.last_accepted, fix_.good_age, sample.stamp);
   }
   return status;
 }

@@ -87,7 +87,7 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
   const bool imu_gap = imu_gap_ || isSilent(imu_, noise_, tracked.stamp + smoother_.timeOffset());
   double blind = health_.secondsWithoutImage(tracked.stamp);
   const bool sees = static_cast<int>(tracked.features.size()) >= HealthMonitor::kMinSightings;
-  lost_ = smoother_.started() && (lost_ || (imu_gap && blind > HealthMonitor::kGoodAge));
+  lost_ = smoother_.started() && (lost_ || (imu_gap && blind > health_.goodAge()));
   if (lost_ && sees) {
     watch_.watchBlackout(tracked.stamp, blind, events_);
     leave(newestAsStart());
@@ -407,12 +407,13 @@ void SmoothStage::publish(const TrackedFrame& tracked, bool imu_missing, Odometr
   if (health_.useful()) last_useful_ = state.T_world_body;
   smoother_.setHealth(state.health);
   watch_.step({tracked.stamp, tracked.camera_present, rig_.camera_count, rest_.state().at_rest, state.health,
-               output.doubt, health_.secondsWithoutImage(tracked.stamp)},
+               output.doubt, health_.secondsWithoutImage(tracked.stamp), health_.goodAge()},
               events_);
   fix_.has_state = true;
   fix_.state = state;
   fix_.gyro = calibration_.gyro;
   fix_.imu = output.statistics.noise.imu;
+  fix_.good_age = health_.goodAge();
   fix_.last_accepted = health_.lastAccepted() + smoother_.timeOffset();
   if (!starting(tracked.stamp)) {
     if (rest_.state().at_rest) last_rest_ = tracked.stamp;

@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 #include <map>
 #include <memory>
+#include <set>
 
 #include "estimator/geometry/so3.hpp"
 #include "tests/frontend/synthetic_image.hpp"
@@ -95,6 +96,8 @@ struct Scene {
 struct Run {
   Scene scene;
   Frontend frontend;
+  Duration interval = Duration::fromMilliseconds(50);
+  std::size_t last_step = 0;
   std::unique_ptr<FrontendPrediction> prediction = std::make_unique<FrontendPrediction>();
   std::unique_ptr<TrackedFrame> out = std::make_unique<TrackedFrame>();
 
@@ -103,7 +106,7 @@ struct Run {
 
   Status step(std::size_t k, std::array<bool, 2> present = {true, true}, bool dark = false) {
     StereoFrame frame;
-    frame.stamp = {static_cast<std::int64_t>(k) * 50'000'000};
+    frame.stamp = {static_cast<std::int64_t>(k) * interval.ns};
     frame.index = k;
     std::array<Canvas, 2> canvas{scene.image(k, 0), scene.image(k, 1)};
     for (std::size_t c = 0; c < 2; ++c) {
@@ -111,9 +114,8 @@ struct Run {
       if (present[c]) frame.image[c] = canvas[c].view();
     }
     prediction->has_rotation = k > 0;
-    if (k > 0) {
-      prediction->R_body_prev_body_cur = scene.pose(k - 1).rotation.conjugate() * scene.pose(k).rotation;
-    }
+    prediction->R_body_prev_body_cur = scene.pose(last_step).rotation.conjugate() * scene.pose(k).rotation;
+    last_step = k;
     return frontend.step(frame, *prediction, 100, *out);
   }
 };
@@ -213,6 +215,23 @@ TEST_CASE("a camera that goes and comes back") {
   int stereo = 0;
   for (const TrackedFeature& f : run.out->features) stereo += f.seen[0] && f.seen[1] ? 1 : 0;
   CHECK(stereo > 35);
+}
+
+TEST_CASE("tracks go on in the images of a slow camera, and after a lost one") {
+  for (const std::int64_t ms : {150, 200, 260, 500, 900}) {
+    CAPTURE(ms);
+    Run run;
+    run.interval = Duration::fromMilliseconds(ms);
+    std::set<TrackId> before;
+    for (const std::size_t k : {0, 1, 2, 3, 5, 6}) {  // the fifth is lost
+      REQUIRE(run.step(k).ok());
+      std::size_t common = 0;
+      for (const TrackedFeature& f : run.out->features) common += before.count(f.id);
+      if (k > 0) CHECK(10 * common > 6 * before.size());
+      before.clear();
+      for (const TrackedFeature& f : run.out->features) before.insert(f.id);
+    }
+  }
 }
 
 TEST_CASE("dark images count as absent, and landmarks are found again by projection") {

@@ -170,3 +170,24 @@ TEST_CASE("Health: a speed that no vehicle has is lost without accepted images t
   watched.steps_of(45);
   CHECK(watched.monitor.lost());
 }
+
+TEST_CASE("Health: a slow camera's usual interval is not counted against it", "[health]") {
+  for (const double interval : {0.25, 0.32, 0.5}) {
+    CAPTURE(interval);
+    Watched watched;
+    for (int k = 0; k < 10; ++k) watched.step(interval);
+    REQUIRE(watched.monitor.health() == Health::kGood);
+    CHECK(watched.monitor.at(watched.frame.stamp + Duration::fromSeconds(interval + 0.2)) == Health::kGood);
+    CHECK(watched.monitor.at(watched.frame.stamp + Duration::fromSeconds(interval + 0.3)) ==
+          Health::kDegraded);
+    CHECK(HealthMonitor::aged(Health::kGood, watched.frame.stamp, watched.monitor.goodAge(),
+                              watched.frame.stamp + Duration::fromSeconds(interval + 0.2)) == Health::kGood);
+  }
+  // At 20 Hz a silence says as much as ever, also after an earlier one.
+  Watched fast;
+  REQUIRE(fast.steps_of(20) == Health::kGood);
+  CHECK(fast.monitor.goodAge() == Approx(HealthMonitor::kGoodAge));
+  fast.step(0.9);
+  fast.step();
+  CHECK(fast.monitor.goodAge() == Approx(HealthMonitor::kGoodAge));
+}

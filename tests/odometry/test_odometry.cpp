@@ -72,6 +72,42 @@ TEST_CASE("Odometry: one camera starts within 3 s and says what it waits for", "
   CHECK(first <= 3.0);
 }
 
+TEST_CASE("Odometry: a camera of 2 to 4 Hz flies and is called good", "[odometry]") {
+  for (const double rate : {2.0, 3.0, 4.0}) {
+    CAPTURE(rate);
+    SimulationSettings settings = test::roomFlight(20, 22);
+    settings.camera_rate = rate;
+    const TrackFlight flight(settings);
+    Odometry odometry(flight.rig(), flight.noise(), test::settingsFor(flight));
+    auto output = std::make_unique<OdometryOutput>();
+    int propagated_good = 0;
+    int propagated = 0;
+    std::vector<RunFrame> frames;
+    flight.play(
+        [&](const ImuSample& sample) {
+          NavState state;
+          if (!odometry.addImu(sample, &state).ok() ||
+              flight.frames()[0].stamp + Duration::fromSeconds(5) > sample.stamp)
+            return;
+          ++propagated;
+          propagated_good += state.health == Health::kGood ? 1 : 0;
+        },
+        [&](std::size_t k) {
+          REQUIRE(odometry.smooth(flight.frames()[k], Effort{}, *output).ok());
+          RunFrame frame;
+          frame.index = k;
+          frame.seconds = flight.seconds(k) - flight.seconds(0);
+          frame.truth = flight.truth(k);
+          test::take(*output, frame);
+          frames.push_back(frame);
+        });
+    std::printf("two cameras at %.0f Hz: ATE %.4f m, %d of %d propagated states good\n", rate,
+                test::ate(frames), propagated_good, propagated);
+    CHECK(propagated_good > 0.9 * propagated);
+    CHECK(test::ate(frames) < 0.1);
+  }
+}
+
 TEST_CASE("Odometry: one camera finds the scale", "[odometry]") {
   for (const std::uint64_t seed : {22, 29, 30}) {
     const TrackFlight flight(test::roomFlight(15, seed));
