@@ -92,7 +92,6 @@ std::size_t MonoStarter::gatherTracks(std::span<const std::size_t> chosen, const
 bool MonoStarter::trySolve(const ImuBuffer& imu, Stamp earliest, const StartPrior& prior,
                            const CalibrationEstimate& calibration, double pixel_sigma, StartState& start,
                            const char*& waiting_for) {
-
   waiting_for = "more frames (with one camera the scale comes from motion)";
   if (!newest_kept_ || count_ < kMinFrames) return false;
   const Stamp newest = frame(count_ - 1).stamp;

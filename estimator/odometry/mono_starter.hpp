@@ -4,9 +4,9 @@
 // One camera does not observe scale until the body accelerates, so the first frames wait here, at most
 // `kMonoPatience`. They are then given to the smoother one after the other from the solved first state, as if
 // they had just arrived. At rest the velocity is known, and no frame has to wait.
-// Memory: 64 frames, 0.9 MiB, reserved by the constructor. If they are full before the patience is over, every
-// second one goes, but no keyframe, and of the later frames every second one is kept: the frames span the
-// whole wait at any frame rate. Cost: one solve of mono_start.hpp per kept frame while waiting.
+// Memory: 64 frames, 0.9 MiB, reserved by the constructor. If they are full before the patience is over,
+// every second one goes, but no keyframe, and of the later frames every second one is kept: the frames span
+// the whole wait at any frame rate. Cost: one solve of mono_start.hpp per kept frame while waiting.
 
 #include <Eigen/Core>
 #include <vector>
