@@ -127,11 +127,9 @@ bool MonoStarter::trySolve(const ImuBuffer& imu, Stamp earliest, const StartPrio
   if (!solved && !impatient) return false;
   start.state = BodyState{};
   start.state.T_world_body.rotation = gravityAlignedRotation(solved ? mono.motion.up : tilt.up);
-  if (solved) {
-    start.state.v_world_body = start.state.T_world_body.rotation * mono.motion.velocity;
-    start.state.bias_gyro = mono.motion.bias_gyro;
-    start.state.bias_accel = mono.motion.bias_accel;
-  }
+  start.state.bias_gyro = solved ? mono.motion.bias_gyro : prior.bias_gyro;
+  start.state.bias_accel = solved ? mono.motion.bias_accel : prior.bias_accel;
+  if (solved) start.state.v_world_body = start.state.T_world_body.rotation * mono.motion.velocity;
   start.tilt_sigma = tilt.sigma;
   start.gyro_bias_sigma = prior.bias_gyro_sigma;
   start.accel_bias_sigma = prior.bias_accel_sigma;

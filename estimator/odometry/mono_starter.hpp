@@ -29,6 +29,7 @@ class MonoStarter {
   MonoStarter(const Rig& rig, const ImuNoise& noise);
 
   void reset();
+  void setNoise(const ImuNoise& noise) { noise_ = noise; }
 
   /// Keeps a frame, unless it lies between those kept of a fast camera. Drops the oldest if full.
   void push(const TrackedFrame& frame);

@@ -64,6 +64,7 @@ void SmoothStage::addImu(const ImuSample& sample) {
   if (verdict.learned) {
     noise_ = monitor_.noise();
     smoother_.setNoise(noise_);
+    mono_starter_.setNoise(noise_);
   }
   imu_.push(sample);
   smoother_.addImu(sample);

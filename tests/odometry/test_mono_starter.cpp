@@ -82,7 +82,13 @@ TEST_CASE("MonoStarter: its patience ends at every frame rate", "[odometry]") {
       starter.push(frame);
       StartState start;
       const char* why = "";
-      if (starter.trySolve(imu, Stamp{}, StartPrior{}, {}, 0.45, start, why)) waited = k / rate;
+      StartPrior prior;
+      prior.bias_gyro = Eigen::Vector3d(0.01, -0.02, 0.03);
+      prior.bias_accel = Eigen::Vector3d(0.1, 0.2, -0.3);
+      if (!starter.trySolve(imu, Stamp{}, prior, {}, 0.45, start, why)) continue;
+      waited = k / rate;
+      CHECK(start.state.bias_gyro == prior.bias_gyro);
+      CHECK(start.state.bias_accel == prior.bias_accel);
     }
     REQUIRE(waited);
     // Of a fast camera not every frame is kept.
