@@ -1,6 +1,5 @@
 #include "estimator/odometry/event_watch.hpp"
 
-
 namespace swiftlet {
 
 void EventBuffer::raise(Stamp stamp, EventKind kind, double value) {

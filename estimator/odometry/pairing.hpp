@@ -31,7 +31,8 @@
 
 namespace swiftlet {
 
-/// Frames that wait at most: 20 ms at 200 Hz. The other camera's may arrive that much later.
+/// Frames that wait at most. The other camera's may arrive less than this many intervals later: 20 ms at 200
+/// Hz.
 inline constexpr std::size_t kPairingFrames = 4;
 
 struct PairingSettings {
