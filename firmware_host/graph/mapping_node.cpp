@@ -53,11 +53,8 @@ void MappingNode::take(const MapMessage& message, const AtHand& at_hand) {
   correct();
   if (records.connected()) record({message.frame, worlds_, spare_turns_, at_hand.number}, at_hand.scene);
   spare_turns_ = 0;
-  if (at_hand.image != nullptr) {
-    fuse(message, at_hand);
-  } else {
-    ++without_image_;
-  }
+  if (at_hand.image == nullptr) ++without_image_;
+  if (at_hand.image == nullptr || !fuse(message, at_hand)) stage_.announce(message.stamp);
 }
 
 void MappingNode::holdFrames() {
@@ -122,7 +119,7 @@ void MappingNode::stepCorrection() {
   if (corrected_.done) draw();
 }
 
-void MappingNode::fuse(const MapMessage& message, const AtHand& at_hand) {
+bool MappingNode::fuse(const MapMessage& message, const AtHand& at_hand) {
   MapInput input;
   input.stamp = message.stamp;
   input.frame = message.frame;
@@ -138,7 +135,7 @@ void MappingNode::fuse(const MapMessage& message, const AtHand& at_hand) {
   input.labels = at_hand.scene.labels;
   if (context_.options.depth_sensor != nullptr && at_hand.scene.empty()) {
     ++without_scene_;
-    return;
+    return false;
   }
   spend(StageId::kDepth, [&] { static_cast<void>(stage_.measure(input, {}, report_)); });
   if (report_.status.ok()) {
@@ -147,12 +144,13 @@ void MappingNode::fuse(const MapMessage& message, const AtHand& at_hand) {
   if (report_.status.code == StatusCode::kInvalidInput) {
     ++refused_;
     faults_.add(report_.status);
-    return;
+    return false;
   }
   vehicle_ = input.T_map_body.translation;
   draw();
   publishSurface(message.stamp);
   publishObstacle(message.stamp, input.T_map_body);
+  return true;
 }
 
 void MappingNode::draw() {

@@ -62,7 +62,8 @@ class MappingNode final : public Node {
   bool useSpareTime(bool ended);
   void correct();
   void stepCorrection();
-  void fuse(const MapMessage& message, const AtHand& at_hand);
+  /// False: no image was taken into the map.
+  bool fuse(const MapMessage& message, const AtHand& at_hand);
   void draw();
   void publishSurface(Stamp stamp);
   void publishObstacle(Stamp stamp, const SE3& T_map_body);

@@ -36,7 +36,9 @@ bool VolumeDistance::inWindow(const BlockIndex& block, const Eigen::Vector3i& or
 void VolumeDistance::step(Stamp newest, const Eigen::Vector3d& p_map_vehicle, const DistanceEffort& effort,
                           DistanceStep& out) {
   out = {};
-  field_.announce(newest);
+  // Again only for another image: one that came since may not have been fused.
+  if (newest != newest_) field_.announce(newest);
+  newest_ = newest;
   const Eigen::Vector3i origin = field_.origin();
   if (field_.follow(p_map_vehicle)) {
     // Blocks that were not in the window before are read anew.

@@ -64,7 +64,8 @@ class VolumeDistance {
   std::vector<std::uint8_t> waits_;  ///< by slot: 1 if the block must be read
   std::size_t waiting_ = 0;
   std::uint32_t cursor_ = 0;
-  Stamp up_to_;  ///< images up to here are in the field
+  Stamp up_to_;   ///< images up to here are in the field
+  Stamp newest_;  ///< of the last step
   std::array<float, static_cast<std::size_t>(kSide) * kSide * kSide> value_{};  ///< m; NaN: unobserved
 };
 

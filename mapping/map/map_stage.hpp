@@ -93,6 +93,8 @@ class MapStage {
   Status integrate(const MapInput& input, const VolumeEffort& effort, MapReport& report);
   /// Draws the surface of changed blocks.
   Status draw(const Eigen::Vector3d& p_map_vehicle, const SurfaceEffort& effort, MapReport& report);
+  /// The stamp of an image that was not taken: the distance is stale until a newer one is.
+  void announce(Stamp newest) { distance_.announce(newest); }
   /// Updates the distance field from the volume.
   void updateDistance(const Eigen::Vector3d& p_map_vehicle, const DistanceEffort& effort, MapReport& report);
 
