@@ -86,7 +86,8 @@ bool MapSubmaps::addKept(const Submap& submap) {
 }
 
 void MapSubmaps::correct(std::span<const WorldInMap> worlds) {
-  if (!submaps_.correct(worlds)) return;
+  const Submaps::Correction correction = submaps_.correct(worlds);
+  if (!correction.moved && !correction.tied) return;
   leaving_.clear();
   const double most = kOutOfPlaceVoxels * volume_.settings().voxel_size;
   for (std::uint32_t slot = 0; slot < volume_.slots(); ++slot) {
@@ -97,7 +98,7 @@ void MapSubmaps::correct(std::span<const WorldInMap> worlds) {
   }
   counters_.blocks_moved += leaving_.size();
   volume_.remove(leaving_);
-  bool any = !leaving_.empty();
+  bool any = !leaving_.empty() || correction.tied;
   for (std::size_t i = 0; i < submaps_.size(); ++i) {
     if (Submaps::shift(submaps_[i], shown_[i]) <= most) continue;
     shown_[i] = submaps_[i].T_map_world;

@@ -94,8 +94,8 @@ bool Submaps::follow(const Submap& image) {
   return true;
 }
 
-bool Submaps::correct(std::span<const WorldInMap> worlds) {
-  bool any = false;
+Submaps::Correction Submaps::correct(std::span<const WorldInMap> worlds) {
+  Correction correction;
   // They may still be those of an epoch that is over.
   const bool of_newest =
       std::ranges::any_of(worlds, [&](const WorldInMap& world) { return world.epoch == epoch_; });
@@ -103,14 +103,16 @@ bool Submaps::correct(std::span<const WorldInMap> worlds) {
     Submap& submap = submaps_[i];
     SE3 T_map_world;
     const bool listed = worldOf(submap, worlds, T_map_world);
+    const bool was_in_map = isInMap(i);
     if (of_newest) submap.tied = listed;
+    correction.tied = correction.tied || isInMap(i) != was_in_map;
     if (!listed) continue;
-    any = any || shift(submap, T_map_world) > 0;
+    correction.moved = correction.moved || shift(submap, T_map_world) > 0;
     submap.T_map_world = T_map_world;
     // The last that there can be takes all images to come.
     outdated_[i] = i + 1 < kMost && shift(submap, submap.T_map_world_fused) > tolerance_ ? 1 : 0;
   }
-  return any;
+  return correction;
 }
 
 }  // namespace swiftlet

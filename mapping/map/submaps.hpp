@@ -65,8 +65,12 @@ class Submaps {
     return submaps_.size() < kMost || submaps_.back().epoch == epoch;
   }
   /// Updates the poses of the submaps. `worlds` are ordered by frame; between two of one epoch the correction
-  /// is interpolated by frame number. Submaps of other epochs do not move. True if one moved.
-  bool correct(std::span<const WorldInMap> worlds);
+  /// is interpolated by frame number. Submaps of other epochs do not move.
+  struct Correction {
+    bool moved = false;
+    bool tied = false;  ///< a submap has come into the newest image's frame, or left it
+  };
+  Correction correct(std::span<const WorldInMap> worlds);
 
   [[nodiscard]] std::size_t size() const { return submaps_.size(); }
   [[nodiscard]] const Submap& operator[](std::size_t id) const { return submaps_[id]; }

@@ -201,13 +201,14 @@ void VolumeIntegrator::listBand(std::uint32_t blocks, VolumeStep& out) {
 }
 
 void VolumeIntegrator::update(std::uint32_t slot, bool carve, VolumeStep& out) {
-  volume_.touch(slot);
+  volume_.beginImage(slot);
   BlockHeader& header = volume_.changeHeader(slot);
   VoxelBlock& voxels = volume_.changeVoxels(slot);
   const BlockUpdate::Result result =
       carve ? update_.carve(voxels) : update_.project(header.index, voxels, volume_.changeLabels(slot));
   (carve ? out.carved : out.updated) += 1;
   if (result.observed == 0) return;
+  volume_.touch(slot);
   header.sides = result.sides;
   header.drift += result.largest_change;
   const auto tolerance = static_cast<float>(volume_.settings().change_tolerance);

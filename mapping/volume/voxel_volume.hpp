@@ -6,7 +6,7 @@
 // is not in the volume is unknown.
 //
 // A block belongs to the submap in which it became known, whose images move rigidly when loops move them
-// (mapping/map/submaps.hpp). Call touch() before every image that changes a block.
+// (mapping/map/submaps.hpp). Call beginImage() before and touch() after every image that changes a block.
 //
 // For readers (surface, distance field): slots 0 to slots() - 1 hold all blocks, in an order that depends on
 // the history. revision(slot) lets each reader find independently what changed since it last looked. A
@@ -141,11 +141,13 @@ class VoxelVolume {
   void beginSubmap(SubmapId id, SubmapId stale_before, const std::uint8_t* outdated);
   /// Call before an image changes a block with voxels. If the block begins anew, the listeners are called
   /// first, and its content stays as a hint with the least weight until something newer is known.
+  void beginImage(std::uint32_t slot) {
+    if (isOutdated(headers_[slot])) renew(slot);
+  }
+  /// Call after an image has changed the block.
   void touch(std::uint32_t slot) {
-    BlockHeader& header = headers_[slot];
-    if (isOutdated(header)) renew(slot);
-    header.touched = submap_;
-    header.observed = true;
+    headers_[slot].touched = submap_;
+    headers_[slot].observed = true;
   }
 
   /// Begins a set of changes and returns its revision.

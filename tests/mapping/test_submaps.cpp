@@ -63,7 +63,7 @@ TEST_CASE("between two keyframes the map moves evenly; before the first and afte
   Submaps submaps(MapPoses::kEstimated, kTolerance);
   for (int i = 0; i < 20; ++i) submaps.follow(imageAt(2 * i, static_cast<std::uint64_t>(i)));
   REQUIRE(submaps.size() == 20);
-  CHECK(submaps.correct(std::vector<WorldInMap>{worldAt(5, 0, {}), worldAt(9, 0, shifted(0.4))}));
+  CHECK(submaps.correct(std::vector<WorldInMap>{worldAt(5, 0, {}), worldAt(9, 0, shifted(0.4))}).moved);
   for (std::size_t i = 0; i < submaps.size(); ++i) {
     const double part = std::clamp((static_cast<double>(i) - 5) / 4, 0.0, 1.0);
     if (i == 5 || i == 9) continue;  // keyframes themselves: the next test
@@ -73,8 +73,8 @@ TEST_CASE("between two keyframes the map moves evenly; before the first and afte
   }
   // The newest has moved: no more images go into it.
   CHECK(submaps.follow(imageAt(38.1, 20, shifted(0.4))));
-  CHECK_FALSE(submaps.correct(std::vector<WorldInMap>{worldAt(5, 0, {}), worldAt(9, 0, shifted(0.4))}));
-  CHECK_FALSE(submaps.correct({}));
+  CHECK_FALSE(submaps.correct(std::vector<WorldInMap>{worldAt(5, 0, {}), worldAt(9, 0, shifted(0.4))}).moved);
+  CHECK_FALSE(submaps.correct({}).moved);
 }
 
 TEST_CASE("a submap whose anchor is a keyframe goes where the keyframe is, as the smoother has it by now") {
@@ -83,7 +83,8 @@ TEST_CASE("a submap whose anchor is a keyframe goes where the keyframe is, as th
   submaps.follow(image);
   SE3 refined = image.T_world_body;
   refined.translation.y() += 0.03;
-  CHECK(submaps.correct(std::vector<WorldInMap>{{5, 0, {}, {}}, {7, 0, shifted(1) * refined, refined}}));
+  CHECK(
+      submaps.correct(std::vector<WorldInMap>{{5, 0, {}, {}}, {7, 0, shifted(1) * refined, refined}}).moved);
   CHECK((submaps[0].motion() * image.T_world_body.translation - Eigen::Vector3d(4, 0.03, 0)).norm() < 1e-9);
 }
 
