@@ -15,7 +15,7 @@
 #include "firmware_host/runs/run_output.hpp"
 #include "firmware_host/runs/vehicle_calibration.hpp"
 #include "firmware_host/settings/confusion_file.hpp"
-#include "firmware_host/settings/moving_labels.hpp"
+#include "firmware_host/settings/map_check.hpp"
 
 namespace swiftlet {
 namespace {
@@ -165,7 +165,7 @@ FlyResult runFlight(const FlyRequest& request, Settings settings) {
   if (request.loop_closure) settings.loop.enabled = true;
   request.kept_maps.apply(settings);
   if (request.map) settings.map.enabled = true;
-  checkMovingLabels(settings.map_stage);
+  checkMapSettings(settings.map_stage);
   // A mistake that the user can correct, unlike a broken disk.
   if (!request.out.empty() && !request.replace) refuseRunIn(request.out);
   auto run = std::make_unique<FlightRun>(request, std::move(settings));

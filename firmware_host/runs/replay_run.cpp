@@ -23,7 +23,7 @@
 #include "firmware_host/schedule/lockstep.hpp"
 #include "firmware_host/schedule/recorded.hpp"
 #include "firmware_host/settings/confusion_file.hpp"
-#include "firmware_host/settings/moving_labels.hpp"
+#include "firmware_host/settings/map_check.hpp"
 #include "firmware_host/settings/read_settings.hpp"
 
 namespace swiftlet {
@@ -120,7 +120,7 @@ class ReplayRun {
   /// Refuses what cannot be mapped before anything is written.
   void openScenes() {
     if (!settings_.map.enabled || request_.reproduce) return;
-    checkMovingLabels(settings_.map_stage);
+    checkMapSettings(settings_.map_stage);
     confusion_ = confusionOf(settings_);
     if (!facts_.tracks.empty()) {
       throw InputError(request_.log, 0, "", "a log of feature tracks has no images to map", "Omit --map");

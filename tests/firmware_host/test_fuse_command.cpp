@@ -63,6 +63,8 @@ TEST_CASE("what cannot be fused is refused with a remedy", "[fuse_command]") {
   CHECK(run({"fuse", kLog, "--out", out, "--depth", "sensor"}) == kExitBadInput);
   CHECK(run({"fuse", kLog, "--out", out, "--depth", "sonar"}) == kExitBadInput);
   CHECK(run({"fuse", kLog, "--out", out, "--set", "map.moving_labels=chair"}) == kExitBadInput);
+  CHECK(run({"fuse", kLog, "--out", out, "--set", "map.voxel_size=0.02", "--set", "map.most_range=90"}) ==
+        kExitBadInput);
   CHECK(run({"fuse", folder.file("nowhere"), "--out", out}) == kExitBadInput);
   CHECK_FALSE(fs::exists(out));
 }

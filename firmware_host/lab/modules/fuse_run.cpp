@@ -16,7 +16,7 @@
 #include "firmware_host/outputs/map_files/map_output.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"
 #include "firmware_host/settings/confusion_file.hpp"
-#include "firmware_host/settings/moving_labels.hpp"
+#include "firmware_host/settings/map_check.hpp"
 #include "mapping/map/map_stage.hpp"
 
 namespace swiftlet {
@@ -101,7 +101,7 @@ class FuseRun {
 
 void FuseRun::begin() {
   refuseRunIn(request_.out, RunKind::kMap);
-  checkMovingLabels(settings_.map_stage);
+  checkMapSettings(settings_.map_stage);
   const std::optional<ConfusionModel> confusion = confusionOf(settings_);
   log_.poses().warnOfJumps("the map starts anew after each", log_.warnings());
   sensor_ =
