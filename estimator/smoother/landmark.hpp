@@ -74,6 +74,8 @@ struct Landmark {
   FixedVector<Sighting, kMaxStates> sightings;
 
   [[nodiscard]] std::span<const Sighting> views() const { return {sightings.data(), sightings.size()}; }
+  /// In the last solve, and it fitted: its point is not given up.
+  [[nodiscard]] bool accepted() const { return in_system && point.triangulated; }
   [[nodiscard]] bool seenFrom(std::uint32_t slot) const {
     return std::ranges::find(sightings, slot, &Sighting::slot) != sightings.end();
   }

@@ -41,7 +41,7 @@ void Marginalization::involve(WindowProblem& problem, const Departure& departure
   if (departure.with_motion_factor) involved_[problem.window.order()[departure.position + 1]] = true;
   if (landmarks_of_ != kNoSlot) {
     for (const Landmark& landmark : problem.landmarks) {
-      if (!landmark.in_system || !leaves(problem, landmark)) continue;
+      if (!landmark.accepted() || !leaves(problem, landmark)) continue;
       for (const Sighting& s : landmark.sightings) involved_[s.slot] = true;
     }
   }
@@ -77,7 +77,7 @@ void Marginalization::build(WindowProblem& problem, NormalEquations& system, con
     for (Landmark& landmark : problem.landmarks) {
       if (!leaves(problem, landmark)) continue;
       // One that constrains nothing leaves without a trace.
-      if (landmark.in_system) {
+      if (landmark.accepted()) {
         static_cast<void>(
             system.addLandmark(problem.viewsOf(landmark.views()), landmark.point, problem.window.slots()));
       }

@@ -127,7 +127,7 @@ void Smoother::updateStatistics() {
   int views = 0;
   for (const Landmark& landmark : problem_.landmarks) {
     // An explicit landmark may have lost its last sighting.
-    if (!landmark.in_system || landmark.sightings.empty()) continue;
+    if (!landmark.accepted() || landmark.sightings.empty()) continue;
     ++statistics_.landmarks;
     const int count = landmark.viewCount();
     sum += landmark.mean_square * count;
@@ -165,7 +165,7 @@ void Smoother::updateTrackCorrelation() {
   double product = 0;
   double square = 0;
   for (const Landmark& landmark : problem_.landmarks) {
-    if (!landmark.in_system) continue;
+    if (!landmark.accepted()) continue;
     std::array<const Sighting*, 2> seen{};
     for (const Sighting& sighting : landmark.sightings) {
       if (sighting.slot == slots[0]) seen[0] = &sighting;
@@ -218,7 +218,7 @@ void Smoother::window(SmoothedWindow& out) const {
     if (problem_.rig.rolls()) out.poses.back().scan = {s.scan, T.rotation.conjugate() * s.x.v_world_body};
   }
   for (const Landmark& landmark : problem_.landmarks) {
-    if (!landmark.in_system || landmark.point.inverse_depth <= 0) continue;
+    if (!landmark.accepted() || landmark.point.inverse_depth <= 0) continue;
     out.landmarks.pushBack({landmark.id, landmark.point.position(), landmark.point.inverse_depth_sigma,
                             static_cast<int>(landmark.sightings.size())});
   }
