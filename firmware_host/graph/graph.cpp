@@ -143,7 +143,8 @@ void Graph::look(FlightFacts& facts) const {
                     frame.health,
                     frame.epoch,
                     frame.track_level,
-                    frame.smooth_level};
+                    frame.smooth_level,
+                    frame.world_up};
   if (!record_) return;
   facts.recorder_running = record_->recorder().running();
   facts.recorder_lost = record_->lost();

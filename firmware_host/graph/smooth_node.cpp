@@ -70,6 +70,7 @@ void SmoothNode::smoothFrame(const TrackMessage& message, FrameResult& out) {
   const NavState& state = out.output.state;
   frame_ = {frame_.count + 1, message.tracked.stamp, out.output.has_state, state.health,
             state.epoch,      out.track_level,       out.smooth_level};
+  Eigen::Map<Eigen::Vector3d>(frame_.world_up.data()) = state.T_world_body.R().row(2).transpose();
   newest_frame_.write(frame_);
   context_.count(StageId::kSmooth, spent, message.tracked.keyframe);
   steps.send(out.step);

@@ -4,6 +4,7 @@
 // When it falls behind: its effort falls, and `track` waits for it. The state goes out before room is made in
 // the window: marginalization costs no latency.
 
+#include <array>
 #include <cstdint>
 
 #include "estimator/core/newest_shared.hpp"
@@ -24,6 +25,7 @@ struct SmoothedFrameNews {
   std::uint32_t epoch = 0;
   int track_level = 0;
   int smooth_level = 0;
+  std::array<double, 3> world_up{0, 0, 1};  ///< in the IMU's axes
 };
 
 class SmoothNode final : public Node {

@@ -5,6 +5,7 @@
 #include <cstdarg>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "estimator/core/units.hpp"
 
@@ -129,6 +130,22 @@ void checkMembers(const ArmingFacts& facts, ArmingVerdict& verdict) {
        facts.members_unwell > 1 ? ", and others" : "");
 }
 
+void checkMounting(const ArmingFacts& facts, const ArmingSettings& settings, ArmingVerdict& verdict) {
+  if (facts.tilted_for < settings.tilted) return;
+  const double degrees = facts.vehicle_tilt * 180 / std::numbers::pi;
+  // Beyond this it is upside down: the one mistake that has one remedy, an IMU whose z points down.
+  constexpr double kUpsideDown = 150;
+  // The remedy is in the text too: the autopilot's texts and events have no other.
+  lack(verdict, ArmingCondition::kMounting,
+       "level the vehicle; if it is level, correct autopilot.roll_deg, pitch_deg and yaw_deg: the IMU of a "
+       "flight controller or of DroneCAN, whose z points down, needs autopilot.roll_deg: 180",
+       degrees > kUpsideDown
+           ? "the vehicle is upside down (%.0f deg from level): correct autopilot.roll_deg, 180 "
+             "for an IMU whose z points down"
+           : "the vehicle is %.0f deg from level: correct autopilot.roll_deg, pitch_deg, yaw_deg",
+       degrees);
+}
+
 }  // namespace
 
 const char* conditionName(ArmingCondition condition) {
@@ -149,6 +166,8 @@ const char* conditionName(ArmingCondition condition) {
       return "effort";
     case ArmingCondition::kMembers:
       return "members";
+    case ArmingCondition::kMounting:
+      return "mounting";
   }
   return "unknown";
 }
@@ -167,6 +186,7 @@ ArmingVerdict ReadyToArm::evaluate(const ArmingFacts& facts) const {
   checkRecorder(facts, verdict);
   checkEffort(facts, verdict);
   checkMembers(facts, verdict);
+  checkMounting(facts, settings_, verdict);
   return verdict;
 }
 

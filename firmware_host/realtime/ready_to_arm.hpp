@@ -14,11 +14,13 @@
 // | `recorder`      | a recorder that is wanted runs and has lost nothing
 // | `effort`        | the stages work at full effort
 // | `members`       | the supervisor finds no thread and no sensor at fault
+// | `mounting`      | the attitude sent to an autopilot is not far from level
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
+#include <numbers>
 #include <string>
 
 #include "estimator/core/fixed_vector.hpp"
@@ -35,11 +37,12 @@ enum class ArmingCondition {
   kInitialized,
   kRecorder,
   kEffort,
-  kMembers
+  kMembers,
+  kMounting
 };
-inline constexpr std::size_t kArmingConditions = 8;
+inline constexpr std::size_t kArmingConditions = 9;
 
-/// "rights", "memory_locked", "clocks", "sensors", "initialized", "recorder", "effort", "members".
+/// "rights", "memory_locked" and so on: the names of the table above.
 const char* conditionName(ArmingCondition condition);
 
 struct ArmingFacts {
@@ -73,6 +76,9 @@ struct ArmingFacts {
   int track_level = 0;  ///< levels below full effort
   int smooth_level = 0;
 
+  double vehicle_tilt = 0;  ///< rad; between the vehicle's up, as the autopilot is told it, and the world's
+  Duration tilted_for;      ///< beyond ArmingSettings::tilt without a break; 0: it is not, or nobody is told
+
   int members_unwell = 0;              ///< by the supervisor's table
   const char* first_unwell = "";       ///< its name
   const char* first_unwell_is = "";    ///< "late", "lost"
@@ -85,6 +91,10 @@ struct ArmingSettings {
   Duration sample_age = Duration::fromMilliseconds(100);     ///< of the newest IMU sample
   Duration image_age = Duration::fromMilliseconds(500);      ///< of each camera's newest image
   Duration steady = Duration::fromMilliseconds(3000);        ///< of health and epoch
+  /// rad (60 degrees). No vehicle starts on such a slope; a wrong mounting is off by 90 or 180 degrees.
+  double tilt = std::numbers::pi / 3;
+  /// As `steady`, so that readiness does not precede it; longer than a flip or a roll in flight.
+  Duration tilted = Duration::fromMilliseconds(3000);
 };
 
 struct MissingCondition {

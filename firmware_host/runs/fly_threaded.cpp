@@ -66,6 +66,10 @@ FlightGround groundOf(const std::vector<ThreadReport>& threads, const Calibratio
   ground.host_stamps = request.host_stamps;
   ground.cameras = static_cast<int>(settings.odometry.use_stereo ? calibration.rig.camera_count : 1);
   ground.trigger = request.trigger;
+  if (!settings.autopilot.device.empty()) {
+    Eigen::Map<Eigen::Vector3d>(ground.vehicle_up.emplace().data()) =
+        linkSettings(settings.autopilot).mounting.q_vehicle_body.conjugate() * Eigen::Vector3d::UnitZ();
+  }
   return ground;
 }
 

@@ -140,7 +140,9 @@ std::vector<Setting> deviceSettings() {
        "Also send the distance to the nearest point of the local mesh in 72 sectors.",
        onOff(kAutopilot, &A::obstacles)},
       {"autopilot.roll_deg", "deg",
-       "Rotation of the IMU in the vehicle (axes forward, left, up) about forward, applied first.",
+       "Rotation of the IMU in the vehicle (axes forward, left, up) about forward, applied first. Use 180 "
+       "for "
+       "an IMU whose z points down: a flight controller's, DroneCAN's, VectorNav's.",
        real(kAutopilot, &A::roll_deg, -180, 180)},
       {"autopilot.pitch_deg", "deg", "Rotation of the IMU in the vehicle about left, applied second.",
        real(kAutopilot, &A::pitch_deg, -180, 180)},

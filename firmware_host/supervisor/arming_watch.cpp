@@ -1,6 +1,8 @@
 #include "firmware_host/supervisor/arming_watch.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 
 namespace swiftlet {
 namespace {
@@ -64,6 +66,17 @@ ArmingVerdict ArmingWatch::evaluate(const FlightFacts& flight, Health health,
   facts.health_good = good;
   if (good_since_) facts.health_good_for = since(*good_since_);
   facts.epoch_steady_for = since(*epoch_since_);
+
+  if (ground_.vehicle_up) {
+    const auto& up = estimate.world_up;
+    const double cosine = std::inner_product(up.begin(), up.end(), ground_.vehicle_up->begin(), 0.0);
+    facts.vehicle_tilt = std::acos(std::clamp(cosine, -1.0, 1.0));
+  }
+  // Only a good attitude accuses the mounting.
+  const bool tilted = good && facts.vehicle_tilt > ArmingSettings{}.tilt;
+  if (!tilted) tilted_since_.reset();
+  if (tilted && !tilted_since_) tilted_since_ = now;
+  if (tilted_since_) facts.tilted_for = since(*tilted_since_);
 
   facts.recorder_wanted = ground_.recorder_wanted;
   facts.recorder_running = flight.recorder_running;

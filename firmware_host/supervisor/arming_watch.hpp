@@ -36,6 +36,7 @@ class ArmingWatch {
   std::optional<Mark> older_;
   std::optional<Mark> newer_;
   std::optional<Stamp> good_since_;
+  std::optional<Stamp> tilted_since_;
   std::optional<Stamp> epoch_since_;
   std::uint32_t epoch_ = 0;
   std::uint64_t frames_ = 0;

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "estimator/core/limits.hpp"
 #include "estimator/core/stamp.hpp"
@@ -24,6 +25,8 @@ struct FlightGround {
   int cameras = 0;      ///< that are used
   bool trigger = false;
   bool recorder_wanted = false;
+  /// The vehicle's up in the IMU's axes by autopilot.roll_deg and so on; empty: no autopilot is told.
+  std::optional<std::array<double, 3>> vehicle_up;
   bool host_stamps = true;  ///< the run's clock is CLOCK_MONOTONIC
 };
 
@@ -46,6 +49,7 @@ struct EstimateNews {
   std::uint32_t epoch = 0;
   int track_level = 0;  ///< levels below full effort
   int smooth_level = 0;
+  std::array<double, 3> world_up{0, 0, 1};  ///< in the IMU's axes, of the newest frame
 };
 
 struct FlightFacts {

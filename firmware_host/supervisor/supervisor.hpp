@@ -74,7 +74,7 @@ class Supervisor {
  private:
   struct Event {
     /// A verdict that misses every condition, in full.
-    static constexpr std::size_t kTextBytes = 2304;
+    static constexpr std::size_t kTextBytes = 2560;
     Stamp stamp;
     std::array<char, kTextBytes> text{};
     std::size_t size = 0;

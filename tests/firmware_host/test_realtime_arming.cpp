@@ -4,6 +4,7 @@
 #include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <set>
 #include <string>
 
@@ -90,6 +91,18 @@ const Withheld kWithheld[] = {
        f.first_unwell_text = "no memory";
      },
      "mesh is lost: no memory, and others"},
+    {"the right way up", ArmingCondition::kMounting,
+     [](ArmingFacts& f) {
+       f.vehicle_tilt = std::numbers::pi;
+       f.tilted_for = Duration::fromMilliseconds(3000);
+     },
+     "upside down (180 deg from level): correct autopilot.roll_deg, 180"},
+    {"a level vehicle", ArmingCondition::kMounting,
+     [](ArmingFacts& f) {
+       f.vehicle_tilt = std::numbers::pi / 2;
+       f.tilted_for = Duration::fromMilliseconds(3000);
+     },
+     "90 deg from level: correct autopilot.roll_deg, pitch_deg, yaw_deg"},
 };
 
 TEST_CASE("with every condition given the vehicle is ready to arm") {
@@ -150,6 +163,7 @@ TEST_CASE("everything missing at once finds room in the verdict") {
   facts.recorder_wanted = true;
   facts.track_level = 1;
   facts.members_unwell = 1;
+  facts.tilted_for = Duration::fromMilliseconds(9000);
   const ArmingVerdict verdict = ReadyToArm().evaluate(facts);
   for (std::size_t i = 0; i < kArmingConditions; ++i) CHECK(verdict.lacks(static_cast<ArmingCondition>(i)));
   CHECK(verdict.missing.size() == ArmingVerdict::kMost);

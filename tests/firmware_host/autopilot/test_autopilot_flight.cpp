@@ -194,12 +194,14 @@ TEST_CASE("The settings' angles turn the IMU in the vehicle: roll, then pitch, t
     double roll, pitch, yaw;
     Vector3d x, y, z;  ///< where the IMU's axes point in the vehicle
   };
-  const std::array<Turned, 7> cases = {{{0, 0, 0, forward, left, up},
+  const std::array<Turned, 8> cases = {{{0, 0, 0, forward, left, up},
                                         {90, 0, 0, forward, up, -left},
                                         {0, 90, 0, -up, left, forward},
                                         {0, 0, 90, left, -forward, up},
                                         {90, 0, 90, left, up, forward},
                                         {90, 90, 0, -up, forward, -left},
+                                        // A flight controller's: x forward, y right, z down.
+                                        {180, 0, 0, forward, -left, -up},
                                         // EuRoC's: x up, y right, z forward.
                                         {0, -90, 180, up, -left, forward}}};
   for (const Turned& turned : cases) {

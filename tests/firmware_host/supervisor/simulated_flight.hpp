@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -28,7 +29,8 @@ struct SimulatedFlight {
     std::string text;
   };
 
-  explicit SimulatedFlight(bool host_stamps = true, double speed = 1, SystemdNotify* systemd = nullptr)
+  explicit SimulatedFlight(bool host_stamps = true, double speed = 1, SystemdNotify* systemd = nullptr,
+                           std::optional<std::array<double, 3>> vehicle_up = {})
       : stamps_on_host(host_stamps) {
     for (std::size_t i = 0; i < kMembers.size(); ++i) {
       hearts.push_back(std::make_unique<Heartbeat>());
@@ -43,6 +45,7 @@ struct SimulatedFlight {
     ground.trigger = true;
     ground.recorder_wanted = true;
     ground.host_stamps = host_stamps;
+    ground.vehicle_up = vehicle_up;
     facts.recorder_running = true;
     facts.estimate.epoch = 1;
     supervisor.begin(

@@ -1,6 +1,8 @@
 // Readiness that nobody confirms any more: facts that stand still because nothing comes.
 
+#include <array>
 #include <catch2/catch.hpp>
+#include <cmath>
 
 #include "firmware_host/realtime/ready_to_arm.hpp"
 #include "tests/firmware_host/supervisor/simulated_flight.hpp"
@@ -72,6 +74,42 @@ TEST_CASE("a new epoch takes readiness away for its time", "[arming]") {
   CHECK(flight.verdict.arming.lacks(ArmingCondition::kInitialized));
   flight.pass(3.0);
   CHECK(flight.verdict.arming.ready());
+}
+
+TEST_CASE("a mounting that turns the vehicle over keeps it on the ground", "[arming]") {
+  // The IMU of a flight controller, z down, with the mounting of one whose z points up.
+  SimulatedFlight flight(true, 1, nullptr, std::array<double, 3>{0, 0, 1});
+  flight.facts.estimate.world_up = {0, 0, -1};
+  flight.pass(8.0);
+  CHECK(flight.verdict.arming.missing.size() == 1);
+  CHECK(flight.verdict.arming.lacks(ArmingCondition::kMounting));
+  CHECK(flight.times("ready to arm") == 0);
+  CHECK(flight.told.back().text ==
+        "not ready to arm: mounting (the vehicle is upside down (180 deg from level): correct "
+        "autopilot.roll_deg, 180 for an IMU whose z points down)");
+
+  SimulatedFlight right(true, 1, nullptr, std::array<double, 3>{0, 0, -1});
+  right.facts.estimate.world_up = {0, 0, -1};
+  right.pass(8.0);
+  CHECK(right.verdict.arming.ready());
+}
+
+TEST_CASE("a flip in flight is no mounting, and nobody without an autopilot has one", "[arming]") {
+  SimulatedFlight flight(true, 1, nullptr, std::array<double, 3>{0, 0, 1});
+  flight.pass(8.0);
+  flight.facts.estimate.world_up = {0, 0, -1};
+  flight.pass(2.0);
+  CHECK(flight.verdict.arming.ready());
+  flight.pass(2.0);
+  CHECK(flight.verdict.arming.lacks(ArmingCondition::kMounting));
+  flight.facts.estimate.world_up = {0.5, 0, std::sqrt(0.75)};  // a slope of 30 degrees
+  flight.pass(0.2);
+  CHECK(flight.verdict.arming.ready());
+
+  SimulatedFlight alone;
+  alone.facts.estimate.world_up = {0, 0, -1};
+  alone.pass(8.0);
+  CHECK(alone.verdict.arming.ready());
 }
 
 }  // namespace
