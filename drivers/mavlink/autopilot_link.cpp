@@ -24,6 +24,7 @@ bool usable(const NavState& state) {
 AutopilotLink::AutopilotLink(const AutopilotLinkSettings& settings)
     : settings_(settings), period_(Duration::fromSeconds(1 / settings.rate)) {
   sender_.system = settings.system;
+  resets_ = settings.first_reset;
 }
 
 void AutopilotLink::receive(std::span<const std::uint8_t> bytes, Stamp read_at, Duration byte_time) {

@@ -7,7 +7,8 @@
 //   autopilot about), never older than kOldest, and only while health is good or degraded.
 // - Lost: failed, or no new state for kSilence. Then poses of quality -1 without numbers for kTellLoss, and
 //   after that silence: an autopilot that hears an old pose again flies on it.
-// - reset_counter rises with every epoch, and when poses begin anew after a loss.
+// - reset_counter begins at the given number, and rises with every epoch and when poses begin anew after a
+//   loss.
 // Memory: 8 kB inside the object, no allocation. Cost: about 5 us a pose.
 // Source: docs/mavlink.md; PX4 guide "External Position Estimation".
 
@@ -30,6 +31,9 @@ struct AutopilotLinkSettings {
   bool position_estimate = false;  ///< VISION_POSITION_ESTIMATE in place of ODOMETRY
   AutopilotMounting mounting;
   std::uint8_t system = 1;  ///< the vehicle's
+  /// reset_counter of the first poses: another one than the process before had, so that a restart in flight
+  /// is a reset to the autopilot.
+  std::uint8_t first_reset = 0;
 };
 
 struct AutopilotLinkCounters {

@@ -38,6 +38,16 @@ mavlink::StatusText::Severity severityOf(Health health) {
                                      : mavlink::StatusText::Severity::kInfo;
 }
 
+/// The service restarts the program after 5 s (RestartSec), so that each process begins with another number;
+/// the 256 numbers last for 17 minutes.
+constexpr Duration kResetStep = Duration::fromMilliseconds(4000);
+
+/// With the first reset_counter of this process.
+AutopilotLinkSettings restarted(AutopilotLinkSettings link) {
+  link.first_reset = static_cast<std::uint8_t>(monotonicNow().ns / kResetStep.ns);
+  return link;
+}
+
 }  // namespace
 
 AutopilotLinkSettings linkSettings(const AutopilotGroup& settings) {
@@ -65,7 +75,7 @@ class AutopilotThread::Work final : public Follower::Work {
         options_(options),
         mounting_(linkSettings(options.settings).mounting),
         journal_("autopilot (" + options.settings.device + ")"),
-        link_(linkSettings(options.settings)),
+        link_(restarted(linkSettings(options.settings))),
         port_(options.settings.device, static_cast<unsigned>(options.settings.baud)) {
     if (const DeviceFault fault = openOwn(); !fault.ok()) {
       throw InputError("settings", 0, "autopilot.device", describe(fault, options.settings.device),

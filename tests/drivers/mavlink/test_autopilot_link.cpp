@@ -145,6 +145,25 @@ TEST_CASE("A loss is told for a second, then nothing; what comes back has anothe
   CHECK(flight.autopilot.beats.back().system_status == 4);
 }
 
+TEST_CASE("The reset counter begins where it is told to, and wraps", "[mavlink]") {
+  AutopilotLinkSettings settings;
+  settings.first_reset = 255;
+  AutopilotLink link(settings);
+  Autopilot autopilot;
+  NavState state;
+  state.health = Health::kGood;
+  for (const std::uint32_t epoch : {1U, 2U}) {
+    state.epoch = epoch;
+    state.stamp = kBegin + Duration::fromMilliseconds(100 * epoch);
+    std::array<std::uint8_t, AutopilotLink::kMostBytes> bytes;
+    const std::size_t count = link.step(state.stamp, &state, Eigen::Vector3d::Zero(), bytes);
+    autopilot.hear(std::span(bytes).first(count), state.stamp);
+  }
+  REQUIRE(autopilot.poses.size() == 2);
+  CHECK(autopilot.poses[0].reset_counter == 255);
+  CHECK(autopilot.poses[1].reset_counter == 0);
+}
+
 TEST_CASE("A state that comes late is not sent as new", "[mavlink]") {
   AutopilotLink link({});
   NavState state;
