@@ -32,6 +32,10 @@ void AutopilotLink::receive(std::span<const std::uint8_t> bytes, Stamp read_at, 
     bytes = bytes.subspan(parser_.feed(bytes, read_at, byte_time));
     MavlinkFrame frame;
     while (parser_.next(frame)) {
+      mavlink::Heartbeat heartbeat;
+      if (mavlink::read(frame, heartbeat) && heartbeat.autopilot != mavlink::Heartbeat::kNoAutopilot) {
+        px4_ = heartbeat.autopilot == mavlink::Heartbeat::kPx4;
+      }
       mavlink::Timesync request;
       if (!mavlink::read(frame, request) || request.tc1 != 0) continue;
       request.target_system = frame.system;
@@ -95,6 +99,8 @@ std::size_t AutopilotLink::tellPose(Stamp now, const NavState* state, const Eige
   if (!fresh) {
     if (newer) ++counters_.too_old;
     if (!lost_ || now - lost_since_ > kTellLoss) return 0;
+    // VISION_POSITION_ESTIMATE has no quality, and others than PX4 may not read it: silence says it.
+    if (!px4_ || settings_.position_estimate) return 0;
     next_pose_ = now + period_;
     ++counters_.lost_poses;
     return writeLoss(now, out);
@@ -123,8 +129,6 @@ std::size_t AutopilotLink::writePose(const NavState& state, const Eigen::Vector3
 }
 
 std::size_t AutopilotLink::writeLoss(Stamp now, std::span<std::uint8_t> out) {
-  // VISION_POSITION_ESTIMATE has no quality: silence says it.
-  if (settings_.position_estimate) return 0;
   mavlink::Odometry message;
   message.time_usec = static_cast<std::uint64_t>(now.ns / kNanosecondsPerMicrosecond);
   message.position.setConstant(kUnknown);

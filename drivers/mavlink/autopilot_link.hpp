@@ -5,8 +5,9 @@
 // Bytes in, bytes out; whoever owns the port calls step() more often than the rate, with the clock.
 // - A pose is sent once, with the stamp of its state (CLOCK_MONOTONIC, which the answers to TIMESYNC tell the
 //   autopilot about), never older than kOldest, and only while health is good or degraded.
-// - Lost: failed, or no new state for kSilence. Then poses of quality -1 without numbers for kTellLoss, and
-//   after that silence: an autopilot that hears an old pose again flies on it.
+// - Lost: failed, or no new state for kSilence. Then silence: an autopilot that hears an old pose again flies
+//   on it. PX4 alone hears of it at once, by poses of quality -1 without numbers for kTellLoss: versions of
+//   ArduPilot that do not read `quality` would take the numbers.
 // - reset_counter begins at the given number, and rises with every epoch and when poses begin anew after a
 //   loss.
 // Memory: 8 kB inside the object, no allocation. Cost: about 5 us a pose.
@@ -58,6 +59,8 @@ class AutopilotLink {
 
   explicit AutopilotLink(const AutopilotLinkSettings& settings);
 
+  /// Whether the autopilot is PX4, heard on another's link; receive() knows it by itself.
+  void knowPx4(bool px4) { px4_ = px4; }
   /// What the autopilot sent; as MavlinkParser::feed.
   void receive(std::span<const std::uint8_t> bytes, Stamp read_at, Duration byte_time);
   /// Sent once, in chunks of 50 characters, cut to kMostText; beyond kTexts the oldest are dropped.
@@ -100,6 +103,7 @@ class AutopilotLink {
   FixedVector<Text, kTexts> texts_;
   std::uint16_t text_id_ = 0;
   std::optional<mavlink::ObstacleDistance> obstacles_;
+  bool px4_ = false;   ///< by the newest HEARTBEAT of an autopilot
   bool any_ = false;   ///< a pose was ever sent
   bool lost_ = false;  ///< and since then the state was
   Stamp lost_since_;

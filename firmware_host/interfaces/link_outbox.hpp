@@ -39,6 +39,8 @@ class LinkOutbox {
 
   // Of the sender.
   [[nodiscard]] bool attended() const { return attended_.load(std::memory_order_acquire); }
+  /// The autopilot at the other end reports to be PX4.
+  [[nodiscard]] bool px4() const { return px4_.load(std::memory_order_relaxed); }
   /// False: there is no room, or it is too long.
   [[nodiscard]] bool push(std::span<const std::uint8_t> bytes) {
     if (bytes.size() > kMostBytes) return false;
@@ -53,6 +55,7 @@ class LinkOutbox {
 
   // Of the owner.
   void attend(bool attended) { attended_.store(attended, std::memory_order_release); }
+  void tellPx4(bool px4) { px4_.store(px4, std::memory_order_relaxed); }
   /// To poll for reading: something waits.
   [[nodiscard]] int descriptor() const { return wake_; }
   /// Resets the wake-up; call before taking queued messages.
@@ -70,7 +73,7 @@ class LinkOutbox {
   static constexpr std::size_t kPushes = 8;
 
   int wake_;
-  std::atomic<bool> attended_{false};
+  std::atomic<bool> attended_{false}, px4_{false};
   SpscRing<Bytes, kPushes> ring_;
 };
 

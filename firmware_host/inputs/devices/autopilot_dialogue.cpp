@@ -23,6 +23,9 @@ std::size_t AutopilotDialogue::step(ImuDecoder& decoder, Stamp now, std::span<st
   std::size_t answers = 0;
   for (ReceivedMavlink received; decoder.nextMavlink(received);) {
     if (const auto* heartbeat = std::get_if<mavlink::Heartbeat>(&received.message)) {
+      if (heartbeat->autopilot != mavlink::Heartbeat::kNoAutopilot) {
+        px4_ = heartbeat->autopilot == mavlink::Heartbeat::kPx4;
+      }
       stream_.hear(*heartbeat, received.system, received.component, received.arrival);
     } else if (const auto* ack = std::get_if<mavlink::CommandAck>(&received.message)) {
       stream_.hear(*ack, received.system);

@@ -35,6 +35,8 @@ class AutopilotDialogue {
 
   /// The autopilot's clock on the host's; empty: not sure yet.
   [[nodiscard]] std::optional<Stamp> toHost(Stamp device) const;
+  /// The newest HEARTBEAT of an autopilot is PX4's.
+  [[nodiscard]] bool px4() const { return px4_; }
   [[nodiscard]] std::uint64_t answers() const { return answers_; }
   [[nodiscard]] std::uint64_t requests() const { return requests_; }
   [[nodiscard]] ImuStreamRequest& stream() { return stream_; }
@@ -44,6 +46,7 @@ class AutopilotDialogue {
   MavlinkSender sender_{.system = 1, .component = 191, .sequence = 0};
   TwoWayClockMap exchange_;
   std::uint8_t system_ = 0, component_ = 0;  ///< whose clock it is: the sender of the readings; 0: not known
+  bool px4_ = false;
   ImuStreamRequest stream_;
   Stamp asked_;                ///< when the newest request left; its answer names it
   std::uint64_t samples_ = 0;  ///< of the decoder, counted

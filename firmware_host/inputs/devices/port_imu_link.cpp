@@ -81,6 +81,7 @@ DeviceFault PortImuLink::send() {
       return fault;
   }
   if (outbox_ == nullptr) return {};
+  outbox_->tellPx4(dialogue_.px4());
   outbox_->hush();
   if (!outbox_->attended()) {
     // Of before the link was there.

@@ -154,6 +154,7 @@ class AutopilotThread::Work final : public Follower::Work {
   }
 
   /// False: there was more than a round reads.
+      link_.knowPx4(outbox.px4());
   bool hear() {
     std::array<std::uint8_t, MavlinkParser::kMostFed> bytes;
     int reads = 0;

@@ -63,6 +63,15 @@ class Flight {
   std::uint32_t epoch = 0;
   bool states_come = true;
 
+  /// The autopilot says what it is.
+  void beat(std::uint8_t kind) {
+    mavlink::Heartbeat heartbeat;
+    heartbeat.autopilot = kind;
+    std::array<std::uint8_t, kLongestMavlinkFrame> bytes;
+    const std::size_t length = mavlink::write(sender_, heartbeat, bytes);
+    link.receive(std::span(bytes).first(length), now, Duration{});
+  }
+
   void fly(Duration time) {
     for (const Stamp end = now + time; now < end; now = now + kLinkStep) {
       constexpr std::int64_t kStatePeriod = 5'000'000;
@@ -80,6 +89,7 @@ class Flight {
   }
 
  private:
+  MavlinkSender sender_;
   NavState state_;
   bool any_ = false;
 };
@@ -115,6 +125,7 @@ TEST_CASE("A loss is told for a second, then nothing; what comes back has anothe
           "[mavlink]") {
   const bool failed = GENERATE(true, false);
   Flight flight;
+  flight.beat(mavlink::Heartbeat::kPx4);
   flight.fly(Duration::fromMilliseconds(2'000));
   const std::size_t before = flight.autopilot.poses.size();
   if (failed) {
@@ -143,6 +154,26 @@ TEST_CASE("A loss is told for a second, then nothing; what comes back has anothe
   flight.fly(Duration::fromMilliseconds(1'000));
   CHECK(poses.back().reset_counter == 2);
   CHECK(flight.autopilot.beats.back().system_status == 4);
+}
+
+TEST_CASE("An autopilot that is not PX4, or not known, is told a loss by silence", "[mavlink]") {
+  constexpr std::uint8_t kArduPilot = 3;  // MAV_AUTOPILOT_ARDUPILOTMEGA
+  const bool known = GENERATE(true, false);
+  Flight flight;
+  if (known) {
+    flight.beat(mavlink::Heartbeat::kPx4);
+    flight.beat(kArduPilot);
+    flight.beat(mavlink::Heartbeat::kNoAutopilot);  // another member of the network
+  }
+  flight.fly(Duration::fromMilliseconds(2'000));
+  flight.health = Health::kFailed;
+  flight.fly(Duration::fromMilliseconds(3'000));
+  for (const mavlink::Odometry& pose : flight.autopilot.poses) REQUIRE(pose.quality == 100);
+  CHECK(flight.link.counters().losses == 1);
+  CHECK(flight.link.counters().lost_poses == 0);
+  flight.health = Health::kGood;
+  flight.fly(Duration::fromMilliseconds(1'000));
+  CHECK(flight.autopilot.poses.back().reset_counter == 1);
 }
 
 TEST_CASE("The reset counter begins where it is told to, and wraps", "[mavlink]") {

@@ -30,7 +30,9 @@ struct Plug {
   /// Says that the autopilot lives.
   void beat() {
     std::array<std::uint8_t, kLongestMavlinkFrame> frame;
-    const std::size_t length = mavlink::write(sender, mavlink::Heartbeat{}, frame);
+    mavlink::Heartbeat px4;
+    px4.autopilot = mavlink::Heartbeat::kPx4;
+    const std::size_t length = mavlink::write(sender, px4, frame);
     std::size_t taken = 0;
     REQUIRE(terminal.send(std::span(frame).first(length), taken).ok());
   }
@@ -63,6 +65,7 @@ TEST_CASE("Degraded, failed and good again are told as autopilots understand the
   const auto isGood = [](const Pose& pose) { return pose.quality == 100; };
   const auto isDegraded = [](const Pose& pose) { return pose.quality > 0 && pose.quality < 100; };
   const auto isLost = [](const Pose& pose) { return pose.quality == -1 && std::isnan(pose.position.x()); };
+  plug.beat();
   static_cast<void>(fly(Health::kGood, isGood));
   for (const Pose& pose : fly(Health::kDegraded, isDegraded)) CHECK_FALSE(isGood(pose));
   const int resets = poses.back().reset_counter;

@@ -79,6 +79,9 @@ TEST_CASE("Over a serial port: poses, reasons, health, clocks; unplugged and bac
 
   // A state that stands still is not sent again: quality -1 for a second, then nothing.
   const std::size_t moved = heard.poses.size();
+  mavlink::Heartbeat px4;
+  px4.autopilot = mavlink::Heartbeat::kPx4;
+  REQUIRE(plug.send(std::span(request).first(mavlink::write(sender, px4, request)), taken).ok());
   REQUIRE(until([&] { return heard.poses.size() > moved + 2; }, listen));
   pass(1.5, listen);
   for (std::size_t i = moved + 2; i < heard.poses.size(); ++i) CHECK(heard.poses[i].quality == -1);
