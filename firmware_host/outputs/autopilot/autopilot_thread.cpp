@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "drivers/device/monotonic_now.hpp"
@@ -48,6 +50,11 @@ AutopilotLinkSettings restarted(AutopilotLinkSettings link) {
   return link;
 }
 
+bool cannotHeal(DeviceFaultKind kind) {
+  return kind == DeviceFaultKind::kWrongDevice || kind == DeviceFaultKind::kUnsupported ||
+         kind == DeviceFaultKind::kChanged;
+}
+
 }  // namespace
 
 AutopilotLinkSettings linkSettings(const AutopilotGroup& settings) {
@@ -77,10 +84,7 @@ class AutopilotThread::Work final : public Follower::Work {
         journal_("autopilot (" + options.settings.device + ")"),
         link_(restarted(linkSettings(options.settings))),
         port_(options.settings.device, static_cast<unsigned>(options.settings.baud)) {
-    if (const DeviceFault fault = openOwn(); !fault.ok()) {
-      throw InputError("settings", 0, "autopilot.device", describe(fault, options.settings.device),
-                       "Or leave it empty to disable the output");
-    }
+    if (const DeviceFault fault = openOwn(); !fault.ok()) refuseOrAwait(fault);
     ThreadSettings thread;
     thread.name = "autopilot";
     thread.priority = options.priority;
@@ -115,6 +119,20 @@ class AutopilotThread::Work final : public Follower::Work {
  private:
   DeviceFault openOwn() { return options_.outbox == nullptr ? port_.open() : DeviceFault{}; }
 
+  /// A companion may boot before the autopilot: what can heal by itself is looked for in flight, as after an
+  /// unplug. What only the settings can heal ends the program.
+  void refuseOrAwait(const DeviceFault& fault) {
+    const std::string what = describe(fault, options_.settings.device);
+    if (cannotHeal(fault.kind)) {
+      throw InputError("settings", 0, "autopilot.device", what, "Or leave it empty to disable the output");
+    }
+    // To resolve a name takes seconds, in which the thread would count as lost: a restart tries again.
+    if (port_.isUdp() && fault.kind == DeviceFaultKind::kMissing) {
+      throw std::runtime_error("autopilot.device: " + what + ". Or give the host's number, as 192.168.1.10");
+    }
+    fail(fault);
+  }
+
   void run() {
     heard_ = monotonicNow();
     if (options_.outbox != nullptr) return runOnAnothersLink(*options_.outbox);
@@ -136,6 +154,7 @@ class AutopilotThread::Work final : public Follower::Work {
     while (thread_.turn()) {
       sleepFor(kRound);
       takeNews();
+      link_.knowPx4(outbox.px4());
       if (outbox.attended()) tell();
     }
   }
@@ -154,7 +173,6 @@ class AutopilotThread::Work final : public Follower::Work {
   }
 
   /// False: there was more than a round reads.
-      link_.knowPx4(outbox.px4());
   bool hear() {
     std::array<std::uint8_t, MavlinkParser::kMostFed> bytes;
     int reads = 0;

@@ -8,9 +8,9 @@
 // while a planner computes. Besides poses it sends obstacles (10 Hz) and texts of the supervisor's verdict:
 // each reason not to arm when it appears and every 30 s, readiness to arm, every change of health, members
 // that are late, lost or recovered, and missing states or a stopped supervisor. From its second turn on it
-// neither allocates nor takes a lock. It looks for an unplugged serial port five times a second; an unplugged
-// port and an autopilot that is silent for 3 s are logged with the remedy. Clock: CLOCK_MONOTONIC. Stamps of
-// a log are converted by the constant offset of its player.
+// neither allocates nor takes a lock. It looks for a port that is missing at the start, or unplugged later,
+// five times a second; such a port and an autopilot that is silent for 3 s are logged with the remedy. Clock:
+// CLOCK_MONOTONIC. Stamps of a log are converted by the constant offset of its player.
 
 #include <functional>
 #include <optional>
@@ -40,7 +40,8 @@ AutopilotLinkSettings linkSettings(const AutopilotGroup& settings);
 
 class AutopilotThread : public Follower {
  public:
-  /// Opens the port and begins. InputError naming the setting where it does not open. `outlet` outlives it.
+  /// Opens the port, or looks for it from now on, and begins. InputError naming the setting where only other
+  /// settings help; std::runtime_error where a host's name is not resolved. `outlet` outlives it.
   AutopilotThread(LiveOutlet& outlet, const AutopilotThreadOptions& options);
 
   /// What happened to the port since the last call; any one thread.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 
 #include "drivers/dds/dds_link.hpp"
@@ -81,8 +82,10 @@ class DdsThread::Work final : public Follower::Work {
     settings.complain = [](std::string_view line) { warn("dds: " + std::string(line)); };
     if (options.labels != nullptr) settings.label_topic = options.settings.label_topic;
     if (!link_.open(settings)) {
-      throw InputError("settings", 0, "ros2.interface, ros2.domain", link_.error(),
-                       "Or disable it with ros2.enabled: false");
+      // A network interface may come up later: a service that ends by this is started again, one that ends by
+      // an InputError is not.
+      throw std::runtime_error("settings: ros2.interface, ros2.domain: " + link_.error() +
+                               ". Or disable it with ros2.enabled: false");
     }
     ThreadSettings thread;
     thread.name = "dds";

@@ -24,7 +24,7 @@ struct DdsThreadOptions {
 
 class DdsThread : public Follower {
  public:
-  /// Opens and begins. InputError naming the setting where DDS does not open. `outlet` outlives it.
+  /// Opens and begins. std::runtime_error naming the setting where DDS does not open. `outlet` outlives it.
   DdsThread(LiveOutlet& outlet, const DdsThreadOptions& options);
 
  private:

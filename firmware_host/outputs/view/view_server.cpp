@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <charconv>
 #include <limits>
+#include <stdexcept>
 #include <system_error>
 
 #include "drivers/input/input_error.hpp"
@@ -121,9 +122,12 @@ class ViewServer::Work : public httplib::Server {
     std::string what = "cannot be served at: " + std::generic_category().message(error);
     if (taken) what = "another program serves there already";
     if (error == 0) what = "is no address of this host";
-    throw InputError("--view", 0, address_.text(), what,
-                     taken ? "Choose another with --view ADDRESS:PORT, or port 0 for any that is free"
-                           : "Give --view an address of this host and a port that this user may have");
+    const InputError said("--view", 0, address_.text(), what,
+                          taken ? "Choose another with --view ADDRESS:PORT, or port 0 for any that is free"
+                                : "Give --view an address of this host and a port that this user may have");
+    // An address comes with its network, and a port goes with the program that has it: a service that ends by
+    // this is started again, one that ends by an InputError is not.
+    throw std::runtime_error(said.what());
   }
 
   // In place of the library's own, whose reads and writes know no end of the whole.

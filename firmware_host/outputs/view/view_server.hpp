@@ -33,7 +33,7 @@ class ViewServer {
   /// One for each viewer, and some for pages and for those who are refused.
   static constexpr std::size_t kWorkers = ViewHub::kMostViewers + 4;
 
-  /// Listens and answers from now on. InputError naming --view where the address cannot be had. `hub`
+  /// Listens and answers from now on. std::runtime_error naming --view where the address cannot be had. `hub`
   /// outlives it.
   ViewServer(ViewHub& hub, const ViewAddress& address, ViewPages pages);
   /// Ends it: viewers that take what they are sent get what waits for them and the end, within half a second.

@@ -14,9 +14,9 @@ namespace swiftlet {
 
 class ViewThread : public Follower {
  public:
-  /// Listens and begins. InputError naming --view where the address cannot be had. `outlet` outlives it.
-  /// `name`: what the page calls the run. Its end tells the viewers, and takes a second at most.
-  /// `rig`: the cameras in use, whose images are shown where the outlet has them.
+  /// Listens and begins. std::runtime_error naming --view where the address cannot be had. `outlet` outlives
+  /// it. `name`: what the page calls the run. Its end tells the viewers, and takes a second at most. `rig`:
+  /// the cameras in use, whose images are shown where the outlet has them.
   ViewThread(LiveOutlet& outlet, const ViewAddress& address, const std::string& name, const Rig& rig);
 
   /// "http://127.0.0.1:8320/", with the port that it has got, and the token where one is needed.

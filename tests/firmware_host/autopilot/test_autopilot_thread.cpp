@@ -4,7 +4,10 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <vector>
 
 #include "drivers/input/input_error.hpp"
@@ -77,11 +80,11 @@ TEST_CASE("Over a serial port: poses, reasons, health, clocks; unplugged and bac
   CHECK(heard.answers[0].tc1 >= asked.ns);
   CHECK(heard.answers[0].tc1 <= monotonicNow().ns);
 
-  // A state that stands still is not sent again: quality -1 for a second, then nothing.
-  const std::size_t moved = heard.poses.size();
   mavlink::Heartbeat px4;
   px4.autopilot = mavlink::Heartbeat::kPx4;
   REQUIRE(plug.send(std::span(request).first(mavlink::write(sender, px4, request)), taken).ok());
+  // A state that stands still is not sent again: quality -1 for a second, then nothing.
+  const std::size_t moved = heard.poses.size();
   REQUIRE(until([&] { return heard.poses.size() > moved + 2; }, listen));
   pass(1.5, listen);
   for (std::size_t i = moved + 2; i < heard.poses.size(); ++i) CHECK(heard.poses[i].quality == -1);
@@ -157,15 +160,67 @@ TEST_CASE("Over UDP, of a log with a clock of its own, with obstacles; silence i
   CHECK(lines[0].find("no MAVLink for 3 s") != std::string::npos);
 }
 
-TEST_CASE("A port that is not there is said before the flight", "[autopilot]") {
+TEST_CASE("A port that is not there at the start is noted, looked for and used when it comes",
+          "[autopilot]") {
+  const ScratchFolder folder("autopilot_late");
+  const std::filesystem::path port = folder.file("by-id");
+  Vehicle vehicle;
+  AutopilotThread autopilot(vehicle.outlet, optionsOf(port));
+  std::vector<std::string> lines;
+  const auto drain = [&] {
+    vehicle.move();
+    autopilot.drainEvents([&](Stamp, const std::string& line) { lines.push_back(line); });
+  };
+  REQUIRE(until([&] { return !lines.empty(); }, drain));
+  CHECK(lines[0].find("autopilot (" + port.string() + "): not there") == 0);
+  pass(0.5, drain);
+  CHECK(lines.size() == 1);
+  PseudoTerminal plug;
+  REQUIRE(plug.open().ok());
+  std::filesystem::create_symlink(plug.path(), port);
+  Heard heard;
+  REQUIRE(until([&] { return heard.poses.size() > 5 && lines.size() > 1; },
+                [&] {
+                  drain();
+                  std::array<std::uint8_t, 4096> bytes;
+                  std::size_t count = 0;
+                  while (plug.receive(bytes, count).ok() && count > 0)
+                    heard.take(std::span(bytes).first(count));
+                }));
+  CHECK(lines[1].find("works again") != std::string::npos);
+}
+
+TEST_CASE("An agreed UDP port that another program has is waited for", "[autopilot]") {
+  auto other = std::make_unique<LinkPort>("udp:127.0.0.1:24583@24584", 0);
+  REQUIRE(other->open().ok());
+  Vehicle vehicle;
+  AutopilotThread autopilot(vehicle.outlet, optionsOf("udp:127.0.0.1:24583@24584"));
+  std::vector<std::string> lines;
+  const auto drain = [&] {
+    autopilot.drainEvents([&](Stamp, const std::string& line) { lines.push_back(line); });
+  };
+  REQUIRE(until([&] { return !lines.empty(); }, drain));
+  CHECK(lines[0].find("held by another program") != std::string::npos);
+  other.reset();
+  REQUIRE(until([&] { return lines.size() > 1; }, drain));
+  CHECK(lines[1].find("works again") != std::string::npos);
+}
+
+TEST_CASE("Settings of a port that no time heals are refused before the flight", "[autopilot]") {
   LiveOutlet outlet;
+  const ScratchFolder folder("autopilot_wrong");
+  const std::string file = folder.file("no_port");
+  std::ofstream(file) << "text";
   try {
-    AutopilotThread autopilot(outlet, optionsOf("/dev/no-such-port"));
+    AutopilotThread autopilot(outlet, optionsOf(file));
     FAIL("was opened");
   } catch (const InputError& error) {
     CHECK(error.field == "autopilot.device");
-    CHECK(std::string(error.what()).find("/dev/no-such-port") != std::string::npos);
+    CHECK(std::string(error.what()).find("not a serial port") != std::string::npos);
   }
+  CHECK_THROWS_AS(AutopilotThread(outlet, optionsOf("udp:127.0.0.1")), InputError);
+  // Not wrong for good: names are resolved when the network is up. The program ends and is restarted.
+  CHECK_THROWS_AS(AutopilotThread(outlet, optionsOf("udp:no-such-host.invalid:14550")), std::runtime_error);
 }
 
 }  // namespace
