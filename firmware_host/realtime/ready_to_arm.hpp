@@ -85,6 +85,7 @@ struct ArmingFacts {
   const char* first_unwell_text = "";  ///< "no progress for 0.4 s"
 };
 
+/// ArmingWatch raises the limits of images for slow cameras.
 struct ArmingSettings {
   double imu_rate_tolerance = 0.2;                           ///< share of the expected rate
   Duration sensor_offset = Duration::fromMilliseconds(200);  ///< newest image against newest sample

@@ -65,6 +65,7 @@ FlightGround groundOf(const std::vector<ThreadReport>& threads, const Calibratio
   ground.speed = request.speed;
   ground.host_stamps = request.host_stamps;
   ground.cameras = static_cast<int>(settings.odometry.use_stereo ? calibration.rig.camera_count : 1);
+  ground.camera_rate = settings.cameras.rate_hz;
   ground.trigger = request.trigger;
   if (!settings.autopilot.device.empty()) {
     Eigen::Map<Eigen::Vector3d>(ground.vehicle_up.emplace().data()) =

@@ -9,9 +9,17 @@ namespace {
 
 constexpr Duration kLookBack = Duration::fromMilliseconds(1000);
 /// Health that nobody has confirmed for so long is not good.
-constexpr double kOldestFrame = 1;  // s
+constexpr Duration kOldestFrame = Duration::fromMilliseconds(1000);
 
 }  // namespace
+
+void ArmingWatch::begin(const FlightGround& ground) {
+  ground_ = ground;
+  ArmingSettings settings;
+  settings.sensor_offset = imageLimit(settings.sensor_offset, ground.camera_rate);
+  settings.image_age = imageLimit(settings.image_age, ground.camera_rate);
+  rule_ = ReadyToArm(settings);
+}
 
 void ArmingWatch::measureRate(const SensorNews& imu, std::uint64_t reversed, ArmingFacts& facts) {
   if (imu.messages == 0) return;  // no stamp to begin from
@@ -57,7 +65,7 @@ ArmingVerdict ArmingWatch::evaluate(const FlightFacts& flight, Health health,
   const EstimateNews& estimate = flight.estimate;
   if (estimate.frames != frames_) frame_at_ = now;
   frames_ = estimate.frames;
-  const bool fresh = frames_ > 0 && since(frame_at_).seconds() <= kOldestFrame;
+  const bool fresh = frames_ > 0 && since(frame_at_) <= imageLimit(kOldestFrame, ground_.camera_rate);
   const bool good = fresh && estimate.has_state && health == Health::kGood;
   if (!good) good_since_.reset();
   if (good && !good_since_) good_since_ = now;

@@ -16,7 +16,7 @@ namespace swiftlet {
 
 class ArmingWatch {
  public:
-  void begin(const FlightGround& ground) { ground_ = ground; }
+  void begin(const FlightGround& ground);
 
   /// `health`: the estimator's. `troubles`: the supervisor's of now.
   ArmingVerdict evaluate(const FlightFacts& facts, Health health, std::span<const Trouble> troubles,

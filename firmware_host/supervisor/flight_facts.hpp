@@ -2,6 +2,7 @@
 // Facts that the supervisor needs about a flight: plain values that the schedule collects ten times a second.
 // Host times are CLOCK_MONOTONIC; other stamps use the run's clock (the log's in a replay).
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -20,15 +21,24 @@ struct FlightGround {
   int threads_without_priority = 0;
   std::array<char, 16> first_without_priority{};  ///< name; ends with a zero
   bool memory_locked = false;
-  double imu_rate = 0;  ///< Hz, the calibration's
-  double speed = 1;     ///< of the run's clock against the host's
-  int cameras = 0;      ///< that are used
+  double imu_rate = 0;     ///< Hz, the calibration's
+  double speed = 1;        ///< of the run's clock against the host's
+  int cameras = 0;         ///< that are used
+  double camera_rate = 0;  ///< Hz, configured; 0: not known, limits are those of fast cameras
   bool trigger = false;
   bool recorder_wanted = false;
   /// The vehicle's up in the IMU's axes by autopilot.roll_deg and so on; empty: no autopilot is told.
   std::optional<std::array<double, 3>> vehicle_up;
   bool host_stamps = true;  ///< the run's clock is CLOCK_MONOTONIC
 };
+
+/// For silence of images: at least `limit`, and two and a half periods of slow cameras, so that one image may
+/// be lost and the next one be late by half a period.
+inline Duration imageLimit(Duration limit, double camera_rate) {
+  constexpr double kPeriods = 2.5;
+  if (!(camera_rate > 0)) return limit;
+  return std::max(limit, Duration::fromSeconds(kPeriods / camera_rate));
+}
 
 /// What one sensor delivered.
 struct SensorNews {

@@ -114,13 +114,17 @@ void Liveness::judge(std::span<const Beat> beats, const FlightFacts& facts, Stam
     // Three periods of a slow IMU; at 1 s it has been off for longer than any hole that can be bridged.
     constexpr DataRule kImu = {"sample", milliseconds(100), milliseconds(1000), Health::kFailed, false};
     // Some images lost in a row are the estimator's matter; half a second is a camera that is gone.
-    constexpr DataRule kCamera = {"image", milliseconds(500), milliseconds(2000), Health::kDegraded, false};
-    constexpr DataRule kTrigger = {"edge", milliseconds(1000), std::nullopt, Health::kDegraded, true};
+    // Of a slow camera two images and a half; it is lost after twice as many.
+    const double rate = ground_.camera_rate;
+    const DataRule image_rule = {"image", imageLimit(milliseconds(500), rate),
+                                 imageLimit(milliseconds(2000), rate / 2), Health::kDegraded, false};
+    const DataRule edge_rule = {"edge", imageLimit(milliseconds(1000), rate), std::nullopt, Health::kDegraded,
+                                true};
     judgeData(kImuData, kImu, facts.imu, now);
     for (std::size_t c = 0; c < std::min(static_cast<std::size_t>(ground_.cameras), kMaxCameras); ++c) {
-      judgeData(static_cast<Other>(kCameraData + c), kCamera, facts.camera[c], now);
+      judgeData(static_cast<Other>(kCameraData + c), image_rule, facts.camera[c], now);
     }
-    if (ground_.trigger) judgeData(kTriggerData, kTrigger, facts.trigger, now);
+    if (ground_.trigger) judgeData(kTriggerData, edge_rule, facts.trigger, now);
     // As long as for the threads that make them: a consumer misses the product, not the turn.
     constexpr ProductRule kState = {"state", "samples", kFlightRule.late, kFlightRule.lost};
     constexpr ProductRule kFrame = {"frame", "images", milliseconds(1000), kFlightRule.lost};

@@ -13,6 +13,7 @@
 // | frames while images come  | 1 s           | 3 s                      | health failed until they are back
 // | equal IMU readings      |                 | 100 in a row             | health failed until they differ
 // | files                   |                 | at once                  | degraded
+// Limits of images and edges are at least two and a half periods of a slow camera, five for a lost one.
 // liveness.cpp has the reasons. A stall that is over is forgotten, but for two things: what went bad four
 // times stays degraded, and a flight thread that was lost ends the run. A throw and an early end stay.
 

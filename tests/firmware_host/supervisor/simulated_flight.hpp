@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -30,8 +31,8 @@ struct SimulatedFlight {
   };
 
   explicit SimulatedFlight(bool host_stamps = true, double speed = 1, SystemdNotify* systemd = nullptr,
-                           std::optional<std::array<double, 3>> vehicle_up = {})
-      : stamps_on_host(host_stamps) {
+                           std::optional<std::array<double, 3>> vehicle_up = {}, double camera_rate = 20)
+      : stamps_on_host(host_stamps), image_turns(static_cast<std::uint64_t>(std::lround(200 / camera_rate))) {
     for (std::size_t i = 0; i < kMembers.size(); ++i) {
       hearts.push_back(std::make_unique<Heartbeat>());
       static_cast<void>(supervisor.add(kMembers[i], *hearts[i]));
@@ -46,6 +47,7 @@ struct SimulatedFlight {
     ground.recorder_wanted = true;
     ground.host_stamps = host_stamps;
     ground.vehicle_up = vehicle_up;
+    ground.camera_rate = camera_rate;
     facts.recorder_running = true;
     facts.estimate.epoch = 1;
     supervisor.begin(
@@ -94,6 +96,7 @@ struct SimulatedFlight {
   Stamp start{1'000'000'000'000};
   Stamp now = start;
   bool stamps_on_host;
+  std::uint64_t image_turns;  ///< of 5 ms, between two images
   // What is switched off.
   std::vector<std::string_view> stalled;
   bool imu_silent = false, trigger_silent = false, no_states = false, no_frames = false;
@@ -119,7 +122,7 @@ struct SimulatedFlight {
       deliver(facts.imu);
       if (!no_states) ++estimate.states;
     }
-    if (turns % 10 == 0) {
+    if (turns % image_turns == 0) {
       bool any = false;
       for (std::size_t c = 0; c < kMaxCameras; ++c) {
         if (camera_silent[c]) continue;

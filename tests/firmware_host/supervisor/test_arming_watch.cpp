@@ -1,5 +1,6 @@
 // Readiness that nobody confirms any more: facts that stand still because nothing comes.
 
+#include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -74,6 +75,34 @@ TEST_CASE("a new epoch takes readiness away for its time", "[arming]") {
   CHECK(flight.verdict.arming.lacks(ArmingCondition::kInitialized));
   flight.pass(3.0);
   CHECK(flight.verdict.arming.ready());
+}
+
+TEST_CASE("slow cameras are no late cameras", "[arming]") {
+  // At 1 Hz, between images, the newest sample is up to a second newer and the newest image as old.
+  const double rate = GENERATE(1.0, 2.0, 4.0);
+  SimulatedFlight flight(true, 1, nullptr, {}, rate);
+  flight.pass(8.0);
+  CHECK(flight.verdict.arming.ready());
+  for (int i = 0; i < 50; ++i) {
+    flight.pass(0.1);
+    REQUIRE(flight.verdict.arming.ready());
+  }
+  CHECK(flight.verdict.troubles.empty());
+  CHECK(flight.times("ready to arm") == 1);
+  CHECK(flight.times("camera0 is") == 0);
+  // Silence is still found: late after two and a half periods, lost after twice as long.
+  flight.camera_silent[0] = true;
+  const auto is = [&](Condition condition) {
+    return [&flight, condition] {
+      const Trouble* found = flight.trouble("camera0", Cause::kNoData);
+      return found != nullptr && found->condition == condition;
+    };
+  };
+  const double late = flight.until(is(Condition::kLate));
+  CHECK(late > std::max(0.5, 2.5 / rate) - 1 / rate - 0.2);
+  CHECK(late < std::max(0.5, 2.5 / rate) + 0.2);
+  CHECK(flight.until(is(Condition::kLost)) < std::max(2.0, 5 / rate));
+  CHECK_FALSE(flight.verdict.arming.ready());
 }
 
 TEST_CASE("a mounting that turns the vehicle over keeps it on the ground", "[arming]") {
