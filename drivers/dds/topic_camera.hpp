@@ -48,6 +48,8 @@ class TopicCamera : public CameraSource {
 
   DeviceFault open() override;
   void close() override;
+  /// The publisher's stream, of which nothing is held here.
+  [[nodiscard]] bool restarts() const override { return false; }
   [[nodiscard]] bool isOpen() const override { return open_; }
   [[nodiscard]] int fd() const override { return bell_.fd(); }
   DeviceFault next(CapturedFrame& frame) override;

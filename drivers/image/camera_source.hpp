@@ -107,6 +107,9 @@ class CameraSource {
   /// True: taking or returning frames allocates and locks, which a thread of the flight path must not do.
   [[nodiscard]] virtual bool allocates() const { return false; }
 
+  /// False: closing and reopening a silent stream cannot help.
+  [[nodiscard]] virtual bool restarts() const { return true; }
+
   /// Remarks about the camera that are not faults, for the user; call until it returns false.
   virtual bool nextRemark(DeviceFault& /*remark*/) { return false; }
 

@@ -2,6 +2,8 @@
 
 #include <poll.h>
 
+#include <algorithm>
+
 #include "estimator/core/units.hpp"
 #include "firmware_host/inputs/devices/device_times.hpp"
 #include "firmware_host/realtime/host_sleep.hpp"
@@ -11,6 +13,10 @@ namespace {
 
 /// Frames of one round: more wait only after the thread was held up.
 constexpr int kMostFrames = 8;
+/// Wait between restarts of a silent stream: first and longest. Some USB cameras need two seconds to their
+/// first frame. The wait doubles, because a camera without trigger edges is silent without being broken.
+constexpr Duration kFirstRestartWait = Duration::fromMilliseconds(4000);
+constexpr Duration kLongestRestartWait = Duration::fromMilliseconds(32'000);
 /// Images running that show nothing, or nothing new, before it is said: a hand before the lens, a lost frame
 /// that the driver fills in.
 constexpr int kOddImages = 5;
@@ -32,6 +38,7 @@ CameraThread::CameraThread(const Setup& setup, std::unique_ptr<CameraSource> sou
       source_(std::move(source)),
       journal_(setup.name),
       longest_silence_(longestSilence(setup.settings.rate_hz)),
+      restart_wait_(kFirstRestartWait),
       train_(Duration::fromSeconds(1 / setup.settings.rate_hz)),
       rate_(setup.settings.rate_hz) {
   timing_.readout = Duration::fromSeconds(setup_.settings.readout_ms * kFromMs);
@@ -111,11 +118,18 @@ void CameraThread::run(SensorSink& sink, const RunControl& control) {
     publish();
     const Stamp now = hostNow();
     for (DeviceFault remark; source_->nextRemark(remark);) journal_.note(now, remark);
-    if (source_->isOpen() && now - newest_ > longest_silence_) {
-      journal_.fault(
-          now, deviceFault(DeviceFaultKind::kSilent, 0, "no frame for %.1f s", (now - newest_).seconds()));
-    }
+    watchSilence(now);
   }
+}
+
+void CameraThread::watchSilence(Stamp now) {
+  if (!source_->isOpen() || now - newest_ <= longest_silence_) return;
+  journal_.fault(now,
+                 deviceFault(DeviceFaultKind::kSilent, 0, "no frame for %.1f s", (now - newest_).seconds()));
+  if (now < restart_at_ || !source_->restarts()) return;
+  source_->close();
+  restart_at_ = now + restart_wait_;
+  restart_wait_ = std::min(restart_wait_ + restart_wait_, kLongestRestartWait);
 }
 
 void CameraThread::discard() {
@@ -206,6 +220,8 @@ void CameraThread::take(const CapturedFrame& frame, SensorSink& sink) {
     return;
   }
   newest_ = frame.arrival;
+  restart_at_ = {};
+  restart_wait_ = kFirstRestartWait;
   if (exposure_) timing_.exposure = exposure_->inForce(frame.sequence).exposure;
   if (watchQuality(images[0], frame.arrival)) handOver(frame, images, sink);
   if (!exposure_) return;

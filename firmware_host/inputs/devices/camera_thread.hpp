@@ -78,6 +78,8 @@ class CameraThread {
   DeviceFault reopen();
   /// The source with the control of its exposure, at first and when it is there again.
   DeviceFault openSource();
+  /// A stream that has stalled is closed, for run() to reopen.
+  void watchSilence(Stamp now);
   /// Frames that wait from before the flight.
   void discard();
   void takeEdges();
@@ -96,6 +98,8 @@ class CameraThread {
   Heartbeat heart_;
   DeviceJournal journal_;
   Duration longest_silence_;
+  Duration restart_wait_;  ///< until the next restart of a silent stream; grows while none helps
+  Stamp restart_at_;       ///< of a silent stream
   ExposureTiming timing_;  ///< of the image at hand
   std::optional<ExposureLoop> exposure_;
   EdgeRing edges_;

@@ -3,6 +3,7 @@
 #include <array>
 #include <atomic>
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "firmware_host/inputs/devices/camera_thread.hpp"
+#include "firmware_host/inputs/devices/device_times.hpp"
 #include "tests/firmware_host/live/imu_bench.hpp"
 
 namespace swiftlet {
@@ -93,6 +95,126 @@ TEST_CASE("a camera that comes back with other pixels is refused until it has th
   CHECK(soon([&] { return !camera.goes.load() && camera.facts().format == kGrey8; }));
   stop.store(true);
   runner.join();
+}
+
+/// Sends whenever it is asked, until it is told to stall. Reopening ends a stall unless it is hopeless.
+class StallingCamera : public CameraSource {
+ public:
+  std::atomic<int> opened{0};
+  std::atomic<bool> stalls{false};  ///< until the next open
+  std::atomic<bool> hopeless{false};
+  std::atomic<std::int64_t> exposure{5'000'000};  ///< ns, from the next open on
+  std::atomic<bool> warns{false};
+
+  DeviceFault open() override {
+    warning_count_ = 0;
+    ++opened;
+    stalls.store(hopeless.load());
+    open_ = true;
+    facts_ = {};
+    facts_.width = facts_.stride = kSide;
+    facts_.height = kSide;
+    facts_.event = StampEvent::kStartOfExposure;
+    facts_.exposure = Duration{exposure.load()};
+    if (warns.load()) warn(deviceFault(DeviceFaultKind::kFailed, 0, "auto exposure stays on"));
+    return {};
+  }
+  void close() override {
+    open_ = false;
+    forgetLent();
+  }
+  [[nodiscard]] bool isOpen() const override { return open_; }
+  [[nodiscard]] int fd() const override { return -1; }
+  DeviceFault next(CapturedFrame& frame) override {
+    frame.release();
+    if (!open_ || stalls.load() || given_++ % 2 == 1) return {};
+    pixels_.fill(static_cast<std::uint8_t>(50 + number_ % 100));
+    frame.image = {pixels_.data(), kSide, kSide, kSide};
+    frame.event = StampEvent::kStartOfExposure;
+    frame.stamp = frame.arrival = hostNow();
+    frame.sequence = number_++;
+    lend(frame, 0);
+    return {};
+  }
+
+ private:
+  static constexpr int kSide = 32;
+  void giveBack(std::uint32_t /*buffer*/) override {}
+  bool open_ = false;
+  std::uint64_t number_ = 0, given_ = 0;
+  std::array<std::uint8_t, static_cast<std::size_t>(kSide* kSide)> pixels_{};
+};
+
+class CountingImages : public SensorSink {
+ public:
+  void takeImu(const ImuSample& /*sample*/, Stamp /*arrival*/, const HostTimes& /*host*/) override {}
+  void takeScene(const SceneImages& /*scene*/) override {}
+  void takeImage(const CameraFrame& image, const HostTimes& /*host*/) override {
+    shift.store((image.stamp - image.arrival).ns);
+    ++count;
+  }
+  std::atomic<std::uint64_t> count{0};
+  std::atomic<std::int64_t> shift{0};  ///< of the newest: from the driver's stamp to the image's [ns]
+};
+
+/// A thread at work on a StallingCamera.
+struct Stalling {
+  Stalling() {
+    auto owned = std::make_unique<StallingCamera>();
+    camera = owned.get();
+    CameraThread::Setup setup;
+    setup.name = "camera 0";
+    setup.settings.rate_hz = 20;
+    setup.settings.exposure_ms = 5;
+    thread.emplace(setup, std::move(owned));
+    REQUIRE(thread->open().ok());
+    control.stop = &stop;
+    runner = std::thread([this] { thread->run(sink, control); });
+    CHECK(soon([this] { return sink.count.load() > 2; }));
+  }
+  ~Stalling() {
+    stop.store(true);
+    runner.join();
+  }
+  std::size_t linesWith(const std::string& part) {
+    DeviceEvent event;
+    while (thread->journal().next(event)) lines.push_back(thread->journal().text(event));
+    std::size_t count = 0;
+    for (const std::string& line : lines) count += line.find(part) != std::string::npos ? 1 : 0;
+    return count;
+  }
+  StallingCamera* camera = nullptr;
+  std::optional<CameraThread> thread;
+  CountingImages sink;
+  std::atomic<bool> stop{false};
+  RunControl control;
+  std::vector<std::string> lines;
+  std::thread runner;
+};
+
+TEST_CASE("a stream that stalls is restarted") {
+  Stalling bench;
+  bench.camera->stalls = true;
+  CHECK(soon([&] { return bench.camera->opened.load() == 2; }));
+  const std::uint64_t before = bench.sink.count.load();
+  CHECK(soon([&] { return bench.sink.count.load() > before + 2; }));
+  CHECK(soon([&] { return bench.linesWith("works again") == 1; }));
+  CHECK(bench.linesWith("no frame for") == 1);
+}
+
+TEST_CASE("a stream that stays silent is restarted seldom, and said once") {
+  Stalling bench;
+  bench.camera->hopeless = true;
+  bench.camera->stalls = true;
+  CHECK(soon([&] { return bench.camera->opened.load() == 2; }));
+  std::this_thread::sleep_for(std::chrono::milliseconds(3000));
+  CHECK(bench.camera->opened.load() == 2);
+  CHECK(bench.linesWith("no frame for") == 1);
+  bench.camera->hopeless = false;
+  // Without a restart: its trigger is back.
+  bench.camera->stalls = false;
+  const std::uint64_t before = bench.sink.count.load();
+  CHECK(soon([&] { return bench.sink.count.load() > before + 2; }));
 }
 
 constexpr Duration kTriggerPeriod = Duration::fromMilliseconds(50);
