@@ -55,6 +55,11 @@ Words words(DeviceFaultKind kind) {
       return {"sees nothing", "check the lens cap, the light, exposure and gain"};
     case DeviceFaultKind::kFrozen:
       return {"repeats one image", "unplug it and plug it in again"};
+    case DeviceFaultKind::kUnmatched:
+      return {"its frames match no trigger edges",
+              "check the trigger's wire, trigger.line, trigger.delay_us and cameras.exposure_ms"};
+    case DeviceFaultKind::kMatched:
+      return {"its frames match the trigger edges again", ""};
   }
   return {"unknown fault", ""};
 }

@@ -29,6 +29,8 @@ enum class DeviceFaultKind : std::uint8_t {
   kWrongClock,   ///< its stamps are of another clock than this computer's
   kClockSet,     ///< this computer's wall clock was set, by which it stamps
   kFrozen,       ///< a camera that sends one image again and again
+  kUnmatched,    ///< a camera whose frames match no trigger edges
+  kMatched,      ///< the end of that
 };
 
 struct DeviceFault {

@@ -22,6 +22,7 @@ namespace swiftlet {
 /// Which instant a source's stamp marks.
 enum class StampEvent : std::uint8_t {
   kStartOfExposure,
+  kEndOfExposure,  ///< of the first row: its data begin
   kEndOfFrame,
   kArrival,  ///< the capture's time is unknown: when the frame came to the host
 };
@@ -93,6 +94,8 @@ class CapturedFrame {
 
 class CameraSource {
  public:
+  static constexpr std::size_t kMostWarnings = 4;  // exposure, gain, buffers, stamps
+
   CameraSource() = default;
   CameraSource(const CameraSource&) = delete;
   CameraSource& operator=(const CameraSource&) = delete;
@@ -139,7 +142,7 @@ class CameraSource {
 
   CameraFacts facts_;
   CameraCounters counters_;
-  std::array<DeviceFault, 4> warnings_;  // exposure, gain, buffers, stamps
+  std::array<DeviceFault, kMostWarnings> warnings_;
   std::size_t warning_count_ = 0;
 
  private:

@@ -171,6 +171,10 @@ bool TriggerMatcher::decide() {
   return true;
 }
 
+std::optional<Duration> TriggerMatcher::lag() const {
+  return lag_known_ ? std::optional(Duration{std::llround(lag_)}) : std::nullopt;
+}
+
 TimesyncStatus TriggerMatcher::status() const {
   TimesyncStatus s;
   s.lock = lock_;

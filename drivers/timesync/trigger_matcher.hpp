@@ -16,6 +16,7 @@
 // Read edges before frames. Cost: O(1). Memory: 1 KiB. Nothing allocated; any stamps, nothing overflows.
 
 #include <cstdint>
+#include <optional>
 
 #include "drivers/timesync/delay_histogram.hpp"
 #include "drivers/timesync/edge_train.hpp"
@@ -47,6 +48,8 @@ class TriggerMatcher {
 
   Status match(const FrameMark& frame, TriggerMatch& out);
 
+  /// From an edge to the frame's stamp, as measured while locked; empty: not known, or not any more.
+  [[nodiscard]] std::optional<Duration> lag() const;
   [[nodiscard]] LockState lock() const { return lock_; }
   [[nodiscard]] TimesyncStatus status() const;
 

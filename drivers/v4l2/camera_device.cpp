@@ -11,6 +11,7 @@
 
 #include "drivers/device/monotonic_now.hpp"
 #include "drivers/v4l2/camera_offers.hpp"
+#include "drivers/v4l2/stamp_event.hpp"
 
 namespace swiftlet {
 namespace {
@@ -26,14 +27,6 @@ constexpr std::size_t kOfferBytes = 140;        // leaves room for the words aro
 std::uint32_t code(std::string_view letters) {
   return v4l2_fourcc(static_cast<std::uint32_t>(letters[0]), static_cast<std::uint32_t>(letters[1]),
                      static_cast<std::uint32_t>(letters[2]), static_cast<std::uint32_t>(letters[3]));
-}
-
-StampEvent eventOf(std::uint32_t flags) {
-  if ((flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) != V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC)
-    return StampEvent::kArrival;
-  return (flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE
-             ? StampEvent::kStartOfExposure
-             : StampEvent::kEndOfFrame;
 }
 
 template <std::size_t kSize>
@@ -97,6 +90,7 @@ void CameraDevice::describeDevice() {
   v4l2_capability capability = {};
   if (node_.call(VIDIOC_QUERYCAP, &capability) != 0) return;
   copyText(reinterpret_cast<const char*>(capability.driver), facts_.driver);
+  first_data_ = stampsFirstData(facts_.driver.data());
   copyText(reinterpret_cast<const char*>(capability.card), facts_.card);
   copyText(reinterpret_cast<const char*>(capability.bus_info), facts_.bus);
 }
@@ -182,7 +176,7 @@ DeviceFault CameraDevice::setBuffers() {
     warn(deviceFault(DeviceFaultKind::kChanged, 0, "requested %u buffers, got %zu: frames may be missed",
                      settings_.buffers, facts_.buffers));
   }
-  facts_.event = eventOf(node_.stampFlags());
+  facts_.event = stampEvent(node_.stampFlags(), first_data_);
   if (facts_.event == StampEvent::kArrival) {
     fault = deviceFault(DeviceFaultKind::kUnsupported, 0,
                         "stamps its images with a clock other than CLOCK_MONOTONIC");
@@ -245,7 +239,7 @@ DeviceFault CameraDevice::next(CapturedFrame& frame) {
     }
     frame.image = {filled.bytes.data(), facts_.width, facts_.height, facts_.stride, facts_.format, 0,
                    filled.bytes.size()};
-    frame.event = eventOf(filled.flags);
+    frame.event = stampEvent(filled.flags, first_data_);
     frame.arrival = arrival;
     frame.stamp = frame.event == StampEvent::kArrival ? arrival : filled.stamp;
     if (frame.stamp > arrival) ++counters_.stamp_ahead;

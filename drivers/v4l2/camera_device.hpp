@@ -60,6 +60,7 @@ class CameraDevice : public CameraSource {
   CameraControls controls_;
   CameraDeviceSettings settings_;
   bool opened_ = false;          // ever
+  bool first_data_ = false;      // stampsFirstData()
   bool sequence_known_ = false;  // of this stream
   std::uint32_t raw_sequence_ = 0;
   std::uint64_t sequence_ = 0;

@@ -13,21 +13,36 @@ namespace {
 
 /// Frames of one round: more wait only after the thread was held up.
 constexpr int kMostFrames = 8;
-/// Wait between restarts of a silent stream: first and longest. Some USB cameras need two seconds to their
-/// first frame. The wait doubles, because a camera without trigger edges is silent without being broken.
-constexpr Duration kFirstRestartWait = Duration::fromMilliseconds(4000);
-constexpr Duration kLongestRestartWait = Duration::fromMilliseconds(32'000);
 /// Images running that show nothing, or nothing new, before it is said: a hand before the lens, a lost frame
 /// that the driver fills in.
 constexpr int kOddImages = 5;
 
+/// Frames without an edge before it is said, as a time and as a number for slow cameras. The first match
+/// takes 32 frames, a later one up to 11: three to notice a slip and eight to match again.
+constexpr Duration kFirstMatchPatience = Duration::fromMilliseconds(5000);
+constexpr int kFirstMatchFrames = 40;
+constexpr Duration kUnmatchedPatience = Duration::fromMilliseconds(1000);
+constexpr int kUnmatchedFrames = 16;
+
 FrameEvent frameEvent(StampEvent event) {
-  return event == StampEvent::kEndOfFrame ? FrameEvent::kEndOfFrame : FrameEvent::kStartOfExposure;
+  switch (event) {
+    case StampEvent::kStartOfExposure:
+      return FrameEvent::kStartOfExposure;
+    case StampEvent::kEndOfExposure:
+      return FrameEvent::kEndOfExposure;
+    case StampEvent::kEndOfFrame:
+      break;
+    case StampEvent::kArrival:
+      // A frame arrives after its end, by a delay that is not known.
+      break;
+  }
+  return FrameEvent::kEndOfFrame;
 }
 
 /// A lag that is guessed may be a period off, and so would be every edge.
 bool lagKnown(StampEvent event, const ExposureTiming& timing) {
   return event == StampEvent::kStartOfExposure ||
+         (event == StampEvent::kEndOfExposure && timing.exposure.ns > 0) ||
          (event == StampEvent::kEndOfFrame && timing.exposure.ns > 0 && timing.readout.ns > 0);
 }
 
@@ -61,22 +76,52 @@ DeviceFault CameraThread::open() {
   const CameraFacts& facts = source_->facts();
   reader_.reserve(facts.format, facts.width, facts.height, setup_.settings.side_by_side);
   prepared_ = facts;
+  adoptTiming();
+  said_count_ = source_->warnings().size();
+  std::ranges::copy(source_->warnings(), said_.begin());
+  return fault;
+}
+
+void CameraThread::adoptTiming() {
+  const CameraFacts& facts = source_->facts();
+  prepared_.event = facts.event;
   // As the camera has taken it.
   if (setup_.settings.exposure_ms > 0) timing_.exposure = facts.exposure.value_or(Duration{});
   if (exposure_) timing_.exposure = exposure_->asked().exposure;
-  if (setup_.trigger && lagKnown(facts.event, timing_)) {
-    matcher_.emplace(train_, expectedLag(frameEvent(facts.event), timing_));
+  if (!setup_.trigger) return;
+  if (!lagKnown(facts.event, timing_)) {
+    matcher_.reset();
+    return;
   }
-  return fault;
+  const Duration lag = expectedLag(frameEvent(facts.event), timing_);
+  if (matcher_ && lag == expected_lag_) return;
+  expected_lag_ = lag;
+  ever_matched_ = false;
+  matcher_.emplace(train_, lag);
+}
+
+void CameraThread::noteWarnings() {
+  const std::span<const DeviceFault> warnings = source_->warnings();
+  for (const DeviceFault& warning : warnings) {
+    const auto same = [&](const DeviceFault& before) { return before.text() == warning.text(); };
+    if (std::ranges::none_of(std::span(said_).first(said_count_), same)) journal_.note(hostNow(), warning);
+  }
+  said_count_ = warnings.size();
+  std::ranges::copy(warnings, said_.begin());
 }
 
 std::string CameraThread::triggerWarning() const {
   if (!setup_.trigger || matcher_ || prepared_.width == 0) return {};
-  return prepared_.event == StampEvent::kArrival
-             ? "trigger edges are not used, because its stamps are arrival times; use a driver or "
-               "pipeline that stamps the start of exposure"
-             : "trigger edges are not used, because its driver stamps the end of the frame and exposure or "
-               "readout is unknown; set cameras.exposure_ms and cameras.readout_ms";
+  if (prepared_.event == StampEvent::kArrival) {
+    return "trigger edges are not used, because its stamps are arrival times; use a driver or pipeline that "
+           "stamps the start of exposure";
+  }
+  if (prepared_.event == StampEvent::kEndOfExposure) {
+    return "trigger edges are not used, because its driver stamps the end of exposure and the exposure is "
+           "unknown; set cameras.exposure_ms";
+  }
+  return "trigger edges are not used, because its driver stamps the end of the frame and exposure or readout "
+         "is unknown; set cameras.exposure_ms and cameras.readout_ms";
 }
 
 SensorInput::Level CameraThread::level() const {
@@ -87,10 +132,14 @@ SensorInput::Level CameraThread::level() const {
 DeviceFault CameraThread::reopen() {
   if (prepared_.width == 0) return open();
   DeviceFault fault = openSource();
+  if (!fault.ok()) return fault;
   const CameraFacts& facts = source_->facts();
-  const bool same =
-      facts.format == prepared_.format && facts.width == prepared_.width && facts.height == prepared_.height;
-  if (!fault.ok() || same) return fault;
+  if (facts.format == prepared_.format && facts.width == prepared_.width &&
+      facts.height == prepared_.height) {
+    adoptTiming();
+    noteWarnings();
+    return fault;
+  }
   fault = deviceFault(DeviceFaultKind::kChanged, 0, "reopened with %dx%d %s instead of %dx%d %s", facts.width,
                       facts.height, facts.format.letters.data(), prepared_.width, prepared_.height,
                       prepared_.format.letters.data());
@@ -198,6 +247,26 @@ bool CameraThread::watchQuality(const ImageView& image, Stamp now) {
   return look != ImageWatch::Look::kRepeated;
 }
 
+void CameraThread::watchTrigger(bool matched, Stamp now) {
+  if (matched) {
+    if (said_unmatched_) journal_.note(now, DeviceFault{DeviceFaultKind::kMatched, 0, {}});
+    said_unmatched_ = false;
+    ever_matched_ = true;
+    unmatched_ = 0;
+    return;
+  }
+  const Duration patience = ever_matched_ ? kUnmatchedPatience : kFirstMatchPatience;
+  const int fewest = ever_matched_ ? kUnmatchedFrames : kFirstMatchFrames;
+  const int most = std::max(fewest, static_cast<int>(patience.seconds() * setup_.settings.rate_hz));
+  unmatched_ = std::min(unmatched_ + 1, most);
+  if (unmatched_ < most || said_unmatched_) return;
+  said_unmatched_ = true;
+  journal_.note(now, deviceFault(DeviceFaultKind::kUnmatched, 0,
+                                 matcher_->lag() ? "%d in a row: stamped by their usual delay to the edge"
+                                                 : "%d in a row: stamped by the driver",
+                                 most));
+}
+
 Stamp CameraThread::middleOfExposure(const CapturedFrame& frame) {
   if (matcher_ && frame.event == prepared_.event) {
     takeEdges();
@@ -205,9 +274,15 @@ Stamp CameraThread::middleOfExposure(const CapturedFrame& frame) {
     const FrameMark mark{frame.stamp, static_cast<std::uint32_t>(frame.sequence), frame.arrival};
     const bool matched = matcher_->match(mark, match).ok();
     counted_.trigger = matcher_->status();
+    watchTrigger(matched, frame.arrival);
     if (matched) {
       ++counted_.by_trigger;
       return exposureMidpoint(match.edge, FrameEvent::kTriggerEdge, timing_);
+    }
+    // The edge as the stamp tells it: without the delay, stamps would jump by it.
+    if (const std::optional<Duration> lag = matcher_->lag()) {
+      ++counted_.by_lag;
+      return exposureMidpoint(frame.stamp - *lag, FrameEvent::kTriggerEdge, timing_);
     }
   }
   return exposureMidpoint(frame.stamp, frameEvent(frame.event), timing_);
@@ -219,7 +294,7 @@ void CameraThread::take(const CapturedFrame& frame, SensorSink& sink) {
     ++undecoded_;
     return;
   }
-  newest_ = frame.arrival;
+  newest_ = hostNow();
   restart_at_ = {};
   restart_wait_ = kFirstRestartWait;
   if (exposure_) timing_.exposure = exposure_->inForce(frame.sequence).exposure;

@@ -3,11 +3,13 @@
 // CLOCK_MONOTONIC. The camera may be unplugged and return.
 //
 // Stamps: the trigger's edge if one is connected, the delay from it to the driver's stamps is known and the
-// association is certain; otherwise the driver's stamp (drivers/timesync/exposure_midpoint.hpp explains how
-// each is moved to mid-exposure). Threads: open() before the flight, run() on its own thread, journal and
-// status from any. Memory: no allocation after open(), except by a source that is reopened and by the decoder
-// of compressed images.
+// association is certain; otherwise the driver's stamp, less its delay to the edge once that was measured
+// (drivers/timesync/exposure_midpoint.hpp explains how each is moved to mid-exposure). Threads: open() before
+// the flight, run() on its own thread, journal and status from any. Memory: no allocation after open(),
+// except by a source that is reopened and by the decoder of compressed images.
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -33,6 +35,7 @@ struct CameraStatus {
   CameraCounters counters;
   std::uint64_t repeated = 0;            ///< frames equal to the previous one; dropped
   std::uint64_t by_trigger = 0;          ///< frames stamped by a trigger edge
+  std::uint64_t by_lag = 0;              ///< by the driver's stamp, less its measured delay to the edge
   TimesyncStatus trigger;                ///< where one is connected
   std::optional<ExposureSetting> asked;  ///< by exposure control
 };
@@ -78,6 +81,10 @@ class CameraThread {
   DeviceFault reopen();
   /// The source with the control of its exposure, at first and when it is there again.
   DeviceFault openSource();
+  /// Exposure and stamps of the source that has just been opened.
+  void adoptTiming();
+  /// Of a source that was reopened: what it did not say at the opening before.
+  void noteWarnings();
   /// A stream that has stalled is closed, for run() to reopen.
   void watchSilence(Stamp now);
   /// Frames that wait from before the flight.
@@ -89,12 +96,16 @@ class CameraThread {
   void handOver(const CapturedFrame& frame, std::span<const ImageView> images, SensorSink& sink);
   /// False: an image that is none.
   bool watchQuality(const ImageView& image, Stamp arrival);
+  /// Notes when frames match no edges for long, and when they do again.
+  void watchTrigger(bool matched, Stamp now);
   [[nodiscard]] Stamp middleOfExposure(const CapturedFrame& frame);
 
   Setup setup_;
   std::unique_ptr<CameraSource> source_;
   GreyReader reader_;
   CameraFacts prepared_;  ///< what reader_ has memory for; of no width before open()
+  std::array<DeviceFault, CameraSource::kMostWarnings> said_;  ///< warnings of the newest opening
+  std::size_t said_count_ = 0;
   Heartbeat heart_;
   DeviceJournal journal_;
   Duration longest_silence_;
@@ -104,11 +115,15 @@ class CameraThread {
   std::optional<ExposureLoop> exposure_;
   EdgeRing edges_;
   EdgeTrain train_;
+  Duration expected_lag_;                  ///< of matcher_
   std::optional<TriggerMatcher> matcher_;  ///< where a trigger is connected and the stamps' delay is known
+  int unmatched_ = 0;                      ///< frames in a row without an edge
+  bool ever_matched_ = false;              ///< by this opening's matcher
+  bool said_unmatched_ = false;
   RateWatch rate_;
   ImageWatch images_;
   int odd_images_ = 0;  ///< dark or repeated, running
-  Stamp newest_;        ///< arrival of the newest image, or since when there is none
+  Stamp newest_;        ///< when the newest image was taken, or since when there is none
   std::uint64_t undecoded_ = 0;
   CameraCounters before_;  ///< when the flight began
   bool any_ = false;       ///< a frame was handed over

@@ -24,6 +24,8 @@ const char* stampEventName(StampEvent event) {
   switch (event) {
     case StampEvent::kStartOfExposure:
       return "of the start of exposure";
+    case StampEvent::kEndOfExposure:
+      return "of the end of exposure";
     case StampEvent::kEndOfFrame:
       return "of the end of the frame";
     case StampEvent::kArrival:
@@ -67,6 +69,7 @@ Json toJson(const CameraStatus& status) {
   }
   if (status.trigger.samples + status.trigger.refused > 0) {
     json["by_trigger"] = status.by_trigger;
+    json["by_lag"] = status.by_lag;
     json["trigger"] = toJson(status.trigger);
     json["trigger"]["missed_edges"] = status.trigger.missed_edges;
     json["trigger"]["glitch_edges"] = status.trigger.glitch_edges;

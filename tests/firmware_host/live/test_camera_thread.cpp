@@ -1,9 +1,11 @@
 // A camera's thread: where it runs, a camera that comes back as another, and edges of a trigger.
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <chrono>
+#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <string>
@@ -217,15 +219,31 @@ TEST_CASE("a stream that stays silent is restarted seldom, and said once") {
   CHECK(soon([&] { return bench.sink.count.load() > before + 2; }));
 }
 
+TEST_CASE("a camera that returns with another exposure is stamped by it, and its warnings are said") {
+  Stalling bench;
+  CHECK(bench.sink.shift.load() == 2'500'000);
+  bench.camera->exposure = 20'000'000;
+  bench.camera->warns = true;
+  bench.camera->stalls = true;
+  CHECK(soon([&] { return bench.sink.shift.load() == 10'000'000; }));
+  CHECK(soon([&] { return bench.linesWith("auto exposure stays on") == 1; }));
+  // Again the same: nothing new.
+  bench.camera->stalls = true;
+  CHECK(soon([&] { return bench.camera->opened.load() == 3; }));
+  CHECK(soon([&] { return bench.linesWith("works again") == 2; }));
+  CHECK(bench.linesWith("auto exposure stays on") == 1);
+}
+
 constexpr Duration kTriggerPeriod = Duration::fromMilliseconds(50);
-constexpr int kTriggered = 100;  ///< edges, and frames that they made
+constexpr int kTriggered = 150;  ///< edges, and frames that they made
 
 Stamp edgeOf(std::uint64_t number) { return {static_cast<std::int64_t>(number + 1) * kTriggerPeriod.ns}; }
 
 /// Each frame is stamped, and arrives, `lag` after its edge.
 class TriggeredCamera : public CameraSource {
  public:
-  TriggeredCamera(StampEvent event, Duration lag) : event_(event), lag_(lag) {}
+  TriggeredCamera(StampEvent event, Duration given_lag) : lag(given_lag), event_(event) {}
+  Duration lag;
   std::optional<Duration> exposure;
   std::atomic<bool> runs{false};
 
@@ -246,7 +264,7 @@ class TriggeredCamera : public CameraSource {
     pixels_.fill(static_cast<std::uint8_t>(50 + number_));
     frame.image = {pixels_.data(), kSide, kSide, kSide};
     frame.event = event_;
-    frame.stamp = frame.arrival = edgeOf(number_) + lag_;
+    frame.stamp = frame.arrival = edgeOf(number_) + lag;
     frame.sequence = number_++;
     lend(frame, 0);
     return {};
@@ -256,7 +274,6 @@ class TriggeredCamera : public CameraSource {
   static constexpr int kSide = 32;
   void giveBack(std::uint32_t /*buffer*/) override {}
   StampEvent event_;
-  Duration lag_;
   std::uint64_t number_ = 0;
   std::array<std::uint8_t, static_cast<std::size_t>(kSide* kSide)> pixels_{};
 };
@@ -267,9 +284,19 @@ class TriggerSink : public SensorSink {
   void takeScene(const SceneImages& /*scene*/) override {}
   void takeImage(const CameraFrame& image, const HostTimes& /*host*/) override {
     if (image.stamp > image.arrival) ++of_future;
+    shift = (image.stamp - image.arrival).ns;
+    // Of the first 45 some pass before the flight, and 32 before the first match.
+    if (image.sequence > 45) {
+      const Duration step = image.stamp - newest;
+      largest_jump = std::max(largest_jump, std::abs(step.ns - kTriggerPeriod.ns));
+    }
+    newest = image.stamp;
     last.store(image.sequence);
   }
   int of_future = 0;
+  std::int64_t shift = 0;         ///< of the newest: from its arrival to its stamp [ns]
+  std::int64_t largest_jump = 0;  ///< ns
+  Stamp newest;
   std::atomic<std::uint64_t> last{0};
 };
 
@@ -277,13 +304,17 @@ struct Triggered {
   std::string warning;
   std::uint64_t by_trigger = 0;
   LockState lock = LockState::kUnlocked;
+  std::int64_t shift = 0;
+  std::int64_t largest_jump = 0;
+  std::vector<std::string> lines;
 };
 
-Triggered fly(std::unique_ptr<TriggeredCamera> owned, const CamerasGroup& settings) {
+Triggered fly(std::unique_ptr<TriggeredCamera> owned, const CamerasGroup& settings,
+              std::uint64_t edges = kTriggered) {
   TriggeredCamera& camera = *owned;
   CameraThread thread({"camera 0", 0, settings, TriggerGroup{"gpiochip0"}}, std::move(owned));
   REQUIRE(thread.open().ok());
-  for (std::uint64_t i = 0; i < kTriggered; ++i) {
+  for (std::uint64_t i = 0; i < edges; ++i) {
     REQUIRE(thread.edges().tryPush({edgeOf(i), i}));
   }
   std::atomic<bool> stop{false};
@@ -295,8 +326,15 @@ Triggered fly(std::unique_ptr<TriggeredCamera> owned, const CamerasGroup& settin
   CHECK(soon([&] { return sink.last.load() == kTriggered - 1; }));
   stop.store(true);
   runner.join();
-  CHECK(sink.of_future == 0);
   Triggered result;
+  result.shift = sink.shift;
+  result.largest_jump = sink.largest_jump;
+  DeviceEvent event;
+  while (thread.journal().next(event)) {
+    const std::string line = thread.journal().text(event);
+    if (line.find("trigger") != std::string::npos) result.lines.push_back(line);
+  }
+  CHECK(sink.of_future == 0);
   result.warning = thread.triggerWarning();
   result.by_trigger = thread.status().by_trigger;
   result.lock = thread.status().trigger.lock;
@@ -319,6 +357,35 @@ TEST_CASE("edges are matched to frames only where the delay to the stamps is kno
     CHECK(found.warning.empty());
     CHECK(found.by_trigger > 50);
     CHECK(found.lock == LockState::kLocked);
+  }
+  SECTION("the edges end: stamps keep their place, and it is said") {
+    auto made = camera(StampEvent::kStartOfExposure);
+    made->lag = Duration::fromMilliseconds(8);
+    const Triggered found = fly(std::move(made), settings, 80);
+    CHECK(found.by_trigger > 30);
+    CHECK(found.largest_jump < 100'000);
+    REQUIRE(found.lines.size() == 1);
+    CHECK_THAT(found.lines[0], Catch::Contains("match no trigger edges") && Catch::Contains("usual delay"));
+  }
+  SECTION("no edges at all are said") {
+    const Triggered found = fly(camera(StampEvent::kStartOfExposure), settings, 0);
+    CHECK(found.by_trigger == 0);
+    REQUIRE(found.lines.size() == 1);
+    CHECK_THAT(found.lines[0], Catch::Contains("match no trigger edges") && Catch::Contains("by the driver"));
+  }
+  SECTION("end of exposure") {
+    auto made = camera(StampEvent::kEndOfExposure);
+    made->lag = exposure;
+    settings.exposure_ms = 5;
+    const Triggered found = fly(std::move(made), settings);
+    CHECK(found.warning.empty());
+    CHECK(found.by_trigger > 50);
+    CHECK(found.shift == -2'500'000);
+  }
+  SECTION("arrival, which cannot be matched, is after the end of the frame") {
+    settings.exposure_ms = 5;
+    const Triggered found = fly(camera(StampEvent::kArrival), settings);
+    CHECK(found.shift == -2'500'000);
   }
   SECTION("arrival") {
     const Triggered found = fly(camera(StampEvent::kArrival), settings);
