@@ -92,7 +92,7 @@ class FlightRun {
     flight.host_stamps = true;
     flight.service = true;
     flight.record = request_.record;
-    flight.trigger = input_.trigger() != nullptr;
+    flight.trigger = input_.hasTrigger();
     flight.name = "flight";
     flight.autopilot_outbox = input_.outbox();
     flight.view = request_.view;

@@ -22,6 +22,9 @@ class ImuLink {
 
   virtual DeviceFault open() = 0;
   [[nodiscard]] virtual bool isOpen() const = 0;
+  /// Closes the link of a device that may have lost its configuration: open() configures it again. False: the
+  /// link stays open, since it configures nothing or does so while it is open.
+  virtual bool restart() { return false; }
   /// True: reading costs allocations and locks, which a thread of the flight path must not have.
   [[nodiscard]] virtual bool allocates() const { return false; }
   /// To poll for reading.

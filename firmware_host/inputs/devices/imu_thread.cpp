@@ -21,6 +21,12 @@ constexpr Duration kLongestDelay = Duration::fromMilliseconds(100);
 constexpr Duration kTransportChange = Duration::fromMilliseconds(3);
 constexpr Duration kSettling = Duration::fromMilliseconds(10'000);
 
+/// A device that sends nothing useful, or less than kLeastRate of its rate, for kRestartAfter may have lost
+/// power, and its configuration with it. Shorter gaps are losses on the way.
+constexpr Duration kRestartAfter = Duration::fromMilliseconds(2000);
+/// Of the expected rate. Sensors fall back to factory settings of 40 to 100 Hz; losses are smaller.
+constexpr double kLeastRate = 0.5;
+
 /// s: motors shake faster than at 15 Hz, and move the image by little.
 constexpr double kTurnSmoothing = 0.01;
 
@@ -35,7 +41,8 @@ ImuThread::ImuThread(std::string name, std::unique_ptr<ImuLink> link, const ImuC
       correction_(correction),
       delay_(delay),
       clock_(ClockMapSettings{delay}),
-      rate_(rate) {}
+      rate_(rate),
+      restart_wait_(kFirstRestartWait) {}
 
 void ImuThread::run(SensorSink& sink, const ImuEdges& edges, const RunControl& control) {
   // What came before the flight has lost its time of arrival.
@@ -60,6 +67,7 @@ void ImuThread::run(SensorSink& sink, const ImuEdges& edges, const RunControl& c
     for (DeviceFault remark; link_->nextRemark(remark);) journal_.note(now, remark);
     if (fault.ok()) {
       watchSilence(now);
+      restart(now);
     } else {
       journal_.fault(now, fault);
     }
@@ -81,6 +89,8 @@ void ImuThread::takeReadings(SensorSink& sink, const ImuEdges& edges) {
     }
     const std::optional<Stamp> stamp = hostOf(edge.device);
     if (!stamp) continue;
+    ++counted_.edges;
+    counted_.edge = hostNow();
     for (EdgeRing* ring : edges.cameras) static_cast<void>(ring->tryPush({*stamp, edge.counter}));
   }
   if (readings == 0) return;
@@ -171,7 +181,9 @@ void ImuThread::watchQuality(std::size_t readings) {
   journal_.works(heard_);
   if (returned) {
     rate_.restart(heard_);
+    slow_since_.reset();
   } else if (rate_.add(heard_, readings)) {
+    watchRate();
     if (rate_.tooFew()) {
       journal_.defect(heard_,
                       deviceFault(DeviceFaultKind::kLossy, 0, "%.0f of %.0f expected samples in a second",
@@ -180,6 +192,27 @@ void ImuThread::watchQuality(std::size_t readings) {
       journal_.sound(heard_);
     }
   }
+}
+
+void ImuThread::watchRate() {
+  if (rate_.seen() >= kLeastRate * rate_.expected()) {
+    was_at_rate_ = true;
+    slow_since_.reset();
+    restart_wait_ = kFirstRestartWait;
+  } else if (was_at_rate_ && !slow_since_) {
+    // One that never reached the rate was said at the opening: a restart would only interrupt it.
+    slow_since_ = heard_;
+  }
+}
+
+void ImuThread::restart(Stamp now) {
+  const bool silent = now - heard_ > kRestartAfter;
+  const bool slow = slow_since_ && now - *slow_since_ > kRestartAfter;
+  if ((!silent && !slow) || now < restart_at_ || !link_->restart()) return;
+  restart_at_ = now + restart_wait_;
+  restart_wait_ = std::min(restart_wait_ + restart_wait_, kLongestRestartWait);
+  slow_since_.reset();
+  rate_.restart(now);
 }
 
 void ImuThread::watchSilence(Stamp now) {

@@ -32,6 +32,8 @@ struct ImuStatus {
   std::uint64_t by_arrival = 0;
   std::uint64_t by_driver = 0;  ///< the driver provides the host's time
   TimesyncStatus clock;
+  std::uint64_t edges = 0;  ///< of a trigger, handed to the cameras
+  Stamp edge;               ///< host time at which the newest was read
 };
 
 /// Where trigger edges that arrive over the link go, and which of them.
@@ -82,6 +84,9 @@ class ImuThread {
   void hear();
   void watchSilence(Stamp now);
   void watchQuality(std::size_t readings);
+  void watchRate();
+  /// A device that is silent, or lost most of its rate, may have lost its configuration with its power.
+  void restart(Stamp now);
 
   std::unique_ptr<ImuLink> link_;
   Heartbeat heart_;
@@ -90,6 +95,10 @@ class ImuThread {
   Duration delay_;
   ClockMap clock_;
   RateWatch rate_;
+  bool was_at_rate_ = false;         ///< it has sent more than the least rate
+  std::optional<Stamp> slow_since_;  ///< less than that since
+  Duration restart_wait_;            ///< until the next restart; grows while none helps
+  Stamp restart_at_;                 ///< not before
   /// Difference between the one-way clock map and the two-way exchange when both were last trusted, at
   /// `agreed_`. After a clock step it is subtracted until the exchange is certain again.
   std::optional<Duration> transport_;

@@ -336,9 +336,13 @@ std::vector<SensorInput::Thread> LiveInput::threads(SensorSink& sink, const RunC
 Duration LiveInput::samplePatience() const { return topics_ ? kTopicPatience : kLinkPatience; }
 
 void LiveInput::look(FlightFacts& facts) const {
-  if (!trigger_) return;
-  const TriggerStatus status = trigger_->status();
-  facts.trigger = {status.edges, 0, status.heard, status.heard};
+  if (trigger_) {
+    const TriggerStatus status = trigger_->status();
+    facts.trigger = {status.edges, 0, status.heard, status.heard};
+  } else if (hasTrigger()) {
+    const ImuStatus status = imu_->status();
+    facts.trigger = {status.edges, 0, status.edge, status.edge};
+  }
 }
 
 std::uint64_t LiveInput::taken() const {

@@ -57,6 +57,8 @@ class LiveInput : public SensorInput {
   [[nodiscard]] LinkOutbox* outbox() { return outbox_.get(); }
   [[nodiscard]] ImuThread& imu() { return *imu_; }
   [[nodiscard]] std::span<const std::unique_ptr<CameraThread>> cameras() const { return cameras_; }
+  /// Cameras are triggered, by a GPIO line's edges or the IMU's.
+  [[nodiscard]] bool hasTrigger() const { return trigger_ != nullptr || !imu_edges_.cameras.empty(); }
   /// Null: no line is connected.
   [[nodiscard]] TriggerThread* trigger() { return trigger_.get(); }
 

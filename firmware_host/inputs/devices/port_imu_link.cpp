@@ -34,6 +34,13 @@ DeviceFault PortImuLink::open() {
   return fault;
 }
 
+bool PortImuLink::restart() {
+  // The dialogue requests an autopilot's stream again, and its link may carry poses too.
+  if (isMavlink()) return false;
+  static_cast<void>(close({}));
+  return true;
+}
+
 void PortImuLink::discard() {
   std::size_t count = 1;
   Stamp read_at;

@@ -26,6 +26,7 @@ class PortImuLink : public ImuLink {
 
   DeviceFault open() override;
   [[nodiscard]] bool isOpen() const override { return port_.isOpen(); }
+  bool restart() override;
   [[nodiscard]] int fd() const override { return port_.descriptor(); }
   [[nodiscard]] int wakeFd() const override { return outbox_ != nullptr ? outbox_->descriptor() : -1; }
   void discard() override;

@@ -25,7 +25,7 @@ constexpr int kFewest = 10;
 void SensorSetup::run(LinkPort& port, ImuDecoder& decoder) {
   ImuConfiguration configuration(decoder.protocol(), rate_);
   if (rate_ <= 0 || configuration.steps() == 0) return;
-  if (!listened_) {
+  if (!asks_ || !set_) {
     listened_ = true;
     found_ = listen(port, decoder);
     decoder.restart();

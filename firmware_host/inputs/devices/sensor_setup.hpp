@@ -3,8 +3,9 @@
 //
 // A sensor that already sends at that rate is not changed. Otherwise it is configured step by step, each
 // followed by its reply, in at most 2.5 s; refused or changed steps give a warning. The sensor does not store
-// the configuration, so it is sent again each time the port is opened, then without listening first. Threads:
-// one. Memory: 4 kB inside the object, no allocation.
+// the configuration and may have lost power, so it is judged anew each time the port is opened. One that was
+// configured before is configured again without listening first, which saves half a second. Threads: one.
+// Memory: 4 kB inside the object, no allocation.
 
 #include <array>
 #include <optional>
@@ -34,7 +35,7 @@ class SensorSetup {
   bool ask(LinkPort& port, const ConfigurationStep& step);
 
   double rate_;
-  bool asks_ = false;  ///< it had to be asked the first time
+  bool asks_ = false;  ///< it sent at another rate when it was listened to
   bool listened_ = false;
   double found_ = 0;           ///< Hz
   std::optional<double> set_;  ///< Hz

@@ -47,6 +47,20 @@ std::string refusal(const Settings& settings, const Calibration& calibration) {
   return {};
 }
 
+TEST_CASE("a trigger is known to the flight whichever device gives its edges") {
+  Settings settings = vehicle();
+  CHECK_FALSE(LiveInput(settings, stereo()).hasTrigger());
+  settings.trigger.chip = "imu";
+  LiveInput by_imu(settings, stereo());
+  CHECK(by_imu.hasTrigger());
+  FlightFacts facts;
+  by_imu.look(facts);
+  CHECK(facts.trigger.messages == 0);
+  settings.trigger.chip = "/dev/no_such_chip";
+  settings.trigger.line = "0";
+  CHECK(LiveInput(settings, stereo()).hasTrigger());
+}
+
 TEST_CASE("each refusal names its setting and what to do") {
   CHECK(refusal(vehicle(), stereo()).empty());
 

@@ -13,6 +13,7 @@
 #include "drivers/serial/pseudo_terminal.hpp"
 #include "firmware_host/inputs/devices/device_times.hpp"
 #include "firmware_host/inputs/devices/port_imu_link.hpp"
+#include "tests/firmware_host/live/imu_bench.hpp"
 
 namespace swiftlet::test {
 namespace {
@@ -47,12 +48,15 @@ class ScriptedSensor {
   [[nodiscard]] const std::string& path() const { return terminal_.path(); }
   [[nodiscard]] int commands() const { return commands_; }
   [[nodiscard]] bool wasAsked() const { return asked_; }
+  /// Its power fails: it sends at its factory rate again, while its port stays.
+  void fallBackTo(double rate) { factory_ = rate; }
 
  private:
   void run() {
     Stamp next = hostNow();
     std::string heard;
     while (!stop_.load()) {
+      if (const double factory = factory_.exchange(-1); factory >= 0) rate_ = factory;
       std::array<std::uint8_t, 256> bytes;
       std::size_t count = 0, taken = 0;
       static_cast<void>(terminal_.receive(bytes, count));
@@ -84,6 +88,7 @@ class ScriptedSensor {
   std::vector<Script> scripts_;
   std::atomic<bool> stop_{false}, asked_{false};
   std::atomic<int> commands_{0};
+  std::atomic<double> factory_{-1};
   std::thread thread_;
 };
 
@@ -159,6 +164,32 @@ TEST_CASE("sensors that send at another rate are set") {
     CHECK_THAT(opened.warnings[0], Catch::Contains("200 Hz requested, 166.7 Hz set"));
     CHECK(sensor.commands() == 5);
   }
+}
+
+TEST_CASE("a sensor that loses power in flight is set again") {
+  // Found at the rate, or set to it, when the flight began.
+  const double at_first = GENERATE(200.0, 40.0);
+  const double after = GENERATE(40.0, 0.0);
+  ScriptedSensor sensor(ImuProtocol::kVectorNav, at_first,
+                        {{"$VNWRG,75,3,4,01,0201*71", bytesOf("$VNWRG,75,3,4,01,0201*71\r\n"), 200}});
+  ImuLinkGroup settings;
+  settings.device = sensor.path();
+  settings.protocol = "vectornav";
+  constexpr double kRate = 200;
+  ImuThread imu("IMU", std::make_unique<PortImuLink>(settings, kRate), ImuCorrection{}, Duration{}, kRate);
+  REQUIRE(imu.open().ok());
+  const int commands = sensor.commands();
+  KeepingSink sink;
+  RunningImu running(imu, sink);
+  REQUIRE(soon([&] { return sink.count() > 300; }));
+  CHECK(sensor.commands() == commands);
+  sensor.fallBackTo(after);
+  CHECK(soon([&] { return sensor.commands() == commands + 1; }));
+  const std::size_t before = sink.count();
+  CHECK(soon([&] { return sink.count() > before + 200; }));
+  CHECK(soon([&] { return running.linesWith(after > 0 ? "normal again" : "works again") == 1; }));
+  running.end();
+  CHECK(sensor.commands() == commands + 1);
 }
 
 TEST_CASE("a refusal and silence are warnings, and the sensor goes on") {
