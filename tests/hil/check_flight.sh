@@ -103,7 +103,8 @@ case $what in
       '4.6,camera1,unplug,0.8' >"$out/faults.csv"
     fly flight realtime "$@"
     sed -n '/^thread  /,$p' "$out/flight/fly.txt"
-    SWIFTLET_TRAP_REOPENS=camera1
+    # A stream that stalls for a second is restarted.
+    SWIFTLET_TRAP_REOPENS='camera0 camera1'
     export SWIFTLET_TRAP_REOPENS
     fly faults realtime "$@" faults="$out/faults.csv"
     sed -n '/^thread  /,$p' "$out/faults/fly.txt"

@@ -1,8 +1,8 @@
 // The program with a trap on its threads: what each of them allocated, locked, waited for and faulted in, and
 // whether those that must not did not. Used as swiftlet; for tests in the kernel sandbox.
-// SWIFTLET_TRAP_REOPENS=THREAD: its camera goes and returns. A camera's buffers are its node's, so that a
-// node that is opened again has them mapped anew: the page faults of that thread are printed and not judged.
-// Exit code: the program's own, or 3 where a thread did what it must not.
+// SWIFTLET_TRAP_REOPENS="THREAD...": their cameras go or stall, and return. A camera's buffers are its
+// node's, so that a node that is opened again has them mapped anew: the page faults of these threads are
+// printed and not judged. Exit code: the program's own, or 3 where a thread did what it must not.
 
 #include <algorithm>
 #include <array>
@@ -36,7 +36,7 @@ bool keepsTheRules(const TrappedThread& thread) {
   const bool follower = isIn(kFollowersHeld, thread.name);
   if (!stage && !follower && !isIn(kSensorThreads, thread.name)) return true;
   const char* reopens = std::getenv("SWIFTLET_TRAP_REOPENS");
-  const bool maps = reopens != nullptr && thread.name == reopens;
+  const bool maps = reopens != nullptr && std::string(reopens).find(thread.name) != std::string::npos;
   const TrapCounts& counts = thread.counts;
   return counts.heap == 0 && counts.locks == 0 && (!stage || counts.waits == 0) &&
          (maps || follower || counts.minor_faults + counts.major_faults == 0);
