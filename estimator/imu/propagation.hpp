@@ -38,8 +38,8 @@ class Propagator {
   /// Takes one sample. Writes the state at its stamp to `state`, which may be null.
   Status step(const ImuSample& sample, NavState* state = nullptr);
 
-  /// The state at `at`, not stored: the prediction for an image. After the last sample by holding its reading,
-  /// before it from the state set on. kInvalidInput if `at` is before the state set.
+  /// The state at `at`, not stored: the prediction for an image. After the last sample by holding its
+  /// reading, before it from the state set on. kInvalidInput if `at` is before the state set.
   Status predict(Stamp at, NavState& state) const;
 
   [[nodiscard]] bool hasState() const { return has_state_; }
