@@ -11,6 +11,10 @@ namespace {
 /// Depth [m] below which nothing is projected.
 constexpr float kNearestDepth = 0.05F;
 constexpr float kMostWeightSteps = 65535.0F;
+/// A measurement says that something came if it is nearer than what is known by this share of the truncation
+/// distance (errors of poses and depths are smaller) and by so many of its sigmas.
+constexpr float kNearer = 0.5F;
+constexpr double kSureSigmas = 3;
 
 }  // namespace
 
@@ -41,7 +45,11 @@ struct BlockUpdate::Sums {
   bool label_news = false;
 };
 
-BlockUpdate::BlockUpdate(const VolumeSettings& settings) : settings_(settings) {}
+BlockUpdate::BlockUpdate(const VolumeSettings& settings)
+    : settings_(settings),
+      sure_(static_cast<float>(kSureSigmas * kSureSigmas * settings.reference_sigma *
+                               settings.reference_sigma) *
+            kWeightSteps) {}
 
 void BlockUpdate::begin(const PreparedImage& image, const SE3& T_camera_world) {
   image_ = &image;
@@ -110,8 +118,13 @@ void BlockUpdate::projectEight(const Eigen::Vector3f& first, std::size_t at, Vox
   lanes::load(weights, &block.weight[at]);
   const Floats old_distance = __builtin_convertvector(distances, Floats);
   const Floats old_weight = __builtin_convertvector(weights, Floats);
-  const Floats sum = old_weight + gain;
-  const Floats mean = seen ? (old_distance * old_weight + cut * gain) / sum : old_distance;
+  // A surface where there was none: something has come. What was known then counts as one measurement.
+  const Floats nearer = old_distance * (truncation / kDistanceSteps) - s;
+  const Ints come = hit & (s >= -static_cast<float>(settings_.voxel_size)) & (nearer > kNearer * truncation) &
+                    (nearer * nearer * pixel_weight > sure_) & (old_weight > gain);
+  const Floats kept_weight = come ? gain : old_weight;
+  const Floats sum = kept_weight + gain;
+  const Floats mean = seen ? (old_distance * kept_weight + cut * gain) / sum : old_distance;
   // Rounded to the nearest; what is behind by less than half a step stays behind.
   const Ints now_behind = mean < 0.0F;
   const Floats rounded = mean + (now_behind ? Floats{} - 0.5F : Floats{} + 0.5F);

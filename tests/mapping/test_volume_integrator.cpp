@@ -134,7 +134,7 @@ TEST_CASE("the update by eights is the update voxel by voxel") {
   BlockUpdate update(settings);
   const SE3 T_camera_world = lookAt({0.1, 0.05, -1.0}, {0, 0.1, 0.2}).inverse();
   update.begin(prepared, T_camera_world);
-  std::size_t observed = 0;
+  std::size_t observed = 0, came_count = 0;
   for (const BlockIndex& index :
        {BlockIndex{0, 0, 0}, BlockIndex{-1, 0, 0}, BlockIndex{0, -1, -1}, BlockIndex{1, 1, 0}}) {
     VoxelBlock block{}, twin{};
@@ -176,13 +176,59 @@ TEST_CASE("the update by eights is the update voxel by voxel") {
       }
       ++count;
       const double cut = std::min(s, settings.truncation) / settings.truncation * 32767;
-      REQUIRE(std::abs(block.distance[i] - (old * weight + cut * gain) / (weight + gain)) < 4);
-      REQUIRE(std::abs(block.weight[i] - std::min(weight + gain, 25600.0)) < 0.51);  // rounded
+      const double nearer = old / 32767 * settings.truncation - s;
+      const bool came = s >= -settings.voxel_size && nearer > 0.5 * settings.truncation &&
+                        nearer > 3 * settings.sigma_constant;
+      if (std::abs(nearer - 0.5 * settings.truncation) < 1e-5) continue;
+      const double kept = came ? std::min(weight, gain) : weight;
+      came_count += came && weight > gain ? 1 : 0;
+      REQUIRE(std::abs(block.distance[i] - (old * kept + cut * gain) / (kept + gain)) < 4);
+      REQUIRE(std::abs(block.weight[i] - std::min(kept + gain, 25600.0)) < 0.51);  // rounded
     }
     observed += count;
     CHECK(result.observed >= count);
   }
   CHECK(observed > 300);
+  CHECK(came_count > 5);
+}
+
+TEST_CASE("what comes into free space is mapped within some images, however long it was free") {
+  for (const int free_images : {3, 200}) {
+    INFO(free_images << " images of free space");
+    Fused fused;
+    const SE3 pose = lookAt({0, 0, 0}, {1, 0, 0});
+    const Ball ball{{1.5, 0, 0}, 0.25};
+    const auto both = [&](const Eigen::Vector3d& o, const Eigen::Vector3d& r) {
+      const double near = ball(o, r);
+      return near > 0 ? near : kWall(o, r);
+    };
+    int stamp = 0;
+    for (int i = 0; i < free_images; ++i) REQUIRE(fused.add(render(pose, ++stamp, kWall), pose).ok());
+    float distance = 1;
+    int images = 0;
+    while (images < 20 && distance > 0) {
+      REQUIRE(fused.add(render(pose, ++stamp, both), pose).ok());
+      ++images;
+      REQUIRE(fused.volume.distanceAt(fused.volume.voxelAt({1.28, 0.02, 0.02}), distance));
+    }
+    CHECK(images <= 8);
+    // It goes, and comes again.
+    for (int i = 0; i < 20; ++i) REQUIRE(fused.add(render(pose, ++stamp, both), pose).ok());
+    for (int i = 0; i < 60; ++i) REQUIRE(fused.add(render(pose, ++stamp, kWall), pose).ok());
+    REQUIRE(fused.volume.distanceAt(fused.volume.voxelAt({1.28, 0.02, 0.02}), distance));
+    CHECK(distance > 0);
+    for (images = 0; images < 20 && distance > 0; ++images) {
+      REQUIRE(fused.add(render(pose, ++stamp, both), pose).ok());
+      REQUIRE(fused.volume.distanceAt(fused.volume.voxelAt({1.28, 0.02, 0.02}), distance));
+    }
+    CHECK(images <= 8);
+    // One image alone is not believed.
+    Fused once;
+    for (int i = 0; i < free_images; ++i) REQUIRE(once.add(render(pose, i + 1, kWall), pose).ok());
+    REQUIRE(once.add(render(pose, free_images + 1, both), pose).ok());
+    REQUIRE(once.volume.distanceAt(once.volume.voxelAt({1.28, 0.02, 0.02}), distance));
+    CHECK(distance > 0);
+  }
 }
 
 TEST_CASE("what has gone is carved away, and blocks in front are free") {
