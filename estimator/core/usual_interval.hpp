@@ -10,7 +10,7 @@ namespace swiftlet {
 
 class UsualInterval {
  public:
-  /// Of the slowest camera that is supported (1 Hz). Known to be this at most before any interval was seen.
+  /// At the lowest frame rate that can be set (1 Hz); the usual interval before any was seen.
   static constexpr Duration kLongest = Duration::fromMilliseconds(1000);
 
   void add(Duration interval) { usual_ = std::min({interval, usual_ + usual_, kLongest}); }

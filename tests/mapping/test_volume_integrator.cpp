@@ -14,6 +14,12 @@ namespace {
 
 const Plane kWall{{-1, 0, 0}, -3};  // x = 3, seen from below it
 
+/// A ball at x = 1.5 before the wall.
+double ballBeforeWall(const Eigen::Vector3d& o, const Eigen::Vector3d& r) {
+  const double near = Ball{{1.5, 0, 0}, 0.25}(o, r);
+  return near > 0 ? near : kWall(o, r);
+}
+
 struct Fused {
   explicit Fused(const VolumeSettings& settings = sceneSettings())
       : volume(settings), integrator(volume, kSceneCamera.pixels()) {}
@@ -197,35 +203,30 @@ TEST_CASE("what comes into free space is mapped within some images, however long
     INFO(free_images << " images of free space");
     Fused fused;
     const SE3 pose = lookAt({0, 0, 0}, {1, 0, 0});
-    const Ball ball{{1.5, 0, 0}, 0.25};
-    const auto both = [&](const Eigen::Vector3d& o, const Eigen::Vector3d& r) {
-      const double near = ball(o, r);
-      return near > 0 ? near : kWall(o, r);
-    };
     int stamp = 0;
     for (int i = 0; i < free_images; ++i) REQUIRE(fused.add(render(pose, ++stamp, kWall), pose).ok());
     float distance = 1;
     int images = 0;
     while (images < 20 && distance > 0) {
-      REQUIRE(fused.add(render(pose, ++stamp, both), pose).ok());
+      REQUIRE(fused.add(render(pose, ++stamp, ballBeforeWall), pose).ok());
       ++images;
       REQUIRE(fused.volume.distanceAt(fused.volume.voxelAt({1.28, 0.02, 0.02}), distance));
     }
     CHECK(images <= 8);
     // It goes, and comes again.
-    for (int i = 0; i < 20; ++i) REQUIRE(fused.add(render(pose, ++stamp, both), pose).ok());
+    for (int i = 0; i < 20; ++i) REQUIRE(fused.add(render(pose, ++stamp, ballBeforeWall), pose).ok());
     for (int i = 0; i < 60; ++i) REQUIRE(fused.add(render(pose, ++stamp, kWall), pose).ok());
     REQUIRE(fused.volume.distanceAt(fused.volume.voxelAt({1.28, 0.02, 0.02}), distance));
     CHECK(distance > 0);
     for (images = 0; images < 20 && distance > 0; ++images) {
-      REQUIRE(fused.add(render(pose, ++stamp, both), pose).ok());
+      REQUIRE(fused.add(render(pose, ++stamp, ballBeforeWall), pose).ok());
       REQUIRE(fused.volume.distanceAt(fused.volume.voxelAt({1.28, 0.02, 0.02}), distance));
     }
     CHECK(images <= 8);
     // One image alone is not believed.
     Fused once;
     for (int i = 0; i < free_images; ++i) REQUIRE(once.add(render(pose, i + 1, kWall), pose).ok());
-    REQUIRE(once.add(render(pose, free_images + 1, both), pose).ok());
+    REQUIRE(once.add(render(pose, free_images + 1, ballBeforeWall), pose).ok());
     REQUIRE(once.volume.distanceAt(once.volume.voxelAt({1.28, 0.02, 0.02}), distance));
     CHECK(distance > 0);
   }
@@ -234,12 +235,7 @@ TEST_CASE("what comes into free space is mapped within some images, however long
 TEST_CASE("what has gone is carved away, and blocks in front are free") {
   Fused fused;
   const SE3 pose = lookAt({0, 0, 0}, {1, 0, 0});
-  const Ball ball{{1.5, 0, 0}, 0.25};
-  const auto both = [&](const Eigen::Vector3d& o, const Eigen::Vector3d& r) {
-    const double near = ball(o, r);
-    return near > 0 ? near : kWall(o, r);
-  };
-  REQUIRE(fused.add(render(pose, 1, both), pose).ok());
+  REQUIRE(fused.add(render(pose, 1, ballBeforeWall), pose).ok());
   float distance = 0;
   const VoxelIndex inside = fused.volume.voxelAt({1.26, 0.02, 0.02});
   REQUIRE(fused.volume.distanceAt(inside, distance));

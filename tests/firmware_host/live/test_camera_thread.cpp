@@ -99,8 +99,36 @@ TEST_CASE("a camera that comes back with other pixels is refused until it has th
   runner.join();
 }
 
+/// Gives small images, each of another grey.
+class GreyCamera : public CameraSource {
+ public:
+  [[nodiscard]] int fd() const override { return -1; }
+
+ protected:
+  void describe(StampEvent event, std::optional<Duration> exposure) {
+    facts_ = {};
+    facts_.width = facts_.stride = facts_.height = kSide;
+    facts_.event = event;
+    facts_.exposure = exposure;
+  }
+  void give(CapturedFrame& frame, Stamp stamp) {
+    pixels_.fill(static_cast<std::uint8_t>(50 + number_ % 100));
+    frame.image = {pixels_.data(), kSide, kSide, kSide};
+    frame.event = facts_.event;
+    frame.stamp = frame.arrival = stamp;
+    frame.sequence = number_++;
+    lend(frame, 0);
+  }
+  std::uint64_t number_ = 0;  ///< of the next image
+
+ private:
+  static constexpr int kSide = 32;
+  void giveBack(std::uint32_t /*buffer*/) override {}
+  std::array<std::uint8_t, static_cast<std::size_t>(kSide* kSide)> pixels_{};
+};
+
 /// Sends whenever it is asked, until it is told to stall. Reopening ends a stall unless it is hopeless.
-class StallingCamera : public CameraSource {
+class StallingCamera : public GreyCamera {
  public:
   std::atomic<int> opened{0};
   std::atomic<bool> stalls{false};  ///< until the next open
@@ -113,11 +141,7 @@ class StallingCamera : public CameraSource {
     ++opened;
     stalls.store(hopeless.load());
     open_ = true;
-    facts_ = {};
-    facts_.width = facts_.stride = kSide;
-    facts_.height = kSide;
-    facts_.event = StampEvent::kStartOfExposure;
-    facts_.exposure = Duration{exposure.load()};
+    describe(StampEvent::kStartOfExposure, Duration{exposure.load()});
     if (warns.load()) warn(deviceFault(DeviceFaultKind::kFailed, 0, "auto exposure stays on"));
     return {};
   }
@@ -126,25 +150,15 @@ class StallingCamera : public CameraSource {
     forgetLent();
   }
   [[nodiscard]] bool isOpen() const override { return open_; }
-  [[nodiscard]] int fd() const override { return -1; }
   DeviceFault next(CapturedFrame& frame) override {
     frame.release();
-    if (!open_ || stalls.load() || given_++ % 2 == 1) return {};
-    pixels_.fill(static_cast<std::uint8_t>(50 + number_ % 100));
-    frame.image = {pixels_.data(), kSide, kSide, kSide};
-    frame.event = StampEvent::kStartOfExposure;
-    frame.stamp = frame.arrival = hostNow();
-    frame.sequence = number_++;
-    lend(frame, 0);
+    if (open_ && !stalls.load() && asked_++ % 2 == 0) give(frame, hostNow());
     return {};
   }
 
  private:
-  static constexpr int kSide = 32;
-  void giveBack(std::uint32_t /*buffer*/) override {}
   bool open_ = false;
-  std::uint64_t number_ = 0, given_ = 0;
-  std::array<std::uint8_t, static_cast<std::size_t>(kSide* kSide)> pixels_{};
+  std::uint64_t asked_ = 0;
 };
 
 class CountingImages : public SensorSink {
@@ -240,7 +254,7 @@ constexpr int kTriggered = 150;  ///< edges, and frames that they made
 Stamp edgeOf(std::uint64_t number) { return {static_cast<std::int64_t>(number + 1) * kTriggerPeriod.ns}; }
 
 /// Each frame is stamped, and arrives, `lag` after its edge.
-class TriggeredCamera : public CameraSource {
+class TriggeredCamera : public GreyCamera {
  public:
   TriggeredCamera(StampEvent event, Duration given_lag) : lag(given_lag), event_(event) {}
   Duration lag;
@@ -248,34 +262,19 @@ class TriggeredCamera : public CameraSource {
   std::atomic<bool> runs{false};
 
   DeviceFault open() override {
-    facts_ = {};
-    facts_.width = facts_.stride = kSide;
-    facts_.height = kSide;
-    facts_.event = event_;
-    facts_.exposure = exposure;
+    describe(event_, exposure);
     return {};
   }
   void close() override { forgetLent(); }
   [[nodiscard]] bool isOpen() const override { return true; }
-  [[nodiscard]] int fd() const override { return -1; }
   DeviceFault next(CapturedFrame& frame) override {
     frame.release();
-    if (!runs.load() || number_ == kTriggered) return {};
-    pixels_.fill(static_cast<std::uint8_t>(50 + number_));
-    frame.image = {pixels_.data(), kSide, kSide, kSide};
-    frame.event = event_;
-    frame.stamp = frame.arrival = edgeOf(number_) + lag;
-    frame.sequence = number_++;
-    lend(frame, 0);
+    if (runs.load() && number_ < kTriggered) give(frame, edgeOf(number_) + lag);
     return {};
   }
 
  private:
-  static constexpr int kSide = 32;
-  void giveBack(std::uint32_t /*buffer*/) override {}
   StampEvent event_;
-  std::uint64_t number_ = 0;
-  std::array<std::uint8_t, static_cast<std::size_t>(kSide* kSide)> pixels_{};
 };
 
 class TriggerSink : public SensorSink {
