@@ -45,6 +45,12 @@ void checkClocks(const ArmingFacts& facts, const ArmingSettings& settings, Armin
          "check for two drivers on one device, or a clock that is being set", "%llu stamps did not advance",
          static_cast<unsigned long long>(facts.reversed_stamps));
   }
+  for (std::size_t i = 0; i < kMaxCameras; ++i) {
+    if (!facts.off_trigger[i]) continue;
+    lack(verdict, ArmingCondition::kClocks,
+         "check the trigger line, trigger.delay_us and cameras.exposure_ms; `swiftlet doctor` shows the match",
+         "the images of camera %zu do not match the trigger edges", i);
+  }
   if (!facts.has_sample || !facts.has_image) {
     lack(verdict, ArmingCondition::kClocks, "wait for the sensors, or check their cables",
          "no %s yet: clocks cannot be compared", facts.has_sample ? "image" : "IMU sample");

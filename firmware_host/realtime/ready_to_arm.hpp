@@ -8,7 +8,8 @@
 // | condition       | holds when
 // | `rights`        | every flight thread has the priority that it was to have
 // | `memory_locked` | all memory that the flight path uses is locked
-// | `clocks`        | no stamp ran backwards of late, newest image and newest sample are near each other
+// | `clocks`        | no stamp ran backwards of late, newest image and newest sample are near each other,
+// |                 | images are associated with trigger edges if these are used
 // | `sensors`       | the IMU delivers at its rate, and each camera of the rig delivers
 // | `initialized`   | health has been good, and the epoch the same, for some seconds
 // | `recorder`      | a recorder that is wanted runs and has lost nothing
@@ -64,6 +65,7 @@ struct ArmingFacts {
   int cameras = 0;                                ///< of the rig
   std::array<bool, kMaxCameras> has_image_of{};   ///< camera i delivered since the start
   std::array<Duration, kMaxCameras> image_age{};  ///< since the arrival of camera i's newest image
+  std::array<bool, kMaxCameras> off_trigger{};    ///< camera i's images are not associated with trigger edges
 
   bool health_good = false;
   Duration health_good_for;  ///< without a break until now
@@ -109,8 +111,9 @@ struct MissingCondition {
 };
 
 struct ArmingVerdict {
-  /// Clocks and initialized may be missed in two ways at once, sensors by the IMU and by each camera.
-  static constexpr std::size_t kMost = kArmingConditions + 2 + kMaxCameras;
+  /// Clocks may be missed in two ways at once and by each camera, initialized in two ways, sensors by the IMU
+  /// and by each camera.
+  static constexpr std::size_t kMost = kArmingConditions + 2 + 2 * kMaxCameras;
 
   FixedVector<MissingCondition, kMost> missing;
 

@@ -55,6 +55,7 @@ ArmingVerdict ArmingWatch::evaluate(const FlightFacts& flight, Health health,
     const SensorNews& camera = flight.camera[c];
     reversed += camera.reversed_stamps;
     facts.has_image_of[c] = camera.messages > 0;
+    facts.off_trigger[c] = flight.off_trigger[c];
     if (!facts.has_image_of[c]) continue;
     facts.image_age[c] = since(camera.arrival);
     if (!facts.has_image || camera.newest > facts.newest_image) facts.newest_image = camera.newest;

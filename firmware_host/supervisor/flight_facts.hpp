@@ -68,7 +68,8 @@ struct FlightFacts {
   SensorNews imu;
   std::array<SensorNews, kMaxCameras> camera;
   SensorNews trigger;
-  std::uint64_t equal_samples = 0;  ///< of the IMU, as EqualReadings counts them
+  std::array<bool, kMaxCameras> off_trigger{};  ///< camera i's images are not associated with trigger edges
+  std::uint64_t equal_samples = 0;              ///< of the IMU, as EqualReadings counts them
   EstimateNews estimate;
   bool recorder_running = false;
   std::uint64_t recorder_lost = 0;              ///< records

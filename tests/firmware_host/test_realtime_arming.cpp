@@ -60,6 +60,8 @@ const Withheld kWithheld[] = {
      [](ArmingFacts& f) { f.newest_image = Stamp{700'000'000}; }, "300.0 ms"},
     {"agreement, images ahead", ArmingCondition::kClocks,
      [](ArmingFacts& f) { f.newest_image = Stamp{1'300'000'000}; }, "-300.0 ms"},
+    {"trigger edges that match", ArmingCondition::kClocks, [](ArmingFacts& f) { f.off_trigger[1] = true; },
+     "the images of camera 1 do not match"},
     {"a fifth of the rate", ArmingCondition::kSensors, [](ArmingFacts& f) { f.imu_rate = 159; }, "159.0 Hz"},
     {"a rate that was told", ArmingCondition::kSensors, [](ArmingFacts& f) { f.imu_rate = 241; }, "200.0 Hz"},
     {"a rate that is a number", ArmingCondition::kSensors,
@@ -160,6 +162,7 @@ TEST_CASE("everything missing at once finds room in the verdict") {
   ArmingFacts facts;
   facts.cameras = 100;
   facts.reversed_stamps = 1;
+  facts.off_trigger.fill(true);
   facts.recorder_wanted = true;
   facts.track_level = 1;
   facts.members_unwell = 1;

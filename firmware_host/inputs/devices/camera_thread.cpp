@@ -268,12 +268,14 @@ void CameraThread::watchTrigger(bool matched, Stamp now) {
 }
 
 Stamp CameraThread::middleOfExposure(const CapturedFrame& frame) {
+  counted_.off_trigger = false;
   if (matcher_ && frame.event == prepared_.event) {
     takeEdges();
     TriggerMatch match;
     const FrameMark mark{frame.stamp, static_cast<std::uint32_t>(frame.sequence), frame.arrival};
     const bool matched = matcher_->match(mark, match).ok();
     counted_.trigger = matcher_->status();
+    counted_.off_trigger = matcher_->lock() != LockState::kLocked;
     watchTrigger(matched, frame.arrival);
     if (matched) {
       ++counted_.by_trigger;

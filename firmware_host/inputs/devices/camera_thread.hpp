@@ -37,6 +37,7 @@ struct CameraStatus {
   std::uint64_t by_trigger = 0;          ///< frames stamped by a trigger edge
   std::uint64_t by_lag = 0;              ///< by the driver's stamp, less its measured delay to the edge
   TimesyncStatus trigger;                ///< where one is connected
+  bool off_trigger = false;              ///< edges are to stamp the frames, but are not associated with them
   std::optional<ExposureSetting> asked;  ///< by exposure control
 };
 

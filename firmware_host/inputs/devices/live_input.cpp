@@ -343,6 +343,7 @@ void LiveInput::look(FlightFacts& facts) const {
     const ImuStatus status = imu_->status();
     facts.trigger = {status.edges, 0, status.edge, status.edge};
   }
+  for (std::size_t i = 0; i < cameras_.size(); ++i) facts.off_trigger[i] = cameras_[i]->status().off_trigger;
 }
 
 std::uint64_t LiveInput::taken() const {

@@ -303,6 +303,7 @@ struct Triggered {
   std::string warning;
   std::uint64_t by_trigger = 0;
   LockState lock = LockState::kUnlocked;
+  bool off_trigger = false;
   std::int64_t shift = 0;
   std::int64_t largest_jump = 0;
   std::vector<std::string> lines;
@@ -337,6 +338,7 @@ Triggered fly(std::unique_ptr<TriggeredCamera> owned, const CamerasGroup& settin
   result.warning = thread.triggerWarning();
   result.by_trigger = thread.status().by_trigger;
   result.lock = thread.status().trigger.lock;
+  result.off_trigger = thread.status().off_trigger;
   return result;
 }
 
@@ -356,6 +358,7 @@ TEST_CASE("edges are matched to frames only where the delay to the stamps is kno
     CHECK(found.warning.empty());
     CHECK(found.by_trigger > 50);
     CHECK(found.lock == LockState::kLocked);
+    CHECK_FALSE(found.off_trigger);
   }
   SECTION("the edges end: stamps keep their place, and it is said") {
     auto made = camera(StampEvent::kStartOfExposure);
@@ -363,12 +366,14 @@ TEST_CASE("edges are matched to frames only where the delay to the stamps is kno
     const Triggered found = fly(std::move(made), settings, 80);
     CHECK(found.by_trigger > 30);
     CHECK(found.largest_jump < 100'000);
+    CHECK(found.off_trigger);
     REQUIRE(found.lines.size() == 1);
     CHECK_THAT(found.lines[0], Catch::Contains("match no trigger edges") && Catch::Contains("usual delay"));
   }
   SECTION("no edges at all are said") {
     const Triggered found = fly(camera(StampEvent::kStartOfExposure), settings, 0);
     CHECK(found.by_trigger == 0);
+    CHECK(found.off_trigger);
     REQUIRE(found.lines.size() == 1);
     CHECK_THAT(found.lines[0], Catch::Contains("match no trigger edges") && Catch::Contains("by the driver"));
   }
@@ -390,6 +395,7 @@ TEST_CASE("edges are matched to frames only where the delay to the stamps is kno
     const Triggered found = fly(camera(StampEvent::kArrival), settings);
     CHECK_THAT(found.warning, Catch::Contains("arrival"));
     CHECK(found.by_trigger == 0);
+    CHECK_FALSE(found.off_trigger);
     CHECK(found.lock == LockState::kUnlocked);
   }
   SECTION("end of the frame, exposure and readout unknown") {

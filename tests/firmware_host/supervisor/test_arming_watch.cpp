@@ -33,6 +33,15 @@ TEST_CASE("readiness does not outlive its sensors", "[arming]") {
   CHECK(dead.facts.estimate.frame_health == Health::kGood);
 }
 
+TEST_CASE("images that do not match the trigger edges take readiness away", "[arming]") {
+  SimulatedFlight flight;
+  flight.pass(8.0);
+  REQUIRE(flight.verdict.arming.ready());
+  flight.facts.off_trigger[0] = true;
+  flight.pass(0.2);
+  CHECK(flight.verdict.arming.lacks(ArmingCondition::kClocks));
+}
+
 TEST_CASE("a rate that was right when the IMU fell silent is not enough", "[arming]") {
   ArmingFacts facts;
   facts.flight_threads = 1;
