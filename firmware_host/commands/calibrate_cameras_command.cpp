@@ -47,7 +47,7 @@ int calibrateLogCameras(CamerasOptions options) {
   input.image_size = log.image_size;
   input.told_baseline = options.baseline_mm * 1e-3;
   constexpr int kParts = 100;
-  Progress progress("% of the solution", kParts);
+  Progress progress("fitting cameras", kParts);
   const CameraSolution solution = calibrateCameras(
       input, [&](double part) { progress.update(static_cast<std::uint64_t>(std::lround(part * kParts))); });
   progress.finish();

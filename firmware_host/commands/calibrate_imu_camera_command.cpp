@@ -70,7 +70,7 @@ CameraSolution findCameras(const ImuCameraOptions& options, const LogViews& log)
   input.views = log.views;
   input.camera_count = log.camera_count;
   input.image_size = log.image_size;
-  Progress progress("% of the cameras", kProgressParts);
+  Progress progress("fitting cameras", kProgressParts);
   const CameraSolution solution = calibrateCameras(input, partsOf(progress));
   progress.finish();
   return solution;
@@ -105,7 +105,7 @@ int calibrateLogImuCamera(ImuCameraOptions options) {
   const bool lenses = input.cameras.camera_count > 0 && input.cameras.camera[0].model.width() > 0;
   ImuCameraSolution solution;
   if (lenses) {
-    Progress progress("% of the IMU", kProgressParts);
+    Progress progress("fitting cameras and IMU", kProgressParts);
     solution = calibrateImuCamera(input, partsOf(progress));
     progress.finish();
   }

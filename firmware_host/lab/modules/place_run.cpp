@@ -124,7 +124,7 @@ void PlaceRun::runFolder() {
   warnAll(warnings.lines());
   warnings_ = warnings.lines();
   ImageFile image;
-  Progress progress("place", request_.show_progress ? files.size() : 0);
+  Progress progress("recognizing places", request_.show_progress ? files.size() : 0);
   std::optional<ImageSize> size;
   Rig rig;
   for (std::size_t i = 0; i < files.size(); ++i) {

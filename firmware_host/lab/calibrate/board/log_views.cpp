@@ -63,7 +63,7 @@ LogViews readLogViews(const LogViewsRequest& request) {
   for (unsigned t = 0; t < std::clamp(std::thread::hardware_concurrency(), 1U, kMostThreads); ++t) {
     detectors.push_back(std::make_unique<BoardDetector>(request.target));
   }
-  Progress progress("images searched", request.show_progress ? source->imageCount() : 0);
+  Progress progress("searching images", request.show_progress ? source->imageCount() : 0);
   std::vector<WaitingImage> batch(kBatch);
   std::size_t waiting = 0;
   SensorMessage message;

@@ -364,7 +364,7 @@ CheckResult checkCalibration(const CheckRequest& request, Settings settings) {
     if (piece.solved) to.push_back(std::move(piece));
   };
   const std::vector<Keyframes> pieces = cut(readStretches(reader));
-  Progress progress("calibration", request.show_progress ? pieces.size() : 0);
+  Progress progress("checking calibration", request.show_progress ? pieces.size() : 0);
   for (std::size_t i = 0; i < pieces.size() && !request.stopped(); ++i) {
     add(pieces[i], ImagePart::kAll, result.pieces);
     add(pieces[i], ImagePart::kInner, parts.inner);
