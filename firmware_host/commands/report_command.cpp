@@ -34,6 +34,11 @@ int report(const ReportOptions& options) {
     throw InputError("--truth", 0, "", "more truths than runs",
                      "Give one truth for all runs, or one for each");
   }
+  const std::string out =
+      options.out.empty() ? (fs::path(options.runs.front()) / "report.html").string() : options.out;
+  if (fs::exists(out) && fs::path(out).extension() != ".html") {
+    throw InputError(out, 0, "", "exists and is no page", "Give --out a new file, or one that ends in .html");
+  }
   const Settings settings = options.settings.read();
   std::vector<ReportedRun> runs;
   for (std::size_t i = 0; i < options.runs.size(); ++i) {
@@ -58,8 +63,6 @@ int report(const ReportOptions& options) {
   } else {
     html = pageWith(page.text, page.name, reportDocument(runs));
   }
-  const std::string out =
-      options.out.empty() ? (fs::path(options.runs.front()) / "report.html").string() : options.out;
   writeWholeFile(out, html + "\n");
   fmt::print("written to {} ({:.2f} MiB)\n", out, static_cast<double>(html.size()) / kMebibyte);
   return kExitDone;

@@ -228,6 +228,12 @@ TEST_CASE("a report goes into the folder of its run") {
   }
   CHECK(run({"report", folder.path(), "--plain"}) == kExitDone);
   CHECK(std::filesystem::exists(folder.file("report.html")));
+  // Never over a file of the run; a page may be made anew.
+  const std::string odometry = folder.file("odometry.tum");
+  const auto bytes = std::filesystem::file_size(odometry);
+  CHECK(run({"report", folder.path(), "--plain", "--out", odometry}) == kExitBadInput);
+  CHECK(std::filesystem::file_size(odometry) == bytes);
+  CHECK(run({"report", folder.path(), "--plain"}) == kExitDone);
 }
 
 TEST_CASE("summary.json has what DESIGN's run folder promises") {
