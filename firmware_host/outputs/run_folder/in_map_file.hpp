@@ -2,8 +2,9 @@
 // in_map.tum: the pose of each image in the frame of a kept map, as long as the flight is located there.
 //
 // An image's pose is the odometry's at its time, moved by what loop closure knew at the newest keyframe up to
-// it, so that a line never knows of later images. Loop closure may take its time: images wait for its word.
-// Which keyframe it was asked at is recorded with the flight, so that a repetition writes the same lines.
+// it, so that a line never knows of later images. Images and reports come through different queues, so either
+// may come first: images wait for the report on a later keyframe, reports for the images before them. Which
+// keyframe has a report is recorded with the flight, so that a repetition writes the same lines.
 
 #include <deque>
 #include <string>
@@ -30,11 +31,17 @@ class InMapFile {
     std::uint32_t epoch = 0;
     SE3 T_world_body;
   };
-  /// Those before `frame`.
-  void writeUpTo(std::uint64_t frame);
+  struct Report {
+    std::uint64_t frame = 0;
+    MapCorrection correction;
+  };
+  void takeReport();
+  /// The images whose newest report is known; all that wait if no more reports come.
+  void write(bool ended);
 
   LineFile file_;
   std::deque<Waiting> waiting_;
+  std::deque<Report> reports_;  ///< of images that have not come
   MapCorrection known_;
 };
 
