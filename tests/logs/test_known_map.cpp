@@ -1,8 +1,14 @@
 // Whole runs that keep a map, fly in it and go on with it, on the seconds of log in the repository.
 
+#include <fmt/format.h>
+
+#include <atomic>
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <string_view>
+#include <thread>
 
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
@@ -160,7 +166,7 @@ TEST_CASE("the volume of a kept map is flown in, extended and merged") {
   }
 }
 
-TEST_CASE("a threaded run in a map is repeated byte for byte") {
+TEST_CASE("a threaded run in a map is repeated byte for byte, however late its log is written") {
   const ScratchFolder folder("known_map_threaded");
   const std::string map = folder.file("map");
   Settings settings = quick();
@@ -173,7 +179,35 @@ TEST_CASE("a threaded run in a map is repeated byte for byte") {
   request.speed = kSanitized ? 0.2 : 2;
   request.record = true;
   request.kept_maps.in = map;
-  const ReplayResult flown = runReplay(request, settings);
+  // Loop closure is done with a keyframe before the log has looked at it, or at the frames before it. The
+  // pauses are shorter than what the log's queues hold.
+  std::atomic<int> turns{0};
+  ReplayHooks hooks;
+  hooks.before_turn = [&turns](const char* node) {
+    constexpr int kEvery = 15;
+    constexpr auto kPause = std::chrono::milliseconds(200);
+    if (std::string_view(node) == "log" && ++turns % kEvery == 0) std::this_thread::sleep_for(kPause);
+    return true;
+  };
+  // A disk or a machine that others keep busy may cost records, which the recording says: what is incomplete
+  // cannot be repeated, and says nothing about repetition.
+  constexpr int kAttempts = 3;
+  const auto lost = [](const ReplayResult& run) {
+    std::string what;
+    for (const auto& [arrow, count] : run.statistics.losses) {
+      const bool kept = arrow.ends_with("_to_log") || arrow.ends_with("_to_record");
+      if (kept || arrow.ends_with("_unrecorded")) what += fmt::format("{} {} ", count, arrow);
+    }
+    const auto& unwritten = run.summary.at("executor").at("recording").at("lost");
+    return what + (unwritten.empty() ? "" : "unwritten " + unwritten.dump());
+  };
+  ReplayResult flown = runReplay(request, settings, hooks);
+  for (int attempt = 1; attempt < kAttempts && !lost(flown).empty(); ++attempt) {
+    WARN("flown again: lost " << lost(flown));
+    flown = runReplay(request, settings, hooks);
+  }
+  INFO("lost in each of " << kAttempts << " attempts, the last: " << lost(flown));
+  REQUIRE(lost(flown).empty());
   REQUIRE(flown.finished);
   REQUIRE(flown.summary.at("counters").at("in_map").at("located_at_end").get<bool>());
   ReplayRequest again;
