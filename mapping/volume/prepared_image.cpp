@@ -162,6 +162,18 @@ void PreparedImage::findSlopes() {
   std::copy_n(&slope_[(height - 2) * width], width, &slope_[(height - 1) * width]);
 }
 
+/// Of an unmeasured pixel: another one touches it. A single one is noise; more may be a pole without depth.
+bool PreparedImage::isHole(int u, int v) const {
+  int unmeasured = 0;
+  for (int y = std::max(v - 1, 0); y <= std::min(v + 1, camera_.height - 1); ++y) {
+    const float* const line =
+        depth_.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width);
+    for (int x = std::max(u - 1, 0); x <= std::min(u + 1, camera_.width - 1); ++x)
+      unmeasured += line[x] == 0 ? 1 : 0;
+  }
+  return unmeasured > 1;
+}
+
 void PreparedImage::buildPyramid() {
   const int columns = (camera_.width + kTile - 1) / kTile;
   const int rows = (camera_.height + kTile - 1) / kTile;
@@ -169,7 +181,6 @@ void PreparedImage::buildPyramid() {
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
       float nearest = kFarAway, deepest = 0;
-      int measured = 0;
       const int bottom = std::min((row + 1) * kTile, camera_.height);
       const int right = std::min((column + 1) * kTile, camera_.width);
       for (int v = row * kTile; v < bottom; ++v) {
@@ -177,15 +188,17 @@ void PreparedImage::buildPyramid() {
             depth_.data() + static_cast<std::size_t>(v) * static_cast<std::size_t>(camera_.width);
         for (int u = column * kTile; u < right; ++u) {
           const float d = std::abs(line[u]);
-          measured += d > 0 ? 1 : 0;
-          nearest = std::min(nearest, d > 0 ? d : kFarAway);
           deepest = std::max(deepest, d);
+          if (d > 0) {
+            nearest = std::min(nearest, d);
+          } else if (nearest > 0 && isHole(u, v)) {
+            nearest = 0;
+          }
         }
       }
-      const int size = (bottom - row * kTile) * (right - column * kTile);
       const auto at = static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
                       static_cast<std::size_t>(column);
-      free_[at] = measured * kTile * kTile >= size * kLeastMeasured ? nearest : 0.0F;
+      free_[at] = deepest > 0 ? nearest : 0.0F;
       deepest_[at] = deepest;
     }
   }

@@ -32,8 +32,6 @@ class PreparedImage {
   static constexpr float kSureSigmas = 3;
   /// Limits the angle between ray and normal to 84 degrees.
   static constexpr float kLeastSlope = 0.1F;
-  /// A tile with fewer measured pixels is unknown.
-  static constexpr int kLeastMeasured = kTile * kTile / 2;
 
   explicit PreparedImage(std::size_t most_pixels);
 
@@ -56,8 +54,9 @@ class PreparedImage {
   [[nodiscard]] const std::uint8_t* grey() const { return grey_; }
   [[nodiscard]] const std::uint8_t* labels() const { return has_labels_ ? label_.data() : nullptr; }
 
-  /// A depth [m] up to which all measured pixels of the rectangle (inclusive, within the image) are free; 0
-  /// if too few are measured. A lower bound: coarse levels of the pyramid make it smaller, never larger.
+  /// A depth [m] up to which all of the rectangle (inclusive, within the image) is free; 0 if one of its
+  /// tiles has a hole, two unmeasured pixels beside each other: a thing that gives no depth may stand there.
+  /// A lower bound: coarse levels of the pyramid make it smaller, never larger.
   [[nodiscard]] float freeDepth(int left, int top, int right, int bottom) const;
   /// The deepest measured pixel of the tile (column, row at level 0), or 0.
   [[nodiscard]] float deepest(int column, int row) const {
@@ -78,6 +77,7 @@ class PreparedImage {
   void checkPixels(const DepthImageView& image, const VolumeSettings& settings, PixelCounters& counters);
   void checkLabels(const DepthImageView& image, const VolumeSettings& settings, PixelCounters& counters);
   void findSlopes();
+  [[nodiscard]] bool isHole(int u, int v) const;
   void buildPyramid();
 
   std::size_t most_pixels_;
