@@ -262,7 +262,8 @@ std::vector<Setting> estimationSettings() {
        "When it is full, the farthest triangles are dropped.",
        integer(&Settings::map_stage, &MapSettings::surface_mib, 1, 16384)},
       {"map.most_range", "m",
-       "Maximum measured distance that is fused into the map. Farther measurements give no surface.",
+       "Maximum measured distance that is fused into the map. Farther measurements give no surface; "
+       "the space in front of them is free up to this range.",
        real(&Settings::map_stage, &MapSettings::most_range, 0.5, 100)},
       {"map.labels", "", "Store labels in the map if the log or a network provides label images.",
        onOff(&Settings::map_stage, &MapSettings::labels)},

@@ -62,7 +62,6 @@ void DepthStage::fillDepth(DepthBuffer& out) {
   const auto scale = static_cast<float>(depth_disparity * kDisparitySteps);
   const auto sigma_scale = static_cast<float>(1 / (depth_disparity * kDisparitySteps));
   const auto nearest = static_cast<float>(settings_.min_depth);
-  const auto farthest = static_cast<float>(settings_.max_depth);
   const std::uint16_t* const disparity = disparity_.disparity();
   const std::uint8_t* const sigma = disparity_.sigma();
   float* __restrict const depth_out = out.depth.data();
@@ -72,7 +71,7 @@ void DepthStage::fillDepth(DepthBuffer& out) {
   for (std::size_t i = 0; i < disparity_.pixels(); ++i) {
     const bool is_known = disparity[i] != kNoDisparity;
     const float z = scale / static_cast<float>(std::max<int>(disparity[i], 1));
-    const bool good = is_known && z >= nearest && z <= farthest;
+    const bool good = is_known && z >= nearest;
     depth_out[i] = good ? z : 0.0F;
     sigma_out[i] = good ? z * z * sigma_scale * static_cast<float>(sigma[i]) : 0.0F;
     known += is_known ? 1U : 0U;

@@ -2,7 +2,8 @@
 // Raw stereo pair to depth image: rectification, semi-global matching, depth with its standard deviation.
 //
 // Depth z = f b / d and sigma_z = z^2 / (f b) sigma_d, in metres along the axis of the rectified camera 0;
-// sigma_d is from the matcher. Pixels nearer than `min_depth` or beyond `max_depth` have no depth.
+// sigma_d is from the matcher. Pixels nearer than `min_depth` have no depth. There is
+// no upper limit, because a far surface proves that the space before it is free.
 // Errors: kInvalidInput (an image missing or of another size, a rig that cannot be rectified, an output of
 // another size); the output is then unchanged and the step counted. Memory: fixed by the constructor, 38
 // bytes a pixel and the matcher's strips. Time grows with pixels x disparities. One thread, no clock,
@@ -24,7 +25,6 @@ namespace swiftlet {
 struct DepthSettings {
   MatcherSettings matcher;
   double min_depth = 0.2;  ///< m
-  double max_depth = 10;   ///< m
 };
 
 struct DepthEffort {
@@ -38,7 +38,7 @@ struct DepthCounters {
   std::uint64_t refused = 0;         ///< steps with kInvalidInput
   std::uint64_t pixels = 0;          ///< of the delivered images
   std::uint64_t measured = 0;        ///< of these, with a depth
-  std::uint64_t out_of_range = 0;    ///< measured, but outside min_depth to max_depth
+  std::uint64_t out_of_range = 0;    ///< measured, but nearer than min_depth
   std::uint64_t label_images = 0;    ///< warped
   std::uint64_t labels_refused = 0;  ///< of a wrong size
 };

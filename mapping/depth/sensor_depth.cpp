@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <type_traits>
 
 namespace swiftlet {
@@ -23,7 +24,7 @@ float SensorDepth::depthOf(double z) {
     ++counters_.missing;
     return 0;
   }
-  if (z < settings_.min_depth || z > settings_.max_depth) {
+  if (z < settings_.min_depth) {
     ++counters_.out_of_range;
     return 0;
   }
@@ -45,7 +46,8 @@ Status SensorDepth::take(const Value* values, int width, int height, int stride,
   for (int y = 0; y < height; ++y) {
     const Value* const row = values + static_cast<std::ptrdiff_t>(y) * stride;
     for (int x = 0; x < width; ++x, ++i) {
-      const float z = depthOf(scale * static_cast<double>(row[x]));
+      const bool saturated = std::is_integral_v<Value> && row[x] == std::numeric_limits<Value>::max();
+      const float z = depthOf(saturated ? 0 : scale * static_cast<double>(row[x]));
       const double beyond = std::max(z - settings_.sigma_knee, 0.0);
       out.depth[i] = z;
       out.sigma[i] =

@@ -2,11 +2,11 @@
 // Image of a depth sensor to a depth image with standard deviations: 16-bit counts (a log's `depth0`) or
 // float metres.
 //
-// Depth is along the axis of an ideal pinhole camera. Count 0, NaN, infinite, not positive and out of range
-// are no depth; each kind is counted. sigma = floor + square (z - knee)^2 for z > knee, floor below; the
-// defaults are Kinect's (Nguyen, Izadi, Lovell, 3DIMPVT 2012, eq. 2). mapping/map/view_warp.hpp adds grey
-// values and labels of a camera. Errors: kInvalidInput (missing, or of another size), counted; the output is
-// then unchanged. Deterministic.
+// Depth is along the axis of an ideal pinhole camera. Counts 0 and 65535 (what some sensors write
+// for no depth), NaN, infinite, not positive and too near are no depth; each kind is counted. sigma = floor +
+// square (z - knee)^2 for z > knee, floor below; the defaults are Kinect's (Nguyen, Izadi, Lovell, 3DIMPVT
+// 2012, eq. 2). mapping/map/view_warp.hpp adds grey values and labels of a camera. Errors: kInvalidInput
+// (missing, or of another size), counted; the output is then unchanged. Deterministic.
 
 #include <cstdint>
 
@@ -19,7 +19,6 @@ namespace swiftlet {
 struct SensorDepthSettings {
   double metres_per_count = 0.001;
   double min_depth = 0.1;        ///< m
-  double max_depth = 10;         ///< m
   double sigma_floor = 0.0012;   ///< m
   double sigma_square = 0.0019;  ///< 1/m
   double sigma_knee = 0.4;       ///< m
@@ -29,9 +28,9 @@ struct SensorDepthCounters {
   std::uint64_t images = 0;
   std::uint64_t refused = 0;  ///< images missing or of another size
   std::uint64_t pixels = 0;
-  std::uint64_t missing = 0;       ///< count or value 0
+  std::uint64_t missing = 0;       ///< count or value 0, or the largest count
   std::uint64_t not_finite = 0;    ///< NaN or infinite
-  std::uint64_t out_of_range = 0;  ///< negative, or outside min_depth to max_depth
+  std::uint64_t out_of_range = 0;  ///< negative, or nearer than min_depth
 };
 
 class SensorDepth {

@@ -26,18 +26,6 @@ VolumeSettings volumeSettings(const MapSettings& settings) {
   return volume;
 }
 
-DepthSettings depthSettings(const MapSettings& settings) {
-  DepthSettings depth;
-  depth.max_depth = settings.most_range;
-  return depth;
-}
-
-SensorDepthSettings sensorSettings(const MapSettings& settings) {
-  SensorDepthSettings sensor;
-  sensor.max_depth = settings.most_range;
-  return sensor;
-}
-
 SurfaceSettings surfaceFor(bool has_sensor) {
   SurfaceSettings surface;
   if (has_sensor) surface.least_weight = SurfaceSettings::kLeastSensorWeight;
@@ -72,13 +60,12 @@ std::optional<std::uint32_t> labelMask(std::string_view labels) {
   return mask;
 }
 
-MapStage::Sensor::Sensor(const DepthImageView& camera, const Rig& rig, const MapSettings& settings)
-    : depth(camera.camera, camera.T_body_camera, sensorSettings(settings)),
+MapStage::Sensor::Sensor(const DepthImageView& camera, const Rig& rig)
+    : depth(camera.camera, camera.T_body_camera),
       warp(camera.camera, rig.camera[0], rig.T_body_cam[0].inverse() * camera.T_body_camera),
       buffer(depth.makeBuffer()) {}
 
-MapStage::Pair::Pair(const Rig& rig, const MapSettings& settings)
-    : depth(rig, depthSettings(settings)), buffer(depth.makeBuffer()) {
+MapStage::Pair::Pair(const Rig& rig) : depth(rig), buffer(depth.makeBuffer()) {
   if (rig.rolls() && depth.status().ok()) unrolled.emplace(rig, depth.rectification());
 }
 
@@ -87,8 +74,8 @@ MapStage::MapStage(const Rig& rig, const MapSettings& settings, const DepthImage
     : rig_(rig),
       confusion_(kLabelValues, static_cast<float>(settings.label_certainty)),
       volume_(volumeSettings(settings)),
-      sensor_(depth_sensor == nullptr ? nullptr : std::make_unique<Sensor>(*depth_sensor, rig, settings)),
-      pair_(rig.camera_count < 2 ? nullptr : std::make_unique<Pair>(rig, settings)),
+      sensor_(depth_sensor == nullptr ? nullptr : std::make_unique<Sensor>(*depth_sensor, rig)),
+      pair_(rig.camera_count < 2 ? nullptr : std::make_unique<Pair>(rig)),
       integrator_(volume_, mostPixels(rig, depth_sensor)),
       store_(static_cast<std::size_t>(settings.surface_mib) << 20U, volume_.blockSize()),
       surface_settings_(surfaceFor(depth_sensor != nullptr)),

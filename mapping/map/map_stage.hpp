@@ -146,14 +146,14 @@ class MapStage {
  private:
   /// A depth sensor, with the correspondence of its pixels to those of camera 0.
   struct Sensor {
-    Sensor(const DepthImageView& camera, const Rig& rig, const MapSettings& settings);
+    Sensor(const DepthImageView& camera, const Rig& rig);
     SensorDepth depth;
     ViewWarp warp;
     DepthBuffer buffer;
   };
   /// Two cameras.
   struct Pair {
-    Pair(const Rig& rig, const MapSettings& settings);
+    explicit Pair(const Rig& rig);
     DepthStage depth;
     DepthBuffer buffer;
     std::optional<UnrolledDepth> unrolled;  ///< only for a rolling shutter

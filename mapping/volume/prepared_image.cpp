@@ -71,10 +71,9 @@ void PreparedImage::checkPixels(const DepthImageView& image, const VolumeSetting
     const float d = image.depth[i];
     // False for NaN; an infinite depth says nothing of what is on the way.
     const bool usable = d >= least && d < kFarAway;
-    const bool far = usable && d > most;
-    depth_[i] = usable ? (far ? -most : d) : 0.0F;
+    depth_[i] = usable ? d : 0.0F;
     measured += usable ? 1U : 0U;
-    beyond += far ? 1U : 0U;
+    beyond += usable && d > most ? 1U : 0U;
   }
   depth_[pixels] = 0;
   counters.unmeasured += pixels - measured;
@@ -84,9 +83,17 @@ void PreparedImage::checkPixels(const DepthImageView& image, const VolumeSetting
     const float ratio = reference / sigma;
     return std::min(std::max(kWeightSteps * ratio * ratio, 1.0F), kMostPixelWeight);
   };
+  // Free up to the range, and not up to what the measurement may be wrong.
+  const auto freeBefore = [least, most](float d, float sigma) {
+    const float free = std::min(d - kSureSigmas * sigma, most);
+    return free > least ? -free : 0.0F;
+  };
   is_even_ = image.sigma == nullptr && settings.sigma_quadratic == 0;
   if (is_even_) {
-    even_weight_ = weightOf(static_cast<float>(settings.sigma_constant));
+    const auto sigma = static_cast<float>(settings.sigma_constant);
+    even_weight_ = weightOf(sigma);
+    for (std::size_t i = 0; i < pixels; ++i)
+      depth_[i] = depth_[i] > most ? freeBefore(depth_[i], sigma) : depth_[i];
     return;
   }
   const auto constant = static_cast<float>(settings.sigma_constant);
@@ -99,10 +106,10 @@ void PreparedImage::checkPixels(const DepthImageView& image, const VolumeSetting
     weight_[i] = weightOf(known ? sigma : 1.0F);
     // A deviation that is no number leaves the pixel without a measurement.
     if (!known) depth_[i] = 0;
-    if (!known || sigma <= most_sigma || depth_[i] <= 0) continue;
-    const float free = depth_[i] - kSureSigmas * sigma;
-    depth_[i] = free > least ? -free : 0.0F;
-    ++counters.uncertain;
+    const bool far = depth_[i] > most;
+    if (!known || (sigma <= most_sigma && !far) || depth_[i] <= 0) continue;
+    depth_[i] = freeBefore(depth_[i], sigma);
+    counters.uncertain += far ? 0 : 1;
   }
   weight_[pixels] = 0;
 }

@@ -28,7 +28,7 @@ class PreparedImage {
   /// Edge of a tile at the finest level of the pyramid [px].
   static constexpr int kTile = 8;
   static constexpr int kMostLevels = 12;
-  /// An uncertain measurement marks free space up to this many sigmas in front of it.
+  /// A measurement that is uncertain or beyond the range marks free space up to this many sigmas before it.
   static constexpr float kSureSigmas = 3;
   /// Limits the angle between ray and normal to 84 degrees.
   static constexpr float kLeastSlope = 0.1F;

@@ -107,6 +107,18 @@ TEST_CASE("a wall becomes a surface where it stands, with its labels and grey va
   CHECK(sample.distance == Approx(kWall - 1.0).margin(0.01));
 }
 
+TEST_CASE("a wall beyond the range is not mapped, and what lies before it within the range is free") {
+  Wall wall;
+  MapSettings settings = smallSettings();
+  settings.most_range = 1;
+  MapStage map(wall.rig, settings, &wall.sensor);
+  MapReport report;
+  for (int i = 0; i < 5; ++i) REQUIRE(map.step(wall.at(i), {}, report).ok());
+  CHECK(countOf(map).triangles == 0);
+  CHECK(map.distance().query({0.6, 0, 0}).space == Space::kFree);
+  CHECK(map.distance().query({1.2, 0, 0}).space == Space::kUnknown);
+}
+
 TEST_CASE("labels of moving things leave no surface") {
   Wall wall;
   MapSettings settings = smallSettings();

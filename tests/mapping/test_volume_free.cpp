@@ -15,11 +15,13 @@ const SE3 kFromOrigin = lookAt({0, 0, 0}, {1, 0, 0});
 struct View {
   explicit View(const VolumeSettings& settings = sceneSettings())
       : volume(settings), integrator(volume, kSceneCamera.pixels()) {}
-  void add(SceneImage image) {
+  void add(SceneImage image, const float* sigma = nullptr) {
     stamp += 1;
     image.stamp = {1'000'000'000LL * stamp};
+    DepthImageView with_sigma = image.view();
+    with_sigma.sigma = sigma;
     VolumeStep step;
-    REQUIRE(integrator.step(image.view(), kFromOrigin, {}, step).ok());
+    REQUIRE(integrator.step(with_sigma, kFromOrigin, {}, step).ok());
   }
   /// The voxel at `p` is known and in front of all surface.
   [[nodiscard]] bool isFree(const Eigen::Vector3d& p) const {
@@ -98,4 +100,19 @@ TEST_CASE("single pixels without depth hide nothing") {
   }
   gaps.add(image);
   CHECK(gaps.volume.freeCount() == whole.volume.freeCount());
+}
+
+TEST_CASE("what is beyond the range is free up to it, less three sigma") {
+  VolumeSettings settings = sceneSettings();
+  settings.most_range = 2;
+  const SceneImage image = render(kFromOrigin, 1, kFarWall);
+  for (const float sigma : {0.05F, 0.6F}) {
+    View view(settings);
+    const std::vector<float> sigmas(image.depth.size(), sigma);
+    view.add(image, sigmas.data());
+    CHECK(view.volume.blockCount() == 0);
+    CHECK(view.isFree({0.8, 0, 0}));
+    CHECK(view.isFree({1.6, 0, 0}) == (sigma < 0.1F));
+    CHECK_FALSE(view.isFree({2.2, 0, 0}));
+  }
 }
