@@ -73,6 +73,11 @@ class FlightRun {
 
  private:
   void fly() {
+    if (const std::string line = settings_.map.enabled ? nearDepthWarning(calibration_.rig) : "";
+        !line.empty()) {
+      warn("warning: " + line + "\n");
+      facts_.warnings.push_back(line);
+    }
     GraphOptions wanted = output_->graphOptions();
     wanted.recorder = recorder_.get();
     wanted.confusion = confusionOf(settings_);

@@ -98,6 +98,7 @@ class ReplayRun {
     steps_ = source_->imageCount();
     openScenes();
     if (request_.inspect && !request_.reproduce) inspect();
+    warnAll(findings_);
     if (facts_.tracks.empty()) return;
     if (request_.real_time || request_.record) {
       throw InputError(request_.log, 0, "", "a log of feature tracks has no images to feed or record",
@@ -113,7 +114,6 @@ class ReplayRun {
     for (const Finding& finding : inspectLog(request_, settings_, kInspectedImages).findings) {
       findings_.push_back(finding.line());
     }
-    warnAll(findings_);
     memory_.note("inspection");
   }
 
@@ -134,6 +134,8 @@ class ReplayRun {
       throw InputError(request_.log, 0, "", "one camera and no depth images: --map has no source of depth",
                        "Give a log with two cameras or with mav0/depth0, or omit --map");
     }
+    const std::string line = scenes_->depthSensor() == nullptr ? nearDepthWarning(source_->rig()) : "";
+    if (!line.empty()) findings_.push_back(line);
   }
 
   /// What an earlier run left in the folder goes, its recording too.

@@ -1,7 +1,10 @@
 #pragma once
-// Checks settings of the map that a range for each cannot; every command with a map calls it first.
+// Checks settings of the map that a range for each cannot, and the cameras that it takes depth from; every
+// command with a map calls it first.
 
 #include <fmt/format.h>
+
+#include <string>
 
 #include "drivers/input/input_error.hpp"
 #include "mapping/map/map_stage.hpp"
@@ -22,6 +25,16 @@ inline void checkMapSettings(const MapSettings& settings) {
                                settings.voxel_size),
                    fmt::format("Use at most {:g} m, or larger voxels (map.voxel_size)",
                                kMostVoxels * settings.voxel_size));
+}
+
+/// What the user must know of the depth of this pair; empty: nothing. Without a depth sensor only.
+inline std::string nearDepthWarning(const Rig& rig) {
+  const DepthStage stage(rig);
+  if (!stage.status().ok() || stage.nearestDepth() <= DepthSettings{}.wanted_nearest) return {};
+  return fmt::format(
+      "the cameras measure depth from {:.1f} m on: nearer obstacles are missing from the map or lie too far "
+      "away. Use smaller images, a wider lens, a shorter baseline or a depth sensor",
+      stage.nearestDepth());
 }
 
 }  // namespace swiftlet

@@ -1,6 +1,7 @@
 #include "mapping/depth/depth_stage.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 
 namespace swiftlet {
@@ -12,18 +13,34 @@ bool fits(const DepthBuffer& out, std::size_t pixels) {
          out.labels.size() == pixels;
 }
 
+/// Depth times disparity, the same for all points [m px].
+double depthDisparity(const StereoRectification& pair) { return pair.intrinsics().fx * pair.baseline(); }
+
+MatcherSettings matcherFor(const DepthSettings& settings, const StereoRectification& pair) {
+  constexpr double kMost = 32 * kMaxDisparityVectors;
+  MatcherSettings matcher = settings.matcher;
+  const double wanted = std::min(depthDisparity(pair) / settings.wanted_nearest + 1, kMost);
+  matcher.disparities = std::max(matcher.disparities, static_cast<int>(std::ceil(wanted)));
+  return matcher;
+}
+
 }  // namespace
 
 DepthStage::DepthStage(const Rig& rig, const DepthSettings& settings)
     : settings_(settings),
       rectification_(rig),
-      matcher_(rectification_.intrinsics().width, rectification_.intrinsics().height, settings.matcher),
+      matcher_(rectification_.intrinsics().width, rectification_.intrinsics().height,
+               matcherFor(settings, rectification_)),
       left_(rectification_.intrinsics().pixels()),
       right_(left_.size()),
       disparity_(rectification_.intrinsics().width, rectification_.intrinsics().height) {
   for (std::size_t i = 0; i < left_.size(); ++i) {
     if (!rectification_.warp(0).covered(i)) uncovered_.push_back(static_cast<std::uint32_t>(i));
   }
+}
+
+double DepthStage::nearestDepth() const {
+  return depthDisparity(rectification_) / (matcher_.settings().disparities - 1);
 }
 
 DepthBuffer DepthStage::makeBuffer() const { return DepthBuffer(rectification_.intrinsics()); }
@@ -58,7 +75,7 @@ Status DepthStage::step(const ImageView& left, const ImageView& right, Stamp sta
 }
 
 void DepthStage::fillDepth(DepthBuffer& out) {
-  const double depth_disparity = rectification_.intrinsics().fx * rectification_.baseline();  // m px
+  const double depth_disparity = depthDisparity(rectification_);
   const auto scale = static_cast<float>(depth_disparity * kDisparitySteps);
   const auto sigma_scale = static_cast<float>(1 / (depth_disparity * kDisparitySteps));
   const auto nearest = static_cast<float>(settings_.min_depth);

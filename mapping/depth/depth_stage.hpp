@@ -25,6 +25,9 @@ namespace swiftlet {
 struct DepthSettings {
   MatcherSettings matcher;
   double min_depth = 0.2;  ///< m
+  /// Depth [m] from which the pair should measure: more disparities than the matcher's are searched for it,
+  /// as many as there can be. What a vehicle has to avoid at a metre must not be missing.
+  double wanted_nearest = 1.0;
 };
 
 struct DepthEffort {
@@ -60,6 +63,8 @@ class DepthStage {
   /// Adds labels in camera 0's raw geometry to the output of a step.
   Status addLabels(const ImageView& labels, DepthBuffer& out);
 
+  /// Depth [m] of the largest disparity. What is nearer gets no depth or a wrong one.
+  [[nodiscard]] double nearestDepth() const;
   [[nodiscard]] const DisparityImage& disparity() const { return disparity_; }
   [[nodiscard]] const DepthCounters& counters() const { return counters_; }
 

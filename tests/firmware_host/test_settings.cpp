@@ -5,8 +5,10 @@
 #include <string>
 
 #include "drivers/input/input_error.hpp"
+#include "firmware_host/settings/map_check.hpp"
 #include "firmware_host/settings/read_settings.hpp"
 #include "firmware_host/settings/registry.hpp"
+#include "tests/mapping/depth_scene.hpp"
 
 namespace swiftlet {
 namespace {
@@ -31,6 +33,15 @@ InputError overrideError(const std::string& assignment) {
   }
   FAIL("accepted: " << assignment);
   throw std::logic_error("unreachable");
+}
+
+TEST_CASE("a pair of cameras that measures nothing near is told, with a remedy") {
+  Rig rig = depth_scene::makeRig(CameraKind::kPinholeRadtan);
+  CHECK(nearDepthWarning(rig).empty());
+  rig.T_body_cam[1].translation.y() -= 1.5;
+  const std::string line = nearDepthWarning(rig);
+  CHECK(line.find("from 2.3 m on") != std::string::npos);
+  CHECK(line.find("shorter baseline") != std::string::npos);
 }
 
 TEST_CASE("the registry: keys once, groups together, defaults inside their bounds, everything explained") {

@@ -57,6 +57,25 @@ TEST_CASE("depth: a plane's depth comes out of the raw pair, with an honest sigm
   }
 }
 
+TEST_CASE("depth: a wide pair searches more disparities, so that depth begins within a metre") {
+  Rig rig = makeRig(CameraKind::kPinholeRadtan);
+  Eigen::Vector3d& second = rig.T_body_cam[1].translation;
+  second.y() = rig.T_body_cam[0].translation.y() - 0.44;  // four times as wide
+  DepthStage stage(rig);
+  REQUIRE(stage.status().ok());
+  DepthBuffer out = stage.makeBuffer();
+  // A metre in front of the cameras.
+  const Image left = seePlane(rig, 0, {1, 0, 0}, 1.1), right = seePlane(rig, 1, {1, 0, 0}, 1.1);
+  REQUIRE(stage.step(left.view(), right.view(), Stamp{42}, {}, out).ok());
+  const auto measured = std::ranges::count_if(out.depth, [](float z) { return std::abs(z - 1) < 0.02F; });
+  CHECK(static_cast<double>(measured) > 0.5 * static_cast<double>(out.depth.size()));
+  CHECK(stage.nearestDepth() < 1);
+  // As many as there are leave the rest.
+  second.y() -= 0.56;
+  CHECK(DepthStage(rig).nearestDepth() > 1);
+  CHECK(DepthStage(makeRig(CameraKind::kPinholeRadtan)).nearestDepth() == Approx(0.316).margin(0.001));
+}
+
 TEST_CASE("depth: labels follow into the rectified geometry") {
   const Rig rig = makeRig(CameraKind::kPinholeRadtan);
   DepthStage stage(rig);

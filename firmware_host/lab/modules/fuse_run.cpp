@@ -120,6 +120,7 @@ void FuseRun::begin() {
     map_ = std::make_unique<MapStage>(rig_, settings_.map_stage, &camera, &storage_, MapPoses::kGiven);
   } else {
     map_ = std::make_unique<MapStage>(rig_, settings_.map_stage, nullptr, &storage_, MapPoses::kGiven);
+    if (const std::string line = nearDepthWarning(rig_); !line.empty()) log_.warnings().add(line);
   }
   if (confusion) map_->setConfusion(*confusion);
   openKept();
