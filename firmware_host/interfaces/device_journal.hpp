@@ -15,8 +15,8 @@ namespace swiftlet {
 
 struct DeviceEvent {
   Stamp stamp;
-  DeviceFault fault;    ///< ok: the end of what stood
-  bool defect = false;  ///< of a device that works
+  DeviceFault fault;    ///< ok: the current fault has ended
+  bool defect = false;  ///< reported by a device that works
 };
 
 class DeviceJournal {
@@ -24,10 +24,10 @@ class DeviceJournal {
   /// `name`: as the user knows the device, "camera 0 (/dev/video0)".
   explicit DeviceJournal(std::string name) : name_(std::move(name)) {}
 
-  // Of the device's thread.
-  /// Noted where it is another fault than the one that stands.
+  // For the device's thread.
+  /// Notes the fault unless it is the current one.
   void fault(Stamp now, const DeviceFault& fault) {
-    // What went is not there while it is looked for: nothing new.
+    // While an unplugged device is searched for, it is missing: still the same fault.
     const bool still_gone =
         standing_ == DeviceFaultKind::kUnplugged && fault.kind == DeviceFaultKind::kMissing;
     if (standing_ == fault.kind || still_gone) return;
@@ -54,24 +54,24 @@ class DeviceJournal {
     defect_ = DeviceFaultKind::kNone;
     static_cast<void>(events_.tryPush({now, {}, true}));
   }
-  /// A line that ends nothing and needs no end: a setting that the device took otherwise.
+  /// Notes an event that has no end, for example a setting that the device applied differently.
   void note(Stamp now, const DeviceFault& what) { static_cast<void>(events_.tryPush({now, what, false})); }
   [[nodiscard]] DeviceFaultKind standing() const { return standing_; }
 
-  // Of the log's thread.
+  // For the log's thread.
   [[nodiscard]] bool next(DeviceEvent& event) { return events_.tryPop(event); }
   [[nodiscard]] std::string text(const DeviceEvent& event) const {
     if (!event.fault.ok()) return describe(event.fault, name_);
     return name_ + (event.defect ? ": normal again" : ": works again");
   }
 
-  // Of any.
+  // For any thread.
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] std::uint64_t faults() const { return faults_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::uint64_t lost() const { return events_.refused(); }
 
  private:
-  /// The log looks every few milliseconds; a device fails and returns a few times a second at most.
+  /// The log reads every few milliseconds; a device fails and recovers a few times a second at most.
   static constexpr std::size_t kEvents = 64;
 
   std::string name_;

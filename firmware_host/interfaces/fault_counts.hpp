@@ -1,5 +1,5 @@
 #pragma once
-// Counts of faults by their text, in fixed memory. Texts are literals: one is known by its address.
+// Counts of faults by text, in fixed memory. Texts are literals and are compared by address.
 
 #include <cstdint>
 
@@ -22,7 +22,7 @@ class FaultCounts {
         return;
       }
     }
-    // More kinds of faults than the stages have texts for do not happen; the total stays right.
+    // Never full: the stages have fewer texts. If it were, the total would still be right.
     if (!rows_.tryPushBack({status.what, 1})) ++rows_[0].count;
   }
   [[nodiscard]] const auto& rows() const { return rows_; }

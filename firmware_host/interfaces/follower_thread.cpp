@@ -63,13 +63,13 @@ void FollowerThread::repeat(double period, const std::function<void(double now)>
 }
 
 Follower::~Follower() {
-  // A thread that is left behind goes on using it.
+  // An abandoned thread still uses its work, so the work is leaked.
   if (work_ && !work_->end()) static_cast<void>(work_.release());
 }
 
 nlohmann::ordered_json Follower::finish() {
   const std::string& fault = work_->thread_.fault();
-  // What a thread that is left behind counts is still being written.
+  // An abandoned thread may still write its counters.
   if (!work_->end()) return {{"fault", fault}};
   nlohmann::ordered_json json = work_->json();
   if (!fault.empty()) json["fault"] = fault;

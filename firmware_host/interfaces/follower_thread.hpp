@@ -18,7 +18,7 @@ namespace swiftlet {
 
 class FollowerThread {
  public:
-  /// A run's end takes 2 s at most, should all three followers be stuck.
+  /// Limits the end of a run to 2 s if all three followers are stuck.
   static constexpr Duration kLongestEnd = Duration::fromMilliseconds(600);
 
   FollowerThread() = default;
@@ -30,22 +30,22 @@ class FollowerThread {
   /// started.
   void start(const ThreadSettings& settings, const std::string& file, const std::string& field,
              std::function<void()> entry);
-  /// Waits for the entry to return, which looks at ending(). False: it did not within `limit` and is given
-  /// up, now or by an earlier call.
+  /// Tells the entry to end and waits until it returns. False: it did not return within `limit` and is
+  /// abandoned, now or by an earlier call.
   [[nodiscard]] bool end(Duration limit = kLongestEnd);
-  /// Waits for nothing.
+  /// Requests the end without waiting for it.
   void tellEnd() { ending_.store(true, std::memory_order_relaxed); }
-  /// Of the entry, at each turn: beats. False: it is to return.
+  /// Called by the entry at each turn: beats. False: the entry must return.
   [[nodiscard]] bool turn();
 
-  /// Of the entry, which may say what it does; of the supervisor.
+  /// For the entry, which may note what it is doing, and for the supervisor.
   [[nodiscard]] Heartbeat& heart() { return heart_; }
   [[nodiscard]] const Heartbeat& heart() const { return heart_; }
   /// After end(): why it ended early or was abandoned; empty: it ended normally.
   [[nodiscard]] const std::string& fault() const { return fault_; }
 
-  /// For the entry: `work(now)` every `period` seconds of the host's clock, until it is to end. A thread that
-  /// came late does not hurry after.
+  /// For the entry: calls `work(now)` every `period` seconds of the host's clock until the thread must end.
+  /// Missed periods are skipped.
   void repeat(double period, const std::function<void(double now)>& work);
 
   /// For tests that throw or stall inside the thread: called on each follower's thread at each turn;
@@ -55,25 +55,26 @@ class FollowerThread {
  private:
   std::atomic<bool> ending_{false};
   bool abandoned_ = false;
-  bool returned_early_ = false;  ///< of the thread; read after its end
+  bool returned_early_ = false;  ///< written by the thread, read after it has ended
   Heartbeat heart_;
   std::string name_;
   std::string fault_;
   FlightThread thread_;
 };
 
-/// A follower of a run, as the run sees it. Each kind of follower derives its own Work, which starts the
-/// thread as the last step of its construction.
+/// A follower of a run, as the run sees it. Each kind of follower derives its own Work, whose constructor
+/// starts the thread last.
 class Follower {
  public:
   Follower(const Follower&) = delete;
   Follower& operator=(const Follower&) = delete;
 
-  /// For the supervisor; as long as this object.
+  /// For the supervisor; valid as long as this object.
   [[nodiscard]] const Heartbeat& heart() const { return work_->thread_.heart(); }
-  /// Tells it to end, and waits for nothing: so that several end at the same time.
+  /// Requests the end without waiting, so that several followers can end at the same time.
   void tellEnd() { work_->thread_.tellEnd(); }
-  /// Ends it and returns its counters for the summary; `fault`: why it ended early, or that it is stuck.
+  /// Ends the thread and returns its counters for the summary; `fault`: why it ended early, or that it is
+  /// stuck.
   nlohmann::ordered_json finish();
 
  protected:
@@ -84,7 +85,7 @@ class Follower {
     Work(const Work&) = delete;
     Work& operator=(const Work&) = delete;
 
-    /// False: the thread is stuck and was left behind, with all of this.
+    /// False: the thread is stuck and is abandoned together with this object.
     [[nodiscard]] virtual bool end() { return thread_.end(); }
     /// Its counters, after it has ended.
     [[nodiscard]] virtual nlohmann::ordered_json json() const = 0;
@@ -94,7 +95,7 @@ class Follower {
     friend Follower;
   };
   explicit Follower(std::unique_ptr<Work> work) : work_(std::move(work)) {}
-  /// Ends it; a thread that is stuck is left behind: its outlet has to stay then.
+  /// Ends the thread. A stuck thread is abandoned; its outlet must then stay alive.
   ~Follower();
 
   std::unique_ptr<Work> work_;

@@ -1,11 +1,11 @@
 #pragma once
-// Images of a run, and what was found in them, for one thread outside of the graph that shows them.
+// Images of a run and what was found in them, for one thread outside the graph that shows them.
 //
-// The cameras' threads lend it the slots in which their images lie, without a copy, up to kViewQuota of each
-// camera and 30 a second; `smooth` adds the tracks of these frames, `loop` the matches of each loop. All of
-// it only while `wanted`: otherwise each thread reads one flag and goes on. Threads: hand() from the camera's
-// own, wanted and tryPop() for the reader; sight and loop as Newest says. Memory: three of each value; the
-// slots are the graph's, and live as long as this.
+// The cameras' threads lend the slots that hold their images, without a copy: up to kViewQuota of each
+// camera, and 30 a second. `smooth` adds the tracks of these frames, `loop` the matches of each loop. All of
+// this happens only while `wanted` is set; otherwise each thread only reads the flag. Threads: each camera's
+// own thread calls hand(), the reader sets `wanted` and calls tryPop(); `sight` and `loop` as Newest. Memory:
+// three of each value. The slots belong to the graph's pools and live as long as this object.
 
 #include <Eigen/Core>
 #include <array>
@@ -36,18 +36,18 @@ struct SightNews {
   FixedVector<TrackedFeature, kMaxFeatures> features;
   LostSightings lost;
   bool has_pose = false;
-  FixedVector<TrackId, kMaxLandmarks> landmarks;  ///< of the window, in no order; where has_pose
+  FixedVector<TrackId, kMaxLandmarks> landmarks;  ///< of the window, unordered; only if has_pose
   std::uint32_t epoch = 0;
-  std::array<SE3, kMaxCameras> T_world_cam;  ///< where has_pose
+  std::array<SE3, kMaxCameras> T_world_cam;  ///< only if has_pose
 };
 
 /// A selected loop of this flight, just found.
 struct LoopNews {
   struct Match {
     Eigen::Vector2f now = Eigen::Vector2f::Zero();   ///< px of camera 0, in the keyframe
-    Eigen::Vector2f then = Eigen::Vector2f::Zero();  ///< in the older one
+    Eigen::Vector2f then = Eigen::Vector2f::Zero();  ///< px of camera 0, in the older keyframe
   };
-  static constexpr std::size_t kMost = 100;  ///< matches; the rest is left out
+  static constexpr std::size_t kMost = 100;  ///< matches; further ones are omitted
 
   Stamp stamp;  ///< of the keyframe
   Stamp old_stamp;
@@ -55,7 +55,7 @@ struct LoopNews {
   FixedVector<Match, kMost> matches;
 };
 
-/// Of a fast camera the first image in each period: the same ones for all who ask with the same stamps.
+/// Selects the first image of a fast camera in each period. Equal stamps give equal decisions.
 class ShownInstants {
  public:
   static constexpr std::int64_t kPeriod = 33'333'333;  ///< ns: images of 30 Hz and slower pass
@@ -72,13 +72,13 @@ class ShownInstants {
 struct ImageFeed {
   using Ring = SpscRing<SlotHandle, kViewQuota>;
 
-  /// Of the camera's thread: lends the image that it holds.
+  /// For the camera's thread: lends the image that it holds.
   void hand(std::size_t camera, SlotHandle handle, Stamp stamp) {
     if (!wanted.load(std::memory_order_relaxed) || !instants[camera].take(stamp)) return;
     if (!pool[camera]->tryHand(handle, kViewReads)) return;
     if (!handles[camera].tryPush(handle)) pool[camera]->takeBack(handle, kViewReads);
   }
-  /// Of the reader. False: nothing waits.
+  /// For the reader. False: no image is waiting.
   bool tryPop(std::size_t camera, ImagePool::Loan& loan) {
     SlotHandle handle;
     if (!handles[camera].tryPop(handle)) return false;
@@ -87,9 +87,9 @@ struct ImageFeed {
   }
 
   std::atomic<bool> wanted{false};
-  std::array<std::shared_ptr<ImagePool>, kMaxCameras> pool;  ///< of the graph, before its first image
+  std::array<std::shared_ptr<ImagePool>, kMaxCameras> pool;  ///< set by the graph before the first image
   std::array<Ring, kMaxCameras> handles;
-  std::array<ShownInstants, kMaxCameras> instants;  ///< each of its camera's thread
+  std::array<ShownInstants, kMaxCameras> instants;  ///< each used by its camera's thread
   Newest<SightNews> sight;
   Newest<LoopNews> loop;
 };

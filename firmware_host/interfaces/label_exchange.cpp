@@ -21,7 +21,7 @@ std::int64_t LabelExchange::bytes() const { return std::int64_t{2 * kPlaces + kE
 int LabelExchange::open(Stamp stamp, const ImageView& image) {
   for (std::size_t i = 0; i < kPlaces; ++i) {
     Place& place = places_[i];
-    // With acquire: what the other side read and wrote there is over.
+    // Acquire: the other side's accesses to this place have finished.
     if (place.state.load(std::memory_order_acquire) != State::kFree) continue;
     place.stamp = stamp;
     place.number = ++opened_;
@@ -48,7 +48,7 @@ ImageView LabelExchange::labels(int place) const {
 
 void LabelExchange::free(int place) { at(place).state.store(State::kFree, std::memory_order_release); }
 
-/// Takes hold of it.
+/// Leaves the returned place in state kBusy.
 LabelExchange::Place* LabelExchange::oldestUnseen() {
   Place* oldest = nullptr;
   for (Place& place : places_) {
@@ -63,7 +63,7 @@ LabelExchange::Place* LabelExchange::oldestUnseen() {
   return oldest;
 }
 
-/// False: no place waits for them.
+/// False: no place waits for labels of this stamp.
 bool LabelExchange::hand(Stamp stamp, const ImageView& labels) {
   for (Place& place : places_) {
     State state = State::kOpen;
@@ -87,7 +87,7 @@ void LabelExchange::offer(Stamp stamp, const ImageView& labels) {
     ++counters_.wrong_size;
     return;
   }
-  // Read before the places are: a stamp that is opened meanwhile is early, and is offered again.
+  // Read before the places: a stamp opened meanwhile counts as early and is offered again.
   const std::int64_t newest = newest_.load(std::memory_order_acquire);
   if (hand(stamp, labels)) return;
   if (stamp.ns <= newest) {

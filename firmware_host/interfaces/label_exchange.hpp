@@ -29,9 +29,9 @@ class LabelExchange {
   struct Counters {
     std::uint64_t shown = 0;       ///< images
     std::uint64_t offered = 0;     ///< labels
-    std::uint64_t taken = 0;       ///< into a place that waited for them
-    std::uint64_t wrong_size = 0;  ///< not camera 0's
-    std::uint64_t unawaited = 0;   ///< too late, or of no frame that is mapped
+    std::uint64_t taken = 0;       ///< copied into a waiting place
+    std::uint64_t wrong_size = 0;  ///< size differs from camera 0's
+    std::uint64_t unawaited = 0;   ///< too late, or of a frame that is not mapped
   };
 
   /// Size of camera 0's images. `patience`: how long the map may hold a frame.
@@ -42,14 +42,15 @@ class LabelExchange {
 
   // The map's thread.
 
-  /// The place that now holds a copy of `image`, of this exchange's size; -1: none is free.
+  /// Copies `image`, which has this exchange's size, into a free place and returns that place; -1: none is
+  /// free.
   int open(Stamp stamp, const ImageView& image);
-  /// Its image, until freed.
+  /// The place's image; valid until free().
   [[nodiscard]] ImageView image(int place) const { return viewOf(at(place).image); }
   [[nodiscard]] bool isLabelled(int place) const {
     return at(place).state.load(std::memory_order_acquire) == State::kLabelled;
   }
-  /// From then on the other side leaves it alone. False: it is at it right now.
+  /// After success the other side leaves the place alone. False: the other side is using it right now.
   [[nodiscard]] bool tryClose(int place);
   /// Labels of a closed place; empty if none arrived.
   [[nodiscard]] ImageView labels(int place) const;
@@ -60,7 +61,7 @@ class LabelExchange {
   // The other side's thread.
 
   void setLabeller(bool present) { has_labeller_.store(present, std::memory_order_relaxed); }
-  /// Calls `take(stamp, image)` for the oldest image that was not shown yet; false: there is none.
+  /// Calls `take(stamp, image)` for the oldest image not shown yet. False: there is none.
   template <typename Take>
   bool show(Take&& take) {
     Place* const place = oldestUnseen();
@@ -74,7 +75,7 @@ class LabelExchange {
     take(place->stamp, viewOf(place->image));
     return true;
   }
-  /// Labels of the image of `stamp`; copied where somebody waits for them.
+  /// Offers labels of the image with this stamp. They are copied if a place waits for them.
   void offer(Stamp stamp, const ImageView& labels);
   /// Call periodically: offers early labels again.
   void retryEarly();
@@ -84,7 +85,7 @@ class LabelExchange {
   enum class State : std::uint32_t {
     kFree,
     kOpen,
-    kBusy,      ///< the other side's for a moment
+    kBusy,      ///< in use by the other side for a moment
     kLabelled,  ///< open, with labels
     kClosed,
   };
@@ -112,10 +113,10 @@ class LabelExchange {
   int width_, height_;
   Duration patience_;
   std::array<Place, kPlaces> places_;
-  std::atomic<std::int64_t> newest_{kNever};  ///< stamp of those that were opened
+  std::atomic<std::int64_t> newest_{kNever};  ///< stamp of the place opened last
   std::atomic<bool> has_labeller_{false};
-  std::uint64_t opened_ = 0;  ///< of the map's thread
-  // Of the other side's.
+  std::uint64_t opened_ = 0;  ///< for the map's thread
+  // For the other side's thread.
   std::uint64_t last_shown_ = 0;
   std::array<Early, kEarly> early_;
   std::size_t next_early_ = 0;

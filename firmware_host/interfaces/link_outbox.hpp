@@ -37,11 +37,11 @@ class LinkOutbox {
   LinkOutbox(const LinkOutbox&) = delete;
   LinkOutbox& operator=(const LinkOutbox&) = delete;
 
-  // Of the sender.
+  // For the sender.
   [[nodiscard]] bool attended() const { return attended_.load(std::memory_order_acquire); }
-  /// The autopilot at the other end reports to be PX4.
+  /// Whether the autopilot at the other end reports that it is PX4.
   [[nodiscard]] bool px4() const { return px4_.load(std::memory_order_relaxed); }
-  /// False: there is no room, or it is too long.
+  /// False: there is no room, or `bytes` is too long.
   [[nodiscard]] bool push(std::span<const std::uint8_t> bytes) {
     if (bytes.size() > kMostBytes) return false;
     Bytes* slot = ring_.beginPush();
@@ -53,23 +53,23 @@ class LinkOutbox {
     return true;
   }
 
-  // Of the owner.
+  // For the owner.
   void attend(bool attended) { attended_.store(attended, std::memory_order_release); }
   void tellPx4(bool px4) { px4_.store(px4, std::memory_order_relaxed); }
-  /// To poll for reading: something waits.
+  /// Poll for reading: readable while something is queued.
   [[nodiscard]] int descriptor() const { return wake_; }
   /// Resets the wake-up; call before taking queued messages.
   void hush() const {
     eventfd_t pushes = 0;
     static_cast<void>(eventfd_read(wake_, &pushes));
   }
-  /// The oldest that waits, until pop(); null: nothing does.
+  /// The oldest queued push, valid until pop(); null: nothing is queued.
   [[nodiscard]] const Bytes* front() { return ring_.front(); }
   void pop() { ring_.pop(); }
 
  private:
-  // Two periods of poses at the default rate, with a text and obstacles each: a link that holds more back
-  // than that is too slow, and poses that waited longer are of no use.
+  // Two periods of poses at the default rate, each with a text and obstacles. A link with a longer backlog is
+  // too slow, and poses that waited longer are useless.
   static constexpr std::size_t kPushes = 8;
 
   int wake_;

@@ -20,10 +20,10 @@ namespace {
 
 constexpr std::string_view kUdp = "udp:";
 constexpr std::int64_t kNanosecondsPerMillisecond = 1'000'000;
-/// Datagrams of others that one read passes over: some 30 us of work.
+/// Most datagrams from other senders that one read discards: about 30 us of work.
 constexpr int kMostForeign = 16;
 
-/// Where MAVLink frames begin, of version 1 and 2.
+/// First bytes of MAVLink frames, versions 1 and 2.
 constexpr std::uint8_t kFrameBegin1 = 0xFE;
 constexpr std::uint8_t kFrameBegin2 = 0xFD;
 
@@ -37,8 +37,8 @@ std::uint16_t portOf(std::string_view text, std::string_view device, const char*
   return port;
 }
 
-/// The kernel drops datagrams of other hosts before they wake anybody or fill the buffer. Where it cannot,
-/// they are dropped as they are read.
+/// Makes the kernel drop datagrams from other hosts before they wake a thread or fill the buffer. If it
+/// cannot, read() drops them.
 void takeOnlyFrom(int socket, in_addr_t host) {
   constexpr std::uint32_t kSourceAddress = 12;  // in the IPv4 header
   std::array<sock_filter, 4> program = {
@@ -72,8 +72,7 @@ std::optional<UdpAddress> udpAddress(std::string_view device, const char* settin
 
 bool samePort(const std::string& a, const std::string& b) {
   if (a == b) return true;
-  // std::filesystem::equivalent does not compare devices. A port that is not there is reported when it is
-  // opened.
+  // std::filesystem::equivalent does not compare devices. A missing port is reported when it is opened.
   struct stat of_a = {}, of_b = {};
   if (::stat(a.c_str(), &of_a) != 0 || ::stat(b.c_str(), &of_b) != 0) return false;
   return S_ISCHR(of_a.st_mode) && S_ISCHR(of_b.st_mode) && of_a.st_rdev == of_b.st_rdev;
@@ -119,8 +118,8 @@ DeviceFault LinkPort::openUdp() {
     return deviceFault(errno == EADDRINUSE ? DeviceFaultKind::kBusy : DeviceFaultKind::kFailed, errno,
                        "UDP port %d", udp_->own_port);
   }
-  // Whoever hears of our port by our datagrams answers from where they go to. An agreed port is sent to from
-  // any.
+  // Without an agreed port, the other side learns our port from our datagrams and answers from the port they
+  // go to, so the socket can be connected. To an agreed port, the other side may send from any port.
   if (udp_->own_port == 0 &&
       ::connect(socket_, reinterpret_cast<const sockaddr*>(&peer_), sizeof(peer_)) != 0) {
     return openFault(errno, "UDP socket");
@@ -149,7 +148,8 @@ DeviceFault LinkPort::read(std::span<std::uint8_t> into, std::size_t& count, Sta
     const ssize_t got =
         ::recvfrom(socket_, into.data(), into.size(), 0, reinterpret_cast<sockaddr*>(&sender), &length);
     read_at = monotonicNow();
-    // An autopilot that is not up yet answers our datagrams by ICMP: no fault, and no end of what waits.
+    // ECONNREFUSED: ICMP answer of a host where the autopilot is not running yet. That is no fault, and more
+    // datagrams may be waiting.
     if (got < 0 && errno != ECONNREFUSED) break;
     if (got <= 0 || sender.sin_addr.s_addr != peer_.sin_addr.s_addr) continue;
     count = static_cast<std::size_t>(got);
@@ -161,7 +161,7 @@ DeviceFault LinkPort::read(std::span<std::uint8_t> into, std::size_t& count, Sta
 
 bool LinkPort::flush() {
   std::size_t taken = 1;
-  // Each turn sends a byte at least, or is the last.
+  // Each pass sends at least one byte, or is the last.
   while (kept_begin_ < kept_end_ && taken > 0) {
     const auto rest = std::span<const std::uint8_t>(kept_).subspan(kept_begin_, kept_end_ - kept_begin_);
     if (!serial_.writeSome(rest, taken).ok()) return false;
@@ -192,7 +192,7 @@ DeviceFault LinkPort::sendDatagram(std::span<const std::uint8_t> bytes) {
                     sizeof(peer_));
   };
   ssize_t sent = send();
-  // The answer to an earlier datagram: nobody was there. This one has not been tried yet.
+  // ECONNREFUSED answers an earlier datagram that had no receiver; this one has not been sent yet.
   if (sent < 0 && errno == ECONNREFUSED) sent = send();
   if (sent == static_cast<ssize_t>(bytes.size()) || errno == ECONNREFUSED) return {};
   return deviceFault(DeviceFaultKind::kFailed, errno, "the datagram was not accepted");

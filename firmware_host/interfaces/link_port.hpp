@@ -24,7 +24,7 @@
 
 namespace swiftlet {
 
-/// Where datagrams go.
+/// Destination of datagrams.
 struct UdpAddress {
   std::string host;
   std::uint16_t port = 0;
@@ -34,7 +34,7 @@ struct UdpAddress {
 /// Empty if `device` does not start with "udp:". InputError naming `setting` if it is malformed.
 std::optional<UdpAddress> udpAddress(std::string_view device, const char* setting);
 
-/// Whether two settings name one port: by the same words, or by two names of one serial port.
+/// Whether two settings name the same port: equal texts, or two names of one serial port.
 bool samePort(const std::string& a, const std::string& b);
 
 class LinkPort {
@@ -42,7 +42,7 @@ class LinkPort {
   /// The longest write.
   static constexpr std::size_t kMostWritten = 2048;
 
-  /// InputError as udpAddress().
+  /// Throws InputError like udpAddress().
   LinkPort(const std::string& device, unsigned baud, const char* setting = "autopilot.device");
   ~LinkPort() { close(); }
   LinkPort(const LinkPort&) = delete;
@@ -52,16 +52,16 @@ class LinkPort {
   DeviceFault open();
   void close();
   [[nodiscard]] bool isOpen() const { return descriptor() >= 0; }
-  /// To poll for reading; below 0: closed.
+  /// Poll for reading; negative: closed.
   [[nodiscard]] int descriptor() const { return udp_ ? socket_ : serial_.descriptor(); }
 
-  /// Waits until bytes are there or `most` has passed.
+  /// Waits until bytes have arrived or `most` has passed.
   void wait(Duration most);
-  /// What is there; `count` may be 0. Passes over a bounded number of others' datagrams.
+  /// Reads what has arrived; `count` may be 0. Discards a bounded number of datagrams from other senders.
   DeviceFault read(std::span<std::uint8_t> into, std::size_t& count, Stamp& read_at);
-  /// Accepts all of `bytes`, at most kMostWritten, or none: kUnplugged, or kFailed while there is no room.
+  /// Accepts all of `bytes`, at most kMostWritten, or none: kUnplugged, or kFailed if there is no room.
   DeviceFault write(std::span<const std::uint8_t> bytes);
-  /// Sends bytes kept from an earlier write. True: none are left.
+  /// Sends bytes kept from an earlier write. True: no bytes are left.
   bool flush();
 
   /// UDP, when open: the port on which answers arrive.
@@ -79,7 +79,7 @@ class LinkPort {
   sockaddr_in peer_ = {};
   bool peer_known_ = false;
   int socket_ = -1;
-  // What the serial port still has to take.
+  // Bytes that the serial port has not accepted yet.
   std::array<std::uint8_t, kMostWritten> kept_;
   std::size_t kept_begin_ = 0, kept_end_ = 0;
 };

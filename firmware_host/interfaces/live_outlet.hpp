@@ -20,7 +20,7 @@
 
 namespace swiftlet {
 
-/// A frame that was smoothed, or waits to be.
+/// A frame that was smoothed or waits for initialization.
 struct FrameNews {
   Stamp stamp;
   bool has_state = false;
@@ -28,42 +28,42 @@ struct FrameNews {
   Health health = Health::kInitializing;
   std::uint32_t epoch = 0;
   FrameStatistics statistics;
-  double since_arrival = 0;  ///< from the image's arrival until here, on the host's clock [s]
+  double since_arrival = 0;  ///< from the image's arrival until this was written, on the host's clock [s]
 };
 
 /// Vertices of the map's surface, in the map's axes.
 struct SurfaceNews {
-  static constexpr std::size_t kMost = 200'000;  ///< the rest is left out
+  static constexpr std::size_t kMost = 200'000;  ///< vertices; further ones are omitted
 
   SurfaceNews() { vertices.reserve(kMost); }
 
-  Stamp stamp;  ///< of the frame that was mapped last
+  Stamp stamp;  ///< of the newest mapped frame
   std::vector<SurfaceVertex> vertices;
 };
 
 /// Values of the map's distance field at the vehicle's last mapped position.
 struct ObstacleNews {
-  Stamp stamp;  ///< of that frame
+  Stamp stamp;  ///< of the mapped frame
   SE3 T_map_body;
   DistanceSample nearest;  ///< at the body
 };
 
 struct LiveOutlet {
-  Newest<StateNews> state;           ///< of `propagate`: at every IMU sample
-  Newest<FrameNews> frame;           ///< of `smooth`
-  Newest<LocalMesh> mesh;            ///< of `mesh`: over the horizon
-  Newest<MapCorrection> correction;  ///< of `loop`
-  Newest<SurfaceNews> surface;       ///< of `map`, each time that surface_wanted is set
+  Newest<StateNews> state;           ///< from `propagate`, at every IMU sample
+  Newest<FrameNews> frame;           ///< from `smooth`
+  Newest<LocalMesh> mesh;            ///< from `mesh`: mesh over the horizon
+  Newest<MapCorrection> correction;  ///< from `loop`
+  Newest<SurfaceNews> surface;       ///< from `map`, each time surface_wanted is set
   std::atomic<bool> surface_wanted{false};
-  Newest<ObstacleNews> obstacle;      ///< of `map`: with every frame that is mapped
-  Newest<Verdict> verdict;            ///< of the supervisor, ten times a second: readers check its age
-  std::unique_ptr<ImageFeed> images;  ///< null: its reader shows none
+  Newest<ObstacleNews> obstacle;      ///< from `map`, for every mapped frame
+  Newest<Verdict> verdict;            ///< from the supervisor, ten times a second; readers check its age
+  std::unique_ptr<ImageFeed> images;  ///< null: the reader shows no images
 };
 
-/// One for each thread that listens.
+/// One for each thread that reads results.
 using LiveOutlets = FixedVector<LiveOutlet*, 4>;
 
-/// The one among them whose reader shows images; null: there is none.
+/// The first image feed among the outlets; null: no reader shows images.
 inline ImageFeed* imageFeedOf(const LiveOutlets& outlets) {
   for (LiveOutlet* outlet : outlets) {
     if (outlet->images) return outlet->images.get();

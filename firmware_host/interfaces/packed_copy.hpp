@@ -8,7 +8,7 @@
 
 namespace swiftlet {
 
-/// `to` has width * height bytes; the view of it, empty if `from` is.
+/// `to` has width * height bytes. Returns a view of the copy; empty if `from` is empty.
 inline ImageView packedCopy(const ImageView& from, std::uint8_t* to) {
   if (from.empty()) return {};
   for (int y = 0; y < from.height; ++y)

@@ -8,7 +8,7 @@
 namespace swiftlet {
 
 struct RunControl {
-  const std::atomic<bool>* stop = nullptr;  ///< set: end cleanly after the current message
+  const std::atomic<bool>* stop = nullptr;  ///< when true: end cleanly after the current message
   /// Called with the number of images, or frames of tracks, taken so far.
   std::function<void(std::uint64_t)> progress;
 

@@ -16,13 +16,13 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::array kHealths{Health::kInitializing, Health::kGood, Health::kDegraded, Health::kFailed};
 constexpr double kDegrees = 180.0 / M_PI;
-// Shorter than this a doubt is not worth a line.
-constexpr double kWorthTelling = 0.05;  // of the run's time
-constexpr double kNoisyTracks = 1.5;    // of the noise set
-constexpr double kNoisyImu = 1.5;       // likewise
-constexpr double kBentGyro = 0.01;      // of a reading: two sigmas of a sensor as it leaves the factory
+// A doubt that lasts a smaller share of the run is not reported.
+constexpr double kWorthTelling = 0.05;  // share of the run's time
+constexpr double kNoisyTracks = 1.5;    // times the configured noise
+constexpr double kNoisyImu = 1.5;       // times the configured noise
+constexpr double kBentGyro = 0.01;      // of a reading: two sigmas of a typical new sensor
 
-/// What to look at first.
+/// What to check first.
 const char* remedy(Doubt doubt) {
   switch (doubt) {
     case Doubt::kNoImage:
@@ -56,7 +56,7 @@ const char* remedy(Doubt doubt) {
 void RunVerdict::add(Stamp stamp, const OdometryOutput& output) {
   const Health health = output.has_state ? output.state.health : Health::kInitializing;
   const Doubt doubt = output.has_state ? output.doubt : Doubt::kSettling;
-  // Each frame stands for the time since the one before.
+  // Each frame counts for the time since the previous frame.
   const double seconds = last_ ? std::max(0.0, (stamp - *last_).seconds()) : 0;
   last_ = stamp;
   seconds_ += seconds;

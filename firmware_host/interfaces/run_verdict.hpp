@@ -16,18 +16,18 @@ namespace swiftlet {
 
 class RunVerdict {
  public:
-  /// A frame's answer; without a state it counts as initializing.
+  /// Adds a frame's output; a frame without a state counts as initializing.
   void add(Stamp stamp, const OdometryOutput& output);
 
-  /// Of the run's time, from the first image on; 1 for a run without frames.
+  /// Share of the run's time with good health, from the first image on; 1 for a run without frames.
   [[nodiscard]] double shareGood() const;
-  /// The newest, where something of it is estimated.
+  /// The newest calibration, if any part of it is estimated; else null.
   [[nodiscard]] const CalibrationEstimate* estimatedCalibration() const;
   /// For summary.json: shares, doubts, sigmas, the estimated calibration if there is one, and `words`.
   [[nodiscard]] nlohmann::ordered_json json() const;
 
  private:
-  /// Lines for a person.
+  /// Human-readable lines.
   [[nodiscard]] std::vector<std::string> words() const;
   /// Mean of a sum over the time with a state; 0 without a state.
   [[nodiscard]] double mean(double sum) const { return state_seconds_ > 0 ? sum / state_seconds_ : 0; }
@@ -40,7 +40,7 @@ class RunVerdict {
   double state_seconds_ = 0;
   double pixel_sigma_s_ = 0;                                    ///< px s, over the time with a state
   double gyro_factor_s_ = 0, accel_factor_s_ = 0;               ///< s, over the time with a state
-  double first_pixel_sigma_ = 0;                                ///< as set
+  double first_pixel_sigma_ = 0;                                ///< as configured
   double pose_variance_factor_s_ = 0;                           ///< s, over the time with a state
   double top_speed_ = 0;                                        ///< m/s
   double largest_velocity_sigma_ = 0, largest_tilt_sigma_ = 0;  ///< m/s, rad, while good

@@ -29,10 +29,10 @@ class SensorSink {
   virtual ~SensorSink() = default;
 
   virtual void takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host) = 0;
-  /// Of the thread of camera 0, before its image.
+  /// Called by the thread of camera 0, before its image.
   virtual void takeScene(const SceneImages& scene) = 0;
   virtual void takeImage(const CameraFrame& image, const HostTimes& host) = 0;
-  /// Any thread: the input has ended, and its threads return.
+  /// Called by any thread: the input has ended and its threads return.
   virtual void expectEnd() {}
 };
 
@@ -40,9 +40,9 @@ class SensorInput {
  public:
   /// Priority level of a thread.
   enum class Level : std::uint8_t {
-    kSensor,   ///< a device's, at the priority of sensors
-    kLibrary,  ///< of a device whose library or decoder allocates and locks: below the flight path, like maps
-    kAhead,    ///< reads ahead from a file, at no priority
+    kSensor,   ///< a device's thread, at the priority of sensors
+    kLibrary,  ///< a device whose library or decoder allocates and locks: below the flight path, like the map
+    kAhead,    ///< reads ahead from a file, without real-time priority
   };
   struct Thread {
     const char* name = "";
@@ -57,12 +57,12 @@ class SensorInput {
   SensorInput& operator=(const SensorInput&) = delete;
   virtual ~SensorInput() = default;
 
-  /// The threads. Each ends when its input has ended, or soon after `control` requests a stop. Both outlive
-  /// them.
+  /// The threads of this input. Each ends when the input has ended, or soon after `control` requests a stop.
+  /// `sink` and `control` outlive them.
   virtual std::vector<Thread> threads(SensorSink& sink, const RunControl& control) = 0;
-  /// Any thread: images gone by so far.
+  /// Any thread: number of images handed over so far.
   [[nodiscard]] virtual std::uint64_t taken() const = 0;
-  /// Any thread: facts about its sensors that do not pass through the sink.
+  /// Any thread: adds facts about the sensors that do not pass through the sink.
   virtual void look(FlightFacts& /*facts*/) const {}
   /// After the threads have ended; throws the error that ended the input early.
   virtual void finish() {}

@@ -12,11 +12,11 @@ namespace swiftlet {
 
 class StateNews {
  public:
-  /// Of the state's error, from the first on: phi, p, v, bg.
+  /// Leading rows of the state's error that are sent: phi, p, v, bg.
   static constexpr int kTold = 12;
 
   StateNews() = default;
-  /// `omega_body`: of the sample, without bias [rad/s].
+  /// `omega_body`: angular rate of the sample, without bias [rad/s].
   StateNews(const NavState& state, const Eigen::Vector3d& omega_body);
 
   [[nodiscard]] const Eigen::Vector3d& omegaBody() const { return omega_body_; }
@@ -34,7 +34,7 @@ class StateNews {
   Eigen::Vector3d bias_gyro_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d bias_accel_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d omega_body_ = Eigen::Vector3d::Zero();
-  std::array<float, kTriangle> covariance_ = {};  ///< column by column, from the diagonal down
+  std::array<float, kTriangle> covariance_ = {};  ///< lower triangle, column by column from the diagonal down
 };
 
 }  // namespace swiftlet
