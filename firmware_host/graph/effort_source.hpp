@@ -1,5 +1,5 @@
 #pragma once
-// Where a thread asks what its stage may spend on the next frame, and says what it took.
+// Source of a stage's effort: the thread asks what the next step may spend, and reports what it took.
 
 #include "estimator/messages/effort.hpp"
 #include "firmware_host/realtime/effort_governor.hpp"
@@ -14,13 +14,13 @@ class EffortSource {
   virtual ~EffortSource() = default;
 
   [[nodiscard]] virtual Effort give() const = 0;
-  /// What the step that was given it was like.
+  /// Reports the timing of the step that ran with give()'s effort.
   virtual void took(const StepTiming& timing) = 0;
-  /// Steps below full effort.
+  /// Levels below full effort.
   [[nodiscard]] virtual int level() const = 0;
 };
 
-/// The same for every frame: lockstep, where time is no matter.
+/// The same effort for every frame: for lockstep, where timing does not matter.
 class ConstantEffort : public EffortSource {
  public:
   explicit ConstantEffort(const Effort& effort) : effort_(effort) {}
@@ -32,7 +32,8 @@ class ConstantEffort : public EffortSource {
   Effort effort_;
 };
 
-/// Less before a deadline is missed, more when there is room (effort_governor.hpp).
+/// Effort by the governor: lowered before a deadline is missed, raised when there is room
+/// (effort_governor.hpp).
 class GovernedEffort : public EffortSource {
  public:
   GovernedEffort(const EffortLadder& ladder, const GovernorSettings& settings)

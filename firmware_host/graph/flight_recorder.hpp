@@ -1,10 +1,10 @@
 #pragma once
-// Writes what the node `record` hands it, and keeps its promises in time: with the kernel every
-// kFlushSeconds, on the disk every kSyncSeconds.
+// Writes what the node `record` hands over. Data is flushed to the kernel every kFlushSeconds and synced to
+// disk every kSyncSeconds.
 //
-// What never came to the node is a loss record in its place, known by the gap in the numbers of samples and
-// images. Errors of the disk stay with the writer (status, statistics): nothing here could be done about
-// them.
+// Items that were lost before they reached the node are found by gaps in the numbers of samples and images,
+// and written as loss records in their place. Disk errors are kept by the writer (status, statistics);
+// nothing else handles them.
 
 #include <array>
 #include <atomic>
@@ -18,7 +18,7 @@ namespace swiftlet {
 class FlightRecorder {
  public:
   static constexpr double kFlushSeconds = 0.05;
-  static constexpr double kSyncSeconds = 0.4;  ///< and one sync's duration: below a second in all
+  static constexpr double kSyncSeconds = 0.4;  ///< together with the duration of one sync: less than a second
 
   FlightRecorder(const std::string& folder, const RecordingHeader& header) : writer_(folder, header) {}
 
@@ -34,17 +34,18 @@ class FlightRecorder {
   static constexpr std::array kStepKinds{RecordKind::kPropagateStep, RecordKind::kTrackStep,
                                          RecordKind::kSmoothStep,    RecordKind::kMeshStep,
                                          RecordKind::kLoopStep,      RecordKind::kMapStep};
-  /// Steps of each kind that were lost so far.
+  /// Number of steps of each kind lost so far.
   void noteLost(const std::array<std::uint64_t, kStepKinds.size()>& lost);
-  /// After each drain: flushes and syncs when it is time.
+  /// After each drain: flushes and syncs if it is time.
   void keepUp();
-  /// After the last drain: notes losses at the tail, from how many there were, and marks the end.
+  /// After the last drain: notes losses at the end, from the total numbers of samples and images, and marks
+  /// the end.
   void end(std::uint64_t imu_samples, const std::array<std::uint64_t, kMaxCameras>& images);
 
-  /// Any thread. No error of the disk so far.
+  /// Any thread. True: no disk error so far.
   [[nodiscard]] bool running() const { return running_.load(std::memory_order_relaxed); }
   [[nodiscard]] const RecordingStatistics& statistics() const { return writer_.statistics(); }
-  /// The first error of the disk, or ok.
+  /// The first disk error, or ok.
   [[nodiscard]] Status status() const { return writer_.status(); }
 
  private:

@@ -22,7 +22,7 @@ std::optional<FrameQueue::Refusal> FrameQueue::takeArrivals(Stamp newest_sample)
     bool any = false;
     for (std::size_t c = 0; c < cameras_; ++c) any = takeHead(c) || any;
     if (!any) break;
-    // Of two cameras' images the earlier goes first, however the threads ran.
+    // Of two cameras' images the earlier one goes first, independent of thread timing.
     std::size_t first = held_[0].has_head ? 0 : 1;
     if (held_[0].has_head && held_[1].has_head && held_[1].head().stamp < held_[0].head().stamp) first = 1;
     Held& held = held_[first];
@@ -35,7 +35,7 @@ std::optional<FrameQueue::Refusal> FrameQueue::takeArrivals(Stamp newest_sample)
       return refusal;
     }
   }
-  // Before the first sample nothing says how late it is.
+  // Before the first sample, a frame's lateness is unknown.
   const bool any_sample = newest_sample.ns != std::numeric_limits<std::int64_t>::min();
   while (any_sample && !waiting_.full() && pairing_.expire(newest_sample, paired_).ok()) push(paired_);
   return std::nullopt;
@@ -51,7 +51,7 @@ bool FrameQueue::takeHead(std::size_t camera) {
 }
 
 Status FrameQueue::pair(const CameraFrame& image) {
-  // Handed over while the other camera's first image of the new time line was on its way.
+  // The image was queued while the other camera's first image of the new time line was arriving.
   if (image.timeline < timeline_)
     return {StatusCode::kInvalidInput, "image from before the clock was restarted"};
   if (image.timeline > timeline_) {
@@ -115,8 +115,8 @@ HostTimes FrameQueue::hostTimes() const {
 bool FrameQueue::awaitsSamples() {
   if (sample_patience_.ns == 0 || told_) return false;
   constexpr std::int64_t kNoWait = std::numeric_limits<std::int64_t>::max();
-  // Written before the newest sample is read, as the IMU's thread reads it after its write: one of the two
-  // sees the other.
+  // awaited_imu_ is written before the newest sample is read; the IMU's thread does the reverse. So at least
+  // one of the two threads sees the other's write.
   const bool waited = awaited_imu_.exchange((waiting_.front().stamp + last_sample_).ns + 1) != kNoWait;
   bool waits = newestSample().ns < awaited_imu_.load();
   if (waits && wallSeconds() - hostTimes().arrival > sample_patience_.seconds()) {

@@ -10,7 +10,7 @@
 namespace swiftlet {
 namespace {
 
-/// Bytes that malloc has given out.
+/// Bytes currently allocated by malloc.
 std::int64_t heapBytes() {
   const struct mallinfo2 info = mallinfo2();
   return static_cast<std::int64_t>(info.uordblks + info.hblkhd);
@@ -50,8 +50,8 @@ Graph::Graph(const Rig& rig, const ImuNoise& noise, const Settings& settings, Ru
 
 Graph::~Graph() = default;
 
-// The system in one screen: from where, to where. Capacity, policy and counter of an arrow stand with the
-// reader's end, in the reader's header.
+// The whole system on one screen: every arrow, from writer to reader. Capacity, policy and counter of an
+// arrow are declared at the reader's end, in the reader's header.
 void Graph::connectNodes(const RunObserver& observer) {
   const GraphOptions& options = context_.options;
   SensorNode& sensors = *sensors_;
@@ -100,7 +100,7 @@ void Graph::connectNodes(const RunObserver& observer) {
     if (loop_) loop_->worlds.to(map_->worlds);
   }
 
-  // all that entered, and what each node took for a step -> recording
+  // everything that entered, and what each node used for a step -> recording
   if (record_) {
     RecordNode& record = *record_;
     sensors.imu_as_delivered.to(record.samples);

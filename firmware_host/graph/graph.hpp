@@ -1,15 +1,13 @@
 #pragma once
 // Every node of the system and the arrows between them. graph.cpp reads as the block diagram.
 //
-// The nodes are stepped by a schedule (firmware_host/schedule): all from one thread (lockstep), each from its
-// own (threaded), or as a recording says (recorded). The arrows are in fixed memory and nobody waits on them.
-// Nothing on the flight path (sensor, propagate, track, smooth, mesh) allocates or locks once the graph is
-// built.
+// A schedule (firmware_host/schedule) steps the nodes: all from one thread (lockstep), each from its own
+// (threaded), or as a recording says (recorded). Arrows have fixed memory and never block. Once the graph is
+// built, nothing on the flight path (sensor, propagate, track, smooth, mesh) allocates or locks.
 //
-// IMU samples go to their readers at once. `track` and `smooth` take those not later than the frame that they
-// work on, so that a frame never sees samples from beyond its stamp. From a log they come before the frame;
-// from devices they may come after it, and `track` waits for them, not longer than
-// GraphOptions::sample_patience.
+// IMU samples are passed to their readers at once. `track` and `smooth` take only samples up to the stamp of
+// their frame, so a frame never uses later samples. In a log these samples precede the frame. From devices
+// they may arrive after it: `track` waits for them, but not longer than GraphOptions::sample_patience.
 
 #include <map>
 #include <memory>
@@ -33,14 +31,14 @@ class MemoryTable;
 
 class Graph {
  public:
-  /// `settings` and `log` outlive it.
+  /// `settings` and `observer` outlive the graph.
   Graph(const Rig& rig, const ImuNoise& noise, const Settings& settings, RunObserver& observer,
         const GraphOptions& options);
   ~Graph();
   Graph(const Graph&) = delete;
   Graph& operator=(const Graph&) = delete;
 
-  /// Before the run: one node more, whose maker connects it.
+  /// Before the run: adds a node; the caller connects it.
   template <typename T>
   T& add(std::unique_ptr<T> node) {
     T& added = *node;
@@ -49,7 +47,7 @@ class Graph {
     return added;
   }
 
-  /// In the order of the stream, but the sensors, which have no turn.
+  /// In the order of the stream, without the sensor node, which has no turn.
   [[nodiscard]] std::span<Node* const> nodes() const { return nodes_; }
 
   [[nodiscard]] SensorNode& sensors() { return *sensors_; }
@@ -57,21 +55,21 @@ class Graph {
   [[nodiscard]] TrackNode& track() { return *track_; }
   [[nodiscard]] SmoothNode& smooth() { return *smooth_; }
   [[nodiscard]] LogNode& log() { return *log_; }
-  /// Null if switched off.
+  /// Null if disabled.
   [[nodiscard]] MeshNode* mesh() { return mesh_.get(); }
   [[nodiscard]] LoopNode* loop() { return loop_.get(); }
   [[nodiscard]] MappingNode* map() { return map_.get(); }
   [[nodiscard]] RecordNode* record() { return record_.get(); }
 
-  /// Any thread: what the supervisor asks of it.
+  /// Any thread: adds what the supervisor needs to know.
   void look(FlightFacts& facts) const;
-  /// After the run: what the nodes counted, found and lost, to the log.
+  /// After the run: reports to `observer` what the nodes counted, found and lost.
   void report(RunObserver& observer) const;
   /// What was reserved for what, by the constructor.
   void addReservations(MemoryTable& table) const;
 
  private:
-  /// Makes a node and notes what it reserved.
+  /// Makes a node and notes the memory it reserved.
   template <typename T, typename... Arguments>
   std::unique_ptr<T> make(Arguments&&... arguments);
   void connectNodes(const RunObserver& observer);

@@ -1,5 +1,5 @@
 #pragma once
-// What a run asks of its graph beside the settings.
+// What a run requests from its graph in addition to the settings.
 
 #include <functional>
 #include <optional>
@@ -22,40 +22,41 @@ class FlightRecorder;
 class RunObserver;
 
 struct GraphOptions {
-  bool imu_states = false;               ///< ask for RunListener::onImuState
-  bool meshes = false;                   ///< ask for RunListener::onMesh
-  FlightRecorder* recorder = nullptr;    ///< null: nothing is recorded
-  EffortSource* track_effort = nullptr;  ///< null: the settings' effort, always
+  bool imu_states = false;               ///< calls RunListener::onImuState
+  bool meshes = false;                   ///< calls RunListener::onMesh
+  FlightRecorder* recorder = nullptr;    ///< null: no recording
+  EffortSource* track_effort = nullptr;  ///< null: always the settings' effort
   EffortSource* smooth_effort = nullptr;
-  const DepthImageView* depth_sensor = nullptr;  ///< of the map; null: none, depth from the cameras
+  const DepthImageView* depth_sensor = nullptr;  ///< of the map; null: none, the cameras give depth
   std::optional<ConfusionModel> confusion;       ///< of the map's labels; empty: the settings' certainty
-  BlockStorage* storage = nullptr;         ///< of the map; null: what its volume has no room for is lost
-  const Vocabulary* vocabulary = nullptr;  ///< of loop closure; null: the shipped one; outlives the graph
-  const KeptGraph* kept_map = nullptr;     ///< of settings.loop.in_map; outlives the graph's constructor
-  /// Puts the kept map's volume into that of the map, by where the graph's nodes had it; empty: there is
-  /// none.
+  BlockStorage* storage = nullptr;         ///< of the map; null: blocks that do not fit the volume are lost
+  const Vocabulary* vocabulary = nullptr;  ///< for loop closure; null: the shipped one; outlives the graph
+  const KeptGraph* kept_map = nullptr;     ///< for settings.loop.in_map; outlives the graph's constructor
+  /// Puts the kept map's volume into the map's volume; `nodes`: poses of its nodes in the graph. Empty: there
+  /// is no kept map.
   std::function<void(MapSubmaps&, std::span<const WorldInMap> nodes)> kept_volume;
-  /// Longest wait of `track` after a frame's arrival for the samples up to its stamp, on the host's clock. 0:
-  /// no wait, the caller feeds the samples first.
+  /// Longest time `track` waits after a frame's arrival for the samples up to its stamp, on the host's clock.
+  /// 0: it does not wait; the caller feeds the samples first.
   Duration sample_patience{0};
-  LiveOutlets outlets;  ///< each gets the newest of everything; they outlive the graph
-  /// Over which labels come after their image; the map holds frames for them. Null: it does not wait.
+  LiveOutlets outlets;  ///< each gets all newest values; they outlive the graph
+  /// Exchange over which labels arrive after their images; the map holds frames for them. Null: it does not
+  /// wait.
   LabelExchange* labels = nullptr;
-  /// Called by `log` each time: what the input has to say of itself, to the log. True: there was something.
+  /// Called by `log` at each turn: passes the input's remarks to the observer. True: there were some.
   std::function<bool(RunObserver&)> remarks;
-  /// Called after a stage's work with its CPU seconds, within its wall time: tests slow stages down.
+  /// Called within a stage's measured wall time with its CPU seconds. Tests use it to slow stages down.
   std::function<void(StageId, double)> drag;
 };
 
-/// What all nodes of a graph share. `rig`: the cameras in use. It outlives the nodes.
+/// Shared by all nodes of a graph, which it outlives. `rig`: the cameras in use.
 struct GraphContext {
   Rig rig;
   ImuNoise noise;
   const Settings& settings;
   GraphOptions options;
-  StageTable times;  ///< each row is one node's
+  StageTable times;  ///< each row belongs to one node
 
-  /// Runs a stage's work and counts its time.
+  /// Runs a stage's work and records its time.
   template <typename Work>
   Spent timed(StageId stage, Work&& work) {
     if (!options.drag) return measured(work);

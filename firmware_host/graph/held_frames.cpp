@@ -57,9 +57,9 @@ const HeldFrames::Frame* HeldFrames::due(double now) {
   const bool nobody = !exchange_.hasLabeller();
   const bool late = now - frame.since > exchange_.patience().seconds();
   if (!labelled && !nobody && !late && !full()) return nullptr;
-  if (!exchange_.tryClose(frame.place)) return nullptr;  // labels are just coming
+  if (!exchange_.tryClose(frame.place)) return nullptr;  // labels are being written right now
   frame.scene.labels = exchange_.labels(frame.place);
-  // They may have come since.
+  // The labels may have arrived since isLabelled().
   ++(!frame.scene.labels.empty() ? counters_.labelled
      : nobody                    ? counters_.nobody
      : late                      ? counters_.late

@@ -20,19 +20,19 @@ class HeldFrames {
   struct Frame {
     MapMessage message;
     bool has_images = false;
-    std::array<std::uint64_t, kMaxCameras> number{};  ///< of each camera's image
+    std::array<std::uint64_t, kMaxCameras> number{};  ///< number of each camera's image
     std::array<ImageView, kMaxCameras> image;
     SceneImages scene;  ///< empty if there is none
 
-    // Of HeldFrames.
-    int place = -1;    ///< of the exchange; -1: waits for nothing
-    double since = 0;  ///< host time [s]
+    // Used by HeldFrames.
+    int place = -1;    ///< in the exchange; -1: waits for no labels
+    double since = 0;  ///< host time at which it was held [s]
     std::array<std::vector<std::uint8_t>, kMaxCameras> pixels;
     std::vector<float> depth;
     std::vector<std::uint8_t> labels;
   };
 
-  /// `depth_pixels`: of the depth sensor, 0 without. The exchange outlives it.
+  /// `depth_pixels`: size of the depth sensor's image; 0: no sensor. The exchange outlives this object.
   HeldFrames(LabelExchange& exchange, const std::array<std::size_t, kMaxCameras>& pixels,
              std::size_t depth_pixels);
 
@@ -40,9 +40,9 @@ class HeldFrames {
   [[nodiscard]] bool full() const { return count_ == frames_.size(); }
   [[nodiscard]] std::int64_t bytes() const;
 
-  /// While not full. `images` null: they are gone.
+  /// Adds a frame; not when full. `images` null: they are no longer available.
   void hold(const MapMessage& message, const KeyframeImages* images, const SceneImages& scene, double now);
-  /// The oldest, once it is to be mapped; then drop() it.
+  /// The oldest frame, if it is due for mapping; call drop() after mapping it.
   [[nodiscard]] const Frame* due(double now);
   void drop();
 
@@ -52,7 +52,7 @@ class HeldFrames {
   LabelExchange& exchange_;
   std::array<Frame, LabelExchange::kPlaces> frames_;
   std::size_t first_ = 0, count_ = 0;
-  bool taken_ = false;  ///< due() gave the oldest
+  bool taken_ = false;  ///< due() has returned the oldest
   HeldFrameCounters counters_;
 };
 

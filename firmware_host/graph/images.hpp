@@ -1,5 +1,5 @@
 #pragma once
-// Images between nodes, lent by handle; the cameras' own: firmware_host/interfaces/image_pool.hpp.
+// Images passed between nodes, lent by handle. The cameras' own: firmware_host/interfaces/image_pool.hpp.
 
 #include <array>
 #include <cstdint>
@@ -15,8 +15,8 @@
 
 namespace swiftlet {
 
-/// Images of a keyframe, copied by `track`: the threads that look at keyframes are slow, and would otherwise
-/// hold the cameras' slots. `image` shows `pixels`; empty if missing.
+/// Images of a keyframe, copied by `track`: threads that process keyframes are slow and would otherwise hold
+/// the cameras' slots. `image` shows `pixels`; empty if missing.
 struct KeyframeImages {
   std::uint64_t frame = 0;  ///< StereoFrame::index
   std::array<std::uint64_t, kMaxCameras> number{};
@@ -26,14 +26,14 @@ struct KeyframeImages {
 
 enum KeyframeImageReader : std::size_t { kLoopReads, kMapReads, kKeyframeReaders };
 
-/// Frames that wait for the map: as kLoopKeyframes.
+/// Frames that wait for the map; as many as kLoopKeyframes.
 inline constexpr std::size_t kMapFrames = 4;
-/// As kMeshQuota.
+/// Composed like kMeshQuota.
 inline constexpr std::uint32_t kLoopQuota = kLoopKeyframes + 2;
 inline constexpr std::uint32_t kMapQuota = kMapFrames + 2;
 using KeyframePool = SlotPool<KeyframeImages, 1 + kLoopQuota + kMapQuota, kKeyframeReaders>;
 
-/// Depth and labels in their slot; `images` shows `depth` and `labels`.
+/// Slot with depth and labels; `images` shows `depth` and `labels`.
 struct SceneSlot {
   SceneImages images;
   std::vector<float> depth;
@@ -41,7 +41,7 @@ struct SceneSlot {
 };
 using ScenePool = SlotPool<SceneSlot, 1 + kMapQuota, 1>;
 
-/// Of each camera's image; 0 for one that is not in use.
+/// Number of pixels of each camera's image; 0 for a camera that is not in use.
 inline std::array<std::size_t, kMaxCameras> pixelsOf(const Rig& rig) {
   std::array<std::size_t, kMaxCameras> pixels{};
   for (std::size_t c = 0; c < rig.camera_count; ++c) {
@@ -50,8 +50,8 @@ inline std::array<std::size_t, kMaxCameras> pixelsOf(const Rig& rig) {
   return pixels;
 }
 
-using ImageIn = SlotIn<ImagePool, kTrackReads, kImageRing>;      ///< of `track`
-using MeshImageIn = SlotIn<ImagePool, kMeshReads, kMeshImages>;  ///< of `mesh`
+using ImageIn = SlotIn<ImagePool, kTrackReads, kImageRing>;      ///< for `track`
+using MeshImageIn = SlotIn<ImagePool, kMeshReads, kMeshImages>;  ///< for `mesh`
 using RecordedImageIn = SlotIn<ImagePool, kRecordReads, kRecordQuota>;
 using LoopImagesIn = SlotIn<KeyframePool, kLoopReads, kLoopKeyframes>;
 using MapImagesIn = SlotIn<KeyframePool, kMapReads, kMapFrames>;

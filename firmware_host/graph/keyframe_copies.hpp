@@ -1,6 +1,6 @@
 #pragma once
-// Copies of a frame's images for the nodes that look at keyframes: those are slow, and would otherwise hold
-// the cameras' slots. Of `track`'s thread. Memory: a pool of KeyframeImages once a reader is connected.
+// Copies of a frame's images for the nodes that process keyframes: they are slow and would otherwise hold the
+// cameras' slots. Used by the thread of `track`. Memory: a pool of KeyframeImages once a reader is connected.
 
 #include <array>
 #include <cstdint>
@@ -17,13 +17,13 @@ class KeyframeCopies {
  public:
   explicit KeyframeCopies(Node& track) : track_(track) {}
 
-  /// `pixels`: of each camera's image.
+  /// `pixels`: size of each camera's image.
   void to(LoopImagesIn& in, const std::array<std::size_t, kMaxCameras>& pixels) { lend(in, loop_, pixels); }
   void to(MapImagesIn& in, const std::array<std::size_t, kMaxCameras>& pixels) { lend(in, map_, pixels); }
   /// Returns whether the map receives the images; does nothing if no reader is connected.
   bool send(const StereoFrame& frame, bool to_loop, bool to_map);
-  /// Recorded schedule: images are available on request, so none is copied. Whether the map receives those of
-  /// the next frame.
+  /// Recorded schedule: images are available on request, so none are copied. `mapped`: whether the map
+  /// receives those of the next frame.
   void tell(bool mapped) { told_ = mapped; }
 
  private:

@@ -3,7 +3,7 @@
 namespace swiftlet {
 namespace {
 
-/// Gives all that waits to `take`; whether there was anything.
+/// Passes every queued value to `take`. Returns whether there were any.
 template <typename Queue, typename Take>
 bool drain(Queue& queue, Take&& take) {
   bool any = false;
@@ -24,7 +24,7 @@ bool LogNode::turn() {
   any = drain(meshes, [this](const MeshResult& result) { observer_.onMesh(result); }) || any;
   any = drain(states, [this](const NavState& state) { observer_.onImuState(state); }) || any;
   if (const FrameResult* result = results.front(); result != nullptr) {
-    // What the smoother had, so that a repetition of the run keeps the same.
+    // Takes the samples that the smoother took, so that a repetition of the run keeps the same ones.
     if (result->kind == TrackMessage::Kind::kFrame) samples.takeUpTo(result->step.samples, observer_);
     if (result->kind == TrackMessage::Kind::kEnd) samples.takeUpTo(SampleIn::kNoLimit, observer_);
     observer_.onResult(*result);

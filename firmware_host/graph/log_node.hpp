@@ -1,8 +1,9 @@
 #pragma once
-// The node `log`: what the run finds, to its listener (run_observer.hpp), and the keyframes and samples to be
-// kept.
+// The node `log`: passes what the run finds to its listener (run_observer.hpp), and keeps keyframes and
+// samples for full smoothing.
 //
-// When it falls behind: results, states and meshes are lost to the files, counted, not to the estimate.
+// When it falls behind: results, states and meshes are missing in the files, counted; the estimate is not
+// affected.
 
 #include "firmware_host/graph/graph_options.hpp"
 #include "firmware_host/graph/messages.hpp"

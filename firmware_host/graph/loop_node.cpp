@@ -7,7 +7,7 @@
 namespace swiftlet {
 namespace {
 
-/// The flight's, and beside it room for a kept map.
+/// The flight's limits, with additional room for a kept map.
 LoopLimits limitsBeside(const KeptGraph* kept) {
   LoopLimits limits;
   if (kept == nullptr) return limits;
@@ -113,7 +113,7 @@ void listWorlds(const LoopStage& stage, WorldsInMap& out) {
   std::size_t room = out.keyframes.capacity(), flown = 0;
   for (std::size_t i = 0; i < kept; i += kept_step) room -= isListed(i) ? 1 : 0;
   for (std::size_t i = kept; i < stage.nodeCount(); ++i) flown += isListed(i) ? 1 : 0;
-  // More than fit, once nodes of the flight have taken the room of kept ones.
+  // The flight's nodes may exceed the room that the kept map's nodes leave: take every `step`-th.
   const std::size_t step = (flown + room - 1) / room;
   for (std::size_t i = kept; i < stage.nodeCount(); ++i) {
     if (isListed(i) && --flown % step == 0) static_cast<void>(out.keyframes.tryPushBack(worldOf(stage, i)));

@@ -1,8 +1,8 @@
 #pragma once
-// The node `loop`: keyframes with their images, one after the other, to places, loops and the pose graph.
+// The node `loop`: adds keyframes and their images, one by one, to places, loops and the pose graph.
 //
-// When it falls behind: it misses keyframes, or their images, counted; the next link bridges the gap where
-// the window still holds both keyframes.
+// When it falls behind: keyframes or their images are missed, counted. The next link bridges the gap if the
+// window still holds both keyframes.
 
 #include <vector>
 
@@ -14,8 +14,8 @@
 
 namespace swiftlet {
 
-/// How the world of the newest epoch lies in the map. Nodes beyond the room of `out` are left out evenly, of
-/// the kept map and of the flight; the newest is always listed.
+/// Lists how the world of the newest epoch lies in the map. If there are more nodes than `out` can hold, the
+/// nodes of the kept map and of the flight are thinned evenly; the newest is always listed.
 void listWorlds(const LoopStage& stage, WorldsInMap& out);
 
 class LoopNode final : public Node {
@@ -29,18 +29,18 @@ class LoopNode final : public Node {
   Out<LoopStep> steps{*this};
 
   bool turn() override;
-  /// Of the map that it flies in; all of one epoch.
+  /// Nodes of the kept map that the flight uses, all of one epoch.
   [[nodiscard]] std::vector<WorldInMap> keptNodes() const;
-  /// Once it is done.
+  /// Only when the node is done.
   [[nodiscard]] LoopStage& stage() { return stage_; }
 
  private:
   void step(const KeyframeMessage& message);
-  /// The loop that this keyframe has closed, for who shows images.
+  /// Sends the loop that this keyframe has closed to the viewer of images.
   void sendLoop(Stamp keyframe);
 
   GraphContext& context_;
-  ImageFeed* const view_;  ///< null: nobody shows images
+  ImageFeed* const view_;  ///< null: no images are shown
   LoopStage stage_;
   std::uint32_t shown_loops_ = 0;
   LoopRevisit revisit_;

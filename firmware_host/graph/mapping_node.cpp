@@ -39,7 +39,7 @@ MappingNode::AtHand MappingNode::findFor(const MapMessage& message) {
   if (found == nullptr) return at_hand;
   at_hand.image = &found->image;
   at_hand.number = found->number;
-  // Left from before the stamps went back.
+  // Left over from before the stamps jumped back.
   scenes.forgetIf([&](const SceneSlot& slot) { return isFarAhead(message.stamp, slot.images.stamp); });
   const SceneSlot* scene =
       scenes.connected() ? scenes.find(message.stamp, [](const SceneSlot& slot) { return slot.images.stamp; })
@@ -66,7 +66,7 @@ void MappingNode::holdFrames() {
   }
 }
 
-/// The oldest of those held, where it need not wait any more.
+/// Maps the oldest held frame if it is due.
 bool MappingNode::takeHeldFrame() {
   const HeldFrames::Frame* frame = held_->due(wallSeconds());
   if (frame == nullptr) return false;
@@ -105,7 +105,7 @@ void MappingNode::end() {
   finish();
 }
 
-/// What was fused before, as loop closure has it now.
+/// Applies loop closure's newest correction to what was fused before.
 void MappingNode::correct() {
   const std::uint64_t number = worlds.refresh();
   if (number == worlds_) return;
@@ -154,12 +154,12 @@ bool MappingNode::fuse(const MapMessage& message, const AtHand& at_hand) {
 }
 
 void MappingNode::draw() {
-  // What is left over is counted in the report and drawn later.
+  // What is not drawn now is counted in the report and drawn later.
   spend(StageId::kSurface, [&] { static_cast<void>(stage_.draw(vehicle_, {}, report_)); });
   spend(StageId::kDistance, [&] { stage_.updateDistance(vehicle_, {}, report_); });
 }
 
-/// To each who asks for it.
+/// To each outlet that requests it.
 void MappingNode::publishSurface(Stamp stamp) {
   struct Gather : SurfaceSink {
     explicit Gather(std::vector<SurfaceVertex>& to) : vertices(to) {}

@@ -1,10 +1,9 @@
 #pragma once
-// The node `map`: frames with their images, depth and labels, to volume, surface and distance field.
+// The node `map`: fuses frames with their images, depth and labels into volume, surface and distance field.
 //
-// When it falls behind: frames go by unmapped, the oldest first, counted. Where labels come after their
-// images (GraphOptions::labels) frames are held for them. Spare time, while no frame waits, goes to
-// corrections of what was fused before and to what the distance field left over; how much of it there was is
-// recorded.
+// When it falls behind: the oldest frames are not mapped, counted. If labels arrive after their images
+// (GraphOptions::labels), frames are held for them. While no frame waits, spare turns correct what was fused
+// before and update what the distance field left over; the number of spare turns is recorded.
 
 #include <array>
 #include <cstdint>
@@ -35,20 +34,20 @@ class MappingNode final : public Node {
   void report(RunStatistics& statistics) const override;
   void addLosses(std::map<std::string, std::uint64_t>& losses) const override;
 
-  /// Once it is done, but for the distance field, which any one thread may read at any time.
+  /// Only when the node is done, except the distance field, which one other thread may read at any time.
   [[nodiscard]] MapStage& stage() { return stage_; }
-  /// Once it is done: earlier epochs whose worlds loop closure has tied to the newest.
+  /// When the node is done: earlier epochs whose worlds loop closure has tied to the newest.
   [[nodiscard]] std::span<const std::uint32_t> tiedEpochs() const;
 
-  /// Recorded schedule: the work of one turn in spare time. False: there was none to do.
+  /// Recorded schedule: one spare turn. False: there was nothing to do.
   bool spareTurn();
-  /// Recorded schedule: the end, once all else was repeated.
+  /// Recorded schedule: ends the node after everything else was repeated.
   void end();
-  /// Recorded schedule: passes a frame by that was lost to the map.
+  /// Recorded schedule: skips a frame that the map had lost.
   void skip() { frames.pop(); }
 
  private:
-  /// What is at hand for a frame; null: its images are gone.
+  /// Data available for a frame; `image` null: its images are no longer available.
   struct AtHand {
     const std::array<ImageView, kMaxCameras>* image = nullptr;
     std::array<std::uint64_t, kMaxCameras> number{};
@@ -62,7 +61,7 @@ class MappingNode final : public Node {
   bool useSpareTime(bool ended);
   void correct();
   void stepCorrection();
-  /// False: no image was taken into the map.
+  /// False: nothing was fused into the map.
   bool fuse(const MapMessage& message, const AtHand& at_hand);
   void draw();
   void publishSurface(Stamp stamp);
@@ -72,16 +71,16 @@ class MappingNode final : public Node {
 
   GraphContext& context_;
   MapStage stage_;
-  std::unique_ptr<HeldFrames> held_;  ///< null if no labels are waited for
+  std::unique_ptr<HeldFrames> held_;  ///< null: no labels are expected
   std::uint64_t worlds_ = 0;
   std::uint64_t spare_turns_ = 0;  ///< since the last frame
   CorrectionStep corrected_;
   Eigen::Vector3d vehicle_ = Eigen::Vector3d::Zero();  ///< in the map
   MapReport report_;
 
-  std::uint64_t taken_ = 0;          ///< frames that were to be mapped
-  std::uint64_t without_image_ = 0;  ///< of them, skipped: others came before they were looked at
-  std::uint64_t without_scene_ = 0;  ///< of them, whose depth or labels were gone
+  std::uint64_t taken_ = 0;          ///< frames to be mapped
+  std::uint64_t without_image_ = 0;  ///< of these, skipped because their images were no longer available
+  std::uint64_t without_scene_ = 0;  ///< of these, skipped: depth sensor in use, but its depth was gone
   std::uint64_t refused_ = 0;        ///< by the stage
   FaultCounts faults_;
 };

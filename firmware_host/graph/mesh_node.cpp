@@ -39,7 +39,7 @@ void MeshNode::meshFrame(const MeshMessage& message) {
   input.tracks = &message.tracked;
   if (slot != nullptr) input.image = slot->frame.image;
   const Spent spent = context_.timed(StageId::kMesh, [&] {
-    // What was refused is in the stage's counters.
+    // Refused input is counted by the stage.
     if (stage_.step(input).code != StatusCode::kInvalidInput) publish(message.tracked.keyframe);
   });
   context_.count(StageId::kMesh, spent, message.tracked.keyframe);

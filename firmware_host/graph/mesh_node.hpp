@@ -1,8 +1,8 @@
 #pragma once
-// The node `mesh`: the newest window with its frame and that frame's image, to meshes and planes.
+// The node `mesh`: makes meshes and planes from the newest window, its frame and that frame's image.
 //
-// When it falls behind: it skips to the newest window, counted. A frame whose image is gone is meshed without
-// grey values, counted.
+// When it falls behind: it skips to the newest window, counted. A frame whose image is no longer available is
+// meshed without intensities, counted.
 
 #include <cstdint>
 #include <optional>
@@ -23,7 +23,7 @@ class MeshNode final : public Node {
   MeshImageIn image{*this, "camera_0_unmeshed", Arrow::kWaits};  ///< of camera 0
   Out<PlaneReport> planes{*this};
   Out<LocalMesh> newest{*this};
-  Out<MeshResult> meshes{*this};  ///< each, on request
+  Out<MeshResult> meshes{*this};  ///< every mesh, on request
   Out<MeshStep> steps{*this};
 
   bool turn() override;
@@ -36,8 +36,8 @@ class MeshNode final : public Node {
   GraphContext& context_;
   MeshStage stage_;
   std::uint64_t window_ = 0;
-  std::uint64_t skipped_ = 0;        ///< windows that a newer one overtook
-  std::uint64_t without_image_ = 0;  ///< steps whose image was gone, or never came
+  std::uint64_t skipped_ = 0;        ///< windows skipped because a newer one was available
+  std::uint64_t without_image_ = 0;  ///< steps whose image was no longer available or never arrived
 };
 
 }  // namespace swiftlet

@@ -1,5 +1,5 @@
 #pragma once
-// What goes from node to node, with the times that the host notes on it. Images: images.hpp.
+// Messages between nodes, with the times that the host adds. Images: images.hpp.
 
 #include <array>
 #include <cstdint>
@@ -30,13 +30,14 @@ namespace swiftlet {
 
 struct ImuArrival {
   ImuSample sample;
-  std::uint64_t number = 0;    ///< from 1; counts those too that the guard held out
+  std::uint64_t number = 0;    ///< from 1, including samples that the guard held out
   std::uint32_t timeline = 0;  ///< of its stamp (estimator/odometry/stamp_guard.hpp)
   Stamp arrival;               ///< on the log's clock
   HostTimes host;
 };
 
-/// What came with a stamp, for `track`, which copies the images of that frame for the map.
+/// Whether depth and labels came with a stamp. For `track`, which copies the images of that frame for the
+/// map.
 struct SceneNote {
   Stamp stamp;
   bool depth = false;
@@ -48,34 +49,34 @@ struct TrackMessage {
   enum class Kind : std::uint8_t {
     kFrame,         ///< tracked
     kFrameRefused,  ///< `status` says why; `tracked` is not filled
-    kImageRefused,  ///< by pairing
-    kEnd,           ///< of FrameResult alone: the run's last
+    kImageRefused,  ///< refused by pairing
+    kEnd,           ///< only in FrameResult: the last one of the run
   };
   Kind kind = Kind::kFrame;
   Status status;
   TrackStep step;
   TrackedFrame tracked;
-  HostTimes host;        ///< of the later image
-  double ready = 0;      ///< host time since when `track` had image and samples [s]
-  Spent spent;           ///< by `track`
-  int dropped = 0;       ///< frames that went by untracked since the message before
-  int effort_level = 0;  ///< steps below full effort
-  bool mapped = false;   ///< its images have gone to the map
-  LostSightings lost;    ///< by the front-end, while somebody looks; else empty
+  HostTimes host;        ///< of the image that arrived last
+  double ready = 0;      ///< host time at which `track` had images and samples [s]
+  Spent spent;           ///< used by `track`
+  int dropped = 0;       ///< frames not tracked since the previous message
+  int effort_level = 0;  ///< levels below full effort
+  bool mapped = false;   ///< its images were sent to the map
+  LostSightings lost;    ///< by the front-end; filled only while images are shown
 };
 
-/// Output of `smooth`, for the log and for all that follow the estimate.
+/// Output of `smooth`, for the log and all readers of the estimate.
 struct FrameResult {
   TrackMessage::Kind kind = TrackMessage::Kind::kFrame;
   Status track_status;
-  Status status;  ///< of the smoother
+  Status status;  ///< status of the smoother
   TrackStep track_step;
   SmoothStep step;
   TrackedFrame tracked;
   OdometryOutput output;
   HostTimes host;
   double published = 0;  ///< host time
-  Spent spent;           ///< by `track` and `smooth` until it was published
+  Spent spent;           ///< used by `track` and `smooth` until publication
   int dropped = 0;
   int track_level = 0;
   int smooth_level = 0;
@@ -87,11 +88,11 @@ struct MeshMessage {
   TrackedFrame tracked;
   std::uint64_t image = 0;  ///< number of camera 0's image of that frame; 0: missing
 
-  /// False while the start waits.
+  /// False while the smoother initializes.
   [[nodiscard]] bool hasPose() const { return window.started && !window.poses.empty(); }
 };
 
-/// From `smooth` to `loop`: a keyframe as it stands once it has been smoothed.
+/// From `smooth` to `loop`: a keyframe after it was smoothed.
 struct KeyframeMessage {
   std::uint64_t window_number = 0;
   SmoothedWindow window;
@@ -100,15 +101,15 @@ struct KeyframeMessage {
   std::array<std::uint64_t, kMaxCameras> image{};  ///< numbers; 0: missing
 };
 
-/// From `smooth` to `map`: a frame that is to be mapped.
+/// From `smooth` to `map`: a frame to be mapped.
 struct MapMessage {
   std::uint64_t frame = 0;
-  Stamp stamp;  ///< of the images
+  Stamp stamp;  ///< stamp of the images
   std::uint32_t epoch = 0;
   WindowPose pose;
 };
 
-/// From `mesh` to `log`, where the meshes of all frames are wanted.
+/// From `mesh` to `log`, if the meshes of all frames are requested.
 struct MeshResult {
   bool keyframe = false;  ///< `horizon` is of this frame
   LocalMesh frame;
@@ -116,17 +117,16 @@ struct MeshResult {
   FixedVector<Eigen::Vector2f, kMaxFeatures> hull;  ///< of the frame's features, raw pixels of camera 0
 };
 
-/// How the odometry's world lies in the map, now and at the keyframes that are nodes of the newest one's
-/// piece (listWorlds()).
+/// Transforms from the odometry's world to the map, now and at listed keyframes (listWorlds()).
 struct WorldsInMap {
   MapCorrection newest;
-  /// Of a kept map's nodes; the map moves evenly between them.
+  /// Most listed nodes of a kept map; the map moves evenly between listed nodes.
   static constexpr std::size_t kMostKept = 1000;
-  FixedVector<WorldInMap, LoopLimits{}.nodes + kMostKept> keyframes;  ///< by frame
+  FixedVector<WorldInMap, LoopLimits{}.nodes + kMostKept> keyframes;  ///< ordered by frame
   FixedVector<std::uint32_t, kTiedEpochs> tied;                       ///< LoopStage::tiedEpochs()
 };
 
-/// From `map` to `record`: a step, with the depth and labels that it took.
+/// From `map` to `record`: a step, with the depth and labels it used.
 struct MapRecord {
   MapStep step;
   SceneImages scene;  ///< shows `depth` and `labels`

@@ -1,5 +1,5 @@
 #pragma once
-// A node of the graph: a stage with the ends of its arrows, stepped by a schedule.
+// A node of the graph: a stage with its arrow ends, stepped by a schedule.
 //
 // In turn() a node takes what is queued on its arrows, at most one frame, and returns whether it did
 // anything. It is done when the nodes before it are done and nothing is queued. A schedule calls turn() from
@@ -36,39 +36,40 @@ class Node {
   [[nodiscard]] const char* name() const { return name_; }
   [[nodiscard]] Rank rank() const { return rank_; }
 
-  /// False: there was nothing to do.
+  /// Returns false if there was nothing to do.
   virtual bool turn() = 0;
-  /// After the run: what it counted.
+  /// After the run: adds what it counted.
   virtual void report(RunStatistics& /*statistics*/) const {}
-  /// What its arrows lost, by counter; at the end.
+  /// At the end: adds what its arrows lost, by counter.
   virtual void addLosses(std::map<std::string, std::uint64_t>& losses) const;
 
-  /// Any thread: the node does nothing from now on, and no other node waits for it.
+  /// Any thread: the node has finished; no other node waits for it.
   [[nodiscard]] bool done() const { return done_.load(std::memory_order_acquire); }
-  /// Any thread: its thread has ended before its time, or stands still. Those behind it end as if it had.
+  /// Any thread: the node's thread has ended early or is stuck. Nodes behind it end as if it had finished.
   void abandon() {
     abandoned_.store(true, std::memory_order_relaxed);
     finish();
   }
-  /// Any thread, when done: the node was abandoned before it had finished.
+  /// Any thread, once done(): the node was abandoned before it had finished.
   [[nodiscard]] bool wasAbandoned() const { return abandoned_.load(std::memory_order_relaxed); }
-  /// Of the schedule, at the end: its thread is stuck and may go on at any time, so that nothing of it is
-  /// read.
+  /// Called by the schedule at the end: the thread is stuck and may continue at any time, so nothing of the
+  /// node may be read.
   void leaveBehind() { left_behind_ = true; }
   [[nodiscard]] bool isLeftBehind() const { return left_behind_; }
 
-  /// Of its thread, where it has one.
+  /// Beats of the node's own thread, if it has one.
   [[nodiscard]] Heartbeat& heart() { return heart_; }
-  /// Rung for it when something arrived.
+  /// Rung when something has arrived for the node.
   [[nodiscard]] Doorbell& bell() { return bell_; }
-  /// Rings those that look after a turn of this node.
+  /// Rings the readers that must look after a turn of this node.
   void wakeReaders() {
     for (Node* reader : woken_) reader->bell().ring();
   }
 
  protected:
   void finish() { done_.store(true, std::memory_order_release); }
-  /// The nodes before this one are done. To be asked before a look at the arrows that finds nothing.
+  /// Whether the nodes before this one are done. Ask before looking at the arrows; if they are then empty,
+  /// nothing more will arrive.
   [[nodiscard]] bool inputEnded() const;
 
  private:

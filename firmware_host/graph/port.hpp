@@ -33,17 +33,17 @@ namespace swiftlet {
 
 class Node;
 
-/// What an arrow is to its reader.
+/// How an arrow wakes its reader.
 enum class Arrow : std::uint8_t {
   kWakes,     ///< the reader looks at once when the writer's turn is over
   kWaits,     ///< the reader looks when something else wakes it, or after some milliseconds
-  kFeedback,  ///< kWakes, from a node behind the reader: the reader's end does not wait for the writer's
-  kHint,      ///< kWaits, likewise from behind
+  kFeedback,  ///< like kWakes, from a node behind the reader: the reader can end before the writer
+  kHint,      ///< like kWaits, from a node behind the reader
 };
 
 class In {
  public:
-  /// `counter`: name of what was lost here, in summary.json; literal text, null if nothing can be.
+  /// `counter`: literal name of the loss counter in summary.json; null if nothing can be lost.
   In(Node& reader, const char* counter, Arrow arrow);
   In(const In&) = delete;
   In& operator=(const In&) = delete;
@@ -60,12 +60,12 @@ class In {
   Arrow arrow_;
 };
 
-/// Where values of one type arrive.
+/// End of an arrow for values of one type.
 template <typename T>
 class InOf : public In {
  public:
   using In::In;
-  /// Writer. The value to fill before commit; null, counted, when there is no room.
+  /// Writer. The value to fill before commit; null if there is no room, counted.
   virtual T* begin() = 0;
   virtual void commit() = 0;
   [[nodiscard]] virtual bool hasRoom() const = 0;
@@ -83,7 +83,7 @@ class QueueIn : public InOf<T> {
   [[nodiscard]] bool canRefuse() const override { return true; }
   [[nodiscard]] std::uint64_t lost() const override { return ring_.refused(); }
 
-  /// Reader. The oldest value, until pop; null when there is none.
+  /// Reader. The oldest value, valid until pop; null if there is none.
   [[nodiscard]] T* front() { return ring_.front(); }
   void pop() { ring_.pop(); }
   [[nodiscard]] std::size_t size() const { return ring_.size(); }
@@ -107,7 +107,7 @@ class LatestIn final : public InOf<T> {
   [[nodiscard]] bool hasRoom() const override { return true; }
   [[nodiscard]] bool canRefuse() const override { return false; }
 
-  /// Reader. Takes the newest value; its number, 0 while there is none.
+  /// Reader. Takes the newest value and returns its number; 0: none yet.
   std::uint64_t refresh() { return kept_ ? number() : newest_.refresh(); }
   [[nodiscard]] const T& value() const {
     return kept_ && number() > 0 ? kept_->front().value : newest_.value();
@@ -117,11 +117,11 @@ class LatestIn final : public InOf<T> {
     return kept_->empty() || kept_->front().number != expected_ ? 0 : expected_;
   }
 
-  // Recorded schedule, one thread.
+  // For the recorded schedule, one thread.
 
-  /// From now on refresh() gives what expect() says, and nothing else.
+  /// From now on refresh() returns only the value set by expect().
   void keepAll() { kept_.emplace(); }
-  /// False: value `number` was not sent yet. 0: none.
+  /// Sets the value that refresh() returns; 0: none. False: value `number` was not sent yet.
   bool expect(std::uint64_t number) {
     while (!kept_->empty() && kept_->front().number < number) kept_->pop_front();
     if (number > 0 && (kept_->empty() || kept_->front().number != number)) return false;
@@ -139,7 +139,7 @@ class LatestIn final : public InOf<T> {
   std::uint64_t expected_ = 0;
 };
 
-/// The reader borrows slots of a pool that belongs to the writer; there it is number kReader.
+/// The reader borrows slots of the writer's pool, where it has the index kReader.
 template <typename Pool, std::size_t kReader, std::size_t kCapacity>
 class SlotIn final : public In {
  public:
@@ -150,7 +150,8 @@ class SlotIn final : public In {
   void lendFrom(Pool& pool) { pool_ = &pool; }
   [[nodiscard]] bool connected() const { return pool_ != nullptr; }
 
-  /// Writer. False: the reader holds its quota, counted. The oldest that waits may go instead, counted too.
+  /// Writer. False: the reader is at its quota, counted. If the ring is full, the oldest slot is returned
+  /// instead, counted too.
   bool hand(SlotHandle handle) {
     if (!pool_->tryHand(handle, kReader)) {
       miss();
@@ -163,19 +164,19 @@ class SlotIn final : public In {
     }
     return true;
   }
-  /// Writer. Counts a slot that could not be had.
+  /// Writer. Counts an image for which no slot was available.
   void miss() { lost_.add(); }
   [[nodiscard]] std::uint64_t lost() const override { return lost_.value(); }
 
-  /// Reader. False if nothing waits.
+  /// Reader. False if nothing is queued.
   bool tryPop(Loan& loan) {
     SlotHandle handle;
     if (!ring_.tryPop(handle)) return false;
     loan = pool_->borrow(handle, kReader);
     return true;
   }
-  /// Reader. The slot with this key, held until find is called for a later one or clear is called; older
-  /// slots are returned, newer ones are kept. Null if it is not there.
+  /// Reader. The slot with this key; null if it is not there. It is held until find is called for a later key
+  /// or clear is called. Older slots are returned, newer ones are kept.
   template <typename Key, typename KeyOf>
   const Slot* find(const Key& wanted, KeyOf&& keyOf) {
     if (told_) return *told_ != nullptr && keyOf(**told_) == wanted ? *told_ : nullptr;
@@ -185,7 +186,7 @@ class SlotIn final : public In {
     }
     return keyOf(*head_) == wanted ? &*head_ : nullptr;
   }
-  /// Lets go of the slot that find has left for later, if `stale(slot)`.
+  /// Returns the slot that find kept for later, if `stale(slot)`.
   template <typename Stale>
   void forgetIf(Stale&& stale) {
     if (head_ && stale(*head_)) head_.reset();
@@ -193,7 +194,7 @@ class SlotIn final : public In {
   void clear() { head_.reset(); }
   [[nodiscard]] std::size_t size() const { return ring_.size(); }
 
-  /// Recorded schedule: what find sees from now on; null: nothing is at hand.
+  /// Recorded schedule: what find sees from now on; null: nothing is available.
   void tell(const Slot* slot) { told_ = slot; }
 
  private:
@@ -206,7 +207,7 @@ class SlotIn final : public In {
 
 void connect(Node& writer, In& in);
 
-/// A writer's end: leads to each reader that graph.cpp names.
+/// A writer's end, connected to each reader named in graph.cpp.
 template <typename T>
 class Out {
  public:
@@ -220,7 +221,7 @@ class Out {
     connect(writer_, in);
   }
   [[nodiscard]] bool connected() const { return !readers_.empty(); }
-  /// At each reader.
+  /// At every reader.
   [[nodiscard]] bool hasRoom() const {
     for (const InOf<T>* in : readers_) {
       if (!in->hasRoom()) return false;
@@ -228,7 +229,7 @@ class Out {
     return true;
   }
 
-  /// The reader has ended.
+  /// Every reader has ended.
   [[nodiscard]] bool readersDone() const {
     for (const InOf<T>* in : readers_) {
       if (!in->reader().done()) return false;
@@ -236,8 +237,8 @@ class Out {
     return true;
   }
 
-  /// The value to fill before send, while connected: the first reader's own where it has room. It holds some
-  /// older value.
+  /// The value to fill before send, while connected: in the first reader that has room. It holds an older
+  /// value.
   T& draft() {
     for (drafted_ = 0; drafted_ < readers_.size(); ++drafted_) {
       draft_ = readers_[drafted_]->begin();
@@ -245,7 +246,7 @@ class Out {
     }
     return *spare_;
   }
-  /// To all that have room; the others have counted.
+  /// Sends to all readers that have room; the others have counted a loss.
   void send() {
     for (std::size_t i = drafted_ + 1; i < readers_.size(); ++i) {
       T* copy = readers_[i]->begin();

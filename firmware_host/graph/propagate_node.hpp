@@ -1,7 +1,7 @@
 #pragma once
-// The node `propagate`: a state for every IMU sample, from the newest fix of `smooth`.
+// The node `propagate`: a state for every IMU sample, propagated from the newest fix of `smooth`.
 //
-// When samples come faster than it works: none is skipped; an overflow of the queue is a counted fault.
+// When samples arrive faster than it works: none is skipped; a queue overflow is a counted fault.
 
 #include <atomic>
 #include <cstdint>
@@ -21,13 +21,13 @@ class PropagateNode final : public Node {
 
   SampleIn samples{*this, "imu_to_propagate", Arrow::kWakes};
   LatestIn<StateFix> fix{*this, Arrow::kFeedback};
-  Out<NavState> states{*this};  ///< each, on request
+  Out<NavState> states{*this};  ///< every state, on request
   Out<PropagateStep> steps{*this};
 
   bool turn() override;
-  /// Any thread: states so far.
+  /// Any thread: number of states so far.
   [[nodiscard]] std::uint64_t stateCount() const { return states_given_.value(); }
-  /// One thread: the health of the newest state at the last call, or of a later one. If no reader receives
+  /// One thread: health of the newest state at the previous call, or of a later state. If no reader receives
   /// the states, this call requests the next one.
   [[nodiscard]] Health askHealth() {
     health_wanted_.store(true, std::memory_order_relaxed);

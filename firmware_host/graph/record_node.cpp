@@ -11,8 +11,8 @@ RecordNode::RecordNode(FlightRecorder& recorder, const SensorNode& sensors)
       recorder_(recorder),
       sensors_(sensors) {}
 
-/// The earliest arrival; of equal ones the sample, then camera 0. Samples are looked at first: what came
-/// before a sample that is seen is seen too.
+/// Writes the earliest arrival; at equal arrivals the sample first, then camera 0. Samples are read first:
+/// everything that arrived before a visible sample is visible too.
 bool RecordNode::writeNext() {
   const ImuArrival* sample = samples.front();
   std::size_t earliest = kMaxCameras;

@@ -30,7 +30,7 @@ class RecordNode final : public Node {
   QueueIn<MapRecord, kMapFrames> map{*this, "map_steps_to_record", Arrow::kWaits};
 
   bool turn() override;
-  /// Any thread: records that found no room.
+  /// Any thread: records lost because there was no room.
   [[nodiscard]] std::uint64_t lost() const;
   [[nodiscard]] const FlightRecorder& recorder() const { return recorder_; }
 
@@ -41,7 +41,7 @@ class RecordNode final : public Node {
 
   FlightRecorder& recorder_;
   const SensorNode& sensors_;
-  std::array<ImagePool::Loan, kMaxCameras> head_;  ///< that comes next of each camera
+  std::array<ImagePool::Loan, kMaxCameras> head_;  ///< next image of each camera
 };
 
 }  // namespace swiftlet

@@ -1,7 +1,6 @@
 #pragma once
-// What the node `log` does with what comes: what the run tells its listener, what it sums up, and what it
-// keeps for full smoothing. Host side, of one thread. Memory: constant but for the lists that RunStatistics
-// names.
+// What the node `log` does with its input: notifies the run's listener, sums up statistics, and keeps data
+// for full smoothing. Host side, one thread. Memory: constant except for the lists in RunStatistics.
 
 #include <memory>
 #include <span>
@@ -22,12 +21,12 @@ class RunObserver {
 
   /// Before the first message: keep keyframes and IMU for full smoothing.
   void keepForMap(std::unique_ptr<MapKeeper> keeper) { keeper_ = std::move(keeper); }
-  /// Before the first message: the flight is to be located in a kept map of so many nodes.
+  /// Before the first message: the flight is to be located in a kept map with `nodes` nodes.
   void awaitLocation(std::size_t nodes) { statistics_.located.emplace().nodes = nodes; }
   [[nodiscard]] bool wantsImu() const { return keeper_ != nullptr; }
 
   void addImu(const ImuSample& sample) { keeper_->addImu(sample); }
-  /// The samples to come are of another time line.
+  /// The samples that follow belong to another time line.
   void restart(std::uint32_t timeline, Stamp first);
   void onImuState(const NavState& state) { listener_.onImuState(state); }
   void onResult(const FrameResult& result);
@@ -40,14 +39,14 @@ class RunObserver {
   /// A remark of the schedule or the supervisor, for events.log.
   void remark(Stamp stamp, const std::string& text) { listener_.onRemark(stamp, text); }
 
-  /// After the run: the map that was made.
+  /// After the run: passes the map to the listener.
   void showMap(MapStage& map, std::span<const std::uint32_t> tied) { listener_.onMap(map, tied); }
-  /// After the run: the loops that were found, for full smoothing.
+  /// After the run: keeps the loops for full smoothing.
   void keepLoops(LoopStage& loops);
   [[nodiscard]] const std::vector<MapLoop>& loops() const { return loops_; }
-  /// After the run: the keyframes' poses in the pose graph of the loops; empty without loop closure.
+  /// After the run: poses of the keyframes in the pose graph; empty without loop closure.
   [[nodiscard]] const std::vector<MapPose>& nodes() const { return nodes_; }
-  /// After the run: closes the file of keyframes, where one was kept.
+  /// After the run: closes the keyframe file, if one was written.
   void finishKeeping() {
     if (keeper_) keeper_->finish();
   }
@@ -63,14 +62,14 @@ class RunObserver {
 
   RunListener& listener_;
   std::unique_ptr<MapKeeper> keeper_;
-  std::uint32_t timeline_ = 0;  ///< of the samples kept
+  std::uint32_t timeline_ = 0;  ///< of the kept samples
   std::string waiting_for_;
   bool any_frame_ = false;
   Effort track_effort_;
   Effort smooth_effort_;
   RunStatistics statistics_;
   std::vector<MapLoop> loops_;
-  std::vector<MapPose> nodes_;  ///< of the pose graph, at the end
+  std::vector<MapPose> nodes_;  ///< of the pose graph; filled at the end
 };
 
 }  // namespace swiftlet

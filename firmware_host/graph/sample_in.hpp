@@ -1,5 +1,5 @@
 #pragma once
-// Where IMU samples wait for a node that takes them up to the stamp of its frame.
+// Queue of IMU samples for a node that takes them up to the stamp of its frame.
 //
 // `Taker` has addImu(sample) and restart(timeline, first stamp), which is called before the first sample of a
 // new time line (estimator/odometry/stamp_guard.hpp).
@@ -14,17 +14,18 @@ class SampleIn final : public QueueIn<ImuArrival, kImuRing> {
  public:
   using QueueIn::QueueIn;
 
-  /// The oldest sample; null when there is none, or none that the limit lets through.
+  /// The oldest sample; null if there is none, or none within the limit.
   [[nodiscard]] const ImuArrival* next() { return upTo(limit_); }
-  /// Whether a time line begins with this sample.
+  /// Whether a new time line begins with this sample.
   [[nodiscard]] bool begins(const ImuArrival& arrival) const { return arrival.timeline != timeline_; }
   void drop() {
     taken_ = front()->number;
     timeline_ = front()->timeline;
     pop();
   }
-  /// Hands samples to `taker`, in order: of a frame's time line those not later than `until`, and the first
-  /// in any case, by which a repetition of the run knows that it has begun; all of time lines before it.
+  /// Hands samples to `taker` in order: all of earlier time lines, and those of the frame's time line that
+  /// are not later than `until`. The first sample of the frame's time line is always taken, so that a
+  /// repetition of the run knows that it has begun.
   template <typename Taker>
   void takeUntil(Stamp until, std::uint32_t timeline, Taker& taker) {
     if (limit_ != kNoLimit) return takeUpTo(limit_, taker);
@@ -34,20 +35,20 @@ class SampleIn final : public QueueIn<ImuArrival, kImuRing> {
       hand(*arrival, taker);
     }
   }
-  /// The same for samples up to this number.
+  /// Hands over the samples up to this number.
   template <typename Taker>
   void takeUpTo(std::uint64_t number, Taker& taker) {
     while (const ImuArrival* arrival = upTo(number)) hand(*arrival, taker);
   }
-  /// The same where no frame has come for long and samples must not fill the queue: half of it is more than
-  /// any frame will ask for.
+  /// Keeps samples from filling the queue when no frame has arrived for long: hands over all but the newest
+  /// half of its capacity, which is more than any frame needs.
   template <typename Taker>
   void takeSurplus(Taker& taker) {
     while (size() > kImuRing / 2) hand(*front(), taker);
   }
   /// Number of the newest sample taken.
   [[nodiscard]] std::uint64_t taken() const { return taken_; }
-  /// Of the newest sample taken.
+  /// Time line of the newest sample taken.
   [[nodiscard]] std::uint32_t timeline() const { return timeline_; }
 
   /// Recorded schedule: takeUntil takes samples up to this number regardless of their stamps.

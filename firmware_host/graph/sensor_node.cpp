@@ -10,7 +10,7 @@ namespace swiftlet {
 
 namespace {
 
-/// A stamp that was held out says nothing of where the stream is.
+/// A stamp that was held out does not show where the stream is.
 void note(SensorNews& news, Stamp stamp, double host_arrival, bool held_out) {
   if (!held_out) {
     if (news.messages > 0 && stamp <= news.newest) ++news.reversed_stamps;
@@ -72,7 +72,7 @@ void SensorNode::takeImu(const ImuSample& sample, Stamp arrival, const HostTimes
   } else {
     imu.send(message);
     newest_imu_.store(imu_guard_.time().newest.ns);
-    // After the sample: an image of a new time line finds its first sample in the queues.
+    // Written after the sample: an image of a new time line then finds its first sample in the queues.
     imu_time_.write(imu_guard_.time());
   }
   note(imu_sensed_.news, sample.stamp, host.arrival, held_out);

@@ -1,11 +1,11 @@
 #pragma once
-// Where sensors' messages enter the graph: samples to queues, images, depth and labels into slots.
+// Entry of sensor messages into the graph: samples go to queues; images, depth and labels into slots.
 //
-// Threads: takeImu from the IMU's, takeImage from each camera's own (one thread may have both),
-//   takeScene from camera 0's, endInput from the last of them. It has no turn: it ends when the input does.
-// An image is copied; one of another size than the calibration's is counted and goes no further. Messages
-// whose stamps have jumped (estimator/odometry/stamp_guard.hpp) go to the recording alone, counted: there
-// they are decided on again when the run is repeated.
+// Threads: takeImu from the IMU's, takeImage from each camera's own (one thread may have both), takeScene
+// from camera 0's, endInput from the last of them. The node has no turn: it ends when the input does. Images
+// are copied; an image whose size differs from the calibration's is counted and dropped. Messages whose
+// stamps have jumped (estimator/odometry/stamp_guard.hpp) are counted and go only to the recording: a
+// repetition of the run decides on them again.
 
 #include <array>
 #include <atomic>
@@ -26,7 +26,7 @@ namespace swiftlet {
 
 struct ImuNews {
   SensorNews news;
-  std::uint64_t equal = 0;  ///< samples in a row with the same readings
+  std::uint64_t equal = 0;  ///< consecutive samples with equal readings
 };
 
 class SensorNode final : public Node {
@@ -34,36 +34,36 @@ class SensorNode final : public Node {
   explicit SensorNode(const GraphContext& context);
 
   Out<ImuArrival> imu{*this};
-  Out<ImuArrival> imu_as_delivered{*this};  ///< with those that were held out
+  Out<ImuArrival> imu_as_delivered{*this};  ///< including those held out
   Out<SceneNote> scene_notes{*this};
   void imagesTo(std::size_t camera, ImageIn& in) { lend(camera, in, camera_[camera].track); }
   void imagesTo(std::size_t camera, MeshImageIn& in) { lend(camera, in, camera_[camera].mesh); }
   void imagesTo(std::size_t camera, RecordedImageIn& in) { lend(camera, in, camera_[camera].record); }
   void scenesTo(SceneIn& in);
-  /// Makes the memory of all images resident. Before the threads start.
+  /// Makes the memory of all images resident. Call before the threads start.
   void touchImages();
 
   void takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host);
   void takeImage(const CameraFrame& image, const HostTimes& host);
-  /// Depth and labels of the image of camera 0 that comes next. Without a map: nothing happens.
+  /// Depth and labels of camera 0's next image. Ignored without a map.
   void takeScene(const SceneImages& scene);
   void endInput() { finish(); }
   bool turn() override { return false; }
 
-  /// Any thread: of the newest sample; the earliest stamp of all before the first.
+  /// Any thread: stamp of the newest sample; the earliest possible stamp before the first.
   [[nodiscard]] Stamp newestSample() const { return Stamp{newest_imu_.load()}; }
-  /// The IMU's thread: of the newest sample.
+  /// The IMU's thread: time line of the newest sample.
   [[nodiscard]] std::uint32_t timeline() const { return imu_guard_.timeline(); }
-  /// Any thread: what the sensors did of late.
+  /// Any thread: recent activity of the sensors.
   void look(FlightFacts& facts) const;
 
-  /// Once the sensors have ended.
+  /// For use after the sensors have ended.
   struct Counters {
-    std::uint64_t samples = 0;           ///< including those held out; the same for images
-    std::uint64_t samples_held_out = 0;  ///< stamps far ahead
+    std::uint64_t samples = 0;           ///< including those held out; so are images
+    std::uint64_t samples_held_out = 0;  ///< stamp far ahead
     std::array<std::uint64_t, kMaxCameras> images{};
-    std::array<std::uint64_t, kMaxCameras> images_held_out{};  ///< stamps far from the IMU's
-    std::array<std::uint64_t, kMaxCameras> images_lost{};      ///< no slot was free
+    std::array<std::uint64_t, kMaxCameras> images_held_out{};  ///< stamp far from the IMU's
+    std::array<std::uint64_t, kMaxCameras> images_lost{};      ///< no free slot
     std::array<std::uint64_t, kMaxCameras> images_wrong_size{};
     std::uint64_t labels_wrong_size = 0;
     std::uint64_t depths_wrong_size = 0;
@@ -78,7 +78,7 @@ class SensorNode final : public Node {
     ImageIn* track = nullptr;
     MeshImageIn* mesh = nullptr;
     RecordedImageIn* record = nullptr;
-    // Of the camera's thread.
+    // For the camera's thread.
     ImageGuard guard;
     SensorNews sensed;
     NewestShared<SensorNews> news;
@@ -93,7 +93,7 @@ class SensorNode final : public Node {
   void fillScene(const SceneImages& from, SceneSlot& slot);
 
   const GraphContext& context_;
-  ImageFeed* const view_;  ///< null: nobody shows images
+  ImageFeed* const view_;  ///< null: no images are shown
   const ImagePool::Quotas quotas_;
   std::array<Camera, kMaxCameras> camera_;
   std::unique_ptr<ScenePool> scenes_;  ///< null without a map

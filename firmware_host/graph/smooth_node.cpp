@@ -86,7 +86,7 @@ void SmoothNode::publishWindow(const TrackMessage& message) {
     to_mesh.image = message.step.image[0];
     mesh.send();
   }
-  ++windows_;  // about to be sent
+  ++windows_;  // this one is about to be sent
   if (keyframes.connected() && message.tracked.keyframe && smoothed.started) sendKeyframe(message, smoothed);
   if (mapped.connected() && message.mapped && smoothed.started) sendMapped(message, smoothed);
   if (view_ != nullptr && view_->wanted.load(std::memory_order_relaxed) && shown_.take(message.tracked.stamp))
@@ -126,7 +126,7 @@ void SmoothNode::sendKeyframe(const TrackMessage& message, const SmoothedWindow&
 
 void SmoothNode::sendMapped(const TrackMessage& message, const SmoothedWindow& smoothed) {
   const Health health = smoothed.newest.health;
-  // Where the pose is not to be flown on, or still being found, there is nothing to map.
+  // Nothing is mapped while the pose is unreliable or still initializing.
   if (smoothed.poses.empty() || (health != Health::kGood && health != Health::kDegraded)) return;
   MapMessage& out = mapped.draft();
   out.frame = message.tracked.index;
@@ -142,7 +142,7 @@ SmoothedFrameNews SmoothNode::newestFrame() const {
   return frame;
 }
 
-/// The last result holds what had not come out yet. It is not to be lost, unless nobody is left to take it.
+/// The last result holds the remaining output, so it waits for room unless all readers have ended.
 void SmoothNode::end() {
   if (!results.hasRoom() && !results.readersDone()) return;
   FrameResult& out = results.draft();

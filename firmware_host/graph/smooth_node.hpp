@@ -1,8 +1,8 @@
 #pragma once
-// The node `smooth`: tracked frames and samples to states, the window and all that follows from it.
+// The node `smooth`: estimates states and the window from tracked frames and samples.
 //
-// When it falls behind: its effort falls, and `track` waits for it. The state goes out before room is made in
-// the window: marginalization costs no latency.
+// When it falls behind: its effort is reduced, and `track` waits for it. The state is published before the
+// window is trimmed, so marginalization adds no latency.
 
 #include <array>
 #include <cstdint>
@@ -38,14 +38,14 @@ class SmoothNode final : public Node {
   Out<StateFix> fix{*this};
   Out<FrameResult> results{*this};
   Out<SmoothedWindow> window{*this};
-  Out<MeshMessage> mesh{*this};           ///< the window with its frame
-  Out<KeyframeMessage> keyframes{*this};  ///< with window and link to the one before
-  Out<MapMessage> mapped{*this};          ///< frames whose images have gone to the map
+  Out<MeshMessage> mesh{*this};           ///< the window and its newest frame
+  Out<KeyframeMessage> keyframes{*this};  ///< with their window and the link to the previous keyframe
+  Out<MapMessage> mapped{*this};          ///< frames whose images were sent to the map
   Out<SmoothStep> steps{*this};
 
   bool turn() override;
 
-  /// Any thread. `count` is 0 before the first.
+  /// Any thread. `count` is 0 before the first frame.
   [[nodiscard]] SmoothedFrameNews newestFrame() const;
 
  private:
@@ -54,14 +54,14 @@ class SmoothNode final : public Node {
   void publishWindow(const TrackMessage& message);
   void sendKeyframe(const TrackMessage& message, const SmoothedWindow& smoothed);
   void sendMapped(const TrackMessage& message, const SmoothedWindow& smoothed);
-  /// For who shows images.
+  /// For the viewer of images.
   void sendSight(const TrackMessage& message, const SmoothedWindow& smoothed);
   void end();
 
   GraphContext& context_;
   ConstantEffort full_effort_;
   EffortSource* effort_;
-  ImageFeed* const view_;  ///< null: nobody shows images
+  ImageFeed* const view_;  ///< null: no images are shown
   ShownInstants shown_;
   SmoothStage stage_;
   std::uint64_t planes_ = 0;

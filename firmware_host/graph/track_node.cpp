@@ -30,11 +30,11 @@ bool TrackNode::turn() {
     samples.takeSurplus(stage_);
     return ended && !done() && flushAndFinish();
   }
-  if (frames.front()->timeline < samples.timeline()) {  // its samples were given up
+  if (frames.front()->timeline < samples.timeline()) {  // its samples were discarded
     frames.drop();
     return true;
   }
-  // Where smooth was given up its queue stays full.
+  // If `smooth` was abandoned, its queue stays full.
   if (!tracked.hasRoom() && !tracked.readersDone()) return false;
   if (!ended && frames.awaitsSamples()) return false;
   trackFrame();
@@ -96,12 +96,12 @@ bool TrackNode::flushAndFinish() {
   return false;
 }
 
-/// Mapped are: with a depth sensor, frames that have a depth image; else keyframes seen by both cameras, and
-/// frames that have labels.
+/// With a depth sensor, frames that have a depth image are mapped; otherwise keyframes and labelled frames,
+/// if they have both cameras' images.
 bool TrackNode::wantsMap(const StereoFrame& frame, bool keyframe) {
   bool depth = false, labels = false;
   while (const SceneNote* note = scene_notes.front()) {
-    // Those far ahead are left from before the stamps went back.
+    // Notes far ahead are left over from before the stamps jumped back.
     if (note->stamp > frame.stamp && !isFarAhead(frame.stamp, note->stamp)) break;
     if (note->stamp == frame.stamp) {
       depth = note->depth;

@@ -1,8 +1,8 @@
 #pragma once
-// The node `track`: images through pairing to the front-end.
+// The node `track`: pairs images and passes them to the front-end.
 //
-// When it falls behind: the oldest frames go (frame_queue.hpp), and its effort falls. It waits for room in
-// front of `smooth`: nothing tracked is lost.
+// When it falls behind: the oldest frames are dropped (frame_queue.hpp), and its effort is reduced. It waits
+// while the queue to `smooth` is full, so tracked frames are never lost.
 
 #include <cstdint>
 #include <memory>
@@ -26,13 +26,13 @@ class TrackNode final : public Node {
   QueueIn<SceneNote, 4 * kMapFrames> scene_notes{*this, "scenes_to_track", Arrow::kWaits};
   Out<TrackMessage> tracked{*this};
   Out<TrackStep> steps{*this};
-  KeyframeCopies copies{*this};  ///< of a frame's images, for `loop` and `map`
+  KeyframeCopies copies{*this};  ///< copies of a frame's images, for `loop` and `map`
 
   bool turn() override;
   void report(RunStatistics& statistics) const override;
   void addLosses(std::map<std::string, std::uint64_t>& losses) const override;
-  /// In place of images, from the thread of all nodes: the back-end alone. `timeline`: of the IMU's newest
-  /// sample. False while there is no room.
+  /// Replaces images: only the back-end runs. Called from the thread that runs all nodes. `timeline`: of the
+  /// IMU's newest sample. False: there is no room.
   bool takeTracks(const TrackedFrame& frame, std::uint32_t timeline);
 
  private:
@@ -44,7 +44,7 @@ class TrackNode final : public Node {
   GraphContext& context_;
   ConstantEffort full_effort_;
   EffortSource* effort_;
-  ImageFeed* const view_;  ///< null: nobody shows images
+  ImageFeed* const view_;  ///< null: no images are shown
   TrackStage stage_;
   std::uint64_t window_ = 0;
   std::uint64_t next_frame_ = 0;
