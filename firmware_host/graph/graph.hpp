@@ -65,7 +65,7 @@ class Graph {
   void look(FlightFacts& facts) const;
   /// After the run: reports to `observer` what the nodes counted, found and lost.
   void report(RunObserver& observer) const;
-  /// What was reserved for what, by the constructor.
+  /// Adds what the constructor reserved, by purpose.
   void addReservations(MemoryTable& table) const;
 
  private:

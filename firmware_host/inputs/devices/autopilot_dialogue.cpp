@@ -3,8 +3,9 @@
 namespace swiftlet {
 namespace {
 
-/// About as often as PX4 asks, 3 % of a link at 57600 Bd. Not a multiple of usual periods of poses: behind a
-/// pose on the same wire each request would be 3 ms late, and half of that in every stamp.
+/// About as often as PX4 asks; 3 % of a link at 57600 Bd. Not a multiple of usual pose periods: otherwise
+/// each request would follow a pose on the same wire and be 3 ms late, which adds half of that to every
+/// stamp.
 constexpr Duration kAskPeriod = Duration::fromMilliseconds(93);
 
 }  // namespace
@@ -14,7 +15,8 @@ std::size_t AutopilotDialogue::step(ImuDecoder& decoder, Stamp now, std::span<st
   const auto send = [&](const auto& message) {
     length += mavlink::write(sender_, message, out.subspan(length));
   };
-  // Readings are in their sender's clock: on a link with several systems no other may be asked for it.
+  // Readings are in their sender's clock, so on a link with several systems only the sender is asked for its
+  // clock.
   if (const auto& source = decoder.mavlinkSource()) {
     if (source->system != system_ || source->component != component_) exchange_ = TwoWayClockMap();
     system_ = source->system;

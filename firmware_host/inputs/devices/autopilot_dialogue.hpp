@@ -21,21 +21,21 @@ class AutopilotDialogue {
  public:
   /// TIMESYNC answers per round: an autopilot sends ten requests a second.
   static constexpr std::size_t kMostAnswers = 4;
-  /// These, a request and a command.
+  /// The answers, one TIMESYNC request and one command.
   static constexpr std::size_t kMostBytes = (kMostAnswers + 2) * kLongestMavlinkFrame;
 
   /// `rate`: required sample rate [Hz]; 0: not requested.
   explicit AutopilotDialogue(double rate) : stream_(rate) {}
 
-  /// Takes what the decoder has received, after its samples have been taken, and sets which message it
-  /// decodes. Writes the bytes to send at `now` (CLOCK_MONOTONIC) and returns their number.
+  /// Takes what the decoder has received and sets which message it decodes; call after its samples have been
+  /// taken. Writes the bytes to send at `now` (CLOCK_MONOTONIC) and returns their number.
   std::size_t step(ImuDecoder& decoder, Stamp now, std::span<std::uint8_t, kMostBytes> out);
-  /// After the link was gone.
+  /// Call after the link was lost.
   void restart();
 
-  /// The autopilot's clock on the host's; empty: not sure yet.
+  /// Converts a stamp of the autopilot's clock to the host's; empty: not certain yet.
   [[nodiscard]] std::optional<Stamp> toHost(Stamp device) const;
-  /// The newest HEARTBEAT of an autopilot is PX4's.
+  /// Whether the newest HEARTBEAT of an autopilot came from PX4.
   [[nodiscard]] bool px4() const { return px4_; }
   [[nodiscard]] std::uint64_t answers() const { return answers_; }
   [[nodiscard]] std::uint64_t requests() const { return requests_; }
@@ -45,11 +45,11 @@ class AutopilotDialogue {
  private:
   MavlinkSender sender_{.system = 1, .component = 191, .sequence = 0};
   TwoWayClockMap exchange_;
-  std::uint8_t system_ = 0, component_ = 0;  ///< whose clock it is: the sender of the readings; 0: not known
+  std::uint8_t system_ = 0, component_ = 0;  ///< owner of the clock: the sender of the readings; 0: unknown
   bool px4_ = false;
   ImuStreamRequest stream_;
-  Stamp asked_;                ///< when the newest request left; its answer names it
-  std::uint64_t samples_ = 0;  ///< of the decoder, counted
+  Stamp asked_;                ///< when the newest request was sent; its answer repeats this stamp
+  std::uint64_t samples_ = 0;  ///< samples of the decoder counted so far
   std::uint64_t answers_ = 0, requests_ = 0;
 };
 

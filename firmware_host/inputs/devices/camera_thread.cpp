@@ -11,13 +11,13 @@
 namespace swiftlet {
 namespace {
 
-/// Frames of one round: more wait only after the thread was held up.
+/// Most frames per round; more wait only after the thread was held up.
 constexpr int kMostFrames = 8;
-/// Images running that show nothing, or nothing new, before it is said: a hand before the lens, a lost frame
-/// that the driver fills in.
+/// Consecutive dark or repeated images before a report. Fewer are normal: a hand in front of the lens, a lost
+/// frame that the driver replaces.
 constexpr int kOddImages = 5;
 
-/// Frames without an edge before it is said, as a time and as a number for slow cameras. The first match
+/// Frames without an edge before a report, as a time and, for slow cameras, as a number. The first match
 /// takes 32 frames, a later one up to 11: three to notice a slip and eight to match again.
 constexpr Duration kFirstMatchPatience = Duration::fromMilliseconds(5000);
 constexpr int kFirstMatchFrames = 40;
@@ -33,13 +33,13 @@ FrameEvent frameEvent(StampEvent event) {
     case StampEvent::kEndOfFrame:
       break;
     case StampEvent::kArrival:
-      // A frame arrives after its end, by a delay that is not known.
+      // A frame arrives after its end, by an unknown delay.
       break;
   }
   return FrameEvent::kEndOfFrame;
 }
 
-/// A lag that is guessed may be a period off, and so would be every edge.
+/// A guessed lag may be wrong by a whole period, and then every edge would be assigned to the wrong frame.
 bool lagKnown(StampEvent event, const ExposureTiming& timing) {
   return event == StampEvent::kStartOfExposure ||
          (event == StampEvent::kEndOfExposure && timing.exposure.ns > 0) ||
@@ -85,7 +85,7 @@ DeviceFault CameraThread::open() {
 void CameraThread::adoptTiming() {
   const CameraFacts& facts = source_->facts();
   prepared_.event = facts.event;
-  // As the camera has taken it.
+  // The exposure that the camera applied.
   if (setup_.settings.exposure_ms > 0) timing_.exposure = facts.exposure.value_or(Duration{});
   if (exposure_) timing_.exposure = exposure_->asked().exposure;
   if (!setup_.trigger) return;
@@ -201,7 +201,7 @@ void CameraThread::publish() {
 
 void CameraThread::takeEdges() {
   EdgeMessage edge;
-  // As many as fit into the ring: the trigger's thread goes on meanwhile.
+  // At most one ring of edges: the trigger's thread keeps adding.
   for (std::size_t i = 0; i < EdgeRing::capacity() && edges_.tryPop(edge); ++i) {
     if (matcher_) train_.add(edge.stamp, static_cast<std::uint32_t>(edge.sequence));
   }
@@ -215,7 +215,7 @@ void CameraThread::takeFrames(SensorSink& sink) {
       return;
     }
     if (!frame.valid()) return;
-    // The first tells how many went by while nobody fetched any.
+    // The first frame's counters tell how many frames passed while none was fetched.
     if (!any_) before_.missed = source_->counters().missed;
     any_ = true;
     take(frame, sink);
@@ -281,7 +281,8 @@ Stamp CameraThread::middleOfExposure(const CapturedFrame& frame) {
       ++counted_.by_trigger;
       return exposureMidpoint(match.edge, FrameEvent::kTriggerEdge, timing_);
     }
-    // The edge as the stamp tells it: without the delay, stamps would jump by it.
+    // The driver's stamp less its usual delay to the edge. Without subtracting it, stamps would jump by the
+    // delay.
     if (const std::optional<Duration> lag = matcher_->lag()) {
       ++counted_.by_lag;
       return exposureMidpoint(frame.stamp - *lag, FrameEvent::kTriggerEdge, timing_);
@@ -302,7 +303,7 @@ void CameraThread::take(const CapturedFrame& frame, SensorSink& sink) {
   if (exposure_) timing_.exposure = exposure_->inForce(frame.sequence).exposure;
   if (watchQuality(images[0], frame.arrival)) handOver(frame, images, sink);
   if (!exposure_) return;
-  // Also of an image that repeats the one before: one that is white all over does.
+  // Also for a repeated image: a fully saturated image repeats too.
   const DeviceFault fault = exposure_->step(frame.sequence, images[0], frame.arrival, *source_);
   if (!fault.ok()) journal_.defect(frame.arrival, fault);
   counted_.asked = exposure_->asked();

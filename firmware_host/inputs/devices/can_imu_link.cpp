@@ -20,7 +20,7 @@ DeviceFault CanImuLink::open() {
 DeviceFault CanImuLink::receive(Stamp /*now*/) {
   first_ = count_ = 0;
   std::optional<CanFrame> frame;
-  // A full round of frames that are all parts of readings.
+  // At most so many frames: a full round of readings of eight frames each.
   constexpr std::size_t kFramesOfReading = 8;
   for (std::size_t i = 0; i < kMostReadings * kFramesOfReading && count_ < kMostReadings; ++i) {
     if (const DeviceFault fault = bus_.next(frame); !fault.ok()) return fault;

@@ -24,13 +24,13 @@ class CanImuLink : public ImuLink {
   [[nodiscard]] nlohmann::ordered_json counters() const override;
 
  private:
-  /// Of one round of the thread: a tenth of a second of RawIMU at 1 kHz, so that other work is not held up.
+  /// Per round of the thread: a tenth of a second of RawIMU at 1 kHz, so that other work is not delayed.
   static constexpr std::size_t kMostReadings = 128;
 
   CanBusSettings settings_;
   CanBus bus_;
   bool opened_ = false;
-  bool warned_ = false;  ///< of the bus's receive buffer
+  bool warned_ = false;  ///< about the bus's receive buffer
   RawImuDecoder decoder_;
   std::array<ImuReading, kMostReadings> readings_;
   std::size_t first_ = 0;

@@ -35,7 +35,7 @@ std::string firstLine(const fs::path& path) {
   return line;
 }
 
-/// Whether this user may open a node for reading and writing, with what to do where not.
+/// Reports whether this user may open a device node for reading and writing, with the remedy if not.
 MachineLine node(const std::string& what, const fs::path& path, std::string found) {
   if (access(path.c_str(), R_OK | W_OK) == 0) return {what, std::move(found), MachineVerdict::kGood, ""};
   const std::string group = what == "serial port" ? "dialout" : "gpio";
@@ -44,10 +44,10 @@ MachineLine node(const std::string& what, const fs::path& path, std::string foun
                       path.string())};
 }
 
-/// Whether a camera gives images in this format, in the size that it has.
+/// Tries whether a camera delivers images in this format at its current size.
 DeviceFault tryFormat(const std::string& path, const std::string& fourcc) {
-  constexpr int kPatience = 1000;  // ms; the slowest cameras give five images a second
-  constexpr int kMostBroken = 3;   // the first after a start often is
+  constexpr int kPatience = 1000;  // ms; the slowest cameras deliver five images a second
+  constexpr int kMostBroken = 3;   // the first image after a start is often broken
   CameraDeviceSettings settings;
   settings.setPath(path.c_str());
   settings.setFormat(fourcc.c_str());
@@ -69,7 +69,7 @@ DeviceFault tryFormat(const std::string& path, const std::string& fourcc) {
   return deviceFault(DeviceFaultKind::kGarbage, 0, "its images are damaged");
 }
 
-/// "YUYV, MJPG 640x480 1280x720; GREY 640x480": formats of the same sizes stand together.
+/// "YUYV, MJPG 640x480 1280x720; GREY 640x480": formats with the same sizes are grouped.
 std::string inGroups(const std::vector<const FormatOffer*>& formats) {
   std::string text;
   for (std::size_t i = 0; i < formats.size(); ++i) {
@@ -93,7 +93,7 @@ void addCamera(const CameraListing& camera, bool try_formats, MachineReport& rep
       others.push_back(format.fourcc);
       continue;
     }
-    // One that gives no image at all is not waited for in each format.
+    // A camera that delivers no image at all is not tried in every format.
     DeviceFault fault;
     if (first.kind == DeviceFaultKind::kSilent || first.kind == DeviceFaultKind::kBusy) {
       fault = first;
@@ -122,7 +122,7 @@ void addCamera(const CameraListing& camera, bool try_formats, MachineReport& rep
 void addCameras(bool try_formats, MachineReport& report) {
   bool any = false;
   for (const CameraListing& camera : listCameras()) {
-    // Decoders and the second nodes of USB cameras, which give metadata, are no cameras.
+    // Decoders and the metadata nodes of USB cameras are not cameras.
     if (camera.fault.kind == DeviceFaultKind::kWrongDevice) continue;
     any = true;
     if (camera.fault.ok()) {
@@ -143,7 +143,7 @@ void addCameras(bool try_formats, MachineReport& report) {
 void addSerialPorts(const fs::path& root, MachineReport& report) {
   constexpr std::array<const char*, 6> kPrefixes = {"ttyUSB", "ttyACM", "ttyAMA",
                                                     "ttyTHS", "ttymxc", "ttySAC"};
-  std::vector<std::pair<fs::path, fs::path>> names;  // a name that stays, and what it leads to
+  std::vector<std::pair<fs::path, fs::path>> names;  // device path, and the persistent name that links to it
   for (const fs::path& name : entries(root / "dev/serial/by-id")) {
     std::error_code error;
     names.emplace_back(fs::weakly_canonical(name, error), name);

@@ -15,7 +15,7 @@ std::vector<Duration> steps(const std::vector<Stamp>& stamps) {
 
 Duration distance(Stamp a, Stamp b) { return a < b ? b - a : a - b; }
 
-/// Nearest rank; of none: 0.
+/// Percentile by nearest rank; 0 for no values.
 Duration percentile(std::vector<Duration> values, double share) {
   if (values.empty()) return {};
   std::ranges::sort(values);
@@ -62,7 +62,7 @@ Duration CountingSink::Stream::jitter(double share) const {
   const Duration typical = medianStep();
   if (typical <= Duration{}) return {};
   for (Duration& step : off) {
-    // A step over lost frames counts as well.
+    // Also for a step over lost frames: its distance from a whole multiple of the median.
     const std::int64_t over = ((step.ns % typical.ns) + typical.ns) % typical.ns;
     step.ns = std::min(over, typical.ns - over);
   }
@@ -75,7 +75,7 @@ std::vector<Duration> CountingSink::pairDistances() const {
   std::vector<Duration> distances;
   std::vector<Stamp> left = camera_[0].stamps;
   if (left.empty()) return distances;
-  // A driver may have them otherwise.
+  // A driver may deliver stamps out of order.
   std::ranges::sort(left);
   for (const Stamp stamp : camera_[1].stamps) {
     const auto after = std::ranges::lower_bound(left, stamp);

@@ -15,18 +15,18 @@ class CountingSink : public SensorSink {
  public:
   struct Stream {
     std::vector<Stamp> stamps;
-    std::vector<Duration> latencies;  ///< of images: from the stamp to the arrival
-    std::uint64_t beyond = 0;         ///< came after `stamps` was full
+    std::vector<Duration> latencies;  ///< of images: from stamp to arrival
+    std::uint64_t beyond = 0;         ///< messages that came after `stamps` was full
 
-    /// Per second, of the stamps kept; 0 for less than two.
+    /// Messages per second, from the stamps kept; 0 for fewer than two.
     [[nodiscard]] double rate() const;
-    /// The largest step between stamps that follow each other.
+    /// Largest step between consecutive stamps.
     [[nodiscard]] Duration largestStep() const;
-    /// The steps' median.
+    /// Median of the steps.
     [[nodiscard]] Duration medianStep() const;
-    /// What `share` of the steps are off whole multiples of their median by at most.
+    /// `share` of the steps are within this distance of a whole multiple of their median.
     [[nodiscard]] Duration jitter(double share) const;
-    /// What `share` of the latencies are at most.
+    /// `share` of the latencies do not exceed this.
     [[nodiscard]] Duration latency(double share) const;
   };
 
@@ -44,10 +44,11 @@ class CountingSink : public SensorSink {
     keep(stream, image.stamp);
   }
 
-  // Call after the devices' threads have ended.
+  // Call only after the devices' threads have ended.
   [[nodiscard]] const Stream& imu() const { return imu_; }
   [[nodiscard]] const Stream& camera(std::size_t index) const { return camera_.at(index); }
-  /// From each image of camera 1 to the nearest of camera 0, smallest first; empty without both.
+  /// Distance from each image of camera 1 to the nearest of camera 0, ascending; empty if either camera has
+  /// none.
   [[nodiscard]] std::vector<Duration> pairDistances() const;
 
  private:

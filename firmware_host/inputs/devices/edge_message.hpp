@@ -1,5 +1,5 @@
 #pragma once
-// An edge of the cameras' trigger on its way to the thread of a camera.
+// An edge of the cameras' trigger, passed to a camera's thread.
 
 #include <cstdint>
 
@@ -10,10 +10,10 @@ namespace swiftlet {
 
 struct EdgeMessage {
   Stamp stamp;                 ///< CLOCK_MONOTONIC
-  std::uint64_t sequence = 0;  ///< of edges; a jump shows edges that were not read
+  std::uint64_t sequence = 0;  ///< number of the edge; a jump means that edges were not read
 };
 
-/// A camera's thread looks with every frame: room for half a second of the fastest cameras.
+/// A camera's thread reads the ring with every frame: room for half a second of the fastest cameras.
 using EdgeRing = SpscRing<EdgeMessage, 256>;
 
 }  // namespace swiftlet

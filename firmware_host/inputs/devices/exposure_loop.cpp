@@ -3,7 +3,7 @@
 namespace swiftlet {
 namespace {
 
-/// rad/s, of a vehicle whose IMU is silent: a brisk turn.
+/// rad/s, assumed while the IMU is silent: a brisk turn.
 constexpr double kUnknownTurnRate = 1.0;
 constexpr Duration kTurnRateAge = Duration::fromMilliseconds(200);
 
@@ -16,7 +16,7 @@ DeviceFault ExposureLoop::begin(CameraSource& source) {
                        "the exposure cannot be set in flight: set cameras.exposure_control to false");
   }
   const ExposureSetting start = begun_ ? control_.asked() : ability->now;
-  // Also where it is in force already: the camera's automatics end.
+  // Set even if this exposure is in force already: this turns the camera's automatic exposure off.
   if (const DeviceFault fault = source.setExposure(start); !fault.ok()) return fault;
   control_ = ExposureControl(ability->range, setup_.focal, setup_.period, start);
   begun_ = true;

@@ -17,7 +17,7 @@
 
 namespace swiftlet {
 
-/// How fast the vehicle turns, of the IMU's thread.
+/// Angular rate of the vehicle, from the IMU's thread.
 struct TurnRate {
   double rate = 0;  ///< rad/s
   Stamp arrival;
@@ -38,19 +38,19 @@ class ExposureLoop {
   struct Setup {
     bool leads = true;  ///< camera 0
     double focal = 1;   ///< px
-    Duration period;    ///< of images
+    Duration period;    ///< image period
     SharedExposure* asked = nullptr;
     const NewestShared<TurnRate>* turn_rate = nullptr;
   };
   explicit ExposureLoop(const Setup& setup) : setup_(setup) {}
 
-  /// Call after the source is opened or reopened; a reopened source starts with the last request.
-  /// kUnsupported: its exposure cannot be set.
+  /// Call after the source is opened or reopened; a reopened source starts with the newest request.
+  /// kUnsupported: the source's exposure cannot be set.
   DeviceFault begin(CameraSource& source);
   /// Call after image `frame`, whose view is still valid; `now`: its arrival.
   DeviceFault step(std::uint64_t frame, const ImageView& image, Stamp now, CameraSource& source);
 
-  /// What image `frame` was taken with.
+  /// Exposure and gain of image `frame`.
   [[nodiscard]] ExposureSetting inForce(std::uint64_t frame) const { return control_.inForce(frame); }
   [[nodiscard]] const ExposureSetting& asked() const { return control_.asked(); }
 

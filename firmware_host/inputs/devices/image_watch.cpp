@@ -3,9 +3,9 @@
 namespace swiftlet {
 namespace {
 
-/// Grey; as the front-end, which takes such images for absent.
+/// Mean grey value; the same as in the front-end, which treats darker images as missing.
 constexpr std::uint64_t kDarkMean = 12;
-// FNV-1a's.
+// Constants of FNV-1a.
 constexpr std::uint64_t kStart = 0xcbf29ce484222325;
 constexpr std::uint64_t kFactor = 0x100000001b3;
 

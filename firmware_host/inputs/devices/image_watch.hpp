@@ -17,7 +17,8 @@ class ImageWatch {
   Look look(const ImageView& image);
 
  private:
-  /// Rows between those that are read: prime, so that no pattern of a sensor or of text hides between them.
+  /// Distance between the rows that are read: prime, so that no regular pattern of a sensor or of text falls
+  /// between them.
   static constexpr int kRowStep = 37;
 
   std::uint64_t signature_ = 0;

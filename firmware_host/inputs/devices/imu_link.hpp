@@ -25,11 +25,11 @@ class ImuLink {
   /// Closes the link of a device that may have lost its configuration: open() configures it again. False: the
   /// link stays open, since it configures nothing or does so while it is open.
   virtual bool restart() { return false; }
-  /// True: reading costs allocations and locks, which a thread of the flight path must not have.
+  /// Whether reading allocates and locks; such a link must not run on a thread of the flight path.
   [[nodiscard]] virtual bool allocates() const { return false; }
-  /// To poll for reading.
+  /// Poll for reading.
   [[nodiscard]] virtual int fd() const = 0;
-  /// Also to be polled: becomes readable when another thread has a message to send; below 0: never.
+  /// Poll as well: readable while another thread has a message to send; negative: never.
   [[nodiscard]] virtual int wakeFd() const { return -1; }
   /// Discards queued samples whose arrival time is no longer known. Bounded.
   virtual void discard() {}
@@ -38,17 +38,17 @@ class ImuLink {
   /// Sends what the protocol requires, after the samples have been taken. Never waits.
   virtual DeviceFault send() { return {}; }
   virtual bool next(ImuReading& reading) = 0;
-  /// Edges of a trigger that the IMU sees.
+  /// Trigger edges seen by the IMU. False: none left.
   virtual bool nextEdge(TriggerEdge& /*edge*/) { return false; }
   /// Bytes or frames received so far, of any kind. If they grow without samples, the protocol is wrong.
   [[nodiscard]] virtual std::uint64_t received() const = 0;
-  /// Host stamp by the protocol's own exchange of clocks; empty: none, or not yet sure.
+  /// Host stamp by the protocol's own clock exchange; empty: there is none, or it is not certain yet.
   [[nodiscard]] virtual std::optional<Stamp> toHost(Stamp /*device*/) const { return std::nullopt; }
   /// Deviations of the device from what was requested, for the user; call until it returns false.
   virtual bool nextRemark(DeviceFault& /*remark*/) { return false; }
   /// What was requested from the device and its answer, as text; empty: nothing was requested.
   [[nodiscard]] virtual std::string stream() const { return {}; }
-  /// What was counted; after the flight.
+  /// Counters, after the flight.
   [[nodiscard]] virtual nlohmann::ordered_json counters() const = 0;
 };
 

@@ -13,21 +13,22 @@
 namespace swiftlet {
 namespace {
 
-/// Two maps of one clock differ by the link's constant delay, which is less. Farther apart, one of them has
-/// not heard of a step yet.
+/// Two maps of one clock differ by the link's constant delay, which is shorter than this. If they differ by
+/// more, one of them has not noticed a clock step yet.
 constexpr Duration kLongestDelay = Duration::fromMilliseconds(100);
-/// The constant delay hardly changes in flight. Where the maps are suddenly this much farther apart or
-/// nearer, one has heard of a step; where they stay so for kSettling, the link has changed.
+/// The constant delay hardly changes in flight. If the difference between the maps suddenly changes by more
+/// than this, one of them has noticed a clock step; if the change lasts for kSettling, the link itself has
+/// changed.
 constexpr Duration kTransportChange = Duration::fromMilliseconds(3);
 constexpr Duration kSettling = Duration::fromMilliseconds(10'000);
 
 /// A device that sends nothing useful, or less than kLeastRate of its rate, for kRestartAfter may have lost
-/// power, and its configuration with it. Shorter gaps are losses on the way.
+/// power and thereby its configuration. Shorter gaps are transmission losses.
 constexpr Duration kRestartAfter = Duration::fromMilliseconds(2000);
-/// Of the expected rate. Sensors fall back to factory settings of 40 to 100 Hz; losses are smaller.
+/// Share of the expected rate. Sensors fall back to factory settings of 40 to 100 Hz; losses are smaller.
 constexpr double kLeastRate = 0.5;
 
-/// s: motors shake faster than at 15 Hz, and move the image by little.
+/// s; motors vibrate above 15 Hz, but move the image by little.
 constexpr double kTurnSmoothing = 0.01;
 
 Duration magnitude(Duration d) { return {std::abs(d.ns)}; }
@@ -45,7 +46,7 @@ ImuThread::ImuThread(std::string name, std::unique_ptr<ImuLink> link, const ImuC
       restart_wait_(kFirstRestartWait) {}
 
 void ImuThread::run(SensorSink& sink, const ImuEdges& edges, const RunControl& control) {
-  // What came before the flight has lost its time of arrival.
+  // The arrival times of data queued before the flight are unknown.
   link_->discard();
   hear();
   while (!control.stopped()) {
@@ -136,7 +137,7 @@ bool ImuThread::stampOf(const ImuReading& reading, Stamp& stamp) {
     ++counted_.by_arrival;
     return true;
   }
-  // Also where the exchange is sure: it hears of a step of the clock some tenths of a second later.
+  // Also while the exchange is certain: it notices a clock step some tenths of a second later than this map.
   if (!clock_.add(*reading.device, reading.arrival, stamp).ok()) return false;
   arrival_ = reading.arrival;
   const std::optional<Stamp> one_way = clock_.toHost(*reading.device);
@@ -169,7 +170,7 @@ std::optional<Stamp> ImuThread::hostOf(Stamp device) const {
   return exchanged ? exchanged : *one_way - transport_.value_or(Duration{});
 }
 
-/// Of a device that sends: its clock, and whether all of it comes.
+/// Watches the clock and the rate of a device that sends.
 void ImuThread::watchQuality(std::size_t readings) {
   const TimesyncStatus before = counted_.clock;
   counted_.clock = clock_.status();
@@ -200,7 +201,8 @@ void ImuThread::watchRate() {
     slow_since_.reset();
     restart_wait_ = kFirstRestartWait;
   } else if (was_at_rate_ && !slow_since_) {
-    // One that never reached the rate was said at the opening: a restart would only interrupt it.
+    // A device that never reached the rate was reported when it was opened; a restart would only interrupt
+    // it.
     slow_since_ = heard_;
   }
 }

@@ -24,19 +24,19 @@
 
 namespace swiftlet {
 
-/// What the IMU did so far.
+/// Counters of the IMU so far.
 struct ImuStatus {
   std::uint64_t samples = 0;
-  std::uint64_t refused = 0;  ///< no stamp, or one that does not rise
+  std::uint64_t refused = 0;  ///< without a stamp, or with one that does not rise
   std::uint64_t by_exchange = 0;
   std::uint64_t by_arrival = 0;
-  std::uint64_t by_driver = 0;  ///< the driver provides the host's time
+  std::uint64_t by_driver = 0;  ///< stamped with the host's time that the driver provides
   TimesyncStatus clock;
-  std::uint64_t edges = 0;  ///< of a trigger, handed to the cameras
-  Stamp edge;               ///< host time at which the newest was read
+  std::uint64_t edges = 0;  ///< trigger edges passed to the cameras
+  Stamp edge;               ///< host time at which the newest edge was read
 };
 
-/// Where trigger edges that arrive over the link go, and which of them.
+/// Which of the trigger edges that arrive over the link are passed on, and to which cameras.
 struct ImuEdges {
   std::span<EdgeRing* const> cameras = {};
   bool rising = true;
@@ -45,7 +45,7 @@ struct ImuEdges {
 
 class ImuThread {
  public:
-  /// `delay`: from sensing to arrival at the least. `rate`: samples a second that are expected; 0: unknown.
+  /// `delay`: least time from measurement to arrival. `rate`: expected samples per second; 0: unknown.
   ImuThread(std::string name, std::unique_ptr<ImuLink> link, const ImuCorrection& correction, Duration delay,
             double rate = 0);
 
@@ -60,12 +60,12 @@ class ImuThread {
   [[nodiscard]] SensorInput::Level level() const {
     return link_->allocates() ? SensorInput::Level::kLibrary : SensorInput::Level::kSensor;
   }
-  /// Of run(), at each turn.
+  /// Beats at each turn of run().
   [[nodiscard]] Heartbeat& heart() { return heart_; }
 
   [[nodiscard]] DeviceJournal& journal() { return journal_; }
   [[nodiscard]] const ImuLink& link() const { return *link_; }
-  /// Any thread: without what vibration adds.
+  /// Any thread: angular rate without vibration.
   [[nodiscard]] const NewestShared<TurnRate>& turnRate() const { return turn_rate_; }
   [[nodiscard]] ImuStatus status() const {
     ImuStatus status;
@@ -77,15 +77,16 @@ class ImuThread {
   void takeReadings(SensorSink& sink, const ImuEdges& edges);
   void hand(const ImuReading& reading, SensorSink& sink);
   [[nodiscard]] bool stampOf(const ImuReading& reading, Stamp& stamp);
-  /// By the protocol's exchange of clocks, where it is sure and the arrivals do not contradict it.
+  /// Host stamp by the protocol's clock exchange, if that is certain and the arrivals do not contradict it.
   [[nodiscard]] std::optional<Stamp> byExchange(Stamp device, Stamp one_way) const;
-  /// Of other things on the sensor's clock: mapped as its samples are.
+  /// Host stamp of other events on the sensor's clock, mapped like samples.
   [[nodiscard]] std::optional<Stamp> hostOf(Stamp device) const;
   void hear();
   void watchSilence(Stamp now);
   void watchQuality(std::size_t readings);
   void watchRate();
-  /// A device that is silent, or lost most of its rate, may have lost its configuration with its power.
+  /// Restarts a device that is silent or has lost most of its rate: it may have lost power and its
+  /// configuration.
   void restart(Stamp now);
 
   std::unique_ptr<ImuLink> link_;
@@ -95,16 +96,16 @@ class ImuThread {
   Duration delay_;
   ClockMap clock_;
   RateWatch rate_;
-  bool was_at_rate_ = false;         ///< it has sent more than the least rate
-  std::optional<Stamp> slow_since_;  ///< less than that since
-  Duration restart_wait_;            ///< until the next restart; grows while none helps
-  Stamp restart_at_;                 ///< not before
+  bool was_at_rate_ = false;         ///< it has reached the least rate once
+  std::optional<Stamp> slow_since_;  ///< below the least rate since then
+  Duration restart_wait_;            ///< until the next restart; grows while restarts do not help
+  Stamp restart_at_;                 ///< earliest time of the next restart
   /// Difference between the one-way clock map and the two-way exchange when both were last trusted, at
   /// `agreed_`. After a clock step it is subtracted until the exchange is certain again.
   std::optional<Duration> transport_;
   Stamp agreed_;
   Stamp arrival_;               ///< of the newest reading with a clock
-  Stamp newest_;                ///< handed over
+  Stamp newest_;                ///< when the newest sample was handed over, or when waiting began
   Stamp heard_;                 ///< when the newest sample was handed over, or since when there is none
   std::uint64_t received_ = 0;  ///< at `heard_`
   std::uint64_t refused_ = 0;   ///< at `heard_`

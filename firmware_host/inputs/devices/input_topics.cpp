@@ -23,7 +23,7 @@ struct DriverTopics {
   const char* accel;
 };
 
-/// As the drivers' launch files have it: docs/ros2.md says what must be switched on.
+/// Names in the drivers' launch files; docs/ros2.md lists what must be enabled.
 constexpr std::array kDrivers = {
     DriverTopics{"realsense",
                  {"/camera/camera/infra1/image_rect_raw", "/camera/camera/infra2/image_rect_raw"},
@@ -36,13 +36,13 @@ constexpr std::array kDrivers = {
                  ""},
 };
 
-/// CameraInfo comes with every image; discovery takes some tenths of a second.
+/// CameraInfo is published with every image; discovery takes some tenths of a second.
 constexpr Duration kInfoPatience = Duration::fromMilliseconds(3000);
 constexpr double kMostApart = 1;  // px
-/// A participant announces itself at once when another appears; images of a busy computer make it wait.
+/// A participant announces itself as soon as another appears; image traffic on a busy computer delays this.
 constexpr Duration kHearsay = Duration::fromMilliseconds(1500);
 
-/// Empty: none came; `why` says what there is.
+/// Empty: none arrived; `why` lists what is there.
 std::optional<CameraInfo> receiveInfo(const Settings& settings, const std::string& topic, std::string& why) {
   const std::shared_ptr<DdsDomain> domain = DdsDomain::open(inputNetwork(settings), why);
   TopicBell bell;
@@ -138,7 +138,7 @@ double largestDifference(const CameraModel& a, const CameraModel& b) {
       Eigen::Vector3d bearing;
       Eigen::Vector2d other;
       if (!a.unproject(pixel, bearing)) continue;
-      // What `b` cannot see at all is farther off than any image is wide.
+      // A point outside of `b`'s view counts as farther away than any image width.
       const bool seen = b.project(bearing, other);
       largest = std::max(largest, seen ? (other - pixel).norm() : static_cast<double>(a.width()));
     }

@@ -16,30 +16,30 @@ namespace swiftlet {
 
 struct InputTopics {
   std::array<std::string, kMaxCameras> camera;
-  std::string imu;    ///< or of the gyroscope
-  std::string accel;  ///< empty: `imu` has both
+  std::string imu;    ///< or the gyroscope's topic
+  std::string accel;  ///< empty: `imu` carries both
 
   [[nodiscard]] bool any() const { return !imu.empty() || !camera[0].empty() || !camera[1].empty(); }
 };
 
-/// What the settings name, and for what they do not name at all the topics of ros2.driver. `cameras`: of the
-/// rig.
+/// The topics in the settings. For a camera or IMU that the settings do not name at all, the topics of
+/// ros2.driver. `cameras`: number in the rig.
 [[nodiscard]] InputTopics inputTopics(const Settings& settings, std::size_t cameras = kMaxCameras);
 
-/// Of ros2.domain and ros2.interface; the library's complaints go to the console.
+/// Network of ros2.domain and ros2.interface; the library's messages go to the console.
 [[nodiscard]] DdsNetwork inputNetwork(const Settings& settings);
 
-/// A line for each topic of images, inertial samples and calibrations that somebody publishes there, after
-/// listening for some seconds.
+/// Listens for some seconds and adds a line for each published topic of images, inertial samples or
+/// calibrations.
 void addTopics(const Settings& settings, MachineReport& report);
 
-/// "/camera/infra1/camera_info" of "/camera/infra1/image_rect_raw" and of its compressed kind.
+/// "/camera/infra1/camera_info" for "/camera/infra1/image_rect_raw" and for its compressed variant.
 [[nodiscard]] std::string cameraInfoTopic(std::string_view image_topic);
 
-/// Whether the images of a topic are rectified: by a word `rect` in its name, as ROS's drivers have it.
+/// Whether the images of a topic are rectified: its name contains the word `rect`, as in ROS drivers.
 [[nodiscard]] bool isRectified(std::string_view image_topic);
 
-/// Largest distance between the two images of one bearing [px], over all that `a` sees.
+/// Largest distance between the two cameras' pixels of one bearing [px], over the whole image of `a`.
 [[nodiscard]] double largestDifference(const CameraModel& a, const CameraModel& b);
 
 /// For cameras behind topics, according to cameras.camera_info: compares the calibration's lenses with those

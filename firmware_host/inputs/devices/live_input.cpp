@@ -22,17 +22,17 @@ namespace {
 
 constexpr const char* kTriggerByImu = "imu";
 constexpr const char* kAnyFormat = "any";
-/// Longer than an IMU's samples take over any of the links: their buffers hold 16 ms at the most.
+/// Longer than an IMU's samples take over any link, whose buffers hold at most 16 ms.
 constexpr Duration kLinkPatience = Duration::fromMilliseconds(25);
-/// Those of topics pass two processes that the kernel runs when it likes, and wait for an accelerometer that
-/// is apart.
+/// Samples from topics pass through two other processes, scheduled at the kernel's discretion, and may wait
+/// for a separate accelerometer.
 constexpr Duration kTopicPatience = Duration::fromMilliseconds(60);
 
 [[noreturn]] void failAt(const char* setting, const std::string& what, const std::string& remedy) {
   throw InputError("settings", 0, setting, what, remedy);
 }
 
-/// Whether autopilot.device names the IMU's port: then they share one link.
+/// Whether autopilot.device names the IMU's port, so that both share one link.
 bool sharesLink(const Settings& settings) {
   const std::string& device = settings.autopilot.device;
   if (device.empty() || !samePort(device, settings.imu_link.device)) return false;
@@ -75,7 +75,7 @@ std::unique_ptr<ImuLink> makeImuLink(const ImuLinkGroup& settings, double rate, 
   return std::make_unique<PortImuLink>(settings, rate, outbox);
 }
 
-/// The IMU's input that trigger.line names; empty: all.
+/// The IMU's input named by trigger.line; empty: all inputs.
 std::optional<std::uint8_t> imuLine(const std::string& text) {
   if (text.empty()) return std::nullopt;
   std::uint8_t line = 0;
@@ -87,7 +87,7 @@ std::optional<std::uint8_t> imuLine(const std::string& text) {
   return line;
 }
 
-/// Where camera `index` comes from, as the settings name it.
+/// Origin of a camera, as named in the settings.
 struct CameraOrigin {
   const char* device_key;
   const char* pipeline_key;
@@ -97,12 +97,12 @@ struct CameraOrigin {
   const std::string& topic;
 
   [[nodiscard]] bool named() const { return !device.empty() || !pipeline.empty() || !topic.empty(); }
-  /// The key that names it.
+  /// The setting that names the origin.
   [[nodiscard]] const char* key() const {
     if (!topic.empty()) return topic_key;
     return pipeline.empty() ? device_key : pipeline_key;
   }
-  /// For messages: a pipeline's first words.
+  /// For messages: the origin's name; a long pipeline is cut.
   [[nodiscard]] std::string name() const {
     constexpr std::size_t kMost = 40;
     if (!topic.empty()) return topic;
@@ -155,13 +155,13 @@ std::unique_ptr<CameraSource> makeSource(const Settings& settings, const CameraO
       PipelineSettings{origin.pipeline, width, height, group.rate_hz, exposure});
 }
 
-/// Both cameras come from device0 or pipeline0, in the halves of one image or pixel beside pixel.
+/// Both cameras come from device0 or pipeline0: side by side in one image, or in alternating pixels.
 bool twoInOne(const CamerasGroup& group) {
   const std::optional<PixelFormat> format = pixelFormat(group.format);
   return group.side_by_side || (format && format->layout == PixelLayout::kPairs);
 }
 
-/// One origin a camera, and no setting that means nothing to it.
+/// Requires one origin per camera, and no setting that does not apply to it.
 void checkOrigins(const CamerasGroup& group, const InputTopics& topics) {
   bool any_device = false;
   for (std::size_t i = 0; i < kMaxCameras; ++i) {
@@ -256,7 +256,7 @@ LiveInput::LiveInput(const Settings& settings, const Calibration& calibration) {
     cameras.readout_ms = rig.readout.seconds() / kFromMs;
   }
   checkCameras(cameras, topics, rig);
-  // A sensor that is set loses what else it sends, edges too.
+  // Configuring a sensor disables its other outputs, edges included.
   const bool keeps_edges = settings.trigger.chip == kTriggerByImu && settings.imu_link.protocol != "mavlink";
   const double asked_rate = keeps_edges ? 0 : calibration.noise.rate_hz;
   if (sharesLink(settings)) outbox_ = std::make_unique<LinkOutbox>();

@@ -22,7 +22,7 @@
 
 namespace swiftlet {
 
-/// One or two: how many cameras the settings name.
+/// Number of cameras named in the settings, one or two.
 std::size_t namedCameras(const Settings& settings);
 
 class LiveInput : public SensorInput {
@@ -30,11 +30,11 @@ class LiveInput : public SensorInput {
   /// IMU, cameras, trigger.
   static constexpr std::size_t kMostThreads = 2 + kMaxCameras;
 
-  /// InputError, naming the setting, where the settings name too few devices or too many for the rig.
+  /// InputError naming the setting if the settings name too few devices, or too many for the rig.
   LiveInput(const Settings& settings, const Calibration& calibration);
   ~LiveInput() override;
 
-  /// Opens all. What is wrong with those that did not open, or took a setting otherwise, one line each.
+  /// Opens all devices. Reports one line for each that did not open or applied a setting differently.
   struct Opened {
     std::vector<std::string> faults;
     std::vector<std::string> warnings;
@@ -42,13 +42,14 @@ class LiveInput : public SensorInput {
   Opened open();
 
   std::vector<Thread> threads(SensorSink& sink, const RunControl& control) override;
-  /// The trigger's edges.
+  /// Adds the trigger's edges.
   void look(FlightFacts& facts) const override;
   [[nodiscard]] std::uint64_t taken() const override;
-  /// How long a frame waits for the samples that belong to it.
+  /// How long a frame waits for its samples.
   [[nodiscard]] Duration samplePatience() const;
 
-  /// Of one thread: what happened to devices since, as lines for the user. True: there was something.
+  /// For one thread: passes what has happened to devices since the last call, as lines for the user. True:
+  /// there was something.
   bool drainEvents(const std::function<void(Stamp, const std::string&)>& take);
   /// After the flight: the devices' statistics.
   [[nodiscard]] nlohmann::ordered_json counters();
@@ -57,9 +58,9 @@ class LiveInput : public SensorInput {
   [[nodiscard]] LinkOutbox* outbox() { return outbox_.get(); }
   [[nodiscard]] ImuThread& imu() { return *imu_; }
   [[nodiscard]] std::span<const std::unique_ptr<CameraThread>> cameras() const { return cameras_; }
-  /// Cameras are triggered, by a GPIO line's edges or the IMU's.
+  /// Whether cameras are triggered, by edges of a GPIO line or of the IMU.
   [[nodiscard]] bool hasTrigger() const { return trigger_ != nullptr || !imu_edges_.cameras.empty(); }
-  /// Null: no line is connected.
+  /// Null: no GPIO line is connected.
   [[nodiscard]] TriggerThread* trigger() { return trigger_.get(); }
 
  private:
@@ -70,8 +71,8 @@ class LiveInput : public SensorInput {
   std::unique_ptr<ImuThread> imu_;
   std::vector<std::unique_ptr<CameraThread>> cameras_;
   std::unique_ptr<TriggerThread> trigger_;
-  std::vector<EdgeRing*> edge_rings_;  ///< one a camera's thread
-  ImuEdges imu_edges_;                 ///< to no camera unless the trigger is the IMU's
+  std::vector<EdgeRing*> edge_rings_;  ///< one per camera thread
+  ImuEdges imu_edges_;                 ///< without cameras unless the IMU gives the trigger
   bool topics_ = false;                ///< any device is a topic
 };
 

@@ -10,10 +10,10 @@
 namespace swiftlet {
 namespace {
 
-/// Reads that empty the kernel's buffer: of a serial port 64 kB at the most, of UDP some hundred datagrams.
+/// Enough reads to empty the kernel's buffer: at most 64 kB on a serial port, some hundred datagrams on UDP.
 constexpr int kMostDiscarded = 1000;
-/// Datagrams of a millisecond, some 0.2 ms of work: more is a flood, on which the highest priority is not
-/// spent.
+/// Most datagrams per millisecond, about 0.2 ms of work. More is a flood, which must not occupy the highest
+/// priority.
 constexpr int kMostDatagrams = 64;
 constexpr Duration kFloodWindow = Duration::fromMilliseconds(1);
 
@@ -35,7 +35,7 @@ DeviceFault PortImuLink::open() {
 }
 
 bool PortImuLink::restart() {
-  // The dialogue requests an autopilot's stream again, and its link may carry poses too.
+  // The dialogue requests an autopilot's stream again while the link is open; the link may also carry poses.
   if (isMavlink()) return false;
   static_cast<void>(close({}));
   return true;
@@ -58,7 +58,7 @@ DeviceFault PortImuLink::receive(Stamp /*now*/) {
   std::size_t count = 0;
   Stamp read_at;
   if (const DeviceFault fault = port_.read(bytes_, count, read_at); !fault.ok()) return close(fault);
-  // All of it fits: the decoder has been asked until it had no more.
+  // All bytes fit: the decoder was emptied before.
   static_cast<void>(decoder_.feed(std::span(bytes_).first(count), read_at, port_.byteTime()));
   if (port_.isUdp() && count > 0) pauseInFlood(read_at);
   return {};
@@ -75,7 +75,7 @@ void PortImuLink::pauseInFlood(Stamp read_at) {
 DeviceFault PortImuLink::judge(const DeviceFault& fault) {
   if (fault.ok()) return {};
   ++refused_;
-  // A full port loses what was said and no more.
+  // A full port loses this message only.
   return fault.kind == DeviceFaultKind::kUnplugged ? close(fault) : DeviceFault{};
 }
 
@@ -91,12 +91,11 @@ DeviceFault PortImuLink::send() {
   outbox_->tellPx4(dialogue_.px4());
   outbox_->hush();
   if (!outbox_->attended()) {
-    // Of before the link was there.
+    // Drop messages queued while the link was down.
     while (outbox_->front() != nullptr) outbox_->pop();
     outbox_->attend(true);
   }
-  // As long as the port keeps nothing back: what it has no room for makes the outbox full, which its sender
-  // sees.
+  // Only while the port holds nothing back. If it has no room, the outbox fills up, which the sender notices.
   while (const LinkOutbox::Bytes* bytes = port_.flush() ? outbox_->front() : nullptr) {
     const DeviceFault fault = judge(port_.write(bytes->used()));
     outbox_->pop();

@@ -1,7 +1,7 @@
 #pragma once
-// An IMU on a serial port, or an autopilot's IMU on a serial port or UDP, for which TIMESYNC and the sample
-// rate are also negotiated. Messages of other threads over the same link are sent here too: one thread reads
-// and writes the port.
+// An IMU on a serial port, or an autopilot's IMU on a serial port or UDP. With an autopilot, TIMESYNC and the
+// sample rate are also negotiated. Other threads' messages over the same link are sent here too, so only one
+// thread reads and writes the port.
 
 #include <array>
 #include <memory>
@@ -20,8 +20,8 @@ namespace swiftlet {
 
 class PortImuLink : public ImuLink {
  public:
-  /// `rate`: sample rate requested from the device [Hz]; 0: not requested. `outbox`: of an autopilot's outlet
-  /// on the same link, or null; it must outlive this. InputError naming imu_link.device.
+  /// `rate`: sample rate requested from the device [Hz]; 0: not requested. `outbox`: messages of an autopilot
+  /// outlet on the same link, or null; must outlive this object. InputError naming imu_link.device.
   explicit PortImuLink(const ImuLinkGroup& settings, double rate = 0, LinkOutbox* outbox = nullptr);
 
   DeviceFault open() override;
@@ -53,9 +53,9 @@ class PortImuLink : public ImuLink {
   SensorSetup setup_;
   LinkOutbox* outbox_;
   std::array<std::uint8_t, ImuDecoder::kMostFed> bytes_;
-  Stamp window_;  ///< in which datagrams are counted
+  Stamp window_;  ///< start of the interval in which datagrams are counted
   int datagrams_ = 0;
-  std::uint64_t sent_ = 0, refused_ = 0;  ///< writes; of the outbox, and of our own that found no room
+  std::uint64_t sent_ = 0, refused_ = 0;  ///< outbox messages sent; writes refused for lack of room
 };
 
 }  // namespace swiftlet

@@ -10,12 +10,12 @@ namespace swiftlet {
 
 class RateWatch {
  public:
-  /// Of the messages expected: fewer is a loss, more is noise. A second of the slowest camera holds 10, of
-  /// which the window's ends may cost one.
+  /// Limits as a share of the expected messages: fewer is a loss, more is noise. A second of the slowest
+  /// camera holds 10 messages, of which one may fall outside at the ends of the window.
   static constexpr double kFewest = 0.85;
   static constexpr double kMost = 1.15;
 
-  /// Per second; 0: unknown, and nothing is ever wrong.
+  /// `expected`: messages per second; 0: unknown, no rate is ever wrong.
   explicit RateWatch(double expected) : expected_(expected) {}
 
   /// Counting starts after the message that arrived at `now`.

@@ -15,9 +15,9 @@ constexpr Duration kListening = Duration::fromMilliseconds(500);
 /// Sensors answer within tens of milliseconds.
 constexpr Duration kPatience = Duration::fromMilliseconds(500);
 constexpr Duration kRound = Duration::fromMilliseconds(5);
-/// Of the rate, by which a sensor may be off and be left alone.
+/// Relative deviation from the rate up to which a sensor is not configured.
 constexpr double kTolerance = 0.05;
-/// Fewer readings tell no rate.
+/// With fewer readings the rate is unknown.
 constexpr int kFewest = 10;
 
 }  // namespace
@@ -43,7 +43,7 @@ void SensorSetup::run(LinkPort& port, ImuDecoder& decoder) {
         deviceFault(DeviceFaultKind::kUnsupported, 0,
                     "%.0f Hz requested, but \"%s\" got %s: set the output rate with the maker's program",
                     rate_, step.what, reply_ < count_ ? "a refusal" : "no reply");
-    // So that it sends again what it did.
+    // The last step lets the sensor send again.
     static_cast<void>(ask(port, configuration.step(configuration.steps() - 1)));
     return;
   }
@@ -78,7 +78,7 @@ bool SensorSetup::ask(LinkPort& port, const ConfigurationStep& step) {
   const Stamp end = hostNow() + kPatience;
   while (hostNow() < end) {
     port.wait(kRound);
-    // Readings that go on to come push older bytes out.
+    // Readings that keep arriving push older bytes out.
     if (count_ > heard_.size() / 2) {
       std::copy(heard_.begin() + static_cast<std::ptrdiff_t>(count_ / 2),
                 heard_.begin() + static_cast<std::ptrdiff_t>(count_), heard_.begin());
@@ -94,7 +94,7 @@ bool SensorSetup::ask(LinkPort& port, const ConfigurationStep& step) {
     if (count_ - reply_ >= step.answer_length) return true;
     if (step.refusal.empty() || reply_ < count_) continue;
     const auto refused = std::search(heard.begin(), heard.end(), step.refusal.begin(), step.refusal.end());
-    // Where a refusal is told from a reply by its last bytes, these must be there.
+    // If a refusal differs from a reply only in its last bytes, wait for these.
     if (static_cast<std::size_t>(heard.end() - refused) < std::max(step.refusal.size(), step.reply.size()))
       continue;
     reply_ = static_cast<std::size_t>(refused - heard.begin());

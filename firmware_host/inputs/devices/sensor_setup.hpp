@@ -1,11 +1,11 @@
 #pragma once
 // Sets a sensor on a serial port to the rate in its calibration when its port is opened.
 //
-// A sensor that already sends at that rate is not changed. Otherwise it is configured step by step, each
-// followed by its reply, in at most 2.5 s; refused or changed steps give a warning. The sensor does not store
-// the configuration and may have lost power, so it is judged anew each time the port is opened. One that was
-// configured before is configured again without listening first, which saves half a second. Threads: one.
-// Memory: 4 kB inside the object, no allocation.
+// A sensor that already sends at that rate is not changed. Otherwise it is configured step by step, each step
+// confirmed by its reply, in at most 2.5 s; a refused or changed step gives a warning. The sensor does not
+// store the configuration and may have lost power, so its rate is checked each time the port is opened. A
+// sensor that was configured before is configured again without checking first, which saves half a second.
+// Threads: one. Memory: 4 kB inside the object, no allocation.
 
 #include <array>
 #include <optional>
@@ -26,7 +26,7 @@ class SensorSetup {
   void run(LinkPort& port, ImuDecoder& decoder);
   /// Call until it returns false.
   bool nextWarning(DeviceFault& warning);
-  /// What was found and asked, in words; empty: nothing was.
+  /// Describes what was found and requested; empty: nothing was.
   [[nodiscard]] std::string text() const;
 
  private:
@@ -35,14 +35,14 @@ class SensorSetup {
   bool ask(LinkPort& port, const ConfigurationStep& step);
 
   double rate_;
-  bool asks_ = false;  ///< it sent at another rate when it was listened to
+  bool asks_ = false;  ///< it sent at another rate when checked
   bool listened_ = false;
   double found_ = 0;           ///< Hz
   std::optional<double> set_;  ///< Hz
   std::optional<DeviceFault> warning_;
   std::array<std::uint8_t, 4096> heard_;
-  std::size_t count_ = 0;  ///< of heard_
-  std::size_t reply_ = 0;  ///< where it begins
+  std::size_t count_ = 0;  ///< bytes in heard_
+  std::size_t reply_ = 0;  ///< position of the reply in heard_
 };
 
 }  // namespace swiftlet

@@ -1,5 +1,5 @@
 #pragma once
-// The threads of an input, without an executor: for recording and for looking at devices.
+// Runs the threads of an input without an executor: for recording and for inspecting devices.
 
 #include <atomic>
 #include <string>
@@ -13,15 +13,15 @@ namespace swiftlet {
 
 class SensorThreads {
  public:
-  /// Starts them. Input and sink outlive this.
+  /// Starts the threads. Input and sink outlive this object.
   SensorThreads(SensorInput& input, SensorSink& sink, const RealtimeGroup& realtime);
   ~SensorThreads() { join(); }
   SensorThreads(const SensorThreads&) = delete;
   SensorThreads& operator=(const SensorThreads&) = delete;
 
-  /// Tells them to end and waits.
+  /// Requests the end and waits for it.
   void join();
-  /// What threads did not get, in words.
+  /// Describes what the threads were not granted.
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// What devices did, for the summary, and in words for `doctor`.
+// Status of devices for the summary, and as text for `doctor`.
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -12,7 +12,7 @@ namespace swiftlet {
 
 /// "unlocked", "locking", "locked".
 const char* lockName(LockState lock);
-/// What a driver's stamps mark, in words.
+/// Text for the event that a driver's stamps mark.
 const char* stampEventName(StampEvent event);
 
 nlohmann::ordered_json toJson(const TimesyncStatus& status);

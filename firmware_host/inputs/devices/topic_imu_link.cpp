@@ -79,7 +79,7 @@ DeviceFault TopicImuLink::judge(const TopicImu& message) const {
   if (!message.gyro.allFinite() || !message.accel.allFinite()) {
     return deviceFault(DeviceFaultKind::kGarbage, 0, "values that are not finite");
   }
-  // Exactly zero, as drivers fill in what a message does not have.
+  // Exactly zero: drivers fill in fields that they do not measure with zeros.
   if (!apart() && message.accel.isZero(0)) {
     return deviceFault(DeviceFaultKind::kUnsupported, 0,
                        "no acceleration in %s: set imu_link.accel_topic to the accelerometer's topic",
@@ -125,7 +125,7 @@ DeviceFault TopicImuLink::takeOne(Stream& stream, const TopicImu& message) {
 void TopicImuLink::countHole(Stamp stamp) {
   if (newest_ && stamp > *newest_ && settings_.rate > 0) {
     const double steps = std::round((stamp - *newest_).seconds() * settings_.rate);
-    // A longer hole is a silence, which is said.
+    // A longer gap is a silence, which is reported as such.
     constexpr double kLongestHole = 1;  // s
     if (steps > 1 && steps <= kLongestHole * settings_.rate)
       missing_ += static_cast<std::uint64_t>(steps) - 1;

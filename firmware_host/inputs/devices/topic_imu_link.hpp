@@ -22,12 +22,13 @@ namespace swiftlet {
 
 struct TopicImuSettings {
   DdsNetwork network;
-  std::string topic;        ///< of the IMU, or of the gyroscope
-  std::string accel_topic;  ///< empty: `topic` has both
-  double rate = 0;          ///< samples a second; 0: losses are not counted
-  /// For the first sample. Discovery takes some tenths of a second, a driver's start longer.
+  std::string topic;        ///< of the IMU or the gyroscope
+  std::string accel_topic;  ///< empty: `topic` carries both
+  double rate = 0;          ///< samples per second; 0: losses are not counted
+  /// Longest wait for the first sample. Discovery takes some tenths of a second; a driver's start takes
+  /// longer.
   Duration patience = Duration::fromMilliseconds(3000);
-  std::function<HostClocks()> read_clocks = readHostClocks;  ///< another one in tests
+  std::function<HostClocks()> read_clocks = readHostClocks;  ///< replaced in tests
 };
 
 class TopicImuLink : public ImuLink {
@@ -57,7 +58,7 @@ class TopicImuLink : public ImuLink {
 
   [[nodiscard]] bool apart() const { return !settings_.accel_topic.empty(); }
   DeviceFault prepare();
-  /// A message of one stream; a fault: it is of no use.
+  /// Takes a message of one stream. A fault: the message is unusable.
   DeviceFault takeOne(Stream& stream, const TopicImu& message);
   [[nodiscard]] DeviceFault judge(const TopicImu& message) const;
   [[nodiscard]] DeviceFault silent() const;
@@ -66,15 +67,15 @@ class TopicImuLink : public ImuLink {
   TopicImuSettings settings_;
   std::shared_ptr<DdsDomain> domain_;
   TopicBell bell_;
-  Stream imu_;    ///< both, or the gyroscope
-  Stream accel_;  ///< where it is apart
+  Stream imu_;    ///< the whole IMU, or the gyroscope
+  Stream accel_;  ///< only if separate
   AccelAtGyro joined_;
   std::optional<DeviceFault> remark_;
-  std::optional<Stamp> newest_;  ///< of the gyroscope
+  std::optional<Stamp> newest_;  ///< stamp of the newest gyroscope sample
   Stamp now_;
-  int bad_ = 0;  ///< running
+  int bad_ = 0;  ///< consecutive unusable samples
   bool open_ = false;
-  bool opened_ = false;  // ever
+  bool opened_ = false;  // at least once
   std::uint64_t came_ = 0, samples_ = 0, missing_ = 0, damaged_ = 0, wrong_clock_ = 0, unsure_ = 0;
 };
 

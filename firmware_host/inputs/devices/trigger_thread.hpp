@@ -1,5 +1,5 @@
 #pragma once
-// The thread of the cameras' trigger line: edges from a GPIO chip to the threads of the cameras.
+// The thread of the cameras' trigger line: passes edges from a GPIO chip to the cameras' threads.
 
 #include <span>
 
@@ -22,12 +22,12 @@ struct TriggerStatus {
 
 class TriggerThread {
  public:
-  /// `rate`: of the cameras, Hz.
+  /// `rate`: of the cameras [Hz].
   TriggerThread(const TriggerGroup& settings, double rate);
 
   DeviceFault open() { return source_.open(settings_); }
   void run(std::span<EdgeRing* const> cameras, const RunControl& control);
-  /// Of run(), at each turn.
+  /// Beats at each turn of run().
   [[nodiscard]] Heartbeat& heart() { return heart_; }
 
   [[nodiscard]] DeviceJournal& journal() { return journal_; }
@@ -46,8 +46,8 @@ class TriggerThread {
   DeviceJournal journal_;
   EdgeSource source_;
   RateWatch rate_;
-  Stamp heard_;               ///< when the newest edge was read, or since when there is none
-  std::uint64_t number_ = 0;  ///< of the newest edge where the kernel counts none
+  Stamp heard_;               ///< when the newest edge was read; before the first, when waiting began
+  std::uint64_t number_ = 0;  ///< number of the newest edge if the kernel does not count edges
   TriggerStatus counted_;
   NewestShared<TriggerStatus> status_;
 };

@@ -6,7 +6,7 @@ namespace swiftlet {
 namespace {
 
 constexpr Stamp kEndOfTime{std::numeric_limits<std::int64_t>::max()};
-/// A run that starts within a log gets this much of the IMU before its first image.
+/// IMU samples this long before the first image are fed to a run that starts within a log.
 constexpr Duration kImuLead = Duration::fromMilliseconds(100);
 
 }  // namespace
@@ -46,7 +46,7 @@ LogFeed::Next LogFeed::next() {
     if (!has_message_) {
       Spent reading;
       const auto read = [&] { ended_ = !source_.next(message_); };
-      // Samples are many, and in memory: asking the clock takes longer than reading them.
+      // Samples are many and in memory: reading the clock would take longer than reading a sample.
       if (source_.imageIsNext()) {
         reading = measured(read);
       } else {

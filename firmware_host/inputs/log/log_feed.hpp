@@ -16,7 +16,7 @@ namespace swiftlet {
 struct LogSection {
   double from = 0;                  ///< s after the log's first image
   std::optional<double> until;      ///< s after the log's first image; images up to and including it
-  std::optional<Stamp> last_stamp;  ///< the same as a stamp: nothing later is fed
+  std::optional<Stamp> last_stamp;  ///< like `until`, as a stamp: nothing later is fed
 };
 
 class LogFeed {
@@ -34,9 +34,9 @@ class LogFeed {
   [[nodiscard]] const SceneImages& scene() const { return scene_; }
   [[nodiscard]] const TrackedFrame& tracks() const { return *tracked_; }
 
-  /// Images, or frames of tracks, gone by so far, unwanted ones included.
+  /// Images, or frames of tracks, passed so far, including those outside the section.
   [[nodiscard]] std::uint64_t taken() const { return taken_; }
-  /// Reading and decoding, image by image.
+  /// Time of reading and decoding, per image.
   [[nodiscard]] const StageTimes& times() const { return times_[static_cast<std::size_t>(StageId::kSource)]; }
 
  private:
@@ -54,7 +54,7 @@ class LogFeed {
   SceneImages scene_;
   const TrackedFrame* tracked_ = nullptr;
   SensorMessage message_;
-  bool has_message_ = false;  ///< read, waiting behind tracks
+  bool has_message_ = false;  ///< already read; waits until earlier tracks are taken
   bool ended_ = false;
   std::optional<Stamp> first_image_;
   std::optional<Stamp> last_;

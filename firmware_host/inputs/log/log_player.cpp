@@ -79,7 +79,7 @@ void LogPlayer::play(SensorSink& sink, const RunControl& control) {
 void LogPlayer::begin(Stamp first) {
   begun_ = true;
   first_ = first;
-  // The other threads have a moment to fall asleep.
+  // Lets the other threads fall asleep first.
   constexpr double kLead = 0.05;  // s
   zero_ = wallSeconds() + kLead;
   to_host_ns_.store((Duration::fromSeconds(zero_) - (first - Stamp{})).ns, std::memory_order_relaxed);

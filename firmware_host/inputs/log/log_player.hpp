@@ -1,6 +1,6 @@
 #pragma once
 // Plays a log's messages at their arrival times, as sensors would deliver them. Two threads: `source` reads
-// and decodes ahead (a vehicle does not have it), `sensor` hands the messages over.
+// and decodes ahead (a vehicle has no such thread), `sensor` hands the messages over.
 
 #include <atomic>
 #include <exception>
@@ -15,15 +15,15 @@ namespace swiftlet {
 
 class LogPlayer : public SensorInput {
  public:
-  /// `speed`: times faster than recorded. The feed outlives the player.
+  /// `speed`: factor relative to the recorded time. The feed outlives the player.
   LogPlayer(LogFeed& feed, double speed) : feed_(feed), speed_(speed) {}
 
   std::vector<Thread> threads(SensorSink& sink, const RunControl& control) override;
   [[nodiscard]] std::uint64_t taken() const override { return taken_.load(std::memory_order_relaxed); }
-  /// An InputError of the log's reader is thrown again here.
+  /// Rethrows an InputError of the log's reader.
   void finish() override;
 
-  /// From the log's stamps to CLOCK_MONOTONIC, at speed 1; empty before the first message. Any thread.
+  /// Any thread: offset from the log's stamps to CLOCK_MONOTONIC at speed 1; empty before the first message.
   [[nodiscard]] std::optional<Duration> toHost() const {
     const std::int64_t ns = to_host_ns_.load(std::memory_order_relaxed);
     return ns == kNotYet ? std::nullopt : std::optional(Duration{ns});
@@ -40,7 +40,7 @@ class LogPlayer : public SensorInput {
     SceneImages scene;
     std::uint64_t taken = 0;
   };
-  /// Messages read ahead of their time, and of these images of both cameras: their memory is the source's.
+  /// Messages read ahead, and of these images of both cameras: the source owns the images' memory.
   static constexpr std::size_t kReadAhead = 256;
   static constexpr std::uint64_t kImagesAhead = LogSource::kImageSlots - 1;
 
@@ -59,7 +59,7 @@ class LogPlayer : public SensorInput {
   std::atomic<std::int64_t> to_host_ns_{kNotYet};
   std::exception_ptr read_error_;
 
-  // Of `sensor`.
+  // For the thread `sensor`.
   bool begun_ = false;
   Stamp first_;
   double zero_ = 0;

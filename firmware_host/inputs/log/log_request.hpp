@@ -19,7 +19,7 @@ struct LogRequest {
   bool mono = false;                ///< camera 0 alone
   double from = 0;                  ///< s after the first image
   std::optional<double> until;      ///< s after the first image
-  std::optional<Stamp> last_stamp;  ///< the same as a stamp
+  std::optional<Stamp> last_stamp;  ///< like `until`, as a stamp
   const std::atomic<bool>* stop = nullptr;
   bool show_progress = false;
 

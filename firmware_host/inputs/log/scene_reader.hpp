@@ -1,8 +1,8 @@
 #pragma once
-// Depth and label images of a log, by the stamp of camera 0's images: for the map.
+// Depth and label images of a log for the map, found by the stamp of camera 0's image.
 //
-// Host side: opening allocates and throws InputError (DepthImages, LabelImages); images that cannot be used
-// are warned of and left out. Memory: kSlots decoded images of each kind.
+// Host side: opening allocates and throws InputError (DepthImages, LabelImages). Unusable images give a
+// warning and are skipped. Memory: kSlots decoded images of each kind.
 
 #include <array>
 #include <optional>
@@ -19,7 +19,7 @@ namespace swiftlet {
 
 class SceneReader {
  public:
-  /// As many scenes stay valid as images of a LogSource, with which they go.
+  /// Scenes stay valid for as many calls as the images of a LogSource that they belong to.
   static constexpr std::size_t kSlots = LogSource::kImageSlots;
 
   struct Wanted {

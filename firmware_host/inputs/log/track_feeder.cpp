@@ -10,7 +10,7 @@ constexpr Duration kMaxInterval = Duration::fromMilliseconds(1000);
 constexpr double kSurvival = 0.7;
 constexpr float kMotion = 20.F;  // px
 
-/// Median distance of the ids both hold; negative without any. `common` gets their number.
+/// Median displacement of the tracks in both frames [px]; negative if there are none. `common`: their number.
 float medianMotion(const std::map<TrackId, Eigen::Vector2f>& before,
                    const std::map<TrackId, Eigen::Vector2f>& now, std::size_t& common) {
   std::vector<float> moved;

@@ -12,14 +12,14 @@
 namespace swiftlet {
 namespace {
 
-// ORBvoc.txt has 145 MB; what unpacks to more than this is no vocabulary.
+// ORBvoc.txt has 145 MB. A file that unpacks to more than this limit is not a vocabulary.
 constexpr std::size_t kMaxText = std::size_t{1} << 30;
 
 std::string unpacked(const std::string& name, std::string_view bytes) {
   z_stream stream{};
   constexpr int kGzipOnly = 16 + MAX_WBITS;
   if (inflateInit2(&stream, kGzipOnly) != Z_OK) throw InputError(name, 0, "", "cannot be unpacked", "");
-  // zlib does not write to its input; its type is older than const.
+  // zlib does not write to its input; its interface predates const.
   stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
   stream.avail_in = static_cast<uInt>(bytes.size());
   std::string text;

@@ -2,8 +2,8 @@
 // Vocabulary files: the project's compact form (mapping/place/vocabulary.hpp), ORB-SLAM's text (ORBvoc.txt)
 // and DBoW2's YAML, plain or compressed by gzip, recognized by content.
 //
-// Weights are used as in the file. The bits of a descriptor depend on the comparisons that produced it: a
-// vocabulary of ORB descriptors also divides swiftlet's descriptors into words, but was not trained on them.
+// Weights are used as in the file. Descriptor bits depend on the comparisons that produced them: a vocabulary
+// of ORB descriptors also divides swiftlet's descriptors into words, but was not trained on them.
 //
 // Host side: allocates, throws InputError that names file, line and field.
 
@@ -17,17 +17,17 @@
 namespace swiftlet {
 
 Vocabulary readVocabulary(const std::string& path);
-/// `name` names the file in messages; `bytes` as they are in the file.
+/// `name`: the file's name in messages. `bytes`: the file's content.
 Vocabulary readVocabularyBytes(const std::string& name, std::string_view bytes);
 
-/// The compact form.
+/// Writes the compact form.
 void writeVocabulary(const std::string& path, const Vocabulary& vocabulary);
 
-/// "k L scoring weighting", then a line "parent isLeaf d0 .. d31 weight" for each node in the order of ids 1,
-/// 2, ...
+/// Format: a line "k L scoring weighting", then a line "parent isLeaf d0 .. d31 weight" for each node, with
+/// ids 1, 2, ...
 std::vector<VocabularyNode> readVocabularyText(const std::string& name, std::string_view text);
-/// "{ nodeId, parentId, weight, descriptor }" for each node, in any order, "{ wordId, nodeId }" for each
-/// leaf.
+/// Format: "{ nodeId, parentId, weight, descriptor }" for each node in any order, and "{ wordId, nodeId }"
+/// for each leaf.
 std::vector<VocabularyNode> readVocabularyYaml(const std::string& name, std::string_view text);
 
 }  // namespace swiftlet

@@ -10,7 +10,7 @@ namespace swiftlet {
 namespace {
 
 constexpr const char* kTextRemedy = "Give a vocabulary in the format of DBoW2 or ORB-SLAM (ORBvoc.txt)";
-constexpr std::int64_t kMaxBranching = 20, kMaxLevels = 10;  // as their loaders check
+constexpr std::int64_t kMaxBranching = 20, kMaxLevels = 10;  // limits of the original loaders
 
 /// Blank-separated words of a text, line by line.
 class Words {
@@ -28,7 +28,7 @@ class Words {
     }
     return false;
   }
-  /// The next word of the line; empty at its end.
+  /// The next word of the line; empty at the line's end.
   std::string_view next() {
     const std::size_t begin = line_.find_first_not_of(" \t\r");
     if (begin == std::string_view::npos) return {};

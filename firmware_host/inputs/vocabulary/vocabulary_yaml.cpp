@@ -10,8 +10,9 @@
 namespace swiftlet {
 namespace {
 
-// OpenCV's FileStorage writes "key:value" without a blank, which general YAML parsers do not take for a key,
-// and a large vocabulary would be a million nodes of theirs: the one form that these files have is read here.
+// OpenCV's FileStorage writes "key:value" without a blank, which general YAML parsers do not recognize as a
+// key, and a large vocabulary would need a million of their nodes. So this file's own parser reads only the
+// form that these files have.
 constexpr const char* kYamlRemedy = "Give a vocabulary saved by DBoW2";
 constexpr std::string_view kBlank = " \t\r\n";
 constexpr std::int64_t kMaxNodes = 16'000'000;
@@ -22,7 +23,7 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(begin, text.find_last_not_of(kBlank) - begin + 1);
 }
 
-/// One "{ key:value, ... }" and the line on which it begins.
+/// An item "{ key:value, ... }" and the line on which it begins.
 struct Item {
   const std::string& name;
   std::string_view text;
@@ -31,7 +32,7 @@ struct Item {
   [[nodiscard]] InputError error(const char* field, const std::string& message) const {
     return {name, line, field, message, kYamlRemedy};
   }
-  /// The value of a key; quotes are taken off.
+  /// The value of a key, without quotes.
   [[nodiscard]] std::optional<std::string_view> find(std::string_view key) const {
     std::string_view rest = text;
     while (!rest.empty()) {
