@@ -11,11 +11,11 @@
 namespace swiftlet {
 namespace {
 
-/// Of one call of the kernel. A pipe (4096 bytes) and a terminal (256) that say they have room take as much
-/// at once, line ends turned into two bytes included. O_NONBLOCK is no choice: other programs share the
-/// setting.
+/// Bytes per system call. A pipe (4096 bytes) and a terminal (256) that report room accept this many at once,
+/// even if line ends become two bytes. O_NONBLOCK is not used: it would also affect other programs on the
+/// same stream.
 constexpr std::size_t kPiece = 240;
-/// For a reader that stands still. The log's arrows hold several times as much.
+/// Longest wait for a stalled reader. The log's arrows hold several times as much.
 constexpr int kPatience = 100;  // ms
 
 class Stream {
@@ -29,7 +29,7 @@ class Stream {
   }
 
  private:
-  /// No other thread between the question for room and the writing. Bounded, unlike a lock.
+  /// Keeps other threads out between the check for room and the write. Bounded, unlike a lock.
   bool take() {
     for (int waited = 0; busy_.exchange(true, std::memory_order_acquire); ++waited) {
       if (waited == kPatience) return false;
@@ -38,7 +38,7 @@ class Stream {
     return true;
   }
 
-  /// False: the rest is given up.
+  /// False: the rest is dropped.
   bool putAll(std::string_view text) {
     const std::size_t size = text.size();
     while (!text.empty()) {
@@ -53,7 +53,7 @@ class Stream {
     return true;
   }
 
-  /// False where nobody reads, now or ever.
+  /// False: nobody reads, for the moment or for good.
   bool hasRoom() {
     pollfd out{file_, POLLOUT, 0};
     int ready = ::poll(&out, 1, 0);
@@ -69,9 +69,9 @@ class Stream {
 
   const int file_;
   std::atomic<bool> busy_{false};
-  // Of the thread that has taken the stream.
-  bool still_ = false;  ///< the last question for room was in vain
-  bool torn_ = false;   ///< the last message broke off
+  // For the thread that has taken the stream.
+  bool still_ = false;  ///< the last check found no room
+  bool torn_ = false;   ///< the last message was cut off
 };
 
 Stream& out() {
@@ -95,7 +95,8 @@ void warnAll(std::span<const std::string> warnings, std::size_t from) {
 void holdStandardStreams() {
   for (const int file : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (::fcntl(file, F_GETFD) != -1 || errno != EBADF) continue;
-    // The lowest free number is this one. Opened the wrong way round: use goes on to fail, as it did.
+    // open() takes the lowest free number, which is this one. The direction is the wrong one, so that reads
+    // and writes still fail.
     static_cast<void>(::open("/dev/null", file == STDIN_FILENO ? O_WRONLY : O_RDONLY));
   }
 }

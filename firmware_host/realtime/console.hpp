@@ -16,11 +16,11 @@ namespace swiftlet {
 void say(std::string_view text);
 /// To stderr.
 void warn(std::string_view text);
-/// A line to stderr for each, from the `from`-th on, as a warning.
+/// Writes one warning line to stderr for each entry, beginning with number `from`.
 void warnAll(std::span<const std::string> warnings, std::size_t from = 0);
 
-/// At the program's start: gives 0, 1 and 2 where they are closed to files that take and give nothing.
-/// Otherwise the first files of the run would get these numbers, and messages would be written into them.
+/// Call at the program's start: opens /dev/null as 0, 1 and 2 where these are closed. Otherwise the run's
+/// first files would get these numbers, and messages would be written into them.
 void holdStandardStreams();
 
 }  // namespace swiftlet

@@ -16,7 +16,7 @@ static_assert(sizeof(timespec{}.tv_sec) == sizeof(long), "SYS_futex takes the ke
 
 constexpr long kNanosPerSecond = 1'000'000'000;
 
-/// The clock's reading after `duration`.
+/// The clock's reading `duration` from now.
 timespec deadlineAfter(Duration duration) {
   timespec deadline{};
   clock_gettime(CLOCK_MONOTONIC, &deadline);
@@ -35,7 +35,7 @@ bool isPast(const timespec& deadline) {
   return now.tv_sec > deadline.tv_sec || (now.tv_sec == deadline.tv_sec && now.tv_nsec >= deadline.tv_nsec);
 }
 
-/// Sleeps while the word is `value`, until the deadline (absolute, CLOCK_MONOTONIC), or for no reason.
+/// Sleeps while the word is `value`, until the deadline (absolute, CLOCK_MONOTONIC). May return early.
 void futexWait(std::atomic<std::uint32_t>& word, std::uint32_t value, const timespec& deadline) {
   syscall(SYS_futex, &word, FUTEX_WAIT_BITSET_PRIVATE, value, &deadline, nullptr, FUTEX_BITSET_MATCH_ANY);
 }
@@ -43,13 +43,13 @@ void futexWait(std::atomic<std::uint32_t>& word, std::uint32_t value, const time
 }  // namespace
 
 void KernelSleep::wake(std::atomic<std::uint32_t>& word) {
-  // One sleeper: one to wake.
+  // There is one sleeper, so at most one thread is woken.
   syscall(SYS_futex, &word, FUTEX_WAKE_PRIVATE, 1, nullptr, nullptr, 0);
 }
 
 void KernelSleep::sleepWhile(std::atomic<std::uint32_t>& word, std::uint32_t value, Duration at_most) {
   const timespec deadline = deadlineAfter(at_most);
-  // A signal, or the wake of a ring that an earlier round has seen already, may end a sleep early.
+  // A sleep may end early: by a signal, or by the wake-up of a ring that an earlier round has already seen.
   while (word.load(std::memory_order_relaxed) == value && !isPast(deadline)) {
     futexWait(word, value, deadline);
   }

@@ -5,12 +5,12 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kHigh = 0.9;   ///< of the budget: above it a miss is near
-constexpr double kLow = 0.7;    ///< of the budget: below it there is room
-constexpr double kAmple = 2;    ///< no step up costs more than this factor
-constexpr double kFarOver = 2;  ///< of the budget: one level would not do
-constexpr int kCrowd = 2;       ///< frames waiting; one may have come during the step
-constexpr int kLateOnEnd = 3;   ///< steps; a single hiccup is worked off within two
+constexpr double kHigh = 0.9;   ///< share of the budget above which a miss is near
+constexpr double kLow = 0.7;    ///< share of the budget below which there is room
+constexpr double kAmple = 2;    ///< one level up costs at most this factor
+constexpr double kFarOver = 2;  ///< times the budget above which one level down is not enough
+constexpr int kCrowd = 2;       ///< frames waiting; a single one may have arrived during the step
+constexpr int kLateOnEnd = 3;   ///< consecutive steps; a single delay is made up within two
 constexpr int kGoodCredit = 4;
 constexpr int kFairCredit = 1;
 constexpr int kMostBackoff = 8;
@@ -19,10 +19,10 @@ constexpr int kLeastFeatures = 40;
 constexpr int kLeastKeyframes = 5;
 constexpr int kSmootherFeatureLevels = 3;
 
-/// Three quarters, but not below `least` unless it was below already.
+/// Three quarters of `value`, but not below `least` unless `value` already is.
 int threeQuarters(int value, int least) { return std::max(value * 3 / 4, std::min(value, least)); }
 
-/// Appends while `next` differs and there is room.
+/// Appends `next` if it differs from the last entry and there is room.
 bool appendIfNew(EffortLadder& ladder, const Effort& next) {
   return next != ladder.back() && ladder.tryPushBack(next);
 }
@@ -37,7 +37,7 @@ EffortLadder ladderFrom(Effort full) {
   return ladder;
 }
 
-/// NaN too.
+/// NaN becomes 0 too.
 double atLeastZero(double seconds) { return seconds > 0 ? seconds : 0; }
 
 }  // namespace
@@ -107,7 +107,7 @@ void EffortGovernor::credit(double wall, double predicted) {
   if (late_steps_ > 0 || waiting_before_ >= kCrowd) {
     credit_ = 0;
   } else if (wall <= kHigh * settings_.step_budget) {
-    // A single slow step neither counts nor takes away what was counted.
+    // A single slow step is not credited, but does not reset the credit either.
     const bool good = std::max(wall, predicted) <= kLow * settings_.step_budget;
     credit_ += good ? kGoodCredit : kFairCredit;
   }

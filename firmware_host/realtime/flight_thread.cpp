@@ -54,12 +54,12 @@ PageFaults ownFaults() {
   return {static_cast<std::uint64_t>(usage.ru_minflt), static_cast<std::uint64_t>(usage.ru_majflt)};
 }
 
-/// Of another thread of this process; nothing where there is none.
+/// Page faults of another thread of this process; empty: no such thread.
 std::optional<PageFaults> faultsOf(pid_t thread) {
   std::ifstream file(fmt::format("/proc/self/task/{}/stat", thread));
   std::string text;
   if (!std::getline(file, text)) return std::nullopt;
-  // After the name in brackets: state, 6 numbers, minor faults, those of children, major faults (proc(5)).
+  // After the name in parentheses: state, 6 numbers, minor faults, those of children, major faults (proc(5)).
   std::istringstream fields(text.substr(text.rfind(')') + 1));
   constexpr int kBefore = 7;
   std::string skipped;
@@ -182,7 +182,7 @@ ThreadReport FlightThread::start(const ThreadSettings& settings, std::function<v
   fault_.clear();
 
   int error = create(settings, fifo, pinned);
-  // One wish after the other is given up, whichever the kernel refuses first.
+  // Requests that the kernel refuses are dropped one by one, in any order.
   while ((error == EINVAL && pinned) || (error == EPERM && fifo)) {
     if (error == EINVAL) {
       say(fmt::format("CPU {} does not exist or is not allowed for this process: the thread may run on any",
@@ -276,7 +276,7 @@ void FlightThread::abandon() {
   if (!joinable_) return;
   pthread_detach(thread_);
   joinable_ = false;
-  // Kept to the program's end: the thread may go on at any time.
+  // Kept until the program's end: the thread may continue at any time.
   static std::atomic<Core*> left{nullptr};
   Core* const core = core_.release();
   core->left_before = left.exchange(core);

@@ -1,6 +1,6 @@
 #pragma once
 // A thread for the flight path: name, real-time priority, CPU, and a fixed stack that is touched in advance.
-// The result is reported as a value; a missing permission is not an error.
+// What the thread was granted is a value; a missing permission is not an error.
 //
 // Without permission for SCHED_FIFO the thread runs under SCHED_OTHER; if the CPU does not exist or is not
 // allowed it runs on any CPU. The report says what is missing and how to get it. ready_to_arm.hpp decides
@@ -31,8 +31,8 @@
 
 namespace swiftlet {
 
-/// Stack of a flight thread: a whole replay of a recorded log on one thread uses 0.25 MiB at its deepest.
-/// The rest is room for other logs, other compilers and the sanitizers' own 0.8 MiB.
+/// Stack of a flight thread: a whole replay of a recorded log on one thread uses at most 0.25 MiB. The rest
+/// is room for other logs, other compilers and the sanitizers' own 0.8 MiB.
 inline constexpr std::size_t kFlightStackBytes = std::size_t{2} * 1024 * 1024;
 
 enum class ThreadPolicy {
@@ -44,19 +44,19 @@ enum class ThreadPolicy {
 const char* policyName(ThreadPolicy policy);
 
 struct ThreadSettings {
-  std::string name;  ///< as `top -H` and `perf` show it; the kernel keeps 15 characters
+  std::string name;  ///< as shown by `top -H` and `perf`; the kernel keeps 15 characters
   int priority = 0;  ///< 1 to 99: SCHED_FIFO with this priority; 0: SCHED_OTHER
   int cpu = -1;      ///< the one CPU to run on; -1: any
   std::size_t stack_bytes = kFlightStackBytes;
 };
 
-/// Accesses to memory that was not there. Minor: a page was mapped or copied; major: read from a disk.
+/// Page faults. Minor: a page was mapped or copied; major: read from a disk.
 struct PageFaults {
   std::uint64_t minor = 0;
   std::uint64_t major = 0;
 };
 
-/// What was wanted and what the kernel gave.
+/// What was requested and what the kernel granted.
 struct ThreadReport {
   std::string name;
   ThreadPolicy wanted_policy = ThreadPolicy::kOther;
@@ -64,13 +64,13 @@ struct ThreadReport {
   int wanted_priority = 0;
   int actual_priority = 0;
   int wanted_cpu = -1;
-  std::vector<int> actual_cpus;  ///< that the thread may run on
+  std::vector<int> actual_cpus;  ///< CPUs that the thread may run on
   std::size_t stack_bytes = 0;
   bool started = false;
-  std::string message;  ///< what is missing and the remedy, one sentence each; empty: all as wanted
-  PageFaults faults;    ///< of its entry; filled in when the thread is ended
+  std::string message;  ///< what is missing and the remedy, one sentence each; empty: all granted
+  PageFaults faults;    ///< of the entry; set when the thread has ended
 
-  /// It runs, with the policy and priority that it was to have.
+  /// Whether it runs with the requested policy and priority.
   [[nodiscard]] bool hasPriority() const {
     return started && actual_policy == wanted_policy && actual_priority == wanted_priority;
   }
@@ -83,26 +83,26 @@ std::string describe(const ThreadReport& report);
 class FlightThread {
  public:
   FlightThread() = default;
-  /// Joins unless the thread was abandoned. The owner must have asked it to end before.
+  /// Joins unless the thread was abandoned. The owner must have requested its end before.
   ~FlightThread();
   FlightThread(const FlightThread&) = delete;
   FlightThread& operator=(const FlightThread&) = delete;
 
   /// Starts `entry` on the thread; not while one is running. Returns when the thread has begun, or with
-  /// `started` false and the reason when there is no thread.
+  /// `started` false and the reason if it could not be created.
   ThreadReport start(const ThreadSettings& settings, std::function<void()> entry);
-  /// Waits for the end; nothing when there is no thread.
+  /// Waits for the end; returns at once if there is no thread.
   void join();
-  /// Waits for the end, at most `limit`; false: it still runs. True when there is no thread.
+  /// Waits for the end, at most `limit`. False: it still runs. True also if there is no thread.
   [[nodiscard]] bool joinWithin(Duration limit);
-  /// Gives a thread up that does not end; nothing when there is none.
+  /// Abandons a thread that does not end; does nothing if there is none.
   void abandon();
 
   [[nodiscard]] bool joinable() const { return joinable_; }
   /// After join: what() of the exception that ended the thread; empty: it returned.
   [[nodiscard]] const std::string& fault() const { return fault_; }
-  /// Since `entry` began: of a thread that runs, or hangs, as the kernel counts them; of one that has ended,
-  /// all. Opens a file: not for the flight path.
+  /// Page faults since `entry` began: up to now for a running or stuck thread, all for one that has ended.
+  /// Opens a file: not for the flight path.
   [[nodiscard]] PageFaults pageFaults() const;
 
   /// For tests that arm allocation traps: called on each thread of the program when its entry begins and
@@ -126,19 +126,19 @@ class FlightThread {
     std::size_t guard_ = 0;
   };
 
-  /// What the thread itself uses: it outlives this object where the thread is abandoned.
+  /// State used by the thread itself; it outlives this object if the thread is abandoned.
   struct Core {
     Stack stack;
     std::function<void()> entry;
     std::string fault;
     std::string name;
-    ThreadReport seen;  ///< what the thread found of itself as it began
+    ThreadReport seen;  ///< what the thread found out about itself when it began
     pid_t kernel_id = 0;
-    PageFaults faults_before;  ///< of making the thread
+    PageFaults faults_before;  ///< from creating the thread
     PageFaults faults;         ///< of an entry that has ended
     std::atomic<bool> begun{false};
     std::atomic<bool> over{false};
-    Doorbell ended;  ///< rung by the thread's last step
+    Doorbell ended;  ///< rung in the thread's last step
     Core* left_before = nullptr;
   };
 
@@ -150,7 +150,7 @@ class FlightThread {
   pthread_t thread_{};
   bool joinable_ = false;
   std::string fault_;
-  PageFaults faults_;  ///< of a thread that was joined
+  PageFaults faults_;  ///< of a joined thread
 };
 
 }  // namespace swiftlet

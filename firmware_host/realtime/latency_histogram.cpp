@@ -28,7 +28,7 @@ double LatencyHistogram::percentile(double share) const {
   for (std::size_t i = 0; i < buckets_.size(); ++i) {
     below += buckets_[i];
     if (below >= wanted && buckets_[i] > 0) {
-      // The bucket's geometric middle, never beyond what was seen.
+      // The bucket's geometric middle, but not above the maximum seen.
       const double middle = (static_cast<double>(i) + 0.5) / kPerDecade;
       return std::min(kSmallest * std::pow(10.0, middle), max_);
     }
@@ -37,7 +37,7 @@ double LatencyHistogram::percentile(double share) const {
 }
 
 std::uint64_t LatencyHistogram::countUpTo(double seconds) const {
-  // percentile() rises with its share: the number of durations is found by bisection.
+  // percentile() rises with its share, so the number of durations is found by bisection.
   const auto all = static_cast<double>(count());
   std::uint64_t low = 0;  // known to be at or below
   std::uint64_t high = count() + 1;

@@ -12,7 +12,7 @@ class LatencyHistogram {
  public:
   static constexpr std::size_t kPerDecade = 100;
   static constexpr std::size_t kDecades = 9;
-  static constexpr double kSmallest = 1e-7;  ///< s; what is shorter counts in the first bucket
+  static constexpr double kSmallest = 1e-7;  ///< s; shorter durations count in the first bucket
 
   void add(double seconds);
   void add(const LatencyHistogram& other);
@@ -23,7 +23,7 @@ class LatencyHistogram {
   [[nodiscard]] double max() const { return max_; }
   /// The value below which `share` (0 to 1) of the durations lie; 0 when empty.
   [[nodiscard]] double percentile(double share) const;
-  /// How many durations lie at or below `seconds`, to the bucket.
+  /// Number of durations at or below `seconds`, to the resolution of a bucket.
   [[nodiscard]] std::uint64_t countUpTo(double seconds) const;
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// The files in which a machine says what it is and grants. Private to this folder.
+// Files in which a machine describes itself and the rights it grants. Private to this folder.
 
 #include <cctype>
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace swiftlet {
 
-/// The files of one machine, real or made up.
+/// The files of one machine, real or simulated.
 class Machine {
  public:
   explicit Machine(std::string root) : root_(std::move(root)) {}
@@ -33,7 +33,7 @@ class Machine {
     const auto content = text(path);
     return content ? toNumber(*content) : std::nullopt;
   }
-  /// The rest of the first line that begins so.
+  /// The rest of the first line that begins with `start`.
   [[nodiscard]] std::optional<std::string> lineAfter(const std::string& path, std::string_view start) const {
     const auto content = text(path);
     if (!content) return std::nullopt;
@@ -44,7 +44,7 @@ class Machine {
     return std::nullopt;
   }
 
-  /// Whether it is in the effective set of the thread whose status this file is.
+  /// Whether the capability is in the effective set of the thread whose status file this is.
   [[nodiscard]] std::optional<bool> hasCapability(const std::string& status, unsigned capability) const {
     const auto effective = lineAfter(status, "CapEff:");
     if (!effective) return std::nullopt;
@@ -68,7 +68,7 @@ inline MachineLine unknown(const char* what) { return {what, "unknown", MachineV
 
 /// Whether a sleeping CPU wakes quickly.
 MachineLine idleStates(const Machine& machine);
-/// Which CPU the devices' interrupts keep.
+/// Which CPU handles the devices' interrupts.
 MachineLine interrupts(const Machine& machine);
 
 }  // namespace swiftlet

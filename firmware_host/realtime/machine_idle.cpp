@@ -1,4 +1,4 @@
-// What keeps a CPU from a thread that has just become ready: sleep from which it wakes slowly, and
+// Causes that keep a CPU from a thread that has just become ready: idle states with slow wake-up, and
 // interrupts.
 
 #include <fmt/format.h>
@@ -14,7 +14,7 @@ namespace swiftlet {
 MachineLine idleStates(const Machine& machine) {
   const char* what = "idle states";
   const std::string folder = "/sys/devices/system/cpu/cpu0/cpuidle/state";
-  // Propagation of a sample has 50 us at the 99th percentile.
+  // us; propagation of a sample has a budget of 50 us at the 99th percentile.
   constexpr std::int64_t kQuick = 50;
   constexpr int kMostStates = 16;
   std::int64_t slowest = -1;
@@ -51,7 +51,7 @@ MachineLine interrupts(const Machine& machine) {
     std::istringstream fields(line);
     std::string label;
     fields >> label;
-    // Rows of devices have numbers; the others are the kernel's own timers and calls.
+    // Devices' rows are numbered; the others are the kernel's own timers and calls.
     if (label.empty() || std::isdigit(static_cast<unsigned char>(label.front())) == 0) continue;
     for (std::int64_t& count : counts) {
       std::int64_t here = 0;
@@ -63,7 +63,7 @@ MachineLine interrupts(const Machine& machine) {
   constexpr std::int64_t kPercent = 100;
   std::string found = fmt::format("CPU {} handles {} % of the devices'", busiest - counts.begin(),
                                   all > 0 ? *busiest * kPercent / all : 0);
-  // A camera's and an IMU's own are some hundred.
+  // A camera and an IMU together cause some hundred a second.
   constexpr double kMany = 5000;  // a second
   const double rate = uptime > 0 ? static_cast<double>(all) / uptime : kMany;
   if (uptime > 0) found += fmt::format(", {:.0f} a second since boot", rate);

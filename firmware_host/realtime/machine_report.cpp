@@ -18,7 +18,7 @@
 namespace swiftlet {
 namespace {
 
-/// The soft limit's words in /proc/self/limits: the first after the name.
+/// Soft limit in /proc/self/limits: the first word after the limit's name.
 std::optional<std::string> limitOf(const Machine& machine, std::string_view name) {
   const auto rest = machine.lineAfter("/proc/self/limits", name);
   if (!rest) return std::nullopt;
@@ -27,7 +27,7 @@ std::optional<std::string> limitOf(const Machine& machine, std::string_view name
   return words >> soft ? std::optional(soft) : std::nullopt;
 }
 
-/// Whether the kernel has the server that runs starving threads in place of throttling (Linux 6.12).
+/// Whether the kernel serves starving threads by a fair server instead of throttling (Linux 6.12 and later).
 bool hasFairServer(const Machine& machine) {
   const auto release = machine.text("/proc/sys/kernel/osrelease");
   int major = 0;
@@ -51,7 +51,7 @@ MachineLine throttling(const Machine& machine) {
   std::string found = fmt::format("on: real-time threads get {:.1f} % of {:.3f} s", share,
                                   static_cast<double>(*period) * 1e-6);
   if (hasFairServer(machine)) found += ", the rest only if other threads starve";
-  // The flight threads sleep more than half of the time: a share below this is a setting gone wrong.
+  // Flight threads sleep more than half of the time: a smaller share is a wrong setting.
   constexpr double kLeastShare = 90;
   if (share >= kLeastShare) return {what, found, MachineVerdict::kGood, ""};
   return {what, found, MachineVerdict::kPoor, "sysctl kernel.sched_rt_runtime_us=950000"};
@@ -101,7 +101,7 @@ MachineLine preemption(const Machine& machine) {
   if (realtime == 1 || contains("PREEMPT_RT")) return {what, "PREEMPT_RT", MachineVerdict::kGood, ""};
   if (!version) return unknown(what);
   if (contains("PREEMPT_DYNAMIC")) {
-    // "none voluntary (full)": the one in brackets is on.
+    // "none voluntary (full)": the mode in parentheses is active.
     const auto modes = machine.text("/sys/kernel/debug/sched/preempt");
     const std::string mode = modes.value_or("not readable");
     const bool full = mode.find("(full)") != std::string::npos;
@@ -111,7 +111,7 @@ MachineLine preemption(const Machine& machine) {
   return {what, "none inside the kernel", MachineVerdict::kPoor, remedy};
 }
 
-/// How many CPUs "0-3,6" names; nothing when it is no such list.
+/// Number of CPUs in a list such as "0-3,6"; empty: not such a list.
 std::optional<int> countOf(const std::string& list) {
   std::istringstream parts(list);
   int count = 0;
@@ -133,7 +133,7 @@ MachineLine cpus(const Machine& machine) {
   if (!count) return unknown(what);
   const std::string apart = isolated && !isolated->empty() ? *isolated : std::string("none");
   std::string found = fmt::format("{} ({}), isolated: {}", *count, *online, isolated ? apart : "unknown");
-  // Tracking and smoothing run at the same time.
+  // Tracking and smoothing run in parallel.
   if (*count < 2)
     return {what, std::move(found), MachineVerdict::kPoor, "tracking and smoothing need one each"};
   const bool some = isolated && !isolated->empty();
@@ -177,11 +177,11 @@ std::optional<std::string> groupOf(const Machine& machine, std::string_view cont
 }
 
 struct Quota {
-  double cpus = 0;     ///< CPUs' worth; 0: none is set
-  bool found = false;  ///< at least one file said something
+  double cpus = 0;     ///< number of CPUs granted; 0: no quota
+  bool found = false;  ///< at least one file could be read
 };
 
-/// The tightest quota of the group and of those above it, asked of `read` with each group's folder.
+/// The smallest quota of the group and of those above it; `read` is called with each group's folder.
 template <typename Read>
 Quota tightest(std::string group, Read&& read) {
   Quota quota;
@@ -219,7 +219,7 @@ MachineLine quotaLine(const Machine& machine) {
       });
       if (here.found) quota = here;
     }
-    // Only groups below the first have the file: none means no quota.
+    // Only groups below the root have the file: if there is none, there is no quota.
     if (!quota.found && machine.text("/sys/fs/cgroup/cgroup.controllers")) quota.found = true;
   }
   if (const auto group = groupOf(machine, "cpu"); group && !quota.found) {
@@ -268,7 +268,7 @@ MachineLine clockLine(const Machine& machine) {
   const char* what = "clock";
   const auto source = machine.text("/sys/devices/system/clocksource/clocksource0/current_clocksource");
   if (!source) return unknown(what);
-  // Those that are read without entering the kernel.
+  // Clock sources that are read without entering the kernel.
   const bool fast = *source == "tsc" || *source == "kvm-clock" || *source == "arch_sys_counter" ||
                     *source == "hyperv_clocksource_tsc_page";
   return {

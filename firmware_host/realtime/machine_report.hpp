@@ -1,7 +1,6 @@
 #pragma once
-// What this machine says about its latency before anything is measured: each fact that delays real-time
-// threads, with a verdict and a remedy. Facts only: nothing is changed, nothing fails. What does not exist
-// or cannot be read is "unknown".
+// Facts about this machine that delay real-time threads, each with a verdict and a remedy, before anything is
+// measured. Nothing is changed and nothing fails. What does not exist or cannot be read is "unknown".
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -11,18 +10,18 @@ namespace swiftlet {
 
 enum class MachineVerdict {
   kGood,
-  kNote,     ///< harmless; useful if measurements surprise
-  kPoor,     ///< costs latency: see the remedy
-  kUnknown,  ///< the machine does not say
+  kNote,     ///< harmless; useful if measurements are unexpected
+  kPoor,     ///< costs latency; see the remedy
+  kUnknown,  ///< not available
 };
 /// "good", "note", "poor", "unknown".
 const char* verdictName(MachineVerdict verdict);
 
 struct MachineLine {
   std::string what;   ///< "real-time throttling", "CPU governor", ...
-  std::string found;  ///< as the machine says it, with units
+  std::string found;  ///< as the machine states it, with units
   MachineVerdict verdict = MachineVerdict::kUnknown;
-  std::string remedy;  ///< empty when there is nothing to do
+  std::string remedy;  ///< empty if there is nothing to do
 };
 
 struct MachineReport {
@@ -30,7 +29,7 @@ struct MachineReport {
 
   /// The line called `what`, or null.
   [[nodiscard]] const MachineLine* find(const std::string& what) const;
-  /// A table, remedies indented below their lines.
+  /// A table with remedies indented below their lines.
   [[nodiscard]] std::string text(const std::string& title = "this machine") const;
   /// [{"what", "found", "verdict", "remedy"}]
   [[nodiscard]] nlohmann::ordered_json json() const;

@@ -45,7 +45,7 @@ std::int64_t lockLimit() {
       std::min<rlim_t>(limit.rlim_cur, static_cast<rlim_t>(std::numeric_limits<std::int64_t>::max())));
 }
 
-/// The capability that lifts the limit, in the thread's effective set.
+/// Whether the thread's effective set has the capability that lifts the limit.
 bool mayLockBeyondLimit() {
   return Machine("").hasCapability("/proc/thread-self/status", CAP_IPC_LOCK).value_or(false);
 }
@@ -56,7 +56,7 @@ int threadsOfProcess() {
   return error ? 0 : static_cast<int>(std::distance(begin(tasks), end(tasks)));
 }
 
-/// How a library is told to stay on one thread.
+/// Function that limits a library to one thread.
 struct LibraryFunction {
   const char* library;
   const char* symbol;
@@ -114,7 +114,7 @@ void touchPages(void* memory, std::size_t bytes) {
   auto* first = static_cast<volatile unsigned char*>(memory);
   if (bytes == 0) return;
   for (std::size_t i = 0; i < bytes; i += pageBytes()) first[i] = first[i];
-  // The range need not begin at a page's start: its last byte may lie on one page more.
+  // The range need not begin at a page's start, so its last byte may lie on one more page.
   first[bytes - 1] = first[bytes - 1];
 }
 
@@ -136,7 +136,8 @@ std::string confineMalloc() {
 }
 
 void reserveHeap(std::size_t bytes) {
-  // Held all at once, so that each is new; blocks that the heap serves, not mappings of their own.
+  // Blocks are held all at once, so that each is new, and are small enough to come from the heap instead of
+  // mappings of their own.
   constexpr std::size_t kBlock = kHeapBlockBytes / 4;
   std::vector<void*> blocks;
   blocks.reserve(bytes / kBlock + 1);

@@ -1,6 +1,6 @@
 #pragma once
-// Memory that is there before the flight and stays: locking, touching, and how malloc and the numerical
-// libraries are held to it. Everything here is for the time before arm(); what it got is a value.
+// Makes memory resident before the flight and keeps it so: locking, touching, and limits on malloc and
+// numerical libraries. Everything here is for the time before arm(). Outcomes are values.
 
 #include <cstddef>
 #include <cstdint>
@@ -11,25 +11,25 @@
 namespace swiftlet {
 
 struct MemoryLockReport {
-  bool current = false;           ///< all that is mapped now stays resident
-  bool future = false;            ///< and all that is mapped later
+  bool current = false;           ///< everything mapped now stays resident
+  bool future = false;            ///< everything mapped later stays resident, too
   std::int64_t limit_bytes = -1;  ///< RLIMIT_MEMLOCK; -1: none
-  std::int64_t mapped_bytes = 0;  ///< what the process had mapped when it asked
+  std::int64_t mapped_bytes = 0;  ///< mapped by the process at the time of the call
   std::string message;            ///< what is missing and the remedy; empty: both locked
 };
 
-/// mlockall(MCL_CURRENT | MCL_FUTURE). Under a limit that all of the memory fits into, without the right
-/// to go beyond it (CAP_IPC_LOCK), only what is mapped now is locked: a later allocation that the limit
-/// refuses would be worse than a page fault, and the flight path has all of its memory by then.
+/// mlockall(MCL_CURRENT | MCL_FUTURE). If all memory fits below RLIMIT_MEMLOCK but the process may not exceed
+/// this limit (CAP_IPC_LOCK), only what is mapped now is locked: a later allocation refused because of the
+/// limit would be worse than a page fault, and by then the flight path has all its memory.
 MemoryLockReport lockMemory();
 void unlockMemory();
 nlohmann::ordered_json toJson(const MemoryLockReport& report);
 
-/// Makes every page of a writable range resident and private by writing each back as it is. No other
+/// Makes every page of a writable range resident and private by writing its content back unchanged. No other
 /// thread may write there meanwhile.
 void touchPages(void* memory, std::size_t bytes);
 
-/// Keeps malloc in memory that neither shrinks nor spreads. Call it once, before other threads exist.
+/// Keeps malloc's memory compact and resident. Call once, before other threads exist.
 /// - One arena (M_ARENA_MAX 1): by default each thread gets its own arena, and other threads cannot reuse
 ///   memory that it frees. Threads then share a lock; flight threads never take it since they do not
 ///   allocate.
@@ -39,31 +39,30 @@ void touchPages(void* memory, std::size_t bytes);
 ///   and adapts it): otherwise each image would be mapped, faulted in and unmapped at every frame. Larger
 ///   blocks are rare, exist from start to end, and would leave holes.
 ///
-/// Returns the settings that were refused; empty: all are set. Without glibc it returns that nothing was
-/// done.
+/// Returns the settings that were refused; empty: all are set. Without glibc, returns that nothing was done.
 std::string confineMalloc();
-/// Grows the heap by `bytes`, makes it resident and gives it back to malloc, so that the low-priority
-/// threads find their memory there and ask the kernel for none. After confineMalloc, which keeps it.
+/// Grows the heap by `bytes`, makes it resident and returns it to malloc, so that low-priority threads find
+/// memory without asking the kernel. Call after confineMalloc, which keeps the heap from shrinking.
 void reserveHeap(std::size_t bytes);
 
 /// A numerical library that could run its own threads.
 struct LibraryThreads {
   std::string library;
-  bool linked = false;  ///< found in this process, and told to use one thread
+  bool linked = false;  ///< found in this process and limited to one thread
 };
 struct LibraryReport {
   std::vector<LibraryThreads> libraries;  ///< OpenBLAS, OpenMP, MKL, OpenCV
-  int threads = 0;                        ///< of this process afterwards; 0: the kernel does not say
+  int threads = 0;                        ///< number in this process afterwards; 0: unknown
   std::string message;                    ///< one line for the start
 };
-/// Tells every library that is linked (found by name at run time: nothing is linked for it) to use the
-/// calling thread only. The environment variables are of no use here: the libraries have read them before
-/// main; they are set all the same for child processes. OpenMP's setting holds for the thread that calls:
-/// call it before the other threads are made, and first in each that calls such a library.
+/// Limits every linked library to the calling thread. Libraries are found by name at run time, so nothing is
+/// linked for this. Environment variables have no effect here, since libraries read them before main; they
+/// are set for child processes. OpenMP's setting applies to the calling thread: call before other threads are
+/// created, and first in each thread that calls such a library.
 LibraryReport confineLibraries();
 nlohmann::ordered_json toJson(const LibraryReport& report);
 
-/// What was reserved for what, as the objects say when they are made.
+/// Reserved memory by purpose, as stated by the objects that reserve it.
 class MemoryTable {
  public:
   struct Row {
@@ -74,7 +73,7 @@ class MemoryTable {
   void add(std::string what, std::int64_t bytes) { rows_.push_back({std::move(what), bytes}); }
   [[nodiscard]] const std::vector<Row>& rows() const { return rows_; }
   [[nodiscard]] std::int64_t total() const;
-  /// One line a row in the order of adding, with the share of the total; the total last.
+  /// One line per row in the order of adding, with its share of the total; the total last.
   [[nodiscard]] std::string text() const;
   /// {"rows": [{"what", "bytes"}], "total_bytes"}
   [[nodiscard]] nlohmann::ordered_json json() const;

@@ -18,7 +18,7 @@ std::int64_t residentBytes() {
 std::int64_t peakResidentBytes() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
-  constexpr std::int64_t kKibibyte = 1024;  // Linux gives ru_maxrss in KiB
+  constexpr std::int64_t kKibibyte = 1024;  // Linux returns ru_maxrss in KiB
   return usage.ru_maxrss * kKibibyte;
 }
 

@@ -5,7 +5,7 @@
 
 namespace swiftlet {
 
-std::int64_t residentBytes();      ///< now; 0 if the kernel does not say
+std::int64_t residentBytes();      ///< now; 0: unknown
 std::int64_t peakResidentBytes();  ///< highest so far
 
 }  // namespace swiftlet

@@ -1,5 +1,5 @@
 #pragma once
-// Progress on stderr: a bar with the time left on a terminal, one plain line every tenth otherwise.
+// Progress on stderr: on a terminal a bar with the remaining time, otherwise a plain line for every tenth.
 
 #include <cstdint>
 #include <string>
@@ -8,7 +8,7 @@ namespace swiftlet {
 
 class Progress {
  public:
-  /// `total` steps of `what`; zero: nothing is shown.
+  /// `total` steps of `what`; 0: shows nothing.
   Progress(std::string what, std::uint64_t total);
   void update(std::uint64_t done);
   /// Ends the line.

@@ -19,7 +19,7 @@ __attribute__((format(printf, 4, 5))) void lack(ArmingVerdict& verdict, ArmingCo
   va_start(arguments, format);
   std::vsnprintf(missing.text.data(), missing.text.size(), format, arguments);
   va_end(arguments);
-  // kMost counts every call of this function in one evaluation.
+  // One evaluation calls this function at most kMost times.
   static_cast<void>(verdict.missing.tryPushBack(missing));
 }
 
@@ -65,7 +65,7 @@ void checkClocks(const ArmingFacts& facts, const ArmingSettings& settings, Armin
 }
 
 void checkSensors(const ArmingFacts& facts, const ArmingSettings& settings, ArmingVerdict& verdict) {
-  // Written so that a NaN is refused.
+  // Written so that NaN counts as missing.
   const double allowed = settings.imu_rate_tolerance * facts.imu_rate_expected;
   const bool at_rate =
       facts.imu_rate_expected > 0 && std::abs(facts.imu_rate - facts.imu_rate_expected) <= allowed;
@@ -139,9 +139,9 @@ void checkMembers(const ArmingFacts& facts, ArmingVerdict& verdict) {
 void checkMounting(const ArmingFacts& facts, const ArmingSettings& settings, ArmingVerdict& verdict) {
   if (facts.tilted_for < settings.tilted) return;
   const double degrees = facts.vehicle_tilt * 180 / std::numbers::pi;
-  // Beyond this it is upside down: the one mistake that has one remedy, an IMU whose z points down.
+  // Beyond this the IMU is upside down: the only mounting error with a single remedy (its z points down).
   constexpr double kUpsideDown = 150;
-  // The remedy is in the text too: the autopilot's texts and events have no other.
+  // The text repeats the remedy, because the autopilot's texts and events show only the text.
   lack(verdict, ArmingCondition::kMounting,
        "level the vehicle; if it is level, correct autopilot.roll_deg, pitch_deg and yaw_deg: the IMU of a "
        "flight controller or of DroneCAN, whose z points down, needs autopilot.roll_deg: 180",

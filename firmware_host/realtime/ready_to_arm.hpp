@@ -3,18 +3,18 @@
 // lists what is missing, with the remedy. Missing conditions block readiness, never running.
 //
 // Pure: facts in, verdict out; no clock, no files, no heap. The executor collects the facts; times are
-// differences that it measured.
+// differences that it has measured.
 //
 // | condition       | holds when
-// | `rights`        | every flight thread has the priority that it was to have
+// | `rights`        | every flight thread has its requested priority
 // | `memory_locked` | all memory that the flight path uses is locked
-// | `clocks`        | no stamp ran backwards of late, newest image and newest sample are near each other,
-// |                 | images are associated with trigger edges if these are used
+// | `clocks`        | no stamp ran backwards recently; newest image and newest sample are close in time;
+// |                 | if trigger edges are used, the images of each camera match them
 // | `sensors`       | the IMU delivers at its rate, and each camera of the rig delivers
-// | `initialized`   | health has been good, and the epoch the same, for some seconds
-// | `recorder`      | a recorder that is wanted runs and has lost nothing
+// | `initialized`   | for some seconds, health has been good and the epoch unchanged
+// | `recorder`      | the recorder, if requested, runs and has lost nothing
 // | `effort`        | the stages work at full effort
-// | `members`       | the supervisor finds no thread and no sensor at fault
+// | `members`       | the supervisor finds no faulty thread or sensor
 // | `mounting`      | the attitude sent to an autopilot is not far from level
 
 #include <array>
@@ -47,47 +47,47 @@ inline constexpr std::size_t kArmingConditions = 9;
 const char* conditionName(ArmingCondition condition);
 
 struct ArmingFacts {
-  int flight_threads = 0;  ///< that run; 0: the executor is not up
+  int flight_threads = 0;  ///< running; 0: the executor has not started
   int threads_without_priority = 0;
   const char* first_without_priority = "";  ///< its name
 
   bool memory_locked = false;
 
-  std::uint64_t reversed_stamps = 0;  ///< over the look-back, of all sensors: at or before the one before
+  std::uint64_t reversed_stamps = 0;  ///< in the look-back, of all sensors: not later than the previous stamp
   bool has_sample = false;            ///< there is a newest IMU sample
   bool has_image = false;
   Stamp newest_sample;
   Stamp newest_image;
 
-  Duration sample_age;  ///< since the arrival of the newest IMU sample
-  double imu_rate = 0;  ///< Hz, measured over the look-back
+  Duration sample_age;  ///< time since the newest IMU sample arrived
+  double imu_rate = 0;  ///< Hz, measured in the look-back
   double imu_rate_expected = 0;
-  int cameras = 0;                                ///< of the rig
-  std::array<bool, kMaxCameras> has_image_of{};   ///< camera i delivered since the start
-  std::array<Duration, kMaxCameras> image_age{};  ///< since the arrival of camera i's newest image
-  std::array<bool, kMaxCameras> off_trigger{};    ///< camera i's images are not associated with trigger edges
+  int cameras = 0;                                ///< in the rig
+  std::array<bool, kMaxCameras> has_image_of{};   ///< camera i has delivered since the start
+  std::array<Duration, kMaxCameras> image_age{};  ///< time since camera i's newest image arrived
+  std::array<bool, kMaxCameras> off_trigger{};    ///< trigger edges are used, but camera i's images match none
 
   bool health_good = false;
-  Duration health_good_for;  ///< without a break until now
+  Duration health_good_for;  ///< without interruption until now
   Duration epoch_steady_for;
 
   bool recorder_wanted = false;
   bool recorder_running = false;
-  std::uint64_t recorder_lost = 0;  ///< records, since the recording began
+  std::uint64_t recorder_lost = 0;  ///< records lost since the recording began
 
   int track_level = 0;  ///< levels below full effort
   int smooth_level = 0;
 
-  double vehicle_tilt = 0;  ///< rad; between the vehicle's up, as the autopilot is told it, and the world's
-  Duration tilted_for;      ///< beyond ArmingSettings::tilt without a break; 0: it is not, or nobody is told
+  double vehicle_tilt = 0;  ///< rad, between the world's up and the vehicle's up as sent to the autopilot
+  Duration tilted_for;      ///< time beyond ArmingSettings::tilt; 0: not tilted, or no autopilot is told
 
-  int members_unwell = 0;              ///< by the supervisor's table
+  int members_unwell = 0;              ///< in the supervisor's table
   const char* first_unwell = "";       ///< its name
   const char* first_unwell_is = "";    ///< "late", "lost"
   const char* first_unwell_text = "";  ///< "no progress for 0.4 s"
 };
 
-/// ArmingWatch raises the limits of images for slow cameras.
+/// ArmingWatch raises the image limits for slow cameras.
 struct ArmingSettings {
   double imu_rate_tolerance = 0.2;                           ///< share of the expected rate
   Duration sensor_offset = Duration::fromMilliseconds(200);  ///< newest image against newest sample
@@ -96,7 +96,7 @@ struct ArmingSettings {
   Duration steady = Duration::fromMilliseconds(3000);        ///< of health and epoch
   /// rad (60 degrees). No vehicle starts on such a slope; a wrong mounting is off by 90 or 180 degrees.
   double tilt = std::numbers::pi / 3;
-  /// As `steady`, so that readiness does not precede it; longer than a flip or a roll in flight.
+  /// Equal to `steady`, so that readiness does not precede it; longer than a flip or a roll in flight.
   Duration tilted = Duration::fromMilliseconds(3000);
 };
 
@@ -104,15 +104,15 @@ struct MissingCondition {
   static constexpr std::size_t kTextBytes = 160;
 
   ArmingCondition condition = ArmingCondition::kRights;
-  std::array<char, kTextBytes> text{};  ///< what is missing, with its figures; ends with a zero
+  std::array<char, kTextBytes> text{};  ///< what is missing, with numbers; zero-terminated
   const char* remedy = "";              ///< literal
 
   [[nodiscard]] const char* name() const { return conditionName(condition); }
 };
 
 struct ArmingVerdict {
-  /// Clocks may be missed in two ways at once and by each camera, initialized in two ways, sensors by the IMU
-  /// and by each camera.
+  /// At once, clocks can lack two things and one for each camera, initialized two, and sensors the IMU and
+  /// each camera.
   static constexpr std::size_t kMost = kArmingConditions + 2 + 2 * kMaxCameras;
 
   FixedVector<MissingCondition, kMost> missing;
@@ -132,7 +132,7 @@ class ReadyToArm {
   ArmingSettings settings_;
 };
 
-/// One line for each missing condition: `name: what is missing; remedy`. "ready to arm" when none is.
+/// One line for each missing condition: `name: what is missing; remedy`. "ready to arm" if none is missing.
 std::string describe(const ArmingVerdict& verdict);
 /// {"ready": bool, "missing": [{"condition", "what", "remedy"}]}
 nlohmann::ordered_json toJson(const ArmingVerdict& verdict);

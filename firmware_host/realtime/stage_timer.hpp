@@ -1,6 +1,6 @@
 #pragma once
-// Wall and CPU time of the stages, frames and keyframes apart. Clocks live here, on the host's side:
-// stages read none.
+// Wall and CPU time of the stages, separately for frames and keyframes. The clocks are here on the host's
+// side: stages read none.
 
 #include <array>
 #include <string_view>
@@ -11,21 +11,21 @@ namespace swiftlet {
 
 enum class StageId : std::size_t {
   kSource,          ///< reading and decoding an image
-  kPairing,         ///< a look at the images that have come
-  kImu,             ///< sample to state: wall from its arrival until the state is published
-  kFix,             ///< propagation starts again from a new fix
+  kPairing,         ///< checking for newly arrived images
+  kImu,             ///< sample to state: wall time from its arrival to the publication of the state
+  kFix,             ///< restart of propagation from a new fix
   kTrack,           ///< front-end
-  kSmooth,          ///< back-end until the state stands
-  kTrim,            ///< making room in the window, after the state was published
-  kMesh,            ///< frame mesh, at keyframes the mesh over the horizon too
-  kLoop,            ///< loop closure, of a keyframe
-  kDepth,           ///< the map's parts, of a mapped frame: depth,
-  kVolume,          ///< fusion of it,
-  kSurface,         ///< surface of the blocks that changed,
+  kSmooth,          ///< back-end until the state is estimated
+  kTrim,            ///< making room in the window after the state was published
+  kMesh,            ///< frame mesh; at keyframes also the mesh over the horizon
+  kLoop,            ///< loop closure of a keyframe
+  kDepth,           ///< map, per mapped frame: depth image
+  kVolume,          ///< fusion of depth
+  kSurface,         ///< surface of changed blocks
   kDistance,        ///< distance field
-  kCorrection,      ///< what moved, fused again
-  kImageToPose,     ///< wall from the image's arrival until the pose is published; CPU of track and smooth
-  kExposureToPose,  ///< wall from the middle of the exposure
+  kCorrection,      ///< fusing again what loop closure moved
+  kImageToPose,     ///< wall: image's arrival to published pose; CPU: track and smooth
+  kExposureToPose,  ///< wall time from mid-exposure to the publication of the pose
   kMap,             ///< full smoothing
   kCount
 };
@@ -33,11 +33,11 @@ enum class StageId : std::size_t {
 /// In snake case: "source", "image_to_pose", ...
 std::string_view stageName(StageId stage);
 
-/// Wall time is the latency for a reader. CPU time is the stage's own time, independent of other load.
+/// Wall time is what a reader waits. CPU time is the stage's own, independent of other load.
 struct StageTimes {
-  LatencyHistogram wall_frames;  ///< frames that are no keyframes, and what belongs to no frame
+  LatencyHistogram wall_frames;  ///< frames that are not keyframes, and work that belongs to no frame
   LatencyHistogram wall_keyframes;
-  LatencyHistogram cpu_frames;  ///< of this thread
+  LatencyHistogram cpu_frames;  ///< CPU time of this thread
   LatencyHistogram cpu_keyframes;
 };
 
@@ -47,7 +47,7 @@ double wallSeconds();        ///< monotonic
 double threadCpuSeconds();   ///< this thread
 double processCpuSeconds();  ///< all threads
 
-/// What one call took.
+/// Duration of one call.
 struct Spent {
   double wall = 0;
   double cpu = 0;
