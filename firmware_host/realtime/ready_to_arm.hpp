@@ -65,7 +65,7 @@ struct ArmingFacts {
   int cameras = 0;                                ///< in the rig
   std::array<bool, kMaxCameras> has_image_of{};   ///< camera i has delivered since the start
   std::array<Duration, kMaxCameras> image_age{};  ///< time since camera i's newest image arrived
-  std::array<bool, kMaxCameras> off_trigger{};    ///< trigger edges are used, but camera i's images match none
+  std::array<bool, kMaxCameras> off_trigger{};    ///< camera i's images match no trigger edges
 
   bool health_good = false;
   Duration health_good_for;  ///< without interruption until now

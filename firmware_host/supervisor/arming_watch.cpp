@@ -8,7 +8,7 @@ namespace swiftlet {
 namespace {
 
 constexpr Duration kLookBack = Duration::fromMilliseconds(1000);
-/// Health that nobody has confirmed for so long is not good.
+/// Health counts as good only if a frame confirmed it within this time.
 constexpr Duration kOldestFrame = Duration::fromMilliseconds(1000);
 
 }  // namespace
@@ -22,9 +22,9 @@ void ArmingWatch::begin(const FlightGround& ground) {
 }
 
 void ArmingWatch::measureRate(const SensorNews& imu, std::uint64_t reversed, ArmingFacts& facts) {
-  if (imu.messages == 0) return;  // no stamp to begin from
+  if (imu.messages == 0) return;  // no stamp to start from
   const Mark now{imu.newest, imu.messages, reversed};
-  if (newer_ && now.stamp < newer_->stamp) newer_.reset();  // stamps went back for good: measured anew
+  if (newer_ && now.stamp < newer_->stamp) newer_.reset();  // stamps went back permanently: measure anew
   if (!newer_ || now.stamp - newer_->stamp > kLookBack) {
     older_ = newer_ ? newer_ : now;
     newer_ = now;
@@ -36,7 +36,7 @@ void ArmingWatch::measureRate(const SensorNews& imu, std::uint64_t reversed, Arm
 
 ArmingVerdict ArmingWatch::evaluate(const FlightFacts& flight, Health health,
                                     std::span<const Trouble> troubles, Stamp now) {
-  // Ages are on the run's clock, as the rule's bounds are.
+  // Ages are on the run's clock, like the bounds of the rule.
   const auto since = [&](Stamp host) {
     return Duration::fromSeconds((now - host).seconds() * ground_.speed);
   };
@@ -81,7 +81,7 @@ ArmingVerdict ArmingWatch::evaluate(const FlightFacts& flight, Health health,
     const double cosine = std::inner_product(up.begin(), up.end(), ground_.vehicle_up->begin(), 0.0);
     facts.vehicle_tilt = std::acos(std::clamp(cosine, -1.0, 1.0));
   }
-  // Only a good attitude accuses the mounting.
+  // The mounting is judged only while health is good.
   const bool tilted = good && facts.vehicle_tilt > ArmingSettings{}.tilt;
   if (!tilted) tilted_since_.reset();
   if (tilted && !tilted_since_) tilted_since_ = now;

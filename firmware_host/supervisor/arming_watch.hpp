@@ -1,5 +1,5 @@
 #pragma once
-// The facts for ReadyToArm, collected at the supervisor's pace: they age even if no frame and no sample
+// Collects the facts for ReadyToArm, each time the supervisor steps: ages grow even if no frame and no sample
 // arrives.
 //
 // Pure: facts and the time in, verdict out; no clock, no heap.
@@ -18,7 +18,7 @@ class ArmingWatch {
  public:
   void begin(const FlightGround& ground);
 
-  /// `health`: the estimator's. `troubles`: the supervisor's of now.
+  /// `health`: the estimator's. `troubles`: the supervisor's current ones.
   ArmingVerdict evaluate(const FlightFacts& facts, Health health, std::span<const Trouble> troubles,
                          Stamp now);
 
@@ -27,7 +27,7 @@ class ArmingWatch {
 
   FlightGround ground_;
   ReadyToArm rule_;
-  // The look-back of rate and stamps: between one and two times kLookBack.
+  // Marks for rate and stamps: the look-back is between one and two times kLookBack.
   struct Mark {
     Stamp stamp;
     std::uint64_t samples = 0;
@@ -40,7 +40,7 @@ class ArmingWatch {
   std::optional<Stamp> epoch_since_;
   std::uint32_t epoch_ = 0;
   std::uint64_t frames_ = 0;
-  Stamp frame_at_;  ///< host time at which the newest frame was seen first
+  Stamp frame_at_;  ///< host time at which the newest frame was first seen
 };
 
 }  // namespace swiftlet

@@ -1,7 +1,7 @@
 #pragma once
-// How often in a row an IMU has given one reading: a sensor that hangs repeats its last one.
+// Counts consecutive equal readings of an IMU: a sensor that hangs repeats its last one.
 //
-// Of the thread that takes the samples. Cost: six comparisons a sample.
+// For the thread that takes the samples. Cost: six comparisons per sample.
 
 #include <cstdint>
 
@@ -11,7 +11,7 @@ namespace swiftlet {
 
 class EqualReadings {
  public:
-  /// Equal readings in a row, this one included; the stamp does not count.
+  /// Returns the number of consecutive equal readings, this one included; stamps are not compared.
   std::uint64_t note(const ImuSample& sample) {
     const bool equal = run_ > 0 && sample.gyro == before_.gyro && sample.accel == before_.accel;
     run_ = equal ? run_ + 1 : 1;

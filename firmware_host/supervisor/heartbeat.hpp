@@ -1,10 +1,10 @@
 #pragma once
-// The sign of life of one thread, read by the supervisor.
+// Sign of life of one thread, read by the supervisor.
 //
-// Threads: the thread itself calls begin, beat, doing, end and fail; any thread calls read. A heartbeat
-// serves one life: calls after end() or fail() are ignored, so that the text of a failure never changes once
-// it is visible. Errors: none. Memory: three cache lines, fixed. Cost of beat(): one clock read and two
-// relaxed stores, under 0.1 us. Nothing here locks, allocates or calls the kernel.
+// Threads: the thread itself calls begin, beat, doing, end and fail; any thread calls read. A heartbeat is
+// used once: calls after end() or fail() are ignored, so the text of a failure never changes once it is
+// visible. Errors: none. Memory: three cache lines, fixed. Cost of beat(): one clock read and two relaxed
+// stores, under 0.1 us. Nothing here locks, allocates or calls the kernel.
 
 #include <algorithm>
 #include <array>
@@ -21,7 +21,7 @@
 
 namespace swiftlet {
 
-/// For a thread that ended early.
+/// Fault of a thread that ended early.
 inline constexpr const char* kReturnedEarly = "the thread returned although the run continues";
 
 enum class Life : std::uint32_t {
@@ -34,10 +34,10 @@ enum class Life : std::uint32_t {
 /// A heartbeat at one moment.
 struct Beat {
   Life life = Life::kNotBegun;
-  Stamp last;               ///< CLOCK_MONOTONIC, of the newest turn, or of the end
-  std::uint64_t turns = 0;  ///< since the beginning
-  const char* doing = "";   ///< literal; the thread's last report of its work
-  std::string_view fault;   ///< of a failure; lives as long as the heartbeat
+  Stamp last;               ///< CLOCK_MONOTONIC, of the newest turn or of the end
+  std::uint64_t turns = 0;  ///< since the start
+  const char* doing = "";   ///< literal; what the thread last reported to be doing
+  std::string_view fault;   ///< text of a failure; lives as long as the heartbeat
 };
 
 class alignas(kCacheLine) Heartbeat {
@@ -49,13 +49,13 @@ class alignas(kCacheLine) Heartbeat {
   Heartbeat& operator=(const Heartbeat&) = delete;
 
   void begin() { begin(monotonicNow()); }
-  /// Each turn of the thread's loop, also one that found nothing to do.
+  /// Call at each turn of the thread's loop, also if there was nothing to do.
   void beat() { beat(monotonicNow()); }
   void end() { end(monotonicNow()); }
   /// `what` is cut to kFaultBytes.
   void fail(std::string_view what) { fail(what, monotonicNow()); }
 
-  // The same at a given time, for tests and for threads that have read the clock already.
+  // The same at a given time, for tests and for threads that have already read the clock.
   void begin(Stamp now) {
     if (life() != Life::kNotBegun) return;
     last_.store(now.ns, std::memory_order_relaxed);
@@ -72,7 +72,7 @@ class alignas(kCacheLine) Heartbeat {
     std::copy_n(what.data(), fault_size_, fault_.data());
     finish(Life::kFailed, now);
   }
-  /// A literal, for the text of a stall: the last thing that the thread is known to have begun.
+  /// `what`: literal that names the work about to begin; shown if the thread stalls.
   void doing(const char* what) { doing_.store(what, std::memory_order_relaxed); }
 
   [[nodiscard]] Beat read() const {
@@ -98,12 +98,12 @@ class alignas(kCacheLine) Heartbeat {
   std::atomic<std::int64_t> last_{std::numeric_limits<std::int64_t>::min()};
   std::atomic<std::uint64_t> turns_{0};
   std::atomic<const char*> doing_{""};
-  // Written before the release of kFailed, never after.
+  // Written before the release of kFailed, never afterwards.
   std::array<char, kFaultBytes> fault_{};
   std::size_t fault_size_ = 0;
 };
 
-/// Runs a thread's function between begin and end; an exception becomes fail() and is rethrown.
+/// Runs a thread's function between begin and end. An exception is reported by fail() and rethrown.
 template <typename Entry>
 void runBeating(Heartbeat& heart, Entry&& entry) {
   heart.begin();

@@ -11,15 +11,15 @@ namespace {
 
 constexpr Duration milliseconds(std::int64_t ms) { return Duration::fromMilliseconds(ms); }
 
-/// A flight thread looks at its arrows every 5 ms and works 50 ms at most, 0.2 s where another program
-/// takes the CPU; at 0.3 s the autopilot's own limits for a pose are used up. A thread that stands for 3 s
-/// has outlived the longest coast that the estimator calls degraded: a restart is better than waiting.
+/// A flight thread looks at its arrows every 5 ms and works for 50 ms at most, 0.2 s if another program takes
+/// the CPU; at 0.3 s the autopilot's own limits for a pose are used up. A stall of 3 s exceeds the longest
+/// coast that the estimator calls degraded: a restart is better than waiting.
 constexpr MemberRule kFlightRule = {MemberKind::kFlight, milliseconds(300), milliseconds(3000)};
-/// A solve of the pose graph or a redrawn map takes tenths of a second; 10 s are no work, but a hang.
+/// Solving the pose graph or redrawing the map takes tenths of a second; 10 s is a hang.
 constexpr MemberRule kSideRule = {MemberKind::kSide, milliseconds(1000), milliseconds(10'000)};
-/// An fsync on an SD card takes up to a second now and then.
+/// An fsync on an SD card occasionally takes up to a second.
 constexpr MemberRule kFileRule = {MemberKind::kSide, milliseconds(1500), milliseconds(10'000)};
-/// They wait for their device for half a second at most; opening one again takes longer.
+/// Sensor threads wait for their device for half a second at most; reopening one takes longer.
 constexpr MemberRule kSensorRule = {MemberKind::kSensor, milliseconds(1000), milliseconds(10'000)};
 
 struct NamedRule {
@@ -27,8 +27,8 @@ struct NamedRule {
   MemberRule rule;
 };
 constexpr NamedRule kRules[] = {
-    // The IMU's thread, too: without samples there is no state, and only a restart brings a dead thread back.
-    // Opening a port again takes it as long as a camera's.
+    // The IMU's thread is a flight thread: without samples there is no state, and only a restart brings a
+    // dead thread back. Its limits are those of sensors, since reopening a port takes as long as a camera.
     {"imu", {MemberKind::kFlight, kSensorRule.late, kSensorRule.lost}},
     {"propagate", kFlightRule},
     {"track", kFlightRule},
@@ -40,14 +40,14 @@ constexpr NamedRule kRules[] = {
     {"trigger", kSensorRule},
 };
 
-/// Cameras are opened one after the other and may need seconds for the first image.
+/// Cameras are opened one after the other and may need seconds to their first image.
 constexpr Duration kFirstMessage = milliseconds(10'000);
-/// As PX4: no sensor that lives repeats all six values so often (flicker of the lowest bit).
+/// As in PX4: a working sensor never repeats all six values so often (its lowest bits flicker).
 constexpr std::uint64_t kStuckReadings = 100;
-/// As PX4: what came back four times will not stay.
+/// As in PX4: what has failed four times will fail again.
 constexpr int kTimesBad = 4;
-/// The supervisor looks every 0.1 s. After a longer break of its own (the process was stopped, the machine
-/// overloaded) silence proves nothing about the others: it counts from the end of the break.
+/// The supervisor runs every 0.1 s. After a longer gap of its own (process stopped, machine overloaded), the
+/// silence of others proves nothing and is counted from the end of the gap.
 constexpr Duration kOwnBreak = milliseconds(300);
 
 template <std::size_t kBytes, typename... Arguments>
@@ -65,7 +65,7 @@ struct Liveness::DataRule {
   Duration late;
   std::optional<Duration> lost;
   Health lost_effect;
-  bool blocks_arming;  ///< where ReadyToArm does not ask for it
+  bool blocks_arming;  ///< set if ReadyToArm does not check this
 };
 
 struct Liveness::ProductRule {
@@ -111,10 +111,10 @@ void Liveness::judge(std::span<const Beat> beats, const FlightFacts& facts, Stam
     judgeThread(members_[i], beats[i], facts.ending, now);
   }
   if (!facts.ending) {
-    // Three periods of a slow IMU; at 1 s it has been off for longer than any hole that can be bridged.
+    // 0.1 s are three periods of a slow IMU; a gap of 1 s is longer than any that can be bridged.
     constexpr DataRule kImu = {"sample", milliseconds(100), milliseconds(1000), Health::kFailed, false};
-    // Some images lost in a row are the estimator's matter; half a second is a camera that is gone.
-    // Of a slow camera two images and a half; it is lost after twice as many.
+    // A few lost images in a row are left to the estimator; after half a second the camera counts as late.
+    // Slow cameras: late after two and a half periods, lost after twice as many.
     const double rate = ground_.camera_rate;
     const DataRule image_rule = {"image", imageLimit(milliseconds(500), rate),
                                  imageLimit(milliseconds(2000), rate / 2), Health::kDegraded, false};
@@ -125,7 +125,7 @@ void Liveness::judge(std::span<const Beat> beats, const FlightFacts& facts, Stam
       judgeData(static_cast<Other>(kCameraData + c), image_rule, facts.camera[c], now);
     }
     if (ground_.trigger) judgeData(kTriggerData, edge_rule, facts.trigger, now);
-    // As long as for the threads that make them: a consumer misses the product, not the turn.
+    // The same limits as for the threads that produce them: readers miss the product, not the turn.
     constexpr ProductRule kState = {"state", "samples", kFlightRule.late, kFlightRule.lost};
     constexpr ProductRule kFrame = {"frame", "images", milliseconds(1000), kFlightRule.lost};
     const EstimateNews& estimate = facts.estimate;
@@ -176,8 +176,7 @@ void Liveness::judgeThread(Row& row, const Beat& beat, bool ending, Stamp now) {
     found.effect = Health::kFailed;
     run_failed_ = true;
   }
-  // A follower or a file that comes late keeps nobody on the ground; one that is gone says something is
-  // wrong.
+  // A late side thread does not prevent arming; a lost one does, since something is wrong.
   found.blocks_arming = lost || row.rule.kind != MemberKind::kSide;
   settle(row, found);
 }

@@ -1,6 +1,6 @@
 #pragma once
-// Who is late, who is lost, and what it means for the flight. Pure: facts and the time in, troubles out; no
-// clock, no heap, no thread. Cost: some microseconds.
+// Judges which threads and sensors are late or lost, and what that means for the flight. Pure: facts and the
+// time in, troubles out; no clock, no heap, no thread. Cost: some microseconds.
 //
 // | row                     | late after      | lost after               | lost means
 // | flight thread           | 0.3 s           | 3 s, or threw, or ended  | health failed, the run ends
@@ -13,9 +13,9 @@
 // | frames while images come  | 1 s           | 3 s                      | health failed until they are back
 // | equal IMU readings      |                 | 100 in a row             | health failed until they differ
 // | files                   |                 | at once                  | degraded
-// Limits of images and edges are at least two and a half periods of a slow camera, five for a lost one.
-// liveness.cpp has the reasons. A stall that is over is forgotten, but for two things: what went bad four
-// times stays degraded, and a flight thread that was lost ends the run. A throw and an early end stay.
+// Limits for images and edges are at least two and a half periods of a slow camera, five for a lost one.
+// liveness.cpp gives the reasons. A trouble that is over is forgotten, with these exceptions: what has failed
+// four times stays degraded, a lost flight thread ends the run, and exceptions and early ends stay.
 
 #include <array>
 #include <cstddef>
@@ -32,18 +32,18 @@
 namespace swiftlet {
 
 enum class MemberKind : std::uint8_t {
-  kFlight,  ///< without it there is no estimate: the IMU's thread, propagate, track, smooth
+  kFlight,  ///< needed for the estimate: the IMU's thread, propagate, track, smooth
   kSide,    ///< mesh, loop, map, log, record, and the followers
   kSensor,  ///< threads of cameras and the trigger
 };
 
 struct MemberRule {
   MemberKind kind = MemberKind::kSide;
-  Duration late;  ///< without a turn of its loop
+  Duration late;  ///< longest time without a turn of its loop
   Duration lost;
 };
 
-/// By the thread's name; an unknown one is a side thread.
+/// Rule by the thread's name; an unknown thread is a side thread.
 MemberRule memberRule(std::string_view name);
 
 class Liveness {
@@ -52,20 +52,20 @@ class Liveness {
 
   using Troubles = FixedVector<Trouble, Verdict::kMostTroubles>;
 
-  /// Call before the first judge(); beats are in the order of adding. False: the table is full.
+  /// Call before the first judge(), which takes beats in the same order. False: the table is full.
   [[nodiscard]] bool add(std::string_view name);
   void begin(const FlightGround& ground) { ground_ = ground; }
 
-  /// `facts.ending` is to be read after the beats.
+  /// Read `facts.ending` after the beats.
   void judge(std::span<const Beat> beats, const FlightFacts& facts, Stamp now);
 
   /// In the order of the rows.
   [[nodiscard]] const Troubles& troubles() const { return troubles_; }
-  /// A flight thread was lost.
+  /// Whether a flight thread was lost.
   [[nodiscard]] bool runFailed() const { return run_failed_; }
 
  private:
-  /// Rows after the members': sensors' data, products, the IMU's values, the files.
+  /// Rows after the threads': data of sensors, products, the IMU's values, files.
   enum Other : std::size_t {
     kImuData,
     kCameraData,
@@ -79,14 +79,14 @@ class Liveness {
   struct Row {
     std::array<char, Trouble::kNameBytes> name{};
     MemberRule rule;
-    Trouble trouble;  ///< of the last judgement
+    Trouble trouble;  ///< of the last judge()
     int times_bad = 0;
   };
   /// Whether output is produced while input arrives.
   struct Progress {
     std::uint64_t in = 0, out = 0;
-    Stamp in_at;                         ///< of the newest input
-    std::optional<Stamp> waiting_since;  ///< the first input after the newest product
+    Stamp in_at;                         ///< time of the newest input
+    std::optional<Stamp> waiting_since;  ///< time of the first input after the newest product
   };
   struct DataRule;
   struct ProductRule;
@@ -99,7 +99,7 @@ class Liveness {
   void judgeFiles(const FlightFacts& facts, Stamp now);
   void settle(Row& row, const Trouble& found);
   [[nodiscard]] Row& other(Other which) { return others_[which]; }
-  /// Seconds of the host since `from`, without the time in which the supervisor itself stood still.
+  /// Seconds of the host's clock since `from`, not counting gaps of the supervisor itself.
   [[nodiscard]] double silence(Stamp from, Stamp now) const;
 
   FlightGround ground_;
@@ -107,9 +107,9 @@ class Liveness {
   std::array<Row, kOthers> others_{};
   Progress states_, frames_;
   Troubles troubles_;
-  std::optional<Stamp> begun_;  ///< the first judge()
-  Stamp judged_;                ///< the last
-  Stamp floor_;                 ///< silence counts from here at the earliest
+  std::optional<Stamp> begun_;  ///< time of the first judge()
+  Stamp judged_;                ///< time of the last judge()
+  Stamp floor_;                 ///< silence is counted from this time at the earliest
   bool run_failed_ = false;
 };
 

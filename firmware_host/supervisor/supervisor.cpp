@@ -28,7 +28,7 @@ const Trouble* ofRow(const Liveness::Troubles& troubles, std::uint8_t row) {
   return found != troubles.end() ? found : nullptr;
 }
 
-/// Appends to text in a fixed buffer; what does not fit is cut.
+/// Appends text to a fixed buffer; what does not fit is cut off.
 class Text {
  public:
   explicit Text(std::span<char> into) : into_(into) {}
@@ -81,7 +81,7 @@ void Supervisor::run() {
     if (stopping_.load(std::memory_order_acquire)) return;
     const Stamp now = monotonicNow();
     step(now);
-    // Late once, it does not hurry after.
+    // Missed periods are skipped.
     next = std::max(next + kPeriod, now);
     bell_.wait(ticket, next - monotonicNow());
   }
@@ -92,13 +92,13 @@ void Supervisor::step(Stamp now) {
   for (const Member& member : members_) static_cast<void>(beats.tryPushBack(member.heart->read()));
   FlightFacts facts;
   if (facts_) facts_(facts);
-  // After the beats: a thread that has returned in order was preceded by this.
+  // Read after the beats: `ending` is set before any thread returns in order.
   facts.ending = facts.ending || ending_.load(std::memory_order_acquire);
 
   liveness_.judge({beats.data(), beats.size()}, facts, now);
   const Liveness::Troubles& troubles = liveness_.troubles();
   const EstimateNews& estimate = facts.estimate;
-  // A state's health ages by itself while no frame comes; a frame's stays what it was.
+  // A state's health degrades by itself while frames are missing; a frame's health does not.
   Health health = estimate.frames > 0 ? estimate.frame_health : Health::kInitializing;
   if (estimate.has_state && estimate.states > 0) health = worse(health, estimate.state_health);
   const ArmingVerdict arming = arming_.evaluate(facts, health, {troubles.data(), troubles.size()}, now);
@@ -128,7 +128,7 @@ void Supervisor::step(Stamp now) {
   tellSystemd(now);
 }
 
-/// Events carry the run's clock: that of the newest message, carried on by the host's.
+/// Events carry the run's clock: the newest message's stamp, extrapolated by the host's clock.
 bool Supervisor::findRunClock(const FlightFacts& facts, Stamp now) {
   if (ground_.host_stamps) {
     run_clock_ = now;
@@ -205,16 +205,16 @@ void Supervisor::tellSystemd(Stamp now) {
   systemd_->status({line.data(), text.size()});
 }
 
-/// Once; again if systemd did not take it.
+/// Tells systemd once; repeated if systemd did not take it.
 void Supervisor::tellEnd() {
   if (systemd_ == nullptr || end_told_) return;
-  // STOPPING disarms the watchdog, which has to kill a failed run that hangs at its end.
+  // STOPPING would disarm the watchdog, which must kill a failed run that hangs at its end.
   end_told_ = verdict_.run_failed ? systemd_->limitWatchdog(kLongestFailedEnd) : systemd_->stopping();
 }
 
 Verdict Supervisor::verdict() const {
   Verdict verdict;
-  // Overtaken four times in a row: not at ten writes a second.
+  // Fails only if overtaken by four writes in a row, which ten writes a second cannot do.
   static_cast<void>(newest_.read(verdict));
   return verdict;
 }

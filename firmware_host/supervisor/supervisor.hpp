@@ -2,11 +2,11 @@
 // Decides whether everything is alive: checks every member's heartbeat and the data of sensors and estimate
 // ten times a second, and publishes one verdict (verdict.hpp) to all readers.
 //
-// Use: add every member, begin(), start(); or, without a thread, step() at times of the caller's choice.
-// Threads: its own thread (ThreadSettings: below `track`, above `mesh`, so that low-priority work cannot
-// silence it), which calls `facts` and the sinks; verdict() and expectEnd() from any thread; drainEvents from
-// one thread. step() only without its own thread. Errors: none in flight; start() reports a thread that
-// cannot be started. Memory: 130 kB, fixed; no allocation or lock after begin(). Cost: 10 us a turn.
+// Use: add every member, begin(), start(); or, without a thread, call step() at chosen times. Threads: its
+// own thread (ThreadSettings: below `track`, above `mesh`, so that low-priority work cannot silence it) calls
+// `facts` and the sinks; verdict() and expectEnd() from any thread; drainEvents from one thread; step() only
+// without its own thread. Errors: none in flight; start() reports a thread that cannot be started. Memory:
+// 130 kB, fixed; no allocation or lock after begin(). Cost: 10 us per step.
 
 #include <array>
 #include <atomic>
@@ -35,8 +35,8 @@ class Supervisor {
  public:
   static constexpr Duration kPeriod = Duration::fromMilliseconds(100);
   static constexpr std::size_t kMostSinks = 8;
-  /// From the failure of a run to systemd's watchdog, should the program not have ended by then: 4 s to give
-  /// up threads and followers that are stuck, the rest to write files to a slow disk.
+  /// Time from the failure of a run until systemd's watchdog kills the program if it has not ended: 4 s to
+  /// abandon stuck threads and followers, the rest to write files to a slow disk.
   static constexpr Duration kLongestFailedEnd = Duration::fromMilliseconds(30'000);
 
   using Facts = std::function<void(FlightFacts&)>;
@@ -47,33 +47,33 @@ class Supervisor {
   Supervisor(const Supervisor&) = delete;
   Supervisor& operator=(const Supervisor&) = delete;
 
-  /// Before begin(). `heart` outlives the supervisor. False: the table is full.
+  /// Call before begin(). `heart` outlives the supervisor. False: the table is full.
   [[nodiscard]] bool add(std::string_view name, const Heartbeat& heart);
   [[nodiscard]] bool addSink(Sink sink) { return sinks_.tryPushBack(std::move(sink)); }
-  /// `facts` fills in what it knows. `facts` and `systemd` (may be null) must outlive the supervisor.
+  /// `facts` fills in the current facts. `facts` and `systemd` (may be null) outlive the supervisor.
   void begin(const FlightGround& ground, Facts facts, SystemdNotify* systemd = nullptr);
 
   ThreadReport start(const ThreadSettings& settings);
-  /// Waits for the thread, at most a turn. Tells systemd that the run ends if no turn did.
+  /// Waits for the thread, at most one turn. Tells systemd that the run ends, unless a turn already did.
   void stop();
-  /// The run ends in order from here on: to be called before the first thread returns because of it.
+  /// Announces that the run ends in order. Call before the first thread returns for this reason.
   void expectEnd() { ending_.store(true, std::memory_order_release); }
 
-  /// One turn at `now` of CLOCK_MONOTONIC.
+  /// One turn; `now`: CLOCK_MONOTONIC.
   void step(Stamp now);
 
-  /// The newest; `evaluated` is 0 before the first turn.
+  /// The newest verdict; its `evaluated` is 0 before the first turn.
   [[nodiscard]] Verdict verdict() const;
-  /// A flight thread was lost: the run is to end with exit code 1.
+  /// A flight thread was lost: the run must end with exit code 1.
   [[nodiscard]] bool runFailed() const { return run_failed_.load(std::memory_order_acquire); }
-  /// What changed since the last call, in words, with stamps of the run's clock.
+  /// Passes the changes since the last call as text, with stamps of the run's clock.
   bool drainEvents(const std::function<void(Stamp, const std::string&)>& take);
   /// For the summary, after stop(): the last verdict, first readiness, each member's turns.
   [[nodiscard]] nlohmann::ordered_json json() const;
 
  private:
   struct Event {
-    /// A verdict that misses every condition, in full.
+    /// Fits a verdict in which every condition is missing.
     static constexpr std::size_t kTextBytes = 2560;
     Stamp stamp;
     std::array<char, kTextBytes> text{};
@@ -102,10 +102,10 @@ class Supervisor {
   ArmingWatch arming_;
 
   Verdict verdict_;
-  Liveness::Troubles told_;  ///< troubles that events have named
+  Liveness::Troubles told_;  ///< troubles already reported in events
   bool arming_told_ = false;
   std::optional<ArmingVerdict> last_arming_;
-  std::optional<Stamp> run_clock_;  ///< now, on the run's clock
+  std::optional<Stamp> run_clock_;  ///< current time on the run's clock
   std::optional<Stamp> first_ready_;
   bool ready_sent_ = false, end_told_ = false;
 

@@ -16,8 +16,8 @@
 namespace swiftlet {
 namespace {
 
-/// systemd advises half of WATCHDOG_USEC. With a quarter, three feeds in a row have to be late before it
-/// kills a flight that is well.
+/// systemd advises half of WATCHDOG_USEC. With a quarter, three consecutive feeds must be late before it
+/// kills a working flight.
 constexpr std::uint64_t kFeedsPerLimit = 4;
 constexpr std::int64_t kNanosecondsPerMicrosecond = 1000;
 constexpr std::size_t kMessageBytes = 512;
@@ -42,7 +42,7 @@ SystemdNotify::SystemdNotify() {
   const std::size_t length = std::strlen(path);
   if (length >= sizeof(address.sun_path)) return;
   std::copy_n(path, length, address.sun_path);
-  if (path[0] == '@') address.sun_path[0] = '\0';  // a name of the kernel's, no file
+  if (path[0] == '@') address.sun_path[0] = '\0';  // abstract socket name, not a file
   socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (socket_ < 0) return;
   const auto bytes = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + length);
@@ -92,7 +92,7 @@ void SystemdNotify::watchdog(Stamp now) {
 }
 
 bool SystemdNotify::limitWatchdog(Duration limit) const {
-  if (!watchdog_period_) return true;  // it would be switched on
+  if (!watchdog_period_) return true;  // the message would enable the watchdog
   std::array<char, kMessageBytes> message;
   const auto end = fmt::format_to_n(message.data(), message.size(), "WATCHDOG_USEC={}",
                                     limit.ns / kNanosecondsPerMicrosecond);

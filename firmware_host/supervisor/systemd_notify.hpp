@@ -1,9 +1,9 @@
 #pragma once
-// Tells systemd how the service is: the protocol of sd_notify(3), one datagram a message, without its
-// library.
+// Reports the service's state to systemd by the protocol of sd_notify(3), one datagram per message, without
+// its library.
 //
-// Without NOTIFY_SOCKET in the environment every call does nothing. Nothing blocks, allocates or fails: what
-// systemd does not take is lost, and repeated where it matters (the watchdog). One thread.
+// Without NOTIFY_SOCKET in the environment, every call does nothing. Nothing blocks, allocates or fails: a
+// message that systemd does not take is lost; essential ones (the watchdog) are repeated. One thread.
 
 #include <cstdint>
 #include <optional>
@@ -24,22 +24,21 @@ class SystemdNotify {
   [[nodiscard]] bool wanted() const { return socket_ >= 0; }
 
   void ready();
-  /// From here on TimeoutStopSec limits the end, and nothing may feed the watchdog: that would arm it again.
-  /// False: not sent, to be called again.
+  /// From here on TimeoutStopSec limits the end. Do not call watchdog() afterwards: it would arm the watchdog
+  /// again. False: not sent, call again.
   [[nodiscard]] bool stopping() const;
-  /// One line for `systemctl status`; sent when it differs from the one before.
+  /// One line for `systemctl status`; sent if it differs from the previous one.
   void status(std::string_view line);
-  /// Feeds the watchdog where it is due.
+  /// Feeds the watchdog if it is due.
   void watchdog(Stamp now);
-  /// The watchdog kills the process `limit` from now if nothing feeds it. False: not sent, to be called
-  /// again.
+  /// Makes the watchdog kill the process `limit` from now if nothing feeds it. False: not sent, call again.
   [[nodiscard]] bool limitWatchdog(Duration limit) const;
 
  private:
   bool send(std::string_view message) const;
 
   int socket_ = -1;
-  std::optional<Duration> watchdog_period_;  ///< between two feeds; empty: systemd's watchdog is off
+  std::optional<Duration> watchdog_period_;  ///< between two feeds; empty: systemd's watchdog is disabled
   std::optional<Stamp> next_feed_;
   std::uint64_t status_hash_ = 0;
 };

@@ -1,6 +1,6 @@
 #pragma once
-// What the supervisor found at one moment: the only answer to "is everything alive, and may it fly?". Arming,
-// MAVLink, ROS diagnostics, the live view, the log, systemd and the exit code read it.
+// The supervisor's findings at one moment, and the only answer to "is everything alive, and may it fly?".
+// Read by arming, MAVLink, ROS diagnostics, the live view, the log, systemd and the exit code.
 //
 // Trivially copyable: some 7 kB.
 
@@ -16,14 +16,14 @@
 
 namespace swiftlet {
 
-/// An older verdict is none: the supervisor itself has stopped, five of its periods ago.
+/// An older verdict is invalid: the supervisor itself has missed five of its periods.
 inline constexpr Duration kOldestVerdict = Duration::fromMilliseconds(500);
 
 enum class Condition : std::uint8_t {
   kOk,
-  kLate,      ///< silent for longer than its longest silence, or at fault without being gone
-  kLost,      ///< gone: it threw, ended, or was silent for longer than its limit
-  kUnsteady,  ///< works, but went bad four times in this run
+  kLate,      ///< silent for too long, or faulty without being gone
+  kLost,      ///< threw, ended, or was silent for longer than its limit
+  kUnsteady,  ///< works, but has failed four times in this run
 };
 /// "ok", "late", "lost", "unsteady".
 const char* conditionName(Condition condition);
@@ -37,25 +37,25 @@ enum class Cause : std::uint8_t {
   kStuckValues,  ///< the IMU repeats one reading
   kNoProduct,    ///< the stage runs and receives input but produces no output
   kFiles,        ///< files are not written
-  kFlapping,     ///< went bad too often
+  kFlapping,     ///< failed too often
 };
 
-/// One member of the flight, or one of its sensors' data, that is not well.
+/// A member of the flight, or the data of a sensor, that is not well.
 struct Trouble {
   static constexpr std::size_t kNameBytes = 16;
   static constexpr std::size_t kTextBytes = 160;
 
-  std::array<char, kNameBytes> member{};  ///< ends with a zero
-  std::uint8_t row = 0;                   ///< of the supervisor's table: one trouble a row at a time
+  std::array<char, kNameBytes> member{};  ///< zero-terminated
+  std::uint8_t row = 0;                   ///< in the supervisor's table; at most one trouble per row
   Condition condition = Condition::kOk;
   Cause cause = Cause::kNone;
-  Health effect = Health::kDegraded;    ///< the health is at best this
-  bool blocks_arming = false;           ///< as condition `members`
-  Stamp since;                          ///< CLOCK_MONOTONIC: the last sign of life, or the end
-  std::array<char, kTextBytes> text{};  ///< "no progress for 0.4 s"; ends with a zero
+  Health effect = Health::kDegraded;    ///< upper limit of the health
+  bool blocks_arming = false;           ///< by the arming condition `members`
+  Stamp since;                          ///< CLOCK_MONOTONIC, the last sign of life or the end
+  std::array<char, kTextBytes> text{};  ///< "no progress for 0.4 s"; zero-terminated
 
   [[nodiscard]] const char* name() const { return member.data(); }
-  /// The same trouble regardless of the numbers in its text: a changed number alone is not news.
+  /// Whether the troubles are the same apart from the numbers in their texts, which are not news.
   [[nodiscard]] bool sameAs(const Trouble& other) const;
 };
 
@@ -66,22 +66,22 @@ struct Verdict {
   Stamp evaluated;  ///< CLOCK_MONOTONIC
   Health health = Health::kInitializing;
   bool run_failed = false;  ///< the run must end with exit code 1; never becomes false again
-  bool ending = false;      ///< the run is ending in order
+  bool ending = false;      ///< the run ends in order
   ArmingVerdict arming;
   FixedVector<Trouble, kMostTroubles> troubles;
-  // Counted up with each change, so that a reader knows news from figures that run on.
+  // Incremented with each change, so that a reader can tell news from numbers that merely advance.
   std::uint32_t arming_changes = 0;
   std::uint32_t trouble_changes = 0;
 
   [[nodiscard]] bool stale(Stamp now) const { return now - evaluated > kOldestVerdict; }
-  /// The worst trouble, the first of them; null: none.
+  /// The worst trouble, the first of equal ones; null: none.
   [[nodiscard]] const Trouble* worst() const;
 };
 
 /// {"run_failed", "arming", "troubles": [{"member", "condition", "since_ns", "text"}]}
 nlohmann::ordered_json toJson(const Verdict& verdict);
 
-/// The worse of two: initializing before good, since a pose that is not there yet is not to be flown by.
+/// The worse of two. Initializing is worse than good: a missing pose cannot be flown.
 Health worse(Health a, Health b);
 
 }  // namespace swiftlet
