@@ -18,7 +18,7 @@ namespace {
 constexpr double kSumTolerance = 0.01;
 constexpr const char* kForm = "Write true,said,probability, for example 3,4,0.05";
 
-/// One line's fields; throws where they are not three numbers in range.
+/// The fields of one line; throws unless they are three numbers in range.
 struct ConfusionLine {
   ConfusionLine(const std::string& path, int number, std::string_view line) {
     const std::array<const char*, 3> names{"true", "said", "probability"};

@@ -1,5 +1,5 @@
 #pragma once
-// How often a segmentation takes one label for another, as a file: what map.confusion names.
+// Reads how often a segmentation confuses labels, from the file named by map.confusion.
 
 #include <optional>
 #include <string>
@@ -15,7 +15,7 @@ namespace swiftlet {
 /// remedy.
 ConfusionModel readConfusion(const std::string& path, float right);
 
-/// Of the file that map.confusion names; empty if it names none.
+/// Reads the file named by map.confusion; empty if none is named.
 std::optional<ConfusionModel> confusionOf(const Settings& settings);
 
 }  // namespace swiftlet

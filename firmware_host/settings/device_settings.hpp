@@ -12,7 +12,7 @@ struct VehicleGroup {
 
 struct ImuLinkGroup {
   std::string device = "";  ///< serial port, CAN interface or udp:HOST:PORT; empty: none
-  std::string topic = "";   ///< of ROS 2, in place of device
+  std::string topic = "";   ///< ROS 2 topic, instead of device
   std::string accel_topic = "";
   std::string protocol = "bridge";
   int baud = 921600;
@@ -21,10 +21,10 @@ struct ImuLinkGroup {
   int can_node = 0;  ///< 0: any
 };
 
-/// CamerasGroup::shutter of a rolling one.
+/// Value of CamerasGroup::shutter for a rolling shutter.
 inline constexpr const char* kRolling = "rolling";
 
-/// CamerasGroup::camera_info.
+/// Values of CamerasGroup::camera_info.
 inline constexpr const char* kCameraInfoOff = "off";
 inline constexpr const char* kCameraInfoCheck = "check";
 inline constexpr const char* kCameraInfoUse = "use";
@@ -32,17 +32,17 @@ inline constexpr const char* kCameraInfoUse = "use";
 struct CamerasGroup {
   std::string device0 = "";
   std::string device1 = "";
-  std::string pipeline0 = "";  ///< of GStreamer, in place of device0
+  std::string pipeline0 = "";  ///< GStreamer pipeline, instead of device0
   std::string pipeline1 = "";
-  std::string topic0 = "";  ///< of ROS 2, in place of device0
+  std::string topic0 = "";  ///< ROS 2 topic, instead of device0
   std::string topic1 = "";
   std::string camera_info = kCameraInfoCheck;
   bool side_by_side = false;
   std::string format = "any";
-  std::string resolution = "";  ///< width x height, without a calibration
+  std::string resolution = "";  ///< width x height; used without a calibration
   double rate_hz = 20;
-  double exposure_ms = 0;  ///< 0: as the camera has it
-  int gain = -1;           ///< below 0: as the camera has it
+  double exposure_ms = 0;  ///< 0: the camera's own setting
+  int gain = -1;           ///< negative: the camera's own setting
   bool exposure_control = false;
   std::string shutter = "global";
   double readout_ms = 0;
@@ -55,32 +55,32 @@ struct TriggerGroup {
   double delay_us = 0;
 };
 
-/// The autopilot that uses the estimate, over MAVLink.
+/// An autopilot that receives the estimate over MAVLink.
 struct AutopilotGroup {
-  std::string device = "";  ///< serial port or udp:HOST:PORT, also imu_link's; empty: none
+  std::string device = "";  ///< serial port or udp:HOST:PORT, may equal imu_link.device; empty: none
   int baud = 921600;
   int system = 1;
   double rate_hz = 40;
   std::string message = "odometry";
   bool obstacles = true;
-  double roll_deg = 0;  ///< of the IMU in the vehicle
+  double roll_deg = 0;  ///< rotation of the IMU in the vehicle
   double pitch_deg = 0;
   double yaw_deg = 0;
-  double arm_x = 0;  ///< m; from the IMU to the vehicle's reference point, in the IMU's axes
+  double arm_x = 0;  ///< m, from the IMU to the vehicle's reference point, in the IMU's axes
   double arm_y = 0;
   double arm_z = 0;
 };
 
-/// Other processes, over DDS.
+/// Topics for other processes, over DDS.
 struct Ros2Group {
   bool enabled = false;
   int domain = 0;
   std::string interface = "lo";  ///< network interface; lo: this computer alone
-  std::string driver = "none";   ///< driver whose topics are cameras and IMU
+  std::string driver = "none";   ///< driver whose topics are used for cameras and IMU
   double odometry_hz = 50;
   double mesh_hz = 5;
   std::string label_topic = "";  ///< label images for the map; empty: none
-  double label_patience = 0.5;   ///< s, for which the map waits for them
+  double label_patience = 0.5;   ///< s, longest wait of the map for labels
 };
 
 /// The far ends of the devices above, for `hil`.

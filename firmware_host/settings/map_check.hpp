@@ -1,6 +1,6 @@
 #pragma once
-// Checks settings of the map that a range for each cannot, and the cameras that it takes depth from; every
-// command with a map calls it first.
+// Checks map settings that a range per setting cannot express, and the cameras that give depth. Every command
+// with a map calls it first.
 
 #include <fmt/format.h>
 
@@ -11,13 +11,14 @@
 
 namespace swiftlet {
 
-/// InputError if the moving labels are no list, or if the voxels are too small for the range.
+/// InputError if moving_labels is not a list of labels, or if the voxels are too small for the range.
 inline void checkMapSettings(const MapSettings& settings) {
   if (!labelMask(settings.moving_labels)) {
     throw InputError("map.moving_labels", 0, "", "\"" + settings.moving_labels + "\" is not a list of labels",
                      "Write numbers from 1 to 31 separated by commas, for example 10,12");
   }
-  // Each image marks the blocks of a cube as wide as twice the range: 16 MiB with so many voxels each way.
+  // Each image marks the blocks of a cube whose edge is twice the range: 16 MiB at this many voxels per
+  // range.
   constexpr double kMostVoxels = 2000;
   if (settings.most_range / settings.voxel_size <= kMostVoxels) return;
   throw InputError("map.most_range", 0, "",
@@ -27,7 +28,7 @@ inline void checkMapSettings(const MapSettings& settings) {
                                kMostVoxels * settings.voxel_size));
 }
 
-/// What the user must know of the depth of this pair; empty: nothing. Without a depth sensor only.
+/// Warning for a pair that measures no near depth; empty: there is none. For runs without a depth sensor.
 inline std::string nearDepthWarning(const Rig& rig) {
   const DepthStage stage(rig);
   if (!stage.status().ok() || stage.nearestDepth() <= DepthSettings{}.wanted_nearest) return {};

@@ -17,7 +17,7 @@ namespace {
 
 constexpr const char* kListThem = "`swiftlet settings` prints all keys and their ranges";
 
-/// Where a value came from.
+/// Origin of a value.
 struct Place {
   std::string file;
   int line = 0;
@@ -66,7 +66,7 @@ void assign(const Place& place, const Setting& setting, const YAML::Node& node, 
     return;
   }
   const auto bounded = [&](const auto& kind, auto value) {
-    // NaN fails both comparisons and must not pass.
+    // NaN fails both comparisons and is refused.
     if (!(value >= kind.low && value <= kind.high)) {
       failAt(place, setting.key, fmt::format("{} is outside the allowed range", value),
              "Allowed: " + rangeText(setting));
@@ -100,7 +100,7 @@ void readGroup(const std::string& file, const YAML::Node& node, const std::strin
     if (entry.second.IsMap()) {
       readGroup(file, entry.second, key + ".", settings);
     } else if (entry.second.IsNull() && findSetting(key) == nullptr) {
-      continue;  // a group with all of its lines commented out
+      continue;  // a group whose lines are all commented out
     } else {
       assign(place, settingAt(place, key), entry.second, settings);
     }

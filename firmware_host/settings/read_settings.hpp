@@ -1,8 +1,8 @@
 #pragma once
-// Settings from YAML files and `key=value` overrides, and back to YAML.
+// Reads settings from YAML files and `key=value` overrides, and prints them as YAML.
 //
-// Every complaint is an InputError that names file, line, key, the allowed range and the remedy.
-// Unknown keys, keys given twice and values outside their bounds are errors, never ignored.
+// Every error is an InputError that names file, line, key, the allowed range and the remedy. Unknown keys,
+// duplicate keys and values out of range are errors, never ignored.
 
 #include <string>
 #include <string_view>
@@ -11,10 +11,10 @@
 
 namespace swiftlet {
 
-/// Applies a YAML file on top of `settings` (unchanged when it throws).
+/// Applies a YAML file to `settings`, which stay unchanged if it throws.
 void readSettingsFile(const std::string& path, Settings& settings);
 
-/// The same from text; `name` names the file in messages.
+/// Applies YAML text like a file; `name`: the file's name in messages.
 void readSettingsText(const std::string& name, std::string_view text, Settings& settings);
 
 /// Applies one `group.name=value`.

@@ -13,11 +13,11 @@
 namespace swiftlet {
 namespace {
 
-/// SCHED_FIFO ends at 99, which the kernel's own threads have.
+/// Highest SCHED_FIFO priority for settings; the kernel's own threads have 99.
 constexpr int kHighestPriority = 98;
-/// glibc's fixed CPU sets end there.
+/// Highest CPU in glibc's fixed CPU sets.
 constexpr int kHighestCpu = 1023;
-/// A budget in milliseconds: longer than this is no flight estimator.
+/// Budgets in milliseconds; a longer one makes no sense for a flight estimator.
 constexpr double kLongestBudget = 10'000;
 constexpr double kShortestBudget = 0.001;
 
@@ -315,7 +315,7 @@ std::size_t editDistance(std::string_view a, std::string_view b) {
   return row[b.size()];
 }
 
-/// In YAML's single quotes, within which a quote is doubled and nothing else is special.
+/// The text in YAML's single quotes: quotes inside are doubled, nothing else is special.
 std::string inQuotes(const std::string& text) {
   std::string out = "'";
   for (const char c : text) out += c == '\'' ? "''" : std::string(1, c);
@@ -339,10 +339,10 @@ const Setting* findSetting(std::string_view key) {
 
 std::string_view nearestSetting(std::string_view key) {
   std::string_view best;
-  // Beyond half the name wrong, a suggestion is noise.
+  // A suggestion that differs in more than half of the characters is not useful.
   std::size_t best_distance = key.size() / 2 + 1;
   for (const Setting& setting : settingsRegistry()) {
-    // The right name in the wrong group is nearer than any misspelling.
+    // The right name in the wrong group counts as nearer than any misspelling.
     const std::size_t distance = lastPart(key) == lastPart(setting.key) ? 1 : editDistance(key, setting.key);
     if (distance < best_distance) {
       best = setting.key;
@@ -353,7 +353,7 @@ std::string_view nearestSetting(std::string_view key) {
 }
 
 std::string valueText(const Setting& setting, const Settings& settings) {
-  // The accessors give references that may be written through; nothing is written here.
+  // The accessors return mutable references; nothing is written here.
   Settings copy = settings;
   if (const auto* real_or_word = std::get_if<RealOrWordSetting>(&setting.kind)) {
     if (real_or_word->chosen(copy)) return std::string(real_or_word->word);

@@ -1,5 +1,5 @@
 #pragma once
-// Every setting by name: key, unit, explanation, bounds, and where it lives in the tree.
+// Every setting by name: key, unit, explanation, bounds, and its place in the settings tree.
 
 #include <functional>
 #include <span>
@@ -24,20 +24,20 @@ struct RealSetting {
   double high = 0;
 };
 
-/// A number, or one word in its place that leaves the number at its default.
+/// A number, or a word in its place; the word leaves the number at its default.
 struct RealOrWordSetting : RealSetting {
   std::string_view word;
-  std::function<bool&(Settings&)> chosen;  ///< the word instead of a number
+  std::function<bool&(Settings&)> chosen;  ///< the word was given instead of a number
 };
 
 struct SwitchSetting {
   std::function<bool&(Settings&)> value;
 };
 
-/// Text, a file's name for instance; may be empty.
+/// Text such as a file name; may be empty.
 struct TextSetting {
   std::function<std::string&(Settings&)> value;
-  std::string_view what;  ///< in words
+  std::string_view what;  ///< what the text is, in words
 };
 
 /// One of a few words.
@@ -54,20 +54,20 @@ struct Setting {
       kind;
 };
 
-/// All settings; those of one group stand together.
+/// All settings, grouped.
 std::span<const Setting> settingsRegistry();
 
 /// The setting called `key`, or null.
 const Setting* findSetting(std::string_view key);
 
-/// The key that `key` was most likely meant to be; empty when nothing is near.
+/// The setting that `key` most likely means; empty if none is near.
 std::string_view nearestSetting(std::string_view key);
 
-/// The value as YAML text (the word where that is chosen); numbers in the shortest form that reads back to
-/// the same value, text in quotes.
+/// The value as YAML text (the word if that is chosen): numbers in the shortest form that reads back to the
+/// same value, text in quotes.
 std::string valueText(const Setting& setting, const Settings& settings);
 
-/// What values are allowed, in words: "0.5 to 30 s", "true or false".
+/// The allowed values in words: "0.5 to 30 s", "true or false".
 std::string rangeText(const Setting& setting);
 
 }  // namespace swiftlet

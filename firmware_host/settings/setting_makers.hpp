@@ -1,11 +1,11 @@
 #pragma once
-// One row of the registry from a group and its member.
+// Makes rows of the registry from a group and its member.
 
 #include "firmware_host/settings/registry.hpp"
 
 namespace swiftlet {
 
-/// settings.*group.*member, as one callable.
+/// Accessor for settings.*group.*member.
 template <typename Group, typename Value>
 auto member(Group Settings::*group, Value Group::*value) {
   return [group, value](Settings& settings) -> Value& { return settings.*group.*value; };
@@ -26,7 +26,7 @@ SwitchSetting onOff(Group Settings::*group, bool Group::*value) {
   return {member(group, value)};
 }
 
-/// What devices are connected and how: registry_devices.cpp.
+/// Settings of the connected devices: registry_devices.cpp.
 std::vector<Setting> deviceSettings();
 
 }  // namespace swiftlet

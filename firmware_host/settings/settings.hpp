@@ -1,8 +1,8 @@
 #pragma once
-// The settings tree of the program: one typed value with the defaults.
+// The settings tree of the program with its defaults.
 //
-// registry.cpp declares each setting once more with key, unit, bounds and description; the reader, the
-// printer and the checks use only that table.
+// registry.cpp lists every setting with key, unit, bounds and description; reader, printer and checks use
+// only that table.
 
 #include <string>
 
@@ -37,7 +37,7 @@ struct EvaluationGroup {
   double rpe_delta_s = 1.0;
 };
 
-/// Of `fly`, where no --out is given.
+/// For `fly` without --out.
 struct FlightsGroup {
   std::string folder = "flights";
   int keep_free_mib = 0;  ///< 0: nothing is ever deleted
@@ -51,8 +51,8 @@ struct MeshGroup {
 struct LoopGroup {
   bool enabled = false;
   std::string vocabulary = "";  ///< file; empty: the shipped one
-  std::string in_map = "";      ///< folder of a kept map to be located in; empty: none
-  bool extend_map = false;      ///< add keyframes to it
+  std::string in_map = "";      ///< folder of a kept map in which the run is located; empty: none
+  bool extend_map = false;      ///< add keyframes to the kept map
 };
 
 struct MapGroup {
@@ -61,8 +61,8 @@ struct MapGroup {
   std::string confusion = "";  ///< file; empty: map.label_certainty
 };
 
-/// Priorities are of SCHED_FIFO, 1 to 98; 0 is SCHED_OTHER. All of them below 50, where kernels with
-/// PREEMPT_RT run their interrupt handlers, without which no sample arrives.
+/// SCHED_FIFO priorities, 1 to 98; 0: SCHED_OTHER. All are below 50, the priority at which PREEMPT_RT kernels
+/// run interrupt handlers, without which no sample arrives.
 struct RealtimeGroup {
   bool enabled = true;
   bool lock_memory = true;
@@ -127,8 +127,8 @@ struct Settings {
   MapSettings map_stage;
   RealtimeGroup realtime;
   BudgetsGroup budgets;
-  bool full_smoothing = true;  ///< smoother.horizon is `full`
-  int full_memory_mib = 2048;  ///< of full smoothing
+  bool full_smoothing = true;  ///< true if smoother.horizon is `full`
+  int full_memory_mib = 2048;  ///< memory limit of full smoothing
 };
 
 }  // namespace swiftlet

@@ -23,7 +23,7 @@ bool stopped(const FullSmoothingOptions& options) {
   return options.stop != nullptr && options.stop->load(std::memory_order_relaxed);
 }
 
-/// Takes everything in, the last estimate of the calibration last; stops early where that is asked for.
+/// Adds all records to the smoother, the last calibration estimate at the end. Returns early when stopped.
 void fill(KeyframeReader& reader, const FullSmoothingOptions& options, FullSmoother& smoother,
           FullSmoothing& result) {
   std::optional<CalibrationEstimate> calibration;

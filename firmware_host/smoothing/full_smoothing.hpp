@@ -1,8 +1,9 @@
 #pragma once
-// Full smoothing of a run from its keyframes.swk: what `replay` does at its end and `swiftlet smooth` later.
+// Full smoothing of a run from its keyframes.swk, at the end of `replay` or later by `swiftlet smooth`.
 //
-// Off the flight path: allocates without bound of time, memory below FullSmoothingOptions::most_bytes, which
-// is known before the solve begins. InputError for a file that cannot be read.
+// Off the flight path: allocates and takes unbounded time. Memory is limited by
+// FullSmoothingOptions::most_bytes; the need is known before the solve begins. InputError for a file that
+// cannot be read.
 
 #include <atomic>
 #include <cstdint>
@@ -22,19 +23,19 @@ struct MapPose {
 };
 
 struct FullSmoothingOptions {
-  std::size_t most_bytes = 0;               ///< of memory; a run that needs more is refused
-  const std::atomic<bool>* stop = nullptr;  ///< set: end at once, without a result
-  /// Told what the solve will take before it begins: keyframes and bytes.
+  std::size_t most_bytes = 0;               ///< memory limit; a run that needs more is refused
+  const std::atomic<bool>* stop = nullptr;  ///< set: end at once without a result
+  /// Called before the solve begins, with the number of keyframes and the memory needed in bytes.
   std::function<void(std::size_t, std::size_t)> begins;
 };
 
 struct FullSmoothing {
   std::vector<MapPose> poses;  ///< of the keyframes; empty: see `problem`
-  FullSmootherReport report;   ///< where there are poses
+  FullSmootherReport report;   ///< only if there are poses
   Spent spent;
-  FaultCounts faults;   ///< keyframes and loops that were refused
-  std::string cut;      ///< where the file ended too early, in words; empty: in order
-  std::string problem;  ///< why there are no poses, with the remedy; empty: there are
+  FaultCounts faults;   ///< refused keyframes and loops
+  std::string cut;      ///< where the file was cut off, as text; empty: it was complete
+  std::string problem;  ///< why there are no poses, with the remedy; empty: there are some
 };
 
 FullSmoothing smoothKeyframes(const std::string& path, const FullSmoothingOptions& options);

@@ -18,8 +18,8 @@ namespace {
 using namespace keyframe_file;  // NOLINT(google-build-using-namespace)
 
 constexpr const char* kRemedy = "Give the folder of a run with smoother.horizon: full";
-constexpr double kLargestSigma = 1000;   // px; the setting allows 10, a flight raises it 15 times
-constexpr double kLargestFactor = 1000;  // a flight shows 30
+constexpr double kLargestSigma = 1000;   // px; the setting allows 10, and a flight raises it up to 15 times
+constexpr double kLargestFactor = 1000;  // flights reach 30
 constexpr double kLargestGyroMatrix = 1;
 /// Calibrations with a shift above 1 s are refused.
 constexpr Duration kMostShift = Duration::fromSeconds(10);
@@ -35,7 +35,7 @@ Eigen::Vector3d getVector(LittleEndianReader& from) {
 }
 
 bool getPose(LittleEndianReader& from, SE3& pose) {
-  // Past SE3's constructor, which would normalize and so change bits.
+  // Bypasses SE3's constructor, which would normalize and change bits.
   for (int i = 0; i < 4; ++i) pose.rotation.coeffs()[i] = from.f64();
   pose.translation = getVector(from);
   constexpr double kUnit = 1e-6;

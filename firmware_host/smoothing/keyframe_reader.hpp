@@ -1,9 +1,8 @@
 #pragma once
 // Reads keyframes.swk back (map_keeper.hpp writes it, docs/formats.md has the layout).
 //
-// Host side, of one thread. Memory: one record. A file that was cut off, or is damaged behind its head, ends
-// at its last sound record and cut() says where. InputError for what is no such file, one of another version
-// and a damaged head.
+// Host side, one thread. Memory: one record. A file that is cut off or damaged after its head ends at its
+// last intact record; cut() says where. InputError for other files, other versions and a damaged head.
 
 #include <cstdint>
 #include <istream>
@@ -24,24 +23,24 @@ namespace swiftlet {
 
 class KeyframeReader {
  public:
-  /// Reads the head. `name` is for messages; `in` outlives this.
+  /// Reads the head. `name` is used in messages; `in` outlives this object.
   KeyframeReader(std::string name, std::istream& in);
 
   [[nodiscard]] const Rig& rig() const { return rig_; }           ///< the cameras in use
-  [[nodiscard]] const ImuNoise& noise() const { return noise_; }  ///< as in flight, before what it showed
+  [[nodiscard]] const ImuNoise& noise() const { return noise_; }  ///< before the flight's estimates
 
   enum class Next { kSample, kKeyframe, kRevisit, kCalibration, kEnd };
-  /// What the next record is; it is then in the accessor of that name until the next call.
+  /// Reads the next record and returns its kind; the accessor of that kind holds it until the next call.
   Next next();
   [[nodiscard]] const ImuSample& sample() const { return sample_; }
   [[nodiscard]] const TrackedFrame& frame() const { return frame_; }
-  [[nodiscard]] const NavState& state() const { return state_; }          ///< of frame()
-  [[nodiscard]] const NoiseInUse& noiseInUse() const { return in_use_; }  ///< likewise
+  [[nodiscard]] const NavState& state() const { return state_; }          ///< at frame()
+  [[nodiscard]] const NoiseInUse& noiseInUse() const { return in_use_; }  ///< at frame()
   [[nodiscard]] const LoopRevisit& revisit() const { return revisit_; }
-  /// The estimate that was in use from the next keyframe on.
+  /// The estimate that is in use from the next keyframe on.
   [[nodiscard]] const CalibrationEstimate& calibration() const { return calibration_; }
 
-  /// After kEnd: in words, where the file was cut off or is damaged; empty: it ends in order.
+  /// After kEnd: where the file was cut off or damaged, as text; empty: it is complete.
   [[nodiscard]] const std::string& cut() const { return cut_; }
 
  private:
@@ -56,7 +55,7 @@ class KeyframeReader {
   std::istream& in_;
   std::vector<std::uint8_t> bytes_;
   std::size_t payload_ = 0;
-  std::uint64_t at_ = 0;  ///< byte of the file behind the last sound record
+  std::uint64_t at_ = 0;  ///< end of the last intact record, in bytes from the file's beginning
   std::uint32_t head_crc_ = 0;
   Rig rig_;
   ImuNoise noise_;

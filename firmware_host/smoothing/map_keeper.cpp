@@ -32,7 +32,7 @@ void put(LittleEndianWriter& to, TrackId id, const std::array<bool, kMaxCameras>
   for (const bool by : seen) to.u8(by ? 1 : 0);
   to.u16(0);
   for (std::size_t c = 0; c < kMaxCameras; ++c) {
-    // What was not seen has no pixel: the same run is to give the same bytes.
+    // Pixels of unseen features are written as 0, so that equal runs give equal bytes.
     for (int i = 0; i < 2; ++i) to.u32(seen[c] ? std::bit_cast<std::uint32_t>(pixel[c][i]) : 0U);
   }
 }
@@ -98,7 +98,7 @@ void MapKeeper::writeRecord(Kind kind, std::size_t payload) {
 void MapKeeper::restart() {
   monitor_.restart();
   if (!file_) return;
-  // The first writes out what the buffer holds.
+  // fseek also writes out the buffer.
   check(std::fseek(file_.get(), head_bytes_, SEEK_SET) == 0 &&
         ::ftruncate(::fileno(file_.get()), head_bytes_) == 0);
 }

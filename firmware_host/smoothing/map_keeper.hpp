@@ -1,11 +1,12 @@
 #pragma once
-// Keeps keyframes and IMU of a run for full smoothing after it, in `keyframes.swk` of the run folder
-// (docs/formats.md): a flight's memory does not grow with its length, and `swiftlet smooth` can do it later.
+// Writes keyframes and IMU samples of a run to `keyframes.swk` in the run folder (docs/formats.md), for full
+// smoothing after the run. So a flight's memory does not grow with its length, and `swiftlet smooth` can run
+// later.
 //
-// Each keyframe is handed to the system as it comes, so a program that is killed loses none but the newest.
-// Memory: a fixed buffer of kBufferBytes. Disk: some 10 kB a keyframe at 300 features and 200 Hz.
-// Errors: InputError when the file cannot be made; a write that fails ends the keeping, told to `lost`, and
-// the file holds what was kept before.
+// Each keyframe is handed to the operating system as it comes, so a killed program loses at most the newest.
+// Memory: a fixed buffer of kBufferBytes. Disk: some 10 kB per keyframe at 300 features and 200 Hz. Errors:
+// InputError if the file cannot be created. A failed write ends the file and is reported to `lost`; the file
+// keeps what was written before.
 
 #include <cstdint>
 #include <cstdio>
@@ -31,20 +32,22 @@ inline constexpr const char* kKeyframeFile = "keyframes.swk";
 
 class MapKeeper {
  public:
-  /// The file is made in `folder`; an older one there is replaced. `lost` outlives this.
+  /// Creates the file in `folder`, replacing an older one. `lost` outlives this object.
   MapKeeper(const std::string& folder, const Rig& rig, const ImuNoise& noise,
             const OdometrySettings& settings, LostFiles& lost);
 
-  /// Every sample, in order; those that the odometry refuses are left out here too.
+  /// Every sample, in order. Samples that the odometry refuses are omitted here too.
   void addImu(const ImuSample& sample);
-  /// The stamps went backwards permanently: kept keyframes are discarded, and the map covers what follows.
+  /// The stamps went backwards permanently: discards the kept keyframes; the map then covers only what
+  /// follows.
   void restart();
   void addKeyframe(const TrackedFrame& frame, const NavState& state, const NoiseInUse& noise);
-  /// Before the keyframe that it was estimated with; without effect unless the settings ask for an estimate.
+  /// Call before the keyframe that it was estimated with. Does nothing unless the settings request an
+  /// estimate.
   void addCalibration(const CalibrationEstimate& calibration);
   /// After the run: a loop between two of the keyframes.
   void addRevisit(const LoopRevisit& revisit);
-  /// Marks the end and brings the file to the disk. Whatever comes later is left out.
+  /// Marks the end and writes the file to the disk. Whatever comes later is ignored.
   void finish();
 
  private:
@@ -65,7 +68,7 @@ class MapKeeper {
   std::vector<std::uint8_t> record_;
   std::unique_ptr<std::FILE, Close> file_;  ///< null: failed or finished
   std::uint32_t head_crc_ = 0;
-  long head_bytes_ = 0;  // NOLINT(google-runtime-int): as fseek takes it
+  long head_bytes_ = 0;  // type of fseek's offset
 };
 
 }  // namespace swiftlet
