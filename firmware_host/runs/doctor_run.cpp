@@ -44,7 +44,7 @@ void addInspection(const InspectionReport& inspection, MachineReport& report) {
   }
 }
 
-/// Watches the opened devices and says what they did.
+/// Watches the opened devices and reports what they did.
 class VehicleCheck {
  public:
   VehicleCheck(const Settings& settings, const Calibration& calibration, LiveInput& input, double seconds)
@@ -120,7 +120,7 @@ class VehicleCheck {
         "{}, skew {:.1f} ppm, delay above the minimum: median {:.2f} ms, 99 % below {:.2f} ms, steps {}",
         lockName(status.clock.lock), status.clock.skew_ppm, status.clock.residual_p50.seconds() * kToMs,
         status.clock.residual_p99.seconds() * kToMs, status.clock.resets);
-    // drivers/timesync/clock_map.cpp: four seconds, and what opening and the first sample take.
+    // drivers/timesync/clock_map.cpp needs four seconds; the rest is for opening and the first sample.
     constexpr double kLockTime = 6;  // s
     if (status.clock.resets == 0 && status.clock.lock == LockState::kLocking && seconds_ < kLockTime) {
       report.lines.push_back(
@@ -191,7 +191,7 @@ class VehicleCheck {
     if (distances.empty()) return;
     const double median = distances[distances.size() / 2].seconds() * kToMs;
     const double largest = distances.back().seconds() * kToMs;
-    // Half a pixel at 400 px of focal length and 6 rad/s; docs/timesync.md.
+    // 0.2 ms is half a pixel at a focal length of 400 px and 6 rad/s; docs/timesync.md.
     constexpr double kGood = 0.2;  // ms
     report.lines.push_back(
         line("stereo pairs", fmt::format("{:.3f} ms apart, at most {:.3f} ms", median, largest),
@@ -271,7 +271,7 @@ MachineReport examineLog(const LogRequest& request, const Settings& settings) {
 DoctorReport examine(const DoctorRequest& request, const Settings& settings) {
   DoctorReport report;
   report.computer = inspectMachine("", settings.realtime.sensor_priority);
-  // Cameras that the settings name are watched at work below.
+  // Cameras named in the settings are observed in operation below.
   report.connected = connectedDevices("", !namesDevices(settings));
   if (inputTopics(settings).any()) addTopics(settings, report.connected);
   if (namesDevices(settings)) {

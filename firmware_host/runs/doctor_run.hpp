@@ -13,7 +13,7 @@
 namespace swiftlet {
 
 struct DoctorRequest {
-  double seconds = 5;  ///< that the vehicle's devices are watched
+  double seconds = 5;  ///< how long the vehicle's devices are observed
   const std::atomic<bool>* stop = nullptr;
 };
 
@@ -21,17 +21,17 @@ struct DoctorReport {
   MachineReport computer;
   MachineReport connected;
   MachineReport vehicle;          ///< empty if the settings name no device
-  std::vector<std::string> next;  ///< what to do, in order; empty: fly
+  std::vector<std::string> next;  ///< what to do next, in order; empty: ready to fly
 
-  /// Neither a device of the vehicle nor one that is missing for it is poor. The computer's own poor lines
-  /// cost latency and do not count.
+  /// Whether no device of the vehicle is poor or missing. Poor lines of the computer cost latency but do not
+  /// count.
   [[nodiscard]] bool ready() const;
 };
 
 DoctorReport examine(const DoctorRequest& request, const Settings& settings);
 
-/// Inspects a minute of motion of a recorded log: mistakes in units, axes, clocks and calibration as poor
-/// lines, and the measured values. InputError if the log cannot be read.
+/// Inspects a minute of motion in a recorded log. Returns mistakes in units, axes, clocks and calibration as
+/// poor lines, and the measured values. InputError if the log cannot be read.
 MachineReport examineLog(const LogRequest& request, const Settings& settings);
 
 }  // namespace swiftlet

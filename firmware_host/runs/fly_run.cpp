@@ -23,7 +23,7 @@ namespace {
 constexpr const char* kHungUp =
     "terminal closed (SIGHUP): the flight continues; stop it with SIGINT or SIGTERM (`pkill -INT swiftlet`)";
 
-/// The run folder; empty where there is none to be had.
+/// Claims the run folder; empty if none can be claimed.
 std::string claimFolder(const FlyRequest& request, const Settings& settings, std::optional<RunClaim>& claim,
                         LostFiles& lost) {
   try {
@@ -44,7 +44,7 @@ std::string claimFolder(const FlyRequest& request, const Settings& settings, std
   }
 }
 
-/// What a flight is made of. Threads refer to all of it.
+/// The parts of a flight. Threads refer to all of them.
 class FlightRun {
  public:
   FlightRun(const FlyRequest& request, Settings settings)
@@ -83,7 +83,7 @@ class FlightRun {
     wanted.confusion = confusionOf(settings_);
     wanted.sample_patience = input_.samplePatience();
     wanted.remarks = [this](RunObserver& observer) { return remark(observer); };
-    // The schedule asks ten times a second.
+    // The schedule calls this ten times a second.
     const double begin = wallSeconds();
     const double cpu = processCpuSeconds();
     RunControl control;
@@ -106,13 +106,13 @@ class FlightRun {
                                         control, facts_.executor);
     result_.faultless = flown.faultless;
     result_.left_behind = flown.left_behind;
-    // A flight has no end of its own: to be told is its end.
+    // A flight ends only by request, so a requested end counts as finished.
     facts_.finished = flown.faultless;
     facts_.wall = wallSeconds() - begin;
     facts_.cpu = processCpuSeconds() - cpu;
   }
 
-  /// What the input and the terminal have to say, on the thread `log`.
+  /// Remarks of the input and of the terminal, on the thread `log`.
   bool remark(RunObserver& observer) {
     const auto tell = [&observer](Stamp stamp, const std::string& line) {
       observer.remark(stamp, line);
@@ -171,11 +171,11 @@ FlyResult runFlight(const FlyRequest& request, Settings settings) {
   request.kept_maps.apply(settings);
   if (request.map) settings.map.enabled = true;
   checkMapSettings(settings.map_stage);
-  // A mistake that the user can correct, unlike a broken disk.
+  // The user can correct this mistake, unlike a broken disk.
   if (!request.out.empty() && !request.replace) refuseRunIn(request.out);
   auto run = std::make_unique<FlightRun>(request, std::move(settings));
   FlyResult result = (*run)();
-  // Leaked on purpose: a thread that is stuck may go on at any time.
+  // Leaked on purpose: a stuck thread may continue at any time.
   if (result.left_behind) static_cast<void>(run.release());
   return result;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// A live run as a function: vehicle settings in, run folder and summary out. What `swiftlet fly` calls.
+// A live run as a function: vehicle settings in, run folder and summary out. Called by `swiftlet fly`.
 
 #include <atomic>
 #include <functional>
@@ -22,12 +22,12 @@ struct FlyRequest {
   KeptMapRequest kept_maps;
   bool map = false;                 ///< sets map.enabled
   bool record = false;              ///< write `recording/` into the run folder
-  std::optional<ViewAddress> view;  ///< serve the live view there
+  std::optional<ViewAddress> view;  ///< serve the live view at this address
   double seconds = 0;               ///< stop after this long; 0: only on request
   const std::atomic<bool>* stop = nullptr;
-  std::atomic<bool>* hung_up = nullptr;  ///< set: the terminal has closed; noted as an event, and cleared
-  /// After the flight, before full smoothing (flights.smooth): returns the flag that stops smoothing, since
-  /// `stop` ended the flight.
+  std::atomic<bool>* hung_up = nullptr;  ///< set when the terminal has closed: noted as an event and cleared
+  /// Called after the flight, before full smoothing (flights.smooth). Returns the flag that stops smoothing,
+  /// because `stop` has already ended the flight.
   std::function<const std::atomic<bool>*()> renew_stop;
   bool show_progress = false;
 };
@@ -35,11 +35,11 @@ struct FlyRequest {
 struct FlyResult {
   nlohmann::ordered_json summary;  ///< as written to summary.json
   std::string out;                 ///< the run folder; empty: it could not be created
-  std::string lost;                ///< the first file that could not be written; empty: all were
+  std::string lost;                ///< the first file that could not be written; empty: none
   bool faultless = true;           ///< false: a thread ended early; see the summary
   bool left_behind = false;        ///< a thread was stuck at the end; its memory is kept
   bool has_pose = false;
-  std::vector<std::string> missing;  ///< devices that did not open, as text; no flight took place then
+  std::vector<std::string> missing;  ///< devices that did not open, as text; then no flight took place
 };
 
 /// InputError for bad settings or calibration, and if `out` holds a run. A disk error neither ends nor

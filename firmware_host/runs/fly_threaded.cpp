@@ -16,7 +16,7 @@
 namespace swiftlet {
 namespace {
 
-/// What the low-priority threads work with: text of the log, the libraries' own.
+/// Heap for the low-priority threads: text of the log and memory of libraries.
 constexpr std::size_t kHeapReserve = std::size_t{2} * 1024 * 1024;
 
 Effort fullEffort(const Settings& settings) {
@@ -39,7 +39,7 @@ GovernorSettings smoothGovernor(const BudgetsGroup& budgets) {
   return governor;
 }
 
-/// Governed where the budgets say so; the thread that gives effort owns its governor.
+/// Governors of the stages whose effort the budgets govern; each is used by its stage's thread.
 struct Governors {
   explicit Governors(const Settings& settings)
       : track(trackerLadder(fullEffort(settings)), trackGovernor(settings.budgets)),
@@ -48,7 +48,7 @@ struct Governors {
   GovernedEffort smooth;
 };
 
-/// What the supervisor is told before the first message.
+/// Constant facts for the supervisor, before the first message.
 FlightGround groundOf(const std::vector<ThreadReport>& threads, const Calibration& calibration,
                       const Settings& settings, const FlightRequest& request) {
   FlightGround ground;
@@ -74,7 +74,7 @@ FlightGround groundOf(const std::vector<ThreadReport>& threads, const Calibratio
   return ground;
 }
 
-/// Of the supervisor: below `track`, above `mesh`, so that work of low priority cannot silence it.
+/// The supervisor's thread: below `track`, above `mesh`, so that low-priority work cannot silence it.
 ThreadSettings supervisorThread(const RealtimeGroup& realtime) {
   ThreadSettings thread;
   thread.name = "supervisor";
@@ -90,7 +90,7 @@ FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const 
   const std::string confined = confineMalloc();
   const LibraryReport libraries = confineLibraries();
   const MachineReport machine = inspectMachine("", settings.realtime.sensor_priority);
-  // What threads refer to: leaked where one of them is stuck at the end.
+  // What threads refer to; leaked if one of them is stuck at the end.
   struct Flight {
     explicit Flight(const Settings& s) : governors(s) {}
     Governors governors;
@@ -98,7 +98,7 @@ FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const 
     std::unique_ptr<Graph> graph;
     Supervisor supervisor;
   };
-  SystemdNotify systemd;  // the supervisor's end uses it
+  SystemdNotify systemd;  // used when the supervisor ends
   auto flight = std::make_unique<Flight>(settings);
   Supervisor& supervisor = flight->supervisor;
   wanted.track_effort = &flight->governors.track;
@@ -143,7 +143,7 @@ FlightEnd flyThreaded(const Calibration& calibration, SensorInput& input, const 
     static_cast<void>(supervisor.add(name, heart));
   };
   options.expect_end = [&] { supervisor.expectEnd(); };
-  std::string unsupervised;  // why; empty: there is a supervisor
+  std::string unsupervised;  // why there is no supervisor; empty: there is one
   options.failed = [&] { return !unsupervised.empty() || supervisor.runFailed(); };
   options.started = [&](const std::vector<ThreadReport>& threads) {
     FlightGround ground = groundOf(threads, calibration, settings, request);

@@ -1,6 +1,6 @@
 #pragma once
-// A threaded run with its environment: memory reserved, reported and locked, libraries confined, the machine
-// report, effort governed by the budgets, the consumers of the run, and the supervisor.
+// A threaded run with its environment: memory is reserved, reported and locked, libraries are confined, the
+// machine is inspected, budgets govern the effort, and consumers and supervisor run.
 
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -16,27 +16,27 @@
 namespace swiftlet {
 
 struct FlightRequest {
-  double speed = 1;          ///< of the log's clock against the host's
-  bool host_stamps = false;  ///< of CLOCK_MONOTONIC, not of a log
-  /// From a log's stamps to CLOCK_MONOTONIC; gives none while that is not known. Any thread.
+  double speed = 1;          ///< speed of the log's clock relative to the host's
+  bool host_stamps = false;  ///< stamps are of CLOCK_MONOTONIC, not of a log
+  /// Any thread: offset from the log's stamps to CLOCK_MONOTONIC; empty while unknown.
   std::function<std::optional<Duration>()> to_host;
   bool announce = false;  ///< print the table of reserved and missing resources
-  bool trigger = false;   ///< a separate line reports edges (SensorInput::look)
+  bool trigger = false;   ///< trigger edges are reported separately (SensorInput::look)
   bool record = false;    ///< the flight is to be recorded
-  bool service = false;   ///< notify systemd if it requests it
+  bool service = false;   ///< notify systemd if it has requested it
   std::string name;       ///< name of the flight for viewers
-  /// Outbox of the IMU's link if the autopilot shares it; null: the autopilot has its own port. It outlives
-  /// the run.
+  /// Outbox of the IMU's link, if the autopilot shares that link; null: the autopilot has its own port.
+  /// Outlives the run.
   LinkOutbox* autopilot_outbox = nullptr;
-  std::optional<ViewAddress> view;  ///< serve the live view there
-  /// What is wrong with the run's files; null: nothing. Any thread.
+  std::optional<ViewAddress> view;  ///< serve the live view at this address
+  /// Any thread: what is wrong with the run's files; null: nothing.
   std::function<const char*()> file_problem;
   std::function<bool(const char* node)> before_turn;  ///< ThreadedOptions::before_turn
-  std::function<void(const Verdict&)> verdict;        ///< on the supervisor's thread; for tests
+  std::function<void(const Verdict&)> verdict;        ///< called on the supervisor's thread; for tests
 };
 
 struct FlightEnd {
-  bool finished = true;      ///< false: stopped
+  bool finished = true;      ///< false: stopped on request
   bool faultless = true;     ///< no thread ended early
   bool left_behind = false;  ///< a thread is stuck: its memory must stay (ThreadedReport::left_behind)
 };

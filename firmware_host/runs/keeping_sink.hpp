@@ -1,5 +1,5 @@
 #pragma once
-// Keeps what devices deliver in some seconds, to look for mistakes in it afterwards.
+// Keeps what devices deliver for some seconds, to inspect it for mistakes afterwards.
 
 #include <array>
 #include <cstddef>
@@ -14,7 +14,8 @@ namespace swiftlet {
 
 class KeepingSink final : public CountingSink {
  public:
-  /// Of each stream, as many stamps as `most`, and samples. Images: at most kMostBytes a camera.
+  /// Keeps at most `most` stamps of each stream and `most` samples, and at most kMostBytes of images per
+  /// camera.
   explicit KeepingSink(std::size_t most);
 
   void takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host) override;
@@ -26,7 +27,7 @@ class KeepingSink final : public CountingSink {
  private:
   static constexpr std::size_t kMostBytes = 128U << 20U;  // 18 s of 752 x 480 at 20 Hz
   struct Kept {
-    CameraFrame frame;  ///< its image's memory is in `pixels`
+    CameraFrame frame;  ///< its image points into `pixels`
     std::vector<std::uint8_t> pixels;
   };
 

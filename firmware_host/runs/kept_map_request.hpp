@@ -1,5 +1,5 @@
 #pragma once
-// Options of a run for kept maps.
+// Options of a run that concern kept maps.
 
 #include <string>
 
@@ -10,10 +10,10 @@ namespace swiftlet {
 
 struct KeptMapRequest {
   std::string keep;     ///< new folder for this run's places, graph and volume; empty: none; closes loops
-  std::string in;       ///< folder of a kept map to be located in; sets loop.in_map
+  std::string in;       ///< folder of a kept map in which the run is located; sets loop.in_map
   bool extend = false;  ///< continue the map; sets loop.extend_map
 
-  /// InputError if a map is to be kept that is not to be extended.
+  /// InputError if the run is located in a kept map that is not extended, and a map is to be kept.
   void apply(Settings& settings) const {
     if (!in.empty()) settings.loop.in_map = in;
     if (extend) settings.loop.extend_map = true;

@@ -102,7 +102,7 @@ bool LiveConsumers::finish(nlohmann::ordered_json& report, std::vector<std::stri
     report[name] = follower->finish();
     if (!report[name].contains("fault")) continue;
     faults.push_back(std::string(name) + ": " + report[name]["fault"].get<std::string>());
-    if (report[name].size() == 1) sound = false;  // it is stuck: nothing is counted
+    if (report[name].size() == 1) sound = false;  // only the fault: the thread is stuck
   }
   return sound;
 }

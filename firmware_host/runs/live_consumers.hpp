@@ -1,6 +1,6 @@
 #pragma once
-// Consumers that follow a running run, each on its own thread: an autopilot, ROS 2 topics and their labels,
-// the live view. Opened before the graph is built, ended after the executor. Only for real-time executors.
+// Consumers that follow a run, each on its own thread: an autopilot, ROS 2 topics and their labels, the live
+// view. Opened before the graph is built, ended after the executor. Only for real-time executors.
 
 #include <array>
 #include <memory>
@@ -20,12 +20,12 @@ namespace swiftlet {
 
 class LiveConsumers {
  public:
-  /// Opens those that settings and request switch on. InputError naming the option where one does not open.
+  /// Opens the consumers that settings and request enable. InputError naming the option if one does not open.
   LiveConsumers(const Calibration& calibration, const Settings& settings, const FlightRequest& request);
 
-  /// For GraphOptions; they live as long as this.
+  /// For GraphOptions; valid as long as this object.
   [[nodiscard]] const LiveOutlets& outlets() const { return outlets_; }
-  /// Likewise; null if nobody brings labels.
+  /// For GraphOptions, like outlets(); null if no labels are received.
   [[nodiscard]] LabelExchange* labels() const { return labels_.get(); }
   /// Writes the consumers' messages since the last call to the log. True: there were some.
   bool drainRemarks(RunObserver& observer);
@@ -39,8 +39,8 @@ class LiveConsumers {
   void openRos2(const Calibration& calibration, const Settings& settings, const FlightRequest& request);
   LiveOutlet& newOutlet(std::unique_ptr<LiveOutlet>& owner);
   struct Named {
-    const char* name;    ///< in the summary
-    const char* thread;  ///< to the supervisor
+    const char* name;    ///< name in the summary
+    const char* thread;  ///< name for the supervisor
     Follower* follower;  ///< null: there is none
   };
   [[nodiscard]] std::array<Named, 3> followers() const {

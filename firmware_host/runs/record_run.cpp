@@ -20,7 +20,7 @@ std::unique_ptr<RecordSink> makeSink(const RecordRequest& request, const Calibra
   return std::make_unique<FolderSink>(request.out, calibration, settings.cameras.rate_hz);
 }
 
-// What comes goes to the recording, and to who looks at it.
+// Passes everything to the recording and to the watcher.
 class WatchedSink final : public SensorSink {
  public:
   WatchedSink(RecordSink& record, RecordWatcher* watcher) : record_(record), watcher_(watcher) {}

@@ -1,5 +1,5 @@
 #pragma once
-// A recording of the vehicle's devices as a function. What `swiftlet record` calls.
+// A recording of the vehicle's devices as a function. Called by `swiftlet record`.
 
 #include <atomic>
 #include <string>
@@ -12,7 +12,7 @@
 namespace swiftlet {
 
 struct RecordRequest {
-  std::string out;     ///< folder, or file
+  std::string out;     ///< folder or file
   bool mcap = false;   ///< an MCAP file instead of an EuRoC folder
   double seconds = 0;  ///< stop after this long; 0: only on request
   const std::atomic<bool>* stop = nullptr;
@@ -22,10 +22,10 @@ struct RecordRequest {
 struct RecordResult {
   RecordSink::Counters written;
   std::size_t cameras = 0;
-  std::vector<std::string> missing;  ///< devices that did not open, in words; nothing was recorded then
+  std::vector<std::string> missing;  ///< devices that did not open, as text; then nothing was recorded
 };
 
-/// InputError for bad settings or calibration, and where the recording cannot be written.
+/// InputError for bad settings or calibration, and if the recording cannot be written.
 RecordResult runRecord(const RecordRequest& request, const Settings& settings);
 
 }  // namespace swiftlet

@@ -1,5 +1,6 @@
 #pragma once
-// Observes a running recording and may end it: guidance for calibration. It does not change what is recorded.
+// Observes a running recording and may end it: used for guidance during calibration. It does not change what
+// is recorded.
 
 #include "drivers/calibration/calibration.hpp"
 #include "estimator/messages/frames.hpp"
@@ -14,14 +15,15 @@ class RecordWatcher {
   RecordWatcher& operator=(const RecordWatcher&) = delete;
   virtual ~RecordWatcher() = default;
 
-  /// Before the devices begin, of which the calibration tells the images' sizes.
+  /// Called before the devices start; the calibration gives the image sizes.
   virtual void begin(const Calibration& calibration) = 0;
-  /// The devices' threads, one of the IMU and one of each camera: must not wait, lock or allocate.
+  /// Called by the devices' threads, one for the IMU and one for each camera: must not wait, lock or
+  /// allocate.
   virtual void takeImu(const ImuSample& sample) = 0;
   virtual void takeImage(const CameraFrame& image) = 0;
-  /// Twenty times a second, of the thread that waits for the end. False: the recording is to end.
+  /// Called twenty times a second by the thread that waits for the end. False: end the recording.
   [[nodiscard]] virtual bool goOn() = 0;
-  /// Call after the devices' threads have ended.
+  /// Called after the devices' threads have ended.
   virtual void end() = 0;
 };
 

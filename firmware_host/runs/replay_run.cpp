@@ -47,10 +47,10 @@ TrackFileFacts checkTracks(const std::string& path, const LogSource& log, bool m
   return facts;
 }
 
-// Ten seconds of motion at 20 Hz: half a second of CPU.
+// Ten seconds of motion at 20 Hz; costs half a second of CPU time.
 constexpr std::size_t kInspectedImages = 200;
 
-/// What one run is made of, from opening to the summary.
+/// The parts of one run, from opening to the summary.
 class ReplayRun {
  public:
   ReplayRun(const ReplayRequest& request, Settings settings, const ReplayHooks& hooks)
@@ -108,7 +108,7 @@ class ReplayRun {
     tracks_ = std::make_unique<TrackReader>(facts_.tracks);
   }
 
-  /// On a log opened for that alone: what the run reads and delivers stays the same.
+  /// Uses a log opened only for this, so that what the run reads and delivers stays the same.
   void inspect() {
     if (!facts_.tracks.empty()) return;
     for (const Finding& finding : inspectLog(request_, settings_, kInspectedImages).findings) {
@@ -117,7 +117,7 @@ class ReplayRun {
     memory_.note("inspection");
   }
 
-  /// Refuses what cannot be mapped before anything is written.
+  /// Refuses what cannot be mapped, before anything is written.
   void openScenes() {
     if (!settings_.map.enabled || request_.reproduce) return;
     checkMapSettings(settings_.map_stage);
@@ -138,7 +138,7 @@ class ReplayRun {
     if (!line.empty()) findings_.push_back(line);
   }
 
-  /// What an earlier run left in the folder goes, its recording too.
+  /// Claiming a folder deletes an earlier run in it, including its recording.
   void refuseOwnLog() const {
     const std::string recording = findRecordingFolder(request_.log);
     if (recording.empty()) return;
@@ -184,7 +184,7 @@ class ReplayRun {
   }
 
   void fly() {
-    if (request_.record) {  // one thread feeds the estimator
+    if (request_.record) {  // as written, because one thread feeds the estimator
       recorder_ = output_->startRecorder(RecordOrder::kAsWritten, scenes_ ? scenes_->depthSensor() : nullptr);
     }
     GraphOptions wanted = output_->graphOptions();
@@ -197,7 +197,7 @@ class ReplayRun {
       FlightRequest flight;
       flight.speed = request_.speed;
       flight.announce = request_.show_progress;
-      // Of a folder named with a slash at its end, too.
+      // Also for a folder name that ends with a slash.
       const std::filesystem::path log = std::filesystem::path(request_.log).lexically_normal();
       flight.name = (log.has_filename() ? log : log.parent_path()).filename().string();
       flight.view = request_.view;
@@ -251,7 +251,7 @@ class ReplayRun {
     }
     output_->close(facts_);
     if (output_->canSmooth()) {
-      // It takes its time, and the run is worth something without it.
+      // Smoothing takes time; the run is useful without it, so the summary is written first.
       output_->writeSummary(output_->summary(facts_));
       output_->smooth(request_.stop, request_.show_progress);
     }
@@ -264,7 +264,7 @@ class ReplayRun {
     return result;
   }
 
-  /// The run is worth something without it.
+  /// Errors only give a warning: the run is useful without accuracy.
   void addAccuracy(ReplayResult& result) {
     if (!request_.accuracy || !result.has_pose) return;
     try {
@@ -287,7 +287,7 @@ class ReplayRun {
   const ReplayHooks hooks_;
   MemoryTrack memory_;
   std::unique_ptr<LogSource> source_;
-  RecordingSource* recording_ = nullptr;  ///< source_, when it is to be repeated
+  RecordingSource* recording_ = nullptr;  ///< source_, if the run repeats a recording
   std::unique_ptr<TrackReader> tracks_;
   std::optional<SceneReader> scenes_;
   std::size_t scene_warnings_ = 0;
@@ -312,7 +312,7 @@ class ReplayRun {
 ReplayResult runReplay(const ReplayRequest& request, Settings settings, const ReplayHooks& hooks) {
   auto run = std::make_unique<ReplayRun>(request, std::move(settings), hooks);
   ReplayResult result = (*run)();
-  // Leaked on purpose: a thread that is stuck may go on at any time.
+  // Leaked on purpose: a stuck thread may continue at any time.
   if (result.left_behind) static_cast<void>(run.release());
   return result;
 }

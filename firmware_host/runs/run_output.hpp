@@ -1,8 +1,8 @@
 #pragma once
-// The run folder while a run writes it, for any kind of input: log files of the threads, the recorder, and at
-// the end the loops, the summary and the smoothed trajectory of the map.
+// The run folder during a run with any kind of input: log files of the threads, the recorder, and at the end
+// the loops, the summary and the map's smoothed trajectory.
 //
-// With Wanted::fly_on the disk cannot end the run: lost() lists what could not be written, and the run
+// With Wanted::fly_on, disk errors do not end the run: lost() lists what could not be written, and the run
 // continues. Otherwise InputError if a file cannot be created.
 
 #include <atomic>
@@ -26,33 +26,35 @@ class RunOutput {
     bool imu_rate = false;       ///< imu_rate.tum
     bool mesh_sequence = false;  ///< meshes/
     std::string keep_map = "";   ///< folder; empty: no map is kept
-    bool fly_on = false;         ///< without files rather than not
+    bool fly_on = false;         ///< continue without files that cannot be written
   };
 
-  /// `out` is there and the run's own (run_claim.hpp); empty: there is none, and nothing is written.
-  /// Settings, calibration and `lost` outlive this.
+  /// `out` exists and is claimed by the run (run_claim.hpp); empty: there is no folder, and nothing is
+  /// written. Settings, calibration and `lost` outlive this object.
   RunOutput(const std::string& out, const Settings& settings, const Calibration& calibration, Wanted wanted,
             LostFiles& lost);
 
   [[nodiscard]] RunObserver& observer() { return observer_; }
-  /// Of loop closure: null is the shipped one.
+  /// Vocabulary for loop closure; null: the shipped one.
   [[nodiscard]] const Vocabulary* vocabulary();
-  /// What the graph is to know of this folder.
+  /// Graph options that depend on this folder.
   [[nodiscard]] GraphOptions graphOptions();
-  /// Writes `recording/`. `depth_sensor`: of the map; null: none. Null if it cannot (fly_on).
+  /// Writes `recording/`. `depth_sensor`: the map's; null: none. Returns null if it cannot be written
+  /// (fly_on).
   [[nodiscard]] std::unique_ptr<FlightRecorder> startRecorder(
       RecordOrder order, const DepthImageView* depth_sensor = nullptr) const;
 
-  /// After the run: writes loops.csv, estimated_calibration/ if there is an estimate, closes the keyframes,
-  /// and writes map.tum of the pose graph if there is one. Sets the facts' peak memory.
+  /// After the run: writes loops.csv and, if there is one, the estimated calibration to
+  /// estimated_calibration/; closes the keyframe file; writes map.tum from the pose graph if there is one.
+  /// Sets the facts' peak memory.
   void close(RunFacts& facts);
   /// Whether smooth() has something to do.
   [[nodiscard]] bool canSmooth() const { return keeps_keyframes_; }
-  /// After close(), with the summary written before: map.tum of all keyframes smoothed together. `stop` ends
-  /// it without one.
+  /// After close() and after the summary was written: smooths all keyframes together and writes map.tum.
+  /// `stop` ends it without map.tum.
   void smooth(const std::atomic<bool>* stop, bool announce);
 
-  /// The summary of the work so far.
+  /// The summary so far.
   [[nodiscard]] nlohmann::ordered_json summary(const RunFacts& facts);
   void writeSummary(const nlohmann::ordered_json& summary) const;
 
@@ -73,7 +75,7 @@ class RunOutput {
   RunObserver observer_;
 };
 
-/// Growth of memory: what each part made resident.
+/// Resident memory added by each part.
 class MemoryTrack {
  public:
   MemoryTrack() : last_(residentBytes()) { rows_.push_back({"program_at_start", last_}); }
@@ -89,7 +91,7 @@ class MemoryTrack {
   std::int64_t last_;
 };
 
-/// Of the summary.
+/// For the summary.
 nlohmann::ordered_json recordingJson(const FlightRecorder& recorder);
 
 }  // namespace swiftlet

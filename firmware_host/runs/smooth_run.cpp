@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// A run that was killed has no summary; one that is no JSON any more is left alone.
+/// A killed run has no summary. A summary that is not valid JSON is left unchanged.
 void addToSummary(const fs::path& path, const FullSmoothing& found) {
   std::ifstream file(path);
   if (!file) return;

@@ -1,5 +1,5 @@
 #pragma once
-// Full smoothing of a finished run folder: implements `swiftlet smooth`, and shares its steps with the end of
+// Full smoothing of a finished run folder: implements `swiftlet smooth` and shares its steps with the end of
 // a run.
 
 #include <atomic>
@@ -14,7 +14,7 @@ namespace swiftlet {
 /// Options from the settings; `announce`: print the expected memory on stderr first.
 FullSmoothingOptions smoothingOptions(const Settings& settings, bool announce);
 
-/// map.tum. InputError.
+/// Writes map.tum. InputError if it cannot.
 void writeMapPoses(const std::string& path, const std::vector<MapPose>& poses);
 
 struct SmoothRequest {
@@ -23,8 +23,8 @@ struct SmoothRequest {
   bool announce = false;
 };
 
-/// Writes map.tum, then its results into summary.json if there is one. On failure the folder is unchanged and
-/// the result gives the reason. InputError for bad input and if a file cannot be written.
+/// Writes map.tum, then adds the results to summary.json if there is one. On failure the folder is unchanged
+/// and the result gives the reason. InputError for bad input and if a file cannot be written.
 FullSmoothing runSmooth(const SmoothRequest& request, const Settings& settings);
 
 }  // namespace swiftlet

@@ -13,8 +13,8 @@
 namespace swiftlet {
 namespace {
 
-/// Focal length over image width of a lens about which nothing is known, 80 degrees across: bounds motion
-/// blur where exposure control runs.
+/// Focal length over image width assumed for an unknown lens, 80 degrees wide. It limits motion blur in
+/// exposure control.
 constexpr double kUnknownFocal = 0.6;
 
 CameraModel unknownLens(const std::string& resolution) {

@@ -28,7 +28,7 @@ bool runLockstep(LogFeed& feed, Graph& graph, const RunControl& control) {
       sensors.takeScene(feed.scene());
       sensors.takeImage(feed.image(), now());
     } else {
-      // Nobody is ahead of us: there is room.
+      // All earlier frames have been processed, so there is room.
       static_cast<void>(graph.track().takeTracks(feed.tracks(), sensors.timeline()));
     }
     runAll(graph);

@@ -1,6 +1,5 @@
 #pragma once
-// The lockstep schedule: one thread in place of all, as fast as it goes, the same bytes out for the same log
-// in.
+// The lockstep schedule: one thread runs all nodes as fast as possible. The same log gives the same bytes.
 
 #include "firmware_host/graph/graph.hpp"
 #include "firmware_host/inputs/log/log_feed.hpp"
@@ -8,11 +7,11 @@
 
 namespace swiftlet {
 
-/// Hands the feed's messages over one by one and gives every node its turns after each. False when it was
-/// stopped; the run then ends in order with what came so far. InputError of the log's reader passes through.
+/// Hands over the feed's messages one by one and gives every node its turns after each. False: stopped; the
+/// run then ends in order with what has arrived. Rethrows an InputError of the log's reader.
 bool runLockstep(LogFeed& feed, Graph& graph, const RunControl& control);
 
-/// Turns for every node in the order of the stream, until none has anything to do.
+/// Gives turns to every node, in the order of the stream, until none has anything to do.
 void runAll(Graph& graph);
 
 }  // namespace swiftlet

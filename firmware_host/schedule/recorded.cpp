@@ -46,7 +46,7 @@ class Repeat {
   }
 
  private:
-  /// One look at every node; whether any did something.
+  /// One pass over all nodes. Returns whether any did something.
   bool turns() {
     bool any = propagate();
     any = track() || any;
@@ -58,13 +58,13 @@ class Repeat {
     return any;
   }
 
-  /// The recording ends or has a hole: the first reason stands.
+  /// The recording ends or has a gap. Only the first reason is kept.
   bool stop(const std::string& why) {
     if (why_.empty()) why_ = why;
     return false;
   }
 
-  /// The next sample, to all its readers; false when there is none, or no room.
+  /// Feeds the next sample to all its readers. False: there is none, or no room.
   bool feed() {
     if (fed_ >= recording_.imuCount() || !graph_.sensors().imu.hasRoom()) return false;
     if (recording_.imuNumber(fed_) != fed_ + 1) {
@@ -77,7 +77,7 @@ class Repeat {
     if (timeline_starts_.size() < sensors.timeline()) timeline_starts_.push_back(fed_);
     return true;
   }
-  /// Feeds until the reader can take the samples up to this number. False: not yet.
+  /// Feeds samples up to this number and allows the reader to take them. False: not all are available yet.
   bool bring(SampleIn& samples, std::uint64_t number) {
     while (fed_ < number) {
       if (!feed()) return false;
@@ -85,7 +85,7 @@ class Repeat {
     samples.limit(number);
     return true;
   }
-  /// Of a frame whose newest sample has this number.
+  /// Time line of a frame whose newest sample has this number.
   [[nodiscard]] std::uint32_t timelineAt(std::uint64_t number) const {
     const auto after = std::upper_bound(timeline_starts_.begin(), timeline_starts_.end(), number);
     return static_cast<std::uint32_t>(after - timeline_starts_.begin());
@@ -129,7 +129,7 @@ class Repeat {
     const TrackStep& step = steps_.track[track_];
     if (!node.window.expect(step.window)) return false;
     if (!bring(node.samples, step.samples)) {
-      node.turn();  // makes room where too many wait
+      node.turn();  // takes surplus samples to make room
       return false;
     }
     StereoFrame frame;
@@ -231,14 +231,14 @@ class Repeat {
     return number != std::array<std::uint64_t, kMaxCameras>{};
   }
 
-  /// What is left to do once no node takes another step.
+  /// Ends the nodes once none takes another step.
   void end() {
     SmoothNode& smooth = graph_.smooth();
-    while (smooth.tracked.front() != nullptr) smooth.tracked.pop();  // tracked, and not smoothed any more
+    while (smooth.tracked.front() != nullptr) smooth.tracked.pop();  // tracked, never smoothed
     propagate_ = steps_.propagate.size();
     track_ = steps_.track.size();
     while (fed_ < recording_.imuCount()) {
-      if (!feed()) {  // no room: those who take no frames any more take samples ahead
+      if (!feed()) {  // no room: let nodes without further frames take samples
         graph_.track().turn();
         smooth.turn();
         graph_.log().turn();
@@ -253,7 +253,7 @@ class Repeat {
       if (told) static_cast<void>(node->worlds.expect(steps_.map[map_].correction));
       node->end();
     }
-    // The others end by themselves.
+    // The other nodes end by themselves.
     for (bool any = true; any;) {
       any = false;
       for (Node* node : graph_.nodes()) any = (!node->done() && node->turn()) || any;
@@ -264,13 +264,13 @@ class Repeat {
   const RecordedSteps& steps_;
   Graph& graph_;
   RecordedEfforts& efforts_;
-  std::size_t fed_ = 0;  ///< samples
+  std::size_t fed_ = 0;  ///< samples fed
   /// Number of the first sample of each time line after the first.
   std::vector<std::uint64_t> timeline_starts_;
-  // Steps taken.
+  // Number of steps taken.
   std::size_t propagate_ = 0, track_ = 0, smooth_ = 0, mesh_ = 0, loop_ = 0, map_ = 0;
   std::set<std::uint64_t> mapped_;  ///< frames that the map took
-  std::uint64_t spare_turns_ = 0;   ///< of `map`, before its next step
+  std::uint64_t spare_turns_ = 0;   ///< spare turns of `map` before its next step
   ImageSlot mesh_image_;
   KeyframeImages keyframe_;
   SceneSlot scene_;

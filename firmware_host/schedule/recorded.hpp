@@ -15,7 +15,7 @@
 
 namespace swiftlet {
 
-/// What the recording says that a stage spent.
+/// The effort that the recording gives for a stage.
 class RecordedEffort : public EffortSource {
  public:
   void tell(const Effort& effort) { effort_ = effort; }
@@ -32,12 +32,12 @@ struct RecordedEfforts {
 };
 
 struct RepeatReport {
-  bool finished = true;  ///< false: stopped
+  bool finished = true;  ///< false: stopped on request
   std::uint64_t frames = 0;
-  std::string stopped_early;  ///< why the recording could not be followed to its end; empty: it was
+  std::string stopped_early;  ///< why the recording could not be followed to its end; empty: it could
 };
 
-/// The graph is one of the recording's rig, noise and settings, with `efforts` in its options.
+/// The graph is built from the recording's rig, noise and settings, with `efforts` in its options.
 RepeatReport runRecorded(RecordingSource& recording, Graph& graph, RecordedEfforts& efforts,
                          const RunControl& control);
 

@@ -12,7 +12,7 @@
 namespace swiftlet {
 namespace {
 
-/// Nobody sleeps longer without a look.
+/// Longest sleep of a thread before it looks again.
 constexpr Duration kLongestSleep = Duration::fromMilliseconds(5);
 
 struct Place {
@@ -49,7 +49,7 @@ class Run : public SensorSink {
   ThreadedReport operator()() {
     sensors_ = input_.threads(*this, to_sensors_);
     tellMembers();
-    // From the end of the stream to its beginning: whoever starts finds its readers running.
+    // Started from the end of the stream to its beginning, so that each node finds its readers running.
     const std::span<Node* const> nodes = graph_.nodes();
     for (auto last = nodes.rbegin(); last != nodes.rend(); ++last) {
       Node* const node = *last;
@@ -63,7 +63,7 @@ class Run : public SensorSink {
     for (const SensorInput::Thread& sensor : sensors_) sensing_ += sensor.level != Level::kAhead ? 1 : 0;
     for (const SensorInput::Thread& sensor : sensors_) {
       if (sensor.level == Level::kAhead) continue;
-      // One that could not be created has ended.
+      // A thread that could not be created counts as ended.
       const Rank rank = sensor.level == Level::kSensor ? Rank::kSensor : Rank::kLow;
       const Place place = placeOf(rank, options_.realtime);
       if (start(sensor.name, place, [this, &sensor] { sense(sensor); })) continue;
@@ -86,7 +86,7 @@ class Run : public SensorSink {
 
   struct Thread {
     std::unique_ptr<FlightThread> thread;
-    Node* node = nullptr;  ///< null: of a sensor
+    Node* node = nullptr;  ///< null: a sensor's thread
   };
 
   void tellMembers() {
@@ -131,7 +131,7 @@ class Run : public SensorSink {
     }
   }
 
-  // Sink.
+  // SensorSink.
 
   void takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host) override {
     graph_.sensors().takeImu(sample, arrival, host);
@@ -152,7 +152,7 @@ class Run : public SensorSink {
 
   // Threads.
 
-  /// The input ends with its last thread, whatever ends it.
+  /// The input ends with its last thread, for whatever reason that thread ends.
   void sensorEnded() {
     if (sensing_.fetch_sub(1) > 1) return;
     expectEnd();
@@ -220,14 +220,14 @@ class Run : public SensorSink {
     return sensing_.load() == 0 &&
            std::ranges::all_of(graph_.nodes(), [](const Node* node) { return node->done(); });
   }
-  /// Those behind a thread that stands still have what is left of the time.
+  /// Abandons stuck nodes, so that those behind them can use the remaining time.
   void abandonStuck() {
     for (Node* node : graph_.nodes()) {
       if (!node->done() && monotonicNow() - node->heart().read().last > kStandsStill) node->abandon();
     }
   }
 
-  /// Of the stop; then who stands still is not waited for any more.
+  /// Time after a stop request from which stuck threads are abandoned.
   static constexpr Duration kPatience = Duration::fromMilliseconds(1000);
   static constexpr Duration kStandsStill = Duration::fromMilliseconds(500);
 
@@ -250,7 +250,7 @@ ThreadedReport runThreaded(SensorInput& input, Graph& graph, const ThreadedOptio
                            const RunControl& control) {
   auto run = std::make_unique<Run>(input, graph, options, control);
   ThreadedReport report = (*run)();
-  // Leaked on purpose: a thread that is stuck may go on at any time.
+  // Leaked on purpose: a stuck thread may continue at any time.
   if (report.left_behind) static_cast<void>(run.release());
   return report;
 }
